@@ -55,13 +55,13 @@ void find_axes(const comm::Communicator& comm, const std::vector<Vec3>& centres,
     moments.assign(9 * groups.size(), 0.0);
   });
   for (std::size_t e = 0; e < centres.size(); ++e) {
-    double* sum = sums.data() + 4 * static_cast<std::size_t>(group_of[e]);
+    double* sum = sums.data() + 4 * group_of[e];
     sum[0] += 1;
     for (std::size_t k = 0; k < 3; ++k) sum[1 + k] += centres[e][k];
   }
   comm.sum(sums);
   for (std::size_t e = 0; e < centres.size(); ++e) {
-    const auto g = static_cast<std::size_t>(group_of[e]);
+    const std::size_t g = group_of[e];
     const Eigen::Vector3d arm = to_vector(centres[e]) - Eigen::Vector3d(sums[4 * g + 1], sums[4 * g + 2], sums[4 * g + 3]) / sums[4 * g];
     Eigen::Map<Eigen::Matrix3d>(moments.data() + 9 * g) += arm * arm.transpose();
   }
@@ -89,7 +89,7 @@ Cuts find_cuts(const comm::Communicator& comm, const std::vector<std::uint64_t>&
   });
   const auto count_below = [&](const std::vector<std::uint64_t>& trial, std::vector<std::int64_t>& counts) {
     for (std::size_t e = 0; e < key.size(); ++e) {
-      const auto g = static_cast<std::size_t>(group_of[e]);
+      const std::size_t g = group_of[e];
       counts[g] += key[e] < trial[g];
     }
   };
@@ -100,7 +100,7 @@ Cuts find_cuts(const comm::Communicator& comm, const std::vector<std::uint64_t>&
   for (std::size_t g = 0; g < wanted.size(); ++g) wanted[g] -= below[g];
   cuts.tie = comm::find_places(comm, 32, wanted, [&](const std::vector<std::uint64_t>& trial, std::vector<std::int64_t>& counts) {
     for (std::size_t e = 0; e < key.size(); ++e) {
-      const auto g = static_cast<std::size_t>(group_of[e]);
+      const std::size_t g = group_of[e];
       counts[g] += key[e] == cuts.cut[g] && static_cast<std::uint64_t>(first_element) + e < trial[g];
     }
   });
@@ -119,7 +119,7 @@ std::vector<Group> split(const std::vector<Group>& groups, const Cuts& cuts, con
     halves.push_back({.first_rank = group.first_rank + left_ranks, .ranks = group.ranks - left_ranks});
   }
   for (std::size_t e = 0; e < key.size(); ++e) {
-    const auto g = static_cast<std::size_t>(group_of[e]);
+    const std::size_t g = group_of[e];
     const bool is_right = groups[g].ranks > 1 && !cuts.is_left(g, key[e], first_element + static_cast<std::int64_t>(e));
     group_of[e] = left_half[g] + is_right;
   }
@@ -139,12 +139,11 @@ std::vector<std::int32_t> bisect(const comm::Communicator& comm, const std::vect
   });
   while (std::any_of(groups.begin(), groups.end(), [](const Group& group) { return group.ranks > 1; })) {
     find_axes(comm, centres_m, group_of, groups);
-    for (std::size_t e = 0; e < key.size(); ++e)
-      key[e] = make_key(groups[static_cast<std::size_t>(group_of[e])].axis.dot(to_vector(centres_m[e])));
+    for (std::size_t e = 0; e < key.size(); ++e) key[e] = make_key(groups[group_of[e]].axis.dot(to_vector(centres_m[e])));
     const Cuts cuts = find_cuts(comm, key, first_element, group_of, groups);
     groups = comm.agree([&] { return split(groups, cuts, key, first_element, group_of); });
   }
-  for (std::int32_t& group : group_of) group = groups[static_cast<std::size_t>(group)].first_rank;
+  for (std::int32_t& group : group_of) group = groups[group].first_rank;
   return group_of;
 }
 

@@ -50,7 +50,7 @@ class Dominators {
     for (const std::int32_t u : near) mark(u) = 0;
   }
 
-  char& mark(std::int32_t vertex) { return mark_[static_cast<std::size_t>(vertex)]; }
+  char& mark(std::int32_t vertex) { return mark_[vertex]; }
   /// Of the vertices with this mark the one with the fewest neighbours; -1: none.
   std::int32_t find_least(std::span<const std::int32_t> vertices, char wanted) {
     std::int32_t least = -1;
@@ -71,7 +71,7 @@ class Dominators {
     const std::size_t count = graph_.list_neighbours(v).size();
     if (near.size() < count || (near.size() == count && u > v)) return false;
     std::size_t common = 1;  // v
-    for (const std::int32_t w : near) common += mark_[static_cast<std::size_t>(w)] != 0 ? 1 : 0;
+    for (const std::int32_t w : near) common += mark_[w] != 0 ? 1 : 0;
     return common == count;
   }
 
@@ -100,13 +100,13 @@ class ElementDominators {
     std::int32_t before = 0;  // elements of v
     for (const std::int32_t e : of_v) {
       for (const std::int32_t u : get(e))
-        if (u >= 0) shared_[static_cast<std::size_t>(u)] += shared_[static_cast<std::size_t>(u)] == before ? 1 : 0;
+        if (u >= 0) shared_[u] += shared_[u] == before ? 1 : 0;
       ++before;
     }
     for (const std::int32_t u : get(of_v.front())) {
       if (u < 0) continue;
       const std::size_t count = lists_.of(u).size();
-      if (std::exchange(shared_[static_cast<std::size_t>(u)], 0) == before && u != v && (count > of_v.size() || u < v)) list.push_back(u);
+      if (std::exchange(shared_[u], 0) == before && u != v && (count > of_v.size() || u < v)) list.push_back(u);
     }
   }
   std::span<const std::int32_t> get(std::int32_t e) const { return elements_.subspan(static_cast<std::size_t>(e) * width_, width_); }
@@ -139,7 +139,7 @@ Condensation::Condensation(std::span<const std::int32_t> elements, int width, st
   }
   Ints of_core(elements.begin(), elements.end());
   for (std::int32_t& node : of_core)
-    if (node >= 0) node = number_[static_cast<std::size_t>(node)];
+    if (node >= 0) node = number_[node];
   core_ = make_node_graph(of_core, width, static_cast<std::int32_t>(kept.size()));
 }
 
@@ -157,7 +157,7 @@ Ints Condensation::choose_core(const Ints& offsets, const Ints& dominators, std:
   }
   for (std::size_t v = 0; v < number_.size(); ++v) {
     for (std::int32_t k = offsets[v]; k < offsets[v + 1]; ++k) {
-      const std::int32_t host = number_[static_cast<std::size_t>(dominators[static_cast<std::size_t>(k)])];
+      const std::int32_t host = number_[dominators[k]];
       if (host >= 0) hosts_.push_back(host);
     }
     offsets_.push_back(static_cast<std::int32_t>(hosts_.size()));
@@ -173,9 +173,8 @@ double Condensation::dominated_per_edge() const {
 Ints Condensation::expand_sides(const Ints& side) const {
   Ints result(number_.size(), 2);
   for (std::size_t v = 0; v < number_.size(); ++v) {
-    if (number_[v] >= 0) result[v] = side[static_cast<std::size_t>(number_[v])];
-    for (std::int32_t k = offsets_[v]; k < offsets_[v + 1]; ++k)
-      result[v] = std::min(result[v], side[static_cast<std::size_t>(hosts_[static_cast<std::size_t>(k)])]);
+    if (number_[v] >= 0) result[v] = side[number_[v]];
+    for (std::int32_t k = offsets_[v]; k < offsets_[v + 1]; ++k) result[v] = std::min(result[v], side[hosts_[k]]);
   }
   return result;
 }
@@ -183,8 +182,7 @@ Ints Condensation::expand_sides(const Ints& side) const {
 /// The place of the first vertex of the core that dominates this one.
 std::int32_t Condensation::find_first_host(std::int32_t vertex, const Ints& position) const {
   auto first = static_cast<std::int32_t>(position.size());
-  for (std::int32_t k = offsets_[static_cast<std::size_t>(vertex)]; k < offsets_[static_cast<std::size_t>(vertex) + 1]; ++k)
-    first = std::min(first, position[static_cast<std::size_t>(hosts_[static_cast<std::size_t>(k)])]);
+  for (std::int32_t k = offsets_[vertex]; k < offsets_[vertex + 1]; ++k) first = std::min(first, position[hosts_[k]]);
   return first;
 }
 
@@ -194,20 +192,18 @@ Ints Condensation::expand_order(const Ints& position) const {
   Ints last(position.size());
   for (std::size_t v = 0; v < number_.size(); ++v) {
     if (number_[v] >= 0) {
-      last[static_cast<std::size_t>(position[static_cast<std::size_t>(number_[v])])] = static_cast<std::int32_t>(v);
+      last[position[number_[v]]] = static_cast<std::int32_t>(v);
       continue;
     }
-    dominated[static_cast<std::size_t>(find_first_host(static_cast<std::int32_t>(v), position))].push_back(static_cast<std::int32_t>(v));
+    dominated[find_first_host(static_cast<std::int32_t>(v), position)].push_back(static_cast<std::int32_t>(v));
   }
   Ints result(number_.size());
   std::int32_t next = 0;
   for (std::size_t place = 0; place < position.size(); ++place) {
     Ints& before = dominated[place];
-    std::stable_sort(before.begin(), before.end(), [&](std::int32_t a, std::int32_t b) {
-      return degree_[static_cast<std::size_t>(a)] < degree_[static_cast<std::size_t>(b)];
-    });
-    for (const std::int32_t v : before) result[static_cast<std::size_t>(v)] = next++;
-    result[static_cast<std::size_t>(last[place])] = next++;
+    std::stable_sort(before.begin(), before.end(), [&](std::int32_t a, std::int32_t b) { return degree_[a] < degree_[b]; });
+    for (const std::int32_t v : before) result[v] = next++;
+    result[last[place]] = next++;
   }
   return result;
 }
@@ -222,22 +218,21 @@ double estimate_operations(const Graph& core, double dominated_per_edge, const I
   Ints at(count);
   std::vector<double> width(count, 1.0);  // (places) what is eliminated there
   for (std::size_t v = 0; v < count; ++v) {
-    at[static_cast<std::size_t>(position[v])] = static_cast<std::int32_t>(v);
+    at[position[v]] = static_cast<std::int32_t>(v);
     for (const std::int32_t u : core.list_neighbours(static_cast<std::int32_t>(v)))
-      if (position[static_cast<std::size_t>(u)] > position[v]) width[static_cast<std::size_t>(position[v])] += dominated_per_edge;
+      if (position[u] > position[v]) width[position[v]] += dominated_per_edge;
   }
   // Row by row of the factor: the places on the ways up the elimination tree from the neighbours before (Liu 1990).
   std::vector<double> below(count, 0.0);
   Ints parent(count, -1);
   Ints seen_from(count, -1);
   for (std::int32_t row = 0; row < static_cast<std::int32_t>(count); ++row) {
-    seen_from[static_cast<std::size_t>(row)] = row;
-    for (const std::int32_t u : core.list_neighbours(at[static_cast<std::size_t>(row)])) {
-      if (position[static_cast<std::size_t>(u)] > row) continue;
-      for (auto place = static_cast<std::size_t>(position[static_cast<std::size_t>(u)]); seen_from[place] != row;
-           place = static_cast<std::size_t>(parent[place])) {
+    seen_from[row] = row;
+    for (const std::int32_t u : core.list_neighbours(at[row])) {
+      if (position[u] > row) continue;
+      for (auto place = static_cast<std::size_t>(position[u]); seen_from[place] != row; place = static_cast<std::size_t>(parent[place])) {
         seen_from[place] = row;
-        below[place] += width[static_cast<std::size_t>(row)];
+        below[place] += width[row];
         if (parent[place] < 0) parent[place] = row;
       }
     }

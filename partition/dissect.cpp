@@ -30,12 +30,12 @@ class Dissector {
   Dissector(const Graph& graph, std::int32_t largest_gathered)
       : graph_(graph), largest_gathered_(largest_gathered), side_(static_cast<std::size_t>(graph.vertex_count()), -1), number_(side_) {
     cluster_ = make_clusters(graph, graph.vertex_count() <= largest_gathered ? 1 : std::min(kClusters, graph.vertex_count() / 4));
-    place_of_cluster_.assign(static_cast<std::size_t>(cluster_.empty() ? 0 : *std::max_element(cluster_.begin(), cluster_.end()) + 1), -1);
-    result_.position.assign(static_cast<std::size_t>(graph.vertex_count()), 0);
+    place_of_cluster_.assign(cluster_.empty() ? 0 : *std::max_element(cluster_.begin(), cluster_.end()) + 1, -1);
+    result_.position.assign(graph.vertex_count(), 0);
   }
 
   Dissection run(int parts) {
-    Ints all(static_cast<std::size_t>(graph_.vertex_count()));
+    Ints all(graph_.vertex_count());
     std::iota(all.begin(), all.end(), 0);
     cut(all, parts);
     return std::move(result_);
@@ -56,7 +56,7 @@ class Dissector {
       for (const std::int32_t v : cover_edges(list_cut_edges(vertices))) side_[v] = 2;
     }
     std::array<Ints, 3> sides;
-    for (const std::int32_t v : vertices) sides[static_cast<std::size_t>(side_[v])].push_back(v);
+    for (const std::int32_t v : vertices) sides[side_[v]].push_back(v);
     for (const std::int32_t v : vertices) side_[v] = -1;
     cut(sides[0], left_parts);
     cut(sides[1], parts - left_parts);
@@ -130,7 +130,7 @@ class Dissector {
 };
 
 Ints separate_core(Graph core, double dominated_per_edge, int tries, int seed) {
-  Ints side(static_cast<std::size_t>(core.vertex_count()), 0);
+  Ints side(core.vertex_count(), 0);
   if (core.neighbours.empty()) {
     for (std::size_t v = 0; v < side.size(); ++v) side[v] = 2 * v < side.size() ? 0 : 1;
     return side;
@@ -156,7 +156,7 @@ std::vector<std::int32_t> separate(const Graph& graph, int tries, int seed, std:
 }
 
 std::vector<std::int32_t> make_clusters(const Graph& graph, std::int32_t count) {
-  Ints cluster(static_cast<std::size_t>(graph.vertex_count()), 0);
+  Ints cluster(graph.vertex_count(), 0);
   if (count <= 1 || graph.neighbours.empty()) return cluster;
   MetisOptions options = make_metis_options();
   Graph copy = graph;

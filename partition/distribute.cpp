@@ -183,7 +183,7 @@ LocalMesh make_local_mesh(const mesh::TetMesh& mesh, Plan& plan, int rank) {
   local.tet_in_mesh = elements;
   local.tets.reserve(elements.size() * mesh.nodes_per_tet());
   for (const std::int32_t e : elements) {
-    local.region.push_back(static_cast<std::size_t>(e) < mesh.regions.size() ? mesh.regions[e] : 0);
+    local.region.push_back(e < std::ssize(mesh.regions) ? mesh.regions[e] : 0);
     for (const std::int32_t node : mesh.tet(e)) local.tets.push_back(plan.local[node]);
   }
   for (const std::int32_t node : touched) plan.local[node] = -1;

@@ -71,7 +71,7 @@ LocalMesh deserialise(const std::vector<std::byte>& bytes) {
   for_each_array(local, [&](auto& array) {
     std::int64_t length = 0;
     take(&length, sizeof length);
-    array.resize(static_cast<std::size_t>(length));
+    array.resize(length);
     take(array.data(), count_bytes(array));
   });
   return local;
@@ -108,8 +108,8 @@ std::vector<Vec3> find_supporting_points(const std::vector<Vec3>& points_m) {
 }
 
 std::vector<std::vector<Vec3>> find_supporting_points(const std::vector<FixedPoint>& points, std::int32_t components) {
-  std::vector<std::vector<Vec3>> points_m(static_cast<std::size_t>(components));
-  for (const FixedPoint& point : points) points_m[static_cast<std::size_t>(point.component)].push_back(point.x_m);
+  std::vector<std::vector<Vec3>> points_m(components);
+  for (const FixedPoint& point : points) points_m[point.component].push_back(point.x_m);
   for (auto& list : points_m) list = find_supporting_points(list);
   return points_m;
 }

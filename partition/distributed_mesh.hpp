@@ -33,7 +33,7 @@ struct LocalMesh {
   int nodes_per_tet() const { return order == 1 ? 4 : 10; }
   /// The nodes of tetrahedron e, in this rank's numbers.
   std::span<const std::int32_t> get_tet(std::int32_t e) const {
-    const auto width = static_cast<std::size_t>(nodes_per_tet());
+    const std::size_t width = nodes_per_tet();
     return {&tets[static_cast<std::size_t>(e) * width], width};
   }
   std::int32_t tet_count() const { return static_cast<std::int32_t>(tet_in_mesh.size()); }

@@ -32,8 +32,8 @@ void level_elements(const comm::Communicator& comm, std::vector<std::int32_t>& r
   std::vector<std::vector<std::uint64_t>> keys;  // (ranks) of the elements of each, ascending
   std::vector<std::int64_t> counts;
   comm.agree([&] {
-    keys.resize(static_cast<std::size_t>(comm.size()));
-    for (std::size_t e = 0; e < rank.size(); ++e) keys[static_cast<std::size_t>(rank[e])].push_back(make_key(position[e]));
+    keys.resize(comm.size());
+    for (std::size_t e = 0; e < rank.size(); ++e) keys[rank[e]].push_back(make_key(position[e]));
     for (std::vector<std::uint64_t>& list : keys) {
       std::sort(list.begin(), list.end());
       counts.push_back(static_cast<std::int64_t>(list.size()));
@@ -42,27 +42,27 @@ void level_elements(const comm::Communicator& comm, std::vector<std::int32_t>& r
   comm.sum(counts);
   std::vector<Transfer> transfers;
   std::vector<std::int64_t> wanted;
-  std::vector<std::size_t> first(static_cast<std::size_t>(comm.size()) + 1, 0);  // transfer of each rank
+  std::vector<std::size_t> first(comm.size() + 1, 0);  // transfer of each rank
   comm.agree([&] {
     transfers = plan_transfers(counts);
     for (const Transfer& one : transfers) {
       wanted.push_back(one.end);
-      ++first[static_cast<std::size_t>(one.from) + 1];
+      ++first[one.from + 1];
     }
     std::partial_sum(first.begin(), first.end(), first.begin());
   });
   const std::vector<std::uint64_t> cut =
       comm::find_places(comm, 32, wanted, [&](const std::vector<std::uint64_t>& trial, std::vector<std::int64_t>& below) {
         for (std::size_t k = 0; k < transfers.size(); ++k) {
-          const std::vector<std::uint64_t>& list = keys[static_cast<std::size_t>(transfers[k].from)];
+          const std::vector<std::uint64_t>& list = keys[transfers[k].from];
           below[k] += std::lower_bound(list.begin(), list.end(), trial[k]) - list.begin();
         }
       });
   for (std::size_t e = 0; e < rank.size(); ++e) {
-    const auto begin = cut.begin() + static_cast<std::ptrdiff_t>(first[static_cast<std::size_t>(rank[e])]);
-    const auto end = cut.begin() + static_cast<std::ptrdiff_t>(first[static_cast<std::size_t>(rank[e]) + 1]);
+    const auto begin = cut.begin() + static_cast<std::ptrdiff_t>(first[rank[e]]);
+    const auto end = cut.begin() + static_cast<std::ptrdiff_t>(first[rank[e] + 1]);
     const auto goes = std::upper_bound(begin, end, make_key(position[e]));
-    if (goes != end) rank[e] = transfers[static_cast<std::size_t>(goes - cut.begin())].to;
+    if (goes != end) rank[e] = transfers[goes - cut.begin()].to;
   }
 }
 

@@ -143,11 +143,11 @@ Graph make_dual_graph(std::span<const std::int32_t> corners) {
     if (v[1] < v[0]) std::swap(v[0], v[1]);
     return v;
   };
-  std::vector<std::int64_t> begin(static_cast<std::size_t>(nodes) + 1, 0);
+  std::vector<std::int64_t> begin(nodes + 1, 0);
   for (std::int32_t e = 0; e < elements; ++e)
     for (const auto& local : kFaceCorners) ++begin[make_face(e, local)[0] + 1];
   std::partial_sum(begin.begin(), begin.end(), begin.begin());
-  std::vector<Face> faces(4 * static_cast<std::size_t>(elements));
+  std::vector<Face> faces(4 * elements);
   {
     std::vector<std::int64_t> next(begin.begin(), begin.end() - 1);
     for (std::int32_t e = 0; e < elements; ++e)
@@ -174,9 +174,9 @@ Graph make_dual_graph(std::span<const std::int32_t> corners) {
     }
   }
   Graph graph;
-  graph.offsets.reserve(static_cast<std::size_t>(elements) + 1);
+  graph.offsets.reserve(elements + 1);
   graph.offsets.push_back(0);
-  graph.neighbours.reserve(4 * static_cast<std::size_t>(elements));
+  graph.neighbours.reserve(4 * elements);
   for (std::int32_t e = 0; e < elements; ++e) {
     const auto first = neighbours[e].begin();
     std::sort(first, first + degree[e]);
@@ -189,7 +189,7 @@ Graph make_dual_graph(std::span<const std::int32_t> corners) {
 ElementLists list_elements(std::span<const std::int32_t> elements, int width, std::int32_t nodes) {
   const std::size_t entries = elements.size() / width * width;
   ElementLists lists;
-  lists.begin.assign(static_cast<std::size_t>(nodes) + 1, 0);
+  lists.begin.assign(nodes + 1, 0);
   for (std::size_t i = 0; i < entries; ++i)
     if (elements[i] >= 0) ++lists.begin[elements[i] + 1];
   std::partial_sum(lists.begin.begin(), lists.begin.end(), lists.begin.begin());
@@ -204,7 +204,7 @@ Graph make_node_graph(std::span<const std::int32_t> elements, int width, std::in
   // For every node the other nodes of its elements, each once.
   const ElementLists lists = list_elements(elements, width, nodes);
   Graph graph;
-  graph.offsets.reserve(static_cast<std::size_t>(nodes) + 1);
+  graph.offsets.reserve(nodes + 1);
   graph.offsets.push_back(0);
   std::vector<std::int32_t> seen_from(nodes, -1);
   std::vector<std::int32_t> near;

@@ -20,8 +20,8 @@ struct Graph {
 
   std::int32_t vertex_count() const { return offsets.empty() ? 0 : static_cast<std::int32_t>(offsets.size()) - 1; }
   std::span<const std::int32_t> list_neighbours(std::int32_t vertex) const {
-    const std::int32_t* first = neighbours.data() + offsets[static_cast<std::size_t>(vertex)];
-    return {first, neighbours.data() + offsets[static_cast<std::size_t>(vertex) + 1]};
+    const std::int32_t* first = neighbours.data() + offsets[vertex];
+    return {first, neighbours.data() + offsets[vertex + 1]};
   }
 };
 
@@ -48,8 +48,8 @@ struct ElementLists {
   std::vector<std::int32_t> items;  // ascending for each node
 
   std::span<const std::int32_t> of(std::int32_t node) const {
-    const std::int32_t* first = items.data() + begin[static_cast<std::size_t>(node)];
-    return {first, items.data() + begin[static_cast<std::size_t>(node) + 1]};
+    const std::int32_t* first = items.data() + begin[node];
+    return {first, items.data() + begin[node + 1]};
   }
 };
 /// elements: (E, width) node indices in [0, nodes); negative entries are skipped.

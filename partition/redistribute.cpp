@@ -80,7 +80,7 @@ Nodes find_nodes(Elements& elements, std::size_t width) {
   for (std::size_t i = 0; i < elements.tets.size(); ++i) parts.join(elements.tets[i / width * width], elements.tets[i]);
   nodes.group.resize(nodes.number.size());
   for (std::size_t i = 0; i < nodes.number.size(); ++i) {  // the root is the lowest, and comes first
-    const auto root = static_cast<std::size_t>(parts.find(static_cast<std::int32_t>(i)));
+    const std::size_t root = parts.find(static_cast<std::int32_t>(i));
     if (root == i) nodes.lowest.push_back(nodes.number[i]);
     nodes.group[i] = root == i ? static_cast<std::int32_t>(nodes.lowest.size()) - 1 : nodes.group[root];
   }
@@ -134,7 +134,7 @@ std::vector<std::int32_t> join_groups(const std::vector<Link>& links, const std:
   std::vector<std::int32_t> root(lowest_node.size()), lowest(lowest_node.size(), INT32_MAX);
   for (std::size_t g = 0; g < root.size(); ++g) {
     root[g] = parts.find(static_cast<std::int32_t>(g));
-    auto& low = lowest[static_cast<std::size_t>(root[g])];
+    auto& low = lowest[root[g]];
     low = std::min(low, lowest_node[g]);
   }
   std::vector<std::pair<std::int32_t, std::int32_t>> roots;  // lowest node, group
@@ -143,8 +143,8 @@ std::vector<std::int32_t> join_groups(const std::vector<Link>& links, const std:
   std::sort(roots.begin(), roots.end());
   count = static_cast<std::int32_t>(roots.size());
   std::vector<std::int32_t> of_root(lowest_node.size(), -1), component;
-  for (std::int32_t i = 0; i < count; ++i) of_root[static_cast<std::size_t>(roots[static_cast<std::size_t>(i)].second)] = i;
-  for (const std::int32_t one : root) component.push_back(of_root[static_cast<std::size_t>(one)]);
+  for (std::int32_t i = 0; i < count; ++i) of_root[roots[i].second] = i;
+  for (const std::int32_t one : root) component.push_back(of_root[one]);
   return component;
 }
 
@@ -174,13 +174,13 @@ LocalMesh make_local_mesh(int rank, int order, Elements& elements, const std::ve
   std::iota(sorted.begin(), sorted.end(), 0);
   const auto kind = [&](const LocalNode& node) { return node.answer.owner != rank ? 2 : node.answer.fixed != 0 ? 1 : 0; };
   std::sort(sorted.begin(), sorted.end(), [&](std::int32_t i, std::int32_t j) {
-    const LocalNode &a = nodes[static_cast<std::size_t>(i)], &b = nodes[static_cast<std::size_t>(j)];
+    const LocalNode &a = nodes[i], &b = nodes[j];
     return std::pair(kind(a), a.number) < std::pair(kind(b), b.number);
   });
   std::vector<std::int32_t> place(nodes.size());
   for (std::size_t i = 0; i < sorted.size(); ++i) {
-    const LocalNode& node = nodes[static_cast<std::size_t>(sorted[i])];
-    place[static_cast<std::size_t>(sorted[i])] = static_cast<std::int32_t>(i);
+    const LocalNode& node = nodes[sorted[i]];
+    place[sorted[i]] = static_cast<std::int32_t>(i);
     local.nodes_m.push_back(node.answer.x_m);
     local.node_in_mesh.push_back(node.number);
     local.component.push_back(node.component);
@@ -191,7 +191,7 @@ LocalMesh make_local_mesh(int rank, int order, Elements& elements, const std::ve
   }
   local.row.assign(nodes.size(), -1);
   local.tets = std::move(elements.tets);
-  for (std::int32_t& node : local.tets) node = place[static_cast<std::size_t>(node)];
+  for (std::int32_t& node : local.tets) node = place[node];
   local.tet_in_mesh = std::move(elements.number);
   local.region = std::move(elements.region);
   return local;
@@ -208,7 +208,7 @@ void number_rows(const comm::Communicator& comm, const MeshBlock& block, const s
       if (on_seam[i] != 0) rows.push_back({local.node_in_mesh[i], local.row[i]});
     return rows;
   };
-  for (std::int32_t i = 0; i < local.free_nodes; ++i) local.row[static_cast<std::size_t>(i)] = local.first_row + i;
+  for (std::int32_t i = 0; i < local.free_nodes; ++i) local.row[i] = local.first_row + i;
   const auto shared = comm::all_to_all(comm, list_shared_rows, [&](const Row& row) { return block.find_owner(row.node); });
   const auto halo = comm.agree([&] { return std::vector(local.node_in_mesh.begin() + local.owned_nodes, local.node_in_mesh.end()); });
   const auto find_rows = [&](const comm::ByRank<std::int32_t>& nodes) {
@@ -253,7 +253,7 @@ DistributedMesh redistribute(const comm::Communicator& comm, const std::string& 
   out.local = comm.agree([&] {
     std::vector<LocalNode> list;
     for (std::size_t i = 0; i < nodes.number.size(); ++i)
-      list.push_back({nodes.number[i], component[static_cast<std::size_t>(groups.own_begin() + nodes.group[i])], answers[i]});
+      list.push_back({nodes.number[i], component[groups.own_begin() + nodes.group[i]], answers[i]});
     return make_local_mesh(comm.rank(), block.order, elements, list, on_seam);
   });
   const comm::IndexPartition rows(comm, out.local.free_nodes);

@@ -31,7 +31,7 @@ std::string read_from(const fs::path& file, off_t& from, off_t max) {
   if (fd < 0) return bytes;
   struct stat info {};
   if (::fstat(fd, &info) == 0 && S_ISREG(info.st_mode) && info.st_size > from) {
-    bytes.resize(static_cast<std::size_t>(std::min(max, info.st_size - from)));
+    bytes.resize(std::min(max, info.st_size - from));
     const ssize_t got = ::pread(fd, bytes.data(), bytes.size(), from);
     bytes.resize(got > 0 ? static_cast<std::size_t>(got) : 0);
     from += static_cast<off_t>(bytes.size());

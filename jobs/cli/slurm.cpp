@@ -66,7 +66,7 @@ void follow_slurm(Shared& shared) {
 
 std::size_t hand_over_to_slurm(Shared& shared) {
   const std::vector<Job> jobs = hand_over(shared);
-  return static_cast<std::size_t>(std::count_if(jobs.begin(), jobs.end(), [](const Job& job) { return !job.slurm_job.empty(); }));
+  return std::count_if(jobs.begin(), jobs.end(), [](const Job& job) { return !job.slurm_job.empty(); });
 }
 
 queue::CommandResult cancel_in_slurm(Shared& shared, const store::Id& id) {

@@ -43,7 +43,7 @@ std::string format_counts(const std::vector<registry::Job>& jobs) {
 }
 
 std::string format_bar(double percent) {
-  const auto full = static_cast<std::size_t>(std::lround(percent / 100.0 * kBarWidth));
+  const std::size_t full = std::lround(percent / 100.0 * kBarWidth);
   return "[" + std::string(full, '#') + std::string(kBarWidth - full, '.') + "]";
 }
 

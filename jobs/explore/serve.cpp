@@ -232,7 +232,7 @@ class Connection {
           ::pread(answer_.file.get(), buffer.data(), std::min<std::uint64_t>(kPiece, answer_.left), static_cast<off_t>(answer_.at));
       if (count <= 0) return false;  // a file cut meanwhile
       from = buffer.data();
-      length = static_cast<std::size_t>(count);
+      length = count;
     }
     if (length > 0) {
       const ssize_t sent = ::send(socket(), from, length, MSG_NOSIGNAL | (is_head && answer_.left > 0 ? MSG_MORE : 0));

@@ -53,7 +53,7 @@ double calc_memory(const Need& need, int ranks) {
   if (need.memory_gb > 0.0) return need.memory_gb;
   if (need.predicted_gb.empty()) return std::max(kUnknownGb, need.min_gb);
   // Between the powers of two that were predicted the larger of both; beyond them the last.
-  const auto place = static_cast<std::size_t>(std::max(0.0, std::log2(std::max(1, ranks))));
+  const std::size_t place = std::max(0.0, std::log2(std::max(1, ranks)));
   const std::size_t last = need.predicted_gb.size() - 1;
   const bool is_power = (ranks & (ranks - 1)) == 0;
   const double predicted_gb =

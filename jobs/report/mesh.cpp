@@ -38,7 +38,7 @@ SurfaceQuality measure_surface(const bank::Bank& bank) {
     std::array<double, 3> edge{};
     bool is_inside = true;
     for (std::size_t i = 0; i < 3; ++i) {
-      const auto a = static_cast<std::size_t>(triangle[i]), b = static_cast<std::size_t>(triangle[(i + 1) % 3]);
+      const std::size_t a = triangle[i], b = triangle[(i + 1) % 3];
       is_inside = is_inside && a < bank.vertices_m.size() && b < bank.vertices_m.size();
       if (!is_inside) break;
       const Vec3 &x = bank.vertices_m[a], &y = bank.vertices_m[b];

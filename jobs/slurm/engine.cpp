@@ -158,7 +158,7 @@ std::vector<Job> Engine::hand_over(registry::Registry& registry, const FindNeeds
   } else {
     for (std::size_t i = 0; i < short_jobs.size(); ++i) add_alone(short_jobs[i], short_needs[i]);
   }
-  const auto most = static_cast<std::size_t>(max_tasks);
+  const std::size_t most = max_tasks;
   for (const auto& [needs, jobs] : alike) {
     for (std::size_t at = 0; at < jobs.size(); at += most) {
       const Rows part(jobs.begin() + static_cast<std::ptrdiff_t>(at),

@@ -22,7 +22,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 double find_memory(const PackJob& job, int ranks) {
   if (job.memory_gb.empty()) return 0.0;
-  const auto place = static_cast<std::size_t>(std::ceil(std::log2(std::max(1, ranks))));
+  const std::size_t place = std::ceil(std::log2(std::max(1, ranks)));
   return job.memory_gb[std::min(place, job.memory_gb.size() - 1)];
 }
 
@@ -35,7 +35,7 @@ std::size_t count_tasks(const std::vector<PackJob>& jobs, double work_s, const M
   const double rounds = std::max(1.0, std::ceil(node_s / machine.nodes / terms.longest_s));
   const double worth = std::max(1.0, std::floor(node_s / (kStartsWorth * terms.start_s)));
   const double max = std::min(static_cast<double>(std::max(1, terms.max_tasks)), static_cast<double>(jobs.size()));
-  return static_cast<std::size_t>(std::min({machine.nodes * rounds, worth, max}));
+  return std::min({machine.nodes * rounds, worth, max});
 }
 
 /// The fewest that keep the job within `limit_s`, as far as more are worth it.
@@ -142,7 +142,7 @@ PackPlan plan_packs(const std::vector<PackJob>& jobs, const Machine& machine, co
   for (const Placed& placed : all) {
     const auto least =
         std::min_element(loads.begin(), loads.end(), [&](const Load& a, const Load& b) { return calc_fill(a) < calc_fill(b); });
-    plan.tasks[static_cast<std::size_t>(least - loads.begin())].push_back(placed);
+    plan.tasks[least - loads.begin()].push_back(placed);
     least->core_s += placed.ranks * placed.seconds;
     least->memory_gb_s += placed.memory_gb * placed.seconds;
     least->jobs += 1;

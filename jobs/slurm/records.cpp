@@ -157,9 +157,9 @@ std::string read_output(const fs::path& root, const SubmittedJob& submitted) {
   if (!stream) return "";
   const std::streamoff size = stream.tellg();
   stream.seekg(std::max<std::streamoff>(0, size - kOutputTailBytes));
-  std::string text(static_cast<std::size_t>(std::min(size, kOutputTailBytes)), '\0');
+  std::string text(std::min(size, kOutputTailBytes), '\0');
   stream.read(text.data(), static_cast<std::streamsize>(text.size()));
-  text.resize(static_cast<std::size_t>(std::max<std::streamsize>(0, stream.gcount())));
+  text.resize(std::max<std::streamsize>(0, stream.gcount()));
   return text;
 }
 

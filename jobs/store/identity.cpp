@@ -130,7 +130,7 @@ Id copy_hashed(const fs::path& file, std::string_view what, const fs::path& targ
   const auto write_all = [&](std::string_view bytes) {
     while (!bytes.empty() && error == 0) {
       const ssize_t put = ::write(fd, bytes.data(), bytes.size());
-      if (put > 0) bytes.remove_prefix(static_cast<std::size_t>(put));
+      if (put > 0) bytes.remove_prefix(put);
       if (put < 0 && errno != EINTR) error = errno;
     }
     if (error != 0) throw_errno(target, "write", error);

@@ -126,7 +126,7 @@ JobOrder read_order(const fs::path& file) {
 JobOrder parse_order(std::string_view text, const fs::path& file, int first_line) {
   if (!job::is_simulation(text)) return {job::parse_job(text, file, job::BankKey::optional, first_line)};
   // Empty lines bring every value to its line of the file.
-  const std::string moved = std::string(static_cast<std::size_t>(first_line - 1), '\n') + std::string(text);
+  const std::string moved = std::string(first_line - 1, '\n') + std::string(text);
   return JobOrder(make_simulation(job::parse_simulation(moved, file), moved));
 }
 

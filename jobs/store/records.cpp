@@ -50,7 +50,7 @@ auto find_word(const Words& words, std::string_view word) {
 /// Values are in the order of their enumeration.
 template <class Words, class Value>
 std::string get_word(const Words& words, Value value) {
-  return std::string(words.at(static_cast<std::size_t>(value)).word);
+  return std::string(words.at(value).word);
 }
 
 std::optional<base::Object> read_root(const fs::path& file) {
@@ -98,7 +98,7 @@ std::string read_tail(const fs::path& file, off_t max) {
   if (fd < 0) return text;
   struct stat info {};
   if (::fstat(fd, &info) == 0 && S_ISREG(info.st_mode)) {
-    text.resize(static_cast<std::size_t>(std::min(max, info.st_size)));
+    text.resize(std::min(max, info.st_size));
     const ssize_t got = ::pread(fd, text.data(), text.size(), info.st_size - static_cast<off_t>(text.size()));
     text.resize(got > 0 ? static_cast<std::size_t>(got) : 0);
   }

@@ -320,7 +320,7 @@ void Circle::calc_deflections(const Point2& point_m, std::span<const Mode> modes
     cached_radius_ = r;
   }
   for (std::size_t i = 0; i < modes.size(); ++i) {
-    const auto place = static_cast<std::size_t>(modes[i].index[3]);
+    const std::size_t place = modes[i].index[3];
     if (std::isnan(cached_[place])) {
       const Radial& radial = radials_[place];
       cached_[place] = radial.bessel * calc_j(radial.m, radial.root * r);
@@ -337,11 +337,11 @@ la::Matrix Circle::calc_slope_products(std::span<const Mode> modes) const {
   const auto count = static_cast<Eigen::Index>(modes.size());
   la::Matrix products = la::Matrix::Zero(count, count);
   double largest = 1.0;
-  for (const Mode& mode : modes) largest = std::max(largest, radials_[static_cast<std::size_t>(mode.index[3])].root);
+  for (const Mode& mode : modes) largest = std::max(largest, radials_[mode.index[3]].root);
   const GaussRule rule = make_gauss_rule(30 + static_cast<int>(largest));
   la::Matrix w(static_cast<Eigen::Index>(rule.x.size()), count), bent = w;
   for (Eigen::Index j = 0; j < count; ++j) {
-    const Radial& radial = radials_[static_cast<std::size_t>(modes[static_cast<std::size_t>(j)].index[3])];
+    const Radial& radial = radials_[modes[j].index[3]];
     for (std::size_t k = 0; k < rule.x.size(); ++k) {
       const double j_part = radial.bessel * calc_j(radial.m, radial.root * rule.x[k]);
       const double i_part =
@@ -352,7 +352,7 @@ la::Matrix Circle::calc_slope_products(std::span<const Mode> modes) const {
   }
   for (Eigen::Index j = 0; j < count; ++j)
     for (Eigen::Index i = 0; i <= j; ++i) {
-      const auto &one = modes[static_cast<std::size_t>(i)].index, &other = modes[static_cast<std::size_t>(j)].index;
+      const auto &one = modes[i].index, &other = modes[j].index;
       if (one[0] != other[0] || one[2] != other[2]) continue;
       products(i, j) = products(j, i) = (one[0] == 0 ? 2.0 : 1.0) * pi * w.col(i).dot(bent.col(j));
     }
@@ -363,7 +363,7 @@ Net Circle::make_net(int grid) const { return make_disc_net(radius_m_, std::max(
 
 int Circle::choose_grid(std::span<const Mode> modes) const {
   double root = 1.0;
-  for (const Mode& mode : modes) root = std::max(root, radials_[static_cast<std::size_t>(mode.index[3])].root);
+  for (const Mode& mode : modes) root = std::max(root, radials_[mode.index[3]].root);
   return choose_flat_grid(2.0 * root / pi);
 }
 

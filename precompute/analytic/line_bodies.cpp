@@ -72,7 +72,7 @@ void String::calc_shapes(const Vec3& point_m, std::span<const Mode> modes, std::
   const double x = std::clamp(point_m[0] / length_m_, 0.0, 1.0), scale = std::sqrt(2.0 / (mass_kg_m_ * length_m_));
   for (std::size_t m = 0; m < modes.size(); ++m) {
     phi[m] = {0.0, 0.0, 0.0};
-    phi[m][static_cast<std::size_t>(modes[m].index[1])] = scale * std::sin(modes[m].index[0] * pi * x);
+    phi[m][modes[m].index[1]] = scale * std::sin(modes[m].index[0] * pi * x);
   }
 }
 
@@ -198,7 +198,7 @@ void Beam::add_timoshenko(Motion motion, double second_moment_m4, double high_hz
     weight << mass * unit + turning * first, -turning * turn, -turning * turn.transpose(), turning * unit;
     std::vector<la::Vector> conditions;
     for (int end = 0; end < 2; ++end) {
-      const job::Edge edge = body_.ends[static_cast<std::size_t>(end)];
+      const job::Edge edge = body_.ends[end];
       la::Vector deflection = la::Vector::Zero(2 * n), slope = la::Vector::Zero(2 * n);
       deflection.head(n) = calc_legendre(n, end);
       slope << calc_legendre(n, end, 1), -calc_legendre(n, end);
@@ -255,7 +255,7 @@ void Beam::calc_shapes(const Vec3& point_m, std::span<const Mode> modes, std::sp
   const double mass = density_kg_m3_ * area_m2_ * body_.length_m;
   la::Vector polynomials, derivatives;
   for (std::size_t m = 0; m < modes.size(); ++m) {
-    const Shape& shape = shapes_[static_cast<std::size_t>(modes[m].index[2])];
+    const Shape& shape = shapes_[modes[m].index[2]];
     const int motion = modes[m].index[0];
     if (motion == kBendingY || motion == kBendingZ) {
       const std::size_t axis = motion == kBendingY ? 1 : 2;
@@ -295,7 +295,7 @@ bank::QuarticEnergy Beam::calc_coupling(std::span<const Mode> modes, const mater
   int half_waves = 1, polynomials = 1;
   std::vector<const Shape*> shapes;
   for (const Mode& mode : modes) {
-    shapes.push_back(&shapes_[static_cast<std::size_t>(mode.index[2])]);
+    shapes.push_back(&shapes_[mode.index[2]]);
     half_waves = std::max(half_waves, mode.index[1] + 1);
     polynomials = std::max(polynomials, static_cast<int>(shapes.back()->deflection.size()));
   }
@@ -303,8 +303,8 @@ bank::QuarticEnergy Beam::calc_coupling(std::span<const Mode> modes, const mater
   const la::Matrix products = body_.is_timoshenko ? calc_products(polynomials, 1, 1) : la::Matrix();
   for (Eigen::Index j = 0; j < n; ++j)
     for (Eigen::Index i = 0; i <= j; ++i) {
-      if (modes[static_cast<std::size_t>(i)].index[0] != modes[static_cast<std::size_t>(j)].index[0]) continue;
-      const Shape &one = *shapes[static_cast<std::size_t>(i)], &other = *shapes[static_cast<std::size_t>(j)];
+      if (modes[i].index[0] != modes[j].index[0]) continue;
+      const Shape &one = *shapes[i], &other = *shapes[j];
       double sum = 0.0;
       if (body_.is_timoshenko) {
         const Eigen::Index count = std::min(one.deflection.size(), other.deflection.size());

@@ -47,7 +47,7 @@ class Beam : public KnownBody {
   void add_bending(Motion motion, double second_moment_m4, double high_hz, std::vector<Mode>& modes);
   void add_timoshenko(Motion motion, double second_moment_m4, double high_hz, std::vector<Mode>& modes);
   void add_waves(Motion motion, double speed_m_s, double high_hz, std::vector<Mode>& modes);
-  bool is_fixed(int end) const { return body_.ends[static_cast<std::size_t>(end)] != job::Edge::free; }
+  bool is_fixed(int end) const { return body_.ends[end] != job::Edge::free; }
 
   job::BeamBody body_;
   double young_pa_, shear_pa_, density_kg_m3_, poisson_ratio_;

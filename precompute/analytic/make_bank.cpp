@@ -90,8 +90,8 @@ Band find_band(KnownBody& body, const job::JobSpec& job) {
   proof.margin = {calc_margin(proof.cut_hz[0], before_hz, first_hz), calc_margin(proof.cut_hz[1], last_hz, next_hz)};
   proof.rigid_per_component = {body.rigid_modes};
   proof.method = body.method;
-  if (band.modes.size() > static_cast<std::size_t>(max_modes)) {
-    band.modes.resize(static_cast<std::size_t>(max_modes));
+  if (std::ssize(band.modes) > max_modes) {
+    band.modes.resize(max_modes);
     band.is_complete = false;
   }
   for (std::size_t m = 0; m < band.modes.size();) {
@@ -124,7 +124,7 @@ void set_damping(bank::Bank& bank, const KnownBody& body, const job::JobSpec& jo
   const ModesTable& table = measured->get_table();
   bool has_twins = false;
   for (std::size_t m = 0; m < modes.size(); ++m) {
-    const auto row = static_cast<std::size_t>(modes[m].index[0]);
+    const std::size_t row = modes[m].index[0];
     const double hz = to_hz(bank.eigenvalue_rad2_s2[m]);
     bank.decay_per_s.push_back(table.decay_per_s[row]);
     if (!bank.damping.freq_hz.empty() && hz <= bank.damping.freq_hz.back()) {
@@ -163,11 +163,11 @@ std::vector<std::int32_t> choose_coupled(const KnownBody& body, const job::Nonli
   std::vector<std::int32_t> chosen;
   for (std::size_t m = 0; m < modes.size(); ++m)
     if (body.is_coupled(modes[m]) && to_hz(modes[m].lambda_rad2_s2) <= asked.below_hz) chosen.push_back(static_cast<std::int32_t>(m));
-  auto kept = std::min(chosen.size(), static_cast<std::size_t>(asked.modes));
-  const auto get_lambda = [&](std::size_t i) { return modes[static_cast<std::size_t>(chosen[i])].lambda_rad2_s2; };
+  auto kept = std::min<std::size_t>(chosen.size(), asked.modes);
+  const auto get_lambda = [&](std::size_t i) { return modes[chosen[i]].lambda_rad2_s2; };
   if (kept < chosen.size()) {
     while (kept > 0 && get_lambda(kept) - get_lambda(kept - 1) <= kDegenerate * get_lambda(kept)) --kept;
-    if (kept == 0) kept = static_cast<std::size_t>(asked.modes);
+    if (kept == 0) kept = asked.modes;
   }
   chosen.resize(kept);
   return chosen;
@@ -181,7 +181,7 @@ void couple(const KnownBody& body, const job::JobSpec& job, const std::vector<Mo
     return;
   }
   std::vector<Mode> coupled;
-  for (const std::int32_t mode : chosen) coupled.push_back(modes[static_cast<std::size_t>(mode)]);
+  for (const std::int32_t mode : chosen) coupled.push_back(modes[mode]);
   bank::QuarticEnergy& energy = made.bank.quartic;
   energy = body.calc_coupling(coupled, job.material, job.nonlinear->is_stretch);
   energy.modes = chosen;

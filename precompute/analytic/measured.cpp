@@ -55,7 +55,7 @@ std::optional<Vec3> parse_point(std::string_view name) {
     if (word.empty()) continue;
     const std::optional<double> value = parse_number(word);
     if (!value || found == 3) return std::nullopt;
-    point[static_cast<std::size_t>(found++)] = *value;
+    point[found++] = *value;
   }
   return found == 3 ? std::optional(point) : std::nullopt;
 }
@@ -74,7 +74,7 @@ Columns read_names(const std::vector<std::string_view>& names, const std::string
   };
   int everywhere = -1;
   for (int i = 0; i < static_cast<int>(names.size()); ++i) {
-    const std::string_view name = names[static_cast<std::size_t>(i)];
+    const std::string_view name = names[i];
     if (name == "frequency_hz") {
       take(columns.freq, i, name);
     } else if (name == "decay_per_s") {
@@ -136,7 +136,7 @@ ModesTable read_modes_table(const std::filesystem::path& file) {
     }
     if (cells.size() != count) throw InputError(fmt::format("{}: {} values, and there are {} columns", place, cells.size(), count));
     const auto get = [&](int column) {
-      const std::string_view cell = cells[static_cast<std::size_t>(column)];
+      const std::string_view cell = cells[column];
       const std::optional<double> value = parse_number(cell);
       if (!value) throw InputError(fmt::format("{}: \"{}\" is no finite number", place, base::printable(cell.substr(0, kMaxShown))));
       return *value;
@@ -220,7 +220,7 @@ void MeasuredObject::calc_shapes(const Vec3& point_m, std::span<const Mode> mode
     if (const double now = std::abs(point_m[c] - centre_m_[c]) / half_m_[c]; now > out) out = now, axis = c;
   Vec3 normal{};
   normal[axis] = point_m[axis] < centre_m_[axis] ? -1.0 : 1.0;
-  for (std::size_t m = 0; m < modes.size(); ++m) phi[m] = table_.gains[static_cast<std::size_t>(modes[m].index[0])][nearest] * normal;
+  for (std::size_t m = 0; m < modes.size(); ++m) phi[m] = table_.gains[modes[m].index[0]][nearest] * normal;
 }
 
 ClosedSurface MeasuredObject::make_surface(int grid) const {

@@ -21,12 +21,12 @@ constexpr double kMaxWaves = 60.0;  // wave number times reach beyond which the 
 /// J at the orders first, first + 1, ..., (count), by Miller's downward recurrence, matched to the library's value at the larger of the two
 /// lowest.
 std::vector<double> calc_bessel(double first, int count, double x) {
-  std::vector<double> values(static_cast<std::size_t>(count), 0.0);
+  std::vector<double> values(count, 0.0);
   if (x <= 0.0) return values;
   const int start = std::max(count, static_cast<int>(x)) + 40;
   double next = 0.0, now = 1e-200, zero = 0.0, one = 0.0;
   for (int k = start; k >= 0; --k) {
-    if (k < count) values[static_cast<std::size_t>(k)] = now;
+    if (k < count) values[k] = now;
     if (k == 1) one = now;
     if (k == 0) zero = now;
     const double before = 2.0 * (first + k) / x * now - next;
@@ -73,7 +73,7 @@ bool is_regular(double angle) {
 
 std::optional<ParticularSolutions> ParticularSolutions::make(const std::vector<Point2>& p) {
   const std::vector<double> angles = calc_angles(p);
-  std::size_t corner = static_cast<std::size_t>(std::max_element(angles.begin(), angles.end()) - angles.begin());
+  std::size_t corner = std::max_element(angles.begin(), angles.end()) - angles.begin();
   std::size_t singular = 0;
   for (std::size_t i = 0; i < p.size(); ++i)
     if (!is_regular(angles[i])) corner = i, ++singular;
@@ -124,7 +124,7 @@ double ParticularSolutions::calc_sine(double kappa, int rank) const {
   const int rise = static_cast<int>(std::lround(q * alpha_));
   for (Eigen::Index row = 0; row < rows; ++row) {
     const bool is_rim = static_cast<std::size_t>(row) < rim_.size();
-    const auto& [radius, angle] = is_rim ? rim_[static_cast<std::size_t>(row)] : inside_[static_cast<std::size_t>(row) - rim_.size()];
+    const auto& [radius, angle] = is_rim ? rim_[row] : inside_[static_cast<std::size_t>(row) - rim_.size()];
     const double x = k * radius;
     for (int chain = 1; chain <= (has_chains ? std::min(q, count) : count); ++chain) {
       const double order = chain * alpha_, first = order - std::floor(order + 1e-9);
@@ -132,7 +132,7 @@ double ParticularSolutions::calc_sine(double kappa, int rank) const {
       const std::vector<double> values = calc_bessel(std::max(first, 0.0), skip + (members - 1) * rise + 2, x);
       for (int i = 0; i < members; ++i) {
         const int n = chain + i * q;
-        a(row, n - 1) = values[static_cast<std::size_t>(skip + i * rise)] * std::sin(n * alpha_ * angle);
+        a(row, n - 1) = values[skip + i * rise] * std::sin(n * alpha_ * angle);
       }
     }
   }

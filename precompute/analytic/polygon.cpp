@@ -76,7 +76,7 @@ Net Polygon::make_elements(double k, double edge_m) const {
   std::vector<double> longest(corners_m_.size(), 0.0);
   for (const Triangle& t : net.triangles)
     for (int c = 0; c < 3; ++c) {
-      const auto corner = static_cast<std::size_t>(t[c]);
+      const std::size_t corner = t[c];
       if (corner >= corners_m_.size()) continue;
       for (int other = 0; other < 3; ++other) {
         const Point2 &a = net.points_m[corner], &b = net.points_m[t[other]];
@@ -185,8 +185,7 @@ void Polygon::calc_deflections(const Point2& point_m, std::span<const Mode> mode
   const la::Vector values = basis_.calc(r, s) / std::sqrt(density_kg_m2_);
   for (std::size_t i = 0; i < modes.size(); ++i) {
     double sum = 0.0;
-    for (int n = 0; n < basis_.size(); ++n)
-      sum += values(n) * modes_.shapes(modes_.elements[t][static_cast<std::size_t>(n)], modes[i].index[0]);
+    for (int n = 0; n < basis_.size(); ++n) sum += values(n) * modes_.shapes(modes_.elements[t][n], modes[i].index[0]);
     w[i] = sum;
   }
 }

@@ -19,7 +19,7 @@ la::Vector calc_legendre(int n, double x, int order) {
     p[1](k) = p[1](k - 2) + (2 * k - 1) * p[0](k - 1);
     p[2](k) = p[2](k - 2) + (2 * k - 1) * p[1](k - 1);
   }
-  la::Vector& values = p[static_cast<std::size_t>(order)];
+  la::Vector& values = p[order];
   for (int k = 0; k < n; ++k) values(k) *= std::sqrt(2 * k + 1.0) * std::pow(2.0, order);
   return values;
 }

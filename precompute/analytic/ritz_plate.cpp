@@ -79,7 +79,7 @@ RitzPlate::Solved RitzPlate::solve(int x_polynomials, int y_polynomials, double 
   std::vector<Found> found;
   for (int i = 0; i < static_cast<int>(x_lines_.size()); ++i)
     for (int j = 0; j < static_cast<int>(y_lines_.size()); ++j) {
-      const Line &x = x_lines_[static_cast<std::size_t>(i)], &y = y_lines_[static_cast<std::size_t>(j)];
+      const Line &x = x_lines_[i], &y = y_lines_[j];
       const Eigen::Index nx = x.functions.cols(), ny = y.functions.cols();
       la::Matrix k(nx * ny, nx * ny);  // unknown (p, q) is p + nx q
       for (Eigen::Index q = 0; q < ny; ++q)
@@ -156,8 +156,8 @@ void RitzPlate::calc_deflections(const Point2& point_m, std::span<const Mode> mo
                                 ys = calc_values(y_lines_, calc_legendre(y_polynomials_, y));
   const double scale = 1.0 / std::sqrt(density_kg_m2_ * body_.length_m * body_.width_m);
   for (std::size_t i = 0; i < modes.size(); ++i) {
-    const Shape& shape = shapes_[static_cast<std::size_t>(modes[i].index[0])];
-    w[i] = scale * xs[static_cast<std::size_t>(shape.x_line)].dot(shape.coefficients * ys[static_cast<std::size_t>(shape.y_line)]);
+    const Shape& shape = shapes_[modes[i].index[0]];
+    w[i] = scale * xs[shape.x_line].dot(shape.coefficients * ys[shape.y_line]);
   }
 }
 
@@ -166,11 +166,11 @@ la::Matrix RitzPlate::calc_slope_products(std::span<const Mode> modes) const {
   const auto count = static_cast<Eigen::Index>(modes.size());
   la::Matrix products = la::Matrix::Zero(count, count);
   for (Eigen::Index j = 0; j < count; ++j) {
-    const Shape& shape = shapes_[static_cast<std::size_t>(modes[static_cast<std::size_t>(j)].index[0])];
-    const la::Matrix turned = x_lines_[static_cast<std::size_t>(shape.x_line)].slopes * shape.coefficients / square(a) +
-                              shape.coefficients * y_lines_[static_cast<std::size_t>(shape.y_line)].slopes / square(b);
+    const Shape& shape = shapes_[modes[j].index[0]];
+    const la::Matrix turned =
+        x_lines_[shape.x_line].slopes * shape.coefficients / square(a) + shape.coefficients * y_lines_[shape.y_line].slopes / square(b);
     for (Eigen::Index i = 0; i <= j; ++i) {
-      const Shape& other = shapes_[static_cast<std::size_t>(modes[static_cast<std::size_t>(i)].index[0])];
+      const Shape& other = shapes_[modes[i].index[0]];
       if (other.x_line != shape.x_line || other.y_line != shape.y_line) continue;
       products(i, j) = products(j, i) = other.coefficients.cwiseProduct(turned).sum() / density_kg_m2_;
     }

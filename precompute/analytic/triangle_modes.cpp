@@ -39,8 +39,7 @@ Numbering number_nodes(const Net& net, const TriangleBasis& basis) {
     for (const std::array<int, 3>& weights : basis.places()) {
       const auto zeros = std::count(weights.begin(), weights.end(), 0);
       if (zeros == 2) {
-        nodes.push_back(
-            t[static_cast<std::size_t>(std::find_if(weights.begin(), weights.end(), [](int w) { return w > 0; }) - weights.begin())]);
+        nodes.push_back(t[std::find_if(weights.begin(), weights.end(), [](int w) { return w > 0; }) - weights.begin()]);
       } else if (zeros == 1) {
         const int off = weights[0] == 0 ? 0 : weights[1] == 0 ? 1 : 2, a = (off + 1) % 3, b = (off + 2) % 3;
         const bool is_up = t[a] < t[b];
@@ -54,7 +53,7 @@ Numbering number_nodes(const Net& net, const TriangleBasis& basis) {
     for (int k = 0; k < 3; ++k) ++uses[{std::min(t[k], t[(k + 1) % 3]), std::max(t[k], t[(k + 1) % 3])}];
     numbering.elements.push_back(std::move(nodes));
   }
-  numbering.is_fixed.assign(static_cast<std::size_t>(next), false);
+  numbering.is_fixed.assign(next, false);
   for (const auto& [edge, count] : uses) {
     if (count > 1) continue;
     numbering.is_fixed[edge.first] = numbering.is_fixed[edge.second] = true;

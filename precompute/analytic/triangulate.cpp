@@ -49,7 +49,7 @@ std::vector<Triangle> cut_ears(const std::vector<Point2>& p) {
     auto best = std::max_element(quality.begin(), quality.end());
     if (*best < 0.0) best = judge_all();  // corners that were in the way may have been removed
     if (*best < 0.0) throw InputError("the polygon is too thin to be divided into triangles; move its corners apart");
-    const auto at = static_cast<std::size_t>(best - quality.begin());
+    const std::size_t at = best - quality.begin();
     const std::size_t n = ring.size();
     triangles.push_back({ring[(at + n - 1) % n], ring[at], ring[(at + 1) % n]});
     ring.erase(ring.begin() + static_cast<std::ptrdiff_t>(at));
@@ -76,7 +76,7 @@ double calc_angle(const Point2& tip, const Point2& a, const Point2& b) {
 /// Lawson's flips: an inner edge whose opposite angles add up to more than a half turn is exchanged for the other diagonal, unless that
 /// joins two points that are to be apart.
 void flip_edges(Net& net, const std::vector<bool>& apart) {
-  const auto is_marked = [&](std::int32_t v) { return static_cast<std::size_t>(v) < apart.size() && apart[static_cast<std::size_t>(v)]; };
+  const auto is_marked = [&](std::int32_t v) { return v < std::ssize(apart) && apart[v]; };
   constexpr double kSlack = 1e-9;
   std::map<NodePair, std::size_t> edges = list_edges(net.triangles);
   std::vector<NodePair> work;
@@ -123,7 +123,7 @@ void halve_edges(Net& net, double max_edge_m, const std::vector<bool>& apart, st
     return std::pair(best, length);
   };
   const auto is_apart = [&](const Triangle& t) {
-    return std::count_if(t.begin(), t.end(), [&](std::int32_t v) { return static_cast<std::size_t>(v) < apart.size() && apart[v]; }) < 2;
+    return std::count_if(t.begin(), t.end(), [&](std::int32_t v) { return v < std::ssize(apart) && apart[v]; }) < 2;
   };
   const auto split = [&](std::size_t t, const NodePair& e, std::int32_t middle) {
     const Triangle v = net.triangles[t];
@@ -212,7 +212,7 @@ void grade(Net& net, std::int32_t point, int layers, double ratio) {
     const Triangle v = net.triangles[t];
     const auto at = std::find(v.begin(), v.end(), point);
     if (at == v.end()) continue;
-    const auto k = static_cast<std::size_t>(at - v.begin());
+    const std::size_t k = at - v.begin();
     const std::vector<std::int32_t> a = get_spoke(v[(k + 1) % 3]), b = get_spoke(v[(k + 2) % 3]);
     net.triangles[t] = {point, a.back(), b.back()};
     for (std::size_t i = 0; i + 1 < a.size(); ++i) {

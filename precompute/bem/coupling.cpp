@@ -54,7 +54,7 @@ Mixture make_mixture(const Problem& problem, Eigen::VectorXd parts, std::vector<
 std::vector<Mixture> couple_modes(std::span<const double> wave_number_1_m, std::span<const double> mass, double kept) {
   const Problem problem(wave_number_1_m, mass);
   const la::Matrix& vectors = problem.vectors;
-  const auto n = static_cast<std::size_t>(vectors.cols());
+  const std::size_t n = vectors.cols();
   // By falling part: each motion gets the mode that is most of it.
   std::vector<std::size_t> order(n * n);
   std::iota(order.begin(), order.end(), 0U);

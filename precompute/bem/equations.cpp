@@ -153,7 +153,7 @@ BoundaryEquations::PatchData BoundaryEquations::make_patch(std::size_t first, st
       PatchPoint& point = patch.points[patch.facet_points[(t - first) * 3 + c]];
       for (std::size_t axis = 0; axis < 3; ++axis)
         point.normal[axis] += static_cast<float>(facets[t].area_m2 / 6.0 * facets[t].normal[axis]);
-      const auto node = static_cast<std::size_t>(node_of_corner[(t - first) * 3 + c]);
+      const std::size_t node = node_of_corner[(t - first) * 3 + c];
       next_facets[node].push_back(static_cast<std::int32_t>(t - first));
       for (const double x : facets[t].curl[c]) curls[node].push_back(static_cast<float>(facets[t].area_m2 / 3.0 * x));
       for (const std::size_t other : {(c + 1) % 3, (c + 2) % 3}) next_points[node].push_back(patch.facet_points[(t - first) * 3 + other]);
@@ -294,9 +294,9 @@ void BoundaryEquations::add_sparse(double k, double coupling, std::span<const st
   using Complex = std::complex<double>;
   const Complex alpha(0.0, coupling);
   for (const Facet& facet : surface_.get_facets()) {
-    const auto t = static_cast<std::size_t>(&facet - surface_.get_facets().data());
+    const std::size_t t = &facet - surface_.get_facets().data();
     for (std::size_t i = 0; i < 3; ++i) {
-      const auto row = static_cast<std::size_t>(facet.corners[i]);
+      const std::size_t row = facet.corners[i];
       if (row < system.first || row >= system.last) continue;
       for (std::size_t j = 0; j < 3; ++j) {
         const double mass = facet.area_m2 / (i == j ? 6.0 : 12.0);

@@ -68,7 +68,7 @@ class Harmonics {
         here = next;
       }
       diagonal *= std::sqrt((2.0 * m + 3.0) / (2.0 * m + 2.0));
-      const auto i = static_cast<std::size_t>(m);
+      const std::size_t i = m;
       if (m <= order_) {
         cosine_[i + 1] = u[0] * cosine_[i] - u[1] * sine_[i];
         sine_[i + 1] = u[1] * cosine_[i] + u[0] * sine_[i];
@@ -81,7 +81,7 @@ class Harmonics {
     const double scale = m == 0 ? 1.0 : std::numbers::sqrt2, q = scale * value_[at(l, m)];
     // the derivative of q_lm is that of m + 1 times this factor
     const double slope = scale * (m < l ? value_[at(l, m + 1)] * std::sqrt((l - m) * (l + m + 1.0)) : 0.0);
-    const auto i = static_cast<std::size_t>(m);
+    const std::size_t i = m;
     even = q * cosine_[i];
     odd = q * sine_[i];
     const double c = m > 0 ? m * cosine_[i - 1] : 0.0, s = m > 0 ? m * sine_[i - 1] : 0.0;
@@ -105,23 +105,23 @@ struct Waves {
 }  // namespace
 
 std::vector<double> calc_bessel(double x, int order) {
-  std::vector<double> j(static_cast<std::size_t>(order) + 1);
+  std::vector<double> j(order + 1);
   if (!(x > 0.0)) {
     j[0] = 1.0;
     return j;
   }
   // Ratios downwards are stable at every l; the first function fixes the rest, or the second where that is near a zero.
-  std::vector<double> ratio(static_cast<std::size_t>(order) + 2);
-  ratio[static_cast<std::size_t>(order) + 1] = calc_bessel_ratio(x, order + 1);
-  std::vector<double> down(static_cast<std::size_t>(order) + 1);
-  double here = 1.0, above = ratio[static_cast<std::size_t>(order) + 1];
+  std::vector<double> ratio(order + 2);
+  ratio[order + 1] = calc_bessel_ratio(x, order + 1);
+  std::vector<double> down(order + 1);
+  double here = 1.0, above = ratio[order + 1];
   for (int l = order; l >= 0; --l) {
-    down[static_cast<std::size_t>(l)] = here;
+    down[l] = here;
     const double below = (2 * l + 1) / x * here - above;
     above = here;
     here = below;
     if (std::abs(here) > 1e200) {
-      for (int i = l; i <= order; ++i) down[static_cast<std::size_t>(i)] *= 1e-200;
+      for (int i = l; i <= order; ++i) down[i] *= 1e-200;
       here *= 1e-200;
       above *= 1e-200;
     }
@@ -171,7 +171,7 @@ std::vector<Complex> calc_expansion(const RadiatingSurface& surface, const Spher
   for (std::size_t t = 0; t < surface.count_facets(); ++t) {
     const Facet& facet = surface.get_facets()[t];
     for (std::size_t c = 0; c < 3; ++c) {
-      const auto p = static_cast<std::size_t>(facet.points[c]);
+      const std::size_t p = facet.points[c];
       flow_area[p] = flow_area[p] + (facet.area_m2 / 3.0) * facet.normal;
       const float *a = &velocity[(t * 3 + (c + 1) % 3) * count], *b = &velocity[(t * 3 + (c + 2) % 3) * count];
       for (std::size_t m = 0; m < fields; ++m)
@@ -194,7 +194,7 @@ std::vector<Complex> calc_expansion(const RadiatingSurface& surface, const Spher
       find.set(u);
       const double radial = dot(u, area);
       for (int l = 0; l <= order; ++l) {
-        const auto at = static_cast<std::size_t>(l);
+        const std::size_t at = l;
         // j_l' = l / x j_l - j_{l+1}; at the centre only l = 1 has a slope, 1/3 along the axis of Y_1m
         const double slope = r > 0.0 ? l * per_r * j[at] - k * j[at + 1] : l == 1 ? k / 3.0 : 0.0;
         const double turn = r > 0.0 ? per_r * j[at] : l == 1 ? k / 3.0 : 0.0;

@@ -60,8 +60,8 @@ class Group {
   bool has_all_rows() const { return comm_->size() == 1; }
   /// Each rank may take the whole matrix.
   bool fits_one_rank() const { return fits_one_rank_; }
-  std::size_t get_first() const { return first_[static_cast<std::size_t>(comm_->rank())]; }
-  std::size_t get_last() const { return first_[static_cast<std::size_t>(comm_->rank()) + 1]; }
+  std::size_t get_first() const { return first_[comm_->rank()]; }
+  std::size_t get_last() const { return first_[comm_->rank() + 1]; }
 
   /// All rows of what each rank has its own of.
   void gather(const Sides& mine, Sides& all) const { all.values = comm_->all_gather(mine.values); }
@@ -141,7 +141,7 @@ WaveAnswer solve_wave(const BoundaryEquations& equations, const Group& group, do
       for (std::size_t i = 0; i < motions; ++i) mode.row.emplace_back(rows[m * motions + i]);
     mode.coefficient.resize(harmonics);
     for (int l = 0; l <= order; ++l) {
-      const double size = std::exp(hankel[static_cast<std::size_t>(l)]);
+      const double size = std::exp(hankel[l]);
       for (std::size_t i = count_harmonics(l - 1); i < count_harmonics(l); ++i)
         mode.coefficient[i] = Single(expansion[m * harmonics + i] * size);
     }
@@ -158,7 +158,7 @@ Sounding interpolate(const std::vector<const Answer*>& answers, const Stencil& s
   sounding.coefficient.resize(harmonics);
   double sum_near = 0.0, sum_far = 0.0, error_near = 0.0, error_far = 0.0;
   for (std::int32_t l = 0; l <= sounding.order; ++l) {
-    const double near = spread.near[static_cast<std::size_t>(l)], far = spread.far[static_cast<std::size_t>(l)];
+    const double near = spread.near[l], far = spread.far[l];
     for (std::size_t i = count_harmonics(l - 1); i < count_harmonics(l); ++i) {
       Double fine{}, coarse{};
       for (std::size_t n = 0; n < answers.size(); ++n) {
@@ -191,7 +191,7 @@ Answer combine(const WaveAnswer& wave, const Mixture& mixture) {
     const Answer& one = wave.modes.at(mixture.motions[a]);
     for (std::size_t i = 0; i < one.coefficient.size(); ++i) coefficient[i] += mixture.parts[a] * Double(one.coefficient[i]);
     for (std::size_t b = 0; b < mixture.motions.size(); ++b)
-      sum.reaction += mixture.parts[a] * mixture.parts[b] * Double(one.row[static_cast<std::size_t>(mixture.motions[b])]);
+      sum.reaction += mixture.parts[a] * mixture.parts[b] * Double(one.row[mixture.motions[b]]);
   }
   for (const Double& x : coefficient) sum.coefficient.emplace_back(x);
   return sum;
@@ -223,7 +223,7 @@ std::vector<double> calc_masses_within(const std::vector<const WaveAnswer*>& wav
     for (std::size_t a = 0; a < count; ++a) {
       const std::vector<Single>& row = waves[n]->modes.at(motions[a]).row;
       for (std::size_t b = 0; b < count; ++b) {
-        const double part = -0.5 * density * stencil.weights[n] * static_cast<double>(row[static_cast<std::size_t>(motions[b])].real());
+        const double part = -0.5 * density * stencil.weights[n] * static_cast<double>(row[motions[b]].real());
         mass[a * count + b] += part;
         mass[b * count + a] += part;
       }
@@ -252,7 +252,7 @@ double calc_reciprocity(const std::map<double, WaveAnswer>& answers) {
     for (const auto& [i, one] : wave.modes)
       for (const auto& [j, other] : wave.modes) {
         if (j <= i || one.row.empty() || other.row.empty()) continue;
-        const double there = one.row[static_cast<std::size_t>(j)].real(), back = other.row[static_cast<std::size_t>(i)].real();
+        const double there = one.row[j].real(), back = other.row[i].real();
         worst = std::max(worst, std::abs(there - back) / std::sqrt(std::abs(one.reaction.real() * other.reaction.real()) + 1e-300));
       }
   return worst;
@@ -303,7 +303,7 @@ std::optional<WaveAnswer> unpack(std::span<const double> packed) {
     Answer& mode = answer.modes[static_cast<std::int32_t>(packed[at])];
     mode.order = static_cast<std::int32_t>(packed[at + 1]);
     mode.reaction = {packed[at + 2], packed[at + 3]};
-    const std::size_t harmonics = count_harmonics(mode.order), motions = static_cast<std::size_t>(packed[at + 4]);
+    const std::size_t harmonics = count_harmonics(mode.order), motions = packed[at + 4];
     at += 5;
     if ((packed.size() - at) / 2 < harmonics + motions) return std::nullopt;
     for (auto [numbers, count] : {std::pair(&mode.coefficient, harmonics), std::pair(&mode.row, motions)}) {
@@ -360,13 +360,13 @@ AirSolution solve_air(const comm::Communicator& comm, const Radiator& radiator_o
       for (const std::int32_t node : stencils.back().nodes) {
         readers[node].insert(static_cast<std::int32_t>(m));
         if (!mixtures.empty()) readers[node].insert(mixtures[m].motions.begin(), mixtures[m].motions.end());
-        orders[static_cast<std::size_t>(node)] = std::max(orders[static_cast<std::size_t>(node)], find_order(modes[m] * radius));
+        orders[node] = std::max(orders[node], find_order(modes[m] * radius));
       }
     }
     std::vector<std::int32_t> wanted = comm.broadcast([&] {
       std::vector<std::int32_t> list;  // wave number, count, modes ...
       for (const auto& [node, who] : readers) {
-        const auto known = answers.find(waves.get()[static_cast<std::size_t>(node)]);
+        const auto known = answers.find(waves.get()[node]);
         std::vector<std::int32_t> lacking;
         for (const std::int32_t m : who)
           if (known == answers.end() || !known->second.modes.contains(m)) lacking.push_back(m);
@@ -384,7 +384,7 @@ AirSolution solve_air(const comm::Communicator& comm, const Radiator& radiator_o
       const std::size_t own_work = first + static_cast<std::size_t>(group.get_number());
       const WaveAnswer answer = comm.agree([&] {
         if (own_work >= work.size()) return WaveAnswer{};
-        const auto node = static_cast<std::size_t>(work[own_work].first);
+        const std::size_t node = work[own_work].first;
         return solve_wave(*equations, group, waves.get()[node], orders[node], work[own_work].second, options.tolerance, has_rows);
       });
       const std::vector<double> packed = comm.all_gather([&] {
@@ -397,7 +397,7 @@ AirSolution solve_air(const comm::Communicator& comm, const Radiator& radiator_o
       comm.agree([&] {
         if (!comm.is_root()) return;
         for (std::size_t at = 0; at < packed.size(); at += 1 + static_cast<std::size_t>(packed[at])) {
-          WaveAnswer home = unpack(std::span(packed).subspan(at + 1, static_cast<std::size_t>(packed[at]))).value();
+          WaveAnswer home = unpack(std::span(packed).subspan(at + 1, packed[at])).value();
           if (keeper.save) keeper.save(home);
           add_answer(std::move(home));
         }
@@ -411,9 +411,7 @@ AirSolution solve_air(const comm::Communicator& comm, const Radiator& radiator_o
       if (is_stopped) throw SolveStopped();
     }
     // What a mode reads, on rank 0.
-    const auto mine = [&](std::size_t m, std::size_t n) -> const WaveAnswer& {
-      return answers.at(waves.get()[static_cast<std::size_t>(stencils[m].nodes[n])]);
-    };
+    const auto mine = [&](std::size_t m, std::size_t n) -> const WaveAnswer& { return answers.at(waves.get()[stencils[m].nodes[n]]); };
     const auto list_mine = [&](std::size_t m) {
       std::vector<const WaveAnswer*> list;
       for (std::size_t n = 0; n < stencils[m].nodes.size(); ++n) list.push_back(&mine(m, n));
@@ -426,8 +424,7 @@ AirSolution solve_air(const comm::Communicator& comm, const Radiator& radiator_o
         for (std::size_t m = 0; m < modes.size(); ++m) {
           std::vector<double> wave_numbers;
           for (const std::int32_t i : mixtures[m].motions)
-            wave_numbers.push_back(static_cast<std::size_t>(i) < modes.size() ? radiator.wave_number_1_m[static_cast<std::size_t>(i)]
-                                                                              : 0.0);
+            wave_numbers.push_back(i < std::ssize(modes) ? radiator.wave_number_1_m[i] : 0.0);
           mixtures[m] =
               follow_mode(wave_numbers, calc_masses_within(list_mine(m), stencils[m], options.coupling->density_kg_m3, mixtures[m].motions),
                           mixtures[m]);

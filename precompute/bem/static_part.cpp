@@ -31,7 +31,7 @@ std::vector<OuterPoint> make_rule(bool is_fine) {
     const double a = (6.0 + sign * root) / 21.0, weight = (155.0 + sign * root) / 1200.0;
     for (int c = 0; c < 3; ++c) {
       OuterPoint point{{a, a, a}, weight};
-      point.hat[static_cast<std::size_t>(c)] = 1.0 - 2.0 * a;
+      point.hat[c] = 1.0 - 2.0 * a;
       rule.push_back(point);
     }
   }
@@ -41,7 +41,7 @@ std::vector<OuterPoint> make_rule(bool is_fine) {
     for (const OuterPoint& point : rule) {
       OuterPoint moved{{}, point.weight / 4.0};
       for (int c = 0; c < 3; ++c) {
-        const auto k = static_cast<std::size_t>(c);
+        const std::size_t k = c;
         moved.hat[k] = quarter == 3 ? (1.0 - point.hat[k]) / 2.0 : (point.hat[k] + (c == quarter ? 1.0 : 0.0)) / 2.0;
       }
       fine.push_back(moved);
@@ -214,11 +214,11 @@ StaticPart make_static_part(const RadiatingSurface& surface, std::span<const flo
         const auto begin = part.column.begin() + static_cast<std::ptrdiff_t>(part.first[row]);
         const auto end = part.column.begin() + static_cast<std::ptrdiff_t>(part.first[row + 1]);
         for (std::size_t j = 0; j < 3; ++j) {
-          const auto at = static_cast<std::size_t>(std::lower_bound(begin, end, inner.corners[j]) - part.column.begin());
+          const std::size_t at = std::lower_bound(begin, end, inner.corners[j]) - part.column.begin();
           part.double_layer[at] += kPerSphere * pair.double_layer[i][j];
           part.normals[at] += kPerSphere * normals * pair.single[i][j];
           part.curls[at] += kPerSphere * dot(outer.curl[i], inner.curl[j]) * pair.plain;
-          const float* v = &velocity[(static_cast<std::size_t>(t) * 3 + j) * count];
+          const float* v = &velocity[(t * 3 + j) * count];
           double *single = &part.single[row * count], *adjoint = &part.adjoint[row * count];
           const double by_single = kPerSphere * pair.single[i][j], by_adjoint = kPerSphere * pair.adjoint[i][j];
           for (std::size_t n = 0; n < count; ++n) {

@@ -27,7 +27,7 @@ void order_range(std::span<const Vec3> places, std::span<std::int32_t> items, st
       high[k] = std::max(high[k], places[i][k]);
     }
   const Vec3 side = high - low;
-  const auto axis = static_cast<std::size_t>(std::max_element(side.begin(), side.end()) - side.begin());
+  const std::size_t axis = std::max_element(side.begin(), side.end()) - side.begin();
   const std::size_t half = (items.size() / run + 1) / 2 * run;  // whole runs in front
   const std::size_t cut = std::min(half, items.size());
   const auto before = [&](std::int32_t a, std::int32_t b) {
@@ -118,7 +118,7 @@ RadiatingSurface::RadiatingSurface(std::span<const Vec3> nodes_m, std::span<cons
   std::vector<std::int32_t> number(nodes_m.size(), -1);
   std::map<std::pair<std::int32_t, std::int32_t>, std::int32_t> edges;
   for (const std::int32_t k : order_by_place(centroids, 16)) {
-    const std::int32_t source = kept[static_cast<std::size_t>(k)];
+    const std::int32_t source = kept[k];
     Facet facet;
     for (std::size_t c = 0; c < 3; ++c) {
       const std::int32_t node = triangles[source][c];

@@ -44,7 +44,7 @@ Radiator transfer(const Radiator& fine, std::vector<Vec3> nodes_m, std::vector<T
       Vec3 place{};
       for (std::size_t c = 0; c < 3; ++c) place = place + at[c] * fine.nodes_m[corners[c]];
       const bank::NearestPlace found = tree.find(place);
-      const auto facet = static_cast<std::size_t>(found.triangle);
+      const std::size_t facet = found.triangle;
       const Vec3& hat = found.barycentric;
       for (std::size_t i = 0; i < 3; ++i) gram[facet][i] = gram[facet][i] + (weight * hat[i]) * hat;
       for (std::size_t m = 0; m < modes; ++m) {

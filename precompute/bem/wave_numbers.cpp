@@ -46,7 +46,7 @@ Stencil WaveNumbers::find_stencil(double k) const {
   const std::int32_t first = std::clamp(at - count / 2, 0, static_cast<std::int32_t>(nodes_.size()) - count);
   Stencil stencil;
   for (std::int32_t i = first; i < first + count; ++i) stencil.nodes.push_back(i);
-  const std::span<const double> near = std::span(nodes_).subspan(static_cast<std::size_t>(first), static_cast<std::size_t>(count));
+  const std::span<const double> near = std::span(nodes_).subspan(first, count);
   stencil.weights = calc_lagrange(near, k);
   const bool drops_first = count > 1 && k - near.front() > near.back() - k;
   stencil.weights_without_farthest = calc_lagrange(drops_first ? near.subspan(1) : near.first(near.size() - 1), k);

@@ -22,8 +22,8 @@ void agree_on(const Communicator& comm, base::Result failure) {
                                static_cast<double>(failure.place.size()), failure.need_bytes, static_cast<double>(failure.possible_nodes)};
   MPI_Bcast(header.data(), static_cast<int>(header.size()), MPI_DOUBLE, first, comm);
   failure.kind = static_cast<base::ResultKind>(header[0]);
-  failure.message.resize(static_cast<std::size_t>(header[1]));
-  failure.place.resize(static_cast<std::size_t>(header[2]));
+  failure.message.resize(header[1]);
+  failure.place.resize(header[2]);
   failure.need_bytes = header[3];
   failure.possible_nodes = static_cast<std::int64_t>(header[4]);
   for (std::string* text : {&failure.message, &failure.place})
@@ -61,7 +61,7 @@ void Communicator::broadcast_bytes(void* data, std::size_t bytes) const {
 
 std::string Communicator::broadcast(std::string text) const {
   const auto count = broadcast(static_cast<std::int64_t>(text.size()));
-  agree([&] { text.resize(static_cast<std::size_t>(count)); });
+  agree([&] { text.resize(count); });
   broadcast_bytes(text.data(), text.size());
   return text;
 }
@@ -81,7 +81,7 @@ std::vector<std::string> Communicator::broadcast(std::vector<std::string> texts)
     std::vector<std::string> all;
     std::size_t at = 0;
     for (const std::int64_t length : lengths) {
-      all.push_back(joined.substr(at, static_cast<std::size_t>(length)));
+      all.push_back(joined.substr(at, length));
       at += static_cast<std::size_t>(length);
     }
     return all;
@@ -91,8 +91,8 @@ std::vector<std::string> Communicator::broadcast(std::vector<std::string> texts)
 Communicator::Gathering Communicator::plan_gathering(std::size_t own_bytes) const {
   Gathering gathering;
   agree([&] {
-    gathering.bytes.resize(static_cast<std::size_t>(size_));
-    gathering.begin.assign(static_cast<std::size_t>(size_) + 1, 0);
+    gathering.bytes.resize(size_);
+    gathering.begin.assign(size_ + 1, 0);
     if (own_bytes > INT32_MAX) throw SystemError(fmt::format("{} bytes are too many to bring to every rank; start more ranks", own_bytes));
   });
   const int own = static_cast<int>(own_bytes);
@@ -106,8 +106,7 @@ Communicator::Gathering Communicator::plan_gathering(std::size_t own_bytes) cons
 }
 
 void Communicator::all_gather_bytes(const void* own, const Gathering& gathering, void* all) const {
-  MPI_Allgatherv(own, gathering.bytes[static_cast<std::size_t>(rank_)], MPI_BYTE, all, gathering.bytes.data(), gathering.begin.data(),
-                 MPI_BYTE, comm_);
+  MPI_Allgatherv(own, gathering.bytes[rank_], MPI_BYTE, all, gathering.bytes.data(), gathering.begin.data(), MPI_BYTE, comm_);
 }
 
 }  // namespace carillon::comm

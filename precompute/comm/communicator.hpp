@@ -129,7 +129,7 @@ class Communicator {
   template <Plain T>
   std::vector<T> broadcast(std::vector<T> items) const {
     const auto count = broadcast(static_cast<std::int64_t>(items.size()));
-    agree([&] { items.resize(static_cast<std::size_t>(count)); });
+    agree([&] { items.resize(count); });
     broadcast_bytes(items.data(), items.size() * sizeof(T));
     return items;
   }
@@ -167,7 +167,7 @@ class Communicator {
   struct Gathering {
     std::vector<int> bytes;  // (ranks)
     std::vector<int> begin;  // (ranks + 1)
-    std::size_t total_bytes() const { return static_cast<std::size_t>(begin.back()); }
+    std::size_t total_bytes() const { return begin.back(); }
   };
   Gathering plan_gathering(std::size_t own_bytes) const;
 

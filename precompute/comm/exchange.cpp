@@ -14,7 +14,7 @@ constexpr int kExchangeTag = 7101, kHandshakeTag = 7102;
 
 Exchange::Exchange(const Communicator& comm, std::vector<std::int64_t> sent_begin, std::size_t block_bytes)
     : comm_(comm), rank_(comm.rank()), sent_begin_(std::move(sent_begin)), messages_(block_bytes) {
-  const auto ranks = static_cast<std::size_t>(comm.size());
+  const std::size_t ranks = comm.size();
   std::vector<std::int64_t> sent, received;
   comm.agree([&] {
     for (std::size_t r = 0; r < ranks; ++r) sent.push_back(sent_begin_[r + 1] - sent_begin_[r]);
@@ -26,7 +26,7 @@ Exchange::Exchange(const Communicator& comm, std::vector<std::int64_t> sent_begi
 }
 
 void Exchange::reserve(std::size_t item_bytes) {
-  const auto items = static_cast<std::size_t>(sent_count() + received_count());
+  const std::size_t items = sent_count() + received_count();
   messages_.reserve(2 * sent_begin_.size(), items * item_bytes);
 }
 
@@ -35,7 +35,7 @@ void Exchange::run(const std::vector<std::int64_t>& from, const void* sent, cons
   const auto find_bytes = [&](const std::vector<std::int64_t>& begin, std::size_t r) {
     return std::pair(static_cast<std::size_t>(begin[r]) * item_bytes, static_cast<std::size_t>(begin[r + 1] - begin[r]) * item_bytes);
   };
-  const auto own = static_cast<std::size_t>(rank_);
+  const std::size_t own = rank_;
   for (std::size_t r = 0; r + 1 < to.size(); ++r) {
     const auto [at, bytes] = find_bytes(to, r);
     if (r != own) messages_.receive(comm_, static_cast<char*>(received) + at, bytes, static_cast<int>(r), kExchangeTag);
@@ -81,7 +81,7 @@ bool receive_with_handshake(const Communicator& comm, std::vector<std::byte>& by
   if (size < 0) return false;
   int has_room = 1;
   try {
-    bytes.resize(static_cast<std::size_t>(size));
+    bytes.resize(size);
   } catch (const std::bad_alloc&) {
     has_room = 0;
   }

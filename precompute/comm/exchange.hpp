@@ -30,8 +30,8 @@ struct ByRank {
 
   int rank_count() const { return static_cast<int>(begin.size()) - 1; }
   std::span<const T> of(int rank) const {
-    const auto r = static_cast<std::size_t>(rank);
-    return std::span(items).subspan(static_cast<std::size_t>(begin[r]), static_cast<std::size_t>(begin[r + 1] - begin[r]));
+    const std::size_t r = rank;
+    return std::span(items).subspan(begin[r], begin[r + 1] - begin[r]);
   }
 };
 
@@ -76,14 +76,14 @@ ByRank<T> sort_by_receiver(int ranks, const std::vector<T>& items, FindReceiver&
                            std::vector<std::size_t>* source = nullptr) {
   ByRank<T> sorted;
   std::vector<int> receiver(items.size());
-  sorted.begin.assign(static_cast<std::size_t>(ranks) + 1, 0);
+  sorted.begin.assign(ranks + 1, 0);
   for (std::size_t i = 0; i < items.size(); ++i) ++sorted.begin[static_cast<std::size_t>(receiver[i] = find_receiver(items[i])) + 1];
   std::partial_sum(sorted.begin.begin(), sorted.begin.end(), sorted.begin.begin());
   std::vector<std::int64_t> next(sorted.begin.begin(), sorted.begin.end() - 1);
   sorted.items.resize(items.size());
   if (source != nullptr) source->resize(items.size());
   for (std::size_t i = 0; i < items.size(); ++i) {
-    const auto place = static_cast<std::size_t>(next[static_cast<std::size_t>(receiver[i])]++);
+    const std::size_t place = next[receiver[i]]++;
     sorted.items[place] = items[i];
     if (source != nullptr) (*source)[place] = i;
   }
@@ -96,7 +96,7 @@ ByRank<T> all_to_all(const Communicator& comm, const ByRank<T>& sent) {
   Exchange exchange(comm, sent.begin);
   auto received = comm.agree([&] {
     exchange.reserve(sizeof(T));
-    return ByRank<T>{std::vector<T>(static_cast<std::size_t>(exchange.received_count())), exchange.received_begin()};
+    return ByRank<T>{std::vector<T>(exchange.received_count()), exchange.received_begin()};
   });
   exchange.forward(sent.items.data(), received.items.data());
   return received;
@@ -124,13 +124,13 @@ auto all_to_all(const Communicator& comm, Items&& items, FindReceiver&& find_rec
 template <Plain T>
 std::vector<T> gather(const Communicator& comm, const std::vector<T>& items) {
   Exchange exchange(comm, comm.agree([&] {
-    std::vector<std::int64_t> begin(static_cast<std::size_t>(comm.size()) + 1, static_cast<std::int64_t>(items.size()));
+    std::vector<std::int64_t> begin(comm.size() + 1, static_cast<std::int64_t>(items.size()));
     begin.front() = 0;
     return begin;
   }));
   auto received = comm.agree([&] {
     exchange.reserve(sizeof(T));
-    return std::vector<T>(static_cast<std::size_t>(exchange.received_count()));
+    return std::vector<T>(exchange.received_count());
   });
   exchange.forward(items.data(), received.data());
   return received;
@@ -152,7 +152,7 @@ std::vector<Answer> query_owners(const Communicator& comm, const std::vector<Que
   Exchange exchange(comm, sent.begin);
   auto asked = comm.agree([&] {
     exchange.reserve(std::max(sizeof(Question), sizeof(Answer)));
-    return ByRank<Question>{std::vector<Question>(static_cast<std::size_t>(exchange.received_count())), exchange.received_begin()};
+    return ByRank<Question>{std::vector<Question>(exchange.received_count()), exchange.received_begin()};
   });
   exchange.forward(sent.items.data(), asked.items.data());
   std::vector<Answer> replies, returned, answers;
@@ -187,7 +187,7 @@ std::vector<T> report_to_owners(const Communicator& comm, Make&& make, FindOwner
                                 T missing = {}) {
   const auto arrived = all_to_all(comm, std::forward<Make>(make), [&](const Reported<T>& one) { return find_owner(one.number); });
   return comm.agree([&] {
-    std::vector<T> values(static_cast<std::size_t>(count), missing);
+    std::vector<T> values(count, missing);
     for (const Reported<T>& one : arrived.items) values[to_local(one.number)] = one.value;
     return values;
   });

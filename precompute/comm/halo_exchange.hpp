@@ -40,8 +40,7 @@ class HaloExchange {
       for (int r = 0; r < comm.size(); ++r) {
         Neighbour neighbour;
         neighbour.rank = r;
-        for (std::int64_t k = wanted.begin[static_cast<std::size_t>(r)]; k < wanted.begin[static_cast<std::size_t>(r) + 1]; ++k)
-          neighbour.halo.push_back(halo.place[source[static_cast<std::size_t>(k)]]);
+        for (std::int64_t k = wanted.begin[r]; k < wanted.begin[r + 1]; ++k) neighbour.halo.push_back(halo.place[source[k]]);
         for (const Wanted& one : asked.of(r)) neighbour.owned.push_back(find_own_place(one.number));
         add(std::move(neighbour));
       }

@@ -5,7 +5,7 @@
 namespace carillon::comm {
 
 IndexPartition::IndexPartition(const Communicator& comm, std::int64_t own_count) : rank_(comm.rank()) {
-  comm.agree([&] { begin_.assign(static_cast<std::size_t>(comm.size()) + 1, 0); });
+  comm.agree([&] { begin_.assign(comm.size() + 1, 0); });
   MPI_Allgather(&own_count, 1, MPI_INT64_T, begin_.data() + 1, 1, MPI_INT64_T, comm);
   std::partial_sum(begin_.begin(), begin_.end(), begin_.begin());
 }

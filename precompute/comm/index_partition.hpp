@@ -21,7 +21,7 @@ class IndexPartition {
 
   std::int64_t total() const { return begin_.empty() ? 0 : begin_.back(); }
   /// 0 <= rank <= ranks.
-  std::int64_t begin(int rank) const { return begin_[static_cast<std::size_t>(rank)]; }
+  std::int64_t begin(int rank) const { return begin_[rank]; }
   /// Pre: 0 <= number < total().
   int find_owner(std::int64_t number) const {
     return static_cast<int>(std::upper_bound(begin_.begin(), begin_.end(), number) - begin_.begin()) - 1;
@@ -32,7 +32,7 @@ class IndexPartition {
   std::int64_t own_count() const { return own_end() - own_begin(); }
   bool is_own(std::int64_t number) const { return number >= own_begin() && number < own_end(); }
   /// Place of an own number in this rank's run.
-  std::size_t to_local(std::int64_t number) const { return static_cast<std::size_t>(number - own_begin()); }
+  std::size_t to_local(std::int64_t number) const { return number - own_begin(); }
 
  private:
   std::vector<std::int64_t> begin_;  // (ranks + 1), ascending from 0

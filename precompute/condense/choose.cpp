@@ -15,7 +15,7 @@ std::vector<double> calc_slenderness(const comm::Communicator& comm, const Strai
                                      const la::Columns& shapes) {
   comm::HaloExchange halo = make_halo(comm, local);
   constexpr int kAtOnce = 32;
-  std::vector<double> rotation(static_cast<std::size_t>(shapes.count), 0.0), strain = rotation;
+  std::vector<double> rotation(shapes.count, 0.0), strain = rotation;
   ElementPoints points;
   RowMatrix values, gradients;
   for (int first = 0; first < shapes.count; first += kAtOnce) {
@@ -30,9 +30,9 @@ std::vector<double> calc_slenderness(const comm::Communicator& comm, const Strai
           for (int k = 0; k < 3; ++k)
             for (int j = 0; j < width; ++j) {
               const double h = gradients(9 * p + 3 * a + k, j), t = gradients(9 * p + 3 * k + a, j);
-              const double w = 0.25 * points.volume_m3[static_cast<std::size_t>(p)];
-              rotation[static_cast<std::size_t>(first + j)] += w * (h - t) * (h - t);
-              strain[static_cast<std::size_t>(first + j)] += w * (h + t) * (h + t);
+              const double w = 0.25 * points.volume_m3[p];
+              rotation[first + j] += w * (h - t) * (h - t);
+              strain[first + j] += w * (h + t) * (h + t);
             }
     }
   }
@@ -47,11 +47,11 @@ Choice choose_modes(std::span<const double> freq_hz, std::span<const double> sle
   constexpr double kSame = 1e-6;  // of the frequency: modes of one frequency
   Choice choice;
   std::vector<std::int32_t> bending;
-  const auto find_freq = [&](std::int32_t mode) { return freq_hz[static_cast<std::size_t>(mode)]; };
+  const auto find_freq = [&](std::int32_t mode) { return freq_hz[mode]; };
   for (const std::int32_t mode : eligible)
-    if (slenderness[static_cast<std::size_t>(mode)] >= kSlender && find_freq(mode) <= below_hz) bending.push_back(mode);
+    if (slenderness[mode] >= kSlender && find_freq(mode) <= below_hz) bending.push_back(mode);
   const auto membrane = std::find_if(slenderness.begin(), slenderness.end(), [](double value) { return value < kSlender; });
-  if (membrane != slenderness.end()) choice.membrane_hz = freq_hz[static_cast<std::size_t>(membrane - slenderness.begin())];
+  if (membrane != slenderness.end()) choice.membrane_hz = freq_hz[membrane - slenderness.begin()];
   choice.bending_count = static_cast<std::int64_t>(bending.size());
   auto kept = static_cast<std::size_t>(std::min<std::int64_t>(count, choice.bending_count));
   const auto is_same = [&](std::size_t a, std::size_t b) {

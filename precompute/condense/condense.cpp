@@ -101,7 +101,7 @@ Condensed condense_modes(const comm::Communicator& comm, const SolvedModes& solv
   const auto modes = static_cast<int>(choice.modes.size());
   const la::Columns columns{kept.data(), shapes.rows, shapes.rows, modes};
   std::vector<double> omega;
-  for (const std::int32_t mode : choice.modes) omega.push_back(std::sqrt(solved.lambda[static_cast<std::size_t>(mode)]));
+  for (const std::int32_t mode : choice.modes) omega.push_back(std::sqrt(solved.lambda[mode]));
   if (options.report) options.report("factorisation of K", 0.0);
   StaticAnswer answer(comm, solved.local, solved.stiffness, solved.mass, columns, solved.lambda.front());
   const Nodal nodal = answer.spread(columns);

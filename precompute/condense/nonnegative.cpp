@@ -20,7 +20,7 @@ struct Normal {
   std::ptrdiff_t size() const { return static_cast<std::ptrdiff_t>(joined.size()); }
   void add(const la::Matrix& a, const la::Vector& b, std::ptrdiff_t column) {
     const std::ptrdiff_t n = size();
-    for (std::ptrdiff_t i = 0; i < n; ++i) products(i, n) = products(n, i) = a.col(joined[static_cast<std::size_t>(i)]).dot(a.col(column));
+    for (std::ptrdiff_t i = 0; i < n; ++i) products(i, n) = products(n, i) = a.col(joined[i]).dot(a.col(column));
     products(n, n) = a.col(column).squaredNorm();
     sides[n] = a.col(column).dot(b);
     joined.push_back(column);
@@ -43,17 +43,17 @@ void settle(Normal& normal, la::Vector& x) {
     double step = 1;
     std::ptrdiff_t leaves = -1;
     for (std::ptrdiff_t i = 0; i < normal.size(); ++i) {
-      const double from = x[normal.joined[static_cast<std::size_t>(i)]];
+      const double from = x[normal.joined[i]];
       if (wanted[i] > 0 || (leaves >= 0 && from / (from - wanted[i]) >= step)) continue;
       step = from > 0 ? from / (from - wanted[i]) : 0.0;
       leaves = i;
     }
     for (std::ptrdiff_t i = 0; i < normal.size(); ++i) {
-      double& value = x[normal.joined[static_cast<std::size_t>(i)]];
+      double& value = x[normal.joined[i]];
       value += step * (wanted[i] - value);
     }
     if (leaves < 0) return;
-    x[normal.joined[static_cast<std::size_t>(leaves)]] = 0;
+    x[normal.joined[leaves]] = 0;
     normal.remove(leaves);
   }
 }
@@ -64,7 +64,7 @@ la::Vector solve_nonnegative(const la::Matrix& a, const la::Vector& b, double to
   constexpr double kSlope = 1e-12;  // of |b|: no way down
   la::Vector x = la::Vector::Zero(a.cols());
   const la::Vector norms = a.colwise().norm().transpose();
-  std::vector<char> barred(static_cast<std::size_t>(a.cols()), 0);  // those that left as soon as they had joined
+  std::vector<char> barred(a.cols(), 0);  // those that left as soon as they had joined
   Normal normal{{}, la::Matrix(most, most), la::Vector(most)};
   la::Vector residual = b;
   while (normal.size() < most && residual.norm() > tolerance * b.norm()) {
@@ -72,7 +72,7 @@ la::Vector solve_nonnegative(const la::Matrix& a, const la::Vector& b, double to
     std::ptrdiff_t best = -1;
     double steepest = kSlope * b.norm();
     for (std::ptrdiff_t j = 0; j < a.cols(); ++j)
-      if (x[j] == 0 && barred[static_cast<std::size_t>(j)] == 0 && slope[j] > steepest * norms[j]) {
+      if (x[j] == 0 && barred[j] == 0 && slope[j] > steepest * norms[j]) {
         steepest = slope[j] / norms[j];
         best = j;
       }
@@ -82,7 +82,7 @@ la::Vector solve_nonnegative(const la::Matrix& a, const la::Vector& b, double to
     if (x[best] > 0)
       std::fill(barred.begin(), barred.end(), char{0});
     else
-      barred[static_cast<std::size_t>(best)] = 1;
+      barred[best] = 1;
     residual = b - a * x;
   }
   return x;

@@ -42,7 +42,7 @@ std::vector<double> list_candidates(const CoupledBody& body, const partition::Lo
   for (std::int32_t e = 0; e < strains.element_count(); ++e) {
     bool is_calculated = false;
     for (int p = 0; p < (strains.row_count(e) / 6); ++p) {
-      const auto number = static_cast<std::uint64_t>(local.tet_in_mesh[static_cast<std::size_t>(e)]) * 16 + static_cast<std::uint64_t>(p);
+      const auto number = static_cast<std::uint64_t>(local.tet_in_mesh[e]) * 16 + static_cast<std::uint64_t>(p);
       if (base::to_unit(base::scramble(number + 1)) * static_cast<double>(all_points) >= static_cast<double>(kCandidates)) continue;
       if (!std::exchange(is_calculated, true)) {
         strains.calc_points(e, points);
@@ -63,14 +63,12 @@ std::vector<double> list_candidates(const CoupledBody& body, const partition::Lo
 
 Candidates sort_candidates(const std::vector<double>& list, std::ptrdiff_t modes, std::ptrdiff_t rows) {
   const std::ptrdiff_t width = 1 + 9 * modes + 6 * rows, count = static_cast<std::ptrdiff_t>(list.size()) / width;
-  std::vector<std::ptrdiff_t> order(static_cast<std::size_t>(count));
+  std::vector<std::ptrdiff_t> order(count);
   std::iota(order.begin(), order.end(), std::ptrdiff_t{0});
-  std::sort(order.begin(), order.end(), [&](std::ptrdiff_t a, std::ptrdiff_t b) {
-    return list[static_cast<std::size_t>(a * width)] < list[static_cast<std::size_t>(b * width)];
-  });
+  std::sort(order.begin(), order.end(), [&](std::ptrdiff_t a, std::ptrdiff_t b) { return list[a * width] < list[b * width]; });
   Candidates candidates{la::Matrix(9 * count, modes), la::Matrix(6 * count, rows)};
   for (std::ptrdiff_t c = 0; c < count; ++c) {
-    const double* from = list.data() + order[static_cast<std::size_t>(c)] * width;
+    const double* from = list.data() + order[c] * width;
     candidates.gradient.middleRows(9 * c, 9) = Eigen::Map<const RowMatrix>(from + 1, 9, modes);
     candidates.stress.middleRows(6 * c, 6) = Eigen::Map<const la::Matrix>(from + 1 + 9 * modes, 6, rows);
   }
@@ -90,7 +88,7 @@ la::Matrix calc_strains(const la::Matrix& gradient, const la::Matrix& q) {
   la::Matrix strain = la::Matrix::Zero(h.rows() / 9 * 6, q.cols());
   for (std::ptrdiff_t p = 0; p < h.rows() / 9; ++p)
     for (int c = 0; c < 6; ++c) {
-      const auto [a, b] = kComponents[static_cast<std::size_t>(c)];
+      const auto [a, b] = kComponents[c];
       for (int k = 0; k < 3; ++k)
         strain.row(6 * p + c) += (c < 3 ? 0.5 : 1.0) * h.row(9 * p + 3 * k + a).cwiseProduct(h.row(9 * p + 3 * k + b));
     }
@@ -104,7 +102,7 @@ la::Matrix calc_pair_strains(const la::Matrix& gradient, const Pairs& pairs) {
     for (std::ptrdiff_t i = 0; i <= j; ++i)
       for (std::ptrdiff_t p = 0; p < gradient.rows() / 9; ++p)
         for (int c = 0; c < 6; ++c) {
-          const auto [a, b] = kComponents[static_cast<std::size_t>(c)];
+          const auto [a, b] = kComponents[c];
           double sum = 0;
           for (int k = 0; k < 3; ++k)
             sum += gradient(9 * p + 3 * k + a, i) * gradient(9 * p + 3 * k + b, j) +

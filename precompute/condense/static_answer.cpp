@@ -27,12 +27,12 @@ std::unique_ptr<eigen::ShiftedFactor> factorise(const comm::Communicator& comm, 
 
 void read_own(const Nodal& nodal, const la::Columns& columns) {
   for (std::ptrdiff_t row = 0; row < columns.rows; ++row)
-    for (int j = 0; j < columns.count; ++j) columns.column(j)[row] = nodal[static_cast<std::size_t>(row * columns.count + j)];
+    for (int j = 0; j < columns.count; ++j) columns.column(j)[row] = nodal[row * columns.count + j];
 }
 
 void write_own(const la::Columns& columns, Nodal& nodal) {
   for (std::ptrdiff_t row = 0; row < columns.rows; ++row)
-    for (int j = 0; j < columns.count; ++j) nodal[static_cast<std::size_t>(row * columns.count + j)] = columns.column(j)[row];
+    for (int j = 0; j < columns.count; ++j) nodal[row * columns.count + j] = columns.column(j)[row];
 }
 
 }  // namespace
@@ -40,7 +40,7 @@ void write_own(const la::Columns& columns, Nodal& nodal) {
 comm::HaloExchange make_halo(const comm::Communicator& comm, const partition::LocalMesh& local) {
   const comm::IndexPartition owners(comm, local.free_nodes);
   std::vector<std::int32_t> numbers, places;
-  for (std::size_t i = static_cast<std::size_t>(local.owned_nodes); i < local.row.size(); ++i) {
+  for (std::size_t i = local.owned_nodes; i < local.row.size(); ++i) {
     if (local.row[i] < 0) continue;
     numbers.push_back(local.row[i]);
     places.push_back(static_cast<std::int32_t>(i));
@@ -51,7 +51,7 @@ comm::HaloExchange make_halo(const comm::Communicator& comm, const partition::Lo
 Nodal spread(const comm::Communicator& comm, comm::HaloExchange& halo, const partition::LocalMesh& local, const la::Columns& columns) {
   Nodal nodal = comm.agree([&] { return Nodal(3 * local.nodes_m.size() * static_cast<std::size_t>(columns.count), 0.0); });
   write_own(columns, nodal);
-  halo.copy_to_halo(nodal.data(), 3 * static_cast<std::size_t>(columns.count));
+  halo.copy_to_halo(nodal.data(), 3 * columns.count);
   return nodal;
 }
 
@@ -64,7 +64,7 @@ StaticAnswer::StaticAnswer(const comm::Communicator& comm, const partition::Loca
       rows_(3 * static_cast<std::ptrdiff_t>(local.free_nodes)),
       kept_count_(kept.count) {
   comm.agree([&] {
-    kept_.resize(static_cast<std::size_t>(rows_ * kept.count));
+    kept_.resize(rows_ * kept.count);
     images_.resize(kept_.size());
     for (int j = 0; j < kept.count; ++j) std::copy_n(kept.column(j), rows_, kept_.data() + j * rows_);
   });
@@ -73,8 +73,8 @@ StaticAnswer::StaticAnswer(const comm::Communicator& comm, const partition::Loca
 }
 
 la::Matrix StaticAnswer::solve(Nodal& loads, int width) {
-  halo_.sum_to_owner(loads.data(), 3 * static_cast<std::size_t>(width));
-  std::vector<double> values = comm_.agree([&] { return std::vector<double>(static_cast<std::size_t>(rows_ * width)); });
+  halo_.sum_to_owner(loads.data(), 3 * width);
+  std::vector<double> values = comm_.agree([&] { return std::vector<double>(rows_ * width); });
   const la::Columns columns{values.data(), rows_, rows_, width};
   const la::Columns kept{kept_.data(), rows_, rows_, kept_count_}, images{images_.data(), rows_, rows_, kept_count_};
   read_own(loads, columns);
@@ -85,7 +85,7 @@ la::Matrix StaticAnswer::solve(Nodal& loads, int width) {
   write_own(columns, loads);
   for (std::size_t i = 0; i < local_->row.size(); ++i)
     if (local_->row[i] < 0) std::fill_n(loads.begin() + static_cast<std::ptrdiff_t>(i) * 3 * width, 3 * width, 0.0);
-  halo_.copy_to_halo(loads.data(), 3 * static_cast<std::size_t>(width));
+  halo_.copy_to_halo(loads.data(), 3 * width);
   return work;
 }
 

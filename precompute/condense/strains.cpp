@@ -28,7 +28,7 @@ const Points& get_rule_of_degree_2() {
     Points points;
     for (int i = 0; i < 4; ++i) {
       fem::Point point{{b, b, b, b}, 0.25};
-      point.at[static_cast<std::size_t>(i)] = a;
+      point.at[i] = a;
       points.push_back(point);
     }
     return points;
@@ -45,9 +45,9 @@ Matrix6 make_stiffness(const fem::Solid& solid) {
         c(a, b) = (a < 3 && b < 3 ? solid.displacement_lambda_pa : 0.0) + (a == b ? 2 * solid.lame_mu_pa : 0.0);
         continue;
       }
-      const auto [r, t] = kComponents[static_cast<std::size_t>(a)];
-      const auto [s, d] = kComponents[static_cast<std::size_t>(b)];
-      c(a, b) = solid.tensor_pa[static_cast<std::size_t>(27 * r + 9 * s + 3 * t + d)] * (a < 3 ? 1 : kShear) * (b < 3 ? 1 : kShear);
+      const auto [r, t] = kComponents[a];
+      const auto [s, d] = kComponents[b];
+      c(a, b) = solid.tensor_pa[27 * r + 9 * s + 3 * t + d] * (a < 3 ? 1 : kShear) * (b < 3 ? 1 : kShear);
     }
   return c;
 }
@@ -64,7 +64,7 @@ Strains::Strains(const partition::LocalMesh& local, const fem::Materials& materi
     bool curved = false;
     if (local.order == 2) {
       std::array<Vec3, 10> x;
-      for (std::size_t i = 0; i < 10; ++i) x[i] = local.nodes_m[static_cast<std::size_t>(nodes(e)[i])];
+      for (std::size_t i = 0; i < 10; ++i) x[i] = local.nodes_m[nodes(e)[i]];
       curved = !fem::is_straight(x);
     }
     is_curved_.push_back(static_cast<char>(curved));
@@ -74,19 +74,18 @@ Strains::Strains(const partition::LocalMesh& local, const fem::Materials& materi
 }
 
 std::span<const std::int32_t> Strains::nodes(std::int32_t e) const {
-  const auto width = static_cast<std::size_t>(local_->nodes_per_tet());
+  const std::size_t width = local_->nodes_per_tet();
   return {local_->tets.data() + static_cast<std::size_t>(e) * width, width};
 }
 
 void Strains::calc_points(std::int32_t e, ElementPoints& out) const {
   const auto numbers = nodes(e);
   std::array<Vec3, 10> x;
-  for (std::size_t i = 0; i < numbers.size(); ++i) x[i] = local_->nodes_m[static_cast<std::size_t>(numbers[i])];
+  for (std::size_t i = 0; i < numbers.size(); ++i) x[i] = local_->nodes_m[numbers[i]];
   out.nodes = static_cast<int>(numbers.size());
   if (out.nodes == 4) {  // as a T10 with straight sides, whose corners' slopes of the barycentric coordinates are those of the T4
     for (std::size_t i = 0; i < 6; ++i)
-      for (std::size_t k = 0; k < 3; ++k)
-        x[4 + i][k] = (x[static_cast<std::size_t>(mesh::kEdges[i][0])][k] + x[static_cast<std::size_t>(mesh::kEdges[i][1])][k]) / 2;
+      for (std::size_t k = 0; k < 3; ++k) x[4 + i][k] = (x[mesh::kEdges[i][0]][k] + x[mesh::kEdges[i][1]][k]) / 2;
     const fem::Jacobian jacobian = fem::calc_jacobian(x, fem::calc_shape({0.25, 0.25, 0.25, 0.25}));
     out.volume_m3.assign(1, jacobian.determinant / 6);
     out.at.assign(1, {0.25, 0.25, 0.25, 0.25});
@@ -100,7 +99,7 @@ void Strains::calc_points(std::int32_t e, ElementPoints& out) const {
   }
   static const std::vector<fem::Shape> kStraight = fem::calc_shapes(get_rule_of_degree_2());
   static const std::vector<fem::Shape> kCurved = fem::calc_shapes(fem::get_rule_of_degree_5());
-  const bool curved = is_curved_[static_cast<std::size_t>(e)] != 0;
+  const bool curved = is_curved_[e] != 0;
   const Points& rule = curved ? fem::get_rule_of_degree_5() : get_rule_of_degree_2();
   const std::vector<fem::Shape>& shapes = curved ? kCurved : kStraight;
   out.volume_m3.resize(rule.size());
@@ -123,14 +122,14 @@ void Strains::scale(std::int32_t e, const ElementPoints& points, RowMatrix& stra
     double volume = 0;
     strains.row(mean).setZero();
     for (int p = 0; p < points.point_count(); ++p) {
-      const double w = points.volume_m3[static_cast<std::size_t>(p)];
+      const double w = points.volume_m3[p];
       volume += w;
       strains.row(mean) += w * (strains.row(6 * p) + strains.row(6 * p + 1) + strains.row(6 * p + 2));
     }
     strains.row(mean) *= std::sqrt(solid.mean_dilatation_modulus_pa / volume);
   }
   for (int p = 0; p < points.point_count(); ++p) {
-    const double w = std::sqrt(points.volume_m3[static_cast<std::size_t>(p)]);
+    const double w = std::sqrt(points.volume_m3[p]);
     for (int a = 0; a < 6; ++a) {  // U is upper: rows above are done, those below are still strains
       auto row = strains.row(6 * p + a);
       row *= w * solid.root(a, a);
@@ -144,10 +143,10 @@ void Strains::calc_linear(std::int32_t e, const ElementPoints& points, RowMatrix
   b.setZero(row_count(e), 3 * points.nodes);
   for (int p = 0; p < points.point_count(); ++p)
     for (int c = 0; c < 6; ++c) {
-      const auto [k, l] = kComponents[static_cast<std::size_t>(c)];
+      const auto [k, l] = kComponents[c];
       const double factor = c < 3 ? 0.5 : 0.5 * kShear;
       for (int i = 0; i < points.nodes; ++i) {
-        const double* slope = points.slope[static_cast<std::size_t>(p)].data() + 3 * i;
+        const double* slope = points.slope[p].data() + 3 * i;
         b(6 * p + c, 3 * i + k) += factor * slope[l];
         b(6 * p + c, 3 * i + l) += factor * slope[k];
       }
@@ -168,9 +167,7 @@ void Strains::calc_gradients(const ElementPoints& points, const RowMatrix& value
   for (int p = 0; p < points.point_count(); ++p)
     for (int i = 0; i < points.nodes; ++i)
       for (int a = 0; a < 3; ++a)
-        for (int k = 0; k < 3; ++k)
-          gradients.row(9 * p + 3 * a + k) +=
-              points.slope[static_cast<std::size_t>(p)][static_cast<std::size_t>(3 * i + k)] * values.row(3 * i + a);
+        for (int k = 0; k < 3; ++k) gradients.row(9 * p + 3 * a + k) += points.slope[p][3 * i + k] * values.row(3 * i + a);
 }
 
 void Strains::calc_pair_strains(std::int32_t e, const ElementPoints& points, const RowMatrix& gradients, const Pairs& pairs,
@@ -178,7 +175,7 @@ void Strains::calc_pair_strains(std::int32_t e, const ElementPoints& points, con
   z.resize(row_count(e), count);
   for (int p = 0; p < points.point_count(); ++p)
     for (int c = 0; c < 6; ++c) {
-      const auto [k, l] = kComponents[static_cast<std::size_t>(c)];
+      const auto [k, l] = kComponents[c];
       const double factor = c < 3 ? 0.5 : 0.5 * kShear;
       for (std::ptrdiff_t j = 0; j < pairs.modes; ++j) {  // pairs (0, j) ... (j, j) follow each other
         const std::ptrdiff_t column = pairs.find(0, j);
@@ -201,7 +198,7 @@ void Strains::calc_square_strains(std::int32_t e, const ElementPoints& points, c
   z.setZero(row_count(e), gradients.cols());
   for (int p = 0; p < points.point_count(); ++p)
     for (int c = 0; c < 6; ++c) {
-      const auto [k, l] = kComponents[static_cast<std::size_t>(c)];
+      const auto [k, l] = kComponents[c];
       const double factor = c < 3 ? 0.5 : 0.5 * kShear;
       for (int a = 0; a < 3; ++a)
         z.row(6 * p + c).array() += factor * gradients.row(9 * p + 3 * a + k).array() * gradients.row(9 * p + 3 * a + l).array();
@@ -211,7 +208,7 @@ void Strains::calc_square_strains(std::int32_t e, const ElementPoints& points, c
 
 la::Matrix Strains::calc_stress(std::int32_t e, const ElementPoints& points, int point, const Eigen::Ref<const la::Matrix>& values) const {
   const ScaledSolid& solid = solids_[material(e)];
-  const double w = points.volume_m3[static_cast<std::size_t>(point)];
+  const double w = points.volume_m3[point];
   la::Matrix stress = std::sqrt(w) * solid.root.transpose() * values.middleRows(6 * point, 6);
   stress.bottomRows(3) /= kShear;
   if (solid.mean_dilatation_modulus_pa > 0) {

@@ -41,7 +41,7 @@ class Strains {
 
   std::int32_t element_count() const { return static_cast<std::int32_t>(first_row_.size()) - 1; }
   /// Rows of the elements before e; of all of this rank at element_count().
-  std::int64_t first_row(std::int32_t e) const { return first_row_[static_cast<std::size_t>(e)]; }
+  std::int64_t first_row(std::int32_t e) const { return first_row_[e]; }
   int row_count(std::int32_t e) const { return static_cast<int>(first_row(e + 1) - first_row(e)); }
   std::span<const std::int32_t> nodes(std::int32_t e) const;
 
@@ -68,7 +68,7 @@ class Strains {
     Matrix6 root = Matrix6::Zero();
     double mean_dilatation_modulus_pa = 0;
   };
-  std::size_t material(std::int32_t e) const { return static_cast<std::size_t>(materials_->find(e)); }
+  std::size_t material(std::int32_t e) const { return materials_->find(e); }
   /// Scales rows of Mandel's strains in place and adds the row of the mean.
   void scale(std::int32_t e, const ElementPoints& points, RowMatrix& strains) const;
 

@@ -267,8 +267,7 @@ la::Vector calc_pair_scale(const std::vector<double>& omega) {
   const Pairs pairs{to_index(omega.size())};
   la::Vector scale(pairs.count());
   for (std::ptrdiff_t i = 0; i < pairs.modes; ++i)
-    for (std::ptrdiff_t j = i; j < pairs.modes; ++j)
-      scale[pairs.find(i, j)] = 1 / (omega[static_cast<std::size_t>(i)] * omega[static_cast<std::size_t>(j)]);
+    for (std::ptrdiff_t j = i; j < pairs.modes; ++j) scale[pairs.find(i, j)] = 1 / (omega[i] * omega[j]);
   return scale;
 }
 

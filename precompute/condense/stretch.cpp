@@ -12,24 +12,22 @@
 namespace carillon::condense {
 
 la::Vector calc_mean_shares(const CoupledBody& body, const StressFields& fields, std::ptrdiff_t count) {
-  std::vector<double> sums(static_cast<std::size_t>(6 * count + 1), 0.0);  // of each field, and the volume
+  std::vector<double> sums(6 * count + 1, 0.0);  // of each field, and the volume
   body.comm.agree([&] {
     ElementPoints points;
     for (std::int32_t e = 0; e < body.strains.element_count(); ++e) {
       body.strains.calc_points(e, points);
       for (int p = 0; p < points.point_count(); ++p) {
-        const double volume = points.volume_m3[static_cast<std::size_t>(p)];
+        const double volume = points.volume_m3[p];
         sums.back() += volume;
         for (std::ptrdiff_t r = 0; r < count; ++r)
-          for (int c = 0; c < 6; ++c)
-            sums[static_cast<std::size_t>(6 * r + c)] += std::sqrt(volume) * fields.values(body.strains.first_row(e) + 6 * p + c, r);
+          for (int c = 0; c < 6; ++c) sums[6 * r + c] += std::sqrt(volume) * fields.values(body.strains.first_row(e) + 6 * p + c, r);
       }
     }
   });
   body.comm.sum(sums);
   la::Vector shares(count);
-  for (std::ptrdiff_t r = 0; r < count; ++r)
-    shares[r] = Eigen::Map<const la::Vector>(&sums[static_cast<std::size_t>(6 * r)], 6).squaredNorm() / sums.back();
+  for (std::ptrdiff_t r = 0; r < count; ++r) shares[r] = Eigen::Map<const la::Vector>(&sums[6 * r], 6).squaredNorm() / sums.back();
   return shares;
 }
 

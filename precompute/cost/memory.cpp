@@ -41,7 +41,7 @@ double calc_coupling_bytes(const ProblemSize& size) {
 /// By log2 of the ranks; further doublings by the step.
 double find_growth(const std::array<double, 3>& growth, double step, int ranks) {
   const double doublings = std::log2(static_cast<double>(ranks));
-  const auto index = static_cast<std::size_t>(doublings);
+  const std::size_t index = doublings;
   if (index + 1 >= growth.size()) return growth.back() + step * (doublings + 1 - static_cast<double>(growth.size()));
   return growth[index] + (doublings - std::floor(doublings)) * (growth[index + 1] - growth[index]);
 }

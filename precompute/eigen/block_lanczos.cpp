@@ -110,7 +110,7 @@ void BlockLanczos::restart(RitzPairs& pairs, const RitzSelection& selection) {
   const int max = std::max(size - 2 * block, 1);
   const int kept = std::clamp(std::max(static_cast<int>(selection.converged) + block, (static_cast<int>(goal_.wanted) + size) / 2), 1, max);
   la::Vector theta(kept);
-  for (int j = 0; j < kept; ++j) theta[j] = pairs.theta[selection.order[static_cast<std::size_t>(j)]];
+  for (int j = 0; j < kept; ++j) theta[j] = pairs.theta[selection.order[j]];
   basis_.restart(theta, pick_vectors(pairs, selection, kept));
   last_size_ = basis_.size();
   orthogonaliser_.reset();
@@ -127,7 +127,7 @@ la::Matrix BlockLanczos::calc_purified(const RitzPairs& pairs, const RitzSelecti
   la::Matrix purified = la::Matrix::Zero(n + r.rows(), count);
   purified.topRows(n) = picked;
   for (int j = 0; j < count; ++j) {
-    const double theta = pairs.theta[selection.order[static_cast<std::size_t>(j)]];
+    const double theta = pairs.theta[selection.order[j]];
     for (int k = 0; k < r.rows(); ++k) {
       for (int i = 0; i < width; ++i) purified(n + k, j) += r(k, i) * picked(n - width + i, j) / theta;
     }
@@ -151,21 +151,21 @@ void BlockLanczos::finish(RitzPairs& pairs, const RitzSelection& selection) {
 // What a skipped projection leaves is rounding along the pairs nearest the shift, by their large theta. These are the most exact ones, so
 // it is the others that are made orthogonal to them, block by block.
 void BlockLanczos::clear_nearest(const RitzPairs& pairs, const RitzSelection& selection, int count) {
-  std::vector<int> order(static_cast<std::size_t>(count));
+  std::vector<int> order(count);
   std::iota(order.begin(), order.end(), 0);
-  const auto theta = [&](int j) { return std::abs(pairs.theta[selection.order[static_cast<std::size_t>(j)]]); };
+  const auto theta = [&](int j) { return std::abs(pairs.theta[selection.order[j]]); };
   std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return theta(a) > theta(b); });
   const Columns found = basis_.columns(0, count);
   const Columns w = inner_.w();
   for (int first = 0; first < std::min(count, kPurifiedAgainst); first += basis_.block()) {
     const int width = std::min(basis_.block(), count - first);
     const Columns nearest = w.part(0, width);
-    for (int j = 0; j < width; ++j) std::copy_n(found.column(order[static_cast<std::size_t>(first + j)]), w.rows, nearest.column(j));
+    for (int j = 0; j < width; ++j) std::copy_n(found.column(order[first + j]), w.rows, nearest.column(j));
     inner_.multiply();
     la::Matrix products = inner_.calc_products(inner_.z().part(0, width), found);
     for (int place = 0; place < std::min(first + width, count); ++place) {  // Nearer ones stay as they are.
       const int from = std::max(place - first, 0);
-      products.col(order[static_cast<std::size_t>(place)]).segment(from, width - from).setZero();
+      products.col(order[place]).segment(from, width - from).setZero();
     }
     la::subtract_product(nearest, products.data(), width, found);
   }

@@ -90,8 +90,8 @@ struct Basis {
 };
 
 Basis calc_basis(const Operators& operators, const NodeLayout& nodes, const Box& box, const Columns& phi, int form) {
-  const auto count = static_cast<std::size_t>(phi.count);
-  std::vector<double> weight(static_cast<std::size_t>(phi.rows));
+  const std::size_t count = phi.count;
+  std::vector<double> weight(phi.rows);
   for (std::size_t i = 0; i < weight.size(); ++i)
     weight[i] = operators.mass_diagonal[i] * calc_weight(box, nodes.nodes_m[i / 3], nodes.component[i / 3], i % 3, form);
   std::vector<double> space(weight.size() * count);

@@ -97,7 +97,7 @@ void multiply_and_sum(const Operators& operators, const Columns& phi, int first,
   if (!operators.mass.is_diagonal()) operators.mass.pack(phi, first, packed_for_mass);
   const std::vector<Row>& for_mass = operators.mass.is_diagonal() ? packed : packed_for_mass;
   total = {};
-  const auto nodes = static_cast<std::size_t>(phi.rows / 3);
+  const std::size_t nodes = phi.rows / 3;
   for (std::size_t node = 0; node < nodes; node += kNodes) {
     const std::size_t count = std::min(kNodes, nodes - node);
     operators.stiffness.multiply_rows(packed.data(), node, count, k_rows);
@@ -128,7 +128,7 @@ ModeErrors normalise_and_measure(const Operators& operators, std::vector<double>
   if (modes == 0) return errors;
   const LocalColumns access(shapes);
   const Columns phi = access.view();
-  const auto rows = static_cast<std::size_t>(phi.rows);
+  const std::size_t rows = phi.rows;
   std::vector<Row> packed, packed_for_mass;
   std::vector<double> square(modes);  // phi^T M phi
   const la::Matrix gram = calc_gram(operators.comm, phi, [&](int wide, const Columns& m_phi) {
@@ -147,7 +147,7 @@ ModeErrors normalise_and_measure(const Operators& operators, std::vector<double>
         for (int c = 0; c < width; ++c) near.column[c] += calc_delta(c);
       }
       for (int c = 0; c < width; ++c) {
-        const auto j = static_cast<std::size_t>(first + c);
+        const std::size_t j = first + c;
         const double delta = calc_delta(c);
         const double residual = sums[kRR].column[c] - 2 * delta * sums[kRMPhi].column[c] + delta * delta * sums[kMPhiMPhi].column[c];
         square[j] = sums[kPhiMPhi].column[c];
@@ -193,7 +193,7 @@ void orthonormalise_shapes(const Operators& operators, Mat shapes) {
 void orient_shapes(Mat shapes, const std::vector<Vec3>& nodes_m) {
   const comm::Communicator comm = petsc::get_communicator(shapes);
   const LocalColumns phi(shapes);
-  const auto modes = static_cast<std::size_t>(phi.columns);
+  const std::size_t modes = phi.columns;
   std::vector<double> largest(modes, 0.0);
   for (std::size_t j = 0; j < modes; ++j) {
     const double* column = phi.column(static_cast<PetscInt>(j));
@@ -218,7 +218,7 @@ void orient_shapes(Mat shapes, const std::vector<Vec3>& nodes_m) {
     const double* column = phi.column(static_cast<PetscInt>(j));
     for (PetscInt i = 0; i < phi.rows; ++i) {
       if (std::abs(column[i]) < (1 - kTieTolerance) * largest[j]) continue;
-      const Vec3& x = nodes_m[static_cast<std::size_t>(i / 3)];
+      const Vec3& x = nodes_m[i / 3];
       const Candidate candidate{x[0], x[1], x[2], static_cast<double>(i % 3), column[i]};
       if (comes_first(candidate, mine[j])) mine[j] = candidate;
     }

@@ -53,14 +53,14 @@ std::vector<double> NumberReader::get_doubles(std::int64_t max) {
   const std::int64_t left = static_cast<std::int64_t>((bytes_.size() - at_) / sizeof(double));
   const std::int64_t count = get_count(0, std::min(max, left));
   std::vector<double> values;
-  values.reserve(static_cast<std::size_t>(count));
+  values.reserve(count);
   for (std::int64_t i = 0; i < count; ++i) values.push_back(get_double());
   return values;
 }
 
 std::string NumberReader::get_text() {
   const std::int64_t size = get_count(0, static_cast<std::int64_t>(bytes_.size() - at_));
-  std::string text(static_cast<std::size_t>(size), '\0');
+  std::string text(size, '\0');
   take(text.data(), text.size());
   return text;
 }

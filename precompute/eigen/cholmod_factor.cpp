@@ -23,9 +23,9 @@ class CholmodFactor final : public ShiftedFactor {
     check(MatGetSize(pencil.stiffness, &n, nullptr));
     is_given_ = !elimination_position.empty();
     if (is_given_) {
-      std::vector<PetscInt> pivot_rows(static_cast<std::size_t>(n));
+      std::vector<PetscInt> pivot_rows(n);
       for (std::size_t node = 0; node < elimination_position.size(); ++node) {
-        const auto place = static_cast<std::size_t>(3 * elimination_position[node]);
+        const std::size_t place = 3 * elimination_position[node];
         for (std::size_t d = 0; d < 3; ++d) pivot_rows[place + d] = static_cast<PetscInt>(3 * node + d);
       }
       check(ISCreateGeneral(PETSC_COMM_SELF, n, pivot_rows.data(), PETSC_COPY_VALUES, order_.out()));

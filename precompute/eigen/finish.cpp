@@ -149,8 +149,8 @@ void Finisher::run() {
 // Degenerate modes past max_modes have served to make the basis of their cluster.
 void drop_beyond(std::int64_t limit, Modes& modes) {
   if (static_cast<std::int64_t>(modes.lambda.size()) <= limit) return;
-  modes.lambda.resize(static_cast<std::size_t>(limit));
-  modes.residual.resize(static_cast<std::size_t>(limit));
+  modes.lambda.resize(limit);
+  modes.residual.resize(limit);
   std::vector<Cluster>& clusters = modes.proof.clusters;
   for (Cluster& cluster : clusters) cluster.count = std::min(cluster.count, limit - cluster.first);
   std::erase_if(clusters, [](const Cluster& cluster) { return cluster.count < 2; });

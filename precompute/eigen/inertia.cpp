@@ -110,7 +110,7 @@ std::int64_t InertiaCounter::count_negative() {
   const Columns solved{space.data() + size, rows, rows, rigid};
   for (int j = 0; j < rigid; ++j) {
     const PetscScalar* values = nullptr;
-    check(MatMult(problem_.mass, rigid_[static_cast<std::size_t>(j)], image));
+    check(MatMult(problem_.mass, rigid_[j], image));
     check(VecGetArrayRead(image, &values));
     std::transform(values, values + rows, images.column(j), [&](double x) { return pencil_.mass_factor * x; });
     check(VecRestoreArrayRead(image, &values));

@@ -350,7 +350,7 @@ LockedModes FoundModes::find_above(double low) const {
   LockedModes locked;
   const auto first = static_cast<int>(std::find_if(lambda.begin(), lambda.end(), [&](double x) { return x > low; }) - lambda.begin());
   const int count = static_cast<int>(lambda.size()) - first;
-  locked.lambda.assign(static_cast<std::size_t>(rigid_count_), 0.0);
+  locked.lambda.assign(rigid_count_, 0.0);
   locked.lambda.insert(locked.lambda.end(), lambda.begin() + first, lambda.end());
   if (rigid_count_ > 0) locked.sets.push_back(LocalColumns(rigid_).view());
   if (count > 0) locked.sets.push_back(LocalColumns(columns_).view().part(first, count));
@@ -360,7 +360,7 @@ LockedModes FoundModes::find_above(double low) const {
 petsc::MatHandle FoundModes::take(const std::vector<std::size_t>& order) {
   petsc::MatHandle result;
   if (!order.empty()) {
-    if (order.size() == static_cast<std::size_t>(capacity_)) {
+    if (std::ssize(order) == capacity_) {
       const LocalColumns columns(columns_);
       permute_columns(columns.view(), order);
       result = std::move(columns_);

@@ -18,7 +18,7 @@ class LdltFactor final : public ShiftedFactor {
   }
   std::int64_t get_negative_pivots() const override { return factor_.get_negative_pivots(); }
   double get_backward_error() const override { return factor_.get_backward_error(); }
-  std::int64_t get_peak_bytes() const override { return factor_.get_analysis().ranks[static_cast<std::size_t>(rank_)].peak_bytes; }
+  std::int64_t get_peak_bytes() const override { return factor_.get_analysis().ranks[rank_].peak_bytes; }
   std::string get_solver() const override { return "carillon L D L^T"; }
   std::string get_ordering() const override { return "METIS nested dissection, a separator tree over the ranks"; }
   std::int64_t get_entries() const override { return factor_.get_analysis().entries; }

@@ -197,7 +197,7 @@ MumpsFactor::MumpsFactor(const la::Pencil& pencil, const std::vector<std::int32_
   constexpr int kOrderGiven = 1, kOrderChosen = 7;
   s.icntl(7) = is_given ? kOrderGiven : own_ordering >= 0 ? own_ordering : kOrderChosen;
   if (is_given && comm.is_root()) {
-    s.permutation.resize(static_cast<std::size_t>(n));
+    s.permutation.resize(n);
     for (std::size_t node = 0; node < elimination_position.size(); ++node) {
       for (std::size_t d = 0; d < 3; ++d) s.permutation[3 * node + d] = static_cast<MUMPS_INT>(3 * elimination_position[node] + d + 1);
     }
@@ -250,7 +250,7 @@ bool MumpsFactor::factorise(double sigma) {
 void MumpsFactor::State::prepare_solution(int columns) {
   const int local = std::max(mumps.info[22], 1);  // INFO(23): the pivots on this rank.
   solution.assign(static_cast<std::size_t>(local) * static_cast<std::size_t>(columns), 0.0);
-  solution_rows.assign(static_cast<std::size_t>(local), 0);
+  solution_rows.assign(local, 0);
   mumps.sol_loc = solution.data();
   mumps.isol_loc = solution_rows.data();
   mumps.lsol_loc = local;
@@ -260,7 +260,7 @@ void MumpsFactor::State::make_scatter() {
   const int local = mumps.info[22];
   check(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, local, nullptr, solution_vec.out()));
   check(MatCreateVecs(pencil.stiffness, result_vec.out(), nullptr));
-  std::vector<PetscInt> rows(static_cast<std::size_t>(local));
+  std::vector<PetscInt> rows(local);
   for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = solution_rows[i] - 1;
   petsc::IsHandle to;
   petsc::IsHandle from;

@@ -135,7 +135,7 @@ LockedRange DeflationEstimate::find_columns_to_project(const LanczosStep& step, 
   scale_ = calc_largest(alpha);
   if (rows == 0 || clean_ == 0 || last_.size() != predicted_.size() || before_.size() != std::ptrdiff_t{rows} * old) return all();
   for (int j = 0; j < b; ++j) {
-    for (int i = 0; i < rows; ++i) predicted_(i, j) = theta_[static_cast<std::size_t>(i)] * last_(i, j);
+    for (int i = 0; i < rows; ++i) predicted_(i, j) = theta_[i] * last_(i, j);
   }
   gemm(Transpose::kNo, rows, b, b, -1, last_.data(), rows, alpha.data(), b, 1, predicted_.data(), rows);
   gemm(Transpose::kNo, rows, b, old, -1, before_.data(), rows, find_coupling(step), step.t.rows(), 1, predicted_.data(), rows);
@@ -143,7 +143,7 @@ LockedRange DeflationEstimate::find_columns_to_project(const LanczosStep& step, 
   std::vector<double> loss = noise_;
   for (int j = 0; j < b; ++j) {
     for (int i = 0; i < rows; ++i) {
-      double& x = loss[static_cast<std::size_t>(i)];
+      double& x = loss[i];
       x = std::max(x, std::abs(predicted_(i, j)));
     }
   }
@@ -160,8 +160,8 @@ void DeflationEstimate::update_noise(LockedRange range, const la::Matrix& c) {
   constexpr double kMaxRise = 100;  // by which one measurement raises what is expected
   for (int i = 0; i < range.count; ++i) {
     const int row = range.first + i;
-    double& noise = noise_[static_cast<std::size_t>(row)];
-    double& remaining = remaining_[static_cast<std::size_t>(row)];
+    double& noise = noise_[row];
+    double& remaining = remaining_[row];
     double measured = 0, predicted = 0;
     for (int j = 0; j < c.cols(); ++j) {
       measured = std::max(measured, std::abs(c(i, j)));
@@ -172,7 +172,7 @@ void DeflationEstimate::update_noise(LockedRange range, const la::Matrix& c) {
     } else if (measured > predicted) {
       noise *= measured < kMaxRise * predicted ? measured / predicted : kMaxRise;
       // An eigenvector that is not exact has a residual along a few directions, and the row jumps when the basis reaches them.
-      remaining = std::max(remaining, (measured - predicted) / std::max(std::abs(theta_[static_cast<std::size_t>(row)]), scale_));
+      remaining = std::max(remaining, (measured - predicted) / std::max(std::abs(theta_[row]), scale_));
     }
   }
 }
@@ -181,7 +181,7 @@ double DeflationEstimate::calc_returned(LockedRange range, const la::Matrix& c) 
   double largest = 0;
   for (int j = 0; j < c.cols(); ++j) {
     double sum = 0;
-    for (int i = 0; i < range.count; ++i) sum += remaining_[static_cast<std::size_t>(range.first + i)] * std::abs(c(i, j));
+    for (int i = 0; i < range.count; ++i) sum += remaining_[range.first + i] * std::abs(c(i, j));
     largest = std::max(largest, sum);
   }
   return largest;
@@ -200,7 +200,7 @@ void DeflationEstimate::advance(const LanczosStep& step, const la::Matrix& r, Lo
   last_ = la::Matrix::Zero(rows, next);
   if (!is_cleared) {
     for (int j = 0; j < next; ++j) {
-      for (int i = 0; i < rows; ++i) last_(i, j) = predicted_(i, j) + noise_[static_cast<std::size_t>(i)] * make_random(i, j);
+      for (int i = 0; i < rows; ++i) last_(i, j) = predicted_(i, j) + noise_[i] * make_random(i, j);
     }
     la::solve_upper_from_right(rows, step.width, r.data(), step.width, last_.data(), rows);
   }
@@ -209,7 +209,7 @@ void DeflationEstimate::advance(const LanczosStep& step, const la::Matrix& r, Lo
   for (int j = 0; j < next; ++j) {
     for (int i = from; i < to; ++i) last_(i, j) = kRounding * make_random(i, j);
     for (int i = 0; i < rows; ++i) {
-      double& remaining = remaining_[static_cast<std::size_t>(i)];
+      double& remaining = remaining_[i];
       remaining = std::max(remaining, std::abs(last_(i, j)));
     }
   }

@@ -61,23 +61,21 @@ std::vector<double> calc_ritz(const Operators& operators, const Columns& x, cons
 
 // The columns to M-norm one; first to an ordinary size, for near an eigenvalue a solution is huge.
 void normalise(const Operators& operators, const Columns& x, const Columns& work) {
-  const auto count = static_cast<std::size_t>(x.count);
+  const std::size_t count = x.count;
   const auto scale_all = [&](const std::vector<double>& by) {
     for (int j = 0; j < x.count; ++j) {
-      for (std::ptrdiff_t i = 0; i < x.rows; ++i) x.column(j)[i] /= by[static_cast<std::size_t>(j)];
+      for (std::ptrdiff_t i = 0; i < x.rows; ++i) x.column(j)[i] /= by[j];
     }
   };
   std::vector<double> largest(count, 0.0);
   for (int j = 0; j < x.count; ++j) {
-    for (std::ptrdiff_t i = 0; i < x.rows; ++i)
-      largest[static_cast<std::size_t>(j)] = std::max(largest[static_cast<std::size_t>(j)], std::abs(x.column(j)[i]));
+    for (std::ptrdiff_t i = 0; i < x.rows; ++i) largest[j] = std::max(largest[j], std::abs(x.column(j)[i]));
   }
   operators.comm.max(largest);
   scale_all(largest);
   operators.mass.multiply(x, work);
   std::vector<double> norm(count);
-  for (int j = 0; j < x.count; ++j)
-    norm[static_cast<std::size_t>(j)] = std::inner_product(x.column(j), x.column(j) + x.rows, work.column(j), 0.0);
+  for (int j = 0; j < x.count; ++j) norm[j] = std::inner_product(x.column(j), x.column(j) + x.rows, work.column(j), 0.0);
   operators.comm.sum(norm);
   for (double& square : norm) square = std::sqrt(square);
   scale_all(norm);
@@ -89,7 +87,7 @@ void calc_residuals(const Operators& operators, const Group& group, const std::v
   operators.stiffness.multiply(phi, residual);
   operators.mass.multiply(phi, work);
   for (int c = 0; c < phi.count; ++c) {
-    const double value = lambda[group[static_cast<std::size_t>(c)]];
+    const double value = lambda[group[c]];
     for (std::ptrdiff_t i = 0; i < phi.rows; ++i) residual.column(c)[i] -= value * work.column(c)[i];
   }
 }

@@ -52,7 +52,7 @@ Eigen::Matrix<double, 3, 6> calc_basis(const Body& body, const Vector3& x) {
 
 // Sums over the nodes of every component: count, position, and after the centres are known the second moments.
 std::vector<Body> calc_bodies(const comm::Communicator& comm, const NodeLayout& nodes) {
-  const auto count = static_cast<std::size_t>(nodes.component_count);
+  const std::size_t count = nodes.component_count;
   std::vector<double> sums(4 * count, 0.0);
   const auto for_each_node = [&](auto&& visit) {
     for (std::size_t i = 0; i < nodes.nodes_m.size(); ++i) visit(static_cast<std::size_t>(nodes.component[i]), to_vector(nodes.nodes_m[i]));
@@ -168,8 +168,8 @@ std::vector<petsc::VecHandle> make_rigid_modes(const la::Pencil& pencil, const N
   static const std::vector<Vec3> none;
   per_component.clear();
   for (std::int32_t c = 0; c < nodes.component_count; ++c) {
-    Body& body = bodies[static_cast<std::size_t>(c)];
-    const auto& fixed = static_cast<std::size_t>(c) < nodes.fixed.size() ? nodes.fixed[static_cast<std::size_t>(c)] : none;
+    Body& body = bodies[c];
+    const auto& fixed = static_cast<std::size_t>(c) < nodes.fixed.size() ? nodes.fixed[c] : none;
     body.motions = calc_admissible_motions(body, fixed);
     fill_motion(nodes, c, body, Eigen::Matrix<double, 6, 1>::Unit(0), candidate);
     const double unit = calc_mass_norm(mass, candidate, work);

@@ -39,16 +39,16 @@ double calc_gap(const la::Vector& theta, Eigen::Index i) {
 }
 
 void order_first(RitzSelection& selection, const std::vector<double>& lambda, const RitzGoal& goal) {
-  const auto at = [&](int i) { return lambda[static_cast<std::size_t>(i)]; };
+  const auto at = [&](int i) { return lambda[i]; };
   std::stable_sort(selection.order.begin(), selection.order.end(), [&](int a, int b) { return goal.comes_first(at(a), at(b)); });
-  const auto is_converged = [&](int i) { return selection.error[static_cast<std::size_t>(i)] <= goal.tolerance; };
+  const auto is_converged = [&](int i) { return selection.error[i] <= goal.tolerance; };
   selection.converged = std::find_if_not(selection.order.begin(), selection.order.end(), is_converged) - selection.order.begin();
   selection.is_complete = selection.converged >= goal.wanted;
 }
 
 void order_interval(RitzSelection& selection, const la::Vector& theta, const std::vector<double>& lambda, const RitzGoal& goal) {
-  const auto at = [&](int i) { return lambda[static_cast<std::size_t>(i)]; };
-  const auto error = [&](int i) { return selection.error[static_cast<std::size_t>(i)]; };
+  const auto at = [&](int i) { return lambda[i]; };
+  const auto error = [&](int i) { return selection.error[i]; };
   const auto is_inside = [&](int i) { return at(i) >= goal.low && at(i) <= goal.high; };
   std::vector<int>& order = selection.order;
   // Converged ones of the interval, the others of the interval, those beyond it by their nearness to the shift.
@@ -106,7 +106,7 @@ RitzSelection select(const RitzPairs& pairs, const RitzGoal& goal) {
   std::vector<double> lambda;
   for (Eigen::Index i = 0; i < pairs.theta.size(); ++i) {
     const double theta = pairs.theta[i];
-    const double residual = pairs.residual[static_cast<std::size_t>(i)];
+    const double residual = pairs.residual[i];
     const double error = goal.error(theta, residual);
     const double allowed = std::max(kVectorAngle * calc_gap(pairs.theta, i), kThetaRounding * std::abs(theta));
     selection.error.push_back(std::max(error, residual / allowed * goal.tolerance));
@@ -124,7 +124,7 @@ RitzSelection select(const RitzPairs& pairs, const RitzGoal& goal) {
 
 la::Matrix pick_vectors(const RitzPairs& pairs, const RitzSelection& selection, int count) {
   la::Matrix picked(pairs.theta.size(), count);
-  for (int j = 0; j < count; ++j) picked.col(j) = pairs.vectors.col(selection.order[static_cast<std::size_t>(j)]);
+  for (int j = 0; j < count; ++j) picked.col(j) = pairs.vectors.col(selection.order[j]);
   return picked;
 }
 

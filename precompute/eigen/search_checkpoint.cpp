@@ -64,7 +64,7 @@ void SearchCheckpoint::unpack(std::int64_t rows) {
   for (const std::int64_t power : powers_) {
     if (from.get_count(-4096, 4096) != power) throw InputError("it is of a problem in other units");
   }
-  steps_.resize(static_cast<std::size_t>(from.get_count(0, kMaxSteps)));
+  steps_.resize(from.get_count(0, kMaxSteps));
   for (SearchStep& step : steps_) {
     step.kind = from.get_count(SearchStep::kCount, SearchStep::kRound);
     for (double& value : step.asked) value = from.get_double();
@@ -230,19 +230,19 @@ void write(NumberWriter& to, const Proof& proof) {
 
 Proof read_proof(NumberReader& from, std::int64_t modes) {
   Proof proof;
-  proof.counts.resize(static_cast<std::size_t>(from.get_count(0, kMaxSteps)));
+  proof.counts.resize(from.get_count(0, kMaxSteps));
   for (Count& count : proof.counts) {
     count.freq_hz = from.get_double();
     count.below = from.get_count(0, kMax);
     count.margin = from.get_double();
     if (count.margin < 0) count.margin = std::numeric_limits<double>::infinity();
   }
-  proof.rigid_per_component.resize(static_cast<std::size_t>(from.get_count(0, 100 * kMaxSteps)));
+  proof.rigid_per_component.resize(from.get_count(0, 100 * kMaxSteps));
   for (std::int64_t& rigid : proof.rigid_per_component) rigid = from.get_count(0, 6);
   proof.found = from.get_count(0, kMax);
   proof.method = from.get_text();
   proof.factor_backward_error = from.get_double();
-  proof.clusters.resize(static_cast<std::size_t>(from.get_count(0, modes)));
+  proof.clusters.resize(from.get_count(0, modes));
   for (Cluster& cluster : proof.clusters) {
     cluster.first = from.get_count(0, modes);
     cluster.count = from.get_count(0, modes - cluster.first);

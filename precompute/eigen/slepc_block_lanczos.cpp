@@ -76,13 +76,13 @@ RitzGoal make_goal(EPS eps) {
 
 // Says how far the iteration is and asks SLEPc whether it is to end.
 bool report(EPS eps, const RitzPairs& pairs, const RitzSelection& selection, int steps) {
-  const auto n = static_cast<std::size_t>(pairs.theta.size());
+  const std::size_t n = pairs.theta.size();
   eps->its = steps;
   eps->nconv = static_cast<PetscInt>(std::min<std::int64_t>(selection.converged, pairs.theta.size()));
   for (std::size_t j = 0; j < n; ++j) {
     eps->eigr[j] = pairs.theta[selection.order[j]];
     eps->eigi[j] = 0;
-    eps->errest[j] = selection.error[static_cast<std::size_t>(selection.order[j])];
+    eps->errest[j] = selection.error[selection.order[j]];
   }
   const PetscInt nev = eps->which == EPS_ALL && !selection.is_complete ? std::max(eps->nev, eps->nconv + 1) : eps->nev;
   check((*eps->stopping)(eps, eps->its, eps->max_it, eps->nconv, nev, &eps->reason, eps->stoppingctx));

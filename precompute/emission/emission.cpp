@@ -160,7 +160,7 @@ void Emission::State::emit(std::int64_t k, const double* x, Frames source, const
   for (std::size_t r = 0; r < surfaces.runs.size(); ++r) {
     const Surfaces::Run& run = surfaces.runs[r];
     for (std::size_t begin = run.begin; begin < (poles ? run.middle : run.end); begin += kLane) {
-      const auto count = static_cast<std::size_t>(counts[begin / kLane]);
+      const std::size_t count = counts[begin / kLane];
       if (count == 0) continue;
       const double* from = source.data + begin / kLane * source.stride;
       loops->find_facets(x, surfaces.corners[begin].data(), &facets);

@@ -21,7 +21,7 @@ typedef std::int64_t Whole __attribute__((vector_size(8 * kWidth), aligned(8), m
 void add_places(double* __restrict sum, const double* __restrict u, const std::int32_t* __restrict node, std::size_t n, bool is_first) {
   for (std::size_t i = 0; i < n; ++i)
     for (std::size_t part = 0; part < 4; part += kQuad) {
-      const Quad x = *reinterpret_cast<const Quad*>(u + 4 * static_cast<std::size_t>(node[i]) + part);
+      const Quad x = *reinterpret_cast<const Quad*>(u + 4 * node[i] + part);
       Quad* to = reinterpret_cast<Quad*>(sum + 4 * i + part);
       if (is_first)
         *to = x;
@@ -40,7 +40,7 @@ void add_numbers(double* __restrict open, const double* __restrict sum, const do
     Quad x[4 / kQuad]{};
     for (std::size_t part = 0; part < 4 / kQuad; ++part) {
       if (kHasSum) x[part] = *reinterpret_cast<const Quad*>(sum + 4 * i + kQuad * part);
-      if (kHasStep) x[part] += *reinterpret_cast<const Quad*>(u + 4 * static_cast<std::size_t>(node[i]) + kQuad * part);
+      if (kHasStep) x[part] += *reinterpret_cast<const Quad*>(u + 4 * node[i] + kQuad * part);
     }
     Wide* to = reinterpret_cast<Wide*>(open + kNumbers * i);
 #if defined(__AVX512F__)

@@ -24,16 +24,14 @@ LowPass::LowPass(std::size_t rows, int values, double first)
     : rows_(rows), weight_(static_cast<std::size_t>(values)), open_(rows * kSlots, 0.0), waiting_(rows * kTogether, 0.0) {
   double total = 0.0;
   for (int i = 0; i < values; ++i)
-    for (int s = 0; s < kSlots; ++s)
-      total += weight_[static_cast<std::size_t>(i)][static_cast<std::size_t>(s)] =
-          calc_kernel((first + i) / values + (kHalf - 1) - s, kHalfWidth);
+    for (int s = 0; s < kSlots; ++s) total += weight_[i][s] = calc_kernel((first + i) / values + (kHalf - 1) - s, kHalfWidth);
   for (auto& weight : weight_)
     for (std::size_t s = 0; s < kSlots; ++s) weight[s + kSlots] = weight[s] /= total;
 }
 
 void LowPass::add(int i, const double* value) {
   // Slot s of the ring has the weight of place (s - ring_) mod kSlots.
-  const double* weight = weight_[static_cast<std::size_t>(i)].data() + (kSlots - ring_) % kSlots;
+  const double* weight = weight_[i].data() + (kSlots - ring_) % kSlots;
   std::copy_n(value, rows_, waiting_.begin() + static_cast<std::ptrdiff_t>(waiting_count_ * rows_));
   waiting_weight_[waiting_count_++] = weight;
   if (waiting_count_ == kTogether) take_in();
@@ -47,7 +45,7 @@ void LowPass::take_in() {
 
 void LowPass::close(double* out) {
   take_in();
-  const auto slot = static_cast<std::size_t>(ring_);
+  const std::size_t slot = ring_;
   const double scale = weights_[slot] > 0.0 ? 1.0 / weights_[slot] : 0.0;
   for (std::size_t row = 0; row < rows_; ++row) {
     double& open = open_[row * kSlots + slot];

@@ -58,7 +58,7 @@ void MotionFilter::set_rate(int steps_per_sample) {
   shift_ = 0.5 * (box_ - 1) / box_;
   if (has_speed()) change_ = join(before * values_, end, shift_);
   // Of all values around one half-sample: the moment that a shift leaves is taken out, since all have the same one.
-  weight_.assign(static_cast<std::size_t>(values_), {});
+  weight_.assign(values_, {});
   distance_ = weight_;
   double sum = 0.0, moment = 0.0, square = 0.0;
   for (int pass = 0; pass < 2; ++pass)
@@ -66,8 +66,8 @@ void MotionFilter::set_rate(int steps_per_sample) {
       for (int s = 0; s < kEntry; ++s) {
         const double x = (i + shift_) / values_ + 1 - s, first = calc_entry(x);
         const double weight = pass == 0 ? first : first * (square - moment * x) / (sum * square - moment * moment);
-        weight_[static_cast<std::size_t>(i)][static_cast<std::size_t>(s)] = weight;
-        distance_[static_cast<std::size_t>(i)][static_cast<std::size_t>(s)] = weight * x;
+        weight_[i][s] = weight;
+        distance_[i][s] = weight * x;
         if (pass > 0) continue;
         sum += first;
         moment += first * x;
@@ -96,7 +96,7 @@ void MotionFilter::keep(const double* u) {
   for (std::size_t v = 0; v < surfaces_.node.size(); ++v)
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const std::size_t at = 4 * v + axis;
-      const double value = ((box_ > 1 ? sum_[at] : 0.0) + u[4 * static_cast<std::size_t>(surfaces_.node[v]) + axis]) / box_;
+      const double value = ((box_ > 1 ? sum_[at] : 0.0) + u[4 * surfaces_.node[v] + axis]) / box_;
       slope_[at] = per_time * (value - last_[at]);
       last_[at] = value;
     }
@@ -116,7 +116,7 @@ void MotionFilter::feed_uniform(std::int64_t count) {
 void MotionFilter::push_uniform(std::int64_t j) {
   const double time = static_cast<double>(j) - last_at_;
   for (std::size_t v = 0; v < surfaces_.row.size(); ++v) {
-    const auto row = static_cast<std::size_t>(surfaces_.row[v]);
+    const std::size_t row = surfaces_.row[v];
     double* to = ring_.get(row, j).data + row % kLane;
     for (std::size_t axis = 0; axis < 3; ++axis) to[axis] = last_[4 * v + axis] + time * slope_[4 * v + axis];
   }
@@ -134,11 +134,11 @@ void MotionFilter::begin() {
 
 /// Of a box: sum_, and its last step u.
 void MotionFilter::feed(const double* u) {
-  const auto& weight = weight_[static_cast<std::size_t>(value_)];
-  const auto& distance = distance_[static_cast<std::size_t>(value_)];
+  const auto& weight = weight_[value_];
+  const auto& distance = distance_[value_];
   std::array<double, kEntry> by_slot;
   for (std::size_t s = 0; s < kEntry; ++s) {
-    const auto slot = static_cast<std::size_t>((half_ - 1 + static_cast<std::int64_t>(s)) & kSlot);
+    const std::size_t slot = (half_ - 1 + static_cast<std::int64_t>(s)) & kSlot;
     by_slot[slot] = change_[0] * weight[s] / box_;
     open_sum_[slot] += change_[0] * weight[s];
     open_moment_[slot] += change_[0] * distance[s];
@@ -151,7 +151,7 @@ void MotionFilter::feed(const double* u) {
 
 void MotionFilter::close_half() {
   const std::int64_t j = half_ - 1;
-  const auto slot = static_cast<std::size_t>(j & kSlot);
+  const std::size_t slot = j & kSlot;
   const double scale = 1.0 / open_sum_[slot], shift = open_moment_[slot] * scale;  // in half-samples
   loops_->close_value(open_.data(), surfaces_.node.size(), static_cast<int>(slot), scale, ring_.get(0, j));
   if (std::abs(shift) > 1e-9) {

@@ -24,8 +24,7 @@ PaperFilter::PaperFilter(const Surfaces& surfaces, double sample_rate_hz, int st
       sources_(pressure_) {}
 
 void PaperFilter::add_step(const double* u) {
-  for (std::size_t v = 0; v < surfaces_.node.size(); ++v)
-    std::copy_n(u + 4 * static_cast<std::size_t>(surfaces_.node[v]), 3, now_.get() + surfaces_.row[v]);
+  for (std::size_t v = 0; v < surfaces_.node.size(); ++v) std::copy_n(u + 4 * surfaces_.node[v], 3, now_.get() + surfaces_.row[v]);
   advance();
 }
 

@@ -29,11 +29,11 @@ Spline make_spline() {
     for (int p = order; p >= 0; --p) {
       std::array<double, kSplinePoints + 1> next{};
       for (std::size_t d = 0; d < kSplinePoints; ++d) {
-        const double own = piece[static_cast<std::size_t>(p)][d], before = p > 0 ? piece[static_cast<std::size_t>(p) - 1][d] : 0.0;
+        const double own = piece[p][d], before = p > 0 ? piece[p - 1][d] : 0.0;
         next[d] += (p * own + (order + 1 - p) * before) / order;
         next[d + 1] += (own - before) / order;
       }
-      piece[static_cast<std::size_t>(p)] = next;
+      piece[p] = next;
     }
   Spline spline;
   for (std::size_t d = 0; d < kSplinePoints; ++d)
@@ -52,7 +52,7 @@ std::array<double, kReach + 1> make_filter() {
     for (int n = 1; n < base::kSincHalf * kParts; ++n)
       response += 2.0 * sinc.evaluate(static_cast<double>(n) / kParts) * std::cos(2.0 / kParts * turn * n);
     response /= std::pow(std::sin(0.5 * turn) / (0.5 * turn), kSplinePoints);
-    for (int j = 0; j <= kReach; ++j) filter[static_cast<std::size_t>(j)] += response * std::cos(turn * j);
+    for (int j = 0; j <= kReach; ++j) filter[j] += response * std::cos(turn * j);
   }
   double total = filter[0];
   for (std::size_t j = 1; j <= kReach; ++j) total += 2.0 * filter[j];
@@ -89,8 +89,7 @@ std::vector<double> Arrivals::sum(const comm::Communicator& comm) const {
   for (std::size_t n = 0; n < frames_; ++n) {
     const std::int64_t* now = all.data() + kReach + 2 * n;
     double sum = filter[0] * static_cast<double>(now[0]);
-    for (int j = 1; j <= kReach; ++j)
-      sum += filter[static_cast<std::size_t>(j)] * (static_cast<double>(now[j]) + static_cast<double>(now[-j]));
+    for (int j = 1; j <= kReach; ++j) sum += filter[j] * (static_cast<double>(now[j]) + static_cast<double>(now[-j]));
     pressure[n] = sum / kUnitsPerPa;
   }
   return pressure;

@@ -72,7 +72,7 @@ void Recorder::write_block(std::uint64_t number, bool& is_fine) {
     std::vector<float> all_scales(surfaces_.triangle_total);
     std::vector<std::int16_t> all_values(surfaces_.triangle_total * recording::kBlockFrames);
     for (std::size_t i = 0; i < scales.size(); ++i) {
-      const auto at = static_cast<std::size_t>(surfaces_.gathered_places[i]);
+      const std::size_t at = surfaces_.gathered_places[i];
       all_scales[at] = scales[i];
       std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(i * recording::kBlockFrames), recording::kBlockFrames,
                   all_values.begin() + static_cast<std::ptrdiff_t>(at * recording::kBlockFrames));

@@ -31,13 +31,13 @@ Screens::Screens(const Surfaces& surfaces, const SurfacePart& part, const Option
   for (const Triangle& corner : part.silent) own.insert(corner.begin(), corner.end());
   for (const std::int32_t one : own) {
     node_.push_back(one);
-    numbers.push_back(part.node_number[static_cast<std::size_t>(one)]);
-    for (const double x : part.nodes_m[static_cast<std::size_t>(one)]) rest_.push_back(x);
+    numbers.push_back(part.node_number[one]);
+    for (const double x : part.nodes_m[one]) rest_.push_back(x);
   }
   std::vector<std::array<std::int64_t, 3>> triangles;
   for (const Triangle& corner : part.silent) {
     triangles.emplace_back();
-    for (std::size_t c = 0; c < 3; ++c) triangles.back()[c] = part.node_number[static_cast<std::size_t>(corner[c])];
+    for (std::size_t c = 0; c < 3; ++c) triangles.back()[c] = part.node_number[corner[c]];
   }
   triangles_ = surfaces_.comm.all_gather(triangles);
   std::map<std::int64_t, std::int64_t> place_of;
@@ -53,7 +53,7 @@ void Screens::keep(std::int64_t k, const double* u) {
   if (static_cast<std::size_t>(k) % every_ != 0) return;
   double* to = get_places(k);
   for (std::size_t s = 0; s < node_.size(); ++s)
-    for (std::size_t axis = 0; axis < 3; ++axis) *to++ = rest_[3 * s + axis] + u[4 * static_cast<std::size_t>(node_[s]) + axis];
+    for (std::size_t axis = 0; axis < 3; ++axis) *to++ = rest_[3 * s + axis] + u[4 * node_[s] + axis];
   for (const Vec3& ball : balls_) to = std::copy(ball.begin(), ball.end(), to);
 }
 
@@ -62,7 +62,7 @@ void Screens::look(std::int64_t k, const double* x) {
   const std::vector<Vec3> vertices = surfaces_.gather_vertices(x);
   std::vector<Corners> triangles;
   for (const Triangle& corner : surfaces_.tables.triangles) {
-    const auto at = [&](std::size_t c) { return vertices[static_cast<std::size_t>(corner[c])]; };
+    const auto at = [&](std::size_t c) { return vertices[corner[c]]; };
     triangles.push_back({at(0), at(1), at(2)});
   }
   std::vector<job::RigidObstacle> walls = options_.walls;
@@ -70,7 +70,7 @@ void Screens::look(std::int64_t k, const double* x) {
     std::vector<Vec3> screen;
     for (std::size_t s = 0; s < node_.size(); ++s) screen.push_back(get_vertex(get_places(k), static_cast<std::int32_t>(3 * s)));
     screen = surfaces_.comm.all_gather(screen);
-    const auto at = [&](std::int64_t s) { return screen[static_cast<std::size_t>(s)]; };
+    const auto at = [&](std::int64_t s) { return screen[s]; };
     for (const auto& corner : triangles_) triangles.push_back({at(corner[0]), at(corner[1]), at(corner[2])});
   }
   for (std::size_t b = 0; b < balls_.size(); ++b)
@@ -80,7 +80,7 @@ void Screens::look(std::int64_t k, const double* x) {
   before_ = now_;
   for (std::size_t t = 0; t < surfaces_.get_slots(); ++t) {
     if (surfaces_.place[t] < 0) continue;
-    const Corners& corner = triangles[static_cast<std::size_t>(surfaces_.place[t])];
+    const Corners& corner = triangles[surfaces_.place[t]];
     const Vec3 centre = (1.0 / 3.0) * (corner[0] + corner[1] + corner[2]);
     const Vec3 out = cross(corner[1] - corner[0], corner[2] - corner[0]);
     for (std::size_t i = 0; i < options_.receivers.size(); ++i) {

@@ -17,7 +17,7 @@ Sources::Sources(const Surfaces& surfaces, double sample_rate_hz, double sound_s
   static_assert(recording::kPoleTaps == kPoleSpan);
   poles_.fill(Rows(has_poles ? surfaces.get_slots() : 0));
   for (const Surfaces::Run& run : surfaces.runs)
-    pole_.push_back(recording::make_pole(surfaces.tables.radius_m[static_cast<std::size_t>(run.body)], sample_rate_hz, sound_speed_m_s));
+    pole_.push_back(recording::make_pole(surfaces.tables.radius_m[run.body], sample_rate_hz, sound_speed_m_s));
 }
 
 std::optional<std::int64_t> Sources::calc(const MotionFilter& motion, std::int64_t k) {
@@ -39,7 +39,7 @@ std::optional<std::int64_t> Sources::calc(const MotionFilter& motion, std::int64
     // The flux of one side of a sheet is minus that of the other.
     if (has_twins_)
       for (std::size_t t = run.middle; t < run.end; ++t)
-        if (const auto twin = static_cast<std::size_t>(surfaces_.twin[t]); surfaces_.twin[t] >= 0)
+        if (const std::size_t twin = surfaces_.twin[t]; surfaces_.twin[t] >= 0)
           for (const std::size_t at : to)
             rates_.get(t / kLane * kLane).data[at + t % kLane] = -rates_.get(twin / kLane * kLane).data[at + twin % kLane];
   }

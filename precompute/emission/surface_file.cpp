@@ -77,8 +77,8 @@ void SurfaceFile::make(const SurfaceTables& tables) {
       const recording::Header::Shape shape = header_.get_shape(static_cast<Array>(i));
       std::array<hsize_t, 3> extent{};
       int ranks = 0;
-      while (ranks < 3 && shape.extent[static_cast<std::size_t>(ranks)] > 0) {
-        extent[static_cast<std::size_t>(ranks)] = shape.extent[static_cast<std::size_t>(ranks)];
+      while (ranks < 3 && shape.extent[ranks] > 0) {
+        extent[ranks] = shape.extent[ranks];
         ++ranks;
       }
       const bank::Hdf5Id space(H5Screate_simple(ranks, extent.data(), nullptr), H5Sclose, "a space");
@@ -119,7 +119,7 @@ void SurfaceFile::write(std::uint64_t offset, std::span<const std::byte> bytes) 
     if (done < 0 && errno == EINTR) continue;
     if (done <= 0) throw SystemError(fmt::format("{}: cannot be written: {}; make room and resume", part_.string(), std::strerror(errno)));
     offset += static_cast<std::uint64_t>(done);
-    bytes = bytes.subspan(static_cast<std::size_t>(done));
+    bytes = bytes.subspan(done);
   }
 }
 
@@ -132,7 +132,7 @@ void SurfaceFile::write_key(std::uint64_t key, std::span<const Vec3> places_m) {
   std::vector<Vec3> low(header_.bodies, {kMost, kMost, kMost}), high(header_.bodies, {-kMost, -kMost, -kMost}), centre(header_.bodies);
   std::vector<double> step(header_.bodies, 0.0);
   for (std::size_t v = 0; v < places_m.size(); ++v) {
-    const auto body = static_cast<std::size_t>(vertex_body_[v]);
+    const std::size_t body = vertex_body_[v];
     for (std::size_t axis = 0; axis < 3; ++axis) {
       low[body][axis] = std::min(low[body][axis], places_m[v][axis]);
       high[body][axis] = std::max(high[body][axis], places_m[v][axis]);
@@ -146,7 +146,7 @@ void SurfaceFile::write_key(std::uint64_t key, std::span<const Vec3> places_m) {
   }
   std::vector<std::array<std::int16_t, 3>> place(places_m.size());
   for (std::size_t v = 0; v < places_m.size(); ++v) {
-    const auto body = static_cast<std::size_t>(vertex_body_[v]);
+    const std::size_t body = vertex_body_[v];
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const double steps = step[body] > 0.0 ? std::round((places_m[v][axis] - centre[body][axis]) / step[body]) : 0.0;
       place[v][axis] = static_cast<std::int16_t>(std::clamp(steps, -32767.0, 32767.0));
@@ -171,7 +171,7 @@ void SurfaceFile::commit() {
     const ssize_t got = ::pread(descriptor_.get(), piece.data(), wanted, static_cast<off_t>(at));
     if (got < 0 && errno == EINTR) continue;
     if (got <= 0) throw SystemError(fmt::format("{}: cannot be read again: {}", part_.string(), std::strerror(errno)));
-    sha.add(std::span<const std::byte>(piece).first(static_cast<std::size_t>(got)));
+    sha.add(std::span<const std::byte>(piece).first(got));
     at += static_cast<std::uint64_t>(got);
   }
   const std::string digest = base::to_hex(sha.finish());

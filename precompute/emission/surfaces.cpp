@@ -51,7 +51,7 @@ Surfaces::Surfaces(const comm::Communicator& communicator, const SurfacePart& pa
   rest = Rows(get_rows());
   for (std::size_t v = 0; v < node.size(); ++v) {
     row.push_back(static_cast<std::int32_t>(v / kVertices * kLane + v % kVertices * 3));
-    const Vec3& place_m = part.nodes_m[static_cast<std::size_t>(node[v])];
+    const Vec3& place_m = part.nodes_m[node[v]];
     std::copy(place_m.begin(), place_m.end(), rest.get() + row.back());
   }
 
@@ -80,7 +80,7 @@ Surfaces::Surfaces(const comm::Communicator& communicator, const SurfacePart& pa
     if (!(one.area_m2 > 0.0)) throw InputError(fmt::format("triangle {} of a surface has no area; repair the mesh", one.number));
     numbers.push_back(one.number);
     body_area.resize(std::max(body_area.size(), static_cast<std::size_t>(one.body) + 1), 0.0);
-    body_area[static_cast<std::size_t>(one.body)] += one.area_m2;
+    body_area[one.body] += one.area_m2;
   }
   if (numbers.empty()) throw InputError("no surface sounds; set \"sounds\" of a body");
   const auto find_place = [](const std::vector<std::int64_t>& list, std::int64_t number) {
@@ -96,7 +96,7 @@ Surfaces::Surfaces(const comm::Communicator& communicator, const SurfacePart& pa
     Triangle corner;
     for (std::size_t c = 0; c < 3; ++c) {
       corner[c] = static_cast<std::int32_t>(find_place(vertices, one.nodes[c]));
-      tables.vertex_body[static_cast<std::size_t>(corner[c])] = one.body;
+      tables.vertex_body[corner[c]] = one.body;
     }
     tables.triangles.push_back(corner);
     tables.triangle_body.push_back(one.body);
@@ -104,7 +104,7 @@ Surfaces::Surfaces(const comm::Communicator& communicator, const SurfacePart& pa
   }
   for (const double whole : body_area) tables.radius_m.push_back(std::sqrt(std::max(whole, 1e-12) / (4.0 * std::numbers::pi)));
   std::vector<std::int64_t> vertex_place;
-  for (const std::int32_t one : node) vertex_place.push_back(find_place(vertices, part.node_number[static_cast<std::size_t>(one)]));
+  for (const std::int32_t one : node) vertex_place.push_back(find_place(vertices, part.node_number[one]));
   gathered_vertices = comm.all_gather(vertex_place);
 
   // Own triangles, body after body.
@@ -115,11 +115,10 @@ Surfaces::Surfaces(const comm::Communicator& communicator, const SurfacePart& pa
   });
   const auto add_slot = [&](std::size_t t, std::int32_t of_twin) {
     Triangle corner;
-    for (std::size_t c = 0; c < 3; ++c)
-      corner[c] = row[static_cast<std::size_t>(used.number[static_cast<std::size_t>(part.triangles[t][c])])];
+    for (std::size_t c = 0; c < 3; ++c) corner[c] = row[used.number[part.triangles[t][c]]];
     corners.push_back(corner);
     place.push_back(find_place(numbers, part.triangle_number[t]));
-    area.push_back(tables.area_m2[static_cast<std::size_t>(place.back())]);
+    area.push_back(tables.area_m2[place.back()]);
     twin.push_back(of_twin);
   };
   const auto pad = [&] {
@@ -154,7 +153,7 @@ Surfaces::Surfaces(const comm::Communicator& communicator, const SurfacePart& pa
   }
   has_twin.assign(corners.size(), false);
   for (const std::int32_t one : twin)
-    if (one >= 0) has_twin[static_cast<std::size_t>(one)] = true;
+    if (one >= 0) has_twin[one] = true;
 
   std::vector<std::int64_t> own_places;
   for (const std::int64_t one : place)
@@ -167,7 +166,7 @@ std::vector<Vec3> Surfaces::gather_vertices(const double* x) const {
   for (const std::int32_t one : row) own.push_back(get_vertex(x, one));
   const std::vector<Vec3> all = comm.all_gather(own);
   std::vector<Vec3> vertices(vertex_total);
-  for (std::size_t i = 0; i < all.size(); ++i) vertices[static_cast<std::size_t>(gathered_vertices[i])] = all[i];
+  for (std::size_t i = 0; i < all.size(); ++i) vertices[gathered_vertices[i]] = all[i];
   return vertices;
 }
 

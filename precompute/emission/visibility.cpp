@@ -71,9 +71,9 @@ Visibility::Visibility(std::span<const Corners> triangles) : triangles_(triangle
 
 void Visibility::split(std::size_t begin, std::size_t end) {
   const std::size_t place = boxes_.size();
-  Box box{triangles_[static_cast<std::size_t>(order_[begin])][0], triangles_[static_cast<std::size_t>(order_[begin])][0]};
+  Box box{triangles_[order_[begin]][0], triangles_[order_[begin]][0]};
   for (std::size_t i = begin; i < end; ++i)
-    for (const Vec3& corner : triangles_[static_cast<std::size_t>(order_[i])])
+    for (const Vec3& corner : triangles_[order_[i]])
       for (std::size_t axis = 0; axis < 3; ++axis) {
         box.low[axis] = std::min(box.low[axis], corner[axis]);
         box.high[axis] = std::max(box.high[axis], corner[axis]);
@@ -85,9 +85,9 @@ void Visibility::split(std::size_t begin, std::size_t end) {
     return;
   }
   const Vec3 size = box.high - box.low;
-  const auto axis = static_cast<std::size_t>(std::max_element(size.begin(), size.end()) - size.begin());
+  const std::size_t axis = std::max_element(size.begin(), size.end()) - size.begin();
   const auto get_centre = [&](std::int32_t i) {
-    const Corners& corner = triangles_[static_cast<std::size_t>(i)];
+    const Corners& corner = triangles_[i];
     return corner[0][axis] + corner[1][axis] + corner[2][axis];
   };
   const std::size_t middle = begin + (end - begin) / 2;
@@ -109,7 +109,7 @@ bool Visibility::is_free(const Vec3& from, const Vec3& to, std::int64_t own) con
   waiting[0] = 0;
   while (count > 0) {
     const std::int32_t place = waiting[--count];
-    const Box& box = boxes_[static_cast<std::size_t>(place)];
+    const Box& box = boxes_[place];
     if (!meets_box(box.low, box.high, from, inverse)) continue;
     if (box.count == 0) {
       waiting[count++] = box.second;
@@ -117,8 +117,8 @@ bool Visibility::is_free(const Vec3& from, const Vec3& to, std::int64_t own) con
       continue;
     }
     for (std::int32_t i = box.first; i < box.first + box.count; ++i) {
-      const std::int32_t triangle = order_[static_cast<std::size_t>(i)];
-      if (triangle != own && meets_triangle(triangles_[static_cast<std::size_t>(triangle)], from, way)) return false;
+      const std::int32_t triangle = order_[i];
+      if (triangle != own && meets_triangle(triangles_[triangle], from, way)) return false;
     }
   }
   return true;

@@ -123,7 +123,7 @@ MassBounds find_mass_bounds(const comm::Communicator& comm, const partition::Loc
   const MassBounds straight = find_element_bounds(x);
   std::array<double, 2> worst{straight.max, 1.0 / straight.min};
   for (std::int32_t e = 0; e < local.tet_count(); ++e) {
-    for (int i = 0; i < 10; ++i) x[i] = local.nodes_m[local.tets[10 * static_cast<std::size_t>(e) + i]];
+    for (int i = 0; i < 10; ++i) x[i] = local.nodes_m[local.tets[10 * e + i]];
     const auto [min, max] = enclose_jacobian(x);
     if (max < (1 + 1e-9) * min) continue;
     const MassBounds bounds = min > 0.5 * max ? MassBounds{straight.min * min / max, straight.max * max / min} : find_element_bounds(x);

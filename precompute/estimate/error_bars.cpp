@@ -27,7 +27,7 @@ void check_arguments(const comm::Communicator& comm, const partition::LocalMesh&
                      std::span<const std::int32_t> material_of_tet, const Solution& solution) {
   comm.agree([&] {
     if (solids.empty()) throw InputError("error bars need a material");
-    if (material_of_tet.empty() ? solids.size() > 1 : material_of_tet.size() != static_cast<std::size_t>(local.tet_count()))
+    if (material_of_tet.empty() ? solids.size() > 1 : std::ssize(material_of_tet) != local.tet_count())
       throw InputError(fmt::format("{} elements have {} materials", local.tet_count(), material_of_tet.size()));
     for (const std::int32_t m : material_of_tet)
       if (m < 0 || m >= static_cast<std::int32_t>(solids.size())) throw InputError(fmt::format("there is no material {}", m));
@@ -111,7 +111,7 @@ Sums calc_block(const ElementKernels& kernels, Recovery& recovery, Room& room, j
 std::vector<double> calc_sums(const comm::Communicator& comm, const partition::LocalMesh& local, Recovery& recovery, job::Mass mass_kind,
                               const Solution& solution) {
   const Elements& elements = recovery.elements;
-  const std::size_t count = solution.lambda.size(), materials = static_cast<std::size_t>(elements.materials);
+  const std::size_t count = solution.lambda.size(), materials = elements.materials;
   Room room;
   std::vector<double> result(count * kSums, 0.0);
   comm.agree([&] {
@@ -153,7 +153,7 @@ bool is_curved(const comm::Communicator& comm, const partition::LocalMesh& local
   if (local.order == 2)
     for (std::size_t e = 0; e < local.tets.size() && is_straight; e += 10) {
       std::array<Vec3, 10> x;
-      for (std::size_t i = 0; i < x.size(); ++i) x[i] = local.nodes_m[static_cast<std::size_t>(local.tets[e + i])];
+      for (std::size_t i = 0; i < x.size(); ++i) x[i] = local.nodes_m[local.tets[e + i]];
       is_straight = fem::is_straight(x);
     }
   return !comm.all(is_straight);

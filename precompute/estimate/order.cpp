@@ -21,7 +21,7 @@ constexpr double kOctave = 1200.0;  // cents
 /// The bar that a mode at `top` can have, which is not below the last. at: places of the modes [cents], ascending.
 double predict(std::span<const double> at, std::span<const double> cents, double top) {
   const std::size_t count = at.size();
-  const auto octave = static_cast<std::size_t>(std::upper_bound(at.begin(), at.end(), top - kOctave) - at.begin());
+  const std::size_t octave = std::upper_bound(at.begin(), at.end(), top - kOctave) - at.begin();
   const std::size_t first = std::min(octave, count - (count + 3) / 4);  // at least a quarter of the list
   const auto begin = cents.begin();
   const auto near = std::max_element(begin + static_cast<std::ptrdiff_t>(first), cents.end());
@@ -29,7 +29,7 @@ double predict(std::span<const double> at, std::span<const double> cents, double
   double power = 1.0;
   if (octave > 0) {
     const auto far = std::max_element(begin, begin + static_cast<std::ptrdiff_t>(octave));
-    const double apart = (at[static_cast<std::size_t>(near - begin)] - at[static_cast<std::size_t>(far - begin)]) / kOctave;
+    const double apart = (at[near - begin] - at[far - begin]) / kOctave;
     power = *near > *far && apart > 0 ? std::min(1.0, std::log2(*near / *far) / apart) : 0.0;
   }
   double widest = 0.0;

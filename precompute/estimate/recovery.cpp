@@ -262,7 +262,7 @@ void find_middles(const partition::LocalMesh& local, const Patches& patches, Rec
   std::vector<char> done(local.nodes_m.size(), 0);
   for (std::size_t e = 0; e < recovery.elements.count; ++e)
     for (int m = 0; m < 6; ++m) {
-      const std::int32_t* tet = &local.tets[static_cast<std::size_t>(recovery.order[e]) * 10];
+      const std::int32_t* tet = &local.tets[recovery.order[e] * 10];
       const std::int32_t node = tet[4 + m];
       if (done[node]++ != 0) continue;
       Middle middle;
@@ -372,7 +372,7 @@ comm::HaloExchange make_exchange(const comm::Communicator& comm, const partition
   const auto own_end = local.node_in_mesh.begin() + local.owned_nodes;
   comm::Halo halo;
   const auto owned = comm.agree([&] {
-    for (std::size_t n = static_cast<std::size_t>(local.owned_nodes); n < place.size(); ++n) {
+    for (std::size_t n = local.owned_nodes; n < place.size(); ++n) {
       if (place[n] < 0) continue;
       halo.number.push_back(local.node_in_mesh[n]);
       halo.place.push_back(place[n]);
@@ -401,11 +401,11 @@ Recovery make_recovery(const comm::Communicator& comm, const partition::LocalMes
   elements.samples = local.order == 1 ? 1 : 4;
   elements.terms = local.order == 1 ? 1 : 10;
   elements.materials = static_cast<int>(solids.size());
-  elements.count = static_cast<std::size_t>(local.tet_count());
+  elements.count = local.tet_count();
   const Surface surface = find_surface(comm, local);
   std::array<double, 3> size{0.0, static_cast<double>(elements.count), 0.0};  // volume, elements, those of a thin wall of one layer
   comm.agree([&] {
-    recovery.vertex_node.resize(static_cast<std::size_t>(*std::max_element(vertex_place.begin(), vertex_place.end()) + 1));
+    recovery.vertex_node.resize(*std::max_element(vertex_place.begin(), vertex_place.end()) + 1);
     for (std::size_t n = 0; n < place.size(); ++n)
       if (vertex_place[n] >= 0) recovery.vertex_node[vertex_place[n]] = place[n];
     fill_elements(local, solids, material_of_tet, surface, recovery);

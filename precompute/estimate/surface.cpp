@@ -41,7 +41,7 @@ struct FaceHash {
   std::size_t operator()(const FaceKey& key) const {
     std::uint64_t hash = 1469598103934665603ULL;
     for (const std::int32_t id : key) hash = (hash ^ static_cast<std::uint32_t>(id)) * 1099511628211ULL;
-    return static_cast<std::size_t>(hash ^ hash >> 29);
+    return hash ^ hash >> 29;
   }
 };
 
@@ -233,7 +233,7 @@ std::vector<Mark> find_marks(const comm::Communicator& comm, const partition::Lo
     std::vector<Mark> list(local.nodes_m.size());
     for (std::size_t n = 0; n < list.size(); ++n) list[n].node = local.node_in_mesh[n];
     for (std::size_t s = 0; s < ends.size(); ++s)  // three of each face
-      for (const std::int32_t node : ends[s]) list[static_cast<std::size_t>(node)].join({0, bend[s / 3], 1, is_singular[s]});
+      for (const std::int32_t node : ends[s]) list[node].join({0, bend[s / 3], 1, is_singular[s]});
     return list;
   });
   return comm::query_owners<Mark>(

@@ -73,7 +73,7 @@ void sort_by_transposing(BlockRows& rows) {
 void find_own_pattern(const LocalMesh& local, Neighbours& neighbours, LocalRows& rows) {
   rows.own.begin.reserve(local.free_nodes + 1);
   rows.off.begin.reserve(local.free_nodes + 1);
-  rows.own.column.reserve(16 * static_cast<std::size_t>(local.free_nodes));
+  rows.own.column.reserve(16 * local.free_nodes);
   for (std::int32_t i = 0; i < local.free_nodes; ++i) {
     neighbours.visit(i, [&](std::int32_t other) {
       if (other < local.free_nodes) {
@@ -300,7 +300,7 @@ void LocalRows::add(std::span<const std::int32_t> nodes, const LocalMesh& local,
     for (int j = 0; j < n; ++j) {
       const std::int32_t column = slot[nodes[j]];
       if (column == -1) continue;
-      const double* k = &element.stiffness[static_cast<std::size_t>(3 * i * stride + 3 * j)];
+      const double* k = &element.stiffness[3 * i * stride + 3 * j];
       const double m = element.mass[i * n + j];
       if (row < 0) {
         halo.add(-2 - row, local.row[nodes[j]], k, stride, m);

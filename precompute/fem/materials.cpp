@@ -16,7 +16,7 @@ using partition::LocalMesh;
 /// The regions of all ranks, ascending. Collective.
 std::vector<std::int32_t> find_regions(const comm::Communicator& comm, const LocalMesh& local) {
   auto all = comm.all_gather([&] {
-    if (local.region.size() != static_cast<std::size_t>(local.tet_count()))
+    if (std::ssize(local.region) != local.tet_count())
       throw SystemError(fmt::format("{} tetrahedra came with {} region tags", local.tet_count(), local.region.size()));
     const std::set<std::int32_t> own(local.region.begin(), local.region.end());
     return std::vector(own.begin(), own.end());

@@ -126,7 +126,7 @@ Layout find_members(std::vector<NodeRecord> nodes) {
     const std::int32_t root = joined.find(static_cast<std::int32_t>(i));
     if (root != static_cast<std::int32_t>(i)) layout.members[i].support = of_root[root];
   }
-  for (const auto& [root, support] : of_root) layout.members[static_cast<std::size_t>(root)].support = support;
+  for (const auto& [root, support] : of_root) layout.members[root].support = support;
   return layout;
 }
 
@@ -182,7 +182,7 @@ void measure(const std::vector<FaceRecord>& faces, Layout& layout) {
   };
   for (const FaceRecord& face : faces) {
     const Member* corner[3] = {&find(face.node[0]), &find(face.node[1]), &find(face.node[2])};
-    const auto s = static_cast<std::size_t>(corner[0]->support);
+    const std::size_t s = corner[0]->support;
     Vec3 x[3], sum{};
     for (int i = 0; i < 3; ++i)
       for (int k = 0; k < 3; ++k) {
@@ -238,7 +238,7 @@ Layout find_layout(const comm::Communicator& comm, const LocalMesh& local) {
 /// The fixed nodes of a support in cells as wide as its thickness.
 class Nearby {
  public:
-  Nearby(const Layout& layout, std::int32_t support) : width_m_(layout.list[static_cast<std::size_t>(support)].thickness_m) {
+  Nearby(const Layout& layout, std::int32_t support) : width_m_(layout.list[support].thickness_m) {
     low_.fill(1e300);
     high_.fill(-1e300);
     for (const Member& member : layout.members) {
@@ -382,7 +382,7 @@ void add_element(const Sums& sums, const Near& near, const ElementMatrices& elem
   double twice = 0.0;
   for (int r = 0; r < width; ++r) {
     double sum = 0.0;
-    for (int c = 0; c < width; ++c) sum += element.stiffness[static_cast<std::size_t>(r * width + c)] * u[c];
+    for (int c = 0; c < width; ++c) sum += element.stiffness[r * width + c] * u[c];
     f[r] = sum;
     twice += u[r] * sum;
   }
@@ -393,7 +393,7 @@ void add_element(const Sums& sums, const Near& near, const ElementMatrices& elem
     Vec3 force;
     for (int d = 0; d < 3; ++d) {
       force[d] = f[3 * i + d];
-      for (int j = 0; j < n; ++j) force[d] -= lambda * element.mass[static_cast<std::size_t>(i * n + j)] * u[3 * j + d];
+      for (int j = 0; j < n; ++j) force[d] -= lambda * element.mass[i * n + j] * u[3 * j + d];
     }
     Vec3 arm;
     for (int d = 0; d < 3; ++d) arm[d] = sums.local.nodes_m[nodes[i]][d] - sums.layout.list[s].centre_m[d];
@@ -449,7 +449,7 @@ Supports calc_supports(const comm::Communicator& comm, const LocalMesh& local, c
       const auto nodes = local.get_tet(one.tet);
       for (std::size_t i = 0; i < nodes.size(); ++i) x[i] = local.nodes_m[nodes[i]];
       // The assembly has been through every element; a bad one ended it.
-      if (!calc_element({x.data(), nodes.size()}, solids[static_cast<std::size_t>(materials.find(one.tet))], mass, element)) continue;
+      if (!calc_element({x.data(), nodes.size()}, solids[materials.find(one.tet)], mass, element)) continue;
       for (std::size_t j = 0; j < block; ++j) {
         add_element(sums, one, element, phi.data() + j * sums.width, lambda[first + j], &supports.reaction[(first + j) * count * 6],
                     &supports.energy[(first + j) * count]);

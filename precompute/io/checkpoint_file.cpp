@@ -70,7 +70,7 @@ Fingerprint seal(RawHeader header, const std::string& text) {
 
 std::uint64_t sum_records(const std::vector<double>& records, std::int64_t first, int group, int width) {
   std::uint64_t sum = 0;
-  const std::size_t size = static_cast<std::size_t>(3 * width);
+  const std::size_t size = 3 * width;
   for (std::size_t i = 0; i * size < records.size(); ++i) {
     Mixer mixer(static_cast<std::uint64_t>(first) + i);
     mixer.add(static_cast<std::uint64_t>(group));
@@ -236,7 +236,7 @@ std::string CheckpointFile::read_content(Content& content) const {
   const std::int64_t data_at = find_data_start(header.settings_bytes, header.numbers_bytes);
   const auto total = static_cast<std::int64_t>(data_at + 24.0 * static_cast<double>(header.rows) * static_cast<double>(header.columns));
   if (header.total_bytes != total || info.st_size != total) return "it is cut short or damaged";
-  std::string text(static_cast<std::size_t>(header.settings_bytes + header.numbers_bytes), '\0');
+  std::string text(header.settings_bytes + header.numbers_bytes, '\0');
   if (!read_all(text.data(), text.size(), sizeof header) || seal(header, text) != header.sha256) return "it is damaged";
   const std::string version(header.version, strnlen(header.version, sizeof header.version));
   if (version != cut_version()) return fmt::format("it was saved by another version, {}", version);
@@ -246,8 +246,8 @@ std::string CheckpointFile::read_content(Content& content) const {
   content.sum = header.sum;
   content.data_at = data_at;
   content.system = header.system;
-  content.numbers = text.substr(static_cast<std::size_t>(header.settings_bytes));
-  content.settings = text.substr(0, static_cast<std::size_t>(header.settings_bytes));
+  content.numbers = text.substr(header.settings_bytes);
+  content.settings = text.substr(0, header.settings_bytes);
   return "";
 }
 
@@ -310,7 +310,7 @@ std::string CheckpointFile::verify() {
       order_->make_room(kGroup, room);
       for (std::int64_t group = 0; group * kGroup < content_.columns; ++group) {
         const int width = find_width(content_.columns, group);
-        room.records.resize(static_cast<std::size_t>(order_->count() * 3 * width));
+        room.records.resize(order_->count() * 3 * width);
         file.read(find_place(content_.data_at, group, width), room.records.data(), room.records.size() * sizeof(double));
         sum += sum_records(room.records, order_->first(), static_cast<int>(group), width);
       }
@@ -337,7 +337,7 @@ void CheckpointFile::read_columns(std::int64_t first, const eigen::Columns& into
   for (std::int64_t group = first / kGroup; group * kGroup < last; ++group) {
     const eigen::Columns part{rows.data(), into.rows, into.rows, find_width(content_.columns, group)};
     comm_.agree([&] {
-      room.records.resize(static_cast<std::size_t>(order_->count() * 3 * part.count));
+      room.records.resize(order_->count() * 3 * part.count);
       file.read(find_place(content_.data_at, group, part.count), room.records.data(), room.records.size() * sizeof(double));
     });
     order_->from_records(room, part);
@@ -421,7 +421,7 @@ void CheckpointFile::write(const std::string& numbers, const std::vector<eigen::
     header.sha256 = seal(header, text);
     std::string start(reinterpret_cast<const char*>(&header), sizeof header);
     start += text;
-    start.resize(static_cast<std::size_t>(data_at), '\0');
+    start.resize(data_at, '\0');
     file.write(0, start.data(), start.size());
     file.flush();
     if (::rename(temporary_.c_str(), file_.c_str()) != 0) throw SystemError(std::strerror(errno));

@@ -58,17 +58,16 @@ Fingerprint find_system_fingerprint(const comm::Communicator& comm, const Finger
                                     const partition::LocalMesh& local) {
   std::array<std::uint64_t, 4> sums{};  // of nodes, of elements; how many
   for (std::int32_t i = 0; i < local.owned_nodes; ++i) {
-    const auto at = static_cast<std::size_t>(i);
+    const std::size_t at = i;
     Mixer node(static_cast<std::uint64_t>(local.node_in_mesh[at]));
     for (const double x : local.nodes_m[at]) node.add(x);
     node.add(static_cast<std::uint64_t>(local.row[at] < 0));
     sums[0] += node.get();
   }
-  const auto width = static_cast<std::size_t>(local.nodes_per_tet());
+  const std::size_t width = local.nodes_per_tet();
   for (std::size_t e = 0; e < local.tet_in_mesh.size(); ++e) {
     Mixer tet(static_cast<std::uint64_t>(local.tet_in_mesh[e]));
-    for (std::size_t k = 0; k < width; ++k)
-      tet.add(static_cast<std::uint64_t>(local.node_in_mesh[static_cast<std::size_t>(local.tets[e * width + k])]));
+    for (std::size_t k = 0; k < width; ++k) tet.add(static_cast<std::uint64_t>(local.node_in_mesh[local.tets[e * width + k]]));
     if (!local.region.empty()) tet.add(static_cast<std::uint64_t>(local.region[e]));
     sums[1] += tet.get();
   }

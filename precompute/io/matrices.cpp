@@ -59,7 +59,7 @@ void write_in_turn(const comm::Communicator& comm, const fs::path& file, const s
       MPI_Bcast(&size, 1, MPI_INT64_T, turn, comm);
       if (turn != 0 && rank == turn) MPI_Send(piece.data(), static_cast<int>(size), MPI_CHAR, 0, 0, comm);
       if (turn != 0 && rank == 0) {
-        piece.resize(static_cast<std::size_t>(size));
+        piece.resize(size);
         MPI_Recv(piece.data(), static_cast<int>(size), MPI_CHAR, turn, 0, comm, MPI_STATUS_IGNORE);
       }
       if (rank == 0) attempt([&] { whole->append(piece); });
@@ -77,16 +77,15 @@ std::vector<std::int32_t> find_places(const comm::Communicator& comm, const part
       comm.all_gather([&] { return std::vector(local.node_in_mesh.begin(), local.node_in_mesh.begin() + local.free_nodes); });
   std::vector<std::int32_t> order(in_mesh.size()), places(in_mesh.size());
   std::iota(order.begin(), order.end(), 0);
-  std::sort(order.begin(), order.end(),
-            [&](std::int32_t a, std::int32_t b) { return in_mesh[static_cast<std::size_t>(a)] < in_mesh[static_cast<std::size_t>(b)]; });
-  for (std::size_t i = 0; i < order.size(); ++i) places[static_cast<std::size_t>(order[i])] = static_cast<std::int32_t>(i);
+  std::sort(order.begin(), order.end(), [&](std::int32_t a, std::int32_t b) { return in_mesh[a] < in_mesh[b]; });
+  for (std::size_t i = 0; i < order.size(); ++i) places[order[i]] = static_cast<std::int32_t>(i);
   return places;
 }
 
 /// Calls visit(row, column, value) for what of one row of the matrix is in the lower triangle, in the order of the mesh and from 1 on.
 template <class Visit>
 void visit_row(Mat matrix, PetscInt row, const std::vector<std::int32_t>& places, Visit&& visit) {
-  const auto find = [&](PetscInt i) { return 3 * static_cast<std::int64_t>(places[static_cast<std::size_t>(i / 3)]) + i % 3 + 1; };
+  const auto find = [&](PetscInt i) { return 3 * static_cast<std::int64_t>(places[i / 3]) + i % 3 + 1; };
   PetscInt count = 0;
   const PetscInt* columns = nullptr;
   const PetscScalar* values = nullptr;
@@ -124,8 +123,8 @@ void write_nodes(const comm::Communicator& comm, const fs::path& file, const par
   NodeOrder order(comm, local);
   std::vector<double> positions, numbers;
   for (std::int32_t i = 0; i < local.free_nodes; ++i) {
-    for (const double x : local.nodes_m[static_cast<std::size_t>(i)]) positions.push_back(x);
-    numbers.insert(numbers.end(), 3, local.node_in_mesh[static_cast<std::size_t>(i)]);
+    for (const double x : local.nodes_m[i]) positions.push_back(x);
+    numbers.insert(numbers.end(), 3, local.node_in_mesh[i]);
   }
   NodeOrder::Room room;
   const std::vector<const double*> columns{numbers.data(), positions.data()};

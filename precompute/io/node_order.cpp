@@ -12,34 +12,33 @@ namespace carillon::io {
 NodeOrder::NodeOrder(const comm::Communicator& comm, const partition::LocalMesh& local) {
   const auto& numbers = local.node_in_mesh;
   std::int64_t max = 0;
-  for (std::int32_t i = 0; i < local.free_nodes; ++i) max = std::max<std::int64_t>(max, numbers[static_cast<std::size_t>(i)]);
+  for (std::int32_t i = 0; i < local.free_nodes; ++i) max = std::max<std::int64_t>(max, numbers[i]);
   const std::int64_t stretch = comm.max(max) / comm.size() + 1;
   std::vector<std::int64_t> sent_begin;
   const auto own = comm.agree([&] {
-    row_.resize(static_cast<std::size_t>(local.free_nodes));
+    row_.resize(local.free_nodes);
     std::iota(row_.begin(), row_.end(), 0);
-    const auto sorted = comm::sort_by_receiver(
-        comm.size(), row_, [&](std::int32_t row) { return static_cast<int>(numbers[static_cast<std::size_t>(row)] / stretch); });
+    const auto sorted =
+        comm::sort_by_receiver(comm.size(), row_, [&](std::int32_t row) { return static_cast<int>(numbers[row] / stretch); });
     row_ = sorted.items;
     sent_begin = sorted.begin;
     std::vector<std::int32_t> going;
-    for (const std::int32_t row : row_) going.push_back(numbers[static_cast<std::size_t>(row)]);
+    for (const std::int32_t row : row_) going.push_back(numbers[row]);
     return going;
   });
   exchange_ = comm::Exchange(comm, std::move(sent_begin));
   std::vector<std::int32_t> arrived;
   comm.agree([&] {
     exchange_.reserve(sizeof(std::int32_t));
-    arrived.resize(static_cast<std::size_t>(exchange_.received_count()));
+    arrived.resize(exchange_.received_count());
   });
   exchange_.forward(own.data(), arrived.data());
   comm.agree([&] {
     std::vector<std::int32_t> order(arrived.size());
     std::iota(order.begin(), order.end(), 0);
-    std::sort(order.begin(), order.end(),
-              [&](std::int32_t a, std::int32_t b) { return arrived[static_cast<std::size_t>(a)] < arrived[static_cast<std::size_t>(b)]; });
+    std::sort(order.begin(), order.end(), [&](std::int32_t a, std::int32_t b) { return arrived[a] < arrived[b]; });
     place_.resize(arrived.size());
-    for (std::size_t i = 0; i < order.size(); ++i) place_[static_cast<std::size_t>(order[i])] = static_cast<std::int32_t>(i);
+    for (std::size_t i = 0; i < order.size(); ++i) place_[order[i]] = static_cast<std::int32_t>(i);
   });
   const comm::IndexPartition stretches(comm, count());
   first_ = stretches.own_begin();
@@ -47,7 +46,7 @@ NodeOrder::NodeOrder(const comm::Communicator& comm, const partition::LocalMesh&
 }
 
 void NodeOrder::make_room(int columns, Room& room) {
-  const std::size_t width = 3 * static_cast<std::size_t>(columns);
+  const std::size_t width = 3 * columns;
   room.sent.reserve(std::max(row_.size(), place_.size()) * width);
   room.come.reserve(std::max(row_.size(), place_.size()) * width);
   room.records.reserve(place_.size() * width);
@@ -70,7 +69,7 @@ void NodeOrder::to_records(std::span<const double* const> columns, Room& room) {
 }
 
 void NodeOrder::from_records(Room& room, const la::Columns& columns) {
-  const auto width = static_cast<std::size_t>(3 * columns.count);
+  const std::size_t width = 3 * columns.count;
   room.sent.resize(place_.size() * width);
   room.come.resize(row_.size() * width);
   for (std::size_t i = 0; i < place_.size(); ++i)

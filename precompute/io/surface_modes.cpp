@@ -62,7 +62,7 @@ SurfaceWork::SurfaceWork(const comm::Communicator& comm, Mat shapes, const Surfa
   PetscInt modes = 0, own_rows = 0;
   petsc::check(MatGetSize(shapes, nullptr, &modes));
   petsc::check(MatGetLocalSize(shapes, &own_rows, nullptr));
-  modes_ = static_cast<std::size_t>(modes);
+  modes_ = modes;
   owners_ = comm::IndexPartition(comm, own_rows / 3);
   deal(surface);
   find_halo();
@@ -79,14 +79,14 @@ SurfaceWork::SurfaceWork(const comm::Communicator& comm, Mat shapes, const Surfa
 /// Rank 0 sends every rank its rows of the surface and the panels whose first moving corner it owns.
 void SurfaceWork::deal(const Surface& surface) {
   const auto list_rows = [&] {
-    vertex_count_.assign(static_cast<std::size_t>(comm_.size()), 0);
+    vertex_count_.assign(comm_.size(), 0);
     std::vector<std::int32_t> rows;
     for (std::size_t v = 0; comm_.is_root() && v < surface.row.size(); ++v)
       if (surface.row[v] >= 0) vertex_.push_back(v);
     std::sort(vertex_.begin(), vertex_.end(), [&](std::size_t a, std::size_t b) { return surface.row[a] < surface.row[b]; });
     for (const std::size_t v : vertex_) {
       rows.push_back(surface.row[v]);
-      ++vertex_count_[static_cast<std::size_t>(owners_.find_owner(rows.back()))];
+      ++vertex_count_[owners_.find_owner(rows.back())];
     }
     return rows;
   };
@@ -166,7 +166,7 @@ void SurfaceWork::add_flow(std::size_t mode, std::size_t count) {
     std::array<double, kBlock> through{};  // 3 phi . n of the middle, times twice the area
     for (const std::int32_t row : panel.row) {
       if (row < 0) continue;
-      const double* phi = &values_[static_cast<std::size_t>(row) * 3 * kBlock];
+      const double* phi = &values_[row * 3 * kBlock];
       for (int d = 0; d < 3; ++d)
         for (std::size_t k = 0; k < kBlock; ++k) through[k] += panel.normal[d] * phi[d * kBlock + k];
     }
@@ -203,7 +203,7 @@ std::vector<std::int16_t> SurfaceWork::collect() {
   steps_ = {};
   std::size_t at = own_;
   for (int from = 1; from < comm_.size(); ++from) {
-    const auto theirs = static_cast<std::size_t>(vertex_count_[static_cast<std::size_t>(from)]);
+    const std::size_t theirs = vertex_count_[from];
     for (std::size_t done = 0; done < theirs; done += rows_at_a_time) {
       const std::size_t now = std::min(rows_at_a_time, theirs - done);
       MPI_Recv(arrived.data(), static_cast<int>(now * row), MPI_INT16_T, from, kStepsTag, comm_, MPI_STATUS_IGNORE);

@@ -255,7 +255,7 @@ Blow read_blow(base::Object& object, const std::vector<SimulatedBody>& bodies) {
     const std::string near = base::find_nearest(name, names);
     object.fail("body", fmt::format("there is no body \"{}\"{}", name, near.empty() ? "" : fmt::format(", did you mean \"{}\"?", near)));
   }
-  blow.body = static_cast<std::size_t>(body - bodies.begin());
+  blow.body = body - bodies.begin();
   blow.time_s = read_within(object, "time_s", 0.0, kMaxSeconds);
   blow.point_m = read_vector(object, "point_m", {}, kFarthestM);
   blow.impulse_n_s = object.numbers<3>("impulse_n_s");

@@ -64,7 +64,7 @@ int calc_eigenpairs(Matrix& a, Vector& values) {
   const int n = static_cast<int>(a.rows()), work_size = calc_work_size(n);
   int info = 0;
   values.resize(n);
-  std::vector<double> work(static_cast<std::size_t>(work_size));
+  std::vector<double> work(work_size);
   dsyev_("V", "L", &n, a.data(), &n, values.data(), work.data(), &work_size, &info);
   return info;
 }
@@ -73,8 +73,8 @@ int calc_eigenpairs_by_division(Matrix& a, Vector& values) {
   const int n = static_cast<int>(a.rows()), work_size = 1 + 6 * n + 2 * n * n, integers_size = 3 + 5 * n;
   int info = 0;
   values.resize(n);
-  std::vector<double> work(static_cast<std::size_t>(work_size));
-  std::vector<int> integers(static_cast<std::size_t>(integers_size));
+  std::vector<double> work(work_size);
+  std::vector<int> integers(integers_size);
   dsyevd_("V", "L", &n, a.data(), &n, values.data(), work.data(), &work_size, integers.data(), &integers_size, &info);
   return info;
 }
@@ -83,7 +83,7 @@ int calc_generalised_eigenpairs(Matrix& a, Matrix& b, Vector& values) {
   const int type = 1, n = static_cast<int>(a.rows()), work_size = calc_work_size(n);
   int info = 0;
   values.resize(n);
-  std::vector<double> work(static_cast<std::size_t>(work_size));
+  std::vector<double> work(work_size);
   dsygv_(&type, "V", "L", &n, a.data(), &n, b.data(), &n, values.data(), work.data(), &work_size, &info);
   return info;
 }
@@ -95,8 +95,8 @@ int calc_generalised_eigenpairs_by_division(Matrix& a, Matrix& b, Vector& values
   values.resize(n);
   dsygvd_(&type, "V", "L", &n, a.data(), &n, b.data(), &n, values.data(), &best_size, &ask, &integers_size, &ask, &info);
   const int work_size = static_cast<int>(best_size);
-  std::vector<double> work(static_cast<std::size_t>(work_size));
-  std::vector<int> integers(static_cast<std::size_t>(integers_size));
+  std::vector<double> work(work_size);
+  std::vector<int> integers(integers_size);
   dsygvd_(&type, "V", "L", &n, a.data(), &n, b.data(), &n, values.data(), work.data(), &work_size, integers.data(), &integers_size, &info);
   return info;
 }

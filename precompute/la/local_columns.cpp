@@ -27,7 +27,7 @@ void mark_changed(Mat dense) {
 }
 
 void permute_columns(const Columns& columns, const std::vector<std::size_t>& order) {
-  std::vector<double> first(static_cast<std::size_t>(columns.rows));
+  std::vector<double> first(columns.rows);
   std::vector<bool> is_done(order.size(), false);
   for (std::size_t start = 0; start < order.size(); ++start) {
     if (is_done[start] || order[start] == start) continue;

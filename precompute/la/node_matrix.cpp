@@ -136,7 +136,7 @@ class NodeRow {
         while (at < blocks_.size() && blocks_[at].node < other) ++at;
         if (at == blocks_.size() || blocks_[at].node != other)
           blocks_.insert(blocks_.begin() + static_cast<std::ptrdiff_t>(at), Block{other, {}});
-        blocks_[at].values[static_cast<std::size_t>(3 * d + column % 3)] = factor * value;
+        blocks_[at].values[3 * d + column % 3] = factor * value;
       };
       bool is_own = true;  // columns of other ranks come after those of this one, from the lowest on
       rows_.visit(
@@ -174,7 +174,7 @@ void NodeMatrix::read(Mat matrix, double factor) {
   const comm::Communicator comm = petsc::get_communicator(matrix);
   const NodeRows rows(matrix);
   const PetscInt first_node = rows.first_row() / 3;
-  nodes_ = static_cast<std::size_t>(rows.rows() / 3);
+  nodes_ = rows.rows() / 3;
   bool only_diagonal = true;
   bool only_scalars = true;  // then one value per block is kept
   std::vector<PetscInt> global;
@@ -183,7 +183,7 @@ void NodeMatrix::read(Mat matrix, double factor) {
   NodeRow node_row(rows);
   MatInfo info;
   check(MatGetInfo(matrix, MAT_LOCAL, &info));
-  const auto entries = static_cast<std::size_t>(info.nz_used);  // three of a scalar, nine of a block
+  const std::size_t entries = info.nz_used;  // three of a scalar, nine of a block
   global.reserve(entries / 3);
   values_.reserve(entries / 3);
   const auto keep_blocks = [&] {
@@ -211,7 +211,7 @@ void NodeMatrix::read(Mat matrix, double factor) {
     diagonal_.assign(3 * nodes_, 0.0);
     for (std::size_t node = 0; node < nodes_; ++node) {
       if (start_[node] == start_[node + 1]) continue;
-      for (std::size_t d = 0; d < 3; ++d) diagonal_[3 * node + d] = values_[9 * static_cast<std::size_t>(start_[node]) + 4 * d];
+      for (std::size_t d = 0; d < 3; ++d) diagonal_[3 * node + d] = values_[9 * start_[node] + 4 * d];
     }
     start_ = {};
     values_ = {};
@@ -313,7 +313,7 @@ void NodeMatrix::multiply(const Columns& x, const Columns& y) const {
     for (int j = 0; j < x.count; ++j) {
       const double* from = x.column(j);
       double* to = y.column(j);
-      for (std::ptrdiff_t i = 0; i < x.rows; ++i) to[i] = diagonal_[static_cast<std::size_t>(i)] * from[i];
+      for (std::ptrdiff_t i = 0; i < x.rows; ++i) to[i] = diagonal_[i] * from[i];
     }
     return;
   }

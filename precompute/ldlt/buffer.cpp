@@ -17,7 +17,7 @@ namespace carillon::ldlt {
 namespace {
 
 constexpr std::size_t kMapped = 1 << 20;  // from here on buffers have pages of their own
-const std::size_t kPage = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
+const std::size_t kPage = sysconf(_SC_PAGESIZE);
 constexpr std::size_t kLargePage = std::size_t{2} << 20;
 
 std::size_t round_up(std::size_t bytes, std::size_t to) { return (bytes + to - 1) / to * to; }

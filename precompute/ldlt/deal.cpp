@@ -38,8 +38,8 @@ Pruning prune(const HeldPart& held, bool is_leaf, double most_operations, double
     pruning.entries[s] += static_cast<double>(count_entries(nodes[s].width, nodes[s].size()));
     pruning.is_whole[s] = is_leaf && pruning.operations[s] < most_operations && pruning.entries[s] < most_entries;
     if (nodes[s].parent < 0) continue;
-    pruning.operations[static_cast<std::size_t>(nodes[s].parent)] += pruning.operations[s];
-    pruning.entries[static_cast<std::size_t>(nodes[s].parent)] += pruning.entries[s];
+    pruning.operations[nodes[s].parent] += pruning.operations[s];
+    pruning.entries[nodes[s].parent] += pruning.entries[s];
   }
   return pruning;
 }
@@ -59,11 +59,11 @@ MappedFronts map_fronts(const Communicator& comm, Elimination elimination) {
   std::vector<FrontRecord> records = comm.all_gather([&] {
     std::vector<FrontRecord> own;
     for (const HeldPart& held : all.parts) {
-      const TreePart& part = all.tree.parts[static_cast<std::size_t>(held.part)];
+      const TreePart& part = all.tree.parts[held.part];
       const std::vector<Supernode>& nodes = held.forest.supernodes;
       const Pruning pruning = prune(held, part.is_leaf(), kWhole * total[0] / comm.size(), kWhole * total[1] / comm.size());
       for (std::size_t s = 0; s < nodes.size(); ++s) {
-        if (nodes[s].parent >= 0 && pruning.is_whole[static_cast<std::size_t>(nodes[s].parent)]) continue;
+        if (nodes[s].parent >= 0 && pruning.is_whole[nodes[s].parent]) continue;
         FrontRecord& record = own.emplace_back();
         record.id = part.first_front + static_cast<std::int32_t>(s);
         record.cost = {held.parents[s], nodes[s].width, static_cast<std::int32_t>(nodes[s].rows.size()),
@@ -84,14 +84,13 @@ MappedFronts map_fronts(const Communicator& comm, Elimination elimination) {
     shared.mapping = choose_mapping(shared.costs, comm.size());
     shared.order.assign(shared.ids.size(), -1);
     const std::vector<std::int32_t> order = order_shared(shared.costs, shared.mapping);
-    for (std::size_t k = 0; k < order.size(); ++k) shared.order[static_cast<std::size_t>(order[k])] = static_cast<std::int32_t>(k);
+    for (std::size_t k = 0; k < order.size(); ++k) shared.order[order[k]] = static_cast<std::int32_t>(k);
     for (std::size_t h = 0; h < all.parts.size(); ++h) {
       const std::vector<Supernode>& nodes = all.parts[h].forest.supernodes;
       Ints& owner = fronts.owners.emplace_back(nodes.size(), -1);
       for (std::size_t s = nodes.size(); s-- > 0;) {
-        const std::int32_t at =
-            shared.find(all.tree.parts[static_cast<std::size_t>(all.parts[h].part)].first_front + static_cast<std::int32_t>(s));
-        owner[s] = at >= 0 ? shared.mapping.owner(at) : owner[static_cast<std::size_t>(nodes[s].parent)];
+        const std::int32_t at = shared.find(all.tree.parts[all.parts[h].part].first_front + static_cast<std::int32_t>(s));
+        owner[s] = at >= 0 ? shared.mapping.owner(at) : owner[nodes[s].parent];
       }
     }
   });
@@ -103,10 +102,10 @@ std::vector<DealtFront> deal_fronts(const Communicator& comm, const MappedFronts
   const SharedMapping& shared = fronts.shared;
   const std::vector<Ints>& owners = fronts.owners;
   const auto received = comm::all_to_all(comm, [&] {
-    std::vector<Ints> lists(static_cast<std::size_t>(comm.size()));
+    std::vector<Ints> lists(comm.size());
     for (std::size_t h = 0; h < all.parts.size(); ++h) {
       const HeldPart& held = all.parts[h];
-      const TreePart& part = all.tree.parts[static_cast<std::size_t>(held.part)];
+      const TreePart& part = all.tree.parts[held.part];
       for (std::size_t s = 0; s < held.forest.supernodes.size(); ++s) {
         const Supernode& node = held.forest.supernodes[s];
         const std::int32_t above = held.parents[s] < 0 ? -1 : shared.find(held.parents[s]);
@@ -119,7 +118,7 @@ std::vector<DealtFront> deal_fronts(const Communicator& comm, const MappedFronts
         }
         if (owners[h][s] >= 0 && std::find(ranks.begin(), ranks.end(), owners[h][s]) == ranks.end()) ranks.push_back(owners[h][s]);
         for (const std::int32_t rank : ranks) {
-          Ints& list = lists[static_cast<std::size_t>(rank)];
+          Ints& list = lists[rank];
           list.insert(list.end(), {part.first_front + static_cast<std::int32_t>(s), held.parents[s], owners[h][s], node.first, node.width,
                                    static_cast<std::int32_t>(node.rows.size())});
           const auto nodes = held.nodes.begin() + (node.first - part.first);

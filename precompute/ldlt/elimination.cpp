@@ -50,13 +50,12 @@ class PartEliminator {
     for (std::size_t h = 0; h < elements_.size(); ++h)
       if (above[h] < 0 && !elements_[h].rows.empty()) left.push_back(std::move(elements_[h]));
     Ints ordered(held_.nodes.size());
-    for (std::size_t k = 0; k < ordered.size(); ++k) ordered[static_cast<std::size_t>(held_.forest.position[k])] = held_.nodes[k];
+    for (std::size_t k = 0; k < ordered.size(); ++k) ordered[held_.forest.position[k]] = held_.nodes[k];
     held_.nodes = std::move(ordered);
     for (std::size_t s = 0; s < held_.forest.supernodes.size(); ++s) {
       Supernode& node = held_.forest.supernodes[s];
       node.first += part_.first;
-      for (std::int32_t& row : node.rows)
-        row = row < part_.count ? part_.first + row : boundary_[static_cast<std::size_t>(row - part_.count)];
+      for (std::int32_t& row : node.rows) row = row < part_.count ? part_.first + row : boundary_[row - part_.count];
       if (node.parent < 0 && !node.rows.empty()) left.push_back({held_.part, static_cast<std::int32_t>(s), node.rows});
     }
     return left;
@@ -86,22 +85,22 @@ class PartEliminator {
     // Calls visit(vertex, one behind it) for each link, by ascending vertex: so a vertex gets the neighbours before it first.
     const auto for_links = [&](auto&& visit) {
       for (std::int32_t h = 0; h < hubs; ++h)
-        for (const std::int32_t row : elements_[static_cast<std::size_t>(h)].rows) visit(h, find(row));
+        for (const std::int32_t row : elements_[h].rows) visit(h, find(row));
       for (std::int32_t p = 0; p < part_.count; ++p)
         for (const std::int32_t* to = links_.begin(p); to != links_.end(p); ++to) visit(hubs + p, find(*to));
     };
     Graph graph;
     graph.offsets.assign(static_cast<std::size_t>(hubs + part_.count) + boundary_.size() + 1, 0);
     for_links([&](std::int32_t from, std::int32_t to) {
-      ++graph.offsets[static_cast<std::size_t>(from) + 1];
-      ++graph.offsets[static_cast<std::size_t>(to) + 1];
+      ++graph.offsets[from + 1];
+      ++graph.offsets[to + 1];
     });
     std::partial_sum(graph.offsets.begin(), graph.offsets.end(), graph.offsets.begin());
-    graph.neighbours.resize(static_cast<std::size_t>(graph.offsets.back()));
+    graph.neighbours.resize(graph.offsets.back());
     Ints next(graph.offsets.begin(), graph.offsets.end() - 1);
     for_links([&](std::int32_t from, std::int32_t to) {
-      graph.neighbours[static_cast<std::size_t>(next[static_cast<std::size_t>(from)]++)] = to;
-      graph.neighbours[static_cast<std::size_t>(next[static_cast<std::size_t>(to)]++)] = from;
+      graph.neighbours[next[from]++] = to;
+      graph.neighbours[next[to]++] = from;
     });
     return graph;
   }
@@ -120,13 +119,13 @@ std::vector<Ragged> sort_links(const Communicator& comm, const Ints& items, cons
     std::vector<std::vector<std::size_t>> at(all.parts.size());
     std::vector<std::size_t> held_of(all.tree.parts.size(), 0);
     for (std::size_t h = 0; h < all.parts.size(); ++h) {
-      at[h].assign(static_cast<std::size_t>(all.tree.parts[static_cast<std::size_t>(all.parts[h].part)].count), 0);
-      held_of[static_cast<std::size_t>(all.parts[h].part)] = h;
+      at[h].assign(all.tree.parts[all.parts[h].part].count, 0);
+      held_of[all.parts[h].part] = h;
     }
     for (ListReader reader(items); !reader.is_at_end();) {
       const std::int32_t position = reader.next();
-      const auto part = static_cast<std::size_t>(all.tree.find_part(position));
-      at[held_of[part]][static_cast<std::size_t>(position - all.tree.parts[part].first)] = reader.place();
+      const std::size_t part = all.tree.find_part(position);
+      at[held_of[part]][position - all.tree.parts[part].first] = reader.place();
       reader.skip(reader.next());
     }
     for (std::size_t h = 0; h < links.size(); ++h)
@@ -142,14 +141,14 @@ std::vector<Ragged> sort_links(const Communicator& comm, const Ints& items, cons
 /// Links of the nodes of each held part, by position. Collective.
 std::vector<Ragged> send_links(const Communicator& comm, const NodeLinks& nodes, const Elimination& all) {
   const auto received = comm::all_to_all(comm, [&] {
-    std::vector<Ints> lists(static_cast<std::size_t>(comm.size()));
+    std::vector<Ints> lists(comm.size());
     for (std::int32_t v = 0; v < nodes.own_nodes; ++v) {
-      const std::int32_t position = all.position[static_cast<std::size_t>(v)];
-      Ints& list = lists[static_cast<std::size_t>(all.tree.find_holder(position))];
+      const std::int32_t position = all.position[v];
+      Ints& list = lists[all.tree.find_holder(position)];
       list.insert(list.end(), {position, 0});
       const std::size_t count = list.size() - 1;
       for (const std::int32_t* u = nodes.links.begin(v); u != nodes.links.end(v); ++u)
-        if (all.position[static_cast<std::size_t>(*u)] > position) list.push_back(all.position[static_cast<std::size_t>(*u)]);
+        if (all.position[*u] > position) list.push_back(all.position[*u]);
       list[count] = static_cast<std::int32_t>(list.size() - count) - 1;
     }
     return join(lists);
@@ -167,7 +166,7 @@ std::vector<Above> eliminate_parts(const Communicator& comm, Elimination& all, c
   std::vector<Element> elements;  // for the part that comes next
   for (int depth = all.tree.depth(); depth >= 0; --depth) {
     const auto received = comm::all_to_all(comm, [&] {
-      std::vector<Ints> lists(static_cast<std::size_t>(comm.size()));
+      std::vector<Ints> lists(comm.size());
       for (std::size_t h = 0; h < all.parts.size(); ++h) {
         HeldPart& held = all.parts[h];
         const TreePart& part = all.tree[held.part];
@@ -180,7 +179,7 @@ std::vector<Above> eliminate_parts(const Communicator& comm, Elimination& all, c
         for (std::size_t k = 0; k < named.size(); ++k)
           if (above[k] >= 0) found.push_back({named[k].part, named[k].supernode, held.part, above[k]});
         for (const Element& element : left) {
-          Ints& list = lists[static_cast<std::size_t>(all.tree[part.parent].begin)];
+          Ints& list = lists[all.tree[part.parent].begin];
           list.insert(list.end(), {element.part, element.supernode, static_cast<std::int32_t>(element.rows.size())});
           list.insert(list.end(), element.rows.begin(), element.rows.end());
         }
@@ -202,25 +201,22 @@ std::vector<Above> eliminate_parts(const Communicator& comm, Elimination& all, c
 /// Numbers the fronts, and reports to the holder of each root which front is above it. Collective.
 void link_parts(const Communicator& comm, Elimination& all, const std::vector<Above>& found) {
   Ints counts(all.tree.parts.size(), 0);
-  for (const HeldPart& held : all.parts)
-    counts[static_cast<std::size_t>(held.part)] = static_cast<std::int32_t>(held.forest.supernodes.size());
+  for (const HeldPart& held : all.parts) counts[held.part] = static_cast<std::int32_t>(held.forest.supernodes.size());
   comm.sum(std::span<std::int32_t>(counts));
   all.tree.fronts = 0;
   for (std::size_t t = 0; t < counts.size(); ++t) {
     all.tree.parts[t].first_front = all.tree.fronts;
     all.tree.fronts += counts[t];
   }
-  const auto first_front = [&](std::int32_t part) { return all.tree.parts[static_cast<std::size_t>(part)].first_front; };
-  const auto reported =
-      comm::all_to_all(comm, found, [&](const Above& one) { return all.tree.parts[static_cast<std::size_t>(one.part)].begin; });
+  const auto first_front = [&](std::int32_t part) { return all.tree.parts[part].first_front; };
+  const auto reported = comm::all_to_all(comm, found, [&](const Above& one) { return all.tree.parts[one.part].begin; });
   comm.agree([&] {
     for (HeldPart& held : all.parts) {
       held.parents.clear();
       for (const Supernode& node : held.forest.supernodes)
         held.parents.push_back(node.parent < 0 ? -1 : first_front(held.part) + node.parent);
       for (const Above& one : reported.items)
-        if (one.part == held.part)
-          held.parents[static_cast<std::size_t>(one.supernode)] = first_front(one.above_part) + one.above_supernode;
+        if (one.part == held.part) held.parents[one.supernode] = first_front(one.above_part) + one.above_supernode;
     }
   });
 }
@@ -228,13 +224,13 @@ void link_parts(const Communicator& comm, Elimination& all, const std::vector<Ab
 /// The last places of positions that the holders of their parts have moved. Collective.
 Ints find_moved(const Communicator& comm, const Elimination& all, const Ints& positions) {
   std::vector<const HeldPart*> held_of(all.tree.parts.size(), nullptr);
-  for (const HeldPart& held : all.parts) held_of[static_cast<std::size_t>(held.part)] = &held;
+  for (const HeldPart& held : all.parts) held_of[held.part] = &held;
   return comm::query_owners<std::int32_t>(
       comm, positions, [&](std::int32_t position) { return all.tree.find_holder(position); },
       [&](std::int32_t position) {
-        const auto part = static_cast<std::size_t>(all.tree.find_part(position));
+        const std::size_t part = all.tree.find_part(position);
         const std::int32_t first = all.tree.parts[part].first;
-        return first + held_of[part]->forest.position[static_cast<std::size_t>(position - first)];
+        return first + held_of[part]->forest.position[position - first];
       });
 }
 
@@ -290,13 +286,12 @@ void find_fronts(const Communicator& comm, Elimination& all, const std::vector<R
 
 /// Nodes in their order, for the holder of each part. position: (nodes) on rank 0, elsewhere empty. Local.
 std::vector<Ints> list_nodes(const Communicator& comm, const SeparatorTree& tree, const Ints& position) {
-  std::vector<Ints> lists(static_cast<std::size_t>(comm.size()));
+  std::vector<Ints> lists(comm.size());
   if (position.empty()) return lists;
   Ints node_at(position.size());
-  for (std::size_t v = 0; v < position.size(); ++v) node_at[static_cast<std::size_t>(position[v])] = static_cast<std::int32_t>(v);
+  for (std::size_t v = 0; v < position.size(); ++v) node_at[position[v]] = static_cast<std::int32_t>(v);
   for (const TreePart& part : tree.parts)
-    lists[static_cast<std::size_t>(part.begin)].insert(lists[static_cast<std::size_t>(part.begin)].end(), node_at.begin() + part.first,
-                                                       node_at.begin() + part.first + part.count);
+    lists[part.begin].insert(lists[part.begin].end(), node_at.begin() + part.first, node_at.begin() + part.first + part.count);
   return lists;
 }
 
@@ -305,7 +300,7 @@ std::vector<Ints> list_nodes(const Communicator& comm, const SeparatorTree& tree
 /// Local.
 std::vector<Ints> list_star_links(const Communicator& comm, const SeparatorTree& tree, std::span<const std::int32_t> elements, int width,
                                   const Ints& position) {
-  std::vector<Ints> lists(static_cast<std::size_t>(comm.size()));
+  std::vector<Ints> lists(comm.size());
   const std::size_t count = position.size();
   if (count == 0) return lists;
   // The elements by their first node, as chains.
@@ -314,25 +309,24 @@ std::vector<Ints> list_star_links(const Communicator& comm, const SeparatorTree&
   Ints places(elements.begin(), elements.end());
   for (std::size_t at = 0; at < places.size(); at += static_cast<std::size_t>(width)) {
     auto first = static_cast<std::int32_t>(count);
-    for (std::int32_t& place : std::span(places).subspan(at, static_cast<std::size_t>(width))) {
+    for (std::int32_t& place : std::span(places).subspan(at, width)) {
       if (place < 0) continue;
-      place = position[static_cast<std::size_t>(place)];
+      place = position[place];
       first = std::min(first, place);
     }
     const auto e = static_cast<std::int32_t>(next.size());
-    next.push_back(first < static_cast<std::int32_t>(count) ? std::exchange(head[static_cast<std::size_t>(first)], e) : -1);
+    next.push_back(first < static_cast<std::int32_t>(count) ? std::exchange(head[first], e) : -1);
   }
   Ints seen_from(count, -1);
   for (const TreePart& part : tree.parts) {
-    Ints& list = lists[static_cast<std::size_t>(part.begin)];
+    Ints& list = lists[part.begin];
     for (std::int32_t p = part.first; p < part.first + part.count; ++p) {
       list.insert(list.end(), {p, 0});
       const std::size_t behind = list.size() - 1;
-      seen_from[static_cast<std::size_t>(p)] = p;
-      for (std::int32_t e = head[static_cast<std::size_t>(p)]; e >= 0; e = next[static_cast<std::size_t>(e)])
-        for (const std::int32_t q :
-             std::span(places).subspan(static_cast<std::size_t>(e) * static_cast<std::size_t>(width), static_cast<std::size_t>(width)))
-          if (q >= 0 && std::exchange(seen_from[static_cast<std::size_t>(q)], p) != p) list.push_back(q);
+      seen_from[p] = p;
+      for (std::int32_t e = head[p]; e >= 0; e = next[e])
+        for (const std::int32_t q : std::span(places).subspan(static_cast<std::size_t>(e) * static_cast<std::size_t>(width), width))
+          if (q >= 0 && std::exchange(seen_from[q], p) != p) list.push_back(q);
       list[behind] = static_cast<std::int32_t>(list.size() - behind) - 1;
     }
   }
@@ -382,8 +376,8 @@ Elimination eliminate_elements(const Communicator& comm, std::span<const std::in
     for (std::size_t v = 0; v < position.size(); ++v) {
       const std::int32_t number = condensed.numbers()[v];
       if (number < 0) continue;
-      const int part = all.tree.find_part(core_position[static_cast<std::size_t>(number)]);
-      end[static_cast<std::size_t>(part)] = std::max(end[static_cast<std::size_t>(part)], position[v] + 1);
+      const int part = all.tree.find_part(core_position[number]);
+      end[part] = std::max(end[part], position[v] + 1);
     }
     return end;
   });

@@ -174,7 +174,7 @@ bool Factor::factorise(double sigma) {
       s.drop_scratch();
       throw;
     }
-    petsc::add_flops(s.plan.analysis.ranks[static_cast<std::size_t>(s.plan.rank)].flops);
+    petsc::add_flops(s.plan.analysis.ranks[s.plan.rank].flops);
   });
   s.backward_error = std::numeric_limits<double>::infinity();
   if (!s.numbers.outcome.is_complete || s.numbers.outcome.smallest <= kVanishedPivot * s.norm) return false;
@@ -190,7 +190,7 @@ double Factor::get_backward_error() const { return state_->backward_error; }
 double Factor::get_growth() const { return state_->numbers.outcome.growth; }
 
 void Factor::State::solve(const double* b, double* x, int stride, int columns) {
-  petsc::add_flops(4.0 * static_cast<double>(plan.analysis.ranks[static_cast<std::size_t>(plan.rank)].entries) * columns);
+  petsc::add_flops(4.0 * static_cast<double>(plan.analysis.ranks[plan.rank].entries) * columns);
   for (int first = 0; first < columns; first += kSolveColumns) {
     const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(first) * stride;
     solve_columns(plan, numbers, workspace, b + at, x + at, stride, std::min(kSolveColumns, columns - first));
@@ -206,7 +206,7 @@ void Factor::State::solve_refined(double* x, int stride, int columns) {
   PetscInt rows = 0;
   check(VecGetLocalSize(from, &rows));
   const std::ptrdiff_t n = rows;
-  std::vector<double> rest(static_cast<std::size_t>(n * columns));  // B - A X
+  std::vector<double> rest(n * columns);  // B - A X
   for (int j = 0; j < columns; ++j) std::copy_n(x + std::ptrdiff_t{j} * stride, n, rest.data() + j * n);
   solve(x, x, stride, columns);
   for (int j = 0; j < columns; ++j) {
@@ -215,12 +215,12 @@ void Factor::State::solve_refined(double* x, int stride, int columns) {
     check(VecResetArray(from));
     const PetscScalar* image = nullptr;
     check(VecGetArrayRead(to, &image));
-    for (std::ptrdiff_t i = 0; i < n; ++i) rest[static_cast<std::size_t>(j * n + i)] -= image[i];
+    for (std::ptrdiff_t i = 0; i < n; ++i) rest[j * n + i] -= image[i];
     check(VecRestoreArrayRead(to, &image));
   }
   solve(rest.data(), rest.data(), std::max<int>(rows, 1), columns);
   for (int j = 0; j < columns; ++j)
-    for (std::ptrdiff_t i = 0; i < n; ++i) x[std::ptrdiff_t{j} * stride + i] += rest[static_cast<std::size_t>(j * n + i)];
+    for (std::ptrdiff_t i = 0; i < n; ++i) x[std::ptrdiff_t{j} * stride + i] += rest[j * n + i];
 }
 
 void Factor::solve(const double* b, double* x, int stride, int columns) {

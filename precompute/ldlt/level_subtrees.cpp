@@ -22,7 +22,7 @@ class Levelling {
     for (std::size_t s = 0; s < fronts.size(); ++s) {
       const auto front = static_cast<std::int32_t>(s);
       work_[s] += fronts[s].operations;
-      if (fronts[s].parent >= 0) work_[static_cast<std::size_t>(fronts[s].parent)] += work_[s];
+      if (fronts[s].parent >= 0) work_[fronts[s].parent] += work_[s];
       add_front(front, 1);
       if (mapping.owner(front) >= 0 && fronts[s].parent >= 0 && mapping.owner(fronts[s].parent) < 0) subtrees_.push_back(front);
     }
@@ -64,7 +64,7 @@ class Levelling {
     const int most = find_most();
     std::int32_t best = -1;
     for (const std::int32_t subtree : subtrees_) {
-      if (mapping_.owner(subtree) != most || children_[static_cast<std::size_t>(subtree)].empty()) continue;
+      if (mapping_.owner(subtree) != most || children_[subtree].empty()) continue;
       double least = load(most);
       for (const FrontShare& share : list_takers(subtree)) least = std::min(least, load(share.rank));
       const double gap = load(most) - least;
@@ -73,10 +73,10 @@ class Levelling {
     }
     if (best < 0) return false;
     add_front(best, -1);
-    mapping_.share(best, fronts_[static_cast<std::size_t>(best)].parent);
+    mapping_.share(best, fronts_[best].parent);
     add_front(best, 1);
     std::erase(subtrees_, best);
-    const std::vector<std::int32_t>& below = children_[static_cast<std::size_t>(best)];
+    const std::vector<std::int32_t>& below = children_[best];
     subtrees_.insert(subtrees_.end(), below.begin(), below.end());
     return true;
   }
@@ -84,12 +84,10 @@ class Levelling {
  private:
   static constexpr double kUneven = 1e-3;
 
-  double work(std::int32_t subtree) const { return work_[static_cast<std::size_t>(subtree)]; }
-  double load(int rank) const { return load_[static_cast<std::size_t>(rank)]; }
+  double work(std::int32_t subtree) const { return work_[subtree]; }
+  double load(int rank) const { return load_[rank]; }
   int find_most() const { return static_cast<int>(std::max_element(load_.begin(), load_.end()) - load_.begin()); }
-  std::vector<FrontShare> list_takers(std::int32_t subtree) const {
-    return mapping_.list_shares(fronts_[static_cast<std::size_t>(subtree)].parent);
-  }
+  std::vector<FrontShare> list_takers(std::int32_t subtree) const { return mapping_.list_shares(fronts_[subtree].parent); }
   bool can_take(std::int32_t subtree, int rank) const {
     const std::vector<FrontShare> takers = list_takers(subtree);
     return std::any_of(takers.begin(), takers.end(), [&](const FrontShare& share) { return share.rank == rank; });
@@ -98,19 +96,17 @@ class Levelling {
   void add_front(std::int32_t front, int sign) {
     const std::vector<FrontShare> shares = mapping_.list_shares(front);
     if (shares.size() == load_.size()) return;
-    for (const FrontShare& share : shares)
-      load_[static_cast<std::size_t>(share.rank)] +=
-          sign * fronts_[static_cast<std::size_t>(front)].operations / static_cast<double>(shares.size());
+    for (const FrontShare& share : shares) load_[share.rank] += sign * fronts_[front].operations / static_cast<double>(shares.size());
   }
   void give(std::int32_t subtree, int to) {
-    load_[static_cast<std::size_t>(mapping_.owner(subtree))] -= work(subtree);
-    load_[static_cast<std::size_t>(to)] += work(subtree);
+    load_[mapping_.owner(subtree)] -= work(subtree);
+    load_[to] += work(subtree);
     std::vector<std::int32_t> open{subtree};
     while (!open.empty()) {
       const std::int32_t front = open.back();
       open.pop_back();
       mapping_.set_owner(front, to);
-      const std::vector<std::int32_t>& below = children_[static_cast<std::size_t>(front)];
+      const std::vector<std::int32_t>& below = children_[front];
       open.insert(open.end(), below.begin(), below.end());
     }
   }

@@ -32,7 +32,7 @@ class ListReader {
   std::int32_t next() { return items_[at_++]; }
   void skip(std::int32_t count) { at_ += static_cast<std::size_t>(count); }
   std::vector<std::int32_t> take(std::int32_t count) {
-    const std::span<const std::int32_t> taken = items_.subspan(at_, static_cast<std::size_t>(count));
+    const std::span<const std::int32_t> taken = items_.subspan(at_, count);
     skip(count);
     return {taken.begin(), taken.end()};
   }

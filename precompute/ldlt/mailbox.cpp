@@ -43,7 +43,7 @@ std::optional<Letter> Mailbox::receive() {
     return Letter(std::move(data));
   } catch (const std::bad_alloc&) {
     // The sender must not wait for ever. Open MPI ends the process where it reads a long message into less room.
-    if (static_cast<std::size_t>(count) <= refuge_.size()) {
+    if (count <= std::ssize(refuge_)) {
       MPI_Mrecv(refuge_.data(), count, MPI_DOUBLE, &message, MPI_STATUS_IGNORE);
       throw;
     }

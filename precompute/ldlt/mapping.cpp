@@ -95,11 +95,11 @@ class Replay {
       } else {
         shared.push_back(front);
         const std::int32_t parent = fronts_[s].parent;
-        if (parent >= 0) ++waiting_[static_cast<std::size_t>(parent)];
+        if (parent >= 0) ++waiting_[parent];
       }
     }
     for (const std::int32_t s : shared)
-      if (waiting_[static_cast<std::size_t>(s)] == 0) open_.emplace(start(s), s);
+      if (waiting_[s] == 0) open_.emplace(start(s), s);
     while (!open_.empty()) {
       // Starts only grow later, so the first whose start still holds is the earliest of all.
       const auto [known, s] = open_.top();
@@ -112,8 +112,8 @@ class Replay {
       if (levelled_ != nullptr) level_front(s);
       eliminate(s, (levelled_ != nullptr ? *levelled_ : mapping_).list_shares(s));
       order_.push_back(s);
-      const std::int32_t parent = fronts_[static_cast<std::size_t>(s)].parent;
-      if (parent >= 0 && --waiting_[static_cast<std::size_t>(parent)] == 0) open_.emplace(start(parent), parent);
+      const std::int32_t parent = fronts_[s].parent;
+      if (parent >= 0 && --waiting_[parent] == 0) open_.emplace(start(parent), parent);
     }
     return *std::max_element(free_.begin(), free_.end());
   }
@@ -131,36 +131,35 @@ class Replay {
  private:
   /// When all ranks of a front are free and its children complete.
   double start(std::int32_t front) const {
-    double time = ready_[static_cast<std::size_t>(front)];
-    for (const FrontShare& share : mapping_.list_shares(front)) time = std::max(time, free_[static_cast<std::size_t>(share.rank)]);
+    double time = ready_[front];
+    for (const FrontShare& share : mapping_.list_shares(front)) time = std::max(time, free_[share.rank]);
     return time;
   }
 
   void level_front(std::int32_t front) {
     std::vector<FrontShare> shares = mapping_.list_shares(front);
     std::vector<double> times;
-    for (const FrontShare& share : shares)
-      times.push_back(std::max(free_[static_cast<std::size_t>(share.rank)], ready_[static_cast<std::size_t>(front)]));
-    level(shares, times, fronts_[static_cast<std::size_t>(front)].operations, kLeastShare / static_cast<double>(shares.size()));
-    shared_[static_cast<std::size_t>(front)] = deal_tiles(fronts_[static_cast<std::size_t>(front)], shares);
+    for (const FrontShare& share : shares) times.push_back(std::max(free_[share.rank], ready_[front]));
+    level(shares, times, fronts_[front].operations, kLeastShare / static_cast<double>(shares.size()));
+    shared_[front] = deal_tiles(fronts_[front], shares);
     levelled_->set_shares(front, std::move(shares));
   }
 
   void eliminate(std::int32_t front, const std::vector<FrontShare>& shares) {
-    const FrontCost& cost = fronts_[static_cast<std::size_t>(front)];
-    const std::vector<double>& parts = shared_[static_cast<std::size_t>(front)].operations;
+    const FrontCost& cost = fronts_[front];
+    const std::vector<double>& parts = shared_[front].operations;
     const auto find_operations = [&](std::size_t place) { return parts.empty() ? cost.operations : parts[place]; };
     const double together = is_gang_ ? start(front) : 0;
     double largest = 0;
     for (std::size_t place = 0; place < shares.size(); ++place) largest = std::max(largest, find_operations(place));
     double complete = 0;
     for (std::size_t place = 0; place < shares.size(); ++place) {
-      double& free = free_[static_cast<std::size_t>(shares[place].rank)];
-      free = is_gang_ ? together + largest : std::max(ready_[static_cast<std::size_t>(front)], free) + find_operations(place);
+      double& free = free_[shares[place].rank];
+      free = is_gang_ ? together + largest : std::max(ready_[front], free) + find_operations(place);
       complete = std::max(complete, free);
     }
     if (cost.parent >= 0) {
-      double& ready = ready_[static_cast<std::size_t>(cost.parent)];
+      double& ready = ready_[cost.parent];
       ready = std::max(ready, complete);
     }
   }
@@ -185,7 +184,7 @@ std::vector<std::vector<std::int32_t>> list_children(const std::vector<FrontCost
   std::vector<std::vector<std::int32_t>> children(fronts.size());
   for (std::size_t s = 0; s < fronts.size(); ++s) {
     const std::int32_t parent = fronts[s].parent;
-    (parent < 0 ? roots : children[static_cast<std::size_t>(parent)]).push_back(static_cast<std::int32_t>(s));
+    (parent < 0 ? roots : children[parent]).push_back(static_cast<std::int32_t>(s));
   }
   return children;
 }
@@ -215,19 +214,19 @@ Mapping::Mapping(const std::vector<FrontCost>& fronts, int ranks, double operati
   for (std::size_t s = 0; s < count; ++s) {
     const FrontCost& front = fronts[s];
     work[s] += operations_weight * front.operations / operations + (1 - operations_weight) * front.entries / entries;
-    if (front.parent >= 0) work[static_cast<std::size_t>(front.parent)] += work[s];
+    if (front.parent >= 0) work[front.parent] += work[s];
   }
   std::vector<std::int32_t> roots;
   const std::vector<std::vector<std::int32_t>> children = list_children(fronts, roots);
   // In the order of the forest, which is that of the ranks whose rows they are.
   const auto divide = [&](const std::vector<std::int32_t>& siblings, double begin, double end) {
     double all = 0;
-    for (const std::int32_t s : siblings) all += work[static_cast<std::size_t>(s)];
+    for (const std::int32_t s : siblings) all += work[s];
     double at = begin;
     for (const std::int32_t s : siblings) {
-      begin_[static_cast<std::size_t>(s)] = at;
-      at += all > 0 ? (end - begin) * work[static_cast<std::size_t>(s)] / all : 0;
-      end_[static_cast<std::size_t>(s)] = std::min(at, end);
+      begin_[s] = at;
+      at += all > 0 ? (end - begin) * work[s] / all : 0;
+      end_[s] = std::min(at, end);
     }
   };
   divide(roots, 0, ranks);
@@ -241,8 +240,8 @@ Mapping::Mapping(const std::vector<FrontCost>& fronts, int ranks, double operati
         end_[s] = end;
       }
       if (fronts[s].parent >= 0) {  // the ranks of a front are among those of the front above
-        begin_[s] = std::max(begin_[s], begin_[static_cast<std::size_t>(fronts[s].parent)]);
-        end_[s] = std::min(end_[s], end_[static_cast<std::size_t>(fronts[s].parent)]);
+        begin_[s] = std::max(begin_[s], begin_[fronts[s].parent]);
+        end_[s] = std::min(end_[s], end_[fronts[s].parent]);
       }
       const int first = std::clamp(static_cast<int>(std::floor(begin_[s] + 1e-9)), 0, ranks - 1);
       const int last = std::clamp(static_cast<int>(std::ceil(end_[s] - 1e-9)) - 1, first, ranks - 1);
@@ -256,22 +255,22 @@ Mapping::Mapping(const std::vector<FrontCost>& fronts, int ranks, double operati
       continue;
     }
     for (const std::int32_t child : children[s]) {
-      begin_[static_cast<std::size_t>(child)] = begin_[s];
-      end_[static_cast<std::size_t>(child)] = end_[s];
-      owner_[static_cast<std::size_t>(child)] = owner_[s];
+      begin_[child] = begin_[s];
+      end_[child] = end_[s];
+      owner_[child] = owner_[s];
     }
   }
 }
 
 void Mapping::share(std::int32_t front, std::int32_t as) {
-  const auto to = static_cast<std::size_t>(front);
+  const std::size_t to = front;
   owner_[to] = -1;
-  begin_[to] = begin_[static_cast<std::size_t>(as)];
-  end_[to] = end_[static_cast<std::size_t>(as)];
+  begin_[to] = begin_[as];
+  end_[to] = end_[as];
 }
 
 std::vector<FrontShare> Mapping::list_shares(std::int32_t front) const {
-  const auto s = static_cast<std::size_t>(front);
+  const std::size_t s = front;
   if (owner_[s] >= 0) return {{owner_[s], 1.0}};
   if (!given_shares_.empty() && !given_shares_[s].empty()) return given_shares_[s];
   std::vector<FrontShare> shares;
@@ -283,7 +282,7 @@ std::vector<FrontShare> Mapping::list_shares(std::int32_t front) const {
 
 void Mapping::set_shares(std::int32_t front, std::vector<FrontShare> shares) {
   given_shares_.resize(owner_.size());
-  given_shares_[static_cast<std::size_t>(front)] = std::move(shares);
+  given_shares_[front] = std::move(shares);
 }
 
 double MappingCounts::fullest_ratio() const {
@@ -327,12 +326,12 @@ class FrontMessages {
     }
   }
   void receive(int place, double numbers) {
-    counts_.messages[static_cast<std::size_t>(map_.rank(place))] += 1;
-    counts_.bytes[static_cast<std::size_t>(map_.rank(place))] += 8 * numbers;
+    counts_.messages[map_.rank(place)] += 1;
+    counts_.bytes[map_.rank(place)] += 8 * numbers;
   }
   void solve(int place, double rows) {
-    counts_.solve_messages[static_cast<std::size_t>(map_.rank(place))] += 1;
-    counts_.solve_bytes[static_cast<std::size_t>(map_.rank(place))] += 8 * kColumns * rows;
+    counts_.solve_messages[map_.rank(place)] += 1;
+    counts_.solve_bytes[map_.rank(place)] += 8 * kColumns * rows;
   }
 
   const TileMap& map_;
@@ -341,7 +340,7 @@ class FrontMessages {
 
 /// Sums up operations, entries and paths, which are what a mapping is chosen by.
 MappingCounts count_work(const std::vector<FrontCost>& fronts, const Mapping& mapping) {
-  const auto ranks = static_cast<std::size_t>(mapping.ranks());
+  const std::size_t ranks = mapping.ranks();
   MappingCounts counts;
   counts.operations.assign(ranks, 0.0);
   counts.entries.assign(ranks, 0.0);
@@ -353,8 +352,8 @@ MappingCounts count_work(const std::vector<FrontCost>& fronts, const Mapping& ma
     counts.total_operations += cost.operations;
     counts.total_entries += cost.entries;
     if (mapping.owner(front) >= 0) {
-      counts.operations[static_cast<std::size_t>(mapping.owner(front))] += cost.operations;
-      counts.entries[static_cast<std::size_t>(mapping.owner(front))] += cost.entries;
+      counts.operations[mapping.owner(front)] += cost.operations;
+      counts.entries[mapping.owner(front)] += cost.entries;
       continue;
     }
     ++counts.shared_fronts;
@@ -362,9 +361,9 @@ MappingCounts count_work(const std::vector<FrontCost>& fronts, const Mapping& ma
     counts.shared_entries += cost.entries;
     const std::vector<FrontShare> shares = mapping.list_shares(front);
     for (std::size_t place = 0; place < shares.size(); ++place) {
-      ++shared_of_rank[static_cast<std::size_t>(shares[place].rank)];
-      counts.operations[static_cast<std::size_t>(shares[place].rank)] += shared[s].operations[place];
-      counts.entries[static_cast<std::size_t>(shares[place].rank)] += static_cast<double>(shared[s].entries[place]);
+      ++shared_of_rank[shares[place].rank];
+      counts.operations[shares[place].rank] += shared[s].operations[place];
+      counts.entries[shares[place].rank] += static_cast<double>(shared[s].entries[place]);
     }
   }
   for (const std::int32_t count : shared_of_rank) counts.most_shared_fronts = std::max(counts.most_shared_fronts, count);
@@ -377,7 +376,7 @@ MappingCounts count_work(const std::vector<FrontCost>& fronts, const Mapping& ma
 MappingCounts count_mapping(const std::vector<FrontCost>& fronts, const Mapping& mapping) {
   MappingCounts counts = count_work(fronts, mapping);
   counts.gang_operations = Replay(fronts, mapping, list_parts(fronts, mapping), true).run();
-  const auto ranks = static_cast<std::size_t>(mapping.ranks());
+  const std::size_t ranks = mapping.ranks();
   for (std::vector<double>* list : {&counts.messages, &counts.bytes, &counts.solve_messages, &counts.solve_bytes}) list->assign(ranks, 0.0);
   std::vector<std::int32_t> planned(ranks, 0);
   std::vector<double> path(fronts.size(), 0.0);  // messages of a solve from the leaves to the front and back
@@ -389,15 +388,14 @@ MappingCounts count_mapping(const std::vector<FrontCost>& fronts, const Mapping&
     const std::vector<FrontShare> shares = mapping.list_shares(front);
     const TileMap map(fronts[s].width, fronts[s].rows, shares);
     FrontMessages(map, counts).count();
-    for (const FrontShare& share : shares)
-      planned[static_cast<std::size_t>(share.rank)] += 1 + static_cast<std::int32_t>(children[s].size());
+    for (const FrontShare& share : shares) planned[share.rank] += 1 + static_cast<std::int32_t>(children[s].size());
     for (const std::int32_t child : children[s]) {
-      const auto rows = 3.0 * static_cast<double>(fronts[static_cast<std::size_t>(child)].rows);
+      const auto rows = 3.0 * static_cast<double>(fronts[child].rows);
       const std::vector<FrontShare> from = mapping.list_shares(child);
       const double copies = std::ceil(std::sqrt(static_cast<double>(from.size())));  // ranks that have a part of the sum of a row
-      path[s] = std::max(path[s], path[static_cast<std::size_t>(child)]);
+      path[s] = std::max(path[s], path[child]);
       for (const FrontShare& share : shares) {
-        const auto rank = static_cast<std::size_t>(share.rank);
+        const std::size_t rank = share.rank;
         for (const FrontShare& sender : from) {
           if (sender.rank == share.rank) continue;
           const double part = share.fraction * sender.fraction;
@@ -405,8 +403,8 @@ MappingCounts count_mapping(const std::vector<FrontCost>& fronts, const Mapping&
           counts.bytes[rank] += 8 * count_triangle_of(rows) * part;
           counts.solve_messages[rank] += 1;
           counts.solve_bytes[rank] += 8 * kColumns * rows * copies * part;
-          counts.solve_messages[static_cast<std::size_t>(sender.rank)] += 1;
-          counts.solve_bytes[static_cast<std::size_t>(sender.rank)] += 8 * kColumns * rows * copies * part;
+          counts.solve_messages[sender.rank] += 1;
+          counts.solve_bytes[sender.rank] += 8 * kColumns * rows * copies * part;
         }
       }
     }

@@ -41,11 +41,11 @@ class Mapping {
   int ranks() const { return ranks_; }
   double operations_weight() const { return operations_weight_; }
   /// The rank that has a front whole, -1: it is shared.
-  int owner(std::int32_t front) const { return owner_[static_cast<std::size_t>(front)]; }
+  int owner(std::int32_t front) const { return owner_[front]; }
   /// Its ranks, ascending; the fractions add up to one. A front that one rank has is one share of 1.
   std::vector<FrontShare> list_shares(std::int32_t front) const;
   /// Gives a front to one rank.
-  void set_owner(std::int32_t front, int rank) { owner_[static_cast<std::size_t>(front)] = rank; }
+  void set_owner(std::int32_t front, int rank) { owner_[front] = rank; }
   /// Gives a front to the ranks of another one.
   void share(std::int32_t front, std::int32_t as);
   /// Gives the same ranks of a shared front other fractions, which add up to one.

@@ -22,17 +22,16 @@ using comm::IndexPartition;
 /// Links of the own nodes, from elements of any ranks. Collective.
 NodeLinks gather_links(const Communicator& comm, std::span<const std::int32_t> elements, int width, const IndexPartition& owners) {
   const auto received = comm::all_to_all(comm, [&] {
-    std::vector<Ints> lists(static_cast<std::size_t>(comm.size()));
+    std::vector<Ints> lists(comm.size());
     std::vector<int> ranks;
     for (std::size_t at = 0; at < elements.size(); at += static_cast<std::size_t>(width)) {
-      const auto nodes = elements.subspan(at, static_cast<std::size_t>(width));
+      const auto nodes = elements.subspan(at, width);
       ranks.clear();
       for (const std::int32_t node : nodes)
         if (node >= 0) ranks.push_back(owners.find_owner(node));
       std::sort(ranks.begin(), ranks.end());
       ranks.erase(std::unique(ranks.begin(), ranks.end()), ranks.end());
-      for (const int rank : ranks)
-        lists[static_cast<std::size_t>(rank)].insert(lists[static_cast<std::size_t>(rank)].end(), nodes.begin(), nodes.end());
+      for (const int rank : ranks) lists[rank].insert(lists[rank].end(), nodes.begin(), nodes.end());
     }
     return join(lists);
   });
@@ -49,8 +48,8 @@ NodeLinks gather_links(const Communicator& comm, std::span<const std::int32_t> e
     for (std::int32_t& node : local)
       if (node >= 0) node = is_own(node) ? node - links.first_node : links.find_ghost(node);
     partition::Graph graph = partition::make_node_graph(local, width, links.count());
-    graph.offsets.resize(static_cast<std::size_t>(links.own_nodes) + 1);
-    graph.neighbours.resize(static_cast<std::size_t>(graph.offsets.back()));
+    graph.offsets.resize(links.own_nodes + 1);
+    graph.neighbours.resize(graph.offsets.back());
     links.links = {std::move(graph.offsets), std::move(graph.neighbours)};
     return links;
   });
@@ -122,13 +121,13 @@ ElementRanks MeshOrder::find_ranks(const Communicator& comm, std::span<const std
       comm, foreign, [&](std::int32_t node) { return owners_.find_owner(node); }, find_own);
   const auto find_place = [&](std::int32_t node) {
     if (owners_.is_own(node)) return find_own(node);
-    return places[static_cast<std::size_t>(std::lower_bound(foreign.begin(), foreign.end(), node) - foreign.begin())];
+    return places[std::lower_bound(foreign.begin(), foreign.end(), node) - foreign.begin()];
   };
   return comm.agree([&] {
     ElementRanks ranks;
     for (std::size_t at = 0; at < elements.size(); at += static_cast<std::size_t>(width)) {
       Place first{0, -1};
-      for (const std::int32_t node : elements.subspan(at, static_cast<std::size_t>(width))) {
+      for (const std::int32_t node : elements.subspan(at, width)) {
         if (node < 0) continue;
         const Place place = find_place(node);
         if (first.rank < 0 || place.position < first.position) first = place;

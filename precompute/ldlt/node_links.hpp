@@ -18,8 +18,8 @@ struct Ragged {
   Ints offsets{0};
   Ints items;
   std::int32_t count() const { return static_cast<std::int32_t>(offsets.size()) - 1; }
-  const std::int32_t* begin(std::int32_t i) const { return items.data() + offsets[static_cast<std::size_t>(i)]; }
-  const std::int32_t* end(std::int32_t i) const { return items.data() + offsets[static_cast<std::size_t>(i) + 1]; }
+  const std::int32_t* begin(std::int32_t i) const { return items.data() + offsets[i]; }
+  const std::int32_t* end(std::int32_t i) const { return items.data() + offsets[i + 1]; }
   void close() { offsets.push_back(static_cast<std::int32_t>(items.size())); }
 };
 
@@ -31,9 +31,7 @@ struct NodeLinks {
   Ragged links;  // (own_nodes) ascending, without the node itself
 
   std::int32_t count() const { return own_nodes + static_cast<std::int32_t>(ghosts.size()); }
-  std::int32_t find_global(std::int32_t v) const {
-    return v < own_nodes ? first_node + v : ghosts[static_cast<std::size_t>(v - own_nodes)];
-  }
+  std::int32_t find_global(std::int32_t v) const { return v < own_nodes ? first_node + v : ghosts[v - own_nodes]; }
   /// Pre: `node` is a ghost.
   std::int32_t find_ghost(std::int32_t node) const;
 };

@@ -52,7 +52,7 @@ class Factoriser {
     wide_ = Buffer(scratch);
     block_ = Buffer(kMaxBlock * kMaxBlock);
     for (int parity = 0; parity < 2; ++parity) top_[parity] = numbers.panels.data() + plan.room.stack_begin[parity];
-    where_.assign(static_cast<std::size_t>(plan.local_nodes), -1);
+    where_.assign(plan.local_nodes, -1);
     slot_.assign(plan.node_of_link.size(), -1);
     requests_.reserve(plan.received.size() + plan.sent.size());
     for (const SentBlocks& list : plan.sent) sent_.emplace_back(9 * list.columns.size());
@@ -72,17 +72,16 @@ class Factoriser {
 
  private:
   void process(std::int32_t s) {
-    const Front& front = plan_.fronts[static_cast<std::size_t>(s)];
+    const Front& front = plan_.fronts[s];
     w_ = 3 * front.width;
     r_ = 3 * static_cast<int>(front.rows.size());
     f_ = w_ + r_;
     update_ = top_[front.depth % 2] -= count_update(r_);
-    double* panels = numbers_.panels.data() + numbers_.front_offsets[static_cast<std::size_t>(s)];
+    double* panels = numbers_.panels.data() + numbers_.front_offsets[s];
     columns_ = panels + kColumnsBegin;
     point_at_columns();
-    for (std::int32_t i = 0; i < front.width; ++i) where_[static_cast<std::size_t>(front.first + i)] = i;
-    for (std::size_t i = 0; i < front.rows.size(); ++i)
-      where_[static_cast<std::size_t>(front.rows[i])] = front.width + static_cast<std::int32_t>(i);
+    for (std::int32_t i = 0; i < front.width; ++i) where_[front.first + i] = i;
+    for (std::size_t i = 0; i < front.rows.size(); ++i) where_[front.rows[i]] = front.width + static_cast<std::int32_t>(i);
     std::fill_n(columns_, static_cast<std::size_t>(f_) * static_cast<std::size_t>(w_), 0.0);
     // The first panel makes the update matrix, so it need not be cleared, and the children's shares in it come behind.
     add_entries(front);
@@ -101,7 +100,7 @@ class Factoriser {
 
   /// starts_: where row 0 of each column of the front would be.
   void point_at_columns() {
-    starts_.resize(static_cast<std::size_t>(f_));
+    starts_.resize(f_);
     for (int c = 0; c < w_; ++c) starts_[c] = columns_ + static_cast<std::ptrdiff_t>(c) * f_;
     for (int c = w_; c < f_; ++c) starts_[c] = update_ + find_update_column(r_, c - w_) - w_;
   }
@@ -119,7 +118,7 @@ class Factoriser {
   void add_entries(const Front& front) {
     for (std::int32_t i = 0; i < front.width; ++i) {
       double* target = columns_ + static_cast<std::ptrdiff_t>(3 * i) * f_;
-      const std::int32_t own = plan_.own_of_pivot[static_cast<std::size_t>(front.first + i)];
+      const std::int32_t own = plan_.own_of_pivot[front.first + i];
       if (own < 0) continue;  // add_blocks has it
       if (k_.has_blocks())
         add_node_rows(own, front.first, target);
@@ -150,9 +149,9 @@ class Factoriser {
       for (std::size_t begin = 0; begin < list.columns.size();) {
         std::size_t end = begin;
         for (; end < list.columns.size() && list.columns[end] == list.columns[begin]; ++end)
-          slot_[static_cast<std::size_t>(list.rows[end])] = static_cast<std::int32_t>(end);
+          slot_[list.rows[end]] = static_cast<std::int32_t>(end);
         collect_blocks(list.columns[begin], sent_[l]);
-        for (std::size_t i = begin; i < end; ++i) slot_[static_cast<std::size_t>(list.rows[i])] = -1;
+        for (std::size_t i = begin; i < end; ++i) slot_[list.rows[i]] = -1;
         begin = end;
       }
     }
@@ -177,12 +176,12 @@ class Factoriser {
     for (int d = 0; d < 3; ++d) {
       const auto collect = [&](const NodeRows& rows, const Ints& ghosts, double factor) {
         const auto add = [&](std::int32_t link, PetscInt column, double value) {
-          const std::int32_t at = slot_[static_cast<std::size_t>(link)];
-          if (at >= 0) blocks[9 * static_cast<std::size_t>(at) + static_cast<std::size_t>(3 * d + column % 3)] += factor * value;
+          const std::int32_t at = slot_[link];
+          if (at >= 0) blocks[9 * at + static_cast<std::size_t>(3 * d + column % 3)] += factor * value;
         };
         rows.visit(
             3 * own + d, [&](PetscInt column, double value) { add(column / 3, column, value); },
-            [&](PetscInt ghost, double value) { add(ghosts[static_cast<std::size_t>(ghost)], rows.ghosts()[ghost], value); });
+            [&](PetscInt ghost, double value) { add(ghosts[ghost], rows.ghosts()[ghost], value); });
       };
       collect(k_, plan_.link_of_ghost_k, k_factor_);
       collect(m_, plan_.link_of_ghost_m, m_factor_);
@@ -197,8 +196,8 @@ class Factoriser {
       for (; at < list.columns.size() && list.columns[at] < front.first + front.width; ++at)
         for (int d = 0; d < 3; ++d)
           for (int e = 0; e < 3; ++e)
-            columns_[static_cast<std::ptrdiff_t>(3 * where_[static_cast<std::size_t>(list.columns[at])] + d) * f_ +
-                     3 * where_[static_cast<std::size_t>(list.rows[at])] + e] += received_[l][9 * at + static_cast<std::size_t>(3 * d + e)];
+            columns_[static_cast<std::ptrdiff_t>(3 * where_[list.columns[at]] + d) * f_ + 3 * where_[list.rows[at]] + e] +=
+                received_[l][9 * at + static_cast<std::size_t>(3 * d + e)];
     }
   }
 
@@ -235,7 +234,7 @@ class Factoriser {
   /// Adds what of a child's update matrix falls into the columns of pivots, or the rest of it, and gives it back with that. Children lie on
   /// their stack in order, and are taken from its top: the last one first.
   void add_child(std::int32_t s, Part part) {
-    const Front& child = plan_.fronts[static_cast<std::size_t>(s)];
+    const Front& child = plan_.fronts[s];
     const std::size_t pivots = locate(child.rows, w_ / 3);
     const std::int64_t r = 3 * static_cast<std::int64_t>(child.rows.size());
     const double* source = top_[child.depth % 2];
@@ -248,7 +247,7 @@ class Factoriser {
     for (std::int32_t p = 0; p < count_panels(front.width); ++p) {
       const int begin = 3 * find_panel_start(front.width, p);
       const int end = 3 * find_panel_start(front.width, p + 1);
-      panels = eliminate_panel(3 * static_cast<std::size_t>(front.first), begin, end, p == 0, panels);
+      panels = eliminate_panel(3 * front.first, begin, end, p == 0, panels);
     }
   }
 
@@ -346,14 +345,14 @@ Numbers make_numbers(const Plan& plan) {
         stored += count_triangle(n);
       }
       panel.tiles = stored;
-      stored += 3 * n * (front.own_nodes() - front.row_begin[static_cast<std::size_t>(k) + 1]);
+      stored += 3 * n * (front.own_nodes() - front.row_begin[k + 1]);
     }
     stored = numbers.shared_columns.back() + front.count_pivot_columns();  // panels take no more than the columns that they are made of
   }
   numbers.panels = Buffer(plan.room.numbers, Pages::kAtOnce);
-  numbers.d_diagonal.assign(3 * static_cast<std::size_t>(pivots), 0.0);
-  numbers.d_off.assign(3 * static_cast<std::size_t>(pivots), 0.0);
-  numbers.order.assign(3 * static_cast<std::size_t>(pivots), 0);
+  numbers.d_diagonal.assign(3 * pivots, 0.0);
+  numbers.d_off.assign(3 * pivots, 0.0);
+  numbers.order.assign(3 * pivots, 0);
   return numbers;
 }
 

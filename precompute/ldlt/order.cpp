@@ -74,11 +74,11 @@ Ints bisect_clusters(const SeparatorTree& tree, const Ints& weights, std::vector
     if (nodes > largest && !tree[part].is_leaf() && members.size() > 1) {
       partition::WeightedGraph quotient;
       for (const std::int32_t c : members) {
-        quotient.weights.push_back(weights[static_cast<std::size_t>(c)]);
+        quotient.weights.push_back(weights[c]);
         auto at = std::lower_bound(links.begin(), links.end(), Link{c, 0});
         for (; at != links.end() && at->from == c; ++at) {
-          const std::int32_t to = number[static_cast<std::size_t>(at->to)];
-          if (to < 0 || to == number[static_cast<std::size_t>(c)]) continue;
+          const std::int32_t to = number[at->to];
+          if (to < 0 || to == number[c]) continue;
           if (static_cast<std::int32_t>(quotient.graph.neighbours.size()) == quotient.graph.offsets.back() ||
               quotient.graph.neighbours.back() != to) {
             quotient.graph.neighbours.push_back(to);
@@ -91,11 +91,11 @@ Ints bisect_clusters(const SeparatorTree& tree, const Ints& weights, std::vector
       const int left = tree[part].left;
       const double share = static_cast<double>(tree[left].end - tree[left].begin) / (tree[part].end - tree[part].begin);
       const Ints side = partition::halve(quotient, share);
-      for (std::size_t m = 0; m < members.size(); ++m) place[static_cast<std::size_t>(members[m])] = side[m] == 0 ? left : tree[part].right;
+      for (std::size_t m = 0; m < members.size(); ++m) place[members[m]] = side[m] == 0 ? left : tree[part].right;
       open.push_back(tree[part].right);
       open.push_back(left);
     }
-    for (const std::int32_t c : members) number[static_cast<std::size_t>(c)] = -1;
+    for (const std::int32_t c : members) number[c] = -1;
   }
   return place;
 }
@@ -111,7 +111,7 @@ std::vector<Label> label_nodes(const Communicator& comm, const NodeLinks& nodes,
   for (std::int32_t& c : cluster) c += static_cast<std::int32_t>(clusters.own_begin());
   const Ints ghost_cluster = fetch_ghosts(comm, nodes, owners, cluster);
   const Ints weights = comm::gather(comm, [&] {
-    Ints own(static_cast<std::size_t>(clusters.own_count()), 0);
+    Ints own(clusters.own_count(), 0);
     for (const std::int32_t c : cluster) ++own[clusters.to_local(c)];
     return own;
   });
@@ -119,27 +119,25 @@ std::vector<Label> label_nodes(const Communicator& comm, const NodeLinks& nodes,
     std::vector<Link> own;
     for (std::int32_t v = 0; v < nodes.own_nodes; ++v)
       for (const std::int32_t* u = nodes.links.begin(v); u != nodes.links.end(v); ++u) {
-        const std::int32_t to =
-            *u < nodes.own_nodes ? cluster[static_cast<std::size_t>(*u)] : ghost_cluster[static_cast<std::size_t>(*u - nodes.own_nodes)];
-        if (to != cluster[static_cast<std::size_t>(v)]) own.push_back({cluster[static_cast<std::size_t>(v)], to});
+        const std::int32_t to = *u < nodes.own_nodes ? cluster[*u] : ghost_cluster[*u - nodes.own_nodes];
+        if (to != cluster[v]) own.push_back({cluster[v], to});
       }
     return own;
   });
   const Ints place = comm.broadcast([&] { return bisect_clusters(tree, weights, links, largest); });
-  std::vector<Label> label(static_cast<std::size_t>(nodes.count()));
-  for (std::size_t v = 0; v < label.size(); ++v)
-    label[v].part = place[static_cast<std::size_t>(v < cluster.size() ? cluster[v] : ghost_cluster[v - cluster.size()])];
+  std::vector<Label> label(nodes.count());
+  for (std::size_t v = 0; v < label.size(); ++v) label[v].part = place[v < cluster.size() ? cluster[v] : ghost_cluster[v - cluster.size()]];
   for (int depth = 0; depth < tree.depth(); ++depth) {
-    std::vector<Ints> cut(static_cast<std::size_t>(comm.size()));
+    std::vector<Ints> cut(comm.size());
     const auto edges = comm::all_to_all(comm, [&] {
       for (std::int32_t v = 0; v < nodes.own_nodes; ++v) {
-        const Label mine = label[static_cast<std::size_t>(v)];
+        const Label mine = label[v];
         for (const std::int32_t* u = nodes.links.begin(v); mine.is_separator == 0 && u != nodes.links.end(v); ++u) {
-          const Label other = label[static_cast<std::size_t>(*u)];
+          const Label other = label[*u];
           if (other.is_separator != 0 || other.part == mine.part) continue;
           const int common = tree.find_common(mine.part, other.part);
           if (tree[common].depth != depth || !tree.is_left_of(mine.part, common)) continue;
-          Ints& list = cut[static_cast<std::size_t>(tree[common].begin)];
+          Ints& list = cut[tree[common].begin];
           list.insert(list.end(), {nodes.find_global(v), nodes.find_global(*u), common});
         }
       }
@@ -174,7 +172,7 @@ struct Piece {
 Piece take(const Piece& piece, const Ints& vertices, Label label, Ints& number) {
   Piece taken;
   taken.label = label;
-  for (const std::int32_t v : vertices) taken.nodes.push_back(piece.nodes[static_cast<std::size_t>(v)]);
+  for (const std::int32_t v : vertices) taken.nodes.push_back(piece.nodes[v]);
   taken.graph = partition::take_part(piece.graph, vertices, number);
   return taken;
 }
@@ -188,7 +186,7 @@ std::array<Piece, 3> cut(const Piece& piece, const Ints& side, const SeparatorTr
     if (side[v] < 2) kept += (owners.find_owner(piece.nodes[v]) >= middle) == (side[v] == 1) ? 1 : -1;
   std::array<Ints, 3> sides;
   for (std::size_t v = 0; v < side.size(); ++v)
-    sides[static_cast<std::size_t>(side[v] < 2 && kept < 0 ? 1 - side[v] : side[v])].push_back(static_cast<std::int32_t>(v));
+    sides[side[v] < 2 && kept < 0 ? 1 - side[v] : side[v]].push_back(static_cast<std::int32_t>(v));
   Ints number(piece.nodes.size(), -1);
   return {take(piece, sides[0], {tree[part].left, 0}, number), take(piece, sides[1], {tree[part].right, 0}, number),
           take(piece, sides[2], {part, 1}, number)};
@@ -215,14 +213,14 @@ Piece unpack(ListReader& reader) {
 std::vector<Piece> gather_pieces(const Communicator& comm, const NodeLinks& nodes, const SeparatorTree& tree,
                                  const std::vector<Label>& label) {
   const auto received = comm::all_to_all(comm, [&] {
-    std::vector<Ints> lists(static_cast<std::size_t>(comm.size()));
+    std::vector<Ints> lists(comm.size());
     for (std::int32_t v = 0; v < nodes.own_nodes; ++v) {
-      const Label mine = label[static_cast<std::size_t>(v)];
-      Ints& list = lists[static_cast<std::size_t>(tree[mine.part].begin)];
+      const Label mine = label[v];
+      Ints& list = lists[tree[mine.part].begin];
       list.insert(list.end(), {mine.part, mine.is_separator, nodes.find_global(v), 0});
       const std::size_t degree = list.size() - 1;
       for (const std::int32_t* u = nodes.links.begin(v); u != nodes.links.end(v); ++u)
-        if (label[static_cast<std::size_t>(*u)] == mine) list.push_back(nodes.find_global(*u));
+        if (label[*u] == mine) list.push_back(nodes.find_global(*u));
       list[degree] = static_cast<std::int32_t>(list.size() - degree) - 1;
     }
     return join(lists);
@@ -264,7 +262,7 @@ std::vector<Piece> gather_pieces(const Communicator& comm, const NodeLinks& node
 Piece make_whole(const NodeLinks& nodes, const SeparatorTree& tree) {
   Piece whole;
   whole.label = {tree.root(), 0};
-  whole.nodes.resize(static_cast<std::size_t>(nodes.own_nodes));
+  whole.nodes.resize(nodes.own_nodes);
   std::iota(whole.nodes.begin(), whole.nodes.end(), 0);
   whole.graph = {nodes.links.offsets, nodes.links.items};
   return whole;
@@ -278,14 +276,12 @@ std::vector<Piece> find_pieces(const Communicator& comm, const NodeLinks& nodes,
     return comm.agree([&] { return nodes.own_nodes > 0 ? std::vector<Piece>{make_whole(nodes, tree)} : std::vector<Piece>(); });
   }
   if (!is_one_piece) return gather_pieces(comm, nodes, tree, label_nodes(comm, nodes, owners, tree, largest));
-  return gather_pieces(comm, nodes, tree, comm.agree([&] {
-    return std::vector<Label>(static_cast<std::size_t>(nodes.count()), Label{tree.root(), 0});
-  }));
+  return gather_pieces(comm, nodes, tree, comm.agree([&] { return std::vector<Label>(nodes.count(), Label{tree.root(), 0}); }));
 }
 
 /// Appends the piece's nodes to their part, in the order of METIS.
 void place(const Piece& piece, std::optional<double> dominated_per_edge, std::vector<Ints>& placed) {
-  Ints& list = placed[static_cast<std::size_t>(piece.label.part)];
+  Ints& list = placed[piece.label.part];
   const std::size_t before = list.size();
   list.resize(before + piece.nodes.size());
   const Ints order = partition::order_nested_dissection(piece.graph, dominated_per_edge);
@@ -304,23 +300,22 @@ Ints seek_separator(const Communicator& comm, const std::vector<Piece>& pieces, 
   for (const Piece& piece : pieces)
     if (is_cut(piece, tree, depth)) own = &piece;
   const auto copies = comm::all_to_all(comm, [&] {
-    std::vector<Ints> lists(static_cast<std::size_t>(comm.size()));
+    std::vector<Ints> lists(comm.size());
     if (own != nullptr && own->nodes.size() >= kSmallestCut) {
       const TreePart& part = tree[own->label.part];
-      for (int rank = part.begin + 1; rank < std::min(part.end, part.begin + kTries); ++rank)
-        pack(*own, lists[static_cast<std::size_t>(rank)]);
+      for (int rank = part.begin + 1; rank < std::min(part.end, part.begin + kTries); ++rank) pack(*own, lists[rank]);
     }
     return join(lists);
   });
   Ints best;
   const auto found = comm::all_to_all(comm, [&] {
-    std::vector<Ints> lists(static_cast<std::size_t>(comm.size()));
+    std::vector<Ints> lists(comm.size());
     if (own != nullptr)
       best = own->nodes.size() < kSmallestCut ? Ints(own->nodes.size(), 0) : partition::separate(own->graph, 1, 0, dominated_per_edge);
     for (ListReader reader(copies.items); !reader.is_at_end();) {
       const Piece piece = unpack(reader);
       const int holder = tree[piece.label.part].begin;
-      lists[static_cast<std::size_t>(holder)] = partition::separate(piece.graph, 1, comm.rank() - holder, dominated_per_edge);
+      lists[holder] = partition::separate(piece.graph, 1, comm.rank() - holder, dominated_per_edge);
     }
     return join(lists);
   });
@@ -344,7 +339,7 @@ int SeparatorTree::add(int begin, int end, int depth) {
   const int right = end - begin > 1 ? add(middle, end, depth + 1) : -1;
   const auto part = static_cast<int>(parts.size());
   for (const int child : {left, right})
-    if (child >= 0) parts[static_cast<std::size_t>(child)].parent = part;
+    if (child >= 0) parts[child].parent = part;
   parts.push_back({begin, end, -1, left, right, depth, 0, 0, 0});
   depth_ = std::max(depth_, depth);
   return part;
@@ -372,12 +367,12 @@ std::vector<Ints> order_parts(const Communicator& comm, const NodeLinks& nodes, 
   for (int depth = 0; depth < tree.depth(); ++depth) {
     const Ints side = seek_separator(comm, pieces, tree, depth, dominated_per_edge);
     const auto received = comm::all_to_all(comm, [&] {
-      std::vector<Ints> lists(static_cast<std::size_t>(comm.size()));
+      std::vector<Ints> lists(comm.size());
       for (Piece& piece : pieces) {
         if (!is_cut(piece, tree, depth)) continue;
         std::array<Piece, 3> sides = cut(piece, side, tree, owners);
         place(sides[2], dominated_per_edge, placed);
-        pack(sides[1], lists[static_cast<std::size_t>(tree[sides[1].label.part].begin)]);
+        pack(sides[1], lists[tree[sides[1].label.part].begin]);
         piece = std::move(sides[0]);
       }
       return join(lists);

@@ -35,7 +35,7 @@ class SeparatorTree {
   std::vector<TreePart> parts;
   std::int32_t fronts = 0;
 
-  const TreePart& operator[](int part) const { return parts[static_cast<std::size_t>(part)]; }
+  const TreePart& operator[](int part) const { return parts[part]; }
   int root() const { return static_cast<int>(parts.size()) - 1; }
   /// Of the lowest leaf.
   int depth() const { return depth_; }

@@ -45,24 +45,22 @@ class PlanMaker {
     add_shared_fronts();
     for (std::size_t s = plan_.fronts.size(); s-- > 0;) {
       Front& front = plan_.fronts[s];
-      if (front.parent >= 0) front.depth = plan_.fronts[static_cast<std::size_t>(front.parent)].depth + 1;
+      if (front.parent >= 0) front.depth = plan_.fronts[front.parent].depth + 1;
     }
     for (std::size_t s = 0; s < plan_.fronts.size(); ++s)
-      if (plan_.fronts[s].parent >= 0)
-        plan_.fronts[static_cast<std::size_t>(plan_.fronts[s].parent)].children.push_back(static_cast<std::int32_t>(s));
+      if (plan_.fronts[s].parent >= 0) plan_.fronts[plan_.fronts[s].parent].children.push_back(static_cast<std::int32_t>(s));
   }
 
   /// What has to come from the owners of matrix rows: columns of own fronts that they own themselves do not.
   std::vector<WantedColumn> list_wanted() const {
     std::vector<WantedColumn> wanted;
     for (std::int32_t p = 0; p < plan_.pivot_nodes; ++p)
-      if (owners_.find_owner(node_of_pivot_[static_cast<std::size_t>(p)]) != plan_.rank)
-        wanted.push_back({node_of_pivot_[static_cast<std::size_t>(p)], -1, p});
+      if (owners_.find_owner(node_of_pivot_[p]) != plan_.rank) wanted.push_back({node_of_pivot_[p], -1, p});
     for (std::size_t f = 0; f < plan_.shared.size(); ++f) {
       const SharedFront& front = plan_.shared[f];
       for (std::int32_t c = 0; c < front.width; ++c)
         if (front.map.has_column(front.place, front.map.find_tile(c)))
-          wanted.push_back({shared_nodes_[f][static_cast<std::size_t>(c)], static_cast<std::int32_t>(f), c});
+          wanted.push_back({shared_nodes_[f][c], static_cast<std::int32_t>(f), c});
     }
     return wanted;
   }
@@ -70,13 +68,12 @@ class PlanMaker {
   /// Slots of the pivots that this rank solves for, and their nodes.
   std::vector<std::pair<std::int32_t, std::int32_t>> list_homes() const {
     std::vector<std::pair<std::int32_t, std::int32_t>> homes;
-    for (std::int32_t p = 0; p < plan_.pivot_nodes; ++p) homes.emplace_back(node_of_pivot_[static_cast<std::size_t>(p)], p);
+    for (std::int32_t p = 0; p < plan_.pivot_nodes; ++p) homes.emplace_back(node_of_pivot_[p], p);
     for (std::size_t f = 0; f < plan_.shared.size(); ++f) {
       const SharedFront& front = plan_.shared[f];
       for (int k = 0; k < front.map.pivot_tiles(); ++k)
         for (std::int32_t c = front.map.start(k); front.map.owner(k, k) == front.place && c < front.map.start(k + 1); ++c)
-          homes.emplace_back(shared_nodes_[f][static_cast<std::size_t>(c)],
-                             front.first_slot + front.row_begin[static_cast<std::size_t>(k)] + c - front.map.start(k));
+          homes.emplace_back(shared_nodes_[f][c], front.first_slot + front.row_begin[k] + c - front.map.start(k));
     }
     return homes;
   }
@@ -88,7 +85,7 @@ class PlanMaker {
 
   /// The node of a shared front at a position, -1: none.
   std::int32_t find_node(std::int32_t front, std::int32_t position) const {
-    const DealtFront& dealt = dealt_[static_cast<std::size_t>(shared_dealt_[static_cast<std::size_t>(front)])];
+    const DealtFront& dealt = dealt_[shared_dealt_[front]];
     return find_node(dealt, position);
   }
 
@@ -109,7 +106,7 @@ class PlanMaker {
     for (std::size_t d = 0; d < dealt_.size(); ++d) {
       if (dealt_[d].owner != plan_.rank) continue;
       const auto parent = own_of.find(dealt_[d].parent);
-      (parent == own_of.end() ? roots : children[static_cast<std::size_t>(parent->second)]).push_back(static_cast<std::int32_t>(d));
+      (parent == own_of.end() ? roots : children[parent->second]).push_back(static_cast<std::int32_t>(d));
     }
     sort_by_room(dealt_, children, roots);
     Ints order;
@@ -118,30 +115,30 @@ class PlanMaker {
       const std::int32_t d = stack.back();
       stack.pop_back();
       order.push_back(d);
-      stack.insert(stack.end(), children[static_cast<std::size_t>(d)].begin(), children[static_cast<std::size_t>(d)].end());
+      stack.insert(stack.end(), children[d].begin(), children[d].end());
     }
     std::reverse(order.begin(), order.end());
     std::unordered_map<std::int32_t, std::int32_t> front_of;
     std::int32_t pivots = 0;
     for (const std::int32_t d : order) {
-      const DealtFront& dealt = dealt_[static_cast<std::size_t>(d)];
+      const DealtFront& dealt = dealt_[d];
       for (std::int32_t k = 0; k < dealt.width(); ++k) {
         local_of_.emplace(dealt.first + k, pivots++);
-        node_of_pivot_.push_back(dealt.nodes[static_cast<std::size_t>(k)]);
+        node_of_pivot_.push_back(dealt.nodes[k]);
       }
       front_of.emplace(dealt.id, static_cast<std::int32_t>(front_of.size()));
     }
     plan_.pivot_nodes = pivots;
     Ints behind;
     for (const std::int32_t d : order)
-      for (const std::int32_t row : dealt_[static_cast<std::size_t>(d)].rows)
+      for (const std::int32_t row : dealt_[d].rows)
         if (!local_of_.contains(row)) behind.push_back(row);
     std::sort(behind.begin(), behind.end());
     behind.erase(std::unique(behind.begin(), behind.end()), behind.end());
     for (const std::int32_t row : behind) local_of_.emplace(row, static_cast<std::int32_t>(local_of_.size()));
     plan_.local_nodes = static_cast<std::int32_t>(local_of_.size());
     for (const std::int32_t d : order) {
-      const DealtFront& dealt = dealt_[static_cast<std::size_t>(d)];
+      const DealtFront& dealt = dealt_[d];
       Front& front = plan_.fronts.emplace_back();
       front.first = local_of_.at(dealt.first);
       front.width = dealt.width();
@@ -163,14 +160,13 @@ class PlanMaker {
       if (dealt_[d].owner >= 0) continue;
       bool is_shared_here = false;
       for (const FrontShare& share : list_shares(dealt_[d])) is_shared_here = is_shared_here || share.rank == plan_.rank;
-      if (is_shared_here)
-        order.emplace_back(mapping_.order[static_cast<std::size_t>(mapping_.find(dealt_[d].id))], static_cast<std::int32_t>(d));
+      if (is_shared_here) order.emplace_back(mapping_.order[mapping_.find(dealt_[d].id)], static_cast<std::int32_t>(d));
     }
     std::sort(order.begin(), order.end());
     std::unordered_map<std::int32_t, std::int32_t> shared_of;
     std::int32_t slot = plan_.local_nodes;
     for (const auto& [place, d] : order) {
-      const DealtFront& dealt = dealt_[static_cast<std::size_t>(d)];
+      const DealtFront& dealt = dealt_[d];
       shared_of.emplace(dealt.id, static_cast<std::int32_t>(plan_.shared.size()));
       shared_dealt_.push_back(d);
       shared_nodes_.push_back(dealt.nodes);
@@ -183,20 +179,20 @@ class PlanMaker {
     for (std::size_t d = 0; d < dealt_.size(); ++d) {
       const auto above = shared_of.find(dealt_[d].parent);
       if (above == shared_of.end()) continue;
-      SharedFront& parent = plan_.shared[static_cast<std::size_t>(above->second)];
+      SharedFront& parent = plan_.shared[above->second];
       const auto rows = static_cast<std::int32_t>(dealt_[d].rows.size());
       SharedChild child{TileMap(dealt_[d].width(), rows, list_shares(dealt_[d])), dealt_[d].width(), {}, {}, -1, -1};
       for (const std::int32_t row : dealt_[d].rows) child.node_of_row.push_back(find_node(above->second, row));
       const auto place = static_cast<std::int32_t>(parent.children.size());
       if (dealt_[d].owner == plan_.rank) {
         child.front = own_front_of_.at(dealt_[d].id);
-        Front& front = plan_.fronts[static_cast<std::size_t>(child.front)];
+        Front& front = plan_.fronts[child.front];
         front.shared_parent = above->second;
         front.place_in_parent = place;
       } else if (const auto at = shared_of.find(dealt_[d].id); at != shared_of.end()) {
         child.shared = at->second;
-        plan_.shared[static_cast<std::size_t>(at->second)].parent = above->second;
-        plan_.shared[static_cast<std::size_t>(at->second)].place_in_parent = place;
+        plan_.shared[at->second].parent = above->second;
+        plan_.shared[at->second].place_in_parent = place;
       }
       add_messages(dealt_[d].id, parent, child);
       parent.children.push_back(std::move(child));
@@ -207,15 +203,14 @@ class PlanMaker {
   void add_messages(std::int32_t id, SharedFront& parent, SharedChild& child) {
     const auto slot_in = [](const SharedFront& front, std::int32_t node) {
       const int i = front.map.find_tile(node);
-      return front.first_slot + front.row_begin[static_cast<std::size_t>(i)] + node - front.map.start(i);
+      return front.first_slot + front.row_begin[i] + node - front.map.start(i);
     };
     for (int from = 0; from < child.map.places(); ++from) {
       std::int64_t numbers = 0;
       for_pieces(child, from, parent.map, parent.place, [&](const Piece& piece) { numbers += piece.count(); });
       child.arriving.push_back(numbers);
       SumMessage sums{child.map.rank(from), id, {}};
-      for_sums(child, from, parent.map, parent.place,
-               [&](std::int32_t a) { sums.slots.push_back(slot_in(parent, child.node_of_row[static_cast<std::size_t>(a)])); });
+      for_sums(child, from, parent.map, parent.place, [&](std::int32_t a) { sums.slots.push_back(slot_in(parent, child.node_of_row[a])); });
       if (!sums.slots.empty()) parent.from_children.push_back(std::move(sums));
     }
     const int place = child.map.find_place(plan_.rank);
@@ -223,13 +218,10 @@ class PlanMaker {
     for (int to = 0; to < parent.map.places(); ++to) {
       SumMessage sums{parent.map.rank(to), id, {}};
       for_sums(child, place, parent.map, to, [&](std::int32_t a) {
-        sums.slots.push_back(child.front >= 0 ? plan_.fronts[static_cast<std::size_t>(child.front)].rows[static_cast<std::size_t>(a)]
-                                              : slot_in(plan_.shared[static_cast<std::size_t>(child.shared)], child.width + a));
+        sums.slots.push_back(child.front >= 0 ? plan_.fronts[child.front].rows[a] : slot_in(plan_.shared[child.shared], child.width + a));
       });
       if (sums.slots.empty()) continue;
-      (child.front >= 0 ? plan_.fronts[static_cast<std::size_t>(child.front)].to_parent
-                        : plan_.shared[static_cast<std::size_t>(child.shared)].to_parent)
-          .push_back(std::move(sums));
+      (child.front >= 0 ? plan_.fronts[child.front].to_parent : plan_.shared[child.shared].to_parent).push_back(std::move(sums));
     }
   }
 
@@ -249,20 +241,19 @@ class PlanMaker {
 
 /// Whether the fronts of this rank have all rows that K and M have in their columns.
 void check_fronts(const Plan& plan, const NodeLinks& nodes) {
-  Ints front_of(static_cast<std::size_t>(plan.local_nodes), -1);  // the last front that has the row
+  Ints front_of(plan.local_nodes, -1);  // the last front that has the row
   std::vector<std::size_t> next(plan.received.size(), 0);
   for (std::size_t s = 0; s < plan.fronts.size(); ++s) {
     const Front& front = plan.fronts[s];
     const std::int32_t behind = front.first + front.width;
-    for (const std::int32_t row : front.rows) front_of[static_cast<std::size_t>(row)] = static_cast<std::int32_t>(s);
+    for (const std::int32_t row : front.rows) front_of[row] = static_cast<std::int32_t>(s);
     const auto check_row = [&](std::int32_t row) {
-      if (row < 0 || (row >= behind && front_of[static_cast<std::size_t>(row)] != static_cast<std::int32_t>(s))) refuse_order();
+      if (row < 0 || (row >= behind && front_of[row] != static_cast<std::int32_t>(s))) refuse_order();
     };
     for (std::int32_t pivot = front.first; pivot < behind; ++pivot) {
-      const std::int32_t v = plan.own_of_pivot[static_cast<std::size_t>(pivot)];
+      const std::int32_t v = plan.own_of_pivot[pivot];
       if (v < 0) continue;  // received
-      for (const std::int32_t* u = nodes.links.begin(v); u != nodes.links.end(v); ++u)
-        check_row(plan.node_of_link[static_cast<std::size_t>(*u)]);
+      for (const std::int32_t* u = nodes.links.begin(v); u != nodes.links.end(v); ++u) check_row(plan.node_of_link[*u]);
     }
     for (std::size_t l = 0; l < plan.received.size(); ++l) {  // columns ascend, as fronts do
       const ReceivedBlocks& list = plan.received[l];
@@ -279,21 +270,21 @@ void plan_blocks(const Communicator& comm, Plan& plan, const PlanMaker& maker, c
   });
   const auto asked = comm::all_to_all(comm, wanted);
   const auto answers = comm::all_to_all(comm, [&] {
-    std::vector<Ints> lists(static_cast<std::size_t>(comm.size()));
+    std::vector<Ints> lists(comm.size());
     for (int rank = 0; rank < comm.size(); ++rank) {
       SentBlocks sent;
       sent.rank = rank;
-      Ints& list = lists[static_cast<std::size_t>(rank)];
+      Ints& list = lists[rank];
       for (const WantedColumn& column : asked.of(rank)) {
         const auto own = static_cast<std::int32_t>(owners.to_local(column.node));
-        const std::int32_t at = position[static_cast<std::size_t>(own)];
+        const std::int32_t at = position[own];
         const std::size_t count = list.size();
         list.push_back(0);
         const auto add = [&](std::int32_t link) {
-          if (position[static_cast<std::size_t>(link)] < at) return;
+          if (position[link] < at) return;
           sent.columns.push_back(own);
           sent.rows.push_back(link);
-          list.push_back(position[static_cast<std::size_t>(link)]);
+          list.push_back(position[link]);
         };
         add(own);
         for (const std::int32_t* u = nodes.links.begin(own); u != nodes.links.end(own); ++u) add(*u);
@@ -316,7 +307,7 @@ void plan_blocks(const Communicator& comm, Plan& plan, const PlanMaker& maker, c
             received.rows.push_back(maker.find_local(at));
             continue;
           }
-          const SharedFront& front = plan.shared[static_cast<std::size_t>(column.front)];
+          const SharedFront& front = plan.shared[column.front];
           const std::int32_t row = maker.find_node(column.front, at);
           if (row < 0) refuse_order();
           const bool is_here = front.map.has_row(front.place, front.map.find_tile(row));
@@ -340,7 +331,7 @@ void plan_rows(const Communicator& comm, Plan& plan, const PlanMaker& maker, con
   const auto reported = comm::all_to_all(comm, homes);
   comm.agree([&] {
     plan.slots = plan.given_slots;
-    plan.slot_of_own.assign(static_cast<std::size_t>(plan.own_nodes), -1);
+    plan.slot_of_own.assign(plan.own_nodes, -1);
     for (int rank = 0; rank < comm.size(); ++rank) {
       const auto given = reported.of(rank);
       if (rank != comm.rank() && !given.empty()) {
@@ -372,19 +363,19 @@ Analysis::Rank measure(Plan& plan) {
   std::int64_t shared_columns = 0;
   std::int64_t shared_peak = 0;
   for (const SharedFront& front : plan.shared) {
-    own.entries += front.map.count_entries()[static_cast<std::size_t>(front.place)];
-    own.flops += front.map.count_operations()[static_cast<std::size_t>(front.place)];
+    own.entries += front.map.count_entries()[front.place];
+    own.flops += front.map.count_operations()[front.place];
     shared_columns += kColumnsBegin + front.count_pivot_columns();
     const std::int64_t update = front.count_update();  // goes to the parent
     const std::int64_t panels = std::int64_t{4} * 3 * kPanelNodes * 3 * (front.own_nodes() + std::int64_t{kWideRows});
     std::int64_t come = 0;  // from other ranks
     for (const SharedChild& child : front.children)
       for (int from = 0; from < child.map.places(); ++from)
-        if (child.map.rank(from) != plan.rank) come += child.arriving[static_cast<std::size_t>(from)];
+        if (child.map.rank(from) != plan.rank) come += child.arriving[from];
     shared_peak = std::max(shared_peak, kept + update + std::max(come + panels, update));  // at the end the tiles are copied into letters
     kept += update;
     for (const SharedChild& child : front.children)
-      if (child.shared >= 0) kept -= plan.shared[static_cast<std::size_t>(child.shared)].count_update();
+      if (child.shared >= 0) kept -= plan.shared[child.shared].count_update();
   }
   constexpr int kBlocks = kSolveColumns / kBlockColumns;
   const Room& room = plan.room = plan_room(plan.fronts, shared_columns, kBlocks, plan.count_block());
@@ -467,10 +458,10 @@ Plan make_plan(Mat stiffness, Mat mass, const MeshOrder* order) {
     const NodeRows k(stiffness);
     const NodeRows m(mass);
     for (const std::int32_t at : position) plan.node_of_link.push_back(maker.find_local(at));
-    plan.own_of_pivot.assign(static_cast<std::size_t>(plan.pivot_nodes), -1);
+    plan.own_of_pivot.assign(plan.pivot_nodes, -1);
     for (std::int32_t v = 0; v < plan.own_nodes; ++v) {
-      const std::int32_t node = plan.node_of_link[static_cast<std::size_t>(v)];
-      if (node >= 0 && node < plan.pivot_nodes) plan.own_of_pivot[static_cast<std::size_t>(node)] = v;
+      const std::int32_t node = plan.node_of_link[v];
+      if (node >= 0 && node < plan.pivot_nodes) plan.own_of_pivot[node] = v;
     }
     const auto find_ghosts = [&](const NodeRows& rows, Ints& links) {
       for (PetscInt g = 0; g < rows.ghost_count(); ++g) links.push_back(nodes.find_ghost(rows.ghosts()[g] / 3));

@@ -76,16 +76,14 @@ struct SharedFront {
 
   std::int32_t own_nodes() const { return row_begin.back(); }
   /// Numbers of its tiles in column j of tiles, one that it has.
-  std::int64_t count_column(int j) const { return 9 * std::int64_t{map.nodes(j)} * (own_nodes() - row_begin[static_cast<std::size_t>(j)]); }
+  std::int64_t count_column(int j) const { return 9 * std::int64_t{map.nodes(j)} * (own_nodes() - row_begin[j]); }
   /// Of its tiles in the columns of pivots, and in those behind them.
   std::int64_t count_pivot_columns() const { return count_columns(0, map.pivot_tiles()); }
   std::int64_t count_update() const { return count_columns(map.pivot_tiles(), map.tiles()); }
   /// Place of tile j among the column tiles; pre: it is one.
-  std::size_t find_column_tile(int j) const {
-    return static_cast<std::size_t>(std::lower_bound(column_tiles.begin(), column_tiles.end(), j) - column_tiles.begin());
-  }
+  std::size_t find_column_tile(int j) const { return std::lower_bound(column_tiles.begin(), column_tiles.end(), j) - column_tiles.begin(); }
   /// Whether a place has tiles behind panel k.
-  bool is_updated(int by_place, int k) const { return last_columns[static_cast<std::size_t>(by_place)] > k; }
+  bool is_updated(int by_place, int k) const { return last_columns[by_place] > k; }
 
  private:
   std::int64_t count_columns(int begin, int end) const {
@@ -109,7 +107,7 @@ void for_pieces(const SharedChild& child, int from, const TileMap& parent, int t
   std::vector<Group> groups;
   for (std::int32_t a = 0; a < rows; ++a) {
     const int tile = map.find_tile(child.width + a);
-    const int parent_tile = parent.find_tile(child.node_of_row[static_cast<std::size_t>(a)]);
+    const int parent_tile = parent.find_tile(child.node_of_row[a]);
     if (groups.empty() || groups.back().tile != tile || groups.back().parent_tile != parent_tile) groups.push_back({a, tile, parent_tile});
   }
   for (std::size_t b = 0; b < groups.size(); ++b) {

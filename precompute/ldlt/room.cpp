@@ -28,8 +28,7 @@ Room plan_room(const std::vector<Front>& fronts, std::int64_t shared_columns, in
     }
     room.panels += count_stored(front.width, front.size());
     if (front.parent < 0) used[front.depth % 2] -= count_update_of(front.rows);  // the shared front has its letters
-    for (const std::int32_t child : front.children)
-      used[fronts[static_cast<std::size_t>(child)].depth % 2] -= count_update_of(fronts[static_cast<std::size_t>(child)].rows);
+    for (const std::int32_t child : front.children) used[fronts[child].depth % 2] -= count_update_of(fronts[child].rows);
   }
   const int apart = most_used[0] + most_below[1] <= most_used[1] + most_below[0] ? 0 : 1;
   room.panels += shared_columns;
@@ -44,21 +43,18 @@ void sort_by_room(const std::vector<DealtFront>& dealt, std::vector<Ints>& child
   std::vector<std::int64_t> most(dealt.size(), 0);  // while a subtree is eliminated
   std::vector<std::int64_t> left(dealt.size(), 0);  // afterwards: its panels and one update matrix
   const auto sort = [&](Ints& list) {
-    std::stable_sort(list.begin(), list.end(), [&](std::int32_t a, std::int32_t b) {
-      return most[static_cast<std::size_t>(a)] - left[static_cast<std::size_t>(a)] >
-             most[static_cast<std::size_t>(b)] - left[static_cast<std::size_t>(b)];
-    });
+    std::stable_sort(list.begin(), list.end(), [&](std::int32_t a, std::int32_t b) { return most[a] - left[a] > most[b] - left[b]; });
   };
   std::vector<bool> is_root(dealt.size(), false);  // its update matrix is sent to a shared front at once
-  for (const std::int32_t root : roots) is_root[static_cast<std::size_t>(root)] = true;
+  for (const std::int32_t root : roots) is_root[root] = true;
   for (std::size_t d = 0; d < dealt.size(); ++d) {
     sort(children[d]);
     std::int64_t before = 0;  // panels and update matrices of the children
     std::int64_t updates = 0;
     for (const std::int32_t child : children[d]) {
-      most[d] = std::max(most[d], before + most[static_cast<std::size_t>(child)]);
-      before += left[static_cast<std::size_t>(child)];
-      updates += count_update_of(dealt[static_cast<std::size_t>(child)].rows);
+      most[d] = std::max(most[d], before + most[child]);
+      before += left[child];
+      updates += count_update_of(dealt[child].rows);
     }
     const std::int32_t width = dealt[d].width();
     const auto size = static_cast<std::int32_t>(dealt[d].nodes.size() + dealt[d].rows.size());

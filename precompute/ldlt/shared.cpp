@@ -133,9 +133,9 @@ void SharedFactoriser::take(Letter letter) {
     return;
   }
   const std::int32_t f = shared_of_id_.at(heading.front);
-  Work& work = works_[static_cast<std::size_t>(f)];
+  Work& work = works_[f];
   if (heading.kind == kUpdate) {
-    work.children[static_cast<std::size_t>(heading.index)][static_cast<std::size_t>(heading.place)] = std::move(letter);
+    work.children[heading.index][heading.place] = std::move(letter);
     --work.missing;
   } else if (heading.kind == kDiagonal) {
     work.diagonals.emplace(heading.index, std::move(letter));
@@ -145,11 +145,11 @@ void SharedFactoriser::take(Letter letter) {
 }
 
 void SharedFactoriser::take_panel(std::int32_t f, Letter letter) {
-  const SharedFront& front = plan_.shared[static_cast<std::size_t>(f)];
+  const SharedFront& front = plan_.shared[f];
   const Heading heading = letter.heading();
   const int k = heading.index;
   const int n = 3 * front.map.nodes(k);
-  Update& update = find_update(front, works_[static_cast<std::size_t>(f)], k);
+  Update& update = find_update(front, works_[f], k);
   std::copy_n(letter.numbers(), n, update.pivots.diagonal);
   std::copy_n(letter.numbers() + kMaxBlock, n, update.pivots.off);
   if (front.map.has_whole_columns()) {
@@ -163,8 +163,8 @@ void SharedFactoriser::take_panel(std::int32_t f, Letter letter) {
 }
 
 bool SharedFactoriser::step(std::int32_t f) {
-  const SharedFront& front = plan_.shared[static_cast<std::size_t>(f)];
-  Work& work = works_[static_cast<std::size_t>(f)];
+  const SharedFront& front = plan_.shared[f];
+  Work& work = works_[f];
   if (!work.is_assembled) {
     if (work.missing > 0) return false;
     assemble(front, work, f);
@@ -180,7 +180,7 @@ bool SharedFactoriser::step(std::int32_t f) {
 bool SharedFactoriser::eliminate_lead(const SharedFront& front, Work& work, std::int32_t f) {
   const int k = work.lead;
   if (k >= front.map.pivot_tiles()) return false;
-  const bool has_rows = front.map.has_column(front.place, k) && front.own_nodes() > front.row_begin[static_cast<std::size_t>(k)];
+  const bool has_rows = front.map.has_column(front.place, k) && front.own_nodes() > front.row_begin[k];
   if (!has_rows) {
     ++work.lead;
     return true;
@@ -208,7 +208,7 @@ bool SharedFactoriser::eliminate_lead(const SharedFront& front, Work& work, std:
 
 void SharedFactoriser::eliminate_diagonal(const SharedFront& front, Work& work, std::int32_t f, int k) {
   const int n = 3 * front.map.nodes(k);
-  const SharedPanel& panel = numbers_.shared[static_cast<std::size_t>(f)][static_cast<std::size_t>(k)];
+  const SharedPanel& panel = numbers_.shared[f][k];
   const std::size_t at = front.find_column_tile(k);
   double* block = block_.data();
   const int first = find_first_row(front, k);
@@ -222,7 +222,7 @@ void SharedFactoriser::eliminate_diagonal(const SharedFront& front, Work& work, 
   std::copy_n(pivots.diagonal, n, numbers_.d_diagonal.begin() + panel.pivots);
   std::copy_n(pivots.off, n, numbers_.d_off.begin() + panel.pivots);
   std::copy_n(pivots.order, n, numbers_.order.begin() + panel.pivots);
-  for (const int place : front.column_places[static_cast<std::size_t>(k)]) {
+  for (const int place : front.column_places[k]) {
     Letter letter({kDiagonal, front.id, front.place, k}, 3 * std::int64_t{n} + count_triangle(n));
     double* to = std::copy_n(pivots.diagonal, n, letter.numbers());
     to = std::copy_n(pivots.off, n, to);
@@ -262,7 +262,7 @@ void SharedFactoriser::eliminate_column(const SharedFront& front, Work& work, st
     std::copy_n(pivots.off, n, letter->numbers() + kMaxBlock);
   }
   send_rows(front, k, pivots, letter, wide);
-  double* tiles = numbers_.panels.data() + numbers_.shared[static_cast<std::size_t>(f)][static_cast<std::size_t>(k)].tiles;
+  double* tiles = numbers_.panels.data() + numbers_.shared[f][k].tiles;
   kernels_.scale_by_d_inverse(wide, 0, end - begin, n, pivots, tiles, numbers_.outcome.growth);
   if (update == nullptr) return;
   update->pivots = pivots;
@@ -343,7 +343,7 @@ void SharedFactoriser::complete(const SharedFront& front, std::int32_t f, Update
   if (update.missing > 0) return;
   const int n = 3 * front.map.nodes(k);
   const int first = find_first_row(front, k + 1);
-  const double* own = numbers_.find_tiles(numbers_.shared[static_cast<std::size_t>(f)][static_cast<std::size_t>(k)]);
+  const double* own = numbers_.find_tiles(numbers_.shared[f][k]);
   std::int64_t made = 0;
   for (const int j : front.column_tiles)
     if (j > k && front.map.owner(j, k) != front.place) made += 3 * front.map.nodes(j);
@@ -377,8 +377,7 @@ bool SharedFactoriser::update_next(const SharedFront& front, Work& work) {
   const auto pass = [&] {
     work.updates.erase(k);
     ++work.panel;
-    work.next = static_cast<std::size_t>(std::upper_bound(front.column_tiles.begin(), front.column_tiles.end(), work.panel) -
-                                         front.column_tiles.begin());
+    work.next = std::upper_bound(front.column_tiles.begin(), front.column_tiles.end(), work.panel) - front.column_tiles.begin();
     return true;
   };
   if (!front.is_updated(front.place, k)) return work.lead > k && pass();
@@ -443,7 +442,7 @@ void SharedFactoriser::add_update(const SharedFront& front, Work& work, const Sh
 }
 
 void SharedFactoriser::assemble(const SharedFront& front, Work& work, std::int32_t f) {
-  double* const pivots = numbers_.panels.data() + numbers_.shared_columns[static_cast<std::size_t>(f)];
+  double* const pivots = numbers_.panels.data() + numbers_.shared_columns[f];
   std::fill_n(pivots, front.count_pivot_columns(), 0.0);
   const auto place = [&](auto first, auto last, double* at) {
     for (; first != last; ++first) {
@@ -501,8 +500,8 @@ void SharedFactoriser::assemble(const SharedFront& front, Work& work, std::int32
 }
 
 void SharedFactoriser::send_update(std::int32_t parent, std::int32_t child, int from, const FindRows& find) {
-  const SharedFront& above = plan_.shared[static_cast<std::size_t>(parent)];
-  const SharedChild& below = above.children[static_cast<std::size_t>(child)];
+  const SharedFront& above = plan_.shared[parent];
+  const SharedChild& below = above.children[child];
   for (int to = 0; to < above.map.places(); ++to) {
     std::int64_t count = 0;
     for_pieces(below, from, above.map, to, [&](const Piece& piece) { count += piece.count(); });
@@ -523,7 +522,7 @@ void SharedFactoriser::send_update(std::int32_t parent, std::int32_t child, int 
 }
 
 void SharedFactoriser::finish(const SharedFront& front, Work& work) {
-  if (front.parent >= 0 && front.last_columns[static_cast<std::size_t>(front.place)] >= front.map.pivot_tiles()) {
+  if (front.parent >= 0 && front.last_columns[front.place] >= front.map.pivot_tiles()) {
     const auto find = [&](std::int32_t a, std::int64_t c) {
       const std::int32_t row = front.width + a;
       const auto column = static_cast<std::int32_t>(front.width + c / 3);

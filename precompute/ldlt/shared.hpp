@@ -80,7 +80,7 @@ class SharedFactoriser {
 
   /// Where row 0 of this rank's rows of the front would be in a column of a column of tiles.
   static double* find_column(const SharedFront& front, const Work& work, std::size_t at, std::int32_t column);
-  static int find_first_row(const SharedFront& front, int k) { return 3 * front.row_begin[static_cast<std::size_t>(k)]; }
+  static int find_first_row(const SharedFront& front, int k) { return 3 * front.row_begin[k]; }
 
   const Plan& plan_;
   Numbers& numbers_;

@@ -33,7 +33,7 @@ class Solver {
       : plan_(plan), numbers_(numbers), kernels_(get_kernels()) {
     for (int first = 0; first < columns; first += kBlockColumns) {
       const int count = std::min(kBlockColumns, columns - first);
-      blocks_.push_back({workspace.blocks[static_cast<std::size_t>(first / kBlockColumns)], count > 8 ? 16 : 8, count, first});
+      blocks_.push_back({workspace.blocks[first / kBlockColumns], count > 8 ? 16 : 8, count, first});
       row_width_ += blocks_.back().width;
     }
   }
@@ -72,20 +72,18 @@ class Solver {
         }
         kernels_.transpose(rows, block.width, static_cast<int>(3 * nodes), block.columns, strip, kColumn);
         for (int c = 0; c < block.columns; ++c)
-          std::memcpy(x + (block.first_column + c) * stride + 3 * first, strip + c * kColumn,
-                      sizeof(double) * 3 * static_cast<std::size_t>(nodes));
+          std::memcpy(x + (block.first_column + c) * stride + 3 * first, strip + c * kColumn, sizeof(double) * 3 * nodes);
       }
   }
 
   void forward() {
     for (std::int32_t s = 0; s < static_cast<std::int32_t>(plan_.fronts.size()); ++s) {
       forward(s);
-      const Front& front = plan_.fronts[static_cast<std::size_t>(s)];
+      const Front& front = plan_.fronts[s];
       if (front.shared_parent < 0) continue;
       for (const SumMessage& sums : front.to_parent) send_sums(sums, kSums);
       for (const Block& block : blocks_)
-        for (const std::int32_t row : front.rows)
-          std::memset(find_row(block, row), 0, sizeof(double) * 3 * static_cast<std::size_t>(block.width));
+        for (const std::int32_t row : front.rows) std::memset(find_row(block, row), 0, sizeof(double) * 3 * block.width);
     }
     for (std::size_t f = 0; f < plan_.shared.size(); ++f) forward_shared(f);
     finish_sends();
@@ -111,8 +109,7 @@ class Solver {
     for (std::ptrdiff_t first = 0; first < plan_.own_nodes; first += kStrip) {
       const std::ptrdiff_t nodes = std::min<std::ptrdiff_t>(kStrip, plan_.own_nodes - first);
       prefetch_columns(block, b, stride, first + kStrip);
-      for (int c = 0; c < block.columns; ++c)
-        std::memcpy(strip + c * kColumn, b + c * stride + 3 * first, sizeof(double) * 3 * static_cast<std::size_t>(nodes));
+      for (int c = 0; c < block.columns; ++c) std::memcpy(strip + c * kColumn, b + c * stride + 3 * first, sizeof(double) * 3 * nodes);
       kernels_.transpose(strip, kColumn, block.width, static_cast<int>(3 * nodes), rows, block.width);
       for (std::ptrdiff_t v = 0; v < nodes; ++v) {
         prefetch_rows(block, first + v, true);
@@ -125,7 +122,7 @@ class Solver {
     return block.rows + 3 * static_cast<std::ptrdiff_t>(node) * block.width;
   }
 
-  double* find_own(const Block& block, std::ptrdiff_t v) const { return find_row(block, plan_.slot_of_own[static_cast<std::size_t>(v)]); }
+  double* find_own(const Block& block, std::ptrdiff_t v) const { return find_row(block, plan_.slot_of_own[v]); }
 
   /// Prefetches the strip that begins at an own node: runs as short as it has in a column are over before the processor sees them.
   template <bool kIsWritten = false>
@@ -143,7 +140,7 @@ class Solver {
   }
 
   const std::uint8_t* find_order(const Front& front, int begin) const {
-    return numbers_.order.data() + 3 * static_cast<std::size_t>(front.first) + static_cast<std::size_t>(begin);
+    return numbers_.order.data() + 3 * front.first + static_cast<std::size_t>(begin);
   }
 
   static void copy_row(const double* from, int width, double* to) {
@@ -162,7 +159,7 @@ class Solver {
 
   /// nodes_: the nodes of a front.
   void list_nodes(const Front& front) {
-    nodes_.resize(static_cast<std::size_t>(front.size()));
+    nodes_.resize(front.size());
     std::iota(nodes_.begin(), nodes_.begin() + front.width, front.first);
     std::copy(front.rows.begin(), front.rows.end(), nodes_.begin() + front.width);
   }
@@ -200,7 +197,7 @@ class Solver {
       const int n = end - begin;
       const int m = 3 * front.size() - end;
       const std::uint8_t* order = find_order(front, begin);
-      const auto first_row = static_cast<std::size_t>(3 * front.first + begin);
+      const std::size_t first_row = 3 * front.first + begin;
       tiles -= count_triangle(n) + static_cast<std::ptrdiff_t>(n) * m;
       const double* next = tiles - find_below(s, p);
       for (const Block& block : blocks_) {
@@ -234,12 +231,12 @@ class Solver {
   static int find_tag(std::int32_t front, Tag tag) { return kFirstTag + kTags * front + tag; }
 
   static Ints list_slots(const SharedFront& front, int i) {
-    Ints slots(static_cast<std::size_t>(front.map.nodes(i)));
-    std::iota(slots.begin(), slots.end(), front.first_slot + front.row_begin[static_cast<std::size_t>(i)]);
+    Ints slots(front.map.nodes(i));
+    std::iota(slots.begin(), slots.end(), front.first_slot + front.row_begin[i]);
     return slots;
   }
   static Ints list_given(const GivenRows& given) {
-    Ints slots(static_cast<std::size_t>(given.count));
+    Ints slots(given.count);
     std::iota(slots.begin(), slots.end(), given.first_slot);
     return slots;
   }
@@ -250,7 +247,7 @@ class Solver {
   void subtract_column(const SharedFront& front, const double* tiles, int k, std::int32_t begin, std::int32_t end,
                        const std::vector<const double*>& in) {
     const int n = 3 * front.map.nodes(k);
-    const std::int32_t first = front.row_begin[static_cast<std::size_t>(k) + 1];
+    const std::int32_t first = front.row_begin[k + 1];
     if (begin == end) return;
     for (std::size_t b = 0; b < blocks_.size(); ++b)
       kernels_.subtract_product(tiles + std::int64_t{3} * (begin - first) * n, 3 * (end - begin), n, blocks_[b].width / 8, in[b],
@@ -260,18 +257,18 @@ class Solver {
   void forward_shared(std::size_t f) {
     const SharedFront& front = plan_.shared[f];
     for (const SumMessage& sums : front.from_children) receive_sums(sums, kSums, Arrival::kIsAdded);
-    nodes_.resize(static_cast<std::size_t>(front.own_nodes()));
+    nodes_.resize(front.own_nodes());
     std::iota(nodes_.begin(), nodes_.end(), front.first_slot);
     alignas(64) double pivots[kMaxBlock * 16];
     for (int k = 0; k < front.map.pivot_tiles(); ++k) {
-      const SharedPanel& panel = numbers_.shared[f][static_cast<std::size_t>(k)];
+      const SharedPanel& panel = numbers_.shared[f][k];
       const int home = front.map.owner(k, k);
       const int n = 3 * front.map.nodes(k);
-      const std::vector<int>& column = front.column_places[static_cast<std::size_t>(k)];
+      const std::vector<int>& column = front.column_places[k];
       std::vector<const double*> in;
       if (home == front.place) {
         const Ints slots = list_slots(front, k);
-        for (const std::int32_t place : front.row_places[static_cast<std::size_t>(k)])
+        for (const std::int32_t place : front.row_places[k])
           receive(front.map.rank(place), find_tag(front.id, kAlongRow), slots, Arrival::kIsAdded);
         for (const Block& block : blocks_) {
           double* own = find_row(block, slots.front());
@@ -284,11 +281,11 @@ class Solver {
       } else if (contains(column, front.place)) {
         in = receive_block(front.map.rank(home), find_tag(front.id, kAlongColumn), n);
       }
-      const std::int32_t begin = front.row_begin[static_cast<std::size_t>(k) + 1];
-      const std::int32_t next = k + 1 < front.map.pivot_tiles() ? front.row_begin[static_cast<std::size_t>(k) + 2] : begin;
+      const std::int32_t begin = front.row_begin[k + 1];
+      const std::int32_t next = k + 1 < front.map.pivot_tiles() ? front.row_begin[k + 2] : begin;
       const double* tiles = numbers_.find_tiles(panel);
       if (!in.empty()) subtract_column(front, tiles, k, begin, next, in);
-      if (k + 1 < front.map.pivot_tiles() && contains(front.row_places[static_cast<std::size_t>(k) + 1], front.place))
+      if (k + 1 < front.map.pivot_tiles() && contains(front.row_places[k + 1], front.place))
         send(front.map.rank(front.map.owner(k + 1, k + 1)), find_tag(front.id, kAlongRow), list_slots(front, k + 1));
       if (!in.empty()) subtract_column(front, tiles, k, next, front.own_nodes(), in);
     }
@@ -298,24 +295,24 @@ class Solver {
   void backward_shared(std::size_t f) {
     const SharedFront& front = plan_.shared[f];
     for (const SumMessage& sums : front.to_parent) receive_sums(sums, kSolutions, Arrival::kIsSet);
-    nodes_.resize(static_cast<std::size_t>(front.own_nodes()));
+    nodes_.resize(front.own_nodes());
     std::iota(nodes_.begin(), nodes_.end(), front.first_slot);
     for (int k = front.map.pivot_tiles(); k-- > 0;) {
-      const SharedPanel& panel = numbers_.shared[f][static_cast<std::size_t>(k)];
+      const SharedPanel& panel = numbers_.shared[f][k];
       const bool is_home = front.map.owner(k, k) == front.place;
       const int n = 3 * front.map.nodes(k);
-      const std::vector<int>& column = front.column_places[static_cast<std::size_t>(k)];
+      const std::vector<int>& column = front.column_places[k];
       const bool has_column = is_home || contains(column, front.place);
       std::vector<double*> sums = has_column ? clear_sums(n) : std::vector<double*>();
       if (is_home)
         for (std::size_t b = 0; b < blocks_.size(); ++b)
           kernels_.multiply_by_d_inverse(numbers_.d_diagonal.data() + panel.pivots, numbers_.d_off.data() + panel.pivots, n,
                                          blocks_[b].width / 8, find_row(blocks_[b], list_slots(front, k).front()), sums[b]);
-      const std::int32_t begin = front.row_begin[static_cast<std::size_t>(k) + 1];
-      const std::int32_t next = k + 1 < front.map.pivot_tiles() ? front.row_begin[static_cast<std::size_t>(k) + 2] : begin;
+      const std::int32_t begin = front.row_begin[k + 1];
+      const std::int32_t next = k + 1 < front.map.pivot_tiles() ? front.row_begin[k + 2] : begin;
       const double* tiles = numbers_.find_tiles(panel);
       if (has_column) subtract_rows(front, tiles, k, next, front.own_nodes(), sums);
-      if (k + 1 < front.map.pivot_tiles() && contains(front.row_places[static_cast<std::size_t>(k) + 1], front.place))
+      if (k + 1 < front.map.pivot_tiles() && contains(front.row_places[k + 1], front.place))
         receive(front.map.rank(front.map.owner(k + 1, k + 1)), find_tag(front.id, kAlongRow), list_slots(front, k + 1), Arrival::kIsSet);
       if (has_column) subtract_rows(front, tiles, k, begin, next, sums);
       if (!is_home) {
@@ -331,11 +328,9 @@ class Solver {
         std::memset(solution, 0, sizeof(double) * static_cast<std::size_t>(n * width));
         kernels_.add_trmm_transposed(triangle, n, width / 8, sums[b], solution, triangle);
         double* own = find_row(blocks_[b], slots.front());
-        for (int c = 0; c < n; ++c)
-          copy_row(solution + c * width, width, own + numbers_.order[static_cast<std::size_t>(panel.pivots + c)] * width);
+        for (int c = 0; c < n; ++c) copy_row(solution + c * width, width, own + numbers_.order[panel.pivots + c] * width);
       }
-      for (const std::int32_t place : front.row_places[static_cast<std::size_t>(k)])
-        send(front.map.rank(place), find_tag(front.id, kAlongRow), slots);
+      for (const std::int32_t place : front.row_places[k]) send(front.map.rank(place), find_tag(front.id, kAlongRow), slots);
     }
     for (const SumMessage& sums : front.from_children) send_sums(sums, kSolutions);
   }
@@ -345,7 +340,7 @@ class Solver {
                      const std::vector<double*>& sums) {
     if (begin == end) return;
     const int n = 3 * front.map.nodes(k);
-    const double* from = tiles + std::int64_t{3} * (begin - front.row_begin[static_cast<std::size_t>(k) + 1]) * n;
+    const double* from = tiles + std::int64_t{3} * (begin - front.row_begin[k + 1]) * n;
     for (std::size_t b = 0; b < blocks_.size(); ++b)
       kernels_.subtract_transposed(from, 3 * (end - begin), n, blocks_[b].width / 8, nodes_.data() + begin, blocks_[b].rows, sums[b], from);
   }

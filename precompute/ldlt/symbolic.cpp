@@ -181,7 +181,7 @@ void fill_rows(const Graph& graph, const Ints& parent, std::int32_t elements, co
     hubs_of[forest.element_parents[h]].push_back(h);
   }
   std::vector<Ints> children(vertices.size());
-  Ints mark(static_cast<std::size_t>(graph.vertex_count() - elements), -1);
+  Ints mark(graph.vertex_count() - elements, -1);
   for (std::size_t s = 0; s < vertices.size(); ++s) {
     Supernode& node = forest.supernodes[s];
     const std::int32_t behind = node.first + node.width;

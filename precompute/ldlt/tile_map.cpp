@@ -45,26 +45,26 @@ TileMap::TileMap(std::int32_t width, std::int32_t rows, const std::vector<FrontS
     members[c].push_back(static_cast<int>(g));
     class_weight[c] += shares[g].fraction;
   }
-  const auto count = static_cast<std::size_t>(tiles());
+  const std::size_t count = tiles();
   std::vector<double> load(classes, 0.0);
   for (int j = 0; j < tiles(); ++j) {
     const double below = start(tiles()) - start(j);
     const double column = cost(j, j) * below / std::max(nodes(j), 1);
     class_of_column_.push_back(choose(load, class_weight, column));
-    load[static_cast<std::size_t>(class_of_column_.back())] += column;
+    load[class_of_column_.back()] += column;
   }
   row_owner_.assign(classes, std::vector<int>(count, 0));
   for (std::size_t c = 0; c < classes; ++c) {
     std::vector<double> weight;
-    for (const int m : members[c]) weight.push_back(shares[static_cast<std::size_t>(m)].fraction);
+    for (const int m : members[c]) weight.push_back(shares[m].fraction);
     std::vector<double> row_load(members[c].size(), 0.0);
     double columns = 0;  // cost of a row of one node in the columns up to this one
     for (int i = 0; i < tiles(); ++i) {
-      if (class_of_column_[static_cast<std::size_t>(i)] == static_cast<int>(c)) columns += cost(i, i) / std::max(nodes(i), 1);
+      if (class_of_column_[i] == static_cast<int>(c)) columns += cost(i, i) / std::max(nodes(i), 1);
       const double row = columns * nodes(i);
       const int m = choose(row_load, weight, row);
-      row_load[static_cast<std::size_t>(m)] += row;
-      row_owner_[c][static_cast<std::size_t>(i)] = members[c][static_cast<std::size_t>(m)];
+      row_load[m] += row;
+      row_owner_[c][i] = members[c][m];
     }
   }
 }
@@ -116,8 +116,8 @@ std::vector<double> TileMap::count_operations() const {
   for (int j = 0; j < tiles(); ++j) {
     const double w = 3.0 * nodes(j);
     const double inside = j < pivot_tiles_ ? w * w * w / 3 : 0;
-    operations[static_cast<std::size_t>(owner(j, j))] += inside + w * w * 3.0 * start(std::min(j, pivot_tiles_));
-    for (int i = j + 1; i < tiles(); ++i) operations[static_cast<std::size_t>(owner(i, j))] += cost(i, j);
+    operations[owner(j, j)] += inside + w * w * 3.0 * start(std::min(j, pivot_tiles_));
+    for (int i = j + 1; i < tiles(); ++i) operations[owner(i, j)] += cost(i, j);
   }
   return operations;
 }
@@ -126,8 +126,8 @@ std::vector<std::int64_t> TileMap::count_entries() const {
   std::vector<std::int64_t> entries(ranks_.size(), 0);
   for (int j = 0; j < pivot_tiles_; ++j) {
     const std::int64_t w = 3 * std::int64_t{nodes(j)};
-    entries[static_cast<std::size_t>(owner(j, j))] += w * (w + 1) / 2;
-    for (int i = j + 1; i < tiles(); ++i) entries[static_cast<std::size_t>(owner(i, j))] += w * 3 * nodes(i);
+    entries[owner(j, j)] += w * (w + 1) / 2;
+    for (int i = j + 1; i < tiles(); ++i) entries[owner(i, j)] += w * 3 * nodes(i);
   }
   return entries;
 }

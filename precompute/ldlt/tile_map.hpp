@@ -19,27 +19,21 @@ class TileMap {
   int tiles() const { return static_cast<int>(starts_.size()) - 1; }
   int pivot_tiles() const { return pivot_tiles_; }
   /// First node of tile i; of tile tiles(): the number of nodes.
-  std::int32_t start(int i) const { return starts_[static_cast<std::size_t>(i)]; }
+  std::int32_t start(int i) const { return starts_[i]; }
   std::int32_t nodes(int i) const { return start(i + 1) - start(i); }
   /// The tile of a node.
   int find_tile(std::int32_t node) const;
 
   int places() const { return static_cast<int>(ranks_.size()); }
-  int rank(int place) const { return ranks_[static_cast<std::size_t>(place)]; }
+  int rank(int place) const { return ranks_[place]; }
   /// -1: the rank has no share.
   int find_place(int rank) const;
   /// The place that has tile (i, j), i >= j.
-  int owner(int i, int j) const {
-    return row_owner_[static_cast<std::size_t>(class_of_column_[static_cast<std::size_t>(j)])][static_cast<std::size_t>(i)];
-  }
+  int owner(int i, int j) const { return row_owner_[class_of_column_[j]][i]; }
   /// Whether column j can hold tiles of a place: a place has tiles in the columns of one class only.
-  bool has_column(int place, int j) const {
-    return class_of_place_[static_cast<std::size_t>(place)] == class_of_column_[static_cast<std::size_t>(j)];
-  }
+  bool has_column(int place, int j) const { return class_of_place_[place] == class_of_column_[j]; }
   /// Whether the place has row i in its columns.
-  bool has_row(int place, int i) const {
-    return row_owner_[static_cast<std::size_t>(class_of_place_[static_cast<std::size_t>(place)])][static_cast<std::size_t>(i)] == place;
-  }
+  bool has_row(int place, int i) const { return row_owner_[class_of_place_[place]][i] == place; }
   /// Whether each column lies on one place whole.
   bool has_whole_columns() const { return row_owner_.size() == ranks_.size(); }
   /// The last column in which a place has a tile, -1: none.

@@ -19,9 +19,9 @@ class TagTable {
     // Unsigned arithmetic: the tags of a damaged file may span all of int64.
     const std::uint64_t span = static_cast<std::uint64_t>(*high) - static_cast<std::uint64_t>(*low);
     if (span < 4 * tags.size() + 1024) {
-      dense_.assign(static_cast<std::size_t>(span) + 1, -1);
+      dense_.assign(span + 1, -1);
       for (std::size_t i = 0; i < tags.size(); ++i) {
-        auto& slot = dense_[static_cast<std::size_t>(tags[i] - low_)];
+        auto& slot = dense_[tags[i] - low_];
         if (slot >= 0) refuse_twin(raw, cursor, i);
         slot = static_cast<std::int32_t>(i);
       }
@@ -38,7 +38,7 @@ class TagTable {
   std::int32_t find(std::int64_t tag) const {
     if (!dense_.empty()) {
       const std::uint64_t offset = static_cast<std::uint64_t>(tag) - static_cast<std::uint64_t>(low_);
-      return offset < dense_.size() ? dense_[static_cast<std::size_t>(offset)] : -1;
+      return offset < dense_.size() ? dense_[offset] : -1;
     }
     const auto found = std::lower_bound(sorted_.begin(), sorted_.end(), std::pair{tag, std::numeric_limits<std::int32_t>::min()});
     return found != sorted_.end() && found->first == tag ? found->second : -1;
@@ -60,7 +60,7 @@ void sort_set(std::vector<std::int32_t>& set, std::size_t node_count) {
     return;
   }
   std::vector<char> inside(node_count, 0);
-  for (const auto i : set) inside[static_cast<std::size_t>(i)] = 1;
+  for (const auto i : set) inside[i] = 1;
   set.clear();
   for (std::size_t i = 0; i < node_count; ++i)
     if (inside[i]) set.push_back(static_cast<std::int32_t>(i));
@@ -145,7 +145,7 @@ TetMesh build_mesh(RawMesh&& raw, const Cursor& nodes, const Cursor& elements) {
   const TagTable table(raw, nodes);
   TetMesh mesh;
   mesh.order = raw.order;
-  const std::size_t width = static_cast<std::size_t>(mesh.nodes_per_tet());
+  const std::size_t width = mesh.nodes_per_tet();
   mesh.tets.resize(raw.tets.size());
   for (std::size_t k = 0; k < raw.tets.size(); ++k) {
     mesh.tets[k] = table.find(raw.tets[k]);

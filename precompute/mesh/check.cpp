@@ -46,7 +46,7 @@ void check_indices(const TetMesh& mesh, const std::string& name) {
     refuse(name, fmt::format("{} element{} with a repeated node: {}; mesh the body again", repeated.size(), repeated.size() == 1 ? "" : "s",
                              list_elements(repeated)));
   for (std::int64_t i = 0; i < count; ++i)
-    for (const double x : mesh.nodes_m[static_cast<std::size_t>(i)])
+    for (const double x : mesh.nodes_m[i])
       if (!std::isfinite(x))
         refuse(name, fmt::format("node {} has a coordinate that is not finite; correct the mesh where it was made", i + 1));
   for (const auto& [set, nodes] : mesh.node_sets)
@@ -57,7 +57,7 @@ void check_indices(const TetMesh& mesh, const std::string& name) {
 
 double calc_determinant(const TetMesh& mesh, std::int64_t e, double& longest_squared) {
   const auto tet = mesh.tet(e);
-  const auto at = [&](int i) -> const Vec3& { return mesh.nodes_m[static_cast<std::size_t>(tet[static_cast<std::size_t>(i)])]; };
+  const auto at = [&](int i) -> const Vec3& { return mesh.nodes_m[tet[i]]; };
   std::array<Vec3, 6> edge{};
   longest_squared = 0.0;
   for (std::size_t m = 0; m < 6; ++m) {
@@ -97,7 +97,7 @@ void orient(TetMesh& mesh, const std::string& name, CheckReport& report) {
 
 /// Two elements with the same four corners share each of their faces; the face opposite the greatest corner is enough to find them.
 void refuse_duplicates(const TetMesh& mesh, const std::vector<Face>& faces, const std::string& name) {
-  const auto apex = [&](const Face& face) { return mesh.tet(face.tet)[static_cast<std::size_t>(face.local)]; };
+  const auto apex = [&](const Face& face) { return mesh.tet(face.tet)[face.local]; };
   std::vector<std::int64_t> copies;
   std::int64_t first_original = -1;
   for (std::size_t i = 0; i < faces.size();) {
@@ -133,7 +133,7 @@ std::vector<Face> check_faces(const TetMesh& mesh, const std::vector<Face>& face
       refuse(name, fmt::format("the face of nodes {}, {} and {} belongs to {} elements: {}; a face joins two at most: mesh the body again",
                                faces[i].a + 1, faces[i].b + 1, faces[i].c + 1, end - i, list_elements(elements)));
     } else if (faces[i].odd == faces[i + 1].odd) {
-      const auto apex = [&](const Face& face) { return mesh.tet(face.tet)[static_cast<std::size_t>(face.local)] + 1; };
+      const auto apex = [&](const Face& face) { return mesh.tet(face.tet)[face.local] + 1; };
       refuse(
           name,
           fmt::format(
@@ -182,7 +182,7 @@ void check_boundary(const std::vector<Face>& boundary, std::size_t node_count, c
     const BoundaryEdge& edge = edges[broken.front()];
     std::vector<std::int64_t> elements;
     for (std::size_t i = broken.front(); i < edges.size() && edges[i].low == edge.low && edges[i].high == edge.high; ++i)
-      elements.push_back(boundary[static_cast<std::size_t>(edges[i].face)].tet);
+      elements.push_back(boundary[edges[i].face].tet);
     refuse(
         name,
         fmt::format(
@@ -196,7 +196,7 @@ void check_boundary(const std::vector<Face>& boundary, std::size_t node_count, c
   for (std::size_t f = 0; f < boundary.size(); ++f) {
     const std::array<std::int32_t, 3> nodes{boundary[f].a, boundary[f].b, boundary[f].c};
     for (std::size_t k = 0; k < 3; ++k) {
-      const auto node = static_cast<std::size_t>(nodes[k]);
+      const std::size_t node = nodes[k];
       const auto fan = fans.find(static_cast<std::int32_t>(3 * f + k));
       if (fan_of[node] < 0) fan_of[node] = fan;
       if (fan_of[node] != fan) pinched[node] = 1;
@@ -209,21 +209,21 @@ void check_boundary(const std::vector<Face>& boundary, std::size_t node_count, c
 /// Drops the nodes of no element (welded ones are among them), renumbers elements and sets.
 void drop_unused(TetMesh& mesh, const std::vector<std::int32_t>& stand, CheckReport& report) {
   std::vector<std::int32_t> number(mesh.nodes_m.size(), -1);
-  for (const auto node : mesh.tets) number[static_cast<std::size_t>(node)] = 0;
+  for (const auto node : mesh.tets) number[node] = 0;
   std::int32_t kept = 0;
   for (std::size_t i = 0; i < number.size(); ++i)
     if (number[i] == 0) {
-      mesh.nodes_m[static_cast<std::size_t>(kept)] = mesh.nodes_m[i];
-      if (!mesh.doubt_m.empty()) mesh.doubt_m[static_cast<std::size_t>(kept)] = mesh.doubt_m[i];
+      mesh.nodes_m[kept] = mesh.nodes_m[i];
+      if (!mesh.doubt_m.empty()) mesh.doubt_m[kept] = mesh.doubt_m[i];
       number[i] = kept++;
     }
   report.unreferenced = static_cast<std::int64_t>(mesh.nodes_m.size()) - kept - report.welded;
-  if (static_cast<std::size_t>(kept) == mesh.nodes_m.size()) return;
-  mesh.nodes_m.resize(static_cast<std::size_t>(kept));
-  if (!mesh.doubt_m.empty()) mesh.doubt_m.resize(static_cast<std::size_t>(kept));
-  for (auto& node : mesh.tets) node = number[static_cast<std::size_t>(node)];
+  if (kept == std::ssize(mesh.nodes_m)) return;
+  mesh.nodes_m.resize(kept);
+  if (!mesh.doubt_m.empty()) mesh.doubt_m.resize(kept);
+  for (auto& node : mesh.tets) node = number[node];
   for (auto& [name, set] : mesh.node_sets) {
-    for (auto& node : set) node = number[static_cast<std::size_t>(stand[static_cast<std::size_t>(node)])];
+    for (auto& node : set) node = number[stand[node]];
     std::sort(set.begin(), set.end());
     set.erase(std::unique(set.begin(), set.end()), set.end());
     if (!set.empty() && set.front() < 0) set.erase(set.begin());
@@ -236,7 +236,7 @@ void find_components(const TetMesh& mesh, CheckReport& report) {
     for (const auto node : mesh.tet(e)) parts.join(mesh.tet(e)[0], node);
   report.component_of_node.assign(mesh.nodes_m.size(), -1);
   for (std::size_t i = 0; i < mesh.nodes_m.size(); ++i) {
-    auto& first = report.component_of_node[static_cast<std::size_t>(parts.find(static_cast<std::int32_t>(i)))];
+    auto& first = report.component_of_node[parts.find(static_cast<std::int32_t>(i))];
     if (first < 0) first = report.components++;
     report.component_of_node[i] = first;
   }
@@ -310,7 +310,7 @@ std::int64_t count_flat(const TetMesh& mesh) {
 CheckReport check_mesh(TetMesh& mesh, const std::string& name) {
   CheckReport report;
   check_indices(mesh, name);
-  mesh.regions.resize(static_cast<std::size_t>(mesh.tet_count()), 0);
+  mesh.regions.resize(mesh.tet_count(), 0);
   const auto stand = weld_cracks(mesh, name, report);
   orient(mesh, name, report);
   {

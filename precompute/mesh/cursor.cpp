@@ -87,7 +87,7 @@ std::size_t Cursor::checked_count(std::int64_t count, std::size_t min_bytes, con
   if (count < 0 || static_cast<std::uint64_t>(count) > max)
     fail(place, "the file announces {} {}, but the {} bytes after it have room for {} at most; it was cut short or damaged: write it again",
          count, what, remaining(), max);
-  return static_cast<std::size_t>(count);
+  return count;
 }
 
 }  // namespace carillon::mesh

@@ -24,13 +24,13 @@ Slopes calc_slopes(const TetMesh& mesh, std::int64_t e) {
   const auto tet = mesh.tet(e);
   std::array<std::array<Vec3, 4>, 4> g{};  // dx / dL_i = sum over j of L_j g[i][j]
   for (std::size_t i = 0; i < 4; ++i) {
-    const Vec3& x = mesh.nodes_m[static_cast<std::size_t>(tet[i])];
+    const Vec3& x = mesh.nodes_m[tet[i]];
     for (std::size_t j = 0; j < 4; ++j)
       for (std::size_t k = 0; k < 3; ++k) g[i][j][k] = (i == j ? 3.0 : -1.0) * x[k];
   }
   for (std::size_t m = 0; m < 6; ++m) {
-    const auto i = static_cast<std::size_t>(kEdges[m][0]), j = static_cast<std::size_t>(kEdges[m][1]);
-    const Vec3& x = mesh.nodes_m[static_cast<std::size_t>(tet[4 + m])];
+    const std::size_t i = kEdges[m][0], j = kEdges[m][1];
+    const Vec3& x = mesh.nodes_m[tet[4 + m]];
     for (std::size_t k = 0; k < 3; ++k) {
       g[i][j][k] += 4.0 * x[k];
       g[j][i][k] += 4.0 * x[k];
@@ -83,7 +83,7 @@ void add_orbit(std::vector<Point>& points, double other, double weight) {
 void add_edge_orbit(std::vector<Point>& points, double other, double weight) {
   for (const auto& edge : kEdges) {
     Barycentric b{other, other, other, other};
-    b[static_cast<std::size_t>(edge[0])] = b[static_cast<std::size_t>(edge[1])] = 0.5 - other;
+    b[edge[0]] = b[edge[1]] = 0.5 - other;
     points.push_back({b, weight});
   }
 }
@@ -115,8 +115,8 @@ const std::vector<Point>& get_points() {
 }  // namespace
 
 Vec3 calc_middle(const TetMesh& mesh, std::int64_t e, std::size_t edge) {
-  const Vec3& a = mesh.nodes_m[static_cast<std::size_t>(mesh.tet(e)[static_cast<std::size_t>(kEdges[edge][0])])];
-  const Vec3& b = mesh.nodes_m[static_cast<std::size_t>(mesh.tet(e)[static_cast<std::size_t>(kEdges[edge][1])])];
+  const Vec3& a = mesh.nodes_m[mesh.tet(e)[kEdges[edge][0]]];
+  const Vec3& b = mesh.nodes_m[mesh.tet(e)[kEdges[edge][1]]];
   return {0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.5 * (a[2] + b[2])};
 }
 
@@ -124,9 +124,8 @@ bool is_curved(const TetMesh& mesh, std::int64_t e) {
   constexpr double kStraight = 1e-6;  // of the edge's length
   for (std::size_t m = 0; m < 6; ++m) {
     const auto tet = mesh.tet(e);
-    const Vec3 off = mesh.nodes_m[static_cast<std::size_t>(tet[4 + m])] - calc_middle(mesh, e, m);
-    const Vec3 edge = mesh.nodes_m[static_cast<std::size_t>(tet[static_cast<std::size_t>(kEdges[m][1])])] -
-                      mesh.nodes_m[static_cast<std::size_t>(tet[static_cast<std::size_t>(kEdges[m][0])])];
+    const Vec3 off = mesh.nodes_m[tet[4 + m]] - calc_middle(mesh, e, m);
+    const Vec3 edge = mesh.nodes_m[tet[kEdges[m][1]]] - mesh.nodes_m[tet[kEdges[m][0]]];
     if (dot(off, off) > kStraight * kStraight * dot(edge, edge)) return true;
   }
   return false;
@@ -152,7 +151,7 @@ double calc_curved_volume(const TetMesh& mesh, std::int64_t e) {
 namespace {
 
 void straighten_element(TetMesh& mesh, std::int64_t e) {
-  for (std::size_t m = 0; m < 6; ++m) mesh.nodes_m[static_cast<std::size_t>(mesh.tet(e)[4 + m])] = calc_middle(mesh, e, m);
+  for (std::size_t m = 0; m < 6; ++m) mesh.nodes_m[mesh.tet(e)[4 + m]] = calc_middle(mesh, e, m);
 }
 
 }  // namespace

@@ -14,8 +14,8 @@ std::vector<Face> sort_faces(const TetMesh& mesh, const std::vector<std::int32_t
     const auto tet = mesh.tet(e);
     std::array<std::int32_t, 3> v{};
     for (std::size_t k = 0; k < 3; ++k) {
-      const auto node = tet[static_cast<std::size_t>(kFaces[static_cast<std::size_t>(local)][k])];
-      v[k] = node_of.empty() ? node : node_of[static_cast<std::size_t>(node)];
+      const auto node = tet[kFaces[local][k]];
+      v[k] = node_of.empty() ? node : node_of[node];
     }
     bool odd = false;
     const auto order = [&](std::size_t i, std::size_t j) {
@@ -31,16 +31,16 @@ std::vector<Face> sort_faces(const TetMesh& mesh, const std::vector<std::int32_t
   };
   std::vector<std::size_t> begin(mesh.nodes_m.size() + 1, 0);
   std::vector<Face> unsorted;
-  unsorted.reserve(static_cast<std::size_t>(4 * mesh.tet_count()));
+  unsorted.reserve(4 * mesh.tet_count());
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
     for (int local = 0; local < 4; ++local) {
       unsorted.push_back(make_face(e, local));
-      ++begin[static_cast<std::size_t>(unsorted.back().a) + 1];
+      ++begin[unsorted.back().a + 1];
     }
   for (std::size_t i = 1; i < begin.size(); ++i) begin[i] += begin[i - 1];
   std::vector<Face> faces(unsorted.size());
   std::vector<std::size_t> next(begin.begin(), begin.end() - 1);
-  for (const Face& face : unsorted) faces[next[static_cast<std::size_t>(face.a)]++] = face;
+  for (const Face& face : unsorted) faces[next[face.a]++] = face;
   // Faces come in the order of elements, so a stable sort by the other corners is all; the faces of one lowest corner are some twenty.
   const auto get_key = [](const Face& face) { return std::int64_t{face.b} << 32 | face.c; };
   constexpr std::size_t kFew = 64;
@@ -80,11 +80,11 @@ Surface extract_boundary(const TetMesh& mesh) {
   Surface surface;
   const auto add = [&](std::int32_t e, int i, int j, int k) {
     const auto tet = mesh.tet(e);
-    surface.triangles.push_back({tet[static_cast<std::size_t>(i)], tet[static_cast<std::size_t>(j)], tet[static_cast<std::size_t>(k)]});
+    surface.triangles.push_back({tet[i], tet[j], tet[k]});
     surface.tets.push_back(e);
   };
   for (const auto& [e, local] : boundary) {
-    const auto [i, j, k] = kFaces[static_cast<std::size_t>(local)];
+    const auto [i, j, k] = kFaces[local];
     if (mesh.order == 1) {
       add(e, i, j, k);
       continue;
@@ -97,14 +97,14 @@ Surface extract_boundary(const TetMesh& mesh) {
   }
   std::vector<std::int32_t> vertex(mesh.nodes_m.size(), -1);
   for (const auto& triangle : surface.triangles)
-    for (const auto node : triangle) vertex[static_cast<std::size_t>(node)] = 0;
+    for (const auto node : triangle) vertex[node] = 0;
   for (std::size_t i = 0; i < vertex.size(); ++i)
     if (vertex[i] == 0) {
       vertex[i] = static_cast<std::int32_t>(surface.nodes.size());
       surface.nodes.push_back(static_cast<std::int32_t>(i));
     }
   for (auto& triangle : surface.triangles)
-    for (auto& node : triangle) node = vertex[static_cast<std::size_t>(node)];
+    for (auto& node : triangle) node = vertex[node];
   return surface;
 }
 

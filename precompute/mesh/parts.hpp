@@ -14,9 +14,9 @@ class Parts {
     for (std::size_t i = 0; i < count; ++i) parent_[i] = static_cast<std::int32_t>(i);
   }
   std::int32_t find(std::int32_t i) {
-    while (parent_[static_cast<std::size_t>(i)] != i) {
-      auto& up = parent_[static_cast<std::size_t>(i)];
-      up = parent_[static_cast<std::size_t>(up)];
+    while (parent_[i] != i) {
+      auto& up = parent_[i];
+      up = parent_[up];
       i = up;
     }
     return i;
@@ -25,8 +25,8 @@ class Parts {
   void join(std::int32_t i, std::int32_t j) {
     i = find(i);
     j = find(j);
-    if (i < j) parent_[static_cast<std::size_t>(j)] = i;
-    if (j < i) parent_[static_cast<std::size_t>(i)] = j;
+    if (i < j) parent_[j] = i;
+    if (j < i) parent_[i] = j;
   }
 
  private:

@@ -16,7 +16,7 @@ TetMesh to_quadratic(const TetMesh& mesh) {
   fine.regions = mesh.regions;
   fine.region_names = mesh.region_names;
   fine.node_sets = mesh.node_sets;
-  const std::size_t count = static_cast<std::size_t>(mesh.tet_count());
+  const std::size_t count = mesh.tet_count();
   fine.tets.resize(10 * count);
   struct Edge {
     std::int32_t high;
@@ -25,10 +25,10 @@ TetMesh to_quadratic(const TetMesh& mesh) {
   std::vector<std::size_t> begin(mesh.nodes_m.size() + 1, 0);
   const auto corners = [&](std::size_t e, std::size_t k) {
     const auto tet = mesh.tet(static_cast<std::int64_t>(e));
-    return std::minmax(tet[static_cast<std::size_t>(kEdges[k][0])], tet[static_cast<std::size_t>(kEdges[k][1])]);
+    return std::minmax(tet[kEdges[k][0]], tet[kEdges[k][1]]);
   };
   for (std::size_t e = 0; e < count; ++e)
-    for (std::size_t k = 0; k < 6; ++k) ++begin[static_cast<std::size_t>(corners(e, k).first) + 1];
+    for (std::size_t k = 0; k < 6; ++k) ++begin[corners(e, k).first + 1];
   for (std::size_t i = 1; i < begin.size(); ++i) begin[i] += begin[i - 1];
   std::vector<Edge> edges(6 * count);
   std::vector<std::size_t> next(begin.begin(), begin.end() - 1);
@@ -36,7 +36,7 @@ TetMesh to_quadratic(const TetMesh& mesh) {
     std::copy_n(mesh.tet(static_cast<std::int64_t>(e)).begin(), 4, fine.tets.begin() + static_cast<std::ptrdiff_t>(10 * e));
     for (std::size_t k = 0; k < 6; ++k) {
       const auto [low, high] = corners(e, k);
-      edges[next[static_cast<std::size_t>(low)]++] = {high, static_cast<std::int64_t>(10 * e + 4 + k)};
+      edges[next[low]++] = {high, static_cast<std::int64_t>(10 * e + 4 + k)};
     }
   }
   std::vector<std::array<std::int32_t, 2>> ends;  // of each mid node
@@ -46,24 +46,23 @@ TetMesh to_quadratic(const TetMesh& mesh) {
     std::sort(first, last, [](const Edge& x, const Edge& y) { return x.high < y.high || (x.high == y.high && x.slot < y.slot); });
     for (auto edge = first; edge != last; ++edge) {
       if (edge == first || edge->high != (edge - 1)->high) {
-        const Vec3 a = mesh.nodes_m[low], b = mesh.nodes_m[static_cast<std::size_t>(edge->high)];
+        const Vec3 a = mesh.nodes_m[low], b = mesh.nodes_m[edge->high];
         fine.nodes_m.push_back({0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.5 * (a[2] + b[2])});
         if (!mesh.doubt_m.empty()) {
-          const Vec3 &p = mesh.doubt_m[low], &q = mesh.doubt_m[static_cast<std::size_t>(edge->high)];
+          const Vec3 &p = mesh.doubt_m[low], &q = mesh.doubt_m[edge->high];
           fine.doubt_m.push_back({0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1]), 0.5 * (p[2] + q[2])});
         }
         ends.push_back({static_cast<std::int32_t>(low), edge->high});
       }
-      fine.tets[static_cast<std::size_t>(edge->slot)] = static_cast<std::int32_t>(fine.nodes_m.size()) - 1;
+      fine.tets[edge->slot] = static_cast<std::int32_t>(fine.nodes_m.size()) - 1;
     }
   }
   std::vector<char> inside(mesh.nodes_m.size());
   for (auto& [name, set] : fine.node_sets) {
     std::fill(inside.begin(), inside.end(), 0);
-    for (const auto node : mesh.node_sets.at(name)) inside[static_cast<std::size_t>(node)] = 1;
+    for (const auto node : mesh.node_sets.at(name)) inside[node] = 1;
     for (std::size_t m = 0; m < ends.size(); ++m)
-      if (inside[static_cast<std::size_t>(ends[m][0])] != 0 && inside[static_cast<std::size_t>(ends[m][1])] != 0)
-        set.push_back(static_cast<std::int32_t>(mesh.nodes_m.size() + m));
+      if (inside[ends[m][0]] != 0 && inside[ends[m][1]] != 0) set.push_back(static_cast<std::int32_t>(mesh.nodes_m.size() + m));
   }
   return fine;
 }
@@ -76,20 +75,20 @@ TetMesh to_linear(const TetMesh& mesh) {
   coarse.region_names = mesh.region_names;
   std::vector<std::int32_t> number(mesh.nodes_m.size(), -1);
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
-    for (std::size_t k = 0; k < 4; ++k) number[static_cast<std::size_t>(mesh.tet(e)[k])] = 0;
+    for (std::size_t k = 0; k < 4; ++k) number[mesh.tet(e)[k]] = 0;
   for (std::size_t i = 0; i < number.size(); ++i)
     if (number[i] == 0) {
       number[i] = static_cast<std::int32_t>(coarse.nodes_m.size());
       coarse.nodes_m.push_back(mesh.nodes_m[i]);
       if (!mesh.doubt_m.empty()) coarse.doubt_m.push_back(mesh.doubt_m[i]);
     }
-  coarse.tets.reserve(static_cast<std::size_t>(4 * mesh.tet_count()));
+  coarse.tets.reserve(4 * mesh.tet_count());
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
-    for (std::size_t k = 0; k < 4; ++k) coarse.tets.push_back(number[static_cast<std::size_t>(mesh.tet(e)[k])]);
+    for (std::size_t k = 0; k < 4; ++k) coarse.tets.push_back(number[mesh.tet(e)[k]]);
   for (const auto& [name, set] : mesh.node_sets) {
     auto& kept = coarse.node_sets[name];
     for (const auto node : set)
-      if (number[static_cast<std::size_t>(node)] >= 0) kept.push_back(number[static_cast<std::size_t>(node)]);
+      if (number[node] >= 0) kept.push_back(number[node]);
   }
   return coarse;
 }

@@ -30,24 +30,24 @@ void calc_quality(const TetMesh& mesh, CheckReport& report) {
       report.box_high[k] = std::max(report.box_high[k], x[k]);
     }
   const std::int64_t count = mesh.tet_count();
-  std::vector<double> ratios(static_cast<std::size_t>(count));
+  std::vector<double> ratios(count);
   double shortest = std::numeric_limits<double>::infinity();  // of the squared edges
   double max = -1.0, min = 1.0, sum = 0.0;                    // of the cosines of the dihedral angles
   for (std::int64_t e = 0; e < count; ++e) {
     const auto tet = mesh.tet(e);
     std::array<Vec3, 4> x{};
-    for (std::size_t i = 0; i < 4; ++i) x[i] = mesh.nodes_m[static_cast<std::size_t>(tet[i])];
+    for (std::size_t i = 0; i < 4; ++i) x[i] = mesh.nodes_m[tet[i]];
     std::array<Vec3, 4> normal{};
     for (std::size_t f = 0; f < 4; ++f) {
       const auto [i, j, k] = kFaces[f];
-      const Vec3& origin = x[static_cast<std::size_t>(i)];
-      normal[f] = cross(x[static_cast<std::size_t>(j)] - origin, x[static_cast<std::size_t>(k)] - origin);
+      const Vec3& origin = x[i];
+      normal[f] = cross(x[j] - origin, x[k] - origin);
       const double length = std::sqrt(dot(normal[f], normal[f]));
       for (double& value : normal[f]) value /= length;
     }
     double own_max = -1.0, own_min = 1.0;
     for (const auto& [f, g] : kEdges) {  // every pair of faces, too
-      const double cosine = -dot(normal[static_cast<std::size_t>(f)], normal[static_cast<std::size_t>(g)]);
+      const double cosine = -dot(normal[f], normal[g]);
       own_max = std::max(own_max, cosine);
       own_min = std::min(own_min, cosine);
     }
@@ -57,13 +57,13 @@ void calc_quality(const TetMesh& mesh, CheckReport& report) {
     const double volume = dot(x[1] - x[0], cross(x[2] - x[0], x[3] - x[0])) / 6.0;
     double squares = 0.0;
     for (const auto& [i, j] : kEdges) {
-      const Vec3 edge = x[static_cast<std::size_t>(j)] - x[static_cast<std::size_t>(i)];
+      const Vec3 edge = x[j] - x[i];
       squares += dot(edge, edge);
       shortest = std::min(shortest, dot(edge, edge));
     }
     const double root = std::cbrt(3.0 * volume);
-    ratios[static_cast<std::size_t>(e)] = 12.0 * root * root / squares;
-    sum += ratios[static_cast<std::size_t>(e)];
+    ratios[e] = 12.0 * root * root / squares;
+    sum += ratios[e];
     if (mesh.order == 1 || report.curved == 0 || !is_curved(mesh, e)) {
       report.volume_m3 += volume;
     } else {

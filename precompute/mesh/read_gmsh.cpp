@@ -141,7 +141,7 @@ void GmshReader::read_entities(bool partitioned) {
     for (std::size_t i = 0; i < count; ++i) use(cursor_.int32(what));
   };
   for (int dimension = 0; dimension < 4; ++dimension) {
-    for (std::size_t i = 0; i < counts[static_cast<std::size_t>(dimension)]; ++i) {
+    for (std::size_t i = 0; i < counts[dimension]; ++i) {
       const auto tag = cursor_.int32("the tag of an entity");
       if (partitioned) {
         cursor_.int32("the dimension of the parent entity");
@@ -237,7 +237,7 @@ void GmshReader::add_element(std::int64_t tag, int number, const GmshType& type,
   ++raw_.others[type.name];
   for (const auto physical : physicals) {
     auto& group = node_groups_[{type.dimension, physical}];
-    for (int i = 0; i < type.nodes; ++i) group.push_back({tags_[static_cast<std::size_t>(i)], place});
+    for (int i = 0; i < type.nodes; ++i) group.push_back({tags_[i], place});
   }
 }
 
@@ -278,7 +278,7 @@ void GmshReader::read_elements_2() {
         // A negative tag marks an element of the opposite orientation.
         if (k == 0 && value != 0) physicals.push_back(type.dimension < 3 && value != INT32_MIN ? std::abs(value) : value);
       }
-      for (int k = 0; k < type.nodes; ++k) tags_[static_cast<std::size_t>(k)] = cursor_.int32("a node of an element");
+      for (int k = 0; k < type.nodes; ++k) tags_[k] = cursor_.int32("a node of an element");
       add_element(tag, number, type, physicals, place);
     }
     done += size;
@@ -310,7 +310,7 @@ void GmshReader::read_elements_4() {
       if (!binary_) cursor_.skip_space();
       const std::size_t place = cursor_.place();
       const auto tag = cursor_.int64("the number of an element");
-      for (int k = 0; k < type.nodes; ++k) tags_[static_cast<std::size_t>(k)] = cursor_.int64("a node of an element");
+      for (int k = 0; k < type.nodes; ++k) tags_[k] = cursor_.int64("a node of an element");
       add_element(tag, number, type, physicals, place);
     }
     total += size;
@@ -471,7 +471,7 @@ void GmshReader::merge_repeated() {
   if (version_ != 2 || tet_groups_.size() < 2) return;
   const std::vector<std::int64_t> position_of = merge_repeated_tets(raw_);
   for (auto& [group, positions] : tet_groups_)
-    for (auto& position : positions) position = position_of[static_cast<std::size_t>(position)];
+    for (auto& position : positions) position = position_of[position];
 }
 
 TetMesh GmshReader::read() {

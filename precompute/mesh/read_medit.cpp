@@ -97,14 +97,13 @@ int MeditReader::count_line_numbers() {
 }
 
 void MeditReader::read_tets(int node_count) {
-  const auto count = read_count(2 * static_cast<std::size_t>(node_count) + 2, "tetrahedra");
+  const auto count = read_count(2 * node_count + 2, "tetrahedra");
   if (count > 0 && count_line_numbers() == 11) node_count = 10;
   std::array<std::int64_t, 10> tags{};
   for (std::size_t i = 0; i < count; ++i) {
     cursor_.skip_space();
     const std::size_t place = cursor_.place();
-    for (int k = 0; k < node_count; ++k)
-      tags[static_cast<std::size_t>(k)] = cursor_.text_int("a vertex of a tetrahedron", INT32_MIN, INT32_MAX);
+    for (int k = 0; k < node_count; ++k) tags[k] = cursor_.text_int("a vertex of a tetrahedron", INT32_MIN, INT32_MAX);
     const auto region = static_cast<std::int32_t>(cursor_.text_int("the reference of a tetrahedron", INT32_MIN, INT32_MAX));
     raw_.add_tet(cursor_, static_cast<std::int64_t>(i) + 1, tags.data(), node_count, kVtkOrder, region, place);
   }
@@ -112,13 +111,12 @@ void MeditReader::read_tets(int node_count) {
 
 void MeditReader::read_surface(const Section& section) {
   const std::size_t start = cursor_.place();
-  const auto count = read_count(2 * static_cast<std::size_t>(section.numbers) + 2, section.plural);
+  const auto count = read_count(2 * section.numbers + 2, section.plural);
   if (count > 0 && section.volume)
     cursor_.fail(start, "the mesh holds {} {}; only tetrahedra are read: mesh the volume with those", count, section.plural);
   if (count > 0) raw_.others[section.plural] += static_cast<std::int64_t>(count);
-  std::size_t numbers = static_cast<std::size_t>(section.numbers);
-  if (count > 0 && section.quadratic > 0 && count_line_numbers() == section.quadratic + 1)
-    numbers = static_cast<std::size_t>(section.quadratic);
+  std::size_t numbers = section.numbers;
+  if (count > 0 && section.quadratic > 0 && count_line_numbers() == section.quadratic + 1) numbers = section.quadratic;
   std::vector<RawMesh::Reference> nodes(numbers);
   for (std::size_t i = 0; i < count; ++i) {
     cursor_.skip_space();
@@ -141,10 +139,9 @@ void MeditReader::read_ordering() {
     std::array<std::int64_t, 4> weights{};
     for (auto& weight : weights) weight = cursor_.text_int("a barycentric number", 0, 2);
     for (int c = 0; c < 4; ++c)
-      if (weights[static_cast<std::size_t>(c)] == 2) ordering[static_cast<std::size_t>(c)] = row;
+      if (weights[c] == 2) ordering[c] = row;
     for (std::size_t e = 0; e < kEdges.size(); ++e)
-      if (weights[static_cast<std::size_t>(kEdges[e][0])] == 1 && weights[static_cast<std::size_t>(kEdges[e][1])] == 1)
-        ordering[4 + e] = row;
+      if (weights[kEdges[e][0]] == 1 && weights[kEdges[e][1]] == 1) ordering[4 + e] = row;
   }
   for (const int position : ordering)
     if (position < 0) cursor_.fail(start, "TetrahedraP2Ordering does not place every corner and edge; write the mesh again");
@@ -163,7 +160,7 @@ void MeditReader::skip_numbers() {
 
 void MeditReader::order_mid_nodes() {
   if (raw_.order != 2) return;
-  const auto at = [&](std::int64_t tag) { return raw_.nodes[static_cast<std::size_t>(tag - 1)]; };
+  const auto at = [&](std::int64_t tag) { return raw_.nodes[tag - 1]; };
   const auto known = [&](std::int64_t tag) { return tag >= 1 && tag <= static_cast<std::int64_t>(raw_.nodes.size()); };
   std::array<int, 10> order{};
   std::copy_n(kVtkOrder, 10, order.begin());
@@ -186,7 +183,7 @@ void MeditReader::order_mid_nodes() {
   for (std::size_t e = 0; e < raw_.tet_tags.size(); ++e) {
     std::array<std::int64_t, 10> tags{};
     std::copy_n(raw_.tets.begin() + static_cast<std::ptrdiff_t>(10 * e), 10, tags.begin());
-    for (std::size_t i = 0; i < 10; ++i) raw_.tets[10 * e + i] = tags[static_cast<std::size_t>(order[i])];
+    for (std::size_t i = 0; i < 10; ++i) raw_.tets[10 * e + i] = tags[order[i]];
   }
 }
 

@@ -51,7 +51,7 @@ TetMesh parse_tetgen(std::string_view node_bytes, const std::string& node_name, 
   const auto region_count = ele.text_int("the number of region attributes", 0, 1000);
   if (corners != 4 && corners != 10)
     ele.fail(ele_head, "elements of {} nodes; only tetrahedra of 4 or 10 nodes are read: write those (TetGen -o1 or -o2)", corners);
-  const auto tet_count = ele.checked_count(tets, 2 * static_cast<std::size_t>(corners) + 2, "tetrahedra", ele_head);
+  const auto tet_count = ele.checked_count(tets, 2 * corners + 2, "tetrahedra", ele_head);
   std::int64_t tags[10] = {};
   for (std::size_t i = 0; i < tet_count; ++i) {
     ele.skip_space();

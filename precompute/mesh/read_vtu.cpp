@@ -126,7 +126,7 @@ std::size_t VtuReader::place_of(const pugi::xml_node& node) const {
 void VtuReader::parse_xml() {
   const auto result = document_.load_buffer(xml_.data(), xml_.size(), pugi::parse_default, pugi::encoding_utf8);
   if (!result) {
-    std::size_t place = static_cast<std::size_t>(std::max<std::ptrdiff_t>(result.offset, 0));
+    std::size_t place = std::max<std::ptrdiff_t>(result.offset, 0);
     if (cut_size_ > 0 && place >= cut_at_) place += cut_size_;
     file_.fail(place, "the XML is damaged ({}); write or copy the file again", result.description());
   }
@@ -156,7 +156,7 @@ std::size_t VtuReader::read_size(const pugi::xml_node& node, const char* key, st
   const std::string text = node.attribute(key).as_string();
   Cursor number(text, file_.name());
   try {
-    return static_cast<std::size_t>(number.text_int(key, 0, max));
+    return number.text_int(key, 0, max);
   } catch (const InputError&) {
     file_.fail(place_of(node), "{} is {}; it has to be a whole number from 0 to {}: write the mesh again", key, quote_excerpt(text), max);
   }
@@ -238,11 +238,11 @@ void VtuReader::read_piece(const Piece& piece) {
                    type == 10 ? 4 : 10);
       std::array<std::int64_t, 10> tags{};
       for (std::int64_t k = 0; k < size; ++k) {
-        const auto node = connectivity[static_cast<std::size_t>(begin + k)];
+        const auto node = connectivity[begin + k];
         if (node < 0 || node >= static_cast<std::int64_t>(piece.points))
           file_.fail(place, "cell {} refers to point {}, but the points run from 0 to {}; write the mesh again", c + 1, node,
                      static_cast<std::int64_t>(piece.points) - 1);
-        tags[static_cast<std::size_t>(k)] = static_cast<std::int64_t>(first_node) + node;
+        tags[k] = static_cast<std::int64_t>(first_node) + node;
       }
       const auto region = std::clamp<std::int64_t>(regions[c], INT32_MIN, INT32_MAX);
       raw_.add_tet(file_, static_cast<std::int64_t>(raw_.tet_tags.size()) + 1, tags.data(), static_cast<int>(size), kVtkOrder,

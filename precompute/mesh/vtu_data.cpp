@@ -63,11 +63,11 @@ class ByteStream {
       if (c == ' ' || c == '\n' || c == '\r' || c == '\t') continue;
       if (c == '=' && k >= 2) {
         ++padding;
-        value[static_cast<std::size_t>(k++)] = 0;
+        value[k++] = 0;
         continue;
       }
       if (kValues[c] < 0 || padding > 0) return false;
-      value[static_cast<std::size_t>(k++)] = kValues[c];
+      value[k++] = kValues[c];
     }
     const unsigned bits = static_cast<unsigned>(value[0]) << 18 | static_cast<unsigned>(value[1]) << 12 |
                           static_cast<unsigned>(value[2]) << 6 | static_cast<unsigned>(value[3]);
@@ -127,7 +127,7 @@ std::string VtuData::decode(const std::string& name, const std::string& format, 
     file_.fail(place,
                "DataArray '{}' lies at offset {} of the appended data, which ends at {}; the file was cut short: write or copy it again",
                name, offset, appended_.size());
-  ByteStream stream(appended ? appended_.substr(static_cast<std::size_t>(offset)) : text, !(appended && encoding_.appended_raw));
+  ByteStream stream(appended ? appended_.substr(offset) : text, !(appended && encoding_.appended_raw));
   const auto cut_short = [&] {
     file_.fail(place, "the data of DataArray '{}' end too early or are not valid base64; the file was cut short or damaged: write it again",
                name);
@@ -183,7 +183,7 @@ std::string VtuData::decode(const std::string& name, const std::string& format, 
   std::size_t at = 0;
   std::string block;
   for (std::size_t b = 0; b < packed.size(); ++b) {
-    const std::size_t want = static_cast<std::size_t>(b + 1 == packed.size() ? last : sizes[0]);
+    const std::size_t want = b + 1 == packed.size() ? last : sizes[0];
     block.clear();
     if (!stream.take(static_cast<std::size_t>(packed[b]), block)) cut_short();
     uLongf got = want;

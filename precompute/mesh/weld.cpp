@@ -39,15 +39,15 @@ bool join_twins(const TetMesh& mesh, const std::vector<char>& used, const Vec3& 
             [](const Entry& a, const Entry& b) { return a.key < b.key || (a.key == b.key && a.node < b.node); });
   bool any = false;
   const auto compare = [&](std::int32_t i, std::int32_t j) {
-    const Vec3& x = mesh.nodes_m[static_cast<std::size_t>(i)];
-    const Vec3& y = mesh.nodes_m[static_cast<std::size_t>(j)];
+    const Vec3& x = mesh.nodes_m[i];
+    const Vec3& y = mesh.nodes_m[j];
     if (i == j || std::hypot(x[0] - y[0], x[1] - y[1], x[2] - y[2]) > tolerance) return;
     twins.join(i, j);
     any = true;
   };
   for (std::size_t n = 0; n < entries.size(); ++n) {
     for (std::size_t m = n + 1; m < entries.size() && entries[m].key == entries[n].key; ++m) compare(entries[n].node, entries[m].node);
-    const Vec3& x = mesh.nodes_m[static_cast<std::size_t>(entries[n].node)];
+    const Vec3& x = mesh.nodes_m[entries[n].node];
     std::array<std::int64_t, 3> from{}, to{};
     for (std::size_t k = 0; k < 3; ++k) {
       from[k] = cell_of(x[k] - tolerance, low[k]);
@@ -68,7 +68,7 @@ bool join_twins(const TetMesh& mesh, const std::vector<char>& used, const Vec3& 
 /// Marks the corners and mid nodes of the pairs of boundary faces that would be one face if twins were one node.
 void mark_cracks(const TetMesh& mesh, const std::vector<std::int32_t>& twin_of, std::vector<char>& marked) {
   // Faces by the nodes themselves first: what is shared already is no crack.
-  std::vector<char> single(static_cast<std::size_t>(4 * mesh.tet_count()), 0);
+  std::vector<char> single(4 * mesh.tet_count(), 0);
   const auto slot = [](const Face& face) { return static_cast<std::size_t>(4 * static_cast<std::int64_t>(face.tet) + face.local); };
   {
     const auto faces = sort_faces(mesh);
@@ -83,11 +83,10 @@ void mark_cracks(const TetMesh& mesh, const std::vector<std::int32_t>& twin_of, 
     if (!same_corners(faces[i - 1], faces[i]) || single[slot(faces[i - 1])] == 0 || single[slot(faces[i])] == 0) continue;
     for (const Face& face : {faces[i - 1], faces[i]}) {
       const auto tet = mesh.tet(face.tet);
-      const auto corners = kFaces[static_cast<std::size_t>(face.local)];
+      const auto corners = kFaces[face.local];
       for (std::size_t k = 0; k < 3; ++k) {
-        marked[static_cast<std::size_t>(tet[static_cast<std::size_t>(corners[k])])] = 1;
-        if (mesh.order == 2)
-          marked[static_cast<std::size_t>(tet[static_cast<std::size_t>(4 + find_edge(corners[k], corners[(k + 1) % 3]))])] = 1;
+        marked[tet[corners[k]]] = 1;
+        if (mesh.order == 2) marked[tet[4 + find_edge(corners[k], corners[(k + 1) % 3])]] = 1;
       }
     }
   }
@@ -105,22 +104,22 @@ void match_mid_nodes(const TetMesh& mesh, const std::string& name, const std::ve
   std::vector<std::size_t> begin(mesh.nodes_m.size() + 1, 0);
   const auto ends = [&](std::int64_t e, std::size_t k) {
     const auto tet = mesh.tet(e);
-    const auto a = corner_of[static_cast<std::size_t>(tet[static_cast<std::size_t>(kEdges[k][0])])];
-    const auto b = corner_of[static_cast<std::size_t>(tet[static_cast<std::size_t>(kEdges[k][1])])];
+    const auto a = corner_of[tet[kEdges[k][0]]];
+    const auto b = corner_of[tet[kEdges[k][1]]];
     return std::pair{std::min(a, b), std::max(a, b)};
   };
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
-    for (std::size_t k = 0; k < 6; ++k) ++begin[static_cast<std::size_t>(ends(e, k).first) + 1];
+    for (std::size_t k = 0; k < 6; ++k) ++begin[ends(e, k).first + 1];
   for (std::size_t i = 1; i < begin.size(); ++i) begin[i] += begin[i - 1];
-  std::vector<MidNode> edges(static_cast<std::size_t>(6 * mesh.tet_count()));
+  std::vector<MidNode> edges(6 * mesh.tet_count());
   std::vector<std::size_t> next(begin.begin(), begin.end() - 1);
   std::vector<std::array<std::int32_t, 2>> edge_of(mesh.nodes_m.size(), {-1, -1});
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
     for (std::size_t k = 0; k < 6; ++k) {
       const auto [low, high] = ends(e, k);
       const auto mid = mesh.tet(e)[4 + k];
-      edges[next[static_cast<std::size_t>(low)]++] = {high, mid, static_cast<std::int32_t>(e)};
-      auto& known = edge_of[static_cast<std::size_t>(mid)];
+      edges[next[low]++] = {high, mid, static_cast<std::int32_t>(e)};
+      auto& known = edge_of[mid];
       if (known[0] >= 0 && known != std::array{low, high})
         throw InputError(fmt::format(
             "{}: node {} is the mid node of two different edges (one of them in element {}); write the quadratic mesh again, in the "
@@ -130,7 +129,7 @@ void match_mid_nodes(const TetMesh& mesh, const std::string& name, const std::ve
     }
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
     for (std::size_t k = 0; k < 4; ++k)
-      if (edge_of[static_cast<std::size_t>(mesh.tet(e)[k])][0] >= 0)
+      if (edge_of[mesh.tet(e)[k]][0] >= 0)
         throw InputError(fmt::format(
             "{}: node {} is a corner of element {} and the mid node of another; write the quadratic mesh again, in the node order of "
             "its format",
@@ -142,12 +141,12 @@ void match_mid_nodes(const TetMesh& mesh, const std::string& name, const std::ve
     for (auto edge = first; edge != last; ++edge) {
       if (edge == first || edge->high != (edge - 1)->high || edge->mid == (edge - 1)->mid) continue;
       const auto before = edge - 1;
-      if (twin_of[static_cast<std::size_t>(edge->mid)] != twin_of[static_cast<std::size_t>(before->mid)])
+      if (twin_of[edge->mid] != twin_of[before->mid])
         throw InputError(fmt::format(
             "{}: elements {} and {} share the edge of nodes {} and {}, but have different mid nodes ({} and {}) on it; write the "
             "quadratic mesh again with one node per edge",
             name, before->tet + 1, edge->tet + 1, low + 1, edge->high + 1, before->mid + 1, edge->mid + 1));
-      marked[static_cast<std::size_t>(edge->mid)] = marked[static_cast<std::size_t>(before->mid)] = 1;
+      marked[edge->mid] = marked[before->mid] = 1;
     }
   }
 }
@@ -158,8 +157,7 @@ double find_shortest_edge(const TetMesh& mesh) {
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e) {
     const auto tet = mesh.tet(e);
     for (const auto& [i, j] : kEdges) {
-      const Vec3 &a = mesh.nodes_m[static_cast<std::size_t>(tet[static_cast<std::size_t>(i)])],
-                 &b = mesh.nodes_m[static_cast<std::size_t>(tet[static_cast<std::size_t>(j)])];
+      const Vec3 &a = mesh.nodes_m[tet[i]], &b = mesh.nodes_m[tet[j]];
       shortest = std::min(shortest, std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]));
     }
   }
@@ -171,7 +169,7 @@ double find_shortest_edge(const TetMesh& mesh) {
 std::vector<std::int32_t> weld_cracks(TetMesh& mesh, const std::string& name, CheckReport& report) {
   const std::size_t count = mesh.nodes_m.size();
   std::vector<char> used(count, 0);
-  for (const auto node : mesh.tets) used[static_cast<std::size_t>(node)] = 1;
+  for (const auto node : mesh.tets) used[node] = 1;
   Vec3 low{HUGE_VAL, HUGE_VAL, HUGE_VAL}, high{-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
   for (std::size_t i = 0; i < count; ++i)
     for (std::size_t k = 0; used[i] != 0 && k < 3; ++k) {
@@ -202,11 +200,10 @@ std::vector<std::int32_t> weld_cracks(TetMesh& mesh, const std::string& name, Ch
     const auto tet = mesh.tet(e);
     for (std::size_t i = 0; i < tet.size(); ++i)
       for (std::size_t j = 0; j < i; ++j)
-        if (twin_of[static_cast<std::size_t>(tet[i])] == twin_of[static_cast<std::size_t>(tet[j])])
-          barred[static_cast<std::size_t>(twin_of[static_cast<std::size_t>(tet[i])])] = 1;
+        if (twin_of[tet[i]] == twin_of[tet[j]]) barred[twin_of[tet[i]]] = 1;
   }
   for (std::size_t i = 0; i < count; ++i)
-    if (barred[static_cast<std::size_t>(twins.find(identity[i]))] != 0) twin_of[i] = identity[i];
+    if (barred[twins.find(identity[i])] != 0) twin_of[i] = identity[i];
   std::vector<char> marked(count, 0);
   mark_cracks(mesh, twin_of, marked);
   // The first marked twin stands for the others.
@@ -214,7 +211,7 @@ std::vector<std::int32_t> weld_cracks(TetMesh& mesh, const std::string& name, Ch
     std::vector<std::int32_t> first(count, -1), stand(identity);
     for (std::size_t i = 0; i < count; ++i) {
       if (marked[i] == 0) continue;
-      auto& chosen = first[static_cast<std::size_t>(twin_of[i])];
+      auto& chosen = first[twin_of[i]];
       if (chosen < 0) chosen = identity[i];
       stand[i] = chosen;
     }
@@ -227,10 +224,9 @@ std::vector<std::int32_t> weld_cracks(TetMesh& mesh, const std::string& name, Ch
   }
   for (std::size_t i = 0; i < count; ++i) {
     report.welded += stand[i] != identity[i];
-    report.touching_nodes +=
-        used[i] != 0 && stand[i] == identity[i] && twin_of[i] != identity[i] && stand[static_cast<std::size_t>(twin_of[i])] != stand[i];
+    report.touching_nodes += used[i] != 0 && stand[i] == identity[i] && twin_of[i] != identity[i] && stand[twin_of[i]] != stand[i];
   }
-  for (auto& node : mesh.tets) node = stand[static_cast<std::size_t>(node)];
+  for (auto& node : mesh.tets) node = stand[node];
   return stand;
 }
 

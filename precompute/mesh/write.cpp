@@ -56,7 +56,7 @@ std::vector<std::int32_t> find_region_nodes(const TetMesh& mesh, const std::vect
   std::vector<char> is_in(mesh.nodes_m.size(), 0);
   for (std::size_t e = 0; e < region_of.size(); ++e)
     if (region_of[e] == region)
-      for (const std::int32_t node : mesh.tet(static_cast<std::int64_t>(e))) is_in[static_cast<std::size_t>(node)] = 1;
+      for (const std::int32_t node : mesh.tet(static_cast<std::int64_t>(e))) is_in[node] = 1;
   std::vector<std::int32_t> nodes;
   for (std::size_t i = 0; i < is_in.size(); ++i)
     if (is_in[i] != 0) nodes.push_back(static_cast<std::int32_t>(i));
@@ -83,7 +83,7 @@ void write_doubt(const TetMesh& mesh, bool binary, Output& out) {
 std::string make_gmsh(const TetMesh& mesh, GmshEncoding encoding) {
   const bool binary = encoding == GmshEncoding::kBinary;
   std::vector<std::int32_t> region_of(mesh.regions);
-  region_of.resize(static_cast<std::size_t>(mesh.tet_count()), 0);
+  region_of.resize(mesh.tet_count(), 0);
   std::vector<std::int32_t> regions(region_of);
   std::sort(regions.begin(), regions.end());
   regions.erase(std::unique(regions.begin(), regions.end()), regions.end());
@@ -135,7 +135,7 @@ std::string make_gmsh(const TetMesh& mesh, GmshEncoding encoding) {
   out.end_line();
   for (const std::size_t s : filled) {
     out.int32(static_cast<std::int32_t>(s + 1));
-    for (const double value : mesh.nodes_m[static_cast<std::size_t>(sets[s].second->front())]) out.real(value);
+    for (const double value : mesh.nodes_m[sets[s].second->front()]) out.real(value);
     out.size(1);
     out.int32(static_cast<std::int32_t>(s + 1));
     out.end_line();
@@ -163,7 +163,7 @@ std::string make_gmsh(const TetMesh& mesh, GmshEncoding encoding) {
     for (const double value : x) out.real(value);
     out.end_line();
   }
-  std::size_t elements = static_cast<std::size_t>(mesh.tet_count());
+  std::size_t elements = mesh.tet_count();
   for (const std::size_t s : filled) elements += sets[s].second->size();
   out.text(binary ? "\n$EndNodes\n$Elements\n" : "$EndNodes\n$Elements\n");
   std::size_t tag = 0;
@@ -182,7 +182,7 @@ std::string make_gmsh(const TetMesh& mesh, GmshEncoding encoding) {
     for (std::size_t e = run_begin[b]; e < run_begin[b + 1]; ++e) {
       out.size(++tag);
       const auto tet = mesh.tet(static_cast<std::int64_t>(e));
-      for (std::size_t k = 0; k < tet.size(); ++k) out.size(static_cast<std::size_t>(tet[static_cast<std::size_t>(kGmshOrder[k])]) + 1);
+      for (std::size_t k = 0; k < tet.size(); ++k) out.size(static_cast<std::size_t>(tet[kGmshOrder[k]]) + 1);
       out.end_line();
     }
   }

@@ -67,7 +67,7 @@ class Judge {
   }
 
  private:
-  const Vec3& at(std::int32_t v) const { return surface_.points[static_cast<std::size_t>(v)]; }
+  const Vec3& at(std::int32_t v) const { return surface_.points[v]; }
   Vec3 calc_middle(const Bend& edge) const { return 0.5 * (at(edge.ends[0]) + at(edge.ends[1])); }
   std::int32_t pane_of(const Bend& edge, int side) const { return out_.pane[edge.faces[side]]; }
   const Outline& outline_of(std::int32_t pane) const { return outlines_[place_[pane]]; }
@@ -202,7 +202,7 @@ class Judge {
       }
       return best;
     };
-    const auto own = static_cast<std::size_t>(std::find(outline.edges.begin(), outline.edges.end(), entry) - outline.edges.begin());
+    const std::size_t own = std::find(outline.edges.begin(), outline.edges.end(), entry) - outline.edges.begin();
     if (outline.sides == 4) return find_nearest((outline.side[own] + 2) % 4);
     if (outline.sides == 3) {  // one side on the rim: from one of the others to the third
       std::array<bool, 3> rim{};
@@ -375,7 +375,7 @@ Bends find_bends(const TriangleSurface& surface, double sharp_angle_deg) { retur
 bool is_tip(const TriangleSurface& surface, const Bends& bends, std::int32_t v, const Vec3& normal) {
   constexpr double kMin = 0.05;     // 3 degrees
   constexpr double kFurther = 0.4;  // of the slope: on a ball the next edge turns by twice of it
-  const auto at = [&](std::int32_t n) -> const Vec3& { return surface.points[static_cast<std::size_t>(n)]; };
+  const auto at = [&](std::int32_t n) -> const Vec3& { return surface.points[n]; };
   double all = 0;
   std::map<std::int32_t, int> panes;
   for (const std::int32_t corner : bends.corners_at[v]) {

@@ -35,7 +35,7 @@ struct Crossing {
 void collect_crossings(const TriangleSurface& surface, const DistanceField& field, std::vector<std::vector<Crossing>>& rows) {
   for (const Triangle& t : surface.triangles) {
     std::array<const Vec3*, 3> p;
-    for (int c = 0; c < 3; ++c) p[c] = &surface.points[static_cast<std::size_t>(t[c])];
+    for (int c = 0; c < 3; ++c) p[c] = &surface.points[t[c]];
     const auto range = [&](int axis) {
       const auto [low, high] = std::minmax({(*p[0])[axis], (*p[1])[axis], (*p[2])[axis]});
       const auto first = static_cast<std::int32_t>(std::floor((low - field.origin[axis]) / field.voxel_m));

@@ -109,9 +109,7 @@ class Extruder {
  private:
   std::size_t count() const { return skin_.surface.points.size(); }
   double level(std::size_t v, double part) const { return wall_.levels_m[v][0] + part * (wall_.levels_m[v][1] - wall_.levels_m[v][0]); }
-  Vec3 find_at(std::int32_t v, double part) const {
-    return skin_.surface.points[v] + level(static_cast<std::size_t>(v), part) * ways_[static_cast<std::size_t>(v)];
-  }
+  Vec3 find_at(std::int32_t v, double part) const { return skin_.surface.points[v] + level(static_cast<std::size_t>(v), part) * ways_[v]; }
   double calc_volume(const std::array<Vec3, 4>& x) const { return dot(cross(x[1] - x[0], x[2] - x[0]), x[3] - x[0]); }
 
   /// The tetrahedra of the prism over a triangle, as its points in ascending order and whether each corner is high.
@@ -182,7 +180,7 @@ class Extruder {
       if (n == kSmoothings) {
         const Vec3 middle =
             (1.0 / 3) * (skin_.surface.points[(*first)[0]] + skin_.surface.points[(*first)[1]] + skin_.surface.points[(*first)[2]]);
-        const auto v = static_cast<std::size_t>((*first)[0]);
+        const std::size_t v = (*first)[0];
         throw WallError(fmt::format("is too thick for the bend of the surface at {}: {:.3g} mm fold over there{}", format_place(middle),
                                     1000 * (wall_.levels_m[v][1] - wall_.levels_m[v][0]),
                                     faults > 1 ? fmt::format(", and at {} more triangles", faults - 1) : ""));

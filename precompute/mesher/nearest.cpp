@@ -18,7 +18,7 @@ struct NearestPoint::Tree {
 
 NearestPoint::NearestPoint(const TriangleSurface& surface) : tree_(std::make_unique<Tree>()) {
   const auto point = [&](std::int32_t v) {
-    const Vec3& p = surface.points[static_cast<std::size_t>(v)];
+    const Vec3& p = surface.points[v];
     return DoubleKernel::Point_3(p[0], p[1], p[2]);
   };
   for (std::size_t f = 0; f < surface.triangles.size(); ++f) {
@@ -41,12 +41,12 @@ Vec3 NearestPoint::find(const Vec3& p) const {
 
 std::pair<Vec3, std::int32_t> NearestPoint::find_on(const Vec3& p) const {
   const auto [q, triangle] = tree_->tree.closest_point_and_primitive({p[0], p[1], p[2]});
-  return {{q.x(), q.y(), q.z()}, tree_->number[static_cast<std::size_t>(triangle - tree_->triangles.cbegin())]};
+  return {{q.x(), q.y(), q.z()}, tree_->number[triangle - tree_->triangles.cbegin()]};
 }
 
 std::optional<std::pair<double, std::int32_t>> NearestPoint::find_hit(const Vec3& from, const Vec3& way, std::int32_t own) const {
   const DoubleKernel::Ray_3 ray(DoubleKernel::Point_3(from[0], from[1], from[2]), DoubleKernel::Vector_3(way[0], way[1], way[2]));
-  const auto number_of = [&](auto triangle) { return tree_->number[static_cast<std::size_t>(triangle - tree_->triangles.cbegin())]; };
+  const auto number_of = [&](auto triangle) { return tree_->number[triangle - tree_->triangles.cbegin()]; };
   const auto hit = tree_->tree.first_intersected_primitive(ray, [&](auto triangle) { return number_of(triangle) == own; });
   if (!hit) return std::nullopt;
   const DoubleKernel::Triangle_3& t = **hit;

@@ -98,7 +98,7 @@ std::int64_t part_pinched_nodes(mesh::TetMesh& mesh, std::int64_t components, co
     for (std::int32_t e = 0; e < mesh.tet_count(); ++e)
       for (const std::int32_t v : mesh.tet(e)) around[v].push_back(e);
     std::vector<char> touched(mesh.nodes_m.size(), 0);
-    std::vector<char> remove(static_cast<std::size_t>(mesh.tet_count()), 0);
+    std::vector<char> remove(mesh.tet_count(), 0);
     for (const auto& [v, fans] : pinched) {
       // Fans of neighbours change with each other: they wait for the next pass.
       bool wait = touched[v];

@@ -109,9 +109,9 @@ class Gltf {
     const std::size_t corners = indices ? indices->count() : points;
     if (kind == 0 && corners % 3 != 0)
       primitive.fail("", fmt::format("mesh {} has {} corners, which are no whole number of triangles; export it again", m, corners));
-    if (corners / (kind == 0 ? 3 : 1) + soup_.counts.size() > static_cast<std::size_t>(kMaxTriangles)) refuse_size();
+    if (corners / (kind == 0 ? 3 : 1) + std::ssize(soup_.counts) > kMaxTriangles) refuse_size();
     const auto get = [&](std::size_t i) {
-      const auto index = static_cast<std::size_t>(indices ? indices->get(i, 0) : static_cast<double>(i));
+      const std::size_t index = indices ? indices->get(i, 0) : static_cast<double>(i);
       if (index >= points) primitive.fail("indices", fmt::format("mesh {} has {} points, but its index {} is {}", m, points, i, index));
       return first + static_cast<std::int32_t>(index);
     };

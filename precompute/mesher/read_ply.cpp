@@ -197,7 +197,7 @@ void PlyReader::read_text(const Element& element) {
     for (const Property& property : element.properties) {
       if (property.count_type == nullptr) {
         const std::string_view word = take();
-        if (property.axis >= 0) soup_.points.back()[static_cast<std::size_t>(property.axis)] = text_.read_coordinate(word);
+        if (property.axis >= 0) soup_.points.back()[property.axis] = text_.read_coordinate(word);
         continue;
       }
       const std::string_view word = take();
@@ -221,7 +221,7 @@ void PlyReader::read_text(const Element& element) {
 }
 
 double PlyReader::read_binary_number(const Type& type, const char* what) {
-  const auto size = static_cast<std::size_t>(type.bytes);
+  const std::size_t size = type.bytes;
   if (bytes_.size() - at_ < size) refuse_byte(at_, fmt::format("the file ends where {} should be; it is cut off, export it again", what));
   std::uint64_t bits = 0;
   for (std::size_t b = 0; b < size; ++b) {
@@ -243,7 +243,7 @@ void PlyReader::read_binary(const Element& element) {
     refuse_byte(
         at_, fmt::format("the header promises {} {}, but only {} bytes are left for them; the file is cut off or damaged, export it again",
                          element.count, quote_excerpt(element.name), bytes_.size() - at_));
-  if (element.is_vertex()) soup_.points.reserve(static_cast<std::size_t>(element.count));
+  if (element.is_vertex()) soup_.points.reserve(element.count);
   for (std::int64_t n = 0; n < element.count; ++n) {
     if (element.is_vertex()) soup_.points.emplace_back();
     for (const Property& property : element.properties) {
@@ -254,11 +254,11 @@ void PlyReader::read_binary(const Element& element) {
         if (!(std::abs(value) <= kLargestCoordinate))
           refuse_byte(place,
                       fmt::format("the coordinate {} of vertex {} must be a finite number below 1e30; export the surface again", value, n));
-        soup_.points.back()[static_cast<std::size_t>(property.axis)] = value;
+        soup_.points.back()[property.axis] = value;
         continue;
       }
       const std::int64_t length = read_binary_whole(*property.count_type, "the length of a list");
-      const auto size = static_cast<std::size_t>(property.type->bytes);
+      const std::size_t size = property.type->bytes;
       if (length < 0 || static_cast<std::uint64_t>(length) > (bytes_.size() - at_) / size)
         refuse_byte(place, fmt::format("a list of {} values where {} bytes are left; the file is cut off or damaged, export it again",
                                        length, bytes_.size() - at_));

@@ -50,9 +50,9 @@ PolygonSoup parse_binary(std::string_view bytes, const std::string& name) {
         count, bytes.size()));
   if (count > kMaxPoints / 3) throw InputError(fmt::format("{}: {} triangles are too many; reduce the surface first", name, count));
   PolygonSoup soup;
-  soup.points.reserve(3 * static_cast<std::size_t>(count));
+  soup.points.reserve(3 * count);
   soup.counts.reserve(count);
-  soup.corners.reserve(3 * static_cast<std::size_t>(count));
+  soup.corners.reserve(3 * count);
   for (std::uint32_t t = 0; t < count; ++t) {
     const std::size_t corners = kHeader + kRecord * t + 12;
     for (std::size_t n = 0; n < 9; ++n) {

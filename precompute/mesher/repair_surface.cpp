@@ -191,13 +191,12 @@ std::vector<Triangle> fill_loop(const Polyline& polygon) {
 bool has_opening(const TriangleSurface& surface, const std::vector<std::vector<std::int32_t>>& loops) {
   const double diagonal = calc_box(surface.points).diagonal();
   const auto calc_area_vector = [](const std::vector<Vec3>& points, const Triangle& t) {
-    return cross(points[static_cast<std::size_t>(t[1])] - points[static_cast<std::size_t>(t[0])],
-                 points[static_cast<std::size_t>(t[2])] - points[static_cast<std::size_t>(t[0])]);
+    return cross(points[t[1]] - points[t[0]], points[t[2]] - points[t[0]]);
   };
   const EdgeFaces edges = find_edge_faces(surface.triangles);
   return std::any_of(loops.begin(), loops.end(), [&](const std::vector<std::int32_t>& loop) {
     Polyline polygon;
-    for (const std::int32_t v : loop) polygon.push_back(surface.points[static_cast<std::size_t>(v)]);
+    for (const std::int32_t v : loop) polygon.push_back(surface.points[v]);
     if (loop.size() < 3) return false;
     const std::vector<Triangle> fill = fill_loop(polygon);
     if (2 * std::sqrt(calc_area({polygon, fill}) / std::numbers::pi) < kSmallestOpening * diagonal) return false;
@@ -207,11 +206,11 @@ bool has_opening(const TriangleSurface& surface, const std::vector<std::vector<s
       for (int c = 0; c < 3; ++c) {
         const std::int32_t i = t[c], j = t[(c + 1) % 3];
         if ((i + 1) % count != j && (j + 1) % count != i) continue;  // inside
-        const auto found = edges.find(make_edge(loop[static_cast<std::size_t>(i)], loop[static_cast<std::size_t>(j)]));
+        const auto found = edges.find(make_edge(loop[i], loop[j]));
         if (found == edges.end() || found->second.size() != 1) continue;
         const Vec3 own = calc_area_vector(polygon, t);
-        const Vec3 other = calc_area_vector(surface.points, surface.triangles[static_cast<std::size_t>(std::abs(found->second[0]) - 1)]);
-        const double edge = norm(polygon[static_cast<std::size_t>(j)] - polygon[static_cast<std::size_t>(i)]);
+        const Vec3 other = calc_area_vector(surface.points, surface.triangles[std::abs(found->second[0]) - 1]);
+        const double edge = norm(polygon[j] - polygon[i]);
         turn += edge * std::atan2(norm(cross(own, other)), dot(own, other)) * 180 / std::numbers::pi;
         length += edge;
       }
@@ -228,7 +227,7 @@ bool fill_loops(TriangleSurface& surface, const std::vector<std::vector<std::int
   std::vector<Triangle> fresh;
   for (const auto& loop : loops) {
     Polyline polygon;
-    for (const std::int32_t v : loop) polygon.push_back(surface.points[static_cast<std::size_t>(v)]);
+    for (const std::int32_t v : loop) polygon.push_back(surface.points[v]);
     if (loop.size() == 2) continue;  // an edge there and back closes itself
     const std::vector<Triangle> fill = fill_loop(polygon);
     const double area = calc_area({polygon, fill});
@@ -239,8 +238,7 @@ bool fill_loops(TriangleSurface& surface, const std::vector<std::vector<std::int
       holes.largest_across_m = calc_across(polygon);
       holes.largest_part = 2 * std::sqrt(area / std::numbers::pi) / diagonal;
     }
-    for (const Triangle& t : fill)
-      fresh.push_back({loop[static_cast<std::size_t>(t[0])], loop[static_cast<std::size_t>(t[1])], loop[static_cast<std::size_t>(t[2])]});
+    for (const Triangle& t : fill) fresh.push_back({loop[t[0]], loop[t[1]], loop[t[2]]});
   }
   if (holes.largest_part > close_holes.value_or(kLargestHole)) return false;
   if (!close_holes && holes.area_m2 > kLargestHolesTogether * (holes.surface_m2 + holes.area_m2)) return false;
@@ -252,7 +250,7 @@ bool fill_loops(TriangleSurface& surface, const std::vector<std::vector<std::int
 void orient_outward(TriangleSurface& surface, SurfaceReport& report) {
   std::int32_t count = 0;
   const auto patch = find_patches(find_edge_faces(surface.triangles), surface.triangles.size(), true, count);
-  std::vector<TriangleSurface> parts(static_cast<std::size_t>(count));
+  std::vector<TriangleSurface> parts(count);
   for (std::size_t f = 0; f < surface.triangles.size(); ++f) parts[patch[f]].triangles.push_back(surface.triangles[f]);
   for (auto& part : parts) {
     // Keep the parts' own points only, so that a part costs what it has.
@@ -260,7 +258,7 @@ void orient_outward(TriangleSurface& surface, SurfaceReport& report) {
     for (Triangle& t : part.triangles)
       for (std::int32_t& v : t) {
         const auto [found, fresh] = number.try_emplace(v, static_cast<std::int32_t>(part.points.size()));
-        if (fresh) part.points.push_back(surface.points[static_cast<std::size_t>(v)]);
+        if (fresh) part.points.push_back(surface.points[v]);
         v = found->second;
       }
   }
@@ -353,7 +351,7 @@ std::optional<Sheet> find_sheet(const TriangleSurface& surface, const SurfaceOpt
     }
   }
   const auto describe_place = [&](const Edge& e) {
-    const Vec3 p = 0.5 * (sheet.surface.points[static_cast<std::size_t>(e[0])] + sheet.surface.points[static_cast<std::size_t>(e[1])]);
+    const Vec3 p = 0.5 * (sheet.surface.points[e[0]] + sheet.surface.points[e[1]]);
     return fmt::format("at ({:.4g}, {:.4g}, {:.4g}) in the file's units", p[0], p[1], p[2]);
   };
   std::optional<Edge> branch, turn;  // the first of each

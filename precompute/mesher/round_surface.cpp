@@ -46,7 +46,7 @@ struct RoundSurface::Patches {
     find_edge_curves(sharp_angle_deg);
   }
 
-  const Vec3& at(std::int32_t v) const { return surface.points[static_cast<std::size_t>(v)]; }
+  const Vec3& at(std::int32_t v) const { return surface.points[v]; }
 
   std::int32_t get_corner(std::int32_t f, std::int32_t v) const {
     const Triangle& t = surface.triangles[f];
@@ -332,7 +332,7 @@ TriangleSurface RoundSurface::cut(int pieces) {
     first_of.push_back(static_cast<std::int32_t>(out.points.size()));
     for (int n = 1; n < pieces; ++n) out.points.push_back(patches_->calc_on_edge(e, static_cast<double>(n) / pieces));
   }
-  std::vector<std::vector<std::int32_t>> row(static_cast<std::size_t>(pieces) + 1);
+  std::vector<std::vector<std::int32_t>> row(pieces + 1);
   for (std::size_t f = 0; f < facets_->triangles.size(); ++f) {
     const Triangle& t = facets_->triangles[f];
     const auto on_edge = [&](int side, int from, int to, int n) {  // the n-th point from corner `from` to corner `to`
@@ -341,7 +341,7 @@ TriangleSurface RoundSurface::cut(int pieces) {
       return first_of[patches_->bends.edges_of[f][side]] + (t[from] < t[to] ? n : pieces - n) - 1;
     };
     for (int j = 0; j <= pieces; ++j) {  // towards corner 2
-      auto& points = row[static_cast<std::size_t>(j)];
+      auto& points = row[j];
       points.clear();
       for (int i = 0; i + j <= pieces; ++i) {  // towards corner 1
         const int k = pieces - i - j;

@@ -50,7 +50,7 @@ std::vector<Border> find_borders(const TriangleSurface& surface) {
       const Triangle& t = surface.triangles[f];
       const std::int32_t a = t[c], b = t[(c + 1) % 3];
       if (a == b || count.at(make_edge(a, b)) != 1) continue;
-      const double length = norm(surface.points[static_cast<std::size_t>(b)] - surface.points[static_cast<std::size_t>(a)]);
+      const double length = norm(surface.points[b] - surface.points[a]);
       if (length > 0.0) borders.push_back({static_cast<std::int32_t>(f), c, a, b, length});
     }
   return borders;
@@ -64,7 +64,7 @@ class BorderGrid {
     for (std::size_t b = 0; b < borders.size(); ++b) {
       const int level = std::max(std::ilogb(borders[b].length), std::ilogb(4.0 * reach)) + 1;
       if (std::find(levels_.begin(), levels_.end(), level) == levels_.end()) levels_.push_back(level);
-      const Vec3 &p = points[static_cast<std::size_t>(borders[b].from)], &q = points[static_cast<std::size_t>(borders[b].to)];
+      const Vec3 &p = points[borders[b].from], &q = points[borders[b].to];
       for_each_cell(level, p, q, [&](const Cell& cell) { cells_[cell].push_back(static_cast<std::int32_t>(b)); });
     }
   }
@@ -140,8 +140,8 @@ class SeamJoiner {
   }
 
  private:
-  const Vec3& at(std::int32_t v) const { return surface_.points[static_cast<std::size_t>(v)]; }
-  const Border& border(std::int32_t b) const { return borders_[static_cast<std::size_t>(b)]; }
+  const Vec3& at(std::int32_t v) const { return surface_.points[v]; }
+  const Border& border(std::int32_t b) const { return borders_[b]; }
 
   /// Tolerance for points on this border.
   double find_reach(const Border& b) const { return std::min(tolerance_, kPartOfEdge * b.length); }
@@ -176,8 +176,8 @@ class SeamJoiner {
   bool is_folded(const Border& a, const Border& b) const {
     const Vec3 along = (1.0 / a.length) * (at(a.to) - at(a.from));
     const auto find_inward = [&](const Border& x) {
-      const Triangle& t = surface_.triangles[static_cast<std::size_t>(x.triangle)];
-      const Vec3 way = at(t[static_cast<std::size_t>((x.side + 2) % 3)]) - at(x.from);
+      const Triangle& t = surface_.triangles[x.triangle];
+      const Vec3 way = at(t[(x.side + 2) % 3]) - at(x.from);
       return way - dot(way, along) * along;
     };
     const Vec3 p = find_inward(a), q = find_inward(b);
@@ -279,7 +279,7 @@ void weld(TriangleSurface& surface, double tolerance) {
           const auto found = cells.find({cell[0] + x, cell[1] + y, cell[2] + z});
           if (found == cells.end()) continue;
           for (const std::int32_t v : found->second)
-            if (norm(kept[static_cast<std::size_t>(v)] - p) <= tolerance) return v;
+            if (norm(kept[v] - p) <= tolerance) return v;
         }
     const auto fresh = static_cast<std::int32_t>(kept.size());
     kept.push_back(p);
@@ -288,8 +288,8 @@ void weld(TriangleSurface& surface, double tolerance) {
   };
   for (Triangle& t : surface.triangles)
     for (std::int32_t& v : t) {
-      auto& n = number[static_cast<std::size_t>(v)];
-      if (n < 0) n = join(surface.points[static_cast<std::size_t>(v)]);
+      auto& n = number[v];
+      if (n < 0) n = join(surface.points[v]);
       v = n;
     }
   surface.points = std::move(kept);
@@ -297,10 +297,10 @@ void weld(TriangleSurface& surface, double tolerance) {
 
 std::int64_t drop_unused_points(TriangleSurface& surface) {
   const base::UsedPoints used = base::find_used_points(surface.triangles, surface.points.size());
-  for (std::size_t v = 0; v < used.points.size(); ++v) surface.points[v] = surface.points[static_cast<std::size_t>(used.points[v])];
+  for (std::size_t v = 0; v < used.points.size(); ++v) surface.points[v] = surface.points[used.points[v]];
   surface.points.resize(used.points.size());
   for (Triangle& t : surface.triangles)
-    for (std::int32_t& v : t) v = used.number[static_cast<std::size_t>(v)];
+    for (std::int32_t& v : t) v = used.number[v];
   return static_cast<std::int64_t>(used.number.size() - used.points.size());
 }
 

@@ -72,7 +72,7 @@ Skin make_room(const Skin& start, const SkinPlaces& places, const std::vector<Ve
     double longest = 0, least = HUGE_VAL, most = 0;
     for (int c = 0; c < 3; ++c) longest = std::max(longest, norm(q[(c + 1) % 3] - q[c]));
     for (const double level : levels_m) {
-      const auto at = [&](int c) { return q[c] + level * ways[static_cast<std::size_t>(t[c])]; };
+      const auto at = [&](int c) { return q[c] + level * ways[t[c]]; };
       const double area = dot(cross(at(1) - at(0), at(2) - at(0)), normal);
       least = std::min(least, area);
       most = std::max(most, std::abs(area));

@@ -99,7 +99,7 @@ class Stuffer {
   mesh::TetMesh run() {
     warp();
     lattice_.for_each_point([&](const Cell& p) { add_tets_at(p); });
-    out_.regions.assign(static_cast<std::size_t>(out_.tet_count()), 0);
+    out_.regions.assign(out_.tet_count(), 0);
     return std::move(out_);
   }
 

@@ -143,10 +143,8 @@ PolygonSoup parse_off(std::string_view bytes, const std::string& name) {
   std::int64_t counts[2] = {0, 0};
   for (int n = 0; n < 2; ++n) {
     const char* what = n == 0 ? "vertices" : "faces";
-    const auto count = read_whole(words[static_cast<std::size_t>(n)]);
-    if (!count)
-      text.refuse("found {} where the number of {} should be; export the surface again", quote_excerpt(words[static_cast<std::size_t>(n)]),
-                  what);
+    const auto count = read_whole(words[n]);
+    if (!count) text.refuse("found {} where the number of {} should be; export the surface again", quote_excerpt(words[n]), what);
     // A vertex takes six bytes at least ("0 0 0\n"), a face two.
     const std::int64_t max = std::min(static_cast<std::int64_t>(bytes.size()) / (n == 0 ? 5 : 2) + 1, kMaxPoints);
     if (*count < 0 || *count > max)
@@ -154,7 +152,7 @@ PolygonSoup parse_off(std::string_view bytes, const std::string& name) {
                   bytes.size());
     counts[n] = *count;
   }
-  soup.points.reserve(static_cast<std::size_t>(counts[0]));
+  soup.points.reserve(counts[0]);
   for (std::int64_t v = 0; v < counts[0]; ++v) {
     if (!text.next_filled(words)) text.refuse("the file ends after {} of {} vertices; it is cut off, export it again", v, counts[0]);
     if (words.size() < 3) text.refuse("a vertex has fewer than three coordinates; export the surface again, one vertex to a line");

@@ -42,7 +42,7 @@ Triangle get_face(const mesh::TetMesh& mesh, std::int64_t e, int face) {
 
 /// The element at the other side of each face of each element; -1 at the boundary.
 std::vector<std::array<std::int32_t, 4>> find_neighbours(const mesh::TetMesh& mesh) {
-  std::vector<std::array<std::int32_t, 4>> neighbours(static_cast<std::size_t>(mesh.tet_count()), {-1, -1, -1, -1});
+  std::vector<std::array<std::int32_t, 4>> neighbours(mesh.tet_count(), {-1, -1, -1, -1});
   // Faces in buckets by their lowest node; few share one, so twins are found by looking through the bucket.
   struct Entry {
     std::int32_t middle, high, element;
@@ -50,14 +50,14 @@ std::vector<std::array<std::int32_t, 4>> find_neighbours(const mesh::TetMesh& me
   };
   std::vector<std::size_t> begin(mesh.nodes_m.size() + 1, 0);
   for (std::int32_t e = 0; e < mesh.tet_count(); ++e)
-    for (int f = 0; f < 4; ++f) ++begin[static_cast<std::size_t>(sorted(get_face(mesh, e, f))[0]) + 1];
+    for (int f = 0; f < 4; ++f) ++begin[sorted(get_face(mesh, e, f))[0] + 1];
   for (std::size_t v = 1; v < begin.size(); ++v) begin[v] += begin[v - 1];
   std::vector<Entry> entries(begin.back());
   std::vector<std::size_t> end(begin.begin(), begin.end() - 1);
   for (std::int32_t e = 0; e < mesh.tet_count(); ++e)
     for (int f = 0; f < 4; ++f) {
       const Triangle key = sorted(get_face(mesh, e, f));
-      const std::size_t bucket = static_cast<std::size_t>(key[0]);
+      const std::size_t bucket = key[0];
       std::size_t n = begin[bucket];
       while (n < end[bucket] && (entries[n].middle != key[1] || entries[n].high != key[2])) ++n;
       if (n == end[bucket]) {
@@ -156,7 +156,7 @@ std::vector<char> find_crumbs(const std::vector<std::array<std::int32_t, 4>>& ne
   if (!any) return remove;
   std::sort(sizes.begin(), sizes.end());
   std::vector<char> keep(sizes.size(), 0);
-  for (std::int64_t c = 0; c < components; ++c) keep[sizes[static_cast<std::size_t>(c)].second] = 1;
+  for (std::int64_t c = 0; c < components; ++c) keep[sizes[c].second] = 1;
   for (std::size_t e = 0; e < remove.size(); ++e) remove[e] = keep[piece[e]] ? 0 : 1;
   return remove;
 }
@@ -239,7 +239,7 @@ std::int64_t count_pinches(const std::vector<Triangle>& faces) {
         if (a != b) leader[a] = b, --groups;
       }
   }
-  std::vector<char> used(static_cast<std::size_t>(top), 0);
+  std::vector<char> used(top, 0);
   for (const Triangle& face : faces)
     for (const std::int32_t v : face) used[v] = 1;
   return pinches + groups - std::count(used.begin(), used.end(), 1);
@@ -247,7 +247,7 @@ std::int64_t count_pinches(const std::vector<Triangle>& faces) {
 
 std::int64_t count_edges(const mesh::TetMesh& mesh) {
   std::vector<Edge> edges;
-  edges.reserve(static_cast<std::size_t>(mesh.tet_count()) * 6);
+  edges.reserve(mesh.tet_count() * 6);
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
     for (const auto& [a, b] : mesh::kEdges) edges.push_back(sorted(Edge{mesh.tet(e)[a], mesh.tet(e)[b]}));
   std::sort(edges.begin(), edges.end());
@@ -258,7 +258,7 @@ void drop_elements(mesh::TetMesh& mesh, const std::vector<char>& remove) {
   std::vector<std::int32_t> number(mesh.nodes_m.size(), -1), tets;
   std::vector<Vec3> nodes;
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e) {
-    if (remove[static_cast<std::size_t>(e)]) continue;
+    if (remove[e]) continue;
     for (const std::int32_t v : mesh.tet(e)) {
       if (number[v] < 0) {
         number[v] = static_cast<std::int32_t>(nodes.size());
@@ -269,7 +269,7 @@ void drop_elements(mesh::TetMesh& mesh, const std::vector<char>& remove) {
   }
   mesh.nodes_m = std::move(nodes);
   mesh.tets = std::move(tets);
-  mesh.regions.assign(static_cast<std::size_t>(mesh.tet_count()), 0);
+  mesh.regions.assign(mesh.tet_count(), 0);
 }
 
 std::int64_t make_manifold(mesh::TetMesh& mesh, std::int64_t components) {
@@ -309,12 +309,12 @@ std::int64_t peel_flat_elements(mesh::TetMesh& mesh) {
       std::sort(face.begin(), face.end());
       boundary.insert(face);
     }
-    std::vector<char> remove(static_cast<std::size_t>(mesh.tet_count()), 0);
+    std::vector<char> remove(mesh.tet_count(), 0);
     std::int64_t count = 0;
     for (std::int64_t e = 0; e < mesh.tet_count(); ++e) {
       const auto tet = mesh.tet(e);
       std::array<Vec3, 4> corners;
-      for (int c = 0; c < 4; ++c) corners[c] = mesh.nodes_m[static_cast<std::size_t>(tet[c])];
+      for (int c = 0; c < 4; ++c) corners[c] = mesh.nodes_m[tet[c]];
       if (std::abs(calc_flatness(corners)) > kFlatDeg) continue;
       const bool is_outer = std::any_of(std::begin(mesh::kFaces), std::end(mesh::kFaces), [&](const auto& face) {
         Triangle key{tet[face[0]], tet[face[1]], tet[face[2]]};
@@ -322,7 +322,7 @@ std::int64_t peel_flat_elements(mesh::TetMesh& mesh) {
         return boundary.contains(key);
       });
       if (!is_outer) continue;
-      remove[static_cast<std::size_t>(e)] = 1;
+      remove[e] = 1;
       ++count;
     }
     if (count == 0) break;

@@ -175,12 +175,12 @@ class ThinMesher {
     const std::vector<char> on_border = mark_border(plain.surface);
     attempt.skin = add_rings(plain, places_, [&](const LeavingEdge& leaving) {
       const std::int32_t v = leaving.point;
-      const Vec3 &out = ways[static_cast<std::size_t>(v)], &across = leaving.across;
+      const Vec3 &out = ways[v], &across = leaving.across;
       double distance = on_border[v] != 0 ? kRimRing * wall : 0;
       if (norm(out) > kRingFrom) {
         // Width of the mitre at the wall's inner corner. The measured corner of a round wall lies off the plane of edge and fold, and
         // counts along the edge.
-        const auto point = static_cast<std::size_t>(v);
+        const std::size_t point = v;
         const double shift = low_source_ ? dot(low[point] - plain.surface.points[point], leaving.way) / leaving.sine
                                          : std::max(levels_[0] * dot(out, across), levels_[1] * dot(out, across));
         distance = std::max(shift, 0.0) + calc_margin(edge_m);

@@ -35,7 +35,7 @@ Box calc_used_box(const TriangleSurface& surface) {
   std::vector<Vec3> used;
   used.reserve(3 * surface.triangles.size());
   for (const Triangle& t : surface.triangles)
-    for (const std::int32_t v : t) used.push_back(surface.points[static_cast<std::size_t>(v)]);
+    for (const std::int32_t v : t) used.push_back(surface.points[v]);
   return calc_box(used);
 }
 

@@ -77,7 +77,7 @@ std::vector<Region> find_regions(const DistanceField& field, double wall_m, bool
     }
   };
   for (std::size_t row = 0; row < rows; ++row) {
-    const auto ny = static_cast<std::size_t>(field.size[1]);
+    const std::size_t ny = field.size[1];
     if (row % ny + 1 < ny) join_rows(row, row + 1, false);
     if (row + ny < rows) join_rows(row, row + ny, false);
     if (by_corners && row % ny + 1 < ny && row + ny + 1 < rows) join_rows(row, row + ny + 1, true);

@@ -237,7 +237,7 @@ void measure_mesh(const mesh::TetMesh& linear, const Body& body, SurfaceReport& 
   double sum = 0, low = 1e300, high = 0;
   std::int64_t count = 0;
   for (const std::int32_t v : skin) {
-    const Vec3& p = linear.nodes_m[static_cast<std::size_t>(v)];
+    const Vec3& p = linear.nodes_m[v];
     if (body.field->calc_distance(p) > -0.5 * body.wall_m) continue;
     const double depth = norm(body.nearest->find(p) - p) - body.repaired.offset_m;
     sum += depth;

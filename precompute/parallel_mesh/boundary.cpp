@@ -34,17 +34,16 @@ struct FaceRecord {
 bool have_same_corners(const FaceRecord& x, const FaceRecord& y) { return x.a == y.a && x.b == y.b && x.c == y.c; }
 
 std::vector<FaceRecord> list_faces(const LocalMesh& local) {
-  const auto width = static_cast<std::size_t>(local.nodes_per_tet());
+  const std::size_t width = local.nodes_per_tet();
   std::vector<FaceRecord> faces;
-  faces.reserve(4 * static_cast<std::size_t>(local.tet_count()));
+  faces.reserve(4 * local.tet_count());
   for (std::int32_t e = 0; e < local.tet_count(); ++e)
     for (int side = 0; side < 4; ++side) {
       const auto at = [&](int corner) {
-        return local
-            .node_in_mesh[static_cast<std::size_t>(local.tets[static_cast<std::size_t>(e) * width + static_cast<std::size_t>(corner)])];
+        return local.node_in_mesh[local.tets[static_cast<std::size_t>(e) * width + static_cast<std::size_t>(corner)]];
       };
       std::array<std::int32_t, 3> v{};
-      for (std::size_t k = 0; k < 3; ++k) v[k] = at(mesh::kFaces[static_cast<std::size_t>(side)][k]);
+      for (std::size_t k = 0; k < 3; ++k) v[k] = at(mesh::kFaces[side][k]);
       bool is_odd = false;
       const auto order = [&](std::size_t i, std::size_t j) {
         if (v[j] > v[i]) return;
@@ -54,8 +53,7 @@ std::vector<FaceRecord> list_faces(const LocalMesh& local) {
       order(0, 1);
       order(1, 2);
       order(0, 1);
-      faces.push_back(
-          {v[0], v[1], v[2], at(side), local.tet_in_mesh[static_cast<std::size_t>(e)], e, static_cast<std::int8_t>(side), is_odd, false});
+      faces.push_back({v[0], v[1], v[2], at(side), local.tet_in_mesh[e], e, static_cast<std::int8_t>(side), is_odd, false});
     }
   return faces;
 }
@@ -98,8 +96,7 @@ bool match_at_rank(const std::string& name, const LocalMesh& local, const std::v
   mesh::Parts parts(static_cast<std::size_t>(local.tet_count()));
   const auto is_on_seam = [&](const FaceRecord& face) {
     const std::int32_t* tet = local.tets.data() + static_cast<std::size_t>(face.in_local) * static_cast<std::size_t>(local.nodes_per_tet());
-    return std::ranges::all_of(mesh::kFaces[static_cast<std::size_t>(face.local)],
-                               [&](int corner) { return on_seam[static_cast<std::size_t>(tet[corner])] != 0; });
+    return std::ranges::all_of(mesh::kFaces[face.local], [&](int corner) { return on_seam[tet[corner]] != 0; });
   };
   std::size_t kept = 0;
   std::int64_t joined = 0;
@@ -132,7 +129,7 @@ struct VertexRecord {
 };
 
 void add_triangles(const LocalMesh& local, const FaceRecord& face, std::vector<TriangleRecord>& triangles) {
-  const auto [i, j, k] = mesh::kFaces[static_cast<std::size_t>(face.local)];
+  const auto [i, j, k] = mesh::kFaces[face.local];
   const auto add = [&](int part, int a, int b, int c) {
     const std::size_t first = static_cast<std::size_t>(face.in_local) * static_cast<std::size_t>(local.nodes_per_tet());
     const auto at = [&](int corner) {
@@ -211,7 +208,7 @@ std::vector<char> match_faces(const std::string& name, std::vector<FaceRecord> f
   for (std::size_t i = 0; i < faces.size(); ++i) faces[i].in_local = static_cast<std::int32_t>(i);  // sorting loses the order of arrival
   for_each_face(faces, [&](std::size_t first, std::size_t end) {
     check_face(name, faces, first, end);
-    if (end - first == 1) is_alone[static_cast<std::size_t>(faces[first].in_local)] = 1;
+    if (end - first == 1) is_alone[faces[first].in_local] = 1;
     cut += end - first == 2 && !faces[first].is_matched;
   });
   return is_alone;
@@ -226,8 +223,8 @@ std::vector<TriangleRecord> list_triangles(const LocalMesh& local, const std::ve
   std::vector<char> is_vertex(local.nodes_m.size(), 0);
   for (TriangleRecord& triangle : triangles)
     for (std::int32_t& node : triangle.nodes) {
-      is_vertex[static_cast<std::size_t>(node)] = 1;
-      node = local.node_in_mesh[static_cast<std::size_t>(node)];
+      is_vertex[node] = 1;
+      node = local.node_in_mesh[node];
     }
   for (std::size_t i = 0; i < is_vertex.size(); ++i)
     if (is_vertex[i] != 0) vertices.push_back({local.node_in_mesh[i], local.row[i], local.nodes_m[i]});

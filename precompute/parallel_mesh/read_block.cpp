@@ -88,12 +88,11 @@ void check_cells(const Source& source, const std::string& name, const Layout& la
   const auto types = source.read<std::int64_t>(layout.types, begin, count);
   const auto offsets = source.read<std::int64_t>(layout.offsets, begin, count + 1);
   for (std::int64_t e = 0; e < count; ++e)
-    if (types[static_cast<std::size_t>(e)] != type)
-      throw InputError(fmt::format("{}: {}", name, describe_cell(types[static_cast<std::size_t>(e)], begin + e)));
+    if (types[e] != type) throw InputError(fmt::format("{}: {}", name, describe_cell(types[e], begin + e)));
   for (std::int64_t e = 0; e <= count; ++e)
-    if (offsets[static_cast<std::size_t>(e)] != (begin + e) * width)
-      throw InputError(fmt::format("{}: Offsets of cell {} is {} and should be {}; write the mesh again", name, begin + e + 1,
-                                   offsets[static_cast<std::size_t>(e)], (begin + e) * width));
+    if (offsets[e] != (begin + e) * width)
+      throw InputError(fmt::format("{}: Offsets of cell {} is {} and should be {}; write the mesh again", name, begin + e + 1, offsets[e],
+                                   (begin + e) * width));
 }
 
 void read_connectivity(const Source& source, const std::string& name, const Layout& layout, MeshBlock& block) {
@@ -136,7 +135,7 @@ const Array* find_region_array(const Layout& layout) {
 
 void read_regions(const Source& source, const Layout& layout, MeshBlock& block) {
   const std::int64_t count = block.elements.own_count();
-  block.regions.assign(static_cast<std::size_t>(count), 0);
+  block.regions.assign(count, 0);
   const Array* array = find_region_array(layout);
   if (array == nullptr) return;
   const auto values = source.read<std::int64_t>(*array, block.elements.own_begin(), count);
@@ -162,9 +161,7 @@ std::vector<std::int64_t> orient(MeshBlock& block, const Touched& touched, const
   std::vector<std::int64_t> flat;
   block.centres_m.resize(count);
   for (std::size_t e = 0; e < count; ++e) {
-    const auto at = [&](int i) -> const Vec3& {
-      return nodes_m[static_cast<std::size_t>(touched.place[e * width + static_cast<std::size_t>(i)])];
-    };
+    const auto at = [&](int i) -> const Vec3& { return nodes_m[touched.place[e * width + static_cast<std::size_t>(i)]]; };
     std::array<Vec3, 6> edge{};
     double longest = 0;
     for (std::size_t m = 0; m < 6; ++m) {
@@ -226,13 +223,13 @@ void drop_unused(const comm::Communicator& comm, MeshBlock& block, mesh::CheckRe
   if (report.unreferenced == 0) return;
   for (std::size_t i = 0; i < number.size(); ++i) {
     if (number[i] < 0) continue;
-    block.nodes_m[static_cast<std::size_t>(number[i])] = block.nodes_m[i];
-    block.fixed[static_cast<std::size_t>(number[i])] = block.fixed[i];
+    block.nodes_m[number[i]] = block.nodes_m[i];
+    block.fixed[number[i]] = block.fixed[i];
   }
-  block.nodes_m.resize(static_cast<std::size_t>(kept));
-  block.fixed.resize(static_cast<std::size_t>(kept));
+  block.nodes_m.resize(kept);
+  block.fixed.resize(kept);
   for (std::size_t i = 0; i < block.tets.size(); ++i) {
-    const auto t = static_cast<std::size_t>(touched.place[i]);
+    const std::size_t t = touched.place[i];
     block.tets[i] = static_cast<std::int32_t>(used.begin(find_owner(touched.nodes[t]))) + place[t];
   }
   block.corners = used;
@@ -262,8 +259,8 @@ struct Corner {
 Edge make_edge(const Touched& touched, const std::vector<Corner>& corners, std::size_t e, std::size_t m) {
   const auto [a, b] = std::minmax(touched.place[4 * e + static_cast<std::size_t>(mesh::kEdges[m][0])],
                                   touched.place[4 * e + static_cast<std::size_t>(mesh::kEdges[m][1])]);  // places ascend as the nodes do
-  const Corner &low = corners[static_cast<std::size_t>(a)], &high = corners[static_cast<std::size_t>(b)];
-  return {touched.nodes[static_cast<std::size_t>(a)], touched.nodes[static_cast<std::size_t>(b)], 0.5 * (low.x_m + high.x_m),
+  const Corner &low = corners[a], &high = corners[b];
+  return {touched.nodes[a], touched.nodes[b], 0.5 * (low.x_m + high.x_m),
           low.fixed != 0 && high.fixed != 0 ? std::min(low.fixed, high.fixed) : 0};
 }
 
@@ -309,7 +306,7 @@ void add_mid_nodes(const comm::Communicator& comm, MeshBlock& block, const std::
       for (std::size_t m = 0; m < 6; ++m) {
         const auto edge = std::lower_bound(edges.begin(), edges.end(), make_edge(touched, corners, e, m));
         const std::int64_t first = block.corners.total() + block.mids.begin(find_owner(edge->low));
-        fine[10 * e + 4 + m] = static_cast<std::int32_t>(first) + places[static_cast<std::size_t>(edge - edges.begin())];
+        fine[10 * e + 4 + m] = static_cast<std::int32_t>(first) + places[edge - edges.begin()];
       }
     }
     block.tets = std::move(fine);

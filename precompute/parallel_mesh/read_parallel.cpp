@@ -47,7 +47,7 @@ Layout broadcast_layout(const comm::Communicator& comm, const std::filesystem::p
   });
   const auto point_arrays = comm.broadcast(static_cast<std::int64_t>(layout.point_data.size()));
   comm.agree([&] {
-    layout.point_data.resize(static_cast<std::size_t>(point_arrays));
+    layout.point_data.resize(point_arrays);
     layout.cell_data.resize(names.size() - 4 - layout.point_data.size());
     std::size_t i = 0;
     for_each_array(layout, [&](Array& array) {

@@ -36,7 +36,7 @@ class Source {
   /// The rows first ... first + rows - 1 as T (double or std::int64_t).
   template <typename T>
   std::vector<T> read(const Array& array, std::int64_t first, std::int64_t rows) const {
-    std::vector<T> values(static_cast<std::size_t>(rows * array.columns));
+    std::vector<T> values(rows * array.columns);
     std::array<unsigned char, 1 << 16> block;
     const std::size_t in_block = block.size() / static_cast<std::size_t>(array.bytes);
     for (std::size_t done = 0; done < values.size();) {

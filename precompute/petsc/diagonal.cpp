@@ -13,7 +13,7 @@ std::vector<double> read_diagonal(Mat matrix) {
   PetscInt rows = 0;
   check(VecGetLocalSize(diagonal, &rows));
   std::vector<double> copy;
-  comm.agree([&] { copy.reserve(static_cast<std::size_t>(rows)); });
+  comm.agree([&] { copy.reserve(rows); });
   const PetscScalar* values = nullptr;
   check(VecGetArrayRead(diagonal, &values));
   copy.assign(values, values + rows);

@@ -56,7 +56,7 @@ AirReport choose(const Run& run, const bank::Bank& bank) {
 bem::AirOptions make_air_options(const job::Air& air) {
   bem::AirOptions options;
   options.solve.error_db = air.error_db;
-  options.most_nodes = static_cast<std::size_t>(air.skin_nodes);
+  options.most_nodes = air.skin_nodes;
   options.coarsen = coarsen_surface;
   if (air.half_space) options.half_space = bem::Plane{air.half_space->point_m, normalise(air.half_space->normal)};
   return options;

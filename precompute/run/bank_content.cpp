@@ -55,7 +55,7 @@ bank::Supports make_supports(const job::JobSpec& job, const fem::Supports& found
   std::map<std::int32_t, int> patches, seen;
   for (const fem::Support& support : found.list) ++patches[support.entry];
   for (const fem::Support& support : found.list) {
-    const job::Fixed& fixed = job.fixed[static_cast<std::size_t>(support.entry)];
+    const job::Fixed& fixed = job.fixed[support.entry];
     std::string name = !fixed.name.empty() ? fixed.name : fixed.node_set ? *fixed.node_set : fmt::format("box {}", support.entry + 1);
     if (patches[support.entry] > 1) name += fmt::format(":{}", ++seen[support.entry]);
     supports_json.member("supports").add(material::write_fixing(fixed.fixing, base::Json::object().set("name", name)));

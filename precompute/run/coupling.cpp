@@ -26,7 +26,7 @@ std::vector<std::int32_t> find_kept_modes(const Run& run, const SolvedBody& solv
   if (freq_hz.empty()) freq_hz = solved.modes.lambda;
   std::vector<std::int32_t> kept;
   for (const std::size_t mode : base::find_sort_order(freq_hz)) kept.push_back(static_cast<std::int32_t>(mode));
-  if (run.job.max_modes) kept.resize(std::min(kept.size(), static_cast<std::size_t>(*run.job.max_modes)));
+  if (run.job.max_modes) kept.resize(std::min<std::size_t>(kept.size(), *run.job.max_modes));
   std::sort(kept.begin(), kept.end());
   return kept;
 }

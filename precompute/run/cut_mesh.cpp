@@ -29,7 +29,7 @@ OrderedPieces order_pieces(const comm::Communicator& comm, const Ints& tets, int
   const Ints elements = comm.agree([&] {
     Ints list;
     list.reserve(tets.size());
-    for (const std::int32_t node : tets) list.push_back(numbers[static_cast<std::size_t>(node)]);
+    for (const std::int32_t node : tets) list.push_back(numbers[node]);
     return list;
   });
   OrderedPieces pieces;
@@ -65,7 +65,7 @@ Ints gather_ranks(const comm::Communicator& comm, const partition::DistributedMe
 CutMesh cut_once(const comm::Communicator& comm, const mesh::TetMesh& mesh, const Ints& fixed_nodes, const Ints& free_nodes) {
   const Ints numbers = comm.agree([&] {
     Ints list(comm.is_root() ? mesh.nodes_m.size() : 0, -1);
-    for (std::size_t i = 0; i < free_nodes.size(); ++i) list[static_cast<std::size_t>(free_nodes[i])] = static_cast<std::int32_t>(i);
+    for (std::size_t i = 0; i < free_nodes.size(); ++i) list[free_nodes[i]] = static_cast<std::int32_t>(i);
     return list;
   });
   const int width = comm.broadcast(mesh.nodes_per_tet());
@@ -77,7 +77,7 @@ CutMesh cut_once(const comm::Communicator& comm, const mesh::TetMesh& mesh, cons
   cut.pieces = partition::distribute(comm, mesh, fixed_nodes, {.part = std::move(ordered.ranks)});
   const Ints rows = comm.agree([&] {
     Ints list;
-    for (const std::int32_t node : free_nodes) list.push_back(cut.pieces.row_of_node[static_cast<std::size_t>(node)]);
+    for (const std::int32_t node : free_nodes) list.push_back(cut.pieces.row_of_node[node]);
     return list;
   });
   ordered.order->renumber(comm, rows);
@@ -95,9 +95,9 @@ CutMesh cut_twice(const comm::Communicator& comm, const mesh::TetMesh& mesh, con
   Ints part = gather_ranks(comm, cut.pieces, ordered.ranks);
   cut.pieces = {};
   cut.pieces = partition::distribute(comm, mesh, fixed_nodes, {.part = std::move(part)});
-  ordered.order->renumber(comm, comm::query_owners<std::int32_t>(
-                                    comm, nodes, [](std::int32_t) { return 0; },
-                                    [&](std::int32_t node) { return cut.pieces.row_of_node[static_cast<std::size_t>(node)]; }));
+  ordered.order->renumber(
+      comm, comm::query_owners<std::int32_t>(
+                comm, nodes, [](std::int32_t) { return 0; }, [&](std::int32_t node) { return cut.pieces.row_of_node[node]; }));
   return cut;
 }
 

@@ -80,7 +80,7 @@ double ProgressEstimator::calc_modes_done() const {
 
 /// The price of the step under way.
 double ProgressEstimator::calc_step() const {
-  if (phase_ != kModes) return list(costs_)[static_cast<std::size_t>(phase_)];
+  if (phase_ != kModes) return list(costs_)[phase_];
   switch (progress_.phase) {
     case eigen::Phase::kRigid:
     case eigen::Phase::kAnalyse:
@@ -100,8 +100,8 @@ ProgressEstimator::Share ProgressEstimator::calc_share(double seconds) const {
   double done = 0;
   double all = 0;
   for (int i = 0; i < static_cast<int>(prices.size()); ++i) {
-    all += prices[static_cast<std::size_t>(i)];
-    if (i < phase_) done += prices[static_cast<std::size_t>(i)];
+    all += prices[i];
+    if (i < phase_) done += prices[i];
   }
   if (phase_ == kModes) done += calc_modes_done();
   const double step = phase_ < 0 ? 0 : calc_step();

@@ -112,13 +112,11 @@ Built make_point(const Sweep& sweep, double height, int rings, int levels) {
   }
   for (const Local& node : built.nodes) built.mesh.nodes_m.push_back(sweep.place(node));  // the refinement looks at lengths
   for (int sector = 0; sector < sweep.sectors; ++sector) {
-    append_refined(built.mesh, rings, [&](int centre, int a, int b) {
-      return first_of_level[static_cast<std::size_t>(centre + a + b)] + find_point(sweep.sectors, a + b, sector, b);
-    });
+    append_refined(built.mesh, rings,
+                   [&](int centre, int a, int b) { return first_of_level[centre + a + b] + find_point(sweep.sectors, a + b, sector, b); });
   }
   const std::vector<std::array<std::int32_t, 3>> triangles = make_triangles(sweep.sectors, rings);
-  for (int level = rings; level < levels; ++level)
-    append_layer(built, triangles, first_of_level[static_cast<std::size_t>(level)], first_of_level[static_cast<std::size_t>(level) + 1]);
+  for (int level = rings; level < levels; ++level) append_layer(built, triangles, first_of_level[level], first_of_level[level + 1]);
   built.first = {0};
   for (std::int32_t n = first_of_level.back(); n < static_cast<std::int32_t>(built.nodes.size()); ++n) built.last.push_back(n);
   return built;
@@ -142,16 +140,15 @@ mesh::TetMesh finish(const Sweep& sweep, Built built, int order, const std::arra
   if (!names[1].empty()) built.mesh.node_sets[names[1]] = built.last;
   built.mesh.node_sets[names[2]] = built.round;
   if (order == 2) {
-    raise_order(built.mesh, [&](std::int32_t p, std::int32_t q) {
-      return sweep.place(find_middle(sweep, built.nodes[static_cast<std::size_t>(p)], built.nodes[static_cast<std::size_t>(q)]));
-    });
+    raise_order(built.mesh,
+                [&](std::int32_t p, std::int32_t q) { return sweep.place(find_middle(sweep, built.nodes[p], built.nodes[q])); });
   }
   return std::move(built.mesh);
 }
 
 std::vector<double> divide_evenly(double length, int layers) {
-  std::vector<double> along(static_cast<std::size_t>(layers) + 1);
-  for (int k = 0; k <= layers; ++k) along[static_cast<std::size_t>(k)] = k == layers ? length : length * k / layers;
+  std::vector<double> along(layers + 1);
+  for (int k = 0; k <= layers; ++k) along[k] = k == layers ? length : length * k / layers;
   return along;
 }
 

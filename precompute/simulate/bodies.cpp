@@ -65,8 +65,7 @@ std::vector<transient::NodeShare> find_struck_nodes(const transient::Assembly& a
                                                     const Vec3& point_m, const std::string& place) {
   double distance = 0, extent = 0;
   const transient::Assembly::Body& struck = assembly.bodies[body];
-  for (std::int32_t n = struck.first_node; n < struck.last_node; ++n)
-    extent = std::max(extent, norm(assembly.nodes_m[static_cast<std::size_t>(n)] - centre_m));
+  for (std::int32_t n = struck.first_node; n < struck.last_node; ++n) extent = std::max(extent, norm(assembly.nodes_m[n] - centre_m));
   std::vector<transient::NodeShare> shares = find_shares(assembly, skin, point_m, &distance);
   if (distance > kMostStrikeDistance * extent)
     throw InputError(fmt::format("{}: \"point_m\" is {:.3g} m from the surface of body \"{}\"; give a point on it, in the axes of its mesh",
@@ -84,7 +83,7 @@ std::vector<std::int32_t> find_group(const mesh::TetMesh& mesh, const job::NodeG
 
 /// A list of nodes on a line?
 bool is_line(const std::vector<Vec3>& nodes_m, const std::vector<std::int32_t>& nodes) {
-  const auto at = [&](std::size_t i) { return nodes_m[static_cast<std::size_t>(nodes[i])]; };
+  const auto at = [&](std::size_t i) { return nodes_m[nodes[i]]; };
   std::size_t far = 0;
   for (std::size_t i = 1; i < nodes.size(); ++i)
     if (norm(at(i) - at(0)) > norm(at(far) - at(0))) far = i;
@@ -92,7 +91,7 @@ bool is_line(const std::vector<Vec3>& nodes_m, const std::vector<std::int32_t>& 
   if (!(length > 0)) return true;
   const Vec3 along = (1.0 / length) * (at(far) - at(0));
   return std::all_of(nodes.begin(), nodes.end(), [&](std::int32_t node) {
-    const Vec3 way = nodes_m[static_cast<std::size_t>(node)] - at(0);
+    const Vec3 way = nodes_m[node] - at(0);
     return norm(way - dot(way, along) * along) < 1e-6 * length;
   });
 }
@@ -168,7 +167,7 @@ std::vector<std::int32_t> find_table_nodes(const mesh::TetMesh& mesh, const job:
     std::int32_t found = -1;
     for (auto i = std::lower_bound(by_x.begin(), by_x.end(), std::pair(at[0] - reach, std::int32_t{-1}));
          i != by_x.end() && i->first <= at[0] + reach; ++i)
-      if (const double distance = norm(mesh.nodes_m[static_cast<std::size_t>(i->second)] - at); distance <= nearest) {
+      if (const double distance = norm(mesh.nodes_m[i->second] - at); distance <= nearest) {
         nearest = distance;
         found = i->second;
       }
@@ -221,7 +220,7 @@ Made make_solid(const job::SimulatedBody& body) {
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e) {
     const auto tet = mesh.tet(e);
     std::array<Vec3, 4> at{};
-    for (std::size_t c = 0; c < 4; ++c) at[c] = mesh.nodes_m[static_cast<std::size_t>(tet[c])];
+    for (std::size_t c = 0; c < 4; ++c) at[c] = mesh.nodes_m[tet[c]];
     const double v = dot(at[1] - at[0], cross(at[2] - at[0], at[3] - at[0])) / 6.0;
     volume += v;
     made.centre_m = made.centre_m + 0.25 * v * (at[0] + at[1] + at[2] + at[3]);
@@ -235,7 +234,7 @@ Made make_solid(const job::SimulatedBody& body) {
 /// rim, which go where both ends of their edge go.
 void clamp_directions(const std::string& place, const transient::SheetElements& elements, const std::vector<std::int32_t>& group_of,
                       Made& made, std::vector<std::int32_t>& fixed_nodes) {
-  const auto find_group_of = [&](std::int32_t vertex) { return group_of[static_cast<std::size_t>(vertex)]; };
+  const auto find_group_of = [&](std::int32_t vertex) { return group_of[vertex]; };
   for (std::size_t e = 0; e < elements.edge.size(); ++e)
     if (find_group_of(elements.edge[e][0]) >= 0 && find_group_of(elements.edge[e][1]) >= 0)
       fixed_nodes.push_back(elements.vertices + static_cast<std::int32_t>(e));
@@ -247,8 +246,8 @@ void clamp_directions(const std::string& place, const transient::SheetElements& 
       if (group != find_group_of(nodes[(i + 2) % 3]))
         throw InputError(
             fmt::format("{}: an edge of the rim joins two groups of constrained nodes; leave a free vertex between them", place));
-      if (static_cast<std::size_t>(group) < made.constrained.size())
-        made.constrained[static_cast<std::size_t>(group)].nodes.push_back(ghost);
+      if (group < std::ssize(made.constrained))
+        made.constrained[group].nodes.push_back(ghost);
       else
         fixed_nodes.push_back(ghost);
     }
@@ -276,8 +275,8 @@ Made make_sheet(const job::SimulatedBody& body) {
   sheet.clamped.resize(vertices.nodes_m.size());
   const auto clamp = [&](const std::vector<std::int32_t>& nodes, std::size_t group) {
     for (const std::int32_t node : nodes) {
-      group_of[static_cast<std::size_t>(node)] = static_cast<std::int32_t>(group);
-      sheet.clamped[static_cast<std::size_t>(node)] = true;
+      group_of[node] = static_cast<std::int32_t>(group);
+      sheet.clamped[node] = true;
     }
   };
   // A released edge turns freely: elements include the direction of clamps that stay.
@@ -295,7 +294,7 @@ Made make_sheet(const job::SimulatedBody& body) {
   double area = 0;
   for (const Triangle& triangle : sheet.mesh.triangles) {
     std::array<Vec3, 3> at{};
-    for (std::size_t c = 0; c < 3; ++c) at[c] = sheet.mesh.vertices_m[static_cast<std::size_t>(triangle[c])];
+    for (std::size_t c = 0; c < 3; ++c) at[c] = sheet.mesh.vertices_m[triangle[c]];
     const double a = 0.5 * norm(cross(at[1] - at[0], at[2] - at[0]));
     area += a;
     made.centre_m = made.centre_m + (a / 3.0) * (at[0] + at[1] + at[2]);
@@ -314,7 +313,7 @@ Bent bend(const job::SimulationSpec& spec, std::size_t b, Made& made) {
   const auto assembly = std::make_shared<const transient::Assembly>(transient::make_assembly(alone, std::vector{made.body}));
   transient::Domain domain(alone, assembly);
   const transient::Assembly::Body& body = assembly->bodies[0];
-  const auto find_number = [&](std::int32_t node) { return body.is_sheet ? node : body.node_of_mesh[static_cast<std::size_t>(node)]; };
+  const auto find_number = [&](std::int32_t node) { return body.is_sheet ? node : body.node_of_mesh[node]; };
   std::map<std::int32_t, Vec3> held;
   for (const Made::Group& group : made.constrained)
     for (const std::int32_t node : group.nodes) held[find_number(node)] = {};
@@ -344,13 +343,13 @@ Bent bend(const job::SimulationSpec& spec, std::size_t b, Made& made) {
     // Without a ramp, gravity acts from the start.
     if (spec.settle_s == 0.0 && norm(spec.gravity_m_s2) > 0.0)
       for (std::int32_t n = 0; n < domain.node_count(); ++n)
-        if (domain.is_point(n)) pulled.push_back({n, domain.get_masses_kg()[static_cast<std::size_t>(n)] * spec.gravity_m_s2});
+        if (domain.is_point(n)) pulled.push_back({n, domain.get_masses_kg()[n] * spec.gravity_m_s2});
     u = transient::calc_equilibrium(domain, held_nodes, pulled);
   });
   for (const double energy : domain.calc_state(u.data()).energy_j) bent.energy_j += energy;
   const std::size_t nodes = body.is_sheet ? u.size() : body.node_of_mesh.size();
   for (std::size_t n = 0; n < nodes; ++n) {
-    const auto number = static_cast<std::size_t>(find_number(static_cast<std::int32_t>(n)));
+    const std::size_t number = find_number(static_cast<std::int32_t>(n));
     made.start.push_back(u[number]);
     if (domain.is_point(static_cast<std::int32_t>(number)))
       bent.displacement_m = std::max(bent.displacement_m, norm({u[number].x, u[number].y, u[number].z}));
@@ -382,8 +381,7 @@ void share_start(const comm::Communicator& comm, const std::vector<Made>& made, 
       start.resize(bodies.assembly->nodes_m.size());
       const transient::Assembly::Body& body = bodies.assembly->bodies[b];
       for (std::size_t n = 0; n < made[b].start.size(); ++n)
-        start[static_cast<std::size_t>(body.is_sheet ? body.first_node + static_cast<std::int32_t>(n) : body.node_of_mesh[n])] =
-            made[b].start[n];
+        start[body.is_sheet ? body.first_node + static_cast<std::int32_t>(n) : body.node_of_mesh[n]] = made[b].start[n];
     }
     return start;
   });
@@ -411,7 +409,7 @@ void share(const comm::Communicator& comm, const std::vector<Made>& made, const 
         const auto constraint = static_cast<std::int32_t>(kinds.size());
         const transient::Assembly::Body& body = assembly.bodies[b];
         for (const std::int32_t node : constrained.nodes)
-          entries.push_back({constraint, body.is_sheet ? body.first_node + node : body.node_of_mesh[static_cast<std::size_t>(node)]});
+          entries.push_back({constraint, body.is_sheet ? body.first_node + node : body.node_of_mesh[node]});
         for (const auto& row : constrained.rows) rows.push_back({constraint, {row[0], row[1], row[2], row[3]}});
         kinds.push_back({constrained.is_hinge ? 1 : 0, constrained.release_s});
       }
@@ -420,8 +418,8 @@ void share(const comm::Communicator& comm, const std::vector<Made>& made, const 
   kinds = comm.broadcast(std::move(kinds));
   bodies.constraints.resize(kinds.size());
   std::vector<std::vector<transient::PathRow>> paths(kinds.size());
-  for (const Entry& entry : entries) bodies.constraints[static_cast<std::size_t>(entry.constraint)].nodes.push_back(entry.node);
-  for (const Row& row : rows) paths[static_cast<std::size_t>(row.constraint)].push_back({row.at[0], {row.at[1], row.at[2], row.at[3]}});
+  for (const Entry& entry : entries) bodies.constraints[entry.constraint].nodes.push_back(entry.node);
+  for (const Row& row : rows) paths[row.constraint].push_back({row.at[0], {row.at[1], row.at[2], row.at[3]}});
   for (std::size_t h = 0; h < kinds.size(); ++h) {
     if (!paths[h].empty()) bodies.constraints[h].path = transient::Path(std::move(paths[h]));
     bodies.constraints[h].is_hinge = kinds[h].is_hinge != 0;

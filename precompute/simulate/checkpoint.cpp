@@ -115,8 +115,7 @@ std::optional<SimulationState> load_checkpoint(const comm::Communicator& comm, c
   comm::ByRank<std::byte> parts;
   parts.items = std::move(content.sounds);
   parts.begin.assign(1, 0);
-  for (int r = 0; r < comm.size(); ++r)
-    parts.begin.push_back(parts.begin.back() + (content.sizes.empty() ? 0 : content.sizes[static_cast<std::size_t>(r)]));
+  for (int r = 0; r < comm.size(); ++r) parts.begin.push_back(parts.begin.back() + (content.sizes.empty() ? 0 : content.sizes[r]));
   content.state.sound = comm::all_to_all(comm, parts).items;
   return std::move(content.state);
 }

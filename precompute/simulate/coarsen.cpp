@@ -23,11 +23,10 @@ double estimate_nodes(const job::Body& body, int order) {
   if (!body.edge_m || body.shape.empty()) return 0.0;
   run::MesherWords unused;
   const mesh::TetMesh coarse = run::make_body_mesh(body, order, {.nodes = kCoarseNodes, .edge_m = {}}, unused);
-  const auto width = static_cast<std::size_t>(coarse.nodes_per_tet());
+  const std::size_t width = coarse.nodes_per_tet();
   double edges_m = 0.0;
   for (std::size_t t = 0; t < static_cast<std::size_t>(coarse.tet_count()); ++t)
-    edges_m += norm(coarse.nodes_m[static_cast<std::size_t>(coarse.tets[width * t + 1])] -
-                    coarse.nodes_m[static_cast<std::size_t>(coarse.tets[width * t])]);
+    edges_m += norm(coarse.nodes_m[coarse.tets[width * t + 1]] - coarse.nodes_m[coarse.tets[width * t]]);
   edges_m /= static_cast<double>(coarse.tet_count());
   return static_cast<double>(coarse.nodes_m.size()) * std::pow(edges_m / *body.edge_m, 3);
 }

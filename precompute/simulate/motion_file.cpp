@@ -92,8 +92,8 @@ void MotionFile::add_sample(const transient::Motion& motion) {
   if (motion.get_sample() != static_cast<std::int64_t>(std::ceil(static_cast<double>(frame) * every_samples_ - 1e-9))) return;
   std::vector<Point> own;
   for (const auto& [number, place] : own_) {
-    const Vec3& rest = domain_.get_rest_m()[static_cast<std::size_t>(place)];
-    const transient::Quad &u = motion.get_u()[static_cast<std::size_t>(place)], &v = motion.get_v()[static_cast<std::size_t>(place)];
+    const Vec3& rest = domain_.get_rest_m()[place];
+    const transient::Quad &u = motion.get_u()[place], &v = motion.get_v()[place];
     own.push_back({number, static_cast<float>(rest[0] + u.x), static_cast<float>(rest[1] + u.y), static_cast<float>(rest[2] + u.z),
                    static_cast<float>(std::sqrt(v.x * v.x + v.y * v.y + v.z * v.z))});
   }
@@ -132,9 +132,9 @@ void MotionFile::write() const {
     write_attribute(root, "Version", H5T_NATIVE_INT64, {2}, version);
     write_text(root, "Type", "UnstructuredGrid");
     const auto cells = static_cast<std::int64_t>(triangles_.size());
-    write_list(root, "NumberOfPoints", std::vector<std::int64_t>(static_cast<std::size_t>(count_), points_));
-    write_list(root, "NumberOfCells", std::vector<std::int64_t>(static_cast<std::size_t>(count_), cells));
-    write_list(root, "NumberOfConnectivityIds", std::vector<std::int64_t>(static_cast<std::size_t>(count_), 3 * cells));
+    write_list(root, "NumberOfPoints", std::vector<std::int64_t>(count_, points_));
+    write_list(root, "NumberOfCells", std::vector<std::int64_t>(count_, cells));
+    write_list(root, "NumberOfConnectivityIds", std::vector<std::int64_t>(count_, 3 * cells));
     std::vector<std::int64_t> corners, offsets{0};
     for (const auto& triangle : triangles_) {
       corners.insert(corners.end(), triangle.begin(), triangle.end());
@@ -188,7 +188,7 @@ void MotionFile::write() const {
     base::read_pieces(frames_, "frames of the motion", row * sizeof(float), [&](std::string_view piece) {
       kept.append(piece);
       while (kept.size() >= row * sizeof(float) && frame < count_) {
-        std::vector<float> values(row), place(3 * static_cast<std::size_t>(points_)), size(static_cast<std::size_t>(points_));
+        std::vector<float> values(row), place(3 * points_), size(static_cast<std::size_t>(points_));
         std::memcpy(values.data(), kept.data(), row * sizeof(float));
         kept.erase(0, row * sizeof(float));
         for (std::size_t p = 0; p < static_cast<std::size_t>(points_); ++p) {

@@ -46,12 +46,12 @@ void make_motion(const comm::Communicator& comm, Simulation& simulation) {
                                                               std::move(strikers), std::move(obstacles), rules);
   if (simulation.contacts->is_needed()) simulation.motion->add(*simulation.contacts);
   simulation.motion->set_start([&](std::int32_t node, const Vec3& rest_m) {
-    const auto body = static_cast<std::size_t>(simulation.bodies.assembly->find_body_of_node(node));
+    const std::size_t body = simulation.bodies.assembly->find_body_of_node(node);
     const job::SimulatedBody& described = spec.bodies[body];
     transient::Motion::Start start;
     start.velocity_m_s = described.velocity_m_s + cross(described.angular_velocity_rad_s, rest_m - simulation.bodies.centre_m[body]);
     if (!simulation.bodies.start.empty()) {
-      const transient::Quad& u = simulation.bodies.start[static_cast<std::size_t>(node)];
+      const transient::Quad& u = simulation.bodies.start[node];
       start.displacement_m = transient::to_vector(u);
       start.angle_rad = u.x;
     }

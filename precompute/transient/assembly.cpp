@@ -40,9 +40,7 @@ std::vector<std::int32_t> sort_nodes(const std::vector<Vec3>& nodes_m) {
       key[n] |= spread_bits(static_cast<std::uint64_t>(2097151.0 * ((nodes_m[n][i] - low[i]) / extent))) << i;
   std::vector<std::int32_t> order(nodes_m.size());
   std::iota(order.begin(), order.end(), 0);
-  std::sort(order.begin(), order.end(), [&](std::int32_t a, std::int32_t b) {
-    return std::tuple(key[static_cast<std::size_t>(a)], a) < std::tuple(key[static_cast<std::size_t>(b)], b);
-  });
+  std::sort(order.begin(), order.end(), [&](std::int32_t a, std::int32_t b) { return std::tuple(key[a], a) < std::tuple(key[b], b); });
   return order;
 }
 
@@ -88,14 +86,14 @@ void check_sheet(const SheetBody& sheet) {
 void append_body(const SolidBody& solid, Assembly& assembly, std::vector<Numbers>& numbers, std::vector<std::int32_t>& node_of_mesh) {
   check_law(solid);
   const mesh::TetMesh& mesh = solid.mesh;
-  const auto width = static_cast<std::size_t>(mesh.nodes_per_tet()), elements = static_cast<std::size_t>(mesh.tet_count());
+  const std::size_t width = mesh.nodes_per_tet(), elements = mesh.tet_count();
   if (elements == 0) throw InputError(fmt::format("body '{}' has no elements", solid.name));
   const std::int32_t first_node = assembly.node_count();
   const std::vector<std::int32_t> order = sort_nodes(mesh.nodes_m);
   std::vector<std::int32_t> number(order.size());
   for (std::size_t i = 0; i < order.size(); ++i) {
-    number[static_cast<std::size_t>(order[i])] = first_node + static_cast<std::int32_t>(i);
-    assembly.nodes_m.push_back(mesh.nodes_m[static_cast<std::size_t>(order[i])]);
+    number[order[i]] = first_node + static_cast<std::int32_t>(i);
+    assembly.nodes_m.push_back(mesh.nodes_m[order[i]]);
   }
   struct Key {
     bool curved;
@@ -112,7 +110,7 @@ void append_body(const SolidBody& solid, Assembly& assembly, std::vector<Numbers
     key.sorted.fill(std::numeric_limits<std::int32_t>::max());
     std::array<Vec3, 10> x{};
     for (std::size_t a = 0; a < width; ++a) {
-      const auto node = static_cast<std::size_t>(mesh.tets[e * width + a]);
+      const std::size_t node = mesh.tets[e * width + a];
       key.sorted[a] = number[node];
       x[a] = mesh.nodes_m[node];
     }
@@ -129,8 +127,7 @@ void append_body(const SolidBody& solid, Assembly& assembly, std::vector<Numbers
   }
   std::sort(keys.begin(), keys.end());
   for (const Key& key : keys) {
-    for (std::size_t a = 0; a < width; ++a)
-      assembly.tets.push_back(number[static_cast<std::size_t>(mesh.tets[static_cast<std::size_t>(key.element) * width + a])]);
+    for (std::size_t a = 0; a < width; ++a) assembly.tets.push_back(number[mesh.tets[static_cast<std::size_t>(key.element) * width + a]]);
     assembly.element_of_mesh.push_back(key.element);
   }
   node_of_mesh.insert(node_of_mesh.end(), number.begin(), number.end());
@@ -152,13 +149,13 @@ std::int32_t Assembly::find_body(std::int32_t element) const {
 }
 
 Kind Assembly::find_kind(std::int32_t element) const {
-  const Body& body = bodies[static_cast<std::size_t>(find_body(element))];
+  const Body& body = bodies[find_body(element)];
   return body.is_sheet ? Kind::kSheet : body.width == 4 ? Kind::kT4 : element < body.first_curved ? Kind::kT10 : Kind::kCurvedT10;
 }
 
 std::span<const std::int32_t> Assembly::find_nodes(std::int32_t element) const {
-  const Body& body = bodies[static_cast<std::size_t>(find_body(element))];
-  const auto width = static_cast<std::size_t>(body.width);
+  const Body& body = bodies[find_body(element)];
+  const std::size_t width = body.width;
   return {tets.data() + body.nodes_at + static_cast<std::size_t>(element - body.first_element) * width, width};
 }
 
@@ -166,15 +163,13 @@ std::string Assembly::describe(std::int32_t element) const {
   Vec3 centre{};
   const auto nodes = find_nodes(element);
   const std::size_t corners = find_kind(element) == Kind::kSheet ? 3 : 4;
-  for (std::size_t a = 0; a < corners; ++a)
-    centre = centre + 1.0 / static_cast<double>(corners) * nodes_m[static_cast<std::size_t>(nodes[a])];
+  for (std::size_t a = 0; a < corners; ++a) centre = centre + 1.0 / static_cast<double>(corners) * nodes_m[nodes[a]];
   return fmt::format("body '{}', element {} of its mesh, whose centre is at rest at ({:.4g}, {:.4g}, {:.4g}) m",
-                     bodies[static_cast<std::size_t>(find_body(element))].name, element_of_mesh[static_cast<std::size_t>(element)] + 1,
-                     centre[0], centre[1], centre[2]);
+                     bodies[find_body(element)].name, element_of_mesh[element] + 1, centre[0], centre[1], centre[2]);
 }
 
 bool Assembly::is_point(std::int32_t node) const {
-  const Body& body = bodies[static_cast<std::size_t>(find_body_of_node(node))];
+  const Body& body = bodies[find_body_of_node(node)];
   return !body.is_sheet || node - body.first_node < body.sheet.vertices;
 }
 
@@ -275,7 +270,7 @@ Assembly make_assembly(const comm::Communicator& comm, const std::vector<AnyBody
       }
       for (std::int32_t t = 0; t < sheet.triangles; ++t, corner += 3)
         mesh.triangles.push_back({corners[corner], corners[corner + 1], corners[corner + 2]});
-      Assembly::Body& body = assembly.bodies[static_cast<std::size_t>(sheet.body)];
+      Assembly::Body& body = assembly.bodies[sheet.body];
       body.is_sheet = true;
       body.sheet = make_elements(mesh, is_clamped);
       body.sheet_law = sheet.law;
@@ -285,7 +280,7 @@ Assembly make_assembly(const comm::Communicator& comm, const std::vector<AnyBody
 }
 
 std::vector<std::array<std::int32_t, 6>> list_skin(const Assembly& assembly, std::int32_t body_number) {
-  const Assembly::Body& body = assembly.bodies[static_cast<std::size_t>(body_number)];
+  const Assembly::Body& body = assembly.bodies[body_number];
   if (body.is_sheet) {
     std::vector<std::array<std::int32_t, 6>> triangles;
     for (std::int32_t e = body.first_element; e < body.last_element; ++e) {
@@ -308,8 +303,8 @@ std::vector<std::array<std::int32_t, 6>> list_skin(const Assembly& assembly, std
       Facet facet{{}, std::int64_t{4} * e + static_cast<std::int64_t>(face), {}};
       for (std::size_t i = 0; i < 3; ++i) {
         const int corner = mesh::kFaces[face][i], next = mesh::kFaces[face][(i + 1) % 3];
-        facet.nodes[i] = facet.key[i] = nodes[static_cast<std::size_t>(corner)];
-        facet.nodes[3 + i] = body.width == 4 ? -1 : nodes[static_cast<std::size_t>(kMiddle[corner][next])];
+        facet.nodes[i] = facet.key[i] = nodes[corner];
+        facet.nodes[3 + i] = body.width == 4 ? -1 : nodes[kMiddle[corner][next]];
       }
       std::sort(facet.key.begin(), facet.key.end());
       facets.push_back(facet);
@@ -336,7 +331,7 @@ std::vector<NodeShare> find_shares(const Assembly& assembly, std::int32_t body, 
 
 std::vector<NodeShare> find_shares(const Assembly& assembly, std::span<const std::array<std::int32_t, 6>> skin, const Vec3& point_m,
                                    double* distance_m) {
-  const auto at = [&](std::int32_t node) { return assembly.nodes_m[static_cast<std::size_t>(node)]; };
+  const auto at = [&](std::int32_t node) { return assembly.nodes_m[node]; };
   double least = std::numeric_limits<double>::infinity();
   std::array<std::int32_t, 6> nearest{};
   Vec3 weight{};

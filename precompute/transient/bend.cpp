@@ -39,14 +39,14 @@ class Tangent {
  public:
   Tangent(Domain& domain, const std::vector<HeldNode>& held) : domain_(domain) {
     const Assembly& assembly = domain.get_assembly();
-    const auto nodes = static_cast<std::size_t>(assembly.node_count());
+    const std::size_t nodes = assembly.node_count();
     held_.assign(nodes, 0);
-    for (const HeldNode& one : held) held_[static_cast<std::size_t>(one.node)] = 1;
+    for (const HeldNode& one : held) held_[one.node] = 1;
     first_.assign(nodes, -1);
     axes_.assign(nodes, 0);
     for (std::size_t n = 0; n < nodes; ++n) {
       const auto node = static_cast<std::int32_t>(n);
-      const Assembly::Body& body = assembly.bodies[static_cast<std::size_t>(assembly.find_body_of_node(node))];
+      const Assembly::Body& body = assembly.bodies[assembly.find_body_of_node(node)];
       const bool is_angle = body.is_sheet && node - body.first_node < body.sheet.vertices + body.sheet.edges;
       axes_[n] = assembly.is_point(node) ? 3 : is_angle ? 1 : 0;
       if (axes_[n] == 0 || held_[n] != 0) continue;
@@ -57,14 +57,14 @@ class Tangent {
     near_.resize(nodes);
     for (std::int32_t e = 0; e < assembly.element_count(); ++e)
       for (const std::int32_t node : assembly.find_nodes(e))
-        if (node >= 0) elements[static_cast<std::size_t>(node)].push_back(e);
+        if (node >= 0) elements[node].push_back(e);
     for (std::size_t n = 0; n < nodes; ++n) {
       for (const std::int32_t e : elements[n])
         for (const std::int32_t other : assembly.find_nodes(e)) {
           if (other < 0) continue;
           near_[n].push_back(other);
-          const double length = norm(assembly.nodes_m[n] - assembly.nodes_m[static_cast<std::size_t>(other)]);
-          if (length > 0.0 && axes_[n] == 3 && axes_[static_cast<std::size_t>(other)] == 3) edge_m_ = std::min(edge_m_, length);
+          const double length = norm(assembly.nodes_m[n] - assembly.nodes_m[other]);
+          if (length > 0.0 && axes_[n] == 3 && axes_[other] == 3) edge_m_ = std::min(edge_m_, length);
         }
       std::sort(near_[n].begin(), near_[n].end());
       near_[n].erase(std::unique(near_[n].begin(), near_[n].end()), near_[n].end());
@@ -78,7 +78,7 @@ class Tangent {
 
   /// (free) Elastic forces at u.
   Vector calc_forces(const std::vector<Quad>& u) {
-    force_.resize(static_cast<std::size_t>(domain_.force_count()));
+    force_.resize(domain_.force_count());
     domain_.set_elastic_forces(u.data(), force_.data());
     return gather(force_);
   }
@@ -97,26 +97,25 @@ class Tangent {
     pull = Vector::Zero(freedoms_);
     std::vector<Quad> trial = u;
     std::vector<Vec3> slope(u.size());
-    force_.resize(static_cast<std::size_t>(domain_.force_count()));
+    force_.resize(domain_.force_count());
     for (const std::vector<std::int32_t>& together : colours_)
-      for (int axis = 0; axis < axes_[static_cast<std::size_t>(together[0])]; ++axis) {
-        const double by = axes_[static_cast<std::size_t>(together[0])] == 3 ? kDifference * edge_m_ : kDifference;
+      for (int axis = 0; axis < axes_[together[0]]; ++axis) {
+        const double by = axes_[together[0]] == 3 ? kDifference * edge_m_ : kDifference;
         std::fill(slope.begin(), slope.end(), Vec3{});
         for (const auto& [places, weight] : {std::pair{1.0, 8.0}, {-1.0, -8.0}, {2.0, -1.0}, {-2.0, 1.0}}) {
           for (const std::int32_t node : together)
-            get_component(trial[static_cast<std::size_t>(node)], axis) =
-                get_component(const_cast<Quad&>(u[static_cast<std::size_t>(node)]), axis) + places * by;
+            get_component(trial[node], axis) = get_component(const_cast<Quad&>(u[node]), axis) + places * by;
           domain_.set_elastic_forces(trial.data(), force_.data());
           for (std::size_t n = 0; n < slope.size(); ++n) slope[n] = slope[n] + (weight / (12.0 * by)) * to_vector(force_[n]);
         }
         for (const std::int32_t node : together) {
-          const auto column = static_cast<std::size_t>(node);
+          const std::size_t column = node;
           trial[column] = u[column];
           for (const std::int32_t other : near_[column]) {
-            const auto row = static_cast<std::size_t>(other);
+            const std::size_t row = other;
             if (first_[row] < 0) continue;
             for (int k = 0; k < axes_[row]; ++k) {
-              const double stiffness = -slope[row][static_cast<std::size_t>(k)];
+              const double stiffness = -slope[row][k];
               if (first_[column] >= 0)
                 entries.emplace_back(first_[row] + k, first_[column] + axis, stiffness);
               else
@@ -145,8 +144,8 @@ class Tangent {
       if (axes_[n] == 0) continue;
       used.assign(colours_.size(), 0);
       for (const std::int32_t first : near_[n])
-        for (const std::int32_t second : near_[static_cast<std::size_t>(first)])
-          if (const std::int32_t taken = of[static_cast<std::size_t>(second)]; taken >= 0) used[static_cast<std::size_t>(taken)] = 1;
+        for (const std::int32_t second : near_[first])
+          if (const std::int32_t taken = of[second]; taken >= 0) used[taken] = 1;
       std::size_t own = 0;
       while (own < colours_.size() && (used[own] != 0 || axes_of[own] != axes_[n])) ++own;
       if (own == colours_.size()) {
@@ -213,9 +212,9 @@ bool find_balance(Domain& domain, Tangent& tangent, const Vector& load, std::vec
 
 std::vector<Quad> calc_equilibrium(Domain& domain, const std::vector<HeldNode>& held, const std::vector<PulledNode>& pulled) {
   Tangent tangent(domain, held);
-  std::vector<Quad> u(static_cast<std::size_t>(domain.node_count())), force(u.size());
+  std::vector<Quad> u(domain.node_count()), force(u.size());
   for (const PulledNode& one : pulled) {
-    Quad& f = force[static_cast<std::size_t>(one.node)];
+    Quad& f = force[one.node];
     f = {f.x + one.force_n[0], f.y + one.force_n[1], f.z + one.force_n[2], 0.0};
   }
   const Vector load = tangent.gather(force);
@@ -225,7 +224,7 @@ std::vector<Quad> calc_equilibrium(Domain& domain, const std::vector<HeldNode>& 
     std::vector<Quad> trial = u, moved(u.size());
     for (const HeldNode& one : held) {
       const Vec3 by = (target - done) * one.displacement_m;
-      moved[static_cast<std::size_t>(one.node)] = {by[0], by[1], by[2], 0.0};
+      moved[one.node] = {by[0], by[1], by[2], 0.0};
     }
     if (find_balance(domain, tangent, target * load, moved, trial)) {
       u = std::move(trial);
@@ -245,7 +244,7 @@ std::vector<Quad> calc_equilibrium(Domain& domain, const std::vector<HeldNode>& 
 
 ElasticMode calc_mode(Domain& domain, const std::vector<HeldNode>& held, int number) {
   Tangent tangent(domain, held);
-  std::vector<Quad> u(static_cast<std::size_t>(domain.node_count()));
+  std::vector<Quad> u(domain.node_count());
   Vector none;
   const Sparse k = tangent.calc(u, u, none);
   const int freedoms = tangent.count_freedoms();

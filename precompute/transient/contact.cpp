@@ -88,16 +88,14 @@ Contacts::Contacts(const Domain& domain, TouchSurface surface, std::vector<BallS
     if (place_[i] < 0) continue;
     own_.push_back(static_cast<std::int32_t>(i));
     owner_[i] = comm_.rank();
-    mass_kg_[i] = domain.get_masses_kg()[static_cast<std::size_t>(place)];
+    mass_kg_[i] = domain.get_masses_kg()[place];
   }
   comm_.sum(std::span<std::int32_t>(owner_));
   comm_.sum(std::span<double>(mass_kg_));
   for (const Assembly::Body& body : domain.get_assembly().bodies) names_.push_back(body.name);
   double edges = 0;
   for (const auto& triangle : surface_.triangles)
-    for (std::size_t c = 0; c < 3; ++c)
-      edges += norm(surface_.nodes[static_cast<std::size_t>(triangle[(c + 1) % 3])].rest_m -
-                    surface_.nodes[static_cast<std::size_t>(triangle[c])].rest_m);
+    for (std::size_t c = 0; c < 3; ++c) edges += norm(surface_.nodes[triangle[(c + 1) % 3]].rest_m - surface_.nodes[triangle[c]].rest_m);
   edge_m_ = surface_.triangles.empty() ? 0.0 : edges / (3.0 * static_cast<double>(surface_.triangles.size()));
   margin_m_ = kMargin * edge_m_;
 }
@@ -108,7 +106,7 @@ Contacts::Nearest Contacts::find_nearest(const Vec3& p, const std::vector<std::i
   double least = std::numeric_limits<double>::infinity(), height = 0;
   Vec3 way{}, face{};
   for (const std::int32_t t : triangles) {
-    const auto& triangle = surface_.triangles[static_cast<std::size_t>(t)];
+    const auto& triangle = surface_.triangles[t];
     const std::array<Vec3, 3> at{find_position(triangle[0]), find_position(triangle[1]), find_position(triangle[2])};
     const Vec3 w = weigh_corners(p, at[0], at[1], at[2]);
     const Vec3 there = p - (w[0] * at[0] + w[1] * at[1] + w[2] * at[2]), twice = cross(at[1] - at[0], at[2] - at[0]);
@@ -123,8 +121,7 @@ Contacts::Nearest Contacts::find_nearest(const Vec3& p, const std::vector<std::i
     way = there;
     face = (1.0 / norm(twice)) * twice;
   }
-  const bool is_sheet =
-      surface_.nodes[static_cast<std::size_t>(surface_.triangles[static_cast<std::size_t>(nearest.triangle)][0])].reach_m > 0;
+  const bool is_sheet = surface_.nodes[surface_.triangles[nearest.triangle][0]].reach_m > 0;
   nearest.distance_m = is_sheet || height >= 0 ? least : -least;
   nearest.normal = least > kSame * edge_m_ ? (1.0 / nearest.distance_m) * way : face;
   return nearest;
@@ -135,7 +132,7 @@ void Contacts::check_start() const {
   const auto refuse = [](const std::string& who, double depth, const std::string& where) {
     throw InputError(fmt::format("{} lies {:.3g} m deep in {} at the start; move it away", who, depth, where));
   };
-  const auto name = [&](std::int32_t body) { return fmt::format("body \"{}\"", names_[static_cast<std::size_t>(body)]); };
+  const auto name = [&](std::int32_t body) { return fmt::format("body \"{}\"", names_[body]); };
   for (std::size_t i = 0; i < surface_.nodes.size(); ++i)
     for (std::size_t o = 0; o < obstacles_.size(); ++o) {
       const double depth = surface_.nodes[i].reach_m - find_clearance(obstacles_[o], found_at_m_[i]).distance_m;
@@ -143,11 +140,10 @@ void Contacts::check_start() const {
     }
   for (const Candidate& candidate : candidates_) {
     const bool is_striker = candidate.vertex < 0;
-    const auto vertex = static_cast<std::size_t>(is_striker ? -1 - candidate.vertex : candidate.vertex);
+    const std::size_t vertex = is_striker ? -1 - candidate.vertex : candidate.vertex;
     const Vec3 p = is_striker ? strikers_[vertex].position_m : found_at_m_[vertex];
-    const Nearest nearest =
-        find_nearest(p, candidate.triangles, [&](std::int32_t node) { return found_at_m_[static_cast<std::size_t>(node)]; });
-    const TouchNode& corner = surface_.nodes[static_cast<std::size_t>(surface_.triangles[static_cast<std::size_t>(nearest.triangle)][0])];
+    const Nearest nearest = find_nearest(p, candidate.triangles, [&](std::int32_t node) { return found_at_m_[node]; });
+    const TouchNode& corner = surface_.nodes[surface_.triangles[nearest.triangle][0]];
     const double reach = (is_striker ? strikers_[vertex].radius_m : surface_.nodes[vertex].reach_m) + corner.reach_m;
     const double depth = reach - nearest.distance_m;
     if (depth > most)
@@ -159,7 +155,7 @@ void Contacts::search(const Quad* u) {
   // Positions of all, on every rank: those that others own are 0 here.
   std::vector<double> all(3 * surface_.nodes.size());
   for (const std::int32_t i : own_) {
-    const auto s = static_cast<std::size_t>(i);
+    const std::size_t s = i;
     const Vec3 at = surface_.nodes[s].rest_m + to_vector(u[place_[s]]);
     for (std::size_t k = 0; k < 3; ++k) all[3 * s + k] = at[k];
   }
@@ -171,7 +167,7 @@ void Contacts::search(const Quad* u) {
   near_obstacles_.clear();
   for (const std::int32_t i : own_)
     for (std::size_t o = 0; o < obstacles_.size(); ++o) {
-      const auto s = static_cast<std::size_t>(i);
+      const std::size_t s = i;
       if (find_clearance(obstacles_[o], found_at_m_[s]).distance_m < surface_.nodes[s].reach_m + margin_m_)
         near_obstacles_.push_back({i, static_cast<std::int32_t>(o)});
     }
@@ -181,17 +177,15 @@ void Contacts::search(const Quad* u) {
   if (strikers_.empty() && bodies_ < 2) return;
   double longest = edge_m_;
   for (const auto& triangle : surface_.triangles)
-    for (std::size_t c = 0; c < 3; ++c)
-      longest = std::max(
-          longest, norm(found_at_m_[static_cast<std::size_t>(triangle[(c + 1) % 3])] - found_at_m_[static_cast<std::size_t>(triangle[c])]));
+    for (std::size_t c = 0; c < 3; ++c) longest = std::max(longest, norm(found_at_m_[triangle[(c + 1) % 3]] - found_at_m_[triangle[c]]));
   Grid grid{longest + 2.0 * margin_m_, {}};
   for (std::size_t t = 0; t < surface_.triangles.size(); ++t) {
     const auto& triangle = surface_.triangles[t];
-    Vec3 low = found_at_m_[static_cast<std::size_t>(triangle[0])], high = low;
+    Vec3 low = found_at_m_[triangle[0]], high = low;
     for (std::size_t c = 1; c < 3; ++c)
       for (std::size_t k = 0; k < 3; ++k) {
-        low[k] = std::min(low[k], found_at_m_[static_cast<std::size_t>(triangle[c])][k]);
-        high[k] = std::max(high[k], found_at_m_[static_cast<std::size_t>(triangle[c])][k]);
+        low[k] = std::min(low[k], found_at_m_[triangle[c]][k]);
+        high[k] = std::max(high[k], found_at_m_[triangle[c]][k]);
       }
     const auto from = grid.find(low), to = grid.find(high);
     for (std::int64_t i = from[0]; i <= to[0]; ++i)
@@ -208,9 +202,8 @@ void Contacts::search(const Quad* u) {
           const auto cell = grid.at.find(Grid::hash({i, j, k}));
           if (cell == grid.at.end()) continue;
           for (const std::int32_t t : cell->second) {
-            const auto& triangle = surface_.triangles[static_cast<std::size_t>(t)];
-            const auto a = static_cast<std::size_t>(triangle[0]), b = static_cast<std::size_t>(triangle[1]),
-                       c = static_cast<std::size_t>(triangle[2]);
+            const auto& triangle = surface_.triangles[t];
+            const std::size_t a = triangle[0], b = triangle[1], c = triangle[2];
             if (surface_.nodes[a].body == body) continue;
             const Vec3 w = weigh_corners(p, found_at_m_[a], found_at_m_[b], found_at_m_[c]);
             const Vec3 at = w[0] * found_at_m_[a] + w[1] * found_at_m_[b] + w[2] * found_at_m_[c];
@@ -221,8 +214,8 @@ void Contacts::search(const Quad* u) {
       std::sort(triangles.begin(), triangles.end());
       triangles.erase(std::unique(triangles.begin(), triangles.end()), triangles.end());
       for (const std::int32_t t : triangles)
-        for (const std::int32_t node : surface_.triangles[static_cast<std::size_t>(t)]) is_active[static_cast<std::size_t>(node)] = true;
-      if (vertex >= 0) is_active[static_cast<std::size_t>(vertex)] = true;
+        for (const std::int32_t node : surface_.triangles[t]) is_active[node] = true;
+      if (vertex >= 0) is_active[vertex] = true;
       candidates_.push_back({vertex, other, std::move(triangles)});
     }
   };
@@ -233,12 +226,12 @@ void Contacts::search(const Quad* u) {
       find_near(static_cast<std::int32_t>(i), surface_.nodes[i].body, found_at_m_[i], surface_.nodes[i].reach_m + margin_m_);
 
   active_.clear();
-  std::vector<std::vector<std::int32_t>> by_rank(static_cast<std::size_t>(comm_.size()));
+  std::vector<std::vector<std::int32_t>> by_rank(comm_.size());
   for (std::size_t i = 0; i < is_active.size(); ++i) {
     if (!is_active[i]) continue;
     active_index_[i] = static_cast<std::int32_t>(active_.size());
     active_.push_back(static_cast<std::int32_t>(i));
-    by_rank[static_cast<std::size_t>(owner_[i])].push_back(static_cast<std::int32_t>(i));
+    by_rank[owner_[i]].push_back(static_cast<std::int32_t>(i));
   }
   active_counts_.clear();
   active_begin_.assign(1, 0);
@@ -248,7 +241,7 @@ void Contacts::search(const Quad* u) {
     active_begin_.push_back(active_begin_.back() + active_counts_.back());
     active_order_.insert(active_order_.end(), list.begin(), list.end());
   }
-  sent_.resize(static_cast<std::size_t>(active_counts_[static_cast<std::size_t>(comm_.rank())]));
+  sent_.resize(active_counts_[comm_.rank()]);
   received_.resize(6 * active_.size());
   x_.resize(active_.size());
   v_.resize(active_.size());
@@ -256,9 +249,9 @@ void Contacts::search(const Quad* u) {
 
 void Contacts::gather_active(const Quad* u, const Quad* v) {
   std::size_t at = 0;
-  const auto rank = static_cast<std::size_t>(comm_.rank());
+  const std::size_t rank = comm_.rank();
   for (std::size_t k = static_cast<std::size_t>(active_begin_[rank]) / 6; k < static_cast<std::size_t>(active_begin_[rank + 1]) / 6; ++k) {
-    const auto i = static_cast<std::size_t>(active_order_[k]);
+    const std::size_t i = active_order_[k];
     const Vec3 x = surface_.nodes[i].rest_m + to_vector(u[place_[i]]), speed = to_vector(v[place_[i]]);
     for (std::size_t c = 0; c < 3; ++c) sent_[at++] = x[c];
     for (std::size_t c = 0; c < 3; ++c) sent_[at++] = speed[c];
@@ -266,7 +259,7 @@ void Contacts::gather_active(const Quad* u, const Quad* v) {
   MPI_Allgatherv(sent_.data(), static_cast<int>(sent_.size()), MPI_DOUBLE, received_.data(), active_counts_.data(), active_begin_.data(),
                  MPI_DOUBLE, comm_);
   for (std::size_t k = 0; k < active_order_.size(); ++k) {
-    const auto i = static_cast<std::size_t>(active_index_[static_cast<std::size_t>(active_order_[k])]);
+    const std::size_t i = active_index_[active_order_[k]];
     for (std::size_t c = 0; c < 3; ++c) {
       x_[i][c] = received_[6 * k + c];
       v_[i][c] = received_[6 * k + 3 + c];
@@ -301,9 +294,9 @@ Vec3 Contacts::calc_force(const StepTime& time, const Key& key, const Pair& pair
 
 void Contacts::add_obstacles(const StepTime& time, const Quad* u, const Quad* v, Quad* f) {
   for (const auto& [i, o] : near_obstacles_) {
-    const auto s = static_cast<std::size_t>(i);
+    const std::size_t s = i;
     const TouchNode& node = surface_.nodes[s];
-    const Clearance at = find_clearance(obstacles_[static_cast<std::size_t>(o)], node.rest_m + to_vector(u[place_[s]]));
+    const Clearance at = find_clearance(obstacles_[o], node.rest_m + to_vector(u[place_[s]]));
     const Pair pair{node.stiffness_n_m, node.reach_m - at.distance_m, mass_kg_[s], at.normal, to_vector(v[place_[s]])};
     Account account;
     add(f[place_[s]], calc_force(time, {i, -1 - o}, pair, account));
@@ -316,26 +309,26 @@ void Contacts::add_pairs(const StepTime& time, Quad* f) {
   on_striker_n_.assign(strikers_.size(), Vec3{});
   on_striker_n_m_.assign(strikers_.size(), Vec3{});
   Account account;
-  const auto find_active = [&](std::int32_t node) { return static_cast<std::size_t>(active_index_[static_cast<std::size_t>(node)]); };
+  const auto find_active = [&](std::int32_t node) { return static_cast<std::size_t>(active_index_[node]); };
   const auto give = [&](std::int32_t node, const Vec3& force) {
-    const std::int32_t place = place_[static_cast<std::size_t>(node)];
+    const std::int32_t place = place_[node];
     if (place >= 0) add(f[place], force);
   };
   for (const Candidate& candidate : candidates_) {
     const bool is_striker = candidate.vertex < 0;
-    const auto striker = static_cast<std::size_t>(is_striker ? -1 - candidate.vertex : 0);
-    const auto vertex = static_cast<std::size_t>(is_striker ? 0 : candidate.vertex);
+    const std::size_t striker = is_striker ? -1 - candidate.vertex : 0;
+    const std::size_t vertex = is_striker ? 0 : candidate.vertex;
     const Vec3 p = is_striker ? strikers_[striker].position_m : x_[find_active(candidate.vertex)];
     const Nearest nearest = find_nearest(p, candidate.triangles, [&](std::int32_t node) { return x_[find_active(node)]; });
-    const auto& triangle = surface_.triangles[static_cast<std::size_t>(nearest.triangle)];
+    const auto& triangle = surface_.triangles[nearest.triangle];
     Pair pair;
     pair.normal = nearest.normal;
-    pair.depth_m = (is_striker ? strikers_[striker].radius_m : surface_.nodes[vertex].reach_m) +
-                   surface_.nodes[static_cast<std::size_t>(triangle[0])].reach_m - nearest.distance_m;
+    pair.depth_m = (is_striker ? strikers_[striker].radius_m : surface_.nodes[vertex].reach_m) + surface_.nodes[triangle[0]].reach_m -
+                   nearest.distance_m;
     pair.relative_m_s = is_striker ? calc_touching_velocity(strikers_[striker], pair.normal) : v_[find_active(candidate.vertex)];
     double per_mass = is_striker ? kBallSlide / strikers_[striker].mass_kg : 1.0 / mass_kg_[vertex];
     for (std::size_t c = 0; c < 3; ++c) {
-      const auto corner = static_cast<std::size_t>(triangle[c]);
+      const std::size_t corner = triangle[c];
       const double w = nearest.weights[c];
       pair.relative_m_s = pair.relative_m_s - w * v_[find_active(triangle[c])];
       pair.stiffness_n_m += w * surface_.nodes[corner].stiffness_n_m;
@@ -394,7 +387,7 @@ void Contacts::add_striker_obstacles(const StepTime& time, Account& account) {
 void Contacts::look_around(const StepTime& time, const Quad* u, const Quad* v) {
   double moved = 0, fastest = 0;
   for (const std::int32_t i : own_) {
-    const auto s = static_cast<std::size_t>(i);
+    const std::size_t s = i;
     take_larger(norm(surface_.nodes[s].rest_m + to_vector(u[place_[s]]) - found_at_m_[s]), moved);
     take_larger(norm(to_vector(v[place_[s]])), fastest);
   }
@@ -437,8 +430,8 @@ double Contacts::calc_longest_step_s(const std::vector<double>& omega_rad_s) con
   double longest = std::numeric_limits<double>::infinity();
   if (is_needed())
     for (const std::int32_t i : own_) {
-      const auto s = static_cast<std::size_t>(i);
-      const double omega = omega_rad_s[static_cast<std::size_t>(surface_.nodes[s].body)];
+      const std::size_t s = i;
+      const double omega = omega_rad_s[surface_.nodes[s].body];
       longest = std::min(longest, 2.0 / std::sqrt(omega * omega + surface_.nodes[s].stiffness_n_m / mass_kg_[s]));
     }
   return comm_.min(longest);
@@ -511,7 +504,7 @@ void Contacts::load(std::span<const std::byte> bytes) {
     const auto refuse = [] { throw InputError("the checkpoint's contacts are cut off or of other bodies; start again without it"); };
     if (all.size() < sizeof head) refuse();
     std::memcpy(&head, all.data(), sizeof head);
-    const auto strikers = static_cast<std::size_t>(head.strikers), touches = static_cast<std::size_t>(head.touches);
+    const std::size_t strikers = head.strikers, touches = head.touches;
     if (strikers != strikers_.size() || touches > all.size() ||
         all.size() != sizeof head + strikers * kStrikerBytes + touches * sizeof(KeptTouch))
       refuse();
@@ -525,8 +518,7 @@ void Contacts::load(std::span<const std::byte> bytes) {
       std::memcpy(&kept, all.data() + sizeof head + strikers * kStrikerBytes + t * sizeof kept, sizeof kept);
       if (kept.first >= static_cast<std::int32_t>(surface_.nodes.size())) refuse();
       const bool is_local = kept.first >= 0 && kept.second < 0;
-      if (!is_local || place_[static_cast<std::size_t>(kept.first)] >= 0)
-        touches_[{kept.first, kept.second}] = {kept.closing_m_s, kept.stiffness_n_m, kept.loss_n};
+      if (!is_local || place_[kept.first] >= 0) touches_[{kept.first, kept.second}] = {kept.closing_m_s, kept.stiffness_n_m, kept.loss_n};
     }
     lost_own_ = {};
     lost_shared_ = head.lost_j;

@@ -21,7 +21,7 @@ namespace {
 constexpr double kSliverShare = 0.2;
 
 std::vector<std::int32_t> cut(const comm::Communicator& comm, const Assembly& assembly) {
-  const auto elements = static_cast<std::size_t>(assembly.element_count());
+  const std::size_t elements = assembly.element_count();
   if (comm.size() == 1) return std::vector<std::int32_t>(elements, 0);
   const bool has_sheets =
       std::any_of(assembly.bodies.begin(), assembly.bodies.end(), [](const Assembly::Body& body) { return body.is_sheet; });
@@ -39,13 +39,13 @@ std::vector<std::int32_t> cut(const comm::Communicator& comm, const Assembly& as
     if (elements < static_cast<std::size_t>(comm.size()))
       throw InputError(fmt::format("there are {} elements for {} ranks; take fewer ranks", elements, comm.size()));
   });
-  const auto ranks = static_cast<std::size_t>(comm.size()), rank = static_cast<std::size_t>(comm.rank());
+  const std::size_t ranks = comm.size(), rank = comm.rank();
   const std::size_t first = elements * rank / ranks, last = elements * (rank + 1) / ranks;
   std::vector<Vec3> centres;
   for (std::size_t e = first; e < last; ++e) {
     Vec3 centre{};
     for (std::size_t a = 0; a < 3; ++a)
-      centre = centre + 1.0 / 3.0 * assembly.nodes_m[static_cast<std::size_t>(assembly.find_nodes(static_cast<std::int32_t>(e))[a])];
+      centre = centre + 1.0 / 3.0 * assembly.nodes_m[assembly.find_nodes(static_cast<std::int32_t>(e))[a]];
     centres.push_back(centre);
   }
   return comm.all_gather(partition::bisect(comm, centres, static_cast<std::int64_t>(first)));
@@ -53,10 +53,10 @@ std::vector<std::int32_t> cut(const comm::Communicator& comm, const Assembly& as
 
 /// The step [s] that a triangle of a sheet allows by itself: its least height over the speed of a plane wave.
 double calc_triangle_step(const Assembly& assembly, std::int32_t element) {
-  const Assembly::Body& body = assembly.bodies[static_cast<std::size_t>(assembly.find_body(element))];
+  const Assembly::Body& body = assembly.bodies[assembly.find_body(element)];
   const auto nodes = assembly.find_nodes(element);
   std::array<Vec3, 3> at{};
-  for (std::size_t c = 0; c < 3; ++c) at[c] = assembly.nodes_m[static_cast<std::size_t>(nodes[c])];
+  for (std::size_t c = 0; c < 3; ++c) at[c] = assembly.nodes_m[nodes[c]];
   double longest = 0;
   for (std::size_t c = 0; c < 3; ++c) longest = std::max(longest, norm(at[(c + 1) % 3] - at[c]));
   const SheetLaw& law = body.sheet_law;
@@ -67,14 +67,14 @@ double calc_triangle_step(const Assembly& assembly, std::int32_t element) {
 /// The rank of each node. Nodes on the seam between two parts go half to the one and half to the other, by number, that is by place: so
 /// both compute half of the elements along the seam twice, and not one of them all.
 std::vector<std::int32_t> find_owners(const Assembly& all, const std::vector<std::int32_t>& part) {
-  const auto nodes = static_cast<std::size_t>(all.node_count());
+  const std::size_t nodes = all.node_count();
   std::vector<std::int32_t> lowest(nodes, std::numeric_limits<std::int32_t>::max()), highest(nodes, 0);
   for (std::int32_t e = 0; e < all.element_count(); ++e)
     for (const std::int32_t node : all.find_nodes(e)) {
       if (node < 0) continue;
-      const auto n = static_cast<std::size_t>(node);
-      lowest[n] = std::min(lowest[n], part[static_cast<std::size_t>(e)]);
-      highest[n] = std::max(highest[n], part[static_cast<std::size_t>(e)]);
+      const std::size_t n = node;
+      lowest[n] = std::min(lowest[n], part[e]);
+      highest[n] = std::max(highest[n], part[e]);
     }
   std::map<std::pair<std::int32_t, std::int32_t>, std::pair<std::int64_t, std::int64_t>> seams;  // how many nodes, how many seen
   for (std::size_t n = 0; n < nodes; ++n) ++seams[{lowest[n], highest[n]}].first;
@@ -88,7 +88,7 @@ std::vector<std::int32_t> find_owners(const Assembly& all, const std::vector<std
 ElementShape make_shape_of(const Assembly& assembly, std::int32_t element) {
   const auto nodes = assembly.find_nodes(element);
   std::array<Vec3, 10> x{};
-  for (std::size_t a = 0; a < nodes.size(); ++a) x[a] = assembly.nodes_m[static_cast<std::size_t>(nodes[a])];
+  for (std::size_t a = 0; a < nodes.size(); ++a) x[a] = assembly.nodes_m[nodes[a]];
   ElementShape shape;
   if (!make_shape(assembly.find_kind(element), std::span(x.data(), nodes.size()), shape))
     throw InputError(assembly.describe(element) + ", is inside out or folded over; repair the mesh");
@@ -109,18 +109,17 @@ Domain::Domain(const comm::Communicator& comm, std::shared_ptr<const Assembly> a
     std::vector<char> is_wanted(owner.size(), 0);
     for (std::int32_t e = 0; e < all.element_count(); ++e) {
       const auto nodes = all.find_nodes(e);
-      const auto is_own = [&](std::int32_t node) { return node >= 0 && owner[static_cast<std::size_t>(node)] == rank; };
+      const auto is_own = [&](std::int32_t node) { return node >= 0 && owner[node] == rank; };
       if (std::none_of(nodes.begin(), nodes.end(), is_own)) continue;
       element_.push_back(e);
       // Reported by the owner of its first node, who has it surely.
       is_reported_.push_back(is_own(nodes[0]) ? 1 : 0);
       for (const std::int32_t node : nodes)
-        if (node >= 0 && !is_own(node) && !std::exchange(is_wanted[static_cast<std::size_t>(node)], 1))
-          others.emplace_back(owner[static_cast<std::size_t>(node)], node);
+        if (node >= 0 && !is_own(node) && !std::exchange(is_wanted[node], 1)) others.emplace_back(owner[node], node);
     }
     std::sort(others.begin(), others.end());
     for (std::int32_t node = 0; node < all.node_count(); ++node)
-      if (owner[static_cast<std::size_t>(node)] == rank) number_.push_back(node);
+      if (owner[node] == rank) number_.push_back(node);
     own_ = static_cast<std::int32_t>(number_.size());
     for (const auto& [of, node] : others) {
       halo.number.push_back(node);
@@ -130,11 +129,11 @@ Domain::Domain(const comm::Communicator& comm, std::shared_ptr<const Assembly> a
     }
     place_.assign(owner.size(), -1);
     for (std::size_t i = 0; i < number_.size(); ++i) {
-      place_[static_cast<std::size_t>(number_[i])] = static_cast<std::int32_t>(i);
-      rest_m_.push_back(all.nodes_m[static_cast<std::size_t>(number_[i])]);
+      place_[number_[i]] = static_cast<std::int32_t>(i);
+      rest_m_.push_back(all.nodes_m[number_[i]]);
       body_.push_back(all.find_body_of_node(number_[i]));
       is_point_.push_back(all.is_point(number_[i]) ? 1 : 0);
-      const Assembly::Body& body = all.bodies[static_cast<std::size_t>(body_.back())];
+      const Assembly::Body& body = all.bodies[body_.back()];
       const std::int32_t in_body = number_[i] - body.first_node;
       is_angle_.push_back(body.is_sheet && in_body >= body.sheet.vertices && in_body < body.sheet.vertices + body.sheet.edges ? 1 : 0);
       if (body.is_sheet) of_sheets_.push_back(static_cast<std::int32_t>(i));
@@ -151,7 +150,7 @@ void Domain::make_elements() {
   ElementNodes elements;  // without the places that a sheet's triangle at the rim does not have
   std::vector<Law> laws;
   for (const Assembly::Body& body : all.bodies) laws.push_back(body.law);
-  mass_kg_.assign(static_cast<std::size_t>(own_), 0.0);
+  mass_kg_.assign(own_, 0.0);
   for (const std::int32_t e : element_) {
     std::vector<std::int32_t> places;
     for (const std::int32_t node : all.find_nodes(e))
@@ -160,22 +159,20 @@ void Domain::make_elements() {
     if (all.find_kind(e) == Kind::kSheet) continue;
     const ElementShape shape = make_shape_of(all, e);
     for (std::size_t a = 0; a < places.size(); ++a)
-      if (places[a] < own_)
-        mass_kg_[static_cast<std::size_t>(places[a])] +=
-            laws[static_cast<std::size_t>(all.find_body(e))].density_kg_m3 * shape.lumped_m3[a];
+      if (places[a] < own_) mass_kg_[places[a]] += laws[all.find_body(e)].density_kg_m3 * shape.lumped_m3[a];
   }
   for (const Assembly::Body& body : all.bodies) {
     if (!body.is_sheet) continue;
     const std::vector<double> mass = calc_masses(body.sheet, body.sheet_law);
     for (std::size_t n = 0; n < mass.size(); ++n) {
       const std::int32_t place = find_place(body.first_node + static_cast<std::int32_t>(n));
-      if (place >= 0 && place < own_) mass_kg_[static_cast<std::size_t>(place)] = mass[n];
+      if (place >= 0 && place < own_) mass_kg_[place] = mass[n];
     }
   }
   if (!of_sheets_.empty()) x_.resize(number_.size());
   const std::int32_t no_entry = own_;
   plan_ = plan_writes(elements, own_, own_ + 1, no_entry);
-  const auto find_writes = [&](std::int32_t i) { return plan_.writes.begin() + elements.begin[static_cast<std::size_t>(i)]; };
+  const auto find_writes = [&](std::int32_t i) { return plan_.writes.begin() + elements.begin[i]; };
   const auto pick = [&](const std::vector<std::int32_t>& list) {
     Part part;
     std::vector<SolidElement> solids;
@@ -185,7 +182,7 @@ void Domain::make_elements() {
     };
     std::vector<Triangles> sheets(all.bodies.size());
     for (const std::int32_t i : list) {
-      const std::int32_t e = element_[static_cast<std::size_t>(i)], body = all.find_body(e);
+      const std::int32_t e = element_[i], body = all.find_body(e);
       const auto nodes = all.find_nodes(e);
       auto write = find_writes(i);
       if (all.find_kind(e) != Kind::kSheet) {
@@ -196,9 +193,9 @@ void Domain::make_elements() {
         part.list.push_back(i);
         continue;
       }
-      Triangles& triangles = sheets[static_cast<std::size_t>(body)];
+      Triangles& triangles = sheets[body];
       triangles.list.push_back(i);
-      triangles.which.push_back(e - all.bodies[static_cast<std::size_t>(body)].first_element);
+      triangles.which.push_back(e - all.bodies[body].first_element);
       std::array<std::int32_t, 9> from{}, to{};
       for (std::size_t a = 0; a < 9; ++a) {
         from[a] = nodes[a] < 0 ? -1 : find_place(nodes[a]);
@@ -221,7 +218,7 @@ void Domain::make_elements() {
 void Domain::set_places(const Quad* u, std::int32_t begin, std::int32_t end) const {
   const auto from = std::lower_bound(of_sheets_.begin(), of_sheets_.end(), begin), to = std::lower_bound(from, of_sheets_.end(), end);
   for (auto at = from; at != to; ++at) {
-    const auto i = static_cast<std::size_t>(*at);
+    const std::size_t i = *at;
     const bool is_angle = is_angle_[i] != 0;
     x_[i] = is_angle ? u[i] : Quad{rest_m_[i][0] + u[i].x, rest_m_[i][1] + u[i].y, rest_m_[i][2] + u[i].z, 0.0};
   }
@@ -237,12 +234,11 @@ void Domain::check_slivers() const {
     for (std::size_t i = 0; i < element_.size(); ++i) {
       if (is_reported_[i] == 0) continue;
       const std::int32_t body = assembly_->find_body(element_[i]);
-      if (assembly_->bodies[static_cast<std::size_t>(body)].is_sheet) {
+      if (assembly_->bodies[body].is_sheet) {
         own.push_back({body, element_[i], calc_triangle_step(*assembly_, element_[i])});
         continue;
       }
-      own.push_back({body, element_[i],
-                     2.0 / calc_omega(make_shape_of(*assembly_, element_[i]), assembly_->bodies[static_cast<std::size_t>(body)].law)});
+      own.push_back({body, element_[i], 2.0 / calc_omega(make_shape_of(*assembly_, element_[i]), assembly_->bodies[body].law)});
     }
     return own;
   });
@@ -295,7 +291,7 @@ Domain::State Domain::calc_state(const Quad* u) const {
   State state;
   std::vector<double> energy, least;
   const auto report = [&](std::int32_t i, double energy_j, double least_det) {
-    const auto at = static_cast<std::size_t>(i);
+    const std::size_t at = i;
     if (is_reported_[at] == 0) return;
     state.element.push_back(element_[at]);
     state.energy_j.push_back(energy_j);
@@ -320,10 +316,10 @@ std::vector<double> Domain::list_spent() const {
   for (const Part* part : {&inner_, &outer_}) {
     const std::vector<double> all = part->solids.list_spent();
     for (std::size_t i = 0; i < part->list.size(); ++i)
-      if (is_reported_[static_cast<std::size_t>(part->list[i])] != 0) spent.push_back(all[i]);
+      if (is_reported_[part->list[i]] != 0) spent.push_back(all[i]);
     for (const SheetRun& run : part->sheets)
       for (std::size_t i = 0; i < run.list.size(); ++i)
-        if (is_reported_[static_cast<std::size_t>(run.list[i])] != 0) spent.push_back(run.sheets.get_spent(i));
+        if (is_reported_[run.list[i]] != 0) spent.push_back(run.sheets.get_spent(i));
   }
   return spent;
 }
@@ -338,7 +334,7 @@ void Domain::forget_spent() {
 void Domain::save_elements(std::vector<std::int32_t>& element, std::vector<double>& state) const {
   static_assert(Sheets::kStateWidth <= Solids::kStateWidth);
   const auto append = [&](std::int32_t i, const double* values, std::size_t count) {
-    const auto at = static_cast<std::size_t>(i);
+    const std::size_t at = i;
     if (is_reported_[at] == 0) return;
     element.push_back(element_[at]);
     state.insert(state.end(), values, values + count);
@@ -359,7 +355,7 @@ void Domain::save_elements(std::vector<std::int32_t>& element, std::vector<doubl
 
 void Domain::load_elements(std::span<const double> state_of_all) {
   const auto find = [&](std::int32_t i) {
-    return state_of_all.subspan(static_cast<std::size_t>(element_[static_cast<std::size_t>(i)]) * Solids::kStateWidth, Solids::kStateWidth);
+    return state_of_all.subspan(static_cast<std::size_t>(element_[i]) * Solids::kStateWidth, Solids::kStateWidth);
   };
   for (Part* part : {&inner_, &outer_}) {
     std::vector<double> own;

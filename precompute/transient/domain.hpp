@@ -31,13 +31,13 @@ class Domain {
   std::int32_t node_count() const { return static_cast<std::int32_t>(number_.size()); }      // own and halo: length of u and v
   std::int32_t force_count() const { return plan_.last_slot; }                               // length of f: own, one spare, slots
   std::int64_t element_count() const { return static_cast<std::int64_t>(element_.size()); }  // that this rank computes
-  std::int32_t find_number(std::int32_t place) const { return number_[static_cast<std::size_t>(place)]; }
-  std::int32_t find_body(std::int32_t place) const { return body_[static_cast<std::size_t>(place)]; }
+  std::int32_t find_number(std::int32_t place) const { return number_[place]; }
+  std::int32_t find_body(std::int32_t place) const { return body_[place]; }
   /// Place of a node of the assembly in u and v; -1 where this rank does not have it. Own if under own_count().
-  std::int32_t find_place(std::int32_t number) const { return place_[static_cast<std::size_t>(number)]; }
-  bool is_point(std::int32_t place) const { return is_point_[static_cast<std::size_t>(place)] != 0; }  // Assembly::is_point
-  const std::vector<Vec3>& get_rest_m() const { return rest_m_; }                                      // (node_count)
-  const std::vector<double>& get_masses_kg() const { return mass_kg_; }                                // (own_count) lumped
+  std::int32_t find_place(std::int32_t number) const { return place_[number]; }
+  bool is_point(std::int32_t place) const { return is_point_[place] != 0; }  // Assembly::is_point
+  const std::vector<Vec3>& get_rest_m() const { return rest_m_; }            // (node_count)
+  const std::vector<double>& get_masses_kg() const { return mass_kg_; }      // (own_count) lumped
 
   /// Sends own values to the halos of others, and fills the halo of `values` (node_count). Between both, inner elements may be computed.
   /// Collective; allocates nothing.

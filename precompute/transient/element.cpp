@@ -21,7 +21,7 @@ std::array<Barycentric, 10> calc_derivatives(const Barycentric& L) {
   std::array<Barycentric, 10> d{};
   for (std::size_t k = 0; k < 4; ++k) d[k][k] = 4.0 * L[k] - 1.0;
   for (std::size_t e = 0; e < 6; ++e) {
-    const auto i = static_cast<std::size_t>(mesh::kEdges[e][0]), j = static_cast<std::size_t>(mesh::kEdges[e][1]);
+    const std::size_t i = mesh::kEdges[e][0], j = mesh::kEdges[e][1];
     d[4 + e][i] = 4.0 * L[j];
     d[4 + e][j] = 4.0 * L[i];
   }
@@ -31,8 +31,7 @@ std::array<Barycentric, 10> calc_derivatives(const Barycentric& L) {
 std::array<double, 10> calc_values(const Barycentric& L) {
   std::array<double, 10> n{};
   for (std::size_t k = 0; k < 4; ++k) n[k] = L[k] * (2.0 * L[k] - 1.0);
-  for (std::size_t e = 0; e < 6; ++e)
-    n[4 + e] = 4.0 * L[static_cast<std::size_t>(mesh::kEdges[e][0])] * L[static_cast<std::size_t>(mesh::kEdges[e][1])];
+  for (std::size_t e = 0; e < 6; ++e) n[4 + e] = 4.0 * L[mesh::kEdges[e][0]] * L[mesh::kEdges[e][1]];
   return n;
 }
 
@@ -87,7 +86,7 @@ bool lump_curved(std::span<const Vec3> x, std::array<double, 10>& lumped) {
 
 bool is_curved(std::span<const Vec3> x_m) {
   for (std::size_t e = 0; e < 6; ++e) {
-    const Vec3 &a = x_m[static_cast<std::size_t>(mesh::kEdges[e][0])], &b = x_m[static_cast<std::size_t>(mesh::kEdges[e][1])];
+    const Vec3 &a = x_m[mesh::kEdges[e][0]], &b = x_m[mesh::kEdges[e][1]];
     if (norm(x_m[4 + e] - 0.5 * (a + b)) > 1e-6 * norm(b - a)) return true;
   }
   return false;
@@ -122,7 +121,7 @@ bool make_shape(Kind kind, std::span<const Vec3> x_m, ElementShape& shape) {
 
 double calc_omega(const ElementShape& shape, const Law& law) {
   constexpr int kIterations = 40;
-  const auto nodes = static_cast<std::size_t>(count_nodes(shape.kind)), points = static_cast<std::size_t>(count_points(shape.kind));
+  const std::size_t nodes = count_nodes(shape.kind), points = count_points(shape.kind);
   // Gradients of the shape functions at the points.
   std::array<std::array<Vec3, 10>, 4> b{};
   for (std::size_t q = 0; q < points; ++q) {

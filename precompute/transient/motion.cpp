@@ -53,9 +53,9 @@ Motion::Motion(Domain& domain, const MotionOptions& options, std::vector<Constra
     constraints_ = std::move(constraints);
     impulses_ = std::move(impulses);
     const Assembly& assembly = domain_.get_assembly();
-    const auto own = static_cast<std::size_t>(domain_.own_count()), nodes = static_cast<std::size_t>(domain_.node_count());
+    const std::size_t own = domain_.own_count(), nodes = domain_.node_count();
     for (auto* array : {&u_, &v_}) array->resize(nodes);
-    f_.resize(static_cast<std::size_t>(domain_.force_count()));
+    f_.resize(domain_.force_count());
     for (auto* array : {&external_, &work_, &brake_loss_, &carried_, &home_, &reaction_}) array->resize(own);
     is_constrained_.resize(own, 0);
     is_constrained_for_ever_.resize(own, 0);
@@ -63,11 +63,11 @@ Motion::Motion(Domain& domain, const MotionOptions& options, std::vector<Constra
       for (const std::int32_t number : constraints_[h].nodes) {
         const std::int32_t place = domain_.find_place(number);
         if (place < 0 || place >= domain_.own_count()) continue;
-        is_constrained_[static_cast<std::size_t>(place)] = 1;
-        is_constrained_for_ever_[static_cast<std::size_t>(place)] = std::isfinite(constraints_[h].release_s) ? 0 : 1;
+        is_constrained_[place] = 1;
+        is_constrained_for_ever_[place] = std::isfinite(constraints_[h].release_s) ? 0 : 1;
         constrained_nodes_.push_back({place, static_cast<std::int32_t>(h)});
       }
-    find_hinges([&](std::int32_t node) { return assembly.nodes_m[static_cast<std::size_t>(node)]; });
+    find_hinges([&](std::int32_t node) { return assembly.nodes_m[node]; });
     for (std::size_t i = 0; i < impulses_.size(); ++i)
       for (const NodeShare& one : impulses_[i].shares) {
         const std::int32_t place = domain_.find_place(one.node);
@@ -75,7 +75,7 @@ Motion::Motion(Domain& domain, const MotionOptions& options, std::vector<Constra
       }
     for (std::size_t i = 0; i < own; ++i) {
       const double mass = domain_.get_masses_kg()[i];
-      const double alpha2 = assembly.bodies[static_cast<std::size_t>(domain_.find_body(static_cast<std::int32_t>(i)))].mass_damping_per_s;
+      const double alpha2 = assembly.bodies[domain_.find_body(static_cast<std::int32_t>(i))].mass_damping_per_s;
       inverse_kg_.push_back(1.0 / mass);
       braked_kg_s_.push_back(is_constrained_[i] != 0 ? 0.0 : alpha2 * mass);
     }
@@ -94,7 +94,7 @@ void Motion::find_carried() {
     if (constraint.nodes.empty()) continue;  // or released
     next_release_s_ = std::min(next_release_s_, constraint.release_s);
     for (const std::int32_t node : constraint.nodes)
-      if (!constraint.is_hinge) is_carried_[static_cast<std::size_t>(assembly.find_body_of_node(node))] = 0;
+      if (!constraint.is_hinge) is_carried_[assembly.find_body_of_node(node)] = 0;
   }
   has_carried_ = std::find(is_carried_.begin(), is_carried_.end(), 1) != is_carried_.end();
 }
@@ -104,9 +104,9 @@ void Motion::release() {
   if (now_s < next_release_s_) return;
   const auto is_released = [&](const Constraint& constraint) { return now_s >= constraint.release_s; };
   std::erase_if(constrained_nodes_, [&](const ConstrainedNode& node) {
-    if (!is_released(constraints_[static_cast<std::size_t>(node.constraint)])) return false;
-    const auto place = static_cast<std::size_t>(node.place);
-    const auto body = static_cast<std::size_t>(domain_.find_body(node.place));
+    if (!is_released(constraints_[node.constraint])) return false;
+    const std::size_t place = node.place;
+    const std::size_t body = domain_.find_body(node.place);
     is_constrained_[place] = 0;
     reaction_[place] = {};
     braked_kg_s_[place] = domain_.get_assembly().bodies[body].mass_damping_per_s * domain_.get_masses_kg()[place];
@@ -122,7 +122,7 @@ void Motion::check_input(const std::vector<Constraint>& constraints, const std::
   if (!(options_.sample_rate_hz > 0.0) || !(options_.longest_step_s > 0.0) || !(options_.settle_s >= 0.0) ||
       !(options_.step_check_s > 0.0) || options_.inversion_check_steps < 1)
     throw InputError("the sample rate, the longest step and the times of checks must be positive, the time to settle not negative");
-  std::vector<char> is_constrained(static_cast<std::size_t>(assembly.node_count()), 0);
+  std::vector<char> is_constrained(assembly.node_count(), 0);
   const auto check_node = [&](std::int32_t node) {
     if (node < 0 || node >= assembly.node_count())
       throw InputError(fmt::format("node {} is constrained or struck, and there are {} nodes", node, assembly.node_count()));
@@ -131,10 +131,10 @@ void Motion::check_input(const std::vector<Constraint>& constraints, const std::
     if (!(constraint.release_s >= 0.0)) throw InputError("nodes are let go at a time that is 0 s or later");
     for (const std::int32_t node : constraint.nodes) {
       check_node(node);
-      if (std::exchange(is_constrained[static_cast<std::size_t>(node)], 1) != 0) {
-        const Vec3& x = assembly.nodes_m[static_cast<std::size_t>(node)];
+      if (std::exchange(is_constrained[node], 1) != 0) {
+        const Vec3& x = assembly.nodes_m[node];
         throw InputError(fmt::format("body '{}': the node at ({:.4g}, {:.4g}, {:.4g}) m is constrained twice; name it in one set only",
-                                     assembly.bodies[static_cast<std::size_t>(assembly.find_body_of_node(node))].name, x[0], x[1], x[2]));
+                                     assembly.bodies[assembly.find_body_of_node(node)].name, x[0], x[1], x[2]));
       }
     }
   }
@@ -153,7 +153,7 @@ void Motion::add(ExternalForces& forces) {
 void Motion::set_start(const std::function<Start(std::int32_t, const Vec3&)>& find_start) {
   domain_.get_comm().agree([&] {
     for (std::int32_t i = 0; i < domain_.node_count(); ++i) {
-      const auto at = static_cast<std::size_t>(i);
+      const std::size_t at = i;
       const Start start = find_start(domain_.find_number(i), domain_.get_rest_m()[at]);
       u_[at] = to_quad(domain_.is_point(i) ? start.displacement_m : Vec3{start.angle_rad, 0.0, 0.0});
       v_[at] = to_quad(domain_.is_point(i) ? start.velocity_m_s : Vec3{});
@@ -162,7 +162,7 @@ void Motion::set_start(const std::function<Start(std::int32_t, const Vec3&)>& fi
       v_[at] = Quad{};
     }
     find_hinges([&](std::int32_t node) {
-      const Vec3& rest_m = domain_.get_assembly().nodes_m[static_cast<std::size_t>(node)];
+      const Vec3& rest_m = domain_.get_assembly().nodes_m[node];
       return rest_m + find_start(node, rest_m).displacement_m;
     });
   });
@@ -174,7 +174,7 @@ void Motion::find_hinges(const std::function<Vec3(std::int32_t)>& find_place) {
     if (!constraint.is_hinge || constraint.nodes.empty()) continue;
     std::vector<Vec3> places_m;
     for (const std::int32_t node : constraint.nodes) places_m.push_back(find_place(node));
-    hinges_[static_cast<std::size_t>(domain_.get_assembly().find_body_of_node(constraint.nodes[0]))] = make_hinge(places_m);
+    hinges_[domain_.get_assembly().find_body_of_node(constraint.nodes[0])] = make_hinge(places_m);
   }
 }
 
@@ -309,11 +309,11 @@ void Motion::set_external_forces() {
                        ? Quad{mass[i] * gravity[0], mass[i] * gravity[1], mass[i] * gravity[2], 0.0}
                        : Quad{};
   for (const OwnShare& one : shares_) {
-    const Impulse& impulse = impulses_[static_cast<std::size_t>(one.impulse)];
+    const Impulse& impulse = impulses_[one.impulse];
     const double x = (time_s - impulse.time_s) / impulse.duration_s;
     if (!(x > 0.0 && x < 1.0)) continue;
     const double factor = one.share * (1.0 - std::cos(2.0 * std::numbers::pi * x)) / impulse.duration_s;
-    Quad& f = external_[static_cast<std::size_t>(one.place)];
+    Quad& f = external_[one.place];
     f.x += factor * impulse.impulse_n_s[0];
     f.y += factor * impulse.impulse_n_s[1];
     f.z += factor * impulse.impulse_n_s[2];
@@ -331,8 +331,8 @@ void Motion::set_external_forces() {
   std::vector<Vec3> next;
   for (const Constraint& constraint : constraints_) next.push_back(constraint.path.calc(find_next_time_s()));
   for (const ConstrainedNode& constrained : constrained_nodes_) {
-    const auto i = static_cast<std::size_t>(constrained.place);
-    const Vec3 to = to_vector(home_[i]) + next[static_cast<std::size_t>(constrained.constraint)];
+    const std::size_t i = constrained.place;
+    const Vec3 to = to_vector(home_[i]) + next[constrained.constraint];
     const double factor = mass[i] / act_s_;
     const Quad others = external_[i];
     external_[i] = {factor * ((to[0] - u_[i].x) / step_s_ - v_[i].x) - f_[i].x, factor * ((to[1] - u_[i].y) / step_s_ - v_[i].y) - f_[i].y,
@@ -346,7 +346,7 @@ Vec3 Motion::calc_reaction(std::size_t constraint) {
   std::vector<OrderFreeSum> sums(3);
   for (const ConstrainedNode& constrained : constrained_nodes_) {
     if (static_cast<std::size_t>(constrained.constraint) != constraint || !domain_.is_point(constrained.place)) continue;
-    const Quad& f = reaction_[static_cast<std::size_t>(constrained.place)];
+    const Quad& f = reaction_[constrained.place];
     sums[0].add(f.x);
     sums[1].add(f.y);
     sums[2].add(f.z);
@@ -362,7 +362,7 @@ void Motion::update_carried() {
     const auto node = static_cast<std::int32_t>(i);
     if (!domain_.is_point(node)) continue;
     const Vec3 place_m = domain_.get_rest_m()[i] + to_vector(u_[i]);
-    carried_[i] = to_quad(rigid[static_cast<std::size_t>(domain_.find_body(node))].calc_velocity(place_m));
+    carried_[i] = to_quad(rigid[domain_.find_body(node)].calc_velocity(place_m));
   }
 }
 
@@ -469,7 +469,7 @@ std::vector<std::byte> Motion::save() {
   comm.agree([&] {
     domain_.save_elements(element, of_element);
     for (std::int32_t i = 0; i < domain_.own_count(); ++i) {
-      const auto at = static_cast<std::size_t>(i);
+      const std::size_t at = i;
       node.push_back(domain_.find_number(i));
       for (const Quad& q : {u_[at], v_[at], f_[at], external_[at], work_[at], brake_loss_[at], carried_[at], highest_.get_vectors()[at],
                             home_[at], reaction_[at]})
@@ -483,8 +483,7 @@ std::vector<std::byte> Motion::save() {
   std::vector<std::byte> bytes;
   comm.agree([&] {
     if (!comm.is_root()) return;
-    const auto nodes = static_cast<std::size_t>(domain_.get_assembly().node_count()),
-               elements = static_cast<std::size_t>(domain_.get_assembly().element_count());
+    const std::size_t nodes = domain_.get_assembly().node_count(), elements = domain_.get_assembly().element_count();
     SavedHead head{};
     std::memcpy(head.magic, kMagic, sizeof(kMagic));
     head.nodes = static_cast<std::int64_t>(nodes);
@@ -542,7 +541,7 @@ void Motion::load(std::span<const std::byte> bytes) {
     std::vector<double> values((all.size() - sizeof(head)) / sizeof(double));
     std::memcpy(values.data(), all.data() + sizeof(head), values.size() * sizeof(double));
     for (std::int32_t i = 0; i < domain_.node_count(); ++i) {
-      const auto at = static_cast<std::size_t>(i);
+      const std::size_t at = i;
       const double* from = values.data() + static_cast<std::size_t>(domain_.find_number(i)) * kNodeWidth;
       std::vector<Quad*> targets{&u_[at], &v_[at]};
       if (i < domain_.own_count())

@@ -41,7 +41,7 @@ std::vector<RigidMotion> calc_rigid_motions(const Domain& domain, const std::vec
                                             const std::vector<char>& is_wanted, std::span<const Hinge> hinges) {
   std::vector<OrderFreeSum> sums(kSums * is_wanted.size());
   for (std::int32_t node = 0; node < domain.own_count(); ++node) {
-    const auto i = static_cast<std::size_t>(node), b = static_cast<std::size_t>(domain.find_body(node));
+    const std::size_t i = node, b = domain.find_body(node);
     if (is_wanted[b] == 0 || !domain.is_point(node)) continue;
     const double mass = domain.get_masses_kg()[i];
     const Vec3 x = domain.get_rest_m()[i] + to_vector(u[i]), speed = to_vector(v[i]), turn = cross(x, speed);

@@ -103,8 +103,7 @@ SheetElements make_elements(const SheetMesh& mesh, const std::vector<bool>& clam
   std::map<std::array<std::int32_t, 2>, std::vector<Side>> sides;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     const Triangle& v = mesh.triangles[t];
-    const Vec3 twice = cross(mesh.vertices_m[static_cast<std::size_t>(v[1])] - mesh.vertices_m[static_cast<std::size_t>(v[0])],
-                             mesh.vertices_m[static_cast<std::size_t>(v[2])] - mesh.vertices_m[static_cast<std::size_t>(v[0])]);
+    const Vec3 twice = cross(mesh.vertices_m[v[1]] - mesh.vertices_m[v[0]], mesh.vertices_m[v[2]] - mesh.vertices_m[v[0]]);
     if (!(norm(twice) > 0.0)) throw InputError(fmt::format("triangle {} of the sheet has no area; remove it", t));
     for (std::size_t i = 0; i < 3; ++i) {
       const std::int32_t a = v[(i + 1) % 3], b = v[(i + 2) % 3];
@@ -118,7 +117,7 @@ SheetElements make_elements(const SheetMesh& mesh, const std::vector<bool>& clam
   std::vector<Vec3> ghosts_m;
   std::int32_t e = 0;
   for (auto& [ends, at] : sides) {
-    const Vec3 &a = mesh.vertices_m[static_cast<std::size_t>(ends[0])], &b = mesh.vertices_m[static_cast<std::size_t>(ends[1])];
+    const Vec3 &a = mesh.vertices_m[ends[0]], &b = mesh.vertices_m[ends[1]];
     if (at.size() > 2)
       throw InputError(fmt::format("the edge between vertices {} and {} of the sheet has {} triangles; a sheet has one or two there",
                                    ends[0], ends[1], at.size()));
@@ -127,20 +126,20 @@ SheetElements make_elements(const SheetMesh& mesh, const std::vector<bool>& clam
                                    at[0].triangle, at[1].triangle));
     made.edge.push_back(ends);
     made.rest_m.push_back(0.5 * (a + b));
-    const bool constraints = at.size() == 1 && clamped[static_cast<std::size_t>(ends[0])] && clamped[static_cast<std::size_t>(ends[1])];
+    const bool constraints = at.size() == 1 && clamped[ends[0]] && clamped[ends[1]];
     for (std::size_t k = 0; k < at.size(); ++k) {
-      const auto t = static_cast<std::size_t>(at[k].triangle), i = static_cast<std::size_t>(at[k].corner);
+      const std::size_t t = at[k].triangle, i = at[k].corner;
       const Triangle& v = mesh.triangles[t];
       for (std::size_t c = 0; c < 3; ++c) made.nodes[t][c] = v[c];
       made.nodes[t][6 + i] = made.vertices + e;
       made.side[t][i] = at.size() == 2 && !at[k].is_left ? -1.0 : 1.0;
       if (at.size() == 2) {
-        const auto other = static_cast<std::size_t>(at[1 - k].triangle);
-        made.nodes[t][3 + i] = mesh.triangles[other][static_cast<std::size_t>(at[1 - k].corner)];
+        const std::size_t other = at[1 - k].triangle;
+        made.nodes[t][3 + i] = mesh.triangles[other][at[1 - k].corner];
         made.turn[t][i] = 0.5;
       } else if (constraints) {
         // The mirror image of the corner about the edge, in the plane of the triangle.
-        const Vec3& c = mesh.vertices_m[static_cast<std::size_t>(v[i])];
+        const Vec3& c = mesh.vertices_m[v[i]];
         const Vec3 along = normalise(b - a), foot = a + dot(c - a, along) * along;
         made.nodes[t][3 + i] = made.vertices + made.edges + static_cast<std::int32_t>(ghosts_m.size());
         ghosts_m.push_back(foot + (foot - c));

@@ -31,15 +31,15 @@ std::array<double, 3> calc_angles(const std::array<Vec3, 6>& at, const std::arra
 }  // namespace
 
 std::vector<double> calc_masses(const SheetElements& elements, const SheetLaw& law) {
-  std::vector<double> mass(static_cast<std::size_t>(elements.count_nodes()));
+  std::vector<double> mass(elements.count_nodes());
   for (const auto& nodes : elements.nodes) {
     std::array<Vec3, 3> at{};
-    for (std::size_t c = 0; c < 3; ++c) at[c] = elements.rest_m[static_cast<std::size_t>(nodes[c])];
+    for (std::size_t c = 0; c < 3; ++c) at[c] = elements.rest_m[nodes[c]];
     const double area = 0.5 * norm(cross(at[1] - at[0], at[2] - at[0])), third = law.density_kg_m3 * law.thickness_m * area / 3.0;
     for (std::size_t c = 0; c < 3; ++c) {
-      mass[static_cast<std::size_t>(nodes[c])] += third;
-      mass[static_cast<std::size_t>(nodes[6 + c])] += kEdgeInertia * third * 2.0 * area;
-      if (nodes[3 + c] >= elements.vertices + elements.edges) mass[static_cast<std::size_t>(nodes[3 + c])] += third;
+      mass[nodes[c]] += third;
+      mass[nodes[6 + c]] += kEdgeInertia * third * 2.0 * area;
+      if (nodes[3 + c] >= elements.vertices + elements.edges) mass[nodes[3 + c]] += third;
     }
   }
   return mass;
@@ -55,13 +55,13 @@ Sheets::Sheets(const SheetElements& elements, std::span<const std::int32_t> whic
   for (std::size_t k = 0; k < blocks_.size() * kLanes; ++k) {
     const bool is_padded = k >= count_;
     const std::size_t from = std::min(k, count_ - 1), lane = k % kLanes;
-    const auto triangle = static_cast<std::size_t>(which[from]);
+    const std::size_t triangle = which[from];
     const auto& nodes = elements.nodes[triangle];
     Block& block = blocks_[k / kLanes];
     std::array<Vec3, 6> at{};
     for (std::size_t c = 0; c < 6; ++c) {
       const bool is_there = nodes[c] >= 0;
-      at[c] = is_there ? elements.rest_m[static_cast<std::size_t>(nodes[c])] : Vec3{};
+      at[c] = is_there ? elements.rest_m[nodes[c]] : Vec3{};
     }
     const Vec3 d1 = at[1] - at[0], d2 = at[2] - at[0];
     const double p = norm(d1), q = dot(d1, d2) / p, r = norm(cross(d1, d2)) / p, area = 0.5 * p * r;

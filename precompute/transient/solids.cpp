@@ -31,7 +31,7 @@ Solids::Solids(const std::vector<SolidElement>& elements, const std::vector<Law>
   for (std::size_t first = 0; first < elements.size();) {
     std::size_t last = first;
     while (last < elements.size() && elements[last].kind == elements[first].kind && elements[last].law == elements[first].law) ++last;
-    add_run(elements, first, last, laws[static_cast<std::size_t>(elements[first].law)], places_m, no_entry);
+    add_run(elements, first, last, laws[elements[first].law], places_m, no_entry);
     first = last;
   }
 }
@@ -46,7 +46,7 @@ void Solids::add_run(const std::vector<SolidElement>& elements, std::size_t firs
   run.count = static_cast<std::int64_t>(count);
   const std::size_t blocks = (count + lanes - 1) / lanes;
   run.blocks = static_cast<std::int64_t>(blocks);
-  const auto nodes = static_cast<std::size_t>(count_nodes(run.kind)), points = static_cast<std::size_t>(count_points(run.kind));
+  const std::size_t nodes = count_nodes(run.kind), points = count_points(run.kind);
   const std::size_t shapes = run.kind == Kind::kCurvedT10 ? 4 : 1, width = 10 * shapes;
   const double scale = run.kind == Kind::kT4 ? 1.0 : kPointScale;
   run.shape.resize(blocks * width * lanes);
@@ -62,7 +62,7 @@ void Solids::add_run(const std::vector<SolidElement>& elements, std::size_t firs
     const std::size_t block = place / lanes, lane = place % lanes;
     std::array<Vec3, 10> x{};
     for (std::size_t a = 0; a < nodes; ++a) {
-      x[a] = places_m[static_cast<std::size_t>(element.read[a])];
+      x[a] = places_m[element.read[a]];
       run.read[(block * nodes + a) * lanes + lane] = 4 * element.read[a];
       run.write[(block * nodes + a) * lanes + lane] = 4 * (is_real ? element.write[a] : no_entry);
     }
@@ -126,9 +126,9 @@ void Solids::forget_spent() {
 }
 
 void Solids::save_state(std::vector<double>& state) const {
-  const auto lanes = static_cast<std::size_t>(loops_->lanes);
+  const std::size_t lanes = loops_->lanes;
   for (const Place& at : block_lane_) {
-    const Run& run = runs_[static_cast<std::size_t>(at.run)];
+    const Run& run = runs_[at.run];
     const std::size_t begin = state.size();
     state.resize(begin + kStateWidth, 0.0);
     if (!run.law.is_damped()) continue;
@@ -139,11 +139,11 @@ void Solids::save_state(std::vector<double>& state) const {
 }
 
 void Solids::load_state(std::span<const double> state) {
-  const auto lanes = static_cast<std::size_t>(loops_->lanes);
+  const std::size_t lanes = loops_->lanes;
   for (std::size_t e = 0; e < block_lane_.size(); ++e) {
-    Run& run = runs_[static_cast<std::size_t>(block_lane_[e].run)];
+    Run& run = runs_[block_lane_[e].run];
     if (!run.law.is_damped()) continue;
-    const auto place = static_cast<std::size_t>(block_lane_[e].place);
+    const std::size_t place = block_lane_[e].place;
     const std::size_t width = static_cast<std::size_t>(count_points(run.kind)) * kStresses;
     run.spent.data()[place] = state[e * kStateWidth];
     for (std::size_t i = 0; i < width; ++i)

@@ -42,9 +42,7 @@ HighestFrequency::HighestFrequency(const Domain& domain)
     for (std::int32_t e = body.first_element; e < body.last_element; ++e) {
       const auto nodes = assembly.find_nodes(e);
       for (std::size_t i = 0; i < (body.is_sheet ? 3U : 4U); ++i)
-        for (std::size_t j = 0; j < i; ++j)
-          shortest = std::min(
-              shortest, norm(assembly.nodes_m[static_cast<std::size_t>(nodes[i])] - assembly.nodes_m[static_cast<std::size_t>(nodes[j])]));
+        for (std::size_t j = 0; j < i; ++j) shortest = std::min(shortest, norm(assembly.nodes_m[nodes[i]] - assembly.nodes_m[nodes[j]]));
     }
     shortest_edge_m_.push_back(shortest);
   }

@@ -15,7 +15,7 @@ TouchSurface make_touch_surface(std::span<const Vec3> rest_m, std::span<const st
   std::map<std::int32_t, Sum> sums;
   for (std::size_t t = 0; t < triangles.size(); ++t) {
     std::array<Vec3, 3> at{};
-    for (std::size_t c = 0; c < 3; ++c) at[c] = rest_m[static_cast<std::size_t>(triangles[t][c])];
+    for (std::size_t c = 0; c < 3; ++c) at[c] = rest_m[triangles[t][c]];
     const double area = 0.5 * norm(cross(at[1] - at[0], at[2] - at[0]));
     for (std::size_t c = 0; c < 3; ++c) {
       Sum& sum = sums[triangles[t][c]];
@@ -28,10 +28,9 @@ TouchSurface make_touch_surface(std::span<const Vec3> rest_m, std::span<const st
   TouchSurface surface;
   std::map<std::int32_t, std::int32_t> number;
   for (const auto& [node, sum] : sums) {
-    const auto body = static_cast<std::size_t>(sum.body);
+    const std::size_t body = sum.body;
     number[node] = static_cast<std::int32_t>(surface.nodes.size());
-    surface.nodes.push_back({node, sum.body, kappa * modulus_pa[body] * sum.area / (sum.edge / sum.edges), reach_m[body],
-                             rest_m[static_cast<std::size_t>(node)]});
+    surface.nodes.push_back({node, sum.body, kappa * modulus_pa[body] * sum.area / (sum.edge / sum.edges), reach_m[body], rest_m[node]});
   }
   for (const auto& triangle : triangles) surface.triangles.push_back({number[triangle[0]], number[triangle[1]], number[triangle[2]]});
   return surface;

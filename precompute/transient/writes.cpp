@@ -20,26 +20,26 @@ void WritePlan::gather(Quad* f) const {
 
 WritePlan plan_writes(const ElementNodes& elements, std::int32_t own_nodes, std::int32_t first_slot, std::int32_t no_entry) {
   WritePlan plan;
-  std::vector<std::int32_t> slots(static_cast<std::size_t>(own_nodes), 0);  // contributions of each own node
+  std::vector<std::int32_t> slots(own_nodes, 0);  // contributions of each own node
   const auto list = [&](std::size_t e) {
     return std::span<const std::int32_t>(elements.nodes.data() + elements.begin[e],
                                          static_cast<std::size_t>(elements.begin[e + 1] - elements.begin[e]));
   };
-  std::vector<char> by_halo(static_cast<std::size_t>(own_nodes), 0);
+  std::vector<char> by_halo(own_nodes, 0);
   for (std::size_t e = 0; e < elements.count(); ++e) {
     const auto nodes = list(e);
     const bool is_outer = std::any_of(nodes.begin(), nodes.end(), [&](std::int32_t node) { return node >= own_nodes; });
     (is_outer ? plan.outer : plan.inner).push_back(static_cast<std::int32_t>(e));
     if (!is_outer) continue;
     for (const std::int32_t node : nodes)
-      if (node < own_nodes) by_halo[static_cast<std::size_t>(node)] = 1;
+      if (node < own_nodes) by_halo[node] = 1;
   }
   for (const std::int32_t node : elements.nodes)
-    if (node < own_nodes) ++slots[static_cast<std::size_t>(node)];
-  std::vector<std::int32_t> next(static_cast<std::size_t>(own_nodes), 0);
+    if (node < own_nodes) ++slots[node];
+  std::vector<std::int32_t> next(own_nodes, 0);
   std::int32_t slot = first_slot;
   for (std::int32_t node = 0; node < own_nodes; ++node) {
-    const auto n = static_cast<std::size_t>(node);
+    const std::size_t n = node;
     if (by_halo[n] == 0) continue;
     plan.summed.push_back(node);
     plan.slot_begin.push_back(slot);
@@ -49,7 +49,7 @@ WritePlan plan_writes(const ElementNodes& elements, std::int32_t own_nodes, std:
   plan.slot_begin.push_back(slot);
   plan.last_slot = slot;
   for (const std::int32_t node : elements.nodes) {
-    const auto n = static_cast<std::size_t>(node);
+    const std::size_t n = node;
     plan.writes.push_back(node >= own_nodes ? no_entry : by_halo[n] != 0 ? next[n]++ : node);
   }
   return plan;

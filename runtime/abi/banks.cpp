@@ -90,7 +90,7 @@ int32_t carillon_bank_triangle_count(const carillon_bank* bank) {
 }
 
 double carillon_bank_frequency_hz(const carillon_bank* bank, int32_t mode) {
-  return mode < 0 || mode >= carillon_bank_mode_count(bank) ? 0.0 : bank->bank.freq_hz(static_cast<std::size_t>(mode));
+  return mode < 0 || mode >= carillon_bank_mode_count(bank) ? 0.0 : bank->bank.freq_hz(mode);
 }
 
 int32_t carillon_bank_vertex_count(const carillon_bank* bank) {
@@ -172,7 +172,7 @@ carillon_status carillon_model_make(const carillon_bank* bank, const carillon_mo
   if (ours->radiation < 0 || ours->radiation >= static_cast<std::int32_t>(kKinds.size()))
     return refuse("carillon_model_make: options.radiation is none of carillon_radiation", message, message_size);
   return run(message, message_size, [&] {
-    const radiation::GainKind kind = radiation::choose_gain_kind(bank->bank, kKinds[static_cast<std::size_t>(ours->radiation)]);
+    const radiation::GainKind kind = radiation::choose_gain_kind(bank->bank, kKinds[ours->radiation]);
     std::vector<double> gains = radiation::calc_gains(bank->bank, kind);
     // The losses by the bank's own supports; a bank without losses is not copied.
     std::optional<bank::Bank> mounted;

@@ -107,12 +107,12 @@ carillon_status carillon_push_force(carillon_synth* synth, const carillon_force*
     for (std::int32_t done = 0; done < ours->count; done += events::kMaxForceSteps) {
       std::array<Vec3, events::kMaxForceSteps> impulses{};
       const std::int32_t count = std::min(events::kMaxForceSteps, ours->count - done);
-      for (std::int32_t k = 0; k < count; ++k) impulses[static_cast<std::size_t>(k)] = to_vector(ours->impulse_n_s[done + k]);
+      for (std::int32_t k = 0; k < count; ++k) impulses[k] = to_vector(ours->impulse_n_s[done + k]);
       events::Force first = piece;
       first.time_s += done * piece.step_s;
       first.continues = piece.continues || done > 0;
       carillon_status status = CARILLON_OK;
-      events::split_force(first, std::span(impulses).first(static_cast<std::size_t>(count)), [&](const events::Force& part) {
+      events::split_force(first, std::span(impulses).first(count), [&](const events::Force& part) {
         if (pass > 0 || events::find_fault(part) != nullptr) status = push(synth, part);
       });
       if (status != CARILLON_OK) return status;
@@ -128,7 +128,7 @@ carillon_status carillon_vary_impulse(const carillon_bank* bank, double variatio
   return run(nullptr, 0, [&] {
     events::Impulse event = to_event(*ours);
     if (!(variation >= 0.0 && variation <= 1.0) || events::find_fault(event) != nullptr || event.triangle < 0 ||
-        static_cast<std::size_t>(event.triangle) >= bank->bank.triangles.size())
+        event.triangle >= std::ssize(bank->bank.triangles))
       throw InputError("no strike that can be varied");
     if (variation == 0.0) return;
     synth::vary_strike(

@@ -29,7 +29,7 @@ double calc_decay(const Damping& damping, const Material& material, double eigen
     const auto& freq = damping.freq_hz;
     const auto& eta = damping.loss_factor;
     const double f = omega / (2.0 * std::numbers::pi);
-    const auto above = static_cast<std::size_t>(std::upper_bound(freq.begin(), freq.end(), f) - freq.begin());
+    const std::size_t above = std::upper_bound(freq.begin(), freq.end(), f) - freq.begin();
     if (above == 0) return eta.front() * omega / 2.0;
     if (above == freq.size()) return eta.back() * omega / 2.0;
     const double part = std::log(f / freq[above - 1]) / std::log(freq[above] / freq[above - 1]);
@@ -41,7 +41,7 @@ double calc_decay(const Damping& damping, const Material& material, double eigen
 std::vector<double> calc_shapes(const Bank& bank, std::int32_t triangle, const Vec3& barycentric) {
   const std::size_t values = 3 * bank.mode_count();
   std::vector<double> shapes(values, 0.0);
-  const auto& corners = bank.triangles[static_cast<std::size_t>(triangle)];
+  const auto& corners = bank.triangles[triangle];
   for (std::size_t c = 0; c < 3; ++c) {
     const std::int16_t* row = bank.shape.data() + static_cast<std::size_t>(corners[c]) * values;
     for (std::size_t i = 0; i < values; ++i) shapes[i] += barycentric[c] * bank.shape_scale[i / 3] * row[i];

@@ -31,7 +31,7 @@ std::vector<Vec3> calc_vertex_normals(const Bank& bank) {
   std::vector<Vec3> normals(bank.vertex_count(), Vec3{});
   for (const Triangle& t : bank.triangles) {
     const Vec3 normal = calc_normal(bank.vertices_m, t);
-    for (const std::int32_t v : t) normals[static_cast<std::size_t>(v)] = normals[static_cast<std::size_t>(v)] + normal;
+    for (const std::int32_t v : t) normals[v] = normals[v] + normal;
   }
   for (Vec3& n : normals)
     if (norm(n) > 0.0) n = (1.0 / norm(n)) * n;

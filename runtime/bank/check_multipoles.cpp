@@ -34,7 +34,7 @@ void check_sphere(const Bank& bank, Faults& faults) {
   for (const auto& triangle : bank.triangles)
     for (const std::int32_t v : triangle)
       if (v >= 0 && static_cast<std::size_t>(v) < bank.vertex_count())  // others are reported elsewhere
-        farthest = std::max(farthest, norm(bank.vertices_m[static_cast<std::size_t>(v)] - air.centre_m));
+        farthest = std::max(farthest, norm(bank.vertices_m[v] - air.centre_m));
   if (!(farthest <= air.radius_m * (1.0 + kOutside)))
     faults.add("the surface reaches to {:.9g} m from radiation/centre_m, and the sphere has a radius of {:.9g} m", farthest, air.radius_m);
 }
@@ -100,7 +100,7 @@ std::string find_mixing_fault(const Mixing& mixing) {
   std::size_t at = 0;
   for (std::size_t i = 0; i < mixing.count.size(); ++i) {
     const std::int32_t count = mixing.count[i];
-    if (count < 1 || static_cast<std::size_t>(count) > mixing.motion.size() - at)
+    if (count < 1 || count > std::ssize(mixing.motion) - at)
       return fmt::format("radiation/mixing_count[{}] is {}, and {} parts are left", i, count, mixing.motion.size() - at);
     for (std::int64_t k = 0, before = -1; k < count; ++k, before = mixing.motion[at++])
       if (mixing.motion[at] <= before || mixing.motion[at] >= motions)

@@ -113,7 +113,7 @@ Check check_margins(const Bank& bank, const Proof& proof) {
   for (std::size_t i = 0; i < proof.cut_hz.size(); ++i) {
     const double sigma = calc_lambda(proof.cut_hz[i]);
     double nearest = 1.0;
-    const auto above = static_cast<std::size_t>(count_modes_below(bank, proof.cut_hz[i]));
+    const std::size_t above = count_modes_below(bank, proof.cut_hz[i]);
     for (const std::size_t mode : {above - 1, above}) {  // above - 1 of 0 is no mode
       if (mode >= bank.mode_count()) continue;
       const double lambda = bank.eigenvalue_rad2_s2[mode];
@@ -187,8 +187,7 @@ Check check_clusters(const Bank& bank, const Proof& proof) {
     }
     next = first + count;
     largest = std::max(largest, count);
-    const double low = bank.eigenvalue_rad2_s2[static_cast<std::size_t>(first)],
-                 high = bank.eigenvalue_rad2_s2[static_cast<std::size_t>(next - 1)];
+    const double low = bank.eigenvalue_rad2_s2[first], high = bank.eigenvalue_rad2_s2[next - 1];
     if (!(high - low <= kClusterSpread * high))
       faults.add("group {} of degenerate modes spreads over {:.2g} of lambda", i, (high - low) / high);
   }

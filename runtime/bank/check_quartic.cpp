@@ -43,8 +43,7 @@ bool is_part_of_linear(const Bank& bank) {
   const std::size_t n = energy.mode_count(), rows = energy.row_count();
   std::vector<double> w(n * n), row(n);
   for (std::size_t r = 0; r < rows; ++r) {
-    for (std::size_t i = 0; i < n; ++i)
-      row[i] = energy.linear[r * n + i] / std::sqrt(bank.eigenvalue_rad2_s2[static_cast<std::size_t>(energy.modes[i])]);
+    for (std::size_t i = 0; i < n; ++i) row[i] = energy.linear[r * n + i] / std::sqrt(bank.eigenvalue_rad2_s2[energy.modes[i]]);
     for (std::size_t i = 0; i < n; ++i)
       for (std::size_t j = 0; j <= i; ++j) w[i * n + j] += row[i] * row[j];
   }
@@ -60,7 +59,7 @@ double calc_gradient_error(const Bank& bank) {
   std::mt19937 chance(7);
   const auto draw = [&] { return (static_cast<double>(chance() % 2001) / 1000.0 - 1.0); };
   for (std::size_t i = 0; i < n; ++i) {
-    const double size = 1.0 / std::sqrt(bank.eigenvalue_rad2_s2[static_cast<std::size_t>(energy.modes[i])]);
+    const double size = 1.0 / std::sqrt(bank.eigenvalue_rad2_s2[energy.modes[i]]);
     q[i] = size * draw();
     way[i] = size * draw();
   }
@@ -110,7 +109,7 @@ Check check_quartic(const Bank& bank) {
   if (!(energy.thickness_m >= 0.0 && energy.thickness_m <= kMaxThicknessM))
     faults.add("nonlinear/thickness_m is {:.6g} m, which is none", energy.thickness_m);
   for (const std::int32_t mode : energy.modes)
-    if (!(bank.eigenvalue_rad2_s2[static_cast<std::size_t>(mode)] > 0.0)) return {"nonlinear", "", faults.take()};  // reported elsewhere
+    if (!(bank.eigenvalue_rad2_s2[mode] > 0.0)) return {"nonlinear", "", faults.take()};  // reported elsewhere
   if (!faults.empty()) return {"nonlinear", "", faults.take()};
   // As it is played in air, the linear energy has the air in it.
   if (!energy.linear.empty() && !bank.multipoles.is_in_decay && !is_part_of_linear(bank))

@@ -253,7 +253,7 @@ Check check_corrected(const Bank& bank) {
       faults.add("corrected_frequency_hz[{}] is {:.6g}, and the mesh's is {:.6g}: too far apart", i, hz, mesh_hz);
     if (!(d >= 0.0 && d <= kMaxDecayPerS)) faults.add("corrected_decay[{}] is {:.6g} 1/s, which is none", i, d);
     if (!(cents >= 0.0)) faults.add("corrected_error_cents[{}] is {:.6g}, negative", i, cents);
-    const auto correction = static_cast<std::size_t>(corrected.correction[i]);
+    const std::size_t correction = corrected.correction[i];
     if (correction >= counts.size()) {
       faults.add("correction[{}] is {}, and none above {} is known", i, correction, counts.size() - 1);
       continue;
@@ -348,7 +348,7 @@ double calc_enclosed_volume(const Bank& bank, const Vec3& origin) {
   for (const auto& triangle : bank.triangles) {
     Vec3 p[3];
     for (int i = 0; i < 3; ++i) {
-      for (int k = 0; k < 3; ++k) p[i][k] = bank.vertices_m[static_cast<std::size_t>(triangle[i])][k] - origin[k];
+      for (int k = 0; k < 3; ++k) p[i][k] = bank.vertices_m[triangle[i]][k] - origin[k];
     }
     volume += (p[0][0] * (p[1][1] * p[2][2] - p[1][2] * p[2][1]) + p[0][1] * (p[1][2] * p[2][0] - p[1][0] * p[2][2]) +
                p[0][2] * (p[1][0] * p[2][1] - p[1][1] * p[2][0])) /

@@ -71,12 +71,12 @@ void mix_nonlinear(Bank& bank) {
   if (!bank.corrected.is_empty()) scale_nonlinear(bank, bank.corrected.freq_hz);
   const std::size_t n = bank.quartic.mode_count();
   std::vector<std::size_t> place(bank.mode_count() + kRigidMotions, n);
-  for (std::size_t i = 0; i < n; ++i) place[static_cast<std::size_t>(bank.quartic.modes[i])] = i;
+  for (std::size_t i = 0; i < n; ++i) place[bank.quartic.modes[i]] = i;
   std::vector<double> parts(n * n);
   std::size_t at = 0;
   for (std::size_t m = 0; m < mixing.count.size(); ++m)
     for (std::int32_t k = 0; k < mixing.count[m]; ++k, ++at) {
-      const std::size_t to = place[m], from = place[static_cast<std::size_t>(mixing.motion[at])];
+      const std::size_t to = place[m], from = place[mixing.motion[at]];
       if (to < n && from < n) parts[to * n + from] = mixing.part[at];
     }
   combine_modes(bank.quartic, parts);

@@ -23,7 +23,7 @@ void for_each_edge(const std::vector<std::array<std::int32_t, 3>>& triangles, st
   constexpr std::int32_t kFew = 24;  // sorted by insertion
   std::vector<std::int32_t> next(vertices + 1, 0);
   for (const auto& corners : triangles)
-    for (std::size_t k = 0; k < 3; ++k) ++next[static_cast<std::size_t>(std::min(corners[k], corners[(k + 1) % 3]))];
+    for (std::size_t k = 0; k < 3; ++k) ++next[std::min(corners[k], corners[(k + 1) % 3])];
   std::int32_t before = 0;
   for (std::int32_t& count : next) {
     const std::int32_t here = count;
@@ -35,7 +35,7 @@ void for_each_edge(const std::vector<std::array<std::int32_t, 3>>& triangles, st
   for (const auto& corners : triangles) {
     for (std::size_t k = 0; k < 3; ++k, ++number) {
       const std::int32_t a = corners[k], b = corners[(k + 1) % 3];
-      edges[static_cast<std::size_t>(next[static_cast<std::size_t>(std::min(a, b))]++)] = {std::max(a, b), number};
+      edges[next[std::min(a, b)]++] = {std::max(a, b), number};
     }
   }
   // next[v] is now where the bucket of v ends.

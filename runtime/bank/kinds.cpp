@@ -79,7 +79,7 @@ struct Frame {
   /// Index of a place among `count` equal parts of the extent along axis k.
   std::size_t find_part(const Vec3& p, int k, int count) const {
     const double along = (p[k] - extent[0][k]) / std::max(size(k), 1e-300);
-    return static_cast<std::size_t>(std::clamp(static_cast<int>(along * count), 0, count - 1));
+    return std::clamp(static_cast<int>(along * count), 0, count - 1);
   }
 };
 
@@ -99,7 +99,7 @@ Frame make_frame(const Bank& bank) {
   Frame frame;
   frame.area.assign(bank.vertex_count(), 0.0);
   for (const Triangle& t : bank.triangles)
-    for (const std::int32_t v : t) frame.area[static_cast<std::size_t>(v)] += norm(calc_normal(bank.vertices_m, t)) / 6.0;
+    for (const std::int32_t v : t) frame.area[v] += norm(calc_normal(bank.vertices_m, t)) / 6.0;
   Vec3 centre{};
   for (std::size_t v = 0; v < frame.area.size(); ++v) {
     frame.all_area += frame.area[v];
@@ -154,7 +154,7 @@ class Slices {
   explicit Slices(const Frame& frame) : frame_(frame) {
     constexpr int kMost = 48;
     const int count = std::clamp(static_cast<int>(frame.place.size() / (3 * kFewPoints)), 1, kMost);
-    std::vector<std::vector<std::size_t>> parts(static_cast<std::size_t>(count));
+    std::vector<std::vector<std::size_t>> parts(count);
     for (std::size_t v = 0; v < frame.place.size(); ++v) parts[frame.find_part(frame.place[v], 0, count)].push_back(v);
     for (std::vector<std::size_t>& part : parts)
       if (part.size() >= kFewPoints) slices_.push_back(make_slice(std::move(part)));
@@ -262,7 +262,7 @@ class Rings {
       largest = std::max(largest, radius_.back());
     }
     for (std::size_t v = 0; v < frame.place.size(); ++v) {
-      const auto out = static_cast<std::size_t>(std::min(static_cast<int>(kRings * radius_[v] / largest), kRings - 1));
+      const std::size_t out = std::min(static_cast<int>(kRings * radius_[v] / largest), kRings - 1);
       ring_.push_back(kRings * frame.find_part(frame.place[v], axis, kRings) + out);
     }
   }
@@ -369,7 +369,7 @@ class Skin {
   Skin(const Bank& bank, const Frame& frame) : normal_(bank.vertex_count()) {
     for (const Triangle& t : find_outer_triangles(bank.vertices_m, bank.triangles)) {
       const Vec3 third = (1.0 / 6.0) * (frame.axes.axis * calc_normal(bank.vertices_m, t));
-      for (const std::int32_t v : t) normal_[static_cast<std::size_t>(v)] = normal_[static_cast<std::size_t>(v)] + third;
+      for (const std::int32_t v : t) normal_[v] = normal_[v] + third;
     }
   }
 
@@ -393,7 +393,7 @@ class Skin {
 
 constexpr std::array kNames{"-", "bending", "lateral bending", "torsion", "longitudinal", "breathing", "", "plate bending", "in plane"};
 
-const char* get_name(MotionKind motion) { return kNames.at(static_cast<std::size_t>(motion)); }
+const char* get_name(MotionKind motion) { return kNames.at(motion); }
 
 }  // namespace
 

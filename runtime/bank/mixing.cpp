@@ -26,7 +26,7 @@ class MixedRows {
     for (std::size_t i = 0; i < row_.size(); ++i) {
       Vec3 sum{};
       for (std::int32_t k = 0; k < mixing.count[i]; ++k, ++at) {
-        const auto j = static_cast<std::size_t>(mixing.motion[at]);
+        const std::size_t j = mixing.motion[at];
         sum = sum + mixing.part[at] * (j < row_.size() ? bank_.shape_at(vertex, j) : rigid[j - row_.size()]);
       }
       row_[i] = sum;
@@ -98,7 +98,7 @@ void mix_modes(Bank& bank) {
   for (std::size_t i = 0; i < modes; ++i) {
     double strain = 0.0;
     for (std::int32_t k = 0; k < mixing.count[i]; ++k, ++at) {
-      const auto j = static_cast<std::size_t>(mixing.motion[at]);
+      const std::size_t j = mixing.motion[at];
       if (j >= modes) continue;  // a rigid motion loses nothing, and nothing holds it
       const double part = mixing.part[at], share = part * part * bank.eigenvalue_rad2_s2[j];
       decay[i] += part * part * bank.decay_per_s[j];

@@ -99,7 +99,7 @@ Mixing select_mixing(const Multipoles& multipoles, const std::vector<std::size_t
     std::vector<std::pair<std::int32_t, double>> parts;
     double squares = 0.0;
     for (std::size_t k = first[mode]; k < first[mode + 1]; ++k) {
-      const std::int32_t motion = place[static_cast<std::size_t>(mixing.motion[k])];
+      const std::int32_t motion = place[mixing.motion[k]];
       if (motion < 0) continue;
       parts.emplace_back(motion, mixing.part[k]);
       squares += mixing.part[k] * mixing.part[k];

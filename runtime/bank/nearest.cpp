@@ -52,9 +52,8 @@ bool is_a_place(const Vec3& point_m) {
 
 /// Takes a triangle for the best place where it is nearer, or as near and earlier.
 void try_triangle(const Bank& bank, std::int32_t triangle, const Vec3& p, double& min, NearestPlace& best) {
-  const auto& corner = bank.triangles[static_cast<std::size_t>(triangle)];
-  const Vec3 &a = bank.vertices_m[static_cast<std::size_t>(corner[0])], &b = bank.vertices_m[static_cast<std::size_t>(corner[1])],
-             &c = bank.vertices_m[static_cast<std::size_t>(corner[2])];
+  const auto& corner = bank.triangles[triangle];
+  const Vec3 &a = bank.vertices_m[corner[0]], &b = bank.vertices_m[corner[1]], &c = bank.vertices_m[corner[2]];
   const Vec3 weight = find_nearest_barycentric(p, a, b, c);
   Vec3 place{};
   for (std::size_t k = 0; k < 3; ++k) place[k] = weight[0] * a[k] + weight[1] * b[k] + weight[2] * c[k];
@@ -105,7 +104,7 @@ SurfaceTree::SurfaceTree(const Bank& bank) : bank_(&bank), order_(bank.triangles
   for (const auto& corner : bank.triangles) {
     Vec3 sum{};
     for (const std::int32_t v : corner) {
-      for (std::size_t k = 0; k < 3; ++k) sum[k] += bank.vertices_m[static_cast<std::size_t>(v)][k];
+      for (std::size_t k = 0; k < 3; ++k) sum[k] += bank.vertices_m[v][k];
     }
     centres_m.push_back(sum);
   }
@@ -118,9 +117,9 @@ std::int32_t SurfaceTree::build(std::vector<Vec3>& centres_m, std::int32_t first
   constexpr double kInfinite = std::numeric_limits<double>::infinity();
   Box box{{kInfinite, kInfinite, kInfinite}, {-kInfinite, -kInfinite, -kInfinite}, first, last - first};
   for (std::int32_t i = first; i < last; ++i) {
-    for (const std::int32_t v : bank_->triangles[static_cast<std::size_t>(order_[static_cast<std::size_t>(i)])]) {
+    for (const std::int32_t v : bank_->triangles[order_[i]]) {
       for (std::size_t k = 0; k < 3; ++k) {
-        const double x = bank_->vertices_m[static_cast<std::size_t>(v)][k];
+        const double x = bank_->vertices_m[v][k];
         box.low[k] = std::min(box.low[k], x);
         box.high[k] = std::max(box.high[k], x);
       }
@@ -129,15 +128,14 @@ std::int32_t SurfaceTree::build(std::vector<Vec3>& centres_m, std::int32_t first
   boxes_.push_back(box);
   if (last - first <= kLeaf) return at;
   const Vec3 extent = box.high - box.low;
-  const auto axis = static_cast<std::size_t>(std::max_element(extent.begin(), extent.end()) - extent.begin());
+  const std::size_t axis = std::max_element(extent.begin(), extent.end()) - extent.begin();
   const std::int32_t middle = first + (last - first) / 2;
-  std::nth_element(order_.begin() + first, order_.begin() + middle, order_.begin() + last, [&](std::int32_t s, std::int32_t t) {
-    return centres_m[static_cast<std::size_t>(s)][axis] < centres_m[static_cast<std::size_t>(t)][axis];
-  });
+  std::nth_element(order_.begin() + first, order_.begin() + middle, order_.begin() + last,
+                   [&](std::int32_t s, std::int32_t t) { return centres_m[s][axis] < centres_m[t][axis]; });
   build(centres_m, first, middle);
   const std::int32_t second = build(centres_m, middle, last);
-  boxes_[static_cast<std::size_t>(at)].first = second;
-  boxes_[static_cast<std::size_t>(at)].count = 0;
+  boxes_[at].first = second;
+  boxes_[at].count = 0;
   return at;
 }
 
@@ -149,26 +147,25 @@ NearestPlace SurfaceTree::find(const Vec3& point_m) const noexcept {
     double square;
   };
   const auto weigh = [&](std::int32_t at) {
-    const Box& box = boxes_[static_cast<std::size_t>(at)];
+    const Box& box = boxes_[at];
     return Waiting{at, calc_square(point_m, box.low, box.high)};
   };
   double min = std::numeric_limits<double>::infinity();
   std::array<Waiting, kDeepest> stack;
   int depth = 0;
-  stack[static_cast<std::size_t>(depth++)] = weigh(0);
+  stack[depth++] = weigh(0);
   while (depth > 0) {
-    const Waiting next = stack[static_cast<std::size_t>(--depth)];
+    const Waiting next = stack[--depth];
     if (next.square * kRounding > min) continue;
-    const Box& box = boxes_[static_cast<std::size_t>(next.box)];
+    const Box& box = boxes_[next.box];
     if (box.count > 0) {
-      for (std::int32_t i = box.first; i < box.first + box.count; ++i)
-        try_triangle(*bank_, order_[static_cast<std::size_t>(i)], point_m, min, best);
+      for (std::int32_t i = box.first; i < box.first + box.count; ++i) try_triangle(*bank_, order_[i], point_m, min, best);
       continue;
     }
     Waiting near = weigh(next.box + 1), far = weigh(box.first);
     if (far.square < near.square) std::swap(near, far);
-    stack[static_cast<std::size_t>(depth++)] = far;
-    stack[static_cast<std::size_t>(depth++)] = near;
+    stack[depth++] = far;
+    stack[depth++] = near;
   }
   best.distance_m = best.triangle < 0 ? 0.0 : std::sqrt(min);
   return best;

@@ -43,7 +43,7 @@ void append_row(const Bank& bank, std::int32_t vertex, std::vector<std::int16_t>
 Bank drop_unused(const Bank& bank) {
   std::vector<std::int32_t> moved(bank.vertex_count(), -1);
   for (const Triangle& triangle : bank.triangles)
-    for (const std::int32_t v : triangle) moved[static_cast<std::size_t>(v)] = 0;
+    for (const std::int32_t v : triangle) moved[v] = 0;
   if (std::find(moved.begin(), moved.end(), -1) == moved.end()) return bank;
   Bank used = bank;
   used.vertices_m.clear();
@@ -55,7 +55,7 @@ Bank drop_unused(const Bank& bank) {
     append_row(bank, static_cast<std::int32_t>(v), used.shape);
   }
   for (Triangle& triangle : used.triangles)
-    for (std::int32_t& v : triangle) v = moved[static_cast<std::size_t>(v)];
+    for (std::int32_t& v : triangle) v = moved[v];
   return used;
 }
 
@@ -71,7 +71,7 @@ codec::TriangleOrder find_triangle_order(const codec::Surface& surface, const st
                                          const std::vector<Triangle>& triangles, const std::vector<std::int32_t>& moved) {
   codec::TriangleOrder order{before, {}};
   for (std::size_t i = 0; i < before.size(); ++i) {
-    const std::int32_t corner = moved[static_cast<std::size_t>(triangles[static_cast<std::size_t>(before[i])][0])];
+    const std::int32_t corner = moved[triangles[before[i]][0]];
     const Triangle& now = surface.triangles[i];
     order.first.push_back(static_cast<std::uint8_t>(std::find(now.begin(), now.end(), corner) - now.begin()));
   }
@@ -104,7 +104,7 @@ PackedSurface pack_surface(const Bank& original, bool keep_numbers) {
   std::vector<std::uint8_t> order;
   if (keep_numbers) {
     std::vector<std::int32_t> moved(bank.vertex_count());
-    for (std::size_t v = 0; v < moved.size(); ++v) moved[static_cast<std::size_t>(written.vertices[v])] = static_cast<std::int32_t>(v);
+    for (std::size_t v = 0; v < moved.size(); ++v) moved[written.vertices[v]] = static_cast<std::int32_t>(v);
     order = codec::write_order(find_triangle_order(surface, written.triangles, bank.triangles, moved));
   }
   bank.triangles = surface.triangles;

@@ -21,14 +21,13 @@ StruckSkin find_skin(const Bank& bank) {
   StruckSkin skin{std::vector<double>(bank.vertex_count(), 0.0), std::vector<Vec3>(bank.vertex_count(), Vec3{})};
   for (const Triangle& triangle : bank.triangles) {
     const Vec3 normal = calc_normal(bank.vertices_m, triangle);
-    for (const std::int32_t v : triangle) skin.normal[static_cast<std::size_t>(v)] = skin.normal[static_cast<std::size_t>(v)] + normal;
+    for (const std::int32_t v : triangle) skin.normal[v] = skin.normal[v] + normal;
   }
   for (Vec3& normal : skin.normal)
     if (const double length = norm(normal); length > 0.0) normal = (1.0 / length) * normal;
   for (const Triangle& triangle : find_outer_triangles(bank.vertices_m, bank.triangles))
     for (const std::int32_t v : triangle)
-      if (norm(skin.normal[static_cast<std::size_t>(v)]) > 0.0)
-        skin.area_m2[static_cast<std::size_t>(v)] += norm(calc_normal(bank.vertices_m, triangle)) / 6.0;
+      if (norm(skin.normal[v]) > 0.0) skin.area_m2[v] += norm(calc_normal(bank.vertices_m, triangle)) / 6.0;
   return skin;
 }
 
@@ -95,7 +94,7 @@ Check check_packing(const Bank& bank) {
   std::size_t above = 0;
   double worst_db = kExactDb;
   for (std::size_t i = 0; i < packing.witness.size(); ++i) {
-    const auto v = static_cast<std::size_t>(packing.witness[i]);
+    const std::size_t v = packing.witness[i];
     const std::int16_t* own = packing.witness_shape.data() + i * bank.mode_count() * 3;
     const Vec3& normal = blows.skin.normal[v];
     const double missed = calc_heard(blows.weight, normal, own, bank.shape.data() + v * bank.mode_count() * 3);

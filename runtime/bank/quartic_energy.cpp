@@ -199,7 +199,7 @@ QuarticEnergy select_coupled(const QuarticEnergy& energy, const std::vector<std:
 
 void scale_frequencies(QuarticEnergy& energy, std::span<const double> factor) {
   const std::size_t n = energy.mode_count();
-  const auto get_factor = [&](std::size_t i) { return factor[static_cast<std::size_t>(energy.modes[i])]; };
+  const auto get_factor = [&](std::size_t i) { return factor[energy.modes[i]]; };
   for (std::size_t at = 0; at < energy.rows.size();)
     for (std::size_t j = 0; j < n; ++j)
       for (std::size_t i = 0; i <= j; ++i, ++at)

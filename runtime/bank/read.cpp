@@ -62,7 +62,7 @@ class File {
       if (got == 0)
         throw InputError(fmt::format("{}: truncated at byte {} while it was read; read it again when its writer is done", name_, offset));
       offset += static_cast<std::uint64_t>(got);
-      bytes = bytes.subspan(static_cast<std::size_t>(got));
+      bytes = bytes.subspan(got);
     }
   }
 

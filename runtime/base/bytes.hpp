@@ -51,7 +51,7 @@ std::vector<T> take_list(std::span<const std::byte>& from) {
   static_assert(std::is_trivially_copyable_v<T>);
   const auto count = take<std::uint64_t>(from);
   if (count > from.size() / sizeof(T)) throw InputError("the checkpoint is cut off; remove it and run again");
-  std::vector<T> values(static_cast<std::size_t>(count));
+  std::vector<T> values(count);
   if (count > 0) std::memcpy(values.data(), from.data(), values.size() * sizeof(T));
   from = from.subspan(values.size() * sizeof(T));
   return values;

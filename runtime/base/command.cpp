@@ -108,7 +108,7 @@ struct Plan {
     if (score >= 0) (void)!::write(score, kOomScore, std::strlen(kOomScore));
   }
   bool ready = plan.signal_at_end == 0 || ::getppid() == plan.parent;
-  for (int k = 0; k < 3; ++k) ready = ready && ::dup2(plan.streams[static_cast<std::size_t>(k)], k) == k;
+  for (int k = 0; k < 3; ++k) ready = ready && ::dup2(plan.streams[k], k) == k;
   ready = ready && (plan.folder == nullptr || ::chdir(plan.folder) == 0);
   ::sigprocmask(SIG_SETMASK, &plan.mask, nullptr);
   if (ready) ::execve(plan.program, plan.words, plan.environment);
@@ -135,7 +135,7 @@ bool take(int descriptor, std::string& text, const RunOptions& options) {
 /// Gives some more of the input; false when all is given, or the program takes no more.
 bool give(int descriptor, std::string_view& input) {
   const ssize_t put = ::write(descriptor, input.data(), input.size());
-  if (put > 0) input.remove_prefix(static_cast<std::size_t>(put));
+  if (put > 0) input.remove_prefix(put);
   return !input.empty() && (put > 0 || errno == EINTR || errno == EAGAIN);
 }
 

@@ -268,7 +268,7 @@ std::size_t skip_quoted(std::string_view text, std::size_t at) {
 
 /// The byte behind the value that begins at `at`.
 std::size_t find_end(std::string_view text, std::size_t at, const Value& value) {
-  if (value.is(Value::Kind::kList) || value.is(Value::Kind::kObject)) return static_cast<std::size_t>(value.end);
+  if (value.is(Value::Kind::kList) || value.is(Value::Kind::kObject)) return value.end;
   if (value.is(Value::Kind::kText)) return skip_quoted(text, at);
   return std::min(text.find_first_of(" \t\r\n,]}/", at), text.size());
 }

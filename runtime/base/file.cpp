@@ -86,7 +86,7 @@ std::string read_file(const fs::path& file, std::string_view what, std::uint64_t
   if (length > max_bytes) {
     throw InputError(fmt::format("{}: {} bytes are too many for a {} (at most {}); {}", find_name(file), length, what, max_bytes, remedy));
   }
-  std::string bytes(static_cast<std::size_t>(length), '\0');
+  std::string bytes(length, '\0');
   bytes.resize(read_some(fd.get(), bytes.data(), bytes.size(), file, what));  // shorter when the file shrank meanwhile
   return bytes;
 }
@@ -96,7 +96,7 @@ void read_pieces(const fs::path& file, std::string_view what, std::size_t piece_
   const Descriptor fd(open_regular(file, what, length));
   std::string piece(piece_bytes, '\0');
   for (std::uint64_t done = 0; done < length;) {  // what is appended meanwhile is not read
-    const auto wanted = static_cast<std::size_t>(std::min<std::uint64_t>(piece_bytes, length - done));
+    const std::size_t wanted = std::min<std::uint64_t>(piece_bytes, length - done);
     const std::size_t got = read_some(fd.get(), piece.data(), wanted, file, what);
     if (got == 0) return;
     take(std::string_view(piece).substr(0, got));
@@ -141,7 +141,7 @@ int write_all(int descriptor, std::string_view bytes) noexcept {
     const ssize_t put = ::write(descriptor, bytes.data(), bytes.size());
     if (put < 0 && errno == EINTR) continue;
     if (put <= 0) return put < 0 ? errno : ENOSPC;
-    bytes.remove_prefix(static_cast<std::size_t>(put));
+    bytes.remove_prefix(put);
   }
   return 0;
 }

@@ -12,7 +12,7 @@ namespace carillon::base {
 /// DLMF 10.51.1. With |h_0| = 1 / x every size follows, with h_l' = h_{l-1} - (l + 1) / x h_l every slope (DLMF 10.51.2).
 inline std::vector<std::complex<double>> calc_hankel_quotients(double x, int order) {
   std::vector<std::complex<double>> quotients{{0.0, 1.0}};
-  quotients.reserve(static_cast<std::size_t>(order) + 1);
+  quotients.reserve(order + 1);
   for (int l = 0; l < order; ++l) quotients.push_back(1.0 / ((2.0 * l + 1.0) / x - quotients.back()));
   return quotients;
 }

@@ -32,7 +32,7 @@ int DocumentData::line_at(std::ptrdiff_t offset) const {
     scanned_bytes = text.size();
     for (std::size_t at = text.find('\n'); at != std::string::npos; at = text.find('\n', at + 1)) line_ends.push_back(at);
   }
-  const auto end = static_cast<std::size_t>(std::max<std::ptrdiff_t>(offset, 0));
+  const std::size_t end = std::max<std::ptrdiff_t>(offset, 0);
   return first_line + static_cast<int>(std::lower_bound(line_ends.begin(), line_ends.end(), end) - line_ends.begin());
 }
 

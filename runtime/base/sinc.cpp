@@ -41,7 +41,7 @@ const Sinc& Sinc::get() {
 }
 
 Sinc::Sinc() {
-  for (int i = 0; i < kSincHalf * kSincPhases; ++i) value_[static_cast<std::size_t>(i)] = calc_value(static_cast<double>(i) / kSincPhases);
+  for (int i = 0; i < kSincHalf * kSincPhases; ++i) value_[i] = calc_value(static_cast<double>(i) / kSincPhases);
   for (std::size_t phase = 0; phase <= kSincPhases; ++phase) {
     std::array<double, kSincTaps> taps{};
     double total = 0.0;
@@ -62,7 +62,7 @@ double Sinc::evaluate(double x) const noexcept {
 
 void Sinc::make_delay(double fraction, std::array<float, kSincTaps>& taps) const noexcept {
   const double place = std::clamp(fraction, 0.0, 1.0) * kSincPhases;
-  const std::size_t phase = std::min(static_cast<std::size_t>(place), static_cast<std::size_t>(kSincPhases - 1));
+  const std::size_t phase = std::min(static_cast<std::size_t>(place), kSincPhases - 1);
   const auto mix = static_cast<float>(place - static_cast<double>(phase));
   const auto& before = delays_[phase];
   const auto& after = delays_[phase + 1];

@@ -25,7 +25,7 @@ class Sinc {
 
   /// The taps of a delay by kSincHalf - 1 + phase / kSincPhases samples, 0 <= phase <= kSincPhases; behind them those of the next phase.
   /// [audio-thread]
-  const float* get_taps(int phase) const noexcept { return delays_[static_cast<std::size_t>(phase)].data(); }
+  const float* get_taps(int phase) const noexcept { return delays_[phase].data(); }
 
  private:
   Sinc();

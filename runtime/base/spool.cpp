@@ -77,7 +77,7 @@ void Spool::write_tail() {
     if (put < 0 && errno == EINTR) continue;
     if (put <= 0) refuse(put < 0 ? errno : ENOSPC);
     written_ += static_cast<std::uint64_t>(put);
-    rest = rest.subspan(static_cast<std::size_t>(put));
+    rest = rest.subspan(put);
   }
   tail_.clear();
   if (tail_.capacity() > 2 * memory_) {
@@ -89,7 +89,7 @@ void Spool::write_tail() {
 
 void Spool::read(std::uint64_t offset, std::span<std::byte> bytes) const {
   while (!bytes.empty() && offset < written_) {
-    const auto wanted = static_cast<std::size_t>(std::min<std::uint64_t>(bytes.size(), written_ - offset));
+    const std::size_t wanted = std::min<std::uint64_t>(bytes.size(), written_ - offset);
     const ssize_t got = ::pread(descriptor_, bytes.data(), wanted, static_cast<off_t>(offset));
     if (got < 0 && errno == EINTR) continue;
     if (got <= 0) {
@@ -97,7 +97,7 @@ void Spool::read(std::uint64_t offset, std::span<std::byte> bytes) const {
                                     got < 0 ? std::strerror(errno) : "it ends early"));
     }
     offset += static_cast<std::uint64_t>(got);
-    bytes = bytes.subspan(static_cast<std::size_t>(got));
+    bytes = bytes.subspan(got);
   }
   if (!bytes.empty()) std::memcpy(bytes.data(), tail_.data() + (offset - written_), bytes.size());
 }

@@ -74,7 +74,7 @@ class Records {
       if (at_ == buffer_.size()) {
         first_ += at_;
         at_ = 0;
-        buffer_.resize(static_cast<std::size_t>(std::min<std::uint64_t>(kBuffered, records_->size() - first_)));
+        buffer_.resize(std::min<std::uint64_t>(kBuffered, records_->size() - first_));
         records_->read(first_, buffer_);
       }
       return at_ < buffer_.size() ? &buffer_[at_] : nullptr;

@@ -19,7 +19,7 @@ struct UsedPoints {
 inline UsedPoints find_used_points(std::span<const Triangle> triangles, std::size_t count) {
   UsedPoints used{{}, std::vector<std::int32_t>(count, -1)};
   for (const Triangle& triangle : triangles)
-    for (const std::int32_t point : triangle) used.number[static_cast<std::size_t>(point)] = 0;
+    for (const std::int32_t point : triangle) used.number[point] = 0;
   for (std::size_t point = 0; point < count; ++point)
     if (used.number[point] == 0) {
       used.number[point] = static_cast<std::int32_t>(used.points.size());

@@ -55,7 +55,7 @@ class Border {
   }
 
  private:
-  bool is_known(std::int32_t vertex) const { return static_cast<std::size_t>(vertex) < out_.size(); }
+  bool is_known(std::int32_t vertex) const { return vertex < std::ssize(out_); }
 
   std::int32_t find_open(std::int32_t from, std::int32_t to) {
     if (!is_known(from)) return -1;

@@ -115,7 +115,7 @@ class Fitter {
     Eigen::Matrix<float, n, 3> gradient;
     Eigen::Matrix<float, 3, n> offset;
     for (Eigen::Index k = 0; k < n; ++k) {
-      const auto i = static_cast<std::size_t>(k);
+      const std::size_t i = k;
       value[k] = stencil.value[i];
       for (std::size_t j = 0; j < 3; ++j) {
         gradient(k, static_cast<Eigen::Index>(j)) = stencil.gradient[j][i];
@@ -130,7 +130,7 @@ class Fitter {
     for (Eigen::Index c = 0; c < 3; ++c) {
       gathered_.resize(padded_, n);
       for (Eigen::Index k = 0; k < n; ++k)
-        gathered_.col(k) = FieldMap(rows_.get(static_cast<std::size_t>(neighbours[static_cast<std::size_t>(k)])), padded_, 3).col(c);
+        gathered_.col(k) = FieldMap(rows_.get(static_cast<std::size_t>(neighbours[k])), padded_, 3).col(c);
       features_.energy += gathered_.squaredNorm() / static_cast<float>(kNeighbours);
       features_.value.col(c).noalias() = gathered_ * value;
       features_.fields.middleCols(3 * c, 3).noalias() = gathered_ * gradient;
@@ -255,7 +255,7 @@ class Fitter {
 
   /// Adds to row_ what is missing of the vertex, in steps, and keeps the row. False when that is nothing.
   bool add_residual(std::size_t v, LevelNumbers& numbers) {
-    const auto padded = static_cast<std::size_t>(padded_);
+    const std::size_t padded = padded_;
     const float* wanted = wanted_.get(v);
     const std::size_t before = numbers.residual.size();
     bool is_any = false;

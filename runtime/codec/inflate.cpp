@@ -19,7 +19,7 @@ namespace carillon::codec {
 bool inflate(std::span<const std::uint8_t> stream, std::span<std::uint8_t> bytes) {
   const int length = stbi_zlib_decode_buffer(reinterpret_cast<char*>(bytes.data()), static_cast<int>(bytes.size()),
                                              reinterpret_cast<const char*>(stream.data()), static_cast<int>(stream.size()));
-  return length >= 0 && static_cast<std::size_t>(length) == bytes.size();
+  return length >= 0 && length == std::ssize(bytes);
 }
 
 #else

@@ -179,7 +179,7 @@ class ShapeReader {
     float energy = 0.0F;
     for (std::size_t k = 0; k < kNeighbours; ++k) {
       from[k] = rows_.get(static_cast<std::size_t>(neighbours[k]));
-      energy += energies_[static_cast<std::size_t>(neighbours[k])] / static_cast<float>(kNeighbours);
+      energy += energies_[neighbours[k]] / static_cast<float>(kNeighbours);
     }
     if (fit == Fit::kNone) {
       return loops_.add_weighted(from.data(), stencil.value.data(), row_.size(), row_.data());

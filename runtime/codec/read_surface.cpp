@@ -58,7 +58,7 @@ class Vertices {
     }
     return static_cast<std::int32_t>(used_++);
   }
-  const Place& operator[](std::int32_t vertex) const { return places_[static_cast<std::size_t>(vertex)]; }
+  const Place& operator[](std::int32_t vertex) const { return places_[vertex]; }
   Place get_last() const { return used_ > 0 ? places_[used_ - 1] : Place{}; }
   std::int32_t find_other(std::uint32_t back) {
     if (back >= used_) reader_.fail("a corner is a vertex that is not there yet");
@@ -124,12 +124,12 @@ void sort_vertices(Surface& surface, const std::vector<std::uint8_t>& level, std
   std::vector<std::int32_t> moved(level.size());
   std::vector<Place> places(level.size());
   for (std::size_t v = 0; v < level.size(); ++v) {
-    moved[static_cast<std::size_t>(order[v])] = static_cast<std::int32_t>(v);
-    places[v] = surface.places[static_cast<std::size_t>(order[v])];
+    moved[order[v]] = static_cast<std::int32_t>(v);
+    places[v] = surface.places[order[v]];
   }
   surface.places = std::move(places);
   for (Triangle& triangle : surface.triangles)
-    for (std::int32_t& corner : triangle) corner = moved[static_cast<std::size_t>(corner)];
+    for (std::int32_t& corner : triangle) corner = moved[corner];
 }
 
 /// The lowest 19 bits with two zeros behind each.
@@ -179,7 +179,7 @@ void restore_order(std::span<const std::byte> bytes, std::vector<Triangle>& tria
   for (std::size_t i = 0; i < triangles.size(); ++i) {
     t += unfold(steps[i]);
     if (t < 0 || t >= static_cast<std::int64_t>(before.size())) reader.fail(fmt::format("triangle {} is out of range", i));
-    Triangle& triangle = before[static_cast<std::size_t>(t)];
+    Triangle& triangle = before[t];
     if (triangle[0] >= 0) reader.fail(fmt::format("two triangles have the number {}", t));
     if (first[i] > 2) reader.fail(fmt::format("triangle {} begins with its corner {}", i, first[i]));
     for (std::size_t k = 0; k < 3; ++k) triangle[k] = triangles[i][(k + first[i]) % 3];

@@ -13,17 +13,17 @@ class EdgeTable {
  public:
   EdgeTable(const std::vector<Triangle>& triangles, std::size_t vertices) : triangles_(triangles), begin_(vertices + 1, 0) {
     for (const Triangle& triangle : triangles)
-      for (const std::int32_t v : triangle) ++begin_[static_cast<std::size_t>(v) + 1];
+      for (const std::int32_t v : triangle) ++begin_[v + 1];
     std::partial_sum(begin_.begin(), begin_.end(), begin_.begin());
     edges_.resize(3 * triangles.size());
     std::vector<std::size_t> next(begin_.begin(), begin_.end() - 1);
     for (std::size_t t = 0; t < triangles.size(); ++t)
-      for (std::size_t k = 0; k < 3; ++k) edges_[next[static_cast<std::size_t>(triangles[t][k])]++] = static_cast<std::int32_t>(3 * t + k);
+      for (std::size_t k = 0; k < 3; ++k) edges_[next[triangles[t][k]]++] = static_cast<std::int32_t>(3 * t + k);
   }
   /// Three times the triangle, plus the corner where the edge begins, of the first triangle that is not done. There is one.
   std::int32_t find(std::int32_t from, std::int32_t to, const std::vector<bool>& is_done) const {
-    std::size_t i = begin_[static_cast<std::size_t>(from)];
-    while (triangles_[edges_[i] / 3][(edges_[i] + 1) % 3] != to || is_done[static_cast<std::size_t>(edges_[i] / 3)]) ++i;
+    std::size_t i = begin_[from];
+    while (triangles_[edges_[i] / 3][(edges_[i] + 1) % 3] != to || is_done[edges_[i] / 3]) ++i;
     return edges_[i];
   }
 
@@ -63,7 +63,7 @@ class Traversal {
         t = edge / 3;
         corners = {gate->to, gate->from, name_corner(triangles_[t][(edge + 2) % 3], gate)};
       }
-      is_done[static_cast<std::size_t>(t)] = true;
+      is_done[t] = true;
       order_.push_back(t);
       border_.add(corners);
     }
@@ -74,7 +74,7 @@ class Traversal {
 
  private:
   std::int32_t name_corner(std::int32_t vertex, const Gate* gate) {
-    std::int32_t& number = number_[static_cast<std::size_t>(vertex)];
+    std::int32_t& number = number_[vertex];
     Corner corner = Corner::kOther;
     if (number < 0) {
       add_vertex(vertex, gate);
@@ -91,16 +91,14 @@ class Traversal {
   }
 
   void add_vertex(std::int32_t vertex, const Gate* gate) {
-    const auto at = [&](std::int32_t number) -> const Place& {
-      return places_[static_cast<std::size_t>(vertices_[static_cast<std::size_t>(number)])];
-    };
+    const auto at = [&](std::int32_t number) -> const Place& { return places_[vertices_[number]]; };
     for (std::size_t k = 0; k < 3; ++k) {
       const std::int32_t predicted = gate != nullptr     ? at(gate->from)[k] + at(gate->to)[k] - at(gate->opposite)[k]
                                      : vertices_.empty() ? 0
-                                                         : places_[static_cast<std::size_t>(vertices_.back())][k];
-      streams_.places[k].push_back(fold(places_[static_cast<std::size_t>(vertex)][k] - predicted));
+                                                         : places_[vertices_.back()][k];
+      streams_.places[k].push_back(fold(places_[vertex][k] - predicted));
     }
-    number_[static_cast<std::size_t>(vertex)] = static_cast<std::int32_t>(vertices_.size());
+    number_[vertex] = static_cast<std::int32_t>(vertices_.size());
     vertices_.push_back(vertex);
   }
 
@@ -155,13 +153,13 @@ WrittenSurface write_surface(const Vec3& origin_m, double step_m, const std::vec
   std::vector<std::uint8_t> levels_of;
   std::vector<Place> places_of;
   for (const std::int32_t v : written.vertices) {
-    levels_of.push_back(level[static_cast<std::size_t>(v)]);
-    places_of.push_back(places[static_cast<std::size_t>(v)]);
+    levels_of.push_back(level[v]);
+    places_of.push_back(places[v]);
   }
   writer.put_block(levels_of);
   const std::vector<std::int32_t> seen = written.vertices;
   const std::vector<std::int32_t> order = find_order(places_of, levels_of);
-  for (std::size_t v = 0; v < order.size(); ++v) written.vertices[v] = seen[static_cast<std::size_t>(order[v])];
+  for (std::size_t v = 0; v < order.size(); ++v) written.vertices[v] = seen[order[v]];
   written.bytes = writer.get_bytes();
   return written;
 }

@@ -73,7 +73,7 @@ void check_body(const BodySpec& b) {
 
 void check_joints(const WorldSpec& spec) {
   const int count = static_cast<int>(spec.bodies.size());
-  const auto is_fixed = [&](int body) { return body < 0 || spec.bodies[static_cast<std::size_t>(body)].fixed; };
+  const auto is_fixed = [&](int body) { return body < 0 || spec.bodies[body].fixed; };
   const auto check_ends = [&](const std::string& place, const char* what, int body, int to) {
     if (body < 0 || body >= count || to < -1 || to >= count) throw InputError(fmt::format("{}: a {} names no body", place, what));
     std::string who = describe(spec, place, what, body, to);
@@ -130,9 +130,7 @@ void check_joints(const WorldSpec& spec) {
 }  // namespace
 
 std::string describe(const WorldSpec& spec, const std::string& place, const char* what, int body, int to) {
-  const auto name = [&](int b) {
-    return b < 0 ? std::string("the world") : fmt::format("'{}'", spec.bodies[static_cast<std::size_t>(b)].name);
-  };
+  const auto name = [&](int b) { return b < 0 ? std::string("the world") : fmt::format("'{}'", spec.bodies[b].name); };
   return fmt::format("{}{}the {} between {} and {}", place, place.empty() ? "" : ": ", what, name(body), name(to));
 }
 

@@ -144,8 +144,7 @@ void LastingContacts::record(const rigid::Space& space, const Group& g, Spot& sp
     const double sign = side == 0 ? 1.0 : -1.0;
     const rigid::State& state = space.state(body);
     const Mat3 back = transpose(rigid::make_rotation(state.rotation));
-    const Spotted place =
-        find_place(space.solid(body), state, g.where, (-sign) * g.normal, is_new ? -1 : spot.last[static_cast<std::size_t>(side)].triangle);
+    const Spotted place = find_place(space.solid(body), state, g.where, (-sign) * g.normal, is_new ? -1 : spot.last[side].triangle);
     events::LastingContact c;
     c.time_s = time_s;
     c.id = spot.id;
@@ -162,7 +161,7 @@ void LastingContacts::record(const rigid::Space& space, const Group& g, Spot& sp
     c.spin_rad_s = norm(g.turn);
     c.patch_radius_m = patch;
     c.impedance_n_s_m = calc_impedance(other, patch);
-    spot.last[static_cast<std::size_t>(side)] = c;
+    spot.last[side] = c;
     events.push_back(c);
   }
 }
@@ -243,7 +242,7 @@ void LastingContacts::end_or_keep(const rigid::Space& space, std::vector<Spot>& 
     if (lies) {
       spot.seen_s = time_s;
       for (const int side : {0, 1}) {
-        events::LastingContact& c = spot.last[static_cast<std::size_t>(side)];
+        events::LastingContact& c = spot.last[side];
         if (spot.lies || spot.begun_s < 0.0 || c.body < 0) continue;
         c.time_s = time_s;
         c.state = events::ContactState::kHold;
@@ -258,7 +257,7 @@ void LastingContacts::end_or_keep(const rigid::Space& space, std::vector<Spot>& 
     if (lies) continue;
     if (time_s - spot.seen_s <= kGone || spot.begun_s < 0.0) continue;
     for (const int side : {0, 1}) {
-      events::LastingContact c = spot.last[static_cast<std::size_t>(side)];
+      events::LastingContact c = spot.last[side];
       if (c.body < 0) continue;
       c.time_s = time_s;
       c.state = events::ContactState::kEnd;

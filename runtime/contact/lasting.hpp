@@ -84,7 +84,7 @@ class LastingContacts {
   void end_or_keep(const rigid::Space& space, std::vector<Spot>& spots, std::vector<events::Event>& events);
   std::uint64_t make_id(const Spot& spot);
   std::uint64_t hash_name(int body) const;
-  const Matter& get_matter(int body) const { return body < 0 ? matter_.back() : matter_[static_cast<std::size_t>(body)]; }
+  const Matter& get_matter(int body) const { return body < 0 ? matter_.back() : matter_[body]; }
   double calc_patch(const Group& group, double radius_m) const;
   double calc_impedance(int body, double patch_m) const;
 

@@ -25,8 +25,7 @@ double calc_inverse_mass(const rigid::Space& space, const rigid::Strike& strike,
   for (const int body : {hit.a, hit.b}) {
     if (body < 0 || space.solid(body).fixed) continue;
     const auto at = std::find(strike.bodies.begin(), strike.bodies.end(), body);
-    const rigid::State& state =
-        at == strike.bodies.end() ? space.state(body) : strike.before[static_cast<std::size_t>(at - strike.bodies.begin())];
+    const rigid::State& state = at == strike.bodies.end() ? space.state(body) : strike.before[at - strike.bodies.begin()];
     const rigid::Solid& solid = space.solid(body);
     const Vec3 arm = cross(where - state.centre, normal);
     sum += 1.0 / solid.mass_kg + dot(arm, rigid::place(solid, state).inverse_inertia * arm);
@@ -67,12 +66,11 @@ void add_spot(const rigid::Space& space, const rigid::Strike& strike, const std:
     const int body = side == 0 ? first.a : first.b;
     if (body < 0 || (masks != nullptr && masks->take(body, strike.time_s, norm(impulse), pulse.duration_s))) continue;
     const auto at = std::find(strike.bodies.begin(), strike.bodies.end(), body);
-    const rigid::State& state =
-        at == strike.bodies.end() ? space.state(body) : strike.before[static_cast<std::size_t>(at - strike.bodies.begin())];
+    const rigid::State& state = at == strike.bodies.end() ? space.state(body) : strike.before[at - strike.bodies.begin()];
     const double sign = side == 0 ? 1.0 : -1.0;
     // Where one hit is alone, the place is known; where there are more, it is on the same face or near.
-    const std::optional<shape::Place>& known = first.places[static_cast<std::size_t>(side)];
-    const std::int32_t near = first.triangles[static_cast<std::size_t>(side)];
+    const std::optional<shape::Place>& known = first.places[side];
+    const std::int32_t near = first.triangles[side];
     const Spotted place = known && hits.size() == 1 ? Spotted{known->triangle, known->barycentric}
                                                     : find_place(space.solid(body), state, where, (-sign) * normal, near);
     pulse.body = body;
@@ -87,7 +85,7 @@ void add_spot(const rigid::Space& space, const rigid::Strike& strike, const std:
 }  // namespace
 
 bool Masks::take(int body, double time_s, double impulse_n_s, double duration_s) {
-  Mask& mask = masks_[static_cast<std::size_t>(body)];
+  Mask& mask = masks_[body];
   mask.impulse_n_s *= std::exp(-std::max(time_s - mask.time_s, 0.0) / kMaskTime);
   mask.time_s = std::max(time_s, mask.time_s);
   if (impulse_n_s < kHidden * mask.impulse_n_s && duration_s >= mask.duration_s) return true;

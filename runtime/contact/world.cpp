@@ -83,18 +83,15 @@ std::vector<Matter> list_matter(const WorldSpec& spec) {
 
 /// The stops of a joint: one at each end of its way.
 void add_stops(const JointSpec& j, const std::vector<rigid::Solid>& solids, const std::vector<rigid::State>& states, rigid::Links& links) {
-  const bool turned = solids[static_cast<std::size_t>(j.body)].fixed;  // what moves comes first
+  const bool turned = solids[j.body].fixed;  // what moves comes first
   const int a = turned ? j.to : j.body, b = turned ? j.body : j.to;
   const auto get_turn = [&](int body) {
-    return body < 0 ? Mat3{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}
-                    : transpose(rigid::make_rotation(states[static_cast<std::size_t>(body)].rotation));
+    return body < 0 ? Mat3{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}} : transpose(rigid::make_rotation(states[body].rotation));
   };
-  const auto get_place = [&](int body) {
-    return body < 0 ? j.at_m : get_turn(body) * (j.at_m - states[static_cast<std::size_t>(body)].centre);
-  };
+  const auto get_place = [&](int body) { return body < 0 ? j.at_m : get_turn(body) * (j.at_m - states[body].centre); };
   const Vec3 lever = find_across(j.axis);
-  double arm = solids[static_cast<std::size_t>(a)].radius_m;
-  if (b >= 0 && !solids[static_cast<std::size_t>(b)].fixed) arm = std::min(arm, solids[static_cast<std::size_t>(b)].radius_m);
+  double arm = solids[a].radius_m;
+  if (b >= 0 && !solids[b].fixed) arm = std::min(arm, solids[b].radius_m);
   for (const bool is_lower : {true, false}) {
     rigid::Stop stop{.turns = j.kind == joints::Kind::kHinge, .at_a = get_place(a), .at_b = get_place(b), .axis = get_turn(b) * j.axis};
     stop.lever_a = get_turn(a) * lever;
@@ -115,12 +112,12 @@ rigid::Links make_links(const WorldSpec& spec, const std::vector<rigid::Solid>& 
   for (const CordSpec& c : spec.cords) {
     const auto tie = [&](int body, const Vec3& where) {
       if (body < 0) return where;
-      const rigid::State& state = states[static_cast<std::size_t>(body)];
+      const rigid::State& state = states[body];
       return transpose(rigid::make_rotation(state.rotation)) * (where - state.centre);
     };
     rigid::Cord cord;
     // What moves comes first.
-    const bool turned = solids[static_cast<std::size_t>(c.body)].fixed;
+    const bool turned = solids[c.body].fixed;
     cord.a = turned ? c.to : c.body;
     cord.b = turned ? c.body : c.to;
     cord.at_a = tie(cord.a, turned ? c.to_m : c.from_m);
@@ -260,8 +257,8 @@ class World::Course {
 
   /// The window in which a body is put to sleep ends with its last motion.
   bool just_slept(int body) {
-    still_.resize(static_cast<std::size_t>(count()), 1);
-    const char now = space_.is_still(body) ? 1 : 0, before = std::exchange(still_[static_cast<std::size_t>(body)], now);
+    still_.resize(count(), 1);
+    const char now = space_.is_still(body) ? 1 : 0, before = std::exchange(still_[body], now);
     return now != 0 && before == 0;
   }
 
@@ -327,7 +324,7 @@ class World::Course {
     std::vector<ContactWatch::Bodies> pairs;
     const std::vector<std::vector<int>> near = find_near();
     for (int a = 0; a < count(); ++a)
-      for (const int b : near[static_cast<std::size_t>(a)])
+      for (const int b : near[a])
         if (!space_.is_joined(a, b)) pairs.emplace_back(a, b);
     watch_.look_at_ground(space_);
     watch_.look_at_pairs(space_, pairs, true);
@@ -393,14 +390,14 @@ std::vector<std::vector<int>> World::Course::find_near() const {
     boxes.push_back(space_.solid(i).shape->calc_box(rigid::place(space_.solid(i), space_.state(i)).frame));
     order.push_back(i);
   }
-  const auto box = [&](int body) -> const shape::Box& { return boxes[static_cast<std::size_t>(body)]; };
+  const auto box = [&](int body) -> const shape::Box& { return boxes[body]; };
   std::sort(order.begin(), order.end(), [&](int a, int b) { return box(a).low[0] < box(b).low[0]; });
   std::vector<std::vector<int>> near(boxes.size());
   for (auto a = order.begin(); a != order.end(); ++a) {
     for (auto b = a + 1; b != order.end() && box(*b).low[0] <= box(*a).high[0]; ++b) {
       if (space_.solid(*a).fixed && space_.solid(*b).fixed) continue;
       const auto is_apart = [&](std::size_t k) { return box(*a).low[k] > box(*b).high[k] || box(*b).low[k] > box(*a).high[k]; };
-      if (!is_apart(1) && !is_apart(2)) near[static_cast<std::size_t>(std::min(*a, *b))].push_back(std::max(*a, *b));
+      if (!is_apart(1) && !is_apart(2)) near[std::min(*a, *b)].push_back(std::max(*a, *b));
     }
   }
   for (std::vector<int>& bodies : near) std::sort(bodies.begin(), bodies.end());
@@ -435,9 +432,9 @@ void World::Course::check_overlaps(const WorldSpec& spec) const {
       for (const shape::Touch& touch : touches) depth = std::max(depth, -touch.gap_m);
       if (depth > allowed_m(a))
         throw InputError(fmt::format("body '{}' starts {:.2f} mm inside the ground (height {:g} m); raise it by that much",
-                                     spec.bodies[static_cast<std::size_t>(a)].name, depth * 1e3, spec.ground->height_m));
+                                     spec.bodies[a].name, depth * 1e3, spec.ground->height_m));
     }
-    for (const int b : near[static_cast<std::size_t>(a)]) {
+    for (const int b : near[a]) {
       if (space_.is_joined(a, b)) continue;
       Vec3 where{};
       const double depth = shape::calc_overlap(*space_.solid(a).shape, at_a.frame, *space_.solid(b).shape,
@@ -445,8 +442,7 @@ void World::Course::check_overlaps(const WorldSpec& spec) const {
       if (depth > std::min(allowed_m(a), allowed_m(b)))
         throw InputError(
             fmt::format("bodies '{}' and '{}' start inside each other, {:.2f} mm deep near ({:.4f}, {:.4f}, {:.4f}) m; move one of them",
-                        spec.bodies[static_cast<std::size_t>(a)].name, spec.bodies[static_cast<std::size_t>(b)].name, depth * 1e3, where[0],
-                        where[1], where[2]));
+                        spec.bodies[a].name, spec.bodies[b].name, depth * 1e3, where[0], where[1], where[2]));
     }
   }
 }
@@ -464,13 +460,13 @@ std::vector<std::string> ask_about_links(const WorldSpec& spec) {
   constexpr double kFar = 30.0;  // radii of a body
   std::vector<std::string> questions;
   const auto calc_distance = [&](int body, const Vec3& where, double& radius) {
-    const BodySpec& b = spec.bodies[static_cast<std::size_t>(body)];
+    const BodySpec& b = spec.bodies[body];
     radius = 0.0;
     for (const Vec3& v : b.bank->vertices_m) radius = std::max(radius, norm(v - b.bank->rigid.centre_m));
     const Mat3 rotation = rigid::make_rotation(rigid::normalise(b.initial.rotation));
     return norm(where - b.initial.position_m - rotation * b.bank->rigid.centre_m);
   };
-  const auto name = [&](int body) { return spec.bodies[static_cast<std::size_t>(body)].name; };
+  const auto name = [&](int body) { return spec.bodies[body].name; };
   for (const JointSpec& joint : spec.joints) {
     bool far = true;
     double nearest = std::numeric_limits<double>::infinity(), of = 0.0;
@@ -511,12 +507,12 @@ Pose calc_pose(const events::BodyMotion& motion, const Vec3& c) {
 Simulation collect(const std::vector<events::Event>& events, const std::vector<Vec3>& centres_m) {
   Simulation all;
   all.poses.resize(centres_m.size());
-  const auto is_known = [&](std::int32_t body) { return body >= 0 && static_cast<std::size_t>(body) < centres_m.size(); };
+  const auto is_known = [&](std::int32_t body) { return body >= 0 && body < std::ssize(centres_m); };
   for (const events::Event& event : events) {
     if (const auto* impulse = std::get_if<Impulse>(&event); impulse != nullptr && is_known(impulse->body)) {
       all.impulses.push_back(*impulse);
     } else if (const auto* motion = std::get_if<events::BodyMotion>(&event); motion != nullptr && is_known(motion->body)) {
-      const auto body = static_cast<std::size_t>(motion->body);
+      const std::size_t body = motion->body;
       auto& path = all.poses[body];
       if (!path.empty() && path.back().time_s >= motion->time_s) continue;  // after an impact it is where it was before
       path.push_back(calc_pose(*motion, centres_m[body]));

@@ -19,14 +19,14 @@ constexpr double kRecordGapS = 0.01;  // longest time between two records of a c
 
 /// The surfaces of a contact with their moduli: of the body of the record, and of the other one.
 std::array<synth::ContactSurface, 2> find_surfaces(const SceneFacts& facts, const events::LastingContact& contact) {
-  const bool has_other = contact.other >= 0 && static_cast<std::size_t>(contact.other) < facts.bodies.size();
+  const bool has_other = contact.other >= 0 && contact.other < std::ssize(facts.bodies);
   const auto complete = [](const BodyFacts& body) {
     const bank::Material& m = body.bank->material;
     return synth::complete(body.surface, m.young_modulus_pa / (1.0 - m.poisson_ratio * m.poisson_ratio), bank::calc_wave_impedance(m));
   };
-  const synth::ContactSurface own = complete(facts.bodies[static_cast<std::size_t>(contact.body)]);
+  const synth::ContactSurface own = complete(facts.bodies[contact.body]);
   synth::ContactSurface other = facts.ground;
-  if (has_other) other = complete(facts.bodies[static_cast<std::size_t>(contact.other)]);
+  if (has_other) other = complete(facts.bodies[contact.other]);
   return {own, other};
 }
 

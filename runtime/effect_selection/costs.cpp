@@ -77,7 +77,7 @@ double time_force(int modes, int steps, double length_s) {
   std::array<float, kBlock> block{};
   std::int64_t sample = 0;
   events::Force force{.step_s = length_s / steps, .count = static_cast<std::int16_t>(steps)};
-  for (int k = 0; k < steps; ++k) force.impulse_n_s[static_cast<std::size_t>(k)] = {0.0F, 0.0F, 1e-3F / static_cast<float>(steps)};
+  for (int k = 0; k < steps; ++k) force.impulse_n_s[k] = {0.0F, 0.0F, 1e-3F / static_cast<float>(steps)};
   const auto play = [&] {
     for (int b = 0; b < kBlocks; ++b, sample += kBlock) {
       force.time_s = static_cast<double>(sample + kBlock / 4) / kRateHz;

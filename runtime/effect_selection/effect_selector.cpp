@@ -201,7 +201,7 @@ void EffectSelector::State::begin_walk(double time_s) {
 }
 
 void EffectSelector::State::apply(const events::Event& event) {
-  const auto find_body = [&](std::int32_t body) -> SelectedBody& { return bodies[static_cast<std::size_t>(body)]; };
+  const auto find_body = [&](std::int32_t body) -> SelectedBody& { return bodies[body]; };
   if (const auto* impulse = std::get_if<events::Impulse>(&event)) judge(find_body(impulse->body), *impulse, hearing);
   if (const auto* force = std::get_if<events::Force>(&event)) judge(find_body(force->body), *force, hearing);
   if (const auto* contact = std::get_if<events::LastingContact>(&event)) judge(find_body(contact->body), *contact, hearing);
@@ -213,7 +213,7 @@ void EffectSelector::State::apply(const events::Event& event) {
 }
 
 EffectSet EffectSelector::get_possible(int body) const {
-  const auto i = static_cast<std::size_t>(body);
+  const std::size_t i = body;
   const EffectOverrides& overrides = state_->hearing.facts.bodies.at(i).overrides;
   const EffectSet offered = overrides.automatic ? state_->bodies[i].possible.with(overrides.on) : overrides.on;
   return offered.without(overrides.off);
@@ -230,15 +230,15 @@ bool EffectSelector::needs_contacts() const {
 void EffectSelector::watch(const events::Event& event) {
   State& s = *state_;
   double from_s = events::get_time_s(event);
-  const auto is_ours = [&](std::int32_t body) { return body >= 0 && static_cast<std::size_t>(body) < s.bodies.size(); };
+  const auto is_ours = [&](std::int32_t body) { return body >= 0 && body < std::ssize(s.bodies); };
   if (events::find_fault(event) != nullptr) return;
   if (const auto* impulse = std::get_if<events::Impulse>(&event)) {
     if (!is_ours(impulse->body)) return;
-    const double lead = s.bodies[static_cast<std::size_t>(impulse->body)].bank->get_radius_m() / bank::kSoundSpeedMs;
+    const double lead = s.bodies[impulse->body].bank->get_radius_m() / bank::kSoundSpeedMs;
     from_s -= 0.5 * synth::calc_pulse_length(impulse->shape, impulse->duration_s) + lead;
   } else if (const auto* force = std::get_if<events::Force>(&event)) {
     if (!is_ours(force->body)) return;
-    from_s -= s.bodies[static_cast<std::size_t>(force->body)].bank->get_radius_m() / bank::kSoundSpeedMs;
+    from_s -= s.bodies[force->body].bank->get_radius_m() / bank::kSoundSpeedMs;
   } else if (const auto* contact = std::get_if<events::LastingContact>(&event)) {
     if (!is_ours(contact->body)) return;
   } else if (const auto* motion = std::get_if<events::BodyMotion>(&event)) {
@@ -287,7 +287,7 @@ std::vector<EffectChange> EffectSelector::advance(double known_s) {
 double EffectSelector::get_time_s() const { return static_cast<double>(state_->tick) * kTickS; }
 
 BodyPlan EffectSelector::get_plan(int number) const {
-  const auto i = static_cast<std::size_t>(number);
+  const std::size_t i = number;
   const SelectedBody& body = state_->bodies.at(i);
   const EffectOverrides& overrides = state_->hearing.facts.bodies[i].overrides;
   BodyPlan plan = body.plan;
@@ -312,7 +312,7 @@ BodyPlan EffectSelector::get_plan(int number) const {
 double EffectSelector::calc_silence_pa(int number) const {
   constexpr double kStandardPa = 1e-10;  // of VoiceOptions
   constexpr double kMargin = 0.5;        // of the inaudible level, for bodies that come nearer and modes that add up
-  const SelectedBody& body = state_->bodies.at(static_cast<std::size_t>(number));
+  const SelectedBody& body = state_->bodies.at(number);
   if (!(state_->hearing.loudest_pa2_s > 0.0)) return kStandardPa;
   const double quiet_pa = kReferencePa * std::pow(10.0, state_->hearing.calc_inaudible_db() / 20.0);
   return std::max(kStandardPa, kMargin * quiet_pa * body.nearest_m);

@@ -58,7 +58,7 @@ double calc_pulse_spectrum(events::PulseShape shape, double cycles) noexcept {
   if (shape == events::PulseShape::kGaussian) return std::exp(-2.0 * pi * pi * kVariance * cycles * cycles);
   if (cycles >= kMaxCycles) return 0.26886870 * std::pow(cycles, -2.5);  // Gamma(7/4)^2 / pi
   const double place = cycles * kStepsPerCycle;
-  const auto index = static_cast<std::size_t>(place);
+  const std::size_t index = place;
   const double share = place - static_cast<double>(index);
   const std::vector<double>& table = get_hertz_table();
   return table[index] + share * (table[index + 1] - table[index]);
@@ -144,13 +144,13 @@ void BankLevels::find_spreads(const radiation::Transfers& transfers) {
 
 bool BankLevels::calc_projections(std::int32_t triangle, const Vec3& barycentric, const Vec3& direction,
                                   std::vector<double>& projections) const {
-  if (triangle < 0 || static_cast<std::size_t>(triangle) >= bank_->triangles.size()) return false;
+  if (triangle < 0 || triangle >= std::ssize(bank_->triangles)) return false;
   projections.assign(modes_.size(), 0.0);
-  const auto& corners = bank_->triangles[static_cast<std::size_t>(triangle)];
+  const auto& corners = bank_->triangles[triangle];
   for (std::size_t i = 0; i < modes_.size(); ++i) {
     double sum = 0.0;
     for (std::size_t corner = 0; corner < 3; ++corner) {
-      const Vec3 phi = bank_->shape_at(static_cast<std::size_t>(corners[corner]), static_cast<std::size_t>(modes_[i].index));
+      const Vec3 phi = bank_->shape_at(corners[corner], modes_[i].index);
       sum += barycentric[corner] * (phi[0] * direction[0] + phi[1] * direction[1] + phi[2] * direction[2]);
     }
     projections[i] = std::abs(sum);
@@ -160,12 +160,12 @@ bool BankLevels::calc_projections(std::int32_t triangle, const Vec3& barycentric
 
 double BankLevels::calc_pushed_pa2_s(std::int32_t triangle, const Vec3& barycentric, const Vec3& impulse_n_s, events::PulseShape shape,
                                      double duration_s) const {
-  if (triangle < 0 || static_cast<std::size_t>(triangle) >= bank_->triangles.size()) return 0.0;
-  const auto& corners = bank_->triangles[static_cast<std::size_t>(triangle)];
+  if (triangle < 0 || triangle >= std::ssize(bank_->triangles)) return 0.0;
+  const auto& corners = bank_->triangles[triangle];
   double sum = 0.0;
   for (const PushedMode& mode : pushed_) {
     for (std::size_t corner = 0; corner < 3; ++corner) {
-      const Vec3 phi = bank_->shape_at(static_cast<std::size_t>(corners[corner]), mode.index);
+      const Vec3 phi = bank_->shape_at(corners[corner], mode.index);
       sum += mode.gain_s2 * barycentric[corner] * (phi[0] * impulse_n_s[0] + phi[1] * impulse_n_s[1] + phi[2] * impulse_n_s[2]);
     }
   }

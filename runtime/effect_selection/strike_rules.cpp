@@ -109,7 +109,7 @@ void call_nonlinear(SelectedBody& body, const events::Impulse& impulse, double u
   for (std::size_t i = 0, m = 0; i < coupled.size(); ++i) {
     while (m < modes.size() && modes[m].index < coupled[i]) ++m;
     if (m == modes.size() || modes[m].index != coupled[i]) continue;
-    const auto mode = static_cast<std::size_t>(coupled[i]);
+    const std::size_t mode = coupled[i];
     const double lambda = bank.eigenvalue_rad2_s2[mode], decay_per_s = std::max(modes[m].decay_per_s, 1e-9);
     const double pulse = calc_pulse_spectrum(impulse.shape, modes[m].freq_hz * impulse.duration_s);
     body.swing[i] = body.swing[i] * std::exp(-decay_per_s * passed_s) + projection[m] * pulse / std::sqrt(lambda);

@@ -66,7 +66,7 @@ base::Json make_changes_json(std::span<const EffectChange> changes, const SceneF
       if (count++ == max_count) return json;
       json.add(base::Json::object()
                    .set("time_s", base::decimals(change.time_s, 3))
-                   .set("body", facts.bodies[static_cast<std::size_t>(change.body)].name)
+                   .set("body", facts.bodies[change.body].name)
                    .set("effect", synth::get_name(one.effect))
                    .set("on", one.on)
                    .set("why", describe(one.reason)));

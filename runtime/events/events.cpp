@@ -66,7 +66,7 @@ const char* find_own_fault(const Force& force) noexcept {
   if (force.count < 1 || force.count > kMaxForceSteps) return "the number of steps is not 1 to 16";
   if (!(is_amount(force.step_s) && force.step_s > 0.0)) return "the length of a step is not above 0";
   for (int k = 0; k < force.count; ++k) {
-    for (const float x : force.impulse_n_s[static_cast<std::size_t>(k)]) {
+    for (const float x : force.impulse_n_s[k]) {
       if (!std::isfinite(x)) return "an impulse is not finite";
     }
   }
@@ -101,7 +101,7 @@ const char* find_own_fault(const Listener& listener) noexcept { return find_movi
 Vec3 calc_impulse(const Force& force) noexcept {
   Vec3 sum{};
   for (int k = 0; k < force.count; ++k) {
-    for (std::size_t axis = 0; axis < 3; ++axis) sum[axis] += static_cast<double>(force.impulse_n_s[static_cast<std::size_t>(k)][axis]);
+    for (std::size_t axis = 0; axis < 3; ++axis) sum[axis] += static_cast<double>(force.impulse_n_s[k][axis]);
   }
   return sum;
 }
@@ -109,7 +109,7 @@ Vec3 calc_impulse(const Force& force) noexcept {
 Impulse to_impulse(const Force& force) noexcept {
   double weights = 0.0, middle = 0.0;
   for (int k = 0; k < force.count; ++k) {
-    const auto& [x, y, z] = force.impulse_n_s[static_cast<std::size_t>(k)];
+    const auto& [x, y, z] = force.impulse_n_s[k];
     const double size = std::hypot(static_cast<double>(x), static_cast<double>(y), static_cast<double>(z));
     weights += size;
     middle += size * (k + 0.5);

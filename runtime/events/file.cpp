@@ -80,7 +80,7 @@ void write(Out out, const Force& e) {
   if (e.continues) fmt::format_to(out, R"("continues": true, )");
   fmt::format_to(out, R"("impulse_n_s": [)");
   for (int k = 0; k < e.count; ++k) {
-    const auto& [x, y, z] = e.impulse_n_s[static_cast<std::size_t>(k)];
+    const auto& [x, y, z] = e.impulse_n_s[k];
     fmt::format_to(out, "{}[{}, {}, {}]", k > 0 ? ", " : "", format_number(x), format_number(y), format_number(z));
   }
   fmt::format_to(out, "]}}}}");
@@ -138,7 +138,7 @@ class EventReader {
     e.continues = in_.boolean_or("continues", false);
     check_size("step_s", e.step_s, kLongestPulse / kMaxForceSteps);
     for (const std::vector<double>& row : in_.number_rows("impulse_n_s", 3, kMaxForceSteps)) {
-      auto& sample = e.impulse_n_s[static_cast<std::size_t>(e.count++)];
+      auto& sample = e.impulse_n_s[e.count++];
       for (std::size_t axis = 0; axis < 3; ++axis) {
         check_size("impulse_n_s", row[axis]);
         sample[axis] = static_cast<float>(row[axis]);
@@ -205,7 +205,7 @@ class EventReader {
     e.body = read_body("body", 0);
     e.other = in_.has("other") ? read_body("other", -1) : -1;
     const long long triangle = in_.integer("triangle", 0, kInt32);
-    const RecordedBody& body = bodies_[static_cast<std::size_t>(e.body)];
+    const RecordedBody& body = bodies_[e.body];
     if (triangle >= body.triangles) {
       in_.fail("triangle",
                fmt::format("the bank of \"{}\" has {} triangles, counted from 0, and no triangle {}", body.name, body.triangles, triangle));
@@ -290,7 +290,7 @@ SurfaceMark mark_surface(std::span<const Vec3> vertices_m, std::span<const std::
     const auto weight = static_cast<double>(t + 1);
     weights += weight;
     for (const std::int32_t corner : triangles[t]) {
-      for (std::size_t k = 0; k < 3; ++k) sum[k] += weight / 3.0 * vertices_m[static_cast<std::size_t>(corner)][k];
+      for (std::size_t k = 0; k < 3; ++k) sum[k] += weight / 3.0 * vertices_m[corner][k];
     }
   }
   SurfaceMark mark;

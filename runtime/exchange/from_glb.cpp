@@ -282,7 +282,7 @@ class Reader {
     base::UsedPoints used = base::find_used_points(model_.triangles, model_.positions.size());
     used_ = std::move(used.points);
     for (auto& triangle : model_.triangles)
-      for (std::int32_t& v : triangle) v = used.number[static_cast<std::size_t>(v)];
+      for (std::int32_t& v : triangle) v = used.number[v];
     if (const std::size_t dropped = used.number.size() - used_.size(); dropped > 0)
       notes_.push_back(fmt::format("{} of its points belong to no triangle and were dropped", dropped));
   }
@@ -295,7 +295,7 @@ class Reader {
     for (std::size_t n = 0; n < nodes.size(); ++n) {
       if (nodes[n].has("children"))
         for (const double child : nodes[n].number_list("children", kMaxNodes))
-          if (child >= 0.0 && child < static_cast<double>(nodes.size())) parent[static_cast<std::size_t>(child)] = n;
+          if (child >= 0.0 && child < static_cast<double>(nodes.size())) parent[child] = n;
       std::optional<base::Object> extensions = nodes[n].object_if("extensions");
       std::optional<base::Object> own = extensions ? extensions->object_if(kExtension) : std::nullopt;
       if (found || !own) continue;
@@ -329,8 +329,7 @@ class Reader {
     Eigen::Vector3d first = Eigen::Vector3d::Zero();
     for (const auto& triangle : bank.triangles) {
       Eigen::Matrix3d p;
-      for (int c = 0; c < 3; ++c)
-        p.col(c) = Eigen::Map<const Eigen::Vector3d>(bank.vertices_m[static_cast<std::size_t>(triangle[c])].data());
+      for (int c = 0; c < 3; ++c) p.col(c) = Eigen::Map<const Eigen::Vector3d>(bank.vertices_m[triangle[c]].data());
       const double part = p.determinant() / 6.0;  // of the tetrahedron with the origin
       const Eigen::Vector3d sum = p.rowwise().sum();
       solid.volume_m3 += part;
@@ -356,7 +355,7 @@ class Reader {
     std::vector<base::Object> materials = extension.objects("acousticMaterials");
     const auto number = model.integer_if("material", 0, static_cast<long long>(materials.size()) - 1);
     if (!number) model.fail("material", "the model names no material, and contacts need its stiffness; give --material NAME");
-    base::Object& own = materials[static_cast<std::size_t>(*number)];
+    base::Object& own = materials[*number];
     for (const char* key : {"density", "youngsModulus", "poissonRatio"})
       if (!own.has(key)) own.fail(key, fmt::format("the material of the model has no \"{}\"; give --material NAME", key));
     material.density_kg_m3 = own.number("density", base::kPositive);
@@ -462,7 +461,7 @@ class Reader {
     const std::size_t modes = model_.freq_hz.size(), points = used_.size();
     const double node_scale = find_scale();
     bank::Bank bank;
-    for (const std::int32_t v : used_) bank.vertices_m.push_back(model_.positions[static_cast<std::size_t>(v)]);
+    for (const std::int32_t v : used_) bank.vertices_m.push_back(model_.positions[v]);
     bank.triangles = model_.triangles;
     bank.material = read_material(extension, model);
     const bool is_of_unscaled_body = is_of_unscaled(model, node_scale, calc_solid(bank).volume_m3, bank.material.density_kg_m3);

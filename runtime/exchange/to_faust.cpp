@@ -94,7 +94,7 @@ Place make_place(const bank::Bank& bank, const Vec3& point_m) {
   const auto [low, high] = bank::find_extent(bank.vertices_m);
   if (found.triangle < 0 || !(found.distance_m <= kFarthestShare * norm(high - low)))
     throw InputError(fmt::format("[{:g}, {:g}, {:g}] is not near the surface; give metres", point_m[0], point_m[1], point_m[2]));
-  const Vec3 across = bank::calc_normal(bank.vertices_m, bank.triangles[static_cast<std::size_t>(found.triangle)]);
+  const Vec3 across = bank::calc_normal(bank.vertices_m, bank.triangles[found.triangle]);
   Place place{.point_m = found.point_m};
   if (norm(across) > 0.0) place.inward = -1.0 * normalise(across);
   const std::vector<double> shapes = bank::calc_shapes(bank, found.triangle, found.barycentric);

@@ -116,7 +116,7 @@ void File::open_buffers(std::optional<std::string_view> binary) {
   }
   for (std::size_t b = 0; b < buffers.size(); ++b) {
     base::Object& buffer = buffers[b];
-    const auto length = static_cast<std::size_t>(buffer.integer("byteLength", 1, kHuge));
+    const std::size_t length = buffer.integer("byteLength", 1, kHuge);
     if (!buffer.has("uri")) {
       if (b != 0 || !binary) buffer.fail("", fmt::format("buffer {} has no bytes: neither a \"uri\" nor a binary chunk", b));
       if (binary->size() < length)
@@ -154,8 +154,8 @@ std::string File::read_uri(base::Object& buffer) const {
 
 std::string_view File::find_view(std::size_t number, base::Object& view) {
   const std::string_view buffer = buffers_[require_index(view, "buffer", buffers_.size(), "buffer")];
-  const auto at = static_cast<std::size_t>(view.integer_if("byteOffset", 0, kHuge).value_or(0));
-  const auto size = static_cast<std::size_t>(view.integer("byteLength", 1, kHuge));
+  const std::size_t at = view.integer_if("byteOffset", 0, kHuge).value_or(0);
+  const std::size_t size = view.integer("byteLength", 1, kHuge);
   if (at > buffer.size() || size > buffer.size() - at)
     view.fail("byteLength", fmt::format("bufferView {} ends at byte {} of a buffer of {}", number, at + size, buffer.size()));
   return buffer.substr(at, size);
@@ -178,16 +178,16 @@ Numbers File::read(base::Object& owner, const char* key, const char* type, std::
     accessor.fail("componentType", fmt::format("{} is no type of {} (\"{}\")", component,
                                                components.size() == kIndexTypes.size() ? "an index" : "a position", key));
   numbers.is_normalised_ = accessor.boolean_or("normalized", false);
-  numbers.count_ = static_cast<std::size_t>(accessor.integer("count", 1, kHuge));
+  numbers.count_ = accessor.integer("count", 1, kHuge);
   const std::size_t size = find_component_bytes(component) * (std::string_view(type) == "SCALAR" ? 1 : 3);
   if (!accessor.has("bufferView")) accessor.fail("", fmt::format("accessor {} has no \"bufferView\"; export it again", a));
   const std::size_t v = require_index(accessor, "bufferView", views_.size(), "bufferView");
   base::Object& view = views_[v];
   const std::string_view bytes = find_view(v, view);
-  numbers.stride_ = static_cast<std::size_t>(view.integer_if("byteStride", 4, 252).value_or(static_cast<long long>(size)));
+  numbers.stride_ = view.integer_if("byteStride", 4, 252).value_or(static_cast<long long>(size));
   if (numbers.stride_ < size)
     view.fail("byteStride", fmt::format("bufferView {} has a stride of {} for {} bytes", v, numbers.stride_, size));
-  const auto at = static_cast<std::size_t>(accessor.integer_if("byteOffset", 0, kHuge).value_or(0));
+  const std::size_t at = accessor.integer_if("byteOffset", 0, kHuge).value_or(0);
   if (at > bytes.size() || size > bytes.size() - at || (numbers.count_ - 1) > (bytes.size() - at - size) / numbers.stride_)
     accessor.fail("count", fmt::format("accessor {} has {} entries of {} bytes, more than its bufferView of {} holds", a, numbers.count_,
                                        size, bytes.size()));

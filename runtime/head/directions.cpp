@@ -37,7 +37,7 @@ double scatter(std::uint64_t i) {
 }
 
 Face make_face(const std::vector<Vec3>& points, int a, int b, int c) {
-  const auto at = [&](int i) -> const Vec3& { return points[static_cast<std::size_t>(i)]; };
+  const auto at = [&](int i) -> const Vec3& { return points[i]; };
   const Vec3 normal = cross(at(b) - at(a), at(c) - at(a));
   return {{a, b, c}, normal, dot(normal, at(a))};
 }
@@ -66,7 +66,7 @@ std::vector<Face> make_first_faces(const std::vector<Vec3>& points) {
 
 /// Takes a point into the hull. `seen` is room that is used again.
 void add_point(const std::vector<Vec3>& points, int p, std::vector<Face>& faces, std::vector<Face>& seen) {
-  const Vec3& place = points[static_cast<std::size_t>(p)];
+  const Vec3& place = points[p];
   seen.clear();
   for (std::size_t f = 0; f < faces.size();) {
     if (dot(faces[f].normal, place) - faces[f].offset > 0.0) {
@@ -101,7 +101,7 @@ std::vector<Face> make_hull(const std::vector<Vec3>& unit) {
   std::sort(order.begin(), order.end(), [](std::size_t a, std::size_t b) { return scatter(~a) < scatter(~b); });
   std::vector<bool> is_in(points.size());
   for (const Face& face : faces)
-    for (const int corner : face.corner) is_in[static_cast<std::size_t>(corner)] = true;
+    for (const int corner : face.corner) is_in[corner] = true;
   for (const std::size_t p : order)
     if (!is_in[p]) add_point(points, static_cast<int>(p), faces, seen);
   return faces;
@@ -164,12 +164,12 @@ std::size_t Directions::find_cell(const Vec3& direction) noexcept {
 
 int Directions::walk(const Vec3& direction, int from, std::array<double, 3>& share) const noexcept {
   for (int step = 0;; ++step) {
-    const Triangle& triangle = triangles_[static_cast<std::size_t>(from)];
-    const Vec3& a = unit_[static_cast<std::size_t>(triangle.corner[0])];
-    const Vec3& b = unit_[static_cast<std::size_t>(triangle.corner[1])];
-    const Vec3& c = unit_[static_cast<std::size_t>(triangle.corner[2])];
+    const Triangle& triangle = triangles_[from];
+    const Vec3& a = unit_[triangle.corner[0]];
+    const Vec3& b = unit_[triangle.corner[1]];
+    const Vec3& c = unit_[triangle.corner[2]];
     share = {dot(direction, cross(b, c)), dot(direction, cross(c, a)), dot(direction, cross(a, b))};
-    const std::size_t least = static_cast<std::size_t>(std::min_element(share.begin(), share.end()) - share.begin());
+    const std::size_t least = std::min_element(share.begin(), share.end()) - share.begin();
     if (!(share[least] < 0.0) || step == kMaxSteps) return from;
     from = triangle.neighbour[least];
   }
@@ -180,7 +180,7 @@ Surrounding Directions::find(const Vec3& direction) const noexcept {
   const Vec3 d = std::isfinite(square) && square > 0.0 ? direction : Vec3{1.0, 0.0, 0.0};
   Surrounding found;
   const int t = walk(d, start_[find_cell(d)], found.share);
-  found.direction = triangles_[static_cast<std::size_t>(t)].corner;
+  found.direction = triangles_[t].corner;
   double total = 0.0;
   for (double& share : found.share) total += share = std::max(0.0, share);
   if (!(total > 0.0)) return {found.direction, {1.0, 0.0, 0.0}};

@@ -33,7 +33,7 @@ float* EarFilter::Line::extend(std::size_t count) noexcept {
 }
 
 EarFilter::EarFilter(std::shared_ptr<const Head> head) : head_(std::move(head)), loops_(&get_loops()) {
-  const auto taps = static_cast<std::size_t>(head_->get_taps());
+  const std::size_t taps = head_->get_taps();
   for (Filter& filter : filters_)
     for (auto& response : filter.response) response.resize(taps);
   input_.reserve(taps);

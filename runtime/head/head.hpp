@@ -63,11 +63,11 @@ class Head {
   int get_taps() const noexcept { return content_.taps; }
   std::size_t count_responses() const noexcept { return content_.delays.size(); }
   std::span<const float> get_response(int i) const noexcept {
-    const auto taps = static_cast<std::size_t>(content_.taps);
+    const std::size_t taps = content_.taps;
     return std::span(content_.responses).subspan(static_cast<std::size_t>(i) * taps, taps);
   }
   /// [samples], with origin_samples for what arrives at an ear when it would arrive at the origin.
-  double get_delay(int i) const noexcept { return content_.delays[static_cast<std::size_t>(i)]; }
+  double get_delay(int i) const noexcept { return content_.delays[i]; }
   double get_max_delay() const noexcept { return max_delay_; }
   /// Samples by which an EarFilter's output lags: sample n is what would arrive at the origin at sample n - get_latency(), earlier or later
   /// by what the head makes of it.

@@ -106,7 +106,7 @@ double find_onset(std::span<const float> response) {
     const auto first = static_cast<std::ptrdiff_t>(std::floor(place)) - base::kSincHalf + 1;
     double sum = 0.0;
     for (std::ptrdiff_t k = std::max<std::ptrdiff_t>(first, 0); k < first + base::kSincTaps && k < std::ssize(response); ++k)
-      sum += static_cast<double>(response[static_cast<std::size_t>(k)]) * sinc.evaluate(place - static_cast<double>(k));
+      sum += static_cast<double>(response[k]) * sinc.evaluate(place - static_cast<double>(k));
     return std::abs(sum);
   };
   const double wanted = kThreshold * static_cast<double>(peak);
@@ -131,7 +131,7 @@ void resample(std::span<const float> response, double onset, double ratio, std::
     const auto first = static_cast<std::ptrdiff_t>(std::ceil(place - reach)), last = static_cast<std::ptrdiff_t>(std::floor(place + reach));
     double sum = 0.0;
     for (std::ptrdiff_t k = std::max<std::ptrdiff_t>(first, 0); k <= std::min(last, std::ssize(response) - 1); ++k)
-      sum += static_cast<double>(response[static_cast<std::size_t>(k)]) * sinc.evaluate(band * (place - static_cast<double>(k)));
+      sum += static_cast<double>(response[k]) * sinc.evaluate(band * (place - static_cast<double>(k)));
     to[n] = static_cast<float>(sum * band / ratio);
   }
 }
@@ -159,7 +159,7 @@ Head::Content align(const Measured& measured, double sample_rate_hz, const std::
 
 /// Where a pole is left out: a direction there, with the mean of the ring that is next to it.
 void add_poles(std::vector<Vec3>& directions, Head::Content& head) {
-  const auto taps = static_cast<std::size_t>(head.taps);
+  const std::size_t taps = head.taps;
   for (const double up : {-1.0, 1.0}) {
     double nearest = std::numbers::pi;
     const auto calc_angle = [&](const Vec3& d) { return std::acos(std::clamp(up * d[2], -1.0, 1.0)); };
@@ -212,7 +212,7 @@ void set_level(Head::Content& head, const std::string& name) {
   for (int f = 0; f < kFrequencies; ++f) {
     const double omega = 2.0 * std::numbers::pi * (kLevelFromHz + (kLevelToHz - kLevelFromHz) * f / (kFrequencies - 1));
     wanted += calc_sphere_mean_power(omega * sphere.radius_m / sphere.sound_speed_m_s) / kFrequencies;
-    std::vector<std::complex<double>> wave(static_cast<std::size_t>(head.taps));
+    std::vector<std::complex<double>> wave(head.taps);
     for (std::size_t n = 0; n < wave.size(); ++n) wave[n] = std::polar(1.0, -omega * static_cast<double>(n) / head.sample_rate_hz);
     for (std::size_t i = 0; i < head.delays.size(); ++i) {
       std::complex<double> sum = 0.0;

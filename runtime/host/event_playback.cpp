@@ -69,7 +69,7 @@ std::vector<int> EventPlayback::count_waypoints(std::span<const double> longest_
   events_->for_each([&](const events::Event& event) {
     const auto* motion = std::get_if<events::BodyMotion>(&event);
     times.find(event, [&](const DueEvent&) {
-      if (motion != nullptr) tracks[static_cast<std::size_t>(motion->body)].add(motion->time_s);
+      if (motion != nullptr) tracks[motion->body].add(motion->time_s);
     });
   });
   for (const events::Listener& waypoint : path_) {

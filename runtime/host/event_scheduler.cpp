@@ -22,9 +22,8 @@ DueTimes::DueTimes(const std::vector<ScheduledBody>& bodies, double margin_s)
     : bodies_(&bodies), margin_s_(margin_s), last_s_(bodies.size() + 1, kFromTheStart) {}
 
 const ScheduledBody* DueTimes::find_body(std::int32_t body) const {
-  const bool is_played =
-      body >= 0 && static_cast<std::size_t>(body) < bodies_->size() && (*bodies_)[static_cast<std::size_t>(body)].number >= 0;
-  return is_played ? &(*bodies_)[static_cast<std::size_t>(body)] : nullptr;
+  const bool is_played = body >= 0 && body < std::ssize(*bodies_) && (*bodies_)[body].number >= 0;
+  return is_played ? &(*bodies_)[body] : nullptr;
 }
 
 int DueTimes::find(const events::Event& event, DueEvent* due) {
@@ -56,7 +55,7 @@ int DueTimes::find(const events::Event& event, DueEvent* due) {
   const auto* motion = std::get_if<events::BodyMotion>(&event);
   const ScheduledBody* body = motion != nullptr ? find_body(motion->body) : nullptr;
   if (body == nullptr || !body->moves) return 0;
-  return find_waypoint(last_s_[static_cast<std::size_t>(motion->body)], motion->time_s, number, due);
+  return find_waypoint(last_s_[motion->body], motion->time_s, number, due);
 }
 
 /// The first waypoint also says that the body rested there until then.
@@ -80,12 +79,12 @@ void EventScheduler::add_listener(std::span<const events::Listener> path) {
 /// With the bodies' numbers in the synthesiser.
 events::Event EventScheduler::make_event(const Queued& queued) const {
   events::Event event = queued.event;
-  const auto get_number = [this](std::int32_t body) { return bodies_[static_cast<std::size_t>(body)].number; };
+  const auto get_number = [this](std::int32_t body) { return bodies_[body].number; };
   if (auto* impulse = std::get_if<events::Impulse>(&event)) impulse->body = get_number(impulse->body);
   if (auto* force = std::get_if<events::Force>(&event)) force->body = get_number(force->body);
   if (auto* contact = std::get_if<events::LastingContact>(&event)) {
     contact->body = get_number(contact->body);
-    const bool is_known = contact->other >= 0 && static_cast<std::size_t>(contact->other) < bodies_.size();
+    const bool is_known = contact->other >= 0 && contact->other < std::ssize(bodies_);
     contact->other = is_known ? get_number(contact->other) : -1;
   }
   if (auto* motion = std::get_if<events::BodyMotion>(&event)) {

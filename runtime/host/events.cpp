@@ -113,7 +113,7 @@ Tally count_impulses(const Events& events, std::size_t bodies) {
     const auto count = [&](std::int32_t body, std::int32_t other) {
       if (body < 0 || static_cast<std::size_t>(body) >= bodies) return;
       ++tally.impulses;
-      ++tally.body_impulses[static_cast<std::size_t>(body)];
+      ++tally.body_impulses[body];
       if (other < 0 || body < other) ++tally.contacts;
     };
     if (const auto* impulse = std::get_if<events::Impulse>(&event)) count(impulse->body, impulse->other);

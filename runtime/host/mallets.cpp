@@ -34,9 +34,9 @@ struct Spot {
 };
 
 Spot find_spot(const bank::Bank& bank, std::int32_t triangle, const Vec3& barycentric) {
-  const auto& corners = bank.triangles[static_cast<std::size_t>(triangle)];
+  const auto& corners = bank.triangles[triangle];
   std::array<Vec3, 3> at;
-  for (std::size_t c = 0; c < 3; ++c) at[c] = bank.vertices_m[static_cast<std::size_t>(corners[c])];
+  for (std::size_t c = 0; c < 3; ++c) at[c] = bank.vertices_m[corners[c]];
   Spot spot;
   const Vec3 across = cross(at[1] - at[0], at[2] - at[0]);
   if (norm(across) > 0.0) spot.normal = normalise(across);
@@ -148,8 +148,8 @@ Blow make_blow(const std::string& body, const impact::Impact& impact, const std:
 /// The forces of the impact as events, and what they say of the blows, one for each head.
 void add_forces(impact::Impact& impact, const std::vector<Head>& heads, std::span<Blow> blows, std::vector<events::Event>& events) {
   for (const impact::Pulse& pulse : impact.take_pulses()) {
-    const Head& head = heads[static_cast<std::size_t>(pulse.contact)];
-    Blow& blow = blows[static_cast<std::size_t>(pulse.contact)];
+    const Head& head = heads[pulse.contact];
+    Blow& blow = blows[pulse.contact];
     std::vector<Vec3> impulses;
     for (const Vec3& j : pulse.impulse_n_s) {
       impulses.push_back(-1.0 * j);

@@ -50,11 +50,11 @@ std::vector<BodySummary> summarise(const Scene& scene, const std::vector<const b
   std::vector<BodySummary> summaries(scene.bodies.size());
   std::vector<bool> is_placed(scene.bodies.size());
   const auto find = [&](std::int32_t body) -> BodySummary* {
-    return body >= 0 && static_cast<std::size_t>(body) < summaries.size() ? &summaries[static_cast<std::size_t>(body)] : nullptr;
+    return body >= 0 && body < std::ssize(summaries) ? &summaries[body] : nullptr;
   };
   events.for_each([&](const events::Event& event) {
     if (const auto* motion = std::get_if<events::BodyMotion>(&event); motion != nullptr && find(motion->body) != nullptr) {
-      const auto i = static_cast<std::size_t>(motion->body);
+      const std::size_t i = motion->body;
       BodySummary& body = summaries[i];
       if (!is_placed[i]) body.first = *motion;
       if (!is_placed[i] || !scene.bodies[i].spec.fixed) body.reach_m = std::max(body.reach_m, calc_distance(motion->position_m, base));
@@ -87,7 +87,7 @@ class EffectTimeline {
     steps_.emplace(plan->steps);
     std::vector<bool> is_known(summaries.size());
     plan->steps.for_each([&](const PlanStep& step) {
-      const auto body = static_cast<std::size_t>(step.body);
+      const std::size_t body = step.body;
       all_[body] = is_known[body] ? all_[body].with(step.effects) : step.effects;
       if (!is_known[body]) first_[body] = step.effects;
       is_known[body] = true;
@@ -161,7 +161,7 @@ class Outlet {
   void pass_on() {
     const double began = base::get_process_cpu_s();
     const std::size_t channels = store_->get_channels(), count = frames_.size() / channels;
-    const auto before = static_cast<std::size_t>(std::min<std::uint64_t>(count, tail_begin_ - std::min(tail_begin_, taken_)));
+    const std::size_t before = std::min<std::uint64_t>(count, tail_begin_ - std::min(tail_begin_, taken_));
     const std::span<const float> all(frames_);
     store(all.first(before * channels));
     const std::span<const float> rest = all.subspan(before * channels);
@@ -230,7 +230,7 @@ class Rendering {
 
   /// Renders so many samples, without those of the latency at the beginning, into the outlet.
   void render(std::size_t samples, Outlet& outlet) {
-    const auto latency = static_cast<std::size_t>(synthesiser_->get_latency());
+    const std::size_t latency = synthesiser_->get_latency();
     const auto rate_hz = static_cast<double>(options_->rate_hz);
     std::vector<std::array<float, kBlock>> blocks(session_.get_microphones().offset_m.size());
     std::vector<const float*> heard(blocks.size());
@@ -254,7 +254,7 @@ class Rendering {
     }
   }
 
-  std::size_t get_latency() const { return static_cast<std::size_t>(synthesiser_->get_latency()); }
+  std::size_t get_latency() const { return synthesiser_->get_latency(); }
 
   void note_energy() {
     double held_j = 0.0;

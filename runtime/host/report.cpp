@@ -25,8 +25,8 @@ Paths collect_paths(const std::vector<const bank::Bank*>& banks, const Events& e
   std::vector<std::optional<double>> last_s(banks.size());
   events.for_each([&](const events::Event& event) {
     const auto* motion = std::get_if<events::BodyMotion>(&event);
-    if (motion == nullptr || motion->body < 0 || static_cast<std::size_t>(motion->body) >= banks.size()) return;
-    const auto body = static_cast<std::size_t>(motion->body);
+    if (motion == nullptr || motion->body < 0 || motion->body >= std::ssize(banks)) return;
+    const std::size_t body = motion->body;
     if (last_s[body] && *last_s[body] >= motion->time_s) return;
     last_s[body] = motion->time_s;
     paths.append(body, contact::calc_pose(*motion, banks[body]->rigid.centre_m));
@@ -97,7 +97,7 @@ std::optional<events::Impulse> find_impulse(const events::Event& event) {
 Vec3 find_contact_point(const bank::Bank& bank, const contact::Impulse& impulse) {
   Vec3 point{};
   for (int corner = 0; corner < 3; ++corner) {
-    const auto vertex = static_cast<std::size_t>(bank.triangles[static_cast<std::size_t>(impulse.triangle)][corner]);
+    const std::size_t vertex = bank.triangles[impulse.triangle][corner];
     for (int k = 0; k < 3; ++k) point[k] += impulse.barycentric[corner] * bank.vertices_m[vertex][k];
   }
   return point;
@@ -139,7 +139,7 @@ base::Json make_mounting_json(const Mounting& mounting) {
 }
 
 base::Json make_pair_json(const Scene& scene, int body, int other) {
-  const auto name = [&](int i) { return i < 0 ? base::Json() : base::Json(scene.bodies[static_cast<std::size_t>(i)].name); };
+  const auto name = [&](int i) { return i < 0 ? base::Json() : base::Json(scene.bodies[i].name); };
   return base::Json::object().set("body", name(body)).set("other", name(other));
 }
 
@@ -317,7 +317,7 @@ EnergyBooks make_books(const Scene& scene, const contact::EnergyAudit& physics, 
 
 std::string describe_pair(const Scene& scene, int body, int other) {
   if (body < 0) return "none";
-  const auto name = [&](int i) { return "'" + base::printable(scene.bodies[static_cast<std::size_t>(i)].name) + "'"; };
+  const auto name = [&](int i) { return "'" + base::printable(scene.bodies[i].name) + "'"; };
   return fmt::format("{} and {}", name(body), other < 0 ? "the ground" : name(other));
 }
 
@@ -371,8 +371,8 @@ void write_trajectory(const Scene& scene, const std::vector<const bank::Bank*>& 
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) cursors.emplace_back(paths, i);
   events.for_each([&](const events::Event& event) {
     const std::optional<events::Impulse> impulse = find_impulse(event);
-    if (!impulse || impulse->body < 0 || static_cast<std::size_t>(impulse->body) >= scene.bodies.size()) return;
-    const auto i = static_cast<std::size_t>(impulse->body);
+    if (!impulse || impulse->body < 0 || impulse->body >= std::ssize(scene.bodies)) return;
+    const std::size_t i = impulse->body;
     const contact::Pose pose = cursors[i].is_empty() ? scene.bodies[i].spec.initial : cursors[i].find(impulse->time_s);
     json.add(describe_impulse(*impulse, calc_world_point(pose, find_contact_point(*banks[i], *impulse))));
   });

@@ -84,7 +84,7 @@ std::vector<synth::PathPoint> read_path(base::Object& object, std::string_view k
 /// The index of the name at `key`.
 std::size_t read_name(base::Object& object, std::string_view key, const std::vector<std::string>& names, const std::string& fallback) {
   const std::string name = object.choice_or(key, names, fallback);
-  return static_cast<std::size_t>(std::find(names.begin(), names.end(), name) - names.begin());
+  return std::find(names.begin(), names.end(), name) - names.begin();
 }
 
 /// The ears of a listener: free, on a sphere or on a measured head.

@@ -64,7 +64,7 @@ Vec3 find_velocity(const Mallet& mallet, const bank::Bank& bank, std::int32_t tr
   if (mallet.direction) {
     way = *mallet.direction;
   } else {
-    const auto& corners = bank.triangles[static_cast<std::size_t>(triangle)];
+    const auto& corners = bank.triangles[triangle];
     const Vec3 &p = bank.vertices_m[corners[0]], &q = bank.vertices_m[corners[1]], &r = bank.vertices_m[corners[2]];
     const Vec3 u = q - p, v = r - p, normal = cross(v, u);  // inwards
     way = (1.0 / std::max(std::hypot(normal[0], normal[1], normal[2]), 1e-300)) * normal;
@@ -77,7 +77,7 @@ std::optional<std::string> question_strike(const SceneStrike& strike, const std:
                                            const events::Impulse& impulse) {
   if (strike.duration_s > 0.0) return std::nullopt;
   const double size = std::hypot(impulse.impulse_n_s[0], impulse.impulse_n_s[1], impulse.impulse_n_s[2]);
-  const auto& corners = bank.triangles[static_cast<std::size_t>(impulse.triangle)];
+  const auto& corners = bank.triangles[impulse.triangle];
   const std::size_t modes = bank.mode_count();
   double energy_j = 0.0;
   for (std::size_t m = 0; m < modes; ++m) {
@@ -117,7 +117,7 @@ Strikes make_strikes(const Scene& scene, const std::vector<const bank::Bank*>& b
                             .duration_s = strike.duration_s};
     if (strike.triangle) {
       impulse.triangle = *strike.triangle;
-      if (static_cast<std::size_t>(impulse.triangle) >= bank.triangles.size()) {
+      if (impulse.triangle >= std::ssize(bank.triangles)) {
         throw InputError(fmt::format("{}: \"triangle\" is {}, and \"{}\" has {}; the first is 0", strike.place, impulse.triangle, name,
                                      bank.triangles.size()));
       }

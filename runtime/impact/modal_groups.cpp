@@ -9,7 +9,7 @@
 namespace carillon::impact {
 namespace {
 
-std::size_t pad(int n) { return static_cast<std::size_t>((n + kLanes - 1) / kLanes * kLanes); }
+std::size_t pad(int n) { return (n + kLanes - 1) / kLanes * kLanes; }
 
 struct State {
   const double *a, *b, *c, *e, *g;
@@ -84,7 +84,7 @@ void ModalGroups::place(int body, std::span<const double> shape, double sign, in
   Group& group = *find(false);
   const Modes& modes = *group.modes;
   const auto n = static_cast<std::size_t>(modes.size()), padded = pad(modes.size());
-  const auto place = static_cast<std::size_t>(std::find(group.rows.begin(), group.rows.end(), row) - group.rows.begin());
+  const std::size_t place = std::find(group.rows.begin(), group.rows.end(), row) - group.rows.begin();
   if (place == group.rows.size()) {
     for (std::size_t k = 0; k < axes.size(); ++k) group.rows.push_back(row + static_cast<int>(k));
     group.phi.resize(group.rows.size() * padded, 0.0);
@@ -155,7 +155,7 @@ void ModalGroups::set_up(int k, std::size_t n, std::vector<double>& a) {
       group.w_free[r] = calc_dot(phi, group.x.data(), padded);
       for (std::size_t s = 0; s <= r; ++s) {
         const double compliance = calc_dot(phi, group.p->g.data(), group.phi.data() + s * padded, padded);
-        const auto i = static_cast<std::size_t>(group.rows[r]), j = static_cast<std::size_t>(group.rows[s]);
+        const std::size_t i = group.rows[r], j = group.rows[s];
         group.compliance[r * m + s] = group.compliance[s * m + r] = compliance;
         a[i * n + j] += compliance;
         if (r != s) a[j * n + i] += compliance;
@@ -166,7 +166,7 @@ void ModalGroups::set_up(int k, std::size_t n, std::vector<double>& a) {
 
 void ModalGroups::add_free_motion(std::vector<double>& free) const {
   for (const Group& group : groups_)
-    for (std::size_t r = 0; r < group.rows.size(); ++r) free[static_cast<std::size_t>(group.rows[r])] += group.w_free[r] - group.w[r];
+    for (std::size_t r = 0; r < group.rows.size(); ++r) free[group.rows[r]] += group.w_free[r] - group.w[r];
 }
 
 void ModalGroups::move(const std::vector<double>& force) {
@@ -174,7 +174,7 @@ void ModalGroups::move(const std::vector<double>& force) {
     const std::size_t m = group.rows.size();
     group.f.resize(m);
     group.lanes.resize(m * kLanes);
-    for (std::size_t r = 0; r < m; ++r) group.f[r] = force[static_cast<std::size_t>(group.rows[r])];
+    for (std::size_t r = 0; r < m; ++r) group.f[r] = force[group.rows[r]];
     for (std::size_t r = 0; r < m; ++r) {
       double w = group.w_free[r];
       for (std::size_t s = 0; s < m; ++s) w += group.compliance[r * m + s] * group.f[s];
@@ -204,7 +204,7 @@ ModalEnergy ModalGroups::calc_energy() const {
       sum.above_band += group.work;
       continue;
     }
-    const auto n = static_cast<std::size_t>(group.modes->size());
+    const std::size_t n = group.modes->size();
     const double modal = group.modes->calc_energy({group.q.data(), n}, {group.v.data(), n});
     sum.modal += modal;
     sum.dissipated += group.energy + group.work - modal;

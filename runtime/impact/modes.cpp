@@ -119,7 +119,7 @@ double Modes::calc_tail_compliance(std::span<const double> phi) const {
 std::vector<double> Modes::calc_tail_shapes(double compliance) const {
   std::vector<double> phi;
   for (int j = 0; j < kTailModes && has_tail_; ++j) {
-    const double low = band_ * std::pow(kTailRatio, j), w = tail_omega_[static_cast<std::size_t>(j)];
+    const double low = band_ * std::pow(kTailRatio, j), w = tail_omega_[j];
     // The last one also has all that lies above it.
     const double share = band_ / low * (j + 1 < kTailModes ? 1.0 - 1.0 / kTailRatio : 1.0);
     phi.push_back(w * std::sqrt(compliance * share));

@@ -20,7 +20,7 @@ std::array<double, kCells + 1> make_table() {
   std::array<double, kPoints> time{}, weight{};
   double area = 0.0;
   for (int i = 0; i < kPoints; ++i) {
-    const auto k = static_cast<std::size_t>(i);
+    const std::size_t k = i;
     const double angle = std::numbers::pi * (i + 0.5) / kPoints;
     time[k] = 0.5 * (1.0 - std::cos(angle));
     weight[k] = std::pow(std::sin(std::numbers::pi * time[k]), 1.5) * std::sin(angle);
@@ -30,7 +30,7 @@ std::array<double, kCells + 1> make_table() {
     const double x = kEnd * c / kCells;
     double sum = 0.0;
     for (std::size_t i = 0; i < kPoints; ++i) sum += weight[i] * std::cos(x * (time[i] - 0.5));  // even about its middle
-    table[static_cast<std::size_t>(c)] = sum * sum / (area * area);
+    table[c] = sum * sum / (area * area);
   }
   return table;
 }

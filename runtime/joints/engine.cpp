@@ -48,7 +48,7 @@ class Tree final : public Mechanism {
     build(members, joints);
     state_ = system_.realizeTopology();
     system_.realizeModel(state_);
-    damping_.assign(static_cast<std::size_t>(state_.getNU()), 0.0);
+    damping_.assign(state_.getNU(), 0.0);
     for (const Damped& d : damped_) {
       const MobilizedBody& body = matter_.getMobilizedBody(d.body);
       for (int k = 0; k < body.getNumU(state_); ++k) damping_[static_cast<std::size_t>(body.getFirstUIndex(state_)) + k] = d.damping;
@@ -138,7 +138,7 @@ class Tree final : public Mechanism {
     SimTK::Vector_<SpatialVec> impulses(matter_.getNumBodies(), SpatialVec(SimTK::Vec3(0))), velocities;
     SimTK::Vector f, du;
     for (int column = 0; column < 6; ++column) {
-      SpatialVec& on = impulses[bodies_[static_cast<std::size_t>(member)]];
+      SpatialVec& on = impulses[bodies_[member]];
       on = SpatialVec(SimTK::Vec3(0));
       on[column < 3 ? 1 : 0][column % 3] = 1.0;
       matter_.multiplyBySystemJacobianTranspose(state_, impulses, f);
@@ -190,18 +190,18 @@ class Tree final : public Mechanism {
     std::vector<char> placed(members.size(), 0), used(joints.size(), 0);
     const auto get_pose = [&](int member) {
       if (member < 0) return SimTK::Transform();
-      const Motion& m = members[static_cast<std::size_t>(member)].start;
+      const Motion& m = members[member].start;
       return SimTK::Transform(to_rotation(m.rotation), to_simtk(m.centre));
     };
     const auto make_body = [&](int member) {
-      const Member& m = members[static_cast<std::size_t>(member)];
+      const Member& m = members[member];
       const Mat3& i = m.inertia_kg_m2;
       return SimTK::Body::Rigid(
           SimTK::MassProperties(m.mass_kg, SimTK::Vec3(0), SimTK::Inertia(i[0][0], i[1][1], i[2][2], i[0][1], i[0][2], i[1][2])));
     };
     const auto add = [&](int member, SimTK::MobilizedBodyIndex index) {
-      bodies_[static_cast<std::size_t>(member)] = index;
-      placed[static_cast<std::size_t>(member)] = 1;
+      bodies_[member] = index;
+      placed[member] = 1;
     };
     const bool hangs = std::any_of(joints.begin(), joints.end(), [](const Joint& j) { return j.to < 0 || j.body < 0; });
     if (!hangs && !members.empty()) {
@@ -213,7 +213,7 @@ class Tree final : public Mechanism {
       for (std::size_t j = 0; j < joints.size(); ++j) {
         if (used[j]) continue;
         const Joint& joint = joints[j];
-        const auto is_placed = [&](int member) { return member < 0 || placed[static_cast<std::size_t>(member)]; };
+        const auto is_placed = [&](int member) { return member < 0 || placed[member]; };
         const bool has_body = is_placed(joint.body), has_to = is_placed(joint.to);
         if (has_body && has_to) throw std::invalid_argument("the joints close a loop");
         if (!has_body && !has_to) continue;
@@ -223,8 +223,7 @@ class Tree final : public Mechanism {
         const int outer = has_to ? joint.body : joint.to, inner = has_to ? joint.to : joint.body;
         const SimTK::Transform frame(find_axes(joint), to_simtk(joint.at));
         const SimTK::Transform in = ~get_pose(inner) * frame, out = ~get_pose(outer) * frame;
-        MobilizedBody& parent = inner < 0 ? static_cast<MobilizedBody&>(matter_.updGround())
-                                          : matter_.updMobilizedBody(bodies_[static_cast<std::size_t>(inner)]);
+        MobilizedBody& parent = inner < 0 ? static_cast<MobilizedBody&>(matter_.updGround()) : matter_.updMobilizedBody(bodies_[inner]);
         const auto way = has_to ? MobilizedBody::Forward : MobilizedBody::Reverse;
         const SimTK::Body::Rigid body = make_body(outer);
         SimTK::MobilizedBodyIndex index;
@@ -256,7 +255,7 @@ class Tree final : public Mechanism {
   /// Velocities that the joints allow, nearest to those asked for by the kinetic energy of the difference.
   void start(const std::vector<Member>& members) {
     start_.q = to_list(state_.getQ());
-    start_.u.assign(static_cast<std::size_t>(state_.getNU()), 0.0);
+    start_.u.assign(state_.getNU(), 0.0);
     std::vector<Spatial> momenta;
     for (const Member& m : members) {
       const SimTK::Rotation r = to_rotation(m.start.rotation);
@@ -287,7 +286,7 @@ class Tree final : public Mechanism {
   /// q', u' and the damping's power.
   void calc_rates(const std::vector<double>& x, std::vector<double>& k) {
     SimTK::Vector &q = state_.updQ(), &u = state_.updU();
-    const std::size_t nq = static_cast<std::size_t>(q.size()), nu = static_cast<std::size_t>(u.size());
+    const std::size_t nq = static_cast<std::size_t>(q.size()), nu = u.size();
     for (std::size_t i = 0; i < nq; ++i) q[static_cast<int>(i)] = x[i];
     for (std::size_t i = 0; i < nu; ++i) u[static_cast<int>(i)] = x[nq + i];
     system_.realize(state_, Stage::Velocity);
@@ -305,7 +304,7 @@ class Tree final : public Mechanism {
     mobility_forces_.resize(u.size());
     double power = 0.0;
     for (int i = 0; i < u.size(); ++i) {
-      const double damping = damping_[static_cast<std::size_t>(i)];
+      const double damping = damping_[i];
       mobility_forces_[i] = -damping * u[i];
       power += damping * u[i] * u[i];
     }
@@ -324,14 +323,14 @@ class Tree final : public Mechanism {
 
   void normalise() {
     SimTK::Vector& q = state_.updQ();
-    for (int i = 0; i < q.size(); ++i) q[i] = x_[static_cast<std::size_t>(i)];
+    for (int i = 0; i < q.size(); ++i) q[i] = x_[i];
     matter_.normalizeQuaternions(state_);
-    for (int i = 0; i < state_.getNQ(); ++i) x_[static_cast<std::size_t>(i)] = state_.getQ()[i];
+    for (int i = 0; i < state_.getNQ(); ++i) x_[i] = state_.getQ()[i];
   }
 
   static std::vector<double> to_list(const SimTK::Vector& v) {
-    std::vector<double> list(static_cast<std::size_t>(v.size()));
-    for (int i = 0; i < v.size(); ++i) list[static_cast<std::size_t>(i)] = v[i];
+    std::vector<double> list(v.size());
+    for (int i = 0; i < v.size(); ++i) list[i] = v[i];
     return list;
   }
 

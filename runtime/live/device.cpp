@@ -119,8 +119,7 @@ Device::Device(synth::Synthesiser& synthesiser, const DeviceOptions& options) : 
   if (options.null) {
     state_->period_s = options.frames / options.rate_hz;
     state_->frames_of_block = options.frames;
-    state_->channels.assign(static_cast<std::size_t>(synthesiser.get_microphone_count()),
-                            std::vector<float>(static_cast<std::size_t>(options.frames)));
+    state_->channels.assign(synthesiser.get_microphone_count(), std::vector<float>(options.frames));
     return;
   }
   state_->library.emplace();

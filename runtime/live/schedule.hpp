@@ -17,9 +17,7 @@ class Schedule {
  public:
   explicit Schedule(std::size_t bodies) : of_(bodies) {}
 
-  void add(const effect_selection::EffectChange& change) {
-    of_[static_cast<std::size_t>(change.body)].steps.push_back({change.time_s, change.effects});
-  }
+  void add(const effect_selection::EffectChange& change) { of_[change.body].steps.push_back({change.time_s, change.effects}); }
 
   /// Calls `set(body, effects)` for each body whose effects from `now_s` to `until_s` are not what it was given last.
   template <typename Set>

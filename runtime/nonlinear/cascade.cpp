@@ -90,7 +90,7 @@ Cascade::Cascade(std::span<const ModeConstants> coupled, std::span<const ModeCon
 
 /// All modes to the next sample, and by an angle more.
 void Cascade::turn(double angle) noexcept {
-  const auto count = static_cast<std::size_t>(count_);
+  const std::size_t count = count_;
   const double t = std::tan(0.5 * angle), c = (1.0 - t * t) / (1.0 + t * t), s = 2.0 * t / (1.0 + t * t);
   double* v = v_.data();
   double* y = y_.data();
@@ -137,7 +137,7 @@ double Cascade::feed(CoupledModes& coupled, const Band& band) noexcept {
   double energy = 0.0, freq = 0.0;
   for (int i = limit - top; i < limit; ++i) {
     energy += coupled.calc_mode_energy_j(i);
-    freq += coupled_hz_[static_cast<std::size_t>(i)] / top;
+    freq += coupled_hz_[i] / top;
   }
   const double mean = energy / top, other = band.calc_mean_j();
   if (!(energy > kSmallestJ) || !(mean > other)) return 0.0;
@@ -212,7 +212,7 @@ void Cascade::exchange(CoupledModes& coupled) noexcept {
 }
 
 void Cascade::set_state(int i, double q, double velocity) noexcept {
-  const auto m = static_cast<std::size_t>(i);
+  const std::size_t m = i;
   v_[m] = velocity;
   y_[m] = omega_[m] * q;
   is_moving_ = is_moving_ || q != 0.0 || velocity != 0.0;

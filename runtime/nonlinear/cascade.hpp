@@ -49,11 +49,11 @@ class Cascade {
   void step(CoupledModes& coupled, std::span<const double> push_re, std::span<const double> push_im, std::span<const double> keep) noexcept;
 
   int get_count() const noexcept { return count_; }
-  double get_velocity(int i) const noexcept { return v_[static_cast<std::size_t>(i)]; }
-  std::span<const double> get_velocities() const noexcept { return std::span(v_).first(static_cast<std::size_t>(count_)); }
+  double get_velocity(int i) const noexcept { return v_[i]; }
+  std::span<const double> get_velocities() const noexcept { return std::span(v_).first(count_); }
   /// As of CoupledModes.
-  double get_re(int i) const noexcept { return v_[static_cast<std::size_t>(i)] + tilt_[static_cast<std::size_t>(i)] * get_im(i); }
-  double get_im(int i) const noexcept { return y_[static_cast<std::size_t>(i)] * damped_share_[static_cast<std::size_t>(i)]; }
+  double get_re(int i) const noexcept { return v_[i] + tilt_[i] * get_im(i); }
+  double get_im(int i) const noexcept { return y_[i] * damped_share_[i]; }
   void set_state(int i, double q, double velocity) noexcept;
   void reset() noexcept;
 

@@ -84,8 +84,8 @@ CoupledModes::CoupledModes(const bank::QuarticEnergy& energy, std::span<const Mo
       first_rest_j_(is_curved_ ? energy.rest_energy_j : 0.0) {
   for (auto* values : {&half_tangent_, &sine_, &keep_, &tilt_, &stiffness_, &to_q_, &restoring_, &omega_, &re_, &im_, &middle_, &gradient_,
                        &before_, &shift_, &lift_})
-    values->assign(static_cast<std::size_t>(padded_), 0.0);
-  q_.assign(static_cast<std::size_t>(padded_), 0.0F);
+    values->assign(padded_, 0.0);
+  q_.assign(padded_, 0.0F);
   for (std::size_t m = 0; m < modes.size(); ++m) {
     const double lambda = modes[m].eigenvalue_rad2_s2, d = modes[m].decay_per_s;
     const double omega = std::sqrt(lambda), damped = std::sqrt((omega - d) * (omega + d)), angle = damped * period_s_;
@@ -136,7 +136,7 @@ double CoupledModes::restart() noexcept {
 }
 
 void CoupledModes::set_state(int i, double q, double velocity) noexcept {
-  const auto m = static_cast<std::size_t>(i);
+  const std::size_t m = i;
   const double before = restart();
   im_[m] = omega_[m] * q;
   middle_[m] = velocity + tilt_[m] * im_[m];
@@ -159,7 +159,7 @@ double CoupledModes::take_velocity(std::span<const double> share) noexcept {
 }
 
 double CoupledModes::calc_mode_energy_j(int i) const noexcept {
-  const auto m = static_cast<std::size_t>(i);
+  const std::size_t m = i;
   const double v = re_[m] - tilt_[m] * im_[m];
   return 0.5 * (v * v + stiffness_[m] * im_[m] * im_[m]);
 }
@@ -179,8 +179,7 @@ void CoupledModes::set_limit(int modes) noexcept {
   if (modes == limit_) return;
   limit_ = modes;
   evaluator_.set_count(modes);
-  for (int i = 0; i < count_; ++i)
-    to_q_[static_cast<std::size_t>(i)] = i < modes ? evaluator_.get_scale() / omega_[static_cast<std::size_t>(i)] : 0.0;
+  for (int i = 0; i < count_; ++i) to_q_[i] = i < modes ? evaluator_.get_scale() / omega_[i] : 0.0;
   // The book continues with the energy of those that are coupled still.
   const double before = get_energy_j();
   bound_j_ += restart() - before;

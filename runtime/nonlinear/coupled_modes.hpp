@@ -62,14 +62,14 @@ class CoupledModes {
 
   int get_count() const noexcept { return count_; }
   /// State of mode i at the sample: re and im, in the middle of what the nonlinear force does there.
-  double get_re(int i) const noexcept { return middle_[static_cast<std::size_t>(i)]; }
-  double get_im(int i) const noexcept { return im_[static_cast<std::size_t>(i)]; }
+  double get_re(int i) const noexcept { return middle_[i]; }
+  double get_im(int i) const noexcept { return im_[i]; }
   double get_velocity(int i) const noexcept {
-    const auto m = static_cast<std::size_t>(i);
+    const std::size_t m = i;
     return middle_[m] - tilt_[m] * im_[m];
   }
   /// q [m kg^1/2].
-  double get_amplitude(int i) const noexcept { return im_[static_cast<std::size_t>(i)] / omega_[static_cast<std::size_t>(i)]; }
+  double get_amplitude(int i) const noexcept { return im_[i] / omega_[i]; }
 
   /// Sets a mode, by amplitude and velocity. What it has of energy counts as put in. Not between samples of a blow. [audio-thread]
   void set_state(int i, double q, double velocity) noexcept;

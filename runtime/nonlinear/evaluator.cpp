@@ -53,11 +53,11 @@ Evaluator::Evaluator(const bank::QuarticEnergy& energy, const CoupledKernels& ke
     add_entries(energy);
   else
     add_rows(energy);
-  const auto padded_rows = static_cast<std::size_t>(pad(rows_, kUnit));
+  const std::size_t padded_rows = pad(rows_, kUnit);
   eta_.assign(padded_rows, 0.0F);
   of_linear_.assign(padded_rows, 0.0F);
-  forces_.assign(static_cast<std::size_t>(padded_), 0.0F);
-  more_.assign(static_cast<std::size_t>(padded_), 0.0F);
+  forces_.assign(padded_, 0.0F);
+  more_.assign(padded_, 0.0F);
   if (form_ == Form::kEntries) weight_.assign(padded_rows, 0.0F);
   if (is_curved_ && form_ != Form::kDiagonals) {
     linear_.assign(padded_rows * static_cast<std::size_t>(padded_), 0.0F);
@@ -84,7 +84,7 @@ void Evaluator::add_rows(const bank::QuarticEnergy& energy) {
   const double largest = find_largest(energy.rows);
   scale_ = largest > 0.0 ? std::sqrt(largest) : 1.0;
   stride_ = pad(static_cast<int>(find_column(modes_)), kUnit);
-  matrices_.assign(static_cast<std::size_t>(stride_ * pad(rows_, kRowsAtOnce)), 0.0F);
+  matrices_.assign(stride_ * pad(rows_, kRowsAtOnce), 0.0F);
   for (std::size_t r = 0; r < energy.row_count(); ++r)
     for (std::size_t j = 0; j < n; ++j)
       for (std::size_t i = 0; i <= j; ++i) {
@@ -92,8 +92,8 @@ void Evaluator::add_rows(const bank::QuarticEnergy& energy) {
         matrices_[r * static_cast<std::size_t>(stride_) + static_cast<std::size_t>(find_column(static_cast<int>(j))) + i] =
             static_cast<float>(entry / (scale_ * scale_) * (i == j ? 0.5 : 1.0));
       }
-  pairs_.assign(static_cast<std::size_t>(stride_), 0.0F);
-  sum_.assign(static_cast<std::size_t>(stride_), 0.0F);
+  pairs_.assign(stride_, 0.0F);
+  sum_.assign(stride_, 0.0F);
 }
 
 /// kUnit rows are as long as the longest of them: the others are filled up by zeros.
@@ -131,15 +131,14 @@ void Evaluator::add_entries(const bank::QuarticEnergy& energy) {
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return by_row[a].size() > by_row[b].size(); });
   std::vector<std::vector<std::pair<std::int32_t, float>>> sorted;
   for (const std::size_t r : order) {
-    for (const auto& [pair, value] : by_row[r])
-      by_pair[static_cast<std::size_t>(pair)].emplace_back(static_cast<std::int32_t>(sorted.size()), value);
+    for (const auto& [pair, value] : by_row[r]) by_pair[pair].emplace_back(static_cast<std::int32_t>(sorted.size()), value);
     sorted.push_back(by_row[r]);
   }
   for (int first = 0; first < rows_; first += kUnit) of_rows_.append(sorted.data() + first, std::min(kUnit, rows_ - first));
   for (std::ptrdiff_t first = 0; first < stride_; first += kUnit) of_pairs_.append(by_pair.data() + first, kUnit);
   places_ = std::move(order);
-  pairs_.assign(static_cast<std::size_t>(stride_), 0.0F);
-  sum_.assign(static_cast<std::size_t>(stride_), 0.0F);
+  pairs_.assign(stride_, 0.0F);
+  sum_.assign(stride_, 0.0F);
 }
 
 void Evaluator::add_points(const bank::QuarticEnergy& energy) {
@@ -161,10 +160,10 @@ void Evaluator::add_points(const bank::QuarticEnergy& energy) {
       for (std::size_t s = 0; s < strains; ++s) largest = std::max(largest, std::abs(weigh(r, p, s)));
   if (!(largest > 0.0)) largest = 1.0;
   scale_ = std::sqrt(largest) * steepest;
-  const auto points = static_cast<std::size_t>(points_);
+  const std::size_t points = points_;
   stride_ = points_ * strains_;
   columns_.assign(n * parts * points, 0.0F);
-  matrices_.assign(static_cast<std::size_t>(stride_ * pad(rows_, kRowsAtOnce)), 0.0F);
+  matrices_.assign(stride_ * pad(rows_, kRowsAtOnce), 0.0F);
   for (std::size_t u = 0; u < used.size(); ++u) {
     for (std::size_t c = 0; c < parts; ++c)
       for (std::size_t j = 0; j < n; ++j)
@@ -174,8 +173,8 @@ void Evaluator::add_points(const bank::QuarticEnergy& energy) {
       for (std::size_t s = 0; s < strains; ++s)
         matrices_[r * static_cast<std::size_t>(stride_) + s * points + u] = static_cast<float>(weigh(r, used[u], s) / largest);
   }
-  pairs_.assign(static_cast<std::size_t>(stride_), 0.0F);
-  sum_.assign(static_cast<std::size_t>(stride_), 0.0F);
+  pairs_.assign(stride_, 0.0F);
+  sum_.assign(stride_, 0.0F);
   gradient_.assign(parts * points, 0.0F);
   back_.assign(parts * points, 0.0F);
 }
@@ -186,7 +185,7 @@ void Evaluator::set_count(int modes) noexcept {
 }
 
 double Evaluator::evaluate_diagonals(const double* im, const double* to_q, double* gradient) noexcept {
-  const auto n = static_cast<std::size_t>(modes_), count = static_cast<std::size_t>(count_);
+  const std::size_t n = modes_, count = count_;
   std::fill(gradient, gradient + n, 0.0);
   double energy = 0.0;
   for (std::size_t r = 0; r < static_cast<std::size_t>(rows_); ++r) {
@@ -235,10 +234,10 @@ double Evaluator::evaluate(const float* q, const double* im, const double* to_q,
     kernels_->pull_back(parts_, points_, gradient_.data(), sum_.data(), back_.data());
     kernels_->gather(columns_.data(), length, back_.data(), count_, forces_.data());
   }
-  for (int i = 0; i < count_; ++i) gradient[i] = factor * static_cast<double>(forces_[static_cast<std::size_t>(i)]);
+  for (int i = 0; i < count_; ++i) gradient[i] = factor * static_cast<double>(forces_[i]);
   if (is_curved_) {
     kernels_->spread(linear_.data(), padded_, eta_.data(), rows_, more_.data());
-    for (int i = 0; i < count_; ++i) gradient[i] += scale_ * static_cast<double>(more_[static_cast<std::size_t>(i)]);
+    for (int i = 0; i < count_; ++i) gradient[i] += scale_ * static_cast<double>(more_[i]);
   }
   std::fill(gradient + count_, gradient + modes_, 0.0);
   return energy;

@@ -100,7 +100,7 @@ class Instrument {
     events::Impulse impulse{.body = body, .impulse_n_s = impulse_n_s, .duration_s = duration_s};
     impulse.time_s = time_s.value_or(get().get_horizon_s() + 0.5 * duration_s);
     if (triangle) {
-      if (*triangle < 0 || static_cast<std::size_t>(*triangle) >= bank.played->triangles.size())
+      if (*triangle < 0 || *triangle >= std::ssize(bank.played->triangles))
         throw InputError(fmt::format("strike: there is no triangle {}; there are {}", *triangle, bank.played->triangles.size()));
       impulse.triangle = *triangle;
       impulse.barycentric = {1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0};
@@ -132,14 +132,14 @@ class Instrument {
     float* const out = samples.mutable_data();
     const py::gil_scoped_release others_run;
     const std::lock_guard one_at_a_time(playing_);
-    std::vector<float> planes(static_cast<std::size_t>(channels * kPiece));
+    std::vector<float> planes(channels * kPiece);
     std::vector<float*> rows;
     for (int c = 0; c < channels; ++c) rows.push_back(planes.data() + c * kPiece);
     for (py::ssize_t first = 0; first < frames; first += kPiece) {
       const py::ssize_t count = std::min(kPiece, frames - first);
       synthesiser.process(rows.data(), channels, static_cast<int>(count));
       for (py::ssize_t i = 0; i < count; ++i)
-        for (int c = 0; c < channels; ++c) out[(first + i) * channels + c] = rows[static_cast<std::size_t>(c)][i];
+        for (int c = 0; c < channels; ++c) out[(first + i) * channels + c] = rows[c][i];
       if (const py::gil_scoped_acquire lock; PyErr_CheckSignals() != 0) throw py::error_already_set();
     }
     return samples;

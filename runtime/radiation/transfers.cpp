@@ -37,7 +37,7 @@ void check(const bank::Multipoles& air, std::size_t modes) {
 }
 
 /// Where harmonic number i of order l, m = i - l, lies in the row of a group.
-std::size_t find_place(int l, int i) { return static_cast<std::size_t>(i >= l ? i - l : l + (l - i)); }
+std::size_t find_place(int l, int i) { return i >= l ? i - l : l + (l - i); }
 
 }  // namespace
 
@@ -107,9 +107,9 @@ Transfers::Transfers(const bank::Bank& bank, [[maybe_unused]] base::Instructions
           sum += static_cast<double>(from[0]) * from[0] + static_cast<double>(from[1]) * from[1];
         }
         radial[l].level[lane] = static_cast<float>(std::sqrt(sum / (4.0 * pi)));
-        if (l > 0) decay *= std::abs(steps[static_cast<std::size_t>(l)]);
+        if (l > 0) decay *= std::abs(steps[l]);
         power += sum / (4.0 * pi) * decay * decay;
-        if (l > 0) near *= std::abs(steps[static_cast<std::size_t>(l)] / outer[static_cast<std::size_t>(l)]);
+        if (l > 0) near *= std::abs(steps[l] / outer[l]);
         turned += sum * near * near * l * l;
         all += sum * near * near;
       }
@@ -145,10 +145,8 @@ std::shared_ptr<const Transfers> make_transfers(const bank::Bank& bank) {
 void Transfers::evaluate_at(std::span<const Vec3> places_m, std::span<const std::int32_t> modes,
                             const std::array<std::span<std::complex<float>>, 2>& transfers) const noexcept {
   int order = -1;
-  const auto find_group = [this](std::int32_t slot) -> const TransferGroup& {
-    return groups_[static_cast<std::size_t>(slot / kTransferLanes)];
-  };
-  for (const std::int32_t mode : modes) order = std::max(order, find_group(slots_[static_cast<std::size_t>(mode)]).order);
+  const auto find_group = [this](std::int32_t slot) -> const TransferGroup& { return groups_[slot / kTransferLanes]; };
+  for (const std::int32_t mode : modes) order = std::max(order, find_group(slots_[mode]).order);
   if (order < 0) return;
 
   static_assert(kWindow == 64 * kTransferLanes);
@@ -184,7 +182,7 @@ void Transfers::evaluate_at(std::span<const Vec3> places_m, std::span<const std:
   std::uint64_t done = 0;
   std::int32_t window = -1;
   for (std::size_t i = 0; i < modes.size(); ++i) {
-    const std::int32_t slot = slots_[static_cast<std::size_t>(modes[i])], place = slot % kWindow, lane = place % kTransferLanes;
+    const std::int32_t slot = slots_[modes[i]], place = slot % kWindow, lane = place % kTransferLanes;
     if (slot / kWindow != window) {
       window = slot / kWindow;
       done = 0;
@@ -195,14 +193,13 @@ void Transfers::evaluate_at(std::span<const Vec3> places_m, std::span<const std:
       work.lines = &lines_[group.first_line];
       work.steps = &radial_[group.first_radial];
       for (std::size_t p = 0; p < places_m.size(); ++p) {
-        work.places[p].re = &rooms[p].re[static_cast<std::size_t>(place - lane)];
-        work.places[p].im = &rooms[p].im[static_cast<std::size_t>(place - lane)];
+        work.places[p].re = &rooms[p].re[place - lane];
+        work.places[p].im = &rooms[p].im[place - lane];
       }
       calc_transfers_(work);
       done |= bit;
     }
-    for (std::size_t p = 0; p < places_m.size(); ++p)
-      transfers[p][i] = {rooms[p].re[static_cast<std::size_t>(place)], rooms[p].im[static_cast<std::size_t>(place)]};
+    for (std::size_t p = 0; p < places_m.size(); ++p) transfers[p][i] = {rooms[p].re[place], rooms[p].im[place]};
   }
 }
 

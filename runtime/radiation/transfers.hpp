@@ -44,12 +44,12 @@ class Transfers {
   const Vec3& get_centre_m() const noexcept { return centre_m_; }
   double get_radius_m() const noexcept { return radius_m_; }
   /// L of a mode: T changes over directions as fast as e^{i L angle} at most.
-  int get_order(int mode) const noexcept { return orders_[static_cast<std::size_t>(mode)]; }
+  int get_order(int mode) const noexcept { return orders_[mode]; }
   /// The same in the root mean square over the orders of a mode, by their power at kTurnRadii: from there on it changes no faster.
-  double get_turn_order(int mode) const noexcept { return turn_orders_[static_cast<std::size_t>(mode)]; }
+  double get_turn_order(int mode) const noexcept { return turn_orders_[mode]; }
   /// Of the far field of a mode, the root mean square over directions, taken back to 1 m [Pa at unit modal velocity]: what GainKind::kBem
   /// has from the decay, here from the multipoles.
-  double get_rms(int mode) const noexcept { return rms_[static_cast<std::size_t>(mode)]; }
+  double get_rms(int mode) const noexcept { return rms_[mode]; }
 
   /// Memory.
   std::size_t calc_bytes() const noexcept;

@@ -81,9 +81,9 @@ void Player::find_ears(const Way& way, double time_s, const std::vector<Vec3>& p
 void Player::look(const Ear& ear, std::size_t triangle, const std::vector<Vec3>& places_m, Spot& spot) const {
   const Header& header = recording_->get_header();
   const Triangle& corners = recording_->get_triangles()[triangle];
-  const Vec3& a = places_m[static_cast<std::size_t>(corners[0])];
-  const Vec3& b = places_m[static_cast<std::size_t>(corners[1])];
-  const Vec3& c = places_m[static_cast<std::size_t>(corners[2])];
+  const Vec3& a = places_m[corners[0]];
+  const Vec3& b = places_m[corners[1]];
+  const Vec3& c = places_m[corners[2]];
   const Vec3 centre = (1.0 / 3.0) * (a + b + c), twice = cross(b - a, c - a);
   const Microphone& receiver = ear.at.receiver;
   Vec3 way = receiver.place_m - centre;
@@ -135,7 +135,7 @@ void Player::emit_segment(const Way& way) {
   std::array<float, base::kSincTaps> taps{};
   std::array<double, kSegment + kPoleTaps> g{};
   for (std::size_t t = 0; t < state_.size(); ++t) {
-    const Pole& pole = poles_[static_cast<std::size_t>(recording_->get_triangle_bodies()[t])];
+    const Pole& pole = poles_[recording_->get_triangle_bodies()[t]];
     const double area = recording_->get_areas_m2()[t];
     for (std::size_t i = 0; i < g.size(); ++i)
       g[i] = area * get_acceleration(frame - base::kSincHalf + 1 + static_cast<std::int64_t>(i), t);
@@ -161,10 +161,8 @@ void Player::emit_segment(const Way& way) {
         sinc.make_delay(arrival - whole, taps);
         const auto first = static_cast<std::int64_t>(whole) - base::kSincHalf + 1;
         auto& heard = arriving_[i];
-        if (first + base::kSincTaps > static_cast<std::int64_t>(heard.size()))
-          heard.resize(static_cast<std::size_t>(first + base::kSincTaps), 0.0);
-        for (std::int64_t j = std::max<std::int64_t>(0, -first); j < base::kSincTaps; ++j)
-          heard[static_cast<std::size_t>(first + j)] += pressure * taps[static_cast<std::size_t>(j)];
+        if (first + base::kSincTaps > static_cast<std::int64_t>(heard.size())) heard.resize(first + base::kSincTaps, 0.0);
+        for (std::int64_t j = std::max<std::int64_t>(0, -first); j < base::kSincTaps; ++j) heard[first + j] += pressure * taps[j];
       }
     }
   }

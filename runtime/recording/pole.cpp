@@ -26,7 +26,7 @@ Pole make_pole(double radius_m, double sample_rate_hz, double sound_speed_m_s) {
       const double share = i == 0 || i == kParts ? 1.0 : (i % 2 == 1 ? 4.0 : 2.0);
       sum += share * std::exp(-pole.rate_per_s * step * (1.0 - at)) * sinc.evaluate(at - (j - base::kSincHalf + 1));
     }
-    total += pole.weight[static_cast<std::size_t>(j)] = sum;
+    total += pole.weight[j] = sum;
   }
   for (double& weight : pole.weight) weight *= (1.0 - pole.keep) / pole.rate_per_s / total;
   return pole;

@@ -57,7 +57,7 @@ void RecordedSurface::read(std::uint64_t offset, std::span<std::byte> to) const 
     if (got == 0)
       throw InputError(fmt::format("{}: truncated at byte {} while it was read; read it again when its writer is done", name_, offset));
     offset += static_cast<std::uint64_t>(got);
-    to = to.subspan(static_cast<std::size_t>(got));
+    to = to.subspan(got);
   }
 }
 
@@ -140,7 +140,7 @@ void RecordedSurface::read_places(std::uint64_t key, std::span<Vec3> places_m) c
   read(find_offset(Array::kStep, key), std::as_writable_bytes(std::span(step)));
   read(find_offset(Array::kPlace, key), std::as_writable_bytes(std::span(place)));
   for (std::size_t v = 0; v < place.size(); ++v) {
-    const auto body = static_cast<std::size_t>(vertex_body_[v]);
+    const std::size_t body = vertex_body_[v];
     for (std::size_t axis = 0; axis < 3; ++axis) places_m[v][axis] = centre[body][axis] + step[body] * place[v][axis];
   }
 }

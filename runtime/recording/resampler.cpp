@@ -14,7 +14,7 @@ Resampler::Resampler(double from_hz, double to_hz)
     : step_(from_hz / to_hz),
       stretch_(std::max(1.0, from_hz / to_hz)),
       reach_(static_cast<std::int64_t>(std::ceil(base::kSincHalf * stretch_))) {
-  input_.assign(static_cast<std::size_t>(reach_), 0.0);
+  input_.assign(reach_, 0.0);
   first_ = -reach_;
 }
 
@@ -22,7 +22,7 @@ std::size_t Resampler::count_missing(std::size_t outputs) const {
   if (outputs == 0) return 0;
   const double last = static_cast<double>(taken_ + outputs - 1) * step_;
   const std::int64_t end = static_cast<std::int64_t>(std::floor(last)) + reach_ + 1;
-  return static_cast<std::size_t>(std::max<std::int64_t>(0, end - first_ - static_cast<std::int64_t>(input_.size())));
+  return std::max<std::int64_t>(0, end - first_ - static_cast<std::int64_t>(input_.size()));
 }
 
 void Resampler::add(std::span<const double> input) { input_.insert(input_.end(), input.begin(), input.end()); }
@@ -35,7 +35,7 @@ void Resampler::take(std::span<double> output) {
     double sum = 0.0, weights = 0.0;
     for (std::int64_t k = middle - reach_ + 1; k <= middle + reach_; ++k) {
       const double weight = sinc.evaluate((at - static_cast<double>(k)) / stretch_);
-      sum += weight * input_[static_cast<std::size_t>(k - first_)];
+      sum += weight * input_[k - first_];
       weights += weight;
     }
     y = sum / weights;

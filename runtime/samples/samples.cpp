@@ -170,7 +170,7 @@ class Maker {
   Vec3 find_point(std::size_t place, int turn) const {
     if (turn == 0) return points_[place];
     const bank::NearestPlace at = bank::find_nearest(*bank_, points_[place]);
-    const Vec3 normal = bank::calc_normal(bank_->vertices_m, bank_->triangles[static_cast<std::size_t>(at.triangle)]);
+    const Vec3 normal = bank::calc_normal(bank_->vertices_m, bank_->triangles[at.triangle]);
     if (!(norm(normal) > 0.0)) return points_[place];
     const Vec3 u = find_across(normalise(normal)), v = cross(normalise(normal), u);
     const double angle = 2.0 * std::numbers::pi * turn / std::max(1, options_->round_robin - 1), far = kAround * extent_m_;
@@ -198,7 +198,7 @@ class Maker {
         if (force == nullptr) continue;
         const std::vector<double>& shapes = find_shapes(*force);
         for (int k = 0; k < force->count; ++k) {
-          const std::array<float, 3>& j = force->impulse_n_s[static_cast<std::size_t>(k)];
+          const std::array<float, 3>& j = force->impulse_n_s[k];
           const double amplitude = shapes[3 * m] * j[0] + shapes[3 * m + 1] * j[1] + shapes[3 * m + 2] * j[2];
           sum += amplitude * std::polar(1.0, -omega * (force->time_s + (k + 0.5) * force->step_s));
         }
@@ -224,7 +224,7 @@ class Maker {
     for (int velocity = kVelocityStep; velocity < kVelocities; velocity += kVelocityStep) {
       const std::vector<double> exact = calc_amplitudes(make_blow(mallet, point_m, velocity), velocity);
       const auto layer = std::find_if(layers_.begin(), layers_.end(), [&](const Layer& l) { return velocity <= l.high; });
-      const std::vector<double>& played = of_layer[static_cast<std::size_t>(layer - layers_.begin())];
+      const std::vector<double>& played = of_layer[layer - layers_.begin()];
       double difference = 0.0, whole = 0.0;
       for (std::size_t m = 0; m < exact.size(); ++m) {
         difference += (played[m] - exact[m]) * (played[m] - exact[m]);
@@ -249,7 +249,7 @@ class Maker {
           const Vec3 point_m = find_point(place, turn);
           if (turn == 0) compare(mallet, point_m);
           for (int layer = 0; layer < options_->layers; ++layer) {
-            const std::vector<events::Event> blow = make_blow(mallet, point_m, layers_[static_cast<std::size_t>(layer)].middle);
+            const std::vector<events::Event> blow = make_blow(mallet, point_m, layers_[layer].middle);
             samples_.push_back(render(blow, {.mallet = mallet, .place = place, .layer = layer, .turn = turn, .file = {}, .frames = {}}));
             if (options_->progress) options_->progress(static_cast<double>(samples_.size()) / all);
           }
@@ -270,17 +270,17 @@ class Maker {
     for (const float p : sample.frames) sample.peak_pa = std::max(sample.peak_pa, static_cast<double>(std::abs(p)));
     std::size_t end = sample.frames.size();
     while (end > 0 && std::abs(static_cast<double>(sample.frames[end - 1])) <= kSilence * sample.peak_pa) --end;
-    sample.frames.resize(std::min(sample.frames.size(), std::max(end, static_cast<std::size_t>(kShortestS * options_->rate_hz))));
+    sample.frames.resize(
+        std::min(sample.frames.size(), std::max<std::size_t>(end, static_cast<std::size_t>(kShortestS * options_->rate_hz))));
     sample.file = fmt::format("{}/{}-{}-{}-v{}{}.wav", kSampleFolder, name_, options_->mallets[sample.mallet], sample.place + 1,
-                              layers_[static_cast<std::size_t>(sample.layer)].middle,
-                              options_->round_robin > 1 ? fmt::format("-r{}", sample.turn + 1) : "");
+                              layers_[sample.layer].middle, options_->round_robin > 1 ? fmt::format("-r{}", sample.turn + 1) : "");
     return sample;
   }
 
   /// Full scale per pascal, of what velocity 127 plays.
   double write_waves(SampleSet& set) const {
     double loudest = 0.0;
-    const auto share = [&](const Sample& sample) { return layers_[static_cast<std::size_t>(sample.layer)].share(); };
+    const auto share = [&](const Sample& sample) { return layers_[sample.layer].share(); };
     for (const Sample& sample : samples_) loudest = std::max(loudest, sample.peak_pa / share(sample));
     if (!(loudest > 0.0)) throw InputError(fmt::format("{}: all strikes are silent; choose other points", options_->bank.string()));
     const double gain = std::pow(10.0, kPeakDbfs / 20.0) / loudest;
@@ -296,7 +296,7 @@ class Maker {
   }
 
   std::string write_region(const Sample& sample) const {
-    const Layer& layer = layers_[static_cast<std::size_t>(sample.layer)];
+    const Layer& layer = layers_[sample.layer];
     const bool is_pitched = options_->keys == Keys::kPitches;
     const auto places = static_cast<int>(points_.size());
     std::string text = fmt::format("<region> sample={} lovel={} hivel={}", sample.file, layer.low, layer.high);
@@ -309,9 +309,9 @@ class Maker {
   /// The key and the cents of the mode that is heard most at the first place.
   std::pair<int, double> find_pitch() const {
     const bank::NearestPlace at = bank::find_nearest(*bank_, points_[0]);
-    const auto vertex = static_cast<std::size_t>(bank_->triangles[static_cast<std::size_t>(at.triangle)][0]);
+    const std::size_t vertex = bank_->triangles[at.triangle][0];
     const std::vector<double> levels = bank::calc_blow_amplitudes(*bank_, vertex, bank::calc_vertex_normals(*bank_)[vertex]);
-    const auto loudest = static_cast<std::size_t>(std::max_element(levels.begin(), levels.end()) - levels.begin());
+    const std::size_t loudest = std::max_element(levels.begin(), levels.end()) - levels.begin();
     const double key = 69.0 + 12.0 * std::log2(bank_->freq_hz(loudest) / 440.0);
     const int nearest = std::clamp(static_cast<int>(std::lround(key)), 0, kKeyCount - 1);
     return {nearest, 100.0 * (key - nearest)};

@@ -31,7 +31,7 @@ class SoundStore {
   void for_each_piece(Work&& work) const {
     std::vector<float> piece(kPiece * channels_);
     for (std::uint64_t first = 0; first < get_frames(); first += kPiece) {
-      const auto count = static_cast<std::size_t>(std::min<std::uint64_t>(kPiece, get_frames() - first));
+      const std::size_t count = std::min<std::uint64_t>(kPiece, get_frames() - first);
       const std::span<float> frames = std::span(piece).first(count * channels_);
       read(first, frames);
       work(first, std::span<const float>(frames));

@@ -108,7 +108,7 @@ void draw_spectrum(cairo_t* cr, const SpectrogramLayout& at, const ShortTimeSpec
   const double octaves = std::log2(static_cast<double>(spectrum.bins - 1) * spectrum.bin_hz / at.lowest_hz);
   const auto find_bin = [&](int y) { return at.lowest_hz / spectrum.bin_hz * std::exp2(octaves * (at.plot_height - y) / at.plot_height); };
   for (int x = 0; x < at.plot_width; ++x) {
-    const auto frame = static_cast<std::size_t>(x);
+    const std::size_t frame = x;
     for (int y = 0; y < at.plot_height; ++y) {
       const double level = find_row_level(spectrum, frame, find_bin(y + 1), find_bin(y));
       set_pixel(image.get(), x, y, calc_color((level - top_db + kRangeDb) / kRangeDb));
@@ -201,7 +201,7 @@ void draw_pressure(cairo_t* cr, const SpectrogramLayout& at, const Spans& spans)
   cairo_set_line_width(cr, 1.0);
   cairo_set_source_rgb(cr, 0.32, 0.07, 0.48);
   for (int x = 0; x < at.plot_width; ++x) {
-    const auto column = static_cast<std::size_t>(x);
+    const std::size_t column = x;
     draw_line(cr, at.left + x + 0.5, middle - spans.high[column] * scale - 0.5, at.left + x + 0.5,
               middle - spans.low[column] * scale + 0.5);
   }
@@ -241,13 +241,13 @@ ShortTimeSpectrum calc_short_time_spectrum(const SoundStore& sound, std::size_t 
   spectrum.bins = static_cast<std::size_t>(length) / 2 + 1;
   spectrum.level_db.assign(frames * spectrum.bins, kFloorDb);
 
-  std::vector<double> hann(static_cast<std::size_t>(window));
+  std::vector<double> hann(window);
   double total = 0.0;
   for (int i = 0; i < window; ++i) total += hann[i] = 0.5 - 0.5 * std::cos(2.0 * std::numbers::pi * (i + 0.5) / window);
   const double hop = static_cast<double>(samples) / static_cast<double>(frames);
   const int parts = std::max(1, static_cast<int>(std::ceil(hop / (0.5 * window))));
   Eigen::FFT<double> fft;
-  std::vector<double> piece(static_cast<std::size_t>(length), 0.0);
+  std::vector<double> piece(length, 0.0);
   std::vector<float> heard;  // of one window, all channels
   std::vector<std::complex<double>> transform;
   std::vector<double> power(spectrum.bins);

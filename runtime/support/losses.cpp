@@ -194,11 +194,11 @@ void add_support(const bank::Bank& bank, std::size_t support, const material::Fi
 void add_holder(const bank::Bank& bank, const Holder& holder, Sums& sums) {
   const bank::NearestPlace place = bank::find_nearest(bank, holder.point_m);
   if (place.triangle < 0) throw InputError("\"point_m\" of \"held\" is too far away; its numbers are too large");
-  const auto& corners = bank.triangles[static_cast<std::size_t>(place.triangle)];
+  const auto& corners = bank.triangles[place.triangle];
   const auto get = [&](std::size_t m) {
     Vec3 phi{};
     for (std::size_t c = 0; c < 3; ++c) {
-      const Vec3 at = bank.shape_at(static_cast<std::size_t>(corners[c]), m);
+      const Vec3 at = bank.shape_at(corners[c], m);
       for (std::size_t k = 0; k < 3; ++k) phi[k] += place.barycentric[c] * at[k];
     }
     return phi;

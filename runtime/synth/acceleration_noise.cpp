@@ -43,8 +43,8 @@ AccelerationNoise::AccelerationNoise(double radius_m, double mass_kg, double sam
   }
   const Moments coefficient_re = calc_chebyshev_coefficients(re), coefficient_im = calc_chebyshev_coefficients(im);
   for (int j = 0; j < kMoments; ++j) force_[j] = {coefficient_re[j], coefficient_im[j]};
-  pulses_.reserve(static_cast<std::size_t>(std::max(max_strikes, 1)));
-  forces_.reserve(static_cast<std::size_t>(std::max(max_forces, 0)));
+  pulses_.reserve(std::max(max_strikes, 1));
+  forces_.reserve(std::max(max_forces, 0));
 }
 
 bool AccelerationNoise::strike(const events::Impulse& impulse, const events::Quaternion& to_world) noexcept {
@@ -139,8 +139,7 @@ void AccelerationNoise::add_answer(const Steps& steps) noexcept {
       if (moments[0] == 0.0) continue;
       Complex answer = 0.0;
       for (int j = 0; j < kMoments; ++j) answer += moments[j] * force_[j];
-      for (std::size_t axis = 0; axis < 3; ++axis)
-        sum[axis] += static_cast<double>(steps.impulse_n_s[static_cast<std::size_t>(k)][axis]) * answer;
+      for (std::size_t axis = 0; axis < 3; ++axis) sum[axis] += static_cast<double>(steps.impulse_n_s[k][axis]) * answer;
     }
   }
   for (std::size_t axis = 0; axis < 3; ++axis) state_[axis] += sum[axis];

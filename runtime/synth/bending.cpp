@@ -94,7 +94,7 @@ void BendingWatch::look_at(int back, int groups, std::span<const DampedState> da
 /// Largest displacement of the vertices of ModelBending [m]; `limit_m` where it is not above that.
 double BendingWatch::calc_deflection_m(int groups, double limit_m) noexcept {
   const ModelBending& bending = model_->get_bending();
-  const auto last = static_cast<std::size_t>(groups);
+  const std::size_t last = groups;
   rest_[last] = 0.0F;
   for (std::size_t g = last; g-- > 0;) {
     Lanes bound{};

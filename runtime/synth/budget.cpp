@@ -74,13 +74,12 @@ bool Budget::begin(double allowed, double spent, std::int64_t live_groups, int a
 }
 
 void Budget::add(std::span<const float> bounds_pa) noexcept {
-  for (std::size_t g = 1; g < bounds_pa.size(); ++g) ++count_[static_cast<std::size_t>(find_bin(bounds_pa[g]))];
+  for (std::size_t g = 1; g < bounds_pa.size(); ++g) ++count_[find_bin(bounds_pa[g])];
 }
 
 void Budget::decide() noexcept {
   last_room_ = room_;
-  for (last_bin_ = kBins - 1; last_bin_ > 0 && count_[static_cast<std::size_t>(last_bin_)] <= last_room_; --last_bin_)
-    last_room_ -= count_[static_cast<std::size_t>(last_bin_)];
+  for (last_bin_ = kBins - 1; last_bin_ > 0 && count_[last_bin_] <= last_room_; --last_bin_) last_room_ -= count_[last_bin_];
   constexpr int kShift = 23 - std::bit_width(static_cast<unsigned>(kStepsPerOctave - 1));
   // Where only first groups ring there is nothing to choose among, and no reason to let strikes wake more.
   threshold_pa_ = std::max(kRelease * threshold_pa_, from_bits(last_bin_ << kShift));

@@ -183,8 +183,8 @@ ContactForces::ContactForces(std::shared_ptr<const Model> model, ContactForcesOp
   surface_ = complete(surface_, model_->get_plane_strain_modulus_pa(), model_->get_wave_impedance_pa_s_m());
   Texture::make_tables();
   rate_hz_ = model_->get_rate_hz();
-  slots_.resize(static_cast<std::size_t>(options.max_contacts));
-  records_.resize(static_cast<std::size_t>(options.max_records));
+  slots_.resize(options.max_contacts);
+  records_.resize(options.max_records);
   for (std::size_t i = 0; i < records_.size(); ++i) records_[i].next = i + 1 < records_.size() ? static_cast<std::int32_t>(i + 1) : -1;
   free_ = 0;
   damped_force_.resize(model_->damped_.size() * (kSubBlock + 2));
@@ -192,8 +192,8 @@ ContactForces::ContactForces(std::shared_ptr<const Model> model, ContactForcesOp
   const auto area = [](int j) { return j % 2 == 0 ? 1.0 / (1.0 - static_cast<double>(j) * j) : 0.0; };
   for (int j = 0; j < kMoments; ++j) {
     const double slope = 0.5 * (area(j + 1) + area(std::abs(j - 1)));
-    ramp_[0][static_cast<std::size_t>(j)] = 0.5 * (area(j) - slope) / rate_hz_;
-    ramp_[1][static_cast<std::size_t>(j)] = 0.5 * (area(j) + slope) / rate_hz_;
+    ramp_[0][j] = 0.5 * (area(j) - slope) / rate_hz_;
+    ramp_[1][j] = 0.5 * (area(j) + slope) / rate_hz_;
   }
   for (std::size_t end = 0; end < 2; ++end) {
     for (std::size_t j = 0; j < kTerms; ++j) drive_.ramp[end][j] = static_cast<float>(ramp_[end][j]);
@@ -213,7 +213,7 @@ ContactForces::Slot* ContactForces::find_place(const events::LastingContact& con
     if (slot.used && slot.id == contact.id && !(slot.ended && contact.state == events::ContactState::kBegin)) return &slot;
     if (!slot.used) empty = &slot;
     if (!slot.used || slot.ended) continue;
-    const double force = slot.tail >= 0 ? records_[static_cast<std::size_t>(slot.tail)].force_n : slot.from.force_n;
+    const double force = slot.tail >= 0 ? records_[slot.tail].force_n : slot.from.force_n;
     if (weakest == nullptr || force < min) {
       weakest = &slot;
       min = force;
@@ -231,10 +231,10 @@ std::int32_t ContactForces::take_free(Slot& slot) noexcept {
     ++counters_.thinned;
     return slot.tail;
   }
-  free_ = records_[static_cast<std::size_t>(taken)].next;
-  records_[static_cast<std::size_t>(taken)].next = -1;
+  free_ = records_[taken].next;
+  records_[taken].next = -1;
   if (slot.tail >= 0)
-    records_[static_cast<std::size_t>(slot.tail)].next = taken;
+    records_[slot.tail].next = taken;
   else
     slot.head = taken;
   slot.tail = taken;
@@ -242,8 +242,8 @@ std::int32_t ContactForces::take_free(Slot& slot) noexcept {
 }
 
 bool ContactForces::take(const events::LastingContact& contact, const ContactSurface& other) noexcept {
-  if (events::find_fault(events::Event(contact)) != nullptr ||
-      static_cast<std::size_t>(contact.triangle) >= model_->surface_->triangles.size() || find_fault(other) != nullptr) {
+  if (events::find_fault(events::Event(contact)) != nullptr || contact.triangle >= std::ssize(model_->surface_->triangles) ||
+      find_fault(other) != nullptr) {
     ++counters_.refused;
     return false;
   }
@@ -270,7 +270,7 @@ bool ContactForces::take(const events::LastingContact& contact, const ContactSur
     ++counters_.dropped;
     return false;
   }
-  Record& record = records_[static_cast<std::size_t>(place)];
+  Record& record = records_[place];
   record.time = contact.time_s * rate_hz_;
   record.force_n = contact.force_n;
   record.sweep_m_s = contact.sweep_m_s;
@@ -295,7 +295,7 @@ void ContactForces::find_modulus(Slot& slot) const noexcept {
 }
 
 void ContactForces::find_rows(Node& node) const noexcept {
-  const auto& triangle = model_->surface_->triangles[static_cast<std::size_t>(node.values.triangle)];
+  const auto& triangle = model_->surface_->triangles[node.values.triangle];
   for (std::size_t i = 0; i < kStrikeRows; ++i) node.row[i] = model_->get_row(triangle[i / 3], static_cast<int>(i % 3));
 }
 
@@ -307,12 +307,11 @@ void ContactForces::take_over(ContactForces& other) noexcept {
   reached_ = other.reached_;
   looked_ = other.looked_;
   counters_ = other.counters_;
-  const auto fits = [this](const Record& record) { return static_cast<std::size_t>(record.triangle) < model_->surface_->triangles.size(); };
+  const auto fits = [this](const Record& record) { return record.triangle < std::ssize(model_->surface_->triangles); };
   for (Slot& slot : slots_) {
     if (!slot.used) continue;
     bool all = fits(slot.from) && (!slot.has_to || fits(slot.to)) && fits(slot.node.values);
-    for (std::int32_t i = slot.head; i >= 0; i = records_[static_cast<std::size_t>(i)].next)
-      all = all && fits(records_[static_cast<std::size_t>(i)]);
+    for (std::int32_t i = slot.head; i >= 0; i = records_[i].next) all = all && fits(records_[i]);
     if (!all) {
       free(slot);
       continue;
@@ -342,8 +341,8 @@ bool ContactForces::is_resting() const noexcept {
 
 void ContactForces::free(Slot& slot) noexcept {
   while (slot.head >= 0) {
-    const std::int32_t next = records_[static_cast<std::size_t>(slot.head)].next;
-    records_[static_cast<std::size_t>(slot.head)].next = free_;
+    const std::int32_t next = records_[slot.head].next;
+    records_[slot.head].next = free_;
     free_ = slot.head;
     slot.head = next;
   }
@@ -355,15 +354,15 @@ void ContactForces::free(Slot& slot) noexcept {
 bool ContactForces::find_values(Slot& slot, double time, Record& values) noexcept {
   const auto pop = [&] {
     const std::int32_t place = slot.head;
-    Record record = records_[static_cast<std::size_t>(place)];
+    Record record = records_[place];
     slot.head = record.next;
     if (slot.head < 0) slot.tail = -1;
-    records_[static_cast<std::size_t>(place)].next = free_;
+    records_[place].next = free_;
     free_ = place;
     return record;
   };
   if (!slot.acts) {
-    if (slot.head < 0 || records_[static_cast<std::size_t>(slot.head)].time > time) return false;
+    if (slot.head < 0 || records_[slot.head].time > time) return false;
     slot.from = pop();
     slot.acts = true;
   }
@@ -437,7 +436,7 @@ ContactForces::Node ContactForces::make_node(const Slot& slot, const Record& val
   find_rows(node);
   for (int corner = 0; corner < 3; ++corner) {
     for (int axis = 0; axis < 3; ++axis) {
-      const auto i = static_cast<std::size_t>(corner * 3 + axis), c = static_cast<std::size_t>(corner), k = static_cast<std::size_t>(axis);
+      const std::size_t i = corner * 3 + axis, c = corner, k = axis;
       node.force[i] = static_cast<float>(values.barycentric[c] * (along * values.normal[k] - drag * values.slip_m_s[k]));
       node.damping[i] = static_cast<float>(values.barycentric[c] * damping * values.normal[k]);
     }

@@ -31,8 +31,7 @@ std::array<double, 3> calc_amplitudes(const QueuedForce& force, const Model& mod
   std::array<double, 3> amplitudes{};
   for (int axis = 0; axis < force.axes; ++axis) {
     force.find_weights(axis, weight);
-    amplitudes[static_cast<std::size_t>(axis)] =
-        calc_amplitude(row, weight, model.get_damped_column(mode), model.get_damped_modes()[mode].scale);
+    amplitudes[axis] = calc_amplitude(row, weight, model.get_damped_column(mode), model.get_damped_modes()[mode].scale);
   }
   return amplitudes;
 }

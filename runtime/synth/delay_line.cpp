@@ -53,7 +53,7 @@ void DelayLine::push_silence(std::int64_t samples) noexcept {
   constexpr std::array<float, 64> kZeros{};
   for (; samples > 0 && !is_silent();) {
     const std::int64_t count = std::min<std::int64_t>(samples, kZeros.size());
-    push(std::span(kZeros).first(static_cast<std::size_t>(count)));
+    push(std::span(kZeros).first(count));
     samples -= count;
   }
   position_ += samples;

@@ -47,7 +47,7 @@ Directivity::Directivity(std::shared_ptr<const Model> model, std::size_t ears, i
     : model_(std::move(model)), radiation_(model_->get_directivity()), phase_(phase), ears_(ears) {
   if (radiation_ == nullptr)
     throw InputError("directivity needs a bank with multipoles; make it with \"radiation\" in its job, or leave the effect out");
-  const auto modes = static_cast<std::size_t>(model_->get_ringing_mode_count());
+  const std::size_t modes = model_->get_ringing_mode_count();
   const std::size_t groups = radiation_->sound.size();
   orders_.reserve(modes);
   for (std::size_t m = 0; m < modes; ++m) {
@@ -120,7 +120,7 @@ void Directivity::set_out(Ear& ear, std::size_t m, Complex target, int ahead) no
   const Complex way = target - get_weight(ear.weight, m);
   const Complex slope(share * way.real(), share * way.imag());
   Complex step = slope;
-  if (ear.steady && mode.ended == block_ && bends_[static_cast<std::size_t>(orders_[m][is_far_])]) {
+  if (ear.steady && mode.ended == block_ && bends_[orders_[m][is_far_]]) {
     const float between = 2.0F / static_cast<float>(blocks + (1 << mode.ahead));  // of the middles of both ways
     const Complex change = slope - mode.slope, bend(between * change.real(), between * change.imag());
     const float half = 0.5F * static_cast<float>(blocks - 1);
@@ -135,7 +135,7 @@ void Directivity::set_out(Ear& ear, std::size_t m, Complex target, int ahead) no
   mode.left = static_cast<std::int16_t>(blocks);
   mode.ahead = static_cast<std::int8_t>(ahead);
   ++ear.ramping;
-  ++ear.plans[static_cast<std::size_t>(ahead)].modes;
+  ++ear.plans[ahead].modes;
 }
 
 /// Looks up the weights of modes at the places of one ear or two and sends them on their way there, 2^ahead blocks; -1: puts them there.
@@ -153,7 +153,7 @@ void Directivity::look_up(std::span<Ear> ears, std::span<const int> modes, const
   evaluations_ += static_cast<std::int64_t>(modes.size() * ears.size());
   for (std::size_t e = 0; e < ears.size(); ++e) {
     for (std::size_t i = 0; i < modes.size(); ++i) {
-      const auto m = static_cast<std::size_t>(modes[i]);
+      const std::size_t m = modes[i];
       const float re = found[e][i].real(), im = -found[e][i].imag(), tilt = radiation_->tilt[m], level = radiation_->level[m];
       Complex weight(level * (re - tilt * im), level * (im + tilt * re));
       if (!(std::abs(weight.real()) + std::abs(weight.imag()) <= std::numeric_limits<float>::max())) weight = {};
@@ -216,8 +216,8 @@ int Directivity::find_due(Ear& ear, int left, int least, const std::array<std::u
     if (mode.left > 0) continue;
     // The first way after a change goes straight on: half as far.
     const bool is_first = !ear.steady || mode.ended != block_;
-    const int wanted = by_order[static_cast<std::size_t>(orders_[m][is_far_])];
-    const auto c = static_cast<std::size_t>(std::max(wanted - static_cast<int>(is_first && wanted > least), 0));
+    const int wanted = by_order[orders_[m][is_far_]];
+    const std::size_t c = std::max(wanted - static_cast<int>(is_first && wanted > least), 0);
     const Vec3 moved = ear.to_m[c] - mode.place_m;
     const double still = kStill * kTurn * r / std::max(1, orders_[m][0]);
     if (dot(moved, moved) <= still * still) continue;
@@ -251,14 +251,14 @@ int Directivity::refresh(std::span<Ear> ears, int left, int least, const BlockPo
     const Vec3 &now = ear.place_m[0], &next = ear.place_m[1];
     const double r = norm(now), turned = norm(cross(now, next)) / (r * norm(next)), nearer = std::abs(std::log(norm(next) / r));
     const double angle = std::asin(std::min(1.0, turned));
-    for (int c = 0; c <= most; ++c) ear.to_m[static_cast<std::size_t>(c)] = find_place(ear, poses, 1 << c);
+    for (int c = 0; c <= most; ++c) ear.to_m[c] = find_place(ear, poses, 1 << c);
     for (int order = 0; order <= highest_; ++order) {
       const double change = std::max(1, order) * angle + (1.0 + order * radius / r) * nearer;
       int c = 0;
       while (c < most && (change * (2 << c) <= kTurn || c < least)) ++c;
-      std::uint8_t& both = by_order[static_cast<std::size_t>(order)];
+      std::uint8_t& both = by_order[order];
       both = &ear == &ears.front() ? static_cast<std::uint8_t>(c) : std::min(both, static_cast<std::uint8_t>(c));
-      bends_[static_cast<std::size_t>(order)] = bends_[static_cast<std::size_t>(order)] && change * (1 << c) <= kBends;
+      bends_[order] = bends_[order] && change * (1 << c) <= kBends;
     }
   }
   for (std::size_t e = 0; e < ears.size(); ++e)
@@ -324,7 +324,7 @@ void Directivity::take_over(Directivity& other, std::span<const int> from) noexc
     ear.spreading_step = 0.0;
     for (std::size_t m = 0; m < ear.modes.size(); ++m) {
       ear.modes[m].place_m = {kNowhere, kNowhere, kNowhere};
-      if (m >= from.size() || from[m] < 0 || static_cast<std::size_t>(from[m]) >= old.modes.size()) continue;
+      if (m >= from.size() || from[m] < 0 || from[m] >= std::ssize(old.modes)) continue;
       set_weight(ear.weight, m, get_weight(old.weight, static_cast<std::size_t>(from[m])));
     }
   }
@@ -346,8 +346,7 @@ void Directivity::sound(const Ear& ear, const Kernels& kernels, const SoundTable
   const auto add = [&](const std::vector<ModeWeight>& weights, auto&& part) {
     alignas(64) std::array<float, kBlock> change{};
     kernels.emit_weighted(table, starts, weights.data() + group, groups, first, sub_blocks, change.data());
-    for (int n = 0; n < sub_blocks * kSubBlock; ++n)
-      out[n] += part(begin + static_cast<float>(n) / kBlock) * change[static_cast<std::size_t>(n)];
+    for (int n = 0; n < sub_blocks * kSubBlock; ++n) out[n] += part(begin + static_cast<float>(n) / kBlock) * change[n];
   };
   if (ear.ramping > 0) add(ear.step, [](float u) { return u; });
   if (ear.bending > 0) add(ear.bend, find_bend_share);
@@ -365,7 +364,7 @@ void Directivity::weigh(const Kernels& kernels, const SampleStates* kept, int gr
     const auto add = [&](const std::vector<ModeWeight>& weights, auto&& part) {
       alignas(64) std::array<float, kSubBlock> change{};
       kernels.weigh(weights.data(), kept, groups, change.data());
-      for (int n = 0; n < kSubBlock; ++n) out[n] += part(begin + static_cast<float>(n) / kBlock) * change[static_cast<std::size_t>(n)];
+      for (int n = 0; n < kSubBlock; ++n) out[n] += part(begin + static_cast<float>(n) / kBlock) * change[n];
     };
     if (ear.ramping > 0) add(ear.step, [](float u) { return u; });
     if (ear.bending > 0) add(ear.bend, find_bend_share);
@@ -383,8 +382,7 @@ void Directivity::add_damped(const float* pressure_pa, int sub_block, int offset
 
 void Directivity::add_fade(int sub_block, int offset) noexcept {
   for (Ear& ear : ears_)
-    for (int n = 0; n < kSubBlock; ++n)
-      ear.sound[static_cast<std::size_t>(offset + n)] += ear.fade[static_cast<std::size_t>(sub_block * kSubBlock + n)];
+    for (int n = 0; n < kSubBlock; ++n) ear.sound[offset + n] += ear.fade[sub_block * kSubBlock + n];
 }
 
 void Directivity::clear_fade() noexcept {

@@ -13,10 +13,10 @@ double calc_radiated_share(double gain, double decay_per_s) noexcept {
 
 EnergyBook::EnergyBook(const Model& model) {
   const double h = 1.0 / model.get_rate_hz();
-  modes_.resize(static_cast<std::size_t>(model.get_mode_count()));
+  modes_.resize(model.get_mode_count());
   kept_.resize((static_cast<std::size_t>(model.get_ringing_mode_count()) + kGroup - 1) / kGroup);
   for (int m = 0; m < model.get_mode_count(); ++m) {
-    Mode& mode = modes_[static_cast<std::size_t>(m)];
+    Mode& mode = modes_[m];
     mode.lambda = model.get_eigenvalue_rad2_s2(m);
     mode.decay = model.get_decay_per_s(m);
     mode.loss = 2.0 * mode.decay * h;

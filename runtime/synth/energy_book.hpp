@@ -115,7 +115,7 @@ void EnergyBook::note(std::int64_t sample, bool acted, const SampleStates* kept,
       lost_j = before_j - now_j;
     } else if (passed > 0) {  // coupled, or silenced; under a force the amplitude changes evenly
       const double mean_j = acted ? (before_j + std::sqrt(before_j * now_j) + now_j) / 3.0 : before_j;
-      lost_j = mean_j * (passed <= kSubBlocks ? mode.falls[static_cast<std::size_t>(passed - 1)] : 1.0);
+      lost_j = mean_j * (passed <= kSubBlocks ? mode.falls[passed - 1] : 1.0);
     }
     mode.state = now;
     mode.energy_j = now_j;

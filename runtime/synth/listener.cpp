@@ -31,7 +31,7 @@ events::Quaternion calc_head_rotation(const Vec3& forward, const Vec3& left) noe
   const std::array<double, 4> squares{1.0 + x[0] + y[1] + z[2], 1.0 + x[0] - y[1] - z[2], 1.0 - x[0] + y[1] - z[2],
                                       1.0 - x[0] - y[1] + z[2]};
   events::Quaternion rotation{};
-  const auto largest = static_cast<std::size_t>(std::max_element(squares.begin(), squares.end()) - squares.begin());
+  const std::size_t largest = std::max_element(squares.begin(), squares.end()) - squares.begin();
   switch (largest) {
     case 0:
       rotation = {squares[0], y[2] - z[1], z[0] - x[2], x[1] - y[0]};

@@ -199,12 +199,12 @@ void Model::add_nonlinear(const bank::QuarticEnergy& energy) {
   if (made->energy.is_empty()) return;
   made->strike = strike_;
   for (const std::int32_t place : made->energy.modes) {
-    const int m = ringing[static_cast<std::size_t>(place)].second;
-    const Mode& mode = modes_[static_cast<std::size_t>(m)];
+    const int m = ringing[place].second;
+    const Mode& mode = modes_[m];
     made->mode.push_back(m);
     made->constants.push_back({mode.lambda, mode.decay});
     made->groups = std::max(made->groups, m / kGroup + 1);
-    made->strike[static_cast<std::size_t>(m / kGroup)].scale[m % kGroup] = 0.0F;
+    made->strike[m / kGroup].scale[m % kGroup] = 0.0F;
     const ForceAnswer answer = calc_force_answer({mode.lambda, mode.decay}, rate_hz_);
     made->force_re.push_back(answer.re);
     made->force_im.push_back(answer.im);
@@ -212,9 +212,8 @@ void Model::add_nonlinear(const bank::QuarticEnergy& energy) {
   double highest = 0.0;
   for (const nonlinear::ModeConstants& mode : made->constants) highest = std::max(highest, mode.eigenvalue_rad2_s2);
   for (int m = 0; m < ringing_; ++m)
-    if (modes_[static_cast<std::size_t>(m)].lambda > highest) made->above.push_back(m);
-  std::sort(made->above.begin(), made->above.end(),
-            [this](int a, int b) { return modes_[static_cast<std::size_t>(a)].lambda < modes_[static_cast<std::size_t>(b)].lambda; });
+    if (modes_[m].lambda > highest) made->above.push_back(m);
+  std::sort(made->above.begin(), made->above.end(), [this](int a, int b) { return modes_[a].lambda < modes_[b].lambda; });
   nonlinear_ = made;
 }
 
@@ -380,8 +379,8 @@ void Model::add_directivity(std::shared_ptr<const radiation::Transfers> transfer
   made->offset_m = transfers->get_centre_m() - centre_m_;
   for (SoundTable& table : made->sound) table = SoundTable{};
   for (int m = 0; m < ringing_; ++m) {
-    const Mode& mode = modes_[static_cast<std::size_t>(m)];
-    const auto group = static_cast<std::size_t>(m / kGroup);
+    const Mode& mode = modes_[m];
+    const std::size_t group = m / kGroup;
     const int lane = m % kGroup;
     const double omega = std::sqrt(mode.lambda), omega_d = std::sqrt((omega - mode.decay) * (omega + mode.decay));
     for (int k = 0; k < kColumn; ++k) {
@@ -393,8 +392,7 @@ void Model::add_directivity(std::shared_ptr<const radiation::Transfers> transfer
     const double focus = std::min(kMostFocused, transfers->get_order(mode.bank_mode) + 1.0);
     made->tilt.push_back(static_cast<float>(mode.decay / omega_d));
     made->level.push_back(1.0F);
-    made->weight[group][static_cast<std::size_t>(lane)] =
-        static_cast<float>(focus * transfers->get_rms(mode.bank_mode) * std::hypot(1.0, mode.decay / omega_d));
+    made->weight[group][lane] = static_cast<float>(focus * transfers->get_rms(mode.bank_mode) * std::hypot(1.0, mode.decay / omega_d));
   }
   float largest = 0.0F;
   for (std::size_t g = sound_.size(); g-- > 0;) {
@@ -416,10 +414,10 @@ std::shared_ptr<const Model> Model::make_solo(const Model& of, int bank_mode) {
   for (int m = 0; m < of.get_mode_count(); ++m) {
     if (of.get_bank_mode(m) == bank_mode) continue;
     if (m >= of.ringing_) {
-      model->damped_[static_cast<std::size_t>(m - of.ringing_)].gain = 0.0;
+      model->damped_[m - of.ringing_].gain = 0.0;
       continue;
     }
-    const auto group = static_cast<std::size_t>(m / kGroup);
+    const std::size_t group = m / kGroup;
     const int lane = m % kGroup;
     for (int part = 0; part < 2; ++part)
       for (int k = 0; k < kColumn; ++k) model->sound_[group].wave[lane / 2][part][k][lane % 2] = 0.0F;
@@ -428,7 +426,7 @@ std::shared_ptr<const Model> Model::make_solo(const Model& of, int bank_mode) {
   if (of.directivity_ == nullptr) return model;
   const auto own = std::make_shared<ModelDirectivity>(*of.directivity_);
   for (int m = 0; m < of.ringing_; ++m)
-    if (of.get_bank_mode(m) != bank_mode) own->level[static_cast<std::size_t>(m)] = 0.0F;
+    if (of.get_bank_mode(m) != bank_mode) own->level[m] = 0.0F;
   model->directivity_ = own;
   return model;
 }
@@ -466,7 +464,7 @@ class TableReader {
     std::uint64_t count = 0;
     take(count);
     if (count > left_.size() / sizeof(Value)) refuse();
-    values.resize(static_cast<std::size_t>(count));
+    values.resize(count);
     const std::byte* from = take_bytes(values.size() * sizeof(Value));
     if (!values.empty()) std::memcpy(values.data(), from, values.size() * sizeof(Value));
   }
@@ -552,11 +550,10 @@ double Model::calc_projection(int mode, std::int32_t triangle, const Vec3& baryc
   double sum = 0.0;
   for (std::size_t corner = 0; corner < 3; ++corner) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      sum += barycentric[corner] * direction[axis] *
-             get_row(surface_->triangles[static_cast<std::size_t>(triangle)][corner], static_cast<int>(axis))[column];
+      sum += barycentric[corner] * direction[axis] * get_row(surface_->triangles[triangle][corner], static_cast<int>(axis))[column];
     }
   }
-  return sum * modes_[static_cast<std::size_t>(mode)].scale;
+  return sum * modes_[mode].scale;
 }
 
 namespace {

@@ -82,16 +82,14 @@ class Model {
   /// Modes below the Nyquist frequency: first the under-damped ones by audibility (the time until the last is silent after the reference
   /// strike, longest first), then those near and above critical damping. 0 <= mode < get_mode_count() below.
   int get_mode_count() const { return static_cast<int>(modes_.size()); }
-  double get_eigenvalue_rad2_s2(int mode) const { return modes_[static_cast<std::size_t>(mode)].lambda; }
-  double get_decay_per_s(int mode) const { return modes_[static_cast<std::size_t>(mode)].decay; }
+  double get_eigenvalue_rad2_s2(int mode) const { return modes_[mode].lambda; }
+  double get_decay_per_s(int mode) const { return modes_[mode].decay; }
   /// Of a ringing mode.
-  nonlinear::ModeConstants calc_constants(int mode) const {
-    return {modes_[static_cast<std::size_t>(mode)].lambda, modes_[static_cast<std::size_t>(mode)].decay};
-  }
-  double get_gain(int mode) const { return modes_[static_cast<std::size_t>(mode)].gain; }
+  nonlinear::ModeConstants calc_constants(int mode) const { return {modes_[mode].lambda, modes_[mode].decay}; }
+  double get_gain(int mode) const { return modes_[mode].gain; }
   /// kg^-1/2 per step of the rows of find_rows().
-  double get_scale(int mode) const { return modes_[static_cast<std::size_t>(mode)].scale; }
-  int get_bank_mode(int mode) const { return modes_[static_cast<std::size_t>(mode)].bank_mode; }
+  double get_scale(int mode) const { return modes_[mode].scale; }
+  int get_bank_mode(int mode) const { return modes_[mode].bank_mode; }
   /// How many of them ring: the first ones.
   int get_ringing_mode_count() const { return ringing_; }
   /// phi(x) . direction [kg^-1/2] at a point of a triangle. Throws InputError when the bank has no such triangle.
@@ -129,9 +127,7 @@ class Model {
   const std::vector<DampedMode>& get_damped_modes() const { return damped_; }
   /// Where the shape of one of them stands in a row of find_rows().
   std::size_t get_damped_column(std::size_t mode) const { return sound_.size() * kGroup + mode; }
-  bool has_triangle(std::int32_t triangle) const {
-    return triangle >= 0 && static_cast<std::size_t>(triangle) < surface_->triangles.size();
-  }
+  bool has_triangle(std::int32_t triangle) const { return triangle >= 0 && triangle < std::ssize(surface_->triangles); }
   const std::shared_ptr<const ModelSurface>& get_surface() const { return surface_; }
 
   /// All but the surface as bytes, for another program of the same build: a WebAssembly module makes models in one memory and plays them
@@ -143,9 +139,9 @@ class Model {
 
   /// The shapes of all modes at the corners of a triangle along x, y and z: kStrikeRows rows, three for each corner.
   void find_rows(std::int32_t triangle, const std::int16_t** row) const {
-    const auto& corners = surface_->triangles[static_cast<std::size_t>(triangle)];
+    const auto& corners = surface_->triangles[triangle];
     for (int corner = 0; corner < 3; ++corner) {
-      for (int axis = 0; axis < 3; ++axis) row[corner * 3 + axis] = get_row(corners[static_cast<std::size_t>(corner)], axis);
+      for (int axis = 0; axis < 3; ++axis) row[corner * 3 + axis] = get_row(corners[corner], axis);
     }
   }
 
@@ -168,7 +164,7 @@ class Model {
   void add_directivity(std::shared_ptr<const radiation::Transfers> transfers);
   void add_nonlinear(const bank::QuarticEnergy& energy);
   const std::int16_t* get_row(std::int32_t vertex, int axis) const {
-    return surface_->shape.data() + (static_cast<std::size_t>(vertex) * 3 + static_cast<std::size_t>(axis)) * surface_->columns;
+    return surface_->shape.data() + (vertex * 3 + static_cast<std::size_t>(axis)) * surface_->columns;
   }
 
   double rate_hz_ = 0.0;

@@ -62,7 +62,7 @@ NonlinearModes::NonlinearModes(const Model& model, bool has_cascade)
     for (const int m : nonlinear_->above) {
       mode_.push_back(m);
       constants_.push_back(model.calc_constants(m));
-      strike_[static_cast<std::size_t>(m / kGroup)].scale[m % kGroup] = 0.0F;
+      strike_[m / kGroup].scale[m % kGroup] = 0.0F;
     }
     const std::span<const nonlinear::ModeConstants> all = constants_;
     cascade_ = std::make_unique<nonlinear::Cascade>(
@@ -72,7 +72,7 @@ NonlinearModes::NonlinearModes(const Model& model, bool has_cascade)
   gain_.reserve(mode_.size());
   answer_.reserve(mode_.size());
   for (std::size_t i = 0; i < mode_.size(); ++i) {
-    place_[static_cast<std::size_t>(mode_[i])] = static_cast<int>(i);
+    place_[mode_[i]] = static_cast<int>(i);
     groups_ = std::max(groups_, mode_[i] / kGroup + 1);
     gain_.push_back(model.get_gain(mode_[i]));
     answer_.push_back(i < nonlinear_->mode.size() ? ForceAnswer{nonlinear_->force_re[i], nonlinear_->force_im[i]}
@@ -120,7 +120,7 @@ void NonlinearModes::add_forces(std::int64_t sample, std::span<const QueuedForce
       for (std::size_t i = 0; i < mode_.size(); ++i) {
         const int mode = mode_[i];
         for (int axis = 0; axis < force.axes; ++axis)
-          add_push(n, i, calc_amplitude(row, weight[axis], mode, model_->get_scale(mode)), moments[static_cast<std::size_t>(axis)]);
+          add_push(n, i, calc_amplitude(row, weight[axis], mode, model_->get_scale(mode)), moments[axis]);
       }
     }
   }
@@ -214,7 +214,7 @@ void NonlinearModes::add(std::int64_t sample, const StrikeQueue& strikes, bool s
 
 /// Turned by one sample, as the lanes of the groups are.
 DampedState NonlinearModes::get_state(int i) const noexcept {
-  const nonlinear::ModeConstants& mode = constants_[static_cast<std::size_t>(i)];
+  const nonlinear::ModeConstants& mode = constants_[i];
   const double omega = std::sqrt(mode.eigenvalue_rad2_s2), d = mode.decay_per_s, k = 1.0 / model_->get_rate_hz();
   const double damped = std::sqrt((omega - d) * (omega + d)), size = std::exp(-d * k), c = std::cos(damped * k), s = std::sin(damped * k);
   const double re = get_re(i), im = get_im(i), q = size * (im * c + re * s) / damped;
@@ -222,7 +222,7 @@ DampedState NonlinearModes::get_state(int i) const noexcept {
 }
 
 void NonlinearModes::set_state(int i, const DampedState& state) noexcept {
-  const nonlinear::ModeConstants& mode = constants_[static_cast<std::size_t>(i)];
+  const nonlinear::ModeConstants& mode = constants_[i];
   const double omega = std::sqrt(mode.eigenvalue_rad2_s2), d = mode.decay_per_s, k = 1.0 / model_->get_rate_hz();
   const double damped = std::sqrt((omega - d) * (omega + d)), size = std::exp(d * k), c = std::cos(damped * k), s = std::sin(damped * k);
   const double re = state.v + d * state.q, im = damped * state.q, q = size * (im * c - re * s) / damped;
@@ -235,7 +235,7 @@ void NonlinearModes::set_state(int i, const DampedState& state) noexcept {
 
 void NonlinearModes::drop_below(double pressure_pa) noexcept {
   double bound = 0.0;
-  for (int i = 0; i < get_count(); ++i) bound += std::abs(gain_[static_cast<std::size_t>(i)]) * std::hypot(get_re(i), get_im(i));
+  for (int i = 0; i < get_count(); ++i) bound += std::abs(gain_[i]) * std::hypot(get_re(i), get_im(i));
   if (bound < pressure_pa && !has_carry_) reset();
 }
 
@@ -256,7 +256,7 @@ std::size_t NonlinearModes::calc_bytes() const noexcept {
 
 std::size_t NonlinearModes::calc_cascade_bytes() const noexcept {
   if (!cascade_) return 0;
-  const auto count = static_cast<std::size_t>(cascade_->get_count());
+  const std::size_t count = cascade_->get_count();
   return cascade_->calc_bytes() + strike_.capacity() * sizeof(StrikeTable) +
          count * (sizeof(int) + sizeof(nonlinear::ModeConstants) + sizeof(ForceAnswer) + (3 * kIntervals + 1) * sizeof(double));
 }
@@ -264,7 +264,7 @@ std::size_t NonlinearModes::calc_cascade_bytes() const noexcept {
 /// At the sample.
 double NonlinearModes::calc_pressure() const noexcept {
   double pressure = 0.0;
-  for (int i = 0; i < get_coupled_count(); ++i) pressure += gain_[static_cast<std::size_t>(i)] * modes_.get_velocity(i);
+  for (int i = 0; i < get_coupled_count(); ++i) pressure += gain_[i] * modes_.get_velocity(i);
   if (!cascade_) return pressure;
   const std::span<const double> velocity = cascade_->get_velocities();
   const double* gain = gain_.data() + get_coupled_count();

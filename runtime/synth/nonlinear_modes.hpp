@@ -52,7 +52,7 @@ class NonlinearModes {
   const StrikeTable* get_strike_tables() const noexcept { return cascade_ ? strike_.data() : nonlinear_->strike.data(); }
   int get_group_count() const noexcept;
   /// Place of a mode of the model among them; -1: not there.
-  int find_place(int mode) const noexcept { return place_[static_cast<std::size_t>(mode)]; }
+  int find_place(int mode) const noexcept { return place_[mode]; }
 
   /// Adds the pressure [Pa at 1 m] of the kSubBlock samples from `sample` on. `struck`: some of `strikes` act; `drive`: contacts that last,
   /// or nullptr. `kept`: where states are added of groups below `groups`, or nullptr.

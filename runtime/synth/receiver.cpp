@@ -39,7 +39,7 @@ bool read_row(const Kernels& kernels, const DelayLine& sent, std::int64_t first,
   for (std::int64_t i = 0; i < count; ++i) {
     const float* one = samples != nullptr ? samples + i : sent.find(first + i, 1);
     if (one == nullptr) continue;
-    copy[static_cast<std::size_t>(i)] = *one;
+    copy[i] = *one;
     heard = true;
   }
   if (!heard) return false;
@@ -207,7 +207,7 @@ int Receiver::process(const Source& source, const Trajectory& listener, std::int
   int moved = 0;
   while (!received_pa.empty()) {
     if (sample / kSubBlock != sub_block_) find_path_states(source, listener, sample / kSubBlock);
-    const auto left = static_cast<std::size_t>(kSubBlock - sample % kSubBlock);
+    const std::size_t left = kSubBlock - sample % kSubBlock;
     const auto piece = received_pa.first(std::min(left, received_pa.size()));
     if (delay_.is_constant()) {
       process_still(source, sample, piece);

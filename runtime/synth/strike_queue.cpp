@@ -31,7 +31,7 @@ bool is_playable(const events::Force& force, const Model& model) {
 
 /// Splits the steps along directions, one by one, each that of the largest step of what is left.
 void find_directions(Steps left, QueuedForce& force) {
-  const auto count = static_cast<std::size_t>(force.count);
+  const std::size_t count = force.count;
   double largest = 0.0;
   for (; force.axes < 3; ++force.axes) {
     const auto max =
@@ -71,8 +71,8 @@ ForceMoments calc_force_moments(const QueuedForce& force, double begin, double s
 }
 
 StrikeQueue::StrikeQueue(const Model& model, int max_pulses, int max_forces) : model_(&model) {
-  pulses_.reserve(static_cast<std::size_t>(std::max(1, max_pulses)));
-  forces_.reserve(static_cast<std::size_t>(std::max(0, max_forces)));
+  pulses_.reserve(std::max(1, max_pulses));
+  forces_.reserve(std::max(0, max_forces));
 }
 
 /// What happens after the sample before the horizon can still be heard.

@@ -91,7 +91,7 @@ Synthesiser::Synthesiser(SynthesiserOptions options)
       listener_(static_cast<std::size_t>(options_.max_waypoints), options_.microphones_m, options_.listener_m, options_.floor,
                 options_.head),
       allowed_(options_.budget) {
-  const auto bodies = static_cast<std::size_t>(options_.max_bodies);
+  const std::size_t bodies = options_.max_bodies;
   // A number comes, changes and goes in at most three commands, and two come back.
   commands_ = std::make_unique<Pipe<Command>>(3 * bodies);
   gone_ = std::make_unique<Pipe<Command>>(2 * bodies);
@@ -181,7 +181,7 @@ int Synthesiser::add_body(std::shared_ptr<const Model> model, const BodySettings
 
 /// The number of a body that is there and stays.
 std::size_t Synthesiser::check_owned(int body) const {
-  const auto i = static_cast<std::size_t>(body);
+  const std::size_t i = body;
   if (body < 0 || i >= owned_.size() || owned_[i].body == nullptr || owned_[i].is_leaving)
     throw InputError("there is no body " + std::to_string(body));
   return i;
@@ -190,7 +190,7 @@ std::size_t Synthesiser::check_owned(int body) const {
 /// The first number that no body has; that of no body when all are taken.
 std::size_t Synthesiser::find_free() const {
   const auto free = std::find_if(owned_.begin(), owned_.end(), [](const Owned& owned) { return owned.body == nullptr; });
-  return static_cast<std::size_t>(free - owned_.begin());
+  return free - owned_.begin();
 }
 
 void Synthesiser::set_effects(int body, EffectSet effects) {
@@ -229,7 +229,7 @@ EffectSet Synthesiser::get_effects(int body) const { return owned_[check_owned(b
 
 /// Makes the wanted change, unless an earlier one is on its way.
 void Synthesiser::send_change(int number) {
-  Owned& owned = owned_[static_cast<std::size_t>(number)];
+  Owned& owned = owned_[number];
   if (owned.change != nullptr || owned.is_leaving || (owned.wanted == owned.effects && owned.wanted_model == nullptr)) return;
   // Directivity goes first where the new model cannot have it.
   const bool waits = owned.effects.has(Effect::kDirectivity) && !owned.wanted.has(Effect::kDirectivity);
@@ -266,7 +266,7 @@ void Synthesiser::collect() noexcept {
   }
   Command command;
   while (gone_->pop(command)) {
-    Owned& owned = owned_[static_cast<std::size_t>(command.number)];
+    Owned& owned = owned_[command.number];
     if (command.removes) {
       owned = Owned{};
       publish_bytes(command.number);
@@ -311,7 +311,7 @@ void Synthesiser::apply_commands() noexcept {
   bool changes = false;
   while (commands_->pop(command)) {
     changes = true;
-    SoundingBody*& place = playing_[static_cast<std::size_t>(command.number)];
+    SoundingBody*& place = playing_[command.number];
     if (command.removes) {
       place = nullptr;
       gone_->push(command);
@@ -330,7 +330,7 @@ void Synthesiser::for_awake(Work&& work) noexcept {
   for (std::size_t w = 0; w < awake_.size(); ++w) {
     for (std::uint64_t left = awake_[w]; left != 0; left &= left - 1) {
       const auto number = static_cast<int>(w * 64) + std::countr_zero(left);
-      SoundingBody* body = playing_[static_cast<std::size_t>(number)];
+      SoundingBody* body = playing_[number];
       if (body == nullptr || !work(number, *body)) awake_[w] &= ~(left & (~left + 1));
     }
   }
@@ -351,7 +351,7 @@ void Synthesiser::count(const SoundingBody& body, Work&& work) noexcept {
 }
 
 SoundingBody* Synthesiser::find_body(std::int32_t number) noexcept {
-  SoundingBody* body = number >= 0 && number < options_.max_bodies ? playing_[static_cast<std::size_t>(number)] : nullptr;
+  SoundingBody* body = number >= 0 && number < options_.max_bodies ? playing_[number] : nullptr;
   if (body == nullptr) ++work_.refused;
   return body;
 }
@@ -383,8 +383,7 @@ void Synthesiser::take_strike(const Strike& strike) noexcept {
 void Synthesiser::take(const events::LastingContact& contact) noexcept {
   SoundingBody* body = find_body(contact.body);
   if (body == nullptr) return;
-  const SoundingBody* other =
-      contact.other >= 0 && contact.other < options_.max_bodies ? playing_[static_cast<std::size_t>(contact.other)] : nullptr;
+  const SoundingBody* other = contact.other >= 0 && contact.other < options_.max_bodies ? playing_[contact.other] : nullptr;
   count(*body, [&] {
     if (!body->take(contact, other != nullptr ? other->get_surface() : options_.ground, sample_, work_.contacts)) return;
     set_awake(contact.body);
@@ -527,7 +526,7 @@ void Synthesiser::process(float* const* out, int channels, int frames) noexcept 
     }
     const int count = std::min(held_, frames - done);
     for (int c = 0; c < heard; ++c) {
-      const double* from = mix_[static_cast<std::size_t>(c)].data() + (rendered_ - held_);
+      const double* from = mix_[c].data() + (rendered_ - held_);
       int bad = 0;
       for (int n = 0; n < count; ++n) {
         const auto heard_fs = static_cast<float>(gain * from[n]);

@@ -10,7 +10,7 @@
 namespace carillon::synth {
 
 void Synthesiser::publish_bytes(int number) {
-  const auto i = static_cast<std::size_t>(number);
+  const std::size_t i = number;
   EffectBytes bytes = owned_[i].bytes;
   const auto move_contacts_to = [&](Effect effect) { bytes[effect] += std::exchange(bytes[Effect::kRoughness], 0); };
   if (!owned_[i].effects.has(Effect::kRoughness)) {
@@ -23,7 +23,7 @@ void Synthesiser::publish_bytes(int number) {
 }
 
 void Synthesiser::publish(int number) noexcept {
-  const auto i = static_cast<std::size_t>(number);
+  const std::size_t i = number;
   const BodyWork& work = playing_[i]->get_work();
   Published& published = published_bodies_[i];
   for (const Effect effect : EffectSet::all()) {
@@ -42,7 +42,7 @@ void Synthesiser::publish(int number) noexcept {
 EffectCounters Synthesiser::get_effect_counters(int body) const noexcept {
   EffectCounters counters;
   if (body < 0 || body >= options_.max_bodies) return counters;
-  const Published& published = published_bodies_[static_cast<std::size_t>(body)];
+  const Published& published = published_bodies_[body];
   for (const Effect effect : EffectSet::all()) {
     counters.units[effect] = published.units[effect].load(std::memory_order_relaxed);
     counters.ticks[effect] = published.ticks[effect].load(std::memory_order_relaxed);
@@ -53,30 +53,30 @@ EffectCounters Synthesiser::get_effect_counters(int body) const noexcept {
 
 double Synthesiser::get_peak_pa(int body) const noexcept {
   if (body < 0 || body >= options_.max_bodies) return 0.0;
-  return static_cast<double>(published_bodies_[static_cast<std::size_t>(body)].peak_pa.load(std::memory_order_relaxed));
+  return static_cast<double>(published_bodies_[body].peak_pa.load(std::memory_order_relaxed));
 }
 
 bool Synthesiser::measure_amplitudes(int body, std::span<float> by_bank_mode) const noexcept {
   std::fill(by_bank_mode.begin(), by_bank_mode.end(), 0.0F);
-  if (body < 0 || body >= options_.max_bodies || playing_[static_cast<std::size_t>(body)] == nullptr) return false;
-  const Voice* voice = playing_[static_cast<std::size_t>(body)]->get_voice();
+  if (body < 0 || body >= options_.max_bodies || playing_[body] == nullptr) return false;
+  const Voice* voice = playing_[body]->get_voice();
   if (voice != nullptr) voice->measure_amplitudes(by_bank_mode);
   return true;
 }
 
 double Synthesiser::get_deflection(int body) const noexcept {
   if (body < 0 || body >= options_.max_bodies) return 0.0;
-  return published_bodies_[static_cast<std::size_t>(body)].deflection.load(std::memory_order_relaxed);
+  return published_bodies_[body].deflection.load(std::memory_order_relaxed);
 }
 
 double Synthesiser::get_energy_rise(int body) const noexcept {
   if (body < 0 || body >= options_.max_bodies) return 0.0;
-  return published_bodies_[static_cast<std::size_t>(body)].energy_rise.load(std::memory_order_relaxed);
+  return published_bodies_[body].energy_rise.load(std::memory_order_relaxed);
 }
 
 ModeEnergy Synthesiser::get_mode_energy(int body) const noexcept {
   if (body < 0 || body >= options_.max_bodies) return {};
-  const Published& of = published_bodies_[static_cast<std::size_t>(body)];
+  const Published& of = published_bodies_[body];
   const auto get = [](const std::atomic<double>& x) { return x.load(std::memory_order_relaxed); };
   return {get(of.given_j), get(of.lost_j), get(of.held_j), get(of.radiated_j)};
 }

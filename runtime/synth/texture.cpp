@@ -68,12 +68,12 @@ struct Tables {
       const double amplitude = std::pow(static_cast<double>(k) / kWaves, -0.5 * (1.0 + 2.0 * Texture::kHurst));
       const double spline = (2.0 + std::cos(2.0 * pi * k / kPoints)) / 3.0;
       power += 0.5 * amplitude * amplitude;
-      x[static_cast<std::size_t>(k)] = std::polar(amplitude / spline, 2.0 * pi * base::to_unit(base::draw(seed)));
+      x[k] = std::polar(amplitude / spline, 2.0 * pi * base::to_unit(base::draw(seed)));
     }
     transform(x);
     for (int n = 0; n < kPoints + 3; ++n) {
-      const double value = x[static_cast<std::size_t>(n % kPoints)].real() / std::sqrt(power);
-      coefficient[static_cast<std::size_t>(n)] = static_cast<float>(value);
+      const double value = x[n % kPoints].real() / std::sqrt(power);
+      coefficient[n] = static_cast<float>(value);
     }
   }
 };
@@ -130,7 +130,7 @@ double Texture::calc_density(const Gains& gains, double speed_m_s, double freq_h
   double share = 2.0 * std::frexp(std::max(freq_hz / lowest_hz, 1.0), &octave) - 1.0;  // 0 at the begin, 1 at the end
   if (--octave >= kOctaves) octave = kOctaves - 1, share = 1.0;
   const auto calc_begin = [&](int i) {
-    const double height = static_cast<double>(gains.height_m[static_cast<std::size_t>(i)]);
+    const double height = static_cast<double>(gains.height_m[i]);
     return kSteep * height * height / std::ldexp(lowest_hz, i);
   };
   const double own = calc_begin(octave) * (1.0 - (1.0 - kEnd) * share);
@@ -145,7 +145,7 @@ void Texture::render(double from_m_s, double to_m_s, double rate_hz, const Gains
   const double turns_per_m = 1.0 / (kLongestM * kWaves);
   for (int n = 0; n <= kSubBlock; ++n) {
     const double t = n, way_m = (from_m_s * t + (to_m_s - from_m_s) * t * t / (2.0 * kSubBlock)) / rate_hz;
-    place[static_cast<std::size_t>(n)] = place_ + to_place(way_m * turns_per_m);
+    place[n] = place_ + to_place(way_m * turns_per_m);
   }
   place_ = place.back();
   for (std::size_t octave = 0; octave < kOctaves; ++octave) {

@@ -73,7 +73,7 @@ void vary_strike(const bank::Bank& bank, const std::function<bank::NearestPlace(
   // A harder hit is shorter, as Hertz has it: tau ~ v^-1/5. It does not begin before the scene.
   impulse.duration_s *= std::pow(more, -0.2) * (1.0 + variation * kLengthScatter * chance.draw());
   impulse.duration_s = std::min(impulse.duration_s, 2.0 * impulse.time_s);
-  const auto& corner = bank.triangles[static_cast<std::size_t>(impulse.triangle)];
+  const auto& corner = bank.triangles[impulse.triangle];
   const Vec3 &p = bank.vertices_m[corner[0]], &q = bank.vertices_m[corner[1]], &r = bank.vertices_m[corner[2]];
   Vec3 normal = cross(q - p, r - p);
   const double area = std::sqrt(dot(normal, normal));

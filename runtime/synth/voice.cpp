@@ -61,9 +61,9 @@ void Voice::process(std::span<float> pressure_pa) noexcept {
     if (held_ == 0) {
       const auto left = static_cast<int>((kBlock - horizon_ % kBlock) / kSubBlock);
       const std::size_t wanted = std::max<std::size_t>(1, pressure_pa.size() / kSubBlock);
-      render(static_cast<int>(std::min(static_cast<std::size_t>(left), wanted)));
+      render(static_cast<int>(std::min<std::size_t>(left, wanted)));
     }
-    const std::size_t count = std::min(static_cast<std::size_t>(held_), pressure_pa.size());
+    const std::size_t count = std::min<std::size_t>(held_, pressure_pa.size());
     if (!silent_) {
       const float* from = block_.data() + (rendered_ - held_);
       for (std::size_t n = 0; n < count; ++n) pressure_pa[n] += from[n];
@@ -209,7 +209,7 @@ void Voice::add_acting(std::int64_t sample, int sub_block, const ContactBlock* d
 
 /// Makes as many groups live as the limit allows; the starts of those that were not are out of date.
 void Voice::wake(int groups) noexcept {
-  for (const int last = std::min(groups, limit_); live_ < last; ++live_) starts_[static_cast<std::size_t>(live_)] = ColumnStates{};
+  for (const int last = std::min(groups, limit_); live_ < last; ++live_) starts_[live_] = ColumnStates{};
 }
 
 /// Up to which group a strike can be heard above the floor.
@@ -269,12 +269,12 @@ void Voice::play_force(const QueuedForce& force, std::int64_t sample, int sub_bl
   const double begin = force.begin - static_cast<double>(sample - 1);
   limit_touch(begin, force.calc_end() - static_cast<double>(sample - 1));
   std::array<ForceMoments, kSubBlock> moments;
-  for (int n = touch_.first; n < touch_.last; ++n) moments[static_cast<std::size_t>(n)] = calc_force_moments(force, begin - n, force.step);
+  for (int n = touch_.first; n < touch_.last; ++n) moments[n] = calc_force_moments(force, begin - n, force.step);
   for (int axis = 0; axis < force.axes; ++axis) {
     model_->find_rows(force.triangle, touch_.row);
     force.find_weights(axis, touch_.weight);
     for (int n = touch_.first; n < touch_.last; ++n) {
-      for (int j = 0; j < kTerms; ++j) touch_.moment[n][j] = static_cast<float>(moments[static_cast<std::size_t>(n)][axis][j]);
+      for (int j = 0; j < kTerms; ++j) touch_.moment[n][j] = static_cast<float>(moments[n][axis][j]);
     }
     play_touch(sub_block, out);
   }
@@ -287,7 +287,7 @@ void Voice::cull() noexcept {
   // times below what is dropped anyway.
   constexpr double kNothing = 1e-25;
   for (int g = 0; g < live_; ++g) {
-    ModeState& state = state_[static_cast<std::size_t>(g)];
+    ModeState& state = state_[g];
     for (int lane = 0; lane < kGroup; ++lane) {
       if (std::abs(state.re[lane]) + std::abs(state.im[lane]) < kNothing) state.re[lane] = state.im[lane] = 0.0;
     }
@@ -296,8 +296,8 @@ void Voice::cull() noexcept {
   const double share = silence_pa_ / static_cast<double>(groups_ + 1);
   const auto& weights = get_weights();
   for (; live_ > 0; --live_) {
-    ModeState& state = state_[static_cast<std::size_t>(live_ - 1)];
-    const auto& weight = weights[static_cast<std::size_t>(live_ - 1)];
+    ModeState& state = state_[live_ - 1];
+    const auto& weight = weights[live_ - 1];
     double bound = 0.0;
     for (int lane = 0; lane < kGroup; ++lane) {
       bound += static_cast<double>(weight[lane]) * std::sqrt(state.re[lane] * state.re[lane] + state.im[lane] * state.im[lane]);
@@ -313,8 +313,8 @@ std::span<const float> Voice::measure(float nearness) noexcept {
   float largest = 0.0F;
   const auto& weights = get_weights();
   for (int g = live_ - 1; g >= 0; --g) {
-    const ModeState& state = state_[static_cast<std::size_t>(g)];
-    const auto& weight = weights[static_cast<std::size_t>(g)];
+    const ModeState& state = state_[g];
+    const auto& weight = weights[g];
     std::array<float, kGroup> size;
     for (int lane = 0; lane < kGroup; ++lane) {
       const auto re = static_cast<float>(state.re[lane]), im = static_cast<float>(state.im[lane]);
@@ -323,7 +323,7 @@ std::span<const float> Voice::measure(float nearness) noexcept {
     float sum = 0.0F;
     for (const float part : size) sum += part;
     largest = std::max(largest, nearness * sum);
-    bounds_[static_cast<std::size_t>(g)] = largest;
+    bounds_[g] = largest;
   }
   return get_measured();
 }
@@ -371,9 +371,9 @@ void Voice::audit() noexcept {
 /// At the start of a column of this block; of the next for kColumns.
 DampedState Voice::get_state_at(int m, int column) const noexcept {
   if (column == kColumns || m >= model_->ringing_ || (is_nonlinear() && nonlinear_->find_place(m) >= 0)) return get_mode_state(m);
-  const auto group = static_cast<std::size_t>(m / kGroup);
+  const std::size_t group = m / kGroup;
   if (m / kGroup >= live_) return {};
-  const auto& mode = model_->modes_[static_cast<std::size_t>(m)];
+  const auto& mode = model_->modes_[m];
   const double omega = std::sqrt(mode.lambda), omega_d = std::sqrt((omega - mode.decay) * (omega + mode.decay));
   const double q = static_cast<double>(starts_[group].im[column][m % kGroup]) / omega_d;
   return {q, static_cast<double>(starts_[group].re[column][m % kGroup]) - mode.decay * q};
@@ -425,8 +425,8 @@ int Voice::get_live_mode_count() const {
 }
 
 double Voice::calc_ringing_energy_j(int m) const noexcept {
-  const auto& mode = model_->modes_[static_cast<std::size_t>(m)];
-  const ModeState& state = state_[static_cast<std::size_t>(m / kGroup)];
+  const auto& mode = model_->modes_[m];
+  const ModeState& state = state_[m / kGroup];
   const double omega = std::sqrt(mode.lambda);
   const double q = state.im[m % kGroup] / std::sqrt((omega - mode.decay) * (omega + mode.decay));
   const double v = state.re[m % kGroup] - mode.decay * q;
@@ -436,19 +436,19 @@ double Voice::calc_ringing_energy_j(int m) const noexcept {
 void Voice::measure_amplitudes(std::span<float> by_bank_mode) const noexcept {
   const int ringing = std::min(live_ * kGroup, model_->ringing_);
   const auto put = [&](int m, double amplitude) {
-    const auto at = static_cast<std::size_t>(model_->get_bank_mode(m));
+    const std::size_t at = model_->get_bank_mode(m);
     if (at < by_bank_mode.size()) by_bank_mode[at] = static_cast<float>(amplitude);
   };
   for (int m = 0; m < ringing; ++m) {
-    const auto& mode = model_->modes_[static_cast<std::size_t>(m)];
-    const ModeState& state = state_[static_cast<std::size_t>(m / kGroup)];
+    const auto& mode = model_->modes_[m];
+    const ModeState& state = state_[m / kGroup];
     const double omega = std::sqrt(mode.lambda);
     put(m, std::hypot(state.re[m % kGroup], state.im[m % kGroup]) / std::sqrt((omega - mode.decay) * (omega + mode.decay)));
   }
   if (is_nonlinear() && nonlinear_->is_live())
     for (const int m : nonlinear_->get_modes()) {
       const DampedState state = get_mode_state(m);
-      const auto& mode = model_->modes_[static_cast<std::size_t>(m)];
+      const auto& mode = model_->modes_[m];
       const double omega = std::sqrt(mode.lambda), omega_d = std::sqrt((omega - mode.decay) * (omega + mode.decay));
       put(m, std::hypot(state.v + mode.decay * state.q, omega_d * state.q) / omega_d);
     }

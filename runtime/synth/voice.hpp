@@ -100,7 +100,7 @@ class Voice {
   /// `nearness` pascals, of this group or of a later one, whichever is larger, so that they never grow along the list. At a multiple of
   /// kBlock samples only; good until the next call. [audio-thread]
   std::span<const float> measure(float nearness) noexcept;
-  std::span<const float> get_measured() const noexcept { return std::span(bounds_).first(static_cast<std::size_t>(live_)); }
+  std::span<const float> get_measured() const noexcept { return std::span(bounds_).first(live_); }
 
   /// Lets the live groups from `groups` on fade out over the block that begins; strikes may wake them again, contacts that last only after
   /// allow_driven(). At least one stays. At a multiple of kBlock samples only. [audio-thread]

@@ -16,7 +16,7 @@ namespace carillon::synth {
 VoiceHandover::VoiceHandover(const Model& from, const Model& to) {
   std::unordered_map<int, int> place;  // of a mode of the bank in `from`
   for (int m = 0; m < from.get_mode_count(); ++m) place.emplace(from.get_bank_mode(m), m);
-  from_mode_.reserve(static_cast<std::size_t>(to.get_mode_count()));
+  from_mode_.reserve(to.get_mode_count());
   for (int m = 0; m < to.get_mode_count(); ++m) {
     const auto found = place.find(to.get_bank_mode(m));
     from_mode_.push_back(found == place.end() ? -1 : found->second);
@@ -27,10 +27,10 @@ VoiceHandover::VoiceHandover(const Model& from, const Model& to) {
 }
 
 DampedState Voice::get_mode_state(int mode) const noexcept {
-  if (mode >= model_->ringing_) return damped_.get_states()[static_cast<std::size_t>(mode - model_->ringing_)];
+  if (mode >= model_->ringing_) return damped_.get_states()[mode - model_->ringing_];
   if (const int place = is_nonlinear() ? nonlinear_->find_place(mode) : -1; place >= 0) return nonlinear_->get_state(place);
-  const auto& m = model_->modes_[static_cast<std::size_t>(mode)];
-  const ModeState& state = state_[static_cast<std::size_t>(mode / kGroup)];
+  const auto& m = model_->modes_[mode];
+  const ModeState& state = state_[mode / kGroup];
   const double omega = std::sqrt(m.lambda);
   const double q = state.im[mode % kGroup] / std::sqrt((omega - m.decay) * (omega + m.decay));
   return {q, state.re[mode % kGroup] - m.decay * q};
@@ -50,8 +50,8 @@ void Voice::set_mode_state(int mode, const DampedState& state) noexcept {
 
 /// Into its lane of the groups.
 void Voice::put_ringing_state(int mode, const DampedState& state) noexcept {
-  const auto& m = model_->modes_[static_cast<std::size_t>(mode)];
-  ModeState& group = state_[static_cast<std::size_t>(mode / kGroup)];
+  const auto& m = model_->modes_[mode];
+  ModeState& group = state_[mode / kGroup];
   const double omega = std::sqrt(m.lambda);
   group.re[mode % kGroup] = state.v + m.decay * state.q;
   group.im[mode % kGroup] = state.q * std::sqrt((omega - m.decay) * (omega + m.decay));
@@ -111,7 +111,7 @@ void Voice::take_over(Voice& other, VoiceHandover& handover) noexcept {
     const DampedState old = other.get_mode_state(from);
     if (old.q == 0.0 && old.v == 0.0) continue;
     const double omega = std::sqrt(model_->modes_[m].lambda);
-    const double q = old.q * std::sqrt(other.model_->modes_[static_cast<std::size_t>(from)].lambda) / omega;
+    const double q = old.q * std::sqrt(other.model_->modes_[from].lambda) / omega;
     set_mode_state(static_cast<int>(m), {q, old.v});
   }
   begin_book();
@@ -121,19 +121,18 @@ void Voice::take_over(Voice& other, VoiceHandover& handover) noexcept {
     for (const int m : other.nonlinear_->get_modes()) other.put_ringing_state(m, other.get_mode_state(m));
   if (is_nonlinear())
     for (const int m : nonlinear_->get_modes()) put_ringing_state(m, get_mode_state(m));
-  const auto count = static_cast<std::size_t>(live_);
+  const std::size_t count = live_;
   std::copy(other.damped_.get_states().begin(), other.damped_.get_states().end(), handover.old_damped_.begin());
   // Copies are rung out; the states themselves begin the block.
   const bool directed = is_directed() && other.is_directed();
   Directivity* ears = directed ? directed_[0] : nullptr;
   if (directed) ears->clear_fade();
-  other.ring_out(std::span(other.state_).first(static_cast<std::size_t>(other.live_)), handover.old_damped_, 1.0F, fade_,
-                 directed ? other.directed_[0] : nullptr, ears);
+  other.ring_out(std::span(other.state_).first(other.live_), handover.old_damped_, 1.0F, fade_, directed ? other.directed_[0] : nullptr,
+                 ears);
   std::copy_n(state_.begin(), count, handover.states_.begin());
   std::copy(damped_.get_states().begin(), damped_.get_states().end(), handover.damped_.begin());
   if (is_nonlinear())
-    for (const int m : nonlinear_->get_modes())
-      state_[static_cast<std::size_t>(m / kGroup)].re[m % kGroup] = state_[static_cast<std::size_t>(m / kGroup)].im[m % kGroup] = 0.0;
+    for (const int m : nonlinear_->get_modes()) state_[m / kGroup].re[m % kGroup] = state_[m / kGroup].im[m % kGroup] = 0.0;
   ring_out(std::span(handover.states_).first(count), handover.damped_, -1.0F, fade_, ears, ears);
   count_work(other.live_ + live_, kBlock);
   for (int n = 0; n < kBlock; ++n) fade_[n] *= 1.0F - static_cast<float>(n) / kBlock;

@@ -254,8 +254,8 @@ void Engine::add_to_playback(int playback, std::span<const double> words) {
   Playback& to = found->second;
   const PlaybackRequest& request = to.request;
   const auto place = [&](const events::BodyMotion& motion) {
-    if (motion.body < 0 || static_cast<std::size_t>(motion.body) >= request.bodies.size()) return;
-    const int body = request.bodies[static_cast<std::size_t>(motion.body)];
+    if (motion.body < 0 || motion.body >= std::ssize(request.bodies)) return;
+    const int body = request.bodies[motion.body];
     const auto way = ways_.find(body);
     if (body < 0 || way == ways_.end() || events::find_fault(motion) != nullptr) return;
     const bool is_there = calc_distance(way->second.position_m, motion.position_m) < 1e-9;

@@ -39,7 +39,7 @@ struct Writer {
   }
   void steps(const events::Force& force) {
     for (int k = 0; k < force.count; ++k)
-      for (const float x : force.impulse_n_s[static_cast<std::size_t>(k)]) words->push_back(static_cast<double>(x));
+      for (const float x : force.impulse_n_s[k]) words->push_back(static_cast<double>(x));
   }
 };
 
@@ -129,7 +129,7 @@ void read_words(std::span<const double> words, const std::function<void(const ev
     const double length = words[0];
     if (!(length >= static_cast<double>(kHead) && length <= static_cast<double>(words.size())) || length != std::floor(length))
       refuse("its length does not fit");
-    const std::span<const double> row = words.first(static_cast<std::size_t>(length)), fields = row.subspan(kHead);
+    const std::span<const double> row = words.first(length), fields = row.subspan(kHead);
     words = words.subspan(row.size());
     if (row[2] != 0.0 && row[2] != 1.0) refuse("its timing is unknown");
     const Timing timing = row[2] == 0.0 ? Timing::kExact : Timing::kSoon;

@@ -189,7 +189,7 @@ WEB_EXPORT(int, web_keep_load)(double share, double busy_s) {
 /// The amplitudes of a body's modes, by number in the bank, are then the numbers.
 WEB_EXPORT(int, web_measure)(int body, int modes) {
   return run([&] {
-    numbers.resize(static_cast<std::size_t>(std::clamp(modes, 0, 1 << 20)));
+    numbers.resize(std::clamp(modes, 0, 1 << 20));
     return get_engine().get_synthesiser().measure_amplitudes(body, numbers) ? 0 : 1;
   });
 }

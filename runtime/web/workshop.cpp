@@ -136,20 +136,19 @@ std::uint32_t to_mask(synth::EffectSet effects) {
 }
 
 void check_place(const bank::Bank& bank, std::int32_t triangle) {
-  if (triangle < 0 || static_cast<std::size_t>(triangle) >= bank.triangles.size())
+  if (triangle < 0 || triangle >= std::ssize(bank.triangles))
     throw InputError(fmt::format("there is no triangle {}; the surface has {}", triangle, bank.triangles.size()));
 }
 
 Vec3 find_point(const bank::Bank& bank, std::int32_t triangle, const Vec3& barycentric) {
   Vec3 point{};
-  for (std::size_t c = 0; c < 3; ++c)
-    point = point + barycentric[c] * bank.vertices_m[static_cast<std::size_t>(bank.triangles[static_cast<std::size_t>(triangle)][c])];
+  for (std::size_t c = 0; c < 3; ++c) point = point + barycentric[c] * bank.vertices_m[bank.triangles[triangle][c]];
   return point;
 }
 
 /// Out of the body; not of unit length where the triangle has no area.
 Vec3 find_normal(const bank::Bank& bank, std::int32_t triangle) {
-  const Vec3 across = bank::calc_normal(bank.vertices_m, bank.triangles[static_cast<std::size_t>(triangle)]);
+  const Vec3 across = bank::calc_normal(bank.vertices_m, bank.triangles[triangle]);
   return (1.0 / std::max(norm(across), 1e-300)) * across;
 }
 
@@ -252,7 +251,7 @@ std::vector<float> Workshop::calc_shape(int bank, int mode) const {
   std::vector<float> shape;
   shape.reserve(3 * b.vertex_count());
   for (std::size_t v = 0; v < b.vertex_count(); ++v)
-    for (const double x : b.shape_at(v, static_cast<std::size_t>(mode))) shape.push_back(static_cast<float>(x));
+    for (const double x : b.shape_at(v, mode)) shape.push_back(static_cast<float>(x));
   return shape;
 }
 
@@ -383,7 +382,7 @@ void Workshop::make_ping(int body, int mode, double pressure_pa, int number, std
   Vec3 shape{};
   for (std::size_t t = 0; t < b.triangles.size(); ++t) {
     for (std::size_t c = 0; c < 3; ++c) {
-      const Vec3 here = b.shape_at(static_cast<std::size_t>(b.triangles[t][c]), static_cast<std::size_t>(mode));
+      const Vec3 here = b.shape_at(b.triangles[t][c], mode);
       if (!(norm(here) > largest)) continue;
       largest = norm(here);
       shape = here;
@@ -392,7 +391,7 @@ void Workshop::make_ping(int body, int mode, double pressure_pa, int number, std
       impulse.barycentric[c] = 1.0;
     }
   }
-  const double per_n_s = std::abs(b.radiation_gain[static_cast<std::size_t>(mode)]) * largest;
+  const double per_n_s = std::abs(b.radiation_gain[mode]) * largest;
   if (!(per_n_s > 0.0)) return;  // it is not heard
   impulse.impulse_n_s = (std::min(pressure_pa / per_n_s, kHardestPing) / largest) * shape;
   append_words(words, impulse, Timing::kSoon);
@@ -424,7 +423,7 @@ std::string Workshop::make_plan(std::string_view scene, std::span<const int> bod
   read_words(words, [&](const events::Event& event, Timing) {
     happened.append(event);
     const auto note = [&](std::int32_t body) {
-      if (body >= 0 && static_cast<std::size_t>(body) < struck.size()) struck[static_cast<std::size_t>(body)] = true;
+      if (body >= 0 && body < std::ssize(struck)) struck[body] = true;
     };
     if (const auto* impulse = std::get_if<events::Impulse>(&event)) note(impulse->body);
     if (const auto* force = std::get_if<events::Force>(&event)) note(force->body);
@@ -437,7 +436,7 @@ std::string Workshop::make_plan(std::string_view scene, std::span<const int> bod
   std::vector<synth::EffectSet> now(bodies.size());
   for (std::uint64_t i = 0; i < plan.steps.size(); ++i) {
     const host::PlanStep step = plan.steps.get(i);
-    now[static_cast<std::size_t>(step.body)] = step.effects;
+    now[step.body] = step.effects;
   }
   Json json = Json::object();
   for (std::size_t i = 0; i < bodies.size(); ++i) {

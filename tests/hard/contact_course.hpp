@@ -65,7 +65,7 @@ inline Course run(const WorldSpec& spec, double middle_s, double end_s, const st
     if (std::holds_alternative<events::Impulse>(e)) ++course.hits;
     const auto* m = std::get_if<events::BodyMotion>(&e);
     if (m == nullptr) return;
-    course.end[static_cast<std::size_t>(m->body)] = *m;
+    course.end[m->body] = *m;
     if (look) look(*m);
   };
   const double forever = std::numeric_limits<double>::infinity();

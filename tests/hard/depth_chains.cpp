@@ -39,7 +39,7 @@ void swing(const std::string& id, int count, double seconds) {
     // Bodies are all known at the ends of windows.
     if (const auto* m = std::get_if<events::BodyMotion>(&event);
         m != nullptr && std::abs(m->time_s / kWindow - std::round(m->time_s / kWindow)) < 1e-9)
-      at[static_cast<std::size_t>(m->body)] = m->position_m;
+      at[m->body] = m->position_m;
     if (std::holds_alternative<events::TimeWatermark>(event))
       for (std::size_t i = 1; i < at.size(); ++i) apart_m = std::max(apart_m, norm(at[i] - at[i - 1]) - kInner);
   });
@@ -62,7 +62,7 @@ void heap(const std::string& id, int count, double end_s, double in_bodies_bound
   WorldSpec spec;
   spec.ground = GroundSpec{};
   for (int i = 0; i < count; ++i) {
-    const bank::Bank& bank = banks[static_cast<std::size_t>((i + i / 4) % 4)];
+    const bank::Bank& bank = banks[(i + i / 4) % 4];
     spec.bodies.push_back(make_body(
         bank, {0.09 * (i / 2 % 2 != 0 ? 1 : -1) + 0.002 * (i % 5), 0.09 * (i % 2 != 0 ? 1 : -1) - 0.001 * (i % 7), 0.12 + 0.17 * (i / 4)}));
     const double half = 0.5 * (0.3 + 0.7 * i);
@@ -81,7 +81,7 @@ void heap(const std::string& id, int count, double end_s, double in_bodies_bound
   std::int64_t steps = 0;
   for (int n = 1; n <= 60; ++n) {
     world.advance(end_s * n / 60, std::numeric_limits<double>::infinity(), [&](const events::Event& event) {
-      if (const auto* m = std::get_if<events::BodyMotion>(&event)) at[static_cast<std::size_t>(m->body)] = *m;
+      if (const auto* m = std::get_if<events::BodyMotion>(&event)) at[m->body] = *m;
     });
     if (std::exchange(steps, world.get_statistics().steps) != steps) awake_s = end_s * n / 60;
   }

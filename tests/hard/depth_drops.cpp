@@ -32,7 +32,7 @@ struct Bounds {
 
 void drop_many(int body, int count, const Bounds& bounds) {
   constexpr int kMaxLateHits = 50;  // in the last 0.5 s
-  const std::string id = std::string("drops_") + kDropBodies.at(static_cast<std::size_t>(body));
+  const std::string id = std::string("drops_") + kDropBodies.at(body);
   double rests_m = 0.0, ever = 0.0, gained = 0.0, lifted = 0.0;
   int rattling = 0;
   for (int number = 0; number < count; ++number) {

@@ -57,7 +57,7 @@ Fastest find_fastest(const Assembly& assembly, double young_pa, double poisson, 
     const auto nodes = assembly.find_nodes(e);
     Eigen::Matrix4d x;
     for (int a = 0; a < 4; ++a) {
-      const Vec3& at = assembly.nodes_m[static_cast<std::size_t>(nodes[static_cast<std::size_t>(a)])];
+      const Vec3& at = assembly.nodes_m[nodes[a]];
       x.row(a) << 1, at[0], at[1], at[2];
     }
     const Eigen::Matrix4d inverse = x.inverse();  // column a: the coefficients of node a's shape function
@@ -71,10 +71,10 @@ Fastest find_fastest(const Assembly& assembly, double young_pa, double poisson, 
     const Eigen::Matrix<double, 12, 12> k = volume * strain.transpose() * law * strain;
     for (Eigen::Index a = 0; a < 4; ++a)
       for (Eigen::Index i = 0; i < 3; ++i) {
-        const Eigen::Index row = 3 * nodes[static_cast<std::size_t>(a)] + i;
+        const Eigen::Index row = 3 * nodes[a] + i;
         mass(row) += density * volume / 4;
         for (Eigen::Index b = 0; b < 4; ++b)
-          for (Eigen::Index j = 0; j < 3; ++j) stiffness(row, 3 * nodes[static_cast<std::size_t>(b)] + j) += k(3 * a + i, 3 * b + j);
+          for (Eigen::Index j = 0; j < 3; ++j) stiffness(row, 3 * nodes[b] + j) += k(3 * a + i, 3 * b + j);
       }
   }
   const Eigen::VectorXd root = mass.cwiseSqrt().cwiseInverse();
@@ -164,8 +164,7 @@ TEST(motion, snap_through) {
   std::vector<Constraint> hinges;
   for (const char* end : {"x-min", "x-max"}) {
     hinges.push_back({});
-    for (const std::int32_t vertex : sheet.mesh.node_sets.at(end))
-      hinges.back().nodes.push_back(assembly->bodies[0].node_of_mesh[static_cast<std::size_t>(vertex)]);
+    for (const std::int32_t vertex : sheet.mesh.node_sets.at(end)) hinges.back().nodes.push_back(assembly->bodies[0].node_of_mesh[vertex]);
   }
   // Across the middle, a little to one side, so that nothing keeps it symmetric.
   std::vector<Impulse> blows;
@@ -244,7 +243,7 @@ mesh::TetMesh make_hollow_box(double edge_m) {
   hollow.regions.clear();
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e) {
     Vec3 middle{};
-    for (std::size_t a = 0; a < 4; ++a) middle = middle + 0.25 * mesh.nodes_m[static_cast<std::size_t>(mesh.tet(e)[a])];
+    for (std::size_t a = 0; a < 4; ++a) middle = middle + 0.25 * mesh.nodes_m[mesh.tet(e)[a]];
     if (std::max({std::abs(middle[0]), std::abs(middle[1]), std::abs(middle[2])}) < edge_m / 6) continue;
     hollow.tets.insert(hollow.tets.end(), mesh.tet(e).begin(), mesh.tet(e).end());
     hollow.regions.push_back(0);

@@ -92,7 +92,7 @@ void check(const std::string& name, const tests::ModalBody& body, double thickne
     }
     double a = 0.0, b = 0.0, linear = 0.0;
     for (int i = 0; i < kModes; ++i) {
-      const auto m = static_cast<std::size_t>(i);
+      const std::size_t m = i;
       a += ear[m] * one.get_velocity(i);
       b += turned_ear[m] * other.get_velocity(i);
       linear += 0.5 * (std::pow(one.get_velocity(i), 2) + constants[m].eigenvalue_rad2_s2 * std::pow(one.get_amplitude(i), 2));

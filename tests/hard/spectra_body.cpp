@@ -30,8 +30,7 @@ Eigen::MatrixXd gather(const Answer& answer, std::size_t nodes) {
   const la::LocalColumns shapes(answer.modes.shapes);
   for (Eigen::Index j = 0; j < all.cols(); ++j)
     for (std::int32_t i = 0; i < local.free_nodes; ++i)
-      for (int d = 0; d < 3; ++d)
-        all(3 * local.node_in_mesh[static_cast<std::size_t>(i)] + d, j) = shapes.column(static_cast<PetscInt>(j))[3 * i + d];
+      for (int d = 0; d < 3; ++d) all(3 * local.node_in_mesh[i] + d, j) = shapes.column(static_cast<PetscInt>(j))[3 * i + d];
   return all;
 }
 
@@ -43,7 +42,7 @@ double find_largest_angle(const Answer& alone, const Answer& together, std::size
   const partition::LocalMesh& local = alone.pieces.local;
   const tests::SparseMatrix mass = tests::copy(alone.system.mass);
   std::vector<Eigen::Triplet<double>> entries;
-  const auto find = [&](Eigen::Index row) { return static_cast<int>(3 * local.node_in_mesh[static_cast<std::size_t>(row / 3)] + row % 3); };
+  const auto find = [&](Eigen::Index row) { return static_cast<int>(3 * local.node_in_mesh[row / 3] + row % 3); };
   for (int column = 0; column < mass.outerSize(); ++column)
     for (tests::SparseMatrix::InnerIterator at(mass, column); at; ++at) entries.emplace_back(find(at.row()), find(at.col()), at.value());
   tests::SparseMatrix m(a.rows(), a.rows());

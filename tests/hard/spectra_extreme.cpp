@@ -38,7 +38,7 @@ std::vector<double> find_shares(const Answer& answer) {
     petsc::check(VecGetArrayRead(phi, &u));
     petsc::check(VecGetArrayRead(m_phi, &v));
     for (std::int32_t i = 0; i < answer.pieces.local.free_nodes; ++i)
-      if (answer.pieces.local.nodes_m[static_cast<std::size_t>(i)][0] < 0)
+      if (answer.pieces.local.nodes_m[i][0] < 0)
         for (int d = 0; d < 3; ++d) shares[j] += u[3 * i + d] * v[3 * i + d];
     petsc::check(VecRestoreArrayRead(m_phi, &v));
     petsc::check(VecRestoreArrayRead(phi, &u));
@@ -95,10 +95,10 @@ TEST(spectra, almost_equal_components) {
 Body make_dumbbell(int order, double soft_e_pa) {
   mesh::TetMesh rod = shapes::make_box({0.22, 0.1, 0.1}, {5, 1, 1}, 1);
   const std::array<double, 6> planes{-0.11, -0.06, -0.01, 0.01, 0.06, 0.11};
-  for (Vec3& x : rod.nodes_m) x[0] = planes[static_cast<std::size_t>(std::lround((x[0] + 0.11) / 0.044))];
+  for (Vec3& x : rod.nodes_m) x[0] = planes[std::lround((x[0] + 0.11) / 0.044)];
   for (std::size_t e = 0; e < rod.regions.size(); ++e) {
     double middle = 0;
-    for (std::size_t i = 0; i < 4; ++i) middle += rod.nodes_m[static_cast<std::size_t>(rod.tets[4 * e + i])][0] / 4;
+    for (std::size_t i = 0; i < 4; ++i) middle += rod.nodes_m[rod.tets[4 * e + i]][0] / 4;
     rod.regions[e] = std::abs(middle) < 0.01 ? 1 : 0;
   }
   rod.node_sets.clear();

@@ -39,8 +39,7 @@ Course run(const WorldSpec& spec, double end_s, double half_s, bool keeps = fals
   course.end.resize(spec.bodies.size());
   const auto take = [&](const events::Event& event) {
     if (const auto* impulse = std::get_if<events::Impulse>(&event)) ++course.impulses, course.last_s = impulse->time_s;
-    if (const auto* motion = std::get_if<events::BodyMotion>(&event))
-      course.end[static_cast<std::size_t>(motion->body)] = motion->position_m;
+    if (const auto* motion = std::get_if<events::BodyMotion>(&event)) course.end[motion->body] = motion->position_m;
     if (keeps) course.events.push_back(event);
   };
   const double forever = std::numeric_limits<double>::infinity();
@@ -81,8 +80,7 @@ TEST(time, twenty_at_rest) {
   // Those of banks with multipoles, of a floor that reflects, of a listener with a head, and of banks with coupled modes.
   all = all.without({synth::Effect::kDirectivity, synth::Effect::kGroundReflection, synth::Effect::kHead, synth::Effect::kNonlinear,
                      synth::Effect::kCascade});
-  for (int i = 0; i < 20; ++i)
-    synthesiser.add_body(model, {.position_m = spec.bodies[static_cast<std::size_t>(i)].initial.position_m, .effects = all});
+  for (int i = 0; i < 20; ++i) synthesiser.add_body(model, {.position_m = spec.bodies[i].initial.position_m, .effects = all});
   std::vector<float> left(4800), right(4800);
   float* const out[2] = {left.data(), right.data()};
   std::size_t next = 0;

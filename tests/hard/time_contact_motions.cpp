@@ -96,7 +96,7 @@ TEST(time, contact_sleeps_apart) {
   world.advance(60.0, std::numeric_limits<double>::infinity(), [&](const events::Event& e) {
     if (const auto* i = std::get_if<events::Impulse>(&e)) hits += i->body >= 4 ? 1 : 0;
     if (const auto* m = std::get_if<events::BodyMotion>(&e); m != nullptr && m->body >= 4)
-      way = std::max(way, norm(m->position_m - spec.bodies[static_cast<std::size_t>(m->body)].initial.position_m));
+      way = std::max(way, norm(m->position_m - spec.bodies[m->body].initial.position_m));
   });
   const auto statistics = world.get_statistics();
   hold("contact_sleeps_apart", way, 1e-5, "way of those that stand in a minute [m]");
@@ -450,7 +450,7 @@ TEST(time, contact_inside) {
     double farthest = 0.0;
     std::array<Vec3, 2> at{};
     const Course course = run(spec, 1.0, 2.0, [&](const events::BodyMotion& m) {
-      at[static_cast<std::size_t>(m.body)] = m.position_m;
+      at[m.body] = m.position_m;
       if (m.body == 1 && m.time_s > 0.0) farthest = std::max(farthest, norm(at[1] - at[0]));
     });
     const std::string part = "throw " + std::to_string(turn);

@@ -36,7 +36,7 @@ double calc_fault(Impact& impact, const std::vector<Contact>& contacts) {
     if (!std::isfinite(sum)) return sum;
   }
   for (const Pulse& pulse : impact.take_pulses()) {
-    const Contact& contact = contacts[static_cast<std::size_t>(pulse.contact)];
+    const Contact& contact = contacts[pulse.contact];
     for (const Vec3& j : pulse.impulse_n_s) {
       const double normal = dot(j, contact.normal);
       const Vec3 rest = j - normal * contact.normal;
@@ -270,8 +270,8 @@ TEST(time, impact_random) {
       for (const int body : {contact.a, contact.b}) {
         shapes.emplace_back();
         if (body < 0) continue;
-        for (std::size_t m = 0; m < 3 * bodies[static_cast<std::size_t>(body)].q.size(); ++m)
-          shapes.back().push_back(chance.draw(-2.0, 2.0) / std::sqrt(bodies[static_cast<std::size_t>(body)].mass_kg));
+        for (std::size_t m = 0; m < 3 * bodies[body].q.size(); ++m)
+          shapes.back().push_back(chance.draw(-2.0, 2.0) / std::sqrt(bodies[body].mass_kg));
       }
       contacts.push_back(contact);
     }

@@ -50,7 +50,7 @@ Course run(const WorldSpec& spec, double middle_s, double end_s) {
   Course course;
   course.end.resize(spec.bodies.size());
   const auto keep = [&](const events::Event& event) {
-    if (const auto* motion = std::get_if<events::BodyMotion>(&event)) course.end[static_cast<std::size_t>(motion->body)] = *motion;
+    if (const auto* motion = std::get_if<events::BodyMotion>(&event)) course.end[motion->body] = *motion;
   };
   world.advance(middle_s, std::numeric_limits<double>::infinity(), keep);
   course.middle = course.end;

@@ -150,7 +150,7 @@ TEST(time, sample_rate_change) {
     const std::vector<float> heard = play(voice, static_cast<std::size_t>(0.06 * rate));
     Real largest = 0;
     for (int k = 0; k < 60; ++k) {
-      const auto n = static_cast<std::size_t>((0.0122 + (k < 30 ? 2e-5 * k : 1.5e-3 * (k - 29))) * rate);
+      const std::size_t n = (0.0122 + (k < 30 ? 2e-5 * k : 1.5e-3 * (k - 29))) * rate;
       Real wanted = 0;
       for (const auto& [lambda, decay] : modes)
         wanted += calc_pushed(lambda, decay, static_cast<Real>(n) / static_cast<Real>(rate) - 0.0123L, length);

@@ -79,7 +79,7 @@ TEST(time, over_damping) {
       Real largest = 0, peak = 0;
       for (int n = 470; n < 560; ++n) {
         const Real wanted = calc_pushed(omega * omega, decay, n / static_cast<Real>(kRate) - 0.01L, length_s);
-        largest = std::max(largest, std::abs(heard[static_cast<std::size_t>(n)] - wanted));
+        largest = std::max(largest, std::abs(heard[n] - wanted));
         peak = std::max(peak, std::abs(wanted));
       }
       const std::string part = to_json(ratio) + " x critical at " + to_json(freq) + " Hz";

@@ -61,7 +61,7 @@ Place find_place(const Bank& bank, const btVector3& x) {
   double least = 1e300;
   for (std::size_t t = 0; t < bank.triangles.size(); ++t) {
     btVector3 corner[3];
-    for (int k = 0; k < 3; ++k) corner[k] = to_bullet(bank.vertices_m[static_cast<std::size_t>(bank.triangles[t][k])]);
+    for (int k = 0; k < 3; ++k) corner[k] = to_bullet(bank.vertices_m[bank.triangles[t][k]]);
     const Vec3 w = find_weights(x, corner[0], corner[1], corner[2]);
     const btVector3 there = btScalar(w[0]) * corner[0] + btScalar(w[1]) * corner[1] + btScalar(w[2]) * corner[2];
     const double distance = (there - x).length2();

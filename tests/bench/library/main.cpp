@@ -70,9 +70,7 @@ struct Account {
 /// Tasks start in the order of the array, each on the node that has its cores first.
 class Cluster {
  public:
-  Cluster(int nodes, int cores) {
-    free_s_.assign(static_cast<std::size_t>(nodes), std::vector<double>(static_cast<std::size_t>(cores), 0.0));
-  }
+  Cluster(int nodes, int cores) { free_s_.assign(nodes, std::vector<double>(cores, 0.0)); }
 
   /// Returns its end.
   double run(std::size_t cores, double seconds) {

@@ -21,8 +21,7 @@ void run(const bench::Arguments& arguments) {
   const a_int nev = arguments.modes;
   const a_int ncv = std::min(2 * nev, n);
   const a_int work_size = ncv * (ncv + 8);
-  std::vector<double> basis(static_cast<std::size_t>(n) * ncv), work(3 * static_cast<std::size_t>(n)), inner(work_size), start(n),
-      product(n);
+  std::vector<double> basis(static_cast<std::size_t>(n) * ncv), work(3 * n), inner(work_size), start(n), product(n);
   a_int parameters[11] = {1, 0, 1000, 1, 0, 0, 3};  // exact shifts, at most 1000 restarts, mode 3
   a_int pointers[14] = {};
   a_int ido = 0, info = 0;

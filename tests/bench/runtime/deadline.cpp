@@ -69,7 +69,7 @@ void run(int bodies, double budget, double seconds) {
     if (block >= blocks / 10) times_us.push_back(spent.count());  // once everything rings
   }
   std::sort(times_us.begin(), times_us.end());
-  const auto pick = [&](double share) { return times_us[static_cast<std::size_t>(share * static_cast<double>(times_us.size() - 1))]; };
+  const auto pick = [&](double share) { return times_us[share * static_cast<double>(times_us.size() - 1)]; };
   const synth::SynthesiserCounters counters = synthesiser.get_counters();
   const double played_s = static_cast<double>(blocks) * kFrames / kRate;
   std::printf("| %d | %.2f | %.2f | %.0f | %.0f | %.0f | %.0f | %.0f %% | %lld | %lld |\n", bodies, 1e-9 * budget,

@@ -68,7 +68,7 @@ void play(const char* name, const std::shared_ptr<const synth::Model>& model, sy
     if (block >= 20) spent.push_back(1e6 * (base::get_thread_cpu_s() - begin));
   }
   std::sort(spent.begin(), spent.end());
-  const auto pick = [&](double share) { return spent[static_cast<std::size_t>(share * (static_cast<double>(spent.size()) - 1.0))]; };
+  const auto pick = [&](double share) { return spent[share * (static_cast<double>(spent.size()) - 1.0)]; };
   std::printf("%-52s %7.1f us  99.9 %%: %7.1f us  looked up a block: %6.1f\n", name, pick(0.5), pick(0.999),
               static_cast<double>(synthesiser.get_effect_counters(body).units[Effect::kDirectivity]) / blocks);
 }

@@ -47,8 +47,7 @@ double measure(synth::Isa isa, const synth::Trajectory& path, bool dipoles, cons
   std::array<double, kBlock> heard{};
   double spent = 0.0;
   for (int block = 0; block < kBlocks; ++block) {
-    for (std::size_t k = 0; k < sent.size(); ++k)
-      sent[k].push(std::span(noise).subspan((static_cast<std::size_t>(block) * 7 + k) % 1000, kBlock));
+    for (std::size_t k = 0; k < sent.size(); ++k) sent[k].push(std::span(noise).subspan((block * 7 + k) % 1000, kBlock));
     const double started = base::get_thread_cpu_s();
     ear.process(source, listener, static_cast<std::int64_t>(block) * kBlock, heard);
     spent += base::get_thread_cpu_s() - started;

@@ -63,7 +63,7 @@ int main(int argc, char** argv) {
     std::array<double, 3> spent{};
     for (int turn = 0; turn < 3; ++turn) {  // everybody is first, second and third in turn, and follows everybody
       const int first = (round + 3) % 3, step = (round + 3) / 3 % 2 == 0 ? 1 : 2;
-      const auto i = static_cast<std::size_t>((first + step * turn) % 3);
+      const std::size_t i = (first + step * turn) % 3;
       spent[i] = builds[i]->play(blocks, &builds[i]->sum);
     }
     if (all.sum != lean.sum || all.sum != again.sum) {
@@ -77,7 +77,7 @@ int main(int argc, char** argv) {
   }
   const auto pick = [](std::vector<double> x, double share) {
     std::sort(x.begin(), x.end());
-    return x[static_cast<std::size_t>(share * (static_cast<double>(x.size()) - 1.0))];
+    return x[share * (static_cast<double>(x.size()) - 1.0)];
   };
   const auto print = [&](const char* what, const std::vector<double>& x) {
     std::printf("%s: median %+.2f %%, quartiles %+.2f %% and %+.2f %%\n", what, 100.0 * (pick(x, 0.5) - 1.0), 100.0 * (pick(x, 0.25) - 1.0),

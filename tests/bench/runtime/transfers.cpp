@@ -59,7 +59,7 @@ double time_us(const radiation::Transfers& transfers, double distance_m, int rou
     times.push_back(1e6 * (base::get_thread_cpu_s() - begin));
   }
   std::nth_element(times.begin(), times.begin() + rounds / 2, times.end());
-  return times[static_cast<std::size_t>(rounds / 2)];
+  return times[rounds / 2];
 }
 
 }  // namespace
@@ -74,7 +74,7 @@ int main(int argc, char** argv) {
     const auto instructions = static_cast<base::Instructions>(i);
     if (!base::has_instructions(instructions)) continue;
     const radiation::Transfers transfers(bank, instructions);
-    fmt::print("| {} ", kNames[static_cast<std::size_t>(i)]);
+    fmt::print("| {} ", kNames[i]);
     for (const double distance_m : {1.05 * kRadius, 2.0 * kRadius, 1.0, 10.0})
       fmt::print("| {:.1f} ", time_us(transfers, distance_m, quick ? 21 : 5001));
     fmt::print("|\n");

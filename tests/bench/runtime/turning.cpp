@@ -87,8 +87,7 @@ Times play(const std::vector<std::shared_ptr<const synth::Model>>& models, synth
     const double angle = 2.0 * pi * b / count, distance = 2.0 + 2.0 * (b % 5) / 4.0;
     places.push_back({distance * std::cos(angle), distance * std::sin(angle), 0.5});
     axes.push_back(make_axis(random));
-    synthesiser.add_body(models[static_cast<std::size_t>(b)],
-                         {.position_m = places.back(), .effects = effects, .max_waypoints = 128, .isa = isa});
+    synthesiser.add_body(models[b], {.position_m = places.back(), .effects = effects, .max_waypoints = 128, .isa = isa});
   }
   std::array<float, kFrames> left{}, right{};
   const std::array<float*, 2> out{left.data(), right.data()};
@@ -101,7 +100,7 @@ Times play(const std::vector<std::shared_ptr<const synth::Model>>& models, synth
     const double until_s = synthesiser.get_time_s() + 0.05;
     for (; pushed_s < until_s; pushed_s += 0.01) {
       for (int b = 0; b < count; ++b) {
-        const auto i = static_cast<std::size_t>(b);
+        const std::size_t i = b;
         for (; struck_s[i] < pushed_s; struck_s[i] += wait(random))
           synthesiser.push(events::Impulse{
               .time_s = std::max(struck_s[i], synthesiser.get_horizon_s()), .body = b, .impulse_n_s = {0.0, 0.0, 1.0}, .duration_s = 5e-5});
@@ -118,7 +117,7 @@ Times play(const std::vector<std::shared_ptr<const synth::Model>>& models, synth
     if (call >= 40) spent.push_back(1e6 * (base::get_thread_cpu_s() - begin));
   }
   std::sort(spent.begin(), spent.end());
-  const auto pick = [&](double share) { return spent[static_cast<std::size_t>(share * (static_cast<double>(spent.size()) - 1.0))]; };
+  const auto pick = [&](double share) { return spent[share * (static_cast<double>(spent.size()) - 1.0)]; };
   double looked_up = 0.0;
   for (int b = 0; b < count; ++b) looked_up += static_cast<double>(synthesiser.get_effect_counters(b).units[Effect::kDirectivity]);
   return {pick(0.5), pick(0.99), spent.back(), looked_up / calls};
@@ -190,7 +189,7 @@ std::vector<float> hear(const std::shared_ptr<const synth::Model>& model, const 
   synthesiser.push(events::Impulse{.time_s = 0.001, .body = 0, .triangle = triangle, .impulse_n_s = {0.1, 0.2, 1.0}});
   for (int i = 0; i * 0.005 <= frames / kRate + 0.02; ++i)
     synthesiser.push(events::BodyMotion{i * 0.005, 0, place_m, {}, turn_about(axis, turn_rad_s * i * 0.005)});
-  std::vector<float> sound(static_cast<std::size_t>(frames));
+  std::vector<float> sound(frames);
   float* out = sound.data();
   synthesiser.process(&out, 1, frames);
   return sound;
@@ -221,7 +220,7 @@ void measure_error(bank::Bank bank, const char* name, bool quick) {
     int order = 0, count = 0;
     const int each = quick ? 40 : static_cast<int>(bank.mode_count()) > 300 ? 4 : 1;
     for (int m = 0; m < static_cast<int>(bank.mode_count()); m += each) {
-      if (bank.freq_hz(static_cast<std::size_t>(m)) > 20000.0) continue;
+      if (bank.freq_hz(m) > 20000.0) continue;
       std::array<std::vector<float>, 3> sound;
       for (std::size_t i = 0; i < 3; ++i)
         sound[i] = hear(synth::Model::make_solo(*models[i], m), {}, away, axis, i == 0 ? turn_rad_s : 0.0, frames, 0);
@@ -242,14 +241,13 @@ void measure_error(bank::Bank bank, const char* name, bool quick) {
       rms = std::sqrt(rms / rms_count);
       for (int n = 960; n < frames; ++n) {
         const double u = (n % 16) / 16.0;
-        const auto i = static_cast<std::size_t>(n / 16 + 2);
+        const std::size_t i = n / 16 + 2;
         const std::complex<double> a = node[i - 1], b = node[i], c = node[i + 1], d = node[i + 2];
         const std::complex<double> t = b + 0.5 * u * (c - a + u * (2.0 * a - 5.0 * b + 4.0 * c - d + u * (3.0 * (b - c) + d - a)));
         // Re(conj(T) v): v's real part by the monopole of 1; conj(i) v = -i v has the real part Im v.
-        const double re = static_cast<double>(sound[1][static_cast<std::size_t>(n)]) / spread,
-                     im = static_cast<double>(sound[2][static_cast<std::size_t>(n)]) / spread;
+        const double re = static_cast<double>(sound[1][n]) / spread, im = static_cast<double>(sound[2][n]) / spread;
         const double expected = t.real() * re + t.imag() * im;
-        const double rest = static_cast<double>(sound[0][static_cast<std::size_t>(n)]) - expected;
+        const double rest = static_cast<double>(sound[0][n]) - expected;
         error += rest * rest;
         power += expected * expected;
         state += re * re + im * im;

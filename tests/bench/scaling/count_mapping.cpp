@@ -67,17 +67,17 @@ std::vector<double> count_peaks(const std::vector<ldlt::FrontCost>& fronts, cons
   std::vector<int> depth(fronts.size(), 0);
   const auto count_update = [&](std::size_t s) { return 4.5 * fronts[s].rows * fronts[s].rows; };
   for (std::size_t s = fronts.size(); s-- > 0;)
-    if (fronts[s].parent >= 0) depth[s] = depth[static_cast<std::size_t>(fronts[s].parent)] + 1;
+    if (fronts[s].parent >= 0) depth[s] = depth[fronts[s].parent] + 1;
   std::vector<double> freed(fronts.size(), 0.0);  // what the children on the same rank leave, in the stack of the other parity
   for (std::size_t s = 0; s < fronts.size(); ++s) {
     const int owner = mapping.owner(static_cast<std::int32_t>(s));
     if (owner < 0) continue;
-    Alive& rank = ranks[static_cast<std::size_t>(owner)];
+    Alive& rank = ranks[owner];
     const int parity = depth[s] % 2;
     const std::int32_t parent = fronts[s].parent;
     if (parent >= 0 && mapping.owner(parent) == owner) {
       rank.stacks[parity] += count_update(s);
-      freed[static_cast<std::size_t>(parent)] += count_update(s);
+      freed[parent] += count_update(s);
     } else if (parent >= 0) {
       rank.sent += count_update(s);
     }
@@ -88,21 +88,21 @@ std::vector<double> count_peaks(const std::vector<ldlt::FrontCost>& fronts, cons
   std::vector<std::vector<double>> updates(fronts.size());  // (shared fronts) of each place
   std::vector<std::vector<std::int32_t>> children(fronts.size());
   for (std::size_t s = 0; s < fronts.size(); ++s)
-    if (fronts[s].parent >= 0) children[static_cast<std::size_t>(fronts[s].parent)].push_back(static_cast<std::int32_t>(s));
+    if (fronts[s].parent >= 0) children[fronts[s].parent].push_back(static_cast<std::int32_t>(s));
   for (const std::int32_t front : ldlt::order_shared(fronts, mapping)) {
-    const auto s = static_cast<std::size_t>(front);
+    const std::size_t s = front;
     const ldlt::TileMap map(fronts[s].width, fronts[s].rows, mapping.list_shares(front));
     std::vector<double>& update = updates[s];
     for (int place = 0; place < map.places(); ++place) {
-      Alive& rank = ranks[static_cast<std::size_t>(map.rank(place))];
+      Alive& rank = ranks[map.rank(place)];
       rank.peak = std::max(rank.peak, rank.sent + 2 * static_cast<double>(map.count_numbers(place)));
       update.push_back(static_cast<double>(map.count_numbers(place, map.pivot_tiles())));
       rank.sent += update.back();
     }
     for (const std::int32_t child : children[s]) {
-      const std::vector<double>& done = updates[static_cast<std::size_t>(child)];
+      const std::vector<double>& done = updates[child];
       const std::vector<ldlt::FrontShare> shares = mapping.list_shares(child);
-      for (std::size_t place = 0; place < done.size(); ++place) ranks[static_cast<std::size_t>(shares[place].rank)].sent -= done[place];
+      for (std::size_t place = 0; place < done.size(); ++place) ranks[shares[place].rank].sent -= done[place];
     }
   }
   std::vector<double> bytes;

@@ -46,7 +46,7 @@ std::shared_ptr<const Assembly> make_box(const comm::Communicator& comm, int ord
     if (curved) {
       std::vector<char> is_mid(body.mesh.nodes_m.size(), 0);
       for (std::int64_t e = 0; e < body.mesh.tet_count(); ++e)
-        for (std::size_t a = 4; a < 10; ++a) is_mid[static_cast<std::size_t>(body.mesh.tet(e)[a])] = 1;
+        for (std::size_t a = 4; a < 10; ++a) is_mid[body.mesh.tet(e)[a]] = 1;
       for (std::size_t n = 0; n < is_mid.size(); ++n)
         if (is_mid[n] != 0) body.mesh.nodes_m[n][0] += 1e-4;
     }
@@ -57,7 +57,7 @@ std::shared_ptr<const Assembly> make_box(const comm::Communicator& comm, int ord
 /// Element-steps a CPU second of forces alone.
 double measure_forces(const comm::Communicator& comm, int order, int cells, bool damped, bool curved, double seconds) {
   Domain domain(comm, make_box(comm, order, {cells, cells, cells}, damped, curved));
-  std::vector<Quad> u(static_cast<std::size_t>(domain.node_count())), v(u.size()), f(static_cast<std::size_t>(domain.force_count()));
+  std::vector<Quad> u(domain.node_count()), v(u.size()), f(static_cast<std::size_t>(domain.force_count()));
   for (std::size_t i = 0; i < u.size(); ++i) {
     u[i].x = 1e-7 * static_cast<double>(i % 13);
     v[i].y = 1e-2 * static_cast<double>(i % 7);
@@ -109,7 +109,7 @@ double measure_halo(const comm::Communicator& comm, int nodes, double seconds) {
     halo.owner.push_back(other);
     halo.place.push_back(nodes + i);
   }
-  std::vector<Quad> values(static_cast<std::size_t>(2 * nodes));
+  std::vector<Quad> values(2 * nodes);
   comm::HaloExchange exchange(comm, halo, [&](std::int32_t number) { return number - comm.rank() * nodes; });
   exchange.reserve(sizeof(Quad));
   std::int64_t count = 0;

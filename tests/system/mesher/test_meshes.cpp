@@ -42,7 +42,7 @@ const char* find_insanity(const char* file) {
   bool sane = report.volume_m3 > 0 && std::isfinite(report.volume_m3) && mesh.tet_count() > 0;
   for (const auto& p : mesh.nodes_m)
     for (const double x : p) sane = sane && std::isfinite(x);
-  for (const auto v : mesh.tets) sane = sane && v >= 0 && static_cast<std::size_t>(v) < mesh.nodes_m.size();
+  for (const auto v : mesh.tets) sane = sane && v >= 0 && v < std::ssize(mesh.nodes_m);
   return sane ? nullptr : "insane";
 }
 

@@ -18,7 +18,7 @@ namespace {
 using Vertices = std::vector<std::int32_t>;
 
 Graph make_graph(std::int32_t count, const std::set<std::pair<std::int32_t, std::int32_t>>& edges) {
-  std::vector<std::set<std::int32_t>> near(static_cast<std::size_t>(count));
+  std::vector<std::set<std::int32_t>> near(count);
   for (const auto& [a, b] : edges) {
     near[a].insert(b);
     near[b].insert(a);
@@ -55,7 +55,7 @@ bool expect_core_of_definition(const Graph& graph) {
   const Condensation condensed(graph, 1);
   const std::int32_t n = graph.vertex_count();
   Vertices kept;
-  std::vector<Vertices> hosts(static_cast<std::size_t>(n));
+  std::vector<Vertices> hosts(n);
   for (std::int32_t v = 0; v < n; ++v) {
     for (std::int32_t u = 0; u < n; ++u)
       if (dominates(graph, u, v)) hosts[v].push_back(u);
@@ -67,7 +67,7 @@ bool expect_core_of_definition(const Graph& graph) {
   }
   EXPECT_EQ(condensed.core().vertex_count(), static_cast<std::int32_t>(kept.size()));
   if (testing::Test::HasFailure()) return true;
-  Vertices number(static_cast<std::size_t>(n), -1);
+  Vertices number(n, -1);
   for (std::size_t c = 0; c < kept.size(); ++c) number[kept[c]] = static_cast<std::int32_t>(c);
   for (std::size_t c = 0; c < kept.size(); ++c) {
     std::set<std::int32_t> expected;
@@ -118,10 +118,10 @@ TEST(Condensation, has_the_core_of_the_definition) {
 
 /// The core of elements by the definition: a node is dominated by one that is in all of its elements.
 void expect_core_of_elements(const Vertices& elements, int width, std::int32_t nodes) {
-  std::vector<std::set<std::int32_t>> of(static_cast<std::size_t>(nodes));
+  std::vector<std::set<std::int32_t>> of(nodes);
   for (std::size_t k = 0; k < elements.size(); ++k)
     if (elements[k] >= 0) of[elements[k]].insert(static_cast<std::int32_t>(k) / width);
-  Vertices number(static_cast<std::size_t>(nodes), -1);
+  Vertices number(nodes, -1);
   std::int32_t kept = 0;
   for (std::int32_t v = 0; v < nodes; ++v) {
     bool is_dominated = false;
@@ -141,7 +141,7 @@ void expect_core_of_elements(const Vertices& elements, int width, std::int32_t n
   Vertices list;
   for (std::int32_t v = 0; v < nodes; ++v)
     if (number[v] >= 0) list.push_back(v);
-  Vertices scratch(static_cast<std::size_t>(nodes), -1);
+  Vertices scratch(nodes, -1);
   const Graph core = take_part(graph, list, scratch);
   EXPECT_EQ(condensed.core().offsets, core.offsets);
   EXPECT_EQ(condensed.core().neighbours, core.neighbours);
@@ -162,7 +162,7 @@ TEST(Condensation, of_elements_needs_no_graph_of_all_nodes) {
   for (int round = 0; round < 200; ++round) {
     const auto nodes = static_cast<std::int32_t>(1 + random() % 20);
     const int width = static_cast<int>(1 + random() % 6);
-    Vertices all(static_cast<std::size_t>(std::max(nodes, width)), -1);  // with gaps
+    Vertices all(std::max(nodes, width), -1);  // with gaps
     std::iota(all.begin(), all.begin() + nodes, 0);
     Vertices elements;
     for (unsigned e = random() % 8; e > 0; --e) {
@@ -232,7 +232,7 @@ TEST(Condensation, of_second_order_is_the_corners_and_its_separators_separate) {
 TEST(Condensation, estimates_operations_as_an_elimination_counts_them) {
   const Graph graph = make_t10_graph({5, 4, 4});
   const Condensation condensed(graph, 1);
-  Vertices position(static_cast<std::size_t>(condensed.core().vertex_count()));
+  Vertices position(condensed.core().vertex_count());
   std::iota(position.begin(), position.end(), 0);
   std::vector<Vertices> orders(3, position);
   for (unsigned k = 0; k < 3; ++k) std::shuffle(orders[k].begin(), orders[k].end(), std::mt19937(k));
@@ -251,7 +251,7 @@ TEST(Condensation, estimates_operations_as_an_elimination_counts_them) {
 Vertices order_all(const Graph& graph) {
   Graph copy = graph;
   idx_t count = graph.vertex_count();
-  Vertices at(static_cast<std::size_t>(count));
+  Vertices at(count);
   Vertices position(at);
   MetisOptions options = make_metis_options();
   call_metis("METIS_NodeND", [&] {

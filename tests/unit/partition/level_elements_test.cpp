@@ -25,8 +25,8 @@ Counts carry_out(Counts counts) {
     const std::int64_t moved = one.end - gone;
     EXPECT_GT(moved, 0);
     gone = one.end;
-    counts[static_cast<std::size_t>(one.from)] -= moved;
-    counts[static_cast<std::size_t>(one.to)] += moved;
+    counts[one.from] -= moved;
+    counts[one.to] += moved;
   }
   return counts;
 }
@@ -59,8 +59,8 @@ TEST(LevelElements, gives_the_first_of_a_rank_and_none_twice) {
   }
   const Ints before = rank;
   level_elements(world, rank, position);
-  Counts counts(static_cast<std::size_t>(world.size()), 0);
-  for (const std::int32_t one : rank) ++counts[static_cast<std::size_t>(one)];
+  Counts counts(world.size(), 0);
+  for (const std::int32_t one : rank) ++counts[one];
   world.sum(std::span<std::int64_t>(counts));
   EXPECT_EQ(std::accumulate(counts.begin(), counts.end(), std::int64_t{0}), all);
   const auto [least, most] = std::minmax_element(counts.begin(), counts.end());

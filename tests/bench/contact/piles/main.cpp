@@ -174,8 +174,7 @@ Scene make_scene(const std::string& name, int triangles) {
     for (const int body : {1, 2, 6, 3}) kinds.push_back(scene.keep(make_bank(rigid::tests::make_drop_surface(body))));
     scene.hollow = {kinds[1], kinds[2]};
     for (int i = 0; i < 12; ++i) {
-      contact::BodySpec& body = scene.add(kinds[static_cast<std::size_t>((i + i / 4) % 4)],
-                                          {0.03 * (i % 2 ? 1 : -1), 0.03 * (i / 2 % 2 ? 1 : -1), 0.12 + 0.17 * i});
+      contact::BodySpec& body = scene.add(kinds[(i + i / 4) % 4], {0.03 * (i % 2 ? 1 : -1), 0.03 * (i / 2 % 2 ? 1 : -1), 0.12 + 0.17 * i});
       turn(body, 0.3 + 0.7 * i, {0.6, 0.0, 0.8});
     }
   } else if (name == "bars") {
@@ -314,7 +313,7 @@ Cost run_bullet(const Scene& scene, double end_s) {
     if (!shape && scene.ball_radius_m > 0.0) shape = std::make_unique<btSphereShape>(btScalar(scene.ball_radius_m));
     if (!shape && scene.hollow.contains(spec.bank)) {
       auto& mesh = meshes.emplace_back(std::make_unique<btTriangleMesh>());
-      const auto get = [&](std::int32_t vertex) { return to_bullet(spec.bank->vertices_m[static_cast<std::size_t>(vertex)]); };
+      const auto get = [&](std::int32_t vertex) { return to_bullet(spec.bank->vertices_m[vertex]); };
       for (const auto& t : spec.bank->triangles) mesh->addTriangle(get(t[0]), get(t[1]), get(t[2]));
       auto triangles = std::make_unique<btGImpactMeshShape>(mesh.get());
       triangles->setMargin(btScalar(0.0005));
@@ -357,7 +356,7 @@ std::vector<std::vector<events::BodyMotion>> follow(const contact::WorldSpec& sp
   std::vector<std::vector<events::BodyMotion>> motions(spec.bodies.size());
   const double begin = base::get_thread_cpu_s();
   world.advance(end_s, std::numeric_limits<double>::infinity(), [&](const events::Event& event) {
-    if (const auto* motion = std::get_if<events::BodyMotion>(&event)) motions[static_cast<std::size_t>(motion->body)].push_back(*motion);
+    if (const auto* motion = std::get_if<events::BodyMotion>(&event)) motions[motion->body].push_back(*motion);
   });
   cpu_s_per_s = (base::get_thread_cpu_s() - begin) / end_s;
   return motions;

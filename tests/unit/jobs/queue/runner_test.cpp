@@ -40,7 +40,7 @@ class Scene {
  public:
   Scene(int jobs, int runners) : table_(world_, [this](const store::Id& id) { return world_.has_bank(id); }), display_(false, true, {}) {
     for (int i = 0; i < jobs; ++i) {
-      Job job{ids()[static_cast<std::size_t>(i)]};
+      Job job{ids()[i]};
       job.resources.ranks = 1 + i % 3;
       job.resources.memory_gb = 1.5 + i % 2;
       table_.add(job);

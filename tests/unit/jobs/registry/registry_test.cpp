@@ -222,7 +222,7 @@ TEST(SubmissionLog, cut_at_any_byte_costs_no_more_than_the_line_that_was_cut) {
   for (std::size_t bytes = 0; bytes <= whole.size(); ++bytes) {
     cut(bytes);
     // A line is whole when its last brace is there, whether or not its end of line is.
-    const auto lines = static_cast<std::size_t>(std::count(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(bytes), '\n'));
+    const std::size_t lines = std::count(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(bytes), '\n');
     const bool has_unended = bytes > 0 && bytes < whole.size() && whole[bytes] == '\n';
     const auto found = registry::read_submission_log(store);
     ASSERT_EQ(found.size(), lines + (has_unended ? 1 : 0)) << bytes;

@@ -28,7 +28,7 @@ std::vector<double> make_mass(std::size_t n, double size, unsigned seed) {
 
 std::vector<double> spread(const Mixture& mixture, std::size_t n) {
   std::vector<double> parts(n);
-  for (std::size_t i = 0; i < mixture.motions.size(); ++i) parts[static_cast<std::size_t>(mixture.motions[i])] = mixture.parts[i];
+  for (std::size_t i = 0; i < mixture.motions.size(); ++i) parts[mixture.motions[i]] = mixture.parts[i];
   return parts;
 }
 

@@ -50,8 +50,7 @@ inline Complex evaluate(std::span<const Complex> coefficients, int order, double
   Complex sum{};
   for (int l = 0; l <= order; ++l) {
     Complex of_order{};
-    for (int m = -l; m <= l; ++m)
-      of_order += coefficients[static_cast<std::size_t>(l * l + l + m)] * calc_harmonic(l, m, (1.0 / r) * offset_m);
+    for (int m = -l; m <= l; ++m) of_order += coefficients[l * l + l + m] * calc_harmonic(l, m, (1.0 / r) * offset_m);
     sum += calc_hankel(l, k * r) * of_order;
   }
   return sum;

@@ -37,7 +37,7 @@ Matrix unpack(const Sides& sides) {
   const std::vector<std::complex<float>> rows = sides.list();
   Matrix matrix(static_cast<Eigen::Index>(sides.unknowns), static_cast<Eigen::Index>(sides.count));
   for (Eigen::Index i = 0; i < matrix.rows(); ++i)
-    for (Eigen::Index j = 0; j < matrix.cols(); ++j) matrix(i, j) = rows[static_cast<std::size_t>(i * matrix.cols() + j)];
+    for (Eigen::Index j = 0; j < matrix.cols(); ++j) matrix(i, j) = rows[i * matrix.cols() + j];
   return matrix;
 }
 

@@ -283,7 +283,7 @@ ExactMode find_exact_mode(const std::array<double, 2>& alone, std::size_t motion
 
 std::array<double, 2> list_parts(const Mixture& mixture) {
   std::array<double, 2> parts{};
-  for (std::size_t i = 0; i < mixture.motions.size(); ++i) parts.at(static_cast<std::size_t>(mixture.motions[i])) = mixture.parts[i];
+  for (std::size_t i = 0; i < mixture.motions.size(); ++i) parts.at(mixture.motions[i]) = mixture.parts[i];
   return parts;
 }
 
@@ -361,7 +361,7 @@ TEST(coupling, conserves_energy_and_unit_mass) {
     const Sounding& mode = found.modes[m];
     double squares = 0.0, stiffness = 0.0, power = 0.0;
     for (std::size_t i = 0; i < mode.mixture.motions.size(); ++i) {
-      const double part = mode.mixture.parts[i], k = radiator.wave_number_1_m[static_cast<std::size_t>(mode.mixture.motions[i])];
+      const double part = mode.mixture.parts[i], k = radiator.wave_number_1_m[mode.mixture.motions[i]];
       squares += part * part;
       stiffness += part * part * k * k;
       mixed += std::abs(part) > 0.03 ? 1 : 0;
@@ -429,9 +429,9 @@ TEST(reaction, of_a_ball_is_its_added_mass) {
   const AirSolution found = solve_air(MPI_COMM_WORLD, keep_on_root(radiator), {});
   if (tests::get_rank() != 0) return;
   for (const int l : orders) {
-    const double k = radiator.wave_number_1_m[static_cast<std::size_t>(l)];
+    const double k = radiator.wave_number_1_m[l];
     const double wanted = (calc_hankel(l, k) / (k * calc_hankel_slope(l, k))).real();
-    const double ratio = found.modes[static_cast<std::size_t>(l)].reaction.real() / wanted;
+    const double ratio = found.modes[l].reaction.real() / wanted;
     EXPECT_NEAR(ratio, 1.0, 0.01) << l;
     EXPECT_NEAR(wanted, -1.0 / (l + 1.0), 0.02);  // the limit of the closed form at low k
   }

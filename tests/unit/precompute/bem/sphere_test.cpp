@@ -154,7 +154,7 @@ TEST(expansion, has_the_functions_of_bessel_and_hankel) {
     const std::vector<double> bessel = calc_bessel(x, 30), logs = calc_log_hankel(x, 30);
     const std::vector<Complex> phases = calc_hankel_phase(x, 30);
     for (int l = 0; l <= 30; ++l) {
-      const auto at = static_cast<std::size_t>(l);
+      const std::size_t at = l;
       const Complex wanted = calc_hankel(l, x);
       EXPECT_NEAR(bessel[at], wanted.real(), 1e-11 * std::max(std::abs(wanted.real()), x > l ? 1.0 / x : 0.0)) << x << " " << l;
       if (!std::isfinite(wanted.imag())) continue;

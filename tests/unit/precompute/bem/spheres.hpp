@@ -53,7 +53,7 @@ class Spheres {
     for (int order = 0; order <= outcome.order; ++order)
       for (int n = -order; n <= order; ++n) {
         const Complex wanted = order == l && n == m ? find_exact(l, k) : Complex();
-        const double size = weigh(order) * std::abs(found[static_cast<std::size_t>(order * order + order + n)] - wanted);
+        const double size = weigh(order) * std::abs(found[order * order + order + n] - wanted);
         error += size * size;
       }
     return to_db(std::sqrt(error) / (weigh(l) * std::abs(find_exact(l, k))));

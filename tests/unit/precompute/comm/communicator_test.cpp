@@ -101,7 +101,7 @@ TEST(Broadcast, brings_rank_0s_value_to_every_rank) {
   EXPECT_EQ(world().broadcast(world().rank() + 3.5), 3.5);
   EXPECT_EQ(world().broadcast(std::string(world().is_root() ? "a name" : "")), "a name");
   EXPECT_THAT(world().broadcast(world().is_root() ? std::vector<int>{4, 5} : std::vector<int>{9, 9, 9}), ElementsAre(4, 5));
-  EXPECT_TRUE(world().broadcast(std::vector<int>(static_cast<std::size_t>(world().rank()))).empty());
+  EXPECT_TRUE(world().broadcast(std::vector<int>(world().rank())).empty());
 }
 
 TEST(Broadcast, keeps_texts_with_any_byte_apart) {
@@ -124,7 +124,7 @@ TEST(Broadcast, runs_its_work_on_rank_0_alone_and_throws_its_error_on_all) {
 TEST(AllGather, keeps_the_order_of_the_ranks_and_takes_empty_ranks) {
   std::vector<int> expected;
   for (int r = 0; r < world().size(); ++r) expected.insert(expected.end(), static_cast<std::size_t>(r), 10 * r);
-  const std::vector<int> own(static_cast<std::size_t>(world().rank()), 10 * world().rank());  // none of rank 0
+  const std::vector<int> own(world().rank(), 10 * world().rank());  // none of rank 0
   EXPECT_EQ(world().all_gather(own), expected);
   EXPECT_EQ(world().all_gather([&] { return own; }), expected);
   EXPECT_TRUE(world().all_gather(std::vector<double>()).empty());

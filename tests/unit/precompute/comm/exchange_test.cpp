@@ -39,8 +39,7 @@ void expect_all_arrived(const ByRank<Item>& received) {
   for (int from = 0; from < world().size(); ++from) {
     const auto items = received.of(from);
     ASSERT_EQ(items.size(), static_cast<std::size_t>(find_length(from, world().rank())));
-    for (int i = 0; i < find_length(from, world().rank()); ++i)
-      EXPECT_EQ(items[static_cast<std::size_t>(i)], (Item{from, world().rank(), i}));
+    for (int i = 0; i < find_length(from, world().rank()); ++i) EXPECT_EQ(items[i], (Item{from, world().rank(), i}));
   }
 }
 
@@ -92,27 +91,27 @@ TEST_P(ExchangeInBlocks, goes_forth_and_back_again_and_again) {
   Exchange exchange(world(), sent.begin, GetParam());
   exchange.reserve(2 * sizeof(Item));
   for (int repeat = 0; repeat < 2; ++repeat) {
-    ByRank<Item> received{std::vector<Item>(static_cast<std::size_t>(exchange.received_count())), exchange.received_begin()};
+    ByRank<Item> received{std::vector<Item>(exchange.received_count()), exchange.received_begin()};
     exchange.forward(sent.items.data(), received.items.data());
     expect_all_arrived(received);
     std::vector<Item> returned(sent.items.size());
     exchange.backward(received.items.data(), returned.data());
     EXPECT_EQ(returned, sent.items);
   }
-  std::vector<double> wide, arrived(2 * static_cast<std::size_t>(exchange.received_count()));
+  std::vector<double> wide, arrived(2 * exchange.received_count());
   for (const Item& item : sent.items) wide.insert(wide.end(), {1.0 * item.from, 1.0 * item.place});
   exchange.forward(wide.data(), arrived.data(), 2);
   for (int from = 0, k = 0; from < world().size(); ++from)
     for (int i = 0; i < find_length(from, world().rank()); ++i, k += 2) {
-      EXPECT_EQ(arrived[static_cast<std::size_t>(k)], from);
-      EXPECT_EQ(arrived[static_cast<std::size_t>(k) + 1], i);
+      EXPECT_EQ(arrived[k], from);
+      EXPECT_EQ(arrived[k + 1], i);
     }
 }
 
 INSTANTIATE_TEST_SUITE_P(Blocks, ExchangeInBlocks, testing::Values(1, 7, 24, kBlockBytes));
 
 TEST(Gather, brings_all_items_to_rank_0_in_order) {
-  const std::vector<int> own(static_cast<std::size_t>(world().rank()), world().rank());
+  const std::vector<int> own(world().rank(), world().rank());
   std::vector<int> expected;
   for (int r = 0; world().is_root() && r < world().size(); ++r) expected.insert(expected.end(), static_cast<std::size_t>(r), r);
   EXPECT_EQ(gather(world(), own), expected);
@@ -196,10 +195,10 @@ TEST(ScatterInTurn, gives_every_rank_what_rank_0_made_for_it) {
       world(),
       [&](int rank) {
         ++made;
-        return std::vector<int>(static_cast<std::size_t>(rank), 10 * rank);  // nothing for rank 0
+        return std::vector<int>(rank, 10 * rank);  // nothing for rank 0
       },
       serialise, deserialise);
-  EXPECT_EQ(own, std::vector<int>(static_cast<std::size_t>(world().rank()), 10 * world().rank()));
+  EXPECT_EQ(own, std::vector<int>(world().rank(), 10 * world().rank()));
   EXPECT_EQ(made, world().is_root() ? world().size() : 0);
 }
 

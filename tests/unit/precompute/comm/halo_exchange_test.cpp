@@ -30,7 +30,7 @@ struct AllShared {
       halo.place.push_back(place[i]);
     }
   }
-  std::int32_t find_own_place(std::int32_t own) const { return place[static_cast<std::size_t>(own % kOwned)]; }
+  std::int32_t find_own_place(std::int32_t own) const { return place[own % kOwned]; }
 };
 
 class HaloInBlocks : public testing::TestWithParam<std::size_t> {};
@@ -59,7 +59,7 @@ TEST_P(HaloInBlocks, copies_and_sums_shared_values) {
   std::vector<float> narrow(shared.place.size(), 1.0f);
   exchange.sum_to_owner(narrow.data(), 1);
   for (std::size_t n = 0; n < narrow.size(); ++n)
-    EXPECT_EQ(narrow[static_cast<std::size_t>(shared.place[n])], n < kOwned ? static_cast<float>(world().size()) : 1.0f);
+    EXPECT_EQ(narrow[shared.place[n]], n < kOwned ? static_cast<float>(world().size()) : 1.0f);
 }
 
 INSTANTIATE_TEST_SUITE_P(Blocks, HaloInBlocks, testing::Values(1, 7, 24, kBlockBytes));
@@ -74,12 +74,11 @@ TEST(Halo, of_runs_is_stored_behind_the_own_values_during_other_work) {
       places.push_back(static_cast<std::int32_t>(owners.own_count()) + static_cast<std::int32_t>(places.size()));
     }
   HaloExchange exchange(world(), owners, numbers, places);
-  std::vector<double> values(static_cast<std::size_t>(owners.total()), -1.0);
-  for (std::int64_t i = 0; i < owners.own_count(); ++i)
-    values[static_cast<std::size_t>(i)] = 100.0 * static_cast<double>(owners.own_begin() + i);
+  std::vector<double> values(owners.total(), -1.0);
+  for (std::int64_t i = 0; i < owners.own_count(); ++i) values[i] = 100.0 * static_cast<double>(owners.own_begin() + i);
   exchange.begin_copy_to_halo(values.data(), 1);
   exchange.end_copy_to_halo(values.data(), 1);
-  for (std::size_t i = 0; i < numbers.size(); ++i) EXPECT_EQ(values[static_cast<std::size_t>(places[i])], 100.0 * numbers[i]);
+  for (std::size_t i = 0; i < numbers.size(); ++i) EXPECT_EQ(values[places[i]], 100.0 * numbers[i]);
 }
 
 TEST(Halo, of_no_one_does_nothing) {

@@ -81,7 +81,7 @@ inline double calc_gamma(const ModalBody& body, const bank::QuarticEnergy& energ
     while (i < energy.modes.size() && energy.modes[i] != mode) ++i;
     return i < energy.modes.size() ? bank::calc_self_coupling(energy)[i] : 0.0;
   });
-  return condense::calc_hardening(self, body.modes.lambda[static_cast<std::size_t>(mode)], body.peak(mode), length_m);
+  return condense::calc_hardening(self, body.modes.lambda[mode], body.peak(mode), length_m);
 }
 
 }  // namespace carillon::tests

@@ -39,20 +39,19 @@ class FullEnergy {
     for (std::int32_t e = 0; e < local.tet_count(); ++e)
       for (int p = 0; p < 4; ++p) {
         std::array<double, 4> l{b, b, b, b};
-        l[static_cast<std::size_t>(p)] = a;
+        l[p] = a;
         Point point;
         Eigen::Matrix<double, 10, 4> slope = Eigen::Matrix<double, 10, 4>::Zero();  // by barycentric coordinates
-        for (int i = 0; i < 4; ++i) slope(i, i) = 4 * l[static_cast<std::size_t>(i)] - 1;
+        for (int i = 0; i < 4; ++i) slope(i, i) = 4 * l[i] - 1;
         constexpr int kEnds[6][2] = {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}};
         for (int i = 0; i < 6; ++i) {
-          slope(4 + i, kEnds[i][0]) = 4 * l[static_cast<std::size_t>(kEnds[i][1])];
-          slope(4 + i, kEnds[i][1]) = 4 * l[static_cast<std::size_t>(kEnds[i][0])];
+          slope(4 + i, kEnds[i][0]) = 4 * l[kEnds[i][1]];
+          slope(4 + i, kEnds[i][1]) = 4 * l[kEnds[i][0]];
         }
         Eigen::Matrix<double, 3, 10> x;
         for (int i = 0; i < 10; ++i) {
-          point.node[static_cast<std::size_t>(i)] = local.tets[static_cast<std::size_t>(10 * e + i)];
-          for (int k = 0; k < 3; ++k)
-            x(k, i) = local.nodes_m[static_cast<std::size_t>(point.node[static_cast<std::size_t>(i)])][static_cast<std::size_t>(k)];
+          point.node[i] = local.tets[10 * e + i];
+          for (int k = 0; k < 3; ++k) x(k, i) = local.nodes_m[point.node[i]][k];
         }
         Eigen::Matrix<double, 10, 3> by_xi;
         for (int k = 0; k < 3; ++k) by_xi.col(k) = slope.col(k + 1) - slope.col(0);
@@ -70,7 +69,7 @@ class FullEnergy {
     for (const Point& point : points_) {
       Eigen::Matrix<double, 3, 10> values = Eigen::Matrix<double, 3, 10>::Zero();
       for (int i = 0; i < 10; ++i)
-        if (const int row = 3 * point.node[static_cast<std::size_t>(i)]; row < free_) values.col(i) = u.segment<3>(row);
+        if (const int row = 3 * point.node[i]; row < free_) values.col(i) = u.segment<3>(row);
       const Eigen::Matrix3d h = values * point.slope, f = Eigen::Matrix3d::Identity() + h;
       const Eigen::Matrix3d strain = 0.5 * (h + h.transpose() + h.transpose() * h);
       const Eigen::Matrix3d stress = lambda_ * strain.trace() * Eigen::Matrix3d::Identity() + 2 * mu_ * strain;
@@ -97,11 +96,11 @@ class FullEnergy {
         for (int j = 0; j < 10; ++j)
           for (int d = 0; d < 3; ++d) k(3 * i + d, 3 * j + d) += initial(i, j);
       for (int i = 0; i < 10; ++i) {
-        const int row = 3 * point.node[static_cast<std::size_t>(i)];
+        const int row = 3 * point.node[i];
         if (row >= free_) continue;
         force->segment<3>(row) += g.segment<3>(3 * i);
         for (int j = 0; j < 10; ++j)
-          if (const int column = 3 * point.node[static_cast<std::size_t>(j)]; column < free_ && stiffness != nullptr)
+          if (const int column = 3 * point.node[j]; column < free_ && stiffness != nullptr)
             stiffness->block<3, 3>(row, column) += k.block<3, 3>(3 * i, 3 * j);
       }
     }
@@ -272,7 +271,7 @@ struct Coupled {
         answer(given.comm, given.pieces.local, given.system.stiffness, given.system.mass, shapes.view().part(0, count),
                given.modes.lambda[0]),
         nodal(answer.spread(shapes.view().part(0, count))) {
-    for (int i = 0; i < count; ++i) omega.push_back(std::sqrt(given.modes.lambda[static_cast<std::size_t>(i)]));
+    for (int i = 0; i < count; ++i) omega.push_back(std::sqrt(given.modes.lambda[i]));
   }
   CoupledBody body() {
     return {modal.comm, strains, answer, nodal, omega, Pairs{static_cast<std::ptrdiff_t>(omega.size())}, [](double) {}};

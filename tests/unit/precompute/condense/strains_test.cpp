@@ -39,7 +39,7 @@ double compare(const std::string& shape, int order, const material::Material& ma
   RowMatrix b;
   for (std::int32_t e = 0; e < strains.element_count(); ++e) {
     std::vector<Vec3> x;
-    for (const std::int32_t node : strains.nodes(e)) x.push_back(pieces.local.nodes_m[static_cast<std::size_t>(node)]);
+    for (const std::int32_t node : strains.nodes(e)) x.push_back(pieces.local.nodes_m[node]);
     fem::ElementMatrices expected;
     EXPECT_TRUE(fem::calc_element(x, solid, job::Mass::consistent, expected));
     const Eigen::Index n = 3 * expected.nodes;

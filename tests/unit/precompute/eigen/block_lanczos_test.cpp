@@ -45,19 +45,19 @@ Outcome run_next_to_locked(int count, double error) {
   check(MatCreateAIJ(PETSC_COMM_WORLD, PETSC_DECIDE, PETSC_DECIDE, n, n, 1, nullptr, 0, nullptr, stiffness.out()));
   PetscInt first = 0, last = 0;
   check(MatGetOwnershipRange(stiffness, &first, &last));
-  for (PetscInt i = first; i < last; ++i) check(MatSetValue(stiffness, i, i, lambda[static_cast<std::size_t>(i)], INSERT_VALUES));
+  for (PetscInt i = first; i < last; ++i) check(MatSetValue(stiffness, i, i, lambda[i], INSERT_VALUES));
   check(MatAssemblyBegin(stiffness, MAT_FINAL_ASSEMBLY));
   check(MatAssemblyEnd(stiffness, MAT_FINAL_ASSEMBLY));
 
   const std::ptrdiff_t rows = last - first;
-  std::vector<double> values(static_cast<std::size_t>(rows * kLocked), 0.0);
+  std::vector<double> values(rows * kLocked, 0.0);
   LockedModes locked;
   for (int j = 0; j < kLocked; ++j) {
     const double lean = j >= kLocked - count ? error : 0;
     for (const auto& [row, value] : {std::pair{j, 1.0}, std::pair{kEqual + 5 * j, lean}}) {
-      if (row >= first && row < last) values[static_cast<std::size_t>(j * rows + row - first)] = value / std::hypot(1, lean);
+      if (row >= first && row < last) values[j * rows + row - first] = value / std::hypot(1, lean);
     }
-    locked.lambda.push_back(lambda[static_cast<std::size_t>(j)]);
+    locked.lambda.push_back(lambda[j]);
   }
   locked.sets.push_back({values.data(), rows, rows, kLocked});
 
@@ -87,9 +87,9 @@ Outcome run_next_to_locked(int count, double error) {
 
   Outcome run;
   check(EPSGetConverged(eps, &run.converged));
-  std::vector<petsc::VecHandle> found(static_cast<std::size_t>(run.converged));
+  std::vector<petsc::VecHandle> found(run.converged);
   for (PetscInt i = 0; i < run.converged; ++i) {
-    petsc::VecHandle& x = found[static_cast<std::size_t>(i)];
+    petsc::VecHandle& x = found[i];
     check(MatCreateVecs(stiffness, x.out(), nullptr));
     check(EPSGetEigenvector(eps, i, x, nullptr));
     PetscScalar* local = nullptr;
@@ -99,7 +99,7 @@ Outcome run_next_to_locked(int count, double error) {
     check(VecRestoreArray(x, &local));
     for (PetscInt j = 0; j <= i; ++j) {
       PetscScalar product = 0;
-      check(VecDot(x, found[static_cast<std::size_t>(j)], &product));
+      check(VecDot(x, found[j], &product));
       run.worst_gram = std::max(run.worst_gram, std::abs(product - (i == j ? 1 : 0)));
     }
   }

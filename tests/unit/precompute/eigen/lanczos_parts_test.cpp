@@ -75,7 +75,7 @@ class Rig {
     check(MatGetOwnershipRange(system.stiffness, &first, &last));
     rows = last - first;
     make_transformation();
-    memory_.assign(static_cast<std::size_t>(rows * (room + kBlock)), 0.0);
+    memory_.assign(rows * (room + kBlock), 0.0);
     fill_at_random(view().part(0, kBlock));
   }
   ~Rig() { (void)STDestroy(&st); }
@@ -184,11 +184,11 @@ TEST(InnerProduct, subtracts_multiplies_and_combines_in_one_pass) {
     rig.fill_at_random(rig.view());
     petsc::MatHandle mass;
     check(MatDuplicate(rig.system.mass, MAT_COPY_VALUES, mass.out()));
-    std::vector<double> diagonal(static_cast<std::size_t>(rig.rows));
+    std::vector<double> diagonal(rig.rows);
     Matrix m = rig.m;
     if (is_diagonal) {
       m = Matrix(rig.m.diagonal().asDiagonal());
-      for (PetscInt i = 0; i < rig.rows; ++i) diagonal[static_cast<std::size_t>(i)] = m(rig.first + i, rig.first + i);
+      for (PetscInt i = 0; i < rig.rows; ++i) diagonal[i] = m(rig.first + i, rig.first + i);
     }
     InnerProduct inner(world(), mass, rig.rows, n, Rig::kBlock, is_diagonal ? diagonal.data() : nullptr);
     inner.place(rig.view().part(Rig::kBlock, Rig::kBlock));
@@ -219,7 +219,7 @@ TEST(InnerProduct, subtracts_multiplies_and_combines_in_one_pass) {
 
 TEST(LockedModes, are_projected_out_by_range) {
   Rig rig(Rig::kBlock);
-  std::vector<double> values(static_cast<std::size_t>(7 * rig.rows));
+  std::vector<double> values(7 * rig.rows);
   LockedModes locked;
   for (int j = 0; j < 7; ++j) {
     rig.scatter(rig.vectors, j, values.data() + j * rig.rows);
@@ -290,8 +290,7 @@ TEST(RitzStep, finds_what_a_dense_solver_finds_and_its_residuals_are_true) {
       const Matrix x = rig.gather_columns(basis.columns(0, basis.size())) * pairs.vectors;
       const Matrix r = rig.inverse * rig.m * x - x * pairs.theta.asDiagonal();
       const double scale = pairs.theta.cwiseAbs().maxCoeff();
-      for (int j = 0; j < basis.size(); ++j)
-        EXPECT_NEAR(pairs.residual[static_cast<std::size_t>(j)], std::sqrt(r.col(j).dot(rig.m * r.col(j))), 1e-10 * scale) << j;
+      for (int j = 0; j < basis.size(); ++j) EXPECT_NEAR(pairs.residual[j], std::sqrt(r.col(j).dot(rig.m * r.col(j))), 1e-10 * scale) << j;
     }
     basis.append();
   }
@@ -301,7 +300,7 @@ TEST(RitzStep, finds_what_a_dense_solver_finds_and_its_residuals_are_true) {
   for (const double x : rig.lambda) expected.push_back(1 / (x - rig.sigma));
   std::sort(expected.begin(), expected.end());
   const double scale = std::max(std::abs(expected.front()), std::abs(expected.back()));
-  for (PetscInt j = 0; j < n; ++j) EXPECT_NEAR(pairs.theta[j], expected[static_cast<std::size_t>(j)], 1e-12 * scale) << j;
+  for (PetscInt j = 0; j < n; ++j) EXPECT_NEAR(pairs.theta[j], expected[j], 1e-12 * scale) << j;
 }
 
 TEST(RitzStep, selects_an_interval_and_sees_when_it_is_complete) {
@@ -317,7 +316,7 @@ TEST(RitzStep, selects_an_interval_and_sees_when_it_is_complete) {
   const std::vector<double> lambda{3.0, 2.2, 1.0, 9.0, 5.2, 3.6};  // by ascending theta
   RitzPairs pairs;
   pairs.theta.resize(6);
-  for (int i = 0; i < 6; ++i) pairs.theta[i] = 1 / (lambda[static_cast<std::size_t>(i)] - goal.sigma);
+  for (int i = 0; i < 6; ++i) pairs.theta[i] = 1 / (lambda[i] - goal.sigma);
   pairs.residual = {1e-15, 1e-15, 1e-15, 1e-15, 1e-15, 1e-3};
   RitzSelection selection = select(pairs, goal);
   EXPECT_EQ(selection.converged, 2);
@@ -352,7 +351,7 @@ TEST(Orthogonaliser, replaces_dependent_columns_of_the_starting_block) {
 TEST(Orthogonaliser, keeps_nearly_dependent_and_nearly_locked_columns_orthonormal) {
   for (const double rest : {1e-1, 1e-3, 1e-6, 1e-9}) {
     Rig rig(20);
-    std::vector<double> known(static_cast<std::size_t>(2 * rig.rows));
+    std::vector<double> known(2 * rig.rows);
     LockedModes locked;
     for (int j = 0; j < 2; ++j) {
       rig.scatter(rig.vectors, j, known.data() + j * rig.rows);
@@ -361,7 +360,7 @@ TEST(Orthogonaliser, keeps_nearly_dependent_and_nearly_locked_columns_orthonorma
     locked.sets = {{known.data(), rig.rows, rig.rows, 2}};
     for (PetscInt i = 0; i < rig.rows; ++i) {
       rig.view().column(1)[i] = rig.view().column(0)[i] + rest * rig.view().column(1)[i];
-      rig.view().column(2)[i] = known[static_cast<std::size_t>(i)] + rest * rig.view().column(2)[i];
+      rig.view().column(2)[i] = known[i] + rest * rig.view().column(2)[i];
     }
     const ShiftInvert inverse(rig.st);
     const auto n = static_cast<PetscInt>(rig.k.rows());

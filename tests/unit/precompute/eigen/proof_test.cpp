@@ -147,7 +147,7 @@ TEST(Canonical, modes_are_the_same_for_any_ranks_and_partition) {
   const auto count = static_cast<int>(place.size());
   for (const int stride : {1, 7, 125}) {  // None divides 288.
     if (stride == 125 && count % 5 == 0) continue;
-    for (int i = 0; i < count; ++i) place[static_cast<std::size_t>(i)] = static_cast<int>((static_cast<std::int64_t>(i) * stride) % count);
+    for (int i = 0; i < count; ++i) place[i] = static_cast<int>((static_cast<std::int64_t>(i) * stride) % count);
     const test::System system = test::make_system(test::reorder(network, place));
     const Modes modes = solve_modes(system.problem, options);
     ASSERT_EQ(modes.lambda.size(), reference.lambda.size());

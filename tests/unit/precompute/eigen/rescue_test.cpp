@@ -60,8 +60,7 @@ Network make_bunches(int count, double tuned, double spacing) {
     for (int i = 0; i < hub + kHub; ++i)
       if (i < first || i >= first + kBunch) alone.fixed.push_back(i);
     const double lowest = test::calc_all_eigenvalues(alone).front();
-    for (int i = first; i < first + kBunch; ++i)
-      network.mass_kg[static_cast<std::size_t>(i)] = lowest / (tuned * (1 + (j - count / 2) * spacing));
+    for (int i = first; i < first + kBunch; ++i) network.mass_kg[i] = lowest / (tuned * (1 + (j - count / 2) * spacing));
   }
   tie(network, hub, hub + kHub, hub, hub + kHub, 1e2);
   return network;
@@ -126,7 +125,7 @@ class MemoryCheckpoint {
     };
     // The solve may save before it has read all: what it began with stays as it was.
     checkpoint_.read = [from = columns_](std::int64_t first, const Columns& into) {
-      for (int j = 0; j < into.count; ++j) std::ranges::copy(from.at(static_cast<std::size_t>(first + j)), into.column(j));
+      for (int j = 0; j < into.count; ++j) std::ranges::copy(from.at(first + j), into.column(j));
     };
     return checkpoint_;
   }

@@ -15,7 +15,7 @@ namespace {
 // Numbers of the free nodes, -1 where fixed.
 std::vector<int> number_free_nodes(const Network& network, int& count) {
   std::vector<int> number(network.nodes.size(), 0);
-  for (const int node : network.fixed) number[static_cast<std::size_t>(node)] = -1;
+  for (const int node : network.fixed) number[node] = -1;
   count = 0;
   for (int& n : number) {
     if (n == 0) n = count++;
@@ -27,8 +27,8 @@ std::vector<int> number_free_nodes(const Network& network, int& count) {
 template <typename Add>
 void visit_stiffness(const Network& network, Add&& add) {
   for (const Spring& spring : network.springs) {
-    const Vec3& a = network.nodes[static_cast<std::size_t>(spring.a)];
-    const Vec3& b = network.nodes[static_cast<std::size_t>(spring.b)];
+    const Vec3& a = network.nodes[spring.a];
+    const Vec3& b = network.nodes[spring.b];
     const Vec3 d{b[0] - a[0], b[1] - a[1], b[2] - a[2]};
     const double square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
     for (std::size_t i = 0; i < 3; ++i) {
@@ -60,8 +60,8 @@ System make_system(const Network& network, MPI_Comm comm) {
   System system;
   std::vector<int> neighbours(network.nodes.size(), 1);
   for (const Spring& spring : network.springs) {
-    ++neighbours[static_cast<std::size_t>(spring.a)];
-    ++neighbours[static_cast<std::size_t>(spring.b)];
+    ++neighbours[spring.a];
+    ++neighbours[spring.b];
   }
   const int width = 3 * *std::max_element(neighbours.begin(), neighbours.end());
   check(MatCreateAIJ(comm, 3 * (last - first), 3 * (last - first), PETSC_DETERMINE, PETSC_DETERMINE, width, nullptr, width, nullptr,
@@ -69,8 +69,8 @@ System make_system(const Network& network, MPI_Comm comm) {
   check(MatCreateAIJ(comm, 3 * (last - first), 3 * (last - first), PETSC_DETERMINE, PETSC_DETERMINE, 1, nullptr, 0, nullptr,
                      system.mass.out()));
   visit_stiffness(network, [&](int a, std::size_t i, int b, std::size_t j, double value) {
-    const int row = number[static_cast<std::size_t>(a)];
-    const int column = number[static_cast<std::size_t>(b)];
+    const int row = number[a];
+    const int column = number[b];
     if (row < first || row >= last || column < 0) return;
     check(MatSetValue(system.stiffness, 3 * row + static_cast<int>(i), 3 * column + static_cast<int>(j), value, ADD_VALUES));
   });
@@ -89,10 +89,10 @@ System make_system(const Network& network, MPI_Comm comm) {
   problem.stiffness = system.stiffness;
   problem.mass = system.mass;
   problem.nodes.component_count = 1 + *std::max_element(network.component.begin(), network.component.end());
-  problem.nodes.fixed.resize(static_cast<std::size_t>(problem.nodes.component_count));
+  problem.nodes.fixed.resize(problem.nodes.component_count);
   for (const int node : network.fixed) {
-    const auto n = static_cast<std::size_t>(node);
-    problem.nodes.fixed[static_cast<std::size_t>(network.component[n])].push_back(network.nodes[n]);
+    const std::size_t n = node;
+    problem.nodes.fixed[network.component[n]].push_back(network.nodes[n]);
   }
   return system;
 }
@@ -100,36 +100,36 @@ System make_system(const Network& network, MPI_Comm comm) {
 Network reorder(const Network& network, const std::vector<int>& place) {
   Network other = network;
   for (std::size_t i = 0; i < place.size(); ++i) {
-    const auto to = static_cast<std::size_t>(place[i]);
+    const std::size_t to = place[i];
     other.nodes[to] = network.nodes[i];
     other.mass_kg[to] = network.mass_kg[i];
     other.component[to] = network.component[i];
   }
   for (Spring& spring : other.springs) {
-    spring.a = place[static_cast<std::size_t>(spring.a)];
-    spring.b = place[static_cast<std::size_t>(spring.b)];
+    spring.a = place[spring.a];
+    spring.b = place[spring.b];
   }
-  for (int& node : other.fixed) node = place[static_cast<std::size_t>(node)];
+  for (int& node : other.fixed) node = place[node];
   return other;
 }
 
 std::vector<double> calc_all_eigenvalues(const Network& network) {
   int count = 0;
   const std::vector<int> number = number_free_nodes(network, count);
-  const auto n = static_cast<std::size_t>(3 * count);
+  const std::size_t n = 3 * count;
   std::vector<double> dense(n * n, 0.0);
   visit_stiffness(network, [&](int a, std::size_t i, int b, std::size_t j, double value) {
-    const int row = number[static_cast<std::size_t>(a)];
-    const int column = number[static_cast<std::size_t>(b)];
+    const int row = number[a];
+    const int column = number[b];
     if (row < 0 || column < 0) return;
-    const double mass = std::sqrt(network.mass_kg[static_cast<std::size_t>(a)] * network.mass_kg[static_cast<std::size_t>(b)]);
-    dense[(3 * static_cast<std::size_t>(column) + j) * n + 3 * static_cast<std::size_t>(row) + i] += value / mass;
+    const double mass = std::sqrt(network.mass_kg[a] * network.mass_kg[b]);
+    dense[(3 * column + j) * n + 3 * row + i] += value / mass;
   });
   std::vector<double> values(n);
   auto size = static_cast<PetscBLASInt>(n);
   PetscBLASInt info = 0;
   PetscBLASInt work_size = 64 * size;
-  std::vector<double> work(static_cast<std::size_t>(work_size));
+  std::vector<double> work(work_size);
   LAPACKsyev_("N", "L", &size, dense.data(), &size, values.data(), work.data(), &work_size, &info);
   return info == 0 ? values : std::vector<double>{};
 }

@@ -109,7 +109,7 @@ TEST(LowPass, BothStagesHaveOneFlatResponse) {
     double sum = is_velocity ? 0.0 : weights.even[0];
     for (int j = 1; j <= kMotionHalf; ++j) {
       const double turn = 0.5 * kTwoPi * rate * j;
-      const auto at = static_cast<std::size_t>(j);
+      const std::size_t at = j;
       sum += is_velocity ? 2.0 * weights.odd[at] * std::sin(turn) / (kTwoPi * rate) : 2.0 * weights.even[at] * std::cos(turn);
     }
     return entry / whole * sum;
@@ -129,7 +129,7 @@ TEST(Derivative, IsThatOfATone) {
   for (int i = 1; i <= 420; ++i) {
     const double omega = kTwoPi * 1e-3 * i;
     double derivative = 0.0;
-    for (int j = 1; j <= kDerivativeHalf; ++j) derivative += 2.0 * weights[static_cast<std::size_t>(j)] * std::sin(j * omega);
+    for (int j = 1; j <= kDerivativeHalf; ++j) derivative += 2.0 * weights[j] * std::sin(j * omega);
     EXPECT_NEAR(derivative / omega, 1.0, 5e-4) << i;
   }
 }

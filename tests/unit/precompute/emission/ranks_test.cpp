@@ -33,8 +33,8 @@ SurfacePart deal(const SurfacePart& whole) {
       const std::int32_t node = whole.triangles[t][c];
       const auto [found, is_new] = place.try_emplace(node, static_cast<std::int32_t>(part.nodes_m.size()));
       if (is_new) {
-        part.nodes_m.push_back(whole.nodes_m[static_cast<std::size_t>(node)]);
-        part.node_number.push_back(whole.node_number[static_cast<std::size_t>(node)]);
+        part.nodes_m.push_back(whole.nodes_m[node]);
+        part.node_number.push_back(whole.node_number[node]);
       }
       corner[c] = found->second;
     }

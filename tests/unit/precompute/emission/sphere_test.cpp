@@ -19,7 +19,7 @@ constexpr double kFreq = 5000.0;
 
 double calc_legendre(int l, double x) {
   const std::array<double, 4> value{1.0, x, 0.5 * (3.0 * x * x - 1.0), 0.5 * (5.0 * x * x * x - 3.0 * x)};
-  return value[static_cast<std::size_t>(l)];
+  return value[l];
 }
 
 /// Spherical Hankel function of the first kind, order l = 0 to 4, by its recurrence.

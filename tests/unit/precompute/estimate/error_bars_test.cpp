@@ -267,7 +267,7 @@ TEST(Materials, are_smoothed_each_by_itself) {
   std::vector<std::int32_t> material_of_tet;
   for (std::int32_t e = 0; e < local.tet_count(); ++e) {
     double x = 0;
-    for (int i = 0; i < 4; ++i) x += local.nodes_m[local.tets[10 * static_cast<std::size_t>(e) + i]][0] / 4;
+    for (int i = 0; i < 4; ++i) x += local.nodes_m[local.tets[10 * e + i]][0] / 4;
     material_of_tet.push_back(x < 0 ? 0 : 1);
   }
   // A stretch that is linear in each half, and exact there: not a mode, but the estimate may not see any error in it.

@@ -52,7 +52,7 @@ std::vector<double> make_columns(const partition::LocalMesh& mesh, int first, in
   std::vector<double> values;
   for (int j = first; j < first + count; ++j)
     for (std::int32_t i = 0; i < mesh.free_nodes; ++i)
-      for (int d = 0; d < 3; ++d) values.push_back(find_value(mesh.node_in_mesh[static_cast<std::size_t>(i)], d, j));
+      for (int d = 0; d < 3; ++d) values.push_back(find_value(mesh.node_in_mesh[i], d, j));
   return values;
 }
 
@@ -119,7 +119,7 @@ void expect_columns(CheckpointFile& file, const partition::LocalMesh& mesh) {
   ASSERT_EQ(file.get().numbers, "the numbers");
   ASSERT_EQ(file.get().column_count, kColumns);
   for (const auto& [first, count] : {std::pair{0, kColumns}, {15, 2}, {16, 3}}) {
-    std::vector<double> values(static_cast<std::size_t>(3 * mesh.free_nodes * count));
+    std::vector<double> values(3 * mesh.free_nodes * count);
     file.get().read(first, view(values, mesh, count));
     EXPECT_EQ(values, make_columns(mesh, first, count));
   }
@@ -217,7 +217,7 @@ TEST(NodeOrder, records_are_in_the_order_of_the_mesh_on_any_number_of_ranks) {
     const std::int64_t place = order.first() + i;
     const auto node = static_cast<std::int32_t>(place < kFixed ? place : place + 1);
     for (int d = 0; d < 3; ++d)
-      for (int j = 0; j < 2; ++j) EXPECT_EQ(room.records[static_cast<std::size_t>(6 * i + 2 * d + j)], find_value(node, d, j));
+      for (int j = 0; j < 2; ++j) EXPECT_EQ(room.records[6 * i + 2 * d + j], find_value(node, d, j));
   }
   std::vector<double> back(values.size());
   order.from_records(room, view(back, mesh, 2));

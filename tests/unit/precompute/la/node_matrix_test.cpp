@@ -54,10 +54,9 @@ TEST(NodeMatrix, multiplies_as_petsc_does) {
     PetscInt first = 0, last = 0;
     check(MatGetOwnershipRange(matrix, &first, &last));
     const auto rows = static_cast<std::ptrdiff_t>(last - first);
-    std::vector<double> in(static_cast<std::size_t>(rows * kColumns)), out(in.size());
+    std::vector<double> in(rows * kColumns), out(in.size());
     for (int j = 0; j < kColumns; ++j) {
-      for (std::ptrdiff_t i = 0; i < rows; ++i)
-        in[static_cast<std::size_t>(j * rows + i)] = std::sin(0.3 * static_cast<double>(first + i) + 1.1 * j);
+      for (std::ptrdiff_t i = 0; i < rows; ++i) in[j * rows + i] = std::sin(0.3 * static_cast<double>(first + i) + 1.1 * j);
     }
     blocks.multiply({in.data(), rows, rows, kColumns}, {out.data(), rows, rows, kColumns});
     for (int j = 0; j < kColumns; ++j) {
@@ -68,7 +67,7 @@ TEST(NodeMatrix, multiplies_as_petsc_does) {
       check(MatMult(matrix, x, y));
       const PetscScalar* result = nullptr;
       check(VecGetArrayRead(y, &result));
-      for (std::ptrdiff_t i = 0; i < rows; ++i) EXPECT_NEAR(out[static_cast<std::size_t>(j * rows + i)], 2 * result[i], 1e-12);
+      for (std::ptrdiff_t i = 0; i < rows; ++i) EXPECT_NEAR(out[j * rows + i], 2 * result[i], 1e-12);
       check(VecRestoreArrayRead(y, &result));
     }
   }

@@ -61,11 +61,11 @@ TEST_F(Buffers, joins_pieces_that_are_given_back_in_any_order) {
   for (const auto& order : {std::array{0, 1, 2}, {2, 1, 0}, {0, 2, 1}, {1, 0, 2}}) {
     std::array<Buffer, 3> pieces;
     for (int k = 0; k < 3; ++k) {
-      pieces[static_cast<std::size_t>(k)] = Buffer(kMillion);
-      ASSERT_EQ(pieces[static_cast<std::size_t>(k)].data(), begin + k * kMillion);
-      pieces[static_cast<std::size_t>(k)].data()[7] = k + 1;
+      pieces[k] = Buffer(kMillion);
+      ASSERT_EQ(pieces[k].data(), begin + k * kMillion);
+      pieces[k].data()[7] = k + 1;
     }
-    for (const int k : order) pieces[static_cast<std::size_t>(k)] = Buffer();
+    for (const int k : order) pieces[k] = Buffer();
     const Buffer whole(3 * kMillion);
     EXPECT_EQ(whole.data(), begin);
     for (int k = 0; k < 3; ++k) EXPECT_EQ(whole.data()[k * kMillion + 7], k + 1) << "fresh pages";

@@ -282,7 +282,7 @@ TEST(factor, gives_the_same_bits_twice_and_in_place) {
   for (int repeat = 0; repeat < 2; ++repeat) {
     Factor factor({pencil.k, pencil.m});
     ASSERT_TRUE(factor.factorise(2.5));
-    std::vector<double> b(static_cast<std::size_t>(pencil.rows) * 4);
+    std::vector<double> b(pencil.rows * 4);
     for (std::size_t i = 0; i < b.size(); ++i) b[i] = std::sin(static_cast<double>(i));
     const std::vector<double> given = b;
     if (repeat == 0) {
@@ -520,7 +520,7 @@ TEST(Factor, keeps_the_memory_of_a_factorisation_for_the_next_and_gives_it_back_
   double kept = 0;
   {
     Factor factor(pencil);
-    std::vector<double> x(static_cast<std::size_t>(lattice.rows) + 1, 1.0);
+    std::vector<double> x(lattice.rows + 1, 1.0);
     const auto solve = [&] { factor.solve(x.data(), x.data(), std::max<int>(lattice.rows, 1), 1); };
     ASSERT_TRUE(factor.factorise(-1.0));
     solve();

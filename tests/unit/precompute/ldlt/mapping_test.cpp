@@ -97,10 +97,9 @@ TEST(Mapping, what_two_ranks_send_to_a_root_that_they_share_is_half_of_each_upda
 
 /// Operations of the fronts that each rank has alone.
 std::vector<double> list_own(const std::vector<FrontCost>& fronts, const Mapping& mapping) {
-  std::vector<double> own(static_cast<std::size_t>(mapping.ranks()), 0.0);
+  std::vector<double> own(mapping.ranks(), 0.0);
   for (std::size_t s = 0; s < fronts.size(); ++s)
-    if (mapping.owner(static_cast<std::int32_t>(s)) >= 0)
-      own[static_cast<std::size_t>(mapping.owner(static_cast<std::int32_t>(s)))] += fronts[s].operations;
+    if (mapping.owner(static_cast<std::int32_t>(s)) >= 0) own[mapping.owner(static_cast<std::int32_t>(s))] += fronts[s].operations;
   return own;
 }
 
@@ -152,10 +151,10 @@ TEST(Mapping, ranks_of_a_front_are_among_those_of_the_front_above) {
     const Mapping mapping = choose_mapping(forest, ranks);
     for (std::size_t s = 0; s < forest.size(); ++s) {
       if (forest[s].parent < 0) continue;
-      std::vector<bool> is_above(static_cast<std::size_t>(ranks), false);
-      for (const FrontShare& share : mapping.list_shares(forest[s].parent)) is_above[static_cast<std::size_t>(share.rank)] = true;
+      std::vector<bool> is_above(ranks, false);
+      for (const FrontShare& share : mapping.list_shares(forest[s].parent)) is_above[share.rank] = true;
       for (const FrontShare& share : mapping.list_shares(static_cast<std::int32_t>(s)))
-        EXPECT_TRUE(is_above[static_cast<std::size_t>(share.rank)]) << "front " << s << " on " << ranks << " ranks";
+        EXPECT_TRUE(is_above[share.rank]) << "front " << s << " on " << ranks << " ranks";
     }
   }
 }

@@ -33,25 +33,23 @@ class OrderedLattice {
         owners_(IndexPartition::make_even(comm_, nodes_)),
         order_(comm_, list_own_springs(), 2, owners_) {
     const Ints part = order_.find_ranks(comm_, list_own_springs(), 2).rank;
-    Ints ranks(static_cast<std::size_t>(nodes_), -1);  // a node goes to the highest rank that touches it
+    Ints ranks(nodes_, -1);  // a node goes to the highest rank that touches it
     const Ints springs = comm_.all_gather(list_own_springs());
     const Ints parts = comm_.all_gather(part);
     for (std::size_t k = 0; k < springs.size(); ++k) {
-      std::int32_t& rank = ranks[static_cast<std::size_t>(springs[k])];
+      std::int32_t& rank = ranks[springs[k]];
       rank = std::max(rank, parts[k / 2]);
     }
     Ints nodes(ranks.size());
     std::iota(nodes.begin(), nodes.end(), 0);
-    std::stable_sort(nodes.begin(), nodes.end(), [&](std::int32_t a, std::int32_t b) {
-      return ranks[static_cast<std::size_t>(a)] < ranks[static_cast<std::size_t>(b)];
-    });
+    std::stable_sort(nodes.begin(), nodes.end(), [&](std::int32_t a, std::int32_t b) { return ranks[a] < ranks[b]; });
     Eigen::PermutationMatrix<Eigen::Dynamic> permutation(3 * nodes_);
     Ints row(ranks.size());
-    std::vector<int> counts(static_cast<std::size_t>(comm_.size()), 0);
+    std::vector<int> counts(comm_.size(), 0);
     for (std::int32_t k = 0; k < nodes_; ++k) {
-      const std::int32_t node = nodes[static_cast<std::size_t>(k)];
-      row[static_cast<std::size_t>(node)] = k;
-      ++counts[static_cast<std::size_t>(ranks[static_cast<std::size_t>(node)])];
+      const std::int32_t node = nodes[k];
+      row[node] = k;
+      ++counts[ranks[node]];
       for (int d = 0; d < 3; ++d) permutation.indices()[3 * node + d] = 3 * k + d;
     }
     pencil_.dense_k = permutation * pencil_.dense_k * permutation.transpose();
@@ -107,7 +105,7 @@ TEST(MeshOrder, panels_and_the_columns_that_they_are_made_of_fill_the_memory_tha
     std::int64_t column = numbers.shared_columns[f];
     EXPECT_EQ(column, at + kColumnsBegin);
     for (int k = 0; k < front.map.pivot_tiles(); ++k) {
-      const SharedPanel& panel = numbers.shared[f][static_cast<std::size_t>(k)];
+      const SharedPanel& panel = numbers.shared[f][k];
       EXPECT_EQ(panel.tiles >= 0, front.map.has_column(front.place, k));
       if (panel.tiles < 0) continue;
       const std::int64_t n = 3 * std::int64_t{front.map.nodes(k)};
@@ -116,8 +114,8 @@ TEST(MeshOrder, panels_and_the_columns_that_they_are_made_of_fill_the_memory_tha
         EXPECT_LE(at += count_triangle(n), column) << "written before its columns have been read";
       }
       EXPECT_EQ(panel.tiles, at);
-      at += 3 * n * (front.own_nodes() - front.row_begin[static_cast<std::size_t>(k) + 1]);
-      column += 3 * n * (front.own_nodes() - front.row_begin[static_cast<std::size_t>(k)]);
+      at += 3 * n * (front.own_nodes() - front.row_begin[k + 1]);
+      column += 3 * n * (front.own_nodes() - front.row_begin[k]);
       EXPECT_LE(at, column) << "panel " << k << " lies where the next columns are in work";
     }
     at = column;
@@ -141,8 +139,7 @@ TEST(MeshOrder, solves_and_counts_as_dense_matrices_do) {
     std::vector<double> x(b.data() + pencil.first_row, b.data() + pencil.first_row + pencil.rows);
     factor.solve(x.data(), x.data(), std::max<int>(pencil.rows, 1), 1);
     const Eigen::VectorXd expected = (pencil.dense_k - sigma * pencil.dense_m).partialPivLu().solve(b);
-    for (PetscInt i = 0; i < pencil.rows; ++i)
-      EXPECT_NEAR(x[static_cast<std::size_t>(i)], expected[pencil.first_row + i], 1e-9 * expected.cwiseAbs().maxCoeff());
+    for (PetscInt i = 0; i < pencil.rows; ++i) EXPECT_NEAR(x[i], expected[pencil.first_row + i], 1e-9 * expected.cwiseAbs().maxCoeff());
   }
 }
 

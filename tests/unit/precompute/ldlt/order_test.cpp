@@ -55,13 +55,12 @@ class Case {
     std::set<std::int32_t> ghosts;
     const auto is_own = [&](std::int32_t u) { return u >= nodes.first_node && u < nodes.first_node + nodes.own_nodes; };
     for (std::int32_t v = 0; v < nodes.own_nodes; ++v)
-      for (const std::int32_t u : graph[static_cast<std::size_t>(nodes.first_node + v)])
+      for (const std::int32_t u : graph[nodes.first_node + v])
         if (!is_own(u)) ghosts.insert(u);
     nodes.ghosts.assign(ghosts.begin(), ghosts.end());
     for (std::int32_t v = 0; v < nodes.own_nodes; ++v) {
       Ints near;
-      for (const std::int32_t u : graph[static_cast<std::size_t>(nodes.first_node + v)])
-        near.push_back(is_own(u) ? u - nodes.first_node : nodes.find_ghost(u));
+      for (const std::int32_t u : graph[nodes.first_node + v]) near.push_back(is_own(u) ? u - nodes.first_node : nodes.find_ghost(u));
       std::sort(near.begin(), near.end());
       nodes.links.items.insert(nodes.links.items.end(), near.begin(), near.end());
       nodes.links.close();
@@ -84,7 +83,7 @@ class Case {
     for (std::size_t v = 0; v < sorted.size(); ++v) ASSERT_EQ(sorted[v], static_cast<std::int32_t>(v)) << "positions are no permutation";
     ASSERT_EQ(nodes_of_fronts_.size(), graph_.size()) << "each node is a pivot of one front";
     for (std::size_t k = 0; k < nodes_of_fronts_.size(); ++k)
-      EXPECT_EQ(position_[static_cast<std::size_t>(nodes_of_fronts_[k])], places_of_nodes_[k]) << "holder and owner disagree";
+      EXPECT_EQ(position_[nodes_of_fronts_[k]], places_of_nodes_[k]) << "holder and owner disagree";
   }
 
   /// Eliminates node by node, with sets.
@@ -92,28 +91,27 @@ class Case {
     std::vector<std::set<std::int32_t>> behind(graph_.size());
     for (std::size_t v = 0; v < graph_.size(); ++v)
       for (const std::int32_t u : graph_[v])
-        if (position_[static_cast<std::size_t>(u)] > position_[v])
-          behind[static_cast<std::size_t>(position_[v])].insert(position_[static_cast<std::size_t>(u)]);
+        if (position_[u] > position_[v]) behind[position_[v]].insert(position_[u]);
     for (std::set<std::int32_t>& column : behind) {
       if (column.empty()) continue;
-      std::set<std::int32_t>& next = behind[static_cast<std::size_t>(*column.begin())];
+      std::set<std::int32_t>& next = behind[*column.begin()];
       next.insert(std::next(column.begin()), column.end());
     }
     for (std::size_t f = 0; f < fronts_.size(); ++f) {
       const Known& front = fronts_[f];
       ASSERT_TRUE(std::is_sorted(front.rows.begin(), front.rows.end()));
       for (std::int32_t p = front.first; p < front.first + front.width; ++p)
-        for (const std::int32_t row : behind[static_cast<std::size_t>(p)])
+        for (const std::int32_t row : behind[p])
           ASSERT_TRUE(row < front.first + front.width || std::binary_search(front.rows.begin(), front.rows.end(), row))
               << "row " << row << " of pivot " << p << " is missing";
-      const std::set<std::int32_t>& last = behind[static_cast<std::size_t>(front.first + front.width - 1)];
+      const std::set<std::int32_t>& last = behind[front.first + front.width - 1];
       EXPECT_EQ(front.rows, Ints(last.begin(), last.end())) << "rows of a front are those of its last pivot";
       if (front.rows.empty()) {
         EXPECT_EQ(front.parent, -1);
         continue;
       }
       ASSERT_GT(front.parent, static_cast<std::int32_t>(f)) << "children stand before their parents";
-      const Known& parent = fronts_[static_cast<std::size_t>(front.parent)];
+      const Known& parent = fronts_[front.parent];
       EXPECT_GE(front.rows.front(), parent.first);
       EXPECT_LT(front.rows.front(), parent.first + parent.width);
       for (const std::int32_t row : front.rows)
@@ -135,21 +133,21 @@ class Case {
     for (const HeldPart& held : all.parts)
       for (std::size_t s = 0; s < held.forest.supernodes.size(); ++s) {
         const Supernode& node = held.forest.supernodes[s];
-        packed.insert(packed.end(), {all.tree.parts[static_cast<std::size_t>(held.part)].first_front + static_cast<std::int32_t>(s),
-                                     node.first, node.width, held.parents[s], static_cast<std::int32_t>(node.rows.size())});
+        packed.insert(packed.end(), {all.tree.parts[held.part].first_front + static_cast<std::int32_t>(s), node.first, node.width,
+                                     held.parents[s], static_cast<std::int32_t>(node.rows.size())});
         packed.insert(packed.end(), node.rows.begin(), node.rows.end());
         for (std::int32_t k = 0; k < node.width; ++k) {
-          const TreePart& part = all.tree.parts[static_cast<std::size_t>(held.part)];
-          nodes_of_fronts_.push_back(held.nodes[static_cast<std::size_t>(node.first - part.first + k)]);
+          const TreePart& part = all.tree.parts[held.part];
+          nodes_of_fronts_.push_back(held.nodes[node.first - part.first + k]);
           places_of_nodes_.push_back(node.first + k);
         }
       }
     nodes_of_fronts_ = comm_.all_gather(nodes_of_fronts_);
     places_of_nodes_ = comm_.all_gather(places_of_nodes_);
     packed = comm_.all_gather(packed);
-    fronts_.resize(static_cast<std::size_t>(all.tree.fronts));
+    fronts_.resize(all.tree.fronts);
     for (std::size_t at = 0; at < packed.size();) {
-      Known& front = fronts_[static_cast<std::size_t>(packed[at])];
+      Known& front = fronts_[packed[at]];
       front.first = packed[at + 1];
       front.width = packed[at + 2];
       front.parent = packed[at + 3];

@@ -22,21 +22,21 @@ int draw(Random& random, int low, int high) { return std::uniform_int_distributi
 
 /// A forest in postorder; roots may have rows, which a shared front gets.
 std::vector<Front> make_forest(Random& random, int count) {
-  std::vector<Front> fronts(static_cast<std::size_t>(count));
+  std::vector<Front> fronts(count);
   std::vector<std::int32_t> open;  // roots of the subtrees so far
   for (std::int32_t s = 0; s < count; ++s) {
-    Front& front = fronts[static_cast<std::size_t>(s)];
+    Front& front = fronts[s];
     front.width = draw(random, 1, 60);
-    front.rows.assign(static_cast<std::size_t>(draw(random, 0, 90)), 0);
+    front.rows.assign(draw(random, 0, 90), 0);
     for (int below = draw(random, 0, 3); below > 0 && !open.empty(); --below) {
-      fronts[static_cast<std::size_t>(open.back())].parent = s;
+      fronts[open.back()].parent = s;
       front.children.insert(front.children.begin(), open.back());
       open.pop_back();
     }
     open.push_back(s);
   }
   for (std::size_t s = fronts.size(); s-- > 0;)
-    if (fronts[s].parent >= 0) fronts[s].depth = fronts[static_cast<std::size_t>(fronts[s].parent)].depth + 1;
+    if (fronts[s].parent >= 0) fronts[s].depth = fronts[fronts[s].parent].depth + 1;
   return fronts;
 }
 
@@ -69,7 +69,7 @@ TEST(Room, has_a_place_of_its_own_for_all_that_lives_at_a_time) {
       ASSERT_LE(live.back().end, room.numbers);
       least_gap = std::min(least_gap, std::min(top[0], top[1]) - live[0].end);
       panels += count_stored(front.width, front.size());
-      for (const std::int32_t child : front.children) updates[static_cast<std::size_t>(child)] = {0, 0};
+      for (const std::int32_t child : front.children) updates[child] = {0, 0};
       if (front.parent < 0) updates[s] = {0, 0};  // sent to a shared front
     }
     EXPECT_EQ(panels, room.panels);
@@ -100,14 +100,13 @@ std::int64_t play(const std::vector<DealtFront>& dealt, const std::vector<Ints>&
   std::int64_t now = 0;
   std::int64_t most = 0;
   const auto eliminate = [&](auto&& self, std::int32_t d, bool is_root) -> void {
-    const DealtFront& front = dealt[static_cast<std::size_t>(d)];
-    for (const std::int32_t child : children[static_cast<std::size_t>(d)]) self(self, child, false);
+    const DealtFront& front = dealt[d];
+    for (const std::int32_t child : children[d]) self(self, child, false);
     const auto size = static_cast<std::int32_t>(front.nodes.size() + front.rows.size());
     const std::int64_t update = count_update_of(front.rows);
     most = std::max(most, now + count_front_room(front.width(), size) + update);
     now += count_stored(front.width(), size) + (is_root ? 0 : update);
-    for (const std::int32_t child : children[static_cast<std::size_t>(d)])
-      now -= count_update_of(dealt[static_cast<std::size_t>(child)].rows);
+    for (const std::int32_t child : children[d]) now -= count_update_of(dealt[child].rows);
   };
   for (const std::int32_t root : roots) eliminate(eliminate, root, true);
   return most;
@@ -123,8 +122,8 @@ TEST(Room, no_other_order_of_children_takes_less) {
     Ints roots;
     const auto add = [&](Ints below) {
       DealtFront& front = dealt.emplace_back();
-      front.nodes.assign(static_cast<std::size_t>(draw(random, 1, 80)), 0);
-      front.rows.assign(static_cast<std::size_t>(draw(random, 0, 120)), 0);
+      front.nodes.assign(draw(random, 1, 80), 0);
+      front.rows.assign(draw(random, 0, 120), 0);
       children.push_back(std::move(below));
       return static_cast<std::int32_t>(dealt.size()) - 1;
     };

@@ -113,7 +113,7 @@ TEST(TileMap, an_update_matrix_goes_to_the_parent_whole_and_each_number_once) {
             for (std::int32_t b = piece.b_begin; b < piece.b_end; ++b)
               for (std::int32_t a = std::max(piece.a_begin, piece.a_begin == piece.b_begin ? b : piece.a_begin); a < piece.a_end; ++a) {
                 EXPECT_TRUE(seen.emplace(a, b).second);
-                const auto row = child.node_of_row[static_cast<std::size_t>(a)], column = child.node_of_row[static_cast<std::size_t>(b)];
+                const auto row = child.node_of_row[a], column = child.node_of_row[b];
                 EXPECT_EQ(parent.owner(parent.find_tile(row), parent.find_tile(column)), to);
                 EXPECT_EQ(child.map.owner(child.map.find_tile(40 + a), child.map.find_tile(40 + b)), from);
               }
@@ -131,7 +131,7 @@ TEST(TileMap, every_part_of_a_sum_goes_to_one_place_of_the_parent) {
     for (int to = 0; to < 16; ++to)
       for_sums(child, from, parent, to, [&](std::int32_t a) {
         ++sent[a];
-        EXPECT_TRUE(parent.has_row(to, parent.find_tile(child.node_of_row[static_cast<std::size_t>(a)])));
+        EXPECT_TRUE(parent.has_row(to, parent.find_tile(child.node_of_row[a])));
       });
     for (std::int32_t a = 0; a < 130; ++a) EXPECT_EQ(sent[a], child.map.has_row(from, child.map.find_tile(40 + a)) ? 1 : 0);
   }

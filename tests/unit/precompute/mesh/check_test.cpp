@@ -48,7 +48,7 @@ TetMesh make_cube(int n) {
           if (p >= 3) std::swap(tet[1], tet[2]);  // the odd paths
           mesh.tets.insert(mesh.tets.end(), tet, tet + 4);
         }
-  mesh.regions.assign(static_cast<std::size_t>(mesh.tet_count()), 0);
+  mesh.regions.assign(mesh.tet_count(), 0);
   return mesh;
 }
 
@@ -98,7 +98,7 @@ TEST(check, elements_inside_out_are_turned_and_counted) {
   for (const int order : {1, 2}) {
     TetMesh mesh = make_cube(2);
     if (order == 2) mesh = to_quadratic(mesh);
-    const auto width = static_cast<std::size_t>(mesh.nodes_per_tet());
+    const std::size_t width = mesh.nodes_per_tet();
     for (const std::size_t e : {0U, 7U, 20U}) {
       // Mirrored by exchanging corners 0 and 3: edges 01 and 13, 02 and 23 change places.
       std::swap(mesh.tets[e * width], mesh.tets[e * width + 3]);
@@ -137,16 +137,16 @@ TEST(check, a_crack_is_welded_and_counted_and_node_sets_follow) {
     std::int64_t split = 0;
     for (std::int64_t e = mesh.tet_count() / 2; e < mesh.tet_count(); ++e)
       for (int k = 0; k < mesh.nodes_per_tet(); ++k) {
-        auto& node = mesh.tets[static_cast<std::size_t>(e * mesh.nodes_per_tet() + k)];
-        if (std::abs(mesh.nodes_m[static_cast<std::size_t>(node)][2] - 0.5) > 1e-9) continue;
-        if (twin[static_cast<std::size_t>(node)] < 0) {
-          twin[static_cast<std::size_t>(node)] = static_cast<std::int32_t>(mesh.nodes_m.size());
-          Vec3 x = mesh.nodes_m[static_cast<std::size_t>(node)];
+        auto& node = mesh.tets[e * mesh.nodes_per_tet() + k];
+        if (std::abs(mesh.nodes_m[node][2] - 0.5) > 1e-9) continue;
+        if (twin[node] < 0) {
+          twin[node] = static_cast<std::int32_t>(mesh.nodes_m.size());
+          Vec3 x = mesh.nodes_m[node];
           x[0] += 3e-16;
           mesh.nodes_m.push_back(x);
           ++split;
         }
-        node = twin[static_cast<std::size_t>(node)];
+        node = twin[node];
       }
     const auto last = static_cast<std::int32_t>(mesh.nodes_m.size()) - 1;
     mesh.node_sets = {{"of the upper half", {last}}};
@@ -157,7 +157,7 @@ TEST(check, a_crack_is_welded_and_counted_and_node_sets_follow) {
     EXPECT_EQ(mesh.nodes_m.size(), whole);
     EXPECT_EQ(report.boundary_faces, 6 * 4 * 2);
     ASSERT_EQ(mesh.node_sets.at("of the upper half").size(), 1U);
-    EXPECT_NEAR(mesh.nodes_m[static_cast<std::size_t>(mesh.node_sets.at("of the upper half")[0])][1], place[1], 1e-12);
+    EXPECT_NEAR(mesh.nodes_m[mesh.node_sets.at("of the upper half")[0]][1], place[1], 1e-12);
     ASSERT_FALSE(report.warnings.empty());
     EXPECT_NE(report.warnings[0].find("repeated nodes were joined"), std::string::npos);
   }
@@ -169,7 +169,7 @@ TEST(check, a_mesh_whose_elements_each_have_nodes_of_their_own_is_joined_into_on
     TetMesh mesh = whole;
     mesh.nodes_m.clear();
     for (auto& node : mesh.tets) {
-      mesh.nodes_m.push_back(whole.nodes_m[static_cast<std::size_t>(node)]);
+      mesh.nodes_m.push_back(whole.nodes_m[node]);
       node = static_cast<std::int32_t>(mesh.nodes_m.size()) - 1;
     }
     const CheckReport report = check_mesh(mesh);
@@ -277,7 +277,7 @@ TEST(check, bodies_that_share_only_an_edge_are_refused_with_its_nodes_and_elemen
 
 TEST(check, quadratic_elements_that_disagree_about_a_mid_node_are_refused) {
   TetMesh mesh = to_quadratic(make_two());
-  Vec3 x = mesh.nodes_m[static_cast<std::size_t>(mesh.tets[10 + 4])];
+  Vec3 x = mesh.nodes_m[mesh.tets[10 + 4]];
   x[0] += 0.1;
   mesh.tets[10 + 4] = static_cast<std::int32_t>(mesh.nodes_m.size());
   mesh.nodes_m.push_back(x);
@@ -286,14 +286,14 @@ TEST(check, quadratic_elements_that_disagree_about_a_mid_node_are_refused) {
 
 TEST(check, curved_elements_are_counted_and_folded_ones_straightened) {
   TetMesh mesh = to_quadratic(make_one());
-  mesh.nodes_m[static_cast<std::size_t>(mesh.tets[4])][1] -= 0.05;  // the middle of edge 01 bulges outwards
+  mesh.nodes_m[mesh.tets[4]][1] -= 0.05;  // the middle of edge 01 bulges outwards
   CheckReport report = check_mesh(mesh);
   EXPECT_EQ(report.curved, 1);
   EXPECT_EQ(report.straightened, 0);
   // A straight edge bulging by b over the faces z = 0 and y = 0: the volume gained is that of the quadratic map, by an independent
   // quadrature.
   EXPECT_GT(report.volume_m3, 1.0 / 6.0);
-  mesh.nodes_m[static_cast<std::size_t>(mesh.tets[4])] = {0.1, 0.9, 0.9};
+  mesh.nodes_m[mesh.tets[4]] = {0.1, 0.9, 0.9};
   report = check_mesh(mesh);
   EXPECT_EQ(report.straightened, 1);
   EXPECT_EQ(report.curved, 0);
@@ -327,9 +327,7 @@ TEST(boundary, triangles_point_outwards_and_enclose_the_volume) {
     double volume = 0.0;
     std::multiset<std::pair<int, int>> edges;
     for (const auto& t : surface.triangles) {
-      const auto at = [&](int k) {
-        return mesh.nodes_m[static_cast<std::size_t>(surface.nodes[static_cast<std::size_t>(t[static_cast<std::size_t>(k)])])];
-      };
+      const auto at = [&](int k) { return mesh.nodes_m[surface.nodes[t[k]]]; };
       const Vec3 a = at(0), b = at(1), c = at(2);
       volume += (a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])) / 6.0;
       for (std::size_t k = 0; k < 3; ++k) edges.insert({t[k], t[(k + 1) % 3]});

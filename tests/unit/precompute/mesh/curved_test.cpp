@@ -24,7 +24,7 @@ TetMesh make_tets(bool two) {
   return to_quadratic(mesh);
 }
 
-Vec3& get_middle_01(TetMesh& mesh) { return mesh.nodes_m[static_cast<std::size_t>(mesh.tets[4])]; }
+Vec3& get_middle_01(TetMesh& mesh) { return mesh.nodes_m[mesh.tets[4]]; }
 
 TEST(curved, a_mid_node_nearer_than_a_quarter_to_a_corner_folds_the_element_there) {
   // Along the edge x(s) = s (1 - s) 4 m + s (2 s - 1): dx/ds at s = 0 is 4 m - 1, negative for m < 1/4, though positive at all Gauss
@@ -61,7 +61,7 @@ TEST(curved, no_element_that_passes_has_a_point_where_it_is_folded_over) {
     Vec3 x{};
     for (int n = 0; n < 10; ++n) {
       const double shape = n < 4 ? l[n] * (2 * l[n] - 1) : 4 * l[kEdges[n - 4][0]] * l[kEdges[n - 4][1]];
-      for (int c = 0; c < 3; ++c) x[c] += shape * mesh.nodes_m[static_cast<std::size_t>(mesh.tets[n])][c];
+      for (int c = 0; c < 3; ++c) x[c] += shape * mesh.nodes_m[mesh.tets[n]][c];
     }
     return x;
   };
@@ -70,7 +70,7 @@ TEST(curved, no_element_that_passes_has_a_point_where_it_is_folded_over) {
     TetMesh mesh = make_tets(false);
     const double size = 0.35 * unit(random);
     for (int n = 4; n < 10; ++n)
-      for (double& x : mesh.nodes_m[static_cast<std::size_t>(mesh.tets[n])]) x += size * shift(random);
+      for (double& x : mesh.nodes_m[mesh.tets[n]]) x += size * shift(random);
     ++(is_folded(mesh, 0) ? refused : passed);
     if (is_folded(mesh, 0)) continue;
     for (int n = 0; n < 10; ++n) {  // the nodes, where curved elements fold first

@@ -31,8 +31,8 @@ void expect_mid_nodes_in_the_middle(const TetMesh& mesh) {
   ASSERT_EQ(mesh.order, 2);
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
     for (std::size_t m = 0; m < 6; ++m) {
-      const auto at = [&](std::size_t k) { return mesh.nodes_m.at(static_cast<std::size_t>(mesh.tet(e)[k])); };
-      const Vec3 a = at(static_cast<std::size_t>(kEdges[m][0])), b = at(static_cast<std::size_t>(kEdges[m][1])), x = at(4 + m);
+      const auto at = [&](std::size_t k) { return mesh.nodes_m.at(mesh.tet(e)[k]); };
+      const Vec3 a = at(kEdges[m][0]), b = at(kEdges[m][1]), x = at(4 + m);
       for (std::size_t k = 0; k < 3; ++k) ASSERT_NEAR(x[k], 0.5 * (a[k] + b[k]), 1e-12) << "element " << e << " edge " << m;
     }
 }
@@ -146,8 +146,8 @@ TEST(read, medit_triangles_make_sets_of_their_references) {
     for (std::size_t k = 0; k < 3; ++k) {
       double low = 1.0, high = -1.0;
       for (const auto i : set) {
-        low = std::min(low, mesh.nodes_m[static_cast<std::size_t>(i)][k]);
-        high = std::max(high, mesh.nodes_m[static_cast<std::size_t>(i)][k]);
+        low = std::min(low, mesh.nodes_m[i][k]);
+        high = std::max(high, mesh.nodes_m[i][k]);
       }
       flat = flat || high - low < 1e-12;
     }

@@ -55,7 +55,7 @@ std::vector<std::vector<Vec3>> place_tets(const TetMesh& mesh) {
 
 std::vector<Vec3> place_nodes(const TetMesh& mesh, const std::vector<std::int32_t>& nodes) {
   std::vector<Vec3> points;
-  for (const auto i : nodes) points.push_back(rounded(mesh.nodes_m.at(static_cast<std::size_t>(i))));
+  for (const auto i : nodes) points.push_back(rounded(mesh.nodes_m.at(i)));
   std::sort(points.begin(), points.end());
   return points;
 }
@@ -72,9 +72,9 @@ double calc_volume(const TetMesh& mesh) {
   double volume = 0.0;
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
     for (const auto& face : kFaces) {
-      const Vec3& a = mesh.nodes_m.at(static_cast<std::size_t>(mesh.tet(e)[static_cast<std::size_t>(face[0])]));
-      const Vec3& b = mesh.nodes_m.at(static_cast<std::size_t>(mesh.tet(e)[static_cast<std::size_t>(face[1])]));
-      const Vec3& c = mesh.nodes_m.at(static_cast<std::size_t>(mesh.tet(e)[static_cast<std::size_t>(face[2])]));
+      const Vec3& a = mesh.nodes_m.at(mesh.tet(e)[face[0]]);
+      const Vec3& b = mesh.nodes_m.at(mesh.tet(e)[face[1]]);
+      const Vec3& c = mesh.nodes_m.at(mesh.tet(e)[face[2]]);
       volume += (a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])) / 6.0;
     }
   return volume;

@@ -123,9 +123,9 @@ TEST(extrude, prisms_of_any_numbering_and_layers_agree_about_their_sides) {
     EXPECT_EQ(made.mesh.tet_count(), static_cast<std::int64_t>(3 * layers * skin.surface.triangles.size()));
     // 4 (2 layers + 1) nodes a point, less what the border lacks.
     const auto edges = skin.surface.points.size() + skin.surface.triangles.size() - 1;
-    EXPECT_EQ(made.mesh.nodes_m.size(), (2 * static_cast<std::size_t>(layers) + 1) * (skin.surface.points.size() + edges));
+    EXPECT_EQ(made.mesh.nodes_m.size(), (2 * layers + 1) * (skin.surface.points.size() + edges));
     EXPECT_NEAR(calc_volume_of(made.mesh) / made.expected_volume_m3, 1, 0.02);
-    EXPECT_EQ(made.mesh.node_sets.at("rim").size(), (2 * static_cast<std::size_t>(layers) + 1) * 2 * 24);
+    EXPECT_EQ(made.mesh.node_sets.at("rim").size(), (2 * layers + 1) * 2 * 24);
   }
 }
 

@@ -96,7 +96,7 @@ TEST(Round, the_cut_surface_encloses_the_same_volume_and_its_points_lie_on_the_b
   EXPECT_NEAR(calc_cut_volume(round) / round.calc_volume(), 1, 1e-6);
   const TriangleSurface cut = round.cut(3);
   for (std::int32_t t = 0; t < static_cast<std::int32_t>(cut.triangles.size()); ++t) {
-    const auto& [a, b, c] = cut.triangles[static_cast<std::size_t>(t)];
+    const auto& [a, b, c] = cut.triangles[t];
     const Vec3 p = 0.2 * cut.points[a] + (0.5 * cut.points[b] + 0.3 * cut.points[c]), q = round.find(t, p);
     if (std::abs(p[2]) < 1e-12 || std::abs(p[2] - 5) < 1e-12)
       EXPECT_NEAR(q[2], p[2], 1e-12);
@@ -209,7 +209,7 @@ TEST(Round, facets_that_may_be_either_are_named_and_both_readings_are_known) {
     const TriangleSurface cut = round.cut(1);
     double largest = 0;
     for (std::int32_t t = 0; t < static_cast<std::int32_t>(cut.triangles.size()); ++t) {
-      const auto& [a, b, c] = cut.triangles[static_cast<std::size_t>(t)];
+      const auto& [a, b, c] = cut.triangles[t];
       const Vec3 p = 0.5 * (cut.points[a] + cut.points[b]);
       if (std::abs(p[2]) < 1.5 - 1e-9) largest = std::max(largest, norm(round.find_doubt(t, p)));
     }

@@ -159,7 +159,7 @@ enum class Cut { kQuads, kDiagonal, kOtherDiagonal, kAlternating, kTurned };  //
 inline Polygons make_lathe(const std::vector<std::array<double, 2>>& profile, int n, Cut cut, bool is_closed = false) {
   Polygons s;
   const int m = static_cast<int>(profile.size());
-  std::vector<std::vector<int>> at(static_cast<std::size_t>(m));
+  std::vector<std::vector<int>> at(m);
   for (int i = 0; i < m; ++i)
     for (int j = 0; j < n; ++j) {
       const auto [r, z] = profile[i];

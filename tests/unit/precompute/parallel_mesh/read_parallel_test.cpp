@@ -53,7 +53,7 @@ class SharedFile {
 mesh::TetMesh make_shuffled_tube(int order) {
   mesh::TetMesh tube = tests::make_box({9, 5, 4}, {0.9, 0.5, 0.4}, order);
   std::mt19937 random(3);
-  const std::size_t width = static_cast<std::size_t>(tube.nodes_per_tet()), count = static_cast<std::size_t>(tube.tet_count());
+  const std::size_t width = static_cast<std::size_t>(tube.nodes_per_tet()), count = tube.tet_count();
   mesh::TetMesh mixed;
   mixed.order = order;
   for (int k = 0; k < 7; ++k) tube.nodes_m.push_back({9.0 + k, 9, 9});
@@ -61,13 +61,12 @@ mesh::TetMesh make_shuffled_tube(int order) {
   std::iota(place.begin(), place.end(), 0);
   std::shuffle(place.begin(), place.end(), random);
   mixed.nodes_m.resize(tube.nodes_m.size());
-  for (std::size_t i = 0; i < place.size(); ++i) mixed.nodes_m[static_cast<std::size_t>(place[i])] = tube.nodes_m[i];
+  for (std::size_t i = 0; i < place.size(); ++i) mixed.nodes_m[place[i]] = tube.nodes_m[i];
   std::iota(elements.begin(), elements.end(), 0);
   std::shuffle(elements.begin(), elements.end(), random);
   for (const auto e : elements) {
     std::vector<std::int32_t> tet;
-    for (std::size_t i = 0; i < width; ++i)
-      tet.push_back(place[static_cast<std::size_t>(tube.tets[static_cast<std::size_t>(e) * width + i])]);
+    for (std::size_t i = 0; i < width; ++i) tet.push_back(place[tube.tets[static_cast<std::size_t>(e) * width + i]]);
     if (e % 5 == 0) {
       std::swap(tet[1], tet[2]);
       if (order == 2) {
@@ -115,17 +114,14 @@ TEST_P(Orders, give_every_rank_a_piece_of_the_very_mesh_that_the_serial_path_mak
   EXPECT_NEAR(read.check.volume_m3, truth.check.volume_m3, 1e-12);
   EXPECT_NEAR(read.check.min_dihedral_deg, truth.check.min_dihedral_deg, 1e-9);
   EXPECT_NEAR(read.check.mean_ratio_mean, truth.check.mean_ratio_mean, 1e-12);
-  const auto width = static_cast<std::size_t>(local.nodes_per_tet());
+  const std::size_t width = local.nodes_per_tet();
   ASSERT_EQ(local.order, order);
   for (std::int32_t e = 0; e < local.tet_count(); ++e) {
-    const auto tet = truth.mesh.tet(local.tet_in_mesh[static_cast<std::size_t>(e)]);
-    for (std::size_t i = 0; i < width; ++i)
-      EXPECT_EQ(local.node_in_mesh[static_cast<std::size_t>(local.tets[static_cast<std::size_t>(e) * width + i])], tet[i]);
-    EXPECT_EQ(local.region[static_cast<std::size_t>(e)],
-              truth.mesh.regions[static_cast<std::size_t>(local.tet_in_mesh[static_cast<std::size_t>(e)])]);
+    const auto tet = truth.mesh.tet(local.tet_in_mesh[e]);
+    for (std::size_t i = 0; i < width; ++i) EXPECT_EQ(local.node_in_mesh[local.tets[static_cast<std::size_t>(e) * width + i]], tet[i]);
+    EXPECT_EQ(local.region[e], truth.mesh.regions[local.tet_in_mesh[e]]);
   }
-  for (std::size_t i = 0; i < local.nodes_m.size(); ++i)
-    EXPECT_EQ(local.nodes_m[i], truth.mesh.nodes_m[static_cast<std::size_t>(local.node_in_mesh[i])]);
+  for (std::size_t i = 0; i < local.nodes_m.size(); ++i) EXPECT_EQ(local.nodes_m[i], truth.mesh.nodes_m[local.node_in_mesh[i]]);
   std::int64_t sums[3] = {local.tet_count(), local.owned_nodes, local.free_nodes};
   MPI_Allreduce(MPI_IN_PLACE, sums, 3, MPI_INT64_T, MPI_SUM, kWorld);
   EXPECT_EQ(sums[0], read.mesh.tets);
@@ -141,14 +137,14 @@ TEST_P(Orders, number_each_free_node_once_and_alike_on_all_ranks) {
   const ParallelMesh read = read_parallel(kWorld, file.path(), {.order = order});
   const partition::LocalMesh& local = read.mesh.local;
   // Every rank writes the rows it believes in; largest and smallest belief must agree, and owned rows follow each other.
-  std::vector<std::int32_t> low(static_cast<std::size_t>(read.mesh.nodes), INT32_MAX), high(low.size(), -1), owners(low.size(), 0);
+  std::vector<std::int32_t> low(read.mesh.nodes, INT32_MAX), high(low.size(), -1), owners(low.size(), 0);
   for (std::size_t i = 0; i < local.row.size(); ++i) {
-    const auto node = static_cast<std::size_t>(local.node_in_mesh[i]);
+    const std::size_t node = local.node_in_mesh[i];
     low[node] = std::min(low[node], local.row[i]);
     high[node] = std::max(high[node], local.row[i]);
     owners[node] += static_cast<std::int32_t>(i) < local.owned_nodes;
   }
-  for (std::int32_t i = 0; i < local.free_nodes; ++i) EXPECT_EQ(local.row[static_cast<std::size_t>(i)], local.first_row + i);
+  for (std::int32_t i = 0; i < local.free_nodes; ++i) EXPECT_EQ(local.row[i], local.first_row + i);
   MPI_Allreduce(MPI_IN_PLACE, low.data(), static_cast<int>(low.size()), MPI_INT32_T, MPI_MIN, kWorld);
   MPI_Allreduce(MPI_IN_PLACE, high.data(), static_cast<int>(high.size()), MPI_INT32_T, MPI_MAX, kWorld);
   MPI_Allreduce(MPI_IN_PLACE, owners.data(), static_cast<int>(owners.size()), MPI_INT32_T, MPI_SUM, kWorld);
@@ -170,7 +166,7 @@ TEST_P(Orders, bring_the_boundary_of_the_serial_path_to_rank_0_vertex_by_vertex)
   EXPECT_EQ(read.boundary.triangles, truth.surface.triangles);
   ASSERT_EQ(read.boundary.vertices_m.size(), truth.surface.nodes.size());
   for (std::size_t v = 0; v < truth.surface.nodes.size(); ++v)
-    EXPECT_EQ(read.boundary.vertices_m[v], truth.mesh.nodes_m[static_cast<std::size_t>(truth.surface.nodes[v])]);
+    EXPECT_EQ(read.boundary.vertices_m[v], truth.mesh.nodes_m[truth.surface.nodes[v]]);
 }
 
 INSTANTIATE_TEST_SUITE_P(All, Orders, testing::Values(std::pair(1, 1), std::pair(1, 2), std::pair(2, 1), std::pair(2, 2)),
@@ -249,7 +245,7 @@ TEST(SinglePrecision, and_the_other_byte_order_are_read) {
   const SharedFile file(box, {.single_precision = true});
   const ParallelMesh read = read_parallel(kWorld, file.path(), {.order = 1});
   for (std::size_t i = 0; i < read.mesh.local.nodes_m.size(); ++i)
-    EXPECT_EQ(read.mesh.local.nodes_m[i], box.nodes_m[static_cast<std::size_t>(read.mesh.local.node_in_mesh[i])]);
+    EXPECT_EQ(read.mesh.local.nodes_m[i], box.nodes_m[read.mesh.local.node_in_mesh[i]]);
 }
 
 struct BadCase {

@@ -49,7 +49,7 @@ inline void write_vtkhdf(const std::filesystem::path& file, const mesh::TetMesh&
   H5Aclose(version);
   const auto nodes = mesh.nodes_m.size(), cells = static_cast<std::size_t>(mesh.tet_count()), ids = mesh.tets.size();
   const auto count = [&](const char* name, std::size_t value) {
-    const std::vector<std::int64_t> values(static_cast<std::size_t>(options.pieces), static_cast<std::int64_t>(value));
+    const std::vector<std::int64_t> values(options.pieces, static_cast<std::int64_t>(value));
     write_array(root, name, H5T_STD_I64LE, H5T_NATIVE_INT64, values.data(), {values.size()});
   };
   count("NumberOfPoints", nodes);

@@ -25,7 +25,7 @@ TEST(ReadDiagonal, gives_every_rank_its_own_rows) {
   check(MatAssemblyEnd(matrix, MAT_FINAL_ASSEMBLY));
   const std::vector<double> diagonal = read_diagonal(matrix);
   ASSERT_EQ(diagonal.size(), static_cast<std::size_t>(rank));
-  for (PetscInt row = first; row < last; ++row) EXPECT_EQ(diagonal[static_cast<std::size_t>(row - first)], 10.0 + row);
+  for (PetscInt row = first; row < last; ++row) EXPECT_EQ(diagonal[row - first], 10.0 + row);
 }
 
 }  // namespace

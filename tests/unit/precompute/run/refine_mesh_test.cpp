@@ -40,7 +40,7 @@ TEST(Refine, gives_the_nodes_that_a_lattice_twice_as_fine_has) {
     }
     for (const auto& [name, nodes] : fine.node_sets) {
       // Sets of faces: all nodes on them and no others.
-      const std::size_t axis = static_cast<std::size_t>(name[0] - 'x');
+      const std::size_t axis = name[0] - 'x';
       const double side = std::array{0.3, 0.02, 0.01}[axis] / 2 * (name.ends_with("min") ? -1 : 1);
       std::vector<std::int32_t> expected;
       for (std::size_t i = 0; i < fine.nodes_m.size(); ++i)

@@ -268,7 +268,7 @@ TEST(Shapes, boundary_nodes_of_quadratic_round_sections_lie_on_their_surfaces_an
       for (const int node : find_boundary_nodes(mesh)) {
         bool is_on_a_face = false;
         for (const auto& [name, distance] : body.faces) {
-          if (distance(mesh.nodes_m[static_cast<std::size_t>(node)]) > 1e-14) continue;
+          if (distance(mesh.nodes_m[node]) > 1e-14) continue;
           expected[name].push_back(node);
           is_on_a_face = true;
         }

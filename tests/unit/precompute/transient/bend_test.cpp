@@ -40,7 +40,7 @@ struct Clamped {
   }
   double find_tip(const std::vector<Quad>& u) const {
     double sum = 0.0;
-    for (const std::int32_t node : end) sum += u[static_cast<std::size_t>(node)].z / static_cast<double>(end.size());
+    for (const std::int32_t node : end) sum += u[node].z / static_cast<double>(end.size());
     return sum;
   }
 };
@@ -62,7 +62,7 @@ TEST(Bend, ABarUnderAForceAtItsEndYieldsAsABeam) {
   // Large displacement: the elastica (Bisshopp and Drucker 1945: 0.302 L, and 0.056 L back, under F L^2 / E I = 1).
   const std::vector<Quad> far = pull(kYoung * inertia / (kLength * kLength));
   double back = 0.0;
-  for (const std::int32_t node : bar.end) back -= far[static_cast<std::size_t>(node)].x / static_cast<double>(bar.end.size());
+  for (const std::int32_t node : bar.end) back -= far[node].x / static_cast<double>(bar.end.size());
   EXPECT_NEAR(bar.find_tip(far) / kLength, 0.3017, 0.004);
   EXPECT_NEAR(back / kLength, 0.0564, 0.002);
 }
@@ -71,7 +71,7 @@ TEST(Bend, WhatIsHeldIsWhereItIsHeldAndTheRestIsInBalance) {
   Clamped bar;
   for (const std::int32_t node : bar.end) bar.held.push_back({node, {0.0, 0.0, -0.02}});
   const std::vector<Quad> u = calc_equilibrium(bar.world.domain, bar.held, {});
-  std::vector<Quad> force(static_cast<std::size_t>(bar.world.domain.force_count()));
+  std::vector<Quad> force(bar.world.domain.force_count());
   bar.world.domain.set_elastic_forces(u.data(), force.data());
   double held = 0.0, free = 0.0;
   for (std::size_t n = 0; n < u.size(); ++n) {
@@ -80,7 +80,7 @@ TEST(Bend, WhatIsHeldIsWhereItIsHeldAndTheRestIsInBalance) {
     const double size = std::hypot(force[n].x, force[n].y, force[n].z);
     (is_held ? held : free) = std::max(is_held ? held : free, size);
   }
-  for (const std::int32_t node : bar.end) EXPECT_EQ(u[static_cast<std::size_t>(node)].z, -0.02);
+  for (const std::int32_t node : bar.end) EXPECT_EQ(u[node].z, -0.02);
   EXPECT_LT(free, 1e-6 * held);
 }
 
@@ -99,7 +99,7 @@ TEST(Bend, AModeIsABeamsAndLetGoItSwingsAtItsFrequency) {
   // Two and a half periods: a cosine in time, with constant energy.
   Motion motion(bar.world.domain, {}, {{bar.clamp, {}, false}});
   motion.set_start([&](std::int32_t node, const Vec3&) {
-    const Quad& at = u[static_cast<std::size_t>(node)];
+    const Quad& at = u[node];
     return Motion::Start{{at.x, at.y, at.z}, {}};
   });
   motion.prepare();
@@ -139,25 +139,24 @@ TEST(Bend, ASheetYieldsAsABeam) {
   SheetBody sheet;
   sheet.mesh = make_rectangle(kLength, kWidth, 40);
   sheet.clamped.assign(sheet.mesh.vertices_m.size(), false);
-  for (const std::int32_t node : sheet.mesh.node_sets.at("x-min")) sheet.clamped[static_cast<std::size_t>(node)] = true;
+  for (const std::int32_t node : sheet.mesh.node_sets.at("x-min")) sheet.clamped[node] = true;
   sheet.law = {0.0, 0.5 * kYoung, kDensity, kThin, 0.0};
   const SheetElements elements = make_elements(sheet.mesh, sheet.clamped);
   const auto assembly = std::make_shared<const Assembly>(make_assembly(comm::Communicator(MPI_COMM_SELF), std::vector<AnyBody>{sheet}));
   Domain domain(MPI_COMM_SELF, assembly);
   std::vector<HeldNode> held;
   for (std::int32_t v = 0; v < elements.vertices; ++v)
-    if (sheet.clamped[static_cast<std::size_t>(v)]) held.push_back({v, {}});
+    if (sheet.clamped[v]) held.push_back({v, {}});
   for (std::int32_t e = 0; e < elements.edges; ++e) {
-    const auto& edge = elements.edge[static_cast<std::size_t>(e)];
-    if (sheet.clamped[static_cast<std::size_t>(edge[0])] && sheet.clamped[static_cast<std::size_t>(edge[1])])
-      held.push_back({elements.vertices + e, {}});
+    const auto& edge = elements.edge[e];
+    if (sheet.clamped[edge[0]] && sheet.clamped[edge[1]]) held.push_back({elements.vertices + e, {}});
   }
   std::vector<PulledNode> pulled;
   const std::vector<std::int32_t>& end = sheet.mesh.node_sets.at("x-max");
   for (const std::int32_t node : end) pulled.push_back({node, {0, 0, 1e-4 / static_cast<double>(end.size())}});
   const std::vector<Quad> u = calc_equilibrium(domain, held, pulled);
   double tip = 0.0;
-  for (const std::int32_t node : end) tip += u[static_cast<std::size_t>(node)].z / static_cast<double>(end.size());
+  for (const std::int32_t node : end) tip += u[node].z / static_cast<double>(end.size());
   EXPECT_NEAR(tip / (1e-4 * 4.0 * std::pow(kLength / kThin, 3) / (kYoung * kWidth)), 1.0, 0.02);
   const double beam = kFirst * kFirst * kThin / (kLength * kLength) * std::sqrt(kYoung / (12.0 * kDensity));
   EXPECT_NEAR(calc_mode(domain, held, 1).omega_rad_s / beam, 1.0, 0.02);

@@ -31,7 +31,7 @@ inline mesh::TetMesh make_box(const std::array<double, 3>& edges_m, const std::a
   if (bend_m == 0.0) return mesh;
   std::vector<char> is_mid(mesh.nodes_m.size(), 0);
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
-    for (std::size_t a = 4; a < 10; ++a) is_mid[static_cast<std::size_t>(mesh.tet(e)[a])] = 1;
+    for (std::size_t a = 4; a < 10; ++a) is_mid[mesh.tet(e)[a]] = 1;
   for (std::size_t n = 0; n < mesh.nodes_m.size(); ++n) {
     if (is_mid[n] == 0) continue;
     Vec3& x = mesh.nodes_m[n];
@@ -53,8 +53,7 @@ struct World {
 
   std::vector<std::int32_t> list_set(const std::string& set, std::size_t body = 0) const {
     std::vector<std::int32_t> nodes;
-    for (const std::int32_t node : bodies[body].mesh.node_sets.at(set))
-      nodes.push_back(assembly->bodies[body].node_of_mesh[static_cast<std::size_t>(node)]);
+    for (const std::int32_t node : bodies[body].mesh.node_sets.at(set)) nodes.push_back(assembly->bodies[body].node_of_mesh[node]);
     return nodes;
   }
   double calc_mass() const {
@@ -73,8 +72,7 @@ struct World {
 inline std::int32_t find_node(const Assembly& assembly, const Vec3& place_m) {
   std::int32_t nearest = 0;
   for (std::int32_t n = 0; n < assembly.node_count(); ++n)
-    if (norm(assembly.nodes_m[static_cast<std::size_t>(n)] - place_m) < norm(assembly.nodes_m[static_cast<std::size_t>(nearest)] - place_m))
-      nearest = n;
+    if (norm(assembly.nodes_m[n] - place_m) < norm(assembly.nodes_m[nearest] - place_m)) nearest = n;
   return nearest;
 }
 
@@ -83,7 +81,7 @@ inline Vec3 find_value(const Domain& domain, const std::vector<Quad>& values, st
   const std::int32_t place = domain.find_place(node);
   std::array<double, 3> value{};
   if (place >= 0 && place < domain.own_count()) {
-    const Quad& q = values[static_cast<std::size_t>(place)];
+    const Quad& q = values[place];
     value = {q.x, q.y, q.z};
   }
   domain.get_comm().sum(std::span<double>(value));

@@ -40,12 +40,12 @@ TEST(Assembly, keeps_every_element_of_every_body_in_the_order_of_its_nodes) {
     std::int32_t lowest = -1;
     for (std::int32_t e = body.first_element; e < body.last_element; ++e) {
       EXPECT_EQ(all.find_body(e), static_cast<std::int32_t>(b));
-      const std::int32_t of_mesh = all.element_of_mesh[static_cast<std::size_t>(e)];
+      const std::int32_t of_mesh = all.element_of_mesh[e];
       elements.insert(of_mesh);
       const auto here = all.find_nodes(e), there = mesh.tet(of_mesh);
       for (std::size_t a = 0; a < here.size(); ++a) {
-        EXPECT_EQ(here[a], body.node_of_mesh[static_cast<std::size_t>(there[a])]);
-        EXPECT_EQ(all.nodes_m[static_cast<std::size_t>(here[a])], mesh.nodes_m[static_cast<std::size_t>(there[a])]);
+        EXPECT_EQ(here[a], body.node_of_mesh[there[a]]);
+        EXPECT_EQ(all.nodes_m[here[a]], mesh.nodes_m[there[a]]);
         EXPECT_EQ(all.find_body_of_node(here[a]), static_cast<std::int32_t>(b));
       }
       const std::int32_t first = *std::min_element(here.begin(), here.end());
@@ -67,13 +67,13 @@ TEST(Assembly, skin_is_closed_and_shares_of_a_point_sum_up_to_one) {
   double volume = 0.0;
   for (const auto& facet : skin) {
     EXPECT_EQ(facet[3], -1);
-    const auto at = [&](std::size_t i) { return world.assembly->nodes_m[static_cast<std::size_t>(facet[i])]; };
+    const auto at = [&](std::size_t i) { return world.assembly->nodes_m[facet[i]]; };
     volume += dot(at(0), cross(at(1), at(2))) / 6.0;
   }
   EXPECT_NEAR(volume, 0.2 * 0.02 * 0.02, 1e-18);
   for (const auto& facet : list_skin(*world.assembly, 1))
     for (std::size_t i = 0; i < 3; ++i) {
-      const auto at = [&](std::size_t n) { return world.assembly->nodes_m[static_cast<std::size_t>(facet[n])]; };
+      const auto at = [&](std::size_t n) { return world.assembly->nodes_m[facet[n]]; };
       EXPECT_LT(norm(at(3 + i) - 0.5 * (at(i) + at((i + 1) % 3))), 1e-3);  // mid nodes between their corners, but for the bend
     }
   for (std::int32_t body : {0, 1}) {
@@ -82,7 +82,7 @@ TEST(Assembly, skin_is_closed_and_shares_of_a_point_sum_up_to_one) {
     Vec3 place{};
     for (const NodeShare& one : find_shares(*world.assembly, body, point, &distance)) {
       sum += one.share;
-      place = place + one.share * world.assembly->nodes_m[static_cast<std::size_t>(one.node)];
+      place = place + one.share * world.assembly->nodes_m[one.node];
       EXPECT_EQ(world.assembly->find_body_of_node(one.node), body);
     }
     EXPECT_NEAR(sum, 1.0, 1e-14);
@@ -95,32 +95,32 @@ TEST(Assembly, skin_is_closed_and_shares_of_a_point_sum_up_to_one) {
 
 TEST(Domain, every_node_has_one_owner_and_all_mass_is_there) {
   const World world(make_two_bodies());
-  std::vector<std::int32_t> owned(static_cast<std::size_t>(world.assembly->node_count()), 0);
-  for (std::int32_t i = 0; i < world.domain.own_count(); ++i) ++owned[static_cast<std::size_t>(world.domain.find_number(i))];
+  std::vector<std::int32_t> owned(world.assembly->node_count(), 0);
+  for (std::int32_t i = 0; i < world.domain.own_count(); ++i) ++owned[world.domain.find_number(i)];
   world.comm.sum(std::span<std::int32_t>(owned));
   for (const std::int32_t count : owned) EXPECT_EQ(count, 1);
   for (std::int32_t i = 0; i < world.domain.node_count(); ++i) EXPECT_EQ(world.domain.find_place(world.domain.find_number(i)), i);
   // The curved block's volume: of its facets, six nodes each, by the divergence theorem and the rule of the three mid points a facet's four
   // triangles would only approximate; a block whose inner and outer mid nodes moved by 0.4 mm keeps its volume to a few per cent.
   EXPECT_NEAR(world.calc_mass(), 2700 * 0.2 * 0.02 * 0.02 + 1100 * 0.05 * 0.04 * 0.03, 0.03 * 1100 * 0.05 * 0.04 * 0.03);
-  EXPECT_EQ(world.comm.sum(static_cast<std::int64_t>(
-                world.domain.calc_state(std::vector<Quad>(static_cast<std::size_t>(world.domain.node_count())).data()).element.size())),
+  EXPECT_EQ(world.comm.sum(
+                static_cast<std::int64_t>(world.domain.calc_state(std::vector<Quad>(world.domain.node_count()).data()).element.size())),
             world.assembly->element_count());
 }
 
 TEST(Domain, halo_brings_the_values_of_owners) {
   World world(make_two_bodies());
-  std::vector<Quad> values(static_cast<std::size_t>(world.domain.node_count()), Quad{-1, -1, -1, 0});
+  std::vector<Quad> values(world.domain.node_count(), Quad{-1, -1, -1, 0});
   for (int round = 1; round < 4; ++round) {
     for (std::int32_t i = 0; i < world.domain.own_count(); ++i) {
       const double number = world.domain.find_number(i);
-      values[static_cast<std::size_t>(i)] = {round * number, number + 0.5, -number, 0.0};
+      values[i] = {round * number, number + 0.5, -number, 0.0};
     }
     world.domain.begin_halo(values.data());
     world.domain.end_halo(values.data());
     for (std::int32_t i = 0; i < world.domain.node_count(); ++i) {
-      EXPECT_EQ(values[static_cast<std::size_t>(i)].x, round * world.domain.find_number(i));
-      EXPECT_EQ(values[static_cast<std::size_t>(i)].y, world.domain.find_number(i) + 0.5);
+      EXPECT_EQ(values[i].x, round * world.domain.find_number(i));
+      EXPECT_EQ(values[i].y, world.domain.find_number(i) + 0.5);
     }
   }
 }
@@ -139,8 +139,8 @@ TEST(Domain, refuses_a_sliver_and_names_it) {
     if (at == tet.end()) continue;
     Vec3 opposite{};
     for (const std::int32_t node : tet)
-      if (node != inner) opposite = opposite + (1.0 / 3.0) * mesh.nodes_m[static_cast<std::size_t>(node)];
-    mesh.nodes_m[static_cast<std::size_t>(inner)] = 0.97 * opposite + 0.03 * mesh.nodes_m[static_cast<std::size_t>(inner)];
+      if (node != inner) opposite = opposite + (1.0 / 3.0) * mesh.nodes_m[node];
+    mesh.nodes_m[inner] = 0.97 * opposite + 0.03 * mesh.nodes_m[inner];
     const std::string message = tests::catch_message<InputError>([&] { World world(bodies); });
     const std::string begin = "body 'bar', element ";
     ASSERT_EQ(message.find(begin), 0U) << message;
@@ -169,7 +169,7 @@ TEST(Domain, a_sheet_has_its_mass_on_any_number_of_ranks) {
   const Domain domain(comm, assembly);
   double mass = 0.0;
   for (std::int32_t place = 0; place < domain.own_count(); ++place)
-    if (domain.is_point(place)) mass += domain.get_masses_kg()[static_cast<std::size_t>(place)];
+    if (domain.is_point(place)) mass += domain.get_masses_kg()[place];
   const double area = 36 * 0.5 * 0.01 * std::sin(2 * std::numbers::pi / 36);  // of the polygon
   EXPECT_NEAR(comm.sum(mass), 7000.0 * 0.002 * area, 1e-13);
 }

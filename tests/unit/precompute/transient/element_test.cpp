@@ -13,7 +13,7 @@ namespace {
 
 std::vector<Vec3> make_t10(const std::array<Vec3, 4>& corners) {
   std::vector<Vec3> x(corners.begin(), corners.end());
-  for (const auto& edge : mesh::kEdges) x.push_back(0.5 * (x[static_cast<std::size_t>(edge[0])] + x[static_cast<std::size_t>(edge[1])]));
+  for (const auto& edge : mesh::kEdges) x.push_back(0.5 * (x[edge[0]] + x[edge[1]]));
   return x;
 }
 const std::array<Vec3, 4> kCorners{Vec3{0.1, 0.0, 0.2}, Vec3{1.3, 0.2, 0.1}, Vec3{0.2, 1.1, 0.0}, Vec3{0.3, 0.2, 0.9}};
@@ -23,8 +23,7 @@ TEST(Element, gradients_of_a_tetrahedron_are_those_of_its_barycentric_coordinate
   ASSERT_TRUE(make_shape(Kind::kT4, kCorners, shape));
   Eigen::Matrix3d edges;
   for (int k = 0; k < 3; ++k)
-    for (int i = 0; i < 3; ++i)
-      edges(i, k) = kCorners[static_cast<std::size_t>(k + 1)][static_cast<std::size_t>(i)] - kCorners[0][static_cast<std::size_t>(i)];
+    for (int i = 0; i < 3; ++i) edges(i, k) = kCorners[k + 1][i] - kCorners[0][i];
   const Eigen::Matrix3d inverse = edges.inverse();
   for (std::size_t k = 0; k < 3; ++k)
     for (std::size_t j = 0; j < 3; ++j) EXPECT_NEAR(shape.gradient[0][k][j], inverse(static_cast<int>(k), static_cast<int>(j)), 1e-14);
@@ -78,9 +77,8 @@ TEST(Element, highest_frequency_of_one_tetrahedron) {
   const Law law = testing::make_law(70e9, 0.3, 2700);
   Eigen::Matrix<double, 6, 12> b = Eigen::Matrix<double, 6, 12>::Zero();
   for (int a = 0; a < 4; ++a) {
-    Vec3 g = a == 0 ? -1.0 * (shape.gradient[0][0] + shape.gradient[0][1] + shape.gradient[0][2])
-                    : shape.gradient[0][static_cast<std::size_t>(a - 1)];
-    for (int i = 0; i < 3; ++i) b(i, 3 * a + i) = g[static_cast<std::size_t>(i)];
+    Vec3 g = a == 0 ? -1.0 * (shape.gradient[0][0] + shape.gradient[0][1] + shape.gradient[0][2]) : shape.gradient[0][a - 1];
+    for (int i = 0; i < 3; ++i) b(i, 3 * a + i) = g[i];
     b(3, 3 * a + 1) = b(4, 3 * a) = g[2];
     b(3, 3 * a + 2) = b(5, 3 * a) = g[1];
     b(4, 3 * a + 2) = b(5, 3 * a + 1) = g[0];

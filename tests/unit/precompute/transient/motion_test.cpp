@@ -51,7 +51,7 @@ TEST(Motion, falls_freely) {
   const double t = motion.get_time_s();
   EXPECT_NEAR(t, 1e-3, 1e-15);
   for (std::int32_t i = 0; i < world.domain.own_count(); ++i) {
-    const Quad& u = motion.get_u()[static_cast<std::size_t>(i)];
+    const Quad& u = motion.get_u()[i];
     // The first half step is from rest at -h/2 on: h^2 n (n + 1) / 2 in place of t^2 / 2.
     const double h = motion.get_step_s(), half_square = 0.5 * (t * t + t * h);
     EXPECT_NEAR(u.z, -9.81 * half_square, 1e-16);
@@ -122,7 +122,7 @@ double find_wave(const Wave& wave, double (*shape)(double)) {
     motion.advance_sample();
     double sum = 0.0;
     for (std::int32_t i = 0; i < world.domain.own_count(); ++i) {
-      const auto at = static_cast<std::size_t>(i);
+      const std::size_t at = i;
       const Quad& u = motion.get_u()[at];
       const double x = world.domain.get_rest_m()[at][0];
       sum += world.domain.get_masses_kg()[at] * shape(x / 0.5 + 0.5) * (wave.axis == 0 ? u.x - (wave.stretch - 1.0) * x : u.z);
@@ -295,7 +295,7 @@ TEST(Constraint, a_hinged_rod_swings_and_mass_damping_does_not_brake_it) {
   Constraint hinge;
   hinge.is_hinge = true;
   for (const std::int32_t node : world.list_set("x-min"))
-    if (std::abs(world.assembly->nodes_m[static_cast<std::size_t>(node)][2]) < 1e-9) hinge.nodes.push_back(node);
+    if (std::abs(world.assembly->nodes_m[node][2]) < 1e-9) hinge.nodes.push_back(node);
   ASSERT_EQ(hinge.nodes.size(), 3U);
   MotionOptions options;
   options.gravity_m_s2 = {0, 0, -9.81};
@@ -320,14 +320,14 @@ TEST(Constraint, mass_damping_takes_from_a_hinged_rod_what_is_not_swing) {
   Constraint hinge;
   hinge.is_hinge = true;
   for (const std::int32_t node : world.list_set("x-min"))
-    if (std::abs(world.assembly->nodes_m[static_cast<std::size_t>(node)][2]) < 1e-9) hinge.nodes.push_back(node);
+    if (std::abs(world.assembly->nodes_m[node][2]) < 1e-9) hinge.nodes.push_back(node);
   MotionOptions options;
   Motion motion(world.domain, options, {hinge});
   // v_z = s^3 - c s of the distance s to the hinge, with c from the masses.
   double second = 0.0, fourth = 0.0;
   for (std::int32_t i = 0; i < world.domain.own_count(); ++i) {
-    const double mass = world.domain.get_masses_kg()[static_cast<std::size_t>(i)];
-    const double s = world.domain.get_rest_m()[static_cast<std::size_t>(i)][0] + 0.05;
+    const double mass = world.domain.get_masses_kg()[i];
+    const double s = world.domain.get_rest_m()[i][0] + 0.05;
     second += mass * s * s;
     fourth += mass * s * s * s * s;
   }
@@ -357,7 +357,7 @@ class Spring : public ExternalForces {
     u_.assign(u, u + domain_.own_count());
     static_cast<void>(v);
     for (std::int32_t i = 0; i < domain_.own_count(); ++i) {
-      const auto at = static_cast<std::size_t>(i);
+      const std::size_t at = i;
       f[at].x -= stiffness_ * u[at].x;
       f[at].y -= stiffness_ * u[at].y;
       f[at].z -= stiffness_ * u[at].z;

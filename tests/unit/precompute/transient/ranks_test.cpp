@@ -55,8 +55,8 @@ void expect_same(const Scene& here, const Scene& alone) {
   EXPECT_EQ(here.motion->get_step_s(), alone.motion->get_step_s());
   EXPECT_EQ(here.motion->get_omega_rad_s(), alone.motion->get_omega_rad_s());
   for (std::int32_t i = 0; i < here.world.domain.node_count(); ++i) {
-    const auto at = static_cast<std::size_t>(i);
-    const auto other = static_cast<std::size_t>(alone.world.domain.find_place(here.world.domain.find_number(i)));
+    const std::size_t at = i;
+    const std::size_t other = alone.world.domain.find_place(here.world.domain.find_number(i));
     ASSERT_EQ(std::memcmp(&here.motion->get_u()[at], &alone.motion->get_u()[other], sizeof(Quad)), 0) << here.world.domain.find_number(i);
     ASSERT_EQ(std::memcmp(&here.motion->get_v()[at], &alone.motion->get_v()[other], sizeof(Quad)), 0) << here.world.domain.find_number(i);
   }

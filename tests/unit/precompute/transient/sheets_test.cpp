@@ -33,12 +33,12 @@ struct Sheet {
       : elements(make_elements(mesh, clamped)), nodes(elements.count_nodes()), which(mesh.triangles.size()) {
     std::iota(which.begin(), which.end(), 0);
     sheets = std::make_unique<Sheets>(elements, which, law, elements.nodes, elements.nodes, nodes);
-    for (auto* array : {&x, &v, &f}) array->resize(static_cast<std::size_t>(nodes) + 1);
+    for (auto* array : {&x, &v, &f}) array->resize(nodes + 1);
     for (std::int32_t n = 0; n < nodes; ++n)
-      if (!is_angle(n)) set(n, elements.rest_m[static_cast<std::size_t>(n)]);
+      if (!is_angle(n)) set(n, elements.rest_m[n]);
   }
   bool is_angle(std::int32_t n) const { return n >= elements.vertices && n < elements.vertices + elements.edges; }
-  void set(std::int32_t n, const Vec3& at) { x[static_cast<std::size_t>(n)] = {at[0], at[1], at[2], 0}; }
+  void set(std::int32_t n, const Vec3& at) { x[n] = {at[0], at[1], at[2], 0}; }
   const std::vector<Quad>& calc_forces(const StepWeights& weights = {}) {
     std::fill(f.begin(), f.end(), Quad{});
     sheets->add_forces(weights, x.data(), v.data(), f.data());
@@ -53,7 +53,7 @@ struct Sheet {
     double largest = 0;
     calc_forces();
     for (std::int32_t n = 0; n < nodes; ++n) {
-      const Quad& q = f[static_cast<std::size_t>(n)];
+      const Quad& q = f[n];
       largest = std::max({largest, std::abs(q.x), std::abs(q.y), std::abs(q.z)});
     }
     return largest;
@@ -69,7 +69,7 @@ struct Sheet {
 std::vector<bool> mark(const SheetMesh& mesh, const std::string& set) {
   std::vector<bool> marked(mesh.vertices_m.size());
   if (!set.empty())
-    for (const std::int32_t v : mesh.node_sets.at(set)) marked[static_cast<std::size_t>(v)] = true;
+    for (const std::int32_t v : mesh.node_sets.at(set)) marked[v] = true;
   return marked;
 }
 
@@ -79,7 +79,7 @@ TEST(Sheets, forces_are_the_gradient_of_the_energy) {
   std::mt19937 random(7);
   std::normal_distribution<double> draw(0.0, 3e-3);
   for (std::int32_t n = 0; n < sheet.nodes; ++n) {
-    Quad& q = sheet.x[static_cast<std::size_t>(n)];
+    Quad& q = sheet.x[n];
     q.x += draw(random);
     if (!sheet.is_angle(n)) q.y += draw(random), q.z += draw(random);
   }
@@ -87,14 +87,14 @@ TEST(Sheets, forces_are_the_gradient_of_the_energy) {
   double largest = 0, worst = 0;
   for (std::int32_t n = 0; n < sheet.nodes; ++n)
     for (int axis = 0; axis < (sheet.is_angle(n) ? 1 : 3); ++axis) {
-      double& value = (&sheet.x[static_cast<std::size_t>(n)].x)[axis];
+      double& value = (&sheet.x[n].x)[axis];
       const double kept = value, step = 1e-6;
       value = kept + step;
       const double above = sheet.calc_energy();
       value = kept - step;
       const double below = sheet.calc_energy();
       value = kept;
-      const double force = (&forces[static_cast<std::size_t>(n)].x)[axis];
+      const double force = (&forces[n].x)[axis];
       worst = std::max(worst, std::abs(force + (above - below) / (2 * step)));
       largest = std::max(largest, std::abs(force));
     }
@@ -106,7 +106,7 @@ TEST(Sheets, rigid_motion_costs_nothing) {
   Sheet sheet(mesh, mark(mesh, ""), make_law(0.001));
   for (std::int32_t n = 0; n < sheet.nodes; ++n) {
     if (sheet.is_angle(n)) continue;
-    const Vec3& r = sheet.elements.rest_m[static_cast<std::size_t>(n)];
+    const Vec3& r = sheet.elements.rest_m[n];
     const double c = std::cos(2.0), s = std::sin(2.0);
     sheet.set(n, {c * r[0] - s * r[2] + 1, r[1] + 2, s * r[0] + c * r[2] + 3});
   }
@@ -119,14 +119,14 @@ TEST(Sheets, forces_and_moments_are_in_balance) {
   std::mt19937 random(3);
   std::normal_distribution<double> draw(0.0, 2e-4);
   for (std::int32_t n = 0; n < sheet.elements.vertices; ++n) {
-    Quad& q = sheet.x[static_cast<std::size_t>(n)];
+    Quad& q = sheet.x[n];
     q = {q.x + draw(random), q.y + draw(random), q.z + draw(random), 0};
   }
   sheet.calc_forces();
   Vec3 total{}, moment{};
   double size = 0;
   for (std::int32_t n = 0; n < sheet.elements.vertices; ++n) {
-    const Quad &q = sheet.x[static_cast<std::size_t>(n)], &f = sheet.f[static_cast<std::size_t>(n)];
+    const Quad &q = sheet.x[n], &f = sheet.f[n];
     const Vec3 force{f.x, f.y, f.z};
     total = total + force;
     moment = moment + cross({q.x, q.y, q.z}, force);
@@ -143,16 +143,16 @@ double find_lowest_hz(const SheetMesh& mesh, const std::string& clamped, const s
   const std::vector<bool> is_clamped = mark(mesh, clamped), is_hinged = mark(mesh, hinged);
   std::vector<std::int32_t> free;
   for (std::int32_t n = 0; n < sheet.elements.vertices; ++n)
-    if (!is_clamped[static_cast<std::size_t>(n)] && !is_hinged[static_cast<std::size_t>(n)]) free.push_back(n);
+    if (!is_clamped[n] && !is_hinged[n]) free.push_back(n);
   for (std::int32_t e = 0; e < sheet.elements.edges; ++e) {
-    const auto [a, b] = sheet.elements.edge[static_cast<std::size_t>(e)];
-    if (!(is_clamped[static_cast<std::size_t>(a)] && is_clamped[static_cast<std::size_t>(b)])) free.push_back(sheet.elements.vertices + e);
+    const auto [a, b] = sheet.elements.edge[e];
+    if (!(is_clamped[a] && is_clamped[b])) free.push_back(sheet.elements.vertices + e);
   }
   const auto count = static_cast<Eigen::Index>(free.size());
   Eigen::MatrixXd stiffness(count, count);
   const auto at = [&](std::vector<Quad>& values, Eigen::Index i) -> double& {
-    const std::int32_t n = free[static_cast<std::size_t>(i)];
-    Quad& q = values[static_cast<std::size_t>(n)];
+    const std::int32_t n = free[i];
+    Quad& q = values[n];
     return sheet.is_angle(n) ? q.x : q.z;
   };
   const double step = 1e-9;
@@ -164,7 +164,7 @@ double find_lowest_hz(const SheetMesh& mesh, const std::string& clamped, const s
   }
   const Eigen::MatrixXd even = 0.5 * (stiffness + stiffness.transpose());
   Eigen::VectorXd root(count);
-  for (Eigen::Index i = 0; i < count; ++i) root(i) = 1 / std::sqrt(mass[static_cast<std::size_t>(free[static_cast<std::size_t>(i)])]);
+  for (Eigen::Index i = 0; i < count; ++i) root(i) = 1 / std::sqrt(mass[free[i]]);
   const Eigen::MatrixXd scaled = root.asDiagonal() * even * root.asDiagonal();
   return std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(scaled, Eigen::EigenvaluesOnly).eigenvalues()(0)) / (2 * pi);
 }
@@ -189,13 +189,13 @@ TEST(Sheets, membrane_has_plane_stress_and_its_damping) {
   const double alpha1 = 1e-5, strain = 1e-7, rate = 1e-2;
   Sheet sheet(mesh, mark(mesh, ""), make_law(0.002, alpha1));
   for (std::int32_t n = 0; n < sheet.elements.vertices; ++n) {
-    const Vec3& r = sheet.elements.rest_m[static_cast<std::size_t>(n)];
+    const Vec3& r = sheet.elements.rest_m[n];
     sheet.set(n, {r[0] * (1 + strain), r[1] * (1 - kPoisson * strain), 0});
-    sheet.v[static_cast<std::size_t>(n)] = {rate * r[0], -kPoisson * rate * r[1], 0, 0};
+    sheet.v[n] = {rate * r[0], -kPoisson * rate * r[1], 0, 0};
   }
   sheet.calc_forces({0.5e-6, 0.5e-6, 1e-6});
   double pull = 0;
-  for (const std::int32_t n : mesh.node_sets.at("x-max")) pull -= sheet.f[static_cast<std::size_t>(n)].x;
+  for (const std::int32_t n : mesh.node_sets.at("x-max")) pull -= sheet.f[n].x;
   const double section = 0.1 * 0.002, expected = kYoung * section * (strain + alpha1 * rate);
   EXPECT_NEAR(pull, expected, 1e-5 * expected);
   // The same again: two halves of the work of a step of 1e-6 s, and the first half of the next.
@@ -225,12 +225,11 @@ TEST(SheetMesh, bow_is_an_arc_and_a_disc_is_round) {
   double top = 0;
   for (const Vec3& x : bowed.vertices_m) top = std::max(top, x[2]);
   EXPECT_NEAR(top, 0.02, 1e-12);
-  for (const std::int32_t n : bowed.node_sets.at("x-min")) EXPECT_NEAR(bowed.vertices_m[static_cast<std::size_t>(n)][2], 0.0, 1e-12);
+  for (const std::int32_t n : bowed.node_sets.at("x-min")) EXPECT_NEAR(bowed.vertices_m[n][2], 0.0, 1e-12);
   const SheetMesh disc = make_disc(0.1, 20);
   double area = 0;
   for (const Triangle& t : disc.triangles)
-    area += 0.5 * norm(cross(disc.vertices_m[static_cast<std::size_t>(t[1])] - disc.vertices_m[static_cast<std::size_t>(t[0])],
-                             disc.vertices_m[static_cast<std::size_t>(t[2])] - disc.vertices_m[static_cast<std::size_t>(t[0])]));
+    area += 0.5 * norm(cross(disc.vertices_m[t[1]] - disc.vertices_m[t[0]], disc.vertices_m[t[2]] - disc.vertices_m[t[0]]));
   EXPECT_NEAR(area, 60 * 0.5 * 0.01 * std::sin(2 * pi / 60), 1e-12);  // of the polygon
 }
 

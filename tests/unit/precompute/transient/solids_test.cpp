@@ -55,7 +55,7 @@ Body make_body(int order, double bend_m, const Law& law, const Loops& loops, con
     const auto nodes = body.mesh.tet(e);
     for (std::size_t a = 0; a < nodes.size(); ++a) {
       element.read[a] = element.write[a] = nodes[a];
-      x.push_back(body.mesh.nodes_m[static_cast<std::size_t>(nodes[a])]);
+      x.push_back(body.mesh.nodes_m[nodes[a]]);
     }
     element.kind = order == 1 ? Kind::kT4 : is_curved(x) ? Kind::kCurvedT10 : Kind::kT10;
     body.elements.push_back(element);
@@ -128,8 +128,7 @@ TEST_P(OfKind, a_homogeneous_deformation_gives_the_known_stress_and_energy) {
     double volume = 0.0;
     for (const SolidElement& element : body.elements) {
       std::vector<Vec3> x;
-      for (int a = 0; a < count_nodes(element.kind); ++a)
-        x.push_back(body.mesh.nodes_m[static_cast<std::size_t>(element.read[static_cast<std::size_t>(a)])]);
+      for (int a = 0; a < count_nodes(element.kind); ++a) x.push_back(body.mesh.nodes_m[element.read[a]]);
       ElementShape shape;
       ASSERT_TRUE(make_shape(element.kind, x, shape));
       for (const double weight : shape.weight_m3) volume += weight;
@@ -248,9 +247,9 @@ TEST_P(OfKind, smallest_determinant_names_the_element_that_is_inside_out) {
   for (const double det : least) EXPECT_NEAR(det, 1.0, 1e-14);
   // A corner through the opposite face of one element, and a mirror of the whole body.
   const auto tet = body.mesh.tet(7);
-  const auto place = [&](std::size_t a) { return body.mesh.nodes_m[static_cast<std::size_t>(tet[a])]; };
+  const auto place = [&](std::size_t a) { return body.mesh.nodes_m[tet[a]]; };
   const Vec3 move = 2.0 * ((1.0 / 3.0) * (place(1) + place(2) + place(3)) - place(0));
-  u[static_cast<std::size_t>(tet[0])] = {move[0], move[1], move[2], 0.0};
+  u[tet[0]] = {move[0], move[1], move[2], 0.0};
   body.solids.calc_state(u.data(), energy, least);
   EXPECT_LT(least[7], 0.0);
   const std::vector<Quad> mirror = make_values(body, {Vec3{-2, 0, 0}, Vec3{0, 0, 0}, Vec3{0, 0, 0}});

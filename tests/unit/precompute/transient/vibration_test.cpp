@@ -35,18 +35,16 @@ Modes solve_modes(const testing::World& world, double young, double poisson, dou
   for (std::int32_t e = 0; e < all.element_count(); ++e) {
     const auto nodes = all.find_nodes(e);
     std::vector<Vec3> x;
-    for (const std::int32_t node : nodes) x.push_back(all.nodes_m[static_cast<std::size_t>(node)]);
+    for (const std::int32_t node : nodes) x.push_back(all.nodes_m[node]);
     fem::ElementMatrices element;
     if (!fem::calc_element(x, fem::Solid(material), job::Mass::lumped, element)) ADD_FAILURE();
     const auto n = static_cast<int>(nodes.size());
     for (int a = 0; a < n; ++a)
       for (int i = 0; i < 3; ++i) {
-        const auto row = static_cast<Eigen::Index>(3 * nodes[static_cast<std::size_t>(a)] + i);
-        m(row) += element.mass[static_cast<std::size_t>(a * n + a)];
+        const auto row = static_cast<Eigen::Index>(3 * nodes[a] + i);
+        m(row) += element.mass[a * n + a];
         for (int b = 0; b < n; ++b)
-          for (int j = 0; j < 3; ++j)
-            k(row, 3 * nodes[static_cast<std::size_t>(b)] + j) +=
-                element.stiffness[static_cast<std::size_t>((3 * a + i) * 3 * n + 3 * b + j)];
+          for (int j = 0; j < 3; ++j) k(row, 3 * nodes[b] + j) += element.stiffness[(3 * a + i) * 3 * n + 3 * b + j];
       }
   }
   Modes modes;
@@ -90,7 +88,7 @@ TEST_P(SmallBlow, sounds_and_decays_as_the_modes_of_the_same_mesh) {
     for (int mode = 0; mode < kModes; ++mode) {
       double sum = 0.0, speed = 0.0;
       for (std::size_t a = 0; a < modes.free_nodes.size(); ++a) {
-        const auto at = static_cast<std::size_t>(world.domain.find_place(modes.free_nodes[a]));
+        const std::size_t at = world.domain.find_place(modes.free_nodes[a]);
         const Quad &u = motion.get_u()[at], &v = motion.get_v()[at], &f = motion.get_f()[at];
         const double half = 0.5 * motion.get_step_s() / world.domain.get_masses_kg()[at];  // v at the time of u
         const double place[3] = {u.x, u.y, u.z}, velocity[3] = {v.x + half * f.x, v.y + half * f.y, v.z + half * f.z};
@@ -100,8 +98,8 @@ TEST_P(SmallBlow, sounds_and_decays_as_the_modes_of_the_same_mesh) {
           speed += modes.shapes(row, mode) * modes.mass(row) * velocity[i];
         }
       }
-      q[static_cast<std::size_t>(mode)].push_back(sum);
-      rate[static_cast<std::size_t>(mode)].push_back(speed);
+      q[mode].push_back(sum);
+      rate[mode].push_back(speed);
     }
   }
   const double sample_s = 1.0 / 48000.0;
@@ -113,7 +111,7 @@ TEST_P(SmallBlow, sounds_and_decays_as_the_modes_of_the_same_mesh) {
     Eigen::MatrixXd left(samples, 2);
     Eigen::VectorXd phases(samples), sizes(samples);
     for (int n = 0; n < samples; ++n) {
-      const auto at = static_cast<std::size_t>(n);
+      const std::size_t at = n;
       const double re = rate[mode][at] + d * q[mode][at], im = -damped * q[mode][at], now = std::atan2(im, re);
       if (n > 0) turned += std::remainder(now - phase + damped * sample_s, 2 * pi) - damped * sample_s;
       phase = now;

@@ -66,10 +66,10 @@ TEST(Corrected, AreInAscendingOrderAndEveryModeKeepsWhatIsItsOwn) {
   ASSERT_EQ(played.mode_count(), kModes);
   bool has_moved = false;
   for (std::size_t m = 0; m < kModes; ++m) {
-    const auto of = static_cast<std::size_t>(
+    const std::size_t of =
         std::min_element(bank.corrected.freq_hz.begin(), bank.corrected.freq_hz.end(),
                          [&](double a, double b) { return std::abs(a - played.freq_hz(m)) < std::abs(b - played.freq_hz(m)); }) -
-        bank.corrected.freq_hz.begin());
+        bank.corrected.freq_hz.begin();
     has_moved = has_moved || of != m;
     EXPECT_NEAR(played.freq_hz(m) / bank.corrected.freq_hz[of], 1.0, 1e-14);
     EXPECT_EQ(played.decay_per_s[m], bank.corrected.decay_per_s[of]);

@@ -38,9 +38,7 @@ class BankFile : public testing::Test {
     std::ifstream stream(file_, std::ios::binary);
     return {std::istreambuf_iterator<char>(stream), {}};
   }
-  std::size_t count_files() const {
-    return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()));
-  }
+  std::size_t count_files() const { return std::distance(fs::directory_iterator(folder_), fs::directory_iterator()); }
 
   const tests::Folder scratch_;
   const fs::path& folder_ = scratch_.path();

@@ -21,7 +21,7 @@ void read(std::span<const std::byte> bytes) {
       sum += bank.freq_hz(mode);
       for (std::size_t vertex = 0; vertex < bank.vertex_count(); ++vertex) sum += bank.shape_at(vertex, mode)[2];
     }
-    for (const auto& triangle : bank.triangles) sum += bank.vertices_m[static_cast<std::size_t>(triangle[0])][0];
+    for (const auto& triangle : bank.triangles) sum += bank.vertices_m[triangle[0]][0];
     if (!bank.multipoles.is_empty()) sum += bank::calc_corrected(bank).radiation_gain.back();
     volatile double sink = sum;
     (void)sink;

@@ -15,7 +15,7 @@ int main(int argc, char** argv) try {
   const int n = argc > 2 ? std::atoi(argv[2]) : 2;
   const int modes = argc > 3 ? std::atoi(argv[3]) : 5;
   namespace example = carillon::bank::example;
-  const auto count = static_cast<std::size_t>(modes);
+  const std::size_t count = modes;
   const std::string kind = argc > 4 ? argv[4] : "";
   carillon::bank::write_bank(kind == "supports"    ? example::make_supported_bank(n, count)
                              : kind == "corrected" ? example::make_corrected_bank(n, count)

@@ -41,11 +41,11 @@ TEST(HankelSizes, AreThoseOfTheFiniteSumOfPositiveTerms) {
     ASSERT_EQ(sizes.size(), 121u);
     for (int l = 0; l <= kMaxOrder; ++l) {
       const long double wanted = std::sqrt(calc_hankel_square(x, l));
-      if (std::isinf(sizes[static_cast<std::size_t>(l)])) {
+      if (std::isinf(sizes[l])) {
         ++infinite;
         EXPECT_GT(wanted, 1e300L) << "x " << x << ", l " << l;
       } else {
-        EXPECT_NEAR(static_cast<double>(sizes[static_cast<std::size_t>(l)] / wanted), 1.0, 1e-12) << "x " << x << ", l " << l;
+        EXPECT_NEAR(static_cast<double>(sizes[l] / wanted), 1.0, 1e-12) << "x " << x << ", l " << l;
       }
     }
   }

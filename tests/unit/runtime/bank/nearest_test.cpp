@@ -17,7 +17,7 @@ double calc_distance(const Vec3& a, const Vec3& b) { return std::hypot(a[0] - b[
 Vec3 calc_place(const Bank& bank, std::size_t triangle, const Vec3& weight) {
   Vec3 place{};
   for (std::size_t i = 0; i < 3; ++i) {
-    for (std::size_t k = 0; k < 3; ++k) place[k] += weight[i] * bank.vertices_m[static_cast<std::size_t>(bank.triangles[triangle][i])][k];
+    for (std::size_t k = 0; k < 3; ++k) place[k] += weight[i] * bank.vertices_m[bank.triangles[triangle][i]][k];
   }
   return place;
 }
@@ -35,9 +35,7 @@ Bank make_heap(int triangles, std::mt19937& random) {
         for (double& x : corner) x += 0.2 * unit(random);
       }
       if (t % 5 == 0 && i == 2) {  // on the line through the other two
-        for (std::size_t k = 0; k < 3; ++k)
-          corner[k] =
-              0.3 * bank.vertices_m[static_cast<std::size_t>(first)][k] + 0.7 * bank.vertices_m[static_cast<std::size_t>(first) + 1][k];
+        for (std::size_t k = 0; k < 3; ++k) corner[k] = 0.3 * bank.vertices_m[first][k] + 0.7 * bank.vertices_m[first + 1][k];
       }
       bank.vertices_m.push_back(corner);
     }
@@ -92,7 +90,7 @@ TEST(Nearest, OfPlacesEquallyNearTheFirstTriangleIsTaken) {
     const NearestPlace place = tree.find(vertex);
     EXPECT_EQ(place.distance_m, 0.0);
     for (std::size_t t = 0; t < static_cast<std::size_t>(place.triangle); ++t) {
-      for (const std::int32_t corner : bank.triangles[t]) EXPECT_NE(bank.vertices_m[static_cast<std::size_t>(corner)], vertex);
+      for (const std::int32_t corner : bank.triangles[t]) EXPECT_NE(bank.vertices_m[corner], vertex);
     }
   }
   Vec3 centre = example::kCornerM;

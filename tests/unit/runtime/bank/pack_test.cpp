@@ -186,8 +186,8 @@ TEST(Pack, bodies_with_cavities_are_packed_and_their_walls_are_near_to_what_they
   const auto outer = static_cast<std::int32_t>(bank.vertex_count());
   const std::size_t triangles = bank.triangles.size();
   for (std::int32_t v = 0; v < outer; ++v) {
-    bank.vertices_m.push_back(0.5 * bank.vertices_m[static_cast<std::size_t>(v)]);
-    for (std::size_t i = 0; i < 15; ++i) bank.shape.push_back(bank.shape[15 * static_cast<std::size_t>(v) + i]);
+    bank.vertices_m.push_back(0.5 * bank.vertices_m[v]);
+    for (std::size_t i = 0; i < 15; ++i) bank.shape.push_back(bank.shape[15 * v + i]);
   }
   for (std::size_t t = 0; t < triangles; ++t) {
     const auto [a, b, c] = bank.triangles[t];
@@ -205,7 +205,7 @@ TEST(Pack, bodies_with_cavities_are_packed_and_their_walls_are_near_to_what_they
     }
   }
   EXPECT_LT(10.0 * std::log10(missed / heard), -20.0);
-  for (const std::int32_t v : packed.bank.packing->witness) EXPECT_GT(norm(packed.bank.vertices_m[static_cast<std::size_t>(v)]), 0.09);
+  for (const std::int32_t v : packed.bank.packing->witness) EXPECT_GT(norm(packed.bank.vertices_m[v]), 0.09);
 }
 
 // ---- files ----
@@ -250,8 +250,7 @@ TEST(Pack, triangles_keep_their_numbers_and_first_corners_when_asked) {
   const std::vector<std::size_t> from = find_original(packed.bank, bank, 0.2);
   ASSERT_EQ(packed.bank.triangles.size(), bank.triangles.size());
   for (std::size_t t = 0; t < bank.triangles.size(); ++t)
-    for (std::size_t k = 0; k < 3; ++k)
-      ASSERT_EQ(from[static_cast<std::size_t>(packed.bank.triangles[t][k])], static_cast<std::size_t>(bank.triangles[t][k])) << t;
+    for (std::size_t k = 0; k < 3; ++k) ASSERT_EQ(from[packed.bank.triangles[t][k]], static_cast<std::size_t>(bank.triangles[t][k])) << t;
   const Bank read = parse_bank(bytes_of(make_packed_bytes(packed)));
   expect_same(read, packed.bank);
   EXPECT_NEAR(compare_packed(read, bank).error_db, packed.bank.packing->error_db, 1e-6);

@@ -52,7 +52,7 @@ QuarticEnergy make_energy(const Bank& bank, Kind kind) {
   }
   if (kind == Kind::kCurvedRows || kind == Kind::kSolidPoints) {
     for (std::size_t i = 0; i < kRows * 4; ++i)
-      energy.linear.push_back(0.28 * std::sqrt(bank.eigenvalue_rad2_s2[static_cast<std::size_t>(energy.modes[i % 4])]) * chance.draw());
+      energy.linear.push_back(0.28 * std::sqrt(bank.eigenvalue_rad2_s2[energy.modes[i % 4]]) * chance.draw());
     energy.rest_energy_j = 1e-3;
   }
   energy.membrane_ratio = 0.3;

@@ -65,7 +65,7 @@ TEST(Reduce, TheLoudestModesAreThoseOfTheMostExposureWithinTheEarsTime) {
       const Vec3 n{u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
       const double twice = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
       for (const std::int32_t corner : t) {
-        const Vec3 phi = bank.shape_at(static_cast<std::size_t>(corner), m);
+        const Vec3 phi = bank.shape_at(corner, m);
         sum += std::pow(phi[0] * n[0] + phi[1] * n[1] + phi[2] * n[2], 2) / twice / 3.0;
       }
       area += twice;

@@ -29,11 +29,10 @@ inline void add_sphere_mode(Multipoles& air, double freq_hz, const SphereMotion&
   const double impedance = air.air_density_kg_m3 * air.sound_speed_ms, area = 4.0 * pi * air.radius_m * air.radius_m;
   const std::complex<double> pulse = std::complex(x * x, -x) / (1.0 + x * x);
   const std::complex<double> shake = std::complex(std::pow(x, 4), -x * (2.0 + x * x)) / (4.0 + std::pow(x, 4));
-  std::vector<std::complex<double>> a(static_cast<std::size_t>((order + 1) * (order + 1)));
+  std::vector<std::complex<double>> a((order + 1) * (order + 1));
   a[0] = impedance * motion.pulse * std::sqrt(4.0 * pi) * pulse;
   for (const auto& [place, axis] : {std::pair(1, 1), std::pair(2, 2), std::pair(3, 0)})  // Y_1m along y, z, x
-    if (order > 0)
-      a[static_cast<std::size_t>(place)] = impedance * motion.shake[static_cast<std::size_t>(axis)] * std::sqrt(4.0 * pi / 3.0) * shake;
+    if (order > 0) a[place] = impedance * motion.shake[axis] * std::sqrt(4.0 * pi / 3.0) * shake;
   add_coefficients(air, order, a);
   const double pulses = area * motion.pulse * motion.pulse, shakes = area / 3.0 * dot(motion.shake, motion.shake);  // of v^2 over the area
   air.freq_hz.push_back(freq_hz);

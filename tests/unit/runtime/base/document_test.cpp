@@ -174,7 +174,7 @@ TEST(Document, finding_the_lines_of_all_values_reads_the_text_once) {
   auto root = document.root();
   const auto list = root.objects("list");
   for (int i = 0; i < kEntries; ++i) {
-    const std::string place = list[static_cast<std::size_t>(i)].find_place("x");
+    const std::string place = list[i].find_place("x");
     ASSERT_TRUE(place.ends_with("file.json:" + std::to_string(i + 2))) << place;
   }
   EXPECT_LE(document.count_scanned_bytes(), text.size());

@@ -18,7 +18,7 @@ using carillon::InputError;
 
 class File : public testing::Test {
  protected:
-  std::size_t count_entries() const { return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder_), {})); }
+  std::size_t count_entries() const { return std::distance(fs::directory_iterator(folder_), {}); }
   const carillon::tests::Folder scratch_;
   const fs::path& folder_ = scratch_.path();
 };

@@ -27,7 +27,7 @@ TEST_F(SpoolTest, what_is_written_is_read_back_from_memory_and_from_the_file) {
     Spool spool(folder_, "test", memory);
     std::string all;
     for (int i = 0; i < 400; ++i) {
-      const std::string piece(static_cast<std::size_t>(i % 13), static_cast<char>('a' + i % 26));
+      const std::string piece(i % 13, static_cast<char>('a' + i % 26));
       spool.append(std::as_bytes(std::span(piece)));
       all += piece;
     }

@@ -25,7 +25,7 @@ void check(const codec::Surface& surface) {
   if (surface.level_begin.back() != surface.places.size()) __builtin_trap();
   for (const Triangle& triangle : surface.triangles)
     for (const std::int32_t v : triangle)
-      if (v < 0 || static_cast<std::size_t>(v) >= surface.places.size()) __builtin_trap();
+      if (v < 0 || v >= std::ssize(surface.places)) __builtin_trap();
 }
 
 /// An order of triangles, of which the surface has some.
@@ -44,7 +44,7 @@ void read_as_it_is(std::span<const std::uint8_t> input) {
   if (input.size() < 3) return;
   const std::size_t modes = input[2];
   input = input.subspan(3);
-  const std::size_t length = std::min<std::size_t>(input.size(), static_cast<std::size_t>(input.data()[-3] | input.data()[-2] << 8));
+  const std::size_t length = std::min<std::size_t>(input.size(), input.data()[-3] | input.data()[-2] << 8);
   const auto bytes = std::as_bytes(input);
   const codec::Surface surface = codec::read_surface(bytes.first(length), "input");
   check(surface);

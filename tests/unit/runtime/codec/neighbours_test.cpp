@@ -46,11 +46,11 @@ TEST(CodecNeighbours, are_nearly_the_nearest_on_an_even_surface_and_come_in_orde
       for (const Place& other : known) distances.push_back(calc_distance2(place, other));
       std::nth_element(distances.begin(), distances.begin() + 2 * kNeighbours - 1, distances.end());
       for (std::size_t k = 0; k < kNeighbours; ++k) {
-        const double here = calc_distance2(place, known[static_cast<std::size_t>(found[k])]);
+        const double here = calc_distance2(place, known[found[k]]);
         good += here <= distances[2 * kNeighbours - 1] ? 1 : 0;
         ++all;
         if (k > 0) {
-          EXPECT_LE(std::sqrt(calc_distance2(place, known[static_cast<std::size_t>(found[k - 1])])), std::sqrt(here) * 1.01 + 4.0);
+          EXPECT_LE(std::sqrt(calc_distance2(place, known[found[k - 1]])), std::sqrt(here) * 1.01 + 4.0);
         }
       }
     }
@@ -132,8 +132,7 @@ TEST(CodecStencil, lets_linear_fields_pass_with_their_gradients) {
   for (std::size_t i = 0; i < all.stencils.size(); ++i) {
     const Place& centre = all.surface.places[all.first + i];
     double h = 0.0;
-    for (const std::int32_t v : all.neighbours[i])
-      h += std::sqrt(calc_distance2(centre, all.surface.places[static_cast<std::size_t>(v)])) / kNeighbours;
+    for (const std::int32_t v : all.neighbours[i]) h += std::sqrt(calc_distance2(centre, all.surface.places[v])) / kNeighbours;
     const std::array<double, 3> slope{0.7 / h, -1.1 / h, 0.4 / h};
     const auto field = [&](const Place& x) {
       double value = 0.3;
@@ -143,7 +142,7 @@ TEST(CodecStencil, lets_linear_fields_pass_with_their_gradients) {
     double value = 0.0, one = 0.0;
     std::array<double, 3> gradient{};
     for (std::size_t k = 0; k < kNeighbours; ++k) {
-      const Place& x = all.surface.places[static_cast<std::size_t>(all.neighbours[i][k])];
+      const Place& x = all.surface.places[all.neighbours[i][k]];
       value += static_cast<double>(all.stencils[i].value[k]) * field(x);
       one += static_cast<double>(all.stencils[i].value[k]);
       for (std::size_t c = 0; c < 3; ++c) {
@@ -214,7 +213,7 @@ TEST(CodecLoops, of_all_instruction_sets_find_the_same_neighbours_in_the_same_or
     kLoopsPlain.find_nearest(near, place, reach, plain);
     if (reach <= kReachBits) {  // exact
       std::sort(expected.begin(), expected.end());
-      for (std::size_t k = 0; k < kNeighbours; ++k) ASSERT_EQ(plain[k], near.vertex[static_cast<std::size_t>(expected[k].second)]) << round;
+      for (std::size_t k = 0; k < kNeighbours; ++k) ASSERT_EQ(plain[k], near.vertex[expected[k].second]) << round;
     }
     for (const auto& [name, loops] : list_others()) {
       Neighbours found;

@@ -44,7 +44,7 @@ void expect_round_trip(const Mesh& mesh, unsigned levels) {
   EXPECT_EQ(std::set(written.triangles.begin(), written.triangles.end()).size(), mesh.triangles.size());
   std::size_t l = 0;
   for (std::size_t v = 0; v < places.size(); ++v) {
-    const auto from = static_cast<std::size_t>(written.vertices[v]);
+    const std::size_t from = written.vertices[v];
     while (v >= surface.level_begin[l + 1]) ++l;
     ASSERT_EQ(surface.places[v], places[from]) << v;
     ASSERT_EQ(level[from], l) << v;
@@ -52,8 +52,8 @@ void expect_round_trip(const Mesh& mesh, unsigned levels) {
   }
   for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
     Triangle back;
-    for (std::size_t k = 0; k < 3; ++k) back[k] = written.vertices[static_cast<std::size_t>(surface.triangles[t][k])];
-    ASSERT_EQ(rotate_least_first(back), rotate_least_first(mesh.triangles[static_cast<std::size_t>(written.triangles[t])])) << t;
+    for (std::size_t k = 0; k < 3; ++k) back[k] = written.vertices[surface.triangles[t][k]];
+    ASSERT_EQ(rotate_least_first(back), rotate_least_first(mesh.triangles[written.triangles[t]])) << t;
   }
 }
 
@@ -83,7 +83,7 @@ TEST(CodecSurface, takes_the_whole_lattice) {
       {-kMaxPlace, -kMaxPlace, kMaxPlace}, {kMaxPlace, kMaxPlace, -kMaxPlace}, {0, kMaxPlace, kMaxPlace}, {kMaxPlace, -kMaxPlace, 1}};
   const WrittenSurface written = write_surface({}, 1.0, places, mesh.triangles, {0, 0, 0, 0});
   const Surface surface = read_surface(example::as_bytes(written.bytes), "a surface");
-  for (std::size_t v = 0; v < places.size(); ++v) EXPECT_EQ(surface.places[v], places[static_cast<std::size_t>(written.vertices[v])]);
+  for (std::size_t v = 0; v < places.size(); ++v) EXPECT_EQ(surface.places[v], places[written.vertices[v]]);
 }
 
 // Raw, a vertex of a closed surface takes 12 bytes and its two triangles 24.
@@ -108,7 +108,7 @@ TEST(CodecSurface, gives_triangles_their_numbers_back) {
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) order.before.push_back(static_cast<std::int32_t>(t));
   std::shuffle(order.before.begin(), order.before.end(), random);
   for (const std::int32_t t : order.before) {
-    packed.push_back(mesh.triangles[static_cast<std::size_t>(t)]);
+    packed.push_back(mesh.triangles[t]);
     order.first.push_back(static_cast<std::uint8_t>(random() % 3));
     std::rotate(packed.back().begin(), packed.back().begin() + (3 - order.first.back()) % 3, packed.back().end());
   }

@@ -109,9 +109,9 @@ inline Mesh shuffle(const Mesh& mesh, unsigned seed) {
   std::iota(order.begin(), order.end(), 0);
   std::shuffle(order.begin(), order.end(), random);
   Mesh shuffled = mesh;
-  for (std::size_t v = 0; v < order.size(); ++v) shuffled.vertices_m[static_cast<std::size_t>(order[v])] = mesh.vertices_m[v];
+  for (std::size_t v = 0; v < order.size(); ++v) shuffled.vertices_m[order[v]] = mesh.vertices_m[v];
   for (Triangle& triangle : shuffled.triangles) {
-    for (std::int32_t& corner : triangle) corner = order[static_cast<std::size_t>(corner)];
+    for (std::int32_t& corner : triangle) corner = order[corner];
     std::rotate(triangle.begin(), triangle.begin() + random() % 3, triangle.end());
   }
   std::shuffle(shuffled.triangles.begin(), shuffled.triangles.end(), random);

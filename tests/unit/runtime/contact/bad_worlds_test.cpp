@@ -136,7 +136,7 @@ TEST(BadWorld, OverlapsAreFoundInWhateverOrderAndDirectionBodiesLie) {
   }
   EXPECT_NO_THROW(World{lattice});
   for (int i = 0; i < kCount; ++i) {
-    const auto moved = static_cast<std::size_t>((7 * i + 3) % kCount), still = static_cast<std::size_t>(i);
+    const std::size_t moved = (7 * i + 3) % kCount, still = i;
     if (moved == still) continue;
     WorldSpec spec = lattice;
     BodySpec &a = spec.bodies[still], &b = spec.bodies[moved];

@@ -62,7 +62,7 @@ inline Course run(const WorldSpec& spec, double settled_s, double end_s) {
   Course course;
   course.at_end.resize(spec.bodies.size());
   const auto take = [&](const events::Event& e) {
-    if (const auto* m = std::get_if<events::BodyMotion>(&e)) course.at_end[static_cast<std::size_t>(m->body)] = *m;
+    if (const auto* m = std::get_if<events::BodyMotion>(&e)) course.at_end[m->body] = *m;
     if (const auto* i = std::get_if<Impulse>(&e)) course.last_hit_s = i->time_s;
   };
   const double forever = std::numeric_limits<double>::infinity();

@@ -36,7 +36,7 @@ std::vector<std::vector<events::BodyMotion>> run(const WorldSpec& spec, double e
   World world(spec, {.end_s = end_s, .lasting_contacts = false});
   std::vector<std::vector<events::BodyMotion>> motions(spec.bodies.size());
   world.advance(end_s, std::numeric_limits<double>::infinity(), [&](const events::Event& e) {
-    if (const auto* m = std::get_if<events::BodyMotion>(&e)) motions[static_cast<std::size_t>(m->body)].push_back(*m);
+    if (const auto* m = std::get_if<events::BodyMotion>(&e)) motions[m->body].push_back(*m);
     if (hits != nullptr && std::holds_alternative<Impulse>(e)) ++*hits;
   });
   return motions;

@@ -53,8 +53,8 @@ TEST(Ringing, GivesBodiesEqualAndOppositeForcesAndTheirMomentum) {
   Vec3 on[2] = {};
   for (const events::Force& f : r.forces) {
     for (int k = 0; k < f.count; ++k) {
-      const auto& j = f.impulse_n_s[static_cast<std::size_t>(k)];
-      const Pose pose = pose_at(paths.poses[static_cast<std::size_t>(f.body)], f.time_s + k * f.step_s);
+      const auto& j = f.impulse_n_s[k];
+      const Pose pose = pose_at(paths.poses[f.body], f.time_s + k * f.step_s);
       on[f.body] = on[f.body] + rotate(pose.rotation, {j[0], j[1], j[2]});
     }
   }
@@ -165,7 +165,7 @@ TEST(Ringing, HeapsOfAllKindsOfBodiesKeepTheBooks) {
     }
     const int count = 2 + static_cast<int>(draw(0, 4));
     for (int k = 0; k < count; ++k) {
-      const auto kind = static_cast<std::size_t>(draw(0, 5));
+      const std::size_t kind = draw(0, 5);
       // One after the other: the order of arguments is the compiler's.
       double numbers[12];
       for (double& x : numbers) x = draw(-1.0, 1.0);
@@ -197,7 +197,7 @@ TEST(Ringing, WhatLiesOnTheGroundIsPushedByItWhenItIsStruck) {
   double on_ball = 0.0, on_plate = 0.0, by_ball = 0.0;
   for (const events::Force& f : r.forces)
     for (int k = 0; k < f.count; ++k) {
-      const double up = f.impulse_n_s[static_cast<std::size_t>(k)][2];
+      const double up = f.impulse_n_s[k][2];
       if (f.body == 1) on_ball += up;
       if (f.body == 0) (f.other == 1 ? by_ball : on_plate) += up;
     }

@@ -22,7 +22,7 @@ TEST(Standing, AStackOfTenStandsForAnHourInSilence) {
   EXPECT_EQ(calc_drift(course), 0.0);
   EXPECT_LT(course.last_hit_s, 0.01);
   EXPECT_EQ(course.steps, 0) << "it does not sleep";
-  for (int i = 0; i < 10; ++i) EXPECT_NEAR(course.at_end[static_cast<std::size_t>(i)].position_m[2], 0.025 + 0.05 * i, 1e-6) << i;
+  for (int i = 0; i < 10; ++i) EXPECT_NEAR(course.at_end[i].position_m[2], 0.025 + 0.05 * i, 1e-6) << i;
 }
 
 TEST(Standing, ABoxOnOthersDoesNotCreep) {
@@ -54,8 +54,8 @@ TEST(Standing, NothingMovesOrStrikesInTheGroupOfSomethingFast) {
   world.advance(0.3, std::numeric_limits<double>::infinity(), [&](const events::Event& e) {
     if (const auto* i = std::get_if<Impulse>(&e)) hits += i->body >= 2 ? 1 : 0;
     if (const auto* m = std::get_if<events::BodyMotion>(&e)) {
-      last[static_cast<std::size_t>(m->body)] = *m;
-      if (m->time_s == 0.0) begun[static_cast<std::size_t>(m->body)] = *m;
+      last[m->body] = *m;
+      if (m->time_s == 0.0) begun[m->body] = *m;
     }
   });
   EXPECT_NEAR(last[1].position_m[0] - begun[1].position_m[0], 1.5, 1e-6) << "nothing brakes it";

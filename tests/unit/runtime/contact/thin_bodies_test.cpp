@@ -233,12 +233,10 @@ TEST_P(Falling, GivesItsModesLessThanTheMotionLost) {
       std::complex<double> sum = 0.0;
       for (const events::Force& f : forces) {
         double phi = 0.0;
-        for (std::size_t c = 0; c < 3; ++c)
-          phi +=
-              f.barycentric[c] * plate.shape_at(static_cast<std::size_t>(plate.triangles[static_cast<std::size_t>(f.triangle)][c]), i)[2];
+        for (std::size_t c = 0; c < 3; ++c) phi += f.barycentric[c] * plate.shape_at(plate.triangles[f.triangle][c], i)[2];
         for (int k = 0; k < f.count; ++k) {
           const double s = f.time_s + k * f.step_s;
-          const double force = phi * f.impulse_n_s[static_cast<std::size_t>(k)][2] / f.step_s;
+          const double force = phi * f.impulse_n_s[k][2] / f.step_s;
           sum += force * (std::exp(p * (end_s - s)) - std::exp(p * (end_s - s - f.step_s))) / p;
         }
       }

@@ -68,7 +68,7 @@ TEST(ContactAudit, CountsTheHitsThatEventsHave) {
   std::array<int, 2> late{};
   world.advance(kEnd, kForever, [&](const events::Event& event) {
     const auto* impulse = std::get_if<events::Impulse>(&event);
-    if (impulse != nullptr && impulse->time_s > kEnd - 1.0) ++late[static_cast<std::size_t>(impulse->body)];
+    if (impulse != nullptr && impulse->time_s > kEnd - 1.0) ++late[impulse->body];
   });
   const ContactAudit audit = world.get_statistics().contacts;
   EXPECT_GT(late[0], late[1]);

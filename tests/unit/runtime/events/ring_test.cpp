@@ -65,7 +65,7 @@ TEST(EventRing, TakesFromManyThreadsAtOnce) {
     }
     ++total;
     const auto& impulse = std::get<Impulse>(event);
-    ASSERT_EQ(impulse.time_s, static_cast<double>(next[static_cast<std::size_t>(impulse.body)]++));
+    ASSERT_EQ(impulse.time_s, static_cast<double>(next[impulse.body]++));
     ASSERT_EQ(impulse.impulse_n_s[0], impulse.time_s);
   }
   for (std::thread& producer : producers) producer.join();

@@ -43,7 +43,7 @@ void check_set(const std::vector<Vec3>& unit) {
   EXPECT_EQ(directions.count_triangles(), 2 * unit.size() - 4);  // Euler: every direction is a corner
   for (std::size_t i = 0; i < unit.size(); ++i) {
     const Surrounding at = directions.find(unit[i]);
-    const std::size_t most = static_cast<std::size_t>(std::max_element(at.share.begin(), at.share.end()) - at.share.begin());
+    const std::size_t most = std::max_element(at.share.begin(), at.share.end()) - at.share.begin();
     EXPECT_EQ(at.direction[most], static_cast<int>(i));
     EXPECT_NEAR(at.share[most], 1.0, 1e-9);
   }
@@ -54,11 +54,11 @@ void check_set(const std::vector<Vec3>& unit) {
     for (std::size_t k = 0; k < 3; ++k) {
       EXPECT_GE(around.share[k], 0.0);
       total += around.share[k];
-      sum = sum + around.share[k] * unit[static_cast<std::size_t>(around.direction[k])];
+      sum = sum + around.share[k] * unit[around.direction[k]];
     }
     EXPECT_NEAR(total, 1.0, 1e-12);
     EXPECT_LT(norm(normalise(sum) - d), 1e-9);
-    const auto corner = [&](std::size_t k) { return unit[static_cast<std::size_t>(around.direction[k])]; };
+    const auto corner = [&](std::size_t k) { return unit[around.direction[k]]; };
     const Vec3 normal = normalise(cross(corner(1) - corner(0), corner(2) - corner(0)));
     for (const Vec3& other : unit) EXPECT_LT(dot(normal, other - corner(0)), 1e-6);
   }
@@ -85,7 +85,7 @@ TEST(Directions, SharesAreContinuous) {
     const double angle = 2.0 * std::numbers::pi * i / kSteps;
     const Surrounding around = directions.find(0.2 * axis + std::cos(angle) * across + std::sin(angle) * third);
     now.assign(unit.size(), 0.0);
-    for (std::size_t k = 0; k < 3; ++k) now[static_cast<std::size_t>(around.direction[k])] += around.share[k];
+    for (std::size_t k = 0; k < 3; ++k) now[around.direction[k]] += around.share[k];
     for (std::size_t k = 0; k < unit.size() && i > 0; ++k) ASSERT_LT(std::abs(now[k] - before[k]), 0.03) << i;
     before = now;
   }

@@ -70,7 +70,7 @@ TEST(EarFilter, IsTheResponseAndTheDelay) {
   const testing::Heard heard = testing::hear_pulse(head, direction);
   for (std::size_t ear = 0; ear < 2; ++ear) {
     double delay = base::kSincHalf - 1.0;
-    std::vector<double> response(static_cast<std::size_t>(head->get_taps()));
+    std::vector<double> response(head->get_taps());
     for (std::size_t i = 0; i < 3; ++i) {
       const double weight = static_cast<double>(blend[ear].weight[i]);
       delay += weight * head->get_delay(blend[ear].response[i]);

@@ -43,7 +43,7 @@ TEST(HeadWithoutHeap, ProcessingTakesNoMemory) {
     std::vector<double> input(200, 1.0), left(200), right(200);
     const long before = g_allocations;
     for (int i = 0; i < 500; ++i) {
-      const auto size = static_cast<std::size_t>(1 + i % 200);
+      const std::size_t size = 1 + i % 200;
       const Vec3 direction{std::cos(0.1 * i), std::sin(0.1 * i), std::cos(0.37 * i)};
       filter.process(direction, std::span(input).first(size), std::span(left).first(size), std::span(right).first(size));
       if (i == 300) filter.reset();

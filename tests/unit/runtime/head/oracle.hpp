@@ -37,7 +37,7 @@ struct Heard {
 };
 inline Heard hear_pulse(const std::shared_ptr<const Head>& head, const Vec3& direction) {
   EarFilter filter(head);
-  const auto length = static_cast<std::size_t>(head->get_taps() + head->get_max_delay() + 2 * kSincTaps);
+  const std::size_t length = head->get_taps() + head->get_max_delay() + 2 * kSincTaps;
   Heard heard{std::vector<double>(length), std::vector<double>(length)};
   std::vector<double> pulse(length);
   pulse[0] = 1.0;

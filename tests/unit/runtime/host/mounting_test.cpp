@@ -65,7 +65,7 @@ TEST_F(Mounting, GivesBodiesOfOneBankTheirOwnDecaysAndSharesThoseThatAreAlike) {
     {"name": "e", "bank": "fixed.hdf", "supports": {"end": {"loss": 0.1}}})");
   const Banks banks = read_banks(scene);
   EXPECT_EQ(banks.size(), 4U);
-  const auto get = [&](int body) -> const bank::Bank& { return *scene.bodies[static_cast<std::size_t>(body)].spec.bank; };
+  const auto get = [&](int body) -> const bank::Bank& { return *scene.bodies[body].spec.bank; };
   EXPECT_EQ(&get(1), &get(3));
   for (std::size_t m = 0; m < get(0).mode_count(); ++m) {
     EXPECT_LT(get(0).decay_per_s[m], get(1).decay_per_s[m]);

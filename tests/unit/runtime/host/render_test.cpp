@@ -330,7 +330,7 @@ TEST(Render, EffectsCanBeTakenAway) {
 TEST(Render, NoSoundComesBeforeTheContactCanBeHeard) {
   const Case c({{1000.0, 5.0, 2.0}}, {0.0, 3.43, 0.0}, 0.1);
   const Heard sound = c.render();
-  const auto arrival = static_cast<std::size_t>((0.1 + std::hypot(3.43, 0.1) / 343.0) * 48000.0);
+  const std::size_t arrival = (0.1 + std::hypot(3.43, 0.1) / 343.0) * 48000.0;
   for (std::size_t n = 0; n + 16 < arrival; ++n) ASSERT_EQ(sound.pressure_pa[0][n], 0.0) << n;
   EXPECT_GT(std::abs(sound.pressure_pa[0][arrival + 2]), 0.1);
 }
@@ -454,8 +454,7 @@ SF_INFO read_info(const std::string& header, std::uint64_t length) {
     auto& from = *static_cast<Source*>(user);
     count = std::min(count, from.length - from.at);
     for (sf_count_t i = 0; i < count; ++i, ++from.at)
-      static_cast<char*>(data)[i] =
-          static_cast<std::size_t>(from.at) < from.header->size() ? (*from.header)[static_cast<std::size_t>(from.at)] : '\0';
+      static_cast<char*>(data)[i] = static_cast<std::size_t>(from.at) < from.header->size() ? (*from.header)[from.at] : '\0';
     return count;
   };
   io.tell = [](void* user) { return static_cast<Source*>(user)->at; };

@@ -76,7 +76,7 @@ TEST(Dense, AddsTheColumnsThatAreNamed) {
   std::vector<double> y(rows, 1.0);
   get_functions().add_columns(A.data(), static_cast<std::size_t>(rows), which.data(), x.data(), x.size(), y.data(), y.size());
   const Eigen::VectorXd expected = Eigen::VectorXd::Ones(rows) + 2.0 * A.col(7) - 1.5 * A.col(3);
-  for (int i = 0; i < rows; ++i) EXPECT_NEAR(y[static_cast<std::size_t>(i)], expected[i], 1e-15) << i;
+  for (int i = 0; i < rows; ++i) EXPECT_NEAR(y[i], expected[i], 1e-15) << i;
 }
 
 }  // namespace

@@ -26,21 +26,19 @@ inline std::vector<std::array<double, 3>> calc_legendre(double x) {
   p[0] = {1, 0, 0};
   p[1] = {x, 1, 0};
   for (int k = 1; k < kDegree; ++k) {
-    const auto& one = p[static_cast<std::size_t>(k)];
-    const auto& before = p[static_cast<std::size_t>(k) - 1];
-    p[static_cast<std::size_t>(k) + 1] = {((2 * k + 1) * x * one[0] - k * before[0]) / (k + 1),
-                                          ((2 * k + 1) * (one[0] + x * one[1]) - k * before[1]) / (k + 1),
-                                          ((2 * k + 1) * (2 * one[1] + x * one[2]) - k * before[2]) / (k + 1)};
+    const auto& one = p[k];
+    const auto& before = p[k - 1];
+    p[k + 1] = {((2 * k + 1) * x * one[0] - k * before[0]) / (k + 1), ((2 * k + 1) * (one[0] + x * one[1]) - k * before[1]) / (k + 1),
+                ((2 * k + 1) * (2 * one[1] + x * one[2]) - k * before[2]) / (k + 1)};
   }
   for (int k = 0; k <= kDegree; ++k)
-    for (double& value : p[static_cast<std::size_t>(k)]) value *= std::sqrt(k + 0.5);
+    for (double& value : p[k]) value *= std::sqrt(k + 0.5);
   return p;
 }
 inline double FreePlate::calc_shape(std::size_t mode, double x, double y) const {
   const auto px = calc_legendre(x), py = calc_legendre(y);
   double sum = 0.0;
-  for (std::size_t k = 0; k < products.size(); ++k)
-    sum += coefficients[mode][k] * px[static_cast<std::size_t>(products[k][0])][0] * py[static_cast<std::size_t>(products[k][1])][0];
+  for (std::size_t k = 0; k < products.size(); ++k) sum += coefficients[mode][k] * px[products[k][0]][0] * py[products[k][1]][0];
   return 2.0 / std::sqrt(mass) * sum;  // mean of its square over the plate, times the mass: 1
 }
 
@@ -110,8 +108,8 @@ inline FreePlate make_free_plate(double side, double thickness, double highest_h
     std::vector<double> A(m * m), V;
     for (std::size_t r = 0; r < m; ++r)
       for (std::size_t s = 0; s < m; ++s) {
-        const auto i = static_cast<std::size_t>(plate.products[members[r]][0]), j = static_cast<std::size_t>(plate.products[members[r]][1]);
-        const auto k = static_cast<std::size_t>(plate.products[members[s]][0]), l = static_cast<std::size_t>(plate.products[members[s]][1]);
+        const std::size_t i = plate.products[members[r]][0], j = plate.products[members[r]][1];
+        const std::size_t k = plate.products[members[s]][0], l = plate.products[members[s]][1];
         A[r * m + s] = I22[i * n + k] * I00[j * n + l] + I00[i * n + k] * I22[j * n + l] +
                        2.0 * (1.0 - kPoisson) * I11[i * n + k] * I11[j * n + l] +
                        kPoisson * (I02[k * n + i] * I02[j * n + l] + I02[i * n + k] * I02[l * n + j]);

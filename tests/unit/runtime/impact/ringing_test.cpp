@@ -149,7 +149,7 @@ TEST(Ringing, LeftAndTakenUpAgainGivesTheSameBits) {
     EXPECT_TRUE(parts.has_ended() || parts.get_time() >= time);
     EXPECT_LT(parts.get_time(), time + parts.get_step_length());
     for (const Pulse& pulse : parts.take_pulses()) {
-      const auto silent = static_cast<std::size_t>(std::llround((pulse.start_s - end) / pulse.step_s));
+      const std::size_t silent = std::llround((pulse.start_s - end) / pulse.step_s);
       if (!samples.empty()) samples.resize(samples.size() + silent);
       samples.insert(samples.end(), pulse.impulse_n_s.begin(), pulse.impulse_n_s.end());
       end = pulse.start_s + pulse.step_s * static_cast<double>(pulse.impulse_n_s.size());

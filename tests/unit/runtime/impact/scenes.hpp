@@ -72,7 +72,7 @@ inline void expect_sound(Impact& impact, const std::vector<Contact>& contacts) {
     for (std::size_t i = 0; i < body.q.size(); ++i) ASSERT_TRUE(std::isfinite(body.q[i] + body.q_dot[i]));
   }
   for (const Pulse& pulse : impact.take_pulses()) {
-    const Contact& contact = contacts[static_cast<std::size_t>(pulse.contact)];
+    const Contact& contact = contacts[pulse.contact];
     for (const Vec3& j : pulse.impulse_n_s) {
       const double normal = dot(j, contact.normal);
       const Vec3 tangential = j - normal * contact.normal;

@@ -185,7 +185,7 @@ TEST(mechanism, impulse_beyond_the_centre_of_percussion_pushes_the_hinge_the_oth
   }
   // The mobility says the same: velocity at a depth d per impulse at a depth e.
   const std::vector<double> w = m->calc_mobility(m->get_start(), 0);
-  const auto at = [&](int row, int column) { return w[static_cast<std::size_t>(6 * row + column)]; };
+  const auto at = [&](int row, int column) { return w[6 * row + column]; };
   EXPECT_NEAR(at(0, 0), 0.25 * l * l / inertia, 1e-12);
   EXPECT_NEAR(at(4, 4), 1.0 / inertia, 1e-12);
   EXPECT_NEAR(at(4, 0), -0.5 * l / inertia, 1e-12);
@@ -201,10 +201,8 @@ TEST(mechanism, mobility_of_a_free_pair_keeps_momentum) {
   for (int column = 0; column < 3; ++column) {
     Vec3 momentum{};
     for (int body = 0; body < 2; ++body)
-      for (std::size_t k = 0; k < 3; ++k)
-        momentum[k] += members[static_cast<std::size_t>(body)].mass_kg *
-                       w[6 * (6 * static_cast<std::size_t>(body) + k) + static_cast<std::size_t>(column)];
-    for (int k = 0; k < 3; ++k) EXPECT_NEAR(momentum[static_cast<std::size_t>(k)], k == column ? 1.0 : 0.0, 1e-12);
+      for (std::size_t k = 0; k < 3; ++k) momentum[k] += members[body].mass_kg * w[6 * (6 * body + k) + static_cast<std::size_t>(column)];
+    for (int k = 0; k < 3; ++k) EXPECT_NEAR(momentum[k], k == column ? 1.0 : 0.0, 1e-12);
   }
 }
 

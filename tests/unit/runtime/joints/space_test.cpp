@@ -172,7 +172,7 @@ TEST(joints, hanging_chain_of_twenty_sleeps_where_it_is) {
   Space space(std::move(solids), std::move(states), std::nullopt, kGravity, {}, links);
   run(space, 1.0);
   EXPECT_TRUE(space.is_all_asleep());
-  for (int i = 0; i < 20; ++i) EXPECT_LT(norm(space.state(i).centre - start[static_cast<std::size_t>(i)].centre), 1e-12);
+  for (int i = 0; i < 20; ++i) EXPECT_LT(norm(space.state(i).centre - start[i].centre), 1e-12);
 }
 
 TEST(joints, sleeping_pendulum_takes_part_in_the_impact_on_a_box_that_touches_it) {

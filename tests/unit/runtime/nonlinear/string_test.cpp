@@ -55,8 +55,7 @@ TEST(String, WhirlsWithItsEnergyAndItsAngularMomentum) {
     CoupledModes modes(body.energy, body.modes, 48000.0, {.integrator = integrator, .relaxation_s = 0.0});
     for (int n = 0; n < kCount; ++n) {
       modes.set_state(n, string.to_q(4e-3 / (1.0 + n * n)), 0.0);
-      modes.set_state(n + kCount, 0.0,
-                      0.7 * string.to_q(4e-3 / (1.0 + n)) * std::sqrt(body.modes[static_cast<std::size_t>(n)].eigenvalue_rad2_s2));
+      modes.set_state(n + kCount, 0.0, 0.7 * string.to_q(4e-3 / (1.0 + n)) * std::sqrt(body.modes[n].eigenvalue_rad2_s2));
     }
     const auto calc_momentum = [&] {
       double sum = 0.0;

@@ -22,7 +22,7 @@ constexpr double kAirKgM2S = 1.21 * 343.0;
 double calc_radiated(const bank::Bank& bank, double length_s) {
   synth::Voice voice(synth::Model::make(bank, {.rate_hz = kRate}));
   voice.strike({.time_s = 0.5 / kRate, .triangle = 0, .barycentric = {1, 0, 0}, .impulse_n_s = {0, 0, 1}});
-  std::vector<float> pressure(static_cast<std::size_t>(length_s * kRate), 0.0F);
+  std::vector<float> pressure(length_s * kRate, 0.0F);
   voice.process(pressure);
   double square = 0.0;
   for (const float p : pressure) square += static_cast<double>(p) * p;

@@ -17,7 +17,7 @@ using tests::g_allocations;
 TEST(TransfersHeap, EvaluatingTakesNoMemoryAndNeverThrows) {
   bank::Bank bank = testing::make_empty_multipoles();
   for (const int order : {0, 7, 120, 3})
-    testing::add_multipoles(bank, 1.0 + order, std::vector<testing::Complex>(static_cast<std::size_t>((order + 1) * (order + 1)), 0.1));
+    testing::add_multipoles(bank, 1.0 + order, std::vector<testing::Complex>((order + 1) * (order + 1), 0.1));
   const long before_making = g_allocations;
   const Transfers transfers(bank);
   EXPECT_GT(g_allocations - before_making, 0) << "the counter sees nothing";

@@ -29,7 +29,7 @@ using testing::kSphereRadius;
 constexpr double kWaveResistance = bank::kAirDensityKgM3 * bank::kSoundSpeedMs;
 
 std::vector<Complex> evaluate(const Transfers& transfers, const Vec3& from_centre_m) {
-  std::vector<std::int32_t> modes(static_cast<std::size_t>(transfers.get_mode_count()));
+  std::vector<std::int32_t> modes(transfers.get_mode_count());
   std::iota(modes.begin(), modes.end(), 0);
   std::vector<std::complex<float>> transfer(modes.size());
   transfers.evaluate(transfers.get_centre_m() + from_centre_m, modes, transfer);
@@ -63,8 +63,8 @@ TEST(Transfers, EachMultipoleIsItsClosedFormAtEveryDistance) {
   for (const double ka : {1e-4, 0.01, 0.1, 0.5, 1.0, pi, 10.0, 40.0, 60.0}) {
     for (int l = 0; l <= 8; ++l) {
       modes.push_back({ka, l, (l * 5 + 2) % (2 * l + 1) - l});
-      std::vector<Complex> coefficients(static_cast<std::size_t>((l + 1) * (l + 1)));
-      coefficients[static_cast<std::size_t>(l * l + l + modes.back().m)] = kOne;
+      std::vector<Complex> coefficients((l + 1) * (l + 1));
+      coefficients[l * l + l + modes.back().m] = kOne;
       add_multipoles(bank, ka, coefficients);
     }
   }
@@ -155,7 +155,7 @@ bank::Bank make_random_bank(int modes, int highest) {
   std::normal_distribution<double> normal;
   for (int i = 0; i < modes; ++i) {
     const int order = static_cast<int>(random() % static_cast<unsigned>(highest + 1));
-    std::vector<Complex> coefficients(static_cast<std::size_t>((order + 1) * (order + 1)));
+    std::vector<Complex> coefficients((order + 1) * (order + 1));
     for (Complex& a : coefficients) a = {normal(random), normal(random)};
     add_multipoles(bank, 0.5 + 10.0 * i / modes, coefficients);
   }
@@ -189,7 +189,7 @@ TEST(Transfers, AnySelectionInAnyOrderIsTheSame) {
   std::vector<std::complex<float>> some(modes.size());
   transfers.evaluate(transfers.get_centre_m() + place, modes, some);
   // Harmonics go to the highest order of the selection, and are the same to every order.
-  for (std::size_t i = 0; i < modes.size(); ++i) EXPECT_EQ(Complex(some[i]), all[static_cast<std::size_t>(modes[i])]) << modes[i];
+  for (std::size_t i = 0; i < modes.size(); ++i) EXPECT_EQ(Complex(some[i]), all[modes[i]]) << modes[i];
   transfers.evaluate(place, {}, {});
 }
 
@@ -206,8 +206,7 @@ TEST(Transfers, TwoPlacesAtOnceAreTheSame) {
       const auto alone = evaluate(transfers, places[p] - kSphereCentre);
       const double distance = norm(places[p] - kSphereCentre);
       for (std::size_t i = 0; i < modes.size(); ++i)
-        EXPECT_LT(std::abs(Complex(both[p][i]) - alone[static_cast<std::size_t>(modes[i])]) * distance, 1e-4 * transfers.get_rms(modes[i]))
-            << modes[i];
+        EXPECT_LT(std::abs(Complex(both[p][i]) - alone[modes[i]]) * distance, 1e-4 * transfers.get_rms(modes[i])) << modes[i];
     }
   }
 }
@@ -327,7 +326,7 @@ TEST(Transfers, SaysWhatItHolds) {
   EXPECT_GT(transfers.calc_bytes(), 2 * bank.multipoles.coefficient.size());
   EXPECT_EQ(make_transfers(bank::Bank{}), nullptr);
   EXPECT_EQ(make_transfers(bank)->get_mode_count(), 20);
-  for (int m = 0; m < 20; ++m) EXPECT_EQ(transfers.get_order(m), bank.multipoles.order[static_cast<std::size_t>(m)]);
+  for (int m = 0; m < 20; ++m) EXPECT_EQ(transfers.get_order(m), bank.multipoles.order[m]);
 }
 
 TEST(Transfers, BanksWithoutMultipolesAndTornOnesAreRefused) {

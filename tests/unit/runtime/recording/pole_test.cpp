@@ -18,7 +18,7 @@ TEST(Pole, AnswersATone) {
       const double omega = 2.0 * std::numbers::pi * freq_hz, turn = omega / 48000.0;
       // z P = keep P + the sum of weight[j] z^{j - 15}, of g = 1.
       Complex sum = 0.0;
-      for (int j = 0; j < kPoleTaps; ++j) sum += pole.weight[static_cast<std::size_t>(j)] * std::polar(1.0, turn * (j - 15));
+      for (int j = 0; j < kPoleTaps; ++j) sum += pole.weight[j] * std::polar(1.0, turn * (j - 15));
       const Complex found = sum / (std::polar(1.0, turn) - pole.keep), wanted = 1.0 / Complex(343.0 / radius_m, omega);
       EXPECT_LT(std::abs(found / wanted - 1.0), 2e-3) << radius_m << " m, " << freq_hz << " Hz";
     }

@@ -32,7 +32,7 @@ TEST(Resampler, TonesKeepTheirTimeAndLevel) {
     for (const double share : {0.0, 0.01, 0.2, 0.39}) {
       const double freq_hz = share * std::min(from, to);
       const auto sound = resample(from, to, freq_hz, {4000});
-      const auto begin = static_cast<std::size_t>(40.0 * std::max(1.0, to / from));  // it begins with a step
+      const std::size_t begin = 40.0 * std::max(1.0, to / from);  // it begins with a step
       for (std::size_t n = begin; n < sound.size(); ++n)
         ASSERT_NEAR(sound[n], std::cos(2.0 * std::numbers::pi * freq_hz * static_cast<double>(n) / to), 1.5e-3)
             << from << " " << to << " " << freq_hz << " " << n;

@@ -84,7 +84,7 @@ struct DropBody {
 };
 
 inline DropBody make_drop_body(int body, int matter) {
-  const DropMatter& m = kDropMatter.at(static_cast<std::size_t>(matter));
+  const DropMatter& m = kDropMatter.at(matter);
   shape::tests::Solid surface = make_drop_surface(body);
   bank::Bank bank;
   bank.material.density_kg_m3 = m.density_kg_m3;
@@ -121,7 +121,7 @@ struct Drop {
 
 /// Any 16 bytes are a drop; half of all tilts are below 10 degrees.
 inline Drop decode_drop(const std::array<std::uint8_t, 16>& bytes) {
-  const auto get = [&](int i) { return bytes[static_cast<std::size_t>(i)] / 255.0; };
+  const auto get = [&](int i) { return bytes[i] / 255.0; };
   const auto get_log = [&](int i, double low, double high) { return low * std::pow(high / low, get(i)); };
   Drop d;
   d.body = bytes[0] % 12;

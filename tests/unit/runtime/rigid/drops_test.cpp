@@ -16,7 +16,7 @@ TEST(drops, touches_with_the_floor_are_complete_at_the_end_of_every_step) {
     for (std::uint8_t& byte : bytes) byte = static_cast<std::uint8_t>(random() & 255U);
     bytes[0] = static_cast<std::uint8_t>(n);  // each body twice
     const Drop drop = decode_drop(bytes);
-    SCOPED_TRACE(kDropBodies.at(static_cast<std::size_t>(drop.body)));
+    SCOPED_TRACE(kDropBodies.at(drop.body));
     EXPECT_LE(run_drop(drop, 0.5).missed_m, 2e-6 + 1e-9);
   }
 }
@@ -55,7 +55,7 @@ TEST(drops, cup_or_bowl_in_a_bowl_is_not_lifted) {
       space.step(1.0);
       kinetic_j = std::max(kinetic_j, calc_kinetic(body, space.state(1)));
     }
-    EXPECT_LT(space.calc_books().lifted_j, kWanted.lifted * kinetic_j) << kDropBodies.at(static_cast<std::size_t>(kind));
+    EXPECT_LT(space.calc_books().lifted_j, kWanted.lifted * kinetic_j) << kDropBodies.at(kind);
   }
 }
 

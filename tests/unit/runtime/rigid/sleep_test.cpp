@@ -69,7 +69,7 @@ TEST(sleep, bodies_of_a_group_sleep_while_others_of_it_move) {
   int still = 0;
   for (const int box : boxes) {
     still += space.is_still(box) ? 1 : 0;
-    EXPECT_LT(norm(space.state(box).centre - table.states[static_cast<std::size_t>(box)].centre), 1e-6) << box;
+    EXPECT_LT(norm(space.state(box).centre - table.states[box].centre), 1e-6) << box;
   }
   EXPECT_GE(still, 8) << "what slides may have woken some a moment ago";
   EXPECT_FALSE(space.is_still(slider));
@@ -245,8 +245,7 @@ TEST(sleep, load_that_comes_slowly_wakes_and_what_carries_it_sleeps_again) {
     EXPECT_GE(slept[n], 3) << n;
     EXPECT_GE(woke[n], 2) << n;
   }
-  for (const int body : {blocks[0], blocks[1], board})
-    EXPECT_LT(norm(space.state(body).centre - table.states[static_cast<std::size_t>(body)].centre), 5e-6) << body;
+  for (const int body : {blocks[0], blocks[1], board}) EXPECT_LT(norm(space.state(body).centre - table.states[body].centre), 5e-6) << body;
   EXPECT_NEAR(space.state(slider).centre[0], 0.25, 5e-4);
   const Books after = space.calc_books();
   EXPECT_NEAR(after.calc_total(), before_j, 1e-8 * before_j);

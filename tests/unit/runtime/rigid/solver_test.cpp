@@ -113,7 +113,7 @@ TEST_P(Towers, of_ten_carry_their_weight) {
   EXPECT_TRUE(solver.solve_directly(movers, points, 10));
   for (const Mover& m : movers) EXPECT_LT(norm(m.velocity), 1e-5 * g * h);
   double carried = 0.0;
-  for (int k = 0; k < 4; ++k) carried += points[static_cast<std::size_t>(k)].impulse[2];
+  for (int k = 0; k < 4; ++k) carried += points[k].impulse[2];
   EXPECT_NEAR(carried, total * g * h, 1e-5 * total * g * h);
 }
 

@@ -92,7 +92,7 @@ TEST(AccelerationNoise, ASphereOfOneCentimetreRingsAt5459HertzFor29Microseconds)
   ASSERT_GE(crossings.size(), 3u);
   const double half_period = (crossings[2] - crossings[1]) / kRate;
   EXPECT_NEAR(0.5 / half_period, 5459.0, 0.5);
-  const auto at = [&](double sample) { return std::abs(dipole[2][static_cast<std::size_t>(std::lround(sample))]); };
+  const auto at = [&](double sample) { return std::abs(dipole[2][std::lround(sample)]); };
   const double quarter = 0.5 * half_period * kRate;
   const double decay = half_period / std::log(at(crossings[0] + quarter) / at(crossings[1] + quarter));
   EXPECT_NEAR(decay * 1e6, 29.15, 0.05);

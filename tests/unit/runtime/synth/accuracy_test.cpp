@@ -34,7 +34,7 @@ Fit fit(const std::vector<float>& seen, std::int64_t from, double freq_hz, doubl
       const long double phase = std::remainder(omega_d * t, 2.0L * std::numbers::pi_v<long double>);
       // As q' of the closed form, and in quadrature with it.
       const long double c = size * (std::cos(phase) - decay / omega_d * std::sin(phase)), s = size * std::sin(phase);
-      cc += c * c, cs += c * s, ss += s * s, cy += c * seen[static_cast<std::size_t>(n)], sy += s * seen[static_cast<std::size_t>(n)];
+      cc += c * c, cs += c * s, ss += s * s, cy += c * seen[n], sy += s * seen[n];
     }
     const long double det = cc * ss - cs * cs;
     return std::array<double, 2>{static_cast<double>((cy * ss - sy * cs) / det), static_cast<double>((sy * cc - cy * cs) / det)};
@@ -47,7 +47,7 @@ Fit fit(const std::vector<float>& seen, std::int64_t from, double freq_hz, doubl
     const long double phase = std::remainder(omega_d * t, 2.0L * std::numbers::pi_v<long double>);
     const double model =
         static_cast<double>(size * (whole[0] * (std::cos(phase) - decay / omega_d * std::sin(phase)) + whole[1] * std::sin(phase)));
-    rest += (seen[static_cast<std::size_t>(n)] - model) * (seen[static_cast<std::size_t>(n)] - model);
+    rest += (seen[n] - model) * (seen[n] - model);
     total += model * model;
   }
   // A wrong frequency has turned the phase away from that of the closed form by the end.

@@ -77,7 +77,7 @@ double play(const bank::Bank& bank, const std::vector<events::Event>& events, st
   Synthesiser synthesiser({.microphones_m = {Vec3{}}, .max_strikes = 256});
   const int body = synthesiser.add_body(Model::make(bank), {.position_m = {0, 1, 0}, .effects = {Effect::kModal, Effect::kHertzPulse}});
   for (const events::Event& event : events) synthesiser.push(event);
-  std::vector<float> out(static_cast<std::size_t>(frames));
+  std::vector<float> out(frames);
   float* channel = out.data();
   for (std::size_t b = 0; b < blocks; ++b) synthesiser.process(&channel, 1, frames);
   return synthesiser.get_deflection(body);
@@ -184,8 +184,7 @@ TEST(Bending, RandomBlowsAreJudgedAsByTheWholeDisplacementField) {
         move(blows[next].time_s);
         for (std::size_t m = 0; m < modes; ++m)
           for (std::size_t c = 0; c < 3; ++c)
-            v[m] += blows[next].barycentric[c] * blows[next].impulse_n_s[2] *
-                    bank.shape_at(static_cast<std::size_t>(bank.triangles[static_cast<std::size_t>(blows[next].triangle)][c]), m)[2];
+            v[m] += blows[next].barycentric[c] * blows[next].impulse_n_s[2] * bank.shape_at(bank.triangles[blows[next].triangle][c], m)[2];
       }
       move(at_s);
       for (std::size_t vertex = 0; vertex < bank.vertex_count() / 2; ++vertex) {

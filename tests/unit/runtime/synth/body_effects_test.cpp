@@ -29,7 +29,7 @@ events::Impulse make_impulse(int body, double time_s) {
 
 /// Plays and appends to the channels.
 void play(Synthesiser& synthesiser, std::vector<std::vector<float>>& out, int frames, int block = 128) {
-  const auto channels = static_cast<std::size_t>(synthesiser.get_microphone_count());
+  const std::size_t channels = synthesiser.get_microphone_count();
   out.resize(channels);
   for (int done = 0; done < frames;) {
     const int count = std::min(block, frames - done);
@@ -371,8 +371,7 @@ TEST(BodyEffects, ContactsWithAnotherBodyTouchItsSurface) {
       synthesiser.process(out.data(), 2, 480);
     }
     double late = 0.0;
-    for (int n = 18000; n < 22000; ++n)
-      late += static_cast<double>(heard[static_cast<std::size_t>(n)]) * heard[static_cast<std::size_t>(n)];
+    for (int n = 18000; n < 22000; ++n) late += static_cast<double>(heard[n]) * heard[n];
     return std::sqrt(late);
   };
   EXPECT_GT(hear(2e-6, false), 0.0);

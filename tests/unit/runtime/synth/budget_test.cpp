@@ -53,7 +53,7 @@ TEST(Budget, KeepsTheMostAudibleGroupsOfAll) {
     std::int64_t stay = 0;
     float faintest = std::numeric_limits<float>::max(), loudest = 0.0F;
     for (const auto& body : bodies) {
-      const auto limit = static_cast<std::size_t>(budget.find_limit(body));
+      const std::size_t limit = budget.find_limit(body);
       ASSERT_GE(limit, 1U);
       stay += static_cast<std::int64_t>(limit);
       if (limit > 1) faintest = std::min(faintest, body[limit - 1]);
@@ -62,7 +62,7 @@ TEST(Budget, KeepsTheMostAudibleGroupsOfAll) {
     EXPECT_EQ(stay, room);                                    // the room is used up
     EXPECT_LT(loudest, faintest * std::pow(2.0F, 1 / 8.0F));  // in order, to a step of the histogram
     if (room > 40) {
-      EXPECT_NEAR(std::log2(faintest / beyond_first[static_cast<std::size_t>(room) - 41]), 0.0, 1 / 8.0);
+      EXPECT_NEAR(std::log2(faintest / beyond_first[room - 41]), 0.0, 1 / 8.0);
     }
   }
   Budget enough;
@@ -95,7 +95,7 @@ Played play_hail(double budget, double strikes_per_s, double seconds, const std:
   }
   Played played;
   const auto frames = static_cast<int>(seconds * kRate);
-  played.sound.resize(static_cast<std::size_t>(frames));
+  played.sound.resize(frames);
   for (int done = 0, i = 0; done < frames; ++i) {
     const int count = std::min(blocks[static_cast<std::size_t>(i) % blocks.size()], frames - done);
     float* at = played.sound.data() + done;
@@ -226,7 +226,7 @@ std::vector<float> play_cut(const std::shared_ptr<const Model>& model, int group
   Synthesiser synthesiser({.rate_hz = kRate, .microphones_m = {{0, 0, 0}}});
   const int body = synthesiser.add_body(model, {.position_m = {0.0, 1.0, 0.0}});
   EXPECT_TRUE(synthesiser.push(events::Impulse{.time_s = 0.01, .body = body, .triangle = 4, .impulse_n_s = {0, 0, 1e-3}}));
-  std::vector<float> sound(static_cast<std::size_t>(frames));
+  std::vector<float> sound(frames);
   float* at = sound.data();
   synthesiser.process(&at, 1, 1920);
   if (groups > 0) synthesiser.set_budget((groups + 0.5) * kGroup * kRate);

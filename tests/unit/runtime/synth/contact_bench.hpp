@@ -54,7 +54,7 @@ inline std::vector<LastingContact> make_records(double end_s, const std::functio
 /// Plays the records, each given 100 ms before its time.
 inline std::vector<float> play(Voice& voice, ContactForces& contacts, std::vector<LastingContact> records, double seconds,
                                std::size_t block = 480, const ContactSurface& other = kOther) {
-  std::vector<float> out(static_cast<std::size_t>(seconds * kRate), 0.0F);
+  std::vector<float> out(seconds * kRate, 0.0F);
   voice.attach(&contacts);
   std::size_t next = 0;
   for (std::size_t n = 0; n < out.size(); n += block) {
@@ -67,7 +67,7 @@ inline std::vector<float> play(Voice& voice, ContactForces& contacts, std::vecto
 
 inline double calc_rms(const std::vector<float>& x, double from_s, double to_s) {
   double sum = 0.0;
-  const auto first = static_cast<std::size_t>(from_s * kRate), last = static_cast<std::size_t>(to_s * kRate);
+  const std::size_t first = from_s * kRate, last = to_s * kRate;
   for (std::size_t n = first; n < last; ++n) sum += static_cast<double>(x[n]) * x[n];
   return std::sqrt(sum / static_cast<double>(last - first));
 }

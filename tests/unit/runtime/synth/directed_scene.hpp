@@ -50,7 +50,7 @@ inline Sound play(const Scene& scene, EffectCounters* counters = nullptr) {
       synthesiser.add_body(Model::make(scene.bank, {.rate_hz = kRate}),
                            {.position_m = scene.position_m, .rotation = scene.rotation, .effects = scene.effects, .isa = scene.isa});
   for (const auto& event : scene.events) synthesiser.push(event);
-  Sound out(scene.microphones_m.size(), std::vector<float>(static_cast<std::size_t>(scene.frames)));
+  Sound out(scene.microphones_m.size(), std::vector<float>(scene.frames));
   bool has_meddled = scene.meddle == nullptr;
   for (int done = 0; done < scene.frames;) {
     const int count = std::min(scene.block, scene.frames - done);

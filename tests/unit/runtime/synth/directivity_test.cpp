@@ -129,7 +129,7 @@ TEST(Directivity, ATurningBodyIsHeardAsItTurns) {
     Scene still = make_tone(kFreq, multipoles, kRadius, {{kDistance, 0.0, 0.0}});
     const Complex loudest = measure(play(still)[0], kFreq);
     double error = 0.0, power = 0.0, step = 0.0;
-    const auto quarter = static_cast<std::size_t>(std::lround(0.25 * kRate / kFreq));
+    const std::size_t quarter = std::lround(0.25 * kRate / kFreq);
     std::vector<Complex> off;
     for (std::size_t n = 0; n < heard[0].size(); ++n) {
       const double t = (static_cast<double>(n) - Synthesiser::kLatency) / kRate, left = t - (kDistance - kRadius) / kC;
@@ -270,7 +270,7 @@ TEST(Directivity, ForcesAndLastingContactsSoundAsByGains) {
   force.barycentric = {0.2, 0.5, 0.3};
   force.step_s = 1e-4;
   force.count = 5;
-  for (int k = 0; k < 5; ++k) force.impulse_n_s[static_cast<std::size_t>(k)] = {0.01F * static_cast<float>(k), 0.02F, -0.03F};
+  for (int k = 0; k < 5; ++k) force.impulse_n_s[k] = {0.01F * static_cast<float>(k), 0.02F, -0.03F};
   scene.events.emplace_back(force);
   std::stable_sort(scene.events.begin(), scene.events.end(), [](const events::Event& a, const events::Event& b) {
     const auto time = [](const events::Event& event) { return std::visit([](const auto& e) { return e.time_s; }, event); };
@@ -426,13 +426,12 @@ Crowd play_crowd(double transfers_per_s, int frames = kBlock) {
   Crowd crowd{.most = {0}, .all = std::vector<std::int64_t>(Crowd::kBodies), .sound = {}};
   std::int64_t before = 0;
   for (int done = 0; done < Crowd::kBlocks * kBlock; done += frames) {
-    std::vector<float> left(static_cast<std::size_t>(frames)), right = left;
+    std::vector<float> left(frames), right = left;
     const std::array<float*, 2> out{left.data(), right.data()};
     synthesiser.process(out.data(), 2, frames);
     crowd.sound.insert(crowd.sound.end(), left.begin(), left.end());
     std::int64_t now = 0;
-    for (int b = 0; b < Crowd::kBodies; ++b)
-      now += crowd.all[static_cast<std::size_t>(b)] = synthesiser.get_effect_counters(b).units[Effect::kDirectivity];
+    for (int b = 0; b < Crowd::kBodies; ++b) now += crowd.all[b] = synthesiser.get_effect_counters(b).units[Effect::kDirectivity];
     crowd.most[0] = std::max(crowd.most[0], now - before);
     before = now;
   }

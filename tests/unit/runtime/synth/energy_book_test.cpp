@@ -92,7 +92,7 @@ TEST(EnergyBook, OfRandomScenesIsThatOfTheSoundAtEveryStep) {
     for (const events::Event& event : make_events(random, kinds, kEnd)) ASSERT_TRUE(synthesiser.push(event));
     std::vector<ModeEnergy> books;
     std::vector<double> lost_j, radiated_j;
-    const auto blocks = static_cast<std::size_t>(0.5 * kRate / kBlock);
+    const std::size_t blocks = 0.5 * kRate / kBlock;
     std::vector<float> out(kBlock);
     float* channel = out.data();
     double lost = 0.0, radiated = 0.0;

@@ -59,7 +59,7 @@ std::vector<double> calc_sound(const bank::Bank& bank, const std::vector<Course>
       for (const Course& c : courses) {
         const double at = std::floor((now + 0.5 * h - c.begin_s) / c.step_s);
         if (!(at >= 0.0 && at < static_cast<double>(c.impulses.size()))) continue;
-        for (std::size_t axis = 0; axis < 3; ++axis) force[axis] += c.impulses[static_cast<std::size_t>(at)][axis] / c.step_s;
+        for (std::size_t axis = 0; axis < 3; ++axis) force[axis] += c.impulses[at][axis] / c.step_s;
       }
       for (std::size_t m = 0; m < modes; ++m) {
         double f = 0.0;  // at vertex 0
@@ -306,7 +306,7 @@ TEST(Force, OfAWholeImpactLeavesTheModesAsTheWorldKnowsThem) {
     // All modes at once, from when the impact is over: velocities, then the energy at the end of a block.
     constexpr std::size_t kSamples = 128 * 40;
     const std::vector<float> heard = play(voice, kSamples);
-    const auto first = static_cast<std::size_t>(std::ceil((kBegin + end_s) * kRate));
+    const std::size_t first = std::ceil((kBegin + end_s) * kRate);
     modes.move_freely(after.q, after.q_dot, static_cast<double>(first) / kRate - kBegin - end_s);
     std::vector<double> expected;
     std::vector<float> rest;

@@ -56,7 +56,7 @@ Sound play(const Scene& scene, EffectCounters* counters = nullptr) {
       synthesiser.add_body(Model::make(scene.bank, {.rate_hz = kRate}), {.position_m = scene.position_m, .effects = scene.effects});
   synthesiser.push(events::Impulse{.time_s = kStruck / kRate, .body = body, .impulse_n_s = {0.0, 0.0, 1.0}});
   for (const events::Event& event : scene.events) synthesiser.push(event);
-  Sound out(2, std::vector<float>(static_cast<std::size_t>(scene.frames)));
+  Sound out(2, std::vector<float>(scene.frames));
   for (int done = 0, number = 0; done < scene.frames; ++number) {
     if (scene.meddle) scene.meddle(synthesiser, number);
     const int count = std::min(scene.block, scene.frames - done);
@@ -300,7 +300,7 @@ TEST(HeadEars, ComeAndGoWithoutAGapOrAClick) {
     if (number == 20) synthesiser.set_effects(0, kDefaultEffects);
   };
   const Sound heard = play(scene);
-  const std::size_t latency = static_cast<std::size_t>(get_sphere()->get_latency() + Synthesiser::kLatency);
+  const std::size_t latency = get_sphere()->get_latency() + Synthesiser::kLatency;
   const auto get_rms = [&](std::size_t block, std::size_t samples) { return calc_rms(std::span(heard[0]).subspan(block * 1024, samples)); };
   EXPECT_NEAR(get_rms(8, 800), free, 0.01 * free);
   EXPECT_NEAR(get_rms(15, 800), by_head, 0.01 * by_head);

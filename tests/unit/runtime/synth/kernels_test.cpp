@@ -39,15 +39,15 @@ struct Invented {
   explicit Invented(int count) : groups(std::max(1, (count + kGroup - 1) / kGroup)), modes(count) {
     std::mt19937 random(7);
     std::uniform_real_distribution<float> number(-1.0F, 1.0F);
-    const auto size = static_cast<std::size_t>(groups);
+    const std::size_t size = groups;
     sound.resize(size), turn.resize(size), strike.resize(size), state.resize(size), starts.resize(size);
     for (auto& table : sound) std::memset(&table, 0, sizeof(table));
     for (auto& table : turn) std::memset(&table, 0, sizeof(table));
     for (auto& table : strike) std::memset(&table, 0, sizeof(table));
     for (auto& table : state) std::memset(&table, 0, sizeof(table));
-    rows.assign(static_cast<std::size_t>(kStrikeRows * groups * kGroup), 0);
+    rows.assign(kStrikeRows * groups * kGroup, 0);
     for (int m = 0; m < modes; ++m) {
-      const std::size_t g = static_cast<std::size_t>(m / kGroup);
+      const std::size_t g = m / kGroup;
       const int l = m % kGroup;
       for (auto& part : sound[g].wave[l / 2]) {
         for (auto& sample : part) sample[l % 2] = number(random);
@@ -68,7 +68,7 @@ struct Invented {
       for (float& x : sample) x = number(random);
     }
   }
-  std::size_t row(int r) const { return static_cast<std::size_t>(r * groups * kGroup); }
+  std::size_t row(int r) const { return r * groups * kGroup; }
 };
 
 constexpr int kEach = kSubBlock / kColumn;  // columns of a sub-block
@@ -103,7 +103,7 @@ TEST(Kernels, AdvanceTurnsTheStateAndFillsTheStarts) {
       const Invented before(count);
       get_kernels(isa).advance(now.turn.data(), now.state.data(), now.starts.data(), now.groups);
       for (int m = 0; m < now.groups * kGroup; ++m) {
-        const std::size_t g = static_cast<std::size_t>(m / kGroup);
+        const std::size_t g = m / kGroup;
         const int l = m % kGroup;
         const Complex z(before.state[g].re[l], before.state[g].im[l]);
         const Complex turned = z * Complex(before.turn[g].block_re[l], before.turn[g].block_im[l]);
@@ -126,20 +126,19 @@ TEST(Kernels, EmitSumsTheSoundOfAllModes) {
       get_kernels(isa).advance(invented.turn.data(), invented.state.data(), invented.starts.data(), invented.groups);
       for (int first = 0; first < kSubBlocks; ++first) {
         for (int sub_blocks = 1; first + sub_blocks <= kSubBlocks; ++sub_blocks) {
-          std::vector<float> out(static_cast<std::size_t>(kBlock), 0.5F);
+          std::vector<float> out(kBlock, 0.5F);
           get_kernels(isa).emit(invented.sound.data(), invented.starts.data(), invented.groups, first, sub_blocks, out.data());
           for (int n = 0; n < kBlock; ++n) {
             double expected = 0.5, size = 1.0;
             for (int m = 0; m < count && n < sub_blocks * kSubBlock; ++m) {
-              const std::size_t g = static_cast<std::size_t>(m / kGroup);
+              const std::size_t g = m / kGroup;
               const int l = m % kGroup, q = first * kEach + n / kColumn, k = n % kColumn;
               const double a = static_cast<double>(invented.starts[g].re[q][l]) * invented.sound[g].wave[l / 2][0][k][l % 2];
               const double b = static_cast<double>(invented.starts[g].im[q][l]) * invented.sound[g].wave[l / 2][1][k][l % 2];
               expected += a + b;
               size += std::abs(a) + std::abs(b);
             }
-            ASSERT_NEAR(out[static_cast<std::size_t>(n)], expected, 2e-6 * size)
-                << get_name(isa) << ", " << count << " modes, " << sub_blocks;
+            ASSERT_NEAR(out[n], expected, 2e-6 * size) << get_name(isa) << ", " << count << " modes, " << sub_blocks;
           }
         }
       }
@@ -181,7 +180,7 @@ TEST(Kernels, AStrikeAddsItsAnswerAndLeavesItToTheRestOfThePeriod) {
         std::vector<double> expected(kSubBlock, 0.25);
         double size = 1.0;
         for (int m = 0; m < count; ++m) {
-          const std::size_t g = static_cast<std::size_t>(m / kGroup);
+          const std::size_t g = m / kGroup;
           const int l = m % kGroup;
           const StrikeTable& table = before.strike[g];
           double amplitude = 0.0;
@@ -196,7 +195,7 @@ TEST(Kernels, AStrikeAddsItsAnswerAndLeavesItToTheRestOfThePeriod) {
             for (int j = 0; j < kTerms && n >= before.touch.first && n < before.touch.last; ++j) {
               x += amplitude * before.touch.moment[n][j] * Complex(table.force_re[j][l], table.force_im[j][l]);
             }
-            expected[static_cast<std::size_t>(n)] += table.out_re[l] * x.real() + table.out_im[l] * x.imag();
+            expected[n] += table.out_re[l] * x.real() + table.out_im[l] * x.imag();
             size += std::abs(x);
           }
           x *= turn;
@@ -227,12 +226,12 @@ TEST(Kernels, EmitWeightedIsEmitOfTheProducts) {
         for (int l = 0; l < kGroup; ++l) group.re[l] = number(random), group.im[l] = number(random);
       }
       for (const auto& [first, sub_blocks] : {std::pair(0, 4), std::pair(1, 2), std::pair(3, 1)}) {
-        std::vector<float> out(static_cast<std::size_t>(kBlock), 0.5F);
+        std::vector<float> out(kBlock, 0.5F);
         kernels.emit_weighted(invented.sound.data(), invented.starts.data(), weight.data(), invented.groups, first, sub_blocks, out.data());
         for (int n = 0; n < kBlock; ++n) {
           double expected = 0.5, size = 1.0;
           for (int m = 0; m < count && n < sub_blocks * kSubBlock; ++m) {
-            const std::size_t g = static_cast<std::size_t>(m / kGroup);
+            const std::size_t g = m / kGroup;
             const int l = m % kGroup, k = n % kColumn;
             const Complex z = get_start(invented, g, l, first * kEach + n / kColumn) * Complex(weight[g].re[l], weight[g].im[l]);
             const double a = z.real() * static_cast<double>(invented.sound[g].wave[l / 2][0][k][l % 2]);
@@ -240,7 +239,7 @@ TEST(Kernels, EmitWeightedIsEmitOfTheProducts) {
             expected += a + b;
             size += std::abs(a) + std::abs(b);
           }
-          ASSERT_NEAR(out[static_cast<std::size_t>(n)], expected, 3e-6 * size) << get_name(isa) << ", " << count << ", " << sub_blocks;
+          ASSERT_NEAR(out[n], expected, 3e-6 * size) << get_name(isa) << ", " << count << ", " << sub_blocks;
         }
       }
     }
@@ -294,7 +293,7 @@ TEST(Kernels, ADriveAddsItsForcesAndTakesItsShareOfWhatRings) {
         for (const bool damps : {false, true}) {
           Invented now(count);
           for (auto& table : now.strike) std::fill(std::begin(table.angle), std::end(table.angle), 0.0F);
-          for (int m = 0; m < count; ++m) now.strike[static_cast<std::size_t>(m / kGroup)].angle[m % kGroup] = 1.0F + 0.5F * number(random);
+          for (int m = 0; m < count; ++m) now.strike[m / kGroup].angle[m % kGroup] = 1.0F + 0.5F * number(random);
           get_kernels(isa).advance(now.turn.data(), now.state.data(), now.starts.data(), now.groups);
           ContactBlock drive{};
           drive.contacts = 3;
@@ -332,7 +331,7 @@ TEST(Kernels, ADriveAddsItsForcesAndTakesItsShareOfWhatRings) {
           std::vector<double> expected(kSubBlock, 0.25);
           double size = 1.0;
           for (int m = 0; m < count; ++m) {
-            const std::size_t g = static_cast<std::size_t>(m / kGroup);
+            const std::size_t g = m / kGroup;
             const int l = m % kGroup;
             const StrikeTable& table = now.strike[g];
             const auto calc_along = [&](const ContactEnd& push, const float* weight) {
@@ -345,7 +344,7 @@ TEST(Kernels, ADriveAddsItsForcesAndTakesItsShareOfWhatRings) {
             for (int end = 0; end < 2; ++end) {
               double x = 0.0;
               for (int c = 0; c < drive.contacts; ++c) {
-                const ContactEnd& push = drive.push[c][static_cast<std::size_t>(end)];
+                const ContactEnd& push = drive.push[c][end];
                 x += std::pow(calc_along(push, push.damping), 2.0);
                 for (int n = 0; n <= kSubBlock && push.forces; ++n) force[n] += calc_along(push, push.force) * push.signal[n];
               }

@@ -198,7 +198,7 @@ TEST(NoHeap, DirectivityTakesNoMemoryWhileItPlays) {
   for (int i = 0; i < 300; ++i) {
     if (i % 40 == 0) {  // the main thread may
       const long until_now = g_allocations;
-      synthesiser.swap_model(body, models[static_cast<std::size_t>(i / 40 % 2)]);
+      synthesiser.swap_model(body, models[i / 40 % 2]);
       synthesiser.set_effects(body, i % 80 == 0 ? kAll : kAll.without(i % 160 == 40 ? Effect::kDirectivity : Effect::kHead));
       before += g_allocations - until_now;
     }

@@ -65,7 +65,7 @@ void strike_softly(Voice& voice, double impulse_n_s) {
                   .duration_s = i % 3 == 0 ? 0.0 : 1e-3 * number(chance)});
   events::Force force{.time_s = 0.1003, .step_s = 3.1e-5, .triangle = 3, .count = 9, .barycentric = {0.1, 0.4, 0.5}};
   for (int i = 0; i < force.count; ++i)
-    force.impulse_n_s[static_cast<std::size_t>(i)] = {static_cast<float>(0.1 * impulse_n_s * i), 0.0F, static_cast<float>(impulse_n_s)};
+    force.impulse_n_s[i] = {static_cast<float>(0.1 * impulse_n_s * i), 0.0F, static_cast<float>(impulse_n_s)};
   EXPECT_TRUE(voice.push(force));
 }
 

@@ -534,10 +534,10 @@ TEST(DelayLine, HoldsWhatWasPushedAsLongAsTheWayIs) {
     std::vector<float> all;
     std::mt19937 random(4);
     std::uniform_int_distribution<int> any(1, kBlock);
-    const auto get = [&all](std::int64_t n) { return n < 0 ? 0.0F : all[static_cast<std::size_t>(n)]; };
+    const auto get = [&all](std::int64_t n) { return n < 0 ? 0.0F : all[n]; };
     const auto longest = static_cast<std::int64_t>(longest_m / 343.0 * kRate);
     for (int push = 0; push < 300; ++push) {
-      std::vector<float> samples(static_cast<std::size_t>(any(random)));
+      std::vector<float> samples(any(random));
       const bool silent = push % 11 == 3;
       for (float& x : samples) x = silent ? 0.0F : static_cast<float>(any(random));
       all.insert(all.end(), samples.begin(), samples.end());

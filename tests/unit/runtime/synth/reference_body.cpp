@@ -72,7 +72,7 @@ ReferenceBody::ReferenceBody(const bank::Bank& bank, double sample_rate_hz, Refe
   }
   mode_count_ = tile_modes_ + static_cast<int>(damped_.size());
   std::stable_sort(damped_.begin(), damped_.end(), [](const DampedMode& a, const DampedMode& b) { return a.substeps < b.substeps; });
-  const auto room = static_cast<std::size_t>(std::max(1, options.max_strikes));
+  const std::size_t room = std::max(1, options.max_strikes);
   pulses_.reserve(room);
   acting_.reserve(room);
   moments_.resize(room);
@@ -144,7 +144,7 @@ void ReferenceBody::add_damped_mode(std::size_t mode) {
 bool ReferenceBody::strike(const Strike& strike) noexcept {
   const bool sane = std::isfinite(strike.sample) && std::isfinite(strike.duration_s) && strike.duration_s >= 0.0 &&
                     is_finite(strike.barycentric) && is_finite(strike.impulse_n_s) && strike.triangle >= 0 &&
-                    static_cast<std::size_t>(strike.triangle) < bank_->triangles.size();
+                    strike.triangle < std::ssize(bank_->triangles);
   if (!sane || pulses_.size() == pulses_.capacity()) {
     ++counters_.refused;
     return false;
@@ -158,7 +158,7 @@ bool ReferenceBody::strike(const Strike& strike) noexcept {
     pulse.begin = std::nextafter(earliest, earliest + 1.0);
     ++counters_.late;
   }
-  pulse.vertex = bank_->triangles[static_cast<std::size_t>(strike.triangle)];
+  pulse.vertex = bank_->triangles[strike.triangle];
   pulse.barycentric = strike.barycentric;
   pulse.impulse_n_s = strike.impulse_n_s;
   pulses_.push_back(pulse);
@@ -169,7 +169,7 @@ bool ReferenceBody::strike(const Strike& strike) noexcept {
 void ReferenceBody::process(std::span<double> pressure_pa) noexcept {
   while (!pressure_pa.empty()) {
     // Chunks end at multiples of kChunk since the beginning, whatever the sizes of the calls.
-    const auto room = static_cast<std::size_t>(kChunk - position_ % kChunk);
+    const std::size_t room = kChunk - position_ % kChunk;
     const std::size_t samples = std::min(room, pressure_pa.size());
     process_chunk(pressure_pa.first(samples));
     pressure_pa = pressure_pa.subspan(samples);
@@ -227,7 +227,7 @@ double ReferenceBody::calc_projection(const Pulse& pulse, std::int32_t mode) con
     const std::int16_t* s = &bank_->shape[row * 3];
     sum += pulse.barycentric[corner] * (s[0] * pulse.impulse_n_s[0] + s[1] * pulse.impulse_n_s[1] + s[2] * pulse.impulse_n_s[2]);
   }
-  return sum * bank_->shape_scale[static_cast<std::size_t>(mode)];
+  return sum * bank_->shape_scale[mode];
 }
 
 void ReferenceBody::calc_forcing(const Tile& tile, int acting, int samples) noexcept {
@@ -238,7 +238,7 @@ void ReferenceBody::calc_forcing(const Tile& tile, int acting, int samples) noex
   for (int i = 0; i < acting; ++i) {
     Lanes amplitude{};
     for (int l = 0; l < kLanes; ++l) {
-      if (tile.mode[l] >= 0) amplitude[l] = calc_projection(pulses_[static_cast<std::size_t>(acting_[i])], tile.mode[l]);
+      if (tile.mode[l] >= 0) amplitude[l] = calc_projection(pulses_[acting_[i]], tile.mode[l]);
     }
     for (int n = 0; n < samples; ++n) {
       const Moments& moments = moments_[i][n];
@@ -297,7 +297,7 @@ void ReferenceBody::advance_damped_modes(std::span<double> pressure, bool driven
           m.q = q;
         }
         for (const int index : acting_) {
-          const Pulse& pulse = pulses_[static_cast<std::size_t>(index)];
+          const Pulse& pulse = pulses_[index];
           const double begin = pulse.begin - static_cast<double>(position_ - 1) - static_cast<double>(n);
           const Moments moments = synth::calc_pulse_moments(synth::PulseShape::kHertz, begin * substeps - step, pulse.duration * substeps);
           if (moments[0] == 0.0) continue;
@@ -347,7 +347,7 @@ void ReferenceBody::fall_asleep_if_silent() noexcept {
   double bound = 0.0;
   for (DampedMode& m : damped_) {
     // q' of an unforced mode never exceeds |q'| + 2 omega |q| from here on.
-    const double size = std::abs(m.v) + 2.0 * std::sqrt(bank_->eigenvalue_rad2_s2[static_cast<std::size_t>(m.mode)]) * std::abs(m.q);
+    const double size = std::abs(m.v) + 2.0 * std::sqrt(bank_->eigenvalue_rad2_s2[m.mode]) * std::abs(m.q);
     if (size < kNothing) m.q = m.v = 0.0;
     bound += size * std::abs(m.gain);
   }
@@ -386,7 +386,7 @@ double ReferenceBody::calc_energy_j() const noexcept {
   for (const Tile& tile : tiles_) {
     for (int l = 0; l < kLanes; ++l) {
       if (tile.mode[l] < 0) continue;
-      const auto mode = static_cast<std::size_t>(tile.mode[l]);
+      const std::size_t mode = tile.mode[l];
       const double d = bank_->decay_per_s[mode];
       const double omega = std::sqrt(bank_->eigenvalue_rad2_s2[mode]);
       const double q = tile.im[l] / std::sqrt((omega - d) * (omega + d));

@@ -28,7 +28,7 @@ constexpr double kDistanceM = 48.0 * kSoundSpeedMs / kRate;
 constexpr int kDelay = 48 + Synthesiser::kLatency;
 
 std::vector<float> play(Synthesiser& synthesiser, int frames) {
-  std::vector<float> out(static_cast<std::size_t>(frames));
+  std::vector<float> out(frames);
   float* at = out.data();
   synthesiser.process(&at, 1, frames);
   return out;
@@ -58,7 +58,7 @@ std::complex<double> find_line(const std::vector<float>& sound, int first, int w
   std::complex<double> sum = 0.0;
   for (int n = 0; n < width; ++n) {
     const double window = 0.5 - 0.5 * std::cos(2 * pi * n / width);
-    sum += window * static_cast<double>(sound[static_cast<std::size_t>(first + n)]) * std::polar(1.0, -2 * pi * freq_hz * n / kRate);
+    sum += window * static_cast<double>(sound[first + n]) * std::polar(1.0, -2 * pi * freq_hz * n / kRate);
   }
   return sum * (4.0 / width);
 }
@@ -295,8 +295,8 @@ TEST(Swap, WhatSlidesContinuesToSlide) {
     synthesiser.collect();
   }
   double before = 0.0, after = 0.0;
-  for (int i = 5; i < 10; ++i) before += level[static_cast<std::size_t>(i)] / 5;
-  for (int i = 12; i < 20; ++i) after += level[static_cast<std::size_t>(i)] / 8;
+  for (int i = 5; i < 10; ++i) before += level[i] / 5;
+  for (int i = 12; i < 20; ++i) after += level[i] / 8;
   EXPECT_GT(after, 0.3 * before);
   EXPECT_LT(after, 3.0 * before);
   EXPECT_EQ(synthesiser.get_counters().refused, 0);

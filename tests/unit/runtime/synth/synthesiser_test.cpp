@@ -34,7 +34,7 @@ using Channels = std::vector<std::vector<float>>;
 template <typename NextBlock>
 Channels play(Synthesiser& synthesiser, const std::vector<events::Event>& events, int frames, NextBlock&& next_block) {
   const int channels = synthesiser.get_microphone_count();
-  Channels out(static_cast<std::size_t>(channels), std::vector<float>(static_cast<std::size_t>(frames), 99.0F));
+  Channels out(static_cast<std::size_t>(channels), std::vector<float>(frames, 99.0F));
   std::size_t next = 0;
   for (int done = 0; done < frames;) {
     const int block = std::min(next_block(), frames - done);
@@ -131,7 +131,7 @@ TEST(Synthesiser, AddsBodiesUpAndKeepsTimeForThoseThatComeLater) {
   const auto model = make_model(12);
   const auto play_one = [&](double time_s, int before) {
     Synthesiser synthesiser({.rate_hz = kRate, .microphones_m = {{0.0, 0.0, 0.0}}});
-    std::vector<float> lead(static_cast<std::size_t>(before) + 1);
+    std::vector<float> lead(before + 1);
     float* at = lead.data();
     if (before > 0) synthesiser.process(&at, 1, before);
     const int body = synthesiser.add_body(model, {.position_m = {0.0, 1.0, 0.0}});

@@ -65,9 +65,9 @@ TEST(Voice, AnImpulseBetweenSamplesHasItsAnalyticPhase) {
     for (int n = 0; n < 400; ++n) {
       const double t = (n - at) / kRate;
       const double expected = calc_velocity(440.0, 3.0, t) + calc_velocity(9876.5, 40.0, t) + calc_velocity(23900.0, 0.0, t);
-      ASSERT_NEAR(pressure[static_cast<std::size_t>(n)], expected, 5e-6) << "impulse at " << at << ", sample " << n;
+      ASSERT_NEAR(pressure[n], expected, 5e-6) << "impulse at " << at << ", sample " << n;
       if (t < 0.0) {
-        ASSERT_EQ(pressure[static_cast<std::size_t>(n)], 0.0F);
+        ASSERT_EQ(pressure[n], 0.0F);
       }
     }
   }
@@ -93,9 +93,9 @@ TEST(Voice, BothPulsesMatchQuadratureBeforeDuringAndAfter) {
               until <= 0.0 ? 0.0
                            : testing::integrate([&](double x) { return force(x) * calc_velocity(freq, decay, now - begin - x * length); },
                                                 0.0, until);
-          ASSERT_NEAR(pressure[static_cast<std::size_t>(n)], expected, 2e-6) << freq << " Hz, tau " << tau << ", sample " << n;
+          ASSERT_NEAR(pressure[n], expected, 2e-6) << freq << " Hz, tau " << tau << ", sample " << n;
           if (until <= 0.0) {
-            ASSERT_EQ(pressure[static_cast<std::size_t>(n)], 0.0F);
+            ASSERT_EQ(pressure[n], 0.0F);
           }
         }
       }
@@ -147,7 +147,7 @@ TEST(Voice, EnergyIsThatOfTheImpulseAndStaysWithoutDamping) {
   for (std::size_t m = 0; m < bank.mode_count(); ++m) {
     double projection = 0.0;
     for (std::size_t corner = 0; corner < 3; ++corner) {
-      const auto shape = bank.shape_at(static_cast<std::size_t>(bank.triangles[4][corner]), m);
+      const auto shape = bank.shape_at(bank.triangles[4][corner], m);
       projection += Vec3{0.2, 0.3, 0.5}[corner] * std::inner_product(shape.begin(), shape.end(), impulse.begin(), 0.0);
     }
     expected += 0.5 * projection * projection;
@@ -287,11 +287,11 @@ TEST(Voice, ALimitFadesTheLastModesOutAndKeepsTheFirst) {
     double expected = 0.0;
     for (int m = 0; m < 96; ++m) {
       const int mode = model->get_bank_mode(m);
-      const double level = bank.radiation_gain[static_cast<std::size_t>(mode)] * bank.shape_at(0, static_cast<std::size_t>(mode))[2];
+      const double level = bank.radiation_gain[mode] * bank.shape_at(0, mode)[2];
       expected += (m < 48 ? 1.0 : part) * level *
                   calc_velocity(std::sqrt(model->get_eigenvalue_rad2_s2(m)) / (2 * pi), model->get_decay_per_s(m), n / kRate);
     }
-    ASSERT_NEAR(limited[static_cast<std::size_t>(n)], expected, 2e-6) << n;
+    ASSERT_NEAR(limited[n], expected, 2e-6) << n;
   }
   EXPECT_NE(whole, limited);
 }
@@ -334,7 +334,7 @@ TEST(Voice, ALateStrikeSoundsAtTheHorizonWithItsWholeImpulse) {
   voice.strike({.time_s = 200.0 / kRate, .impulse_n_s = kUnitImpulse});
   EXPECT_EQ(voice.get_counters().late, 1);
   const std::vector<float> sound = play(voice, 24 + kBlock);
-  for (int n = 0; n < 24; ++n) EXPECT_EQ(sound[static_cast<std::size_t>(n)], 0.0F);
+  for (int n = 0; n < 24; ++n) EXPECT_EQ(sound[n], 0.0F);
   EXPECT_NE(sound[24], 0.0F);
   EXPECT_NEAR(voice.calc_energy_j(), 0.5, 1e-6);
 }

@@ -16,7 +16,7 @@ namespace {
 std::vector<events::Event> make_all() {
   events::Force force{.time_s = 0.5, .step_s = 1e-5, .body = 3, .other = 4, .triangle = 7, .count = 3, .continues = true};
   force.barycentric = {0.25, 0.25, 0.5};
-  for (int k = 0; k < 3; ++k) force.impulse_n_s[static_cast<std::size_t>(k)] = {0.1F * static_cast<float>(k), -1e-9F, 3e7F};
+  for (int k = 0; k < 3; ++k) force.impulse_n_s[k] = {0.1F * static_cast<float>(k), -1e-9F, 3e7F};
   events::LastingContact contact{.time_s = 1.25, .id = 0xfedcba9876543210U, .body = 1, .other = 2, .triangle = 11};
   contact.state = events::ContactState::kEnd;
   contact.barycentric = {0.5, 0.25, 0.25};
