@@ -4,7 +4,7 @@
 #include <iostream>
 #include <iterator>
 
-#include "jobs/cache/cache.hpp"
+#include "jobs/front/cache/cache.hpp"
 #include "jobs/cli/commands.hpp"
 #include "precompute/job/job_spec.hpp"
 #include "runtime/base/result.hpp"

@@ -13,12 +13,12 @@
 #include <vector>
 
 #include "jobs/cli/commands.hpp"
-#include "jobs/slurm/task.hpp"
+#include "jobs/queue/slurm/task.hpp"
 #include "precompute/job/read_body.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/whole_range.hpp"
-#include "runtime/version/version.hpp"
+#include "runtime/base/version.hpp"
 
 namespace carillon::cli {
 namespace {
@@ -388,7 +388,7 @@ Run parse_command_line(int argc, char** argv, Shared& shared) {
   app.add_option("--store", shared.store_option, "Folder of the store; made when there is none");
   app.add_option("--profile", shared.profile_option, "Profile file");
   app.add_flag("--json", shared.json, "One JSON document (of commands that keep running: one object a line)");
-  app.set_version_flag("--version", version::describe("carillon"));
+  app.set_version_flag("--version", base::describe("carillon"));
   for (const auto add : {add_hear, add_explore, add_materials, add_submit, add_status, add_log, add_cancel, add_retry, add_explain, add_run,
                          add_get, add_gc, add_verify, add_validate, add_study, add_report, add_bank_for})
     add(app, shared, run);

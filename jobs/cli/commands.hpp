@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "jobs/attempt/attempt.hpp"
+#include "jobs/queue/attempt/attempt.hpp"
 #include "jobs/cli/options.hpp"
 #include "jobs/cli/shared.hpp"
-#include "jobs/explore/explore.hpp"
-#include "jobs/hear/hear.hpp"
+#include "jobs/front/explore/explore.hpp"
+#include "jobs/front/hear/hear.hpp"
 #include "jobs/queue/run.hpp"
 
 namespace carillon::cli {

@@ -1,5 +1,5 @@
 // carillon explore: a page on which bodies are struck.
-#include "jobs/explore/explore.hpp"
+#include "jobs/front/explore/explore.hpp"
 
 #include <fmt/core.h>
 
@@ -7,7 +7,7 @@
 #include <string>
 
 #include "jobs/cli/commands.hpp"
-#include "jobs/explore/serve.hpp"
+#include "jobs/front/explore/serve.hpp"
 
 namespace carillon::cli {
 namespace {

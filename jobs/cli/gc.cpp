@@ -16,7 +16,7 @@
 #include <string_view>
 
 #include "jobs/cli/commands.hpp"
-#include "jobs/process/process.hpp"
+#include "jobs/store/process/process.hpp"
 #include "jobs/store/files.hpp"
 #include "jobs/store/identity.hpp"
 #include "jobs/store/open_folder.hpp"

@@ -1,5 +1,5 @@
 // carillon hear: an object, and how it sounds.
-#include "jobs/hear/hear.hpp"
+#include "jobs/front/hear/hear.hpp"
 
 #include <fmt/core.h>
 

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "jobs/registry/registry.hpp"
+#include "jobs/store/registry/registry.hpp"
 #include "jobs/store/records.hpp"
 
 namespace carillon::cli {

@@ -1,5 +1,5 @@
 // carillon report: the page about a bank, of the store or of any file.
-#include "jobs/report/report.hpp"
+#include "jobs/front/report/report.hpp"
 
 #include <fmt/core.h>
 

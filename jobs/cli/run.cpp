@@ -3,13 +3,13 @@
 
 #include <fmt/core.h>
 
-#include "jobs/attempt/attempt.hpp"
+#include "jobs/queue/attempt/attempt.hpp"
 #include "jobs/cli/commands.hpp"
 #include "jobs/cli/follow.hpp"
 #include "jobs/cli/slurm.hpp"
 #include "jobs/queue/local.hpp"
 #include "jobs/queue/settle.hpp"
-#include "jobs/slurm/inside.hpp"
+#include "jobs/queue/slurm/inside.hpp"
 #include "runtime/base/command.hpp"
 #include "runtime/base/error.hpp"
 

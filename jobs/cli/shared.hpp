@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "jobs/registry/registry.hpp"
-#include "jobs/slurm/settings.hpp"
+#include "jobs/store/registry/registry.hpp"
+#include "jobs/queue/slurm/settings.hpp"
 #include "jobs/store/store.hpp"
 #include "runtime/base/error.hpp"
 

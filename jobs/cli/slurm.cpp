@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "jobs/cli/follow.hpp"
-#include "jobs/process/process.hpp"
+#include "jobs/store/process/process.hpp"
 #include "jobs/queue/display.hpp"
-#include "jobs/slurm/engine.hpp"
-#include "jobs/slurm/needs.hpp"
+#include "jobs/queue/slurm/engine.hpp"
+#include "jobs/queue/slurm/needs.hpp"
 #include "runtime/base/clock.hpp"
 #include "runtime/base/command.hpp"
 

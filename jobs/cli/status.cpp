@@ -9,7 +9,7 @@
 
 #include "jobs/cli/commands.hpp"
 #include "jobs/cli/follow.hpp"
-#include "jobs/process/process.hpp"
+#include "jobs/store/process/process.hpp"
 #include "jobs/store/warning_kinds.hpp"
 #include "runtime/base/clock.hpp"
 #include "runtime/base/error.hpp"

@@ -5,9 +5,9 @@
 #include <map>
 #include <set>
 
-#include "jobs/attempt/publish.hpp"
+#include "jobs/queue/attempt/publish.hpp"
 #include "jobs/cli/commands.hpp"
-#include "jobs/process/process.hpp"
+#include "jobs/store/process/process.hpp"
 #include "jobs/queue/repair.hpp"
 #include "jobs/store/identity.hpp"
 #include "runtime/base/error.hpp"

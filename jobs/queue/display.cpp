@@ -10,7 +10,7 @@
 #include <optional>
 #include <string>
 
-#include "jobs/process/process.hpp"
+#include "jobs/store/process/process.hpp"
 #include "jobs/store/records.hpp"
 #include "runtime/base/clock.hpp"
 #include "runtime/base/json.hpp"

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "jobs/registry/job_table.hpp"
+#include "jobs/store/registry/job_table.hpp"
 #include "jobs/store/warning_kinds.hpp"
 
 namespace carillon::queue {

@@ -8,9 +8,9 @@
 #include <optional>
 #include <string>
 
-#include "jobs/outcome/outcome.hpp"
-#include "jobs/process/process.hpp"
-#include "jobs/registry/job_table.hpp"
+#include "jobs/store/outcome/outcome.hpp"
+#include "jobs/store/process/process.hpp"
+#include "jobs/store/registry/job_table.hpp"
 #include "runtime/base/host.hpp"
 
 namespace carillon::queue {

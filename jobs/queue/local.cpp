@@ -12,9 +12,9 @@
 #include <fstream>
 #include <map>
 
-#include "jobs/attempt/attempt.hpp"
-#include "jobs/attempt/processes.hpp"
-#include "jobs/attempt/publish.hpp"
+#include "jobs/queue/attempt/attempt.hpp"
+#include "jobs/queue/attempt/processes.hpp"
+#include "jobs/queue/attempt/publish.hpp"
 #include "jobs/store/files.hpp"
 #include "jobs/store/open_folder.hpp"
 #include "runtime/base/clock.hpp"

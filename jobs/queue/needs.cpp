@@ -1,6 +1,6 @@
-// Method:     A job is predicted by precompute/cost from the nodes that it asks for or the size of its mesh file. Larger jobs, and those
+// Method:     A job is predicted by precompute/job/cost from the nodes that it asks for or the size of its mesh file. Larger jobs, and those
 //             whose size is unknown, are predicted by carillon-precompute --validate instead, and simulations by carillon-simulate.
-// Source:     precompute/cost. Deviations: none.
+// Source:     precompute/job/cost. Deviations: none.
 #include "jobs/queue/needs.hpp"
 
 #include <algorithm>
@@ -9,12 +9,12 @@
 #include <filesystem>
 #include <optional>
 
-#include "jobs/attempt/attempt.hpp"
-#include "jobs/outcome/outcome.hpp"
-#include "jobs/outcome/policy.hpp"
-#include "precompute/cost/calibration.hpp"
-#include "precompute/cost/memory.hpp"
-#include "precompute/cost/seconds.hpp"
+#include "jobs/queue/attempt/attempt.hpp"
+#include "jobs/store/outcome/outcome.hpp"
+#include "jobs/store/outcome/policy.hpp"
+#include "precompute/job/cost/calibration.hpp"
+#include "precompute/job/cost/memory.hpp"
+#include "precompute/job/cost/seconds.hpp"
 #include "runtime/base/document.hpp"
 
 namespace carillon::queue {

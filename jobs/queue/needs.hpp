@@ -2,9 +2,9 @@
 #pragma once
 
 #include "jobs/queue/admission.hpp"
-#include "jobs/registry/registry.hpp"
+#include "jobs/store/registry/registry.hpp"
 #include "jobs/store/store.hpp"
-#include "precompute/cost/problem_size.hpp"
+#include "precompute/job/cost/problem_size.hpp"
 
 namespace carillon::queue {
 

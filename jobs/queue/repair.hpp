@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "jobs/registry/registry.hpp"
+#include "jobs/store/registry/registry.hpp"
 #include "jobs/store/store.hpp"
 
 namespace carillon::queue {

@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <optional>
 
-#include "jobs/attempt/attempt.hpp"
+#include "jobs/queue/attempt/attempt.hpp"
 #include "jobs/queue/local.hpp"
 #include "jobs/queue/repair.hpp"
 #include "jobs/queue/runner.hpp"
-#include "jobs/registry/registry.hpp"
+#include "jobs/store/registry/registry.hpp"
 #include "jobs/store/identity.hpp"
 
 namespace carillon::queue {

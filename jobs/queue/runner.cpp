@@ -8,7 +8,7 @@
 
 #include <algorithm>
 
-#include "jobs/attempt/attempt.hpp"
+#include "jobs/queue/attempt/attempt.hpp"
 #include "jobs/queue/settle.hpp"
 #include "runtime/base/error.hpp"
 

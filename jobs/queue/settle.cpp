@@ -10,7 +10,7 @@
 #include <algorithm>
 #include <optional>
 
-#include "jobs/outcome/policy.hpp"
+#include "jobs/store/outcome/policy.hpp"
 #include "jobs/queue/repair.hpp"
 
 namespace carillon::queue {

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "jobs/outcome/outcome.hpp"
+#include "jobs/store/outcome/outcome.hpp"
 #include "jobs/queue/environment.hpp"
-#include "jobs/registry/registry.hpp"
+#include "jobs/store/registry/registry.hpp"
 #include "jobs/store/store.hpp"
 
 namespace carillon::queue {

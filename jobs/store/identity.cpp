@@ -19,7 +19,7 @@
 #include <set>
 #include <sstream>
 
-#include "jobs/process/process.hpp"
+#include "jobs/store/process/process.hpp"
 #include "jobs/store/files.hpp"
 #include "jobs/store/json.hpp"
 #include "runtime/base/error.hpp"

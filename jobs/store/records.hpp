@@ -54,7 +54,7 @@ struct Request {
   double submitted_unix_s = 0.0;
 };
 
-/// state.json: the part of a job's state that is in neither the bank nor the last outcome. Written by jobs/registry, which is made again
+/// state.json: the part of a job's state that is in neither the bank nor the last outcome. Written by jobs/store/registry, which is made again
 /// from it.
 struct SavedState {
   JobState state = JobState::queued;  // queued, waiting, failed or cancelled

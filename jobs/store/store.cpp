@@ -20,7 +20,7 @@
 #include <string_view>
 #include <utility>
 
-#include "jobs/process/process.hpp"
+#include "jobs/store/process/process.hpp"
 #include "jobs/store/bank_sum.hpp"
 #include "jobs/store/files.hpp"
 #include "jobs/store/seal.hpp"

@@ -13,7 +13,7 @@
 //   damaged/                   banks that were set aside
 //   submissions.jsonl          which job file asked for which id, appended
 //   lock                       shared by those who add, exclusive for gc
-//   registry.sqlite            jobs/registry (elsewhere when the store is on a network file system)
+//   registry.sqlite            jobs/store/registry (elsewhere when the store is on a network file system)
 //
 // work/ and banks/ have the same depth: relative paths inside job.json stay right when a folder moves from one to the other.
 // Truth on disk: banks/ab/<id>/ holds a whole bank <=> the job is done. Any number of processes may use a store at once.

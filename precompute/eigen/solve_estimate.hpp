@@ -5,7 +5,7 @@
 #include <functional>
 #include <optional>
 
-#include "precompute/cost/calibration.hpp"
+#include "precompute/job/cost/calibration.hpp"
 #include "precompute/eigen/inertia.hpp"
 #include "precompute/eigen/slices.hpp"
 #include "precompute/eigen/types.hpp"

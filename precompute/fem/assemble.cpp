@@ -19,7 +19,7 @@
 namespace carillon::fem {
 namespace {
 
-using partition::LocalMesh;
+using mesh::LocalMesh;
 
 /// The positions of the nodes of tetrahedron e.
 std::span<const Vec3> copy_positions(const LocalMesh& local, std::int32_t e, std::array<Vec3, kMaxNodes>& x) {

@@ -1,7 +1,7 @@
 // K and M of the whole body as distributed PETSc matrices, and its rigid-body data.
 #pragma once
 
-#include "partition/distributed_mesh.hpp"
+#include "precompute/mesh/distributed/distributed_mesh.hpp"
 #include "precompute/fem/materials.hpp"
 #include "precompute/job/job_spec.hpp"
 #include "precompute/petsc/handle.hpp"
@@ -30,10 +30,10 @@ struct RigidBody {
 /// their pattern cannot be changed. Nodes that no tetrahedron of `local` uses have empty rows.
 /// Collective. Throws on every rank: InputError naming an element whose Jacobian is not positive everywhere (inside out, or a mid-side node
 /// out of place); SystemError when memory runs out.
-System assemble(const comm::Communicator& comm, const partition::LocalMesh& local, const Materials& materials, job::Mass mass,
+System assemble(const comm::Communicator& comm, const mesh::LocalMesh& local, const Materials& materials, job::Mass mass,
                 Form form = Form::automatic);
 
 /// Integrates the rigid-body data over the tetrahedra. Collective.
-RigidBody calc_rigid_body(const comm::Communicator& comm, const partition::LocalMesh& local, const Materials& materials);
+RigidBody calc_rigid_body(const comm::Communicator& comm, const mesh::LocalMesh& local, const Materials& materials);
 
 }  // namespace carillon::fem

@@ -18,7 +18,7 @@
 namespace carillon::fem {
 namespace {
 
-using partition::LocalMesh;
+using mesh::LocalMesh;
 
 /// The tetrahedra of each local node.
 struct Incidence {

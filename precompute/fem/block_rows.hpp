@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "partition/distributed_mesh.hpp"
+#include "precompute/mesh/distributed/distributed_mesh.hpp"
 #include "precompute/comm/communicator.hpp"
 #include "precompute/fem/element.hpp"
 #include "precompute/petsc/handle.hpp"
@@ -41,12 +41,12 @@ struct LocalRows {
   std::vector<std::int32_t> arriving;  // what other ranks send of own rows: row, number of columns, columns, by rank
 
   /// Adds the matrices of an element whose nodes are the local `nodes`.
-  void add(std::span<const std::int32_t> nodes, const partition::LocalMesh& local, const ElementMatrices& element);
+  void add(std::span<const std::int32_t> nodes, const mesh::LocalMesh& local, const ElementMatrices& element);
 };
 
 /// The pattern of the elements of all ranks, values zero. Collective. Throws SystemError on every rank when a rank's share is beyond 32-bit
 /// indices or memory.
-LocalRows make_rows(const comm::Communicator& comm, const partition::LocalMesh& local, bool lumped);
+LocalRows make_rows(const comm::Communicator& comm, const mesh::LocalMesh& local, bool lumped);
 
 /// Sends what was summed for other ranks' rows to them, adds what they send, and completes the lower triangle. Collective.
 void finish(const comm::Communicator& comm, LocalRows& rows);

@@ -12,8 +12,8 @@ namespace carillon::fem {
 namespace {
 
 /// The same nodes with the tetrahedra of one material only.
-partition::LocalMesh take_material(const partition::LocalMesh& local, const Materials& materials, std::int32_t wanted) {
-  partition::LocalMesh part = local;
+mesh::LocalMesh take_material(const mesh::LocalMesh& local, const Materials& materials, std::int32_t wanted) {
+  mesh::LocalMesh part = local;
   part.tets.clear();
   part.tet_in_mesh.clear();
   part.region.clear();
@@ -81,7 +81,7 @@ std::vector<double> calc_decay_per_s(const Materials& materials, const EnergySha
   return decay_per_s;
 }
 
-Decay calc_decay(const comm::Communicator& comm, const partition::LocalMesh& local, const Materials& materials, job::Mass mass,
+Decay calc_decay(const comm::Communicator& comm, const mesh::LocalMesh& local, const Materials& materials, job::Mass mass,
                  std::span<const double> lambda, Mat shapes) {
   Decay decay;
   if (materials.list.size() == 1 || lambda.empty()) {
@@ -92,7 +92,7 @@ Decay calc_decay(const comm::Communicator& comm, const partition::LocalMesh& loc
   const auto count = static_cast<std::int32_t>(materials.list.size());
   std::vector<std::vector<double>> elastic, kinetic;
   for (std::int32_t r = 0; r < count; ++r) {
-    const partition::LocalMesh part = take_material(local, materials, r);
+    const mesh::LocalMesh part = take_material(local, materials, r);
     const System system = assemble(comm, part, materials.list[r], mass);
     elastic.push_back(calc_forms(comm, system.stiffness, shapes, modes));
     kinetic.push_back(calc_forms(comm, system.mass, shapes, modes));

@@ -30,7 +30,7 @@ std::vector<double> calc_decay_per_s(const Materials& materials, const EnergySha
 /// law draws from its share of the mode's elastic and kinetic energy (material::Material::calc_damping_per_s), which is the diagonal of the
 /// modal damping matrix; docs/equations.md, damping. `lambda` (modes) [rad^2/s^2]; `shapes` (3n, modes) dense, rows as those of the system
 /// of `local`, null when there are no modes. Collective. Throws on every rank what assemble() throws.
-Decay calc_decay(const comm::Communicator& comm, const partition::LocalMesh& local, const Materials& materials, job::Mass mass,
+Decay calc_decay(const comm::Communicator& comm, const mesh::LocalMesh& local, const Materials& materials, job::Mass mass,
                  std::span<const double> lambda, Mat shapes);
 
 }  // namespace carillon::fem

@@ -11,7 +11,7 @@
 namespace carillon::fem {
 namespace {
 
-using partition::LocalMesh;
+using mesh::LocalMesh;
 
 /// The regions of all ranks, ascending. Collective.
 std::vector<std::int32_t> find_regions(const comm::Communicator& comm, const LocalMesh& local) {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "partition/distributed_mesh.hpp"
+#include "precompute/mesh/distributed/distributed_mesh.hpp"
 #include "precompute/job/job_spec.hpp"
 
 namespace carillon::fem {
@@ -28,10 +28,10 @@ struct Materials {
 /// Collective. Throws InputError on every rank, naming the job's line and the regions there are: a region that the job names and the mesh
 /// does not have; one that the job names twice, by tag and by name; one without material. SystemError on every rank when memory runs out on
 /// one, or its tetrahedra lack region tags.
-Materials find_materials(const comm::Communicator& comm, const partition::LocalMesh& local, const job::JobSpec& job,
+Materials find_materials(const comm::Communicator& comm, const mesh::LocalMesh& local, const job::JobSpec& job,
                          const std::map<std::int32_t, std::string>& region_names = {});
 
 /// Volume of the tetrahedra of each material [m^3], the same on every rank. Collective.
-std::vector<double> calc_volumes(const comm::Communicator& comm, const partition::LocalMesh& local, const Materials& materials);
+std::vector<double> calc_volumes(const comm::Communicator& comm, const mesh::LocalMesh& local, const Materials& materials);
 
 }  // namespace carillon::fem

@@ -23,7 +23,7 @@
 namespace carillon::fem {
 namespace {
 
-using partition::LocalMesh;
+using mesh::LocalMesh;
 
 constexpr PetscInt kBlock = 16;             // modes at a time
 constexpr std::size_t kMaxSupports = 1000;  // more patches than this are one for each entry

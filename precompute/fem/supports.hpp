@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "partition/distributed_mesh.hpp"
+#include "precompute/mesh/distributed/distributed_mesh.hpp"
 #include "precompute/fem/materials.hpp"
 
 namespace carillon::fem {
@@ -33,7 +33,7 @@ struct Supports {
 /// Calculates the reactions of all modes: (K phi - lambda M phi) at the fixed rows, summed over each patch; docs/equations.md, supports. Of
 /// all patches together, force and couple are -lambda times the integrals of rho phi and rho x cross phi, to the residual of the modes.
 /// `shapes` as in calc_decay(), null when there are no modes. Empty when LocalMesh::fixed_by is. Collective. Throws on every rank.
-Supports calc_supports(const comm::Communicator& comm, const partition::LocalMesh& local, const Materials& materials, job::Mass mass,
+Supports calc_supports(const comm::Communicator& comm, const mesh::LocalMesh& local, const Materials& materials, job::Mass mass,
                        std::span<const double> lambda, Mat shapes);
 
 }  // namespace carillon::fem

@@ -25,7 +25,7 @@
 #include "precompute/mesher/seams.hpp"
 #include "precompute/mesher/surface.hpp"
 #include "precompute/mesher/triangle_surface.hpp"
-#include "precompute/shapes/shapes.hpp"
+#include "precompute/mesh/shapes/shapes.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/base/file.hpp"
 #include "runtime/base/file_limit.hpp"
@@ -34,7 +34,7 @@
 #include "runtime/base/printable.hpp"
 #include "runtime/base/result.hpp"
 #include "runtime/base/standard_output.hpp"
-#include "runtime/version/version.hpp"
+#include "runtime/base/version.hpp"
 
 namespace {
 
@@ -439,7 +439,7 @@ void make(int argc, char** argv, Order& order) {
       "Surface: says on standard error volume, area, thickness and about how many nodes there will be, in JSON, of the surface as it "
       "was read (rough) and repaired (estimate)");
   app.add_flag("-q,--quiet", order.quiet, "Print nothing but notes on the mesh and errors, on standard error");
-  app.set_version_flag("--version", version::describe("carillon-mesh"));
+  app.set_version_flag("--version", base::describe("carillon-mesh"));
   std::map<std::string, std::string> help{
       {"wall",
        "Surface: thickness in metres of an open sheet, or of the shell inside a closed surface, solid without it. Also of tube, sphere, "

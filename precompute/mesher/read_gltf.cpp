@@ -11,8 +11,8 @@
 
 #include "precompute/mesher/surface_text.hpp"
 #include "runtime/base/document.hpp"
-#include "runtime/gltf/file.hpp"
-#include "runtime/gltf/nodes.hpp"
+#include "runtime/exchange/gltf/file.hpp"
+#include "runtime/exchange/gltf/nodes.hpp"
 
 namespace carillon::mesher {
 namespace {

@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <vector>
 
-#include "precompute/launch/blas_kernels.hpp"
+#include "precompute/petsc/launch/blas_kernels.hpp"
 #include "precompute/petsc/session.hpp"
 #include "runtime/base/failure.hpp"
 

@@ -1,4 +1,4 @@
-// What the profiling library (precompute/mpi_profile) counts, and how a program asks for it.
+// What the profiling library (precompute/petsc/profile) counts, and how a program asks for it.
 #pragma once
 
 /// Of this process since MPI started.

@@ -1,4 +1,4 @@
-// Source: PETSc users manual 3.18, PetscGetFlops; counts of messages: precompute/mpi_profile.
+// Source: PETSc users manual 3.18, PetscGetFlops; counts of messages: precompute/petsc/profile.
 #include "precompute/petsc/work.hpp"
 
 #include <dlfcn.h>

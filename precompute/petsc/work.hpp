@@ -10,7 +10,7 @@
 
 namespace carillon::petsc {
 
-/// Do we know the messages of this run? Only under the profiling library (precompute/mpi_profile): carillon-precompute --profile.
+/// Do we know the messages of this run? Only under the profiling library (precompute/petsc/profile): carillon-precompute --profile.
 bool is_profiled();
 
 /// Of one rank or summed over all. Messages and collectives are 0 where they are not counted.

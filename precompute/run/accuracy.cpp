@@ -3,7 +3,7 @@
 //             must be; its cost follows from the last trial's by the cost model, or by the exponent between two trials. What is predicted
 //             is then solved, its corrected frequencies are compared with those of the coarser mesh, and their error bars decide; where
 //             they fall short the rate that was measured between two trials takes the place of the known one.
-// Source:     precompute/estimate/correct.hpp (docs/error-bars.md); precompute/cost.
+// Source:     precompute/fem/error_bars/correct.hpp (docs/error-bars.md); precompute/job/cost.
 // Deviations: none.
 #include "precompute/run/accuracy.hpp"
 
@@ -18,11 +18,11 @@
 #include <optional>
 #include <type_traits>
 
-#include "precompute/cost/memory.hpp"
-#include "precompute/cost/seconds.hpp"
+#include "precompute/job/cost/memory.hpp"
+#include "precompute/job/cost/seconds.hpp"
 #include "precompute/eigen/memory.hpp"
-#include "precompute/io/checkpoint_file.hpp"
-#include "precompute/parallel_mesh/read_parallel.hpp"
+#include "precompute/run/io/checkpoint_file.hpp"
+#include "precompute/mesh/parallel/read_parallel.hpp"
 #include "precompute/petsc/session.hpp"
 #include "runtime/base/failure.hpp"
 
@@ -46,7 +46,7 @@ struct Decision {
 
 static_assert(std::is_trivially_copyable_v<Decision>, "Decisions are sent as bytes.");
 
-double calc_mean_edge(const comm::Communicator& comm, const partition::LocalMesh& local) {
+double calc_mean_edge(const comm::Communicator& comm, const mesh::LocalMesh& local) {
   std::array<double, 2> sum{};  // of lengths, of edges
   for (auto tet = local.tets.begin(); tet != local.tets.end(); tet += local.nodes_per_tet())
     for (const auto& [a, b] : mesh::kEdges) {
@@ -79,8 +79,8 @@ class Search {
   double find_dimension() const;
   double predict_worst(bool keeps_geometry, double ratio) const;
   double find_ratio(double goal_cents, double min) const;
-  std::vector<std::size_t> find_listed(const estimate::Corrections& corrections) const;
-  double find_worst(const estimate::Corrections& corrections) const;
+  std::vector<std::size_t> find_listed(const error_bars::Corrections& corrections) const;
+  double find_worst(const error_bars::Corrections& corrections) const;
   void compare_levels();
   Forecast forecast(const Setting& setting, double ratio) const;
   Forecast forecast_next() const;
@@ -108,12 +108,12 @@ const Trial* Search::find_before(const Trial& trial) const {
 }
 
 /// The modes that the bank will have.
-std::vector<std::size_t> Search::find_listed(const estimate::Corrections& corrections) const {
-  return estimate::find_lowest(corrections, static_cast<std::size_t>(run_.job.max_modes.value_or(std::numeric_limits<int>::max())));
+std::vector<std::size_t> Search::find_listed(const error_bars::Corrections& corrections) const {
+  return error_bars::find_lowest(corrections, static_cast<std::size_t>(run_.job.max_modes.value_or(std::numeric_limits<int>::max())));
 }
 
 /// The widest bar of them.
-double Search::find_worst(const estimate::Corrections& corrections) const {
+double Search::find_worst(const error_bars::Corrections& corrections) const {
   double worst = 0.0;
   for (const std::size_t m : find_listed(corrections)) worst = std::max(worst, corrections.cents[m]);
   return worst;
@@ -122,9 +122,9 @@ double Search::find_worst(const estimate::Corrections& corrections) const {
 /// The largest bar that is predicted on a mesh with edges `ratio` times as long, which is compared with this one. A refined mesh file keeps
 /// its facets.
 double Search::predict_worst(bool keeps_geometry, double ratio) const {
-  const estimate::Level& level = current_.solved.errors.bars.level;
+  const error_bars::Level& level = current_.solved.errors.bars.level;
   if (level.parts.empty()) return 0.0;
-  return find_worst(estimate::calc_corrections(estimate::predict_level(level, order_, keeps_geometry, ratio), &level));
+  return find_worst(error_bars::calc_corrections(error_bars::predict_level(level, order_, keeps_geometry, ratio), &level));
 }
 
 /// The longest edges, as a part of those now, that are predicted to meet the goal; `min` if none above it does.
@@ -140,12 +140,12 @@ double Search::find_ratio(double goal_cents, double min) const {
 
 /// The last trial against the one before it: which corrections both agree on, and how fast the errors fall.
 void Search::compare_levels() {
-  estimate::ErrorBars& bars = current_.solved.errors.bars;
+  error_bars::ErrorBars& bars = current_.solved.errors.bars;
   const Trial& last = report_.trials.back();
   const Trial* before = find_before(last);
-  const estimate::Level* coarser = before == nullptr || before->modes == 0 ? nullptr : &before->level;
-  order_ = estimate::find_order(bars.level, coarser, before == nullptr ? 1.0 : before->edge_m / last.edge_m);
-  if (coarser != nullptr && !bars.level.parts.empty()) bars.corrected = estimate::calc_corrections(bars.level, coarser);
+  const error_bars::Level* coarser = before == nullptr || before->modes == 0 ? nullptr : &before->level;
+  order_ = error_bars::find_order(bars.level, coarser, before == nullptr ? 1.0 : before->edge_m / last.edge_m);
+  if (coarser != nullptr && !bars.level.parts.empty()) bars.corrected = error_bars::calc_corrections(bars.level, coarser);
 }
 
 double Search::measure_exponent(double Trial::*quantity, double fallback, double min, double max) const {
@@ -324,7 +324,7 @@ Trial Search::judge(const Setting& setting, std::size_t first_phase) {
 
 /// The widest bar of the last trial, and where.
 void Search::judge_bars(Trial& trial) const {
-  const estimate::ErrorBars& bars = current_.solved.errors.bars;
+  const error_bars::ErrorBars& bars = current_.solved.errors.bars;
   for (const std::size_t k : find_listed(bars.corrected)) {
     const double cents = bars.algebraic_cents[k] + bars.corrected.cents[k];
     trial.algebraic_cents = std::max(trial.algebraic_cents, bars.algebraic_cents[k]);

@@ -25,7 +25,7 @@ struct Trial {
   double facet_cents = 0.0;      // largest addition by facets in doubt; not part of a bar
   double cpu_seconds = 0.0;      // all ranks
   std::int64_t peak_bytes = 0;   // all ranks, the process so far
-  estimate::Level level;         // its modes and what the estimate says of them
+  error_bars::Level level;         // its modes and what the estimate says of them
 };
 
 /// The next stricter setting and its predicted cost.

@@ -9,13 +9,13 @@
 #include <optional>
 #include <utility>
 
-#include "precompute/bem/radiate.hpp"
+#include "precompute/air/radiate.hpp"
 #include "precompute/eigen/checkpoint.hpp"
 #include "precompute/run/interrupt.hpp"
 #include "precompute/run/meshing.hpp"
 #include "runtime/bank/air.hpp"
 #include "runtime/base/file.hpp"
-#include "runtime/radiation/gains.hpp"
+#include "runtime/acoustics/radiation/gains.hpp"
 
 namespace carillon::run {
 namespace {
@@ -40,25 +40,25 @@ double calc_loss_ratio(const bank::Bank& bank) {
 /// Whether boundary elements are called for, and why; of rank 0.
 AirReport choose(const Run& run, const bank::Bank& bank) {
   if (run.job.air.method == job::AirMethod::bem) return {true, "the job asks for it", {}};
-  const double roundness = bem::calc_roundness(bank);
+  const double roundness = air::calc_roundness(bank);
   const std::string measure = fmt::format("its surface is that of a body of roundness {:.2f}", roundness);
   if (bank.mode_count() == 0) return {false, "there is no mode", {}};
-  if (roundness < bem::kCompact)
-    return {true, fmt::format("{}, below {:g}: flat, thin or open bodies do not radiate as a sphere does", measure, bem::kCompact), {}};
+  if (roundness < air::kCompact)
+    return {true, fmt::format("{}, below {:g}: flat, thin or open bodies do not radiate as a sphere does", measure, air::kCompact), {}};
   const double ratio = calc_loss_ratio(bank);
   const std::string loss =
       fmt::format("by the gains of a sphere the air takes up to {:.2g} times what the material takes from a mode", ratio);
   if (ratio > kLostToAir)
     return {true, fmt::format("{}, but {}, above {:g}: without it modes ring too long", measure, loss, kLostToAir), {}};
-  return {false, fmt::format("{}, and from {:g} on the gains of a sphere do; {}", measure, bem::kCompact, loss), {}};
+  return {false, fmt::format("{}, and from {:g} on the gains of a sphere do; {}", measure, air::kCompact, loss), {}};
 }
 
-bem::AirOptions make_air_options(const job::Air& air) {
-  bem::AirOptions options;
+air::AirOptions make_air_options(const job::Air& air) {
+  air::AirOptions options;
   options.solve.error_db = air.error_db;
   options.most_nodes = air.skin_nodes;
   options.coarsen = coarsen_surface;
-  if (air.half_space) options.half_space = bem::Plane{air.half_space->point_m, normalise(air.half_space->normal)};
+  if (air.half_space) options.half_space = air::Plane{air.half_space->point_m, normalise(air.half_space->normal)};
   return options;
 }
 
@@ -115,9 +115,9 @@ AirReport add_air(Run& run, bank::Bank& bank) {
     run.log.end();
     return report;
   }
-  bem::AirOptions options = make_air_options(run.job.air);
+  air::AirOptions options = make_air_options(run.job.air);
   options.warn = [&run](const std::string& text) { run.log.warn(text); };
-  bem::Keeper keeper;
+  air::Keeper keeper;
   keeper.report = [&run, tenths = 0](const std::string& text, double share) mutable {
     const int now = static_cast<int>(10.0 * share);
     if (std::exchange(tenths, now) != now) run.log.print(text);
@@ -132,13 +132,13 @@ AirReport add_air(Run& run, bank::Bank& bank) {
   try {
     const std::string source = run.comm.broadcast(run.job.file.string());
     bank::Multipoles found =
-        name_errors(source, run, [&] { return bem::calc_multipoles(run.comm, bank, options, std::move(keeper), answers); });
+        name_errors(source, run, [&] { return air::calc_multipoles(run.comm, bank, options, std::move(keeper), answers); });
     if (run.comm.is_root()) {
       report.result = describe_multipoles(found);
       run.log.print(report.result);
       bank.multipoles = std::move(found);
     }
-  } catch (const bem::SolveStopped&) {
+  } catch (const air::SolveStopped&) {
     throw eigen::Stopped();
   }
   run.log.end();

@@ -71,7 +71,7 @@ bank::Supports make_supports(const job::JobSpec& job, const fem::Supports& found
 }
 
 bank::Corrected make_corrected(const SolvedBody& solved) {
-  const estimate::Corrections& found = solved.errors.bars.corrected;
+  const error_bars::Corrections& found = solved.errors.bars.corrected;
   bank::Corrected corrected;
   for (std::size_t m = 0; m < found.lambda.size(); ++m) {
     corrected.freq_hz.push_back(std::sqrt(found.lambda[m]) / (2 * std::numbers::pi));
@@ -83,7 +83,7 @@ bank::Corrected make_corrected(const SolvedBody& solved) {
 }
 
 /// The larger of the values for the mesh's and for the corrected frequency.
-std::vector<double> find_facet_cents(const estimate::ErrorBars& bars) {
+std::vector<double> find_facet_cents(const error_bars::ErrorBars& bars) {
   std::vector<double> cents = bars.facet_cents;
   for (std::size_t m = 0; m < cents.size(); ++m) cents[m] = std::max(cents[m], bars.corrected.facet_cents[m]);
   return cents;

@@ -8,12 +8,12 @@
 #include <utility>
 #include <vector>
 
-#include "partition/distribute.hpp"
-#include "precompute/cost/calibration.hpp"
+#include "precompute/mesh/distributed/distribute.hpp"
+#include "precompute/job/cost/calibration.hpp"
 #include "precompute/eigen/solve_estimate.hpp"
-#include "precompute/estimate/correct.hpp"
+#include "precompute/fem/error_bars/correct.hpp"
 #include "precompute/mesh/read.hpp"
-#include "precompute/parallel_mesh/read_parallel.hpp"
+#include "precompute/mesh/parallel/read_parallel.hpp"
 #include "precompute/petsc/session.hpp"
 #include "precompute/run/cut_mesh.hpp"
 #include "precompute/run/meshing.hpp"
@@ -51,7 +51,7 @@ std::vector<FixedNode> find_fixed_nodes(const mesh::TetMesh& mesh, const job::Jo
 }
 
 /// Sets on every rank which entry of the job fixes its nodes. `list` is read on rank 0. Collective.
-void broadcast_fixed_nodes(const comm::Communicator& comm, std::vector<FixedNode> list, partition::LocalMesh& local) {
+void broadcast_fixed_nodes(const comm::Communicator& comm, std::vector<FixedNode> list, mesh::LocalMesh& local) {
   list = comm.broadcast(std::move(list));
   if (list.empty()) return;
   comm.agree([&] { local.fixed_by.assign(local.nodes_m.size(), -1); });
@@ -147,7 +147,7 @@ Body read_in_parallel(Run& run, const Setting& setting) {
   warn_of_mesh(run, body);
   if (recut.get_order() != nullptr) run.log.print(kByOrder);
   log_size(run, body.pieces.nodes, body.pieces.tets, body.pieces.components, body.fixed_nodes);
-  run.log.print(partition::describe(body.pieces.report));
+  run.log.print(mesh::describe(body.pieces.report));
   run.log.end();
   return body;
 }
@@ -187,7 +187,7 @@ Body make_pieces(Run& run, const Setting& setting, Patience* patience) {
       body.pieces = std::move(cut.pieces);
       body.order = std::move(cut.order);
     } else {
-      body.pieces = partition::distribute(run.comm, mesh, fixed_nodes, {.elimination_order = wants_elimination_order(run.job)});
+      body.pieces = mesh::distribute(run.comm, mesh, fixed_nodes, {.elimination_order = wants_elimination_order(run.job)});
     }
   });
   if (run.comm.size() > 1) run.log.print(body.order != nullptr ? kByOrder : kByMetis);
@@ -195,7 +195,7 @@ Body make_pieces(Run& run, const Setting& setting, Patience* patience) {
   mesh = {};
   for (std::int32_t& row : body.surface.row) row = body.pieces.row_of_node[row];
   body.pieces.row_of_node = {};
-  run.log.print(partition::describe(body.pieces.report));
+  run.log.print(mesh::describe(body.pieces.report));
   run.log.end();
   return body;
 }
@@ -216,7 +216,7 @@ std::string describe_scale_key(const job::JobSpec& job) {
 
 std::optional<std::int64_t> find_computed_count(const job::JobSpec& job) {
   if (!job.max_modes) return std::nullopt;
-  return static_cast<std::int64_t>(estimate::find_computed_count(static_cast<std::size_t>(*job.max_modes)));
+  return static_cast<std::int64_t>(error_bars::find_computed_count(static_cast<std::size_t>(*job.max_modes)));
 }
 
 namespace {

@@ -7,9 +7,9 @@
 #include <optional>
 #include <string>
 
-#include "partition/distributed_mesh.hpp"
-#include "precompute/cost/problem_size.hpp"
-#include "precompute/io/surface_modes.hpp"
+#include "precompute/mesh/distributed/distributed_mesh.hpp"
+#include "precompute/job/cost/problem_size.hpp"
+#include "precompute/run/io/surface_modes.hpp"
 #include "precompute/job/setting.hpp"
 #include "precompute/mesh/check.hpp"
 #include "precompute/run/meshing.hpp"
@@ -25,7 +25,7 @@ using io::Surface;
 using job::Setting;
 
 struct Body {
-  partition::DistributedMesh pieces;
+  mesh::DistributedMesh pieces;
   std::shared_ptr<const ldlt::MeshOrder> order;      // of the factorisation (CutMesh); until the modes are sought
   mesh::CheckReport check;                           // rank 0
   std::vector<std::string> mesher_warnings;          // differences between mesh and surface; rank 0

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "precompute/condense/condense.hpp"
+#include "precompute/coupling/condense.hpp"
 #include "precompute/fem/assemble.hpp"
 #include "runtime/bank/surface.hpp"
 #include "runtime/base/sort_order.hpp"
@@ -17,7 +17,7 @@
 namespace carillon::run {
 namespace {
 
-static_assert(job::kMaxCoupledModes == condense::kMaxModes && static_cast<std::size_t>(condense::kMaxModes) <= bank::kMaxCoupledModes);
+static_assert(job::kMaxCoupledModes == coupling::kMaxModes && static_cast<std::size_t>(coupling::kMaxModes) <= bank::kMaxCoupledModes);
 
 /// The modes that the bank will have, ascending: bank::keep_lowest() leaves those of the lowest corrected frequencies.
 std::vector<std::int32_t> find_kept_modes(const Run& run, const SolvedBody& solved) {
@@ -31,8 +31,8 @@ std::vector<std::int32_t> find_kept_modes(const Run& run, const SolvedBody& solv
   return kept;
 }
 
-condense::CondenseOptions make_condense_options(Run& run, const AccurateBody& found, std::vector<std::int32_t> kept) {
-  condense::CondenseOptions options;
+coupling::CondenseOptions make_condense_options(Run& run, const AccurateBody& found, std::vector<std::int32_t> kept) {
+  coupling::CondenseOptions options;
   options.is_stretch = run.job.nonlinear->is_stretch;
   options.modes = std::min(run.job.nonlinear->modes, static_cast<int>(kept.size()));
   options.below_hz = run.job.nonlinear->below_hz;
@@ -48,7 +48,7 @@ condense::CondenseOptions make_condense_options(Run& run, const AccurateBody& fo
   return options;
 }
 
-std::string describe_condensed(const condense::Condensed& result) {
+std::string describe_condensed(const coupling::Condensed& result) {
   const bank::QuarticEnergy& energy = result.energy;
   return fmt::format("{} coupled modes up to {:.0f} Hz of {} that bend or twist, {} {}{}, error {:.1e}, {} solves; {}", energy.mode_count(),
                      result.top_hz, result.bending_count, energy.row_count(), energy.row_count() == 1 ? "field" : "fields",
@@ -56,7 +56,7 @@ std::string describe_condensed(const condense::Condensed& result) {
                      energy.linear.empty() ? "flat" : fmt::format("curved ({:.2g})", result.curvature));
 }
 
-void warn(Run& run, const condense::Condensed& result) {
+void warn(Run& run, const coupling::Condensed& result) {
   const job::Nonlinear& asked = *run.job.nonlinear;
   if (result.energy.is_empty()) {
     run.log.warn(
@@ -87,12 +87,12 @@ CouplingReport couple_modes(Run& run, const AccurateBody& found) {
   run.log.begin("coupling", fmt::format("quartic energy of {} modes below {:g} Hz", run.job.nonlinear->modes, run.job.nonlinear->below_hz));
   const SolvedBody& solved = found.solved;
   const std::vector<std::int32_t> kept = find_kept_modes(run, solved);
-  const condense::CondenseOptions options = make_condense_options(run, found, kept);
-  condense::Condensed result = name_errors(found.body.source, run, [&] {
+  const coupling::CondenseOptions options = make_condense_options(run, found, kept);
+  coupling::Condensed result = name_errors(found.body.source, run, [&] {
     if (solved.modes.lambda.empty()) throw InputError("\"nonlinear\" couples modes, and none lies in the band: widen \"band_hz\"");
     const fem::Materials& materials = solved.properties.materials;
     const fem::System system = fem::assemble(run.comm, found.body.pieces.local, materials, run.job.mass);
-    return condense::condense_modes(run.comm,
+    return coupling::condense_modes(run.comm,
                                     {found.body.pieces.local, materials, system.stiffness, system.mass, solved.modes.lambda,
                                      solved.modes.shapes, found.body.pieces.components},
                                     options);

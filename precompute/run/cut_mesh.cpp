@@ -5,7 +5,7 @@
 #include <span>
 #include <utility>
 
-#include "partition/level_elements.hpp"
+#include "precompute/mesh/distributed/level_elements.hpp"
 #include "precompute/comm/exchange.hpp"
 #include "precompute/comm/index_partition.hpp"
 #include "precompute/ldlt/mesh_order.hpp"
@@ -40,17 +40,17 @@ OrderedPieces order_pieces(const comm::Communicator& comm, const Ints& tets, int
       ranks.rank[e] = 0;
       ranks.position[e] = -1 - static_cast<std::int32_t>(e);
     }
-  partition::level_elements(comm, ranks.rank, ranks.position);
+  mesh::level_elements(comm, ranks.rank, ranks.position);
   pieces.ranks = std::move(ranks.rank);
   return pieces;
 }
 
-OrderedPieces order_pieces(const comm::Communicator& comm, const partition::LocalMesh& first) {
+OrderedPieces order_pieces(const comm::Communicator& comm, const mesh::LocalMesh& first) {
   return order_pieces(comm, first.tets, first.nodes_per_tet(), first.row, first.free_nodes);
 }
 
 /// Rank 0: the rank of each element of the mesh. Collective.
-Ints gather_ranks(const comm::Communicator& comm, const partition::DistributedMesh& first, const Ints& ranks) {
+Ints gather_ranks(const comm::Communicator& comm, const mesh::DistributedMesh& first, const Ints& ranks) {
   return comm::report_to_owners<std::int32_t>(
       comm,
       [&] {
@@ -74,7 +74,7 @@ CutMesh cut_once(const comm::Communicator& comm, const mesh::TetMesh& mesh, cons
       order_pieces(comm, comm.is_root() ? mesh.tets : none, width, numbers, static_cast<std::int64_t>(free_nodes.size()));
   CutMesh cut;
   cut.order = ordered.order;
-  cut.pieces = partition::distribute(comm, mesh, fixed_nodes, {.part = std::move(ordered.ranks)});
+  cut.pieces = mesh::distribute(comm, mesh, fixed_nodes, {.part = std::move(ordered.ranks)});
   const Ints rows = comm.agree([&] {
     Ints list;
     for (const std::int32_t node : free_nodes) list.push_back(cut.pieces.row_of_node[node]);
@@ -87,14 +87,14 @@ CutMesh cut_once(const comm::Communicator& comm, const mesh::TetMesh& mesh, cons
 /// A mesh that no rank can order alone: METIS cuts it first. Collective.
 CutMesh cut_twice(const comm::Communicator& comm, const mesh::TetMesh& mesh, const Ints& fixed_nodes) {
   CutMesh cut;
-  cut.pieces = partition::distribute(comm, mesh, fixed_nodes);
+  cut.pieces = mesh::distribute(comm, mesh, fixed_nodes);
   const OrderedPieces ordered = order_pieces(comm, cut.pieces.local);
   cut.order = ordered.order;
-  const partition::LocalMesh& first = cut.pieces.local;
+  const mesh::LocalMesh& first = cut.pieces.local;
   const Ints nodes(first.node_in_mesh.begin(), first.node_in_mesh.begin() + first.free_nodes);
   Ints part = gather_ranks(comm, cut.pieces, ordered.ranks);
   cut.pieces = {};
-  cut.pieces = partition::distribute(comm, mesh, fixed_nodes, {.part = std::move(part)});
+  cut.pieces = mesh::distribute(comm, mesh, fixed_nodes, {.part = std::move(part)});
   ordered.order->renumber(
       comm, comm::query_owners<std::int32_t>(
                 comm, nodes, [](std::int32_t) { return 0; }, [&](std::int32_t node) { return cut.pieces.row_of_node[node]; }));
@@ -105,11 +105,11 @@ CutMesh cut_twice(const comm::Communicator& comm, const mesh::TetMesh& mesh, con
 
 CutMesh cut_by_order(const comm::Communicator& comm, const mesh::TetMesh& mesh, const Ints& fixed_nodes, std::int32_t largest_ordered) {
   const Ints free_nodes =
-      comm.agree([&] { return comm.is_root() && comm.size() > 1 ? partition::list_free_nodes(mesh, fixed_nodes) : Ints(); });
+      comm.agree([&] { return comm.is_root() && comm.size() > 1 ? mesh::list_free_nodes(mesh, fixed_nodes) : Ints(); });
   const auto count = comm.broadcast(static_cast<std::int64_t>(free_nodes.size()));
   if (!is_worth_it(comm, count)) {
     CutMesh cut;
-    cut.pieces = partition::distribute(comm, mesh, fixed_nodes);
+    cut.pieces = mesh::distribute(comm, mesh, fixed_nodes);
     return cut;
   }
   return count <= largest_ordered ? cut_once(comm, mesh, fixed_nodes, free_nodes) : cut_twice(comm, mesh, fixed_nodes);
@@ -119,7 +119,7 @@ RecutByOrder::RecutByOrder(const comm::Communicator& comm) : comm_(comm) {}
 
 parallel_mesh::Recut RecutByOrder::make_recut() {
   return {[this](std::int64_t nodes) { return is_worth_it(comm_, nodes); },
-          [this](const partition::LocalMesh& first) {
+          [this](const mesh::LocalMesh& first) {
             OrderedPieces ordered = order_pieces(comm_, first);
             order_ = std::move(ordered.order);
             return std::move(ordered.ranks);

@@ -16,7 +16,7 @@ Json::Value make_list(const Values& values) {
 }
 
 Json::Value describe_mesh(const Body& body, const Setting& setting) {
-  const partition::DistributedMesh& pieces = body.pieces;
+  const mesh::DistributedMesh& pieces = body.pieces;
   const mesh::CheckReport& check = body.check;
   Json::Value mesh;
   mesh["source"] = body.source;
@@ -40,7 +40,7 @@ Json::Value describe_mesh(const Body& body, const Setting& setting) {
   return mesh;
 }
 
-Json::Value describe_partition(const partition::PartitionReport& report) {
+Json::Value describe_partition(const mesh::PartitionReport& report) {
   Json::Value partition;
   partition["edge_cut"] = Json::Int64(report.edge_cut);
   partition["element_balance"] = report.element_balance;

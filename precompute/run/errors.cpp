@@ -11,16 +11,16 @@
 namespace carillon::run {
 namespace {
 
-estimate::ErrorBars calc_bars(Run& run, const Body& body, const AssembledSystem& system, const eigen::Modes& modes) {
+error_bars::ErrorBars calc_bars(Run& run, const Body& body, const AssembledSystem& system, const eigen::Modes& modes) {
   const fem::Materials& materials = system.properties.materials;
-  std::vector<estimate::Solid> solids;
+  std::vector<error_bars::Solid> solids;
   for (const material::Material& material : materials.list) solids.push_back({material.calc_elasticity_pa(), material.density_kg_m3});
   const bool is_cut = modes.band_count > static_cast<std::int64_t>(modes.lambda.size());
   const double last_hz = modes.lambda.empty() ? 0.0 : std::sqrt(modes.lambda.back()) / (2 * std::numbers::pi);
-  estimate::Solution solution{modes.lambda, modes.residual, modes.shapes, find_low_hz(run.job, modes),
+  error_bars::Solution solution{modes.lambda, modes.residual, modes.shapes, find_low_hz(run.job, modes),
                               is_cut ? last_hz : run.job.band_hz[1]};
   solution.below = std::max<std::int64_t>(0, modes.count_below_low - modes.rigid_count - modes.mechanism_count);
-  return estimate::calc_error_bars(run.comm, body.pieces.local, system.matrices.stiffness, system.matrices.mass, solids, materials.of_tet,
+  return error_bars::calc_error_bars(run.comm, body.pieces.local, system.matrices.stiffness, system.matrices.mass, solids, materials.of_tet,
                                    run.job.mass, solution);
 }
 
@@ -28,7 +28,7 @@ estimate::ErrorBars calc_bars(Run& run, const Body& body, const AssembledSystem&
 
 ModeProperties calc_errors(Run& run, const Body& body, const AssembledSystem& system, const eigen::Modes& modes) {
   run.log.begin("errors", "error bars and decays");
-  const partition::LocalMesh& mesh = body.pieces.local;
+  const mesh::LocalMesh& mesh = body.pieces.local;
   const fem::Materials& materials = system.properties.materials;
   ModeProperties errors;
   fem::Decay decay = fem::calc_decay(run.comm, mesh, materials, run.job.mass, modes.lambda, modes.shapes);

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "precompute/eigen/solve_modes.hpp"
-#include "precompute/estimate/error_bars.hpp"
+#include "precompute/fem/error_bars/error_bars.hpp"
 #include "precompute/fem/energy.hpp"
 #include "precompute/fem/supports.hpp"
 #include "precompute/run/body.hpp"
@@ -17,7 +17,7 @@ struct ModeProperties {
   std::vector<double> decay_per_s;  // (m)
   fem::EnergyShares shares;         // of the materials; empty when there is one
   fem::Supports supports;           // energy and reactions at the fixed nodes
-  estimate::ErrorBars bars;
+  error_bars::ErrorBars bars;
 };
 
 /// Decay rates, support losses and error bars of the modes. Phase "errors". Collective. Throws on every rank: SolveError, SystemError, with

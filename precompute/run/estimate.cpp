@@ -4,8 +4,8 @@
 #include <cmath>
 #include <utility>
 
-#include "precompute/cost/memory.hpp"
-#include "precompute/cost/seconds.hpp"
+#include "precompute/job/cost/memory.hpp"
+#include "precompute/job/cost/seconds.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/base/json.hpp"
 

@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "precompute/mesh/read.hpp"
-#include "precompute/shapes/shapes.hpp"
+#include "precompute/mesh/shapes/shapes.hpp"
 #include "runtime/base/command.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/base/failure.hpp"

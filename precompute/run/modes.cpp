@@ -8,7 +8,7 @@
 #include <optional>
 #include <utility>
 
-#include "precompute/io/checkpoint_file.hpp"
+#include "precompute/run/io/checkpoint_file.hpp"
 #include "precompute/run/phase_names.hpp"
 #include "runtime/base/error.hpp"
 
@@ -120,7 +120,7 @@ eigen::Options make_options(const job::JobSpec& job, const Setting& setting) {
 }
 
 eigen::NodeLayout make_layout(Body& body) {
-  partition::DistributedMesh& pieces = body.pieces;
+  mesh::DistributedMesh& pieces = body.pieces;
   eigen::NodeLayout layout;
   layout.order = std::move(body.order);
   const auto free_nodes = pieces.local.free_nodes;

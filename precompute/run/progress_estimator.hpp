@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "precompute/cost/seconds.hpp"
+#include "precompute/job/cost/seconds.hpp"
 #include "precompute/eigen/solve_modes.hpp"
 
 namespace carillon::run {

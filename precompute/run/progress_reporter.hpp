@@ -9,7 +9,7 @@
 #include <thread>
 
 #include "precompute/eigen/solve_modes.hpp"
-#include "precompute/io/progress_file.hpp"
+#include "precompute/run/io/progress_file.hpp"
 #include "precompute/run/progress_estimator.hpp"
 
 namespace carillon::run {

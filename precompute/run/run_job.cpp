@@ -12,10 +12,10 @@
 #include <vector>
 
 #include "precompute/eigen/solver_options.hpp"
-#include "precompute/io/checkpoint_file.hpp"
-#include "precompute/io/fingerprint.hpp"
-#include "precompute/io/matrices.hpp"
-#include "precompute/io/surface_modes.hpp"
+#include "precompute/run/io/checkpoint_file.hpp"
+#include "precompute/run/io/fingerprint.hpp"
+#include "precompute/run/io/matrices.hpp"
+#include "precompute/run/io/surface_modes.hpp"
 #include "precompute/petsc/session.hpp"
 #include "precompute/run/accuracy.hpp"
 #include "precompute/run/air.hpp"

@@ -19,7 +19,7 @@
 #include "runtime/base/clock.hpp"
 #include "runtime/base/host.hpp"
 #include "runtime/base/printable.hpp"
-#include "runtime/version/version.hpp"
+#include "runtime/base/version.hpp"
 
 namespace carillon::run {
 namespace {
@@ -105,7 +105,7 @@ Measured measure(const comm::Communicator& comm) {
   return measured;
 }
 
-std::string git_id() { return version::get_git_id(); }
+std::string git_id() { return base::get_git_id(); }
 
 std::vector<std::pair<std::string, std::string>> find_versions() {
   std::array<unsigned, 3> hdf5{};

@@ -3,9 +3,9 @@
 #include <utility>
 
 #include "precompute/eigen/search_checkpoint.hpp"
-#include "precompute/io/checkpoint_file.hpp"
-#include "precompute/io/fingerprint.hpp"
-#include "precompute/io/matrices.hpp"
+#include "precompute/run/io/checkpoint_file.hpp"
+#include "precompute/run/io/fingerprint.hpp"
+#include "precompute/run/io/matrices.hpp"
 #include "precompute/run/modes.hpp"
 
 namespace carillon::run {

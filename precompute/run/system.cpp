@@ -54,7 +54,7 @@ AssembledSystem assemble_system(Run& run, const Setting& setting, const Body& bo
   check_pieces(run, body);
   run.log.begin("assemble", fmt::format("{} unknowns, {}, {} mass", 3 * body.pieces.free_nodes, job::to_text(setting.element),
                                         job::to_text(run.job.mass)));
-  const partition::LocalMesh& mesh = body.pieces.local;
+  const mesh::LocalMesh& mesh = body.pieces.local;
   AssembledSystem system;
   BodyProperties& properties = system.properties;
   properties.materials = fem::find_materials(run.comm, mesh, run.job, body.region_names);  // its errors name the job's line

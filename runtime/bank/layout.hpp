@@ -38,7 +38,7 @@ struct FileForm {
   std::string radiation_method;     // since 1.5, absent without multipoles
   std::string nonlinear_form;       // since 1.7, absent without a nonlinear energy: "rows" or "points"
   bool has_complete_below = false;  // since 1.4: Proof::complete_below_hz is there
-  // Since 2.0: in place of mesh and shapes what runtime/codec makes of them. The bank has its Packing.
+  // Since 2.0: in place of mesh and shapes what runtime/bank/packed makes of them. The bank has its Packing.
   bool is_packed = false;
   std::vector<std::uint8_t> packed_surface, packed_shape, packed_order;  // order: perhaps empty
 };

@@ -23,7 +23,7 @@ struct Mixing {
 };
 
 /// The pressure outside the body that each mode makes, per unit modal velocity (q' = 1 m kg^1/2 / s), solved by boundary elements
-/// (precompute/bem). Signs of e^{-i omega t}. On and outside the sphere, at distance r from its centre in the direction d:
+/// (precompute/air). Signs of e^{-i omega t}. On and outside the sphere, at distance r from its centre in the direction d:
 ///   p(r, d) = sum over l <= order, |m| <= l of  a_lm  h_l(k r) / h_l(k R)  Y_lm(d),      k = 2 pi freq_hz / sound_speed_ms,  R = radius_m
 /// h_l = j_l + i y_l: outgoing waves. Y_lm: real, orthonormal, number l^2 + l + m; docs/equations.md E10. M modes.
 struct Multipoles {

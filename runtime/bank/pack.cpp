@@ -1,5 +1,5 @@
 // Method:     all modes share the error equally, each weighed by what is heard of it (reverse water-filling): a mode's step is inverse
-//             to the root of its exposure. Steps at a place are as the root of what is heard of a blow there. runtime/codec does the
+//             to the root of its exposure. Steps at a place are as the root of what is heard of a blow there. runtime/bank/packed does the
 //             rest. The steps are scaled until the error that a reader finds is the one that was asked for.
 // Source:     reverse water-filling: Cover and Thomas, Elements of Information Theory, 10.3.3.
 // Deviations: the exposures of modes add, as in calc_audibility().
@@ -13,9 +13,9 @@
 
 #include "runtime/bank/packing_error.hpp"
 #include "runtime/bank/surface.hpp"
-#include "runtime/codec/fit_shapes.hpp"
-#include "runtime/codec/levels.hpp"
-#include "runtime/codec/surface.hpp"
+#include "runtime/bank/packed/fit_shapes.hpp"
+#include "runtime/bank/packed/levels.hpp"
+#include "runtime/bank/packed/surface.hpp"
 
 namespace carillon::bank {
 namespace {
@@ -63,13 +63,13 @@ Bank drop_unused(const Bank& bank) {
 struct PackedSurface {
   Bank bank;  // vertices on the lattice; shapes as they were
   std::vector<std::uint8_t> bytes, order;
-  codec::Surface surface;
+  packed::Surface surface;
 };
 
 /// What the triangles of `surface` were, those of a bank whose vertices are now at `moved`.
-codec::TriangleOrder find_triangle_order(const codec::Surface& surface, const std::vector<std::int32_t>& before,
+packed::TriangleOrder find_triangle_order(const packed::Surface& surface, const std::vector<std::int32_t>& before,
                                          const std::vector<Triangle>& triangles, const std::vector<std::int32_t>& moved) {
-  codec::TriangleOrder order{before, {}};
+  packed::TriangleOrder order{before, {}};
   for (std::size_t i = 0; i < before.size(); ++i) {
     const std::int32_t corner = moved[triangles[before[i]][0]];
     const Triangle& now = surface.triangles[i];
@@ -91,24 +91,24 @@ PackedSurface pack_surface(const Bank& original, bool keep_numbers) {
         shortest_m = std::min(shortest_m, edge_m);
   }
   const double step_m = std::max(std::min(size_m / kLatticePerSize, shortest_m / kLatticePerEdge), size_m / kMostLattice);
-  std::vector<codec::Place> places(bank.vertex_count());
+  std::vector<packed::Place> places(bank.vertex_count());
   for (std::size_t v = 0; v < places.size(); ++v)
     for (std::size_t k = 0; k < 3; ++k) places[v][k] = static_cast<std::int32_t>(std::lround((bank.vertices_m[v][k] - low[k]) / step_m));
-  const codec::WrittenSurface written =
-      codec::write_surface(low, step_m, places, bank.triangles, codec::find_levels(bank.vertices_m, area_m2));
+  const packed::WrittenSurface written =
+      packed::write_surface(low, step_m, places, bank.triangles, packed::find_levels(bank.vertices_m, area_m2));
   std::vector<std::int16_t> shape;
   shape.reserve(bank.shape.size());
   for (const std::int32_t v : written.vertices) append_row(bank, v, shape);
   bank.shape = std::move(shape);
-  codec::Surface surface = codec::read_surface(std::as_bytes(std::span(written.bytes)), "the packed surface");
+  packed::Surface surface = packed::read_surface(std::as_bytes(std::span(written.bytes)), "the packed surface");
   std::vector<std::uint8_t> order;
   if (keep_numbers) {
     std::vector<std::int32_t> moved(bank.vertex_count());
     for (std::size_t v = 0; v < moved.size(); ++v) moved[written.vertices[v]] = static_cast<std::int32_t>(v);
-    order = codec::write_order(find_triangle_order(surface, written.triangles, bank.triangles, moved));
+    order = packed::write_order(find_triangle_order(surface, written.triangles, bank.triangles, moved));
   }
   bank.triangles = surface.triangles;
-  if (keep_numbers) codec::restore_order(std::as_bytes(std::span(order)), bank.triangles, "the packed surface");
+  if (keep_numbers) packed::restore_order(std::as_bytes(std::span(order)), bank.triangles, "the packed surface");
   for (std::size_t v = 0; v < bank.vertex_count(); ++v) bank.vertices_m[v] = surface.find_vertex(v);
   return {std::move(bank), written.bytes, std::move(order), std::move(surface)};
 }
@@ -143,13 +143,13 @@ std::vector<std::uint8_t> calc_fineness(const std::vector<double>& exposure, dou
   std::vector<std::uint8_t> fineness;
   for (const double heard : exposure) {
     const double halvings = heard > 0.0 ? std::log2(loudest / heard) : 0.0;
-    fineness.push_back(static_cast<std::uint8_t>(std::clamp(std::lround(halvings), 0L, static_cast<long>(codec::kMaxFineness))));
+    fineness.push_back(static_cast<std::uint8_t>(std::clamp(std::lround(halvings), 0L, static_cast<long>(packed::kMaxFineness))));
   }
   return fineness;
 }
 
-codec::Rows make_rows(const Bank& bank, const std::vector<float>& step) {
-  codec::Rows rows(bank.vertex_count(), bank.mode_count());
+packed::Rows make_rows(const Bank& bank, const std::vector<float>& step) {
+  packed::Rows rows(bank.vertex_count(), bank.mode_count());
   std::vector<float> row(rows.get_width(), 0.0F);
   std::vector<float> factor;
   for (std::size_t m = 0; m < bank.mode_count(); ++m)
@@ -164,7 +164,7 @@ codec::Rows make_rows(const Bank& bank, const std::vector<float>& step) {
 }
 
 /// As read_shapes() makes them of rows but in double precision, at the vertices that `is_known`.
-std::vector<std::int16_t> make_shape(const Bank& bank, const codec::Rows& rows, const std::vector<float>& step,
+std::vector<std::int16_t> make_shape(const Bank& bank, const packed::Rows& rows, const std::vector<float>& step,
                                      const std::vector<bool>& is_known) {
   std::vector<std::int16_t> shape(bank.shape.size(), 0);
   for (std::size_t v = 0; v < bank.vertex_count(); ++v) {
@@ -218,7 +218,7 @@ std::vector<std::int32_t> choose_witnesses(const StruckSkin& skin, std::size_t c
 /// Finds the scale of the steps with which a packed bank has the error that is asked for, by secants.
 class Packer {
  public:
-  Packer(const Bank& bank, const codec::Surface& surface) : bank_(bank), surface_(surface), blows_(bank) {
+  Packer(const Bank& bank, const packed::Surface& surface) : bank_(bank), surface_(surface), blows_(bank) {
     std::vector<double> exposure = blows_.exposure;
     for (std::size_t v = 0; v < exposure.size(); ++v) {
       if (!(blows_.skin.area_m2[v] > 0.0)) exposure[v] *= kCavity;
@@ -280,7 +280,7 @@ class Packer {
     std::vector<bool> is_known(bank_.vertex_count());
     for (std::size_t v = 0; v < is_known.size(); ++v) is_known[v] = v < finest || v % kSampled == 0;
     const std::vector<float> step = make_steps(asked_db);
-    const codec::FittedShapes fitted = codec::fit_shapes(surface_, make_rows(bank_, step), bank_.mode_count(), fineness_, kSampled);
+    const packed::FittedShapes fitted = packed::fit_shapes(surface_, make_rows(bank_, step), bank_.mode_count(), fineness_, kSampled);
     // Of what is known the finest level is too small a part.
     std::vector<double> area_m2 = blows_.skin.area_m2;
     for (std::size_t v = finest; v < is_known.size(); ++v) area_m2[v] *= static_cast<double>(kSampled);
@@ -289,16 +289,16 @@ class Packer {
 
   double try_whole(double asked_db, std::vector<std::uint8_t>& bytes, Packing& packing) const {
     const std::vector<float> step = make_steps(asked_db);
-    const codec::FittedShapes fitted = codec::fit_shapes(surface_, make_rows(bank_, step), bank_.mode_count(), fineness_);
-    bytes = codec::write_shapes(step, fitted.levels);
+    const packed::FittedShapes fitted = packed::fit_shapes(surface_, make_rows(bank_, step), bank_.mode_count(), fineness_);
+    bytes = packed::write_shapes(step, fitted.levels);
     const std::vector<std::int16_t> shape =
-        codec::read_shapes(std::as_bytes(std::span(bytes)), surface_, bank_.shape_scale, "the packed shapes");
+        packed::read_shapes(std::as_bytes(std::span(bytes)), surface_, bank_.shape_scale, "the packed shapes");
     packing = calc_error(bank_, blows_, blows_.skin.area_m2, shape, std::vector<bool>(bank_.vertex_count(), true));
     return packing.error_db;
   }
 
   const Bank& bank_;
-  const codec::Surface& surface_;
+  const packed::Surface& surface_;
   Blows blows_;
   double loudest_ = 0.0;  // of all vertices, walls of cavities as they weigh
   std::vector<std::uint8_t> fineness_;
@@ -315,7 +315,7 @@ PackedBank calc_packed(const Bank& bank, double error_db, bool keep_numbers) {
   Packing packing;
   packed.shape = Packer(at_places.bank, at_places.surface).run(error_db, packing);
   packed.bank.shape =
-      codec::read_shapes(std::as_bytes(std::span(packed.shape)), at_places.surface, packed.bank.shape_scale, "the packed shapes");
+      packed::read_shapes(std::as_bytes(std::span(packed.shape)), at_places.surface, packed.bank.shape_scale, "the packed shapes");
   packed.bank.shape_bytes = 2;
   packed.bank.provenance = fmt::format(R"({{"packed": {{"error_db": {:.2f}, "worst_db": {:.2f}}})", packing.error_db, packing.worst_db) +
                            (bank.provenance.empty() ? "}" : fmt::format(R"(, "of": {}}})", bank.provenance));

@@ -13,7 +13,7 @@ inline constexpr double kMinPackError = -90.0, kMaxPackError = -10.0;  // dB(A)
 
 struct PackedBank {
   Bank bank;  // what a reader will find: shapes and places with their errors, vertices and triangles in the order of the file
-  std::vector<std::uint8_t> surface, shape, order;  // as runtime/codec reads them; order: empty unless triangles keep their numbers
+  std::vector<std::uint8_t> surface, shape, order;  // as runtime/bank/packed reads them; order: empty unless triangles keep their numbers
 };
 
 /// Packs shapes and surface so that the error of a hard blow is at most `error_db` (Packing::error_db), and nearly that. Modes that are

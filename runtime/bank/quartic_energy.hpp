@@ -57,7 +57,7 @@ std::string find_size_fault(const QuarticEnergy& energy);
 std::string find_mode_fault(const QuarticEnergy& energy, std::size_t modes);
 
 /// V(q) [J] and its gradient [N kg^-1/2] by double precision. q and gradient: (N); the sizes of the energy agree. For checks and
-/// comparisons; what is played: runtime/nonlinear.
+/// comparisons; what is played: runtime/synth/nonlinear.
 double calc_energy_j(const QuarticEnergy& energy, std::span<const double> q, std::span<double> gradient);
 
 /// sum over r of A_r,ii^2 for each coupled mode (N) [J m^-4 kg^-2]: alone it moves by q'' + lambda q + 2 this q^3 = 0 on a flat body.

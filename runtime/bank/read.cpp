@@ -21,8 +21,8 @@
 #include "runtime/bank/seal.hpp"
 #include "runtime/base/large.hpp"
 #include "runtime/base/sha256.hpp"
-#include "runtime/codec/shapes.hpp"
-#include "runtime/codec/surface.hpp"
+#include "runtime/bank/packed/shapes.hpp"
+#include "runtime/bank/packed/surface.hpp"
 
 namespace carillon::bank {
 namespace {
@@ -332,15 +332,15 @@ Loaded load(const Seal& seal, const std::string& name, const Source& read) {
 
 /// Makes mesh and shapes of what is packed.
 void unpack(Bank& bank, const FileForm& form, const std::string& name) {
-  codec::Surface surface = codec::read_surface(std::as_bytes(std::span(form.packed_surface)), name);
+  packed::Surface surface = packed::read_surface(std::as_bytes(std::span(form.packed_surface)), name);
   for (const double scale : bank.shape_scale)
     if (!std::isfinite(scale) || scale < 0.0)
       throw InputError(fmt::format("{}: a scale of shapes is {}; copy or pack the bank again", name, scale));
-  bank.shape = codec::read_shapes(std::as_bytes(std::span(form.packed_shape)), surface, bank.shape_scale, name);
+  bank.shape = packed::read_shapes(std::as_bytes(std::span(form.packed_shape)), surface, bank.shape_scale, name);
   bank.vertices_m.reserve(surface.places.size());
   for (std::size_t v = 0; v < surface.places.size(); ++v) bank.vertices_m.push_back(surface.find_vertex(v));
   bank.triangles = std::move(surface.triangles);
-  if (!form.packed_order.empty()) codec::restore_order(std::as_bytes(std::span(form.packed_order)), bank.triangles, name);
+  if (!form.packed_order.empty()) packed::restore_order(std::as_bytes(std::span(form.packed_order)), bank.triangles, name);
   for (const std::int32_t vertex : bank.packing->witness)
     if (vertex < 0 || static_cast<std::size_t>(vertex) >= bank.vertex_count())
       throw InputError(fmt::format("{}: pack/witness names vertex {}, and there are {}; copy or pack the bank again", name, vertex,

@@ -10,7 +10,7 @@
 
 namespace carillon::bank {
 
-/// A page for people; at most `mode_limit` rows of modes. `heard`: support::calc_heard(). `has_record`: with the record of its run.
+/// A page for people; at most `mode_limit` rows of modes. `heard`: mounting::calc_heard(). `has_record`: with the record of its run.
 std::string format_info(const Bank& bank, std::span<const HeardMode> heard, const std::filesystem::path& file, std::size_t mode_limit,
                         bool has_record);
 

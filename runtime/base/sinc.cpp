@@ -62,7 +62,7 @@ double Sinc::evaluate(double x) const noexcept {
 
 void Sinc::make_delay(double fraction, std::array<float, kSincTaps>& taps) const noexcept {
   const double place = std::clamp(fraction, 0.0, 1.0) * kSincPhases;
-  const std::size_t phase = std::min(static_cast<std::size_t>(place), kSincPhases - 1);
+  const std::size_t phase = std::min<std::size_t>(static_cast<std::size_t>(place), kSincPhases - 1);
   const auto mix = static_cast<float>(place - static_cast<double>(phase));
   const auto& before = delays_[phase];
   const auto& after = delays_[phase + 1];

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "runtime/bank/bank.hpp"
-#include "runtime/radiation/gains.hpp"
+#include "runtime/acoustics/radiation/gains.hpp"
 
 namespace carillon::exchange {
 

@@ -30,8 +30,8 @@
 #include "runtime/base/vector.hpp"
 #include "runtime/exchange/damped.hpp"
 #include "runtime/exchange/glb.hpp"
-#include "runtime/gltf/file.hpp"
-#include "runtime/gltf/nodes.hpp"
+#include "runtime/exchange/gltf/file.hpp"
+#include "runtime/exchange/gltf/nodes.hpp"
 
 namespace carillon::exchange {
 namespace {

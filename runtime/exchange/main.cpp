@@ -33,9 +33,9 @@
 #include "runtime/exchange/commands.hpp"
 #include "runtime/material/solids.hpp"
 #include "runtime/material/table.hpp"
-#include "runtime/radiation/gains.hpp"
-#include "runtime/support/heard.hpp"
-#include "runtime/version/version.hpp"
+#include "runtime/acoustics/radiation/gains.hpp"
+#include "runtime/bank/mounting/heard.hpp"
+#include "runtime/base/version.hpp"
 
 namespace {
 
@@ -297,7 +297,7 @@ int run(int argc, char** argv) {
   app.failure_message(
       [](const CLI::App* asked, const CLI::Error& error) { return base::printable_lines(CLI::FailureMessage::simple(asked, error)); });
   app.require_subcommand(1);
-  app.set_version_flag("--version", version::describe("carillon-bank"));
+  app.set_version_flag("--version", base::describe("carillon-bank"));
   std::string file;
   bool json = false, csv = false, all = false;
   std::size_t modes = 20;
@@ -366,7 +366,7 @@ int run(int argc, char** argv) {
     exchange::run_import(imported);
   } else {
     const bank::Bank bank = bank::read_bank(file);
-    const std::vector<bank::HeardMode> heard = support::calc_heard(bank);
+    const std::vector<bank::HeardMode> heard = mounting::calc_heard(bank);
     fmt::print("{}", json  ? bank::format_info_json(bank, heard, file)
                      : csv ? bank::format_info_csv(bank, heard)
                            : base::printable_lines(bank::format_info(bank, heard, file, modes, all)));

@@ -22,7 +22,7 @@
 #include "runtime/base/sort_order.hpp"
 #include "runtime/base/vector.hpp"
 #include "runtime/exchange/faust.hpp"
-#include "runtime/version/version.hpp"
+#include "runtime/base/version.hpp"
 
 namespace carillon::exchange {
 namespace {
@@ -168,7 +168,7 @@ FaustProgram make_faust(const bank::Bank& given, const FaustOptions& options) {
   const std::string name = clean(options.name);
   std::string& text = program.text;
   text = fmt::format("// {}: {} of {} modes, struck at {} point{}. Written by {}.\n", name, kept.size(), bank.mode_count(), places.size(),
-                     places.size() == 1 ? "" : "s", version::describe("carillon-bank"));
+                     places.size() == 1 ? "" : "s", base::describe("carillon-bank"));
   text += "// Compile with -double: in single precision the phase of a mode of 10 kHz is off by 4e-3 after a second.\n";
   for (std::size_t p = 0; p < places.size(); ++p)
     text += fmt::format("// point {}: {:.6g}, {:.6g}, {:.6g} m\n", p, places[p].point_m[0], places[p].point_m[1], places[p].point_m[2]);

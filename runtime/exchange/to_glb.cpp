@@ -20,8 +20,8 @@
 #include "runtime/base/vector.hpp"
 #include "runtime/exchange/damped.hpp"
 #include "runtime/exchange/glb.hpp"
-#include "runtime/gltf/writer.hpp"
-#include "runtime/version/version.hpp"
+#include "runtime/exchange/gltf/writer.hpp"
+#include "runtime/base/version.hpp"
 
 namespace carillon::exchange {
 namespace {
@@ -120,7 +120,7 @@ void write_glb(const bank::Bank& bank, const GlbOptions& options, const std::fun
   if (swinging.empty())
     throw InputError(fmt::format("the bank has no under-damped mode ({} in all), and {} needs one", bank.mode_count(), kExtension));
 
-  gltf::Writer writer(version::describe("carillon-bank"));
+  gltf::Writer writer(base::describe("carillon-bank"));
   const int positions = writer.add_vertices(to_floats(bank.vertices_m), true);
   std::vector<Vec3> normals_of_vertices = bank::calc_vertex_normals(bank);
   for (Vec3& normal : normals_of_vertices)

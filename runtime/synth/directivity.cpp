@@ -15,7 +15,7 @@
 #include "runtime/base/error.hpp"
 #include "runtime/base/quaternion.hpp"
 #include "runtime/base/vector.hpp"
-#include "runtime/radiation/transfers.hpp"
+#include "runtime/acoustics/radiation/transfers.hpp"
 #include "runtime/synth/receiver.hpp"
 #include "runtime/synth/trajectory.hpp"
 

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "runtime/head/ear_filter.hpp"
+#include "runtime/acoustics/head/ear_filter.hpp"
 
 namespace carillon::synth {
 

@@ -19,7 +19,7 @@
 
 #include "runtime/base/error.hpp"
 #include "runtime/base/large.hpp"
-#include "runtime/radiation/transfers.hpp"
+#include "runtime/acoustics/radiation/transfers.hpp"
 #include "runtime/synth/bending.hpp"
 #include "runtime/synth/effects.hpp"
 #include "runtime/synth/nonlinear_modes.hpp"

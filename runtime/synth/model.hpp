@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "runtime/bank/bank.hpp"
-#include "runtime/nonlinear/coupled_modes.hpp"
+#include "runtime/synth/nonlinear/coupled_modes.hpp"
 #include "runtime/synth/kernels.hpp"
 #include "runtime/synth/pulse.hpp"
 

@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "runtime/nonlinear/cascade.hpp"
-#include "runtime/nonlinear/coupled_modes.hpp"
+#include "runtime/synth/nonlinear/cascade.hpp"
+#include "runtime/synth/nonlinear/coupled_modes.hpp"
 #include "runtime/synth/damped_modes.hpp"
 #include "runtime/synth/kernels.hpp"
 #include "runtime/synth/model.hpp"

@@ -8,8 +8,8 @@
 
 #include <algorithm>
 
-#include "runtime/head/head.hpp"
-#include "runtime/radiation/transfers.hpp"
+#include "runtime/acoustics/head/head.hpp"
+#include "runtime/acoustics/radiation/transfers.hpp"
 
 namespace carillon::synth {
 namespace {

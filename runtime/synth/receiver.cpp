@@ -15,7 +15,7 @@
 
 #include "runtime/base/sinc.hpp"
 #include "runtime/base/vector.hpp"
-#include "runtime/radiation/transfers.hpp"
+#include "runtime/acoustics/radiation/transfers.hpp"
 
 namespace carillon::synth {
 namespace {

@@ -13,7 +13,7 @@
 #include <utility>
 
 #include "runtime/base/error.hpp"
-#include "runtime/radiation/transfers.hpp"
+#include "runtime/acoustics/radiation/transfers.hpp"
 
 namespace carillon::synth {
 namespace {

@@ -14,7 +14,7 @@
 #include <utility>
 
 #include "runtime/base/error.hpp"
-#include "runtime/head/head.hpp"
+#include "runtime/acoustics/head/head.hpp"
 #include "runtime/synth/fp_guard.hpp"
 
 namespace carillon::synth {

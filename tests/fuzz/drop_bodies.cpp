@@ -3,7 +3,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "tests/unit/runtime/rigid/drops.hpp"
+#include "tests/unit/runtime/physics/rigid/drops.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace carillon::rigid::tests;

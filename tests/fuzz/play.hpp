@@ -9,7 +9,7 @@
 #include <string_view>
 
 #include "runtime/base/error.hpp"
-#include "runtime/host/program.hpp"
+#include "runtime/render/program.hpp"
 #include "tests/support/folder.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 
@@ -35,13 +35,13 @@ inline std::string_view to_text(const std::uint8_t* data, std::size_t size) { re
 inline void report(const char* what) { std::fprintf(stderr, "mutant: %s\n", what); }
 
 /// Renders with every output there is; the WAV has to be whole. False: refused.
-inline bool play(host::ProgramOptions options) {
+inline bool play(render::ProgramOptions options) {
   const Folder& folder = get_folder();
   options.wav = folder / "out.wav";
   options.report = folder / "out.json";
   options.quiet = true;
   try {
-    host::run(options);
+    render::run(options);
   } catch (const InputError&) {
     report("refused");
     return false;

@@ -3,7 +3,7 @@
 
 #include "runtime/bank/edits.hpp"
 #include "runtime/bank/report.hpp"
-#include "runtime/support/heard.hpp"
+#include "runtime/bank/mounting/heard.hpp"
 #include "tests/fuzz/play.hpp"
 #include "tests/unit/runtime/bank/seal_again.hpp"
 
@@ -19,7 +19,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const bank::Bank loose = bank::read_bank_unchecked(file);
     for (const bank::Check& check : bank::calc_checks(loose)) bank::format_check(check);
     const bank::Bank bank = bank::read_bank(file);
-    const std::vector<bank::HeardMode> heard = support::calc_heard(bank);
+    const std::vector<bank::HeardMode> heard = mounting::calc_heard(bank);
     bank::format_info(bank, heard, file, 100, true);
     bank::format_info_json(bank, heard, file);
     if (bank.mode_count() > 200 || bank.triangles.size() > 2000) {

@@ -1,5 +1,5 @@
 // Any bytes as a scene: read and played, or refused with an InputError. What is long, or of many bodies or strikes, is only read.
-#include "runtime/host/scene.hpp"
+#include "runtime/scene/scene.hpp"
 #include "tests/fuzz/play.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -7,10 +7,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const fuzz::Folder& folder = fuzz::get_folder();
   const std::filesystem::path file = folder.write("scene.json", fuzz::to_text(data, size));
   try {
-    const host::Scene scene = host::read_scene(file);
+    const scene::Scene scene = scene::read_scene(file);
     const bool is_small =
         scene.duration_s <= 0.15 && scene.bodies.size() <= 4 && scene.strikes.size() <= 100 && scene.sample_rate_hz <= 96000;
-    for (const host::SceneBody& body : scene.bodies)
+    for (const scene::SceneBody& body : scene.bodies)
       if (body.bank.empty()) {  // the solver is another program
         fuzz::report("only read");
         return 0;

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Hard cases of the air outside a body by boundary elements (a job's "radiation"; precompute/bem). The truth is a closed form of what the
+"""Hard cases of the air outside a body by boundary elements (a job's "radiation"; precompute/air). The truth is a closed form of what the
 surface in the bank does, a symmetry, or the same air solved in another way.
 
 usage: air.py CASE

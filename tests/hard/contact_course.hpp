@@ -8,51 +8,51 @@
 #include <variant>
 #include <vector>
 
-#include "runtime/contact/world.hpp"
-#include "tests/unit/runtime/contact/bodies.hpp"
-#include "tests/unit/runtime/shape/solids.hpp"
+#include "runtime/physics/world.hpp"
+#include "tests/unit/runtime/physics/bodies.hpp"
+#include "tests/unit/runtime/physics/geometry/solids.hpp"
 
 namespace carillon::hard {
 
 using carillon::norm;
-using contact::BodySpec;
-using contact::GroundSpec;
-using contact::World;
-using contact::WorldSpec;
-using contact::tests::make_ball;
-using contact::tests::make_box;
+using physics::BodySpec;
+using physics::GroundSpec;
+using physics::World;
+using physics::WorldSpec;
+using physics::tests::make_ball;
+using physics::tests::make_box;
 using carillon::operator+;
 using carillon::operator-;
 using carillon::operator*;
 
 inline constexpr double kGravity = 9.81;
 
-inline bank::Bank make_bank(const shape::tests::Solid& solid, double density) {
-  return contact::tests::make_bank(solid, {70e9, 0.3, density, 1e-6, 10.0});
+inline bank::Bank make_bank(const geometry::tests::Solid& solid, double density) {
+  return physics::tests::make_bank(solid, {70e9, 0.3, density, 1e-6, 10.0});
 }
 
 inline bank::Bank make_dense_box(Vec3 size, double density) {
   bank::Bank box = make_box(size);
   box.material.density_kg_m3 = density;
-  contact::tests::set_rigid_of_solid(box);
+  physics::tests::set_rigid_of_solid(box);
   return box;
 }
 
 /// A ball of 20 n^2 facets; mass and inertia are those of the true ball.
 inline bank::Bank make_round(double radius_m, int n) {
-  bank::Bank ball = make_bank(shape::tests::make_ball(radius_m, n), 2700.0);
+  bank::Bank ball = make_bank(geometry::tests::make_ball(radius_m, n), 2700.0);
   ball.rigid = make_ball(radius_m, 1).rigid;
   return ball;
 }
 
 inline BodySpec make_body(const bank::Bank& bank, Vec3 position, double restitution = 0.3) {
-  return contact::tests::make_body("body", bank, position, restitution);
+  return physics::tests::make_body("body", bank, position, restitution);
 }
 
 /// What a world did until its end.
 struct Course {
   std::vector<events::BodyMotion> middle, end;
-  contact::EnergyAudit energy;
+  physics::EnergyAudit energy;
   int hits = 0;
 };
 
@@ -89,7 +89,7 @@ inline double calc_rise(const Course& course) { return std::max(course.energy.ri
 inline double calc_depth(const bank::Bank& bank, const events::BodyMotion& motion) {
   double depth = -1.0;
   for (const auto& x : bank.vertices_m)
-    depth = std::max(depth, -(motion.position_m[2] + contact::tests::rotate(motion.rotation, x - bank.rigid.centre_m)[2]));
+    depth = std::max(depth, -(motion.position_m[2] + physics::tests::rotate(motion.rotation, x - bank.rigid.centre_m)[2]));
   return depth;
 }
 

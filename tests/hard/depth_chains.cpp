@@ -14,7 +14,7 @@
 
 #include "tests/hard/contact_course.hpp"
 #include "tests/hard/figure.hpp"
-#include "tests/unit/runtime/rigid/drops.hpp"
+#include "tests/unit/runtime/physics/rigid/drops.hpp"
 
 namespace carillon::hard {
 namespace {
@@ -24,7 +24,7 @@ constexpr double kWindow = 2e-3;  // s
 /// Rings that hang in each other, the first of them fixed, let go as a horizontal row.
 void swing(const std::string& id, int count, double seconds) {
   constexpr double kRadius = 0.02, kWire = 0.003, kInner = 2.0 * (kRadius - kWire);
-  const bank::Bank ring = make_bank(shape::tests::make_ring(kRadius, kWire, 48, 16), 7800.0);
+  const bank::Bank ring = make_bank(geometry::tests::make_ring(kRadius, kWire, 48, 16), 7800.0);
   const double q = std::sqrt(0.5);
   WorldSpec spec;
   for (int i = 0; i < count; ++i) {
@@ -43,7 +43,7 @@ void swing(const std::string& id, int count, double seconds) {
     if (std::holds_alternative<events::TimeWatermark>(event))
       for (std::size_t i = 1; i < at.size(); ++i) apart_m = std::max(apart_m, norm(at[i] - at[i - 1]) - kInner);
   });
-  const contact::Statistics statistics = world.get_statistics();
+  const physics::Statistics statistics = world.get_statistics();
   hold(id, apart_m, 5e-5, "distance of neighbours beyond the inner width [m]");
   hold(id, statistics.contacts.deepest.depth_m, 6e-5, "deepest in each other ever [m]");
   hold(id, statistics.energy.lifted_j / statistics.energy.kinetic_j, 1e-3, "energy lifted over the largest of motion");
@@ -86,21 +86,21 @@ void heap(const std::string& id, int count, double end_s, double in_bodies_bound
     if (std::exchange(steps, world.get_statistics().steps) != steps) awake_s = end_s * n / 60;
   }
   double in_ground_m = 0.0, in_bodies_m = 0.0;
-  std::vector<std::unique_ptr<shape::Shape>> shapes;
-  std::vector<shape::Frame> frames;
+  std::vector<std::unique_ptr<geometry::Shape>> shapes;
+  std::vector<geometry::Frame> frames;
   for (std::size_t i = 0; i < at.size(); ++i) {
     const bank::Bank& bank = *spec.bodies[i].bank;
-    shapes.push_back(std::make_unique<shape::Shape>(bank.vertices_m, bank.triangles));
-    const contact::Pose pose = contact::calc_pose(at[i], bank.rigid.centre_m);
+    shapes.push_back(std::make_unique<geometry::Shape>(bank.vertices_m, bank.triangles));
+    const physics::Pose pose = physics::calc_pose(at[i], bank.rigid.centre_m);
     frames.push_back({rigid::make_rotation(pose.rotation), pose.position_m});
     if (!spec.bodies[i].fixed) in_ground_m = std::max(in_ground_m, calc_depth(bank, at[i]));
     for (std::size_t k = 0; k < i; ++k) {
       Vec3 where{};
       if (!spec.bodies[i].fixed || !spec.bodies[k].fixed)
-        in_bodies_m = std::max(in_bodies_m, shape::calc_overlap(*shapes[k], frames[k], *shapes[i], frames[i], where));
+        in_bodies_m = std::max(in_bodies_m, geometry::calc_overlap(*shapes[k], frames[k], *shapes[i], frames[i], where));
     }
   }
-  const contact::Statistics statistics = world.get_statistics();
+  const physics::Statistics statistics = world.get_statistics();
   hold(id, in_ground_m, 1e-4, "in the ground at the end [m]");
   hold(id, in_bodies_m, in_bodies_bound_m, "in each other at the end [m]");
   hold(id, statistics.contacts.deepest.depth_m, 5e-4, "deepest ever [m]");
@@ -128,10 +128,10 @@ TEST(depth, loaded_cup) {
       world.advance(3.0, std::numeric_limits<double>::infinity(), [&](const events::Event& event) {
         if (const auto* m = std::get_if<events::BodyMotion>(&event); m != nullptr && m->body == 1) load = *m;
       });
-      const contact::Statistics statistics = world.get_statistics();
+      const physics::Statistics statistics = world.get_statistics();
       rests_m = std::max(rests_m, statistics.contacts.now.depth_m);
       error = std::max(error, statistics.energy.error_j / statistics.energy.kinetic_j);
-      falls_m = std::max(falls_m, std::abs(contact::calc_pose(load, block.rigid.centre_m).position_m[2] - 0.19));
+      falls_m = std::max(falls_m, std::abs(physics::calc_pose(load, block.rigid.centre_m).position_m[2] - 0.19));
     }
   hold("loaded_cup", rests_m, 5e-5, "deepest at the end [m]");
   hold("loaded_cup", falls_m, 5e-5, "height of the load at the end, off that of the cup and half of its own [m]");

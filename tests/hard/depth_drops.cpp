@@ -1,4 +1,4 @@
-// Hard cases of depth: random drops of one body (tests/unit/runtime/rigid/drops.hpp), looked at after every step.
+// Hard cases of depth: random drops of one body (tests/unit/runtime/physics/rigid/drops.hpp), looked at after every step.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,7 +8,7 @@
 #include <string>
 
 #include "tests/hard/figure.hpp"
-#include "tests/unit/runtime/rigid/drops.hpp"
+#include "tests/unit/runtime/physics/rigid/drops.hpp"
 
 namespace carillon::hard {
 namespace {

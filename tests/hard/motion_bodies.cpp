@@ -12,12 +12,12 @@
 #include <string>
 #include <vector>
 
-#include "precompute/transient/contact.hpp"
+#include "precompute/simulation/transient/contact.hpp"
 #include "runtime/base/error.hpp"
 #include "tests/hard/figure.hpp"
 #include "tests/support/catch_message.hpp"
-#include "tests/unit/precompute/transient/bodies.hpp"
-#include "tests/unit/precompute/transient/spin.hpp"
+#include "tests/unit/precompute/simulation/transient/bodies.hpp"
+#include "tests/unit/precompute/simulation/transient/spin.hpp"
 
 namespace carillon::hard {
 namespace {

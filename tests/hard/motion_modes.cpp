@@ -8,7 +8,7 @@
 
 #include "runtime/synth/fp_guard.hpp"
 #include "tests/hard/figure.hpp"
-#include "tests/unit/runtime/nonlinear/blows.hpp"
+#include "tests/unit/runtime/synth/nonlinear/blows.hpp"
 
 namespace carillon::hard {
 namespace {

@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "precompute/shapes/shapes.hpp"
-#include "runtime/nonlinear/coupled_modes.hpp"
+#include "precompute/mesh/shapes/shapes.hpp"
+#include "runtime/synth/nonlinear/coupled_modes.hpp"
 #include "tests/hard/figure.hpp"
-#include "tests/unit/precompute/condense/bodies.hpp"
+#include "tests/unit/precompute/coupling/bodies.hpp"
 
 namespace carillon::hard {
 namespace {
@@ -59,10 +59,10 @@ std::vector<double> make_blow(std::mt19937& chance, double size) {
 void check(const std::string& name, const tests::ModalBody& body, double thickness_m) {
   const std::vector<std::size_t> pairs = find_pairs(body);
   ASSERT_FALSE(pairs.empty()) << name;
-  const condense::CondenseOptions options{.modes = kModes, .below_hz = 1e6, .energy_error = 1e-4};
-  const condense::Condensed first = condense::condense_modes(body.comm, body.solved(), options);
+  const coupling::CondenseOptions options{.modes = kModes, .below_hz = 1e6, .energy_error = 1e-4};
+  const coupling::Condensed first = coupling::condense_modes(body.comm, body.solved(), options);
   turn_shapes(body, pairs);
-  const condense::Condensed second = condense::condense_modes(body.comm, body.solved(), options);
+  const coupling::Condensed second = coupling::condense_modes(body.comm, body.solved(), options);
   ASSERT_EQ(first.energy.modes.size(), static_cast<std::size_t>(kModes)) << name;
   ASSERT_EQ(first.energy.modes, second.energy.modes) << name;
   std::mt19937 chance(3);

@@ -7,7 +7,7 @@
 #include <limits>
 #include <numbers>
 
-#include "partition/distribute.hpp"
+#include "precompute/mesh/distributed/distribute.hpp"
 #include "precompute/la/local_columns.hpp"
 #include "precompute/petsc/session.hpp"
 #include "tests/hard/figure.hpp"
@@ -24,7 +24,7 @@ double to_lambda(double freq_hz) { return std::pow(2 * std::numbers::pi * freq_h
 
 /// All modes on every rank: rows 3 node + direction by the number of the node in the mesh.
 Eigen::MatrixXd gather(const Answer& answer, std::size_t nodes) {
-  const partition::LocalMesh& local = answer.pieces.local;
+  const mesh::LocalMesh& local = answer.pieces.local;
   Eigen::MatrixXd all = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(3 * nodes), static_cast<Eigen::Index>(answer.freq_hz.size()));
   if (all.cols() == 0) return all;
   const la::LocalColumns shapes(answer.modes.shapes);
@@ -39,7 +39,7 @@ double find_largest_angle(const Answer& alone, const Answer& together, std::size
   Eigen::MatrixXd a = gather(alone, nodes), b = gather(together, nodes);
   MPI_Allreduce(MPI_IN_PLACE, b.data(), static_cast<int>(b.size()), MPI_DOUBLE, MPI_SUM, PETSC_COMM_WORLD);
   // M by the nodes of the mesh.
-  const partition::LocalMesh& local = alone.pieces.local;
+  const mesh::LocalMesh& local = alone.pieces.local;
   const tests::SparseMatrix mass = tests::copy(alone.system.mass);
   std::vector<Eigen::Triplet<double>> entries;
   const auto find = [&](Eigen::Index row) { return static_cast<int>(3 * local.node_in_mesh[row / 3] + row % 3); };
@@ -79,8 +79,8 @@ Body join(const Body& a, const Body& b) {
 
 Answer solve(MPI_Comm comm, const Body& body, const eigen::Options& options) {
   Answer answer;
-  answer.pieces = partition::distribute(comm, body.mesh, {}, {.elimination_order = true});
-  const partition::LocalMesh& local = answer.pieces.local;
+  answer.pieces = mesh::distribute(comm, body.mesh, {}, {.elimination_order = true});
+  const mesh::LocalMesh& local = answer.pieces.local;
   fem::Materials materials;
   materials.list = body.materials;
   if (body.materials.size() > 1) materials.of_tet = local.region;
@@ -96,12 +96,12 @@ Answer solve(MPI_Comm comm, const Body& body, const eigen::Options& options) {
   return answer;
 }
 
-estimate::ErrorBars calc_bars(MPI_Comm comm, const Body& body, const Answer& answer, const eigen::Options& options) {
-  std::vector<estimate::Solid> solids;
+error_bars::ErrorBars calc_bars(MPI_Comm comm, const Body& body, const Answer& answer, const eigen::Options& options) {
+  std::vector<error_bars::Solid> solids;
   for (const material::Material& material : body.materials) solids.push_back({material.calc_elasticity_pa(), material.density_kg_m3});
   const std::vector<std::int32_t> of_tet = body.materials.size() > 1 ? answer.pieces.local.region : std::vector<std::int32_t>{};
   const bool is_cut = answer.modes.band_count > static_cast<std::int64_t>(answer.freq_hz.size());
-  return estimate::calc_error_bars(
+  return error_bars::calc_error_bars(
       comm, answer.pieces.local, answer.system.stiffness, answer.system.mass, solids, of_tet, job::Mass::consistent,
       {answer.modes.lambda, answer.modes.residual, answer.modes.shapes, options.low_hz, is_cut ? answer.freq_hz.back() : options.high_hz,
        answer.modes.count_below_low - answer.modes.rigid_count - answer.modes.mechanism_count});
@@ -147,7 +147,7 @@ Answer hold_every_way(const std::string& id, const std::string& part, const Body
 
 void hold_bars(const std::string& id, const std::string& part, const Body& body, const Answer& answer, const eigen::Options& options,
                const std::vector<double>& true_hz) {
-  const estimate::ErrorBars bars = calc_bars(PETSC_COMM_WORLD, body, answer, options);
+  const error_bars::ErrorBars bars = calc_bars(PETSC_COMM_WORLD, body, answer, options);
   double worst = answer.freq_hz.empty() ? std::numeric_limits<double>::infinity() : 0;
   for (std::size_t m = 0; m < std::min(true_hz.size(), answer.freq_hz.size()); ++m)
     worst = std::max(worst,

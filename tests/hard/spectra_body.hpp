@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "precompute/eigen/solve_modes.hpp"
-#include "precompute/estimate/error_bars.hpp"
+#include "precompute/fem/error_bars/error_bars.hpp"
 #include "precompute/fem/assemble.hpp"
 #include "precompute/mesh/tet_mesh.hpp"
 
@@ -33,7 +33,7 @@ mesh::TetMesh move_nodes(mesh::TetMesh mesh, Place&& place) {
 }
 
 struct Answer {
-  partition::DistributedMesh pieces;
+  mesh::DistributedMesh pieces;
   fem::System system;
   eigen::Modes modes;
   std::vector<double> freq_hz;
@@ -41,7 +41,7 @@ struct Answer {
 Answer solve(MPI_Comm comm, const Body& body, const eigen::Options& options);
 
 /// Of the answer's modes, on the communicator they were solved on. Collective.
-estimate::ErrorBars calc_bars(MPI_Comm comm, const Body& body, const Answer& answer, const eigen::Options& options);
+error_bars::ErrorBars calc_bars(MPI_Comm comm, const Body& body, const Answer& answer, const eigen::Options& options);
 
 /// Eigenvalues of K and M below that frequency by the pivots of Eigen's L D L^T, on this rank alone.
 std::int64_t count_below(const fem::System& alone, double freq_hz);

@@ -1,5 +1,5 @@
 // Corrected frequencies where an estimate is hard to use, against frequencies that no mesh gave
-// (tests/unit/precompute/estimate/data/known_frequencies.csv).
+// (tests/unit/precompute/fem/error_bars/data/known_frequencies.csv).
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -7,11 +7,11 @@
 #include <numbers>
 
 #include "precompute/petsc/session.hpp"
-#include "precompute/shapes/shapes.hpp"
+#include "precompute/mesh/shapes/shapes.hpp"
 #include "runtime/base/sort_order.hpp"
 #include "tests/hard/figure.hpp"
 #include "tests/hard/spectra_body.hpp"
-#include "tests/unit/precompute/estimate/bodies.hpp"
+#include "tests/unit/precompute/fem/error_bars/bodies.hpp"
 
 namespace carillon::hard {
 namespace {
@@ -27,7 +27,7 @@ std::vector<double> read_known(std::size_t count) {
 
 struct Estimated {
   Answer answer;
-  estimate::ErrorBars bars;
+  error_bars::ErrorBars bars;
 };
 
 /// The cube of known_frequencies.csv in T10.
@@ -46,7 +46,7 @@ Estimated solve_cube(int cells, int modes) {
 double to_cents(double lambda, double hz) { return 600 * std::log2(lambda) - 1200 * std::log2(2 * std::numbers::pi * hz); }
 
 /// |error| / bar of the worst of the known modes.
-double find_worst(const estimate::Corrections& corrections, const std::vector<double>& known) {
+double find_worst(const error_bars::Corrections& corrections, const std::vector<double>& known) {
   const std::vector<std::size_t> order = base::find_sort_order(corrections.lambda);
   double worst = 0;
   for (std::size_t k = 0; k < known.size(); ++k)
@@ -60,7 +60,7 @@ TEST(spectra, corrected_clusters) {
   const std::string id = "corrected_clusters";
   const std::vector<double> known = read_known(17);
   const Estimated found = solve_cube(4, 24);
-  const estimate::Corrections& corrected = found.bars.corrected;
+  const error_bars::Corrections& corrected = found.bars.corrected;
   std::vector<double> hz;
   for (const double lambda : corrected.lambda) hz.push_back(std::sqrt(lambda) / (2 * std::numbers::pi));
   hold_groups(id, "corrected", hz, 0, {2, 3, 3}, 1e-9);
@@ -82,15 +82,15 @@ TEST(spectra, wrong_estimate) {
   const std::string id = "wrong_estimate";
   const std::vector<double> known = read_known(17);
   const Estimated coarse = solve_cube(2, 24), fine = solve_cube(4, 24);
-  const estimate::Corrections right = estimate::calc_corrections(fine.bars.level, &coarse.bars.level);
+  const error_bars::Corrections right = error_bars::calc_corrections(fine.bars.level, &coarse.bars.level);
   hold(id, static_cast<double>(std::count(right.correction.begin(), right.correction.end(), Correction::kDisputed)), 0,
        "disputed though right");
   hold(id, find_worst(right, known), 1, "error over bar, two meshes");
-  estimate::Level spoilt = fine.bars.level, spoilt_coarse = coarse.bars.level;
-  for (estimate::Level* level : {&spoilt, &spoilt_coarse})
-    for (estimate::ErrorParts& parts : level->parts) parts.interpolation /= 50;
-  const estimate::Corrections wrong = estimate::calc_corrections(spoilt, &spoilt_coarse);
-  EXPECT_GT(find_worst(estimate::calc_corrections(spoilt), known), 1.0) << "one mesh cannot know";
+  error_bars::Level spoilt = fine.bars.level, spoilt_coarse = coarse.bars.level;
+  for (error_bars::Level* level : {&spoilt, &spoilt_coarse})
+    for (error_bars::ErrorParts& parts : level->parts) parts.interpolation /= 50;
+  const error_bars::Corrections wrong = error_bars::calc_corrections(spoilt, &spoilt_coarse);
+  EXPECT_GT(find_worst(error_bars::calc_corrections(spoilt), known), 1.0) << "one mesh cannot know";
   int trusted = 0;
   for (std::size_t k = 0; k < known.size(); ++k) trusted += wrong.correction[k] == Correction::kDisputed ? 0 : 1;
   hold(id, trusted, 0, "trusted though wrong");

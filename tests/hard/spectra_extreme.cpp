@@ -10,7 +10,7 @@
 
 #include "precompute/mesh/check.hpp"
 #include "precompute/petsc/session.hpp"
-#include "precompute/shapes/shapes.hpp"
+#include "precompute/mesh/shapes/shapes.hpp"
 #include "tests/hard/figure.hpp"
 #include "tests/hard/spectra_body.hpp"
 #include "tests/support/ranks.hpp"

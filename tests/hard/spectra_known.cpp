@@ -1,5 +1,5 @@
 // Bodies whose symmetry makes modes degenerate, against frequencies that no mesh gave
-// (tests/unit/precompute/estimate/data/known_frequencies.csv).
+// (tests/unit/precompute/fem/error_bars/data/known_frequencies.csv).
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,10 +8,10 @@
 
 #include "precompute/mesh/check.hpp"
 #include "precompute/petsc/session.hpp"
-#include "precompute/shapes/shapes.hpp"
+#include "precompute/mesh/shapes/shapes.hpp"
 #include "tests/hard/figure.hpp"
 #include "tests/hard/spectra_body.hpp"
-#include "tests/unit/precompute/estimate/bodies.hpp"
+#include "tests/unit/precompute/fem/error_bars/bodies.hpp"
 
 namespace carillon::hard {
 namespace {

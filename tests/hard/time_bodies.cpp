@@ -6,28 +6,28 @@
 #include <string>
 #include <vector>
 
-#include "runtime/contact/world.hpp"
+#include "runtime/physics/world.hpp"
 #include "runtime/synth/synthesiser.hpp"
 #include "tests/hard/figure.hpp"
-#include "tests/unit/runtime/contact/bodies.hpp"
+#include "tests/unit/runtime/physics/bodies.hpp"
 
 namespace carillon::hard {
 namespace {
 
-using contact::BodySpec;
-using contact::GroundSpec;
-using contact::World;
-using contact::WorldSpec;
-using contact::tests::add_modes;
-using contact::tests::make_ball;
-using contact::tests::make_body;
-using contact::tests::make_box;
+using physics::BodySpec;
+using physics::GroundSpec;
+using physics::World;
+using physics::WorldSpec;
+using physics::tests::add_modes;
+using physics::tests::make_ball;
+using physics::tests::make_body;
+using physics::tests::make_box;
 constexpr double kGravity = 9.81;
 
 /// What a world did until its end.
 struct Course {
   std::vector<events::Event> events;
-  contact::Statistics at_half, at_end;
+  physics::Statistics at_half, at_end;
   int impulses = 0;
   double last_s = 0.0;          // of the impulses
   std::vector<Vec3> half, end;  // where the bodies are
@@ -157,7 +157,7 @@ TEST(time, gap) {
 
 TEST(time, spinning_contacts) {
   // A coin, set down turning about its diameter, dances on its rim and its corners until it lies.
-  const bank::Bank coin = make_box({0.04, 0.04, 0.003}, {6, 6, 1}), lump = contact::tests::make_eared_ball(0.05, 3);
+  const bank::Bank coin = make_box({0.04, 0.04, 0.003}, {6, 6, 1}), lump = physics::tests::make_eared_ball(0.05, 3);
   for (const bool is_coin : {true, false}) {
     WorldSpec spec;
     spec.ground = GroundSpec{};
@@ -198,10 +198,10 @@ double calc_modes_rise(const WorldSpec& spec, const Course& course, double end_s
 TEST(time, energy) {
   const bank::Bank ball = add_modes(make_ball(0.03, 3), 20), box = add_modes(make_box({0.1, 0.08, 0.05}), 20),
                    plate = add_modes(make_box({0.4, 0.3, 0.01}), 20);
-  const bank::Bank lump = add_modes(contact::tests::make_eared_ball(0.05, 3), 20);
+  const bank::Bank lump = add_modes(physics::tests::make_eared_ball(0.05, 3), 20);
   const auto check = [](const std::string& part, const WorldSpec& spec, double end_s) {
     const Course course = run(spec, end_s, 0.5 * end_s, true);
-    const contact::EnergyAudit& energy = course.at_end.energy;
+    const physics::EnergyAudit& energy = course.at_end.energy;
     hold("energy", energy.rise_j / energy.kinetic_j, 1e-9, part + ", gained over the largest of motion");
     hold("energy", energy.hit_rise_j / energy.kinetic_j, 1e-12, part + ", given by a hit");
     if (course.impulses > 0) hold("energy", calc_modes_rise(spec, course, end_s), 1e-12, part + ", modes between strikes");

@@ -8,12 +8,12 @@
 
 #include "tests/hard/contact_course.hpp"
 #include "tests/hard/figure.hpp"
-#include "tests/unit/runtime/contact/plate_bank.hpp"
+#include "tests/unit/runtime/physics/plate_bank.hpp"
 
 namespace carillon::hard {
 namespace {
 
-using contact::tests::rotate;
+using physics::tests::rotate;
 
 std::array<double, 4> make_turn_about_y(double angle) { return {std::cos(angle / 2), 0, std::sin(angle / 2), 0}; }
 
@@ -24,7 +24,7 @@ BodySpec make_fixed(const bank::Bank& bank, Vec3 position, double restitution = 
 }
 
 /// The inside of a hemispherical basin below z = 0, and a wall of a tenth of its radius about it.
-shape::tests::Solid make_basin(double radius_m) {
+geometry::tests::Solid make_basin(double radius_m) {
   std::vector<std::array<double, 2>> outline;
   const int rings = 32;
   for (int i = 0; i <= rings; ++i) {
@@ -35,11 +35,11 @@ shape::tests::Solid make_basin(double radius_m) {
     const double angle = 0.5 * M_PI * i / rings;
     outline.push_back({radius_m * std::sin(angle), -radius_m * std::cos(angle)});
   }
-  return shape::tests::make_lathe(outline, 64, false);
+  return geometry::tests::make_lathe(outline, 64, false);
 }
 
 TEST(time, contact_thin_plate) {
-  const bank::Bank plate = contact::tests::make_plate_bank(0.3, 0.002, 8e3, 16, 3.0);
+  const bank::Bank plate = physics::tests::make_plate_bank(0.3, 0.002, 8e3, 16, 3.0);
   const double weight = plate.rigid.mass_kg * kGravity;
   for (int turn = 0; turn < 4; ++turn) {
     WorldSpec spec;
@@ -57,7 +57,7 @@ TEST(time, contact_thin_plate) {
         const double v = norm(m->velocity_m_s), lost = weight * (0.6 - m->position_m[2]) - 0.5 * plate.rigid.mass_kg * v * v;
         if (modes_j[k] > 1e-6) share = std::max(share, modes_j[k] / lost);
       });
-      const contact::EnergyAudit energy = world.get_statistics().energy;
+      const physics::EnergyAudit energy = world.get_statistics().energy;
       modes_j.push_back(energy.modes_j);
       error = std::max(error, energy.error_j / energy.start_j);
     }
@@ -128,7 +128,7 @@ TEST(time, contact_flush) {
 
 TEST(time, contact_coin_on_rim) {
   const double radius = 0.012;
-  const bank::Bank coin = make_bank(shape::tests::make_cylinder(radius, 0.002, 96), 7800.0);
+  const bank::Bank coin = make_bank(geometry::tests::make_cylinder(radius, 0.002, 96), 7800.0);
   const std::array<double, 4> upright{std::sqrt(0.5), std::sqrt(0.5), 0, 0};
   {
     WorldSpec spec;
@@ -206,7 +206,7 @@ TEST(time, contact_pressed_start) {
 }
 
 TEST(time, contact_spinning_top) {
-  const bank::Bank top = make_bank(shape::tests::make_lathe({{0, 0}, {0.04, 0.02}, {0.04, 0.03}, {0, 0.03}}, 64, false), 2700.0);
+  const bank::Bank top = make_bank(geometry::tests::make_lathe({{0, 0}, {0.04, 0.02}, {0.04, 0.03}, {0, 0.03}}, 64, false), 2700.0);
   const double m = top.rigid.mass_kg, l = top.rigid.centre_m[2], along = top.rigid.inertia_kg_m2[8],
                across = top.rigid.inertia_kg_m2[0] + m * l * l, a = 0.2;
   for (const double spin : {200.0, 400.0}) {
@@ -345,7 +345,7 @@ TEST(time, contact_seam) {
 }
 
 TEST(time, contact_cone_on_tip) {
-  const bank::Bank cone = make_bank(shape::tests::make_lathe({{0, 0}, {0.03, 0.1}, {0, 0.1}}, 64, false), 2700.0);
+  const bank::Bank cone = make_bank(geometry::tests::make_lathe({{0, 0}, {0.03, 0.1}, {0, 0.1}}, 64, false), 2700.0);
   const double m = cone.rigid.mass_kg, l = cone.rigid.centre_m[2], inertia = cone.rigid.inertia_kg_m2[0] + m * l * l;
   const auto fall = [&](double lean, double end_s, double until, double& when) {
     WorldSpec spec;
@@ -437,7 +437,7 @@ TEST(time, contact_inside) {
     outline.push_back({0.055 * s, -0.055 * std::cos(angle)});
     inner.push_back({0.05 * s, -0.05 * std::cos(angle)});
   }
-  shape::tests::Solid shell = shape::tests::make_lathe(outline, 48, false), hollow = shape::tests::make_lathe(inner, 48, false);
+  geometry::tests::Solid shell = geometry::tests::make_lathe(outline, 48, false), hollow = geometry::tests::make_lathe(inner, 48, false);
   hollow.turn_inside_out();
   shell.add(hollow, {});
   const bank::Bank around = make_bank(shell, 2700.0), ball = make_round(0.02, 6);

@@ -128,7 +128,7 @@ TEST(time, contact_crowd) {
 
 TEST(time, contact_rings) {
   // A ring hangs in another one, and swings.
-  const bank::Bank ring = make_bank(shape::tests::make_ring(0.05, 0.005, 64, 16), 7800.0);
+  const bank::Bank ring = make_bank(geometry::tests::make_ring(0.05, 0.005, 64, 16), 7800.0);
   WorldSpec spec;
   spec.bodies = {make_body(ring, {}), make_body(ring, {0, 0, -0.085})};
   spec.bodies[0].fixed = true;

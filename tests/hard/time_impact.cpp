@@ -5,7 +5,7 @@
 #include <string>
 
 #include "tests/hard/figure.hpp"
-#include "tests/unit/runtime/impact/scenes.hpp"
+#include "tests/unit/runtime/physics/impact/scenes.hpp"
 
 namespace carillon::hard {
 namespace {

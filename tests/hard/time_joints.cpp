@@ -7,21 +7,21 @@
 #include <variant>
 #include <vector>
 
-#include "runtime/contact/world.hpp"
+#include "runtime/physics/world.hpp"
 #include "tests/hard/figure.hpp"
-#include "tests/unit/runtime/contact/checks.hpp"
-#include "tests/unit/runtime/contact/solids.hpp"
+#include "tests/unit/runtime/physics/checks.hpp"
+#include "tests/unit/runtime/physics/solids.hpp"
 
 namespace carillon::hard {
 namespace {
 
 using carillon::norm;
-using contact::BodySpec;
-using contact::GroundSpec;
-using contact::World;
-using contact::WorldSpec;
-using contact::tests::make_ball;
-using contact::tests::make_box;
+using physics::BodySpec;
+using physics::GroundSpec;
+using physics::World;
+using physics::WorldSpec;
+using physics::tests::make_ball;
+using physics::tests::make_box;
 using carillon::operator-;
 using joints::Kind;
 
@@ -42,7 +42,7 @@ BodySpec make_body(const bank::Bank& bank, const Vec3& position) {
 
 struct Course {
   std::vector<events::BodyMotion> middle, end;  // of each body
-  contact::Statistics statistics;
+  physics::Statistics statistics;
 };
 
 Course run(const WorldSpec& spec, double middle_s, double end_s) {

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "runtime/base/printable.hpp"
-#include "runtime/support/losses.hpp"
+#include "runtime/bank/mounting/losses.hpp"
 #include "tests/hard/figure.hpp"
 #include "tests/unit/runtime/bank/example_bank.hpp"
 
@@ -25,7 +25,7 @@ TEST(time, support_extremes) {
           base::Object words = base::parse_document("{\"on\": " + base::quote(name) + ", \"loss\": 1}", "words").root();
           material::Fixing fixing = *material::read_fixing(words);
           fixing.base.young_modulus_pa /= softer;
-          const support::Losses losses = support::calc_losses(bank, {.all = fixing});
+          const mounting::Losses losses = mounting::calc_losses(bank, {.all = fixing});
           for (std::size_t m = 0; m < bank.mode_count(); ++m) {
             const double omega = std::sqrt(bank.eigenvalue_rad2_s2[m]);
             const bool is_number =
@@ -34,15 +34,15 @@ TEST(time, support_extremes) {
             max_decay = std::max(max_decay, losses.decay_per_s[m] / omega);
             max_shift = std::max(max_shift, std::abs(losses.shift_rad_s[m]) / omega);
           }
-          support::apply(losses, bank);
+          mounting::apply(losses, bank);
           wrong += static_cast<double>(bank::find_faults(bank).size());
         }
       }
     }
   }
   hold("support_extremes", wrong, 0.0, "numbers that are none, faults of the bank");
-  hold("support_extremes", max_decay, support::kMaxDecay * (1.0 + 1e-12), "decay over the frequency");
-  hold("support_extremes", max_shift, support::kMaxShift * (1.0 + 1e-12), "shift over the frequency");
+  hold("support_extremes", max_decay, mounting::kMaxDecay * (1.0 + 1e-12), "decay over the frequency");
+  hold("support_extremes", max_shift, mounting::kMaxShift * (1.0 + 1e-12), "shift over the frequency");
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """docs/architecture.md against the tree: a row for each folder, the folders that it may use as in the include law, its main type or
-function in one of its headers, and every source file that the page names.
+function in one of its headers; and every source file that this page and docs/walks.md name.
 
 usage: architecture.py SOURCE_DIR             exit 1 and one line per fault
        architecture.py SOURCE_DIR --update    writes the column "may use" of the rows that there are
@@ -12,7 +12,7 @@ import sys
 sys.dont_write_bytecode = True
 from include_law import LAW
 
-SEPARATE = {"jobs/study", "precompute/draw"}  # Python programs, which the law does not know
+SEPARATE = {"jobs/study"}  # a Python program, outside the law
 ROW = re.compile(r"^\| `([a-z_/]+)` \| ([^|]*) \| ([^|]*) \| ([^|]*) \|$", re.M)
 WORDS_AT_MAX = 14
 
@@ -32,7 +32,7 @@ def find_faults(page, source):
             faults.append(f"{folder} may use: {list_allowed(folder)}; run tests/structure/architecture.py . --update")
         if len(duty.split()) > WORDS_AT_MAX:
             faults.append(f"{folder}: its responsibility has more than {WORDS_AT_MAX} words")
-        headers = "".join(path.read_text() for path in (source / folder).glob("*.h*"))
+        headers = "".join(path.read_text() for path in (source / folder).rglob("*.h*"))
         for name in re.findall(r"`(\w+)(?:\(\))?`", kind):
             if not re.search(rf"\b{name}\b", headers):
                 faults.append(f"{folder}: no header there has {name}")
@@ -44,7 +44,7 @@ def find_missing_files(page, source):
     missing, folder = [], source
     for name in re.findall(r"`([a-z_0-9/]+\.[ch]pp)`", page):
         found = next((path for path in (source / name, source / "precompute" / name, folder / name) if path.is_file()), None)
-        missing += [] if found else [f"docs/architecture.md: there is no {name}"]
+        missing += [] if found else [f"docs/architecture.md, docs/walks.md: there is no {name}"]
         folder = found.parent if found else folder
     return missing
 
@@ -58,7 +58,7 @@ def main():
     path = source / "docs/architecture.md"
     if sys.argv[2:] == ["--update"]:
         path.write_text(update(path.read_text()))
-    faults = find_faults(path.read_text(), source) + find_missing_files(path.read_text(), source)
+    faults = find_faults(path.read_text(), source) + find_missing_files(path.read_text() + (source / "docs/walks.md").read_text(), source)
     print("\n".join(faults) if faults else f"{len(LAW) + len(SEPARATE)} folders as in the include law")
     return 1 if faults else 0
 

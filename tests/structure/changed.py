@@ -19,21 +19,21 @@ import ctest
 import include_law
 
 TOPS = ("runtime", "partition", "precompute", "jobs")
-SOLVER = ["precompute", "precompute/mesher"]
+SOLVER = ["precompute/run", "precompute/mesher"]
 # Programs, and the folders whose code runs when they run: of their main, and of programs that they start.
 PROGRAMS = {
-    "carillon-render": ["runtime/host"],
-    "carillon-live": ["runtime/live"],
+    "carillon-render": ["runtime/render"],
+    "carillon-live": ["runtime/render"],
     "carillon-bank": ["runtime/exchange"],
-    "carillon-samples": ["runtime/samples"],
+    "carillon-samples": ["runtime/render"],
     "carillon-mesh": ["precompute/mesher"],
-    "carillon-precompute": ["precompute"],
-    "carillon-simulate": ["precompute/simulate"],
-    "carillon-draw": ["precompute/draw"],
+    "carillon-precompute": ["precompute/run"],
+    "carillon-simulate": ["precompute/simulation"],
+    "carillon-draw": ["precompute/run"],
     "carillon-study": ["jobs/study", *SOLVER],
-    "carillon": ["jobs/cli", "precompute/simulate", "precompute/draw", "runtime/host", *SOLVER],
-    "import carillon": ["runtime/python", *SOLVER],
-    "share/carillon/web": ["runtime/web"],
+    "carillon": ["jobs/cli", "precompute/simulation", "runtime/render", *SOLVER],
+    "import carillon": ["runtime/bindings", *SOLVER],
+    "share/carillon/web": ["runtime/bindings"],
 }
 # How things are built reaches everything.
 ALL = re.compile(
@@ -160,7 +160,7 @@ def self_test():
     assert names("docs/tutorial.md") == {"structure.words"}
     assert names("deploy/cmake/Carillon.cmake") == {"bank", "comm.np2", "host.program", "structure.words"}
     assert find_reached({"runtime/base"}) >= {"runtime/bank", "precompute/run", "jobs/cli"}
-    assert "runtime/base" not in find_reached({"runtime/host"})
+    assert "runtime/base" not in find_reached({"runtime/scene"})
 
 
 def main():

@@ -14,7 +14,7 @@ import tempfile
 SOURCE, BUILD = map(pathlib.Path, sys.argv[1:3])
 PAGE = (SOURCE / "docs/licences.md").read_text()
 NOTICES = (SOURCE / "NOTICES").read_text()
-FOLDERS = ("bin/carillon*", "libexec/carillon/*", "runtime/abi/libcarillon.so", "python/carillon/_carillon*.so")
+FOLDERS = ("bin/carillon*", "libexec/carillon/*", "runtime/bindings/c_api/libcarillon.so", "python/carillon/_carillon*.so")
 # The page's groups of programs.
 GROUPS = {
     "all": lambda name: True,

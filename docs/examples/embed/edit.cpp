@@ -7,7 +7,7 @@
 
 #include "runtime/bank/bank.hpp"
 #include "runtime/bank/edits.hpp"
-#include "runtime/radiation/gains.hpp"
+#include "runtime/acoustics/radiation/gains.hpp"
 #include "runtime/synth/load_keeper.hpp"
 #include "runtime/synth/synthesiser.hpp"
 

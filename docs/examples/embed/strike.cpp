@@ -5,7 +5,7 @@
 #include <exception>
 
 #include "runtime/bank/bank.hpp"
-#include "runtime/radiation/gains.hpp"
+#include "runtime/acoustics/radiation/gains.hpp"
 #include "runtime/synth/synthesiser.hpp"
 
 using namespace carillon;

@@ -12,14 +12,14 @@
 #include <string>
 #include <vector>
 
-#include "tests/unit/precompute/bem/bodies.hpp"
-#include "tests/unit/precompute/bem/sources.hpp"
-#include "tests/unit/precompute/bem/spheres.hpp"
+#include "tests/unit/precompute/air/bodies.hpp"
+#include "tests/unit/precompute/air/sources.hpp"
+#include "tests/unit/precompute/air/spheres.hpp"
 
 namespace {
 
 using namespace carillon;
-using namespace carillon::bem;
+using namespace carillon::air;
 using testing::Skin;
 using testing::Source;
 using testing::Sources;

@@ -9,7 +9,7 @@
 #include <ctime>
 #include <vector>
 
-#include "tests/unit/precompute/emission/motions.hpp"
+#include "tests/unit/precompute/simulation/emission/motions.hpp"
 
 namespace {
 
@@ -43,7 +43,7 @@ double measure(const SurfacePart& part, Radiation radiation, bool has_visibility
 
 int main(int argc, char** argv) {
   MPI_Init(&argc, &argv);
-  const auto part = testing::make_part(bem::testing::make_ball(argc > 1 ? std::max(1, std::atoi(argv[1])) : 7, 0.1));
+  const auto part = testing::make_part(air::testing::make_ball(argc > 1 ? std::max(1, std::atoi(argv[1])) : 7, 0.1));
   fmt::print("{} triangles, two ears; ns a triangle and step\n{:>16} {:>12} {:>12} {:>22} {:>12}\n", part.triangles.size(),
              "steps a sample", "kirchhoff", "rayleigh", "rayleigh, visibility", "paper2001");
   for (const int steps : {16, 64, 112, 208}) {

@@ -24,7 +24,7 @@
 #include "precompute/mesh/check.hpp"
 #include "precompute/mesh/read.hpp"
 #include "precompute/petsc/session.hpp"
-#include "tests/unit/precompute/estimate/bodies.hpp"
+#include "tests/unit/precompute/fem/error_bars/bodies.hpp"
 
 namespace {
 
@@ -37,7 +37,7 @@ bool wants(const std::set<std::string>& chosen, const std::string& name) { retur
 
 void write_modes(std::FILE* file, const Body& body, int fineness, MeshKind kind, const Outcome& outcome) {
   for (std::size_t m = 0; m < outcome.true_hz.size(); ++m) {
-    const estimate::ErrorParts& parts = outcome.bars.level.parts[m];
+    const error_bars::ErrorParts& parts = outcome.bars.level.parts[m];
     const std::size_t c = outcome.by_correction[m];
     fmt::print(
         file,
@@ -79,14 +79,14 @@ Outcome solve_file(const std::string& file, int count) {
 void compare_meshes(const std::string& finest, const std::vector<std::string>& coarser, int count, int rank, std::FILE* modes) {
   const Outcome truth = solve_file(finest, count);
   if (rank == 0) print_head();
-  if (rank == 0) print_row(finest, "finest", truth.bars.level.kind == estimate::Kind::kT4 ? "T4" : "T10 curved", truth);
+  if (rank == 0) print_row(finest, "finest", truth.bars.level.kind == error_bars::Kind::kT4 ? "T4" : "T10 curved", truth);
   for (const std::string& file : coarser) {
     Outcome outcome = solve_file(file, count);
     const std::size_t both = std::min(truth.freq_hz.size(), outcome.freq_hz.size());
     outcome.true_hz.assign(truth.freq_hz.begin(), truth.freq_hz.begin() + static_cast<std::ptrdiff_t>(both));
     for (std::size_t m = 0; m < both; ++m) outcome.truth_cents.push_back(truth.bar_cents(m) / 2);
-    const MeshKind kind = outcome.bars.level.kind == estimate::Kind::kT4    ? MeshKind::T4
-                          : outcome.bars.level.kind == estimate::Kind::kT10 ? MeshKind::T10
+    const MeshKind kind = outcome.bars.level.kind == error_bars::Kind::kT4    ? MeshKind::T4
+                          : outcome.bars.level.kind == error_bars::Kind::kT10 ? MeshKind::T10
                                                                             : MeshKind::T10Curved;
     if (rank == 0) print_row(file, "test", describe(kind), outcome);
     if (modes != nullptr)

@@ -2,7 +2,7 @@
 """Meshes of strips and plates with triangles in no order, in layers: what lattices and the program's own shapes do not try.
 
 usage: unstructured.py FOLDER BODY [ACROSSxLAYERS]...        BODY: strip-thin, ..., plate-thin, ruler, plate, bar, slender-bar of
-                                                             tests/unit/precompute/estimate/bodies.cpp
+                                                             tests/unit/precompute/fem/error_bars/bodies.cpp
 
 Writes FOLDER/BODY-ACROSSxLAYERS.msh: about ACROSS triangles' edges across the body. For  error_bars --body BODY --element T10 --mesh
 FILE.msh

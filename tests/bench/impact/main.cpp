@@ -10,10 +10,10 @@
 #include <vector>
 
 #include "runtime/base/clock.hpp"
-#include "runtime/impact/predict.hpp"
-#include "tests/unit/runtime/impact/free_plate.hpp"
-#include "tests/unit/runtime/impact/scenes.hpp"
-#include "tests/unit/runtime/impact/zener.hpp"
+#include "runtime/physics/impact/predict.hpp"
+#include "tests/unit/runtime/physics/impact/free_plate.hpp"
+#include "tests/unit/runtime/physics/impact/scenes.hpp"
+#include "tests/unit/runtime/physics/impact/zener.hpp"
 
 namespace carillon::impact::tests {
 namespace {

@@ -16,7 +16,7 @@
 #include <string>
 #include <vector>
 
-#include "jobs/slurm/packing.hpp"
+#include "jobs/queue/slurm/packing.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/base/json.hpp"
 
@@ -29,7 +29,7 @@ using slurm::Placed;
 
 constexpr std::size_t kJobs = 10000;
 constexpr double kNodeGbPerCore = 4.0;
-constexpr double kChargedMargin = 1.2 * 1.1, kChargedGb = 0.2;  // as jobs/slurm/needs.cpp asks for a body of one rank
+constexpr double kChargedMargin = 1.2 * 1.1, kChargedGb = 0.2;  // as jobs/queue/slurm/needs.cpp asks for a body of one rank
 
 struct Body {
   PackJob predicted;

@@ -18,7 +18,7 @@
 
 #include "runtime/bank/bank.hpp"
 #include "runtime/base/clock.hpp"
-#include "runtime/nonlinear/cascade.hpp"
+#include "runtime/synth/nonlinear/cascade.hpp"
 
 namespace {
 

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "runtime/base/clock.hpp"
-#include "runtime/nonlinear/coupled_modes.hpp"
-#include "tests/unit/runtime/nonlinear/bodies.hpp"
+#include "runtime/synth/nonlinear/coupled_modes.hpp"
+#include "tests/unit/runtime/synth/nonlinear/bodies.hpp"
 
 namespace {
 

@@ -132,7 +132,7 @@ def restore_order(reader, triangles):
 
 
 def mix(cell):
-    """runtime/codec/neighbours.cpp."""
+    """runtime/bank/packed/neighbours.cpp."""
     x, y, z = (int(value) & 0xFFFFFFFF for value in cell)
     value = (x * 0x9E3779B1) & 0xFFFFFFFF
     value = ((value ^ (value >> 15) ^ y) * 0x85EBCA77) & 0xFFFFFFFF

@@ -15,9 +15,9 @@
 #include <vector>
 
 #include "runtime/base/clock.hpp"
-#include "runtime/head/ear_filter.hpp"
-#include "runtime/head/sofa.hpp"
-#include "runtime/head/sphere.hpp"
+#include "runtime/acoustics/head/ear_filter.hpp"
+#include "runtime/acoustics/head/sofa.hpp"
+#include "runtime/acoustics/head/sphere.hpp"
 #include "runtime/synth/synthesiser.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 

@@ -8,18 +8,18 @@
 #include <cstdlib>
 #include <limits>
 
-#include "runtime/contact/world.hpp"
-#include "tests/unit/runtime/contact/solids.hpp"
+#include "runtime/physics/world.hpp"
+#include "tests/unit/runtime/physics/solids.hpp"
 
 namespace {
 
 using namespace carillon;
 
-contact::WorldSpec make_rain(const bank::Bank& box, int count) {
-  contact::WorldSpec w;
-  w.ground = contact::GroundSpec{};
+physics::WorldSpec make_rain(const bank::Bank& box, int count) {
+  physics::WorldSpec w;
+  w.ground = physics::GroundSpec{};
   for (int i = 0; i < count; ++i) {
-    contact::BodySpec b;
+    physics::BodySpec b;
     b.name = fmt::format("box {}", i);
     b.bank = &box;
     b.initial.position_m = {0.3 * (i % 5), 0.3 * (i / 5), 0.3 + 0.02 * i};
@@ -30,8 +30,8 @@ contact::WorldSpec make_rain(const bank::Bank& box, int count) {
   return w;
 }
 
-contact::Statistics run(const contact::WorldSpec& spec, double end_s, bool islands) {
-  contact::World world(spec, {.end_s = end_s, .islands = islands});
+physics::Statistics run(const physics::WorldSpec& spec, double end_s, bool islands) {
+  physics::World world(spec, {.end_s = end_s, .islands = islands});
   world.advance(end_s, std::numeric_limits<double>::infinity(), [](const events::Event&) {});
   return world.get_statistics();
 }
@@ -41,10 +41,10 @@ contact::Statistics run(const contact::WorldSpec& spec, double end_s, bool islan
 int main(int argc, char** argv) {
   const int boxes = argc > 1 ? std::atoi(argv[1]) : 20;
   const double end_s = argc > 2 ? std::atof(argv[2]) : 2.0;
-  const bank::Bank box = contact::tests::make_box({0.06, 0.05, 0.04}, {4, 4, 4});
-  const contact::WorldSpec spec = make_rain(box, boxes);
-  const contact::Statistics together = run(spec, end_s, false), apart = run(spec, end_s, true);
-  const auto print = [&](const char* name, const contact::Statistics& cost) {
+  const bank::Bank box = physics::tests::make_box({0.06, 0.05, 0.04}, {4, 4, 4});
+  const physics::WorldSpec spec = make_rain(box, boxes);
+  const physics::Statistics together = run(spec, end_s, false), apart = run(spec, end_s, true);
+  const auto print = [&](const char* name, const physics::Statistics& cost) {
     fmt::print("{:<11} {:8.3f} CPU s/s  {:8} steps  {:8} steps of a body  {} searches\n", name, cost.seconds_cpu / end_s, cost.steps,
                cost.body_steps, cost.searches);
   };

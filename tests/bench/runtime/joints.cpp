@@ -10,7 +10,7 @@
 #include <cstring>
 #include <ctime>
 
-#include "runtime/joints/mechanism.hpp"
+#include "runtime/physics/joints/mechanism.hpp"
 
 namespace {
 

@@ -10,11 +10,11 @@
 #include <vector>
 
 #include "runtime/base/clock.hpp"
-#include "runtime/contact/world.hpp"
-#include "runtime/radiation/gains.hpp"
+#include "runtime/physics/world.hpp"
+#include "runtime/acoustics/radiation/gains.hpp"
 #include "runtime/synth/model.hpp"
 #include "runtime/synth/voice.hpp"
-#include "tests/unit/runtime/radiation/sphere_bank.hpp"
+#include "tests/unit/runtime/acoustics/radiation/sphere_bank.hpp"
 
 namespace {
 
@@ -49,11 +49,11 @@ void print_row(const std::string& name, bank::Bank& bank, double read_ms) {
   const double gains = time_ms([&] { bank.radiation_gain = radiation::calc_gains(bank, radiation::GainKind::kSphere); });
   std::shared_ptr<const synth::Model> model;
   const double making = time_ms([&] { model = synth::Model::make(bank, {.rate_hz = 48000.0}); });
-  contact::WorldSpec spec;
+  physics::WorldSpec spec;
   spec.bodies.resize(1);
   spec.bodies[0].name = "body";
   spec.bodies[0].bank = &bank;
-  const double world = time_ms([&] { contact::World made(spec); });
+  const double world = time_ms([&] { physics::World made(spec); });
   double playing = 1e300;
   for (int round = 0; round < 3; ++round) {
     synth::Voice voice(model, {.silence_pa = 1e-30});

@@ -1,7 +1,7 @@
 // What the transfers of all modes to one place cost: a body with the orders of a hollow ceramic bunny, 228 modes from 0.8 to 20 kHz.
 //
 // usage: bench_transfers [--quick]     median microseconds of one evaluation by instruction set and distance
-#include "runtime/radiation/transfers.hpp"
+#include "runtime/acoustics/radiation/transfers.hpp"
 
 #include <fmt/format.h>
 

@@ -30,7 +30,7 @@
 #include "runtime/base/error.hpp"
 #include "runtime/base/instructions.hpp"
 #include "runtime/base/vector.hpp"
-#include "runtime/radiation/transfers.hpp"
+#include "runtime/acoustics/radiation/transfers.hpp"
 #include "runtime/synth/synthesiser.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 #include "tests/unit/runtime/synth/multipole_cube.hpp"

@@ -12,9 +12,9 @@
 #include <string>
 #include <vector>
 
-#include "precompute/shapes/shapes.hpp"
-#include "precompute/transient/domain.hpp"
-#include "precompute/transient/motion.hpp"
+#include "precompute/mesh/shapes/shapes.hpp"
+#include "precompute/simulation/transient/domain.hpp"
+#include "precompute/simulation/transient/motion.hpp"
 
 namespace {
 

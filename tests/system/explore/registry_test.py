@@ -5,7 +5,7 @@ import pathlib
 import subprocess
 import tempfile
 
-PAGE = pathlib.Path(os.environ["CARILLON_SOURCE_DIR"]) / "jobs/explore"
+PAGE = pathlib.Path(os.environ["CARILLON_SOURCE_DIR"]) / "jobs/front/explore"
 
 with tempfile.TemporaryDirectory() as scratch:
     folder = pathlib.Path(scratch)

@@ -43,7 +43,7 @@ class RenderProgram(unittest.TestCase):
         cls.folder = tempfile.TemporaryDirectory()
         cls.root = pathlib.Path(cls.folder.name)
         subprocess.run([BIN / "write_cube_bank", cls.root / "cube.h5"], check=True)
-        (cls.root / "drop.json").write_text((SOURCE / "tests/unit/runtime/host/scenes/drop.json").read_text())
+        (cls.root / "drop.json").write_text((SOURCE / "tests/unit/runtime/scene/scenes/drop.json").read_text())
         cls.run_ = render(
             cls.root / "drop.json",
             "-o",
@@ -287,7 +287,7 @@ class RenderProgram(unittest.TestCase):
 
     def test_every_microphone_has_its_channel_and_walks_and_effects_are_played(self):
         for name, channels in (("microphones", 5), ("walk", 2)):
-            (self.root / f"{name}.json").write_text((SOURCE / f"tests/unit/runtime/host/scenes/{name}.json").read_text())
+            (self.root / f"{name}.json").write_text((SOURCE / f"tests/unit/runtime/scene/scenes/{name}.json").read_text())
             run = render(self.root / f"{name}.json", "-o", self.root / f"{name}.wav", "--report", self.root / f"{name}-report.json", "-q")
             self.assertEqual(run.returncode, 0, run.stderr)
             self.assertEqual(json.loads((self.root / f"{name}-report.json").read_text())["channels"], channels)

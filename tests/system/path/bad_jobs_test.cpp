@@ -4,7 +4,7 @@
 
 #include <functional>
 
-#include "precompute/shapes/shapes.hpp"
+#include "precompute/mesh/shapes/shapes.hpp"
 #include "tests/system/path/run_program.hpp"
 
 namespace carillon::tests {

@@ -2,7 +2,7 @@
 """A faceted cylinder is solved as the cylinder, for any triangulation. With facets in doubt the error bars hold for the meshed body, and
 with the doubt for both. Bells from a lathe: facets are in doubt with few rings, not with many.
 
-Truth: the free steel cylinder of radius 20 mm and length 200 mm, "cylinder-10" of tests/unit/precompute/estimate/data/known_frequencies.csv
+Truth: the free steel cylinder of radius 20 mm and length 200 mm, "cylinder-10" of tests/unit/precompute/fem/error_bars/data/known_frequencies.csv
 (Fourier-Ritz, 7 digits). The prisms, and the bell of planes, are meshed with "facets": true and solved on their own.
 
 usage: facets.py BIN_DIR
@@ -15,7 +15,7 @@ import sys
 import tempfile
 
 bin_dir = pathlib.Path(sys.argv[1]).resolve()
-data = pathlib.Path(__file__).resolve().parents[2] / "unit/precompute/estimate/data/known_frequencies.csv"
+data = pathlib.Path(__file__).resolve().parents[2] / "unit/precompute/fem/error_bars/data/known_frequencies.csv"
 TRUTH = [float(line.split(",")[1]) for line in data.read_text().splitlines() if line.startswith("cylinder-10,")][:9]
 STEEL = {"young_modulus_pa": 200e9, "poisson_ratio": 0.3, "density_kg_m3": 7850, "damping": {"rayleigh": {}}}
 RADIUS, LENGTH = 0.02, 0.2

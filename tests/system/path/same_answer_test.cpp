@@ -7,7 +7,7 @@
 #include <cmath>
 #include <sstream>
 
-#include "precompute/shapes/shapes.hpp"
+#include "precompute/mesh/shapes/shapes.hpp"
 #include "tests/system/path/run_program.hpp"
 
 namespace carillon::tests {

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "precompute/shapes/shapes.hpp"
-#include "runtime/support/losses.hpp"
+#include "precompute/mesh/shapes/shapes.hpp"
+#include "runtime/bank/mounting/losses.hpp"
 #include "tests/system/path/run_program.hpp"
 
 namespace carillon::tests {
@@ -46,8 +46,8 @@ TEST(Cantilever, pulls_at_its_fixed_end_as_beam_theory_says) {
   EXPECT_NEAR(bank.supports.area_m2[0], kWidth * kHeight, 1e-12);
   EXPECT_NEAR(bank.supports.thickness_m[0], kHeight, 1e-9);
   EXPECT_NEAR(bank.supports.normal[0][0], -1, 1e-12);
-  EXPECT_THAT(support::list_names(bank), ElementsAre("x-min"));
-  const support::Losses losses = support::calc_losses(bank, {});
+  EXPECT_THAT(mounting::list_names(bank), ElementsAre("x-min"));
+  const mounting::Losses losses = mounting::calc_losses(bank, {});
   EXPECT_THAT(losses.supports, ElementsAre("x-min on brick wall, screwed"));
   EXPECT_GT(losses.decay_per_s[0], 0.0);
 }
@@ -57,7 +57,7 @@ TEST(Cantilever, has_the_same_supports_on_two_ranks_and_by_its_own_record) {
   write_bar(folder);
   folder.write_job(kSteel, R"("fixed": [{"node_set": "x-min", "name": "left", "loss": 0.03}, "x-max"], "band_hz": [20, 3000],)");
   const bank::Bank one = folder.solve(1), two = folder.solve(2);
-  EXPECT_THAT(support::list_names(one), ElementsAre("left", "x-max"));
+  EXPECT_THAT(mounting::list_names(one), ElementsAre("left", "x-max"));
   EXPECT_EQ(one.supports.text, two.supports.text);
   ASSERT_EQ(one.supports.reaction.size(), two.supports.reaction.size());
   for (std::size_t m = 0; m < one.mode_count(); ++m) {
@@ -78,7 +78,7 @@ TEST(Cantilever, fixed_by_a_box_has_a_support_of_that_name) {
   Folder folder;
   write_bar(folder);
   folder.write_job(kSteel, R"("fixed": {"box_m": {"min": [0, 0, 0], "max": [0, 1, 1]}}, "band_hz": [20, 1000],)");
-  EXPECT_THAT(support::list_names(folder.solve()), ElementsAre("box 1"));
+  EXPECT_THAT(mounting::list_names(folder.solve()), ElementsAre("box 1"));
 }
 
 TEST(FreeBody, has_a_bank_without_supports) {

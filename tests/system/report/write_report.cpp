@@ -3,7 +3,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "jobs/report/report.hpp"
+#include "jobs/front/report/report.hpp"
 
 int main(int argc, char** argv) {
   if (argc < 4) {

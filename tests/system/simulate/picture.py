@@ -14,7 +14,7 @@ from jobs import find_peak_hz, make_bar, run, write_job
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "draw"))
 from read_picture import read_png
 
-# Where the levels are in the picture, and its frequencies from the lowest row to the top (runtime/sound/spectrogram.hpp).
+# Where the levels are in the picture, and its frequencies from the lowest row to the top (runtime/render/sound/spectrogram.hpp).
 LEFT, TOP, WIDTH, HEIGHT, LOWEST_HZ, HIGHEST_HZ = 112, 190, 1140, 620, 50, 24000
 
 

@@ -1,4 +1,4 @@
-// What bodies that touch cost: a scene, in contact::World or in Bullet from the same start.
+// What bodies that touch cost: a scene, in physics::World or in Bullet from the same start.
 //
 // usage: bench_piles SCENE carillon|bullet SECONDS [TRIANGLES]
 //          prints one line of JSON: CPU seconds (clock of the thread) for a second of the scene, the worst 100 ms and the worst 2 ms of it,
@@ -27,11 +27,11 @@
 #include <vector>
 
 #include "runtime/base/clock.hpp"
-#include "runtime/contact/world.hpp"
-#include "tests/unit/runtime/contact/leaning_train.hpp"
-#include "tests/unit/runtime/contact/solids.hpp"
-#include "tests/unit/runtime/rigid/drops.hpp"
-#include "tests/unit/runtime/shape/solids.hpp"
+#include "runtime/physics/world.hpp"
+#include "tests/unit/runtime/physics/leaning_train.hpp"
+#include "tests/unit/runtime/physics/solids.hpp"
+#include "tests/unit/runtime/physics/rigid/drops.hpp"
+#include "tests/unit/runtime/physics/geometry/solids.hpp"
 
 namespace {
 
@@ -61,17 +61,17 @@ bank::Bank make_coin(double radius_m, double thickness_m) {
     coin.triangles.push_back({i, j, up + j});
     coin.triangles.push_back({i, up + j, up + i});
   }
-  contact::tests::set_rigid_of_solid(coin);
+  physics::tests::set_rigid_of_solid(coin);
   return coin;
 }
 
 bank::Bank make_ceramic(bank::Bank bank) {
-  bank.material = contact::tests::ceramic();
-  contact::tests::set_rigid_of_solid(bank);
+  bank.material = physics::tests::ceramic();
+  physics::tests::set_rigid_of_solid(bank);
   return bank;
 }
 
-bank::Bank make_bank(const shape::tests::Solid& solid) {
+bank::Bank make_bank(const geometry::tests::Solid& solid) {
   bank::Bank bank;
   bank.vertices_m.assign(solid.vertices.begin(), solid.vertices.end());
   bank.triangles.assign(solid.triangles.begin(), solid.triangles.end());
@@ -86,7 +86,7 @@ bank::Bank make_bottle(double radius_m) {
     outline.push_back({0.013 + (radius_m - 0.013) * 0.5 * (1.0 + std::cos(M_PI * s)), z});
   }
   outline.push_back({0, 0.24});
-  return make_bank(shape::tests::make_lathe(outline, 48, false));
+  return make_bank(geometry::tests::make_lathe(outline, 48, false));
 }
 
 /// Solid, standing on z = 0, y up in the file.
@@ -126,13 +126,13 @@ bank::Bank make_bunny(double height_m) {
 /// Bodies of few kinds.
 struct Scene {
   std::vector<std::unique_ptr<bank::Bank>> banks;
-  contact::WorldSpec spec;
+  physics::WorldSpec spec;
   double ball_radius_m = 0.0;          // where the body is one; Bullet has a shape for it
   std::set<const bank::Bank*> hollow;  // not convex
 
   const bank::Bank* keep(bank::Bank bank) { return banks.emplace_back(std::make_unique<bank::Bank>(std::move(bank))).get(); }
-  contact::BodySpec& add(const bank::Bank* bank, const Vec3& position) {
-    contact::BodySpec body;
+  physics::BodySpec& add(const bank::Bank* bank, const Vec3& position) {
+    physics::BodySpec body;
     body.name = fmt::format("body {}", spec.bodies.size());
     body.bank = bank;
     body.initial.position_m = position;
@@ -144,16 +144,16 @@ struct Scene {
 };
 
 bank::Bank make_wood(const Vec3& size_m, std::array<int, 3> cells = {1, 1, 1}) {
-  bank::Bank box = contact::tests::make_box(size_m, cells);
+  bank::Bank box = physics::tests::make_box(size_m, cells);
   box.material = {10e9, 0.3, 600.0, 1e-6, 20.0};
-  contact::tests::set_rigid_of_solid(box);
+  physics::tests::set_rigid_of_solid(box);
   return box;
 }
 
 Scene make_scene(const std::string& name, int triangles) {
   Scene scene;
-  scene.spec.ground = contact::GroundSpec{.restitution = kRestitution, .friction = kFriction};
-  const auto turn = [](contact::BodySpec& body, double angle, const Vec3& axis) {
+  scene.spec.ground = physics::GroundSpec{.restitution = kRestitution, .friction = kFriction};
+  const auto turn = [](physics::BodySpec& body, double angle, const Vec3& axis) {
     const double s = std::sin(0.5 * angle);
     body.initial.rotation = {std::cos(0.5 * angle), s * axis[0], s * axis[1], s * axis[2]};
   };
@@ -166,7 +166,7 @@ Scene make_scene(const std::string& name, int triangles) {
     const int count = std::atoi(name.c_str() + 4);
     for (int i = 0; i < count; ++i) {
       // From a grid of two by two, layer above layer, each turned.
-      contact::BodySpec& body = scene.add(box, {0.045 * (i % 2 ? 1 : -1), 0.045 * (i / 2 % 2 ? 1 : -1), 0.06 + 0.09 * (i / 4)});
+      physics::BodySpec& body = scene.add(box, {0.045 * (i % 2 ? 1 : -1), 0.045 * (i / 2 % 2 ? 1 : -1), 0.06 + 0.09 * (i / 4)});
       turn(body, 0.3 + 0.7 * i, {0.6, 0.0, 0.8});
     }
   } else if (name == "heap") {
@@ -174,13 +174,13 @@ Scene make_scene(const std::string& name, int triangles) {
     for (const int body : {1, 2, 6, 3}) kinds.push_back(scene.keep(make_bank(rigid::tests::make_drop_surface(body))));
     scene.hollow = {kinds[1], kinds[2]};
     for (int i = 0; i < 12; ++i) {
-      contact::BodySpec& body = scene.add(kinds[(i + i / 4) % 4], {0.03 * (i % 2 ? 1 : -1), 0.03 * (i / 2 % 2 ? 1 : -1), 0.12 + 0.17 * i});
+      physics::BodySpec& body = scene.add(kinds[(i + i / 4) % 4], {0.03 * (i % 2 ? 1 : -1), 0.03 * (i / 2 % 2 ? 1 : -1), 0.12 + 0.17 * i});
       turn(body, 0.3 + 0.7 * i, {0.6, 0.0, 0.8});
     }
   } else if (name == "bars") {
     const bank::Bank* bar = scene.keep(make_wood({0.2, 0.02, 0.02}));
     for (int i = 0; i < 200; ++i) {
-      contact::BodySpec& body = scene.add(bar, {0.3 * (i % 20), 0.3 * (i / 20), 0.3 + 0.002 * i});
+      physics::BodySpec& body = scene.add(bar, {0.3 * (i % 20), 0.3 * (i / 20), 0.3 + 0.002 * i});
       turn(body, 0.2 + 0.05 * i, {0.0, 0.6, 0.8});
     }
   } else if (name == "stack") {
@@ -194,14 +194,14 @@ Scene make_scene(const std::string& name, int triangles) {
     scene.spec.bodies.front().initial.position_m = {x - x * std::cos(a) + z * std::sin(a), 0, x * std::sin(a) + z * std::cos(a)};
   } else if (name == "ball") {
     scene.ball_radius_m = 0.03;
-    contact::BodySpec& body = scene.add(scene.keep(contact::tests::make_ball(0.03, 4)), {0, 0, 0.03});
+    physics::BodySpec& body = scene.add(scene.keep(physics::tests::make_ball(0.03, 4)), {0, 0, 0.03});
     body.velocity_m_s = {1.0, 0, 0};
     body.angular_velocity_rad_s = {0, 1.0 / 0.03, 0};
   } else if (name == "coin") {
-    // About its centre, which rests: tests/unit/runtime/contact/known_motions_test.cpp.
+    // About its centre, which rests: tests/unit/runtime/physics/known_motions_test.cpp.
     const double radius = 0.012, e = 0.0009, a = 0.5, s = std::sin(a), c = std::cos(a);
     const bank::Bank* coin = scene.keep(make_coin(radius, 2 * e));
-    contact::BodySpec& body = scene.add(coin, {0, 0, radius * s + e * c});
+    physics::BodySpec& body = scene.add(coin, {0, 0, radius * s + e * c});
     turn(body, a, {1, 0, 0});
     const double across = coin->rigid.inertia_kg_m2[0] / coin->rigid.mass_kg, along = coin->rigid.inertia_kg_m2[8] / coin->rigid.mass_kg;
     const double rate = std::sqrt(9.81 * (radius * c - e * s) / (s * (across * c - along * e / radius * s)));
@@ -209,21 +209,21 @@ Scene make_scene(const std::string& name, int triangles) {
   } else if (name == "bottle") {
     const double radius = 0.035, q = std::sqrt(0.5);
     const bank::Bank* bottle = scene.keep(make_bottle(radius));
-    contact::BodySpec& body = scene.add(bottle, {0, 0, radius});
+    physics::BodySpec& body = scene.add(bottle, {0, 0, radius});
     body.initial.rotation = {q, q, 0, 0};
     body.velocity_m_s = {1.0, 0, 0};
     body.angular_velocity_rad_s = {0, 1.0 / radius, 0};
   } else if (name == "pen") {
     // Down a slope of 5 degrees.
     const double a = 5.0 * M_PI / 180.0, radius = 0.0045, q = std::sqrt(0.5);
-    contact::BodySpec& body = scene.add(scene.keep(make_bank(rigid::tests::make_drop_surface(4))), {0, 0, radius});
+    physics::BodySpec& body = scene.add(scene.keep(make_bank(rigid::tests::make_drop_surface(4))), {0, 0, radius});
     body.initial.rotation = {q, q, 0, 0};
     scene.spec.gravity_m_s2 = {9.81 * std::sin(a), 0, -9.81 * std::cos(a)};
   } else if (name == "cards") {
     // Three storeys of cards of 88 x 63 x 0.3 mm that lean by 20 degrees.
-    bank::Bank paper = contact::tests::make_box({0.0003, 0.063, 0.088});
+    bank::Bank paper = physics::tests::make_box({0.0003, 0.063, 0.088});
     paper.material = {3e9, 0.3, 900.0, 1e-6, 50.0};
-    contact::tests::set_rigid_of_solid(paper);
+    physics::tests::set_rigid_of_solid(paper);
     const bank::Bank* card = scene.keep(std::move(paper));
     const double lean = 20.0 * M_PI / 180.0, c = std::cos(lean), s = std::sin(lean);
     const double half = 0.5 * (0.088 * c + 0.0003 * s), side = 0.5 * (0.088 * s + 0.0003 * c), pitch = 4.0 * side;
@@ -237,7 +237,7 @@ Scene make_scene(const std::string& name, int triangles) {
       below += 0.0003;
     }
     scene.spec.ground->friction = 0.5;
-    for (contact::BodySpec& body : scene.spec.bodies) body.friction = 0.5;
+    for (physics::BodySpec& body : scene.spec.bodies) body.friction = 0.5;
   } else if (name.starts_with("bunnies")) {
     const bank::Bank* bunny = scene.keep(make_bunny(0.13));
     for (int i = 0; i < std::atoi(name.c_str() + 7); ++i)
@@ -276,7 +276,7 @@ Cost measure(double end_s, Advance&& advance) {
 }
 
 Cost run_ours(const Scene& scene, double end_s) {
-  contact::World world(scene.spec, {.end_s = end_s});
+  physics::World world(scene.spec, {.end_s = end_s});
   long hits = 0;
   std::int64_t steps = 0;
   Cost cost = measure(end_s, [&](double until_s) {
@@ -308,7 +308,7 @@ Cost run_bullet(const Scene& scene, double end_s) {
   std::vector<std::unique_ptr<btTriangleMesh>> meshes;
   std::map<const bank::Bank*, std::unique_ptr<btCollisionShape>> shapes;
   std::vector<std::unique_ptr<btRigidBody>> bodies;
-  for (const contact::BodySpec& spec : scene.spec.bodies) {
+  for (const physics::BodySpec& spec : scene.spec.bodies) {
     std::unique_ptr<btCollisionShape>& shape = shapes[spec.bank];
     if (!shape && scene.ball_radius_m > 0.0) shape = std::make_unique<btSphereShape>(btScalar(scene.ball_radius_m));
     if (!shape && scene.hollow.contains(spec.bank)) {
@@ -351,8 +351,8 @@ Cost run_bullet(const Scene& scene, double end_s) {
 }
 
 /// Where each body is on the way, every 2 ms.
-std::vector<std::vector<events::BodyMotion>> follow(const contact::WorldSpec& spec, double end_s, double step_s, double& cpu_s_per_s) {
-  contact::World world(spec, {.contact_step_s = step_s, .end_s = end_s});
+std::vector<std::vector<events::BodyMotion>> follow(const physics::WorldSpec& spec, double end_s, double step_s, double& cpu_s_per_s) {
+  physics::World world(spec, {.contact_step_s = step_s, .end_s = end_s});
   std::vector<std::vector<events::BodyMotion>> motions(spec.bodies.size());
   const double begin = base::get_thread_cpu_s();
   world.advance(end_s, std::numeric_limits<double>::infinity(), [&](const events::Event& event) {
@@ -365,12 +365,12 @@ std::vector<std::vector<events::BodyMotion>> follow(const contact::WorldSpec& sp
 /// The error of the speed of the wave in a row of dominoes without friction between them, stones 15 to 25.
 double calc_domino_error(double step_s, double& cpu_s_per_s) {
   Scene row;
-  row.spec.ground = contact::GroundSpec{.restitution = 0.0, .friction = 5e4};  // with that of the stones: 5 at their feet
+  row.spec.ground = physics::GroundSpec{.restitution = 0.0, .friction = 5e4};  // with that of the stones: 5 at their feet
   const bank::Bank* stone = row.keep(make_wood({0.0075, 0.024, 0.048}));
   const double pitch = 0.0171, push = 6.0;
-  const std::vector<double> expected = contact::tests::LeaningTrain(0.048, 0.0075, 0.0096, 0.0).calc_starts(28, push);
+  const std::vector<double> expected = physics::tests::LeaningTrain(0.048, 0.0075, 0.0096, 0.0).calc_starts(28, push);
   for (int i = 0; i < 28; ++i) {
-    contact::BodySpec& body = row.add(stone, {pitch * i, 0, 0.024});
+    physics::BodySpec& body = row.add(stone, {pitch * i, 0, 0.024});
     body.friction = 5e-4;
     body.restitution = 0.0;
   }
@@ -388,10 +388,10 @@ double calc_domino_error(double step_s, double& cpu_s_per_s) {
 double calc_rolling_error(double step_s, double& cpu_s_per_s) {
   const double a = 3.0 * M_PI / 180.0, radius = 0.03, c = 1e-3;
   Scene slope;
-  const bank::Bank *ball = slope.keep(contact::tests::make_ball(radius, 4)), *plane = slope.keep(make_wood({4.0, 0.4, 0.04}));
+  const bank::Bank *ball = slope.keep(physics::tests::make_ball(radius, 4)), *plane = slope.keep(make_wood({4.0, 0.4, 0.04}));
   const double along = -1.9, above = radius + 0.02;
   slope.add(ball, {along * std::cos(a) + above * std::sin(a), 0, -along * std::sin(a) + above * std::cos(a)});
-  contact::BodySpec& fixed = slope.add(plane, {});
+  physics::BodySpec& fixed = slope.add(plane, {});
   fixed.fixed = true;
   fixed.initial.rotation = {std::cos(a / 2), 0, std::sin(a / 2), 0};
   const auto path = follow(slope.spec, 1.2, step_s, cpu_s_per_s)[0];

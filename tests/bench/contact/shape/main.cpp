@@ -6,9 +6,9 @@
 #include <string>
 
 #include "runtime/base/clock.hpp"
-#include "tests/unit/runtime/shape/solids.hpp"
+#include "tests/unit/runtime/physics/geometry/solids.hpp"
 
-namespace carillon::shape::tests {
+namespace carillon::geometry::tests {
 namespace {
 
 bool quick = false;
@@ -133,6 +133,6 @@ int run(int argc, char** argv) {
 }
 
 }  // namespace
-}  // namespace carillon::shape::tests
+}  // namespace carillon::geometry::tests
 
-int main(int argc, char** argv) { return carillon::shape::tests::run(argc, argv); }
+int main(int argc, char** argv) { return carillon::geometry::tests::run(argc, argv); }

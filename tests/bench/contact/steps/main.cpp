@@ -19,7 +19,7 @@ using namespace carillon::hard;
 
 void print_row(const std::string& what, const WorldSpec& spec, double seconds) {
   std::vector<double> costs;
-  contact::Statistics cost;
+  physics::Statistics cost;
   for (int round = 0; round < 5; ++round) {
     World world(spec, {.end_s = seconds});
     const double begin = base::get_thread_cpu_s();

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "jobs/attempt/attempt.hpp"
+#include "jobs/queue/attempt/attempt.hpp"
 #include "jobs/queue/environment.hpp"
 #include "runtime/base/failure.hpp"
 

@@ -3,11 +3,11 @@
 
 #include <gtest/gtest.h>
 
-#include "jobs/outcome/outcome.hpp"
+#include "jobs/store/outcome/outcome.hpp"
 #include "jobs/queue/admission.hpp"
-#include "precompute/cost/calibration.hpp"
-#include "precompute/cost/seconds.hpp"
-#include "tests/unit/jobs/registry/jobs.hpp"
+#include "precompute/job/cost/calibration.hpp"
+#include "precompute/job/cost/seconds.hpp"
+#include "tests/unit/jobs/store/registry/jobs.hpp"
 
 namespace carillon::tests {
 namespace {

@@ -11,7 +11,7 @@
 
 #include "jobs/queue/settle.hpp"
 #include "tests/unit/jobs/queue/fake_environment.hpp"
-#include "tests/unit/jobs/registry/jobs.hpp"
+#include "tests/unit/jobs/store/registry/jobs.hpp"
 
 namespace carillon::tests {
 namespace {

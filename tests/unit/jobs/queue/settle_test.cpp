@@ -9,7 +9,7 @@
 
 #include "jobs/queue/local.hpp"
 #include "jobs/store/identity.hpp"
-#include "tests/unit/jobs/registry/jobs.hpp"
+#include "tests/unit/jobs/store/registry/jobs.hpp"
 
 namespace carillon::tests {
 namespace {

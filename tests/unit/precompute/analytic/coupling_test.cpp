@@ -6,7 +6,7 @@
 #include "precompute/analytic/flat_bodies.hpp"
 #include "precompute/analytic/make_bank.hpp"
 #include "runtime/base/error.hpp"
-#include "runtime/nonlinear/coupled_modes.hpp"
+#include "runtime/synth/nonlinear/coupled_modes.hpp"
 #include "tests/unit/precompute/analytic/bodies.hpp"
 
 namespace carillon::analytic {

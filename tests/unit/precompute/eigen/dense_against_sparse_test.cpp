@@ -7,7 +7,7 @@
 #include <numbers>
 #include <vector>
 
-#include "partition/distribute.hpp"
+#include "precompute/mesh/distributed/distribute.hpp"
 #include "precompute/eigen/solve_modes.hpp"
 #include "precompute/fem/assemble.hpp"
 #include "precompute/petsc/session.hpp"
@@ -58,7 +58,7 @@ TEST_P(Sparse, gives_the_frequencies_that_dense_lapack_gives) {
   constexpr double kLowHz = 20.0, kHighHz = 40000.0;
   const mesh::TetMesh box =
       tests::make_box(GetParam().order == 1 ? std::array{9, 6, 3} : std::array{5, 3, 2}, {0.09, 0.05, 0.02}, GetParam().order);
-  partition::DistributedMesh pieces = partition::distribute(PETSC_COMM_WORLD, box, {}, {.elimination_order = true});
+  mesh::DistributedMesh pieces = mesh::distribute(PETSC_COMM_WORLD, box, {}, {.elimination_order = true});
   const fem::System system = fem::assemble(PETSC_COMM_WORLD, pieces.local, kSteel, GetParam().mass);
   std::vector<double> truth;
   for (const double lambda : calc_dense_eigenvalues(system.stiffness, system.mass)) {

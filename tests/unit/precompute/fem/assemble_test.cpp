@@ -9,7 +9,7 @@
 #include <numeric>
 #include <set>
 
-#include "partition/distribute.hpp"
+#include "precompute/mesh/distributed/distribute.hpp"
 #include "precompute/petsc/session.hpp"
 #include "tests/support/box_mesh.hpp"
 #include "tests/support/ranks.hpp"
@@ -27,14 +27,14 @@ constexpr std::array<double, 3> kSize{0.3, 0.2, 0.1};
 
 mesh::TetMesh on_rank_0(const mesh::TetMesh& whole) { return get_rank() == 0 ? whole : mesh::TetMesh{}; }
 
-partition::DistributedMesh distribute_box(const mesh::TetMesh& whole, const std::vector<std::int32_t>& fixed = {}) {
-  return partition::distribute(kWorld, on_rank_0(whole), get_rank() == 0 ? fixed : std::vector<std::int32_t>{},
+mesh::DistributedMesh distribute_box(const mesh::TetMesh& whole, const std::vector<std::int32_t>& fixed = {}) {
+  return mesh::distribute(kWorld, on_rank_0(whole), get_rank() == 0 ? fixed : std::vector<std::int32_t>{},
                                {.elimination_order = true});
 }
 
 using Field = std::function<Vec3(const Vec3&)>;
 
-petsc::VecHandle sample(const System& system, const partition::LocalMesh& local, const Field& field) {
+petsc::VecHandle sample(const System& system, const mesh::LocalMesh& local, const Field& field) {
   petsc::VecHandle vector;
   petsc::check(MatCreateVecs(system.stiffness, vector.out(), nullptr));
   double* values = nullptr;
@@ -66,7 +66,7 @@ class Assembly : public testing::TestWithParam<std::tuple<int, job::Mass>> {
  protected:
   int order() const { return std::get<0>(GetParam()); }
   mesh::TetMesh box = tests::make_box({5, 4, 3}, kSize, order());
-  partition::DistributedMesh pieces = distribute_box(box);
+  mesh::DistributedMesh pieces = distribute_box(box);
   System system = assemble(kWorld, pieces.local, kSteel, std::get<1>(GetParam()));
 };
 
@@ -154,7 +154,7 @@ TEST(Elimination, of_fixed_nodes_leaves_the_rows_of_the_others_as_they_were) {
   std::vector<std::int32_t> fixed;
   for (std::size_t i = 0; i < box.nodes_m.size(); ++i)
     if (box.nodes_m[i][0] == 0) fixed.push_back(static_cast<std::int32_t>(i));
-  const partition::DistributedMesh pieces = distribute_box(box, fixed);
+  const mesh::DistributedMesh pieces = distribute_box(box, fixed);
   const System system = assemble(kWorld, pieces.local, kSteel, job::Mass::consistent);
   PetscInt rows = 0;
   petsc::check(MatGetSize(system.stiffness, &rows, nullptr));
@@ -168,7 +168,7 @@ TEST(Elimination, of_fixed_nodes_leaves_the_rows_of_the_others_as_they_were) {
 TEST(Assembling, a_mesh_with_an_element_inside_out_fails_on_every_rank_and_names_it) {
   auto box = tests::make_box({3, 2, 2}, kSize);
   std::swap(box.tets[4 * 17], box.tets[4 * 17 + 1]);
-  const partition::DistributedMesh pieces = distribute_box(box);
+  const mesh::DistributedMesh pieces = distribute_box(box);
   try {
     assemble(kWorld, pieces.local, kSteel, job::Mass::consistent);
     FAIL() << "accepted";
@@ -179,7 +179,7 @@ TEST(Assembling, a_mesh_with_an_element_inside_out_fails_on_every_rank_and_names
 
 TEST(RigidData, of_a_box_far_from_the_origin_is_exact) {
   for (const int order : {1, 2}) {
-    const partition::DistributedMesh pieces = distribute_box(tests::make_box({4, 3, 2}, kSize, order, {100, -50, 20}));
+    const mesh::DistributedMesh pieces = distribute_box(tests::make_box({4, 3, 2}, kSize, order, {100, -50, 20}));
     const RigidBody body = calc_rigid_body(kWorld, pieces.local, kSteel);
     const double mass = 7850 * kSize[0] * kSize[1] * kSize[2];
     EXPECT_NEAR(body.volume_m3, mass / 7850, 1e-13);

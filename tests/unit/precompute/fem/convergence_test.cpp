@@ -8,19 +8,19 @@
 #include <numbers>
 #include <utility>
 
-#include "partition/distribute.hpp"
+#include "precompute/mesh/distributed/distribute.hpp"
 #include "precompute/eigen/solve_modes.hpp"
 #include "precompute/fem/assemble.hpp"
 #include "precompute/mesh/check.hpp"
 #include "precompute/petsc/session.hpp"
-#include "precompute/shapes/shapes.hpp"
+#include "precompute/mesh/shapes/shapes.hpp"
 #include "tests/support/lamb.hpp"
 
 namespace carillon::fem {
 namespace {
 
 std::vector<double> calc_omega(const mesh::TetMesh& mesh, const material::Material& material, Form form, double low_hz, double high_hz) {
-  partition::DistributedMesh pieces = partition::distribute(PETSC_COMM_WORLD, mesh, {});
+  mesh::DistributedMesh pieces = mesh::distribute(PETSC_COMM_WORLD, mesh, {});
   const System system = assemble(PETSC_COMM_WORLD, pieces.local, material, job::Mass::consistent, form);
   eigen::NodeLayout layout;
   layout.nodes_m.assign(pieces.local.nodes_m.begin(), pieces.local.nodes_m.begin() + pieces.local.free_nodes);

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <functional>
 
-#include "partition/distribute.hpp"
+#include "precompute/mesh/distributed/distribute.hpp"
 #include "precompute/fem/assemble.hpp"
 #include "precompute/fem/element.hpp"
 #include "precompute/fem/energy.hpp"
@@ -38,9 +38,9 @@ mesh::TetMesh make_halves(int order) {
   return box;
 }
 
-partition::DistributedMesh distribute_halves(int order) {
+mesh::DistributedMesh distribute_halves(int order) {
   const auto whole = make_halves(order);
-  return partition::distribute(kWorld, get_rank() == 0 ? whole : mesh::TetMesh{}, {});
+  return mesh::distribute(kWorld, get_rank() == 0 ? whole : mesh::TetMesh{}, {});
 }
 
 job::JobSpec parse(const std::string& materials) {
@@ -52,7 +52,7 @@ std::string isotropic(double density, const std::string& damping = R"({"rayleigh
 }
 
 TEST(MaterialsByRegion, are_found_by_tag_and_by_name_and_fill_the_rest_with_the_default) {
-  const partition::DistributedMesh pieces = distribute_halves(1);
+  const mesh::DistributedMesh pieces = distribute_halves(1);
   for (const std::string key : {"9", "oak"}) {
     const auto job = parse("\"material\": " + isotropic(1000) + ",\n\"materials\": {\"" + key + "\": " + isotropic(3000) + "}");
     const Materials materials = find_materials(kWorld, pieces.local, job, {{9, "oak"}});
@@ -67,7 +67,7 @@ TEST(MaterialsByRegion, are_found_by_tag_and_by_name_and_fill_the_rest_with_the_
 }
 
 TEST(MaterialsByRegion, are_found_among_names_of_any_bytes) {
-  const partition::DistributedMesh pieces = distribute_halves(1);
+  const mesh::DistributedMesh pieces = distribute_halves(1);
   const auto job = parse("\"material\": " + isotropic(1000) + ",\n\"materials\": {\"12 oak\": " + isotropic(3000) + "}");
   const std::map<std::int32_t, std::string> names{{-3, ""}, {7, std::string("7\0 a\n", 5)}, {9, "12 oak"}};
   const Materials materials = find_materials(kWorld, pieces.local, job, get_rank() == 0 ? names : std::map<std::int32_t, std::string>{});
@@ -76,7 +76,7 @@ TEST(MaterialsByRegion, are_found_among_names_of_any_bytes) {
 }
 
 void expect_refused(const std::string& materials, const std::string& words) {
-  const partition::DistributedMesh pieces = distribute_halves(1);
+  const mesh::DistributedMesh pieces = distribute_halves(1);
   try {
     find_materials(kWorld, pieces.local, parse(materials), {{9, "oak"}});
     FAIL() << "accepted";
@@ -102,7 +102,7 @@ TEST(MaterialsByRegion, that_name_a_region_twice_are_refused) {
 }
 
 TEST(MaterialsByRegion, fail_on_every_rank_with_the_words_of_the_one_that_lacks_tags) {
-  partition::DistributedMesh pieces = distribute_halves(1);
+  mesh::DistributedMesh pieces = distribute_halves(1);
   const auto job = parse("\"materials\": {\"7\": " + isotropic(1) + ", \"9\": " + isotropic(1) + "}");
   if (get_rank() == get_ranks() - 1) pieces.local.region.resize(1);
   try {
@@ -115,7 +115,7 @@ TEST(MaterialsByRegion, fail_on_every_rank_with_the_words_of_the_one_that_lacks_
 }
 
 /// Fills a (3n, fields) dense matrix with fields of the positions.
-petsc::MatHandle sample(const partition::LocalMesh& local, const std::vector<std::function<Vec3(const Vec3&)>>& fields) {
+petsc::MatHandle sample(const mesh::LocalMesh& local, const std::vector<std::function<Vec3(const Vec3&)>>& fields) {
   petsc::MatHandle shapes;
   const auto count = static_cast<PetscInt>(fields.size());
   petsc::check(MatCreateDense(kWorld, 3 * local.free_nodes, PETSC_DECIDE, PETSC_DETERMINE, count, nullptr, shapes.out()));
@@ -142,7 +142,7 @@ TEST(DecayOfACompositeBar, follows_from_the_shares_of_energy_of_each_half) {
   const std::string stiff = R"({"young_modulus_pa": 3e9, "poisson_ratio": 0.25, "density_kg_m3": 3000,
                                 "damping": {"internal_friction": {"tan_phi": 0.02}}})";
   const auto job = parse("\"materials\": {\"7\": " + soft + ",\n\"9\": " + stiff + "}");
-  const partition::DistributedMesh pieces = distribute_halves(2);
+  const mesh::DistributedMesh pieces = distribute_halves(2);
   const Materials materials = find_materials(kWorld, pieces.local, job);
   const auto shapes = sample(pieces.local, {[](const Vec3& x) {
                                               return Vec3{x[0], 0, 0};
@@ -164,7 +164,7 @@ TEST(DecayOfACompositeBar, follows_from_the_shares_of_energy_of_each_half) {
 
 TEST(DecayOfOneMaterial, is_its_law_and_of_two_alike_halves_the_same) {
   const std::string law = R"({"caughey": {"powers": [0, 0.5, 1], "coefficients": [12, 0.001, 2e-7]}})";
-  const partition::DistributedMesh pieces = distribute_halves(1);
+  const mesh::DistributedMesh pieces = distribute_halves(1);
   const std::vector<double> lambda{1e6, 1e9};
   const auto shapes = sample(pieces.local, {[](const Vec3& x) {
                                               return Vec3{x[0], 0, 0};
@@ -190,7 +190,7 @@ material::Material make_spruce(const std::string& axes) {
   return parse("\"material\": " + text).material;
 }
 
-double calc_energy(const Materials& materials, const partition::LocalMesh& local, const std::function<Vec3(const Vec3&)>& field) {
+double calc_energy(const Materials& materials, const mesh::LocalMesh& local, const std::function<Vec3(const Vec3&)>& field) {
   const System system = assemble(kWorld, local, materials, job::Mass::consistent);
   const auto shapes = sample(local, {field});
   petsc::VecHandle x, y;
@@ -206,7 +206,7 @@ TEST(OrthotropicBox, pulled_along_an_axis_stores_the_energy_of_Youngs_modulus_an
   // Strains of the compliance's own columns: eps = S e_i, so eps^T C eps = S_ii = 1 / E_i or 1 / G.
   const double volume = kSize[0] * kSize[1] * kSize[2];
   for (const int order : {1, 2}) {
-    const partition::DistributedMesh pieces = distribute_halves(order);
+    const mesh::DistributedMesh pieces = distribute_halves(order);
     const Materials spruce = make_spruce("");
     const double e[3] = {11e9, 0.9e9, 0.5e9}, nu12 = 0.37, nu23 = 0.43, nu13 = 0.47;
     const double s[3][3] = {
@@ -246,7 +246,7 @@ TEST(OrthotropicBox, turned_together_with_its_axes_keeps_its_energy) {
   const double straight = calc_energy(make_spruce(""), distribute_halves(2).local, field);
   const std::string axes = fmt::format(R"(, "axes": [[{:.17g}, {:.17g}, {:.17g}], [{:.17g}, {:.17g}, {:.17g}]])", r[0][0], r[1][0], r[2][0],
                                        r[0][1], r[1][1], r[2][1]);
-  const partition::DistributedMesh pieces = partition::distribute(kWorld, get_rank() == 0 ? turned : mesh::TetMesh{}, {});
+  const mesh::DistributedMesh pieces = mesh::distribute(kWorld, get_rank() == 0 ? turned : mesh::TetMesh{}, {});
   const double oblique = calc_energy(make_spruce(axes), pieces.local, [&](const Vec3& x) { return turn(field(turn_back(x))); });
   EXPECT_NEAR(oblique / straight, 1, 1e-11);
 }
@@ -301,7 +301,7 @@ TEST(OrthotropicRubber, keeps_the_energy_of_every_uniform_strain) {
   for (int i = 0; i < 6; ++i)
     for (int j = 0; j < 6; ++j) density += strain[i] * c[6 * i + j] * strain[j];
   for (const int order : {1, 2}) {
-    const partition::DistributedMesh pieces = distribute_halves(order);
+    const mesh::DistributedMesh pieces = distribute_halves(order);
     EXPECT_NEAR(calc_energy(material, pieces.local, field) / (0.008 * density), 1, 1e-9) << order;
   }
 }

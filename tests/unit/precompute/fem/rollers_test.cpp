@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-#include "partition/distribute.hpp"
+#include "precompute/mesh/distributed/distribute.hpp"
 #include "precompute/fem/assemble.hpp"
 #include "precompute/petsc/session.hpp"
 #include "tests/support/box_mesh.hpp"
@@ -20,7 +20,7 @@ const material::Material kAluminium{
     .young_modulus_pa = 70e9, .poisson_ratio = 0.33, .density_kg_m3 = 2700, .alpha1_s = 0, .alpha2_per_s = 0};
 
 std::vector<double> calc_frequencies(std::array<int, 3> cells, int order, job::Mass mass) {
-  const partition::DistributedMesh pieces = partition::distribute(PETSC_COMM_WORLD, tests::make_box(cells, kSize, order), {});
+  const mesh::DistributedMesh pieces = mesh::distribute(PETSC_COMM_WORLD, tests::make_box(cells, kSize, order), {});
   const System system = assemble(PETSC_COMM_WORLD, pieces.local, kAluminium, mass);
   std::vector<int> number;
   int size = 0;

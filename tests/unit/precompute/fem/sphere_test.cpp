@@ -4,11 +4,11 @@
 
 #include <cmath>
 
-#include "partition/distribute.hpp"
+#include "precompute/mesh/distributed/distribute.hpp"
 #include "precompute/fem/assemble.hpp"
 #include "precompute/mesh/check.hpp"
 #include "precompute/petsc/session.hpp"
-#include "precompute/shapes/shapes.hpp"
+#include "precompute/mesh/shapes/shapes.hpp"
 #include "tests/support/lamb.hpp"
 #include "tests/support/subspace.hpp"
 
@@ -24,7 +24,7 @@ std::vector<double> calc_modes(const mesh::TetMesh& mesh, double nu, Form form) 
   material.young_modulus_pa = 2 * (1 + nu);
   material.poisson_ratio = nu;
   material.density_kg_m3 = 1;
-  const partition::DistributedMesh pieces = partition::distribute(PETSC_COMM_WORLD, mesh, {});
+  const mesh::DistributedMesh pieces = mesh::distribute(PETSC_COMM_WORLD, mesh, {});
   const System system = assemble(PETSC_COMM_WORLD, pieces.local, material, job::Mass::consistent, form);
   const auto pairs = tests::iterate_subspace(tests::copy(system.stiffness), tests::copy(system.mass), 16, 4, 20);
   std::vector<double> omega;

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <functional>
 
-#include "partition/distribute.hpp"
+#include "precompute/mesh/distributed/distribute.hpp"
 #include "precompute/fem/assemble.hpp"
 #include "precompute/petsc/session.hpp"
 #include "tests/support/box_mesh.hpp"
@@ -33,7 +33,7 @@ struct Body {
     for (std::size_t i = 0; i < whole.nodes_m.size(); ++i)
       if (fix(whole.nodes_m[i]) >= 0) fixed.push_back(static_cast<std::int32_t>(i));
     pieces =
-        partition::distribute(kWorld, get_rank() == 0 ? whole : mesh::TetMesh{}, get_rank() == 0 ? fixed : std::vector<std::int32_t>{});
+        mesh::distribute(kWorld, get_rank() == 0 ? whole : mesh::TetMesh{}, get_rank() == 0 ? fixed : std::vector<std::int32_t>{});
     for (const Vec3& x : pieces.local.nodes_m) pieces.local.fixed_by.push_back(fix(x));
     system = assemble(kWorld, pieces.local, kSteel, mass);
   }
@@ -63,7 +63,7 @@ struct Body {
   }
 
   job::Mass mass;
-  partition::DistributedMesh pieces;
+  mesh::DistributedMesh pieces;
   System system;
 };
 

@@ -16,7 +16,7 @@
 #include "precompute/petsc/session.hpp"
 #include "tests/support/box_mesh.hpp"
 #include "tests/support/ranks.hpp"
-#include "tests/unit/precompute/parallel_mesh/write_vtkhdf.hpp"
+#include "tests/unit/precompute/mesh/parallel/write_vtkhdf.hpp"
 
 namespace carillon::run {
 namespace {
@@ -39,7 +39,7 @@ Ints find_end(const mesh::TetMesh& plate) {
   return nodes;
 }
 
-fem::System assemble(const comm::Communicator& comm, const partition::LocalMesh& local) {
+fem::System assemble(const comm::Communicator& comm, const mesh::LocalMesh& local) {
   material::Material steel;
   steel.young_modulus_pa = 2e11;
   steel.poisson_ratio = 0.3;
@@ -55,11 +55,11 @@ std::int64_t count_below(const fem::System& system, const ldlt::MeshOrder* order
   return factor.get_negative_pivots();
 }
 
-void expect_whole(const comm::Communicator& comm, const partition::DistributedMesh& cut, const partition::DistributedMesh& other) {
+void expect_whole(const comm::Communicator& comm, const mesh::DistributedMesh& cut, const mesh::DistributedMesh& other) {
   EXPECT_EQ(cut.nodes, other.nodes);
   EXPECT_EQ(cut.free_nodes, other.free_nodes);
   EXPECT_EQ(cut.components, other.components);
-  const partition::LocalMesh& local = cut.local;
+  const mesh::LocalMesh& local = cut.local;
   EXPECT_GT(local.tet_count(), 0);
   Ints tets = comm.all_gather(local.tet_in_mesh);
   std::sort(tets.begin(), tets.end());
@@ -76,7 +76,7 @@ TEST(CutByOrder, has_every_element_once_and_the_spectrum_of_the_other_cut) {
   const Ints end = get_rank() == 0 ? find_end(plate) : Ints();
   for (const auto& [fixed, largest_ordered] : {std::pair(Ints(), 100'000), {end, 100'000}, {Ints(), 100}, {end, 100}}) {
     const CutMesh cut = cut_by_order(comm, plate, fixed, largest_ordered);
-    const partition::DistributedMesh metis = partition::distribute(comm, plate, fixed);
+    const mesh::DistributedMesh metis = mesh::distribute(comm, plate, fixed);
     EXPECT_EQ(cut.order != nullptr, get_ranks() > 1);
     EXPECT_LE(cut.pieces.report.element_balance, 1.03);
     EXPECT_LE(cut.pieces.report.node_balance, 1.03);

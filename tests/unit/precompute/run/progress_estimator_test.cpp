@@ -7,7 +7,7 @@
 #include <random>
 #include <string>
 
-#include "precompute/cost/seconds.hpp"
+#include "precompute/job/cost/seconds.hpp"
 
 namespace carillon::run {
 namespace {

@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "precompute/mesh/check.hpp"
-#include "precompute/shapes/shapes.hpp"
+#include "precompute/mesh/shapes/shapes.hpp"
 
 namespace carillon::run {
 namespace {

@@ -16,7 +16,7 @@
 #include "tests/unit/runtime/bank/bank_arrays.hpp"
 #include "tests/unit/runtime/bank/example_bank.hpp"
 #include "tests/unit/runtime/bank/seal_again.hpp"
-#include "tests/unit/runtime/codec/surfaces.hpp"
+#include "tests/unit/runtime/bank/packed/surfaces.hpp"
 
 namespace carillon::bank {
 namespace {
@@ -24,7 +24,7 @@ namespace {
 /// A ball of steel of 100 mm with smooth shapes, which may be fixed where z > 80 mm.
 Bank make_ball_bank(int divisions, std::size_t modes, bool is_fixed = false) {
   Bank bank = example::make_first_bank(1, modes);
-  const codec::example::Mesh mesh = codec::example::shuffle(codec::example::make_ball(divisions, 0.1), 5);
+  const packed::example::Mesh mesh = packed::example::shuffle(packed::example::make_ball(divisions, 0.1), 5);
   bank.vertices_m = mesh.vertices_m;
   bank.triangles = mesh.triangles;
   double six_volumes = 0.0;

@@ -12,11 +12,11 @@
 #include <random>
 #include <vector>
 
-#include "runtime/impact/impact.hpp"
+#include "runtime/physics/impact/impact.hpp"
 #include "runtime/synth/acceleration_noise.hpp"
 #include "runtime/synth/synthesiser.hpp"
 #include "runtime/synth/voice.hpp"
-#include "tests/unit/runtime/impact/scenes.hpp"
+#include "tests/unit/runtime/physics/impact/scenes.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 
 namespace carillon::synth {

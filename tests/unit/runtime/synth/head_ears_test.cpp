@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "runtime/base/error.hpp"
-#include "runtime/head/sphere.hpp"
+#include "runtime/acoustics/head/sphere.hpp"
 #include "runtime/synth/synthesiser.hpp"
-#include "tests/unit/runtime/head/oracle.hpp"
+#include "tests/unit/runtime/acoustics/head/oracle.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 #include "tests/unit/runtime/synth/multipole_cube.hpp"
 

@@ -11,7 +11,7 @@
 #include <cmath>
 #include <vector>
 
-#include "runtime/head/sphere.hpp"
+#include "runtime/acoustics/head/sphere.hpp"
 #include "runtime/synth/acceleration_noise.hpp"
 #include "runtime/synth/contact_forces.hpp"
 #include "runtime/synth/receiver.hpp"

@@ -1,0 +1,289 @@
+// Method:     what is asked for becomes a scene; carillon-render checks it, simulates it and records its contacts; the folder gets scene,
+//             contacts, banks, page and sound engine. explore.json says what belongs to what. For a scene that is silent by itself, a probe
+//             with a blow on each body determines the gain.
+// Source:     the Sonic Explorer of van den Doel and Pai 1996.
+// Deviations: theirs synthesised on the machine of the listener, in a program of its own; this one is a page.
+#include "jobs/front/explore/explore.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+
+#include "jobs/front/explore/banks.hpp"
+#include "jobs/front/explore/files.hpp"
+#include "jobs/front/explore/scenes.hpp"
+#include "jobs/store/process/programs.hpp"
+#include "jobs/front/report/record.hpp"
+#include "runtime/base/command.hpp"
+#include "runtime/base/file.hpp"
+#include "runtime/scene/job_keys.hpp"
+#include "runtime/base/version.hpp"
+
+namespace carillon::explore {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kVersion = 1;  // of explore.json
+constexpr std::uint64_t kMaxSceneBytes = 16 << 20, kMaxTrajectoryBytes = std::uint64_t{1} << 30;
+constexpr const char *kAboutFile = "explore.json", *kSceneFile = "scene.json", *kContactsFile = "contacts.jsonl",
+                     *kPackedContactsFile = "contacts.jsonl.gz", *kBankFolder = "banks";
+constexpr double kProbeGain = 0.35;  // of the gain that brings the probe's blows to full scale: headroom for harder strikes
+
+bool is_bank(const fs::path& file) {
+  std::array<char, 13> begin{};
+  std::FILE* in = std::fopen(file.c_str(), "rb");
+  if (in == nullptr) return false;
+  const std::size_t read = std::fread(begin.data(), 1, begin.size(), in);
+  std::fclose(in);
+  return std::string_view(begin.data(), read) == "CARILLON BANK";
+}
+
+/// The folder of an order, with what stands there now judged.
+fs::path find_place(const PageOrder& order) {
+  fs::path folder = order.folder;
+  if (folder.empty()) folder = make_name(fs::absolute(order.subjects.front()).stem().string()) + "-explore";
+  folder = fs::absolute(folder).lexically_normal();
+  if (folder.filename().empty()) folder = folder.parent_path();
+  std::error_code error;
+  if (!fs::exists(folder, error) || is_explorer(folder) || (fs::is_directory(folder, error) && fs::is_empty(folder, error))) return folder;
+  throw InputError(fmt::format("{}: this folder was not made by carillon explore; give another one with -o", folder.string()));
+}
+
+fs::path find_page() { return base::find_data_folder("explore", "install Carillon with its page, or build it where npm is installed"); }
+fs::path find_engine() {
+  return base::find_data_folder("web", "install Carillon with its page, or build it where emscripten is installed");
+}
+
+/// The name of what is shown: of a file "scene.json" the folder says more.
+std::string find_title(const PageOrder& order) {
+  if (!order.title.empty()) return order.title;
+  const fs::path first = fs::absolute(order.subjects.front());
+  if (order.subjects.size() > 1) return fmt::format("{} and {} more", first.stem().string(), order.subjects.size() - 1);
+  return first.filename() == "scene.json" ? first.parent_path().filename().string() : first.stem().string();
+}
+
+/// Takes effects by name out of a key "effects", in each of its forms: a list, {"on": [...], "off": [...]}, {"head": true}.
+void remove_effects(Json::Value& owner, const std::vector<std::string>& names) {
+  if (!owner.isObject() || !owner.isMember("effects")) return;
+  Json::Value& effects = owner["effects"];
+  const auto take_from = [&](Json::Value& list) {
+    if (!list.isArray()) return;
+    Json::Value kept(Json::arrayValue);
+    for (const Json::Value& one : list)
+      if (!one.isString() || std::find(names.begin(), names.end(), one.asString()) == names.end()) kept.append(one);
+    list = kept;
+  };
+  take_from(effects);
+  if (!effects.isObject()) return;
+  for (const char* key : {"on", "off"})
+    if (effects.isMember(key)) take_from(effects[key]);
+  for (const std::string& name : names) effects.removeMember(name);
+}
+
+/// The same of a scene and of each of its bodies.
+void remove_effects_of_all(Json::Value& scene, const std::vector<std::string>& names) {
+  remove_effects(scene, names);
+  for (Json::Value& body : scene["bodies"]) remove_effects(body, names);
+}
+
+/// Frees the ears of a listener with a head, which the sound engine has not. Whether there was one.
+bool take_head(Json::Value& scene) {
+  if (!scene.isMember("listener")) return false;
+  Json::Value& listener = scene["listener"];
+  const bool has_head = listener["ears"] == "hrtf";
+  listener.removeMember("ears");
+  listener.removeMember("sofa");
+  if (has_head) remove_effects_of_all(scene, {"head"});
+  return has_head;
+}
+
+/// Whether a body is described in place of its bank. What is no scene has none: carillon-render says so.
+bool has_described_body(const Json::Value& scene) {
+  const Json::Value bodies = scene.isObject() ? scene["bodies"] : Json::Value();
+  return bodies.isArray() &&
+         std::any_of(bodies.begin(), bodies.end(), [](const Json::Value& body) { return body.isObject() && !body.isMember("bank"); });
+}
+
+/// Pages play modes, and a recorded surface has none.
+void refuse_recordings(const Json::Value& scene, const fs::path& file) {
+  const Json::Value bodies = scene.isObject() ? scene["bodies"] : Json::Value();
+  if (!bodies.isArray()) return;
+  for (const Json::Value& body : bodies)
+    if (body.isObject() && body.isMember("recording"))
+      throw InputError(fmt::format(
+          "{}: a body is a recording, which pages cannot play; take it out, or play the scene with carillon-render", file.string()));
+}
+
+/// Gives described bodies the banks that carillon-render has played, as its trajectory names them.
+void name_banks(Json::Value& scene, const Json::Value& trajectory) {
+  for (Json::ArrayIndex i = 0; i < scene["bodies"].size(); ++i) {
+    Json::Value& body = scene["bodies"][i];
+    if (body.isMember("bank")) continue;
+    for (const char* key : scene::kJobKeys) body.removeMember(key);
+    body["bank"] = trajectory["bodies"][i]["bank"];
+  }
+}
+
+class Work {
+ public:
+  explicit Work(const PageOrder& order)
+      : order_(order),
+        page_(find_page()),
+        engine_(find_engine()),
+        place_(find_place(order)),
+        folder_(place_),
+        banks_(folder_.path() / kBankFolder, order.keeps_banks),
+        programs_(true) {}
+
+  Explored run() {
+    fs::create_directory(folder_.path() / kBankFolder);
+    read_subject();
+    const double gain = find_gain();
+    write(gain);
+    done_.folder = place_;
+    done_.banks = banks_.list();
+    done_.bytes = calc_bytes(folder_.path());
+    folder_.commit();
+    return std::move(done_);
+  }
+
+ private:
+  fs::path path(const char* name) const { return folder_.path() / name; }
+
+  void read_subject() {
+    const auto is_all = [&](auto&& test) { return std::all_of(order_.subjects.begin(), order_.subjects.end(), test); };
+    std::error_code error;
+    for (const fs::path& subject : order_.subjects)
+      if (!fs::is_regular_file(subject, error)) throw InputError(fmt::format("{}: no such file; give banks or a scene", subject.string()));
+    if (is_all(is_bank) || order_.subjects.size() > 1) {
+      for (const fs::path& subject : order_.subjects) add_bank(subject);
+      scene_ = make_row(files_, facts_, order_.up);
+      return;
+    }
+    const fs::path& file = order_.subjects.front();
+    scene_ = record(file);
+    for (const Json::Value& body : scene_["bodies"]) add_bank(fs::absolute(file).parent_path() / body["bank"].asString());
+  }
+
+  void add_bank(const fs::path& file) {
+    const BankFacts& facts = banks_.add(file);
+    files_.push_back(fs::absolute(file));
+    facts_.push_back(&facts);
+  }
+
+  /// Simulates a scene file, which is checked by that, and keeps what happened. The scene that is returned names the bank of each body.
+  Json::Value record(const fs::path& file) {
+    Json::Value scene = report::parse_json(base::read_file(file, "scene", kMaxSceneBytes));
+    refuse_recordings(scene, file);
+    const fs::path trajectory = path(".trajectory.json");
+    std::vector<std::string> words{"--record", path(kContactsFile).string()};
+    const bool lacks_bank = has_described_body(scene);
+    if (lacks_bank) words.insert(words.end(), {"--trajectory", trajectory.string()});
+    report_ = render(file, words);
+    if (lacks_bank) {
+      name_banks(scene, report::parse_json(base::read_file(trajectory, "trajectory of carillon-render", kMaxTrajectoryBytes)));
+      fs::remove(trajectory);
+    }
+    done_.duration_s = report_["duration_s"].asDouble();
+    for (const Json::Value& warning : report_["warnings"]) done_.warnings.push_back(warning.asString());
+    for (const std::string& note : programs_.get_notes())  // of banks made for this page
+      if (std::find(done_.warnings.begin(), done_.warnings.end(), note) == done_.warnings.end()) done_.warnings.push_back(note);
+    if (take_head(scene)) done_.warnings.emplace_back("listener: pages have no heads; on this one the ears are free");
+    done_.has_recording = report_["peak_pa"].isNumeric() && report_["peak_pa"].asDouble() > 0.0;
+    std::error_code error;
+    if (done_.has_recording)
+      compress_file(path(kContactsFile));
+    else
+      fs::remove(path(kContactsFile), error);
+    return scene;
+  }
+
+  /// The report of carillon-render on a scene file.
+  Json::Value render(const fs::path& scene, std::vector<std::string> words) {
+    const fs::path sound = path(".sound.wav"), report = path(".report.json");
+    words.insert(words.begin(), {fs::absolute(scene).string(), "-q", "-o", sound.string(), "--report", report.string()});
+    (void)programs_.run("carillon-render", words, false);
+    Json::Value root = report::parse_json(base::read_file(report, "report of carillon-render", kMaxSceneBytes));
+    std::error_code error;
+    fs::remove(sound, error);
+    fs::remove(report, error);
+    return root;
+  }
+
+  /// Full scale per pascal.
+  double find_gain() {
+    if (done_.has_recording) return report_["gain_per_pa"].asDouble();
+    const fs::path probe = path(".probe.json");
+    base::write_file(probe, to_text(make_probe(scene_, files_, facts_)));
+    report_ = render(probe, {});
+    std::error_code error;
+    fs::remove(probe, error);
+    return kProbeGain * report_["gain_per_pa"].asDouble();
+  }
+
+  void write(double gain) {
+    Json::Value about(Json::objectValue);
+    about["carillon_explore"] = kVersion;
+    about["made_by"] = base::describe("carillon");
+    about["title"] = find_title(order_);
+    about["scene"] = kSceneFile;
+    about["contacts"] = done_.has_recording ? Json::Value(kPackedContactsFile) : Json::Value();
+    about["duration_s"] = done_.duration_s;
+    about["gain_per_pa"] = gain;
+    for (Json::ArrayIndex i = 0; i < scene_["bodies"].size(); ++i) {
+      const BankFacts& facts = *facts_[i];
+      scene_["bodies"][i]["bank"] = fmt::format("{}/{}", kBankFolder, facts.kept.name);
+      Json::Value body(Json::objectValue);
+      body["bank_bytes"] = Json::UInt64(facts.kept.bytes);
+      body["full_bytes"] = Json::UInt64(facts.kept.full_bytes);
+      body["change"] = facts.kept.change.empty() ? Json::Value() : Json::Value(facts.kept.change);
+      body["material"] = facts.material;
+      body["group"] = facts.group;
+      body["loudest"]["triangle"] = facts.loudest[0];
+      body["loudest"]["corner"] = facts.loudest[1];
+      if (done_.has_recording) body["effects"] = report_["per_body"][i]["effects"];
+      about["bodies"].append(body);
+    }
+    remove_effects_of_all(scene_, {"head", "nonlinear", "cascade", "directivity", "ground_reflection"});  // not in the engine of pages
+    base::write_file(path(kSceneFile), to_text(scene_));
+    base::write_file(path(kAboutFile), to_text(about));
+    put_folder(page_, folder_.path());
+    put_folder(engine_, folder_.path() / "audio");
+  }
+
+  const PageOrder& order_;
+  fs::path page_, engine_, place_;
+  base::WholeFolder folder_;
+  PageBanks banks_;
+  process::Programs programs_;
+  Json::Value scene_, report_;
+  std::vector<fs::path> files_;          // per body: its bank
+  std::vector<const BankFacts*> facts_;  // per body
+  Explored done_;
+};
+
+}  // namespace
+
+Explored explore(const PageOrder& order) {
+  if (order.subjects.empty()) throw InputError("give banks or a scene");
+  return Work(order).run();
+}
+
+bool is_installed() {
+  try {
+    (void)find_page();
+    (void)find_engine();
+  } catch (const SystemError&) {
+    return false;
+  }
+  return true;
+}
+
+bool is_explorer(const fs::path& folder) {
+  std::error_code error;
+  return fs::is_regular_file(folder / kAboutFile, error) && fs::is_regular_file(folder / "index.html", error);
+}
+
+}  // namespace carillon::explore

@@ -1,0 +1,320 @@
+// Method:     Lock the folder; a bank that is there already is published; end what the attempt before left running; say who works here
+//             (attempt.json) before anything is started; start, watch, classify; verify and publish; say how it ended, last.
+// Source:     docs/howto/when-jobs-die.md. Deviations: none.
+#include <fmt/core.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <thread>
+
+#include "jobs/queue/attempt/attempt.hpp"
+#include "jobs/queue/attempt/launch.hpp"
+#include "jobs/queue/attempt/processes.hpp"
+#include "jobs/queue/attempt/publish.hpp"
+#include "jobs/queue/attempt/watch.hpp"
+#include "jobs/store/outcome/outcome.hpp"
+#include "jobs/store/outcome/policy.hpp"
+#include "jobs/store/process/process.hpp"
+#include "jobs/store/files.hpp"
+#include "jobs/store/identity.hpp"
+#include "jobs/store/open_folder.hpp"
+#include "jobs/store/order.hpp"
+#include "jobs/store/store.hpp"
+#include "runtime/base/clock.hpp"
+#include "runtime/base/result.hpp"
+
+namespace carillon::attempt {
+namespace {
+
+namespace fs = std::filesystem;
+using outcome::Cause;
+
+constexpr std::uintmax_t kMaxLog = 1 << 16;  // what is read of it
+constexpr double kMaxDrawSeconds = 60.0;
+
+fs::path find_root(const fs::path& work) {
+  // work/ab/<id> of a store, as named: a link on the way is refused when the folder is opened
+  const fs::path root = work.parent_path().parent_path().parent_path();
+  std::error_code error;
+  if (!fs::is_regular_file(root / "VERSION", error) || work.parent_path().parent_path().filename() != "work")
+    throw InputError(fmt::format("{}: this is no folder of work of a store; name work/ab/ID of a store", work.string()));
+  return root;
+}
+
+/// Size and moment of a file: they change when it is written again. Zeros when there is none.
+std::pair<long long, long long> find_mark(const fs::path& file) {
+  struct stat info {};
+  if (::stat(file.c_str(), &info) != 0) return {0, 0};
+  return {static_cast<long long>(info.st_ino), info.st_mtim.tv_sec * 1000000000LL + info.st_mtim.tv_nsec};
+}
+
+std::string read_end(const fs::path& file, std::uintmax_t from) {
+  std::error_code error;
+  const std::uintmax_t size = fs::file_size(file, error);
+  if (error || size <= from) return {};
+  std::ifstream stream(file, std::ios::binary);
+  stream.seekg(static_cast<std::streamoff>(std::max(from, size > kMaxLog ? size - kMaxLog : 0)));
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+/// Whom mpirun names in its sentence on a rank that a signal ended: "rank 1 on node3"; empty when it names none. No decision rests on it.
+std::string find_dead_rank(std::string_view log) {
+  constexpr std::string_view kMark = "mpirun noticed that process ";
+  const std::size_t at = log.rfind(kMark);
+  if (at == std::string_view::npos) return {};
+  const std::string_view rest = log.substr(at + kMark.size()), line = rest.substr(0, rest.find('\n'));
+  const std::size_t pid = line.find(" with PID "), node = line.find(" on node ");
+  if (pid == std::string_view::npos || node == std::string_view::npos) return {};
+  const std::string_view host = line.substr(node + 9);
+  return fmt::format("{} on {}", line.substr(0, pid), host.substr(0, host.find(' ')));
+}
+
+/// Pictures where the job asks for them now and has the memory to draw them.
+report::Options find_report_options(const Options& attempt) {
+  report::Options wanted;
+  wanted.draw_limit_s = kMaxDrawSeconds;
+  const bool has_room = attempt.memory_gb <= 0.0 || attempt.memory_gb >= kDrawGb;
+  if (!attempt.has_pictures || !has_room) wanted.drawn_modes = 0;
+  if (attempt.has_pictures && !has_room)
+    wanted.undrawn_reason =
+        fmt::format("drawing takes about {:g} GB, and the job had {:g}; carillon report JOB draws them", kDrawGb, attempt.memory_gb);
+  return wanted;
+}
+
+/// Others look at the lock for a moment now and then.
+std::optional<process::Lock> take_lock(const store::OpenFolder& work) {
+  try {
+    // A link or a folder of this name is no lock of anybody's.
+    if (const auto found = work.look_at("lock"); found && !S_ISREG(found->st_mode)) work.remove("lock");
+    for (int round = 0; round < 20; ++round) {
+      if (std::optional<process::Lock> lock = process::Lock::take(work.path() / "lock")) return lock;
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+    return std::nullopt;
+  } catch (const SystemError& error) {
+    store::throw_with_names(work, error);
+  }
+}
+
+class Attempt {
+ public:
+  Attempt(const Options& options, const store::Store& store, const store::Id& id, const store::OpenFolder& folder)
+      : options_(options), folder_(folder), work_(folder.shared_path()), store_(store), id_(id) {
+    outcome_.token = options.token.empty() ? store::make_random_name() : options.token;
+    outcome_.ranks = options.ranks;
+    outcome_.host = process::find_host();
+    outcome_.started = outcome::find_utc();
+    options_.work = work_;
+    options_.root = store.root();
+    options_.id = id.text();
+    // For what this process itself starts (the pictures of the report); its own entry in /proc stays as it is.
+    ::setenv("CARILLON_ATTEMPT", outcome_.token.c_str(), 1);
+  }
+
+  int run() {
+    take_signals();
+    const double start_s = base::get_steady_s();
+    const std::optional<outcome::Outcome> before = outcome::read_outcome(work_);
+    try {
+      clean();
+      solve(before ? before->percent : 0.0);
+    } catch (const SystemError& error) {
+      set(store::is_disk_full(work_, error) ? Cause::disk_full : Cause::system, error.what());
+    } catch (const InputError& error) {
+      set(Cause::bad_input, error.what());
+    } catch (const std::bad_alloc&) {
+      set(Cause::memory, "out of memory while the bank was verified");
+    } catch (const std::exception& error) {
+      set(store::is_disk_full(work_, error) ? Cause::disk_full : Cause::system, error.what());
+    }
+    outcome_.seconds = base::get_steady_s() - start_s;
+    outcome_.percent = std::max(outcome_.percent, before ? before->percent : 0.0);
+    return finish();
+  }
+
+ private:
+  void set(Cause cause, const std::string& reason, double need_gb = 0.0) {
+    outcome_.cause = cause;
+    outcome_.reason = store::show_names(folder_, reason);
+    outcome_.memory_need_gb = need_gb;
+  }
+
+  /// What an attempt before this one left behind, processes and files; then it is we who work here.
+  void clean() {
+    const std::optional<outcome::Attempt> before = outcome::read_attempt(work_);
+    if (before) ranks_before_ = before->ranks;
+    if (before && before->token != outcome_.token) {
+      if (before->process.host == outcome_.host) process::end_with_environment("CARILLON_ATTEMPT=" + before->token);
+      Scratch::remove_left(before->token);
+    }
+    remove_temporary_files();
+    for (const char* name : {store::kLogFile, store::kProgressFile, store::kCheckpointFile, "prediction.new", store::kResultFile})
+      clear_way(work_, name);
+    outcome::write_attempt(work_, {outcome_.token, process::find_self(), options_.ranks, options_.memory_gb, outcome_.started});
+    make_reserve(work_);
+  }
+
+  /// Files that were being written when their writer was killed.
+  void remove_temporary_files() const {
+    std::error_code error;
+    for (fs::directory_iterator it(work_, error), end; !error && it != end; it.increment(error)) {
+      const std::string name = it->path().filename().string();
+      if (name.starts_with(".") && name.find(".tmp.") != std::string::npos) fs::remove(it->path(), error);
+    }
+  }
+
+  /// What is solved is what the id says: the job and every byte of its input.
+  store::Request check_inputs() {
+    if (const auto fault = store::find_job_fault(store_, id_, work_))
+      throw InputError(*fault + "; submit the job again, or carillon verify --repair makes its folder again");
+    const store::Request request = *store::read_request(work_);
+    if (const auto fault = store::find_input_fault(store_, request))
+      throw InputError(fmt::format("{}; submit the job again, which copies its {} again", *fault,
+                                   request.inputs.empty() ? to_text(request.input_kind) : "meshes"));
+    return request;
+  }
+
+  /// A checkpoint of a simulation belongs to a number of ranks.
+  void drop_other_ranks() {
+    std::error_code error;
+    if (ranks_before_ == 0 || ranks_before_ == options_.ranks || !fs::exists(work_ / store::kCheckpointFile, error)) return;
+    fs::remove(work_ / store::kCheckpointFile, error);
+    store::append_text(work_ / store::kLogFile,
+                       fmt::format("carillon attempt: the checkpoint is of {} ranks and these are {}; it starts from the beginning\n",
+                                   ranks_before_, options_.ranks));
+  }
+
+  void solve(double percent_before) {
+    const store::Request request = check_inputs();
+    options_.is_simulation = request.input_kind == store::InputKind::simulation;
+    if (options_.is_simulation) drop_other_ranks();
+    bool has_bank = false;
+    if (!find_bank_fault(work_, request, has_bank)) {
+      // What that attempt printed may be lost with it; a job that is done has a log, under Slurm too, where this error stream is not it.
+      store::append_text(work_ / store::kLogFile,
+                         fmt::format("carillon attempt: the {} was solved by an attempt that ended before it was published\n",
+                                     options_.is_simulation ? "simulation" : "bank"));
+      return set(Cause::done, "");
+    }
+    if (has_bank) store::OpenFolder::open(work_).remove(options_.is_simulation ? store::kRecordFile : store::kBankFile);
+    const fs::path log = work_ / store::kLogFile, checkpoint = work_ / store::kCheckpointFile;
+    std::optional<Scratch> scratch;
+    if (!is_under_slurm()) scratch.emplace(outcome_.token);
+    std::optional<Launch> launch;
+    try {
+      launch = make_launch(options_, outcome_.token, scratch ? &*scratch : nullptr);
+    } catch (const SystemError& error) {
+      return set(Cause::no_program, error.what());
+    }
+    std::error_code error;
+    const std::uintmax_t log_start = fs::file_size(log, error);
+    const auto mark = find_mark(checkpoint);
+    const std::uint64_t kills = find_memory_kills();
+    const fs::path printed = options_.is_prediction ? work_ / "prediction.new" : fs::path();
+    ::unlink((work_ / store::kResultFile).c_str());  // of an earlier attempt
+    const Watched watched = watch(start(*launch, work_, log, printed), options_, outcome_.token);
+    if (const std::optional<store::Progress> progress = store::read_progress(work_)) outcome_.percent = progress->percent;
+    outcome_.exit_code = watched.exit_code;
+    outcome_.peak_memory_gb = watched.peak_memory_gb;
+    outcome::Ending ending{
+        watched.exit_code, watched.was_asked_to_stop,   watched.was_out_of_time,    watched.was_hung,
+        watched.still_s,   find_memory_kills() > kills, store::is_disk_full(work_), base::read_result(work_ / store::kResultFile)};
+    ending.memory_limit_gb = options_.memory_limit_gb;
+    if (watched.was_over_memory) ending.held_gb = watched.peak_memory_gb;
+    ending.has_saved = find_mark(checkpoint) != mark && find_mark(checkpoint).first != 0;
+    outcome_.is_further = outcome_.percent > percent_before && ending.has_saved;
+    if (ending.exit_code != 0 && !ending.result) ending.dead_rank = find_dead_rank(read_end(log, error ? 0 : log_start));
+    const outcome::FailureCause found = outcome::classify(ending);
+    set(found.cause, found.reason, found.memory_need_gb);
+    if (found.cause != Cause::done) return;
+    if (options_.is_prediction) {
+      fs::rename(printed, work_ / kPredictionFile);
+      return set(Cause::predicted, "what it needs is predicted; waits for room");
+    }
+    if (const std::optional<std::string> fault = find_bank_fault(work_, request, has_bank))
+      return set(Cause::bad_bank, "the solver exited with 0, but its result cannot be used: " + *fault);
+    if (const auto fault = store::find_input_fault(store_, request))
+      set(Cause::bad_input, fmt::format("while it was solved {}; submit the job again", *fault));
+  }
+
+  /// Publishes or says why not; returns the exit code.
+  int finish() {
+    remove_reserve(work_);
+    outcome_.ended = outcome::find_utc();
+    if (outcome_.cause == Cause::done) {
+      outcome_.percent = 100.0;
+      try {
+        publish(store_, id_, work_, outcome_, find_report_options(options_));
+        process::end_with_environment("CARILLON_ATTEMPT=" + outcome_.token);
+        store_.remove_work(id_);
+        return 0;
+      } catch (const std::exception& error) {
+        if (store_.has_bank(id_)) return 0;  // only the work could not be removed
+        set(store::is_disk_full(work_, error) ? Cause::disk_full : Cause::system, error.what());
+      }
+    }
+    fmt::print(stderr, "carillon attempt: {}: {}\n", outcome::to_text(outcome_.cause), outcome_.reason);
+    outcome::write_outcome(work_, outcome_);
+    switch (outcome_.cause) {
+      case Cause::bad_input:
+        return kExitInput;
+      case Cause::no_solution:
+        return kExitSolve;
+      case Cause::no_program:
+        return kExitSystem;
+      default:
+        return kExitCheckpointed;
+    }
+  }
+
+  Options options_;
+  const store::OpenFolder& folder_;
+  const fs::path work_;  // that folder, whatever its name leads to
+  const store::Store& store_;
+  const store::Id id_;
+  int ranks_before_ = 0;  // of the attempt before
+  outcome::Outcome outcome_;
+};
+
+}  // namespace
+
+int run_attempt(const Options& options) {
+  fs::path work = fs::absolute(options.work).lexically_normal();
+  if (!work.has_filename()) work = work.parent_path();
+  const store::Store store = store::Store::open(find_root(work));
+  const store::Id id = store::require_id(work.filename().string(), work.string());
+  if (work != store.work_folder(id)) throw InputError(fmt::format("{}: no folder of work; name work/ab/ID of a store", work.string()));
+  // Published and cleared away meanwhile by another attempt: nothing is left to do.
+  if (!store.has_work(id)) throw InputError(fmt::format("{}: there is no such folder of work", work.string()));
+  const store::OpenFolder folder = store.open_work(id);
+  const std::optional<process::Lock> lock = take_lock(folder);
+  if (!lock) {
+    fmt::print(stderr, "{}: another attempt works here; nothing was done\n", work.string());
+    return kExitBusy;
+  }
+  return Attempt(options, store, id, folder).run();
+}
+
+std::vector<std::string> make_arguments(const fs::path& program, const Options& options) {
+  std::vector<std::string> arguments{program, "attempt", options.work, "--ranks", std::to_string(options.ranks)};
+  const auto add = [&](const char* name, const std::string& value) { arguments.insert(arguments.end(), {name, value}); };
+  if (options.memory_gb > 0.0) add("--memory-gb", fmt::format("{}", options.memory_gb));
+  if (options.memory_limit_gb > 0.0) add("--memory-limit-gb", fmt::format("{}", options.memory_limit_gb));
+  if (options.time_limit_s > 0.0) add("--time-limit-s", fmt::format("{}", options.time_limit_s));
+  if (options.is_prediction) arguments.emplace_back("--predict");
+  for (const std::string& word : options.mpirun_options) arguments.push_back("--mpirun-option=" + word);
+  if (options.has_pictures) arguments.emplace_back("--pictures");
+  if (!options.token.empty()) add("--token", options.token);
+  if (options.launcher == Launcher::alone) add("--launcher", "alone");
+  if (options.launcher == Launcher::mpirun) add("--launcher", "mpirun");
+  if (options.launcher == Launcher::srun) add("--launcher", "srun");
+  return arguments;
+}
+
+}  // namespace carillon::attempt

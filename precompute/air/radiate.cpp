@@ -1,0 +1,317 @@
+// Method:     power by the multipoles, which is exact where the surface's p v* cancels to nothing; added mass by the mean of p v over the
+//             surface. A plane that reflects: the body and its mirror image, which move alike.
+// Source:     docs/equations.md E10.
+// Deviations: none.
+#include "precompute/air/radiate.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "precompute/air/answers_file.hpp"
+#include "precompute/air/expansion.hpp"
+#include "precompute/air/transfer.hpp"
+#include "runtime/bank/mixing.hpp"
+#include "runtime/bank/surface.hpp"
+#include "runtime/base/error.hpp"
+
+namespace carillon::air {
+namespace {
+
+using Double = std::complex<double>;
+
+constexpr double kNearTop = 0.7;  // of the highest frequency: modes that lie as near to others beyond the band
+
+/// Behind the plane, as far as it is before it.
+Vec3 mirror(const Plane& plane, const Vec3& place) { return place - (2.0 * dot(place - plane.point_m, plane.normal)) * plane.normal; }
+
+/// The mirror image next to the body: a closed surface again, that moves alike.
+void add_mirror_image(const Plane& plane, Radiator& radiator) {
+  const std::size_t nodes = radiator.nodes_m.size(), facets = radiator.triangles.size(), row = radiator.count_motions();
+  for (std::size_t i = 0; i < nodes; ++i) {
+    if (!(dot(radiator.nodes_m[i] - plane.point_m, plane.normal) > 0.0))
+      throw InputError("\"half_space\": the body is not wholly on the side of the plane that its normal shows to; move the plane");
+    radiator.nodes_m.push_back(mirror(plane, radiator.nodes_m[i]));
+  }
+  const auto shift = static_cast<std::int32_t>(nodes);
+  for (std::size_t t = 0; t < facets; ++t) {
+    const auto [a, b, c] = radiator.triangles[t];
+    radiator.triangles.push_back({a + shift, c + shift, b + shift});
+    for (const std::size_t corner : {0U, 2U, 1U})
+      for (std::size_t m = 0; m < row; ++m) radiator.velocity.push_back(radiator.velocity[(t * 3 + corner) * row + m]);
+  }
+  radiator.sphere = find_enclosing_sphere(radiator.nodes_m);
+}
+
+/// Facets are as long as the edge of an even triangle of their mean area.
+void check_facets(const Radiator& radiator, const AirOptions& options) {
+  double area = 0.0;
+  for (const auto& [a, b, c] : radiator.triangles)
+    area += 0.5 * norm(cross(radiator.nodes_m[b] - radiator.nodes_m[a], radiator.nodes_m[c] - radiator.nodes_m[a]));
+  const double edge = std::sqrt(area / static_cast<double>(radiator.triangles.size()) * 4.0 / std::sqrt(3.0));
+  const double k =
+      radiator.wave_number_1_m.empty() ? 0.0 : *std::max_element(radiator.wave_number_1_m.begin(), radiator.wave_number_1_m.end());
+  const double facets = 2.0 * std::numbers::pi / (k * edge);
+  if (!(facets < kFewFacets)) return;
+  const auto wanted = std::ceil(static_cast<double>(radiator.nodes_m.size()) * kFewFacets * kFewFacets / (facets * facets));
+  const std::string text = fmt::format(
+      "the surface of {} nodes is too coarse for the air at {:.0f} Hz: {:.1f} facets per wavelength; give "
+      "\"radiation\" a \"skin_nodes\" of {:.0f} or more, and the body a mesh as fine, or end the band lower",
+      radiator.nodes_m.size(), k * options.sound_speed_ms / (2.0 * std::numbers::pi), facets, wanted);
+  if (facets < kFewestFacets) throw InputError(text);
+  if (options.warn) options.warn(text);
+}
+
+/// [l]: what the orders above l make of the whole, squared; the larger of far away and at the nearest distance.
+std::vector<double> calc_tail(const Sounding& mode, const Spread& spread) {
+  std::vector<double> tail(spread.far.size());
+  for (const std::vector<double>* counts : {&spread.far, &spread.near}) {
+    std::vector<double> above(tail.size());
+    double sum = 0.0;
+    for (std::size_t l = tail.size(); l-- > 0;) {
+      above[l] = sum;
+      for (std::size_t i = l * l; i < (l + 1) * (l + 1); ++i) sum += (*counts)[l] * std::norm(mode.coefficient[i]);
+    }
+    for (std::size_t l = 0; l < tail.size(); ++l) tail[l] = std::max(tail[l], sum > 0.0 ? above[l] / sum : 0.0);
+  }
+  return tail;
+}
+
+/// Added mass over minus a reaction. A half space is solved with the mirror image, which takes as much.
+double find_density(const AirOptions& options) { return (options.half_space ? 0.5 : 1.0) * options.air_density_kg_m3; }
+
+/// The added mass of a mode over its modal mass.
+double calc_added_mass(const Sounding& mode, const AirOptions& options) {
+  return mode.mixture.is_empty() ? -find_density(options) * mode.reaction.real() : mode.mixture.added_mass;
+}
+
+void add_mixture(const Sounding& mode, bank::Mixing& mixing) {
+  if (mode.mixture.is_empty()) return;
+  mixing.count.push_back(static_cast<std::int32_t>(mode.mixture.motions.size()));
+  mixing.motion.insert(mixing.motion.end(), mode.mixture.motions.begin(), mode.mixture.motions.end());
+  mixing.part.insert(mixing.part.end(), mode.mixture.parts.begin(), mode.mixture.parts.end());
+}
+
+/// Rigid motions with which modes may be coupled: those of one free body.
+std::size_t count_rigid(const bank::Bank& bank) {
+  return bank.counts.components == 1 && bank.counts.rigid_modes == static_cast<std::int64_t>(bank::kRigidMotions) ? bank::kRigidMotions : 0;
+}
+
+/// Refuses what moves with the air rather than in it.
+void check_mass(std::size_t mode, double freq_hz, double mass) {
+  if (mass > kMostMass)
+    throw InputError(
+        fmt::format("mode {} at {:.1f} Hz: the air adds {:.2f} of its own mass: a membrane or a sheet this light moves with "
+                    "the air, which this method cannot do; leave the air out with \"radiation\": \"none\"",
+                    mode + 1, freq_hz, mass));
+}
+
+/// Warns of modes with much air near the end of the band: those beyond it, which the bank has not, would mix in.
+void warn_of_band(const bank::Multipoles& multipoles, std::span<const double> freq_hz, const AirOptions& options) {
+  const double top = *std::max_element(freq_hz.begin(), freq_hz.end());
+  double most = 0.0, lowest = top;
+  for (std::size_t m = 0; m < freq_hz.size(); ++m) {
+    if (freq_hz[m] < kNearTop * top || multipoles.added_mass[m] < kCoupleMass) continue;
+    most = std::max(most, multipoles.added_mass[m]);
+    lowest = std::min(lowest, freq_hz[m]);
+  }
+  if (options.warn && most > 0.0)
+    options.warn(fmt::format(
+        "modes from {:.4g} Hz on, near the end of the band, have an added mass of up to {:.2f}: modes beyond the band, which the "
+        "bank has not, would mix with them in air; end the band an octave above what you need",
+        lowest, most));
+}
+
+/// Appends a mode that was solved at k to a residual. Its error is still a ratio of powers, without rounding, and its decay not yet there.
+void add_mode(const Sounding& mode, double k, double residual, const AirOptions& options, bank::Multipoles& multipoles) {
+  const double radius = multipoles.radius_m, target = std::pow(10.0, options.order_db / 10.0);
+  const std::vector<double> tail = calc_tail(mode, calc_spread(k, radius, multipoles.nearest_m, mode.order));
+  std::size_t order = 0;
+  while (order + 1 < tail.size() && tail[order] > target) ++order;
+  const std::vector<Double> phase = calc_hankel_phase(k * radius, static_cast<int>(order));
+  const Double by_velocity(0.0, k * options.sound_speed_ms * options.air_density_kg_m3);
+  std::vector<Double> pressure;
+  for (std::size_t l = 0; l <= order; ++l)
+    for (std::size_t i = l * l; i < (l + 1) * (l + 1); ++i) pressure.push_back(by_velocity * phase[l] * mode.coefficient[i]);
+  bank::add_coefficients(multipoles, static_cast<std::int32_t>(order), pressure);
+  multipoles.freq_hz.push_back(k * options.sound_speed_ms / (2.0 * std::numbers::pi));
+  multipoles.added_mass.push_back(calc_added_mass(mode, options));
+  add_mixture(mode, multipoles.mixing);
+  multipoles.error_db.push_back(std::pow(10.0, mode.interpolation_db / 10.0) + tail[order] + residual * residual);
+}
+
+/// Decays by the coefficients as they are kept, and errors in decibels, with what rounding adds to them far away.
+void add_decays(const AirOptions& options, bank::Multipoles& multipoles) {
+  const double half = options.half_space ? 0.5 : 1.0;  // the image sends out as much, into the other side
+  const std::vector<bank::CoefficientDecay> decays = bank::calc_coefficient_decays(multipoles);
+  for (std::size_t m = 0; m < decays.size(); ++m) {
+    const double root = decays[m].root_rounding, decay = decays[m].decay_per_s;
+    const double rounding = decay > 0.0 ? root * root / (3.0 * decay) : 0.0;
+    multipoles.error_db[m] = std::min(0.0, 10.0 * std::log10(multipoles.error_db[m] + rounding));
+    multipoles.decay_per_s.push_back(half * decay);
+  }
+}
+
+}  // namespace
+
+std::vector<double> find_played_freq_hz(const bank::Bank& bank) {
+  if (!bank.corrected.is_empty()) return bank.corrected.freq_hz;
+  std::vector<double> freq_hz;
+  for (std::size_t m = 0; m < bank.mode_count(); ++m) freq_hz.push_back(bank.freq_hz(m));
+  return freq_hz;
+}
+
+double calc_mass_bound(const Radiator& radiator, const AirOptions& options) {
+  std::vector<double> squares(radiator.count_motions());  // integrals over the surface, of linear functions
+  for (std::size_t t = 0; t < radiator.triangles.size(); ++t) {
+    const auto& [a, b, c] = radiator.triangles[t];
+    const double area = 0.5 * norm(cross(radiator.nodes_m[b] - radiator.nodes_m[a], radiator.nodes_m[c] - radiator.nodes_m[a]));
+    const float* v = &radiator.velocity[t * 3 * squares.size()];
+    for (std::size_t m = 0; m < squares.size(); ++m) {
+      const double x = v[m], y = v[squares.size() + m], z = v[2 * squares.size() + m];
+      squares[m] += area / 6.0 * (x * x + y * y + z * z + x * y + y * z + z * x);
+    }
+  }
+  squares.resize(radiator.count_modes());
+  const double most = squares.empty() ? 0.0 : *std::max_element(squares.begin(), squares.end());
+  return find_density(options) * radiator.sphere.radius_m * most;
+}
+
+Radiator make_radiator(const bank::Bank& bank, std::span<const double> freq_hz, const AirOptions& options) {
+  Radiator radiator;
+  const std::vector<Triangle> outer = bank::find_outer_triangles(bank.vertices_m, bank.triangles);
+  if (outer.empty()) throw InputError("the surface of the body has no outside: no closed shell of it encloses a volume");
+  std::vector<std::int32_t> number(bank.vertex_count(), -1);
+  const std::size_t modes = bank.mode_count();
+  radiator.rigid = count_rigid(bank);
+  const bank::RigidMotions rigid(bank.rigid);
+  for (const Triangle& triangle : outer) {
+    Triangle made{};
+    for (std::size_t c = 0; c < 3; ++c) {
+      std::int32_t& known = number[triangle[c]];
+      if (known < 0) {
+        known = static_cast<std::int32_t>(radiator.nodes_m.size());
+        radiator.nodes_m.push_back(bank.vertices_m[triangle[c]]);
+      }
+      made[c] = known;
+    }
+    radiator.triangles.push_back(made);
+    const Vec3 twice = bank::calc_normal(bank.vertices_m, triangle);
+    const double size = norm(twice);
+    const Vec3 normal = size > 0.0 ? (1.0 / size) * twice : Vec3{};
+    for (std::size_t c = 0; c < 3; ++c) {
+      const std::int16_t* step = &bank.shape[static_cast<std::size_t>(triangle[c]) * modes * 3];
+      for (std::size_t m = 0; m < modes; ++m, step += 3)
+        radiator.velocity.push_back(
+            static_cast<float>(bank.shape_scale[m] * (step[0] * normal[0] + step[1] * normal[1] + step[2] * normal[2])));
+      for (std::size_t r = 0; r < radiator.rigid; ++r)
+        radiator.velocity.push_back(static_cast<float>(dot(rigid.find(r, bank.vertices_m[triangle[c]]), normal)));
+    }
+  }
+  radiator.sphere = find_enclosing_sphere(radiator.nodes_m);
+  for (const double f : freq_hz) radiator.wave_number_1_m.push_back(2.0 * std::numbers::pi * f / options.sound_speed_ms);
+  if (options.coarsen && radiator.nodes_m.size() > options.most_nodes) {
+    auto [nodes, triangles] = options.coarsen(radiator.nodes_m, radiator.triangles, options.most_nodes);
+    radiator = transfer(radiator, std::move(nodes), std::move(triangles));
+  }
+  check_facets(radiator, options);
+  if (options.half_space) add_mirror_image(*options.half_space, radiator);
+  return radiator;
+}
+
+Radiator leave_out_rigid(const Radiator& radiator) {
+  Radiator made = radiator;
+  made.rigid = 0;
+  made.velocity.clear();
+  const std::size_t motions = radiator.count_motions(), modes = radiator.count_modes();
+  for (std::size_t row = 0; row < 3 * radiator.triangles.size(); ++row) {
+    const auto begin = radiator.velocity.begin() + static_cast<std::ptrdiff_t>(row * motions);
+    made.velocity.insert(made.velocity.end(), begin, begin + static_cast<std::ptrdiff_t>(modes));
+  }
+  return made;
+}
+
+double calc_roundness(const bank::Bank& bank) {
+  const std::vector<Triangle> outer = bank::find_outer_triangles(bank.vertices_m, bank.triangles);
+  if (outer.empty()) return 0.0;
+  const RadiatingSurface surface(bank.vertices_m, outer);
+  const double volume = surface.calc_volume_m3(), area = surface.calc_area_m2();
+  return 36.0 * std::numbers::pi * volume * volume / (area * area * area);
+}
+
+bank::Multipoles calc_multipoles(const comm::Communicator& comm, const bank::Bank& bank, const AirOptions& options, Keeper keeper,
+                                 const std::filesystem::path& answers) {
+  const std::vector<double> played = find_played_freq_hz(bank);
+  bool may_couple = false;  // on rank 0 first
+  const Radiator whole = comm.agree([&] { return comm.is_root() ? make_radiator(bank, played, options) : Radiator{}; });
+  const Radiator modes_alone = comm.agree([&] {
+    if (comm.is_root()) may_couple = calc_mass_bound(whole, options) >= kCoupleMass;
+    return may_couple ? Radiator{} : leave_out_rigid(whole);
+  });
+  may_couple = comm.broadcast(static_cast<std::int32_t>(may_couple)) != 0;
+  AirSolveOptions solve = options.solve;
+  solve.shift = [&](double k, const Sounding& mode) {
+    const double mass = calc_added_mass(mode, options);
+    return mass >= kShiftMass ? k / std::sqrt(1.0 + mass) : k;
+  };
+  solve.coupling = CouplingOptions{.density_kg_m3 = find_density(options)};
+  solve.coupling->is_called_for = [&](const std::vector<Sounding>& modes) {
+    double most = 0.0;
+    for (std::size_t m = 0; m < modes.size(); ++m) {
+      const double mass = calc_added_mass(modes[m], options);
+      check_mass(m, played[m], mass);
+      most = std::max(most, mass);
+    }
+    return most >= kCoupleMass;
+  };
+  solve.coupling->has_rows = may_couple;
+  std::optional<AnswersFile> file, coupled_file;
+  const auto keep_in = [&](std::optional<AnswersFile>& kept, const std::filesystem::path& name, const Radiator& radiator) {
+    if (!comm.is_root() || answers.empty()) return;
+    kept.emplace(name, calc_fingerprint(radiator, solve));
+    keeper.read = [&kept] { return kept->read(); };
+    keeper.save = [&kept](const WaveAnswer& answer) { kept->save(answer); };
+  };
+  const Radiator& first = may_couple ? whole : modes_alone;
+  comm.agree([&] { keep_in(file, answers, first); });
+  AirSolution solution = solve_air(comm, first, solve, keeper);
+  if (comm.broadcast(static_cast<std::int32_t>(solution.lacks_rows)) != 0) {  // a resonance of the air: once more, with all that it takes
+    solve.coupling->has_rows = true;
+    // A file of its own: a run that resumes comes past the first solve again.
+    comm.agree([&] { keep_in(coupled_file, std::filesystem::path(answers) += ".coupled", whole); });
+    solution = solve_air(comm, whole, solve, keeper);
+  }
+  return comm.agree([&] {
+    bank::Multipoles multipoles;
+    if (!comm.is_root() || solution.modes.empty()) return multipoles;
+    multipoles.centre_m = solution.sphere.centre_m;
+    multipoles.radius_m = solution.sphere.radius_m;
+    multipoles.nearest_m = options.solve.nearest_over_radius * solution.sphere.radius_m;
+    multipoles.air_density_kg_m3 = options.air_density_kg_m3;
+    multipoles.sound_speed_ms = options.sound_speed_ms;
+    const double residual = std::max(solve.tolerance, solution.residual);
+    for (std::size_t m = 0; m < played.size(); ++m) {
+      add_mode(solution.modes[m], solution.wave_number_1_m[m], residual, options, multipoles);
+      check_mass(m, played[m], multipoles.added_mass.back());
+    }
+    const bool is_coupled = !multipoles.mixing.is_empty();
+    if (is_coupled) warn_of_band(multipoles, played, options);
+    if (solution.unsettled > solve.coupling->settled && options.warn)
+      options.warn(
+          fmt::format("modes that the air couples were still moving by {:.1e} of their frequency when they were solved for the last "
+                      "time; their frequencies in air are right to that",
+                      solution.unsettled));
+    add_decays(options, multipoles);
+    for (auto* kept : {&file, &coupled_file})
+      if (*kept) (*kept)->remove();
+    multipoles.method = fmt::format("boundary elements (Burton-Miller, Galerkin), {} unknowns, {} wave numbers{}{}", solution.unknowns,
+                                    solution.wave_numbers, options.half_space ? ", half space" : "",
+                                    is_coupled ? fmt::format(", modes coupled (reciprocal to {:.1e})", solution.reciprocity) : "");
+    return multipoles;
+  });
+}
+
+}  // namespace carillon::air

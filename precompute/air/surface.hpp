@@ -1,0 +1,70 @@
+// The surface that radiates, as boundary elements see it: flat facets with the midpoints of their edges.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "runtime/base/triangle.hpp"
+#include "runtime/base/vector.hpp"
+
+namespace carillon::air {
+
+/// A triangle of the surface. The curl of the hat function of corner c on it is the constant curl[c] [1/m].
+struct Facet {
+  Triangle corners{};                    // nodes
+  std::array<std::int32_t, 3> points{};  // midpoint of the edge opposite each corner
+  Vec3 normal{};                         // unit, into the air
+  double area_m2 = 0.0;
+  double size_m = 0.0;  // longest edge
+  std::array<Vec3, 3> curl{};
+};
+
+/// Midpoint of an edge. Products of two hat functions are integrated exactly by the midpoints of a facet, each with a third of its area.
+struct EdgePoint {
+  Vec3 place_m{};
+  std::array<std::int32_t, 2> nodes{};
+  double size_m = 0.0;  // the smallest of the facets there
+};
+
+/// Closed, oriented surfaces with N nodes, T facets and E = 3 T / 2 edges. Invariant: facets that are near in the list are near in
+/// space; nodes and edges are numbered in the order in which the facets meet them; there is no facet without an area.
+class RadiatingSurface {
+ public:
+  /// Gives nodes and facets other numbers. Throws InputError when a number is not finite, and when no facet has an area.
+  RadiatingSurface(std::span<const Vec3> nodes_m, std::span<const Triangle> triangles);
+
+  const std::vector<Vec3>& get_nodes() const { return nodes_m_; }
+  const std::vector<Facet>& get_facets() const { return facets_; }
+  const std::vector<EdgePoint>& get_points() const { return points_; }
+  /// (N), (T) numbers in what the constructor was given.
+  const std::vector<std::int32_t>& get_node_sources() const { return node_source_; }
+  const std::vector<std::int32_t>& get_facet_sources() const { return facet_source_; }
+  std::size_t count_nodes() const { return nodes_m_.size(); }
+  std::size_t count_facets() const { return facets_.size(); }
+  std::size_t count_points() const { return points_.size(); }
+  double calc_area_m2() const;
+  double calc_volume_m3() const;
+  double calc_longest_edge_m() const;
+
+ private:
+  std::vector<Vec3> nodes_m_;
+  std::vector<Facet> facets_;
+  std::vector<EdgePoint> points_;
+  std::vector<std::int32_t> node_source_, facet_source_;
+};
+
+/// A sphere around points.
+struct Sphere {
+  Vec3 centre_m{};
+  double radius_m = 0.0;
+};
+
+/// The smallest sphere around the points, to 1e-9 of its radius; a point at least.
+Sphere find_enclosing_sphere(std::span<const Vec3> points_m);
+
+/// Orders items so that each run of `run` of them, counted from the first, is compact: recursive halving along the longest side.
+std::vector<std::int32_t> order_by_place(std::span<const Vec3> places_m, std::size_t run);
+
+}  // namespace carillon::air

@@ -1,0 +1,82 @@
+// Strains of the elements, scaled so that the product of two is an energy.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "precompute/mesh/distributed/distributed_mesh.hpp"
+#include "precompute/coupling/pairs.hpp"
+#include "precompute/fem/materials.hpp"
+#include "precompute/la/lapack.hpp"
+
+namespace carillon::coupling {
+
+using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+
+/// Components of a symmetric tensor, in this order: xx, yy, zz, yz, xz, xy.
+inline constexpr std::array<std::array<int, 2>, 6> kComponents{{{0, 0}, {1, 1}, {2, 2}, {1, 2}, {0, 2}, {0, 1}}};
+
+/// One element at its points of integration, which are those that make its stiffness exact: one of a T4, four of a straight T10, fourteen
+/// of a curved one.
+struct ElementPoints {
+  int nodes = 0;                              // 4 or 10
+  std::vector<double> volume_m3;              // (points) weights
+  std::vector<std::array<double, 30>> slope;  // (points) d N_i / d x_k at 3 i + k
+  std::vector<std::array<double, 4>> at;      // (points) barycentric coordinates
+  int point_count() const { return static_cast<int>(volume_m3.size()); }
+};
+
+/// What the strains of this rank's elements are, in rows. A point has six rows, sqrt(w) U E with E in Mandel's form and U^T U = C; an
+/// element whose solid resists a mean dilatation (fem::Solid) has one more, sqrt(kappa / V) times its integral. The product of two such
+/// columns, summed over all elements, is <E_a, C E_b>, and B^T B is the stiffness matrix of the element as fem has it.
+/// Borrows the mesh, which must outlive it. Not collective.
+class Strains {
+ public:
+  /// Pre: the Jacobians of all elements are positive (fem::assemble() has checked that).
+  Strains(const mesh::LocalMesh& local, const fem::Materials& materials);
+
+  std::int32_t element_count() const { return static_cast<std::int32_t>(first_row_.size()) - 1; }
+  /// Rows of the elements before e; of all of this rank at element_count().
+  std::int64_t first_row(std::int32_t e) const { return first_row_[e]; }
+  int row_count(std::int32_t e) const { return static_cast<int>(first_row(e + 1) - first_row(e)); }
+  std::span<const std::int32_t> nodes(std::int32_t e) const;
+
+  void calc_points(std::int32_t e, ElementPoints& out) const;
+
+  /// b: (rows, 3 nodes): the linear strain of the displacements of the nodes.
+  void calc_linear(std::int32_t e, const ElementPoints& points, RowMatrix& b) const;
+  /// Values at the nodes of the element, (3 nodes, width), of an array (local nodes, 3, width).
+  void gather(std::int32_t e, const double* nodal, std::ptrdiff_t width, RowMatrix& values) const;
+  /// Gradients d u_a / d x_k at row 9 point + 3 a + k, (9 points, columns).
+  static void calc_gradients(const ElementPoints& points, const RowMatrix& values, RowMatrix& gradients);
+  /// z: (rows, count): Green's quadratic strain of the pairs first ... first + count - 1 of the columns of `gradients`:
+  /// E = 1/2 (H_i^T H_j + H_j^T H_i) for i < j, 1/2 H_i^T H_i for i = j, so that E2(q) = sum over the pairs of q_i q_j E.
+  void calc_pair_strains(std::int32_t e, const ElementPoints& points, const RowMatrix& gradients, const Pairs& pairs, std::ptrdiff_t first,
+                         std::ptrdiff_t count, RowMatrix& z) const;
+  /// z: (rows, columns): 1/2 H^T H of every column.
+  void calc_square_strains(std::int32_t e, const ElementPoints& points, const RowMatrix& gradients, RowMatrix& z) const;
+  /// The stress of scaled rows at a point, times its volume: the product with engineering strains (kComponents) is what the point adds to
+  /// that of the rows. values: (rows, columns) of the element; returns (6, columns).
+  la::Matrix calc_stress(std::int32_t e, const ElementPoints& points, int point, const Eigen::Ref<const la::Matrix>& values) const;
+
+ private:
+  struct ScaledSolid {
+    Matrix6 root = Matrix6::Zero();
+    double mean_dilatation_modulus_pa = 0;
+  };
+  std::size_t material(std::int32_t e) const { return materials_->find(e); }
+  /// Scales rows of Mandel's strains in place and adds the row of the mean.
+  void scale(std::int32_t e, const ElementPoints& points, RowMatrix& strains) const;
+
+  const mesh::LocalMesh* local_;
+  const fem::Materials* materials_;
+  std::vector<ScaledSolid> solids_;
+  std::vector<std::int64_t> first_row_;  // (elements + 1)
+  std::vector<char> is_curved_;
+};
+
+}  // namespace carillon::coupling

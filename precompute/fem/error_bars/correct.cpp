@@ -1,0 +1,228 @@
+// Method: lambda_h - lambda is the energy of the error, for a consistent mass and to first order, and the recovered strains give that
+//   energy: a share I of lambda_h. T10: lambda = lambda_h (1 + G) / (1 + I), without a constant that was fitted; G is Hadamard's shift to
+//   the smooth surface. T4 recover less, and less on coarser meshes: two polynomials in I and the share L that a lumped mass takes, of
+//   first order 1 - I + L but for the constant of I, fitted to the bodies of docs/error-bars.md. Modes that are one eigenvalue to rounding
+//   have shapes that are any basis of a space: they get the mean of their parts, which does not depend on the basis. Bars: half of the
+//   mesh's bar around the corrected value, 0.4 of it for T4. Where the estimate is a large share of lambda the mesh's interval itself is
+//   kept, which lies below the mesh's frequency but for what lumping and geometry leave open (of T4 what of it is within 0.45 of the bar).
+//   Two meshes agree where |lambda' - lambda'_coarser| is less than half of what their corrections differ by. For the part that recovery
+//   cannot detect in curved elements that are wide compared with their wall, see parts.hpp, calc_excess().
+// Source: Naga, Zhang and Zhou 2006, SIAM J. Sci. Comput. 28, 1289 (eigenvalues less the energy of the recovered error); Zienkiewicz and
+//   Zhu 1992.
+// Deviations: strains are recovered (error_bars.cpp), not displacements; the rational form instead of the difference keeps lambda > 0.
+#include "precompute/fem/error_bars/correct.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "runtime/base/sort_order.hpp"
+
+namespace carillon::error_bars {
+namespace {
+
+using bank::Correction;
+
+// Shares of lambda. Above the first the estimate is rough, above the second it is unreliable.
+constexpr double kRoughT4 = 0.5, kStiffT4 = 1.0, kRoughT10 = 0.3, kStiffT10 = 0.6;
+constexpr double kRoughWidthT4 = 0.45, kRoughWidthLumped = 0.5;                  // of the mesh's bar
+constexpr double kSingularShare = 0.25;                                          // of the estimate's energy
+constexpr double kHalf = 0.5, kHalfT4 = 0.4, kQuarter = 0.25, kThird = 1.0 / 3;  // of the mesh's bar
+constexpr double kSameEigenvalue = 1e-6;                                         // of lambda
+
+double to_cents(double share) { return 600 * std::log2(share); }
+
+Correction find_correction(const ErrorParts& parts, Kind kind, bool is_lumped) {
+  if (is_lumped && kind != Kind::kT4) return Correction::kLumped;
+  const bool is_t4 = kind == Kind::kT4;
+  const double excess = calc_excess(parts, kind);
+  if (excess > (is_t4 ? kStiffT4 : kStiffT10)) return Correction::kStiff;
+  if (excess > (is_t4 ? kRoughT4 : kRoughT10) || parts.singular > kSingularShare * parts.interpolation) return Correction::kRough;
+  return Correction::kOneMesh;
+}
+
+/// Modes of one eigenvalue get the mean of their parts.
+std::vector<ErrorParts> share_parts(const Level& level) {
+  std::vector<ErrorParts> shared = level.parts;
+  for (std::size_t first = 0, end = 0; first < shared.size(); first = end) {
+    for (end = first + 1; end < shared.size() && level.lambda[end] <= level.lambda[end - 1] * (1 + kSameEigenvalue);) ++end;
+    for (double ErrorParts::*part : {&ErrorParts::interpolation, &ErrorParts::singular, &ErrorParts::bent, &ErrorParts::lumping,
+                                     &ErrorParts::geometry, &ErrorParts::geometry_noise, &ErrorParts::doubt, &ErrorParts::doubt_noise}) {
+      double sum = 0.0;
+      for (std::size_t m = first; m < end; ++m) sum += level.parts[m].*part;
+      for (std::size_t m = first; m < end; ++m) shared[m].*part = sum / static_cast<double>(end - first);
+    }
+  }
+  return shared;
+}
+
+/// The verdict on each mode, and the least length of its bar.
+struct Verdict {
+  std::vector<Correction> correction;  // (m)
+  std::vector<double> least_cents;     // (m) by which a coarser mesh contradicts, of disputed modes; else 0
+};
+
+/// Where each mode can be by itself around what is stated.
+OwnIntervals find_intervals(const Level& level, const std::vector<ErrorParts>& parts, const Corrections& corrections,
+                            const std::vector<double>& least_cents) {
+  OwnIntervals own;
+  for (std::size_t m = 0; m < parts.size(); ++m) {
+    ErrorParts one_sided = parts[m];
+    one_sided.interpolation = one_sided.singular = one_sided.bent = 0.0;
+    const double all = calc_cents(parts[m], level.kind), above = calc_cents(one_sided, level.kind);
+    const double stated = to_cents(corrections.lambda[m] / level.lambda[m]);
+    double low = -std::max(all, least_cents[m]), high = -low;
+    if (corrections.correction[m] == Correction::kRough) {
+      const double part = level.is_lumped ? kRoughWidthLumped : kRoughWidthT4;
+      const double width = level.kind == Kind::kT4 ? std::max(part * all, above) : HUGE_VAL;
+      high = std::min(std::max(above, stated), stated + width);
+      low = std::max(std::min(-all, stated), stated - width);
+    } else if (bank::is_corrected(corrections.correction[m])) {
+      const double alone = level.kind == Kind::kT4 && !level.is_lumped ? kHalfT4 : kHalf,
+                   both = level.kind == Kind::kT10Curved ? kThird : kQuarter;
+      const double factor = corrections.correction[m] == Correction::kOneMesh ? alone : both;
+      low = stated - factor * all;
+      high = stated + factor * all;
+    }
+    own.stated.push_back(stated);
+    own.low.push_back(low);
+    own.high.push_back(high);
+    own.above.push_back(above);
+  }
+  return own;
+}
+
+}  // namespace
+
+double calc_share_left(const ErrorParts& parts, Kind kind, bool is_lumped) {
+  const double i = calc_excess(parts, kind), l = parts.lumping;
+  double left = 1.0;
+  if (kind != Kind::kT4)
+    left = 1 / (1 + i);
+  else if (is_lumped)
+    left = 1 - 0.93 * i + 0.19 * i * i + l + 0.11 * i * l + 0.35 * l * l;
+  else
+    left = 1 - i * (0.94 - i * (0.62 - 0.5 * i));
+  return std::max(left * (1 + parts.geometry), 1e-3);
+}
+
+namespace {
+
+/// The corrections that follow from the verdicts.
+Corrections correct(const Level& level, const std::vector<ErrorParts>& parts, const Verdict& verdict) {
+  Corrections corrections;
+  corrections.correction = verdict.correction;
+  for (std::size_t m = 0; m < parts.size(); ++m) {
+    const double left = bank::is_corrected(verdict.correction[m]) ? calc_share_left(parts[m], level.kind, level.is_lumped) : 1.0;
+    corrections.lambda.push_back(left * level.lambda[m]);
+  }
+  const OwnIntervals own = find_intervals(level, parts, corrections, verdict.least_cents);
+  corrections.cents = widen_for_order(level.lambda, own, level.unlisted);
+  corrections.facet_cents = find_facet_cents(level, own, corrections.cents);
+  if (is_too_short(level)) std::fill(corrections.cents.begin(), corrections.cents.end(), std::numeric_limits<double>::infinity());
+  return corrections;
+}
+
+/// The verdict on the modes of a mesh after a look at a coarser one, k-th against k-th. Where they contradict each other the estimate is
+/// wrong, and so is the bar that follows from it: the finer mesh is then nearer to the truth than to the coarser mesh.
+Verdict compare(const Level& level, const Corrections& corrections, const Level& coarser) {
+  const Corrections other = calc_corrections(coarser);
+  const std::vector<std::size_t> order = base::find_sort_order(corrections.lambda), before = base::find_sort_order(other.lambda);
+  Verdict verdict{corrections.correction, std::vector<double>(corrections.correction.size(), 0.0)};
+  for (std::size_t k = 0; k < std::min(order.size(), before.size()); ++k) {
+    const std::size_t m = order[k], n = before[k];
+    if (corrections.correction[m] != Correction::kOneMesh || other.correction[n] != Correction::kOneMesh) continue;
+    const double fine = corrections.lambda[m], coarse = other.lambda[n];
+    const double by = std::abs((coarser.lambda[n] - coarse) - (level.lambda[m] - fine));
+    if (std::abs(coarse - fine) <= 0.5 * by) verdict.correction[m] = Correction::kTwoMeshes;
+    if (std::abs(to_cents(coarse / fine)) > corrections.cents[m] + other.cents[n]) {
+      verdict.correction[m] = Correction::kDisputed;
+      verdict.least_cents[m] = std::abs(to_cents(coarser.lambda[n] / level.lambda[m]));
+    }
+  }
+  return verdict;
+}
+
+}  // namespace
+
+Corrections calc_corrections(const Level& level, const Level* coarser) {
+  const std::vector<ErrorParts> parts = share_parts(level);
+  Verdict verdict{{}, std::vector<double>(parts.size(), 0.0)};
+  for (const ErrorParts& mode : parts) verdict.correction.push_back(find_correction(mode, level.kind, level.is_lumped));
+  const Corrections alone = correct(level, parts, verdict);
+  return coarser == nullptr ? alone : correct(level, parts, compare(level, alone, *coarser));
+}
+
+std::vector<double> find_facet_cents(const Level& level, const OwnIntervals& own, const std::vector<double>& cents) {
+  if (std::all_of(level.parts.begin(), level.parts.end(), [](const ErrorParts& parts) { return calc_facet_cents(parts) == 0.0; }))
+    return {};
+  const std::vector<ErrorParts> parts = share_parts(level);
+  OwnIntervals either = own;
+  for (std::size_t m = 0; m < parts.size(); ++m) {
+    const double facets = calc_facet_cents(parts[m]);
+    either.low[m] -= facets;
+    either.high[m] += facets;
+    either.above[m] += facets;
+  }
+  std::vector<double> beyond = widen_for_order(level.lambda, either, level.unlisted);
+  for (std::size_t m = 0; m < beyond.size(); ++m) beyond[m] = std::max(beyond[m] - cents[m], 0.0);
+  return beyond;
+}
+
+double find_order(const Level& level, const Level* coarser, double edge_ratio) {
+  constexpr double kThin = 0.5, kMinRatio = 1.2, kMin = 1.5;
+  const double known = find_order(level.kind);
+  if (coarser != nullptr && edge_ratio > kMinRatio) {
+    std::vector<double> orders;
+    for (std::size_t m = 0; m < std::min(level.parts.size(), coarser->parts.size()); ++m) {
+      const double fine = level.parts[m].interpolation, coarse = coarser->parts[m].interpolation;
+      if (fine > 0 && coarse > 0) orders.push_back(std::log(coarse / fine) / std::log(edge_ratio));
+    }
+    if (!orders.empty()) {
+      const auto middle = orders.begin() + static_cast<std::ptrdiff_t>(orders.size() / 2);
+      std::nth_element(orders.begin(), middle, orders.end());
+      return std::clamp(*middle, std::min(kMin, known), known);
+    }
+  }
+  return level.kind != Kind::kT4 && level.one_layer > kThin ? 2.0 : known;
+}
+
+Level predict_level(const Level& level, double power, bool keeps_geometry, double edge_ratio) {
+  Level then = level;
+  for (std::size_t m = 0; m < then.parts.size(); ++m) {
+    then.parts[m] = predict_parts(level.parts[m], level.kind, power, edge_ratio);
+    if (keeps_geometry) {
+      then.parts[m].geometry = level.parts[m].geometry;
+      then.parts[m].geometry_noise = level.parts[m].geometry_noise;
+    }
+  }
+  for (std::size_t m = 0; m < then.parts.size(); ++m)
+    then.lambda[m] *=
+        calc_share_left(level.parts[m], level.kind, level.is_lumped) / calc_share_left(then.parts[m], level.kind, level.is_lumped);
+  const std::vector<std::size_t> order = base::find_sort_order(then.lambda);
+  const Level moved = then;
+  for (std::size_t m = 0; m < order.size(); ++m) {
+    then.lambda[m] = moved.lambda[order[m]];
+    then.parts[m] = moved.parts[order[m]];
+  }
+  return then;
+}
+
+bool is_too_short(const Level& level) {
+  constexpr std::size_t kFew = 4;
+  return level.is_lumped && level.kind == Kind::kT4 && level.lambda.size() < kFew;
+}
+
+std::size_t find_computed_count(std::size_t wanted) {
+  constexpr std::size_t kLeast = 12, kMost = 20;  // modes in a short list; more than wanted
+  return std::max(wanted + std::min((wanted + 4) / 5, kMost), kLeast);
+}
+
+std::vector<std::size_t> find_lowest(const Corrections& corrections, std::size_t wanted) {
+  std::vector<std::size_t> lowest = base::find_sort_order(corrections.lambda);
+  lowest.resize(std::min(lowest.size(), wanted));
+  std::sort(lowest.begin(), lowest.end());
+  return lowest;
+}
+
+}  // namespace carillon::error_bars

@@ -1,0 +1,72 @@
+// Method:     the k-th lowest of numbers that lie in intervals lies between the k-th lowest of all lower and of all
+//             upper ends. Modes that are not in the list take part: one above it, computed at F or higher, is really at F 2^(-b/1200) or
+//             higher, b being the bar of a mode there; one below it, at F or lower, really at F 2^(b/1200) or lower.
+// Source:     -
+// Deviations: b is an estimate. Modes of different kinds (bending, stretching) differ in their bars a hundredfold and lie far apart, so b
+//             is the widest bar of a whole octave next to the end, and where bars grow from octave to octave it grows on. F is where such
+//             a mode comes down furthest as long as b < 1731 cents times the power by which it grows; wider bars are off the scale anyhow.
+#include "precompute/fem/error_bars/order.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "runtime/base/sort_order.hpp"
+
+namespace carillon::error_bars {
+namespace {
+
+constexpr double kOctave = 1200.0;  // cents
+
+/// The bar that a mode at `top` can have, which is not below the last. at: places of the modes [cents], ascending.
+double predict(std::span<const double> at, std::span<const double> cents, double top) {
+  const std::size_t count = at.size();
+  const std::size_t octave = std::upper_bound(at.begin(), at.end(), top - kOctave) - at.begin();
+  const std::size_t first = std::min(octave, count - (count + 3) / 4);  // at least a quarter of the list
+  const auto begin = cents.begin();
+  const auto near = std::max_element(begin + static_cast<std::ptrdiff_t>(first), cents.end());
+  // Bars grow at most with the frequency, as those of bending do. Of a list within one octave nothing is known but that.
+  double power = 1.0;
+  if (octave > 0) {
+    const auto far = std::max_element(begin, begin + static_cast<std::ptrdiff_t>(octave));
+    const double apart = (at[near - begin] - at[far - begin]) / kOctave;
+    power = *near > *far && apart > 0 ? std::min(1.0, std::log2(*near / *far) / apart) : 0.0;
+  }
+  double widest = 0.0;
+  for (std::size_t m = first; m < count; ++m)
+    widest = std::max(widest, cents[m] * std::exp2(power * std::min(1.0, (top - at[m]) / kOctave)));
+  return widest;
+}
+
+}  // namespace
+
+std::vector<double> widen_for_order(std::span<const double> lambda, const OwnIntervals& own, const Unlisted& unlisted) {
+  const std::size_t count = lambda.size();
+  const auto place = [&](double l) { return 600 * std::log2(l / lambda[0]); };
+  const auto place_hz = [&](double hz) { return place(4 * std::numbers::pi * std::numbers::pi * hz * hz); };
+  std::vector<double> at(count), stated(count), low(count), high(count), reach(count), result(count);
+  for (std::size_t m = 0; m < count; ++m) {
+    at[m] = place(lambda[m]);
+    stated[m] = at[m] + own.stated[m];
+    low[m] = at[m] + own.low[m];
+    high[m] = at[m] + own.high[m];
+    reach[m] = std::max(-own.low[m], 0.0);
+  }
+  const std::vector<std::size_t> order = base::find_sort_order(stated);
+  std::sort(low.begin(), low.end());
+  std::sort(high.begin(), high.end());
+  const double top = unlisted.high_hz > 0 ? std::max(at[count - 1], place_hz(unlisted.high_hz)) : at[count - 1];
+  const double min = top - predict(at, reach, top);  // of all above
+  double max = at[0] - 1e9;                          // of all below
+  if (unlisted.below > 0 && unlisted.low_hz > 0) {
+    const double bottom = std::min(at[0], place_hz(unlisted.low_hz));
+    const auto octave = std::upper_bound(at.begin(), at.end(), bottom + kOctave) - at.begin();
+    const auto last = std::max(octave, static_cast<std::ptrdiff_t>((count + 3) / 4));
+    max = bottom + *std::max_element(own.above.begin(), own.above.begin() + last);
+  }
+  for (std::size_t k = 0; k < count; ++k)
+    result[order[k]] = std::max(stated[order[k]] - std::min(low[k], min), std::max(high[k], max) - stated[order[k]]);
+  return result;
+}
+
+}  // namespace carillon::error_bars

@@ -1,0 +1,50 @@
+// The triangles of the surfaces that sound: those of this rank, and their places among those of all ranks. Internal to carillon::emission.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "precompute/comm/communicator.hpp"
+#include "precompute/simulation/emission/emission.hpp"
+#include "precompute/simulation/emission/rows.hpp"
+#include "precompute/simulation/emission/surface_file.hpp"
+
+namespace carillon::emission {
+
+/// Vertices are the nodes of the triangles. A place or velocity of a vertex is three rows; a triangle has a slot.
+struct Surfaces {
+  /// Slots of one body, from a multiple of kLane to a multiple of kLane.
+  struct Run {
+    std::size_t begin, middle, end;  // from the middle on twins
+    std::int32_t body;
+  };
+
+  /// Throws InputError on all ranks. Collective.
+  Surfaces(const comm::Communicator& communicator, const SurfacePart& part);
+
+  std::size_t get_rows() const { return (node.size() + kVertices - 1) / kVertices * kLane; }
+  std::size_t get_slots() const { return place.size(); }
+  /// Places of the vertices of all ranks [m], from rows. Collective.
+  std::vector<Vec3> gather_vertices(const double* x) const;
+
+  comm::Communicator comm;
+  std::vector<std::int32_t> node;   // (V) of the caller
+  std::vector<std::int32_t> row;    // (V)
+  Rows rest;                        // m
+  std::vector<Triangle> corners;    // (slots): rows of the vertices; 0 in padding
+  std::vector<std::int64_t> place;  // (slots) among the triangles of all ranks by their numbers; -1: padding
+  std::vector<double> area;         // (slots) at rest, m2
+  std::vector<std::int32_t> twin;   // (slots) the same triangle from its other side, which is no twin; -1: none
+  std::vector<bool> has_twin;       // (slots)
+  std::vector<Run> runs;
+  std::vector<std::int64_t> gathered_places;    // of the triangles that ranks send, in the order of the ranks
+  std::vector<std::int64_t> gathered_vertices;  // of the vertices
+  std::size_t vertex_total = 0, triangle_total = 0;
+  SurfaceTables tables;  // of all ranks
+};
+
+inline Vec3 get_vertex(const double* rows, std::int32_t row) { return {rows[row], rows[row + 1], rows[row + 2]}; }
+
+}  // namespace carillon::emission

@@ -1,0 +1,136 @@
+#include "precompute/simulation/outputs.hpp"
+
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "precompute/simulation/emission_input.hpp"
+#include "precompute/simulation/sound_file.hpp"
+#include "runtime/base/file.hpp"
+#include "runtime/base/json.hpp"
+#include "runtime/base/printable.hpp"
+#include "runtime/base/version.hpp"
+
+namespace carillon::simulation {
+namespace {
+
+namespace fs = std::filesystem;
+using transient::EnergyBook;
+
+constexpr double kFullScalePa = 1.0;  // of a WAV file; louder sounds are scaled to a peak of 1
+constexpr double kBookGoal = 1e-6;    // error of an energy book over the largest energy
+constexpr double kBookScatter = 3.0;  // off the square law by 2.7 at most: 11 scenes with errors above the goal, steps down to a sixth
+
+base::Json describe(const EnergyBook& book) {
+  base::Json json = base::Json::object();
+  json.set("time_s", base::significant(book.time_s, 9));
+  for (const auto& [name, value] : {std::pair{"kinetic_j", book.kinetic_j},
+                                    {"elastic_j", book.elastic_j},
+                                    {"dissipated_j", book.dissipated_j},
+                                    {"work_j", book.work_j},
+                                    {"error_j", book.error_j},
+                                    {"relative_error", book.relative_error}})
+    json.set(name, base::finite_or_null(value, base::significant, 9));
+  return json;
+}
+
+/// Step at which the energy book should close to kBookGoal: its error falls with the square of the step. None: it closes.
+std::optional<double> find_closing_step(double step_s, double book_error) {
+  if (!(book_error > kBookGoal) || !std::isfinite(book_error)) return std::nullopt;
+  return step_s * std::sqrt(kBookGoal / (kBookScatter * book_error));
+}
+
+/// Without names of files: the picture from the store is that of a run by hand.
+std::string make_title(const Simulation& simulation) {
+  std::vector<std::string> names;
+  for (const job::SimulatedBody& body : simulation.spec.bodies) names.push_back(base::printable(body.name));
+  return fmt::format("{}: {} elements", fmt::join(names, ", "), simulation.bodies.assembly->element_count());
+}
+
+}  // namespace
+
+std::string write_outputs(const comm::Communicator& comm, Simulation& simulation, double seconds) {
+  const job::SimulationSpec& spec = simulation.spec;
+  std::string result;
+  double peak = 0;
+  std::vector<std::vector<double>> channels;
+  if (simulation.sound) {
+    simulation.sound->finish();
+    const emission::Options options = make_emission_options(spec, simulation.motion->get_steps_per_sample(), false);
+    for (std::size_t r = 0; r < options.receivers.size(); ++r) channels.push_back(simulation.sound->calc_sound(r));
+    for (const auto& channel : channels)
+      for (const double p : channel) peak = std::max(peak, std::abs(p));
+  }
+  const transient::ExternalForces::Energy touch = simulation.contacts->calc_energy();
+  const double cpu[2] = {comm.sum(simulation.steps_cpu_s), comm.sum(simulation.sound_cpu_s)};
+  if (simulation.film) simulation.film->finish();
+  comm.agree([&] {
+    if (!comm.is_root()) return;
+    const EnergyBook& book = simulation.books.back();
+    const double gain = peak > kFullScalePa ? kFullScalePa / peak : 1.0;
+    std::string picture;  // before anything is written
+    if (!spec.spectrogram.empty())
+      picture = draw_spectrogram(channels, spec.sample_rate_hz, make_title(simulation), base::find_folder(spec.spectrogram));
+    if (!spec.sound.empty()) write_sound(spec.sound, channels, spec.sample_rate_hz, gain);
+    if (!spec.spectrogram.empty()) base::write_file(spec.spectrogram, picture);
+    double worst = 0;
+    for (const EnergyBook& one : simulation.books) worst = std::max(worst, std::abs(one.relative_error));
+    // By CPU time, independent of other load on the machine.
+    const double rate = static_cast<double>(simulation.bodies.assembly->element_count()) *
+                        static_cast<double>(simulation.motion->get_step_count() - simulation.first_step) / std::max(1e-9, cpu[0]);
+    base::Json record = base::Json::object();
+    record.set("version", base::describe("carillon-simulate")).set("job_sha256", simulation.job_sha256);
+    record.set("job", spec.file.filename().string()).set("duration_s", spec.duration_s).set("sample_rate_hz", spec.sample_rate_hz);
+    record.set("step_s", base::significant(simulation.motion->get_step_s(), 9)).set("steps", simulation.motion->get_step_count());
+    record.set("elements", static_cast<std::int64_t>(simulation.bodies.assembly->element_count())).set("ranks", comm.size());
+    record.set("seconds", base::decimals(seconds, 3)).set("cpu_seconds", base::decimals(cpu[0] + cpu[1], 3));
+    record.set("sound_cpu_seconds", base::decimals(cpu[1], 3));
+    record.set("element_steps_per_second", base::significant(rate, 4));
+    record.set("peak_pa", base::finite_or_null(peak, base::significant, 6)).set("gain_per_pa", base::significant(gain, 9));
+    record.set("book_error", base::finite_or_null(worst, base::significant, 3));
+    const std::optional<double> closing_step_s = find_closing_step(simulation.motion->get_step_s(), worst);
+    record.set("closing_step_s", base::finite_or_null(closing_step_s.value_or(NAN), base::significant, 3));
+    record.set("contact_stored_j", base::significant(touch.stored_j, 9))
+        .set("contact_dissipated_j", base::significant(touch.dissipated_j, 9));
+    for (const transient::BallStriker& ball : simulation.contacts->get_strikers()) {
+      base::Json striker = base::Json::object();
+      for (const double x : ball.position_m) striker.member("position_m").add(base::significant(x, 9));
+      for (const double x : ball.velocity_m_s) striker.member("velocity_m_s").add(base::significant(x, 9));
+      for (const double x : ball.spin_rad_s) striker.member("angular_velocity_rad_s").add(base::significant(x, 9));
+      record.member("strikers").add(std::move(striker));
+    }
+    for (const Bent& bent : simulation.bodies.bent) {
+      base::Json one = base::Json::object();
+      one.set("body", spec.bodies[bent.body].name).set("displacement_m", base::significant(bent.displacement_m, 6));
+      one.set("energy_j", base::significant(bent.energy_j, 9)).set("cpu_seconds", base::decimals(bent.cpu_s, 3));
+      if (bent.mode_hz > 0.0) one.set("mode_hz", base::significant(bent.mode_hz, 9));
+      record.member("bent").add(std::move(one));
+    }
+    for (const EnergyBook& one : simulation.books) record.member("books").add(describe(one));
+    for (const std::string& warning : spec.warnings) record.member("warnings").add(warning);
+    if (!spec.record.empty()) base::write_file(spec.record, record.text());
+    result = fmt::format(
+        "{:.6g} s in {} steps of {:.4g} s, {:.3g} element-steps a second of CPU time, sound {:.1f} % of the CPU time\n"
+        "energy: kinetic {:.4g} J, elastic {:.4g} J, dissipated {:.4g} J, put in {:.4g} J; the book closes to {:.1e}",
+        book.time_s, simulation.motion->get_step_count(), simulation.motion->get_step_s(), rate,
+        100.0 * cpu[1] / std::max(1e-9, cpu[0] + cpu[1]), book.kinetic_j, book.elastic_j, book.dissipated_j, book.work_j, worst);
+    if (closing_step_s)
+      result += fmt::format("\nthe book is expected to close to {:g} with \"step_s\": {:.2e} (its error falls with the square of the step)",
+                            kBookGoal, *closing_step_s);
+    if (simulation.sound)
+      result += fmt::format("\npeak {:.4g} Pa{}", peak, gain < 1.0 ? fmt::format(", the file has it as 1 (gain {:.4g})", gain) : "");
+    for (const job::SimulationOutput& output : job::kSimulationOutputs)
+      if (!(spec.*output.file).empty()) {
+        std::error_code error;  // the folder may be gone
+        const fs::path whole = fs::absolute(spec.*output.file, error);
+        result += "\n" + (error ? spec.*output.file : whole).string();
+      }
+  });
+  return result;
+}
+
+}  // namespace carillon::simulation

@@ -1,0 +1,15 @@
+// The files of a simulation: sound, spectrogram, motion and record.
+#pragma once
+
+#include <string>
+
+#include "precompute/comm/communicator.hpp"
+#include "precompute/simulation/simulation.hpp"
+
+namespace carillon::simulation {
+
+/// After the last step; `seconds` of wall time for the record. The summary for the terminal, on rank 0. Collective. Throws SystemError on
+/// every rank when the disk refuses.
+std::string write_outputs(const comm::Communicator& comm, Simulation& simulation, double seconds);
+
+}  // namespace carillon::simulation

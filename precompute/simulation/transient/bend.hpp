@@ -1,0 +1,37 @@
+// Initial shapes of bent bodies: equilibrium under forces, or one mode.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "precompute/simulation/transient/domain.hpp"
+
+namespace carillon::transient {
+
+/// A node with a prescribed displacement, by its number in the assembly.
+struct HeldNode {
+  std::int32_t node = 0;
+  Vec3 displacement_m{};
+};
+/// A node with a force [N] of constant direction.
+struct PulledNode {
+  std::int32_t node = 0;
+  Vec3 force_n{};
+};
+
+/// (nodes) Displacements from rest in equilibrium under `pulled`, with `held` prescribed; for an edge of a sheet the angle, in x. Nodes
+/// clamped in direction must be in `held`. Large displacements, all bodies of `domain`, which has one rank. Throws InputError without an
+/// equilibrium: a body free to fly away, or a force too strong for the mesh. Not collective.
+std::vector<Quad> calc_equilibrium(Domain& domain, const std::vector<HeldNode>& held, const std::vector<PulledNode>& pulled);
+
+struct ElasticMode {
+  double omega_rad_s = 0.0;
+  std::vector<Quad> shape;  // (nodes) largest displacement 1, its largest component positive
+};
+inline constexpr int kMostModes = 20;
+
+/// The elastic mode of this number, 1 to kMostModes, from the lowest, about rest. held: fixed nodes; their displacements are ignored.
+/// Domain of one rank. Throws InputError for a body with fewer modes. Not collective.
+ElasticMode calc_mode(Domain& domain, const std::vector<HeldNode>& held, int number);
+
+}  // namespace carillon::transient

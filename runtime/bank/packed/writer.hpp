@@ -1,0 +1,36 @@
+// Numbers and compressed blocks as bytes.
+#pragma once
+
+#include <concepts>
+#include <cstdint>
+#include <cstring>
+#include <span>
+#include <vector>
+
+namespace carillon::packed {
+
+/// Bytes as Reader takes them; the two change together.
+class Writer {
+ public:
+  template <class T>
+  requires std::integral<T> || std::floating_point<T>
+  void put(T value) {
+    bytes_.resize(bytes_.size() + sizeof value);
+    std::memcpy(bytes_.data() + bytes_.size() - sizeof value, &value, sizeof value);
+  }
+  template <class T>
+  void put_list(std::span<const T> values) {
+    for (const T value : values) put(value);
+  }
+  /// SystemError when there is no memory.
+  void put_block(std::span<const std::uint8_t> block);
+  /// As Reader::get_numbers() reads them.
+  void put_numbers(std::span<const std::uint32_t> values);
+
+  const std::vector<std::uint8_t>& get_bytes() const { return bytes_; }
+
+ private:
+  std::vector<std::uint8_t> bytes_;
+};
+
+}  // namespace carillon::packed

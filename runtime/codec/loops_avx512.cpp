@@ -1,8 +1,0 @@
-#define CARILLON_LANES 16
-#include "runtime/codec/loops.inl"
-
-namespace carillon::codec {
-
-const Loops kLoopsAvx512 = Kernels::kAll;
-
-}  // namespace carillon::codec

@@ -1,0 +1,152 @@
+// What a world must be to be simulated, before anything of it is made. Each fault is one InputError that names the body, joint or cord.
+#include "runtime/physics/check.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "runtime/base/error.hpp"
+#include "runtime/physics/rigid/groups.hpp"
+
+namespace carillon::physics {
+namespace {
+
+constexpr double kWidest = kWidestHingeDeg * std::numbers::pi / 180.0 * (1.0 + 1e-12);  // rad; what was given in degrees is rounded
+
+bool is_finite(const Vec3& x) { return std::isfinite(x[0]) && std::isfinite(x[1]) && std::isfinite(x[2]); }
+
+bool is_zero(const Vec3& x) { return x[0] == 0.0 && x[1] == 0.0 && x[2] == 0.0; }
+
+void check_contact_numbers(const std::string& who, double restitution, double friction, double young, double poisson) {
+  if (!(restitution >= 0.0 && restitution <= 1.0)) throw InputError(fmt::format("{}: restitution {} is not within 0..1", who, restitution));
+  if (!(friction >= 0.0 && std::isfinite(friction)))
+    throw InputError(fmt::format("{}: friction {} must be a finite number, 0 or more", who, friction));
+  if (!(young > 0.0 && std::isfinite(young)))
+    throw InputError(fmt::format("{}: young_modulus_pa {} must be a finite number above 0", who, young));
+  if (!(poisson > -1.0 && poisson <= 0.5)) throw InputError(fmt::format("{}: poisson_ratio {} is not within -1..0.5", who, poisson));
+}
+
+/// Sylvester's criterion, with a tolerance relative to the trace. A NaN fails as well.
+bool is_positive_definite(const std::array<double, 9>& m, double tolerance) {
+  const double trace = m[0] + m[4] + m[8];
+  const double minor2 = m[0] * m[4] - m[1] * m[3];
+  const double minor3 = m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) + m[2] * (m[3] * m[7] - m[4] * m[6]);
+  return std::isfinite(trace) && m[0] > tolerance * trace && minor2 > tolerance * trace * trace &&
+         minor3 > tolerance * trace * trace * trace;
+}
+
+void check_rigid(const std::string& who, const bank::RigidBody& r) {
+  if (!(r.mass_kg > 0.0 && std::isfinite(r.mass_kg)) || !is_finite(r.centre_m)) {
+    throw InputError(fmt::format("{}: mass {} kg or centre in its bank is unusable; make the bank again", who, r.mass_kg));
+  }
+  const auto& i = r.inertia_kg_m2;
+  if (!is_positive_definite(i, 0.0)) throw InputError(who + ": the inertia in its bank is not positive definite; make the bank again");
+  // tr(I)/2 - I is the integral of x x^T over the mass, which no mass distribution makes negative.
+  const double half_trace = 0.5 * (i[0] + i[4] + i[8]);
+  const std::array<double, 9> second{half_trace - i[0], -i[1], -i[2], -i[3], half_trace - i[4], -i[5], -i[6], -i[7], half_trace - i[8]};
+  if (!is_positive_definite(second, -1e-9)) {
+    throw InputError(
+        who + ": no body can have the inertia in its bank (one principal moment exceeds the sum of the others); make the bank again");
+  }
+}
+
+void check_body(const BodySpec& b) {
+  const std::string who = fmt::format("body '{}'", b.name);
+  if (b.bank == nullptr) throw InputError(who + ": has no bank; name the file of its mode bank");
+  check_contact_numbers(who, b.restitution, b.friction, b.bank->material.young_modulus_pa, b.bank->material.poisson_ratio);
+  if (!is_finite(b.initial.position_m) || !is_finite(b.velocity_m_s) || !is_finite(b.angular_velocity_rad_s)) {
+    throw InputError(who + ": position, velocity and angular velocity must be finite numbers");
+  }
+  const auto& q = b.initial.rotation;
+  const double norm = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+  if (!(norm > 1e-12 && std::isfinite(norm))) {
+    throw InputError(who + ": the rotation (quaternion w x y z) is zero or not finite; use 1 0 0 0 for none");
+  }
+  if (!b.fixed) {
+    check_rigid(who, b.bank->rigid);
+  } else if (!is_zero(b.velocity_m_s) || !is_zero(b.angular_velocity_rad_s)) {
+    throw InputError(who + ": is fixed but has a velocity; take one of the two away");
+  }
+}
+
+void check_joints(const WorldSpec& spec) {
+  const int count = static_cast<int>(spec.bodies.size());
+  const auto is_fixed = [&](int body) { return body < 0 || spec.bodies[body].fixed; };
+  const auto check_ends = [&](const std::string& place, const char* what, int body, int to) {
+    if (body < 0 || body >= count || to < -1 || to >= count) throw InputError(fmt::format("{}: a {} names no body", place, what));
+    std::string who = describe(spec, place, what, body, to);
+    if (body == to) throw InputError(who + " ties a body to itself; name another one, or \"world\"");
+    if (is_fixed(body) && is_fixed(to)) throw InputError(who + " has nothing to hold: neither of them moves");
+    return who;
+  };
+  rigid::Groups groups(count + 1);  // the last: all that does not move
+  const auto find = [&](int body) { return is_fixed(body) ? count : body; };
+  for (const JointSpec& joint : spec.joints) {
+    const std::string who = check_ends(joint.place, "joint", joint.body, joint.to);
+    if (!is_finite(joint.at_m)) throw InputError(who + ": its place must be three finite numbers");
+    const auto length = [](const Vec3& v) { return std::hypot(v[0], v[1], v[2]); };
+    const bool has_axis =
+        joint.kind == joints::Kind::kHinge || joint.kind == joints::Kind::kSlider || joint.kind == joints::Kind::kUniversal;
+    if (has_axis && !(std::abs(length(joint.axis) - 1.0) < 1e-6)) throw InputError(who + ": its axis is not of length 1");
+    if (joint.kind == joints::Kind::kUniversal &&
+        !(std::abs(length(joint.second_axis) - 1.0) < 1e-6 && std::abs(dot(joint.axis, joint.second_axis)) < 1e-6))
+      throw InputError(who + ": its second axis is not of length 1 and at right angles to the first");
+    if (!(joint.damping >= 0.0 && std::isfinite(joint.damping)))
+      throw InputError(fmt::format("{}: damping {} must be a finite number, 0 or more", who, joint.damping));
+    if (joint.limits) {
+      const auto [low, high] = *joint.limits;
+      const bool turns = joint.kind == joints::Kind::kHinge;
+      if (!turns && joint.kind != joints::Kind::kSlider) throw InputError(who + ": only hinges and sliders have limits");
+      if (!(low <= 0.0 && high >= 0.0 && high - low > 1e-6 && std::isfinite(high - low)))
+        throw InputError(fmt::format("{}: its limits {:g} and {:g} must be on both sides of the start, which is 0", who, low, high));
+      if (turns && !(low >= -kWidest && high <= kWidest))
+        throw InputError(
+            fmt::format("{}: its limits must be within {:g} rad of the start; leave out what never comes so far", who, kWidest));
+      if (!(joint.stop_restitution >= 0.0 && joint.stop_restitution <= 1.0))
+        throw InputError(fmt::format("{}: the restitution {} of its stops is not within 0..1", who, joint.stop_restitution));
+    }
+    if (joint.kind == joints::Kind::kWeld && (is_fixed(joint.body) || is_fixed(joint.to)))
+      throw InputError(who + " welds a body to what does not move; set \"fixed\" of that body to true instead");
+    if (groups.find(find(joint.body)) == groups.find(find(joint.to)))
+      throw InputError(who + " closes a loop of joints, which is not supported; replace one joint of the loop by a cord, or leave one out");
+    groups.join(find(joint.body), find(joint.to));
+  }
+  for (const CordSpec& cord : spec.cords) {
+    const std::string who = check_ends(cord.place, "cord", cord.body, cord.to);
+    if (!is_finite(cord.from_m) || !is_finite(cord.to_m)) throw InputError(who + ": its ends must be finite numbers");
+    const double distance = std::hypot(cord.from_m[0] - cord.to_m[0], cord.from_m[1] - cord.to_m[1], cord.from_m[2] - cord.to_m[2]);
+    if (!(cord.restitution >= 0.0 && cord.restitution <= 1.0))
+      throw InputError(fmt::format("{}: restitution {} is not within 0..1", who, cord.restitution));
+    if (!(distance > 1e-4)) throw InputError(who + ": its ends are at one place; give a ball joint instead, or ends that are apart");
+    if (cord.length_m && !(*cord.length_m >= distance - 1e-9 && std::isfinite(*cord.length_m)))
+      throw InputError(
+          fmt::format("{}: it is {:.6g} m long, and its ends are {:.6g} m apart at the start; give at least that, or leave its length out",
+                      who, *cord.length_m, distance));
+  }
+}
+
+}  // namespace
+
+std::string describe(const WorldSpec& spec, const std::string& place, const char* what, int body, int to) {
+  const auto name = [&](int b) { return b < 0 ? std::string("the world") : fmt::format("'{}'", spec.bodies[b].name); };
+  return fmt::format("{}{}the {} between {} and {}", place, place.empty() ? "" : ": ", what, name(body), name(to));
+}
+
+void check(const WorldSpec& spec, const WorldOptions& options) {
+  if (!(options.end_s >= 0.0)) throw InputError(fmt::format("the end of the world, {} s, must be a number, 0 or more", options.end_s));
+  if (!(options.contact_step_s >= 2e-6 && options.contact_step_s <= 2e-3))
+    throw InputError(fmt::format("the step of contacts, {} s, must lie within 2e-6 and 0.002 s", options.contact_step_s));
+  if (!is_finite(spec.gravity_m_s2)) throw InputError("gravity must be three finite numbers");
+  if (spec.ground) {
+    const GroundSpec& g = *spec.ground;
+    if (!std::isfinite(g.height_m)) throw InputError("ground: the height must be a finite number");
+    if (!(g.density_kg_m3 > 0.0 && std::isfinite(g.density_kg_m3))) throw InputError("ground: the density must be a finite number above 0");
+    check_contact_numbers("ground", g.restitution, g.friction, g.young_modulus_pa, g.poisson_ratio);
+  }
+  for (const BodySpec& body : spec.bodies) check_body(body);
+  check_joints(spec);
+}
+
+}  // namespace carillon::physics

@@ -1,0 +1,16 @@
+// Checks of a world's description.
+#pragma once
+
+#include <string>
+
+#include "runtime/physics/world.hpp"
+
+namespace carillon::physics {
+
+/// Throws InputError for the first fault: numbers, masses and inertias, joints (loops, axes) and cords (lengths).
+void check(const WorldSpec& spec, const WorldOptions& options);
+
+/// "scene.json:12: the joint between 'a' and 'b'". `what`: "joint" or "cord"; `body` and `to`: -1 is the world.
+std::string describe(const WorldSpec& spec, const std::string& place, const char* what, int body, int to);
+
+}  // namespace carillon::physics

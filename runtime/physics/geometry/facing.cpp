@@ -1,0 +1,47 @@
+#include "runtime/physics/geometry/facing.hpp"
+
+#include "runtime/physics/geometry/search.hpp"
+
+namespace carillon::geometry {
+
+Facing describe(const Mesh& mesh, const Skin& skin, const Nearest& at) {
+  int zeros = 0, zero = 0, whole = 0;
+  for (int k = 0; k < 3; ++k) {
+    if (at.weights[k] <= 0.0) {
+      ++zeros;
+      zero = k;
+    } else {
+      whole = k;
+    }
+  }
+  if (zeros == 2) {
+    const int v = mesh.vertex_of(3 * at.face + whole);
+    if (skin.kind(v) == VertexKind::corner) return {Side::point, {}, v};
+    // Amid an edge: along the sharp edge that leaves it.
+    for (int e = 3 * at.face + whole;;) {
+      if (skin.is_sharp(e)) return {Side::line, normalise(mesh.vertices[mesh.vertex_of(Mesh::next(e))] - mesh.vertices[v]), v};
+      e = Mesh::next(mesh.opposite[e]);
+      if (e == 3 * at.face + whole) break;
+    }
+  }
+  if (zeros == 1) {
+    const int e = 3 * at.face + (zero + 1) % 3;
+    if (skin.is_sharp(e))
+      return {Side::line, normalise(mesh.vertices[mesh.vertex_of(Mesh::next(e))] - mesh.vertices[mesh.vertex_of(e)]), -1};
+  }
+  if (skin.is_flat(at.face)) return {Side::plane, mesh.normals[at.face], -1};
+  return {Side::skin, {}, -1};
+}
+
+Vec3 find_normal(const Shape& shape, int face, const Vec3& x) {
+  return shape.skin().calc_normal(face, shape.mesh().find_nearest_on_face(x, face).weights);
+}
+
+Vec3 find_into(const Shape& shape, const Ridge& ridge, int side, const Vec3& x) {
+  const int face = ridge.faces[side];
+  if (shape.skin().is_flat(face)) return ridge.into[side];
+  const Vec3 n = find_normal(shape, face, x);
+  return normalise(side == 0 ? cross(n, ridge.along) : cross(ridge.along, n));
+}
+
+}  // namespace carillon::geometry

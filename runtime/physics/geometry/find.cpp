@@ -1,0 +1,116 @@
+// Method: convex polyhedra by clipping. Of any other pair a pass in each direction (pass.hpp), then ridges against ridges. Candidates and
+//   near samples are kept with a slack: a distance changes by no more than the movement of the pair.
+#include "runtime/physics/geometry/pass.hpp"
+#include "runtime/physics/geometry/reduce.hpp"
+
+namespace carillon::geometry {
+namespace {
+
+constexpr double kNear = 0.01;  // of the size of the smaller body: movement for which the near samples are kept
+
+/// The same touch seen from the other body.
+void turn_round(Touch& t) {
+  t.normal = -1.0 * t.normal;
+  std::swap(t.station_a, t.station_b);
+  std::swap(t.curvature_a_per_m, t.curvature_b_per_m);
+  std::swap(t.side_a, t.side_b);
+  std::swap(t.axis_a, t.axis_b);
+  std::swap(t.face_a, t.face_b);
+  t.id ^= static_cast<std::uint64_t>(Feature::corner_a) << 56 ^ static_cast<std::uint64_t>(Feature::corner_b) << 56;
+}
+
+/// Renews the near samples if `wanted` and the movement since then exceed their reach. Returns that movement.
+double update_near(const Shape& a, const Frame& fa, const Shape& b, const Frame& fb, double wanted, NearSamples& near) {
+  const Frame relative = calc_relative(fa, fb);
+  if (near.known) {
+    const double way = calc_way(near.pose, relative, a);
+    if (wanted + way <= near.reach_m) return way;
+  }
+  near.known = true;
+  near.pose = relative;
+  near.reach_m = std::max(wanted, near.wanted_m) + kNear * std::min(a.get_size_m(), b.get_size_m());
+  std::vector<Touch> none;
+  Pass(a, fa, b, fb, 0.0, none).list(near.reach_m, near.samples[0]);
+  Pass(b, fb, a, fa, 0.0, none).list(near.reach_m, near.samples[1]);
+  near.last = relative;
+  near.gone_m = 0.0;
+  for (std::size_t k : {0, 1}) {
+    near.least_m[k].clear();
+    for (const auto& [sample, distance] : near.samples[k]) near.least_m[k].push_back(distance - (k == 0 ? b : a).get_sag_m());
+  }
+  return 0.0;
+}
+
+void find_candidates(const Shape& a, const Frame& fa, const Shape& b, const Frame& fb, double reach, NearSamples& near,
+                     std::vector<Touch>& out) {
+  static thread_local Distances distances_a, distances_b;
+  // A body that is curved all over and not much larger than the other finds everything itself: its samples are dense enough.
+  const bool a_alone = a.skin().is_all_curved() && a.get_size_m() < 2.0 * b.get_size_m();
+  const bool b_alone = b.skin().is_all_curved() && b.get_size_m() < 2.0 * a.get_size_m();
+  const bool a_first = a.samples().samples.size() <= b.samples().samples.size();
+  const bool by_a = !b_alone || (a_alone && a_first), by_b = !a_alone || (b_alone && !a_first);
+  Pass pass_a(a, fa, b, fb, reach, out), pass_b(b, fb, a, fa, reach, out);
+  near.wanted_m = std::max(pass_a.find_room(), pass_b.find_room());
+  const double way = update_near(a, fa, b, fb, near.wanted_m, near);
+  if (by_a) pass_a.run(distances_a, near.samples[0], way);
+  if (by_b) {
+    const std::size_t first = out.size();
+    pass_b.run(distances_b, near.samples[1], way);
+    for (std::size_t i = first; i < out.size(); ++i) turn_round(out[i]);
+  }
+  pass_a.run_ridges();
+  const std::size_t first = out.size();
+  pass_b.run_ridges();
+  for (std::size_t i = first; i < out.size(); ++i) turn_round(out[i]);
+  cross_ridges(a, fa, b, fb, reach, out);
+}
+
+}  // namespace
+
+Deepest find_deepest(const Shape& a, const Frame& fa, const Shape& b, const Frame& fb, double gap, PairMemory& memory) {
+  Deepest found{.gap_m = gap};
+  const double far = a.get_radius_m() + b.get_radius_m();
+  if (norm2(to_world(fa, a.get_middle_m()) - to_world(fb, b.get_middle_m())) > far * far || (a.is_polyhedron() && b.is_polyhedron()))
+    return found;
+  std::vector<Touch> none;
+  NearSamples& near = memory.near;
+  update_near(a, fa, b, fb, std::max(a.get_sag_m(), b.get_sag_m()), near);
+  const Frame relative = calc_relative(fa, fb);
+  near.gone_m += calc_way(near.last, relative, a);
+  near.last = relative;
+  found.place = Pass(a, fa, b, fb, 0.0, none).find_deepest(found.gap_m, near.samples[0], near.gone_m, near.least_m[0]);
+  if (const int place = Pass(b, fb, a, fa, 0.0, none).find_deepest(found.gap_m, near.samples[1], near.gone_m, near.least_m[1]); place >= 0)
+    found.place = place, found.is_of_a = false;
+  return found;
+}
+
+Touch make_touch(const Shape& a, const Frame& fa, const Shape& b, const Frame& fb, const Deepest& at) {
+  std::vector<Touch> none;
+  if (at.is_of_a) return Pass(a, fa, b, fb, 0.0, none).make_touch(at.place);
+  Touch t = Pass(b, fb, a, fa, 0.0, none).make_touch(at.place);
+  turn_round(t);
+  return t;
+}
+
+void find_touches(const Shape& a, const Frame& fa, const Shape& b, const Frame& fb, double margin, PairMemory& memory,
+                  std::vector<Touch>& out) {
+  out.clear();
+  const double far = a.get_radius_m() + b.get_radius_m() + margin;
+  if (norm2(to_world(fa, a.get_middle_m()) - to_world(fb, b.get_middle_m())) > far * far) return;
+  if (a.is_polyhedron() && b.is_polyhedron()) {
+    find_polyhedra_touches(a, fa, b, fb, margin, memory, out);
+    return;
+  }
+  const Frame pose = calc_relative(fa, fb);
+  if (recall(memory, pose, a, margin) && answer(a, fa, &b, fb, margin, true, memory, out)) return;
+  const double size = std::min(a.get_size_m(), b.get_size_m());
+  memory.known = true;
+  memory.searched = pose;
+  memory.reach_m = margin + choose_slack(margin, size);
+  memory.candidates.clear();
+  find_candidates(a, fa, b, fb, memory.reach_m, memory.near, memory.candidates);
+  thin(memory.candidates, 0.02 * size, kPatch * size);
+  answer(a, fa, &b, fb, margin, false, memory, out);
+}
+
+}  // namespace carillon::geometry

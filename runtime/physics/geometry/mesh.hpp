@@ -1,0 +1,100 @@
+// A closed fine mesh with its neighbourhoods and a tree of boxes.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "runtime/physics/geometry/vectors.hpp"
+
+namespace carillon::geometry {
+
+/// The place of a mesh nearest to a point.
+struct Nearest {
+  double distance2 = Box::kFar;
+  int face = -1;   // -1: none within reach
+  Vec3 weights{};  // barycentric; exactly 0 at edges and corners
+  Vec3 place{};
+};
+
+/// A closed, oriented triangle mesh: every half-edge has exactly one opposite, every vertex one fan of triangles, and normals point
+/// outwards. Never changes once it is made.
+class Mesh {
+ public:
+  /// Throws InputError when the surface is empty, open, has more than two triangles at an edge, is degenerate or inside out. Vertices in
+  /// which several fans of triangles meet are split.
+  Mesh(std::span<const Vec3> vertices_m, std::span<const std::array<std::int32_t, 3>> triangles);
+
+  int count_faces() const { return static_cast<int>(faces.size()); }
+  int count_vertices() const { return static_cast<int>(vertices.size()); }
+  const Vec3& corner(int face, int k) const { return vertices[faces[face][k]]; }
+  int vertex_of(int half_edge) const { return faces[half_edge / 3][half_edge % 3]; }
+  static int next(int half_edge) { return half_edge % 3 == 2 ? half_edge - 2 : half_edge + 1; }
+  Vec3 place(int face, const Vec3& w) const { return w[0] * corner(face, 0) + w[1] * corner(face, 1) + w[2] * corner(face, 2); }
+
+  Nearest find_nearest_on_face(const Vec3& x, int face) const;
+  /// The nearest place within a squared distance; `hint`: a face that may be near, or -1.
+  /// With a `slack` the one found may be further than the nearest by that much, sooner.
+  Nearest find_nearest(const Vec3& x, double within2, int hint, double slack = 0.0) const;
+  /// The nearest place by way of neighbours from a face on: near enough to begin with, it is the nearest of all.
+  Nearest walk_nearest(const Vec3& x, int face) const;
+  /// Is x inside, seen from its nearest place? Exact at edges and corners as well (pseudo-normals).
+  bool is_inside(const Vec3& x, const Nearest& nearest) const;
+  /// Calls take(face) for the faces whose box is within `reach` of x.
+  template <class Take>
+  void for_ball(const Vec3& x, double reach, Take&& take) const {
+    std::array<int, 64> open{};
+    std::size_t count = 0;
+    open[count++] = 0;
+    while (count > 0) {
+      const Node& node = nodes_[open[--count]];
+      if (node.box.calc_distance2(x) > reach * reach) continue;
+      if (node.child >= 0) {
+        open[count++] = node.child;
+        open[count++] = node.child + 1;
+      } else {
+        for (int i = 0; i < node.count; ++i) take(order_[node.first + i]);
+      }
+    }
+  }
+  /// Calls take(face) for the faces whose box the ray from x along d (both ways with t >= 0) may cross.
+  template <class Take>
+  void for_ray(const Vec3& x, const Vec3& d, double length, Take&& take) const {
+    std::array<int, 64> open{};
+    std::size_t count = 0;
+    open[count++] = 0;
+    while (count > 0) {
+      const Node& node = nodes_[open[--count]];
+      if (!crosses(node.box, x, d, length)) continue;
+      if (node.child >= 0) {
+        open[count++] = node.child;
+        open[count++] = node.child + 1;
+      } else {
+        for (int i = 0; i < node.count; ++i) take(order_[node.first + i]);
+      }
+    }
+  }
+
+  // Read only after the making.
+  std::vector<Vec3> vertices, normals;  // normals: unit, of faces
+  std::vector<std::array<std::int32_t, 3>> faces;
+  std::vector<std::int32_t> opposite;       // half-edge 3 f + k runs from corner k to the next; the one that runs back
+  std::vector<Vec3> vertex_normals;         // weighted by angle; not unit
+  std::vector<std::int32_t> any_half_edge;  // that begins at a vertex
+  Box box;
+  double volume_m3 = 0.0, area_m2 = 0.0;
+
+ private:
+  struct Node {
+    Box box;
+    int first = 0, count = 0;
+    int child = -1;
+  };
+  static bool crosses(const Box& box, const Vec3& x, const Vec3& d, double length);
+  void make_tree();
+  std::vector<Node> nodes_;
+  std::vector<int> order_;
+};
+
+}  // namespace carillon::geometry

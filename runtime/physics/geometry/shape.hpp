@@ -1,0 +1,86 @@
+// The collision geometry of a body, made once for all bodies of a bank.
+//
+// Three kinds of body, chosen by the mesh: convex polyhedra of few facets (exact, whatever the fineness), smooth bodies and all others.
+// What only the last two need (samples, distance grid) is made when it is first asked for.
+// [main-thread]
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "runtime/physics/geometry/vectors.hpp"
+
+namespace carillon::geometry {
+
+struct Nearest;
+class Mesh;
+class Skin;
+struct Polyhedron;
+class Samples;
+class Grid;
+class LowVertices;
+
+/// A place of the mesh that was given: its triangle, where in it, and the mean curvature of the smooth body there (convex positive).
+struct Place {
+  std::int32_t triangle = 0;
+  Vec3 barycentric{};
+  double curvature_per_m = 0.0;
+};
+
+/// The collision geometry of one surface, shared by all bodies that have it. Its answers never change; samples and grid are made when they
+/// are first asked for, which only takes time.
+class Shape {
+ public:
+  /// Throws InputError for what is empty, open, not a manifold, without area or inside out; the message names the place.
+  Shape(std::span<const Vec3> vertices_m, std::span<const std::array<std::int32_t, 3>> triangles);
+  ~Shape();
+  Shape(const Shape&) = delete;
+  Shape& operator=(const Shape&) = delete;
+
+  double get_size_m() const { return size_m_; }            // diagonal of the bounding box
+  double get_thickness_m() const { return thickness_m_; }  // its shortest side
+  const Vec3& get_middle_m() const { return middle_m_; }   // of the bounding box
+  double get_radius_m() const { return radius_m_; }        // of a ball about the middle that holds all
+  /// Largest distance of the curved surface from the mesh.
+  double get_sag_m() const;
+  /// Of a ball about `centre` (mesh frame) that holds all.
+  double calc_radius_m(const Vec3& centre) const;
+  /// Upper bound of the speed of any point by a spin about `centre` (mesh frame).
+  double calc_turning_speed(const Vec3& centre, const Vec3& spin) const;
+  /// Upper bound of |way . (x - centre)| of any point x; mesh frame.
+  double calc_reach_m(const Vec3& centre, const Vec3& way) const;
+  /// Along the world's axes.
+  Box calc_box(const Frame& frame) const;
+  /// The triangle of the fine mesh at a point of the surface whose normal is `outward`; mesh frame. `hint`: a triangle that may be it; -1:
+  /// none.
+  Place find_place(const Vec3& point_m, const Vec3& outward, std::int32_t hint = -1) const;
+  /// Makes now what a search against the ground will need, or against other bodies as well, so that the first one is as quick as the next.
+  void prepare(bool meets_bodies = true) const;
+  bool is_polyhedron() const { return polyhedron_ != nullptr; }
+  /// Curvature that stands for a sharp corner; a ridge has half of it.
+  double get_corner_curvature_per_m() const { return 200.0 / size_m_; }
+
+  // Of use to this folder.
+  const Mesh& mesh() const { return *mesh_; }
+  const Skin& skin() const { return *skin_; }
+  const Polyhedron* polyhedron() const { return polyhedron_.get(); }
+  const Samples& samples() const;
+  const Grid& grid() const;
+  LowVertices& low_vertices() const;
+
+ private:
+  Place choose_face(const Nearest& on, const Vec3& point, const Vec3& outward) const;
+
+  std::unique_ptr<const Mesh> mesh_;
+  std::unique_ptr<const Skin> skin_;
+  std::unique_ptr<const Polyhedron> polyhedron_;
+  mutable std::unique_ptr<const Samples> samples_;
+  mutable std::unique_ptr<const Grid> grid_;
+  mutable std::unique_ptr<LowVertices> low_vertices_;
+  Vec3 middle_m_{};
+  double size_m_ = 0.0, thickness_m_ = 0.0, radius_m_ = 0.0;
+};
+
+}  // namespace carillon::geometry

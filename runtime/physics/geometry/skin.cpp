@@ -1,0 +1,409 @@
+// Method: coplanar faces are joined to regions by a flood from a seed. An edge between regions is sharp above 40 degrees, or above 20 and
+//   three times the mean of the other edges about its two regions. Corners of faces joined over edges that are not sharp share a normal
+//   (weighted by angle) and a curvature tensor (least squares over the edges); a plane facet much larger than its curved neighbours keeps
+//   its own normal. At a tip (a vertex whose faces lean from their mean by as much as a sharp edge's, where no edge is sharp: the point of
+//   a cone) each face keeps its own; the edges there lie in both their faces, so that patches still meet. The lowest place of a quadratic
+//   patch has a closed form; the search walks over edges as long as it gets lower.
+// Source: T. Boubekeur, M. Alexa, "Phong tessellation" (2008); G. Thuermer, C. Wuethrich (1998) for the angle weights.
+// Deviations: alpha 1/2 in place of 3/4, which is exact for circles to second order.
+#include "runtime/physics/geometry/skin.hpp"
+
+#include <map>
+#include <numeric>
+#include <utility>
+
+namespace carillon::geometry {
+namespace {
+
+constexpr double kCoplanar = 2e-4;   // rad
+constexpr double kSharp = 0.698;     // rad, 40 degrees
+constexpr double kBlunt = 0.35;      // rad, 20 degrees: below, an edge among others is never sharp
+constexpr double kSharper = 3.0;     // than the mean about it
+constexpr double kLargePlane = 6.0;  // times the area of its curved neighbours
+constexpr double kLargePlaneOfAll = 0.01;
+constexpr double kAlpha = 0.5;
+constexpr double kSpring = 1e-3, kStays = 0.2;  // curvatures over the size
+
+double calc_angle(const Vec3& a, const Vec3& b) { return std::atan2(norm(cross(a, b)), dot(a, b)); }
+
+}  // namespace
+
+Skin::Skin(const Mesh& mesh) : mesh_(mesh) {
+  size_m_ = norm(mesh.box.high - mesh.box.low);
+  tiny_ = 1e-14 * size_m_;
+  find_regions();
+  find_sharp_edges();
+  make_fans();
+  make_groups();
+  for (int f = 0; f < mesh.count_faces(); ++f) {
+    if (flat_[f] != 0) continue;
+    const Patch patch = make_patch(f);
+    for (int k = 0; k < 3; ++k) sag_m_ = std::max(sag_m_, 2.0 / 3.0 * norm(patch.c[k] - 0.5 * (patch.p[k] + patch.p[(k + 1) % 3])));
+  }
+  all_curved_ = std::find(flat_.begin(), flat_.end(), 1) == flat_.end() &&
+                std::all_of(kinds_.begin(), kinds_.end(), [](VertexKind kind) { return kind == VertexKind::smooth; });
+}
+
+void Skin::find_regions() {
+  region_.assign(mesh_.faces.size(), -1);
+  std::vector<int> open;
+  for (int seed = 0; seed < mesh_.count_faces(); ++seed) {
+    if (region_[seed] >= 0) continue;
+    const int r = regions_++;
+    region_area_.push_back(0.0);
+    region_[seed] = r;
+    open.push_back(seed);
+    while (!open.empty()) {
+      const int f = open.back();
+      open.pop_back();
+      region_area_[r] += 0.5 * norm(cross(mesh_.corner(f, 1) - mesh_.corner(f, 0), mesh_.corner(f, 2) - mesh_.corner(f, 0)));
+      for (int k = 0; k < 3; ++k) {
+        const int g = mesh_.opposite[3 * f + k] / 3;
+        if (region_[g] < 0 && norm2(mesh_.normals[g] - mesh_.normals[seed]) < kCoplanar * kCoplanar) {
+          region_[g] = r;
+          open.push_back(g);
+        }
+      }
+    }
+  }
+}
+
+void Skin::find_sharp_edges() {
+  const int edges = 3 * mesh_.count_faces();
+  sharp_.assign(edges, 0);
+  std::map<std::pair<int, int>, double> angles;  // of region pairs, the largest
+  for (int e = 0; e < edges; ++e) {
+    const int f = e / 3, g = mesh_.opposite[e] / 3;
+    if (region_[f] >= region_[g]) continue;
+    double& angle = angles[{region_[f], region_[g]}];
+    angle = std::max(angle, calc_angle(mesh_.normals[f], mesh_.normals[g]));
+  }
+  std::vector<double> sum(regions_, 0.0), area(regions_, 0.0);
+  std::vector<int> count(regions_, 0);
+  for (const auto& [pair, angle] : angles) {
+    if (angle > kSharp) continue;
+    for (const auto& [r, other] : {pair, std::pair(pair.second, pair.first)}) {
+      sum[r] += angle;
+      ++count[r];
+      area[r] += region_area_[other];
+    }
+  }
+  plane_.assign(regions_, 0);
+  for (int r = 0; r < regions_; ++r)
+    plane_[r] = count[r] > 0 && region_area_[r] > kLargePlane * area[r] / count[r] && region_area_[r] > kLargePlaneOfAll * mesh_.area_m2;
+  for (int e = 0; e < edges; ++e) {
+    int r = region_[e / 3], s = region_[mesh_.opposite[e] / 3];
+    if (r == s) continue;
+    if (r > s) std::swap(r, s);
+    const double angle = angles[{r, s}];
+    const int others = count[r] + count[s] - 2;
+    const bool lonely = others <= 0 || (angle > kBlunt && angle > kSharper * (sum[r] + sum[s] - 2.0 * angle) / others);
+    sharp_[e] = angle > kSharp || lonely || (plane_[r] != 0 && plane_[s] != 0);
+  }
+  // What ends amid a curved part is a dent of the mesh, not a ridge: ridges are closed or end at corners.
+  std::vector<int> meeting(mesh_.vertices.size(), 0), open;
+  for (int e = 0; e < edges; ++e)
+    if (sharp_[e] != 0) ++meeting[mesh_.vertex_of(e)];
+  for (int v = 0; v < mesh_.count_vertices(); ++v)
+    if (meeting[v] == 1) open.push_back(v);
+  while (!open.empty()) {
+    const int v = open.back();
+    open.pop_back();
+    if (meeting[v] != 1) continue;
+    int e = mesh_.any_half_edge[v];
+    while (sharp_[e] == 0) e = Mesh::next(mesh_.opposite[e]);
+    const int back = mesh_.opposite[e], end = mesh_.vertex_of(back);
+    sharp_[e] = sharp_[back] = 0;
+    meeting[v] = 0;
+    if (--meeting[end] == 1) open.push_back(end);
+  }
+  for (int e = 0; e < edges; ++e)
+    if (sharp_[e] == 0 && region_[e / 3] != region_[mesh_.opposite[e] / 3]) ++smooth_edges_;
+}
+
+void Skin::make_fans() {
+  fan_.assign(3 * mesh_.faces.size(), -1);
+  kinds_.assign(mesh_.vertices.size(), VertexKind::none);
+  flat_.assign(mesh_.faces.size(), 1);
+  std::vector<int> around, corners;
+  for (int v = 0; v < mesh_.count_vertices(); ++v) {
+    around.clear();
+    int e = mesh_.any_half_edge[v];
+    int first = 0;  // of the first fan: behind a sharp edge
+    int sharp = 0;
+    bool curved = false, tip = false;
+    std::array<Vec3, 2> ways{};
+    do {
+      around.push_back(e);
+      if (sharp_[e] != 0) {
+        first = static_cast<int>(around.size());
+        if (sharp < 2) ways[sharp] = normalise(mesh_.vertices[mesh_.vertex_of(Mesh::next(e))] - mesh_.vertices[v]);
+        ++sharp;
+      }
+      e = Mesh::next(mesh_.opposite[e]);
+    } while (e != mesh_.any_half_edge[v]);
+    const int count = static_cast<int>(around.size());
+    corners.clear();
+    for (int i = 0; i < count; ++i) {
+      const int corner = around[(first + i) % count];
+      corners.push_back(corner);
+      if (i + 1 < count && sharp_[corner] == 0) continue;
+      const int fan = static_cast<int>(fan_normals_.size());
+      Vec3 sum{}, plane{};
+      int one = region_[corners[0] / 3], planes = 0;
+      bool same = true;
+      for (const int c : corners) {
+        fan_[c] = fan;
+        const int f = c / 3, k = c % 3;
+        same = same && region_[f] == one;
+        const Vec3 p = mesh_.corner(f, (k + 1) % 3) - mesh_.corner(f, k), q = mesh_.corner(f, (k + 2) % 3) - mesh_.corner(f, k);
+        sum = sum + calc_angle(p, q) * mesh_.normals[f];
+        if (plane_[region_[f]] != 0) {
+          plane = plane + mesh_.normals[f];
+          ++planes;
+        }
+      }
+      if (sharp == 0 && is_tip(corners, normalise(sum))) {
+        tip = true;
+        for (const int c : corners) {
+          fan_[c] = static_cast<int>(fan_normals_.size());
+          fan_normals_.push_back(mesh_.normals[c / 3]);
+          fan_tensors_.push_back({});
+          fan_curved_.push_back(0);
+        }
+        break;
+      }
+      fan_normals_.push_back(normalise(planes > 0 ? plane : sum));
+      fan_tensors_.push_back({});
+      fan_curved_.push_back(same ? 0 : 1);
+      if (!same) {
+        curved = true;
+        fit_tensor(v, corners, fan);
+        for (const int c : corners)
+          if (plane_[region_[c / 3]] == 0) flat_[c / 3] = 0;
+      }
+      corners.clear();
+    }
+    if (tip) {
+      kinds_[v] = VertexKind::corner;
+    } else if (sharp == 0) {
+      kinds_[v] = curved ? VertexKind::smooth : VertexKind::none;
+    } else if (sharp == 2) {
+      const double bend = calc_angle(ways[0], -1.0 * ways[1]);
+      kinds_[v] = bend > kSharp ? VertexKind::corner : curved || bend > kCoplanar ? VertexKind::ridge : VertexKind::none;
+    } else {
+      kinds_[v] = VertexKind::corner;
+    }
+  }
+}
+
+bool Skin::is_tip(const std::vector<int>& corners, const Vec3& mean) const {
+  double max = 0.0, edges = 0.0;
+  for (const int c : corners) {
+    max = std::max(max, calc_angle(mesh_.normals[c / 3], mean));
+    edges += calc_angle(mesh_.normals[c / 3], mesh_.normals[mesh_.opposite[c] / 3]);
+  }
+  return max > kSharp || (max > kBlunt && max > kSharper * edges / static_cast<double>(corners.size()));
+}
+
+void Skin::fit_tensor(int v, const std::vector<int>& corners, int fan) {
+  const Vec3& n = fan_normals_[fan];
+  const Vec3 s = find_across(n), t = cross(n, s);
+  double m[3][4] = {};  // normal equations of k11, k12, k22
+  double mean = 0.0;
+  int rows = 0;
+  for (const int c : corners) {
+    for (const int other : {Mesh::next(c), Mesh::next(Mesh::next(c))}) {
+      const Vec3 d = mesh_.vertices[mesh_.vertex_of(other)] - mesh_.vertices[v];
+      const double x = dot(d, s), y = dot(d, t), r2 = x * x + y * y;
+      if (!(r2 > 0.0)) continue;
+      const double k = -2.0 * dot(d, n) / r2;
+      const double row[4] = {x * x / r2, 2.0 * x * y / r2, y * y / r2, k};
+      for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 4; ++j) m[i][j] += row[i] * row[j];
+      mean += k;
+      ++rows;
+    }
+  }
+  if (rows == 0) return;
+  mean /= rows;
+  const double soft = 1e-3 * rows;
+  m[0][0] += soft, m[1][1] += soft, m[2][2] += soft;
+  m[0][3] += soft * mean, m[2][3] += soft * mean;
+  for (int i = 0; i < 3; ++i) {  // positive definite: no pivoting
+    for (int j = i + 1; j < 3; ++j) {
+      const double factor = m[j][i] / m[i][i];
+      for (int k = i; k < 4; ++k) m[j][k] -= factor * m[i][k];
+    }
+  }
+  const double k22 = m[2][3] / m[2][2], k12 = (m[1][3] - m[1][2] * k22) / m[1][1];
+  const double k11 = (m[0][3] - m[0][1] * k12 - m[0][2] * k22) / m[0][0];
+  const auto entry = [&](int i, int j) { return k11 * s[i] * s[j] + k12 * (s[i] * t[j] + t[i] * s[j]) + k22 * t[i] * t[j]; };
+  fan_tensors_[fan] = {entry(0, 0), entry(1, 1), entry(2, 2), entry(0, 1), entry(0, 2), entry(1, 2)};
+}
+
+void Skin::make_groups() {
+  group_.assign(mesh_.faces.size(), -1);
+  std::vector<int> open;
+  int groups = 0;
+  for (int seed = 0; seed < mesh_.count_faces(); ++seed) {
+    if (group_[seed] >= 0) continue;
+    group_[seed] = groups;
+    open.push_back(seed);
+    while (!open.empty()) {
+      const int f = open.back();
+      open.pop_back();
+      for (int k = 0; k < 3; ++k) {
+        const int g = mesh_.opposite[3 * f + k] / 3;
+        if (group_[g] >= 0 || sharp_[3 * f + k] != 0) continue;
+        group_[g] = groups;
+        open.push_back(g);
+      }
+    }
+    ++groups;
+  }
+}
+
+int Skin::find_face(int vertex) const {
+  const int start = mesh_.any_half_edge[vertex];
+  int e = start;
+  do {
+    if (!is_flat(e / 3)) return e / 3;
+    e = Mesh::next(mesh_.opposite[e]);
+  } while (e != start);
+  return start / 3;
+}
+
+Patch Skin::make_patch(int face) const {
+  Patch patch;
+  for (int k = 0; k < 3; ++k) patch.p[k] = mesh_.corner(face, k);
+  for (int k = 0; k < 3; ++k) {
+    const int l = (k + 1) % 3;
+    patch.c[k] = 0.5 * (patch.p[k] + patch.p[l]);
+    if (flat_[face] != 0) continue;
+    const Vec3 d = patch.p[l] - patch.p[k];
+    const Vec3 &nk = fan_normals_[fan_[3 * face + k]], &nl = fan_normals_[fan_[3 * face + l]];
+    patch.c[k] = patch.c[k] - (0.5 * kAlpha * dot(d, nk)) * nk + (0.5 * kAlpha * dot(d, nl)) * nl;
+  }
+  return patch;
+}
+
+Vec3 Skin::calc_point(int face, const Vec3& w) const {
+  if (flat_[face] != 0) return mesh_.place(face, w);
+  const Patch q = make_patch(face);
+  Vec3 x{};
+  for (int k = 0; k < 3; ++k) x = x + (w[k] * w[k]) * q.p[k] + (2.0 * w[k] * w[(k + 1) % 3]) * q.c[k];
+  return x;
+}
+
+Vec3 Skin::calc_normal(int face, const Vec3& w) const {
+  if (flat_[face] != 0) return mesh_.normals[face];
+  const Patch q = make_patch(face);
+  std::array<Vec3, 3> d;  // by each weight
+  for (int k = 0; k < 3; ++k) d[k] = w[k] * q.p[k] + w[(k + 1) % 3] * q.c[k] + w[(k + 2) % 3] * q.c[(k + 2) % 3];
+  return normalise(cross(d[1] - d[0], d[2] - d[0]));
+}
+
+Tensor Skin::calc_tensor(int face, const Vec3& w) const {
+  Tensor sum{};
+  if (flat_[face] != 0) return sum;
+  for (int k = 0; k < 3; ++k)
+    for (int i = 0; i < 6; ++i) sum[i] += w[k] * fan_tensors_[fan_[3 * face + k]][i];
+  return sum;
+}
+
+double Skin::calc_mean_curvature(int face, const Vec3& w) const { return calc_mean(calc_tensor(face, w)); }
+
+Spot Skin::find_lowest(const Vec3& up, int face, const Vec3& centre, double spring) const {
+  const Patch q = make_patch(face);
+  const Vec3 d0 = q.p[0] - centre, d1 = q.p[1] - centre, d2 = q.p[2] - centre;
+  const double a0 = dot(up, q.p[0]) + spring * norm2(d0), a1 = dot(up, q.p[1]) + spring * norm2(d1),
+               a2 = dot(up, q.p[2]) + spring * norm2(d2);
+  const double c01 = dot(up, q.c[0]) + spring * dot(d0, d1), c12 = dot(up, q.c[1]) + spring * dot(d1, d2),
+               c20 = dot(up, q.c[2]) + spring * dot(d2, d0);
+  Spot spot;
+  spot.face = face;
+  spot.height = Box::kFar;
+  const auto take = [&](double w0, double w1, double w2) {
+    const double h = w0 * w0 * a0 + w1 * w1 * a1 + w2 * w2 * a2 + 2.0 * (w0 * w1 * c01 + w1 * w2 * c12 + w2 * w0 * c20);
+    if (h < spot.height) {
+      spot.height = h;
+      spot.weights = {w0, w1, w2};
+    }
+  };
+  take(1, 0, 0);
+  take(0, 1, 0);
+  take(0, 0, 1);
+  {
+    const auto on_edge = [&](double a, double c, double b) {  // (1-s)^2 a + 2 s (1-s) c + s^2 b
+      const double bend = a + b - 2.0 * c;
+      const double s = bend > tiny_ ? (a - c) / bend : -1.0;
+      return s > 0.0 && s < 1.0 ? s : -1.0;
+    };
+    double s = on_edge(a0, c01, a1);
+    if (s > 0.0) take(1.0 - s, s, 0.0);
+    s = on_edge(a1, c12, a2);
+    if (s > 0.0) take(0.0, 1.0 - s, s);
+    s = on_edge(a2, c20, a0);
+    if (s > 0.0) take(s, 0.0, 1.0 - s);
+    const double h11 = a0 + a1 - 2.0 * c01, h22 = a0 + a2 - 2.0 * c20, h12 = a0 + c12 - c01 - c20;
+    const double det = h11 * h22 - h12 * h12;
+    if (h11 > tiny_ && det > tiny_ * h11) {
+      const double g1 = a0 - c01, g2 = a0 - c20;
+      const double u = (g1 * h22 - g2 * h12) / det, v = (g2 * h11 - g1 * h12) / det;
+      if (u > 0.0 && v > 0.0 && u + v < 1.0) take(1.0 - u - v, u, v);
+    }
+  }
+  const Vec3& w = spot.weights;
+  spot.point = Vec3{};
+  for (int k = 0; k < 3; ++k) spot.point = spot.point + (w[k] * w[k]) * q.p[k] + (2.0 * w[k] * w[(k + 1) % 3]) * q.c[k];
+  return spot;
+}
+
+Spot Skin::walk_lowest(const Vec3& up, int face, const Vec3& centre, double reach, bool stays) const {
+  constexpr int kMax = 400;
+  const double spring = 0.5 * (stays ? kStays : kSpring) / size_m_;
+  Spot best = find_lowest(up, face, centre, spring);
+  for (int step = 0; step < kMax; ++step) {
+    if (norm2(best.point - centre) > reach * reach) {
+      best.settled = false;
+      return best;
+    }
+    int zeros = 0, zero = 0, whole = 0;
+    for (int k = 0; k < 3; ++k) {
+      if (best.weights[k] == 0.0) {
+        ++zeros;
+        zero = k;
+      } else {
+        whole = k;
+      }
+    }
+    if (zeros == 0) return best;
+    Spot better = best;
+    const double below = best.height - tiny_;
+    if (zeros == 1) {
+      const Spot beyond = find_lowest(up, mesh_.opposite[3 * best.face + (zero + 1) % 3] / 3, centre, spring);
+      if (beyond.height < below) better = beyond;
+    } else {
+      const int start = 3 * best.face + whole;
+      for (int e = Mesh::next(mesh_.opposite[start]); e != start; e = Mesh::next(mesh_.opposite[e])) {
+        const Spot beyond = find_lowest(up, e / 3, centre, spring);
+        if (beyond.height < below && beyond.height < better.height) better = beyond;
+      }
+    }
+    if (!(better.height < below)) return best;
+    best = better;
+  }
+  return best;
+}
+
+Spot Skin::locate(const Vec3& x, int face) const {
+  const Nearest best = mesh_.walk_nearest(x, face);
+  Spot spot;
+  spot.face = best.face;
+  spot.weights = best.weights;
+  spot.point = calc_point(best.face, best.weights);
+  return spot;
+}
+
+}  // namespace carillon::geometry

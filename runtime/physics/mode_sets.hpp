@@ -1,0 +1,22 @@
+// The modes of banks as impacts take them.
+#pragma once
+
+#include <map>
+#include <memory>
+
+#include "runtime/bank/bank.hpp"
+#include "runtime/physics/impact/modes.hpp"
+
+namespace carillon::physics {
+
+/// Bodies of one bank share their modes. Banks must not move.
+class ModeSets {
+ public:
+  /// Null for a bank without modes.
+  std::shared_ptr<const impact::Modes> find(const bank::Bank& bank);
+
+ private:
+  std::map<const bank::Bank*, std::shared_ptr<const impact::Modes>> sets_;
+};
+
+}  // namespace carillon::physics

@@ -1,0 +1,139 @@
+// Method: states, and frames that follow from them; mean properties of two bodies that touch.
+// Source: K. L. Johnson, "Contact mechanics" (1985), eq. 11.24.
+#include "runtime/physics/rigid/bodies.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "runtime/base/error.hpp"
+#include "runtime/physics/impact/spring.hpp"
+#include "runtime/physics/rigid/limits.hpp"
+
+namespace carillon::rigid {
+namespace {
+
+constexpr double kLongestHertz = 20e-3;  // s
+
+}  // namespace
+
+double calc_hertz_duration(double compliance, double radius, double mass, double speed) {
+  const double duration = 2.87 * std::pow(mass * mass * compliance * compliance / (radius * std::max(speed, 1e-3)), 0.2);
+  return std::clamp(duration, 5e-6, kLongestHertz);
+}
+
+Bodies::Bodies(std::vector<Solid> solids, std::vector<State> states, std::optional<Ground> ground, const Vec3& gravity,
+               const std::vector<joints::Joint>& joints, double joint_tolerance)
+    : solids_(std::move(solids)), states_(std::move(states)), ground_(ground), gravity_(gravity), joint_tolerance_(joint_tolerance) {
+  placed_.resize(solids_.size());
+  asleep_.assign(solids_.size(), 0);
+  in_impact_.assign(solids_.size(), 0);
+  struck_s_.assign(solids_.size(), -1.0);
+  swings_m_.assign(solids_.size(), 0.0);
+  for (int i = 0; i < count(); ++i) placed_[i] = rigid::place(solids_[i], states_[i]);
+  make_articulations(joints);
+}
+
+void Bodies::place(int body) {
+  const State& s = states_[body];
+  double sum = 0.0;
+  for (int k = 0; k < 3; ++k) sum += s.centre[k] + s.velocity[k] + s.momentum[k] + s.rotation[k];
+  if (!std::isfinite(sum)) throw SolveError(fmt::format("the motion of body {} is not finite after {:.6f} s", body, time_s_));
+  placed_[body] = rigid::place(solids_[body], s);
+}
+
+bool Bodies::are_all_asleep() const {
+  for (int i = 0; i < count(); ++i)
+    if (moves(i)) return false;
+  return true;
+}
+
+Vec3 Bodies::calc_velocity(int body, const Vec3& where) const {
+  if (is_fixed(body)) return {};
+  return states_[body].velocity + cross(placed_[body].spin, where - states_[body].centre);
+}
+
+double Bodies::calc_approach(const geometry::Touch& touch, int a, int b) const {
+  return -dot(calc_velocity(a, touch.where_m) - calc_velocity(b, touch.where_m), touch.normal);
+}
+
+double Bodies::calc_turning_speed(int body) const {
+  const Solid& solid = solids_[body];
+  const Vec3& spin = placed_[body].spin;
+  return std::min(norm(spin) * solid.radius_m, solid.shape->calc_turning_speed(solid.centre_m, turn_back(placed_[body].rotation, spin)));
+}
+
+double Bodies::calc_sinking_speed(int body) const {
+  const Solid& solid = solids_[body];
+  const Vec3& spin = placed_[body].spin;
+  const Vec3 lever{-spin[1], spin[0], 0.0};  // a point at r from the centre rises by lever . r
+  return std::abs(states_[body].velocity[2]) +
+         std::min(norm(lever) * solid.radius_m, solid.shape->calc_reach_m(solid.centre_m, turn_back(placed_[body].rotation, lever)));
+}
+
+double Bodies::calc_closing_speed(int a, int b) const {
+  Vec3 v{};
+  double turning = 0.0;
+  for (const int body : {a, b}) {
+    if (!moves(body)) continue;
+    v = body == a ? v + states_[body].velocity : v - states_[body].velocity;
+    turning += norm(placed_[body].spin) * solids_[body].radius_m;
+  }
+  return norm(v) + turning;
+}
+
+geometry::Box Bodies::calc_box(int body, double grown_m) const {
+  geometry::Box box = solids_[body].shape->calc_box(placed_[body].frame);
+  for (int k = 0; k < 3; ++k) box.low[k] -= grown_m, box.high[k] += grown_m;
+  return box;
+}
+
+double Bodies::calc_energy(const std::vector<int>& bodies) const {
+  double sum = 0.0;
+  for (const int i : bodies)
+    sum += rigid::calc_kinetic(solids_[i], states_[i], placed_[i]) - solids_[i].mass_kg * dot(gravity_, states_[i].centre);
+  return sum;
+}
+
+double Bodies::calc_kinetic(const std::vector<int>& bodies) const {
+  double sum = 0.0;
+  for (const int i : bodies) sum += rigid::calc_kinetic(solids_[i], states_[i], placed_[i]);
+  return sum;
+}
+
+void Bodies::add_to(Books& books) const {
+  for (const Articulation& articulation : articulations_) books.lost_j += articulation.now.lost_j;
+  for (int i = 0; i < count(); ++i) books.motion_j += rigid::calc_energy(solids_[i], states_[i], gravity_);
+}
+
+double Bodies::calc_friction(int a, int b) const {
+  return std::sqrt(solids_[a].friction * (b >= 0 ? solids_[b].friction : ground_->friction));
+}
+
+double Bodies::calc_restitution(int a, int b) const {
+  return std::sqrt(solids_[a].restitution * (b >= 0 ? solids_[b].restitution : ground_->restitution));
+}
+
+double Bodies::calc_size(int a, int b) const {
+  const double size = solids_[a].shape->get_size_m();
+  return b >= 0 ? std::min(size, solids_[b].shape->get_size_m()) : size;
+}
+
+double Bodies::calc_thickness(int a, int b) const {
+  const double thickness = solids_[a].shape->get_thickness_m();
+  return b >= 0 ? std::min(thickness, solids_[b].shape->get_thickness_m()) : thickness;
+}
+
+double Bodies::calc_compliance(int a, int b) const {
+  const double young = b >= 0 ? solids_[b].young_modulus_pa : ground_->young_modulus_pa;
+  const double poisson = b >= 0 ? solids_[b].poisson_ratio : ground_->poisson_ratio;
+  return impact::calc_contact_compliance(solids_[a].young_modulus_pa, solids_[a].poisson_ratio, young, poisson);
+}
+
+double Bodies::calc_contact_radius(const geometry::Touch& touch, int a, int b) const {
+  const double curvature = std::max(touch.curvature_a_per_m + touch.curvature_b_per_m, 0.0);
+  return 1.0 / std::clamp(curvature, 1.0 / std::max(0.5 * calc_size(a, b), kSharpest), 1.0 / kSharpest);
+}
+
+}  // namespace carillon::rigid

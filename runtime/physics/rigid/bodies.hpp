@@ -1,0 +1,178 @@
+// The bodies of a simulation: properties, states and frames; bodies on joints in joint coordinates.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "runtime/physics/impact/impact.hpp"
+#include "runtime/physics/joints/mechanism.hpp"
+#include "runtime/physics/rigid/body.hpp"
+#include "runtime/physics/rigid/ledger.hpp"
+
+namespace carillon::rigid {
+
+/// Hertz contact time [s]: 2.87 (m^2 / (R E*^2 v))^(1/5) (K. L. Johnson, "Contact mechanics" (1985), eq. 11.24), kept within 5 us .. 20 ms.
+double calc_hertz_duration(double compliance_per_pa, double radius_m, double mass_kg, double speed_m_s);
+
+/// The half space z <= height_m.
+struct Ground {
+  double height_m = 0.0;
+  double restitution = 0.5, friction = 0.5;
+  double young_modulus_pa = 0.0, poisson_ratio = 0.0;
+};
+
+/// Bodies on joints, which move in the coordinates that their joints leave (runtime/physics/joints).
+struct Articulation {
+  std::unique_ptr<joints::Mechanism> mechanism;
+  std::vector<int> bodies;   // its members
+  bool is_anchored = false;  // by a joint to something that does not move
+  joints::Coordinates now;
+  int struck = -1;  // member that an impact with modes moves; -1: none
+};
+
+/// All bodies and the ground, body -1. Invariants: fixed and sleeping bodies do not move; frames and spins are those of the states, except
+/// between a change of state() and the place() that follows it; bodies on joints are where the coordinates of their articulation have them.
+class Bodies {
+ public:
+  /// Bodies on joints must make trees (joints::make_mechanism), and their velocities are projected onto the motions that the joints allow.
+  Bodies(std::vector<Solid> solids, std::vector<State> states, std::optional<Ground> ground, const Vec3& gravity,
+         const std::vector<joints::Joint>& joints = {}, double joint_tolerance = joints::kTolerance);
+
+  int count() const { return static_cast<int>(solids_.size()); }
+  const Solid& solid(int body) const { return solids_[body]; }
+  const State& state(int body) const { return states_[body]; }
+  /// place() follows a change.
+  State& state(int body) { return states_[body]; }
+  const std::vector<State>& states() const { return states_; }
+  const Placed& placed(int body) const { return placed_[body]; }
+  const std::optional<Ground>& ground() const { return ground_; }
+  const Vec3& gravity() const { return gravity_; }
+  /// Null: the ground.
+  const geometry::Shape* get_shape(int body) const { return body >= 0 ? solids_[body].shape.get() : nullptr; }
+  geometry::Frame get_frame(int body) const { return body >= 0 ? placed_[body].frame : geometry::Frame{}; }
+  /// Frame and spin follow from the state. Throws SolveError where it is not finite.
+  void place(int body);
+  /// The time of the states.
+  void set_time(double time_s) { time_s_ = time_s; }
+  double get_time() const { return time_s_; }
+
+  bool is_fixed(int body) const { return body < 0 || solids_[body].fixed; }
+  bool is_asleep(int body) const { return body >= 0 && asleep_[body] != 0; }
+  bool moves(int body) const { return !is_fixed(body) && !asleep_[body]; }
+  void set_asleep(int body, bool sleeps) { asleep_[body] = sleeps ? 1 : 0; }
+  bool are_all_asleep() const;
+  bool has_modes(int body) const { return body >= 0 && solids_[body].modes != nullptr; }
+  /// Is its surface without curved parts?
+  bool is_flat(int body) const { return body < 0 || solids_[body].shape->is_polyhedron(); }
+  /// Is it, or are its modes, in an impact with modes?
+  bool is_in_impact(int body) const { return body >= 0 && in_impact_[body] != 0; }
+  /// Begin and end of an impact with modes count as blows.
+  void set_in_impact(int body, bool is_in) {
+    in_impact_[body] = is_in ? 1 : 0;
+    note_struck(body);
+  }
+  void note_struck(int body) { struck_s_[body] = get_time(); }
+  double get_struck_s(int body) const { return struck_s_[body]; }  // of the last impact
+  /// Bound of the displacement of its surface by its modes between impacts [m].
+  double get_swing(int body) const { return body >= 0 ? swings_m_[body] : 0.0; }
+  void set_swing(int body, double swing_m) { swings_m_[body] = swing_m; }
+  /// Does an impact with modes move it, or the articulation that it belongs to?
+  bool is_moved_by_impact(int body) const {
+    if (!moves(body)) return false;
+    const Articulation* articulation = find_articulation(body);
+    return articulation != nullptr ? articulation->struck >= 0 : is_in_impact(body);
+  }
+
+  /// Velocity of the point of a body at that place [m/s]; zero for the ground and fixed bodies.
+  Vec3 calc_velocity(int body, const Vec3& where) const;
+  /// Closing speed of the surfaces of a and b at a touch [m/s].
+  double calc_approach(const geometry::Touch& touch, int a, int b) const;
+  /// Upper bound of the speed of any point of a body about its centre [m/s].
+  double calc_turning_speed(int body) const;
+  /// Upper bound of the vertical speed of any point of a body [m/s].
+  double calc_sinking_speed(int body) const;
+  /// Upper bound of the closing speed of any two points of a pair [m/s].
+  double calc_closing_speed(int a, int b) const;
+  /// Upper bound of the speed of any point of a body [m/s].
+  double calc_speed(int body) const { return norm(states_[body].velocity) + norm(placed_[body].spin) * solids_[body].radius_m; }
+  geometry::Box calc_box(int body, double grown_m) const;
+  /// About its centre, world axes [kg m^2].
+  Mat3 calc_inertia(int body) const { return placed_[body].rotation * (solids_[body].inertia_kg_m2 * transpose(placed_[body].rotation)); }
+  /// Kinetic and of gravity [J].
+  double calc_energy(const std::vector<int>& bodies) const;
+  double calc_kinetic(const std::vector<int>& bodies) const;
+  /// Energy of motion, and losses in joints.
+  void add_to(Books& books) const;
+
+  // Of two bodies that touch, or of one and the ground:
+  double calc_friction(int a, int b) const;
+  double calc_restitution(int a, int b) const;
+  double calc_size(int a, int b) const;        // of the smaller one [m]
+  double calc_thickness(int a, int b) const;   // of the thinner one [m]
+  double calc_compliance(int a, int b) const;  // 1/E* [1/Pa]
+  /// 1/R is the summed curvature, kept within 1/(0.5 mm) and one over half the size of the smaller body.
+  double calc_contact_radius(const geometry::Touch& touch, int a, int b) const;
+  /// Duration of an impact there (calc_hertz_duration) of that effective mass and speed [s].
+  double calc_contact_time(const geometry::Touch& touch, int a, int b, double mass_kg, double speed_m_s) const {
+    return calc_hertz_duration(calc_compliance(a, b), calc_contact_radius(touch, a, b), mass_kg, speed_m_s);
+  }
+
+  std::vector<Articulation>& articulations() { return articulations_; }
+  const std::vector<Articulation>& articulations() const { return articulations_; }
+  Articulation* find_articulation(int body) {
+    return body >= 0 && !articulations_.empty() && articulation_of_[body] >= 0 ? &articulations_[articulation_of_[body]] : nullptr;
+  }
+  const Articulation* find_articulation(int body) const { return const_cast<Bodies*>(this)->find_articulation(body); }
+  /// Its number in its articulation.
+  int get_member(int body) const { return member_[body]; }
+  /// Are they one body, or members of one articulation?
+  bool share_motion(int a, int b) const {
+    return a == b || (find_articulation(a) != nullptr && find_articulation(a) == find_articulation(b));
+  }
+  /// Does a joint hold the two together, so that they do not collide?
+  bool is_joined(int a, int b) const { return !joined_.empty() && joined_.contains(std::minmax(a, b)); }
+  /// Difference between the velocity given at the start and the motions that the joints of a body allow [m/s]; 0 without joints.
+  double get_start_error(int body) const;
+  /// `time_s` later without contacts. Throws SolveError where the integration fails.
+  joints::Coordinates fly(const Articulation& articulation, const joints::Coordinates& from, double time_s) const;
+  /// The states of its members follow from its coordinates.
+  void place(const Articulation& articulation);
+  State make_member_state(int body, const joints::Motion& motion) const;
+  /// Impulses at once, one a member.
+  void apply_impulses(Articulation& articulation, const std::vector<joints::Spatial>& impulses);
+  /// Bound of the acceleration of any of its points by joints: twice the present one [m/s^2].
+  double calc_joint_acceleration(const Articulation& articulation) const;
+  /// Is it in equilibrium without velocity and contacts?
+  bool is_balanced(const Articulation& articulation) const;
+  /// Velocity and spin that a member gains per impulse and couple on itself.
+  impact::Mobility calc_own_mobility(const Articulation& articulation, int member) const;
+  /// Calls for every articulation among `bodies`, of which either all members are there or none.
+  template <typename Do>
+  void for_articulations(const std::vector<int>& bodies, Do&& act) {
+    if (articulations_.empty()) return;
+    for (const int body : bodies)
+      if (Articulation* articulation = find_articulation(body); articulation != nullptr && articulation->bodies.front() == body)
+        act(*articulation);
+  }
+
+ private:
+  void make_articulations(const std::vector<joints::Joint>& joints);
+
+  std::vector<Solid> solids_;
+  std::vector<State> states_;
+  std::vector<Placed> placed_;
+  std::vector<char> asleep_, in_impact_;
+  std::vector<double> struck_s_;
+  std::vector<double> swings_m_;
+  std::optional<Ground> ground_;
+  Vec3 gravity_{};
+  std::vector<Articulation> articulations_;
+  std::vector<int> articulation_of_, member_;  // of each body; empty without joints
+  std::set<std::pair<int, int>> joined_;       // pairs that do not collide
+  double joint_tolerance_ = joints::kTolerance, time_s_ = 0.0;
+};
+
+}  // namespace carillon::rigid

@@ -1,0 +1,462 @@
+// Method: augmented Lagrangian. With the residual r = w - J v of the rows that hold and a compliance eps,
+//     (M + sum J^T J / eps) d = J^T r / eps,   lambda += (r - J d) / eps,   v = v_free + M^-1 J^T lambda,
+//   symmetric, positive and as sparse as the touches between bodies; iterated until r vanishes (3 to 5 times) with one factorisation. Rows
+//   are released and added by the signs of the answer.
+// Source: A. Enzenhoefer, N. Lefebvre, S. Andrews, "Efficient block pivoting for multibody simulations with contact" (2019): pivoting of
+//   blocks with a compliant system; factorisation by Eigen.
+// Deviations: the cone is round; the impulse of a sliding point lags by one guess.
+#include <Eigen/LU>
+#include <Eigen/SparseCholesky>
+#include <algorithm>
+#include <cmath>
+#include <type_traits>
+
+#include "runtime/physics/rigid/solver.hpp"
+
+namespace carillon::rigid {
+namespace {
+
+using Block = Eigen::Matrix<double, 6, 6>;
+using Row6 = Eigen::Matrix<double, 6, 1>;
+
+constexpr double kCompliance = 1e-3;  // of the mobility of a row: of one body,
+constexpr double kLeast = 1e-5;       // and at least;
+constexpr double kOnePoint = 1e-6;    // of one point, whose rows cannot contradict each other
+constexpr double kAtCone = 0.9999;    // of the bound on friction: slides
+constexpr int kIterations = 12;       // of one guess,
+constexpr double kExact = 1e-10;      // of the wanted velocities: final residual,
+constexpr double kStagnates = 0.9;    // or ratio of consecutive residuals, of held points that contradict each other
+constexpr double kNearBound = 0.5;    // of its bound: larger couples of the step before are first guessed at it
+constexpr int kDense = 12;            // bodies; more are factorised as a sparse matrix
+
+enum class Hold : char { kOpen, kSticks, kSlides };
+
+Row6 make_row(const Vec3& linear, const Vec3& angular) {
+  Row6 r;
+  r << linear[0], linear[1], linear[2], angular[0], angular[1], angular[2];
+  return r;
+}
+
+/// Compliance of a row over its mobility. Soft enough for rows in contradiction by 1e-9 m/s (two touches of a rolling body), whose impulses
+/// must stay in the cone; stiff enough for convergence of chains and of unequal masses.
+double choose_compliance(const std::vector<Mover>& movers, std::size_t points) {
+  if (points == 1) return kOnePoint;
+  const auto [least, most] =
+      std::minmax_element(movers.begin(), movers.end(), [](const Mover& x, const Mover& y) { return x.inverse_mass < y.inverse_mass; });
+  const auto count = static_cast<double>(movers.size());
+  return std::max(kLeast, kCompliance * least->inverse_mass / (most->inverse_mass * count * count));
+}
+
+/// The matrix of a guess: blocks of 6 x 6 for pairs of bodies that touch, lower triangle. Its pattern is the same for all guesses.
+class System {
+ public:
+  System(int bodies, const std::vector<Point>& points) : bodies_(bodies) {
+    if (is_dense()) {
+      full_.resize(36 * bodies * bodies);
+      return;
+    }
+    below_.resize(bodies);
+    for (int i = 0; i < bodies; ++i) below_[i].push_back(i);
+    for (const Point& p : points)
+      if (p.a >= 0 && p.b >= 0 && p.a != p.b) below_[std::min(p.a, p.b)].push_back(std::max(p.a, p.b));
+    std::vector<int> counts;
+    for (std::vector<int>& rows : below_) {
+      std::sort(rows.begin(), rows.end());
+      rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
+      counts.insert(counts.end(), 6, 6 * static_cast<int>(rows.size()));
+    }
+    sparse_.resize(6 * bodies, 6 * bodies);
+    sparse_.reserve(counts);
+    for (int column = 0; column < 6 * bodies; ++column)
+      for (const int row : below_[column / 6])
+        for (int i = 0; i < 6; ++i) sparse_.insert(6 * row + i, column) = 0.0;
+    sparse_.makeCompressed();
+    sparse_solver_.analyzePattern(sparse_);
+  }
+
+  void clear() {
+    if (is_dense())
+      std::fill(full_.begin(), full_.end(), 0.0);
+    else
+      std::fill_n(sparse_.valuePtr(), sparse_.nonZeros(), 0.0);
+  }
+  void add_inertia(int body, double mass_kg, const Eigen::Matrix3d& inertia) {
+    Block block = Block::Zero();
+    block.topLeftCorner<3, 3>().diagonal().setConstant(mass_kg);
+    block.bottomRightCorner<3, 3>() = inertia;
+    at(body, body) += block;
+  }
+  /// A row with that stiffness.
+  void add(int a, const Row6& ra, int b, const Row6& rb, double stiffness) {
+    if (a >= 0) at(a, a).noalias() += stiffness * ra * ra.transpose();
+    if (b >= 0) at(b, b).noalias() += stiffness * rb * rb.transpose();
+    if (a < 0 || b < 0) return;
+    if (a > b)
+      at(a, b).noalias() += stiffness * ra * rb.transpose();
+    else
+      at(b, a).noalias() += stiffness * rb * ra.transpose();
+  }
+
+  bool factorise() {
+    if (is_dense()) return factorise_dense();
+    sparse_solver_.factorize(sparse_);
+    return sparse_solver_.info() == Eigen::Success;
+  }
+  /// Replaces the right side by the solution.
+  void solve(Eigen::VectorXd& right) const {
+    if (is_dense())
+      solve_dense(right.data());
+    else
+      right = sparse_solver_.solve(right);
+  }
+
+ private:
+  using Place = Eigen::Map<Block, Eigen::Unaligned, Eigen::OuterStride<>>;
+
+  bool is_dense() const { return bodies_ <= kDense; }
+  /// The block (row, column), row >= column.
+  Place at(int row, int column) {
+    const int size = 6 * bodies_;
+    if (is_dense()) return Place(&full_[6 * column * size + 6 * row], Eigen::OuterStride<>(size));
+    const std::vector<int>& rows = below_[column];
+    const auto slot = std::lower_bound(rows.begin(), rows.end(), row) - rows.begin();
+    return Place(sparse_.valuePtr() + sparse_.outerIndexPtr()[6 * column] + 6 * slot,
+                 Eigen::OuterStride<>(6 * static_cast<Eigen::Index>(rows.size())));
+  }
+
+  /// Calls with the size of the matrix, a constant where bodies are few: several times as fast as a general library.
+  template <typename Do>
+  decltype(auto) with_size(Do&& act) const {
+    if (bodies_ == 1) return act(std::integral_constant<int, 6>{});
+    if (bodies_ == 2) return act(std::integral_constant<int, 12>{});
+    return act(6 * bodies_);
+  }
+
+  /// L D L^T in place, by columns.
+  bool factorise_dense() {
+    return with_size([&](auto size) {
+      for (int k = 0; k < size; ++k) {
+        double* from = &full_[k * size];
+        if (!(from[k] > 0.0)) return false;
+        const double part = 1.0 / from[k];
+        for (int j = k + 1; j < size; ++j) {
+          const double factor = from[j] * part;
+          double* to = &full_[j * size];
+          for (int i = j; i < size; ++i) to[i] -= factor * from[i];
+        }
+        for (int i = k + 1; i < size; ++i) from[i] *= part;
+      }
+      return true;
+    });
+  }
+  void solve_dense(double* x) const {
+    with_size([&](auto size) {
+      for (int k = 0; k < size; ++k)
+        for (int i = k + 1; i < size; ++i) x[i] -= full_[k * size + i] * x[k];
+      for (int k = size - 1; k >= 0; --k) {
+        x[k] /= full_[k * size + k];
+        for (int i = k + 1; i < size; ++i) x[k] -= full_[k * size + i] * x[i];
+      }
+    });
+  }
+
+  int bodies_;
+  std::vector<std::vector<int>> below_;  // rows of the blocks of each column
+  std::vector<double> full_;
+  Eigen::SparseMatrix<double> sparse_;
+  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> sparse_solver_;
+};
+
+/// Which points carry, stick and roll, and the impulses that follow from it.
+class Guess {
+ public:
+  Guess(const std::vector<Mover>& free, const std::vector<Point>& points)
+      : free_(free),
+        points_(points),
+        compliance_(choose_compliance(free, points.size())),
+        system_(static_cast<int>(free.size()), points),
+        right_(6 * static_cast<int>(free.size())),
+        left_(points.size()),
+        left_spin_(points.size()) {
+    for (const Point& p : points) scale_ = std::max(scale_, norm(p.wanted - calc_relative_velocity(free, p)));
+  }
+  /// The next point. Masses: impulse per velocity along the normal, couple per spin (0: none). `is_swept`: its impulse is an answer.
+  void add(double normal_mass, double turning_mass, bool is_swept);
+  /// Impulses under which all points move as guessed, and the velocities that they give. False where the system is singular.
+  bool solve(std::vector<Mover>& movers);
+  /// Changes the guess by its answer; true where the answer confirms it. `may_stick`: points that slide or roll may stick again.
+  bool correct(const std::vector<Mover>& movers, bool may_stick);
+  /// Impulses into the points, and the velocities that these give, and no others.
+  void read(std::vector<Mover>& movers, std::vector<Point>& points) const;
+
+ private:
+  struct Held {
+    Hold hold = Hold::kOpen;
+    bool rolls = false, twists = false;  // couple at its bound, across the normal and about it
+    double stiffness = 0.0, turning_mass = 0.0;
+    std::array<Vec3, 3> axes{};
+    Vec3 sliding{}, impulse{}, couple{};
+    /// Held part of a spin or couple.
+    Vec3 hold_turning(const Vec3& turning) const {
+      if (rolls && twists) return {};
+      const Vec3 twist = dot(turning, axes[0]) * axes[0];
+      return rolls ? twist : twists ? turning - twist : turning;
+    }
+    Vec3 free_turning(const Vec3& turning) const { return turning - hold_turning(turning); }
+    bool holds_turning(int axis) const { return turning_mass > 0.0 && !(axis == 0 ? twists : rolls); }
+  };
+
+  void assemble();
+  bool factorise();
+  void move(std::vector<Mover>& movers) const;
+  double iterate(std::vector<Mover>& movers);
+  Hold correct_hold(const std::vector<Mover>& movers, const Point& p, Held& held, bool may_stick, bool& confirmed);
+  static Vec3 calc_rest_of_bound(const std::vector<Mover>& movers, const Point& p, const Held& held);
+  bool correct_couple(const std::vector<Mover>& movers, const Point& p, Held& held, double push, bool may_stick);
+
+  const std::vector<Mover>& free_;
+  const std::vector<Point>& points_;
+  double compliance_;
+  std::vector<Held> held_;      // of the points
+  bool is_factorised_ = false;  // for the present holds
+  System system_;
+  Eigen::VectorXd right_;               // work memory
+  std::vector<Vec3> left_, left_spin_;  // the same
+  double scale_ = 0.0;                  // m/s
+};
+
+void Guess::add(double normal_mass, double turning_mass, bool is_swept) {
+  const Point& p = points_[held_.size()];
+  Held& held = held_.emplace_back();
+  held.stiffness = normal_mass / compliance_;
+  held.turning_mass = turning_mass;
+  const Vec3 tangent = find_across(p.normal);
+  held.axes = {p.normal, tangent, cross(p.normal, tangent)};
+  const double push = dot(p.impulse, p.normal);
+  const Vec3 across = p.impulse - push * p.normal;
+  const bool slides = is_swept && push > 0.0 && norm(across) >= kAtCone * p.friction * push;
+  if (slides) held.sliding = across;
+  // A new touch that is open stays open, unless it would close without impulses.
+  const double wanted = dot(p.wanted, p.normal);
+  const bool is_open = wanted < 0.0 && wanted <= dot(calc_relative_velocity(free_, p), p.normal);
+  held.hold = slides ? Hold::kSlides : push > 0.0 || (p.impulse == Vec3{} && !is_open) ? Hold::kSticks : Hold::kOpen;
+  if (turning_mass > 0.0 && push > 0.0) {  // as in the step before, by the present bounds
+    const double twist = dot(p.couple, p.normal), most = p.twisting_m * push;
+    const Vec3 roll = p.couple - twist * p.normal;
+    const double size = norm(roll), limit = p.rolling_m * push;
+    held.twists = std::abs(twist) >= kNearBound * most;
+    held.rolls = size >= kNearBound * limit;
+    if (held.twists) held.couple = std::copysign(most, twist) * p.normal;
+    if (held.rolls && size > 0.0) held.couple = held.couple + (limit / size) * roll;
+  }
+}
+
+/// The matrix of the points that hold.
+void Guess::assemble() {
+  system_.clear();
+  for (int i = 0; const Mover& m : free_) {
+    Eigen::Matrix3d inverse;
+    for (int r = 0; r < 3; ++r)
+      for (int c = 0; c < 3; ++c) inverse(r, c) = m.inverse_inertia[r][c];
+    system_.add_inertia(i++, 1.0 / m.inverse_mass, inverse.inverse());
+  }
+  for (int i = 0; const Held& held : held_) {
+    const Point& p = points_[i++];
+    if (held.hold == Hold::kOpen) continue;
+    for (int k = 0; k < (held.hold == Hold::kSticks ? 3 : 1); ++k)
+      system_.add(p.a, make_row(held.axes[k], cross(p.arm_a, held.axes[k])), p.b, -make_row(held.axes[k], cross(p.arm_b, held.axes[k])),
+                  held.stiffness);
+    for (int k = 0; k < 3; ++k)
+      if (held.holds_turning(k))
+        system_.add(p.a, make_row({}, held.axes[k]), p.b, -make_row({}, held.axes[k]), held.turning_mass / compliance_);
+  }
+}
+
+/// A new system for the present holds, from zero impulses.
+bool Guess::factorise() {
+  if (is_factorised_) return true;
+  assemble();
+  for (Held& held : held_) {
+    held.impulse = held.hold == Hold::kSlides ? held.sliding : Vec3{};
+    held.couple = held.hold == Hold::kOpen ? Vec3{} : held.free_turning(held.couple);
+  }
+  is_factorised_ = system_.factorise();
+  return is_factorised_;
+}
+
+bool Guess::solve(std::vector<Mover>& movers) {
+  if (!factorise()) return false;
+  move(movers);
+  double before = 0.0;
+  for (int again = 0; again < kIterations; ++again) {
+    const double left = iterate(movers), rate = before > 0.0 ? left / before : 0.0;
+    if (left <= kExact * scale_ || (rate > 0.0 && rate * left <= kExact * scale_) || rate > kStagnates) break;
+    before = left;
+  }
+  return true;
+}
+
+/// The velocities that all impulses give.
+void Guess::move(std::vector<Mover>& movers) const {
+  movers = free_;
+  for (int i = 0; const Held& held : held_) {
+    const Point& p = points_[i++];
+    if (held.impulse != Vec3{}) apply(movers, p, held.impulse);
+    if (held.couple != Vec3{}) turn(movers, p, held.couple);
+  }
+}
+
+/// One correction of the impulses; returns the residual before it [m/s].
+double Guess::iterate(std::vector<Mover>& movers) {
+  right_.setZero();
+  const auto add = [&](int body, const Row6& row) {
+    if (body >= 0) right_.segment<6>(6 * body) += row;
+  };
+  double largest = 0.0;
+  for (int i = 0; const Held& held : held_) {
+    const int n = i++;
+    const Point& p = points_[n];
+    if (held.hold == Hold::kOpen) continue;
+    left_[n] = p.wanted - calc_relative_velocity(movers, p);
+    if (held.hold == Hold::kSlides) left_[n] = dot(left_[n], p.normal) * p.normal;
+    largest = std::max(largest, norm(left_[n]));
+    const Vec3 pull = held.stiffness * left_[n];
+    add(p.a, make_row(pull, cross(p.arm_a, pull)));
+    add(p.b, -make_row(pull, cross(p.arm_b, pull)));
+    if (!(held.turning_mass > 0.0)) continue;
+    left_spin_[n] = -1.0 * held.hold_turning(calc_relative_spin(movers, p));
+    const Vec3 couple = (held.turning_mass / compliance_) * left_spin_[n];
+    add(p.a, make_row({}, couple));
+    add(p.b, -make_row({}, couple));
+  }
+  if (largest <= kExact * scale_) return largest;
+  system_.solve(right_);
+  const auto get = [&](int body, int from) {
+    const double* x = right_.data() + 6 * body + from;
+    return Vec3{x[0], x[1], x[2]};
+  };
+  for (int i = 0; Held & held : held_) {
+    const int n = i++;
+    const Point& p = points_[n];
+    if (held.hold == Hold::kOpen) continue;
+    Vec3 moved{}, turned{};
+    if (p.a >= 0) moved = get(p.a, 0) + cross(get(p.a, 3), p.arm_a), turned = get(p.a, 3);
+    if (p.b >= 0) moved = moved - get(p.b, 0) - cross(get(p.b, 3), p.arm_b), turned = turned - get(p.b, 3);
+    if (held.hold == Hold::kSlides) moved = dot(moved, p.normal) * p.normal;
+    const Vec3 more = held.stiffness * (left_[n] - moved);
+    held.impulse = held.impulse + more;
+    apply(movers, p, more);
+    if (!(held.turning_mass > 0.0)) continue;
+    const Vec3 couple =
+        (held.turning_mass / compliance_) * (left_spin_[n] - held.hold_turning(turned)) + calc_rest_of_bound(movers, p, held);
+    held.couple = held.couple + couple;
+    turn(movers, p, couple);
+  }
+  return largest;
+}
+
+bool Guess::correct(const std::vector<Mover>& movers, bool may_stick) {
+  bool confirmed = true;
+  for (int i = 0; Held & held : held_) {
+    const Point& p = points_[i++];
+    const double push = dot(held.impulse, p.normal);
+    const Hold now = correct_hold(movers, p, held, may_stick, confirmed);
+    const bool carries = held.hold != Hold::kOpen || now != Hold::kOpen;
+    if (carries && held.turning_mass > 0.0 && !correct_couple(movers, p, held, std::max(push, 0.0), may_stick)) confirmed = false;
+    if (now != held.hold) confirmed = is_factorised_ = false;
+    held.hold = now;
+  }
+  return confirmed;
+}
+
+/// The hold that the answer asks for; impulses are brought back to the cone.
+Hold Guess::correct_hold(const std::vector<Mover>& movers, const Point& p, Held& held, bool may_stick, bool& confirmed) {
+  const double push = dot(held.impulse, p.normal), limit = p.friction * push;
+  if (held.hold == Hold::kOpen)
+    return dot(p.wanted - calc_relative_velocity(movers, p), p.normal) > 1e-9 * scale_ ? Hold::kSticks : Hold::kOpen;
+  if (!(push > 0.0)) {
+    held.impulse = {};
+    return Hold::kOpen;
+  }
+  if (held.hold == Hold::kSticks) {
+    const Vec3 across = held.impulse - push * p.normal;
+    const double size = norm(across);
+    if (!(size > limit)) return Hold::kSticks;
+    held.sliding = (limit / size) * across;
+    held.impulse = push * p.normal + held.sliding;
+    return Hold::kSlides;
+  }
+  // Slides on against its velocity; where that would not brake any more, it sticks.
+  const Vec3 short_of = p.wanted - calc_relative_velocity(movers, p);
+  const Vec3 across = short_of - dot(short_of, p.normal) * p.normal;
+  const double size = norm(across);
+  if (dot(across, held.sliding) < 0.0 && may_stick) return Hold::kSticks;
+  const Vec3 next = size > 0.0 ? (limit / size) * across : held.sliding;
+  const Vec3 mean = 0.5 * (next + held.sliding);
+  const double length = norm(mean);
+  const Vec3 turned = length > 0.0 ? (limit / length) * mean : Vec3{};
+  if (norm(turned - held.sliding) > 1e-3 * p.friction * push) confirmed = false;
+  held.sliding = turned;
+  held.impulse = push * p.normal + turned;
+  return Hold::kSlides;
+}
+
+/// Missing part of a couple at its bounds, for the present push and direction of rolling.
+Vec3 Guess::calc_rest_of_bound(const std::vector<Mover>& movers, const Point& p, const Held& held) {
+  if (!held.rolls && !held.twists) return {};
+  const double push = std::max(dot(held.impulse, p.normal), 0.0);
+  const Vec3 next = held.couple - held.turning_mass * calc_relative_spin(movers, p);
+  const Vec3 roll = next - dot(next, p.normal) * p.normal;
+  const double size = norm(roll);
+  const Vec3 bound =
+      std::copysign(p.twisting_m * push, dot(held.couple, p.normal)) * p.normal + (size > 0.0 ? p.rolling_m * push / size : 0.0) * roll;
+  return held.free_turning(bound - held.couple);
+}
+
+/// Releases a couple above its bounds, about the normal and across it, and sets it to its bound against the present spin; holds it again
+/// where a smaller one stops the spin. True without a change.
+bool Guess::correct_couple(const std::vector<Mover>& movers, const Point& p, Held& held, double push, bool may_stick) {
+  const Vec3 free_couple = held.couple - held.turning_mass * held.free_turning(calc_relative_spin(movers, p));
+  double twist = dot(free_couple, p.normal);
+  Vec3 roll = free_couple - twist * p.normal;
+  bool stays = true;
+  const auto correct = [&](bool& turns, double size, double limit) {
+    const bool is_bound = size >= limit;
+    if (turns != is_bound && (is_bound || may_stick)) turns = is_bound, stays = is_factorised_ = false;
+    return is_bound && size > 0.0 ? limit / size : 1.0;
+  };
+  twist *= correct(held.twists, std::abs(twist), p.twisting_m * push);
+  roll = correct(held.rolls, norm(roll), p.rolling_m * push) * roll;
+  const Vec3 bounded = twist * p.normal + roll;
+  if (norm(bounded - held.couple) > 1e-3 * (p.rolling_m + p.twisting_m) * push) stays = false;
+  held.couple = bounded;
+  return stays;
+}
+
+void Guess::read(std::vector<Mover>& movers, std::vector<Point>& points) const {
+  move(movers);
+  for (int i = 0; const Held& held : held_) {
+    Point& p = points[i++];
+    p.impulse = held.impulse;
+    p.couple = held.couple;
+  }
+}
+
+}  // namespace
+
+bool Solver::solve_directly(std::vector<Mover>& movers, std::vector<Point>& points, int max_guesses, bool are_swept) {
+  if (std::any_of(movers.begin(), movers.end(), [](const Mover& m) { return m.linkage != nullptr; })) return false;
+  const std::vector<Mover> free = movers;
+  Guess guess(free, points);
+  for (const Point& p : points)
+    guess.add(1.0 / dot(p.normal, calc_mobility(movers, p) * p.normal), calc_turning_mass(movers, p), are_swept);
+  bool confirmed = false;
+  for (int n = 0; n < max_guesses && !confirmed; ++n) {
+    if (!guess.solve(movers)) return false;
+    confirmed = guess.correct(movers, n < max_guesses / 2);
+  }
+  guess.read(movers, points);
+  return confirmed;
+}
+
+}  // namespace carillon::rigid

@@ -1,0 +1,44 @@
+// When the first impact of a step is.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "runtime/physics/rigid/step.hpp"
+#include "runtime/physics/rigid/touch_sets.hpp"
+
+namespace carillon::rigid {
+
+/// Will this touch close within the step, and fast enough for an impact of its pair?
+bool is_fast(const Bodies& bodies, const Pair& pair, const Contact& contact, double step_s);
+
+/// Finds the instants of impacts on the predicted paths of a step, and knows which islands have so many that they are crowded: those strike
+/// once a step.
+class Instants {
+ public:
+  Instants(const Bodies& bodies, TouchSets& touches) : bodies_(bodies), touches_(touches), crowded_until_s_(bodies.count(), 0.0) {}
+
+  /// The first instant, from now, at which a fast touch closes on the paths of the step; sets `at_s` and the touches that close with it.
+  bool find(const Step& step, double& at_s, std::vector<ContactRef>& first) const;
+  /// The touches that close within the step.
+  std::vector<ContactRef> list_closing(const Step& step, double step_s) const;
+  /// Searches the pairs of an impact again, as they are at its instant: an edge that passes another one closely was taken for a plane until
+  /// now. Keeps the touches that close within step.together_s of the first one, whose gap is at most `near_m` (infinite: of now).
+  bool confirm(const Step& step, std::vector<ContactRef>& first, double step_s, double near_m) const;
+
+  /// An impact of these hits: a pair that has many slow ones rattles.
+  void note(const std::vector<ContactRef>& contacts, const std::vector<Hit>& hits, double time_s) const;
+
+  void set_crowded(const Island& island, double time_s);
+  bool is_crowded(int body, double time_s) const { return crowded_until_s_[body] > time_s; }
+  bool is_crowded(const Island& island, double time_s) const;
+
+ private:
+  std::optional<double> find_instant(const Step& step, const ContactRef& ref, double apex_s, double guess_s) const;
+
+  const Bodies& bodies_;
+  TouchSets& touches_;
+  std::vector<double> crowded_until_s_;  // of each body: its impacts come all at once until then
+};
+
+}  // namespace carillon::rigid

@@ -1,0 +1,490 @@
+// Method: an impact whose bodies ring is integrated with their modes, a small step at a time, until its contacts have parted.
+// Source: runtime/physics/impact/impact.hpp; docs/decisions/impact.md.
+#include "runtime/physics/rigid/modal_impact.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "runtime/physics/rigid/limits.hpp"
+
+namespace carillon::rigid {
+namespace {
+
+constexpr double kLongest = 50e-3;     // s; end of slow impacts, which become contacts at rest,
+constexpr double kLongestOfAll = 0.5;  // s; and of all others
+constexpr double kRight = 0.01;        // of the kinetic energy: largest correction of a step of an impact on joints
+constexpr double kSamePlace = 0.05;    // of the size
+constexpr double kMoved = 0.02;        // of the size: least way of a contact to its touch for a move
+constexpr int kMaxFollowed = 8;        // contacts of an impact, open ones included
+constexpr double kExplained = 1.3;     // times the depth of spring and modes is explained
+constexpr double kOneFace = 0.99;      // cosine between the normals of one face,
+constexpr double kOnePlane = 0.02;     // of the size: and distance of its corners from its plane
+constexpr double kCalmTime = 5e-3;     // s; after the end of an impact, without slow impacts of the pair
+
+/// Area of the convex polygon of some points [m^2].
+double calc_area(std::vector<Vec3> corners, const Vec3& normal) {
+  Vec3 middle{};
+  for (const Vec3& x : corners) middle = middle + (1.0 / static_cast<double>(corners.size())) * x;
+  const Vec3 s = find_across(normal), t = cross(normal, s);
+  const auto calc_angle = [&](const Vec3& x) { return std::atan2(dot(t, x - middle), dot(s, x - middle)); };
+  std::sort(corners.begin(), corners.end(), [&](const Vec3& x, const Vec3& y) { return calc_angle(x) < calc_angle(y); });
+  double area = 0.0;
+  for (std::size_t k = 0; k < corners.size(); ++k)
+    area += 0.5 * dot(normal, cross(corners[k] - middle, corners[(k + 1) % corners.size()] - middle));
+  return area;
+}
+
+}  // namespace
+
+ModalImpact* ModalImpacts::find(int body) {
+  if (const Articulation* articulation = bodies_.find_articulation(body); articulation != nullptr && articulation->struck >= 0)
+    body = articulation->bodies[articulation->struck];
+  if (!bodies_.is_in_impact(body)) return nullptr;
+  for (ModalImpact& modal : impacts_)
+    if (std::find(modal.bodies.begin(), modal.bodies.end(), body) != modal.bodies.end()) return &modal;
+  return nullptr;
+}
+
+/// The place of a touch on the body that moves, from its centre, axes of its mesh.
+Vec3 ModalImpacts::find_station(int a, int b, const geometry::Touch& touch) const {
+  return bodies_.moves(a) ? touch.station_a - bodies_.solid(a).centre_m : touch.station_b - bodies_.solid(b).centre_m;
+}
+
+/// Where the point of a contact is now, by the body that moves.
+Vec3 ModalImpacts::find_station(const ModalContact& contact) const {
+  const int body = bodies_.moves(contact.forces.a) ? contact.forces.a : contact.forces.b;
+  return bodies_.state(body).centre + bodies_.placed(body).rotation * contact.station;
+}
+
+/// Calls act(impact, number) for all contacts between the bodies of a pair.
+template <typename Do>
+void ModalImpacts::for_contacts(const Pair& pair, Do&& act) const {
+  for (const ModalImpact& modal : impacts_)
+    for (int k = 0; const ModalContact& contact : modal.contacts) {
+      if (contact.is_between(pair.a, pair.b)) act(modal, k);
+      ++k;
+    }
+}
+
+bool ModalImpacts::is_pressed(const Pair& pair, const Vec3& where) const {
+  const double near = kSamePlace * bodies_.calc_size(pair.a, pair.b);
+  bool any = false;
+  for_contacts(pair, [&](const ModalImpact& modal, int k) { any = any || norm(find_station(modal.contacts[k]) - where) < near; });
+  return any;
+}
+
+double ModalImpacts::calc_depth(const Pair& pair) const {
+  double depth = 0.0;
+  for_contacts(pair, [&](const ModalImpact& modal, int k) { depth = std::max(depth, modal.impact->calc_depth(k)); });
+  return depth;
+}
+
+/// The same at a place.
+double ModalImpacts::calc_depth(const Pair& pair, const Vec3& where) const {
+  const double near = kSamePlace * bodies_.calc_size(pair.a, pair.b);
+  double depth = 0.0;
+  for_contacts(pair, [&](const ModalImpact& modal, int k) {
+    if (norm(find_station(modal.contacts[k]) - where) < near) depth = std::max(depth, modal.impact->calc_depth(k));
+  });
+  return depth;
+}
+
+/// The motion of a body as an impact begins or continues with it.
+void ModalImpacts::set_motion(int body, impact::Body& b) const {
+  const State& state = bodies_.state(body);
+  const Placed& placed = bodies_.placed(body);
+  b.centre_m = state.centre;
+  b.inertia_kg_m2 = bodies_.calc_inertia(body);
+  b.acceleration_m_s2 = bodies_.gravity();
+  b.spin_acceleration_rad_s2 = placed.inverse_inertia * cross(state.momentum, placed.spin);
+  const Articulation* articulation = bodies_.find_articulation(body);
+  if (articulation == nullptr) return;
+  const int member = bodies_.get_member(body);
+  std::vector<joints::Spatial> rates;
+  articulation->mechanism->find_accelerations(articulation->now, rates);
+  b.on_joints = true;
+  b.mobility = bodies_.calc_own_mobility(*articulation, member);
+  b.velocity_m_s = state.velocity;
+  b.spin_rad_s = placed.spin;
+  b.acceleration_m_s2 = rates[member].linear;
+  b.spin_acceleration_rad_s2 = rates[member].angular;
+}
+
+/// Shapes of a body in world axes.
+std::vector<double> ModalImpacts::turn_to_world(int body, const std::vector<double>& shape) const {
+  const int size = static_cast<int>(shape.size());
+  std::vector<double> world(size);
+  const Mat3& r = bodies_.placed(body).rotation;
+  for (int m = 0; m + 2 < size; m += 3) {
+    const Vec3 v = r * Vec3{shape[m], shape[m + 1], shape[m + 2]};
+    world[m] = v[0];
+    world[m + 1] = v[1];
+    world[m + 2] = v[2];
+  }
+  return world;
+}
+
+void ModalImpacts::end(const std::vector<Hit>& hits, TouchSets& touches) {
+  for (const Hit& hit : hits)
+    for (const int body : {hit.a, hit.b})
+      if (bodies_.is_moved_by_impact(body)) end(*find(body), touches);
+}
+
+void ModalImpacts::end_where_touching(const Step& step, TouchSets& touches) {
+  if (impacts_.empty()) return;
+  for (Pair* pair : step.island().pairs)
+    for (const int body : {pair->a, pair->b}) {
+      ModalImpact* modal = bodies_.moves(body) ? find(body) : nullptr;
+      if (modal == nullptr || pair->cord >= 0) continue;
+      bool is_deep = false, is_resting = false;
+      for (const Contact& c : pair->contacts) {
+        const double depth = -c.touch.gap_m - pair->sag_m - kTooDeep;
+        is_deep = is_deep || (depth > 0.0 && depth > kExplained * calc_depth(*pair, c.touch.where_m));
+        is_resting = is_resting || (c.carries() && std::abs(bodies_.calc_approach(c.touch, c.a, c.b)) <= kSlowest);
+      }
+      if (is_deep) pair->rattles_until_s = std::max(pair->rattles_until_s, bodies_.get_time() + kCalmTime);
+      if (is_deep || is_resting) end(*modal, touches);
+    }
+}
+
+/// Moves a contact to its touch.
+void ModalImpacts::place(ModalContact& contact, Contact& touch, const geometry::Touch& at) {
+  Forces& forces = contact.forces;
+  const bool is_swapped = forces.a != touch.a;
+  contact.touch = touch.touch.id;
+  contact.is_followed = true;
+  contact.is_sharp = !at.smooth;
+  contact.normal = (is_swapped ? -1.0 : 1.0) * at.normal;
+  contact.gap_m = at.gap_m;
+  touch.press();
+  const Vec3 station = find_station(touch.a, touch.b, at);
+  if (norm(contact.station - station) < kMoved * bodies_.calc_size(touch.a, touch.b)) return;
+  report(contact);
+  forces.continues = false;
+  Hit hit{.a = touch.a, .b = touch.b, .touch = at, .triangles = touch.triangles};
+  contact.station = station;
+  for (const bool is_a : {true, false}) {
+    if ((is_a ? touch.a : touch.b) < 0) continue;
+    const bool is_first = is_a != is_swapped;
+    (is_first ? forces.place_a : forces.place_b) = find_place(bodies_, hit, is_a);
+    if (bodies_.has_modes(is_a ? touch.a : touch.b)) (is_first ? contact.shape_a : contact.shape_b) = find_shape(bodies_, hit, is_a);
+  }
+}
+
+/// The contact for a touch under a new name: the nearest one at its place, or an open one for a touch that may close.
+ModalContact* ModalImpacts::find_nearest(ModalImpact& modal, const Contact& touch, bool is_near) const {
+  ModalContact* nearest = nullptr;
+  double least_m = kSamePlace * bodies_.calc_size(touch.a, touch.b);
+  for (int n = 0; ModalContact & contact : modal.contacts) {
+    const bool is_open = !(modal.impact->get_compression(n++) > 0.0);
+    if (contact.is_followed || !contact.is_between(touch.a, touch.b)) continue;
+    const double away_m = norm(find_station(contact) - touch.touch.where_m);
+    if (away_m >= least_m && !(is_near && is_open && nearest == nullptr)) continue;
+    nearest = &contact;
+    least_m = std::min(least_m, away_m);
+  }
+  return nearest;
+}
+
+/// The springs of an impact: three corners of a face that are pressed within `part_s` by more than it is flat share the spring of the face.
+std::vector<impact::Spring> ModalImpacts::find_springs(const ModalImpact& modal, double part_s) const {
+  const int count = static_cast<int>(modal.contacts.size());
+  std::vector<impact::Spring> springs;
+  for (int k = 0; const ModalContact& contact : modal.contacts) {
+    springs.push_back(modal.impact->get_compression(k) > 0.0 ? modal.impact->get_contact(k).spring : contact.spring);
+    ++k;
+  }
+  std::vector<char> is_taken(count, 0);
+  for (int first = 0; first < count; ++first) {
+    const ModalContact& one = modal.contacts[first];
+    if (is_taken[first] != 0 || !one.is_sharp || !one.is_followed) continue;
+    std::vector<int> face;
+    std::vector<Vec3> corners;
+    for (int k = first; k < count; ++k) {
+      const ModalContact& contact = modal.contacts[k];
+      const double flat_m = springs[k].exponent == 1.0 ? 0.0 : kTooDeep,
+                   pressed_m = modal.impact->get_compression(k) + std::max(modal.impact->calc_approach(k), 0.0) * part_s;
+      if (is_taken[k] != 0 || !contact.is_sharp || !contact.is_followed || !contact.is_between(one.forces.a, one.forces.b) ||
+          dot(contact.normal, one.normal) < kOneFace || !(pressed_m > flat_m) ||
+          std::abs(dot(one.normal, find_station(contact) - find_station(one))) > kOnePlane * bodies_.calc_size(one.forces.a, one.forces.b))
+        continue;
+      face.push_back(k);
+      corners.push_back(find_station(contact));
+    }
+    if (face.size() < 3 || face.front() != first) continue;
+    const double stiffness =
+        impact::calc_face_stiffness(bodies_.calc_compliance(one.forces.a, one.forces.b), calc_area(corners, one.normal));
+    for (const int k : face) {
+      is_taken[k] = 1;
+      if (stiffness > 0.0) springs[k] = {.stiffness = stiffness / static_cast<double>(face.size()), .exponent = 1.0};
+    }
+  }
+  return springs;
+}
+
+void ModalImpacts::follow(ModalImpact& modal, Pair& pair, double length_s, TouchSets& touches) {
+  const double reach_m =
+      2.0 * bodies_.calc_closing_speed(pair.a, pair.b) * length_s + bodies_.get_swing(pair.a) + bodies_.get_swing(pair.b) + kTooDeep;
+  std::vector<Contact*> others;
+  for (Contact& c : pair.contacts) {
+    const auto same = std::find_if(modal.contacts.begin(), modal.contacts.end(), [&](const ModalContact& contact) {
+      return !contact.is_followed && contact.is_between(pair.a, pair.b) && contact.touch == c.touch.id;
+    });
+    if (same != modal.contacts.end())
+      place(*same, c, touches.find_closing(pair, c, length_s));
+    else
+      others.push_back(&c);
+  }
+  for (Contact* c : others) {
+    const bool is_near = c->touch.gap_m < reach_m;
+    if (ModalContact* nearest = find_nearest(modal, *c, is_near); nearest != nullptr) {
+      place(*nearest, *c, touches.find_closing(pair, *c, length_s));
+    } else if (is_near && modal.contacts.size() < kMaxFollowed) {
+      Hit hit{.a = c->a, .b = c->b, .touch = touches.find_closing(pair, *c, length_s), .triangles = c->triangles};
+      Made made;
+      add_contact(modal, *c, pair.sag_m, hit, false, made);
+      place(modal.contacts.back(), *c, hit.touch);
+    }
+  }
+}
+
+void ModalImpacts::part(Pair& pair, const TouchSets& touches) const {
+  double deepest_m = 0.0;
+  Vec3 normal{};
+  for_contacts(pair, [&](const ModalImpact& modal, int k) {
+    const double depth_m = modal.impact->calc_depth(k);
+    if (depth_m <= deepest_m) return;
+    deepest_m = depth_m;
+    const ModalContact& contact = modal.contacts[k];
+    normal = (contact.forces.a == pair.a ? 1.0 : -1.0) * contact.normal;
+  });
+  if (normal != Vec3{}) touches.part(pair, deepest_m, normal);
+}
+
+void ModalImpacts::follow(const Step& step, double length_s, TouchSets& touches) {
+  for (ModalImpact& modal : impacts_) {
+    if (std::none_of(modal.bodies.begin(), modal.bodies.end(), [&](int body) { return step.find(body) >= 0; })) continue;
+    for (ModalContact& contact : modal.contacts) contact.is_followed = false;
+    for (int n = 0; const impact::Body& b : modal.impact->get_bodies())
+      if (const int body = modal.bodies[n++]; bodies_.has_modes(body)) note_swing(bodies_, body, b.q, b.q_dot);
+    const auto is_in = [&](int body) { return std::find(modal.bodies.begin(), modal.bodies.end(), body) != modal.bodies.end(); };
+    const auto may_join = [&](int body) { return is_in(body) || (!bodies_.moves(body) && !bodies_.has_modes(body)); };
+    for (Pair* pair : step.island().pairs) {
+      if (pair->cord >= 0 || !step.has(*pair) || !(is_in(pair->a) || is_in(pair->b))) continue;
+      if (!may_join(pair->a) || !may_join(pair->b)) continue;
+      part(*pair, touches);
+      touches.search(*pair, length_s);
+      touches.complete_in_flight(*pair, length_s);
+      follow(modal, *pair, length_s, touches);
+    }
+  }
+}
+
+void ModalImpacts::advance(const Step& step, double to_s, double part_s, double window_end_s, TouchSets& touches) {
+  for (ModalImpact& modal : impacts_) {
+    const bool is_here = std::any_of(modal.bodies.begin(), modal.bodies.end(), [&](int body) { return step.find(body) >= 0; });
+    if (!is_here || !(part_s > 0.0)) continue;
+    std::vector<impact::Body> bodies = modal.impact->get_bodies();
+    const int count = static_cast<int>(bodies.size());
+    // A body that slept when it was struck has come to move, or belongs to another island: the impact cannot continue as it was.
+    bool is_whole = true;
+    for (int k = 0; k < count; ++k)
+      is_whole = is_whole && bodies_.moves(modal.bodies[k]) == (bodies[k].mass_kg > 0.0) && step.has(modal.bodies[k]);
+    if (!is_whole) {
+      release(modal, to_s, touches);  // its bodies stay where they are for this part
+      continue;
+    }
+    std::vector<joints::Spatial> pulls(count);
+    for (int k = 0; k < count; ++k) {
+      const int body = modal.bodies[k], n = step.find(body);
+      if (n < 0) continue;
+      impact::Body& b = bodies[k];
+      set_motion(body, b);
+      if (!b.on_joints) b.spin_acceleration_rad_s2 = (1.0 / step.length_s) * (step.free[n].placed.spin - bodies_.placed(body).spin);
+      // Cords and other contacts act as long as the impact continues in this part, whose own steps may be longer.
+      const Vec3 free = b.on_joints ? step.free[n].state.velocity : bodies_.state(body).velocity + step.length_s * bodies_.gravity();
+      pulls[k] = {(1.0 / step.length_s) * (step.movers[n].velocity - free),
+                  (1.0 / step.length_s) * (step.movers[n].spin - step.free[n].placed.spin)};
+      b.acceleration_m_s2 = b.acceleration_m_s2 + pulls[k].linear;
+      b.spin_acceleration_rad_s2 = b.spin_acceleration_rad_s2 + pulls[k].angular;
+    }
+    std::vector<impact::Contact> springs;
+    std::list<std::vector<double>> shapes;
+    const std::vector<impact::Spring> laws = find_springs(modal, part_s);
+    for (int k = 0; const ModalContact& contact : modal.contacts) {
+      impact::Contact& spring = springs.emplace_back(modal.impact->get_contact(k));
+      spring.spring = laws[k++];
+      spring.where_m = find_station(contact);
+      if (contact.is_followed) spring.normal = contact.normal;
+      if (!contact.shape_a.empty()) spring.shape_a = shapes.emplace_back(turn_to_world(contact.forces.a, contact.shape_a));
+      if (!contact.shape_b.empty()) spring.shape_b = shapes.emplace_back(turn_to_world(contact.forces.b, contact.shape_b));
+      spring.gap_m =
+          contact.is_followed ? std::max(contact.gap_m + calc_yield(spring, bodies), 0.0) : -modal.impact->get_compression(k - 1);
+    }
+    modal.impact->update(bodies, springs);
+    const double begun_s = modal.impact->get_time();
+    const bool ended = modal.impact->advance(to_s - modal.start_s);
+    bodies = modal.impact->get_bodies();
+    for (int k = 0; k < count; ++k) {
+      const int body = modal.bodies[k], n = step.find(body);
+      if (n < 0) continue;
+      if (const int number = step.free[n].articulation; number >= 0) {
+        move_articulation(step.articulations[number], bodies[k], modal.impact->get_time() - begun_s, step.length_s);
+        continue;
+      }
+      State& s = bodies_.state(body);
+      s.velocity = bodies[k].velocity_m_s;
+      s.centre = s.centre + bodies[k].moved_m;
+      s.rotation = normalise(multiply(make_turn(bodies[k].turned_rad), s.rotation));
+      const Mat3 rotation = make_rotation(s.rotation);
+      s.momentum = rotation * (bodies_.solid(body).inertia_kg_m2 * (transpose(rotation) * bodies[k].spin_rad_s));
+    }
+    keep_pulses(modal);
+    // Once a window: pieces of a small step each would be many.
+    if (to_s >= window_end_s - 1e-9)
+      for (ModalContact& contact : modal.contacts) report(contact);
+    const bool is_slow = std::all_of(modal.bodies.begin(), modal.bodies.end(),
+                                     [&](int body) { return !bodies_.moves(body) || bodies_.calc_speed(body) < kRattling; });
+    if (!ended && to_s - modal.start_s <= (is_slow ? kLongest : kLongestOfAll)) continue;
+    // It has gone beyond the end of the part, and so did the pulls.
+    const double beyond_s = modal.start_s + modal.impact->get_time() - to_s;
+    const std::vector<int> moved = modal.bodies;
+    release(modal, to_s, touches);
+    for (int k = 0; k < count; ++k)
+      if (beyond_s > 0.0 && bodies_.moves(moved[k])) undo_pull(step, moved[k], pulls[k], beyond_s);
+  }
+  impacts_.remove_if([](const ModalImpact& modal) { return modal.impact == nullptr; });
+}
+
+/// The articulation of a body that an impact has moved by `time_s`, of which the contacts of the step have their part.
+void ModalImpacts::move_articulation(const ArticulationStep& step, const impact::Body& struck, double time_s, double step_s) {
+  Articulation& articulation = *step.articulation;
+  joints::Mechanism& mechanism = *articulation.mechanism;
+  const auto calc = [&] {
+    double kinetic = 0.0, all = articulation.now.lost_j;
+    for (const int body : articulation.bodies) {
+      kinetic += calc_kinetic(bodies_.solid(body), bodies_.state(body));
+      all += calc_energy(bodies_.solid(body), bodies_.state(body), bodies_.gravity());
+    }
+    return std::pair(kinetic, all);
+  };
+  const double before = calc().second;
+  joints::Coordinates moved = bodies_.fly(articulation, articulation.now, time_s);
+  std::vector<joints::Spatial> impulses(articulation.bodies.size()), shifts(articulation.bodies.size());
+  impulses[articulation.struck] = {struck.impulse_n_s, struck.couple_n_m_s};
+  shifts[articulation.struck] = {struck.shift_n_s2, struck.turning_n_m_s2};
+  const std::vector<double> du = mechanism.calc_push(moved, impulses), dq = mechanism.calc_push(moved, shifts);
+  moved = mechanism.move(moved, dq, 0.0, 1.0);
+  moved = mechanism.move(moved, du, 1.0, 0.0);
+  if (!step.push.empty()) moved = mechanism.move(moved, step.push, time_s / step_s, 0.5 * time_s * time_s / step_s);
+  articulation.now = std::move(moved);
+  bodies_.place(articulation);
+  if (!step.push.empty() || !articulation.is_anchored) return;
+  // The impact has taken its mobility for constant: the difference of the motion's energy from the contacts' work is corrected, as a change
+  // of all its velocities by the same part.
+  const auto [kinetic, after] = calc();
+  const double gained = after - before - struck.work_j;
+  if (!(std::abs(gained) < kRight * kinetic)) return;
+  const double part = std::sqrt(1.0 - gained / kinetic);
+  for (double& u : articulation.now.u) u *= part;
+  bodies_.place(articulation);
+}
+
+/// Takes the effect of cords and other contacts on a body in the last `time_s` back.
+void ModalImpacts::undo_pull(const Step& step, int body, const joints::Spatial& pull, double time_s) {
+  if (pull.linear == Vec3{} && pull.angular == Vec3{}) return;
+  if (const int number = step.free[step.find(body)].articulation; number >= 0) {
+    const ArticulationStep& a = step.articulations[number];
+    joints::Coordinates& now = a.articulation->now;
+    if (!a.push.empty()) now = a.articulation->mechanism->move(now, a.push, -time_s / step.length_s, 0.5 * time_s * time_s / step.length_s);
+    bodies_.place(*a.articulation);
+    return;
+  }
+  State& s = bodies_.state(body);
+  s.velocity = s.velocity - time_s * pull.linear;
+  s.centre = s.centre + (0.5 * time_s * time_s) * pull.linear;
+  s.momentum = s.momentum - time_s * (bodies_.calc_inertia(body) * pull.angular);
+  bodies_.place(body);
+}
+
+/// Takes the forces of an impact since the last time into the frames of its bodies, as they are now.
+void ModalImpacts::keep_pulses(ModalImpact& modal) {
+  for (const impact::Pulse& pulse : modal.impact->take_pulses()) {
+    ModalContact& contact = modal.contacts[pulse.contact];
+    Forces& forces = contact.forces;
+    const double start_s = modal.start_s + pulse.start_s;
+    // A contact that was open for a while begins again.
+    if (!forces.on_a.empty() &&
+        std::abs(start_s - forces.time_s - forces.step_s * static_cast<double>(forces.on_a.size())) > 0.5 * forces.step_s)
+      report(contact);
+    if (forces.on_a.empty()) forces.time_s = start_s;
+    forces.step_s = pulse.step_s;
+    const Mat3 to_a = transpose(bodies_.placed(forces.a).rotation),
+               to_b = forces.b >= 0 ? transpose(bodies_.placed(forces.b).rotation) : Mat3{};
+    for (const Vec3& impulse : pulse.impulse_n_s) {
+      forces.on_a.push_back(to_a * impulse);
+      if (forces.b >= 0) forces.on_b.push_back(to_b * (-1.0 * impulse));
+    }
+  }
+}
+
+void ModalImpacts::report(ModalContact& contact) {
+  Forces& forces = contact.forces;
+  if (forces.on_a.empty()) return;
+  forces_.push_back(forces);
+  forces.on_a.clear();
+  forces.on_b.clear();
+  forces.continues = true;
+}
+
+/// Returns the modal states of an impact's bodies. It may be ahead of `time_s` by a part of its step.
+void ModalImpacts::release(ModalImpact& modal, double time_s, TouchSets& touches) {
+  keep_pulses(modal);
+  for (ModalContact& contact : modal.contacts) report(contact);
+  const std::vector<impact::Body> bodies = modal.impact->get_bodies();
+  const double reached_s = modal.start_s + modal.impact->get_time();
+  if (!modal.impact->has_ended()) ++ledger_.costs.ended_impacts;
+  ledger_.costs.longest_impact_s = std::max(ledger_.costs.longest_impact_s, modal.impact->get_time());
+  const impact::Books books = modal.impact->get_books();
+  // Yielded compression keeps the work of its recovery against the weight.
+  double deepest_m = 0.0, weight_n = 0.0;
+  for (int k = 0; k < static_cast<int>(modal.contacts.size()); ++k) deepest_m = std::max(deepest_m, modal.impact->calc_depth(k));
+  for (const impact::Body& b : bodies) weight_n += b.mass_kg * norm(bodies_.gravity());
+  const double kept_j = std::clamp(weight_n * deepest_m - books.spring, 0.0, std::max(books.yielded, 0.0));
+  ledger_.lose(books.dissipated_modes + books.dissipated_contact + books.yielded - kept_j + books.dissipated_friction + books.above_band);
+  for (int k = 0; const impact::Body& b : bodies) {
+    const int body = modal.bodies[k++];
+    bodies_.set_in_impact(body, false);
+    if (bodies_.has_modes(body)) states_.set(body, {b.q, b.q_dot, reached_s});
+    if (Articulation* articulation = bodies_.find_articulation(body); articulation != nullptr && bodies_.moves(body)) {
+      articulation->struck = -1;
+      if (reached_s > time_s) articulation->now = bodies_.fly(*articulation, articulation->now, time_s - reached_s);
+      bodies_.place(*articulation);
+      continue;
+    }
+    State& s = bodies_.state(body);
+    if (bodies_.moves(body) && reached_s > time_s) s = fly(bodies_.solid(body), s, bodies_.gravity(), time_s - reached_s);
+    bodies_.place(body);
+  }
+  const double stored_j = (books.spring + kept_j) / static_cast<double>(modal.contacts.size());
+  for (int k = 0; const ModalContact& contact : modal.contacts)
+    touches.release(contact.forces.a, contact.forces.b, std::max(0.0, modal.impact->calc_depth(k++)), stored_j);
+  modal.impact = nullptr;
+  modal.bodies.clear();
+}
+
+void ModalImpacts::end(ModalImpact& modal, TouchSets& touches) {
+  release(modal, bodies_.get_time(), touches);
+  impacts_.remove_if([](const ModalImpact& m) { return m.impact == nullptr; });
+}
+
+void ModalImpacts::add_to(Books& books) const {
+  for (const ModalImpact& modal : impacts_) {
+    const impact::Books inside = modal.impact->get_books();
+    books.modes_j += inside.modal;
+    books.springs_j += inside.spring + inside.yielded;
+    books.lost_j += inside.dissipated_modes + inside.dissipated_contact + inside.dissipated_friction + inside.above_band;
+  }
+}
+
+}  // namespace carillon::rigid

@@ -1,0 +1,127 @@
+// Impacts in which modes take part.
+#pragma once
+
+#include <list>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "runtime/physics/impact/impact.hpp"
+#include "runtime/physics/rigid/instants.hpp"
+#include "runtime/physics/rigid/modal_states.hpp"
+#include "runtime/physics/rigid/rigid_impact.hpp"
+#include "runtime/physics/rigid/step.hpp"
+
+namespace carillon::rigid {
+
+/// A contact of an impact with modes.
+struct ModalContact {
+  Forces forces;                         // bodies, places, and impulses that are not reported yet
+  impact::Spring spring;                 // of this place alone
+  std::vector<double> shape_a, shape_b;  // axes of the meshes; empty: does not ring
+  Vec3 station{};                        // of the point, from the centre of the one that moves, axes of its mesh
+  std::uint64_t touch = 0;               // name of its touch
+  bool is_sharp = false;                 // a corner: where it bears with others, of a face
+  bool is_followed = false;              // in the present touch set,
+  Vec3 normal{};                         // with this normal to side a
+  double gap_m = 0.0;                    // and this gap of the rigid surfaces
+
+  bool is_between(int a, int b) const { return (forces.a == a && forces.b == b) || (forces.a == b && forces.b == a); }
+};
+
+/// An impact with modes that is not over.
+struct ModalImpact {
+  std::unique_ptr<impact::Impact> impact;
+  double start_s = 0.0;
+  std::vector<int> bodies;  // in the order of the impact's
+  std::vector<ModalContact> contacts;
+};
+
+/// Impacts that are integrated with the modes of their bodies inside (runtime/physics/impact), over as many small steps as they take. Their bodies
+/// take their motion from them; gravity and other contacts enter as accelerations, a small step at a time. Invariant: a
+/// body, and so its modal state, is in one impact at a time.
+class ModalImpacts {
+ public:
+  ModalImpacts(Bodies& bodies, ModalStates& states, Ledger& ledger) : bodies_(bodies), states_(states), ledger_(ledger) {}
+
+  const std::list<ModalImpact>& list() const { return impacts_; }
+  /// Is there an impact between the two bodies of a pair, at that place? Points get other names while bodies roll.
+  bool is_pressed(const Pair& pair, const Vec3& where) const;
+
+  /// Limits the restitution of every hit by the energy that its modes take; true where an impact has to be integrated.
+  bool predict(const Step& step, Collision& collision);
+  /// Begins an impact, or lets the hits join one that is not over. False where there are too many points: the rigid impact stands.
+  bool begin(const Step& step, Collision& collision, const Instants& instants, TouchSets& touches);
+  /// A rigid impact ends the impacts with modes that its bodies were moved by.
+  void end(const std::vector<Hit>& hits, TouchSets& touches);
+  /// Ends impacts with slow touches elsewhere, or touches deeper than by their springs and modes, at the time of the touches.
+  void end_where_touching(const Step& step, TouchSets& touches);
+  /// Moves contacts of impacts to their touches; touches that may close in a step become open contacts.
+  void follow(const Step& step, double length_s, TouchSets& touches);
+  /// Begins impacts of ringing bodies before contact of their deformed surfaces in a step.
+  void begin_early(const Step& step, double length_s, const Instants& instants);
+  /// Depth of a pair by springs and modes of its impact [m].
+  double calc_depth(const Pair& pair) const;
+  /// Moves the impacts of an island to the time `to_s`, `part_s` later. The step has the effect of gravity and of other contacts on
+  /// their bodies. Forces are reported where the window ends.
+  void advance(const Step& step, double to_s, double part_s, double window_end_s, TouchSets& touches);
+  /// Forces since the last call.
+  std::vector<Forces> take_forces() { return std::exchange(forces_, {}); }
+  /// Energies in modes and springs of impacts, and losses there.
+  void add_to(Books& books) const;
+
+ private:
+  /// Which hits and resting contacts of a collision become contacts of an impact.
+  struct Selection {
+    std::vector<int> order;
+    std::vector<char> rests;  // of all contacts of the collision
+  };
+
+  /// Bodies and contacts of a new impact.
+  struct Made {
+    std::vector<impact::Body> bodies;
+    std::vector<impact::Contact> springs;
+    std::list<std::vector<double>> shapes;  // of the contacts
+  };
+
+  ModalImpact* find(int body);
+  ModalImpact* find_own(const Step& step, const Hit& hit);
+  std::optional<Selection> select(const Step& step, const Collision& collision, const Instants& instants);
+  void follow(ModalImpact& modal, Pair& pair, double length_s, TouchSets& touches);
+  void part(Pair& pair, const TouchSets& touches) const;
+  ModalContact* find_nearest(ModalImpact& modal, const Contact& touch, bool is_near) const;
+  void place(ModalContact& contact, Contact& touch, const geometry::Touch& at);
+  std::vector<impact::Spring> find_springs(const ModalImpact& modal, double part_s) const;
+  static double calc_yield(const impact::Contact& contact, const std::vector<impact::Body>& bodies);
+  bool add_resting(const Collision& collision, const Instants& instants, std::vector<int>& order) const;
+  bool shares_articulations(const std::vector<Hit>& hits, const std::vector<int>& order) const;
+  bool join(const std::vector<Hit>& hits, Selection& selection, TouchSets& touches, ModalImpact*& joined);
+  double calc_swing(const Contact& touch);
+  bool may_begin_early(const Step& step, const Pair& pair, const Instants& instants) const;
+  double fly_to_modes(const std::vector<Hit>& hits, const std::vector<int>& order);
+  int add_body(ModalImpact& modal, int body, std::vector<impact::Body>& made);
+  void add_contact(ModalImpact& modal, Contact& touch, double sag_m, Hit& hit, bool rests, Made& made);
+  impact::Body make_body(int body);
+  void set_motion(int body, impact::Body& made) const;
+  std::vector<double> turn_to_world(int body, const std::vector<double>& shape) const;
+  Vec3 find_station(int a, int b, const geometry::Touch& touch) const;
+  Vec3 find_station(const ModalContact& contact) const;
+  template <typename Do>
+  void for_contacts(const Pair& pair, Do&& act) const;
+  double calc_depth(const Pair& pair, const Vec3& where) const;
+  void move_articulation(const ArticulationStep& step, const impact::Body& struck, double time_s, double step_s);
+  void undo_pull(const Step& step, int body, const joints::Spatial& pull, double time_s);
+  void keep_pulses(ModalImpact& modal);
+  void report(ModalContact& contact);
+  void release(ModalImpact& modal, double time_s, TouchSets& touches);
+  void end(ModalImpact& modal, TouchSets& touches);
+
+  Bodies& bodies_;
+  ModalStates& states_;
+  Ledger& ledger_;
+  std::list<ModalImpact> impacts_;
+  std::vector<Forces> forces_;
+};
+
+}  // namespace carillon::rigid

@@ -1,0 +1,42 @@
+// Bodies that are too deep in each other are moved apart.
+#pragma once
+
+#include <vector>
+
+#include "runtime/physics/rigid/bodies.hpp"
+#include "runtime/physics/rigid/solver.hpp"
+#include "runtime/physics/rigid/step.hpp"
+#include "runtime/physics/rigid/touch_sets.hpp"
+
+namespace carillon::rigid {
+
+/// Displaces the bodies of an island so that no touch is deeper than allowed, by the least displacement in the norm of their masses.
+/// Invariants: a free island keeps its momentum and angular momentum; energy is only gained where motion cannot pay for it, and is booked
+/// as lifted then. Bodies on joints and in impacts with modes stay where they are.
+class Projection {
+ public:
+  Projection(Bodies& bodies, TouchSets& touches, Ledger& ledger) : bodies_(bodies), touches_(touches), ledger_(ledger) {}
+
+  /// At the beginning of a step. Touches deeper than `allowed_m` and their allowance (Pair::sag_m) are opened.
+  void run(const Step& step, double allowed_m);
+
+ private:
+  bool is_movable(int body) const {
+    return bodies_.moves(body) && !bodies_.is_moved_by_impact(body) && bodies_.find_articulation(body) == nullptr;
+  }
+  bool can_part(const Step& step, const Pair& pair) const;
+  double find_excess(const Step& step) const;
+  std::vector<Point> make_points(const Step& step, bool& is_held) const;
+  void limit(const Step& step, double most_m, std::vector<Mover>& displacements) const;
+  void move(const Step& step, const std::vector<Mover>& displacements, bool is_held);
+  void pay(const Step& step, const std::vector<Mover>& displacements, double owed_j);
+  Vec3 calc_angular_momentum(const Step& step) const;
+  void turn(const Step& step, const Vec3& gained);
+
+  Bodies& bodies_;
+  TouchSets& touches_;
+  Ledger& ledger_;
+  Solver solver_;
+};
+
+}  // namespace carillon::rigid

@@ -1,0 +1,282 @@
+// Method: a body that has been slow for a while sleeps if contact forces exist that balance it at rest. An island sleeps as a whole. Where
+//   others of the island move, bodies sleep by themselves, with the forces of the others on them as they are. These forces are watched:
+//   where they change by more than a part of its weight a sleeping body wakes, alone, and so may those that lean on it, one after another.
+// Source: J. J. Moreau, "Unilateral contact and dry friction in finite freedom dynamics" (1988), the solution with zero velocities.
+#include "runtime/physics/rigid/rest.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include "runtime/physics/rigid/groups.hpp"
+#include "runtime/physics/rigid/limits.hpp"
+
+namespace carillon::rigid {
+namespace {
+
+constexpr double kPatience = 0.02;  // s; slower than kSlow for so long, a body may be about to rest
+constexpr double kApart = 0.1;      // s; slow for so long, a body may sleep among others that move,
+constexpr double kCalm = 0.05;      // s; if those that it touches have been slow for so long
+constexpr double kStill = 5e-4;     // m/s; and nothing is faster where it touches
+constexpr double kShift = 0.05;     // of its weight: change of the forces on it that wakes it
+
+}  // namespace
+
+void Rest::reset(const std::vector<int>& bodies) {
+  for (const int body : bodies) paces_[body].slow_s = 0.0;
+}
+
+bool Rest::may_sleep(const std::vector<int>& bodies, double time_s) {
+  bool all = true;
+  for (const int body : bodies) {
+    Pace& pace = paces_[body];
+    pace.slow_s = bodies_.calc_speed(body) < kSlow && !bodies_.is_moved_by_impact(body) ? pace.slow_s + time_s : 0.0;
+    all = all && pace.slow_s > kPatience && bodies_.get_time() >= pace.next_proof_s;
+  }
+  return all;
+}
+
+bool Rest::try_articulation(Articulation& articulation, double length_s) {
+  if (!articulation.is_anchored || !may_sleep(articulation.bodies, length_s) || !bodies_.is_balanced(articulation)) return false;
+  for (const int body : articulation.bodies) ledger_.lose(calc_kinetic(bodies_.solid(body), bodies_.state(body)));
+  std::fill(articulation.now.u.begin(), articulation.now.u.end(), 0.0);
+  bodies_.place(articulation);
+  for (const int body : articulation.bodies) bodies_.set_asleep(body, true);
+  return true;
+}
+
+/// Puts an island, or a part of one on which others pull, to sleep if it is balanced at rest.
+Rest::Balance Rest::try_sleep(Island& island, double h, const std::vector<joints::Spatial>& pulls) {
+  bool touches = !pulls.empty();
+  double slow_s = std::numeric_limits<double>::infinity();
+  for (const Pair* pair : island.pairs) {
+    if (pair->sag_m > kDeep) return Balance::none;  // it comes up first
+    touches = touches || pair->has_closed_gap();
+  }
+  bodies_.for_articulations(island.bodies, [&](const Articulation& articulation) { touches = touches || articulation.is_anchored; });
+  if (!touches) return Balance::none;
+  std::vector<State> kept;
+  std::vector<joints::Coordinates> kept_coordinates;
+  bodies_.for_articulations(island.bodies, [&](Articulation& articulation) {
+    kept_coordinates.push_back(articulation.now);
+    std::fill(articulation.now.u.begin(), articulation.now.u.end(), 0.0);
+  });
+  for (const int body : island.bodies) {
+    State& s = bodies_.state(body);
+    kept.push_back(s);
+    slow_s = std::min(slow_s, paces_[body].slow_s);
+    s.velocity = s.momentum = {};
+    bodies_.place(body);
+  }
+  trial_.begin(island);
+  const bool balanced = problem_.solve_rest(trial_, h, pulls, slow_s);
+  std::vector<Point> points = trial_.points;
+  const std::vector<ContactRef> rows = trial_.rows;
+  const bool stands = !balanced || pulls.empty() || problem_.solve_rest(trial_, h, {}, slow_s);
+  trial_.end();
+  for (int n = 0; const int body : island.bodies) {
+    const State& before = kept[n++];
+    if (balanced) {
+      bodies_.set_asleep(body, true);
+      ledger_.lose(calc_kinetic(bodies_.solid(body), before));
+    } else {
+      bodies_.state(body) = before;
+      (pulls.empty() ? paces_[body].next_proof_s : paces_[body].next_part_s) = bodies_.get_time() + std::min(0.5 * slow_s, kLong);
+      bodies_.place(body);
+    }
+  }
+  if (!balanced) {
+    bodies_.for_articulations(island.bodies, [&, k = 0](Articulation& articulation) mutable {
+      articulation.now = kept_coordinates[k++];
+      bodies_.place(articulation);
+    });
+    return Balance::none;
+  }
+  for (int n = 0; const Point& p : points) {
+    Contact& c = rows[n++].get();
+    c.impulse = p.impulse;
+    if (c.is_load) c.impulse = c.impulse + h * c.rest_n;
+    c.couple = p.couple;
+    c.step_s = h;
+    c.touching = dot(c.impulse, c.touch.normal) > 0.0;
+    c.rests = c.is_load = c.touch.gap_m <= kDeep;
+    c.rest_n = (1.0 / h) * c.impulse;
+  }
+  return stands ? Balance::stands : Balance::leans;
+}
+
+/// Bodies that may sleep while others of their island move.
+std::vector<char> Rest::find_slow() const {
+  std::vector<char> is_slow(bodies_.count(), 0);
+  for (int i = 0; i < bodies_.count(); ++i)
+    is_slow[i] = bodies_.moves(i) && paces_[i].slow_s > kApart && bodies_.get_time() >= paces_[i].next_part_s &&
+                 !bodies_.is_moved_by_impact(i) && bodies_.find_articulation(i) == nullptr;
+  if (std::none_of(is_slow.begin(), is_slow.end(), [](char slow) { return slow != 0; })) return {};
+  const auto is_one = [&](int body) { return body >= 0 && is_slow[body] != 0; };
+  for (const Pair* pair : windows_.near()) {
+    if ((!is_one(pair->a) && !is_one(pair->b)) || !(pair->touches() || pair->sag_m > kDeep)) continue;
+    const bool moves_there = std::any_of(pair->contacts.begin(), pair->contacts.end(), [&](const Contact& c) {
+      return c.touching && norm(bodies_.calc_velocity(c.a, c.touch.where_m) - bodies_.calc_velocity(c.b, c.touch.where_m)) > kStill;
+    });
+    for (const bool is_a : {true, false}) {
+      const int body = is_a ? pair->a : pair->b, other = is_a ? pair->b : pair->a;
+      // Forces on articulated bodies belong to the joints.
+      const bool is_calm = !bodies_.moves(other) || (paces_[other].slow_s > kCalm && !bodies_.is_moved_by_impact(other) &&
+                                                     bodies_.find_articulation(other) == nullptr);
+      if (is_one(body) && (pair->cord >= 0 || moves_there || !is_calm || pair->sag_m > kDeep)) is_slow[body] = 0;
+    }
+  }
+  return is_slow;
+}
+
+void Rest::try_parts() {
+  const std::vector<char> is_slow = find_slow();
+  if (is_slow.empty()) return;
+  const auto is_one = [&](int body) { return body >= 0 && is_slow[body] != 0; };
+  Groups groups(bodies_.count());
+  for (const Pair* pair : windows_.near())
+    if (is_one(pair->a) && is_one(pair->b) && pair->touches()) groups.join(pair->a, pair->b);
+  struct Part {
+    Island island;
+    std::vector<Pair*> bounds;  // to bodies that keep moving, with or without forces
+  };
+  std::map<int, Part> parts;
+  for (Pair* pair : windows_.near()) {
+    if (!is_one(pair->a) && !is_one(pair->b)) continue;
+    Part& part = parts[groups.find(is_one(pair->a) ? pair->a : pair->b)];
+    const auto is_bound_to = [&](int body) { return bodies_.moves(body) && !is_one(body); };
+    if (!is_bound_to(pair->a) && !is_bound_to(pair->b))
+      part.island.pairs.push_back(pair);
+    else if (pair->touches() || pair->has_closed_gap())
+      part.bounds.push_back(pair);
+  }
+  for (int i = 0; i < bodies_.count(); ++i)
+    if (is_one(i)) parts[groups.find(i)].island.bodies.push_back(i);
+  for (auto& [first, part] : parts) {
+    if (part.bounds.empty()) continue;  // an island of its own: try_island() handles it
+    std::vector<joints::Spatial> pulls(part.island.bodies.size());
+    for (const Pair* pair : part.bounds) {
+      const bool is_a = is_one(pair->a);
+      const auto at = std::find(part.island.bodies.begin(), part.island.bodies.end(), is_a ? pair->a : pair->b);
+      for (const Contact& c : pair->contacts) add_pull(bodies_, c, is_a, c.calc_force(), pulls[at - part.island.bodies.begin()]);
+    }
+    for (Pair* pair : part.island.pairs) touches_.refresh(*pair);
+    // A part that stands without the others bears them as a fixed body does; one that leans on them, or is carried, is their load.
+    const Balance found = try_sleep(part.island, options_.step_s, pulls);
+    if (found == Balance::none) continue;
+    for (Pair* pair : part.bounds)
+      for (Contact& c : pair->contacts) {
+        c.rests = c.touch.gap_m <= kDeep;
+        c.is_load = found == Balance::leans && c.rests;
+        c.rest_n = c.calc_force();
+      }
+  }
+}
+
+/// Wakes a body and all that touch it, and so on, or it alone.
+std::vector<int> Rest::wake(int body, int by, bool alone) {
+  std::vector<int> woken{body}, awake;
+  while (!woken.empty()) {
+    const int i = woken.back();
+    woken.pop_back();
+    if (!bodies_.is_asleep(i)) continue;
+    bodies_.set_asleep(i, false);
+    awake.push_back(i);
+    paces_[i].slow_s = 0.0;
+    windows_.wake(i, by);
+    for (auto& [key, pair] : touches_.pairs()) {
+      if (key.first != i && key.second != i) continue;
+      windows_.add(pair);
+      const int other = key.first == i ? key.second : key.first;
+      const bool sleeps = bodies_.is_asleep(other);
+      if (!alone && pair.touches() && sleeps) woken.push_back(other);
+      for (Contact& c : pair.contacts)
+        if (!sleeps)
+          c.rests = c.is_load = false;
+        else if (dot((c.a == i ? 1.0 : -1.0) * c.rest_n, bodies_.gravity()) <= 0.0)
+          c.is_load = false;  // the sleeping body below it bears any load
+    }
+    for (Pair& pair : touches_.cord_pairs()) {
+      if (pair.a != i && pair.b != i) continue;
+      windows_.add(pair);
+      const int other = pair.a == i ? pair.b : pair.a;
+      Contact& c = pair.contacts.front();
+      c.rests = c.is_load = false;
+      if (c.touching && other >= 0) woken.push_back(other);
+    }
+    if (const Articulation* articulation = bodies_.find_articulation(i); articulation != nullptr)
+      woken.insert(woken.end(), articulation->bodies.begin(), articulation->bodies.end());
+  }
+  return awake;
+}
+
+void Rest::watch(Pair& pair, double step_s) {
+  const auto resting = std::count_if(pair.contacts.begin(), pair.contacts.end(), [](const Contact& c) { return c.rests; });
+  touches_.update(pair, step_s);
+  const bool a_moves = bodies_.moves(pair.a);
+  const int body = a_moves ? pair.b : pair.a, by = a_moves ? pair.a : pair.b;
+  if (!bodies_.is_asleep(body)) return;
+  const auto left =
+      std::count_if(pair.contacts.begin(), pair.contacts.end(), [](const Contact& c) { return c.rests && c.touch.gap_m <= kDeep; });
+  if (left < resting) {
+    wake(body, by, bodies_.find_articulation(body) == nullptr);
+    return;
+  }
+  const bool comes = std::any_of(pair.contacts.begin(), pair.contacts.end(), [&](const Contact& c) {
+    const double approach = bodies_.calc_approach(c.touch, c.a, c.b);
+    const double pull = (a_moves ? -1.0 : 1.0) * dot(bodies_.gravity(), c.touch.normal);
+    const double fallen_m = 0.5 * std::max(pull, 0.0) * step_s * step_s;
+    // Where the two rest on each other, slow changes are left to wake_unbalanced().
+    return (resting == 0 || approach > kSlowest) && c.touch.gap_m - approach * step_s - fallen_m <= kTouch;
+  });
+  if (comes) wake(body, by);
+}
+
+void Rest::wake_unbalanced() {
+  struct Change {
+    joints::Spatial pull;
+    int by = -1;
+    bool is_struck = false;
+  };
+  std::map<int, Change> changes;
+  for (const Pair* pair : windows_.near()) {
+    if (pair->b < 0 || pair->cord >= 0) continue;
+    const bool is_a = bodies_.is_asleep(pair->a);
+    const int body = is_a ? pair->a : pair->b, other = is_a ? pair->b : pair->a;
+    if (!bodies_.is_asleep(body) || !bodies_.moves(other) || !windows_.is_due(other)) continue;
+    for (const Contact& c : pair->contacts) {
+      if (!c.rests && !c.touching) continue;
+      Change& change = changes[body];
+      change.by = other;
+      change.is_struck = change.is_struck || bodies_.is_moved_by_impact(other);
+      add_pull(bodies_, c, is_a, c.calc_force() - (c.rests ? c.rest_n : Vec3{}), change.pull);
+    }
+  }
+  for (const auto& [body, change] : changes) {
+    const Solid& solid = bodies_.solid(body);
+    const double size = norm(change.pull.linear) + norm(change.pull.angular) / solid.radius_m;
+    if (change.is_struck || size > kShift * solid.mass_kg * norm(bodies_.gravity()))
+      wake(body, change.by, bodies_.find_articulation(body) == nullptr);
+  }
+}
+
+bool Rest::wake_struck(Step& step, const std::vector<ContactRef>& contacts) {
+  bool any = false;
+  std::vector<Pair*>& pairs = step.island().pairs;
+  const auto add = [&](int body) {
+    step.add(body);
+    for (Pair* pair : windows_.near())
+      if ((pair->a == body || pair->b == body) && step.has(*pair) && std::find(pairs.begin(), pairs.end(), pair) == pairs.end())
+        pairs.push_back(pair);
+  };
+  for (const ContactRef& ref : contacts)
+    for (const int body : {ref.pair->a, ref.pair->b}) {
+      if (!bodies_.is_asleep(body)) continue;
+      any = true;
+      for (const int woken : wake(body, step.body(0), true)) add(woken);
+    }
+  return any;
+}
+
+}  // namespace carillon::rigid

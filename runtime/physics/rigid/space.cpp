@@ -1,0 +1,256 @@
+// Method: the loop over windows, steps, islands and the impacts within a step; the stages do the rest.
+#include "runtime/physics/rigid/space.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "runtime/physics/rigid/limits.hpp"
+
+namespace carillon::rigid {
+namespace {
+
+constexpr double kShortest = 1e-9;  // s; a shorter rest of a step is left out
+constexpr double kStruck = 5e-5;    // s; longest part of a step after the begin of an impact with modes
+constexpr int kMaxMissed = 30;      // in a step: instants at which nothing struck after all
+constexpr int kMaxSought = 3;       // of these, with a search for closings on the path
+constexpr int kMaxCompleted = 4;    // solutions of a step that are repeated with touches that were missing
+constexpr int kMaxImpacts = 4;      // of an island in a step, each at its instant; an island with more is crowded
+constexpr int kMinImpacts = 2;      // the same of the largest islands, each of whose impacts costs more
+constexpr int kStruckBodies = 48;   // bodies of an island times its impacts in a step
+
+}  // namespace
+
+Space::Space(std::vector<Solid> solids, std::vector<State> states, std::optional<Ground> ground, const Vec3& gravity,
+             const Options& options, const Links& links)
+    : options_(options),
+      bodies_(std::move(solids), std::move(states), ground, gravity, links.joints, options.joint_tolerance),
+      modal_states_(bodies_, ledger_),
+      modal_impacts_(bodies_, modal_states_, ledger_),
+      touches_(bodies_, links.cords, modal_impacts_, ledger_),
+      windows_(bodies_, touches_, options_, ledger_),
+      projection_(bodies_, touches_, ledger_),
+      problem_(bodies_, touches_, options_, ledger_),
+      instants_(bodies_, touches_),
+      rigid_impact_(bodies_, touches_),
+      rest_(bodies_, touches_, windows_, problem_, options_, ledger_),
+      step_(bodies_) {}
+
+void Space::list_contacts(std::vector<const Contact*>& out) const {
+  out.clear();
+  for (const Pair* pair : windows_.near())
+    if (pair->cord < 0 && (bodies_.moves(pair->a) || bodies_.moves(pair->b)))
+      for (const Contact& c : pair->contacts) out.push_back(&c);
+}
+
+Books Space::calc_books() const {
+  Books books;
+  bodies_.add_to(books);
+  modal_states_.add_to(books, get_time());
+  modal_impacts_.add_to(books);
+  touches_.add_to(books);
+  ledger_.add_to(books);
+  return books;
+}
+
+void Space::skip_window(double end_s) {
+  windows_.skip(end_s);
+  bodies_.set_time(windows_.get_end());
+}
+
+void Space::step(double end_s) {
+  if (at_window_)
+    open_window(end_s);
+  else if (windows_.has_steps())
+    ++ledger_.costs.steps;
+  const double from_s = windows_.get_time();
+  bodies_.set_time(from_s);
+  if (windows_.has_steps()) {
+    for (std::size_t n = 0; n < windows_.near().size(); ++n) {  // waking adds pairs
+      Pair& pair = *windows_.near()[n];
+      if (const int stride = windows_.find_stride(pair); stride > 0) rest_.watch(pair, windows_.calc_length(stride));
+    }
+    rest_.wake_unbalanced();
+    windows_.sort_near();
+    for (Island& island : windows_.make_islands(modal_impacts_.list())) {
+      step_island(island, from_s, windows_.calc_length(island.stride));
+      ledger_.costs.body_steps += static_cast<std::int64_t>(island.bodies.size());
+    }
+  }
+  windows_.next_step();
+  bodies_.set_time(windows_.get_time());
+  at_window_ = windows_.is_over();
+}
+
+void Space::open_window(double end_s) {
+  if (options_.islands) rest_.try_parts();
+  windows_.open(end_s, modal_impacts_.list());
+  rest_.reset(windows_.fly_bodies());
+  for (Articulation& articulation : bodies_.articulations())
+    if (windows_.may_fly(articulation) && !rest_.try_articulation(articulation, windows_.get_length())) windows_.fly(articulation);
+  windows_.choose_steps();
+}
+
+void Space::step_island(Island& island, double start_s, double length_s) {
+  step_.begin(island);
+  double done = 0.0;
+  int impacts = 0, missed = 0, more = 0;
+  bool begun = false;
+  const bool wobbles = std::any_of(island.bodies.begin(), island.bodies.end(),
+                                   [&](int body) { return !bodies_.is_flat(body) && bodies_.calc_speed(body) > kSlow; });
+  const bool is_on_ground =
+      step_.count() == 1 && std::all_of(island.pairs.begin(), island.pairs.end(), [](const Pair* pair) { return pair->b < 0; });
+  const double open_m = is_on_ground ? kDeep : wobbles ? kTooDeep - kMissing : kTooDeep;
+  const int max_impacts = std::clamp(kStruckBodies / step_.count(), kMinImpacts, kMaxImpacts);
+  if (instants_.is_crowded(island, start_s)) {
+    strike_at_once(start_s, length_s);
+    impacts = max_impacts;
+  }
+  while (length_s - done > kShortest) {
+    const double h = impacts > 0 && !modal_impacts_.list().empty() ? std::min(length_s - done, kStruck) : length_s - done;
+    bodies_.set_time(start_s + done);
+    modal_impacts_.begin_early(step_, h, instants_);
+    modal_impacts_.follow(step_, h, touches_);
+    modal_impacts_.end_where_touching(step_, touches_);
+    const bool may_sleep = !std::exchange(begun, true) && rest_.may_sleep(island.bodies, h);
+    projection_.run(step_, open_m);
+    if (may_sleep && try_rest(island, h)) break;
+    touches_.forget_closing(step_);
+    bool is_completed = false;
+    for (int n = 0; n <= kMaxCompleted; ++n) {
+      problem_.predict(step_, h, false);
+      problem_.make_points(step_, impacts < max_impacts);
+      problem_.solve(step_);
+      if (!touches_.complete(step_, missed < kMaxSought)) break;
+      is_completed = true;
+    }
+    // A row stops a touch only at the end of a step, half of its way too deep: missing touches strike at the beginning instead.
+    if (is_completed && impacts >= max_impacts && more++ < kMaxCompleted && strike_at_once(start_s + done, h)) continue;
+    double at = h;
+    std::vector<ContactRef> first;
+    step_.together_s = kTogether;
+    const bool struck = impacts < max_impacts && instants_.find(step_, at, first);
+    problem_.keep_impulses(step_, at);
+    for (Pair* pair : island.pairs) touches_.travel(*pair, at, h);
+    move(start_s + done + at, at);
+    done += at;
+    if (struck) {
+      bodies_.set_time(start_s + done);
+      for (Pair* pair : island.pairs)
+        if (!pair->contacts.empty()) touches_.refresh(*pair);
+      if (instants_.confirm(step_, first, length_s - done, kDeep * (1 + missed))) {
+        strike(first);
+        if (++impacts == max_impacts) instants_.set_crowded(island, start_s + length_s);
+      } else if (++missed > kMaxMissed) {
+        impacts = max_impacts;
+      }
+    }
+    if (length_s - done > kShortest)
+      for (Pair* pair : island.pairs) touches_.update(*pair, length_s - done);
+  }
+  step_.end();
+}
+
+/// Puts an island to sleep if contact forces balance it: first with its bodies moved apart to kDeep, then as it is. If neither balances, no
+/// body is displaced: bodies that fall back from a lift would never come to rest.
+bool Space::try_rest(Island& island, double length_s) {
+  std::vector<State> kept;
+  std::vector<std::pair<double, Pair::Errors>> kept_pairs;
+  for (const int body : island.bodies) kept.push_back(bodies_.state(body));
+  for (const Pair* pair : island.pairs) kept_pairs.emplace_back(pair->stored_j, pair->errors);
+  Books before, after;
+  ledger_.add_to(before);
+  const std::int64_t pushes = ledger_.costs.pushes;
+  // A body that has come to lie may have more touches than the one on which it rocked.
+  for (Pair* pair : island.pairs) {
+    if (pair->b >= 0 || pair->contacts.size() != 1 || !pair->touches()) continue;
+    pair->memory.known = false;
+    touches_.search(*pair, length_s);
+  }
+  projection_.run(step_, kDeep);
+  if (rest_.try_island(island, length_s)) return true;
+  if (ledger_.costs.pushes == pushes) return false;
+  ledger_.add_to(after);
+  ledger_.lose(before.lost_j - after.lost_j);
+  ledger_.lift(before.lifted_j - after.lifted_j);
+  for (int n = 0; const int body : island.bodies) {
+    bodies_.state(body) = kept[n++];
+    bodies_.place(body);
+  }
+  for (int n = 0; Pair * pair : island.pairs) {
+    if (!pair->contacts.empty()) touches_.refresh(*pair);
+    std::tie(pair->stored_j, pair->errors) = kept_pairs[n++];
+  }
+  return rest_.try_island(island, length_s);
+}
+
+/// The impacts of a crowded island: all touches closing within a step strike at its beginning. False: none closes, touches unchanged.
+bool Space::strike_at_once(double start_s, double length_s) {
+  bodies_.set_time(start_s);
+  step_.together_s = length_s;
+  std::vector<ContactRef> first = instants_.list_closing(step_, length_s);
+  if (first.empty()) return false;
+  if (!instants_.confirm(step_, first, length_s, std::numeric_limits<double>::infinity())) return true;
+  if (first.front().pair != first.back().pair) instants_.set_crowded(step_.island(), start_s + length_s);
+  strike(first);
+  return true;
+}
+
+/// Takes the bodies of an island through the part of a step that is made.
+void Space::move(double to_s, double part_s) {
+  const double before_j = bodies_.calc_energy(step_.island().bodies);
+  std::vector<State> moved;
+  std::vector<char> in_impact;  // one that ends in this part has been moved by it, too
+  double loads_j = 0.0;         // work of sleeping bodies that lie on them
+  for (int n = 0; n < step_.count(); ++n) {
+    in_impact.push_back(bodies_.is_moved_by_impact(step_.body(n)) ? 1 : 0);
+    const bool is_free = step_.free[n].articulation < 0;
+    moved.push_back(is_free ? step_.calc_moved(n, part_s) : State{});
+    if (is_free && in_impact.back() == 0) loads_j += step_.calc_load_work(n, moved.back(), part_s);
+  }
+  ledger_.lose(-loads_j);  // a load does not fall with its support until it wakes, within kDeep: this energy comes from nowhere
+  std::vector<const ArticulationStep*> flown;
+  for (const ArticulationStep& a : step_.articulations)
+    if (a.articulation->struck < 0) flown.push_back(&a);
+  const bool has_impacts = std::any_of(in_impact.begin(), in_impact.end(), [](char is_in) { return is_in != 0; });
+  if (has_impacts) modal_impacts_.advance(step_, to_s, part_s, windows_.get_end(), touches_);
+  for (const ArticulationStep* a : flown) {
+    a->articulation->now = step_.calc_moved(*a, part_s);
+    bodies_.place(*a->articulation);
+  }
+  for (int n = 0; n < step_.count(); ++n) {
+    if (step_.free[n].articulation >= 0) continue;
+    if (!in_impact[n]) bodies_.state(step_.body(n)) = moved[n];
+    bodies_.place(step_.body(n));
+  }
+  if (!has_impacts) problem_.remove_gain(step_, before_j + loads_j);
+}
+
+/// All that strikes now, as rigid bodies or with modes.
+void Space::strike(const std::vector<ContactRef>& first) {
+  ++ledger_.costs.impacts;
+  std::vector<ContactRef> contacts = rigid_impact_.gather(step_, first);
+  while (rest_.wake_struck(step_, contacts)) contacts = rigid_impact_.gather(step_, first);
+  Collision collision = rigid_impact_.make(step_, std::move(contacts));
+  instants_.note(collision.contacts, collision.hits, get_time());
+  const auto keep_triangles = [&](const std::vector<Hit>& hits) {
+    for (int n = 0; const Hit& hit : hits) collision.contacts[n++].get().triangles = hit.triangles;
+  };
+  if (modal_impacts_.predict(step_, collision) && modal_impacts_.begin(step_, collision, instants_, touches_))
+    return keep_triangles(collision.hits);
+  modal_impacts_.end(collision.hits, touches_);
+  rigid_impact_.solve(collision);
+  double lost_j = 0.0;
+  Strike& strike = strikes_.emplace_back(rigid_impact_.apply(collision, lost_j));
+  strike.time_s = get_time();
+  strike.together_s = step_.together_s;
+  modal_states_.excite(strike, lost_j);
+  rest_.reset(strike.bodies);
+  for (const int body : strike.bodies) windows_.extend(body);
+  keep_triangles(strike.hits);
+}
+
+}  // namespace carillon::rigid

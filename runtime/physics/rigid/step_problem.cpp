@@ -1,0 +1,214 @@
+// Method: one complementarity problem, by factorisation or by sweeps. Rest is proven by a solution with zero velocities.
+// Source: J. J. Moreau, "Unilateral contact and dry friction in finite freedom dynamics" (1988).
+// Deviations: fast touches end the step at their instant (instants.cpp).
+#include "runtime/physics/rigid/step_problem.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "runtime/physics/rigid/limits.hpp"
+
+namespace carillon::rigid {
+namespace {
+
+constexpr double kComes = 20e-3;             // m/s; a gap that closes so fast at the end of a step strikes in the next one
+constexpr double kSettling = 0.02;           // m/s; an island that is slower is about to rest
+constexpr int kMaxDirect = 24;               // points of a small island
+constexpr int kMaxAtOnce = 12;               // bodies that are about to rest and are factorised without sweeps before
+constexpr double kLoose = 1000.0;            // times the tolerance
+constexpr double kLooseOfSpeed = 1e-3;       // of the fastest of its bodies, where that is more,
+constexpr double kLoosest = 0.3 * kSlowest;  // and no more than this: standing bodies must not strike
+constexpr int kGuesses = 6;                  // of a factorised problem in a step
+constexpr double kRetry = 4e-3;              // s; an island whose guesses failed goes by sweeps for so long,
+constexpr double kRetrySmall = 1e-3;         // s; a small one for so long
+constexpr int kProofSweeps = 600;            // that look for rest,
+constexpr int kMaxProofSweeps = 1200;        // of bodies that were slow for kLong
+
+}  // namespace
+
+/// More than rounding, from the motion without contacts.
+bool StepProblem::gains_energy(const std::vector<Mover>& free, const Step& step) {
+  double gained = 0.0, size = 0.0;
+  for (const Point& p : step.points) {
+    const double work = 0.5 * dot(p.impulse, calc_relative_velocity(free, p) + calc_relative_velocity(step.movers, p));
+    gained += work;
+    size += std::abs(work);
+  }
+  return gained > 1e-9 * size;
+}
+
+void StepProblem::solve(Step& step) {
+  find_impulses(step);
+  sum_impulses(step);
+}
+
+void StepProblem::find_impulses(Step& step) {
+  ++ledger_.costs.solves;
+  if (step.points.empty()) return;
+  std::vector<Mover>& movers = step.movers;
+  std::vector<Point>& points = step.points;
+  const std::vector<int>& bodies = step.island().bodies;
+  const double tolerance_m_s = options_.tolerance * std::max(norm(bodies_.gravity()), 1.0) * step.length_s;
+  const std::vector<Mover> free = movers;
+  const std::vector<Point> begun = points;
+  double fastest = 0.0;
+  for (const int body : bodies) fastest = std::max(fastest, bodies_.calc_speed(body));
+  const int count = step.count();
+  const bool settles = fastest < kSettling;
+  const bool is_small = count <= options_.max_direct && static_cast<int>(points.size()) <= kMaxDirect;
+  const bool rolls = std::any_of(points.begin(), points.end(), [](const Point& p) { return p.rolling_m > 0.0; });
+  const auto factorise = [&](bool are_swept) {
+    if (solver_.solve_directly(movers, points, is_small ? kMaxGuesses : kGuesses, are_swept) && !gains_energy(free, step)) return true;
+    // Rolling bodies keep their energy better that way, even where a guess fails now and then.
+    const double pause_s = !is_small ? kRetry : rolls ? 0.0 : kRetrySmall;
+    for (const int body : bodies) next_guess_s_[body] = bodies_.get_time() + pause_s;
+    return false;
+  };
+  const auto sweep = [&](int max) {
+    const bool is_loose = !settles && !is_small;  // fast motion needs less accuracy than bodies that are about to stand still
+    const double tolerance = is_loose ? std::max(kLoose * tolerance_m_s, std::min(kLooseOfSpeed * fastest, kLoosest)) : tolerance_m_s,
+                 left = solver_.solve(movers, points, tolerance, max);
+    ledger_.costs.sweeps += solver_.get_sweeps();
+    return left <= tolerance && !gains_energy(free, step);
+  };
+  const bool may_guess = std::all_of(bodies.begin(), bodies.end(), [&](int body) { return bodies_.get_time() >= next_guess_s_[body]; });
+  const bool at_once = is_small || (settles && count <= kMaxAtOnce);
+  if (at_once && may_guess) {
+    // First guess: the sliding points of the last step.
+    if (factorise(is_small)) return;
+    movers = free;
+    points = begun;
+  }
+  if (sweep(options_.max_sweeps)) return;
+  if (!at_once && may_guess && settles && count <= options_.max_settling) {
+    // From the guess that the sweeps have made; they would let a pile tremble for long.
+    const std::vector<Point> swept = points;
+    movers = free;
+    if (factorise(true)) return;
+    movers = free;
+    points = swept;
+    sweep(2);
+  }
+  if (!gains_energy(free, step)) return;
+  // Sweeps that begin at zero impulses never add any.
+  movers = free;
+  points = begun;
+  for (Point& p : points) p.impulse = p.couple = {};
+  sweep(options_.max_sweeps);
+}
+
+/// The angular impulses of all points on each body, and the velocities that they give the articulations.
+void StepProblem::sum_impulses(Step& step) const {
+  step.turned.assign(step.count(), Vec3{});
+  for (int n = 0; n < step.count(); ++n) step.turned[n] = step.loads[n].angular;
+  for (const Point& p : step.points) {
+    if (p.a >= 0) step.turned[p.a] = step.turned[p.a] + cross(p.arm_a, p.impulse) + p.couple;
+    if (p.b >= 0) step.turned[p.b] = step.turned[p.b] - cross(p.arm_b, p.impulse) - p.couple;
+  }
+  for (ArticulationStep& a : step.articulations) {
+    std::vector<joints::Spatial> impulses(a.articulation->bodies.size());
+    bool any = false;
+    const auto add = [&](int n, const Vec3& arm, const Vec3& impulse, const Vec3& couple) {
+      if (n < 0 || step.movers[n].linkage != &a.linkage) return;
+      joints::Spatial& on = impulses[step.movers[n].member];
+      on.linear = on.linear + impulse;
+      on.angular = on.angular + cross(arm, impulse) + couple;
+      any = any || impulse != Vec3{} || couple != Vec3{};
+    };
+    for (const Point& p : step.points) {
+      add(p.a, p.arm_a, p.impulse, p.couple);
+      add(p.b, p.arm_b, -1.0 * p.impulse, -1.0 * p.couple);
+    }
+    a.push.clear();
+    if (any) a.push = a.articulation->mechanism->calc_push(a.free, impulses);
+  }
+}
+
+bool StepProblem::solve_rest(Step& step, double h, const std::vector<joints::Spatial>& pulls, double slow_s) {
+  std::vector<Mover>& movers = step.movers;
+  std::vector<Point>& points = step.points;
+  predict(step, h, true);
+  for (int n = 0; n < static_cast<int>(pulls.size()); ++n) {
+    movers[n].velocity = movers[n].velocity + (h * movers[n].inverse_mass) * pulls[n].linear;
+    movers[n].spin = movers[n].spin + h * (movers[n].inverse_inertia * pulls[n].angular);
+  }
+  make_points(step, false);
+  // A gap that roughness bridges is none: here all that is near is in touch.
+  for (int n = 0; Point & p : points)
+    if (step.rows[n++].get().touch.gap_m <= kDeep) p.wanted = {};
+  const std::vector<Point> moving = points;
+  for (Point& p : points) p.impulse = p.couple = {};
+  const std::vector<Point> unloaded = points;
+  const double g = std::max(norm(bodies_.gravity()), 1e-9);
+  const double bound = slow_s > kLong ? kSlow / (g * kLong) : kBalanced;
+  const std::vector<Mover> free = movers;
+  const auto holds = [&] {
+    std::vector<char> carried(step.count(), 0);  // a body that nothing carries is not at rest, even without gravity
+    for (int n = 0; n < static_cast<int>(pulls.size()); ++n) carried[n] = dot(pulls[n].linear, bodies_.gravity()) < 0.0 ? 1 : 0;
+    for (const Point& p : points)
+      for (const int n : {p.a, p.b})
+        if (n >= 0 && dot(p.impulse, p.normal) > 0.0) carried[n] = 1;
+    for (const ArticulationStep& a : step.articulations) {
+      const std::vector<int>& members = a.linkage.movers;
+      const bool any = a.articulation->is_anchored || std::any_of(members.begin(), members.end(), [&](int n) { return carried[n] != 0; });
+      for (const int n : members) carried[n] = any ? 1 : 0;
+    }
+    for (int n = 0; n < step.count(); ++n) {
+      const double radius = bodies_.solid(step.body(n)).radius_m;
+      if (!carried[n] || norm(movers[n].velocity) + norm(movers[n].spin) * radius > bound * g * h) return false;
+    }
+    return true;
+  };
+  ++ledger_.costs.solves;
+  const bool balanced = solver_.solve_directly(movers, points, kMaxGuesses) && holds();
+  // By sweeps from the impulses of the motion, and from none.
+  const auto sweep_from = [&](const std::vector<Point>& from, int max_sweeps) {
+    movers = free;
+    points = from;
+    solver_.solve(movers, points, 1e-2 * bound * g * h, max_sweeps);
+    ledger_.costs.sweeps += solver_.get_sweeps();
+    return holds();
+  };
+  return balanced || sweep_from(moving, kProofSweeps) || sweep_from(unloaded, slow_s > kLong ? kMaxProofSweeps : kProofSweeps);
+}
+
+void StepProblem::keep_impulses(const Step& step, double at_s) const {
+  const double h = step.length_s;
+  for (int n = 0; const Point& p : step.points) {
+    Contact& c = step.rows[n++].get();
+    c.impulse = p.impulse;
+    if (c.is_load) c.impulse = c.impulse + h * c.rest_n;
+    c.couple = p.couple;
+    c.step_s = h;
+    c.until_s = bodies_.get_time() + at_s;
+    c.lost_j = step.calc_loss(p, 1.0);
+    ledger_.lose(at_s < h ? step.calc_loss(p, at_s / h) : c.lost_j);
+    const bool comes = c.touch.gap_m > kTouch && dot(calc_relative_velocity(step.movers, p), p.normal) < -kComes;
+    c.touching = (dot(c.impulse, c.touch.normal) > 0.0 && !comes) || c.is_closed();
+  }
+}
+
+void StepProblem::remove_gain(const Step& step, double before_j) {
+  const std::vector<int>& bodies = step.island().bodies;
+  const double gained = bodies_.calc_energy(bodies) - before_j;
+  if (!(gained > 0.0)) return;
+  const auto is_free = [&](const ContactRef& row) { return bodies_.moves(row.pair->a) && bodies_.moves(row.pair->b); };
+  if (std::all_of(step.rows.begin(), step.rows.end(), is_free)) return;
+  const double kinetic = bodies_.calc_kinetic(bodies);
+  ledger_.lose(std::min(gained, kinetic));
+  const double part = kinetic > gained ? std::sqrt(1.0 - gained / kinetic) : 0.0;
+  for (const ArticulationStep& a : step.articulations) {
+    for (double& u : a.articulation->now.u) u *= part;
+    bodies_.place(*a.articulation);
+  }
+  for (const int body : bodies) {
+    if (bodies_.find_articulation(body) != nullptr) continue;
+    State& s = bodies_.state(body);
+    s.velocity = part * s.velocity;
+    s.momentum = part * s.momentum;
+    bodies_.place(body);
+  }
+}
+
+}  // namespace carillon::rigid

@@ -1,0 +1,88 @@
+// Which touches the bodies have: found with a margin, followed from step to step, named.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "runtime/physics/rigid/bodies.hpp"
+#include "runtime/physics/rigid/contact.hpp"
+#include "runtime/physics/rigid/links.hpp"
+#include "runtime/physics/rigid/step.hpp"
+
+namespace carillon::rigid {
+
+class ModalImpacts;
+
+/// The contacts of all pairs of bodies that are near, and of all cords. Invariant: after search() or update() a pair has every touch that
+/// can close within the step, as the speeds are then, and after complete() none
+/// is missing where its bodies would be deepest at the end of the step; a touch that stays keeps its name, and so its contact its impulses.
+class TouchSets {
+ public:
+  TouchSets(const Bodies& bodies, std::vector<Cord> cords, const ModalImpacts& impacts, Ledger& ledger);
+
+  /// Made where it is asked for first. b: -1, or greater than a.
+  Pair& get(int a, int b);
+  std::map<std::pair<int, int>, Pair>& pairs() { return pairs_; }
+  const std::map<std::pair<int, int>, Pair>& pairs() const { return pairs_; }
+  /// One a cord.
+  std::vector<Pair>& cord_pairs() { return cord_pairs_; }
+  const std::vector<Pair>& cord_pairs() const { return cord_pairs_; }
+  const Cord& cord(int number) const { return cords_[number]; }
+  /// Removes pairs that are not near in this window, unless both bodies are still.
+  void forget_far(std::int64_t window);
+
+  /// The touches as the bodies are now, found again.
+  void search(Pair& pair, double step_s);
+  /// Moves the touches with the bodies. Touches off their surfaces are dropped, and the pair is searched at its next update. The pair notes
+  /// the largest changes of curved touches that last: of the gap, of the place on body a, and of the normal in it.
+  void refresh(Pair& pair) const;
+  /// Removes deep touches of curved surfaces on far sides or past the ends of edges and facets.
+  void remove_false(Pair& pair) const;
+  /// Touches that are good for a step: searched again where the pair may have moved by its margin.
+  void update(Pair& pair, double step_s);
+  /// Contacts of a step are not known to close in it.
+  void forget_closing(const Step& step) const;
+  /// Adds touches that are missing at the end of a step, by its predicted motion, and with `finds_closing` finds those that close. True if
+  /// there were any.
+  bool complete(const Step& step, bool finds_closing);
+  /// The same for a pair in an impact with modes, by free flight.
+  void complete_in_flight(Pair& pair, double time_s);
+  /// The closing place of a touch of a curved surface within a time of free flight, moved back with the bodies.
+  geometry::Touch find_closing(Pair& pair, const Contact& contact, double time_s) const;
+  /// Counts a movement of `time_s` in a step.
+  void travel(Pair& pair, double time_s, double step_s) const;
+  /// Touches are found with bodies as far apart as springs and modes explain, along `normal` (to a). Past the middle of a thin body the
+  /// nearest surface would be that of its other side.
+  void part(Pair& pair, double depth_m, const Vec3& normal) const;
+  /// Frees the contacts of two bodies after an impact with modes. depth_m: explained by it; stored_j: energy of its springs, for lifting.
+  void release(int a, int b, double depth_m, double stored_j);
+  /// Adds the energy left in springs of ended impacts to the books.
+  void add_to(Books& books) const;
+  /// A touch of a pair whose bodies are at these frames.
+  geometry::Touch find_moved(const Pair& pair, geometry::Touch touch, const geometry::Frame& a, const geometry::Frame& b) const;
+
+ private:
+  void keep_lost(Pair& pair, const std::vector<Contact>& old) const;
+  void merge(Pair& pair) const;
+  bool is_jump(const Pair& pair, const geometry::Touch& from, const geometry::Touch& to) const;
+  bool follow(const Pair& pair, geometry::Touch& touch, const geometry::Frame& a, const geometry::Frame& b) const;
+  double calc_way(const Pair& pair, double time_s, double step_s) const;
+  void lose_stored(Pair& pair) const;
+  void limit_apart(Pair& pair) const;
+  std::pair<Contact*, double> find_least(Pair& pair, const geometry::Frame& a, const geometry::Frame& b) const;
+  bool complete(Pair& pair, const geometry::Frame& a, const geometry::Frame& b, double closing_s);
+  geometry::Frame find_flown(int body, double time_s) const;
+  void add(Pair& pair, const geometry::Deepest& deepest);
+
+  const Bodies& bodies_;
+  const ModalImpacts& impacts_;
+  Ledger& ledger_;
+  std::vector<Cord> cords_;
+  std::vector<Pair> cord_pairs_;
+  std::map<std::pair<int, int>, Pair> pairs_;
+  std::vector<geometry::Touch> found_;  // work memory
+};
+
+}  // namespace carillon::rigid

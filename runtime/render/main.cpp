@@ -1,0 +1,75 @@
+// carillon-render: a scene file to a WAV file.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+#include <new>
+
+#include "runtime/base/error.hpp"
+#include "runtime/base/file_limit.hpp"
+#include "runtime/base/message.hpp"
+#include "runtime/base/printable.hpp"
+#include "runtime/base/whole_range.hpp"
+#include "runtime/render/program.hpp"
+#include "runtime/scene/scene.hpp"
+#include "runtime/base/version.hpp"
+
+namespace {
+
+int fail(int code, const char* message) {
+  fmt::print(stderr, "carillon-render: {}\n", carillon::base::show_message(message));
+  return code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  carillon::base::report_file_limit();
+  carillon::render::ProgramOptions options;
+  CLI::App app("Simulates a scene of falling bodies and renders what two ears or microphones hear.", "carillon-render");
+  app.failure_message([](const CLI::App* asked, const CLI::Error& error) {
+    return carillon::base::printable_lines(CLI::FailureMessage::simple(asked, error));
+  });
+  app.add_option("scene", options.scene, "Scene file (JSON)")->required()->option_text("SCENE.json");
+  auto* output =
+      app.add_option("-o,--output", options.wav,
+                     "WAV file to write: stereo, or a channel for each microphone; - is standard output; required without --plan")
+          ->option_text("OUT.wav");
+  app.add_option("--spectrogram", options.spectrogram, "Picture of the sound: level over time and frequency")->option_text("OUT.png");
+  app.add_option("--trajectory", options.trajectory, "Paths of the bodies and their contacts")->option_text("OUT.json");
+  app.add_option("--report", options.report, "Figures of the run: counts, seconds, level, gain")->option_text("OUT.json");
+  app.add_option("--contacts", options.contacts, "Contacts file to play instead of the scene's physics and strikes")
+      ->option_text("IN.jsonl");
+  app.add_option("--record", options.record, "Contacts file to write: all that happens, to be played again")->option_text("OUT.jsonl");
+  app.add_option("--rate", options.rate_hz, "Sample rate instead of the scene's, 8000 to 192000")
+      ->check(carillon::base::whole_range(8000, 192000), carillon::base::describe_whole_range(8000, 192000))
+      ->option_text("HZ");
+  app.add_option("--format", options.format, "pcm16, pcm24 (default), pcm32 or float, instead of the scene's")
+      ->check(CLI::IsMember(carillon::render::kSampleFormatNames))
+      ->option_text("FORMAT");
+  app.add_flag(
+      "--audit", options.audit,
+      "Keep the books of energy: motion, modes, losses, radiation, and energy from nowhere; measure depths of contacts and count hits");
+  app.add_flag("--plan", options.plan, "Say for each body which effects are on, why, and what they will cost; no sound is made");
+  app.add_flag("-q,--quiet", options.quiet, "Print nothing but warnings and errors");
+  app.set_version_flag("--version", carillon::base::describe("carillon-render"));
+  try {
+    app.parse(argc, argv);
+    if (!options.plan && output->empty()) throw CLI::RequiredError("--output");
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : carillon::kExitInput;
+  }
+  try {
+    carillon::render::run(options);
+  } catch (const carillon::InputError& error) {
+    return fail(carillon::kExitInput, error.what());
+  } catch (const carillon::SolveError& error) {
+    return fail(carillon::kExitSolve, error.what());
+  } catch (const std::bad_alloc&) {
+    return fail(carillon::kExitSystem, "not enough memory; use smaller banks or fewer microphones");
+  } catch (const std::exception& error) {
+    return fail(carillon::kExitSystem, error.what());
+  }
+  return 0;
+}

@@ -1,0 +1,274 @@
+#include "runtime/scene/scene_bodies.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "runtime/base/quaternion.hpp"
+#include "runtime/scene/job_keys.hpp"
+#include "runtime/scene/scene_values.hpp"
+#include "runtime/material/supports.hpp"
+
+namespace carillon::scene {
+namespace {
+
+constexpr std::size_t kLongestName = 200;  // bytes
+constexpr double kMaxSpinRadS = 1e4;
+constexpr std::size_t kMaxHolders = 1000;
+constexpr double kLoudestGain = 1e6;  // 120 dB
+
+/// Turns about the fixed axes of the world, x first, then y, then z.
+Quaternion calc_rotation(const Vec3& degrees) {
+  Quaternion rotation{1.0, 0.0, 0.0, 0.0};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double half = degrees[axis] * std::numbers::pi / 360.0;
+    Quaternion turn{std::cos(half), 0.0, 0.0, 0.0};
+    turn[axis + 1] = std::sin(half);
+    rotation = multiply(turn, rotation);
+  }
+  return rotation;
+}
+
+Quaternion read_rotation(base::Object& body) {
+  if (!body.has("quaternion")) return calc_rotation(read_vector(body, "rotation_deg", {0.0, 0.0, 0.0}, 1e6));
+  if (body.has("rotation_deg")) body.fail("quaternion", "says the same thing as \"rotation_deg\"; keep one of them");
+  Quaternion q = body.numbers<4>("quaternion");
+  const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+  if (!(std::abs(norm - 1.0) < 1e-3)) {
+    body.fail("quaternion", fmt::format("[w, x, y, z] has length {:.6g}; give a quaternion of length 1", norm));
+  }
+  for (double& x : q) x /= norm;
+  return q;
+}
+
+/// The effects in the list of `key`, none twice.
+synth::EffectSet read_names(base::Object& object, std::string_view key) {
+  std::vector<std::string> playable;
+  for (const synth::Effect effect : kPlayableEffects) playable.emplace_back(synth::get_name(effect));
+  synth::EffectSet effects;
+  for (const base::Entry& entry : object.entries(key, std::numeric_limits<std::size_t>::max())) {
+    const auto refuse = [&](const std::string& what) { throw InputError(fmt::format("{}: \"{}\" {}", entry.place, key, what)); };
+    if (entry.object) refuse("must be a list of names of effects, and holds an object");
+    const std::optional<synth::Effect> effect = synth::find_effect(entry.text);
+    if (effect && !kPlayableEffects.has(*effect)) {
+      refuse(fmt::format("names \"{}\", which is not in this build (CMake option CARILLON_EFFECTS); there are {}", entry.text,
+                         fmt::join(playable, ", ")));
+    }
+    if (!effect) {
+      const std::string nearest = base::find_nearest(entry.text, playable);
+      refuse(fmt::format("names \"{}\", which is no effect that can be played{}; there are {}", entry.text,
+                         nearest.empty() ? "" : fmt::format(" (did you mean \"{}\"?)", nearest), fmt::join(playable, ", ")));
+    }
+    if (effects.has(*effect)) refuse(fmt::format("names \"{}\" twice", entry.text));
+    effects = effects.with(*effect);
+  }
+  return effects;
+}
+
+/// "auto"; a list: exactly these; or {"base": "auto", "on": [...], "off": [...], "doppler": true, ...}.
+effects::EffectOverrides read_effects(base::Object& object) {
+  effects::EffectOverrides overrides;
+  if (object.has_string("effects")) {
+    const std::string text = object.string("effects");
+    if (text != "auto") {
+      object.fail("effects", fmt::format("is \"{}\"; give \"auto\", a list of names, or {{\"on\": [...], \"off\": [...]}}", text));
+    }
+    return overrides;
+  }
+  if (!object.has_object("effects")) {
+    overrides.automatic = false;
+    overrides.on = read_names(object, "effects");
+    return overrides;
+  }
+  base::Object keys = object.object("effects");
+  keys.choice_or("base", {"auto"}, "auto");
+  if (keys.has("on")) overrides.on = read_names(keys, "on");
+  if (keys.has("off")) overrides.off = read_names(keys, "off");
+  for (const synth::Effect effect : kPlayableEffects) {
+    const char* name = synth::get_name(effect);
+    if (!keys.has(name)) continue;
+    if (keys.has_string(name)) {
+      keys.choice_or(name, {"auto"}, "auto");
+      continue;
+    }
+    synth::EffectSet& set = keys.boolean_or(name, false) ? overrides.on : overrides.off;
+    if (set.has(effect)) keys.fail(name, fmt::format("is in \"{}\" already; keep one of them", &set == &overrides.on ? "on" : "off"));
+    set = set.with(effect);
+  }
+  for (const synth::Effect effect : overrides.on.common(overrides.off)) {
+    keys.fail("off", fmt::format("names \"{}\", and so does \"on\"; keep one of them", synth::get_name(effect)));
+  }
+  keys.finish();
+  return overrides;
+}
+
+/// A body's own "nonlinear", over its effects: "auto", on or off.
+void read_nonlinear(base::Object& body, effects::EffectOverrides& overrides) {
+  constexpr synth::Effect kEffect = synth::Effect::kNonlinear;
+  if (!body.has("nonlinear")) return;
+  if (body.has("effects") && (overrides.on.has(kEffect) || overrides.off.has(kEffect)))
+    body.fail("nonlinear", "says what \"effects\" of this body say already; keep one of them");
+  const bool is_automatic = body.has_string("nonlinear");
+  if (is_automatic) {
+    body.choice_or("nonlinear", {"auto"}, "auto");
+    if (!overrides.automatic)
+      body.fail("nonlinear", "is \"auto\", and its effects are a list, so that nothing is chosen; give true or false");
+  }
+  const bool is_on = !is_automatic && body.boolean_or("nonlinear", false);
+  if (is_on && !kPlayableEffects.has(kEffect))
+    body.fail("nonlinear", "asks for the effect \"nonlinear\", which is not in this build (CMake option CARILLON_EFFECTS)");
+  overrides.on = is_on ? overrides.on.with(kEffect) : overrides.on.without(kEffect);
+  overrides.off = is_automatic || is_on || !overrides.automatic ? overrides.off.without(kEffect) : overrides.off.with(kEffect);
+}
+
+/// The effects of bodies without selection.
+synth::EffectSet find_usual(const effects::EffectOverrides& overrides) {
+  return overrides.automatic ? kDefaultEffects.with(overrides.on).without(overrides.off) : overrides.on;
+}
+
+/// The fixings and holders of a body.
+mounting::MountingRequest read_support(base::Object& body) {
+  mounting::MountingRequest overrides;
+  overrides.all = material::read_fixing(body);
+  if (auto supports = body.object_if("supports")) {
+    for (const std::string& name : supports->keys()) {
+      base::Object one = supports->object(name);
+      const auto fixing = material::read_fixing(one);
+      one.finish();
+      if (!fixing) supports->fail(name, "says nothing; give \"on\", \"joint\" or \"loss\"");
+      overrides.by_name.emplace(name, *fixing);
+    }
+  }
+  for (base::Entry& entry : body.entries("held", kMaxHolders)) {
+    if (!entry.object)
+      throw InputError(fmt::format("{}: \"held\": say where as well: {{\"by\": \"{}\", \"point_m\": [x, y, z]}}", entry.place, entry.text));
+    mounting::Holder holder{.by = material::read_holder(*entry.object, "by")};
+    holder.point_m = read_required_vector(*entry.object, "point_m");
+    entry.object->finish();
+    overrides.held.push_back(holder);
+  }
+  return overrides;
+}
+
+/// The bank of a body, or the keys of a job for the solver's side.
+void read_bank_or_job(base::Object& object, SceneBody& body) {
+  static const std::vector<std::string> kBodies{"shape", "body", "mesh"};
+  static const std::vector<std::string> kKeys(kJobKeys.begin(), kJobKeys.end());
+  const bool is_described = std::any_of(kBodies.begin(), kBodies.end(), [&](const std::string& key) { return object.has(key); });
+  if (!is_described || object.has("bank")) {
+    for (const std::string& key : kKeys)
+      if (object.has("bank") && object.has(key))
+        object.fail(key, "describes the body to be computed, and \"bank\" names it computed; keep one of them");
+    body.bank = object.path("bank");
+    return;
+  }
+  body.job = object.make_excerpt(kKeys);
+}
+
+std::string read_body_name(base::Object& object) {
+  std::string name = object.string("name");
+  if (name.size() > kLongestName || std::any_of(name.begin(), name.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; })) {
+    object.fail("name",
+                fmt::format("is no name: at most {} bytes, and none of them a line feed or another control character", kLongestName));
+  }
+  return name;
+}
+
+SceneBody parse_body(base::Object& object, const effects::EffectOverrides& overrides, double variation) {
+  SceneBody body;
+  body.name = read_body_name(object);
+  body.place = object.find_place("");
+  read_bank_or_job(object, body);
+  body.variation = read_within(object, "variation", variation, 0.0, 1.0);
+  physics::BodySpec& spec = body.spec;
+  spec.name = body.name;
+  spec.fixed = object.boolean_or("fixed", false);
+  spec.initial.position_m = read_vector(object, "position_m", {0.0, 0.0, 0.0}, kFarthestM);
+  spec.initial.rotation = read_rotation(object);
+  spec.velocity_m_s = read_vector(object, "velocity_m_s", {0.0, 0.0, 0.0}, kMaxSpeedMs);
+  spec.angular_velocity_rad_s = read_vector(object, "angular_velocity_rad_s", {0.0, 0.0, 0.0}, kMaxSpinRadS);
+  if (spec.fixed) {
+    for (const char* key : {"velocity_m_s", "angular_velocity_rad_s"}) {
+      if (object.has(key)) object.fail(key, "a fixed body does not move; take this key away or set \"fixed\" to false");
+    }
+  }
+  spec.restitution = read_within(object, "restitution", spec.restitution, 0.0, 1.0);
+  spec.friction = read_within(object, "friction", spec.friction, 0.0, 10.0);
+  spec.roughness_m = read_within(object, "roughness_m", spec.roughness_m, 0.0, kRoughestM);
+  body.support = read_support(object);
+  for (const char* key : {"on", "joint", "loss", "supports", "held"}) {
+    if (body.support_place.empty() && object.has(key)) body.support_place = object.find_place(key);
+  }
+  body.overrides = object.has("effects") ? read_effects(object) : overrides;
+  read_nonlinear(object, body.overrides);
+  object.finish();
+  return body;
+}
+
+/// A recorded surface.
+SceneSurface parse_surface(base::Object& object) {
+  SceneSurface surface;
+  surface.name = read_body_name(object);
+  surface.place = object.find_place("recording");
+  surface.file = object.path("recording");
+  for (const char* key : {"bank", "shape", "body", "mesh"})
+    if (object.has(key)) object.fail(key, "describes a body that is struck, and \"recording\" one that was recorded; keep one of them");
+  surface.pose.position_m = read_vector(object, "position_m", {0.0, 0.0, 0.0}, kFarthestM);
+  surface.pose.rotation = read_rotation(object);
+  surface.start_s = read_within(object, "start_s", surface.start_s, 0.0, kLongestS);
+  surface.loop = object.boolean_or("loop", surface.loop);
+  surface.gain = read_within(object, "gain", surface.gain, 0.0, kLoudestGain);
+  surface.high_pass_hz = read_within(object, "high_pass_hz", surface.high_pass_hz, 0.0, 1000.0);
+  object.finish();
+  return surface;
+}
+
+}  // namespace
+
+Names parse_bodies(base::Object& root, Scene& scene) {
+  std::vector<base::Object> bodies = root.objects("bodies");
+  if (bodies.empty()) {
+    for (const char* later :
+         {"joints", "cords", "strikes", "listener", "microphones", "effects", "variation", "radiation", "frequencies", "output", "quality"})
+      root.has(later);
+    root.finish();  // a mistyped key is the likeliest reason
+    root.fail("bodies", "is missing or empty; list at least one body with a \"name\" and a \"bank\", or a \"recording\"");
+  }
+  if (bodies.size() > kMaxBodies)
+    root.fail("bodies",
+              fmt::format("lists {} bodies; a scene may hold {}: leave some out, or make several scenes of it", bodies.size(), kMaxBodies));
+  if (root.has("effects")) scene.overrides = read_effects(root);
+  scene.effects = find_usual(scene.overrides);
+  const double variation = read_within(root, "variation", 0.0, 0.0, 1.0);
+  Names names;
+  for (base::Object& object : bodies) {
+    const bool is_recorded = object.has("recording");
+    if (is_recorded)
+      scene.surfaces.push_back(parse_surface(object));
+    else
+      scene.bodies.push_back(parse_body(object, scene.overrides, variation));
+    const std::string& name = is_recorded ? scene.surfaces.back().name : scene.bodies.back().name;
+    if (!names.emplace(name, is_recorded ? kNotModal : scene.bodies.size() - 1).second)
+      object.fail("name", fmt::format("there is a body called \"{}\" already; give this one another name", name));
+  }
+  return names;
+}
+
+std::size_t find_body(base::Object& object, const Names& bodies, std::string_view key) {
+  const std::string name = object.string(key);
+  if (const auto found = bodies.find(name); found != bodies.end()) {
+    if (found->second != kNotModal) return found->second;
+    object.fail(key, fmt::format("\"{}\" is a recording, which nothing strikes, joins or holds; name a body that has a bank", name));
+  }
+  std::vector<std::string> names;
+  for (const auto& [known, index] : bodies) names.push_back(known);
+  const std::string nearest = base::find_nearest(name, names);
+  object.fail(key, fmt::format("no body is called \"{}\"; {}", name,
+                               nearest.empty() ? "give the name of one of \"bodies\"" : fmt::format("did you mean \"{}\"?", nearest)));
+}
+
+}  // namespace carillon::scene

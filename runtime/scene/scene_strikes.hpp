@@ -1,0 +1,16 @@
+// The strikes of a scene file and their mallets.
+#pragma once
+
+#include <cstddef>
+
+#include "runtime/base/document.hpp"
+#include "runtime/scene/scene_bodies.hpp"
+
+namespace carillon::scene {
+
+inline constexpr std::size_t kMaxStrikes = 100000;
+
+/// Reads the key "strikes" of a scene with its duration. Throws InputError "file:line: ...".
+void parse_strikes(base::Object& root, const Names& names, Scene& scene);
+
+}  // namespace carillon::scene

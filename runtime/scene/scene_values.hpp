@@ -1,0 +1,30 @@
+// Values of a scene's keys, within their ranges. A refusal is an InputError "file:line: ...".
+#pragma once
+
+#include <cstddef>
+#include <string_view>
+
+#include "runtime/base/ranges.hpp"
+#include "runtime/base/vector.hpp"
+#include "runtime/material/material.hpp"
+
+namespace carillon::scene {
+
+inline constexpr double kLongestS = 3600.0;
+inline constexpr double kFarthestM = 1e4;     // of positions; half a minute of sound
+inline constexpr double kMaxSpeedMs = 300.0;  // below the speed of sound in air
+inline constexpr double kRoughestM = 1e-3;    // a higher roughness is a shape
+inline constexpr double kSoftestPa = 100.0;   // a jelly; the touch of a body lasts as long as a person's step on less
+inline constexpr double kStiffestPa = 1e13;   // ten times a diamond
+
+using base::read_vector;
+using base::read_within;
+
+/// read_vector() of a required key.
+Vec3 read_required_vector(base::Object& object, std::string_view key, double limit = kFarthestM);
+/// A direction, of length 1.
+Vec3 read_direction(base::Object& object, std::string_view key);
+/// The elastic constants of the key "material", which the object's own constants may follow; nullptr without the key.
+const material::Material* read_material(base::Object& object, double& young_modulus_pa, double& poisson_ratio);
+
+}  // namespace carillon::scene

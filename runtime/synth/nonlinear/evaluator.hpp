@@ -1,0 +1,58 @@
+// The nonlinear energy of coupled modes and its gradient, sample by sample. Internal to carillon::nonlinear.
+#pragma once
+
+#include <utility>
+#include <vector>
+
+#include "runtime/bank/quartic_energy.hpp"
+#include "runtime/synth/nonlinear/kernels.hpp"
+
+namespace carillon::nonlinear {
+
+/// The matrices of an energy as the kernels take them, padded by zeros and scaled so that motion of a thickness or so is of the size of 1:
+/// in single precision nothing overflows that a body survives. Matrices without anything off their diagonals (strings, mean stresses) are
+/// kept as their diagonals, and all of it goes in double precision. Of such as are 0 almost everywhere (plates in closed form have four
+/// entries for a pair of modes, whatever the rows) the entries are kept. Memory is taken in the constructor only.
+class Evaluator {
+ public:
+  /// The sizes of the energy agree, and its numbers are finite.
+  Evaluator(const bank::QuarticEnergy& energy, const CoupledKernels& kernels);
+
+  /// Scaled q over q.
+  double get_scale() const noexcept { return scale_; }
+  /// Only the first `modes` are coupled from now on; of the others q is 0. [audio-thread]
+  void set_count(int modes) noexcept;
+  /// V [J] at q, given twice: scaled, in single precision, zeros behind the last; and as im and to_q, whose products are q [m kg^1/2], for
+  /// diagonals in double precision. Fills `gradient`, with regard to q that is not scaled [N kg^-1/2]; 0 of modes that are not coupled.
+  /// [audio-thread]
+  double evaluate(const float* q, const double* im, const double* to_q, double* gradient) noexcept;
+  std::size_t calc_bytes() const noexcept;
+
+ private:
+  double evaluate_diagonals(const double* im, const double* to_q, double* gradient) noexcept;
+  void add_rows(const bank::QuarticEnergy& energy);
+  void add_entries(const bank::QuarticEnergy& energy);
+  void add_diagonals(const bank::QuarticEnergy& energy);
+  void add_points(const bank::QuarticEnergy& energy);
+
+  enum class Form { kDiagonals, kEntries, kRows, kPoints };
+  /// The entries of a sparse matrix, by its rows in groups of kUnit: see CoupledKernels::sum_up.
+  struct Entries {
+    std::vector<std::int32_t> begin, index;
+    std::vector<float> values;
+    void append(const std::vector<std::pair<std::int32_t, float>>* rows, int count);
+  };
+  const CoupledKernels* kernels_;
+  Form form_ = Form::kRows;
+  double scale_ = 1.0;
+  int modes_ = 0, count_ = 0, padded_ = 0, rows_ = 0, parts_ = 0, strains_ = 0, points_ = 0;
+  bool is_curved_ = false;
+  std::ptrdiff_t stride_ = 0;
+  std::vector<double> diagonals_, exact_linear_;    // (R, N)
+  std::vector<std::size_t> places_;                 // entries: the row of the energy that each row is
+  std::vector<float> matrices_, columns_, linear_;  // (R, stride), (N, parts, P), (R, padded N)
+  Entries of_rows_, of_pairs_;                      // of A_r by rows, and of the same by pairs of modes
+  std::vector<float> eta_, weight_, of_linear_, pairs_, sum_, gradient_, back_, forces_, more_;
+};
+
+}  // namespace carillon::nonlinear

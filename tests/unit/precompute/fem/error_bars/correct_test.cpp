@@ -1,0 +1,223 @@
+// Corrected frequencies: right, with bars that hold; refused where the estimate is not to be trusted.
+#include "precompute/fem/error_bars/correct.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "precompute/petsc/session.hpp"
+#include "tests/unit/precompute/fem/error_bars/bodies.hpp"
+
+namespace carillon::tests {
+namespace {
+
+using bank::Correction;
+using error_bars::ErrorParts;
+using error_bars::Kind;
+using error_bars::Level;
+
+/// A body, its mesh, and what the median error of its corrected frequencies must be of that of the mesh's.
+struct Corrects {
+  Case body;
+  double ratio;
+};
+void PrintTo(const Corrects& c, std::ostream* out) { PrintTo(c.body, out); }
+
+class Corrected : public testing::TestWithParam<Corrects> {};
+
+TEST_P(Corrected, frequencies_are_nearer_to_the_truth_and_within_their_bars) {
+  const auto& [name, fineness, kind] = GetParam().body;
+  const Outcome outcome = solve(PETSC_COMM_WORLD, get_body(name), fineness, kind);
+  EXPECT_LT(outcome.median_corrected_error_cents(), GetParam().ratio * outcome.median_error_cents());
+  int good = 0;
+  double bars = 0, corrected_bars = 0;
+  for (std::size_t m = 0; m < outcome.true_hz.size(); ++m) {
+    good += outcome.corrected_contains(m) ? 1 : 0;
+    bars += outcome.bar_cents(m);
+    corrected_bars += outcome.corrected_bar_cents(m);
+  }
+  EXPECT_GE(good, 0.97 * static_cast<double>(outcome.true_hz.size()));
+  EXPECT_LT(corrected_bars, (outcome.bars.level.is_lumped ? 0.85 : outcome.bars.level.kind == Kind::kT10 ? 0.6 : 0.75) * bars);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Bodies, Corrected,
+    testing::Values(Corrects{{"bar", 2, MeshKind::T10}, 0.125}, Corrects{{"plate", -1, MeshKind::T10}, 0.125},
+                    Corrects{{"strip-thin", 41, MeshKind::T10}, 0.25}, Corrects{{"ball", 1200, MeshKind::T10Curved}, 0.125},
+                    Corrects{{"rubber-ball", 1200, MeshKind::T10Curved}, 0.2}, Corrects{{"cube", 6, MeshKind::T4}, 0.167},
+                    Corrects{{"ball", 1200, MeshKind::T4}, 0.167}, Corrects{{"ring", 6000, MeshKind::T4}, 0.2},
+                    Corrects{{"thin-shell", 3000, MeshKind::T4Lumped}, 0.5}, Corrects{{"ring", 6000, MeshKind::T4Lumped}, 0.5},
+                    // Bodies that came when the formulas were fixed.
+                    Corrects{{"tile", -1, MeshKind::T10}, 0.125}, Corrects{{"maple-plate", -1, MeshKind::T10}, 0.125},
+                    Corrects{{"reed", 41, MeshKind::T10}, 0.25}, Corrects{{"stick", 2, MeshKind::T10}, 0.125},
+                    Corrects{{"shell-85", 2400, MeshKind::T10Curved}, 0.125}, Corrects{{"brick", 8, MeshKind::T4}, 0.167},
+                    Corrects{{"collar", 2400, MeshKind::T10Curved}, 0.25}, Corrects{{"washer", 800, MeshKind::T10}, 0.2},
+                    Corrects{{"cone", 2500, MeshKind::T10Curved}, 0.3}, Corrects{{"shell-60", 500, MeshKind::T10Curved}, 0.25},
+                    Corrects{{"board", -1, MeshKind::T10}, 0.125}));
+
+/// Curved elements as wide as the wall is far from flat: the recovered strains miss most of their error.
+TEST(Corrected, frequencies_of_walls_in_wide_curved_elements_are_within_their_bars) {
+  for (const auto& [name, nodes] : {std::pair{"chime", 500}, std::pair{"collar", 300}, std::pair{"shell-95", 700}}) {
+    const Outcome outcome = solve(PETSC_COMM_WORLD, get_body(name), nodes, MeshKind::T10Curved);
+    ASSERT_FALSE(outcome.true_hz.empty()) << name;
+    int good = 0;
+    double largest = 0;
+    for (std::size_t m = 0; m < outcome.true_hz.size(); ++m) {
+      good += outcome.corrected_contains(m) && outcome.contains(m) ? 1 : 0;
+      largest = std::max(largest, std::abs(outcome.error_cents(m)));
+    }
+    EXPECT_GE(good, 0.97 * static_cast<double>(outcome.true_hz.size())) << name;
+    EXPECT_GT(largest, 300) << name << ": no longer a hard mesh";
+  }
+}
+
+TEST(Bars, grow_with_how_far_elements_bend_of_T10_only) {
+  ErrorParts flat, bent;
+  flat.interpolation = bent.interpolation = 0.05;
+  bent.bent = 0.01;
+  EXPECT_EQ(error_bars::calc_cents(flat, Kind::kT4), error_bars::calc_cents(bent, Kind::kT4));
+  EXPECT_NEAR(error_bars::calc_cents(bent, Kind::kT10Curved), 600 * std::log2(1 + 3.5 * 0.09 / 0.91), 1e-9);
+  EXPECT_NEAR(error_bars::calc_share_left(bent, Kind::kT10Curved, false), 1 / 1.09, 1e-12);
+  EXPECT_NEAR(error_bars::predict_parts(bent, Kind::kT10Curved, 4, 0.5).bent, 0.01 / 64, 1e-15);
+}
+
+/// A level of made-up modes.
+Level make_level(const std::vector<double>& hz, const std::vector<double>& interpolation, Kind kind = Kind::kT10) {
+  Level level;
+  level.kind = kind;
+  for (std::size_t m = 0; m < hz.size(); ++m) {
+    level.lambda.push_back(std::pow(2 * M_PI * hz[m], 2));
+    ErrorParts parts;
+    parts.interpolation = interpolation[m];
+    parts.energy = 1.0;
+    level.parts.push_back(parts);
+  }
+  level.unlisted.high_hz = 10 * hz.back();
+  return level;
+}
+
+TEST(Correction, is_refused_to_what_the_elements_cannot_follow) {
+  const auto find = [](const Level& level) { return error_bars::calc_corrections(level).correction; };
+  EXPECT_EQ(find(make_level({100, 200, 300}, {0.01, 0.4, 0.7})),
+            (std::vector{Correction::kOneMesh, Correction::kRough, Correction::kStiff}));
+  EXPECT_EQ(find(make_level({100, 200, 300}, {0.3, 0.7, 1.1}, Kind::kT4)),
+            (std::vector{Correction::kOneMesh, Correction::kRough, Correction::kStiff}));
+  Level lumped = make_level({100}, {0.01});
+  lumped.is_lumped = true;
+  EXPECT_EQ(find(lumped), (std::vector{Correction::kLumped}));
+  Level kink = make_level({100, 200}, {0.01, 0.01});
+  kink.parts[1].singular = 0.005;
+  EXPECT_EQ(find(kink), (std::vector{Correction::kOneMesh, Correction::kRough}));
+  const error_bars::Corrections refused = error_bars::calc_corrections(make_level({300}, {0.7}));
+  EXPECT_EQ(refused.lambda[0], make_level({300}, {0.7}).lambda[0]) << "the mesh's own value is kept";
+}
+
+TEST(Correction, of_a_mode_that_is_not_corrected_to_half_its_bar_leaves_the_meshs_interval) {
+  // A rough mode: the interval below the mesh's frequency stays, whatever is stated within it.
+  const Level level = make_level({1000}, {0.45});
+  const double all = error_bars::calc_cents(level.parts[0], level.kind);
+  const error_bars::Corrections rough = error_bars::calc_corrections(level);
+  const double stated = 600 * std::log2(rough.lambda[0] / level.lambda[0]);
+  EXPECT_NEAR(rough.cents[0], std::max(stated + all, -stated), 1e-9);
+}
+
+TEST(Facets, in_doubt_are_no_part_of_any_bar_and_are_stated_next_to_it) {
+  Level sure = make_level({1000, 1020, 2500}, {0.01, 0.02, 0.45}), level = sure;
+  level.parts[0].doubt = -0.02;
+  level.parts[1].doubt = 0.1;
+  level.parts[1].doubt_noise = 0.2;
+  const error_bars::Corrections alone = error_bars::calc_corrections(sure), both = error_bars::calc_corrections(level);
+  EXPECT_EQ(both.cents, alone.cents);
+  EXPECT_EQ(both.lambda, alone.lambda);
+  EXPECT_TRUE(alone.facet_cents.empty());
+  ASSERT_EQ(both.facet_cents.size(), 3U);
+  // Interval of the other body's k-th mode: each mode shifted by its own facets, then sorted.
+  std::vector<double> low, high;
+  for (std::size_t m = 0; m < 2; ++m) {
+    const double facets = 600 * std::log2(1 + (m == 0 ? 1.5 * 0.02 : 1.5 * 0.1 + 0.15 * 0.2));
+    const double at = 600 * std::log2(alone.lambda[m]), bar = error_bars::calc_cents(level.parts[m], level.kind) / 2;
+    EXPECT_NEAR(error_bars::calc_facet_cents(level.parts[m]), facets, 1e-9);
+    low.push_back(at - bar - facets);
+    high.push_back(at + bar + facets);
+  }
+  std::sort(low.begin(), low.end());
+  std::sort(high.begin(), high.end());
+  for (std::size_t k = 0; k < 2; ++k) {
+    const double at = 600 * std::log2(alone.lambda[k]), reach = alone.cents[k] + both.facet_cents[k] + 1e-9;
+    EXPECT_LE(at - reach, low[k]) << k;
+    EXPECT_GE(at + reach, high[k]) << k;
+  }
+  EXPECT_LT(both.facet_cents[2], 1e-9) << "the third is far from the others";
+}
+
+TEST(TwoMeshes, that_agree_shorten_the_bar_to_a_quarter) {
+  // The truth is 1000 Hz; the error is the estimate, sixteen times as large on the coarser mesh.
+  const auto sharp = [](double i) { return 1000 * std::sqrt(1 + i); };
+  const Level fine = make_level({sharp(0.01)}, {0.01}), coarse = make_level({sharp(0.16)}, {0.16});
+  const error_bars::Corrections alone = error_bars::calc_corrections(fine), both = error_bars::calc_corrections(fine, &coarse);
+  EXPECT_EQ(both.correction[0], Correction::kTwoMeshes);
+  EXPECT_NEAR(both.lambda[0] / alone.lambda[0], 1, 1e-12);
+  EXPECT_NEAR(both.cents[0] / alone.cents[0], 0.5, 1e-9);
+  EXPECT_NEAR(alone.cents[0] / error_bars::calc_cents(fine.parts[0], fine.kind), 0.5, 1e-9);
+}
+
+TEST(TwoMeshes, that_contradict_each_other_leave_the_meshs_value_and_a_bar_that_spans_both) {
+  // A wrong estimate: it says that next to nothing is missing, and the finer mesh is 60 cents lower.
+  const Level fine = make_level({1000}, {1e-4}), coarse = make_level({1035}, {4e-4});
+  const error_bars::Corrections both = error_bars::calc_corrections(fine, &coarse);
+  EXPECT_EQ(both.correction[0], Correction::kDisputed);
+  EXPECT_EQ(both.lambda[0], fine.lambda[0]);
+  EXPECT_NEAR(both.cents[0], 1200 * std::log2(1.035), 1e-9) << "as far as they are apart";
+}
+
+TEST(Degenerate, modes_are_corrected_alike_whatever_basis_their_shapes_are) {
+  Level level = make_level({500, 1000, 1000, 1500}, {0.01, 0.08, 0.02, 0.03});
+  const error_bars::Corrections first = error_bars::calc_corrections(level);
+  std::swap(level.parts[1].interpolation, level.parts[2].interpolation);
+  level.parts[1].interpolation += 0.01;  // another basis of the same space: the sum stays
+  level.parts[2].interpolation -= 0.01;
+  const error_bars::Corrections other = error_bars::calc_corrections(level);
+  EXPECT_EQ(first.lambda[1], first.lambda[2]);
+  for (std::size_t m = 0; m < 4; ++m) EXPECT_NEAR(other.lambda[m] / first.lambda[m], 1, 1e-15) << m;
+}
+
+TEST(Order, of_corrected_frequencies_is_their_own_and_decides_which_are_the_lowest) {
+  // Bending (the third) lies too high on the mesh; it really is the second.
+  const Level level = make_level({1000, 1500, 1600, 2500}, {0.001, 0.001, 0.3, 0.001});
+  const error_bars::Corrections corrections = error_bars::calc_corrections(level);
+  EXPECT_LT(corrections.lambda[2], corrections.lambda[1]);
+  EXPECT_EQ(error_bars::find_lowest(corrections, 2), (std::vector<std::size_t>{0, 2}));
+  EXPECT_EQ(error_bars::find_lowest(corrections, 9).size(), 4U);
+  EXPECT_EQ(error_bars::find_computed_count(1), 12U);
+  EXPECT_EQ(error_bars::find_computed_count(30), 36U);
+  EXPECT_EQ(error_bars::find_computed_count(800), 820U);
+}
+
+TEST(ShortLists, of_lumped_T4_hold_the_truth) {
+  // One to three modes of thin bodies: other kinds of modes, which the mesh has far above, come down between them.
+  for (const char* name : {"plate-thin", "strip-thick", "slab", "tile", "stick"}) {
+    const Outcome outcome = solve(PETSC_COMM_WORLD, get_body(name), get_body(name).fineness.front(), MeshKind::T4Lumped);
+    for (std::size_t m = 0; m < 3; ++m) {
+      EXPECT_LE(std::abs(outcome.corrected_error_cents(m)), 1.05 * outcome.corrected_bar_cents(m)) << name << " " << m;
+    }
+  }
+}
+
+TEST(Levels, that_are_predicted_keep_what_is_believed_and_shrink_its_bars) {
+  const Level level = make_level({1000, 1500, 1600, 2500}, {0.01, 0.02, 0.2, 0.04});
+  const Level then = error_bars::predict_level(level, 4.0, false, 0.5);
+  EXPECT_TRUE(std::is_sorted(then.lambda.begin(), then.lambda.end()));
+  auto believed = error_bars::calc_corrections(level).lambda, later = error_bars::calc_corrections(then, &level).lambda;
+  std::sort(believed.begin(), believed.end());
+  std::sort(later.begin(), later.end());
+  for (std::size_t m = 0; m < 4; ++m) EXPECT_NEAR(later[m] / believed[m], 1, 1e-12);
+  EXPECT_NEAR(error_bars::find_order(then, &level, 2.0), 4.0, 1e-9);
+  Level thin = level;
+  thin.one_layer = 0.9;
+  EXPECT_EQ(error_bars::find_order(thin, nullptr, 1.0), 2.0);
+  EXPECT_EQ(error_bars::find_order(level, nullptr, 1.0), 4.0);
+}
+
+}  // namespace
+}  // namespace carillon::tests

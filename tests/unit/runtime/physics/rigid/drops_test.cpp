@@ -1,0 +1,76 @@
+// The touches of a body and the floor against all its vertices, after every step of random drops.
+#include "tests/unit/runtime/physics/rigid/drops.hpp"
+
+#include <gtest/gtest.h>
+
+#include <random>
+#include <utility>
+
+namespace carillon::rigid::tests {
+namespace {
+
+TEST(drops, touches_with_the_floor_are_complete_at_the_end_of_every_step) {
+  std::mt19937 random(3);
+  for (int n = 0; n < 24; ++n) {
+    std::array<std::uint8_t, 16> bytes{};
+    for (std::uint8_t& byte : bytes) byte = static_cast<std::uint8_t>(random() & 255U);
+    bytes[0] = static_cast<std::uint8_t>(n);  // each body twice
+    const Drop drop = decode_drop(bytes);
+    SCOPED_TRACE(kDropBodies.at(drop.body));
+    EXPECT_LE(run_drop(drop, 0.5).missed_m, 2e-6 + 1e-9);
+  }
+}
+
+// One side lands and throws the other down within a step: its touch is missing at the beginning of the step. Before added touches were
+// kept these drops were 70 to 170 um deep.
+TEST(drops, the_other_side_of_a_body_that_lands_is_not_too_deep) {
+  const std::array<std::uint8_t, 16> drops[] = {{0, 222, 225, 252, 142, 195, 61, 83, 236, 253, 11, 205, 5, 84, 11, 2},
+                                                {1, 61, 195, 86, 73, 51, 37, 146, 193, 47, 128, 220, 44, 240, 173, 107},
+                                                {5, 41, 161, 54, 81, 152, 214, 13, 233, 208, 243, 235, 209, 15, 206, 188},
+                                                {5, 127, 152, 73, 191, 187, 122, 49, 35, 207, 104, 68, 244, 14, 103, 117},
+                                                {6, 199, 100, 232, 232, 243, 184, 109, 156, 237, 71, 93, 117, 136, 155, 234},
+                                                {6, 93, 212, 60, 244, 55, 223, 9, 55, 1, 158, 65, 160, 57, 7, 124}};
+  for (const auto& bytes : drops) {
+    const DropOutcome outcome = run_drop(decode_drop(bytes), 1.0);
+    EXPECT_LE(outcome.deepest_m, calc_allowed_depth(outcome)) << kDropBodies.at(bytes[0]);
+  }
+}
+
+// A cup and a bowl in a bowl that is fixed. Oracle: they fall no higher than they were, so that nothing lifts them. With touches that a
+// search had lost, and with displacements before each proof of rest, they were lifted by 0.4 % of their energy and rattled on.
+TEST(drops, cup_or_bowl_in_a_bowl_is_not_lifted) {
+  const std::pair<int, int> falls[] = {{5, 4}, {6, 0}};
+  for (const auto& [kind, turn] : falls) {
+    const double half = 0.5 * (0.3 + 0.7 * turn);
+    Solid bowl = make_drop_body(6, 0).solid, body = make_drop_body(kind, 0).solid;
+    bowl.fixed = true;
+    bowl.friction = body.friction = 0.4;
+    bowl.restitution = body.restitution = 0.3;
+    State at;
+    at.centre = {0.01, 0, 0.15};
+    at.rotation = {std::cos(half), 0.6 * std::sin(half), 0, 0.8 * std::sin(half)};
+    Space space({bowl, body}, {State{}, at}, Ground{-1.0, 0.5, 0.5, 30e9, 0.2}, {0, 0, -9.81}, {});
+    double kinetic_j = 0.0;
+    while (space.get_time() < 1.0 - 1e-9) {
+      space.step(1.0);
+      kinetic_j = std::max(kinetic_j, calc_kinetic(body, space.state(1)));
+    }
+    EXPECT_LT(space.calc_books().lifted_j, kWanted.lifted * kinetic_j) << kDropBodies.at(kind);
+  }
+}
+
+// A coin that rocks on its rim, 2 mm wide: its one touch goes from edge to edge. At rest it has touches on both edges.
+TEST(drops, coin_that_stands_on_its_rim_sleeps) {
+  const Solid coin = make_drop_body(1, 0).solid;
+  const double tilt = 4e-3, half = 0.5 * (0.5 * std::numbers::pi + tilt);
+  State at;
+  at.rotation = {std::cos(half), std::sin(half), 0, 0};
+  at.centre = {0, 0, 0.012 * std::cos(tilt) + 0.001 * std::sin(tilt) + 1e-6};
+  Space space({coin}, {at}, Ground{0.0, 0.3, 0.5, 30e9, 0.2}, {0, 0, -9.81}, {});
+  while (space.get_time() < 1.5 - 1e-9) space.step(1.5);
+  EXPECT_TRUE(space.is_still(0));
+  EXPECT_NEAR(space.state(0).centre[2], 0.012, 2e-6);
+}
+
+}  // namespace
+}  // namespace carillon::rigid::tests

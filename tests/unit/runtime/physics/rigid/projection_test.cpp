@@ -1,0 +1,128 @@
+// Bodies that are moved apart: gaps, the least displacement in closed form, momenta and energy.
+#include "runtime/physics/rigid/projection.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "tests/unit/runtime/physics/rigid/momenta.hpp"
+#include "tests/unit/runtime/physics/rigid/stages.hpp"
+
+namespace carillon::rigid {
+namespace {
+
+double find_least_gap(const Stages& stages) {
+  double gap = 1.0;
+  for (const Pair* pair : stages.island.pairs)
+    for (const Contact& c : pair->contacts) gap = std::min(gap, c.touch.gap_m);
+  return gap;
+}
+
+/// A box in any orientation, its lowest corner `depth_m` below the ground.
+Stages make_box_in_ground(std::mt19937& random, double depth_m, double speed_m_s) {
+  std::normal_distribution<double> normal;
+  State s;
+  for (double& q : s.rotation) q = normal(random);
+  s.rotation = normalise(s.rotation);
+  const geometry::tests::Solid box = geometry::tests::make_box(kBoxSides, 1);
+  double low = 1.0;
+  for (const Vec3& x : box.vertices) low = std::min(low, (make_rotation(s.rotation) * x)[2]);
+  s.centre[2] = -low - depth_m;
+  for (std::size_t k = 0; k < 3; ++k) s.velocity[k] = speed_m_s * normal(random), s.momentum[k] = 1e-3 * speed_m_s * normal(random);
+  return {{make_solid(box, 0.1, kBoxSides)}, {s}, kWood, {0, 0, -kGravity}};
+}
+
+TEST(projection, a_corner_in_the_ground_goes_the_least_way) {
+  std::mt19937 random(3);
+  for (int n = 0; n < 100; ++n) {
+    const double depth = 1e-4;
+    Stages stages = make_box_in_ground(random, depth, 0.0);
+    stages.begin({{0, -1}});
+    const Pair& pair = *stages.island.pairs[0];
+    if (pair.contacts.size() != 1) continue;  // an edge or a side that is nearly level
+    const State before = stages.bodies.state(0);
+    const Vec3 arm = pair.contacts[0].touch.where_m - before.centre, turning = cross(arm, {0, 0, 1});
+    // min 1/2 dx^T M dx with n.(moved + turned x arm) = depth: moved = lambda n / m, turned = lambda I^-1 (arm x n).
+    const Vec3 turn = stages.bodies.placed(0).inverse_inertia * turning;
+    const double lambda = depth / (1.0 / stages.bodies.solid(0).mass_kg + dot(turning, turn));
+    stages.projection.run(stages.step, kTooDeep);
+    const Vec3 moved = stages.bodies.state(0).centre - before.centre;
+    EXPECT_NEAR(moved[2], lambda / stages.bodies.solid(0).mass_kg, 1e-3 * depth);
+    EXPECT_LT(std::hypot(moved[0], moved[1]), 1e-9);
+    EXPECT_GT(find_least_gap(stages), -kDeep);
+    // Nothing moves that could pay for the work.
+    EXPECT_NEAR(stages.calc_books().lifted_j, 0.1 * kGravity * moved[2], 1e-12);
+  }
+}
+
+TEST(projection, motion_pays_for_the_work) {
+  std::mt19937 random(4);
+  for (int n = 0; n < 200; ++n) {
+    Stages stages = make_box_in_ground(random, 1e-4, n % 2 == 0 ? 1.0 : 1e-3);
+    stages.begin({{0, -1}});
+    const Books before = stages.calc_books();
+    const double kinetic = add_up(stages.bodies).kinetic_j;
+    stages.projection.run(stages.step, kTooDeep);
+    EXPECT_GT(find_least_gap(stages), -kTooDeep);
+    const Books after = stages.calc_books();
+    EXPECT_NEAR(after.calc_total(), before.calc_total(), 1e-12 * kinetic + 1e-15);
+    EXPECT_GE(after.lifted_j, 0.0);
+    EXPECT_LE(after.motion_j, before.motion_j + after.lifted_j + 1e-15);
+    EXPECT_LE(after.lifted_j, n % 2 == 0 ? 1e-12 * kinetic : 0.1 * kGravity * 1e-4) << n;
+  }
+}
+
+TEST(projection, free_bodies_part_as_their_masses_and_keep_both_momenta) {
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal;
+  for (int n = 0; n < 50; ++n) {
+    const double overlap = 1e-4;
+    std::vector<State> states{make_state({0, 0, 0}), make_state({kBoxSides[0] - overlap, 0, 0})};
+    for (State& s : states)
+      for (std::size_t k = 0; k < 3; ++k) s.velocity[k] = normal(random), s.momentum[k] = 1e-3 * normal(random);
+    Stages stages({make_box(0.1, kBoxSides), make_box(0.3, kBoxSides)}, states, std::nullopt, {});
+    stages.begin({{0, 1}});
+    const Momenta before = add_up(stages.bodies);
+    const double total = stages.calc_books().calc_total();
+    stages.projection.run(stages.step, kTooDeep);
+    EXPECT_GT(find_least_gap(stages), -kDeep);
+    EXPECT_NEAR(stages.bodies.state(0).centre[0], -0.75 * overlap, 1e-3 * overlap);
+    EXPECT_NEAR(stages.bodies.state(1).centre[0] - states[1].centre[0], 0.25 * overlap, 1e-3 * overlap);
+    const Momenta after = add_up(stages.bodies);
+    EXPECT_LT(norm(after.linear - before.linear), 1e-13);
+    EXPECT_LT(norm(after.angular - before.angular), 1e-13);
+    EXPECT_NEAR(stages.calc_books().calc_total(), total, 1e-13);
+  }
+}
+
+TEST(projection, allowed_depth_stays) {
+  std::mt19937 random(6);
+  for (const double allowed : {0.0, 1e-4}) {
+    Stages stages = make_box_in_ground(random, 1e-4, 1.0);
+    stages.begin({{0, -1}});
+    stages.island.pairs[0]->sag_m = allowed;
+    const Vec3 before = stages.bodies.state(0).centre;
+    stages.projection.run(stages.step, kTooDeep);
+    EXPECT_EQ(stages.bodies.state(0).centre == before, allowed > 0.0);
+    EXPECT_EQ(stages.ledger.costs.pushes > 0, allowed == 0.0);
+  }
+}
+
+TEST(projection, springs_of_an_impact_lift_the_bodies_out_of_the_depth_that_it_left) {
+  std::mt19937 random(7);
+  Stages stages = make_box_in_ground(random, 1e-4, 0.0);
+  stages.begin({{0, -1}});
+  stages.touches.release(0, -1, 0.0, 1.0);
+  const double total = stages.calc_books().calc_total();
+  stages.projection.run(stages.step, kTooDeep);
+  const Books books = stages.calc_books();
+  EXPECT_GT(find_least_gap(stages), -kTooDeep);
+  EXPECT_EQ(books.lifted_j, 0.0);
+  EXPECT_LT(books.springs_j, 1.0);
+  EXPECT_EQ(books.lost_j, 0.0);
+  EXPECT_NEAR(books.calc_total(), total, 1e-13);
+}
+
+}  // namespace
+}  // namespace carillon::rigid
