@@ -50,7 +50,7 @@ auto find_word(const Words& words, std::string_view word) {
 /// Values are in the order of their enumeration.
 template <class Words, class Value>
 std::string get_word(const Words& words, Value value) {
-  return std::string(words.at(value).word);
+  return std::string(words.at(static_cast<std::size_t>(value)).word);
 }
 
 std::optional<base::Object> read_root(const fs::path& file) {

@@ -253,7 +253,7 @@ Check check_corrected(const Bank& bank) {
       faults.add("corrected_frequency_hz[{}] is {:.6g}, and the mesh's is {:.6g}: too far apart", i, hz, mesh_hz);
     if (!(d >= 0.0 && d <= kMaxDecayPerS)) faults.add("corrected_decay[{}] is {:.6g} 1/s, which is none", i, d);
     if (!(cents >= 0.0)) faults.add("corrected_error_cents[{}] is {:.6g}, negative", i, cents);
-    const std::size_t correction = corrected.correction[i];
+    const auto correction = static_cast<std::size_t>(corrected.correction[i]);
     if (correction >= counts.size()) {
       faults.add("correction[{}] is {}, and none above {} is known", i, correction, counts.size() - 1);
       continue;

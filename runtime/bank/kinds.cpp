@@ -393,7 +393,7 @@ class Skin {
 
 constexpr std::array kNames{"-", "bending", "lateral bending", "torsion", "longitudinal", "breathing", "", "plate bending", "in plane"};
 
-const char* get_name(MotionKind motion) { return kNames.at(motion); }
+const char* get_name(MotionKind motion) { return kNames.at(static_cast<std::size_t>(motion)); }
 
 }  // namespace
 

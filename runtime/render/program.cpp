@@ -93,19 +93,19 @@ class Outputs {
   }
   /// `notes`: where each is named; may be null.
   void commit(std::FILE* notes) {
-    for (const scene::Output& output : files_) {
+    for (const OutputFile& output : files_) {
       output.file->commit();
       if (notes != nullptr) fmt::print(notes, "{:<18} {}\n", output.what, base::printable(output.path.string()));
     }
   }
 
  private:
-  struct scene::Output {
+  struct OutputFile {
     std::unique_ptr<base::WholeFile> file;
     const char* what;
     fs::path path;
   };
-  std::vector<scene::Output> files_;
+  std::vector<OutputFile> files_;
 };
 
 bool is_same_file(const fs::path& a, const fs::path& b) {
@@ -253,8 +253,8 @@ scene::Scene prepare_scene(const ProgramOptions& options) {
   scene::Scene scene = scene::read_scene(options.scene);
   if (options.rate_hz) scene.sample_rate_hz = *options.rate_hz;
   if (options.format) {
-    const auto name = std::find(kSampleFormatNames.begin(), kSampleFormatNames.end(), *options.format);
-    scene.output.format = static_cast<scene::SampleFormat>(name - kSampleFormatNames.begin());
+    const auto name = std::find(scene::kSampleFormatNames.begin(), scene::kSampleFormatNames.end(), *options.format);
+    scene.output.format = static_cast<scene::SampleFormat>(name - scene::kSampleFormatNames.begin());
   }
   if (options.plan && (options.spectrogram || options.trajectory || options.report || options.record || !options.wav.empty())) {
     throw InputError("--plan makes no sound and writes no files; leave the options that name files away");

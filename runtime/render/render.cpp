@@ -289,7 +289,7 @@ class Rendering {
       const synth::EffectSet effects = effects_.find_all(i);
       bodies.push_back({.number = static_cast<int>(i),
                         .moves = !effects.is_empty() && !scene_->bodies[i].spec.fixed,
-                        .lead_s = calc_strike_lead_s(session_.get_model(i), effects)});
+                        .lead_s = scene::calc_strike_lead_s(session_.get_model(i), effects)});
     }
     return bodies;
   }

@@ -23,7 +23,7 @@
 #include "tests/support/folder.hpp"
 #include "tests/support/paths.hpp"
 #include "tests/unit/runtime/acoustics/head/oracle.hpp"
-#include "tests/unit/runtime/scene/heard.hpp"
+#include "tests/unit/runtime/render/heard.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 #include "tests/unit/runtime/synth/multipole_cube.hpp"
 
