@@ -24,7 +24,7 @@ bool count_allocation(std::size_t size) noexcept {
 }
 [[gnu::noinline]] void* operator new(std::size_t size, std::align_val_t align) {
   const bool succeeds = carillon::tests::count_allocation(size);
-  const std::size_t a = align;
+  const auto a = static_cast<std::size_t>(align);
   if (void* memory = succeeds ? std::aligned_alloc(a, (size + a - 1) / a * a) : nullptr) return memory;
   throw std::bad_alloc();
 }
