@@ -1,8 +1,8 @@
-// Reading banks from untrusted bytes.
-// Method: the seal says where each array lies; the file is read once from front to back, its arrays straight to where they belong, and
-//   hashed on the way. Only then is the digest compared and the content looked at.
-// Deviations: HDF5 is not asked. libhdf5 1.10.8 was seen to crash (and to hang) on files with one changed byte, so its parser does not
-//   belong between an untrusted file and a running game; the HDF5 structure of a bank is there for other programs.
+// Reader of banks from untrusted bytes.
+// Method: the seal locates the arrays; the file is read once, front to back, arrays directly to their destination, and hashed on the way.
+// The
+//   content is checked after the digest.
+// Deviations: HDF5 is not used: libhdf5 1.10.8 crashed and hung on files with one changed byte. The HDF5 structure serves other programs.
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/stat.h>
@@ -18,20 +18,20 @@
 
 #include "runtime/bank/bank.hpp"
 #include "runtime/bank/layout.hpp"
+#include "runtime/bank/packed/shapes.hpp"
+#include "runtime/bank/packed/surface.hpp"
 #include "runtime/bank/seal.hpp"
 #include "runtime/base/large.hpp"
 #include "runtime/base/sha256.hpp"
-#include "runtime/bank/packed/shapes.hpp"
-#include "runtime/bank/packed/surface.hpp"
 
 namespace carillon::bank {
 namespace {
 
-/// An open regular file.
+/// Open regular file.
 class File {
  public:
   explicit File(const std::filesystem::path& path) : name_(path.string()) {
-    // Non-blocking, so that a FIFO without a writer cannot hang the program.
+    // Non-blocking: a FIFO without a writer must not hang the program.
     descriptor_ = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC | O_NOCTTY);
     if (descriptor_ < 0) {
       const int error = errno;
@@ -53,7 +53,7 @@ class File {
   const std::string& name() const { return name_; }
   std::uint64_t length() const { return length_; }
 
-  /// Fills `bytes` from `offset`. SystemError when the disk fails, InputError when the file ends early.
+  /// Fills `bytes` from `offset`. SystemError on read errors, InputError if the file ends early.
   void read(std::uint64_t offset, std::span<std::byte> bytes) const {
     while (!bytes.empty()) {
       const ssize_t got = ::pread(descriptor_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
@@ -84,7 +84,7 @@ const Extent& get_extent(const Seal& seal, const std::string& field, const std::
   return found->second;
 }
 
-/// Number of rows of an array that has at least one index.
+/// Rows of an array with at least one index.
 std::uint64_t get_rows(const Seal& seal, const std::string& field, const std::string& name) {
   const Extent& extent = get_extent(seal, field, name);
   if (extent.shape.empty())
@@ -97,10 +97,10 @@ std::string describe(const std::string& dtype, const std::vector<std::uint64_t>&
   return shape.empty() ? dtype + " alone" : fmt::format("{} ({})", dtype, fmt::join(shape, ", "));
 }
 
-/// Throws unless the array in the file has the type and the extents that the other arrays ask for.
+/// Throws unless type and shape in the file are as required by the other arrays.
 void check_extent(const Field& wanted, const Extent& extent, const std::string& name) {
   if (extent.dtype != wanted.dtype || extent.shape != wanted.shape) {
-    throw InputError(fmt::format("{}: arrays disagree: {} is {}, and {} is wanted; write the bank again", name, wanted.name,
+    throw InputError(fmt::format("{}: arrays disagree: {} is {}, {} is required; write the bank again", name, wanted.name,
                                  describe(extent.dtype, extent.shape), describe(wanted.dtype, wanted.shape)));
   }
 }
@@ -113,13 +113,13 @@ struct Loaded {
   FileForm form;
 };
 
-/// True when the file has any array of the group.
+/// True if the file has any array of the group.
 bool has_group(const Seal& seal, const std::string& group) {
   const auto first = seal.extents.lower_bound(group + "/");
   return first != seal.extents.end() && first->first.starts_with(group + "/");
 }
 
-/// The same for what came with version 1.1; what is not there stays as Bank's initialisers have it.
+/// Fields since version 1.1; absent ones keep Bank's initialisers.
 template <class MakeText>
 void allocate_later(const Seal& seal, const std::string& name, Loaded& loaded, const MakeText& make_text) {
   const auto make_table = [&](const char* field, const char* dtype, std::vector<std::uint64_t> shape, auto& values, std::uint64_t size) {
@@ -198,7 +198,7 @@ void allocate_later(const Seal& seal, const std::string& name, Loaded& loaded, c
       make_table("nonlinear/weight", "<f8", {points}, energy.weight, points);
     }
     if (seal.extents.contains("nonlinear/linear")) make_table("nonlinear/linear", "<f8", {rows, modes}, energy.linear, rows * modes);
-    // list_fields() divides by these: a shape of zero extent has no bytes that would bound the others.
+    // list_fields() divides by these: an empty shape has no bytes that would bound the others.
     if (const std::string fault = find_size_fault(energy); energy.is_empty() || !fault.empty())
       throw InputError(fmt::format("{}: {}; write the bank again", name, fault.empty() ? "nonlinear/modes names no mode" : fault));
   }
@@ -214,11 +214,11 @@ void allocate_later(const Seal& seal, const std::string& name, Loaded& loaded, c
   loaded.form.has_complete_below = seal.extents.contains("proof/complete_below_hz");
 }
 
-/// Gives the arrays the sizes that the seal states. The seal bounds their sum by the length of the file.
+/// Sizes the arrays by the seal, which bounds their sum by the length of the file.
 void allocate(const Seal& seal, const std::string& name, Loaded& loaded) {
   Bank& bank = loaded.bank;
   const std::uint64_t modes = get_rows(seal, "modes/eigenvalue", name);
-  // Every extent is compared before memory is taken: rows times three could exceed the file where a declared shape did not.
+  // Check all extents before allocating: rows times three could exceed the file even if a declared shape does not.
   FileForm& form = loaded.form;
   const auto check = [&](const char* field, const char* dtype, std::vector<std::uint64_t> shape) {
     check_extent({field, dtype, std::move(shape), "", "", nullptr}, get_extent(seal, field, name), name);
@@ -281,7 +281,7 @@ std::string trim(std::string_view text) {
   return std::string(text.substr(0, last == std::string_view::npos ? 0 : last + 1));
 }
 
-/// Reads the file from front to back, every array to where it belongs, and compares the digest.
+/// Reads the file from front to back into the arrays and compares the digest.
 Loaded load(const Seal& seal, const std::string& name, const Source& read) {
   Loaded loaded;
   allocate(seal, name, loaded);
@@ -293,13 +293,13 @@ Loaded load(const Seal& seal, const std::string& name, const Source& read) {
   for (const Field& field : list_fields(loaded.bank, loaded.form)) {
     const Extent& extent = get_extent(seal, field.name, name);
     check_extent(field, extent, name);
-    // The table points to const for the writer's sake; what it points to is `loaded`, which is ours to fill.
+    // The table points to const for the writer's sake; the memory belongs to `loaded`.
     if (extent.bytes > 0) targets.push_back({extent.offset, extent.bytes, static_cast<std::byte*>(const_cast<void*>(field.data))});
   }
   std::sort(targets.begin(), targets.end(), [](const Target& a, const Target& b) { return a.offset < b.offset; });
   targets.push_back({seal.length, 0, nullptr});
 
-  constexpr std::uint64_t kPiece = 1 << 18;  // is still in the cache when it is hashed
+  constexpr std::uint64_t kPiece = 1 << 18;  // still cached when hashed
   base::Sha256 digest;
   std::vector<std::byte> buffer(std::min(seal.length, kPiece));
   std::uint64_t place = 0;
@@ -315,7 +315,7 @@ Loaded load(const Seal& seal, const std::string& name, const Source& read) {
     }
   };
   take(nullptr, kTextBytes);
-  place = kSealBytes;  // the digest is not part of itself
+  place = kSealBytes;  // the digest does not cover itself
   for (const Target& target : targets) {
     if (target.offset < place) throw InputError(name + ": damaged seal: two arrays overlap; copy or write the bank again");
     take(nullptr, target.offset - place);
@@ -330,7 +330,7 @@ Loaded load(const Seal& seal, const std::string& name, const Source& read) {
   return loaded;
 }
 
-/// Makes mesh and shapes of what is packed.
+/// Decodes packed mesh and shapes.
 void unpack(Bank& bank, const FileForm& form, const std::string& name) {
   packed::Surface surface = packed::read_surface(std::as_bytes(std::span(form.packed_surface)), name);
   for (const double scale : bank.shape_scale)
@@ -347,7 +347,7 @@ void unpack(Bank& bank, const FileForm& form, const std::string& name) {
                                    bank.vertex_count()));
 }
 
-/// Turns the file's form of things into the bank's.
+/// Converts the file's form to the bank's.
 Bank finish(Loaded&& loaded, const std::string& name) {
   Bank& bank = loaded.bank;
   const FileForm& form = loaded.form;
@@ -364,7 +364,7 @@ Bank finish(Loaded&& loaded, const std::string& name) {
   bank.supports.text = trim(form.supports);
   if (bank.proof) bank.proof->method = trim(form.proof_method);
   if (bank.multipoles.is_empty())
-    bank.multipoles = {};  // of a bank without modes
+    bank.multipoles = {};  // bank without modes
   else
     bank.multipoles.method = trim(form.radiation_method);
   if (const std::string form_name = trim(form.nonlinear_form);
@@ -374,7 +374,7 @@ Bank finish(Loaded&& loaded, const std::string& name) {
   for (std::size_t i = 0; i < bank.mode_count(); ++i) {
     const double freq_hz = std::sqrt(bank.eigenvalue_rad2_s2[i]) / (2.0 * std::numbers::pi);
     const bool agrees = std::abs(form.freq_hz[i] - freq_hz) <= 1e-9 * std::abs(freq_hz);
-    // An eigenvalue that has no frequency is a fault of its own, reported in better words by calc_checks().
+    // An eigenvalue without a frequency is reported by calc_checks().
     if (!agrees && std::isfinite(freq_hz)) {
       throw InputError(fmt::format("{}: modes/frequency_hz[{}] is {} Hz, and its eigenvalue says {} Hz; write the bank again", name, i,
                                    form.freq_hz[i], freq_hz));
@@ -387,7 +387,7 @@ void require_sane(const Bank& bank, const std::string& name) {
   const auto faults = find_faults(bank);
   if (faults.empty()) return;
   const std::string more = faults.size() > 1 ? fmt::format(" (and {} more: carillon-bank check lists them)", faults.size() - 1) : "";
-  throw InputError(fmt::format("{}: not a sane bank: {}{}; compute the bank again", name, faults[0], more));
+  throw InputError(fmt::format("{}: not a valid bank: {}{}; compute the bank again", name, faults[0], more));
 }
 
 }  // namespace
@@ -422,11 +422,11 @@ Bank assemble_bank(const std::vector<FieldBytes>& arrays, const std::string& nam
     std::uint64_t size = find_item_bytes(field.dtype);
     bool is_whole = size > 0;
     for (const std::uint64_t n : field.shape) {
-      is_whole = is_whole && n <= seal.length && (n == 0 || size <= seal.length / n);  // as in a seal: nothing is larger than all of it
+      is_whole = is_whole && n <= seal.length && (n == 0 || size <= seal.length / n);  // as in a seal: no array exceeds the total
       size = is_whole ? size * n : 0;
     }
     if (!is_whole || size != bytes.size())
-      throw InputError(fmt::format("{}: {} is said to be {}, and has {} bytes; write it again", name, field.name,
+      throw InputError(fmt::format("{}: {} is declared as {}, and has {} bytes; write it again", name, field.name,
                                    describe(field.dtype, field.shape), bytes.size()));
     if (!found.emplace(field.name, bytes).second) throw InputError(fmt::format("{}: {} is there twice; write it again", name, field.name));
     seal.extents.emplace(field.name, extent);
@@ -442,7 +442,7 @@ Bank assemble_bank(const std::vector<FieldBytes>& arrays, const std::string& nam
       loaded.bank.shape.resize(extent.bytes / sizeof(std::int16_t));
       std::memcpy(loaded.bank.shape.data(), from, extent.bytes);
     } else {
-      // As in load(): what the table points to is ours to fill.
+      // As in load(): the memory belongs to this function.
       std::memcpy(const_cast<void*>(wanted.data), from, extent.bytes);
     }
   }
@@ -459,7 +459,7 @@ std::array<int, 2> read_version(const std::filesystem::path& path) {
 std::vector<Vec3> read_shape_row(const std::filesystem::path& path, std::size_t vertex) {
   const File file(path);
   const Seal seal = file.read_seal();
-  if (seal.extents.contains("mesh/packed")) {  // no row stands alone
+  if (seal.extents.contains("mesh/packed")) {  // rows cannot be decoded separately
     const Bank bank = read_bank(path);
     if (vertex >= bank.vertex_count())
       throw InputError(fmt::format("{}: no vertex {}; the bank has {}, numbered from 0", file.name(), vertex, bank.vertex_count()));

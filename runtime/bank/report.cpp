@@ -17,7 +17,7 @@
 namespace carillon::bank {
 namespace {
 
-/// A text of the bank as JSON; nothing when it is none (it is free text as far as a reader of banks is concerned).
+/// A text of the bank as JSON; nullopt if invalid (banks may hold any text).
 std::optional<Json::Value> parse_json(const std::string& text) {
   Json::CharReaderBuilder builder;
   builder["stackLimit"] = 64;
@@ -32,7 +32,7 @@ std::optional<Json::Value> parse_json(const std::string& text) {
   return value;
 }
 
-/// "under", "critical" or "over": d against omega. Critical is what equals d = omega to rounding.
+/// "under", "critical" or "over"; critical: d = omega to rounding.
 const char* find_regime(double decay, double omega) {
   if (std::abs(decay - omega) <= 1e-9 * omega) return "critical";
   return decay < omega ? "under" : "over";
@@ -56,8 +56,8 @@ bool is_nested(const Json::Value& value) { return value.isObject() || value.isAr
 
 bool is_flat(const Json::Value& value) { return std::none_of(value.begin(), value.end(), is_nested); }
 
-/// One line per scalar and per short flat object ("solve: peak_bytes 900 MB, seconds 12.25"); what is nested is indented. The members of a
-/// list go by their "name" where they have one.
+/// Scalars and short flat objects on one line ("solve: peak_bytes 900 MB, seconds 12.25"), nested ones indented. Array elements are
+/// labelled by their "name", if any.
 void append_tree(const Json::Value& tree, std::size_t depth, std::string& text) {
   const std::string indent(2 * depth, ' ');
   std::size_t index = 0;
@@ -83,7 +83,7 @@ void append_tree(const Json::Value& tree, std::size_t depth, std::string& text) 
   }
 }
 
-/// "0.012", or "-" where the bank does not say.
+/// "0.012", or "-" if unknown.
 std::string format_cents(const std::vector<double>& cents, std::size_t mode) {
   return mode < cents.size() && std::isfinite(cents[mode]) ? fmt::format("{:.2g}", cents[mode]) : "-";
 }
@@ -144,14 +144,14 @@ std::string format_damping(const Bank& bank) {
   return text + ", weighed by each material's part of the energies";
 }
 
-/// What info says of the multipoles of a bank that has some.
+/// Summary of a bank's multipoles.
 struct RadiationFacts {
   std::int32_t lowest = 0, highest = 0;  // order
-  std::size_t bytes = 0;                 // of orders, scales and coefficients
+  std::size_t bytes = 0;                 // orders, scales and coefficients
   double worst_db = 0.0;                 // stated error
-  std::size_t strong = 0;                // modes of whose damping radiation is more than half
-  double cents = 0.0;                    // by which the mass of the air lowers a mode, the largest of either sign
-  std::int32_t parts = 0;                // of the mode in air that has most, where the air couples modes
+  std::size_t strong = 0;                // modes with more than half of their damping by radiation
+  double cents = 0.0;                    // largest shift by the mass of the air, either sign
+  std::int32_t parts = 0;                // largest number of parts of a coupled mode
 };
 
 RadiationFacts find_radiation_facts(const Bank& bank) {
@@ -325,7 +325,7 @@ std::string format_info(const Bank& bank, std::span<const HeardMode> heard, cons
                       inertia[8], inertia[1], inertia[2], inertia[5]);
   if (mode_limit > 0 && bank.mode_count() > 0) text += format_modes(bank, heard, mode_limit);
   const std::optional<Json::Value> provenance = parse_json(bank.provenance);
-  // The record of the run; the job around it is left to --json.
+  // Record of the run; the whole job is printed by --json only.
   const bool is_recorded = provenance && provenance->isObject() && provenance->isMember("run") && (*provenance)["run"].isObject();
   if (is_recorded && !has_record) text += "the record of its run: --all; the whole job too: --json\n";
   if (is_recorded && has_record) {

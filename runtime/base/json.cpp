@@ -51,7 +51,7 @@ std::string Json::line() const {
 
 std::string Json::text(std::size_t columns) const {
   std::string out;
-  append_lines(out, 0, columns, columns);  // the outermost is never on one line
+  append_lines(out, 0, columns, columns);  // the root is always broken
   return out + '\n';
 }
 
@@ -71,7 +71,7 @@ void Json::append_line(std::string& out) const {
   out += kind_ == Kind::array ? ']' : '}';
 }
 
-/// `taken`: columns of the line that are used up before the value.
+/// `taken`: columns already used on the line.
 void Json::append_lines(std::string& out, std::size_t indentation, std::size_t columns, std::size_t taken) const {
   const std::size_t before = out.size();
   append_line(out);

@@ -1,4 +1,4 @@
-// Vectors and matrices of three, world axes.
+// 3-vectors and 3x3 matrices.
 #pragma once
 
 #include <array>
@@ -18,14 +18,14 @@ inline Vec3 cross(const Vec3& a, const Vec3& b) {
 }
 inline double norm(const Vec3& a) { return std::sqrt(dot(a, a)); }
 inline Vec3 normalise(const Vec3& a) { return (1.0 / norm(a)) * a; }
-/// normalise(a), and zero of zero.
+/// As normalise(); zero for a zero vector.
 inline Vec3 calc_unit(const Vec3& a) {
   const double length = norm(a);
   return length > 0 ? (1 / length) * a : Vec3{};
 }
-/// The determinant of the matrix with these rows.
+/// Determinant of the matrix with rows a, b, c.
 inline double calc_det(const Vec3& a, const Vec3& b, const Vec3& c) { return dot(a, cross(b, c)); }
-/// The unit vector of the axis that n is least along; the first of several.
+/// Unit vector of the axis with the smallest component of n; the first of several.
 inline Vec3 find_least_axis(const Vec3& n) {
   std::size_t k = 0;
   for (std::size_t i = 1; i < 3; ++i)
@@ -34,7 +34,7 @@ inline Vec3 find_least_axis(const Vec3& n) {
   axis[k] = 1.0;
   return axis;
 }
-/// A unit vector at right angles to n.
+/// Unit vector perpendicular to n.
 inline Vec3 find_across(const Vec3& n) {
   const Vec3 axis = std::abs(n[0]) < 0.6 ? Vec3{1, 0, 0} : Vec3{0, 1, 0};
   return normalise(cross(n, axis));
@@ -50,7 +50,7 @@ inline Mat3 operator*(const Mat3& a, const Mat3& b) {
   const Mat3 t = transpose(b);
   return {t * a[0], t * a[1], t * a[2]};
 }
-/// Of a symmetric matrix that is not singular.
+/// Inverse of a non-singular symmetric matrix.
 inline Mat3 calc_inverse(const Mat3& m) {
   const Vec3 a = cross(m[1], m[2]), b = cross(m[2], m[0]), c = cross(m[0], m[1]);
   const double s = 1.0 / dot(m[0], a);

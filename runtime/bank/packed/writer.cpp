@@ -10,7 +10,7 @@
 namespace carillon::packed {
 namespace {
 
-constexpr int kEffort = 12;  // the most: a bank is packed once
+constexpr int kEffort = 12;  // maximum: banks are packed once
 
 }  // namespace
 

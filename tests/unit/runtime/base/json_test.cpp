@@ -85,7 +85,7 @@ TEST(Json, texts_are_read_back_as_they_were) {
     const std::string line = Json::object().set("x", text).line();
     auto read = parse(line);
     EXPECT_EQ(read.string_or("x", ""), text);
-    EXPECT_EQ(base::printable(line), line);  // a terminal obeys nothing in it
+    EXPECT_EQ(base::printable(line), line);  // free of control characters
   }
   EXPECT_EQ(base::quote("\x1b\u202E"), "\"\\u001b\\u202e\"");
 }
