@@ -31,6 +31,9 @@ struct Value {
   const Value* find(std::string_view wanted) const;
 };
 
+/// Nearest double of a number of JSON; nullopt on overflow.
+std::optional<double> to_double(std::string_view text);
+
 /// Description of a value for messages: "a list of 3".
 std::string kind_of(const Value& value);
 

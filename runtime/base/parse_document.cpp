@@ -38,6 +38,28 @@ void DocumentData::fail(std::ptrdiff_t offset, const std::string& message) const
   throw PlacedError(fmt::format("{}:{}", file.string(), line_at(offset)), message);
 }
 
+// By the standard library: RapidJSON's conversion has undefined behaviour for leading zeros.
+std::optional<double> to_double(std::string_view text) {
+#ifdef __cpp_lib_to_chars
+  double number = 0.0;
+  auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error == std::errc::result_out_of_range) {
+    // Over- or underflow: parse as long double. Beyond its range too, the number is small if its exponent is negative or its integer part
+    // is 0, since RapidJSON rejects exponents above 308.
+    long double wide = 0.0L;
+    const bool is_within = std::from_chars(text.data(), text.data() + text.size(), wide).ec == std::errc();
+    if (!is_within && text.find('-', 1) == std::string_view::npos && text.substr(text.starts_with('-') ? 1 : 0, 1) != "0")
+      return std::nullopt;
+    number = static_cast<double>(wide);
+    error = std::errc();
+  }
+  if (error != std::errc()) return std::nullopt;
+#else
+  const double number = std::strtod(std::string(text).c_str(), nullptr);  // WebAssembly has one locale only
+#endif
+  return std::isfinite(number) ? std::optional(number) : std::nullopt;
+}
+
 std::string kind_of(const Value& value) {
   switch (value.kind) {
     case Value::Kind::kNull:
@@ -60,28 +82,6 @@ namespace {
 
 constexpr std::uint64_t kMaxBytes = 16u << 20;
 constexpr int kMaxDepth = 100;
-
-/// Nearest double; nullopt on overflow. By the standard library: RapidJSON's conversion has undefined behaviour for leading zeros.
-std::optional<double> to_double(std::string_view text) {
-#ifdef __cpp_lib_to_chars
-  double number = 0.0;
-  auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (error == std::errc::result_out_of_range) {
-    // Over- or underflow: parse as long double. Beyond its range too, the number is small if its exponent is negative or its integer part
-    // is 0, since RapidJSON rejects exponents above 308.
-    long double wide = 0.0L;
-    const bool is_within = std::from_chars(text.data(), text.data() + text.size(), wide).ec == std::errc();
-    if (!is_within && text.find('-', 1) == std::string_view::npos && text.substr(text.starts_with('-') ? 1 : 0, 1) != "0")
-      return std::nullopt;
-    number = static_cast<double>(wide);
-    error = std::errc();
-  }
-  if (error != std::errc()) return std::nullopt;
-#else
-  const double number = std::strtod(std::string(text).c_str(), nullptr);  // WebAssembly has one locale only
-#endif
-  return std::isfinite(number) ? std::optional(number) : std::nullopt;
-}
 
 /// Builds Values from rapidjson::Reader events.
 class Builder {
