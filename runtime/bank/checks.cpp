@@ -37,8 +37,6 @@ constexpr double kMaxAlpha1S = 1e6, kMaxAlpha2PerS = 1e12;
 constexpr double kMinShare = 1e-12;
 constexpr double kGainSlack = 10.0;  // factor over the gain of a sphere pulsating with the largest motion
 
-double calc_size(const Vec3& v) { return std::hypot(v[0], v[1], v[2]); }
-
 constexpr double kMaxSteps = 32767.0;  // two-byte component
 
 /// Largest |phi| representable by that many steps of a mode.
@@ -294,7 +292,7 @@ double calc_area(const Bank& bank) {
   for (const auto& triangle : bank.triangles) {
     if (std::any_of(triangle.begin(), triangle.end(), [&](std::int64_t v) { return v < 0 || v >= count; }))
       return std::numeric_limits<double>::infinity();
-    twice += calc_size(calc_normal(bank.vertices_m, triangle));
+    twice += calc_length(calc_normal(bank.vertices_m, triangle));
   }
   return 0.5 * twice;
 }
@@ -345,13 +343,8 @@ Check check_shapes(const Bank& bank) {
 double calc_enclosed_volume(const Bank& bank, const Vec3& origin) {
   double volume = 0.0;
   for (const auto& triangle : bank.triangles) {
-    Vec3 p[3];
-    for (int i = 0; i < 3; ++i) {
-      for (int k = 0; k < 3; ++k) p[i][k] = bank.vertices_m[triangle[i]][k] - origin[k];
-    }
-    volume += (p[0][0] * (p[1][1] * p[2][2] - p[1][2] * p[2][1]) + p[0][1] * (p[1][2] * p[2][0] - p[1][0] * p[2][2]) +
-               p[0][2] * (p[1][0] * p[2][1] - p[1][1] * p[2][0])) /
-              6.0;
+    const auto at = [&](int i) { return bank.vertices_m[triangle[i]] - origin; };
+    volume += calc_det(at(0), at(1), at(2)) / 6.0;
   }
   return volume;
 }
@@ -403,7 +396,7 @@ Check check_rigid_body(const Bank& bank) {
   }
   const auto& inertia = rigid.inertia_kg_m2;
   const double trace = inertia[0] + inertia[4] + inertia[8];
-  double s[3][3];
+  Mat3 s;
   for (int i = 0; i < 3; ++i) {
     for (int k = 0; k < 3; ++k) {
       s[i][k] = (i == k ? trace / 2.0 : 0.0) - inertia[3 * i + k];
@@ -412,8 +405,7 @@ Check check_rigid_body(const Bank& bank) {
     }
   }
   const double minor2 = s[0][0] * s[1][1] - s[0][1] * s[1][0];
-  const double minor3 = s[0][0] * (s[1][1] * s[2][2] - s[1][2] * s[2][1]) - s[0][1] * (s[1][0] * s[2][2] - s[1][2] * s[2][0]) +
-                        s[0][2] * (s[1][0] * s[2][1] - s[1][1] * s[2][0]);
+  const double minor3 = calc_det(s[0], s[1], s[2]);
   if (!(s[0][0] > 0.0 && minor2 > 0.0 && minor3 > 0.0)) {
     faults.add("inertia_kg_m2 is not that of a solid: not positive definite, or one principal moment exceeds the sum of the others");
   }
@@ -463,7 +455,7 @@ Check check_supports(const Bank& bank) {
     if (const std::string fault = find_text_fault(supports); !fault.empty()) faults.add("{}", fault);
   }
   for (std::size_t s = 0; s < count; ++s) {
-    const double length = calc_size(supports.normal[s]);
+    const double length = calc_length(supports.normal[s]);
     if (!(length < 1e-6 || std::abs(length - 1.0) < 1e-6)) faults.add("supports/normal[{}] has length {:.6g}, neither 0 nor 1", s, length);
     if (!(supports.area_m2[s] >= 0.0 && supports.thickness_m[s] >= 0.0))
       faults.add("support {} has area {:.6g} m^2 and thickness {:.6g} m, negative", s, supports.area_m2[s], supports.thickness_m[s]);
@@ -480,7 +472,7 @@ Check check_supports(const Bank& bank) {
     }
     if (!(shares <= 1.0 + kShareTolerance)) faults.add("support_energy of mode {} sums up to {:.6g}, more than 1", m, shares);
     if (bank.multipoles.is_in_decay) continue;  // forces without air, frequencies with air
-    const double share = calc_size(force) / (bank.eigenvalue_rad2_s2[m] * std::sqrt(bank.rigid.mass_kg));
+    const double share = calc_length(force) / (bank.eigenvalue_rad2_s2[m] * std::sqrt(bank.rigid.mass_kg));
     if (!(share <= 1.0 + kMassTolerance))
       faults.add("support_reaction of mode {} is {:.3g} times the maximum for a body of this mass", m, share);
     worst = std::max(worst, share);

@@ -25,7 +25,7 @@ void set_radiation_gains(Bank& bank, std::span<const double> shapes) {
   double twice_area = 0.0;
   for (const Triangle& triangle : find_outer_triangles(bank.vertices_m, bank.triangles)) {
     const Vec3 normal = calc_normal(bank.vertices_m, triangle);
-    twice_area += std::hypot(normal[0], normal[1], normal[2]);
+    twice_area += calc_length(normal);
     const double* rows[3];
     for (int k = 0; k < 3; ++k) rows[k] = &shapes[static_cast<std::size_t>(triangle[k]) * modes * 3];
     for (std::size_t m = 0; m < modes; ++m) {
@@ -43,7 +43,7 @@ double calc_outer_area_m2(const Bank& bank) {
   double twice = 0.0;
   for (const Triangle& triangle : find_outer_triangles(bank.vertices_m, bank.triangles)) {
     const Vec3 normal = calc_normal(bank.vertices_m, triangle);
-    twice += std::hypot(normal[0], normal[1], normal[2]);
+    twice += calc_length(normal);
   }
   return 0.5 * twice;
 }

@@ -28,7 +28,7 @@ std::vector<double> calc_mean_squares(const Bank& bank) {
   double area = 0.0;
   for (const Triangle& triangle : find_outer_triangles(bank.vertices_m, bank.triangles)) {
     const Vec3 normal = calc_normal(bank.vertices_m, triangle);
-    const double size = std::hypot(normal[0], normal[1], normal[2]);
+    const double size = calc_length(normal);
     if (!(size > 0.0)) continue;
     area += size;
     for (const std::int32_t vertex : triangle) {

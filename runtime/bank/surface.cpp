@@ -33,12 +33,7 @@ std::vector<std::int32_t> find_shells(const std::vector<Triangle>& triangles, st
 
 Vec3 calc_normal(const std::vector<Vec3>& vertices_m, const Triangle& triangle) {
   const Vec3 &a = vertices_m[triangle[0]], &b = vertices_m[triangle[1]], &c = vertices_m[triangle[2]];
-  Vec3 u, v;
-  for (int k = 0; k < 3; ++k) {
-    u[k] = b[k] - a[k];
-    v[k] = c[k] - a[k];
-  }
-  return {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
+  return cross(b - a, c - a);
 }
 
 std::array<Vec3, 2> find_extent(const std::vector<Vec3>& vertices_m) {

@@ -17,6 +17,8 @@ inline Vec3 cross(const Vec3& a, const Vec3& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 inline double norm(const Vec3& a) { return std::sqrt(dot(a, a)); }
+/// As norm(), without overflow of the squares.
+inline double calc_length(const Vec3& a) { return std::hypot(a[0], a[1], a[2]); }
 inline Vec3 normalise(const Vec3& a) { return (1.0 / norm(a)) * a; }
 /// As normalise(); zero for a zero vector.
 inline Vec3 calc_unit(const Vec3& a) {
@@ -38,6 +40,14 @@ inline Vec3 find_least_axis(const Vec3& n) {
 inline Vec3 find_across(const Vec3& n) {
   const Vec3 axis = std::abs(n[0]) < 0.6 ? Vec3{1, 0, 0} : Vec3{0, 1, 0};
   return normalise(cross(n, axis));
+}
+
+/// Two unit vectors perpendicular to n and to each other.
+inline std::array<Vec3, 2> find_tangents(const Vec3& n) {
+  Vec3 first = cross(n, find_least_axis(n));
+  const double length = norm(first);
+  for (double& x : first) x /= length;
+  return {first, cross(n, first)};
 }
 
 inline Vec3 operator*(const Mat3& m, const Vec3& a) { return {dot(m[0], a), dot(m[1], a), dot(m[2], a)}; }

@@ -301,7 +301,7 @@ SurfaceMark mark_surface(std::span<const Vec3> vertices_m, std::span<const std::
 
 bool is_same_surface(const SurfaceMark& a, const SurfaceMark& b) {
   constexpr double kSlack = 5e-5;  // relative to the size: rounding, or a packed surface
-  const double size = std::hypot(std::hypot(a.size_m[0], a.size_m[1], a.size_m[2]), std::hypot(b.size_m[0], b.size_m[1], b.size_m[2]));
+  const double size = std::hypot(calc_length(a.size_m), calc_length(b.size_m));
   for (std::size_t k = 0; k < 3; ++k) {
     if (!(std::abs(a.size_m[k] - b.size_m[k]) <= kSlack * size) || !(std::abs(a.order_m[k] - b.order_m[k]) <= kSlack * size)) return false;
   }

@@ -284,6 +284,59 @@ void unpack(const std::string& file, const std::string& out) {
     bank::write_bank(bank, out);
 }
 
+/// Options of all commands.
+struct Options {
+  std::string file, original, packed, unpacked, edited;
+  bool json = false, csv = false, all = false, keep_numbers = false;
+  std::size_t modes = 20;
+  double error_db = -60.0;
+  Wishes wishes{};
+  exchange::ExportWishes exported{};
+  exchange::ImportWishes imported{};
+};
+
+void add_commands(CLI::App& app, Options& options) {
+  const auto add = [&](const char* name, const char* description, const char* bank = "Bank file") {
+    CLI::App* command = app.add_subcommand(name, description);
+    command->add_option("BANK", options.file, bank)->required();
+    return command;
+  };
+  CLI::App* info = add("info", "Shows a bank: frequencies, damping, residuals, counts");
+  CLI::Option* as_json = info->add_flag("--json", options.json, "Everything but mesh and shapes, as JSON");
+  info->add_flag("--csv", options.csv, "Modes only, as CSV")->excludes(as_json);
+  info->add_flag("--all", options.all, "Add the record of the run: versions, seconds, memory, partition, solver");
+  info->add_option("--modes", options.modes, "Rows of the mode table")->capture_default_str();
+  add("check", "Checks a bank, one line per property; exit code 0 if valid, else 2")
+      ->add_option("--original", options.original, "Original of a packed bank, to measure its error again");
+  CLI::App* pack = add("pack", "Compresses a bank with a stated error, for web pages and games");
+  pack->add_option("OUT", options.packed, "Packed bank; -: standard output")->required();
+  pack->add_option("--error", options.error_db,
+                   "A-weighted error of a hard blow relative to the blow [dB], on 95 % of the surface; from -90 to -10")
+      ->check(CLI::Range(bank::kMinPackError, bank::kMaxPackError))
+      ->capture_default_str();
+  pack->add_flag("--keep-numbers", options.keep_numbers,
+                 "Keep the triangle numbers, to which contacts files and strikes of scenes refer; about two bytes per triangle");
+  add("unpack", "Unpacks a bank for other programs; its errors stay", "Packed bank")
+      ->add_option("OUT", options.unpacked, "Output bank; -: standard output")
+      ->required();
+  CLI::App* edit = add("edit", "Changes density, stiffness, size, damping, number of modes or precision of shapes without a solve");
+  edit->add_option("OUT", options.edited, "Output bank; -: standard output")->required();
+  add_options(*edit, options.wishes);
+  add_export(
+      *app.add_subcommand("export", "Exports to GLB (mesh and modes, KHR_audio_rigid_bodies) or Faust (the loudest modes at a few points)"),
+      options.exported);
+  add_import(*app.add_subcommand("import", "Imports a GLB or glTF file with KHR_audio_rigid_bodies as a bank; lossless for exported files"),
+             options.imported);
+}
+
+void show(const Options& options) {
+  const bank::Bank bank = bank::read_bank(options.file);
+  const std::vector<bank::HeardMode> heard = mounting::calc_heard(bank);
+  fmt::print("{}", options.json  ? bank::format_info_json(bank, heard, options.file)
+                   : options.csv ? bank::format_info_csv(bank, heard)
+                                 : base::printable_lines(bank::format_info(bank, heard, options.file, options.modes, options.all)));
+}
+
 int run(int argc, char** argv) {
   CLI::App app("Shows, checks, edits and converts mode banks.");
   app.name("carillon-bank");
@@ -291,75 +344,23 @@ int run(int argc, char** argv) {
       [](const CLI::App* asked, const CLI::Error& error) { return base::printable_lines(CLI::FailureMessage::simple(asked, error)); });
   app.require_subcommand(1);
   app.set_version_flag("--version", base::describe("carillon-bank"));
-  std::string file;
-  bool json = false, csv = false, all = false;
-  std::size_t modes = 20;
-  CLI::App* info = app.add_subcommand("info", "Shows a bank: frequencies, damping, residuals, counts");
-  info->add_option("BANK", file, "Bank file")->required();
-  CLI::Option* as_json = info->add_flag("--json", json, "Everything but mesh and shapes, as JSON");
-  info->add_flag("--csv", csv, "Modes only, as CSV")->excludes(as_json);
-  info->add_flag("--all", all, "Add the record of the run: versions, seconds, memory, partition, solver");
-  info->add_option("--modes", modes, "Rows of the mode table")->capture_default_str();
-  CLI::App* checking = app.add_subcommand("check", "Checks a bank, one line per property; exit code 0 if valid, else 2");
-  checking->add_option("BANK", file, "Bank file")->required();
-  std::string original;
-  checking->add_option("--original", original, "Original of a packed bank, to measure its error again");
-  double error_db = -60.0;
-  std::string packed;
-  CLI::App* packing = app.add_subcommand("pack", "Compresses a bank with a stated error, for web pages and games");
-  packing->add_option("BANK", file, "Bank file")->required();
-  packing->add_option("OUT", packed, "Packed bank; -: standard output")->required();
-  packing
-      ->add_option("--error", error_db,
-                   "A-weighted error of a hard blow relative to the blow [dB], on 95 % of the surface; from -90 to -10")
-      ->check(CLI::Range(bank::kMinPackError, bank::kMaxPackError))
-      ->capture_default_str();
-  bool keep_numbers = false;
-  packing->add_flag("--keep-numbers", keep_numbers,
-                    "Keep the triangle numbers, to which contacts files and strikes of scenes refer; about two bytes per triangle");
-  std::string unpacked;
-  CLI::App* unpacking = app.add_subcommand("unpack", "Unpacks a bank for other programs; its errors stay");
-  unpacking->add_option("BANK", file, "Packed bank")->required();
-  unpacking->add_option("OUT", unpacked, "Output bank; -: standard output")->required();
-  Wishes wishes;
-  std::string edited;
-  CLI::App* editing =
-      app.add_subcommand("edit", "Changes density, stiffness, size, damping, number of modes or precision of shapes without a solve");
-  editing->add_option("BANK", file, "Bank file")->required();
-  editing->add_option("OUT", edited, "Output bank; -: standard output")->required();
-  add_options(*editing, wishes);
-  exchange::ExportWishes exported;
-  CLI::App* exporting =
-      app.add_subcommand("export", "Exports to GLB (mesh and modes, KHR_audio_rigid_bodies) or Faust (the loudest modes at a few points)");
-  add_export(*exporting, exported);
-  exchange::ImportWishes imported;
-  CLI::App* importing =
-      app.add_subcommand("import", "Imports a GLB or glTF file with KHR_audio_rigid_bodies as a bank; lossless for exported files");
-  add_import(*importing, imported);
+  Options options;
+  add_commands(app, options);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : kExitInput;
   }
-  if (*checking) {
-    check(file, original);
-  } else if (*packing) {
-    pack(file, packed, error_db, keep_numbers);
-  } else if (*unpacking) {
-    unpack(file, unpacked);
-  } else if (*editing) {
-    edit(file, edited, wishes);
-  } else if (*exporting) {
-    exchange::run_export(exported);
-  } else if (*importing) {
-    if (!base::is_standard_output(imported.out)) check_bank_name(imported.out);
-    exchange::run_import(imported);
-  } else {
-    const bank::Bank bank = bank::read_bank(file);
-    const std::vector<bank::HeardMode> heard = mounting::calc_heard(bank);
-    fmt::print("{}", json  ? bank::format_info_json(bank, heard, file)
-                     : csv ? bank::format_info_csv(bank, heard)
-                           : base::printable_lines(bank::format_info(bank, heard, file, modes, all)));
+  const std::string command = app.get_subcommands().front()->get_name();
+  if (command == "info") show(options);
+  if (command == "check") check(options.file, options.original);
+  if (command == "pack") pack(options.file, options.packed, options.error_db, options.keep_numbers);
+  if (command == "unpack") unpack(options.file, options.unpacked);
+  if (command == "edit") edit(options.file, options.edited, options.wishes);
+  if (command == "export") exchange::run_export(options.exported);
+  if (command == "import") {
+    if (!base::is_standard_output(options.imported.out)) check_bank_name(options.imported.out);
+    exchange::run_import(options.imported);
   }
   if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");
   return 0;

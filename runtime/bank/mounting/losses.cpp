@@ -117,14 +117,6 @@ Admittance calc_admittance(const material::Base& base, const Patch& patch, doubl
   return {};
 }
 
-/// Two unit vectors perpendicular to n.
-std::array<Vec3, 2> find_across(const Vec3& n) {
-  Vec3 first = cross(n, find_least_axis(n));
-  const double size = norm(first);
-  for (double& x : first) x /= size;
-  return {first, cross(n, first)};
-}
-
 /// Reaction in the axes of Admittance. A wall rotates about its mid-plane: in-plane forces have the lever arm h/2.
 std::array<double, 6> find_components(const double* reaction, const Patch& patch, const material::Base& base) {
   Vec3 force{reaction[0], reaction[1], reaction[2]}, couple{reaction[3], reaction[4], reaction[5]};
@@ -134,7 +126,7 @@ std::array<double, 6> find_components(const double* reaction, const Patch& patch
     const Vec3 moved = cross(n, force);
     for (std::size_t k = 0; k < 3; ++k) couple[k] -= 0.5 * base.thickness_m * moved[k];
   }
-  const auto [a, b] = find_across(n);
+  const auto [a, b] = find_tangents(n);
   return {dot(force, n), dot(force, a), dot(force, b), dot(couple, n), dot(couple, a), dot(couple, b)};
 }
 
