@@ -14,7 +14,7 @@
 namespace carillon::bank {
 namespace {
 
-constexpr double kHeard = 0.1;  // minimum power of a strike position, relative to the loudest vertex
+constexpr double kMinStrikePower = 0.1;  // minimum power of a strike position, relative to the loudest vertex
 constexpr double kLoudest = 0.1;
 
 /// A-weighted level of each mode per unit motion, (m).
@@ -58,7 +58,7 @@ std::vector<std::size_t> find_strikes(const Bank& bank, std::size_t count) {
     double farthest = 0.0;
     for (std::size_t v = 0; v < power.size(); ++v) {
       distance[v] = std::min(distance[v], norm(bank.vertices_m[v] - bank.vertices_m[chosen.back()]));
-      if (power[v] > kHeard * power[chosen[0]] && distance[v] > farthest) farthest = distance[v], next = v;
+      if (power[v] > kMinStrikePower * power[chosen[0]] && distance[v] > farthest) farthest = distance[v], next = v;
     }
     if (!(farthest > 0.0)) break;
     chosen.push_back(next);

@@ -17,7 +17,7 @@
 namespace carillon::bank {
 namespace {
 
-constexpr double kOutside = 1e-4;             // excess over the sphere, relative to its radius
+constexpr double kSphereExcess = 1e-4;        // excess over the sphere, relative to its radius
 constexpr double kMaxDetuning = 0.4;          // relative shift by the mass of the air
 constexpr double kModalMassTolerance = 1e-6;  // modal mass of a mode in air
 constexpr double kRootTolerance = 1e-9;       // root of a decay, round-off
@@ -35,7 +35,7 @@ void check_sphere(const Bank& bank, Faults& faults) {
     for (const std::int32_t v : triangle)
       if (v >= 0 && static_cast<std::size_t>(v) < bank.vertex_count())  // others are reported elsewhere
         farthest = std::max(farthest, norm(bank.vertices_m[v] - air.centre_m));
-  if (!(farthest <= air.radius_m * (1.0 + kOutside)))
+  if (!(farthest <= air.radius_m * (1.0 + kSphereExcess)))
     faults.add("the surface reaches to {:.9g} m from radiation/centre_m, and the sphere has a radius of {:.9g} m", farthest, air.radius_m);
 }
 

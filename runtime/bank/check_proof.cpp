@@ -17,8 +17,8 @@ namespace {
 
 constexpr double kOrthonormalityLimit = 1e-6;
 constexpr double kBackwardLimit = 1e-8;
-constexpr double kEdge = 1e-9;          // relative rounding of band_hz and cut_hz
-constexpr double kZeroFraction = 1e-5;  // relative to the upper end of the band: zero to working precision below
+constexpr double kBandTolerance = 1e-9;  // relative rounding of band_hz and cut_hz
+constexpr double kZeroFraction = 1e-5;   // relative to the upper end of the band: zero to working precision below
 constexpr double kMarginTolerance = 1e-6;
 constexpr double kClusterSpread = 1e-4;  // of lambda
 
@@ -67,8 +67,9 @@ Check check_cuts(const Bank& bank, const Proof& proof) {
     }
   }
   const double low = std::max(bank.band_hz[0], kZeroFraction * bank.band_hz[1]);
-  if (!(proof.cut_hz.front() <= low * (1.0 + kEdge))) faults.add("the first cut at {:.6g} Hz is inside the band", proof.cut_hz.front());
-  if (!(proof.cut_hz.back() >= bank.band_hz[1] * (1.0 - kEdge)))
+  if (!(proof.cut_hz.front() <= low * (1.0 + kBandTolerance)))
+    faults.add("the first cut at {:.6g} Hz is inside the band", proof.cut_hz.front());
+  if (!(proof.cut_hz.back() >= bank.band_hz[1] * (1.0 - kBandTolerance)))
     faults.add("the last cut at {:.6g} Hz is inside the band", proof.cut_hz.back());
   return {"counts",
           fmt::format("{} eigenvalues below {:.6g} Hz, {} below {:.6g} Hz, {} cut{} between", proof.below.front(), proof.cut_hz.front(),

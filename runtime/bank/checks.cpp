@@ -31,10 +31,10 @@ constexpr double kResidualLimit = 1e-4;
 constexpr double kLawTolerance = 1e-9;   // quantities computed by the same formula
 constexpr double kMassTolerance = 0.01;  // mass against density times volume
 constexpr double kShareTolerance = 1e-6;
-constexpr double kMinLengthM = 1e-9, kFarthestM = 1e12;  // size; distance from the origin
+constexpr double kMinLengthM = 1e-9, kMaxOriginDistanceM = 1e12;  // size; distance from the origin
 constexpr double kMaxAlpha1S = 1e6, kMaxAlpha2PerS = 1e12;
 // A mode of unit modal mass that moves the fraction s of the body's mass has |phi| = 1 / sqrt(s m) there.
-constexpr double kMinShare = 1e-12;
+constexpr double kMinMassShare = 1e-12;
 constexpr double kGainSlack = 10.0;  // factor over the gain of a sphere pulsating with the largest motion
 
 constexpr double kMaxSteps = 32767.0;  // two-byte component
@@ -320,7 +320,7 @@ Check check_radiation(const Bank& bank) {
 Check check_shapes(const Bank& bank) {
   Faults faults;
   double step = 0.0;
-  const double max = 1.0 / std::sqrt(kMinShare * bank.rigid.mass_kg);
+  const double max = 1.0 / std::sqrt(kMinMassShare * bank.rigid.mass_kg);
   for (std::size_t i = 0; i < bank.mode_count(); ++i) {
     if (!(bank.shape_scale[i] >= 0.0)) faults.add("shape_scale[{}] is {:.6g}, negative", i, bank.shape_scale[i]);
     const double motion = calc_max_motion(bank, i, bank.shape_bytes == 1 ? 127.0 : kMaxSteps);
@@ -416,7 +416,7 @@ Check check_rigid_body(const Bank& bank) {
       high = std::max(high, vertex[k] - rigid.centre_m[k]);
     }
     const double reach = std::max(-low, high);
-    if (!(high - low >= kMinLengthM && high - low <= kMaxLengthM) || !(std::abs(rigid.centre_m[k]) <= kFarthestM)) {
+    if (!(high - low >= kMinLengthM && high - low <= kMaxLengthM) || !(std::abs(rigid.centre_m[k]) <= kMaxOriginDistanceM)) {
       faults.add("the body measures {:.3g} m along axis {} about {:.3g} m; bodies have {:.0e} to {:.0e} m", high - low, k,
                  rigid.centre_m[k], kMinLengthM, kMaxLengthM);
     }

@@ -19,15 +19,15 @@
 namespace carillon::bank {
 namespace {
 
-constexpr double kLong = 2.5, kFlat = 0.25;           // length / width; thickness / width
-constexpr double kSameWidth = 0.03, kSphere = 0.003;  // relative difference of second moments
-constexpr double kRound = 0.02;                       // limit of the area's Fourier coefficients about the axis
+constexpr double kLong = 2.5, kFlat = 0.25;                          // length / width; thickness / width
+constexpr double kSquareTolerance = 0.03, kSphereTolerance = 0.003;  // relative difference of second moments
+constexpr double kRoundTolerance = 0.02;                             // limit of the area's Fourier coefficients about the axis
 constexpr double kRigidSlices = 0.9, kOneKind = 0.8, kOneOrder = 0.6;
 constexpr double kOnePlane = 0.9, kProduct = 0.85;
-constexpr double kFlow = 0.8;    // squared volume flow relative to uniform motion of equal energy
-constexpr double kStill = 0.03;  // relative to the largest value; treated as 0 below
+constexpr double kMinBreathingFlow = 0.8;  // squared volume flow relative to uniform motion of equal energy
+constexpr double kZeroLevel = 0.03;        // relative to the largest value; treated as 0 below
 constexpr int kMaxOrder = 12, kCells = 12, kRings = 8;
-constexpr std::size_t kFewPoints = 8;  // minimum number of vertices of a slice
+constexpr std::size_t kMinSlicePoints = 8;  // minimum number of vertices of a slice
 
 double square(double x) { return x * x; }
 
@@ -113,7 +113,7 @@ Frame make_frame(const Bank& bank) {
   }
   frame.axes = find_axes(moment);
   for (const Vec3& p : bank.vertices_m) frame.place.push_back(frame.axes.axis * (p - centre));
-  if (frame.axes.moment[0] < (1.0 + kSameWidth) * frame.axes.moment[1]) align(frame);
+  if (frame.axes.moment[0] < (1.0 + kSquareTolerance) * frame.axes.moment[1]) align(frame);
   frame.extent = find_extent(frame.place);
   return frame;
 }
@@ -124,7 +124,7 @@ int count_nodes(const std::vector<double>& values) {
   for (const double x : values) largest = std::max(largest, std::abs(x));
   int nodes = 0;
   for (const double x : values) {
-    if (std::abs(x) <= kStill * largest) continue;
+    if (std::abs(x) <= kZeroLevel * largest) continue;
     if (x * last < 0.0) ++nodes;
     last = x;
   }
@@ -153,11 +153,11 @@ class Slices {
  public:
   explicit Slices(const Frame& frame) : frame_(frame) {
     constexpr int kMost = 48;
-    const int count = std::clamp(static_cast<int>(frame.place.size() / (3 * kFewPoints)), 1, kMost);
+    const int count = std::clamp(static_cast<int>(frame.place.size() / (3 * kMinSlicePoints)), 1, kMost);
     std::vector<std::vector<std::size_t>> parts(count);
     for (std::size_t v = 0; v < frame.place.size(); ++v) parts[frame.find_part(frame.place[v], 0, count)].push_back(v);
     for (std::vector<std::size_t>& part : parts)
-      if (part.size() >= kFewPoints) slices_.push_back(make_slice(std::move(part)));
+      if (part.size() >= kMinSlicePoints) slices_.push_back(make_slice(std::move(part)));
   }
 
   ModeKind find(const Shape& shape) const {
@@ -181,7 +181,7 @@ class Slices {
     }
     const double all = energy[0] + energy[1] + energy[2] + energy[3];
     if (!(all > kRigidSlices * shape.energy())) return {};
-    const bool has_widths = frame_.axes.moment[1] > (1.0 + kSameWidth) * frame_.axes.moment[2];
+    const bool has_widths = frame_.axes.moment[1] > (1.0 + kSquareTolerance) * frame_.axes.moment[2];
     const auto is_most = [&](double part) { return part > kOneKind * all; };
     if (is_most(energy[0])) return finish(MotionKind::kLongitudinal, along[0]);
     if (is_most(energy[3])) return finish(MotionKind::kTorsion, along[3]);
@@ -233,9 +233,9 @@ class Slices {
 /// Symmetry axis of a round body, else nullopt.
 std::optional<int> find_round_axis(const Frame& frame) {
   const Vec3& m = frame.axes.moment;
-  if (m[0] < (1.0 + kSphere) * m[2]) return std::nullopt;  // nearly a sphere: no unique axis
+  if (m[0] < (1.0 + kSphereTolerance) * m[2]) return std::nullopt;  // nearly a sphere: no unique axis
   const int axis = m[0] - m[1] < m[1] - m[2] ? 2 : 0, x = (axis + 1) % 3, y = (axis + 2) % 3;
-  if (m[std::min(x, y)] > (1.0 + kSameWidth) * m[std::max(x, y)]) return std::nullopt;
+  if (m[std::min(x, y)] > (1.0 + kSquareTolerance) * m[std::max(x, y)]) return std::nullopt;
   const double middle = 0.5 * (frame.extent[0][axis] + frame.extent[1][axis]), half = std::max(0.5 * frame.size(axis), 1e-300);
   for (int n = 1; n <= kMaxOrder; ++n) {
     std::array<std::complex<double>, 3> sum{};
@@ -246,7 +246,7 @@ std::optional<int> find_round_axis(const Frame& frame) {
       for (int power = 0; power < 3; ++power) sum[power] += std::pow(height, power) * turn;
     }
     for (const std::complex<double>& one : sum)
-      if (std::abs(one) > kRound * frame.all_area) return std::nullopt;
+      if (std::abs(one) > kRoundTolerance * frame.all_area) return std::nullopt;
   }
   return axis;
 }
@@ -295,7 +295,7 @@ class Rings {
     if (*most < kOneOrder * shape.energy()) return {};
     const int order = static_cast<int>(most - energy.begin());
     if (order == 0 && around > kOneKind * energy[0]) return {.motion = MotionKind::kTorsion};
-    const bool breathes = radial > 0.5 * shape.energy() && square(outward) > kFlow * frame_.all_area * radial;
+    const bool breathes = radial > 0.5 * shape.energy() && square(outward) > kMinBreathingFlow * frame_.all_area * radial;
     if (order == 0 && breathes) return {.motion = MotionKind::kBreathing};
     return {.motion = MotionKind::kDiameters, .nodes = order};
   }
@@ -384,7 +384,7 @@ class Skin {
       normal += a * square(out);
       all += a * dot(shape[v], shape[v]);
     }
-    return square(flow) > kFlow * area * normal && normal > kOneKind * all;
+    return square(flow) > kMinBreathingFlow * area * normal && normal > kOneKind * all;
   }
 
  private:

@@ -16,10 +16,10 @@
 namespace carillon::bank {
 namespace {
 
-constexpr std::int32_t kLeaf = 6;          // triangles per leaf
-constexpr int kDeepest = 64;               // 2^31 triangles need 31 levels
-constexpr double kMinArea = 1e-14;         // (height / length)^2 of a triangle
-constexpr double kRounding = 1.0 - 1e-12;  // bound of a squared distance's rounding
+constexpr std::int32_t kLeafTriangles = 6;       // triangles per leaf
+constexpr int kMaxTreeDepth = 64;                // 2^31 triangles need 31 levels
+constexpr double kMinArea = 1e-14;               // (height / length)^2 of a triangle
+constexpr double kRoundingFactor = 1.0 - 1e-12;  // bound of a squared distance's rounding
 
 /// Parameter 0 to 1 of the point of segment (a, b) closest to p.
 double find_along(const Vec3& p, const Vec3& a, const Vec3& b) {
@@ -126,7 +126,7 @@ std::int32_t SurfaceTree::build(std::vector<Vec3>& centres_m, std::int32_t first
     }
   }
   boxes_.push_back(box);
-  if (last - first <= kLeaf) return at;
+  if (last - first <= kLeafTriangles) return at;
   const Vec3 extent = box.high - box.low;
   const std::size_t axis = std::max_element(extent.begin(), extent.end()) - extent.begin();
   const std::int32_t middle = first + (last - first) / 2;
@@ -151,12 +151,12 @@ NearestPlace SurfaceTree::find(const Vec3& point_m) const noexcept {
     return Waiting{at, calc_square(point_m, box.low, box.high)};
   };
   double min = std::numeric_limits<double>::infinity();
-  std::array<Waiting, kDeepest> stack;
+  std::array<Waiting, kMaxTreeDepth> stack;
   int depth = 0;
   stack[depth++] = weigh(0);
   while (depth > 0) {
     const Waiting next = stack[--depth];
-    if (next.square * kRounding > min) continue;
+    if (next.square * kRoundingFactor > min) continue;
     const Box& box = boxes_[next.box];
     if (box.count > 0) {
       for (std::int32_t i = box.first; i < box.first + box.count; ++i) try_triangle(*bank_, order_[i], point_m, min, best);

@@ -22,14 +22,15 @@ namespace {
 
 constexpr double kLatticePerSize = 32768.0, kLatticePerEdge = 8.0;  // lattice steps per body size, per shortest edge
 constexpr double kMostLattice = 1 << 22;
-constexpr double kMostStep = 1.0;                                // maximum step of a mode over its mean motion, so that none vanishes
-constexpr double kCavity = 16.0;                                 // permitted error of inner walls over that of the outer surface
-constexpr double kOfSurface = 0.95;                              // fraction of the surface within the stated error
-constexpr double kNearEnough = 0.4;                              // dB below the requested error: converged
-constexpr int kMostSampled = 5, kMostNear = 3, kMostTries = 20;  // trials on a sample; on all vertices until near; on all vertices
-constexpr std::size_t kSampled = 8;                              // subsampling of the finest level in sampled trials
-constexpr double kFirstDb = -4.0;                                // offset of the first trial from the request
-constexpr double kMostChange = 20.0, kFiner = 2.0;               // step limit of the secant method; step without it [dB]
+constexpr double kMaxRelativeStep = 1.0;  // maximum step of a mode over its mean motion, so that none vanishes
+constexpr double kCavityFactor = 16.0;    // permitted error of inner walls over that of the outer surface
+constexpr double kSurfaceShare = 0.95;    // fraction of the surface within the stated error
+constexpr double kMaxSlackDb = 0.4;       // dB below the requested error: converged
+constexpr int kMaxSampledTrials = 5, kMaxNearTrials = 3,
+              kMaxTrials = 20;                            // trials on a sample; on all vertices until near; on all vertices
+constexpr std::size_t kSubsampling = 8;                   // subsampling of the finest level in sampled trials
+constexpr double kFirstOffsetDb = -4.0;                   // offset of the first trial from the request
+constexpr double kMaxStepDb = 20.0, kRefinementDb = 2.0;  // step limit of the secant method; step without it [dB]
 constexpr std::size_t kWitnesses = 24;
 
 /// Appends the row (m, 3) of a vertex to `shape`.
@@ -131,7 +132,7 @@ std::vector<float> calc_steps(const Bank& bank, const std::vector<double>& weigh
   const std::vector<double> motion = calc_motion(bank);
   std::vector<float> step;
   for (std::size_t m = 0; m < bank.mode_count(); ++m) {
-    const double most = kMostStep * motion[m];
+    const double most = kMaxRelativeStep * motion[m];
     const double wanted = weight[m] > 0.0 ? bank.shape_scale[m] * std::sqrt(share / weight[m]) : most;
     step.push_back(static_cast<float>(std::min(wanted, most)));
   }
@@ -197,7 +198,7 @@ Packing calc_error(const Bank& bank, const Blows& blows, const std::vector<doubl
   Packing packing;
   packing.error_db = packing.worst_db = errors.empty() ? kExactDb : errors.back().first;
   double above = 0.0;
-  for (std::size_t i = errors.size(); i-- > 0 && above <= (1.0 - kOfSurface) * area; above += errors[i].second)
+  for (std::size_t i = errors.size(); i-- > 0 && above <= (1.0 - kSurfaceShare) * area; above += errors[i].second)
     packing.error_db = errors[i].first;
   return packing;
 }
@@ -221,7 +222,7 @@ class Packer {
   Packer(const Bank& bank, const packed::Surface& surface) : bank_(bank), surface_(surface), blows_(bank) {
     std::vector<double> exposure = blows_.exposure;
     for (std::size_t v = 0; v < exposure.size(); ++v) {
-      if (!(blows_.skin.area_m2[v] > 0.0)) exposure[v] *= kCavity;
+      if (!(blows_.skin.area_m2[v] > 0.0)) exposure[v] *= kCavityFactor;
       loudest_ = std::max(loudest_, exposure[v]);
     }
     fineness_ = calc_fineness(exposure, loudest_);
@@ -229,16 +230,16 @@ class Packer {
 
   /// Returns the bytes of the shapes; fills `packing`.
   std::vector<std::uint8_t> run(double error_db, Packing& packing) {
-    const auto is_near = [&](double found_db) { return found_db <= error_db && found_db > error_db - kNearEnough; };
-    double asked_db = error_db + kFirstDb, before_db = 0.0, found_before_db = 0.0;
+    const auto is_near = [&](double found_db) { return found_db <= error_db && found_db > error_db - kMaxSlackDb; };
+    double asked_db = error_db + kFirstOffsetDb, before_db = 0.0, found_before_db = 0.0;
     const auto find_next = [&](int tries, double found_db) {
       const double slope = tries > 0 && asked_db != before_db ? (found_db - found_before_db) / (asked_db - before_db) : 1.0;
       before_db = asked_db;
       found_before_db = found_db;
-      asked_db += std::clamp((error_db - 0.5 * kNearEnough - found_db) / std::clamp(slope, 0.4, 1.5), -kMostChange, kMostChange);
+      asked_db += std::clamp((error_db - 0.5 * kMaxSlackDb - found_db) / std::clamp(slope, 0.4, 1.5), -kMaxStepDb, kMaxStepDb);
     };
     if (surface_.level_count() > 1) {
-      for (int tries = 0; tries < kMostSampled; ++tries) {
+      for (int tries = 0; tries < kMaxSampledTrials; ++tries) {
         const double found_db = try_sampled(asked_db);
         if (is_near(found_db)) break;
         find_next(tries, found_db);
@@ -246,7 +247,7 @@ class Packer {
     }
     std::vector<std::uint8_t> best;
     double least_db = std::numeric_limits<double>::infinity();
-    for (int tries = 0; tries < kMostTries; ++tries) {
+    for (int tries = 0; tries < kMaxTrials; ++tries) {
       Packing found;
       std::vector<std::uint8_t> bytes;
       const double found_db = try_whole(asked_db, bytes, found);
@@ -255,11 +256,11 @@ class Packer {
         best = std::move(bytes);
         packing = found;
       }
-      if (is_near(found_db) || (tries >= kMostNear && !best.empty())) break;
-      if (tries < kMostNear)
+      if (is_near(found_db) || (tries >= kMaxNearTrials && !best.empty())) break;
+      if (tries < kMaxNearTrials)
         find_next(tries, found_db);
       else
-        asked_db -= std::max(kFiner, found_db - error_db);  // with few vertices the error is not smooth
+        asked_db -= std::max(kRefinementDb, found_db - error_db);  // with few vertices the error is not smooth
     }
     if (best.empty())
       throw InputError(fmt::format("an error of {} dB(A) cannot be reached, the least that was found is {:.1f}; use the bank as it is",
@@ -278,12 +279,12 @@ class Packer {
   double try_sampled(double asked_db) const {
     const std::size_t finest = surface_.level_begin[surface_.level_count() - 1];
     std::vector<bool> is_known(bank_.vertex_count());
-    for (std::size_t v = 0; v < is_known.size(); ++v) is_known[v] = v < finest || v % kSampled == 0;
+    for (std::size_t v = 0; v < is_known.size(); ++v) is_known[v] = v < finest || v % kSubsampling == 0;
     const std::vector<float> step = make_steps(asked_db);
-    const packed::FittedShapes fitted = packed::fit_shapes(surface_, make_rows(bank_, step), bank_.mode_count(), fineness_, kSampled);
+    const packed::FittedShapes fitted = packed::fit_shapes(surface_, make_rows(bank_, step), bank_.mode_count(), fineness_, kSubsampling);
     // The sample under-represents the finest level: reweight the areas.
     std::vector<double> area_m2 = blows_.skin.area_m2;
-    for (std::size_t v = finest; v < is_known.size(); ++v) area_m2[v] *= static_cast<double>(kSampled);
+    for (std::size_t v = finest; v < is_known.size(); ++v) area_m2[v] *= static_cast<double>(kSubsampling);
     return calc_error(bank_, blows_, area_m2, make_shape(bank_, fitted.rows, step, is_known), is_known).error_db;
   }
 

@@ -31,10 +31,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr long kLookNs = 2'000'000;     // interval of waitpid() polls
-constexpr double kAskS = 0.1;           // interval of may_stop() calls
-constexpr double kLateS = 1.0;          // grace for reading the output of a late process
-constexpr double kKillPatienceS = 5.0;  // wait after SIGKILL
+constexpr long kWaitPollNs = 2'000'000;  // interval of waitpid() polls
+constexpr double kMayStopPollS = 0.1;    // interval of may_stop() calls
+constexpr double kOutputGraceS = 1.0;    // grace for reading the output of a late process
+constexpr double kKillPatienceS = 5.0;   // wait after SIGKILL
 constexpr const char* kHelperFolder = "libexec/carillon";
 constexpr const char* kDataFolder = "share/carillon";
 constexpr const char* kOomScore = "500";  // out of 1,000
@@ -146,16 +146,16 @@ void talk(Descriptor& in, Descriptor& out, Descriptor& errors, const RunOptions&
   if (in.get() >= 0) ::fcntl(in.get(), F_SETFL, O_NONBLOCK);
   while (in.get() >= 0 || out.get() >= 0 || errors.get() >= 0) {
     std::array<pollfd, 3> all{{{in.get(), POLLOUT, 0}, {out.get(), POLLIN, 0}, {errors.get(), POLLIN, 0}}};
-    const double wait_s = std::clamp(deadline_s - get_boot_s(), 0.0, options.may_stop ? kAskS : 1e3);
+    const double wait_s = std::clamp(deadline_s - get_boot_s(), 0.0, options.may_stop ? kMayStopPollS : 1e3);
     const int ready = ::poll(all.data(), all.size(), static_cast<int>(std::lround(wait_s * 1e3)));
     if (ready < 0) {
       if (errno != EINTR) throw SystemError(fmt::format("cannot wait for a program: {}", std::strerror(errno)));
       continue;
     }
     const double late_s = get_boot_s() - deadline_s;
-    finished.was_slow = ready == 0 ? late_s >= 0.0 : late_s > kLateS;
+    finished.was_slow = ready == 0 ? late_s >= 0.0 : late_s > kOutputGraceS;
     finished.was_long = !options.keeps_tail && std::max(finished.output.size(), finished.errors.size()) > options.max_bytes;
-    const bool is_asked = options.may_stop && (ready == 0 || get_boot_s() - asked_s >= kAskS);
+    const bool is_asked = options.may_stop && (ready == 0 || get_boot_s() - asked_s >= kMayStopPollS);
     if (is_asked) asked_s = get_boot_s();
     finished.was_stopped = is_asked && options.may_stop(finished);
     if (finished.was_slow || finished.was_long || finished.was_stopped) return;
@@ -173,7 +173,7 @@ std::optional<int> await(pid_t child, double deadline_s, const std::function<boo
     if (ended == child) return status;
     if (ended < 0 && errno != EINTR) return W_EXITCODE(kExitSystem, 0);  // reaped elsewhere: status lost
     if (get_boot_s() >= deadline_s || (may_stop && may_stop())) return std::nullopt;
-    const timespec pause{0, kLookNs};
+    const timespec pause{0, kWaitPollNs};
     ::nanosleep(&pause, nullptr);
   }
 }

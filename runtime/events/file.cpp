@@ -23,12 +23,12 @@
 namespace carillon::events {
 namespace {
 
-constexpr std::size_t kLongestLine = 256u << 20;  // more than a header of kMaxBodies
-constexpr std::size_t kPiece = 1u << 18;          // read size
-constexpr double kMaxBack = 1.0;                  // s
-constexpr double kLongestPulse = 10.0;            // s
-constexpr double kLargest = 1e9;                  // limit of other amounts in SI units: prevents overflow
-constexpr long long kMaxBodies = 1 << 20;         // above all scenes
+constexpr std::size_t kMaxLineBytes = 256u << 20;  // more than a header of kMaxBodies
+constexpr std::size_t kReadBytes = 1u << 18;       // read size
+constexpr double kMaxBackS = 1.0;                  // s
+constexpr double kMaxPulseS = 10.0;                // s
+constexpr double kMaxAmount = 1e9;                 // limit of other amounts in SI units: prevents overflow
+constexpr long long kMaxBodies = 1 << 20;          // above all scenes
 constexpr long long kInt32 = std::numeric_limits<std::int32_t>::max();
 constexpr long long kInt64 = std::numeric_limits<std::int64_t>::max();
 const std::vector<std::string> kShapeNames{"hertz", "gaussian"};     // indexed by PulseShape
@@ -125,7 +125,7 @@ class EventReader {
     e.impulse_n_s = in_.numbers<3>("impulse_n_s");
     e.duration_s = in_.number("duration_s");
     check_size("impulse_n_s", e.impulse_n_s);
-    check_size("duration_s", e.duration_s, kLongestPulse);
+    check_size("duration_s", e.duration_s, kMaxPulseS);
     e.shape = static_cast<PulseShape>(find(kShapeNames, in_.choice_or("shape", kShapeNames, kShapeNames.front())));
     return finish(e);
   }
@@ -135,7 +135,7 @@ class EventReader {
     read_place(e);
     e.step_s = in_.number("step_s");
     e.continues = in_.boolean_or("continues", false);
-    check_size("step_s", e.step_s, kLongestPulse / kMaxForceSteps);
+    check_size("step_s", e.step_s, kMaxPulseS / kMaxForceSteps);
     for (const std::vector<double>& row : in_.number_rows("impulse_n_s", 3, kMaxForceSteps)) {
       auto& sample = e.impulse_n_s[e.count++];
       for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -223,7 +223,7 @@ class EventReader {
     e.rotation = in_.numbers<4>("rotation");
   }
 
-  void check_size(std::string_view key, double value, double largest = kLargest) {
+  void check_size(std::string_view key, double value, double largest = kMaxAmount) {
     if (!(std::abs(value) <= largest)) in_.fail(key, fmt::format("{:g} exceeds the limit; give {:g} at most", value, largest));
   }
   void check_size(std::string_view key, const Vec3& value) {
@@ -355,7 +355,7 @@ class Lines {
     }
     const Event event = parse_event(object, bodies_);
     const double time = get_time_s(event);
-    if (time < latest_ - kMaxBack) {
+    if (time < latest_ - kMaxBackS) {
       throw InputError(
           fmt::format("{}:{}: time goes back from {:g} s to {:g} s; put the lines in order", file_.string(), number_, latest_, time));
     }
@@ -408,13 +408,13 @@ std::vector<RecordedBody> read_recording(const std::filesystem::path& file, cons
   Lines lines(file, sink, begin);
   std::string line;
   bool is_begun = false;
-  base::read_pieces(file, "contacts file", kPiece, [&](std::string_view piece) {
+  base::read_pieces(file, "contacts file", kReadBytes, [&](std::string_view piece) {
     if (!is_begun) base::refuse_utf16(piece, file.string());
     is_begun = true;
     while (!piece.empty()) {
       const std::size_t end = piece.find('\n');
-      if (line.size() + std::min(end, piece.size()) > kLongestLine) {
-        throw InputError(fmt::format("{}: a line of more than {} bytes; this is not a contacts file", file.string(), kLongestLine));
+      if (line.size() + std::min(end, piece.size()) > kMaxLineBytes) {
+        throw InputError(fmt::format("{}: a line of more than {} bytes; this is not a contacts file", file.string(), kMaxLineBytes));
       }
       if (end == std::string_view::npos) {
         line += piece;

@@ -39,11 +39,11 @@ namespace {
 using gltf::Component;
 
 constexpr std::size_t kMaxFields = 1000, kMaxListed = 10'000'000, kMaxNodes = 10'000'000;
-constexpr double kSameFreq = 1e-6;    // relative error of a frequency in float, through a sum of squares
-constexpr double kSameStep = 0.02;    // steps of a shape: rounding of an integer stored as float
-constexpr double kSameLaw = 1e-5;     // relative error of a decay in float against its law
-constexpr double kSameScale = 1e-4;   // relative difference between the axes of a node
-constexpr double kSameInertia = 0.3;  // relative difference for uneven bodies and coarse surfaces
+constexpr double kFreqTolerance = 1e-6;    // relative error of a frequency in float, through a sum of squares
+constexpr double kStepTolerance = 0.02;    // steps of a shape: rounding of an integer stored as float
+constexpr double kDecayTolerance = 1e-5;   // relative error of a decay in float against its law
+constexpr double kScaleTolerance = 1e-4;   // relative difference between the axes of a node
+constexpr double kInertiaTolerance = 0.3;  // relative difference for uneven bodies and coarse surfaces
 constexpr const char* kChanged = "was changed since carillon-bank wrote it; --plain reads the extension alone";
 
 /// Model in the extension.
@@ -206,7 +206,7 @@ class Reader {
         for (std::size_t c = 0; c < 3; ++c) {
           const double exact = scale > 0.0 ? shapes.get(k * points + v, c) / scale : shapes.get(k * points + v, c),
                        step = std::round(exact);
-          if (!(std::abs(exact - step) <= kSameStep && std::abs(step) <= 32767.0))
+          if (!(std::abs(exact - step) <= kStepTolerance && std::abs(step) <= 32767.0))
             owner.fail("shapes", fmt::format("mode {} at point {} is not a whole number of steps: the file {}", k, v, kChanged));
           steps[(v * mode_count + m) * 3 + c] = static_cast<std::int16_t>(step);
         }
@@ -229,7 +229,7 @@ class Reader {
     for (std::size_t k = 0; k < modes.size(); ++k) {
       const double omega = std::sqrt(played.eigenvalue_rad2_s2[place[modes[k]]]), decay = played.decay_per_s[place[modes[k]]];
       const double hz = calc_damped_hz(omega, decay);
-      if (!(std::abs(model_.freq_hz[k] - hz) <= kSameFreq * hz && std::abs(model_.decay_per_s[k] - decay) <= kSameFreq * decay))
+      if (!(std::abs(model_.freq_hz[k] - hz) <= kFreqTolerance * hz && std::abs(model_.decay_per_s[k] - decay) <= kFreqTolerance * decay))
         throw InputError(fmt::format("{}: mode {} has {:.7g} Hz, but {:.7g} Hz in its extras: the file {}", file_.name(), k,
                                      model_.freq_hz[k], hz, kChanged));
     }
@@ -310,7 +310,7 @@ class Reader {
     const std::array<double, 3> along{norm(Vec3{matrix[0], matrix[1], matrix[2]}), norm(Vec3{matrix[4], matrix[5], matrix[6]}),
                                       norm(Vec3{matrix[8], matrix[9], matrix[10]})};
     const auto [low, high] = std::minmax_element(along.begin(), along.end());
-    if (!(*low > 0.0 && *high - *low <= kSameScale * *high))
+    if (!(*low > 0.0 && *high - *low <= kScaleTolerance * *high))
       nodes[*found].fail(
           "", "its node is not scaled by the same along all axes, which changes the modes; apply the scale, and compute them again");
     return *high;
@@ -368,9 +368,9 @@ class Reader {
 
   /// True if modes and mass belong to the unscaled body: its density is closer to the material's than that of the scaled body.
   bool is_of_unscaled(base::Object& model, double scale, double volume_m3, double density_kg_m3) {
-    constexpr double kSameDensity = 0.1;  // relative error of the volume inside facets
+    constexpr double kDensityTolerance = 0.1;  // relative error of the volume inside facets
     std::optional<base::Object> own = model.object_if("massProperties");
-    if (std::abs(scale - 1.0) <= kSameScale || !(volume_m3 > 0.0)) return false;
+    if (std::abs(scale - 1.0) <= kScaleTolerance || !(volume_m3 > 0.0)) return false;
     const auto note = [&](const std::string& text) {
       notes_.push_back(fmt::format("its node scales the body by {:.6g}, {}", scale, text));
     };
@@ -387,7 +387,7 @@ class Reader {
                                                 "{:.6g}, the mass by {:.6g})",
                                                 1.0 / scale, scale * scale * scale)
                                           : "its modes and its mass are those of that size";
-    if (std::min(scaled_off, unscaled_off) > kSameDensity)
+    if (std::min(scaled_off, unscaled_off) > kDensityTolerance)
       note(fmt::format(
           "and its mass contradicts the {:.5g} kg/m^3 of its material: {:.5g} with the scale, {:.5g} without; by the nearer one {}",
           density_kg_m3, scaled, unscaled, taken));
@@ -433,7 +433,7 @@ class Reader {
       const Eigen::Matrix3d inertia =
           axes * Eigen::Vector3d((*diagonal)[0], (*diagonal)[1], (*diagonal)[2]).asDiagonal() * axes.transpose();
       Eigen::Map<Eigen::Matrix3d> of_surface(bank.rigid.inertia_kg_m2.data());  // symmetric
-      if ((inertia - of_surface).norm() > kSameInertia * of_surface.norm())
+      if ((inertia - of_surface).norm() > kInertiaTolerance * of_surface.norm())
         notes_.push_back("its moments of inertia contradict its surface and its mass; those of the surface, filled evenly, were taken");
       else
         of_surface = inertia;
@@ -448,7 +448,7 @@ class Reader {
     std::vector<double> law;
     for (std::size_t m = 0; m < bank.mode_count(); ++m) law.push_back(0.5 * (a1 * bank.eigenvalue_rad2_s2[m] + a2));
     for (std::size_t m = 0; m < bank.mode_count(); ++m)
-      if (!(std::abs(bank.decay_per_s[m] - law[m]) <= kSameLaw * law[m])) {
+      if (!(std::abs(bank.decay_per_s[m] - law[m]) <= kDecayTolerance * law[m])) {
         bank.material.alpha1_s = bank.material.alpha2_per_s = 0.0;
         return;
       }

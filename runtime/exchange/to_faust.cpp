@@ -26,11 +26,11 @@
 namespace carillon::exchange {
 namespace {
 
-constexpr double kCritical = 5e-7;       // relative to omega: distance from critical damping
-constexpr std::size_t kGroup = 32;       // modes per partial sum: Faust's compile time is quadratic in the terms
-constexpr double kFarthestShare = 0.25;  // largest distance of a point from the surface, relative to the body's extent
-constexpr double kUsualNs = 0.01;        // default blow of the instrument
-constexpr double kUsualScale = 0.25;     // largest peak of such a blow, relative to full scale
+constexpr double kCritical = 5e-7;          // relative to omega: distance from critical damping
+constexpr std::size_t kGroup = 32;          // modes per partial sum: Faust's compile time is quadratic in the terms
+constexpr double kMaxPointDistance = 0.25;  // largest distance of a point from the surface, relative to the body's extent
+constexpr double kDefaultBlowNs = 0.01;     // default blow of the instrument
+constexpr double kDefaultPeak = 0.25;       // largest peak of such a blow, relative to full scale
 
 /// Constant part of each Faust file, after the numbers of the body.
 constexpr const char* kResonators = R"(
@@ -91,7 +91,7 @@ std::vector<Vec3> choose_points(const bank::Bank& bank, const FaustOptions& opti
 Place make_place(const bank::Bank& bank, const Vec3& point_m) {
   const bank::NearestPlace found = bank::find_nearest(bank, point_m);
   const auto [low, high] = bank::find_extent(bank.vertices_m);
-  if (found.triangle < 0 || !(found.distance_m <= kFarthestShare * norm(high - low)))
+  if (found.triangle < 0 || !(found.distance_m <= kMaxPointDistance * norm(high - low)))
     throw InputError(fmt::format("[{:g}, {:g}, {:g}] is not near the surface; give metres", point_m[0], point_m[1], point_m[2]));
   const Vec3 across = bank::calc_normal(bank.vertices_m, bank.triangles[found.triangle]);
   Place place{.point_m = found.point_m};
@@ -195,7 +195,7 @@ FaustProgram make_faust(const bank::Bank& given, const FaustOptions& options) {
     groups += fmt::format("{}group{}(point)", first == 0 ? "" : ", ", first / kGroup);
   }
   text += fmt::format("body(point) = _ <: {} :> _;\n", groups);
-  const double usual = loudest > 0.0 ? kUsualScale / (loudest * kUsualNs) : 1.0;
+  const double usual = loudest > 0.0 ? kDefaultPeak / (loudest * kDefaultBlowNs) : 1.0;
   std::string instrument = kInstrument;
   for (const auto& [word, value] : {std::pair("USUAL_GAIN", usual), {"GREATEST_GAIN", 100.0 * usual}, {"SMALL_GAIN", 0.001 * usual}})
     instrument = replace(instrument, word, fmt::format("{:.6e}", value));

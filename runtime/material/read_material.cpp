@@ -33,14 +33,14 @@ double read_positive(base::Object& object, std::string_view key, double max) {
 }
 
 /// The stiffness matrix loses log10(lambda / mu) digits (K / mu near nu = -1); a solve tolerates seven.
-constexpr double kMargin = 1e-7;
+constexpr double kPoissonMargin = 1e-7;
 
 void check_definite(base::Object& material, std::string_view key, double poisson_ratio) {
-  if (poisson_ratio > 0.5 - kMargin || poisson_ratio < -1.0 + kMargin)
+  if (poisson_ratio > 0.5 - kPoissonMargin || poisson_ratio < -1.0 + kPoissonMargin)
     material.fail(key,
                   fmt::format("gives a Poisson's ratio of {:.12g}, too near the limits -1 and 0.5 to be solved in double precision; keep "
                               "{:g} away from them",
-                              poisson_ratio, kMargin));
+                              poisson_ratio, kPoissonMargin));
 }
 
 /// E and nu, or lambda and mu: exactly one pair. E = mu (3 lambda + 2 mu) / (lambda + mu), nu = lambda / (2 (lambda + mu)).
@@ -82,10 +82,10 @@ void read_axes(base::Object& orthotropic, Orthotropic& result) {
     const bool is_unit = max == 1.0 ? std::abs(length - 1) < 1e-15 : std::abs(length * max - 1) < 4e-16;
     for (std::size_t k = 0; k < 3; ++k) axis[r][k] = is_unit ? rows[r][k] : axis[r][k] / length;
   }
-  constexpr double kSkew = 0.02;  // about one degree
+  constexpr double kMaxSkew = 0.02;  // about one degree
   const auto check = [&](std::size_t a, std::size_t b) {
     const double cosine = dot(axis[a], axis[b]);
-    if (std::abs(cosine) > kSkew)
+    if (std::abs(cosine) > kMaxSkew)
       orthotropic.fail("axes", fmt::format("directions {} and {} have to be perpendicular, and meet at {:.1f} degrees", a + 1, b + 1,
                                            std::acos(std::clamp(cosine, -1.0, 1.0)) * 180 / std::numbers::pi));
     return cosine;
@@ -125,13 +125,13 @@ void check_orthotropic(base::Object& object, const Orthotropic& o) {
     const double angle = std::acos(std::clamp(1.5 * q / p * std::sqrt(3 / p), -1.0, 1.0)) / 3;
     min = 1 + 2 * std::sqrt(p / 3) * std::cos(angle + 2 * std::numbers::pi / 3);
   }
-  if (!(min > 2 * kMargin))  // 1 - 2 nu of an isotropic solid
+  if (!(min > 2 * kPoissonMargin))  // 1 - 2 nu of an isotropic solid
     object.fail(
         "poisson_ratio",
         fmt::format("the elasticity is not positive definite: the least eigenvalue of the compliance (scaled to a unit diagonal) is "
                     "{:.3g}, and has to be above {:g}; multiply the three ratios by less than {:.4g}, or check their order nu12, "
                     "nu23, nu13 with nu_ij / E_i = nu_ji / E_j",
-                    min, 2 * kMargin, 1 / (1 - min)));
+                    min, 2 * kPoissonMargin, 1 / (1 - min)));
 }
 
 void read_orthotropic(base::Object object, Material& result) {

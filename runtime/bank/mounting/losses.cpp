@@ -30,9 +30,9 @@ namespace {
 using Complex = std::complex<double>;
 constexpr Complex kI{0.0, 1.0};
 constexpr double kEuler = std::numbers::egamma;
-constexpr double kMinRadiusM = 1e-3;  // patch without area: a screw
-constexpr double kFew = 0.2;          // fraction of modes beyond first order, not the lowest, bounded without a warning
-constexpr double kNearness = 0.5;     // modes mix if their coupling exceeds this fraction of their distance
+constexpr double kMinRadiusM = 1e-3;     // patch without area: a screw
+constexpr double kMaxBeyondShare = 0.2;  // fraction of modes beyond first order, not the lowest, bounded without a warning
+constexpr double kMixingRatio = 0.5;     // modes mix if their coupling exceeds this fraction of their distance
 constexpr std::size_t kMaxSupports = 100000;
 
 /// Velocity of a support per unit force or couple: force along the normal, across it (two), couple about it, across it (two).
@@ -257,7 +257,7 @@ Losses calc_losses(const bank::Bank& bank, const MountingRequest& request) {
     losses.is_lowest_beyond = losses.is_lowest_beyond || (is_beyond && m == 0);
     losses.decay_per_s.push_back(std::isfinite(shift.real()) ? std::clamp(shift.real(), 0.0, kMaxDecay * omega) : kMaxDecay * omega);
     losses.shift_rad_s.push_back(is_beyond ? 0.0 : -shift.imag());
-    if (m + 1 < bank.mode_count() && sums.with_next[m] > kNearness * (std::sqrt(bank.eigenvalue_rad2_s2[m + 1]) - omega)) ++losses.mixed;
+    if (m + 1 < bank.mode_count() && sums.with_next[m] > kMixingRatio * (std::sqrt(bank.eigenvalue_rad2_s2[m + 1]) - omega)) ++losses.mixed;
   }
   return losses;
 }
@@ -310,7 +310,8 @@ std::string describe(const Losses& losses, const bank::Bank& before) {
 }
 
 std::string describe_limits(const Losses& losses, const bank::Bank& before) {
-  if (!losses.is_lowest_beyond && static_cast<double>(losses.beyond) <= kFew * static_cast<double>(before.mode_count())) return {};
+  if (!losses.is_lowest_beyond && static_cast<double>(losses.beyond) <= kMaxBeyondShare * static_cast<double>(before.mode_count()))
+    return {};
   return fmt::format(
       "{} of {} modes are beyond first order (their support would shift them by more than {:g} % of their frequency): their "
       "frequency is kept, and their decay is at most {:g} of it; a stiffer support, or a solve without these fixed nodes and "

@@ -21,9 +21,9 @@ constexpr double kCoefficientStep = 0.5;  // prediction error by coefficient rou
 constexpr double kPrior = 0.02;
 // Bits of a number q: constant at 0, a + 2 log2 |q| elsewhere; squared error [squared steps] traded for one bit.
 constexpr float kZeroResidual = 0.25F, kOneResidual = 2.5F, kZeroCoefficient = 1.0F, kOneCoefficient = 1.8F, kPerError = 3.0F;
-constexpr std::size_t kSampled = 400;  // vertices per level sampled for feature sizes
+constexpr std::size_t kFeatureSamples = 400;  // vertices per level sampled for feature sizes
 constexpr int kGradients = 9, kFeatures = 9 + 3 * static_cast<int>(kNeighbours);
-constexpr float kMostSteps = 1e9F;  // limit of a number; the finest steps are 46,000 times smaller than those of the level
+constexpr float kMaxSteps = 1e9F;  // limit of a number; the finest steps are 46,000 times smaller than those of the level
 
 using Field = Eigen::Matrix<float, Eigen::Dynamic, 3>;  // (padded, 3): a row of Rows in memory order
 using FieldMap = Eigen::Map<const Field>;
@@ -142,7 +142,7 @@ class Fitter {
   /// Coefficient steps whose rounding changes the prediction by kCoefficientStep of the residual's step on average.
   void set_coefficient_steps(const std::vector<Neighbours>& neighbours, const std::vector<Stencil>& stencils, LevelSteps& steps) {
     double gradient = 0.0, differences = 0.0, count = 0.0;
-    const std::size_t stride = std::max<std::size_t>(neighbours.size() / kSampled, 1);
+    const std::size_t stride = std::max<std::size_t>(neighbours.size() / kFeatureSamples, 1);
     for (std::size_t i = 0; i < neighbours.size(); i += stride) {
       calc_features(neighbours[i], stencils[i]);
       const auto calc_log = [&](Eigen::Index first, Eigen::Index columns) {
@@ -191,7 +191,7 @@ class Fitter {
       for (Eigen::Index j = count; j-- > 0;) {
         const Eigen::Index rest = count - 1 - j;
         const double x = (target(j, to) - upper.row(j).tail(rest).dot(coefficients.col(to).tail(rest))) / upper(j, j);
-        const double rounded = std::clamp(std::nearbyint(x / step[j]), -static_cast<double>(kMostSteps), static_cast<double>(kMostSteps));
+        const double rounded = std::clamp(std::nearbyint(x / step[j]), -static_cast<double>(kMaxSteps), static_cast<double>(kMaxSteps));
         trial.numbers(j, to) = static_cast<int>(rounded);
         coefficients(j, to) = rounded * step[j];
         trial.cost += rounded == 0.0 ? kZeroCoefficient : kOneCoefficient + calc_size_bits(static_cast<float>(std::abs(rounded)));
@@ -264,7 +264,7 @@ class Fitter {
       for (std::size_t c = 0; c < 3; ++c) {
         float& value = row_[c * padded + m];
         const float x = (wanted[c * padded + m] - value) / step_;
-        const float size = std::min(std::floor(std::abs(x) + rounding_), kMostSteps);
+        const float size = std::min(std::floor(std::abs(x) + rounding_), kMaxSteps);
         const float q = std::copysign(size, x);
         value += step_ * q;
         is_any = is_any || size > 0.0F;

@@ -12,9 +12,9 @@
 namespace carillon::packed {
 namespace {
 
-constexpr double kLastShare = 2.7;     // all vertices over those of all levels but the last
-constexpr double kPerSquare = 0.7;     // vertices taken per square of the distance
-constexpr std::size_t kCoarsest = 64;  // minimum number of vertices of the first level
+constexpr double kLastShare = 2.7;                // all vertices over those of all levels but the last
+constexpr double kVerticesPerSquare = 0.7;        // vertices taken per square of the distance
+constexpr std::size_t kMinCoarsestVertices = 64;  // minimum number of vertices of the first level
 
 /// Points with a minimum distance, in cells of that width.
 class Darts {
@@ -57,8 +57,8 @@ std::vector<std::uint8_t> find_levels(std::span<const Vec3> vertices_m, double a
   // Distances from the finest level up, then levels from the coarsest down.
   std::vector<double> distances_m;
   for (double count = static_cast<double>(vertices_m.size()) / kLastShare;
-       count >= static_cast<double>(kCoarsest) && distances_m.size() + 1 < kMaxLevels; count /= 4.0)
-    distances_m.push_back(std::sqrt(kPerSquare * area_m2 / count));
+       count >= static_cast<double>(kMinCoarsestVertices) && distances_m.size() + 1 < kMaxLevels; count /= 4.0)
+    distances_m.push_back(std::sqrt(kVerticesPerSquare * area_m2 / count));
   constexpr std::uint8_t kNone = std::numeric_limits<std::uint8_t>::max();
   std::vector<std::uint8_t> level(vertices_m.size(), kNone);
   std::size_t taken = 0;

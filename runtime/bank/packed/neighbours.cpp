@@ -15,8 +15,8 @@
 namespace carillon::packed {
 namespace {
 
-constexpr double kPerCell = 1.5;            // mean vertices of a cell that the surface crosses
-constexpr int kWidest = kMaxCellShift + 2;  // two cells of this width cover the lattice
+constexpr double kVerticesPerCell = 1.5;          // mean vertices of a cell that the surface crosses
+constexpr int kMaxGridShift = kMaxCellShift + 2;  // two cells of this width cover the lattice
 
 std::uint32_t mix(const Place& cell) {
   std::uint32_t hash = static_cast<std::uint32_t>(cell[0]) * 0x9e3779b1U;
@@ -41,7 +41,7 @@ std::array<double, 3> calc_box(std::span<const Place> places) {
 
 int find_cell_shift(std::span<const Place> places) {
   const auto [a, b, c] = calc_box(places);
-  const double width = std::sqrt(kPerCell * 2.0 * (a * b + b * c + c * a) / static_cast<double>(places.size()));
+  const double width = std::sqrt(kVerticesPerCell * 2.0 * (a * b + b * c + c * a) / static_cast<double>(places.size()));
   return std::clamp(static_cast<int>(std::lround(std::log2(width))), 0, kMaxCellShift);
 }
 
@@ -103,7 +103,7 @@ Neighbours NeighbourSearch::find(const Place& place) {
       find_loops().find_nearest(*near_, place, grid.shift + 2, found);  // at most 1.5 cells away
       return found;
     }
-    if (grid.shift < kWidest) continue;
+    if (grid.shift < kMaxGridShift) continue;
     std::iota(found.begin(), found.end(), 0);  // truncated bucket: any will do
     return found;
   }

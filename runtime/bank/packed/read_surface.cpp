@@ -9,7 +9,7 @@
 namespace carillon::packed {
 namespace {
 
-constexpr std::size_t kMostPassed = 256;  // mean list nodes visited per triangle: bounds the time by the length
+constexpr std::size_t kMaxMeanVisits = 256;  // mean list nodes visited per triangle: bounds the time by the length
 
 /// Streams of the triangles, one symbol at a time.
 class Corners {
@@ -218,7 +218,7 @@ Surface read_surface(std::span<const std::byte> bytes, const std::string& name) 
     if (triangle[0] == triangle[1] || triangle[1] == triangle[2] || triangle[2] == triangle[0])
       reader.fail(fmt::format("triangle {} has a vertex twice", t));
     border.add(triangle);
-    if (border.count_passed() > kMostPassed * (t + kMostPassed)) reader.fail("too many of its edges are open at one vertex");
+    if (border.count_passed() > kMaxMeanVisits * (t + kMaxMeanVisits)) reader.fail("too many of its edges are open at one vertex");
     surface.triangles.push_back(triangle);
   }
   corners.finish();
