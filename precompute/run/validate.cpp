@@ -6,7 +6,6 @@
 #include "precompute/run/validate.hpp"
 
 #include <fmt/core.h>
-#include <json/json.h>
 #include <sys/resource.h>
 
 #include <algorithm>
@@ -14,12 +13,12 @@
 #include <cmath>
 #include <fstream>
 
+#include "precompute/eigen/memory.hpp"
+#include "precompute/eigen/solve_estimate.hpp"
 #include "precompute/job/cost/calibration.hpp"
 #include "precompute/job/cost/memory.hpp"
 #include "precompute/job/cost/modes.hpp"
 #include "precompute/job/cost/seconds.hpp"
-#include "precompute/eigen/memory.hpp"
-#include "precompute/eigen/solve_estimate.hpp"
 #include "precompute/ldlt/update_rate.hpp"
 #include "precompute/mesh/parallel/read_parallel.hpp"
 #include "precompute/petsc/session.hpp"
@@ -32,6 +31,7 @@
 #include "precompute/run/system.hpp"
 #include "runtime/base/clock.hpp"
 #include "runtime/base/host.hpp"
+#include "runtime/base/json.hpp"
 
 namespace carillon::run {
 namespace {
@@ -54,8 +54,7 @@ double calc_area(const std::vector<Vec3>& points_m, const Triangles& triangles) 
   double area = 0;
   for (const auto& t : triangles) {
     const Vec3 &a = points_m[t[0]], &b = points_m[t[1]], &c = points_m[t[2]];
-    const Vec3 u{b[0] - a[0], b[1] - a[1], b[2] - a[2]}, v{c[0] - a[0], c[1] - a[1], c[2] - a[2]};
-    area += 0.5 * std::hypot(u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]);
+    area += 0.5 * calc_length(cross(b - a, c - a));
   }
   return area;
 }
@@ -73,7 +72,7 @@ class Validation {
     return run_;
   }
   void run();
-  Json::Value describe() const;
+  base::Json describe() const;
   std::string describe_for_people() const;
 
  private:
@@ -184,7 +183,7 @@ bool Validation::has_time_to_read(const Setting& setting) {
     double edges_m = 0;
     for (std::int64_t t = 0; t < coarse.tet_count(); ++t) {
       const Vec3 &p = coarse.nodes_m[coarse.tets[10 * t]], &q = coarse.nodes_m[coarse.tets[10 * t + 1]];
-      edges_m += std::hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]) / static_cast<double>(coarse.tet_count());
+      edges_m += calc_length(p - q) / static_cast<double>(coarse.tet_count());
     }
     BodyEstimate known;
     known.volume_m3 = check.volume_m3;
@@ -371,30 +370,30 @@ void Validation::predict_time() {
 /// On one rank, in the memory that is left now.
 bool Validation::fits_here() const { return bytes_[0] - std::llround(base_bytes_) <= left_bytes_; }
 
-Json::Value Validation::describe() const {
-  Json::Value root;
+base::Json Validation::describe() const {
+  base::Json root;
   root["ok"] = true;
-  Json::Value& mesh = root["mesh"];
+  base::Json& mesh = root["mesh"];
   mesh["source"] = body_.source;
   mesh["how"] = body_.estimate ? "estimated" : "made";
-  mesh["nodes"] = Json::Int64(size_.nodes);
-  mesh["tets"] = Json::Int64(size_.tets);
+  mesh["nodes"] = size_.nodes;
+  mesh["tets"] = size_.tets;
   mesh["components"] = body_.pieces.components;
-  mesh["fixed_nodes"] = Json::Int64(body_.fixed_nodes);
+  mesh["fixed_nodes"] = body_.fixed_nodes;
   mesh["min_dihedral_deg"] = body_.check.min_dihedral_deg;
   mesh["mean_ratio_min"] = body_.check.mean_ratio_min;
-  root["unknowns"] = Json::Int64(size_.unknowns);
-  Json::Value& modes = root["modes"];
-  modes["count"] = Json::Int64(get_listed(*size_.modes));
+  root["unknowns"] = size_.unknowns;
+  base::Json& modes = root["modes"];
+  modes["count"] = get_listed(*size_.modes);
   modes["how"] = solve_estimate_.modes ? "counted" : has_volume() ? "estimated" : "unknown";
-  modes["estimate"] = Json::Int64(get_listed(std::llround(estimate_.count)));
-  modes["low"] = Json::Int64(get_listed(solve_estimate_.modes ? *size_.modes : std::llround(std::floor(estimate_.low))));
-  modes["high"] = Json::Int64(get_listed(get_max_modes()));
-  root["factor"]["entries"] = Json::Int64(solve_estimate_.entries);
+  modes["estimate"] = get_listed(std::llround(estimate_.count));
+  modes["low"] = get_listed(solve_estimate_.modes ? *size_.modes : std::llround(std::floor(estimate_.low)));
+  modes["high"] = get_listed(get_max_modes());
+  root["factor"]["entries"] = solve_estimate_.entries;
   root["factor"]["flops"] = solve_estimate_.flops;
   root["factor"]["how"] = is_analysed_ ? "analysed" : "guessed";
   for (std::size_t i = 0; i < kRanks.size(); ++i) {
-    root["memory_bytes"][std::to_string(kRanks[i])] = Json::Int64(bytes_[i]);
+    root["memory_bytes"][std::to_string(kRanks[i])] = bytes_[i];
     root["wall_seconds"][std::to_string(kRanks[i])] = wall_s_[i];
   }
   root["cpu_seconds"] = costs_.sum();
@@ -435,15 +434,15 @@ std::string validate_job(const comm::Communicator& comm, const std::filesystem::
   const Run& opened = validation.open(job_file);
   if (opened.job.analytic) return validate_known_body(opened);
   validation.run();
-  return options.json ? write_json(validation.describe()) : validation.describe_for_people();
+  return options.json ? validation.describe().sorted_text() : validation.describe_for_people();
 }
 
 std::string describe_failure(const std::string& message, int code) {
-  Json::Value root;
+  base::Json root;
   root["ok"] = false;
   root["error"] = message;
   root["code"] = code;
-  return write_json(root);
+  return root.sorted_text();
 }
 
 }  // namespace carillon::run

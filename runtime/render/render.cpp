@@ -34,8 +34,6 @@ constexpr double kFarthestHeardM = 15e3;  // what a body sends from further away
 constexpr int kMaxWaitingStrikes = 256;   // of a body, waiting or acting at once
 constexpr int kMaxForces = 512;           // of a body that gets any
 
-double calc_distance(const Vec3& a, const Vec3& b) { return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]); }
-
 /// What the events say about one body.
 struct BodySummary {
   bool is_played = false;    // something happens to it
@@ -57,7 +55,7 @@ std::vector<BodySummary> summarise(const scene::Scene& scene, const std::vector<
       const std::size_t i = motion->body;
       BodySummary& body = summaries[i];
       if (!is_placed[i]) body.first = *motion;
-      if (!is_placed[i] || !scene.bodies[i].spec.fixed) body.reach_m = std::max(body.reach_m, calc_distance(motion->position_m, base));
+      if (!is_placed[i] || !scene.bodies[i].spec.fixed) body.reach_m = std::max(body.reach_m, calc_length(motion->position_m - base));
       is_placed[i] = true;
     } else if (const auto* impulse = std::get_if<events::Impulse>(&event)) {
       if (BodySummary* body = find(impulse->body)) body->is_played = true;
@@ -72,7 +70,7 @@ std::vector<BodySummary> summarise(const scene::Scene& scene, const std::vector<
     const physics::Pose& initial = scene.bodies[i].spec.initial;
     summaries[i].first.position_m = scene::calc_world_point(initial, banks[i]->rigid.centre_m);
     summaries[i].first.rotation = initial.rotation;
-    summaries[i].reach_m = calc_distance(summaries[i].first.position_m, base);
+    summaries[i].reach_m = calc_length(summaries[i].first.position_m - base);
   }
   return summaries;
 }
@@ -192,18 +190,20 @@ double find_silence_pa(const scene::Scene& scene, std::size_t body, const scene:
 /// How far the microphones ever get from where the first of them starts.
 double calc_reach_m(const scene::Scene& scene, const scene::Microphones& microphones, const Vec3& base) {
   double path_m = 0.0, offset_m = 0.0;
-  for (const synth::PathPoint& place : scene.listener.path) path_m = std::max(path_m, calc_distance(place.position_m, base));
-  for (const Vec3& x : microphones.offset_m) offset_m = std::max(offset_m, std::hypot(x[0], x[1], x[2]));
+  for (const synth::PathPoint& place : scene.listener.path) path_m = std::max(path_m, calc_length(place.position_m - base));
+  for (const Vec3& x : microphones.offset_m) offset_m = std::max(offset_m, calc_length(x));
   // By way of a floor it is farther by at most twice the height of who hears.
   double height_m = 0.0;
-  if (const std::optional<synth::Floor> floor = scene::find_floor(scene)) height_m = std::max(0.0, floor->calc_height_m(base)) + path_m + offset_m;
+  if (const std::optional<synth::Floor> floor = scene::find_floor(scene))
+    height_m = std::max(0.0, floor->calc_height_m(base)) + path_m + offset_m;
   return path_m + offset_m + 2.0 * height_m + 1.0;
 }
 
 /// A scene whose events are all known, rendered block by block.
 class Rendering {
  public:
-  Rendering(const scene::Scene& scene, const std::vector<const bank::Bank*>& banks, const scene::Events& events, const RenderOptions& options)
+  Rendering(const scene::Scene& scene, const std::vector<const bank::Bank*>& banks, const scene::Events& events,
+            const RenderOptions& options)
       : scene_(&scene),
         options_(&options),
         session_(scene, banks, options.rate_hz, options.plan != nullptr || scene.effects.has(Effect::kAccelerationNoise),
@@ -339,8 +339,8 @@ class Rendering {
 
 }  // namespace
 
-Sound calc_sound(const scene::Scene& scene, const std::vector<const bank::Bank*>& banks, const scene::Events& events, const RenderOptions& options,
-                 sound::SoundStore& store) {
+Sound calc_sound(const scene::Scene& scene, const std::vector<const bank::Bank*>& banks, const scene::Events& events,
+                 const RenderOptions& options, sound::SoundStore& store) {
   const double started_s = base::get_process_cpu_s();
   Sound sound;
   Rendering rendering(scene, banks, events, options);

@@ -110,7 +110,7 @@ double BendingWatch::calc_deflection_m(int groups, double limit_m) noexcept {
       for (std::size_t c = im_.size(); c < move_.size(); ++c)
         moved[axis] += static_cast<double>(static_cast<float>(rows[axis][c]) * move_[c]);
     }
-    const auto calc_size = [&] { return std::sqrt(moved[0] * moved[0] + moved[1] * moved[1] + moved[2] * moved[2]); };
+    const auto calc_size = [&] { return norm(moved); };
     std::size_t g = 0;
     for (; g < last && calc_size() + static_cast<double>(rest_[g]) > largest; ++g) {
       for (std::size_t axis = 0; axis < 3; ++axis) {

@@ -45,14 +45,6 @@ class Chance {
   std::uint64_t state_;
 };
 
-/// Any two directions across a unit vector, and across each other.
-std::array<Vec3, 2> make_across(const Vec3& axis) {
-  Vec3 u = cross(axis, find_least_axis(axis));
-  const double length = std::sqrt(dot(u, u));
-  for (double& x : u) x /= length;
-  return {u, cross(axis, u)};
-}
-
 }  // namespace
 
 void vary_strike(const bank::Bank& bank, const std::function<bank::NearestPlace(const Vec3&)>& find, double variation, std::uint64_t seed,
@@ -65,7 +57,7 @@ void vary_strike(const bank::Bank& bank, const std::function<bank::NearestPlace(
   if (size > 0.0) {
     Vec3 axis = impulse.impulse_n_s;
     for (double& x : axis) x /= size;
-    const auto [u, v] = make_across(axis);
+    const auto [u, v] = find_tangents(axis);
     const double a = variation * kTiltScatter * chance.draw(), b = variation * kTiltScatter * chance.draw();
     const double length = std::sqrt(1.0 + a * a + b * b);
     for (std::size_t k = 0; k < 3; ++k) impulse.impulse_n_s[k] = more * size * (axis[k] + a * u[k] + b * v[k]) / length;
@@ -79,7 +71,7 @@ void vary_strike(const bank::Bank& bank, const std::function<bank::NearestPlace(
   const double area = std::sqrt(dot(normal, normal));
   if (!(area > 0.0)) return;
   for (double& x : normal) x /= area;
-  const auto [u, v] = make_across(normal);
+  const auto [u, v] = find_tangents(normal);
   const Vec3 extent = calc_extent(bank);
   const double scatter_m = variation * std::min(kPlaceScatterM, kPlaceScatterShare * std::sqrt(dot(extent, extent)));
   const double a = scatter_m * chance.draw(), b = scatter_m * chance.draw();

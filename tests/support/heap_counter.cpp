@@ -6,7 +6,7 @@
 namespace carillon::tests {
 namespace {
 
-/// False: it is to fail.
+/// False: the allocation must fail.
 bool count_allocation(std::size_t size) noexcept {
   ++g_allocations;
   g_bytes += static_cast<long>(size);
@@ -16,7 +16,7 @@ bool count_allocation(std::size_t size) noexcept {
 }  // namespace
 }  // namespace carillon::tests
 
-// Those for arrays, and the aligned one that does not throw, call these (C++20, [new.delete]).
+// The array forms and the aligned non-throwing form call these (C++20, [new.delete]).
 [[gnu::noinline]] void* operator new(std::size_t size) {
   const bool succeeds = carillon::tests::count_allocation(size);
   if (void* memory = succeeds ? std::malloc(size) : nullptr) return memory;

@@ -1,4 +1,5 @@
-// Method:     scenes are read by scene::parse_scene, blows made by scene::make_strikes, plans by scene::make_plan, so that all of it is what
+// Method:     scenes are read by scene::parse_scene, blows made by scene::make_strikes, plans by scene::make_plan, so that all of it is
+// what
 //             carillon-render does; a body's bank is the file's as edited, then what scene::read_banks makes of it.
 // Source:     none.
 // Deviations: a blow meets a body at rest: what rings is in the memory of the engine. A plan is made of what has happened so far.
@@ -11,13 +12,18 @@
 #include <limits>
 #include <utility>
 
+#include "runtime/acoustics/radiation/gains.hpp"
 #include "runtime/bank/corrected.hpp"
 #include "runtime/bank/edits.hpp"
+#include "runtime/bank/mounting/heard.hpp"
 #include "runtime/bank/of_material.hpp"
 #include "runtime/bank/surface.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/json.hpp"
+#include "runtime/bindings/web/event_words.hpp"
+#include "runtime/material/mallets.hpp"
+#include "runtime/material/table.hpp"
 #include "runtime/scene/effects/table.hpp"
 #include "runtime/scene/events.hpp"
 #include "runtime/scene/microphones.hpp"
@@ -26,12 +32,7 @@
 #include "runtime/scene/recorded_bodies.hpp"
 #include "runtime/scene/session.hpp"
 #include "runtime/scene/strikes.hpp"
-#include "runtime/material/mallets.hpp"
-#include "runtime/material/table.hpp"
-#include "runtime/acoustics/radiation/gains.hpp"
-#include "runtime/bank/mounting/heard.hpp"
 #include "runtime/synth/effects.hpp"
-#include "runtime/bindings/web/event_words.hpp"
 
 namespace carillon::web {
 namespace {
@@ -181,24 +182,23 @@ Workshop::Workshop(double rate_hz) : rate_hz_(rate_hz) {
 std::string Workshop::list_choices() const {
   Json choices = Json::object();
   for (const material::NamedMallet& mallet : material::get_mallets()) {
-    choices.member("mallets").add(Json::object()
-                                      .set("name", mallet.name)
-                                      .set("mass_kg", mallet.mass_kg)
-                                      .set("speed_m_s", material::kMalletSpeedMs)
-                                      .set("is_soft", mallet.radius_m == 0.0)
-                                      .set("restitution", mallet.restitution));
+    choices["mallets"].add(Json::object()
+                               .set("name", mallet.name)
+                               .set("mass_kg", mallet.mass_kg)
+                               .set("speed_m_s", material::kMalletSpeedMs)
+                               .set("is_soft", mallet.radius_m == 0.0)
+                               .set("restitution", mallet.restitution));
   }
   for (const material::Row& row : material::MaterialTable::get().rows()) {
     if (row.material.orthotropic) continue;  // no edit makes them of another
-    choices.member("materials")
-        .add(Json::object()
-                 .set("name", row.material.name)
-                 .set("group", row.group)
-                 .set("density_kg_m3", row.material.density_kg_m3)
-                 .set("young_modulus_pa", row.material.young_modulus_pa)
-                 .set("damping", row.material.describe_damping()));
+    choices["materials"].add(Json::object()
+                                 .set("name", row.material.name)
+                                 .set("group", row.group)
+                                 .set("density_kg_m3", row.material.density_kg_m3)
+                                 .set("young_modulus_pa", row.material.young_modulus_pa)
+                                 .set("damping", row.material.describe_damping()));
   }
-  for (const synth::Effect effect : synth::EffectSet::all()) choices.member("effects").add(synth::get_name(effect));
+  for (const synth::Effect effect : synth::EffectSet::all()) choices["effects"].add(synth::get_name(effect));
   choices.set("default_effects", to_mask(synth::kDefaultEffects));
   return choices.line();
 }
@@ -232,7 +232,7 @@ std::string Workshop::add_bank(int bank, std::span<const std::byte> bytes, const
       .set("complete", b.complete)
       .set("completeness", bank::describe_completeness(b))
       .set("accuracy", bank::describe_accuracy(b));
-  facts.member("material")
+  facts["material"]
       .set("young_modulus_pa", b.material.young_modulus_pa)
       .set("poisson_ratio", b.material.poisson_ratio)
       .set("density_kg_m3", b.material.density_kg_m3)
@@ -333,8 +333,8 @@ synth::EffectSet Workshop::find_possible(int body) const {
   }
   // Models that are read from tables have no transfers and no nonlinear energy, and a page has no floor that reflects and no heads.
   return scene::find_effects(scene, 0,
-                            possible.without({synth::Effect::kDirectivity, synth::Effect::kGroundReflection, synth::Effect::kHead,
-                                              synth::Effect::kNonlinear, synth::Effect::kCascade}));
+                             possible.without({synth::Effect::kDirectivity, synth::Effect::kGroundReflection, synth::Effect::kHead,
+                                               synth::Effect::kNonlinear, synth::Effect::kCascade}));
 }
 
 std::string Workshop::make_blow(int body, std::string_view scene, std::int32_t triangle, const Vec3& barycentric,
@@ -443,8 +443,8 @@ std::string Workshop::make_plan(std::string_view scene, std::span<const int> bod
     Json effects = effects::make_plan_json(plan.selector, plan.facts, static_cast<int>(i));
     const effects::BodyPlan of = plan.selector.get_plan(static_cast<int>(i));
     for (const synth::Effect effect : synth::EffectSet::all())
-      effects.member(synth::get_name(effect)).set("on", of[effect].ever).set("now", now[i].has(effect));
-    json.member("bodies").add(Json::object().set("name", described.bodies[i].name).set("effects", std::move(effects)));
+      effects[synth::get_name(effect)].set("on", of[effect].ever).set("now", now[i].has(effect));
+    json["bodies"].add(Json::object().set("name", described.bodies[i].name).set("effects", std::move(effects)));
   }
   json.set("changes", effects::make_changes_json(plan.changes, plan.facts, 1000));
   return json.line();
@@ -469,7 +469,7 @@ std::string Workshop::add_recording(int recording, std::string_view text, const 
       .set("events", static_cast<std::int64_t>(made.events.events.size()))
       .set("words", static_cast<std::int64_t>(made.words.size()))
       .set("warnings", Json::array(warnings));
-  for (const events::RecordedBody& body : made.events.bodies) facts.member("bodies").add(body.name);
+  for (const events::RecordedBody& body : made.events.bodies) facts["bodies"].add(body.name);
   recordings_[recording] = std::move(made);
   return facts.line();
 }

@@ -49,7 +49,7 @@ base::Json make_plan_json(const EffectSelector& selector, const SceneFacts& fact
   const BodyPlan plan = selector.get_plan(body);
   for (const Effect effect : EffectSet::all()) {
     const EffectPlan& of = plan[effect];
-    json.member(synth::get_name(effect))
+    json[synth::get_name(effect)]
         .set("on_s", base::decimals(of.on_s, 3))
         .set("switched", of.switched)
         .set("predicted_us_per_s", base::significant(of.cost_us / duration, 4))
