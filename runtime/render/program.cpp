@@ -303,7 +303,7 @@ class Run {
     figures_.tally = scene::count_impulses(happened_.events, scene_.bodies.size());
     figures_.physics_steps = happened_.steps;
     figures_.blows = happened_.blows;
-    return scene::make_plan(std::move(facts), happened_.events, measures() ? effects::measure_costs() : effects::Costs{});
+    return scene::make_plan(std::move(facts), happened_.events);
   }
 
   /// Renders the sound and writes all outputs: everything is made before anything is seen.
@@ -313,7 +313,6 @@ class Run {
     const Sound sound = calc_sound(scene_, body_banks_, happened_.events,
                                    {.rate_hz = scene_.sample_rate_hz,
                                     .plan = &plan,
-                                    .measures = measures(),
                                     .audits = options_->audit,
                                     .fades_end = scene_.output.fade_end,
                                     .head = &head_,
@@ -343,7 +342,6 @@ class Run {
   const scene::Scene& get_scene() const { return scene_; }
 
  private:
-  bool measures() const { return options_->plan || options_->report.has_value(); }
   base::Spool make_spool(const char* what) const { return base::Spool(find_spool_folder(options_->wav), what); }
 
   void write(const scene::Plan& plan, const Sound& sound, const sound::SoundStore& store) {

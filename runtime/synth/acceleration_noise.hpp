@@ -46,10 +46,6 @@ class AccelerationNoise {
   /// Takes the place of another click, with its time and its strikes; the sound continues without a step and dies away as this sphere's
   /// does. [audio-thread]
   void take_over(const AccelerationNoise& other) noexcept;
-  /// Memory that it has taken.
-  std::size_t calc_bytes() const {
-    return sizeof(AccelerationNoise) + pulses_.capacity() * sizeof(Pulse) + forces_.capacity() * sizeof(Steps);
-  }
   std::int64_t get_refused() const { return refused_; }
 
  private:

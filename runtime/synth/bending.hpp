@@ -37,9 +37,6 @@ class BendingWatch {
   /// In thicknesses; 0 while it has not been above kLinearThicknesses.
   double get_largest() const noexcept { return largest_; }
   void take_over(const BendingWatch& other) noexcept { largest_ = other.largest_; }
-  std::size_t calc_bytes() const noexcept {
-    return (re_.capacity() + im_.capacity() + move_.capacity() + rest_.capacity()) * sizeof(float);
-  }
 
  private:
   void look_at(int back, int groups, std::span<const DampedState> damped) noexcept;

@@ -200,10 +200,6 @@ ContactForces::ContactForces(std::shared_ptr<const Model> model, ContactForcesOp
   }
 }
 
-std::size_t ContactForces::calc_bytes() const noexcept {
-  return sizeof(*this) + slots_.size() * sizeof(Slot) + records_.size() * sizeof(Record) + damped_force_.size() * sizeof(float);
-}
-
 /// The contact's own slot, or one that it may have.
 ContactForces::Slot* ContactForces::find_place(const events::LastingContact& contact) noexcept {
   Slot* empty = nullptr;
@@ -318,15 +314,6 @@ void ContactForces::take_over(ContactForces& other) noexcept {
     }
     find_modulus(slot);
     if (slot.acts) find_rows(slot.node);
-  }
-}
-
-void ContactForces::release() noexcept {
-  for (Slot& slot : slots_) {
-    if (slot.used && !slot.acts)
-      free(slot);
-    else
-      slot.ended = slot.ended || slot.used;
   }
 }
 

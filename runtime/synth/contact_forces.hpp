@@ -117,15 +117,9 @@ class ContactForces {
   /// Nothing earlier than this will come: contacts without newer records stay as they are until then. [audio-thread]
   void reach(double time_s) noexcept;
 
-  /// From the next sub-block on, without a step. [audio-thread]
-  void set_effects(EffectSet effects) noexcept { effects_ = effects; }
-
   /// Takes the place of another one of the same options, of a voice that is taken over likewise; that one is not used afterwards. Contacts
   /// on triangles that the model has not are cut off. [audio-thread]
   void take_over(ContactForces& other) noexcept;
-
-  /// Ends all contacts, within 5 ms. [audio-thread]
-  void release() noexcept;
 
   /// Whether nothing acts and nothing waits.
   bool is_idle() const noexcept { return live_ == 0; }
@@ -144,7 +138,6 @@ class ContactForces {
   const std::array<Moments, 2>& get_ramp() const noexcept { return ramp_; }
 
   const ContactCounters& get_counters() const noexcept { return counters_; }
-  std::size_t calc_bytes() const noexcept;
 
  private:
   /// A record as it waits; times in samples.

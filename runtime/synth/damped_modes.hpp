@@ -40,7 +40,6 @@ class DampedModes {
   void reset() noexcept;
   /// Sum of (q'^2 + lambda q^2) / 2 [J].
   double calc_energy_j() const noexcept;
-  std::size_t calc_bytes() const noexcept { return states_.capacity() * sizeof(DampedState); }
 
  private:
   /// Modes of so many substeps: first <= mode < last.

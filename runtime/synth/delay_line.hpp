@@ -40,8 +40,6 @@ class DelayLine {
   /// Of the next sample. [audio-thread]
   std::int64_t get_position() const noexcept { return position_; }
   std::size_t get_bytes() const noexcept { return samples_.size() * sizeof(float); }
-  /// Of one without travel time.
-  static std::size_t calc_least_bytes(int block) noexcept;
 
  private:
   std::size_t size_ = 0;        // of the ring

@@ -12,10 +12,10 @@
 #include <cmath>
 #include <limits>
 
+#include "runtime/acoustics/radiation/transfers.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/quaternion.hpp"
 #include "runtime/base/vector.hpp"
-#include "runtime/acoustics/radiation/transfers.hpp"
 #include "runtime/synth/receiver.hpp"
 #include "runtime/synth/trajectory.hpp"
 
@@ -407,18 +407,6 @@ void Directivity::add_damped_to_fade(const Directivity& weights, const float* pr
 void Directivity::let_fade_fall() noexcept {
   for (Ear& ear : ears_)
     for (std::size_t n = 0; n < kBlock; ++n) ear.fade[n] *= 1.0F - static_cast<float>(n) / kBlock;
-}
-
-std::size_t Directivity::calc_bytes() const noexcept {
-  std::size_t bytes = sizeof(Directivity) + ears_.capacity() * sizeof(Ear) + kept_.capacity() * sizeof(SampleStates) +
-                      orders_.capacity() * sizeof(orders_[0]) + bank_modes_.capacity() * sizeof(std::int32_t) +
-                      first_.capacity() * sizeof(int);
-  for (const auto& room : transfers_) bytes += room.capacity() * sizeof(Complex);
-  for (const Ear& ear : ears_) {
-    for (const auto& list : ear.due) bytes += list.capacity() * sizeof(int);
-    bytes += (ear.weight.capacity() + ear.step.capacity() + ear.bend.capacity()) * sizeof(ModeWeight) + ear.modes.capacity() * sizeof(Mode);
-  }
-  return bytes;
 }
 
 }  // namespace carillon::synth

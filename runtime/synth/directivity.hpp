@@ -96,7 +96,6 @@ class Directivity {
   std::span<float> get_sound(std::size_t ear) noexcept { return ears_[ear].sound; }
   /// Transfers looked up so far.
   std::int64_t get_evaluations() const noexcept { return evaluations_; }
-  std::size_t calc_bytes() const noexcept;
 
  private:
   static constexpr int kLongest = 4;  // classes of modes: next weights are 1, 2, 4 .. 2^kLongest blocks ahead

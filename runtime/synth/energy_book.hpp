@@ -68,7 +68,6 @@ class EnergyBook {
   const ModeEnergy& get() const noexcept { return sums_; }
   /// Buffer for `kept`, one per group.
   SampleStates* get_kept() noexcept { return kept_.data(); }
-  std::size_t calc_bytes() const noexcept { return modes_.capacity() * sizeof(Mode) + kept_.capacity() * sizeof(SampleStates); }
 
  private:
   struct Mode {

@@ -25,8 +25,4 @@ void HeadEars::process(const Vec3& direction, std::span<const double> input, std
   if (left_ == 0) filter_->reset();
 }
 
-int HeadEars::get_length() const noexcept { return filter_->get_length(); }
-
-std::size_t HeadEars::calc_bytes() const noexcept { return sizeof(HeadEars) + filter_->calc_bytes(); }
-
 }  // namespace carillon::synth

@@ -32,9 +32,6 @@ class HeadEars {
 
   /// All that came in is out.
   bool is_silent() const noexcept { return left_ == 0; }
-  /// Samples for which something that came in is heard, with the latency.
-  int get_length() const noexcept;
-  std::size_t calc_bytes() const noexcept;
 
  private:
   std::unique_ptr<head::EarFilter> filter_;

@@ -17,9 +17,9 @@
 #include <unordered_map>
 #include <utility>
 
+#include "runtime/acoustics/radiation/transfers.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/large.hpp"
-#include "runtime/acoustics/radiation/transfers.hpp"
 #include "runtime/synth/bending.hpp"
 #include "runtime/synth/effects.hpp"
 #include "runtime/synth/nonlinear_modes.hpp"
@@ -124,9 +124,9 @@ std::shared_ptr<const Model> Model::make(const bank::Bank& bank, const ModelOpti
     model->copy_shapes(bank);
   model->find_bounds();
   model->find_bending(find_judged_thickness_m(bank));
-  if (kCompiledEffects.has(Effect::kDirectivity) && (options.transfers != nullptr || !bank.multipoles.is_empty()))
+  if (options.transfers != nullptr || !bank.multipoles.is_empty())
     model->add_directivity(options.transfers != nullptr ? options.transfers : std::make_shared<const radiation::Transfers>(bank));
-  if (kCompiledEffects.has(Effect::kNonlinear)) model->add_nonlinear(bank.quartic);
+  model->add_nonlinear(bank.quartic);
   return model;
 }
 

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "runtime/bank/bank.hpp"
-#include "runtime/synth/nonlinear/coupled_modes.hpp"
 #include "runtime/synth/kernels.hpp"
+#include "runtime/synth/nonlinear/coupled_modes.hpp"
 #include "runtime/synth/pulse.hpp"
 
 namespace carillon::radiation {

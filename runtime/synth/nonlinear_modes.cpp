@@ -247,20 +247,6 @@ void NonlinearModes::reset() noexcept {
   std::fill(push_im_.begin(), push_im_.end(), 0.0);
 }
 
-std::size_t NonlinearModes::calc_bytes() const noexcept {
-  return sizeof(NonlinearModes) + modes_.calc_bytes() + (place_.capacity() + mode_.capacity()) * sizeof(int) +
-         constants_.capacity() * sizeof(nonlinear::ModeConstants) + answer_.capacity() * sizeof(ForceAnswer) +
-         (push_re_.capacity() + push_im_.capacity() + keep_.capacity() + gain_.capacity()) * sizeof(double) +
-         strike_.capacity() * sizeof(StrikeTable) + (cascade_ ? cascade_->calc_bytes() : 0);
-}
-
-std::size_t NonlinearModes::calc_cascade_bytes() const noexcept {
-  if (!cascade_) return 0;
-  const std::size_t count = cascade_->get_count();
-  return cascade_->calc_bytes() + strike_.capacity() * sizeof(StrikeTable) +
-         count * (sizeof(int) + sizeof(nonlinear::ModeConstants) + sizeof(ForceAnswer) + (3 * kIntervals + 1) * sizeof(double));
-}
-
 /// At the sample.
 double NonlinearModes::calc_pressure() const noexcept {
   double pressure = 0.0;

@@ -7,11 +7,11 @@
 #include <span>
 #include <vector>
 
-#include "runtime/synth/nonlinear/cascade.hpp"
-#include "runtime/synth/nonlinear/coupled_modes.hpp"
 #include "runtime/synth/damped_modes.hpp"
 #include "runtime/synth/kernels.hpp"
 #include "runtime/synth/model.hpp"
+#include "runtime/synth/nonlinear/cascade.hpp"
+#include "runtime/synth/nonlinear/coupled_modes.hpp"
 #include "runtime/synth/strike_queue.hpp"
 
 namespace carillon::synth {
@@ -70,9 +70,6 @@ class NonlinearModes {
   void reset() noexcept;
   double calc_energy_j() const noexcept { return modes_.get_energy_j() + (cascade_ ? cascade_->calc_energy_j() : 0.0); }
   const nonlinear::CoupledCounters& get_counters() const noexcept { return modes_.get_counters(); }
-  std::size_t calc_bytes() const noexcept;
-  /// Of them, what the cascade adds.
-  std::size_t calc_cascade_bytes() const noexcept;
 
  private:
   double get_re(int i) const noexcept { return i < get_coupled_count() ? modes_.get_re(i) : cascade_->get_re(i - get_coupled_count()); }

@@ -13,9 +13,9 @@
 #include <cmath>
 #include <limits>
 
+#include "runtime/acoustics/radiation/transfers.hpp"
 #include "runtime/base/sinc.hpp"
 #include "runtime/base/vector.hpp"
-#include "runtime/acoustics/radiation/transfers.hpp"
 
 namespace carillon::synth {
 namespace {
@@ -132,12 +132,12 @@ Receiver::Receiver(const Vec3& offset_m, double sample_rate_hz, EffectSet effect
 
 /// The way of what arrives at a time, through the air or without it; from the sphere, where there is one.
 PathState Receiver::calc_way(const Source& source, const Trajectory& listener, double time_s) const noexcept {
-  PathState way = has(effects_, Effect::kAirDelay) ? calc_path_state(*source.track, listener, offset_m_, time_s)
-                                                   : calc_straight_way(*source.track, listener, offset_m_, time_s);
-  if (!kCompiledEffects.has(Effect::kDirectivity) || sphere_m_ == 0.0) return way;
+  PathState way = effects_.has(Effect::kAirDelay) ? calc_path_state(*source.track, listener, offset_m_, time_s)
+                                                  : calc_straight_way(*source.track, listener, offset_m_, time_s);
+  if (sphere_m_ == 0.0) return way;
   way.spreading_1_m = 1.0;
   way.spreading_slope = 0.0;
-  if (!has(effects_, Effect::kAirDelay)) return way;
+  if (!effects_.has(Effect::kAirDelay)) return way;
   way.delay_s -= sphere_m_ / kSoundSpeedMs;
   if (const double least_s = (radiation::kNearestRadii - 1.0) * sphere_m_ / kSoundSpeedMs; way.delay_s < least_s) {
     way.delay_s = least_s;
@@ -147,15 +147,9 @@ PathState Receiver::calc_way(const Source& source, const Trajectory& listener, d
 }
 
 void Receiver::begin(const Source& source, const Trajectory& listener, std::int64_t sample) noexcept {
-  if (!has(effects_, Effect::kAirDelay)) return;
+  if (!effects_.has(Effect::kAirDelay)) return;
   first_delay_s_ = calc_way(source, listener, static_cast<double>(sample - latency_) / rate_hz_).delay_s;
   is_placed_ = true;
-}
-
-double Receiver::calc_delay_s(const Source& source, const Trajectory& listener, std::int64_t sample) const noexcept {
-  if (!has(effects_, Effect::kAirDelay)) return 0.0;
-  if (!has(effects_, Effect::kDoppler) && is_placed_) return first_delay_s_;
-  return calc_way(source, listener, static_cast<double>(sample - latency_) / rate_hz_).delay_s;
 }
 
 /// Of what arrives at a border of sub-blocks, with the effects that this ear has.
@@ -163,11 +157,11 @@ PathState Receiver::find_path_state(const Source& source, const Trajectory& list
   const double arrival_s = static_cast<double>(border * kSubBlock - latency_) / rate_hz_;
   travel_s = 0.0;
   PathState way = calc_way(source, listener, arrival_s);
-  if (!has(effects_, Effect::kAirDelay)) return way;
+  if (!effects_.has(Effect::kAirDelay)) return way;
   travel_s = way.delay_s + sphere_m_ / kSoundSpeedMs;
   if (!is_placed_) first_delay_s_ = way.delay_s;
   is_placed_ = true;
-  if (!has(effects_, Effect::kDoppler)) {
+  if (!effects_.has(Effect::kDoppler)) {
     way.delay_s = first_delay_s_;
     way.delay_slope = 0.0;
     return way;

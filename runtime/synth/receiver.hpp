@@ -69,9 +69,6 @@ class Receiver {
   /// [audio-thread]
   void begin(const Source& source, const Trajectory& listener, std::int64_t sample) noexcept;
 
-  /// How long the sound that arrives at this sample took, as this ear hears it. [audio-thread]
-  double calc_delay_s(const Source& source, const Trajectory& listener, std::int64_t sample) const noexcept;
-
   /// Adds the pressure [Pa] of samples `sample` to `sample + received_pa.size()`. The source's delay lines hold these samples already.
   /// Calls of any size give the same bits. Returns how many samples came by a way whose length changed; those of a source and a listener
   /// that stand still are cheap. [audio-thread]: no heap, no lock, no throw.

@@ -88,8 +88,6 @@ class StrikeQueue {
   void clear() noexcept;
 
   const StrikeCounters& get_counters() const noexcept { return counters_; }
-  /// Without the queue itself.
-  std::size_t calc_bytes() const noexcept { return pulses_.capacity() * sizeof(QueuedPulse) + forces_.capacity() * sizeof(QueuedForce); }
 
  private:
   void begin_in_time(double& begin, std::int64_t horizon) noexcept;

@@ -34,7 +34,6 @@ class Trajectory {
 
   bool is_still() const { return count_ < 2; }
 
-  std::size_t get_bytes() const noexcept { return waypoints_.size() * sizeof(Waypoint); }
   /// How many waypoints it remembers, and one of them: 0 is the oldest.
   std::size_t get_count() const { return count_; }
   const Waypoint& get_waypoint(std::size_t i) const { return get(i); }
@@ -65,8 +64,6 @@ class Attitude {
 
   /// [audio-thread] Not turned when nothing was pushed.
   events::Quaternion find(double time_s) const noexcept;
-
-  std::size_t get_bytes() const noexcept { return turns_.size() * sizeof(Turn); }
 
  private:
   struct Turn {

@@ -18,8 +18,6 @@
 namespace carillon::synth {
 namespace {
 
-/// Whether this build has any effect of contacts that last.
-constexpr bool kHasContacts = kCompiledEffects.has_any(kContactEffects);
 constexpr std::int64_t kCullEvery = 8;  // blocks
 
 constexpr int kColumnsEach = kColumns / kSubBlocks;  // of a sub-block
@@ -46,9 +44,9 @@ Voice::Voice(std::shared_ptr<const Model> model, VoiceOptions options)
   starts_.resize(model_->sound_.size());
   bounds_.resize(model_->sound_.size());
   if (options.is_nonlinear) {
-    if (!kCompiledEffects.has(Effect::kNonlinear) || model_->get_nonlinear() == nullptr)
+    if (model_->get_nonlinear() == nullptr)
       throw InputError("nonlinear motion needs a bank with a nonlinear energy, which this body's has not");
-    if (options.has_cascade && (!kCompiledEffects.has(Effect::kCascade) || !model_->has_cascade()))
+    if (options.has_cascade && !model_->has_cascade())
       throw InputError("a cascade needs a bank with a nonlinear energy, a mass, a thickness, and modes above the coupled ones");
     nonlinear_ = std::make_unique<NonlinearModes>(*model_, options.has_cascade);
   }
@@ -80,9 +78,9 @@ void Voice::render(int sub_blocks) noexcept {
   horizon_ += sub_blocks * kSubBlock;
   rendered_ = held_ = sub_blocks * kSubBlock;
   if (is_directed()) for_directed([this](Directivity& ears) { ears.clear(rendered_); });
-  silent_ = !is_awake() && !fading_ && strikes_.is_empty() && (!kHasContacts || contacts_ == nullptr || contacts_->is_resting());
+  silent_ = !is_awake() && !fading_ && strikes_.is_empty() && (contacts_ == nullptr || contacts_->is_resting());
   if (silent_) return;
-  const bool touched = kHasContacts && contacts_ != nullptr && !contacts_->is_idle();
+  const bool touched = contacts_ != nullptr && !contacts_->is_idle();
   std::fill(block_.begin(), block_.begin() + rendered_, 0.0F);
   bool struck_at_all = false;
   for (int q = 0; q < sub_blocks; ++q) struck_at_all = struck_at_all || strikes_.acts(start + q * kSubBlock, kSubBlock);
@@ -404,12 +402,6 @@ void Voice::reset() noexcept {
   fading_ = inherits_ = false;
   strikes_.clear();
   ++counters_.resets;
-}
-
-std::size_t Voice::calc_bytes() const {
-  return sizeof(Voice) + strikes_.calc_bytes() + damped_.calc_bytes() + state_.capacity() * sizeof(ModeState) +
-         starts_.capacity() * sizeof(ColumnStates) + bounds_.capacity() * sizeof(float) + (book_ ? book_->calc_bytes() : 0) +
-         bending_.calc_bytes() + calc_nonlinear_bytes();
 }
 
 VoiceCounters Voice::get_counters() const noexcept {

@@ -133,7 +133,7 @@ class Voice {
   int get_live_group_count() const { return live_; }
   int get_group_count() const { return groups_; }
   bool is_awake() const { return live_ > 0 || damped_.is_live() || (is_nonlinear() && nonlinear_->is_live()); }
-  bool is_nonlinear() const noexcept { return kCompiledEffects.has(Effect::kNonlinear) && nonlinear_ != nullptr; }
+  bool is_nonlinear() const noexcept { return nonlinear_ != nullptr; }
   /// Modes that are coupled at this moment, of those that the model couples: fewer under a limit.
   int get_coupled_count() const noexcept { return is_nonlinear() ? nonlinear_->get_limit() : 0; }
   /// Nothing sounds, nothing is to come and nothing is left in the block: process() would only give zeros.
@@ -142,10 +142,6 @@ class Voice {
   }
   /// Advances an idle voice by a multiple of kSubBlock samples without output. [audio-thread]
   void skip(std::int64_t samples) noexcept { horizon_ += samples; }
-  std::size_t calc_nonlinear_bytes() const noexcept { return nonlinear_ ? nonlinear_->calc_bytes() : 0; }        // of all that is below
-  std::size_t calc_cascade_bytes() const noexcept { return nonlinear_ ? nonlinear_->calc_cascade_bytes() : 0; }  // of what is above
-  /// Memory that this voice has taken, without that of the model.
-  std::size_t calc_bytes() const;
   VoiceCounters get_counters() const noexcept;
   /// Fills in the amplitude of q [m kg^1/2] of each mode that rings, by number in the bank, where there is room for it. [audio-thread]
   void measure_amplitudes(std::span<float> by_bank_mode) const noexcept;

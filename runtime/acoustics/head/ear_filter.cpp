@@ -47,14 +47,6 @@ void EarFilter::reset() noexcept {
 
 int EarFilter::get_length() const noexcept { return head_->get_taps() + static_cast<int>(head_->get_max_delay()) + 1 + kSincTaps; }
 
-std::size_t EarFilter::calc_bytes() const noexcept {
-  std::size_t bytes = sizeof(EarFilter) + input_.samples.capacity() * sizeof(float);
-  for (const Filter& filter : filters_)
-    for (const auto& response : filter.response) bytes += response.capacity() * sizeof(float);
-  for (const Line& ear : ears_) bytes += ear.samples.capacity() * sizeof(float);
-  return bytes;
-}
-
 void EarFilter::set(Filter& filter, const std::array<Blend, 2>& blend) const noexcept {
   filter.blend = blend;
   for (std::size_t ear = 0; ear < 2; ++ear) {

@@ -40,8 +40,6 @@ class EarFilter {
   const Head& get_head() const noexcept { return *head_; }
   /// Samples, one of the input and those behind it, in which that one is heard.
   int get_length() const noexcept;
-  /// Memory of its own.
-  std::size_t calc_bytes() const noexcept;
 
  private:
   /// What one direction does, for both ears.

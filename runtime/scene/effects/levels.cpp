@@ -13,10 +13,9 @@
 #include <complex>
 #include <numbers>
 
-#include "runtime/base/vector.hpp"
 #include "runtime/acoustics/radiation/gains.hpp"
 #include "runtime/acoustics/radiation/transfers.hpp"
-#include "runtime/synth/effects.hpp"
+#include "runtime/base/vector.hpp"
 
 namespace carillon::effects {
 namespace {
@@ -80,7 +79,7 @@ BankLevels::BankLevels(const bank::Bank& bank, double rate_hz, double sphere_rad
     const double slow = d > omega ? d - std::sqrt((d - omega) * (d + omega)) : d;
     modes_.push_back({static_cast<int>(m), freq, std::max(slow, 1e-9), std::abs(bank.radiation_gain[m]), calc_a_weight(freq)});
   }
-  if (synth::kCompiledEffects.has(synth::Effect::kDirectivity) && !bank.multipoles.is_empty()) {
+  if (!bank.multipoles.is_empty()) {
     if (transfers != nullptr)
       find_spreads(*transfers);
     else

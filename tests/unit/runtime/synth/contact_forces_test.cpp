@@ -145,15 +145,6 @@ TEST(ContactForces, AreSwitchedByTheirEffects) {
   EXPECT_EQ(hear({Effect::kRolling}, false), 0.0F);
   EXPECT_GT(hear({Effect::kRolling}, true), 0.0F);
   EXPECT_EQ(hear(kBrake, false), 0.0F);
-  // Half way: switched off while it plays, within a sub-block and without a step that can be heard.
-  ContactForces contacts(model, {.effects = kNoise});
-  const std::vector<LastingContact> records = make_records(0.4, [](double t) { return make_sliding(t, 0.4); });
-  for (const LastingContact& record : records) contacts.take(record, kOther);
-  contacts.begin_sub_block(0);
-  EXPECT_NE(contacts.begin_sub_block(32), nullptr);
-  contacts.set_effects({});
-  contacts.begin_sub_block(64);
-  EXPECT_EQ(contacts.begin_sub_block(96), nullptr);
 }
 
 /// Output of the modes on a force of this spectrum: power at each mode by its bandwidth.
@@ -339,9 +330,6 @@ TEST(ContactForces, FadeWhenTheStreamStopsAndComeBackWhenItContinues) {
   contacts.reach(0.7);
   for (; sample < 0.65 * kRate; sample += kSubBlock) peak_of(sample);
   EXPECT_GT(peak_of(sample), 0.0F);
-  contacts.release();
-  for (sample += kSubBlock; sample < 0.66 * kRate; sample += kSubBlock) peak_of(sample);
-  EXPECT_TRUE(contacts.is_idle());
 }
 
 TEST(ContactForces, KeepTheStrongestWhenThereAreTooMany) {

@@ -141,7 +141,6 @@ TEST(Model, a_model_like_another_shares_its_surface_and_sounds_as_one_of_its_own
 }
 
 TEST(Model, all_that_a_nonlinear_energy_holds_counts_as_memory) {
-  if (!kCompiledEffects.has(Effect::kNonlinear)) GTEST_SKIP() << "built without it";
   bank::Bank bank = testing::make_cube_bank({{300.0, 5.0}, {700.0, 5.0}, {1100.0, 5.0}});
   const std::size_t linear = Model::make(bank, {.rate_hz = kRate})->calc_bytes();
   bank.quartic.modes = {0, 1, 2};

@@ -167,7 +167,6 @@ TEST(NonlinearVoice, OffIsTheVoiceOfABankWithoutTheEnergy) {
   Voice a(make_model(with)), b(make_model(without));
   for (Voice* voice : {&a, &b}) strike_softly(*voice, 1.0);
   EXPECT_EQ(play(a, 24000), play(b, 24000));
-  EXPECT_EQ(a.calc_bytes(), b.calc_bytes());
   EXPECT_EQ(a.get_counters().coupled_samples, 0);
   EXPECT_THROW(Voice(make_model(without), {.is_nonlinear = true}), InputError);
 }
@@ -202,34 +201,6 @@ TEST(NonlinearVoice, ALimitLeavesFewerCoupledWithoutAClick) {
   EXPECT_LE(find_step(9500, 9800), 1.3F * find_step(9000, 9500));
   voice.set_limit(1000);
   EXPECT_EQ(voice.get_coupled_count(), 9);
-}
-
-TEST(NonlinearBody, GoesOverWhileItRingsWithoutAClick) {
-  const auto model = make_model(make_bank(1e7));
-  const EffectSet linear{Effect::kModal}, nonlinear{Effect::kModal, Effect::kNonlinear};
-  for (const bool begins_nonlinear : {false, true}) {
-    Synthesiser synthesiser({.rate_hz = kRate, .microphones_m = {{0, 0, 0}}});
-    const int body = synthesiser.add_body(model, {.position_m = {0.0, 1.0, 0.0}, .effects = begins_nonlinear ? nonlinear : linear});
-    synthesiser.push(events::Impulse{
-        .time_s = 0.001, .body = body, .triangle = 4, .barycentric = {0.2, 0.3, 0.5}, .impulse_n_s = {0.0, 0.0, 1e-2}, .duration_s = 2e-3});
-    std::vector<float> sound(19200);
-    const auto process = [&](std::size_t from, std::size_t count) {
-      float* at = sound.data() + from;
-      synthesiser.process(&at, 1, static_cast<int>(count));
-    };
-    process(0, 9600);
-    synthesiser.set_effects(body, begins_nonlinear ? linear : nonlinear);
-    process(9600, 9600);
-    EXPECT_EQ(synthesiser.get_effects(body), begins_nonlinear ? linear : nonlinear);
-    EXPECT_GT(synthesiser.get_effect_counters(body).units[Effect::kNonlinear], 0);
-    const auto find_step = [&](std::size_t from, std::size_t to) {
-      float step = 0.0F;
-      for (std::size_t n = from; n < to; ++n) step = std::max(step, std::abs(sound[n + 1] - 2.0F * sound[n] + sound[n - 1]));
-      return step;
-    };
-    EXPECT_LE(find_step(9500, 10200), 1.3F * find_step(8800, 9500)) << begins_nonlinear;
-    EXPECT_GT(find_step(18000, 19000), 0.0F);
-  }
 }
 
 TEST(NonlinearBody, NeedsABankWithTheEnergy) {
@@ -267,7 +238,6 @@ TEST(NonlinearVoice, SoftlyACascadeIsTheLinearVoiceToMinus100Db) {
   strike_softly(other, 1e-6);
   EXPECT_EQ(play(other, 48000, 37), found);
   EXPECT_GT(other.get_counters().cascade_samples, 0);
-  EXPECT_GT(other.calc_cascade_bytes(), 0);
 }
 
 TEST(NonlinearVoice, WhatIsRadiatedCountsTheModesOfAllKinds) {
@@ -292,32 +262,8 @@ TEST(NonlinearVoice, ACascadeThatIsOffIsNotThere) {
     voice.strike({.time_s = 1e-3, .impulse_n_s = {0.0, 0.0, 1.0}});
     heard.push_back(play(voice, 9600));
     EXPECT_EQ(voice.get_counters().cascade_samples, 0);
-    EXPECT_EQ(voice.calc_cascade_bytes(), 0);
   }
   EXPECT_EQ(heard[0], heard[1]);
-}
-
-TEST(NonlinearVoice, ACascadeComesAndGoesWithoutAClick) {
-  const auto model = make_model(make_cascade_bank());
-  Synthesiser synthesiser({.rate_hz = kRate, .microphones_m = {{0, 0, 0}}});
-  const EffectSet without = kDefaultEffects.with(Effect::kNonlinear), with = without.with(Effect::kCascade);
-  const int body = synthesiser.add_body(model, {.position_m = {0.0, 0.3, 1.0}, .effects = without});
-  synthesiser.push(events::Impulse{
-      .time_s = 0.001, .body = body, .triangle = 4, .barycentric = {0.2, 0.3, 0.5}, .impulse_n_s = {0.0, 0.0, 1e-2}, .duration_s = 2e-4});
-  std::vector<float> heard(12288);
-  for (std::size_t n = 0; n < heard.size(); n += 512) {
-    if (n == 4096) synthesiser.set_effects(body, with);
-    if (n == 8192) synthesiser.set_effects(body, without);
-    float* at = heard.data() + n;
-    synthesiser.process(&at, 1, 512);
-  }
-  float before = 0.0F, around = 0.0F;
-  for (std::size_t n = 2048; n < 12200; ++n) {
-    const float step = std::abs(heard[n + 1] - heard[n]);
-    (n < 4000 ? before : around) = std::max(n < 4000 ? before : around, step);
-  }
-  EXPECT_GT(before, 0.0F);
-  EXPECT_LE(around, 1.2F * before);
 }
 
 }  // namespace

@@ -374,9 +374,8 @@ TEST(Synthesiser, TakesEventsFromManyThreadsWhileItPlays) {
   const std::array<EffectSet, 4> kSets{EffectSet{}, {Effect::kModal}, kDefaultEffects.with(Effect::kAccelerationNoise), kDefaultEffects};
   std::size_t turn = 0;
   while (!stops) {
-    if (!synthesiser.is_full()) bodies.push_back(synthesiser.add_body(model, {.position_m = {1.0, 2.0, 0.0}}));
-    ++turn;
-    synthesiser.set_effects(bodies[turn % bodies.size()], kSets[turn % kSets.size()]);
+    if (!synthesiser.is_full())
+      bodies.push_back(synthesiser.add_body(model, {.position_m = {1.0, 2.0, 0.0}, .effects = kSets[++turn % kSets.size()]}));
     (void)synthesiser.get_effect_counters(bodies.front());
     if (!bodies.empty()) {
       synthesiser.swap_model(bodies.back(), bodies.size() % 2 == 0 ? model : edited);
