@@ -141,7 +141,7 @@ TEST_F(Sofa, WhatCannotBeUsedIsRefusedByName) {
   expect_refusal("fault=late taps=2048 step=30", "delays differ");
   expect_refusal("taps=8193 step=45", "8192");
   expect_refusal("taps=4 step=1 low=-60 high=0", "20000");
-  expect_refusal("span=90", "all round");
+  expect_refusal("span=90", "gap on the sphere");
   expect_refusal("rate=100", "sample rate");
   EXPECT_NE(find_refusal(write("long.sofa", "taps=8000 step=45"), 96000.0).find("96000"), std::string::npos);
   EXPECT_NE(find_refusal(write("good.sofa"), 10.0).find("sample rate"), std::string::npos);
