@@ -1,7 +1,4 @@
-// Method:     a ring of as many samples as the longest way holds, whose beginning stands behind its end once more, so that a window of it
-//             is one piece of memory.
-// Source:     textbook.
-// Deviations: none.
+// Method:     ring buffer of the longest travel time, whose beginning is repeated behind its end, so that a window is contiguous.
 #include "runtime/synth/delay_line.hpp"
 
 #include <algorithm>
@@ -14,8 +11,8 @@
 namespace carillon::synth {
 
 DelayLine::DelayLine(double longest_m, double sample_rate_hz, int block) {
-  if (!(longest_m >= 0.0) || !(longest_m < 1e5)) throw InputError("a source must stay within 100 km of the listener");
-  if (!(sample_rate_hz > 0.0) || block < 1) throw InputError("a delay_line needs a positive sample rate and block");
+  if (!(longest_m >= 0.0) || !(longest_m < 1e5)) throw InputError("delay line: the longest distance must be below 100 km");
+  if (!(sample_rate_hz > 0.0) || block < 1) throw InputError("delay line: the sample rate and the block must be positive");
   size_ =
       static_cast<std::size_t>(std::ceil(longest_m / bank::kSoundSpeedMs * sample_rate_hz)) + 2 * kTaps + static_cast<std::size_t>(block);
   twice_ = kTaps + static_cast<std::size_t>(block);

@@ -1,6 +1,6 @@
 // Method:     head::EarFilter on the grid of sub-blocks.
 // Source:     docs/equations.md.
-// Deviations: a source is as far away as heads are measured; one that is nearer is louder by 1 / r at both ears alike.
+// Deviations: sources have the distance of the head's measurement; nearer ones are louder by 1 / r at both ears alike.
 #include "runtime/synth/head_ears.hpp"
 
 #include <algorithm>

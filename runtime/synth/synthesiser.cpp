@@ -30,9 +30,9 @@ SynthesiserOptions check(SynthesiserOptions options) {
   if (options.microphones_m.empty() || options.microphones_m.size() > kMaxMicrophones) refuse("one to 256 microphones");
   for (const Vec3& place : options.microphones_m)
     for (const double x : place)
-      if (!std::isfinite(x)) refuse("microphones at finite places");
+      if (!std::isfinite(x)) refuse("finite microphone positions");
   for (const double x : options.listener_m)
-    if (!std::isfinite(x)) refuse("a listener at a finite place");
+    if (!std::isfinite(x)) refuse("a finite listener position");
   if (const char* fault = find_fault(options.ground); fault != nullptr) throw InputError(std::string("ground: ") + fault);
   if (const auto& floor = options.floor; floor) {
     if (const char* fault = find_fault(*floor); fault != nullptr) throw InputError(std::string("floor: ") + fault);
@@ -40,7 +40,7 @@ SynthesiserOptions check(SynthesiserOptions options) {
       if (floor->calc_height_m(options.listener_m + place) < 0.0) refuse("microphones above its floor");
   }
   if (options.head) {
-    if (options.microphones_m.size() != 2) refuse("two microphones, left and right, where it has a head");
+    if (options.microphones_m.size() != 2) refuse("two microphones, left and right, for a head");
     if (options.head->head == nullptr || options.head->head->get_sample_rate_hz() != options.rate_hz)
       refuse("a head that is made for its sample rate");
   }
@@ -56,7 +56,7 @@ SynthesiserOptions check(SynthesiserOptions options) {
 
 }  // namespace
 
-/// One writer, one reader.
+/// Single-producer single-consumer queue.
 template <typename T>
 class Synthesiser::Pipe {
  public:
@@ -123,13 +123,13 @@ int Synthesiser::add_body(std::shared_ptr<const Model> model, const BodySettings
   check_model(model.get());
   check_surroundings(settings.effects);
   if (events::find_fault(events::BodyMotion{.position_m = settings.position_m, .rotation = settings.rotation}) != nullptr)
-    throw InputError("a body must be at a finite place, turned by a unit quaternion");
+    throw InputError("the position of a body must be finite and its rotation a unit quaternion");
   if (!(settings.longest_m >= 0.0 && settings.longest_m < 1e5) || settings.max_waypoints < 0 || settings.max_waypoints > kMaxRoom ||
       settings.max_forces > kMaxRoom)
     throw InputError("a body needs a longest distance below 100 km, and room for at most 16,777,216 waypoints and forces");
   // Also checked for bodies without modes.
   if (!(settings.silence_pa > 0.0) || !std::isfinite(settings.silence_pa))
-    throw InputError("a body's pressure of silence must be a positive number of Pa");
+    throw InputError("silence_pa of a body must be a positive number");
   if (const char* fault = find_fault(settings.surface); fault != nullptr) throw InputError(std::string("surface of a body: ") + fault);
   collect();
   const std::size_t free = find_free();
@@ -315,7 +315,7 @@ void Synthesiser::take(const events::TimeWatermark& mark) noexcept {
   has_marks_ = true;
 }
 
-/// At the start of a block: an underrun if physics has not run to its end. Later events come late, or not at all.
+/// At the start of a block: counts an underrun if the physics has not reached its end. Later events are late.
 void Synthesiser::watch_marks() noexcept {
   const bool is_overtaken = has_marks_ && marked_s_ * options_.rate_hz < static_cast<double>(sample_ + kBlock);
   work_.underruns += static_cast<std::int64_t>(is_overtaken && !is_overtaken_);
