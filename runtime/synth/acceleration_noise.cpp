@@ -19,7 +19,7 @@ namespace carillon::synth {
 namespace {
 
 constexpr int kMaxSubsteps = 256;     // limits the radius to 0.03 mm at 48 kHz
-constexpr double kSilencePa = 1e-10;  // as VoiceOptions::silence_pa
+constexpr double kSilencePa = 1e-10;  // as ResonatorOptions::silence_pa
 
 }  // namespace
 

@@ -19,7 +19,7 @@ inline constexpr double kLinearThicknesses = 0.5;
 /// and membranes, whose tension grows with the slope.
 double find_judged_thickness_m(const bank::Bank& bank);
 
-/// Running maximum of a voice's deflection, during and shortly after forces. A bound, the sum over modes of amplitude times largest shape,
+/// Running maximum of the modal deflection, during and shortly after forces. A bound, the sum over modes of amplitude times largest shape,
 /// comes first; above the limit and the maximum, displacements are summed over all modes at the vertices of ModelBending. Allocates in the
 /// constructor only. [audio-thread]
 class BendingWatch {

@@ -184,7 +184,7 @@ ContactForces::ContactForces(std::shared_ptr<const Model> model, ContactForcesOp
   records_.resize(options.max_records);
   for (std::size_t i = 0; i < records_.size(); ++i) records_[i].next = i + 1 < records_.size() ? static_cast<std::int32_t>(i + 1) : -1;
   free_ = 0;
-  damped_force_.resize(model_->damped_.size() * (kSubBlock + 2));
+  damped_force_.resize(model_->get_damped_modes().size() * (kSubBlock + 2));
   // Integrals of 1 - u and u times T_j(2 u - 1) over 0..1, times the length of a sample.
   const auto area = [](int j) { return j % 2 == 0 ? 1.0 / (1.0 - static_cast<double>(j) * j) : 0.0; };
   for (int j = 0; j < kMoments; ++j) {
@@ -235,7 +235,7 @@ std::int32_t ContactForces::take_free(Slot& slot) noexcept {
 }
 
 bool ContactForces::take(const events::LastingContact& contact, const ContactSurface& other) noexcept {
-  if (events::find_fault(events::Event(contact)) != nullptr || contact.triangle >= std::ssize(model_->surface_->triangles) ||
+  if (events::find_fault(events::Event(contact)) != nullptr || contact.triangle >= std::ssize(model_->get_surface()->triangles) ||
       find_fault(other) != nullptr) {
     ++counters_.refused;
     return false;
@@ -288,7 +288,7 @@ void ContactForces::find_modulus(Slot& slot) const noexcept {
 }
 
 void ContactForces::find_rows(Node& node) const noexcept {
-  const auto& triangle = model_->surface_->triangles[node.values.triangle];
+  const auto& triangle = model_->get_surface()->triangles[node.values.triangle];
   for (std::size_t i = 0; i < kStrikeRows; ++i) node.row[i] = model_->get_row(triangle[i / 3], static_cast<int>(i % 3));
 }
 
@@ -300,7 +300,7 @@ void ContactForces::take_over(ContactForces& other) noexcept {
   reached_ = other.reached_;
   looked_ = other.looked_;
   counters_ = other.counters_;
-  const auto fits = [this](const Record& record) { return record.triangle < std::ssize(model_->surface_->triangles); };
+  const auto fits = [this](const Record& record) { return record.triangle < std::ssize(model_->get_surface()->triangles); };
   for (Slot& slot : slots_) {
     if (!slot.used) continue;
     bool all = fits(slot.from) && (!slot.has_to || fits(slot.to)) && fits(slot.node.values);
@@ -506,16 +506,16 @@ const ContactBlock* ContactForces::begin_sub_block(std::int64_t sample) noexcept
 }
 
 void ContactForces::calc_damped_force() noexcept {
-  for (std::size_t i = 0; i < model_->damped_.size(); ++i) {
+  for (std::size_t i = 0; i < model_->get_damped_modes().size(); ++i) {
     float* force = &damped_force_[i * (kSubBlock + 2)];
     force[0] = force[kSubBlock];  // last sample of the previous sub-block
     std::fill(force + 1, force + kSubBlock + 2, 0.0F);
-    const std::size_t column = model_->sound_.size() * kGroup + i;
+    const std::size_t column = model_->get_damped_column(i);
     for (int c = 0; c < drive_.contacts; ++c) {
       for (const ContactEnd& push : drive_.push[c]) {
         double amplitude = 0.0;
         for (int r = 0; r < kStrikeRows; ++r) amplitude += static_cast<double>(push.force[r]) * push.row[r][column];
-        amplitude *= model_->damped_[i].scale;
+        amplitude *= model_->get_damped_modes()[i].scale;
         for (int n = 0; n <= kSubBlock; ++n) force[n + 1] += static_cast<float>(amplitude) * push.signal[n];
       }
     }

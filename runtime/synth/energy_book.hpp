@@ -34,8 +34,8 @@ struct ModeEnergy {
 /// larger, which gains not limited by radiation::limit_gains() allow.
 double calc_radiated_share(double gain, double decay_per_s) noexcept;
 
-/// Balance of one voice, from the states before and after each sub-block with forces and at the start of each block. Loss in free motion:
-/// the decrease of energy. Loss under forces: the integral of 2 d q'^2, summed over samples; the rest of the change is work.
+/// Balance of one ResonatorBank, from the states before and after each sub-block with forces and at the start of each block. Loss in free
+/// motion: the decrease of energy. Loss under forces: the integral of 2 d q'^2, summed over samples; the rest of the change is work.
 class EnergyBook {
  public:
   explicit EnergyBook(const Model& model);

@@ -144,12 +144,21 @@ class Model {
     }
   }
 
- private:
-  friend class BendingWatch;
-  friend class ContactForces;
-  friend class Directivity;
-  friend class Voice;
+  /// Shape row of a vertex along an axis, all modes.
+  const std::int16_t* get_row(std::int32_t vertex, int axis) const {
+    return surface_->shape.data() + (vertex * 3 + static_cast<std::size_t>(axis)) * surface_->columns;
+  }
 
+  /// Tables of the ringing modes, by group.
+  const std::vector<SoundTable>& get_sound_tables() const { return sound_; }
+  const std::vector<RotationTable>& get_rotation_tables() const { return turn_; }
+  const std::vector<StrikeTable>& get_strike_tables() const { return strike_; }
+  /// Bound on the pressure of a mode per size of its state.
+  const std::vector<std::array<float, kGroup>>& get_weights() const { return weight_; }
+  /// Bound on the pressure at 1 m [Pa per N s] of a group, or a later one, after a strike.
+  const std::vector<float>& get_reach() const { return reach_; }
+
+ private:
   struct Mode {
     double lambda = 0.0, decay = 0.0, gain = 0.0, scale = 0.0;  // scale: kg^-1/2 per integer step of the shape
     int bank_mode = 0;
@@ -162,9 +171,6 @@ class Model {
   void find_bending(double thickness_m);
   void add_directivity(std::shared_ptr<const radiation::Transfers> transfers);
   void add_nonlinear(const bank::QuarticEnergy& energy);
-  const std::int16_t* get_row(std::int32_t vertex, int axis) const {
-    return surface_->shape.data() + (vertex * 3 + static_cast<std::size_t>(axis)) * surface_->columns;
-  }
 
   double rate_hz_ = 0.0;
   double mass_kg_ = 0.0, sphere_radius_m_ = 0.0;
@@ -175,8 +181,8 @@ class Model {
   std::vector<SoundTable> sound_;
   std::vector<RotationTable> turn_;
   std::vector<StrikeTable> strike_;
-  std::vector<std::array<float, kGroup>> weight_;  // bound on the pressure = weight times the size of the state
-  std::vector<float> reach_;                       // Pa at 1 m per N s: what a strike can make of a group, or of a later one
+  std::vector<std::array<float, kGroup>> weight_;  // get_weights()
+  std::vector<float> reach_;                       // get_reach()
   ModelBending bending_;
   std::vector<DampedMode> damped_;  // ascending in substeps; those that follow the force first
   std::shared_ptr<const ModelSurface> surface_;

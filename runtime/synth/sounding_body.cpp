@@ -26,14 +26,14 @@ SoundingBody::SoundingBody(std::shared_ptr<const Model> model, BodyFrame frame, 
   check(effects, *model_);
   track_.push({.position_m = position_m});
   surface_ = make_surface(*model_);
-  voice_ = make_voice(model_);
+  modes_ = make_modes(model_);
   acceleration_noise_ = make_noise(*model_);
   contacts_ = make_contacts(model_, surface_);
-  if (voice_) voice_->attach(contacts_.get());
-  if (!voice_ && !acceleration_noise_) return;
+  if (modes_) modes_->attach(contacts_.get());
+  if (!modes_ && !acceleration_noise_) return;
   propagation_ = make_propagation(effects, make_propagation_options(), model_);
   propagation_->source.track = &track_;
-  if (is_directed()) voice_->direct(propagation_->directed->weights.get());
+  if (is_directed()) modes_->direct(propagation_->directed->weights.get());
 }
 
 void SoundingBody::check(EffectSet effects, const Model& model) {
@@ -55,16 +55,17 @@ PropagationOptions SoundingBody::make_propagation_options() const {
           .phase = frame_.phase};
 }
 
-std::unique_ptr<Voice> SoundingBody::make_voice(const std::shared_ptr<const Model>& model) const {
+std::unique_ptr<ResonatorBank> SoundingBody::make_modes(const std::shared_ptr<const Model>& model) const {
   if (!effects_.has(Effect::kModal)) return nullptr;
   const bool is_nonlinear = effects_.has(Effect::kNonlinear);
-  return std::make_unique<Voice>(model, VoiceOptions{.max_strikes = frame_.max_strikes,
-                                                     .max_forces = frame_.max_forces,
-                                                     .silence_pa = frame_.silence_pa,
-                                                     .isa = frame_.isa,
-                                                     .is_nonlinear = is_nonlinear,
-                                                     .has_cascade = is_nonlinear && effects_.has(Effect::kCascade) && model->has_cascade(),
-                                                     .audits_energy = frame_.audits_energy});
+  return std::make_unique<ResonatorBank>(
+      model, ResonatorOptions{.max_strikes = frame_.max_strikes,
+                              .max_forces = frame_.max_forces,
+                              .silence_pa = frame_.silence_pa,
+                              .isa = frame_.isa,
+                              .is_nonlinear = is_nonlinear,
+                              .has_cascade = is_nonlinear && effects_.has(Effect::kCascade) && model->has_cascade(),
+                              .audits_energy = frame_.audits_energy});
 }
 
 std::unique_ptr<BodyAccelerationNoise> SoundingBody::make_noise(const Model& model) const {
@@ -87,8 +88,8 @@ std::unique_ptr<ModelSwap> SoundingBody::make_swap(std::shared_ptr<const Model> 
   check(effects_, *model);
   auto swap = std::make_unique<ModelSwap>();
   swap->surface = make_surface(*model);
-  swap->voice = make_voice(model);
-  if (swap->voice) swap->handover = std::make_unique<VoiceHandover>(*model_, *model);
+  swap->modes = make_modes(model);
+  if (swap->modes) swap->handover = std::make_unique<ModeHandover>(*model_, *model);
   swap->acceleration_noise = make_noise(*model);
   swap->contacts = make_contacts(model, swap->surface);
   if (is_directed()) swap->directed = make_directed_sound(effects_, make_propagation_options(), model);
@@ -123,12 +124,12 @@ void SoundingBody::apply(ModelSwap& swap, const ListenerTracks& listener, std::i
   if (swap.directed) {
     begin_directed(*swap.directed, listener, sample);
     swap.directed->weights->take_over(*propagation_->directed->weights, swap.handover->get_old_modes());
-    swap.voice->direct(swap.directed->weights.get());
+    swap.modes->direct(swap.directed->weights.get());
     std::swap(propagation_->directed, swap.directed);
   }
-  if (voice_) {
-    swap.voice->take_over(*voice_, *swap.handover);
-    std::swap(voice_, swap.voice);
+  if (modes_) {
+    swap.modes->take_over(*modes_, *swap.handover);
+    std::swap(modes_, swap.modes);
   }
   if (acceleration_noise_) {
     swap.acceleration_noise->noise.take_over(acceleration_noise_->noise);
@@ -138,7 +139,7 @@ void SoundingBody::apply(ModelSwap& swap, const ListenerTracks& listener, std::i
   if (!contacts_) return;
   swap.contacts->take_over(*contacts_);
   std::swap(contacts_, swap.contacts);
-  voice_->attach(contacts_.get());
+  modes_->attach(contacts_.get());
 }
 
 ModelSwap* SoundingBody::finish_swap(std::int64_t sample) noexcept {
@@ -160,7 +161,7 @@ float SoundingBody::calc_nearness(const ListenerTracks& listener, std::int64_t s
 }
 
 bool SoundingBody::is_asleep() const noexcept {
-  return swap_ == nullptr && (!propagation_ || propagation_->is_silent()) && (!voice_ || voice_->is_idle()) &&
+  return swap_ == nullptr && (!propagation_ || propagation_->is_silent()) && (!modes_ || modes_->is_idle()) &&
          (!acceleration_noise_ || acceleration_noise_->noise.is_idle());
 }
 
@@ -169,7 +170,7 @@ void SoundingBody::wake(std::int64_t sample) noexcept {
   const std::int64_t slept = sample - rendered_;
   if (slept <= 0) return;
   rendered_ = sample;
-  if (voice_) voice_->skip(slept);
+  if (modes_) modes_->skip(slept);
   if (acceleration_noise_) acceleration_noise_->noise.skip(slept);
   if (propagation_) propagation_->push_silence(slept);
 }
@@ -201,10 +202,10 @@ bool SoundingBody::play(const Strike& strike, bool has_length, bool is_new, std:
   Strike own = strike;
   own.time_s = strike.time_s - static_cast<double>(first_) / frame_.rate_hz;
   bool is_taken = false, is_refused = false;
-  if (voice_) {
-    const std::int64_t late = voice_->get_counters().late;
-    (hit(*voice_, own) ? is_taken : is_refused) = true;
-    if (is_new) work_.late += voice_->get_counters().late - late;
+  if (modes_) {
+    const std::int64_t late = modes_->get_counters().late;
+    (hit(*modes_, own) ? is_taken : is_refused) = true;
+    if (is_new) work_.late += modes_->get_counters().late - late;
   }
   if (acceleration_noise_)
     (hit(acceleration_noise_->noise, own, acceleration_noise_->attitude.find(strike.time_s)) ? is_taken : is_refused) = true;
@@ -249,9 +250,9 @@ bool SoundingBody::take(const events::BodyMotion& motion) noexcept {
   return true;
 }
 
-/// Adds the work of a call of Voice::process() that filled `mono`.
-void SoundingBody::count_modal_work(const VoiceCounters& before, std::int64_t contact_samples, std::span<const float> mono) noexcept {
-  const VoiceCounters after = voice_->get_counters();
+/// Adds the work of a call of ResonatorBank::process() that filled `mono`.
+void SoundingBody::count_modal_work(const ResonatorCounters& before, std::int64_t contact_samples, std::span<const float> mono) noexcept {
+  const ResonatorCounters after = modes_->get_counters();
   work_.resets += after.resets - before.resets;
   work_.deflection = std::max(work_.deflection, after.deflection);
   work_.energy_rise = std::max(work_.energy_rise, after.energy_rise);
@@ -274,17 +275,17 @@ void SoundingBody::count_modal_work(const VoiceCounters& before, std::int64_t co
 /// Sound of the modes, into their delay lines.
 void SoundingBody::make_modal_sound(std::span<float> mono) noexcept {
   const auto count = static_cast<std::int64_t>(mono.size());
-  if (voice_->is_idle()) {
-    voice_->skip(count);
+  if (modes_->is_idle()) {
+    modes_->skip(count);
     for (DelayLine& line : propagation_->directed_lines) line.push_silence(count);
     if (propagation_->monopole) propagation_->monopole->push_silence(count);
     return;
   }
   std::fill(mono.begin(), mono.end(), 0.0F);
-  const VoiceCounters before = voice_->get_counters();
+  const ResonatorCounters before = modes_->get_counters();
   const bool touched = contacts_ && !contacts_->is_resting();
   const std::int64_t contact_samples = touched ? contacts_->get_counters().samples : -1;
-  voice_->process(mono);
+  modes_->process(mono);
   count_modal_work(before, contact_samples, mono);
   for (std::size_t e = 0; e < propagation_->directed_lines.size(); ++e)
     propagation_->directed_lines[e].push(propagation_->directed->weights->get_sound(e).first(mono.size()));
@@ -329,7 +330,7 @@ void SoundingBody::set_transfer_share(const TransferBudget& budget) noexcept {
 
 /// Weights for this block, if the modes sound.
 void SoundingBody::begin_directed_block(std::int64_t sample, const ListenerTracks& listener) noexcept {
-  if (voice_->is_idle()) return;
+  if (modes_->is_idle()) return;
   DirectedSound& directed = *propagation_->directed;
   const std::int64_t before = directed.weights->get_evaluations();
   directed.begin_block(sample, track_, listener);
@@ -339,7 +340,7 @@ void SoundingBody::begin_directed_block(std::int64_t sample, const ListenerTrack
 /// Modes and acceleration noise, into all delay lines.
 void SoundingBody::make_sound(std::int64_t sample, std::size_t count, const ListenerTracks& listener, BodyScratch& scratch) noexcept {
   if (is_directed()) begin_directed_block(sample, listener);
-  if (voice_) make_modal_sound(std::span(scratch.mono).first(count));
+  if (modes_) make_modal_sound(std::span(scratch.mono).first(count));
   if (!acceleration_noise_) return;
   std::array<std::span<float>, 3> dipole;
   for (std::size_t k = 0; k < 3; ++k) dipole[k] = std::span(scratch.dipole[k]).first(count);

@@ -19,9 +19,9 @@
 #include "runtime/synth/model.hpp"
 #include "runtime/synth/propagation.hpp"
 #include "runtime/synth/receiver.hpp"
+#include "runtime/synth/resonator_bank.hpp"
 #include "runtime/synth/trajectory.hpp"
 #include "runtime/synth/transfer_budget.hpp"
-#include "runtime/synth/voice.hpp"
 
 namespace carillon::synth {
 
@@ -49,8 +49,8 @@ struct BodyAccelerationNoise {
 
 /// Modules of another model for a playing body; after the exchange those of the old model. Made and destroyed on the main thread.
 struct ModelSwap {
-  std::unique_ptr<Voice> voice;  // none without modes, likewise the others
-  std::unique_ptr<VoiceHandover> handover;
+  std::unique_ptr<ResonatorBank> modes;  // none without modes, likewise the others
+  std::unique_ptr<ModeHandover> handover;
   std::unique_ptr<BodyAccelerationNoise> acceleration_noise;
   std::unique_ptr<ContactForces> contacts;
   std::unique_ptr<DirectedSound> directed;
@@ -68,7 +68,7 @@ struct BodyWork {
   PerEffect<std::int64_t> units{};
   std::int64_t strikes = 0, refused = 0, late = 0, resets = 0;
   float peak_pa = 0.0F;
-  double deflection = 0.0, energy_rise = 0.0;  // VoiceCounters
+  double deflection = 0.0, energy_rise = 0.0;  // ResonatorCounters
   ModeEnergy energy;
 };
 
@@ -125,8 +125,8 @@ class SoundingBody {
   const ContactSurface& get_surface() const noexcept { return surface_; }  // as others feel it
   const BodyWork& get_work() const { return work_; }
   /// Its modes; nullptr without.
-  Voice* get_voice() noexcept { return voice_.get(); }
-  const Voice* get_voice() const noexcept { return voice_.get(); }
+  ResonatorBank* get_modes() noexcept { return modes_.get(); }
+  const ResonatorBank* get_modes() const noexcept { return modes_.get(); }
   bool is_directed() const noexcept { return propagation_ && propagation_->directed; }
   /// For directed bodies, at the first sample of a block: transfers that it needs (TransferBudget); then its share of them.
   int find_transfer_need(std::int64_t sample) noexcept;
@@ -139,12 +139,12 @@ class SoundingBody {
   bool play(const Strike& strike, bool has_length, bool is_new, std::int64_t sample) noexcept;
   void wake(std::int64_t sample) noexcept;
   PropagationOptions make_propagation_options() const;
-  std::unique_ptr<Voice> make_voice(const std::shared_ptr<const Model>& model) const;
+  std::unique_ptr<ResonatorBank> make_modes(const std::shared_ptr<const Model>& model) const;
   std::unique_ptr<BodyAccelerationNoise> make_noise(const Model& model) const;
   std::unique_ptr<ContactForces> make_contacts(const std::shared_ptr<const Model>& model, const ContactSurface& surface) const;
   ContactSurface make_surface(const Model& model) const;
   void make_modal_sound(std::span<float> mono) noexcept;
-  void count_modal_work(const VoiceCounters& before, std::int64_t contact_samples, std::span<const float> mono) noexcept;
+  void count_modal_work(const ResonatorCounters& before, std::int64_t contact_samples, std::span<const float> mono) noexcept;
   void begin_directed_block(std::int64_t sample, const ListenerTracks& listener) noexcept;
   void begin_directed(DirectedSound& directed, const ListenerTracks& listener, std::int64_t sample) noexcept;
   void make_acceleration_noise(const std::array<std::span<float>, 3>& dipole) noexcept;
@@ -163,9 +163,9 @@ class SoundingBody {
   Trajectory track_;
   double turned_s_ = 0.0;  // of rotation_
   events::Quaternion rotation_{1.0, 0.0, 0.0, 0.0};
-  std::unique_ptr<Voice> voice_;
+  std::unique_ptr<ResonatorBank> modes_;
   std::unique_ptr<BodyAccelerationNoise> acceleration_noise_;
-  std::unique_ptr<ContactForces> contacts_;  // attached to voice_
+  std::unique_ptr<ContactForces> contacts_;  // attached to modes_
   ContactSurface surface_;                   // with the material of the model
   std::unique_ptr<Propagation> propagation_;
   ModelSwap* swap_ = nullptr;    // in its block

@@ -378,12 +378,12 @@ void Synthesiser::finish_swaps() noexcept {
 /// Sets the audibility floor of strikes in this block, also of a body that wakes within it, and limits the body to as many modes as the
 /// whole budget has room for: more would be removed at once, and their work would remove others.
 void Synthesiser::give_floor(SoundingBody& body) noexcept {
-  Voice* voice = body.get_voice();
-  if (!limited_ || voice == nullptr) return;
-  const double modes = allowed_.load(std::memory_order_relaxed) / options_.rate_hz;
-  voice->set_limit(modes > 0.0 ? static_cast<int>(std::min(modes, kMaxModes)) : 0);
+  ResonatorBank* modes = body.get_modes();
+  if (!limited_ || modes == nullptr) return;
+  const double allowed = allowed_.load(std::memory_order_relaxed) / options_.rate_hz;
+  modes->set_max_modes(allowed > 0.0 ? static_cast<int>(std::min(allowed, kMaxModes)) : 0);
   const std::int64_t begin = sample_ / kBlock * kBlock;
-  voice->set_floor(budget_.get_floor_pa() / body.calc_nearness(listener_, begin));
+  modes->set_floor(budget_.get_floor_pa() / body.calc_nearness(listener_, begin));
 }
 
 /// At the start of a block: removes modes beyond the budget.
@@ -396,10 +396,10 @@ void Synthesiser::keep_budget() noexcept {
     limited_ = false;
     budget_ = Budget();
     for (SoundingBody* body : playing_)
-      if (body != nullptr && body->get_voice() != nullptr) {
-        body->get_voice()->set_floor(0.0F);
-        body->get_voice()->set_limit(static_cast<int>(kMaxModes));
-        body->get_voice()->allow_driven(body->get_voice()->get_group_count());
+      if (ResonatorBank* modes = body != nullptr ? body->get_modes() : nullptr) {
+        modes->set_floor(0.0F);
+        modes->set_max_modes(static_cast<int>(kMaxModes));
+        modes->allow_contacts(modes->get_group_count());
       }
     return;
   }
@@ -407,8 +407,8 @@ void Synthesiser::keep_budget() noexcept {
   std::int64_t groups = 0;
   int awake = 0;
   for_awake([&](int, SoundingBody& body) {
-    const Voice* voice = body.get_voice();
-    const int live = voice == nullptr ? 0 : voice->get_live_group_count();
+    const ResonatorBank* modes = body.get_modes();
+    const int live = modes == nullptr ? 0 : modes->get_ringing_group_count();
     groups += live;
     awake += static_cast<int>(live > 0);
     return true;
@@ -418,19 +418,19 @@ void Synthesiser::keep_budget() noexcept {
   const bool gives_back = budget_.has_room() && sample_ / kBlock % kGiveBackEvery == 0;
   if (is_too_much) {
     for_awake([&](int, SoundingBody& body) {
-      if (Voice* voice = body.get_voice()) budget_.add(voice->measure(body.calc_nearness(listener_, sample_)));
+      if (ResonatorBank* modes = body.get_modes()) budget_.add(modes->measure(body.calc_nearness(listener_, sample_)));
       return true;
     });
     budget_.decide();
   }
   for_awake([&](int, SoundingBody& body) {
-    Voice* voice = body.get_voice();
+    ResonatorBank* modes = body.get_modes();
     give_floor(body);
-    if (voice != nullptr && gives_back) voice->allow_driven(1);
-    if (!is_too_much || voice == nullptr || voice->get_live_group_count() == 0) return true;
-    const int stay = budget_.find_limit(voice->get_measured());
-    work_.faded += voice->get_live_group_count() - stay;
-    voice->cut(stay);
+    if (modes != nullptr && gives_back) modes->allow_contacts(1);
+    if (!is_too_much || modes == nullptr || modes->get_ringing_group_count() == 0) return true;
+    const int stay = budget_.find_limit(modes->get_measured());
+    work_.faded += modes->get_ringing_group_count() - stay;
+    modes->truncate(stay);
     return true;
   });
 }

@@ -60,7 +60,7 @@ struct BodySettings {
   Vec3 position_m{};                                // of the centre of mass before the first BodyMotion
   events::Quaternion rotation{1.0, 0.0, 0.0, 0.0};  // of the mesh frame before the first BodyMotion
   EffectSet effects = kDefaultEffects;
-  double silence_pa = 1e-10;  // VoiceOptions
+  double silence_pa = 1e-10;  // ResonatorOptions
   ContactSurface surface{};   // in lasting contacts
   double longest_m = 0.0;     // 0: SynthesiserOptions::longest_m
   int max_waypoints = 0;      // 0: SynthesiserOptions::max_waypoints

@@ -38,8 +38,8 @@ double Synthesiser::get_peak_pa(int body) const noexcept {
 bool Synthesiser::measure_amplitudes(int body, std::span<float> by_bank_mode) const noexcept {
   std::fill(by_bank_mode.begin(), by_bank_mode.end(), 0.0F);
   if (body < 0 || body >= options_.max_bodies || playing_[body] == nullptr) return false;
-  const Voice* voice = playing_[body]->get_voice();
-  if (voice != nullptr) voice->measure_amplitudes(by_bank_mode);
+  const ResonatorBank* modes = playing_[body]->get_modes();
+  if (modes != nullptr) modes->measure_amplitudes(by_bank_mode);
   return true;
 }
 

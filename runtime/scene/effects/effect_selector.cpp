@@ -226,7 +226,7 @@ BodyPlan EffectSelector::get_plan(int number) const {
 }
 
 double EffectSelector::calc_silence_pa(int number) const {
-  constexpr double kStandardPa = 1e-10;  // VoiceOptions::silence_pa
+  constexpr double kStandardPa = 1e-10;  // ResonatorOptions::silence_pa
   constexpr double kMargin = 0.5;        // for bodies that come nearer and modes that add up
   const SelectedBody& body = state_->bodies.at(number);
   if (!(state_->hearing.loudest_pa2_s > 0.0)) return kStandardPa;

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <vector>
 
-#include "runtime/synth/voice.hpp"
+#include "runtime/synth/resonator_bank.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 
 namespace carillon::synth {
@@ -65,7 +65,7 @@ TEST(Accuracy, TenMinutesAreInTuneAndOnLevel) {
       // With 1 / s nothing is left after ten minutes: the end is then where it is 60 dB down.
       const std::int64_t samples = decay > 0.5 ? static_cast<std::int64_t>(7.0 * kRate) : kMinutes * 60 * static_cast<std::int64_t>(kRate);
       for (const double freq : freqs) {
-        Voice voice(Model::make(testing::make_cube_bank({{freq, decay}}), {.rate_hz = kRate}), {.silence_pa = 1e-30, .isa = isa});
+        ResonatorBank voice(Model::make(testing::make_cube_bank({{freq, decay}}), {.rate_hz = kRate}), {.silence_pa = 1e-30, .isa = isa});
         ASSERT_TRUE(voice.strike({.impulse_n_s = {0.0, 0.0, 1.0}}));
         std::vector<float> seen(kSeen, 0.0F), block(48000);
         for (std::int64_t n = 0; n < samples - kSeen; n += 48000) voice.process(block);

@@ -171,7 +171,7 @@ TEST(BodyEffects, ContactsThatLastAreHeardAsTheirForcesSay) {
   play(synthesiser, out, 1280);  // so that its voice begins later than the scene
   const ContactSurface surface{.roughness_m = 6e-6, .friction = 0.3};
   const int body = synthesiser.add_body(model, {.position_m = {0.0, 3.43, 0.0}, .effects = kTouching, .surface = surface});
-  Voice voice(model);
+  ResonatorBank voice(model);
   ContactForces forces(model, {.surface = surface});
   voice.attach(&forces);
   for (events::LastingContact record : make_slide(body, 0.3)) {

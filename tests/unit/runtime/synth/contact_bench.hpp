@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "runtime/synth/contact_forces.hpp"
-#include "runtime/synth/voice.hpp"
+#include "runtime/synth/resonator_bank.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 
 namespace carillon::testing {
@@ -52,7 +52,7 @@ inline std::vector<LastingContact> make_records(double end_s, const std::functio
 }
 
 /// Plays the records, each given 100 ms before its time.
-inline std::vector<float> play(Voice& voice, ContactForces& contacts, std::vector<LastingContact> records, double seconds,
+inline std::vector<float> play(ResonatorBank& voice, ContactForces& contacts, std::vector<LastingContact> records, double seconds,
                                std::size_t block = 480, const ContactSurface& other = kOther) {
   std::vector<float> out(seconds * kRate, 0.0F);
   voice.attach(&contacts);

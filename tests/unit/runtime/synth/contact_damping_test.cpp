@@ -75,7 +75,7 @@ TEST(ContactForces, TakeTheEnergyThatTheDenseEquationsSay) {
   const auto model = Model::make(make_cube_bank(modes));
   for (const double impedance : {0.5, 5.0, 40.0}) {
     ContactForces contacts(model, {.effects = kBrake});
-    Voice voice(model);
+    ResonatorBank voice(model);
     voice.strike({.time_s = 1e-9, .impulse_n_s = {0.0, 0.0, 1e-3}});
     play(voice, contacts,
          make_records(0.2,
@@ -103,7 +103,7 @@ TEST(ContactForces, TakeWhatTheContactsSpringLosesHoweverLittleItMoves) {
   const auto model = Model::make(make_cube_bank({{freq, 1e-3, 1.0, {0.0, 0.0, phi}}}));
   const auto play_at = [&](double impulse, double own_pa, double other_pa, double patch_m, double seconds) {
     ContactForces contacts(model, {.surface = {.modulus_pa = own_pa}, .effects = kBrake});
-    Voice voice(model);
+    ResonatorBank voice(model);
     voice.strike({.time_s = 1e-9, .impulse_n_s = {0.0, 0.0, impulse}});
     const auto rest = [&](double t) {
       LastingContact c = make_sliding(t, 0.0);
@@ -142,7 +142,7 @@ TEST(ContactForces, NeverAddEnergyByDamping) {
     std::sort(modes.begin(), modes.end(), [](const auto& a, const auto& b) { return a.freq_hz < b.freq_hz; });
     const auto model = Model::make(make_cube_bank(modes));
     ContactForces contacts(model, {.effects = kBrake});
-    Voice voice(model, {.isa = trial % 2 == 0 ? Isa::kBest : Isa::kPlain});
+    ResonatorBank voice(model, {.isa = trial % 2 == 0 ? Isa::kBest : Isa::kPlain});
     voice.attach(&contacts);
     voice.strike({.time_s = 1e-9, .triangle = trial % 12, .impulse_n_s = {0.3, 0.2, 1.0}});
     const double size = std::pow(10.0, 8.0 * any(random) - 3.0);
@@ -177,7 +177,7 @@ TEST(ContactForces, LeaveTheRingingExactWhenTheyHaveGone) {
   const double freq = 987.6, decay = 1.5, gain = 2.0;
   const auto model = Model::make(make_cube_bank({{freq, decay, gain}}));
   ContactForces contacts(model, {.effects = kBrake});
-  Voice voice(model);
+  ResonatorBank voice(model);
   voice.strike({.time_s = 1e-3, .impulse_n_s = {0.0, 0.0, 1e-2}});
   const std::vector<float> heard = play(voice, contacts,
                                         make_records(0.5,
@@ -211,7 +211,7 @@ TEST(ContactForces, DampWithoutZipperNoise) {
   // A pure tone under a contact that comes, changes at every record, and goes: the rest of the spectrum stays far below it.
   const auto model = Model::make(make_cube_bank({{500.0, 0.5, 1.0}}));
   ContactForces contacts(model, {.effects = kBrake});
-  Voice voice(model);
+  ResonatorBank voice(model);
   voice.strike({.time_s = 1e-3, .impulse_n_s = {0.0, 0.0, 1e-2}});
   std::mt19937 random(3);
   const std::vector<float> heard =

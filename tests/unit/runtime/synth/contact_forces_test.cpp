@@ -28,7 +28,7 @@ TEST(ContactForces, DriveTheModesAsQuadratureSays) {
   for (const Isa isa : {Isa::kPlain, Isa::kSse2, Isa::kAvx2, Isa::kAvx512}) {
     const auto make = [](double t) { return make_sliding(t, 0.3 + 2.0 * t); };
     ContactForces traced(model, {.effects = kNoise}), contacts(model, {.effects = kNoise});
-    Voice voice(model, {.isa = isa});
+    ResonatorBank voice(model, {.isa = isa});
     const std::vector<LastingContact> records = make_records(0.06, make);
     const std::vector<double> force = trace(traced, records, 0.06);
     const std::vector<float> heard = play(voice, contacts, records, 0.06);
@@ -107,7 +107,7 @@ TEST(ContactForces, OfARestingBodyAreBitExactSilence) {
   const auto model = Model::make(make_cube_bank(make_modes()));
   for (const double slow : {0.0, 1.9e-4}) {
     ContactForces contacts(model);
-    Voice voice(model);
+    ResonatorBank voice(model);
     const std::vector<float> heard = play(voice, contacts,
                                           make_records(1.0,
                                                        [&](double t) {
@@ -129,7 +129,7 @@ TEST(ContactForces, AreSwitchedByTheirEffects) {
   const auto model = Model::make(make_cube_bank(make_modes()));
   const auto hear = [&](EffectSet effects, bool rolls) {
     ContactForces contacts(model, {.effects = effects});
-    Voice voice(model);
+    ResonatorBank voice(model);
     return calc_peak(play(voice, contacts,
                           make_records(0.2,
                                        [&](double t) {
@@ -162,7 +162,7 @@ TEST(ContactForces, SoundInABandThatFollowsTheSpeed) {
       if (freq < 1.5 * lowest || freq > 0.19 * kRate) continue;
       const auto model = Model::make(make_cube_bank({modes[m]}));
       ContactForces contacts(model, {.effects = {Effect::kRolling}});
-      Voice voice(model);
+      ResonatorBank voice(model);
       const std::vector<float> heard = play(voice, contacts,
                                             make_records(2.0,
                                                          [&](double t) {
@@ -192,7 +192,7 @@ std::vector<float> hear_slide(const Slide& of) {
   for (int m = 0; m < 11; ++m) modes.push_back({300.0 * std::pow(2.0, 0.49 * m), 40.0, 1.0 / (1.0 + m)});
   const auto model = Model::make(make_cube_bank(modes));
   ContactForces contacts(model, {.surface = {.roughness_m = of.own_m, .modulus_pa = of.modulus_pa}});
-  Voice voice(model);
+  ResonatorBank voice(model);
   const std::vector<LastingContact> records = make_records(3.0, [&](double t) {
     LastingContact c = make_sliding(t, of.speed_m_s, of.load_n);
     c.patch_radius_m = of.patch_m;
@@ -289,7 +289,7 @@ TEST(ContactForces, GiveTheSameBitsWhateverTheBlocks) {
   std::vector<std::vector<float>> heard;
   for (const std::size_t block : {1, 31, 32, 100, 128, 511, 4096}) {
     ContactForces contacts(model);
-    Voice voice(model);
+    ResonatorBank voice(model);
     for (const LastingContact& record : records) contacts.take(record, kOther);
     contacts.reach(1.0);
     voice.strike({.time_s = 0.0501, .triangle = 3, .impulse_n_s = {0.0, 0.0, 1e-2}, .duration_s = 1e-3});

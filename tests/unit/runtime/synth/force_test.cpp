@@ -14,8 +14,8 @@
 
 #include "runtime/physics/impact/impact.hpp"
 #include "runtime/synth/acceleration_noise.hpp"
+#include "runtime/synth/resonator_bank.hpp"
 #include "runtime/synth/synthesiser.hpp"
-#include "runtime/synth/voice.hpp"
 #include "tests/unit/runtime/physics/impact/scenes.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 
@@ -76,7 +76,7 @@ std::vector<double> calc_sound(const bank::Bank& bank, const std::vector<Course>
   return sound;
 }
 
-std::vector<float> play(Voice& voice, std::size_t samples, std::size_t block = 256) {
+std::vector<float> play(ResonatorBank& voice, std::size_t samples, std::size_t block = 256) {
   std::vector<float> pressure(samples, 0.0F);
   for (std::size_t n = 0; n < samples; n += block) voice.process(std::span(pressure).subspan(n, std::min(block, samples - n)));
   return pressure;
@@ -132,7 +132,7 @@ TEST(Force, IsAnsweredExactlyByModesOfAllKinds) {
   const bank::Bank bank = make_cube_bank(make_modes(40));
   for (const Case& c : cases) {
     const Course course = make_course(c.begin_s, c.step_s, c.steps, c.rubs);
-    Voice voice(Model::make(bank, {.rate_hz = kRate}), {.silence_pa = 1e-30});
+    ResonatorBank voice(Model::make(bank, {.rate_hz = kRate}), {.silence_pa = 1e-30});
     for (const Force& piece : make_pieces(course)) ASSERT_TRUE(voice.push(piece)) << c.name;
     const double error = calc_error(play(voice, 2400, 61), calc_sound(bank, {course}, 2400));
     EXPECT_LT(error, 1e-6) << c.name;
@@ -147,7 +147,7 @@ TEST(Force, IsAnsweredByModesNearAndAboveCriticalDamping) {
     bank.decay_per_s[0] = share * 2.0 * kPi * 2000.0;
     for (const double step_s : {3.7e-6, 5.0e-5}) {
       const Course course = make_course(1.00013e-3, step_s, 40, true);
-      Voice voice(Model::make(bank, {.rate_hz = kRate}), {.silence_pa = 1e-30});
+      ResonatorBank voice(Model::make(bank, {.rate_hz = kRate}), {.silence_pa = 1e-30});
       for (const Force& piece : make_pieces(course)) ASSERT_TRUE(voice.push(piece));
       EXPECT_LT(calc_error(play(voice, 480), calc_sound(bank, {course}, 480)), share > 1000.0 ? 1e-3 : 1e-6) << share << " " << step_s;
     }
@@ -160,7 +160,7 @@ TEST(Force, OfNoLengthIsAnImpulse) {
     for (const double begin_s : {1e-3, 1.00007e-3, 48.0 / kRate}) {
       Force force = make_pieces(make_course(begin_s, step_s, 16, false)).front();
       for (auto& j : force.impulse_n_s) j = {0.0F, 0.0F, 1e-3F};
-      Voice by_force(Model::make(bank, {.rate_hz = kRate})), by_impulse(Model::make(bank, {.rate_hz = kRate}));
+      ResonatorBank by_force(Model::make(bank, {.rate_hz = kRate})), by_impulse(Model::make(bank, {.rate_hz = kRate}));
       ASSERT_TRUE(by_force.push(force));
       ASSERT_TRUE(by_impulse.strike({.time_s = begin_s, .impulse_n_s = {0.0, 0.0, 16e-3}}));
       std::vector<float> expected = play(by_impulse, 480), heard = play(by_force, 480);
@@ -172,7 +172,7 @@ TEST(Force, OfNoLengthIsAnImpulse) {
 
 TEST(Force, AThousandAtOnceAddUp) {
   const bank::Bank bank = make_cube_bank(make_modes(20));
-  Voice voice(Model::make(bank, {.rate_hz = kRate}), {.max_forces = 1000, .silence_pa = 1e-30});
+  ResonatorBank voice(Model::make(bank, {.rate_hz = kRate}), {.max_forces = 1000, .silence_pa = 1e-30});
   std::vector<Course> courses;
   for (int i = 0; i < 1000; ++i) {
     courses.push_back(make_course(1e-3 + 1.37e-6 * i, 3e-6 + 1e-8 * i, 16, i % 2 == 0));
@@ -189,7 +189,7 @@ TEST(Force, SoundsTheSameInBlocksOfAnySizeAndOnAnyInstructionSetToRounding) {
   for (const Isa isa : {Isa::kPlain, Isa::kSse2, Isa::kAvx2, Isa::kAvx512}) {
     std::vector<float> own;
     for (const std::size_t block : {1U, 31U, 128U, 1000U}) {
-      Voice voice(Model::make(bank, {.rate_hz = kRate}), {.isa = isa});
+      ResonatorBank voice(Model::make(bank, {.rate_hz = kRate}), {.isa = isa});
       for (const Force& piece : make_pieces(course)) ASSERT_TRUE(voice.push(piece));
       const std::vector<float> heard = play(voice, 2000, block);
       if (own.empty()) own = heard;
@@ -202,7 +202,7 @@ TEST(Force, SoundsTheSameInBlocksOfAnySizeAndOnAnyInstructionSetToRounding) {
 
 TEST(Force, ThatCannotBePlayedIsRefused) {
   const bank::Bank bank = make_cube_bank(make_modes(5));
-  Voice voice(Model::make(bank, {.rate_hz = kRate}), {.max_forces = 4});
+  ResonatorBank voice(Model::make(bank, {.rate_hz = kRate}), {.max_forces = 4});
   AccelerationNoise click(0.05, 1.0, kRate, 2, 4);
   const Force good = make_pieces(make_course(1e-3, 1e-5, 10, true)).front();
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
@@ -229,14 +229,14 @@ TEST(Force, ThatCannotBePlayedIsRefused) {
   EXPECT_EQ(voice.get_counters().refused, 8);
   Force nothing = good;
   nothing.impulse_n_s = {};
-  Voice still(Model::make(bank, {.rate_hz = kRate}));
+  ResonatorBank still(Model::make(bank, {.rate_hz = kRate}));
   EXPECT_TRUE(still.push(nothing));
   EXPECT_TRUE(still.is_idle()) << "no force, no work";
 }
 
 TEST(Force, ThatIsLateKeepsItsImpulse) {
   const bank::Bank bank = make_cube_bank({{50.0, 0.0}});
-  Voice voice(Model::make(bank, {.rate_hz = kRate}));
+  ResonatorBank voice(Model::make(bank, {.rate_hz = kRate}));
   play(voice, 4800);
   const Course course = make_course(0.01, 1e-5, 10, false);
   ASSERT_TRUE(voice.push(make_pieces(course).front()));
@@ -297,7 +297,7 @@ TEST(Force, OfAWholeImpactLeavesTheModesAsTheWorldKnowsThem) {
     const double end_s = impact.get_time();
     impact::Body after = impact.get_bodies()[1];
     constexpr double kBegin = 0.0030041;
-    Voice voice(Model::make(bank, {.rate_hz = kRate}), {.silence_pa = 1e-30});
+    ResonatorBank voice(Model::make(bank, {.rate_hz = kRate}), {.silence_pa = 1e-30});
     for (const impact::Pulse& pulse : impact.take_pulses()) {
       Course course{kBegin + pulse.start_s, pulse.step_s, {}};
       for (const Vec3& j : pulse.impulse_n_s) course.impulses.push_back({-j[0], -j[1], -j[2]});
@@ -331,15 +331,15 @@ TEST(Force, InPiecesWakesWhatItWakesInOne) {
   double sum = 0.0;
   for (const auto& j : course.impulses) sum += j[2];
   for (const float floor_pa : {1e-6F, 1e-5F, 1e-4F}) {
-    Voice whole(model), pieces(model);
+    ResonatorBank whole(model), pieces(model);
     whole.set_floor(floor_pa);
     pieces.set_floor(floor_pa);
     ASSERT_TRUE(whole.strike({.time_s = 1.8e-3, .impulse_n_s = {0.0, 0.0, sum}, .duration_s = 1.6e-3}));
     for (const Force& piece : make_pieces(course)) ASSERT_TRUE(pieces.push(piece));
     play(whole, 128);
     play(pieces, 128);
-    EXPECT_EQ(pieces.get_live_group_count(), whole.get_live_group_count()) << floor_pa;
-    EXPECT_LT(pieces.get_live_group_count(), pieces.get_group_count());
+    EXPECT_EQ(pieces.get_ringing_group_count(), whole.get_ringing_group_count()) << floor_pa;
+    EXPECT_LT(pieces.get_ringing_group_count(), pieces.get_group_count());
   }
 }
 

@@ -10,8 +10,8 @@
 #include "runtime/bank/edits.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/synth/model.hpp"
+#include "runtime/synth/resonator_bank.hpp"
 #include "runtime/synth/synthesiser.hpp"
-#include "runtime/synth/voice.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 
 namespace carillon::synth {
@@ -65,7 +65,7 @@ TEST(ListenerTracks, the_first_turn_begins_where_the_listener_was) {
   EXPECT_NEAR(listener.get_track(0).find(1.1).position_m[0], -0.2, 1e-12);
 }
 
-TEST(Voice, amplitudes_are_those_of_the_oscillators) {
+TEST(ResonatorBank, amplitudes_are_those_of_the_oscillators) {
   // An ideal impulse J gives q' = phi J; q then swings by phi J / omega_d, and dies away as exp(-d t).
   const bank::Bank bank = testing::make_cube_bank({{500.0, 20.0, 1.0, {0, 0, 2.0}}, {30000.0, 1.0}, {900.0, 3.0, 0.0, {0, 0, 0.5}}});
   Synthesiser synthesiser({.rate_hz = kRate, .microphones_m = {{0, 0, 0}}});
@@ -89,7 +89,7 @@ TEST(Voice, amplitudes_are_those_of_the_oscillators) {
 }
 
 std::vector<float> ring(std::shared_ptr<const Model> model) {
-  Voice voice(std::move(model));
+  ResonatorBank voice(std::move(model));
   EXPECT_TRUE(voice.strike({.time_s = 0.001, .triangle = 4, .impulse_n_s = {0.01, 0.02, 0.03}, .duration_s = 1e-4}));
   std::vector<float> sound(9600, 0.0F);
   voice.process(sound);

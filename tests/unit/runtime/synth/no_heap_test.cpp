@@ -15,8 +15,8 @@
 #include "runtime/synth/acceleration_noise.hpp"
 #include "runtime/synth/contact_forces.hpp"
 #include "runtime/synth/receiver.hpp"
+#include "runtime/synth/resonator_bank.hpp"
 #include "runtime/synth/synthesiser.hpp"
-#include "runtime/synth/voice.hpp"
 #include "tests/support/heap_counter.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 #include "tests/unit/runtime/synth/multipole_cube.hpp"
@@ -41,14 +41,14 @@ TEST(NoHeap, ModesThatLargeMotionCouplesTakeNoMemory) {
   for (int m = 0; m < 20; ++m) bank.quartic.modes.push_back(m);
   for (std::size_t i = 0; i < 2 * bank::count_pairs(20); ++i) bank.quartic.rows.push_back(i % 3 == 0 ? 1e6F : -3e5F);
   const auto model = Model::make(bank);
-  Voice body(model, {.is_nonlinear = true});
+  ResonatorBank body(model, {.is_nonlinear = true});
   std::vector<float> sent(128);
   const long before = g_allocations;
   for (int i = 0; i < 300; ++i) {
     if (i % 10 == 0)
       body.strike(
           {.time_s = (static_cast<double>(body.get_position()) + 30.3) / 48000.0, .impulse_n_s = {0.0, 0.0, 0.3}, .duration_s = 2e-3});
-    body.set_limit(i % 50 == 0 ? 16 : 1000);
+    body.set_max_modes(i % 50 == 0 ? 16 : 1000);
     body.process(sent);
   }
   EXPECT_EQ(g_allocations - before, 0);
@@ -59,7 +59,7 @@ TEST(NoHeap, StrikingAndProcessingTakeNoMemory) {
   std::vector<testing::InventedMode> modes;
   for (int m = 0; m < 50; ++m) modes.push_back({100.0 + 300.0 * m, 5.0 + (m % 7 == 0 ? 1e5 : 0.0)});
   const bank::Bank bank = testing::make_cube_bank(modes);
-  Voice body(Model::make(bank), {.max_strikes = 8});
+  ResonatorBank body(Model::make(bank), {.max_strikes = 8});
   Trajectory path(4), listener(4);
   listener.push({0.0, {0.0, 0.0, 0.0}, {}});
   DelayLine delay_line(10.0, 48000.0, 128);
@@ -68,7 +68,7 @@ TEST(NoHeap, StrikingAndProcessingTakeNoMemory) {
   std::vector<float> sent(128), x(128), y(128), z(128);
   AccelerationNoise click(0.06, 1.0, 48000.0, 8);
   ContactForces contacts(Model::make(bank), {.max_contacts = 2, .max_records = 8});
-  Voice touched(Model::make(bank));
+  ResonatorBank touched(Model::make(bank));
   touched.attach(&contacts);
   const long before = g_allocations;
   for (int i = 0; i < 300; ++i) {
@@ -78,7 +78,7 @@ TEST(NoHeap, StrikingAndProcessingTakeNoMemory) {
                    .impulse_n_s = {0.0, 0.0, 1.0},
                    .duration_s = k % 3 == 0 ? 2e-3 : 2e-4});
     }
-    body.set_limit(i % 50 == 0 ? 16 : 1000);
+    body.set_max_modes(i % 50 == 0 ? 16 : 1000);
     body.process(sent);
     path.push({i * 128 / 48000.0, {1.0 + 0.001 * i, 0.0, 0.0}, {0.375, 0.0, 0.0}});
     delay_line.push(sent);

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "runtime/base/error.hpp"
+#include "runtime/synth/resonator_bank.hpp"
 #include "runtime/synth/synthesiser.hpp"
-#include "runtime/synth/voice.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 #include "tests/unit/runtime/synth/multipole_cube.hpp"
 
@@ -37,7 +37,7 @@ bank::Bank make_bank(double size = 1e6) {
 
 std::shared_ptr<const Model> make_model(const bank::Bank& bank) { return Model::make(bank, {.rate_hz = kRate}); }
 
-std::vector<float> play(Voice& voice, std::size_t samples, std::size_t block = 256) {
+std::vector<float> play(ResonatorBank& voice, std::size_t samples, std::size_t block = 256) {
   std::vector<float> pressure(samples, 0.0F);
   for (std::size_t n = 0; n < samples; n += block) voice.process(std::span(pressure).subspan(n, std::min(block, samples - n)));
   return pressure;
@@ -53,7 +53,7 @@ double calc_difference_db(const std::vector<float>& a, const std::vector<float>&
   return 10.0 * std::log10(difference / sound);
 }
 
-void strike_softly(Voice& voice, double impulse_n_s) {
+void strike_softly(ResonatorBank& voice, double impulse_n_s) {
   std::mt19937 chance(9);
   std::uniform_real_distribution<double> number(0.0, 1.0);
   for (int i = 0; i < 12; ++i)
@@ -71,8 +71,8 @@ void strike_softly(Voice& voice, double impulse_n_s) {
 
 TEST(NonlinearVoice, SoftlyIsTheLinearOneToMinus100Db) {
   const auto model = make_model(make_bank());
-  Voice linear(model), nonlinear(model, {.is_nonlinear = true});
-  for (Voice* voice : {&linear, &nonlinear}) strike_softly(*voice, 1e-6);
+  ResonatorBank linear(model), nonlinear(model, {.is_nonlinear = true});
+  for (ResonatorBank* voice : {&linear, &nonlinear}) strike_softly(*voice, 1e-6);
   EXPECT_EQ(nonlinear.get_coupled_count(), 9);  // the tenth does not ring
   EXPECT_EQ(linear.get_coupled_count(), 0);
   const std::vector<float> wanted = play(linear, 48000), found = play(nonlinear, 48000);
@@ -84,7 +84,7 @@ TEST(NonlinearVoice, SoftlyIsTheLinearOneToMinus100Db) {
   nonlinear.measure_amplitudes(b);
   for (std::size_t m = 0; m < 40; ++m) EXPECT_NEAR(b[m], a[m], 1e-4F * a[m]) << m;
   // And the same bits however the samples are divided.
-  Voice other(model, {.is_nonlinear = true});
+  ResonatorBank other(model, {.is_nonlinear = true});
   strike_softly(other, 1e-6);
   EXPECT_EQ(play(other, 48000, 37), found);
 }
@@ -93,7 +93,7 @@ TEST(NonlinearVoice, SoftlyIsTheLinearOneUnderContactsThatLast) {
   const auto model = make_model(make_bank());
   std::vector<std::vector<float>> heard;
   for (const bool is_nonlinear : {false, true}) {
-    Voice voice(model, {.is_nonlinear = is_nonlinear});
+    ResonatorBank voice(model, {.is_nonlinear = is_nonlinear});
     ContactForces contacts(model, {.effects = kContactEffects});
     voice.attach(&contacts);
     voice.strike({.time_s = 1e-3, .impulse_n_s = {0.0, 0.0, 1e-6}});
@@ -144,7 +144,7 @@ TEST(NonlinearVoice, StronglyIsTheOscillatorOfDuffing) {
   const double amplitude = 1.0 / std::sqrt(1.5 * lambda);
   bank.quartic.modes = {0};
   bank.quartic.rows = {static_cast<float>(std::sqrt(lambda / (2.0 * amplitude * amplitude)))};
-  Voice voice(make_model(bank), {.is_nonlinear = true});
+  ResonatorBank voice(make_model(bank), {.is_nonlinear = true});
   voice.strike({.time_s = 1e-3, .impulse_n_s = {0.0, 0.0, 1.0}});
   const std::vector<float> sound = play(voice, 48000);
   double first = -1.0, last = -1.0;
@@ -164,16 +164,16 @@ TEST(NonlinearVoice, OffIsTheVoiceOfABankWithoutTheEnergy) {
   with.rigid.volume_m3 = 0.0;  // without a thickness, neither is watched for bending
   bank::Bank without = with;
   without.quartic = {};
-  Voice a(make_model(with)), b(make_model(without));
-  for (Voice* voice : {&a, &b}) strike_softly(*voice, 1.0);
+  ResonatorBank a(make_model(with)), b(make_model(without));
+  for (ResonatorBank* voice : {&a, &b}) strike_softly(*voice, 1.0);
   EXPECT_EQ(play(a, 24000), play(b, 24000));
   EXPECT_EQ(a.get_counters().coupled_samples, 0);
-  EXPECT_THROW(Voice(make_model(without), {.is_nonlinear = true}), InputError);
+  EXPECT_THROW(ResonatorBank(make_model(without), {.is_nonlinear = true}), InputError);
 }
 
 TEST(NonlinearVoice, IsAsleepAfterwardsAndWithoutAMemory) {
   const auto model = make_model(make_bank());
-  Voice voice(model, {.is_nonlinear = true}), fresh(model, {.is_nonlinear = true});
+  ResonatorBank voice(model, {.is_nonlinear = true}), fresh(model, {.is_nonlinear = true});
   voice.strike({.time_s = 1e-3, .impulse_n_s = {0.0, 0.0, 30.0}});
   (void)play(voice, 48000 * 8);
   ASSERT_TRUE(voice.is_idle());
@@ -186,10 +186,10 @@ TEST(NonlinearVoice, IsAsleepAfterwardsAndWithoutAMemory) {
 
 TEST(NonlinearVoice, ALimitLeavesFewerCoupledWithoutAClick) {
   const auto model = make_model(make_bank());
-  Voice voice(model, {.is_nonlinear = true});
+  ResonatorBank voice(model, {.is_nonlinear = true});
   voice.strike({.time_s = 1e-3, .impulse_n_s = {0.0, 0.0, 1.0}, .duration_s = 1e-3});
   std::vector<float> sound = play(voice, 9600);
-  voice.set_limit(20);  // of 38 modes that ring
+  voice.set_max_modes(20);  // of 38 modes that ring
   EXPECT_EQ(voice.get_coupled_count(), 4);
   const std::vector<float> rest = play(voice, 9600);
   sound.insert(sound.end(), rest.begin(), rest.end());
@@ -199,7 +199,7 @@ TEST(NonlinearVoice, ALimitLeavesFewerCoupledWithoutAClick) {
     return step;
   };
   EXPECT_LE(find_step(9500, 9800), 1.3F * find_step(9000, 9500));
-  voice.set_limit(1000);
+  voice.set_max_modes(1000);
   EXPECT_EQ(voice.get_coupled_count(), 9);
 }
 
@@ -224,17 +224,17 @@ bank::Bank make_cascade_bank() {
 
 TEST(NonlinearVoice, ACascadeNeedsModesAboveAndAThickness) {
   EXPECT_FALSE(make_model(make_bank())->has_cascade());
-  EXPECT_THROW(Voice(make_model(make_bank()), {.is_nonlinear = true, .has_cascade = true}), InputError);
+  EXPECT_THROW(ResonatorBank(make_model(make_bank()), {.is_nonlinear = true, .has_cascade = true}), InputError);
   EXPECT_TRUE(make_model(make_cascade_bank())->has_cascade());
 }
 
 TEST(NonlinearVoice, SoftlyACascadeIsTheLinearVoiceToMinus100Db) {
   const auto model = make_model(make_cascade_bank());
-  Voice linear(model), cascade(model, {.is_nonlinear = true, .has_cascade = true});
-  for (Voice* voice : {&linear, &cascade}) strike_softly(*voice, 1e-6);
+  ResonatorBank linear(model), cascade(model, {.is_nonlinear = true, .has_cascade = true});
+  for (ResonatorBank* voice : {&linear, &cascade}) strike_softly(*voice, 1e-6);
   const std::vector<float> wanted = play(linear, 48000), found = play(cascade, 48000);
   EXPECT_LE(calc_difference_db(found, wanted), -100.0);
-  Voice other(model, {.is_nonlinear = true, .has_cascade = true});
+  ResonatorBank other(model, {.is_nonlinear = true, .has_cascade = true});
   strike_softly(other, 1e-6);
   EXPECT_EQ(play(other, 48000, 37), found);
   EXPECT_GT(other.get_counters().cascade_samples, 0);
@@ -244,7 +244,7 @@ TEST(NonlinearVoice, WhatIsRadiatedCountsTheModesOfAllKinds) {
   const auto model = make_model(make_cascade_bank());
   std::vector<double> radiated_j;
   for (const auto& [is_nonlinear, has_cascade] : {std::pair{false, false}, {true, false}, {true, true}}) {
-    Voice voice(model, {.is_nonlinear = is_nonlinear, .has_cascade = has_cascade, .audits_energy = true});
+    ResonatorBank voice(model, {.is_nonlinear = is_nonlinear, .has_cascade = has_cascade, .audits_energy = true});
     strike_softly(voice, 1e-6);
     (void)play(voice, 48000);
     radiated_j.push_back(voice.get_counters().energy.radiated_j);
@@ -258,7 +258,7 @@ TEST(NonlinearVoice, ACascadeThatIsOffIsNotThere) {
   const auto model = make_model(make_cascade_bank()), without = make_model(make_bank());
   std::vector<std::vector<float>> heard;
   for (const auto& of : {model, without}) {
-    Voice voice(of, {.is_nonlinear = true});
+    ResonatorBank voice(of, {.is_nonlinear = true});
     voice.strike({.time_s = 1e-3, .impulse_n_s = {0.0, 0.0, 1.0}});
     heard.push_back(play(voice, 9600));
     EXPECT_EQ(voice.get_counters().cascade_samples, 0);

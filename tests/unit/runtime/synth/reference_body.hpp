@@ -1,4 +1,4 @@
-// One body that rings, in double precision and sample by sample: slow, plain, and the oracle of synth::Voice.
+// One body that rings, in double precision and sample by sample: slow, plain, and the oracle of synth::ResonatorBank.
 //
 //   testing::ReferenceBody body(bank, 48000.0);
 //   body.strike({.sample = 100.37, .duration_s = 80e-6, .triangle = 12, .barycentric = {0.2, 0.3, 0.5}, .impulse_n_s = {0, 0, 0.01}});

@@ -117,7 +117,7 @@ TEST(Synthesiser, IsItsVoicesByWayOfTheAir) {
   const int body = synthesiser.add_body(model, {.position_m = {0.0, distance, 0.0}});
   const events::Impulse impulse = make_impulse(body, 0.003);
   const Channels out = play(synthesiser, {impulse}, 20000, [] { return 480; });
-  Voice voice(model);
+  ResonatorBank voice(model);
   EXPECT_TRUE(voice.strike(impulse));
   std::vector<float> alone(20000, 0.0F);
   voice.process(alone);

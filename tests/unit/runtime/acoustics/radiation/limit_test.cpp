@@ -5,9 +5,9 @@
 #include <numbers>
 #include <vector>
 
-#include "runtime/base/error.hpp"
 #include "runtime/acoustics/radiation/gains.hpp"
-#include "runtime/synth/voice.hpp"
+#include "runtime/base/error.hpp"
+#include "runtime/synth/resonator_bank.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 
 namespace carillon::radiation {
@@ -20,7 +20,7 @@ constexpr double kAirKgM2S = 1.21 * 343.0;
 
 /// Energy [J] through a sphere of 1 m, of what a strike of 1 N s at the first instant lets ring. The modes have 1/2 J each of it.
 double calc_radiated(const bank::Bank& bank, double length_s) {
-  synth::Voice voice(synth::Model::make(bank, {.rate_hz = kRate}));
+  synth::ResonatorBank voice(synth::Model::make(bank, {.rate_hz = kRate}));
   voice.strike({.time_s = 0.5 / kRate, .triangle = 0, .barycentric = {1, 0, 0}, .impulse_n_s = {0, 0, 1}});
   std::vector<float> pressure(length_s * kRate, 0.0F);
   voice.process(pressure);
