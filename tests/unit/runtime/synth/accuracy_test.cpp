@@ -1,4 +1,4 @@
-// Ten minutes of ringing against the closed form, for every instruction set: pitch, level and what is no sinusoid at all.
+// Ten minutes of ringing against the closed form, for every instruction set: pitch, level and residual.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -17,12 +17,12 @@ constexpr double kRate = 48000.0;
 constexpr std::int64_t kMinutes = 10;
 constexpr int kSeen = 96000;  // samples at the end that are looked at: two seconds
 
-/// What is left at the end of a sinusoid that began with q' = 1: against 1 cos(...) of the closed form.
+/// Result at the end of a sinusoid that began with q' = 1, against 1 cos(...).
 struct Fit {
   double level_db, cents, residual_db;
 };
 
-/// Least squares of exp(-d t) times a cosine and a sine of the known frequency, over two halves: their phases give the frequency.
+/// Least squares of exp(-d t) times cosine and sine of the known frequency, over two halves: their phases give the frequency.
 Fit fit(const std::vector<float>& seen, std::int64_t from, double freq_hz, double decay) {
   const long double omega_d =
       std::sqrt(4.0L * std::numbers::pi_v<long double> * std::numbers::pi_v<long double> * freq_hz * freq_hz - decay * decay);

@@ -1,5 +1,5 @@
-// Deflections beyond the range of linear modes, against a plate's closed form and against the whole displacement field (all modes, all
-// vertices of one side, every second sample).
+// Deflections above the linear range, against a plate's closed form and the whole displacement field (all modes, all vertices of one side,
+// every second sample).
 #include "runtime/synth/bending.hpp"
 
 #include <gtest/gtest.h>

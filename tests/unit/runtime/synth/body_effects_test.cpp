@@ -80,7 +80,7 @@ TEST(BodyEffects, DisabledEffectsDoNoWork) {
   }
 }
 
-TEST(BodyEffects, WithoutTwoEarsAllHearWhatIsHeardInTheMiddle) {
+TEST(BodyEffects, WithoutTwoEarsAllHearTheMiddle) {
   const auto model = make_model({{700.0, 3.0}});
   const auto play_one = [&](std::vector<Vec3> microphones, EffectSet effects) {
     Synthesiser synthesiser({.rate_hz = kRate, .microphones_m = std::move(microphones)});
@@ -99,7 +99,7 @@ TEST(BodyEffects, WithoutTwoEarsAllHearWhatIsHeardInTheMiddle) {
   for (std::size_t n = 0; n < middle[0].size(); ++n) ASSERT_NEAR(both[0][n], middle[0][n], 1e-6) << n;
 }
 
-TEST(BodyEffects, AreRefusedWhereTheyCannotBe) {
+TEST(BodyEffects, ImpossibleEffectsAreRefused) {
   bank::Bank weightless = testing::make_cube_bank({{500.0, 3.0}});
   weightless.rigid.mass_kg = 0.0;
   Synthesiser synthesiser({.rate_hz = kRate});
@@ -140,7 +140,7 @@ TEST(BodyEffects, SleepingBodiesDoNoWork) {
   EXPECT_NEAR(find_peak(out[0], again, again + 4800), find_peak(out[0], 0, 4800), 1e-3);
 }
 
-/// A contact that slides from 0.05 s on, a record a millisecond; without an end.
+/// Contact sliding from 0.05 s on, a record per millisecond; without an end.
 std::vector<events::LastingContact> make_slide(int body, double end_s) {
   std::vector<events::LastingContact> records;
   for (int k = 0; k < static_cast<int>(1e3 * (end_s - 0.05)); ++k) {
@@ -163,8 +163,8 @@ std::vector<events::LastingContact> make_slide(int body, double end_s) {
 
 constexpr EffectSet kTouching = kHere.with({Effect::kRoughness, Effect::kRolling, Effect::kContactDamping});
 
-// What is heard of a body that slides is what its voice plays with these forces, 480 samples late and 1 / 3.43 as loud.
-TEST(BodyEffects, ContactsThatLastAreHeardAsTheirForcesSay) {
+// A sliding body sounds as its ResonatorBank with these forces, 480 samples later and 1 / 3.43 as loud.
+TEST(BodyEffects, LastingContactsSoundAsTheirForces) {
   const auto model = make_model({{420.0, 6.0}, {1370.0, 9.0}, {5200.0, 20.0}});
   Synthesiser synthesiser({.rate_hz = kRate, .microphones_m = {{0.0, 0.0, 0.0}}});
   std::vector<std::vector<float>> out;

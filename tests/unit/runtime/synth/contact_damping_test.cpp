@@ -1,4 +1,4 @@
-// The damping of modes by contacts that last, against the dense equation of motion.
+// Damping of modes by lasting contacts, against the dense equation of motion.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -17,7 +17,7 @@ namespace {
 
 using namespace testing;
 
-/// q'' + 2 D q' + Lambda q + Z(t) phi phi^T q' = 0, by Runge and Kutta's fourth order.
+/// q'' + 2 D q' + Lambda q + Z(t) phi phi^T q' = 0, by fourth-order Runge-Kutta.
 double calc_dense_energy(const std::vector<InventedMode>& modes, const std::vector<double>& phi, double impulse,
                          const std::function<double(double)>& impedance, double seconds) {
   const std::size_t n = modes.size();
@@ -67,7 +67,7 @@ TEST(ContactForces, TakeTheImpedanceOfTheOthersMaterialWhereTheRecordHasNone) {
   EXPECT_EQ(find_impedance(contact, kGroundSurface), 0.0);
 }
 
-TEST(ContactForces, TakeTheEnergyThatTheDenseEquationsSay) {
+TEST(ContactForces, TakeTheEnergyOfTheDenseEquations) {
   const std::vector<InventedMode> modes{{310.0, 1.0, 1.0, {0.0, 0.0, 0.9}},
                                         {870.0, 2.0, 1.0, {0.0, 0.0, -0.6}},
                                         {2100.0, 3.0, 1.0, {0.0, 0.0, 1.1}},
@@ -96,7 +96,7 @@ TEST(ContactForces, TakeTheEnergyThatTheDenseEquationsSay) {
   }
 }
 
-TEST(ContactForces, TakeWhatTheContactsSpringLosesHoweverLittleItMoves) {
+TEST(ContactForces, TakeTheLossOfTheContactSpring) {
   // A spring k (1 + i eta) at the point, weak against the mode: omega'^2 = omega^2 + k (1 + i eta) phi^2, so d = eta k phi^2 / (2 omega).
   // Steel on steel loses 0.01; wood and plastics ten times that, by the part of the give that is theirs.
   const double freq = 1000.0, phi = 0.9, omega = 2.0 * pi * freq;
@@ -173,7 +173,7 @@ TEST(ContactForces, NeverAddEnergyByDamping) {
   }
 }
 
-TEST(ContactForces, LeaveTheRingingExactWhenTheyHaveGone) {
+TEST(ContactForces, LeaveTheRingingExactAfterwards) {
   const double freq = 987.6, decay = 1.5, gain = 2.0;
   const auto model = Model::make(make_cube_bank({{freq, decay, gain}}));
   ContactForces contacts(model, {.effects = kBrake});

@@ -1,4 +1,4 @@
-// Forces of contacts that last on bodies: against quadrature and measured laws; streams of records.
+// Forces of lasting contacts: against quadrature and measured laws; streams of records.
 #include "runtime/synth/contact_forces.hpp"
 
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@ namespace {
 
 using namespace testing;
 
-TEST(ContactForces, DriveTheModesAsQuadratureSays) {
+TEST(ContactForces, DriveTheModesAsQuadrature) {
   // Force along e = n - mu s; the shape is the same at all corners but for the third mode's slope.
   std::vector<InventedMode> modes = make_modes();
   modes.push_back({300.0, 3000.0, 0.5, {0.2, 0.0, 1.0}});  // over-damped, too
@@ -125,7 +125,7 @@ TEST(ContactForces, OfARestingBodyAreBitExactSilence) {
   }
 }
 
-TEST(ContactForces, AreSwitchedByTheirEffects) {
+TEST(ContactForces, FollowTheirEffects) {
   const auto model = Model::make(make_cube_bank(make_modes()));
   const auto hear = [&](EffectSet effects, bool rolls) {
     ContactForces contacts(model, {.effects = effects});
@@ -147,7 +147,7 @@ TEST(ContactForces, AreSwitchedByTheirEffects) {
   EXPECT_EQ(hear(kBrake, false), 0.0F);
 }
 
-/// Output of the modes on a force of this spectrum: power at each mode by its bandwidth.
+/// Output of the modes under a force of this spectrum: power at each mode by its bandwidth.
 TEST(ContactForces, SoundInABandThatFollowsTheSpeed) {
   // Many modes of equal shape; each hears the force's spectrum at its own frequency: power ~ S(f) gain^2 / (2 d) for a narrow mode.
   std::vector<InventedMode> modes;
@@ -186,7 +186,7 @@ struct Slide {
   double own_m = 0.0, floor_m = 2e-6, speed_m_s = 0.1, load_n = 2.0, patch_m = 0.2e-3, modulus_pa = 38e9;
 };
 
-/// A body with modes from 300 Hz to 9 kHz that slides flat for 3 s.
+/// Body with modes from 300 Hz to 9 kHz, sliding flat for 3 s.
 std::vector<float> hear_slide(const Slide& of) {
   std::vector<InventedMode> modes;
   for (int m = 0; m < 11; ++m) modes.push_back({300.0 * std::pow(2.0, 0.49 * m), 40.0, 1.0 / (1.0 + m)});
@@ -203,9 +203,9 @@ std::vector<float> hear_slide(const Slide& of) {
 
 double calc_slide_db(const Slide& of) { return 20.0 * std::log10(calc_rms(hear_slide(of), 0.1, 2.9)); }
 
-// Measured: levels of flat bodies that slide grow evenly with the logarithms of roughness and speed, with exponents of 0.8 to 1.16 and 0.7
-// to 0.96 (Ben Abdelounis et al. 2010 and those that Dang et al. 2013 list).
-TEST(ContactForces, OfWhatSlidesGrowEvenlyWithRoughnessAndSpeed) {
+// Measured: levels of sliding flat bodies grow linearly with the logarithms of roughness and speed, with exponents of 0.8 to 1.16 and 0.7
+// to 0.96 (Ben Abdelounis et al. 2010 and those listed by Dang et al. 2013).
+TEST(ContactForces, OfSlidingGrowWithRoughnessAndSpeed) {
   const std::vector<double> floors{0.02e-6, 0.1e-6, 0.5e-6, 2e-6, 10e-6, 20e-6, 50e-6}, speeds{0.02, 0.05, 0.1, 0.2, 0.4, 1.0};
   const auto calc_exponent = [](double from_db, double to_db, double from, double to) {
     return (to_db - from_db) / (20.0 * std::log10(to / from));
@@ -255,7 +255,7 @@ TEST(ContactForces, OfABoxThatSlidesFlatAreTheRoughnessOfBothSurfaces) {
   EXPECT_EQ(calc_peak(hear_slide({.own_m = 0.0, .floor_m = 0.0})), 0.0F) << "two smooth surfaces make no sound";
 }
 
-TEST(ContactForces, OfWhatSlidesStayFiniteAndEvenAtTheExtremes) {
+TEST(ContactForces, OfSlidingStayFiniteAtTheExtremes) {
   double last = -1e9;
   for (const double floor : {1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 5e-4, 1.0, 1e300}) {
     const std::vector<float> heard = hear_slide({.floor_m = floor, .speed_m_s = 1.0});
@@ -272,10 +272,10 @@ TEST(ContactForces, OfWhatSlidesStayFiniteAndEvenAtTheExtremes) {
     }
   }
   const double heavy = calc_slide_db({.load_n = 2.0}), light = calc_slide_db({.load_n = 2e-3});
-  EXPECT_NEAR(light, heavy - 60.0, 0.5) << "what hardly presses hardly sounds";
+  EXPECT_NEAR(light, heavy - 60.0, 0.5) << "light contacts are soft";
 }
 
-TEST(ContactForces, GiveTheSameBitsWhateverTheBlocks) {
+TEST(ContactForces, GiveTheSameBitsForAnyBlocks) {
   std::vector<InventedMode> modes = testing::make_many_modes(70);
   modes.push_back({23500.0, 200000.0});
   const auto model = Model::make(make_cube_bank(modes));
@@ -392,7 +392,7 @@ TEST(ContactForces, OfBothBodiesReadTheSameTwoSurfaces) {
   EXPECT_NE(hear(true, {5, 9}), hear(true, {5, 8})) << "another body has another surface";
 }
 
-TEST(ContactForces, DoNotHangOnTheNumbersOfBodies) {
+TEST(ContactForces, DoNotDependOnTheNumbersOfBodies) {
   const auto model = Model::make(make_cube_bank(make_modes()));
   const auto hear = [&](std::int32_t body, std::int32_t other, std::uint64_t id) {
     ContactForces contacts(model, {.surface = {.seed = 11}});

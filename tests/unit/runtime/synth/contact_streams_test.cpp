@@ -1,4 +1,4 @@
-// Any stream of contact records: bounded forces, and sound no louder than a push by them.
+// Arbitrary streams of contact records: bounded forces, and sound no louder than under a push.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Energy books of the modes against the work of blows in closed form, and against losses and radiation derived from the sound.
+// Energy balance of the modes against the work of strikes in closed form, and against losses and radiation derived from the sound.
 #include "runtime/synth/energy_book.hpp"
 
 #include <gtest/gtest.h>
@@ -73,7 +73,7 @@ std::vector<events::Event> make_events(std::mt19937_64& random, int kinds, doubl
   return events;
 }
 
-TEST(EnergyBook, OfRandomScenesIsThatOfTheSoundAtEveryStep) {
+TEST(EnergyBook, OfRandomScenesIsThatOfTheSound) {
   Texture::make_tables();
   std::mt19937_64 random(3);
   const auto pick = [&](double low, double high) { return std::uniform_real_distribution(low, high)(random); };

@@ -1,5 +1,4 @@
-// Forces that are known step by step, against the closed form of modes (that of the impact stage, which shares no code with voices) and
-// against whole impacts.
+// Forces known step by step, against the closed form of modes (that of the impact stage, which shares no code) and whole impacts.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -27,7 +26,7 @@ using testing::InventedMode;
 using testing::make_cube_bank;
 constexpr double kRate = 48000.0, kPi = std::numbers::pi;
 
-/// The force of a whole pulse, in the mesh's frame.
+/// Force of a whole pulse, mesh axes.
 struct Course {
   double begin_s = 0.0, step_s = 0.0;
   std::vector<Vec3> impulses;
@@ -40,7 +39,7 @@ std::vector<Force> make_pieces(const Course& course, std::int32_t triangle = 0, 
   return pieces;
 }
 
-/// Sum of gain q' at every sample, in double precision, by exact steps from one border of a step or sample to the next.
+/// Sum of gain q' at every sample, in double precision, by exact maps between borders of steps and samples.
 std::vector<double> calc_sound(const bank::Bank& bank, const std::vector<Course>& courses, std::size_t samples) {
   const std::size_t modes = bank.mode_count();
   std::vector<double> omega, q(modes), v(modes), sound;
@@ -82,7 +81,7 @@ std::vector<float> play(ResonatorBank& voice, std::size_t samples, std::size_t b
   return pressure;
 }
 
-/// Root of the squared difference over that of the expected sound.
+/// Relative root mean square difference.
 double calc_error(const std::vector<float>& heard, const std::vector<double>& expected) {
   double difference = 0.0, size = 0.0;
   for (std::size_t n = 0; n < expected.size(); ++n) {
@@ -93,7 +92,7 @@ double calc_error(const std::vector<float>& heard, const std::vector<double>& ex
   return std::sqrt(difference / size);
 }
 
-/// Vertex 0 is struck: triangle 0 begins there.
+/// Strike at vertex 0 in triangle 0.
 std::vector<InventedMode> make_modes(int count) {
   std::vector<InventedMode> modes;
   std::mt19937_64 random(7);
@@ -200,7 +199,7 @@ TEST(Force, SoundsTheSameInBlocksOfAnySizeAndOnAnyInstructionSetToRounding) {
   }
 }
 
-TEST(Force, ThatCannotBePlayedIsRefused) {
+TEST(Force, UnplayableForcesAreRefused) {
   const bank::Bank bank = make_cube_bank(make_modes(5));
   ResonatorBank voice(Model::make(bank, {.rate_hz = kRate}), {.max_forces = 4});
   AccelerationNoise click(0.05, 1.0, kRate, 2, 4);
@@ -234,7 +233,7 @@ TEST(Force, ThatCannotBePlayedIsRefused) {
   EXPECT_TRUE(still.is_idle()) << "no force, no work";
 }
 
-TEST(Force, ThatIsLateKeepsItsImpulse) {
+TEST(Force, LateForcesKeepTheirImpulse) {
   const bank::Bank bank = make_cube_bank({{50.0, 0.0}});
   ResonatorBank voice(Model::make(bank, {.rate_hz = kRate}));
   play(voice, 4800);
@@ -268,8 +267,8 @@ TEST(Force, MovesAClickAsTheSamePulseInOnePiece) {
   }
 }
 
-/// A ball on a plate, with and without friction: what the synthesiser rings with afterwards is what the world knows.
-TEST(Force, OfAWholeImpactLeavesTheModesAsTheWorldKnowsThem) {
+/// Ball on a plate, with and without friction: the modes after the impact are those of the world.
+TEST(Force, OfAWholeImpactLeavesTheModesOfTheWorld) {
   for (const double friction : {0.0, 0.3}) {
     const impact::tests::Plate plate = impact::tests::make_plate(0.5, 0.4, 0.006, 19000.0, 0.21, 0.17, 4.0);
     bank::Bank bank = make_cube_bank(std::vector<InventedMode>(plate.omega.size(), {1000.0, 4.0}));
@@ -322,8 +321,8 @@ TEST(Force, OfAWholeImpactLeavesTheModesAsTheWorldKnowsThem) {
   }
 }
 
-/// A floor keeps groups asleep that a strike cannot lift above it: a pulse in pieces wakes those that it wakes in one.
-TEST(Force, InPiecesWakesWhatItWakesInOne) {
+/// Audibility floor: a pulse in pieces wakes the groups of the whole pulse.
+TEST(Force, InPiecesWakesTheSameGroups) {
   std::vector<InventedMode> modes = make_modes(200);
   for (std::size_t m = 0; m < modes.size(); ++m) modes[m].gain = std::pow(0.95, static_cast<double>(m));
   const auto model = Model::make(make_cube_bank(modes), {.rate_hz = kRate});
@@ -343,7 +342,7 @@ TEST(Force, InPiecesWakesWhatItWakesInOne) {
   }
 }
 
-/// The body is exchanged for an equal one in the middle of a long force, with a click and a change of effects.
+/// The model is swapped for an equal one during a long force, with acceleration noise.
 TEST(Force, ContinuesWhenTheBodyIsExchanged) {
   const bank::Bank bank = make_cube_bank(make_modes(20));
   const Course course = make_course(5e-3, 1e-5, 1300, true);
@@ -366,7 +365,7 @@ TEST(Force, ContinuesWhenTheBodyIsExchanged) {
   EXPECT_LT(calc_error(swapped, std::vector<double>(alone.begin(), alone.end())), 1e-4);
 }
 
-TEST(Force, ReachesASynthesiserAsItReachesAVoice) {
+TEST(Force, ReachesASynthesiserAsAResonatorBank) {
   const bank::Bank bank = make_cube_bank(make_modes(20));
   const Course course = make_course(2.0e-3, 1.1e-5, 40, true);
   const auto listen = [&](EffectSet effects, bool as_impulses) {

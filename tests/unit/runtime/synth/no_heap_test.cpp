@@ -1,4 +1,4 @@
-// process() and strike() take no memory and make no system call. A program of its own, as tests/support/heap_counter.hpp asks.
+// process() and strike() do not allocate and make no system call. A separate program, see tests/support/heap_counter.hpp.
 #include <gtest/gtest.h>
 #include <linux/seccomp.h>
 #include <sys/prctl.h>
@@ -34,7 +34,7 @@ TEST(NoHeap, TheCounterSeesAllocations) {
   delete memory;
 }
 
-TEST(NoHeap, ModesThatLargeMotionCouplesTakeNoMemory) {
+TEST(NoHeap, CoupledModesTakeNoMemory) {
   std::vector<testing::InventedMode> modes;
   for (int m = 0; m < 30; ++m) modes.push_back({100.0 + 90.0 * m, 5.0});
   bank::Bank bank = testing::make_cube_bank(modes);
@@ -123,7 +123,7 @@ TEST(NoHeap, DisabledEffectsTakeNoMemory) {
   bank.quartic.thickness_m = 1e-3;
   const auto model = Model::make(bank);
   Synthesiser synthesiser({.max_waypoints = 2, .floor = Floor{}, .head = ListeningHead{head::make_sphere(48000.0)}});
-  synthesiser.add_body(model, {.effects = EffectSet::all()});  // and with it the tables that all share
+  synthesiser.add_body(model, {.effects = EffectSet::all()});  // with the shared tables
   EXPECT_LT(measure_bytes(synthesiser, model, {}), 2500);
   constexpr EffectSet kBase{Effect::kModal, Effect::kTwoEars, Effect::kNonlinear};
   const long base = measure_bytes(synthesiser, model, kBase);
@@ -175,7 +175,7 @@ TEST(NoHeap, AWholeSceneTakesNoMemoryWhileItPlays) {
   EXPECT_GT(synthesiser.get_counters().faded, 0);
 }
 
-// A body that turns above a floor, sliding and struck, heard by a head that turns, gets other models while it sounds.
+// A body rotates above a floor, sliding and struck, heard by a rotating head, with model swaps.
 TEST(NoHeap, DirectivityTakesNoMemoryWhileItPlays) {
   std::vector<testing::InventedMode> modes;
   for (int m = 0; m < 50; ++m) modes.push_back({150.0 + 250.0 * m, 30.0 + (m % 7 == 0 ? 1e5 : 0.0)});
@@ -224,7 +224,7 @@ TEST(NoHeap, DirectivityTakesNoMemoryWhileItPlays) {
   EXPECT_GT(synthesiser.get_effect_counters(body).units[Effect::kRoughness], 0);
 }
 
-// In a child that the kernel kills at the first system call but read, write and exit.
+// In a child killed by the kernel at the first system call except read, write and exit.
 TEST(NoHeap, AWholeSceneMakesNoSystemCallWhileItPlays) {
   std::vector<testing::InventedMode> modes;
   for (int m = 0; m < 30; ++m) modes.push_back({150.0 + 250.0 * m, 30.0 + (m % 9 == 0 ? 1e5 : 0.0)});

@@ -1,4 +1,4 @@
-// A voice whose modes large motion couples: softly the linear one, strongly the oscillator of Duffing; its way into a body and out of it.
+// ResonatorBank with coupled modes: linear for soft strikes, Duffing's oscillator for strong ones.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -21,7 +21,7 @@ using testing::InventedMode;
 using testing::make_cube_bank;
 constexpr double kRate = 48000.0;
 
-/// Forty modes, of which every other one of the first twenty is coupled; two do not ring, and one of those is in the energy too.
+/// Forty modes, every other of the first twenty coupled; two do not ring, one of them in the energy.
 bank::Bank make_bank(double size = 1e6) {
   std::vector<InventedMode> modes;
   for (int m = 0; m < 40; ++m)
@@ -43,7 +43,7 @@ std::vector<float> play(ResonatorBank& voice, std::size_t samples, std::size_t b
   return pressure;
 }
 
-/// Of the difference, over the sound [dB].
+/// Level of the difference relative to the sound [dB].
 double calc_difference_db(const std::vector<float>& a, const std::vector<float>& b) {
   double difference = 0.0, sound = 0.0;
   for (std::size_t n = 0; n < a.size(); ++n) {
@@ -69,7 +69,7 @@ void strike_softly(ResonatorBank& voice, double impulse_n_s) {
   EXPECT_TRUE(voice.push(force));
 }
 
-TEST(NonlinearVoice, SoftlyIsTheLinearOneToMinus100Db) {
+TEST(NonlinearResonators, SoftlyIsTheLinearOneToMinus100Db) {
   const auto model = make_model(make_bank());
   ResonatorBank linear(model), nonlinear(model, {.is_nonlinear = true});
   for (ResonatorBank* voice : {&linear, &nonlinear}) strike_softly(*voice, 1e-6);
@@ -89,7 +89,7 @@ TEST(NonlinearVoice, SoftlyIsTheLinearOneToMinus100Db) {
   EXPECT_EQ(play(other, 48000, 37), found);
 }
 
-TEST(NonlinearVoice, SoftlyIsTheLinearOneUnderContactsThatLast) {
+TEST(NonlinearResonators, SoftlyIsTheLinearOneUnderContactsThatLast) {
   const auto model = make_model(make_bank());
   std::vector<std::vector<float>> heard;
   for (const bool is_nonlinear : {false, true}) {
@@ -117,7 +117,7 @@ TEST(NonlinearVoice, SoftlyIsTheLinearOneUnderContactsThatLast) {
   EXPECT_LE(calc_difference_db(heard[1], heard[0]), -100.0);
 }
 
-TEST(NonlinearVoice, SoftlySendsToTheEarsWhatTheLinearOneSends) {
+TEST(NonlinearResonators, SoftlySendsToTheEarsWhatTheLinearOneSends) {
   bank::Bank bank = make_bank();
   std::vector<testing::ModeMultipoles> air;
   for (std::size_t m = 0; m < bank.mode_count(); ++m) air.push_back(testing::make_dipole({0.5, 0.2 * static_cast<double>(m % 4)}));
@@ -137,7 +137,7 @@ TEST(NonlinearVoice, SoftlySendsToTheEarsWhatTheLinearOneSends) {
   EXPECT_LE(calc_difference_db(heard[1], heard[0]), -100.0);
 }
 
-TEST(NonlinearVoice, StronglyIsTheOscillatorOfDuffing) {
+TEST(NonlinearResonators, StronglyIsTheOscillatorOfDuffing) {
   bank::Bank bank = make_cube_bank({{300.0, 0.0, 1.0, {0.0, 0.0, 1.0}}});
   const double lambda = bank.eigenvalue_rad2_s2[0];
   // q' = 1 at q = 0. With alpha = 1 at the turning point, (1 + alpha / 2) lambda q^2 = 1.
@@ -159,7 +159,7 @@ TEST(NonlinearVoice, StronglyIsTheOscillatorOfDuffing) {
   EXPECT_NEAR(voice.calc_energy_j(), 0.5, 0.005);
 }
 
-TEST(NonlinearVoice, OffIsTheVoiceOfABankWithoutTheEnergy) {
+TEST(NonlinearResonators, OffIsABankWithoutTheEnergy) {
   bank::Bank with = make_bank();
   with.rigid.volume_m3 = 0.0;  // without a thickness, neither is watched for bending
   bank::Bank without = with;
@@ -171,7 +171,7 @@ TEST(NonlinearVoice, OffIsTheVoiceOfABankWithoutTheEnergy) {
   EXPECT_THROW(ResonatorBank(make_model(without), {.is_nonlinear = true}), InputError);
 }
 
-TEST(NonlinearVoice, IsAsleepAfterwardsAndWithoutAMemory) {
+TEST(NonlinearResonators, SleepsAfterwardsInItsInitialState) {
   const auto model = make_model(make_bank());
   ResonatorBank voice(model, {.is_nonlinear = true}), fresh(model, {.is_nonlinear = true});
   voice.strike({.time_s = 1e-3, .impulse_n_s = {0.0, 0.0, 30.0}});
@@ -184,7 +184,7 @@ TEST(NonlinearVoice, IsAsleepAfterwardsAndWithoutAMemory) {
   EXPECT_LE(calc_difference_db(later, first), -130.0);
 }
 
-TEST(NonlinearVoice, ALimitLeavesFewerCoupledWithoutAClick) {
+TEST(NonlinearResonators, ALimitLeavesFewerCoupledWithoutAClick) {
   const auto model = make_model(make_bank());
   ResonatorBank voice(model, {.is_nonlinear = true});
   voice.strike({.time_s = 1e-3, .impulse_n_s = {0.0, 0.0, 1.0}, .duration_s = 1e-3});
@@ -214,7 +214,7 @@ TEST(NonlinearBody, NeedsABankWithTheEnergy) {
   EXPECT_EQ(Model::read_tables(model->write_tables(), model->get_surface())->get_nonlinear(), nullptr);
 }
 
-/// With what a cascade needs.
+/// Bank with the data for a cascade.
 bank::Bank make_cascade_bank() {
   bank::Bank bank = make_bank();
   bank.quartic.thickness_m = 1e-3;
@@ -222,13 +222,13 @@ bank::Bank make_cascade_bank() {
   return bank;
 }
 
-TEST(NonlinearVoice, ACascadeNeedsModesAboveAndAThickness) {
+TEST(NonlinearResonators, ACascadeNeedsModesAboveAndAThickness) {
   EXPECT_FALSE(make_model(make_bank())->has_cascade());
   EXPECT_THROW(ResonatorBank(make_model(make_bank()), {.is_nonlinear = true, .has_cascade = true}), InputError);
   EXPECT_TRUE(make_model(make_cascade_bank())->has_cascade());
 }
 
-TEST(NonlinearVoice, SoftlyACascadeIsTheLinearVoiceToMinus100Db) {
+TEST(NonlinearResonators, SoftlyACascadeIsLinearToMinus100Db) {
   const auto model = make_model(make_cascade_bank());
   ResonatorBank linear(model), cascade(model, {.is_nonlinear = true, .has_cascade = true});
   for (ResonatorBank* voice : {&linear, &cascade}) strike_softly(*voice, 1e-6);
@@ -240,7 +240,7 @@ TEST(NonlinearVoice, SoftlyACascadeIsTheLinearVoiceToMinus100Db) {
   EXPECT_GT(other.get_counters().cascade_samples, 0);
 }
 
-TEST(NonlinearVoice, WhatIsRadiatedCountsTheModesOfAllKinds) {
+TEST(NonlinearResonators, RadiationCountsTheModesOfAllKinds) {
   const auto model = make_model(make_cascade_bank());
   std::vector<double> radiated_j;
   for (const auto& [is_nonlinear, has_cascade] : {std::pair{false, false}, {true, false}, {true, true}}) {
@@ -254,7 +254,7 @@ TEST(NonlinearVoice, WhatIsRadiatedCountsTheModesOfAllKinds) {
   EXPECT_NEAR(radiated_j[2] / radiated_j[0], 1.0, 1e-3);
 }
 
-TEST(NonlinearVoice, ACascadeThatIsOffIsNotThere) {
+TEST(NonlinearResonators, ADisabledCascadeDoesNoWork) {
   const auto model = make_model(make_cascade_bank()), without = make_model(make_bank());
   std::vector<std::vector<float>> heard;
   for (const auto& of : {model, without}) {

@@ -1,4 +1,4 @@
-// A voice against closed forms, quadrature and the slow body in double precision, and what it promises its host.
+// ResonatorBank against closed forms, quadrature and the reference body in double precision; its guarantees to the host.
 #include "runtime/synth/resonator_bank.hpp"
 
 #include <gtest/gtest.h>
@@ -103,7 +103,7 @@ TEST(ResonatorBank, BothPulsesMatchQuadratureBeforeDuringAndAfter) {
   }
 }
 
-TEST(ResonatorBank, SoundsLikeTheSlowBodyInDoublePrecision) {
+TEST(ResonatorBank, SoundsLikeTheReferenceBody) {
   std::vector<InventedMode> modes = make_many_modes(75);
   modes.push_back({23500.0, 4e5, 0.3, {0.2, 0.1, -0.4}, 0.05});  // over-damped
   const bank::Bank bank = make_cube_bank(modes);
@@ -226,7 +226,7 @@ TEST(ResonatorBank, ModesAreInTheOrderOfAudibility) {
   EXPECT_NEAR(model->get_eigenvalue_rad2_s2(0), std::pow(2 * pi * 400.0, 2), 1e-3);
 }
 
-TEST(ResonatorBank, WhatIsStillHeardIsAlwaysTheFirstModes) {
+TEST(ResonatorBank, TheAudibleModesAreTheFirstOnes) {
   const bank::Bank bank = make_cube_bank(make_many_modes(320));
   const auto model = make_model(bank);
   const double silence = 1e-10;
@@ -339,7 +339,7 @@ TEST(ResonatorBank, ALateStrikeSoundsAtTheHorizonWithItsWholeImpulse) {
   EXPECT_NEAR(voice.calc_energy_j(), 0.5, 1e-6);
 }
 
-TEST(ResonatorBank, AddsToWhatIsInTheBlock) {
+TEST(ResonatorBank, AddsToTheBlock) {
   const auto model = make_model(make_cube_bank(make_many_modes(20)));
   ResonatorBank voice(model), again(model);
   voice.strike({.impulse_n_s = kUnitImpulse});
@@ -378,7 +378,7 @@ TEST(ResonatorBank, BadBanksAndNumbersAreRefused) {
   EXPECT_THROW(ResonatorBank(make_model(good), {.silence_pa = -1.0}), InputError);
 }
 
-TEST(ResonatorBank, OtherGainsTakeThePlaceOfTheBanks) {
+TEST(ResonatorBank, OtherGainsReplaceThoseOfTheBank) {
   const bank::Bank bank = make_cube_bank({{1000.0, 1.0, 1.0}});
   const std::vector<double> gains{0.25};
   ResonatorBank own(make_model(bank)), other(Model::make(bank, {.gains = gains}));

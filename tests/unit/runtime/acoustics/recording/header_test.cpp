@@ -1,4 +1,4 @@
-// Headers of recorded surfaces, from bytes that are not trusted.
+// Headers of recorded surfaces from untrusted bytes.
 #include "runtime/acoustics/recording/header.hpp"
 
 #include <gtest/gtest.h>
@@ -43,7 +43,7 @@ TEST(Header, IsReadAsItWasWritten) {
   EXPECT_EQ(read.count_blocks(), 4U);
 }
 
-TEST(Header, CountsAndOffsetsThatCannotBeAreRefused) {
+TEST(Header, ImpossibleCountsAndOffsetsAreRefused) {
   for (const char* count : {"frames", "vertices", "triangles", "bodies", "key_frames", "place", "acceleration"})
     for (const char* value : {"0", "-1", "", "x", "1e3", "18446744073709551615", "1099511627776", "99999999999999999999"})
       EXPECT_EQ(change(count, value).find("f: "), 0U) << count << " " << value;

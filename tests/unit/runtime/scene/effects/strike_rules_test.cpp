@@ -32,7 +32,7 @@ TEST(EffectSelector, AStrikeCallsForModesPulseDelayAndEars) {
             (EffectSet{Effect::kModal, Effect::kHertzPulse, Effect::kAirDelay, Effect::kTwoEars}));
 }
 
-// Two thousand steps of 1 us each: a Hertz pulse of 2 ms. Each piece of it alone is 40 dB less.
+// 2000 steps of 1 us: a Hertz pulse of 2 ms. Each piece alone is 40 dB less.
 TEST(EffectSelector, APulseInPiecesIsJudgedAsOne) {
   constexpr double kLength = 2e-3;
   constexpr int kSteps = 2000;
@@ -53,7 +53,7 @@ TEST(EffectSelector, APulseInPiecesIsJudgedAsOne) {
   }
 }
 
-TEST(EffectSelector, WhatIsInaudibleIsOff) {
+TEST(EffectSelector, InaudibleBodiesHaveNoEffects) {
   Stage stage;
   stage.facts.bodies.push_back(stage.body());
   std::vector<events::Event> events{make_strike(0.5, 0.01)};
@@ -160,7 +160,7 @@ void give_multipoles(bank::Bank& bank, const std::vector<double>& multipoles) {
   bank.multipoles.error_db = {-60.0};
 }
 
-// The level of a dipole has 20 log |cos|, evenly over the cosine, cut at -20 dB of its mean power: its standard deviation by quadrature.
+// The level of a dipole is 20 log |cos|, uniform over the cosine, cut at -20 dB of its mean power: its standard deviation by quadrature.
 TEST(EffectSelector, DirectivityNeedsALevelThatVariesOverDirections) {
   double sum = 0.0, squares = 0.0;
   constexpr int kSteps = 100000;
