@@ -27,7 +27,7 @@ struct PropagationOptions {
   double longest_m = 0.0;
   int max_waypoints = 0;
   std::optional<Floor> floor;         // for kGroundReflection
-  std::optional<ListeningHead> head;  // for kHead; what does not go through it is heard as late
+  std::optional<ListeningHead> head;  // for kHead; sound without it is delayed as much
   int phase = 0;                      // of Directivity
 };
 

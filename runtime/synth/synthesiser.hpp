@@ -153,7 +153,7 @@ class Synthesiser {
   /// Capacity of the event ring. [any-thread]
   std::size_t get_ring_room() const noexcept { return ring_.get_room(); }
   int get_microphone_count() const { return static_cast<int>(options_.microphones_m.size()); }
-  /// Of the next frame. [any-thread]
+  /// Time of the next frame. [any-thread]
   double get_time_s() const noexcept { return static_cast<double>(position_.load(std::memory_order_relaxed)) / options_.rate_hz; }
   /// Events from this time on are not late: at most kBlock frames after get_time_s(). [any-thread]
   double get_horizon_s() const noexcept { return static_cast<double>(horizon_.load(std::memory_order_relaxed)) / options_.rate_hz; }

@@ -1,4 +1,4 @@
-// Where a body or the listener is over time.
+// Trajectories and attitudes of bodies and the listener.
 #pragma once
 
 #include <array>

@@ -192,7 +192,7 @@ TEST(BodyEffects, LastingContactsSoundAsTheirForces) {
 }
 
 TEST(BodyEffects, ContactsWithAnotherBodyTouchItsSurface) {
-  // What is heard depends on the other body's roughness, and continues when the model changes.
+  // The sound depends on the other body's roughness, and continues after a model swap.
   const std::vector<testing::InventedMode> modes{{420.0, 6.0}, {1370.0, 9.0}, {5200.0, 20.0}};
   const auto model = make_model(modes);
   const auto hear = [&](double other_m, bool swaps) {

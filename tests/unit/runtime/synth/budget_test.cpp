@@ -328,7 +328,7 @@ TEST(Budget, DistanceCounts) {
   };
   const std::vector<float> both = play({0, 1}, 7.5 * kGroup * kRate), near = play({1}, kUnlimited), far = play({0}, kUnlimited);
   std::vector<float> rest(both.size());
-  for (std::size_t n = 0; n < both.size(); ++n) rest[n] = both[n] - near[n];  // what is left of the far one
+  for (std::size_t n = 0; n < both.size(); ++n) rest[n] = both[n] - near[n];  // remainder of the far one
   const double left = calc_energy(rest, std::vector<float>(rest.size())), of_far = calc_energy(far, std::vector<float>(far.size()));
   EXPECT_LT(left, 0.35 * of_far);
   EXPECT_GT(left, 0.05 * of_far);

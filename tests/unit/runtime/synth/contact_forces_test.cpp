@@ -36,7 +36,7 @@ TEST(ContactForces, DriveTheModesAsQuadrature) {
     std::vector<double> expected(heard.size());
     for (int m = 0; m < model->get_mode_count(); ++m) {
       const double lambda = model->get_eigenvalue_rad2_s2(m), d = model->get_decay_per_s(m);
-      // Of a force that goes linearly from 1 to 0 or from 0 to 1 within a sample, by double-exponential quadrature; then the exact step.
+      // Response to a force linear from 1 to 0 or 0 to 1 within a sample, by double-exponential quadrature; then the exact step.
       const double h = 1.0 / kRate, s2 = d * d - lambda;
       const auto velocity = [&](double t) {
         if (s2 < 0.0) return testing::calc_velocity(std::sqrt(lambda) / (2.0 * pi), d, t);
@@ -85,7 +85,7 @@ TEST(ContactForces, NeverPullAndLeaveTheLoadItselfOut) {
         c.patch_radius_m = 1e-5 * (1.2 + std::sin(300.0 * t));
         return c;
       });
-      // Of the heights, up to waves of 6.4 mm, over the skin: beyond 1 the shocks are larger than the load.
+      // RMS heights, up to waves of 6.4 mm, over the skin: beyond 1 the shocks exceed the load.
       const double max = std::max(1.0, std::sqrt(2.0) * 5.3 * roughness / 10e-6);
       double sum = 0.0, square = 0.0;
       const std::vector<double> force = trace(contacts, records, 1.0, {.roughness_m = roughness, .friction = 0.5, .modulus_pa = 200e9});
@@ -169,7 +169,7 @@ TEST(ContactForces, SoundInABandThatFollowsTheSpeed) {
                                                            LastingContact c = make_sliding(t, speed);
                                                            c.slip_m_s = {};
                                                            c.patch_radius_m = 1e-7;  // blunts nothing
-                                                           c.force_n = 1e3;          // the spring, not the load, is what limits
+                                                           c.force_n = 1e3;          // limited by the spring, not the load
                                                            return c;
                                                          }),
                                             2.0);

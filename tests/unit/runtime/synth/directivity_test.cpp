@@ -340,7 +340,7 @@ TEST(Directivity, ABodyRotatedWhileAsleepIsHeardAsItLies) {
 TEST(Directivity, NonFiniteStatesAreSilenced) {
   Scene scene = make_gains_scene();
   scene.events[4] = events::Impulse{.time_s = 0.05, .body = 0, .impulse_n_s = {0.0, 0.0, 1e42}};
-  // The blow clears what waits, too; what was before is heard.
+  // The strike clears waiting strikes, too; earlier sound is heard.
   for (const auto& channel : play(scene)) {
     double loudest = 0.0;
     for (const float p : channel) loudest = std::max(loudest, std::isfinite(p) ? static_cast<double>(std::abs(p)) : 1e30);

@@ -163,7 +163,7 @@ TEST(Force, OfNoLengthIsAnImpulse) {
       ASSERT_TRUE(by_force.push(force));
       ASSERT_TRUE(by_impulse.strike({.time_s = begin_s, .impulse_n_s = {0.0, 0.0, 16e-3}}));
       std::vector<float> expected = play(by_impulse, 480), heard = play(by_force, 480);
-      heard[48] = expected[48] = 0.0F;  // an impulse at a sample is heard there, what begins there is not yet
+      heard[48] = expected[48] = 0.0F;  // an impulse at a sample is audible there, a force beginning there is not yet
       EXPECT_LT(calc_error(heard, std::vector<double>(expected.begin(), expected.end())), 1e-5) << step_s << " " << begin_s;
     }
   }
@@ -251,7 +251,7 @@ TEST(Force, MovesAClickAsTheSamePulseInOnePiece) {
   Course course = make_course(kBegin, kLength / 4000.0, 4000, false);
   const double sum = std::accumulate(course.impulses.begin(), course.impulses.end(), 0.0, [](double s, const auto& j) { return s + j[2]; });
   for (auto& j : course.impulses) j = {0.6e-3 * j[2] / sum, 0.0, -0.8e-3 * j[2] / sum};
-  // The smallest sounds as the slope of the force, which a stair has not.
+  // The smallest body follows the slope of the force, which steps lack.
   for (const double radius : {0.0005, 0.02, 0.2}) {
     const events::Quaternion turned{std::sqrt(0.5), 0.0, 0.0, std::sqrt(0.5)};
     AccelerationNoise by_steps(radius, 0.3, kRate, 1, 300), by_pulse(radius, 0.3, kRate);

@@ -64,7 +64,7 @@ Sound play(const Scene& scene, EffectCounters* counters = nullptr) {
     synthesiser.process(at.data(), 2, count);
     done += count;
   }
-  // What comes before the latency is of no time.
+  // Samples before the latency have no time.
   for (auto& channel : out) channel.erase(channel.begin(), channel.begin() + synthesiser.get_latency());
   if (counters != nullptr) *counters = synthesiser.get_effect_counters(body);
   return out;
@@ -194,7 +194,7 @@ TEST(HeadEars, AgreeWithFreeEarsAtLowFrequencies) {
       const Complex a = measure(by_head[ear], kFreq, 4800), b = measure(free[ear], kFreq, 4800);
       EXPECT_LT(std::abs(to_db(std::abs(a / b))), 0.5) << azimuth;
       EXPECT_LT(std::abs(std::arg(a / b)), 2.0 * pi * kFreq * 2.5e-4) << "later or earlier by a sphere's way around";
-      // Free ears of a listener with a head come with the head's latency, and are what they are without it.
+      // Free ears of a listener with a head have the head's latency, and else the same sound as without it.
       for (std::size_t n = 0; n < free[ear].size(); ++n) ASSERT_NEAR(free[ear][n], alone[ear][n], 1e-6) << n;
     }
   }

@@ -135,7 +135,7 @@ TEST(Model, a_model_like_another_shares_its_surface_and_sounds_as_one_of_its_own
     off += std::pow(static_cast<double>(a[n]) - b[n], 2);
   }
   EXPECT_LT(off, 1e-11 * power);
-  // Of another body, and where modes have gone beyond what can be heard, it has a surface of its own.
+  // Models of other bodies, and those with fewer audible modes, have their own surface.
   const auto smaller = bank::calc_edited(bank, {.size_scale = 0.2});
   EXPECT_NE(Model::make(smaller, {.rate_hz = kRate, .like = first.get()})->get_surface(), first->get_surface());
 }

@@ -208,7 +208,7 @@ TEST(NonlinearBody, NeedsABankWithTheEnergy) {
   bank.quartic = {};
   Synthesiser synthesiser({.rate_hz = kRate});
   EXPECT_THROW(synthesiser.add_body(make_model(bank), {.effects = {Effect::kModal, Effect::kNonlinear}}), InputError);
-  // What is read from tables of another program has none.
+  // Models read from tables have none.
   const auto model = make_model(make_bank());
   EXPECT_NE(model->get_nonlinear(), nullptr);
   EXPECT_EQ(Model::read_tables(model->write_tables(), model->get_surface())->get_nonlinear(), nullptr);

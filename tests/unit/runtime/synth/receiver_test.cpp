@@ -231,7 +231,7 @@ TEST(Ears, OneKilohertzPassingAt20MetresPerSecondHasTheExactDopplerShift) {
   }
   EXPECT_LT(worst, 1e-3);
   RecordProperty("worst", std::to_string(worst));
-  EXPECT_LT(worst, 1e-4);  // what the delay line itself keeps
+  EXPECT_LT(worst, 1e-4);  // error of the interpolation
   EXPECT_GT(highest, 1060.0);
   EXPECT_LT(lowest, 947.0);
 }
@@ -367,7 +367,7 @@ TEST(Ears, ApproachingSourcesAreLouderByTheWaveEquation) {
     for (const double x : one) largest = std::max(largest, std::abs(x));
     for (std::size_t i = 0; i < times.size(); ++i) {
       const double distance = std::hypot(way_of(times[i])[0], 3.0, 1.0);
-      const double slack = speed / (2 * pi * kFreq * distance) * 2.0 + 1e-3;  // the near field of what moves
+      const double slack = speed / (2 * pi * kFreq * distance) * 2.0 + 1e-3;  // near field of a moving source
       EXPECT_NEAR(see(heard, times[i]), one[i], slack * largest) << speed << " m/s, " << times[i] << " s";
       EXPECT_NEAR(unit * see(felt, times[i]), two[i], (slack + 1.5 / (unit * distance)) * unit * largest) << speed << " m/s, " << times[i];
     }
@@ -388,8 +388,7 @@ TEST(Ears, AMovingListenerHearsTheClosedForm) {
 }
 
 TEST(Ears, AMovingListenerIsAMovingSourceMirroredInTime) {
-  // What leaves a source at X(s) and reaches the origin at t takes as long as what leaves the origin at -t and reaches a listener at X(s)
-  // at -s.
+  // Sound from a source at X(s) to the origin at t takes as long as sound from the origin at -t to a listener at X(s) at -s.
   const auto way_of = [](double t) { return Vec3{-3.0 + 20.0 * t, 2.0 - t * t, 0.5}; };
   const Trajectory moving = make_motion(0.002, 1.0, way_of);
   const Trajectory mirrored = make_motion(0.002, 1.0, [&](double t) { return way_of(1.0 - t); });  // runs from s = 1 back to 0

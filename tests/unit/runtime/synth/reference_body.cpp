@@ -152,7 +152,7 @@ bool ReferenceBody::strike(const Strike& strike) noexcept {
   Pulse pulse;
   pulse.duration = strike.duration_s * rate_hz_;
   pulse.begin = strike.sample - 0.5 * pulse.duration;
-  // The sample at position_ is still to come: what happens after position_ - 1 can still be heard.
+  // The sample at position_ is the next one: forces after position_ - 1 are still audible.
   const double earliest = static_cast<double>(position_ - 1);
   if (!(pulse.begin > earliest)) {
     pulse.begin = std::nextafter(earliest, earliest + 1.0);

@@ -354,7 +354,7 @@ TEST(ResonatorBank, AddsToTheBlock) {
 TEST(ResonatorBank, DenormalsAreFlushedInsideAndTheCallersSettingComesBack) {
   ResonatorBank voice(make_model(make_cube_bank({{1000.0, 2000.0}})), {.silence_pa = 1e-300});
   voice.strike({.impulse_n_s = kUnitImpulse});
-  const unsigned before = _mm_getcsr() & ~0x3FU;  // without the flags that say what happened
+  const unsigned before = _mm_getcsr() & ~0x3FU;  // without the exception flags
   for (int i = 0; i < 400; ++i) {
     for (const float p : play(voice, 128)) ASSERT_NE(std::fpclassify(p), FP_SUBNORMAL);
   }

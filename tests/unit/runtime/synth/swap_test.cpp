@@ -129,7 +129,7 @@ TEST(Swap, EnergyAndPhaseOfEachModeAreContinuous) {
 }
 
 TEST(Swap, MakesNoClick) {
-  // All modes below 3 kHz before and after; what is above it at the swap is the click.
+  // All modes are below 3 kHz before and after; anything above at the swap is a click.
   std::vector<testing::InventedMode> modes;
   for (int m = 0; m < 40; ++m) modes.push_back({300.0 + 40.0 * m, 3.0, 1.0, {0, 0, 1}});
   const bank::Bank bank = testing::make_cube_bank(modes);
@@ -184,7 +184,7 @@ TEST(Swap, ModesOfOneModelOnlyFadeOrBeginAtRest) {
   synthesiser.swap_model(body, make_model(bank));
   play(synthesiser, 1280);
   sound = play(synthesiser, 9600);
-  EXPECT_LT(std::abs(find_line(sound, 2400, 4800, 15000.0)), 1e-5 * level);  // what is gone stays gone
+  EXPECT_LT(std::abs(find_line(sound, 2400, 4800, 15000.0)), 1e-5 * level);  // lost modes do not return
   EXPECT_GT(std::abs(find_line(sound, 2400, 4800, 600.0)), 1e-6);
 }
 

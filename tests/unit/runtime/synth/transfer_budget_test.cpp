@@ -11,7 +11,7 @@ namespace {
 TEST(TransferBudget, SharesAreNeedsPlusTheRest) {
   TransferBudget budget;
   budget.begin(1000.0, 4, 400);
-  EXPECT_EQ(budget.find_share(0), 150);  // a quarter of what is left
+  EXPECT_EQ(budget.find_share(0), 150);  // a quarter of the rest
   EXPECT_EQ(budget.find_share(300), 450);
 }
 

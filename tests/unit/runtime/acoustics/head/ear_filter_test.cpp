@@ -149,7 +149,7 @@ TEST(EarFilter, ASecondOfSilenceEndsInSilence) {
   noise.resize(4000);
   const Sound sound = play(filter, noise, {32}, [](std::size_t n) { return make_direction(static_cast<double>(n) / 50.0, 0.0); });
   EXPECT_TRUE(std::isnan(sound.left[600]));
-  for (std::size_t n = 2000; n < 4000; ++n) ASSERT_EQ(sound.left[n], 0.0);  // what is not a number is gone, too
+  for (std::size_t n = 2000; n < 4000; ++n) ASSERT_EQ(sound.left[n], 0.0);  // non-finite numbers are gone, too
 }
 
 TEST(EarFilter, AllInstructionSetsAgree) {

@@ -91,7 +91,7 @@ TEST(Gains, RigidMotionIsSilentAtLongWavelengths) {
   bank::Bank bank = testing::make_sphere_surface(kRadius, 3);
   for (Vec3& x : bank.vertices_m) x = {10.0 * x[0], x[1], 0.5 * x[2]};
   testing::set_modes(bank, {0.01}, kRadius, [](const Vec3& x, std::size_t) { return Vec3{0.0, 0.0, std::cos(2.0 * pi * x[0])}; });
-  // Of 1 m^2 of faces some 0.4 move, at 34.3 rad/s: 1.3 Pa if they did not cancel. What is left is a dipole.
+  // About 0.4 of 1 m^2 of faces move, at 34.3 rad/s: 1.3 Pa without cancellation. The remainder is a dipole.
   EXPECT_LT(calc_gains(bank, GainKind::kSphere)[0], 0.01 * 1.3);
 }
 

@@ -260,7 +260,7 @@ std::vector<std::pair<double, double>> make_gauss(int count) {
 
 TEST(Transfers, TheMeanOverDirectionsFarAwayIsTheGainOfTheDecay) {
   bank::Bank bank = make_random_bank(30, 9);
-  // What the far field carries off, from the coefficients in closed form: sum of |a / h|^2 / (2 rho c k^2).
+  // Power of the far field, from the coefficients in closed form: sum of |a / h|^2 / (2 rho c k^2).
   const std::int16_t* steps = bank.multipoles.coefficient.data();
   for (std::size_t i = 0; i < bank.mode_count(); ++i) {
     const double k = 2.0 * pi * bank.multipoles.freq_hz[i] / bank::kSoundSpeedMs;

@@ -23,7 +23,6 @@ struct Ball {
   double corner_m = 1e-3;
   std::function<Vec3(double)> centre_m = [](double) { return Vec3{}; };
   std::function<double(double)> acceleration_m_s2;
-  /// Of its surface.
   double calc_area_m2() const { return 4.0 * std::sqrt(3.0) * corner_m * corner_m; }
 };
 

@@ -120,7 +120,7 @@ TEST(EffectSelector, GroundReflectionNeedsAnAudibleReflection) {
   EffectSelector selector(stage.facts);
   selector.watch(make_strike(0.5, 0.01));
   selector.advance(10.0);
-  // Of the two ears the farther one has the ways more alike: its squared distance and 4 m^2 more, twice the height.
+  // The paths of the farther ear are more alike: its squared distance, and 4 m^2 more (twice the height).
   const double straight = 0.5 * 0.5 + 4.0;
   EXPECT_NEAR(selector.get_plan(0)[Effect::kGroundReflection].reason.value, 10.0 * std::log10(straight / (straight + 4.0)), 1e-6);
   stage.facts.floor->reflection = 1e-3;

@@ -85,7 +85,7 @@ TEST(EffectSelector, BodiesWithoutAudibleModesDoNotRing) {
 
 TEST(EffectSelector, PulseLengthNeedsAnAudibleDifference) {
   Stage stage;
-  // (1 - P)^2 of the sound is what an ideal impulse adds: the threshold by bisection on the quadrature.
+  // An ideal impulse adds (1 - P)^2 of the sound: threshold by bisection on the quadrature.
   double low = 1e-6, high = 1e-3;
   for (int i = 0; i < 60; ++i) {
     const double middle = 0.5 * (low + high), pulse = calc_spectrum(1000.0 * middle);

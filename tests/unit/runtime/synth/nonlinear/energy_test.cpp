@@ -109,7 +109,7 @@ TEST(Energy, IsNeverMoreThanTheWorkOfForces) {
     const Body body = make_random(chance, is_curved);
     const std::size_t n = body.modes.size();
     CoupledModes modes(body.energy, body.modes, kRateHz);
-    // Where the nonlinear force of the first mode is as large as the linear one; every other blow is ten thousand times that.
+    // Strength at which the nonlinear force of the first mode equals the linear one; every other strike is 10^4 times that.
     const double self = std::max(1e-3, bank::calc_self_coupling(body.energy)[0]);
     const double sane = body.modes[0].eigenvalue_rad2_s2 / std::sqrt(2.0 * self);
     std::vector<double> re(n), im(n, 0.0);
