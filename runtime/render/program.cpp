@@ -16,7 +16,6 @@
 #include "runtime/base/file.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/base/standard_output.hpp"
-#include "runtime/scene/effects/costs.hpp"
 #include "runtime/scene/effects/table.hpp"
 #include "runtime/scene/banks.hpp"
 #include "runtime/scene/events.hpp"

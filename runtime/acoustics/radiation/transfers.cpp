@@ -71,53 +71,59 @@ Transfers::Transfers(const bank::Bank& bank, [[maybe_unused]] base::Instructions
     std::stable_sort(sorted.begin() + static_cast<std::ptrdiff_t>(window),
                      sorted.begin() + static_cast<std::ptrdiff_t>(std::min(window + kWindow, modes)),
                      [&](std::size_t a, std::size_t b) { return orders_[a] < orders_[b]; });
-  for (std::size_t begin = 0; begin < modes; begin += kTransferLanes) {
-    const std::size_t end = std::min(begin + kTransferLanes, modes);
-    const int order = orders_[sorted[end - 1]];
-    TransferGroup group{.inverse_k_m = {}, .scale = {}, .first_line = lines_.size(), .first_radial = radial_.size(), .order = order};
-    lines_.resize(lines_.size() + bank::count_coefficients(order));
-    radial_.resize(radial_.size() + static_cast<std::size_t>(order) + 1);
-    for (std::size_t lane = 0; lane < kTransferLanes; ++lane) {
-      const bool is_mode = begin + lane < end;
-      const std::size_t mode = sorted[is_mode ? begin + lane : begin];
-      const double k = 2.0 * pi * air.freq_hz[mode] / air.sound_speed_ms, x = k * radius_m_;
-      const std::vector<Complex> steps = base::calc_hankel_quotients(x, order);
-      group.inverse_k_m[lane] = static_cast<float>(1.0 / k);
-      RadialLine* const radial = &radial_[group.first_radial];
-      for (std::size_t l = 0; l < steps.size(); ++l) {
-        radial[l].step_re[lane] = static_cast<float>(steps[l].real());
-        radial[l].step_im[lane] = static_cast<float>(steps[l].imag());
-      }
-      if (!is_mode) continue;
-      slots_[mode] = static_cast<std::int32_t>(begin + lane);
-      group.scale[lane] = static_cast<float>(air.scale[mode] / 65536.0);
-      const std::int16_t* from = &air.coefficient[first[mode]];
-      double power = 0.0;
-      double decay = 1.0;  // |F_l| r / R far away: product of the steps, since far h_l differ by phases only
-      double near = 1.0;   // |F_l| r / R at kTurnRadii
-      const std::vector<Complex> outer = base::calc_hankel_quotients(kTurnRadii * x, order);
-      double turned = 0.0, all = 0.0;
-      for (int l = 0; l <= orders_[mode]; ++l) {
-        double sum = 0.0;
-        for (int i = 0; i <= 2 * l; ++i, from += 2) {
-          // Values below -32767, which no written bank has, would overflow the sum.
-          lines_[group.first_line + static_cast<std::size_t>(l * l) + find_place(l, i)].steps[lane] =
-              std::max<std::int32_t>(from[1], -32767) * 65536 + from[0];
-          sum += static_cast<double>(from[0]) * from[0] + static_cast<double>(from[1]) * from[1];
-        }
-        radial[l].level[lane] = static_cast<float>(std::sqrt(sum / (4.0 * pi)));
-        if (l > 0) decay *= std::abs(steps[l]);
-        power += sum / (4.0 * pi) * decay * decay;
-        if (l > 0) near *= std::abs(steps[l] / outer[l]);
-        turned += sum * near * near * l * l;
-        all += sum * near * near;
-      }
-      turn_orders_[mode] = all > 0.0 ? std::sqrt(turned / all) : 0.0;
-      rms_[mode] = radius_m_ * air.scale[mode] * std::sqrt(power);
+  for (std::size_t begin = 0; begin < modes; begin += kTransferLanes)
+    add_group(air, first, std::span(sorted).subspan(begin, std::min<std::size_t>(kTransferLanes, modes - begin)));
+  set_recurrences(modes == 0 ? 0 : *std::max_element(orders_.begin(), orders_.end()));
+}
+
+void Transfers::add_group(const bank::Multipoles& air, std::span<const std::size_t> first, std::span<const std::size_t> modes) {
+  const int order = orders_[modes.back()];
+  TransferGroup group{.inverse_k_m = {}, .scale = {}, .first_line = lines_.size(), .first_radial = radial_.size(), .order = order};
+  const std::size_t first_slot = groups_.size() * kTransferLanes;
+  lines_.resize(lines_.size() + bank::count_coefficients(order));
+  radial_.resize(radial_.size() + static_cast<std::size_t>(order) + 1);
+  for (std::size_t lane = 0; lane < kTransferLanes; ++lane) {
+    const bool is_mode = lane < modes.size();
+    const std::size_t mode = modes[is_mode ? lane : 0];
+    const double k = 2.0 * pi * air.freq_hz[mode] / air.sound_speed_ms, x = k * radius_m_;
+    const std::vector<Complex> steps = base::calc_hankel_quotients(x, order);
+    group.inverse_k_m[lane] = static_cast<float>(1.0 / k);
+    RadialLine* const radial = &radial_[group.first_radial];
+    for (std::size_t l = 0; l < steps.size(); ++l) {
+      radial[l].step_re[lane] = static_cast<float>(steps[l].real());
+      radial[l].step_im[lane] = static_cast<float>(steps[l].imag());
     }
-    groups_.push_back(group);
+    if (!is_mode) continue;
+    slots_[mode] = static_cast<std::int32_t>(first_slot + lane);
+    group.scale[lane] = static_cast<float>(air.scale[mode] / 65536.0);
+    const std::int16_t* from = &air.coefficient[first[mode]];
+    double power = 0.0;
+    double decay = 1.0;  // |F_l| r / R far away: product of the steps, since far h_l differ by phases only
+    double near = 1.0;   // |F_l| r / R at kTurnRadii
+    const std::vector<Complex> outer = base::calc_hankel_quotients(kTurnRadii * x, order);
+    double turned = 0.0, all = 0.0;
+    for (int l = 0; l <= orders_[mode]; ++l) {
+      double sum = 0.0;
+      for (int i = 0; i <= 2 * l; ++i, from += 2) {
+        // Values below -32767, which no written bank has, would overflow the sum.
+        lines_[group.first_line + static_cast<std::size_t>(l * l) + find_place(l, i)].steps[lane] =
+            std::max<std::int32_t>(from[1], -32767) * 65536 + from[0];
+        sum += static_cast<double>(from[0]) * from[0] + static_cast<double>(from[1]) * from[1];
+      }
+      radial[l].level[lane] = static_cast<float>(std::sqrt(sum / (4.0 * pi)));
+      if (l > 0) decay *= std::abs(steps[l]);
+      power += sum / (4.0 * pi) * decay * decay;
+      if (l > 0) near *= std::abs(steps[l] / outer[l]);
+      turned += sum * near * near * l * l;
+      all += sum * near * near;
+    }
+    turn_orders_[mode] = all > 0.0 ? std::sqrt(turned / all) : 0.0;
+    rms_[mode] = radius_m_ * air.scale[mode] * std::sqrt(power);
   }
-  const int highest = modes == 0 ? 0 : *std::max_element(orders_.begin(), orders_.end());
+  groups_.push_back(group);
+}
+
+void Transfers::set_recurrences(int highest) {
   diagonal_.assign(1, 0.0);
   for (int l = 1; l <= highest; ++l) {
     diagonal_.push_back(std::sqrt((2.0 * l + 1.0) / (2.0 * l)));

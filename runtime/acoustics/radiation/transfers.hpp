@@ -65,6 +65,11 @@ class Transfers {
   }
 
  private:
+  /// Appends a group of up to kTransferLanes modes, ascending in order; `first`: first coefficient of each mode.
+  void add_group(const bank::Multipoles& air, std::span<const std::size_t> first, std::span<const std::size_t> modes);
+  /// Factors of the recurrences of harmonics up to the order `highest`.
+  void set_recurrences(int highest);
+
   void evaluate_at(std::span<const Vec3> places_m, std::span<const std::int32_t> modes,
                    const std::array<std::span<std::complex<float>>, 2>& transfers) const noexcept;
 
