@@ -1,6 +1,5 @@
-// Method:     modes ring by kernels.hpp, block by block. The response to a strike is that of modes at rest, over the sub-blocks of its
-// pulse,
-//             and is added to the ringing: the modes are linear. Modes near and above critical damping are few and decay at once
+// Method:     modes ring by kernels.hpp, block by block. Linear modes: the response to a strike is that of modes at rest, over the
+//             sub-blocks of its pulse, added to the ringing. Modes near and above critical damping are few and decay at once
 //             (damped_modes.hpp). Inaudible groups are dropped from the end of the list, every eighth block.
 // Source:     OSG02 section 4 (impulses to modes), corrected by its missing factor 1/2 in eq. 16-18; docs/equations.md E4 and E5.
 #include "runtime/synth/resonator_bank.hpp"
