@@ -123,7 +123,7 @@ void SoundingBody::apply(ModelSwap& swap, const ListenerTracks& listener, std::i
   surface_ = swap.surface;
   if (swap.directed) {
     begin_directed(*swap.directed, listener, sample);
-    swap.directed->weights->take_over(*propagation_->directed->weights, swap.handover->get_old_modes());
+    swap.directed->weights->take_over(*propagation_->directed->weights, swap.handover->from_mode);
     swap.modes->direct(swap.directed->weights.get());
     std::swap(propagation_->directed, swap.directed);
   }
