@@ -16,7 +16,6 @@
 #include "runtime/base/file.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/base/standard_output.hpp"
-#include "runtime/scene/effects/costs.hpp"
 #include "runtime/scene/effects/table.hpp"
 #include "runtime/scene/banks.hpp"
 #include "runtime/scene/events.hpp"
@@ -303,7 +302,7 @@ class Run {
     figures_.tally = scene::count_impulses(happened_.events, scene_.bodies.size());
     figures_.physics_steps = happened_.steps;
     figures_.blows = happened_.blows;
-    return scene::make_plan(std::move(facts), happened_.events, measures() ? effects::measure_costs() : effects::Costs{});
+    return scene::make_plan(std::move(facts), happened_.events);
   }
 
   /// Renders the sound and writes all outputs: everything is made before anything is seen.
@@ -313,7 +312,6 @@ class Run {
     const Sound sound = calc_sound(scene_, body_banks_, happened_.events,
                                    {.rate_hz = scene_.sample_rate_hz,
                                     .plan = &plan,
-                                    .measures = measures(),
                                     .audits = options_->audit,
                                     .fades_end = scene_.output.fade_end,
                                     .head = &head_,
@@ -343,7 +341,6 @@ class Run {
   const scene::Scene& get_scene() const { return scene_; }
 
  private:
-  bool measures() const { return options_->plan || options_->report.has_value(); }
   base::Spool make_spool(const char* what) const { return base::Spool(find_spool_folder(options_->wav), what); }
 
   void write(const scene::Plan& plan, const Sound& sound, const sound::SoundStore& store) {

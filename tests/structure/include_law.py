@@ -177,7 +177,7 @@ PUBLIC = {
     "runtime/acoustics": ["radiation/", "head/", "recording/"],
     "runtime/exchange": ["gltf/"],
     "runtime/physics": ["impact/impact.hpp", "impact/predict.hpp"],
-    "runtime/scene": ["effects/effect_selector.hpp", "effects/costs.hpp", "effects/table.hpp"],
+    "runtime/scene": ["effects/effect_selector.hpp", "effects/table.hpp"],
     "runtime/render": ["sound/sound_store.hpp", "sound/spectrogram.hpp"],
     "precompute/job": ["cost/"],
     "precompute/mesh": ["shapes/shapes.hpp", "distributed/", "parallel/read_parallel.hpp"],

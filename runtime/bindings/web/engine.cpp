@@ -108,12 +108,6 @@ void Engine::set_solo(int body, int bank_mode) {
   played.solo = std::max(-1, bank_mode);
 }
 
-void Engine::set_effects(int body, synth::EffectSet effects) {
-  PlayedBody& played = find_body(body);
-  synthesiser_.set_effects(body, effects);
-  played.effects = effects;
-}
-
 void Engine::remove_body(int body) {
   find_body(body);
   synthesiser_.remove_body(body);
