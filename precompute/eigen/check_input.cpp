@@ -41,11 +41,11 @@ void check_input(const Problem& problem, const Options& options) {
     }
     for (const std::int32_t c : nodes.component) {
       if (c < 0 || c >= nodes.component_count)
-        throw InputError(fmt::format("Component {} is none of the layout's {}.", c, nodes.component_count));
+        throw InputError(fmt::format("Component {} is out of range: the layout has {}.", c, nodes.component_count));
     }
     const std::size_t order = nodes.elimination_position.size();
     if (comm.is_root() && order != 0 && 3 * order != static_cast<std::size_t>(n)) {
-      throw InputError(fmt::format("The elimination order names {} nodes of {}.", order, n / 3));
+      throw InputError(fmt::format("The elimination order has {} of {} nodes.", order, n / 3));
     }
   });
 }

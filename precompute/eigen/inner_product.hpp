@@ -1,4 +1,4 @@
-// The M inner product on blocks of columns.
+// M inner product of column blocks.
 #pragma once
 
 #include <petscmat.h>
@@ -14,8 +14,7 @@ namespace carillon::eigen {
 
 using la::Columns;
 
-/// A block W of `width` columns in memory that others own, and Z. Keeps Z = M W from multiply() on, until W changes or is
-/// placed elsewhere.
+/// A block W of `width` columns in memory owned by the caller, and Z = M W, valid from multiply() until W changes or moves.
 class InnerProduct {
  public:
   /// mass: M (n, n) with `rows` rows on this rank; null: the identity. diagonal: (rows) where M has nothing else, and must outlive it; null
@@ -25,7 +24,7 @@ class InnerProduct {
   InnerProduct(const InnerProduct&) = delete;
   InnerProduct& operator=(const InnerProduct&) = delete;
 
-  /// W is from now on what stands in `memory`, `width` columns one right after the other.
+  /// W becomes the first `width` columns of `memory`, which must be contiguous.
   void place(const Columns& memory);
   /// Z = M W. Collective.
   void multiply();
@@ -36,14 +35,14 @@ class InnerProduct {
   Mat z_mat() const { return z_mat_; }
   const comm::Communicator& comm() const { return comm_; }
 
-  /// A^T B of all ranks, (a.count, b.count). Collective.
+  /// A^T B summed over all ranks, (a.count, b.count). Collective.
   la::Matrix calc_products(const Columns& a, const Columns& b) const { return la::multiply_transposed(comm_, a, b); }
 
-  /// The first `count` columns of W: W <- W - A S; returns C^T M W of all ranks, set by set of C below each other. W may be one of them.
-  /// `sums` of all ranks go in the same message. Collective.
+  /// On the first `count` columns of W: W <- W - A S; returns C^T M W summed over all ranks, the sets of C stacked. W may be one of the
+  /// sets. `sums` are summed in the same message. Collective.
   la::Matrix subtract_and_calc_products(const la::Product& product, int s_stride, std::span<const Columns> c, int count,
                                         std::array<double, 2>& sums);
-  /// W <- (W - the sum of the products) T, Z = M W; T: (count, count), null: the identity. Collective.
+  /// W <- (W - sum of the products) T, Z = M W; T: (count, count), null: the identity. Collective.
   void subtract_and_combine(std::span<const la::Product> products, int s_stride, const double* t, int count);
 
  private:

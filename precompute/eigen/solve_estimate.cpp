@@ -1,5 +1,5 @@
-// Method:     The analysis of the factorisation says what it takes; Sylvester's law of inertia counts the modes (inertia.cpp).
-// Source:     Parlett, The symmetric eigenvalue problem, 1998, section 3.3. Deviations: none.
+// Method: The symbolic analysis gives the cost of the factorisation; Sylvester's law of inertia counts the modes (inertia.cpp).
+// Source: Parlett, The symmetric eigenvalue problem, 1998, section 3.3.
 #include "precompute/eigen/solve_estimate.hpp"
 
 #include <algorithm>
@@ -19,8 +19,8 @@ namespace {
 
 using petsc::check;
 
-constexpr double kZeroFraction = 1e-7;  // Of high_hz: what is below is lost in the rounding of what is up there.
-constexpr double kLowEnd = 1e-4;        // Of the upper end, in lambda: a lower end below need not be counted.
+constexpr double kZeroFraction = 1e-7;  // Relative to high_hz: lower frequencies vanish in the rounding of the highest.
+constexpr double kLowEnd = 1e-4;        // Relative to the upper end, in lambda: a lower end below this need not be counted.
 
 double calc_lambda(double freq_hz) {
   const double omega_rad_s = 2 * std::numbers::pi * freq_hz;
@@ -56,7 +56,7 @@ std::int64_t calc_copies_bytes(const Problem& problem) {
 }
 
 std::int64_t calc_kept_bytes(const Problem& problem) {
-  // Blocks of nine numbers, or one number, and the place of each.
+  // Blocks of nine numbers, or one number, each with its column index.
   MatInfo k, m;
   check(MatGetInfo(problem.stiffness, MAT_LOCAL, &k));
   check(MatGetInfo(problem.mass, MAT_LOCAL, &m));
@@ -67,7 +67,7 @@ std::int64_t calc_kept_bytes(const Problem& problem) {
 
 std::int64_t calc_search_bytes(std::int64_t rows, std::int64_t modes, std::int64_t rigid_count) {
   const bool is_cut = modes > kSliceModes;
-  const std::int64_t locked = rigid_count + (is_cut ? kSliceModes : 0);  // They are where they were found.
+  const std::int64_t locked = rigid_count + (is_cut ? kSliceModes : 0);  // Locked modes stay where they were found.
   const std::int64_t basis = calc_basis_size(std::min(modes, kSliceModes), locked, !is_cut);
   return rows * 8 * (modes + rigid_count + basis);
 }
