@@ -1,4 +1,5 @@
-// The few vertices of a graph that decide its separators: in a mesh of second order the corners, an eighth of the nodes.
+// Graph compression by dominated vertices: the core determines the separators. In a second-order mesh the core is the corners, an eighth of
+// the nodes.
 #pragma once
 
 #include <cstdint>
@@ -9,54 +10,55 @@
 
 namespace carillon::partition {
 
-/// A graph without its dominated vertices. Vertex u dominates v if they are neighbours and every other neighbour of v is one of u too: what
-/// separates u from a vertex then separates v from it, and v can be eliminated before u without a link that u would not have. In a mesh of
-/// T10 the middle of an edge is dominated by both ends. Vertices with the same neighbours dominate each other; the first of them stays.
+/// A graph without its dominated vertices. Vertex u dominates v if they are adjacent and every other neighbour of v is also adjacent to u:
+/// a set that separates u from a vertex then separates v from it too, and v can be eliminated before u without additional fill. In a T10
+/// mesh the middle of an edge is dominated by both ends. Vertices with the same neighbours dominate each other; the first of them stays.
 class Condensation {
  public:
-  /// One whose core would have fewer than `smallest_core` vertices, or more than half of them, is its own core.
+  /// If the core would have fewer than `smallest_core` vertices, or more than half of all, the graph is not compressed.
   explicit Condensation(const Graph& graph, std::int32_t smallest_core = kSmallestCore);
-  /// Of the node graph of a mesh, which is not made: u dominates v if it is in all elements of v. So a vertex whose neighbours another one
-  /// happens to have as well stays in the core. elements: as make_node_graph(), each with different nodes.
+  /// Compresses the node graph of a mesh without building it: u dominates v if it is in all elements of v. A vertex whose neighbours happen
+  /// to be shared by another vertex stays in the core. elements: as for make_node_graph(), nodes of an element distinct.
   Condensation(std::span<const std::int32_t> elements, int width, std::int32_t nodes, std::int32_t smallest_core = kSmallestCore);
 
-  /// The graph of the vertices that no other dominates, in their order.
+  /// The graph of the vertices not dominated by another, in their order.
   const Graph& core() const { return core_; }
-  /// (vertices) the number of each in the core, -1: dominated.
+  /// (vertices) index of each in the core, -1: dominated.
   const std::vector<std::int32_t>& numbers() const { return number_; }
-  /// Dominated vertices for each edge of the core: 1 in a mesh of second order, where they are the middles of the edges.
+  /// Dominated vertices per edge of the core: 1 in a second-order mesh, where they are the middles of the edges.
   double dominated_per_edge() const;
 
-  /// A separator of the whole graph from one of the core. side: (core vertices) 0, 1 or 2, the separator; the same for every vertex of
-  /// the graph. A dominated vertex is in the separator only if all are that dominate it.
+  /// Expands a separator of the core to the whole graph. side: (core vertices) 0, 1 or 2 (separator); result: the same for all vertices. A
+  /// dominated vertex is in the separator only if all its dominators are.
   std::vector<std::int32_t> expand_sides(const std::vector<std::int32_t>& side) const;
 
-  /// An order of elimination of the whole graph from one of the core: a dominated vertex comes before the first that dominates it, those
-  /// with few neighbours first. position: (core vertices) a permutation; result: (vertices) a permutation.
+  /// Expands an elimination order of the core to the whole graph: a dominated vertex precedes its first dominator, those with few
+  /// neighbours first. position: (core vertices) a permutation; result: (vertices) a permutation.
   std::vector<std::int32_t> expand_order(const std::vector<std::int32_t>& position) const;
 
  private:
   static constexpr std::int32_t kSmallestCore = 64;
 
-  /// dominators, offsets: all that dominate each vertex, in compressed rows. The vertices of the core; empty: it is not worth it.
+  /// dominators, offsets: all dominators of each vertex, in compressed rows. Returns the core vertices; empty if compression is not
+  /// worthwhile.
   std::vector<std::int32_t> choose_core(const std::vector<std::int32_t>& offsets, const std::vector<std::int32_t>& dominators,
                                         std::int32_t smallest_core);
   std::int32_t find_first_host(std::int32_t vertex, const std::vector<std::int32_t>& position) const;
 
   std::vector<std::int32_t> offsets_{0};  // (vertices + 1) of hosts_
-  std::vector<std::int32_t> hosts_;       // per dominated vertex the vertices of the core that dominate it
-  std::vector<std::int32_t> number_;      // (vertices) in the core, -1: dominated
-  std::vector<std::int32_t> degree_;      // (vertices) neighbours, or elements: who dominates another has no fewer
+  std::vector<std::int32_t> hosts_;       // dominators in the core, per dominated vertex
+  std::vector<std::int32_t> number_;      // (vertices) index in the core, -1: dominated
+  std::vector<std::int32_t> degree_;      // (vertices) number of neighbours, or of elements: a dominator has at least as many
   Graph core_;
 };
 
-/// How many separators or orders of a core, or of a part of one, to seek where one would be sought of the whole graph: METIS's time goes
-/// with the core, that of the factorisation with the graph.
+/// Number of separators or orders of a core, or part of one, to compute in place of one of the whole graph: the time of METIS depends on
+/// the core, that of the factorisation on the graph.
 int find_tries(const Graph& core, double dominated_per_edge);
 
-/// Operations of a factorisation in the order that expand_order makes of this one, to compare orders by: squares of the lengths of the
-/// columns of L, summed. The dominated vertices of each edge go with the end that is eliminated first, as if they had all its rows, which
-/// is up to twice too much. position: (core vertices) a permutation.
+/// Predicted operations of a factorisation in the order made by expand_order, to compare orders: sum of the squared column lengths of L.
+/// The dominated vertices of an edge are assigned to its first eliminated end with all its rows, up to twice too many. position: (core
+/// vertices) a permutation.
 double estimate_operations(const Graph& core, double dominated_per_edge, const std::vector<std::int32_t>& position);
 
 }  // namespace carillon::partition

@@ -8,8 +8,8 @@
 
 namespace carillon::petsc {
 
-/// Owns one reference to a PETSc object. Destruction is collective, as PETSc's is: let handles die in the same order on every rank, and
-/// before the Session. Converts to the plain handle for calls; out() gives the address for MatCreate and its like and must be empty.
+/// Owns one reference to a PETSc object. Destruction is collective, as in PETSc: destroy handles in the same order on every rank, and
+/// before the Session. Converts to the plain handle for calls; out() returns the address for MatCreate and similar calls.
 template <typename T, PetscErrorCode (*destroy)(T*)>
 class Handle {
  public:

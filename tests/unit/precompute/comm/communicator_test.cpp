@@ -144,7 +144,7 @@ TEST(AllGather, refuses_more_bytes_than_mpi_can_count) {
   EXPECT_THAT(catch_message<SystemError>([] { world().plan_gathering(is_last() ? std::size_t{1} << 31 : 0); }),
               HasSubstr("2147483648 bytes"));
   const std::size_t share = (std::size_t{1} << 31) / static_cast<std::size_t>(world().size());  // fits one rank's count, but for one rank
-  EXPECT_THAT(catch_message<SystemError>([&] { world().plan_gathering(share + 1); }), HasSubstr("too many to bring to every rank"));
+  EXPECT_THAT(catch_message<SystemError>([&] { world().plan_gathering(share + 1); }), HasSubstr("too many to gather on every rank"));
 }
 
 TEST(IndexPartition, of_equal_runs_covers_every_number_once) {
