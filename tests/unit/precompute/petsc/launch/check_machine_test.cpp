@@ -33,7 +33,7 @@ TEST(CheckMachine, names_a_temporary_folder_that_takes_no_files) {
 
 TEST(CheckMachine, names_a_limit_on_the_size_of_files) {
   const rlimit limit{20'000, 20'000};
-  EXPECT_EXIT(::setrlimit(RLIMIT_FSIZE, &limit); expect_refusal("at most 20000 bytes here (ulimit -f"), ::testing::ExitedWithCode(0), "");
+  EXPECT_EXIT(::setrlimit(RLIMIT_FSIZE, &limit); expect_refusal("the file size limit is 20000 bytes (ulimit -f"), ::testing::ExitedWithCode(0), "");
 }
 
 }  // namespace
