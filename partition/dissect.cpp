@@ -10,7 +10,7 @@
 #include <numeric>
 #include <utility>
 
-#include "partition/condense.hpp"
+#include "partition/compress.hpp"
 #include "partition/metis.hpp"
 #include "partition/vertex_cover.hpp"
 
@@ -149,8 +149,8 @@ Ints separate_core(Graph core, double dominated_per_edge, int tries, int seed) {
 
 std::vector<std::int32_t> separate(const Graph& graph, int tries, int seed, std::optional<double> dominated_per_edge) {
   if (dominated_per_edge) return separate_core(graph, *dominated_per_edge, tries, seed);
-  const Condensation condensed(graph);
-  return condensed.expand_sides(separate_core(condensed.core(), condensed.dominated_per_edge(), tries, seed));
+  const CompressedGraph compressed(graph);
+  return compressed.expand_sides(separate_core(compressed.core(), compressed.dominated_per_edge(), tries, seed));
 }
 
 std::vector<std::int32_t> make_clusters(const Graph& graph, std::int32_t count) {

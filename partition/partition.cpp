@@ -16,7 +16,7 @@
 #include <numeric>
 #include <utility>
 
-#include "partition/condense.hpp"
+#include "partition/compress.hpp"
 #include "partition/metis.hpp"
 
 namespace carillon::partition {
@@ -117,7 +117,7 @@ std::vector<std::int32_t> order_core(const Graph& core, double dominated_per_edg
   for (int orders = 0; orders == 0 || (seeks_all ? pays_another_order(fewest, orders, vertices, tries) : orders < tries);
        ++orders, ++options[METIS_OPTION_SEED]) {
     order();
-    const double operations = estimate_operations(core, dominated_per_edge, position);
+    const double operations = predict_operations(core, dominated_per_edge, position);
     if (operations >= fewest) continue;
     fewest = operations;
     best = position;
@@ -272,8 +272,8 @@ Partition measure_parts(std::span<const std::int32_t> corners, std::vector<std::
 
 std::vector<std::int32_t> order_nested_dissection(const Graph& graph, std::optional<double> dominated_per_edge) {
   if (dominated_per_edge) return order_core(graph, *dominated_per_edge);
-  const Condensation condensed(graph);
-  return condensed.expand_order(order_core(condensed.core(), condensed.dominated_per_edge()));
+  const CompressedGraph compressed(graph);
+  return compressed.expand_order(order_core(compressed.core(), compressed.dominated_per_edge()));
 }
 
 Graph take_part(const Graph& graph, const std::vector<std::int32_t>& vertices, std::vector<std::int32_t>& number) {

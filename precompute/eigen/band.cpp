@@ -4,8 +4,8 @@
 #include <fmt/core.h>
 
 #include "precompute/eigen/memory.hpp"
+#include "precompute/eigen/predict_cost.hpp"
 #include "precompute/eigen/rigid_modes.hpp"
-#include "precompute/eigen/solve_estimate.hpp"
 #include "precompute/petsc/session.hpp"
 #include "runtime/base/error.hpp"
 

@@ -23,10 +23,6 @@ void check_input(const Problem& problem, const Options& options) {
     throw InputError(fmt::format("The tolerance {} is out of range: take one between 1e-14 and 1e-2.", options.tolerance));
   }
   const comm::Communicator comm = petsc::get_communicator(problem.stiffness);
-  if (comm.size() > 1 && options.factorisation == Factorisation::kCholmod) {
-    throw InputError(
-        fmt::format("CHOLMOD factorises on one rank and there are {}: leave the choice to the program, or take MUMPS.", comm.size()));
-  }
   comm.agree([&] {
     PetscInt rows = 0;
     PetscInt n = 0;

@@ -1,14 +1,14 @@
 // M inner product of column blocks.
 #pragma once
 
-#include <petscmat.h>
-
 #include <array>
+#include <cstddef>
 #include <span>
+#include <vector>
 
 #include "precompute/comm/communicator.hpp"
 #include "precompute/la/block_kernels.hpp"
-#include "precompute/petsc/handle.hpp"
+#include "precompute/la/node_matrix.hpp"
 
 namespace carillon::eigen {
 
@@ -17,22 +17,18 @@ using la::Columns;
 /// A block W of `width` columns in memory owned by the caller, and Z = M W, valid from multiply() until W changes or moves.
 class InnerProduct {
  public:
-  /// mass: M (n, n) with `rows` rows on this rank; null: the identity. diagonal: (rows) where M has nothing else, and must outlive it; null
-  /// where it has. Collective.
-  InnerProduct(const comm::Communicator& comm, Mat mass, PetscInt rows, PetscInt n, int width, const double* diagonal = nullptr);
-  ~InnerProduct();
+  /// mass: must outlive this object. rows: of this rank.
+  InnerProduct(const comm::Communicator& comm, const la::NodeMatrix& mass, std::ptrdiff_t rows, int width);
   InnerProduct(const InnerProduct&) = delete;
   InnerProduct& operator=(const InnerProduct&) = delete;
 
   /// W becomes the first `width` columns of `memory`, which must be contiguous.
-  void place(const Columns& memory);
+  void place(const Columns& memory) { w_ = memory.part(0, width_); }
   /// Z = M W. Collective.
-  void multiply();
+  void multiply() { mass_.multiply(w_, z_); }
 
   const Columns& w() const { return w_; }
   const Columns& z() const { return z_; }
-  Mat w_mat() const { return w_mat_; }
-  Mat z_mat() const { return z_mat_; }
   const comm::Communicator& comm() const { return comm_; }
 
   /// A^T B summed over all ranks, (a.count, b.count). Collective.
@@ -47,11 +43,10 @@ class InnerProduct {
 
  private:
   comm::Communicator comm_;
+  const la::NodeMatrix& mass_;
   int width_;
-  petsc::MatHandle mass_, w_mat_, z_mat_;
+  std::vector<double> space_;  // of Z
   Columns w_, z_;
-  const double* diagonal_;
-  bool is_placed_ = false;
 };
 
 }  // namespace carillon::eigen

@@ -14,8 +14,8 @@ using la::Columns;
 /// set_coupling() complete the relation for the last block; append() and restart() preserve it.
 class LanczosBasis {
  public:
-  /// memory: `fixed` columns that the basis is kept orthogonal to, then room + block columns, all one right after the other.
-  LanczosBasis(const Columns& memory, int fixed, int room, int block);
+  /// memory: room + block contiguous columns.
+  LanczosBasis(const Columns& memory, int room, int block);
 
   int room() const { return room_; }
   int block() const { return block_; }
@@ -26,10 +26,8 @@ class LanczosBasis {
   bool is_full() const { return size_ + next_width() > room_; }
 
   /// Columns of V and of the blocks behind it.
-  Columns columns(int first, int count) const { return memory_.part(fixed_ + first, count); }
-  Columns fixed() const { return memory_.part(0, fixed_); }
-  /// The fixed columns and V.
-  Columns fixed_and_basis() const { return memory_.part(0, fixed_ + size_); }
+  Columns columns(int first, int count) const { return memory_.part(first, count); }
+  Columns all() const { return columns(0, size_); }
 
   const la::Matrix& t() const { return t_; }                // (room, room), of which the first size() rows and columns count
   const la::Matrix& coupling() const { return coupling_; }  // R, (next_width, width)
@@ -48,7 +46,6 @@ class LanczosBasis {
 
  private:
   Columns memory_;
-  int fixed_;
   int room_;
   int block_;
   int size_ = 0;

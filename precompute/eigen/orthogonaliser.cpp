@@ -121,9 +121,9 @@ la::Matrix Orthogonaliser::subtract_and_vote(const la::Product& product, int s_s
 std::vector<Columns> Orthogonaliser::find_projected_out() const {
   std::vector<Columns> sets;
   if (is_skipped_) {
-    sets = {basis_.columns(basis_.previous(), basis_.size() - basis_.previous()), basis_.fixed()};
+    sets = {basis_.columns(basis_.previous(), basis_.size() - basis_.previous())};
   } else {
-    sets = {basis_.fixed_and_basis()};
+    sets = {basis_.all()};
   }
   for (const Columns& part : locked_.find_parts(projected_)) sets.push_back(part);
   return sets;
@@ -148,7 +148,7 @@ la::Matrix Orthogonaliser::project(la::Matrix* alpha) {
   const std::vector<Columns> against = find_projected_out();
   std::vector<Columns> sets = against;
   sets.push_back(next);
-  const int width = basis_.width(), fixed = is_skipped_ ? 0 : basis_.fixed().count, basis = against.front().count;
+  const int width = basis_.width(), basis = against.front().count;
   for (int pass = 0;; ++pass) {
     const la::Matrix c = subtract_and_vote(recurrence, static_cast<int>(local.rows()), sets, next.count);
     const auto stride = static_cast<int>(c.rows()), all = stride - next.count;
@@ -156,7 +156,7 @@ la::Matrix Orthogonaliser::project(la::Matrix* alpha) {
     recurrence.a.count = 0;
     if (!is_first) (*alpha) += c.middleRows(basis - width, width);
     if (pass == 0 && !is_first) deflation_.update_noise(projected_, parts);
-    if (pass == 0 && !is_first && !is_skipped_) estimate_.update_noise(here(), c.data() + fixed, stride);
+    if (pass == 0 && !is_first && !is_skipped_) estimate_.update_noise(here(), c.data(), stride);
     const la::Vector along_basis = c.topRows(basis).colwise().squaredNorm();
     // Largest removed part of a column's squared norm; its rounding error stays in the column.
     const double taken = (along_basis.array() / c.bottomRows(next.count).diagonal().array()).maxCoeff();
@@ -192,7 +192,7 @@ la::Matrix Orthogonaliser::reproject(const la::Matrix& before) {
   projected_ = deflation_.all();
   const Columns next = inner_.w().part(0, basis_.width());
   const Columns next_mass = inner_.z().part(0, basis_.width());
-  const Columns all = basis_.fixed_and_basis();
+  const Columns all = basis_.all();
   for (int pass = 0; pass < 2; ++pass) {
     inner_.multiply();
     (void)locked_.project_out(inner_.comm(), projected_, next, next_mass);
@@ -248,7 +248,7 @@ bool Orthogonaliser::orthonormalise_by_cholesky(la::Matrix& r) {
 // Orthogonalises column i of w twice against the basis, the locked modes and the preceding columns; adds to coefficients (i). Returns its
 // M-norm, zero if almost nothing is left.
 double Orthogonaliser::orthogonalise_column(int i, double* coefficients) {
-  const Columns all = basis_.fixed_and_basis();
+  const Columns all = basis_.all();
   const Columns column = inner_.w().part(i, 1);
   const Columns image = inner_.z().part(i, 1);
   inner_.multiply();

@@ -43,7 +43,7 @@ class Orthogonaliser {
  private:
   LanczosStep here() const { return {basis_.t(), basis_.size(), basis_.width(), basis_.previous()}; }
   int count() const { return basis_.size() == 0 ? basis_.block() : basis_.width(); }  // maximum columns of the next block
-  PetscInt free_dimension() const { return n_ - basis_.fixed().count - locked_.count(); }
+  PetscInt free_dimension() const { return n_ - locked_.count(); }
   la::Matrix calc_recurrence(const la::Matrix& alpha) const;
   void decide(const la::Matrix& alpha);
   la::Matrix project(la::Matrix* alpha);

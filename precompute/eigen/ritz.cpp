@@ -37,14 +37,6 @@ double calc_gap(const la::Vector& theta, Eigen::Index i) {
   return gap;
 }
 
-void order_first(RitzSelection& selection, const std::vector<double>& lambda, const RitzGoal& goal) {
-  const auto at = [&](int i) { return lambda[i]; };
-  std::stable_sort(selection.order.begin(), selection.order.end(), [&](int a, int b) { return goal.comes_first(at(a), at(b)); });
-  const auto is_converged = [&](int i) { return selection.error[i] <= goal.tolerance; };
-  selection.converged = std::find_if_not(selection.order.begin(), selection.order.end(), is_converged) - selection.order.begin();
-  selection.is_complete = selection.converged >= goal.wanted;
-}
-
 void order_interval(RitzSelection& selection, const la::Vector& theta, const std::vector<double>& lambda, const RitzGoal& goal) {
   const auto at = [&](int i) { return lambda[i]; };
   const auto error = [&](int i) { return selection.error[i]; };
@@ -66,6 +58,13 @@ void order_interval(RitzSelection& selection, const la::Vector& theta, const std
 }
 
 }  // namespace
+
+double calc_ritz_error(double sigma, double theta, double residual) {
+  constexpr double kMaxLoss = 1e3;
+  const double lambda = std::abs(sigma + 1 / theta);
+  const double loss = std::min(std::abs(1 / theta) / std::max(lambda, std::numeric_limits<double>::epsilon()), kMaxLoss);
+  return residual / std::abs(theta) * std::max(loss, 1.0);
+}
 
 RitzPairs calc_ritz_pairs(const comm::Communicator& comm, const LanczosBasis& basis) {
   const int n = basis.size(), width = basis.width();
@@ -106,18 +105,14 @@ RitzSelection select(const RitzPairs& pairs, const RitzGoal& goal) {
   for (Eigen::Index i = 0; i < pairs.theta.size(); ++i) {
     const double theta = pairs.theta[i];
     const double residual = pairs.residual[i];
-    const double error = goal.error(theta, residual);
+    const double error = calc_ritz_error(goal.sigma, theta, residual);
     const double allowed = std::max(kVectorAngle * calc_gap(pairs.theta, i), kThetaRounding * std::abs(theta));
     selection.error.push_back(std::max(error, residual / allowed * goal.tolerance));
-    lambda.push_back(goal.to_lambda(theta));
+    lambda.push_back(to_lambda(goal.sigma, theta));
   }
   selection.order.resize(lambda.size());
   std::iota(selection.order.begin(), selection.order.end(), 0);
-  if (goal.is_interval) {
-    order_interval(selection, pairs.theta, lambda, goal);
-  } else {
-    order_first(selection, lambda, goal);
-  }
+  order_interval(selection, pairs.theta, lambda, goal);
   return selection;
 }
 

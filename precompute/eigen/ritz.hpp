@@ -4,7 +4,6 @@
 #include <mpi.h>
 
 #include <cstdint>
-#include <functional>
 #include <vector>
 
 #include "precompute/comm/communicator.hpp"
@@ -28,20 +27,20 @@ void share_vectors(const comm::Communicator& comm, RitzPairs& pairs);
 
 /// Convergence goal of an iteration.
 struct RitzGoal {
-  bool is_interval = false;  // all eigenvalues lambda of [low, high]; else the `wanted` ones that come first
-  double low = 0;
+  double low = 0;  // all eigenvalues lambda of [low, high] are wanted
   double high = 0;
-  std::int64_t wanted = 0;     // their number,
-  bool is_count_known = true;  // as is known, or guessed
+  std::int64_t wanted = 0;     // their number
+  bool is_count_known = true;  // wanted is exact; otherwise a guess
   double sigma = 0;
-  double tolerance = 0;  // of error()
-  /// The error of a Ritz value from its residual: the convergence test.
-  std::function<double(double theta, double residual)> error;
-  /// From theta to lambda.
-  std::function<double(double theta)> to_lambda;
-  /// Whether eigenvalue a is wanted before b; ignored with an interval.
-  std::function<bool(double a, double b)> comes_first;
+  double tolerance = 0;  // of calc_ritz_error()
 };
+
+inline double to_lambda(double sigma, double theta) { return 1 / theta + sigma; }
+
+/// Error of a Ritz value theta from its residual: the convergence test of both methods. Relative to lambda = sigma + 1 / theta if that is
+/// stricter than relative to theta, so that a mode near zero keeps its digits under a shift far above it; limited because rounding of the
+/// operator prevents convergence beyond.
+double calc_ritz_error(double sigma, double theta, double residual);
 
 /// Pairs in the order in which they are wanted, converged ones first.
 struct RitzSelection {

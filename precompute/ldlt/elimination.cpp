@@ -10,7 +10,7 @@
 #include <numeric>
 #include <utility>
 
-#include "partition/condense.hpp"
+#include "partition/compress.hpp"
 #include "precompute/comm/exchange.hpp"
 #include "precompute/ldlt/lists.hpp"
 
@@ -353,26 +353,26 @@ Elimination eliminate_on_paper(const Communicator& comm, const NodeLinks& nodes,
 
 Elimination eliminate_elements(const Communicator& comm, std::span<const std::int32_t> elements, int width, std::int32_t nodes) {
   Elimination all = comm.agree([&] { return Elimination(comm.size()); });
-  const auto condensed = comm.agree([&] { return partition::Condensation(elements, width, nodes, kSmallestCore); });
+  const auto compressed = comm.agree([&] { return partition::CompressedGraph(elements, width, nodes, kSmallestCore); });
   NodeLinks core = comm.agree([&] {
     NodeLinks links;
-    links.own_nodes = condensed.core().vertex_count();
-    links.links = {condensed.core().offsets, condensed.core().neighbours};
+    links.own_nodes = compressed.core().vertex_count();
+    links.links = {compressed.core().offsets, compressed.core().neighbours};
     return links;
   });
   const IndexPartition core_owners(comm, core.own_nodes);
   core.first_node = static_cast<std::int32_t>(core_owners.own_begin());
-  const double dominated_per_edge = comm.broadcast([&] { return condensed.dominated_per_edge(); });
+  const double dominated_per_edge = comm.broadcast([&] { return compressed.dominated_per_edge(); });
   std::vector<Ints> placed = order_parts(comm, core, core_owners, all.tree, kAnyNumber, dominated_per_edge);
   comm.agree([&] { hold_parts(comm, all, std::move(placed)); });
   const Ints core_position = report_own_positions(comm, all, core_owners);
 
   // Rank 0 expands the compressed graph; the parts grow accordingly.
-  const Ints position = comm.agree([&] { return condensed.expand_order(core_position); });
+  const Ints position = comm.agree([&] { return compressed.expand_order(core_position); });
   const Ints ends = comm.broadcast([&] {
     Ints end(all.tree.parts.size(), 0);
     for (std::size_t v = 0; v < position.size(); ++v) {
-      const std::int32_t number = condensed.numbers()[v];
+      const std::int32_t number = compressed.numbers()[v];
       if (number < 0) continue;
       const int part = all.tree.find_part(core_position[number]);
       end[part] = std::max(end[part], position[v] + 1);

@@ -11,11 +11,6 @@
 #include <utility>
 #include <vector>
 
-#include "precompute/eigen/solver_options.hpp"
-#include "precompute/run/io/checkpoint_file.hpp"
-#include "precompute/run/io/fingerprint.hpp"
-#include "precompute/run/io/matrices.hpp"
-#include "precompute/run/io/surface_modes.hpp"
 #include "precompute/petsc/session.hpp"
 #include "precompute/run/accuracy.hpp"
 #include "precompute/run/air.hpp"
@@ -24,6 +19,10 @@
 #include "precompute/run/coupling.hpp"
 #include "precompute/run/describe_run.hpp"
 #include "precompute/run/interrupt.hpp"
+#include "precompute/run/io/checkpoint_file.hpp"
+#include "precompute/run/io/fingerprint.hpp"
+#include "precompute/run/io/matrices.hpp"
+#include "precompute/run/io/surface_modes.hpp"
 #include "precompute/run/known_body.hpp"
 #include "precompute/run/open_job.hpp"
 #include "precompute/run/run.hpp"

@@ -7,9 +7,9 @@
 #include <numbers>
 #include <vector>
 
-#include "precompute/mesh/distributed/distribute.hpp"
 #include "precompute/eigen/solve_modes.hpp"
 #include "precompute/fem/assemble.hpp"
+#include "precompute/mesh/distributed/distribute.hpp"
 #include "precompute/petsc/session.hpp"
 #include "tests/support/box_mesh.hpp"
 
@@ -85,9 +85,7 @@ TEST_P(Sparse, gives_the_frequencies_that_dense_lapack_gives) {
 
 INSTANTIATE_TEST_SUITE_P(Table, Sparse,
                          testing::Values(Case{"T4_lumped_mumps", 1, job::Mass::lumped, Factorisation::kMumps},
-                                         Case{"T4_consistent_cholmod", 1, job::Mass::consistent, Factorisation::kCholmod},
-                                         Case{"T10_consistent_mumps", 2, job::Mass::consistent, Factorisation::kMumps},
-                                         Case{"T10_consistent_cholmod", 2, job::Mass::consistent, Factorisation::kCholmod}),
+                                         Case{"T10_consistent_mumps", 2, job::Mass::consistent, Factorisation::kMumps}),
                          [](const auto& info) { return info.param.name; });
 
 }  // namespace

@@ -4,7 +4,7 @@
 // separator has them on both sides.
 // Source: George and Liu 1989, "The evolution of the minimum degree ordering algorithm" (postponed elimination by outmatching); Barmak and
 // Minian 2012 (dominated vertices); Liu 1990, "The role of elimination trees in sparse factorization".
-#include "partition/condense.hpp"
+#include "partition/compress.hpp"
 
 #include <algorithm>
 #include <numeric>
@@ -118,7 +118,8 @@ class ElementDominators {
 
 }  // namespace
 
-Condensation::Condensation(const Graph& graph, std::int32_t smallest_core) : number_(static_cast<std::size_t>(graph.vertex_count()), -1) {
+CompressedGraph::CompressedGraph(const Graph& graph, std::int32_t smallest_core)
+    : number_(static_cast<std::size_t>(graph.vertex_count()), -1) {
   for (std::int32_t v = 0; v < graph.vertex_count(); ++v) degree_.push_back(static_cast<std::int32_t>(graph.list_neighbours(v).size()));
   const Dominators all(graph);
   const Ints kept = choose_core(all.offsets, all.list, smallest_core);
@@ -126,7 +127,7 @@ Condensation::Condensation(const Graph& graph, std::int32_t smallest_core) : num
   core_ = kept.empty() ? graph : take_part(graph, kept, scratch);
 }
 
-Condensation::Condensation(std::span<const std::int32_t> elements, int width, std::int32_t nodes, std::int32_t smallest_core)
+CompressedGraph::CompressedGraph(std::span<const std::int32_t> elements, int width, std::int32_t nodes, std::int32_t smallest_core)
     : number_(static_cast<std::size_t>(nodes), -1) {
   const ElementLists lists = list_elements(elements, width, nodes);
   for (std::int32_t v = 0; v < nodes; ++v) degree_.push_back(static_cast<std::int32_t>(lists.of(v).size()));
@@ -142,7 +143,7 @@ Condensation::Condensation(std::span<const std::int32_t> elements, int width, st
   core_ = make_node_graph(of_core, width, static_cast<std::int32_t>(kept.size()));
 }
 
-Ints Condensation::choose_core(const Ints& offsets, const Ints& dominators, std::int32_t smallest_core) {
+Ints CompressedGraph::choose_core(const Ints& offsets, const Ints& dominators, std::int32_t smallest_core) {
   Ints kept;
   for (std::size_t v = 0; v < number_.size(); ++v) {
     if (offsets[v] < offsets[v + 1]) continue;
@@ -164,12 +165,12 @@ Ints Condensation::choose_core(const Ints& offsets, const Ints& dominators, std:
   return kept;
 }
 
-double Condensation::dominated_per_edge() const {
+double CompressedGraph::dominated_per_edge() const {
   const auto dominated = static_cast<double>(number_.size()) - core_.vertex_count();
   return core_.neighbours.empty() ? 0 : dominated / (0.5 * static_cast<double>(core_.neighbours.size()));
 }
 
-Ints Condensation::expand_sides(const Ints& side) const {
+Ints CompressedGraph::expand_sides(const Ints& side) const {
   Ints result(number_.size(), 2);
   for (std::size_t v = 0; v < number_.size(); ++v) {
     if (number_[v] >= 0) result[v] = side[number_[v]];
@@ -179,13 +180,13 @@ Ints Condensation::expand_sides(const Ints& side) const {
 }
 
 /// Position of the first core vertex that dominates this vertex.
-std::int32_t Condensation::find_first_host(std::int32_t vertex, const Ints& position) const {
+std::int32_t CompressedGraph::find_first_host(std::int32_t vertex, const Ints& position) const {
   auto first = static_cast<std::int32_t>(position.size());
   for (std::int32_t k = offsets_[vertex]; k < offsets_[vertex + 1]; ++k) first = std::min(first, position[hosts_[k]]);
   return first;
 }
 
-Ints Condensation::expand_order(const Ints& position) const {
+Ints CompressedGraph::expand_order(const Ints& position) const {
   // Grouped by the position of the first dominator, dominated vertices before it.
   std::vector<Ints> dominated(position.size());
   Ints last(position.size());
@@ -212,7 +213,7 @@ int find_tries(const Graph& core, double dominated_per_edge) {
   return dominated >= 3.0 * core.vertex_count() ? 4 : 1;
 }
 
-double estimate_operations(const Graph& core, double dominated_per_edge, const Ints& position) {
+double predict_operations(const Graph& core, double dominated_per_edge, const Ints& position) {
   const std::size_t count = position.size();
   Ints at(count);
   std::vector<double> width(count, 1.0);  // (positions) vertices eliminated there

@@ -52,7 +52,7 @@ std::int64_t calc_search_bytes(std::int64_t rows, std::int64_t modes, std::int64
 std::int64_t calc_dense_bytes(std::int64_t unknowns, bool is_root);
 
 /// Predicted cost of a solve.
-struct SolveEstimate {
+struct SolveCost {
   bool is_dense = false;               // LAPACK; only copies and rigid_count are set
   std::int64_t entries = 0;            // factor entries, all ranks
   double flops = 0;                    // of one factorisation
@@ -67,6 +67,6 @@ struct SolveEstimate {
 
 /// Analyses K - sigma M. If may_count() accepts the cost of two factorisations and memory suffices, also counts the modes of the band by
 /// inertia. K and M are unchanged. Throws the errors that solve_modes() throws before its search, except for lack of memory. Collective.
-SolveEstimate estimate_solve(const Problem& problem, const Options& options, const std::function<bool(const SolveEstimate&)>& may_count);
+SolveCost predict_cost(const Problem& problem, const Options& options, const std::function<bool(const SolveCost&)>& may_count);
 
 }  // namespace carillon::eigen

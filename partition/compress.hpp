@@ -13,13 +13,13 @@ namespace carillon::partition {
 /// A graph without its dominated vertices. Vertex u dominates v if they are adjacent and every other neighbour of v is also adjacent to u:
 /// a set that separates u from a vertex then separates v from it too, and v can be eliminated before u without additional fill. In a T10
 /// mesh the middle of an edge is dominated by both ends. Vertices with the same neighbours dominate each other; the first of them stays.
-class Condensation {
+class CompressedGraph {
  public:
   /// If the core would have fewer than `smallest_core` vertices, or more than half of all, the graph is not compressed.
-  explicit Condensation(const Graph& graph, std::int32_t smallest_core = kSmallestCore);
+  explicit CompressedGraph(const Graph& graph, std::int32_t smallest_core = kSmallestCore);
   /// Compresses the node graph of a mesh without building it: u dominates v if it is in all elements of v. A vertex whose neighbours happen
   /// to be shared by another vertex stays in the core. elements: as for make_node_graph(), nodes of an element distinct.
-  Condensation(std::span<const std::int32_t> elements, int width, std::int32_t nodes, std::int32_t smallest_core = kSmallestCore);
+  CompressedGraph(std::span<const std::int32_t> elements, int width, std::int32_t nodes, std::int32_t smallest_core = kSmallestCore);
 
   /// The graph of the vertices not dominated by another, in their order.
   const Graph& core() const { return core_; }
@@ -59,6 +59,6 @@ int find_tries(const Graph& core, double dominated_per_edge);
 /// Predicted operations of a factorisation in the order made by expand_order, to compare orders: sum of the squared column lengths of L.
 /// The dominated vertices of an edge are assigned to its first eliminated end with all its rows, up to twice too many. position: (core
 /// vertices) a permutation.
-double estimate_operations(const Graph& core, double dominated_per_edge, const std::vector<std::int32_t>& position);
+double predict_operations(const Graph& core, double dominated_per_edge, const std::vector<std::int32_t>& position);
 
 }  // namespace carillon::partition
