@@ -49,8 +49,8 @@ bool dominates(const Graph& graph, std::int32_t u, std::int32_t v) {
   return u != v && of_u.contains(v) && std::includes(of_u.begin(), of_u.end(), of_v.begin(), of_v.end()) && (of_u != of_v || u < v);
 }
 
-/// The core by the definition, if it is used: whether it is; and every dominated vertex in a separator that its core asks for, and in no
-/// other.
+/// Checks the core against the definition: whether it is used, and that a dominated vertex is in a separator exactly if its core requires
+/// it.
 bool expect_core_of_definition(const Graph& graph) {
   const CompressedGraph compressed(graph, 1);
   const std::int32_t n = graph.vertex_count();
@@ -96,7 +96,7 @@ bool expect_core_of_definition(const Graph& graph) {
   return true;
 }
 
-TEST(CompressedGraph, has_the_core_of_the_definition) {
+TEST(CompressedGraph, matches_the_definition) {
   EXPECT_TRUE(expect_core_of_definition(make_t10_graph({2, 2, 2})));
   EXPECT_TRUE(expect_core_of_definition(make_t10_graph({4, 1, 1})));
   const auto t4 = tests::make_box({3, 3, 1}, {1, 1, 1});
@@ -116,7 +116,7 @@ TEST(CompressedGraph, has_the_core_of_the_definition) {
   EXPECT_GT(used, 10);
 }
 
-/// The core of elements by the definition: a node is dominated by one that is in all of its elements.
+/// Core of elements by the definition: a node is dominated by one that is in all of its elements.
 void expect_core_of_elements(const Vertices& elements, int width, std::int32_t nodes) {
   std::vector<std::set<std::int32_t>> of(nodes);
   for (std::size_t k = 0; k < elements.size(); ++k)
@@ -184,7 +184,7 @@ TEST(CompressedGraph, of_elements_and_of_their_graph_give_the_same_separators) {
   EXPECT_EQ(of_elements.expand_sides(separate(of_elements.core(), 1, 0, of_elements.dominated_per_edge())), separate(graph, 1));
 }
 
-TEST(CompressedGraph, of_hard_graphs_is_what_it_has_to_be) {
+TEST(CompressedGraph, handles_hard_graphs) {
   std::set<std::pair<std::int32_t, std::int32_t>> clique, star, path;
   for (std::int32_t a = 0; a < 12; ++a)
     for (std::int32_t b = a + 1; b < 12; ++b) {
@@ -208,11 +208,11 @@ TEST(CompressedGraph, of_hard_graphs_is_what_it_has_to_be) {
   }
 }
 
-TEST(CompressedGraph, of_second_order_is_the_corners_and_its_separators_separate) {
+TEST(CompressedGraph, of_second_order_keeps_the_corners_and_separates) {
   const std::array<int, 3> cells{8, 7, 6};
   const Graph graph = make_t10_graph(cells);
   const CompressedGraph compressed(graph);
-  // Without the eight corners of the box: what lies in one cell only is dominated by an end of the cell's diagonal.
+  // Without the eight corners of the box: a node in one cell only is dominated by an end of the cell's diagonal.
   EXPECT_EQ(compressed.core().vertex_count(), (cells[0] + 1) * (cells[1] + 1) * (cells[2] + 1) - 8);
   EXPECT_EQ(find_tries(compressed.core(), compressed.dominated_per_edge()), 4);
   const Vertices side = separate(graph);
@@ -229,7 +229,7 @@ TEST(CompressedGraph, of_second_order_is_the_corners_and_its_separators_separate
   EXPECT_LE(counts[2], 1.3 * (2 * cells[1] + 1) * (2 * cells[2] + 1)) << "a plane of nodes across the shorter sides";
 }
 
-TEST(CompressedGraph, estimates_operations_as_an_elimination_counts_them) {
+TEST(CompressedGraph, predicts_the_operations_of_an_elimination) {
   const Graph graph = make_t10_graph({5, 4, 4});
   const CompressedGraph compressed(graph, 1);
   Vertices position(compressed.core().vertex_count());
@@ -247,7 +247,7 @@ TEST(CompressedGraph, estimates_operations_as_an_elimination_counts_them) {
   for (std::size_t k = 0; k < 3; ++k) EXPECT_GT(estimate(orders[k]), 2 * estimate(orders[3]));
 }
 
-/// What METIS makes of all vertices.
+/// METIS on all vertices.
 Vertices order_all(const Graph& graph) {
   Graph copy = graph;
   idx_t count = graph.vertex_count();

@@ -34,7 +34,7 @@ Graph make_grid(std::int32_t nx, std::int32_t ny, std::int32_t nz) {
   return graph;
 }
 
-/// The vertices of each connected piece that is left when the last `removed` places of the order are taken away.
+/// Vertices of each connected component that remains when the last `removed` positions of the order are removed.
 Ints measure_pieces(const Graph& graph, const Ints& position, std::int32_t removed) {
   const std::int32_t kept = graph.vertex_count() - removed;
   std::vector<bool> seen(position.size(), false);

@@ -1,4 +1,4 @@
-// What solve_modes promises for any body, against LAPACK's dense solver on the same springs.
+// solve_modes for any body, against the dense solver of LAPACK on the same springs.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -15,7 +15,7 @@
 namespace carillon::eigen {
 namespace {
 
-// The block that most tests use: 5 x 5 x 10 masses, free, 750 unknowns; the band holds its lowest 60 modes or so.
+// The block used by most tests: 5 x 5 x 10 free masses, 750 unknowns; the band holds about its lowest 60 modes.
 const Network& get_block() {
   static const Network block = make_block(5, 5, 10);
   return block;
@@ -78,7 +78,7 @@ TEST(SolveModes, keeps_residuals_that_an_independent_calculation_confirms) {
   }
 }
 
-TEST(SolveModes, leaves_the_matrices_bit_for_bit_as_they_were) {
+TEST(SolveModes, does_not_change_the_matrices) {
   const test::System system = test::make_system(get_block());
   petsc::MatHandle k;
   petsc::MatHandle m;
@@ -256,7 +256,7 @@ TEST(SolveModes, agrees_between_block_lanczos_and_krylov_schur) {
   expect_eigenvalues(single, pick(get_block_eigenvalues(), options.low_hz, options.high_hz));
 }
 
-// Dense matrices pay where most of the spectrum is wanted: a wide band of which max_modes wants a few is no reason (docs/accuracy.md).
+// Dense matrices are faster if most of the spectrum is wanted; a wide band with a small max_modes is not such a case (docs/accuracy.md).
 TEST(SolveModes, goes_dense_by_the_modes_wanted_and_not_by_the_band) {
   const test::System system = test::make_system(get_block());
   Options options = make_options();
@@ -282,7 +282,7 @@ TEST(SolveModes, solves_densely_when_asked_to) {
   EXPECT_EQ(modes.factor.solves, 0);
 }
 
-TEST(SolveModes, names_the_interval_and_the_counts_when_modes_stay_missing) {
+TEST(SolveModes, names_interval_and_counts_of_missing_modes) {
   const test::System system = test::make_system(get_block());
   Options options = make_options();
   options.max_steps = 1;
@@ -292,7 +292,7 @@ TEST(SolveModes, names_the_interval_and_the_counts_when_modes_stay_missing) {
   } catch (const SolveError& error) {
     message = error.what();
   }
-  // One of the parts that the counts at the ends and at the shift cut the band into.
+  // The interval is one of those between the counts at the ends and at the shift.
   double low_hz = 0, high_hz = 0;
   unsigned long counted = 0, found = 1;
   ASSERT_EQ(std::sscanf(message.c_str(), "Between %lf and %lf Hz the inertia of K - lambda M counts %lu modes, and %lu were found", &low_hz,

@@ -1,4 +1,4 @@
-// Block Lanczos next to modes that it is to stay away from: what it returns is neither one of them nor twice the same.
+// Block Lanczos with locked modes: results are orthogonal to these and to each other.
 #include "precompute/eigen/block_lanczos.hpp"
 
 #include <gtest/gtest.h>
@@ -23,10 +23,10 @@ namespace {
 using petsc::check;
 
 constexpr double kSigma = 0.7;
-constexpr int kEqual = 240;   // unknowns with the eigenvalue next to the shift,
-constexpr int kLocked = 150;  // and as many of them are locked
+constexpr int kEqual = 240;   // unknowns with the eigenvalue next to the shift
+constexpr int kLocked = 150;  // locked modes among them
 constexpr int kOthers = 960;
-constexpr double kNear = 3e-5;  // how far the shift is, relative to it
+constexpr double kNear = 3e-5;  // distance of that eigenvalue from the shift, relative
 
 // A diagonal K, M = 1: eigenvalue i belongs to unit vector i.
 std::vector<double> make_diagonal() {
@@ -37,7 +37,7 @@ std::vector<double> make_diagonal() {
 
 struct Outcome {
   PetscInt converged = 0;
-  double worst_locked = 0;  // |l^T x| of a locked mode and a returned one
+  double worst_locked = 0;  // |l^T x| of a locked and a returned mode
   double worst_gram = 0;    // |X^T X - 1|
 };
 
@@ -105,9 +105,9 @@ Outcome run_next_to_locked(int count, double error) {
   return run;
 }
 
-// A locked mode with an error has a residual, which points where the basis comes late. What has come up of the mode until it is taken out
-// is then far more than predicted, and taking it out turns the new block towards older ones. Residuals of 1e-6 and 3e-6 are far above
-// rounding. Orthogonality that a step is not to lose: 2e-8.
+// A locked mode with an error has a residual along directions that the basis reaches late. The part of the mode that appears before it is
+// projected out is then far larger than predicted, and projecting it out turns the new block towards older ones. Residuals of 1e-6 and 3e-6
+// are far above rounding. Bound: the loss allowed per step, 2e-8.
 TEST(BlockLanczos, stays_orthogonal_next_to_locked_modes_with_errors) {
   for (const int count : {0, 1, 10, kLocked}) {
     for (const double error : {3e-11, 1e-10}) {

@@ -1,4 +1,4 @@
-// Bodies whose eigenvalues are known in closed form.
+// Bodies with closed-form eigenvalues.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -16,8 +16,8 @@ namespace {
 constexpr double kRate = 4e6;  // [N/m]
 constexpr double kMass = 0.5;  // [kg]
 
-// side^3 free masses between fixed walls, coupled to their neighbours alike in x, y and z:
-// lambda = 4 k/m sum_d sin^2(pi j_d / (2 (side + 1))), j_d = 1 ... side, each three times. Symmetry makes up to 18 of them equal.
+// side^3 free masses between fixed walls, coupled isotropically to their neighbours: lambda = 4 k/m sum_d sin^2(pi j_d / (2 (side + 1))),
+// j_d = 1 ... side, each three times. Symmetry makes up to 18 of them equal.
 Network make_cube_between_walls(int side, double rate = kRate) {
   Network network;
   const int width = side + 2;
@@ -54,7 +54,7 @@ std::vector<double> calc_cube_eigenvalues(int side, double rate = kRate) {
   return lambda;
 }
 
-// Compares with the closed form's eigenvalues of the band.
+// Compares with the closed-form eigenvalues of the band.
 void expect_band(const Modes& modes, const std::vector<double>& all, const Options& options) {
   std::vector<double> expected;
   for (const double lambda : all) {
@@ -68,7 +68,7 @@ void expect_band(const Modes& modes, const std::vector<double>& all, const Optio
 }
 
 TEST(SolveModes, gives_a_molecule_of_four_masses_its_six_vibrations) {
-  Network network;  // A regular tetrahedron of springs: lambda = k/m twice, 2 k/m three times, 4 k/m once.
+  Network network;  // regular tetrahedron of springs: lambda = k/m twice, 2 k/m three times, 4 k/m once
   network.nodes = {{1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}};
   network.mass_kg.assign(4, kMass);
   network.component.assign(4, 0);
@@ -121,7 +121,7 @@ TEST(SolveModes, finds_every_copy_when_blocks_are_narrower_than_the_multiplicity
 TEST(SolveModes, counts_a_mode_on_the_end_of_the_band_as_in_it) {
   const test::System system = test::make_system(make_cube_between_walls(8));
   const std::vector<double> all = calc_cube_eigenvalues(8);
-  Options options;  // Both ends hit clusters of equal eigenvalues exactly.
+  Options options;  // both ends hit clusters of equal eigenvalues exactly
   options.low_hz = to_hz(all[3]);
   options.high_hz = to_hz(all[60]);
   for (const auto how : {Factorisation::kAutomatic, Factorisation::kMumps}) {
@@ -152,7 +152,7 @@ TEST(SolveModes, leaves_out_modes_that_lie_just_outside_the_band) {
   }
 }
 
-// Below the last shift of a slice all copies are found before the next slice begins, and a group larger than any slice is no obstacle.
+// All copies below the last shift of a slice are found before the next slice begins; a group larger than a slice is handled.
 TEST(SolveModes, finds_more_degenerate_modes_than_a_slice_holds) {
   int size = 1;
   MPI_Comm_size(PETSC_COMM_WORLD, &size);

@@ -1,4 +1,4 @@
-// The parts of block Lanczos, each against dense matrices that every rank has.
+// Parts of block Lanczos against dense matrices known on every rank.
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
@@ -84,7 +84,7 @@ class Rig {
     for (int j = 0; j < columns.count; ++j) std::copy_n(columns.column(j), rows, all.col(j).data() + first);
     return sum_over_ranks(all);
   }
-  /// This rank's rows of column j of a dense matrix, into a column.
+  /// Copies this rank's rows of column j of a dense matrix into a column.
   void scatter(const Matrix& all, Eigen::Index j, double* column) const { std::copy_n(all.col(j).data() + first, rows, column); }
   RitzGoal make_goal(double low, double high, int wanted) const {
     RitzGoal goal;
@@ -139,7 +139,7 @@ TEST(InnerProduct, multiplies_by_the_mass_at_every_place_of_its_block) {
   }
 }
 
-// With a mass matrix of any kind, and with a diagonal one, against Eigen's products.
+// With a general and a diagonal mass matrix, against products of Eigen.
 TEST(InnerProduct, subtracts_multiplies_and_combines_in_one_pass) {
   Rig rig(2 * Rig::kBlock);
   for (const bool is_diagonal : {false, true}) {
@@ -241,7 +241,7 @@ TEST(LanczosBasis, keeps_the_krylov_relation_through_steps_and_restarts) {
   EXPECT_GE(restarts, 2);
 }
 
-TEST(RitzStep, finds_what_a_dense_solver_finds_and_its_residuals_are_true) {
+TEST(RitzStep, agrees_with_a_dense_solver_and_has_true_residuals) {
   Rig rig(72 + Rig::kBlock);
   ShiftInvert inverse = rig.make_inverse();
   const auto n = static_cast<PetscInt>(rig.k.rows());
@@ -270,7 +270,7 @@ TEST(RitzStep, finds_what_a_dense_solver_finds_and_its_residuals_are_true) {
   for (PetscInt j = 0; j < n; ++j) EXPECT_NEAR(pairs.theta[j], expected[j], 1e-12 * scale) << j;
 }
 
-TEST(RitzStep, selects_an_interval_and_sees_when_it_is_complete) {
+TEST(RitzStep, selects_an_interval_and_detects_completion) {
   RitzGoal goal;
   goal.low = 2;
   goal.high = 4;
@@ -310,8 +310,8 @@ TEST(Orthogonaliser, replaces_dependent_columns_of_the_starting_block) {
   EXPECT_LT(find_largest(v.transpose() * rig.m * v - Matrix::Identity(Rig::kBlock, Rig::kBlock)), 1e-12);
 }
 
-// Hard cases of the Gram matrix that comes with the products: nearly dependent columns, where it is not enough; and locked modes that make
-// up nearly all of a column, where w^T M w - c^T c would be cancellation. Bound: still orthonormal to 1e-12.
+// Hard cases for the Gram matrix computed with the products: nearly dependent columns, where it is insufficient; and locked modes that make
+// up nearly all of a column, where w^T M w - c^T c cancels. Bound: orthonormal to 1e-12.
 TEST(Orthogonaliser, keeps_nearly_dependent_and_nearly_locked_columns_orthonormal) {
   for (const double rest : {1e-1, 1e-3, 1e-6, 1e-9}) {
     Rig rig(20);
