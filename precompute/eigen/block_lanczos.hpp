@@ -39,7 +39,6 @@ class BlockLanczos {
   /// get_converged() Ritz vectors, M-orthonormal, in the order of the selection.
   End run(const Monitor& monitor);
   std::int64_t get_converged() const { return converged_; }
-  int get_steps() const { return steps_; }
 
   /// Parts of run(). start(): from the starting block; false if nothing of it is left. step(): adds a block behind the basis; false if the
   /// space is exhausted. restart(): keeps the best Ritz vectors.

@@ -26,9 +26,6 @@ struct LocalColumns {
   PetscInt stride = 0;
 };
 
-/// Marks the values of a matrix as changed for PETSc after writes through other pointers. Local.
-void mark_changed(Mat dense);
-
 /// Moves column order[j] to place j, for all j; order: a permutation of the columns. Local.
 void permute_columns(const Columns& columns, const std::vector<std::size_t>& order);
 

@@ -49,7 +49,6 @@ using MatHandle = Handle<Mat, MatDestroy>;
 using VecHandle = Handle<Vec, VecDestroy>;
 using IsHandle = Handle<IS, ISDestroy>;
 using ScatterHandle = Handle<VecScatter, VecScatterDestroy>;
-using KspHandle = Handle<KSP, KSPDestroy>;
 using EpsHandle = Handle<EPS, EPSDestroy>;
 using BvHandle = Handle<BV, BVDestroy>;
 
