@@ -1,7 +1,6 @@
 // Owners of PETSc and SLEPc objects: move-only, destroyed with the scope.
 #pragma once
 
-#include <petscksp.h>
 #include <slepceps.h>
 
 #include <utility>
