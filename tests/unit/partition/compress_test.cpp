@@ -62,7 +62,7 @@ bool expect_core_of_definition(const Graph& graph) {
     if (hosts[v].empty()) kept.push_back(v);
   }
   if (2 * static_cast<std::int32_t>(kept.size()) > n) {
-    EXPECT_EQ(compressed.core().neighbours, graph.neighbours) << "hardly anything would be gained";
+    EXPECT_EQ(compressed.core().neighbours, graph.neighbours) << "compression is not worthwhile";
     return false;
   }
   EXPECT_EQ(compressed.core().vertex_count(), static_cast<std::int32_t>(kept.size()));
@@ -195,7 +195,7 @@ TEST(CompressedGraph, handles_hard_graphs) {
   for (const auto& edges : {clique, star, path, {}}) expect_core_of_definition(make_graph(12, edges));
   EXPECT_EQ(CompressedGraph(make_graph(12, clique), 1).core().vertex_count(), 1);
   EXPECT_EQ(CompressedGraph(make_graph(12, star), 1).core().vertex_count(), 1);
-  EXPECT_EQ(CompressedGraph(make_graph(12, path), 1).core().vertex_count(), 12) << "10 would not be worth it";
+  EXPECT_EQ(CompressedGraph(make_graph(12, path), 1).core().vertex_count(), 12) << "10 is not worthwhile";
   EXPECT_EQ(CompressedGraph(make_graph(12, {}), 1).core().vertex_count(), 12);
   const Graph few = make_graph(12, clique);
   EXPECT_EQ(CompressedGraph(few).core().neighbours, few.neighbours) << "too few to be cut";
@@ -241,7 +241,7 @@ TEST(CompressedGraph, predicts_the_operations_of_an_elimination) {
   std::vector<double> counted;
   for (const Vertices& one : orders) {
     counted.push_back(count_factor_operations(graph, compressed.expand_order(one)));
-    EXPECT_GT(estimate(one), counted.back()) << "what is eliminated at a place counts as if it had all its rows";
+    EXPECT_GT(estimate(one), counted.back()) << "vertices eliminated at a position count with all its rows";
     EXPECT_LT(estimate(one), 2 * counted.back());
   }
   for (std::size_t k = 0; k < 3; ++k) EXPECT_GT(estimate(orders[k]), 2 * estimate(orders[3]));

@@ -187,7 +187,7 @@ TEST(Metis, is_unaffected_by_signals_to_any_thread) {
   EXPECT_EQ(wrong, 0);
   EXPECT_GE(caught, 100);
   EXPECT_EQ(after.sa_handler, action.sa_handler);
-  EXPECT_TRUE(sigismember(&after.sa_mask, SIGUSR2)) << "METIS put it back with other flags";
+  EXPECT_TRUE(sigismember(&after.sa_mask, SIGUSR2)) << "METIS restored it with other flags";
 }
 
 /// METIS raises SIGTERM for its own errors, through the functions overridden here, and leaves by longjmp.

@@ -55,21 +55,21 @@ TEST(Agree, keeps_the_kind_of_the_error) {
   EXPECT_EQ(catch_message<DiskFullError>([&] { world().agree(fail(DiskFullError("no room"))); }), "no room");
   try {
     world().agree(fail(MemoryError("needs 3 GB", 3e9)));
-    ADD_FAILURE() << "nothing was thrown";
+    ADD_FAILURE() << "no exception";
   } catch (const MemoryError& error) {
     EXPECT_STREQ(error.what(), "needs 3 GB");
     EXPECT_EQ(error.get_need_bytes(), 3e9);
   }
   try {
     world().agree(fail(PlacedError("job.json:3", "bad key")));
-    ADD_FAILURE() << "nothing was thrown";
+    ADD_FAILURE() << "no exception";
   } catch (const PlacedError& error) {
     EXPECT_STREQ(error.what(), "job.json:3: bad key");
     EXPECT_EQ(error.get_place(), "job.json:3");
   }
   try {
     world().agree(fail(CountRefusal("too few nodes", 7000)));
-    ADD_FAILURE() << "nothing was thrown";
+    ADD_FAILURE() << "no exception";
   } catch (const CountRefusal& error) {
     EXPECT_STREQ(error.what(), "too few nodes");
     EXPECT_EQ(error.get_possible_nodes(), 7000);

@@ -39,7 +39,7 @@ TEST(SolveModes, agrees_with_dense_lapack_on_a_free_body) {
   EXPECT_EQ(modes.lambda.size(), 65u);
   EXPECT_EQ(modes.rigid_count, 6);
   EXPECT_EQ(modes.count_below_low, 6);
-  EXPECT_GT(modes.factor.solves, 0) << "the sparse path was meant to be tested";
+  EXPECT_GT(modes.factor.solves, 0) << "not solved by the sparse solver";
 }
 
 TEST(LowEnd, is_left_to_the_first_shift_where_it_is_far_below_the_upper_end) {

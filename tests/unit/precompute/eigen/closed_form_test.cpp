@@ -110,7 +110,7 @@ TEST(SolveModes, finds_every_copy_when_blocks_are_narrower_than_the_multiplicity
   options.low_hz = 10;
   options.high_hz = to_hz(0.5 * (all[280] + *std::upper_bound(all.begin(), all.end(), all[280] * (1 + 1e-9))));
   const Modes modes = solve_modes(system.problem, options);
-  EXPECT_GT(modes.factor.solves, 0) << "the sparse path was meant to be tested";
+  EXPECT_GT(modes.factor.solves, 0) << "not solved by the sparse solver";
   expect_band(modes, all, options);
   std::int64_t largest = 0;
   for (const Cluster& cluster : modes.proof.clusters) largest = std::max(largest, cluster.count);
@@ -156,7 +156,7 @@ TEST(SolveModes, leaves_out_modes_that_lie_just_outside_the_band) {
 TEST(SolveModes, finds_more_degenerate_modes_than_a_slice_holds) {
   int size = 1;
   MPI_Comm_size(PETSC_COMM_WORLD, &size);
-  if (size > 2) GTEST_SKIP() << "two ranks show it, more take long on fewer cores";
+  if (size > 2) GTEST_SKIP() << "two ranks suffice; more are slow on few cores";
   constexpr int kEqual = 145;
   constexpr int kOthers = 40;
   Network many;
@@ -183,7 +183,7 @@ TEST(SolveModes, finds_more_degenerate_modes_than_a_slice_holds) {
 TEST(SolveModes, joins_slices_without_a_gap_or_a_double) {
   int size = 1;
   MPI_Comm_size(PETSC_COMM_WORLD, &size);
-  if (size > 1) GTEST_SKIP() << "slices know nothing of ranks, and 600 modes take long on more ranks than cores";
+  if (size > 1) GTEST_SKIP() << "slices do not depend on ranks, and 600 modes are slow on more ranks than cores";
   const test::System system = test::make_system(make_cube_between_walls(9));  // 2187 unknowns
   const std::vector<double> all = calc_cube_eigenvalues(9);
   Options options;
@@ -196,7 +196,7 @@ TEST(SolveModes, joins_slices_without_a_gap_or_a_double) {
 TEST(SolveModes, keeps_the_tolerance_over_seven_decades_of_eigenvalues) {
   int size = 1;
   MPI_Comm_size(PETSC_COMM_WORLD, &size);
-  if (size > 2) GTEST_SKIP() << "two ranks show it, more take long on fewer cores";
+  if (size > 2) GTEST_SKIP() << "two ranks suffice; more are slow on few cores";
   const test::System system = test::make_system(test::join(make_cube_between_walls(8), make_cube_between_walls(3, 1e-6 * kRate)));
   std::vector<double> all = calc_cube_eigenvalues(8);
   for (const double lambda : calc_cube_eigenvalues(3, 1e-6 * kRate)) all.push_back(lambda);
@@ -207,7 +207,7 @@ TEST(SolveModes, keeps_the_tolerance_over_seven_decades_of_eigenvalues) {
   options.factorisation = Factorisation::kMumps;
   const Modes modes = solve_modes(system.problem, options);
   EXPECT_GT(modes.lambda.back() / modes.lambda.front(), 1e6);
-  EXPECT_GT(modes.factor.solves, 0) << "the sparse path was meant to be tested";
+  EXPECT_GT(modes.factor.solves, 0) << "not solved by the sparse solver";
   EXPECT_EQ(modes.above_tolerance_count, 0);
   expect_band(modes, all, options);
 }

@@ -289,7 +289,7 @@ TEST(RitzStep, selects_an_interval_and_detects_completion) {
   pairs.residual[5] = 1e-15;
   EXPECT_TRUE(select(pairs, goal).is_complete);
   goal.wanted = 7;
-  EXPECT_TRUE(select(pairs, goal).is_complete) << "1.0 and 5.2 lie beyond the interval, and have settled";
+  EXPECT_TRUE(select(pairs, goal).is_complete) << "1.0 and 5.2 are outside the interval and have converged";
   pairs.residual = {1e-15, 1e-15, 1, 1, 1, 1e-15};
   EXPECT_FALSE(select(pairs, goal).is_complete);
 }

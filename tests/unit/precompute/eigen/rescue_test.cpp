@@ -72,12 +72,12 @@ TEST(Fallback, goes_to_mumps_where_pivoting_within_fronts_breaks_down) {
   constexpr double kTuned = 1000;
   const Network network = make_bunches(25, kTuned, 4e-8);
   const std::vector<double> all = test::calc_all_eigenvalues(network);
-  for (const double lambda : all) ASSERT_GT(std::abs(lambda / kTuned - 1), 1e-5) << "an eigenvalue of the whole";
+  for (const double lambda : all) ASSERT_GT(std::abs(lambda / kTuned - 1), 1e-5) << "an eigenvalue of the whole network";
   const test::System system = test::make_system(network);
 
   ldlt::Factor ours({system.problem.stiffness, system.problem.mass});
   for (const double step : {-4e-7, -2e-7, 0.0, 2e-7, 4e-7})  // the five shifts tried by a count
-    EXPECT_FALSE(ours.factorise(kTuned * (1 + step))) << step << " of the way breaks nothing";
+    EXPECT_FALSE(ours.factorise(kTuned * (1 + step))) << step << " relative to the shift: no breakdown";
   EXPECT_TRUE(ours.factorise(kTuned * (1 + 1e-5)));
 
   Options options;
@@ -252,7 +252,8 @@ TEST(Missing, modes_are_searched_between_two_counts) {
       const Modes modes = solve_modes(system.problem, options);
       is_solved = true;
       expect_eigenvalues(modes, pick(all, options.low_hz, options.high_hz));
-      EXPECT_GT(modes.proof.counts.size(), 3u) << "the ends and the first shift were enough with " << options.max_steps << " steps";
+      EXPECT_GT(modes.proof.counts.size(), 3u) << "the counts at the ends and the first shift sufficed with " << options.max_steps
+                                               << " steps";
     } catch (const SolveError&) {
     }
   }

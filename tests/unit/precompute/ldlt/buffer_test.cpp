@@ -112,7 +112,7 @@ TEST_F(Buffers, keeps_pages_for_the_next_reuse_until_returned) {
     EXPECT_EQ(early.data(), begin) << "before the next reuse begins";
     EXPECT_EQ(early.data()[5], 7.0) << "fresh pages";
   }
-  EXPECT_LE(find_mapped(), waiting - 8 * kMillion) << "what is freed outside of a reuse does not wait";
+  EXPECT_LE(find_mapped(), waiting - 8 * kMillion) << "pages freed outside of a reuse are not kept";
   BufferReuse::give_back_waiting();
   EXPECT_LE(find_mapped(), waiting - 8 * 4 * kMillion);
 }
@@ -137,18 +137,18 @@ TEST_F(Buffers, lends_its_tail_and_gets_it_back) {
       EXPECT_LE(base::find_memory().resident, resident + 8 * 2 * kMillion + kSlack) << "6 + 12 are in use where 16 were lent";
     }
     BufferReuse::give_back_waiting();
-    EXPECT_LE(base::find_memory().resident, resident + kSlack) << "more than the buffer's own";
+    EXPECT_LE(base::find_memory().resident, resident + kSlack) << "more than the buffer itself";
     room.populate();
-    EXPECT_GE(base::find_memory().resident, resident - kSlack) << "the tail is its own again";
+    EXPECT_GE(base::find_memory().resident, resident - kSlack) << "the tail was not returned";
     room.give_back_tail(8 * kMillion);
     EXPECT_LE(base::find_memory().resident, resident - 8 * 16 * kMillion + kSlack);
     room.populate();
     EXPECT_GE(base::find_memory().resident, resident - kSlack);
     std::fill_n(room.data() + 8 * kMillion, 16 * kMillion, 5.0);
-    EXPECT_EQ(std::count(room.data(), room.data() + 8 * kMillion, 7.0), 8 * kMillion) << "what is not lent stays";
+    EXPECT_EQ(std::count(room.data(), room.data() + 8 * kMillion, 7.0), 8 * kMillion) << "pages that are not lent changed";
     EXPECT_EQ(std::count(room.data() + 8 * kMillion, room.data() + room.size(), 5.0), 16 * kMillion);
   }
-  EXPECT_NEAR(static_cast<double>(find_mapped() - before), 0, kSlack) << "all of it goes with the buffer";
+  EXPECT_NEAR(static_cast<double>(find_mapped() - before), 0, kSlack) << "memory remains after the buffer";
 }
 
 TEST_F(Buffers, is_intact_after_lending_all_to_one_buffer) {

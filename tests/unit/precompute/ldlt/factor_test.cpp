@@ -206,7 +206,7 @@ TEST(factor, solves_without_a_collective) {
   ASSERT_TRUE(factor.factorise(1.4));
   const int first = std::exchange(collectives, 0);
   ASSERT_TRUE(factor.factorise(1.5));
-  EXPECT_EQ(collectives, first) << "as many for every shift, whatever the fronts";
+  EXPECT_EQ(collectives, first) << "the same number for every shift";
   EXPECT_LE(first, 16);
 }
 
@@ -511,7 +511,7 @@ TEST(factor, refuses_rows_that_are_not_whole_nodes) {
 }
 
 TEST(Factor, keeps_the_memory_of_a_factorisation_for_the_next_and_gives_it_back_at_the_first_solve) {
-  if (find_ranks() > 1) GTEST_SKIP() << "MPI's own memory changes as much";
+  if (find_ranks() > 1) GTEST_SKIP() << "memory of MPI changes by the same amount";
   const Pencil lattice = make_lattice(11, 11, 11, 1, MassKind::kDiagonal, 5);
   const la::Pencil pencil{lattice.k, lattice.m};
   const auto find_resident = [] { return static_cast<double>(base::find_memory().resident); };
@@ -529,14 +529,14 @@ TEST(Factor, keeps_the_memory_of_a_factorisation_for_the_next_and_gives_it_back_
       ASSERT_TRUE(factor.factorise(-1.0 - round));
       kept = find_resident();
       ASSERT_TRUE(factor.factorise(-1.5 - round));
-      EXPECT_NEAR(find_resident(), kept, kSlack) << "another factorisation takes the same pages";
+      EXPECT_NEAR(find_resident(), kept, kSlack) << "another factorisation uses the same pages";
       solve();
       EXPECT_NEAR(find_resident(), solved, kSlack) << "round " << round;
     }
-    EXPECT_GT(kept - solved, kSlack) << "nothing was kept that could be given back";
+    EXPECT_GT(kept - solved, kSlack) << "no memory was kept";
     ASSERT_TRUE(factor.factorise(-1.0));
   }
-  EXPECT_LT(find_resident() - before, kept - before) << "what waits goes with the factor";
+  EXPECT_LT(find_resident() - before, kept - before) << "kept memory must be freed with the factor";
 }
 
 }  // namespace

@@ -127,7 +127,7 @@ TEST(Mapping, a_subtree_too_large_to_move_is_shared_at_its_root) {
   level_subtrees(fronts, mapping);
   EXPECT_EQ(mapping.owner(2), -1);
   EXPECT_EQ(mapping.list_shares(2).size(), 2U);
-  EXPECT_EQ(list_own(fronts, mapping), (std::vector<double>{6, 5})) << "no exchange brings 6 and 5 closer";
+  EXPECT_EQ(list_own(fronts, mapping), (std::vector<double>{6, 5})) << "no exchange levels 6 and 5";
 }
 
 TEST(Mapping, keeps_what_cannot_be_levelled) {
@@ -191,8 +191,8 @@ TEST(Mapping, path_and_memory_of_a_block_stay_near_an_equal_share) {
     const std::vector<FrontCost> forest = make_block(24, ranks);
     const MappingCounts counts = count_mapping(forest, choose_mapping(forest, ranks));
     EXPECT_LE(counts.path_ratio(), ranks <= 16 ? 1.5 : 2.5) << ranks;
-    EXPECT_LE(counts.fullest_ratio(), ranks <= 32 ? 1.3 : 1.35) << ranks << " ranks; on 64 each has but 216 nodes, and tiles are coarse";
-    EXPECT_LE(counts.most_planned_fronts, 40 * std::log2(ranks)) << "a rank plans its way to the root, not the whole tree";
+    EXPECT_LE(counts.fullest_ratio(), ranks <= 32 ? 1.3 : 1.35) << ranks << " ranks; on 64 each has only 216 nodes, and tiles are coarse";
+    EXPECT_LE(counts.most_planned_fronts, 40 * std::log2(ranks)) << "a rank plans its path to the root, not the whole tree";
   }
 }
 
@@ -203,7 +203,7 @@ TEST(Mapping, ranks_end_the_fronts_that_they_share_together) {
     const MappingCounts proportional = count_mapping(forest, Mapping(forest, ranks, 1));
     EXPECT_LE(chosen.path_operations, proportional.path_operations);
     EXPECT_LE(chosen.path_ratio(), ranks == 2 ? 1.02 : 1.25) << ranks << " ranks";
-    EXPECT_LE(chosen.gang_operations, proportional.gang_operations) << ranks << " ranks: who is free early waits less too";
+    EXPECT_LE(chosen.gang_operations, proportional.gang_operations) << ranks << " ranks: waiting times are lower too";
   }
 }
 

@@ -88,7 +88,7 @@ TEST(MeshOrder, only_rows_of_shared_fronts_are_sent) {
   EXPECT_LE(lattice.comm().sum(travel), plan.analysis.shared_nodes);
   std::int64_t blocks = 0;
   for (const ReceivedBlocks& received : plan.received) blocks += static_cast<std::int64_t>(received.columns.size());
-  EXPECT_EQ(lattice.comm().sum(blocks), 0) << "columns of own fronts come from no other rank";
+  EXPECT_EQ(lattice.comm().sum(blocks), 0) << "columns of own fronts were received";
 }
 
 TEST(MeshOrder, panels_and_columns_fill_the_planned_memory) {
@@ -116,7 +116,7 @@ TEST(MeshOrder, panels_and_columns_fill_the_planned_memory) {
       EXPECT_EQ(panel.tiles, at);
       at += 3 * n * (front.own_nodes() - front.row_begin[k + 1]);
       column += 3 * n * (front.own_nodes() - front.row_begin[k]);
-      EXPECT_LE(at, column) << "panel " << k << " lies where the next columns are in work";
+      EXPECT_LE(at, column) << "panel " << k << " overlaps the columns of the next panel";
     }
     at = column;
   }

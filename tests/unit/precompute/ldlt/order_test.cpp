@@ -80,7 +80,7 @@ class Case {
   void expect_every_node_once() const {
     Ints sorted = position_;
     std::sort(sorted.begin(), sorted.end());
-    for (std::size_t v = 0; v < sorted.size(); ++v) ASSERT_EQ(sorted[v], static_cast<std::int32_t>(v)) << "positions are no permutation";
+    for (std::size_t v = 0; v < sorted.size(); ++v) ASSERT_EQ(sorted[v], static_cast<std::int32_t>(v)) << "positions are not a permutation";
     ASSERT_EQ(nodes_of_fronts_.size(), graph_.size()) << "each node is a pivot of one front";
     for (std::size_t k = 0; k < nodes_of_fronts_.size(); ++k)
       EXPECT_EQ(position_[nodes_of_fronts_[k]], places_of_nodes_[k]) << "holder and owner disagree";
@@ -105,12 +105,12 @@ class Case {
           ASSERT_TRUE(row < front.first + front.width || std::binary_search(front.rows.begin(), front.rows.end(), row))
               << "row " << row << " of pivot " << p << " is missing";
       const std::set<std::int32_t>& last = behind[front.first + front.width - 1];
-      EXPECT_EQ(front.rows, Ints(last.begin(), last.end())) << "rows of a front are those of its last pivot";
+      EXPECT_EQ(front.rows, Ints(last.begin(), last.end())) << "rows of a front differ from those of its last pivot";
       if (front.rows.empty()) {
         EXPECT_EQ(front.parent, -1);
         continue;
       }
-      ASSERT_GT(front.parent, static_cast<std::int32_t>(f)) << "children stand before their parents";
+      ASSERT_GT(front.parent, static_cast<std::int32_t>(f)) << "children must precede parents";
       const Known& parent = fronts_[front.parent];
       EXPECT_GE(front.rows.front(), parent.first);
       EXPECT_LT(front.rows.front(), parent.first + parent.width);
@@ -239,7 +239,7 @@ TEST(order, the_same_from_elements_as_from_the_links_of_all_their_nodes) {
     double operations = 0;
     for (const Supernode& front : find_supernodes(partition::renumber(graph, body.position()), 0, nodes).supernodes)
       operations += count_flops(front.width, front.size());
-    EXPECT_DOUBLE_EQ(body.count_operations(), operations) << "other fronts than those of the whole graph in this order";
+    EXPECT_DOUBLE_EQ(body.count_operations(), operations) << "fronts differ from those of the whole graph in this order";
   }
 }
 

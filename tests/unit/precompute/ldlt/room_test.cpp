@@ -73,8 +73,8 @@ TEST(Room, live_data_does_not_overlap) {
       if (front.parent < 0) updates[s] = {0, 0};  // sent to a shared front
     }
     EXPECT_EQ(panels, room.panels);
-    for (const Span& update : updates) EXPECT_EQ(update.begin, update.end) << "each update matrix was added to a parent or sent";
-    EXPECT_EQ(least_gap, 0) << "room that is never used, in round " << round;
+    for (const Span& update : updates) EXPECT_EQ(update.begin, update.end) << "a contribution block was neither added nor sent";
+    EXPECT_EQ(least_gap, 0) << "unused room, in round " << round;
     EXPECT_LE(room.solve_begin() + room.solve_blocks * block, std::max(room.numbers, room.solve_begin()));
   }
 }
@@ -90,7 +90,7 @@ TEST(Room, reuses_memory_for_right_hand_sides) {
   EXPECT_GT(spare, 0);
   EXPECT_EQ(plan_room(fronts, 0, 2, spare).solve_blocks, 1);
   EXPECT_EQ(plan_room(fronts, 0, 2, spare / 2).solve_blocks, 2);
-  EXPECT_EQ(plan_room(fronts, 0, 2, spare / 5).solve_blocks, 2) << "no more than asked for";
+  EXPECT_EQ(plan_room(fronts, 0, 2, spare / 5).solve_blocks, 2) << "more than requested";
   EXPECT_EQ(plan_room(fronts, 1'000'000, 2, spare).numbers, plan_room(fronts, 0, 2, spare).panels + 1'000'000) << "shared panels fill it";
   EXPECT_EQ(plan_room({}, 0, 2, 1).numbers, 0);
 }
@@ -156,7 +156,7 @@ TEST(Room, no_other_order_of_children_takes_less) {
     EXPECT_EQ(play(dealt, children, roots), least) << round;
     improved += before > least ? 1 : 0;
   }
-  EXPECT_GT(improved, 20) << "orders that make no difference show nothing";
+  EXPECT_GT(improved, 20) << "all orders are equal";
 }
 
 }  // namespace

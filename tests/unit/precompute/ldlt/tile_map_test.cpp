@@ -29,7 +29,7 @@ TEST(TileMap, every_node_is_in_one_tile_and_every_tile_has_one_owner) {
         std::int32_t nodes = 0;
         for (int i = 0; i < map.tiles(); ++i) {
           EXPECT_GT(map.nodes(i), 0);
-          EXPECT_LE(3 * map.nodes(i), kMaxBlock) << "the kernels eliminate and update so much at once";
+          EXPECT_LE(3 * map.nodes(i), kMaxBlock) << "limit of the kernels";
           EXPECT_EQ(map.find_tile(map.start(i)), i);
           EXPECT_EQ(map.find_tile(map.start(i + 1) - 1), i);
           nodes += map.nodes(i);
@@ -41,7 +41,7 @@ TEST(TileMap, every_node_is_in_one_tile_and_every_tile_has_one_owner) {
           }
         }
         EXPECT_EQ(nodes, width + rows);
-        EXPECT_EQ(map.start(map.pivot_tiles()), width) << "a tile is of pivots or of rows behind them";
+        EXPECT_EQ(map.start(map.pivot_tiles()), width) << "a tile mixes pivots and other rows";
       }
 }
 
