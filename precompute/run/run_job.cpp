@@ -10,7 +10,6 @@
 #include <utility>
 #include <vector>
 
-#include "precompute/eigen/solver_options.hpp"
 #include "precompute/petsc/session.hpp"
 #include "precompute/run/accuracy.hpp"
 #include "precompute/run/air.hpp"

@@ -268,7 +268,7 @@ def check_refusals(folder):
     )
     run(folder, BIN / "carillon-precompute", "-q", "bad.json")
     run(folder, BIN / "carillon-precompute", "bar.json", "--matrices", "matrices", code=2)
-    run(folder, BIN / "carillon-precompute", "bar.json", "--", "-eps_ncv", "9", code=2)
+    run(folder, BIN / "carillon-precompute", "bar.json", "--", "-mumps_ordering", "amd", code=2)
 
 
 def main():
