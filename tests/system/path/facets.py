@@ -2,8 +2,8 @@
 """A faceted cylinder is solved as the cylinder, for any triangulation. With facets in doubt the error bars hold for the meshed body, and
 with the doubt for both. Bells from a lathe: facets are in doubt with few rings, not with many.
 
-Truth: the free steel cylinder of radius 20 mm and length 200 mm, "cylinder-10" of tests/unit/precompute/fem/error_bars/data/known_frequencies.csv
-(Fourier-Ritz, 7 digits). The prisms, and the bell of planes, are meshed with "facets": true and solved on their own.
+Truth: the free steel cylinder of radius 20 mm and length 200 mm, "cylinder-10" of
+tests/unit/precompute/fem/error_bars/data/known_frequencies.csv (Fourier-Ritz, 7 digits). The prisms, and the bell of planes, are meshed with "facets": true and solved on their own.
 
 usage: facets.py BIN_DIR
 """
