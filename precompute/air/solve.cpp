@@ -1,10 +1,8 @@
-// One march over the wave numbers, whose matrix, solutions and moments every step shares; longer than most files.
-// Method:     a wave number at a time: matrix in single precision, GMRES for the modes that read it, multipoles; LU where GMRES fails.
-//             Modes are interpolated over the wave number; where three and four wave numbers disagree by more than is asked, one more is
-//             put between. Modes that the air couples are sums of solutions at the wave number of the sum: what moves with a mode is
-//             found from the modes' own wave numbers first, then solved at the mode's in air, which moves until it stays.
+// Method:     one wave number at a time: matrix in single precision, GMRES for the modes that read it, multipoles; LU where GMRES fails.
+//   Modes are interpolated over the wave number; where three-point and four-point interpolation differ by more than the tolerance, a wave
+//   number is inserted. Modes coupled by the air are sums of solutions at the wave number of the sum: partners are found from the modes'
+//   own wave numbers, then solved at the mode's wave number in air, iterated until it settles.
 // Source:     docs/equations.md E10.
-// Deviations: none.
 #include "precompute/air/solve.hpp"
 
 #include <fmt/core.h>
@@ -28,12 +26,12 @@ namespace {
 using Single = std::complex<float>;
 using Double = std::complex<double>;
 
-constexpr double kDirectResidual = 1e-3;  // of a solve by LU, in single precision
-constexpr int kRounds = 40;               // of refinement
-constexpr int kSteps = 20;                // after coupled modes that move
+constexpr double kDirectResidual = 1e-3;  // relative residual of LU in single precision
+constexpr int kRounds = 40;               // refinements of the wave numbers
+constexpr int kSteps = 20;                // iterations of shifted or coupled modes
 constexpr std::int32_t kMostOrder = 110;
 
-/// Ranks that share wave numbers: each has some of the rows.
+/// Ranks that share wave numbers; each rank owns some of the rows.
 class Group {
  public:
   Group(const comm::Communicator& comm, std::size_t unknowns, double matrix_bytes, std::size_t wave_numbers)
@@ -58,12 +56,12 @@ class Group {
   int count() const { return count_; }
   bool is_first() const { return comm_->is_root(); }
   bool has_all_rows() const { return comm_->size() == 1; }
-  /// Each rank may take the whole matrix.
+  /// True if each rank may hold the whole matrix.
   bool fits_one_rank() const { return fits_one_rank_; }
   std::size_t get_first() const { return first_[comm_->rank()]; }
   std::size_t get_last() const { return first_[comm_->rank() + 1]; }
 
-  /// All rows of what each rank has its own of.
+  /// Gathers all rows from the ranks.
   void gather(const Sides& mine, Sides& all) const { all.values = comm_->all_gather(mine.values); }
 
  private:
@@ -71,10 +69,10 @@ class Group {
   std::optional<comm::Communicator> comm_;
   bool fits_one_rank_;
   int number_ = 0, count_ = 1;
-  std::vector<std::size_t> first_;  // row of each rank, and the end
+  std::vector<std::size_t> first_;  // first row of each rank, and the end
 };
 
-/// Integral of p v over the surface, for each side.
+/// Surface integral of p v, per side.
 std::vector<Double> calc_reactions(const BoundaryEquations& equations, const std::vector<Single>& pressure,
                                    std::span<const std::int32_t> sides) {
   std::vector<Double> reactions(sides.size());
@@ -110,7 +108,7 @@ WaveAnswer solve_wave(const BoundaryEquations& equations, const Group& group, do
   };
   GmresResult result = solve_gmres(multiply, right, {.tolerance = tolerance}, pressures);
   if (!result.is_converged && (group.has_all_rows() || group.fits_one_rank())) {
-    if (!group.has_all_rows()) equations.assemble(k, sides, 0, unknowns, system);  // each of the group alike
+    if (!group.has_all_rows()) equations.assemble(k, sides, 0, unknowns, system);  // every rank of the group assembles all rows
     result.residual = solve_directly(system, pressures);
     result.is_converged = result.residual <= kDirectResidual;
   }
@@ -182,7 +180,7 @@ Sounding interpolate(const std::vector<const Answer*>& answers, const Stencil& s
 
 // ---- coupling ----
 
-/// What a wave number gave to a mixture. All of its motions were solved there.
+/// Solutions at one wave number for a mixture. All of its motions were solved there.
 Answer combine(const WaveAnswer& wave, const Mixture& mixture) {
   Answer sum;
   for (const std::int32_t i : mixture.motions) sum.order = std::max(sum.order, wave.modes.at(i).order);
@@ -197,8 +195,8 @@ Answer combine(const WaveAnswer& wave, const Mixture& mixture) {
   return sum;
 }
 
-/// The air's mass between all modes, (n, n) symmetric: what each makes of the others at its own wave number, in the mean of both ways.
-/// `mine`: the answers that a mode reads.
+/// Air mass matrix of all modes, (n, n) symmetric: each pair at the two modes' own wave numbers, averaged. `mine`: the answers that a mode
+/// reads.
 template <typename Mine>
 std::vector<double> calc_masses(std::size_t modes, const std::vector<Stencil>& stencils, double density, const Mine& mine) {
   std::vector<double> mass(modes * modes);
@@ -214,7 +212,7 @@ std::vector<double> calc_masses(std::size_t modes, const std::vector<Stencil>& s
   return mass;
 }
 
-/// The same between the motions of a mixture alone, at its wave number.
+/// Mass matrix of the motions of one mixture at its wave number.
 std::vector<double> calc_masses_within(const std::vector<const WaveAnswer*>& waves, const Stencil& stencil, double density,
                                        const std::vector<std::int32_t>& motions) {
   const std::size_t count = motions.size();
@@ -231,7 +229,7 @@ std::vector<double> calc_masses_within(const std::vector<const WaveAnswer*>& wav
   return mass;
 }
 
-/// The mixture with the rigid motions on which the mode's pressure works as much as counts.
+/// The mixture plus the rigid motions that are coupled to it above the threshold.
 void add_rigid_motions(const std::vector<const WaveAnswer*>& waves, const Stencil& stencil, const CouplingOptions& options,
                        std::int32_t mode, std::size_t modes, Mixture& mixture) {
   const std::size_t motions = waves[0]->modes.at(mode).row.size();
@@ -245,7 +243,7 @@ void add_rigid_motions(const std::vector<const WaveAnswer*>& waves, const Stenci
   }
 }
 
-/// The largest difference of both ways between two motions, relative to the mean of what they have alone.
+/// Largest asymmetry between two motions, relative to the mean of their own masses.
 double calc_reciprocity(const std::map<double, WaveAnswer>& answers) {
   double worst = 0.0;
   for (const auto& [k, wave] : answers)
@@ -264,7 +262,7 @@ Radiator share(const comm::Communicator& comm, const Radiator& radiator) {
           comm.broadcast(radiator.sphere),   static_cast<std::size_t>(comm.broadcast(static_cast<std::int64_t>(radiator.rigid)))};
 }
 
-/// The velocities in the order of the surface's facets and corners.
+/// Velocities in the order of the surface's facets and corners.
 std::vector<float> reorder(const RadiatingSurface& surface, const Radiator& radiator) {
   const std::size_t row = radiator.count_motions();
   std::vector<float> velocity(surface.count_facets() * 3 * row);
@@ -348,10 +346,10 @@ AirSolution solve_air(const comm::Communicator& comm, const Radiator& radiator_o
   solution.modes.resize(modes.size());
   const bool has_rows = options.coupling && options.coupling->has_rows;
   enum class Stage : std::uint8_t { kAlone, kShifted, kCoupled } stage = Stage::kAlone;
-  int steps = 0;                  // after coupled modes that move
-  std::vector<Mixture> mixtures;  // (n) once modes are coupled; of other ranks the motions alone
+  int steps = 0;
+  std::vector<Mixture> mixtures;  // (n) once modes are coupled; on other ranks the motions only
   for (int round = 0;; ++round) {
-    // What is still to be solved: (wave number, modes). The same on all ranks.
+    // Pending (wave number, modes). The same on all ranks.
     std::vector<Stencil> stencils;
     std::map<std::int32_t, std::set<std::int32_t>> readers;
     std::vector<std::int32_t> orders(waves.get().size());
@@ -410,7 +408,7 @@ AirSolution solve_air(const comm::Communicator& comm, const Radiator& radiator_o
           comm.broadcast(static_cast<std::int32_t>(comm.is_root() && keeper.is_stop_asked && keeper.is_stop_asked())) != 0;
       if (is_stopped) throw SolveStopped();
     }
-    // What a mode reads, on rank 0.
+    // Answers that a mode reads, on rank 0.
     const auto mine = [&](std::size_t m, std::size_t n) -> const WaveAnswer& { return answers.at(waves.get()[stencils[m].nodes[n]]); };
     const auto list_mine = [&](std::size_t m) {
       std::vector<const WaveAnswer*> list;

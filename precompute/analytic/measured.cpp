@@ -21,9 +21,9 @@ namespace {
 
 constexpr std::uint64_t kMaxBytes = 64 << 20;
 constexpr std::size_t kMaxRows = 40000, kMaxPoints = 10000;
-constexpr double kT60 = 6.907755278982137;  // ln 1000: decay times T60
+constexpr double kT60 = 6.907755278982137;  // ln 1000: T60 times decay
 constexpr double kMaxGain = 1e9, kFarthestM = 1e4;
-constexpr std::size_t kMaxShown = 80;  // characters of a cell, in a message
+constexpr std::size_t kMaxShown = 80;  // characters of a cell in a message
 
 std::string_view trim(std::string_view text) {
   const auto is_blank = [](char c) { return c == ' ' || c == '\t' || c == '\r' || c == '"'; };
@@ -60,7 +60,7 @@ std::optional<Vec3> parse_point(std::string_view name) {
   return found == 3 ? std::optional(point) : std::nullopt;
 }
 
-/// What each column holds.
+/// Column roles.
 struct Columns {
   int freq = -1, decay = -1, t60 = -1;
   std::vector<int> gains;
@@ -213,7 +213,7 @@ void MeasuredObject::calc_shapes(const Vec3& point_m, std::span<const Mode> mode
     const Vec3 apart = table_.points_m[p] - point_m;
     if (const double now = dot(apart, apart); now < least) least = now, nearest = p;
   }
-  // Along the normal of the side that the point is nearest to.
+  // Motion along the normal of the nearest side.
   std::size_t axis = 0;
   double out = -1.0;
   for (std::size_t c = 0; c < 3; ++c)

@@ -1,6 +1,6 @@
-// Method:     Which modes (choose.hpp); the fields that their pairs span (stresses.hpp); few points, where they cost less than rows
-//             (points.hpp).
-// Source:     docs/equations.md E13. Deviations: none.
+// Method:     choice of the modes (choose.hpp); fields spanned by their pairs (stresses.hpp); integration points, where cheaper than rows
+//   (points.hpp).
+// Source:     docs/equations.md E13.
 #include "precompute/coupling/condense.hpp"
 
 #include <fmt/core.h>
@@ -21,7 +21,7 @@
 namespace carillon::coupling {
 namespace {
 
-constexpr double kFieldsShare = 0.5;  // of the error that is asked for: for leaving fields out; the points have the rest
+constexpr double kFieldsShare = 0.5;  // share of the error budget for omitted fields; the rest is for the points
 
 /// Multiply-adds of one evaluation of the energy and its gradient.
 double count_rows_cost(double rows, double modes) { return rows * modes * (modes + 1); }
@@ -45,7 +45,7 @@ std::vector<double> calc_freq_hz(std::span<const double> lambda) {
   return freq;
 }
 
-/// The columns of the chosen modes, one behind the other.
+/// Columns of the chosen modes, one after the other.
 std::vector<double> copy_columns(const la::Columns& shapes, std::span<const std::int32_t> modes) {
   std::vector<double> copied;
   copied.reserve(static_cast<std::size_t>(shapes.rows) * modes.size());
@@ -146,7 +146,7 @@ Condensed condense_modes(const comm::Communicator& comm, const SolvedModes& solv
     if (fields.curvature < kCurved) return;
     for (std::ptrdiff_t r = 0; r < fields.linear.rows(); ++r)
       for (std::ptrdiff_t i = 0; i < fields.linear.cols(); ++i) energy.linear.push_back(fields.linear(r, i));
-    // Of the lowest mode at a thousandth of the thickness
+    // For the lowest mode at a thousandth of the thickness
     const double q = 1e-3 * options.thickness_m / first_peak;
     energy.rest_energy_j = 0.5 * omega.front() * omega.front() * q * q;
   });

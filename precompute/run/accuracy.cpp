@@ -4,7 +4,6 @@
 //             is then solved, its corrected frequencies are compared with those of the coarser mesh, and their error bars decide; where
 //             they fall short the rate that was measured between two trials takes the place of the known one.
 // Source:     precompute/fem/error_bars/correct.hpp (docs/error-bars.md); precompute/job/cost.
-// Deviations: none.
 #include "precompute/run/accuracy.hpp"
 
 #include <fmt/core.h>
@@ -18,12 +17,12 @@
 #include <optional>
 #include <type_traits>
 
+#include "precompute/eigen/memory.hpp"
 #include "precompute/job/cost/memory.hpp"
 #include "precompute/job/cost/seconds.hpp"
-#include "precompute/eigen/memory.hpp"
-#include "precompute/run/io/checkpoint_file.hpp"
 #include "precompute/mesh/parallel/read_parallel.hpp"
 #include "precompute/petsc/session.hpp"
+#include "precompute/run/io/checkpoint_file.hpp"
 #include "runtime/base/failure.hpp"
 
 namespace carillon::run {

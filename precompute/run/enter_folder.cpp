@@ -1,6 +1,5 @@
 // Method:     openat() name by name with O_NOFOLLOW, then fchdir(): a folder that is replaced by a link meanwhile is not entered.
 // Source:     POSIX.1-2008.
-// Deviations: none.
 #include "precompute/run/enter_folder.hpp"
 
 #include <fcntl.h>

@@ -1,6 +1,6 @@
 // Method: the handler calls only async-signal-safe functions (signal-safety(7)): write, poll, unlink, _exit, and those of
 //   runtime/base/temporary.
-// Source: POSIX.1-2008, 2.4.3. Deviations: none.
+// Source: POSIX.1-2008, 2.4.3.
 #include "precompute/run/interrupt.hpp"
 
 #include <poll.h>

@@ -2,7 +2,6 @@
 //             really took gives the pace; the pace times the prices of what is left gives the seconds left, and
 //             percent = 100 gone / (gone + left). Within a factorisation the clock says how far it is; within the iteration the number of
 //             right-hand sides does.
-// Source:     none. Deviations: none.
 #include "precompute/run/progress_estimator.hpp"
 
 #include <algorithm>

@@ -2,7 +2,6 @@
 //             rest by precompute/job/cost: factorisations at the pace of those that were timed, all else by this machine's update rate.
 //             The answer comes within --patience: a step is begun only if its cost by precompute/job/cost, on a processor that gives this
 //             process as little of its time as it did so far, fits what is left of it; else what the step would find is estimated.
-// Source:     none. Deviations: none.
 #include "precompute/run/validate.hpp"
 
 #include <fmt/core.h>
@@ -14,12 +13,12 @@
 #include <cmath>
 #include <fstream>
 
+#include "precompute/eigen/memory.hpp"
+#include "precompute/eigen/solve_estimate.hpp"
 #include "precompute/job/cost/calibration.hpp"
 #include "precompute/job/cost/memory.hpp"
 #include "precompute/job/cost/modes.hpp"
 #include "precompute/job/cost/seconds.hpp"
-#include "precompute/eigen/memory.hpp"
-#include "precompute/eigen/solve_estimate.hpp"
 #include "precompute/ldlt/update_rate.hpp"
 #include "precompute/mesh/parallel/read_parallel.hpp"
 #include "precompute/petsc/session.hpp"

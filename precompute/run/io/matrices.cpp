@@ -1,6 +1,5 @@
 // Method:     Every rank writes the lower triangle of its rows as text, a piece at a time; rank 0 puts the pieces into the file.
 // Source:     Boisvert, Pozo, Remington, The Matrix Market exchange formats, NISTIR 5935, 1996.
-// Deviations: none.
 #include "precompute/run/io/matrices.hpp"
 
 #include <fmt/core.h>
@@ -16,8 +15,8 @@
 #include <string>
 #include <vector>
 
-#include "precompute/run/io/node_order.hpp"
 #include "precompute/petsc/session.hpp"
+#include "precompute/run/io/node_order.hpp"
 #include "runtime/base/file.hpp"
 
 namespace carillon::io {

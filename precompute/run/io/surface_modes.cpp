@@ -1,7 +1,7 @@
 // Method: rank 0 sends each rank its rows on the surface and hands out the outer triangles; what a triangle needs of another
 //   rank's rows is fetched once per block of modes. A block is read from the columns once: its largest components give the steps (maximum
 //   over the ranks), its flow through the triangles the gains (sum over the ranks). Rank 0 then takes the steps, one rank after the other.
-// Source: none needed; the flow is that of runtime/bank/radiation_gain.hpp. Deviations: none.
+// Source: none needed; the flow is that of runtime/bank/radiation_gain.hpp.
 #include "precompute/run/io/surface_modes.hpp"
 
 #include <fmt/core.h>
