@@ -34,7 +34,7 @@ struct Problem {
     la::Matrix destroyed = inertia;
     if (n == 0 || la::calc_generalised_eigenpairs(vectors, destroyed, values) != 0)
       throw InputError(
-          "the air takes more than the whole mass of a motion of the modes, as in a resonance of a cavity that this method cannot couple; "
+          "the added mass of a mode is below minus its modal mass, as in a cavity resonance, which this method cannot couple; "
           "end the band lower, or leave the air out with \"radiation\": \"none\"");
   }
 };

@@ -32,7 +32,7 @@ void add_mirror_image(const Plane& plane, Radiator& radiator) {
   const std::size_t nodes = radiator.nodes_m.size(), facets = radiator.triangles.size(), row = radiator.count_motions();
   for (std::size_t i = 0; i < nodes; ++i) {
     if (!(dot(radiator.nodes_m[i] - plane.point_m, plane.normal) > 0.0))
-      throw InputError("\"half_space\": the body is not wholly on the side of the plane that its normal shows to; move the plane");
+      throw InputError("\"half_space\": part of the body is behind the plane; move the plane, or reverse its normal");
     radiator.nodes_m.push_back(mirror(plane, radiator.nodes_m[i]));
   }
   const auto shift = static_cast<std::int32_t>(nodes);
@@ -103,8 +103,8 @@ std::size_t count_rigid(const bank::Bank& bank) {
 void check_mass(std::size_t mode, double freq_hz, double mass) {
   if (mass > kMostMass)
     throw InputError(
-        fmt::format("mode {} at {:.1f} Hz: the air adds {:.2f} of its own mass: a membrane or a sheet this light moves with "
-                    "the air, which this method cannot do; leave the air out with \"radiation\": \"none\"",
+        fmt::format("mode {} at {:.1f} Hz: the air adds {:.2f} of its own mass: a membrane or sheet this light moves with "
+                    "the air, which this method cannot solve; omit the air with \"radiation\": \"none\"",
                     mode + 1, freq_hz, mass));
 }
 
@@ -118,10 +118,10 @@ void warn_of_band(const bank::Multipoles& multipoles, std::span<const double> fr
     lowest = std::min(lowest, freq_hz[m]);
   }
   if (options.warn && most > 0.0)
-    options.warn(fmt::format(
-        "modes from {:.4g} Hz on, near the end of the band, have an added mass of up to {:.2f}: modes beyond the band, which the "
-        "bank has not, would mix with them in air; end the band an octave above what you need",
-        lowest, most));
+    options.warn(
+        fmt::format("modes from {:.4g} Hz on, near the end of the band, have an added mass of up to {:.2f}: missing modes "
+                    "beyond the band would mix with them in air; end the band an octave higher",
+                    lowest, most));
 }
 
 /// Appends a mode that was solved at k to a residual. The error is still a power ratio without rounding; the decay is set later.
@@ -182,7 +182,7 @@ double calc_mass_bound(const Radiator& radiator, const AirOptions& options) {
 Radiator make_radiator(const bank::Bank& bank, std::span<const double> freq_hz, const AirOptions& options) {
   Radiator radiator;
   const std::vector<Triangle> outer = bank::find_outer_triangles(bank.vertices_m, bank.triangles);
-  if (outer.empty()) throw InputError("the surface of the body has no outside: no closed shell of it encloses a volume");
+  if (outer.empty()) throw InputError("the surface of the body has no outside: no closed part of it encloses a volume");
   std::vector<std::int32_t> number(bank.vertex_count(), -1);
   const std::size_t modes = bank.mode_count();
   radiator.rigid = count_rigid(bank);
@@ -300,8 +300,8 @@ bank::Multipoles calc_multipoles(const comm::Communicator& comm, const bank::Ban
     if (is_coupled) warn_of_band(multipoles, played, options);
     if (solution.unsettled > solve.coupling->settled && options.warn)
       options.warn(
-          fmt::format("modes that the air couples were still moving by {:.1e} of their frequency when they were solved for the last "
-                      "time; their frequencies in air are right to that",
+          fmt::format("the frequencies of modes coupled by the air still changed by {:.1e} (relative) in the last iteration, "
+                      "which is their uncertainty",
                       solution.unsettled));
     add_decays(options, multipoles);
     for (auto* kept : {&file, &coupled_file})

@@ -117,8 +117,8 @@ WaveAnswer solve_wave(const BoundaryEquations& equations, const Group& group, do
   if (!result.is_converged)
     throw SolveError(
         fmt::format("the pressure on the surface does not converge at k = {:.6g} 1/m: residual {:.1e} after {} products of GMRES, asked "
-                    "{:.0e}; a skin too coarse for the wave can do that (\"skin_nodes\"), and slivers or folds of the surface: mesh it "
-                    "again, or leave the air out with "
+                    "{:.0e}; possible causes: a surface mesh too coarse for the wavelength (\"skin_nodes\"), slivers or folds: remesh the "
+                    "surface, or omit the air with "
                     "\"radiation\": \"none\"",
                     k, result.residual, result.products, tolerance));
   if (!group.is_first()) return answer;

@@ -176,8 +176,7 @@ std::vector<std::int32_t> choose_coupled(const KnownBody& body, const job::Nonli
 void couple(const KnownBody& body, const job::JobSpec& job, const std::vector<Mode>& modes, Made& made) {
   const std::vector<std::int32_t> chosen = choose_coupled(body, *job.nonlinear, modes);
   if (chosen.empty()) {
-    made.warnings.push_back(
-        fmt::format("no mode that large motion couples lies below {:g} Hz: the bank stays linear", job.nonlinear->below_hz));
+    made.warnings.push_back(fmt::format("large motion couples no mode below {:g} Hz: the bank stays linear", job.nonlinear->below_hz));
     return;
   }
   std::vector<Mode> coupled;
@@ -189,8 +188,8 @@ void couple(const KnownBody& body, const job::JobSpec& job, const std::vector<Mo
   energy.membrane_ratio = top_hz / membrane_hz;
   if (energy.membrane_ratio > bank::kMaxMembraneRatio)
     made.warnings.push_back(
-        fmt::format("stretching begins at {:.0f} Hz, and the highest coupled mode has {:.0f} Hz: above half of it the inertia of "
-                    "stretching, which is left out, is heard; lower \"nonlinear.below_hz\"",
+        fmt::format("stretching begins at {:.0f} Hz, and the highest coupled mode has {:.0f} Hz: above half of it the neglected "
+                    "inertia of stretching is audible; lower \"nonlinear.below_hz\"",
                     membrane_hz, top_hz));
   made.coupling = fmt::format("{} coupled modes up to {:.0f} Hz, {} {}", energy.mode_count(), top_hz, energy.row_count(),
                               energy.row_count() == 1 ? "row" : "rows");

@@ -29,8 +29,8 @@ double count_points_cost(double points, double rows, double modes) { return 2 * 
 
 void check(const SolvedModes& solved, const CondenseOptions& options) {
   if (solved.components != 1)
-    throw InputError(fmt::format("nonlinear motion couples the modes of one piece, and the body has {}: solve each as a body of its own",
-                                 solved.components));
+    throw InputError(
+        fmt::format("nonlinear coupling needs a connected body, and this one has {} parts: solve each part separately", solved.components));
   const std::size_t eligible = options.eligible.empty() ? solved.lambda.size() : options.eligible.size();
   if (static_cast<std::size_t>(options.modes) > eligible)
     throw InputError(
@@ -117,8 +117,8 @@ Condensed condense_modes(const comm::Communicator& comm, const SolvedModes& solv
     keep_stretch(body, fields);
     if (fields.form.rows() == 0)
       throw InputError(
-          "\"nonlinear\": \"stretch\" is the mean stretch of a body that is held on opposite sides, and no stress of this one has a mean: "
-          "hold it so by \"fixed\", or couple its modes in full, {\"modes\": 30}");
+          "\"nonlinear\": \"stretch\" needs a body held on opposite sides, and no stress field of this one has a nonzero mean: "
+          "fix opposite sides (\"fixed\"), or couple the modes in full, {\"modes\": 30}");
   }
   result.solves = fields.solves;
   result.curvature = fields.curvature;

@@ -71,13 +71,13 @@ std::map<std::int32_t, std::int32_t> match(const std::vector<std::int32_t>& regi
       if (!is_named(tag)) continue;
       found = true;
       if (!place.emplace(tag, static_cast<std::int32_t>(out.list.size())).second)
-        throw InputError(fmt::format("{}: \"materials.{}\": region {} has a material already, as \"{}\"; remove one", material.place, key,
+        throw InputError(fmt::format("{}: \"materials.{}\": region {} already has a material, as \"{}\"; remove one", material.place, key,
                                      describe(tag, names), out.region[place[tag]]));
     }
     if (!found)
       throw InputError(
-          fmt::format("{}: \"materials.{}\": the mesh has no such region; there is {}", material.place, key,
-                      regions.size() == 1 && regions[0] == 0 ? "none at all: its elements carry no region tag" : describe(regions, names)));
+          fmt::format("{}: \"materials.{}\": no such region in the mesh, which has {}", material.place, key,
+                      regions.size() == 1 && regions[0] == 0 ? "none: its elements have no region tags" : describe(regions, names)));
     out.list.push_back(material);
     out.region.push_back(key);
   }

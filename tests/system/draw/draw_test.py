@@ -105,7 +105,7 @@ def check_patterns():
             error = numpy.abs(found - wanted).max() / numpy.abs(wanted).max()
             expect(error < 1e-12, f"pattern of number {index} at kR {waves}: off by {error:.1e}")
 
-    # High orders: on the axis only m = 0 is left, with sqrt((2 l + 1) / 4 pi); the squares of an order add up to (2 l + 1) / 4 pi.
+    # High orders: on the axis only m = 0 contributes, sqrt((2 l + 1) / 4 pi); the squares of an order sum to (2 l + 1) / 4 pi.
     order = 60
     inverse = draw.calc_inverse_hankels(70.0, order)
     for l in (3, 20, 60):
@@ -121,7 +121,7 @@ def check_patterns():
         expect(numpy.abs(square - (2 * l + 1) / (4 * math.pi)).max() < 1e-10, f"Unsoeld's sum of the harmonics of order {l}")
     expect(numpy.isfinite(draw.calc_inverse_hankels(1e-3, 120)).all(), "orders that send nothing are no numbers")
 
-    # ln |cos| over directions has the standard deviation 1, along any axis: no null may count for more than its share.
+    # ln |cos| over directions has standard deviation 1 along any axis: a null must not dominate.
     for number, (coefficient, order, wanted) in enumerate(
         [([1], 0, 0.0), ([0, 0, 1, 0], 1, 8.6859), ([0, 0, 0, 1], 1, 8.6859), ([0, 1, 0, 0], 1, 8.6859), ([0, 1, -2, 0.5], 1, 8.6859)]
     ):
@@ -130,7 +130,7 @@ def check_patterns():
         expect(abs(spread - wanted) < 0.1, f"spread of pattern {number}: {spread:.3f} dB, not {wanted}")
     expect(draw.calc_levels(0j * z) is None, "a mode that sends nothing has levels")
 
-    # The closed surface: outward, and the volume of what its radii enclose.
+    # The closed surface: oriented outward, with the volume enclosed by its radii.
     for levels, volume in [(0 * z, 4 / 3 * math.pi), (-15 + 0 * z, 4 / 3 * math.pi / 8), (-15 * (1 - z), math.pi / 3)]:
         vertices, triangles, colour = draw.make_balloon(levels, polar, azimuth)
         a, b, c = (vertices[triangles[:, corner]] for corner in range(3))
@@ -152,7 +152,7 @@ with tempfile.TemporaryDirectory() as name:
     make_bank.write_ball_bank(folder / "ball.hdf")
     make_bank.write_box_bank(folder / "shelf.hdf", (0.3, 0.2, 0.005))
 
-    # The first three modes: three bodies in three columns, purple where they rest and yellow where they move most.
+    # The first three modes: three bodies in three columns, purple at nodes and yellow at antinodes.
     done = run("modes", "ball.hdf", "-o", "modes.png", folder=folder)
     expect(done.returncode == 0, f"modes: exit code {done.returncode}: {done.stderr}")
     if done.returncode == 0:
@@ -168,7 +168,7 @@ with tempfile.TemporaryDirectory() as name:
         edges = numpy.concatenate([image[0], image[-1], image[:, 0], image[:, -1]])
         expect(edges.min() > 240, "modes: something is cut off at the edge of the picture")
 
-    # What modes send: a dipole along the axis that points up, one across it, a monopole, nothing.
+    # Radiation patterns: a dipole along the vertical axis, a horizontal dipole, a monopole, none.
     check_patterns()
     shutil.copy(AIR_BANK, folder / "air.hdf")
     spoil("air.hdf", "dipoles.hdf", write_dipoles)
@@ -184,7 +184,7 @@ with tempfile.TemporaryDirectory() as name:
         expect(abs(round_[0] / round_[1] - 1) < 0.03, f"directivity: a monopole covers {round_[0]} x {round_[1]} pixels")
         expect(silent[0] < 0.5 * round_[0], f"directivity: a silent mode covers {silent[0]} x {silent[1]} pixels")
 
-    # A ball that falls on a shelf above the ground.
+    # A ball falls on a shelf above the ground.
     poses = [[t, 0.0, 0.0, 0.5 - 4.9 * t * t, 1, 0, 0, 0] for t in numpy.linspace(0, 0.3, 40)]
     scene = {
         "up": "z",
@@ -226,7 +226,7 @@ with tempfile.TemporaryDirectory() as name:
         expect(part.std() > 15, "modes at rest: the picture is blank")
         expect(count_like(part, (253, 231, 37)) < 100, "modes at rest: something moves")
 
-    # What cannot be drawn.
+    # Invalid input.
     spoil("ball.hdf", "nan.hdf", lambda bank: bank["mesh/vertices"].__setitem__((0, 0), numpy.nan))
     spoil("ball.hdf", "far.hdf", lambda bank: bank["mesh/vertices"].__setitem__((0, 0), 1e300))
     spoil("ball.hdf", "wild.hdf", lambda bank: bank["mesh/triangles"].__setitem__((0, 0), 10**6))

@@ -101,7 +101,7 @@ def check_frames(times_s, points, speed):
         wanted.append([seen[:, 0].min(), seen[:, 0].max(), -seen[:, 1].max(), -seen[:, 1].min()])
     wanted = numpy.array(wanted)
     found = numpy.array([find_outline(image[:-150]) for image in images])
-    # One scale and one place for all frames: the width at rest gives them, the rest must follow.
+    # All frames share scale and position: both follow from the width at rest.
     pixel = (wanted[0, 1] - wanted[0, 0]) / (found[0, 1] - found[0, 0])
     shift = found[0, [0, 2]] - wanted[0, [0, 2]] / pixel
     error = numpy.abs(found - (wanted / pixel + shift[[0, 0, 1, 1]])).max()
@@ -139,7 +139,7 @@ with tempfile.TemporaryDirectory() as name:
         first, last = (count_like(image[:-150, side], YELLOW) for side in (slice(third), slice(-third, None)))
         expect(first == 0 and last > 100, f"the strip has {first} and {last} pixels of the largest speed")
 
-    # What cannot be drawn.
+    # Invalid input.
     data = (folder / "bar.vtkhdf").read_bytes()
     (folder / "cut.vtkhdf").write_bytes(data[: len(data) // 2])
     (folder / "text.vtkhdf").write_text("hello")

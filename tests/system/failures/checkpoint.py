@@ -142,7 +142,7 @@ def stops(folder):
         text, code = body.stop(ranks, line, delay_s)
         name = f"{ranks} ranks, {delay_s} s after '{line}'"
         check(code in (STOPPED, 0), f"{name}: exit code {code}:\n{text}")
-        if code == 0:  # The machine was faster.
+        if code == 0:  # finished before the signal
             check_bank(folder, "out.bank", body.expected, name)
             (folder / "out.bank").unlink()
             continue
@@ -155,11 +155,11 @@ def stops(folder):
         check("warning" not in heed(resumed), resumed)
         print(f"{name}, then {then}: {'resumed' if has_saved else 'from the start'}, frequencies equal to {worst:.1e}")
     check(was_stopped >= 6, f"only {was_stopped} runs were stopped")
-    # Several times on the way to one bank, on all numbers of ranks; a single process without mpirun, by SIGTERM.
+    # Several interruptions until the bank is complete, on all numbers of ranks; a single process without mpirun, by SIGTERM.
     for turn in range(4):
         text, code = body.stop(1 + turn % 3, "modes     ", 0.1 + 0.1 * turn)
         check(code in (STOPPED, 0), text)
-        if code == 0:  # What was left took less than that.
+        if code == 0:  # the rest took less than that
             check_bank(folder, "out.bank", body.expected, f"stop {turn + 1} of four")
             (folder / "out.bank").unlink()
     if code == STOPPED:
@@ -255,7 +255,7 @@ def damage(folder):
     folder.mesh("--shape", "plate", "--length", 0.3, "--width", 0.21, "--thickness", 0.02, "--nodes", 1500, "--order", 2, "-o", "body.msh")
     body = Body(folder, band_hz=[20, 30000])
     whole = b""
-    for _ in range(20):  # The solve is short, and where cores are busy all that it saves may come and go between two looks.
+    for _ in range(20):  # the solve is short; on a busy machine a checkpoint may appear and vanish between two polls
         seen = catch_checkpoint(folder, body)
         whole = seen if len(seen) > len(whole) else whole
         (folder / "out.bank").unlink()
@@ -305,14 +305,14 @@ def damage(folder):
         check(said == 1 or (kind == "flipped" and place < 4096), f"{kind} at {place}: nothing was said:\n{text}")
         if said:
             check((folder / "state.aside").read_bytes() == bytes(spoilt), "it was not set aside")
-    check(silent <= 1, f"{silent} flipped bytes were not seen")  # one may lie in the zeros before the columns
-    # Two ranks with damage that only the second reads.
+    check(silent <= 1, f"{silent} flipped bytes were not seen")  # one may lie in the padding before the columns
+    # Two ranks, with damage in the part read by the second only.
     spoilt = bytearray(whole)
     spoilt[-5] ^= 64
     (folder / "state").write_bytes(spoilt)
     text, _ = body.resume(2, "damage of the second rank")
     check("because it is damaged" in text, text)
-    # Of another job, mesh, program.
+    # Checkpoint of another job, mesh, program.
     for change, words in ((dict(band_hz=[20, 29000]), "another job"), (dict(band_hz=[20, 30000], mass="lumped"), "another job")):
         other = Body(folder, name="other.json", **change)
         (folder / "state").write_bytes(whole)
@@ -323,7 +323,7 @@ def damage(folder):
     (folder / "state").write_bytes(whole)
     text, _ = other.resume(2, "another mesh")
     check("because it is of another mesh" in text, text)
-    # What is no file for a checkpoint.
+    # Not a regular file.
     (folder / "state").mkdir()
     text, code = folder.run(2, command=body.command(2))
     check(code == 2 and text.count("carillon-precompute: error:") == 1, text)
@@ -345,7 +345,7 @@ def disk(folder):
     """No room for the checkpoint: a warning, the older one stays, the solve continues."""
     make_plate(folder)
     body = Body(folder, band_hz=[20, 45000])
-    limit = 16_000_000  # bytes: more than the bank and MPI's own files take, less than the basis
+    limit = 16_000_000  # bytes: more than the bank and MPI's own files, less than the basis
     for ranks in (1, 2):
         command = body.command(ranks, "--checkpoint-every", 0)
         at = command.index(str(folder.bin / "carillon-precompute"))
@@ -394,7 +394,7 @@ def replaced(folder):
         check_bank(folder, "out.bank", body.expected, f"{ranks} ranks")
         (folder / "out.bank").unlink()
         (folder / ".state.new.taken").unlink()
-    # A link that was there before is no checkpoint, and one in place of the temporary file is removed.
+    # A pre-existing link is not a checkpoint; one in place of the temporary file is removed.
     for name in ("state", ".state.new"):
         (folder / name).symlink_to(victim)
         text, code = folder.run(2, command=body.command(2, "--checkpoint-every", 0), timeout_s=200)

@@ -19,7 +19,7 @@ def bad_element(folder):
     """One element whose mid node folds it: the file is well formed, and only the rank of that element finds out, while it assembles."""
     nodes, tets = add_mid_nodes(*make_box((12, 3, 3), (0.12, 0.03, 0.03)))
     write_vtkhdf(folder / "good.vtkhdf", nodes, tets)
-    # The middle of an edge inside the last cell is moved beyond the edge's end: the elements around fold there.
+    # A mid-side node of the last cell is moved beyond the end of its edge: the surrounding elements fold.
     middle = tets[-1, 4]
     ends = nodes[tets[-1, :2]]
     nodes[middle] = ends[0] + 1.6 * (ends[1] - ends[0])
@@ -30,7 +30,7 @@ def bad_element(folder):
         text = folder.expect(ranks, 2, ["bad.vtkhdf", "Jacobian"])
         named = text.split(" of the mesh (first node")[0].split()[-1]
         check(named in folded, f"element {named} is none of the folded {folded}")
-    # The same with an element without volume, which the reader finds.
+    # The same with an element without volume, detected by the reader.
     nodes, tets = make_box((12, 3, 3), (0.12, 0.03, 0.03))
     extra = len(nodes)
     nodes = list(map(list, nodes)) + [[1, 0, 0], [1, 1, 0], [1, 0, 1], [1, 1, 1]]
@@ -119,7 +119,7 @@ def killed_rank(folder):
 def disk(folder):
     """A disk that is full when the bank is written: the error is reported, and no half bank stays."""
     folder.mesh("--shape", "bar", "--length", 0.2, "--width", 0.05, "--thickness", 0.05, "--nodes", 6000, "--order", 2, "-o", "bar.msh")
-    # A folder in the place of the bank, which no one may write, not even root.
+    # A folder in place of the bank cannot be written, not even by root.
     folder.write_job("bar.msh", bank="taken", band_hz=[20, 20000])
     (folder / "taken").mkdir()
     folder.expect(2, 2, ["taken"])

@@ -23,7 +23,7 @@ LOSSY = {
     "damping": {"rayleigh": {"alpha1_s": 0, "alpha2_per_s": 500}},
 }
 LOSSLESS = LOSSY | {"damping": {"rayleigh": {"alpha1_s": 0, "alpha2_per_s": 0}}}
-CASES = {  # body, material, whether boundary elements are taken, what is said
+CASES = {  # body, material, boundary elements or sphere, message
     "solid": ({"shape": "box", **CUBE}, "acrylic", False, "roundness 0.52, and from 0.4 on the gains of a sphere do"),
     "hollow": (HOLLOW, "aluminium", True, "without it modes ring too long"),
     "hollow-lossy": (HOLLOW, LOSSY, False, "the gains of a sphere do"),
@@ -54,7 +54,7 @@ def main():
                     continue
                 ratio = float(re.search(r"up to ([0-9.]+) times what", line)[1])
                 solved = (bank["radiation/decay"][:] / bank["modes/corrected_decay"][:]).max()
-                assert 0.5 < ratio / solved < 2 and solved > 1, (ratio, solved)  # the sphere's figure against the true one
+                assert 0.5 < ratio / solved < 2 and solved > 1, (ratio, solved)  # sphere estimate against the solved value
     print("auto_air: all cases hold")
 
 

@@ -1,4 +1,4 @@
-// Jobs and meshes that cannot be used: exit code, one message that says where and how to correct it, and nothing left behind.
+// Invalid jobs and meshes: exit code, one message with place and remedy, no files left behind.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -16,8 +16,8 @@ using testing::HasSubstr;
 struct BadCase {
   std::string name;
   int ranks = 1;
-  std::function<void(const Folder&)> spoil;  // job.json and mesh.msh are good before
-  std::vector<std::string> words;            // each in the message
+  std::function<void(const Folder&)> spoil;  // modifies the valid job.json and mesh.msh
+  std::vector<std::string> words;            // expected in the message
 };
 
 void write_good(const Folder& folder) {

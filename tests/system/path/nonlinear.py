@@ -25,8 +25,8 @@ MATERIAL = {
     "density_kg_m3": DENSITY_KG_M3,
     "damping": {"rayleigh": {"alpha1_s": 0, "alpha2_per_s": ALPHA2_PER_S}},
 }
-# Of the first mode of a clamped beam: its number k L, the share of the mass that moves with the middle, and q'' + omega^2 (q + gamma q^3 /
-# h^2) = 0 for the deflection q of the middle.
+# First mode of a clamped beam: k L, modal mass of the mid-point deflection over the total mass, and gamma of q'' + omega^2 (q + gamma q^3 /
+# h^2) = 0 for the deflection q of the mid-point.
 WAVE_NUMBER, MASS_SHARE, GAMMA = 4.730040744862704, 0.396478, 0.719293030305
 BEGIN_S, AWAY_M = 0.01, 1.0
 WINDOWS_S = ((0.02, 0.12), (0.2, 0.4), (0.7, 0.95))  # of the motion
@@ -132,7 +132,7 @@ def check_bar(folder):
     for impulse in (0.005, 0.014):
         path = integrate(omega, impulse)
         sound, effect = strike(folder, "bar", impulse)
-        assert effect["on_s"] > 0.3, effect  # by itself, until it is soft
+        assert effect["on_s"] > 0.3, effect  # switches off by itself once quiet
         found = list_cents(sound, soft, near_hz)
         wanted = [1200 * math.log2(find_pitch(path, window, near_hz) / (omega / (2 * math.pi))) for window in WINDOWS_S]
         furthest = abs(path).max() / BAR["thickness_m"]

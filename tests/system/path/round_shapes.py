@@ -89,7 +89,7 @@ with tempfile.TemporaryDirectory(prefix="carillon-round-") as scratch:
     bank = solve(folder, {"shape": "cone", "radius_m": r, "height_m": l, "nodes": 5000}, [0.98 * hz, 1.02 * hz])
     compare("cone along its axis", [min(bank["frequencies_hz"], key=lambda f: abs(f - hz))], [hz], 5e-3)
 
-    # A cone that is cut off, of a closed form: volume and centre; with equal radii it is the cylinder.
+    # A truncated cone in closed form: volume and centre; with equal radii it is the cylinder.
     a, b, l = 0.03, 0.01, 0.08
     bank = solve(folder, {"shape": "cone", "radius_m": a, "top_radius_m": b, "height_m": l, "nodes": 3000}, [20, 40000], {"max_modes": 1})
     volume, centre = math.pi * l / 3 * (a * a + a * b + b * b), l / 4 * (a * a + 2 * a * b + 3 * b * b) / (a * a + a * b + b * b) - l / 2

@@ -63,7 +63,7 @@ with tempfile.TemporaryDirectory(prefix="carillon-surface-") as scratch:
     folder = pathlib.Path(scratch)
     write_sphere(folder / "sphere.off", 0.05)
     write_sphere(folder / "nafems.off", 0.06)
-    # Stuffing needs edges shorter than a wall, so the thin shell is left to Delaunay refinement.
+    # Stuffing needs edges shorter than the wall, so the thin shell uses Delaunay refinement only.
     both = ("delaunay", "stuffing")
     cases = [
         ("sphere", both, [], CERAMIC, [20, 8000], [6937.16] * 5 + [7349.28] * 5, 0.01),
@@ -77,7 +77,7 @@ with tempfile.TemporaryDirectory(prefix="carillon-surface-") as scratch:
                 folder, f"{body}-{method}", [f"{surface}.off", *wall, "--nodes", 9000, "--order", 2, "--method", method], material, band
             )
             found = bank["frequencies_hz"]
-            assert len(found) == len(truth), (body, method, found, truth)  # the multiplets are whole, and nothing is between them
+            assert len(found) == len(truth), (body, method, found, truth)  # multiplets are complete, without extra modes
             errors = [f / t - 1 for f, t in zip(found, truth)]
             largest = max(errors, key=abs)
             print(

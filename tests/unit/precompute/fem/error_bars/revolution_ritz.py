@@ -73,7 +73,7 @@ def solve_waves(n, section, density, e, nu, count):
     f = len(value)
     zero = numpy.zeros_like(value)
     over_r = value / r
-    strains = [  # (of u_r, of u_phi, of u_z): rr, phi phi, zz, phi z, r z, r phi
+    strains = [  # columns (u_r, u_phi, u_z): rr, phi phi, zz, phi z, r z, r phi
         (by_r, zero, zero),
         (over_r, n * over_r, zero),
         (zero, zero, by_z),
@@ -89,7 +89,7 @@ def solve_waves(n, section, density, e, nu, count):
         stiffness += (2 * shear if k < 3 else shear) * (b * weights) @ b.T
     mass = numpy.kron(numpy.eye(3), density * (value * weights) @ value.T)
     parts = [numpy.arange(3 * f)]
-    if n == 0:  # torsion parts from the rest
+    if n == 0:  # torsion decouples
         parts = [numpy.r_[0:f, 2 * f : 3 * f], numpy.arange(f, 2 * f)]
     found = []
     for part in parts:
@@ -107,7 +107,7 @@ def solve(make, degrees, modes, material):
         values = values[values > 1e-9 * largest] if n > 1 else values[2:] if n == 0 else values[2:]
         found += [(v, n) for v in values for _ in range(1 if n == 0 else 2)]
         found.sort()
-        # Beyond some n the lowest rises with n.
+        # Beyond some n the lowest mode rises with n.
         if n > 3 and len(found) >= modes and values[0] > found[modes - 1][0]:
             break
     return [(numpy.sqrt(v) / 2 / numpy.pi, n) for v, n in found[:modes]]
