@@ -1,8 +1,7 @@
 #!/usr/bin/python3
 """Draws small banks and a small scene, and reads the pictures back: they have to show what was put into them."""
 import contextlib
-import importlib.machinery
-import importlib.util
+import importlib
 import io
 import json
 import math
@@ -37,7 +36,7 @@ def run(*arguments, folder):
 
 def run_in_process(*arguments, folder):
     """The same in this process, for errors before drawing."""
-    program, before, errors = load_program(), (os.getcwd(), sys.argv), io.StringIO()
+    program, before, errors = load("program"), (os.getcwd(), sys.argv), io.StringIO()
     os.chdir(folder)
     sys.argv = [str(PROGRAM), *arguments]
     try:
@@ -53,7 +52,7 @@ def run_in_process(*arguments, folder):
 
 def split_panels(image, count):
     """Panels of a picture of directivity, without their labels, as carillon-draw arranges them."""
-    columns, width, height = load_program().choose_panels(count, 1.0)
+    columns, width, height = load("picture").choose_panels(count, 1.0)
     corners = [(index // columns * height, index % columns * width) for index in range(count)]
     return [image[y : y + height - 112, x : x + width] for y, x in corners]
 
@@ -72,18 +71,17 @@ def spoil(source, target, change):
     make_bank.seal(folder / target)
 
 
-def load_program():
-    """The program as a module, for what it computes before it draws."""
+def load(name):
+    """A module of the program."""
     sys.dont_write_bytecode = True
-    loader = importlib.machinery.SourceFileLoader("carillon_draw", str(PROGRAM))
-    module = importlib.util.module_from_spec(importlib.util.spec_from_loader("carillon_draw", loader))
-    loader.exec_module(module)
-    return module
+    if str(PROGRAM) not in sys.path:
+        sys.path.insert(0, str(PROGRAM))
+    return importlib.import_module(name)
 
 
 def check_patterns():
     """Far patterns against closed forms: (-i)^(l + 1) / h_l of orders 0 to 2 and real harmonics, both written out."""
-    draw = load_program()
+    draw = load("far_field")
     polar, azimuth = numpy.linspace(0, math.pi, 181), 2 * math.pi * numpy.arange(360) / 360
     x = numpy.sin(polar)[:, None] * numpy.cos(azimuth)
     y = numpy.sin(polar)[:, None] * numpy.sin(azimuth)
@@ -132,7 +130,7 @@ def check_patterns():
 
     # The closed surface: oriented outward, with the volume enclosed by its radii.
     for levels, volume in [(0 * z, 4 / 3 * math.pi), (-15 + 0 * z, 4 / 3 * math.pi / 8), (-15 * (1 - z), math.pi / 3)]:
-        vertices, triangles, colour = draw.make_balloon(levels, polar, azimuth)
+        vertices, triangles, colour = load("directivity").make_balloon(levels, polar, azimuth)
         a, b, c = (vertices[triangles[:, corner]] for corner in range(3))
         found = numpy.einsum("ij,ij->", a, numpy.cross(b, c)) / 6
         expect(abs(found / volume - 1) < 1e-3, f"balloon: volume {found:.4f}, not {volume:.4f}")
@@ -266,7 +264,7 @@ with tempfile.TemporaryDirectory() as name:
     before = sorted(folder.iterdir())
     for arguments, words in [
         (["modes", "absent.hdf", "-o", "x.png"], ["absent.hdf", "No such file"]),
-        (["modes", "text.hdf", "-o", "x.png"], ["text.hdf", "no mode bank"]),
+        (["modes", "text.hdf", "-o", "x.png"], ["text.hdf", "not a mode bank"]),
         (["modes", "short.hdf", "-o", "x.png"], ["short.hdf", "SHA-256"]),
         (["modes", "newer.hdf", "-o", "x.png"], ["newer.hdf", "version 3.0"]),
         (["modes", "packed.hdf", "-o", "x.png"], ["packed.hdf", "carillon-bank unpack"]),
@@ -289,7 +287,7 @@ with tempfile.TemporaryDirectory() as name:
         (["scene", "broken.json", "-o", "x.png"], ["broken.json", "line 2"]),
         (["scene", "empty.json", "-o", "x.png"], ["empty.json", "no bodies"]),
         (["scene", "poor.json", "-o", "x.png"], ["poor.json", "body 'a'", "poses"]),
-        (["scene", "list.json", "-o", "x.png"], ["list.json", "no trajectory"]),
+        (["scene", "list.json", "-o", "x.png"], ["list.json", "not a trajectory"]),
         (["scene", "far.json", "-o", "x.png"], ["absent.hdf", "No such file"]),
         (["modes", "nan.hdf", "-o", "x.png"], ["nan.hdf", "finite"]),
         (["modes", "far.hdf", "-o", "x.png"], ["far.hdf", "finite"]),
@@ -300,7 +298,7 @@ with tempfile.TemporaryDirectory() as name:
         (["modes", "words.hdf", "-o", "x.png"], ["words.hdf", "numbers"]),
         (["modes", "flat.hdf", "-o", "x.png"], ["flat.hdf", "triangles"]),
         (["scene", "infinite.json", "-o", "x.png"], ["infinite.json", "finite"]),
-        (["scene", "remote.json", "-o", "x.png"], ["remote.json", "farther"]),
+        (["scene", "remote.json", "-o", "x.png"], ["remote.json", "too far"]),
         (["scene", "deep.json", "-o", "x.png"], ["deep.json"]),
         (["scene", "escape.json", "-o", "x.png"], ["escape.json", "\\u001b]0;x"]),
         (["scenes", "far.json", "-o", "x.png"], ["scenes", "--help"]),
