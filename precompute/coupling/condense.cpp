@@ -15,6 +15,7 @@
 #include "precompute/coupling/static_answer.hpp"
 #include "precompute/coupling/stresses.hpp"
 #include "precompute/coupling/stretch.hpp"
+#include "precompute/job/cost/calibration.hpp"
 #include "precompute/la/local_columns.hpp"
 #include "runtime/base/error.hpp"
 
@@ -109,10 +110,10 @@ Condensed condense_modes(const comm::Communicator& comm, const SolvedModes& solv
     if (options.report) options.report(fmt::format("{:.0f} % of the pairs of {} modes", 100 * share, modes), share);
   };
   const CoupledBody body{comm, strains, answer, nodal, omega, Pairs{modes}, proceed};
-  const bool wants_points = modes > kModesOfAllPairs && !options.is_stretch;
+  const bool wants_points = modes > cost::kModesOfAllPairs && !options.is_stretch;
   const double fields_error = kFieldsShare * options.energy_error;
-  StressFields fields =
-      modes > kModesOfAllPairs ? calc_fields_of_samples(body, fields_error) : calc_fields_of_pairs(body, fields_error, options.is_stretch);
+  StressFields fields = modes > cost::kModesOfAllPairs ? calc_fields_of_samples(body, fields_error)
+                                                       : calc_fields_of_pairs(body, fields_error, options.is_stretch);
   if (options.is_stretch) {
     keep_stretch(body, fields);
     if (fields.form.rows() == 0)

@@ -16,8 +16,7 @@
 
 namespace carillon::coupling {
 
-inline constexpr int kMaxModes = 400;        // maximum per job: 80,200 pairs
-inline constexpr int kModesOfAllPairs = 40;  // up to this count every pair has its own solve; beyond, motions are sampled
+inline constexpr int kMaxModes = 400;  // maximum per job: 80,200 pairs
 
 struct CondenseOptions {
   bool is_stretch = false;                  // mean stretch only, at most three rows: pitch glide at negligible cost
