@@ -5,10 +5,10 @@
 #include <functional>
 #include <optional>
 
-#include "precompute/job/cost/calibration.hpp"
 #include "precompute/eigen/inertia.hpp"
 #include "precompute/eigen/slices.hpp"
 #include "precompute/eigen/types.hpp"
+#include "precompute/job/cost/calibration.hpp"
 
 namespace carillon::eigen {
 
@@ -62,7 +62,6 @@ struct SolveEstimate {
   std::int64_t copies_bytes = 0;
   std::int64_t copies_kept_bytes = 0;
   std::int64_t rigid_count = 0;
-  double factor_seconds = 0;          // CPU, of one factorisation; 0: none was made
   std::optional<std::int64_t> modes;  // of the band, as many as are wanted at most; empty: not counted
 };
 

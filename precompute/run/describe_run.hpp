@@ -1,4 +1,4 @@
-// The record of a run as JSON: what was chosen, found and used.
+// The record of a run as JSON: choices, results and resources.
 #pragma once
 
 #include <json/forwards.h>
@@ -6,17 +6,18 @@
 #include <string>
 #include <vector>
 
-#include "precompute/run/solve_body.hpp"
+#include "precompute/run/run.hpp"
+#include "precompute/run/stages.hpp"
 
 namespace carillon::run {
 
-/// What goes under "run" in the resolved job and in the provenance of the bank. Rank 0 only.
-Json::Value describe_run(const Run& run, const Setting& setting, const Body& body, const SolvedBody& solved, const Measured& measured);
+/// "run" of the resolved job and of the bank's provenance. Rank 0 only.
+Json::Value describe_run(const Run& run, const Solution& found, const Measured& measured);
 
-/// Its part about the program alone: name, version, ranks, phases.
+/// Its part about the program: name, version, ranks, phases.
 Json::Value describe_program(const Run& run);
 
-/// Materials by region: what they are, how they damp, and their volume.
+/// Materials by region: constants, damping, volume.
 Json::Value describe_materials(const fem::Materials& materials, const std::vector<double>& volume_m3);
 
 /// One line without spaces, numbers to full double precision.

@@ -7,8 +7,8 @@ FLOOR_DB = -120.0  # minimum far level
 
 
 def calc_inverse_hankels(x, order):
-    """(-i)^(l + 1) / h_l(x) for l = 0 .. order: the far field of a multipole on the sphere. Stable upward recurrence of h_l (DLMF 10.51.1) in
-    ratios, so that overflow becomes 0."""
+    """(-i)^(l + 1) / h_l(x) for l = 0 .. order: the far field of a multipole on the sphere. Stable upward recurrence of h_l
+    (DLMF 10.51.1) in ratios, so that overflow becomes 0."""
     ratio = 1 / x - 1j  # h_1 / h_0
     inverse = [x * numpy.exp(-1j * x)]  # h_0 = -i e^(ix) / x
     for l in range(1, order + 1):

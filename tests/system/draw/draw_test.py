@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Draws small banks and a small scene, and reads the pictures back: they have to show what was put into them."""
+"""Draws small banks and a small scene, and checks the pictures against their content."""
 import contextlib
 import importlib
 import io
@@ -58,13 +58,13 @@ def split_panels(image, count):
 
 
 def measure_ink(image):
-    """Width and height of all that is not grey, in pixels: balloon and body, not the rings."""
+    """Width and height of the coloured pixels: balloon and body, without the rings."""
     ink = numpy.ptp(image.astype(int), axis=2) > 40
     return numpy.ptp(numpy.flatnonzero(ink.any(axis=0))) + 1, numpy.ptp(numpy.flatnonzero(ink.any(axis=1))) + 1
 
 
 def spoil(source, target, change):
-    """A copy of a bank with `change` made to its HDF5 part, sealed again."""
+    """A copy of a bank with `change` applied to its HDF5 part and a new checksum."""
     shutil.copy(folder / source, folder / target)
     with h5py.File(folder / target, "r+") as bank:
         change(bank)

@@ -1,6 +1,5 @@
 #!/usr/bin/python3
-"""Simulates a bar that is struck, draws its motion, and reads the pictures back: outline and colour have to be those of the points in the
-file, projected here."""
+"""Simulates a struck bar, draws its motion, and compares outline and colour of the pictures with the projected points of the file."""
 import contextlib
 import importlib
 import io
@@ -65,7 +64,7 @@ def load_program():
 
 
 def run_here(program, arguments):
-    """Exit code and standard error of the program in this process: a start of Python for each bad input would be most of the test."""
+    """Exit code and standard error of the program in this process: starting Python for each invalid input would dominate the test."""
     sys.argv = ["carillon-draw", "motion", *arguments]
     with contextlib.redirect_stderr(io.StringIO()) as errors:
         code = program.main()
@@ -81,7 +80,7 @@ def project(points):
 
 
 def find_outline(image):
-    """First and last column and row of what is not white above the time, in pixels: left, right, top, bottom."""
+    """Bounding box of the non-white pixels above the time: left, right, top, bottom."""
     ink = image.min(axis=2) < 200
     columns, rows = numpy.flatnonzero(ink.any(axis=0)), numpy.flatnonzero(ink.any(axis=1))
     return numpy.array([columns[0], columns[-1] + 1, rows[0], rows[-1] + 1], float)

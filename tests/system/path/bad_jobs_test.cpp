@@ -135,7 +135,7 @@ TEST(Band, without_a_mode_gives_a_silent_bank_and_a_warning) {
   folder.write_job({}, R"("element": "T4", "band_hz": [20, 30],)");
   const Outcome outcome = folder.run();
   EXPECT_EQ(outcome.code, 0) << outcome.output;
-  EXPECT_THAT(outcome.output, HasSubstr("no mode lies in the band"));
+  EXPECT_THAT(outcome.output, HasSubstr("no mode in the band"));
   EXPECT_EQ(bank::read_bank(folder / "out.bank").mode_count(), 0u);
 }
 

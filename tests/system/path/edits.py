@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""A bank that was edited is the bank of a fresh solve of the edited body: density, stiffness, size and damping of a steel bar, T10, alone
+"""An edited bank equals a fresh solve of the edited body: density, stiffness, size and damping of a steel bar, T10, alone
 and together.
 
 usage: edits.py BIN_DIR

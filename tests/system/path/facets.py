@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""A faceted cylinder is solved as the cylinder, for any triangulation. With facets in doubt the error bars hold for the meshed body, and
-with the doubt for both. Bells from a lathe: facets are in doubt with few rings, not with many.
+"""A faceted cylinder is solved as the smooth one, for any triangulation. With ambiguous facets the error bars hold for the meshed body and,
+with the doubt, for both. Turned bells: facets are ambiguous with few rings, not with many.
 
 Truth: the free steel cylinder of radius 20 mm and length 200 mm, "cylinder-10" of
 tests/unit/precompute/fem/error_bars/data/known_frequencies.csv
@@ -23,7 +23,7 @@ RADIUS, LENGTH = 0.02, 0.2
 
 
 def write_cylinder(path, sides, rings, quads):
-    """An OBJ file of rings of quads or triangles, ends of one polygon each."""
+    """An OBJ file of rings of quads or triangles, with polygonal ends."""
     points = [
         (RADIUS * math.cos(2 * math.pi * j / sides), RADIUS * math.sin(2 * math.pi * j / sides), LENGTH * i / rings)
         for i in range(rings + 1)

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""Corrected frequencies from the job to the sound: a scene plays them, or the mesh's, as it asks; a list that is too short for error bars
-says so in the log, in the bank and in its report, and nowhere as a number.
+"""Corrected frequencies from the job to the sound: a scene plays them or the mesh's, as selected; lists too short for error
+bars are marked in the log, the bank and its report, without numbers.
 
 usage: frequencies.py BIN_DIR
 """
@@ -36,7 +36,7 @@ def solve(folder, name, **more):
 
 
 def measure(folder, name, freq_hz):
-    """How strong each frequency is in the WAV, by a Hann window over its last second."""
+    """Amplitude of each frequency in the last second of the WAV, with a Hann window."""
     with wave.open(str(folder / f"{name}.wav")) as file:
         rate, channels = file.getframerate(), file.getnchannels()
         sound = numpy.frombuffer(file.readframes(file.getnframes()), "<i2").reshape(-1, channels).sum(axis=1)[-rate:]

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
-"""A run that is stopped from outside leaves no half bank, no temporary file and no process, whatever it was doing.
+"""A run stopped by a signal leaves no partial bank, temporary file or process, in any phase.
 
-Starts a run on several ranks, waits for the line of a phase, and sends a signal to mpirun or to a single rank.
+Starts a run on several ranks, waits for the log line of a phase, and sends a signal to mpirun or to one rank.
 
 usage: interrupt.py BIN_DIR
 """
@@ -22,7 +22,7 @@ bin_dir = pathlib.Path(sys.argv[1]).resolve()
 
 
 def find_mentions(folder):
-    """Processes that have the folder on their command line."""
+    """Processes with the folder in their command line."""
     found = []
     for entry in pathlib.Path("/proc").glob("[0-9]*"):
         try:

@@ -1,8 +1,8 @@
 #!/usr/bin/python3
-"""The kinds of modes of carillon-bank against those of closed forms at the same frequencies.
+"""Kinds of modes by carillon-bank against closed forms at the same frequencies.
 
 A free steel bar: Timoshenko's bending in both planes (Huang 1961), torsion (St Venant) and longitudinal motion (Rayleigh). A ball: Lamb's
-breathing mode. A ring: its nodal diameters in and out of the plane (Love 1927). A plate: Leissa 1973, table C20. A lumpy body: none.
+breathing mode. A ring: its nodal diameters in and out of the plane (Love 1927). A plate: Leissa 1973, table C20. An irregular body: none.
 
 usage: kinds.py BIN_DIR
 """
@@ -56,7 +56,7 @@ def bending(length, width, height, high_hz):
 
 
 def solve(folder, name, job):
-    """[(heard frequency [Hz], kind)]"""
+    """[(playback frequency [Hz], kind)]"""
     (folder / f"{name}.json").write_text(json.dumps({"bank": f"{name}.hdf", "material": STEEL, **job}))
     for words in (["carillon-precompute", f"{name}.json", "-q"], ["carillon-bank", "info", f"{name}.hdf", "--csv"]):
         done = subprocess.run([bin_dir / words[0], *words[1:]], cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True)

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""Bodies whose modes are known, through the programs: figure 2 of van den Doel and Pai 1996 from the job to the rendered sound; banks of
-every kind pass the check and are played, struck and dropped; the queue computes them; input with mistakes gets one error.
+"""Bodies with known modes, through the programs: figure 2 of van den Doel and Pai 1996 from the job to the rendered sound; banks of
+every kind pass the check and are played, struck and dropped; the queue computes them; invalid input gets one error.
 
 usage: known_bodies.py BIN_DIR SOURCE_DIR
 """
@@ -96,7 +96,7 @@ def render(folder, point, name):
 
 
 def list_lines(point, modes=400):
-    """{half-waves squared: sum of the modes' amplitudes}: what modes of one frequency add up to. Closed form."""
+    """{half-waves squared: sum of the amplitudes of degenerate modes}, in closed form."""
     pairs = sorted(((m * m + n * n, m, n) for m in range(1, 60) for n in range(1, 60)))[:modes]
     lines = {}
     for square, m, n in pairs:
@@ -146,8 +146,8 @@ def check_rendered_lines(folder):
 
 
 def check_brightness(folder):
-    """The known centroids of the modes' energies, rising towards the edge; and the centroid of the rendered sound against that of its
-    lines, in which modes of one frequency add up with their signs."""
+    """Centroids of the modes' energies against known ones, rising towards the edge; centroid of the rendered sound against that of its
+    lines, in which degenerate modes add with their signs."""
     before = 0.0
     for row in list(csv.reader((DATA / "square_membrane_brightness.csv").open()))[1:]:
         point = float(row[0]), float(row[1])

@@ -1,11 +1,11 @@
 #!/usr/bin/python3
-"""Solves cylinder, disc, ring and cone as bodies of a job, and compares frequencies, volume and inertia with what is known.
+"""Solves cylinder, disc, ring and cone as bodies of a job, and compares frequencies, volume and inertia with known values.
 
 Truth: a free solid cylinder of L = 2 R with nu = 0.3 (Fourier-Ritz, nine digits, omega R / c_T); a free thin disc (Kirchhoff's plate, nu =
 0.3: roots of the frequency equation of the free edge, Leissa, NASA SP-160, 1969, chapter 2); a thin ring of round wire, in its plane (Hoppe
 1871) and out of it (Michell 1889), in Love's Treatise, sections 293 and 294; a slender cone clamped at its base (Kirchhoff 1879: 8.7192 of
-c r / 2 L^2) and a free one along its axis (tan kL = kL). Thin-body theories leave shear and rotary inertia out, a part of (h / R)^2 or so
-of the frequency; that is what their tolerances allow.
+c r / 2 L^2) and a free one along its axis (tan kL = kL). Thin-body theories neglect shear and rotary inertia, a relative error of
+about (h / R)^2, which sets the tolerances.
 
 usage: round_shapes.py BIN_DIR
 """

@@ -1,10 +1,10 @@
 #!/usr/bin/python3
-"""Meshes surfaces in both ways, solves them, and holds the frequencies against exact ones.
+"""Meshes surfaces with both methods, solves them, and compares with exact frequencies.
 
 Truth: Lamb modes of a solid ceramic sphere, R = 50 mm (torsional and spheroidal, l = 2: 6937.16 and 7349.28 Hz, five of each), and of a
 steel shell, radii 50 and 45 mm (S2, five at 12550.313 Hz; 200 GPa, 0.3, 7850 kg/m^3), and of NAFEMS FV42's thick sphere at 1:100, radii 60
-and 18 mm (S2, five at 19666.18 Hz; 200 GPa, 0.3, 8000 kg/m^3): roots of the exact frequency equations. What remains of the error is mostly
-the polygon's: elements have straight sides here, so a ball is a little small and its modes a little high.
+and 18 mm (S2, five at 19666.18 Hz; 200 GPa, 0.3, 8000 kg/m^3): roots of the exact frequency equations. The remaining error is mostly
+geometric: elements have straight sides here, so a ball is slightly small and its modes slightly high.
 
 usage: surface_frequencies.py BIN_DIR RANKS
 """

@@ -1,6 +1,5 @@
 #!/usr/bin/python3
-"""What strangers write does not reach the terminal as control characters: errors of every program, from file names, keys, texts and words
-of the command line.
+"""Untrusted text reaches the terminal without control characters: errors of every program, from file names, keys, texts and arguments.
 
 usage: terminal.py BIN_DIR
 """
@@ -84,7 +83,7 @@ def check_texts(folder):
 
 
 def check_names(folder):
-    """Names of files and words of the command line, which may be no UTF-8 at all."""
+    """File names and arguments, which may be invalid UTF-8."""
     for name in (NASTY.encode().replace(b"/", b""), b"latin \xe9 \x9b \xff"):
         for program, words in (
             ("carillon-render", [name, b"-o", b"x.wav"]),

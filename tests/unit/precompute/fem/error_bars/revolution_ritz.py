@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Frequencies of free elastic bodies of revolution without any mesh: Fourier series around, Rayleigh-Ritz across.
+"""Frequencies of free elastic bodies of revolution, meshless: Fourier series around, Rayleigh-Ritz across.
 
 usage: revolution_ritz.py MODES DENSITY E NU R1 Z1 R2 Z2 R3 Z3 R4 Z4 [--degrees N M]
        revolution_ritz.py MODES DENSITY E NU --torus R RADIUS [--degrees N M]
@@ -67,7 +67,7 @@ def make_disc(far, radius, degrees):
 
 
 def solve_waves(n, section, density, e, nu, count):
-    """Eigenvalues of the modes with n waves around, those of the turned functions (sin for cos) the same."""
+    """Eigenvalues of the modes with n waves around, equal for the rotated functions (sin for cos)."""
     value, by_r, by_z, r, weights = section
     lame, shear = e * nu / (1 + nu) / (1 - 2 * nu), e / 2 / (1 + nu)
     f = len(value)
