@@ -28,8 +28,6 @@ constexpr PetscInt kBlock = 16;             // modes per block
 constexpr std::size_t kMaxSupports = 1000;  // beyond it, one support per entry
 constexpr double kOpenShare = 0.05;         // of the area: a patch whose face normals sum to less is closed and has no normal
 
-double calc_norm(const Vec3& v) { return std::hypot(v[0], v[1], v[2]); }
-
 /// A fixed node of a rank's elements, sent to rank 0. `root`: a node of the mesh connected to it.
 struct NodeRecord {
   std::int32_t node, entry, root, pad;
@@ -194,7 +192,7 @@ void measure(const std::vector<FaceRecord>& faces, Layout& layout) {
       b[k] = x[2][k] - x[0][k];
     }
     const Vec3 n = cross(a, b);
-    const double area = 0.5 * calc_norm(n);
+    const double area = 0.5 * calc_length(n);
     layout.list[s].area_m2 += area;
     for (int k = 0; k < 3; ++k) {
       normal[s][k] += 0.5 * n[k];
@@ -213,7 +211,7 @@ void measure(const std::vector<FaceRecord>& faces, Layout& layout) {
     for (int r = 0; r < 3; ++r)
       for (int c = 0; c < 3; ++c) second[s][3 * r + c] = second[s][3 * r + c] / area - first[s][r] * first[s][c] / (area * area);
     support.thickness_m = std::sqrt(std::max(0.0, 12.0 * calc_middle_eigenvalue(second[s])));
-    const double size = calc_norm(normal[s]);
+    const double size = calc_length(normal[s]);
     if (size > kOpenShare * area)
       for (int k = 0; k < 3; ++k) support.normal[k] = normal[s][k] / size;
   }
@@ -261,7 +259,7 @@ class Nearby {
         for (int k = -1; k <= 1; ++k) {
           const auto cell = cells_.find(find_cell(x, {i, j, k}));
           if (cell == cells_.end()) continue;
-          for (const Vec3& y : cell->second) nearest = std::min(nearest, std::hypot(x[0] - y[0], x[1] - y[1], x[2] - y[2]));
+          for (const Vec3& y : cell->second) nearest = std::min(nearest, calc_length(x - y));
         }
     return nearest <= width_m_ ? nearest : 1e300;
   }

@@ -1,6 +1,6 @@
 // Method: indices, welding, orientation, volume, twins of elements, then the faces: two elements on a face run through its corners in
 //   opposite senses when they lie on opposite sides of it; faces that stay alone form the boundary, whose edges must pair up.
-// Source: own; orientation by the sign of det(x1 - x0, x2 - x0, x3 - x0).
+// orientation by the sign of det(x1 - x0, x2 - x0, x3 - x0).
 // Deviations: elements that interpenetrate without sharing a face are not found (that would need a search for intersections).
 
 #include "precompute/mesh/check.hpp"
@@ -65,7 +65,7 @@ double calc_determinant(const TetMesh& mesh, std::int64_t e, double& longest_squ
     longest_squared = std::max(longest_squared, edge[m][0] * edge[m][0] + edge[m][1] * edge[m][1] + edge[m][2] * edge[m][2]);
   }
   const Vec3 &a = edge[0], &b = edge[2], &c = edge[3];
-  return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
+  return calc_det(a, b, c);
 }
 
 /// `determinant` and the square of the longest edge as calc_determinant gives them.

@@ -1,8 +1,6 @@
 // Accuracy as an input: "accuracy_cents" in a job instead of element, mesh size and tolerance.
 #pragma once
 
-#include <json/forwards.h>
-
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -10,6 +8,7 @@
 #include "precompute/job/cost/problem_size.hpp"
 #include "precompute/run/run.hpp"
 #include "precompute/run/stages.hpp"
+#include "runtime/base/json.hpp"
 
 namespace carillon::run {
 
@@ -64,6 +63,6 @@ Body make_trial_body(Run& run, Setting& setting);
 /// "T10, meshed with edges of 0.0021 m, tolerance 1e-07".
 std::string describe(const Setting& setting);
 
-Json::Value describe_accuracy(const AccuracyReport& report);
+base::Json describe_accuracy(const AccuracyReport& report);
 
 }  // namespace carillon::run

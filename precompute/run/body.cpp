@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "precompute/eigen/solve_estimate.hpp"
+#include "precompute/eigen/predict_cost.hpp"
 #include "precompute/fem/error_bars/correct.hpp"
 #include "precompute/mesh/distributed/distribute.hpp"
 #include "precompute/mesh/parallel/read_parallel.hpp"
@@ -113,11 +113,9 @@ void log_size(const Run& run, std::int64_t nodes, std::int64_t tets, int compone
                             fixed_nodes));
 }
 
-/// CHOLMOD and MUMPS need the elimination order of the whole graph, which costs rank 0 time and memory. Our factorisation orders by itself;
-/// MUMPS as its fallback orders by itself with more fill.
-bool wants_elimination_order(const job::JobSpec& job) {
-  return job.factorisation == job::Factorisation::mumps || job.factorisation == job::Factorisation::cholmod;
-}
+/// MUMPS needs the elimination order of the whole graph, which costs rank 0 time and memory; our factorisation orders by itself, and MUMPS
+/// as its fallback does so with more fill.
+bool wants_elimination_order(const job::JobSpec& job) { return job.factorisation == job::Factorisation::mumps; }
 
 /// For our factorisation the mesh is best cut at its separators.
 bool wants_cut_by_order(const job::JobSpec& job) { return !wants_elimination_order(job) && job.method != job::Method::dense; }

@@ -1,7 +1,6 @@
 #include "precompute/run/run_job.hpp"
 
 #include <fmt/core.h>
-#include <json/json.h>
 
 #include <algorithm>
 #include <cmath>
@@ -11,7 +10,6 @@
 #include <utility>
 #include <vector>
 
-#include "precompute/eigen/solver_options.hpp"
 #include "precompute/petsc/session.hpp"
 #include "precompute/run/accuracy.hpp"
 #include "precompute/run/air.hpp"
@@ -30,6 +28,7 @@
 #include "precompute/run/solve_body.hpp"
 #include "runtime/bank/corrected.hpp"
 #include "runtime/base/file.hpp"
+#include "runtime/base/json.hpp"
 
 namespace carillon::run {
 namespace {
@@ -125,7 +124,7 @@ RunSummary write_outputs(Run& run, const Solution& found, const AccuracyReport& 
   if (run.comm.is_root()) summary.warning = describe_wide_bars(bank, found.setting, run.job.accuracy_cents.has_value());
   const fs::path folder = fs::absolute(summary.bank).parent_path();
   const auto make_record = [&](const Measured& measured) {
-    Json::Value record = describe_run(run, found, measured);
+    base::Json record = describe_run(run, found, measured);
     if (run.job.accuracy_cents) record["accuracy"] = describe_accuracy(accuracy);
     if (!air.why.empty()) {
       record["air"]["solved"] = air.is_solved;
@@ -134,7 +133,7 @@ RunSummary write_outputs(Run& run, const Solution& found, const AccuracyReport& 
     }
     if (!coupling.result.empty()) record["coupling"] = coupling.result;
     if (!summary.warning.empty()) record["warnings"].append(summary.warning);
-    return job::resolved_json(run.job, folder, write_json(record));
+    return job::resolved_json(run.job, folder, record.sorted_text());
   };
   run.log.begin("write", summary.bank.string());
   Measured measured = measure(run.comm);

@@ -1,17 +1,16 @@
 // Method: memory is measured up to the analysis of the factorisation; the rest follows from the solver's own formulas
-//   (eigen/solve_estimate, precompute/job/cost). Modes are counted by two factorisations if these are small, otherwise estimated by Weyl's
+//   (eigen/predict_cost, precompute/job/cost). Modes are counted by two factorisations if these are small, otherwise estimated by Weyl's
 //   law. Seconds: the cost model on its reference machine.
 #include "precompute/run/validate.hpp"
 
 #include <fmt/core.h>
-#include <json/json.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "precompute/eigen/memory.hpp"
-#include "precompute/eigen/solve_estimate.hpp"
+#include "precompute/eigen/predict_cost.hpp"
 #include "precompute/job/cost/calibration.hpp"
 #include "precompute/job/cost/memory.hpp"
 #include "precompute/job/cost/modes.hpp"
@@ -24,6 +23,7 @@
 #include "precompute/run/open_job.hpp"
 #include "precompute/run/system.hpp"
 #include "runtime/base/host.hpp"
+#include "runtime/base/json.hpp"
 
 namespace carillon::run {
 namespace {
@@ -37,7 +37,7 @@ constexpr std::array<int, 3> kRanks{1, 2, 4};
 struct Prediction {
   Body body;
   BodyProperties properties;
-  eigen::SolveEstimate solve;
+  eigen::SolveCost solve;
   bool is_analysed = false;
   cost::ProblemSize size;
   cost::ModeEstimate weyl;
@@ -54,7 +54,7 @@ double calc_area(const Surface& surface) {
   double area = 0;
   for (const Triangle& t : surface.triangles) {
     const Vec3 &a = surface.vertices_m[t[0]], &b = surface.vertices_m[t[1]], &c = surface.vertices_m[t[2]];
-    area += 0.5 * norm(cross(b - a, c - a));
+    area += 0.5 * calc_length(cross(b - a, c - a));
   }
   return area;
 }
@@ -64,7 +64,7 @@ void analyse(Run& run, const Setting& setting, Prediction& found) {
   AssembledSystem system = assemble_system(run, setting, found.body);
   found.memory.assembled = static_cast<double>(base::find_memory().resident);
   found.memory.read_peak = static_cast<double>(base::find_memory().peak);
-  const auto may_count = [&](const eigen::SolveEstimate& estimate) {
+  const auto may_count = [&](const eigen::SolveCost& estimate) {
     const bool fits = static_cast<double>(estimate.factor_bytes) < kRoomUsed * static_cast<double>(eigen::find_memory_left());
     if (!fits) found.notes.push_back("the modes were not counted: a factorisation does not fit into the available memory");
     if (fits && estimate.flops > kMaxCountFlops)
@@ -72,8 +72,8 @@ void analyse(Run& run, const Setting& setting, Prediction& found) {
     return fits && estimate.flops <= kMaxCountFlops;
   };
   found.solve = name_errors(found.body.source, run, [&] {
-    return eigen::estimate_solve({system.matrices.stiffness, system.matrices.mass, make_layout(found.body)}, make_options(run.job, setting),
-                                 may_count);
+    return eigen::predict_cost({system.matrices.stiffness, system.matrices.mass, make_layout(found.body)}, make_options(run.job, setting),
+                               may_count);
   });
   found.is_analysed = true;
   found.properties = std::move(system.properties);
@@ -151,35 +151,35 @@ Prediction predict(Run& run) {
 /// On one rank, in the memory available now.
 bool fits_here(const Prediction& found) { return found.bytes[0] - std::llround(found.memory.program) <= found.available_bytes; }
 
-Json::Value describe(const Run& run, const Prediction& found) {
-  Json::Value root;
+base::Json describe(const Run& run, const Prediction& found) {
+  base::Json root;
   root["ok"] = true;
-  Json::Value& mesh = root["mesh"];
+  base::Json& mesh = root["mesh"];
   mesh["source"] = found.body.source;
-  mesh["nodes"] = Json::Int64(found.size.nodes);
-  mesh["tets"] = Json::Int64(found.size.tets);
+  mesh["nodes"] = found.size.nodes;
+  mesh["tets"] = found.size.tets;
   mesh["components"] = found.body.pieces.components;
-  mesh["fixed_nodes"] = Json::Int64(found.body.fixed_nodes);
+  mesh["fixed_nodes"] = found.body.fixed_nodes;
   mesh["min_dihedral_deg"] = found.body.check.min_dihedral_deg;
   mesh["mean_ratio_min"] = found.body.check.mean_ratio_min;
-  root["unknowns"] = Json::Int64(found.size.unknowns);
-  Json::Value& modes = root["modes"];
-  modes["count"] = Json::Int64(get_listed(run, *found.size.modes));
+  root["unknowns"] = found.size.unknowns;
+  base::Json& modes = root["modes"];
+  modes["count"] = get_listed(run, *found.size.modes);
   modes["how"] = found.solve.modes ? "counted" : "estimated";
-  modes["estimate"] = Json::Int64(get_listed(run, std::llround(found.weyl.count)));
-  modes["low"] = Json::Int64(get_listed(run, found.solve.modes ? *found.size.modes : std::llround(std::floor(found.weyl.low))));
-  modes["high"] = Json::Int64(get_listed(run, found.get_max_modes()));
-  root["factor"]["entries"] = Json::Int64(found.solve.entries);
+  modes["estimate"] = get_listed(run, std::llround(found.weyl.count));
+  modes["low"] = get_listed(run, found.solve.modes ? *found.size.modes : std::llround(std::floor(found.weyl.low)));
+  modes["high"] = get_listed(run, found.get_max_modes());
+  root["factor"]["entries"] = found.solve.entries;
   root["factor"]["flops"] = found.solve.flops;
   root["factor"]["how"] = found.is_analysed ? "analysed" : "extrapolated";
   for (std::size_t i = 0; i < kRanks.size(); ++i) {
-    root["memory_bytes"][std::to_string(kRanks[i])] = Json::Int64(found.bytes[i]);
+    root["memory_bytes"][std::to_string(kRanks[i])] = found.bytes[i];
     root["wall_seconds"][std::to_string(kRanks[i])] = cost::calc_wall(found.cpu_s, found.size, kRanks[i]).sum();
   }
   root["cpu_seconds"] = found.cpu_s.sum();
   root["fits_here"] = fits_here(found);
-  for (const std::string& note : found.notes) root["notes"].append(note);
-  for (const std::string& warning : run.log.get_warnings()) root["warnings"].append(warning);
+  for (const std::string& note : found.notes) root["notes"].add(note);
+  for (const std::string& warning : run.log.get_warnings()) root["warnings"].add(warning);
   return root;
 }
 
@@ -209,15 +209,15 @@ std::string validate_job(const comm::Communicator& comm, const std::filesystem::
   if (run.job.analytic) return validate_known_body(run);
   if (comm.size() > 1) throw InputError("--validate works on one rank: start carillon-precompute without mpirun");
   const Prediction found = predict(run);
-  return options.json ? write_json(describe(run, found)) : describe_for_people(run, found);
+  return options.json ? describe(run, found).sorted_text() : describe_for_people(run, found);
 }
 
 std::string describe_failure(const std::string& message, int code) {
-  Json::Value root;
+  base::Json root;
   root["ok"] = false;
   root["error"] = message;
   root["code"] = code;
-  return write_json(root);
+  return root.sorted_text();
 }
 
 }  // namespace carillon::run

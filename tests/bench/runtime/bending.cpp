@@ -4,8 +4,6 @@
 //
 // Method:     two voices of one box, one of them with a bank of the kind that is not judged (a membrane); both get the same strikes of 1 ms
 //             and play the same second in turns. CPU time of the thread; the median of the ratios of the rounds.
-// Source:     none.
-// Deviations: none.
 #include <algorithm>
 #include <array>
 #include <cstdio>
@@ -13,7 +11,7 @@
 #include <vector>
 
 #include "runtime/base/clock.hpp"
-#include "runtime/synth/voice.hpp"
+#include "runtime/synth/resonator_bank.hpp"
 #include "tests/unit/runtime/bank/example_bank.hpp"
 
 namespace {
@@ -34,7 +32,7 @@ struct Played {
 };
 
 Played play(const std::shared_ptr<const synth::Model>& model, const Case& one) {
-  synth::Voice voice(model, {.max_strikes = 8});
+  synth::ResonatorBank voice(model, {.max_strikes = 8});
   std::array<float, 128> block{};
   Played played;
   const double began_s = base::get_thread_cpu_s();

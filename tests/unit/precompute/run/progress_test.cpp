@@ -2,24 +2,23 @@
 #include "precompute/run/progress.hpp"
 
 #include <gtest/gtest.h>
-#include <json/json.h>
 
 #include <sstream>
 #include <string>
 #include <vector>
 
 #include "runtime/base/file.hpp"
+#include "runtime/base/json.hpp"
 #include "runtime/base/temporary.hpp"
 
 namespace carillon::run {
 namespace {
 
-std::vector<Json::Value> read_lines(const std::filesystem::path& file) {
+std::vector<base::Json> read_lines(const std::filesystem::path& file) {
   std::istringstream stream(base::read_file(file, "progress", 1 << 20));
-  std::vector<Json::Value> lines;
+  std::vector<base::Json> lines;
   for (std::string line; std::getline(stream, line);) {
-    std::istringstream text(line);
-    text >> lines.emplace_back();
+    lines.push_back(base::Json::parse(line).value());
   }
   return lines;
 }
@@ -41,18 +40,18 @@ TEST(ProgressReporter, never_decreases_and_ends_at_100_after_any_number_of_trial
     for (int trial = 0; trial < trials; ++trial) solve(progress, 20);
     for (const char* phase : {"coupling", "collect", "air", "write"}) progress.begin(phase);
     progress.finish();
-    const std::vector<Json::Value> lines = read_lines(file);
+    const std::vector<base::Json> lines = read_lines(file);
     double before = 0.0;
     for (std::size_t i = 0; i + 1 < lines.size(); ++i) {
-      EXPECT_GE(lines[i]["percent"].asDouble(), before) << trials << " " << i;
-      EXPECT_LT(lines[i]["percent"].asDouble(), 100.0) << trials << " " << i;
-      EXPECT_LE(lines[i]["modes_done"].asInt(), lines[i].get("modes_wanted", 0).asInt()) << trials << " " << i;
-      before = lines[i]["percent"].asDouble();
+      EXPECT_GE(lines[i]["percent"].as_double(), before) << trials << " " << i;
+      EXPECT_LT(lines[i]["percent"].as_double(), 100.0) << trials << " " << i;
+      EXPECT_LE(lines[i]["modes_done"].as_double(), lines[i]["modes_wanted"].as_double()) << trials << " " << i;
+      before = lines[i]["percent"].as_double();
     }
-    EXPECT_EQ(lines.back()["phase"].asString(), "done");
-    EXPECT_EQ(lines.back()["percent"].asDouble(), 100.0);
-    EXPECT_EQ(lines.back()["modes_done"].asInt(), 20);
-    EXPECT_EQ(lines.back()["modes_wanted"].asInt(), 20);
+    EXPECT_EQ(lines.back()["phase"].as_string(), "done");
+    EXPECT_EQ(lines.back()["percent"].as_double(), 100.0);
+    EXPECT_EQ(lines.back()["modes_done"].as_double(), 20);
+    EXPECT_EQ(lines.back()["modes_wanted"].as_double(), 20);
   }
 }
 
@@ -62,10 +61,10 @@ TEST(ProgressReporter, a_step_of_the_search_moves_the_percentage_before_any_mode
   progress.begin("assemble");
   progress.advance({eigen::Phase::kIterate, 0, 100, 0, 0, 3, 16});
   progress.advance({eigen::Phase::kIterate, 0, 100, 0, 0, 3, 32});
-  const std::vector<Json::Value> lines = read_lines(folder.path() / "p");
+  const std::vector<base::Json> lines = read_lines(folder.path() / "p");
   ASSERT_EQ(lines.size(), 3u);
-  EXPECT_FALSE(lines[0].isMember("modes_wanted"));
-  EXPECT_LT(lines[1]["percent"].asDouble(), lines[2]["percent"].asDouble());
+  EXPECT_FALSE(lines[0].has("modes_wanted"));
+  EXPECT_LT(lines[1]["percent"].as_double(), lines[2]["percent"].as_double());
 }
 
 TEST(Describe, a_step_of_the_eigensolver) {
