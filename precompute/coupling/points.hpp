@@ -16,7 +16,7 @@ struct CouplingPoints {
 };
 
 /// Chooses integration points by nonnegative least squares on random motions, then fits the stress at the points. Adds points until `error`
-/// is met, at most `most`; the result's error tells which. fields: with values. Collective; empty except on rank 0.
+/// is met, at most `most`; the result's error shows which. fields: with values. Collective; empty except on rank 0.
 CouplingPoints choose_points(const CoupledBody& body, const mesh::LocalMesh& local, const StressFields& fields, double error,
                              std::ptrdiff_t most);
 

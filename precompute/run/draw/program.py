@@ -185,7 +185,7 @@ def describe_error(error):
         return "disk-full", str(error), 4
     if isinstance(error, (SystemError_, ImportError, OSError)):
         return "system", str(error), 4
-    # Unforeseen values.
+    # Unexpected values.
     return "bad-input", f"cannot be drawn ({type(error).__name__}: {error}); run carillon-bank check on its banks", 2
 
 
