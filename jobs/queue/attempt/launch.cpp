@@ -137,7 +137,7 @@ Launch make_launch(const Options& options, const std::string& token, const Scrat
   } else if (options.is_simulation) {
     add({"--checkpoint", store::kCheckpointFile, "--progress", store::kProgressFile});  // what it writes is in the job
   } else if (options.is_prediction) {
-    add({"--validate", "--json", "--patience", "1000000", "--count", "20"});  // what is reserved rests on the mesh, not on an estimate
+    add({"--validate", "--json"});
   } else {
     add({"--bank", store::kBankFile, "--checkpoint", store::kCheckpointFile, "--progress", store::kProgressFile});
   }

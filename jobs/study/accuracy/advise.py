@@ -34,7 +34,7 @@ TRIAL_TOLERANCE = 1e-6
 START_S = 0.15  # CPU seconds of starting, which no phase of a run's record claims
 BUDGET_MARGIN = 0.85  # of --seconds: what is aimed at
 CHECK_GROWTH = 2.5  # of the nodes, for --check
-PATIENCE_S = 6.0  # for a first look; what does not fit is estimated
+PATIENCE_S = 20.0  # maximum for a first look
 LONG_S, MANY_NODES = (
     10.0,
     45000,
@@ -187,8 +187,8 @@ class Adviser:
             return None
         # A surface that is not thin has a few thousand nodes in its first trial, whatever its usual mesh takes.
         is_thin = self.target.kind == "surface" and found["mesh"]["nodes"] > MANY_NODES
-        is_unmade = self.target.kind == "mesh" or found["mesh"]["how"] == "estimated"
-        return found if is_thin or is_unmade and found["cpu_seconds"] > LONG_S else None
+        is_long = self.target.kind == "mesh" and found["cpu_seconds"] > LONG_S
+        return found if is_thin or is_long else None
 
     def look(self):
         setting = forecast.Setting("T10", PROBE_NODES["surface"], TRIAL_TOLERANCE)
@@ -197,8 +197,13 @@ class Adviser:
         with tempfile.TemporaryDirectory(dir=self.lab.runs) as folder:
             file = pathlib.Path(folder) / "job.json"
             file.write_text(json.dumps(job))
-            command = [self.lab.find_program("carillon-precompute"), "--validate", "--json", "--quiet", "--patience", str(PATIENCE_S), file]
-            done = subprocess.run(command, capture_output=True, text=True, errors="surrogateescape", stdin=subprocess.DEVNULL)
+            command = [self.lab.find_program("carillon-precompute"), "--validate", "--json", "--quiet", file]
+            try:
+                done = subprocess.run(
+                    command, capture_output=True, text=True, errors="surrogateescape", stdin=subprocess.DEVNULL, timeout=PATIENCE_S
+                )
+            except subprocess.TimeoutExpired:
+                return None
         if done.returncode != 0:
             return None  # the first trial says why, in the words of a run
         return json.loads(done.stdout)
@@ -465,22 +470,17 @@ def describe_estimate(adviser, found, options):
     asked = " and ".join(f"{value:g} {unit}" for value, unit in ((options.cents, "cents"), (options.seconds, "CPU s")) if value is not None)
     memory = found["memory_bytes"]["1"] * 1e-9
     lines = [f"{adviser.target.name}: {note}" for note in adviser.target.notes or [f"a {adviser.target.kind}, as the job has it"]]
-    modes = (
-        "modes that are not known before it is read"
-        if found["modes"]["how"] == "unknown"
-        else f"{'' if found['modes']['how'] == 'counted' else 'about '}{found['modes']['count']} modes in the band"
-    )
+    modes = f"{'' if found['modes']['how'] == 'counted' else 'about '}{found['modes']['count']} modes in the band"
     what = (
         "so many nodes take long to solve. The mesh has"
         if adviser.target.kind == "mesh"
         else "so thin a body takes long to mesh and to solve. Its coarsest mesh has"
     )
-    by = "by its size alone and to a factor of two" if found["mesh"]["how"] == "estimated" else "without a solve"
     lines += [
         f"asked:     {asked}",
         (
             f"estimate:  {what} about {found['mesh']['nodes']:,} nodes (T10), {modes}, {found['cpu_seconds']:.0f} CPU s and"
-            f" {memory:.1f} GB, {by}"
+            f" {memory:.1f} GB, without a solve"
         ),
     ]
     if options.dry_run:
