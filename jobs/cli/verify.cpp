@@ -5,11 +5,11 @@
 #include <map>
 #include <set>
 
-#include "jobs/queue/attempt/publish.hpp"
 #include "jobs/cli/commands.hpp"
-#include "jobs/store/process/process.hpp"
+#include "jobs/queue/attempt/publish.hpp"
 #include "jobs/queue/repair.hpp"
 #include "jobs/store/identity.hpp"
+#include "jobs/store/process/process.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::cli {
@@ -39,13 +39,7 @@ class Progress {
   bool is_shown_;
 };
 
-bool is_worked_on(const store::Store& store, const store::Id& id) {
-  try {
-    return process::Lock::is_held(store.open_work(id).path() / "lock");
-  } catch (const SystemError&) {
-    return false;
-  }
-}
+bool is_worked_on(const store::Store& store, const store::Id& id) { return process::Lock::is_held(store.work_folder(id) / "lock"); }
 
 void check_job(Shared& shared, const store::Id& id, std::map<std::string, std::optional<std::string>>& inputs,
                std::vector<Finding>& findings) {
@@ -58,7 +52,7 @@ void check_job(Shared& shared, const store::Id& id, std::map<std::string, std::o
   }
   if (!store.has_bank_folder(id) && !store.has_work(id)) findings.push_back({"bank", id, "its bank is missing", "", false});
   if (store.has_work(id) && !is_worked_on(store, id)) {
-    if (const auto fault = store::find_job_fault(store, id, store.work_folder(id))) findings.push_back({"work", id, *fault, "", false});
+    if (const auto fault = store::find_job_fault(store, id)) findings.push_back({"work", id, *fault, "", false});
   }
   const auto request = queue::find_request(store, shared.registry(), id);
   for (const store::Input& input : request ? store::list_inputs(*request) : std::vector<store::Input>()) {

@@ -12,8 +12,8 @@
 #include <optional>
 #include <system_error>
 
-#include "jobs/store/process/programs.hpp"
 #include "jobs/store/identity.hpp"
+#include "jobs/store/process/programs.hpp"
 #include "jobs/store/store.hpp"
 #include "precompute/job/preview.hpp"
 #include "runtime/base/document.hpp"
@@ -153,7 +153,7 @@ class Maker {
     const auto start = std::chrono::steady_clock::now();
     say(fmt::format("computing the modes of {}, once", describe(job_)));
     const store::Temporary temporary = cache_.make_temporary();
-    const fs::path folder = temporary.content().shared_path(), file = folder / store::kJobFile;
+    const fs::path folder = temporary.path(), file = folder / store::kJobFile;
     job_.bank = folder / store::kBankFile;
     base::write_file(file, job::resolved_json(job_, folder, ""));
     std::vector<std::string> words{file.string()};

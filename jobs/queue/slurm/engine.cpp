@@ -13,13 +13,12 @@
 #include <set>
 #include <tuple>
 
-#include "jobs/store/outcome/policy.hpp"
-#include "jobs/store/process/process.hpp"
 #include "jobs/queue/local.hpp"
 #include "jobs/queue/settle.hpp"
 #include "jobs/queue/slurm/task.hpp"
 #include "jobs/store/files.hpp"
-#include "jobs/store/open_folder.hpp"
+#include "jobs/store/outcome/policy.hpp"
+#include "jobs/store/process/process.hpp"
 #include "runtime/base/clock.hpp"
 #include "runtime/base/failure.hpp"
 
@@ -59,7 +58,7 @@ void append_output(const fs::path& root, const fs::path& work, const SubmittedJo
 }
 
 void remove_submitted_job(const store::Store& store, const store::Id& id) {
-  if (store.has_work(id)) slurm::remove_submitted_job(store.open_work(id).path());
+  if (store.has_work(id)) slurm::remove_submitted_job(store.work_folder(id));
 }
 
 /// As queue::apply(). Memory that the user named is not raised behind his back; memory that was predicted is, beyond what was given.
@@ -244,8 +243,7 @@ void Engine::submit(registry::Registry& registry, const Batch& batch, const Rows
     const std::string script = make_script(batch, client_.settings());
     std::vector<store::Id> ids;
     for (std::size_t i = 0; i < jobs.size(); ++i) {
-      const store::OpenFolder opened = store_.open_work(jobs[i].id);
-      const fs::path work = opened.path();
+      const fs::path work = store_.work_folder(jobs[i].id);
       ids.push_back(jobs[i].id);
       if (jobs[i].failures != read_failures(work)) write_failures(work, jobs[i].failures);
       const std::optional<outcome::Attempt> before = outcome::read_attempt(work);
@@ -326,7 +324,7 @@ void Engine::end_unwanted(const Rows& jobs) {
     std::optional<SubmittedJob> submitted = read_submitted_job(work);
     if (!submitted || submitted->is_unwanted) continue;
     submitted->is_unwanted = true;
-    write_submitted_job(store_.open_work(job.id).path(), *submitted);
+    write_submitted_job(work, *submitted);
   }
   std::vector<std::string> names;
   std::set_difference(unwanted.begin(), unwanted.end(), needed.begin(), needed.end(), std::back_inserter(names));
@@ -419,7 +417,7 @@ void Engine::settle_ended(registry::Registry& registry, const Job& job, const Su
   if (!is_done) {
     judgement = judge(store_, job.id, submitted, seen);
     failures = read_failures(work);
-    if (store_.has_work(job.id) && !is_shared) append_output(store_.root(), store_.open_work(job.id).path(), submitted);
+    if (store_.has_work(job.id) && !is_shared) append_output(store_.root(), work, submitted);
     has_asked_memory = find_asked(work).memory_gb > 0.0;
     if (is_shared) state = find_packed_state(store_, job.id, submitted);
     // It ended by itself before its task did.

@@ -1,6 +1,4 @@
-// Method:     One thread that waits for signals with a timeout; what starts next is choose_next() of what is wanted.
 // Source:     Linux sigtimedwait(2); sbatch(1), --signal.
-// Deviations: none.
 #include "jobs/queue/slurm/task.hpp"
 
 #include <fmt/core.h>
@@ -15,12 +13,12 @@
 #include <set>
 
 #include "jobs/queue/attempt/attempt.hpp"
-#include "jobs/store/outcome/outcome.hpp"
-#include "jobs/store/outcome/policy.hpp"
 #include "jobs/queue/local.hpp"
 #include "jobs/queue/slurm/client.hpp"
 #include "jobs/queue/slurm/inside.hpp"
 #include "jobs/store/files.hpp"
+#include "jobs/store/outcome/outcome.hpp"
+#include "jobs/store/outcome/policy.hpp"
 #include "runtime/base/clock.hpp"
 #include "runtime/base/command.hpp"
 
@@ -156,7 +154,7 @@ class TaskRunner {
   /// Saved before the time limit: each of these jobs counts its own attempts without progress, as one with a task of its own does.
   bool keep_stopped(const TaskJob& job) const {
     if (!is_wanted(job)) return false;
-    const fs::path work = store_.open_work(job.id).path();
+    const fs::path work = store_.work_folder(job.id);
     const std::optional<outcome::Outcome> left = outcome::read_outcome(work);
     if (!left || (left->cause != Cause::stopped && left->cause != Cause::checkpointed)) return true;
     const outcome::Outcome explained = explain_stop(*left);

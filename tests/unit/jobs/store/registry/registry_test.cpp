@@ -190,6 +190,67 @@ TEST(Registry, a_reader_without_write_access_sees_the_states_of_the_folders) {
   EXPECT_FALSE(fs::exists(file));
 }
 
+/// Six jobs in different states, and a copy of their registry file.
+class Rebuild : public testing::Test {
+ protected:
+  Rebuild() : store_(store::Store::open(folder_ / "store")) {
+    Registry registry = Registry::open(store_, be_silent);
+    for (int n = 0; n < 6; ++n) submit(store_, registry, n);
+    make_bank(store_, make_submission(0));
+    store_.remove_work(make_id(0));
+    registry.update(make_id(0), [](Job& job) { return job.state = JobState::done, true; });
+    registry.update(make_id(1), [](Job& job) { return job.state = JobState::failed, job.reason = "bad mesh", job.failures = 1, true; });
+    registry.update(make_id(2), [](Job& job) { return job.state = JobState::cancelled, job.reason = "cancelled", true; });
+    wanted_ = describe(registry);
+  }
+
+  /// Replaces the file, opens the registry, and expects one message and all jobs.
+  void check(const std::string& bytes) const {
+    for (const char* ending : {"-wal", "-shm"}) fs::remove(file_.string() + ending);
+    folder_.write("store/registry.sqlite", bytes);
+    int messages = 0;
+    const Registry registry = Registry::open(store_, [&](const std::string&) { ++messages; });
+    EXPECT_EQ(describe(registry), wanted_) << bytes.size();
+    EXPECT_EQ(registry.list_last_submissions().size(), 6u);
+    EXPECT_LE(messages, 1);
+  }
+
+  const Folder folder_;
+  const store::Store store_;
+  const fs::path file_ = folder_ / "store/registry.sqlite";
+  std::string wanted_;
+};
+
+TEST_F(Rebuild, truncated_file) {
+  const std::string whole = read_all(file_);
+  ASSERT_GT(whole.size(), 8000u);
+  for (std::size_t bytes = 0; bytes < whole.size(); bytes += 509) check(whole.substr(0, bytes));
+}
+
+TEST_F(Rebuild, file_that_is_not_a_database) { check("not a database " + std::string(5000, 'x')); }
+
+TEST_F(Rebuild, file_of_another_version) {
+  std::string bytes = read_all(file_);
+  bytes[63] = 1;  // user_version, sqlite.org, fileformat2.html
+  check(bytes);
+}
+
+TEST_F(Rebuild, file_deleted_while_open) {
+  Registry registry = Registry::open(store_, be_silent);
+  fs::remove(file_);
+  EXPECT_EQ(describe(registry), wanted_);
+  EXPECT_TRUE(registry.update(make_id(3), [](Job& job) { return job.state = JobState::failed, job.reason = "x", true; }));
+  EXPECT_EQ(Registry::open(store_, be_silent).find(make_id(3))->state, JobState::failed);
+}
+
+TEST_F(Rebuild, file_damaged_while_open) {
+  Registry registry = Registry::open(store_, be_silent);
+  std::string bytes = read_all(file_);
+  std::fill(bytes.begin() + 4096, bytes.end(), 'x');
+  std::fstream(file_, std::ios::in | std::ios::out | std::ios::binary) << bytes;
+  EXPECT_EQ(describe(registry), wanted_);
+}
+
 TEST(Registry, hostile_names_stay_text) {
   const Folder folder;
   const store::Store store = store::Store::open(folder / "store");
