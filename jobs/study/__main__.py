@@ -1,11 +1,10 @@
-"""carillon-study: how a job's cost grows with its mesh and falls with the ranks, and what accuracy costs.
+"""carillon-study: scaling of a job with its mesh and with ranks, and mesh settings for a given accuracy.
 
     carillon-study scaling JOB.json [-o FOLDER] [--ranks 1,2,4] [--nodes 2500,5000,10000] [--repeats 3]
     carillon-study scaling JOB.json --quick --record FILE | --check FILE
-    carillon-study accuracy [--quick] [--on BODY...] [--only SECTION...] -o REPORT
     carillon-study advise BODY --cents 5 [--seconds 10]
 
-Exit codes: 0 done, 2 the input cannot be used, 3 the work has grown, 4 the machine refused.
+Exit codes: 0 done, 2 bad input, 3 the work has grown, 4 system error.
 """
 import argparse
 import contextlib
@@ -13,11 +12,11 @@ import json
 import signal
 import sys
 
+import advise
 import programs
 import report
 import scaling
 import work
-from accuracy import advise, study
 from errors import InputError, RunError, printable
 
 VERSION = "unknown"  # what the build writes here
@@ -87,17 +86,12 @@ def make_parser():
         action="store_true",
         help="one JSON document on standard output: the report's path and the work of every case; the rest on standard error",
     )
-    study.add_command(commands, read_count)
     advise.add_command(commands)
     return parser
 
 
 def run(arguments):
     options = make_parser().parse_args(arguments)
-    if options.command == "accuracy":
-        made = study.run(options)
-        print(json.dumps(made, indent=2) if options.json else made["report"], flush=True)
-        return 0
     if options.command == "advise":
         return advise.run(options)
     if not options.json:

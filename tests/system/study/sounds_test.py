@@ -1,14 +1,14 @@
 #!/usr/bin/python3
-"""How two sounds differ (jobs/study/accuracy/sounds.py) against closed forms: sines, noise, and a body's sound worked out by hand."""
+"""How two sounds differ (tests/bench/study/sounds.py) against closed forms: sines, noise, and a body's sound worked out by hand."""
 import pathlib
 import sys
 import unittest
 
 import numpy as np
 
-STUDY = pathlib.Path(__file__).resolve().parents[3] / "jobs/study"
-sys.path.insert(0, str(STUDY))
-from accuracy import sounds  # noqa: E402
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+sys.path[:0] = [str(ROOT / "tests/bench/study"), str(ROOT / "jobs/study")]
+import sounds  # noqa: E402
 
 RATE = 48000
 TIME = np.arange(2 * RATE) / RATE

@@ -2,9 +2,11 @@
 import dataclasses
 import statistics
 
-from accuracy import cents, elements, plots
-from accuracy.lab import Case
-from accuracy.section import Section
+import cents
+import elements
+import plots
+from lab import Case
+from section import Section
 
 PROGRAMS = elements.PROGRAMS
 GOALS = (20.0, 5.0)  # cents that accuracy_cents is asked for

@@ -5,10 +5,16 @@ import os
 import statistics
 import time
 
-from accuracy import banks, cents, elements, forecast, playing, solver, sounds
-from accuracy.bodies import Kind, find_kind
-from accuracy.lab import Case, write_whole
-from accuracy.section import Section
+import banks
+import cents
+import elements
+import forecast
+import playing
+import solver
+import sounds
+from bodies import Kind, find_kind
+from lab import Case, write_whole
+from section import Section
 from errors import InputError
 
 PROGRAMS = solver.PROGRAMS
@@ -77,7 +83,7 @@ def make_content(lab, bodies, facts):
     calibration = lab.measure([Case("calibration", CALIBRATION)], 3)["calibration"]
     content = {
         "format": forecast.FORMAT,
-        "made_by": "carillon study accuracy --write-advice FILE",
+        "made_by": "tests/bench/study/run --write-advice FILE",
         "machine": lab.describe_machine(),
         "date": time.strftime("%Y-%m-%d"),
         "is_quick": lab.quick,

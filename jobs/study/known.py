@@ -16,7 +16,7 @@ class Truth:
 
 def read_known():
     """{body: Truth}."""
-    text = pkgutil.get_data(__package__, "known.csv").decode()
+    text = pkgutil.get_data(__name__, "known.csv").decode()
     rows = {}
     for row in csv.DictReader(line for line in io.StringIO(text) if not line.startswith("#")):
         rows.setdefault(row["body"], []).append(row)

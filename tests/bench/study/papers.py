@@ -2,9 +2,12 @@
 import math
 import statistics
 
-from accuracy import banks, cents, elements, plots
-from accuracy.bodies import find_kind, make_bodies
-from accuracy.section import Section
+import banks
+import cents
+import elements
+import plots
+from bodies import find_kind, make_bodies
+from section import Section
 
 PROGRAMS = ("carillon-mesh", "carillon-precompute", "carillon-bank", "carillon-render")
 AUDIBLE_CENTS = 5  # about what a trained ear hears

@@ -5,7 +5,7 @@ import html
 import json
 import re
 
-from accuracy.lab import write_whole
+from lab import write_whole
 
 STYLE = """body { font: 15px/1.5 sans-serif; max-width: 980px; margin: 2em auto; padding: 0 1em; color: #222; }
 table { border-collapse: collapse; margin: 1em 0; font-size: 13px; }
@@ -79,9 +79,7 @@ def format_html(sections, setting, machine, findings):
                 out.append(f"<pre>{html.escape(item.command)}</pre>")
                 shown = item.command
             if item.kind == "chart":
-                # Two pictures in one page must not share the names of their clip paths.
-                picture = re.sub(r'(id="|url\(#)clip', rf"\g<1>{section.name}-{item.name}-clip", item.svg)
-                out.append(f"<figure>{picture}<figcaption>{to_inline(item.text)}</figcaption></figure>")
+                out.append(f"<figure>{item.svg}<figcaption>{to_inline(item.text)}</figcaption></figure>")
             else:
                 head, *rows = item.rows
                 out.append(

@@ -4,7 +4,7 @@ import math
 import statistics
 
 import scaling
-from accuracy.known import Truth
+from known import Truth
 
 
 def to_cents(freq_hz, true_hz):

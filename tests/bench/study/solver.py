@@ -3,9 +3,9 @@ import dataclasses
 import math
 import os
 
-from accuracy import plots
-from accuracy.bodies import find_kind, make_bodies
-from accuracy.section import Section
+import plots
+from bodies import find_kind, make_bodies
+from section import Section
 
 PROGRAMS = ("carillon-mesh", "carillon-precompute", "carillon-bank")
 TOLERANCES = (5e-5, 1e-5, 1e-6, 1e-8, 1e-10, 1e-12)  # a bank takes none of 1e-4 or above

@@ -4,11 +4,12 @@ import dataclasses
 import os
 import pathlib
 
-from accuracy import bodies as known_bodies
-from accuracy import plots, sounds
-from accuracy.lab import Case, calc_digest, calc_key
-from accuracy.section import Section
-from accuracy.sounds import np
+import bodies as known_bodies
+import plots
+import sounds
+from lab import Case, calc_digest, calc_key
+from section import Section
+from sounds import np
 
 NAME, TITLE = "banks", "Modes kept, precision of shapes, size of banks"
 PROGRAMS = ("carillon-precompute", "carillon-mesh", "carillon-bank", "carillon-render")

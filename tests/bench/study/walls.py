@@ -1,10 +1,12 @@
 """Thin-wall elements: a sheet with a thickness, extruded, against the volume of the same body and against its regular mesh."""
 import math
 
-from accuracy import bodies, elements, plots
-from accuracy.corrected import Compared, compare
-from accuracy.lab import Case
-from accuracy.section import Section
+import bodies
+import elements
+import plots
+from corrected import Compared, compare
+from lab import Case
+from section import Section
 from errors import RunError
 
 PROGRAMS = elements.PROGRAMS

@@ -2,9 +2,11 @@
 the most accurate setting."""
 import dataclasses
 
-from accuracy import banks, plots, sounds
-from accuracy.section import Section
-from accuracy.sounds import np
+import banks
+import plots
+import sounds
+from section import Section
+from sounds import np
 
 NAME, TITLE = "playing", "Playing: what each knob of the runtime costs and buys"
 PROGRAMS = banks.PROGRAMS

@@ -2,9 +2,10 @@
 import collections
 import statistics
 
-from accuracy import cents, plots
-from accuracy.bodies import KINDS, make_bodies
-from accuracy.section import Section
+import cents
+import plots
+from bodies import KINDS, make_bodies
+from section import Section
 
 PROGRAMS = ("carillon-mesh", "carillon-precompute", "carillon-bank")
 LEVELS = ((1, "one cent"), (10, "ten cents"), (100, "a semitone"))

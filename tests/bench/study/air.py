@@ -7,10 +7,11 @@ import re
 import statistics
 import subprocess
 
-from accuracy import plots, sounds
-from accuracy.lab import Case
-from accuracy.section import Section
-from accuracy.sounds import np
+import plots
+import sounds
+from lab import Case
+from section import Section
+from sounds import np
 from errors import RunError
 
 NAME, TITLE = "air", "Air: nodes of the skin, wave numbers, orders"

@@ -3,8 +3,9 @@ import dataclasses
 import math
 import pathlib
 
-from accuracy import gmsh, known
-from accuracy.lab import Case
+import gmsh
+import known
+from lab import Case
 from errors import InputError
 
 BUNNY_SURFACE = "/usr/share/glmark2/models/bunny.obj"  # of Debian's glmark2-data, which the demo installs

@@ -4,11 +4,12 @@ import dataclasses
 import json
 import math
 
-from accuracy import plots, sounds
-from accuracy.cents import to_cents
-from accuracy.lab import Case, calc_digest, calc_key, read_kept, write_whole
-from accuracy.section import Section
-from accuracy.sounds import np
+import plots
+import sounds
+from cents import to_cents
+from lab import Case, calc_digest, calc_key, read_kept, write_whole
+from section import Section
+from sounds import np
 
 NAME, TITLE = "motion", "Large motion: elements, steps, sheets, coupled modes"
 PROGRAMS = ("carillon-precompute", "carillon-bank", "carillon-simulate", "carillon-render")

@@ -24,8 +24,10 @@ import time
 
 import programs
 import scaling
-from accuracy import bodies, forecast, targets
-from accuracy.lab import Case, Lab
+import bodies
+import forecast
+import targets
+from lab import Case, Lab
 from errors import InputError, RunError, printable
 
 RANKS_FROM_S = 4.0  # CPU seconds from which a second rank saves more of the clock than its start takes
@@ -548,10 +550,10 @@ def make_document(adviser, found, remark, outcome, job, bank):
 
 
 def read_packed_advice(path=None):
-    """That of the package, or of a file that `carillon study accuracy --write-advice` wrote."""
+    """That of the package, or of a file that `tests/bench/study/run --write-advice` wrote."""
     if path is None:
-        return forecast.read_advice(pkgutil.get_data(__package__, "advice.json").decode())
-    remedy = "carillon study accuracy --write-advice FILE writes one"
+        return forecast.read_advice(pkgutil.get_data(__name__, "advice.json").decode())
+    remedy = "tests/bench/study/run --write-advice FILE writes one"
     try:
         return forecast.read_advice(scaling.read_text(path, "advice", remedy))
     except (ValueError, KeyError, TypeError, AttributeError, ArithmeticError, RecursionError) as error:
@@ -676,7 +678,7 @@ def add_command(commands):
     one.add_argument(
         "--advice",
         metavar="FILE",
-        help="measurements of another study: carillon study accuracy --write-advice FILE (default: those in this program)",
+        help="measurements of another study: tests/bench/study/run --write-advice FILE (default: those in this program)",
     )
     one.add_argument("--bin", metavar="FOLDER", help="where the programs are (default: next to this one)")
     one.add_argument("--json", action="store_true", help="one JSON document on standard output; the rest on standard error")

@@ -122,19 +122,7 @@ class Lab:
         on = ["--on", *self.on] if self.on and "--on" not in words else []
         repeats = ["--repeats", str(self.asked_repeats)] if self.asked_repeats else []
         return shlex.join(
-            [
-                "carillon",
-                "study",
-                "accuracy",
-                "--only",
-                section,
-                *words,
-                *on,
-                *repeats,
-                *(["--quick"] if self.quick else []),
-                "-o",
-                "REPORT",
-            ]
+            ["tests/bench/study/run", "--only", section, *words, *on, *repeats, *(["--quick"] if self.quick else []), "-o", "REPORT"]
         )
 
     def find_program(self, name):

@@ -4,9 +4,11 @@ import json
 import math
 
 import measuring
-from accuracy import banks, plots, sounds
-from accuracy.section import Section
-from accuracy.sounds import np
+import banks
+import plots
+import sounds
+from section import Section
+from sounds import np
 
 NAME, TITLE = "contact", "Contact: what the knobs of the physics cost and buy"
 PROGRAMS = banks.PROGRAMS
