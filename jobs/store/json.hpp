@@ -1,4 +1,4 @@
-// Text of JSON from and to values, as jobs and requests have it.
+// JSON text from and to values, for jobs and requests.
 #pragma once
 
 #include <json/json.h>
@@ -8,9 +8,9 @@
 
 namespace carillon::store {
 
-/// None when it is no JSON, or too deep.
+/// None for invalid or too deeply nested JSON.
 std::optional<Json::Value> parse_json(const std::string& text);
-/// Numbers with 17 digits, which is all of them; no comments. indentation "": one line.
+/// Numbers with 17 digits (exact); no comments. indentation "": one line.
 std::string write_json(const Json::Value& value, const char* indentation);
 
 }  // namespace carillon::store
