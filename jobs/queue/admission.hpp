@@ -1,9 +1,9 @@
 // Admission: which jobs start now, and on how many ranks. Pure functions.
 //
-// Ranks: as requested, at most the cores. Without a request a small job (under kSmallSeconds on one rank) gets one rank, a large job cores / n,
-// where n is the number of jobs that can run concurrently: running plus ready jobs, limited by cores and by memory. Memory: as requested, or
-// predicted for these ranks. Order: as submitted. Later jobs may overtake a job that does not fit for kPatienceSeconds; then cores and memory
-// are reserved for it.
+// Ranks: as requested, at most the cores. Without a request a small job (under kSmallSeconds on one rank) gets one rank, a large job cores
+// / n, where n is the number of jobs that can run concurrently: running plus ready jobs, limited by cores and by memory. Memory: as
+// requested, or predicted for these ranks. Order: as submitted. Later jobs may overtake a job that does not fit for kPatienceSeconds; then
+// cores and memory are reserved for it.
 #pragma once
 
 #include <functional>

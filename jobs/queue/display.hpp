@@ -12,8 +12,8 @@
 
 namespace carillon::queue {
 
-/// Writes complete lines to standard output. On a terminal the last line may be the progress bar, which is cleared before any other line and
-/// at the end. Text output shows the first warning of each kind, and counts at the end.
+/// Writes complete lines to standard output. On a terminal the last line may be the progress bar, which is cleared before any other line
+/// and at the end. Text output shows the first warning of each kind, and counts at the end.
 class Display {
  public:
   using ReadProgress = std::function<std::optional<store::Progress>(const store::Id&)>;

@@ -1,5 +1,5 @@
-// Interfaces of the queue to disk, clock and processes. settle.hpp and runner.hpp use only these and rows, so that tests control time and the
-// order of events. Implementations: local.hpp.
+// Interfaces of the queue to disk, clock and processes. settle.hpp and runner.hpp use only these and rows, so that tests control time and
+// the order of events. Implementations: local.hpp.
 #pragma once
 
 #include <sys/types.h>

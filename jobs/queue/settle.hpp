@@ -1,5 +1,5 @@
-// State changes of rows: end of attempts, cancel, retry. Every command that opens the registry settles first, so that no row stays "running"
-// without a running attempt.
+// State changes of rows: end of attempts, cancel, retry. Every command that opens the registry settles first, so that no row stays
+// "running" without a running attempt.
 #pragma once
 
 #include <functional>
@@ -47,8 +47,8 @@ struct CommandResult {
 /// Cancels a job that does not run; for a running one sets cancel_wanted.
 CommandResult request_cancel(registry::JobTable& table, const store::Id& id);
 
-/// Cancels a queued or waiting job at once. A running one is asked to save and stop; waits up to `patience_s` for it (later the queue settles
-/// it). A done job stays done. For jobs of the engine "slurm" sets only cancel_wanted.
+/// Cancels a queued or waiting job at once. A running one is asked to save and stop; waits up to `patience_s` for it (later the queue
+/// settles it). A done job stays done. For jobs of the engine "slurm" sets only cancel_wanted.
 CommandResult cancel(const Environment& at, registry::JobTable& table, const store::Id& id, double patience_s = 90.0);
 
 /// Cancels a row without a running attempt, with its previous state and reason as the reason. Pure.

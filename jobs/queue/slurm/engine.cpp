@@ -1,7 +1,5 @@
-// Method:     Rows are claimed in one transaction; jobs are written to their folders, then sbatch is called, then the number is written: a
-//             process that dies in between leaves enough to find the job in Slurm by its name, or to know that it is not there.
-// Source:     docs/howto/slurm.md.
-// Deviations: none.
+// Method:     Rows are claimed in one transaction; submissions are recorded in the job folders, then sbatch is called, then the number is
+//             written. After a crash in between, the job is found in Slurm by its name, or known to be missing. docs/howto/slurm.md
 #include "jobs/queue/slurm/engine.hpp"
 
 #include <fmt/core.h>
@@ -31,9 +29,9 @@ using registry::JobState;
 
 constexpr double kMemoryGrowth = 1.5;
 constexpr double kCancelPatienceS = 5.0;
-constexpr std::size_t kMinPacked = 4;  // fewer jobs are not worth a task of their own kind
-constexpr double kRunnerGb = 0.1;      // of the process that starts the jobs of a task
-constexpr double kTimeMargin = 2.0;    // of a predicted time
+constexpr std::size_t kMinPacked = 4;  // minimum number of jobs for packing
+constexpr double kRunnerGb = 0.1;      // memory of the task runner
+constexpr double kTimeMargin = 2.0;    // factor for a predicted time
 
 bool is_open(const Job& job) { return job.state == JobState::queued || job.state == JobState::running || job.state == JobState::waiting; }
 
@@ -48,7 +46,7 @@ void make_queued(Job& row, const std::string& reason) {
   row.reason = reason;
 }
 
-/// What Slurm said goes to the end of the job's own log, where people look.
+/// Appends Slurm's output to the log of the job.
 void append_output(const fs::path& root, const fs::path& work, const SubmittedJob& submitted) {
   const std::string output = read_output(root, submitted);
   if (output.empty()) return;
@@ -61,11 +59,11 @@ void remove_submitted_job(const store::Store& store, const store::Id& id) {
   if (store.has_work(id)) slurm::remove_submitted_job(store.work_folder(id));
 }
 
-/// As queue::apply(). Memory that the user named is not raised behind his back; memory that was predicted is, beyond what was given.
+/// queue::apply(). After an end for lack of memory, predicted memory is raised; memory requested by the user is not.
 void apply(Job& row, const outcome::Outcome& outcome, bool has_asked_memory) {
   if (outcome.cause == outcome::Cause::memory && has_asked_memory && !row.cancel_wanted) {
     row.state = JobState::failed;
-    row.reason = outcome.reason + "; ask for more by \"resources\": {\"memory_gb\": ...} in the job";
+    row.reason = outcome.reason + "; request more by \"resources\": {\"memory_gb\": ...} in the job";
     return;
   }
   const double given_gb = row.given.memory_gb;
@@ -104,7 +102,7 @@ Engine::Engine(const store::Store& store, Settings settings, fs::path program, s
 }
 
 void Engine::show_unreachable(const Unreachable& error) {
-  if (!is_unreachable_shown_) say_(fmt::format("{}; the jobs stay as they are until it does", error.what()));
+  if (!is_unreachable_shown_) say_(fmt::format("{}; states of jobs are not updated", error.what()));
   is_unreachable_shown_ = true;
 }
 
@@ -196,8 +194,8 @@ void Engine::submit_packed(registry::Registry& registry, const Machine& machine,
   if (plan.memory_gb > 0.0) batch.memory_gb = plan.memory_gb + kRunnerGb;
   if (limit_s > 0.0) batch.time_limit_s = limit_s + kTimeMargin * plan.seconds;
   say_(fmt::format(
-      "{} jobs of less than {:.0f} minutes on one rank are packed into {} {} of {} {} (predicted: {:.0f} s, {:.0f} % idle), as Slurm "
-      "would start a task for each of them; \"pack\": false in the profile's \"slurm\" turns it off",
+      "{} jobs of less than {:.0f} minutes on one rank are packed into {} {} of {} {} (predicted: {:.0f} s, {:.0f} % idle); disable by "
+      "\"pack\": false in \"slurm\" of the profile",
       jobs.size(), kShortSeconds / 60.0, batch.tasks, batch.tasks == 1 ? "task" : "tasks", plan.cores, plan.cores == 1 ? "core" : "cores",
       plan.seconds, 100.0 * plan.idle_share));
   const Packed packed{plan.tasks, plan.memory_gb};
@@ -253,7 +251,7 @@ void Engine::submit(registry::Registry& registry, const Batch& batch, const Rows
     make_batch_folder(store_, batch.name, script, ids, lists);
     number = client_.submit(batch);
   } catch (const Unreachable& error) {
-    // Slurm may still have accepted the batch: then adopt() finds it by its name.
+    // Slurm may have accepted the batch: adopt() finds it by its name.
     return show_unreachable(error);
   } catch (const DiskFullError& error) {
     return give_up(JobState::waiting, error.what(), outcome::decide(outcome::Cause::disk_full, 0, false).delay_s);
@@ -262,14 +260,14 @@ void Engine::submit(registry::Registry& registry, const Batch& batch, const Rows
   } catch (const InputError& error) {
     return give_up(JobState::failed, error.what());
   }
-  // Slurm has it. Where this cannot be written any more (a full disk) adopt() finds it later, as after a kill.
+  // Accepted. If writing fails (full disk), adopt() finds it later.
   write_number(batch.root, batch.name, number);
   for (std::size_t i = 0; i < jobs.size(); ++i) {
     change(jobs[i], [&](Job& row) {
       row.state = JobState::queued;
       row.slurm_job = make_name(submitted[i], number);
       row.given = jobs[i].given;
-      row.reason = packed == nullptr ? "handed to Slurm" : "handed to Slurm, in a task with other jobs";
+      row.reason = packed == nullptr ? "submitted to Slurm" : "submitted to Slurm, in a task with other jobs";
     });
   }
 }
@@ -286,7 +284,7 @@ std::vector<Job> Engine::follow(registry::Registry& registry) {
     cancel_left(registry);
     end_unwanted(jobs);
     const std::map<std::string, SlurmStatus> all = names.empty() ? std::map<std::string, SlurmStatus>() : client_.list(names);
-    std::map<std::string, std::optional<SlurmStatus>> ends;  // by task: a packed one has many jobs
+    std::map<std::string, std::optional<SlurmStatus>> ends;  // by task
     for (const Job& job : jobs) {
       if (job.slurm_job.empty()) continue;
       const std::string task = find_task(job.slurm_job);
@@ -294,7 +292,7 @@ std::vector<Job> Engine::follow(registry::Registry& registry) {
       if (seen == all.end() || seen->second.phase == SlurmPhase::ended) {
         if (!ends.contains(task)) {
           ends[task] = client_.find_end(task);
-          // squeue knows an array that was cancelled while all of it waited by its number alone.
+          // squeue lists an array that was cancelled while pending by its number only.
           const auto known = seen == all.end() ? all.find(find_array(task)) : seen;
           if (!ends[task] && known != all.end() && known->second.phase == SlurmPhase::ended) ends[task] = known->second;
         }
@@ -311,8 +309,7 @@ std::vector<Job> Engine::follow(registry::Registry& registry) {
   return changed;
 }
 
-/// Cancelled jobs: Slurm ends those that have a task of their own, and tasks all of whose jobs are cancelled. Of a task that others need,
-/// the job's folder says that it is unwanted.
+/// Cancels tasks all of whose jobs are unwanted; in other tasks the job's folder is marked as unwanted.
 void Engine::end_unwanted(const Rows& jobs) {
   std::set<std::string> needed, unwanted;
   for (const Job& job : jobs) {
@@ -337,8 +334,7 @@ void Engine::adopt(registry::Registry& registry, Rows& jobs) {
     if (!job.slurm_job.empty()) continue;
     const bool is_claimed = job.state == JobState::running;
     const std::optional<SubmittedJob> submitted = read_submitted_job(store_.work_folder(job.id));
-    // A registry that was made again names the attempt itself, wherever it runs; else the process that claimed the job may be about to hand
-    // it over.
+    // After a rebuild of the registry the row names the attempt itself; otherwise the claiming process may be about to submit the job.
     const auto attempt = outcome::read_attempt(store_.work_folder(job.id));
     const bool is_attempt = submitted && attempt && attempt->token == job.token;
     if (is_claimed && !is_attempt && process::find_life(job.worker) != process::Life::gone && !process::is_self(job.worker)) continue;
@@ -348,7 +344,7 @@ void Engine::adopt(registry::Registry& registry, Rows& jobs) {
       if (number.empty()) number = numbers[submitted->batch] = client_.find_by_title(submitted->title, submitted->batch).value_or("none");
       if (number != "none") write_number(store_.root(), submitted->batch, number);
     }
-    if (!submitted && !is_claimed) continue;  // waits to be handed over
+    if (!submitted && !is_claimed) continue;  // not submitted yet
     if (submitted && number == "none") remove_submitted_job(store_, job.id);
     registry.update(job.id, [&](Job& row) {
       if (!row.slurm_job.empty() || row.state != job.state || row.token != job.token) return false;
@@ -360,7 +356,7 @@ void Engine::adopt(registry::Registry& registry, Rows& jobs) {
   }
 }
 
-/// While its task waits or runs; the task may have run before.
+/// A job whose task is pending or running.
 void Engine::look_at_packed(registry::Registry& registry, const Job& job, const SlurmStatus& seen, Rows& changed) {
   const fs::path work = store_.work_folder(job.id);
   const SubmittedJob submitted = read_submitted_job(work).value_or(SubmittedJob{});
@@ -369,7 +365,7 @@ void Engine::look_at_packed(registry::Registry& registry, const Job& job, const 
   if (is_over) return settle_ended(registry, job, submitted, std::nullopt, changed);
   SlurmStatus own = seen;
   if (state != PackedState::runs) own.phase = SlurmPhase::waits;
-  // Thousands of rows are not written because the task that they wait for has begun.
+  // Rows of waiting jobs are not rewritten when their task begins.
   if (own.phase == SlurmPhase::runs || job.state == JobState::running) show_phase(registry, job, own, changed);
 }
 
@@ -382,7 +378,7 @@ void Engine::show_phase(registry::Registry& registry, const Job& job, const Slur
   const bool is_running = seen.phase == SlurmPhase::runs;
   const JobState state = is_running ? JobState::running : JobState::queued;
   const bool has_reason = !seen.reason.empty() && seen.reason != "None";
-  const std::string reason = is_running ? "" : fmt::format("waits in Slurm{}", has_reason ? " (" + seen.reason + ")" : "");
+  const std::string reason = is_running ? "" : fmt::format("pending in Slurm{}", has_reason ? " (" + seen.reason + ")" : "");
   if (job.state == state && job.reason == reason) return;
   registry.update(job.id, [&](Job& row) {
     if (row.slurm_job != job.slurm_job || !is_open(row)) return false;
@@ -404,7 +400,7 @@ void Engine::settle(registry::Registry& registry, const Job& job, const std::opt
 
 void Engine::settle_ended(registry::Registry& registry, const Job& job, const SubmittedJob& submitted,
                           const std::optional<SlurmStatus>& seen, Rows& changed) {
-  // Another command may have settled it while Slurm was asked, and submitted it over again.
+  // Another command may have settled and resubmitted it meanwhile.
   const std::optional<Job> now = registry.find(job.id);
   if (!now || now->slurm_job != job.slurm_job || !is_open(*now)) return;
   const fs::path work = store_.work_folder(job.id);
@@ -420,7 +416,7 @@ void Engine::settle_ended(registry::Registry& registry, const Job& job, const Su
     if (store_.has_work(job.id) && !is_shared) append_output(store_.root(), work, submitted);
     has_asked_memory = find_asked(work).memory_gb > 0.0;
     if (is_shared) state = find_packed_state(store_, job.id, submitted);
-    // It ended by itself before its task did.
+    // It ended before its task.
     if (is_shared && state == PackedState::ended) judgement.is_cancelled = false;
   }
   registry.update(job.id, [&](Job& row) {
@@ -436,8 +432,8 @@ void Engine::settle_ended(registry::Registry& registry, const Job& job, const Su
       row.state = JobState::cancelled;
       row.reason = row.cancel_wanted ? "cancelled" : "cancelled in Slurm (scancel)";
     } else if (state == PackedState::waits && has_begun(store_.root(), submitted)) {
-      // What ended its task was no fault of a job that had not begun.
-      make_queued(row, "its task in Slurm ended before it began: " + judgement.outcome.reason);
+      // The end of the task is not a failure of a job that had not begun.
+      make_queued(row, "its Slurm task ended before it began: " + judgement.outcome.reason);
       row.attempts -= 1;
     } else {
       row.failures = failures;

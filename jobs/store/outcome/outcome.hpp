@@ -1,5 +1,5 @@
-// attempt.json (the process of an attempt) and outcome.json (how it ended): files in the folder of work, written by the attempt on any host,
-// read by the queue.
+// attempt.json (the process of an attempt) and outcome.json (how it ended): files in the folder of work, written by the attempt on any
+// host, read by the queue.
 #pragma once
 
 #include <filesystem>

@@ -1,5 +1,5 @@
-// Processes of this machine: identity, life, and termination of leftovers. Process numbers are reused, so an identity includes the start time
-// and the boot; wall clocks are not used.
+// Processes of this machine: identity, life, and termination of leftovers. Process numbers are reused, so an identity includes the start
+// time and the boot; wall clocks are not used.
 #pragma once
 
 #include <sys/types.h>

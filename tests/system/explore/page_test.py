@@ -370,7 +370,7 @@ class PageTest(unittest.TestCase):
             for word in words:
                 self.assertIn(word, said)
             self.assertEqual(len(said.splitlines()), 1)
-            self.assertEqual(page.evaluate("document.getElementById('card-title').textContent"), "This cannot be played")
+            self.assertEqual(page.evaluate("document.getElementById('card-title').textContent"), "Cannot play this")
 
 
 if __name__ == "__main__":
