@@ -19,7 +19,7 @@ import scaling
 import work
 from errors import InputError, RunError, printable
 
-VERSION = "unknown"  # what the build writes here
+VERSION = "unknown"  # set by the build
 
 
 def read_numbers(name, least):
@@ -27,7 +27,7 @@ def read_numbers(name, least):
         try:
             numbers = sorted({int(word) for word in text.split(",")})
         except ValueError:
-            raise argparse.ArgumentTypeError(f"{text!r}: give whole numbers with commas between them, like 1,2,4")
+            raise argparse.ArgumentTypeError(f"{text!r}: give whole numbers separated by commas, like 1,2,4")
         if numbers[0] < least:
             raise argparse.ArgumentTypeError(f"{numbers[0]}: {name} are {least} or more")
         return numbers
@@ -44,7 +44,7 @@ def read_count(text):
 
 class Parser(argparse.ArgumentParser):
     def error(self, message):
-        raise InputError(f"{message}; {self.prog} --help says what there is")
+        raise InputError(f"{message}; {self.prog} see --help")
 
 
 def make_parser():
@@ -58,12 +58,9 @@ def make_parser():
         '(report.md, cases.csv and SVG pictures). A job with a "mesh" file has one mesh, and gets strong scaling only.',
     )
     one.add_argument("job", metavar="JOB.json", help="a job of carillon-precompute")
-    one.add_argument("-o", "--out", metavar="FOLDER", default="study", help="where everything goes (default: study)")
+    one.add_argument("-o", "--out", metavar="FOLDER", default="study", help="output folder (default: study)")
     one.add_argument(
-        "--ranks",
-        type=read_numbers("ranks", 1),
-        metavar="1,2,4",
-        help="numbers of ranks (default: 1,2,4); more than there are cores are marked",
+        "--ranks", type=read_numbers("ranks", 1), metavar="1,2,4", help="numbers of ranks (default: 1,2,4); more than the cores are marked"
     )
     one.add_argument(
         "--nodes",
@@ -73,18 +70,18 @@ def make_parser():
         metavar="N,N,N",
         help="meshes of the body; the largest serves for strong scaling (default: a quarter, half and all of the job's)",
     )
-    one.add_argument("--repeats", type=read_count, help="of every case, all cases in turn (default: 3)")
+    one.add_argument("--repeats", type=read_count, help="repeats of every case, all cases in turn (default: 3)")
     one.add_argument("--quick", action="store_true", help="meshes of 600 and 1200 nodes, 1 and 2 ranks, one repeat, unless given otherwise")
-    one.add_argument("--record", metavar="FILE", help="keep the work per phase (operations, messages, bytes) in this file")
+    one.add_argument("--record", metavar="FILE", help="write the work per phase (operations, messages, bytes) to this file")
     one.add_argument(
-        "--check", metavar="FILE", help="compare the work per phase with this file's, and fail where it has grown by more than 5 %%"
+        "--check", metavar="FILE", help="compare the work per phase with this file, and fail if it has grown by more than 5 %%"
     )
-    one.add_argument("--timeout", type=programs.read_seconds, default=3600, help="seconds that one run may take (default: 3600)")
-    one.add_argument("--bin", metavar="FOLDER", help="where carillon-precompute is (default: next to this program)")
+    one.add_argument("--timeout", type=programs.read_seconds, default=3600, help="limit of one run in seconds (default: 3600)")
+    one.add_argument("--bin", metavar="FOLDER", help="folder of carillon-precompute (default: next to this program)")
     one.add_argument(
         "--json",
         action="store_true",
-        help="one JSON document on standard output: the report's path and the work of every case; the rest on standard error",
+        help="print one JSON document: path of the report and work of every case; other output goes to standard error",
     )
     advise.add_command(commands)
     return parser

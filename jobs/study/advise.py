@@ -1,9 +1,7 @@
-"""`carillon study advise BODY --cents 5 [--seconds 10]`: the setting to use, what it will reach and cost, and afterwards what it did.
+"""`carillon study advise BODY --cents 5 [--seconds 10]`: recommends a setting, predicts its error and cost, and reports the result.
 
-Bodies of the study are predicted from what the study measured on them; others from coarse solves of their own (forecast.Probe). Seconds
-of another machine are scaled by one small solve that both made.
-
-One path from a body to advice and back to what came of it; longer than most files.
+Bodies of the study are predicted from its measurements, others from coarse solves (forecast.Probe). CPU seconds are scaled to this machine by
+one small solve.
 """
 import argparse
 import contextlib
@@ -30,13 +28,13 @@ import targets
 from lab import Case, Lab
 from errors import InputError, RunError, printable
 
-RANKS_FROM_S = 4.0  # CPU seconds from which a second rank saves more of the clock than its start takes
+RANKS_FROM_S = 4.0  # CPU seconds above which a second rank reduces the wall time
 PROBE_NODES, PROBE_GROWTH, MAX_PROBE_NODES = {"shape": 1000, "surface": 2500}, {"shape": 3, "surface": 2}, 60000
 TRIAL_TOLERANCE = 1e-6
-START_S = 0.15  # CPU seconds of starting, which no phase of a run's record claims
-BUDGET_MARGIN = 0.85  # of --seconds: what is aimed at
-CHECK_GROWTH = 2.5  # of the nodes, for --check
-PATIENCE_S = 6.0  # for a first look; what does not fit is estimated
+START_S = 0.15  # CPU seconds of the start, in no phase of the record
+BUDGET_MARGIN = 0.85  # fraction of --seconds that is used
+CHECK_GROWTH = 2.5  # factor of the nodes for --check
+PATIENCE_S = 6.0  # limit of --validate; longer ones are estimated
 LONG_S, MANY_NODES = (
     10.0,
     45000,
@@ -47,7 +45,7 @@ PROGRAMS = ("carillon-precompute", "carillon-mesh", "carillon-bank")
 
 @dataclasses.dataclass
 class Outcome:
-    """What the run came to. how: "known" frequencies, the study's "extrapolated" ones, a "finer" mesh, or error "bars"."""
+    """Result of a run. how: "known" frequencies, the study's "extrapolated" ones, a "finer" mesh, or error "bars"."""
 
     cents: float
     mode: int
@@ -86,7 +84,7 @@ class KnownTarget:
 
 
 class OwnTarget:
-    """Any other body: a shape, a surface, a mesh, a job."""
+    """Another body: a shape, a surface, a mesh, a job."""
 
     def __init__(self, target):
         self.target, self.name, self.kind, self.notes, self.truth_hz = target, target.name, target.kind, target.notes, []
@@ -112,11 +110,11 @@ class Adviser:
                         " study of more bodies"
                     )
         self.lab = Lab(options.out, tools, repeats=1, surface=options.surface)
-        self.lab.say = lambda text: None  # what there is to say is said here
+        self.lab.say = lambda text: None  # messages are printed here
         self.cores = len(os.sched_getaffinity(0))
         self.probe, self.probe_cpu_s = None, 0.0
         self.predicted = {}  # CPU seconds by (element, nodes, modes)
-        self.pace = 1.0  # CPU seconds of this machine over those of the study's
+        self.pace = 1.0  # CPU seconds of this machine / machine of the study
 
     def find_target(self, word):
         target = self.name_target(word)
@@ -125,14 +123,14 @@ class Adviser:
         return target
 
     def check_folder(self):
-        """InputError where what is kept would take the place of what was given."""
+        """InputError if an output would overwrite an input."""
         given = [self.options.body, *self.target.list_files()]
         for kept in self.find_kept():
             if kept.exists() and any(os.path.exists(path) and os.path.samefile(kept, path) for path in given):
-                raise InputError(f"{kept}: this was given, and what is kept would take its place; give another folder with -o")
+                raise InputError(f"{kept}: would be overwritten; give another folder with -o")
 
     def find_kept(self):
-        """(job, bank): under the body's name in the folder."""
+        """Paths (job, bank) in the output folder."""
         name = pathlib.Path(self.target.name).stem
         return [pathlib.Path(self.options.out).resolve() / f"{name}.{ending}" for ending in ("json", "hdf")]
 
@@ -156,12 +154,12 @@ class Adviser:
     # --- before
 
     def say(self, text):
-        """Progress: trials take their time."""
+        """Prints progress."""
         print(f"carillon-study: {printable(text)}", file=sys.stderr, flush=True)
 
     @contextlib.contextmanager
     def doing(self, text):
-        """Says so, and again while it continues."""
+        """Prints a message, repeatedly while the work continues."""
         self.say(text)
         done, begin = threading.Event(), time.monotonic()
 
@@ -206,14 +204,14 @@ class Adviser:
         return json.loads(done.stdout)
 
     def calibrate(self):
-        """How fast this machine is relative to the study's, by the study's small solve."""
+        """Speed of this machine relative to that of the study, by a small solve."""
         known = self.advice.get_calibration()
-        with self.doing("measuring the pace of this machine"):
+        with self.doing("measuring the speed of this machine"):
             solve = self.lab.measure([Case("calibration", known["job"])], 2, is_fresh=True)["calibration"]
         self.pace = min(max(min(solve.cpu_s) / known["cpu_s"], 0.05), 20.0)
 
     def find_curves(self):
-        """The curves to choose from, seconds of this machine."""
+        """Candidate curves, in seconds of this machine."""
         curves = self.advice.curves.get(self.target.name) if self.target.kind == "study" else None
         if curves is None:
             return [self.try_coarse().make_curve()]
@@ -224,7 +222,7 @@ class Adviser:
         ]
 
     def try_mesh(self):
-        """[(Setting, Solve, cents)] of a mesh file with both elements: it is what it is, and no finer one can be made of it here."""
+        """[(Setting, Solve, cents)] of a mesh file with both elements."""
         tried = []
         for element in ("T4", "T10"):
             setting = forecast.Setting(element, 0, forecast.find_tolerance(self.options.cents or 1.0))
@@ -298,7 +296,7 @@ class Adviser:
         return self.probe
 
     def predict_seconds(self, element, nodes, modes):
-        """CPU seconds of one rank, by the cost model of carillon-precompute."""
+        """CPU seconds on one rank by the cost model of carillon-precompute."""
         key = (element, nodes, modes)
         if key not in self.predicted:
             size = json.dumps({"element": element, "nodes": nodes, "modes": modes})
@@ -310,10 +308,10 @@ class Adviser:
         return self.predicted[key]
 
     def is_within_reach(self):
-        """Whether the trials suffice: the cents, or all that the seconds buy, are no more than a step away."""
+        """True if the request is within reach of the trials."""
         trials, options = self.probe.trials, self.options
         if len(trials) < 2 or not trials[-2].freq_hz:
-            return len(trials) > 2  # three times none: there is none
+            return len(trials) > 2  # no modes in three trials
         curve = self.probe.make_curve()
         if options.cents is not None and curve.find_nodes(options.cents) is not None:
             return True
@@ -343,7 +341,7 @@ class Adviser:
         return forecast.Forecast(setting, cents, cpu_s * more, cpu_s * wall)
 
     def choose(self):
-        """(Forecast, sentence): the cheapest setting that meets the cents, or the best within the seconds."""
+        """(Forecast, remark): the cheapest setting for the cents, or the best within the seconds."""
         if self.target.kind == "mesh":
             return self.choose_for_mesh()
         cents, seconds = self.options.cents, self.options.seconds
@@ -392,7 +390,7 @@ class Adviser:
         elif self.options.check:
             finer = self.solve(dataclasses.replace(setting, nodes=round(CHECK_GROWTH * setting.nodes)), "finer mesh, to check")
             slope = self.probe.find_slope(*self.probe.trials[-2:]) if self.probe else 4 / 3
-            # What the finer mesh is wrong itself is made up for by the rate.
+            # Correct for the error of the finer mesh by the rate.
             errors = [abs(1200 * math.log2(f / fine)) / (1 - CHECK_GROWTH**-slope) for f, fine in zip(solve.freq_hz, finer.freq_hz)]
             how = "finer"
         else:
@@ -403,7 +401,7 @@ class Adviser:
         return Outcome(worst, errors.index(worst) + 1, bar, how, solve.cpu, min(solve.wall_s), solve.nodes, len(solve.freq_hz))
 
     def keep(self, solve):
-        """The job and its bank, under the body's name in the folder."""
+        """Writes the job and its bank to the output folder."""
         file, bank = self.find_kept()
         content = json.loads((solve.bank.parent / "job.json").read_text()) | {"bank": bank.name}
         shutil.copyfile(solve.bank, bank)
@@ -415,13 +413,13 @@ def find_bars(solve):
     return [a + b for a, b in zip(solve.algebraic_cents, solve.discretisation_cents)]
 
 
-# --- what is said
+# --- output
 
 HOW = {
-    "known": "against frequencies that are known without a mesh",
-    "extrapolated": "against the study's finest curved T10, extrapolated",
-    "finer": "against a finer mesh, what that one is wrong itself made up for",
-    "bars": "by its error bars over the factor by which such bars are too long",
+    "known": "against reference frequencies",
+    "extrapolated": "against the extrapolated finest curved T10 of the study",
+    "finer": "against a finer mesh, corrected for its own error",
+    "bars": "by its error bars, divided by their usual overestimate",
 }
 
 
@@ -561,9 +559,9 @@ def read_packed_advice(path=None):
 
 
 def run(options):
-    """Exit code 0; what goes wrong is raised."""
+    """Returns exit code 0; errors are raised."""
     if options.cents is None and options.seconds is None:
-        raise InputError("give --cents, how wrong a frequency may be, or --seconds, how much CPU time may be spent, or both")
+        raise InputError("give --cents (allowed frequency error), --seconds (allowed CPU time), or both")
     adviser = Adviser(options, programs.find_all(options.bin, PROGRAMS), read_packed_advice(options.advice))
     with contextlib.redirect_stdout(sys.stderr) if options.json else contextlib.nullcontext():
         estimate = adviser.estimate()
@@ -591,7 +589,7 @@ def make_estimate_document(adviser, found):
 
 
 def advise(adviser, options):
-    """Trials, the advice, and what it comes to."""
+    """Trials, advice, and result."""
     with contextlib.redirect_stdout(sys.stderr) if options.json else contextlib.nullcontext():
         adviser.calibrate()
         found, remark = adviser.choose()
@@ -633,7 +631,7 @@ def read_band(text):
 def add_command(commands):
     one = commands.add_parser(
         "advise",
-        help="the setting to use for so many cents or seconds, what it will reach and cost, and afterwards what it did",
+        help="the setting for an accuracy in cents or a CPU time, its predicted error and cost, and the result",
         description=(
             "Says which element, mass, mesh size, tolerance and ranks to use for a body, with the error and the CPU seconds to expect, then"
             " solves it so and says what they were. Bodies of the study are predicted from its measurements; others are tried on coarse"
@@ -649,29 +647,21 @@ def add_command(commands):
             " .off) or a mesh file; steel where no material is given"
         ),
     )
-    one.add_argument(
-        "--cents", type=read_positive(MAX_CENTS, "cents"), metavar="C", help="the largest error that any frequency of the band may have"
-    )
+    one.add_argument("--cents", type=read_positive(MAX_CENTS, "cents"), metavar="C", help="allowed error of any frequency in the band")
     one.add_argument(
         "--seconds",
         type=read_positive(MAX_SECONDS, "CPU seconds"),
         metavar="S",
-        help="CPU seconds, of all ranks, that the solve may take (in addition to trials and calibration)",
+        help="allowed CPU seconds of the solve, all ranks (without trials and calibration)",
     )
     one.add_argument(
-        "--dry-run", action="store_true", help="say what to use, and do not solve (a body of your own is still tried on its coarse meshes)"
+        "--dry-run", action="store_true", help="only print the advice (bodies outside the study are still tried on coarse meshes)"
     )
-    one.add_argument(
-        "--check", action="store_true", help="a body of unknown frequencies: solve a mesh of 2.5 times the nodes as well, and compare"
-    )
-    one.add_argument(
-        "--wall", type=read_positive(1e4, "metres"), metavar="M", help="of a surface file: hollow, with a wall of so many metres"
-    )
+    one.add_argument("--check", action="store_true", help="bodies outside the study: also solve a mesh of 2.5 times the nodes, and compare")
+    one.add_argument("--wall", type=read_positive(1e4, "metres"), metavar="M", help="of a surface file: wall thickness in metres")
     one.add_argument("--height", type=read_positive(1e4, "metres"), metavar="M", help="of a surface file: scaled to this height")
     one.add_argument("--band", type=read_band, metavar="LOW,HIGH", help="Hz; default: the job's, else 20,20000")
-    one.add_argument(
-        "-o", "--out", metavar="FOLDER", default="advice", help="where the job, the bank and what was tried go (default: advice)"
-    )
+    one.add_argument("-o", "--out", metavar="FOLDER", default="advice", help="output folder of job, bank and trials (default: advice)")
     one.add_argument(
         "--surface", metavar="FILE", default=bodies.BUNNY_SURFACE, help="the bunny's surface (default: that of Debian's glmark2-data)"
     )
@@ -680,6 +670,6 @@ def add_command(commands):
         metavar="FILE",
         help="measurements of another study: tests/bench/study/run --write-advice FILE (default: those in this program)",
     )
-    one.add_argument("--bin", metavar="FOLDER", help="where the programs are (default: next to this one)")
+    one.add_argument("--bin", metavar="FOLDER", help="folder of the programs (default: next to this one)")
     one.add_argument("--json", action="store_true", help="one JSON document on standard output; the rest on standard error")
     return one

@@ -1,4 +1,4 @@
-"""The bodies of the study: geometry, material, truth, and their meshes of every kind and size."""
+"""Bodies of the study: geometry, material, reference frequencies, and meshes of all kinds and sizes."""
 import dataclasses
 import math
 import pathlib
@@ -13,7 +13,7 @@ BUNNY_SURFACE = "/usr/share/glmark2/models/bunny.obj"  # of Debian's glmark2-dat
 
 @dataclasses.dataclass(frozen=True)
 class Kind:
-    """An element as the study compares it."""
+    """An element type of the study."""
 
     name: str
     element: str
@@ -22,7 +22,7 @@ class Kind:
 
     @property
     def order(self):
-        """Of the error of a frequency in the edge length, on a body without singular edges (straight T10: on flat bodies 4)."""
+        """Order of the frequency error in the edge length, without singular edges (straight T10: 4 on flat bodies)."""
         return 4 if self.element == "T10" and self.curved else 2
 
 
@@ -67,7 +67,7 @@ class Body:
     material: dict
     words: tuple
     modes: int
-    round: bool  # has curved faces: a straight T10 is another body
+    round: bool  # has curved faces, which a straight T10 does not represent
     sizes: tuple = (400, 1000, 2500, 6000, 15000)
     quick_sizes: tuple = (300, 900, 2700)
     quadratic_sizes: tuple = ()
@@ -76,7 +76,7 @@ class Body:
     surface: bool = False
 
     def get_kinds(self):
-        """On flat bodies straight and curved T10 are the same."""
+        """Straight and curved T10 are equal on flat bodies."""
         return [kind for kind in KINDS if self.round or kind.name != "T10 curved"]
 
     def get_sizes(self, lab, kind):
@@ -85,13 +85,13 @@ class Body:
         return self.quick_sizes if lab.quick else self.sizes
 
     def make_mesh(self, lab, kind, nodes):
-        """A Mesh of this kind with about so many nodes."""
+        """A Mesh of this kind with about `nodes` nodes."""
         words, inputs = list(self.words), ()
         if self.surface:
             words, inputs = [lab.surface, *words], (lab.surface,)
         if kind.element == "T10":
             words += ["--order", 2]
-        # The straight mesh is the curved one with its mid-side nodes put back, so that the two differ in nothing else.
+        # The straight mesh is the curved one with mid-side nodes moved to the edges.
         is_straight = kind.element == "T10" and not kind.curved and self.round
         names = ([self.change[0]] if self.change else []) + (["straight"] if is_straight else [])
 
@@ -106,7 +106,7 @@ class Body:
         return lab.make_mesh([*words, "--nodes", nodes], change if names else None, ", ".join(names), inputs)
 
     def find_band(self):
-        """The band that all meshes look in, far above the highest known mode: coarse meshes are sharp by octaves. max_modes ends it."""
+        """The band for all meshes, far above the highest known mode because coarse meshes are too high by octaves; max_modes limits it."""
         highest = self.truth.freq_hz[-1] if self.truth else 6000.0
         lowest = self.truth.freq_hz[0] if self.truth else 600.0
         return [lowest / 4, 8 * highest]
@@ -123,12 +123,12 @@ class Body:
         } | more
 
     def make_case(self, lab, kind, nodes, ranks=1, name="", **more):
-        """The job of one mesh of one kind, to be measured. Its name says which, and `name` what is special about it."""
+        """The Case of one mesh of one kind. name: suffix of its name."""
         mesh = self.make_mesh(lab, kind, nodes)
         return Case(f"{self.name}, {kind.name}, {nodes} nodes{', ' + name if name else ''}", self.make_job(mesh, kind, **more), ranks)
 
 
-# A hemispherical bowl of middle radius 60 mm, 4 mm thick, from 5 to 90 degrees of the polar angle, from a tube of its middle circumference.
+# Hemispherical bowl, middle radius 60 mm, 4 mm thick, polar angle from 5 to 90 degrees, mapped from a tube.
 BOWL_RADIUS, BOWL_WALL, BOWL_FROM, BOWL_TO = 0.06, 0.004, math.radians(5), math.radians(90)
 BOWL_LENGTH, BOWL_TUBE = BOWL_RADIUS * (BOWL_TO - BOWL_FROM), 0.0423
 
@@ -230,9 +230,9 @@ def choose(names, surface, quick=False):
     bodies = make_bodies()
     for name in names or []:
         if name not in bodies:
-            raise InputError(f"--on {name}: there is no such body; choose among {', '.join(bodies)}")
+            raise InputError(f"--on {name}: no such body; choose among {', '.join(bodies)}")
     chosen = [bodies[name] for name in dict.fromkeys(names or bodies)]
     has_surface = pathlib.Path(surface).is_file()
     if names and not has_surface and any(body.surface for body in chosen):
-        raise InputError(f"--on bunny: {surface} is not there; install glmark2-data, or give the bunny's surface with --surface")
+        raise InputError(f"--on bunny: {surface} does not exist; install glmark2-data, or give the bunny's surface with --surface")
     return [body for body in chosen if not body.surface or (has_surface and (names or not quick))]

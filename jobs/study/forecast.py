@@ -1,4 +1,4 @@
-"""What a setting will reach and cost, predicted from what the study measured (advice.json). Pure: runs nothing.
+"""Prediction of error and cost of a setting from the measurements of the accuracy study (advice.json). Pure functions.
 
 A curve is one body with one element on meshes of several sizes: the largest error of the band, the largest error bar, CPU seconds. Between
 two sizes all are powers of the nodes. A body that the study does not have is measured on two coarse meshes first (Probe): how much its
@@ -9,29 +9,29 @@ import json
 import math
 
 FORMAT = 1
-GOAL = 0.75  # of what was asked: aimed at, for meshes come in steps and rates are not quite steady
-MAX_FINER = 10.0  # times the nodes of the finest mesh that was measured: no prediction goes further
-MAX_FINER_TRIAL = 4.0  # times those of a body's finest trial
-START_S, STEEPEST_CPU = 0.1, 1.8  # CPU seconds of starting, and the power of the nodes by which what follows grows at most
+GOAL = 0.75  # fraction of the requested error that is aimed at
+MAX_FINER = 10.0  # limit of extrapolation: nodes / nodes of the finest measured mesh
+MAX_FINER_TRIAL = 4.0  # the same for trials
+START_S, STEEPEST_CPU = 0.1, 1.8  # CPU seconds of the start; largest power of the nodes of the rest
 TRUST, STEEPEST_BEYOND = (
     0.85,
     4 / 3,
 )  # of the power at the end of a curve, beyond it: meshes that are coarse for their walls gain faster than those that follow
-DISTRUST = 0.9  # of a power that coarse meshes show: the next step is seldom as steep
-# Powers of the nodes by which errors fall: order four, and bodies that are refined in two directions.
+DISTRUST = 0.9  # factor for a power measured on coarse meshes
+# Limits of the power of the nodes for errors: order four, and bodies refined in two directions.
 MIN_STEEPNESS, MAX_STEEPNESS = 0.3, 4 / 2
 LOOSEST_TOLERANCE, STRICTEST_TOLERANCE = 1e-6, 1e-12
-CENTS_OF_RESIDUAL = 600 / math.log(2)  # of a frequency, for a relative residual of lambda
+CENTS_OF_RESIDUAL = 600 / math.log(2)  # frequency error in cents per relative residual of lambda
 
 
 class OutOfReach(Exception):
-    """Nothing that can be predicted meets what was asked."""
+    """No predictable setting meets the request."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Setting:
     element: str  # "T4", "T4 lumped", "T10" (curved where the body is)
-    nodes: int  # asked of the mesher, mid-side nodes among them
+    nodes: int  # requested, including mid-side nodes
     tolerance: float
     ranks: int = 1
 
@@ -39,14 +39,14 @@ class Setting:
 @dataclasses.dataclass(frozen=True)
 class Forecast:
     setting: Setting
-    cents: float  # the largest error of the band
+    cents: float  # largest error in the band
     cpu_s: float  # of all ranks, on this machine
     wall_s: float
 
 
 @dataclasses.dataclass(frozen=True)
 class Sample:
-    """One mesh of a curve. Errors and bars are the largest of the band, in cents."""
+    """One mesh of a curve. Errors and bars: largest in the band, in cents."""
 
     nodes: int  # asked of the mesher
     unknowns: int
@@ -80,7 +80,7 @@ class Curve:
         for sample in sorted(samples, key=lambda s: s.nodes):
             if not self.samples or sample.nodes > self.samples[-1].nodes:
                 self.samples.append(sample)
-        # An error that is small by chance (where one sign turns into the other) promises nothing for coarser meshes.
+        # An accidentally small error (change of sign) does not hold for coarser meshes.
         worst, self.errors = 0.0, []
         for sample in reversed(self.samples):
             worst = max(worst, sample.cents)
@@ -111,7 +111,7 @@ class Curve:
         return math.ceil(bisect(lambda n: self.predict_cents(n) <= GOAL * cents, self.samples[-1].nodes, most))
 
     def find_affordable(self, cpu_s):
-        """The most nodes for the CPU seconds; None when the coarsest mesh takes more."""
+        """The most nodes within the CPU seconds; None if the coarsest mesh needs more."""
         if self.samples[0].cpu_s > cpu_s:
             return None
         most = self.get_max_nodes()
@@ -123,7 +123,7 @@ class Curve:
 
 
 def bisect(is_beyond, low, high):
-    """The least x of low .. high for which is_beyond(x), which stays so from there on."""
+    """The smallest x in low .. high with is_beyond(x), which is monotonic."""
     for _ in range(50):
         middle = math.sqrt(low * high)
         low, high = (low, middle) if is_beyond(middle) else (middle, high)
@@ -137,7 +137,7 @@ def find_tolerance(cents):
 
 
 class Advice:
-    """What the study measured: curves by body and element, bars over errors."""
+    """Measurements of the study: curves by body and element, ratios of bars to errors."""
 
     def __init__(self, content):
         self.content = content
@@ -173,13 +173,13 @@ class Advice:
         return bool(row) and not row["crowded"] and row["wall"] < 0.9
 
     def find_rank_cost(self, ranks):
-        """(CPU, wall clock) of so many ranks over those of one, as the study measured them."""
+        """Measured (CPU, wall time) on `ranks` ranks / one rank."""
         row = self.content.get("ranks", {}).get(str(ranks))
         return (row["cpu"], row["wall"]) if row else (1.0, 1.0)
 
 
 def find_quantile(values, part):
-    """Of a sorted list, interpolated."""
+    """Interpolated quantile of a sorted list."""
     place = part * (len(values) - 1)
     low = math.floor(place)
     high = min(low + 1, len(values) - 1)
@@ -187,10 +187,10 @@ def find_quantile(values, part):
 
 
 def read_advice(text):
-    """Raises ValueError when this is no advice file of this version."""
+    """Raises ValueError for anything but an advice file of this version."""
     content = json.loads(text)
     if not isinstance(content, dict) or content.get("format") != FORMAT or not isinstance(content.get("bodies"), dict):
-        raise ValueError(f"no advice of format {FORMAT}")
+        raise ValueError(f"not an advice file of format {FORMAT}")
     calibration = content["calibration"]
     numbers = [
         calibration["cpu_s"],
@@ -204,13 +204,13 @@ def read_advice(text):
     if not isinstance(calibration["job"], dict) or not all(
         isinstance(number, (int, float)) and 0 < number < math.inf for number in numbers
     ):
-        raise ValueError("what was measured is no number above 0")
+        raise ValueError("a measurement is not a positive number")
     return Advice(content)
 
 
 @dataclasses.dataclass
 class Trial:
-    """One coarse solve of a body that the study does not have."""
+    """One coarse solve of a body outside the study."""
 
     nodes: int
     unknowns: int
@@ -221,12 +221,12 @@ class Trial:
 
 
 def find_fall(coarse_hz, fine_hz):
-    """The largest distance in cents between modes of the same number, counted from the lowest."""
+    """Largest distance in cents between modes of equal index."""
     return max((abs(1200 * math.log2(a / b)) for a, b in zip(coarse_hz, fine_hz)), default=0.0)
 
 
 class Probe:
-    """A body unknown to the study, by trials with T10 from coarse to fine, two at least.
+    """A body outside the study, from at least two trials with T10, coarse to fine.
     predict_seconds(element, nodes, modes): CPU seconds by the cost model of carillon-precompute."""
 
     def __init__(self, advice, element, predict_seconds):

@@ -1,6 +1,6 @@
-"""Meshes of bodies that carillon-mesh has no shape for: the nodes of a parametric mesh are moved, everything else of the file stays.
+"""Meshes of bodies without a shape in carillon-mesh, by moving the nodes of a parametric mesh.
 
-Reads and writes what carillon-mesh writes: Gmsh 4.1, binary, one block of nodes (Gmsh reference manual, "MSH file format")."""
+Reads and writes the format of carillon-mesh: Gmsh 4.1, binary, one block of nodes (Gmsh reference manual, "MSH file format")."""
 import array
 import pathlib
 import struct
@@ -48,7 +48,7 @@ class MeshFile:
 
     def move(self, find_parameters, find_place, periods=(0.0, 0.0, 0.0)):
         """Corners from (x, y, z) to find_place(find_parameters(x, y, z)), mid-side nodes to the place of their corners' mean parameters:
-        onto the true surface where a parameter is constant on it. periods: those of the parameters, 0 where one does not come round."""
+        onto the true surface if a parameter is constant on it. periods: of the parameters, 0: not periodic."""
         parameters = [find_parameters(*node) for node in self.nodes]
         corners = {corner for tet in self.tets for corner in tet[:4]}
         for corner in corners:
@@ -62,7 +62,7 @@ class MeshFile:
                 self.nodes[middle] = list(find_place(*mean))
 
     def straighten(self):
-        """Mid-side nodes into the middles of their edges."""
+        """Moves mid-side nodes to the middle of their edges."""
         for tet in self.tets:
             for (a, b), middle in zip(EDGES, tet[4:]):
                 self.nodes[middle] = [(self.nodes[tet[a]][k] + self.nodes[tet[b]][k]) / 2 for k in range(3)]

@@ -1,4 +1,4 @@
-"""Frequencies that no finite-element mesh gave: known.csv, next to this module, each with its source."""
+"""Reference frequencies from other sources than finite elements: known.csv."""
 import csv
 import dataclasses
 import io
@@ -7,7 +7,7 @@ import pkgutil
 
 @dataclasses.dataclass(frozen=True)
 class Truth:
-    """Sorted frequencies with their multiplicities, and how far each may itself be wrong, relative."""
+    """Sorted frequencies, repeated by multiplicity, with relative uncertainties."""
 
     freq_hz: tuple
     uncertainty: tuple

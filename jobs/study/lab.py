@@ -22,13 +22,12 @@ class Mesh:
     path: pathlib.Path
     nodes: int
     elements: int
-    cpu_s: float  # that meshing took
+    cpu_s: float  # of meshing
 
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """One job to measure. job: as carillon-precompute takes it, without "bank"; "mesh" and "surface" are absolute paths.
-    options: what follows "--" on the command line of the solver; environment: pairs (name, value)."""
+    """One job to measure. job: without "bank", with absolute paths; options: solver options after "--"; environment: pairs (name, value)."""
 
     name: str
     job: dict = dataclasses.field(hash=False)
@@ -39,7 +38,7 @@ class Case:
 
 @dataclasses.dataclass
 class Solve:
-    """What one case gave; one entry of cpu_s and wall_s for each repeat. Cents and residuals: one for each mode, as the bank has them."""
+    """Result of one case. cpu_s, wall_s: per repeat; cents and residuals: per mode, as in the bank."""
 
     cpu_s: list
     wall_s: list
@@ -47,14 +46,14 @@ class Solve:
     algebraic_cents: list
     discretisation_cents: list
     residual: list
-    corrected_hz: list  # in the order of freq_hz: not ascending where modes change places
+    corrected_hz: list  # in the order of freq_hz, not sorted
     corrected_cents: list
     nodes: int
     unknowns: int
     elements: int
     bank: pathlib.Path
     record: dict  # "run" of the resolved job: phases, solver, memory
-    error: str = ""  # of a case that may fail, and did; the lists above are empty then
+    error: str = ""  # of a failed case that may fail; the lists are empty then
 
     @property
     def cpu(self):
@@ -68,7 +67,7 @@ class Solve:
 
 @functools.cache
 def calc_digest(path):
-    """SHA-256 of a file's bytes; read once in a run."""
+    """SHA-256 of a file, cached."""
     digest = hashlib.sha256()
     with open(path, "rb") as stream:
         while piece := stream.read(1 << 20):
@@ -81,14 +80,14 @@ def calc_key(value):
 
 
 def write_whole(path, text):
-    """A file that is there as a whole or not at all."""
+    """Atomic write."""
     part = path.with_name(path.name + f".{os.getpid()}.part")
     part.write_text(text)
     os.replace(part, path)
 
 
 def read_kept(path):
-    """What an earlier run kept; None when there is nothing that can be used."""
+    """A kept JSON object; None if missing or invalid."""
     try:
         value = json.loads(path.read_text())
     except (OSError, ValueError):
@@ -109,16 +108,16 @@ class Lab:
             for folder in (self.meshes, self.runs):
                 folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise InputError(f"{out}: the folder cannot be made: {error.strerror}; give another one with -o") from None
+            raise InputError(f"{out}: cannot create folder: {error.strerror}; give another one with -o") from None
         self.start, self.load_start = time.monotonic(), os.getloadavg()[0]
-        self.measured_s = 0.0  # CPU seconds of this call
-        self.found = {}  # by section: what it measured, for the sections after it
+        self.measured_s = 0.0  # CPU seconds of this run
+        self.found = {}  # results by section, for later sections
 
     def say(self, text):
         print(text, file=sys.stderr, flush=True)
 
     def make_command(self, section, *words):
-        """The line that makes a section or a part of it again."""
+        """The command that repeats a section or a part of it."""
         on = ["--on", *self.on] if self.on and "--on" not in words else []
         repeats = ["--repeats", str(self.asked_repeats)] if self.asked_repeats else []
         return shlex.join(
@@ -164,7 +163,7 @@ class Lab:
         return Mesh(mesh, kept["nodes"], kept["elements"], kept["cpu_s"])
 
     def call(self, command, what, environment=None, cwd=None):
-        """One measured run. RunError carries the program's exit code and its own error line."""
+        """One measured run. RunError with exit code and error line of the program."""
         return measuring.run_part(command, cwd or self.out, what, environment, self.timeout_s)
 
     # --- solves
@@ -175,7 +174,7 @@ class Lab:
         repeats = repeats or self.repeats
         keys = {case.name: self.find_key(case) for case in cases}
         if len(keys) != len(cases):
-            raise ValueError("two cases have one name")
+            raise ValueError("duplicate case name")
         find_kept = lambda case: None if is_fresh else read_kept(self.runs / keys[case.name] / "kept.json")
         kept = {case.name: find_kept(case) or {"cpu_s": [], "wall_s": []} for case in cases}
         rounds = [
@@ -211,7 +210,7 @@ class Lab:
         return calc_key([calc_digest(self.find_program("carillon-precompute")), job, files, case.ranks, case.options, case.environment])
 
     def find_weight(self, case):
-        """Something that grows with what a case costs."""
+        """A rough measure of the cost of a case."""
         mesh = case.job.get("mesh")
         return (os.path.getsize(mesh) if mesh else case.job.get("body", {}).get("nodes", 5000) * 100) ** 1.2
 

@@ -1,4 +1,4 @@
-"""Bodies that the study does not have: what a word of the command line names, and the job that solves it with a setting."""
+"""Bodies outside the study: command line arguments, and jobs for them."""
 import copy
 import pathlib
 
@@ -13,17 +13,17 @@ STEEL = {
     "density_kg_m3": 7850,
     "damping": {"rayleigh": {"alpha1_s": 1e-7, "alpha2_per_s": 0.5}},
 }
-STEEL_TEXT = "steel (200 GPa, nu 0.3, 7850 kg/m^3), as no material was given"
+STEEL_TEXT = "steel (200 GPa, nu 0.3, 7850 kg/m^3), since no material was given"
 
 
 class Target:
-    """What is to be solved. template: a job without mesh size, element, tolerance and bank; kind: "shape", "surface" or "mesh"."""
+    """A body to solve. template: a job without mesh size, element, tolerance and bank; kind: "shape", "surface" or "mesh"."""
 
     def __init__(self, name, template, kind, notes=()):
         self.name, self.template, self.kind, self.notes = name, template, kind, list(notes)
 
     def list_files(self):
-        """The files that the job names."""
+        """Input files of the job."""
         return [file for file in (self.template.get("mesh"), self.template.get("body", {}).get("surface")) if file]
 
     def make_job(self, setting):
@@ -37,7 +37,7 @@ class Target:
 
 
 def find_target(word, wall_m=None, height_m=None, band_hz=None):
-    """Target of a word of the command line that is no body of the study. InputError says what it might have been."""
+    """Target of a command line argument that is not a body of the study. InputError with alternatives."""
     path = pathlib.Path(word)
     ending = path.suffix.lower()
     if not path.exists() and word in SHAPES:
@@ -58,9 +58,9 @@ def find_target(word, wall_m=None, height_m=None, band_hz=None):
 
 def find_file(path, ending):
     if not path.exists():
-        raise InputError(f"{path}: there is no such file")
+        raise InputError(f"{path}: no such file")
     if not path.is_file():
-        raise InputError(f"{path}: this is no regular file; give a job, a mesh or a surface")
+        raise InputError(f"{path}: not a regular file; give a job, a mesh or a surface")
     full = str(path.resolve())
     if ending == ".json":
         return find_job(path)
@@ -103,7 +103,7 @@ def find_job(path):
 
 def resolve(job_file, folder, path):
     if not isinstance(path, str):
-        raise InputError(f"{job_file}: {path!r} is no path")
+        raise InputError(f"{job_file}: {path!r} is not a path")
     found = (folder / path).resolve()
     if not found.is_file():
         raise InputError(
