@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "jobs/store/outcome/outcome.hpp"
 #include "jobs/queue/admission.hpp"
+#include "jobs/store/outcome/outcome.hpp"
 #include "precompute/job/cost/calibration.hpp"
 #include "precompute/job/cost/seconds.hpp"
 #include "tests/unit/jobs/store/registry/jobs.hpp"
