@@ -23,14 +23,14 @@ BIN = pathlib.Path(os.environ["CARILLON_BIN_DIR"])
 
 
 def find_processes(entry):
-    """The numbers of the processes that were started with "NAME=value" in their environment."""
+    """Processes with "NAME=value" in their environment."""
     found = []
     for file in pathlib.Path("/proc").glob("[0-9]*/environ"):
         try:
             if entry.encode() in file.read_bytes().split(b"\0"):
                 found.append(file.parent.name)
         except OSError:
-            continue  # it has ended, or belongs to another user
+            continue  # ended, or of another user
     return found
 
 
@@ -188,7 +188,7 @@ class Hear(unittest.TestCase):
         rate, samples = read_wave(sound["wav"])
         self.assertEqual((rate, samples.shape[1]), (48000, 2))
         self.assertTrue(0.5 < numpy.abs(samples).max() < 1 and numpy.all(numpy.isfinite(samples)))
-        # What is heard are the modes: the strongest line is one of the table.
+        # The strongest line of the sound is a mode of the table.
         spectrum = numpy.abs(numpy.fft.rfft(samples[: 2 * rate, 0] * numpy.hanning(2 * rate)))
         strongest = numpy.argmax(spectrum) / 2
         self.assertLess(min(abs(strongest - mode["freq_hz"]) for mode in sound["modes"]), 2)
@@ -326,7 +326,7 @@ class Hear(unittest.TestCase):
         self.refuse("--shape", "barr", contains=("barr",))
         (self.folder / "text.obj").write_text("hello\n")
         self.refuse("text.obj", contains=("text.obj",))
-        # A run that was refused before it had anything to write has left no folder.
+        # A refused run leaves no folder.
         self.assertFalse(
             [f for f in self.folder.iterdir() if f.name in ("empty-sound", "ball-sound", "far-sound", "text-sound", "cup-sound")]
         )
@@ -363,7 +363,7 @@ class Hear(unittest.TestCase):
             run.stderr.read()
             self.assertEqual(run.wait(30), -signal.SIGINT)
         self.assertEqual(sorted(f.name for f in (self.folder / "ball-sound").iterdir()), ["ball-oak.json", "ball.msh"])
-        # Of Open MPI empty folders may stay.
+        # Open MPI may leave empty folders.
         self.assertFalse([f for f in temporary.rglob("*") if not f.is_dir() or f.name.startswith("carillon-")])
         self.assertFalse(find_processes(f"TMPDIR={temporary}"))
         subprocess.run([BIN / "carillon-mesh", "ball-sound/ball.msh", "--look"], cwd=self.folder, check=True, stdout=subprocess.DEVNULL)

@@ -61,7 +61,7 @@ class Damage(Bench):
         shutil.copy2(forged, bank)
         id_, other_id = bank.parent.name, forged.parent.name
         first = (forged.parent / "bank.sum").read_text().splitlines()[0]
-        for has_sum in (True, False):  # earlier versions wrote none
+        for has_sum in (True, False):  # banks of earlier versions have none
             sum_file = bank.parent / "bank.sum"
             sum_file.chmod(0o644)
             sum_file.unlink()
@@ -138,7 +138,7 @@ class Damage(Bench):
                 self.assertEqual(pathlib.Path(self.run_it("get", job).stdout.strip()), bank)
                 subprocess.run([BIN / "carillon-bank", "check", bank], check=True, stdout=subprocess.DEVNULL)
                 self.assertEqual(self.ask("verify")["damaged"], [])
-        # A bit that no timestamp shows.
+        # A flipped bit with unchanged time.
         for path in (bank.parent, bank):
             path.chmod(0o755)
         time = bank.stat()
@@ -180,7 +180,7 @@ class Damage(Bench):
         for number, content in enumerate((flipped, second, flipped[: len(whole) // 2], second)):
             with self.subTest(number):
                 spoil(content)
-                self.assertIn("computes it again", self.run_it("get", job, code=1).stderr)  # checked for a path as for a copy
+                self.assertIn("computes it again", self.run_it("get", job, code=1).stderr)  # also without --to
                 (self.folder / "copy.hdf").unlink(missing_ok=True)
                 self.assertIn("computes it again", self.run_it("get", job, "--to", self.folder / "copy.hdf", code=1).stderr)
                 self.assertFalse((self.folder / "copy.hdf").exists())
@@ -214,7 +214,7 @@ class Damage(Bench):
             for kind, make in damages.items():
                 for has_sum in (True, False):
                     if not has_sum and (name == "request.json" or (name, kind) == ("outcome.json", "other")):
-                        continue  # a bank that nothing else records; and one end that is as good as another
+                        continue  # not detectable without bank.sum
                     with self.subTest(f"{name} {kind} {has_sum}"):
                         self.open_up(bank.parent)
                         shutil.rmtree(bank.parent)

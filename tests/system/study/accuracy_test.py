@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""tests/bench/study/run from outside: rates, error bars and signs against theory, what stops it, and what it says to bad input.
+"""tests/bench/study/run from outside: rates, error bars and signs against theory, interruption, and bad input.
 
 usage: accuracy_test.py BIN_DIR
 """
@@ -87,7 +87,7 @@ class Study(unittest.TestCase):
         self.assertNotIn('src="', page)
 
     def test_errors_in_the_csv_are_those_of_the_banks(self):
-        """The truth is written here once more, from the paper: the cube's lowest pair is 2.85604469 c_T / a (Demarest 1971)."""
+        """Independent reference from the paper: the cube's lowest pair is 2.85604469 c_T / a (Demarest 1971)."""
         shear = math.sqrt(200e9 / 2.6 / 7850)
         true_hz = 2.85604469 * shear / 0.05 / (2 * math.pi)
         points = {
@@ -114,7 +114,7 @@ class Study(unittest.TestCase):
         self.assertLess(rates["ring", "T10 straight"], rates["ring", "T10 curved"])
 
     def test_consistent_mass_is_sharp_and_lumping_flattens(self):
-        """Ritz: on a flat body consistent elements are never below the truth. Lumping T4 lowers every frequency of the same mesh."""
+        """Ritz: consistent elements on a flat body are never too low. Lumping T4 lowers every frequency."""
         consistent, lumped = self.find_modes("cube", "T4 consistent"), self.find_modes("cube", "T4 lumped")
         self.assertEqual(set(consistent), set(lumped))
         for nodes, errors in consistent.items():
@@ -160,7 +160,7 @@ class Study(unittest.TestCase):
         self.assertEqual(first.returncode, 0, first.stderr)
         text = page.read_text()
         self.assertIn("| cube | T10 straight |", text)
-        # A part of the study renews its own findings, and leaves those of the others.
+        # A partial study updates only its own findings.
         summary = lambda page: re.search(r"<!-- accuracy:summary -->(.*?)<!-- /accuracy:summary -->", page, re.S)[1].splitlines()
         old, new = summary((ROOT / "docs/reports/accuracy.md").read_text()), summary(text)
         self.assertTrue(set(old) - set(new), "nothing was renewed")

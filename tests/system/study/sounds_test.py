@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""How two sounds differ (tests/bench/study/sounds.py) against closed forms: sines, noise, and a body's sound worked out by hand."""
+"""Differences of sounds (tests/bench/study/sounds.py) against closed forms: sines, noise, the sound of a body."""
 import pathlib
 import sys
 import unittest
@@ -19,7 +19,7 @@ def make(pressure, rate=RATE):
 
 
 def make_sine(freq, peak_pa=1.0, rate=RATE):
-    """With soft ends, so that its spectrum is a line."""
+    """A sine with a soft start and end: a line spectrum."""
     time = np.arange(2 * rate) / rate
     return peak_pa * np.sin(2 * np.pi * freq * time) * np.sin(np.pi * time / 2) ** 2
 

@@ -1,4 +1,4 @@
-// What the queue admits: nothing above the cores, nothing above the memory, and no job starves.
+// Admission: limits of cores and memory, no starvation.
 #include "jobs/queue/admission.hpp"
 
 #include <gtest/gtest.h>
@@ -39,7 +39,7 @@ TEST(Admission, one_large_job_takes_all_cores_and_two_take_half_each) {
 }
 
 TEST(Admission, jobs_that_memory_keeps_apart_share_no_cores) {
-  // Two of 20 GB do not fit 32: the first gets every core, as no other job could use them.
+  // Two jobs of 20 GB do not fit into 32 GB: the first gets all cores.
   const std::vector<Admission> admissions = choose(kHost, {}, {large(20.0), large(20.0)});
   EXPECT_EQ(admissions[0].decision, Admission::Decision::start);
   EXPECT_EQ(admissions[0].ranks, 8);
@@ -65,7 +65,7 @@ TEST(Admission, what_no_moment_of_this_machine_holds_never_runs) {
 
 TEST(Admission, memory_that_was_promised_and_is_not_used_yet_is_not_given_twice) {
   const std::vector<Admitted> running{{1, 20.0, 0.5}};
-  // 31.5 GB look free, but 19.5 of them are promised.
+  // 31.5 GB are free, but 19.5 GB are admitted to other jobs.
   const Host host{8, 32.0, 31.5};
   EXPECT_EQ(choose(host, running, {asking(1, 12.0)})[0].decision, Admission::Decision::wait);
   EXPECT_EQ(choose(host, running, {asking(1, 10.0)})[0].decision, Admission::Decision::start);
@@ -88,7 +88,7 @@ TEST(Admission, a_job_that_waits_for_room_is_passed_at_first_and_kept_room_for_l
 }
 
 TEST(Admission, nothing_is_kept_for_a_job_that_others_than_us_keep_out) {
-  // Another user's program holds 26 of 32 GB: waiting for our own jobs would not help.
+  // Another program holds 26 of 32 GB: waiting for own jobs does not help.
   const Host host{8, 32.0, 6.0};
   const std::vector<Admission> admissions = choose(host, {{1, 1.0, 1.0}}, {asking(1, 20.0, 1e6), small()});
   EXPECT_EQ(admissions[0].decision, Admission::Decision::wait);
@@ -120,15 +120,15 @@ TEST(Admission, no_queue_whatever_oversubscribes_cores_or_memory) {
       EXPECT_GE(admission.ranks, 1);
     }
     EXPECT_LE(ranks, host.cores) << "round " << round;
-    if (!running.empty() && ranks == static_cast<int>(running.size())) continue;  // nothing was started
+    if (!running.empty() && ranks == static_cast<int>(running.size())) continue;  // none started
     EXPECT_LE(promised, kMemoryShare * host.total_gb + 1e-9) << "round " << round;
   }
 }
 
 TEST(Admission, an_endless_stream_of_small_jobs_does_not_starve_a_large_one) {
-  // Every second a slot of the two frees itself and a new small job comes; the large one needs both.
+  // Small jobs keep arriving; the large job needs both slots.
   const Host host{2, 32.0, 32.0};
-  std::vector<int> left{3, 5};  // seconds of the small ones that run
+  std::vector<int> left{3, 5};  // remaining seconds of running small jobs
   double blocked_s = 0.0;
   for (int second = 0; second < 1000; ++second) {
     std::erase_if(left, [](int& seconds) { return --seconds <= 0; });

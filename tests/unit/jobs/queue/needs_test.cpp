@@ -1,4 +1,4 @@
-// What a job will need, by its request alone.
+// Needs of jobs from their requests.
 #include "jobs/queue/needs.hpp"
 
 #include <gtest/gtest.h>

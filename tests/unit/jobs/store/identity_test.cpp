@@ -1,4 +1,4 @@
-// What is part of an id and what is not. The hashes of files are compared with those of sha256sum.
+// Parts of ids. File hashes are compared with sha256sum.
 #include "jobs/store/identity.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// What is part of the id of a simulation and what is not, and the job that is carried out in the store.
+// Parts of ids of simulations, and their jobs in the store.
 #include "jobs/store/order.hpp"
 
 #include <gtest/gtest.h>
@@ -87,11 +87,11 @@ TEST(Order, work_is_a_simulation_of_the_copies_in_the_store) {
   EXPECT_EQ(inner.sound, work / "sound.wav");
   EXPECT_EQ(inner.record, work / store::kRecordFile);
   EXPECT_TRUE(inner.motion.empty());
-  // Made again from the request alone: to the byte.
+  // Rebuilt from the request: bitwise equal.
   store.remove_work(id);
   EXPECT_TRUE(store::restore_work(store, request));
   EXPECT_EQ(tests::read_all(work / store::kJobFile), text);
-  // One digit of the job in the store is another simulation.
+  // A changed digit is detected.
   std::string changed = text;
   changed.replace(changed.find("0.25"), 4, "0.24");
   folder.write(work.lexically_relative(folder / "").string() + "/" + store::kJobFile, changed);

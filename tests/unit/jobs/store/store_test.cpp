@@ -114,7 +114,7 @@ TEST(Store, what_is_no_id_in_its_folders_is_passed_over) {
   const Folder folder;
   const store::Store store = store::Store::open(folder / "store");
   fs::create_directories(folder / "store/banks/aa/not-an-id");
-  fs::create_directories(folder / ("store/banks/bb/" + kId.text()));  // in the wrong place
+  fs::create_directories(folder / ("store/banks/bb/" + kId.text()));  // in the wrong shard
   EXPECT_TRUE(store.list_banks().empty());
 }
 
@@ -163,7 +163,7 @@ TEST(Store, a_bank_that_is_no_longer_what_was_published_is_found) {
     act(bank);
     if (keeps_time) fs::last_write_time(bank, time);
     const auto fault = store.find_bank_fault(kId, look);
-    // What a full look has found every later one finds.
+    // A fault found once is found by every later quick look.
     return fault && store.find_bank_fault(kId, store::Look::quick);
   };
   const auto flip = [](const fs::path& bank) {
@@ -194,7 +194,7 @@ TEST(Store, a_quota_that_is_full_is_a_full_disk) {
   EXPECT_FALSE(base::is_full_error(EACCES));
   const Folder folder;
   EXPECT_EQ(store::is_disk_full(folder.path(), SystemError(std::strerror(ENOSPC))),
-            store::is_disk_full(folder.path()));  // words decide nothing
+            store::is_disk_full(folder.path()));  // only the type counts
 }
 
 TEST(Store, a_file_system_without_locks_and_a_limit_of_files_are_named) {

@@ -1,4 +1,4 @@
-// Rows of the engine "slurm" that need no question to Slurm.
+// Rows of the engine "slurm" without a real Slurm.
 #include "jobs/queue/slurm/engine.hpp"
 
 #include <gtest/gtest.h>
@@ -28,7 +28,7 @@ class Engine : public testing::Test {
     registry_.submit({submission});
   }
 
-  /// The row after `worker` claimed it and the engine looked at it.
+  /// The row after a claim by `worker` and follow().
   JobState follow(const process::Identity& worker) {
     const auto all = [](const std::vector<Job>&, const std::vector<Job>& ready) { return ready; };
     EXPECT_EQ(registry_.claim(store::JobEngine::slurm, worker, all).size(), 1u);
@@ -58,7 +58,7 @@ TEST_F(Engine, a_job_that_waits_after_a_failure_keeps_why_when_it_is_cancelled) 
   EXPECT_EQ(registry_.find(make_id(1))->reason, "cancelled while it waited: node n7 died");
 }
 
-/// Packed jobs, with a Slurm of scripts: sbatch gives the number 77, squeue shows what `show` wrote, scancel keeps what it was asked.
+/// Packed jobs with Slurm commands as scripts: sbatch prints 77, squeue prints the text of show(), scancel records its arguments.
 class PackedEngine : public testing::Test {
  protected:
   PackedEngine() : store_(store::Store::open(folder_ / "store")), registry_(Registry::open(store_, be_silent)) {
@@ -98,7 +98,7 @@ class PackedEngine : public testing::Test {
     std::ifstream stream(folder_ / name);
     return {std::istreambuf_iterator<char>(stream), {}};
   }
-  /// As an attempt does; no cause: it is at work.
+  /// Files of an attempt; without cause: running.
   void leave(int number, std::optional<outcome::Cause> cause) const {
     const std::filesystem::path work = store_.work_folder(make_id(number));
     outcome::Attempt attempt;
@@ -160,7 +160,7 @@ TEST_F(PackedEngine, cancel_takes_one_job_out_of_a_task_that_others_need) {
   EXPECT_TRUE(engine_.cancel(registry_, make_id(4)));
   EXPECT_EQ(find(4).state, JobState::cancelled);
   EXPECT_FALSE(slurm::read_submitted_job(store_.work_folder(make_id(4))));
-  // One that runs is asked by its task, and has ended when its attempt says so.
+  // A running job is stopped by its task and ends with its attempt.
   registry_.update(make_id(1), [](Job& job) { return job.cancel_wanted = true; });
   engine_.follow(registry_);
   EXPECT_EQ(find(1).state, JobState::running);

@@ -1,4 +1,4 @@
-// Jobs in tasks: each once, evenly, and no core waits for a long one.
+// Packing: every job once, balanced tasks, few idle cores.
 #include "jobs/queue/slurm/packing.hpp"
 
 #include <gtest/gtest.h>
@@ -66,7 +66,7 @@ TEST(packing, little_work_is_one_task) {
 TEST(packing, a_body_too_large_for_its_share_keeps_several_ranks_and_starts_first) {
   std::vector<PackJob> jobs(400, PackJob{2.0, 0.1, {0.1}, 0});
   jobs.push_back({300.0, 5.0, {1.0, 1.2}, 0});
-  jobs.push_back({2.0, 0.1, {0.1}, 3});  // asked for
+  jobs.push_back({2.0, 0.1, {0.1}, 3});  // requested
   const PackPlan plan = plan_packs(jobs, {1, 16, 0.0}, {1.0, 1800.0, 1000, 16});
   ASSERT_EQ(plan.tasks.size(), 1u);
   const std::vector<Placed>& task = plan.tasks[0];
@@ -84,7 +84,7 @@ TEST(packing, a_task_holds_what_its_jobs_need_at_a_time_and_no_more_than_a_node_
   EXPECT_DOUBLE_EQ(plan_packs(jobs, {1, 4, 64.0}, {}).memory_gb, 5.0);
   const PackPlan tight = plan_packs(jobs, {1, 4, 2.5}, {});
   EXPECT_DOUBLE_EQ(tight.memory_gb, 2.5);
-  EXPECT_NEAR(tight.seconds, 1.0 + 100.0, 1e-9);  // two at a time
+  EXPECT_NEAR(tight.seconds, 1.0 + 100.0, 1e-9);  // two concurrent jobs
 }
 
 TEST(packing, a_job_passes_one_that_waits_for_memory_and_none_that_waits_for_cores) {
@@ -100,7 +100,7 @@ TEST(packing, a_replay_runs_every_job_once_with_its_own_time_and_within_the_task
   const std::vector<PackJob> jobs = make_library(500);
   const PackPlan plan = plan_packs(jobs, {1, 8, 1.0}, {1.0, 1e9, 1000, 4});
   ASSERT_EQ(plan.tasks.size(), 1u);
-  // Predictions are wrong by up to two either way.
+  // Predictions are wrong by up to a factor of two.
   std::mt19937 random(7);
   std::uniform_real_distribution<double> error(-1.0, 1.0);
   std::vector<double> true_s;
