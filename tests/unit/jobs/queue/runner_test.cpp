@@ -233,11 +233,11 @@ class Scene {
   std::string events_;
 };
 
-TEST(Runner, jobs_that_go_well_are_done) {
+TEST(Runner, jobs_without_failures_are_done) {
   for (int jobs = 1; jobs <= 6; ++jobs) Scene(jobs, 1).finish();
 }
 
-TEST(Runner, ends_each_job_once_in_any_random_order_of_events) {
+TEST(Runner, every_job_ends_once_under_random_events) {
   constexpr int kOrders = 3000, kLength = 40;
   for (int seed = 0; seed < kOrders && !testing::Test::HasFailure(); ++seed) {
     SCOPED_TRACE(seed);
@@ -252,7 +252,7 @@ TEST(Runner, ends_each_job_once_in_any_random_order_of_events) {
   }
 }
 
-TEST(Runner, ends_each_job_once_in_every_short_order_of_events) {
+TEST(Runner, every_job_ends_once_under_all_short_event_sequences) {
   constexpr int kLength = 4;
   int orders = 1;
   for (int i = 0; i < kLength; ++i) orders *= kEvents - 2;  // without disk and starts

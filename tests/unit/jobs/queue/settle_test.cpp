@@ -42,14 +42,14 @@ class Settle : public testing::Test {
   Registry registry_;
 };
 
-TEST_F(Settle, a_cancelled_job_says_what_it_was_and_why) {
+TEST_F(Settle, reason_of_a_cancelled_job) {
   EXPECT_EQ(cancel(JobState::queued, 0, ""), "cancelled before it ran");
   EXPECT_EQ(cancel(JobState::queued, 1, ""), "cancelled before it resumed");
   EXPECT_EQ(cancel(JobState::waiting, 2, "rank 1 was killed"), "cancelled while it waited: rank 1 was killed");
   EXPECT_EQ(cancel(JobState::failed, 4, "the mesh is bad"), "cancelled after it had failed: the mesh is bad");
 }
 
-TEST_F(Settle, a_retry_and_what_is_asked_with_it_are_one_change) {
+TEST_F(Settle, retry_with_options_is_one_change) {
   // A job with a valid id, which retry checks.
   const job::JobSpec job = job::parse_job(
       R"({"body": {"shape": "bar", "length_m": 0.2, "width_m": 0.03, "thickness_m": 0.01, "nodes": 600},
@@ -68,13 +68,13 @@ TEST_F(Settle, a_retry_and_what_is_asked_with_it_are_one_change) {
   EXPECT_EQ(registry_.find(id)->resources.ranks, 7);
 }
 
-TEST_F(Settle, a_job_whose_folder_is_of_another_is_not_retried) {
+TEST_F(Settle, job_with_the_folder_of_another_is_not_retried) {
   put(JobState::failed, 4, "rank 1 was killed");  // id without a request
   EXPECT_FALSE(queue::retry(store_, registry_, make_id(1)).is_done);
   EXPECT_EQ(registry_.find(make_id(1))->state, JobState::failed);
 }
 
-TEST_F(Settle, a_process_that_was_not_started_for_the_row_gets_no_signal) {
+TEST_F(Settle, unrelated_process_gets_no_signal) {
   queue::LocalLauncher launcher(store_, {});
   Job job{make_id(1)};
   job.token = store::make_random_name();

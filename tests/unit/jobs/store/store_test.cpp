@@ -29,7 +29,7 @@ unsigned mode_of(const fs::path& path) {
   return ::stat(path.c_str(), &info) == 0 ? info.st_mode & 07777U : 0;
 }
 
-TEST(Store, a_bank_is_published_whole_and_read_only) {
+TEST(Store, published_bank_is_complete_and_read_only) {
   const Folder folder;
   const store::Store store = store::Store::open(folder / "store");
   store::Temporary made = store.make_temporary();
@@ -48,7 +48,7 @@ TEST(Store, a_bank_is_published_whole_and_read_only) {
   EXPECT_TRUE(fs::is_empty(folder / "store/tmp"));
 }
 
-TEST(Store, the_second_of_two_publications_is_no_error_and_changes_nothing) {
+TEST(Store, second_publication_changes_nothing) {
   const Folder folder;
   const store::Store store = store::Store::open(folder / "store");
   for (const char* text : {"first", "second"}) {
@@ -59,7 +59,7 @@ TEST(Store, the_second_of_two_publications_is_no_error_and_changes_nothing) {
   EXPECT_EQ(tests::read_all(store.bank_folder(kId) / store::kBankFile), "first");
 }
 
-TEST(Store, of_eight_processes_that_publish_at_once_one_wins_and_nothing_is_left) {
+TEST(Store, concurrent_publications_by_eight_processes) {
   const Folder folder;
   const store::Store store = store::Store::open(folder / "store");
   std::vector<pid_t> children;
@@ -92,7 +92,7 @@ TEST(Store, of_eight_processes_that_publish_at_once_one_wins_and_nothing_is_left
   EXPECT_TRUE(fs::is_empty(folder / "store/tmp"));
 }
 
-TEST(Store, another_folder_is_not_taken_for_a_store) {
+TEST(Store, other_folders_are_refused) {
   const Folder folder;
   folder.write("home/letter.txt", "dear");
   EXPECT_THROW(store::Store::open(folder / "home"), InputError);
@@ -110,7 +110,7 @@ TEST(Store, another_folder_is_not_taken_for_a_store) {
   }
 }
 
-TEST(Store, what_is_no_id_in_its_folders_is_passed_over) {
+TEST(Store, other_names_in_its_folders_are_skipped) {
   const Folder folder;
   const store::Store store = store::Store::open(folder / "store");
   fs::create_directories(folder / "store/banks/aa/not-an-id");
@@ -118,7 +118,7 @@ TEST(Store, what_is_no_id_in_its_folders_is_passed_over) {
   EXPECT_TRUE(store.list_banks().empty());
 }
 
-TEST(Store, a_store_of_a_group_is_writable_by_it_whatever_the_umask) {
+TEST(Store, group_store_is_writable_with_any_umask) {
   const Folder folder;
   fs::create_directory(folder / "store");
   ::chmod((folder / "store").c_str(), 02775);
@@ -134,7 +134,7 @@ TEST(Store, a_store_of_a_group_is_writable_by_it_whatever_the_umask) {
   EXPECT_EQ(status, 0);
 }
 
-TEST(Store, what_is_removed_follows_no_link_inside) {
+TEST(Store, removal_does_not_follow_links) {
   const Folder folder;
   const store::Store store = store::Store::open(folder / "store");
   folder.write("victim/thesis.tex", "important");
@@ -148,7 +148,7 @@ TEST(Store, what_is_removed_follows_no_link_inside) {
   EXPECT_EQ(tests::read_all(folder / "victim/thesis.tex"), "important");
 }
 
-TEST(Store, a_bank_that_is_no_longer_what_was_published_is_found) {
+TEST(Store, damaged_bank_is_detected) {
   const auto spoil = [](const std::function<void(const fs::path&)>& act, store::Look look, bool keeps_time) {
     const Folder folder;
     const store::Store store = store::Store::open(folder / "store");
@@ -179,7 +179,7 @@ TEST(Store, a_bank_that_is_no_longer_what_was_published_is_found) {
   EXPECT_TRUE(spoil(flip, store::Look::full, true));
 }
 
-TEST(Store, a_quota_that_is_full_is_a_full_disk) {
+TEST(Store, full_quota_is_a_full_disk) {
   for (const int error : {ENOSPC, EDQUOT}) {
     EXPECT_TRUE(base::is_full_error(error));
     try {
@@ -197,7 +197,7 @@ TEST(Store, a_quota_that_is_full_is_a_full_disk) {
             store::is_disk_full(folder.path()));  // only the type counts
 }
 
-TEST(Store, a_file_system_without_locks_and_a_limit_of_files_are_named) {
+TEST(Store, messages_for_missing_locks_and_file_size_limits) {
   for (const auto& [error, words] : {std::pair{ENOLCK, "this file system keeps no locks"}, {EFBIG, "ulimit -f"}}) {
     try {
       store::throw_errno("/some/file", "lock", error);
@@ -209,7 +209,7 @@ TEST(Store, a_file_system_without_locks_and_a_limit_of_files_are_named) {
   }
 }
 
-TEST(Store, names_of_temporary_folders_are_known_again) {
+TEST(Store, names_of_temporary_folders) {
   const Folder folder;
   const store::Store store = store::Store::open(folder / "store");
   store::Temporary made = store.make_temporary();
@@ -219,7 +219,7 @@ TEST(Store, names_of_temporary_folders_are_known_again) {
     EXPECT_FALSE(store::Store::is_temporary_name(name)) << name;
 }
 
-TEST(Store, another_user_without_rights_hears_whose_it_is) {
+TEST(Store, user_without_rights_gets_the_owner) {
   if (::geteuid() != 0) GTEST_SKIP() << "only root becomes another user";
   const Folder folder;
   ::chmod(folder.path().c_str(), 0755);

@@ -9,7 +9,7 @@
 namespace carillon::explore {
 namespace {
 
-TEST(Names, safe_in_files_and_addresses) {
+TEST(PageNames, safe_in_files_and_addresses) {
   EXPECT_EQ(make_name("bar-1_a.hdf"), "bar-1_a.hdf");
   for (const char* text : {"", ".", "../x", "a/b", "%2e", "\xc3\xa4", "..."}) {
     const std::string name = make_name(text);
@@ -23,7 +23,7 @@ TEST(Names, safe_in_files_and_addresses) {
   EXPECT_EQ(cut_name("a" + accents), ("a" + accents).substr(0, 99));
 }
 
-TEST(Files, copied_compressed_and_counted) {
+TEST(PageFiles, copied_compressed_and_counted) {
   const tests::Folder folder;
   folder.write("from/a/b.txt", std::string(10000, 'x'));
   put_folder(folder / "from", folder / "to");

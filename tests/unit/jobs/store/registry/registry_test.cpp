@@ -27,7 +27,7 @@ void submit(const store::Store& store, Registry& registry, int number) {
   registry.submit({make_submission(number)});
 }
 
-TEST(Registry, a_job_that_is_submitted_twice_has_one_row) {
+TEST(Registry, job_submitted_twice_has_one_row) {
   const Folder folder;
   const store::Store store = store::Store::open(folder / "store");
   Registry registry = Registry::open(store, be_silent);
@@ -74,7 +74,7 @@ TEST(Registry, every_job_is_claimed_once_by_eight_processes) {
   for (const Job& job : Registry::open(store, be_silent).list()) EXPECT_EQ(job.attempts, 1);
 }
 
-TEST(Registry, only_what_is_ready_is_handed_out) {
+TEST(Registry, only_ready_jobs_are_claimed) {
   const Folder folder;
   const store::Store store = store::Store::open(folder / "store");
   Registry registry = Registry::open(store, be_silent);
@@ -96,7 +96,7 @@ TEST(Registry, only_what_is_ready_is_handed_out) {
   EXPECT_EQ(names, "1.json 2.json 4.json ");
 }
 
-TEST(Registry, what_is_done_is_never_claimed) {
+TEST(Registry, done_jobs_are_not_claimed) {
   const Folder folder;
   const store::Store store = store::Store::open(folder / "store");
   Registry registry = Registry::open(store, be_silent);
@@ -106,7 +106,7 @@ TEST(Registry, what_is_done_is_never_claimed) {
   EXPECT_EQ(registry.find(make_id(1))->state, JobState::done);
 }
 
-TEST(Registry, prefixes_find_jobs_and_nothing_else_does) {
+TEST(Registry, find_by_prefix) {
   const Folder folder;
   const store::Store store = store::Store::open(folder / "store");
   Registry registry = Registry::open(store, be_silent);
@@ -117,7 +117,7 @@ TEST(Registry, prefixes_find_jobs_and_nothing_else_does) {
   EXPECT_EQ(registry.list().size(), 40u);
 }
 
-TEST(Registry, is_brought_up_to_date_with_the_store) {
+TEST(Registry, opening_reconciles_with_the_store) {
   const Folder folder;
   const store::Store store = store::Store::open(folder / "store");
   {
@@ -135,7 +135,7 @@ TEST(Registry, is_brought_up_to_date_with_the_store) {
   EXPECT_NE(registry.find(make_id(2))->reason.find("submit the job again"), std::string::npos);
 }
 
-TEST(Registry, a_job_that_a_process_works_on_is_running_whatever_was_forgotten) {
+TEST(Registry, job_with_a_live_attempt_is_running) {
   const Folder folder;
   const store::Store store = store::Store::open(folder / "store");
   make_work(store, make_submission(1));
@@ -155,7 +155,7 @@ TEST(Registry, a_job_that_a_process_works_on_is_running_whatever_was_forgotten) 
   EXPECT_EQ(Registry::open(store, be_silent).find(make_id(1))->state, JobState::queued);
 }
 
-TEST(Registry, a_reader_without_write_access_sees_the_states_of_the_folders) {
+TEST(Registry, read_only_registry) {
   const Folder folder;
   std::string wanted;
   {
@@ -271,7 +271,7 @@ TEST(Registry, hostile_names_stay_text) {
   EXPECT_EQ(again.find_last_submission("/a/'; drop table jobs; --")->request.id, make_id(1).text());
 }
 
-TEST(SubmissionLog, cut_at_any_byte_costs_no_more_than_the_line_that_was_cut) {
+TEST(SubmissionLog, truncation_loses_only_the_last_line) {
   const Folder folder;
   const store::Store store = store::Store::open(folder / "store");
   std::vector<registry::Submission> all{make_submission(1), make_submission(2), make_submission(3)};
