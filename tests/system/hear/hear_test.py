@@ -257,7 +257,7 @@ class Hear(unittest.TestCase):
         (self.folder / "rod.obj").write_text(make_rod())
         wish = ("rod.obj", "--scale", 1)
         said = self.call("hear", "-q", *wish, "-o", "smooth", "--accuracy", 20)  # applies to the bars, without facets in doubt
-        for words in ("+-facets", "facets in doubt", "--facets takes them for planes"):
+        for words in ("+-facets", "facets in doubt", "--facets declares planes"):
             self.assertIn(words, said)
         info = subprocess.run([BIN / "carillon-bank", "info", "--json", self.folder / "smooth/rod-steel.hdf"], capture_output=True)
         smooth = sorted(json.loads(info.stdout)["modes"], key=lambda mode: mode["corrected_frequency_hz"])
@@ -298,7 +298,7 @@ class Hear(unittest.TestCase):
         self.refuse(".", contains=(".: a folder",))
         for name, words in (
             ("s.json", "a scene (play it: carillon-render"),
-            ("b.hdf", "a bank, by its name"),
+            ("b.hdf", "by its name a bank"),
             ("c.3ds", "convert other formats first"),
         ):
             (self.folder / name).write_text("{}")
@@ -319,7 +319,7 @@ class Hear(unittest.TestCase):
         self.refuse("ball.off", "--scale", "1e-9", contains=("--scale",))
         self.refuse("ball.off", "--height", "0.1", "--scale", "0.001", contains=("exclude each other",))
         self.refuse("ball.off", "--length", "1", contains=("--length", "--shape"))
-        self.refuse("ball.off", "--material", "steel,steel", contains=("asked for twice",))
+        self.refuse("ball.off", "--material", "steel,steel", contains=("given twice",))
         self.refuse("far.off", contains=("far.off", "--height"))
         self.refuse("tiny.off", "--scale", "1", "--material", "alumina", contains=("no mode from 20 to 20000 Hz", "larger"))
         self.refuse("--shape", "bar", "--scale", "1", contains=("--scale",))
@@ -357,7 +357,7 @@ class Hear(unittest.TestCase):
         environment = os.environ | {"HOME": str(self.folder), "TMPDIR": str(temporary)}
         with subprocess.Popen(words, cwd=self.folder, env=environment, stderr=subprocess.PIPE, text=True) as run:
             for line in run.stderr:
-                if "finding the modes" in line:
+                if "computing the modes" in line:
                     break
             run.send_signal(signal.SIGINT)
             run.stderr.read()

@@ -140,7 +140,7 @@ class Path(Bench):
         said = self.ask("status")
         self.assertTrue(said["read_only"])
         self.assertEqual({job["name"]: (job["id"], job["state"], job["reason"], job["bank"]) for job in said["jobs"]}, wanted)
-        self.assertIn("may only be read", self.run_it("status").stderr)
+        self.assertIn("read-only store", self.run_it("status").stderr)
         self.run_it("status", "--watch", done)
         self.assertFalse(self.ask("explain", failed)["would_run"])
         self.assertTrue(self.run_it("report", done, "--no-pictures").stdout.strip().endswith("report.html"))
@@ -353,7 +353,7 @@ class Strangers(Bench):
         self.assertFalse((self.folder / "pwned").exists())
         self.assertEqual(self.ask("status", files[1])["jobs"][0]["state"], "queued")
         self.refuse("submit", self.folder / ("y" * 4096 + ".json"), says="too long")
-        self.refuse("status", "../../x", says="no job of this store")
+        self.refuse("status", "../../x", says="not a job of this store")
         self.refuse("log", "../" * 20 + "etc/passwd", says="passwd:1: ")
         self.refuse("get", "%", says="neither")
 
@@ -383,7 +383,7 @@ class Strangers(Bench):
 
     def test_folders_and_manifests(self):
         (self.folder / "empty").mkdir()
-        self.refuse("submit", "empty", says="no job in this folder")
+        self.refuse("submit", "empty", says="no jobs in this folder")
         self.write("jobs/a.json", make_job(max_modes=1))
         self.write("jobs/b.json", make_job(max_modes=2))
         self.write("jobs/b.hdf.resolved.json", "{}")
@@ -416,7 +416,7 @@ class Strangers(Bench):
         (self.folder / "letters").mkdir()
         (self.folder / "letters/dear.txt").write_text("dear")
         self.store = self.folder / "letters"
-        self.refuse("status", says="no store of Carillon")
+        self.refuse("status", says="not a Carillon store")
 
     @unittest.skipUnless(os.geteuid() == 0, "mounting needs root")
     def test_a_full_disk_is_a_clear_error_and_nothing_is_half_written(self):

@@ -270,7 +270,7 @@ def killed_before_publication(service):
     shutil.copy(solved, service.store / "work" / identity[:2] / identity / "bank.hdf")
     check(service.wait_end(service.run()) == 0, "carillon run ends badly")
     check(service.job(identity)["state"] == "done", f"{service.job(identity)}")
-    check("solved by an attempt that ended before it was published" in service.call("log", identity), "no log")
+    check("computed by an attempt that ended before publication" in service.call("log", identity), "no log")
     check(service.bank(identity).read_bytes() == solved.read_bytes(), "it was solved again")
     service.check_nothing_left()
 

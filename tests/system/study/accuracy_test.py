@@ -207,7 +207,7 @@ class Study(unittest.TestCase):
             ("--only", "element"): "elements",
             ("--on", "bunny", "--surface", "none.obj"): "none.obj",
             ("--bin", empty): "--bin",
-            ("-o", "file"): "cannot be made",
+            ("-o", "file"): "cannot create folder",
             ("--repeats", "0"): "repeats",
             ("--fast",): "--fast",
             ("--timeout", "-1"): "above 0",
