@@ -9,14 +9,27 @@
 #include <algorithm>
 #include <optional>
 
-#include "jobs/store/outcome/policy.hpp"
 #include "jobs/queue/repair.hpp"
+#include "jobs/store/outcome/policy.hpp"
 
 namespace carillon::queue {
 namespace {
 
 using registry::Job;
 using registry::JobState;
+
+/// The end of the attempt of this row.
+outcome::Outcome find_outcome(const Disk& disk, const Job& job) {
+  if (std::optional<outcome::Outcome> outcome = disk.read_outcome(job.id); outcome && outcome->token == job.token) return *outcome;
+  outcome::Outcome outcome = outcome::make_killed(job.token);
+  if (disk.is_full(nullptr)) {
+    outcome.cause = outcome::Cause::disk_full;
+    outcome.reason = "the disk of the store is full, and the outcome of the attempt could not be written";
+  }
+  return outcome;
+}
+
+}  // namespace
 
 void end(Job& job, JobState state, const std::string& reason) {
   job.state = state;
@@ -32,18 +45,6 @@ void wait(Job& job, double delay_s, const std::string& reason, const Clock& cloc
   job.ready_boot_id = clock.get_boot_id();
 }
 
-/// The end of the attempt of this row.
-outcome::Outcome find_outcome(const Disk& disk, const Job& job) {
-  if (std::optional<outcome::Outcome> outcome = disk.read_outcome(job.id); outcome && outcome->token == job.token) return *outcome;
-  outcome::Outcome outcome = outcome::make_killed(job.token);
-  if (disk.is_full(nullptr)) {
-    outcome.cause = outcome::Cause::disk_full;
-    outcome.reason = "the disk of the store is full, and the outcome of the attempt could not be written";
-  }
-  return outcome;
-}
-
-/// Changes the row of `job` unless another process has; true if changed.
 bool change_running(registry::JobTable& table, const Job& job, const std::function<void(Job&)>& change, std::vector<Job>* changed) {
   return table.update(job.id, [&](Job& row) {
     if (row.state != JobState::running || row.token != job.token) return false;
@@ -52,8 +53,6 @@ bool change_running(registry::JobTable& table, const Job& job, const std::functi
     return true;
   });
 }
-
-}  // namespace
 
 bool ask_to_stop(const Environment& at, const Job& job) {
   const std::optional<outcome::Attempt> attempt = at.disk.read_attempt(job.id);

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "jobs/store/outcome/outcome.hpp"
 #include "jobs/queue/environment.hpp"
+#include "jobs/store/outcome/outcome.hpp"
 #include "jobs/store/registry/registry.hpp"
 #include "jobs/store/store.hpp"
 
@@ -25,6 +25,16 @@ AttemptState find_attempt_state(const Environment& at, const registry::Job& job)
 
 /// Asks the attempt of a running row to save and stop. False: not reachable.
 bool ask_to_stop(const Environment& at, const registry::Job& job);
+
+/// Changes the row of a running job unless its attempt is another one by now, and appends it to `changed` (may be null). True if changed.
+bool change_running(registry::JobTable& table, const registry::Job& job, const std::function<void(registry::Job&)>& change,
+                    std::vector<registry::Job>* changed);
+
+/// Ends a row in this state.
+void end(registry::Job& job, registry::JobState state, const std::string& reason);
+
+/// Queued, or waiting for `delay_s` of boot time.
+void wait(registry::Job& job, double delay_s, const std::string& reason, const Clock& clock);
 
 /// Changes a row by the outcome of its attempt: done, failed, cancelled (if requested), waiting or queued.
 void apply(registry::Job& job, const outcome::Outcome& outcome, const Clock& clock);

@@ -61,11 +61,8 @@ void remove_submitted_job(const store::Store& store, const store::Id& id) {
 
 /// queue::apply(). After an end for lack of memory, predicted memory is raised; memory requested by the user is not.
 void apply(Job& row, const outcome::Outcome& outcome, bool has_asked_memory) {
-  if (outcome.cause == outcome::Cause::memory && has_asked_memory && !row.cancel_wanted) {
-    row.state = JobState::failed;
-    row.reason = outcome.reason + "; request more by \"resources\": {\"memory_gb\": ...} in the job";
-    return;
-  }
+  if (outcome.cause == outcome::Cause::memory && has_asked_memory && !row.cancel_wanted)
+    return queue::end(row, JobState::failed, outcome.reason + "; request more by \"resources\": {\"memory_gb\": ...} in the job");
   const double given_gb = row.given.memory_gb;
   queue::apply(row, outcome, queue::LocalClock());
   if (outcome.cause == outcome::Cause::memory)
@@ -203,24 +200,17 @@ void Engine::submit_packed(registry::Registry& registry, const Machine& machine,
 }
 
 void Engine::submit(registry::Registry& registry, const Batch& batch, const Rows& jobs, const Packed* packed, Rows& changed) {
-  const auto change = [&](const Job& job, const std::function<void(Job&)>& act) {
-    registry.update(job.id, [&](Job& row) {
-      if (row.state != JobState::running || row.token != job.token) return false;
-      act(row);
-      changed.push_back(row);
-      return true;
-    });
-  };
+  const auto change = [&](const Job& job, const std::function<void(Job&)>& act) { queue::change_running(registry, job, act, &changed); };
   const auto give_up = [&](JobState state, const std::string& reason, double delay_s = 0.0) {
     for (const Job& job : jobs) {
       remove_submitted_job(store_, job.id);
       change(job, [&](Job& row) {
-        make_queued(row, reason);
-        row.state = row.cancel_wanted ? JobState::cancelled : state;
+        row.slurm_job.clear();
         row.attempts -= 1;
-        row.ready_boot_s = base::get_boot_s() + delay_s;
-        row.ready_boot_id = process::find_boot();
-        if (row.state == JobState::failed || row.state == JobState::cancelled) row.ended_unix_s = registry::find_unix_seconds();
+        if (row.cancel_wanted || state == JobState::failed)
+          queue::end(row, row.cancel_wanted ? JobState::cancelled : state, reason);
+        else
+          queue::wait(row, delay_s, reason, queue::LocalClock());
       });
     }
     remove_batch_folder(batch.root, batch.name);
@@ -424,13 +414,10 @@ void Engine::settle_ended(registry::Registry& registry, const Job& job, const Su
     remove_submitted_job(store_, job.id);
     row.slurm_job.clear();
     row.attempts += seen && !is_shared ? seen->restarts : 0;
-    row.ended_unix_s = registry::find_unix_seconds();
     if (is_done) {
-      row.state = JobState::done;
-      row.reason.clear();
+      queue::end(row, JobState::done, "");
     } else if (judgement.is_cancelled || (row.cancel_wanted && state == PackedState::waits)) {
-      row.state = JobState::cancelled;
-      row.reason = row.cancel_wanted ? "cancelled" : "cancelled in Slurm (scancel)";
+      queue::end(row, JobState::cancelled, row.cancel_wanted ? "cancelled" : "cancelled in Slurm (scancel)");
     } else if (state == PackedState::waits && has_begun(store_.root(), submitted)) {
       // The end of the task is not a failure of a job that had not begun.
       make_queued(row, "its Slurm task ended before it began: " + judgement.outcome.reason);
