@@ -1,7 +1,7 @@
 """`carillon study advise BODY --cents 5 [--seconds 10]`: recommends a setting, predicts its error and cost, and reports the result.
 
-Bodies of the study are predicted from its measurements, others from coarse solves (forecast.Probe). CPU seconds are scaled to this machine by
-one small solve.
+Bodies of the study are predicted from its measurements, others from coarse solves (forecast.Probe). CPU seconds are scaled to this machine
+by one small solve.
 """
 import argparse
 import contextlib

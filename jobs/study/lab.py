@@ -27,7 +27,7 @@ class Mesh:
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """One job to measure. job: without "bank", with absolute paths; options: solver options after "--"; environment: pairs (name, value)."""
+    """A job to measure. job: without "bank", with absolute paths; options: solver options after "--"; environment: (name, value) pairs."""
 
     name: str
     job: dict = dataclasses.field(hash=False)

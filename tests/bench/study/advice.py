@@ -1,5 +1,5 @@
-"""Section: the recommendation. For every default of the program the figure that chose it, and what the next stricter and the next looser
-would cost and bring; and the measurements that `carillon study advise` predicts from (advice.json), written again by a study."""
+"""Section: recommendation. Justifies every default by its figures and those of the next stricter and looser setting; also writes the
+measurements behind `carillon study advise` (advice.json)."""
 import json
 import os
 import statistics
@@ -18,12 +18,12 @@ from section import Section
 from errors import InputError
 
 PROGRAMS = solver.PROGRAMS
-# A job that leaves all to the program; its resolved form says what today's defaults are.
+# A job without settings; its resolved form shows the current defaults.
 PLAIN = {
     "body": {"shape": "bar"},
     "material": {"young_modulus_pa": 70e9, "poisson_ratio": 0.33, "density_kg_m3": 2700, "damping": {"rayleigh": {}}},
 }
-# Why a default is dearer than what this study can distinguish from it.
+# Why a default costs more than settings that this study cannot distinguish from it.
 REASONS = {
     "silence_pa": (
         "a scene may be played with any gain, and what sleeps costs nothing from then on: the saving is that of the last of a decay"
@@ -33,9 +33,9 @@ REASONS = {
     "sample_rate_hz": "it is that of sound cards",
 }
 TRAINED_EAR, SEMITONE = 5.0, 100.0  # cents
-START_DECIDES = 1.25  # the same on meshes so small that starting weighs as much as solving
-WORTH_MS = 10.0  # of CPU for a second of sound: a hundredth of a core
-LITTLE = 1.1  # times the CPU seconds: what is not worth a choice
+START_DECIDES = 1.25  # on small meshes, where start-up time matters
+WORTH_MS = 10.0  # CPU per second of sound: 1 % of a core
+LITTLE = 1.1  # ratios of CPU time below this are insignificant
 HEAD = ("default", "today", "the figure that chose it", "the next stricter", "the next looser", "does today's agree")
 CALIBRATION = {
     "body": {"shape": "bar", "length_m": 0.3, "width_m": 0.03, "thickness_m": 0.012, "nodes": 4000},
@@ -46,14 +46,14 @@ CALIBRATION = {
 
 
 def name_element(body, kind):
-    """As advice.json has it: T10 are as good as the body lets them be, and "T10 straight" are those that could have been curved."""
+    """Element name in advice.json: "T10" is the best T10 of the body; "T10 straight" means straight where curved was possible."""
     if kind.element == "T4":
         return "T4" if kind.mass == "consistent" else "T4 lumped"
     return "T10" if kind.curved or not body.round else "T10 straight"
 
 
 def list_samples(body, solves):
-    """(rows of advice.json for one body, its Truth)."""
+    """(advice.json rows of one body, its Truth)."""
     truth, _ = elements.find_truth(body, solves)
     doubt = max(cents.to_cents(1 + doubt, 1) for doubt in truth.uncertainty)
     rows = []
@@ -78,7 +78,7 @@ def list_samples(body, solves):
 
 
 def make_content(lab, bodies, facts):
-    """advice.json: raw measurements; what follows from them is calculated when they are read (forecast.Advice)."""
+    """advice.json: raw measurements only; forecast.Advice derives the rest."""
     solves = elements.measure(lab, bodies)
     calibration = lab.measure([Case("calibration", CALIBRATION)], 3)["calibration"]
     content = {
@@ -96,12 +96,12 @@ def make_content(lab, bodies, facts):
         content["bodies"][body.name], truth = list_samples(body, solves[body.name])
         if not body.truth:
             content["truths"][body.name] = {"freq_hz": truth.freq_hz, "uncertainty": truth.uncertainty}
-    forecast.Advice(content)  # it can be read
+    forecast.Advice(content)  # check that it can be read
     return content
 
 
 def check_path(path):
-    """InputError where write() could not write."""
+    """Raises InputError if write() could not write."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -111,8 +111,7 @@ def check_path(path):
 
 
 def write(lab, bodies, path):
-    """Writes what `carillon study advise --advice FILE` reads; what the sections measured is kept, so this runs little more than the
-    calibration."""
+    """Writes the file of `carillon study advise --advice FILE`. Solves of other sections are cached, so mostly the calibration runs."""
     facts = solver.find_facts(lab, bodies)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -138,8 +137,8 @@ def find_best_t10(body):
 
 
 def find_costs(results, level):
-    """{kind or "T10": {body: CPU seconds}} for the worst mode within so many cents, of bodies whose truth is known so well; "T10" are those
-    that suit the body."""
+    """{kind or "T10": {body: CPU seconds}} for the worst mode within so many cents, of bodies with a sufficiently known truth; "T10" is
+    the best T10 of the body."""
     costs = {}
     for body, points, truth in results:
         for kind in body.get_kinds() if cents.is_known(truth, level) else ():
@@ -237,7 +236,7 @@ def recommend_mass(lab, bodies, results, today):
 
 
 def find_today(lab):
-    """{"element", "mass", "tolerance", "method", "factorisation", "nodes"}: what the program takes where a job says nothing."""
+    """Defaults of the program: {"element", "mass", "tolerance", "method", "factorisation", "nodes"}."""
     solve = lab.measure([Case("a job that says nothing", PLAIN)], 1)["a job that says nothing"]
     job = json.loads(solve.bank.with_name(solve.bank.name + ".resolved.json").read_text())
     return {"element": job["element"], "mass": job["mass"], "nodes": round(solve.nodes, -3), **job["solver"]}
@@ -335,8 +334,8 @@ def recommend_ranks(facts):
 
 
 def recommend_knob(knob, turns):
-    """A default of the runtime, by what the section on it measured. One looser setting that does not differ audibly is the distance that a
-    default keeps, since other scenes are more sensitive; of more, those count that would save a hundredth of a core."""
+    """Judges a default of the runtime. One inaudibly looser setting is a wanted margin, since other scenes are more sensitive; further ones
+    count only if they save 1 % of a core."""
     index = next(i for i, turn in enumerate(turns) if turn.setting == knob.default)
     usual = turns[index]
     describe = lambda turn: (
@@ -353,7 +352,7 @@ def recommend_knob(knob, turns):
 
 
 def recommend_modes(results):
-    """All modes of the band in a bank, and 16 bits of a shape's component."""
+    """Judges the defaults of banks: all modes of the band, 16 bits per component of a shape."""
     rows = []
     counts = [row for modes, _ in results.values() for row in modes[1:] if row.kept == "loudest"]
     fewest = {name: found for name, (modes, _) in results.items() if (found := banks.find_fewest(modes, "loudest"))}

@@ -1,5 +1,4 @@
-"""What the air around a body costs: nodes of its skin, wave numbers, orders of its multipoles, as error of the far field against CPU
-seconds of the solve and bytes of the bank."""
+"""Section: radiation. Far-field error against CPU time and bank size, by surface nodes, wave numbers and multipole order."""
 import dataclasses
 import json
 import math
@@ -16,7 +15,7 @@ from errors import RunError
 
 NAME, TITLE = "air", "Air: nodes of the skin, wave numbers, orders"
 PROGRAMS = ("carillon-precompute", "carillon-bank")
-# Two plates of 300 x 200 mm, which no sphere replaces: a thick one on a fine skin, a thin one with many modes.
+# Plates of 300 x 200 mm, far from spherical: a thick one with a fine surface mesh, a thin one with many modes.
 PLATE = {"shape": "plate", "length_m": 0.3, "width_m": 0.2}
 THICK = {"material": "aluminium", "band_hz": [20, 20000]}
 THIN = {"material": "steel", "band_hz": [20, 6000]}
@@ -27,27 +26,27 @@ ERRORS, BEST_DB = ((-21, -30, -40, -50, -60), (-21, -40)), -79
 USUAL_SKIN, USUAL_DB = 4500, -40
 ORDERS = (-4, -2, 0, 2, 4, 6, 8)  # above k R
 NEAR_RADII = 2.0
-BYTES = 4  # of a coefficient
+BYTES = 4  # bytes per coefficient
 WHICH, WHERE = ("median of the modes", "worst mode"), ("far away", "at two radii")
 FIELDS = ("radiation/order", "radiation/freq_hz", "radiation/radius_m", "radiation/scale", "radiation/coefficient")
 SPEED_M_S = 343.0
-LOWEST_DB = -150.0  # what is below counts as the same
+LOWEST_DB = -150.0  # smaller differences count as equal
 
 
 @dataclasses.dataclass
 class Field:
-    """What a bank's modes send out. far[m] (harmonics): coefficients of Y_lm far away; kr[m]: wave number times the radius."""
+    """Radiation of a bank's modes. far[m] (harmonics): far-field coefficients of Y_lm; kr[m]: wave number times radius."""
 
     far: list
     kr: list
-    cpu_s: float  # of the air alone
+    cpu_s: float  # of the radiation solve alone
     unknowns: int
     wave_numbers: int
 
 
 @dataclasses.dataclass
 class Row:
-    """One setting against the best: errors in dB over the modes, (median, worst)."""
+    """One setting against the most accurate: (median, worst) error in dB over the modes."""
 
     setting: int
     field: Field
@@ -56,7 +55,7 @@ class Row:
 
 
 def calc_hankel(order, x):
-    """h_l(x), l = 0 to order: the recurrence upwards, which y_l keeps stable (DLMF 10.51.1)."""
+    """h_l(x), l = 0..order, by upward recurrence, stable for y_l (DLMF 10.51.1)."""
     h = [np.exp(1j * x) / (1j * x)]
     h.append(h[0] * (1.0 / x - 1j))
     for el in range(1, order):
@@ -65,12 +64,12 @@ def calc_hankel(order, x):
 
 
 def find_orders(count):
-    """Of each of so many harmonics, its order l."""
+    """Order l of each harmonic."""
     return np.sqrt(np.arange(count) + 0.5).astype(int)
 
 
 def read_method(lab, bank):
-    """(unknowns, wave numbers) of a bank's air."""
+    """(unknowns, wave numbers) of a bank's radiation solve."""
     child = subprocess.run(
         [str(lab.find_program("carillon-bank")), "info", "--json", str(bank)], capture_output=True, text=True, stdin=subprocess.DEVNULL
     )
@@ -83,7 +82,7 @@ def read_method(lab, bank):
 def read_field(lab, solve):
     arrays = sounds.read_arrays(solve.bank, set(FIELDS))
     orders, scale = arrays["radiation/order"], arrays["radiation/scale"]
-    pressure = arrays["radiation/coefficient"].astype(float) @ np.array([1, 1j])  # on the sphere of radius R, in steps
+    pressure = arrays["radiation/coefficient"].astype(float) @ np.array([1, 1j])  # on the sphere of radius R, in quantization steps
     kr = 2 * math.pi * arrays["radiation/freq_hz"] / SPEED_M_S * float(arrays["radiation/radius_m"].reshape(()))
     ends = np.cumsum((orders + 1) ** 2)
     far = []
@@ -98,19 +97,19 @@ def to_db(ratio):
 
 
 def compare(setting, field, best):
-    """A Row. Harmonics are orthonormal: root mean squares over directions are sums over them."""
+    """Returns a Row. The harmonics are orthonormal, so mean squares over directions are sums of squares."""
     level, pattern = [], []
     for one, true in zip(field.far, best.far):
         size = max(len(one), len(true))
         one, true = (np.pad(c, (0, size - len(c))) for c in (one, true))
-        sign = np.sign(np.real(np.vdot(true, one)))  # of the mode shape, which no solver promises
+        sign = np.sign(np.real(np.vdot(true, one)))  # the sign of a mode shape is arbitrary
         level.append(abs(to_db(np.linalg.norm(one) / np.linalg.norm(true))))
         pattern.append(to_db(np.linalg.norm(sign * one - true) / np.linalg.norm(true)))
     return Row(setting, field, *((statistics.median(errors), max(errors)) for errors in (level, pattern)))
 
 
 def solve_skins(lab):
-    """([Row] of fewer nodes, Field of the whole skin)."""
+    """([Row] of reduced surface meshes, Field of the full one)."""
     quick = lab.quick
     job = {"body": {**PLATE, "thickness_m": 0.01, "nodes": WHOLE_NODES[quick]}, **THICK, "max_modes": THICK_MODES[quick]}
     whole = 20000
@@ -121,7 +120,7 @@ def solve_skins(lab):
 
 
 def solve_errors(lab):
-    """([Row] of larger errors asked for, Field of the smallest)."""
+    """([Row] of larger error tolerances, Field of the smallest)."""
     quick = lab.quick
     job = {"body": {**PLATE, "thickness_m": 0.002, "nodes": THIN_NODES[quick]}, **THIN, "max_modes": THIN_MODES[quick]}
     cases = {
@@ -137,7 +136,7 @@ def make_air(job, skin_nodes, error_db):
 
 
 def cut_orders(field):
-    """[(above k R, bytes of a mode, (median, worst) far away, the same at two radii)] of orders that end so far above k R."""
+    """[(orders above k R, bytes per mode, (median, worst) error in the far field, the same at two radii)]."""
     rows = []
     for above in ORDERS:
         cut, far, near = [], [], []

@@ -1,5 +1,4 @@
-"""What a bank's size buys: modes that are kept and bits of their shapes against what is heard of a rendered hit, the bank's bytes and the
-CPU of the sound."""
+"""Section: bank size. Audible error of a rendered hit, bank bytes and CPU, by number of modes and bits of the shapes."""
 import dataclasses
 import os
 import pathlib
@@ -17,14 +16,14 @@ COUNTS = (800, 400, 200, 100, 50, 20)
 BITS = (14, 12, 10, 8, 6, 4)
 SHIPPED_BITS = 16
 BLOW_N_S = 0.05
-BLOW_S = 1e-4  # hard: it holds all that is heard
-# A block of granite, because many modes are heard of it: 0.27 m^3 that carry shear waves at 2.7 km/s.
+BLOW_S = 1e-4  # hard, so that the hit covers the audible band
+# A block of granite with many audible modes: 0.27 m^3, shear waves at 2.7 km/s.
 GRANITE = {"young_modulus_pa": 50e9, "poisson_ratio": 0.25, "density_kg_m3": 2650, "damping": {"internal_friction": {"tan_phi": 0.003}}}
 
 
 @dataclasses.dataclass(frozen=True)
 class Sounding:
-    """A body that is struck."""
+    """A struck body."""
 
     name: str
     summary: str
@@ -33,18 +32,18 @@ class Sounding:
 
 @dataclasses.dataclass
 class Row:
-    """One reduced bank against the whole one. kept: "loudest", "lowest" or "" (all modes)."""
+    """A reduced bank against the full one. kept: "loudest", "lowest" or "" (all modes)."""
 
     modes: int
     kept: str
     bits: int
     bank_bytes: int
     played: sounds.Played
-    difference: sounds.Difference | None  # None of the whole bank itself
+    difference: sounds.Difference | None  # None for the full bank
 
 
 def make_stone(lab):
-    """The body of many modes."""
+    """The body with many modes."""
     body = {"shape": "box", "length_m": 0.9, "width_m": 0.6, "height_m": 0.5, "nodes": 1500 if lab.quick else 6000}
     return Sounding(
         "stone",
@@ -54,8 +53,8 @@ def make_stone(lab):
 
 
 def make_sounding(lab, body):
-    """A body of the study with all its modes that are heard."""
-    if body.surface:  # a thin wall takes many nodes of second order
+    """A body of the study with all its audible modes."""
+    if body.surface:  # thin walls need many second-order nodes
         kind, nodes = known_bodies.find_kind("T4 consistent" if lab.quick else "T10 curved"), 3000 if lab.quick else 20000
     else:
         kind, nodes = known_bodies.find_kind("T10 curved" if body.round else "T10 straight"), 800 if lab.quick else 3000
@@ -68,21 +67,20 @@ def make_sounding(lab, body):
 
 
 def find_soundings(lab, bodies):
-    """The bodies that are struck: those of --on; of the whole list the bunny and the stone."""
+    """The struck bodies: those of --on; of the whole list, the bunny and the stone."""
     if len(bodies) < len(known_bodies.make_bodies()) - 1:  # the bunny may be missing
         return [make_sounding(lab, body) for body in bodies]
     return [make_sounding(lab, body) for body in bodies if body.surface] + [make_stone(lab)]
 
 
 def solve(lab, soundings):
-    """{name: path of the bank}; each solved once."""
+    """{name: path of the bank}; each is solved once."""
     solves = lab.measure([Case(f"{one.name}, all that is heard", one.job) for one in soundings], repeats=1)
     return {one.name: solves[f"{one.name}, all that is heard"].bank for one in soundings}
 
 
 def make_strikes(bank, times_s, body="body", duration_s=BLOW_S, impulse_n_s=BLOW_N_S):
-    """Blows of one strength along the inward normal, at places far apart: the triangles furthest in as many directions that no symmetry
-    prefers."""
+    """Equal blows along the inward normal at distant points: the extreme triangles in directions that avoid the symmetries."""
     arrays = sounds.read_arrays(bank, {"mesh/vertices", "mesh/triangles"})
     corners = arrays["mesh/vertices"][arrays["mesh/triangles"]]  # (T, 3, 3)
     middles = corners.mean(axis=1)
@@ -107,8 +105,7 @@ def make_strikes(bank, times_s, body="body", duration_s=BLOW_S, impulse_n_s=BLOW
 
 
 def make_scene(lab, bank, struck_by=None, seconds=None, **more):
-    """The body of a bank hangs still, is struck three times, and heard at 1 m. struck_by: the bank that says where, if it is not this
-    one."""
+    """Scene: a suspended body is struck three times, microphone at 1 m. struck_by: the bank that defines the points (default: this one)."""
     seconds = seconds or (1.5 if lab.quick else 3.0)
     centre = sounds.read_arrays(bank, {"rigid/centre_m"})["rigid/centre_m"]
     scene = {
@@ -122,7 +119,7 @@ def make_scene(lab, bank, struck_by=None, seconds=None, **more):
 
 
 def reduce(lab, bank, modes=None, kept="loudest", bits=SHIPPED_BITS):
-    """The path of the bank with fewer modes or coarser shapes, by carillon-bank edit."""
+    """Path of the bank with fewer modes or coarser shapes, by carillon-bank edit."""
     folder = lab.out / "work/banks"
     folder.mkdir(parents=True, exist_ok=True)
     words = (["--modes", modes, "--keep", kept] if modes else []) + (["--shape-bits", bits] if bits < SHIPPED_BITS else [])
@@ -134,7 +131,7 @@ def reduce(lab, bank, modes=None, kept="loudest", bits=SHIPPED_BITS):
 
 
 def measure_reduced(lab, name, bank, wishes):
-    """[Row] of a bank: the whole first, then one for each wish, a dictionary of `modes`, `kept` and `bits`."""
+    """[Row] of a bank: the full one first, then one per wish, a dictionary of `modes`, `kept` and `bits`."""
     files = [(pathlib.Path(bank), {})] + [(reduce(lab, bank, **wish), wish) for wish in wishes]
     scenes = {f"{name}-{number}": make_scene(lab, file, bank) for number, (file, _) in enumerate(files)}
     played = list(sounds.play_all(lab, scenes, 1 if lab.quick else max(3, lab.repeats)).values())
@@ -157,7 +154,7 @@ def count_modes(bank):
 
 
 def measure_modes(lab, name, bank, counts=COUNTS, keeps=("loudest", "lowest")):
-    """[Row]: all modes, then so many of them, the loudest and the lowest. Counts that the bank does not reach are left out."""
+    """[Row]: all modes, then the loudest and the lowest of each count below the number of modes."""
     total = count_modes(bank)
     return measure_reduced(
         lab, f"{name}-modes", bank, [{"modes": count, "kept": kept} for kept in keeps for count in counts if count < total]
@@ -165,7 +162,7 @@ def measure_modes(lab, name, bank, counts=COUNTS, keeps=("loudest", "lowest")):
 
 
 def measure_bits(lab, name, bank, bits=BITS):
-    """[Row]: shapes as they are shipped, then rounded."""
+    """[Row]: shapes as stored, then rounded."""
     return measure_reduced(lab, f"{name}-bits", bank, [{"bits": number} for number in bits])
 
 
@@ -200,7 +197,7 @@ DATA = ("bank_bytes", "cpu_ms_per_s", "cpu_spread", *sounds.DATA)
 
 
 def find_fewest(rows, kept):
-    """The fewest modes of a kind from which on nothing differs audibly; None when even the most are."""
+    """Smallest number of modes of a kind from which on no difference is audible; None without one."""
     fewest = None
     for row in sorted((row for row in rows if row.kept == kept), key=lambda row: -row.modes):
         if row.difference.is_audible:
@@ -210,7 +207,7 @@ def find_fewest(rows, kept):
 
 
 def describe_modes(name, rows):
-    """Sentences about the numbers of modes of one body."""
+    """Sentences on the numbers of modes of one body."""
     whole = rows[0]
     out = []
     for kept in dict.fromkeys(row.kept for row in rows[1:]):
@@ -233,7 +230,7 @@ def describe_modes(name, rows):
 
 
 def describe_lost(name, rows, counts=(800, 200, 50)):
-    """What is lost at a few numbers of modes, one sentence: for the papers' "800 modes or fewer suffice"."""
+    """Sentence on the loss at the papers' numbers of modes ("800 modes or fewer suffice")."""
     parts = []
     for count in counts:
         row = next((row for row in rows if row.modes == count and row.kept == "loudest"), None)
@@ -249,7 +246,7 @@ def describe_lost(name, rows, counts=(800, 200, 50)):
 
 
 def estimate_shipped_db(rows):
-    """The error of 16 bits themselves, by the 6.02 dB that each bit is worth, from the finest rounding that was heard."""
+    """Error of 16 bits, extrapolated from the finest measured rounding by 6.02 dB per bit."""
     finest = max((row for row in rows if row.difference), key=lambda row: row.bits)
     return finest.difference.error_db - 6.0206 * (SHIPPED_BITS - finest.bits)
 
@@ -282,7 +279,7 @@ def add_body(lab, section, one, bank):
 
 
 def describe_bits(name, bits):
-    """What shapes of so many bits are worth, one sentence."""
+    """Sentence on the bits of shapes."""
     shipped = estimate_shipped_db(bits)
     text = (
         f"Rounding shapes to {SHIPPED_BITS} bits, as banks have them, is an error of {shipped:.0f} dB(A) in the {name}'s sound, by the 6 dB"
@@ -306,7 +303,7 @@ def describe_bits(name, bits):
 
 
 def describe_bargain(name, modes, bits):
-    """Whether coarser shapes or fewer modes are the better way to a smaller bank, one sentence; "" where nothing can be compared."""
+    """Sentence on coarser shapes against fewer modes for a smaller bank; "" if there is nothing to compare."""
     byte = next((row for row in bits if row.bits == 8), None)
     fitting = [row for row in modes if row.kept == "loudest" and byte and row.bank_bytes <= byte.bank_bytes]
     if not fitting:
@@ -321,7 +318,7 @@ def describe_bargain(name, modes, bits):
 
 
 def measure_papers(lab, counts=(800, 200, 50)):
-    """([Row], sentence) of the body of many modes: what is lost at the numbers of modes that the papers name."""
+    """([Row], sentence) on the papers' numbers of modes, for the body with many modes."""
     stone = make_stone(lab)
     rows = measure_modes(lab, "stone-papers", solve(lab, [stone])["stone"], counts, ("loudest",))
     return rows, describe_lost("stone", rows, counts)

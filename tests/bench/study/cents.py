@@ -1,4 +1,4 @@
-"""Errors of frequencies in cents, the truth they are compared with, rates, and what so many cents cost."""
+"""Frequency errors in cents, reference values, convergence rates and the cost of an accuracy."""
 import dataclasses
 import math
 import statistics
@@ -13,8 +13,7 @@ def to_cents(freq_hz, true_hz):
 
 @dataclasses.dataclass
 class Point:
-    """One mesh of one kind: what it cost and how far its frequencies are from the truth. Cents: one for each mode, sorted lists compared
-    against each other with their multiplicities."""
+    """Cost and error of one mesh of one kind. cents: one per mode, k-th frequency against k-th, multiplicities included."""
 
     kind: str
     nodes: int
@@ -38,12 +37,12 @@ class Point:
 
     @property
     def edge(self):
-        """Mean edge length in units of the body's size: the cube root of one over the number of elements."""
+        """Mean edge length relative to the body's size: elements^(-1/3)."""
         return self.elements ** (-1 / 3)
 
 
 def make_point(kind, solve, truth):
-    """None when the mesh is so coarse that it has fewer modes than are known."""
+    """None if the mesh has fewer modes than are known."""
     if len(solve.freq_hz) < len(truth.freq_hz):
         return None
     return Point(
@@ -58,18 +57,18 @@ def make_point(kind, solve, truth):
 
 
 def fit_line(x, y):
-    """(intercept, slope) of least squares."""
+    """(intercept, slope) of a least-squares line."""
     mean_x, mean_y = statistics.fmean(x), statistics.fmean(y)
     slope = sum((a - mean_x) * (b - mean_y) for a, b in zip(x, y)) / sum((a - mean_x) ** 2 for a in x)
     return mean_y - slope * mean_x, slope
 
 
 def extrapolate(edges, freq_hz):
-    """(Truth, order): the limit of three or more meshes, edges: their mean edge lengths, freq_hz: [mesh][mode].
+    """(Truth, order): limit of three or more meshes. edges: mean edge lengths; freq_hz: [mesh][mode].
 
-    f(h) = f0 + c h^p by least squares, f0 and c for each mode, one p from 2 to 4 for all (that with the least relative residuals): meshes
-    without a common pattern scatter, and two of them say little of a limit. The uncertainty of a mode is the most of: the distance to the
-    limits by p - 1/2 and p + 1/2, the largest residual, the whole way from the finest mesh to the limit. After Richardson 1911.
+    f(h) = f0 + c h^p by least squares, f0 and c per mode, one p in [2, 4] for all modes (least relative residuals), since unstructured
+    meshes scatter. Uncertainty of a mode: maximum of the distances to the limits for p - 1/2 and p + 1/2, the largest residual, and the
+    distance from the finest mesh to the limit. After Richardson 1911.
     """
     modes = list(zip(*freq_hz))
 
@@ -83,7 +82,7 @@ def extrapolate(edges, freq_hz):
         return sum((residual / limit) ** 2 for limit, residual in fit(power))
 
     low, high = 2.0, 4.0
-    for _ in range(80):  # the misfit has one minimum
+    for _ in range(80):  # the misfit is unimodal
         third = (high - low) / 3
         low, high = (low, high - third) if find_misfit(low + third) < find_misfit(high - third) else (low + third, high)
     power = (low + high) / 2
@@ -96,8 +95,7 @@ def extrapolate(edges, freq_hz):
 
 
 def find_rate(points, truth, find_error=lambda point: point.median):
-    """The power of the edge length with which the error falls over the three finest meshes whose error is clear of the truth's own; None
-    with fewer than two."""
+    """Convergence order over the three finest meshes whose error exceeds the uncertainty of the truth; None with fewer than two."""
     doubt = to_cents(1 + statistics.median(truth.uncertainty), 1)
     clear = [point for point in sorted(points, key=lambda point: point.elements) if find_error(point) > 4 * doubt][-3:]
     fit = scaling.fit_power([point.edge for point in clear], [find_error(point) for point in clear])
@@ -106,8 +104,8 @@ def find_rate(points, truth, find_error=lambda point: point.median):
 
 @dataclasses.dataclass
 class Cost:
-    """CPU seconds for so many cents. how: "measured" (between two meshes), "at most" (the coarsest mesh is better), "extrapolated" (the
-    finest is worse)."""
+    """CPU seconds for an accuracy. how: "measured" (between two meshes), "at most" (the coarsest mesh suffices), "extrapolated" (the finest
+    is worse)."""
 
     cpu_s: float
     how: str
@@ -118,17 +116,16 @@ class Cost:
 
 
 def is_known(truth, cents):
-    """Whether the truth is known well enough, in all its modes, to resolve an error of so many cents."""
+    """True if the truth of every mode is certain enough to resolve an error of so many cents."""
     return to_cents(1 + max(truth.uncertainty), 1) <= cents
 
 
-MIN_GROWTH = 1.2  # of CPU seconds with the number of elements; on small meshes the start of the program hides it
+MIN_GROWTH = 1.2  # exponent of CPU time in the number of elements; start-up time hides it on small meshes
 
 
 def find_cost(points, cents, find_error=lambda point: point.worst):
-    """What one kind of element costs for an error of no more than `cents`, by straight lines in logarithms; beyond the finest mesh with the
-    last error's slope, and seconds that grow at least as the elements to the power MIN_GROWTH. None where it cannot be known: errors do
-    not fall, or are thirty times as large."""
+    """Cost of one element kind for an error of at most `cents`, by log-log interpolation. Beyond the finest mesh: last slope of the error,
+    CPU time growing at least as elements^MIN_GROWTH. None if errors do not fall or the finest is over thirty times as large."""
     curve = []
     for point in sorted(points, key=lambda point: point.cpu_s):
         if not curve or find_error(point) < find_error(curve[-1]):

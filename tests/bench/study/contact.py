@@ -1,5 +1,5 @@
-"""What the knobs of the physics cost and buy, against motions that have a closed form: the step of contacts, the triangles of a body,
-impacts with and without modes; and how deep falling discs are in the ground, by the step."""
+"""Section: physics settings against closed-form motions: contact step, triangles of a body, impacts with and without modes; and the
+penetration of falling discs by step."""
 import json
 import math
 
@@ -18,7 +18,7 @@ NODES = (150, 400, 1000, 3000, 8000)
 QUICK_NODES = (150, 1000)
 USUAL_NODES = 1000
 GRAVITY = 9.81
-ROLLING_RESISTANCE = 1e-3  # of hard on hard, docs/decisions/contact.md
+ROLLING_RESISTANCE = 1e-3  # hard on hard, docs/decisions/contact.md
 STEEL = {"young_modulus_pa": 200e9, "poisson_ratio": 0.3, "density_kg_m3": 7800, "damping": {"internal_friction": {"tan_phi": 4e-4}}}
 TOP = {
     "body": {"shape": "cone", "radius_m": 0.04, "height_m": 0.04, "nodes": 1500},
@@ -39,7 +39,7 @@ DISC = {
     "band_hz": [20, 20000],
     "material": STEEL,
 }
-DISC_TILTS_DEG = (0.2, 1, 3, 8, 20, 45, 70, 89)  # thin bodies that land nearly flat were the deepest
+DISC_TILTS_DEG = (0.2, 1, 3, 8, 20, 45, 70, 89)  # thin bodies landing nearly flat penetrate deepest
 QUICK_TILTS_DEG = (0.2, 20)
 LEAN, SPIN_RAD_S = 0.2, 200.0
 SLOPE = 0.05  # rad
@@ -48,7 +48,7 @@ DATA = ("error", "cpu_ms_per_s", "spread")
 
 
 def run(lab, scenes, repeats=None):
-    """{name: (report, poses of the first body, [CPU ms for a second])}: all in turn, every other time backwards."""
+    """{name: (report, poses of the first body, [CPU ms per second])}; rounds alternate in direction to even out other load."""
     folder = lab.out / "work/contact"
     folder.mkdir(parents=True, exist_ok=True)
     found = {}
@@ -89,12 +89,12 @@ def make_scene(seconds, body, ground, step_s=USUAL_STEP_S, **more):
     } | more
 
 
-# --- a top on its tip
+# --- spinning top
 
 
 def find_top(bank):
-    """(tip in the frame of the mesh, distance of the centre from it, inertia along the axis, inertia across it about the tip, mass) of a
-    cone along z."""
+    """(tip in mesh coordinates, distance from tip to centre of mass, axial inertia, transverse inertia about the tip, mass) of a cone
+    along z."""
     arrays = sounds.read_arrays(bank, {"mesh/vertices", "rigid/centre_m", "rigid/inertia_kg_m2", "rigid/mass_kg"})
     vertices, centre, inertia = arrays["mesh/vertices"], arrays["rigid/centre_m"].reshape(3), arrays["rigid/inertia_kg_m2"].reshape(3, 3)
     mass = float(arrays["rigid/mass_kg"].reshape(-1)[0])
@@ -105,7 +105,7 @@ def find_top(bank):
 
 
 def calc_precession(arm, along, across, mass):
-    """Of the slower steady motion: along s W - across W^2 cos a = m g l."""
+    """Rate of the slower steady precession: along s W - across W^2 cos a = m g l."""
     c = across * math.cos(LEAN)
     return (along * SPIN_RAD_S - math.sqrt((along * SPIN_RAD_S) ** 2 - 4 * c * mass * GRAVITY * arm)) / (2 * c)
 
@@ -130,14 +130,14 @@ def make_top(bank, step_s, seconds=1.0):
 
 
 def calc_top_error(bank, poses):
-    """Of the angle by which the top has precessed, relative."""
+    """Relative error of the precession angle."""
     _, arm, along, across, mass = find_top(bank)
     w, x, y, z = poses[:, 4:8].T
     angle = np.unwrap(np.arctan2(2 * (y * z - w * x), 2 * (x * z + w * y)))
     return abs((angle[-1] - angle[0]) / (calc_precession(arm, along, across, mass) * (poses[-1, 0] - poses[0, 0])) - 1)
 
 
-# --- a ball that rolls
+# --- rolling ball
 
 
 def make_roll(bank, step_s=USUAL_STEP_S, seconds=1.0):
@@ -155,17 +155,17 @@ def make_roll(bank, step_s=USUAL_STEP_S, seconds=1.0):
 
 
 def calc_roll_error(poses):
-    """Of the way, relative to 5/7 (g sin a - c g cos a) t^2 / 2 and that of the speed at the start."""
+    """Relative error of the distance, 5/7 (g sin a - c g cos a) t^2 / 2 plus that of the initial speed."""
     seconds = poses[-1, 0]
     way = 0.2 * seconds + 0.5 * 5 / 7 * GRAVITY * (math.sin(SLOPE) - ROLLING_RESISTANCE * math.cos(SLOPE)) * seconds**2
     return abs((poses[-1, 1] - poses[0, 1]) / way - 1)
 
 
-# --- discs that fall
+# --- falling discs
 
 
 def make_discs(bank, step_s, tilts_deg, seconds=2.0):
-    """Rigid, a metre apart: each is an island of its own."""
+    """Rigid discs a metre apart, each an island of its own."""
     bodies = [
         {
             "name": f"disc {n}",
@@ -184,7 +184,7 @@ def make_discs(bank, step_s, tilts_deg, seconds=2.0):
 
 
 def list_depths(found, steps):
-    """(setting, is it the usual one, largest depth, that at the end [um], [CPU ms a body])"""
+    """(setting, default?, maximum depth, final depth [um], [CPU ms per body])"""
     return [
         (
             f"{step:g}",
@@ -200,7 +200,7 @@ def list_depths(found, steps):
 
 
 def add_table(section, name, rows, caption):
-    """rows: (setting, is it the usual one, error, [CPU ms])"""
+    """rows: (setting, default?, error, [CPU ms])"""
     section.add_table(
         name,
         [

@@ -1,4 +1,4 @@
-"""Corrected frequencies against those of the mesh: how much nearer they are, whether their bars hold, and what accuracy_cents costs."""
+"""Section: corrected frequencies against those of the mesh: gain, validity of the error bars, cost of accuracy_cents."""
 import dataclasses
 import statistics
 
@@ -9,13 +9,13 @@ from lab import Case
 from section import Section
 
 PROGRAMS = elements.PROGRAMS
-GOALS = (20.0, 5.0)  # cents that accuracy_cents is asked for
+GOALS = (20.0, 5.0)  # tested values of accuracy_cents
 QUADRATIC = ("T10 curved", "T10 straight")
 
 
 @dataclasses.dataclass
 class Compared:
-    """One mesh of one kind: errors in cents, k-th against k-th, of the mesh's frequencies and of the corrected ones, and their bars."""
+    """One mesh of one kind: errors in cents, k-th against k-th, of mesh and corrected frequencies, and the error bars."""
 
     kind: str
     nodes: int
@@ -24,16 +24,16 @@ class Compared:
     corrected: list
     mesh_bars: list
     corrected_bars: list
-    doubts: list  # of the truth
+    doubts: list  # uncertainty of the truth
 
     @property
     def ratio(self):
-        """Median error of the corrected frequencies over that of the mesh's."""
+        """Median error of corrected frequencies relative to that of the mesh."""
         mesh, corrected = self.find_median()
         return corrected / mesh
 
     def find_median(self):
-        """(of the mesh's frequencies, of the corrected ones): median error, cents."""
+        """Median error in cents: (mesh, corrected)."""
         return tuple(statistics.median(map(abs, errors)) for errors in (self.mesh, self.corrected))
 
     def find_worst(self):
@@ -44,7 +44,7 @@ class Compared:
 
 
 def compare(kind, solve, truth, mesh_cpu_s):
-    """None when the mesh is so coarse that it has fewer modes than are known."""
+    """None if the mesh has fewer modes than are known."""
     count = len(truth.freq_hz)
     if len(solve.freq_hz) < count:
         return None
@@ -95,12 +95,12 @@ def draw(section, lab, body, found):
 
 
 def add_ratios(section, lab, results):
-    """By element: how much nearer, how long the bars, how many hold."""
+    """By element: gain, length of the error bars, share that holds."""
     rows = [("element", "meshes", "corrected over mesh: median error", "bars: corrected over mesh", "modes", "within their bars")]
     data = [("body", "element", "nodes", "ratio_of_medians", "bars", "modes", "held")]
     for name in dict.fromkeys(one.kind for _, found, _ in results for one in found):
         own = [(body, one) for body, found, _ in results for one in found if one.kind == name]
-        # The truth must resolve what is left.
+        # the truth must resolve the remaining error
         clear = [(body, one) for body, one in own if statistics.median(map(abs, one.corrected)) > 2 * statistics.median(one.doubts)]
         by_body = [
             statistics.median(one.ratio for body, one in clear if body.name == chosen)
@@ -130,7 +130,7 @@ def add_ratios(section, lab, results):
 
 
 def find_shape(body):
-    """The key "body" of a job for a parametric body; None for one that is bent from another or comes from a file."""
+    """The key "body" of a job for a parametric body; None for bent bodies and files."""
     if body.surface or body.change:
         return None
     words = body.words[2:]
@@ -138,7 +138,7 @@ def find_shape(body):
 
 
 def add_goals(section, lab, results):
-    """What accuracy_cents spends, all trials and meshes included, against the cheapest mesh of the study that would just do."""
+    """Cost of accuracy_cents, including trials and meshing, against the cheapest sufficient mesh of the study."""
     cases = {}
     for body, _, truth in results:
         shape = find_shape(body)
@@ -195,7 +195,7 @@ def add_goals(section, lab, results):
 
 
 def make_cost_point(one):
-    """A Point of the mesh's own frequencies, for cents.find_cost()."""
+    """Point of the uncorrected frequencies, for cents.find_cost()."""
     return cents.Point(one.kind, one.nodes, 3 * one.nodes, one.nodes, one.cpu_s, None, one.mesh)
 
 

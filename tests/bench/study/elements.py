@@ -1,4 +1,4 @@
-"""Which element at which size: errors of frequencies against CPU seconds, rates of convergence, and what one cent costs."""
+"""Section: elements. Frequency errors against CPU time, convergence rates, cost of one cent."""
 import collections
 import statistics
 
@@ -12,8 +12,7 @@ LEVELS = ((1, "one cent"), (10, "ten cents"), (100, "a semitone"))
 
 
 def measure(lab, bodies, kinds=None):
-    """{body's name: [(kind, Solve)]}, meshes from coarse to fine; two sizes that give the same mesh count once. kinds: names, all without
-    them."""
+    """{body's name: [(kind, Solve)]}, coarse to fine, identical meshes once. kinds: names (default: all)."""
     cases, order = {}, collections.defaultdict(list)
     for body in bodies:
         lab.say(f"meshing: {body.name}")
@@ -30,7 +29,7 @@ def measure(lab, bodies, kinds=None):
 
 
 def find_truth(body, solves):
-    """(Truth, sentence or ""): the known one, or the limit of its curved T10, on which the sentence says more."""
+    """(Truth, sentence or ""): the known one, or the limit of curved T10 meshes, described by the sentence."""
     if body.truth:
         return body.truth, ""
     finest = sorted((solve for kind, solve in solves if kind.curved), key=lambda solve: solve.elements)
@@ -148,14 +147,14 @@ def add_table(section, body, points, command):
 
 
 def expect_rate(body, kind):
-    """The order of theory: 2p for elements of degree p, 2 where straight sides make another body."""
+    """Theoretical order: 2p for elements of degree p, 2 where straight sides approximate a curved body."""
     if kind.element == "T4":
         return 2
     return 4 if kind.curved or not body.round else 2
 
 
 def describe_cost(points, kinds, truth):
-    """The cheapest element for each level that the truth can resolve, as a sentence; "" without one."""
+    """Sentence: cheapest element for each accuracy that the truth resolves; "" without one."""
     parts = []
     for level, text in reversed([(level, text) for level, text in LEVELS if cents.is_known(truth, level)]):
         costs = {kind.name: cents.find_cost([point for point in points if point.kind == kind.name], level) for kind in kinds}
@@ -167,7 +166,7 @@ def describe_cost(points, kinds, truth):
 
 
 def study_body(section, lab, body, solves):
-    """Chart, table and sentences of one body; returns (points, truth)."""
+    """Adds chart, table and sentences of one body; returns (points, truth)."""
     truth, remark = find_truth(body, solves)
     points = make_points(body, solves, truth)
     command = lab.make_command("elements", "--on", body.name)
@@ -185,7 +184,7 @@ def study_body(section, lab, body, solves):
 
 
 def add_rates(section, lab, results):
-    """The measured rate of every kind on every body against theory."""
+    """Measured against theoretical rate of every kind on every body."""
     rows = [("body", *(f"{kind.name}: measured (theory)" for kind in KINDS))]
     data = [("body", "element", "rate_measured", "rate_theory")]
     gaps = collections.defaultdict(list)
@@ -216,7 +215,7 @@ def add_rates(section, lab, results):
 
 
 def add_costs(section, lab, results):
-    """What one cent, ten cents and a semitone cost, for every body and element, and the sentences of the summary."""
+    """Cost of one cent, ten cents and a semitone by body and element, and the sentences of the summary."""
     rows = [("body", "element", *(f"{text}: CPU s" for _, text in LEVELS))]
     data = [("body", "element", "cents", "cpu_s", "how")]
     cheapest = {level: collections.Counter() for level, _ in LEVELS}
@@ -267,8 +266,7 @@ def add_costs(section, lab, results):
 
 
 def describe_level(text, least, cheapest, count):
-    """What so many cents cost, over all bodies. least: the lowest Cost of each body that has one; cheapest: how often each element has
-    it."""
+    """Cost of an accuracy over all bodies. least: lowest Cost of each body; cheapest: how often each element has it."""
     seconds = [cost.cpu_s for cost in least]
     spread = (
         f"{min(seconds):.2g} to {max(seconds):.2g} CPU s (median {statistics.median(seconds):.2g} s over {len(seconds)} of {count} bodies)"

@@ -1,5 +1,5 @@
-"""What accuracy of large motion costs: elements, steps, sheets and solids of full-order motion as error of a pitch against CPU seconds, and
-the error of the energy that couples modes against its rows."""
+"""Section: large motion. Pitch error of full-order motion against CPU time, by elements, steps, sheets and solids; error of the
+mode-coupling energy against its rows."""
 import dataclasses
 import json
 import math
@@ -16,23 +16,23 @@ PROGRAMS = ("carillon-precompute", "carillon-bank", "carillon-simulate", "carill
 LOSSES = {"damping": {"rayleigh": {"alpha1_s": 1e-9, "alpha2_per_s": 2}}}
 ALUMINIUM = {"young_modulus_pa": 70e9, "poisson_ratio": 0.33, "density_kg_m3": 2700} | LOSSES
 STEEL = {"young_modulus_pa": 200e9, "poisson_ratio": 0.3, "density_kg_m3": 7850} | LOSSES
-LENGTH_M, SIDE_M = 0.2, 0.02  # of the bar
-EDGE_M, THICKNESS_M = 0.3, 0.006  # of the plate
-DISC_M, WALL_M, DISC_GAMMA = 0.2, 0.002, 0.5008  # clamped disc, nu = 0.3: von Karman's equations by Ritz's method
+LENGTH_M, SIDE_M = 0.2, 0.02  # bar
+EDGE_M, THICKNESS_M = 0.3, 0.006  # plate
+DISC_M, WALL_M, DISC_GAMMA = 0.2, 0.002, 0.5008  # clamped disc, nu = 0.3; gamma: von Karman's equations by Ritz's method
 BAR_S, PLATE_S = (0.03, 0.01), (0.06, 0.03)  # all, quick
 BAR_NODES = {"T4": ((150, 500, 1500), (150,)), "T10": ((150, 500, 1500), (150,))}
-STEPS = ((1.0, 0.5, 0.25), (1.0, 0.5))  # of the program's own step
+STEPS = ((1.0, 0.5, 0.25), (1.0, 0.5))  # relative to the default step
 CELLS, PLATE_NODES = ((8, 12, 16, 24), (8, 12)), ((700, 1500), (700,))
 # (nodes, energy_error)
 DISCS = (((2500, 0.09), (2500, 0.01), (2500, 0.001), (9000, 0.01)), ((1200, 0.09),))
-# Coupled modes of a hinged plate; the last are the reference.
+# Coupled modes of a hinged plate; the last count is the reference.
 COUPLED, PLAYED_S, BLOW_N_S = ((1, 4, 12, 30, 60), (1, 4, 12)), (1.0, 0.35), 0.1
-LOWEST_HZ = 55.0  # about there, 41.7 of soft motion
+LOWEST_HZ = 55.0  # expected with large motion; 41.7 Hz for small amplitudes
 
 
 @dataclasses.dataclass
 class Run:
-    """freq_hz: of the strongest line where it is expected; cpu_s: of the whole run."""
+    """freq_hz: strongest line near the expected one; cpu_s: of the whole run."""
 
     freq_hz: float
     cpu_s: float
@@ -42,7 +42,7 @@ class Run:
 
 
 def calc_bar_hz(length_m, side_m, young_pa, nu, density):
-    """First bending of a free bar of square section, ASTM E1876."""
+    """First bending frequency of a free bar of square section, ASTM E1876."""
     r = (side_m / length_m) ** 2
     t1 = 1 + 6.585 * (1 + 0.0752 * nu + 0.8109 * nu**2) * r - 0.868 * r**2
     t1 -= 8.340 * (1 + 0.2023 * nu + 2.173 * nu**2) * r**2 / (1 + 6.338 * (1 + 0.1408 * nu + 1.536 * nu**2) * r)
@@ -51,14 +51,14 @@ def calc_bar_hz(length_m, side_m, young_pa, nu, density):
 
 
 def calc_plate_hz(edge_m, thickness_m, young_pa, nu, density):
-    """Lowest mode of a square plate hinged on all sides by Mindlin's theory, whose leading terms these are."""
+    """Lowest mode of a square plate hinged on all sides, leading terms of Mindlin's theory."""
     k = math.sqrt(2) * math.pi / edge_m
     thin = k**2 * math.sqrt(young_pa * thickness_m**2 / (12 * density * (1 - nu**2))) / (2 * math.pi)
     return thin / math.sqrt(1 + (thickness_m * k) ** 2 / 12 * (1 + 2 / (math.pi**2 / 12 * (1 - nu))))
 
 
 def find_line_hz(sound, rate, near_hz):
-    """The strongest line within a third of near_hz, placed by a parabola through its logarithm."""
+    """Strongest line from near_hz / 1.5 to 1.5 near_hz, by parabolic interpolation of the log magnitude."""
     level = np.log(np.abs(np.fft.rfft(sound * np.hanning(len(sound)), 1 << 20)) + 1e-300)
     step = rate / (1 << 20)
     low, high = int(near_hz / 1.5 / step), int(near_hz * 1.5 / step)
@@ -68,7 +68,7 @@ def find_line_hz(sound, rate, near_hz):
 
 
 def simulate(lab, name, body, duration_s, blow, near_hz, step_s=None):
-    """A Run, kept by the hash of its job."""
+    """Returns a Run, cached by the hash of its job."""
     job = {
         "simulate": {
             "duration_s": duration_s,
@@ -122,7 +122,7 @@ def simulate_plate(lab, cells=None, nodes=None):
         body = {"sheet": {"shape": "rectangle", **edges, "cells": cells}, "hinged": "rim"}
         name = f"hinged plate, sheet of {cells} cells"
     else:
-        # The middle of the rim is held: the faces may turn.
+        # only the middle of the rim is fixed, so the faces can rotate
         half, thin = EDGE_M / 2, 1e-6
         boxes = []
         for axis in (0, 1):
@@ -136,7 +136,7 @@ def simulate_plate(lab, cells=None, nodes=None):
 
 
 def couple_disc(lab):
-    """[(nodes, energy_error, error that the bank states, rows, bytes, CPU s of the solve, gamma of the first mode)] of a clamped disc."""
+    """Clamped disc: [(nodes, energy_error, error stated in the bank, rows, bytes, CPU s of the solve, gamma of mode 1)]."""
     quick, cases = lab.quick, {}
     for nodes, error in DISCS[quick]:
         job = {
@@ -165,7 +165,7 @@ def couple_disc(lab):
 
 
 def describe_blow(sound):
-    """(pitch of the lowest mode, centroid of the power between 20 Hz and 1 kHz) in the first 0.3 s after a blow, first microphone."""
+    """(pitch of the lowest mode, power centroid from 20 Hz to 1 kHz) of the first 0.3 s after a blow, first microphone."""
     part = sound.pressure_pa[int(0.02 * sound.rate_hz) : int(0.32 * sound.rate_hz), 0]
     power = np.abs(np.fft.rfft(part * np.hanning(len(part)))) ** 2
     hz = np.fft.rfftfreq(len(part), 1 / sound.rate_hz)
@@ -174,7 +174,7 @@ def describe_blow(sound):
 
 
 def play_plate(lab):
-    """[(coupled modes, share of a core, pitch, centroid)] of a blow on a hinged plate of steel, whose coupling has a closed form."""
+    """[(coupled modes, share of a core, pitch, centroid)]: blow on a hinged steel plate, whose coupling has a closed form."""
     quick, banks = lab.quick, {}
     program = lab.find_program("carillon-precompute")
     for count in COUPLED[quick]:

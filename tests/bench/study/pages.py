@@ -1,5 +1,4 @@
-"""What a study of accuracy writes: report.md, report.html with the pictures inside, report.json, and an SVG and a CSV for each chart and
-table."""
+"""Files of the accuracy study: report.md, report.html (pictures embedded), report.json, an SVG and a CSV per chart, a CSV per table."""
 import csv
 import html
 import json
@@ -17,7 +16,7 @@ p, li { overflow-wrap: anywhere; } pre, .table { overflow-x: auto; }"""
 
 
 def write(lab, sections, setting):
-    """Writes all of them into the lab's folder; returns the path of report.md. setting: the command line of this study, as text."""
+    """Writes all files into the lab's folder; returns the path of report.md. setting: command line of the study."""
     files = {}
     for section in sections:
         for item in section.items:
@@ -51,7 +50,7 @@ def format_csv(rows):
 
 
 def to_inline(text):
-    """The little Markdown that sections write: `code`, **bold** and links."""
+    """Converts the Markdown subset of the sections: `code`, **bold** and links."""
     text = html.escape(text)
     text = re.sub(r"`([^`]+)`", r"<code>\1</code>", text)
     text = re.sub(r"\*\*([^*]+)\*\*", r"<b>\1</b>", text)

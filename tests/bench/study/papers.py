@@ -1,4 +1,4 @@
-"""The papers' own trade-offs, with numbers: a density that makes up for a coarse mesh, lumped mass, few modes, dense matrices."""
+"""Section: trade-offs of the papers, measured: density that compensates a coarse mesh, lumped mass, few modes, dense matrices."""
 import math
 import statistics
 
@@ -10,14 +10,14 @@ from bodies import find_kind, make_bodies
 from section import Section
 
 PROGRAMS = ("carillon-mesh", "carillon-precompute", "carillon-bank", "carillon-render")
-AUDIBLE_CENTS = 5  # about what a trained ear hears
+AUDIBLE_CENTS = 5  # about the threshold of a trained ear
 DENSE_NODES, DENSE_NODES_QUICK = (105, 140, 210, 350, 512, 729, 1000), (105, 140, 210, 350)
-ALWAYS_DENSE = 300  # unknowns up to which the program takes LAPACK whatever its options say
+ALWAYS_DENSE = 300  # unknowns up to which the program always uses LAPACK
 EIGEN_PHASES = ("factor", "solve", "orthogonalise")
 
 
 def find_points(lab, bodies):
-    """[(body, truth, {kind: [Point]})] of the T4 meshes; a body whose truth is not known has its curved T10 solved too."""
+    """[(body, truth, {kind: [Point]})] of the T4 meshes; without a known truth, curved T10 meshes are solved too."""
     known = elements.measure(lab, [body for body in bodies if body.truth], ("T4 consistent", "T4 lumped"))
     known |= elements.measure(lab, [body for body in bodies if not body.truth], ("T4 consistent", "T4 lumped", "T10 curved"))
     results = []
@@ -35,7 +35,7 @@ def list_modes(values):
 
 
 def study_density(section, lab, results):
-    """Every frequency goes with the root of one over the density: the factor that puts mode 1 right shifts all by the same cents."""
+    """Frequencies scale with density^(-1/2): the factor that corrects mode 1 shifts all modes by the same cents."""
     rows = [("body", "nodes, T4", "mode 1, cents", "density times", "others before: median", "worst", "others after: median", "worst")]
     data = [("body", "nodes", "density_factor", "mode", "error_before_cents", "error_after_cents")]
     left, curves = [], {}
@@ -98,8 +98,7 @@ def study_density(section, lab, results):
 
 
 def find_nodes_below(pairs, level):
-    """Nodes at which a value that falls with the nodes passes the level, by the line between two meshes in logarithms; None when it does
-    not."""
+    """Number of nodes at which a decreasing value crosses the level, by log-log interpolation; None without a crossing."""
     for (few, high), (many, low) in zip(pairs, pairs[1:]):
         if high > level >= low > 0:
             return round(few * (many / few) ** (math.log(high / level) / math.log(high / low)), -1)
@@ -161,14 +160,14 @@ def study_lumping(section, results):
         section.conclude(describe_lumping(ratios, crossings))
 
 
-SMALL_SHARE = 0.1  # of the error: what a figure hides
+SMALL_SHARE = 0.1  # share of the error below which a difference is insignificant
 
 
 def describe_lumping(ratios, crossings):
-    """Where lumping is insignificant: against the error of T4 itself, and for the ear.
+    """Sentences: where lumping is insignificant against the error of T4, and inaudible.
 
     ratios: {body: [difference / error, coarse to fine]}
-    crossings: [(body, (nodes, cents) of the finest, nodes or None where the difference gets inaudible, whether it always was)]
+    crossings: [(body, (nodes, cents) of the finest mesh, nodes or None where the difference becomes inaudible, always inaudible?)]
     """
     every = [ratio for values in ratios.values() for ratio in values]
     small = [name for name, values in ratios.items() if max(values) < SMALL_SHARE]
@@ -193,7 +192,7 @@ def describe_lumping(ratios, crossings):
 
 
 def study_modes(section, lab):
-    """What is lost of the sound at the numbers of modes that the papers name; as the section on banks measures it."""
+    """Loss of sound at the papers' numbers of modes, measured as in the section on banks."""
     rows, sentence = banks.measure_papers(lab)
     section.add_table(
         "modes",
@@ -211,7 +210,7 @@ def calc_eigen_s(solve):
 
 
 def find_crossing(sizes, dense_s, sparse_s):
-    """Unknowns from which on dense takes longer, by the line between two sizes in logarithms; None when it always or never does."""
+    """Unknowns above which dense takes longer, by log-log interpolation; None without a crossing."""
     gaps = [math.log(a / b) for a, b in zip(dense_s, sparse_s)]
     for i in range(len(gaps) - 1):
         if gaps[i] <= 0 < gaps[i + 1]:
@@ -220,7 +219,7 @@ def find_crossing(sizes, dense_s, sparse_s):
 
 
 def study_dense(section, lab):
-    """Dense LAPACK against the sparse solver on cubes of T4, the same modes."""
+    """Dense LAPACK against the sparse solver, same modes, cubes of T4."""
     body, kind = make_bodies()["cube"], find_kind("T4 consistent")
     names = ("dense", "block-lanczos")
     sizes = DENSE_NODES_QUICK if lab.quick else DENSE_NODES

@@ -1,5 +1,5 @@
-"""What the runtime's knobs cost and buy: each turned by itself, the error of the sound against the CPU of a second of it. The reference is
-the most accurate setting."""
+"""Section: runtime settings. Each is varied alone: error of the sound against CPU per second of sound. The most accurate setting is the
+reference."""
 import dataclasses
 
 import banks
@@ -13,9 +13,9 @@ PROGRAMS = banks.PROGRAMS
 EFFECTS = ("modal", "hertz_pulse", "roughness", "rolling", "contact_damping", "acceleration_noise", "air_delay", "doppler", "two_ears")
 INSTRUCTIONS = ("plain", "sse2", "avx2", "avx512")
 SOUND_SPEED = 343.0  # m/s
-# The strictest thresholds of effect selection that a scene may set, and the most accurate: the reference of what selection leaves out.
+# Most accurate thresholds of effect selection that a scene may set: reference for selection errors.
 STRICTEST = {"planner_db": -150, "quiet_db": 250, "silence_pa": 1e-15, "lead_s": 0.2}
-SOFT_DB = 40.0  # a blow that is just heard in a living room
+SOFT_DB = 40.0  # just audible in a living room
 BALL = {
     "body": {"shape": "sphere", "radius_m": 0.05},
     "element": "T10",
@@ -54,8 +54,8 @@ SHELF = {
 
 @dataclasses.dataclass(frozen=True)
 class Knob:
-    """A key of a scene's "quality" (or "sample_rate_hz"), its settings from accurate to cheap, the default, and the scene that it is turned
-    in. physics: it changes what happens, and its CPU is that of the physics."""
+    """A key of a scene's "quality" (or "sample_rate_hz"), its settings from accurate to cheap, the default and the test scene. physics: it
+    affects the motion, and CPU means that of the physics."""
 
     key: str
     title: str
@@ -101,23 +101,22 @@ class Turn:
     setting: object
     cpu_ms: float
     spread: float
-    difference: sounds.Difference | None  # None of the reference
+    difference: sounds.Difference | None  # None for the reference
 
 
 def find_jobs(lab):
-    """{name: job} of the bodies that move."""
+    """{name: job} of the moving bodies."""
     grow = lambda job, nodes: job | {"body": job["body"] | {"nodes": nodes // 2 if lab.quick else nodes}}
     return {"tile": grow(TILE, 2000), "shelf": grow(SHELF, 1500), "ball": grow(BALL, 1500)}
 
 
 def make_hang(lab, bank):
-    """A body hangs still and is struck three times."""
+    """Scene: a suspended body is struck three times."""
     return banks.make_scene(lab, bank)
 
 
 def make_soft(lab, bank):
-    """The same so softly that its loudest is SOFT_DB, and with effect selection on: what is culled is what is not heard of a soft sound; of
-    a loud one anything could be."""
+    """The same scene scaled to a peak level of SOFT_DB with effect selection on, as culling depends on the absolute level."""
     scene = banks.make_scene(lab, bank)
     level = sounds.calc_loudest_db(sounds.play(lab, "soft-level", scene).sound)
     factor = 10 ** ((SOFT_DB - level) / 20)
@@ -128,8 +127,8 @@ def make_soft(lab, bank):
 
 
 def make_roll(lab, paths):
-    """A ball of plastic rolls up a slope (gravity is turned, the floor is level), and is struck meanwhile. Roughness is left out: it is
-    random, and begins again with every contact, so that another step would be another draw."""
+    """Scene: a plastic ball rolls up a slope (tilted gravity, level floor) and is struck meanwhile. No roughness: it is random and restarts
+    with every contact, so different steps would draw different profiles."""
     seconds = 0.5 if lab.quick else 0.8
     return {
         "duration_s": seconds,
@@ -152,7 +151,7 @@ def make_roll(lab, paths):
 
 
 def make_chute(lab, paths):
-    """The chute in short form: a tile falls on a slanting shelf, slides off it and onto the floor, and comes to rest."""
+    """Scene: a tile falls on a slanting shelf, slides off onto the floor and comes to rest."""
     return {
         "duration_s": 1.2 if lab.quick else 2.0,
         "ground": {"restitution": 0.3},
@@ -180,7 +179,7 @@ def make_chute(lab, paths):
 
 
 def turn(scene, key, setting):
-    """The scene with a knob at a setting; None and "planned": not given."""
+    """The scene with a knob at a setting; None and "planned" leave it out."""
     if key == "sample_rate_hz":
         return scene | {key: setting}
     quality = dict(scene.get("quality", {}))
@@ -192,12 +191,12 @@ def turn(scene, key, setting):
 
 
 def thin(lab, settings, default):
-    """Quick studies look at the ends and the default."""
+    """Settings to measure; quick studies take the ends and the default."""
     return tuple(s for n, s in enumerate(settings) if n in (0, len(settings) - 1) or s == default) if lab.quick else settings
 
 
 def measure_knob(lab, knob, scene, contacts=None):
-    """[Turn] of a knob, the most accurate setting first, which is the reference."""
+    """[Turn] of a knob; the first is the most accurate setting, the reference."""
     settings = thin(lab, knob.settings, knob.default)
     scenes = {f"{knob.key}-{number}": turn(scene, knob.key, setting) for number, setting in enumerate(settings)}
     played = list(sounds.play_all(lab, scenes, contacts=None if knob.physics else contacts).values())
@@ -209,7 +208,7 @@ def measure_knob(lab, knob, scene, contacts=None):
 
 
 def measure_effects(lab, scene, contacts):
-    """{what: (Turn)}: everything on, each effect off by itself, and by effect selection, with the same contacts."""
+    """{effects: Turn}: all on, each off alone, and effect selection, with the same contacts."""
     wishes = (
         {"all on": list(EFFECTS)}
         | {f"without {effect}": [name for name in EFFECTS if name != effect] for effect in (EFFECTS[1::3] if lab.quick else EFFECTS)}
@@ -227,24 +226,24 @@ def measure_effects(lab, scene, contacts):
 
 
 def measure_fall(lab, scene, steps=(2.5e-4, 1e-4)):
-    """(Difference, milliseconds of physics of both) of one fall at two steps of the physics."""
+    """(Difference, CPU ms of physics of both) of one fall at two physics steps."""
     played = sounds.play_all(lab, {f"fall-{number}": turn(scene, "contact_step_s", step) for number, step in enumerate(steps)}, repeats=1)
     usual, finer = played.values()
     return sounds.compare(usual.sound, finer.sound), usual.physics_ms, finer.physics_ms
 
 
-# --- the kernel against the closed form
+# --- kernel against closed form
 
 
 def calc_sphere_gain(freq_hz, corners):
-    """What the gain of a pulsating sphere of the surface's area has of the frequency, but for a constant (Pierce 1981, section 4.1)."""
+    """Frequency dependence of the gain of a pulsating sphere of equal area, up to a constant (Pierce 1981, section 4.1)."""
     area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
     return freq_hz / np.hypot(1, 2 * np.pi * freq_hz / SOUND_SPEED * np.sqrt(area / (4 * np.pi)))
 
 
 def calc_closed_form(bank, strikes, rate_hz, samples):
-    """Pressure at 1 m of ideal blows in double precision, without the runtime's tables: sum g (phi . J) e^(-d t) (cos w_d t - d / w_d sin
-    w_d t)."""
+    """Pressure at 1 m of ideal impulses in double precision, without the runtime's tables:
+    sum g (phi . J) e^(-d t) (cos w_d t - d / w_d sin w_d t)."""
     names = (
         "mesh/vertices",
         "mesh/triangles",
@@ -262,7 +261,7 @@ def calc_closed_form(bank, strikes, rate_hz, samples):
     heard = (np.sqrt(eigenvalue) < np.pi * rate_hz) & (decay < 0.9 * np.sqrt(eigenvalue))
     pressure = np.zeros(samples)
     for strike in strikes:
-        phi = shape[triangles[strike["triangle"]]].astype(float).mean(axis=0) * scale[:, None]  # the middle of the triangle
+        phi = shape[triangles[strike["triangle"]]].astype(float).mean(axis=0) * scale[:, None]  # centroid of the triangle
         amplitude = gain * (phi @ np.array(strike["impulse_n_s"]))
         first = int(np.ceil(strike["time_s"] * rate_hz - 1e-9))
         time = np.arange(first, samples) / rate_hz - strike["time_s"]
@@ -272,8 +271,8 @@ def calc_closed_form(bank, strikes, rate_hz, samples):
 
 
 def measure_kernels(lab, bank):
-    """[(instructions, Turn)], against the closed form; those that this processor has not are left out. The blows are between two samples,
-    at the middle of the body's sphere of 1 m."""
+    """[(instruction set, Turn)] against the closed form, for the instruction sets of this processor. Blows fall between samples; microphone
+    1 m from the body's centre."""
     scene = banks.make_scene(
         lab, bank, seconds=1.5 if lab.quick else 4.0, radiation="osg02", effects=["modal"], quality={"silence_pa": 1e-15}
     )
@@ -331,7 +330,7 @@ def describe_difference(difference):
 
 
 def describe_knob(knob, turns):
-    """What the default is worth against the most accurate and the loosest setting that does not differ audibly."""
+    """Compares the default with the most accurate and the loosest inaudible setting."""
     best, usual = turns[0], find_turn(turns, knob.default)
     cheap = None
     for one in turns[1:]:
@@ -473,7 +472,7 @@ def study(lab, bodies):
 
 
 def make_base(knob, scene):
-    """What else is set while a knob is turned: effects by effect selection where it is one of its knobs."""
+    """Settings that accompany a knob: effect selection for its own knobs."""
     if knob.scene == "chute":
         return scene | {"quality": {key: value for key, value in STRICTEST.items() if key != knob.key}}
     if knob.physics:
@@ -482,7 +481,7 @@ def make_base(knob, scene):
 
 
 def find_defaults(measured):
-    """[(key, default, its error in dB(A), its distance in dB)]: the figures that the defaults rest on."""
+    """[(key, default, error in dB(A), distance in dB)]: basis of the defaults."""
     out = []
     for knob, turns in measured:
         usual = find_turn(turns, knob.default).difference

@@ -1,4 +1,4 @@
-"""A section of the report: words, tables and charts in the order in which they were added; each table and chart has a CSV next to it."""
+"""A section of the report: text, tables and charts in order of addition; each table and chart has a CSV."""
 import dataclasses
 
 import measuring
@@ -6,11 +6,11 @@ import measuring
 
 @dataclasses.dataclass
 class Item:
-    """kind: "text", "table" or "chart". rows[0] is the head of what a page shows, data[0] that of its CSV."""
+    """kind: "text", "table" or "chart". rows[0]: header on the page; data[0]: header of the CSV."""
 
     kind: str
     name: str = ""
-    text: str = ""  # of a text; the caption of the others
+    text: str = ""  # the text, or the caption
     rows: list = dataclasses.field(default_factory=list)
     data: list = dataclasses.field(default_factory=list)
     svg: str = ""
@@ -19,21 +19,21 @@ class Item:
 
 class Section:
     def __init__(self, name, title, command):
-        """name: a word that file names and --only take; command: the one that makes this section again."""
+        """name: for file names and --only; command: reproduces this section."""
         self.name, self.title, self.command = name, title, command
         self.items, self.findings = [], []
 
     def say(self, text):
-        """A paragraph. It follows from the numbers: sections make their sentences."""
+        """Adds a paragraph, composed from the measured numbers."""
         self.items.append(Item("text", text=text))
 
     def conclude(self, text):
-        """A sentence that also stands in the summary at the head of the report."""
+        """Adds a sentence that the summary at the top of the report repeats."""
         self.findings.append(text)
         self.say(text)
 
     def add_table(self, name, rows, caption, data=None, command=None):
-        """rows: what the page shows, rows[0] the head; data: the same for the CSV with all digits (default: rows)."""
+        """rows: as shown, rows[0] is the header; data: for the CSV, all digits (default: rows)."""
         self.items.append(
             Item(
                 "table",
@@ -46,14 +46,14 @@ class Section:
         )
 
     def add_chart(self, name, svg, caption, rows, command=None):
-        """rows: what is drawn, rows[0] the head; it goes into the CSV next to the picture."""
+        """rows: plotted data for the CSV, rows[0] is the header."""
         self.items.append(Item("chart", name, caption, data=[list(row) for row in rows], svg=svg, command=command or self.command))
 
     def file_name(self, item, ending):
         return f"{self.name}-{item.name}.{ending}"
 
     def to_markdown(self, find_picture=lambda name: name):
-        """The section as lines; find_picture: from a picture's name to its path in the page."""
+        """Markdown lines of the section; find_picture: maps a picture's name to its path on the page."""
         lines = [f"## {self.title}", ""]
         shown = None
         for item in self.items:
@@ -79,7 +79,7 @@ class Section:
 
 
 def read_section(value):
-    """The opposite of to_json()."""
+    """Inverse of to_json()."""
     section = Section(value["name"], value["title"], value["command"])
     section.findings = value["findings"]
     section.items = [Item(**item) for item in value["items"]]

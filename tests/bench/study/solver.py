@@ -1,4 +1,4 @@
-"""Section: what the solver's knobs cost and bring: tolerance, number of modes, ranks, ordering and factorisation, method."""
+"""Section: solver settings: tolerance, number of modes, ranks, ordering and factorisation, method."""
 import dataclasses
 import math
 import os
@@ -8,7 +8,7 @@ from bodies import find_kind, make_bodies
 from section import Section
 
 PROGRAMS = ("carillon-mesh", "carillon-precompute", "carillon-bank")
-TOLERANCES = (5e-5, 1e-5, 1e-6, 1e-8, 1e-10, 1e-12)  # a bank takes none of 1e-4 or above
+TOLERANCES = (5e-5, 1e-5, 1e-6, 1e-8, 1e-10, 1e-12)  # banks reject residuals of 1e-4 or above
 MODES = (10, 30, 100, 300, 800)
 # (label, solver.factorisation, options after --)
 FACTORISATIONS = (
@@ -20,19 +20,19 @@ FACTORISATIONS = (
     ("MUMPS, AMD", "mumps", ("-mumps_ordering", "amd")),
     ("CHOLMOD, METIS", "cholmod", ()),
 )
-MAX_DENSE_NODES = 400  # a dense solve of 1,000 takes most of a minute; the section of the papers does that once
+MAX_DENSE_NODES = 400  # a dense solve of 1,000 takes most of a minute; the section on the papers includes one
 METHODS = ("block-lanczos", "krylov-schur", "dense")
-PREFERRED = ("sphere", "plate")  # curved with groups of degenerate modes, and thin with rounding in its lowest ones
-HIGHEST_HZ = 1e6  # above the 800th mode of any body here
+PREFERRED = ("sphere", "plate")  # curved with degenerate groups; thin with rounding errors in its lowest modes
+HIGHEST_HZ = 1e6  # above the 800th mode of all bodies
 
 
 def find_errors(body, freq_hz):
-    """Cents above the truth, mode by mode; none where it is not known."""
+    """Cents above the truth by mode; empty without a truth."""
     return [1200 * math.log2(f / true) for f, true in zip(freq_hz, body.truth.freq_hz)] if body.truth else []
 
 
 def find_distance(one_hz, other_hz):
-    """Largest distance in cents of modes of the same number; infinite when the counts differ."""
+    """Largest distance in cents of modes of equal index; infinite if the counts differ."""
     if len(one_hz) != len(other_hz):
         return math.inf
     return max((abs(1200 * math.log2(a / b)) for a, b in zip(one_hz, other_hz)), default=0.0)
@@ -47,7 +47,7 @@ def draw_curves(curves, title, subtitle, x_label, y_label):
 
 
 def choose_bodies(bodies):
-    """Those preferred, or the first that coarse meshes can have: a thin wall takes none."""
+    """Preferred bodies, else the first that can be meshed coarsely (thin walls cannot)."""
     chosen = [body for name in PREFERRED for body in bodies if body.name == name]
     return chosen or [body for body in bodies if not body.quadratic_sizes][:1] or [make_bodies()[PREFERRED[0]]]
 
@@ -445,5 +445,5 @@ def study(lab, bodies):
 
 
 def find_facts(lab, bodies):
-    """What the recommendation rests on: {knob: {...}}. What the section measured is kept, so this costs nothing after it."""
+    """Basis of the recommendation: {knob: {...}}. Uses the section's cached solves."""
     return run(lab, bodies).facts

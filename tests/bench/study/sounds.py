@@ -1,14 +1,14 @@
-"""Sounds as carillon-render makes them, and how far two of them are apart.
+"""Rendering with carillon-render, and differences of two sounds.
 
-Three measures, each of the whole of two sounds at the same places:
-  error_db      exposure of the difference over that of the reference, both A-weighted (IEC 61672-1:2013, E.4.2) from 20 Hz to 20 kHz, all
-                channels. It knows phases: below -40 dB it is inaudible; of two sounds that run out of step it says nothing.
-  distance_db   log-spectral distance: root mean square, over third-octave bands (IEC 61260-1) and frames of 43 ms, of the difference of
-                levels in dB. Cells count that either sound lifts above a floor: 60 dB below the reference's loudest cell of all and not
-                below 0 dB re 20 uPa; what is softer counts as the floor. It knows no phases. Below 1 dB, with no more than 2 % of the
-                frames more than 2 dB off (outliers), it is inaudible (Paliwal & Atal 1993).
-  loudness_db   change of the loudest A-weighted level within the ear's own time, 0.2 s (Zwislocki 1969), in dB(A): the model of loudness is
-                ISO 131's, sones = 2^((L - 40 dB) / 10) with L the A-weighted level, so that 10 dB double the loudness. 1 dB is just heard
+Three measures of two whole sounds with the same microphones:
+  error_db      sound exposure of the difference relative to the reference, A-weighted (IEC 61672-1:2013, E.4.2), 20 Hz to 20 kHz, all
+                channels. Phase-sensitive: inaudible below -40 dB, meaningless for sounds that drift apart.
+  distance_db   log-spectral distance: RMS level difference in dB over third-octave bands (IEC 61260-1) and frames of 43 ms. Counts cells
+                where either sound exceeds a floor of 60 dB below the reference's loudest cell, at least 0 dB re 20 uPa; softer levels
+                are raised to the floor. Insensitive to phase. Inaudible below 1 dB with at most 2 % of the frames more than 2 dB off
+                (outliers; Paliwal & Atal 1993).
+  loudness_db   change of the maximum A-weighted level over the ear's integration time, 0.2 s (Zwislocki 1969), in dB(A). Loudness by
+                ISO 131: sones = 2^((L - 40 dB) / 10), L the A-weighted level, so 10 dB double the loudness. 1 dB is just noticeable
                 (Jesteadt, Wier & Green 1977).
 """
 import dataclasses
@@ -29,16 +29,16 @@ EAR_S = 0.2
 FRAME_S = 0.0427
 RANGE_DB = 60.0
 LOW_HZ, HIGH_HZ = 20.0, 20000.0
-# Full scale per pascal, in files of floating point: so small that nothing is ever scaled down.
+# Full scale per pascal in float files, small enough to avoid any scaling down.
 GAIN_PER_PA = 1e-6
-# Below these two sounds do not differ audibly (above).
-NONE_DB = -200.0  # the same but for the rounding of these sums
+# Thresholds of audibility (above).
+NONE_DB = -200.0  # equal up to the rounding of the sums
 ERROR_LIMIT_DB, DISTANCE_LIMIT_DB, LOUDNESS_LIMIT_DB = -40.0, 1.0, 1.0
 OUTLIER_DB, OUTLIER_LIMIT = 2.0, 0.02
 
 
 def find_spread(values):
-    """Half the distance of the extremes over the median; 0 of what took no time."""
+    """Half the range over the median; 0 if the median is 0."""
     return measuring.find_spread(values) if measuring.find_median(values) > 0 else 0.0
 
 
@@ -50,7 +50,7 @@ class Sound:
 
 @dataclasses.dataclass
 class Played:
-    """A scene that was played. Seconds: of CPU for a second of sound; playing_s: one entry for each repeat."""
+    """A rendered scene. Times: CPU seconds per second of sound; playing_s: one entry per repeat."""
 
     sound: Sound
     playing_s: list
@@ -59,7 +59,7 @@ class Played:
 
     @property
     def cpu_ms(self):
-        """Median CPU milliseconds that the sound takes for a second of itself, without physics."""
+        """Median CPU ms per second of sound, without physics."""
         return 1e3 * float(np.median(self.playing_s))
 
     @property
@@ -72,7 +72,7 @@ class Played:
 
     @property
     def physics_ms(self):
-        """The same of the physics."""
+        """Median CPU ms of the physics per second."""
         return 1e3 * float(np.median(self.physics_s))
 
 
@@ -81,11 +81,11 @@ class Difference:
     error_db: float
     distance_db: float
     loudness_db: float
-    outliers: float = 0.0  # share of the frames that are more than OUTLIER_DB off
+    outliers: float = 0.0  # share of frames more than OUTLIER_DB off
 
     @property
     def is_audible(self):
-        """Whether the difference is audible by the metric: by the waveform not below -40 dB, else by bands and loudness."""
+        """True if the difference is audible: waveform error above -40 dB, and bands or loudness above threshold."""
         bands = self.distance_db > DISTANCE_LIMIT_DB or self.outliers > OUTLIER_LIMIT
         return self.error_db > ERROR_LIMIT_DB and (bands or abs(self.loudness_db) > LOUDNESS_LIMIT_DB)
 
@@ -98,7 +98,7 @@ class Difference:
 
 HEAD = ("error, dB(A)", "log-spectral distance, dB", "frames off", "loudness, dB(A)")
 DATA = ("error_dba", "log_spectral_distance_db", "frames_off", "loudness_change_dba", "audible")
-NO_CELLS, NO_DATA = ("-",) * len(HEAD), (-300.0, 0.0, 0.0, 0.0, "")  # of the reference itself
+NO_CELLS, NO_DATA = ("-",) * len(HEAD), (-300.0, 0.0, 0.0, 0.0, "")  # of the reference
 
 
 def format_db(value):
@@ -106,7 +106,7 @@ def format_db(value):
 
 
 def format_change(value):
-    """With its sign, and no minus before nothing."""
+    """Formats with sign, without negative zero."""
     return f"{round(value, 2) + 0.0:+.2f}"
 
 
@@ -114,7 +114,7 @@ def format_change(value):
 
 
 def read_wav(data, name="the WAV"):
-    """Sound in full scale of the bytes of a WAV of 32-bit floats. ValueError for anything else."""
+    """Samples of a WAV file of 32-bit floats, in full scale. ValueError for other formats."""
     if data[:4] != b"RIFF" or data[8:12] != b"WAVE":
         raise ValueError(f"{name} is no WAV")
     chunks, at = {}, 12
@@ -132,8 +132,8 @@ def read_wav(data, name="the WAV"):
 
 
 def play(lab, name, scene, repeats=1, contacts=None, record=None):
-    """Played: the scene through carillon-render, in pascals. Banks and files of contacts by absolute paths. RunError when the program
-    fails."""
+    """Renders the scene with carillon-render; returns Played, in pascals. Banks and contact files need absolute paths. RunError if the
+    program fails."""
     folder = lab.out / "work/sounds"
     folder.mkdir(parents=True, exist_ok=True)
     scene = dict(scene) | {"output": {"gain": GAIN_PER_PA, "format": "float"}}
@@ -157,8 +157,7 @@ def play(lab, name, scene, repeats=1, contacts=None, record=None):
 
 
 def play_all(lab, scenes, repeats=None, contacts=None):
-    """{name: Played} of {name: scene}: all of them in turn, every other time backwards, so that other load on the machine affects
-    all."""
+    """{name: Played} of {name: scene}. Rounds alternate in direction, so that other load affects all scenes equally."""
     repeats = repeats or lab.repeats
     played = {}
     for number in range(repeats):
@@ -179,7 +178,7 @@ TYPES = {"<f8": "<f8", "<f4": "<f4", "<i8": "<i8", "<i4": "<i4", "<i2": "<i2", "
 
 
 def read_arrays(path, names):
-    """{name: array} of a bank's arrays, by the table of its seal (docs/bank-format.md); arrays that it has not are left out."""
+    """{name: array} from the table of a bank's seal (docs/bank-format.md); missing arrays are left out."""
     data = pathlib.Path(path).read_bytes()
     arrays = {}
     for line in data[:4032].decode().splitlines()[2:]:
@@ -195,7 +194,7 @@ def read_arrays(path, names):
 
 
 def calc_a_weight(freq_hz):
-    """A-weighting as a factor of the amplitude, 1 at 1 kHz; 0 outside of what is heard."""
+    """A-weighting as an amplitude factor, 1 at 1 kHz, 0 outside the audible band."""
     f2 = np.square(np.asarray(freq_hz, float))
     weight = (
         1.2589254
@@ -208,7 +207,7 @@ def calc_a_weight(freq_hz):
 
 
 def resample(sound, rate_hz):
-    """The same sound at another rate, band-limited: its spectrum is cut or continued with zeros."""
+    """Band-limited resampling: truncates or zero-pads the spectrum."""
     if sound.rate_hz == rate_hz:
         return sound
     count = len(sound.pressure_pa)
@@ -221,7 +220,7 @@ def resample(sound, rate_hz):
 
 
 def match(reference, other):
-    """Both at the higher rate and of one length."""
+    """Both sounds at the higher rate, truncated to equal length."""
     rate = max(reference.rate_hz, other.rate_hz)
     a, b = resample(reference, rate).pressure_pa, resample(other, rate).pressure_pa
     if a.shape[1] != b.shape[1]:
@@ -244,14 +243,13 @@ def calc_error_db(reference, other):
 
 
 def calc_bands(pressure, rate):
-    """(frames, bands): mean square [Pa^2] in third-octave bands, channels added. Bands narrower than three lines of the transform are left
-    out."""
+    """(frames, bands): mean square [Pa^2] in third-octave bands, summed over channels. Bands narrower than three FFT bins are left out."""
     size = 2 ** round(math.log2(FRAME_S * rate))
     hop = size // 4
     phase = 2 * np.pi * np.arange(size) / size
     window = (
         0.35875 - 0.48829 * np.cos(phase) + 0.14128 * np.cos(2 * phase) - 0.01168 * np.cos(3 * phase)
-    )  # Harris 1978: what leaks is below -92 dB
+    )  # Harris 1978: sidelobes below -92 dB
     padded = np.concatenate([np.zeros((size - hop, pressure.shape[1])), pressure, np.zeros((size, pressure.shape[1]))])
     frames = np.lib.stride_tricks.sliding_window_view(padded, size, axis=0)[::hop]  # (frames, channels, size)
     freq = np.fft.rfftfreq(size, 1 / rate)
@@ -260,14 +258,14 @@ def calc_bands(pressure, rate):
     edges = [(low, high) for low, high in edges if (high - low) >= 3 * rate / size and high <= rate / 2]
     members = np.array([(freq >= low) & (freq < high) for low, high in edges], float).reshape(len(edges), len(freq))
     out = np.empty((len(frames), len(edges)))
-    for first in range(0, len(frames), 64):  # a little memory at a time
+    for first in range(0, len(frames), 64):  # in chunks, to limit memory
         power = np.abs(np.fft.rfft(frames[first : first + 64] * window, axis=-1)) ** 2
         out[first : first + 64] = power.sum(axis=1) @ members.T
     return out * 2 / (size * np.square(window).sum())
 
 
 def calc_distance(reference, other):
-    """(dB, share of the frames that are more than OUTLIER_DB off)."""
+    """(dB, share of frames more than OUTLIER_DB off)."""
     rate, a, b = match(reference, other)
     first, second = calc_bands(a, rate), calc_bands(b, rate)
     if first.size == 0 or not first.max() > 0:
@@ -282,7 +280,7 @@ def calc_distance(reference, other):
 
 
 def calc_loudest_db(sound):
-    """The loudest A-weighted level within EAR_S, dB(A) re 20 uPa, of all channels' mean square; -300 of silence."""
+    """Maximum A-weighted level over EAR_S, dB(A) re 20 uPa, mean square of all channels; -300 for silence."""
     pressure = sound.pressure_pa
     size = 2 * len(pressure)
     weighted = np.fft.irfft(
@@ -295,7 +293,7 @@ def calc_loudest_db(sound):
 
 
 def calc_sones(level_dba):
-    """ISO 131: 1 sone at 40 dB, twice as loud every 10 dB."""
+    """ISO 131: 1 sone at 40 dB, doubling every 10 dB."""
     return 2.0 ** ((level_dba - 40.0) / 10.0)
 
 

@@ -1,4 +1,4 @@
-"""Thin-wall elements: a sheet with a thickness, extruded, against the volume of the same body and against its regular mesh."""
+"""Section: thin-wall elements. An extruded sheet against the volume mesh and the regular mesh of the same body."""
 import math
 
 import bodies
@@ -11,13 +11,13 @@ from errors import RunError
 
 PROGRAMS = elements.PROGRAMS
 WALL, VOLUME, REGULAR = "thin wall", "volume", "regular mesh"
-SIZES = {WALL: ((2500, 5000, 10000, 20000), (1500, 4000)), VOLUME: ((10000, 20000, 40000), (6000,))}  # nodes: all, quick
+SIZES = {WALL: ((2500, 5000, 10000, 20000), (1500, 4000)), VOLUME: ((10000, 20000, 40000), (6000,))}  # nodes (all, quick)
 T10 = bodies.find_kind("T10 curved")
 
 
 def calc_bowl(u, v):
     """(point of the middle surface, normal)."""
-    polar, turn = bodies.BOWL_FROM + v * (bodies.BOWL_TO - bodies.BOWL_FROM), -2 * math.pi * u  # the triangles face out
+    polar, turn = bodies.BOWL_FROM + v * (bodies.BOWL_TO - bodies.BOWL_FROM), -2 * math.pi * u  # outward triangles
     normal = math.sin(polar) * math.cos(turn), math.sin(polar) * math.sin(turn), math.cos(polar)
     return [bodies.BOWL_RADIUS * x for x in normal], normal
 
@@ -31,7 +31,7 @@ def calc_plate(u, v):
     return [0.1 * u, 0.1 * v, 0.0], (0.0, 0.0, 1.0)
 
 
-# By body: its middle surface, wall [m], facets around and along, and whether it closes around.
+# By body: middle surface, wall [m], facets around and along, closed around?
 SHEETS = {
     "tube": (calc_tube, 0.001, 48, 48, True),
     "plate": (calc_plate, 0.01, 8, 8, False),
@@ -40,7 +40,7 @@ SHEETS = {
 
 
 def make_sheet(name, level):
-    """Points at `level` walls off the middle surface, and the triangles between them."""
+    """Points offset by `level` wall thicknesses from the middle surface, and their triangles."""
     place, wall, across, along, is_closed = SHEETS[name]
     columns = across if is_closed else across + 1
     points = []
@@ -57,7 +57,7 @@ def make_sheet(name, level):
 
 
 def make_solid(name):
-    """Both sides of the wall and its rims."""
+    """Both faces of the wall and its rims."""
     high, faces = make_sheet(name, 0.5)
     low, _ = make_sheet(name, -0.5)
     sides = {(a, b) for t in faces for a, b in zip(t, t[1:] + t[:1])}
@@ -78,7 +78,7 @@ def write_surface(path, surface):
 
 
 def make_mesh(lab, words, file, nodes):
-    """A Mesh of about so many nodes, or of the nearest count that the mesher names; None where that is far off."""
+    """Mesh of about so many nodes, or of the nearest count that the mesher suggests; None if that is far off."""
     for _ in range(2):
         try:
             return lab.make_mesh([*words, "--nodes", nodes], inputs=(file,))
@@ -90,7 +90,7 @@ def make_mesh(lab, words, file, nodes):
 
 
 def make_meshes(lab, body):
-    """[(name of the way, Mesh)]; what a way refuses at a size, since its elements cannot be so few, is left out."""
+    """[(method, Mesh)] without the sizes that a method cannot mesh."""
     folder = lab.out / "work/surfaces"
     sheet = write_surface(folder / f"{body.name}-sheet.obj", make_sheet(body.name, 0.0))
     solid = write_surface(folder / f"{body.name}-solid.obj", make_solid(body.name))
@@ -162,7 +162,7 @@ def draw(section, lab, body, found):
 
 
 def conclude(section, results):
-    """What ten cents cost by thin-wall elements and by the volume mesher, where both reach them."""
+    """Cost of ten cents by thin-wall elements and by the volume mesher, where both reach it."""
     parts = []
     for body, found in results:
         costs = {}
