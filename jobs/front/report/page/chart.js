@@ -46,7 +46,8 @@ function seconds(value) {
   if (value < 99.5) return `${value.toFixed(2)} s`;
   if (!(value < 1e12)) return `${digits(value, 3)} s`;
   const all = Math.round(value);
-  return all < 3600 ? `${Math.floor(all / 60)} min ${all % 60} s` : `${whole(Math.floor(all / 3600))} h ${Math.floor((all % 3600) / 60)} min`;
+  return all < 3600 ? `${Math.floor(all / 60)} min ${all % 60} s`
+    : `${whole(Math.floor(all / 3600))} h ${Math.floor((all % 3600) / 60)} min`;
 }
 
 function cents(value) {
@@ -80,7 +81,8 @@ function table(heads, rows) {
 /** rows: [name, value, remark]; rows with an undefined value are skipped. */
 function facts(rows) {
   const shown = rows.filter((row) => row[1] !== undefined && row[1] !== null);
-  return shown.length === 0 ? null : h('div', { class: 'table' }, h('table', { class: 'facts' }, h('tbody', {}, shown.map(([name, value, remark]) =>
+  return shown.length === 0 ? null : h('div', { class: 'table' },
+    h('table', { class: 'facts' }, h('tbody', {}, shown.map(([name, value, remark]) =>
     h('tr', {}, h('th', {}, name), h('td', { class: 'n' }, value), h('td', { class: 'remark' }, remark ?? ''))))));
 }
 
@@ -119,7 +121,10 @@ class Scale {
 
   turn(value) { return this.isLog ? Math.log10(Math.max(value, Number.MIN_VALUE)) : value; }
 
-  place(value) { return this.from + Math.min(1, Math.max(0, (this.turn(value) - this.low) / (this.high - this.low))) * (this.to - this.from); }
+  place(value) {
+    const share = (this.turn(value) - this.low) / (this.high - this.low);
+    return this.from + Math.min(1, Math.max(0, share)) * (this.to - this.from);
+  }
 
   findTicks() {
     const ticks = [], span = this.high - this.low;
@@ -172,7 +177,8 @@ function drawMarks(marks, one, x, y, box) {
     const top = (y.place(mark.y) - 3).toFixed(1);
     return `M${x.place(mark.xLow).toFixed(1)} ${top}v6m0 -3H${x.place(mark.xHigh).toFixed(1)}m0 -3v6`;
   };
-  const circle = (mark) => h('circle', { cx: x.place(mark.x).toFixed(1), cy: y.place(mark.y).toFixed(1), r: 3 }, h('title', {}, mark.title));
+  const circle = (mark) => h('circle', { cx: x.place(mark.x).toFixed(1), cy: y.place(mark.y).toFixed(1), r: 3 },
+    h('title', {}, mark.title));
   return [path('stick', one.isStick ? marks.map((mark) => `${at(mark)}V${box.bottom}`) : []),
     path('bar', marks.filter((mark) => mark.xHigh > mark.xLow).map(whisker)),
     path('dots', marks.length > kMaxTitled ? marks.map((mark) => `${at(mark)}h0`) : []),
@@ -189,7 +195,8 @@ function drawScatter({ title, xLabel, yLabel, isLogY, series, level }) {
   const up = [...all.map((mark) => mark.y), ...(level ? [level.y] : [])].filter(isOnY);
   const least = (values) => values.reduce((a, b) => Math.min(a, b)), most = (values) => values.reduce((a, b) => Math.max(a, b));
   const box = { left: 64, right: kWidth - 14, top: 12, bottom: 250 };
-  const x = new Scale(true, least(across), most(across), box.left, box.right), y = new Scale(isLogY, least(up), most(up), box.bottom, box.top);
+  const x = new Scale(true, least(across), most(across), box.left, box.right),
+    y = new Scale(isLogY, least(up), most(up), box.bottom, box.top);
   const line = level ? [h('path', { class: 'level', d: `M${box.left} ${y.place(level.y).toFixed(1)}H${box.right}` }),
     h('text', { class: 'level', x: box.right - 4, y: (y.place(level.y) - 5).toFixed(1), 'text-anchor': 'end' }, level.label)] : [];
   return [h('div', { class: 'chart' }, h('svg', { viewBox: `0 0 ${kWidth} ${box.bottom + 40}`, role: 'img', 'aria-label': title },
