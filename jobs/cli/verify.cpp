@@ -123,10 +123,10 @@ int run_verify(Shared& shared, const VerifyOptions& options) {
     }
   }
   bool is_whole = true;
-  Json::Value root;
+  base::Json root;
   root["store"] = to_json(store.root().string());
-  root["checked"] = Json::UInt64(ids.size());
-  root["damaged"] = Json::arrayValue;
+  root["checked"] = ids.size();
+  root["damaged"] = base::Json::array();
   for (Finding& finding : findings) {
     if (options.repairs) {
       finding.kind == "input"    ? repair_input(shared, finding)
@@ -134,12 +134,12 @@ int run_verify(Shared& shared, const VerifyOptions& options) {
                                  : repair(shared, finding);
     }
     is_whole = is_whole && finding.is_repaired;
-    Json::Value entry;
+    base::Json entry;
     entry["kind"] = finding.kind;
     entry["id"] = finding.id.text();
     entry["fault"] = to_json(finding.fault);
     entry["repaired"] = finding.is_repaired;
-    entry["repair"] = finding.repair.empty() ? Json::Value() : to_json(finding.repair);
+    entry["repair"] = finding.repair.empty() ? base::Json() : to_json(finding.repair);
     root["damaged"].append(entry);
     if (shared.json) continue;
     fmt::print("{}  {:<6}  {}\n", finding.id.short_text(), finding.kind, show_message(finding.fault));

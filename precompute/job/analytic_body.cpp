@@ -260,7 +260,7 @@ base::Json write_kind(const MembraneBody& body) {
   if (body.shape == "rectangle") json.set("length_m", body.length_m).set("width_m", body.width_m);
   if (body.shape == "circle") json.set("radius_m", body.radius_m);
   if (body.shape == "L") json.set("side_m", body.side_m);
-  for (const auto& corner : body.corners_m) json.member("corners_m").add(base::Json::array(corner));
+  for (const auto& corner : body.corners_m) json["corners_m"].add(base::Json::array(corner));
   if (body.tension_n_m) json.set("tension_n_m", *body.tension_n_m);
   if (body.lowest_hz) json.set("lowest_hz", *body.lowest_hz);
   if (body.density_kg_m2) json.set("density_kg_m2", *body.density_kg_m2);

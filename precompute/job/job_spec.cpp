@@ -48,10 +48,8 @@ const Words<Method> kMethods{{{"automatic", Method::automatic},
                               {"block-lanczos", Method::block_lanczos},
                               {"krylov-schur", Method::krylov_schur},
                               {"dense", Method::dense}}};
-const Words<Factorisation> kFactorisations{{{"automatic", Factorisation::automatic},
-                                            {"ldlt", Factorisation::ldlt},
-                                            {"mumps", Factorisation::mumps},
-                                            {"cholmod", Factorisation::cholmod}}};
+const Words<Factorisation> kFactorisations{
+    {{"automatic", Factorisation::automatic}, {"ldlt", Factorisation::ldlt}, {"mumps", Factorisation::mumps}}};
 const Words<AirMethod> kAirMethods{{{"none", AirMethod::none}, {"auto", AirMethod::automatic}, {"bem", AirMethod::bem}}};
 
 Fixed read_fixed(base::Object fixed) {

@@ -22,7 +22,7 @@ enum class Mass { consistent, lumped };
 /// Which eigensolver. automatic: dense LAPACK for small problems, else the fastest that suits the band.
 enum class Method { automatic, block_lanczos, krylov_schur, dense };
 /// Which sparse factorisation serves shift-invert. automatic: our L D L^T, and MUMPS where that proves unstable.
-enum class Factorisation { automatic, ldlt, mumps, cholmod };
+enum class Factorisation { automatic, ldlt, mumps };
 
 /// What becomes of the sound of the modes in the air. none: gains from the motion of the surface alone; bem: boundary elements; automatic:
 /// boundary elements for the bodies that need them.

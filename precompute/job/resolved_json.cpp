@@ -1,10 +1,10 @@
 // The job as text again.
-#include <json/json.h>
 
-#include <sstream>
+#include <optional>
 
 #include "precompute/job/job_spec.hpp"
 #include "precompute/job/read_body.hpp"
+#include "runtime/base/json.hpp"
 
 namespace carillon::job {
 namespace {
@@ -13,8 +13,8 @@ using material::CaugheyTerm, material::DampingLaw, material::LossRow, material::
 
 namespace fs = std::filesystem;
 
-Json::Value to_json(const std::array<double, 3>& v) {
-  Json::Value list(Json::arrayValue);
+base::Json to_json(const std::array<double, 3>& v) {
+  base::Json list = base::Json::array();
   for (const double x : v) list.append(x);
   return list;
 }
@@ -25,8 +25,8 @@ std::string relative_to(const fs::path& path, const fs::path& folder) {
   return relative.empty() ? path.string() : relative.string();
 }
 
-Json::Value write_damping(const Material& material) {
-  Json::Value damping;
+base::Json write_damping(const Material& material) {
+  base::Json damping;
   switch (material.law) {
     case DampingLaw::rayleigh:
       damping["rayleigh"]["alpha1_s"] = material.alpha1_s;
@@ -43,7 +43,7 @@ Json::Value write_damping(const Material& material) {
       break;
     case DampingLaw::loss_table:
       for (const LossRow& row : material.loss_table) {
-        Json::Value& pair = damping["loss_table"].append(Json::arrayValue);
+        base::Json& pair = damping["loss_table"].append(base::Json::array());
         pair.append(row.freq_hz);
         pair.append(row.loss_factor);
       }
@@ -52,8 +52,8 @@ Json::Value write_damping(const Material& material) {
   return damping;
 }
 
-Json::Value write_material(const Material& material) {
-  Json::Value root;
+base::Json write_material(const Material& material) {
+  base::Json root;
   if (!material.name.empty()) root["name"] = material.name;
   if (material.orthotropic) {
     const Orthotropic& o = *material.orthotropic;
@@ -71,8 +71,8 @@ Json::Value write_material(const Material& material) {
   return root;
 }
 
-Json::Value write_body(const Body& body, const fs::path& base) {
-  Json::Value root;
+base::Json write_body(const Body& body, const fs::path& base) {
+  base::Json root;
   if (!body.shape.empty()) {
     root["shape"] = body.shape;
     for (const auto& [dimension, value] : body.dimensions) root[find_dimension_key(dimension)] = value;
@@ -87,24 +87,21 @@ Json::Value write_body(const Body& body, const fs::path& base) {
     root["up"] = std::string(1, body.up);
     root["method"] = body.method;
   }
-  if (body.nodes) root["nodes"] = Json::Int64(*body.nodes);
+  if (body.nodes) root["nodes"] = *body.nodes;
   if (body.edge_m) root["edge_m"] = *body.edge_m;
   return root;
 }
 
 /// The members of a JSON object, added to `entry`.
-void add_members(const base::Json& members, Json::Value& entry) {
-  Json::Value added;
-  std::istringstream stream(members.line());
-  std::string errors;
-  if (!Json::parseFromStream(Json::CharReaderBuilder(), stream, &added, &errors)) throw SolveError("internal: not JSON: " + errors);
-  for (const std::string& key : added.getMemberNames()) entry[key] = added[key];
+void add_members(const base::Json& members, base::Json& entry) {
+  const base::Json added = base::Json::parse(members.line()).value();  // numbers as they are read from a file
+  for (const std::string& key : added.keys()) entry[key] = added[key];
 }
 
-Json::Value write_fixed(const std::vector<Fixed>& list) {
-  Json::Value root(Json::arrayValue);
+base::Json write_fixed(const std::vector<Fixed>& list) {
+  base::Json root = base::Json::array();
   for (const Fixed& fixed : list) {
-    Json::Value& entry = root.append(Json::objectValue);
+    base::Json& entry = root.append(base::Json::object());
     if (fixed.node_set) entry["node_set"] = *fixed.node_set;
     if (fixed.box_m) {
       entry["box_m"]["min"] = to_json((*fixed.box_m)[0]);
@@ -116,8 +113,8 @@ Json::Value write_fixed(const std::vector<Fixed>& list) {
   return root.size() == 1 ? root[0] : root;
 }
 
-Json::Value write_air(const Air& air) {
-  Json::Value root;
+base::Json write_air(const Air& air) {
+  base::Json root;
   root["method"] = to_text(air.method);
   root["skin_nodes"] = air.skin_nodes;
   root["error_db"] = air.error_db;
@@ -128,8 +125,8 @@ Json::Value write_air(const Air& air) {
   return root;
 }
 
-Json::Value write_nonlinear(const Nonlinear& nonlinear, bool has_energy_error) {
-  Json::Value root;
+base::Json write_nonlinear(const Nonlinear& nonlinear, bool has_energy_error) {
+  base::Json root;
   if (nonlinear.is_stretch) root["form"] = "stretch";
   root["modes"] = nonlinear.modes;
   root["below_hz"] = nonlinear.below_hz;
@@ -138,7 +135,7 @@ Json::Value write_nonlinear(const Nonlinear& nonlinear, bool has_energy_error) {
 }
 
 /// How the modes of a body of elements are found.
-void write_solve(const JobSpec& job, Json::Value& root) {
+void write_solve(const JobSpec& job, base::Json& root) {
   root["mass"] = to_text(job.mass);
   if (!job.fixed.empty()) root["fixed"] = write_fixed(job.fixed);
   if (job.accuracy_cents) {
@@ -156,7 +153,7 @@ void write_solve(const JobSpec& job, Json::Value& root) {
 
 std::string resolved_json(const JobSpec& job, const fs::path& folder, const std::string& run_json) {
   const fs::path base = fs::absolute(folder).lexically_normal();
-  Json::Value root;
+  base::Json root;
   if (job.analytic)
     add_members(write_analytic(*job.analytic, base), root["body"]);
   else if (job.body)
@@ -173,16 +170,11 @@ std::string resolved_json(const JobSpec& job, const fs::path& folder, const std:
   if (!job.analytic) write_solve(job, root);
   if (job.nonlinear) root["nonlinear"] = write_nonlinear(*job.nonlinear, !job.analytic && !job.nonlinear->is_stretch);
   if (!run_json.empty()) {
-    std::istringstream stream(run_json);
-    Json::CharReaderBuilder reader;
-    std::string errors;
-    if (!Json::parseFromStream(reader, stream, &root["run"], &errors))
-      throw SolveError("internal: the record of the run is not JSON: " + errors);
+    std::optional<base::Json> record = base::Json::parse(run_json);
+    if (!record) throw SolveError("internal: the record of the run is not JSON");
+    root["run"] = std::move(*record);
   }
-  Json::StreamWriterBuilder writer;
-  writer["indentation"] = "  ";
-  writer["precision"] = 17;
-  return Json::writeString(writer, root) + "\n";
+  return root.sorted_text({.indentation = "  ", .breaks_arrays = true}) + "\n";
 }
 
 }  // namespace carillon::job

@@ -1,4 +1,4 @@
-// Values of a document within bounds, both included. Others are an InputError "file:line: ...".
+// Document values with inclusive bounds; violations are InputError "file:line: ...".
 #pragma once
 
 #include <string_view>
@@ -8,11 +8,11 @@
 
 namespace carillon::base {
 
-/// A required number.
+/// Required number.
 double read_within(Object& object, std::string_view key, double low, double high);
-/// The same of an optional one; the fallback is not checked.
+/// Optional number; the fallback is not checked.
 double read_within(Object& object, std::string_view key, double fallback, double low, double high);
-/// Three numbers, each of at most `limit` in size.
+/// Three numbers of magnitude at most `limit`.
 Vec3 read_vector(Object& object, std::string_view key, const Vec3& fallback, double limit);
 
 }  // namespace carillon::base

@@ -60,18 +60,16 @@ struct Sound {
   std::int64_t refused = 0;                            // events that could not be: too many at once
   std::int64_t faults = 0;                             // events that no synthesiser plays: numbers that are not finite ...
   std::int64_t resets = 0;                             // bodies cleared because their state was no number
-  std::vector<synth::EffectSet> body_effects;          // per body, what it had at any time
+  std::vector<synth::EffectSet> body_effects;          // per body
   std::vector<synth::EffectCounters> effect_counters;  // per body, at the end
   std::vector<SurfaceFigures> surfaces;                // per recorded surface of the scene
-  double seconds_per_tick = 0.0;                       // of the counters' ticks; 0 where they were not asked for
   double seconds_cpu = 0.0;
   double seconds_playing_cpu = 0.0;  // of them for what is done block by block
 };
 
 struct RenderOptions {
   int rate_hz = 48000;
-  const scene::Plan* plan = nullptr;  // whose changes the bodies follow; without, all bodies have the scene's effects
-  bool measures = false;       // what each effect of each body costs
+  const scene::Plan* plan = nullptr;  // choice of effects; nullptr: all bodies have the scene's effects
   bool audits = false;         // the energy of the modes
   bool fades_end = false;      // what still sounds at the end goes to zero within kFadeS
   /// make_head() of the scene at that rate, where it was made before; nullptr: it is made here.

@@ -24,7 +24,7 @@ void refuse_surfaces(const scene::Scene& scene, const char* who);
 /// How a recorded surface is heard, and why: by what, how often, with what price.
 struct SurfacePlan {
   std::size_t receivers = 0;  // ears or microphones, mirrored ones too
-  bool scene::has_head = false, is_reflected = false, is_resampled = false;
+  bool has_head = false, is_reflected = false, is_resampled = false;
   double sounding_s = 0.0;  // of it in the scene
   double cost_s = 0.0;      // CPU time, about
 };

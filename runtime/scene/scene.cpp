@@ -88,7 +88,7 @@ std::size_t read_name(base::Object& object, std::string_view key, const std::vec
 }
 
 /// The ears of a listener: free, on a sphere or on a measured head.
-void parse_ears(base::Object& object, SceneListener& listener, std::vector<std::string>& warnings) {
+void parse_ears(base::Object& object, SceneListener& listener) {
   listener.ears = static_cast<Ears>(read_name(object, "ears", kEarsNames, "free"));
   if (listener.ears == Ears::kFree) {
     if (object.has("sofa")) object.fail("sofa", "is a head's file; it goes with \"ears\": \"hrtf\", or leave it out");
@@ -102,12 +102,9 @@ void parse_ears(base::Object& object, SceneListener& listener, std::vector<std::
   } else {
     listener.ear_distance_m = read_within(object, "ear_distance_m", kHeadWidthM, kNarrowestHeadM, kWidestHeadM);
   }
-  if (kPlayableEffects.has(synth::Effect::kHead)) return;
-  listener.ears = Ears::kFree;
-  warnings.push_back(object.find_place("ears") + ": this build has no heads (the effect \"head\"); the ears are heard as free ones");
 }
 
-SceneListener parse_listener(base::Object& object, std::vector<std::string>& warnings) {
+SceneListener parse_listener(base::Object& object) {
   SceneListener listener;
   if (object.has("path")) {
     if (object.has("position_m")) object.fail("path", "says the same thing as \"position_m\"; keep one of them");
@@ -116,7 +113,7 @@ SceneListener parse_listener(base::Object& object, std::vector<std::string>& war
   } else {
     listener.position_m = read_vector(object, "position_m", listener.position_m, kFarthestM);
   }
-  parse_ears(object, listener, warnings);
+  parse_ears(object, listener);
   Vec3 direction = listener.facing;
   std::string key = "facing";
   if (object.has("look_at_m")) {
@@ -156,7 +153,6 @@ Quality parse_quality(base::Object& object) {
   effects::SelectionThresholds& thresholds = quality.thresholds;
   if (object.has("planner_db")) thresholds.audible_share = std::pow(10.0, 0.1 * read_within(object, "planner_db", 0.0, -150.0, -10.0));
   thresholds.below_loudest_db = read_within(object, "quiet_db", thresholds.below_loudest_db, 20.0, 250.0);
-  thresholds.lead_s = read_within(object, "lead_s", thresholds.lead_s, 0.001, 1.0);
   if (object.has("silence_pa")) quality.silence_pa = read_within(object, "silence_pa", 0.0, 1e-15, 1.0);
   quality.modes = object.integer_if("modes", synth::kGroup, std::numeric_limits<std::int32_t>::max());
   quality.contact_step_s = read_within(object, "contact_step_s", quality.contact_step_s, 1e-5, 2e-3);
@@ -224,7 +220,7 @@ Scene parse_scene(const base::Document& document) {
   const Names names = parse_bodies(root, scene);
   parse_joints(root, names, scene);
   parse_strikes(root, names, scene);
-  if (auto listener = root.object_if("listener")) scene.listener = parse_listener(*listener, scene.warnings);
+  if (auto listener = root.object_if("listener")) scene.listener = parse_listener(*listener);
   if (root.has("microphones")) {
     if (root.has("listener")) root.fail("microphones", "takes the place of \"listener\"; keep one of them");
     for (const std::vector<double>& row : root.number_rows("microphones", 3, kMaxMicrophones)) {

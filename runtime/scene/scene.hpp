@@ -44,7 +44,6 @@ inline const std::vector<std::string> kEarsNames{"free", "hrtf"};
 inline const std::vector<std::string> kJointNames{"weld", "hinge", "slider", "universal", "ball"};
 
 /// What carillon-render can play, and what it plays where effects are not planned.
-inline constexpr synth::EffectSet kPlayableEffects = synth::kCompiledEffects;
 inline constexpr synth::EffectSet kDefaultEffects = synth::kDefaultEffects;
 
 /// What supports take of a body's modes; filled when the banks are read, empty without losses.

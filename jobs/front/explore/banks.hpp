@@ -1,8 +1,6 @@
 // Banks of a page: packed if large, with the data that the page needs before loading them.
 #pragma once
 
-#include <json/json.h>
-
 #include <array>
 #include <cstddef>
 #include <filesystem>

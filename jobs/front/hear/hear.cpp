@@ -413,12 +413,12 @@ class Listening {
     base::Json scene = base::Json::object(), body = base::Json::object(), listener = base::Json::object();
     scene.set("duration_s", begin + gap * static_cast<double>(strikes.size() - 1) + std::clamp(ring, 0.5, 4.0));
     body.set("name", stem_).set("bank", sound.bank.filename().string()).set("fixed", true);
-    scene.set("bodies", base::Json::array()).member("bodies").add(body);
+    scene.set("bodies", base::Json::array())["bodies"].add(body);
     for (std::size_t k = 0; k < strikes.size(); ++k) {
       base::Json strike = base::Json::object();
       strike.set("time_s", begin + gap * static_cast<double>(k)).set("body", stem_);
       strike.set("point_m", base::Json::array(bank.vertices_m[strikes[k]])).set("mallet", order_.mallet);
-      scene.member("strikes").add(strike);
+      scene["strikes"].add(strike);
     }
     listener.set("position_m", base::Json::array(Vec3{middle[0], middle[1] - std::clamp(2.0 * size, 1.0, 500.0), middle[2]}));
     listener.set("look_at_m", base::Json::array(middle));

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <vector>
 
@@ -23,10 +24,13 @@ constexpr std::size_t kMaxNamedModes = 1000;  // rows of the table of modes
 constexpr std::size_t kMaxFaults = 20;        // per check
 constexpr std::size_t kBins = 6;              // of 10 degrees: the smallest angle of a triangle is at most 60 degrees
 
+/// null for infinity and NaN.
+base::Json to_json(double value) { return std::isfinite(value) ? base::Json(value) : base::Json(); }
+
 template <class Values>
-Json::Value make_list(const Values& values) {
-  Json::Value list(Json::arrayValue);
-  for (const auto& value : values) list.append(Json::Value(static_cast<double>(value)));
+base::Json make_list(const Values& values) {
+  base::Json list = base::Json::array();
+  for (const auto& value : values) list.add(to_json(static_cast<double>(value)));
   return list;
 }
 
@@ -69,22 +73,22 @@ std::string describe_bars(const bank::Bank& bank) {
   return bank.facet_error_cents.empty() ? text : text + "; " + bank::describe_facets(bank);
 }
 
-Json::Value make_modes(const bank::Bank& bank, const std::vector<bank::HeardMode>& heard) {
-  Json::Value modes;
+base::Json make_modes(const bank::Bank& bank, const std::vector<bank::HeardMode>& heard) {
+  base::Json modes;
   for (const char* key :
        {"freq_hz", "heard_hz", "decay_per_s", "material_per_s", "radiation_per_s", "supports_per_s", "correction", "kind"})
-    modes[key] = Json::arrayValue;
+    modes[key] = base::Json::array();
   for (std::size_t i = 0; i < bank.mode_count(); ++i) {
-    modes["freq_hz"].append(bank.freq_hz(i));
-    modes["heard_hz"].append(heard[i].freq_hz);
-    modes["decay_per_s"].append(heard[i].calc_decay_per_s());
-    modes["material_per_s"].append(heard[i].material_per_s);
-    if (!bank.multipoles.is_empty()) modes["radiation_per_s"].append(heard[i].radiation_per_s);
-    if (bank.supports.count() > 0) modes["supports_per_s"].append(heard[i].supports_per_s);
-    if (!bank.corrected.is_empty() && i < kMaxNamedModes) modes["correction"].append(bank::describe(bank.corrected.correction[i]));
+    modes["freq_hz"].add(to_json(bank.freq_hz(i)));
+    modes["heard_hz"].add(to_json(heard[i].freq_hz));
+    modes["decay_per_s"].add(to_json(heard[i].calc_decay_per_s()));
+    modes["material_per_s"].add(to_json(heard[i].material_per_s));
+    if (!bank.multipoles.is_empty()) modes["radiation_per_s"].add(to_json(heard[i].radiation_per_s));
+    if (bank.supports.count() > 0) modes["supports_per_s"].add(to_json(heard[i].supports_per_s));
+    if (!bank.corrected.is_empty() && i < kMaxNamedModes) modes["correction"].add(bank::describe(bank.corrected.correction[i]));
   }
   for (const bank::ModeKind& kind : bank::find_kinds(bank, std::min(kMaxNamedModes, bank.mode_count())))
-    modes["kind"].append(bank::describe(kind));
+    modes["kind"].add(bank::describe(kind));
   modes["bound_cents"] = make_list(bank.algebraic_error_cents);
   modes["body_cents"] = make_list(bank.discretisation_error_cents);
   modes["corrected_cents"] = make_list(bank.corrected.error_cents);
@@ -94,25 +98,25 @@ Json::Value make_modes(const bank::Bank& bank, const std::vector<bank::HeardMode
   return modes;
 }
 
-Json::Value make_proof(const bank::Proof& proof) {
-  Json::Value json;
+base::Json make_proof(const bank::Proof& proof) {
+  base::Json json;
   const std::size_t cuts = std::min({proof.cut_hz.size(), proof.below.size(), proof.margin.size()});
-  for (const char* key : {"cut_hz", "below", "margin"}) json[key] = Json::arrayValue;
+  for (const char* key : {"cut_hz", "below", "margin"}) json[key] = base::Json::array();
   for (std::size_t i = 0; i < cuts; ++i) {
-    json["cut_hz"].append(proof.cut_hz[i]);
-    json["below"].append(Json::Int64(proof.below[i]));
-    json["margin"].append(proof.margin[i]);
+    json["cut_hz"].add(to_json(proof.cut_hz[i]));
+    json["below"].add(proof.below[i]);
+    json["margin"].add(to_json(proof.margin[i]));
   }
-  json["orthonormality"] = proof.orthonormality;
-  json["backward_error"] = proof.backward_error;
+  json["orthonormality"] = to_json(proof.orthonormality);
+  json["backward_error"] = to_json(proof.backward_error);
   json["rigid"] = make_list(proof.rigid_per_component);
-  json["clusters"] = Json::UInt64(proof.cluster_first.size());
+  json["clusters"] = proof.cluster_first.size();
   json["method"] = proof.method;
   return json;
 }
 
 /// Edges and smallest angles of the triangles with finite corners; null without such triangles. An edge counts once per triangle.
-Json::Value make_surface(const bank::Bank& bank) {
+base::Json make_surface(const bank::Bank& bank) {
   double shortest_m = std::numeric_limits<double>::infinity(), longest_m = 0.0, sum_m = 0.0, smallest_deg = 180.0;
   std::array<std::int64_t, kBins> triangles{};
   std::int64_t count = 0;
@@ -136,7 +140,7 @@ Json::Value make_surface(const bank::Bank& bank) {
     ++triangles[std::min(static_cast<std::size_t>(angle_deg / 10.0), kBins - 1)];
     ++count;
   }
-  Json::Value json;
+  base::Json json;
   if (count == 0) return json;
   json["shortest_m"] = shortest_m;
   json["longest_m"] = longest_m;
@@ -147,7 +151,7 @@ Json::Value make_surface(const bank::Bank& bank) {
 }
 
 /// [name, bytes] of the parts of the file.
-Json::Value make_parts(const bank::Bank& bank, double file_bytes) {
+base::Json make_parts(const bank::Bank& bank, double file_bytes) {
   const double shapes = 2.0 * static_cast<double>(bank.shape.size());
   const double surface = 24.0 * static_cast<double>(bank.vertex_count()) + 12.0 * static_cast<double>(bank.triangles.size());
   const double bars =
@@ -155,41 +159,40 @@ Json::Value make_parts(const bank::Bank& bank, double file_bytes) {
   const double numbers = 8.0 * 6.0 * static_cast<double>(bank.mode_count()) + bars;
   const double record = static_cast<double>(bank.provenance.size() + bank.regions.size());
   const double rest = std::max(0.0, file_bytes - shapes - surface - numbers - record);
-  Json::Value parts(Json::arrayValue);
+  base::Json parts = base::Json::array();
   for (const auto& [name, bytes] : {std::pair{"shapes", shapes},
                                     {"surface", surface},
                                     {"numbers of modes", numbers},
                                     {"job and record", record},
                                     {"layout, views, rest", rest}}) {
-    Json::Value& part = parts.append(Json::arrayValue);
-    part.append(name);
-    part.append(bytes);
+    base::Json& part = parts.append();
+    part.add(name).add(bytes);
   }
   return parts;
 }
 
-Json::Value make_checks(const std::vector<bank::Check>& checks) {
-  Json::Value list(Json::arrayValue);
+base::Json make_checks(const std::vector<bank::Check>& checks) {
+  base::Json list = base::Json::array();
   for (const bank::Check& check : checks) {
-    Json::Value& json = list.append(Json::objectValue);
+    base::Json& json = list.append();
     json["property"] = check.property;
     json["figure"] = check.figure;
-    json["faults"] = Json::arrayValue;
-    for (std::size_t i = 0; i < std::min(check.faults.size(), kMaxFaults); ++i) json["faults"].append(check.faults[i]);
+    json["faults"] = base::Json::array();
+    for (std::size_t i = 0; i < std::min(check.faults.size(), kMaxFaults); ++i) json["faults"].add(check.faults[i]);
   }
   return list;
 }
 
 }  // namespace
 
-Json::Value make_figures(const fs::path& file, std::string& provenance) {
+base::Json make_figures(const fs::path& file, std::string& provenance) {
   const bank::Bank bank = bank::read_bank_unchecked(file);
   const std::vector<bank::Check> checks = bank::calc_checks(bank);
   const bool is_sound = is_valid(checks);
   std::error_code error;
   const std::uintmax_t bytes = fs::file_size(file, error);
   provenance = bank.provenance;
-  Json::Value json;
+  base::Json json;
   json["file"] = file.filename().string();
   json["bytes"] = error ? 0.0 : static_cast<double>(bytes);
   json["version"] = make_list(bank::read_version(file));
@@ -198,19 +201,19 @@ Json::Value make_figures(const fs::path& file, std::string& provenance) {
   json["origin"] = bank::name_origin(bank);
   json["band_hz"] = make_list(bank.band_hz);
   json["complete"] = bank.complete;
-  json["completeness"] = is_sound && bank.proof ? Json::Value(bank::describe_completeness(bank)) : Json::Value();
-  json["accuracy"] = is_sound ? describe_bars(bank) : "";
-  json["nodes"] = Json::Int64(bank.counts.nodes);
-  json["tets"] = Json::Int64(bank.counts.tets);
-  json["components"] = Json::Int64(bank.counts.components);
-  json["triangles"] = Json::UInt64(bank.triangles.size());
-  json["vertices"] = Json::UInt64(bank.vertex_count());
-  json["mass_kg"] = bank.rigid.mass_kg;
-  json["volume_m3"] = bank.rigid.volume_m3;
+  json["completeness"] = is_sound && bank.proof ? base::Json(bank::describe_completeness(bank)) : base::Json();
+  json["accuracy"] = is_sound ? describe_bars(bank) : std::string();
+  json["nodes"] = bank.counts.nodes;
+  json["tets"] = bank.counts.tets;
+  json["components"] = bank.counts.components;
+  json["triangles"] = bank.triangles.size();
+  json["vertices"] = bank.vertex_count();
+  json["mass_kg"] = to_json(bank.rigid.mass_kg);
+  json["volume_m3"] = to_json(bank.rigid.volume_m3);
   json["modes"] = make_modes(bank, find_heard(bank, is_sound));
-  json["proof"] = bank.proof ? make_proof(*bank.proof) : Json::Value();
+  json["proof"] = bank.proof ? make_proof(*bank.proof) : base::Json();
   json["surface"] = make_surface(bank);
-  json["parts"] = make_parts(bank, json["bytes"].asDouble());
+  json["parts"] = make_parts(bank, json["bytes"].as_double());
   json["checks"] = make_checks(checks);
   return json;
 }

@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <memory>
-
 #include "runtime/base/file.hpp"
 
 namespace carillon::report {
@@ -13,28 +11,13 @@ constexpr std::uint64_t kMaxBytes = 64 << 20;
 
 }  // namespace
 
-Json::Value parse_json(std::string_view text) {
-  Json::CharReaderBuilder builder;
-  builder["stackLimit"] = 64;
-  builder["failIfExtra"] = true;
-  const std::unique_ptr<Json::CharReader> reader(builder.newCharReader());
-  Json::Value value;
-  std::string errors;
-  try {
-    if (reader->parse(text.data(), text.data() + text.size(), &value, &errors)) return value;
-  } catch (const Json::Exception&) {  // nested too deep
-  }
-  return {};
-}
+base::Json parse_json(const std::string& text) { return base::Json::parse(text).value_or(base::Json()); }
 
-const Json::Value& find(const Json::Value& in, const char* key) {
-  return in.isObject() && in.isMember(key) ? in[key] : Json::Value::nullSingleton();
-}
+const base::Json& find(const base::Json& in, const char* key) { return in[key]; }
 
-std::optional<std::string> find_text(const Json::Value& in, const char* key) {
-  const Json::Value& value = find(in, key);
-  if (!value.isString()) return std::nullopt;
-  return value.asString();
+std::optional<std::string> find_text(const base::Json& in, const char* key) {
+  const base::Json& value = find(in, key);
+  return value.is_string() ? std::optional(value.as_string()) : std::nullopt;
 }
 
 Record read_record(const std::filesystem::path& resolved_job, const std::string& provenance) {
@@ -42,22 +25,22 @@ Record read_record(const std::filesystem::path& resolved_job, const std::string&
   if (!resolved_job.empty()) {
     try {
       record.job = parse_json(base::read_file(resolved_job, "resolved job", kMaxBytes));
-      if (!record.job.isObject()) record.remarks.emplace_back("The file of the resolved job is not a JSON object.");
+      if (!record.job.is_object()) record.remarks.emplace_back("The file of the resolved job is not a JSON object.");
     } catch (const InputError&) {
       record.remarks.emplace_back("The file of the resolved job cannot be read.");
     }
   }
-  if (!find(record.job, "run").isObject()) {
-    if (record.job.isObject()) record.remarks.emplace_back("The file of the resolved job holds no record of the run.");
-    Json::Value own = parse_json(provenance);
-    if (!record.job.isObject() && own.isObject()) record.job = own;
+  if (!find(record.job, "run").is_object()) {
+    if (record.job.is_object()) record.remarks.emplace_back("The file of the resolved job holds no record of the run.");
+    base::Json own = parse_json(provenance);
+    if (!record.job.is_object() && own.is_object()) record.job = own;
     record.run = find(own, "run");
-    if (!resolved_job.empty() && record.run.isObject()) record.remarks.emplace_back("The bank's own copy of the record is shown.");
+    if (!resolved_job.empty() && record.run.is_object()) record.remarks.emplace_back("The bank's own copy of the record is shown.");
   } else {
     record.run = record.job["run"];
   }
-  if (!record.job.isObject()) record.job = Json::Value();
-  if (!record.run.isObject()) record.run = Json::Value();
+  if (!record.job.is_object()) record.job = base::Json();
+  if (!record.run.is_object()) record.run = base::Json();
   return record;
 }
 

@@ -1,26 +1,25 @@
 // The record of a run: untrusted input.
 #pragma once
 
-#include <json/json.h>
-
 #include <filesystem>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
+
+#include "runtime/base/json.hpp"
 
 namespace carillon::report {
 
 /// Null for invalid JSON.
-Json::Value parse_json(std::string_view text);
+base::Json parse_json(const std::string& text);
 
 /// A member of an object; null if missing, or if `in` is not an object.
-const Json::Value& find(const Json::Value& in, const char* key);
-std::optional<std::string> find_text(const Json::Value& in, const char* key);
+const base::Json& find(const base::Json& in, const char* key);
+std::optional<std::string> find_text(const base::Json& in, const char* key);
 
 /// The resolved job of a bank and its member "run", each an object or null.
 struct Record {
-  Json::Value job, run;
+  base::Json job, run;
   std::vector<std::string> remarks;  // about missing or damaged parts
 };
 

@@ -23,8 +23,8 @@ namespace fs = std::filesystem;
 constexpr int kMaxDrawn = 12;  // limit of carillon-draw
 
 /// The mesh, surface or shape of the job, else the file name of the bank.
-std::string find_title(const Json::Value& job, const fs::path& bank) {
-  const Json::Value& body = find(job, "body");
+std::string find_title(const base::Json& job, const fs::path& bank) {
+  const base::Json& body = find(job, "body");
   for (const auto& name : {find_text(job, "mesh"), find_text(body, "surface"), find_text(body, "shape")}) {
     if (name && !fs::path(*name).filename().empty()) return fs::path(*name).filename().string();
   }
@@ -32,10 +32,10 @@ std::string find_title(const Json::Value& job, const fs::path& bank) {
 }
 
 /// {"file", "modes"}, or {"reason"} as a sentence.
-Json::Value draw(const Json::Value& figures, const fs::path& bank, const fs::path& folder, const Options& options) {
-  const int mode_count = static_cast<int>(std::min<Json::ArrayIndex>(figures["modes"]["heard_hz"].size(), kMaxDrawn));
+base::Json draw(const base::Json& figures, const fs::path& bank, const fs::path& folder, const Options& options) {
+  const int mode_count = static_cast<int>(std::min<std::size_t>(figures["modes"]["heard_hz"].size(), kMaxDrawn));
   const int modes = std::min({options.drawn_modes, kMaxDrawn, mode_count});
-  Json::Value json;
+  base::Json json;
   if (modes < 1) {
     std::error_code error;
     fs::remove(folder / kPictureFile, error);
@@ -55,27 +55,23 @@ Json::Value draw(const Json::Value& figures, const fs::path& bank, const fs::pat
 }
 
 /// Escapes control and bidirectional characters and invalid UTF-8 in all strings and keys.
-Json::Value clean(const Json::Value& value) {
-  if (value.isString()) return base::printable(value.asString());
-  if (value.isArray()) {
-    Json::Value list(Json::arrayValue);
-    for (const Json::Value& member : value) list.append(clean(member));
+base::Json clean(const base::Json& value) {
+  if (value.is_string()) return base::printable(value.as_string());
+  if (value.is_array()) {
+    base::Json list = base::Json::array();
+    for (const base::Json& member : value) list.add(clean(member));
     return list;
   }
-  if (!value.isObject()) return value;
-  Json::Value object(Json::objectValue);
-  for (const std::string& key : value.getMemberNames()) object[base::printable(key)] = clean(value[key]);
+  if (!value.is_object()) return value;
+  base::Json object = base::Json::object();
+  for (const std::string& key : value.keys()) object[base::printable(key)] = clean(value[key]);
   return object;
 }
 
-/// JSON for an HTML script element: no "<". Infinite numbers become 1e+9999, NaN null.
-std::string write_data(const Json::Value& data) {
-  Json::StreamWriterBuilder writer;
-  writer["indentation"] = "";
-  writer["precision"] = 17;
-  writer["emitUTF8"] = true;
+/// JSON for an HTML script element: no "<".
+std::string write_data(const base::Json& data) {
   std::string text;
-  for (const char letter : Json::writeString(writer, data)) {
+  for (const char letter : data.line()) {
     if (letter == '<')
       text += "\\u003c";
     else
@@ -93,15 +89,14 @@ std::string fill(std::string_view page, std::string_view mark, std::string_view 
 
 void write_report(const fs::path& bank, const fs::path& resolved_job, const fs::path& folder, const Options& options) {
   std::string provenance;
-  Json::Value data;
+  base::Json data;
   data["bank"] = make_figures(bank, provenance);
   Record record = read_record(resolved_job, provenance);
   data["title"] = options.title.empty() ? find_title(record.job, bank) : options.title;
-  if (record.job.isObject()) record.job.removeMember("run");
+  if (record.job.is_object()) record.job.erase("run");
   data["job"] = record.job;
   data["run"] = record.run;
-  data["remarks"] = Json::arrayValue;
-  for (const std::string& remark : record.remarks) data["remarks"].append(remark);
+  data["remarks"] = base::Json::array(record.remarks);
   data["explorer"] = options.explorer;
   std::error_code error;
   fs::create_directories(folder, error);

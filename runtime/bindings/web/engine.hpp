@@ -61,7 +61,6 @@ class Engine {
   void swap_model(int body, int model);
   /// One mode of a body alone, by its number in the bank; -1: all.
   void set_solo(int body, int bank_mode);
-  void set_effects(int body, synth::EffectSet effects);
   void remove_body(int body);
 
   /// Interactive events (event_words.hpp). Returns how many could not be played; find_fault() has the reason of the last one. Throws

@@ -21,7 +21,7 @@ TEST(Show, numbers) {
   EXPECT_EQ(format_bytes(999), "999 B");
   EXPECT_EQ(format_bytes(1.25e9), "1.2 GB");
   EXPECT_EQ(to_json_time(0).isNull(), true);
-  EXPECT_EQ(to_json_time(1e9).asString(), "2001-09-09T01:46:40Z");
+  EXPECT_EQ(to_json_time(1e9).as_string(), "2001-09-09T01:46:40Z");
 }
 
 TEST(Follow, exit_code) {

@@ -15,15 +15,15 @@
 #include <numbers>
 #include <string>
 
-#include "runtime/base/error.hpp"
 #include "runtime/acoustics/head/sofa.hpp"
-#include "runtime/scene/microphones.hpp"
+#include "runtime/base/error.hpp"
 #include "runtime/render/report.hpp"
 #include "runtime/render/sound_file.hpp"
+#include "runtime/scene/microphones.hpp"
 #include "tests/support/folder.hpp"
 #include "tests/support/paths.hpp"
 #include "tests/unit/runtime/acoustics/head/oracle.hpp"
-#include "tests/unit/runtime/scene/heard.hpp"
+#include "tests/unit/runtime/render/heard.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 #include "tests/unit/runtime/synth/multipole_cube.hpp"
 
@@ -154,7 +154,7 @@ TEST(Render, AsManyModesRingAtOnceAsTheSceneAllows) {
   std::vector<testing::InventedMode> modes;
   for (int i = 0; i < 64; ++i) modes.push_back({400.0 + 150.0 * i, 2.0, 1.0 / (1.0 + i)});
   Case c(modes, {3.0, 0.0, 0.0}, 0.01);
-  const RenderOptions options{.rate_hz = 48000, .measures = true};
+  const RenderOptions options{.rate_hz = 48000};
   const auto count_mode_samples = [&](const Sound& sound) { return sound.effect_counters[0].units[synth::Effect::kModal]; };
   const auto all = count_mode_samples(calc_sound(c.scene, {&c.bank}, c.list_events(), options));
   c.scene.quality.modes = 16;
@@ -380,7 +380,8 @@ TEST(Render, ASceneWithoutContactsIsSilentAndStaysFinite) {
   EXPECT_EQ(wav.find_first_not_of('\0', wav.size() - 24000 * 6), std::string::npos);
   Figures figures;
   c.scene.bodies[0].spec.bank = &c.bank;
-  const scene::Plan plan = scene::make_plan(scene::make_facts(c.scene, scene::make_microphones(c.scene), true), scene::make_events(c.list_events()), {});
+  const scene::Plan plan =
+      scene::make_plan(scene::make_facts(c.scene, scene::make_microphones(c.scene), true), scene::make_events(c.list_events()), {});
   EXPECT_NE(make_report_json(c.scene, sound, plan, figures).find("\"mean_db_spl\": null"), std::string::npos);
 }
 

@@ -334,16 +334,14 @@ TEST(Scene, SurfacesAreAsRoughAsTheySay) {
 TEST(Scene, QualityIsReadAndWithoutItNothingChanges) {
   const Quality usual = parse("{\"duration_s\": 2, " + kBody + "}").quality;
   EXPECT_EQ(usual.thresholds.audible_share, effects::kAudibleShare);
-  EXPECT_EQ(usual.thresholds.lead_s, effects::kLeadS);
   EXPECT_FALSE(usual.silence_pa.has_value() || usual.modes.has_value());
   EXPECT_EQ(usual.contact_step_s, physics::WorldOptions{}.contact_step_s);
   EXPECT_EQ(usual.instructions, synth::Isa::kBest);
-  const Quality quality = parse("{\"duration_s\": 2, " + kBody + R"(, "quality": {"planner_db": -70, "quiet_db": 90, "lead_s": 0.1,
+  const Quality quality = parse("{\"duration_s\": 2, " + kBody + R"(, "quality": {"planner_db": -70, "quiet_db": 90,
     "silence_pa": 1e-6, "modes": 320, "contact_step_s": 1e-4, "instructions": "avx2"}})")
                               .quality;
   EXPECT_NEAR(quality.thresholds.audible_share, 1e-7, 1e-16);
   EXPECT_EQ(quality.thresholds.below_loudest_db, 90.0);
-  EXPECT_EQ(quality.thresholds.lead_s, 0.1);
   EXPECT_EQ(quality.silence_pa, 1e-6);
   EXPECT_EQ(quality.modes, 320);
   EXPECT_EQ(quality.contact_step_s, 1e-4);

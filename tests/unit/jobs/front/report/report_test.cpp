@@ -16,11 +16,11 @@ TEST(Record, file_before_the_copy_in_the_bank) {
   const std::string bank = R"({"mesh": "bank.msh", "run": {"ranks": 1}})";
   const Record whole = read_record(folder.write("a.json", R"({"mesh": "file.msh", "run": {"ranks": 2}})"), bank);
   EXPECT_EQ(find_text(whole.job, "mesh"), "file.msh");
-  EXPECT_EQ(whole.run["ranks"].asInt(), 2);
+  EXPECT_EQ(whole.run["ranks"].as_double(), 2);
   EXPECT_TRUE(whole.remarks.empty());
   const Record without_run = read_record(folder.write("b.json", R"({"mesh": "file.msh"})"), bank);
   EXPECT_EQ(find_text(without_run.job, "mesh"), "file.msh");
-  EXPECT_EQ(without_run.run["ranks"].asInt(), 1);
+  EXPECT_EQ(without_run.run["ranks"].as_double(), 1);
   EXPECT_EQ(without_run.remarks.size(), 2u);
   for (const std::string& text : {std::string(), std::string("[1]"), std::string("{\"a\":"), std::string(100000, '[')}) {
     const Record damaged = read_record(folder.write("c.json", text), bank);
@@ -28,7 +28,7 @@ TEST(Record, file_before_the_copy_in_the_bank) {
     EXPECT_FALSE(damaged.remarks.empty());
   }
   const Record none = read_record("", "");
-  EXPECT_TRUE(none.job.isNull() && none.run.isNull());
+  EXPECT_TRUE(none.job.is_null() && none.run.is_null());
 }
 
 TEST(Report, page_holds_the_data_without_markup) {
@@ -36,7 +36,7 @@ TEST(Report, page_holds_the_data_without_markup) {
   const bank::Bank bank = bank::example::make_mounted_bank();
   bank::write_bank(bank, folder / "b.hdf");
   std::string provenance;
-  const Json::Value figures = make_figures(folder / "b.hdf", provenance);
+  const base::Json figures = make_figures(folder / "b.hdf", provenance);
   EXPECT_EQ(figures["modes"]["freq_hz"].size(), bank.mode_count());
   EXPECT_EQ(figures["checks"].empty(), false);
   const std::string job = R"({"mesh": "</script><script>alert(1)</script>\u202e", "run": {}})";
