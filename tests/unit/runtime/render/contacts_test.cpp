@@ -122,7 +122,8 @@ TEST(PlannedContacts, KeepTheRingUntilItIsNotHeard) {
   for (const Contacts& of : kCases) {
     const Stage stage;
     const std::vector<events::Event> events = of.list_events();
-    const scene::Plan plan = scene::make_plan(scene::make_facts(stage.scene, scene::make_microphones(stage.scene), true), scene::make_events(events), {});
+    const scene::Plan plan =
+        scene::make_plan(scene::make_facts(stage.scene, scene::make_microphones(stage.scene), true), scene::make_events(events), {});
     const Heard all = stage.play_all(events), planned = calc_sound(stage.scene, stage.list_banks(), events, {.plan = &plan});
     const Difference difference = compare(planned, all);
     EXPECT_GT(difference.whole_pa2_s, 0.2 * std::pow(10.0, 4.0) * kReferencePa * kReferencePa) << of.name << ": 40 dB are not to be heard";

@@ -15,11 +15,11 @@
 #include <numbers>
 #include <string>
 
-#include "runtime/base/error.hpp"
 #include "runtime/acoustics/head/sofa.hpp"
-#include "runtime/scene/microphones.hpp"
+#include "runtime/base/error.hpp"
 #include "runtime/render/report.hpp"
 #include "runtime/render/sound_file.hpp"
+#include "runtime/scene/microphones.hpp"
 #include "tests/support/folder.hpp"
 #include "tests/support/paths.hpp"
 #include "tests/unit/runtime/acoustics/head/oracle.hpp"
@@ -380,7 +380,8 @@ TEST(Render, ASceneWithoutContactsIsSilentAndStaysFinite) {
   EXPECT_EQ(wav.find_first_not_of('\0', wav.size() - 24000 * 6), std::string::npos);
   Figures figures;
   c.scene.bodies[0].spec.bank = &c.bank;
-  const scene::Plan plan = scene::make_plan(scene::make_facts(c.scene, scene::make_microphones(c.scene), true), scene::make_events(c.list_events()), {});
+  const scene::Plan plan =
+      scene::make_plan(scene::make_facts(c.scene, scene::make_microphones(c.scene), true), scene::make_events(c.list_events()), {});
   EXPECT_NE(make_report_json(c.scene, sound, plan, figures).find("\"mean_db_spl\": null"), std::string::npos);
 }
 

@@ -14,8 +14,8 @@
 #include "runtime/scene/scene.hpp"
 #include "tests/support/catch_message.hpp"
 #include "tests/support/folder.hpp"
-#include "tests/unit/runtime/render/heard.hpp"
 #include "tests/unit/runtime/acoustics/recording/make_surface.hpp"
+#include "tests/unit/runtime/render/heard.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 
 namespace carillon::render {
@@ -34,15 +34,17 @@ class Surfaces : public ::testing::Test {
  protected:
   /// A scene of 0.1 s at 48 kHz, with these bodies and more root keys.
   scene::Scene read(const std::string& bodies, const std::string& root = R"("microphones": [[0.5, 0, 0], [0, 0.7, 0.2]])") {
-    scene::Scene scene =
-        scene::parse_scene(base::parse_document("{\"duration_s\": 0.1, \"bodies\": [" + bodies + "], " + root + "}", folder / "scene.json"));
+    scene::Scene scene = scene::parse_scene(
+        base::parse_document("{\"duration_s\": 0.1, \"bodies\": [" + bodies + "], " + root + "}", folder / "scene.json"));
     read_surfaces(scene);
     return scene;
   }
   void write(const std::string& name, const Ball& ball, const recording::testing::BallOptions& options = {}) {
     folder.write(name, recording::testing::make_ball_surface(ball, options));
   }
-  static std::vector<std::vector<double>> hear(const scene::Scene& scene) { return calc_sound(scene, {}, {}, {.rate_hz = 48000}).pressure_pa; }
+  static std::vector<std::vector<double>> hear(const scene::Scene& scene) {
+    return calc_sound(scene, {}, {}, {.rate_hz = 48000}).pressure_pa;
+  }
 
   tests::Folder folder;
 };

@@ -66,7 +66,8 @@ TEST(EventPlayback, PushesForcesBeforeTheyBegin) {
   for (int i = 0; i < 200; ++i) events.emplace_back(events::Force{.time_s = 0.05 + 5e-4 * i, .step_s = 1e-4, .count = 1});
   events.emplace_back(events::Force{.time_s = 0.2, .step_s = 1e-4, .body = 3, .count = 1});
   const Events kept = make_events(events);
-  render::EventPlayback playback(kept, {{.number = body, .moves = true, .lead_s = model->get_sphere_radius_m() / synth::kSoundSpeedMs}}, {});
+  render::EventPlayback playback(kept, {{.number = body, .moves = true, .lead_s = model->get_sphere_radius_m() / synth::kSoundSpeedMs}},
+                                 {});
   play(synthesiser, playback, 0.2);
   const synth::SynthesiserCounters counters = synthesiser.get_counters();
   EXPECT_EQ(counters.strikes, 1 + 200);
