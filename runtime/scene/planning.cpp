@@ -58,8 +58,8 @@ effects::SceneFacts make_facts(const Scene& scene, const Microphones& microphone
 }
 
 Plan make_plan(effects::SceneFacts facts, const Events& events, const effects::Costs& costs) {
-  // The selector may decide about what no event can change any more: a strike calls for effects half its pulse before it, and so much
-  // earlier as its click takes to cross the body.
+  // The selector may decide up to a time that no later event can affect: a strike needs effects half its pulse and the travel time of its
+  // click across the body earlier.
   constexpr double kDisorderS = 1.0;  // EventPlayback
   constexpr double kLargestCrossingS = 1.0;
   constexpr double kEveryS = 0.1;
@@ -82,11 +82,11 @@ Plan make_plan(effects::SceneFacts facts, const Events& events, const effects::C
       plan.changes.push_back(std::move(change));
     }
   };
-  if (first_listener) plan.selector.watch(*first_listener);  // that the listener walks holds from the beginning
+  if (first_listener) plan.selector.watch(*first_listener);  // the listener moves from the beginning
   double decided_s = 0.0;
   events.for_each([&](const events::Event& event) {
     if (first_listener && std::holds_alternative<events::Listener>(event))
-      first_listener.reset();  // seen
+      first_listener.reset();  // already seen
     else
       plan.selector.watch(event);
     const double known_s = events::get_time_s(event) - behind_s;

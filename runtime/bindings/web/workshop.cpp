@@ -1,7 +1,5 @@
-// Method:     scenes are read by scene::parse_scene, blows made by scene::make_strikes, plans by scene::make_plan, so that all of it is what
-//             carillon-render does; a body's bank is the file's as edited, then what scene::read_banks makes of it.
-// Source:     none.
-// Deviations: a blow meets a body at rest: what rings is in the memory of the engine. A plan is made of what has happened so far.
+// Method: scenes, blows and plans use scene::parse_scene, scene::make_strikes and scene::make_plan, as carillon-render does. A body's bank
+// is the edited file after scene::read_banks. Blows meet a body at rest, since its ringing state is in the engine. Plans cover past events.
 #include "runtime/bindings/web/workshop.hpp"
 
 #include <fmt/format.h>
@@ -11,13 +9,18 @@
 #include <limits>
 #include <utility>
 
+#include "runtime/acoustics/radiation/gains.hpp"
 #include "runtime/bank/corrected.hpp"
 #include "runtime/bank/edits.hpp"
+#include "runtime/bank/mounting/heard.hpp"
 #include "runtime/bank/of_material.hpp"
 #include "runtime/bank/surface.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/json.hpp"
+#include "runtime/bindings/web/event_words.hpp"
+#include "runtime/material/mallets.hpp"
+#include "runtime/material/table.hpp"
 #include "runtime/scene/effects/table.hpp"
 #include "runtime/scene/events.hpp"
 #include "runtime/scene/microphones.hpp"
@@ -26,12 +29,7 @@
 #include "runtime/scene/recorded_bodies.hpp"
 #include "runtime/scene/session.hpp"
 #include "runtime/scene/strikes.hpp"
-#include "runtime/material/mallets.hpp"
-#include "runtime/material/table.hpp"
-#include "runtime/acoustics/radiation/gains.hpp"
-#include "runtime/bank/mounting/heard.hpp"
 #include "runtime/synth/effects.hpp"
-#include "runtime/bindings/web/event_words.hpp"
 
 namespace carillon::web {
 namespace {
@@ -44,7 +42,7 @@ constexpr std::size_t kMostEvents = std::size_t{1} << 30;  // bytes of a plan's 
 
 Json to_json(const Vec3& x) { return Json::array(x); }
 
-/// The modes of a bank for playing, as JSON; unknown `error_cents` and `radiation_per_s` are null. `heard`: of mounting::mount().
+/// Modes of a bank for playback, as JSON; unknown `error_cents` and `radiation_per_s` are null. `heard`: of mounting::mount().
 Json list_modes(const bank::Bank& bank, const std::vector<bank::HeardMode>& heard) {
   Json modes = Json::array();
   for (std::size_t m = 0; m < bank.mode_count(); ++m) {
@@ -65,7 +63,7 @@ Json list_modes(const bank::Bank& bank, const std::vector<bank::HeardMode>& hear
   return modes;
 }
 
-/// A law with all its losses times `scale`; of Rayleigh's the constants are those of the edits or of the material.
+/// A damping law with all losses times `scale`; Rayleigh constants come from the edits or the material.
 void scale_damping(double scale, const bank::Bank& bank, bank::Edits& edits) {
   if (scale == 1.0) return;
   if (!edits.damping && !edits.alphas) {
@@ -81,7 +79,7 @@ void scale_damping(double scale, const bank::Bank& bank, bank::Edits& edits) {
   for (double& loss : edits.damping->loss_factor) loss *= scale;
 }
 
-/// Nothing: the bank as it is.
+/// Empty: the unmodified bank.
 std::optional<bank::Edits> read_edits(const bank::Bank& bank, std::string_view text) {
   const base::Document document = base::parse_document(text, "edit");
   base::Object object = document.root();
@@ -146,18 +144,18 @@ Vec3 find_point(const bank::Bank& bank, std::int32_t triangle, const Vec3& baryc
   return point;
 }
 
-/// Out of the body; not of unit length where the triangle has no area.
+/// Outward, not of unit length; degenerate triangles included.
 Vec3 find_normal(const bank::Bank& bank, std::int32_t triangle) {
   const Vec3 across = bank::calc_normal(bank.vertices_m, bank.triangles[triangle]);
   return (1.0 / std::max(norm(across), 1e-300)) * across;
 }
 
-/// The radius of the patch under 1 N of each mallet's head; it grows with the cube root of the force (Hertz).
+/// Contact radius under 1 N for each mallet head; it grows with the cube root of the force (Hertz).
 Json list_patches(const bank::Bank& bank) {
   Json patches = Json::object();
   const bank::Material& body = bank.material;
   for (const material::NamedMallet& mallet : material::get_mallets()) {
-    double radius_m = mallet.radius_m, modulus_pa = 1e7;  // of felt: about that of dense felt
+    double radius_m = mallet.radius_m, modulus_pa = 1e7;  // felt: modulus of dense felt
     if (mallet.radius_m > 0.0) {
       const material::Material& head = material::MaterialTable::get().require("mallet", mallet.material).material;
       modulus_pa = head.young_modulus_pa / (1.0 - head.poisson_ratio * head.poisson_ratio);
@@ -189,7 +187,7 @@ std::string Workshop::list_choices() const {
                                       .set("restitution", mallet.restitution));
   }
   for (const material::Row& row : material::MaterialTable::get().rows()) {
-    if (row.material.orthotropic) continue;  // no edit makes them of another
+    if (row.material.orthotropic) continue;  // edits keep materials isotropic
     choices.member("materials")
         .add(Json::object()
                  .set("name", row.material.name)
@@ -261,7 +259,7 @@ std::string Workshop::make_body(int body, int bank, std::string_view scene, std:
   scene::SceneBody& described = made.scene.bodies[0];
   std::vector<bank::HeardMode> heard;
   try {
-    // As scene::read_banks does it, of an edited bank.
+    // As in scene::read_banks, for an edited bank.
     const std::optional<bank::Edits> wanted = read_edits(*as_read, edits);
     auto played = std::make_shared<bank::Bank>(
         bank::choose_frequencies(wanted ? bank::calc_edited(*as_read, *wanted) : *as_read, made.scene.frequencies));
@@ -313,7 +311,7 @@ std::string Workshop::make_body(int body, int bank, std::string_view scene, std:
 
 namespace {
 
-/// The scenes' facts with the banks that bodies are played with.
+/// Scene facts with the banks that the bodies play.
 effects::SceneFacts make_scene_facts(const scene::Scene& scene) {
   const auto moves = [](const scene::SceneBody& body) { return !body.spec.fixed; };
   return scene::make_facts(scene, scene::make_microphones(scene), std::any_of(scene.bodies.begin(), scene.bodies.end(), moves));
@@ -324,17 +322,17 @@ effects::SceneFacts make_scene_facts(const scene::Scene& scene) {
 synth::EffectSet Workshop::find_possible(int body) const {
   scene::Scene scene = get_body(body).scene;
   const effects::EffectSelector selector(make_scene_facts(scene));
-  // The listener of a page moves and bodies are touched, even where the scene has neither.
+  // A page's listener moves and bodies are touched, even if the scene has neither.
   synth::EffectSet possible = selector.get_possible(0);
   const effects::EffectOverrides& overrides = scene.bodies[0].overrides;
   if (overrides.automatic) {
     for (const synth::Effect effect : synth::kDefaultEffects.with(synth::kContactEffects))
       if (!overrides.off.has(effect)) possible = possible.with(effect);
   }
-  // Models that are read from tables have no transfers and no nonlinear energy, and a page has no floor that reflects and no heads.
+  // Models read from tables have neither transfers nor nonlinear energy; pages have neither reflecting floors nor heads.
   return scene::find_effects(scene, 0,
-                            possible.without({synth::Effect::kDirectivity, synth::Effect::kGroundReflection, synth::Effect::kHead,
-                                              synth::Effect::kNonlinear, synth::Effect::kCascade}));
+                             possible.without({synth::Effect::kDirectivity, synth::Effect::kGroundReflection, synth::Effect::kHead,
+                                               synth::Effect::kNonlinear, synth::Effect::kCascade}));
 }
 
 std::string Workshop::make_blow(int body, std::string_view scene, std::int32_t triangle, const Vec3& barycentric,
@@ -392,7 +390,7 @@ void Workshop::make_ping(int body, int mode, double pressure_pa, int number, std
     }
   }
   const double per_n_s = std::abs(b.radiation_gain[mode]) * largest;
-  if (!(per_n_s > 0.0)) return;  // it is not heard
+  if (!(per_n_s > 0.0)) return;  // inaudible
   impulse.impulse_n_s = (std::min(pressure_pa / per_n_s, kHardestPing) / largest) * shape;
   append_words(words, impulse, Timing::kSoon);
 }

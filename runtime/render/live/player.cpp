@@ -1,7 +1,5 @@
-// Method:     one thread runs the physics in slices until it is `look_ahead_s` ahead of the card and pushes its events as they fall due;
-//             the card's thread plays them. Where physics falls behind, impulses act late, which is counted.
-// Source:     none.
-// Deviations: none.
+// Method: one thread advances the physics in slices until it is `look_ahead_s` ahead of the card, and pushes events when due; the card's
+// thread plays them. If physics falls behind, impulses act late and are counted.
 #include "runtime/render/live/player.hpp"
 
 #include <fmt/core.h>
@@ -16,40 +14,38 @@
 
 #include "runtime/base/clock.hpp"
 #include "runtime/base/printable.hpp"
-#include "runtime/physics/world.hpp"
 #include "runtime/events/events.hpp"
+#include "runtime/physics/world.hpp"
+#include "runtime/render/live/device.hpp"
+#include "runtime/render/live/schedule.hpp"
+#include "runtime/render/render.hpp"
+#include "runtime/render/surface_playback.hpp"
 #include "runtime/scene/banks.hpp"
 #include "runtime/scene/event_scheduler.hpp"
 #include "runtime/scene/events.hpp"
 #include "runtime/scene/planning.hpp"
-#include "runtime/render/render.hpp"
 #include "runtime/scene/scene.hpp"
 #include "runtime/scene/session.hpp"
 #include "runtime/scene/strikes.hpp"
-#include "runtime/render/surface_playback.hpp"
-#include "runtime/render/live/device.hpp"
-#include "runtime/render/live/schedule.hpp"
 #include "runtime/synth/load_keeper.hpp"
 #include "runtime/synth/synthesiser.hpp"
 
 namespace carillon::live {
 namespace {
 
-constexpr double kSliceS = 0.01;   // of CPU time for physics, between two looks at the ring
-constexpr double kChangeS = 0.03;  // by which a change of effects is sent before the events that call for it
-constexpr double kMarginS = 0.01;  // by which waypoints and records of contacts are pushed earlier than strikes
-// Events are pushed at most this long before they are due, however far physics is in front: the synthesiser has room for what waits so
-// long.
+constexpr double kSliceS = 0.01;   // CPU time of physics between two checks of the ring
+constexpr double kChangeS = 0.03;  // lead of a change of effects over the events that need it
+constexpr double kMarginS = 0.01;  // lead of waypoints and contact records over strikes
+// Longest time that a pushed event waits; bounds the synthesiser's queues, however far ahead the physics is.
 constexpr double kPushedS = 0.25;
-constexpr int kMaxStrikes = 1024, kMaxForces = 2048;  // of a body that wait or act
+constexpr int kMaxStrikes = 1024, kMaxForces = 2048;  // per body, waiting or active
 constexpr int kMaxWaypoints = 1024, kRingEvents = 1 << 14;
 
 void warn(const std::vector<std::string>& warnings) {
   for (const std::string& warning : warnings) fmt::print(stderr, "carillon-live: warning: {}\n", base::printable(warning));
 }
 
-/// The physics of a scene, advanced in slices ahead of the sound. Every event goes to the selector and the scheduler once, in order of
-/// time.
+/// Physics of a scene, advanced in slices ahead of the sound. Every event goes once, in order of time, to the selector and the scheduler.
 class Physics {
  public:
   Physics(const scene::Scene& scene, effects::EffectSelector& selector, scene::EventScheduler& scheduler)
@@ -58,17 +54,17 @@ class Physics {
     try {
       world_ =
           std::make_unique<physics::World>(scene::make_world(scene), physics::WorldOptions{.contact_step_s = scene.quality.contact_step_s,
-                                                                                          .joint_tolerance = scene.quality.joint_tolerance,
-                                                                                          .end_s = scene.duration_s,
-                                                                                          .modes = scene.quality.modes_in_impacts,
-                                                                                          .masks_hits = scene.quality.masking,
-                                                                                          .lasting_contacts = selector.needs_contacts()});
+                                                                                           .joint_tolerance = scene.quality.joint_tolerance,
+                                                                                           .end_s = scene.duration_s,
+                                                                                           .modes = scene.quality.modes_in_impacts,
+                                                                                           .masks_hits = scene.quality.masking,
+                                                                                           .lasting_contacts = selector.needs_contacts()});
     } catch (const InputError& error) {
       throw InputError(fmt::format("{}: {}", scene.file.string(), error.what()));
     }
   }
 
-  /// Advances towards a time, for a slice of CPU time. False when there is nothing to do: physics goes by whole windows, the last of which
+  /// Advances towards a time for one slice of CPU time. False if nothing is to be done: physics advances by whole windows, and the last one
   /// may have to wait.
   bool advance(double until_s) {
     if (world_ == nullptr || time_s_ >= std::min(until_s, end_s_)) return false;
@@ -82,13 +78,13 @@ class Physics {
     window_cpu_s_ += now_s - counted_s_;
     return time_s_ > was_s || now_s - began_s >= kSliceS;
   }
-  /// The most CPU time that a window of the physics, 2 ms of the scene, has taken.
+  /// Largest CPU time of one window of physics (2 ms of scene time).
   double get_worst_window_s() const { return worst_window_s_; }
-  /// Up to where all events are known.
+  /// Time up to which all events are known.
   double get_time_s() const { return world_ == nullptr || time_s_ >= end_s_ ? std::numeric_limits<double>::infinity() : time_s_; }
 
  private:
-  /// The physics marks the end of each window.
+  /// Physics marks the end of each window.
   void end_window() {
     const double now_s = base::get_thread_cpu_s();
     worst_window_s_ = std::max(worst_window_s_, window_cpu_s_ + now_s - counted_s_);
@@ -103,11 +99,11 @@ class Physics {
   double window_cpu_s_ = 0.0, worst_window_s_ = 0.0, counted_s_ = 0.0;
 };
 
-/// How far in front of the sound things are done. A body has its effects kChangeS before the first event that calls for them is pushed.
+/// Lead times over the sound. Effects of a body are set kChangeS before the first event that needs them is pushed.
 struct Lead {
   double look_ahead_s;  // physics
-  bool plans;           // physics is known so far ahead that the selector can decide; else all bodies have what they may ever need
-  double changed_s;     // effects: planned lead_s before the events that call for them, sent by so much ahead
+  bool plans;           // the lead suffices for the selector; else each body has all effects it may need
+  double changed_s;     // effects: planned lead_s before the events that need them, sent this much ahead
   double pushed_s;      // events
 
   Lead(double look_ahead, double selector_lead_s)
@@ -117,7 +113,7 @@ struct Lead {
         pushed_s(std::min(kPushedS, plans ? changed_s + selector_lead_s - kChangeS - kMarginS : look_ahead)) {}
 };
 
-/// A scene on its way to a device: physics, plan, events and sound, each so far in front of the next as Lead says.
+/// Playback pipeline: physics, plan, events, sound, each ahead of the next by the times in Lead.
 class Player {
  public:
   Player(const scene::Scene& scene, const std::vector<const bank::Bank*>& banks, const PlayerOptions& options)
@@ -142,18 +138,18 @@ class Player {
 
   synth::Synthesiser& get_synthesiser() { return *synthesiser_; }
 
-  /// Adds the bodies, with what they need at the start, and pushes the first events.
+  /// Adds the bodies with their initial effects and pushes the first events.
   void begin() {
     while (advance(lead_.look_ahead_s)) {
     }
-    std::vector<synth::EffectSet> first;  // without time to plan, all that a body might call for
+    std::vector<synth::EffectSet> first;  // without planning: all effects that a body might need
     for (std::size_t i = 0; i < scene_->bodies.size(); ++i) first.push_back(selector_.get_possible(static_cast<int>(i)));
     if (lead_.plans) schedule_.apply(0.0, lead_.changed_s, [&](std::size_t body, synth::EffectSet effects) { first[body] = effects; });
     for (std::size_t i = 0; i < first.size(); ++i) session_.add_body(session_.make_settings(i, scene::find_effects(*scene_, i, first[i])));
     push(0.0);
   }
 
-  /// What is to be done when the sound has come to a time. False when physics need not advance.
+  /// Work when the sound has reached a time. False if the physics need not advance.
   bool step(double now_s) {
     const bool advanced = advance(now_s + lead_.look_ahead_s);
     min_lead_s_ = std::min(min_lead_s_, physics_.get_time_s() - synthesiser_->get_time_s());
@@ -166,7 +162,7 @@ class Player {
     return advanced;
   }
 
-  /// How far physics was in front of the sound at the worst; infinite for a scene without physics.
+  /// Smallest lead of the physics over the sound; infinite without physics.
   double get_min_lead_s() const { return min_lead_s_; }
   double get_worst_window_s() const { return physics_.get_worst_window_s(); }
   std::int64_t get_faults() const { return scheduler_.get_faults(); }
@@ -192,7 +188,7 @@ class Player {
     return session_.open(room);
   }
 
-  /// The selector decides as the physics advances, so that it keeps few events.
+  /// The selector decides as the physics advances, so few events are kept.
   bool advance(double until_s) {
     const bool advanced = physics_.advance(until_s);
     if (!lead_.plans) return advanced;
@@ -200,7 +196,7 @@ class Player {
     return advanced;
   }
 
-  /// What does not fit into the ring waits.
+  /// Events that do not fit into the ring wait.
   void push(double now_s) {
     scheduler_.push_until(now_s + lead_.pushed_s, physics_.get_time_s(),
                           [this](const events::Event& event) { return synthesiser_->push(event); });

@@ -1,4 +1,4 @@
-// Effects that are planned before they change.
+// Effects planned ahead of time.
 #pragma once
 
 #include <cstddef>
@@ -11,15 +11,15 @@
 
 namespace carillon::live {
 
-/// The effects that bodies are to have, as they were planned: a body has all that it is to have within some time, so that what makes its
-/// sound is there before the events are, and stays until the last of them is heard.
+/// Planned effects of the bodies over time. A body has all effects planned within a period, so that they exist before the events and remain
+/// until the last of them is heard.
 class Schedule {
  public:
   explicit Schedule(std::size_t bodies) : of_(bodies) {}
 
   void add(const effects::EffectChange& change) { of_[change.body].steps.push_back({change.time_s, change.effects}); }
 
-  /// Calls `set(body, effects)` for each body whose effects from `now_s` to `until_s` are not what it was given last.
+  /// Calls `set(body, effects)` for each body whose effects between `now_s` and `until_s` differ from those set last.
   template <typename Set>
   void apply(double now_s, double until_s, Set&& set) {
     for (std::size_t body = 0; body < of_.size(); ++body) {
