@@ -1,4 +1,4 @@
-// When the effects that were planned come to a body.
+// Times at which planned effects reach a body.
 #include "runtime/render/live/schedule.hpp"
 
 #include <gtest/gtest.h>
@@ -11,7 +11,7 @@ namespace {
 using synth::Effect;
 using synth::EffectSet;
 
-TEST(Schedule, GivesABodyAllThatItHasUntilATimeAndTakesNothingBeforeItsTime) {
+TEST(Schedule, AddsEffectsAheadAndRemovesThemInTime) {
   const EffectSet none{}, rings{Effect::kModal}, rolls{Effect::kModal, Effect::kRolling};
   Schedule schedule(2);
   schedule.add({0.0, 0, none, {}});
