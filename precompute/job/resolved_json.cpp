@@ -1,9 +1,9 @@
-// The job as text again.
+// Writes a job with all values used.
 #include <json/json.h>
 
 #include <sstream>
 
-#include "precompute/job/job_spec.hpp"
+#include "precompute/job/keys.hpp"
 #include "precompute/job/read_body.hpp"
 
 namespace carillon::job {
@@ -17,6 +17,27 @@ Json::Value to_json(const std::array<double, 3>& v) {
   Json::Value list(Json::arrayValue);
   for (const double x : v) list.append(x);
   return list;
+}
+
+Json::Value to_json(const base::KeyValue& value) {
+  return std::visit(
+      [](const auto& held) {
+        using Held = std::decay_t<decltype(held)>;
+        if constexpr (std::is_same_v<Held, std::monostate>)
+          return Json::Value();
+        else if constexpr (std::is_same_v<Held, long long>)
+          return Json::Value(Json::Int64(held));
+        else if constexpr (std::is_same_v<Held, std::array<double, 3>>)
+          return to_json(held);
+        else
+          return Json::Value(held);
+      },
+      value);
+}
+
+template <class T>
+void write_keys(const base::Keys<T>& keys, const T& source, Json::Value& root) {
+  for (const auto& [name, value] : keys.get(source)) root[name] = to_json(value);
 }
 
 /// `path` relative to `folder` when both share a root below "/", else absolute.
@@ -78,21 +99,15 @@ Json::Value write_body(const Body& body, const fs::path& base) {
     for (const auto& [dimension, value] : body.dimensions) root[find_dimension_key(dimension)] = value;
   } else {
     root["surface"] = relative_to(body.surface, base);
-    if (body.wall_m) root["wall_m"] = *body.wall_m;
-    if (!body.side.empty()) root["side"] = body.side;
-    if (body.height_m) root["height_m"] = *body.height_m;
-    if (body.scale) root["scale"] = *body.scale;
-    if (body.close_holes) root["close_holes"] = *body.close_holes;
-    if (body.facets) root["facets"] = true;
-    root["up"] = std::string(1, body.up);
-    root["method"] = body.method;
+    write_keys(kSurfaceKeys, body, root);
+    if (!body.facets) root.removeMember("facets");
   }
   if (body.nodes) root["nodes"] = Json::Int64(*body.nodes);
-  if (body.edge_m) root["edge_m"] = *body.edge_m;
+  write_keys(kMeshSizeKeys, body, root);
   return root;
 }
 
-/// The members of a JSON object, added to `entry`.
+/// Adds the members of a JSON object to `entry`.
 void add_members(const base::Json& members, Json::Value& entry) {
   Json::Value added;
   std::istringstream stream(members.line());
@@ -105,7 +120,7 @@ Json::Value write_fixed(const std::vector<Fixed>& list) {
   Json::Value root(Json::arrayValue);
   for (const Fixed& fixed : list) {
     Json::Value& entry = root.append(Json::objectValue);
-    if (fixed.node_set) entry["node_set"] = *fixed.node_set;
+    write_keys(kFixedKeys, fixed, entry);
     if (fixed.box_m) {
       entry["box_m"]["min"] = to_json((*fixed.box_m)[0]);
       entry["box_m"]["max"] = to_json((*fixed.box_m)[1]);
@@ -118,9 +133,7 @@ Json::Value write_fixed(const std::vector<Fixed>& list) {
 
 Json::Value write_air(const Air& air) {
   Json::Value root;
-  root["method"] = to_text(air.method);
-  root["skin_nodes"] = air.skin_nodes;
-  root["error_db"] = air.error_db;
+  write_keys(kAirKeys, air, root);
   if (air.half_space) {
     root["half_space"]["point_m"] = to_json(air.half_space->point_m);
     root["half_space"]["normal"] = to_json(air.half_space->normal);
@@ -130,25 +143,23 @@ Json::Value write_air(const Air& air) {
 
 Json::Value write_nonlinear(const Nonlinear& nonlinear, bool has_energy_error) {
   Json::Value root;
-  if (nonlinear.is_stretch) root["form"] = "stretch";
-  root["modes"] = nonlinear.modes;
-  root["below_hz"] = nonlinear.below_hz;
-  if (has_energy_error) root["energy_error"] = nonlinear.energy_error;
+  write_keys(kNonlinearKeys, nonlinear, root);
+  if (!nonlinear.is_stretch) root.removeMember("form");
+  if (!has_energy_error) root.removeMember("energy_error");
   return root;
 }
 
-/// How the modes of a body of elements are found.
+/// Keys of bodies of finite elements.
 void write_solve(const JobSpec& job, Json::Value& root) {
   root["mass"] = to_text(job.mass);
   if (!job.fixed.empty()) root["fixed"] = write_fixed(job.fixed);
+  write_keys(kSolverKeys, job, root["solver"]);
   if (job.accuracy_cents) {
     root["accuracy_cents"] = *job.accuracy_cents;
+    root["solver"].removeMember("tolerance");
   } else {
     root["element"] = to_text(job.element);
-    root["solver"]["tolerance"] = job.tolerance;
   }
-  root["solver"]["method"] = to_text(job.method);
-  root["solver"]["factorisation"] = to_text(job.factorisation);
   if (job.air.method != AirMethod::none) root["radiation"] = write_air(job.air);
 }
 

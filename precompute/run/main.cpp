@@ -106,6 +106,9 @@ struct CommandLine {
                    "in place of a job: solve the air outside the body of this bank, and write the bank with its multipoles to --bank")
         ->check(named)
         ->excludes("JOB", "--matrices", "--progress", "--validate", "--at", "--estimate");
+    app.add_flag_callback(
+        "--keys", [] { throw CLI::CallForVersion(base::write_key_tables(job::describe_job_keys()), 0); },
+        "print the keys of jobs with defaults, ranges and meaning");
     app.set_version_flag("--version", base::describe("carillon-precompute"));
     // What follows "--" is for PETSc and SLEPc.
     const int own = static_cast<int>(std::find(argv, argv + argc, std::string_view("--")) - argv);

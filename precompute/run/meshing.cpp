@@ -120,7 +120,7 @@ mesh::TetMesh mesh_surface(const job::Body& body, int order, const Fineness& fin
   if (body.facets) words.emplace_back("--facets");
   const std::string result_file = file + ".result";
   add("--result", result_file);
-  add("--up", std::string(1, body.up));
+  add("--up", body.up);
   add("--method", body.method);
   if (fineness.nodes) add("--nodes", std::to_string(*fineness.nodes));
   if (fineness.edge_m) add("--edge", format_length(*fineness.edge_m));

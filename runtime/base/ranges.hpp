@@ -1,4 +1,4 @@
-// Values of a document within bounds, both included. Others are an InputError "file:line: ...".
+// Values of a document within closed bounds. Others are an InputError "file:line: ...".
 #pragma once
 
 #include <string_view>
@@ -10,9 +10,13 @@ namespace carillon::base {
 
 /// A required number.
 double read_within(Object& object, std::string_view key, double low, double high);
-/// The same of an optional one; the fallback is not checked.
+/// An optional number; the fallback is not checked.
 double read_within(Object& object, std::string_view key, double fallback, double low, double high);
-/// Three numbers, each of at most `limit` in size.
+/// An optional vector with components from -limit to limit.
 Vec3 read_vector(Object& object, std::string_view key, const Vec3& fallback, double limit);
+
+/// Direction, not normalised and not 0, in which a listener at `position_m` looks: "look_at_m", a point, or "facing", a direction;
+/// components up to `limit`.
+Vec3 read_facing(Object& listener, const Vec3& position_m, const Vec3& fallback, double limit);
 
 }  // namespace carillon::base

@@ -52,6 +52,9 @@ int main(int argc, char** argv) {
                "Audit energy (motion, modes, losses, radiation, balance error) and contacts (penetration depth, hit rate)");
   app.add_flag("--plan", options.plan, "Print the effects of each body with reasons and estimated cost; no sound is made");
   app.add_flag("-q,--quiet", options.quiet, "Print warnings and errors only");
+  app.add_flag_callback(
+      "--keys", [] { throw CLI::CallForVersion(carillon::base::write_key_tables(carillon::scene::describe_scene_keys()), 0); },
+      "Print the keys of scene files with defaults, ranges and meaning");
   app.set_version_flag("--version", carillon::base::describe("carillon-render"));
   try {
     app.parse(argc, argv);

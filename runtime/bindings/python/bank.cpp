@@ -166,20 +166,9 @@ std::optional<std::filesystem::path> find_bank(const std::filesystem::path& file
   return job.has("bank") ? std::optional(job.path("bank")) : std::nullopt;
 }
 
-}  // namespace
+using Class = py::class_<SharedBank>;
 
-void bind_bank(py::module_& module) {
-  using py::literals::operator""_a;
-  using Class = py::class_<SharedBank>;
-  Class type(
-      module, "Bank",
-      "The modes of a body, as carillon-precompute writes them. m modes, V vertices and T triangles of the surface, in the frame of the "
-      "mesh. Stored arrays are read-only views.");
-  type.def(
-      py::init(&open), "file"_a, "frequencies"_a = "corrected",
-      "Reads a bank. frequencies: \"corrected\" has the estimated error of the mesh removed, where the bank has it; \"mesh\" takes those "
-      "of the mesh. Raises InputError for an invalid or incomplete bank.");
-  type.def_static("parse", &parse, "data"_a, "frequencies"_a = "corrected", "The same from the bytes of a file.");
+void bind_arrays(Class& type) {
   const auto array = [&](const char* name, auto&& find, const char* text) {
     type.def_property_readonly(
         name, [find](const py::object& self) { return find(*py::cast<const SharedBank&>(self).played, self); }, text);
@@ -201,9 +190,7 @@ void bind_bank(py::module_& module) {
         const std::vector<bank::HeardMode> heard = mounting::calc_heard_as_played(b);
         return make_per_mode(b, [&](std::size_t m) { return heard[m].calc_t60_s(); });
       },
-      "(m) float64 [s]: time to decay by 60 dB, as in carillon-bank info: including support losses, "
-      "which "
-      "unlike decay_per_s.");
+      "(m) float64 [s]: time to decay by 60 dB, as in carillon-bank info: including support losses, unlike decay_per_s.");
   array(
       "radiation_gain", [](const bank::Bank& b, const py::object& self) { return view(b.radiation_gain, self); },
       "(m) float64: pressure [Pa] at 1 m for unit modal velocity (1 m kg^1/2 / s), by O'Brien, Shen and Gatchalian 2002.");
@@ -232,6 +219,15 @@ void bind_bank(py::module_& module) {
   array(
       "shape_scale", [](const bank::Bank& b, const py::object& self) { return view(b.shape_scale, self); },
       "(m) float64 [kg^-1/2]: one step of shape_steps.");
+}
+
+void bind_operations(Class& type) {
+  using py::literals::operator""_a;
+  type.def(
+      py::init(&open), "file"_a, "frequencies"_a = "corrected",
+      "Reads a bank. frequencies: \"corrected\" has the estimated error of the mesh removed, where the bank has it; \"mesh\" takes those "
+      "of the mesh. Raises InputError for an invalid or incomplete bank.");
+  type.def_static("parse", &parse, "data"_a, "frequencies"_a = "corrected", "The same from the bytes of a file.");
   type.def("shapes", &calc_shapes, "modes"_a = py::none(),
            "Shapes on the surface, mass-normalised [kg^-1/2], float64: (V, 3) of one mode, (V, k, 3) of a slice or list; default: all. "
            "A blow J [N s] at vertex v starts mode k with the velocity shapes(k)[v] @ J.");
@@ -245,7 +241,12 @@ void bind_bank(py::module_& module) {
       [](const SharedBank& bank, const std::filesystem::path& file) {
         bank::write_bank(*bank.stored, file);
       },  // HDF5: one thread at a time
-      "file"_a, "Writes the bank as it was read or edited, whole or not at all.");
+      "file"_a, "Writes the bank as it was read or edited, complete or not at all.");
+  type.def("__len__", [](const SharedBank& bank) { return bank.played->mode_count(); });
+  type.def("__repr__", &describe);
+}
+
+void bind_facts(Class& type) {
   type.def_property_readonly(
       "name", [](const SharedBank& bank) { return base::printable(bank.name); }, "The file that it was read from.");
   const auto number = [&](const char* name, auto&& find, const char* text) {
@@ -276,8 +277,19 @@ void bind_bank(py::module_& module) {
       "complete", [](const bank::Bank& b) { return b.complete; }, "Whether every mode of band_hz is in the bank.");
   number(
       "element", [](const bank::Bank& b) { return b.element; }, "\"T4\", \"T10\", \"analytic\" or \"imported\".");
-  type.def("__len__", [](const SharedBank& bank) { return bank.played->mode_count(); });
-  type.def("__repr__", &describe);
+}
+
+}  // namespace
+
+void bind_bank(py::module_& module) {
+  using py::literals::operator""_a;
+  Class type(module, "Bank",
+             "The modes of a body, as written by carillon-precompute: m modes, V vertices and T triangles of the surface, in the frame of "
+             "the mesh. "
+             "Stored arrays are read-only views.");
+  bind_operations(type);
+  bind_arrays(type);
+  bind_facts(type);
   module.def("find_bank", &find_bank, "file"_a, "text"_a, "The bank file of a job; None if it names none.");
   module.def("materials", &list_materials, "All known materials, by name: dicts of SI values with their sources.");
 }
