@@ -1,10 +1,8 @@
-// Method:     A part that one rank can hold is condensed (condense.cpp) and cut by METIS's vertex separator, the best of four. A larger one
-// is cut into clusters by
-//             METIS k-way; their quotient graph, weighted by vertices and edges, is bisected by METIS (the best of eight cuts), and the
-//             edges cut are covered by the fewest vertices: the separator. Leaves and separators are ordered by METIS. Sides may be a fifth
-//             apart: a small separator is worth more, for work is balanced later, when it is known.
-// Source:     George 1973; Karypis and Kumar 1998; Koenig 1931 (vertex_cover.cpp).
-// Deviations: covers are not refined.
+// Method: A part that one rank can hold is compressed (compress.cpp) and cut by the vertex separator of METIS, best of four. A larger one
+// is divided into clusters by METIS k-way; their quotient graph, weighted by vertices and edges, is bisected by METIS (best of eight cuts),
+// and a minimum vertex cover of the cut edges is the separator. Leaves and separators are ordered by METIS. Sides may differ by a fifth: a
+// small separator is worth more, as work is balanced later. Covers are not refined.
+// Source: George 1973; Karypis and Kumar 1998; Koenig 1931 (vertex_cover.cpp).
 #include "partition/dissect.hpp"
 
 #include <algorithm>
@@ -12,7 +10,7 @@
 #include <numeric>
 #include <utility>
 
-#include "partition/condense.hpp"
+#include "partition/compress.hpp"
 #include "partition/metis.hpp"
 #include "partition/vertex_cover.hpp"
 
@@ -21,9 +19,9 @@ namespace {
 
 using Ints = std::vector<std::int32_t>;
 
-constexpr std::int32_t kClusters = 1024;  // with 4,096 one cut of the bunny in 64 parts was so bad that it doubled the operations
+constexpr std::int32_t kClusters = 1024;  // with 4,096 one cut of the bunny in 64 parts doubled the operations
 constexpr idx_t kCuts = 8;
-constexpr idx_t kImbalance = 200;  // thousandths
+constexpr idx_t kImbalance = 200;  // per thousand
 
 class Dissector {
  public:
@@ -64,7 +62,7 @@ class Dissector {
     result_.separator.push_back(static_cast<std::int32_t>(sides[2].size()));
   }
 
-  /// side_: 0 or 1 for each of the vertices.
+  /// Sets side_ to 0 or 1 for each of the vertices.
   void halve_clusters(const Ints& vertices, double left) {
     Ints clusters;
     for (const std::int32_t v : vertices)
@@ -112,7 +110,7 @@ class Dissector {
     return edges;
   }
 
-  /// The next places of the order, by nested dissection among these vertices.
+  /// Orders these vertices by nested dissection and appends them to the order.
   void place(const Ints& vertices) {
     const Ints order = order_nested_dissection(take_part(graph_, vertices, number_));
     for (std::size_t i = 0; i < vertices.size(); ++i) result_.position[vertices[i]] = placed_ + order[i];
@@ -122,8 +120,8 @@ class Dissector {
   const Graph& graph_;
   std::int32_t largest_gathered_ = 0;
   Ints cluster_;           // (vertices)
-  Ints place_of_cluster_;  // (clusters) among those at hand, -1: not there
-  Ints side_;              // (vertices) -1: not at hand
+  Ints place_of_cluster_;  // (clusters) index among those of the current part, -1: none
+  Ints side_;              // (vertices) -1: not in the current part
   Ints number_;            // (vertices) scratch, -1 between uses
   std::int32_t placed_ = 0;
   Dissection result_;
@@ -151,8 +149,8 @@ Ints separate_core(Graph core, double dominated_per_edge, int tries, int seed) {
 
 std::vector<std::int32_t> separate(const Graph& graph, int tries, int seed, std::optional<double> dominated_per_edge) {
   if (dominated_per_edge) return separate_core(graph, *dominated_per_edge, tries, seed);
-  const Condensation condensed(graph);
-  return condensed.expand_sides(separate_core(condensed.core(), condensed.dominated_per_edge(), tries, seed));
+  const CompressedGraph compressed(graph);
+  return compressed.expand_sides(separate_core(compressed.core(), compressed.dominated_per_edge(), tries, seed));
 }
 
 std::vector<std::int32_t> make_clusters(const Graph& graph, std::int32_t count) {

@@ -1,4 +1,4 @@
-// Separators between the parts of a graph, as a tree: an order of elimination whose upper levels many ranks can share.
+// Tree of separators between the parts of a graph: an elimination order whose upper levels many ranks can share.
 #pragma once
 
 #include <cstdint>
@@ -9,37 +9,37 @@
 
 namespace carillon::partition {
 
-/// Vertices of a graph, or of a part of it, that one process cuts: larger parts are cut with up to a quarter more operations.
+/// Largest graph cut by one process; larger ones are cut with up to a quarter more operations.
 inline constexpr std::int32_t kLargestGathered = 1'000'000;
 
-/// A graph whose vertices and links count more or less.
+/// A graph with weights of vertices and links.
 struct WeightedGraph {
   Graph graph{{0}, {}};
   std::vector<std::int32_t> weights;  // (vertices)
-  std::vector<std::int32_t> links;    // (2 edges) as the neighbours
+  std::vector<std::int32_t> links;    // (2 edges) in the order of the neighbours
 };
 
-/// 0 and 1, the sides, or 2, the separator between them, for each vertex: the smallest of `tries` found. Sides may be a fifth apart.
-/// Another seed finds others. dominated_per_edge: as order_nested_dissection. Throws SystemError when METIS runs out of memory, as all
-/// below.
+/// Side of each vertex, 0 or 1, or 2 for the separator: the smallest of `tries` separators. Sides may differ by a fifth. Different seeds
+/// give different separators. dominated_per_edge: as for order_nested_dissection. This and the functions below throw SystemError if METIS
+/// runs out of memory.
 std::vector<std::int32_t> separate(const Graph& graph, int tries = 4, int seed = 0, std::optional<double> dominated_per_edge = {});
 
-/// Vertices in `count` clusters of nearly equal size with few edges between them: the cluster of each.
+/// Cluster of each vertex: `count` clusters of nearly equal size with few edges between them.
 std::vector<std::int32_t> make_clusters(const Graph& graph, std::int32_t count);
 
-/// 0 or 1 for each vertex; side 0 has `left` of the weight, and the edges cut weigh little.
+/// Side of each vertex, 0 or 1; side 0 has the fraction `left` of the weight, and the cut edges have little weight.
 std::vector<std::int32_t> halve(const WeightedGraph& graph, double left);
 
 /// A binary tree of separators over `parts` leaves.
 struct Dissection {
-  std::vector<std::int32_t> position;   // (vertices) place in the order of elimination: left, right, then their separator
-  std::vector<std::int32_t> separator;  // (parts - 1) vertices of each, children before parents
+  std::vector<std::int32_t> position;   // (vertices) position in the elimination order: left, right, then their separator
+  std::vector<std::int32_t> separator;  // (parts - 1) size of each separator, children before parents
 };
 
-/// Cuts the graph into `parts` leaves (>= 1) by separators and orders them. Up to `largest_gathered` vertices a part is cut as it is; a
-/// larger one by a quotient graph of clusters and the smallest vertex cover of the edges cut, so that where the graph is distributed, only
-/// clusters and cut edges have to be gathered. Leaves and separators are ordered by nested dissection. The same input gives the same
-/// answer. Throws SystemError when METIS runs out of memory.
+/// Cuts the graph into `parts` leaves (>= 1) by separators and orders them. A part of up to `largest_gathered` vertices is cut directly; a
+/// larger one by a quotient graph of clusters and a minimum vertex cover of the cut edges, so that in a distributed graph only clusters and
+/// cut edges are gathered. Leaves and separators are ordered by nested dissection. Deterministic. Throws SystemError if METIS runs out of
+/// memory.
 Dissection dissect(const Graph& graph, int parts, std::int32_t largest_gathered = kLargestGathered);
 
 }  // namespace carillon::partition

@@ -1,10 +1,8 @@
-// Method:     METIS installs its own SIGTERM handler, which longjmps out of whatever is running. Out of malloc, that leaves a lock held and
-//             the program hangs; and when METIS returns, it restores the previous handler for one signal only. METIS raises SIGTERM itself
-//             too, for its own errors. It does both by two functions of the C library, __sysv_signal() and raise(). They are defined here:
-//             while a thread is in METIS, its handler of SIGTERM is only noted, and called where METIS raises the signal. A SIGTERM from
-//             outside meets the program's handler, as if METIS were not there.
-// Source:     gk_sigtrap(), gk_errexit() of GKlib in METIS 5.1.0, as Debian 12 builds it; ELF symbol interposition, ld.so(8); sigaction(2).
-// Deviations: none.
+// Method: METIS installs its own SIGTERM handler, which leaves by longjmp. Out of malloc, that leaves a lock held and the program hangs;
+// and on return METIS restores the previous handler for one signal only. METIS also raises SIGTERM itself for its own errors. It uses two
+// functions of the C library, __sysv_signal() and raise(), which are overridden here: while a thread is in METIS, its SIGTERM handler is
+// only stored, and called when METIS raises the signal. A SIGTERM from outside reaches the handler of the program.
+// Source: gk_sigtrap(), gk_errexit() of GKlib in METIS 5.1.0, as built by Debian 12; ELF symbol interposition, ld.so(8); sigaction(2).
 #include "partition/metis.hpp"
 
 #include <fmt/core.h>
@@ -36,7 +34,7 @@ struct InMetis {
 
 }  // namespace
 
-/// As glibc's, but for METIS and SIGTERM. METIS passes back what it got when it ends, calls of it within a call too.
+/// As in glibc, except for METIS and SIGTERM. METIS passes the previous handler back when it ends, also in nested calls.
 extern "C" SignalHandler __sysv_signal(int signal, SignalHandler handler) noexcept {
   if (is_in_metis && signal == SIGTERM) return std::exchange(metis_handler, handler);
   struct sigaction action {};
@@ -46,7 +44,7 @@ extern "C" SignalHandler __sysv_signal(int signal, SignalHandler handler) noexce
   return ::sigaction(signal, &action, &before) == 0 ? before.sa_handler : SIG_ERR;
 }
 
-/// As glibc's, but for METIS and SIGTERM: leaves METIS by longjmp.
+/// As in glibc, except for METIS and SIGTERM: leaves METIS by longjmp.
 extern "C" int raise(int signal) noexcept {
   if (is_in_metis && signal == SIGTERM && metis_handler != nullptr) metis_handler(signal);
   const int error = pthread_kill(pthread_self(), signal);
@@ -70,7 +68,7 @@ void call_metis(const char* what, const std::function<int()>& call) {
     status = call();
   }
   if (status == METIS_OK) return;
-  if (status == METIS_ERROR_MEMORY) throw SystemError(fmt::format("METIS ran out of memory in {}; use a machine with more", what));
+  if (status == METIS_ERROR_MEMORY) throw SystemError(fmt::format("METIS ran out of memory in {}; use a machine with more memory", what));
   throw SystemError(fmt::format("METIS failed in {} (status {})", what, status));
 }
 

@@ -1,4 +1,4 @@
-// What every call of METIS needs here: options, its status as an error, and signals that reach the program.
+// Calls of METIS: options, errors, signals.
 #pragma once
 
 #include <metis.h>
@@ -12,11 +12,11 @@ namespace carillon::partition {
 static_assert(sizeof(idx_t) == sizeof(std::int32_t), "METIS has to be built with 32-bit indices");
 
 using MetisOptions = std::array<idx_t, METIS_NOPTIONS>;
-/// METIS's own, counted from zero, with a seed: the same graph gives the same answer.
+/// Default options with zero-based numbering and a fixed seed: deterministic.
 MetisOptions make_metis_options();
 
-/// Calls METIS, and throws SystemError where it did not succeed. what: the name of the call. Signals are left to the program: a SIGTERM
-/// runs its handler at once, and METIS continues when that returns.
+/// Calls METIS; throws SystemError on failure. what: name of the call. A SIGTERM runs the handler of the program at once, and METIS
+/// continues when it returns.
 void call_metis(const char* what, const std::function<int()>& call);
 
 }  // namespace carillon::partition

@@ -1,11 +1,11 @@
-// Method: k-way partition of the dual graph by communication volume and nested dissection of the condensed node graph (condense.cpp) by
-//   METIS 5: with four separators a level where that graph is small against the whole; below 5,000 vertices, where METIS seeks one whatever
-//   it is asked for, the order of fewest operations of four. Above, the operations of orders from several seeds scatter by 2.2 %, so
-//   another is tried as long as what it will probably save in three factorisations is more than it costs.
+// Method: k-way partition of the dual graph by communication volume, and nested dissection of the compressed node graph (compress.cpp) by
+// METIS 5: with four separators per level where the core is small relative to the graph; below 5,000 vertices, where METIS computes one
+// separator in any case, the best of four orders by operations. For larger graphs, the operations of orders from different seeds scatter by
+// 2.2 %, so another order is computed while its expected saving in three factorisations exceeds its cost. The graphs are built by sorting,
+// so they are the same on every machine. A part that METIS leaves empty, possible for graphs of few vertices, takes one element from the
+// largest part.
 // Source: Karypis and Kumar 1998, "A fast and high quality multilevel scheme for partitioning irregular graphs"; "Multilevel k-way
-//   partitioning scheme for irregular graphs" (the METIS manual 5.1 names the options).
-// Deviations: the graphs are built here, by sorting, so that they are the same on every machine; a part that METIS leaves empty, which it
-//   may on a graph of few vertices, takes one element from the largest part.
+// partitioning scheme for irregular graphs" (options: METIS manual 5.1).
 #include "partition/partition.hpp"
 
 #include <fmt/core.h>
@@ -16,22 +16,22 @@
 #include <numeric>
 #include <utility>
 
-#include "partition/condense.hpp"
+#include "partition/compress.hpp"
 #include "partition/metis.hpp"
 
 namespace carillon::partition {
 namespace {
 
-constexpr std::int32_t kManySeparators = 5000;  // vertices: from here on METIS seeks as many separators a level as it is asked for
+constexpr std::int32_t kManySeparators = 5000;  // vertices: METIS computes the requested number of separators per level from this size on
 
-constexpr double kScatter = 0.022;          // standard deviation of the operations of orders from several seeds
-constexpr double kFactorisations = 3;       // of a job
-constexpr double kOperationRate = 50e9;     // [1/s] of a core
-constexpr double kSeparatorSeconds = 3e-6;  // of METIS per vertex, for each separator that it tries at a level
+constexpr double kScatter = 0.022;          // standard deviation of the operations of orders from different seeds
+constexpr double kFactorisations = 3;       // per job
+constexpr double kOperationRate = 50e9;     // [1/s] per core
+constexpr double kSeparatorSeconds = 3e-6;  // of METIS per vertex, for each separator tried at a level
 constexpr int kMostOrders = 8;
 
-/// Whether another order will probably save more time than it costs, where the best of `orders` has so many operations on nodes, 27 on
-/// numbers each. Of k + 1 normal numbers the least is 0.56 / k standard deviations below that of k, within an eighth.
+/// True if another order is expected to save more time than it costs, where the best of `orders` has this many operations on nodes (27 on
+/// numbers each). The minimum of k + 1 normal variables is 0.56 / k standard deviations below that of k, within an eighth.
 bool pays_another_order(double node_operations, int orders, std::int64_t vertices, int tries) {
   const double operations = 27 * node_operations;
   const double saved = kScatter * 0.56 / orders * kFactorisations * operations / kOperationRate;
@@ -44,7 +44,7 @@ void check_entries(std::size_t entries) {
         fmt::format("the mesh is too large: its graph has {} entries, 32-bit indices end at 2147483647; use a coarser mesh", entries));
 }
 
-/// The number of connected pieces of each part (of the whole graph when `part` is all zero).
+/// Connected components of each part (of the whole graph if `part` is all zero).
 std::vector<int> count_pieces(const Graph& graph, const std::vector<std::int32_t>& part, int parts) {
   std::vector<int> pieces(parts, 0);
   std::vector<bool> seen(graph.vertex_count(), false);
@@ -93,12 +93,12 @@ void fill_empty_parts(std::vector<std::int32_t>& part, int parts) {
   }
 }
 
-/// METIS's order of a core.
+/// Order of a core by METIS.
 std::vector<std::int32_t> order_core(const Graph& core, double dominated_per_edge) {
   std::vector<std::int32_t> position(core.vertex_count());
   std::iota(position.begin(), position.end(), 0);
   if (core.neighbours.empty()) return position;
-  // METIS takes the graph by pointers to mutable memory and leaves it unchanged in effect; a copy keeps the promise of const.
+  // METIS takes pointers to mutable memory but leaves the graph unchanged in effect; a copy preserves constness.
   Graph copy = core;
   const int tries = find_tries(core, dominated_per_edge);
   idx_t vertices = copy.vertex_count();
@@ -117,7 +117,7 @@ std::vector<std::int32_t> order_core(const Graph& core, double dominated_per_edg
   for (int orders = 0; orders == 0 || (seeks_all ? pays_another_order(fewest, orders, vertices, tries) : orders < tries);
        ++orders, ++options[METIS_OPTION_SEED]) {
     order();
-    const double operations = estimate_operations(core, dominated_per_edge, position);
+    const double operations = predict_operations(core, dominated_per_edge, position);
     if (operations >= fewest) continue;
     fewest = operations;
     best = position;
@@ -132,10 +132,10 @@ Graph make_dual_graph(std::span<const std::int32_t> corners) {
   const auto elements = static_cast<std::int32_t>(corners.size() / 4);
   const std::int32_t nodes = corners.empty() ? 0 : *std::max_element(corners.begin(), corners.end()) + 1;
   struct Face {
-    std::int32_t middle, high;  // with the bucket's, the corners in ascending order
+    std::int32_t middle, high;  // the other two corners in ascending order; the bucket is the lowest
     std::int32_t element;
   };
-  // Faces fall into buckets by their lowest corner: a face then meets its twin among the few faces of one node.
+  // Faces are bucketed by their lowest corner, so that a face is compared only with the few faces of one node.
   const auto make_face = [&](std::int32_t e, const std::array<int, 3>& local) {
     std::array<std::int32_t, 3> v{corners[4 * e + local[0]], corners[4 * e + local[1]], corners[4 * e + local[2]]};
     if (v[1] < v[0]) std::swap(v[0], v[1]);
@@ -211,7 +211,7 @@ Graph make_node_graph(std::span<const std::int32_t> elements, int width, std::in
   for (std::int32_t v = 0; v < nodes; ++v) {
     seen_from[v] = v;
     near.resize(lists.of(v).size() * width + 1);
-    // Each is written, and kept where it is new: a branch would be predicted wrongly half of the time.
+    // Branch-free: writes every node and keeps new ones; a branch would be mispredicted half of the time.
     std::size_t count_near = 0;
     for (const std::int32_t e : lists.of(v))
       for (const std::int32_t w : elements.subspan(static_cast<std::size_t>(e) * width, width)) {
@@ -230,7 +230,7 @@ Graph make_node_graph(std::span<const std::int32_t> elements, int width, std::in
 
 Partition partition_elements(std::span<const std::int32_t> corners, int parts) {
   const auto elements = static_cast<std::int64_t>(corners.size() / 4);
-  if (parts < 1) throw InputError(fmt::format("a mesh cannot be cut into {} parts; ask for at least one", parts));
+  if (parts < 1) throw InputError(fmt::format("a mesh cannot be cut into {} parts; request at least one", parts));
   if (elements < parts)
     throw InputError(fmt::format("the mesh has {} tetrahedra, fewer than the {} ranks; start at most {} ranks", elements, parts, elements));
   if (elements > std::numeric_limits<std::int32_t>::max() / 4)
@@ -243,11 +243,11 @@ Partition partition_elements(std::span<const std::int32_t> corners, int parts) {
   }
   Graph dual = make_dual_graph(corners);
   {
-    // METIS refuses contiguous parts of a graph that is itself in pieces, and prints where it should return: so ask first.
+    // METIS rejects contiguous parts of a disconnected graph, and prints instead of returning an error: test connectivity first.
     const bool connected = count_pieces(dual, result.part, 1).front() == 1;
     MetisOptions options = make_metis_options();
     options[METIS_OPTION_CONTIG] = connected ? 1 : 0;
-    // Few elements at the seams rather than few faces there: that leaves smaller separators to a factorisation, at the same price.
+    // Few elements at the interfaces rather than few faces: this gives a factorisation smaller separators at the same cost.
     options[METIS_OPTION_OBJTYPE] = METIS_OBJTYPE_VOL;
     idx_t vertices = dual.vertex_count();
     idx_t constraints = 1;
@@ -272,8 +272,8 @@ Partition measure_parts(std::span<const std::int32_t> corners, std::vector<std::
 
 std::vector<std::int32_t> order_nested_dissection(const Graph& graph, std::optional<double> dominated_per_edge) {
   if (dominated_per_edge) return order_core(graph, *dominated_per_edge);
-  const Condensation condensed(graph);
-  return condensed.expand_order(order_core(condensed.core(), condensed.dominated_per_edge()));
+  const CompressedGraph compressed(graph);
+  return compressed.expand_order(order_core(compressed.core(), compressed.dominated_per_edge()));
 }
 
 Graph take_part(const Graph& graph, const std::vector<std::int32_t>& vertices, std::vector<std::int32_t>& number) {

@@ -1,6 +1,5 @@
-// Method:     A maximum matching by augmenting paths, then the cover from what alternating walks from unmatched left vertices reach.
-// Source:     Koenig 1931; Pothen, Simon, Liou 1990, Partitioning sparse matrices with eigenvectors of graphs (vertex from edge
-// separators). Deviations: none.
+// Method: Maximum matching by augmenting paths; the cover follows from alternating walks from unmatched left vertices.
+// Source: Koenig 1931; Pothen, Simon, Liou 1990, Partitioning sparse matrices with eigenvectors of graphs (vertex from edge separators).
 #include "partition/vertex_cover.hpp"
 
 #include <algorithm>
@@ -10,7 +9,7 @@ namespace {
 
 using Ints = std::vector<std::int32_t>;
 
-/// The edges between two sides: links of the left vertices to the right ones.
+/// Edges between two sides: links from left to right vertices.
 struct Bipartite {
   Ints left;
   Ints right;
@@ -35,8 +34,8 @@ Bipartite make_bipartite(const std::vector<std::pair<std::int32_t, std::int32_t>
   return graph;
 }
 
-/// Walks from the left vertices `front` along free and matched edges in turn. reached_from: (right) the left vertex before, -1: not
-/// reached. Stops at a right vertex without a partner, and returns it; -1 if there is none. `visited` lists what was reached.
+/// Walks from the left vertices `front` along free and matched edges alternately. reached_from: (right) preceding left vertex, -1: not
+/// reached. Stops at a right vertex without a partner and returns it; -1 if there is none. `visited` lists the reached vertices.
 std::int32_t walk(const Bipartite& graph, const Ints& partner_of_right, Ints front, Ints& reached_from, Ints& visited) {
   for (std::size_t i = 0; i < front.size(); ++i)
     for (const std::int32_t r : graph.links[front[i]]) {
@@ -62,12 +61,12 @@ std::vector<std::int32_t> cover_edges(const std::vector<std::pair<std::int32_t, 
     for (std::int32_t r = walk(graph, partner_of_right, {l}, reached_from, visited); r >= 0;) {
       const std::int32_t from = reached_from[r];
       partner_of_right[r] = from;
-      std::swap(partner_of_left[from], r);  // the vertex that loses its partner takes the one before it
+      std::swap(partner_of_left[from], r);  // the vertex that loses its partner takes the preceding one
       if (from == l) break;
     }
     for (const std::int32_t r : visited) reached_from[r] = -1;
   }
-  // Of the vertices that walks from unmatched left vertices reach, the right ones are in the cover; of the others, the left ones.
+  // The cover consists of the right vertices reached from unmatched left vertices, and the left vertices not reached.
   Ints unmatched;
   for (std::int32_t l = 0; l < static_cast<std::int32_t>(graph.left.size()); ++l)
     if (partner_of_left[l] < 0) unmatched.push_back(l);

@@ -1,4 +1,4 @@
-// The fewest vertices that hold an end of every edge between two sides.
+// Minimum vertex cover of the edges between two sides.
 #pragma once
 
 #include <cstdint>
@@ -7,8 +7,8 @@
 
 namespace carillon::partition {
 
-/// A minimum vertex cover of a bipartite graph, ascending. edges: (left, right) vertices; the sides have no vertex in common.
-/// Koenig 1931: as many as a maximum matching has edges.
+/// Minimum vertex cover of a bipartite graph, ascending. edges: (left, right) vertices; the sides are disjoint. As many vertices as edges
+/// in a maximum matching (Koenig 1931).
 std::vector<std::int32_t> cover_edges(const std::vector<std::pair<std::int32_t, std::int32_t>>& edges);
 
 }  // namespace carillon::partition

@@ -3,5 +3,5 @@
 @PROLOGUE@
 set -- @FOLDERS@
 shift "${SLURM_ARRAY_TASK_ID:-0}"
-# exec: Slurm's signals reach the attempt itself. It saves, tells Slurm to queue the job again, and ends.
+# exec: Slurm's signals reach the attempt itself. It saves, has Slurm queue the job again, and ends.
 exec @PROGRAM@ attempt @WORK@/"$1" --engine slurm --ranks @RANKS@ --memory-gb @MEMORY_GB@ --launcher @LAUNCHER@@OPTIONS@

@@ -4,8 +4,8 @@
 #include <iostream>
 #include <iterator>
 
-#include "jobs/front/cache/cache.hpp"
 #include "jobs/cli/commands.hpp"
+#include "jobs/front/cache/cache.hpp"
 #include "precompute/job/job_spec.hpp"
 #include "runtime/base/result.hpp"
 
@@ -24,7 +24,7 @@ int make(const Shared& shared, const BankForOptions& options) {
   const cache::Made made = cache::find_or_make(read(options), read_solver_version(), cache, options.is_quiet || shared.json);
   for (const std::string& warning : made.warnings) fmt::print(stderr, "carillon: warning: {}\n", show_message(warning));
   if (shared.json) {
-    Json::Value root;
+    base::Json root;
     root["bank"] = to_json(made.bank.string());
     root["is_new"] = made.is_new;
     root["warnings"] = to_json(made.warnings);

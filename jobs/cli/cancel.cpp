@@ -18,13 +18,13 @@ namespace {
 template <class Act>
 int do_to_all(Shared& shared, const std::vector<registry::Job>& jobs, const Act& act) {
   bool is_done = true;
-  Json::Value root;
-  root["jobs"] = Json::arrayValue;
+  base::Json root;
+  root["jobs"] = base::Json::array();
   for (const registry::Job& job : jobs) {
     const queue::CommandResult result = act(job);
     is_done = is_done && result.is_done;
     if (shared.json) {
-      Json::Value entry = describe(shared, shared.registry().find(job.id).value_or(job));
+      base::Json entry = describe(shared, shared.registry().find(job.id).value_or(job));
       entry["did"] = result.is_done;
       entry["said"] = to_json(result.text);
       root["jobs"].append(entry);

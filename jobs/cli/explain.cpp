@@ -6,8 +6,8 @@
 
 #include "jobs/cli/commands.hpp"
 #include "jobs/cli/gather.hpp"
-#include "jobs/store/json.hpp"
 #include "runtime/base/error.hpp"
+#include "runtime/base/json.hpp"
 
 namespace carillon::cli {
 namespace {
@@ -20,17 +20,17 @@ struct Change {
   std::string after;
 };
 
-void flatten(const Json::Value& value, const std::string& name, std::map<std::string, std::string>& leaves) {
-  if (value.isObject() && !value.empty()) {
-    for (const std::string& key : value.getMemberNames()) flatten(value[key], name.empty() ? key : name + "." + key, leaves);
+void flatten(const base::Json& value, const std::string& name, std::map<std::string, std::string>& leaves) {
+  if (value.is_object() && !value.empty()) {
+    for (const std::string& key : value.keys()) flatten(value[key], name.empty() ? key : name + "." + key, leaves);
     return;
   }
-  leaves[name] = store::write_json(value, "");
+  leaves[name] = value.sorted_text({.is_ascii = false});
 }
 
 std::map<std::string, std::string> read_leaves(const std::string& job) {
   std::map<std::string, std::string> leaves;
-  if (const auto root = store::parse_json(job)) flatten(*root, "", leaves);
+  if (const auto root = base::Json::parse(job)) flatten(*root, "", leaves);
   return leaves;
 }
 
@@ -113,7 +113,7 @@ Explanation explain(Shared& shared, const store::Id& id, const std::optional<reg
 }
 
 /// JSON of one job; null after printing text.
-Json::Value explain_one(Shared& shared, const Source& source) {
+base::Json explain_one(Shared& shared, const Source& source) {
   if (!source.error.empty()) throw InputError(source.error);
   const store::Id id = store::require_id(source.request.id, source.job_file);
   const auto job = shared.registry().find(id);
@@ -121,23 +121,23 @@ Json::Value explain_one(Shared& shared, const Source& source) {
   const Explanation explanation = explain(shared, id, job);
   const std::vector<Change> changes = last ? find_changes(last->request, source.request) : std::vector<Change>();
   if (shared.json) {
-    Json::Value root;
+    base::Json root;
     root["id"] = id.text();
     root["job_file"] = to_json(source.job_file);
     root["state"] = explanation.word;
     root["would_run"] = explanation.would_run;
     root["why"] = to_json(explanation.line);
-    root["last_id"] = last ? Json::Value(last->request.id) : Json::Value();
-    root["changes"] = Json::arrayValue;
+    root["last_id"] = last ? base::Json(last->request.id) : base::Json();
+    root["changes"] = base::Json::array();
     for (const Change& change : changes) {
-      Json::Value entry;
+      base::Json entry;
       entry["part"] = change.part;
-      entry["key"] = change.key.empty() ? Json::Value() : to_json(change.key);
-      entry["before"] = change.before.empty() ? Json::Value() : to_json(change.before);
-      entry["after"] = change.after.empty() ? Json::Value() : to_json(change.after);
+      entry["key"] = change.key.empty() ? base::Json() : to_json(change.key);
+      entry["before"] = change.before.empty() ? base::Json() : to_json(change.before);
+      entry["after"] = change.after.empty() ? base::Json() : to_json(change.after);
       root["changes"].append(entry);
     }
-    root["bank"] = Json::Value();
+    root["bank"] = base::Json();
     if (const auto results = list_results(shared.store(), id); explanation.word == "done" && results.count("bank") > 0)
       root["bank"] = to_json(results.at("bank").string());
     return root;
@@ -160,7 +160,7 @@ int run_explain(Shared& shared, const ExplainOptions& options) {
   const std::string solver = read_solver_version();
   const std::vector<Source> sources = gather({options.word}, solver);
   shared.settle();
-  Json::Value root;
+  base::Json root;
   for (const Source& source : sources) root["jobs"].append(explain_one(shared, source));
   if (shared.json) print_json(sources.size() == 1 ? root["jobs"][0] : root);
   return 0;

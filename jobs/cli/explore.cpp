@@ -27,20 +27,20 @@ void print(const explore::Explored& made) {
              format_bytes(static_cast<double>(made.bytes)));
 }
 
-Json::Value describe(const explore::Explored& made) {
-  Json::Value root;
+base::Json describe(const explore::Explored& made) {
+  base::Json root;
   root["folder"] = to_json(made.folder.string());
   root["page"] = to_json((made.folder / "index.html").string());
-  root["bytes"] = Json::UInt64(made.bytes);
-  root["recording_s"] = made.has_recording ? Json::Value(made.duration_s) : Json::Value();
+  root["bytes"] = made.bytes;
+  root["recording_s"] = made.has_recording ? base::Json(made.duration_s) : base::Json();
   root["warnings"] = to_json(made.warnings);
-  root["banks"] = Json::arrayValue;
+  root["banks"] = base::Json::array();
   for (const explore::PageBank& bank : made.banks) {
-    Json::Value& one = root["banks"].append(Json::objectValue);
+    base::Json& one = root["banks"].append(base::Json::object());
     one["file"] = to_json(bank.name);
-    one["bytes"] = Json::UInt64(bank.bytes);
-    one["full_bytes"] = Json::UInt64(bank.full_bytes);
-    one["change"] = bank.change.empty() ? Json::Value() : to_json(bank.change);
+    one["bytes"] = bank.bytes;
+    one["full_bytes"] = bank.full_bytes;
+    one["change"] = bank.change.empty() ? base::Json() : to_json(bank.change);
   }
   return root;
 }
@@ -51,7 +51,7 @@ int run_explore(Shared& shared, const ExploreOptions& options) {
   explore::PageOrder order = options.explore;
   std::error_code error;
   const bool is_made = order.subjects.size() == 1 && std::filesystem::is_directory(order.subjects[0], error);
-  Json::Value root;
+  base::Json root;
   if (is_made) {
     order.folder = order.subjects[0];
     if (!options.is_serving || !explore::is_explorer(order.folder))

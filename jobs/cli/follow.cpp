@@ -11,7 +11,6 @@
 #include <thread>
 
 #include "jobs/cli/status.hpp"
-#include "jobs/store/json.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::cli {
@@ -59,7 +58,7 @@ class Screen {
 void print_changes(Shared& shared, const std::vector<registry::Job>& jobs, std::map<store::Id, std::string>& before) {
   for (const registry::Job& job : jobs) {
     if (has_ended(job) && before.count(job.id) > 0 && before[job.id] == to_text(job.state)) continue;
-    const std::string line = store::write_json(describe(shared, job), "");
+    const std::string line = describe(shared, job).sorted_text({.is_ascii = false});
     std::string& known = before[job.id];
     if (known != line) fmt::print("{}\n", store::to_plain_json(line));
     known = has_ended(job) ? to_text(job.state) : line;

@@ -16,10 +16,10 @@
 #include <string_view>
 
 #include "jobs/cli/commands.hpp"
-#include "jobs/store/process/process.hpp"
 #include "jobs/store/files.hpp"
 #include "jobs/store/identity.hpp"
 #include "jobs/store/open_folder.hpp"
+#include "jobs/store/process/process.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::cli {
@@ -275,19 +275,19 @@ int run_gc(Shared& shared, const GcOptions& options) {
   }
   double bytes = 0.0;
   bool has_failed = false;
-  Json::Value root;
+  base::Json root;
   root["deleted"] = options.is_deleting;
-  root["items"] = Json::arrayValue;
+  root["items"] = base::Json::array();
   for (const Item& item : items) {
     has_failed = has_failed || !item.error.empty();
     if (item.error.empty()) bytes += item.bytes;
-    Json::Value entry;
+    base::Json entry;
     entry["kind"] = item.kind;
     entry["path"] = to_json(item.path.string());
-    entry["id"] = item.id ? Json::Value(item.id->text()) : Json::Value();
+    entry["id"] = item.id ? base::Json(item.id->text()) : base::Json();
     entry["why"] = to_json(item.why);
     entry["bytes"] = item.bytes;
-    entry["error"] = item.error.empty() ? Json::Value() : to_json(item.error);
+    entry["error"] = item.error.empty() ? base::Json() : to_json(item.error);
     root["items"].append(entry);
     if (shared.json) continue;
     fmt::print("{:<9}  {:>9}  {}: {}\n", item.kind, format_bytes(item.bytes),

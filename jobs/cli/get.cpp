@@ -105,17 +105,17 @@ void choose_places(std::vector<Got>& all, const fs::path& to) {
   }
 }
 
-Json::Value describe(const Got& got, const fs::path& to, bool is_one) {
-  Json::Value root;
+base::Json describe(const Got& got, const fs::path& to, bool is_one) {
+  base::Json root;
   root["id"] = got.named.id.text();
   root["name"] = to_json(got.named.name);
   root["state"] = got.state;
   root["reason"] = to_json(got.state == "new" ? "" : got.why);
   root["warnings"] = to_json(got.warnings);
-  root["bank"] = got.is_bank() ? to_json(got.results.at("bank").string()) : Json::Value();
-  root["results"] = Json::objectValue;
+  root["bank"] = got.is_bank() ? to_json(got.results.at("bank").string()) : base::Json();
+  root["results"] = base::Json::object();
   for (const auto& [key, file] : got.results) root["results"][key] = to_json(file.string());
-  root["copy"] = Json::Value();
+  root["copy"] = base::Json();
   if (!got.copies.empty())
     root["copy"] = to_json((is_one ? to : got.is_bank() ? got.copies.at("bank") : got.copies.begin()->second.parent_path()).string());
   return root;
@@ -152,7 +152,7 @@ int run_get(Shared& shared, const GetOptions& options) {
     for (const auto& [key, to] : got.copies) copy_to(got.results.at(key), to);
   const bool is_one = all.size() == 1;
   if (shared.json) {
-    Json::Value root;
+    base::Json root;
     for (const Got& got : all) root["jobs"].append(describe(got, options.to, is_one));
     print_json(is_one ? root["jobs"][0] : root);
   } else {

@@ -10,29 +10,29 @@
 namespace carillon::cli {
 namespace {
 
-Json::Value describe(const hear::Sound& sound) {
-  Json::Value entry;
+base::Json describe(const hear::Sound& sound) {
+  base::Json entry;
   entry["name"] = to_json(sound.name);
   entry["material"] = to_json(sound.material);
-  entry["height_m"] = sound.height_m > 0.0 ? Json::Value(sound.height_m) : Json::Value();
+  entry["height_m"] = sound.height_m > 0.0 ? base::Json(sound.height_m) : base::Json();
   for (const auto& [key, file] :
        {std::pair{"bank", &sound.bank}, {"scene", &sound.scene}, {"wav", &sound.wav}, {"spectrogram", &sound.spectrogram}})
     entry[key] = to_json(file->string());
   entry["is_scaled"] = sound.is_edited;
-  entry["mode_count"] = Json::UInt64(sound.mode_count);
+  entry["mode_count"] = sound.mode_count;
   entry["highest_hz"] = sound.highest_hz;
   entry["is_complete"] = sound.is_complete;
-  entry["worst_cents"] = std::isfinite(sound.worst_cents) ? Json::Value(sound.worst_cents) : Json::Value();
-  entry["facet_cents"] = sound.facet_cents;
-  entry["modes"] = Json::arrayValue;
+  entry["worst_cents"] = std::isfinite(sound.worst_cents) ? base::Json(sound.worst_cents) : base::Json();
+  entry["facet_cents"] = std::isfinite(sound.facet_cents) ? base::Json(sound.facet_cents) : base::Json();
+  entry["modes"] = base::Json::array();
   for (const hear::StruckMode& mode : sound.modes) {
-    Json::Value& one = entry["modes"].append(Json::objectValue);
+    base::Json& one = entry["modes"].append(base::Json::object());
     one["freq_hz"] = mode.heard.freq_hz;
     const double t60_s = mode.heard.calc_t60_s();
-    one["t60_s"] = std::isfinite(t60_s) ? Json::Value(t60_s) : Json::Value();
-    one["error_cents"] = std::isfinite(mode.error_cents) ? Json::Value(mode.error_cents) : Json::Value();
-    one["facet_cents"] = mode.facet_cents;
-    one["level_dba"] = std::isfinite(mode.level_dba) ? Json::Value(mode.level_dba) : Json::Value();
+    one["t60_s"] = std::isfinite(t60_s) ? base::Json(t60_s) : base::Json();
+    one["error_cents"] = std::isfinite(mode.error_cents) ? base::Json(mode.error_cents) : base::Json();
+    one["facet_cents"] = std::isfinite(mode.facet_cents) ? base::Json(mode.facet_cents) : base::Json();
+    one["level_dba"] = std::isfinite(mode.level_dba) ? base::Json(mode.level_dba) : base::Json();
   }
   return entry;
 }
@@ -81,14 +81,14 @@ int run_hear(Shared& shared, const HearOptions& options) {
   }
   const hear::Heard heard = hear::hear(wanted);
   if (shared.json) {
-    Json::Value root;
+    base::Json root;
     root["folder"] = to_json(heard.folder.string());
     root["page"] = to_json(heard.page.string());
-    root["explorer"] = heard.explorer.empty() ? Json::Value() : to_json(heard.explorer.string());
+    root["explorer"] = heard.explorer.empty() ? base::Json() : to_json(heard.explorer.string());
     root["assumed"] = to_json(heard.assumed);
     root["warnings"] = to_json(heard.warnings);
     for (const double x : heard.extent_m) root["extent_m"].append(x);
-    root["sounds"] = Json::arrayValue;
+    root["sounds"] = base::Json::array();
     for (const hear::Sound& sound : heard.sounds) root["sounds"].append(describe(sound));
     root["seconds"] = heard.seconds;
     print_json(root);

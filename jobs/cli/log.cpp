@@ -48,7 +48,7 @@ int print_log(Shared& shared, registry::Job job, bool follows) {
   off_t at = 0;
   if (shared.json) {
     const fs::path file = shared.store().find_folder(job.id) / store::kLogFile;
-    Json::Value root;
+    base::Json root;
     root["id"] = job.id.text();
     root["state"] = to_text(job.state);
     root["file"] = to_json(file.string());

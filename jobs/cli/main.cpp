@@ -21,7 +21,7 @@ namespace {
 int fail(bool json, const std::string& what, int code) {
   std::fflush(stdout);
   if (json) {
-    Json::Value root;
+    base::Json root;
     root["error"] = to_json(base::shorten(what));
     root["exit_code"] = code;
     print_json(root);

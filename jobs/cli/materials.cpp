@@ -20,9 +20,9 @@ double calc_loss_factor(const material::Material& material) {
   return 2 * material.calc_decay_per_s(omega * omega) / omega;
 }
 
-Json::Value describe(const material::Row& row) {
+base::Json describe(const material::Row& row) {
   const material::Material& m = row.material;
-  Json::Value entry;
+  base::Json entry;
   entry["name"] = to_json(m.name);
   entry["group"] = to_json(row.group);
   entry["also"] = to_json(row.also);
@@ -39,7 +39,7 @@ Json::Value describe(const material::Row& row) {
   entry["damping"] = to_json(m.describe_damping());
   entry["elasticity_source"] = to_json(row.elasticity_source);
   entry["loss_source"] = to_json(row.loss_source);
-  entry["place"] = row.place.empty() ? Json::Value() : to_json(row.place);
+  entry["place"] = row.place.empty() ? base::Json() : to_json(row.place);
   return entry;
 }
 
@@ -72,8 +72,8 @@ int run_materials(Shared& shared, const MaterialsOptions& options) {
   if (options.names.empty())
     for (const material::Row& row : table.rows()) rows.push_back(&row);
   if (shared.json) {
-    Json::Value root;
-    root["materials"] = Json::arrayValue;
+    base::Json root;
+    root["materials"] = base::Json::array();
     for (const material::Row* row : rows) root["materials"].append(describe(*row));
     print_json(root);
     return 0;

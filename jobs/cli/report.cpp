@@ -59,9 +59,9 @@ void draw_in_store(const store::Store& store, const store::Id& id, const std::st
   }
 }
 
-void print(Shared& shared, Json::Value root, const fs::path& page) {
+void print(Shared& shared, base::Json root, const fs::path& page) {
   if (shared.json) {
-    root["report"] = page.empty() ? Json::Value() : to_json(page.string());
+    root["report"] = page.empty() ? base::Json() : to_json(page.string());
     print_json(root);
   } else if (!page.empty()) {
     fmt::print("{}\n", page.string());
@@ -77,7 +77,7 @@ int report_file(Shared& shared, const ReportOptions& options) {
   fs::path record = bank.string() + ".resolved.json";
   if (!fs::exists(record, error)) record = bank.parent_path() / store::kJobFile;
   if (!fs::exists(record, error)) record.clear();
-  Json::Value root;
+  base::Json root;
   root["bank"] = to_json(bank.string());
   print(shared, root, write(options, bank, record, ""));
   return 0;
@@ -88,7 +88,7 @@ int report_job(Shared& shared, const ReportOptions& options) {
   const auto [id, job] = find_by_content(shared, options.word);
   const fs::path folder = shared.store().bank_folder(id);
   const bool is_done = shared.store().has_bank(id);
-  Json::Value root;
+  base::Json root;
   root["id"] = id.text();
   root["state"] = is_done ? "done" : job ? to_text(job->state) : "new";
   fs::path page;
@@ -108,7 +108,7 @@ int report_job(Shared& shared, const ReportOptions& options) {
   print(shared, root, page);
   if (!page.empty()) return 0;
   if (!shared.json)
-    fmt::print(stderr, "carillon: no report{}: {} is {}{}\n", is_done ? "" : " yet", id.short_text(), root["state"].asString(),
+    fmt::print(stderr, "carillon: no report{}: {} is {}{}\n", is_done ? "" : " yet", id.short_text(), root["state"].as_string(),
                is_done ? ", but its report could not be made then; carillon report -o FOLDER makes one" : "");
   return kExitNotYet;
 }

@@ -205,8 +205,8 @@ std::vector<std::string> find_warnings(Shared& shared, const registry::Job& job,
   return store::read_warnings(shared.store(), job.id, name);
 }
 
-Json::Value to_json(const std::vector<std::string>& texts) {
-  Json::Value list(Json::arrayValue);
+base::Json to_json(const std::vector<std::string>& texts) {
+  base::Json list = base::Json::array();
   for (const std::string& text : texts) list.append(to_json(text));
   return list;
 }
@@ -221,8 +221,8 @@ std::map<std::string, fs::path> list_results(const store::Store& store, const st
   return results;
 }
 
-Json::Value describe(Shared& shared, const registry::Job& job) {
-  Json::Value root;
+base::Json describe(Shared& shared, const registry::Job& job) {
+  base::Json root;
   root["id"] = job.id.text();
   root["state"] = to_text(job.state);
   root["name"] = to_json(job.name);
@@ -233,22 +233,22 @@ Json::Value describe(Shared& shared, const registry::Job& job) {
   root["ranks"] = job.given.ranks > 0 ? job.given.ranks : job.resources.ranks;  // as chosen, once it was
   root["memory_gb"] = job.given.ranks > 0 ? job.given.memory_gb : job.resources.memory_gb;
   root["time_limit_s"] = job.resources.time_limit_s;
-  root["slurm_job"] = job.slurm_job.empty() ? Json::Value() : to_json(job.slurm_job);
+  root["slurm_job"] = job.slurm_job.empty() ? base::Json() : to_json(job.slurm_job);
   root["submitted"] = to_json_time(job.submitted_unix_s);
   root["started"] = to_json_time(job.started_unix_s);
   root["ended"] = to_json_time(job.ended_unix_s);
   const bool is_done = job.state == registry::JobState::done;
   const auto progress = is_done ? std::nullopt : store::read_progress(shared.store().work_folder(job.id));
-  root["phase"] = is_done ? Json::Value("done") : progress ? to_json(progress->phase) : Json::Value();
+  root["phase"] = is_done ? base::Json("done") : progress ? to_json(progress->phase) : base::Json();
   root["percent"] = is_done ? 100.0 : progress ? progress->percent : 0.0;
-  root["modes_done"] = progress && progress->modes_done >= 0 ? Json::Value(Json::Int64(progress->modes_done)) : Json::Value();
-  root["modes_wanted"] = progress && progress->modes_wanted >= 0 ? Json::Value(Json::Int64(progress->modes_wanted)) : Json::Value();
+  root["modes_done"] = progress && progress->modes_done >= 0 ? base::Json(progress->modes_done) : base::Json();
+  root["modes_wanted"] = progress && progress->modes_wanted >= 0 ? base::Json(progress->modes_wanted) : base::Json();
   root["seconds_left"] = progress && progress->seconds_left >= 0 && job.state == registry::JobState::running
-                             ? Json::Value(progress->seconds_left)
-                             : Json::Value();
+                             ? base::Json(progress->seconds_left)
+                             : base::Json();
   const auto results = is_done ? list_results(shared.store(), job.id) : std::map<std::string, fs::path>();
-  root["bank"] = results.count("bank") > 0 ? to_json(results.at("bank").string()) : Json::Value();
-  root["results"] = Json::objectValue;
+  root["bank"] = results.count("bank") > 0 ? to_json(results.at("bank").string()) : base::Json();
+  root["results"] = base::Json::object();
   for (const auto& [key, file] : results) root["results"][key] = to_json(file.string());
   root["warnings"] = to_json(find_warnings(shared, job));
   return root;

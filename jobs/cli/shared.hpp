@@ -1,8 +1,6 @@
 // What the commands share: the store, ways to name a job, and two ways to print: lines for people, one JSON document for programs.
 #pragma once
 
-#include <json/json.h>
-
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -10,10 +8,11 @@
 #include <string>
 #include <vector>
 
-#include "jobs/store/registry/registry.hpp"
 #include "jobs/queue/slurm/settings.hpp"
+#include "jobs/store/registry/registry.hpp"
 #include "jobs/store/store.hpp"
 #include "runtime/base/error.hpp"
+#include "runtime/base/json.hpp"
 
 namespace carillon::slurm {
 class Engine;
@@ -70,11 +69,11 @@ std::string show(const std::string& text, std::size_t max = 200);
 /// A message of an error: as show(), and long ones whole.
 std::string show_message(const std::string& text);
 /// For JSON: valid UTF-8.
-Json::Value to_json(const std::string& text);
+base::Json to_json(const std::string& text);
 /// "2026-11-20T20:22:30Z"; null for 0.
-Json::Value to_json_time(double unix_s);
+base::Json to_json_time(double unix_s);
 /// Prints one document and a line end. SystemError when standard output refuses.
-void print_json(const Json::Value& root);
+void print_json(const base::Json& root);
 /// "1 h 04 min", "12.3 s".
 std::string format_seconds(double seconds);
 /// "1.2 GB"
@@ -97,13 +96,13 @@ registry::Job find_job(Shared& shared, const std::string& word);
 bool is_submitted_again(const registry::Job& job, bool has_work);
 
 /// A row with its progress, its bank and its log, under the keys of docs/howto/jobs.md.
-Json::Value describe(Shared& shared, const registry::Job& job);
+base::Json describe(Shared& shared, const registry::Job& job);
 /// The files of a job that is done, by the keys of jobs: "bank", or those of a simulation ("sound", "motion" ...).
 std::map<std::string, std::filesystem::path> list_results(const store::Store& store, const store::Id& id);
 /// What the solver warned of, of a job that is done; `name` stands for its job file.
 std::vector<std::string> find_warnings(Shared& shared, const registry::Job& job, const std::string& name = "the job");
 /// A list of texts as JSON.
-Json::Value to_json(const std::vector<std::string>& texts);
+base::Json to_json(const std::vector<std::string>& texts);
 /// The reason of a row with the file that the user named in place of its copy in the store.
 std::string find_reason(Shared& shared, const registry::Job& job);
 

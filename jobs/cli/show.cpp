@@ -8,9 +8,9 @@
 #include <string_view>
 
 #include "jobs/cli/shared.hpp"
-#include "jobs/store/json.hpp"
 #include "jobs/store/records.hpp"
 #include "runtime/base/error.hpp"
+#include "runtime/base/json.hpp"
 #include "runtime/base/message.hpp"
 #include "runtime/base/printable.hpp"
 
@@ -30,9 +30,9 @@ std::string show(const std::string& text, std::size_t max) { return escape(text,
 
 std::string show_message(const std::string& text) { return base::show_message(store::to_text(text)); }
 
-Json::Value to_json(const std::string& text) { return Json::Value(store::to_text(text)); }
+base::Json to_json(const std::string& text) { return base::Json(store::to_text(text)); }
 
-Json::Value to_json_time(double unix_s) {
+base::Json to_json_time(double unix_s) {
   if (!(unix_s > 0) || unix_s > 1e11) return {};
   const auto seconds = static_cast<std::time_t>(unix_s);
   std::tm parts{};
@@ -41,8 +41,8 @@ Json::Value to_json_time(double unix_s) {
                      parts.tm_min, parts.tm_sec);
 }
 
-void print_json(const Json::Value& root) {
-  fmt::print("{}\n", store::to_plain_json(store::write_json(root, "  ")));
+void print_json(const base::Json& root) {
+  fmt::print("{}\n", store::to_plain_json(root.sorted_text({.indentation = "  ", .is_ascii = false})));
   if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");
 }
 

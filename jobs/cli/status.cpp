@@ -98,15 +98,15 @@ int run_status(Shared& shared, const StatusOptions& options) {
     return std::max(code, find_exit_code(shared.registry().list({registry::JobState::failed, registry::JobState::cancelled})));
   }
   if (shared.json) {
-    Json::Value root;
+    base::Json root;
     root["store"] = to_json(shared.store().root().string());
     root["read_only"] = !shared.store().may_write();
-    root["jobs"] = Json::arrayValue;
+    root["jobs"] = base::Json::array();
     for (const char* state : {"queued", "running", "waiting", "done", "failed", "cancelled"}) root["counts"][state] = 0;
     for (const registry::Job& job : jobs) {
       root["jobs"].append(describe(shared, job));
-      Json::Value& count = root["counts"][to_text(job.state)];
-      count = count.asInt() + 1;
+      base::Json& count = root["counts"][to_text(job.state)];
+      count = std::lround(count.as_double()) + 1;
     }
     print_json(root);
     return 0;

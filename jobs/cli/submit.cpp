@@ -92,13 +92,13 @@ std::vector<std::string> find_own_warnings(Shared& shared, const SubmitResult& r
   return warnings;
 }
 
-Json::Value describe_results(Shared& shared, const std::vector<SubmitResult>& results) {
-  Json::Value root;
+base::Json describe_results(Shared& shared, const std::vector<SubmitResult>& results) {
+  base::Json root;
   root["store"] = to_json(shared.store().root().string());
-  root["jobs"] = Json::arrayValue;
-  root["errors"] = Json::arrayValue;
+  root["jobs"] = base::Json::array();
+  root["errors"] = base::Json::array();
   for (const SubmitResult& result : results) {
-    Json::Value entry;
+    base::Json entry;
     if (result.job) {
       entry = describe(shared, *result.job);
       entry["warnings"] = to_json(find_own_warnings(shared, result));

@@ -5,11 +5,11 @@
 #include <map>
 #include <set>
 
-#include "jobs/queue/attempt/publish.hpp"
 #include "jobs/cli/commands.hpp"
-#include "jobs/store/process/process.hpp"
+#include "jobs/queue/attempt/publish.hpp"
 #include "jobs/queue/repair.hpp"
 #include "jobs/store/identity.hpp"
+#include "jobs/store/process/process.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::cli {
@@ -129,10 +129,10 @@ int run_verify(Shared& shared, const VerifyOptions& options) {
     }
   }
   bool is_whole = true;
-  Json::Value root;
+  base::Json root;
   root["store"] = to_json(store.root().string());
-  root["checked"] = Json::UInt64(ids.size());
-  root["damaged"] = Json::arrayValue;
+  root["checked"] = ids.size();
+  root["damaged"] = base::Json::array();
   for (Finding& finding : findings) {
     if (options.repairs) {
       finding.kind == "input"    ? repair_input(shared, finding)
@@ -140,12 +140,12 @@ int run_verify(Shared& shared, const VerifyOptions& options) {
                                  : repair(shared, finding);
     }
     is_whole = is_whole && finding.is_repaired;
-    Json::Value entry;
+    base::Json entry;
     entry["kind"] = finding.kind;
     entry["id"] = finding.id.text();
     entry["fault"] = to_json(finding.fault);
     entry["repaired"] = finding.is_repaired;
-    entry["repair"] = finding.repair.empty() ? Json::Value() : to_json(finding.repair);
+    entry["repair"] = finding.repair.empty() ? base::Json() : to_json(finding.repair);
     root["damaged"].append(entry);
     if (shared.json) continue;
     fmt::print("{}  {:<6}  {}\n", finding.id.short_text(), finding.kind, show_message(finding.fault));

@@ -19,11 +19,11 @@
 #include <set>
 #include <sstream>
 
-#include "jobs/store/process/process.hpp"
 #include "jobs/store/files.hpp"
-#include "jobs/store/json.hpp"
+#include "jobs/store/process/process.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/file.hpp"
+#include "runtime/base/json.hpp"
 
 namespace carillon::store {
 namespace {
@@ -34,57 +34,57 @@ constexpr std::size_t kMeshHeadBytes = 4096;
 constexpr std::size_t kMaxTexts = 50;
 constexpr const char* kScheme = "carillon identity 1";
 
-Json::Value parse_resolved(const std::string& text) {
-  auto root = parse_json(text);
+base::Json parse_resolved(const std::string& text) {
+  auto root = base::Json::parse(text);
   if (!root) throw SystemError("internal: a resolved job is not JSON");
   return std::move(*root);
 }
 
 /// -0 is 0.
-void drop_signs_of_zero(Json::Value& value) {
-  if (value.type() == Json::realValue && value.asDouble() == 0.0) value = 0.0;
-  if (value.isArray() || value.isObject()) {
-    for (Json::Value& member : value) drop_signs_of_zero(member);
+void drop_signs_of_zero(base::Json& value) {
+  if (value.is_real() && value.as_double() == 0.0) value = 0.0;
+  if (value.is_array() || value.is_object()) {
+    for (base::Json& member : value) drop_signs_of_zero(member);
   }
 }
 
 /// A resolved job without paths on one line.
-std::string make_canonical(Json::Value root) {
-  if (root.isMember("simulate")) return make_canonical_simulation(std::move(root));
-  root.removeMember("mesh");
-  if (root["body"].isObject())
-    for (const char* path : {"surface", "modes_csv"}) root["body"].removeMember(path);
-  if (root["body"].isNull()) root.removeMember("body");
+std::string make_canonical(base::Json root) {
+  if (root.has("simulate")) return make_canonical_simulation(std::move(root));
+  root.erase("mesh");
+  if (root["body"].is_object())
+    for (const char* path : {"surface", "modes_csv"}) root["body"].erase(path);
+  if (root["body"].is_null()) root.erase("body");
   drop_signs_of_zero(root);
-  return write_json(root, "");
+  return root.sorted_text({.is_ascii = false});
 }
 
 /// What a record of a run (JSON) has in common with a request.
 enum class Origin { same, unknown, another_job, another_input };
 
 /// An object of JSON; null for anything else.
-Json::Value parse_object(const std::string& text) {
-  auto root = parse_json(text);
-  return root && root->isObject() ? std::move(*root) : Json::Value();
+base::Json parse_object(const std::string& text) {
+  auto root = base::Json::parse(text);
+  return root && root->is_object() ? std::move(*root) : base::Json();
 }
 
 /// Where a job names its input.
-Json::Value& get_input_key(Json::Value& root, InputKind kind) {
+base::Json& get_input_key(base::Json& root, InputKind kind) {
   if (kind == InputKind::surface) return root["body"]["surface"];
   return kind == InputKind::table ? root["body"]["modes_csv"] : root["mesh"];
 }
 
 /// As JSON, not as a job: the words of the schema at that time are those of the request.
-Origin compare_origin(Json::Value root, const Request& request) {
-  if (!root.isObject()) return Origin::unknown;
+Origin compare_origin(base::Json root, const Request& request) {
+  if (!root.is_object()) return Origin::unknown;
   try {
     if (request.input_kind == InputKind::simulation) return make_canonical(root) == request.job ? Origin::same : Origin::another_job;
-    const Json::Value& named = get_input_key(root, request.input_kind);
-    const std::string input = named.isString() ? fs::path(named.asString()).stem().string() : "";
-    for (const char* key : {"run", "bank"}) root.removeMember(key);
+    const base::Json& named = get_input_key(root, request.input_kind);
+    const std::string input = named.is_string() ? fs::path(named.as_string()).stem().string() : "";
+    for (const char* key : {"run", "bank"}) root.erase(key);
     if (make_canonical(root) != request.job) return Origin::another_job;
     return request.input_kind == InputKind::shape || input == request.input_sha256 ? Origin::same : Origin::another_input;
-  } catch (const Json::Exception&) {
+  } catch (const std::logic_error&) {
     return Origin::unknown;
   }
 }
@@ -214,13 +214,13 @@ void fill_work(const std::string& job, const Request& request, const fs::path& f
 
 /// The job of a request, with its inputs in the store and its bank where carillon-precompute is to write it.
 std::string make_job(const Store& store, const Request& request, const Id& id) {
-  Json::Value root = parse_resolved(request.job);
+  base::Json root = parse_resolved(request.job);
   const fs::path work = store.work_folder(id);
   const std::vector<fs::path> files = find_input_files(store, request);
   if (request.input_kind == InputKind::simulation) return write_simulation(std::move(root), files);
   if (!files.empty()) get_input_key(root, request.input_kind) = files[0].string();
   root["bank"] = (work / kBankFile).string();
-  return job::resolved_json(job::parse_job(write_json(root, "  "), work / kJobFile), work, "");
+  return job::resolved_json(job::parse_job(root.sorted_text({.indentation = "  ", .is_ascii = false}), work / kJobFile), work, "");
 }
 
 /// Why a job file in a folder of work is not that of its request.
@@ -439,20 +439,19 @@ std::vector<std::string> read_warnings(const Store& store, const Id& id, const s
   std::vector<std::string> texts;
   const fs::path folder = store.bank_folder(id);
   try {
-    const Json::Value root = parse_object(base::read_file(folder / kJobFile, "record", kMaxJobBytes));
-    const Json::Value list = root.isMember("simulate")
-                                 ? parse_object(base::read_file(folder / kRecordFile, "record", kMaxJobBytes))["warnings"]
-                                 : root["run"]["warnings"];
+    const base::Json root = parse_object(base::read_file(folder / kJobFile, "record", kMaxJobBytes));
+    const base::Json list = root.has("simulate") ? parse_object(base::read_file(folder / kRecordFile, "record", kMaxJobBytes))["warnings"]
+                                                 : root["run"]["warnings"];
     if (list.empty()) return texts;
     const std::optional<Request> request = read_request(folder);
     if (!request || request->id != id.text() || calc_id(*request) != id || compare_origin(root, *request) != Origin::same) return texts;
-    for (Json::ArrayIndex i = 0; list.isArray() && i < list.size() && texts.size() < kMaxTexts; ++i) {
-      if (!list[i].isString()) continue;
-      const std::string text = name_job(list[i].asString(), id, name);
+    for (std::size_t i = 0; list.is_array() && i < list.size() && texts.size() < kMaxTexts; ++i) {
+      if (!list[i].is_string()) continue;
+      const std::string text = name_job(list[i].as_string(), id, name);
       if (std::find(texts.begin(), texts.end(), text) == texts.end()) texts.push_back(text);
     }
   } catch (const InputError&) {
-  } catch (const Json::Exception&) {
+  } catch (const std::logic_error&) {
   }
   return texts;
 }

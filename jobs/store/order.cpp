@@ -9,12 +9,12 @@
 #include <iterator>
 #include <utility>
 
-#include "jobs/store/json.hpp"
 #include "jobs/store/store.hpp"
 #include "precompute/job/simulation.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/file.hpp"
+#include "runtime/base/json.hpp"
 #include "runtime/base/sha256.hpp"
 #include "runtime/material/read_material.hpp"
 
@@ -25,38 +25,38 @@ namespace fs = std::filesystem;
 
 constexpr std::array<double, 2> kHearingHz{20.0, 20000.0};
 
-Json::Value parse_job_json(const std::string& text) {
-  auto root = parse_json(text);
+base::Json parse_job_json(const std::string& text) {
+  auto root = base::Json::parse(text);
   if (!root) throw InputError("the job is not JSON");
   return std::move(*root);
 }
 
 /// 1 and 1.0 are the same number, and so are 0 and -0.
-void unify_numbers(Json::Value& value) {
+void unify_numbers(base::Json& value) {
   constexpr double kMaxWhole = 1e15;
-  if (value.isNumeric()) {
-    const double x = value.asDouble();
-    value = x == std::trunc(x) && std::abs(x) < kMaxWhole ? Json::Value(static_cast<Json::Int64>(x)) : Json::Value(x);
+  if (value.is_number()) {
+    const double x = value.as_double();
+    value = x == std::trunc(x) && std::abs(x) < kMaxWhole ? base::Json(static_cast<std::int64_t>(x)) : base::Json(x);
   }
-  if (value.isArray() || value.isObject())
-    for (Json::Value& member : value) unify_numbers(member);
+  if (value.is_array() || value.is_object())
+    for (base::Json& member : value) unify_numbers(member);
 }
 
 /// Where a job of a simulation names files of bodies, in their order.
-std::vector<Json::Value*> find_input_values(Json::Value& root) {
-  std::vector<Json::Value*> found;
-  Json::Value& bodies = root["simulate"]["bodies"];
-  if (!bodies.isArray()) return found;
-  for (Json::Value& body : bodies) {
-    if (!body.isObject()) continue;
-    if (body.isMember("mesh")) found.push_back(&body["mesh"]);
-    if (body.isMember("body") && body["body"].isObject() && body["body"].isMember("surface")) found.push_back(&body["body"]["surface"]);
+std::vector<base::Json*> find_input_values(base::Json& root) {
+  std::vector<base::Json*> found;
+  base::Json& bodies = root["simulate"]["bodies"];
+  if (!bodies.is_array()) return found;
+  for (base::Json& body : bodies) {
+    if (!body.is_object()) continue;
+    if (body.has("mesh")) found.push_back(&body["mesh"]);
+    if (body.has("body") && body["body"].is_object() && body["body"].has("surface")) found.push_back(&body["body"]["surface"]);
   }
   return found;
 }
 
 /// A material with all its constants, as jobs have it: the table that it was taken from may change.
-Json::Value write_material(const material::Material& material) {
+base::Json write_material(const material::Material& material) {
   job::JobSpec spec;
   spec.mesh = "/mesh";
   spec.material = material;
@@ -70,21 +70,21 @@ SimulationOrder make_simulation(const job::SimulationSpec& spec, const std::stri
   order.file = spec.file;
   order.resources = spec.resources;
   order.warnings = spec.warnings;
-  Json::Value root = parse_job_json(text);
+  base::Json root = parse_job_json(text);
   const base::Document document = base::parse_document(text, spec.file);
   std::vector<base::Object> bodies = document.root().object("simulate").objects("bodies");
   std::vector<std::string> known;
   for (std::size_t i = 0; i < spec.bodies.size(); ++i) {
     const job::SimulatedBody& body = spec.bodies[i];
-    Json::Value& json = root["simulate"]["bodies"][static_cast<Json::ArrayIndex>(i)];
+    base::Json& json = root["simulate"]["bodies"][i];
     json["material"] = write_material(material::read_material(bodies[i], "material", kHearingHz, known));
     if (!body.mesh.empty()) order.inputs.push_back({InputKind::mesh, body.mesh});
     if (body.body && !body.body->surface.empty()) order.inputs.push_back({InputKind::surface, body.body->surface});
   }
-  root.removeMember("resources");
+  root.erase("resources");
   job::check_has_output(spec, spec.file.string());
   for (const Output& output : kOutputs)
-    if (root.isMember(output.key)) root[output.key] = output.file;
+    if (root.has(output.key)) root[output.key] = output.file;
   root["record"] = kRecordFile;
   std::vector<fs::path> files;
   for (const NamedInput& input : order.inputs) files.push_back(input.file);
@@ -131,33 +131,33 @@ JobOrder parse_order(std::string_view text, const fs::path& file, int first_line
 }
 
 std::vector<std::string> list_outputs(const std::string& job) {
-  const Json::Value root = parse_job_json(job);
+  const base::Json root = parse_job_json(job);
   std::vector<std::string> files;
   for (const Output& output : kOutputs)
-    if (root.isMember(output.key)) files.emplace_back(output.file);
+    if (root.has(output.key)) files.emplace_back(output.file);
   return files;
 }
 
-std::string make_canonical_simulation(Json::Value root) {
-  for (Json::Value* value : find_input_values(root)) *value = fs::path(value->asString()).filename().string();
+std::string make_canonical_simulation(base::Json root) {
+  for (base::Json* value : find_input_values(root)) *value = fs::path(value->as_string()).filename().string();
   unify_numbers(root);
-  return write_json(root, "");
+  return root.sorted_text({.is_ascii = false});
 }
 
-std::string write_simulation(Json::Value root, const std::vector<fs::path>& inputs) {
-  const std::vector<Json::Value*> values = find_input_values(root);
+std::string write_simulation(base::Json root, const std::vector<fs::path>& inputs) {
+  const std::vector<base::Json*> values = find_input_values(root);
   if (values.size() != inputs.size())
     throw InputError(fmt::format("the job names {} files of bodies, and {} are known", values.size(), inputs.size()));
   for (std::size_t i = 0; i < inputs.size(); ++i) *values[i] = inputs[i].string();
-  return write_json(root, "  ") + "\n";
+  return root.sorted_text({.indentation = "  ", .is_ascii = false}) + "\n";
 }
 
 std::optional<std::string> find_record_fault(const std::string& record, const std::string& job_text) {
-  const auto root = parse_json(record);
-  if (!root || !root->isObject()) return "its record is no JSON";
-  if (!(*root)["job_sha256"].isString()) return "its record does not say of which job it is";
-  return (*root)["job_sha256"].asString() == base::to_hex(base::calc_sha256(job_text)) ? std::nullopt
-                                                                                       : std::optional("its record is of another job");
+  const auto root = base::Json::parse(record);
+  if (!root || !root->is_object()) return "its record is no JSON";
+  if (!(*root)["job_sha256"].is_string()) return "its record does not say of which job it is";
+  return (*root)["job_sha256"].as_string() == base::to_hex(base::calc_sha256(job_text)) ? std::nullopt
+                                                                                        : std::optional("its record is of another job");
 }
 
 }  // namespace carillon::store

@@ -10,10 +10,7 @@
 
 #include "jobs/store/records.hpp"
 #include "precompute/job/job_spec.hpp"
-
-namespace Json {
-class Value;
-}
+#include "runtime/base/json.hpp"
 
 namespace carillon::store {
 
@@ -81,9 +78,9 @@ inline constexpr Output kOutputs[] = {{"sound", "sound.wav"},
 std::vector<std::string> list_outputs(const std::string& job);
 
 /// Of a job of a simulation as JSON: its line as in make_canonical(), with the file names of its inputs.
-std::string make_canonical_simulation(Json::Value root);
+std::string make_canonical_simulation(base::Json root);
 /// The same job with inputs at these paths, to be carried out.
-std::string write_simulation(Json::Value root, const std::vector<std::filesystem::path>& inputs);
+std::string write_simulation(base::Json root, const std::vector<std::filesystem::path>& inputs);
 /// Why a record of a run (JSON) is not that of the job with this text, in one sentence; none when it is.
 std::optional<std::string> find_record_fault(const std::string& record, const std::string& job_text);
 

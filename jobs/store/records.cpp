@@ -3,7 +3,6 @@
 
 #include <fcntl.h>
 #include <fmt/core.h>
-#include <json/json.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -50,7 +49,7 @@ auto find_word(const Words& words, std::string_view word) {
 /// Values are in the order of their enumeration.
 template <class Words, class Value>
 std::string get_word(const Words& words, Value value) {
-  return std::string(words.at(value).word);
+  return std::string(words.at(static_cast<std::size_t>(value)).word);
 }
 
 std::optional<base::Object> read_root(const fs::path& file) {
@@ -107,24 +106,18 @@ std::string read_tail(const fs::path& file, off_t max) {
 }
 
 std::optional<Progress> parse_progress(const std::string& line) {
-  Json::Value root;
-  Json::CharReaderBuilder reader;
-  std::istringstream stream(line);
-  std::string errors;
-  try {
-    if (!Json::parseFromStream(reader, stream, &root, &errors) || !root.isObject() || !root["phase"].isString()) return std::nullopt;
-    const auto number = [&](const char* key, double fallback) { return root[key].isNumeric() ? root[key].asDouble() : fallback; };
-    Progress progress;
-    progress.phase = root["phase"].asString();
-    progress.percent = std::clamp(number("percent", 0.0), 0.0, 100.0);
-    progress.modes_done = static_cast<long long>(std::clamp(number("modes_done", -1.0), -1.0, 1e15));
-    progress.modes_wanted = static_cast<long long>(std::clamp(number("modes_wanted", -1.0), -1.0, 1e15));
-    progress.seconds_left = std::clamp(number("seconds_left", -1.0), -1.0, 1e12);
-    progress.seconds = std::clamp(number("seconds", 0.0), 0.0, 1e12);
-    return progress;
-  } catch (const Json::Exception&) {
-    return std::nullopt;
-  }
+  const std::optional<base::Json> parsed = base::Json::parse(line);
+  if (!parsed || !(*parsed)["phase"].is_string()) return std::nullopt;
+  const base::Json& root = *parsed;
+  const auto number = [&](const char* key, double fallback) { return root[key].is_number() ? root[key].as_double() : fallback; };
+  Progress progress;
+  progress.phase = root["phase"].as_string();
+  progress.percent = std::clamp(number("percent", 0.0), 0.0, 100.0);
+  progress.modes_done = static_cast<long long>(std::clamp(number("modes_done", -1.0), -1.0, 1e15));
+  progress.modes_wanted = static_cast<long long>(std::clamp(number("modes_wanted", -1.0), -1.0, 1e15));
+  progress.seconds_left = std::clamp(number("seconds_left", -1.0), -1.0, 1e12);
+  progress.seconds = std::clamp(number("seconds", 0.0), 0.0, 1e12);
+  return progress;
 }
 
 }  // namespace
@@ -154,7 +147,7 @@ std::string format_request(const Request& request, bool one_line) {
     json.set("kind", to_text(input.kind)).set("sha256", input.sha256);
     if (!input.format.empty()) json.set("format", input.format);
     if (!input.file.empty()) json.set("file", input.file);
-    root.member("inputs").add(std::move(json));
+    root["inputs"].add(std::move(json));
   }
   root.set("solver", request.solver).set("ranks", request.resources.ranks).set("memory_gb", request.resources.memory_gb);
   root.set("time_limit_s", request.resources.time_limit_s).set("engine", to_text(request.engine));

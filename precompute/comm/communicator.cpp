@@ -93,13 +93,13 @@ Communicator::Gathering Communicator::plan_gathering(std::size_t own_bytes) cons
   agree([&] {
     gathering.bytes.resize(size_);
     gathering.begin.assign(size_ + 1, 0);
-    if (own_bytes > INT32_MAX) throw SystemError(fmt::format("{} bytes are too many to bring to every rank; start more ranks", own_bytes));
+    if (own_bytes > INT32_MAX) throw SystemError(fmt::format("{} bytes are too many to gather on every rank; start more ranks", own_bytes));
   });
   const int own = static_cast<int>(own_bytes);
   MPI_Allgather(&own, 1, MPI_INT, gathering.bytes.data(), 1, MPI_INT, comm_);
   agree([&] {
     const auto total = std::accumulate(gathering.bytes.begin(), gathering.bytes.end(), std::int64_t{0});
-    if (total > INT32_MAX) throw SystemError(fmt::format("{} bytes are too many to bring to every rank; start fewer ranks", total));
+    if (total > INT32_MAX) throw SystemError(fmt::format("{} bytes are too many to gather on every rank; start fewer ranks", total));
     std::partial_sum(gathering.bytes.begin(), gathering.bytes.end(), gathering.begin.begin() + 1);
   });
   return gathering;

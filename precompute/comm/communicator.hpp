@@ -19,28 +19,28 @@
 
 namespace carillon::comm {
 
-/// What may travel as bytes.
+/// Types that can be sent as bytes.
 template <typename T>
 concept Plain = std::is_trivially_copyable_v<T>;
 
-/// A number that MPI can add and compare.
+/// Number types supported by MPI reductions.
 template <typename T>
 concept Number =
     std::same_as<T, double> || std::same_as<T, std::int32_t> || std::same_as<T, std::int64_t> || std::same_as<T, std::uint64_t>;
 
-/// The numbers of a record that has nothing but doubles.
+/// Numbers of a record that consists of doubles only.
 template <Plain T>
 std::span<double> list_numbers(T& record) {
   static_assert(sizeof(T) % sizeof(double) == 0 && alignof(T) == alignof(double));
   return {reinterpret_cast<double*>(&record), sizeof(T) / sizeof(double)};
 }
 
-/// A communicator, which it does not own, with this rank and their number. All methods are collective but the conversions, rank(), size()
-/// and is_root(): all ranks call them in the same order. Those that allocate or run a caller's work either return on all ranks or throw the
-/// same on all ranks, so that no rank waits for one that failed.
+/// A communicator (not owned) with rank and size. All methods are collective except the conversions, rank(), size() and is_root(): all
+/// ranks call them in the same order. Methods that allocate or run the caller's work either return on all ranks or throw the same error on
+/// all ranks, so that no rank waits for a failed one.
 class Communicator {
  public:
-  /// Implicit in both directions: a communicator of MPI may be passed where a Communicator is taken, and the other way round.
+  /// Implicit conversions in both directions to and from MPI_Comm.
   Communicator(MPI_Comm comm);
   operator MPI_Comm() const { return comm_; }
 
@@ -53,16 +53,16 @@ class Communicator {
   /// True on every rank if `ok` was true on every rank.
   bool all(bool ok) const;
 
-  /// The error of the lowest failing rank is thrown on every rank (null: this rank did not fail). InputError, PlacedError, SolveError,
-  /// SystemError, MemoryError and DiskFullError keep their type, place and need; std::bad_alloc arrives as MemoryError, any other exception
-  /// as SystemError.
+  /// Throws the error of the lowest failing rank on every rank (null: this rank did not fail). InputError, PlacedError, SolveError,
+  /// SystemError, MemoryError and DiskFullError keep their type, place and need; std::bad_alloc becomes MemoryError, any other exception
+  /// SystemError.
   void agree(std::exception_ptr error) const;
 
-  /// Throws InputError(text) on every rank if any rank brings a non-empty text; the lowest such rank's text wins.
+  /// Throws InputError(text) on every rank if any rank passes a non-empty text; the text of the lowest such rank is used.
   void agree(const std::string& error_text) const;
 
-  /// Runs `work` on every rank, then agrees: either all ranks get their result or all throw the same. `work` is local: it must not be
-  /// collective itself, unless it throws on all ranks alike.
+  /// Runs `work` on every rank, then agrees: either all ranks get their result or all throw the same error. `work` must not be collective,
+  /// unless it throws on all ranks alike.
   template <std::invocable Work>
   auto agree(Work&& work) const {
     using Result = std::invoke_result_t<Work>;
@@ -103,7 +103,7 @@ class Communicator {
     max(std::span<T>(&value, 1));
     return value;
   }
-  /// Of each entry, in place.
+  /// Reduces each entry, in place.
   void sum(std::span<double> values) const { reduce(values.data(), values.size(), MPI_DOUBLE, MPI_SUM); }
   void sum(std::span<std::int32_t> values) const { reduce(values.data(), values.size(), MPI_INT32_T, MPI_SUM); }
   void sum(std::span<std::int64_t> values) const { reduce(values.data(), values.size(), MPI_INT64_T, MPI_SUM); }
@@ -119,7 +119,7 @@ class Communicator {
 
   // ---- rank 0 to all ----
 
-  /// Rank 0's value; what other ranks bring is ignored.
+  /// Value of rank 0; values of other ranks are ignored.
   template <Plain T>
   requires(!std::invocable<T>) T broadcast(T value)
   const {
@@ -133,14 +133,14 @@ class Communicator {
     broadcast_bytes(items.data(), items.size() * sizeof(T));
     return items;
   }
-  /// Of entries in place; all ranks bring as many.
+  /// Entries in place; the same count on all ranks.
   template <Plain T>
   void broadcast_into(std::span<T> values) const {
     broadcast_bytes(values.data(), values.size_bytes());
   }
   std::string broadcast(std::string text) const;
   std::vector<std::string> broadcast(std::vector<std::string> texts) const;
-  /// The result of `make`, which runs on rank 0 only; its error is thrown on every rank.
+  /// Result of `make`, which runs on rank 0 only; its error is thrown on every rank.
   template <std::invocable Make>
   auto broadcast(Make&& make) const {
     using Result = std::invoke_result_t<Make>;
@@ -149,7 +149,7 @@ class Communicator {
 
   // ---- all to all ----
 
-  /// The items of all ranks on every rank, in the order of the ranks. Of few items. Throws SystemError when all are more than 2 GB.
+  /// Items of all ranks on every rank, in rank order; for few items. Throws SystemError if all together exceed 2 GB.
   template <Plain T>
   std::vector<T> all_gather(const std::vector<T>& own) const {
     Gathering gathering = plan_gathering(own.size() * sizeof(T));
@@ -157,13 +157,13 @@ class Communicator {
     all_gather_bytes(own.data(), gathering, all.data());
     return all;
   }
-  /// Of the items that `make` returns.
+  /// Gathers the items returned by `make`.
   template <std::invocable Make>
   auto all_gather(Make&& make) const {
     return all_gather(agree(std::forward<Make>(make)));
   }
 
-  /// What is gathered from every rank, in bytes, and where it begins. Throws SystemError on every rank when it is more than 2 GB in all.
+  /// Sizes and offsets of a gathering, in bytes. Throws SystemError on every rank if the total exceeds 2 GB.
   struct Gathering {
     std::vector<int> bytes;  // (ranks)
     std::vector<int> begin;  // (ranks + 1)

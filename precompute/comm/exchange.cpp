@@ -1,4 +1,4 @@
-// Source: the meeting places of find_owners are the rendezvous of Pinar and Hendrickson 2001, as in Zoltan's distributed directory.
+// Source: find_owners uses the rendezvous of Pinar and Hendrickson 2001, as in the distributed directory of Zoltan.
 #include "precompute/comm/exchange.hpp"
 
 #include <cstring>

@@ -1,11 +1,11 @@
-// Items from every rank to every rank, and questions to the ranks that can answer them.
+// All-to-all exchange of items, and queries to the owners of numbers.
 //
 //   const auto find_owner = [&](std::int32_t node) { return owners.find_owner(node); };
 //   const auto arrived = comm::all_to_all(comm, [&] { return list_faces(mesh); }, [&](const Face& face) { return find_owner(face.a); });
 //   const auto x = comm::query_owners<Vec3>(comm, nodes, find_owner, [&](std::int32_t node) { return own_m[owners.to_local(node)]; });
 //
-// All functions are collective. What the caller passes to make, sort or answer items is local work: when it throws on one rank, all ranks
-// throw the same.
+// All functions are collective. Callbacks that make, sort or answer items are local work: if one throws on one rank, all ranks throw the
+// same error.
 #pragma once
 
 #include <cstddef>
@@ -22,7 +22,7 @@
 
 namespace carillon::comm {
 
-/// Items in the order of the ranks that they go to or come from, and of one rank in the order in which they were made.
+/// Items sorted by the rank they go to or come from; for one rank in their original order.
 template <typename T>
 struct ByRank {
   std::vector<T> items;
@@ -35,26 +35,25 @@ struct ByRank {
   }
 };
 
-/// An all-to-all whose counts are known on both sides: it can be repeated, and reversed, without counting again. Each item goes to one
-/// rank.
+/// All-to-all with counts known on both sides: can be repeated and reversed without counting again. Each item goes to one rank.
 class Exchange {
  public:
-  Exchange() = default;  // of one rank, without items
-  /// sent_begin: (ranks + 1) first item for each rank, from 0. Collective.
+  Exchange() = default;  // one rank, no items
+  /// sent_begin: (ranks + 1) first item for each rank, starting at 0. Collective.
   Exchange(const Communicator& comm, std::vector<std::int64_t> sent_begin, std::size_t block_bytes = kBlockBytes);
 
   std::int64_t sent_count() const { return sent_begin_.back(); }
   std::int64_t received_count() const { return received_begin_.back(); }
   const std::vector<std::int64_t>& received_begin() const { return received_begin_; }
 
-  /// Makes room for items of so many bytes, so that what follows does not allocate. Local.
+  /// Reserves memory for items of this size, so that later calls do not allocate. Local.
   void reserve(std::size_t item_bytes);
   /// sent: (sent_count, width), received: (received_count, width). Collective.
   template <Plain T>
   void forward(const T* sent, T* received, std::size_t width = 1) {
     run(sent_begin_, sent, received_begin_, received, width * sizeof(T));
   }
-  /// The other way: answers go back to where the items came from.
+  /// Reverse direction: answers return to the senders of the items.
   template <Plain T>
   void backward(const T* answers, T* returned, std::size_t width = 1) {
     run(received_begin_, answers, sent_begin_, returned, width * sizeof(T));
@@ -70,7 +69,7 @@ class Exchange {
   Messages messages_;
 };
 
-/// Items in the order of their receivers; `source`, if wanted, becomes the place that each had before. Local.
+/// Items sorted by receiver; `source`, if not null, gets the original index of each. Local.
 template <Plain T, typename FindReceiver>
 ByRank<T> sort_by_receiver(int ranks, const std::vector<T>& items, FindReceiver&& find_receiver,
                            std::vector<std::size_t>* source = nullptr) {
@@ -90,7 +89,7 @@ ByRank<T> sort_by_receiver(int ranks, const std::vector<T>& items, FindReceiver&
   return sorted;
 }
 
-/// Sends items that are in the order of their receivers.
+/// Sends items sorted by receiver.
 template <Plain T>
 ByRank<T> all_to_all(const Communicator& comm, const ByRank<T>& sent) {
   Exchange exchange(comm, sent.begin);
@@ -102,13 +101,13 @@ ByRank<T> all_to_all(const Communicator& comm, const ByRank<T>& sent) {
   return received;
 }
 
-/// Sends the ByRank that `make` returns.
+/// Sends the ByRank returned by `make`.
 template <std::invocable Make>
 auto all_to_all(const Communicator& comm, Make&& make) {
   return all_to_all(comm, comm.agree(std::forward<Make>(make)));
 }
 
-/// Sends every item to the rank that find_receiver(item) names. `items`: a vector, or what returns one.
+/// Sends every item to rank find_receiver(item). `items`: a vector, or a function that returns one.
 template <typename Items, typename FindReceiver>
 auto all_to_all(const Communicator& comm, Items&& items, FindReceiver&& find_receiver) {
   return all_to_all(comm, [&] {
@@ -120,7 +119,7 @@ auto all_to_all(const Communicator& comm, Items&& items, FindReceiver&& find_rec
   });
 }
 
-/// All items on rank 0, in the order of the ranks; empty elsewhere.
+/// All items on rank 0, in rank order; empty on other ranks.
 template <Plain T>
 std::vector<T> gather(const Communicator& comm, const std::vector<T>& items) {
   Exchange exchange(comm, comm.agree([&] {
@@ -136,14 +135,15 @@ std::vector<T> gather(const Communicator& comm, const std::vector<T>& items) {
   return received;
 }
 
-/// Gathers the vector that `make` returns.
+/// Gathers the vector returned by `make`.
 template <std::invocable Make>
 auto gather(const Communicator& comm, Make&& make) {
   return gather(comm, comm.agree(std::forward<Make>(make)));
 }
 
-/// Asks for every question the rank that find_owner(question) names. There answer(question) returns an Answer, or answer(questions), which
-/// takes the ByRank of all that was asked there, a vector of answers in that order. Returns the answers in the order of the questions.
+/// Sends each question to rank find_owner(question), where it is answered by answer(question), which returns one Answer, or by
+/// answer(questions), which takes the ByRank of all questions and returns a vector of answers in that order. Returns the answers in the
+/// order of the questions.
 template <Plain Answer, Plain Question, typename FindOwner, typename FindAnswer>
 std::vector<Answer> query_owners(const Communicator& comm, const std::vector<Question>& questions, FindOwner&& find_owner,
                                  FindAnswer&& answer) {
@@ -173,15 +173,15 @@ std::vector<Answer> query_owners(const Communicator& comm, const std::vector<Que
   return answers;
 }
 
-/// A value of a number that some rank owns.
+/// A value for a number owned by some rank.
 template <Plain T>
 struct Reported {
   std::int32_t number;
   T value;
 };
 
-/// Sends each Reported of the list that `make` returns to the rank that find_owner(number) names. Returns `count` values there, at
-/// to_local(number); those that nothing is reported for are `missing`.
+/// Sends each Reported of the list returned by `make` to rank find_owner(number). Returns `count` values there, at to_local(number); values
+/// without a report are `missing`.
 template <Plain T, std::invocable Make, typename FindOwner, typename FindLocal>
 std::vector<T> report_to_owners(const Communicator& comm, Make&& make, FindOwner&& find_owner, std::int64_t count, FindLocal&& to_local,
                                 T missing = {}) {
@@ -200,29 +200,29 @@ std::vector<T> report_to_owners(const Communicator& comm, Make&& make, const Ind
       [&](std::int32_t number) { return owners.to_local(number); }, missing);
 }
 
-/// Which rank owns each of the wanted numbers, of which every rank names those that it owns; numbers are not negative. Every wanted number
-/// has one owner. By a meeting place for each number (rank = number modulo ranks).
+/// Owner of each wanted number, given the numbers owned by each rank; numbers are not negative. Every wanted number has one owner. Uses a
+/// rendezvous rank for each number (number modulo ranks).
 std::vector<std::int32_t> find_owners(const Communicator& comm, const std::vector<std::int32_t>& owned,
                                       const std::vector<std::int32_t>& wanted);
 
 namespace detail {
-/// Sends the bytes in three steps, so that neither side waits for one that ran out of memory: their number (null: there are none, because
-/// this side failed), the answer whether there is room for them, and the bytes themselves.
+/// Sends the bytes in three steps, so that neither side waits for one that ran out of memory: their count (null bytes: this side failed),
+/// the reply whether memory suffices, and the bytes themselves.
 void send_with_handshake(const Communicator& comm, const std::vector<std::byte>* bytes, int to);
-/// The other side. False if the sender failed. Throws std::bad_alloc after it has said that it has no room.
+/// Receiving side. False if the sender failed. Throws std::bad_alloc after replying that memory does not suffice.
 bool receive_with_handshake(const Communicator& comm, std::vector<std::byte>& bytes, int from);
 }  // namespace detail
 
-/// Rank 0 calls make(rank) for one rank after the other, its own last, and sends what serialise(result) returns; deserialise(bytes) makes
-/// the result of it again. Rank 0 never has more than one rank's result. Returns this rank's. Throws the same on every rank when any of the
-/// three throws or memory runs out on either side.
+/// Rank 0 calls make(rank) for one rank after the other, its own last, and sends serialise(result); deserialise(bytes) restores the result.
+/// Rank 0 holds only one result at a time. Returns the result of this rank. Throws the same error on every rank if any of the three throws
+/// or memory runs out on either side.
 template <typename Make, typename Serialise, typename Deserialise>
 auto scatter_in_turn(const Communicator& comm, Make&& make, Serialise&& serialise, Deserialise&& deserialise) {
   using Result = std::invoke_result_t<Make, int>;
   return comm.agree([&]() -> Result {
     if (!comm.is_root()) {
       std::vector<std::byte> bytes;
-      return detail::receive_with_handshake(comm, bytes, 0) ? deserialise(bytes) : Result();  // rank 0 names the error
+      return detail::receive_with_handshake(comm, bytes, 0) ? deserialise(bytes) : Result();  // the error comes from rank 0
     }
     std::exception_ptr error;
     for (int to = 1; to < comm.size(); ++to) {

@@ -1,5 +1,5 @@
-// Method: every rank sends the owners the list of the numbers that it needs, once; afterwards only values travel, between neighbours.
-// Source: none. Deviations: none.
+// Method: Every rank sends the owners the list of the numbers that it needs, once; afterwards only values are exchanged, between
+// neighbours.
 #include "precompute/comm/halo_exchange.hpp"
 
 #include <algorithm>
@@ -16,7 +16,7 @@ Halo make_halo(const IndexPartition& owners, std::span<const std::int32_t> numbe
   return halo;
 }
 
-/// Copies the items at `places` one behind the other.
+/// Copies the items at `places` into a contiguous buffer.
 void pack(const std::byte* values, const std::vector<std::int32_t>& places, std::size_t item_bytes, std::byte* out) {
   for (const std::int32_t place : places) {
     std::memcpy(out, values + static_cast<std::size_t>(place) * item_bytes, item_bytes);

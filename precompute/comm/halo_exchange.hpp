@@ -1,4 +1,4 @@
-// Values of numbers that several ranks use: each has one owner, the others keep copies, their halo.
+// Values shared by several ranks: each has one owner, the other ranks keep copies, their halo.
 #pragma once
 
 #include <cstddef>
@@ -11,19 +11,19 @@
 
 namespace carillon::comm {
 
-/// Numbers of other ranks, and where this rank keeps its copies of them.
+/// Numbers of other ranks, and the places of their local copies.
 struct Halo {
-  std::vector<std::int32_t> number;  // (h) each once
-  std::vector<std::int32_t> owner;   // (h) a rank, never this one
-  std::vector<std::int32_t> place;   // (h) into the arrays of values
+  std::vector<std::int32_t> number;  // (h) unique
+  std::vector<std::int32_t> owner;   // (h) another rank
+  std::vector<std::int32_t> place;   // (h) index into the arrays of values
 };
 
-/// Copies values from owners to halos and sums them the other way. Values are arrays (places, width). Once made, each rank talks to its
-/// neighbours only, and what fits the room reserved allocates nothing.
+/// Copies values from owners to halos and sums them in the opposite direction. Values are arrays (places, width). After construction, each
+/// rank communicates only with its neighbours, and exchanges within the reserved size do not allocate.
 class HaloExchange {
  public:
-  HaloExchange() = default;  // of a rank without neighbours
-  /// owned: places of the numbers that this rank owns, as find_own_place(number) returns them. Collective.
+  HaloExchange() = default;  // a rank without neighbours
+  /// Own numbers are at find_own_place(number). Collective.
   template <typename FindOwnPlace>
   HaloExchange(const Communicator& comm, const Halo& halo, FindOwnPlace&& find_own_place, std::size_t block_bytes = kBlockBytes)
       : comm_(comm), messages_(block_bytes) {
@@ -46,17 +46,17 @@ class HaloExchange {
       }
     });
   }
-  /// Numbers in one run per rank: own number i is at place own_begin + i - owners.own_begin(). Collective.
+  /// Contiguous numbers per rank: own number i is at place own_begin + i - owners.own_begin(). Collective.
   HaloExchange(const Communicator& comm, const IndexPartition& owners, std::span<const std::int32_t> halo_numbers,
                std::span<const std::int32_t> halo_places, std::int32_t own_begin = 0);
 
   bool has_neighbours() const { return !neighbours_.empty(); }
 
-  /// Makes room for items of so many bytes (width times the size of a value), so that what follows does not allocate. Local.
+  /// Reserves memory for items of this size (width times the size of a value), so that later calls do not allocate. Local.
   void reserve(std::size_t item_bytes);
 
-  /// Halo places get what the owner has. Collective; `begin` sends, `end` waits for what comes: work that needs no halo may go between, and
-  /// leaves the values at halo places alone. No other exchange of this object may go between.
+  /// Copies owner values to halo places. Collective. `begin` sends and `end` waits for the received values: work in between must not touch
+  /// the values at halo places or use this object for another exchange.
   template <Plain T>
   void begin_copy_to_halo(T* values, std::size_t width) {
     begin_copy(reinterpret_cast<std::byte*>(values), width * sizeof(T));
@@ -71,10 +71,10 @@ class HaloExchange {
     end_copy_to_halo(values, width);
   }
 
-  /// Adds to the owner's value those of all copies, in the order of the ranks. Collective.
+  /// Adds the values of all copies to the owner's value, in rank order. Collective.
   void sum_to_owner(float* values, std::size_t width);
   void sum_to_owner(double* values, std::size_t width);
-  /// The same, and every copy gets the sum. Collective.
+  /// The same, and then copies the sum to all halos. Collective.
   template <typename T>
   void sum(T* values, std::size_t width) {
     sum_to_owner(values, width);
@@ -87,9 +87,9 @@ class HaloExchange {
   };
   struct Neighbour {
     int rank = 0;
-    std::vector<std::int32_t> halo;   // places of our copies of what it owns
-    std::vector<std::int32_t> owned;  // places of what we own and it keeps copies of, in its order
-    bool is_halo_one_run = false;     // halo places follow each other: they are received where they belong
+    std::vector<std::int32_t> halo;   // places of local copies of the neighbour's values
+    std::vector<std::int32_t> owned;  // places of own values copied by the neighbour, in its order
+    bool is_halo_one_run = false;     // halo places are contiguous: received in place
   };
   void add(Neighbour neighbour);
   void begin_copy(std::byte* values, std::size_t item_bytes);

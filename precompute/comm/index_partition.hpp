@@ -1,4 +1,4 @@
-// Numbers 0 ... total - 1 in one run per rank.
+// Numbers 0 ... total - 1, contiguous per rank.
 #pragma once
 
 #include <algorithm>
@@ -9,14 +9,14 @@
 
 namespace carillon::comm {
 
-/// Which rank owns which numbers: rank r owns begin(r) ... begin(r + 1) - 1, and ranks follow each other from 0 to total(). The same on
-/// every rank but for what is called "own".
+/// Ownership of numbers: rank r owns begin(r) ... begin(r + 1) - 1, from 0 to total(). The same on every rank except for members named
+/// "own".
 class IndexPartition {
  public:
-  IndexPartition() = default;  // no number and no rank
-  /// Runs of the lengths that the ranks bring. Collective.
+  IndexPartition() = default;  // no numbers, no ranks
+  /// Run lengths given by each rank. Collective.
   IndexPartition(const Communicator& comm, std::int64_t own_count);
-  /// Runs of equal length, to one; longer ones first. Local.
+  /// Equal run lengths, differing by at most one; longer runs first. Local.
   static IndexPartition make_even(const Communicator& comm, std::int64_t total);
 
   std::int64_t total() const { return begin_.empty() ? 0 : begin_.back(); }
@@ -31,7 +31,7 @@ class IndexPartition {
   std::int64_t own_end() const { return begin(rank_ + 1); }
   std::int64_t own_count() const { return own_end() - own_begin(); }
   bool is_own(std::int64_t number) const { return number >= own_begin() && number < own_end(); }
-  /// Place of an own number in this rank's run.
+  /// Index of an own number in this rank's run.
   std::size_t to_local(std::int64_t number) const { return number - own_begin(); }
 
  private:

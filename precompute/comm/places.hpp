@@ -1,4 +1,4 @@
-// Where a sequence that all ranks have a part of is to be cut, so that so many items come before.
+// Cut positions of a distributed sequence by item count.
 #pragma once
 
 #include <algorithm>
@@ -9,8 +9,8 @@
 
 namespace carillon::comm {
 
-/// The largest numbers of so many bits for which count(g, number) is at most wanted[g]; counts ascend with the number. A bisection over the
-/// bits, all groups at once. count_below(numbers, counts) adds this rank's counts. Collective.
+/// Largest numbers with `bits` bits for which the count below is at most wanted[g]; counts ascend with the number. Bisection over the bits,
+/// for all groups at once. count_below(numbers, counts) adds the counts of this rank. Collective.
 template <typename CountBelow>
 std::vector<std::uint64_t> find_places(const Communicator& comm, int bits, const std::vector<std::int64_t>& wanted,
                                        CountBelow&& count_below) {

@@ -4,8 +4,8 @@
 #include <fmt/core.h>
 
 #include "precompute/eigen/memory.hpp"
+#include "precompute/eigen/predict_cost.hpp"
 #include "precompute/eigen/rigid_modes.hpp"
-#include "precompute/eigen/solve_estimate.hpp"
 #include "precompute/petsc/session.hpp"
 #include "runtime/base/error.hpp"
 
@@ -14,9 +14,9 @@ namespace {
 
 using petsc::check;
 
-constexpr double kDenseRounding = 1e4;       // Of epsilon times the largest ratio of the diagonals: far above what LAPACK leaves of it.
-constexpr double kMechanismTolerance = 1e2;  // Of the same: eigenvalues below are zero as far as a count by inertia can resolve.
-constexpr double kMechanismRatio = 1e-4;     // Of the band's lower end: no mechanism is faster.
+constexpr double kDenseRounding = 1e4;  // Factor on epsilon times the largest ratio of the diagonals: far above the rounding of LAPACK.
+constexpr double kMechanismTolerance = 1e2;  // Factor on the same: smaller eigenvalues count as zero.
+constexpr double kMechanismRatio = 1e-4;     // Relative to the lower end of the band: upper limit for mechanisms.
 
 // Collective.
 double find_fastest(const Operators& operators) {
@@ -26,12 +26,12 @@ double find_fastest(const Operators& operators) {
   return operators.comm.max(fastest);
 }
 
-// Where rounding is near the lower end, it may have to move.
+// If rounding is near the lower end, the end may have to move, so it is counted.
 bool can_assume_low_end(const BandProblem& body) {
   return eigen::can_assume_low_end(body.options) && body.asked.low > kDenseRounding * body.rounding();
 }
 
-// What follows copies K and M.
+// The following stages copy K and M.
 std::vector<petsc::VecHandle> make_rigid(const comm::Communicator& comm, const Problem& problem, const Options& options,
                                          const la::Pencil& pencil, std::vector<std::int64_t>& per_component) {
   check_memory(comm, calc_copies_bytes(problem), options.memory_limit_bytes, "The eigensolver's copy of K and M");
@@ -59,7 +59,7 @@ double BandProblem::rounding() const { return PETSC_MACHINE_EPSILON * fastest; }
 bool is_dense_exact(const BandProblem& body, const BandLimits& limits) { return limits.low > kDenseRounding * body.rounding(); }
 
 std::string explain_rounding(const BandProblem& body, const BandLimits& limits) {
-  constexpr double kSafe = 30;  // times that rounding, squared frequencies keep their digits
+  constexpr double kSafe = 30;  // squared frequencies keep their digits above this multiple of the rounding
   if (limits.low > kSafe * body.rounding()) return {};
   return fmt::format(
       " Rounding of K alone moves the squared frequencies of this body by ({:.2g} Hz)^2, because it is so thin or its elements are so "
@@ -94,14 +94,14 @@ void count_low_end(const BandProblem& body, const BandCounter& counter, BandCoun
   if (band.below_low < body.rigid_count() || band.count() < 0) {
     throw SolveError(
         fmt::format("The inertia counts {} eigenvalues below {:.6g} Hz and {} below {:.6g} Hz, with {} rigid modes: K or M is not "
-                    "what a body has. Look for inverted elements.",
+                    "valid. Look for inverted elements.",
                     band.below_low, body.to_hz(band.low), band.below_high, body.to_hz(band.high), body.rigid_count()));
   }
   if (band.below_low > body.rigid_count()) {
     constexpr double kReach = 1e-6;
     const double limit = kMechanismRatio * counts.limits.low;
     const Inertia zeros = counter.count_below(std::min(limit, kMechanismTolerance * body.rounding()), kReach, ShiftRule::kMayMoveUp);
-    // Where rounding hides what is so slow, slow modes would be taken for mechanisms.
+    // If rounding hides such slow motions, slow modes would be taken for mechanisms.
     if (zeros.lambda <= limit * (1 + kReach)) counts.mechanism_count = std::max<std::int64_t>(0, zeros.below - body.rigid_count());
     if (zeros.lambda != band.low) counter.forget(zeros.lambda);
   }

@@ -1,9 +1,9 @@
-// Method:     V_{j+1} R_j = A^-1 M V_j - V_j alpha_j - V_{j-1} R_{j-1}^T in the M inner product, A = K - sigma M, blocks of b columns. The
-//             projected matrix is block tridiagonal; the Ritz step is due where the wanted pairs should have converged, by how they came so
-//             far. A full basis is restarted with its best Ritz vectors.
-// Source:     Grimes, Lewis, Simon, A shifted block Lanczos algorithm, SIAM J. Matrix Anal. Appl. 15(1), 1994. Wu, Simon, Thick-restart
-//             Lanczos, SIAM J. Matrix Anal. Appl. 22(2), 2000.
-// Deviations: Ritz vectors go through the operator once more by the recurrence, and are cleared of the pairs nearest the shift.
+// Method: V_{j+1} R_j = A^-1 M V_j - V_j alpha_j - V_{j-1} R_{j-1}^T in the M inner product, A = K - sigma M, blocks of b columns. The
+// projected matrix is block tridiagonal; a Ritz step is made when the wanted pairs are predicted to have converged. A full basis is
+// restarted with its best Ritz vectors. Ritz vectors pass through the operator once more by the recurrence, and are orthogonalised against
+// the pairs nearest to the shift.
+// Source: Grimes, Lewis, Simon, A shifted block Lanczos algorithm, SIAM J. Matrix Anal. Appl. 15(1), 1994. Wu, Simon, Thick-restart
+// Lanczos, SIAM J. Matrix Anal. Appl. 22(2), 2000.
 #include "precompute/eigen/block_lanczos.hpp"
 
 #include <algorithm>
@@ -18,10 +18,11 @@
 namespace carillon::eigen {
 namespace {
 
-constexpr int kPurifiedAgainst = 32;        // Converged pairs that the others are cleared of at the end.
-constexpr int kColumnsCleared = 128;        // Locked modes that the others are cleared of at a time.
-constexpr double kLockedRemainder = 1e-12;  // Less of a locked mode may stay in the others.
-constexpr double kOrthonormal = 1e-6;       // An orthonormal block that was saved is no farther from being one.
+constexpr int kPurifiedAgainst =
+    32;  // Number of converged pairs nearest to the shift that the others are orthogonalised against at the end.
+constexpr int kColumnsCleared = 128;        // Locked modes that the others are orthogonalised against at a time.
+constexpr double kLockedRemainder = 1e-12;  // Smaller remainders of a locked mode are ignored.
+constexpr double kOrthonormal = 1e-6;       // Maximum orthonormality error of a saved block.
 
 std::vector<double> calc_theta(const LockedModes& locked, double sigma) {
   std::vector<double> theta = locked.lambda;
@@ -45,13 +46,13 @@ BlockLanczos::BlockLanczos(const LanczosProblem& problem, RitzGoal goal, int max
       checkpoint_(checkpoint),
       orthogonaliser_(inner_, basis_, locked_, calc_theta(locked_, inverse_.get_sigma()), problem.n, problem.first_row, checkpoint) {}
 
-// w = A^-1 z, z being M times the current block; w stands at column `to` of the basis then.
+// w = A^-1 z, z: M times the current block; w is at column `to` of the basis afterwards.
 void BlockLanczos::invert(int to) {
   inner_.place(basis_.columns(to, basis_.block()));
-  inverse_.apply(inner_.z_mat(), inner_.w_mat());
+  inverse_.apply(inner_.z(), inner_.w());
 }
 
-// The starting block goes through the operator once, which damps what is far from the shift.
+// The starting block passes through the operator once, which damps components far from the shift.
 bool BlockLanczos::start() {
   inner_.place(basis_.columns(0, basis_.block()));
   inner_.multiply();
@@ -69,7 +70,7 @@ bool BlockLanczos::step() {
 }
 
 BlockLanczos::End BlockLanczos::run(const Monitor& monitor) {
-  if (!resume() && !start()) return End::kExhausted;  // nothing except what is fixed and locked
+  if (!resume() && !start()) return End::kExhausted;  // the space is spanned by locked modes
   while (true) {
     const bool is_exhausted = !step();
     if (is_exhausted || basis_.is_full() || basis_.size() >= next_check_ || steps_ >= max_steps_) {
@@ -89,7 +90,7 @@ BlockLanczos::End BlockLanczos::run(const Monitor& monitor) {
   }
 }
 
-// The next Ritz step: when the wanted pairs should be there, going by how they came so far.
+// Schedules the next Ritz step by the convergence rate so far.
 void BlockLanczos::plan_check(const RitzSelection& selection) {
   const auto wanted = static_cast<double>(goal_.wanted);
   const auto converged = static_cast<double>(selection.converged);
@@ -116,10 +117,10 @@ void BlockLanczos::restart(RitzPairs& pairs, const RitzSelection& selection) {
   orthogonaliser_.reset();
 }
 
-// ---- the Ritz vectors in the end
+// ---- final Ritz vectors
 
-// Once through the operator, y + V_next R s / theta, which costs next to nothing as V_next is at hand: what is left of frequencies far
-// above the shift, small in the M norm and large in the residual of K, is gone. (size + next_width, count)
+// Passes the vectors through the operator once, y + V_next R s / theta, at almost no cost as V_next is available: removes remainders of
+// frequencies far above the shift, which are small in the M norm and large in the residual of K. (size + next_width, count)
 la::Matrix BlockLanczos::calc_purified(const RitzPairs& pairs, const RitzSelection& selection, int count) const {
   const la::Matrix picked = pick_vectors(pairs, selection, count);
   const la::Matrix& r = basis_.coupling();
@@ -140,16 +141,16 @@ void BlockLanczos::finish(RitzPairs& pairs, const RitzSelection& selection) {
   const auto count = static_cast<int>(converged_);
   const la::Matrix purified = calc_purified(pairs, selection, count);
   la::combine_columns(basis_.columns(0, static_cast<int>(purified.rows())), purified.data(), count);
-  inner_.place(basis_.columns(count, basis_.block()));  // to work in
+  inner_.place(basis_.columns(count, basis_.block()));  // workspace
   clear_nearest(pairs, selection, count);
   clear_locked(count);
-  // The room behind what was found, before that is copied.
+  // Free memory behind the result, before that is copied.
   const Columns room = basis_.columns(count, basis_.room() + basis_.block() - count);
   if (room.rows > 0) petsc::give_back_pages(room.values, room.column(room.count));
 }
 
-// What a skipped projection leaves is rounding along the pairs nearest the shift, by their large theta. These are the most exact ones, so
-// it is the others that are made orthogonal to them, block by block.
+// Skipped projections leave rounding along the pairs nearest to the shift, due to their large theta. These pairs are the most accurate, so
+// the others are orthogonalised against them, block by block.
 void BlockLanczos::clear_nearest(const RitzPairs& pairs, const RitzSelection& selection, int count) {
   std::vector<int> order(count);
   std::iota(order.begin(), order.end(), 0);
@@ -163,7 +164,7 @@ void BlockLanczos::clear_nearest(const RitzPairs& pairs, const RitzSelection& se
     for (int j = 0; j < width; ++j) std::copy_n(found.column(order[first + j]), w.rows, nearest.column(j));
     inner_.multiply();
     la::Matrix products = inner_.calc_products(inner_.z().part(0, width), found);
-    for (int place = 0; place < std::min(first + width, count); ++place) {  // Nearer ones stay as they are.
+    for (int place = 0; place < std::min(first + width, count); ++place) {  // Nearer pairs stay unchanged.
       const int from = std::max(place - first, 0);
       products.col(order[place]).segment(from, width - from).setZero();
     }
@@ -171,7 +172,7 @@ void BlockLanczos::clear_nearest(const RitzPairs& pairs, const RitzSelection& se
   }
 }
 
-// What remained of locked modes. M times them is made behind w, where the columns are free now.
+// Removes remainders of locked modes. M times these is computed behind w, where the columns are free.
 void BlockLanczos::clear_locked(int count) {
   const std::vector<double>& remaining = orthogonaliser_.get_remaining();
   const auto is_left = [](double x) { return x > kLockedRemainder; };
@@ -199,7 +200,7 @@ void BlockLanczos::clear_locked(int count) {
 
 // ---- checkpoints
 
-// From where the checkpoint's iteration was. False where there is none or it does not fit this one: what was read has no effect then.
+// Resumes the iteration of the checkpoint. False if there is none or it does not fit; then it has no effect.
 bool BlockLanczos::resume() {
   if (checkpoint_ == nullptr || checkpoint_->start == nullptr) return false;
   const LanczosState& state = *checkpoint_->start;
@@ -208,7 +209,7 @@ bool BlockLanczos::resume() {
                     previous <= size - width && last_size <= size && last_converged <= size && next_check <= room + 4 * block &&
                     steps < max_steps_ && static_cast<std::int64_t>(state.t.size()) == size * size;
   if (!fits) {
-    checkpoint_->reject("its iteration is not this one");
+    checkpoint_->reject("its iteration is a different one");
     return false;
   }
   const Columns initial = basis_.columns(0, basis_.block());
@@ -229,7 +230,7 @@ bool BlockLanczos::resume() {
   return true;
 }
 
-// Whether `width` columns from `first` on are; Z is M times them afterwards.
+// True if `width` columns from `first` on are M-orthonormal; afterwards Z is M times them.
 bool BlockLanczos::is_orthonormal(int first, int width) {
   inner_.place(basis_.columns(first, basis_.block()));
   for (int j = width; j < basis_.block(); ++j) std::fill_n(inner_.w().column(j), inner_.w().rows, 0.0);
@@ -242,7 +243,7 @@ bool BlockLanczos::is_orthonormal(int first, int width) {
   return error < kOrthonormal;
 }
 
-// Between two steps: saves where a rank requested it. True if one requests a stop.
+// Between two steps: saves if a rank requested it. True on a stop request.
 bool BlockLanczos::save_if_requested() {
   const CheckpointRequest request = orthogonaliser_.request();
   if (checkpoint_ == nullptr || !(request.stop || request.save)) return false;

@@ -14,35 +14,34 @@
 
 namespace carillon::eigen {
 
-/// What an iteration works on; everything must outlive it.
+/// Data of an iteration; everything must outlive it.
 struct LanczosProblem {
-  const ShiftInvert& inverse;
+  ShiftInvert& inverse;
   InnerProduct& inner;
-  LanczosBasis& basis;  // the starting block stands in its first columns
+  LanczosBasis& basis;  // its first columns hold the starting block
   const LockedModes& locked;
-  PetscInt n = 0;          // rows of all ranks,
-  PetscInt first_row = 0;  // and the first of this one
+  PetscInt n = 0;          // global rows
+  PetscInt first_row = 0;  // first row of this rank
 };
 
-/// Keeps the Krylov relation of its basis between its calls, and the basis semi-orthogonal (orthogonaliser.hpp). Every member but the get_
-/// ones is collective.
+/// Keeps the Krylov relation of its basis between calls, and the basis semi-orthogonal (orthogonaliser.hpp). Every member except get_...()
+/// is collective.
 class BlockLanczos {
  public:
   enum class End { kStopped, kExhausted, kCheckpointed };
-  /// After a Ritz step, with all steps so far: true ends the iteration.
+  /// Called after a Ritz step with the steps so far; true ends the iteration.
   using Monitor = std::function<bool(const RitzPairs&, const RitzSelection&, int steps)>;
 
-  /// max_steps: blocks at most. checkpoint: may be null.
+  /// max_steps: maximum number of blocks. checkpoint: may be null.
   BlockLanczos(const LanczosProblem& problem, RitzGoal goal, int max_steps, LanczosCheckpoint* checkpoint);
 
-  /// Until the monitor says so, the space is exhausted or the checkpoint stops it. After kStopped the basis holds get_converged() Ritz
-  /// vectors, M-orthonormal, in the order of the selection.
+  /// Runs until the monitor returns true, the space is exhausted, or the checkpoint stops it. After kStopped the basis holds
+  /// get_converged() Ritz vectors, M-orthonormal, in the order of the selection.
   End run(const Monitor& monitor);
   std::int64_t get_converged() const { return converged_; }
-  int get_steps() const { return steps_; }
 
-  /// The parts of run(). start(): from the starting block; false where nothing is left of it. step(): one block more stands behind the
-  /// basis; false when the space is exhausted. restart(): with the best Ritz vectors.
+  /// Parts of run(). start(): from the starting block; false if nothing of it is left. step(): adds a block behind the basis; false if the
+  /// space is exhausted. restart(): keeps the best Ritz vectors.
   bool start();
   bool step();
   void restart(RitzPairs& pairs, const RitzSelection& selection);
@@ -58,7 +57,7 @@ class BlockLanczos {
   void clear_nearest(const RitzPairs& pairs, const RitzSelection& selection, int count);
   void clear_locked(int count);
 
-  const ShiftInvert& inverse_;
+  ShiftInvert& inverse_;
   InnerProduct& inner_;
   LanczosBasis& basis_;
   const LockedModes& locked_;
@@ -67,8 +66,8 @@ class BlockLanczos {
   LanczosCheckpoint* checkpoint_;
   Orthogonaliser orthogonaliser_;
   int steps_ = 0;
-  int next_check_ = 0;  // size of the basis at the next Ritz step,
-  int last_size_ = 0;   // and at the last one,
+  int next_check_ = 0;  // size of the basis at the next Ritz step
+  int last_size_ = 0;   // size at the last one
   std::int64_t last_converged_ = 0;
   std::int64_t converged_ = 0;
 };

@@ -1,12 +1,10 @@
-// Method:     Modes that agree to the tolerance may be mixtures of such as do not agree to rounding. Their span is far more exact than
-//             they are: Rayleigh and Ritz in it, of K - mean M, so that differences keep their digits, separate what can be separated
-//             (split_clusters). In the span of what is left, a cluster Phi, the symmetric matrix Phi^T D Phi, D = diag(m_i w_d(x_i)) with
-//             smooth weights w_d of no symmetry, has eigenvectors that depend on the span alone. Phi times these, by ascending eigenvalue,
-//             is the basis. If two eigenvalues of one form nearly coincide, another form is taken: the first of a fixed list that separates
-//             them well, or the best of the list.
-// Source:     Stewart, Sun, Matrix perturbation theory, 1990, chapter V: an eigenvector moves by the perturbation over the gap. Parlett,
-//             The symmetric eigenvalue problem, 1998, section 11.4 (what Rayleigh and Ritz make of a span).
-// Deviations: none.
+// Method: Modes that agree to the tolerance may be mixtures of modes that differ by more than rounding. Their span is far more accurate
+// than the modes: Rayleigh-Ritz in it with K - mean M, so that differences keep their digits, separates them as far as possible
+// (split_clusters). For a remaining cluster Phi, the symmetric matrix Phi^T D Phi, D = diag(m_i w_d(x_i)) with smooth weights w_d without
+// symmetry, has eigenvectors that depend only on the span. The basis is Phi times these, by ascending eigenvalue. If two eigenvalues of one
+// form nearly coincide, another form is used: the first of a fixed list that separates them well, or the best of the list.
+// Source: Stewart, Sun, Matrix perturbation theory, 1990, chapter V: an eigenvector moves by the perturbation over the gap. Parlett, The
+// symmetric eigenvalue problem, 1998, section 11.4 (Rayleigh-Ritz in a span).
 #include "precompute/eigen/canonical.hpp"
 
 #include <algorithm>
@@ -29,12 +27,12 @@ using la::LocalColumns;
 using petsc::check;
 
 constexpr int kForms = 12;
-constexpr double kMixture = 0.25;    // Of the tolerance: a mixture of such modes has residuals below it.
-constexpr double kLoosest = 2.5e-9;  // Not beyond this, however loose the tolerance,
-constexpr double kTightest = 1e-12;  // and not below rounding.
-constexpr double kGoodGap = 0.05;    // over the square of the size: the eigenvalues of a cluster crowd.
+constexpr double kMixture = 0.25;    // Relative to the tolerance: a mixture of modes this close has residuals below the tolerance.
+constexpr double kLoosest = 2.5e-9;  // Upper limit, for loose tolerances,
+constexpr double kTightest = 1e-12;  // and lower limit by rounding.
+constexpr double kGoodGap = 0.05;    // Relative to 1 / size^2, as the eigenvalues of a large cluster are dense.
 
-// Where the bodies are: centre and half the diagonal, the same for every partition.
+// Bounding box of all bodies: centre and half the diagonal, the same for every partition.
 struct Box {
   Vec3 centre{};
   double size = 1;
@@ -60,8 +58,8 @@ Box find_box(const comm::Communicator& comm, const std::vector<Vec3>& nodes_m) {
   return box;
 }
 
-// The weight of a displacement at a node, of no symmetry in place, direction and body. Frequencies and phases are multiples of irrational
-// numbers, so that no two forms agree.
+// Weight of a displacement at a node, without symmetry in position, direction and component. Frequencies and phases are multiples of
+// irrational numbers, so that no two forms agree.
 double calc_weight(const Box& box, const Vec3& x, std::int32_t component, std::size_t direction, int form) {
   const double f = 1.0 + form;
   const auto d = static_cast<double>(direction);
@@ -72,8 +70,8 @@ double calc_weight(const Box& box, const Vec3& x, std::int32_t component, std::s
   return std::sin(phase) + 0.31 * std::cos(1.8392867552 * phase + 0.5 * d);
 }
 
-// The eigenvalues, ascending, of a symmetric matrix that every rank has; its eigenvectors take its place. The first rank's are every
-// rank's, so that all decide alike. Collective. Throws SolveError(failure) on every rank when LAPACK fails.
+// Eigenvalues, ascending, of a symmetric matrix known on every rank; it is replaced by its eigenvectors. All ranks take the results of rank
+// 0, so that decisions agree. Collective. Throws SolveError(failure) on every rank if LAPACK fails.
 la::Vector diagonalise(const comm::Communicator& comm, la::Matrix& matrix, const std::string& failure) {
   la::Vector values(matrix.rows());
   comm.agree([&] {
@@ -86,7 +84,7 @@ la::Vector diagonalise(const comm::Communicator& comm, la::Matrix& matrix, const
 
 struct Basis {
   la::Matrix rotation;  // columns by ascending eigenvalue
-  double gap = 0;       // smallest distance of two eigenvalues
+  double gap = 0;       // smallest distance between two eigenvalues
 };
 
 Basis calc_basis(const Operators& operators, const NodeLayout& nodes, const Box& box, const Columns& phi, int form) {
@@ -105,7 +103,7 @@ Basis calc_basis(const Operators& operators, const NodeLayout& nodes, const Box&
   return basis;
 }
 
-// Runs of modes whose neighbours agree to `equal`, or to what rounding leaves open.
+// Groups of consecutive modes whose neighbours agree to `equal`, or to rounding.
 std::vector<Cluster> find_runs(const std::vector<double>& lambda, const ModeErrors& errors, double equal) {
   std::vector<Cluster> runs;
   for (std::size_t j = 1; j < lambda.size(); ++j) {
@@ -118,7 +116,7 @@ std::vector<Cluster> find_runs(const std::vector<double>& lambda, const ModeErro
   return runs;
 }
 
-// The eigenvectors of Phi^T (K - mean M) Phi, and its eigenvalues, ascending; the same on every rank.
+// Eigenvectors of Phi^T (K - mean M) Phi and its eigenvalues, ascending; the same on every rank.
 la::Vector calc_differences(const Operators& operators, const Columns& phi, double mean, la::Matrix& rotation) {
   const auto size = static_cast<std::size_t>(phi.rows) * static_cast<std::size_t>(phi.count);
   std::vector<double> space(2 * size);

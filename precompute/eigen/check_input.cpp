@@ -23,10 +23,6 @@ void check_input(const Problem& problem, const Options& options) {
     throw InputError(fmt::format("The tolerance {} is out of range: take one between 1e-14 and 1e-2.", options.tolerance));
   }
   const comm::Communicator comm = petsc::get_communicator(problem.stiffness);
-  if (comm.size() > 1 && options.factorisation == Factorisation::kCholmod) {
-    throw InputError(
-        fmt::format("CHOLMOD factorises on one rank and there are {}: leave the choice to the program, or take MUMPS.", comm.size()));
-  }
   comm.agree([&] {
     PetscInt rows = 0;
     PetscInt n = 0;
@@ -41,11 +37,11 @@ void check_input(const Problem& problem, const Options& options) {
     }
     for (const std::int32_t c : nodes.component) {
       if (c < 0 || c >= nodes.component_count)
-        throw InputError(fmt::format("Component {} is none of the layout's {}.", c, nodes.component_count));
+        throw InputError(fmt::format("Component {} is out of range: the layout has {}.", c, nodes.component_count));
     }
     const std::size_t order = nodes.elimination_position.size();
     if (comm.is_root() && order != 0 && 3 * order != static_cast<std::size_t>(n)) {
-      throw InputError(fmt::format("The elimination order names {} nodes of {}.", order, n / 3));
+      throw InputError(fmt::format("The elimination order has {} of {} nodes.", order, n / 3));
     }
   });
 }

@@ -1,7 +1,6 @@
-// Method:     Rayleigh quotients, residuals and Gram matrix with matrix-matrix products; Gram-Schmidt as Cholesky of the Gram matrix.
-// Source:     Parlett, The symmetric eigenvalue problem, 1998, section 4.5 (a residual bounds the error of its eigenvalue); Golub, Van
-//             Loan, Matrix Computations, sections 2.7 (rounding of products) and 5.2 (orthonormal bases).
-// Deviations: none.
+// Method: Rayleigh quotients, residuals and Gram matrix by matrix-matrix products; Gram-Schmidt as Cholesky of the Gram matrix.
+// Source: Parlett, The symmetric eigenvalue problem, 1998, section 4.5 (a residual bounds the error of its eigenvalue); Golub, Van Loan,
+// Matrix Computations, sections 2.7 (rounding of products) and 5.2 (orthonormal bases).
 #include "precompute/eigen/check_modes.hpp"
 
 #include <fmt/core.h>
@@ -26,15 +25,16 @@ namespace {
 using petsc::check;
 
 constexpr double kTieTolerance = 1e-4;  // Far above the errors of shapes, so that rounding breaks no tie.
-constexpr double kRoundOff = 10;        // Refined modes of thin shelves come out at 1 to 2.
+constexpr double kRoundOff = 10;        // Refined modes of thin shells reach 1 to 2.
 using la::LocalColumns;
 using la::NodeMatrix;
 using Row = NodeMatrix::Row;
 constexpr int kStrip = NodeMatrix::kStrip;
-constexpr int kWide = 2 * kStrip;  // Columns at a time in a Gram matrix: what block_kernels.hpp takes without packing the others.
-constexpr double kNear = 1e-4;     // Relative to lambda: nearer ones serve to measure a residual.
+constexpr int kWide =
+    2 * kStrip;                 // Columns at a time in a Gram matrix: the width that block_kernels.hpp handles without packing the others.
+constexpr double kNear = 1e-4;  // Relative to lambda: largest difference that is accurate enough to measure a residual.
 
-// The upper triangle of Phi^T M Phi, summed over the ranks; calc_mass_product(first, m_phi) writes M times as many columns from `first` on.
+// Upper triangle of Phi^T M Phi, summed over the ranks; calc_mass_product(first, m_phi) writes M times the columns from `first` on.
 template <class CalcMassProduct>
 la::Matrix calc_gram(const comm::Communicator& comm, const Columns& phi, const CalcMassProduct& calc_mass_product) {
   la::Matrix gram = la::Matrix::Zero(phi.count, phi.count);
@@ -48,13 +48,13 @@ la::Matrix calc_gram(const comm::Communicator& comm, const Columns& phi, const C
   return gram;
 }
 
-// Sums over the rows for sixteen columns each; r = K phi - lambda M phi with a lambda that is given.
+// Sums over the rows for sixteen columns each; r = K phi - lambda M phi with a given lambda.
 enum Sum : int { kPhiMPhi, kPhiR, kRR, kRMPhi, kMPhiMPhi, kDiagonal, kSums };
 using Sums = std::array<Row, kSums>;
 typedef double Vector __attribute__((vector_size(64), may_alias));
 constexpr int kVectors = kStrip / 8;
 
-// Loops over the sums are unrolled: GCC 12 sends them through memory otherwise.
+// Loops over the sums are unrolled: GCC 12 spills them to memory otherwise.
 #if defined(__x86_64__)
 __attribute__((target_clones("avx512f", "arch=haswell", "default")))
 #endif
@@ -87,7 +87,7 @@ void add_sums(std::size_t rows, const Row* phi_rows, const Row* m_rows, const Ro
   }
 }
 
-// K and M times columns first ... first + 15 of phi, a few nodes at a time: their sums, and M phi.
+// K and M times columns first ... first + 15 of phi, a few nodes at a time: sums and M phi.
 void multiply_and_sum(const Operators& operators, const Columns& phi, int first, const Row& lambda, std::vector<Row>& packed,
                       std::vector<Row>& packed_for_mass, Sums& total, const Columns& m_phi) {
   constexpr std::size_t kNodes = 32;
@@ -120,8 +120,8 @@ Operators::Operators(const la::Pencil& pencil)
   for (double& x : mass_diagonal) x *= pencil.mass_factor;
 }
 
-// The residual comes from a lambda at hand: r = (K - lambda' M) phi - delta M phi, delta = lambda - lambda'. Its norm then loses nothing to
-// cancellation as long as delta is small; where it is not, the sums are taken again.
+// The residual uses a given lambda': r = (K - lambda' M) phi - delta M phi, delta = lambda - lambda'. Its norm loses nothing to
+// cancellation while delta is small; otherwise the sums are repeated.
 ModeErrors normalise_and_measure(const Operators& operators, std::vector<double>& lambda, Mat shapes) {
   const std::size_t modes = lambda.size();
   ModeErrors errors;
@@ -186,7 +186,7 @@ void orthonormalise_shapes(const Operators& operators, Mat shapes) {
                               [&](int first, const Columns& m_phi) { operators.mass.multiply(phi.part(first, m_phi.count), m_phi); });
   const int info = la::factorise_cholesky(gram);
   if (info != 0)
-    throw SolveError(fmt::format("Mode {} is a combination of lower ones: it converged twice. Solve the band in parts.", info));
+    throw SolveError(fmt::format("Mode {} is a combination of lower ones: the same mode converged twice. Solve the band in parts.", info));
   la::solve_upper_from_right(phi.rows, phi.count, gram.data(), phi.count, phi.values, phi.stride);
 }
 
@@ -207,7 +207,7 @@ void orient_shapes(Mat shapes, const std::vector<Vec3>& nodes_m) {
   }
   comm.max(largest);
 
-  // Each rank's first candidate by (x, y, z, axis); all ranks' candidates meet everywhere.
+  // First candidate of each rank by (x, y, z, axis), gathered on all ranks.
   using Candidate = std::array<double, 5>;  // x, y, z, axis, entry; entry 0: none
   std::vector<Candidate> mine(modes, Candidate{0, 0, 0, 0, 0});
   const auto comes_first = [](const Candidate& a, const Candidate& b) {

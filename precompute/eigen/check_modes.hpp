@@ -1,4 +1,4 @@
-// What a set of modes is worth, measured from K and M alone.
+// Accuracy of a set of modes, measured from K and M alone.
 #pragma once
 
 #include <petscmat.h>
@@ -11,7 +11,7 @@
 
 namespace carillon::eigen {
 
-/// K and M of a pencil, with its factors, for products with many columns.
+/// K and M of a pencil, with their factors, for products with many columns.
 struct Operators {
   explicit Operators(const la::Pencil& pencil);
 
@@ -24,25 +24,25 @@ struct Operators {
 
 struct ModeErrors {
   std::vector<double> residual;  // (modes) ||K phi - lambda M phi||_2 / (lambda ||M phi||_2)
-  /// (modes) residual that rounding of K phi alone explains: kRoundOff epsilon ||diag(K) phi||_2 / (lambda ||M phi||_2)
+  /// (modes) residual explained by rounding of K phi: kRoundOff epsilon ||diag(K) phi||_2 / (lambda ||M phi||_2)
   std::vector<double> floor;
   double orthonormality = 0;  // max |phi_i^T M phi_j - delta_ij|
 };
 
-/// Normalises each column to phi^T M phi = 1, sets lambda to the Rayleigh quotients phi^T K phi, whose errors are of second order, and
-/// measures residuals and orthonormality. lambda: (modes); shapes: (3n, modes) dense. Collective.
+/// Normalises each column to phi^T M phi = 1, sets lambda to the Rayleigh quotients phi^T K phi (error of second order), and measures
+/// residuals and orthonormality. lambda: (modes); shapes: (3n, modes) dense. Collective.
 ModeErrors normalise_and_measure(const Operators& operators, std::vector<double>& lambda, Mat shapes);
 
-/// Sorts modes by ascending lambda, their shapes and errors with them. Collective.
+/// Sorts modes, shapes and errors by ascending lambda. Collective.
 void sort_modes(std::vector<double>& lambda, Mat shapes, ModeErrors& errors);
 
 /// Gram-Schmidt in the M inner product from the first column on: Phi <- Phi R^-1 with Phi^T M Phi = R^T R. Columns must ascend in lambda:
-/// an error of a high mode, small against its own lambda, would be large against a low one's, so the low modes must take none from above.
-/// Collective. Throws SolveError when columns are linearly dependent.
+/// an error that is small relative to a high mode would be large relative to a low one, so low modes take no part of higher ones.
+/// Collective. Throws SolveError if columns are linearly dependent.
 void orthonormalise_shapes(const Operators& operators, Mat shapes);
 
-/// Turns each column so that its entry of largest magnitude is positive; among entries as large to 1e-4 the one whose node comes first by
-/// x, y, z decides, so that the partition has no say. Collective.
+/// Sets the sign of each column so that its entry of largest magnitude is positive; among entries equal to 1e-4, the node that comes first
+/// by x, y, z decides, so results do not depend on the partition. Collective.
 void orient_shapes(Mat shapes, const std::vector<Vec3>& nodes_m);
 
 }  // namespace carillon::eigen

@@ -66,7 +66,7 @@ std::string NumberReader::get_text() {
 }
 
 void NumberReader::end() const {
-  if (at_ != bytes_.size()) throw InputError("it has numbers too many");
+  if (at_ != bytes_.size()) throw InputError("it has too many numbers");
 }
 
 }  // namespace carillon::eigen

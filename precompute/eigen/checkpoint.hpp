@@ -1,4 +1,4 @@
-// A solve that is saved on its way and resumed later, by as many ranks as one likes.
+// A solve that is saved while it runs and resumed later on any number of ranks.
 #pragma once
 
 #include <cstdint>
@@ -13,40 +13,40 @@ namespace carillon::eigen {
 
 using la::Columns;
 
-/// What a rank requests at a safe point.
+/// Request of a rank at a safe point.
 struct CheckpointRequest {
-  bool stop = false;  // it was asked to stop: save and throw Stopped
-  bool save = false;  // it is time to save
+  bool stop = false;  // save and throw Stopped
+  bool save = false;  // save and continue
 };
 
-/// All that a solve has to remember: numbers, the same on every rank and a few MB at most, and columns over the rows of K, of which each
-/// rank brings its own. The code that stores them need not know what they mean.
+/// State of a solve: numbers, the same on all ranks and at most a few MB, and columns over the rows of K, each rank with its own rows. The
+/// storage does not interpret them.
 struct Checkpoint {
-  /// Local and cheap; asked at every safe point. What one rank requests all do.
+  /// Local and cheap; called at every safe point. A request of one rank applies to all.
   std::function<CheckpointRequest()> ask;
-  /// Collective. Whether it worked; where it did not, the solve continues.
+  /// Collective. Returns success; the solve continues in either case.
   std::function<bool(const std::string& numbers, const std::vector<Columns>& columns)> save;
-  /// Reports whether there is now something that has not been saved. Local.
+  /// Reports if there is unsaved progress. Local.
   std::function<void(bool has_news)> report_unsaved;
 
-  std::string numbers;            // of the state to resume from; empty: from the beginning
-  std::int64_t column_count = 0;  // and how many columns belong to it
+  std::string numbers;            // numbers of the state to resume from; empty: start from the beginning
+  std::int64_t column_count = 0;  // number of columns of that state
   /// Reads the columns from `first` on into this rank's rows. Collective. Throws SystemError on every rank.
   std::function<void(std::int64_t first, const Columns& into)> read;
-  /// Says why the state cannot be resumed from; the solve then starts from the beginning. Collective.
+  /// Reports the reason why the state cannot be resumed; the solve then starts from the beginning. Collective.
   std::function<void(const std::string& why)> reject;
 };
 
-/// Thrown on every rank alike after a rank was asked to stop: what can be resumed is saved.
+/// Thrown on all ranks after a stop request; the state has been saved.
 class Stopped : public std::exception {
  public:
   const char* what() const noexcept override { return "stopped"; }
 };
 
-/// What any rank asks for. Collective.
+/// Combined request of all ranks. Collective.
 CheckpointRequest vote(const comm::Communicator& comm, const Checkpoint& checkpoint);
 
-/// Numbers as bytes.
+/// Serialises numbers.
 class NumberWriter {
  public:
   void add(double value);
@@ -56,7 +56,7 @@ class NumberWriter {
   std::string bytes;
 };
 
-/// And back, in the same order. What does not fit throws InputError; the bytes are untrusted.
+/// Reads numbers in the order of NumberWriter. The bytes are untrusted; throws InputError on a mismatch.
 class NumberReader {
  public:
   explicit NumberReader(const std::string& bytes) : bytes_(bytes) {}

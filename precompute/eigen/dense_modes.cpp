@@ -1,7 +1,6 @@
-// Method:     Cholesky of M, L^-1 K L^-T to tridiagonal form, divide and conquer. Rank 0 solves the gathered matrices, and every rank
-//             keeps its rows of the result.
-// Source:     Golub, Van Loan, Matrix Computations, sections 8.4 and 8.7; LAPACK's dsygvd (five times as fast as the QR of dsygv).
-// Deviations: none.
+// Method: Cholesky of M, L^-1 K L^-T to tridiagonal form, divide and conquer. Rank 0 solves the gathered matrices; every rank keeps its
+// rows of the result.
+// Source: Golub, Van Loan, Matrix Computations, sections 8.4 and 8.7; LAPACK dsygvd (five times as fast as the QR of dsygv).
 #include "precompute/eigen/dense_modes.hpp"
 
 #include <fmt/core.h>
@@ -20,9 +19,10 @@ namespace {
 using la::LocalColumns;
 using petsc::check;
 
-constexpr double kEigenFlops = 9;  // of n^3 at most: both matrices reduced, divide and conquer, vectors back (Golub, Van Loan, 8.3 to 8.7)
+constexpr double kEigenFlops =
+    9;  // times n^3 at most: reduction of both matrices, divide and conquer, back-transformation (Golub, Van Loan, 8.3 to 8.7)
 
-// `factor` times the whole matrix on every rank.
+// `factor` times the whole matrix, on every rank.
 la::Matrix gather_dense(Mat matrix, double factor, PetscInt n) {
   const comm::Communicator comm = petsc::get_communicator(matrix);
   la::Matrix dense = comm.agree([&] { return la::Matrix(la::Matrix::Zero(n, n)); });

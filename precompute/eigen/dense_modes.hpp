@@ -1,4 +1,4 @@
-// All eigenpairs of a small problem at once.
+// All eigenpairs of a small problem.
 #pragma once
 
 #include <petscmat.h>
@@ -15,8 +15,8 @@ struct DensePairs {
   petsc::MatHandle vectors;    // (n, n) dense, M-orthonormal columns, the row distribution of K
 };
 
-/// Solves K x = lambda M x completely with dense matrices on every rank. Collective; memory grows as n^2 on each rank, time as n^3.
-/// Throws SolveError when M is not positive definite.
+/// Solves K x = lambda M x completely with dense matrices on every rank. Collective; memory per rank grows as n^2, time as n^3. Throws
+/// SolveError if M is not positive definite.
 DensePairs solve_dense(const la::Pencil& pencil);
 
 }  // namespace carillon::eigen

@@ -1,7 +1,6 @@
-// Method:     Refinement brings residuals below the tolerance; what rounding of K alone leaves in them is measured through the inverse; a
-//             cluster of degenerate modes gets the basis that depends on its span alone.
-// Source:     Parlett, The symmetric eigenvalue problem, 1998, section 4.5. Refinement: refine.cpp; clusters: canonical.cpp.
-// Deviations: none.
+// Method: Refinement reduces residuals below the tolerance; residuals limited by rounding of K are measured through the inverse; a cluster
+// of degenerate modes gets a basis that depends only on its span.
+// Source: Parlett, The symmetric eigenvalue problem, 1998, section 4.5. Refinement: refine.cpp; clusters: canonical.cpp.
 #include "precompute/eigen/finish.hpp"
 
 #include <fmt/core.h>
@@ -26,10 +25,10 @@ namespace {
 
 using petsc::check;
 
-constexpr double kMaxResidual = 1e-4;  // Of a mode whose residual rounding alone explains: a bank takes none above.
-constexpr int kMaxBases = 3;           // of degenerate modes that are tried, because their residuals added up
+constexpr double kMaxResidual = 1e-4;  // Largest residual accepted as rounding; a bank rejects larger ones.
+constexpr int kMaxBases = 3;           // attempts at a basis of degenerate modes whose residuals added up
 
-/// Keeps lambda, shapes and errors of the same modes: each step leaves errors as they were measured last.
+/// lambda, shapes and errors of the same modes; each step leaves errors as last measured.
 class Finisher {
  public:
   Finisher(const BandProblem& body, InertiaCounter* counter, Modes& modes) : body_(body), counter_(counter), modes_(modes) {}
@@ -49,7 +48,7 @@ class Finisher {
   const BandProblem& body_;
   InertiaCounter* counter_;
   Modes& modes_;
-  std::optional<InertiaCounter> own_counter_;  // where none was given
+  std::optional<InertiaCounter> own_counter_;  // used if none was given
   ModeErrors errors_;
 };
 
@@ -71,7 +70,7 @@ RefineRequest Finisher::make_request(double tolerance) {
   return request;
 }
 
-/// Refinement uses its own factor: the statistics of the solve stay, its counts are added.
+/// Refinement uses its own factor: keeps the statistics of the solve and adds the costs.
 template <class Step>
 void Finisher::add_cost(Step&& step) {
   const FactorStatistics before = modes_.factor;
@@ -81,13 +80,13 @@ void Finisher::add_cost(Step&& step) {
   modes_.factor.solves += cost.solves;
 }
 
-/// Modes whose residual is above the tolerance because of rounding alone are measured through the inverse.
+/// Measures modes whose residual is limited by rounding through the inverse.
 void Finisher::bound_errors() {
   const RefineRequest request = make_request(body_.options.tolerance);
   add_cost([&] { return bound_error_by_inverse_residual(request, modes_.lambda, modes_.shapes, errors_); });
 }
 
-/// Until every residual is below `tolerance`, or no better can be had; throws where that is not within the tolerance of the options.
+/// Reduces every residual below `tolerance` if possible; throws if the tolerance of the options is not reached.
 void Finisher::refine(double tolerance) {
   const RefineRequest request = make_request(tolerance);
   add_cost([&] { return refine_modes(request, modes_.lambda, modes_.shapes, errors_); });
@@ -100,7 +99,7 @@ void Finisher::refine(double tolerance) {
   }
 }
 
-/// Of modes that are degenerate, or nearly; all are measured in the new basis.
+/// Makes the basis of degenerate or nearly degenerate modes canonical and measures all modes again.
 void Finisher::canonicalise() {
   const std::vector<Cluster> groups = find_groups(modes_.lambda, errors_, body_.options.tolerance);
   modes_.proof.clusters = split_clusters(body_.operators, groups, errors_, modes_.lambda, modes_.shapes);
@@ -110,7 +109,7 @@ void Finisher::canonicalise() {
   errors_ = normalise_and_measure(body_.operators, quotients, modes_.shapes);
 }
 
-/// The largest residual, relative to what is accepted.
+/// Largest residual relative to its accepted value.
 double Finisher::find_worst() const {
   double worst = 0;
   for (std::size_t j = 0; j < errors_.residual.size(); ++j)
@@ -132,7 +131,7 @@ void Finisher::run() {
   refine(body_.options.tolerance);
   bound_errors();
   canonicalise();
-  // In a basis of degenerate modes their residuals meet, and many that were within the tolerance may add up to one that is not.
+  // In a basis of degenerate modes residuals mix: many within the tolerance may add up to one above it.
   double aim = body_.options.tolerance;
   for (int i = 0; i < kMaxBases && find_worst() > 1; ++i) {
     aim *= 0.5 / find_worst();
@@ -146,7 +145,7 @@ void Finisher::run() {
   modes_.orthonormality_error = errors_.orthonormality;
 }
 
-// Degenerate modes past max_modes have served to make the basis of their cluster.
+// Modes beyond max_modes that completed the cluster of the last one.
 void drop_beyond(std::int64_t limit, Modes& modes) {
   if (static_cast<std::int64_t>(modes.lambda.size()) <= limit) return;
   modes.lambda.resize(limit);
@@ -162,7 +161,7 @@ void drop_beyond(std::int64_t limit, Modes& modes) {
   modes.shapes = std::move(kept);
 }
 
-// The counts stay where they were taken; refinement may have moved the modes next to them by some digits.
+// The counts stay valid; refinement may have moved adjacent modes by some digits.
 void measure_margins(const BandProblem& body, const std::vector<double>& others, Modes& modes) {
   for (Count& count : modes.proof.counts) {
     const double at = body.scaling.to_scaled(std::pow(2 * std::numbers::pi * count.freq_hz, 2));

@@ -1,10 +1,9 @@
-// Method:     Sylvester's law of inertia: A = K - sigma M = L D L^T has as many negative pivots as there are eigenvalues below sigma.
-//             Rounding of K moves the eigenvalues of rigid motions, R, off zero to either side, and past a sigma as small. The count is
-//             then of all others: A on the vectors M-orthogonal to R has n(A) + n(S) - dim R negative eigenvalues, n(A) those of A and n(S)
-//             those of S = -(M R)^T A^-1 M R, by the inertia of [A, M R; (M R)^T, 0] taken apart in two ways.
-// Source:     Parlett, The symmetric eigenvalue problem, 1998, section 3.3; Haynsworth, Linear Algebra Appl. 1, 1968 (inertia is
-//             additive); Gould, Math. Program. 32, 1985 (inertia on a subspace).
-// Deviations: none.
+// Method: Sylvester's law of inertia: A = K - sigma M = L D L^T has as many negative pivots as there are eigenvalues below sigma. Rounding
+// of K moves the eigenvalues of rigid motions, R, off zero to either side, possibly past a small sigma. The count then excludes them: A on
+// the vectors M-orthogonal to R has n(A) + n(S) - dim R negative eigenvalues, n(A) those of A and n(S) those of S = -(M R)^T A^-1 M R, by
+// two block eliminations of [A, M R; (M R)^T, 0].
+// Source: Parlett, The symmetric eigenvalue problem, 1998, section 3.3; Haynsworth, Linear Algebra Appl. 1, 1968 (additivity of inertia);
+// Gould, Math. Program. 32, 1985 (inertia on a subspace).
 #include "precompute/eigen/inertia.hpp"
 
 #include <fmt/core.h>
@@ -24,10 +23,10 @@ namespace {
 
 using petsc::check;
 
-constexpr double kRigidRange = 1e4;     // Of rounding_: below, rigid modes may lie on either side.
-constexpr double kRoundingRange = 1e3;  // Of rounding_: below, rounding may keep a shift from being factorised.
-constexpr double kMinShift = 1e-3;      // Of rounding_: no shift below is tried.
-constexpr double kShiftStep = 16;       // From one such shift to the next: four times the frequency.
+constexpr double kRigidRange = 1e4;     // Times rounding_: below this shift, rigid modes may be on either side.
+constexpr double kRoundingRange = 1e3;  // Times rounding_: below this shift, rounding may prevent factorisation.
+constexpr double kMinShift = 1e-3;      // Times rounding_: lowest shift tried.
+constexpr double kShiftStep = 16;       // Ratio of successive shifts: four times the frequency.
 
 }  // namespace
 
@@ -95,7 +94,7 @@ bool InertiaCounter::try_around(double lambda, double reach) {
   return false;
 }
 
-// Eigenvalues below the current shift; the rigid ones are below it.
+// Eigenvalues below the current shift, counting all rigid modes.
 std::int64_t InertiaCounter::count_negative() {
   const std::int64_t all = factor_->get_negative_pivots();
   const auto rigid = static_cast<int>(rigid_.size());
@@ -124,7 +123,7 @@ std::int64_t InertiaCounter::count_negative() {
     if (comm_.is_root() && la::calc_eigenpairs(s, values) != 0) throw SolveError("The dense eigensolver failed on the rigid motions.");
   });
   const auto positive = comm_.broadcast(std::int64_t{(values.array() > 0).count()});
-  return all + positive;  // all + n(S) - dim R without the rigid ones, and dim R of these; n(S) of -s
+  return all + positive;  // all + n(S) - dim R without the rigid modes, plus dim R; n(S) from -s
 }
 
 Inertia InertiaCounter::count_below(double lambda, double reach, ShiftRule rule) {

@@ -1,4 +1,4 @@
-// Counts of eigenvalues, and the factorisation they come from.
+// Eigenvalue counts and the factorisation that provides them.
 #pragma once
 
 #include <cstdint>
@@ -14,52 +14,51 @@
 
 namespace carillon::eigen {
 
-/// How many eigenvalues lie below lambda (scaled).
+/// Number of eigenvalues below lambda (scaled).
 struct Inertia {
   double lambda = 0;
   std::int64_t below = 0;
 };
 
-/// What shift a count may be taken at: the one given; or, where rounding makes a shift so near zero unusable, the lowest one above that is
-/// usable.
+/// Shift of a count: exactly the given one, or, if rounding makes it unusable so near zero, the lowest usable one above.
 enum class ShiftRule { kExact, kMayMoveUp };
 
-/// Keeps a factorisation of K - sigma M at the last shift, with the solver that the options name, and every count that was taken.
+/// Factorisation of K - sigma M at the last shift, by the solver of the options, and all counts taken.
 class InertiaCounter {
  public:
-  /// Problem, options, rigid modes (M-orthonormal), seconds and statistics must outlive it. to_hz: of a scaled lambda, for messages.
+  /// Problem, options, rigid modes (M-orthonormal), seconds and statistics must outlive it. to_hz: scaled lambda to Hz, for messages.
   InertiaCounter(const la::Pencil& pencil, const Problem& problem, const Options& options, const std::vector<petsc::VecHandle>& rigid,
                  Seconds& seconds, FactorStatistics& statistics, std::function<double(double)> to_hz);
 
-  /// Factorises at lambda, or up to `reach` (relative) above it where lambda hits an eigenvalue, and counts. Near zero, rigid modes count
-  /// as below lambda whatever rounding of K has made of them. Throws SolveError when K - sigma M is singular all around, SystemError when
-  /// memory does not suffice. Collective.
+  /// Factorises at lambda, or up to `reach` (relative) above if lambda is an eigenvalue, and counts. Near zero, rigid modes count as below
+  /// lambda regardless of rounding of K. Throws SolveError if K - sigma M is singular at all shifts tried, SystemError if memory does not
+  /// suffice. Collective.
   Inertia count_below(double lambda, double reach = 1e-6, ShiftRule rule = ShiftRule::kExact);
   const std::vector<Inertia>& counts() const { return counts_; }
-  /// A count that was taken before, by another run.
+  /// Adds a count taken before, by another run.
   void restore(const Inertia& count) { counts_.push_back(count); }
-  /// Forgets counts that were taken too near an eigenvalue.
+  /// Removes counts taken too near an eigenvalue.
   void forget(double lambda);
 
-  /// The factor without numbers: its fill, flops and memory. Collective.
+  /// The factor without values: its fill, flops and memory. Collective.
   const ShiftedFactor& analyse();
-  /// The factor of the last count; one that is analysed only if there was none, or it was released. Collective.
+  /// The factor of the last count; only analysed if there was none, or it was released. Collective.
   ShiftedFactor& get_factor();
-  /// The factor where the last count left it; null if it has no numbers.
+  /// The factor of the last count; null if it has no values.
   ShiftedFactor* current_factor() { return is_current_ ? factor_.get() : nullptr; }
-  /// The factor at sigma, where a count was taken before; factorised again if it is at another shift. Throws as count_below() does.
+  /// The factor at sigma, where a count was taken before; factorises again if it is at another shift. Throws as count_below() does.
   /// Collective.
   ShiftedFactor& factor_at(double sigma);
-  /// The next factor is one that pivots across fronts: slower, and stable where ours is not. False if it does already, or the options
-  /// forbid it. Frees the factor. Collective.
+  /// Switches to a solver that pivots across fronts: slower, and stable where ours is not. False if already switched, or forbidden by the
+  /// options. Frees the factor. Collective.
   bool switch_to_mumps();
-  /// Frees the factor; the next count makes another. Collective.
+  /// Frees the factor; the next count makes a new one. Collective.
   void release() {
     factor_.reset();
     is_current_ = false;
   }
 
-  /// Takes over what another run has found out of the factorisation.
+  /// Takes over the state of a previous run.
   void resume(bool uses_mumps, double worst_backward_error);
   bool uses_mumps() const { return uses_mumps_; }
   double get_worst_backward_error() const { return worst_backward_error_; }
@@ -79,7 +78,7 @@ class InertiaCounter {
   FactorStatistics& statistics_;
   std::function<double(double)> to_hz_;
   const comm::Communicator comm_;
-  double rounding_ = 0;  // of an eigenvalue, by that of an ordinary entry of K
+  double rounding_ = 0;  // of an eigenvalue, from a typical entry of K
   bool uses_mumps_ = false;
   std::unique_ptr<ShiftedFactor> factor_;
   bool is_current_ = false;  // factor_ holds the values at sigma_

@@ -1,58 +1,52 @@
-// The M inner product on blocks of columns.
+// M inner product of column blocks.
 #pragma once
 
-#include <petscmat.h>
-
 #include <array>
+#include <cstddef>
 #include <span>
+#include <vector>
 
 #include "precompute/comm/communicator.hpp"
 #include "precompute/la/block_kernels.hpp"
-#include "precompute/petsc/handle.hpp"
+#include "precompute/la/node_matrix.hpp"
 
 namespace carillon::eigen {
 
 using la::Columns;
 
-/// A block W of `width` columns in memory that others own, and Z. Keeps Z = M W from multiply() on, until W changes or is
-/// placed elsewhere.
+/// A block W of `width` columns in memory owned by the caller, and Z = M W, valid from multiply() until W changes or moves.
 class InnerProduct {
  public:
-  /// mass: M (n, n) with `rows` rows on this rank; null: the identity. diagonal: (rows) where M has nothing else, and must outlive it; null
-  /// where it has. Collective.
-  InnerProduct(const comm::Communicator& comm, Mat mass, PetscInt rows, PetscInt n, int width, const double* diagonal = nullptr);
-  ~InnerProduct();
+  /// mass: must outlive this object. rows: of this rank.
+  InnerProduct(const comm::Communicator& comm, const la::NodeMatrix& mass, std::ptrdiff_t rows, int width);
   InnerProduct(const InnerProduct&) = delete;
   InnerProduct& operator=(const InnerProduct&) = delete;
 
-  /// W is from now on what stands in `memory`, `width` columns one right after the other.
-  void place(const Columns& memory);
+  /// W becomes the first `width` columns of `memory`, which must be contiguous.
+  void place(const Columns& memory) { w_ = memory.part(0, width_); }
   /// Z = M W. Collective.
-  void multiply();
+  void multiply() { mass_.multiply(w_, z_); }
 
   const Columns& w() const { return w_; }
   const Columns& z() const { return z_; }
-  Mat w_mat() const { return w_mat_; }
-  Mat z_mat() const { return z_mat_; }
   const comm::Communicator& comm() const { return comm_; }
 
-  /// A^T B of all ranks, (a.count, b.count). Collective.
+  /// A^T B summed over all ranks, (a.count, b.count). Collective.
   la::Matrix calc_products(const Columns& a, const Columns& b) const { return la::multiply_transposed(comm_, a, b); }
 
-  /// The first `count` columns of W: W <- W - A S; returns C^T M W of all ranks, set by set of C below each other. W may be one of them.
-  /// `sums` of all ranks go in the same message. Collective.
+  /// On the first `count` columns of W: W <- W - A S; returns C^T M W summed over all ranks, the sets of C stacked. W may be one of the
+  /// sets. `sums` are summed in the same message. Collective.
   la::Matrix subtract_and_calc_products(const la::Product& product, int s_stride, std::span<const Columns> c, int count,
                                         std::array<double, 2>& sums);
-  /// W <- (W - the sum of the products) T, Z = M W; T: (count, count), null: the identity. Collective.
+  /// W <- (W - sum of the products) T, Z = M W; T: (count, count), null: the identity. Collective.
   void subtract_and_combine(std::span<const la::Product> products, int s_stride, const double* t, int count);
 
  private:
   comm::Communicator comm_;
+  const la::NodeMatrix& mass_;
   int width_;
-  petsc::MatHandle mass_, w_mat_, z_mat_;
+  std::vector<double> space_;  // of Z
   Columns w_, z_;
-  const double* diagonal_;
-  bool is_placed_ = false;
 };
 
 }  // namespace carillon::eigen

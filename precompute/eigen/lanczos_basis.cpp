@@ -4,8 +4,8 @@
 
 namespace carillon::eigen {
 
-LanczosBasis::LanczosBasis(const Columns& memory, int fixed, int room, int block)
-    : memory_(memory), fixed_(fixed), room_(room), block_(block), t_(la::Matrix::Zero(room, room)) {}
+LanczosBasis::LanczosBasis(const Columns& memory, int room, int block)
+    : memory_(memory), room_(room), block_(block), t_(la::Matrix::Zero(room, room)) {}
 
 void LanczosBasis::start(int width) {
   size_ = width_ = width;

@@ -1,4 +1,4 @@
-// How a block Lanczos iteration is saved between two steps, and resumed.
+// Save and resume of a block Lanczos iteration between two steps.
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@
 
 namespace carillon::eigen {
 
-/// Where an iteration is between two steps, without its basis. The same on every rank.
+/// State of an iteration between two steps, without its basis. The same on all ranks.
 struct LanczosState {
   /// block, room, size, width, previous, next_check, last_size, last_converged, steps, random columns so far.
   std::array<std::int64_t, 10> sizes{};
@@ -20,14 +20,14 @@ struct LanczosState {
   std::int64_t size() const { return sizes[2]; }
 };
 
-/// What saves an iteration, and what it resumes from.
+/// Hooks to save an iteration, and the state to resume from.
 struct LanczosCheckpoint {
   std::function<CheckpointRequest()> ask;                               // local, every step
   std::function<void(const LanczosState&, const Columns& basis)> save;  // collective
-  const LanczosState* start = nullptr;                                  // null: from the beginning
-  std::function<void(const Columns& basis)> read;                       // of start; collective
+  const LanczosState* start = nullptr;                                  // null: start from the beginning
+  std::function<void(const Columns& basis)> read;                       // columns of the basis of start; collective
   std::function<void(const std::string& why)> reject;                   // start does not fit; collective
-  bool was_stopped = false;                                             // it ended on request, after save()
+  bool was_stopped = false;                                             // stopped on request, after save()
 };
 
 }  // namespace carillon::eigen

@@ -4,7 +4,7 @@
 
 namespace carillon::eigen {
 
-// visit(columns, where they are in the range) for every set that has some.
+// Calls visit(columns, offset in the range) for every set that intersects the range.
 template <class Visit>
 void LockedModes::for_parts(LockedRange range, const Visit& visit) const {
   int at = 0;  // first column of the set

@@ -1,4 +1,4 @@
-// Eigenvectors that are known already and that an iteration stays orthogonal to.
+// Known eigenvectors that an iteration stays orthogonal to.
 #pragma once
 
 #include <mpi.h>
@@ -18,20 +18,20 @@ struct LockedRange {
   int count = 0;
 };
 
-/// Keeps nothing but references: M-orthonormal columns of this rank's rows that others own, and the eigenvalue of each.
+/// References to M-orthonormal columns (rows of this rank) owned by others, and their eigenvalues.
 struct LockedModes {
   std::vector<Columns> sets;
   std::vector<double> lambda;  // of all columns, set by set
 
   int count() const { return static_cast<int>(lambda.size()); }
   LockedRange all() const { return {0, count()}; }
-  /// Those columns, in as many parts as they are in.
+  /// The columns of a range, one part per set.
   std::vector<Columns> find_parts(LockedRange range) const;
-  /// L^T B of all ranks for a range of columns of L, (range.count, b.count). Collective.
+  /// L^T B summed over all ranks for a range of columns of L, (range.count, b.count). Collective.
   la::Matrix multiply_transposed(const comm::Communicator& comm, LockedRange range, const Columns& b) const;
-  /// B <- B - L S for that range, S: (range.count, b.count). Local.
+  /// B <- B - L S for a range, S: (range.count, b.count). Local.
   void subtract_product(LockedRange range, const la::Matrix& s, const Columns& b) const;
-  /// B <- B - L (L^T Z), Z = M B; returns what was in the brackets. Collective.
+  /// B <- B - L (L^T Z), Z = M B; returns L^T Z. Collective.
   la::Matrix project_out(const comm::Communicator& comm, LockedRange range, const Columns& b, const Columns& z) const;
 
  private:

@@ -14,7 +14,7 @@
 namespace carillon::eigen {
 namespace {
 
-/// Of the machine and its control groups [byte].
+/// Available on the machine and in its control groups [byte].
 std::int64_t find_host_left() { return static_cast<std::int64_t>(1e9 * base::find_host().available_gb); }
 
 double to_gb(std::int64_t bytes) { return static_cast<double>(bytes) / 1e9; }
@@ -37,13 +37,13 @@ void check_memory(const comm::Communicator& comm, std::int64_t need_bytes, std::
   comm.agree([&] {
     constexpr const char* kRemedy = "Take a coarser mesh, a narrower band or fewer modes, or more ranks on more machines.";
     if (need_bytes > own_left) {
-      throw MemoryError(fmt::format("{} needs about {:.2f} GB on one rank ({:.2f} GB on all), and this process may take {:.2f} GB more "
+      throw MemoryError(fmt::format("{} needs about {:.2f} GB on one rank ({:.2f} GB on all), and this process may allocate {:.2f} GB more "
                                     "(ulimit -v). {}",
                                     what, to_gb(need_bytes), to_gb(everywhere), to_gb(own_left), kRemedy),
                         static_cast<double>(together[0]));
     }
     if (limit_bytes > 0 && total > limit_bytes)
-      throw MemoryError(fmt::format("{} needs about {:.2f} GB in addition to the {:.2f} GB that are taken, and the limit (--memory-gb) is "
+      throw MemoryError(fmt::format("{} needs about {:.2f} GB in addition to {:.2f} GB in use, and the limit (--memory-gb) is "
                                     "{:.2f} GB. {}",
                                     what, to_gb(together[0]), to_gb(together[1]), to_gb(limit_bytes), kRemedy),
                         static_cast<double>(total));

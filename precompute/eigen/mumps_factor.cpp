@@ -1,8 +1,7 @@
-// Method:     Multifrontal L D L^T of K - sigma M with 1x1 and 2x2 pivots; the entries stay on the ranks that assembled them, the analysis
-//             is sequential under a METIS order handed in, right-hand sides and solutions are distributed.
-// Source:     MUMPS 5.5.1 users' guide, sections 3, 5 and 6. The inertia: Parlett, The symmetric eigenvalue problem, 1998, section 3.3.
-// Deviations: PETSc's own interface to MUMPS is not used, for it cannot hand an order to a distributed matrix, and the MUMPS of Debian
-//             that PETSc links is built without METIS.
+// Method: Multifrontal L D L^T of K - sigma M with 1x1 and 2x2 pivots; the entries stay on the ranks that assembled them, the analysis is
+// sequential with a given METIS order, right-hand sides and solutions are distributed. PETSc's interface to MUMPS is not used: it cannot
+// pass an order for a distributed matrix, and the MUMPS of Debian linked by PETSc has no METIS.
+// Source: MUMPS 5.5.1 users' guide, sections 3, 5 and 6. Inertia: Parlett, The symmetric eigenvalue problem, 1998, section 3.3.
 #include <dmumps_c.h>
 #include <fmt/core.h>
 
@@ -26,8 +25,8 @@ constexpr int kJobAnalyse = 1;
 constexpr int kJobFactorise = 2;
 constexpr int kJobSolve = 3;
 
-// MUMPS' ICNTL(7) by the names of "-mumps_ordering". The MUMPS that Debian's PETSc links (libmumps-5.5) has neither METIS, whose order is
-// handed in, nor SCOTCH; libmumps-scotch-5.5, which has SCOTCH, is another build of the same library and is not linked.
+// ICNTL(7) of MUMPS for the names of "-mumps_ordering". Debian's libmumps-5.5, linked by PETSc, has neither METIS, whose order is passed
+// in, nor SCOTCH.
 constexpr std::array<std::pair<std::string_view, int>, 4> kOwnOrderings{{{"amd", 0}, {"amf", 2}, {"pord", 4}, {"qamd", 6}}};
 
 using petsc::check;
@@ -85,7 +84,7 @@ const char* find_ordering_name(int infog7) {
   }
 }
 
-/// What "-mumps_ordering" asks for as MUMPS' ICNTL(7); -1 when it is not given: the order of the caller. Not collective.
+/// ICNTL(7) requested by "-mumps_ordering"; -1 if not given: the order of the caller. Not collective.
 int find_own_ordering() {
   std::string name(64, '\0');
   PetscBool is_given = PETSC_FALSE;
@@ -150,17 +149,17 @@ struct MumpsFactor::State {
 };
 
 void MumpsFactor::State::set_controls() {
-  icntl(1) = icntl(2) = icntl(3) = -1;  // Silent: errors come back as codes.
+  icntl(1) = icntl(2) = icntl(3) = -1;  // No output: errors are returned as codes.
   icntl(4) = 0;
   icntl(5) = 0;     // Assembled entries ...
   icntl(18) = 3;    // ... distributed over the ranks.
-  icntl(6) = 0;     // No column permutation: the diagonal is good.
-  icntl(12) = 1;    // The order is used as it is given, not compressed around 2x2 pivots.
-  icntl(13) = 1;    // No ScaLAPACK at the root: it would not count negative pivots.
+  icntl(6) = 0;     // No column permutation, as the diagonal is good.
+  icntl(12) = 1;    // Use the order as given, without compression around 2x2 pivots.
+  icntl(13) = 1;    // No ScaLAPACK at the root, which does not count negative pivots.
   icntl(14) = 30;   // Per cent of workspace beyond the estimate, for delayed pivots.
   icntl(28) = 1;    // Sequential analysis.
   icntl(10) = 0;    // No iterative refinement.
-  icntl(27) = -32;  // Right-hand sides go through the factor by so many.
+  icntl(27) = -32;  // Right-hand sides per block.
   icntl(20) = size > 1 ? 10 : 0;
   icntl(21) = size > 1 ? 1 : 0;
 }
@@ -207,7 +206,7 @@ MumpsFactor::MumpsFactor(const la::Pencil& pencil, const std::vector<std::int32_
   if (lacks_memory(code))
     throw MemoryError("Out of memory in the analysis of K - sigma M. Take a coarser mesh or more ranks on more machines.");
   if (code < 0) throw SolveError(fmt::format("MUMPS cannot analyse K - sigma M: code {}, {}.", code, s.infog(2)));
-  s.analysis_megabytes = s.mumps.info[14];  // INFO(15): what this rank's factorisation is estimated to take.
+  s.analysis_megabytes = s.mumps.info[14];  // INFO(15): predicted memory of the factorisation on this rank.
 
   PetscInt first = 0;
   PetscInt last = 0;
@@ -216,7 +215,7 @@ MumpsFactor::MumpsFactor(const la::Pencil& pencil, const std::vector<std::int32_
 }
 
 MumpsFactor::~MumpsFactor() {
-  // Ending MUMPS is collective. A rank that unwinds alone (out of memory, say) must not wait here for the others: the process ends anyway.
+  // Ending MUMPS is collective. A rank that unwinds alone (out of memory) must not wait for the others here: the process ends anyway.
   const bool unwinds = std::uncaught_exceptions() > 0;
   if (state_ != nullptr && state_->is_alive && !(unwinds && state_->size > 1)) (void)state_->call(kJobEnd);
 }
@@ -229,7 +228,7 @@ bool MumpsFactor::factorise(double sigma) {
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
     const int code = s.call(kJobFactorise);
     if (code >= 0) {
-      s.scatter.reset();  // Where the solution comes out is known after the first solve.
+      s.scatter.reset();  // The distribution of the solution is known after the first solve.
       return true;
     }
     if (code == -10) return false;
@@ -243,12 +242,12 @@ bool MumpsFactor::factorise(double sigma) {
     throw SolveError(fmt::format("MUMPS cannot factorise K - sigma M at sigma = {:.9g}: code {}, {}.", sigma, code, s.infog(2)));
   }
   throw SolveError(
-      fmt::format("MUMPS cannot factorise K - sigma M at sigma = {:.9g}: its workspace never sufficed (code {}).", sigma, s.infog(1)));
+      fmt::format("MUMPS cannot factorise K - sigma M at sigma = {:.9g}: its workspace did not suffice (code {}).", sigma, s.infog(1)));
 }
 
-// The solution comes back where the pivots live: room for it, and later the way to the rows' owners.
+// The solution is distributed by pivots; prepare_solution() allocates it, make_scatter() maps it to the owners of the rows.
 void MumpsFactor::State::prepare_solution(int columns) {
-  const int local = std::max(mumps.info[22], 1);  // INFO(23): the pivots on this rank.
+  const int local = std::max(mumps.info[22], 1);  // INFO(23): number of pivots on this rank.
   solution.assign(static_cast<std::size_t>(local) * static_cast<std::size_t>(columns), 0.0);
   solution_rows.assign(local, 0);
   mumps.sol_loc = solution.data();
@@ -306,7 +305,7 @@ std::string MumpsFactor::get_ordering() const { return find_ordering_name(state_
 
 std::int64_t MumpsFactor::get_entries() const {
   const std::int64_t entries = state_->infog(29);
-  return entries < 0 ? -entries * 1'000'000 : entries;  // Large counts come in millions, negated.
+  return entries < 0 ? -entries * 1'000'000 : entries;  // Large counts are in millions, negated.
 }
 
 std::int64_t MumpsFactor::get_peak_bytes() const { return std::int64_t{1'000'000} * state_->analysis_megabytes; }

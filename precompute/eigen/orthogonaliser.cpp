@@ -1,9 +1,8 @@
-// Method:     The three-term recurrence is followed by one projection, against the whole basis only where orthogonality is about to be lost
-//             (orthogonality.cpp); the block is orthonormalised by Cholesky QR, twice if it is badly conditioned, and column by column,
-//             with random columns for dependent ones, if it is singular.
-// Source:     Grimes, Lewis, Simon, A shifted block Lanczos algorithm, SIAM J. Matrix Anal. Appl. 15(1), 1994. Yamamoto et al., Roundoff
-//             error analysis of the CholeskyQR2 algorithm, ETNA 44, 2015.
-// Deviations: none.
+// Method: The three-term recurrence is followed by one projection, against the whole basis only where orthogonality is about to be lost
+// (orthogonality.cpp). The block is orthonormalised by Cholesky QR, twice if badly conditioned; column by column, with random columns in
+// place of dependent ones, if singular.
+// Source: Grimes, Lewis, Simon, A shifted block Lanczos algorithm, SIAM J. Matrix Anal. Appl. 15(1), 1994; Yamamoto et al., Roundoff error
+// analysis of the CholeskyQR2 algorithm, ETNA 44, 2015.
 #include "precompute/eigen/orthogonaliser.hpp"
 
 #include <algorithm>
@@ -17,19 +16,19 @@
 namespace carillon::eigen {
 namespace {
 
-constexpr double kWellConditioned = 1e-2;  // Smallest pivot of the scaled Gram matrix that needs no second Cholesky QR,
-constexpr double kDependent = 1e-11;       // and smallest that Cholesky QR is trusted with.
-constexpr double kReproject = 1e-2;        // A projection that takes more of a column's square is done once more,
-constexpr int kPasses = 3;                 // so often at most.
-constexpr double kNegligible = 1e-9;       // Where one takes less, the semi-orthogonality of the basis does not show in what is left.
+constexpr double kWellConditioned = 1e-2;  // Above this smallest pivot of the scaled Gram matrix, no second Cholesky QR.
+constexpr double kDependent = 1e-11;       // Below this smallest pivot, Cholesky QR is not used.
+constexpr double kReproject = 1e-2;        // A projection that removes more of a column's squared norm is repeated,
+constexpr int kPasses = 3;                 // up to this many passes.
+constexpr double kNegligible = 1e-9;       // Below this removed part, the semi-orthogonality of the basis is invisible in the rest.
 
-// One rank decides for all.
+// Rank 0 decides for all.
 template <std::size_t count>
 void take_from_first(const comm::Communicator& comm, std::array<int, count>& values) {
   comm.broadcast_into(std::span<int>(values));
 }
 
-// 1 on the diagonal of a positive definite matrix. False where it is not one.
+// Scales a positive definite matrix to unit diagonal. False if it is not positive definite.
 bool scale_to_unit_diagonal(la::Matrix& gram, la::Vector& scale) {
   scale.resize(gram.rows());
   for (Eigen::Index i = 0; i < gram.rows(); ++i) {
@@ -42,8 +41,8 @@ bool scale_to_unit_diagonal(la::Matrix& gram, la::Vector& scale) {
   return true;
 }
 
-// R and its inverse by the Gram matrix of a block that has yet to lose c along an almost orthonormal set; empty where that is not enough:
-// where c is not small, or the block so badly conditioned that it would take another step.
+// R and its inverse from the Gram matrix of a block that still loses c along an almost orthonormal set. Empty if c is not small, or if the
+// block is so badly conditioned that another step is needed.
 void calc_triangle(const la::Matrix& c, la::Matrix gram, la::Matrix& r, la::Matrix& inverse) {
   r.resize(0, 0);
   const la::Vector square = gram.diagonal();
@@ -89,7 +88,7 @@ void Orthogonaliser::step() {
   basis_.set_coupling(std::move(r));
 }
 
-// The coefficients of V_{j-1} and V_j in A^-1 M V_j: R_{j-1}^T and alpha, (size - previous, width).
+// Coefficients of V_{j-1} and V_j in A^-1 M V_j: R_{j-1}^T and alpha, (size - previous, width).
 la::Matrix Orthogonaliser::calc_recurrence(const la::Matrix& alpha) const {
   const int width = basis_.width(), previous = basis_.previous(), coupled = basis_.size() - previous;
   la::Matrix local(coupled, width);
@@ -98,7 +97,7 @@ la::Matrix Orthogonaliser::calc_recurrence(const la::Matrix& alpha) const {
   return local;
 }
 
-// What is projected out in this step.
+// Decides which projections this step needs.
 void Orthogonaliser::decide(const la::Matrix& alpha) {
   is_skipped_ = estimate_.can_skip_reorthogonalisation(here(), alpha);
   projected_ = deflation_.find_columns_to_project(here(), alpha);
@@ -118,25 +117,25 @@ la::Matrix Orthogonaliser::subtract_and_vote(const la::Product& product, int s_s
   return products;
 }
 
-// Where little is predicted to be left along the basis, only the blocks that the recurrence couples to.
+// A skipped step projects only against the blocks of the recurrence.
 std::vector<Columns> Orthogonaliser::find_projected_out() const {
   std::vector<Columns> sets;
   if (is_skipped_) {
-    sets = {basis_.columns(basis_.previous(), basis_.size() - basis_.previous()), basis_.fixed()};
+    sets = {basis_.columns(basis_.previous(), basis_.size() - basis_.previous())};
   } else {
-    sets = {basis_.fixed_and_basis()};
+    sets = {basis_.all()};
   }
   for (const Columns& part : locked_.find_parts(projected_)) sets.push_back(part);
   return sets;
 }
 
-// w -= V_{j-1} R_{j-1}^T + V_j alpha, Z still being M V_j, and then w -= (everything so far) (everything so far)^T M w.
-// alpha: (width, width) the diagonal block; null for the first block. The last pass makes w M-orthonormal as well where the Gram matrix
-// that came with its products allows, by (w - V c)^T M (w - V c) = w^T M w - c^T c. Returns R then, and an empty matrix otherwise.
+// w -= V_{j-1} R_{j-1}^T + V_j alpha, with Z = M V_j, then w -= Q Q^T M w for all vectors Q so far. alpha: (width, width) diagonal block;
+// null for the first block. The last pass also makes w M-orthonormal if the Gram matrix computed with its products allows it, by (w - V
+// c)^T M (w - V c) = w^T M w - c^T c; then returns R, otherwise an empty matrix.
 la::Matrix Orthogonaliser::project(la::Matrix* alpha) {
   const bool is_first = alpha == nullptr;
   const Columns next = inner_.w().part(0, count());
-  la::Matrix local;  // what the recurrence takes away
+  la::Matrix local;  // coefficients of the recurrence
   la::Product recurrence{basis_.columns(0, 0), nullptr};
   is_skipped_ = false;
   projected_ = deflation_.all();
@@ -149,7 +148,7 @@ la::Matrix Orthogonaliser::project(la::Matrix* alpha) {
   const std::vector<Columns> against = find_projected_out();
   std::vector<Columns> sets = against;
   sets.push_back(next);
-  const int width = basis_.width(), fixed = is_skipped_ ? 0 : basis_.fixed().count, basis = against.front().count;
+  const int width = basis_.width(), basis = against.front().count;
   for (int pass = 0;; ++pass) {
     const la::Matrix c = subtract_and_vote(recurrence, static_cast<int>(local.rows()), sets, next.count);
     const auto stride = static_cast<int>(c.rows()), all = stride - next.count;
@@ -157,9 +156,9 @@ la::Matrix Orthogonaliser::project(la::Matrix* alpha) {
     recurrence.a.count = 0;
     if (!is_first) (*alpha) += c.middleRows(basis - width, width);
     if (pass == 0 && !is_first) deflation_.update_noise(projected_, parts);
-    if (pass == 0 && !is_first && !is_skipped_) estimate_.update_noise(here(), c.data() + fixed, stride);
+    if (pass == 0 && !is_first && !is_skipped_) estimate_.update_noise(here(), c.data(), stride);
     const la::Vector along_basis = c.topRows(basis).colwise().squaredNorm();
-    // The largest part of a column's square that this pass takes away: its rounding is what it leaves behind.
+    // Largest removed part of a column's squared norm; its rounding error stays in the column.
     const double taken = (along_basis.array() / c.bottomRows(next.count).diagonal().array()).maxCoeff();
     if (!is_skipped_) estimate_.record_projection(std::sqrt(along_basis.maxCoeff()));
     estimate_.record_deflation(deflation_.calc_returned(projected_, parts));
@@ -184,8 +183,8 @@ bool Orthogonaliser::confirm(const la::Matrix& r) const {
   return is_good[0] != 0;
 }
 
-// The projection that a step has skipped, or another two passes, of the block that came of it with R = before. What they take away is
-// rounding of the operator. Returns the R of both.
+// Performs the skipped projection, or two more passes, on the block obtained with R = before. The removed part is rounding of the operator.
+// Returns the combined R.
 la::Matrix Orthogonaliser::reproject(const la::Matrix& before) {
   is_skipped_ = false;
   estimate_.record_projection(0);
@@ -193,7 +192,7 @@ la::Matrix Orthogonaliser::reproject(const la::Matrix& before) {
   projected_ = deflation_.all();
   const Columns next = inner_.w().part(0, basis_.width());
   const Columns next_mass = inner_.z().part(0, basis_.width());
-  const Columns all = basis_.fixed_and_basis();
+  const Columns all = basis_.all();
   for (int pass = 0; pass < 2; ++pass) {
     inner_.multiply();
     (void)locked_.project_out(inner_.comm(), projected_, next, next_mass);
@@ -209,8 +208,8 @@ la::Matrix Orthogonaliser::reproject(const la::Matrix& before) {
   return product;
 }
 
-// Makes the columns of w M-orthonormal: w <- w R^-1, z <- M w. Returns R: as many rows as columns are left, fewer than there were when the
-// space is exhausted.
+// Makes the columns of w M-orthonormal: w <- w R^-1, z <- M w. Returns R with one row per remaining column, fewer than columns if the space
+// is exhausted.
 la::Matrix Orthogonaliser::orthonormalise() {
   inner_.multiply();
   la::Matrix r;
@@ -246,10 +245,10 @@ bool Orthogonaliser::orthonormalise_by_cholesky(la::Matrix& r) {
   return true;
 }
 
-// Column i of w against the basis, the deflated vectors and the columns before it, twice; coefficients (i) of the last. Its M-norm, zero if
-// next to nothing is left.
+// Orthogonalises column i of w twice against the basis, the locked modes and the preceding columns; adds to coefficients (i). Returns its
+// M-norm, zero if almost nothing is left.
 double Orthogonaliser::orthogonalise_column(int i, double* coefficients) {
-  const Columns all = basis_.fixed_and_basis();
+  const Columns all = basis_.all();
   const Columns column = inner_.w().part(i, 1);
   const Columns image = inner_.z().part(i, 1);
   inner_.multiply();
@@ -271,7 +270,7 @@ double Orthogonaliser::orthogonalise_column(int i, double* coefficients) {
   return after;
 }
 
-// A random vector, orthogonal to everything, as column i. False where none is found.
+// Fills column i with a random vector orthogonal to all others. False if none is found.
 bool Orthogonaliser::fill_at_random(int i) {
   constexpr int kAttempts = 3;
   const Columns column = inner_.w().part(i, 1);
@@ -289,7 +288,7 @@ la::Matrix Orthogonaliser::orthonormalise_by_columns() {
   const int n = count();
   const Columns w = inner_.w();
   const auto left = static_cast<int>(std::min<PetscInt>(n, free_dimension() - basis_.size()));
-  double scale = 0;  // of the operator on the block: what is small against it is rounding
+  double scale = 0;  // norm of the operator on the block; smaller values are rounding
   for (int j = 0; j < n; ++j)
     scale = std::max(scale, std::sqrt(std::max(inner_.calc_products(w.part(j, 1), inner_.z().part(j, 1))(0, 0), 0.0)));
   la::Matrix full = la::Matrix::Zero(n, n);

@@ -1,4 +1,4 @@
-// Projection and orthonormalisation of the blocks of a Lanczos basis.
+// Projection and orthonormalisation of Lanczos blocks.
 #pragma once
 
 #include <cstdint>
@@ -13,37 +13,37 @@
 
 namespace carillon::eigen {
 
-/// Makes the block W of the inner product the next block of the basis. Keeps the basis semi-orthogonal, |V^T M V - 1| below 2e-7,
-/// orthogonal to the fixed columns, and |L^T M V| of the locked modes below 1e-6.
+/// Turns the block W of the inner product into the next block of the basis. Keeps the basis semi-orthogonal, |V^T M V - 1| < 2e-7, and |L^T
+/// M V| of the locked modes L below 1e-6.
 class Orthogonaliser {
  public:
-  /// All must outlive it. theta: the locked modes' eigenvalues of the operator. n: rows of all ranks; first_row: of this one. checkpoint
-  /// may be null; what the ranks request of it is voted along with the sums of the projection.
+  /// All arguments must outlive it. theta: eigenvalues of the operator for the locked modes. n: global rows; first_row: first row of this
+  /// rank. checkpoint may be null; the ranks' requests to it are summed with the projection coefficients.
   Orthogonaliser(InnerProduct& inner, LanczosBasis& basis, const LockedModes& locked, std::vector<double> theta, PetscInt n,
                  PetscInt first_row, LanczosCheckpoint* checkpoint);
 
-  /// W, the first block, is projected against what is fixed and locked and made M-orthonormal. Returns how many columns are left: fewer
-  /// when the space is exhausted. Collective.
+  /// Projects the first block W against the locked modes and makes it M-orthonormal. Returns the number of columns left: fewer than the
+  /// block if the space is exhausted. Collective.
   int start();
-  /// W = A^-1 Z, Z = M V_j, becomes V_next; the basis gets the diagonal block of T and R with
-  /// A^-1 M V_j = V_{j-1} R_{j-1}^T + V_j alpha + V_next R. Columns of W beyond V_next are zero. Collective.
+  /// Turns W = A^-1 Z, Z = M V_j, into V_next and sets the diagonal block of T and R such that A^-1 M V_j = V_{j-1} R_{j-1}^T + V_j alpha +
+  /// V_next R. Columns of W beyond V_next are set to zero. Collective.
   void step();
-  /// The basis has been restarted, and what was estimated of it no longer holds.
+  /// Discards the loss-of-orthogonality estimates after a restart.
   void reset();
 
-  /// Of all ranks, since clear_request().
+  /// Requests of all ranks since clear_request().
   const CheckpointRequest& request() const { return request_; }
   void clear_request() { request_ = {}; }
 
   std::uint64_t get_random_columns() const { return random_columns_; }
   void set_random_columns(std::uint64_t count) { random_columns_ = count; }
-  /// (locked) the largest entries of L^T M V that remained.
+  /// (locked) largest remaining entry of L^T M V per locked mode.
   const std::vector<double>& get_remaining() const { return deflation_.get_remaining(); }
 
  private:
   LanczosStep here() const { return {basis_.t(), basis_.size(), basis_.width(), basis_.previous()}; }
-  int count() const { return basis_.size() == 0 ? basis_.block() : basis_.width(); }  // columns of the next block at most
-  PetscInt free_dimension() const { return n_ - basis_.fixed().count - locked_.count(); }
+  int count() const { return basis_.size() == 0 ? basis_.block() : basis_.width(); }  // maximum columns of the next block
+  PetscInt free_dimension() const { return n_ - locked_.count(); }
   la::Matrix calc_recurrence(const la::Matrix& alpha) const;
   void decide(const la::Matrix& alpha);
   la::Matrix project(la::Matrix* alpha);
@@ -66,8 +66,8 @@ class Orthogonaliser {
   CheckpointRequest request_;
   OrthogonalityEstimate estimate_;
   DeflationEstimate deflation_;
-  bool is_skipped_ = false;  // the step did without the projection against the whole basis,
-  LockedRange projected_;    // the locked modes that it projected out
+  bool is_skipped_ = false;  // this step skips the projection against the whole basis
+  LockedRange projected_;    // locked modes projected out in this step
   std::uint64_t random_columns_ = 0;
 };
 

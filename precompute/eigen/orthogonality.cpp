@@ -1,12 +1,11 @@
-// Method:     With A V = V T + w E^T, W_j = V^T M V_j obeys W_{j+1} R_j = T W_j - W_j alpha_j - W_{j-1} R_{j-1}^T + rounding, where the
-//             rows of the last two blocks are left out, as these are always projected out. The rounding is the operator's: it is measured
-//             whenever the basis is projected out with all of it orthogonal. Locked eigenvectors have their theta in the place of T;
-//             c = L^T M w taken out of w leaves V^T M L c along V, which is bounded by what remained of L, and projected out
-//             where that is too much.
-// Source:     Simon, The Lanczos algorithm with partial reorthogonalization, Math. Comp. 42, 1984; Grimes, Lewis, Simon, A shifted block
-//             Lanczos algorithm, SIAM J. Matrix Anal. Appl. 15(1), 1994, section 3.3.
-// Deviations: whole matrices go through the recurrence where they bound norms, which is sharper and costs next to nothing; rounding is
-//             measured, not assumed; a projection is skipped only where far more than half the digits stay.
+// Method: With A V = V T + w E^T, W_j = V^T M V_j obeys W_{j+1} R_j = T W_j - W_j alpha_j - W_{j-1} R_{j-1}^T + rounding. Rows of the last
+// two blocks are left out, as these blocks are always projected out. The rounding of the operator is measured whenever the whole orthogonal
+// basis is projected out. For locked eigenvectors, theta replaces T; subtracting c = L^T M w leaves V^T M L c along V, which is bounded by
+// the remaining part of L and projected out where too large. Differences to the sources: whole matrices instead of norm bounds go through
+// the recurrence, which is sharper at negligible cost; rounding is measured, not assumed; a projection is skipped only where far more than
+// half of the digits stay.
+// Source: Simon, The Lanczos algorithm with partial reorthogonalization, Math. Comp. 42, 1984; Grimes, Lewis, Simon, A shifted block
+// Lanczos algorithm, SIAM J. Matrix Anal. Appl. 15(1), 1994, section 3.3.
 #include "precompute/eigen/orthogonality.hpp"
 
 #include <algorithm>
@@ -26,9 +25,9 @@ using la::Transpose;
 constexpr double kOmegaMax = 2e-8;            // largest entry of W_j (Simon's omega) without a projection
 constexpr double kOmegaAfterPass = 1e-10;     // the same after a projection
 constexpr double kOmegaConfirmed = 2e-7;      // the same where R turns out smaller than predicted
-constexpr double kDeflationMax = 1e-7;        // largest entry of L^T M V_j until the end: what it does to T is its square
+constexpr double kDeflationMax = 1e-7;        // largest entry of L^T M V_j during the iteration; its effect on T is quadratic
 constexpr double kDeflationConfirmed = 1e-6;  // the same where R turns out smaller than predicted
-constexpr int kCleanBlocks = 3;               // that everything locked is projected out of, before any projection is skipped
+constexpr int kCleanBlocks = 3;               // blocks with all locked modes projected out before any projection is skipped
 constexpr double kRounding = 10 * std::numeric_limits<double>::epsilon();  // an entry of W_j after a projection
 
 double calc_largest(const la::Matrix& a) {
@@ -37,7 +36,7 @@ double calc_largest(const la::Matrix& a) {
   return largest;
 }
 
-// By how much R shrinks a column at most: the reciprocal of the largest entry of R^-1. 0 if R is not square or singular.
+// Smallest factor 1 / max |R^-1|; R shrinks no column by more. 0 if R is not square or singular.
 double calc_divisor(const la::Matrix& r, int width) {
   if (r.rows() != width) return 0;
   la::Matrix inverse = r;
@@ -46,10 +45,10 @@ double calc_divisor(const la::Matrix& r, int width) {
   return info == 0 && std::isfinite(largest) ? 1 / largest : 0;
 }
 
-// In [-1, 1), the same on every rank.
+// Uniform in [-1, 1), the same on all ranks.
 double make_random(int i, int j) { return 2 * petsc::make_noise(static_cast<std::uint64_t>(i), static_cast<std::uint64_t>(j)); }
 
-// The block of T that couples V_{j-1}, from row `previous` on, to V_j: R_{j-1}^T.
+// Block of T that couples V_{j-1}, from row `previous` on, to V_j: R_{j-1}^T.
 const double* find_coupling(const LanczosStep& step) { return &step.t(step.previous, step.size - step.width); }
 
 }  // namespace
@@ -82,7 +81,7 @@ bool OrthogonalityEstimate::is_confirmed(const LanczosStep& step, const la::Matr
 
 void OrthogonalityEstimate::update_noise(const LanczosStep& step, const double* c, int stride) {
   constexpr double kDecay = 0.7;
-  if (since_skipped_ < 2) return;  // What is predicted then is partly noise itself.
+  if (since_skipped_ < 2) return;  // The prediction is partly noise itself then.
   double largest = 0;
   for (int j = 0; j < step.width; ++j) {
     for (int i = 0; i < step.previous; ++i)
@@ -114,7 +113,7 @@ void OrthogonalityEstimate::advance(const LanczosStep& step, const la::Matrix& r
   if (last_.size() == std::ptrdiff_t{m} * b) {
     before_.resize(all, b);
     before_.topRows(m) = last_;
-    if (next > 0) before_.bottomRows(next) = product.middleRows(m - b, b).transpose();  // nothing is left: no block to look up
+    if (next > 0) before_.bottomRows(next) = product.middleRows(m - b, b).transpose();  // no next block: no row to copy
   }
   last_ = std::move(product);
 }
@@ -157,7 +156,7 @@ LockedRange DeflationEstimate::find_columns_to_project(const LanczosStep& step, 
 }
 
 void DeflationEstimate::update_noise(LockedRange range, const la::Matrix& c) {
-  constexpr double kMaxRise = 100;  // by which one measurement raises what is expected
+  constexpr double kMaxRise = 100;  // largest increase of the expected noise by one measurement
   for (int i = 0; i < range.count; ++i) {
     const int row = range.first + i;
     double& noise = noise_[row];
@@ -171,7 +170,7 @@ void DeflationEstimate::update_noise(LockedRange range, const la::Matrix& c) {
       noise = std::max(noise, measured);
     } else if (measured > predicted) {
       noise *= measured < kMaxRise * predicted ? measured / predicted : kMaxRise;
-      // An eigenvector that is not exact has a residual along a few directions, and the row jumps when the basis reaches them.
+      // The residual of an inexact eigenvector lies along a few directions; its row jumps when the basis reaches them.
       remaining = std::max(remaining, (measured - predicted) / std::max(std::abs(theta_[row]), scale_));
     }
   }

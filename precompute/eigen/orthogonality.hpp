@@ -8,56 +8,56 @@
 
 namespace carillon::eigen {
 
-/// Where a block Lanczos iteration is between two blocks.
+/// State of a block Lanczos iteration between two blocks.
 struct LanczosStep {
-  const la::Matrix& t;  // projected operator, of which the first `size` rows and columns count
+  const la::Matrix& t;  // projected operator; its first `size` rows and columns are valid
   int size = 0;         // columns of the basis V,
   int width = 0;        // of its last block V_j,
-  int previous = 0;     // and the first column of the block before
+  int previous = 0;     // first column of the block before
 };
 
-/// Keeps an estimate of W_j = V^T M V_j for the last two blocks, by the recurrence that the basis itself obeys: no entry of W_j is larger
-/// than what is estimated but for rounding that it has not met yet. Small matrices only; the same on every rank, not collective.
+/// Estimates W_j = V^T M V_j for the last two blocks by the recurrence of the basis itself. The estimate bounds every entry of W_j except
+/// for rounding not measured yet. Small matrices only; the same on all ranks, not collective.
 class OrthogonalityEstimate {
  public:
-  /// Nothing is known of the basis: the next two steps are to project.
+  /// Discards all estimates: the next two steps project.
   void reset();
-  /// Before the projection: whether w = A V_j - V_j alpha - V_{j-1} R^T, made a block, stays semi-orthogonal without it. alpha: (width,
-  /// width).
+  /// Before the projection: true if the next block, from w = A V_j - V_j alpha - V_{j-1} R^T, stays semi-orthogonal without it. alpha:
+  /// (width, width).
   bool can_skip_reorthogonalisation(const LanczosStep& step, const la::Matrix& alpha);
-  /// After the first pass of a projection: c = V^T M w as it was measured, (size, width) with stride `stride`. What was not predicted is
-  /// rounding, and expected again.
+  /// After the first pass of a projection: measured c = V^T M w, (size, width) with stride `stride`. The deviation from the prediction is
+  /// rounding, and is expected again.
   void update_noise(const LanczosStep& step, const double* c, int stride);
-  /// After the last pass of a projection, which took `norm` away from a column at most: V is not quite orthogonal, and leaves a part of it.
+  /// After the last pass of a projection that removed at most `norm` from a column: V is only nearly orthogonal and leaves a part of it.
   void record_projection(double norm);
-  /// After the last pass, skipped or not: what was subtracted of locked modes has left at most this much along the basis
+  /// After the last pass, skipped or not: bound on the error along the basis left by subtracting locked modes
   /// (DeflationEstimate::calc_returned).
   void record_deflation(double returned) { returned_ = returned; }
-  /// After the step: whether w, made a block with R (next_width, width), was right to skip the projection, or to stop after as many passes
-  /// as it had. R is known only then, and where the space is nearly exhausted it shrinks w by far more than the R before.
+  /// After the step, with R (next_width, width): true if skipping the projection, or stopping after the passes made, was justified. R is
+  /// known only then; where the space is nearly exhausted it shrinks w far more than the preceding R.
   bool is_confirmed(const LanczosStep& step, const la::Matrix& r, bool is_skipped) const;
-  /// The block with R (next_width, width) becomes the last one.
+  /// Appends the block with R (next_width, width).
   void advance(const LanczosStep& step, const la::Matrix& r, bool is_skipped);
 
-  /// W_j of the last block as it is estimated, (size, width); empty: nothing is known.
+  /// Estimated W_j of the last block, (size, width); empty if unknown.
   const la::Matrix& last() const { return last_; }
 
  private:
   la::Matrix predicted_;  // V^T M w, (size, width)
-  double largest_ = 0;    // of it and of noise_
+  double largest_ = 0;    // largest entry of predicted_ and noise_
   la::Matrix last_;       // W_j, (size, width)
   la::Matrix before_;     // W_{j-1}, (size, width of that block)
-  double noise_ = 0;      // what rounding adds to V^T M w; 0: not yet measured
-  double worst_ = 0;      // entry of V^T M V - 1 so far
-  double left_ = 0;       // of V^T M w by the projection
-  double returned_ = 0;   // to V^T M w with what was taken of locked modes
-  double divisor_ = 0;    // by which R shrinks w at most, from the last step
+  double noise_ = 0;      // rounding added to V^T M w; 0 if not measured yet
+  double worst_ = 0;      // largest entry of V^T M V - 1 so far
+  double left_ = 0;       // part of V^T M w left by the projection
+  double returned_ = 0;   // part of V^T M w added by subtracting locked modes
+  double divisor_ = 0;    // largest factor by which R of the last step shrinks w
   int since_skipped_ = 0;
 };
 
-/// Keeps the same estimate for locked eigenvectors L of the operator: L^T M of the last two blocks. Their rows obey recurrences of their
-/// own, and few of them grow: those of the columns nearest to the shift. About 1e-10 of the others may remain. Small matrices only; the
-/// same on every rank, not collective.
+/// The same estimate for locked eigenvectors L of the operator: L^T M of the last two blocks. Each row obeys its own recurrence, and only
+/// the rows of modes near the shift grow. About 1e-10 of the other modes may remain. Small matrices only; the same on all ranks, not
+/// collective.
 class DeflationEstimate {
  public:
   DeflationEstimate() = default;
@@ -65,30 +65,30 @@ class DeflationEstimate {
   explicit DeflationEstimate(std::vector<double> theta);
 
   void reset();
-  /// Before the projection: the columns that must be projected out of w, made a block. alpha: (width, width).
+  /// Before the projection: columns that must be projected out of the next block. alpha: (width, width).
   LockedRange find_columns_to_project(const LanczosStep& step, const la::Matrix& alpha);
-  /// c = L^T M w of a range as it was measured, (range.count, width).
+  /// Measured c = L^T M w of a range, (range.count, width).
   void update_noise(LockedRange range, const la::Matrix& c);
-  /// An entry of V^T M L c at most, c = L^T M w of a range that is being subtracted from w.
+  /// Bound on the entries of V^T M L c, c = L^T M w of a range that is subtracted from w.
   double calc_returned(LockedRange range, const la::Matrix& c) const;
   bool is_confirmed(const LanczosStep& step, const la::Matrix& r) const;
-  /// After the step, which projected `range` out.
+  /// After the step that projected out `range`.
   void advance(const LanczosStep& step, const la::Matrix& r, LockedRange range);
   LockedRange all() const { return {0, static_cast<int>(theta_.size())}; }
-  /// (count) the largest entries of L^T M V_j that remained, as predicted, or as a later step has shown.
+  /// (count) largest remaining entries of L^T M V_j, as predicted or as measured in a later step.
   const std::vector<double>& get_remaining() const { return remaining_; }
 
  private:
   std::vector<double> theta_;
   la::Matrix predicted_;       // L^T M w, (count, width)
-  double largest_ = 0;         // of its rows that are not projected out
+  double largest_ = 0;         // largest entry of its rows that are not projected out
   double scale_ = 0;           // largest entry of alpha
   la::Matrix last_;            // L^T M V_j
   la::Matrix before_;          // L^T M V_{j-1}
-  std::vector<double> noise_;  // (count) what rounding, and the error of the eigenvector, add to a row
+  std::vector<double> noise_;  // (count) rounding and eigenvector error added to a row
   std::vector<double> remaining_;
   double divisor_ = 0;
-  int clean_ = 0;  // blocks in a row that all locked columns were projected out of
+  int clean_ = 0;  // consecutive blocks with all locked columns projected out
 };
 
 }  // namespace carillon::eigen

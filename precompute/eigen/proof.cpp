@@ -1,6 +1,5 @@
-// Method:     Between any two counts as many modes must lie as they differ by. A count on a mode counts it or not, as rounding falls.
-// Source:     Grimes, Lewis, Simon, A shifted block Lanczos algorithm, SIAM J. Matrix Anal. Appl. 15(1), 1994, section 4.
-// Deviations: none.
+// Method: Between two counts, the number of modes must equal their difference. A count on a mode includes it or not, depending on rounding.
+// Source: Grimes, Lewis, Simon, A shifted block Lanczos algorithm, SIAM J. Matrix Anal. Appl. 15(1), 1994, section 4.
 #include "precompute/eigen/proof.hpp"
 
 #include <fmt/core.h>
@@ -91,7 +90,7 @@ WantedModes select_wanted(const std::vector<double>& lambda, const BandLimits& l
   order = base::find_sort_order(lambda);
   std::erase_if(order, [&](std::size_t i) { return limits.is_below(lambda[i]) || limits.is_above(lambda[i]); });
   wanted.within = static_cast<std::int64_t>(order.size());
-  // Of degenerate modes all are kept until their basis is made: part of a cluster would depend on how it was found.
+  // Degenerate modes are all kept until their basis is made: part of a cluster would depend on the iteration.
   if (max_modes && wanted.within > *max_modes) {
     auto kept = static_cast<std::size_t>(*max_modes);
     while (kept < order.size() && lambda[order[kept]] <= lambda[order[kept - 1]] * (1 + kSeparated)) ++kept;

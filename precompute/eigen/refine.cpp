@@ -1,14 +1,12 @@
-// Method:     A few bad modes go through the operator at hand once more, (K - sigma M)^-1 M phi, and are made orthogonal to the others:
-//             that corrects what rounding in the recurrence and the solves left. The rest are taken in groups of neighbours. One step of
-//             inverse iteration with sigma just below the group damps everything farther from sigma than the group is. It is written as a
-//             correction, phi - (K - sigma M)^-1 (K phi - lambda M phi), so that it ends at the modes of K and M and not at those of the
-//             factors' rounding, which differ for thin bodies. Rayleigh-Ritz within the group parts its members; Gram-Schmidt from the
-//             lowest mode up makes the whole set M-orthonormal again. What is still bad is tried again in narrower groups, whose shifts are
-//             nearer; the narrowest hold a single mode. The stiffness against fast motions multiplies the rounding of a slow mode's
-//             entries: its residual is large though the mode is right. The inverse takes that out again: with d = (K - sigma M)^-1 r there
-//             is an eigenvalue within |lambda - sigma| ||d||_M, relative to itself, of lambda - sigma, as for any residual of the inverse.
-// Source:     Parlett, The symmetric eigenvalue problem, 1998, sections 4.2 (inverse iteration), 11.3 (Rayleigh-Ritz).
-// Deviations: none.
+// Method: A few bad modes pass through the available operator once more, (K - sigma M)^-1 M phi, and are made orthogonal to the others,
+// which corrects rounding of the recurrence and the solves. The rest is treated in groups of neighbours: one step of inverse iteration with
+// sigma just below the group damps everything farther from sigma than the group. It is written as a correction, phi - (K - sigma M)^-1 (K
+// phi - lambda M phi), so that it converges to the modes of K and M and not to those of the rounded factors, which differ for thin bodies.
+// Rayleigh-Ritz in the group separates its members; Gram-Schmidt from the lowest mode up makes the whole set M-orthonormal again. Modes
+// still bad are repeated in narrower groups with nearer shifts, down to single modes. The residual of a correct slow mode may be large, as
+// the stiffness of fast motions amplifies the rounding of its entries. The inverse removes this: with d = (K - sigma M)^-1 r there is an
+// eigenvalue within |lambda - sigma| ||d||_M of lambda - sigma, relative to itself, as for any residual of the inverse.
+// Source: Parlett, The symmetric eigenvalue problem, 1998, sections 4.2 (inverse iteration), 11.3 (Rayleigh-Ritz).
 #include "precompute/eigen/refine.hpp"
 
 #include <fmt/core.h>
@@ -29,10 +27,10 @@ namespace {
 using la::LocalColumns;
 using petsc::check;
 
-// Highest lambda of a group over its lowest, pass by pass. An error in the direction of a mode just outside the group's far end decays
-// slowly; the passes end with groups of one.
+// Ratio of the highest to the lowest lambda of a group, per pass. An error along a mode just beyond the far end of the group decays slowly;
+// the passes end with groups of one.
 constexpr std::array<double, 6> kSpread{10, 3, 1.3, 1.05, 1.005, 1.0001};
-constexpr double kOrthonormal = 5e-11;  // Good enough without another orthonormalisation.
+constexpr double kOrthonormal = 5e-11;  // Below this no orthonormalisation is needed.
 
 using Group = std::vector<std::size_t>;
 
@@ -45,8 +43,8 @@ std::vector<Group> group_neighbours(const std::vector<std::size_t>& bad, const s
   return groups;
 }
 
-// Rayleigh-Ritz in the span of the columns: they become M-orthonormal Ritz vectors, their ascending Ritz values are returned. work: as many
-// columns.
+// Rayleigh-Ritz in the span of the columns: they become M-orthonormal Ritz vectors. Returns the Ritz values, ascending. work: same number
+// of columns.
 std::vector<double> calc_ritz(const Operators& operators, const Columns& x, const Columns& work) {
   operators.mass.multiply(x, work);
   la::Matrix m = multiply_transposed(operators.comm, x, work);
@@ -59,7 +57,7 @@ std::vector<double> calc_ritz(const Operators& operators, const Columns& x, cons
   return {values.begin(), values.end()};
 }
 
-// The columns to M-norm one; first to an ordinary size, for near an eigenvalue a solution is huge.
+// Normalises the columns in the M norm; first scales them by their largest entry, as a solution near an eigenvalue is huge.
 void normalise(const Operators& operators, const Columns& x, const Columns& work) {
   const std::size_t count = x.count;
   const auto scale_all = [&](const std::vector<double>& by) {
@@ -81,7 +79,7 @@ void normalise(const Operators& operators, const Columns& x, const Columns& work
   scale_all(norm);
 }
 
-// K phi - lambda M phi of a group's modes. work: as many columns.
+// K phi - lambda M phi of the modes of a group. work: same number of columns.
 void calc_residuals(const Operators& operators, const Group& group, const std::vector<double>& lambda, const Columns& phi,
                     const Columns& residual, const Columns& work) {
   operators.stiffness.multiply(phi, residual);
@@ -92,7 +90,7 @@ void calc_residuals(const Operators& operators, const Group& group, const std::v
   }
 }
 
-// The factor at a shift below the group, `nearness` away relative to lambda. Returns the shift.
+// Factorises at a shift below the group, `nearness` away relative to lambda. Returns the shift.
 double factorise_below(const RefineRequest& request, const Group& group, double nearness, const std::vector<double>& lambda,
                        RefineCost& cost) {
   constexpr int kShifts = 6;
@@ -108,7 +106,7 @@ double factorise_below(const RefineRequest& request, const Group& group, double 
   throw SolveError("K - sigma M is singular all around a mode: the mesh has nodes without mass or stiffness.");
 }
 
-// The modes of a group, and what they have to be corrected by: (K - sigma M)^-1 (K phi - lambda M phi), with the factor that stands.
+// The modes of a group and their corrections (K - sigma M)^-1 (K phi - lambda M phi), with the current factor.
 struct Corrections {
   Corrections(const RefineRequest& request, const Group& group, const std::vector<double>& lambda, const Columns& all, RefineCost& cost)
       : rows(static_cast<std::size_t>(all.rows)),
@@ -135,7 +133,7 @@ struct Corrections {
     return norms;
   }
 
-  /// The group's modes become Ritz vectors in the span of what is left of them, lambda their values.
+  /// Replaces the modes of the group by Ritz vectors in the span of the corrected modes, and lambda by their values.
   void apply(const RefineRequest& request, const Group& group, std::vector<double>& lambda, const Columns& all) {
     for (std::size_t i = 0; i < rows * group.size(); ++i) phi.values[i] -= d.values[i];
     normalise(*request.operators, phi, work);
@@ -151,7 +149,7 @@ struct Corrections {
   Columns phi, d, work;
 };
 
-// Replaces the group's modes by better ones. `nearness` is the distance of the shift below the group, relative to lambda.
+// Improves the modes of a group. `nearness`: distance of the shift below the group, relative to lambda.
 void improve_group(const RefineRequest& request, const Group& group, double nearness, std::vector<double>& lambda, Mat shapes,
                    RefineCost& cost) {
   factorise_below(request, group, nearness, lambda, cost);
@@ -160,8 +158,8 @@ void improve_group(const RefineRequest& request, const Group& group, double near
   Corrections(request, group, lambda, all, cost).apply(request, group, lambda, all);
 }
 
-// The modes once through the operator at hand, whatever its shift; what that brings in of the others is taken out again. Modes that it does
-// not improve stay as they were. The other modes do not move, so nothing else needs to be measured again.
+// Passes the bad modes through the available operator, at any shift, and removes the components along other modes. Modes that do not
+// improve are kept. The other modes do not change, so they need no new measurement.
 void polish(const RefineRequest& request, const Group& bad, std::vector<double>& lambda, Mat shapes, ModeErrors& errors, RefineCost& cost) {
   const Operators& operators = *request.operators;
   const LocalColumns access(shapes);
@@ -173,7 +171,7 @@ void polish(const RefineRequest& request, const Group& bad, std::vector<double>&
   check(MatAssemblyBegin(polished, MAT_FINAL_ASSEMBLY));
   check(MatAssemblyEnd(polished, MAT_FINAL_ASSEMBLY));
   std::vector<double> ritz;
-  double overlap = 0;  // with the other modes, in the end
+  double overlap = 0;  // largest final overlap with other modes
   {
     const LocalColumns own(polished);
     const Columns x = own.view();
@@ -182,7 +180,7 @@ void polish(const RefineRequest& request, const Group& bad, std::vector<double>&
     const Columns phi{space.data(), x.rows, x.rows, x.count};
     const Columns work{space.data() + size, x.rows, x.rows, x.count};
     for (std::size_t j = 0; j < bad.size(); ++j) std::copy_n(all.column(static_cast<int>(bad[j])), x.rows, phi.column(static_cast<int>(j)));
-    // (lambda - sigma) (K - sigma M)^-1 M phi, as a correction: so the rounding of the solve is that of the correction, not of phi.
+    // (lambda - sigma) (K - sigma M)^-1 M phi, as a correction: the rounding of the solve is then relative to the correction, not to phi.
     calc_residuals(operators, bad, lambda, phi, x, work);
     request.at_hand->solve(x.values, x.values, x.stride, x.count);
     cost.solves += x.count;
@@ -216,7 +214,7 @@ void polish(const RefineRequest& request, const Group& bad, std::vector<double>&
   errors.orthonormality = std::max({errors.orthonormality, overlap, corrected.orthonormality});
 }
 
-// Gram-Schmidt must go upwards in lambda, and refined values may have passed their neighbours.
+// Gram-Schmidt must proceed upwards in lambda, and refined values may have changed order.
 ModeErrors measure_orthonormal(const RefineRequest& request, std::vector<double>& lambda, Mat shapes) {
   ModeErrors errors = normalise_and_measure(*request.operators, lambda, shapes);
   sort_modes(lambda, shapes, errors);
@@ -235,8 +233,8 @@ bool is_accepted(const ModeErrors& errors, std::size_t j, double tolerance) {
 }
 
 RefineCost bound_error_by_inverse_residual(const RefineRequest& request, std::vector<double>& lambda, Mat shapes, ModeErrors& errors) {
-  // A mode below the shift that is nearer to it than the group's upper end is would grow: groups are narrow and their shifts near, though
-  // not so near that the rounding of the factors decides.
+  // A mode below the shift that is nearer to it than the upper end of the group would grow: groups are narrow and shifts near, but not so
+  // near that rounding of the factors dominates.
   constexpr std::array<std::array<double, 2>, 4> kRounds{{{1.2, 0.1}, {1.02, 0.01}, {1.005, 0.01}, {1.005, 0.01}}};  // spread, nearness
   RefineCost cost;
   for (std::size_t round = 0;; ++round) {

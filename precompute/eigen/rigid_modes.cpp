@@ -1,10 +1,7 @@
-// Method:     A rigid motion of component c is u(x) = sum_j a_j b_j(x), with three translations b = e_i and three rotations
-//             b = p_i x (x - x_c) / R about the centre x_c, along the principal axes p_i of its nodes. Fixed nodes demand H a = 0 (H: 3
-//             rows per fixed node, 6 columns); the null space of H comes from its singular value decomposition. The motions are then made
-//             M-orthonormal by Gram-Schmidt, twice.
-// Source:     Geradin, Rixen, Mechanical Vibrations, 3rd ed. 2015, section 2.2 (rigid body modes); Golub, Van Loan, section 2.4 (null
-//             space).
-// Deviations: none.
+// Method: A rigid motion of component c is u(x) = sum_j a_j b_j(x), with three translations b = e_i and three rotations b = p_i x (x - x_c)
+// / R about the centre x_c, along the principal axes p_i of its nodes. Fixed nodes require H a = 0 (H: 3 rows per fixed node, 6 columns);
+// the null space of H comes from its singular value decomposition. The motions are made M-orthonormal by Gram-Schmidt, twice.
+// Source: Geradin, Rixen, Mechanical Vibrations, 3rd ed. 2015, section 2.2 (rigid body modes); Golub, Van Loan, section 2.4 (null space).
 #include "precompute/eigen/rigid_modes.hpp"
 
 #include <fmt/core.h>
@@ -27,13 +24,13 @@ using Matrix3 = Eigen::Matrix3d;
 using Vector3 = Eigen::Vector3d;
 using Motions = Eigen::Matrix<double, 6, Eigen::Dynamic>;
 
-// Singular values and lengths below these parts of the largest count as zero.
+// Smaller singular values and lengths, relative to the largest, count as zero.
 constexpr double kRankTolerance = 1e-9;
 constexpr double kLineTolerance = 1e-10;
 
 Vector3 to_vector(const Vec3& x) { return {x[0], x[1], x[2]}; }
 
-// Centre, principal axes and size of one component, fixed nodes included, the same on every rank.
+// Centre, principal axes and size of a component, fixed nodes included, the same on every rank.
 struct Body {
   Vector3 centre = Vector3::Zero();
   Matrix3 axes = Matrix3::Identity();  // columns
@@ -41,7 +38,7 @@ struct Body {
   Motions motions;                     // columns: admissible combinations of the six basis motions
 };
 
-// The basis motions' displacement at x (3 x 6).
+// Displacement of the basis motions at x (3 x 6).
 Eigen::Matrix<double, 3, 6> calc_basis(const Body& body, const Vector3& x) {
   Eigen::Matrix<double, 3, 6> basis;
   basis.leftCols<3>().setIdentity();
@@ -50,13 +47,13 @@ Eigen::Matrix<double, 3, 6> calc_basis(const Body& body, const Vector3& x) {
   return basis;
 }
 
-// Sums over the nodes of every component: count, position, and after the centres are known the second moments.
+// Sums over the nodes of each component: count and position, then second moments about the centre.
 std::vector<Body> calc_bodies(const comm::Communicator& comm, const NodeLayout& nodes) {
   const std::size_t count = nodes.component_count;
   std::vector<double> sums(4 * count, 0.0);
   const auto for_each_node = [&](auto&& visit) {
     for (std::size_t i = 0; i < nodes.nodes_m.size(); ++i) visit(static_cast<std::size_t>(nodes.component[i]), to_vector(nodes.nodes_m[i]));
-    if (!comm.is_root()) return;  // Every rank knows the fixed nodes; one of them counts them.
+    if (!comm.is_root()) return;  // Every rank knows the fixed nodes; only rank 0 adds them.
     for (std::size_t c = 0; c < std::min(count, nodes.fixed.size()); ++c) {
       for (const Vec3& x : nodes.fixed[c]) visit(c, to_vector(x));
     }
@@ -86,10 +83,10 @@ std::vector<Body> calc_bodies(const comm::Communicator& comm, const NodeLayout& 
   return bodies;
 }
 
-// The combinations of basis motions that leave the fixed nodes where they are.
+// Combinations of basis motions that vanish at the fixed nodes.
 Motions calc_admissible_motions(const Body& body, const std::vector<Vec3>& fixed) {
   if (fixed.empty()) return Motions::Identity(6, 6);
-  // H^T H would square the condition; H R with H = Q R is as small and keeps it.
+  // H^T H would square the condition number; R of H = Q R is as small and preserves it.
   la::Matrix constraints(3 * static_cast<Eigen::Index>(fixed.size()), 6);
   for (std::size_t i = 0; i < fixed.size(); ++i)
     constraints.middleRows<3>(3 * static_cast<Eigen::Index>(i)) = calc_basis(body, to_vector(fixed[i]));
@@ -110,7 +107,7 @@ double calc_mass_norm(Mat mass, Vec vector, Vec work) {
   return std::sqrt(std::max(calc_dot(vector, work), 0.0));
 }
 
-// Sets `motion` to the displacements of component c under the combination a of its basis motions.
+// Sets `motion` to the displacements of component c for the combination a of its basis motions.
 void fill_motion(const NodeLayout& nodes, std::int32_t c, const Body& body, const Eigen::Matrix<double, 6, 1>& a, Vec motion) {
   PetscScalar* values = nullptr;
   check(VecZeroEntries(motion));
@@ -121,8 +118,8 @@ void fill_motion(const NodeLayout& nodes, std::int32_t c, const Body& body, cons
   check(VecRestoreArray(motion, &values));
 }
 
-// M-orthonormalises `candidate` against `basis`, the motions of the same component; false if nothing is left of it relative to `unit`, the
-// norm of a translation.
+// M-orthonormalises `candidate` against `basis`, the motions of the same component; false if its remaining norm is negligible relative to
+// `unit`, the norm of a translation.
 bool orthonormalise(Mat mass, Vec candidate, Vec work, const std::vector<Vec>& basis, double unit) {
   for (int pass = 0; pass < 2; ++pass) {
     check(MatMult(mass, candidate, work));
@@ -134,7 +131,7 @@ bool orthonormalise(Mat mass, Vec candidate, Vec work, const std::vector<Vec>& b
   return true;
 }
 
-// ||K r|| must vanish relative to what the entries of K alone would give, ||diag(K) r||.
+// ||K r|| must vanish relative to ||diag(K) r||, the bound from the entries of K.
 void check_stress_free(Mat stiffness, Vec motion, Vec work, Vec diagonal, std::int32_t component) {
   check(MatMult(stiffness, motion, work));
   PetscReal force = 0;
@@ -145,7 +142,7 @@ void check_stress_free(Mat stiffness, Vec motion, Vec work, Vec diagonal, std::i
   constexpr double kForceTolerance = 1e-6;
   if (!(force <= kForceTolerance * scale)) {
     throw SolveError(
-        fmt::format("A rigid motion of component {} meets elastic forces ({:.2g} of the largest possible): the stiffness matrix and "
+        fmt::format("A rigid motion of component {} causes elastic forces ({:.2g} of the largest possible): the stiffness matrix and "
                     "the node layout are not of the same body, or fixed nodes are missing from the layout.",
                     component, force / scale));
   }
@@ -186,7 +183,7 @@ std::vector<petsc::VecHandle> make_rigid_modes(const la::Pencil& pencil, const N
     }
     per_component.push_back(static_cast<std::int64_t>(of_component.size()));
   }
-  // M-orthonormal so far; the root of the factor is a power of two as well.
+  // M-orthonormal so far; the square root of the factor is a power of two as well.
   for (petsc::VecHandle& mode : modes) check(VecScale(mode, 1 / std::sqrt(pencil.mass_factor)));
   return modes;
 }

@@ -1,8 +1,7 @@
-// Method:     ||R_j s_i||, s_i the last block row of an eigenvector of T, is the residual of its Ritz pair. A vector has converged when its
-//             residual over the distance of the next Ritz value, its angle, is small as well (Parlett, section 11.7).
-// Source:     Grimes, Lewis, Simon, A shifted block Lanczos algorithm, SIAM J. Matrix Anal. Appl. 15(1), 1994, section 3; Parlett, The
-//             symmetric eigenvalue problem, 1998.
-// Deviations: none.
+// Method: ||R_j s_i||, with the last block row of eigenvector s_i of T, is the residual of the Ritz pair. A vector has converged if its
+// angle, the residual over the distance to the next Ritz value, is small as well (Parlett, section 11.7).
+// Source: Grimes, Lewis, Simon, A shifted block Lanczos algorithm, SIAM J. Matrix Anal. Appl. 15(1), 1994, section 3; Parlett, The
+// symmetric eigenvalue problem, 1998.
 #include "precompute/eigen/ritz.hpp"
 
 #include <algorithm>
@@ -17,13 +16,13 @@
 namespace carillon::eigen {
 namespace {
 
-constexpr double kVectorAngle = 1e-7;     // Ritz vectors must be separated from their neighbours to this angle,
-constexpr double kThetaRounding = 1e-14;  // as far as residuals, relative to theta, can say.
-constexpr double kRitzMerge = 1e-9;       // Closer Ritz values are one.
-constexpr double kSettled = 1e-3;         // A Ritz value with this error is no spurious one.
+constexpr double kVectorAngle = 1e-7;     // Required angle between a Ritz vector and its eigenvector,
+constexpr double kThetaRounding = 1e-14;  // as far as residuals resolve it, relative to theta.
+constexpr double kRitzMerge = 1e-9;       // Ritz values closer than this (relative) are treated as equal.
+constexpr double kSettled = 1e-3;         // A Ritz value with a smaller error is not spurious.
 constexpr double kEigenFlops = 9;         // of n^3: a symmetric eigenproblem with its vectors (Golub, Van Loan, 8.3)
 
-// The distance of theta_i from the next Ritz value that is another.
+// Distance from theta_i to the nearest distinct Ritz value.
 double calc_gap(const la::Vector& theta, Eigen::Index i) {
   const double same = kRitzMerge * std::abs(theta[i]);
   double gap = std::numeric_limits<double>::infinity();
@@ -38,20 +37,12 @@ double calc_gap(const la::Vector& theta, Eigen::Index i) {
   return gap;
 }
 
-void order_first(RitzSelection& selection, const std::vector<double>& lambda, const RitzGoal& goal) {
-  const auto at = [&](int i) { return lambda[i]; };
-  std::stable_sort(selection.order.begin(), selection.order.end(), [&](int a, int b) { return goal.comes_first(at(a), at(b)); });
-  const auto is_converged = [&](int i) { return selection.error[i] <= goal.tolerance; };
-  selection.converged = std::find_if_not(selection.order.begin(), selection.order.end(), is_converged) - selection.order.begin();
-  selection.is_complete = selection.converged >= goal.wanted;
-}
-
 void order_interval(RitzSelection& selection, const la::Vector& theta, const std::vector<double>& lambda, const RitzGoal& goal) {
   const auto at = [&](int i) { return lambda[i]; };
   const auto error = [&](int i) { return selection.error[i]; };
   const auto is_inside = [&](int i) { return at(i) >= goal.low && at(i) <= goal.high; };
   std::vector<int>& order = selection.order;
-  // Converged ones of the interval, the others of the interval, those beyond it by their nearness to the shift.
+  // Order: converged pairs in the interval, other pairs in the interval, then pairs outside by distance from the shift.
   const auto rank = [&](int i) { return is_inside(i) ? (error(i) <= goal.tolerance ? 0 : 1) : 2; };
   std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
     if (rank(a) != rank(b)) return rank(a) < rank(b);
@@ -59,7 +50,7 @@ void order_interval(RitzSelection& selection, const la::Vector& theta, const std
   });
   selection.converged = std::count_if(order.begin(), order.end(), [&](int i) { return rank(i) == 0; });
   const std::int64_t inside = std::count_if(order.begin(), order.end(), is_inside);
-  // The iteration has seen past the interval when something beyond its farther end has settled.
+  // A converged Ritz value beyond the farther end shows that the iteration has covered the interval.
   const double reach = std::max(goal.high - goal.sigma, goal.sigma - goal.low);
   const bool sees_past = std::any_of(order.begin(), order.end(),
                                      [&](int i) { return !is_inside(i) && std::abs(at(i) - goal.sigma) > reach && error(i) <= kSettled; });
@@ -68,13 +59,20 @@ void order_interval(RitzSelection& selection, const la::Vector& theta, const std
 
 }  // namespace
 
+double calc_ritz_error(double sigma, double theta, double residual) {
+  constexpr double kMaxLoss = 1e3;
+  const double lambda = std::abs(sigma + 1 / theta);
+  const double loss = std::min(std::abs(1 / theta) / std::max(lambda, std::numeric_limits<double>::epsilon()), kMaxLoss);
+  return residual / std::abs(theta) * std::max(loss, 1.0);
+}
+
 RitzPairs calc_ritz_pairs(const comm::Communicator& comm, const LanczosBasis& basis) {
   const int n = basis.size(), width = basis.width();
   const la::Matrix& r = basis.coupling();
   RitzPairs pairs;
   pairs.theta = la::Vector::Zero(n);
   la::Matrix last = la::Matrix::Zero(width, n);
-  comm.agree([&] {  // One rank calculates and the others take its bits: decisions must be the same everywhere.
+  comm.agree([&] {  // One rank computes, all use its bits, so that decisions agree.
     if (!comm.is_root()) return;
     pairs.vectors = basis.t().topLeftCorner(n, n);
     if (la::calc_eigenpairs_by_division(pairs.vectors, pairs.theta) != 0)
@@ -107,18 +105,14 @@ RitzSelection select(const RitzPairs& pairs, const RitzGoal& goal) {
   for (Eigen::Index i = 0; i < pairs.theta.size(); ++i) {
     const double theta = pairs.theta[i];
     const double residual = pairs.residual[i];
-    const double error = goal.error(theta, residual);
+    const double error = calc_ritz_error(goal.sigma, theta, residual);
     const double allowed = std::max(kVectorAngle * calc_gap(pairs.theta, i), kThetaRounding * std::abs(theta));
     selection.error.push_back(std::max(error, residual / allowed * goal.tolerance));
-    lambda.push_back(goal.to_lambda(theta));
+    lambda.push_back(to_lambda(goal.sigma, theta));
   }
   selection.order.resize(lambda.size());
   std::iota(selection.order.begin(), selection.order.end(), 0);
-  if (goal.is_interval) {
-    order_interval(selection, pairs.theta, lambda, goal);
-  } else {
-    order_first(selection, lambda, goal);
-  }
+  order_interval(selection, pairs.theta, lambda, goal);
   return selection;
 }
 

@@ -1,4 +1,4 @@
-// K and M in units in which the band ends near 1.
+// Scaling of K and M such that the band ends near 1.
 #pragma once
 
 #include <array>
@@ -9,8 +9,8 @@
 
 namespace carillon::eigen {
 
-/// Powers of two that bring lambda to about 1 at the upper end of the band and M to about 1: thresholds of the solvers then mean what they
-/// say. They change no mantissa, and no matrix.
+/// Powers of two that scale lambda to about 1 at the upper end of the band and M to about 1, so that absolute thresholds of the solvers
+/// apply. They change no mantissa and no matrix.
 class Scaling {
  public:
   /// lambda_high: eigenvalue that becomes about 1. Collective. Throws SolveError when M has no positive trace.
@@ -28,7 +28,7 @@ class Scaling {
   double get_shape_factor() const { return std::ldexp(1.0, -mass_power_ / 2); }
 
  private:
-  int mass_power_ = 0;  // even: its root is a power of two as well
+  int mass_power_ = 0;  // even: its square root is a power of two as well
   int lambda_power_ = 0;
 };
 

@@ -1,8 +1,7 @@
-// Method:     Block Lanczos with a shift inside each slice finds its modes; copies of repeated eigenvalues that a run leaves out are sought
-//             again with everything found deflated. What is missing between two counts is then sought with a shift between them.
-// Source:     Grimes, Lewis, Simon, A shifted block Lanczos algorithm, SIAM J. Matrix Anal. Appl. 15(1), 1994 (counts and slices).
-//             Block Lanczos: block_lanczos.cpp.
-// Deviations: none.
+// Method: Block Lanczos with a shift inside each slice finds its modes; missing copies of repeated eigenvalues are searched again with all
+// found modes deflated. Modes still missing between two counts are then searched with a shift between these.
+// Source: Grimes, Lewis, Simon, A shifted block Lanczos algorithm, SIAM J. Matrix Anal. Appl. 15(1), 1994 (counts and slices). Block
+// Lanczos: block_lanczos.cpp.
 #include "precompute/eigen/search.hpp"
 
 #include <fmt/core.h>
@@ -12,8 +11,8 @@
 #include <numeric>
 
 #include "precompute/eigen/memory.hpp"
+#include "precompute/eigen/predict_cost.hpp"
 #include "precompute/eigen/proof.hpp"
-#include "precompute/eigen/solve_estimate.hpp"
 #include "precompute/eigen/timer.hpp"
 #include "precompute/petsc/session.hpp"
 #include "runtime/base/error.hpp"
@@ -22,10 +21,11 @@ namespace carillon::eigen {
 namespace {
 
 constexpr double kEdge = BandLimits::kTolerance;
-constexpr int kMaxRounds = 60;            // Krylov runs per interval at most until its count is met,
-constexpr int kMaxIdleRounds = 2;         // and so many without a new mode.
-constexpr double kLockedMargin = 1;       // Of a slice's width: modes found that near are locked.
-constexpr double kKrylovTolerance = 0.1;  // Of the tolerance: Ritz residuals of the inverse leave out what K does to high frequencies.
+constexpr int kMaxRounds = 60;       // Maximum Krylov runs per interval,
+constexpr int kMaxIdleRounds = 2;    // and without a new mode.
+constexpr double kLockedMargin = 1;  // Modes found within this distance of a slice, in widths of the slice, are locked.
+constexpr double kKrylovTolerance =
+    0.1;  // Relative to the tolerance: Ritz residuals of the inverse omit the amplification of high frequencies by K.
 
 }  // namespace
 
@@ -81,8 +81,8 @@ KrylovRequest Search::make_request(const Slice& slice, double sigma, Missing mis
   request.high = slice.high * (1 + kEdge);
   request.count = petsc::to_petsc_int(missing.count);
   request.is_count_known = missing.is_known;
-  // Those below the slice are nearer the shift than its upper end when it starts at the bottom. Copies that rounding alone brings in come
-  // late: later runs ask for some more, beyond the slice.
+  // Modes below the slice are nearer to the shift than its upper end if it starts at the bottom. Copies that appear only through rounding
+  // converge late: later runs request some more, beyond the slice.
   const bool is_below = sigma - slice.low * 0.5 > slice.high - sigma || sigma < slice.low;
   const std::int64_t below = slice.below_low - body_.rigid_count();
   request.nearest = petsc::to_petsc_int(missing.count + (is_below || 5 * below <= slice.count() ? below : 0) + std::min(round, 4) * 10);
@@ -90,14 +90,15 @@ KrylovRequest Search::make_request(const Slice& slice, double sigma, Missing mis
   request.tolerance = kKrylovTolerance * body_.options.tolerance;
   request.nodes_m = &body_.problem.nodes.nodes_m;
   request.round = round;
-  // Vectors far from the slice are orthogonal to it by their residuals; those near its ends or in it must be locked, and fewer neighbours
-  // make the iteration shorter.
+  request.max_steps = body_.options.max_steps;
+  // Vectors far from the slice are orthogonal to it by their residuals; those in it or near its ends must be locked. Fewer locked
+  // neighbours make the iteration cheaper.
   request.locked_above = slice.low - kLockedMargin * (slice.high - slice.low);
   return request;
 }
 
-// One Krylov run; adds to the modes found what lies in the slice and was not there. Returns up to where from sigma on it left nothing out.
-double Search::run_round(const Slice& slice, ShiftedFactor* cholmod, double sigma, Missing missing, int round) {
+// One Krylov run; adds new modes of the slice. Returns the lambda up to which, from sigma on, it left nothing out.
+double Search::run_round(const Slice& slice, double sigma, Missing missing, int round) {
   SearchStep step;
   step.kind = SearchStep::kRound;
   step.asked = {sigma, slice.low, slice.high, static_cast<double>(missing.count), round + (missing.is_known ? 0.0 : 0.5)};
@@ -105,7 +106,7 @@ double Search::run_round(const Slice& slice, ShiftedFactor* cholmod, double sigm
     checkpoint_.restore_found(*known);
     return known->answer[0];
   }
-  ShiftedFactor& factor = cholmod != nullptr ? *cholmod : counter_.factor_at(sigma);
+  ShiftedFactor& factor = counter_.factor_at(sigma);
   const Timer timer(seconds_.iterate);
   KrylovRequest request = make_request(slice, sigma, missing, round);
   request.factor = &factor;
@@ -121,8 +122,8 @@ double Search::run_round(const Slice& slice, ShiftedFactor* cholmod, double sigm
   return statistics.solved_to;
 }
 
-// After the first run, whose slice begins at the lower end of the band. As many modes found up to the shift as were counted there, but for
-// the rigid ones, leave none for what is below the band; else that is counted.
+// Called after the first run, whose slice starts at the lower end of the band. If the modes found up to the shift equal the count there
+// less the rigid modes, no mode is below the band; otherwise the lower end is counted.
 void Search::settle_low_end(Slice& slice, const Inertia& shift) {
   const std::int64_t found = count_found(found_.lambda, slice.low * (1 - kEdge), shift.lambda);
   if (shift.below - found == slice.below_low && find_margin(found_.lambda, shift.lambda) >= kSafeMargin) {
@@ -136,8 +137,8 @@ void Search::settle_low_end(Slice& slice, const Inertia& shift) {
   slice.below_low = counts_->band.below_low;
 }
 
-// Runs with the factor at sigma until the slice holds what it was counted to hold, or runs find nothing new.
-void Search::run_rounds(Slice slice, ShiftedFactor* cholmod, double sigma, int first) {
+// Runs with the factor at sigma until the slice is complete by count, or runs find nothing new.
+void Search::run_rounds(Slice slice, double sigma, int first) {
   int idle = 0;
   const auto find_shift = [&] {
     return *std::find_if(counts().begin(), counts().end(), [&](const Inertia& c) { return c.lambda == sigma; });
@@ -146,35 +147,16 @@ void Search::run_rounds(Slice slice, ShiftedFactor* cholmod, double sigma, int f
     const std::int64_t missing = slice.count() - count_found(found_.lambda, slice.low * (1 - kEdge), slice.high * (1 + kEdge));
     if (missing <= 0) break;
     const std::int64_t before = count();
-    run_round(slice, cholmod, sigma, {missing, true}, round);
+    run_round(slice, sigma, {missing, true}, round);
     if (counts_->is_low_assumed) settle_low_end(slice, find_shift());
     idle = count() > before ? 0 : idle + 1;
   }
 }
 
-std::unique_ptr<ShiftedFactor> Search::factorise_with_cholmod(double sigma) {
-  counter_.release();  // Two factors at a time would double the memory.
-  const Timer timer(seconds_.factor);
-  std::unique_ptr<ShiftedFactor> cholmod = make_cholmod_factor(body_.pencil, body_.problem.nodes.elimination_position);
-  ++factor_.factorisations;
-  (void)cholmod->factorise(sigma);
-  factor_.solver = cholmod->get_solver();
-  factor_.ordering = cholmod->get_ordering();
-  factor_.entries = cholmod->get_entries();
-  return cholmod;
-}
-
-// Runs around sigma, where the factor is or will be, until the slice holds what it was counted to hold.
+// Runs around sigma until the slice is complete by count.
 void Search::find_missing(const Slice& slice, double sigma) {
-  std::unique_ptr<ShiftedFactor> cholmod;
-  if (body_.options.factorisation == Factorisation::kCholmod) {
-    sigma = -2.5e-3 * slice.high;
-    cholmod = factorise_with_cholmod(sigma);
-  } else {
-    report_(Phase::kFactor, count());
-    sigma = count_below(sigma, 1e-5).lambda;
-  }
-  run_rounds(slice, cholmod.get(), sigma, 0);
+  report_(Phase::kFactor, count());
+  run_rounds(slice, count_below(sigma, 1e-5).lambda, 0);
 }
 
 void Search::run(BandCounts& counts) {
@@ -185,9 +167,7 @@ void Search::run(BandCounts& counts) {
                fmt::format("The search for {} modes", wanted.count()));
   found_.reset(body_.problem.stiffness, petsc::to_petsc_int(wanted.count()), body_.rigid);
   checkpoint_.load_found();
-  // CHOLMOD cannot shift into the band.
-  const std::int64_t max_modes = body_.options.factorisation == Factorisation::kCholmod ? wanted.count() : kSliceModes;
-  Sweep sweep(wanted, max_modes, [this](double lambda) {
+  Sweep sweep(wanted, kSliceModes, [this](double lambda) {
     report_(Phase::kFactor, count());
     return count_below(lambda).below;
   });
@@ -196,7 +176,7 @@ void Search::run(BandCounts& counts) {
     const Sweep::Part part = sweep.take();
     counted.high = part.sigma;
     counted.below_high = part.below_sigma;
-    const double solved_to = run_round(part.slice, nullptr, part.sigma, {part.slice.count(), false}, 0);
+    const double solved_to = run_round(part.slice, part.sigma, {part.slice.count(), false}, 0);
     if (counts.is_low_assumed) {
       settle_low_end(counted, {part.sigma, part.below_sigma});
       wanted.low = counted.low;
@@ -205,8 +185,8 @@ void Search::run(BandCounts& counts) {
     if (count_found(found_.lambda, counted.low, counted.high) >= counted.count()) {
       sweep.advance(solved_to, wanted.below_low + count_found(found_.lambda, wanted.low * (1 - kEdge), solved_to));
     } else {
-      // Copies are missing below the shift, and above it no doubt too. Left for later they would count as modes of the slices to come.
-      run_rounds(counted, nullptr, part.sigma, 1);
+      // Copies are missing below the shift, and probably above. If left for later they would count as modes of later slices.
+      run_rounds(counted, part.sigma, 1);
       sweep.advance(part.sigma, part.below_sigma);
     }
     counted.low = part.sigma;
@@ -228,7 +208,7 @@ void Search::move_doubtful_counts(const BandLimits& limits) {
   }
 }
 
-// Seeks what is missing between two counts once more. True if nothing was.
+// Searches gaps between counts once more. True if there were none.
 bool Search::search_gaps() {
   const std::vector<Inertia> counts = sort_counts(counter_.counts());
   bool is_complete = true;
@@ -243,8 +223,7 @@ bool Search::search_gaps() {
   return is_complete;
 }
 
-// A mode between an end of the band and its count would be counted and is not of the band: the count is taken again between them. True if
-// one was.
+// A mode between an end of the band and its count is counted but outside the band: repeats the count between them. True if there was one.
 bool Search::move_counts_to_band(BandCounts& counts) {
   const BandLimits& limits = counts.limits;
   bool has_moved = false;

@@ -1,8 +1,7 @@
-// The search for the modes of a band.
+// Search for the modes of a band.
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <vector>
 
 #include "precompute/eigen/band.hpp"
@@ -14,35 +13,35 @@
 
 namespace carillon::eigen {
 
-/// Says how far a solve is; on the first rank, and where the options ask for it.
+/// Reports progress on rank 0, if the options have a callback.
 struct ProgressReport {
   const BandProblem& body;
   const FactorStatistics& factor;
-  std::int64_t band_count = 0;  // modes in the band; 0 until they are counted
+  std::int64_t band_count = 0;  // modes in the band; 0 until counted
 
   void operator()(Phase phase, std::int64_t modes_done, std::int64_t more_solves = 0) const;
 };
 
-/// Keeps the factor of the last shift, every count, and the modes found so far, M-orthonormal; with a checkpoint it keeps a record of both,
-/// so that a resumed search replays it. Every member is collective and throws Stopped where the checkpoint asks for it.
+/// Keeps the factor of the last shift, all counts, and the modes found so far, M-orthonormal; with a checkpoint, records counts and modes,
+/// so that a resumed search replays them. Every member is collective and throws Stopped on a stop request.
 class Search {
  public:
-  /// All must outlive it. The checkpoint's record is read here.
+  /// All arguments must outlive it. Reads the record of the checkpoint.
   Search(const BandProblem& body, const ProgressReport& report, FactorStatistics& factor, Seconds& seconds);
 
-  /// The count, or what is recorded of it. See InertiaCounter.
+  /// The count, or its recorded value. See InertiaCounter.
   Inertia count_below(double lambda, double reach = 1e-6, ShiftRule rule = ShiftRule::kExact);
   void forget(double lambda) { counter_.forget(lambda); }
   InertiaCounter& counter() { return counter_; }
 
-  /// Both of this search.
+  /// count_below() and forget() of this search.
   BandCounter get_band_counter();
 
-  /// Goes through the part of the band that holds the modes wanted, slice by slice. Copies of repeated eigenvalues that stay hidden are
-  /// left to complete(). Where the lower end was assumed it is proven by the first shift, or else counted, and `counts` changes with it.
+  /// Searches the part of the band with the wanted modes, slice by slice. Missing copies of repeated eigenvalues are left to complete(). An
+  /// assumed lower end is proven by the first shift, or else counted; `counts` is updated.
   void run(BandCounts& counts);
-  /// Until every count agrees with the modes found: counts on a mode are taken again elsewhere, gaps between two counts are searched once
-  /// more. Counts of the ends move to the band where a mode lies between, and `counts` with them. Throws SolveError where a gap stays.
+  /// Continues until every count agrees with the modes found: repeats counts on a mode elsewhere, and searches gaps between two counts once
+  /// more. Moves counts at the ends towards the band if a mode lies between; `counts` is updated. Throws SolveError if a gap remains.
   void complete(BandCounts& counts);
 
   const std::vector<Inertia>& counts() const { return counter_.counts(); }
@@ -52,15 +51,14 @@ class Search {
  private:
   struct Missing {
     std::int64_t count = 0;
-    bool is_known = true;  // by inertia, or guessed
+    bool is_known = true;  // by inertia; otherwise a guess
   };
-  double run_round(const Slice& slice, ShiftedFactor* cholmod, double sigma, Missing missing, int round);
+  double run_round(const Slice& slice, double sigma, Missing missing, int round);
   KrylovRequest make_request(const Slice& slice, double sigma, Missing missing, int round) const;
   Slice cut_to_wanted(const Slice& band);
-  void run_rounds(Slice slice, ShiftedFactor* cholmod, double sigma, int first);
+  void run_rounds(Slice slice, double sigma, int first);
   void settle_low_end(Slice& slice, const Inertia& shift);
   void find_missing(const Slice& slice, double sigma);
-  std::unique_ptr<ShiftedFactor> factorise_with_cholmod(double sigma);
   void move_doubtful_counts(const BandLimits& limits);
   bool search_gaps();
   bool move_counts_to_band(BandCounts& counts);
@@ -75,8 +73,8 @@ class Search {
   FoundModes found_;
   SearchCheckpoint checkpoint_;
   InertiaCounter counter_;
-  double searched_to_ = 0;        // the end of the last slice
-  BandCounts* counts_ = nullptr;  // of run() and complete()
+  double searched_to_ = 0;        // end of the last slice
+  BandCounts* counts_ = nullptr;  // argument of run() and complete()
 };
 
 }  // namespace carillon::eigen

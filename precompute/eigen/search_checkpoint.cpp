@@ -1,9 +1,8 @@
-// Method:     The search is a deterministic function of the results of its factorisations and iterations. Only these are recorded, in
-//             their order, and the modes with them: a replay with the recorded results costs nothing and ends where the search was. An
-//             iteration in the middle is resumed from its basis and its projected matrix.
-// Source:     Elnozahy, Alvisi, Wang, Johnson, A survey of rollback-recovery protocols, ACM Computing Surveys 34(3), 2002, section 3.1
-//             (replay of what is deterministic).
-// Deviations: none.
+// Method: The search is a deterministic function of the results of its factorisations and iterations. Only these and the modes are
+// recorded, in order: a replay with the recorded results costs almost nothing and ends at the last recorded step. An interrupted iteration
+// is resumed from its basis and projected matrix.
+// Source: Elnozahy, Alvisi, Wang, Johnson, A survey of rollback-recovery protocols, ACM Computing Surveys 34(3), 2002, section 3.1 (replay
+// of deterministic processes).
 #include "precompute/eigen/search_checkpoint.hpp"
 
 #include <algorithm>
@@ -21,8 +20,8 @@ namespace {
 using la::LocalColumns;
 using petsc::check;
 
-constexpr std::int64_t kSearch = 1, kModes = 2;   // what a state is of
-constexpr std::int64_t kMaxSteps = 100'000;       // Bounds for numbers that come from a file.
+constexpr std::int64_t kSearch = 1, kModes = 2;   // kind of a state
+constexpr std::int64_t kMaxSteps = 100'000;       // Limits for numbers read from a file.
 constexpr std::int64_t kMax = 1'000'000'000'000;  // counts and operations
 
 void write(NumberWriter& to, const LanczosState& state) {
@@ -48,7 +47,7 @@ void SearchCheckpoint::load(std::int64_t rows, std::array<std::int64_t, 2> power
   if (checkpoint_->numbers.empty()) return;
   try {
     unpack(rows);
-  } catch (const InputError& error) {  // The numbers are the same on every rank, and so is this.
+  } catch (const InputError& error) {  // The numbers are the same on all ranks, so all ranks throw.
     steps_.clear();
     kept_lambda_.clear();
     has_round_ = false;
@@ -82,7 +81,7 @@ void SearchCheckpoint::unpack(std::int64_t rows) {
     for (double& value : round_.asked) value = from.get_double();
     round_state_ = read_lanczos(from, rows);
   }
-  if (checkpoint_->column_count != kept + (has_round_ ? round_state_.size() : 0)) throw InputError("it has columns too many or too few");
+  if (checkpoint_->column_count != kept + (has_round_ ? round_state_.size() : 0)) throw InputError("it has the wrong number of columns");
   uses_mumps_ = from.get_count(0, 1);
   backward_error_ = from.get_double();
   FactorStatistics factor;
@@ -125,7 +124,7 @@ void SearchCheckpoint::set_counter(InertiaCounter* counter) {
   if (counter != nullptr) counter->resume(uses_mumps_ == 1, backward_error_);
 }
 
-// The search has taken another way than the one recorded.
+// The search deviates from the recorded one.
 void SearchCheckpoint::drop_rest() {
   steps_.resize(next_);
   has_round_ = false;
@@ -140,12 +139,12 @@ const SearchStep* SearchCheckpoint::replay(const SearchStep& step) {
 
 void SearchCheckpoint::record(const SearchStep& step) {
   if (checkpoint_ == nullptr) return;
-  if (step.kind == SearchStep::kCount && has_round_) drop_rest();  // The iteration under way came next.
+  if (step.kind == SearchStep::kCount && has_round_) drop_rest();  // The interrupted iteration came next in the record.
   steps_.push_back(step);
   steps_.back().found = static_cast<std::int64_t>(sources_.found->lambda.size());
   next_ = steps_.size();
   checkpoint_->report_unsaved(true);
-  save_if_requested(sources_.found->lambda.empty());  // A few counts are a few bytes, and each has cost a factorisation.
+  save_if_requested(sources_.found->lambda.empty());  // A few counts are a few bytes, and each cost a factorisation.
 }
 
 void SearchCheckpoint::save_if_requested(bool always) {
@@ -257,7 +256,7 @@ Modes read_modes(const std::string& numbers, std::int64_t rows) {
   modes.lambda = from.get_doubles(rows);
   const auto count = static_cast<std::int64_t>(modes.lambda.size());
   modes.residual = from.get_doubles(rows);
-  if (modes.residual.size() != modes.lambda.size()) throw InputError("it has residuals too many or too few");
+  if (modes.residual.size() != modes.lambda.size()) throw InputError("it has the wrong number of residuals");
   modes.above_tolerance_count = from.get_count(0, count);
   modes.orthonormality_error = from.get_double();
   for (std::int64_t* number : {&modes.rigid_count, &modes.count_below_low, &modes.band_count, &modes.mechanism_count})
@@ -319,7 +318,7 @@ std::optional<Modes> load_modes(Mat stiffness, Checkpoint& checkpoint) {
   Modes modes;
   try {
     modes = read_modes(numbers, all);
-    if (checkpoint.column_count != static_cast<std::int64_t>(modes.lambda.size())) throw InputError("it has columns too many or too few");
+    if (checkpoint.column_count != static_cast<std::int64_t>(modes.lambda.size())) throw InputError("it has the wrong number of columns");
   } catch (const InputError& error) {
     checkpoint.reject(error.what());
     return std::nullopt;

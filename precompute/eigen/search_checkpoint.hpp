@@ -1,4 +1,4 @@
-// The record of a search for the modes of a band, from which it is resumed.
+// Record of a band search, from which it is resumed.
 #pragma once
 
 #include <mpi.h>
@@ -16,7 +16,7 @@
 
 namespace carillon::eigen {
 
-/// A step of the search that costs a factorisation or an iteration: what was asked, to the last bit, and what came of it.
+/// A step of the search that costs a factorisation or an iteration: its arguments, bit for bit, and its result.
 struct SearchStep {
   enum Kind : std::int64_t { kCount = 1, kRound = 2 };
   std::int64_t kind = kCount;
@@ -27,12 +27,12 @@ struct SearchStep {
   bool asks_as(const SearchStep& other) const { return kind == other.kind && asked == other.asked; }
 };
 
-/// Keeps the steps of a search, the modes found and the basis of the iteration under way, in the order in which they came. Resume replays
-/// the search: recorded steps return their stored result, later steps are computed. Where the search asks for another step than the one
-/// recorded, the rest of the record is dropped. Everything is collective, and without a checkpoint nothing happens.
+/// Records the steps of a search, the modes found and the basis of the current iteration, in order. Resume replays the search: recorded
+/// steps return their stored result, later steps are computed. If the search requests a step other than the recorded one, the rest of the
+/// record is dropped. All members are collective; without a checkpoint they do nothing.
 class SearchCheckpoint {
  public:
-  /// What is saved in addition to the steps.
+  /// Data saved in addition to the steps.
   struct Sources {
     FoundModes* found = nullptr;
     FactorStatistics* factor = nullptr;
@@ -42,22 +42,21 @@ class SearchCheckpoint {
   SearchCheckpoint(const comm::Communicator& comm, Checkpoint* checkpoint, Sources sources)
       : comm_(comm), checkpoint_(checkpoint), sources_(sources) {}
 
-  /// Takes the state of the checkpoint, if it has one that fits a problem of n rows with these powers of its scaling. The rest of the
-  /// statistics are taken over here.
+  /// Takes the state of the checkpoint if it fits a problem of n rows with these scaling powers. Restores the other statistics as well.
   void load(std::int64_t rows, std::array<std::int64_t, 2> powers);
   void set_counter(InertiaCounter* counter);
 
-  /// The recorded result of this step; null where it is to be computed.
+  /// Recorded result of this step; null if it must be computed.
   const SearchStep* replay(const SearchStep& step);
-  /// A step was computed: a safe point. Throws Stopped.
+  /// Records a computed step; a safe point. Throws Stopped.
   void record(const SearchStep& step);
-  /// Puts the recorded modes into found. Call before the first step that finds some.
+  /// Reads the recorded modes into found. Call before the first step that finds modes.
   void load_found();
-  /// The modes that a replayed step found are in found again.
+  /// Restores the modes found by a replayed step.
   void restore_found(const SearchStep& step);
-  /// For the iteration of a step that is to be computed: what it resumes from, and what saves it. Null without a checkpoint.
+  /// Hooks for the iteration of a step to be computed: state to resume from and save(). Null without a checkpoint.
   LanczosCheckpoint* begin_round(const SearchStep& step);
-  /// After it. Throws Stopped where the iteration was stopped.
+  /// After the iteration. Throws Stopped if it was stopped.
   void end_round();
 
  private:
@@ -72,10 +71,10 @@ class SearchCheckpoint {
   Sources sources_;
   std::array<std::int64_t, 2> powers_{};
   std::vector<SearchStep> steps_;
-  std::size_t next_ = 0;             // of steps_: those before have been replayed or recorded
-  std::vector<double> kept_lambda_;  // of the modes in the checkpoint
+  std::size_t next_ = 0;             // index in steps_; earlier ones have been replayed or recorded
+  std::vector<double> kept_lambda_;  // eigenvalues of the modes in the checkpoint
   bool has_loaded_ = false;
-  bool has_round_ = false;  // the checkpoint holds a basis, and the step it belongs to
+  bool has_round_ = false;  // the checkpoint holds the basis of round_
   SearchStep round_;
   LanczosState round_state_;
   std::int64_t uses_mumps_ = 0;
@@ -83,9 +82,9 @@ class SearchCheckpoint {
   LanczosCheckpoint lanczos_;
 };
 
-/// The result of a solve as a state in which nothing is left to be computed. Collective.
+/// Saves the result of a finished solve. Collective.
 bool save_modes(const Modes& modes, Checkpoint& checkpoint);
-/// The result that a checkpoint holds, with the rows of K; none where it holds something else. Collective.
+/// Result of a finished solve in a checkpoint; nullopt if it holds another state. Collective.
 std::optional<Modes> load_modes(Mat stiffness, Checkpoint& checkpoint);
 
 }  // namespace carillon::eigen

@@ -1,46 +1,22 @@
 #include "precompute/eigen/shift_invert.hpp"
 
-#include <string>
+#include <algorithm>
 
-#include "precompute/la/local_columns.hpp"
-#include "precompute/petsc/session.hpp"
+#include "precompute/eigen/timer.hpp"
+#include "precompute/petsc/work.hpp"
 
 namespace carillon::eigen {
-namespace {
 
-using petsc::check;
-
-// The preconditioner of a transformation that does nothing but apply it, if it is a shell; null otherwise, and where the user has set any
-// option of the KSP, which may ask for output.
-PC find_direct(ST st) {
-  KSP ksp = nullptr;
-  PC pc = nullptr;
-  const char* prefix = nullptr;
-  char* options = nullptr;
-  PetscBool applies = PETSC_FALSE;
-  PetscBool is_shell = PETSC_FALSE;
-  check(STGetKSP(st, &ksp));
-  check(KSPGetPC(ksp, &pc));
-  check(KSPGetOptionsPrefix(ksp, &prefix));
-  check(PetscOptionsGetAll(nullptr, &options));
-  const std::string of_ksp = std::string("-") + (prefix != nullptr ? prefix : "") + "ksp_";
-  const bool is_set = std::string(options).find(of_ksp) != std::string::npos;
-  check(PetscFree(options));
-  if (is_set) return nullptr;
-  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(ksp), KSPPREONLY, &applies));
-  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(pc), PCSHELL, &is_shell));
-  return applies == PETSC_TRUE && is_shell == PETSC_TRUE ? pc : nullptr;
-}
-
-}  // namespace
-
-ShiftInvert::ShiftInvert(ST st) : st_(st), direct_(find_direct(st)) { check(STGetShift(st, &sigma_)); }
-
-void ShiftInvert::apply(Mat z, Mat w) const {
-  la::mark_changed(w);
-  la::mark_changed(z);
-  if (direct_ != nullptr) return check(PCMatApply(direct_, z, w));
-  check(STMatMatSolve(st_, z, w));
+void ShiftInvert::apply(const Columns& b, const Columns& x) {
+  {
+    const petsc::WorkScope scope(petsc::WorkPhase::kSolve);
+    const Timer timer(seconds_);
+    const bool is_in_place = b.stride != x.stride;  // the factor takes one stride
+    for (int j = 0; is_in_place && j < x.count; ++j) std::copy_n(b.column(j), x.rows, x.column(j));
+    factor_.solve(is_in_place ? x.values : b.values, x.values, x.stride, x.count);
+  }
+  solves_ += x.count;
+  if (after_solve_) after_solve_();
 }
 
 }  // namespace carillon::eigen

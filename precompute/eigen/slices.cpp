@@ -1,8 +1,8 @@
-// Method:     The count of eigenvalues grows about as a power of frequency. Between two counts that were taken it is interpolated in
-//             logarithms; below the first one that counts anything, the power of the next interval, or the usual one, is taken.
-// Source:     Grimes, Lewis, Simon, A shifted block Lanczos algorithm, SIAM J. Matrix Anal. Appl. 15(1), 1994, section 4 (shifts by
-//             counts). Courant, Hilbert, Methods of mathematical physics I, 1953, section VI.4: powers of 1 (bending plates) to 3 (solids).
-// Deviations: a slice ends where it was predicted to, not where its pairs stop to converge.
+// Method: The eigenvalue count grows about as a power of frequency. Between two known counts it is interpolated logarithmically; below the
+// first nonzero count, the power of the next interval or a default is used. A slice ends where predicted, not where its pairs stop
+// converging.
+// Source: Grimes, Lewis, Simon, A shifted block Lanczos algorithm, SIAM J. Matrix Anal. Appl. 15(1), 1994, section 4 (shifts by counts).
+// Courant, Hilbert, Methods of mathematical physics I, 1953, section VI.4: powers of 1 (bending plates) to 3 (solids).
 #include "precompute/eigen/slices.hpp"
 
 #include <algorithm>
@@ -13,10 +13,10 @@
 namespace carillon::eigen {
 namespace {
 
-constexpr double kDefaultPower = 0.8;  // of lambda, where nothing better is known: between plates and solids
-constexpr double kNearEnd = 0.05;      // A guess stays this far from the ends of the interval it falls into, as a part of it in frequency.
-constexpr double kNarrow = 1e-4;       // of lambda: the width of what is not cut
-constexpr double kLopsided = 2;        // A shift is at most this much nearer to one end of its slice than to the other.
+constexpr double kDefaultPower = 0.8;  // of lambda, without known counts: between plates and solids
+constexpr double kNearEnd = 0.05;  // Minimum distance of a guess from the ends of its interval, as a fraction of the interval in frequency.
+constexpr double kNarrow = 1e-4;   // relative to lambda: slices narrower than this are not cut
+constexpr double kLopsided = 2;    // Maximum ratio of the distances from a shift to the ends of its slice.
 
 double calc_power(const std::pair<const double, std::int64_t>& a, const std::pair<const double, std::int64_t>& b) {
   const double power = std::log(static_cast<double>(b.second) / static_cast<double>(a.second)) / std::log(b.first / a.first);
@@ -70,14 +70,14 @@ Sweep::Sweep(const Slice& band, std::int64_t max, CountBelow count_below)
 bool Sweep::is_last() const { return rest_.count() <= max_ || rest_.high - rest_.low < kNarrow * rest_.high; }
 
 Sweep::Part Sweep::take() {
-  constexpr int kTrials = 3;  // by what the counts predict, then by halves
+  constexpr int kTrials = 3;  // by prediction, then by bisection
   const double parts = std::ceil(static_cast<double>(rest_.count()) / static_cast<double>(max_));
   const double share = static_cast<double>(rest_.count()) / parts;
   const auto below_low = static_cast<double>(rest_.below_low);
   Part part{rest_.low, rest_.below_low, rest_};
-  double few = rest_.low;    // too few of the slice's eigenvalues lie below it,
-  double many = rest_.high;  // and too many below this
-  double under = 0;          // the shift
+  double few = rest_.low;    // lower bound of the shift: too few eigenvalues below it
+  double many = rest_.high;  // upper bound of the shift: too many eigenvalues below it
+  double under = 0;          // eigenvalues between the start of the slice and the shift
   bool is_cluster = false;
   for (int trial = 0;; ++trial) {
     const double predicted = std::midpoint(rest_.low, counts_.find_lambda(below_low + share, kNearEnd));
@@ -90,7 +90,8 @@ Sweep::Part Sweep::take() {
     if (is_cluster || (under >= 0.2 * share && under <= static_cast<double>(max_))) break;
     (under < share ? few : many) = part.sigma;
     is_cluster = many - few < kNarrow * many;
-    if (is_cluster && (part.sigma == many || many == rest_.high)) break;  // Else once more, above it: all of it is below the shift then.
+    if (is_cluster && (part.sigma == many || many == rest_.high))
+      break;  // Otherwise count once more above the cluster, so that all of it is below the shift.
   }
   const double reach = part.sigma - rest_.low;
   const double wanted = std::max(share, 1.25 * under);

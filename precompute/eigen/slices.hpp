@@ -1,4 +1,4 @@
-// Intervals of lambda with the number of eigenvalues in them, and how a band is gone through.
+// Intervals of lambda with their eigenvalue counts, and the sweep of a band.
 #pragma once
 
 #include <cstdint>
@@ -7,7 +7,7 @@
 
 namespace carillon::eigen {
 
-/// An interval of lambda and how many eigenvalues lie below its ends.
+/// An interval of lambda and the number of eigenvalues below each end.
 struct Slice {
   double low = 0;
   std::int64_t below_low = 0;
@@ -20,13 +20,13 @@ struct Slice {
 /// Number of eigenvalues below lambda. Costs a factorisation.
 using CountBelow = std::function<std::int64_t(double lambda)>;
 
-/// What is known of the number of eigenvalues below lambda, and what it says in between.
+/// Known numbers of eigenvalues below lambda, with interpolation.
 class Counts {
  public:
   explicit Counts(const Slice& band);
 
   void add(double lambda, std::int64_t below);
-  /// Where about `below` eigenvalues lie below; within the interval of known counts around it, `margin` of it (in frequency) from its ends.
+  /// Lambda with about `below` eigenvalues below it; at least `margin` of the surrounding known interval (in frequency) away from its ends.
   double find_lambda(double below, double margin) const;
 
  private:
@@ -34,18 +34,18 @@ class Counts {
   std::map<double, std::int64_t> known_;  // relative to below_low_
 };
 
-/// Lowers the upper end until the slice holds `wanted` eigenvalues and few more; the slice itself when it holds no more than that.
+/// Lowers the upper end until the slice holds slightly more than `wanted` eigenvalues; unchanged if it holds no more.
 Slice cut_to_lowest(const Slice& band, std::int64_t wanted, const CountBelow& count_below);
 
-/// Goes up a band in slices of at most about `max` eigenvalues. The only count that a slice costs is the one at the shift inside it, where
-/// K - sigma M is factorised anyway; what lies above the shift shows at the next one.
+/// Splits a band into slices of at most about `max` eigenvalues, upwards. A slice costs only the count at its shift, where K - sigma M is
+/// factorised anyway; the modes above the shift are verified at the next shift.
 class Sweep {
  public:
   Sweep(const Slice& band, std::int64_t max, CountBelow count_below);
 
-  /// What is left to be solved. Its count is right when all below it is found.
+  /// Unsolved rest. Its count is right once all modes below it are found.
   const Slice& get_rest() const { return rest_; }
-  /// The rest is few enough, or a cluster too narrow to cut: one more slice, with an exact count.
+  /// The rest is small enough, or a cluster too narrow to cut: one more slice, with an exact count.
   bool is_last() const;
 
   struct Part {
@@ -53,9 +53,9 @@ class Sweep {
     std::int64_t below_sigma = 0;
     Slice slice;  // below_high is a guess
   };
-  /// The next slice about its shift; the last count was taken there. Only while it is not the last.
+  /// Next slice and its shift, where the last count was taken. Requires !is_last().
   Part take();
-  /// All below lambda is solved: `below` eigenvalues.
+  /// All `below` eigenvalues below lambda are found.
   void advance(double lambda, std::int64_t below);
 
  private:

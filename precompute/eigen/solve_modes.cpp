@@ -1,10 +1,9 @@
-// Method:     1. The rigid modes are built in closed form and deflated. 2. The inertia of K - lambda M at both ends of the band says how
-//             many modes it holds (band.cpp). 3. They are searched slice by slice (search.cpp). 4. Every count, those at the shifts too,
-//             must agree with the modes found below it (proof.cpp). 5. Modes are refined, clusters get a canonical basis, residuals and
-//             orthonormality are measured from K and M (finish.cpp).
-// Source:     Grimes, Lewis, Simon, A shifted block Lanczos algorithm, SIAM J. Matrix Anal. Appl. 15(1), 1994 (counts and slices);
-//             Parlett, The symmetric eigenvalue problem, 1998, section 3.3 (inertia).
-// Deviations: small problems are solved densely.
+// Method: 1. The rigid modes are built in closed form and deflated. 2. The inertia of K - lambda M at both ends of the band gives the
+// number of modes (band.cpp). 3. These are searched slice by slice (search.cpp). 4. Every count, including those at the shifts, must agree
+// with the modes found below it (proof.cpp). 5. Modes are refined, clusters get a canonical basis, residuals and orthonormality are
+// measured from K and M (finish.cpp). Small problems are solved densely.
+// Source: Grimes, Lewis, Simon, A shifted block Lanczos algorithm, SIAM J. Matrix Anal. Appl. 15(1), 1994 (counts and slices); Parlett, The
+// symmetric eigenvalue problem, 1998, section 3.3 (inertia).
 #include "precompute/eigen/solve_modes.hpp"
 
 #include <fmt/core.h>
@@ -21,9 +20,9 @@
 #include "precompute/eigen/dense_modes.hpp"
 #include "precompute/eigen/finish.hpp"
 #include "precompute/eigen/memory.hpp"
+#include "precompute/eigen/predict_cost.hpp"
 #include "precompute/eigen/proof.hpp"
 #include "precompute/eigen/search.hpp"
-#include "precompute/eigen/solve_estimate.hpp"
 #include "precompute/eigen/timer.hpp"
 #include "precompute/la/local_columns.hpp"
 #include "precompute/petsc/session.hpp"
@@ -34,12 +33,13 @@ namespace {
 
 using petsc::check;
 
-constexpr double kDenseMechanismTolerance = 1e3;  // Of BandProblem::rounding(): eigenvalues below are zero as far as LAPACK can resolve.
+constexpr double kDenseMechanismTolerance =
+    1e3;  // Factor on BandProblem::rounding(): smaller eigenvalues are zero within the accuracy of LAPACK.
 
-// Sets lambda and band_count; returns the order of the modes wanted.
+// Sets lambda and band_count; returns the order of the wanted modes.
 WantedModes take_wanted(const BandProblem& body, const BandLimits& limits, const std::vector<double>& lambda, Modes& modes) {
   WantedModes wanted = select_wanted(lambda, limits, body.options.max_modes);
-  // The counts were taken a little outside the band.
+  // The counts were taken slightly outside the band.
   if (!body.options.max_modes || wanted.within < std::min(modes.band_count, *body.options.max_modes)) modes.band_count = wanted.within;
   for (const std::size_t i : wanted.order) modes.lambda.push_back(lambda[i]);
   return wanted;
@@ -60,7 +60,7 @@ petsc::MatHandle copy_columns(const BandProblem& body, Mat vectors, const std::v
   return shapes;
 }
 
-// Counts a little outside the band, and short of the next mode there: all eigenvalues are known.
+// Counts slightly outside the band, but not beyond the next mode: all eigenvalues are known.
 void prove_dense(const BandProblem& body, const BandLimits& limits, const std::vector<double>& lambda, Modes& modes) {
   const auto count_under = [&](double x) -> std::int64_t { return std::lower_bound(lambda.begin(), lambda.end(), x) - lambda.begin(); };
   double low = limits.low * (1 - kEdgeNudge);
@@ -78,7 +78,7 @@ void prove_dense(const BandProblem& body, const BandLimits& limits, const std::v
   for (const double end : {low, high}) proof.counts.push_back({body.to_hz(end), count_under(end), find_margin(lambda, end)});
 }
 
-// Returns lambda of the modes that are not taken.
+// Returns lambda of the modes not wanted.
 std::vector<double> solve_dense_band(const BandProblem& body, const BandLimits& limits, const ProgressReport& report, Modes& modes) {
   check_memory(body.comm, calc_dense_bytes(body.n, body.comm.is_root()), body.options.memory_limit_bytes, "The dense solve");
   DensePairs pairs;
@@ -96,12 +96,12 @@ std::vector<double> solve_dense_band(const BandProblem& body, const BandLimits& 
   return std::move(wanted.others);
 }
 
-// The counts that the modes found have met.
+// Records the counts verified by the modes found.
 void describe_proof(const BandProblem& body, const Search& search, const BandCounts& band, const std::vector<double>& lambda,
                     Modes& modes) {
   Proof& proof = modes.proof;
   std::vector<Inertia> counts = sort_counts(search.counts());
-  // Where the shift had to go up for rounding, and nothing but the rigid modes lies below it, nothing else lies below the band either.
+  // If rounding moved the shift up, and only the rigid modes are below it, nothing else is below the band either.
   const double asked = body.asked.low * (1 - 2 * kEdgeNudge);
   if (counts.front().below == modes.rigid_count) counts.front().lambda = std::min(counts.front().lambda, asked);
   for (const Inertia& count : counts) proof.counts.push_back({body.to_hz(count.lambda), count.below, find_margin(lambda, count.lambda)});
@@ -111,14 +111,14 @@ void describe_proof(const BandProblem& body, const Search& search, const BandCou
                              band.is_low_derived ? "; below the band lies what the first shift counts less the modes found up to it" : "");
 }
 
-// Whether so many of the lowest modes are wanted that LAPACK finds them sooner.
+// True if so many of the lowest modes are wanted that LAPACK is faster.
 bool is_mostly_wanted(const BandProblem& body, const BandCounts& counts) {
   const Slice& band = counts.band;
   const std::int64_t last = std::min(band.below_high, band.below_low + body.options.max_modes.value_or(band.count()));
   return body.n <= kDenseRowsFull && static_cast<double>(last) > kDenseShare * body.n && is_dense_exact(body, counts.limits);
 }
 
-/// Keeps what has been found out of the band so far, for messages and for the next stage.
+/// Findings about the band so far, for messages and for the next stage.
 class Solve {
  public:
   explicit Solve(const BandProblem& body, Modes& modes) : limits(body.asked), body_(body), modes_(modes), report_{body, modes.factor} {}
@@ -136,7 +136,7 @@ class Solve {
     finish_modes(body_, search_ ? &search_->counter() : nullptr, others_, modes_);
   }
 
-  BandLimits limits;  // of the band, as it is counted
+  BandLimits limits;  // of the band, as counted
 
  private:
   void solve_sparse_band();
@@ -145,7 +145,7 @@ class Solve {
   Modes& modes_;
   ProgressReport report_;
   std::optional<Search> search_;
-  std::vector<double> others_;  // modes found and not taken: outside the band, or beyond max_modes
+  std::vector<double> others_;  // modes found but not wanted: outside the band, or beyond max_modes
 };
 
 void Solve::solve_sparse_band() {

@@ -1,11 +1,11 @@
-// Seconds of the solver's stages.
+// Seconds of the solver stages.
 #pragma once
 
 #include <mpi.h>
 
 namespace carillon::eigen {
 
-/// Adds the time of its life to a sum.
+/// Adds its lifetime to a sum.
 class Timer {
  public:
   explicit Timer(double& sum_s) : sum_s_(sum_s), start_s_(MPI_Wtime()) {}

@@ -66,14 +66,9 @@ void set_stiffness(const Products& products, const Solid& solid, double lambda, 
 
 /// Gradients of the barycentric coordinates and the volume of a straight tetrahedron.
 double calc_linear(std::span<const Vec3> x, std::array<Vec3, 4>& b) {
-  std::array<Vec3, 3> e;
-  for (int i = 0; i < 3; ++i)
-    for (int k = 0; k < 3; ++k) e[i][k] = x[i + 1][k] - x[0][k];
-  const auto cross = [](const Vec3& p, const Vec3& q) {
-    return Vec3{p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]};
-  };
+  const std::array<Vec3, 3> e{x[1] - x[0], x[2] - x[0], x[3] - x[0]};
   const std::array<Vec3, 3> area{cross(e[1], e[2]), cross(e[2], e[0]), cross(e[0], e[1])};
-  const double determinant = e[0][0] * area[0][0] + e[0][1] * area[0][1] + e[0][2] * area[0][2];
+  const double determinant = dot(e[0], area[0]);
   for (int k = 0; k < 3; ++k) {
     for (int i = 0; i < 3; ++i) b[i + 1][k] = area[i][k] / determinant;
     b[0][k] = -(b[1][k] + b[2][k] + b[3][k]);

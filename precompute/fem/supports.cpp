@@ -29,8 +29,6 @@ constexpr PetscInt kBlock = 16;             // modes at a time
 constexpr std::size_t kMaxSupports = 1000;  // more patches than this are one for each entry
 constexpr double kOpenShare = 0.05;         // of the area: a patch whose faces sum up to less is closed and has no normal
 
-double calc_norm(const Vec3& v) { return std::hypot(v[0], v[1], v[2]); }
-
 /// A fixed node that a rank's elements touch, as rank 0 gets it. `root`: a node of the mesh that it is joined with.
 struct NodeRecord {
   std::int32_t node, entry, root, pad;
@@ -195,7 +193,7 @@ void measure(const std::vector<FaceRecord>& faces, Layout& layout) {
       b[k] = x[2][k] - x[0][k];
     }
     const Vec3 n = cross(a, b);
-    const double area = 0.5 * calc_norm(n);
+    const double area = 0.5 * calc_length(n);
     layout.list[s].area_m2 += area;
     for (int k = 0; k < 3; ++k) {
       normal[s][k] += 0.5 * n[k];
@@ -214,7 +212,7 @@ void measure(const std::vector<FaceRecord>& faces, Layout& layout) {
     for (int r = 0; r < 3; ++r)
       for (int c = 0; c < 3; ++c) second[s][3 * r + c] = second[s][3 * r + c] / area - first[s][r] * first[s][c] / (area * area);
     support.thickness_m = std::sqrt(std::max(0.0, 12.0 * calc_middle_eigenvalue(second[s])));
-    const double size = calc_norm(normal[s]);
+    const double size = calc_length(normal[s]);
     if (size > kOpenShare * area)
       for (int k = 0; k < 3; ++k) support.normal[k] = normal[s][k] / size;
   }
@@ -262,7 +260,7 @@ class Nearby {
         for (int k = -1; k <= 1; ++k) {
           const auto cell = cells_.find(find_cell(x, {i, j, k}));
           if (cell == cells_.end()) continue;
-          for (const Vec3& y : cell->second) nearest = std::min(nearest, std::hypot(x[0] - y[0], x[1] - y[1], x[2] - y[2]));
+          for (const Vec3& y : cell->second) nearest = std::min(nearest, calc_length(x - y));
         }
     return nearest <= width_m_ ? nearest : 1e300;
   }

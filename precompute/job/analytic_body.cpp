@@ -237,7 +237,7 @@ base::Json write_kind(const BeamBody& body) {
 
 base::Json write_kind(const MembraneBody& body) {
   base::Json json = kMembrane.write(body, find_sides(body).write(body));
-  for (const auto& corner : body.corners_m) json.member("corners_m").add(base::Json::array(corner));
+  for (const auto& corner : body.corners_m) json["corners_m"].add(base::Json::array(corner));
   return json;
 }
 

@@ -22,7 +22,7 @@ enum class Mass { consistent, lumped };
 /// Eigensolver. automatic: dense LAPACK for small problems, else the fastest for the band.
 enum class Method { automatic, block_lanczos, krylov_schur, dense };
 /// Sparse factorisation of shift-invert. automatic: the own L D L^T, and MUMPS if that is unstable.
-enum class Factorisation { automatic, ldlt, mumps, cholmod };
+enum class Factorisation { automatic, ldlt, mumps };
 
 /// Radiation of the modes. none: gains from the motion of the surface alone; bem: boundary elements; automatic: boundary elements for
 /// bodies that need them.

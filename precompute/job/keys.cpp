@@ -50,7 +50,7 @@ const base::Keys<JobSpec> kSolverKeys{
     {"tolerance", &JobSpec::tolerance, Limits{1e-14, 1e-4, true}, "relative residual of every mode"},
     {"method", &JobSpec::method, kMethodNames,
      "`dense` is LAPACK, up to 8,000 unknowns; automatic up to 300, and to 3,000 if over 40 % of all modes are wanted"},
-    {"factorisation", &JobSpec::factorisation, kFactorisationNames, "`cholmod` on one rank only"}};
+    {"factorisation", &JobSpec::factorisation, kFactorisationNames, "of shift-invert"}};
 const base::Keys<Air> kAirKeys{
     {"method", &Air::method, kAirNames,
      "in an object `\"bem\"` by default. `none`: no solve. `bem`: boundary elements. `auto`: boundary elements if the roundness of the "

@@ -1,10 +1,10 @@
 // Writes a job with all values used.
-#include <json/json.h>
 
-#include <sstream>
+#include <optional>
 
 #include "precompute/job/keys.hpp"
 #include "precompute/job/read_body.hpp"
+#include "runtime/base/json.hpp"
 
 namespace carillon::job {
 namespace {
@@ -13,41 +13,20 @@ using material::CaugheyTerm, material::DampingLaw, material::LossRow, material::
 
 namespace fs = std::filesystem;
 
-Json::Value to_json(const std::array<double, 3>& v) {
-  Json::Value list(Json::arrayValue);
+base::Json to_json(const std::array<double, 3>& v) {
+  base::Json list = base::Json::array();
   for (const double x : v) list.append(x);
   return list;
 }
 
-Json::Value to_json(const base::KeyValue& value) {
-  return std::visit(
-      [](const auto& held) {
-        using Held = std::decay_t<decltype(held)>;
-        if constexpr (std::is_same_v<Held, std::monostate>)
-          return Json::Value();
-        else if constexpr (std::is_same_v<Held, long long>)
-          return Json::Value(Json::Int64(held));
-        else if constexpr (std::is_same_v<Held, std::array<double, 3>>)
-          return to_json(held);
-        else
-          return Json::Value(held);
-      },
-      value);
-}
-
-template <class T>
-void write_keys(const base::Keys<T>& keys, const T& source, Json::Value& root) {
-  for (const auto& [name, value] : keys.get(source)) root[name] = to_json(value);
-}
-
-/// `path` relative to `folder` when both share a root below "/", else absolute.
+/// `path` relative to `folder` if both share a root below "/", else absolute.
 std::string relative_to(const fs::path& path, const fs::path& folder) {
   const fs::path relative = path.lexically_relative(folder);
   return relative.empty() ? path.string() : relative.string();
 }
 
-Json::Value write_damping(const Material& material) {
-  Json::Value damping;
+base::Json write_damping(const Material& material) {
+  base::Json damping;
   switch (material.law) {
     case DampingLaw::rayleigh:
       damping["rayleigh"]["alpha1_s"] = material.alpha1_s;
@@ -64,7 +43,7 @@ Json::Value write_damping(const Material& material) {
       break;
     case DampingLaw::loss_table:
       for (const LossRow& row : material.loss_table) {
-        Json::Value& pair = damping["loss_table"].append(Json::arrayValue);
+        base::Json& pair = damping["loss_table"].append(base::Json::array());
         pair.append(row.freq_hz);
         pair.append(row.loss_factor);
       }
@@ -73,8 +52,8 @@ Json::Value write_damping(const Material& material) {
   return damping;
 }
 
-Json::Value write_material(const Material& material) {
-  Json::Value root;
+base::Json write_material(const Material& material) {
+  base::Json root;
   if (!material.name.empty()) root["name"] = material.name;
   if (material.orthotropic) {
     const Orthotropic& o = *material.orthotropic;
@@ -92,35 +71,30 @@ Json::Value write_material(const Material& material) {
   return root;
 }
 
-Json::Value write_body(const Body& body, const fs::path& base) {
-  Json::Value root;
+base::Json write_body(const Body& body, const fs::path& base) {
+  base::Json root;
   if (!body.shape.empty()) {
     root["shape"] = body.shape;
     for (const auto& [dimension, value] : body.dimensions) root[find_dimension_key(dimension)] = value;
   } else {
     root["surface"] = relative_to(body.surface, base);
-    write_keys(kSurfaceKeys, body, root);
-    if (!body.facets) root.removeMember("facets");
+    root = kSurfaceKeys.write(body, root);
+    if (!body.facets) root.erase("facets");
   }
-  if (body.nodes) root["nodes"] = Json::Int64(*body.nodes);
-  write_keys(kMeshSizeKeys, body, root);
-  return root;
+  if (body.nodes) root["nodes"] = *body.nodes;
+  return kMeshSizeKeys.write(body, root);
 }
 
 /// Adds the members of a JSON object to `entry`.
-void add_members(const base::Json& members, Json::Value& entry) {
-  Json::Value added;
-  std::istringstream stream(members.line());
-  std::string errors;
-  if (!Json::parseFromStream(Json::CharReaderBuilder(), stream, &added, &errors)) throw SolveError("internal: not JSON: " + errors);
-  for (const std::string& key : added.getMemberNames()) entry[key] = added[key];
+void add_members(const base::Json& members, base::Json& entry) {
+  const base::Json added = base::Json::parse(members.line()).value();  // numbers as they are read from a file
+  for (const std::string& key : added.keys()) entry[key] = added[key];
 }
 
-Json::Value write_fixed(const std::vector<Fixed>& list) {
-  Json::Value root(Json::arrayValue);
+base::Json write_fixed(const std::vector<Fixed>& list) {
+  base::Json root = base::Json::array();
   for (const Fixed& fixed : list) {
-    Json::Value& entry = root.append(Json::objectValue);
-    write_keys(kFixedKeys, fixed, entry);
+    base::Json& entry = root.append(kFixedKeys.write(fixed));
     if (fixed.box_m) {
       entry["box_m"]["min"] = to_json((*fixed.box_m)[0]);
       entry["box_m"]["max"] = to_json((*fixed.box_m)[1]);
@@ -131,9 +105,8 @@ Json::Value write_fixed(const std::vector<Fixed>& list) {
   return root.size() == 1 ? root[0] : root;
 }
 
-Json::Value write_air(const Air& air) {
-  Json::Value root;
-  write_keys(kAirKeys, air, root);
+base::Json write_air(const Air& air) {
+  base::Json root = kAirKeys.write(air);
   if (air.half_space) {
     root["half_space"]["point_m"] = to_json(air.half_space->point_m);
     root["half_space"]["normal"] = to_json(air.half_space->normal);
@@ -141,22 +114,21 @@ Json::Value write_air(const Air& air) {
   return root;
 }
 
-Json::Value write_nonlinear(const Nonlinear& nonlinear, bool has_energy_error) {
-  Json::Value root;
-  write_keys(kNonlinearKeys, nonlinear, root);
-  if (!nonlinear.is_stretch) root.removeMember("form");
-  if (!has_energy_error) root.removeMember("energy_error");
+base::Json write_nonlinear(const Nonlinear& nonlinear, bool has_energy_error) {
+  base::Json root = kNonlinearKeys.write(nonlinear);
+  if (!nonlinear.is_stretch) root.erase("form");
+  if (!has_energy_error) root.erase("energy_error");
   return root;
 }
 
 /// Keys of bodies of finite elements.
-void write_solve(const JobSpec& job, Json::Value& root) {
+void write_solve(const JobSpec& job, base::Json& root) {
   root["mass"] = to_text(job.mass);
   if (!job.fixed.empty()) root["fixed"] = write_fixed(job.fixed);
-  write_keys(kSolverKeys, job, root["solver"]);
+  root["solver"] = kSolverKeys.write(job);
   if (job.accuracy_cents) {
     root["accuracy_cents"] = *job.accuracy_cents;
-    root["solver"].removeMember("tolerance");
+    root["solver"].erase("tolerance");
   } else {
     root["element"] = to_text(job.element);
   }
@@ -167,7 +139,7 @@ void write_solve(const JobSpec& job, Json::Value& root) {
 
 std::string resolved_json(const JobSpec& job, const fs::path& folder, const std::string& run_json) {
   const fs::path base = fs::absolute(folder).lexically_normal();
-  Json::Value root;
+  base::Json root;
   if (job.analytic)
     add_members(write_analytic(*job.analytic, base), root["body"]);
   else if (job.body)
@@ -184,16 +156,11 @@ std::string resolved_json(const JobSpec& job, const fs::path& folder, const std:
   if (!job.analytic) write_solve(job, root);
   if (job.nonlinear) root["nonlinear"] = write_nonlinear(*job.nonlinear, !job.analytic && !job.nonlinear->is_stretch);
   if (!run_json.empty()) {
-    std::istringstream stream(run_json);
-    Json::CharReaderBuilder reader;
-    std::string errors;
-    if (!Json::parseFromStream(reader, stream, &root["run"], &errors))
-      throw SolveError("internal: the record of the run is not JSON: " + errors);
+    std::optional<base::Json> record = base::Json::parse(run_json);
+    if (!record) throw SolveError("internal: the record of the run is not JSON");
+    root["run"] = std::move(*record);
   }
-  Json::StreamWriterBuilder writer;
-  writer["indentation"] = "  ";
-  writer["precision"] = 17;
-  return Json::writeString(writer, root) + "\n";
+  return root.sorted_text({.indentation = "  ", .breaks_arrays = true}) + "\n";
 }
 
 }  // namespace carillon::job

@@ -1,10 +1,8 @@
-// One set of loops for narrow blocks, with the same packing and tiles in each; longer than most files.
-// Method:     The narrow block is packed, a panel of rows at a time that stays in the second-level cache; the wide block streams past it, a
-//             few columns at a time, in strips that stay in the first level and are fetched one strip ahead. Sums and
-//             coefficients live in registers (6 x 4 tiles).
-// Source:     Goto, van de Geijn, Anatomy of high-performance matrix multiplication, ACM TOMS 34(3), 2008 (panels, register tiles).
-// Deviations: the wide block is not packed: it is used once, and packing it costs BLAS half its speed for 16 columns (figures:
-//             docs/decisions/block-lanczos.md). Processors without AVX-512 use BLAS on the same panels.
+// Method: The narrow block is packed in panels of rows that stay in the second-level cache; the wide block is streamed, a few columns at a
+// time, in strips that stay in the first-level cache and are prefetched one strip ahead. Sums and coefficients are in registers (6 x 4
+// tiles). The wide block is not packed: it is used once, and packing halves the speed of BLAS for 16 columns
+// (docs/decisions/block-lanczos.md). Processors without AVX-512 use BLAS on the same panels.
+// Source: Goto, van de Geijn, Anatomy of high-performance matrix multiplication, ACM TOMS 34(3), 2008 (panels, register tiles).
 #include "precompute/la/block_kernels.hpp"
 
 #include <algorithm>
@@ -22,15 +20,15 @@
 namespace carillon::la {
 namespace {
 
-constexpr std::ptrdiff_t kRowsTransposed = 4096;  // of a panel for A^T B: 16 columns of B are half a megabyte
-constexpr std::ptrdiff_t kStripTransposed = 128;  // of a strip of it
-constexpr std::ptrdiff_t kRowsProduct = 2048;     // of a panel for B - A S, which is written too
-constexpr std::ptrdiff_t kStripProduct = 128;     // of a strip of it
-constexpr std::ptrdiff_t kRowsFused = 2048;       // of a panel that more than one product uses
-constexpr std::ptrdiff_t kRowsCombined = 256;     // of a panel for A S
-constexpr int kNarrow = 32;                       // columns of the narrow block at most: dgemm is as fast for wider ones
-constexpr int kTile = 4;                          // of them in registers
-constexpr int kWide = 6;                          // columns of the wide block with them
+constexpr std::ptrdiff_t kRowsTransposed = 4096;  // rows of a panel for A^T B: 16 columns of B are half a megabyte
+constexpr std::ptrdiff_t kStripTransposed = 128;  // rows of a strip of it
+constexpr std::ptrdiff_t kRowsProduct = 2048;     // rows of a panel for B - A S, which is also written
+constexpr std::ptrdiff_t kStripProduct = 128;     // rows of a strip of it
+constexpr std::ptrdiff_t kRowsFused = 2048;       // rows of a panel used by several products
+constexpr std::ptrdiff_t kRowsCombined = 256;     // rows of a panel for A S
+constexpr int kNarrow = 32;                       // maximum columns of the narrow block: dgemm is as fast for wider ones
+constexpr int kTile = 4;                          // columns of the narrow block in registers
+constexpr int kWide = 6;                          // columns of the wide block in registers
 
 int round_up(int n, int to) { return (n + to - 1) / to * to; }
 
@@ -39,35 +37,35 @@ int round_up(int n, int to) { return (n + to - 1) / to * to; }
 
 bool has_avx512() { return base::has_instructions(base::Instructions::kAvx512); }
 
-// Loops over what shall stay in registers are unrolled, all of them: one that is not sends the others' values through memory.
+// All loops over register values are unrolled: a rolled one would spill the others to memory.
 
-// What a tile prefetches while it works: some columns of the wide block, one strip ahead to the first-level cache and a few strips ahead to
-// the second. The first alone has too few open requests to keep the memory busy.
+// Prefetches of a tile: columns of the wide block, one strip ahead to the first-level cache and a few strips ahead to the second. The first
+// alone has too few open requests to saturate memory.
 struct Prefetch {
   const double* near = nullptr;
   const double* far = nullptr;
   int columns = 0;
 };
 
-/// The strips of a panel in the order of their use: down some columns, then down the next ones. Where a tile stands costs no division.
+/// The strips of a panel in the order of use: down a group of columns, then the next group. Avoids divisions per tile.
 class Strips {
  public:
-  /// first, rows: of the panel; strip: rows of a strip; tiles: that work on each.
+  /// first, rows: of the panel; strip: rows of a strip; tiles: number of tiles per strip.
   Strips(const Columns& a, std::ptrdiff_t first, std::ptrdiff_t rows, std::ptrdiff_t strip, int tiles)
       : a_(a), first_(first), rows_(rows), strip_(strip), height_((rows + strip - 1) / strip * strip), tiles_(tiles) {}
 
-  /// Columns [i, i + wide) come next.
+  /// Starts columns [i, i + wide).
   void begin_columns(int i, int wide) {
     column_ = i;
     for (int j = 0; j <= tiles_; ++j) share_[j] = j * wide / tiles_;
   }
-  /// Row r of the panel comes next.
+  /// Starts row r of the panel.
   void begin_strip(std::ptrdiff_t r) {
     constexpr int kFar = 3;
     near_ = find(r + strip_);
     far_ = find(r + kFar * strip_);
   }
-  /// The share of tile j.
+  /// Prefetch share of tile j.
   Prefetch find_prefetch(int j) const {
     const std::ptrdiff_t offset = share_[j] * a_.stride;
     return {near_ + offset, far_ + offset, share_[j + 1] - share_[j]};
@@ -160,7 +158,7 @@ CARILLON_AVX512 void subtract_tile(const double* a, std::ptrdiff_t lda, const do
   }
 }
 
-// Of one sum, in a fixed order.
+// Sums the lanes of a sum in fixed order.
 CARILLON_AVX512 double add_lanes(const double* lane) {
   const __m256d half = _mm256_add_pd(_mm256_load_pd(lane), _mm256_load_pd(lane + 4));
   const __m128d quarter = _mm_add_pd(_mm_unpacklo_pd(_mm256_castpd256_pd128(half), _mm256_extractf128_pd(half, 1)),
@@ -181,7 +179,7 @@ constexpr TransposedTile kTransposedTile[] = {nullptr,
 constexpr SubtractTile kSubtractTile[] = {nullptr,          subtract_tile<1>, subtract_tile<2>, subtract_tile<3>,
                                           subtract_tile<4>, subtract_tile<5>, subtract_tile<6>};
 
-// Panels of columns, on cache lines, zero beyond the rows and columns that are filled.
+// Panels of columns, aligned to cache lines, padded by zeros.
 class PackedPanel {
  public:
   PackedPanel(std::ptrdiff_t rows, int columns)
@@ -199,7 +197,7 @@ class PackedPanel {
       std::fill(to + rows, to + rounded, 0.0);
     }
   }
-  /// Row i times d[i].
+  /// Scales row i by d[i].
   void scale(const double* d, std::ptrdiff_t rows, int columns) {
     for (int j = 0; j < columns; ++j) {
       double* column = values_ + j * stride_;
@@ -218,7 +216,7 @@ class PackedPanel {
   double* values_ = nullptr;
 };
 
-/// Adds A^T P to small, P: rows [first, first + rows) of a narrow block, packed.
+/// Adds A^T P to small, P: packed rows [first, first + rows) of a narrow block.
 class TransposedProducts {
  public:
   explicit TransposedProducts(int narrow) : narrow_(narrow), tiles_(round_up(narrow, kTile) / kTile), sums_(kLanes, tiles_) {}
@@ -248,13 +246,13 @@ class TransposedProducts {
   }
 
  private:
-  static constexpr int kLanes = 8 * kWide * kTile;  // of one tile's sums
+  static constexpr int kLanes = 8 * kWide * kTile;  // of the sums of a tile
   int narrow_;
   int tiles_;
   PackedPanel sums_;
 };
 
-/// S of a product, with zero columns up to a whole number of tiles.
+/// S of a product, padded by zero columns to whole tiles.
 class PackedCoefficients {
  public:
   PackedCoefficients(const double* s, int s_stride, int rows, int columns)
@@ -270,7 +268,7 @@ class PackedCoefficients {
   std::vector<double> values_;
 };
 
-// P -= A S, P: rows [first, first + rows) of a block of `narrow` columns, packed.
+// P -= A S, P: packed rows [first, first + rows) of a block of `narrow` columns.
 void subtract_from_panel(const Columns& a, const PackedCoefficients& s, std::ptrdiff_t first, std::ptrdiff_t rows, int narrow,
                          PackedPanel& panel) {
   const int tiles = round_up(narrow, kTile) / kTile;
@@ -425,7 +423,7 @@ void subtract_and_combine_avx512(std::span<const Product>, int, const double*, c
 void combine_columns_avx512(const Columns&, const double*, int) {}
 #endif
 
-// The rows [first, first + rows) of some columns.
+// Rows [first, first + rows) of some columns.
 Columns take_rows(const Columns& from, std::ptrdiff_t first, std::ptrdiff_t rows) {
   return {from.values + first, rows, from.stride, from.count};
 }
@@ -447,7 +445,7 @@ void multiply_transposed(const Columns& a, const Columns& b, double* small, int 
   if (a.count == 0 || b.count == 0) return;
   petsc::add_flops(2.0 * static_cast<double>(a.rows) * a.count * b.count);
   if (b.count <= kNarrow && has_avx512()) return multiply_transposed_avx512(a, b, small, small_stride);
-  if (a.count <= kNarrow && has_avx512()) {  // The transpose of the other way round.
+  if (a.count <= kNarrow && has_avx512()) {  // Transposed product with exchanged operands.
     Matrix turned(b.count, a.count);
     multiply_transposed_avx512(b, a, turned.data(), b.count);
     for (int j = 0; j < b.count; ++j)

@@ -1,4 +1,4 @@
-// Sizes of work arrays decide how LAPACK blocks its loops, and with that the rounding: they are part of the result.
+// Sizes of work arrays determine the blocking of LAPACK, and with it the rounding: they affect results.
 #include "precompute/la/lapack.hpp"
 
 #include <algorithm>
@@ -26,7 +26,7 @@ namespace {
 
 int to_stride(std::ptrdiff_t columns_apart) { return static_cast<int>(std::max<std::ptrdiff_t>(columns_apart, 1)); }
 
-/// Of dsyev and dsygv: tridiagonal form in blocks of up to 64 columns.
+/// Of dsyev and dsygv: tridiagonal reduction in blocks of up to 64 columns.
 int calc_work_size(int n) { return 64 * n + 3 * n; }
 
 }  // namespace

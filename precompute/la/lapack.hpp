@@ -1,5 +1,5 @@
-// BLAS and LAPACK for small dense matrices: lapack.cpp has their prototypes. One more, of dgemm, is in petsc/blas.cpp, which looks it up at
-// run time to make BLAS allocate its memory at the start, and may not include this folder.
+// BLAS and LAPACK for small dense matrices; prototypes are in lapack.cpp. petsc/blas.cpp has one more prototype of dgemm, looked up at run
+// time to make BLAS allocate its memory at the start, because it must not include this folder.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,11 +8,11 @@
 
 namespace carillon::la {
 
-/// Column-major, as BLAS and LAPACK have it.
+/// Column-major, as in BLAS and LAPACK.
 using Matrix = Eigen::MatrixXd;
 using Vector = Eigen::VectorXd;
 
-/// All entries, by column.
+/// All entries, column by column.
 template <typename Derived>
 std::span<double> entries(Eigen::PlainObjectBase<Derived>& values) {
   return {values.data(), static_cast<std::size_t>(values.size())};
@@ -20,25 +20,24 @@ std::span<double> entries(Eigen::PlainObjectBase<Derived>& values) {
 
 enum class Transpose { kNo, kYes };
 
-/// C <- alpha op(A) B + beta C, op(A): (m, k), B: (k, n), C: (m, n), each with the distance of its columns. Nothing is done where m or n
-/// is 0.
+/// C <- alpha op(A) B + beta C, op(A): (m, k), B: (k, n), C: (m, n), each with its leading dimension. No operation if m or n is 0.
 void gemm(Transpose a_transposed, std::ptrdiff_t m, int n, std::ptrdiff_t k, double alpha, const double* a, std::ptrdiff_t lda,
           const double* b, std::ptrdiff_t ldb, double beta, double* c, std::ptrdiff_t ldc);
 
-/// B <- B R^-1 (dtrsm), B: (rows, n), R: (n, n), its upper triangle.
+/// B <- B R^-1 (dtrsm), B: (rows, n), R: (n, n) upper triangular.
 void solve_upper_from_right(std::ptrdiff_t rows, int n, const double* r, std::ptrdiff_t ldr, double* b, std::ptrdiff_t ldb);
 
-/// LAPACK's return values: 0, or what dpotrf, dtrtri, dsyev, dsyevd, dsygv or dsygvd call info.
-/// A = R^T R; R takes the upper triangle of A, the lower one stays (dpotrf).
+/// Return values: info of the LAPACK routine, 0 on success.
+/// A = R^T R; R replaces the upper triangle of A, the lower one is unchanged (dpotrf).
 int factorise_cholesky(Matrix& a);
-/// The upper triangle of R becomes that of its inverse, the lower one stays (dtrtri).
+/// Inverts the upper triangle of R in place, the lower one is unchanged (dtrtri).
 int invert_upper(Matrix& r);
-/// The eigenvectors of a symmetric A, of which the lower triangle is read, take its place; values: (n), ascending. By QR (dsyev).
+/// Eigenpairs of a symmetric A given by its lower triangle; eigenvectors replace A; values: (n), ascending. By QR (dsyev).
 int calc_eigenpairs(Matrix& a, Vector& values);
-/// The same by divide and conquer (dsyevd): faster for some hundred rows, other rounding.
+/// The same by divide and conquer (dsyevd): faster from some hundred rows on, different rounding.
 int calc_eigenpairs_by_division(Matrix& a, Vector& values);
-/// A x = lambda B x, both symmetric, B positive definite, lower triangles; eigenvectors, B-orthonormal, take the place of A, B is
-/// destroyed; values: (n), ascending. By QR (dsygv).
+/// A x = lambda B x, both symmetric, B positive definite, lower triangles; B-orthonormal eigenvectors replace A, B is destroyed; values:
+/// (n), ascending. By QR (dsygv).
 int calc_generalised_eigenpairs(Matrix& a, Matrix& b, Vector& values);
 /// The same by divide and conquer (dsygvd).
 int calc_generalised_eigenpairs_by_division(Matrix& a, Matrix& b, Vector& values);

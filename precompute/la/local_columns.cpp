@@ -20,12 +20,6 @@ LocalColumns::LocalColumns(Mat dense) : mat(dense) {
 
 LocalColumns::~LocalColumns() { (void)MatDenseRestoreArray(mat, &values); }
 
-void mark_changed(Mat dense) {
-  PetscScalar* values = nullptr;
-  check(MatDenseGetArray(dense, &values));
-  check(MatDenseRestoreArray(dense, &values));
-}
-
 void permute_columns(const Columns& columns, const std::vector<std::size_t>& order) {
   std::vector<double> first(columns.rows);
   std::vector<bool> is_done(order.size(), false);

@@ -1,4 +1,4 @@
-// A distributed dense matrix as the columns of this rank's rows.
+// View of the local rows of a distributed dense matrix.
 #pragma once
 
 #include <petscmat.h>
@@ -10,7 +10,7 @@
 
 namespace carillon::la {
 
-/// A dense matrix's own rows, column-major. The matrix must outlive it and belongs to it while it lives.
+/// Local rows of a dense matrix, column-major. The matrix must outlive this object and must not be used otherwise meanwhile.
 struct LocalColumns {
   explicit LocalColumns(Mat dense);
   ~LocalColumns();
@@ -26,10 +26,7 @@ struct LocalColumns {
   PetscInt stride = 0;
 };
 
-/// PETSc takes the values for changed from here on: they were written through pointers of their own. Local.
-void mark_changed(Mat dense);
-
-/// Puts column order[j] at place j, for all j; order: a permutation of the columns. Local.
+/// Moves column order[j] to place j, for all j; order: a permutation of the columns. Local.
 void permute_columns(const Columns& columns, const std::vector<std::size_t>& order);
 
 }  // namespace carillon::la

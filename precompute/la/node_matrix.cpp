@@ -1,10 +1,9 @@
-// Method:     Compressed rows of node blocks; sixteen right-hand sides in row-major order, so that every product with an entry is a vector
-//             operation and a node's values are one stretch of memory.
-//             A matrix of blocks is a stiffness, which answers to differences of displacement alone: y_i = sum_j K_ij (x_j - x_i) + (sum_j
-//             K_ij) x_i, where the last sum is zero but for rounding unless the node has a fixed neighbour. Written so, the rounding of K
-//             and of the product is that of the differences, and motions that are nearly rigid, the low modes of thin bodies, keep digits.
-// Source:     Im, Yelick, Vuduc, Sparsity: optimization framework for sparse matrix kernels, 2004 (register blocks, multiple vectors).
-// Deviations: none.
+// Method: Compressed rows of node blocks; sixteen right-hand sides in row-major order, so that every product with an entry is a vector
+// operation and the values of a node are contiguous. A matrix of blocks is treated as a stiffness, which depends on differences of
+// displacement only: y_i = sum_j K_ij (x_j - x_i) + (sum_j K_ij) x_i, where the last sum is zero up to rounding unless the node has a fixed
+// neighbour. In this form the rounding of K and of the product is relative to the differences, so nearly rigid motions, the low modes of
+// thin bodies, keep their digits.
+// Source: Im, Yelick, Vuduc, Sparsity: optimization framework for sparse matrix kernels, 2004 (register blocks, multiple vectors).
 #include "precompute/la/node_matrix.hpp"
 
 #include <algorithm>
@@ -30,20 +29,20 @@ using Row = NodeMatrix::Row;
 #define CARILLON_CLONES
 #endif
 
-constexpr std::size_t kNodes = 32;  // whose products are put back at a time, while the first-level cache has them
+constexpr std::size_t kNodes = 32;  // unpacked at a time, while their products are in the first-level cache
 
 typedef double Vector __attribute__((vector_size(64), may_alias));
 constexpr int kVectors = kStrip / 8;
 
-constexpr int kAhead = 4;  // blocks, whose rows of x are prefetched: they lie anywhere
+constexpr int kAhead = 4;  // blocks by which rows of x are prefetched, as their addresses are irregular
 
 [[gnu::always_inline]] inline void prefetch_rows(const Row* rows) {
 #pragma GCC unroll 6
   for (int line = 0; line < 3 * kVectors; ++line) __builtin_prefetch(reinterpret_cast<const Vector*>(rows) + line);
 }
 
-// One row of nodes: y (3 x 16) = rest (3 x 3) times its own x (3 x 16) + sum of blocks (3 x 3) times differences from it. kAhead places
-// stand behind the last neighbour. All loops over the sums are unrolled: GCC 12 sends them through memory otherwise.
+// Rows of nodes: y (3 x 16) = rest (3 x 3) times own x (3 x 16) + sum of blocks (3 x 3) times differences from it. The neighbour list is
+// padded by kAhead entries. All loops over the sums are unrolled: GCC 12 spills them to memory otherwise.
 CARILLON_CLONES void multiply_blocks(const std::int64_t* start, const std::int32_t* neighbour, const double* values, const double* rest,
                                      std::size_t nodes, const Row* own_rows, const Row* x, Row* y) {
   auto* out = reinterpret_cast<Vector*>(y);
@@ -95,7 +94,7 @@ CARILLON_CLONES void multiply_scalars(const std::int64_t* start, const std::int3
   }
 }
 
-// Sixteen columns at most.
+// At most sixteen columns.
 void to_rows(const Columns& x, Row* out) {
   constexpr std::ptrdiff_t kRows = 64;
   for (std::ptrdiff_t r = 0; r < x.rows; r += kRows) {
@@ -111,8 +110,8 @@ void to_rows(const Columns& x, Row* out) {
   }
 }
 
-/// The packed columns of a product, 128 bytes for each row of the rank. All matrices share them, and they stay until the process ends:
-/// fresh memory at each product costs as much as the product.
+/// Packed columns of a product, 128 bytes per row of the rank, shared by all matrices and kept until the process ends: fresh memory for
+/// each product costs as much as the product.
 std::vector<Row>& get_strip() {
   static thread_local std::vector<Row> strip;
   return strip;
@@ -138,7 +137,7 @@ class NodeRow {
           blocks_.insert(blocks_.begin() + static_cast<std::ptrdiff_t>(at), Block{other, {}});
         blocks_[at].values[3 * d + column % 3] = factor * value;
       };
-      bool is_own = true;  // columns of other ranks come after those of this one, from the lowest on
+      bool is_own = true;  // columns of other ranks follow the own ones, in ascending order
       rows_.visit(
           3 * node + d, [&](PetscInt column, double value) { add(first_ + column / 3, column, value); },
           [&](PetscInt ghost, double value) {
@@ -151,7 +150,7 @@ class NodeRow {
 
  private:
   const NodeRows& rows_;
-  PetscInt first_;  // own node
+  PetscInt first_;  // first own node
   std::vector<Block> blocks_;
 };
 
@@ -176,14 +175,14 @@ void NodeMatrix::read(Mat matrix, double factor) {
   const PetscInt first_node = rows.first_row() / 3;
   nodes_ = rows.rows() / 3;
   bool only_diagonal = true;
-  bool only_scalars = true;  // then one value per block is kept
+  bool only_scalars = true;  // then one value per block is stored
   std::vector<PetscInt> global;
   start_.reserve(nodes_ + 1);
   start_.push_back(0);
   NodeRow node_row(rows);
   MatInfo info;
   check(MatGetInfo(matrix, MAT_LOCAL, &info));
-  const std::size_t entries = info.nz_used;  // three of a scalar, nine of a block
+  const std::size_t entries = info.nz_used;  // three for a scalar block, nine for a full one
   global.reserve(entries / 3);
   values_.reserve(entries / 3);
   const auto keep_blocks = [&] {
@@ -235,7 +234,7 @@ void NodeMatrix::read(Mat matrix, double factor) {
       neighbour_.push_back(static_cast<std::int32_t>(nodes_) + static_cast<std::int32_t>(at));
     }
   }
-  neighbour_.resize(neighbour_.size() + kAhead, 0);  // see multiply_blocks
+  neighbour_.resize(neighbour_.size() + kAhead, 0);  // padding, see multiply_blocks
   plan_exchange(matrix, ghosts);
 }
 
@@ -274,7 +273,7 @@ void NodeMatrix::plan_exchange(Mat matrix, const std::vector<PetscInt>& ghosts) 
 }
 
 void NodeMatrix::pack(const Columns& x, int first, std::vector<Row>& packed) const {
-  // What is packed is multiplied once.
+  // Each packed strip is multiplied once.
   if (kind_ != Kind::kDiagonal)
     petsc::add_flops((kind_ == Kind::kScalars ? 6.0 : 18.0) * kStrip * static_cast<double>(neighbour_.size() - kAhead));
   packed.resize(3 * (nodes_ + ghosts_));

@@ -12,8 +12,8 @@
 
 namespace carillon::la {
 
-/// K or M by nodes: 3 x 3 blocks, or one number per node pair where every block is a multiple of the identity (M), or a diagonal. Sixteen
-/// columns go at a time, their values at a node side by side; the values that other ranks own are fetched once for all sixteen.
+/// K or M by nodes: 3 x 3 blocks, or one number per node pair if every block is a multiple of the identity (M), or a diagonal. Products use
+/// strips of sixteen columns with the values of a node adjacent; values of other ranks are fetched once per strip.
 class NodeMatrix {
  public:
   static constexpr int kStrip = 16;
@@ -26,27 +26,27 @@ class NodeMatrix {
   /// Copies `factor` times the matrix: AIJ, rows in blocks of three, whole nodes per rank. Collective.
   explicit NodeMatrix(Mat matrix, double factor = 1);
 
-  /// y = A x for all columns; x and y: this rank's rows, must not overlap. Collective.
+  /// y = A x for all columns; x and y: rows of this rank, must not overlap. Collective.
   void multiply(const Columns& x, const Columns& y) const;
 
-  /// Columns first ... first + 15 of x, zeros beyond its last, as rows, with those that other ranks own behind this rank's: what
-  /// multiply_rows takes. Collective.
+  /// Columns first ... first + 15 of x, padded by zeros, row-major, followed by the rows of other ranks: input of multiply_rows.
+  /// Collective.
   void pack(const Columns& x, int first, std::vector<Row>& packed) const;
 
-  /// y (3 nodes): the rows of A x of `nodes` own nodes from `begin` on.
+  /// y (3 nodes): rows of A x of `nodes` own nodes from `begin` on.
   void multiply_rows(const Row* packed, std::size_t begin, std::size_t nodes, Row* y) const;
 
-  /// Puts the rows of such a product into the columns of y, sixteen at most.
+  /// Copies the rows of such a product into the columns of y, at most sixteen.
   static void unpack(const Row* rows, std::size_t begin, std::size_t nodes, const Columns& y);
 
   bool is_diagonal() const { return kind_ == Kind::kDiagonal; }
-  /// (rows) the diagonal where that is all there is, null otherwise.
+  /// (rows) the diagonal if the matrix is diagonal, otherwise null.
   const double* get_diagonal() const { return is_diagonal() ? diagonal_.data() : nullptr; }
 
  private:
   enum class Kind { kDiagonal, kScalars, kBlocks };
   void read(Mat matrix, double factor);
-  /// The sums of the rows of blocks, zero where they are no more than rounding.
+  /// Row sums of the blocks, zero if within rounding.
   void sum_rows();
   void plan_exchange(Mat matrix, const std::vector<PetscInt>& ghosts);
 
@@ -57,7 +57,7 @@ class NodeMatrix {
   std::vector<std::int64_t> start_;      // (nodes + 1) into neighbour_
   std::vector<std::int32_t> neighbour_;  // own nodes first, then ghosts
   std::vector<double> values_;           // one or nine (row by row) per neighbour
-  std::vector<double> rest_;             // (nodes, 9), kBlocks: sum of the row's blocks
+  std::vector<double> rest_;             // (nodes, 9), kBlocks: row sum of the blocks
   petsc::Handle<PetscSF, PetscSFDestroy> exchange_;
 };
 

@@ -13,7 +13,7 @@ void NodeRows::Part::open(Mat sequential) {
   PetscInt count = 0;
   PetscBool done = PETSC_FALSE;
   check(MatGetRowIJ(sequential, 0, PETSC_FALSE, PETSC_FALSE, &count, &offsets, &columns, &done));
-  if (done != PETSC_TRUE) throw SolveError("PETSc does not give the rows of a matrix. Assemble it as AIJ.");
+  if (done != PETSC_TRUE) throw SolveError("PETSc cannot return the rows of a matrix. Assemble it as AIJ.");
   matrix = sequential;
   check(MatSeqAIJGetArrayRead(sequential, &values));
 }

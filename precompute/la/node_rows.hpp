@@ -1,12 +1,12 @@
-// This rank's rows of a PETSc AIJ matrix, by plain arrays.
+// Plain-array access to this rank's rows of a PETSc AIJ matrix.
 #pragma once
 
 #include <petscmat.h>
 
 namespace carillon::la {
 
-/// Row i has its entries in columns of this rank (numbered from first_row) and of others (numbers to be looked up in `ghosts`). Borrows the
-/// matrix while it lives. Throws InputError when the matrix is not AIJ.
+/// Row i has entries in columns of this rank (numbered from first_row) and of others (indices into `ghosts`). The matrix must outlive this
+/// object. Throws InputError if the matrix is not AIJ.
 class NodeRows {
  public:
   explicit NodeRows(Mat matrix);
@@ -19,11 +19,11 @@ class NodeRows {
   PetscInt ghost_count() const { return ghost_count_; }
   const PetscInt* ghosts() const { return ghosts_; }  // (ghost_count) global columns, ascending
 
-  /// Whether all entries lie in blocks of 3x3, of whole nodes.
+  /// True if all entries lie in 3x3 blocks of whole nodes.
   bool has_blocks() const { return has_blocks_; }
 
-  /// Calls own(column, values) and ghost(column, values) for the blocks of the rows of a node, where there are blocks: its first column,
-  /// and where each of its rows begins.
+  /// Calls own(column, values) and ghost(column, values) for the blocks in the rows of a node (if has_blocks()), with the first column and
+  /// pointers to the three rows of the block.
   template <typename Own, typename Ghost>
   void visit_blocks(PetscInt node, Own&& own, Ghost&& ghost) const {
     own_.visit_blocks(node, own);
@@ -52,7 +52,7 @@ class NodeRows {
         visit(columns[rows[0] + k], parts);
       }
     }
-    /// global: the columns' numbers, null: themselves.
+    /// global: numbers of the columns; null: identity.
     bool has_blocks(PetscInt rows, const PetscInt* global) const;
     void open(Mat sequential);
     void close();

@@ -1,12 +1,12 @@
-// K - sigma M as the solvers see it.
+// The scaled pencil (a K, b M).
 #pragma once
 
 #include <petscmat.h>
 
 namespace carillon::la {
 
-/// The pencil (a K, b M), a and b powers of two. K and M are never changed: code that reads their values multiplies them, which is exact,
-/// so that every number of the scaled problem has the bits that it would have with scaled matrices. Borrows both.
+/// The pencil (a K, b M), a and b powers of two. K and M are not changed: code that reads their values multiplies them, which is exact, so
+/// every number has the same bits as with scaled matrices. Refers to both matrices.
 struct Pencil {
   Mat stiffness = nullptr;      // K, (3n, 3n) AIJ, symmetric, both triangles stored, whole nodes per rank
   Mat mass = nullptr;           // M, the same distribution

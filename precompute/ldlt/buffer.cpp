@@ -16,7 +16,7 @@
 namespace carillon::ldlt {
 namespace {
 
-constexpr std::size_t kMapped = 1 << 20;  // from here on buffers have pages of their own
+constexpr std::size_t kMapped = 1 << 20;  // buffers of this size and above are mapped separately
 const std::size_t kPage = sysconf(_SC_PAGESIZE);
 constexpr std::size_t kLargePage = std::size_t{2} << 20;
 
@@ -25,14 +25,14 @@ std::size_t round_up(std::size_t bytes, std::size_t to) { return (bytes + to - 1
 double* advance(double* pages, std::size_t bytes) { return pages + bytes / sizeof(double); }
 std::size_t count_bytes(const double* begin, const double* end) { return sizeof(double) * static_cast<std::size_t>(end - begin); }
 
-/// Pages that wait for their next use.
+/// Free pages kept for reuse.
 struct Kept {
   bool is_active = false;
-  std::map<double*, std::size_t> runs;  // bytes of each; those that follow each other are one
-  double* lent_begin = nullptr;         // pages of a buffer that outlives the reuse: they stay mapped
+  std::map<double*, std::size_t> runs;  // size in bytes of each run; adjacent runs are merged
+  double* lent_begin = nullptr;         // lent tail of a buffer that outlives the reuse: stays mapped
   double* lent_end = nullptr;
 
-  /// The first pages of the smallest run that has enough; null: none has.
+  /// First pages of the smallest sufficient run; null if there is none.
   double* take(std::size_t wanted) {
     auto best = runs.end();
     for (auto at = runs.begin(); at != runs.end(); ++at)
@@ -62,7 +62,7 @@ struct Kept {
       give_back(freed, bytes);
     }
   }
-  /// Gives so many bytes back to the system, or all that there are.
+  /// Returns up to this many bytes to the system.
   void release(std::size_t bytes) {
     while (bytes > 0 && !runs.empty()) {
       const std::size_t part = std::min(bytes, runs.begin()->second);
@@ -72,7 +72,7 @@ struct Kept {
     }
   }
   void clear() { release(std::numeric_limits<std::size_t>::max()); }
-  /// Lent pages are their buffer's again.
+  /// Returns lent pages to their buffer.
   void end_loan() noexcept {
     const auto is_lent = [&](const auto& run) { return run.first < lent_end && lent_begin < advance(run.first, run.second); };
     for (auto at = std::find_if(runs.begin(), runs.end(), is_lent); at != runs.end();
@@ -87,7 +87,7 @@ struct Kept {
   }
 
  private:
-  /// To the system; of lent pages their memory alone.
+  /// Unmaps the pages; of lent pages only the memory is freed.
   void give_back(double* pages, std::size_t bytes) const {
     double* const end = advance(pages, bytes);
     double* const lent = std::clamp(lent_begin, pages, end);
@@ -96,18 +96,18 @@ struct Kept {
     if (lent < after) madvise(lent, count_bytes(lent, after), MADV_DONTNEED);
     if (after < end) munmap(after, count_bytes(after, end));
   }
-  /// Takes so many bytes from the beginning of a run.
+  /// Removes the first `bytes` of a run.
   void cut(std::map<double*, std::size_t>::iterator at, std::size_t bytes) {
     auto run = runs.extract(at);
     run.key() = advance(run.key(), bytes);
     run.mapped() -= bytes;
     if (run.mapped() > 0) runs.insert(std::move(run));
   }
-  /// Pages that are not lent.
+  /// Keeps pages that are not lent.
   void keep(double* begin, double* end) noexcept {
     if (begin < end && !add(begin, count_bytes(begin, end))) munmap(begin, count_bytes(begin, end));
   }
-  /// False: the heap has no memory for it.
+  /// False if the heap is out of memory.
   bool add(double* pages, std::size_t bytes) noexcept {
     try {
       runs.emplace(pages, bytes);
@@ -123,7 +123,7 @@ Kept& get_kept() {
   return kept;
 }
 
-/// Fresh memory of the system, in large pages where it has some; null: there is none. bytes: whole pages.
+/// Fresh system memory, in large pages where available; null if there is none. bytes: a multiple of the page size.
 double* map_pages(std::size_t bytes) {
   const std::size_t mapped = bytes + kLargePage;
   void* all = mmap(nullptr, mapped, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
@@ -161,7 +161,7 @@ Buffer::Buffer(std::int64_t count, Pages pages_come) : size_(count) {
   double* pages = kept.take(mapped);
   is_fresh_ = pages == nullptr;
   if (is_fresh_) {
-    kept.release(mapped);  // with what waits, no more is in memory than was in use at most
+    kept.release(mapped);  // resident memory, kept pages included, never exceeds the peak in use
     pages = map_pages(mapped);
   }
   if (pages == nullptr && !kept.runs.empty()) {

@@ -1,7 +1,6 @@
-// Method:     The holders of the tree's parts report to all ranks what their fronts cost, small subtrees as one; from that every rank
-//             makes the same mapping. Then each front goes to those who have to know it, with its rows.
-// Source:     Pothen and Sun 1993 (mapping.cpp).
-// Deviations: none.
+// Method: The holders of the parts of the tree report the costs of their fronts to all ranks, small subtrees as one; every rank computes
+// the same mapping from them. Then each front is sent, with its rows, to all ranks that need it.
+// Source: Pothen and Sun 1993 (mapping.cpp).
 #include "precompute/ldlt/deal.hpp"
 
 #include <algorithm>
@@ -16,15 +15,15 @@ namespace {
 
 using comm::Communicator;
 
-constexpr double kWhole = 0.03;  // of a rank's work: a subtree of less is mapped as one
+constexpr double kWhole = 0.03;  // fraction of a rank's work: smaller subtrees are mapped as one
 
-/// A front, or a subtree as one, for the mapping.
+/// A front, or a subtree treated as one front, for the mapping.
 struct FrontRecord {
   std::int32_t id;
-  FrontCost cost;  // its parent by id
+  FrontCost cost;  // parent: front id
 };
 
-/// Which of a part's fronts are mapped: itself, or as the root of a whole subtree.
+/// Fronts of a part that are mapped individually or as root of a whole subtree.
 struct Pruning {
   std::vector<double> operations, entries;  // (supernodes) of the subtrees
   std::vector<bool> is_whole;               // (supernodes)

@@ -1,4 +1,4 @@
-// Which rank has which front, and what each has to know of them.
+// Assignment of fronts to ranks.
 #pragma once
 
 #include <cstdint>
@@ -9,12 +9,12 @@
 
 namespace carillon::ldlt {
 
-/// The mapping of all fronts, as every rank makes it.
+/// The mapping of all fronts, identical on every rank.
 struct SharedMapping {
-  Ints ids;  // of the fronts mapped, ascending
+  Ints ids;  // of the mapped fronts, ascending
   std::vector<FrontCost> costs;
   Mapping mapping{{}, 1, 1};
-  Ints order;  // (ids) place among the shared fronts, -1: one rank has it
+  Ints order;  // (ids) position among the shared fronts, -1: front of one rank
 
   std::int32_t find(std::int32_t id) const {
     const auto at = std::lower_bound(ids.begin(), ids.end(), id);
@@ -22,17 +22,17 @@ struct SharedMapping {
   }
 };
 
-/// All fronts as the ranks that hold them know them, and who has which.
+/// All fronts as known by their holders, and their owners.
 struct MappedFronts {
   Elimination elimination;
   SharedMapping shared;
-  std::vector<Ints> owners;  // (parts) of (supernodes): who has each, -1: it is shared
+  std::vector<Ints> owners;  // (parts) of (supernodes): owning rank, -1: shared
 };
 
 /// Maps the fronts. Collective.
 MappedFronts map_fronts(const comm::Communicator& comm, Elimination elimination);
 
-/// A front on its way from the holder to those that have it or share it or its parent. Positions of the whole order.
+/// A front sent from its holder to the ranks that own or share it or its parent. Positions are in the global elimination order.
 struct DealtFront {
   std::int32_t id = 0;
   std::int32_t parent = -1;
@@ -44,8 +44,8 @@ struct DealtFront {
   std::int32_t width() const { return static_cast<std::int32_t>(nodes.size()); }
 };
 
-/// Sends each front to the rank that has it, or to those that share it, and the children of shared fronts to all ranks of those. Result:
-/// ascending ids. Collective.
+/// Sends each front to the rank that owns it, or to the ranks that share it, and the children of shared fronts to all ranks of those.
+/// Result: ascending ids. Collective.
 std::vector<DealtFront> deal_fronts(const comm::Communicator& comm, const MappedFronts& fronts);
 
 }  // namespace carillon::ldlt

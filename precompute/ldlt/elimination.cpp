@@ -1,9 +1,8 @@
-// Method:     From the leaves up: a leaf or a subtree hands on the rows of its roots as elements of the quotient graph, and the holder
-//             of the separator above eliminates it behind them; so no rank sees more than its parts. Positions are those of order_parts
-//             at first; as each part is put in postorder they move, and all who use them ask for the last ones. Where rank 0 has all
-//             elements, it condenses them, lets the core be ordered and puts the other nodes back.
-// Source:     Duff and Reid 1983 (elements of the quotient graph).
-// Deviations: fronts of different parts are not merged.
+// Method: From the leaves up: a leaf or subtree passes the rows of its roots on as elements of the quotient graph, and the holder of the
+// separator above eliminates them; so no rank sees more than its parts. Positions start as those of order_parts and change as each part is
+// put in postorder; their users query the final ones. If rank 0 has all elements, it compresses the graph, orders the core and expands the
+// order to the other nodes. Fronts of different parts are not merged.
+// Source: Duff and Reid 1983 (elements of the quotient graph).
 #include "precompute/ldlt/elimination.hpp"
 
 #include <algorithm>
@@ -11,7 +10,7 @@
 #include <numeric>
 #include <utility>
 
-#include "partition/condense.hpp"
+#include "partition/compress.hpp"
 #include "precompute/comm/exchange.hpp"
 #include "precompute/ldlt/lists.hpp"
 
@@ -22,25 +21,25 @@ using comm::Communicator;
 using comm::IndexPartition;
 using partition::Graph;
 
-// Fewer corners are ordered with all other nodes: their parts would be too small for METIS to choose well, and it takes milliseconds.
+// Below this core size all nodes are ordered together: the parts would be too small for METIS, and it takes milliseconds.
 constexpr std::int32_t kSmallestCore = 256;
-constexpr std::int32_t kAnyNumber = std::numeric_limits<std::int32_t>::max();  // of nodes in one piece
+constexpr std::int32_t kAnyNumber = std::numeric_limits<std::int32_t>::max();  // no limit on the nodes of a piece
 
-/// What a subtree leaves behind: the rows of one of its roots, and which front that is.
+/// Remainder of an eliminated subtree: the rows of one of its roots, and that front.
 struct Element {
   std::int32_t part = 0;
   std::int32_t supernode = 0;
   Ints rows;  // positions, ascending
 };
 
-/// Eliminates a part on paper. links: of each of its positions those behind. Elements that have no row in the part go
-/// to `left` as they are, the roots of the part too; `parents` gets the front above each element.
+/// Symbolic elimination of a part. links: for each of its positions the later neighbours. Elements without a row in the part, and the roots
+/// of the part, are appended to `left`; `parents` gets the front above each element.
 class PartEliminator {
  public:
   PartEliminator(const TreePart& part, HeldPart& held, const Ragged& links, std::vector<Element>& elements)
       : part_(part), held_(held), links_(links), elements_(elements) {}
 
-  /// above: (elements) the supernode above each, -1: none here.
+  /// above: (elements) supernode above each, -1: none in this part.
   std::vector<Element> run(Ints& above) {
     find_boundary();
     const auto hubs = static_cast<std::int32_t>(elements_.size());
@@ -73,7 +72,7 @@ class PartEliminator {
     boundary_.erase(std::unique(boundary_.begin(), boundary_.end()), boundary_.end());
   }
 
-  /// Elements, pivots, boundary.
+  /// Graph of elements, pivots and boundary.
   Graph make_graph() const {
     const auto hubs = static_cast<std::int32_t>(elements_.size());
     const std::int32_t behind = part_.first + part_.count;
@@ -82,7 +81,7 @@ class PartEliminator {
       const auto at = std::lower_bound(boundary_.begin(), boundary_.end(), position) - boundary_.begin();
       return hubs + part_.count + static_cast<std::int32_t>(at);
     };
-    // Calls visit(vertex, one behind it) for each link, by ascending vertex: so a vertex gets the neighbours before it first.
+    // Calls visit(vertex, later neighbour) for each link, by ascending vertex, so that each vertex gets its earlier neighbours first.
     const auto for_links = [&](auto&& visit) {
       for (std::int32_t h = 0; h < hubs; ++h)
         for (const std::int32_t row : elements_[h].rows) visit(h, find(row));
@@ -112,7 +111,7 @@ class PartEliminator {
   Ints boundary_;
 };
 
-/// Lists of (position, count, links to those behind), each of the holder of its position, as rows of the held parts. Collective.
+/// Received lists (position, count, later neighbours), one per position held here, as rows of the held parts. Collective.
 std::vector<Ragged> sort_links(const Communicator& comm, const Ints& items, const Elimination& all) {
   return comm.agree([&] {
     std::vector<Ragged> links(all.parts.size());
@@ -156,14 +155,14 @@ std::vector<Ragged> send_links(const Communicator& comm, const NodeLinks& nodes,
   return sort_links(comm, received.items, all);
 }
 
-/// The front above each root, as (part, supernode) of both.
+/// Front above each root, both as (part, supernode).
 struct Above {
   std::int32_t part, supernode, above_part, above_supernode;
 };
 
 std::vector<Above> eliminate_parts(const Communicator& comm, Elimination& all, const std::vector<Ragged>& links) {
   std::vector<Above> found;
-  std::vector<Element> elements;  // for the part that comes next
+  std::vector<Element> elements;  // for the next part
   for (int depth = all.tree.depth(); depth >= 0; --depth) {
     const auto received = comm::all_to_all(comm, [&] {
       std::vector<Ints> lists(comm.size());
@@ -198,7 +197,7 @@ std::vector<Above> eliminate_parts(const Communicator& comm, Elimination& all, c
   return found;
 }
 
-/// Numbers the fronts, and reports to the holder of each root which front is above it. Collective.
+/// Numbers the fronts and reports the front above each root to its holder. Collective.
 void link_parts(const Communicator& comm, Elimination& all, const std::vector<Above>& found) {
   Ints counts(all.tree.parts.size(), 0);
   for (const HeldPart& held : all.parts) counts[held.part] = static_cast<std::int32_t>(held.forest.supernodes.size());
@@ -221,7 +220,7 @@ void link_parts(const Communicator& comm, Elimination& all, const std::vector<Ab
   });
 }
 
-/// The last places of positions that the holders of their parts have moved. Collective.
+/// Final positions after reordering by the holders of their parts. Collective.
 Ints find_moved(const Communicator& comm, const Elimination& all, const Ints& positions) {
   std::vector<const HeldPart*> held_of(all.tree.parts.size(), nullptr);
   for (const HeldPart& held : all.parts) held_of[held.part] = &held;
@@ -234,7 +233,7 @@ Ints find_moved(const Communicator& comm, const Elimination& all, const Ints& po
       });
 }
 
-/// Own parts of the tree and their nodes. Local.
+/// Parts of the tree held by this rank, and their nodes. Local.
 void hold_parts(const Communicator& comm, Elimination& all, std::vector<Ints> placed) {
   for (std::size_t t = 0; t < placed.size(); ++t) {
     if (all.tree.parts[t].begin != comm.rank()) continue;
@@ -259,7 +258,7 @@ Ints report_own_positions(const Communicator& comm, const Elimination& all, cons
       owners, -1);
 }
 
-/// Finds the fronts, and moves the positions inside their parts. links: of the held parts, as PartEliminator has them. Collective.
+/// Finds the fronts and reorders positions within their parts. links: of the held parts, as for PartEliminator. Collective.
 void find_fronts(const Communicator& comm, Elimination& all, const std::vector<Ragged>& links) {
   link_parts(comm, all, eliminate_parts(comm, all, links));
   const Ints asked = comm.agree([&] {
@@ -284,7 +283,7 @@ void find_fronts(const Communicator& comm, Elimination& all, const std::vector<R
   }
 }
 
-/// Nodes in their order, for the holder of each part. position: (nodes) on rank 0, elsewhere empty. Local.
+/// Nodes in elimination order, for the holder of each part. position: (nodes) on rank 0, empty elsewhere. Local.
 std::vector<Ints> list_nodes(const Communicator& comm, const SeparatorTree& tree, const Ints& position) {
   std::vector<Ints> lists(comm.size());
   if (position.empty()) return lists;
@@ -295,15 +294,14 @@ std::vector<Ints> list_nodes(const Communicator& comm, const SeparatorTree& tree
   return lists;
 }
 
-/// Links that lead to the same fronts as those between all nodes of an element: from that node of each element which is eliminated first
-/// to its others. Then the others become a clique, so no row is lost, and none is gained. Lists as sort_links() takes them.
-/// Local.
+/// Links that produce the same fronts as a clique of all nodes of each element: from the first eliminated node of an element to its other
+/// nodes. The others then become a clique, so the fill is the same. Lists as for sort_links(). Local.
 std::vector<Ints> list_star_links(const Communicator& comm, const SeparatorTree& tree, std::span<const std::int32_t> elements, int width,
                                   const Ints& position) {
   std::vector<Ints> lists(comm.size());
   const std::size_t count = position.size();
   if (count == 0) return lists;
-  // The elements by their first node, as chains.
+  // Elements by their first node, as linked lists.
   Ints head(count, -1);
   Ints next;
   Ints places(elements.begin(), elements.end());
@@ -355,26 +353,26 @@ Elimination eliminate_on_paper(const Communicator& comm, const NodeLinks& nodes,
 
 Elimination eliminate_elements(const Communicator& comm, std::span<const std::int32_t> elements, int width, std::int32_t nodes) {
   Elimination all = comm.agree([&] { return Elimination(comm.size()); });
-  const auto condensed = comm.agree([&] { return partition::Condensation(elements, width, nodes, kSmallestCore); });
+  const auto compressed = comm.agree([&] { return partition::CompressedGraph(elements, width, nodes, kSmallestCore); });
   NodeLinks core = comm.agree([&] {
     NodeLinks links;
-    links.own_nodes = condensed.core().vertex_count();
-    links.links = {condensed.core().offsets, condensed.core().neighbours};
+    links.own_nodes = compressed.core().vertex_count();
+    links.links = {compressed.core().offsets, compressed.core().neighbours};
     return links;
   });
   const IndexPartition core_owners(comm, core.own_nodes);
   core.first_node = static_cast<std::int32_t>(core_owners.own_begin());
-  const double dominated_per_edge = comm.broadcast([&] { return condensed.dominated_per_edge(); });
+  const double dominated_per_edge = comm.broadcast([&] { return compressed.dominated_per_edge(); });
   std::vector<Ints> placed = order_parts(comm, core, core_owners, all.tree, kAnyNumber, dominated_per_edge);
   comm.agree([&] { hold_parts(comm, all, std::move(placed)); });
   const Ints core_position = report_own_positions(comm, all, core_owners);
 
-  // Rank 0 puts back what was condensed; the parts grow by it.
-  const Ints position = comm.agree([&] { return condensed.expand_order(core_position); });
+  // Rank 0 expands the compressed graph; the parts grow accordingly.
+  const Ints position = comm.agree([&] { return compressed.expand_order(core_position); });
   const Ints ends = comm.broadcast([&] {
     Ints end(all.tree.parts.size(), 0);
     for (std::size_t v = 0; v < position.size(); ++v) {
-      const std::int32_t number = condensed.numbers()[v];
+      const std::int32_t number = compressed.numbers()[v];
       if (number < 0) continue;
       const int part = all.tree.find_part(core_position[number]);
       end[part] = std::max(end[part], position[v] + 1);

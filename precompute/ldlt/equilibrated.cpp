@@ -1,6 +1,6 @@
-// Method:     Symmetric scaling to a unit diagonal, in powers of two, which change no digit.
-// Source:     van der Sluis, Condition numbers and equilibration of matrices, Numer. Math. 14, 1969; Higham 2002, section 7.3.
-// Deviations: one factor per node, so that rigid motions of a node stay what they are to the pivots; none within six decades.
+// Method: Symmetric scaling to a unit diagonal by powers of two, which change no digit; one factor per node, so that pivoting sees rigid
+// motions of a node unchanged; none if the diagonal spans less than six decades.
+// Source: van der Sluis, Condition numbers and equilibration of matrices, Numer. Math. 14, 1969; Higham 2002, section 7.3.
 #include "precompute/ldlt/equilibrated.hpp"
 
 #include <algorithm>
@@ -15,9 +15,9 @@ namespace {
 
 using petsc::check;
 
-constexpr double kWide = 1e6;  // Stiffest over softest node; meshes of one material, well shaped, span three decades.
+constexpr double kWide = 1e6;  // Stiffest over softest node; well-shaped meshes of one material span three decades.
 
-/// Of every own node the largest of the diagonal. Collective.
+/// Largest diagonal entry of each own node. Collective.
 std::vector<double> find_stiffness(const la::Pencil& pencil) {
   std::vector<double> largest = petsc::read_diagonal(pencil.stiffness);
   const std::size_t nodes = largest.size() / 3;
@@ -27,9 +27,9 @@ std::vector<double> find_stiffness(const la::Pencil& pencil) {
   return largest;
 }
 
-/// The stiffest over the softest of all nodes that have stiffness; 0 where none has. Collective.
+/// Ratio of the stiffest to the softest node, of all nodes with stiffness; 0 if there is none. Collective.
 double find_width(const comm::Communicator& comm, const std::vector<double>& stiffness) {
-  std::array<double, 2> ends{0, 0};  // largest, and largest inverse
+  std::array<double, 2> ends{0, 0};  // largest value, largest inverse
   for (const double k : stiffness)
     if (k > 0) ends = {std::max(ends[0], k), std::max(ends[1], 1 / k)};
   comm.max(ends);
@@ -46,7 +46,7 @@ EquilibratedPencil::EquilibratedPencil(const la::Pencil& given) : pencil_(given)
   if (!(width > kWide) || !std::isfinite(width)) return;
   petsc::VecHandle factor;
   check(MatCreateVecs(stiffness, nullptr, factor.out()));
-  comm.agree([&] {  // Copies of this rank's rows: one rank alone may have no memory for them.
+  comm.agree([&] {  // Copies of this rank's rows: allocation may fail on one rank alone.
     factor_.resize(3 * node_stiffness.size());
     check(MatDuplicate(stiffness, MAT_COPY_VALUES, scaled_stiffness_.out()));
     check(MatDuplicate(mass, MAT_COPY_VALUES, scaled_mass_.out()));

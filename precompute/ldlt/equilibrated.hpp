@@ -1,4 +1,4 @@
-// K and M as they are factorised where stiffness spans many decades.
+// Equilibrated K and M for stiffness that spans many decades.
 #pragma once
 
 #include <vector>
@@ -8,12 +8,12 @@
 
 namespace carillon::ldlt {
 
-/// S K S and S M S, S a power of two per node that brings the diagonal of K near one: a soft part next to a stiff one, or an element a
-/// thousand times thinner than its neighbours, then has pivots of its own size, not of the rounding of others. A body of one stiffness is
-/// not copied. Borrows K and M, which must stay as they are: their values are read once, here.
+/// S K S and S M S, S a power of two per node that scales the diagonal of K to about one: a soft part next to a stiff one, or an element a
+/// thousand times thinner than its neighbours, then has pivots of its own magnitude instead of the rounding of others. Bodies of uniform
+/// stiffness are not copied. Refers to K and M, which must not change: their values are read once, at construction.
 class EquilibratedPencil {
  public:
-  /// K, M: (3n, 3n) AIJ, whole nodes per rank. Collective. Throws SystemError on every rank when memory runs out.
+  /// K, M: (3n, 3n) AIJ, whole nodes per rank. Collective. Throws SystemError on every rank if memory runs out.
   explicit EquilibratedPencil(const la::Pencil& given);
 
   const la::Pencil& get() const { return pencil_; }
@@ -23,9 +23,9 @@ class EquilibratedPencil {
 
  private:
   la::Pencil pencil_;
-  petsc::MatHandle scaled_stiffness_;  // null where S is one
+  petsc::MatHandle scaled_stiffness_;  // null if S is the identity
   petsc::MatHandle scaled_mass_;
-  std::vector<double> factor_;  // (own rows), empty where S is one
+  std::vector<double> factor_;  // (own rows), empty if S is the identity
 };
 
 }  // namespace carillon::ldlt

@@ -1,8 +1,7 @@
-// Method:     Plan, numbers and workspace behind one door; a factorisation is trusted by what it does to a vector whose image is known.
-//             Shifts that let the numbers grow, as pivots are sought inside the blocks only, get a step of iterative refinement.
-// Source:     Rigal and Gaches 1967 (normwise backward error); Higham 2002, sections 7.1, 12.1 (fixed precision refinement).
-//             What is factorised is equilibrated (equilibrated.cpp).
-// Deviations: the infinity norm of K - sigma M is bounded by ||K|| + |sigma| ||M||.
+// Method: Plan, values and workspace behind one interface; a factorisation is accepted by the backward error of a solve with known
+// solution. If element growth is large, because pivots are sought within blocks only, solves get one step of iterative refinement. The
+// matrix is equilibrated first (equilibrated.cpp). The infinity norm of K - sigma M is bounded by ||K|| + |sigma| ||M||.
+// Source: Rigal and Gaches 1967 (normwise backward error); Higham 2002, sections 7.1, 12.1 (fixed precision refinement).
 #include "precompute/ldlt/factor.hpp"
 
 #include <fmt/core.h>
@@ -29,7 +28,7 @@ namespace {
 using petsc::check;
 
 constexpr double kWorstBackwardError = 1e-10;
-constexpr double kRefinedBackwardError = 3e-13;  // Solves with a factorisation worse than this are refined; bodies have 1e-15 to 1e-13.
+constexpr double kRefinedBackwardError = 3e-13;  // Above this, solves are refined; typical bodies have 1e-15 to 1e-13.
 constexpr double kVanishedPivot = 64 * std::numeric_limits<double>::epsilon();  // relative to ||A||_inf
 
 }  // namespace
@@ -44,30 +43,30 @@ struct Factor::State {
 
   const la::Pencil given;
   Plan plan;
-  std::optional<EquilibratedPencil> equilibrated;  // what is factorised, measured and refined with; from the first factorisation on
-  double stiffness_norm = 0;                       // of the equilibrated K, and M
+  std::optional<EquilibratedPencil> equilibrated;  // the matrix that is factorised and measured; set by the first factorisation
+  double stiffness_norm = 0;                       // of the equilibrated K; mass_norm: of M
   double mass_norm = 0;
   Numbers numbers;
   Workspace workspace;
   double sigma = 0;
   double norm = 0;
   bool needs_refinement = false;
-  double backward_error = 0;  // of the solves as they are made
+  double backward_error = 0;  // of solves as performed, with refinement if any
   bool is_allocated = false;
-  bool has_scratch = false;  // memory of the last factorisation, for the next
+  bool has_scratch = false;  // memory of the last factorisation, kept for the next
 
-  /// Gives back what a factorisation needs and solves do not. A factorisation that counts eigenvalues is often followed by another at once,
-  /// which would wait for fresh pages; solves are not.
+  /// Frees the memory that only a factorisation needs. It is kept until the first solve, as a count of eigenvalues is often followed
+  /// directly by another factorisation, which would wait for fresh pages.
   void drop_scratch();
-  /// Runs work, and says how much is needed where memory runs out. Collective.
+  /// Runs work; adds the memory requirement to an out-of-memory error. Collective.
   template <typename Work>
   void name_need(Work&& work) const;
-  /// What all factorisations share. Collective.
+  /// Preparation shared by all factorisations. Collective.
   void prepare();
   /// y = (K - sigma M) x on this rank's rows. Collective.
   void apply(Vec x, Vec y, Vec scratch) const;
   double measure_backward_error(bool is_refined);
-  /// X <- A^-1 B, A equilibrated, with the factorisation alone. Collective.
+  /// X <- A^-1 B, A equilibrated, without refinement. Collective.
   void solve(const double* b, double* x, int stride, int columns);
   /// X <- A^-1 X with one step of iterative refinement. Collective.
   void solve_refined(double* x, int stride, int columns);

@@ -1,4 +1,4 @@
-// Which inner loops run: decided once, by what the processor says of itself.
+// Selects the fastest kernels that the processor supports.
 #include "precompute/ldlt/kernels.hpp"
 
 #include "runtime/base/instructions.hpp"

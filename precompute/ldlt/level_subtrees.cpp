@@ -1,9 +1,7 @@
-// Method:     Again and again the rank with most to do gives a subtree away, with or without another in return, whichever levels the two
-// best;
-//             where none does, the root of its smallest subtree above half of the gap is shared, so that its children can be given away. A
-//             front that all ranks share does not count: it can be shared evenly whatever lies below.
-// Source:     Fiduccia and Mattheyses 1982 (moves by gain), between ranks in place of halves.
-// Deviations: none is taken back, so the rank with most never gets more.
+// Method: Repeatedly the rank with the most work gives a subtree away, or exchanges one, whichever levels the two ranks best. If no move
+// helps, the root of its smallest subtree above half of the gap is shared, so that its children can be given away. No move is undone, so
+// the maximum never increases. A front that all ranks share is ignored: it can be shared evenly in any case.
+// Source: Fiduccia and Mattheyses 1982 (moves by gain), applied to ranks instead of halves.
 #include "precompute/ldlt/level_subtrees.hpp"
 
 #include <algorithm>
@@ -12,7 +10,7 @@
 namespace carillon::ldlt {
 namespace {
 
-/// The subtrees that one rank each has below shared fronts, and what all their ranks have to do.
+/// Subtrees below shared fronts that belong to one rank, and the work of these ranks.
 class Levelling {
  public:
   Levelling(const std::vector<FrontCost>& fronts, Mapping& mapping)
@@ -28,7 +26,8 @@ class Levelling {
     }
   }
 
-  /// Gives a subtree of the rank with most to another, or exchanges two, whichever levels the two ranks best. False: none would.
+  /// Moves a subtree from the rank with the most work to another, or exchanges two, whichever levels the two ranks best. False if no move
+  /// helps.
   bool exchange() {
     const int most = find_most();
     double best = kUneven * load(most);
@@ -58,8 +57,8 @@ class Levelling {
     return true;
   }
 
-  /// Shares the root of the smallest subtree of the rank with most that is too large to be given away. False: the ranks are level, or there
-  /// is none.
+  /// Shares the root of the smallest subtree of the rank with the most work that is too large to be moved. False if the ranks are level or
+  /// there is no such subtree.
   bool split() {
     const int most = find_most();
     std::int32_t best = -1;
@@ -92,7 +91,7 @@ class Levelling {
     const std::vector<FrontShare> takers = list_takers(subtree);
     return std::any_of(takers.begin(), takers.end(), [&](const FrontShare& share) { return share.rank == rank; });
   }
-  /// A front that all ranks share does not count: it can be shared evenly whatever lies below.
+  /// A front that all ranks share is ignored: it can be shared evenly in any case.
   void add_front(std::int32_t front, int sign) {
     const std::vector<FrontShare> shares = mapping_.list_shares(front);
     if (shares.size() == load_.size()) return;
@@ -114,9 +113,9 @@ class Levelling {
   const std::vector<FrontCost>& fronts_;
   Mapping& mapping_;
   std::vector<std::vector<std::int32_t>> children_;
-  std::vector<double> work_;            // (fronts) of the subtree
+  std::vector<double> work_;            // (fronts) work of the subtree
   std::vector<double> load_;            // (ranks)
-  std::vector<std::int32_t> subtrees_;  // their roots
+  std::vector<std::int32_t> subtrees_;  // roots of the subtrees
 };
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Lists of integers of many lengths in one message. Inner header of carillon::ldlt.
+// Integer lists of varying length in one message. Internal header of carillon::ldlt.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,7 @@
 
 namespace carillon::ldlt {
 
-/// One list for each rank, as an all-to-all takes them.
+/// One list per rank, in the form of an all-to-all.
 inline comm::ByRank<std::int32_t> join(const std::vector<std::vector<std::int32_t>>& lists) {
   comm::ByRank<std::int32_t> joined;
   joined.begin.push_back(0);
@@ -22,7 +22,7 @@ inline comm::ByRank<std::int32_t> join(const std::vector<std::vector<std::int32_
   return joined;
 }
 
-/// Reads a list from front to end, as it was written.
+/// Sequential reader of a received list.
 class ListReader {
  public:
   explicit ListReader(std::span<const std::int32_t> items) : items_(items) {}

@@ -42,12 +42,12 @@ std::optional<Letter> Mailbox::receive() {
     MPI_Mrecv(data.data(), count, MPI_DOUBLE, &message, MPI_STATUS_IGNORE);
     return Letter(std::move(data));
   } catch (const std::bad_alloc&) {
-    // The sender must not wait for ever. Open MPI ends the process where it reads a long message into less room.
+    // The sender must not block forever. Open MPI aborts if a long message is received into a shorter buffer.
     if (count <= std::ssize(refuge_)) {
       MPI_Mrecv(refuge_.data(), count, MPI_DOUBLE, &message, MPI_STATUS_IGNORE);
       throw;
     }
-    // What has room for one number takes the message, and the rest is cut off.
+    // A buffer for one number accepts the message; the rest is truncated.
     double nothing = 0;
     MPI_Errhandler handler = MPI_ERRHANDLER_NULL;
     MPI_Comm_get_errhandler(comm_, &handler);

@@ -1,4 +1,4 @@
-// Messages of numbers between ranks that work on their own fronts meanwhile.
+// Asynchronous messages of doubles between ranks.
 #pragma once
 
 #include <mpi.h>
@@ -13,7 +13,7 @@
 
 namespace carillon::ldlt {
 
-/// Says what the numbers are for.
+/// Purpose of the numbers that follow.
 struct Heading {
   std::int32_t kind = 0;
   std::int32_t front = 0;
@@ -21,7 +21,7 @@ struct Heading {
   std::int32_t index = 0;
 };
 
-/// Numbers behind their heading, aligned for vectors.
+/// A heading and its numbers, aligned for vector instructions.
 class Letter {
  public:
   Letter() = default;
@@ -35,25 +35,25 @@ class Letter {
   const Buffer& data() const { return data_; }
 
  private:
-  static constexpr std::int64_t kHeadingNumbers = 8;  // the numbers behind begin with a line of the cache
+  static constexpr std::int64_t kHeadingNumbers = 8;  // the numbers start on a cache line
   Buffer data_;
 };
 
-/// Sends letters and takes those that have come, in any order; what a rank sends to another stays in order. All ranks of a communicator use
-/// the same tag, and no one else does.
+/// Sends letters and receives them in order of arrival; letters between two ranks stay in order. All ranks of a communicator use the same
+/// tag exclusively.
 class Mailbox {
  public:
-  /// refuge: takes the numbers of a letter for which there is no memory; what was in it is lost then. It must outlive this.
+  /// refuge: memory that receives a letter for which allocation failed; its contents are lost then. Must outlive this object.
   Mailbox(MPI_Comm comm, int tag, std::span<double> refuge) : comm_(comm), tag_(tag), refuge_(refuge) {}
 
   void send(int rank, Letter letter);
-  /// The letter stays the caller's, who may read it, and gives it up after the last send.
+  /// The caller keeps shared, read-only access to the letter.
   void send(int rank, const std::shared_ptr<const Letter>& letter);
-  /// A letter that has arrived, if there is one. Throws std::bad_alloc; the letter is lost then.
+  /// A letter that has arrived, if any. Throws std::bad_alloc; the letter is lost then.
   std::optional<Letter> receive();
-  /// Lets go of what has been sent. Returns whether all has.
+  /// Releases completed sends. True if none is pending.
   bool release();
-  /// Gives the core to another process after a while in which nothing came.
+  /// Yields the core to other processes after some unsuccessful polls.
   void rest();
 
  private:

@@ -1,12 +1,10 @@
-// Method:     From the roots down each front hands its interval of ranks on to its children in proportion to their subtrees' work. Ends
-//             near a whole number move there, so that a rank is not in two groups for nothing; what is shorter than a small part of a rank
-//             goes to one rank whole. The path is found by playing the elimination through: each rank does the subtrees that it has alone,
-//             then its shares of the shared fronts in the order in which these become ready.
-// Source:     Pothen and Sun 1993, A mapping algorithm for parallel sparse Cholesky factorization (proportional mapping); Gupta, Karypis,
-//             Kumar 1997, Highly scalable parallel algorithms for sparse matrix factorization (subtree to subcube, fronts in two
-//             dimensions).
-// Deviations: shares are fractions of ranks, not whole ranks; shared fronts go by readiness, not in postorder, in which a rank of two
-//             groups makes one wait (at 64 ranks the path was four times as long).
+// Method: From the roots down each front divides its interval of ranks among its children in proportion to the work of their subtrees. Ends
+// near an integer are rounded, so that no rank joins two groups needlessly; a subtree shorter than a small part of a rank goes to one rank.
+// The path length results from a simulation of the elimination: each rank processes its own subtrees, then its shares of the shared fronts
+// in the order in which they become ready. Differences to the sources: shares are fractions of ranks, not whole ranks; shared fronts are
+// processed by readiness, not in postorder, in which a rank in two groups makes one wait (four times the path at 64 ranks).
+// Source: Pothen and Sun 1993, A mapping algorithm for parallel sparse Cholesky factorization (proportional mapping); Gupta, Karypis, Kumar
+// 1997, Highly scalable parallel algorithms for sparse matrix factorization (subtree to subcube, fronts in two dimensions).
 #include "precompute/ldlt/mapping.hpp"
 
 #include <algorithm>
@@ -23,20 +21,20 @@
 namespace carillon::ldlt {
 namespace {
 
-constexpr double kSnap = 0.08;   // of a rank
-constexpr double kSmall = 0.06;  // of a rank: a subtree that straddles two ranks goes to one of them
-constexpr double kColumns = 16;  // of a solve
+constexpr double kSnap = 0.08;   // in ranks
+constexpr double kSmall = 0.06;  // in ranks: a shorter subtree that straddles two ranks goes to one of them
+constexpr double kColumns = 16;  // columns of a solve
 constexpr double kEntriesBound = 1.25;
-constexpr double kLeastShare = 0.2;   // of an even one
-constexpr double kSharedFront = 5e6;  // operations that its messages take the time of, in a factorisation and its solves: 0.1 ms
-// Ranks up to which subtrees are levelled, and other grains are tried: the mapping takes longer than it saves where there are more.
+constexpr double kLeastShare = 0.2;   // relative to an even share
+constexpr double kSharedFront = 5e6;  // operations equivalent to the messages of a shared front, factorisation and solves: 0.1 ms
+// Rank counts up to which subtrees are levelled, and several grains are tried; beyond, the mapping takes longer than it saves.
 constexpr int kMostLevelled = 64;
 constexpr int kMostGrains = 16;
 
-/// Of the trailing rows and columns of a front, the numbers of the lower triangle.
+/// Entries of the lower triangle of the trailing rows of a front.
 double count_triangle_of(double rows) { return rows * (rows + 1) / 2; }
 
-/// What each rank of a shared front has of it, as its tiles are dealt; empty: one rank has the front.
+/// Share of each rank in a shared front by the tiles assigned; empty if the front has one rank.
 struct FrontParts {
   std::vector<double> operations;
   std::vector<std::int64_t> entries;
@@ -54,8 +52,8 @@ std::vector<FrontParts> list_parts(const std::vector<FrontCost>& fronts, const M
   return all;
 }
 
-/// Fractions with which ranks that are free at these times [operations] end a front of so many operations together; a rank that is free
-/// too late has `least`.
+/// Fractions such that ranks that become free at these times [operations] finish a front of this many operations together; a rank that is
+/// free too late gets `least`.
 void level(std::vector<FrontShare>& shares, const std::vector<double>& times, double operations, double least) {
   std::vector<double> sorted = times;
   std::sort(sorted.begin(), sorted.end());
@@ -74,7 +72,7 @@ void level(std::vector<FrontShare>& shares, const std::vector<double>& times, do
   for (FrontShare& share : shares) share.fraction /= all;
 }
 
-/// The order of events of an elimination: when each rank is free, and when each front is complete [operations].
+/// Simulated elimination: times [operations] at which each rank becomes free and each front is complete.
 class Replay {
  public:
   Replay(const std::vector<FrontCost>& fronts, const Mapping& mapping, std::vector<FrontParts> shared, bool is_gang)
@@ -101,7 +99,7 @@ class Replay {
     for (const std::int32_t s : shared)
       if (waiting_[s] == 0) open_.emplace(start(s), s);
     while (!open_.empty()) {
-      // Starts only grow later, so the first whose start still holds is the earliest of all.
+      // Start times only increase, so the first entry whose time is still valid is the earliest.
       const auto [known, s] = open_.top();
       open_.pop();
       const double now = start(s);
@@ -118,18 +116,18 @@ class Replay {
     return *std::max_element(free_.begin(), free_.end());
   }
 
-  /// The same, where the ranks of each shared front get as much of it as lets them end it together. Their shares go into `levelled`, which
-  /// begins as the mapping; what parts of shared fronts were given does not count.
+  /// The same, with shares of each shared front chosen so that its ranks finish together. They are stored in `levelled`, which starts as a
+  /// copy of the mapping; shares given to the constructor are ignored.
   double run(Mapping& levelled) {
     levelled_ = &levelled;
     return run();
   }
 
-  /// The shared fronts as they were begun.
+  /// Shared fronts in the order of their start.
   std::vector<std::int32_t> take_order() { return std::move(order_); }
 
  private:
-  /// When all ranks of a front are free and its children complete.
+  /// Time at which all ranks of a front are free and its children are complete.
   double start(std::int32_t front) const {
     double time = ready_[front];
     for (const FrontShare& share : mapping_.list_shares(front)) time = std::max(time, free_[share.rank]);
@@ -164,7 +162,7 @@ class Replay {
     }
   }
 
-  using Start = std::pair<double, std::int32_t>;  // when, and the front
+  using Start = std::pair<double, std::int32_t>;  // time and front
 
   const std::vector<FrontCost>& fronts_;
   const Mapping& mapping_;
@@ -173,7 +171,7 @@ class Replay {
   Mapping* levelled_ = nullptr;
   std::vector<double> free_;           // (ranks)
   std::vector<double> ready_;          // (fronts)
-  std::vector<std::int32_t> waiting_;  // (fronts) shared children that are not complete
+  std::vector<std::int32_t> waiting_;  // (fronts) incomplete shared children
   std::priority_queue<Start, std::vector<Start>, std::greater<>> open_;
   std::vector<std::int32_t> order_;
 };
@@ -210,7 +208,7 @@ Mapping::Mapping(const std::vector<FrontCost>& fronts, int ranks, double operati
     operations += front.operations;
     entries += front.entries;
   }
-  std::vector<double> work(count, 0.0);  // of the subtree
+  std::vector<double> work(count, 0.0);  // work of the subtree
   for (std::size_t s = 0; s < count; ++s) {
     const FrontCost& front = fronts[s];
     work[s] += operations_weight * front.operations / operations + (1 - operations_weight) * front.entries / entries;
@@ -218,7 +216,7 @@ Mapping::Mapping(const std::vector<FrontCost>& fronts, int ranks, double operati
   }
   std::vector<std::int32_t> roots;
   const std::vector<std::vector<std::int32_t>> children = list_children(fronts, roots);
-  // In the order of the forest, which is that of the ranks whose rows they are.
+  // In the order of the forest, which follows the ranks of the rows.
   const auto divide = [&](const std::vector<std::int32_t>& siblings, double begin, double end) {
     double all = 0;
     for (const std::int32_t s : siblings) all += work[s];
@@ -239,7 +237,7 @@ Mapping::Mapping(const std::vector<FrontCost>& fronts, int ranks, double operati
         begin_[s] = begin;
         end_[s] = end;
       }
-      if (fronts[s].parent >= 0) {  // the ranks of a front are among those of the front above
+      if (fronts[s].parent >= 0) {  // the ranks of a front are a subset of those of its parent
         begin_[s] = std::max(begin_[s], begin_[fronts[s].parent]);
         end_[s] = std::min(end_[s], end_[fronts[s].parent]);
       }
@@ -291,7 +289,7 @@ double MappingCounts::fullest_ratio() const {
 
 namespace {
 
-/// Counts what the ranks of a shared front send each other.
+/// Counts the messages between the ranks of a shared front.
 class FrontMessages {
  public:
   FrontMessages(const TileMap& map, MappingCounts& counts) : map_(map), counts_(counts) {}
@@ -302,7 +300,7 @@ class FrontMessages {
       const int home = map_.owner(k, k);
       for (const int place : map_.list_column(k)) {
         receive(place, 3 * n + static_cast<double>(count_triangle(static_cast<std::int64_t>(n))));
-        solve(place, n);  // forward: the solution at the panel
+        solve(place, n);  // forward: solution at the panel
         solve(home, n);   // backward: a sum
         send_rows(k, place);
       }
@@ -315,7 +313,7 @@ class FrontMessages {
   }
 
  private:
-  /// To each place with tiles behind the panel, what it needs for its rows or its columns.
+  /// Sends each place with tiles behind the panel the rows that it needs for its rows or columns.
   void send_rows(int k, int from) {
     const double n = 3.0 * map_.nodes(k);
     for (int to = 0; to < map_.places(); ++to) {
@@ -338,7 +336,7 @@ class FrontMessages {
   MappingCounts& counts_;
 };
 
-/// Sums up operations, entries and paths, which are what a mapping is chosen by.
+/// Sums up operations, entries and path length, the criteria of the mapping.
 MappingCounts count_work(const std::vector<FrontCost>& fronts, const Mapping& mapping) {
   const std::size_t ranks = mapping.ranks();
   MappingCounts counts;
@@ -379,7 +377,7 @@ MappingCounts count_mapping(const std::vector<FrontCost>& fronts, const Mapping&
   const std::size_t ranks = mapping.ranks();
   for (std::vector<double>* list : {&counts.messages, &counts.bytes, &counts.solve_messages, &counts.solve_bytes}) list->assign(ranks, 0.0);
   std::vector<std::int32_t> planned(ranks, 0);
-  std::vector<double> path(fronts.size(), 0.0);  // messages of a solve from the leaves to the front and back
+  std::vector<double> path(fronts.size(), 0.0);  // messages of a solve between the leaves and this front, both ways
   std::vector<std::int32_t> roots;
   const std::vector<std::vector<std::int32_t>> children = list_children(fronts, roots);
   for (std::size_t s = 0; s < fronts.size(); ++s) {
@@ -392,7 +390,7 @@ MappingCounts count_mapping(const std::vector<FrontCost>& fronts, const Mapping&
     for (const std::int32_t child : children[s]) {
       const auto rows = 3.0 * static_cast<double>(fronts[child].rows);
       const std::vector<FrontShare> from = mapping.list_shares(child);
-      const double copies = std::ceil(std::sqrt(static_cast<double>(from.size())));  // ranks that have a part of the sum of a row
+      const double copies = std::ceil(std::sqrt(static_cast<double>(from.size())));  // ranks that hold a partial sum of a row
       path[s] = std::max(path[s], path[child]);
       for (const FrontShare& share : shares) {
         const std::size_t rank = share.rank;
@@ -408,7 +406,7 @@ MappingCounts count_mapping(const std::vector<FrontCost>& fronts, const Mapping&
         }
       }
     }
-    path[s] += 2 + 4.0 * map.pivot_tiles();  // from the children and back, and at each panel along its row and its column
+    path[s] += 2 + 4.0 * map.pivot_tiles();  // from and to the children, and at each panel along its row and its column
     counts.solve_path_messages = std::max(counts.solve_path_messages, path[s]);
   }
   for (const std::int32_t known : planned) counts.most_planned_fronts = std::max(counts.most_planned_fronts, known);

@@ -1,8 +1,7 @@
-// Method:     The graph of the nodes is gathered from the elements by the ranks that answer for the nodes, unless rank 0 has all of both;
-//             order, fronts and mapping are those of a factorisation. The nodes of an element are a clique, so their fronts lie on one way
-//             to the root, and the rank of the first of them has, or shares, all.
-// Source:     Pothen and Sun 1993 (subtrees to ranks); the order: order.cpp.
-// Deviations: none.
+// Method: The graph of the nodes is gathered from the elements by the owners of the nodes, unless rank 0 has all of both; order, fronts and
+// mapping are those of a factorisation. The nodes of an element form a clique, so their fronts lie on one path to the root, and the rank of
+// the first owns, or shares, all of them.
+// Source: Pothen and Sun 1993 (subtrees to ranks); the order: order.cpp.
 #include "precompute/ldlt/mesh_order.hpp"
 
 #include <algorithm>
@@ -19,7 +18,7 @@ namespace {
 using comm::Communicator;
 using comm::IndexPartition;
 
-/// Links of the own nodes, from elements of any ranks. Collective.
+/// Links of the own nodes, from elements on any rank. Collective.
 NodeLinks gather_links(const Communicator& comm, std::span<const std::int32_t> elements, int width, const IndexPartition& owners) {
   const auto received = comm::all_to_all(comm, [&] {
     std::vector<Ints> lists(comm.size());
@@ -62,7 +61,7 @@ Elimination eliminate(const Communicator& comm, std::span<const std::int32_t> el
   return eliminate_on_paper(comm, gather_links(comm, elements, width, owners), owners);
 }
 
-/// The ranks that eliminate the nodes which this rank holds.
+/// Eliminating ranks of the nodes held by this rank.
 std::vector<comm::Reported<std::int32_t>> list_ranks(const MappedFronts& fronts) {
   std::vector<comm::Reported<std::int32_t>> list;
   const Elimination& all = fronts.elimination;
@@ -96,12 +95,12 @@ MeshOrder::MeshOrder(const Communicator& comm, std::span<const std::int32_t> ele
 }
 
 const MappedFronts& MeshOrder::get_fronts() const {
-  if (!is_numbered_) throw std::logic_error("an order of a mesh without the numbers of its rows");
+  if (!is_numbered_) throw std::logic_error("the rows of the mesh order are not numbered yet");
   return fronts_;
 }
 
 ElementRanks MeshOrder::find_ranks(const Communicator& comm, std::span<const std::int32_t> elements, int width) const {
-  if (is_numbered_) throw std::logic_error("ranks of elements are asked for before the rows are numbered");
+  if (is_numbered_) throw std::logic_error("find_ranks() must be called before the rows are numbered");
   struct Place {
     std::int32_t position, rank;
   };
@@ -140,7 +139,7 @@ ElementRanks MeshOrder::find_ranks(const Communicator& comm, std::span<const std
 }
 
 void MeshOrder::renumber(const Communicator& comm, const Ints& row) {
-  if (is_numbered_) throw std::logic_error("the rows of a mesh are numbered once");
+  if (is_numbered_) throw std::logic_error("the rows of a mesh order are already numbered");
   const Ints asked = comm.agree([&] {
     Ints nodes;
     for (const HeldPart& held : fronts_.elimination.parts) nodes.insert(nodes.end(), held.nodes.begin(), held.nodes.end());

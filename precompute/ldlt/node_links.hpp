@@ -1,4 +1,4 @@
-// Who the neighbours of a rank's nodes are.
+// Neighbours of the nodes of a rank.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@ namespace carillon::ldlt {
 using Ints = std::vector<std::int32_t>;
 using la::NodeRows;
 
-/// Lists of integers, one after the other.
+/// Concatenated integer lists of varying length.
 struct Ragged {
   Ints offsets{0};
   Ints items;
@@ -23,7 +23,7 @@ struct Ragged {
   void close() { offsets.push_back(static_cast<std::int32_t>(items.size())); }
 };
 
-/// Neighbours of this rank's nodes: numbers below own_nodes are this rank's, own_nodes + g is the node ghosts[g] of another.
+/// Neighbours of this rank's nodes: numbers below own_nodes are local, own_nodes + g is the ghost node ghosts[g].
 struct NodeLinks {
   std::int32_t first_node = 0;
   std::int32_t own_nodes = 0;
@@ -36,10 +36,10 @@ struct NodeLinks {
   std::int32_t find_ghost(std::int32_t node) const;
 };
 
-/// The union of the patterns of K and M, in nodes. Throws InputError when their rows differ. Local.
+/// Union of the patterns of K and M, in nodes. Throws InputError if their rows differ. Local.
 NodeLinks find_links(const NodeRows& k, const NodeRows& m);
 
-/// Values of ghosts, from their owners; own: (own_nodes). Collective.
+/// Values of ghost nodes, from their owners; own: (own_nodes). Collective.
 template <comm::Plain T>
 std::vector<T> fetch_ghosts(const comm::Communicator& comm, const NodeLinks& nodes, const comm::IndexPartition& owners,
                             const std::vector<T>& own) {

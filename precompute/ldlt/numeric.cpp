@@ -1,11 +1,10 @@
-// Method:     Multifrontal L D L^T. A front holds its pivot columns (f, w) and an update matrix (r, r) for the rows behind them; entries of
-//             A and the children's update matrices are added in, panels of at most 72 columns are eliminated one after the other, and the
-//             update matrix goes to the parent. In a panel the diagonal block is factorised with pivoting (P A11 P^T = L11 D L11^T), L11^-1
-//             is kept instead of L11, and W = A21 P^T L11^-T = L21 D, L21 = W D^-1, A22 -= L21 W^T are products of tiles with strips.
-// Source:     Duff and Reid 1983; Liu 1992; Schenk and Gaertner 2006 (pivots are sought inside the diagonal block only). The explicit
-//             inverse: Higham 2002, Accuracy and stability of numerical algorithms, chapter 14 (L11 has entries of order one by rook
-//             pivoting).
-// Deviations: no delayed pivots: a bad pivot shows in the backward error, which is reported to the caller.
+// Method: Multifrontal L D L^T. A front holds its pivot columns (f, w) and a contribution block (r, r) for the remaining rows; entries of A
+// and the contribution blocks of the children are added, panels of at most 72 columns are eliminated in turn, and the contribution block
+// goes to the parent. In a panel the diagonal block is factorised with pivoting (P A11 P^T = L11 D L11^T), L11^-1 is stored instead of L11,
+// and W = A21 P^T L11^-T = L21 D, L21 = W D^-1, A22 -= L21 W^T are products of tiles and strips. There are no delayed pivots: a bad pivot
+// shows in the backward error, which is reported to the caller.
+// Source: Duff and Reid 1983; Liu 1992; Schenk and Gaertner 2006 (pivots within the diagonal block only). Explicit inverse: Higham 2002,
+// Accuracy and stability of numerical algorithms, chapter 14 (with rook pivoting L11 has entries of order one).
 #include "precompute/ldlt/numeric.hpp"
 
 #include <algorithm>
@@ -27,7 +26,7 @@ using la::NodeRows;
 
 static_assert(3 * kPanelNodes <= kMaxBlock);
 
-/// Panels fit the columns that they are made of (kColumnsBegin): a triangle takes no more than the square that it comes from.
+/// Panels fit into the columns that they replace (kColumnsBegin): a triangle takes no more than its square.
 constexpr bool fit_triangles() {
   for (std::int64_t n = 3; n <= 3 * kPanelNodes; n += 3)
     if (count_triangle(n) > std::min(n * n, kColumnsBegin)) return false;
@@ -83,11 +82,11 @@ class Factoriser {
     for (std::int32_t i = 0; i < front.width; ++i) where_[front.first + i] = i;
     for (std::size_t i = 0; i < front.rows.size(); ++i) where_[front.rows[i]] = front.width + static_cast<std::int32_t>(i);
     std::fill_n(columns_, static_cast<std::size_t>(f_) * static_cast<std::size_t>(w_), 0.0);
-    // The first panel makes the update matrix, so it need not be cleared, and the children's shares in it come behind.
+    // The first panel initialises the contribution block, so it is not cleared; the children are added to it afterwards.
     add_entries(front);
     add_blocks(front);
     double* const top[2] = {top_[0], top_[1]};
-    for (std::size_t c = front.children.size(); c-- > 0;) add_child(front.children[c], Part::kPivots);  // the last one lies on top
+    for (std::size_t c = front.children.size(); c-- > 0;) add_child(front.children[c], Part::kPivots);  // last child is on top of the stack
     std::copy(top, top + 2, top_);
     eliminate(front, panels);
     for (std::size_t c = front.children.size(); c-- > 0;) add_child(front.children[c], Part::kRest);
@@ -98,14 +97,14 @@ class Factoriser {
     top_[front.depth % 2] += count_update(r_);
   }
 
-  /// starts_: where row 0 of each column of the front would be.
+  /// starts_: address of row 0 of each column of the front.
   void point_at_columns() {
     starts_.resize(f_);
     for (int c = 0; c < w_; ++c) starts_[c] = columns_ + static_cast<std::ptrdiff_t>(c) * f_;
     for (int c = w_; c < f_; ++c) starts_[c] = update_ + find_update_column(r_, c - w_) - w_;
   }
 
-  /// Adds factor times this rank's row 3 v + d of a matrix to column `target` of the front; `first`: its first pivot.
+  /// Adds factor times row 3 v + d of a matrix to column `target` of the front; `first`: first pivot of the front.
   void add_row(const NodeRows& rows, const Ints& ghosts, PetscInt row, std::int32_t first, double factor, double* target) const {
     const auto add = [&](std::int32_t node, PetscInt column, double value) {
       if (node >= first) target[3 * where_[node] + column % 3] += factor * value;
@@ -119,7 +118,7 @@ class Factoriser {
     for (std::int32_t i = 0; i < front.width; ++i) {
       double* target = columns_ + static_cast<std::ptrdiff_t>(3 * i) * f_;
       const std::int32_t own = plan_.own_of_pivot[front.first + i];
-      if (own < 0) continue;  // add_blocks has it
+      if (own < 0) continue;  // handled by add_blocks
       if (k_.has_blocks())
         add_node_rows(own, front.first, target);
       else
@@ -128,7 +127,7 @@ class Factoriser {
     }
   }
 
-  /// Adds K's rows of a node, which are blocks of 3x3, to three columns of the front.
+  /// Adds the rows of K of a node, stored as 3x3 blocks, to three columns of the front.
   void add_node_rows(std::int32_t own, std::int32_t first, double* target) const {
     const auto add = [&](std::int32_t node, const double* const(&values)[3]) {
       if (node < first) return;
@@ -188,7 +187,7 @@ class Factoriser {
     }
   }
 
-  /// Adds the blocks that came from other ranks; fronts and blocks are in the same order.
+  /// Adds the blocks received from other ranks; fronts and blocks are in the same order.
   void add_blocks(const Front& front) {
     for (std::size_t l = 0; l < plan_.received.size(); ++l) {
       const ReceivedBlocks& list = plan_.received[l];
@@ -201,7 +200,7 @@ class Factoriser {
     }
   }
 
-  /// Where a child's rows are in the front, as runs; the columns of pivots come first. Returns the number of nodes among the pivots.
+  /// Locates the rows of a child in the front, as runs; pivots come first. Returns the number of nodes among the pivots.
   std::size_t locate(const Ints& rows, std::int32_t pivots) {
     runs_.clear();
     node_runs_.clear();
@@ -216,7 +215,7 @@ class Factoriser {
     return before;
   }
 
-  /// Adds the columns of node j of a child's update matrix of r rows, from their diagonals on.
+  /// Adds the columns of node j of a child's contribution block of r rows, from their diagonals on.
   void add_node(const double* update, std::int64_t r, std::size_t j) {
     const int k = node_runs_[j];
     const RowRun whole = runs_[k];
@@ -231,8 +230,8 @@ class Factoriser {
 
   enum class Part { kPivots, kRest };
 
-  /// Adds what of a child's update matrix falls into the columns of pivots, or the rest of it, and gives it back with that. Children lie on
-  /// their stack in order, and are taken from its top: the last one first.
+  /// Adds the part of a child's contribution block in the pivot columns, or the rest of it, and pops it from its stack. Children are
+  /// stacked in order, so the last one is taken first.
   void add_child(std::int32_t s, Part part) {
     const Front& child = plan_.fronts[s];
     const std::size_t pivots = locate(child.rows, w_ / 3);
@@ -281,12 +280,12 @@ class Factoriser {
   const Plan& plan_;
   NodeRows k_;
   NodeRows m_;
-  double k_factor_;  // of the entries of K and M: a and -sigma b of A = a K - sigma b M
+  double k_factor_;  // of K and M: a and -sigma b of A = a K - sigma b M
   double m_factor_;
   Numbers& numbers_;
   const Kernels& kernels_;
 
-  // The front in work: w pivot columns of f rows, and the update matrix of the r rows behind them.
+  // Current front: w pivot columns of f rows, and the contribution block of the r other rows.
   int w_ = 0;
   int r_ = 0;
   int f_ = 0;
@@ -295,12 +294,12 @@ class Factoriser {
   Buffer block_;
   double* update_ = nullptr;
   std::vector<double*> starts_;
-  Ints where_;                // (local_nodes) node of the front in work
-  std::vector<RowRun> runs_;  // of the child that is being added
-  Ints node_runs_;            // the run of each of its nodes
+  Ints where_;                // (local_nodes) node of the current front
+  std::vector<RowRun> runs_;  // of the child being added
+  Ints node_runs_;            // run of each of its nodes
 
-  double* top_[2] = {nullptr, nullptr};  // of the stacks of update matrices, which grow downwards
-  Ints slot_;                            // (own nodes and ghosts) of the column that is sent, -1
+  double* top_[2] = {nullptr, nullptr};  // of the stacks of contribution blocks, which grow downwards
+  Ints slot_;                            // (own nodes and ghosts) block of the column being sent, -1
   std::vector<MPI_Request> requests_;
   std::vector<std::vector<double>> sent_;
   std::vector<std::vector<double>> received_;
@@ -347,7 +346,7 @@ Numbers make_numbers(const Plan& plan) {
       panel.tiles = stored;
       stored += 3 * n * (front.own_nodes() - front.row_begin[k + 1]);
     }
-    stored = numbers.shared_columns.back() + front.count_pivot_columns();  // panels take no more than the columns that they are made of
+    stored = numbers.shared_columns.back() + front.count_pivot_columns();  // panels fit into the columns that they replace
   }
   numbers.panels = Buffer(plan.room.numbers, Pages::kAtOnce);
   numbers.d_diagonal.assign(3 * pivots, 0.0);

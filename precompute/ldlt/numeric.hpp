@@ -1,4 +1,4 @@
-// The numbers of a factorisation, and what computes and uses them.
+// Values of a factorisation.
 #pragma once
 
 #include <cstdint>
@@ -11,58 +11,58 @@
 
 namespace carillon::ldlt {
 
-/// What the pivots of a factorisation were like.
+/// Pivot statistics of a factorisation.
 struct Outcome {
   std::int64_t negative = 0;                                  // eigenvalues of D below zero
-  double smallest = std::numeric_limits<double>::infinity();  // least magnitude of a pivot
+  double smallest = std::numeric_limits<double>::infinity();  // smallest magnitude of a pivot
   double growth = 0;                                          // largest magnitude in L21
-  bool is_complete = true;                                    // no pivot vanished exactly
+  bool is_complete = true;                                    // no pivot was exactly zero
 
-  /// triangle <- L^-1 of a diagonal block (columns kMaxBlock apart, both triangles); zero with zero pivots when one vanishes, so that what
-  /// follows stays finite.
+  /// triangle <- L^-1 of a diagonal block (columns kMaxBlock apart, both triangles). If a pivot vanishes, sets triangle and pivots to zero,
+  /// so that later values stay finite.
   void eliminate(const Kernels& kernels, double* block, int n, BlockPivots& pivots, double* triangle);
 };
 
-/// Where a panel of a shared front is among this rank's numbers; -1: it has none.
+/// Offsets of a panel of a shared front in this rank's numbers; -1: not on this rank.
 struct SharedPanel {
   std::int64_t triangle = -1;  // L11^-1, with the diagonal tile
-  std::int64_t tiles = -1;     // L21 of its rows below
+  std::int64_t tiles = -1;     // L21 of this rank's rows
   std::int32_t pivots = -1;    // D and order, with the diagonal tile
 };
 
-/// L D L^T of this rank's fronts. Each front is a row of panels; each panel is L11^-1 and then L21, both in tiles (kernels.hpp).
+/// L D L^T of this rank's fronts. A front is a sequence of panels; a panel is L11^-1 followed by L21, both in tiles (kernels.hpp).
 struct Numbers {
   Buffer panels;
-  std::vector<std::int64_t> front_offsets;       // where each front's panels begin
+  std::vector<std::int64_t> front_offsets;       // begin of each front's panels
   std::vector<std::vector<SharedPanel>> shared;  // (shared fronts) of (pivot tiles)
-  std::vector<std::int64_t> shared_columns;      // where the pivot columns of each shared front begin while it is in work
-  // At this rank's pivots, first those of its own fronts:
-  std::vector<double> d_diagonal;   // the inverse of D: diagonal ...
-  std::vector<double> d_off;        // ... and between a row and the next
-  std::vector<std::uint8_t> order;  // of the pivots in their panels: BlockPivots::order
-  Outcome outcome;                  // of this rank until a factorisation ends, then of all
-  int generation = 0;               // how often it was factorised
+  std::vector<std::int64_t> shared_columns;      // begin of the pivot columns of each shared front during its factorisation
+  // At the pivots of this rank, own fronts first:
+  std::vector<double> d_diagonal;   // D^-1: diagonal ...
+  std::vector<double> d_off;        // ... and off-diagonal, between a row and the next
+  std::vector<std::uint8_t> order;  // pivot order in each panel: BlockPivots::order
+  Outcome outcome;                  // of this rank during a factorisation, then of all ranks
+  int generation = 0;               // number of factorisations so far
 
-  /// Null: this rank has none of it.
+  /// Null if this rank has no part of the panel.
   const double* find_tiles(const SharedPanel& panel) const { return panel.tiles < 0 ? nullptr : panels.data() + panel.tiles; }
 };
 
-/// Room for the panels. Throws std::bad_alloc.
+/// Allocates the panels. Throws std::bad_alloc.
 Numbers make_numbers(const Plan& plan);
 
-/// Right-hand sides in order of elimination: blocks of 8 or 16 columns, in each a row of them per row of the matrix.
+/// Right-hand sides in elimination order: blocks of 8 or 16 columns, each row-major.
 struct Workspace {
   std::vector<double*> blocks;  // one per kBlockColumns columns: rows of all slots
-  std::vector<Buffer> buffers;  // of those that have no room after the panels
+  std::vector<Buffer> buffers;  // memory of blocks that do not fit behind the panels
 };
 
 /// x <- A^-1 b for at most kSolveColumns columns, `stride` apart; b may be x. Collective.
 void solve_columns(const Plan& plan, const Numbers& numbers, Workspace& workspace, const double* b, double* x, int stride, int columns);
-/// Lies after the panels where there is room, so numbers must outlive it. Throws std::bad_alloc.
+/// Uses the room behind the panels if sufficient, so numbers must outlive it. Throws std::bad_alloc.
 Workspace make_workspace(const Plan& plan, const Numbers& numbers);
 
-/// Computes L D L^T of K - sigma M, in the memory of the workspace too, which is made again afterwards. Collective. Throws SystemError on
-/// all ranks when memory runs out.
+/// Computes L D L^T of K - sigma M. Also uses the memory of the workspace, which is made again afterwards. Collective. Throws SystemError
+/// on all ranks if memory runs out.
 void factorise_fronts(const Plan& plan, const la::Pencil& pencil, double sigma, Numbers& numbers, Workspace& workspace);
 
 }  // namespace carillon::ldlt

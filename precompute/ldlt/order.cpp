@@ -1,10 +1,9 @@
-// Method:     Every node begins in one piece. While it is larger than one rank can gather, it is cut by its quotient graph: each rank makes
-//             clusters of its own nodes, rank 0 bisects their graph down the tree, and part by part the edges between two sides are covered
-//             by the fewest nodes. Then each piece is gathered and cut by vertex separators, the right half going to another rank, until
-//             each rank has a leaf; up to four of the ranks below seek a separator each, and the smallest is taken; leaves and separators
-//             are ordered by METIS. Of two halves that one goes left whose rows lie more on the ranks there.
-// Source:     George 1973, Nested dissection of a regular finite element mesh; Karypis and Kumar 1998 (METIS). Koenig 1931 (vertex cover).
-// Deviations: the quotient graph is bisected on one rank.
+// Method: All nodes start in one piece. While it exceeds the limit of one rank, it is cut by its quotient graph: each rank clusters its own
+// nodes, rank 0 bisects the cluster graph down the tree, and for each part the edges between its two sides are covered by a minimum vertex
+// cover. Then each piece is gathered and cut by vertex separators, the right half going to another rank, until each rank has a leaf; up to
+// four of the ranks below compute a separator each, and the smallest is taken. Leaves and separators are ordered by METIS. The half with
+// more of its rows on the left ranks goes left.
+// Source: George 1973, Nested dissection of a regular finite element mesh; Karypis and Kumar 1998 (METIS); Koenig 1931 (vertex cover).
 #include "precompute/ldlt/order.hpp"
 
 #include <algorithm>
@@ -24,19 +23,19 @@ using comm::Communicator;
 using comm::IndexPartition;
 using partition::Graph;
 
-constexpr std::int32_t kClusters = 1024;      // of all ranks together
-constexpr std::int32_t kFewestClusters = 64;  // of a rank
-constexpr std::size_t kSmallestCut = 8;       // nodes: fewer stay together
-constexpr int kTries = 4;                     // ranks that seek a separator of the same piece
+constexpr std::int32_t kClusters = 1024;      // for all ranks together
+constexpr std::int32_t kFewestClusters = 64;  // per rank
+constexpr std::size_t kSmallestCut = 8;       // nodes: smaller pieces are not cut
+constexpr int kTries = 4;                     // ranks that compute a separator of the same piece
 
-/// The part where a node is, or of whose separator it is.
+/// Part that contains a node, in its interior or its separator.
 struct Label {
   std::int32_t part = 0;
   std::int32_t is_separator = 0;
   friend bool operator==(const Label&, const Label&) = default;
 };
 
-/// The links among the own nodes.
+/// Links among the own nodes.
 Graph make_own_graph(const NodeLinks& nodes) {
   Graph graph;
   graph.offsets.push_back(0);
@@ -53,8 +52,7 @@ struct Link {
   auto operator<=>(const Link&) const = default;
 };
 
-/// The part where each cluster stays: pieces of at most `largest` nodes, or leaves. Links are between clusters, each as often as there are
-/// links between their nodes.
+/// Part of each cluster: pieces of at most `largest` nodes, or leaves. Links between clusters occur once per link between their nodes.
 Ints bisect_clusters(const SeparatorTree& tree, const Ints& weights, std::vector<Link> links, std::int32_t largest) {
   std::sort(links.begin(), links.end());
   Ints place(weights.size(), tree.root());
@@ -100,7 +98,7 @@ Ints bisect_clusters(const SeparatorTree& tree, const Ints& weights, std::vector
   return place;
 }
 
-/// Where each own node and ghost is before anything is gathered.
+/// Part of each own node and ghost before pieces are gathered.
 std::vector<Label> label_nodes(const Communicator& comm, const NodeLinks& nodes, const IndexPartition& owners, const SeparatorTree& tree,
                                std::int32_t largest) {
   Ints cluster = comm.agree([&] {
@@ -161,14 +159,14 @@ std::vector<Label> label_nodes(const Communicator& comm, const NodeLinks& nodes,
   return label;
 }
 
-/// Nodes that are cut or ordered next, on the rank that holds the part.
+/// Nodes to be cut or ordered next, on the rank that holds the part.
 struct Piece {
   Label label;
-  Ints nodes;  // global
+  Ints nodes;  // global numbers
   Graph graph;
 };
 
-/// Some of a piece's vertices alone. number: scratch of partition::take_part.
+/// Subset of the vertices of a piece. number: scratch of partition::take_part.
 Piece take(const Piece& piece, const Ints& vertices, Label label, Ints& number) {
   Piece taken;
   taken.label = label;
@@ -177,11 +175,12 @@ Piece take(const Piece& piece, const Ints& vertices, Label label, Ints& number) 
   return taken;
 }
 
-/// Into what is left of the separator, right of it, and the separator.
+/// Cuts a piece into left part, right part and separator.
 std::array<Piece, 3> cut(const Piece& piece, const Ints& side, const SeparatorTree& tree, const IndexPartition& owners) {
   const int part = piece.label.part;
   const int middle = tree[tree[part].right].begin;
-  std::int64_t kept = 0;  // nodes whose rows are where their side would go, less those whose are not; all on one rank: any side will do
+  std::int64_t kept =
+      0;  // nodes with rows on their target side minus other nodes; if all rows are on one rank, either orientation is as good
   for (std::size_t v = 0; v < side.size(); ++v)
     if (side[v] < 2) kept += (owners.find_owner(piece.nodes[v]) >= middle) == (side[v] == 1) ? 1 : -1;
   std::array<Ints, 3> sides;
@@ -209,7 +208,7 @@ Piece unpack(ListReader& reader) {
   return piece;
 }
 
-/// The pieces of one label that this rank begins with. Collective.
+/// Gathers the initial pieces of this rank, one per label. Collective.
 std::vector<Piece> gather_pieces(const Communicator& comm, const NodeLinks& nodes, const SeparatorTree& tree,
                                  const std::vector<Label>& label) {
   const auto received = comm::all_to_all(comm, [&] {
@@ -246,7 +245,7 @@ std::vector<Piece> gather_pieces(const Communicator& comm, const NodeLinks& node
           piece.graph.offsets.push_back(static_cast<std::int32_t>(piece.graph.neighbours.size()));
         }
         if (piece.nodes.empty()) continue;
-        // Nodes came in ascending order, often without a gap.
+        // Nodes arrive in ascending order, often without gaps.
         const bool has_gaps = piece.nodes.back() - piece.nodes.front() >= static_cast<std::int32_t>(piece.nodes.size());
         for (std::int32_t& to : piece.graph.neighbours)
           to = has_gaps ? static_cast<std::int32_t>(std::lower_bound(piece.nodes.begin(), piece.nodes.end(), to) - piece.nodes.begin())
@@ -258,7 +257,7 @@ std::vector<Piece> gather_pieces(const Communicator& comm, const NodeLinks& node
   });
 }
 
-/// The piece of all nodes, which are all this rank's.
+/// The piece of all nodes, which are all on this rank.
 Piece make_whole(const NodeLinks& nodes, const SeparatorTree& tree) {
   Piece whole;
   whole.label = {tree.root(), 0};
@@ -268,7 +267,7 @@ Piece make_whole(const NodeLinks& nodes, const SeparatorTree& tree) {
   return whole;
 }
 
-/// The pieces that this rank begins with. Collective.
+/// Initial pieces of this rank. Collective.
 std::vector<Piece> find_pieces(const Communicator& comm, const NodeLinks& nodes, const IndexPartition& owners, const SeparatorTree& tree,
                                std::int32_t largest) {
   const bool is_one_piece = owners.total() <= largest || comm.size() == 1;
@@ -279,7 +278,7 @@ std::vector<Piece> find_pieces(const Communicator& comm, const NodeLinks& nodes,
   return gather_pieces(comm, nodes, tree, comm.agree([&] { return std::vector<Label>(nodes.count(), Label{tree.root(), 0}); }));
 }
 
-/// Appends the piece's nodes to their part, in the order of METIS.
+/// Appends the nodes of a piece to their part, ordered by METIS.
 void place(const Piece& piece, std::optional<double> dominated_per_edge, std::vector<Ints>& placed) {
   Ints& list = placed[piece.label.part];
   const std::size_t before = list.size();
@@ -288,12 +287,12 @@ void place(const Piece& piece, std::optional<double> dominated_per_edge, std::ve
   for (std::size_t v = 0; v < order.size(); ++v) list[before + static_cast<std::size_t>(order[v])] = piece.nodes[v];
 }
 
-/// Whether a piece is cut at this depth of the tree.
+/// True if a piece is cut at this depth of the tree.
 bool is_cut(const Piece& piece, const SeparatorTree& tree, int depth) {
   return piece.label.is_separator == 0 && tree[piece.label.part].depth == depth && !tree[piece.label.part].is_leaf();
 }
 
-/// The sides of the piece that this rank cuts at this depth, empty: it cuts none. Collective: its group seeks separators with it.
+/// Sides of the piece that this rank cuts at this depth; empty if none. Collective: the ranks of its group compute separators too.
 Ints seek_separator(const Communicator& comm, const std::vector<Piece>& pieces, const SeparatorTree& tree, int depth,
                     std::optional<double> dominated_per_edge) {
   const Piece* own = nullptr;
@@ -354,7 +353,7 @@ int SeparatorTree::find_common(int a, int b) const {
 }
 
 int SeparatorTree::find_part(std::int32_t position) const {
-  // Of parts that begin at the same place all but the last are empty.
+  // Among parts with the same first position, all but the last are empty.
   const auto at =
       std::upper_bound(parts.begin(), parts.end(), position, [](std::int32_t p, const TreePart& part) { return p < part.first; });
   return static_cast<int>(at - parts.begin()) - 1;

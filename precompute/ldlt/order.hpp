@@ -1,4 +1,4 @@
-// In which order the nodes are eliminated: a tree of separators over the ranks.
+// Elimination order of the nodes: a tree of separators over the ranks.
 #pragma once
 
 #include <cstdint>
@@ -11,8 +11,8 @@
 
 namespace carillon::ldlt {
 
-/// A part of the tree: the leaf of a rank, or the separator between two subtrees. Of the leaves begin to end - 1, and held by rank `begin`:
-/// it knows the part's nodes and fronts until they are dealt out.
+/// A part of the tree: the leaf of a rank, or the separator between two subtrees. Covers leaves begin to end - 1; rank `begin` holds the
+/// nodes and fronts of the part until they are distributed.
 struct TreePart {
   int begin = 0;
   int end = 1;
@@ -20,7 +20,7 @@ struct TreePart {
   int left = -1;  // parts below a separator
   int right = -1;
   int depth = 0;
-  std::int32_t first = 0;  // of its nodes, in the order of elimination
+  std::int32_t first = 0;  // position of its first node in the elimination order
   std::int32_t count = 0;
   std::int32_t first_front = 0;
   bool is_leaf() const { return end - begin == 1; }
@@ -29,7 +29,7 @@ struct TreePart {
 /// All parts, children before parents; the same on every rank.
 class SeparatorTree {
  public:
-  /// One leaf to a rank, no nodes.
+  /// One leaf per rank, no nodes.
   explicit SeparatorTree(int ranks);
 
   std::vector<TreePart> parts;
@@ -37,13 +37,13 @@ class SeparatorTree {
 
   const TreePart& operator[](int part) const { return parts[part]; }
   int root() const { return static_cast<int>(parts.size()) - 1; }
-  /// Of the lowest leaf.
+  /// Depth of the lowest leaf.
   int depth() const { return depth_; }
-  /// Whether a part is in the left subtree below a separator, of which it is in one.
+  /// True if a part is in the left subtree of a separator above it.
   bool is_left_of(int part, int above) const { return (*this)[part].end <= (*this)[(*this)[above].right].begin; }
-  /// The lowest part above both, or one of them.
+  /// Lowest common ancestor, possibly a or b.
   int find_common(int a, int b) const;
-  /// The part of a position in the order of elimination.
+  /// Part of a position in the elimination order.
   int find_part(std::int32_t position) const;
   int find_holder(std::int32_t position) const { return (*this)[find_part(position)].begin; }
 
@@ -52,10 +52,10 @@ class SeparatorTree {
   int depth_ = 0;
 };
 
-/// The nodes (global numbers) of each part that this rank holds, in the order of elimination. Fills first and count of the parts. Parts of
-/// up to `largest_gathered` nodes are gathered on one rank and cut there; larger ones are cut by their quotient graph, and stay where they
-/// are. dominated_per_edge: of the core of a Condensation, on all ranks the same. Collective. Throws SystemError on all ranks when memory
-/// runs out.
+/// Nodes (global numbers) of each part held by this rank, in elimination order. Sets first and count of the parts. Parts of up to
+/// `largest_gathered` nodes are gathered on one rank and cut there; larger ones are cut by their quotient graph without gathering.
+/// dominated_per_edge: of the core of a CompressedGraph, the same on all ranks. Collective. Throws SystemError on all ranks if memory runs
+/// out.
 std::vector<Ints> order_parts(const comm::Communicator& comm, const NodeLinks& nodes, const comm::IndexPartition& owners,
                               SeparatorTree& tree, std::int32_t largest_gathered, std::optional<double> dominated_per_edge = {});
 

@@ -1,7 +1,6 @@
-// Method:     A rank knows its own subtrees and the shared fronts between them and the root (deal.cpp). It asks the owners of the matrix
-//             rows for the pattern of the columns in which it has pivots or tiles. Where own fronts are made: room.cpp.
-// Source:     Pothen and Sun 1993 (mapping.cpp).
-// Deviations: none.
+// Method: A rank knows its own subtrees and the shared fronts between them and the root (deal.cpp). It asks the owners of the matrix rows
+// for the pattern of the columns in which it has pivots or tiles. Memory layout of own fronts: room.cpp.
+// Source: Pothen and Sun 1993 (mapping.cpp).
 #include "precompute/ldlt/plan.hpp"
 
 #include <algorithm>
@@ -26,14 +25,14 @@ using comm::Communicator;
 using comm::IndexPartition;
 using petsc::check;
 
-/// A column of A in which this rank has pivots: of its own fronts (front -1) or of a shared one.
+/// A column of A in which this rank has pivots, of its own fronts (front -1) or of a shared one.
 struct WantedColumn {
   std::int32_t node = 0;    // global
   std::int32_t front = -1;  // among the shared fronts
   std::int32_t column = 0;  // local node, or node of the shared front
 };
 
-/// Makes a rank's plan of the fronts that it was dealt.
+/// Builds the plan of a rank from the fronts assigned to it.
 class PlanMaker {
  public:
   PlanMaker(Plan& plan, const NodeLinks& nodes, const IndexPartition& owners, std::vector<DealtFront> dealt, const SharedMapping& mapping)
@@ -51,7 +50,7 @@ class PlanMaker {
       if (plan_.fronts[s].parent >= 0) plan_.fronts[plan_.fronts[s].parent].children.push_back(static_cast<std::int32_t>(s));
   }
 
-  /// What has to come from the owners of matrix rows: columns of own fronts that they own themselves do not.
+  /// Columns needed from the owners of matrix rows; own columns of own fronts are excluded.
   std::vector<WantedColumn> list_wanted() const {
     std::vector<WantedColumn> wanted;
     for (std::int32_t p = 0; p < plan_.pivot_nodes; ++p)
@@ -65,7 +64,7 @@ class PlanMaker {
     return wanted;
   }
 
-  /// Slots of the pivots that this rank solves for, and their nodes.
+  /// Nodes of the pivots solved on this rank, and their slots.
   std::vector<std::pair<std::int32_t, std::int32_t>> list_homes() const {
     std::vector<std::pair<std::int32_t, std::int32_t>> homes;
     for (std::int32_t p = 0; p < plan_.pivot_nodes; ++p) homes.emplace_back(node_of_pivot_[p], p);
@@ -83,7 +82,7 @@ class PlanMaker {
     return at == local_of_.end() ? -1 : at->second;
   }
 
-  /// The node of a shared front at a position, -1: none.
+  /// Node of a shared front at a position, -1: none.
   std::int32_t find_node(std::int32_t front, std::int32_t position) const {
     const DealtFront& dealt = dealt_[shared_dealt_[front]];
     return find_node(dealt, position);
@@ -96,9 +95,9 @@ class PlanMaker {
     return at != front.rows.end() && *at == position ? front.width() + static_cast<std::int32_t>(at - front.rows.begin()) : -1;
   }
 
-  /// Own fronts in postorder, though parts of the tree mix them.
+  /// Own fronts in postorder; parts of the tree interleave them.
   void add_own_fronts() {
-    std::unordered_map<std::int32_t, std::int32_t> own_of;  // by id: place in dealt_
+    std::unordered_map<std::int32_t, std::int32_t> own_of;  // by id: index in dealt_
     for (std::size_t d = 0; d < dealt_.size(); ++d)
       if (dealt_[d].owner == plan_.rank) own_of.emplace(dealt_[d].id, static_cast<std::int32_t>(d));
     std::vector<Ints> children(dealt_.size());
@@ -111,7 +110,7 @@ class PlanMaker {
     sort_by_room(dealt_, children, roots);
     Ints order;
     Ints stack(roots.begin(), roots.end());
-    while (!stack.empty()) {  // written from behind: parents before children
+    while (!stack.empty()) {  // filled in reverse: parents before children
       const std::int32_t d = stack.back();
       stack.pop_back();
       order.push_back(d);
@@ -155,7 +154,7 @@ class PlanMaker {
   }
 
   void add_shared_fronts() {
-    std::vector<std::pair<std::int32_t, std::int32_t>> order;  // place among all shared fronts, dealt front
+    std::vector<std::pair<std::int32_t, std::int32_t>> order;  // position among all shared fronts, dealt front
     for (std::size_t d = 0; d < dealt_.size(); ++d) {
       if (dealt_[d].owner >= 0) continue;
       bool is_shared_here = false;
@@ -199,7 +198,7 @@ class PlanMaker {
     }
   }
 
-  /// What the ranks of a child send to those of its parent: tiles in a factorisation, sums of rows in a solve.
+  /// Messages from the ranks of a child to those of its parent: tiles in a factorisation, partial sums in a solve.
   void add_messages(std::int32_t id, SharedFront& parent, SharedChild& child) {
     const auto slot_in = [](const SharedFront& front, std::int32_t node) {
       const int i = front.map.find_tile(node);
@@ -233,15 +232,15 @@ class PlanMaker {
   std::unordered_map<std::int32_t, std::int32_t> local_of_;      // by position
   std::unordered_map<std::int32_t, std::int32_t> own_front_of_;  // by id
   Ints node_of_pivot_;                                           // (pivot_nodes) global
-  Ints shared_dealt_;                                            // (shared fronts) place in dealt_
+  Ints shared_dealt_;                                            // (shared fronts) index in dealt_
   std::vector<Ints> shared_nodes_;                               // (shared fronts) global numbers of the pivots
 };
 
-[[noreturn]] void refuse_order() { throw InputError("The order of a factorisation lacks links that K or M has."); }
+[[noreturn]] void refuse_order() { throw InputError("The elimination order lacks links of K or M."); }
 
-/// Whether the fronts of this rank have all rows that K and M have in their columns.
+/// Checks that the fronts of this rank contain all rows of K and M in their columns.
 void check_fronts(const Plan& plan, const NodeLinks& nodes) {
-  Ints front_of(plan.local_nodes, -1);  // the last front that has the row
+  Ints front_of(plan.local_nodes, -1);  // last front that contains the row
   std::vector<std::size_t> next(plan.received.size(), 0);
   for (std::size_t s = 0; s < plan.fronts.size(); ++s) {
     const Front& front = plan.fronts[s];
@@ -252,7 +251,7 @@ void check_fronts(const Plan& plan, const NodeLinks& nodes) {
     };
     for (std::int32_t pivot = front.first; pivot < behind; ++pivot) {
       const std::int32_t v = plan.own_of_pivot[pivot];
-      if (v < 0) continue;  // received
+      if (v < 0) continue;  // received from another rank
       for (const std::int32_t* u = nodes.links.begin(v); u != nodes.links.end(v); ++u) check_row(plan.node_of_link[*u]);
     }
     for (std::size_t l = 0; l < plan.received.size(); ++l) {  // columns ascend, as fronts do
@@ -262,7 +261,7 @@ void check_fronts(const Plan& plan, const NodeLinks& nodes) {
   }
 }
 
-/// Asks for the pattern of the columns that come from other ranks, or go into shared fronts. Collective.
+/// Requests the pattern of columns that come from other ranks, or go into shared fronts. Collective.
 void plan_blocks(const Communicator& comm, Plan& plan, const PlanMaker& maker, const NodeLinks& nodes, const IndexPartition& owners,
                  const Ints& position) {
   const auto wanted = comm.agree([&] {
@@ -318,7 +317,7 @@ void plan_blocks(const Communicator& comm, Plan& plan, const PlanMaker& maker, c
   });
 }
 
-/// Reports to the owners of matrix rows where these are solved for. Collective.
+/// Reports to the owners of matrix rows the rank that solves for each row. Collective.
 void plan_rows(const Communicator& comm, Plan& plan, const PlanMaker& maker, const IndexPartition& owners) {
   struct Home {
     std::int32_t node, slot;
@@ -348,10 +347,10 @@ void plan_rows(const Communicator& comm, Plan& plan, const PlanMaker& maker, con
   });
 }
 
-/// Room, peak of memory, entries and flops of this rank.
+/// Memory layout, peak memory, entries and flops of this rank.
 Analysis::Rank measure(Plan& plan) {
   Analysis::Rank own;
-  std::int64_t leaving = 0;  // what shared fronts get of update matrices: sent, and perhaps not yet received
+  std::int64_t leaving = 0;  // contribution blocks sent to shared fronts, possibly not received yet
   std::int64_t scratch = 0;
   for (const Front& front : plan.fronts) {
     own.entries += count_entries(front.width, front.size());
@@ -359,14 +358,14 @@ Analysis::Rank measure(Plan& plan) {
     scratch = std::max(scratch, count_wide(front.width, front.size()));
     if (front.shared_parent >= 0) leaving += count_update_of(front.rows);
   }
-  std::int64_t kept = leaving;  // letters of this rank, to itself, too
+  std::int64_t kept = leaving;  // including letters of this rank to itself
   std::int64_t shared_columns = 0;
   std::int64_t shared_peak = 0;
   for (const SharedFront& front : plan.shared) {
     own.entries += front.map.count_entries()[front.place];
     own.flops += front.map.count_operations()[front.place];
     shared_columns += kColumnsBegin + front.count_pivot_columns();
-    const std::int64_t update = front.count_update();  // goes to the parent
+    const std::int64_t update = front.count_update();  // sent to the parent
     const std::int64_t panels = std::int64_t{4} * 3 * kPanelNodes * 3 * (front.own_nodes() + std::int64_t{kWideRows});
     std::int64_t come = 0;  // from other ranks
     for (const SharedChild& child : front.children)
@@ -379,7 +378,7 @@ Analysis::Rank measure(Plan& plan) {
   }
   constexpr int kBlocks = kSolveColumns / kBlockColumns;
   const Room& room = plan.room = plan_room(plan.fronts, shared_columns, kBlocks, plan.count_block());
-  // Of a factorisation, and of the solves after it, whose right-hand sides lie in what it has left.
+  // Peak of a factorisation, and of the later solves, whose right-hand sides use the freed memory.
   std::int64_t numbers = std::max(
       {room.numbers + leaving + scratch, room.panels + shared_peak, room.numbers + (kBlocks - room.solve_blocks) * plan.count_block()});
   for (const SentBlocks& list : plan.sent) numbers += 9 * static_cast<std::int64_t>(list.columns.size());
@@ -397,7 +396,7 @@ void gather_analysis(Plan& plan, const Analysis::Rank& own, const Communicator& 
     all.peak_bytes += rank.peak_bytes;
     all.largest_peak_bytes = std::max(all.largest_peak_bytes, rank.peak_bytes);
   }
-  // A shared front is counted by the first of its ranks.
+  // The first rank of a shared front counts it.
   std::int64_t counts[3] = {static_cast<std::int64_t>(plan.fronts.size()), 0, 0};
   for (const SharedFront& front : plan.shared) {
     if (front.place != 0) continue;
@@ -442,14 +441,14 @@ Plan make_plan(Mat stiffness, Mat mass, const MeshOrder* order) {
   });
   const IndexPartition owners(comm, nodes.own_nodes);
   if (order != nullptr && order->node_count() != owners.total())
-    throw InputError("The order of a factorisation has another number of nodes than K.");
+    throw InputError("The elimination order and K have different numbers of nodes.");
   std::optional<MappedFronts> made;
   if (order == nullptr) made = map_fronts(comm, eliminate_on_paper(comm, nodes, owners));
   const MappedFronts& fronts = order != nullptr ? order->get_fronts() : *made;
   const Ints position = made ? made->elimination.position : report_positions(comm, fronts.elimination, nodes, owners);
   std::vector<DealtFront> dealt = deal_fronts(comm, fronts);
   const SharedMapping mapping = fronts.shared;
-  made.reset();  // the fronts of others are of no more use
+  made.reset();  // the fronts of other ranks are no longer needed
   PlanMaker maker(plan, nodes, owners, std::move(dealt), mapping);
   comm.agree([&] { maker.add_fronts(); });
   plan_blocks(comm, plan, maker, nodes, owners, position);

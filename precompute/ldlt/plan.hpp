@@ -1,4 +1,4 @@
-// Who eliminates what, in which order, and which messages that takes.
+// Plan of a rank: its fronts, their order, and the messages of factorisation and solves.
 #pragma once
 
 #include <petscmat.h>
@@ -15,38 +15,38 @@
 
 namespace carillon::ldlt {
 
-/// Rows of right-hand sides that go from a child of a shared front to its parent, and solutions that come back.
+/// Partial sums of right-hand sides from a child of a shared front to its parent, and solutions in the opposite direction.
 struct SumMessage {
   int rank = -1;
-  std::int32_t child = 0;  // id of the child
+  std::int32_t child = 0;  // id of the child front
   Ints slots;
 };
 
-/// A front that this rank has whole. Pivots and rows are local nodes.
+/// A front owned by this rank alone. Pivots and rows are local nodes.
 struct Front : Supernode {
-  Ints children;                    // fronts of this rank, in order of assembly
-  std::int32_t shared_parent = -1;  // the shared front above, and this front's place among its children; `parent` is -1 then
+  Ints children;                    // own fronts, in order of assembly
+  std::int32_t shared_parent = -1;  // parent if it is a shared front, and index among its children; `parent` is -1 then
   std::int32_t place_in_parent = -1;
-  std::vector<SumMessage> to_parent;  // where the shared parent collects its rows
-  std::int32_t depth = 0;             // below its root; the parity picks the stack of its update matrix
+  std::vector<SumMessage> to_parent;  // sums collected by the shared parent
+  std::int32_t depth = 0;             // below its root; the parity selects the stack of its contribution block
 };
 
-/// A child of a shared front, as all ranks of the parent know it: the ranks that have it, and where its rows are in the parent.
+/// A child of a shared front, as known to all ranks of the parent: its ranks, and its rows in the parent.
 struct SharedChild {
   TileMap map;
   std::int32_t width = 0;
-  Ints node_of_row;                    // (rows) node of the parent, ascending
-  std::vector<std::int64_t> arriving;  // (its places) numbers of its update matrix that come from there to this rank
-  std::int32_t front = -1;             // which of this rank's own fronts it is
-  std::int32_t shared = -1;            // which of its shared fronts
+  Ints node_of_row;                    // (rows) node in the parent, ascending
+  std::vector<std::int64_t> arriving;  // (its places) numbers of its contribution block sent from there to this rank
+  std::int32_t front = -1;             // index among this rank's own fronts, or -1
+  std::int32_t shared = -1;            // index among its shared fronts, or -1
 };
 
-/// Rows a_begin to a_end and columns b_begin to b_end of an update matrix, in nodes, that lie in one tile of the child and in one of the
-/// parent. On the diagonal a_begin is b_begin, and the lower triangle is meant.
+/// Rows a_begin to a_end and columns b_begin to b_end of a contribution block, in nodes, that lie in one tile of the child and one tile of
+/// the parent. On the diagonal a_begin equals b_begin, and only the lower triangle counts.
 struct Piece {
   std::int32_t a_begin, a_end, b_begin, b_end;
 
-  /// The first row meant of column c, as rows and columns of the matrix are numbered.
+  /// First row of column c, numbered in the contribution block.
   std::int64_t find_first_row(std::int64_t c) const { return a_begin == b_begin ? c : std::int64_t{3} * a_begin; }
   std::int64_t count() const {
     const std::int64_t rows = 3 * std::int64_t{a_end - a_begin};
@@ -54,7 +54,7 @@ struct Piece {
   }
 };
 
-/// A front in tiles that several ranks share.
+/// A front stored in tiles on several ranks.
 struct SharedFront {
   SharedFront(std::int32_t id, std::int32_t width, TileMap map, int rank, std::int32_t first_slot);
 
@@ -62,27 +62,27 @@ struct SharedFront {
   std::int32_t width = 0;
   TileMap map;
   int place = 0;             // of this rank in the map
-  std::int32_t parent = -1;  // among the shared fronts; the root has none
+  std::int32_t parent = -1;  // index among the shared fronts; the root has none
   std::int32_t place_in_parent = -1;
   std::vector<SharedChild> children;
-  std::vector<int> column_tiles;                // those where it has its columns
-  Ints row_begin;                               // (tiles + 1) nodes of its rows before each tile
-  std::int32_t first_slot = 0;                  // of its rows in a workspace of the solves
-  std::vector<int> last_columns;                // (places) the last column of tiles in which each has one, -1: none
+  std::vector<int> column_tiles;                // tile columns in which this rank has tiles
+  Ints row_begin;                               // (tiles + 1) own nodes before each tile
+  std::int32_t first_slot = 0;                  // of its rows in the workspace of the solves
+  std::vector<int> last_columns;                // (places) last tile column in which each place has a tile, -1: none
   std::vector<std::vector<int>> row_places;     // (pivot tiles) TileMap::list_row
   std::vector<std::vector<int>> column_places;  // (pivot tiles) TileMap::list_column
-  std::vector<SumMessage> from_children;        // what its ranks have summed up for rows that are collected here, in the order of arrival
-  std::vector<SumMessage> to_parent;            // what this rank has summed up for rows behind the pivots, by where it is collected
+  std::vector<SumMessage> from_children;        // partial sums of child ranks for rows collected here, in the order of arrival
+  std::vector<SumMessage> to_parent;            // partial sums of this rank for rows behind the pivots, by collecting rank
 
   std::int32_t own_nodes() const { return row_begin.back(); }
-  /// Numbers of its tiles in column j of tiles, one that it has.
+  /// Stored numbers of tile column j, which must be one of this rank's.
   std::int64_t count_column(int j) const { return 9 * std::int64_t{map.nodes(j)} * (own_nodes() - row_begin[j]); }
-  /// Of its tiles in the columns of pivots, and in those behind them.
+  /// Stored numbers of the tiles in the pivot columns, and in the columns behind.
   std::int64_t count_pivot_columns() const { return count_columns(0, map.pivot_tiles()); }
   std::int64_t count_update() const { return count_columns(map.pivot_tiles(), map.tiles()); }
-  /// Place of tile j among the column tiles; pre: it is one.
+  /// Index of tile j in column_tiles; pre: it is contained.
   std::size_t find_column_tile(int j) const { return std::lower_bound(column_tiles.begin(), column_tiles.end(), j) - column_tiles.begin(); }
-  /// Whether a place has tiles behind panel k.
+  /// True if a place has tiles behind panel k.
   bool is_updated(int by_place, int k) const { return last_columns[by_place] > k; }
 
  private:
@@ -94,7 +94,7 @@ struct SharedFront {
   }
 };
 
-/// Calls visit(piece) for what place `from` of a child sends to place `to` of its parent, in the order of both.
+/// Calls visit(piece) for all pieces that place `from` of a child sends to place `to` of its parent, in the order used by both.
 template <typename Visit>
 void for_pieces(const SharedChild& child, int from, const TileMap& parent, int to, Visit&& visit) {
   const TileMap& map = child.map;
@@ -119,7 +119,7 @@ void for_pieces(const SharedChild& child, int from, const TileMap& parent, int t
   }
 }
 
-/// Calls visit(row) for each row, of a child, of which place `from` has a part of the sum and place `to` of the parent collects it.
+/// Calls visit(row) for each row of a child with a partial sum on place `from` that is collected on place `to` of the parent.
 template <typename Visit>
 void for_sums(const SharedChild& child, int from, const TileMap& parent, int to, Visit&& visit) {
   for (std::size_t a = 0; a < child.node_of_row.size(); ++a)
@@ -128,25 +128,25 @@ void for_sums(const SharedChild& child, int from, const TileMap& parent, int to,
       visit(static_cast<std::int32_t>(a));
 }
 
-/// 3x3 blocks of A from the rank of their row to one that eliminates it, in the order of both.
+/// 3x3 blocks of A sent from the owner of a matrix row to a rank that eliminates it, in the order used by both.
 struct SentBlocks {
   int rank = -1;
   Ints columns;  // own nodes
   Ints rows;     // own nodes and ghosts
 };
 struct ReceivedBlocks {
-  /// Of a shared front, in its nodes; row -1: the tile is another rank's.
+  /// Block of a shared front, in its nodes; row -1: the tile is on another rank.
   struct Shared {
     std::int32_t front, column, row;
   };
   int rank = -1;
   Ints columns;  // local nodes, ascending
   Ints rows;
-  std::vector<Shared> shared;  // after them, fronts ascending
+  std::vector<Shared> shared;  // following those, fronts ascending
   std::size_t count() const { return columns.size() + shared.size(); }
 };
 
-/// Rows of right-hand sides that are eliminated on another rank than that of the matrix row.
+/// Rows of right-hand sides that are eliminated on another rank than the owner of the matrix row.
 struct GivenRows {
   int rank = -1;
   std::int32_t first_slot = 0;
@@ -157,26 +157,26 @@ struct TakenRows {
   Ints slots;
 };
 
-inline constexpr int kSolveColumns = 32;  // right-hand sides at a time
-inline constexpr int kBlockColumns = 16;  // of a block of them
+inline constexpr int kSolveColumns = 32;  // right-hand sides per pass
+inline constexpr int kBlockColumns = 16;  // columns per block of right-hand sides
 
-/// Local nodes are numbered in the order of elimination: first the pivots of this rank's own fronts, then the nodes behind them. Slots are
-/// rows of right-hand sides, three for a node: those of the local nodes, of the rows of shared fronts, of nodes that other ranks eliminate.
+/// Local nodes are numbered in elimination order: first the pivots of this rank's own fronts, then the remaining nodes. Slots are rows of
+/// right-hand sides, three per node: of the local nodes, of the rows of shared fronts, and of nodes that other ranks eliminate.
 struct Plan {
   MPI_Comm comm = MPI_COMM_NULL;
   int rank = 0;
-  std::int32_t own_nodes = 0;  // rows of the matrix
+  std::int32_t own_nodes = 0;  // node rows of the matrix
   std::int32_t pivot_nodes = 0;
   std::int32_t local_nodes = 0;
-  std::int32_t given_slots = 0;  // the first of those that go to other ranks
+  std::int32_t given_slots = 0;  // first slot of rows sent to other ranks
   std::int32_t slots = 0;
   Ints slot_of_own;                 // (own_nodes)
   Ints node_of_link;                // (own nodes and ghosts) local node, -1: none
-  Ints own_of_pivot;                // (pivot_nodes) own node that is the pivot, -1: the row is another rank's
-  Ints link_of_ghost_k;             // (ghost columns of K) number among own nodes and ghosts
+  Ints own_of_pivot;                // (pivot_nodes) own node of the pivot, -1: the row is on another rank
+  Ints link_of_ghost_k;             // (ghost columns of K) index among own nodes and ghosts
   Ints link_of_ghost_m;             // the same for M
   std::vector<Front> fronts;        // in postorder
-  std::vector<SharedFront> shared;  // in the order in which all ranks go through theirs, children before parents
+  std::vector<SharedFront> shared;  // in the processing order of all ranks, children before parents
   std::vector<SentBlocks> sent;
   std::vector<ReceivedBlocks> received;
   std::vector<GivenRows> given;
@@ -184,11 +184,11 @@ struct Plan {
   Room room;
   Analysis analysis;
 
-  /// Of a block of right-hand sides.
+  /// Numbers of a block of right-hand sides.
   std::int64_t count_block() const { return std::int64_t{3 * kBlockColumns} * slots; }
 };
 
-/// Plans everything. order: as for Factor. Collective; throws as Factor's constructor.
+/// Makes the plan. order: as for Factor. Collective; throws as the constructor of Factor.
 Plan make_plan(Mat stiffness, Mat mass, const MeshOrder* order);
 
 }  // namespace carillon::ldlt

@@ -1,10 +1,9 @@
-// Method:     Update matrices lie on two stacks, by the parity of their depth: those of a front's children are on the other stack than its
-//             own, so an update matrix can be made while those of the children are read, and nothing is moved. Stacks and the columns of
-//             the front in work lie where the panels of later fronts will be. The factorisation is played through: one stack has a place
-//             of its own at the end; the other, before it, grows towards the panels. Which is which is chosen for the least room.
-// Source:     Liu 1986, On the storage requirement in the out-of-core multifrontal method for sparse factorization (order of children);
-//             Liu 1992, The multifrontal method for sparse matrix solution (stacks).
-// Deviations: two stacks in place of one, which the order of children does not know; panels count as memory, too.
+// Method: Contribution blocks are kept on two stacks by the parity of their depth: those of the children are on the other stack than the
+// block of the front, so it can be computed while they are read, without moving data. Stacks and the columns of the current front occupy
+// the memory of the panels of later fronts. The factorisation is simulated: one stack has its own region at the end; the other, before it,
+// grows towards the panels. The assignment with less memory is taken. The order of children assumes one stack, and counts panels as memory.
+// Source: Liu 1986, On the storage requirement in the out-of-core multifrontal method for sparse factorization (order of children); Liu
+// 1992, The multifrontal method for sparse matrix solution (stacks).
 #include "precompute/ldlt/room.hpp"
 
 #include <algorithm>
@@ -27,7 +26,7 @@ Room plan_room(const std::vector<Front>& fronts, std::int64_t shared_columns, in
       most_below[parity] = std::max(most_below[parity], room.panels + count_front_room(front.width, front.size()) + used[parity]);
     }
     room.panels += count_stored(front.width, front.size());
-    if (front.parent < 0) used[front.depth % 2] -= count_update_of(front.rows);  // the shared front has its letters
+    if (front.parent < 0) used[front.depth % 2] -= count_update_of(front.rows);  // already sent to the shared front
     for (const std::int32_t child : front.children) used[fronts[child].depth % 2] -= count_update_of(fronts[child].rows);
   }
   const int apart = most_used[0] + most_below[1] <= most_used[1] + most_below[0] ? 0 : 1;
@@ -40,16 +39,16 @@ Room plan_room(const std::vector<Front>& fronts, std::int64_t shared_columns, in
 }
 
 void sort_by_room(const std::vector<DealtFront>& dealt, std::vector<Ints>& children, Ints& roots) {
-  std::vector<std::int64_t> most(dealt.size(), 0);  // while a subtree is eliminated
-  std::vector<std::int64_t> left(dealt.size(), 0);  // afterwards: its panels and one update matrix
+  std::vector<std::int64_t> most(dealt.size(), 0);  // peak of a subtree
+  std::vector<std::int64_t> left(dealt.size(), 0);  // remainder: its panels and one contribution block
   const auto sort = [&](Ints& list) {
     std::stable_sort(list.begin(), list.end(), [&](std::int32_t a, std::int32_t b) { return most[a] - left[a] > most[b] - left[b]; });
   };
-  std::vector<bool> is_root(dealt.size(), false);  // its update matrix is sent to a shared front at once
+  std::vector<bool> is_root(dealt.size(), false);  // its contribution block is sent to a shared front at once
   for (const std::int32_t root : roots) is_root[root] = true;
   for (std::size_t d = 0; d < dealt.size(); ++d) {
     sort(children[d]);
-    std::int64_t before = 0;  // panels and update matrices of the children
+    std::int64_t before = 0;  // panels and contribution blocks of the children
     std::int64_t updates = 0;
     for (const std::int32_t child : children[d]) {
       most[d] = std::max(most[d], before + most[child]);

@@ -1,13 +1,11 @@
-// One state machine, whose fronts, panels and letters every step changes together; longer than most files.
-// Method:     Right-looking L D L^T of a front in tiles. The owner of a diagonal tile factorises it with pivoting inside it and sends
-//             L11^-1 and D down its column; the owners of the column make W = A21 P^T L11^-T and L21 = W D^-1 and send W to those who
-//             have tiles in the same rows, or in the columns of that number; each updates its own tiles, the next column first, so that
-//             the next panel is under way while the rest is updated. What a child leaves goes tile by tile to the owners in the parent.
-//             Pivot columns lie a little behind the place of the panels that are made of them, as those of own fronts do (storage.hpp).
-// Source:     Gupta, Karypis, Kumar 1997 (fronts in two dimensions); Duff and Reid 1983 (extend-add). Kernels and pivots: numeric.cpp.
-//             The end, with messages under way: Hoefler, Siebert, Lumsdaine 2010, Scalable communication protocols for dynamic sparse
-//             data exchange (a reduction that does not block while messages are taken).
-// Deviations: panels are sent to each receiver by their owner, not by trees.
+// Method: Right-looking L D L^T of a front in tiles. The owner of a diagonal tile factorises it with pivoting inside and sends L11^-1 and D
+// down its column; the owners of the column compute W = A21 P^T L11^-T and L21 = W D^-1 and send W to ranks with tiles in the same rows, or
+// in the columns of the same number; each updates its own tiles, the next column first, so that the next panel overlaps with the update of
+// the rest. The contribution block of a child is sent by tiles to the owners in the parent. Pivot columns lie slightly behind the place of
+// their panels, as for own fronts (storage.hpp). Panels are sent to each receiver by their owner, not along trees.
+// Source: Gupta, Karypis, Kumar 1997 (fronts in two dimensions); Duff and Reid 1983 (extend-add). Kernels and pivots: numeric.cpp.
+// Termination with messages in flight: Hoefler, Siebert, Lumsdaine 2010, Scalable communication protocols for dynamic sparse data exchange
+// (nonblocking reduction while messages are received).
 #include "precompute/ldlt/shared.hpp"
 
 #include <algorithm>
@@ -21,19 +19,18 @@ namespace {
 
 enum Kind : std::int32_t { kUpdate, kDiagonal, kPanel, kAbort };
 
-/// Letters of one factorisation and the next differ in their tag: a rank may be one ahead.
+/// Consecutive factorisations use different tags, as a rank may be one ahead.
 constexpr int kTag = 64;
 
-/// Numbers of D^-1 before the rows of a panel: diagonal and off.
+/// Numbers of D^-1 before the rows of a panel: diagonal and off-diagonal.
 constexpr std::int64_t kPivotNumbers = 2 * kMaxBlock;
 
-/// Columns of tiles behind the pivots share buffers of this size (4 MB) and at most a column more, for which there is room among the pages
-/// that wait.
+/// Tile columns behind the pivots are grouped in buffers of this size (4 MB), at most one column more, which fit into the kept pages.
 constexpr std::int64_t kPieceNumbers = std::int64_t{1} << 19;
 
 std::int64_t count_strips(std::int64_t rows) { return (rows + kWideRows - 1) / kWideRows * kWideRows; }
 
-/// Calls copy(in the strip, in the block, numbers) for the runs of some rows of strips of n columns, and of a block in columns.
+/// Calls copy(in the strips, in the block, count) for the runs of a range of rows, between strips of n columns and a column-major block.
 template <typename Strips, typename Block, typename Copy>
 void for_strip_runs(Strips* wide, int n, std::int64_t first, std::int64_t rows, Block* block, Copy&& copy) {
   for (int k = 0; k < n; ++k, block += rows)
@@ -78,7 +75,7 @@ void SharedFactoriser::run(const std::function<void()>& factorise_own) {
     work_off();
   } catch (const std::bad_alloc&) {
     has_failed_ = true;
-    works_.clear();  // for the messages that still come
+    works_.clear();  // frees memory for messages still to arrive
     for (int rank = 0; rank < comm.size(); ++rank)
       if (rank != comm.rank()) mailbox_.send(rank, Letter({kAbort, 0, 0, 0}, 0));
   }
@@ -176,7 +173,7 @@ bool SharedFactoriser::step(std::int32_t f) {
   return true;
 }
 
-/// Eliminates the next panel in a column of this rank, if it has been updated by all before.
+/// Eliminates the next panel in a column of this rank, once all earlier panels have updated it.
 bool SharedFactoriser::eliminate_lead(const SharedFront& front, Work& work, std::int32_t f) {
   const int k = work.lead;
   if (k >= front.map.pivot_tiles()) return false;
@@ -272,7 +269,7 @@ void SharedFactoriser::eliminate_column(const SharedFront& front, Work& work, st
   complete(front, f, *update, k);
 }
 
-/// To those who need them for their rows or columns.
+/// Sends W to the ranks that need it for their rows or columns.
 void SharedFactoriser::send_rows(const SharedFront& front, int k, const BlockPivots& pivots, const std::shared_ptr<const Letter>& letter,
                                  const double* wide) {
   const int n = 3 * front.map.nodes(k);
@@ -321,7 +318,7 @@ SharedFactoriser::Update& SharedFactoriser::find_update(const SharedFront& front
   return update;
 }
 
-/// Puts rows that came from another rank where this rank's rows and columns need them.
+/// Copies received rows into the strips of this rank's rows and columns.
 void SharedFactoriser::add_rows(const SharedFront& front, Update& update, int k, int from, const double* rows) {
   const int n = 3 * front.map.nodes(k);
   front.map.for_needed(k, from, front.place, [&](int i) {
@@ -338,7 +335,7 @@ void SharedFactoriser::add_rows(const SharedFront& front, Update& update, int k,
   });
 }
 
-/// Once all rows are there: L of this rank's columns.
+/// Computes L of this rank's columns once all rows have arrived.
 void SharedFactoriser::complete(const SharedFront& front, std::int32_t f, Update& update, int k) {
   if (update.missing > 0) return;
   const int n = 3 * front.map.nodes(k);
@@ -370,7 +367,7 @@ void SharedFactoriser::complete(const SharedFront& front, std::int32_t f, Update
   update.is_ready = true;
 }
 
-/// Updates the next column of tiles by the panel in work.
+/// Updates the next tile column by the current panel.
 bool SharedFactoriser::update_next(const SharedFront& front, Work& work) {
   const int k = work.panel;
   if (k >= front.map.pivot_tiles()) return false;
@@ -407,7 +404,7 @@ double* SharedFactoriser::find_column(const SharedFront& front, const Work& work
 
 template <typename FindPieceRows>
 void SharedFactoriser::add_update(const SharedFront& front, Work& work, const SharedChild& child, int from, FindPieceRows&& find_rows) {
-  // Rows that follow each other in the front too.
+  // Runs of rows consecutive in the parent front too.
   struct TileRun {
     std::int64_t begin, end;  // rows of the child
     std::int64_t to;          // row of the tile

@@ -1,4 +1,4 @@
-// Fronts that several ranks share, factorised tile by tile.
+// Tile-by-tile factorisation of fronts shared by several ranks.
 #pragma once
 
 #include <functional>
@@ -12,50 +12,50 @@
 
 namespace carillon::ldlt {
 
-/// Factorises this rank's tiles of shared fronts. It never waits for one message: of the fronts whose children are complete it takes the
-/// next step that can be taken, in the order of the plan. Each tile is updated by one panel after the other, and children are added in
-/// order, so the result does not depend on which message came first.
+/// Factorises this rank's tiles of shared fronts. Never waits for a particular message: among the fronts with complete children it takes
+/// the first possible step in the order of the plan. Each tile is updated panel by panel, and children are added in order, so the result
+/// does not depend on message timing.
 class SharedFactoriser {
  public:
-  /// blocks: what came of A, as plan.received lists it. Both must outlive it.
+  /// blocks: entries of A received, as listed in plan.received. All arguments must outlive it.
   SharedFactoriser(const Plan& plan, Numbers& numbers, const std::vector<std::vector<double>>& blocks);
 
-  /// Does the own fronts, then the shared ones, and makes the outcome that of all ranks. Collective. Throws SystemError on all ranks when
-  /// memory runs out on one, after all messages have been taken.
+  /// Factorises the own fronts, then the shared ones, and combines the outcome of all ranks. Collective. Throws SystemError on all ranks if
+  /// memory runs out on one, after all messages have been received.
   void run(const std::function<void()>& factorise_own);
 
-  /// Where the first row of node a is in column c of an update matrix; the rows of nodes in the same tile follow.
+  /// Address of the first row of node a in column c of a contribution block; rows of nodes in the same tile follow.
   using FindRows = std::function<const double*(std::int32_t a, std::int64_t c)>;
 
-  /// Sends what place `from` has of the update matrix of a child of shared front `parent`, to this rank itself, too.
+  /// Sends the part of place `from` of the contribution block of a child of shared front `parent`, also to this rank itself.
   void send_update(std::int32_t parent, std::int32_t child, int from, const FindRows& find);
 
  private:
-  /// A panel on its way through the tiles of this rank.
+  /// A panel while it is applied to the tiles of this rank.
   struct Update {
-    std::shared_ptr<const Letter> letter;        // W of a whole column as it was sent, or
-    Buffer rows;                                 // W of the rows of this rank behind the panel, in strips,
-    Buffer columns;                              // and of those of its columns that are not among its rows
-    const double* wide = nullptr;                // W of the rows, either way
-    Buffer tiles;                                // L of its columns that it has not made itself
-    std::vector<const double*> tiles_of_column;  // (column tiles) L of each, once all is there
+    std::shared_ptr<const Letter> letter;        // W of a whole column as sent, or
+    Buffer rows;                                 // W of this rank's rows behind the panel, in strips,
+    Buffer columns;                              // and of its columns that are not among its rows
+    const double* wide = nullptr;                // W of the rows, in either case
+    Buffer tiles;                                // L of its columns computed here
+    std::vector<const double*> tiles_of_column;  // (column tiles) L of each, once complete
     BlockPivots pivots;
-    int missing = 0;  // ranks whose rows have not come
+    int missing = 0;  // ranks whose rows have not arrived
     bool is_ready = false;
   };
-  /// A front in work.
+  /// Working state of a front.
   struct Work {
-    std::vector<std::vector<Letter>> children;  // (children) of (places): what has come
-    int missing = 0;                            // letters of children
+    std::vector<std::vector<Letter>> children;  // (children) of (places): letters received
+    int missing = 0;                            // letters of children not yet received
     bool is_assembled = false;
     bool is_done = false;
-    std::vector<Buffer> tiles;        // behind the pivots, by columns of tiles, each column in full height
-    std::vector<double*> columns;     // (column tiles) where each begins: those of pivots in the place of the panels, the rest in `tiles`
-    int lead = 0;                     // the panel that is eliminated next
-    int panel = 0;                    // the panel by which the tiles are updated
-    std::size_t next = 0;             // the column that is updated next by it, among the column tiles
+    std::vector<Buffer> tiles;        // behind the pivots, by tile columns, each of full height
+    std::vector<double*> columns;     // (column tiles) begin of each: pivot columns in the memory of the panels, others in `tiles`
+    int lead = 0;                     // next panel to eliminate
+    int panel = 0;                    // panel currently applied to the tiles
+    std::size_t next = 0;             // next column to update by it, index in column_tiles
     std::map<int, Update> updates;    // by panel
-    std::map<int, Letter> diagonals;  // by panel: L11^-1 and D of other ranks
+    std::map<int, Letter> diagonals;  // by panel: L11^-1 and D from other ranks
   };
 
   void work_off();
@@ -66,7 +66,7 @@ class SharedFactoriser {
   bool eliminate_lead(const SharedFront& front, Work& work, std::int32_t f);
   bool update_next(const SharedFront& front, Work& work);
   void assemble(const SharedFront& front, Work& work, std::int32_t f);
-  /// find_rows(piece, c): where the first row meant of column c is.
+  /// find_rows(piece, c): address of the first row of column c.
   template <typename FindPieceRows>
   void add_update(const SharedFront& front, Work& work, const SharedChild& child, int from, FindPieceRows&& find_rows);
   void finish(const SharedFront& front, Work& work);
@@ -78,7 +78,7 @@ class SharedFactoriser {
                  const double* wide);
   void complete(const SharedFront& front, std::int32_t f, Update& update, int k);
 
-  /// Where row 0 of this rank's rows of the front would be in a column of a column of tiles.
+  /// Address of row 0 of this rank's rows of the front, in one column of a tile column.
   static double* find_column(const SharedFront& front, const Work& work, std::size_t at, std::int32_t column);
   static int find_first_row(const SharedFront& front, int k) { return 3 * front.row_begin[k]; }
 
@@ -90,7 +90,7 @@ class SharedFactoriser {
   std::vector<Work> works_;
   std::map<std::int32_t, std::int32_t> shared_of_id_;
   Buffer block_;
-  int left_ = 0;  // fronts that are not done
+  int left_ = 0;  // unfinished fronts
   bool has_failed_ = false;
 };
 

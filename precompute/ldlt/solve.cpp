@@ -1,11 +1,9 @@
-// Method:     L D L^T X = B by fronts: forward in order of elimination, backward against it, on the rows of the right-hand sides where they
-//             lie. Panels are applied as products (L11^-1 is at hand, so there is no triangular solve), and read once in each direction for
-//             up to 32 columns. Of a shared front each rank multiplies its tiles; the owner of a diagonal tile adds up what the ranks of
-//             its row have gathered, and sends its part of the solution down its column, on the way back along its row. The row of the next
-//             panel is always multiplied first, so that the next owner can begin.
-// Source:     Liu 1992, section 6; Ashcraft, Eisenstat, Liu 1990, A fan-in algorithm for distributed sparse numerical factorization (sums
-//             travel to the owner once).
-// Deviations: none.
+// Method: L D L^T X = B by fronts: forward in elimination order, backward in reverse, in place on the rows of the right-hand sides. Panels
+// are applied as products (L11^-1 is stored, so there is no triangular solve) and read once in each direction for up to 32 columns. For a
+// shared front each rank multiplies its tiles; the owner of a diagonal tile sums the partial results along its row and sends its part of
+// the solution down its column; backward, along its row. The row of the next panel is multiplied first, so that the next owner can start.
+// Source: Liu 1992, section 6; Ashcraft, Eisenstat, Liu 1990, A fan-in algorithm for distributed sparse numerical factorization (sums
+// travel to the owner once).
 #include <algorithm>
 #include <cstring>
 #include <list>
@@ -19,11 +17,11 @@
 namespace carillon::ldlt {
 namespace {
 
-/// One block of 8 or 16 columns.
+/// A block of 8 or 16 columns.
 struct Block {
   double* rows = nullptr;  // (3 slots) rows of `width` numbers
   int width = 0;
-  int columns = 0;  // of them in use
+  int columns = 0;  // used columns
   int first_column = 0;
 };
 
@@ -50,15 +48,15 @@ class Solver {
     finish_sends();
   }
 
-  /// Solutions for rows of other ranks go back to them.
+  /// Returns solutions of rows of other ranks to them.
   void give_back() {
     for (const TakenRows& taken : plan_.taken) send(taken.rank, kGivenTag, taken.slots);
     for (const GivenRows& given : plan_.given) receive(given.rank, kGivenTag, list_given(given), Arrival::kIsSet);
     finish_sends();
   }
 
-  /// By strips of nodes that stay in the first-level cache. Columns are written in whole runs: one number of each at a time would wait for
-  /// memory at every line.
+  /// Works by strips of nodes that fit the first-level cache. Columns are written in contiguous runs: writing single numbers would wait for
+  /// memory at every cache line.
   void store(double* x, std::ptrdiff_t stride) const {
     alignas(64) double rows[kColumn * kWidth];
     alignas(64) double strip[kWidth * kColumn];
@@ -98,10 +96,10 @@ class Solver {
   }
 
  private:
-  static constexpr std::ptrdiff_t kStrip = 32;  // nodes whose rows of 16 and columns are in the first-level cache together
-  static constexpr std::ptrdiff_t kColumn = 3 * kStrip, kWidth = 16;  // numbers of a strip in a column; columns of a block at most
+  static constexpr std::ptrdiff_t kStrip = 32;  // nodes whose rows of 16 numbers and columns fit the first-level cache together
+  static constexpr std::ptrdiff_t kColumn = 3 * kStrip, kWidth = 16;  // numbers of a strip in a column; maximum columns of a block
 
-  /// The rows of the own nodes; columns that are not in use become zero.
+  /// Loads the rows of the own nodes; unused columns are set to zero.
   void load_own(const Block& block, const double* b, std::ptrdiff_t stride) const {
     alignas(64) double rows[kColumn * kWidth];
     alignas(64) double strip[kWidth * kColumn];
@@ -124,7 +122,7 @@ class Solver {
 
   double* find_own(const Block& block, std::ptrdiff_t v) const { return find_row(block, plan_.slot_of_own[v]); }
 
-  /// Prefetches the strip that begins at an own node: runs as short as it has in a column are over before the processor sees them.
+  /// Prefetches the strip starting at an own node: its runs in a column are too short for the hardware prefetcher.
   template <bool kIsWritten = false>
   void prefetch_columns(const Block& block, const double* columns, std::ptrdiff_t stride, std::ptrdiff_t first) const {
     const std::ptrdiff_t count = 3 * std::min<std::ptrdiff_t>(kStrip, plan_.own_nodes - first);
@@ -132,7 +130,7 @@ class Solver {
       for (std::ptrdiff_t i = 0; i < count; i += 8) __builtin_prefetch(columns + c * stride + 3 * first + i, kIsWritten ? 1 : 0);
   }
 
-  /// Prefetches the rows of a later own node: they lie anywhere.
+  /// Prefetches the rows of a later own node, as their addresses are irregular.
   void prefetch_rows(const Block& block, std::ptrdiff_t v, bool is_written) const {
     constexpr std::ptrdiff_t kAhead = 12;
     const double* rows = find_own(block, std::min<std::ptrdiff_t>(v + kAhead, plan_.own_nodes - 1));
@@ -157,7 +155,7 @@ class Solver {
       std::memcpy(to, from, 3 * 8 * sizeof(double));
   }
 
-  /// nodes_: the nodes of a front.
+  /// nodes_: nodes of a front.
   void list_nodes(const Front& front) {
     nodes_.resize(front.size());
     std::iota(nodes_.begin(), nodes_.begin() + front.width, front.first);
@@ -213,7 +211,7 @@ class Solver {
     }
   }
 
-  /// Numbers of L21 of the panel that stands before panel p of front s.
+  /// Numbers of L21 of the panel before panel p of front s.
   std::ptrdiff_t find_below(std::int32_t s, std::int32_t p) const {
     if (p == 0 && s == 0) return 0;
     const Front& front = plan_.fronts[p > 0 ? s : s - 1];
@@ -243,7 +241,7 @@ class Solver {
 
   static bool contains(const std::vector<int>& places, int place) { return std::binary_search(places.begin(), places.end(), place); }
 
-  /// Multiplies rows of column k by the solution there and subtracts that: the tiles from `begin` on, of this rank's nodes.
+  /// Subtracts the tiles of column k, own nodes `begin` to `end`, times the solution there.
   void subtract_column(const SharedFront& front, const double* tiles, int k, std::int32_t begin, std::int32_t end,
                        const std::vector<const double*>& in) {
     const int n = 3 * front.map.nodes(k);
@@ -335,7 +333,7 @@ class Solver {
     for (const SumMessage& sums : front.from_children) send_sums(sums, kSolutions);
   }
 
-  /// sums -= L^T X for the tiles of column k from node `begin` of this rank's on.
+  /// sums -= L^T X for the tiles of column k, own nodes `begin` to `end`.
   void subtract_rows(const SharedFront& front, const double* tiles, int k, std::int32_t begin, std::int32_t end,
                      const std::vector<double*>& sums) {
     if (begin == end) return;
@@ -345,7 +343,7 @@ class Solver {
       kernels_.subtract_transposed(from, 3 * (end - begin), n, blocks_[b].width / 8, nodes_.data() + begin, blocks_[b].rows, sums[b], from);
   }
 
-  /// Room for n rows of each block, zero.
+  /// Zeroed memory for n rows of each block.
   std::vector<double*> clear_sums(int n) {
     std::vector<double*> sums;
     for (std::size_t b = 0; b < blocks_.size(); ++b) {
@@ -357,7 +355,7 @@ class Solver {
 
   // ---- messages ----
 
-  /// To or from this rank itself there is no message: what was sent is kept by its child.
+  /// Sums to or from this rank itself are kept by child, without a message.
   void send_sums(const SumMessage& sums, Tag tag) {
     if (sums.rank != plan_.rank) {
       send(sums.rank, find_tag(sums.child, tag), sums.slots);
@@ -406,7 +404,7 @@ class Solver {
     MPI_Recv(received_.data(), static_cast<int>(count), MPI_DOUBLE, rank, tag, plan_.comm, MPI_STATUS_IGNORE);
   }
 
-  /// n rows of each block, which stay until the next call.
+  /// n rows of each block, valid until the next call.
   std::vector<const double*> receive_block(int rank, int tag, int n) {
     receive_numbers(rank, tag, static_cast<std::size_t>(n) * static_cast<std::size_t>(row_width_));
     std::vector<const double*> in;
@@ -442,7 +440,7 @@ class Solver {
   const Numbers& numbers_;
   const Kernels& kernels_;
   std::vector<Block> blocks_;
-  Ints nodes_;  // of the front in work
+  Ints nodes_;  // of the current front
   int row_width_ = 0;
   alignas(64) double sums_[kMaxBlock * kSolveColumns];
   std::map<std::int32_t, std::vector<double>> kept_;  // by child

@@ -1,9 +1,9 @@
-// Method:     Elimination tree by path compression; column counts by walking the row subtrees; supernodes of equal structure along the
-//             postorder; then children are merged into parents wherever a model of the time (fixed cost per front, per row, per entry, per
-//             flop, per entry of the update matrix) says that the stored zeros cost less than the front they save.
-// Source:     Liu 1990, The role of elimination trees in sparse factorization (tree, row subtrees). Liu, Ng, Peyton 1993, On finding
-//             supernodes. Ashcraft and Grimes 1989, The influence of relaxed supernode partitions on the multifrontal method.
-// Deviations: Ashcraft and Grimes bound the zeros; here modelled time decides, for solves and factorisation weigh differently.
+// Method: Elimination tree by path compression; column counts by walking the row subtrees; supernodes of equal structure along the
+// postorder. Children are then merged into parents where a time model (fixed cost per front, row, entry, flop and entry of the contribution
+// block) predicts that the stored zeros cost less than a separate front. Modelled time replaces the bound on zeros of Ashcraft and Grimes,
+// as solves and factorisation have different weights.
+// Source: Liu 1990, The role of elimination trees in sparse factorization (tree, row subtrees); Liu, Ng, Peyton 1993, On finding
+// supernodes; Ashcraft and Grimes 1989, The influence of relaxed supernode partitions on the multifrontal method.
 #include "precompute/ldlt/symbolic.hpp"
 
 #include <algorithm>
@@ -16,14 +16,14 @@ namespace {
 using Ints = std::vector<std::int32_t>;
 using partition::Graph;
 
-// Measured with tests/unit/precompute/ldlt's bench on one core of Zen 5 with AVX-512: a factorisation and 30 solves of 16 columns.
-constexpr double kFrontNs = 14'000;   // calls, lists and loops that do not fill the vector units
-constexpr double kRowNs = 120;        // a row of a right-hand side read and written
-constexpr double kEntryNs = 24;       // an entry of L used in the solves
-constexpr double kFlopNs = 1.0 / 60;  // of the factorisation
-constexpr double kUpdateNs = 1.0;     // an entry of the update matrix cleared and added to the parent
+// Measured by tests/bench/ldlt on one core of Zen 5 with AVX-512: a factorisation and 30 solves of 16 columns.
+constexpr double kFrontNs = 14'000;   // calls, lists and loops too short for vector units
+constexpr double kRowNs = 120;        // read and write of a row of a right-hand side
+constexpr double kEntryNs = 24;       // use of an entry of L in the solves
+constexpr double kFlopNs = 1.0 / 60;  // per flop of the factorisation
+constexpr double kUpdateNs = 1.0;     // clearing an entry of the contribution block and adding it to the parent
 
-/// parent[v] of the eliminated vertices v < count; -1 at roots.
+/// Parent of each eliminated vertex v < count; -1 at roots.
 Ints find_elimination_tree(const Graph& graph, std::int32_t count) {
   Ints parent(count, -1);
   Ints ancestor(count, -1);
@@ -39,7 +39,7 @@ Ints find_elimination_tree(const Graph& graph, std::int32_t count) {
   return parent;
 }
 
-/// Nodes in each column of L, the diagonal among them: row i fills the columns between its neighbours and i in the tree.
+/// Nodes in each column of L including the diagonal: row i fills the columns on the tree paths from its neighbours to i.
 Ints count_columns(const Graph& graph, const Ints& parent) {
   const auto count = static_cast<std::int32_t>(parent.size());
   Ints columns(count, 1);
@@ -55,7 +55,7 @@ Ints count_columns(const Graph& graph, const Ints& parent) {
   return columns;
 }
 
-/// Children lists as offsets and items; vertices without a parent are the children of `count`.
+/// Children lists as offsets and items; roots are the children of `count`.
 void list_children(const Ints& parent, Ints& offsets, Ints& items) {
   const std::size_t count = parent.size();
   const auto slot = [&](std::int32_t p) { return p < 0 ? count : static_cast<std::size_t>(p); };
@@ -67,14 +67,14 @@ void list_children(const Ints& parent, Ints& offsets, Ints& items) {
   for (std::size_t v = 0; v < count; ++v) items[next[slot(parent[v])]++] = static_cast<std::int32_t>(v);
 }
 
-/// order[i]: the vertex that is i-th when every subtree is contiguous and ends with its root.
+/// order[i]: i-th vertex in a postorder, in which every subtree is contiguous and ends with its root.
 Ints find_postorder(const Ints& parent) {
   Ints offsets;
   Ints items;
   list_children(parent, offsets, items);
   Ints order(parent.size());
   Ints stack(items.begin() + offsets[parent.size()], items.end());
-  // Written from behind, parents before children.
+  // Filled in reverse: parents before children.
   for (std::size_t place = parent.size(); place-- > 0;) {
     const std::int32_t v = stack.back();
     stack.pop_back();
@@ -84,17 +84,17 @@ Ints find_postorder(const Ints& parent) {
   return order;
 }
 
-/// A supernode while supernodes are merged.
+/// A supernode during amalgamation.
 struct Group {
   std::int32_t parent = -1;
   std::int64_t width = 0;
   std::int64_t size = 0;
-  Ints vertices;  // in order of elimination
+  Ints vertices;  // in elimination order
   Ints children;
   bool is_merged = false;
 };
 
-/// Supernodes of equal structure: v follows u if it is u's parent and u has its structure and itself.
+/// Supernodes of equal structure: v follows u if it is the parent of u and column u consists of u and the structure of v.
 std::vector<Group> group_equal_columns(const Ints& parent, const Ints& columns, std::int32_t elements) {
   const auto count = static_cast<std::int32_t>(parent.size());
   Ints pivot_parent(count - elements);
@@ -121,7 +121,7 @@ std::vector<Group> group_equal_columns(const Ints& parent, const Ints& columns, 
   return groups;
 }
 
-/// Merges children into parents while the modelled time falls, the best child first. A merged front has the parent's rows.
+/// Merges children into parents while the modelled time decreases, best child first. A merged front has the rows of the parent.
 void amalgamate(std::vector<Group>& groups) {
   for (Group& parent : groups) {
     while (true) {
@@ -151,7 +151,7 @@ void amalgamate(std::vector<Group>& groups) {
   }
 }
 
-/// Parents of the groups that are left, numbered among themselves.
+/// Parents of the remaining groups, in their new numbering.
 Ints number_groups(std::vector<Group>& groups, Ints& kept) {
   for (std::size_t g = 0; g < groups.size(); ++g)
     for (const std::int32_t child : groups[g].children) groups[child].parent = static_cast<std::int32_t>(g);
@@ -166,7 +166,7 @@ Ints number_groups(std::vector<Group>& groups, Ints& kept) {
   return parent;
 }
 
-/// Rows of each supernode: what its pivots, its children and its elements touch behind its pivots.
+/// Rows of each supernode: rows behind its pivots in the structure of its pivots, children and elements.
 void fill_rows(const Graph& graph, const Ints& parent, std::int32_t elements, const std::vector<Ints>& vertices, Forest& forest) {
   const auto pivots = static_cast<std::int32_t>(forest.position.size());
   const auto place = [&](std::int32_t v) { return v < elements + pivots ? forest.position[v - elements] : v - elements; };

@@ -1,8 +1,7 @@
-// Method:     Classes of about sqrt(g) ranks each. Columns go to classes one after the other, each to the class that has least for its
-//             share once it has this one too, so that at every panel the columns behind it are nearly balanced; rows within a class the
-//             same way. With equal shares that is the block-cyclic distribution.
-// Source:     Gupta, Karypis, Kumar 1997, Highly scalable parallel algorithms for sparse matrix factorization (fronts in two dimensions).
-// Deviations: shares need not be equal, and costs are the operations of the tiles.
+// Method: Classes of about sqrt(g) ranks each. Columns are assigned to classes in turn, each to the class with the least resulting load
+// relative to its share, so that at every panel the remaining columns are nearly balanced; rows within a class the same way. Costs are the
+// operations of the tiles. With equal shares this is the block-cyclic distribution.
+// Source: Gupta, Karypis, Kumar 1997, Highly scalable parallel algorithms for sparse matrix factorization (fronts in two dimensions).
 #include "precompute/ldlt/tile_map.hpp"
 
 #include <algorithm>
@@ -14,7 +13,7 @@
 namespace carillon::ldlt {
 namespace {
 
-/// The member with the least load for its weight once it has `cost` more.
+/// Member with the least load relative to its weight after adding `cost`.
 int choose(const std::vector<double>& load, const std::vector<double>& weight, double cost) {
   int best = 0;
   double least = 0;
@@ -58,7 +57,7 @@ TileMap::TileMap(std::int32_t width, std::int32_t rows, const std::vector<FrontS
     std::vector<double> weight;
     for (const int m : members[c]) weight.push_back(shares[m].fraction);
     std::vector<double> row_load(members[c].size(), 0.0);
-    double columns = 0;  // cost of a row of one node in the columns up to this one
+    double columns = 0;  // cost of a row of one node in the columns so far
     for (int i = 0; i < tiles(); ++i) {
       if (class_of_column_[i] == static_cast<int>(c)) columns += cost(i, i) / std::max(nodes(i), 1);
       const double row = columns * nodes(i);

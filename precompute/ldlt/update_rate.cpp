@@ -11,7 +11,7 @@
 namespace carillon::ldlt {
 
 double measure_update_rate() {
-  constexpr int kRows = 1536;  // as in the larger fronts of a body: the update matrix fits no second-level cache
+  constexpr int kRows = 1536;  // as in the larger fronts of a body: the update exceeds the second-level cache
   constexpr int kPivots = 3 * kPanelNodes;
   constexpr int kRuns = 3;
   constexpr double kSeconds = 0.05, kRowsOfPivots = double{kRows} * kPivots;

@@ -65,7 +65,7 @@ double calc_determinant(const TetMesh& mesh, std::int64_t e, double& longest_squ
     longest_squared = std::max(longest_squared, edge[m][0] * edge[m][0] + edge[m][1] * edge[m][1] + edge[m][2] * edge[m][2]);
   }
   const Vec3 &a = edge[0], &b = edge[2], &c = edge[3];
-  return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
+  return calc_det(a, b, c);
 }
 
 /// `determinant` and the square of the longest edge as calc_determinant gives them.

@@ -14,7 +14,7 @@ double calc_place_tolerance(const Vec3& low, const Vec3& high) {
   double largest = 0.0;
   for (std::size_t k = 0; k < 3; ++k) largest = std::max({largest, std::abs(low[k]), std::abs(high[k])});
   constexpr double kRoundings = 4 * std::numeric_limits<double>::epsilon();
-  return std::max(1e-9 * std::hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]), kRoundings * largest);
+  return std::max(1e-9 * calc_length(high - low), kRoundings * largest);
 }
 
 std::vector<std::int32_t> find_fixed_nodes(const TetMesh& mesh, const std::string& set) {

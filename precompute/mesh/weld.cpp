@@ -41,7 +41,7 @@ bool join_twins(const TetMesh& mesh, const std::vector<char>& used, const Vec3& 
   const auto compare = [&](std::int32_t i, std::int32_t j) {
     const Vec3& x = mesh.nodes_m[i];
     const Vec3& y = mesh.nodes_m[j];
-    if (i == j || std::hypot(x[0] - y[0], x[1] - y[1], x[2] - y[2]) > tolerance) return;
+    if (i == j || calc_length(x - y) > tolerance) return;
     twins.join(i, j);
     any = true;
   };
@@ -158,7 +158,7 @@ double find_shortest_edge(const TetMesh& mesh) {
     const auto tet = mesh.tet(e);
     for (const auto& [i, j] : kEdges) {
       const Vec3 &a = mesh.nodes_m[tet[i]], &b = mesh.nodes_m[tet[j]];
-      shortest = std::min(shortest, std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]));
+      shortest = std::min(shortest, calc_length(a - b));
     }
   }
   return shortest;
@@ -176,11 +176,11 @@ std::vector<std::int32_t> weld_cracks(TetMesh& mesh, const std::string& name, Ch
       low[k] = std::min(low[k], mesh.nodes_m[i][k]);
       high[k] = std::max(high[k], mesh.nodes_m[i][k]);
     }
-  if (!std::isfinite(std::hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2])))
+  if (!std::isfinite(calc_length(high - low)))
     throw InputError(fmt::format("{}: the coordinates are too large to compute with; give them in metres", name));
   // Coordinates of single precision differ by 1e-7 of the body; nodes that close on the scale of an element are still not twins.
   constexpr double kSingle = 1e-6, kOfEdge = 1e-2;
-  const double diagonal = std::hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]);
+  const double diagonal = calc_length(high - low);
   const double tolerance = std::max(calc_place_tolerance(low, high), std::min(kSingle * diagonal, kOfEdge * find_shortest_edge(mesh)));
   Parts twins(count);
   const bool any = tolerance > 0.0 && join_twins(mesh, used, low, tolerance, twins);

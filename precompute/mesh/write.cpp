@@ -78,128 +78,167 @@ void write_doubt(const TetMesh& mesh, bool binary, Output& out) {
   out.text(binary ? "\n$EndNodeData\n" : "$EndNodeData\n");
 }
 
-}  // namespace
-
-std::string make_gmsh(const TetMesh& mesh, GmshEncoding encoding) {
-  const bool binary = encoding == GmshEncoding::kBinary;
-  std::vector<std::int32_t> region_of(mesh.regions);
-  region_of.resize(mesh.tet_count(), 0);
-  std::vector<std::int32_t> regions(region_of);
-  std::sort(regions.begin(), regions.end());
-  regions.erase(std::unique(regions.begin(), regions.end()), regions.end());
-  // The group of region 0 gets an unused number.
-  std::int32_t no_region = 1;
-  while (std::binary_search(regions.begin(), regions.end(), no_region)) ++no_region;
-  std::vector<std::string> names;  // of the groups of the regions; empty: none
-  for (const std::int32_t r : regions) {
-    const auto found = mesh.region_names.find(r);
-    names.push_back(r == 0 ? kNoRegionName : found != mesh.region_names.end() ? clean_name(found->second) : "");
+/// Regions and node sets of a mesh as groups and entities of the file.
+class GmshWriter {
+ public:
+  GmshWriter(const TetMesh& mesh, GmshEncoding encoding)
+      : mesh_(mesh), binary_(encoding == GmshEncoding::kBinary), region_of_(mesh.regions), out_(binary_) {
+    region_of_.resize(mesh.tet_count(), 0);
+    regions_ = region_of_;
+    std::sort(regions_.begin(), regions_.end());
+    regions_.erase(std::unique(regions_.begin(), regions_.end()), regions_.end());
+    while (std::binary_search(regions_.begin(), regions_.end(), no_region_)) ++no_region_;
+    for (const std::int32_t r : regions_) {
+      const auto found = mesh.region_names.find(r);
+      names_.push_back(r == 0 ? kNoRegionName : found != mesh.region_names.end() ? clean_name(found->second) : "");
+    }
+    for (const auto& [name, nodes] : mesh.node_sets)
+      if (!is_region(clean_name(name), nodes)) sets_.emplace_back(clean_name(name), &nodes);
+    for (std::size_t s = 0; s < sets_.size(); ++s)
+      if (!sets_[s].second->empty()) filled_.push_back(s);
   }
-  // Readers derive the set of a region's nodes from its group.
-  const auto is_region = [&](const std::string& name, const std::vector<std::int32_t>& nodes) {
-    for (std::size_t r = 0; r < regions.size(); ++r) {
-      if (regions[r] == 0 || name != (names[r].empty() ? fmt::format("physical:{}", regions[r]) : names[r])) continue;
-      return nodes == find_region_nodes(mesh, region_of, regions[r]);
+
+  std::string write() {
+    write_format();
+    write_names();
+    write_entities();
+    write_nodes();
+    write_elements();
+    write_doubt(mesh_, binary_, out_);
+    return out_.take();
+  }
+
+ private:
+  /// Readers derive the node set of a region from its group.
+  bool is_region(const std::string& name, const std::vector<std::int32_t>& nodes) const {
+    for (std::size_t r = 0; r < regions_.size(); ++r) {
+      if (regions_[r] == 0 || name != (names_[r].empty() ? fmt::format("physical:{}", regions_[r]) : names_[r])) continue;
+      return nodes == find_region_nodes(mesh_, region_of_, regions_[r]);
     }
     return false;
-  };
-  std::vector<std::pair<std::string, const std::vector<std::int32_t>*>> sets;
-  for (const auto& [name, nodes] : mesh.node_sets)
-    if (!is_region(clean_name(name), nodes)) sets.emplace_back(clean_name(name), &nodes);
-  Output out(binary);
-  out.text(fmt::format("$MeshFormat\n4.1 {} 8\n", binary ? 1 : 0));
-  if (binary) {
-    out.int32(1);
-    out.text("\n");
   }
-  out.text("$EndMeshFormat\n");
-  const auto named = std::count_if(names.begin(), names.end(), [](const std::string& name) { return !name.empty(); });
-  if (!sets.empty() || named > 0) {
-    out.text(fmt::format("$PhysicalNames\n{}\n", sets.size() + static_cast<std::size_t>(named)));
-    for (std::size_t r = 0; r < regions.size(); ++r)
-      if (!names[r].empty()) out.text(fmt::format("3 {} \"{}\"\n", regions[r] != 0 ? regions[r] : no_region, names[r]));
-    for (std::size_t s = 0; s < sets.size(); ++s) out.text(fmt::format("0 {} \"{}\"\n", s + 1, sets[s].first));
-    out.text("$EndPhysicalNames\n");
-  }
-  std::vector<std::size_t> filled;  // sets that have nodes
-  for (std::size_t s = 0; s < sets.size(); ++s)
-    if (!sets[s].second->empty()) filled.push_back(s);
-  Vec3 low = mesh.nodes_m.empty() ? Vec3{} : mesh.nodes_m.front(), high = low;
-  for (const Vec3& x : mesh.nodes_m)
-    for (std::size_t k = 0; k < 3; ++k) {
-      low[k] = std::min(low[k], x[k]);
-      high[k] = std::max(high[k], x[k]);
+  std::int32_t find_group(std::size_t r) const { return regions_[r] != 0 ? regions_[r] : no_region_; }
+
+  void begin(const char* section) { out_.text(fmt::format("${}\n", section)); }
+  void end(const char* section) { out_.text(fmt::format("{}$End{}\n", binary_ ? "\n" : "", section)); }
+
+  void write_format() {
+    out_.text(fmt::format("$MeshFormat\n4.1 {} 8\n", binary_ ? 1 : 0));
+    if (binary_) {
+      out_.int32(1);
+      out_.text("\n");
     }
-  out.text("$Entities\n");
-  for (const std::size_t count : {filled.size(), std::size_t{0}, std::size_t{0}, regions.size()}) out.size(count);
-  out.end_line();
-  for (const std::size_t s : filled) {
-    out.int32(static_cast<std::int32_t>(s + 1));
-    for (const double value : mesh.nodes_m[sets[s].second->front()]) out.real(value);
-    out.size(1);
-    out.int32(static_cast<std::int32_t>(s + 1));
-    out.end_line();
+    out_.text("$EndMeshFormat\n");
   }
-  for (std::size_t r = 0; r < regions.size(); ++r) {
-    out.int32(static_cast<std::int32_t>(r + 1));
-    for (const Vec3& corner : {low, high})
-      for (const double value : corner) out.real(value);
-    out.size(1);
-    out.int32(regions[r] != 0 ? regions[r] : no_region);
-    out.size(0);
-    out.end_line();
+
+  void write_names() {
+    const auto named = std::count_if(names_.begin(), names_.end(), [](const std::string& name) { return !name.empty(); });
+    if (sets_.empty() && named == 0) return;
+    out_.text(fmt::format("$PhysicalNames\n{}\n", sets_.size() + static_cast<std::size_t>(named)));
+    for (std::size_t r = 0; r < regions_.size(); ++r)
+      if (!names_[r].empty()) out_.text(fmt::format("3 {} \"{}\"\n", find_group(r), names_[r]));
+    for (std::size_t s = 0; s < sets_.size(); ++s) out_.text(fmt::format("0 {} \"{}\"\n", s + 1, sets_[s].first));
+    out_.text("$EndPhysicalNames\n");
   }
-  out.text(binary ? "\n$EndEntities\n$Nodes\n" : "$EndEntities\n$Nodes\n");
-  for (const std::size_t value : {std::size_t{1}, mesh.nodes_m.size(), std::size_t{1}, mesh.nodes_m.size()}) out.size(value);
-  out.end_line();
-  for (const std::int32_t value : {3, 1, 0}) out.int32(value);
-  out.size(mesh.nodes_m.size());
-  out.end_line();
-  for (std::size_t i = 0; i < mesh.nodes_m.size(); ++i) {
-    out.size(i + 1);
-    out.end_line();
-  }
-  for (const Vec3& x : mesh.nodes_m) {
-    for (const double value : x) out.real(value);
-    out.end_line();
-  }
-  std::size_t elements = mesh.tet_count();
-  for (const std::size_t s : filled) elements += sets[s].second->size();
-  out.text(binary ? "\n$EndNodes\n$Elements\n" : "$EndNodes\n$Elements\n");
-  std::size_t tag = 0;
-  // Elements of one region keep their order; runs of a region become one block each, so that the order of the whole is kept as well.
-  std::vector<std::size_t> run_begin;
-  for (std::size_t e = 0; e < region_of.size(); ++e)
-    if (e == 0 || region_of[e] != region_of[e - 1]) run_begin.push_back(e);
-  for (const std::size_t value : {run_begin.size() + filled.size(), elements, std::size_t{1}, elements}) out.size(value);
-  out.end_line();
-  run_begin.push_back(region_of.size());
-  for (std::size_t b = 0; b + 1 < run_begin.size(); ++b) {
-    const auto region = std::lower_bound(regions.begin(), regions.end(), region_of[run_begin[b]]) - regions.begin();
-    for (const std::int32_t value : {3, static_cast<std::int32_t>(region + 1), mesh.order == 1 ? 4 : 11}) out.int32(value);
-    out.size(run_begin[b + 1] - run_begin[b]);
-    out.end_line();
-    for (std::size_t e = run_begin[b]; e < run_begin[b + 1]; ++e) {
-      out.size(++tag);
-      const auto tet = mesh.tet(static_cast<std::int64_t>(e));
-      for (std::size_t k = 0; k < tet.size(); ++k) out.size(static_cast<std::size_t>(tet[kGmshOrder[k]]) + 1);
-      out.end_line();
+
+  void write_entities() {
+    Vec3 low = mesh_.nodes_m.empty() ? Vec3{} : mesh_.nodes_m.front(), high = low;
+    for (const Vec3& x : mesh_.nodes_m)
+      for (std::size_t k = 0; k < 3; ++k) {
+        low[k] = std::min(low[k], x[k]);
+        high[k] = std::max(high[k], x[k]);
+      }
+    begin("Entities");
+    for (const std::size_t count : {filled_.size(), std::size_t{0}, std::size_t{0}, regions_.size()}) out_.size(count);
+    out_.end_line();
+    for (const std::size_t s : filled_) {
+      out_.int32(static_cast<std::int32_t>(s + 1));
+      for (const double value : mesh_.nodes_m[sets_[s].second->front()]) out_.real(value);
+      out_.size(1);
+      out_.int32(static_cast<std::int32_t>(s + 1));
+      out_.end_line();
     }
-  }
-  for (const std::size_t s : filled) {
-    for (const std::int32_t value : {0, static_cast<std::int32_t>(s + 1), 15}) out.int32(value);
-    out.size(sets[s].second->size());
-    out.end_line();
-    for (const auto node : *sets[s].second) {
-      out.size(++tag);
-      out.size(static_cast<std::size_t>(node) + 1);
-      out.end_line();
+    for (std::size_t r = 0; r < regions_.size(); ++r) {
+      out_.int32(static_cast<std::int32_t>(r + 1));
+      for (const Vec3& corner : {low, high})
+        for (const double value : corner) out_.real(value);
+      out_.size(1);
+      out_.int32(find_group(r));
+      out_.size(0);
+      out_.end_line();
     }
+    end("Entities");
   }
-  out.text(binary ? "\n$EndElements\n" : "$EndElements\n");
-  write_doubt(mesh, binary, out);
-  return out.take();
-}
+
+  void write_nodes() {
+    const std::size_t count = mesh_.nodes_m.size();
+    begin("Nodes");
+    for (const std::size_t value : {std::size_t{1}, count, std::size_t{1}, count}) out_.size(value);
+    out_.end_line();
+    for (const std::int32_t value : {3, 1, 0}) out_.int32(value);
+    out_.size(count);
+    out_.end_line();
+    for (std::size_t i = 0; i < count; ++i) {
+      out_.size(i + 1);
+      out_.end_line();
+    }
+    for (const Vec3& x : mesh_.nodes_m) {
+      for (const double value : x) out_.real(value);
+      out_.end_line();
+    }
+    end("Nodes");
+  }
+
+  /// Tetrahedra in blocks, one for each run of a region, which keeps their order; then the points of the sets.
+  void write_elements() {
+    std::size_t elements = mesh_.tet_count(), tag = 0;
+    for (const std::size_t s : filled_) elements += sets_[s].second->size();
+    std::vector<std::size_t> run_begin;
+    for (std::size_t e = 0; e < region_of_.size(); ++e)
+      if (e == 0 || region_of_[e] != region_of_[e - 1]) run_begin.push_back(e);
+    begin("Elements");
+    for (const std::size_t value : {run_begin.size() + filled_.size(), elements, std::size_t{1}, elements}) out_.size(value);
+    out_.end_line();
+    run_begin.push_back(region_of_.size());
+    for (std::size_t b = 0; b + 1 < run_begin.size(); ++b) {
+      const auto region = std::lower_bound(regions_.begin(), regions_.end(), region_of_[run_begin[b]]) - regions_.begin();
+      for (const std::int32_t value : {3, static_cast<std::int32_t>(region + 1), mesh_.order == 1 ? 4 : 11}) out_.int32(value);
+      out_.size(run_begin[b + 1] - run_begin[b]);
+      out_.end_line();
+      for (std::size_t e = run_begin[b]; e < run_begin[b + 1]; ++e) {
+        out_.size(++tag);
+        const auto tet = mesh_.tet(static_cast<std::int64_t>(e));
+        for (std::size_t k = 0; k < tet.size(); ++k) out_.size(static_cast<std::size_t>(tet[kGmshOrder[k]]) + 1);
+        out_.end_line();
+      }
+    }
+    for (const std::size_t s : filled_) {
+      for (const std::int32_t value : {0, static_cast<std::int32_t>(s + 1), 15}) out_.int32(value);
+      out_.size(sets_[s].second->size());
+      out_.end_line();
+      for (const auto node : *sets_[s].second) {
+        out_.size(++tag);
+        out_.size(static_cast<std::size_t>(node) + 1);
+        out_.end_line();
+      }
+    }
+    end("Elements");
+  }
+
+  const TetMesh& mesh_;
+  bool binary_;
+  std::vector<std::int32_t> region_of_;  // (elements)
+  std::vector<std::int32_t> regions_;    // ascending
+  std::vector<std::string> names_;       // (regions) of their groups; empty: none
+  std::int32_t no_region_ = 1;           // group of region 0: an unused number
+  std::vector<std::pair<std::string, const std::vector<std::int32_t>*>> sets_;
+  std::vector<std::size_t> filled_;  // sets that have nodes
+  Output out_;
+};
+
+}  // namespace
+
+std::string make_gmsh(const TetMesh& mesh, GmshEncoding encoding) { return GmshWriter(mesh, encoding).write(); }
 
 void write_gmsh(const TetMesh& mesh, const std::filesystem::path& file, GmshEncoding encoding) {
   base::write_file(file, make_gmsh(mesh, encoding));

@@ -20,12 +20,12 @@
 #include "precompute/mesh/check.hpp"
 #include "precompute/mesh/curved.hpp"
 #include "precompute/mesh/read.hpp"
+#include "precompute/mesh/shapes/shapes.hpp"
 #include "precompute/mesh/write.hpp"
 #include "precompute/mesher/coarsen.hpp"
 #include "precompute/mesher/seams.hpp"
 #include "precompute/mesher/surface.hpp"
 #include "precompute/mesher/triangle_surface.hpp"
-#include "precompute/mesh/shapes/shapes.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/base/file.hpp"
 #include "runtime/base/file_limit.hpp"
@@ -257,10 +257,10 @@ std::string format_json(const Order& order, const Meshed& result, const mesh::Ch
     root.set("wall_mean_m", rounded(s.wall_mean_m, 9)).set("wall_max_m", rounded(s.wall_max_m, 9));
   }
   root.set("node_sets", base::Json::object()).set("seconds", base::Json::object());
-  for (const auto& [name, nodes] : result.mesh.node_sets) root.member("node_sets").set(name, nodes.size());
-  for (const auto& [phase, value] : result.seconds) root.member("seconds").set(phase, base::decimals(value, 4));
+  for (const auto& [name, nodes] : result.mesh.node_sets) root["node_sets"].set(name, nodes.size());
+  for (const auto& [phase, value] : result.seconds) root["seconds"].set(phase, base::decimals(value, 4));
   root.set("seconds_total", base::decimals(total_s, 4)).set("notes", base::Json::array(result.notes));
-  for (const std::string& remark : result.remarks) root.member("notes").add(remark);
+  for (const std::string& remark : result.remarks) root["notes"].add(remark);
   return root.text();
 }
 

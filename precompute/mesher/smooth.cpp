@@ -37,98 +37,135 @@ std::vector<Place> find_places(const mesh::TetMesh& mesh, const std::function<bo
   return places;
 }
 
-}  // namespace
+/// Moves nodes so that the flattest elements around them become less flat.
+class Improver {
+ public:
+  Improver(mesh::TetMesh& mesh, double angle_deg, const std::function<std::optional<Vec3>(const Vec3&)>& project,
+           const std::function<bool(const Vec3&)>& is_fixed)
+      : mesh_(mesh),
+        angle_deg_(angle_deg),
+        project_(project),
+        places_(find_places(mesh, is_fixed)),
+        around_(mesh.nodes_m.size()),
+        is_stuck_(mesh.nodes_m.size(), 0) {
+    for (std::int32_t e = 0; e < mesh.tet_count(); ++e)
+      for (const std::int32_t v : mesh.tet(e)) around_[v].push_back(e);
+  }
 
-std::int64_t better_flat_elements(mesh::TetMesh& mesh, double angle_deg, const std::function<std::optional<Vec3>(const Vec3&)>& project,
-                                  const std::function<bool(const Vec3&)>& is_fixed) {
-  const auto places = find_places(mesh, is_fixed);
-  std::vector<std::vector<std::int32_t>> around(mesh.nodes_m.size());
-  for (std::int32_t e = 0; e < mesh.tet_count(); ++e)
-    for (const std::int32_t v : mesh.tet(e)) around[v].push_back(e);
-  // Of the elements around a node; one that is not above `min` is enough to know.
-  const auto calc_worst = [&](std::int32_t v, double min) {
+  /// The number of moves.
+  std::int64_t run() {
+    std::int64_t moved = 0;
+    double last = std::numeric_limits<double>::infinity();  // sum of the degrees missing in flat elements
+    for (int pass = 0; pass < kMaxPasses; ++pass) {
+      std::vector<std::pair<double, std::int32_t>> flat;
+      for (std::int32_t e = 0; e < mesh_.tet_count(); ++e)
+        if (const double angle = calc_element_flatness(mesh_, e); angle < angle_deg_) flat.emplace_back(angle, e);
+      const double lacking =
+          std::accumulate(flat.begin(), flat.end(), 0.0, [&](double sum, const auto& f) { return sum + angle_deg_ - f.first; });
+      if (flat.size() > kMany && lacking > kHardly * last) break;  // many elements with little gain: the body itself is flat there
+      last = lacking;
+      std::sort(flat.begin(), flat.end());
+      const std::int64_t moves = move_own(flat) + (flat.size() <= kMany ? move_neighbours(flat) : 0);
+      moved += moves;
+      if (moves == 0) break;
+    }
+    return moved;
+  }
+
+ private:
+  using Flat = std::vector<std::pair<double, std::int32_t>>;  // angle in degrees, element
+
+  bool is_flat(std::int32_t e) const { return calc_element_flatness(mesh_, e) < angle_deg_; }
+
+  /// Flatness of the worst element around a node; stops at the first that is not above `min`.
+  double calc_worst(std::int32_t v, double min) const {
     double worst = 180;
-    for (const std::int32_t e : around[v]) {
-      worst = std::min(worst, calc_element_flatness(mesh, e));
+    for (const std::int32_t e : around_[v]) {
+      worst = std::min(worst, calc_element_flatness(mesh_, e));
       if (worst <= min) break;
     }
     return worst;
-  };
-  const auto climb = [&](std::int32_t v) {
-    const Vec3 start = mesh.nodes_m[v];
+  }
+
+  /// Pattern search around the best position so far, in decreasing steps.
+  bool climb(std::int32_t v) {
+    const Vec3 start = mesh_.nodes_m[v];
     double length = 1e300;
-    for (const std::int32_t e : around[v])
-      for (const std::int32_t w : mesh.tet(e))
-        if (w != v) length = std::min(length, norm(mesh.nodes_m[w] - start));
-    const double before = calc_worst(v, -1e9);
-    double best = before + 0.01;
+    for (const std::int32_t e : around_[v])
+      for (const std::int32_t w : mesh_.tet(e))
+        if (w != v) length = std::min(length, norm(mesh_.nodes_m[w] - start));
+    double best = calc_worst(v, -1e9) + 0.01;
     Vec3 best_place = start;
-    // Around the best place found so far, in decreasing steps.
     for (const double step : {0.3, 0.15, 0.07, 0.03}) {
       const Vec3 from = best_place;
       for (int n = 0; n < 27; ++n) {
         const Vec3 direction{n % 3 - 1.0, n / 3 % 3 - 1.0, n / 9 - 1.0};
         if (n == 13) continue;
         Vec3 place = from + (step * length / norm(direction)) * direction;
-        if (places[v] == Place::kSkin) {
-          const std::optional<Vec3> there = project(place);
+        if (places_[v] == Place::kSkin) {
+          const std::optional<Vec3> there = project_(place);
           if (!there) continue;
           place = *there;
         }
         if (norm(place - start) > 0.5 * length) continue;
-        mesh.nodes_m[v] = place;
+        mesh_.nodes_m[v] = place;
         if (const double worst = calc_worst(v, best); worst > best) best = worst, best_place = place;
       }
     }
-    mesh.nodes_m[v] = best_place;
+    mesh_.nodes_m[v] = best_place;
     return best_place != start;
-  };
-  // A node that found no better place finds none until one next to it has moved.
-  std::vector<char> is_stuck(mesh.nodes_m.size(), 0);
-  const auto move = [&](std::int32_t v) {
-    if (is_stuck[v]) return false;
+  }
+
+  /// A node without a better position has none until a neighbour has moved.
+  bool move(std::int32_t v) {
+    if (places_[v] == Place::kFixed || is_stuck_[v]) return false;
     if (!climb(v)) {
-      is_stuck[v] = 1;
+      is_stuck_[v] = 1;
       return false;
     }
-    for (const std::int32_t e : around[v])
-      for (const std::int32_t w : mesh.tet(e)) is_stuck[w] = 0;
+    for (const std::int32_t e : around_[v])
+      for (const std::int32_t w : mesh_.tet(e)) is_stuck_[w] = 0;
     return true;
-  };
-  std::int64_t moved = 0;
-  double last = std::numeric_limits<double>::infinity();  // degrees that flat elements lack, summed
-  for (int pass = 0; pass < kMaxPasses; ++pass) {
-    std::vector<std::pair<double, std::int32_t>> flat;
-    for (std::int32_t e = 0; e < mesh.tet_count(); ++e)
-      if (const double angle = calc_element_flatness(mesh, e); angle < angle_deg) flat.emplace_back(angle, e);
-    // Where many hardly become better it is the body that is flat there.
-    const double lacking =
-        std::accumulate(flat.begin(), flat.end(), 0.0, [&](double sum, const auto& f) { return sum + angle_deg - f.first; });
-    if (flat.size() > kMany && lacking > kHardly * last) break;
-    last = lacking;
-    std::sort(flat.begin(), flat.end());
-    std::int64_t moves = 0;
-    const auto is_flat = [&](std::int32_t e) { return calc_element_flatness(mesh, e) < angle_deg; };
-    for (const auto& [angle, e] : flat)
-      for (const std::int32_t v : mesh.tet(e))
-        if (places[v] != Place::kFixed && is_flat(e) && move(v)) ++moves;
-    // Where none of its own nodes finds a better place, neighbouring nodes move.
-    if (flat.size() <= kMany)
-      for (const auto& [angle, e] : flat) {
-        if (!is_flat(e)) continue;
-        std::vector<std::int32_t> next;
-        for (const std::int32_t v : mesh.tet(e))
-          for (const std::int32_t other : around[v])
-            for (const std::int32_t w : mesh.tet(other)) next.push_back(w);
-        std::sort(next.begin(), next.end());
-        next.erase(std::unique(next.begin(), next.end()), next.end());
-        for (const std::int32_t w : next)
-          if (places[w] != Place::kFixed && is_flat(e) && move(w)) ++moves;
-      }
-    moved += moves;
-    if (moves == 0) break;
   }
-  return moved;
+
+  std::int64_t move_own(const Flat& flat) {
+    std::int64_t moves = 0;
+    for (const auto& [angle, e] : flat)
+      for (const std::int32_t v : mesh_.tet(e))
+        if (is_flat(e) && move(v)) ++moves;
+    return moves;
+  }
+
+  /// For elements that none of their own nodes improves.
+  std::int64_t move_neighbours(const Flat& flat) {
+    std::int64_t moves = 0;
+    for (const auto& [angle, e] : flat) {
+      if (!is_flat(e)) continue;
+      std::vector<std::int32_t> next;
+      for (const std::int32_t v : mesh_.tet(e))
+        for (const std::int32_t other : around_[v])
+          for (const std::int32_t w : mesh_.tet(other)) next.push_back(w);
+      std::sort(next.begin(), next.end());
+      next.erase(std::unique(next.begin(), next.end()), next.end());
+      for (const std::int32_t w : next)
+        if (is_flat(e) && move(w)) ++moves;
+    }
+    return moves;
+  }
+
+  mesh::TetMesh& mesh_;
+  double angle_deg_;
+  const std::function<std::optional<Vec3>(const Vec3&)>& project_;
+  std::vector<Place> places_;                      // (nodes)
+  std::vector<std::vector<std::int32_t>> around_;  // (nodes) elements
+  std::vector<char> is_stuck_;                     // (nodes)
+};
+
+}  // namespace
+
+std::int64_t better_flat_elements(mesh::TetMesh& mesh, double angle_deg, const std::function<std::optional<Vec3>(const Vec3&)>& project,
+                                  const std::function<bool(const Vec3&)>& is_fixed) {
+  return Improver(mesh, angle_deg, project, is_fixed).run();
 }
 
 }  // namespace carillon::mesher

@@ -1,4 +1,4 @@
-// Which BLAS the process runs on. The dynamic linker chooses it (on Debian: update-alternatives), so only the running process knows.
+// Identifies the BLAS of the process. The dynamic linker chooses it (on Debian: update-alternatives), so only the running process knows.
 #include <dlfcn.h>
 #include <fmt/core.h>
 
@@ -17,7 +17,7 @@ Function find_symbol(const char* name) {
   return reinterpret_cast<Function>(dlsym(RTLD_DEFAULT, name));
 }
 
-// The file that holds dgemm_, links resolved; empty when it is not known.
+// File that defines dgemm_, links resolved; empty if unknown.
 std::string find_blas_file() {
   void* dgemm = dlsym(RTLD_DEFAULT, "dgemm_");
   Dl_info info{};
@@ -47,7 +47,7 @@ std::string find_kernels() {
   return name == nullptr ? "" : name();
 }
 
-/// What OpenBLAS would run without the launcher's choice; empty: the launcher chose nothing.
+/// Kernels that OpenBLAS would use without the launcher; empty if the launcher did not change them.
 std::string find_default_kernels() {
   const char* kernels = std::getenv(launch::kDefaultKernelsVariable);
   return kernels == nullptr ? "" : kernels;
@@ -55,7 +55,7 @@ std::string find_default_kernels() {
 
 bool is_chosen_by_user() { return std::getenv(launch::kKernelsVariable) != nullptr && find_default_kernels().empty(); }
 
-/// ", kernels SkylakeX, OpenBLAS's own choice": the kernels and why these; empty when the BLAS is not OpenBLAS.
+/// ", kernels SkylakeX, OpenBLAS's own choice": the kernels and the reason; empty if the BLAS is not OpenBLAS.
 std::string describe_kernels() {
   const std::string kernels = find_kernels();
   if (kernels.empty()) return {};
@@ -89,7 +89,7 @@ std::string describe_slow_kernels() {
 
 void reserve_blas_memory(MPI_Comm comm) {
   constexpr std::size_t kBytes = std::size_t{160} << 20;  // OpenBLAS 0.3 takes 128 MB
-  constexpr int kSize = 128;                              // beyond its kernels for small matrices, which need no such memory
+  constexpr int kSize = 128;                              // larger than its small-matrix kernels, which need no such memory
   comm::Communicator(comm).agree([&] {
     void* room = std::malloc(kBytes);
     if (room == nullptr)

@@ -1,4 +1,4 @@
-// Callbacks of PETSc and SLEPc are C: no exception may pass through them.
+// C callbacks of PETSc and SLEPc: no exception may pass through them.
 #pragma once
 
 #include <petscsys.h>
@@ -8,7 +8,7 @@
 
 namespace carillon::petsc {
 
-/// Runs the work of a callback; an exception becomes PETSc's error with the same words, which check() turns into one again.
+/// Runs the work of a callback; converts an exception to a PETSc error with the same text, which check() converts back.
 template <typename Work>
 PetscErrorCode guard(Work&& work) {
   try {

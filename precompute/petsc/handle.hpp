@@ -1,15 +1,14 @@
 // Owners of PETSc and SLEPc objects: move-only, destroyed with the scope.
 #pragma once
 
-#include <petscksp.h>
 #include <slepceps.h>
 
 #include <utility>
 
 namespace carillon::petsc {
 
-/// Owns one reference to a PETSc object. Destruction is collective, as PETSc's is: let handles die in the same order on every rank, and
-/// before the Session. Converts to the plain handle for calls; out() gives the address for MatCreate and its like and must be empty.
+/// Owns one reference to a PETSc object. Destruction is collective, as in PETSc: destroy handles in the same order on every rank, and
+/// before the Session. Converts to the plain handle for calls; out() returns the address for MatCreate and similar calls.
 template <typename T, PetscErrorCode (*destroy)(T*)>
 class Handle {
  public:
@@ -49,7 +48,6 @@ using MatHandle = Handle<Mat, MatDestroy>;
 using VecHandle = Handle<Vec, VecDestroy>;
 using IsHandle = Handle<IS, ISDestroy>;
 using ScatterHandle = Handle<VecScatter, VecScatterDestroy>;
-using KspHandle = Handle<KSP, KSPDestroy>;
 using EpsHandle = Handle<EPS, EPSDestroy>;
 using BvHandle = Handle<BV, BVDestroy>;
 

@@ -1,4 +1,4 @@
-// Source:     PETSc users manual 3.18, "Error handling", "Runtime options"; MPI 3.1.
+// Source: PETSc users manual 3.18, "Error handling", "Runtime options"; MPI 3.1.
 #include "precompute/petsc/session.hpp"
 
 #include <fmt/core.h>
@@ -21,7 +21,7 @@
 namespace carillon::petsc {
 namespace {
 
-// The first message since the last check(): PETSc reports the origin first and then every caller on the way up.
+// First message since the last check(): PETSc reports the origin first, then every caller.
 thread_local std::string recorded_error;
 
 PetscErrorCode record_error(MPI_Comm, int line, const char* function, const char* file, PetscErrorCode code, PetscErrorType type,
@@ -40,11 +40,10 @@ bool is_system_error(PetscErrorCode code) {
          code == PETSC_ERR_FILE_UNEXPECTED;
 }
 
-// SuperLU_DIST, which PETSc brings along, forbids malloc when it is loaded to take pages of its own for large pieces, and to give any back:
-// what is freed stays with the process, and calloc writes zeros over it. Large pieces get their pages again; smaller ones, which come and
-// go in every step, stay in the heap.
+// SuperLU_DIST, which PETSc loads, forbids malloc to map large blocks and to return memory: freed memory stays with the process, and calloc
+// clears it. Restore mapping of large blocks; smaller ones, which are allocated in every step, stay in the heap.
 void let_malloc_give_back() {
-  constexpr int kMaxMaps = 65536;  // glibc's own
+  constexpr int kMaxMaps = 65536;  // default of glibc
   constexpr int kLarge = 4 << 20;
   constexpr int kKept = 64 << 20;
   (void)mallopt(M_MMAP_MAX, kMaxMaps);
@@ -52,8 +51,8 @@ void let_malloc_give_back() {
   (void)mallopt(M_TRIM_THRESHOLD, kKept);
 }
 
-// PETSc writes zeros over whatever it shall clear. The system gives large pieces cleared, page by page when they are first touched: so room
-// that is never used takes neither time nor memory.
+// PETSc clears allocated memory by writing zeros. The system provides large blocks already cleared, page by page at first access, so unused
+// memory takes neither time nor memory.
 PetscErrorCode allocate(size_t bytes, PetscBool clear, int, const char[], const char[], void** result) {
   *result = nullptr;
   if (bytes == 0) return 0;
@@ -74,7 +73,7 @@ PetscErrorCode reallocate(size_t bytes, int, const char[], const char[], void** 
   return 0;
 }
 
-// PETSc's own allocators, which these options ask for, and ours exclude each other.
+// Options for PETSc's own allocators exclude ours.
 bool asks_for_allocator(const std::vector<std::string>& options) {
   return std::any_of(options.begin(), options.end(), [](const std::string& option) { return option.rfind("-malloc", 0) == 0; });
 }
@@ -85,13 +84,13 @@ Session::Session(int& argc, char**& argv, const std::vector<std::string>& petsc_
   int is_initialized = 0;
   MPI_Initialized(&is_initialized);
   if (is_initialized == 0) {
-    if (MPI_Init(&argc, &argv) != MPI_SUCCESS) throw SystemError("MPI does not start. Start the program with mpirun, or alone.");
+    if (MPI_Init(&argc, &argv) != MPI_SUCCESS) throw SystemError("MPI does not start. Start the program with mpirun, or directly.");
     started_mpi_ = true;
   }
-  // PETSc reads these even when it is set to skip its option files.
+  // PETSc reads these even if its option files are skipped.
   unsetenv("PETSC_OPTIONS");
   unsetenv("PETSC_OPTIONS_YAML");
-  // PETSc keeps the pointers for as long as it runs.
+  // PETSc keeps the pointers while it runs.
   static std::vector<std::string> own;
   static std::vector<char*> own_argv;
   own = {"carillon", "-skip_petscrc", "-no_signal_handler"};

@@ -1,4 +1,4 @@
-// MPI, PETSc and SLEPc for the life of a program; their errors as exceptions.
+// Lifetime of MPI, PETSc and SLEPc in a program; their errors as exceptions.
 #pragma once
 
 #include <mpi.h>
@@ -14,11 +14,11 @@
 
 namespace carillon::petsc {
 
-/// Starts MPI, PETSc and SLEPc, and ends them. One per program, made first in main and destroyed last.
+/// Starts MPI, PETSc and SLEPc, and ends them. One per program, constructed first in main and destroyed last.
 ///
-/// PETSc reads no option from PETSC_OPTIONS or from its files, takes of the command line what it is handed here ("-eps_monitor",
-/// "-eps_tol", "1e-9"), and installs no signal handlers: what a run does is in its job file and these words alone. PETSc's errors are
-/// recorded instead of printed; check() turns them into exceptions. Throws SystemError when MPI or PETSc does not start.
+/// PETSc reads no options from PETSC_OPTIONS or its files, only those passed here ("-log_view"), and installs no signal handlers: a run
+/// depends on its job file and these options only. PETSc errors are recorded instead of printed; check() converts them to exceptions.
+/// Throws SystemError if MPI or PETSc does not start.
 class Session {
  public:
   Session(int& argc, char**& argv, const std::vector<std::string>& petsc_options = {});
@@ -35,37 +35,37 @@ class Session {
   bool started_mpi_ = false;
 };
 
-/// Names of options that were not used so far: misspelt ones, at the end of a run. Local; the same on every rank.
+/// Names of options not used so far; at the end of a run these are misspelt. Local; the same on every rank.
 std::vector<std::string> find_unused_options();
 
-/// Throws if a PETSc or SLEPc call failed: SystemError for memory, file and library failures, SolveError for everything else, with PETSc's
-/// own words. Local: the other ranks do not know, so use it where an error is a defect or hits every rank alike.
+/// Throws if a PETSc or SLEPc call failed: SystemError for memory, file and library failures, SolveError for other errors, with the message
+/// of PETSc. Local: use it for defects or errors that occur on all ranks alike.
 void check(PetscErrorCode code);
 
-/// The ranks of a Mat, Vec or another object of PETSc's.
+/// Communicator of a Mat, Vec or other PETSc object.
 comm::Communicator get_communicator(PetscObject object);
 template <typename Struct>
 comm::Communicator get_communicator(Struct* object) {
   return get_communicator(reinterpret_cast<PetscObject>(object));
 }
 
-/// Narrows a count to PETSc's (32-bit) index type. Throws SystemError when it does not fit.
+/// Narrows a count to the (32-bit) index type of PETSc. Throws SystemError if it does not fit.
 PetscInt to_petsc_int(std::int64_t value);
 
-/// Gives the memory of the whole pages between two addresses back to the system; what is read there afterwards is zero. Local.
+/// Returns the memory of whole pages between two addresses to the system; they then read as zero. Local.
 void give_back_pages(void* begin, void* end);
 
-/// The BLAS behind dgemm in this process, and why it has the kernels that it has: "OpenBLAS 0.3.21 ... (/usr/lib/...), kernels SkylakeX,
+/// The BLAS that provides dgemm in this process, and the reason for its kernels: "OpenBLAS 0.3.21 ... (/usr/lib/...), kernels SkylakeX,
 /// OpenBLAS's own choice", "reference BLAS (/usr/lib/...)". Local.
 std::string blas_name();
-/// True if it is the unoptimised reference BLAS (in DGEMM about 14 times slower than OpenBLAS on one core).
+/// True for the unoptimised reference BLAS (DGEMM about 14 times slower than OpenBLAS on one core).
 bool blas_is_reference();
-/// A warning where OpenBLAS runs kernels without the vector instructions of this processor (AVX2 on), two to eight times slower in what the
-/// BLAS does, with the correction; empty where there is nothing to say. Local.
+/// Warning if OpenBLAS runs kernels without the vector instructions of this processor (AVX2 or later), two to eight times slower, with a
+/// remedy; empty if none is needed. Local.
 std::string describe_slow_kernels();
 
-/// Has OpenBLAS take its working memory (128 MB of address space) now: later, when there is none left, it retries without end instead of
-/// failing. Collective. Throws SystemError on every rank where there is not so much.
+/// Makes OpenBLAS allocate its working memory (128 MB of address space) now: if allocation fails later, it retries forever. Collective.
+/// Throws SystemError on every rank if memory does not suffice.
 void reserve_blas_memory(MPI_Comm comm);
 
 /// "PETSc 3.18.5", "SLEPc 3.18.2", "Open MPI v4.1.4".

@@ -1,4 +1,4 @@
-// Source: PETSc users manual 3.18, PetscGetFlops; counts of messages: precompute/petsc/profile.
+// Source: PETSc users manual 3.18, PetscGetFlops; message counts: precompute/petsc/profile.
 #include "precompute/petsc/work.hpp"
 
 #include <dlfcn.h>
@@ -12,9 +12,9 @@ namespace {
 
 WorkTable totals{};
 PhaseWork* phase_at_hand = totals.data();
-double petsc_flops = 0;  // booked so far
+double petsc_flops = 0;  // counted so far
 
-/// PETSc counts on its own; what it has counted since the last look belongs to the phase at hand.
+/// PETSc counts operations itself; those since the last call belong to the current phase.
 void book_petsc_flops() {
   PetscLogDouble all = 0;
   if (PetscInitializeCalled == PETSC_FALSE || PetscGetFlops(&all) != 0) return;
@@ -22,7 +22,7 @@ void book_petsc_flops() {
   petsc_flops = all;
 }
 
-/// Null without the profiling library. By dlsym: mold resolves weak undefined symbols at link time.
+/// Null without the profiling library. By dlsym, as mold resolves weak undefined symbols at link time.
 const auto get_mpi_counts = reinterpret_cast<decltype(&carillon_get_mpi_counts)>(dlsym(RTLD_DEFAULT, "carillon_get_mpi_counts"));
 
 double cpu_booked_s = 0;
@@ -52,7 +52,7 @@ void book_messages() {
   counts_booked = now;
 }
 
-/// What was done since the last call belongs to the phase at hand.
+/// Assigns everything since the last call to the current phase.
 void book() {
   book_petsc_flops();
   book_messages();

@@ -1,4 +1,4 @@
-// What a run does, in numbers that do not depend on the machine's load: operations, messages, bytes; and in seconds.
+// Work of a run: operations, messages, bytes, which do not depend on the machine's load; and seconds.
 #pragma once
 
 #include <mpi.h>
@@ -10,23 +10,23 @@
 
 namespace carillon::petsc {
 
-/// Do we know the messages of this run? Only under the profiling library (precompute/petsc/profile): carillon-precompute --profile.
+/// True if messages are counted: with the profiling library (precompute/petsc/profile), carillon-precompute --profile.
 bool is_profiled();
 
-/// Of one rank or summed over all. Messages and collectives are 0 where they are not counted.
+/// For one rank or summed over all. Messages and collectives are 0 if not counted.
 struct Work {
-  double flops = 0;             // floating-point operations of the factorisation, the solves, products of blocks, and what PETSc counts
-  double messages = 0;          // sent from one rank to another
-  double bytes = 0;             // in them
-  double collectives = 0;       // calls in which many ranks take part, counted on each
-  double collective_bytes = 0;  // what the ranks put into them
+  double flops = 0;             // floating-point operations of the factorisation, solves, block products, and those counted by PETSc
+  double messages = 0;          // point-to-point sends
+  double bytes = 0;             // bytes of those
+  double collectives = 0;       // collective calls, counted on each rank
+  double collective_bytes = 0;  // bytes contributed by the ranks
 };
 
-/// Seconds, summed over the ranks where there are several.
+/// Seconds, summed over the ranks if several.
 struct Effort {
   double cpu_seconds = 0;  // user and system
   double wall_seconds = 0;
-  double mpi_seconds = 0;  // of wall_seconds: inside MPI, transfers and waiting; 0 where it is not measured
+  double mpi_seconds = 0;  // part of wall_seconds inside MPI, transfers and waiting; 0 if not measured
 };
 
 enum class WorkPhase { kOther, kRead, kPartition, kAssemble, kFactor, kSolve, kOrthogonalise, kErrors, kWrite };
@@ -34,10 +34,10 @@ inline constexpr std::size_t kWorkPhases = 9;
 inline constexpr std::array<const char*, kWorkPhases> kWorkPhaseNames{"other", "read",          "partition", "assemble", "factor",
                                                                       "solve", "orthogonalise", "errors",    "write"};
 
-/// What follows on this process belongs to the phase. Returns the one before.
+/// Assigns subsequent work of this process to a phase. Returns the previous one.
 WorkPhase set_work_phase(WorkPhase phase);
 
-/// Sets the phase for the time of its life.
+/// Sets the phase for its lifetime.
 class WorkScope {
  public:
   explicit WorkScope(WorkPhase phase) : before_(set_work_phase(phase)) {}
@@ -58,10 +58,10 @@ struct PhaseWork {
 };
 using WorkTable = std::array<PhaseWork, kWorkPhases>;
 
-/// Of this process so far, by phase. Local.
+/// Work of this process so far, by phase. Local.
 WorkTable find_work();
 
-/// The same of all ranks together, on every rank. Collective.
+/// Sum over all ranks, on every rank. Collective.
 WorkTable sum_work(const comm::Communicator& comm);
 
 }  // namespace carillon::petsc

@@ -8,7 +8,6 @@
 #include "precompute/run/accuracy.hpp"
 
 #include <fmt/core.h>
-#include <json/json.h>
 
 #include <algorithm>
 #include <chrono>
@@ -18,12 +17,12 @@
 #include <optional>
 #include <type_traits>
 
+#include "precompute/eigen/memory.hpp"
 #include "precompute/job/cost/memory.hpp"
 #include "precompute/job/cost/seconds.hpp"
-#include "precompute/eigen/memory.hpp"
-#include "precompute/run/io/checkpoint_file.hpp"
 #include "precompute/mesh/parallel/read_parallel.hpp"
 #include "precompute/petsc/session.hpp"
+#include "precompute/run/io/checkpoint_file.hpp"
 #include "runtime/base/failure.hpp"
 
 namespace carillon::run {
@@ -51,7 +50,7 @@ double calc_mean_edge(const comm::Communicator& comm, const mesh::LocalMesh& loc
   for (auto tet = local.tets.begin(); tet != local.tets.end(); tet += local.nodes_per_tet())
     for (const auto& [a, b] : mesh::kEdges) {
       const Vec3 &p = local.nodes_m[tet[a]], &q = local.nodes_m[tet[b]];
-      sum[0] += std::hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]);
+      sum[0] += calc_length(p - q);
       sum[1] += 1;
     }
   comm.sum(sum);
@@ -407,11 +406,11 @@ AccurateBody Search::solve() {
   return std::move(current_);
 }
 
-Json::Value describe_setting(const Setting& setting) {
-  Json::Value value;
+base::Json describe_setting(const Setting& setting) {
+  base::Json value;
   value["element"] = job::to_text(setting.element);
   value["tolerance"] = setting.tolerance;
-  if (setting.nodes) value["body_nodes"] = Json::Int64(*setting.nodes);
+  if (setting.nodes) value["body_nodes"] = *setting.nodes;
   if (setting.edge_m) value["body_edge_m"] = *setting.edge_m;
   if (setting.refinements > 0) value["refinements"] = setting.refinements;
   return value;
@@ -468,29 +467,29 @@ std::string describe(const Setting& setting) {
   return text + fmt::format(", tolerance {:.0e}", setting.tolerance);
 }
 
-Json::Value describe_accuracy(const AccuracyReport& report) {
-  Json::Value root;
+base::Json describe_accuracy(const AccuracyReport& report) {
+  base::Json root;
   root["asked_cents"] = report.asked_cents;
   for (const Trial& trial : report.trials) {
-    Json::Value entry = describe_setting(trial.setting);
-    entry["nodes"] = Json::Int64(trial.nodes);
-    entry["tets"] = Json::Int64(trial.tets);
+    base::Json entry = describe_setting(trial.setting);
+    entry["nodes"] = trial.nodes;
+    entry["tets"] = trial.tets;
     entry["mean_edge_m"] = trial.edge_m;
-    entry["modes"] = Json::UInt64(trial.modes);
+    entry["modes"] = trial.modes;
     entry["worst_cents"] = trial.worst_cents;
     entry["worst_hz"] = trial.worst_hz;
     entry["algebraic_cents"] = trial.algebraic_cents;
     entry["facet_cents"] = trial.facet_cents;
     entry["cpu_seconds"] = trial.cpu_seconds;
-    entry["peak_bytes_all_ranks"] = Json::Int64(trial.peak_bytes);
+    entry["peak_bytes_all_ranks"] = trial.peak_bytes;
     root["trials"].append(entry);
   }
-  if (!report.trials.empty()) root["chosen"] = root["trials"][static_cast<Json::ArrayIndex>(report.trials.size() - 1)];
+  if (!report.trials.empty()) root["chosen"] = root["trials"][report.trials.size() - 1];
   if (report.next.nodes > 0) {
-    Json::Value& next = root["next_stricter"] = describe_setting(report.next.setting);
+    base::Json& next = root["next_stricter"] = describe_setting(report.next.setting);
     if (report.next.needs_new_mesh) next["needs_new_mesh"] = true;
     next["nodes"] = std::round(report.next.nodes);
-    next["worst_cents"] = report.next.worst_cents > 0 ? Json::Value(report.next.worst_cents) : Json::Value();
+    next["worst_cents"] = report.next.worst_cents > 0 ? base::Json(report.next.worst_cents) : base::Json();
     next["cpu_seconds"] = report.next.cpu_seconds;
     next["peak_bytes_all_ranks"] = std::round(report.next.bytes);
   }

@@ -1,13 +1,12 @@
 // Accuracy as an input: "accuracy_cents" in a job instead of element, mesh size and tolerance.
 #pragma once
 
-#include <json/forwards.h>
-
 #include <cstdint>
 #include <string>
 #include <vector>
 
 #include "precompute/run/solve_body.hpp"
+#include "runtime/base/json.hpp"
 
 namespace carillon::run {
 
@@ -25,7 +24,7 @@ struct Trial {
   double facet_cents = 0.0;      // largest addition by facets in doubt; not part of a bar
   double cpu_seconds = 0.0;      // all ranks
   std::int64_t peak_bytes = 0;   // all ranks, the process so far
-  error_bars::Level level;         // its modes and what the estimate says of them
+  error_bars::Level level;       // its modes and what the estimate says of them
 };
 
 /// The next stricter setting and its predicted cost.
@@ -69,6 +68,6 @@ Body make_trial_body(Run& run, Setting& setting, Patience* patience = nullptr);
 /// The setting in words: "T10, meshed with edges of 0.0021 m, tolerance 1e-07".
 std::string describe(const Setting& setting);
 
-Json::Value describe_accuracy(const AccuracyReport& report);
+base::Json describe_accuracy(const AccuracyReport& report);
 
 }  // namespace carillon::run

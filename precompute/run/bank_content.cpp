@@ -1,7 +1,6 @@
 #include "precompute/run/bank_content.hpp"
 
 #include <fmt/core.h>
-#include <json/json.h>
 
 #include <algorithm>
 #include <cmath>
@@ -45,7 +44,7 @@ bank::Material make_material(const SolvedBody& solved) {
 std::string make_regions(const SolvedBody& solved) {
   const auto& materials = solved.properties.materials;
   const bool is_plain = materials.list.size() == 1 && !materials.list[0].orthotropic;
-  return is_plain ? std::string() : write_json(describe_materials(materials, solved.properties.volume_m3));
+  return is_plain ? std::string() : describe_materials(materials, solved.properties.volume_m3).sorted_text();
 }
 
 /// Names are those of the job, or what the nodes are; of several patches of one entry each has a number.
@@ -58,7 +57,7 @@ bank::Supports make_supports(const job::JobSpec& job, const fem::Supports& found
     const job::Fixed& fixed = job.fixed[support.entry];
     std::string name = !fixed.name.empty() ? fixed.name : fixed.node_set ? *fixed.node_set : fmt::format("box {}", support.entry + 1);
     if (patches[support.entry] > 1) name += fmt::format(":{}", ++seen[support.entry]);
-    supports_json.member("supports").add(material::write_fixing(fixed.fixing, base::Json::object().set("name", name)));
+    supports_json["supports"].add(material::write_fixing(fixed.fixing, base::Json::object().set("name", name)));
     supports.centre_m.push_back(support.centre_m);
     supports.normal.push_back(support.normal);
     supports.area_m2.push_back(support.area_m2);

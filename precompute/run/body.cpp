@@ -8,12 +8,12 @@
 #include <utility>
 #include <vector>
 
-#include "precompute/mesh/distributed/distribute.hpp"
-#include "precompute/job/cost/calibration.hpp"
-#include "precompute/eigen/solve_estimate.hpp"
+#include "precompute/eigen/predict_cost.hpp"
 #include "precompute/fem/error_bars/correct.hpp"
-#include "precompute/mesh/read.hpp"
+#include "precompute/job/cost/calibration.hpp"
+#include "precompute/mesh/distributed/distribute.hpp"
 #include "precompute/mesh/parallel/read_parallel.hpp"
+#include "precompute/mesh/read.hpp"
 #include "precompute/petsc/session.hpp"
 #include "precompute/run/cut_mesh.hpp"
 #include "precompute/run/meshing.hpp"
@@ -117,11 +117,9 @@ void log_size(const Run& run, std::int64_t nodes, std::int64_t tets, int compone
                             fixed_nodes));
 }
 
-/// CHOLMOD and MUMPS want the elimination order of the whole graph, which costs rank 0 time and memory; the factorisation of this project
-/// orders by itself, and MUMPS does so with more fill where it replaces it.
-bool wants_elimination_order(const job::JobSpec& job) {
-  return job.factorisation == job::Factorisation::mumps || job.factorisation == job::Factorisation::cholmod;
-}
+/// MUMPS uses the elimination order of the whole graph, which costs rank 0 time and memory; our factorisation orders by itself, and MUMPS
+/// does so with more fill as its fallback.
+bool wants_elimination_order(const job::JobSpec& job) { return job.factorisation == job::Factorisation::mumps; }
 
 /// A factorisation of this project solves the job, so the mesh is best cut where it will have its separators.
 bool wants_cut_by_order(const job::JobSpec& job) { return !wants_elimination_order(job) && job.method != job::Method::dense; }

@@ -1,7 +1,5 @@
 #include "precompute/run/describe_run.hpp"
 
-#include <json/json.h>
-
 #include <algorithm>
 #include <numeric>
 
@@ -9,30 +7,30 @@ namespace carillon::run {
 namespace {
 
 template <class Values>
-Json::Value make_list(const Values& values) {
-  Json::Value list(Json::arrayValue);
-  for (const auto& value : values) list.append(Json::Value(value));
+base::Json make_list(const Values& values) {
+  base::Json list = base::Json::array();
+  for (const auto& value : values) list.append(base::Json(value));
   return list;
 }
 
-Json::Value describe_mesh(const Body& body, const Setting& setting) {
+base::Json describe_mesh(const Body& body, const Setting& setting) {
   const mesh::DistributedMesh& pieces = body.pieces;
   const mesh::CheckReport& check = body.check;
-  Json::Value mesh;
+  base::Json mesh;
   mesh["source"] = body.source;
-  mesh["nodes"] = Json::Int64(pieces.nodes);
-  mesh["tets"] = Json::Int64(pieces.tets);
+  mesh["nodes"] = pieces.nodes;
+  mesh["tets"] = pieces.tets;
   mesh["components"] = pieces.components;
-  mesh["fixed_nodes"] = Json::Int64(body.fixed_nodes);
-  mesh["free_nodes"] = Json::Int64(pieces.free_nodes);
-  mesh["file_nodes"] = Json::Int64(check.nodes);
+  mesh["fixed_nodes"] = body.fixed_nodes;
+  mesh["free_nodes"] = pieces.free_nodes;
+  mesh["file_nodes"] = check.nodes;
   mesh["file_order"] = check.order;
   mesh["refinements"] = setting.refinements;
-  mesh["reoriented"] = Json::Int64(check.reoriented);
-  mesh["unreferenced"] = Json::Int64(check.unreferenced);
-  mesh["welded"] = Json::Int64(check.welded);
-  mesh["curved"] = Json::Int64(check.curved);
-  mesh["straightened"] = Json::Int64(check.straightened);
+  mesh["reoriented"] = check.reoriented;
+  mesh["unreferenced"] = check.unreferenced;
+  mesh["welded"] = check.welded;
+  mesh["curved"] = check.curved;
+  mesh["straightened"] = check.straightened;
   mesh["min_dihedral_deg"] = check.min_dihedral_deg;
   mesh["mean_ratio_min"] = check.mean_ratio_min;
   mesh["warnings"] = make_list(check.warnings);
@@ -40,35 +38,35 @@ Json::Value describe_mesh(const Body& body, const Setting& setting) {
   return mesh;
 }
 
-Json::Value describe_partition(const mesh::PartitionReport& report) {
-  Json::Value partition;
-  partition["edge_cut"] = Json::Int64(report.edge_cut);
+base::Json describe_partition(const mesh::PartitionReport& report) {
+  base::Json partition;
+  partition["edge_cut"] = report.edge_cut;
   partition["element_balance"] = report.element_balance;
   partition["node_balance"] = report.node_balance;
   partition["contiguous"] = report.contiguous;
   for (const auto& rank : report.ranks) {
-    Json::Value& entry = partition["ranks"].append(Json::Value());
-    entry["elements"] = Json::Int64(rank.elements);
-    entry["owned_nodes"] = Json::Int64(rank.owned_nodes);
-    entry["halo_nodes"] = Json::Int64(rank.halo_nodes);
+    base::Json& entry = partition["ranks"].append();
+    entry["elements"] = rank.elements;
+    entry["owned_nodes"] = rank.owned_nodes;
+    entry["halo_nodes"] = rank.halo_nodes;
   }
   return partition;
 }
 
-Json::Value describe_solver(const eigen::Modes& modes) {
-  Json::Value solver;
+base::Json describe_solver(const eigen::Modes& modes) {
+  base::Json solver;
   solver["factorisation"] = modes.factor.solver;
   solver["ordering"] = modes.factor.ordering;
-  solver["factor_entries"] = Json::Int64(modes.factor.entries);
+  solver["factor_entries"] = modes.factor.entries;
   solver["factor_flops"] = modes.factor.flops;
-  solver["factorisations"] = Json::Int64(modes.factor.factorisations);
-  solver["solves"] = Json::Int64(modes.factor.solves);
-  solver["modes"] = Json::UInt64(modes.lambda.size());
-  solver["modes_in_band"] = Json::Int64(modes.band_count);
-  solver["rigid_modes"] = Json::Int64(modes.rigid_count);
-  solver["mechanisms"] = Json::Int64(modes.mechanism_count);
+  solver["factorisations"] = modes.factor.factorisations;
+  solver["solves"] = modes.factor.solves;
+  solver["modes"] = modes.lambda.size();
+  solver["modes_in_band"] = modes.band_count;
+  solver["rigid_modes"] = modes.rigid_count;
+  solver["mechanisms"] = modes.mechanism_count;
   solver["orthonormality_error"] = modes.orthonormality_error;
-  solver["above_tolerance"] = Json::Int64(modes.above_tolerance_count);  // rounding allows no better, see eigen::Modes::residual
+  solver["above_tolerance"] = modes.above_tolerance_count;  // rounding allows no better, see eigen::Modes::residual
   solver["proof"] = modes.proof.method;
   solver["seconds"]["rigid"] = modes.seconds.rigid;
   solver["seconds"]["analyse"] = modes.seconds.analyse;
@@ -81,9 +79,9 @@ Json::Value describe_solver(const eigen::Modes& modes) {
 
 /// Wall clock of the slowest rank by what was done: read, partition, assemble, factor, solve, orthogonalise, errors, write; and what went
 /// before the last body was read (trials of other settings).
-Json::Value describe_phases(const Run& run, const eigen::Modes& modes) {
-  Json::Value sums(Json::objectValue);
-  const auto add = [&](const std::string& name, double seconds) { sums[name] = sums.get(name, 0.0).asDouble() + seconds; };
+base::Json describe_phases(const Run& run, const eigen::Modes& modes) {
+  base::Json sums = base::Json::object();
+  const auto add = [&](const std::string& name, double seconds) { sums[name] = sums[name].as_double() + seconds; };
   const std::vector<RunPhase>& phases = run.log.get_phases();
   const auto is_read = [](const RunPhase& phase) { return phase.name == "read"; };
   const auto last_read = std::find_if(phases.rbegin(), phases.rend(), is_read);
@@ -104,11 +102,11 @@ Json::Value describe_phases(const Run& run, const eigen::Modes& modes) {
 
 /// What all ranks together did so far; unlike seconds it does not depend on the machine's load. Messages are there in a profiled run.
 /// Phases are those of describe_phases(), trials of other settings among them, and "other" is what lies between.
-Json::Value describe_work(const petsc::WorkTable& table) {
-  Json::Value phases(Json::objectValue);
+base::Json describe_work(const petsc::WorkTable& table) {
+  base::Json phases = base::Json::object();
   for (std::size_t i = 0; i < table.size(); ++i) {
     const petsc::Work& work = table[i].work;
-    Json::Value& entry = phases[petsc::kWorkPhaseNames[i]];
+    base::Json& entry = phases[petsc::kWorkPhaseNames[i]];
     entry["flops"] = work.flops;
     if (!petsc::is_profiled()) continue;
     entry["messages"] = work.messages;
@@ -120,11 +118,11 @@ Json::Value describe_work(const petsc::WorkTable& table) {
 }
 
 /// What it took them, in seconds of all ranks together.
-Json::Value describe_effort(const petsc::WorkTable& table) {
-  Json::Value phases(Json::objectValue);
+base::Json describe_effort(const petsc::WorkTable& table) {
+  base::Json phases = base::Json::object();
   for (std::size_t i = 0; i < table.size(); ++i) {
     const petsc::Effort& effort = table[i].effort;
-    Json::Value& entry = phases[petsc::kWorkPhaseNames[i]];
+    base::Json& entry = phases[petsc::kWorkPhaseNames[i]];
     entry["cpu_seconds"] = effort.cpu_seconds;
     entry["wall_seconds"] = effort.wall_seconds;
     if (petsc::is_profiled()) entry["mpi_seconds"] = effort.mpi_seconds;
@@ -132,8 +130,8 @@ Json::Value describe_effort(const petsc::WorkTable& table) {
   return phases;
 }
 
-Json::Value describe_damping(const material::Material& material) {
-  Json::Value damping;
+base::Json describe_damping(const material::Material& material) {
+  base::Json damping;
   switch (material.law) {
     case material::DampingLaw::rayleigh:
       damping["rayleigh"]["alpha1_s"] = material.alpha1_s;
@@ -144,14 +142,14 @@ Json::Value describe_damping(const material::Material& material) {
       break;
     case material::DampingLaw::caughey:
       for (const material::CaugheyTerm& term : material.caughey) {
-        Json::Value& entry = damping["caughey"].append(Json::Value());
+        base::Json& entry = damping["caughey"].append();
         entry["power"] = term.power;
         entry["coefficient"] = term.coefficient;
       }
       break;
     case material::DampingLaw::loss_table:
       for (const material::LossRow& row : material.loss_table) {
-        Json::Value& entry = damping["loss_table"].append(Json::Value());
+        base::Json& entry = damping["loss_table"].append();
         entry["freq_hz"] = row.freq_hz;
         entry["loss_factor"] = row.loss_factor;
       }
@@ -160,15 +158,15 @@ Json::Value describe_damping(const material::Material& material) {
   return damping;
 }
 
-Json::Value describe_warnings(const Run& run) { return make_list(run.log.get_warnings()); }
+base::Json describe_warnings(const Run& run) { return make_list(run.log.get_warnings()); }
 
 }  // namespace
 
-Json::Value describe_materials(const fem::Materials& materials, const std::vector<double>& volume_m3) {
-  Json::Value list(Json::arrayValue);
+base::Json describe_materials(const fem::Materials& materials, const std::vector<double>& volume_m3) {
+  base::Json list = base::Json::array();
   for (std::size_t i = 0; i < materials.list.size(); ++i) {
     const material::Material& material = materials.list[i];
-    Json::Value& entry = list.append(Json::Value());
+    base::Json& entry = list.append();
     entry["region"] = i < materials.region.size() ? materials.region[i] : "";
     if (!material.name.empty()) entry["name"] = material.name;
     entry["volume_m3"] = volume_m3[i];
@@ -177,7 +175,7 @@ Json::Value describe_materials(const fem::Materials& materials, const std::vecto
     entry["poisson_ratio"] = material.poisson_ratio;
     if (material.orthotropic) {
       const material::Orthotropic& own = *material.orthotropic;
-      Json::Value& orthotropic = entry["orthotropic"];
+      base::Json& orthotropic = entry["orthotropic"];
       orthotropic["young_modulus_pa"] = make_list(own.young_modulus_pa);
       orthotropic["shear_modulus_pa"] = make_list(own.shear_modulus_pa);
       orthotropic["poisson_ratio"] = make_list(own.poisson_ratio);
@@ -188,37 +186,30 @@ Json::Value describe_materials(const fem::Materials& materials, const std::vecto
   return list;
 }
 
-std::string write_json(const Json::Value& value) {
-  Json::StreamWriterBuilder writer;
-  writer["indentation"] = "";
-  writer["precision"] = 17;
-  return Json::writeString(writer, value);
-}
-
-Json::Value describe_program(const Run& run) {
-  Json::Value root;
+base::Json describe_program(const Run& run) {
+  base::Json root;
   root["program"] = "carillon-precompute";
   root["git"] = git_id();
   root["finished_utc"] = find_time_utc();
   root["ranks"] = run.comm.size();
   for (const auto& [name, version] : find_versions()) root["versions"][name] = version;
   for (const RunPhase& phase : run.log.get_phases()) {
-    Json::Value& entry = root["stations"].append(Json::Value());
+    base::Json& entry = root["stations"].append();
     entry["name"] = phase.name;
     entry["seconds"] = phase.seconds;
     entry["cpu_seconds"] = phase.cpu_seconds;
-    entry["peak_bytes_largest_rank"] = Json::Int64(phase.peak_bytes);
-    entry["peak_bytes_all_ranks"] = Json::Int64(phase.peak_sum_bytes);
+    entry["peak_bytes_largest_rank"] = phase.peak_bytes;
+    entry["peak_bytes_all_ranks"] = phase.peak_sum_bytes;
   }
   return root;
 }
 
-Json::Value describe_run(const Run& run, const Setting& setting, const Body& body, const SolvedBody& solved, const Measured& measured) {
-  Json::Value root = describe_program(run);
+base::Json describe_run(const Run& run, const Setting& setting, const Body& body, const SolvedBody& solved, const Measured& measured) {
+  base::Json root = describe_program(run);
   root["phase_seconds"] = describe_phases(run, solved.modes);
   root["work"] = describe_work(measured.work);
   root["effort"] = describe_effort(measured.work);
-  for (const std::int64_t bytes : measured.peak_bytes) root["peak_bytes_by_rank"].append(Json::Int64(bytes));
+  for (const std::int64_t bytes : measured.peak_bytes) root["peak_bytes_by_rank"].append(bytes);
   root["solver_options"] = make_list(run.options.solver_options);
   root["chosen"]["element"] = job::to_text(setting.element);
   root["chosen"]["tolerance"] = setting.tolerance;

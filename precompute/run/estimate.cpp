@@ -47,8 +47,8 @@ std::string estimate_costs(const std::string& text) {
   base::Json root = base::Json::object();
   root.set("unknowns", size.unknowns).set("modes", *size.modes);
   root.set("cpu_seconds", base::significant(seconds.sum(), 6)).set("phase_seconds", describe_seconds(seconds));
-  for (const int ranks : {1, 2, 4}) root.member("memory_bytes").set(std::to_string(ranks), std::llround(cost::predict_bytes(size, ranks)));
-  root.member("factor").set("entries", size.factor_entries).set("flops", base::significant(size.factor_flops, 6));
+  for (const int ranks : {1, 2, 4}) root["memory_bytes"].set(std::to_string(ranks), std::llround(cost::predict_bytes(size, ranks)));
+  root["factor"].set("entries", size.factor_entries).set("flops", base::significant(size.factor_flops, 6));
   root.set("factorisations", cost::predict_factorisations(*size.modes, size.counts_low_end))
       .set("right_sides", cost::predict_solves(*size.modes));
   return root.line();

@@ -1,7 +1,6 @@
 #include "precompute/run/known_body.hpp"
 
 #include <fmt/core.h>
-#include <json/json.h>
 
 #include <cmath>
 #include <numbers>
@@ -13,6 +12,7 @@
 #include "runtime/base/clock.hpp"
 #include "runtime/base/file.hpp"
 #include "runtime/base/host.hpp"
+#include "runtime/base/json.hpp"
 
 namespace carillon::run {
 namespace {
@@ -28,8 +28,8 @@ void check_options(const Run& run) {
                                  run.options.solver_options[0], job::get_key(*run.job.analytic)));
 }
 
-Json::Value describe_known_body(const Run& run, const analytic::Made& made) {
-  Json::Value record = describe_program(run);
+base::Json describe_known_body(const Run& run, const analytic::Made& made) {
+  base::Json record = describe_program(run);
   record["theory"] = made.theory;
   record["method"] = made.method;
   if (!made.coupling.empty()) record["coupling"] = made.coupling;
@@ -56,7 +56,7 @@ RunSummary write_known_body(Run& run) {
     if (!run.comm.is_root()) return;
     for (const std::string& warning : made.warnings) run.log.warn(warning);
     const std::string record =
-        job::resolved_json(run.job, fs::absolute(summary.bank).parent_path(), write_json(describe_known_body(run, made)));
+        job::resolved_json(run.job, fs::absolute(summary.bank).parent_path(), describe_known_body(run, made).sorted_text());
     made.bank.provenance = record;
     bank::write_bank(made.bank, run.bank);
     base::write_file(job::find_resolved_path(run.bank), record);
@@ -82,15 +82,15 @@ std::string validate_known_body(const Run& run) {
     for (const std::string& warning : made.warnings) text += "\n" + warning;
     return text;
   }
-  Json::Value root;
+  base::Json root;
   root["ok"] = true;
   root["mesh"]["source"] = made.theory;
   root["mesh"]["how"] = "made";
-  root["mesh"]["nodes"] = Json::Int64(made.bank.vertex_count());
-  for (const char* key : {"count", "estimate", "low", "high"}) root["modes"][key] = Json::Int64(modes);
+  root["mesh"]["nodes"] = made.bank.vertex_count();
+  for (const char* key : {"count", "estimate", "low", "high"}) root["modes"][key] = modes;
   root["modes"]["how"] = "counted";
   for (const char* ranks : {"1", "2", "4"}) {
-    root["memory_bytes"][ranks] = Json::Int64(bytes);
+    root["memory_bytes"][ranks] = bytes;
     root["wall_seconds"][ranks] = seconds;
   }
   root["cpu_seconds"] = seconds;
@@ -98,7 +98,7 @@ std::string validate_known_body(const Run& run) {
   root["fits_here"] = true;
   for (const std::string& warning : run.log.get_warnings()) root["warnings"].append(warning);
   for (const std::string& warning : made.warnings) root["warnings"].append(warning);
-  return write_json(root);
+  return root.sorted_text();
 }
 
 std::string list_modes_at(const comm::Communicator& comm, const fs::path& job_file, const RunOptions& options) {

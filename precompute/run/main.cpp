@@ -52,7 +52,7 @@ struct CommandLine {
   CLI::App app{
       "Computes the vibration modes of a solid body and writes them as a mode bank.\n"
       "Start it on several ranks with: mpirun -np N carillon-precompute JOB.json\n"
-      "Options of PETSc and SLEPc follow after --: carillon-precompute JOB.json -- -eps_type krylovschur",
+      "Options of PETSc follow after --: carillon-precompute JOB.json -- -log_view",
       "carillon-precompute"};
   std::string job;
   std::string result;    // file; empty: none

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <string>
 
-#include "precompute/eigen/solver_options.hpp"
 #include "precompute/petsc/session.hpp"
 #include "precompute/run/same_start.hpp"
 #include "runtime/base/file.hpp"
@@ -26,12 +25,12 @@ job::JobSpec read_shared_job(const Run& run, const fs::path& file, job::BankKey 
 
 void check_job(const Run& run) {
   comm::Communicator(run.comm).agree([&] {
-    eigen::check_solver_options();
-    if (run.comm.size() > 1 && run.job.factorisation == job::Factorisation::cholmod) {
-      throw InputError(
-          fmt::format("{}: \"solver.factorisation\": cholmod works on one rank, and there are {}; take \"mumps\" or \"automatic\"",
-                      run.job.file.string(), run.comm.size()));
-    }
+    for (const std::string& word : run.options.solver_options)
+      if (word.starts_with("-eps_") || word.starts_with("-st_"))
+        throw InputError(
+            fmt::format("\"{}\": the eigensolver takes no options; choose \"solver.method\" of the job: \"block-lanczos\" or "
+                        "\"krylov-schur\"",
+                        word));
     if (!run.comm.is_root() || run.bank.empty()) return;
     base::check_writable(run.bank, "bank");
     base::check_writable(job::find_resolved_path(run.bank), "resolved job");

@@ -38,8 +38,6 @@ eigen::Factorisation to_eigen(job::Factorisation factorisation) {
       return eigen::Factorisation::kLdlt;
     case job::Factorisation::mumps:
       return eigen::Factorisation::kMumps;
-    case job::Factorisation::cholmod:
-      return eigen::Factorisation::kCholmod;
     default:
       return eigen::Factorisation::kAutomatic;
   }

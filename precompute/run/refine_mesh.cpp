@@ -45,8 +45,7 @@ double calc_determinant(const std::array<int, 4>& nodes) {
     const Barycentric at = find_barycentric(nodes[i + 1]);
     for (int k = 0; k < 3; ++k) u[i][k] = at[k + 1] - base[k + 1];  // x, y, z of the reference element are its coordinates 1, 2, 3
   }
-  return u[0][0] * (u[1][1] * u[2][2] - u[1][2] * u[2][1]) - u[0][1] * (u[1][0] * u[2][2] - u[1][2] * u[2][0]) +
-         u[0][2] * (u[1][0] * u[2][1] - u[1][1] * u[2][0]);
+  return calc_det(u[0], u[1], u[2]);
 }
 
 /// Where the quadratic map of the element puts a point.
@@ -60,18 +59,15 @@ Vec3 map_point(std::span<const Vec3, 10> x, const Barycentric& l) {
   return point;
 }
 
-double calc_distance2(const Vec3& a, const Vec3& b) {
-  double sum = 0.0;
-  for (int k = 0; k < 3; ++k) sum += (a[k] - b[k]) * (a[k] - b[k]);
-  return sum;
-}
-
 /// The eight children of an element in its own nodes, positively oriented.
 std::array<std::array<int, 4>, 8> find_children(std::span<const Vec3, 10> x) {
+  const auto calc_square = [&](const Diagonal& diagonal) {
+    const Vec3 way = x[diagonal.from] - x[diagonal.to];
+    return dot(way, way);
+  };
   const Diagonal* shortest = &kDiagonals[0];
   for (const Diagonal& diagonal : kDiagonals) {
-    if (calc_distance2(x[diagonal.from], x[diagonal.to]) < calc_distance2(x[shortest->from], x[shortest->to]) * (1 - 1e-9))
-      shortest = &diagonal;
+    if (calc_square(diagonal) < calc_square(*shortest) * (1 - 1e-9)) shortest = &diagonal;
   }
   std::array<std::array<int, 4>, 8> children{};
   std::copy(kCornerTets.begin(), kCornerTets.end(), children.begin());

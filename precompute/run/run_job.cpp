@@ -1,7 +1,6 @@
 #include "precompute/run/run_job.hpp"
 
 #include <fmt/core.h>
-#include <json/json.h>
 
 #include <algorithm>
 #include <cmath>
@@ -11,11 +10,6 @@
 #include <utility>
 #include <vector>
 
-#include "precompute/eigen/solver_options.hpp"
-#include "precompute/run/io/checkpoint_file.hpp"
-#include "precompute/run/io/fingerprint.hpp"
-#include "precompute/run/io/matrices.hpp"
-#include "precompute/run/io/surface_modes.hpp"
 #include "precompute/petsc/session.hpp"
 #include "precompute/run/accuracy.hpp"
 #include "precompute/run/air.hpp"
@@ -24,12 +18,17 @@
 #include "precompute/run/coupling.hpp"
 #include "precompute/run/describe_run.hpp"
 #include "precompute/run/interrupt.hpp"
+#include "precompute/run/io/checkpoint_file.hpp"
+#include "precompute/run/io/fingerprint.hpp"
+#include "precompute/run/io/matrices.hpp"
+#include "precompute/run/io/surface_modes.hpp"
 #include "precompute/run/known_body.hpp"
 #include "precompute/run/open_job.hpp"
 #include "precompute/run/run.hpp"
 #include "precompute/run/solve_body.hpp"
 #include "runtime/bank/corrected.hpp"
 #include "runtime/base/file.hpp"
+#include "runtime/base/json.hpp"
 
 namespace carillon::run {
 namespace {
@@ -128,7 +127,7 @@ RunSummary write_outputs(Run& run, const AccurateBody& found, const AirReport& a
   if (run.comm.is_root()) summary.warning = describe_wide_bars(bank, found.setting, run.job.accuracy_cents.has_value());
   const fs::path folder = fs::absolute(summary.bank).parent_path();
   const auto make_record = [&](const Measured& measured) {
-    Json::Value record = describe_run(run, found.setting, found.body, found.solved, measured);
+    base::Json record = describe_run(run, found.setting, found.body, found.solved, measured);
     if (run.job.accuracy_cents) record["accuracy"] = describe_accuracy(found.report);
     if (!air.why.empty()) {
       record["air"]["solved"] = air.is_solved;
@@ -137,7 +136,7 @@ RunSummary write_outputs(Run& run, const AccurateBody& found, const AirReport& a
     }
     if (!coupling.result.empty()) record["coupling"] = coupling.result;
     if (!summary.warning.empty()) record["warnings"].append(summary.warning);
-    return job::resolved_json(run.job, folder, write_json(record));
+    return job::resolved_json(run.job, folder, record.sorted_text());
   };
   run.log.begin("write", summary.bank.string());
   Measured measured = measure(run.comm);

@@ -12,7 +12,7 @@ namespace carillon::run {
 
 struct RunOptions {
   bool quiet = false;                         // no progress on standard output
-  std::vector<std::string> solver_options;    // words for PETSc and SLEPc ("-eps_ncv", "200")
+  std::vector<std::string> solver_options;    // words for PETSc ("-log_view")
   std::filesystem::path checkpoint;           // resumed from where it fits, and saved to; empty: none
   double checkpoint_every_s = 300;            // seconds between two saves of it
   std::filesystem::path progress;             // progress as JSON lines is appended here; empty: nowhere

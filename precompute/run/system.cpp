@@ -2,9 +2,8 @@
 
 #include <fmt/core.h>
 
-#include "precompute/eigen/solver_options.hpp"
+#include "precompute/eigen/types.hpp"
 #include "precompute/fem/element.hpp"
-#include "precompute/petsc/session.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::run {
@@ -12,7 +11,6 @@ namespace {
 
 /// Refuses before anything is assembled.
 void check_method(const Run& run, std::int64_t unknowns) {
-  eigen::check_solver_options(petsc::to_petsc_int(unknowns));
   if (run.job.method != job::Method::dense || unknowns <= eigen::kMaxDenseUnknowns) return;
   throw InputError(fmt::format("{}: \"solver.method\": \"dense\" solves up to {} unknowns, and the body has {}; take \"automatic\"",
                                run.job.file.string(), eigen::kMaxDenseUnknowns, unknowns));

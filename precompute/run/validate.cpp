@@ -6,7 +6,6 @@
 #include "precompute/run/validate.hpp"
 
 #include <fmt/core.h>
-#include <json/json.h>
 #include <sys/resource.h>
 
 #include <algorithm>
@@ -14,12 +13,12 @@
 #include <cmath>
 #include <fstream>
 
+#include "precompute/eigen/memory.hpp"
+#include "precompute/eigen/predict_cost.hpp"
 #include "precompute/job/cost/calibration.hpp"
 #include "precompute/job/cost/memory.hpp"
 #include "precompute/job/cost/modes.hpp"
 #include "precompute/job/cost/seconds.hpp"
-#include "precompute/eigen/memory.hpp"
-#include "precompute/eigen/solve_estimate.hpp"
 #include "precompute/ldlt/update_rate.hpp"
 #include "precompute/mesh/parallel/read_parallel.hpp"
 #include "precompute/petsc/session.hpp"
@@ -32,6 +31,7 @@
 #include "precompute/run/system.hpp"
 #include "runtime/base/clock.hpp"
 #include "runtime/base/host.hpp"
+#include "runtime/base/json.hpp"
 
 namespace carillon::run {
 namespace {
@@ -54,8 +54,7 @@ double calc_area(const std::vector<Vec3>& points_m, const Triangles& triangles) 
   double area = 0;
   for (const auto& t : triangles) {
     const Vec3 &a = points_m[t[0]], &b = points_m[t[1]], &c = points_m[t[2]];
-    const Vec3 u{b[0] - a[0], b[1] - a[1], b[2] - a[2]}, v{c[0] - a[0], c[1] - a[1], c[2] - a[2]};
-    area += 0.5 * std::hypot(u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]);
+    area += 0.5 * calc_length(cross(b - a, c - a));
   }
   return area;
 }
@@ -73,7 +72,7 @@ class Validation {
     return run_;
   }
   void run();
-  Json::Value describe() const;
+  base::Json describe() const;
   std::string describe_for_people() const;
 
  private:
@@ -84,7 +83,7 @@ class Validation {
   bool has_time_to_read(const Setting& setting);
   std::string suggest_patience(double seconds) const;
   void guess();
-  bool may_count(const eigen::SolveEstimate& estimate);
+  bool may_count(const eigen::SolveCost& estimate);
   void predict_modes();
   void predict_memory();
   void predict_time();
@@ -92,7 +91,7 @@ class Validation {
   bool fits_here() const;
   bool has_volume() const { return !body_.estimate || body_.estimate->volume_m3 > 0; }
   std::int64_t get_max_modes() const {
-    return solve_estimate_.modes.value_or(has_volume() ? std::llround(std::ceil(estimate_.high)) : *size_.modes);
+    return solve_cost_.modes.value_or(has_volume() ? std::llround(std::ceil(estimate_.high)) : *size_.modes);
   }
   /// Of those that are computed, the ones that the bank will hold.
   std::int64_t get_listed(std::int64_t modes) const {
@@ -104,7 +103,7 @@ class Validation {
   double base_bytes_;  // of a rank without a mesh
   Body body_;
   BodyProperties properties_;
-  eigen::SolveEstimate solve_estimate_;
+  eigen::SolveCost solve_cost_;
   cost::MemoryParts memory_;  // of one rank
   double assembled_s_ = 0;    // CPU seconds until then
   double speed_ = 1;          // of this processor over that of the cost model
@@ -144,11 +143,11 @@ void Validation::run() {
 
 /// Seconds of a factorisation on this machine over those of the cost model.
 double Validation::get_factor_pace() const {
-  if (solve_estimate_.factor_seconds <= 0) return 1 / speed_;
+  if (solve_cost_.factor_seconds <= 0) return 1 / speed_;
   const double predicted = cost::predict_factorisation_seconds(size_);
   // Small factorisations are no measure of the pace.
   constexpr double kTrustSeconds = 0.1;
-  return (solve_estimate_.factor_seconds + kTrustSeconds / speed_) / (predicted + kTrustSeconds);
+  return (solve_cost_.factor_seconds + kTrustSeconds / speed_) / (predicted + kTrustSeconds);
 }
 
 double Validation::find_seconds_left() const { return run_.options.patience_s - find_process_seconds(); }
@@ -184,7 +183,7 @@ bool Validation::has_time_to_read(const Setting& setting) {
     double edges_m = 0;
     for (std::int64_t t = 0; t < coarse.tet_count(); ++t) {
       const Vec3 &p = coarse.nodes_m[coarse.tets[10 * t]], &q = coarse.nodes_m[coarse.tets[10 * t + 1]];
-      edges_m += std::hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]) / static_cast<double>(coarse.tet_count());
+      edges_m += calc_length(p - q) / static_cast<double>(coarse.tet_count());
     }
     BodyEstimate known;
     known.volume_m3 = check.volume_m3;
@@ -257,8 +256,8 @@ void Validation::guess() {
     properties_.volume_m3 = fem::calc_volumes(run_.comm, body_.pieces.local, properties_.materials);
   }
   size_ = complete_factor(size_);
-  solve_estimate_.entries = size_.factor_entries;
-  solve_estimate_.flops = size_.factor_flops;
+  solve_cost_.entries = size_.factor_entries;
+  solve_cost_.flops = size_.factor_flops;
   memory_ = cost::predict_parts(size_);
   memory_.program = base_bytes_;
   memory_.assembled = static_cast<double>(base::find_memory().resident) + cost::calc_matrix_bytes(size_);
@@ -272,7 +271,7 @@ void Validation::guess() {
           : fmt::format("too large to be assembled in the memory that is left here: {}", kGuessed));
 }
 
-bool Validation::may_count(const eigen::SolveEstimate& estimate) {
+bool Validation::may_count(const eigen::SolveCost& estimate) {
   cost::ProblemSize size = size_;
   size.factor_flops = estimate.flops;
   size.factor_entries = estimate.entries;
@@ -312,18 +311,18 @@ void Validation::analyse_mesh(const Setting& setting) {
     memory_.read_peak = static_cast<double>(base::find_memory().peak);
     assembled_s_ = base::get_process_cpu_s();
     heartbeat_.begin("analysing the factorisation");
-    solve_estimate_ = name_errors(body_.source, run_, [&] {
-      return eigen::estimate_solve({system.matrices.stiffness, system.matrices.mass, make_layout(body_)}, make_options(run_.job, setting),
-                                   [&](const eigen::SolveEstimate& estimate) { return may_count(estimate); });
+    solve_cost_ = name_errors(body_.source, run_, [&] {
+      return eigen::predict_cost({system.matrices.stiffness, system.matrices.mass, make_layout(body_)}, make_options(run_.job, setting),
+                                 [&](const eigen::SolveCost& estimate) { return may_count(estimate); });
     });
     properties_ = std::move(system.properties);
-    memory_.copies_peak = static_cast<double>(solve_estimate_.copies_bytes);
-    memory_.copies = static_cast<double>(solve_estimate_.copies_kept_bytes);
-    memory_.factor_peak = static_cast<double>(solve_estimate_.factor_bytes);
-    memory_.factor = static_cast<double>(solve_estimate_.factor_kept_bytes);
+    memory_.copies_peak = static_cast<double>(solve_cost_.copies_bytes);
+    memory_.copies = static_cast<double>(solve_cost_.copies_kept_bytes);
+    memory_.factor_peak = static_cast<double>(solve_cost_.factor_bytes);
+    memory_.factor = static_cast<double>(solve_cost_.factor_kept_bytes);
   }
-  size_.factor_flops = solve_estimate_.flops;
-  size_.factor_entries = solve_estimate_.entries;
+  size_.factor_flops = solve_cost_.flops;
+  size_.factor_entries = solve_cost_.entries;
 }
 
 void Validation::predict_modes() {
@@ -340,8 +339,8 @@ void Validation::predict_modes() {
     for (double* count : {&estimate_.count, &estimate_.low, &estimate_.high}) *count = std::min(*count, most);
   }
   size_.is_thin = estimate_.slenderness > cost::kVerySlender;
-  size_.modes = solve_estimate_.modes.value_or(std::llround(estimate_.count));
-  if (solve_estimate_.modes) return;
+  size_.modes = solve_cost_.modes.value_or(std::llround(estimate_.count));
+  if (solve_cost_.modes) return;
   notes_.push_back(fmt::format("the modes are estimated from volume and surface (Weyl's law), between {} and {}{}",
                                get_listed(std::llround(estimate_.low)), get_listed(std::llround(estimate_.high)),
                                estimate_.is_thin ? ": its walls are thinner than half a shear wave, where that is rough" : ""));
@@ -350,8 +349,8 @@ void Validation::predict_modes() {
 void Validation::predict_memory() {
   cost::ProblemSize size = size_;
   size.modes = get_max_modes();
-  size.rigid_modes = solve_estimate_.rigid_count;
-  size.is_dense = solve_estimate_.is_dense;
+  size.rigid_modes = solve_cost_.rigid_count;
+  size.is_dense = solve_cost_.is_dense;
   for (std::size_t i = 0; i < kRanks.size(); ++i) bytes_[i] = std::llround(cost::calc_peak_bytes(memory_, size, kRanks[i]));
 }
 
@@ -371,30 +370,30 @@ void Validation::predict_time() {
 /// On one rank, in the memory that is left now.
 bool Validation::fits_here() const { return bytes_[0] - std::llround(base_bytes_) <= left_bytes_; }
 
-Json::Value Validation::describe() const {
-  Json::Value root;
+base::Json Validation::describe() const {
+  base::Json root;
   root["ok"] = true;
-  Json::Value& mesh = root["mesh"];
+  base::Json& mesh = root["mesh"];
   mesh["source"] = body_.source;
   mesh["how"] = body_.estimate ? "estimated" : "made";
-  mesh["nodes"] = Json::Int64(size_.nodes);
-  mesh["tets"] = Json::Int64(size_.tets);
+  mesh["nodes"] = size_.nodes;
+  mesh["tets"] = size_.tets;
   mesh["components"] = body_.pieces.components;
-  mesh["fixed_nodes"] = Json::Int64(body_.fixed_nodes);
+  mesh["fixed_nodes"] = body_.fixed_nodes;
   mesh["min_dihedral_deg"] = body_.check.min_dihedral_deg;
   mesh["mean_ratio_min"] = body_.check.mean_ratio_min;
-  root["unknowns"] = Json::Int64(size_.unknowns);
-  Json::Value& modes = root["modes"];
-  modes["count"] = Json::Int64(get_listed(*size_.modes));
-  modes["how"] = solve_estimate_.modes ? "counted" : has_volume() ? "estimated" : "unknown";
-  modes["estimate"] = Json::Int64(get_listed(std::llround(estimate_.count)));
-  modes["low"] = Json::Int64(get_listed(solve_estimate_.modes ? *size_.modes : std::llround(std::floor(estimate_.low))));
-  modes["high"] = Json::Int64(get_listed(get_max_modes()));
-  root["factor"]["entries"] = Json::Int64(solve_estimate_.entries);
-  root["factor"]["flops"] = solve_estimate_.flops;
+  root["unknowns"] = size_.unknowns;
+  base::Json& modes = root["modes"];
+  modes["count"] = get_listed(*size_.modes);
+  modes["how"] = solve_cost_.modes ? "counted" : has_volume() ? "estimated" : "unknown";
+  modes["estimate"] = get_listed(std::llround(estimate_.count));
+  modes["low"] = get_listed(solve_cost_.modes ? *size_.modes : std::llround(std::floor(estimate_.low)));
+  modes["high"] = get_listed(get_max_modes());
+  root["factor"]["entries"] = solve_cost_.entries;
+  root["factor"]["flops"] = solve_cost_.flops;
   root["factor"]["how"] = is_analysed_ ? "analysed" : "guessed";
   for (std::size_t i = 0; i < kRanks.size(); ++i) {
-    root["memory_bytes"][std::to_string(kRanks[i])] = Json::Int64(bytes_[i]);
+    root["memory_bytes"][std::to_string(kRanks[i])] = bytes_[i];
     root["wall_seconds"][std::to_string(kRanks[i])] = wall_s_[i];
   }
   root["cpu_seconds"] = costs_.sum();
@@ -409,7 +408,7 @@ std::string Validation::describe_for_people() const {
   std::string text = fmt::format("{}: well\n{}{} nodes, {} tetrahedra, {} unknowns\n", run_.job.file.string(),
                                  body_.estimate ? "about " : "", size_.nodes, size_.tets, size_.unknowns);
   const std::int64_t listed = get_listed(*size_.modes);
-  text += solve_estimate_.modes
+  text += solve_cost_.modes
               ? fmt::format("{} modes in {:g} .. {:g} Hz, counted by inertia\n", listed, run_.job.band_hz[0], run_.job.band_hz[1])
               : fmt::format("{} {} modes in {:g} .. {:g} Hz\n", has_volume() ? "about" : "as for", listed, run_.job.band_hz[0],
                             run_.job.band_hz[1]);
@@ -435,15 +434,15 @@ std::string validate_job(const comm::Communicator& comm, const std::filesystem::
   const Run& opened = validation.open(job_file);
   if (opened.job.analytic) return validate_known_body(opened);
   validation.run();
-  return options.json ? write_json(validation.describe()) : validation.describe_for_people();
+  return options.json ? validation.describe().sorted_text() : validation.describe_for_people();
 }
 
 std::string describe_failure(const std::string& message, int code) {
-  Json::Value root;
+  base::Json root;
   root["ok"] = false;
   root["error"] = message;
   root["code"] = code;
-  return write_json(root);
+  return root.sorted_text();
 }
 
 }  // namespace carillon::run

@@ -122,90 +122,101 @@ void MotionFile::finish() {
   });
 }
 
+void MotionFile::write_cells(std::int64_t root) const {
+  const std::int64_t version[2] = {2, 0};
+  write_attribute(root, "Version", H5T_NATIVE_INT64, {2}, version);
+  write_text(root, "Type", "UnstructuredGrid");
+  const auto cells = static_cast<std::int64_t>(triangles_.size());
+  write_list(root, "NumberOfPoints", std::vector<std::int64_t>(count_, points_));
+  write_list(root, "NumberOfCells", std::vector<std::int64_t>(count_, cells));
+  write_list(root, "NumberOfConnectivityIds", std::vector<std::int64_t>(count_, 3 * cells));
+  std::vector<std::int64_t> corners, offsets{0};
+  for (const auto& triangle : triangles_) {
+    corners.insert(corners.end(), triangle.begin(), triangle.end());
+    offsets.push_back(static_cast<std::int64_t>(corners.size()));
+  }
+  write_list(root, "Connectivity", corners);
+  write_list(root, "Offsets", offsets);
+  {
+    const hsize_t count = triangles_.size();
+    const std::vector<std::uint8_t> types(triangles_.size(), 5);  // VTK_TRIANGLE
+    const bank::Hdf5Id space(H5Screate_simple(1, &count, nullptr), H5Sclose);
+    const bank::Hdf5Id set(create_set(root, "Types", H5T_STD_U8LE, space), H5Dclose);
+    bank::require(H5Dwrite(set, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, types.data()), "write the motion");
+  }
+  const bank::Hdf5Id cell_data(H5Gcreate2(root, "CellData", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
+  write_list(cell_data, "body", {body_.begin(), body_.end()});
+}
+
+void MotionFile::write_steps(std::int64_t root) const {
+  const bank::Hdf5Id steps(H5Gcreate2(root, "Steps", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
+  write_attribute(steps, "NSteps", H5T_NATIVE_INT64, {}, &count_);
+  std::vector<double> times;
+  std::vector<std::int64_t> first_point, none(static_cast<std::size_t>(count_)), one(static_cast<std::size_t>(count_), 1), part_of;
+  for (std::int64_t f = 0; f < count_; ++f) {
+    times.push_back((std::ceil(static_cast<double>(f) * every_samples_ - 1e-9) + 0.0) / rate_hz_);  // + 0: not -0 for the first
+    first_point.push_back(f * points_);
+    part_of.push_back(f);
+  }
+  {
+    const hsize_t count = times.size();
+    const bank::Hdf5Id space(H5Screate_simple(1, &count, nullptr), H5Sclose);
+    const bank::Hdf5Id set(create_set(steps, "Values", H5T_IEEE_F64LE, space), H5Dclose);
+    bank::require(H5Dwrite(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, times.data()), "write the motion");
+  }
+  write_list(steps, "PartOffsets", part_of);
+  write_list(steps, "NumberOfParts", one);
+  write_list(steps, "PointOffsets", first_point);
+  write_list(steps, "CellOffsets", none);
+  write_list(steps, "ConnectivityIdOffsets", none);
+  const bank::Hdf5Id point_offsets(H5Gcreate2(steps, "PointDataOffsets", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
+  write_list(point_offsets, "speed", first_point);
+  const bank::Hdf5Id cell_offsets(H5Gcreate2(steps, "CellDataOffsets", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
+  write_list(cell_offsets, "body", none);
+}
+
+void MotionFile::write_frames(std::int64_t root) const {
+  const bank::Hdf5Id point_data(H5Gcreate2(root, "PointData", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
+  const hsize_t all_points[2] = {static_cast<hsize_t>(count_) * static_cast<hsize_t>(points_), 3};
+  const bank::Hdf5Id points_space(H5Screate_simple(2, all_points, nullptr), H5Sclose),
+      speed_space(H5Screate_simple(1, all_points, nullptr), H5Sclose);
+  const bank::Hdf5Id points(create_set(root, "Points", H5T_IEEE_F32LE, points_space), H5Dclose);
+  const bank::Hdf5Id speed(create_set(point_data, "speed", H5T_IEEE_F32LE, speed_space), H5Dclose);
+  const std::size_t row = static_cast<std::size_t>(points_) * kRow;
+  std::int64_t frame = 0;
+  std::string kept;
+  base::read_pieces(frames_, "frames of the motion", row * sizeof(float), [&](std::string_view piece) {
+    kept.append(piece);
+    while (kept.size() >= row * sizeof(float) && frame < count_) {
+      std::vector<float> values(row), place(3 * points_), size(static_cast<std::size_t>(points_));
+      std::memcpy(values.data(), kept.data(), row * sizeof(float));
+      kept.erase(0, row * sizeof(float));
+      for (std::size_t p = 0; p < static_cast<std::size_t>(points_); ++p) {
+        for (std::size_t k = 0; k < 3; ++k) place[3 * p + k] = values[kRow * p + k];
+        size[p] = values[kRow * p + 3];
+      }
+      const hsize_t begin[2] = {static_cast<hsize_t>(frame) * static_cast<hsize_t>(points_), 0},
+                    count[2] = {static_cast<hsize_t>(points_), 3};
+      const bank::Hdf5Id part_space(H5Screate_simple(2, count, nullptr), H5Sclose),
+          part_speed(H5Screate_simple(1, count, nullptr), H5Sclose);
+      bank::require(H5Sselect_hyperslab(points_space, H5S_SELECT_SET, begin, nullptr, count, nullptr), "write the motion");
+      bank::require(H5Sselect_hyperslab(speed_space, H5S_SELECT_SET, begin, nullptr, count, nullptr), "write the motion");
+      bank::require(H5Dwrite(points, H5T_NATIVE_FLOAT, part_space, points_space, H5P_DEFAULT, place.data()), "write the motion");
+      bank::require(H5Dwrite(speed, H5T_NATIVE_FLOAT, part_speed, speed_space, H5P_DEFAULT, size.data()), "write the motion");
+      ++frame;
+    }
+  });
+}
+
 void MotionFile::write() const {
   std::filesystem::path part = file_;
   part += ".part";
   try {
     const bank::Hdf5Id file(H5Fcreate(part.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT), H5Fclose);
     const bank::Hdf5Id root(H5Gcreate2(file, "VTKHDF", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
-    const std::int64_t version[2] = {2, 0};
-    write_attribute(root, "Version", H5T_NATIVE_INT64, {2}, version);
-    write_text(root, "Type", "UnstructuredGrid");
-    const auto cells = static_cast<std::int64_t>(triangles_.size());
-    write_list(root, "NumberOfPoints", std::vector<std::int64_t>(count_, points_));
-    write_list(root, "NumberOfCells", std::vector<std::int64_t>(count_, cells));
-    write_list(root, "NumberOfConnectivityIds", std::vector<std::int64_t>(count_, 3 * cells));
-    std::vector<std::int64_t> corners, offsets{0};
-    for (const auto& triangle : triangles_) {
-      corners.insert(corners.end(), triangle.begin(), triangle.end());
-      offsets.push_back(static_cast<std::int64_t>(corners.size()));
-    }
-    write_list(root, "Connectivity", corners);
-    write_list(root, "Offsets", offsets);
-    {
-      const hsize_t count = triangles_.size();
-      const std::vector<std::uint8_t> types(triangles_.size(), 5);  // VTK_TRIANGLE
-      const bank::Hdf5Id space(H5Screate_simple(1, &count, nullptr), H5Sclose);
-      const bank::Hdf5Id set(create_set(root, "Types", H5T_STD_U8LE, space), H5Dclose);
-      bank::require(H5Dwrite(set, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, types.data()), "write the motion");
-    }
-    const bank::Hdf5Id cell_data(H5Gcreate2(root, "CellData", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
-    write_list(cell_data, "body", {body_.begin(), body_.end()});
-    const bank::Hdf5Id point_data(H5Gcreate2(root, "PointData", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
-    const bank::Hdf5Id steps(H5Gcreate2(root, "Steps", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
-    write_attribute(steps, "NSteps", H5T_NATIVE_INT64, {}, &count_);
-    std::vector<double> times;
-    std::vector<std::int64_t> first_point, none(static_cast<std::size_t>(count_)), one(static_cast<std::size_t>(count_), 1), part_of;
-    for (std::int64_t f = 0; f < count_; ++f) {
-      times.push_back((std::ceil(static_cast<double>(f) * every_samples_ - 1e-9) + 0.0) / rate_hz_);  // + 0: not -0 for the first
-      first_point.push_back(f * points_);
-      part_of.push_back(f);
-    }
-    {
-      const hsize_t count = times.size();
-      const bank::Hdf5Id space(H5Screate_simple(1, &count, nullptr), H5Sclose);
-      const bank::Hdf5Id set(create_set(steps, "Values", H5T_IEEE_F64LE, space), H5Dclose);
-      bank::require(H5Dwrite(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, times.data()), "write the motion");
-    }
-    write_list(steps, "PartOffsets", part_of);
-    write_list(steps, "NumberOfParts", one);
-    write_list(steps, "PointOffsets", first_point);
-    write_list(steps, "CellOffsets", none);
-    write_list(steps, "ConnectivityIdOffsets", none);
-    const bank::Hdf5Id point_offsets(H5Gcreate2(steps, "PointDataOffsets", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
-    write_list(point_offsets, "speed", first_point);
-    const bank::Hdf5Id cell_offsets(H5Gcreate2(steps, "CellDataOffsets", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
-    write_list(cell_offsets, "body", none);
-
-    const hsize_t all_points[2] = {static_cast<hsize_t>(count_) * static_cast<hsize_t>(points_), 3};
-    const bank::Hdf5Id points_space(H5Screate_simple(2, all_points, nullptr), H5Sclose),
-        speed_space(H5Screate_simple(1, all_points, nullptr), H5Sclose);
-    const bank::Hdf5Id points(create_set(root, "Points", H5T_IEEE_F32LE, points_space), H5Dclose);
-    const bank::Hdf5Id speed(create_set(point_data, "speed", H5T_IEEE_F32LE, speed_space), H5Dclose);
-    const std::size_t row = static_cast<std::size_t>(points_) * kRow;
-    std::int64_t frame = 0;
-    std::string kept;
-    base::read_pieces(frames_, "frames of the motion", row * sizeof(float), [&](std::string_view piece) {
-      kept.append(piece);
-      while (kept.size() >= row * sizeof(float) && frame < count_) {
-        std::vector<float> values(row), place(3 * points_), size(static_cast<std::size_t>(points_));
-        std::memcpy(values.data(), kept.data(), row * sizeof(float));
-        kept.erase(0, row * sizeof(float));
-        for (std::size_t p = 0; p < static_cast<std::size_t>(points_); ++p) {
-          for (std::size_t k = 0; k < 3; ++k) place[3 * p + k] = values[kRow * p + k];
-          size[p] = values[kRow * p + 3];
-        }
-        const hsize_t begin[2] = {static_cast<hsize_t>(frame) * static_cast<hsize_t>(points_), 0},
-                      count[2] = {static_cast<hsize_t>(points_), 3};
-        const bank::Hdf5Id part_space(H5Screate_simple(2, count, nullptr), H5Sclose),
-            part_speed(H5Screate_simple(1, count, nullptr), H5Sclose);
-        bank::require(H5Sselect_hyperslab(points_space, H5S_SELECT_SET, begin, nullptr, count, nullptr), "write the motion");
-        bank::require(H5Sselect_hyperslab(speed_space, H5S_SELECT_SET, begin, nullptr, count, nullptr), "write the motion");
-        bank::require(H5Dwrite(points, H5T_NATIVE_FLOAT, part_space, points_space, H5P_DEFAULT, place.data()), "write the motion");
-        bank::require(H5Dwrite(speed, H5T_NATIVE_FLOAT, part_speed, speed_space, H5P_DEFAULT, size.data()), "write the motion");
-        ++frame;
-      }
-    });
+    write_cells(root);
+    write_steps(root);
+    write_frames(root);
   } catch (...) {
     std::error_code ignored;
     std::filesystem::remove(part, ignored);

@@ -30,6 +30,9 @@ class MotionFile {
     float x, y, z, speed;
   };
   void write() const;
+  void write_cells(std::int64_t root) const;
+  void write_steps(std::int64_t root) const;
+  void write_frames(std::int64_t root) const;
 
   const transient::Domain& domain_;
   std::filesystem::path file_, frames_;

@@ -98,20 +98,20 @@ std::string write_outputs(const comm::Communicator& comm, Simulation& simulation
         .set("contact_dissipated_j", base::significant(touch.dissipated_j, 9));
     for (const transient::BallStriker& ball : simulation.contacts->get_strikers()) {
       base::Json striker = base::Json::object();
-      for (const double x : ball.position_m) striker.member("position_m").add(base::significant(x, 9));
-      for (const double x : ball.velocity_m_s) striker.member("velocity_m_s").add(base::significant(x, 9));
-      for (const double x : ball.spin_rad_s) striker.member("angular_velocity_rad_s").add(base::significant(x, 9));
-      record.member("strikers").add(std::move(striker));
+      for (const double x : ball.position_m) striker["position_m"].add(base::significant(x, 9));
+      for (const double x : ball.velocity_m_s) striker["velocity_m_s"].add(base::significant(x, 9));
+      for (const double x : ball.spin_rad_s) striker["angular_velocity_rad_s"].add(base::significant(x, 9));
+      record["strikers"].add(std::move(striker));
     }
     for (const Bent& bent : simulation.bodies.bent) {
       base::Json one = base::Json::object();
       one.set("body", spec.bodies[bent.body].name).set("displacement_m", base::significant(bent.displacement_m, 6));
       one.set("energy_j", base::significant(bent.energy_j, 9)).set("cpu_seconds", base::decimals(bent.cpu_s, 3));
       if (bent.mode_hz > 0.0) one.set("mode_hz", base::significant(bent.mode_hz, 9));
-      record.member("bent").add(std::move(one));
+      record["bent"].add(std::move(one));
     }
-    for (const EnergyBook& one : simulation.books) record.member("books").add(describe(one));
-    for (const std::string& warning : spec.warnings) record.member("warnings").add(warning);
+    for (const EnergyBook& one : simulation.books) record["books"].add(describe(one));
+    for (const std::string& warning : spec.warnings) record["warnings"].add(warning);
     if (!spec.record.empty()) base::write_file(spec.record, record.text());
     result = fmt::format(
         "{:.6g} s in {} steps of {:.4g} s, {:.3g} element-steps a second of CPU time, sound {:.1f} % of the CPU time\n"

@@ -15,14 +15,14 @@
 #include <utility>
 #include <vector>
 
-#include "precompute/simulation/emission/emission.hpp"
-#include "precompute/run/io/progress_file.hpp"
 #include "precompute/job/simulation.hpp"
 #include "precompute/run/interrupt.hpp"
+#include "precompute/run/io/progress_file.hpp"
 #include "precompute/run/run_log.hpp"
 #include "precompute/run/same_start.hpp"
 #include "precompute/simulation/checkpoint.hpp"
 #include "precompute/simulation/coarsen.hpp"
+#include "precompute/simulation/emission/emission.hpp"
 #include "precompute/simulation/emission_input.hpp"
 #include "precompute/simulation/outputs.hpp"
 #include "precompute/simulation/predict.hpp"
@@ -171,6 +171,30 @@ class Reporter {
   double last_ = 0.0, last_printed_ = 0.0;
 };
 
+/// Makes sound and film, and resumes from a checkpoint. Collective.
+void start(const comm::Communicator& comm, Simulation& simulation, const std::optional<SimulationState>& saved, const Log& log) {
+  transient::Motion& motion = *simulation.motion;
+  const job::SimulationSpec& spec = simulation.spec;
+  if (simulation.makes_sound())
+    simulation.sound = std::make_unique<emission::Emission>(comm, make_surface_part(*simulation.domain, spec),
+                                                            make_emission_options(spec, motion.get_steps_per_sample(), saved.has_value()));
+  if (!spec.motion.empty()) simulation.film = std::make_unique<MotionFile>(*simulation.domain, spec, saved.has_value());
+  if (saved) {
+    resume(comm, *saved, simulation);
+    simulation.first_step = motion.get_step_count();
+    log.print(fmt::format("resumed at {:.6g} s", motion.get_time_s()));
+  } else {
+    if (simulation.sound) {
+      set_balls(simulation);
+      simulation.sound->add_step(&motion.get_u()[0].x);
+    }
+    simulation.books.push_back(motion.calc_book());
+  }
+  simulation.steps_per_sample = motion.get_steps_per_sample();
+  log.print(fmt::format("step {:.4g} s, {} a sample; {} rank{}", motion.get_step_s(), simulation.steps_per_sample, comm.size(),
+                        comm.size() == 1 ? "" : "s"));
+}
+
 }  // namespace
 
 SimulateSummary simulate(const comm::Communicator& comm, const fs::path& job_file, const SimulateOptions& options) {
@@ -200,24 +224,7 @@ SimulateSummary simulate(const comm::Communicator& comm, const fs::path& job_fil
     for (const auto& file : temporary.resumable) file->set_needed(true);
   };
   if (saved) keep_for_checkpoint();
-  if (simulation.makes_sound())
-    simulation.sound = std::make_unique<emission::Emission>(comm, make_surface_part(*simulation.domain, spec),
-                                                            make_emission_options(spec, motion.get_steps_per_sample(), saved.has_value()));
-  if (!spec.motion.empty()) simulation.film = std::make_unique<MotionFile>(*simulation.domain, spec, saved.has_value());
-  if (saved) {
-    resume(comm, *saved, simulation);
-    simulation.first_step = motion.get_step_count();
-    log.print(fmt::format("resumed at {:.6g} s", motion.get_time_s()));
-  } else {
-    if (simulation.sound) {
-      set_balls(simulation);
-      simulation.sound->add_step(&motion.get_u()[0].x);
-    }
-    simulation.books.push_back(motion.calc_book());
-  }
-  simulation.steps_per_sample = motion.get_steps_per_sample();
-  log.print(fmt::format("step {:.4g} s, {} a sample; {} rank{}", motion.get_step_s(), simulation.steps_per_sample, comm.size(),
-                        comm.size() == 1 ? "" : "s"));
+  start(comm, simulation, saved, log);
 
   Reporter reporter = comm.agree([&] { return Reporter(log, comm.is_root() ? options.progress : fs::path()); });
   const std::int64_t frames = std::llround(spec.duration_s * spec.sample_rate_hz);

@@ -50,7 +50,7 @@ std::vector<double> calc_shapes(const Bank& bank, std::int32_t triangle, const V
 }
 
 double calc_shape_scale(double largest) {
-  // A step too small for a normal double would not hold the error bound; no real shape comes near.
+  // A subnormal step would violate the error bound; physical shapes are far larger.
   return largest > 0.0 ? std::max(largest / 32767.0, std::numeric_limits<double>::min()) : 0.0;
 }
 

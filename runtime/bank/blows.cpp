@@ -1,7 +1,6 @@
-// Method:     A blow J along the normal n at a vertex makes mode m sound with g_m |phi_m . n| J at 1 m; by the ear's weight of its
-//             frequency (A-weighting) that is its level. Vertices are ranked by the sum of the squares.
-// Source:     docs/equations.md, E5 and E7.
-// Deviations: none.
+// Method: a blow J along the normal n at a vertex excites mode m with g_m |phi_m . n| J at 1 m; A-weighted this is its level. Vertices are
+//   ranked by the sum of squares.
+// Source: docs/equations.md, E5 and E7.
 #include "runtime/bank/blows.hpp"
 
 #include <algorithm>
@@ -15,10 +14,10 @@
 namespace carillon::bank {
 namespace {
 
-constexpr double kHeard = 0.1;  // of the loudest vertex's power: struck where less is made, it would seem broken
+constexpr double kMinStrikePower = 0.1;  // minimum power of a strike position, relative to the loudest vertex
 constexpr double kLoudest = 0.1;
 
-/// What a unit of motion of each mode is heard as, (m).
+/// A-weighted level of each mode per unit motion, (m).
 std::vector<double> calc_weights(const Bank& bank) {
   std::vector<double> weights(bank.mode_count());
   for (std::size_t m = 0; m < weights.size(); ++m) weights[m] = calc_a_weight(bank.freq_hz(m)) * bank.radiation_gain[m];
@@ -59,7 +58,7 @@ std::vector<std::size_t> find_strikes(const Bank& bank, std::size_t count) {
     double farthest = 0.0;
     for (std::size_t v = 0; v < power.size(); ++v) {
       distance[v] = std::min(distance[v], norm(bank.vertices_m[v] - bank.vertices_m[chosen.back()]));
-      if (power[v] > kHeard * power[chosen[0]] && distance[v] > farthest) farthest = distance[v], next = v;
+      if (power[v] > kMinStrikePower * power[chosen[0]] && distance[v] > farthest) farthest = distance[v], next = v;
     }
     if (!(farthest > 0.0)) break;
     chosen.push_back(next);

@@ -1,10 +1,11 @@
-// What makes the multipoles of a bank sane.
-// Method:     a body that radiates through a sphere lies within it; the decay by radiation is the power of the far field, found again from
-//             the coefficients, to what rounding them leaves open. In a half space the field is that of the body and its mirror image, and
-//             the body makes half of the power: then all decays are half. Modes that the air couples are sums with unit modal mass.
-// Source:     docs/equations.md E10.
-// Deviations: the sphere may be left by what packing moves vertices (sqrt(3) / 2 of a lattice step, 5.3e-5 of the radius): a packed bank
-//             that was unpacked says nothing of it any more.
+// Checks of a bank's multipoles.
+// Method: the surface lies within the sphere; the radiation decay equals the far-field power recomputed from the coefficients, up to their
+//   rounding. In a half space the field is that of the body and its mirror image and the body radiates half of the power, so all decays are
+//   halved. Modes coupled by the air are sums with unit modal mass.
+// Source: docs/equations.md E10.
+// Deviations: the surface may exceed the sphere by the displacement of packed vertices (sqrt(3) / 2 of a lattice step, 5.3e-5 of the
+// radius):
+//   an unpacked bank does not record that it was packed.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -16,30 +17,29 @@
 namespace carillon::bank {
 namespace {
 
-constexpr double kOutside = 1e-4;             // of the radius
-constexpr double kMaxDetuning = 0.4;          // of the frequency that is played, for the mass of the air
-constexpr double kModalMassTolerance = 1e-6;  // of the modal mass of a mode in air
-constexpr double kRootTolerance = 1e-9;       // of the root of a decay, for arithmetic
+constexpr double kSphereExcess = 1e-4;        // excess over the sphere, relative to its radius
+constexpr double kMaxDetuning = 0.4;          // relative shift by the mass of the air
+constexpr double kModalMassTolerance = 1e-6;  // modal mass of a mode in air
+constexpr double kRootTolerance = 1e-9;       // root of a decay, round-off
 constexpr double kMaxAir = 1e5;               // kg/m^3, m/s: beyond any gas
 
 void check_sphere(const Bank& bank, Faults& faults) {
   const Multipoles& air = bank.multipoles;
-  if (!(air.radius_m > 0.0 && air.radius_m <= kMaxLengthM))
-    return faults.add("radiation/radius_m is {:.6g} m, which is none", air.radius_m);
+  if (!(air.radius_m > 0.0 && air.radius_m <= kMaxLengthM)) return faults.add("radiation/radius_m is {:.6g} m, not a radius", air.radius_m);
   if (!(air.nearest_m >= air.radius_m && air.nearest_m <= kMaxLengthM))
     faults.add("radiation/nearest_m is {:.6g} m, not between the radius of {:.6g} m and {:.0e}", air.nearest_m, air.radius_m, kMaxLengthM);
   for (const auto& [name, value] : {std::pair("air_density_kg_m3", air.air_density_kg_m3), std::pair("sound_speed_ms", air.sound_speed_ms)})
-    if (!(value > 0.0 && value <= kMaxAir)) faults.add("radiation/{} is {:.6g}, that of no gas", name, value);
+    if (!(value > 0.0 && value <= kMaxAir)) faults.add("radiation/{} is {:.6g}, outside the range of gases", name, value);
   double farthest = 0.0;
   for (const auto& triangle : bank.triangles)
     for (const std::int32_t v : triangle)
       if (v >= 0 && static_cast<std::size_t>(v) < bank.vertex_count())  // others are reported elsewhere
         farthest = std::max(farthest, norm(bank.vertices_m[v] - air.centre_m));
-  if (!(farthest <= air.radius_m * (1.0 + kOutside)))
+  if (!(farthest <= air.radius_m * (1.0 + kSphereExcess)))
     faults.add("the surface reaches to {:.9g} m from radiation/centre_m, and the sphere has a radius of {:.9g} m", farthest, air.radius_m);
 }
 
-/// The frequency that the mode has without air [Hz], or with it where the bank is played.
+/// Frequency of the mode [Hz] without air, or in air if the bank is prepared for playing.
 double find_hz(const Bank& bank, std::size_t mode) { return bank.corrected.is_empty() ? bank.freq_hz(mode) : bank.corrected.freq_hz[mode]; }
 
 void check_mode(const Bank& bank, std::size_t i, Faults& faults) {
@@ -49,12 +49,12 @@ void check_mode(const Bank& bank, std::size_t i, Faults& faults) {
     faults.add("radiation/freq_hz[{}] is {:.6g} Hz, and the mode has {:.6g} Hz: too far apart", i, air.freq_hz[i], hz);
   if (!(air.scale[i] >= 0.0)) faults.add("radiation/scale[{}] is {:.6g}, negative", i, air.scale[i]);
   if (!(air.decay_per_s[i] >= 0.0 && air.decay_per_s[i] <= kMaxDecayPerS))
-    faults.add("radiation/decay[{}] is {:.6g} 1/s, which is none", i, air.decay_per_s[i]);
+    faults.add("radiation/decay[{}] is {:.6g} 1/s, not a decay", i, air.decay_per_s[i]);
   if (!(air.added_mass[i] > -1.0)) faults.add("radiation/added_mass[{}] is {:.6g}, not above -1", i, air.added_mass[i]);
-  if (!(air.error_db[i] <= 0.0)) faults.add("radiation/error_db[{}] is {:.6g} dB, more than the sound itself", i, air.error_db[i]);
+  if (!(air.error_db[i] <= 0.0)) faults.add("radiation/error_db[{}] is {:.6g} dB, above the sound itself", i, air.error_db[i]);
 }
 
-/// Modes that the air couples have unit modal mass, the air's in it. Parts of how many modes, at most, there are in one.
+/// Modes coupled by the air have unit modal mass including the air. Returns the largest number of parts of a mode.
 std::int32_t check_mixing(const Multipoles& air, Faults& faults) {
   std::size_t at = 0;
   std::int32_t most = 0;
@@ -64,19 +64,19 @@ std::int32_t check_mixing(const Multipoles& air, Faults& faults) {
     most = std::max(most, air.mixing.count[i]);
     const double mass = squares * (1.0 + air.added_mass[i]);
     if (!(std::abs(mass - 1.0) <= kModalMassTolerance))
-      faults.add("the parts of mode {} (radiation/mixing_part) have a modal mass of {:.9g} in air, and it is 1", i, mass);
+      faults.add("the parts of mode {} (radiation/mixing_part) have a modal mass of {:.9g} in air instead of 1", i, mass);
   }
   return most;
 }
 
-/// Compares the decays with the share of the far field's power that goes into the air; the largest relative difference.
+/// Compares the decays with `share` times the far-field power; returns the largest relative difference.
 double check_decays(const Multipoles& air, const std::vector<CoefficientDecay>& found, double share, Faults& faults) {
   double worst = 0.0;
   for (std::size_t i = 0; i < found.size(); ++i) {
     const double wanted = share * found[i].decay_per_s, root = std::sqrt(wanted), rounding = std::sqrt(share) * found[i].root_rounding;
     const double off = std::abs(std::sqrt(air.decay_per_s[i]) - root);
     if (!std::isfinite(root) || !(off <= rounding * (1.0 + kRootTolerance) + kRootTolerance * root))
-      faults.add("radiation/decay[{}] is {:.9g} 1/s, and the coefficients radiate {:.9g}", i, air.decay_per_s[i], wanted);
+      faults.add("radiation/decay[{}] is {:.9g} 1/s, the coefficients give {:.9g}", i, air.decay_per_s[i], wanted);
     if (wanted > 0.0) worst = std::max(worst, std::abs(air.decay_per_s[i] / wanted - 1.0));
   }
   return worst;
@@ -85,7 +85,7 @@ double check_decays(const Multipoles& air, const std::vector<CoefficientDecay>& 
 }  // namespace
 
 std::string find_order_fault(const Multipoles& multipoles) {
-  std::uint64_t wanted = 0;  // where std::size_t has 32 bits, orders of a hostile file would pass them
+  std::uint64_t wanted = 0;  // 64 bits: untrusted orders could overflow a 32-bit std::size_t
   for (std::size_t i = 0; i < multipoles.order.size(); ++i) {
     const std::int32_t order = multipoles.order[i];
     if (order < 0 || order > kMaxOrder) return fmt::format("radiation/order[{}] is {}, outside 0 to {}", i, order, kMaxOrder);

@@ -1,9 +1,9 @@
-// Whether a bank's proof of completeness adds up, and its error bars.
-// Method: the number of eigenvalues below sigma is the number of negative pivots of K - sigma M = L D L^T. What the bank holds between two
-//   cuts must be the difference of their counts; a cut must not touch the error bar of a mode, or its count could go either way.
+// Checks of a bank's proof of completeness and of its error bars.
+// Method: the number of eigenvalues below sigma is the number of negative pivots of K - sigma M = L D L^T. The modes between two cuts must
+//   equal the difference of the counts; a cut inside the error bar of a mode would make its count uncertain.
 // Source: Sylvester's law of inertia; Parlett 1998, The symmetric eigenvalue problem, section 3.3.
-// Deviations: the counts themselves cannot be taken again without K and M; they are believed as far as the factorisation's backward error
-//   is far below the distance to the nearest mode.
+// Deviations: counts cannot be repeated without K and M; they are trusted if the backward error of the factorisation is far below the
+//   distance to the nearest mode.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -17,8 +17,8 @@ namespace {
 
 constexpr double kOrthonormalityLimit = 1e-6;
 constexpr double kBackwardLimit = 1e-8;
-constexpr double kEdge = 1e-9;          // relative to a frequency: rounding of band_hz and cut_hz
-constexpr double kZeroFraction = 1e-5;  // of the band's upper end: frequencies below are zero to working precision
+constexpr double kBandTolerance = 1e-9;  // relative rounding of band_hz and cut_hz
+constexpr double kZeroFraction = 1e-5;   // relative to the upper end of the band: zero to working precision below
 constexpr double kMarginTolerance = 1e-6;
 constexpr double kClusterSpread = 1e-4;  // of lambda
 
@@ -27,19 +27,19 @@ double calc_lambda(double freq_hz) {
   return omega * omega;
 }
 
-/// Number of the bank's modes below the cut.
+/// Number of modes of the bank below the cut.
 std::int64_t count_modes_below(const Bank& bank, double cut_hz) {
   const auto& lambda = bank.eigenvalue_rad2_s2;
   return std::lower_bound(lambda.begin(), lambda.end(), calc_lambda(cut_hz)) - lambda.begin();
 }
 
-/// How far the eigenvalue may be off, relative to itself: by its error bar, or by its residual where there is none.
+/// Relative uncertainty of the eigenvalue: its error bar, else its residual.
 double calc_uncertainty(const Bank& bank, std::size_t mode) {
   if (bank.algebraic_error_cents.empty()) return bank.residual[mode];
   return std::exp2(bank.algebraic_error_cents[mode] / 600.0) - 1.0;
 }
 
-/// "6 + 6" of few, "6 each" of many alike.
+/// "6 + 6" for few, "6 each" for many equal ones.
 std::string describe_rigid(const std::vector<std::int64_t>& rigid) {
   if (rigid.empty()) return "none";
   if (std::equal(rigid.begin() + 1, rigid.end(), rigid.begin()))
@@ -50,7 +50,7 @@ std::string describe_rigid(const std::vector<std::int64_t>& rigid) {
                      shown < rigid.size() ? " + ..." : "", rigid.size());
 }
 
-/// Sizes and order of the counts. The other checks need them.
+/// Sizes and order of the counts; prerequisite of the other checks.
 Check check_cuts(const Bank& bank, const Proof& proof) {
   Faults faults;
   const std::size_t cuts = proof.cut_hz.size();
@@ -67,8 +67,9 @@ Check check_cuts(const Bank& bank, const Proof& proof) {
     }
   }
   const double low = std::max(bank.band_hz[0], kZeroFraction * bank.band_hz[1]);
-  if (!(proof.cut_hz.front() <= low * (1.0 + kEdge))) faults.add("the first cut at {:.6g} Hz is inside the band", proof.cut_hz.front());
-  if (!(proof.cut_hz.back() >= bank.band_hz[1] * (1.0 - kEdge)))
+  if (!(proof.cut_hz.front() <= low * (1.0 + kBandTolerance)))
+    faults.add("the first cut at {:.6g} Hz is inside the band", proof.cut_hz.front());
+  if (!(proof.cut_hz.back() >= bank.band_hz[1] * (1.0 - kBandTolerance)))
     faults.add("the last cut at {:.6g} Hz is inside the band", proof.cut_hz.back());
   return {"counts",
           fmt::format("{} eigenvalues below {:.6g} Hz, {} below {:.6g} Hz, {} cut{} between", proof.below.front(), proof.cut_hz.front(),
@@ -76,7 +77,7 @@ Check check_cuts(const Bank& bank, const Proof& proof) {
           faults.take()};
 }
 
-/// Modes of the bank against the counts, in every interval between two cuts.
+/// Modes of the bank against the counts, in each interval between cuts.
 Check check_completeness(const Bank& bank, const Proof& proof) {
   Faults faults;
   const auto modes = static_cast<std::int64_t>(bank.mode_count());
@@ -84,7 +85,7 @@ Check check_completeness(const Bank& bank, const Proof& proof) {
   for (std::size_t i = 0; i + 1 < proof.cut_hz.size(); ++i) {
     const std::int64_t wanted = proof.below[i + 1] - proof.below[i];
     const std::int64_t held = count_modes_below(bank, proof.cut_hz[i + 1]) - count_modes_below(bank, proof.cut_hz[i]);
-    // max_modes and calc_reduced keep the lowest ones: only where the list ends may there be more than the bank holds.
+    // max_modes and calc_reduced keep the lowest modes: only past the end of the list may counts exceed the bank.
     const bool is_cut_here = !bank.complete && (proof.complete_below_hz > 0.0 ? proof.cut_hz[i + 1] > proof.complete_below_hz
                                                                               : count_modes_below(bank, proof.cut_hz[i + 1]) == modes);
     if (held == wanted || (is_cut_here && held < wanted)) continue;
@@ -93,7 +94,7 @@ Check check_completeness(const Bank& bank, const Proof& proof) {
   }
   const bool adds_up = bank.complete ? proof.found == counted && modes == counted : proof.found >= modes && proof.found <= counted;
   if (!adds_up) {
-    faults.add("{} modes were found, {} are here, and the counts give {} - {} = {}", proof.found, modes, proof.below.back(),
+    faults.add("{} modes were found, {} are stored, and the counts give {} - {} = {}", proof.found, modes, proof.below.back(),
                proof.below.front(), counted);
   }
   if (bank.complete ? proof.complete_below_hz != 0.0 : !(proof.complete_below_hz >= 0.0))
@@ -106,7 +107,7 @@ Check check_completeness(const Bank& bank, const Proof& proof) {
           faults.take()};
 }
 
-/// Cuts must be clear of the modes' error bars, by the margins that are recorded.
+/// Cuts must lie outside the modes' error bars, with the recorded margins.
 Check check_margins(const Bank& bank, const Proof& proof) {
   Faults faults;
   double min = 1.0, min_hz = proof.cut_hz.front();
@@ -114,16 +115,16 @@ Check check_margins(const Bank& bank, const Proof& proof) {
     const double sigma = calc_lambda(proof.cut_hz[i]);
     double nearest = 1.0;
     const std::size_t above = count_modes_below(bank, proof.cut_hz[i]);
-    for (const std::size_t mode : {above - 1, above}) {  // above - 1 of 0 is no mode
+    for (const std::size_t mode : {above - 1, above}) {  // above = 0 wraps around: no mode
       if (mode >= bank.mode_count()) continue;
       const double lambda = bank.eigenvalue_rad2_s2[mode];
       nearest = std::min(nearest, std::abs(lambda - sigma) / sigma);
       if (!(std::abs(lambda - sigma) > calc_uncertainty(bank, mode) * lambda))
-        faults.add("the cut at {:.9g} Hz lies inside the error bar of mode {} at {:.9g} Hz: its count is not sure", proof.cut_hz[i], mode,
+        faults.add("the cut at {:.9g} Hz lies inside the error bar of mode {} at {:.9g} Hz: its count is uncertain", proof.cut_hz[i], mode,
                    bank.freq_hz(mode));
     }
     const double recorded = proof.margin[i];
-    const bool agrees = recorded <= nearest * (1.0 + kMarginTolerance) + 1e-12;  // a mode outside the list may be nearer
+    const bool agrees = recorded <= nearest * (1.0 + kMarginTolerance) + 1e-12;  // a mode outside the list may be closer
     if (!(recorded > 0.0 && agrees))
       faults.add("margin[{}] is {:.6g}, and the nearest mode is {:.6g} of lambda from the cut", i, recorded, nearest);
     if (recorded < min) {
@@ -159,10 +160,9 @@ Check check_rigid(const Bank& bank, const Proof& proof) {
 Check check_arithmetic(const Bank& bank, const Proof& proof) {
   Faults faults;
   if (!(proof.orthonormality >= 0.0 && proof.orthonormality <= kOrthonormalityLimit))
-    faults.add("phi_i^T M phi_j is off by {:.3g}, beyond {:.0e}: some modes may be one mode twice", proof.orthonormality,
-               kOrthonormalityLimit);
+    faults.add("phi_i^T M phi_j is off by {:.3g}, beyond {:.0e}: modes may be duplicated", proof.orthonormality, kOrthonormalityLimit);
   if (!(proof.backward_error >= 0.0 && proof.backward_error <= kBackwardLimit))
-    faults.add("the factorisation's backward error is {:.3g}, beyond {:.0e}: its counts are not sure", proof.backward_error,
+    faults.add("the factorisation's backward error is {:.3g}, beyond {:.0e}: its counts are uncertain", proof.backward_error,
                kBackwardLimit);
   if (bank.element == "analytic") return {"arithmetic", "shapes are normalised by their theory, and nothing was factorised", faults.take()};
   return {"arithmetic",

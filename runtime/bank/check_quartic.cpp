@@ -1,11 +1,9 @@
-// What makes the nonlinear energy of a bank sane.
-// Method:     the elastic energy of a body is never negative. sum over r of (l_r + eta_r)^2 / 2 is not, and where the squares of l_r are no
-//             more than the linear energy, 1 - L^-1/2 B^T B L^-1/2 positive semi-definite for L the eigenvalues and B the array `linear`,
-//             the whole is not either; a factor of Cholesky says so. The gradient is held against differences of V along a random
-//             direction from a random place: polynomials that agree there are the same (Schwartz and Zippel). Every coupled mode moves,
-//             all by one energy, so large that V is about 1 J; V is evaluated six times, however many modes there are.
-// Source:     docs/equations.md E12.
-// Deviations: none.
+// Checks of a bank's nonlinear energy.
+// Method: elastic energy is non-negative. sum over r of (l_r + eta_r)^2 / 2 is; the total is, too, if the squares of l_r do not exceed the
+//   linear energy: 1 - L^-1/2 B^T B L^-1/2 positive semi-definite (L: eigenvalues, B: array `linear`), tested by Cholesky. The gradient is
+//   compared with finite differences of V along a random direction at a random point: polynomials that agree there are identical (Schwartz
+//   and Zippel). All coupled modes move with equal energy, scaled so that V is about 1 J; V is evaluated six times for any number of modes.
+// Source: docs/equations.md E12.
 #include <algorithm>
 #include <cmath>
 #include <random>
@@ -16,11 +14,11 @@
 namespace carillon::bank {
 namespace {
 
-constexpr double kSlack = 1e-6;              // of 1, for B in a file and the eigenvalues of the same solve
-constexpr double kGradientTolerance = 1e-6;  // of the terms of V; differences of third order are exact but for rounding
+constexpr double kSlack = 1e-6;              // relative to 1: round-off between stored B and eigenvalues
+constexpr double kGradientTolerance = 1e-6;  // relative to the terms of V; the differences are exact up to rounding
 constexpr double kMaxThicknessM = 1e7, kMaxRatio = 1e6;
 
-/// Whether (1 + kSlack) 1 - W is positive definite. w: (n, n), changed.
+/// True if (1 + kSlack) 1 - W is positive definite. w: (n, n), overwritten.
 bool is_below_one(std::vector<double>& w, std::size_t n) {
   for (double& value : w) value = -value;
   for (std::size_t i = 0; i < n; ++i) w[i * n + i] += 1.0 + kSlack;
@@ -50,8 +48,8 @@ bool is_part_of_linear(const Bank& bank) {
   return is_below_one(w, n);
 }
 
-/// The difference between the gradient along a direction and the differences of V there, over the size of what is summed; infinite where
-/// they are no numbers, 0 within rounding.
+/// Directional derivative by the gradient minus that by differences of V, relative to the summed magnitudes; infinite if not finite, 0
+/// within rounding.
 double calc_gradient_error(const Bank& bank) {
   const QuarticEnergy& energy = bank.quartic;
   const std::size_t n = energy.mode_count();
@@ -63,7 +61,7 @@ double calc_gradient_error(const Bank& bank) {
     q[i] = size * draw();
     way[i] = size * draw();
   }
-  // The energy may be anything from a hair's to a bridge's. Of a curved body it may be negative.
+  // The energy spans many orders of magnitude (hair to bridge) and may be negative for a curved body.
   const double energy_j = std::abs(calc_energy_j(energy, q, none));
   if (!std::isfinite(energy_j)) return HUGE_VAL;
   const double share = energy_j > 0.0 ? std::pow(energy_j, -0.25) : 1.0;
@@ -73,7 +71,7 @@ double calc_gradient_error(const Bank& bank) {
   double along = 0.0, difference = 0.0, scale = 0.0;
   for (std::size_t i = 0; i < n; ++i) along += gradient[i] * way[i];
   for (std::size_t i = 0; i < n; ++i) scale += std::abs(gradient[i] * way[i]);
-  // Exact for a polynomial of fourth order.
+  // Exact for quartic polynomials.
   for (const auto& [step, weight] : {std::pair(1.0, 8.0 / 12.0), {-1.0, -8.0 / 12.0}, {2.0, -1.0 / 12.0}, {-2.0, 1.0 / 12.0}}) {
     for (std::size_t i = 0; i < n; ++i) there[i] = q[i] + step * way[i];
     const double there_j = calc_energy_j(energy, there, none);
@@ -102,20 +100,20 @@ Check check_quartic(const Bank& bank) {
     if (!(energy.weight[p] >= 0.0) || !std::isfinite(energy.weight[p]))
       faults.add("nonlinear/weight[{}] is {:.6g}, and weights are not negative", p, energy.weight[p]);
   if (!(energy.rest_energy_j >= 0.0) || !std::isfinite(energy.rest_energy_j))
-    faults.add("nonlinear/rest_energy_j is {:.6g} J, which is none", energy.rest_energy_j);
-  if (!(energy.error >= 0.0) || !std::isfinite(energy.error)) faults.add("nonlinear/error is {:.6g}, which is none", energy.error);
+    faults.add("nonlinear/rest_energy_j is {:.6g} J, not an energy", energy.rest_energy_j);
+  if (!(energy.error >= 0.0) || !std::isfinite(energy.error)) faults.add("nonlinear/error is {:.6g}, not an error", energy.error);
   if (!(energy.membrane_ratio >= 0.0 && energy.membrane_ratio <= kMaxRatio))
     faults.add("nonlinear/membrane_ratio is {:.6g}, not a ratio of frequencies", energy.membrane_ratio);
   if (!(energy.thickness_m >= 0.0 && energy.thickness_m <= kMaxThicknessM))
-    faults.add("nonlinear/thickness_m is {:.6g} m, which is none", energy.thickness_m);
+    faults.add("nonlinear/thickness_m is {:.6g} m, not a thickness", energy.thickness_m);
   for (const std::int32_t mode : energy.modes)
     if (!(bank.eigenvalue_rad2_s2[mode] > 0.0)) return {"nonlinear", "", faults.take()};  // reported elsewhere
   if (!faults.empty()) return {"nonlinear", "", faults.take()};
-  // As it is played in air, the linear energy has the air in it.
+  // In air (after choose_frequencies) the linear energy includes the air.
   if (!energy.linear.empty() && !bank.multipoles.is_in_decay && !is_part_of_linear(bank))
     faults.add("nonlinear/linear holds more than the linear energy of the modes, so that the energy could be negative");
   if (const double error = calc_gradient_error(bank); error > 0.0)
-    faults.add("the gradient of the nonlinear energy differs from its differences by {:.2g}", error);
+    faults.add("the gradient of the nonlinear energy differs from finite differences by {:.2g}", error);
   return {"nonlinear",
           fmt::format("{} coupled modes, {} {}{}, {}", energy.mode_count(), energy.row_count(), energy.row_count() == 1 ? "row" : "rows",
                       energy.is_of_points() ? fmt::format(" at {} points", energy.point_count()) : "",

@@ -1,10 +1,10 @@
-// What makes a bank sane: one check after another, on the same bank; longer than most files.
-// Method: every property that a solve must have delivered is looked at from the numbers of the bank alone.
-//   Surface: a closed oriented surface passes every edge once in each direction; its signed volume (divergence theorem, sum of
-//   a . (b x c) / 6 over the triangles) is positive when it is outward.
-//   Inertia: the second moments S = tr(I)/2 1 - I of a body of positive density are positive definite, which implies that I is and that its
-//   principal moments obey the triangle inequality; S_ii / mass is at most the square of the largest distance from the centre.
-// Deviations: the enclosed volume of the triangles is compared with volume_m3 only within a factor of two, since curved elements bulge.
+// Checks of a bank's content.
+// Method: each property that a valid solve implies is tested from the bank alone.
+//   Surface: a closed oriented surface has each edge once in each direction; its signed volume (sum of a . (b x c) / 6 over the triangles)
+//   is positive if outward. Inertia: the second moments S = tr(I)/2 1 - I of a positive density are positive definite, which implies that I
+//   is and that its principal moments obey the triangle inequality; S_ii / mass is at most the square of the largest distance from the
+//   centre.
+// Deviations: the enclosed volume is compared with volume_m3 within a factor of two only, since curved elements bulge.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -28,20 +28,18 @@ namespace carillon::bank {
 namespace {
 
 constexpr double kResidualLimit = 1e-4;
-constexpr double kLawTolerance = 1e-9;   // of quantities that were computed by the same formula
+constexpr double kLawTolerance = 1e-9;   // quantities computed by the same formula
 constexpr double kMassTolerance = 0.01;  // mass against density times volume
 constexpr double kShareTolerance = 1e-6;
-constexpr double kMinLengthM = 1e-9, kFarthestM = 1e12;  // sizes; how far from the origin
+constexpr double kMinLengthM = 1e-9, kMaxOriginDistanceM = 1e12;  // size; distance from the origin
 constexpr double kMaxAlpha1S = 1e6, kMaxAlpha2PerS = 1e12;
-// A mode of unit modal mass that moves only the share s of the body's mass has |phi| = 1 / sqrt(s m) there.
-constexpr double kMinShare = 1e-12;
-constexpr double kGainSlack = 10.0;  // gains above the pulsating sphere's that has the largest motion everywhere
+// A mode of unit modal mass that moves the fraction s of the body's mass has |phi| = 1 / sqrt(s m) there.
+constexpr double kMinMassShare = 1e-12;
+constexpr double kGainSlack = 10.0;  // factor over the gain of a sphere pulsating with the largest motion
 
-double calc_size(const Vec3& v) { return std::hypot(v[0], v[1], v[2]); }
+constexpr double kMaxSteps = 32767.0;  // two-byte component
 
-constexpr double kMaxSteps = 32767.0;  // of a component of two bytes
-
-/// The largest |phi| that so many steps of a mode can stand for.
+/// Largest |phi| representable by that many steps of a mode.
 double calc_max_motion(const Bank& bank, std::size_t mode, double steps) { return std::numbers::sqrt3 * bank.shape_scale[mode] * steps; }
 
 Check check_arrays(const Bank& bank) {
@@ -49,7 +47,7 @@ Check check_arrays(const Bank& bank) {
   const std::size_t vertices = bank.vertex_count();
   const std::size_t modes = bank.mode_count();
   const auto expect = [&](const char* name, std::size_t size, std::size_t wanted) {
-    if (size != wanted) faults.add("arrays disagree: {} holds {} values and {} are wanted", name, size, wanted);
+    if (size != wanted) faults.add("arrays disagree: {} holds {} values, {} are required", name, size, wanted);
   };
   expect("decay", bank.decay_per_s.size(), modes);
   expect("residual", bank.residual.size(), modes);
@@ -164,7 +162,7 @@ Check check_numbers(const Bank& bank) {
     look("proof/orthonormality", &bank.proof->orthonormality, 1);
     look("proof/backward_error", &bank.proof->backward_error, 1);
   }
-  return {"numbers", fmt::format("{} looked at", count), faults.take()};
+  return {"numbers", fmt::format("{} checked", count), faults.take()};
 }
 
 Check check_eigenvalues(const Bank& bank) {
@@ -172,8 +170,7 @@ Check check_eigenvalues(const Bank& bank) {
   const auto& lambda = bank.eigenvalue_rad2_s2;
   for (std::size_t i = 0; i < lambda.size(); ++i) {
     if (!(lambda[i] > 0.0)) faults.add("eigenvalue[{}] is {:.6g} rad^2/s^2, not positive", i, lambda[i]);
-    if (bank.freq_hz(i) > kMaxHz)
-      faults.add("mode {} is at {:.3g} Hz, beyond the {:.0e} Hz that any solid has", i, bank.freq_hz(i), kMaxHz);
+    if (bank.freq_hz(i) > kMaxHz) faults.add("mode {} is at {:.3g} Hz, above the limit of {:.0e} Hz", i, bank.freq_hz(i), kMaxHz);
     if (i > 0 && !(lambda[i] >= lambda[i - 1])) faults.add("eigenvalue[{}] is below the one before it: not ascending", i);
   }
   const auto figure = lambda.empty() ? std::string("no modes")
@@ -196,7 +193,7 @@ Check check_band(const Bank& bank) {
           faults.take()};
 }
 
-/// What is wrong with the constants of the law.
+/// Checks the constants of the law.
 void check_law(const Bank& bank, Faults& faults) {
   const Damping& law = bank.damping;
   const auto expect = [&](bool is_so, const char* what) {
@@ -216,15 +213,15 @@ void check_law(const Bank& bank, Faults& faults) {
 Check check_decay(const Bank& bank) {
   Faults faults;
   check_law(bank, faults);
-  const bool is_played = bank.multipoles.is_in_decay;  // no law has what radiation adds
+  const bool is_played = bank.multipoles.is_in_decay;  // includes radiation, which no law describes
   const bool has_law = bank.damping.law != "mixed" && faults.empty() && !is_played;
   double worst = 0.0;
   for (std::size_t i = 0; i < bank.mode_count(); ++i) {
     const double d = bank.decay_per_s[i];
     if (!(d >= 0.0)) faults.add("decay[{}] is {:.6g} 1/s, negative", i, d);
-    if (d > kMaxDecayPerS) faults.add("decay[{}] is {:.3g} 1/s, more than any damping makes ({:.0e})", i, d, kMaxDecayPerS);
+    if (d > kMaxDecayPerS) faults.add("decay[{}] is {:.3g} 1/s, above the limit of {:.0e}", i, d, kMaxDecayPerS);
     if (is_played && !(d >= bank.multipoles.decay_per_s[i]))
-      faults.add("decay[{}] is {:.9g} 1/s, and radiation alone takes {:.9g}", i, d, bank.multipoles.decay_per_s[i]);
+      faults.add("decay[{}] is {:.9g} 1/s, radiation alone gives {:.9g}", i, d, bank.multipoles.decay_per_s[i]);
     if (!has_law) continue;
     const double law = calc_decay(bank.damping, bank.material, bank.eigenvalue_rad2_s2[i]);
     if (!(std::abs(d - law) <= kLawTolerance * law)) faults.add("decay[{}] is {:.9g} 1/s, and the damping law gives {:.9g}", i, d, law);
@@ -237,23 +234,23 @@ Check check_decay(const Bank& bank) {
           faults.take()};
 }
 
-constexpr double kMaxCorrection = 64.0;  // of a frequency, to either side
+constexpr double kMaxCorrection = 64.0;  // largest factor of a frequency, either way
 
-/// The corrected frequencies, their decays and what is said of them.
+/// Corrected frequencies, their decays and reasons.
 Check check_corrected(const Bank& bank) {
   Faults faults;
   const Corrected& corrected = bank.corrected;
   if (corrected.is_empty()) return {"corrected", "no corrected frequencies", {}};
-  const bool is_played = bank.multipoles.is_in_decay;  // modes that the air couples have decays that no law has
+  const bool is_played = bank.multipoles.is_in_decay;  // decays of modes coupled by the air follow no law
   const bool has_law = bank.damping.law != "mixed" && !is_played && check_decay(bank).faults.empty();
   std::array<std::size_t, kCorrectionCount> counts{};
   for (std::size_t i = 0; i < bank.mode_count(); ++i) {
     const double hz = corrected.freq_hz[i], mesh_hz = bank.freq_hz(i), d = corrected.decay_per_s[i], cents = corrected.error_cents[i];
     if (!(hz > mesh_hz / kMaxCorrection && hz < mesh_hz * kMaxCorrection))
       faults.add("corrected_frequency_hz[{}] is {:.6g}, and the mesh's is {:.6g}: too far apart", i, hz, mesh_hz);
-    if (!(d >= 0.0 && d <= kMaxDecayPerS)) faults.add("corrected_decay[{}] is {:.6g} 1/s, which is none", i, d);
+    if (!(d >= 0.0 && d <= kMaxDecayPerS)) faults.add("corrected_decay[{}] is {:.6g} 1/s, not a decay", i, d);
     if (!(cents >= 0.0)) faults.add("corrected_error_cents[{}] is {:.6g}, negative", i, cents);
-    const std::size_t correction = corrected.correction[i];
+    const auto correction = static_cast<std::size_t>(corrected.correction[i]);
     if (correction >= counts.size()) {
       faults.add("correction[{}] is {}, and none above {} is known", i, correction, counts.size() - 1);
       continue;
@@ -288,14 +285,14 @@ Check check_residuals(const Bank& bank) {
   return {"residuals", figure, faults.take()};
 }
 
-/// Of all triangles; infinite where one names a vertex that does not exist, which is reported elsewhere.
+/// Total area; infinite if a triangle has an invalid vertex, which is reported elsewhere.
 double calc_area(const Bank& bank) {
   double twice = 0.0;
   const auto count = static_cast<std::int64_t>(bank.vertex_count());
   for (const auto& triangle : bank.triangles) {
     if (std::any_of(triangle.begin(), triangle.end(), [&](std::int64_t v) { return v < 0 || v >= count; }))
       return std::numeric_limits<double>::infinity();
-    twice += calc_size(calc_normal(bank.vertices_m, triangle));
+    twice += calc_length(calc_normal(bank.vertices_m, triangle));
   }
   return 0.5 * twice;
 }
@@ -306,7 +303,7 @@ Check check_radiation(const Bank& bank) {
   const double area = calc_area(bank);
   for (std::size_t i = 0; i < bank.mode_count(); ++i) {
     if (!(bank.radiation_gain[i] >= 0.0)) faults.add("radiation_gain[{}] is {:.6g}, negative", i, bank.radiation_gain[i]);
-    // A pulsating sphere of the surface's area (docs/equations.md), all of it at the largest motion that the mode has anywhere.
+    // Upper bound: a pulsating sphere of the surface's area (docs/equations.md) with the mode's largest motion everywhere.
     const double max = calc_radiation_gain(2.0 * std::numbers::pi * bank.freq_hz(i), area * calc_max_motion(bank, i, kMaxSteps), area);
     if (max >= 0.0 && bank.radiation_gain[i] > kGainSlack * max)  // a negative scale is reported elsewhere
       faults.add("radiation_gain[{}] is {:.3g}, and a surface of this size and motion has {:.3g} at most", i, bank.radiation_gain[i], max);
@@ -323,7 +320,7 @@ Check check_radiation(const Bank& bank) {
 Check check_shapes(const Bank& bank) {
   Faults faults;
   double step = 0.0;
-  const double max = 1.0 / std::sqrt(kMinShare * bank.rigid.mass_kg);
+  const double max = 1.0 / std::sqrt(kMinMassShare * bank.rigid.mass_kg);
   for (std::size_t i = 0; i < bank.mode_count(); ++i) {
     if (!(bank.shape_scale[i] >= 0.0)) faults.add("shape_scale[{}] is {:.6g}, negative", i, bank.shape_scale[i]);
     const double motion = calc_max_motion(bank, i, bank.shape_bytes == 1 ? 127.0 : kMaxSteps);
@@ -342,22 +339,17 @@ Check check_shapes(const Bank& bank) {
   return {"shapes", fmt::format("error at most {:.2e} kg^-1/2", step / 2.0), faults.take()};
 }
 
-/// a . (b x c) / 6 summed over the triangles, with corners relative to `origin`.
+/// Sum of a . (b x c) / 6 over the triangles, vertices relative to `origin`.
 double calc_enclosed_volume(const Bank& bank, const Vec3& origin) {
   double volume = 0.0;
   for (const auto& triangle : bank.triangles) {
-    Vec3 p[3];
-    for (int i = 0; i < 3; ++i) {
-      for (int k = 0; k < 3; ++k) p[i][k] = bank.vertices_m[triangle[i]][k] - origin[k];
-    }
-    volume += (p[0][0] * (p[1][1] * p[2][2] - p[1][2] * p[2][1]) + p[0][1] * (p[1][2] * p[2][0] - p[1][0] * p[2][2]) +
-               p[0][2] * (p[1][0] * p[2][1] - p[1][1] * p[2][0])) /
-              6.0;
+    const auto at = [&](int i) { return bank.vertices_m[triangle[i]] - origin; };
+    volume += calc_det(at(0), at(1), at(2)) / 6.0;
   }
   return volume;
 }
 
-/// Edges that are not passed exactly once in each direction.
+/// Reports edges that do not occur exactly once in each direction.
 void find_open_edges(const Bank& bank, Faults& faults) {
   for_each_edge(bank.triangles, bank.vertex_count(), [&](std::int32_t low, const HalfEdge* first, const HalfEdge* last) {
     const auto begins_low = [&](const HalfEdge& edge) { return bank.triangles[edge.number / 3][edge.number % 3] == low; };
@@ -388,7 +380,7 @@ Check check_surface(const Bank& bank) {
   if (!(volume > 0.0)) {
     faults.add("the surface encloses {:.6g} m^3: its triangles face inward", volume);
   } else if (!(volume > 0.5 * bank.rigid.volume_m3 && volume < 2.0 * bank.rigid.volume_m3)) {
-    faults.add("the surface encloses {:.6g} m^3, and the volume is said to be {:.6g}", volume, bank.rigid.volume_m3);
+    faults.add("the surface encloses {:.6g} m^3, the recorded volume is {:.6g}", volume, bank.rigid.volume_m3);
   }
   return {"surface", fmt::format("closed, outward, encloses {:.6g} m^3", volume), faults.take()};
 }
@@ -404,7 +396,7 @@ Check check_rigid_body(const Bank& bank) {
   }
   const auto& inertia = rigid.inertia_kg_m2;
   const double trace = inertia[0] + inertia[4] + inertia[8];
-  double s[3][3];
+  Mat3 s;
   for (int i = 0; i < 3; ++i) {
     for (int k = 0; k < 3; ++k) {
       s[i][k] = (i == k ? trace / 2.0 : 0.0) - inertia[3 * i + k];
@@ -413,8 +405,7 @@ Check check_rigid_body(const Bank& bank) {
     }
   }
   const double minor2 = s[0][0] * s[1][1] - s[0][1] * s[1][0];
-  const double minor3 = s[0][0] * (s[1][1] * s[2][2] - s[1][2] * s[2][1]) - s[0][1] * (s[1][0] * s[2][2] - s[1][2] * s[2][0]) +
-                        s[0][2] * (s[1][0] * s[2][1] - s[1][1] * s[2][0]);
+  const double minor3 = calc_det(s[0], s[1], s[2]);
   if (!(s[0][0] > 0.0 && minor2 > 0.0 && minor3 > 0.0)) {
     faults.add("inertia_kg_m2 is not that of a solid: not positive definite, or one principal moment exceeds the sum of the others");
   }
@@ -425,7 +416,7 @@ Check check_rigid_body(const Bank& bank) {
       high = std::max(high, vertex[k] - rigid.centre_m[k]);
     }
     const double reach = std::max(-low, high);
-    if (!(high - low >= kMinLengthM && high - low <= kMaxLengthM) || !(std::abs(rigid.centre_m[k]) <= kFarthestM)) {
+    if (!(high - low >= kMinLengthM && high - low <= kMaxLengthM) || !(std::abs(rigid.centre_m[k]) <= kMaxOriginDistanceM)) {
       faults.add("the body measures {:.3g} m along axis {} about {:.3g} m; bodies have {:.0e} to {:.0e} m", high - low, k,
                  rigid.centre_m[k], kMinLengthM, kMaxLengthM);
     }
@@ -435,14 +426,14 @@ Check check_rigid_body(const Bank& bank) {
   return {"rigid body", fmt::format("{:.6g} kg, trace of inertia {:.6g} kg m^2, physically possible", rigid.mass_kg, trace), faults.take()};
 }
 
-/// What is wrong with the words about the supports; empty when nothing is.
+/// Fault of the supports' text; empty if valid.
 std::string find_text_fault(const Supports& supports) {
   try {
     const base::Document document = base::parse_document(supports.text, "supports/text");
     base::Object root = document.root();
     std::size_t count = 0;
     for (base::Entry& entry : root.entries("supports", supports.count())) {
-      if (!entry.object) return "supports/text lists what is no object";
+      if (!entry.object) return "supports/text holds an entry that is not an object";
       entry.object->string("name");
       material::read_fixing(*entry.object);
       entry.object->finish();
@@ -455,7 +446,7 @@ std::string find_text_fault(const Supports& supports) {
   }
 }
 
-/// The force of all patches together is -lambda times the integral of rho phi, which is at most lambda sqrt(m) for a mass-normalised mode.
+/// The total force on all patches is -lambda times the integral of rho phi: at most lambda sqrt(m) for a mass-normalised mode.
 Check check_supports(const Bank& bank) {
   Faults faults;
   const Supports& supports = bank.supports;
@@ -464,7 +455,7 @@ Check check_supports(const Bank& bank) {
     if (const std::string fault = find_text_fault(supports); !fault.empty()) faults.add("{}", fault);
   }
   for (std::size_t s = 0; s < count; ++s) {
-    const double length = calc_size(supports.normal[s]);
+    const double length = calc_length(supports.normal[s]);
     if (!(length < 1e-6 || std::abs(length - 1.0) < 1e-6)) faults.add("supports/normal[{}] has length {:.6g}, neither 0 nor 1", s, length);
     if (!(supports.area_m2[s] >= 0.0 && supports.thickness_m[s] >= 0.0))
       faults.add("support {} has area {:.6g} m^2 and thickness {:.6g} m, negative", s, supports.area_m2[s], supports.thickness_m[s]);
@@ -480,10 +471,10 @@ Check check_supports(const Bank& bank) {
       for (std::size_t k = 0; k < 3; ++k) force[k] += supports.reaction[(m * count + s) * 6 + k];
     }
     if (!(shares <= 1.0 + kShareTolerance)) faults.add("support_energy of mode {} sums up to {:.6g}, more than 1", m, shares);
-    if (bank.multipoles.is_in_decay) continue;  // the forces of the body without air, and frequencies with it
-    const double share = calc_size(force) / (bank.eigenvalue_rad2_s2[m] * std::sqrt(bank.rigid.mass_kg));
+    if (bank.multipoles.is_in_decay) continue;  // forces without air, frequencies with air
+    const double share = calc_length(force) / (bank.eigenvalue_rad2_s2[m] * std::sqrt(bank.rigid.mass_kg));
     if (!(share <= 1.0 + kMassTolerance))
-      faults.add("support_reaction of mode {} is {:.3g} times the most that a body of this mass has", m, share);
+      faults.add("support_reaction of mode {} is {:.3g} times the maximum for a body of this mass", m, share);
     worst = std::max(worst, share);
   }
   return {
@@ -501,8 +492,7 @@ Check check_material(const Bank& bank) {
   if (!(m.alpha1_s >= 0.0)) faults.add("alpha1_s is {:.6g}, negative", m.alpha1_s);
   if (!(m.alpha2_per_s >= 0.0)) faults.add("alpha2_per_s is {:.6g}, negative", m.alpha2_per_s);
   const auto expect = [&](const char* name, double value, double min, double max) {
-    if (value > 0.0 && !(value >= min && value <= max))
-      faults.add("{} is {:.3g}, outside the {:.0e} to {:.0e} of any solid", name, value, min, max);
+    if (value > 0.0 && !(value >= min && value <= max)) faults.add("{} is {:.3g}, outside {:.0e} to {:.0e}", name, value, min, max);
   };
   expect("young_modulus_pa", m.young_modulus_pa, material::kMinStiffnessPa, material::kMaxStiffnessPa);
   expect("density_kg_m3", m.density_kg_m3, material::kMinDensityKgM3, material::kMaxDensityKgM3);

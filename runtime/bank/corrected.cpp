@@ -1,8 +1,7 @@
-// Method:     shapes stay, but for those of modes that the air couples (mixing.hpp); frequencies change: reactions, which are lambda times
-//             mass times phi, and what the radiation gain has of the frequency, follow. Of a bank with multipoles frequencies are those in
-//             air; radiation adds its decay, and the gain is the one that radiates as much.
-// Source:     docs/equations.md E6, E7, E10; docs/error-bars.md.
-// Deviations: none.
+// Method: shapes are kept, except those of modes coupled by the air (mixing.hpp). Reactions (lambda times mass times phi) and the frequency
+//   dependence of radiation gains follow the new frequencies. With multipoles, frequencies are those in air, radiation adds its decay, and
+//   gains correspond to the radiated power.
+// Source: docs/equations.md E6, E7, E10; docs/error-bars.md.
 #include "runtime/bank/corrected.hpp"
 
 #include <algorithm>
@@ -38,7 +37,7 @@ const char* describe(Correction correction) {
 
 namespace {
 
-/// Corrected frequencies and decays take the place of the mesh's. The order is right already.
+/// Replaces frequencies and decays by the corrected ones, already in order.
 void take_corrected(Bank& bank) {
   Corrected corrected = std::exchange(bank.corrected, {});
   const double area = calc_outer_area_m2(bank);
@@ -55,7 +54,7 @@ void take_corrected(Bank& bank) {
   bank.discretisation_error_cents = std::move(corrected.error_cents);
 }
 
-/// The nonlinear energy of modes that are played at these frequencies.
+/// Scales the nonlinear energy to modes at these frequencies.
 void scale_nonlinear(Bank& bank, const std::vector<double>& freq_hz) {
   if (bank.quartic.is_empty()) return;
   std::vector<double> factor;
@@ -63,8 +62,8 @@ void scale_nonlinear(Bank& bank, const std::vector<double>& freq_hz) {
   scale_frequencies(bank.quartic, factor);
 }
 
-/// The nonlinear energy of the modes that mix_modes() will make, at their frequencies in air: sums of the modes of the body as they are at
-/// their corrected frequencies, if there are such. Parts of modes that have none of it are left out.
+/// Nonlinear energy of the modes that mix_modes() will make, at their frequencies in air: sums over the body's modes at their corrected
+/// frequencies, if any. Parts without nonlinear energy are omitted.
 void mix_nonlinear(Bank& bank) {
   const Mixing& mixing = bank.multipoles.mixing;
   if (bank.quartic.is_empty() || mixing.is_empty()) return;
@@ -82,7 +81,7 @@ void mix_nonlinear(Bank& bank) {
   combine_modes(bank.quartic, parts);
 }
 
-/// Decays and gains of a bank with multipoles become those in air.
+/// Decays and gains in air, from the multipoles.
 void add_radiation(Bank& bank) {
   Multipoles& air = bank.multipoles;
   for (std::size_t m = 0; m < bank.mode_count(); ++m)
@@ -112,7 +111,7 @@ Bank calc_corrected(Bank bank) {
   if (!bank.corrected.is_empty()) take_corrected(bank);
   if (has_air) {
     mix_modes(bank);
-    // Reactions are those of the elastic body, at the frequencies that it has alone.
+    // Reactions are those of the elastic body at its frequencies without air.
     for (std::size_t m = 0; m < bank.mode_count(); ++m) {
       const double omega = 2.0 * std::numbers::pi * bank.multipoles.freq_hz[m];
       bank.eigenvalue_rad2_s2[m] = omega * omega;
@@ -128,12 +127,12 @@ Bank choose_frequencies(Bank bank, Frequencies frequencies) {
   if (!bank.multipoles.is_empty()) {
     if (!bank.quartic.is_empty() && !bank.multipoles.mixing.is_empty()) {
       mix_nonlinear(bank);
-      // From the frequencies in air to those of the mesh, as calc_corrected() takes it back.
+      // From the frequencies in air back to those of the mesh, as calc_corrected() does.
       std::vector<double> factor;
       for (std::size_t m = 0; m < bank.mode_count(); ++m) factor.push_back(bank.freq_hz(m) / bank.multipoles.freq_hz[m]);
       scale_frequencies(bank.quartic, factor);
     }
-    mix_modes(bank);  // what the multipoles are of
+    mix_modes(bank);  // the modes of the multipoles
     add_radiation(bank);
   }
   return bank;

@@ -1,4 +1,4 @@
-// What a bank is played with: corrected frequencies, or those of the mesh.
+// Frequencies for playing: corrected, or those of the mesh.
 #pragma once
 
 #include <cstddef>
@@ -11,22 +11,21 @@ namespace carillon::bank {
 
 enum class Frequencies : std::uint8_t { kCorrected, kMesh };
 
-/// The bank with its corrected frequencies and their decays in place of the mesh's, modes in their ascending order, without a proof, which
-/// is about the mesh. Shapes and shares of the energy stay, but for those of modes that the air couples (mix_modes()); reactions and
-/// radiation gains are those at the new frequencies. Error bars are those of the corrected frequencies then. A bank with multipoles is
-/// played in air, with corrected frequencies or without: frequencies are those of the modes in air, decays have radiation in them,
-/// radiation gains are the root mean square over all directions, and the multipoles stay, with `is_in_decay` set: a second call changes
-/// nothing. A bank that has neither is left as it is. Not for an audio thread.
+/// The bank with corrected frequencies and their decays, modes sorted, without the proof (which concerns the mesh). Shapes and energy
+/// shares are kept, except for modes coupled by the air (mix_modes()); reactions and radiation gains follow the new frequencies; error bars
+/// are those of the corrected frequencies. With multipoles, corrected or not: frequencies in air, decays including radiation, rms gains
+/// over all directions; the multipoles stay, with `is_in_decay` set, so that the function is idempotent. A bank with neither is unchanged.
+/// Not for audio threads.
 Bank calc_corrected(Bank bank);
 
-/// calc_corrected(), or the bank with the frequencies of the mesh: as it is, but for what radiation adds to decays, the radiation gains,
-/// and the shapes of modes that the air couples, where it has multipoles.
+/// calc_corrected(), or the bank at the frequencies of the mesh; with multipoles, decays, gains and coupled shapes are those in air either
+/// way.
 Bank choose_frequencies(Bank bank, Frequencies frequencies);
 
 /// Undamped playing frequency [Hz] of a mode of a bank as stored: in air, else corrected, else that of the mesh.
 double find_played_hz(const Bank& bank, std::size_t mode);
 
-/// Numbers of the modes in the order in which calc_corrected() leaves them.
+/// Mode indices in the order of calc_corrected().
 std::vector<std::size_t> sort_played_modes(const Bank& bank);
 
 }  // namespace carillon::bank

@@ -1,4 +1,4 @@
-// The edges of a surface of triangles.
+// Edges of a triangle surface.
 #pragma once
 
 #include <algorithm>
@@ -9,18 +9,17 @@
 
 namespace carillon::bank {
 
-/// The half-edge 3 t + k of a triangle t runs from its corner k to the next.
+/// Half-edge 3 t + k of triangle t: from its corner k to the next.
 struct HalfEdge {
   std::int32_t upper = 0;   // the larger of its two vertices
   std::int32_t number = 0;  // 3 t + k
 };
 
-/// Calls take(lower, first, last) for every edge: its smaller vertex and its half-edges [first, last), numbers ascending. Edges ascend by
-/// their smaller, then by their larger vertex. Corners must be indices below `vertices`. Linear in time where few edges meet in a vertex:
-/// half-edges lie in buckets by their smaller vertex.
+/// Calls take(lower, first, last) for each edge: its smaller vertex and its half-edges [first, last), in ascending order. Edges ascend by
+/// smaller, then larger vertex. Corners must be below `vertices`. Bucket sort by the smaller vertex: linear time at low valence.
 template <class Take>
 void for_each_edge(const std::vector<std::array<std::int32_t, 3>>& triangles, std::size_t vertices, Take&& take) {
-  constexpr std::int32_t kFew = 24;  // sorted by insertion
+  constexpr std::int32_t kFew = 24;  // insertion sort below this
   std::vector<std::int32_t> next(vertices + 1, 0);
   for (const auto& corners : triangles)
     for (std::size_t k = 0; k < 3; ++k) ++next[std::min(corners[k], corners[(k + 1) % 3])];
@@ -38,7 +37,7 @@ void for_each_edge(const std::vector<std::array<std::int32_t, 3>>& triangles, st
       edges[next[std::min(a, b)]++] = {std::max(a, b), number};
     }
   }
-  // next[v] is now where the bucket of v ends.
+  // next[v] is now the end of bucket v.
   HalfEdge* const all = edges.data();
   std::int32_t begin = 0;
   for (std::size_t v = 0; v < vertices; ++v) {

@@ -1,14 +1,11 @@
-// Method:     K is linear in the Lame constants and M in the density; with all lengths times g, K grows with g and M with g^3. So with s,
-//             k, g the scales of density, stiffness and size: lambda' = lambda k / (s g^2), phi' = phi / sqrt(s g^3). Of the radiation gain
-//             the flow, the integral of |phi . n| over the surface, is proportional to phi' g^2; what depends on the frequency is written
-//             again.
-//             Multipoles, of another size g of the same material: omega' = omega / g, so that k' = k / g, and k' R' = k R with R' = g R.
-//             The pressure p' at g x solves the same equation, with dp'/dn = i omega' rho phi' on the surface. With p' = b p this is
-//             b / g dp/dn = i (omega / g) rho g^(-3/2) phi, so b = g^(-3/2): coefficients, which are pressures on the sphere, go with
-//             g^(-3/2). Decay, sum |c|^2 / (2 rho c k^2): g^(-3) g^2 = 1 / g. Added mass, of p / (i omega) times phi over the surface:
-//             g^(-3/2) g g^(-3/2) g^2 = 1. Frequencies in air, f / sqrt(1 + added mass), go with 1 / g.
-// Source:     docs/equations.md E6, E7, E10, E12.
-// Deviations: none.
+// Method: K is linear in the Lame constants, M in the density; scaling lengths by g scales K by g and M by g^3. With scales s, k, g of
+//   density, stiffness and size: lambda' = lambda k / (s g^2), phi' = phi / sqrt(s g^3). The flow of the radiation gain, the integral of
+//   |phi . n| over the surface, scales with phi' g^2; its frequency dependence is recomputed.
+//   Multipoles of size g, same material: omega' = omega / g, so k' = k / g and k' R' = k R with R' = g R. The pressure p' at g x solves the
+//   same equation with dp'/dn = i omega' rho phi' on the surface. With p' = b p: b / g dp/dn = i (omega / g) rho g^(-3/2) phi, so
+//   b = g^(-3/2): coefficients (pressures on the sphere) scale with g^(-3/2). Decay, sum |c|^2 / (2 rho c k^2): g^(-3) g^2 = 1 / g. Added
+//   mass, integral of p / (i omega) times phi: g^(-3/2) g g^(-3/2) g^2 = 1. Frequencies in air, f / sqrt(1 + added mass): 1 / g.
+// Source: docs/equations.md E6, E7, E10, E12.
 #include "runtime/bank/edits.hpp"
 
 #include <fmt/format.h>
@@ -28,7 +25,7 @@ namespace carillon::bank {
 namespace {
 
 constexpr double kMaxPower = 8.0;
-constexpr double kMaxLossFactor = 2.0;  // d = omega eta / 2: from here on no mode swings, whatever its frequency
+constexpr double kMaxLossFactor = 2.0;  // d = omega eta / 2: critical damping at any frequency
 
 void check_loss(double loss) {
   if (!(loss >= 0.0 && loss < kMaxLossFactor))
@@ -37,7 +34,7 @@ void check_loss(double loss) {
                     kMaxLossFactor, loss));
 }
 
-/// Throws InputError unless the law is one that says how a mode of any frequency decays.
+/// Throws InputError unless the law gives the decay at any frequency.
 void check_law(const Damping& law) {
   if (law.law == "internal_friction" && law.coefficient.size() == 1) return check_loss(law.coefficient[0]);
   if (law.law == "caughey" && !law.coefficient.empty() && law.coefficient.size() == law.power.size()) {
@@ -68,7 +65,7 @@ void check(const Bank& bank, const Edits& edits) {
   if (edits.alphas) {
     for (const double alpha : *edits.alphas) {
       if (!(alpha >= 0.0) || !std::isfinite(alpha))
-        throw InputError(fmt::format("a damping of alpha {} is none; alphas are not negative", alpha));
+        throw InputError(fmt::format("a damping of alpha {} is invalid; alphas are not negative", alpha));
     }
   }
   if (edits.damping) {
@@ -83,10 +80,10 @@ void check(const Bank& bank, const Edits& edits) {
   }
 }
 
-/// Whether modes have another wave number in air over the size of the body.
+/// True if the edit changes the ratio of wavelength in air to size.
 bool changes_waves(const Edits& edits) { return edits.density_scale != 1.0 || edits.stiffness_scale != 1.0; }
 
-/// Multipoles of the body in another size.
+/// Scales multipoles to size g.
 void scale_size(Multipoles& air, double g) {
   for (double& x : air.centre_m) x *= g;
   air.radius_m *= g;
@@ -98,7 +95,7 @@ void scale_size(Multipoles& air, double g) {
   }
 }
 
-/// Bank::regions with the volumes of a body that is as many times larger.
+/// Bank::regions with scaled volumes.
 std::string scale_volumes(const std::string& regions, double scale) {
   constexpr std::string_view kKey = "\"volume_m3\":";
   std::string scaled;
@@ -121,7 +118,7 @@ std::string format_list(const char* name, const std::vector<double>& values) {
   return values.empty() ? text : fmt::format(R"(, "{}": [{}])", name, text);
 }
 
-/// A law for the provenance, as JSON.
+/// Damping law as JSON, for the provenance.
 std::string format_law(const Damping& law) {
   return fmt::format(R"(, "damping": {{"law": "{}"{}{}{}{}}})", law.law, format_list("coefficient", law.coefficient),
                      format_list("power", law.power), format_list("freq_hz", law.freq_hz), format_list("loss_factor", law.loss_factor));
@@ -165,7 +162,7 @@ Bank calc_edited(const Bank& bank, const Edits& edits) {
     edited.eigenvalue_rad2_s2[m] *= eigenvalue_scale;
     edited.decay_per_s[m] = calc_decay(edited.damping, edited.material, edited.eigenvalue_rad2_s2[m]);
     if (!(edited.decay_per_s[m] >= 0.0) || !std::isfinite(edited.decay_per_s[m]))
-      throw InputError(fmt::format("the damping makes mode {} ({:.5g} Hz) decay by {:.3g} 1/s, which is no decay; check its numbers", m + 1,
+      throw InputError(fmt::format("the damping makes mode {} ({:.5g} Hz) decay by {:.3g} 1/s, which is invalid; check its numbers", m + 1,
                                    edited.freq_hz(m), edited.decay_per_s[m]));
     if (Corrected& corrected = edited.corrected; !corrected.is_empty()) {
       const double omega = 2.0 * std::numbers::pi * (corrected.freq_hz[m] *= freq_scale);
@@ -176,11 +173,11 @@ Bank calc_edited(const Bank& bank, const Edits& edits) {
                                 calc_radiation_gain(std::sqrt(bank.eigenvalue_rad2_s2[m]), 1.0, area);
     if (air.is_in_decay) edited.decay_per_s[m] += air.decay_per_s[m];
   }
-  if (air.is_in_decay) edited.radiation_gain = calc_far_gains(air);  // a bank that choose_frequencies() has made stays one
+  if (air.is_in_decay) edited.radiation_gain = calc_far_gains(air);  // keep the form of choose_frequencies()
   for (Vec3& vertex : edited.vertices_m) {
     for (double& x : vertex) x *= g;
   }
-  // A reaction is lambda times mass times phi, a couple has an arm more.
+  // Reaction: lambda times mass times phi; a couple has one more length.
   const double reaction_scale = eigenvalue_scale * std::sqrt(s * g * g * g);
   for (std::size_t i = 0; i < edited.supports.reaction.size(); ++i)
     edited.supports.reaction[i] *= i % 6 < 3 ? reaction_scale : reaction_scale * g;

@@ -1,4 +1,4 @@
-// What checks share: bounds that no body reaches, and a list of faults that stays short. Internal to carillon::bank.
+// Shared by the checks: limits, and a bounded list of faults. Internal to carillon::bank.
 #pragma once
 
 #include <fmt/format.h>
@@ -11,11 +11,10 @@
 
 namespace carillon::bank {
 
-// Bounds that no body reaches. Length: a small planet. Frequency and damping: what a job may ask for at most, alpha1 of 1e6 s at that
-// frequency.
+// Limits beyond all bodies. Length: a small planet. Frequency and damping: the maxima of a job, alpha1 of 1e6 s at that frequency.
 inline constexpr double kMaxLengthM = 1e7, kMaxHz = 1e12, kMaxDecayPerS = 1e32;
 
-/// The first three faults in full, the others counted.
+/// Keeps the first three faults and counts the others.
 class Faults {
  public:
   template <class... Values>
@@ -33,22 +32,22 @@ class Faults {
   std::size_t count_ = 0;
 };
 
-/// What is wrong with the orders of multipoles or the number of their coefficients; empty when nothing is.
+/// Fault of the multipoles' orders or number of coefficients; empty if none.
 std::string find_order_fault(const Multipoles& multipoles);
 
-/// What is wrong with the counts and numbers of a mixture; empty when nothing is.
+/// Fault of the mixture's counts or indices; empty if none.
 std::string find_mixing_fault(const Mixing& mixing);
 
-/// Multipoles whose array sizes agree: a part of the check "radiation".
+/// Checks multipoles whose array sizes agree: part of the check "radiation".
 Check check_multipoles(const Bank& bank);
 
-/// A nonlinear energy whose array sizes agree: none of its numbers is out of range, and the elastic energy is never negative.
+/// Checks a nonlinear energy whose array sizes agree: numbers in range, elastic energy non-negative.
 Check check_quartic(const Bank& bank);
 
-/// Error bars: none is negative.
+/// Error bars must not be negative.
 Check check_error_bars(const Bank& bank);
 
-/// The proof that the band is complete, one check for each of its parts; a bank without one gets a single line that says so, and no fault.
+/// Proof of completeness, one check per part; a bank without one gets a single line and no fault.
 std::vector<Check> check_proof(const Bank& bank);
 
 }  // namespace carillon::bank

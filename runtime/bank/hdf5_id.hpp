@@ -1,4 +1,4 @@
-// Identifiers of HDF5 that close themselves. For .cpp files that write HDF5.
+// RAII for HDF5 identifiers, for .cpp files that write HDF5.
 #pragma once
 
 #include <fmt/core.h>
@@ -8,7 +8,7 @@
 
 namespace carillon::bank {
 
-/// One open identifier, closed once. Throws SystemError "HDF5 cannot make WHAT" for one that is none.
+/// Owner of an identifier. Throws SystemError "HDF5 cannot make WHAT" for an invalid one.
 class Hdf5Id {
  public:
   Hdf5Id(hid_t id, herr_t (*close)(hid_t), const char* what = "a part of the file") : id_(id), close_(close) {
@@ -24,7 +24,7 @@ class Hdf5Id {
   herr_t (*close_)(hid_t);
 };
 
-/// Throws SystemError "HDF5 cannot WHAT" when a call has failed.
+/// Throws SystemError "HDF5 cannot WHAT" if a call failed.
 inline void require(herr_t status, const char* what) {
   if (status < 0) throw SystemError(fmt::format("HDF5 cannot {}", what));
 }

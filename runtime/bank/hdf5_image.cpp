@@ -1,8 +1,8 @@
-// Method: the file is built by HDF5's "core" driver, in memory and without a disk: what HDF5 does when a disk is full need not concern us
-//   then, and the checksum is taken of bytes that are at hand. The driver asks us for its memory, and when the file is closed we keep it.
-//   All arrays of the seal are contiguous.
+// Method: HDF5's "core" driver builds the file in memory, so that disk errors do not reach HDF5 and the checksum is computed from memory.
+// The
+//   driver allocates through callbacks, and the memory is kept when the file is closed. All arrays of the seal are contiguous.
 // Deviations: not H5Fget_file_image, which copies all bytes and in 1.10.8 leaves an image that cannot be opened (it clears a flag in the
-//   superblock and keeps the checksum as it was).
+//   superblock but keeps the old checksum).
 // Source: HDF5 1.10 reference manual; VTK file formats, "VTKHDF", version 1.0 (UnstructuredGrid).
 #include "runtime/bank/hdf5_image.hpp"
 
@@ -20,7 +20,7 @@
 namespace carillon::bank {
 namespace {
 
-/// HDF5 prints every error to stderr by default; an object of this class disables that during its lifetime.
+/// Disables HDF5's error output during its lifetime.
 class Silence {
  public:
   Silence() {
@@ -61,7 +61,7 @@ Hdf5Id make_type(const std::string& dtype) {
   return make_string_type(find_item_bytes(dtype));
 }
 
-/// Of variable length, which h5py gives back as str.
+/// Variable length, so that h5py returns str.
 void write_text_attribute(hid_t object, const char* name, const std::string& text) {
   const Hdf5Id type = make_string_type(H5T_VARIABLE);
   const Hdf5Id space = make_space({});
@@ -70,7 +70,7 @@ void write_text_attribute(hid_t object, const char* name, const std::string& tex
   require(H5Awrite(attribute, type, &characters), "write an attribute");
 }
 
-/// Creation properties without time stamps: the same bank gives the same bytes.
+/// Creation properties without time stamps, for reproducible bytes.
 Hdf5Id make_properties(hid_t kind) {
   const hid_t properties = H5Pcreate(kind);
   H5Pset_obj_track_times(properties, false);
@@ -82,7 +82,7 @@ Hdf5Id make_group(hid_t file, const char* path) {
   return {H5Gcreate2(file, path, H5P_DEFAULT, properties, H5P_DEFAULT), H5Gclose, path};
 }
 
-/// Writes one array of the seal and returns where it lies.
+/// Writes an array of the seal; returns its position.
 Extent write_field(hid_t file, const Field& field) {
   const Hdf5Id space = make_space(field.shape);
   const Hdf5Id type = make_type(field.dtype);
@@ -103,7 +103,7 @@ Extent write_field(hid_t file, const Field& field) {
   return extent;
 }
 
-/// A dataset of `shape` that shows the elements `source_space` has selected of the dataset `source` of this same file.
+/// Virtual dataset of `shape` that maps the selection `source_space` of the dataset `source` in this file.
 void make_view(hid_t group, const char* name, hid_t type, const std::vector<std::uint64_t>& shape, const char* source, hid_t source_space) {
   const Hdf5Id space = make_space(shape);
   const Hdf5Id creation = make_properties(H5P_DATASET_CREATE);
@@ -111,7 +111,7 @@ void make_view(hid_t group, const char* name, hid_t type, const std::vector<std:
   const Hdf5Id dataset(H5Dcreate2(group, name, type, space, H5P_DEFAULT, creation, H5P_DEFAULT), H5Dclose, name);
 }
 
-/// A small real dataset, compressed when it is long.
+/// Small real dataset, compressed if long.
 void write_list(hid_t group, const char* name, hid_t file_type, hid_t memory_type, std::uint64_t size, const void* data) {
   const Hdf5Id space = make_space({size});
   const Hdf5Id creation = make_properties(H5P_DATASET_CREATE);
@@ -125,7 +125,7 @@ void write_list(hid_t group, const char* name, hid_t file_type, hid_t memory_typ
   require(H5Dwrite(dataset, memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data), "write a list");
 }
 
-/// The views by which VTK and ParaView see a bank: an unstructured grid of triangles with one point array per mode, in steps of its scale.
+/// VTKHDF views for VTK and ParaView: an unstructured grid of triangles with one point array per mode, in steps of its scale.
 void write_vtk_views(hid_t file, const Bank& bank) {
   const std::uint64_t vertices = bank.vertex_count(), triangles = bank.triangles.size(), modes = bank.mode_count();
   const Hdf5Id group = make_group(file, "VTKHDF");
@@ -168,7 +168,7 @@ void write_vtk_views(hid_t file, const Bank& bank) {
   }
 }
 
-/// The memory of the core driver: handed out by malloc, and kept when the driver lets go of it at closing.
+/// Memory of the core driver, kept when the file is closed.
 struct Keeper {
   void* memory = nullptr;
   std::size_t size = 0;
@@ -200,7 +200,7 @@ struct Keeper {
   }
 };
 
-/// The length of a file by its superblock (versions 2 and 3, behind the user block): "end of file address", bytes 28 to 35.
+/// File length from the superblock (versions 2 and 3, behind the user block): "end of file address", bytes 28 to 35.
 std::uint64_t get_end_of_file(const Keeper& kept) {
   std::uint64_t end = 0;
   if (kept.memory != nullptr && kept.size >= kSealBytes + 36)
@@ -218,11 +218,11 @@ Hdf5Image make_hdf5_image(const Bank& bank, const FileForm& form) {
   const Hdf5Id creation = make_properties(H5P_FILE_CREATE);
   require(H5Pset_userblock(creation, kSealBytes), "reserve the seal");
   const Hdf5Id access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, "a property list");
-  // In the newest format HDF5's own metadata carry checksums too.
+  // The newest format has checksums in HDF5's own metadata.
   require(H5Pset_libver_bounds(access, H5F_LIBVER_LATEST, H5F_LIBVER_LATEST), "choose a format");
   require(H5Pset_alignment(access, 64 << 10, 4096), "align arrays to pages");
   require(H5Pset_fclose_degree(access, H5F_CLOSE_STRONG), "close for good");
-  // Memory grows in steps of what all arrays need, so that it is not copied over and over.
+  // Allocation increment: total size of all arrays, to avoid repeated copies.
   std::uint64_t total = 1 << 20;
   for (const Field& field : fields) total += calc_bytes(field);
   require(H5Pset_fapl_core(access, static_cast<std::size_t>(total), false), "work in memory");

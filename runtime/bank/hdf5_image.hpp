@@ -1,4 +1,4 @@
-// The HDF5 side of a bank file, made in memory. Internal to carillon::bank; its .cpp is the only one that sees hdf5.h.
+// HDF5 part of a bank file, built in memory. Internal to carillon::bank; only its .cpp includes hdf5.h.
 #pragma once
 
 #include <cstddef>
@@ -14,15 +14,15 @@
 
 namespace carillon::bank {
 
-/// An HDF5 file in memory, and where each array of list_fields() lies in it.
+/// HDF5 file in memory and the positions of the arrays of list_fields().
 struct Hdf5Image {
   std::unique_ptr<void, void (*)(void*)> memory{nullptr, nullptr};
-  std::span<std::byte> bytes;  // the file as it will lie on disk; its first kSealBytes wait for the seal
+  std::span<std::byte> bytes;  // file contents; the first kSealBytes are reserved for the seal
   std::map<std::string, Extent> extents;
 };
 
-/// Lays the arrays, and of a bank that is not packed the /VTKHDF views, out as an HDF5 file. Not thread-safe (HDF5 is not). SystemError
-/// when HDF5 or memory fails.
+/// Lays out the arrays, and for unpacked banks the /VTKHDF views, as an HDF5 file. Not thread-safe (HDF5). SystemError if HDF5 or memory
+/// fails.
 Hdf5Image make_hdf5_image(const Bank& bank, const FileForm& form);
 
 }  // namespace carillon::bank

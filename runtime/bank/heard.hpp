@@ -1,4 +1,4 @@
-// Audible frequency and decay of a mode, with the parts of the decay.
+// Audible frequency and decay of modes, with the contributions to the decay.
 #pragma once
 
 #include <cmath>
@@ -9,10 +9,10 @@
 
 namespace carillon::bank {
 
-/// Time of a fall by 60 dB, ln(1000) / d; infinite without damping.
+/// Decay time by 60 dB, ln(1000) / d; infinite without damping.
 inline double calc_t60_s(double decay_per_s) { return std::log(1000.0) / decay_per_s; }
 
-/// A mode as heard. Without multipoles the decay by radiation is unknown, and part of the material's.
+/// Without multipoles the radiation part is unknown and contained in the material's.
 struct HeardMode {
   double freq_hz = 0.0;  // undamped
   double material_per_s = 0.0, radiation_per_s = 0.0, supports_per_s = 0.0;
@@ -24,8 +24,7 @@ struct HeardMode {
 /// Origin of a bank's frequencies: "mesh", "theory" or "imported".
 const char* name_origin(const Bank& bank);
 
-/// The modes of a bank for playing (calc_corrected(), supports applied). `by_supports_per_s` (m): part of its decays by supports; empty:
-/// none.
+/// Modes of a bank prepared for playing (calc_corrected(), supports applied). `by_supports_per_s` (m): decay by supports; empty: none.
 std::vector<HeardMode> list_heard(const Bank& played, std::span<const double> by_supports_per_s);
 
 }  // namespace carillon::bank

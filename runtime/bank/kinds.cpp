@@ -1,9 +1,9 @@
-// Method:     principal axes of the surface. Long bodies: slices with fitted rigid motions; a dominant component is bending, torsion or
-//             longitudinal motion, its sign changes from slice to slice are nodes. Round bodies: Fourier series around the axis, ring by
-//             ring; a dominant order n is the number of nodal diameters. Flat bodies: cells of the motion out of the plane; a dominant
-//             product of functions of length and width (singular values) has the nodal lines of both. All others: kind unknown.
-// Source:     Fletcher and Rossing, The Physics of Musical Instruments, ch. 2, 3 and 21.
-// Deviations: weights are areas of the surface, not masses inside.
+// Method: principal axes of the surface. Long bodies: slices with fitted rigid motions; a dominant component is bending, torsion or
+//   longitudinal motion, its sign changes between slices are nodes. Round bodies: Fourier series about the axis, ring by ring; a dominant
+//   order n is the number of nodal diameters. Flat bodies: out-of-plane motion on a grid of cells; a dominant separable function (singular
+//   value) has the nodal lines of its factors. Otherwise the kind is unknown.
+// Source: Fletcher and Rossing, The Physics of Musical Instruments, ch. 2, 3 and 21.
+// Deviations: weighted by surface area instead of mass.
 #include "runtime/bank/kinds.hpp"
 
 #include <fmt/format.h>
@@ -19,19 +19,19 @@
 namespace carillon::bank {
 namespace {
 
-constexpr double kLong = 2.5, kFlat = 0.25;           // length over width; thickness over width
-constexpr double kSameWidth = 0.03, kSphere = 0.003;  // of second moments
-constexpr double kRound = 0.02;                       // Fourier coefficients of the area about the axis
+constexpr double kLong = 2.5, kFlat = 0.25;                          // length / width; thickness / width
+constexpr double kSquareTolerance = 0.03, kSphereTolerance = 0.003;  // relative difference of second moments
+constexpr double kRoundTolerance = 0.02;                             // limit of the area's Fourier coefficients about the axis
 constexpr double kRigidSlices = 0.9, kOneKind = 0.8, kOneOrder = 0.6;
 constexpr double kOnePlane = 0.9, kProduct = 0.85;
-constexpr double kFlow = 0.8;    // squared volume flow over that of a uniform motion of the same energy
-constexpr double kStill = 0.03;  // of the largest value; less counts as 0
+constexpr double kMinBreathingFlow = 0.8;  // squared volume flow relative to uniform motion of equal energy
+constexpr double kZeroLevel = 0.03;        // relative to the largest value; treated as 0 below
 constexpr int kMaxOrder = 12, kCells = 12, kRings = 8;
-constexpr std::size_t kFewPoints = 8;  // vertices of a slice, at least
+constexpr std::size_t kMinSlicePoints = 8;  // minimum number of vertices of a slice
 
 double square(double x) { return x * x; }
 
-/// Eigenvalues of a symmetric matrix, descending, and a right-handed frame of unit eigenvectors (rows); Jacobi's method.
+/// Eigenvalues of a symmetric matrix, descending, and right-handed unit eigenvectors (rows), by Jacobi rotations.
 struct Axes {
   Vec3 moment{};
   Mat3 axis{};
@@ -67,23 +67,23 @@ Axes find_axes(Mat3 m) {
   return axes;
 }
 
-/// The surface in its principal axes, longest first.
+/// Surface in principal axes, longest first.
 struct Frame {
   Axes axes;
   std::vector<Vec3> place;     // (V) [m]
-  std::vector<double> area;    // (V) a third of the triangles around
-  std::array<Vec3, 2> extent;  // of the places
+  std::vector<double> area;    // (V) a third of the adjacent triangles
+  std::array<Vec3, 2> extent;  // bounds of `place`
   double all_area = 0.0;
 
   double size(int k) const { return extent[1][k] - extent[0][k]; }
-  /// Index of a place among `count` equal parts of the extent along axis k.
+  /// Index of the part that contains p, of `count` equal parts of the extent along axis k.
   std::size_t find_part(const Vec3& p, int k, int count) const {
     const double along = (p[k] - extent[0][k]) / std::max(size(k), 1e-300);
     return std::clamp(static_cast<int>(along * count), 0, count - 1);
   }
 };
 
-/// Turns axes 0 and 1, arbitrary for equal second moments, along the sides of a square.
+/// Aligns axes 0 and 1, arbitrary for equal second moments, with the sides of a square.
 void align(Frame& frame) {
   std::complex<double> fourth = 0.0;
   for (std::size_t v = 0; v < frame.place.size(); ++v)
@@ -113,25 +113,25 @@ Frame make_frame(const Bank& bank) {
   }
   frame.axes = find_axes(moment);
   for (const Vec3& p : bank.vertices_m) frame.place.push_back(frame.axes.axis * (p - centre));
-  if (frame.axes.moment[0] < (1.0 + kSameWidth) * frame.axes.moment[1]) align(frame);
+  if (frame.axes.moment[0] < (1.0 + kSquareTolerance) * frame.axes.moment[1]) align(frame);
   frame.extent = find_extent(frame.place);
   return frame;
 }
 
-/// Number of sign changes, without values near 0.
+/// Number of sign changes, ignoring values near 0.
 int count_nodes(const std::vector<double>& values) {
   double largest = 0.0, last = 0.0;
   for (const double x : values) largest = std::max(largest, std::abs(x));
   int nodes = 0;
   for (const double x : values) {
-    if (std::abs(x) <= kStill * largest) continue;
+    if (std::abs(x) <= kZeroLevel * largest) continue;
     if (x * last < 0.0) ++nodes;
     last = x;
   }
   return nodes;
 }
 
-/// A shape in the axes of the frame.
+/// Mode shape in the axes of the frame.
 class Shape {
  public:
   Shape(const Bank& bank, const Frame& frame, std::size_t mode) : motion_(bank.vertex_count()) {
@@ -148,16 +148,16 @@ class Shape {
   double energy_ = 0.0;
 };
 
-/// A long body in rigid slices.
+/// Slices of a long body, each with a fitted rigid motion.
 class Slices {
  public:
   explicit Slices(const Frame& frame) : frame_(frame) {
     constexpr int kMost = 48;
-    const int count = std::clamp(static_cast<int>(frame.place.size() / (3 * kFewPoints)), 1, kMost);
+    const int count = std::clamp(static_cast<int>(frame.place.size() / (3 * kMinSlicePoints)), 1, kMost);
     std::vector<std::vector<std::size_t>> parts(count);
     for (std::size_t v = 0; v < frame.place.size(); ++v) parts[frame.find_part(frame.place[v], 0, count)].push_back(v);
     for (std::vector<std::size_t>& part : parts)
-      if (part.size() >= kFewPoints) slices_.push_back(make_slice(std::move(part)));
+      if (part.size() >= kMinSlicePoints) slices_.push_back(make_slice(std::move(part)));
   }
 
   ModeKind find(const Shape& shape) const {
@@ -181,7 +181,7 @@ class Slices {
     }
     const double all = energy[0] + energy[1] + energy[2] + energy[3];
     if (!(all > kRigidSlices * shape.energy())) return {};
-    const bool has_widths = frame_.axes.moment[1] > (1.0 + kSameWidth) * frame_.axes.moment[2];
+    const bool has_widths = frame_.axes.moment[1] > (1.0 + kSquareTolerance) * frame_.axes.moment[2];
     const auto is_most = [&](double part) { return part > kOneKind * all; };
     if (is_most(energy[0])) return finish(MotionKind::kLongitudinal, along[0]);
     if (is_most(energy[3])) return finish(MotionKind::kTorsion, along[3]);
@@ -198,7 +198,7 @@ class Slices {
     std::vector<std::size_t> vertices;
     double area = 0.0;
     Vec3 centre{};
-    Mat3 by_moment{};  // inverse of the moments of area: angular momentum to rotation
+    Mat3 by_moment{};  // inverse moments of area: angular momentum to rotation
   };
 
   Slice make_slice(std::vector<std::size_t> vertices) const {
@@ -230,12 +230,12 @@ class Slices {
   std::vector<Slice> slices_;
 };
 
-/// The axis of a round body, else nullopt.
+/// Symmetry axis of a round body, else nullopt.
 std::optional<int> find_round_axis(const Frame& frame) {
   const Vec3& m = frame.axes.moment;
-  if (m[0] < (1.0 + kSphere) * m[2]) return std::nullopt;  // as a sphere: no single axis
+  if (m[0] < (1.0 + kSphereTolerance) * m[2]) return std::nullopt;  // nearly a sphere: no unique axis
   const int axis = m[0] - m[1] < m[1] - m[2] ? 2 : 0, x = (axis + 1) % 3, y = (axis + 2) % 3;
-  if (m[std::min(x, y)] > (1.0 + kSameWidth) * m[std::max(x, y)]) return std::nullopt;
+  if (m[std::min(x, y)] > (1.0 + kSquareTolerance) * m[std::max(x, y)]) return std::nullopt;
   const double middle = 0.5 * (frame.extent[0][axis] + frame.extent[1][axis]), half = std::max(0.5 * frame.size(axis), 1e-300);
   for (int n = 1; n <= kMaxOrder; ++n) {
     std::array<std::complex<double>, 3> sum{};
@@ -246,12 +246,12 @@ std::optional<int> find_round_axis(const Frame& frame) {
       for (int power = 0; power < 3; ++power) sum[power] += std::pow(height, power) * turn;
     }
     for (const std::complex<double>& one : sum)
-      if (std::abs(one) > kRound * frame.all_area) return std::nullopt;
+      if (std::abs(one) > kRoundTolerance * frame.all_area) return std::nullopt;
   }
   return axis;
 }
 
-/// A round body in rings.
+/// Rings of a round body.
 class Rings {
  public:
   Rings(const Frame& frame, int axis) : frame_(frame), axis_(axis), x_((axis + 1) % 3), y_((axis + 2) % 3) {
@@ -295,7 +295,7 @@ class Rings {
     if (*most < kOneOrder * shape.energy()) return {};
     const int order = static_cast<int>(most - energy.begin());
     if (order == 0 && around > kOneKind * energy[0]) return {.motion = MotionKind::kTorsion};
-    const bool breathes = radial > 0.5 * shape.energy() && square(outward) > kFlow * frame_.all_area * radial;
+    const bool breathes = radial > 0.5 * shape.energy() && square(outward) > kMinBreathingFlow * frame_.all_area * radial;
     if (order == 0 && breathes) return {.motion = MotionKind::kBreathing};
     return {.motion = MotionKind::kDiameters, .nodes = order};
   }
@@ -308,7 +308,7 @@ class Rings {
   std::vector<std::size_t> ring_;
 };
 
-/// A flat body in cells.
+/// Kind of a flat body's mode, from cells.
 ModeKind find_plate_kind(const Frame& frame, const Shape& shape) {
   std::array<std::array<double, kCells>, kCells> cell{}, area{};
   double normal = 0.0;
@@ -324,11 +324,11 @@ ModeKind find_plate_kind(const Frame& frame, const Shape& shape) {
   double all = 0.0;
   for (int i = 0; i < kCells; ++i)
     for (int j = 0; j < kCells; ++j) {
-      if (area[i][j] == 0.0) return kind;  // no rectangle, or too coarse
+      if (area[i][j] == 0.0) return kind;  // not a rectangle, or too coarse
       cell[i][j] /= area[i][j];
       all += square(cell[i][j]);
     }
-  // The largest singular value by power iteration, from every row: one start may be orthogonal to its vector.
+  // Largest singular value by power iteration, started from each row: a single start may be orthogonal to the vector.
   std::vector<double> along(kCells), across(kCells);
   double largest = 0.0;
   for (int row = 0; row < kCells; ++row) {
@@ -363,7 +363,7 @@ ModeKind find_plate_kind(const Frame& frame, const Shape& shape) {
   return kind;
 }
 
-/// The outer surface, for breathing.
+/// Outer surface, for breathing modes.
 class Skin {
  public:
   Skin(const Bank& bank, const Frame& frame) : normal_(bank.vertex_count()) {
@@ -384,16 +384,16 @@ class Skin {
       normal += a * square(out);
       all += a * dot(shape[v], shape[v]);
     }
-    return square(flow) > kFlow * area * normal && normal > kOneKind * all;
+    return square(flow) > kMinBreathingFlow * area * normal && normal > kOneKind * all;
   }
 
  private:
-  std::vector<Vec3> normal_;  // (V) area times normal, axes of the frame
+  std::vector<Vec3> normal_;  // (V) area times normal, principal axes
 };
 
 constexpr std::array kNames{"-", "bending", "lateral bending", "torsion", "longitudinal", "breathing", "", "plate bending", "in plane"};
 
-const char* get_name(MotionKind motion) { return kNames.at(motion); }
+const char* get_name(MotionKind motion) { return kNames.at(static_cast<std::size_t>(motion)); }
 
 }  // namespace
 

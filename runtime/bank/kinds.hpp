@@ -1,4 +1,4 @@
-// Kinds of motion of modes (bending, torsion, nodal diameters ...), from their shapes on the surface.
+// Classification of modes by their surface shapes (bending, torsion, nodal diameters ...).
 #pragma once
 
 #include <cstdint>
@@ -11,25 +11,25 @@
 namespace carillon::bank {
 
 enum class MotionKind : std::uint8_t {
-  kUnknown,         // another kind, or a mixture
-  kBending,         // of a long body, along the thinner side of its section; square and round sections: any direction
+  kUnknown,         // other, or mixed
+  kBending,         // long body, along the thinner side of its section; square or round section: any direction
   kLateralBending,  // along the wider side
   kTorsion,         // about the long axis, or about the axis of a round body
   kLongitudinal,    // along the long axis
-  kBreathing,       // the whole skin outward and inward
-  kDiameters,       // of a round body
-  kPlateBending,    // of a flat body, out of its plane
-  kInPlane,         // of a flat body
+  kBreathing,       // uniform expansion of the outer surface
+  kDiameters,       // round body
+  kPlateBending,    // flat body, out of plane
+  kInPlane,         // flat body
 };
 
 struct ModeKind {
   MotionKind motion = MotionKind::kUnknown;
-  // Nodes of a long body, nodal lines across the length of a flat one, nodal diameters of a round one. None: unknown.
+  // Nodes of a long body, nodal lines across the length of a flat one, nodal diameters of a round one; nullopt: unknown.
   std::optional<int> nodes = {};
-  std::optional<int> lines = {};  // nodal lines along the length of a flat body
+  std::optional<int> lines = {};  // flat body: nodal lines along its length
 };
 
-/// Of the first `count` modes, at most all. Cost: a pass over their shapes. Pure; any thread.
+/// Kinds of the first `count` modes. Cost: one pass over their shapes. Thread-safe.
 std::vector<ModeKind> find_kinds(const Bank& bank, std::size_t count = SIZE_MAX);
 
 /// "bending, 2 nodes", "plate bending, 2 x 1 lines", "3 diameters", "breathing"; "-" for kUnknown.

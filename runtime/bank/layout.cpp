@@ -5,9 +5,8 @@
 
 namespace carillon::bank {
 
-// The arrays are copied between file and memory as they are.
-static_assert(std::endian::native == std::endian::little,
-              "Bank files are little-endian and so far only little-endian machines are served.");
+// Arrays are copied unchanged between file and memory.
+static_assert(std::endian::native == std::endian::little, "Bank files are little-endian; big-endian machines are not supported.");
 static_assert(sizeof(Vec3) == 24 && sizeof(std::array<std::int32_t, 3>) == 12, "Rows of three must lie without gaps.");
 
 namespace {
@@ -19,10 +18,10 @@ std::vector<std::uint64_t> find_shape(const Vector& values) {
   return {values.size()};
 }
 
-/// A text of the file has at least one byte.
+/// Texts of the file have at least one byte.
 std::string pad_text(const std::string& text) { return text.empty() ? std::string(1, '\0') : text; }
 
-/// What came with versions 1.5 and 1.6.
+/// Fields since versions 1.5 and 1.6.
 void add_radiation_fields(const Multipoles& air, const FileForm& form, std::vector<Field>& fields) {
   const auto add_number = [&](const char* name, const char* units, const char* meaning, const double& value) {
     fields.push_back({name, "<f8", {}, units, meaning, &value});
@@ -57,7 +56,7 @@ void add_radiation_fields(const Multipoles& air, const FileForm& form, std::vect
   fields.push_back({"radiation/method", text_type(form.radiation_method), {}, "1", "how the air was solved", form.radiation_method.data()});
 }
 
-/// What came with version 1.7.
+/// Fields since version 1.7.
 void add_nonlinear_fields(const QuarticEnergy& energy, const FileForm& form, std::vector<Field>& fields) {
   const std::uint64_t modes = energy.mode_count(), rows = energy.row_count(), points = energy.point_count();
   fields.push_back({"nonlinear/modes", "<i4", {modes}, "1", "numbers of the coupled modes", energy.modes.data()});
@@ -88,7 +87,7 @@ void add_nonlinear_fields(const QuarticEnergy& energy, const FileForm& form, std
   fields.push_back({"nonlinear/thickness_m", "<f8", {}, "m", "by which amplitudes are judged", &energy.thickness_m});
 }
 
-/// What came with version 1.1.
+/// Fields since version 1.1.
 void add_later_fields(const Bank& bank, const FileForm& form, std::vector<Field>& fields) {
   const auto add_errors = [&](const char* name, const char* meaning, const std::vector<double>& cents) {
     if (!cents.empty()) fields.push_back({name, "<f8", find_shape(cents), "cent", meaning, cents.data()});
@@ -168,7 +167,7 @@ void add_later_fields(const Bank& bank, const FileForm& form, std::vector<Field>
                       &proof.complete_below_hz});
 }
 
-/// What a packed bank has in place of mesh and shapes.
+/// Fields of packed banks that replace mesh and shapes.
 void add_packed_fields(const Bank& bank, const FileForm& form, std::vector<Field>& fields) {
   const Packing& packing = *bank.packing;
   fields.insert(
@@ -263,7 +262,7 @@ FileForm make_file_form(const Bank& bank) {
   if (!bank.multipoles.is_empty()) form.radiation_method = pad_text(bank.multipoles.method);
   if (!bank.quartic.is_empty()) form.nonlinear_form = bank.quartic.is_of_points() ? "points" : "rows";
   form.has_complete_below = bank.proof && bank.proof->complete_below_hz > 0.0;
-  if (bank.shape_bytes == 1) form.narrow_shape.assign(bank.shape.begin(), bank.shape.end());  // within -127 and 127: find_faults()
+  if (bank.shape_bytes == 1) form.narrow_shape.assign(bank.shape.begin(), bank.shape.end());  // range checked by find_faults()
   return form;
 }
 

@@ -1,7 +1,7 @@
-// Method:     phi'_i = sum over j of part_ij phi_j, rounded again, each mode with a scale of its own. The damping of the solid does no work
-//             between its modes, so that of a sum is the sum with squared parts; modal masses are 1 with the air's.
-// Source:     docs/equations.md E10.
-// Deviations: shares of the strain energy near supports leave out what two modes share there.
+// Method: phi'_i = sum over j of part_ij phi_j, quantised again, each mode with its own scale. The solid's damping does no work between its
+//   modes: decays are sums with squared parts. Modal masses including the air are 1.
+// Source: docs/equations.md E10.
+// Deviations: strain energy shares near supports neglect cross terms of modes.
 #include "runtime/bank/mixing.hpp"
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 namespace carillon::bank {
 namespace {
 
-/// Shapes of the modes in air, a vertex at a time.
+/// Shapes of the modes in air, vertex by vertex.
 class MixedRows {
  public:
   explicit MixedRows(const Bank& bank) : bank_(bank), rigid_(bank.rigid), row_(bank.mode_count()) {}
@@ -51,7 +51,7 @@ void mix_shapes(Bank& bank) {
   }
   for (double& s : scale) s = calc_shape_scale(s);
   for (std::size_t v = 0; v < bank.vertex_count(); ++v) {
-    const std::vector<Vec3>& row = rows.calc(v);  // read before the row is written
+    const std::vector<Vec3>& row = rows.calc(v);  // read before it is overwritten
     for (std::size_t i = 0; i < modes; ++i)
       for (std::size_t c = 0; c < 3; ++c) bank.shape[(v * modes + i) * 3 + c] = find_step(row[i][c], scale[i]);
   }
@@ -91,7 +91,7 @@ void mix_modes(Bank& bank) {
   if (mixing.is_empty()) return;
   mix_shapes(bank);
   const std::size_t modes = bank.mode_count(), supports = bank.supports.count();
-  const bool is_corrected = !bank.corrected.is_empty();  // and not yet taken
+  const bool is_corrected = !bank.corrected.is_empty();  // not yet applied
   std::vector<double> decay(modes), corrected(is_corrected ? modes : 0), reaction(bank.supports.reaction.size()),
       energy(bank.supports.energy.size());
   std::size_t at = 0;
@@ -99,7 +99,7 @@ void mix_modes(Bank& bank) {
     double strain = 0.0;
     for (std::int32_t k = 0; k < mixing.count[i]; ++k, ++at) {
       const std::size_t j = mixing.motion[at];
-      if (j >= modes) continue;  // a rigid motion loses nothing, and nothing holds it
+      if (j >= modes) continue;  // rigid motion: undamped, unsupported
       const double part = mixing.part[at], share = part * part * bank.eigenvalue_rad2_s2[j];
       decay[i] += part * part * bank.decay_per_s[j];
       if (is_corrected) corrected[i] += part * part * bank.corrected.decay_per_s[j];

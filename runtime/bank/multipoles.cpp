@@ -1,8 +1,6 @@
-// Method:     h_l by its recurrence (runtime/base/hankel.hpp). A component that was rounded is off by half a step at most, a
-//             coefficient by scale / sqrt(2); the root of the decay is a norm of the coefficients, so that it is off by no more than the
-//             norm of these.
-// Source:     DLMF 10.49.6, 10.51.1; docs/equations.md E10.
-// Deviations: none.
+// Method: h_l by recurrence (runtime/base/hankel.hpp). A rounded component is off by at most half a step, a coefficient by scale / sqrt(2);
+//   the root of the decay is a norm of the coefficients, so its error is at most the norm of theirs.
+// Source: DLMF 10.49.6, 10.51.1; docs/equations.md E10.
 #include "runtime/bank/multipoles.hpp"
 
 #include <fmt/format.h>
@@ -106,7 +104,7 @@ Mixing select_mixing(const Multipoles& multipoles, const std::vector<std::size_t
     }
     const bool is_whole = parts.size() == first[mode + 1] - first[mode];
     std::sort(parts.begin(), parts.end());
-    if (squares == 0.0) parts = {{place[mode], squares = 1.0}};  // of all its parts only others were left out
+    if (squares == 0.0) parts = {{place[mode], squares = 1.0}};  // all parts of the mode were dropped
     const double factor = is_whole ? 1.0 : 1.0 / std::sqrt(squares * (1.0 + multipoles.added_mass[mode]));
     for (const auto& [motion, part] : parts) {
       selected.motion.push_back(motion);
@@ -121,7 +119,7 @@ Mixing select_mixing(const Multipoles& multipoles, const std::vector<std::size_t
 
 Multipoles select_multipoles(const Multipoles& multipoles, const std::vector<std::size_t>& chosen) {
   if (chosen.empty() || multipoles.is_empty()) return {};
-  std::vector<std::size_t> first{0};  // of the components of each mode
+  std::vector<std::size_t> first{0};  // first component of each mode
   for (const std::int32_t order : multipoles.order) first.push_back(first.back() + 2 * count_coefficients(order));
   Multipoles selected = multipoles;
   for (auto* values : {&selected.freq_hz, &selected.scale, &selected.decay_per_s, &selected.added_mass, &selected.error_db}) {

@@ -1,8 +1,8 @@
-// Method:     the nearest point of a triangle by its Voronoi regions (corners, edges, face); a tree of axis-aligned boxes, halved at the
-//             median of the triangles' centres along the longest side, nearer child first.
-// Source:     Ericson, Real-Time Collision Detection (2005), sections 5.1.5 and 6.2.
-// Deviations: a box is passed over only when it is further off than the best place by more than rounding, and ties go to the lowest
-//             triangle, so that the tree and the plain loop find the same place to the bit.
+// Method: closest point of a triangle by Voronoi regions (corners, edges, face); a tree of axis-aligned boxes split at the median of the
+//   triangle centres along the longest side, nearer child first.
+// Source: Ericson, Real-Time Collision Detection (2005), sections 5.1.5 and 6.2.
+// Deviations: a box is skipped only if farther than the best point by more than rounding, and ties go to the lowest triangle, so that tree
+//   and linear search agree bit for bit.
 #include "runtime/bank/nearest.hpp"
 
 #include <algorithm>
@@ -16,19 +16,19 @@
 namespace carillon::bank {
 namespace {
 
-constexpr std::int32_t kLeaf = 6;          // triangles
-constexpr int kDeepest = 64;               // halving 2^31 triangles takes 31 levels
-constexpr double kMinArea = 1e-14;         // of a triangle: its height over its length, squared
-constexpr double kRounding = 1.0 - 1e-12;  // of a squared distance: more than its rounding
+constexpr std::int32_t kLeafTriangles = 6;       // triangles per leaf
+constexpr int kMaxTreeDepth = 64;                // 2^31 triangles need 31 levels
+constexpr double kMinArea = 1e-14;               // (height / length)^2 of a triangle
+constexpr double kRoundingFactor = 1.0 - 1e-12;  // bound of a squared distance's rounding
 
-/// How far along (a, b), 0 to 1, the point nearest to p lies.
+/// Parameter 0 to 1 of the point of segment (a, b) closest to p.
 double find_along(const Vec3& p, const Vec3& a, const Vec3& b) {
   const Vec3 ab = b - a;
   const double square = dot(ab, ab);
   return square > 0.0 ? std::clamp(dot(p - a, ab) / square, 0.0, 1.0) : 0.0;
 }
 
-/// The same as find_nearest_barycentric() by the three edges alone, for triangles without area.
+/// find_nearest_barycentric() by the three edges only, for degenerate triangles.
 Vec3 find_on_edges(const Vec3& p, const std::array<Vec3, 3>& corner) {
   Vec3 best{1.0, 0.0, 0.0};
   double min = std::numeric_limits<double>::infinity();
@@ -50,7 +50,7 @@ bool is_a_place(const Vec3& point_m) {
   return std::all_of(point_m.begin(), point_m.end(), [](double x) { return std::abs(x) <= kFarthestPointM; });  // false for NaN
 }
 
-/// Takes a triangle for the best place where it is nearer, or as near and earlier.
+/// Updates `best` if the triangle is closer, or equally close with a lower index.
 void try_triangle(const Bank& bank, std::int32_t triangle, const Vec3& p, double& min, NearestPlace& best) {
   const auto& corner = bank.triangles[triangle];
   const Vec3 &a = bank.vertices_m[corner[0]], &b = bank.vertices_m[corner[1]], &c = bank.vertices_m[corner[2]];
@@ -77,7 +77,7 @@ double calc_square(const Vec3& p, const Vec3& low, const Vec3& high) {
 
 Vec3 find_nearest_barycentric(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) noexcept {
   const Vec3 ab = b - a, ac = c - a;
-  // A triangle without area has no regions that rounding leaves standing.
+  // For a degenerate triangle the regions are dominated by rounding.
   const double square_ab = dot(ab, ab), square_ac = dot(ac, ac), along = dot(ab, ac);
   if (!(square_ab * square_ac - along * along > kMinArea * std::max(square_ab, square_ac) * std::max(square_ab, square_ac)))
     return find_on_edges(p, {a, b, c});
@@ -126,7 +126,7 @@ std::int32_t SurfaceTree::build(std::vector<Vec3>& centres_m, std::int32_t first
     }
   }
   boxes_.push_back(box);
-  if (last - first <= kLeaf) return at;
+  if (last - first <= kLeafTriangles) return at;
   const Vec3 extent = box.high - box.low;
   const std::size_t axis = std::max_element(extent.begin(), extent.end()) - extent.begin();
   const std::int32_t middle = first + (last - first) / 2;
@@ -151,12 +151,12 @@ NearestPlace SurfaceTree::find(const Vec3& point_m) const noexcept {
     return Waiting{at, calc_square(point_m, box.low, box.high)};
   };
   double min = std::numeric_limits<double>::infinity();
-  std::array<Waiting, kDeepest> stack;
+  std::array<Waiting, kMaxTreeDepth> stack;
   int depth = 0;
   stack[depth++] = weigh(0);
   while (depth > 0) {
     const Waiting next = stack[--depth];
-    if (next.square * kRounding > min) continue;
+    if (next.square * kRoundingFactor > min) continue;
     const Box& box = boxes_[next.box];
     if (box.count > 0) {
       for (std::int32_t i = box.first; i < box.first + box.count; ++i) try_triangle(*bank_, order_[i], point_m, min, best);

@@ -1,4 +1,4 @@
-// Where on a body's surface is nearest to a point: what a click, a collision or a strike hits.
+// Closest point on a body's surface: clicks, collisions, strikes.
 #pragma once
 
 #include <array>
@@ -9,38 +9,37 @@
 
 namespace carillon::bank {
 
-/// A place on the surface.
+/// Point on the surface.
 struct NearestPlace {
-  std::int32_t triangle = -1;  // -1: there is none (no triangles, or a point that is not finite or beyond kFarthestPointM)
-  Vec3 barycentric{};          // of the triangle's corners, at least 0, of sum 1
-  Vec3 point_m{};              // the same place, frame of the mesh
-  double distance_m = 0.0;     // from the point asked for
+  std::int32_t triangle = -1;  // -1: none (no triangles, or a query point that is not finite or beyond kFarthestPointM)
+  Vec3 barycentric{};          // weights of the corners, >= 0, sum 1
+  Vec3 point_m{};              // mesh axes
+  double distance_m = 0.0;     // from the query point
 };
 
-/// Coordinates beyond this are no places: their squares would not be numbers.
+/// Limit of coordinates: squares must not overflow.
 inline constexpr double kFarthestPointM = 1e100;
 
-/// Barycentric coordinates of the point of the triangle (a, b, c) that is nearest to p; also of one without area.
+/// Barycentric coordinates of the point of triangle (a, b, c) closest to p; degenerate triangles permitted.
 Vec3 find_nearest_barycentric(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) noexcept;
 
-/// The nearest place of a bank's surface by looking at every triangle: for a few points. Of places equally near, that of the lowest
-/// triangle. Any thread.
+/// Closest point of a bank's surface by linear search, for few queries. Ties go to the lowest triangle. Thread-safe.
 NearestPlace find_nearest(const Bank& bank, const Vec3& point_m) noexcept;
 
-/// The same for many points, by a tree of boxes: O(log T) a point once O(T log T) is spent on the tree. The bank must outlive it and keep
-/// its surface. Built on one thread; find() on any number of threads at once.
+/// The same for many queries: box tree, O(T log T) to build, O(log T) per query. The bank must outlive it and keep its surface. Concurrent
+/// find() calls are safe.
 class SurfaceTree {
  public:
   explicit SurfaceTree(const Bank& bank);
 
-  /// The same place as find_nearest() finds. Takes no memory and does not wait.
+  /// Same result as find_nearest(). Does not allocate or block.
   NearestPlace find(const Vec3& point_m) const noexcept;
 
  private:
   struct Box {
     Vec3 low, high;
-    std::int32_t first = 0, count = 0;  // a leaf's triangles in order_; of an inner box count is 0 and first its second child, the
-                                        // first child being the next box
+    // Leaf: range in order_. Inner box: count 0, first: second child; the first child is the next box.
+    std::int32_t first = 0, count = 0;
   };
   std::int32_t build(std::vector<Vec3>& centres_m, std::int32_t first, std::int32_t last);
 

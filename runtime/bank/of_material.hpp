@@ -1,4 +1,4 @@
-// What a material of the table means for a bank.
+// Materials of the table applied to banks.
 #pragma once
 
 #include "runtime/bank/edits.hpp"
@@ -6,15 +6,15 @@
 
 namespace carillon::bank {
 
-/// Its damping law; of Rayleigh's the constants stand in bank::Material.
+/// Damping law of the material; Rayleigh's constants are in bank::Material.
 Damping make_damping(const material::Material& material);
 
-/// The edits that make a body of this material of the bank's: density, stiffness and damping. Throws InputError where one of the two is not
-/// the same in all directions, which no scale makes of the other.
+/// Edits (density, stiffness, damping) that change the bank's body to this material. Throws InputError if either is anisotropic, which
+/// scaling cannot represent.
 Edits make_edits(const Bank& bank, const material::Material& material);
 
-/// How far frequencies may be off after make_edits(), since Poisson's ratio stays the bank's: of torsion, E / (1 + nu), which changes more
-/// than bending [cent].
+/// Frequency error [cent] after make_edits(), which keeps the bank's Poisson's ratio: that of torsion, E / (1 + nu), larger than of
+/// bending.
 double calc_poisson_cents(const Bank& bank, const material::Material& material);
 
 }  // namespace carillon::bank

@@ -1,8 +1,8 @@
-// Method:     all modes share the error equally, each weighed by what is heard of it (reverse water-filling): a mode's step is inverse
-//             to the root of its exposure. Steps at a place are as the root of what is heard of a blow there. runtime/bank/packed does the
-//             rest. The steps are scaled until the error that a reader finds is the one that was asked for.
-// Source:     reverse water-filling: Cover and Thomas, Elements of Information Theory, 10.3.3.
-// Deviations: the exposures of modes add, as in calc_audibility().
+// Method: reverse water-filling: all modes share the error equally, weighted by audibility; a mode's step is inverse to the root of its
+//   exposure. Steps at a vertex are proportional to the root of the audible energy of a blow there. Coding: runtime/bank/packed. The steps
+//   are scaled until the decoded error equals the requested one.
+// Source: reverse water-filling: Cover and Thomas, Elements of Information Theory, 10.3.3.
+// Deviations: exposures of modes add, as in calc_audibility().
 #include "runtime/bank/pack.hpp"
 
 #include <fmt/format.h>
@@ -11,35 +11,36 @@
 #include <cmath>
 #include <limits>
 
-#include "runtime/bank/packing_error.hpp"
-#include "runtime/bank/surface.hpp"
 #include "runtime/bank/packed/fit_shapes.hpp"
 #include "runtime/bank/packed/levels.hpp"
 #include "runtime/bank/packed/surface.hpp"
+#include "runtime/bank/packing_error.hpp"
+#include "runtime/bank/surface.hpp"
 
 namespace carillon::bank {
 namespace {
 
-constexpr double kLatticePerSize = 32768.0, kLatticePerEdge = 8.0;  // steps of the lattice in the body's size, in its shortest edge
+constexpr double kLatticePerSize = 32768.0, kLatticePerEdge = 8.0;  // lattice steps per body size, per shortest edge
 constexpr double kMostLattice = 1 << 22;
-constexpr double kMostStep = 1.0;    // step of a mode over the mean motion of its vertices, so that none vanishes
-constexpr double kCavity = 16.0;     // error of inner walls over that of the outer surface
-constexpr double kOfSurface = 0.95;  // share of the surface within the stated error
-constexpr double kNearEnough = 0.4;  // dB below the wanted error
-constexpr int kMostSampled = 5, kMostNear = 3, kMostTries = 20;  // trials of a sample, of all until it is near, and of all
-constexpr std::size_t kSampled = 8;                              // one of so many vertices of the finest level counts in a trial
-constexpr double kFirstDb = -4.0;                                // of the first trial, beyond what was asked for
-constexpr double kMostChange = 20.0, kFiner = 2.0;               // dB from one trial to the next, by secants and without
+constexpr double kMaxRelativeStep = 1.0;  // maximum step of a mode over its mean motion, so that none vanishes
+constexpr double kCavityFactor = 16.0;    // permitted error of inner walls over that of the outer surface
+constexpr double kSurfaceShare = 0.95;    // fraction of the surface within the stated error
+constexpr double kMaxSlackDb = 0.4;       // dB below the requested error: converged
+constexpr int kMaxSampledTrials = 5, kMaxNearTrials = 3,
+              kMaxTrials = 20;                            // trials on a sample; on all vertices until near; on all vertices
+constexpr std::size_t kSubsampling = 8;                   // subsampling of the finest level in sampled trials
+constexpr double kFirstOffsetDb = -4.0;                   // offset of the first trial from the request
+constexpr double kMaxStepDb = 20.0, kRefinementDb = 2.0;  // step limit of the secant method; step without it [dB]
 constexpr std::size_t kWitnesses = 24;
 
-/// Appends the row of a vertex (m, 3) to shapes.
+/// Appends the row (m, 3) of a vertex to `shape`.
 void append_row(const Bank& bank, std::int32_t vertex, std::vector<std::int16_t>& shape) {
   const std::size_t width = 3 * bank.mode_count();
   const auto row = bank.shape.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(vertex) * width);
   shape.insert(shape.end(), row, row + static_cast<std::ptrdiff_t>(width));
 }
 
-/// The bank without vertices that no triangle has.
+/// Removes vertices without triangles.
 Bank drop_unused(const Bank& bank) {
   std::vector<std::int32_t> moved(bank.vertex_count(), -1);
   for (const Triangle& triangle : bank.triangles)
@@ -59,16 +60,16 @@ Bank drop_unused(const Bank& bank) {
   return used;
 }
 
-/// A bank whose surface is that of a packed one, and its bytes.
+/// Bank with its surface as packed, and the surface's bytes.
 struct PackedSurface {
-  Bank bank;  // vertices on the lattice; shapes as they were
+  Bank bank;  // vertices on the lattice; original shapes
   std::vector<std::uint8_t> bytes, order;
   packed::Surface surface;
 };
 
-/// What the triangles of `surface` were, those of a bank whose vertices are now at `moved`.
+/// Original triangle order of `surface`, the surface of a bank whose vertices are now at `moved`.
 packed::TriangleOrder find_triangle_order(const packed::Surface& surface, const std::vector<std::int32_t>& before,
-                                         const std::vector<Triangle>& triangles, const std::vector<std::int32_t>& moved) {
+                                          const std::vector<Triangle>& triangles, const std::vector<std::int32_t>& moved) {
   packed::TriangleOrder order{before, {}};
   for (std::size_t i = 0; i < before.size(); ++i) {
     const std::int32_t corner = moved[triangles[before[i]][0]];
@@ -113,7 +114,7 @@ PackedSurface pack_surface(const Bank& original, bool keep_numbers) {
   return {std::move(bank), written.bytes, std::move(order), std::move(surface)};
 }
 
-/// The mean motion of each mode along an axis (m) [kg^-1/2]; of a mode at rest on the surface a step.
+/// Mean motion of each mode along an axis (m) [kg^-1/2]; one step for a mode at rest on the surface.
 std::vector<double> calc_motion(const Bank& bank) {
   const std::size_t modes = bank.mode_count();
   std::vector<double> motion(modes, 0.0);
@@ -125,20 +126,20 @@ std::vector<double> calc_motion(const Bank& bank) {
   return motion;
 }
 
-/// Steps that give each mode the same share of `error` times what is heard at the loudest place, which is `loudest` [kg^-1/2].
+/// Steps that give each mode an equal share of `error` times the audible energy `loudest` at the loudest vertex [kg^-1/2].
 std::vector<float> calc_steps(const Bank& bank, const std::vector<double>& weight, double loudest, double error) {
   const double share = 12.0 * error * loudest / static_cast<double>(bank.mode_count());
   const std::vector<double> motion = calc_motion(bank);
   std::vector<float> step;
   for (std::size_t m = 0; m < bank.mode_count(); ++m) {
-    const double most = kMostStep * motion[m];
+    const double most = kMaxRelativeStep * motion[m];
     const double wanted = weight[m] > 0.0 ? bank.shape_scale[m] * std::sqrt(share / weight[m]) : most;
     step.push_back(static_cast<float>(std::min(wanted, most)));
   }
   return step;
 }
 
-/// How much finer than at the loudest place shapes are kept at each (V): as the root of what is heard there.
+/// Refinement (V) relative to the loudest vertex: root of the audible energy.
 std::vector<std::uint8_t> calc_fineness(const std::vector<double>& exposure, double loudest) {
   std::vector<std::uint8_t> fineness;
   for (const double heard : exposure) {
@@ -163,7 +164,7 @@ packed::Rows make_rows(const Bank& bank, const std::vector<float>& step) {
   return rows;
 }
 
-/// As read_shapes() makes them of rows but in double precision, at the vertices that `is_known`.
+/// Reference decoder in double precision, like read_shapes(), at the vertices with `is_known`.
 std::vector<std::int16_t> make_shape(const Bank& bank, const packed::Rows& rows, const std::vector<float>& step,
                                      const std::vector<bool>& is_known) {
   std::vector<std::int16_t> shape(bank.shape.size(), 0);
@@ -180,11 +181,11 @@ std::vector<std::int16_t> make_shape(const Bank& bank, const packed::Rows& rows,
   return shape;
 }
 
-/// The error of shapes (V, m, 3) against those of the bank, at the vertices that `is_known`, on areas that are given (V) [m^2]. Without
+/// Error of shapes (V, m, 3) against those of the bank, at the vertices with `is_known`, weighted by the areas (V) [m^2]. Without
 /// witnesses.
 Packing calc_error(const Bank& bank, const Blows& blows, const std::vector<double>& area_m2, const std::vector<std::int16_t>& shape,
                    const std::vector<bool>& is_known) {
-  std::vector<std::pair<double, double>> errors;  // [dB], with their areas
+  std::vector<std::pair<double, double>> errors;  // [dB], area
   double area = 0.0;
   for (std::size_t v = 0; v < bank.vertex_count(); ++v) {
     if (!(area_m2[v] > 0.0) || !is_known[v]) continue;
@@ -197,12 +198,12 @@ Packing calc_error(const Bank& bank, const Blows& blows, const std::vector<doubl
   Packing packing;
   packing.error_db = packing.worst_db = errors.empty() ? kExactDb : errors.back().first;
   double above = 0.0;
-  for (std::size_t i = errors.size(); i-- > 0 && above <= (1.0 - kOfSurface) * area; above += errors[i].second)
+  for (std::size_t i = errors.size(); i-- > 0 && above <= (1.0 - kSurfaceShare) * area; above += errors[i].second)
     packing.error_db = errors[i].first;
   return packing;
 }
 
-/// Of each of `count` equal parts of the outer area, the vertex where it begins.
+/// First vertex of each of `count` equal parts of the outer area.
 std::vector<std::int32_t> choose_witnesses(const StruckSkin& skin, std::size_t count) {
   double area = 0.0, before = 0.0;
   for (const double a : skin.area_m2) area += a;
@@ -215,30 +216,30 @@ std::vector<std::int32_t> choose_witnesses(const StruckSkin& skin, std::size_t c
   return witnesses;
 }
 
-/// Finds the scale of the steps with which a packed bank has the error that is asked for, by secants.
+/// Secant search for the step scale that gives the requested error.
 class Packer {
  public:
   Packer(const Bank& bank, const packed::Surface& surface) : bank_(bank), surface_(surface), blows_(bank) {
     std::vector<double> exposure = blows_.exposure;
     for (std::size_t v = 0; v < exposure.size(); ++v) {
-      if (!(blows_.skin.area_m2[v] > 0.0)) exposure[v] *= kCavity;
+      if (!(blows_.skin.area_m2[v] > 0.0)) exposure[v] *= kCavityFactor;
       loudest_ = std::max(loudest_, exposure[v]);
     }
     fineness_ = calc_fineness(exposure, loudest_);
   }
 
-  /// The bytes of the shapes, and fills `packing`.
+  /// Returns the bytes of the shapes; fills `packing`.
   std::vector<std::uint8_t> run(double error_db, Packing& packing) {
-    const auto is_near = [&](double found_db) { return found_db <= error_db && found_db > error_db - kNearEnough; };
-    double asked_db = error_db + kFirstDb, before_db = 0.0, found_before_db = 0.0;
+    const auto is_near = [&](double found_db) { return found_db <= error_db && found_db > error_db - kMaxSlackDb; };
+    double asked_db = error_db + kFirstOffsetDb, before_db = 0.0, found_before_db = 0.0;
     const auto find_next = [&](int tries, double found_db) {
       const double slope = tries > 0 && asked_db != before_db ? (found_db - found_before_db) / (asked_db - before_db) : 1.0;
       before_db = asked_db;
       found_before_db = found_db;
-      asked_db += std::clamp((error_db - 0.5 * kNearEnough - found_db) / std::clamp(slope, 0.4, 1.5), -kMostChange, kMostChange);
+      asked_db += std::clamp((error_db - 0.5 * kMaxSlackDb - found_db) / std::clamp(slope, 0.4, 1.5), -kMaxStepDb, kMaxStepDb);
     };
     if (surface_.level_count() > 1) {
-      for (int tries = 0; tries < kMostSampled; ++tries) {
+      for (int tries = 0; tries < kMaxSampledTrials; ++tries) {
         const double found_db = try_sampled(asked_db);
         if (is_near(found_db)) break;
         find_next(tries, found_db);
@@ -246,7 +247,7 @@ class Packer {
     }
     std::vector<std::uint8_t> best;
     double least_db = std::numeric_limits<double>::infinity();
-    for (int tries = 0; tries < kMostTries; ++tries) {
+    for (int tries = 0; tries < kMaxTrials; ++tries) {
       Packing found;
       std::vector<std::uint8_t> bytes;
       const double found_db = try_whole(asked_db, bytes, found);
@@ -255,11 +256,11 @@ class Packer {
         best = std::move(bytes);
         packing = found;
       }
-      if (is_near(found_db) || (tries >= kMostNear && !best.empty())) break;
-      if (tries < kMostNear)
+      if (is_near(found_db) || (tries >= kMaxNearTrials && !best.empty())) break;
+      if (tries < kMaxNearTrials)
         find_next(tries, found_db);
       else
-        asked_db -= std::max(kFiner, found_db - error_db);  // of few vertices the error does not change smoothly
+        asked_db -= std::max(kRefinementDb, found_db - error_db);  // with few vertices the error is not smooth
     }
     if (best.empty())
       throw InputError(fmt::format("an error of {} dB(A) cannot be reached, the least that was found is {:.1f}; use the bank as it is",
@@ -274,16 +275,16 @@ class Packer {
     return calc_steps(bank_, blows_.weight, loudest_, std::pow(10.0, asked_db / 10.0));
   }
 
-  /// The error of the coarser levels and a sample of the finest one.
+  /// Error on the coarser levels and a sample of the finest one.
   double try_sampled(double asked_db) const {
     const std::size_t finest = surface_.level_begin[surface_.level_count() - 1];
     std::vector<bool> is_known(bank_.vertex_count());
-    for (std::size_t v = 0; v < is_known.size(); ++v) is_known[v] = v < finest || v % kSampled == 0;
+    for (std::size_t v = 0; v < is_known.size(); ++v) is_known[v] = v < finest || v % kSubsampling == 0;
     const std::vector<float> step = make_steps(asked_db);
-    const packed::FittedShapes fitted = packed::fit_shapes(surface_, make_rows(bank_, step), bank_.mode_count(), fineness_, kSampled);
-    // Of what is known the finest level is too small a part.
+    const packed::FittedShapes fitted = packed::fit_shapes(surface_, make_rows(bank_, step), bank_.mode_count(), fineness_, kSubsampling);
+    // The sample under-represents the finest level: reweight the areas.
     std::vector<double> area_m2 = blows_.skin.area_m2;
-    for (std::size_t v = finest; v < is_known.size(); ++v) area_m2[v] *= static_cast<double>(kSampled);
+    for (std::size_t v = finest; v < is_known.size(); ++v) area_m2[v] *= static_cast<double>(kSubsampling);
     return calc_error(bank_, blows_, area_m2, make_shape(bank_, fitted.rows, step, is_known), is_known).error_db;
   }
 
@@ -300,7 +301,7 @@ class Packer {
   const Bank& bank_;
   const packed::Surface& surface_;
   Blows blows_;
-  double loudest_ = 0.0;  // of all vertices, walls of cavities as they weigh
+  double loudest_ = 0.0;  // over all vertices, cavity walls weighted
   std::vector<std::uint8_t> fineness_;
 };
 

@@ -87,7 +87,7 @@ Check check_packing(const Bank& bank) {
   const auto is_vertex = [&](std::int32_t v) { return v >= 0 && static_cast<std::size_t>(v) < bank.vertex_count(); };
   if (!std::all_of(packing.witness.begin(), packing.witness.end(), is_vertex) ||
       packing.witness_shape.size() != packing.witness.size() * bank.mode_count() * 3) {
-    check.faults.push_back("the witnesses are no vertices with the shapes of all modes");
+    check.faults.push_back("the witnesses are not vertices with the shapes of all modes");
     return check;
   }
   const Blows blows(bank);
@@ -103,7 +103,7 @@ Check check_packing(const Bank& bank) {
     if (here_db > packing.error_db + kRoundingDb) ++above;
     if (here_db > packing.worst_db + kRoundingDb)
       check.faults.push_back(
-          fmt::format("the error is {:.1f} dB(A) at vertex {}, and {:.1f} is said to be the worst", here_db, v, packing.worst_db));
+          fmt::format("the error is {:.1f} dB(A) at vertex {}, the recorded maximum is {:.1f}", here_db, v, packing.worst_db));
   }
   check.figure += fmt::format("; {:.1f} at the worst of {} witnesses", worst_db, packing.witness.size());
   if (static_cast<double>(above) > kWitnessShare * static_cast<double>(packing.witness.size()))

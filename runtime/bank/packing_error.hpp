@@ -8,7 +8,7 @@
 
 namespace carillon::bank {
 
-inline constexpr double kExactDb = -200.0;   // no error at all
+inline constexpr double kExactDb = -200.0;   // no error
 inline constexpr double kRoundingDb = 0.05;  // between results of two machines
 
 /// Ratio of an error to a signal [dB].

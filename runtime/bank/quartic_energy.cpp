@@ -1,9 +1,8 @@
-// Method:     sums in double precision. A cut keeps the rows and columns of the modes that stay: a sum of squares stays one.
-//             phi goes with s^(-1/2) g^(-3/2) for a density s and a size g, a gradient has one length less, and eta is the root of an
-//             energy: stress sqrt(volume / modulus) . strain, sqrt(k) g^(3/2) for a stiffness k. So gradient goes with s^(-1/2) g^(-5/2),
-//             stress with k^(1/2) g^(3/2), A with k^(1/2) s^-1 g^(-7/2); linear with a frequency, (k / s)^(1/2) / g.
-// Source:     docs/equations.md E12.
-// Deviations: none.
+// Method: sums in double precision. A truncation keeps the rows and columns of the kept modes: a sum of squares remains one.
+//   phi scales with s^(-1/2) g^(-3/2) for density s and size g, a gradient has one length less, and eta is the root of an energy: stress
+//   sqrt(volume / modulus) . strain, sqrt(k) g^(3/2) for stiffness k. So gradient scales with s^(-1/2) g^(-5/2), stress with k^(1/2)
+//   g^(3/2), A with k^(1/2) s^-1 g^(-7/2); linear with a frequency, (k / s)^(1/2) / g.
+// Source: docs/equations.md E12.
 #include "runtime/bank/quartic_energy.hpp"
 
 #include <fmt/format.h>
@@ -16,7 +15,7 @@
 namespace carillon::bank {
 namespace {
 
-/// What one row is at q [J^1/2]: eta and l.
+/// Values of a row at q [J^1/2]: eta and l.
 struct RowValue {
   double eta = 0.0, linear = 0.0;
 };
@@ -53,7 +52,7 @@ double add_rows(const QuarticEnergy& energy, std::span<const double> q, std::spa
   return sum;
 }
 
-/// Pairs of directions whose product a strain is; a diagonal one counts half.
+/// Index pairs of the strain components; diagonal ones count half.
 constexpr std::array<std::array<std::size_t, 2>, 3> kSheetPairs{{{0, 0}, {1, 1}, {0, 1}}};
 constexpr std::array<std::array<std::size_t, 2>, 6> kSolidPairs{{{0, 0}, {1, 1}, {2, 2}, {1, 2}, {0, 2}, {0, 1}}};
 
@@ -170,7 +169,7 @@ std::vector<double> calc_self_coupling(const QuarticEnergy& energy) {
 
 QuarticEnergy select_coupled(const QuarticEnergy& energy, const std::vector<std::size_t>& chosen) {
   const std::size_t n = energy.mode_count(), rows = energy.row_count();
-  std::vector<std::pair<std::int32_t, std::size_t>> kept;  // number in the bank that is made, place among the coupled modes
+  std::vector<std::pair<std::int32_t, std::size_t>> kept;  // index in the new bank, index among the coupled modes
   for (std::size_t to = 0; to < chosen.size(); ++to) {
     const auto at = std::lower_bound(energy.modes.begin(), energy.modes.end(), static_cast<std::int32_t>(chosen[to]));
     if (at != energy.modes.end() && static_cast<std::size_t>(*at) == chosen[to])
@@ -211,7 +210,7 @@ void scale_frequencies(QuarticEnergy& energy, std::span<const double> factor) {
 
 void combine_modes(QuarticEnergy& energy, std::span<const double> parts) {
   const std::size_t n = energy.mode_count();
-  // Each row of `values` has n numbers, and becomes that of the new modes.
+  // Each row of `values` has n numbers; transforms it to the new modes.
   const auto combine = [&](auto& values) {
     std::vector<double> old(n);
     for (std::size_t row = 0; row < values.size() / n; ++row) {

@@ -1,10 +1,10 @@
-// Method: one omnidirectional gain per mode from the volume velocity of the surface, taken triangle by triangle without sign, as of a
-//   pulsating sphere of the same area.
+// Method: one omnidirectional gain per mode from the unsigned volume velocity of the surface triangles, as for a pulsating sphere of the
+// same
+//   area.
 // Source: OSG02 section 3.4 (one gain per mode); Pierce 1981, Acoustics, section 4.1 (pulsating sphere).
-// Deviations: OSG02 sums the signed normal displacement, which is zero for every bending mode of a symmetric body; here its absolute value
-//   times area. The sign is dropped after the integral over a triangle, not inside it: a motion along a curved surface leaks through flat
-//   triangles with both signs, which cancel within each. The factor 1 / sqrt(1 + (k a)^2) bounds the gain at high frequencies, where
-//   OSG02's grows without end.
+// Deviations: OSG02 sums the signed normal displacement, which vanishes for bending modes of symmetric bodies; here absolute values per
+//   triangle are summed. The sign is dropped after the integral over a triangle: tangential motion of a curved surface contributes with
+//   both signs to a flat triangle, which cancel there. The factor 1 / sqrt(1 + (k a)^2) bounds the gain at high frequencies.
 #include "runtime/bank/radiation_gain.hpp"
 
 #include <cmath>
@@ -25,7 +25,7 @@ void set_radiation_gains(Bank& bank, std::span<const double> shapes) {
   double twice_area = 0.0;
   for (const Triangle& triangle : find_outer_triangles(bank.vertices_m, bank.triangles)) {
     const Vec3 normal = calc_normal(bank.vertices_m, triangle);
-    twice_area += std::hypot(normal[0], normal[1], normal[2]);
+    twice_area += calc_length(normal);
     const double* rows[3];
     for (int k = 0; k < 3; ++k) rows[k] = &shapes[static_cast<std::size_t>(triangle[k]) * modes * 3];
     for (std::size_t m = 0; m < modes; ++m) {
@@ -43,7 +43,7 @@ double calc_outer_area_m2(const Bank& bank) {
   double twice = 0.0;
   for (const Triangle& triangle : find_outer_triangles(bank.vertices_m, bank.triangles)) {
     const Vec3 normal = calc_normal(bank.vertices_m, triangle);
-    twice += std::hypot(normal[0], normal[1], normal[2]);
+    twice += calc_length(normal);
   }
   return 0.5 * twice;
 }

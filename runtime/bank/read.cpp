@@ -1,8 +1,8 @@
-// Reading banks from untrusted bytes.
-// Method: the seal says where each array lies; the file is read once from front to back, its arrays straight to where they belong, and
-//   hashed on the way. Only then is the digest compared and the content looked at.
-// Deviations: HDF5 is not asked. libhdf5 1.10.8 was seen to crash (and to hang) on files with one changed byte, so its parser does not
-//   belong between an untrusted file and a running game; the HDF5 structure of a bank is there for other programs.
+// Reader of banks from untrusted bytes.
+// Method: the seal locates the arrays; the file is read once, front to back, arrays directly to their destination, and hashed on the way.
+// The
+//   content is checked after the digest.
+// Deviations: HDF5 is not used: libhdf5 1.10.8 crashed and hung on files with one changed byte. The HDF5 structure serves other programs.
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/stat.h>
@@ -18,20 +18,20 @@
 
 #include "runtime/bank/bank.hpp"
 #include "runtime/bank/layout.hpp"
+#include "runtime/bank/packed/shapes.hpp"
+#include "runtime/bank/packed/surface.hpp"
 #include "runtime/bank/seal.hpp"
 #include "runtime/base/large.hpp"
 #include "runtime/base/sha256.hpp"
-#include "runtime/bank/packed/shapes.hpp"
-#include "runtime/bank/packed/surface.hpp"
 
 namespace carillon::bank {
 namespace {
 
-/// An open regular file.
+/// Open regular file.
 class File {
  public:
   explicit File(const std::filesystem::path& path) : name_(path.string()) {
-    // Non-blocking, so that a FIFO without a writer cannot hang the program.
+    // Non-blocking: a FIFO without a writer must not hang the program.
     descriptor_ = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC | O_NOCTTY);
     if (descriptor_ < 0) {
       const int error = errno;
@@ -53,7 +53,7 @@ class File {
   const std::string& name() const { return name_; }
   std::uint64_t length() const { return length_; }
 
-  /// Fills `bytes` from `offset`. SystemError when the disk fails, InputError when the file ends early.
+  /// Fills `bytes` from `offset`. SystemError on read errors, InputError if the file ends early.
   void read(std::uint64_t offset, std::span<std::byte> bytes) const {
     while (!bytes.empty()) {
       const ssize_t got = ::pread(descriptor_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
@@ -84,7 +84,7 @@ const Extent& get_extent(const Seal& seal, const std::string& field, const std::
   return found->second;
 }
 
-/// Number of rows of an array that has at least one index.
+/// Rows of an array with at least one index.
 std::uint64_t get_rows(const Seal& seal, const std::string& field, const std::string& name) {
   const Extent& extent = get_extent(seal, field, name);
   if (extent.shape.empty())
@@ -97,10 +97,10 @@ std::string describe(const std::string& dtype, const std::vector<std::uint64_t>&
   return shape.empty() ? dtype + " alone" : fmt::format("{} ({})", dtype, fmt::join(shape, ", "));
 }
 
-/// Throws unless the array in the file has the type and the extents that the other arrays ask for.
+/// Throws unless type and shape in the file are as required by the other arrays.
 void check_extent(const Field& wanted, const Extent& extent, const std::string& name) {
   if (extent.dtype != wanted.dtype || extent.shape != wanted.shape) {
-    throw InputError(fmt::format("{}: arrays disagree: {} is {}, and {} is wanted; write the bank again", name, wanted.name,
+    throw InputError(fmt::format("{}: arrays disagree: {} is {}, {} is required; write the bank again", name, wanted.name,
                                  describe(extent.dtype, extent.shape), describe(wanted.dtype, wanted.shape)));
   }
 }
@@ -113,178 +113,185 @@ struct Loaded {
   FileForm form;
 };
 
-/// True when the file has any array of the group.
+/// True if the file has any array of the group.
 bool has_group(const Seal& seal, const std::string& group) {
   const auto first = seal.extents.lower_bound(group + "/");
   return first != seal.extents.end() && first->first.starts_with(group + "/");
 }
 
-/// The same for what came with version 1.1; what is not there stays as Bank's initialisers have it.
-template <class MakeText>
-void allocate_later(const Seal& seal, const std::string& name, Loaded& loaded, const MakeText& make_text) {
-  const auto make_table = [&](const char* field, const char* dtype, std::vector<std::uint64_t> shape, auto& values, std::uint64_t size) {
-    check_extent({field, dtype, std::move(shape), "", "", nullptr}, get_extent(seal, field, name), name);
+/// Sizes the arrays by the seal, which bounds their sum by the length of the file. Checks each extent before it allocates: rows times three
+/// could exceed the file even if a declared shape does not.
+class Allocator {
+ public:
+  Allocator(const Seal& seal, const std::string& name, Loaded& loaded)
+      : seal_(seal), name_(name), bank_(loaded.bank), form_(loaded.form), modes_(get_rows(seal, "modes/eigenvalue", name)) {}
+
+  void run() {
+    for (const auto& [field, values] :
+         {std::pair("modes/eigenvalue", &bank_.eigenvalue_rad2_s2), std::pair("modes/frequency_hz", &form_.freq_hz),
+          std::pair("modes/decay", &bank_.decay_per_s), std::pair("modes/residual", &bank_.residual),
+          std::pair("modes/radiation_gain", &bank_.radiation_gain), std::pair("modes/shape_scale", &bank_.shape_scale)})
+      make_table(field, "<f8", {modes_}, *values, modes_);
+    form_.is_packed = has("mesh/packed");
+    form_.is_packed ? make_packed() : make_surface();
+    make_text("solve/element", form_.element);
+    make_text("solve/mass", form_.mass);
+    make_text("provenance", form_.provenance);
+    make_modes();
+    if (has("material/regions")) make_text("material/regions", form_.regions);
+    if (has_group(seal_, "supports")) make_supports();
+    if (has_group(seal_, "radiation")) make_radiation();
+    if (has_group(seal_, "nonlinear")) make_nonlinear();
+    if (has_group(seal_, "proof")) make_proof();
+  }
+
+ private:
+  bool has(const char* field) const { return seal_.extents.contains(field); }
+  std::uint64_t find_rows(const char* field) const { return get_rows(seal_, field, name_); }
+  void check(const char* field, const char* dtype, std::vector<std::uint64_t> shape) const {
+    check_extent({field, dtype, std::move(shape), "", "", nullptr}, get_extent(seal_, field, name_), name_);
+  }
+  template <class Values>
+  void make_table(const char* field, const char* dtype, std::vector<std::uint64_t> shape, Values& values, std::uint64_t size) const {
+    check(field, dtype, std::move(shape));
     values.resize(size);
-  };
-  const auto make_list = [&](const char* field, const char* dtype, auto& values) {
-    const std::uint64_t rows = get_rows(seal, field, name);
+  }
+  template <class Values>
+  void make_list(const char* field, const char* dtype, Values& values) const {
+    const std::uint64_t rows = find_rows(field);
     make_table(field, dtype, {rows}, values, rows);
-  };
-  Bank& bank = loaded.bank;
-  for (auto [field, cents] : {std::pair("modes/algebraic_error_cents", &bank.algebraic_error_cents),
-                              std::pair("modes/discretisation_error_cents", &bank.discretisation_error_cents),
-                              std::pair("modes/facet_error_cents", &bank.facet_error_cents)}) {
-    if (seal.extents.contains(field)) make_list(field, "<f8", *cents);
   }
-  if (seal.extents.contains("modes/corrected_frequency_hz")) {
-    make_list("modes/corrected_frequency_hz", "<f8", bank.corrected.freq_hz);
-    make_list("modes/corrected_decay", "<f8", bank.corrected.decay_per_s);
-    make_list("modes/corrected_error_cents", "<f8", bank.corrected.error_cents);
-    make_list("modes/correction", "|u1", bank.corrected.correction);
+  void make_text(const char* field, std::string& text) const {
+    const Extent& extent = get_extent(seal_, field, name_);
+    if (!extent.dtype.starts_with("|S"))
+      throw InputError(fmt::format("{}: arrays disagree: {} is not text; write the bank again", name_, field));
+    text.resize(extent.bytes);
   }
-  if (has_group(seal, "damping")) {
-    make_text("damping/law", loaded.form.damping_law);
-    make_list("damping/coefficient", "<f8", bank.damping.coefficient);
-    make_list("damping/power", "<f8", bank.damping.power);
-    make_list("damping/freq_hz", "<f8", bank.damping.freq_hz);
-    make_list("damping/loss_factor", "<f8", bank.damping.loss_factor);
+
+  void make_packed() const {
+    Packing& packing = bank_.packing.emplace();
+    make_list("mesh/packed", "|u1", form_.packed_surface);
+    make_list("modes/packed_shape", "|u1", form_.packed_shape);
+    make_list("pack/witness", "<i4", packing.witness);
+    const std::uint64_t witnesses = packing.witness.size();
+    make_table("pack/witness_shape", "<i2", {witnesses, modes_, 3}, packing.witness_shape, witnesses * modes_ * 3);
+    if (!has("mesh/packed_order")) return;
+    make_list("mesh/packed_order", "|u1", form_.packed_order);
+    if (form_.packed_order.empty()) throw InputError(name_ + ": mesh/packed_order is empty; copy or pack the bank again");
   }
-  if (seal.extents.contains("material/regions")) make_text("material/regions", loaded.form.regions);
-  if (has_group(seal, "supports")) {
-    make_text("supports/text", loaded.form.supports);
-    Supports& supports = bank.supports;
-    const std::uint64_t count = get_rows(seal, "supports/area_m2", name), modes = bank.mode_count();
+  void make_surface() const {
+    const std::uint64_t vertices = find_rows("mesh/vertices"), triangles = find_rows("mesh/triangles");
+    check("mesh/vertices", "<f8", {vertices, 3});
+    check("mesh/triangles", "<i4", {triangles, 3});
+    bank_.shape_bytes = get_extent(seal_, "modes/shape", name_).dtype == "|i1" ? 1 : 2;
+    check("modes/shape", bank_.shape_bytes == 1 ? "|i1" : "<i2", {vertices, modes_, 3});
+    bank_.vertices_m.resize(vertices);
+    bank_.triangles.resize(triangles);
+    if (bank_.shape_bytes == 1)
+      form_.narrow_shape.resize(vertices * modes_ * 3);
+    else
+      base::reserve_large(bank_.shape, vertices * modes_ * 3);  // load() appends
+  }
+  /// Fields per mode and the damping law, since versions 1.1 and 1.4; absent ones keep Bank's initialisers.
+  void make_modes() const {
+    for (auto [field, cents] : {std::pair("modes/algebraic_error_cents", &bank_.algebraic_error_cents),
+                                std::pair("modes/discretisation_error_cents", &bank_.discretisation_error_cents),
+                                std::pair("modes/facet_error_cents", &bank_.facet_error_cents)}) {
+      if (has(field)) make_list(field, "<f8", *cents);
+    }
+    if (has("modes/corrected_frequency_hz")) {
+      make_list("modes/corrected_frequency_hz", "<f8", bank_.corrected.freq_hz);
+      make_list("modes/corrected_decay", "<f8", bank_.corrected.decay_per_s);
+      make_list("modes/corrected_error_cents", "<f8", bank_.corrected.error_cents);
+      make_list("modes/correction", "|u1", bank_.corrected.correction);
+    }
+    if (!has_group(seal_, "damping")) return;
+    make_text("damping/law", form_.damping_law);
+    make_list("damping/coefficient", "<f8", bank_.damping.coefficient);
+    make_list("damping/power", "<f8", bank_.damping.power);
+    make_list("damping/freq_hz", "<f8", bank_.damping.freq_hz);
+    make_list("damping/loss_factor", "<f8", bank_.damping.loss_factor);
+  }
+  void make_supports() const {
+    make_text("supports/text", form_.supports);
+    Supports& supports = bank_.supports;
+    const std::uint64_t count = find_rows("supports/area_m2");
     make_table("supports/centre_m", "<f8", {count, 3}, supports.centre_m, count);
     make_table("supports/normal", "<f8", {count, 3}, supports.normal, count);
     make_table("supports/area_m2", "<f8", {count}, supports.area_m2, count);
     make_table("supports/thickness_m", "<f8", {count}, supports.thickness_m, count);
-    make_table("modes/support_reaction", "<f8", {modes, count, 6}, supports.reaction, modes * count * 6);
-    make_table("modes/support_energy", "<f8", {modes, count}, supports.energy, modes * count);
+    make_table("modes/support_reaction", "<f8", {modes_, count, 6}, supports.reaction, modes_ * count * 6);
+    make_table("modes/support_energy", "<f8", {modes_, count}, supports.energy, modes_ * count);
   }
-  if (has_group(seal, "radiation")) {
-    Multipoles& air = bank.multipoles;
-    const std::uint64_t modes = bank.mode_count(), coefficients = get_rows(seal, "radiation/coefficient", name);
-    make_table("radiation/freq_hz", "<f8", {modes}, air.freq_hz, modes);
-    make_table("radiation/order", "<i4", {modes}, air.order, modes);
-    make_table("radiation/scale", "<f8", {modes}, air.scale, modes);
-    make_table("radiation/decay", "<f8", {modes}, air.decay_per_s, modes);
-    make_table("radiation/added_mass", "<f8", {modes}, air.added_mass, modes);
-    make_table("radiation/error_db", "<f8", {modes}, air.error_db, modes);
+  void make_radiation() const {
+    Multipoles& air = bank_.multipoles;
+    const std::uint64_t coefficients = find_rows("radiation/coefficient");
+    make_table("radiation/freq_hz", "<f8", {modes_}, air.freq_hz, modes_);
+    make_table("radiation/order", "<i4", {modes_}, air.order, modes_);
+    make_table("radiation/scale", "<f8", {modes_}, air.scale, modes_);
+    make_table("radiation/decay", "<f8", {modes_}, air.decay_per_s, modes_);
+    make_table("radiation/added_mass", "<f8", {modes_}, air.added_mass, modes_);
+    make_table("radiation/error_db", "<f8", {modes_}, air.error_db, modes_);
     make_table("radiation/coefficient", "<i2", {coefficients, 2}, air.coefficient, 2 * coefficients);
-    if (seal.extents.contains("radiation/mixing_count")) {
-      const std::uint64_t parts = get_rows(seal, "radiation/mixing_motion", name);
-      make_table("radiation/mixing_count", "<i4", {modes}, air.mixing.count, modes);
+    if (has("radiation/mixing_count")) {
+      const std::uint64_t parts = find_rows("radiation/mixing_motion");
+      make_table("radiation/mixing_count", "<i4", {modes_}, air.mixing.count, modes_);
       make_table("radiation/mixing_motion", "<i4", {parts}, air.mixing.motion, parts);
       make_table("radiation/mixing_part", "<f8", {parts}, air.mixing.part, parts);
     }
-    make_text("radiation/method", loaded.form.radiation_method);
+    make_text("radiation/method", form_.radiation_method);
   }
-  if (has_group(seal, "nonlinear")) {
-    QuarticEnergy& energy = bank.quartic;
+  void make_nonlinear() const {
+    QuarticEnergy& energy = bank_.quartic;
     make_list("nonlinear/modes", "<i4", energy.modes);
-    make_text("nonlinear/form", loaded.form.nonlinear_form);
+    make_text("nonlinear/form", form_.nonlinear_form);
     const std::uint64_t modes = energy.modes.size();
     std::uint64_t rows = 0;
-    if (seal.extents.contains("nonlinear/A")) {
-      rows = get_rows(seal, "nonlinear/A", name);
+    if (has("nonlinear/A")) {
+      rows = find_rows("nonlinear/A");
       make_table("nonlinear/A", "<f4", {rows, count_pairs(modes)}, energy.rows, rows * count_pairs(modes));
     } else {
-      const Extent& gradient = get_extent(seal, "nonlinear/G", name);
-      const std::uint64_t points = get_rows(seal, "nonlinear/weight", name);
+      const Extent& gradient = get_extent(seal_, "nonlinear/G", name_);
+      const std::uint64_t points = find_rows("nonlinear/weight");
       const std::uint64_t parts = gradient.shape.size() == 3 && gradient.shape[1] == 6 ? 6 : 9, strains = parts == 6 ? 3 : 6;
-      rows = get_rows(seal, "nonlinear/stress", name);
+      rows = find_rows("nonlinear/stress");
       make_table("nonlinear/G", "<f4", {points, parts, modes}, energy.gradient, points * parts * modes);
       make_table("nonlinear/stress", "<f4", {rows, points, strains}, energy.stress, rows * points * strains);
       make_table("nonlinear/weight", "<f8", {points}, energy.weight, points);
     }
-    if (seal.extents.contains("nonlinear/linear")) make_table("nonlinear/linear", "<f8", {rows, modes}, energy.linear, rows * modes);
-    // list_fields() divides by these: a shape of zero extent has no bytes that would bound the others.
+    if (has("nonlinear/linear")) make_table("nonlinear/linear", "<f8", {rows, modes}, energy.linear, rows * modes);
+    // list_fields() divides by these: an empty shape has no bytes that would bound the others.
     if (const std::string fault = find_size_fault(energy); energy.is_empty() || !fault.empty())
-      throw InputError(fmt::format("{}: {}; write the bank again", name, fault.empty() ? "nonlinear/modes names no mode" : fault));
+      throw InputError(fmt::format("{}: {}; write the bank again", name_, fault.empty() ? "nonlinear/modes names no mode" : fault));
   }
-  if (!has_group(seal, "proof")) return;
-  Proof& proof = bank.proof.emplace();
-  make_list("proof/cut_hz", "<f8", proof.cut_hz);
-  make_list("proof/below", "<i8", proof.below);
-  make_list("proof/margin", "<f8", proof.margin);
-  make_list("proof/rigid_per_component", "<i8", proof.rigid_per_component);
-  make_list("proof/cluster_first", "<i8", proof.cluster_first);
-  make_list("proof/cluster_count", "<i8", proof.cluster_count);
-  make_text("proof/method", loaded.form.proof_method);
-  loaded.form.has_complete_below = seal.extents.contains("proof/complete_below_hz");
-}
+  void make_proof() const {
+    Proof& proof = bank_.proof.emplace();
+    make_list("proof/cut_hz", "<f8", proof.cut_hz);
+    make_list("proof/below", "<i8", proof.below);
+    make_list("proof/margin", "<f8", proof.margin);
+    make_list("proof/rigid_per_component", "<i8", proof.rigid_per_component);
+    make_list("proof/cluster_first", "<i8", proof.cluster_first);
+    make_list("proof/cluster_count", "<i8", proof.cluster_count);
+    make_text("proof/method", form_.proof_method);
+    form_.has_complete_below = has("proof/complete_below_hz");
+  }
 
-/// Gives the arrays the sizes that the seal states. The seal bounds their sum by the length of the file.
-void allocate(const Seal& seal, const std::string& name, Loaded& loaded) {
-  Bank& bank = loaded.bank;
-  const std::uint64_t modes = get_rows(seal, "modes/eigenvalue", name);
-  // Every extent is compared before memory is taken: rows times three could exceed the file where a declared shape did not.
-  FileForm& form = loaded.form;
-  const auto check = [&](const char* field, const char* dtype, std::vector<std::uint64_t> shape) {
-    check_extent({field, dtype, std::move(shape), "", "", nullptr}, get_extent(seal, field, name), name);
-  };
-  for (const char* field :
-       {"modes/eigenvalue", "modes/frequency_hz", "modes/decay", "modes/residual", "modes/radiation_gain", "modes/shape_scale"}) {
-    check(field, "<f8", {modes});
-  }
-  form.is_packed = seal.extents.contains("mesh/packed");
-  if (form.is_packed) {
-    const std::uint64_t surface = get_rows(seal, "mesh/packed", name), shape = get_rows(seal, "modes/packed_shape", name);
-    const std::uint64_t witnesses = get_rows(seal, "pack/witness", name);
-    check("mesh/packed", "|u1", {surface});
-    check("modes/packed_shape", "|u1", {shape});
-    check("pack/witness", "<i4", {witnesses});
-    check("pack/witness_shape", "<i2", {witnesses, modes, 3});
-    form.packed_surface.resize(surface);
-    form.packed_shape.resize(shape);
-    if (seal.extents.contains("mesh/packed_order")) {
-      const std::uint64_t order = get_rows(seal, "mesh/packed_order", name);
-      check("mesh/packed_order", "|u1", {order});
-      if (order == 0) throw InputError(name + ": mesh/packed_order is empty; copy or pack the bank again");
-      form.packed_order.resize(order);
-    }
-    bank.packing.emplace();
-    bank.packing->witness.resize(witnesses);
-    bank.packing->witness_shape.resize(witnesses * modes * 3);
-  } else {
-    const std::uint64_t vertices = get_rows(seal, "mesh/vertices", name);
-    const std::uint64_t triangles = get_rows(seal, "mesh/triangles", name);
-    check("mesh/vertices", "<f8", {vertices, 3});
-    check("mesh/triangles", "<i4", {triangles, 3});
-    bank.shape_bytes = get_extent(seal, "modes/shape", name).dtype == "|i1" ? 1 : 2;
-    check("modes/shape", bank.shape_bytes == 1 ? "|i1" : "<i2", {vertices, modes, 3});
-    bank.vertices_m.resize(vertices);
-    bank.triangles.resize(triangles);
-    if (bank.shape_bytes == 1)
-      form.narrow_shape.resize(vertices * modes * 3);
-    else
-      base::reserve_large(bank.shape, vertices * modes * 3);  // load() appends
-  }
-  for (auto* array :
-       {&bank.eigenvalue_rad2_s2, &bank.decay_per_s, &bank.residual, &bank.radiation_gain, &bank.shape_scale, &form.freq_hz}) {
-    array->resize(modes);
-  }
-  const auto make_text = [&](const std::string& field, std::string& text) {
-    const Extent& extent = get_extent(seal, field, name);
-    if (!extent.dtype.starts_with("|S"))
-      throw InputError(fmt::format("{}: arrays disagree: {} is not text; write the bank again", name, field));
-    text.resize(extent.bytes);
-  };
-  make_text("solve/element", form.element);
-  make_text("solve/mass", form.mass);
-  make_text("provenance", form.provenance);
-  allocate_later(seal, name, loaded, make_text);
-}
+  const Seal& seal_;
+  const std::string& name_;
+  Bank& bank_;
+  FileForm& form_;
+  std::uint64_t modes_;
+};
 
 std::string trim(std::string_view text) {
   const std::size_t last = text.find_last_not_of('\0');
   return std::string(text.substr(0, last == std::string_view::npos ? 0 : last + 1));
 }
 
-/// Reads the file from front to back, every array to where it belongs, and compares the digest.
+/// Reads the file from front to back into the arrays and compares the digest.
 Loaded load(const Seal& seal, const std::string& name, const Source& read) {
   Loaded loaded;
-  allocate(seal, name, loaded);
+  Allocator(seal, name, loaded).run();
   struct Target {
     std::uint64_t offset, bytes;
     std::byte* data;
@@ -293,13 +300,13 @@ Loaded load(const Seal& seal, const std::string& name, const Source& read) {
   for (const Field& field : list_fields(loaded.bank, loaded.form)) {
     const Extent& extent = get_extent(seal, field.name, name);
     check_extent(field, extent, name);
-    // The table points to const for the writer's sake; what it points to is `loaded`, which is ours to fill.
+    // The table points to const for the writer's sake; the memory belongs to `loaded`.
     if (extent.bytes > 0) targets.push_back({extent.offset, extent.bytes, static_cast<std::byte*>(const_cast<void*>(field.data))});
   }
   std::sort(targets.begin(), targets.end(), [](const Target& a, const Target& b) { return a.offset < b.offset; });
   targets.push_back({seal.length, 0, nullptr});
 
-  constexpr std::uint64_t kPiece = 1 << 18;  // is still in the cache when it is hashed
+  constexpr std::uint64_t kPiece = 1 << 18;  // still cached when hashed
   base::Sha256 digest;
   std::vector<std::byte> buffer(std::min(seal.length, kPiece));
   std::uint64_t place = 0;
@@ -315,7 +322,7 @@ Loaded load(const Seal& seal, const std::string& name, const Source& read) {
     }
   };
   take(nullptr, kTextBytes);
-  place = kSealBytes;  // the digest is not part of itself
+  place = kSealBytes;  // the digest does not cover itself
   for (const Target& target : targets) {
     if (target.offset < place) throw InputError(name + ": damaged seal: two arrays overlap; copy or write the bank again");
     take(nullptr, target.offset - place);
@@ -330,7 +337,7 @@ Loaded load(const Seal& seal, const std::string& name, const Source& read) {
   return loaded;
 }
 
-/// Makes mesh and shapes of what is packed.
+/// Decodes packed mesh and shapes.
 void unpack(Bank& bank, const FileForm& form, const std::string& name) {
   packed::Surface surface = packed::read_surface(std::as_bytes(std::span(form.packed_surface)), name);
   for (const double scale : bank.shape_scale)
@@ -347,7 +354,7 @@ void unpack(Bank& bank, const FileForm& form, const std::string& name) {
                                    bank.vertex_count()));
 }
 
-/// Turns the file's form of things into the bank's.
+/// Converts the file's form to the bank's.
 Bank finish(Loaded&& loaded, const std::string& name) {
   Bank& bank = loaded.bank;
   const FileForm& form = loaded.form;
@@ -364,7 +371,7 @@ Bank finish(Loaded&& loaded, const std::string& name) {
   bank.supports.text = trim(form.supports);
   if (bank.proof) bank.proof->method = trim(form.proof_method);
   if (bank.multipoles.is_empty())
-    bank.multipoles = {};  // of a bank without modes
+    bank.multipoles = {};  // bank without modes
   else
     bank.multipoles.method = trim(form.radiation_method);
   if (const std::string form_name = trim(form.nonlinear_form);
@@ -374,7 +381,7 @@ Bank finish(Loaded&& loaded, const std::string& name) {
   for (std::size_t i = 0; i < bank.mode_count(); ++i) {
     const double freq_hz = std::sqrt(bank.eigenvalue_rad2_s2[i]) / (2.0 * std::numbers::pi);
     const bool agrees = std::abs(form.freq_hz[i] - freq_hz) <= 1e-9 * std::abs(freq_hz);
-    // An eigenvalue that has no frequency is a fault of its own, reported in better words by calc_checks().
+    // An eigenvalue without a frequency is reported by calc_checks().
     if (!agrees && std::isfinite(freq_hz)) {
       throw InputError(fmt::format("{}: modes/frequency_hz[{}] is {} Hz, and its eigenvalue says {} Hz; write the bank again", name, i,
                                    form.freq_hz[i], freq_hz));
@@ -387,7 +394,7 @@ void require_sane(const Bank& bank, const std::string& name) {
   const auto faults = find_faults(bank);
   if (faults.empty()) return;
   const std::string more = faults.size() > 1 ? fmt::format(" (and {} more: carillon-bank check lists them)", faults.size() - 1) : "";
-  throw InputError(fmt::format("{}: not a sane bank: {}{}; compute the bank again", name, faults[0], more));
+  throw InputError(fmt::format("{}: not a valid bank: {}{}; compute the bank again", name, faults[0], more));
 }
 
 }  // namespace
@@ -422,17 +429,17 @@ Bank assemble_bank(const std::vector<FieldBytes>& arrays, const std::string& nam
     std::uint64_t size = find_item_bytes(field.dtype);
     bool is_whole = size > 0;
     for (const std::uint64_t n : field.shape) {
-      is_whole = is_whole && n <= seal.length && (n == 0 || size <= seal.length / n);  // as in a seal: nothing is larger than all of it
+      is_whole = is_whole && n <= seal.length && (n == 0 || size <= seal.length / n);  // as in a seal: no array exceeds the total
       size = is_whole ? size * n : 0;
     }
     if (!is_whole || size != bytes.size())
-      throw InputError(fmt::format("{}: {} is said to be {}, and has {} bytes; write it again", name, field.name,
+      throw InputError(fmt::format("{}: {} is declared as {}, and has {} bytes; write it again", name, field.name,
                                    describe(field.dtype, field.shape), bytes.size()));
     if (!found.emplace(field.name, bytes).second) throw InputError(fmt::format("{}: {} is there twice; write it again", name, field.name));
     seal.extents.emplace(field.name, extent);
   }
   Loaded loaded;
-  allocate(seal, name, loaded);
+  Allocator(seal, name, loaded).run();
   for (const Field& wanted : list_fields(loaded.bank, loaded.form)) {
     const Extent& extent = get_extent(seal, wanted.name, name);
     check_extent(wanted, extent, name);
@@ -442,7 +449,7 @@ Bank assemble_bank(const std::vector<FieldBytes>& arrays, const std::string& nam
       loaded.bank.shape.resize(extent.bytes / sizeof(std::int16_t));
       std::memcpy(loaded.bank.shape.data(), from, extent.bytes);
     } else {
-      // As in load(): what the table points to is ours to fill.
+      // As in load(): the memory belongs to this function.
       std::memcpy(const_cast<void*>(wanted.data), from, extent.bytes);
     }
   }
@@ -459,7 +466,7 @@ std::array<int, 2> read_version(const std::filesystem::path& path) {
 std::vector<Vec3> read_shape_row(const std::filesystem::path& path, std::size_t vertex) {
   const File file(path);
   const Seal seal = file.read_seal();
-  if (seal.extents.contains("mesh/packed")) {  // no row stands alone
+  if (seal.extents.contains("mesh/packed")) {  // rows cannot be decoded separately
     const Bank bank = read_bank(path);
     if (vertex >= bank.vertex_count())
       throw InputError(fmt::format("{}: no vertex {}; the bank has {}, numbered from 0", file.name(), vertex, bank.vertex_count()));

@@ -1,9 +1,8 @@
-// Method:     a mode that a blow leaves with the pressure p at 1 m and the decay d has the exposure p^2 / (2 (2 d + 1 / T)) within the
-//             ear's time T. Modes are ranked by it, their squared shapes averaged over the surface; equal ones keep the order of their
-//             frequencies. The blow's spectrum is that of the Gaussian of a Hertz pulse's variance, which has no zeros that would favour
-//             one mode of two.
-// Source:     A-weighting: IEC 61672-1:2013, E.4.2; T: Zwislocki 1969.
-// Deviations: modes do not mask each other; the gains are the bank's own, which leave out cancellation (docs/decisions/radiation-gain.md).
+// Method: a mode with pressure p at 1 m after a blow and decay d has the exposure p^2 / (2 (2 d + 1 / T)) within the ear's time constant T.
+//   Modes are ranked by it, squared shapes averaged over the surface; ties keep the frequency order. The blow's spectrum is a Gaussian with
+//   the variance of a Hertz pulse, without zeros that would favour one mode over another.
+// Source: A-weighting: IEC 61672-1:2013, E.4.2; T: Zwislocki 1969.
+// Deviations: no masking between modes; the bank's gains neglect cancellation (docs/decisions/radiation-gain.md).
 #include "runtime/bank/reduce.hpp"
 
 #include <fmt/format.h>
@@ -19,8 +18,8 @@
 namespace carillon::bank {
 namespace {
 
-constexpr double kBlowS = 1e-4;  // a hard contact of bodies that one holds in a hand
-/// The trigamma function at 7/4: the Fourier transform of sin^1.5 falls as exp(-kCurvature (f tau)^2) at first.
+constexpr double kBlowS = 1e-4;  // hard contact of hand-held bodies
+/// Trigamma function at 7/4: the Fourier transform of sin^1.5 falls initially as exp(-kCurvature (f tau)^2).
 constexpr double kCurvature = 0.76410187;
 
 /// Mean over the outer surface of (phi . n)^2 of every mode, (m) [1/kg].
@@ -29,7 +28,7 @@ std::vector<double> calc_mean_squares(const Bank& bank) {
   double area = 0.0;
   for (const Triangle& triangle : find_outer_triangles(bank.vertices_m, bank.triangles)) {
     const Vec3 normal = calc_normal(bank.vertices_m, triangle);
-    const double size = std::hypot(normal[0], normal[1], normal[2]);
+    const double size = calc_length(normal);
     if (!(size > 0.0)) continue;
     area += size;
     for (const std::int32_t vertex : triangle) {
@@ -44,7 +43,7 @@ std::vector<double> calc_mean_squares(const Bank& bank) {
   return sums;
 }
 
-/// Leaves the bank its `count` most audible modes, ascending.
+/// Keeps the `count` most audible modes, in ascending order.
 void keep_loudest(Bank& bank, std::size_t count) {
   std::vector<double> silence = calc_audibility(bank);
   for (double& audibility : silence) audibility = -audibility;

@@ -1,38 +1,23 @@
 #include "runtime/bank/report.hpp"
 
 #include <fmt/format.h>
-#include <json/json.h>
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <optional>
-#include <sstream>
+#include <utility>
 
 #include "runtime/bank/kinds.hpp"
 #include "runtime/bank/pack.hpp"
 #include "runtime/bank/select.hpp"
+#include "runtime/base/json.hpp"
 #include "runtime/base/printable.hpp"
 
 namespace carillon::bank {
 namespace {
 
-/// A text of the bank as JSON; nothing when it is none (it is free text as far as a reader of banks is concerned).
-std::optional<Json::Value> parse_json(const std::string& text) {
-  Json::CharReaderBuilder builder;
-  builder["stackLimit"] = 64;
-  std::istringstream stream(text);
-  Json::Value value;
-  std::string errors;
-  try {
-    if (!Json::parseFromStream(builder, stream, &value, &errors)) return std::nullopt;
-  } catch (const Json::Exception&) {  // jsoncpp throws where it is nested too deep
-    return std::nullopt;
-  }
-  return value;
-}
-
-/// "under", "critical" or "over": d against omega. Critical is what equals d = omega to rounding.
+/// "under", "critical" or "over"; critical: d = omega to rounding.
 const char* find_regime(double decay, double omega) {
   if (std::abs(decay - omega) <= 1e-9 * omega) return "critical";
   return decay < omega ? "under" : "over";
@@ -43,47 +28,52 @@ std::string format_bytes(std::uintmax_t bytes) {
                            : fmt::format("{:.2f} MB", static_cast<double>(bytes) / 1e6);
 }
 
-std::string format_scalar(const std::string& key, const Json::Value& value) {
-  if (value.isUInt64() && key.find("bytes") != std::string::npos) return format_bytes(value.asUInt64());
-  if (value.isDouble()) return fmt::format("{:.6g}", value.asDouble());
-  if (value.isString()) return base::printable(value.asString());
-  std::string text = value.toStyledString();
+std::string format_scalar(const std::string& key, const base::Json& value) {
+  if (value.is_number()) {
+    const double x = value.as_double();
+    const bool is_bytes = x >= 0.0 && x < 1e18 && x == std::floor(x) && key.find("bytes") != std::string::npos;
+    return is_bytes ? format_bytes(static_cast<std::uintmax_t>(x)) : fmt::format("{:.6g}", x);
+  }
+  if (value.is_string()) return base::printable(value.as_string());
+  std::string text = value.sorted_text({.indentation = "\t", .breaks_arrays = true});
   text.erase(std::remove(text.begin(), text.end(), '\n'), text.end());
   return text.size() > 100 ? fmt::format("{}...", std::string_view(text).substr(0, 97)) : text;
 }
 
-bool is_nested(const Json::Value& value) { return value.isObject() || value.isArray(); }
+bool is_nested(const base::Json& value) { return value.is_object() || value.is_array(); }
 
-bool is_flat(const Json::Value& value) { return std::none_of(value.begin(), value.end(), is_nested); }
+bool is_flat(const base::Json& value) { return std::none_of(value.begin(), value.end(), is_nested); }
 
-/// One line per scalar and per short flat object ("solve: peak_bytes 900 MB, seconds 12.25"); what is nested is indented. The members of a
-/// list go by their "name" where they have one.
-void append_tree(const Json::Value& tree, std::size_t depth, std::string& text) {
+/// Scalars and short flat objects on one line ("solve: peak_bytes 900 MB, seconds 12.25"), nested ones indented. Array elements are
+/// labelled by their "name", if any.
+void append_tree(const base::Json& tree, std::size_t depth, std::string& text) {
+  constexpr std::size_t kMaxDepth = 6;
+  if (depth >= kMaxDepth) return;
   const std::string indent(2 * depth, ' ');
-  std::size_t index = 0;
-  for (auto it = tree.begin(); it != tree.end() && depth < 6; ++it, ++index) {
-    Json::Value value = *it;
-    std::string key = tree.isObject() ? it.name() : std::to_string(index);
-    if (tree.isArray() && value.isObject() && value["name"].isString()) {
-      key = value["name"].asString();
-      value.removeMember("name");
+  const std::vector<std::string> keys = tree.keys();
+  for (std::size_t i = 0; i < tree.size(); ++i) {
+    base::Json value = tree.is_object() ? tree[keys[i]] : tree[i];
+    std::string key = tree.is_object() ? keys[i] : std::to_string(i);
+    if (tree.is_array() && std::as_const(value)["name"].is_string()) {
+      key = value["name"].as_string();
+      value.erase("name");
     }
-    if (!is_nested(value) || (value.isArray() && is_flat(value))) {
-      text += fmt::format("{}{}: {}\n", indent, base::printable(key), format_scalar(key, value));
-    } else if (value.isObject() && is_flat(value) && value.size() <= 4) {
+    text += fmt::format("{}{}:", indent, base::printable(key));
+    if (!is_nested(value) || (value.is_array() && is_flat(value))) {
+      text += fmt::format(" {}\n", format_scalar(key, value));
+    } else if (value.is_object() && is_flat(value) && value.size() <= 4) {
       std::string line;
-      for (auto member = value.begin(); member != value.end(); ++member) {
-        line += fmt::format("{}{} {}", line.empty() ? "" : ", ", base::printable(member.name()), format_scalar(member.name(), *member));
-      }
-      text += fmt::format("{}{}: {}\n", indent, base::printable(key), line);
+      for (const std::string& name : value.keys())
+        line += fmt::format("{}{} {}", line.empty() ? "" : ", ", base::printable(name), format_scalar(name, value[name]));
+      text += fmt::format(" {}\n", line);
     } else {
-      text += fmt::format("{}{}:\n", indent, base::printable(key));
+      text += '\n';
       append_tree(value, depth + 1, text);
     }
   }
 }
 
-/// "0.012", or "-" where the bank does not say.
+/// "0.012", or "-" if unknown.
 std::string format_cents(const std::vector<double>& cents, std::size_t mode) {
   return mode < cents.size() && std::isfinite(cents[mode]) ? fmt::format("{:.2g}", cents[mode]) : "-";
 }
@@ -144,14 +134,14 @@ std::string format_damping(const Bank& bank) {
   return text + ", weighed by each material's part of the energies";
 }
 
-/// What info says of the multipoles of a bank that has some.
+/// Summary of a bank's multipoles.
 struct RadiationFacts {
   std::int32_t lowest = 0, highest = 0;  // order
-  std::size_t bytes = 0;                 // of orders, scales and coefficients
+  std::size_t bytes = 0;                 // orders, scales and coefficients
   double worst_db = 0.0;                 // stated error
-  std::size_t strong = 0;                // modes of whose damping radiation is more than half
-  double cents = 0.0;                    // by which the mass of the air lowers a mode, the largest of either sign
-  std::int32_t parts = 0;                // of the mode in air that has most, where the air couples modes
+  std::size_t strong = 0;                // modes with more than half of their damping by radiation
+  double cents = 0.0;                    // largest shift by the mass of the air, either sign
+  std::int32_t parts = 0;                // largest number of parts of a coupled mode
 };
 
 RadiationFacts find_radiation_facts(const Bank& bank) {
@@ -200,21 +190,21 @@ std::string format_nonlinear(const QuarticEnergy& energy) {
 }
 
 template <class Range>
-Json::Value make_list(const Range& values) {
-  Json::Value list(Json::arrayValue);
+base::Json make_list(const Range& values) {
+  base::Json list = base::Json::array();
   for (const double value : values) list.append(value);
   return list;
 }
 
-Json::Value make_mode(const Bank& bank, const HeardMode& heard, std::size_t i, const ModeKind& kind) {
+base::Json make_mode(const Bank& bank, const HeardMode& heard, std::size_t i, const ModeKind& kind) {
   const double omega = 2.0 * std::numbers::pi * heard.freq_hz, decay = heard.calc_decay_per_s();
-  Json::Value mode;
+  base::Json mode;
   mode["frequency_hz"] = bank.freq_hz(i);
   mode["eigenvalue_rad2_s2"] = bank.eigenvalue_rad2_s2[i];
   mode["decay_per_s"] = bank.decay_per_s[i];
   // JSON has no infinity: an undamped mode has no T60.
-  mode["t60_s"] = std::isfinite(calc_t60_s(decay)) ? Json::Value(calc_t60_s(decay)) : Json::Value();
-  Json::Value& parts = mode["heard"];
+  mode["t60_s"] = std::isfinite(calc_t60_s(decay)) ? base::Json(calc_t60_s(decay)) : base::Json();
+  base::Json& parts = mode["heard"];
   parts["frequency_hz"] = heard.freq_hz;
   parts["decay_per_s"] = decay;
   parts["material_per_s"] = heard.material_per_s;
@@ -224,11 +214,11 @@ Json::Value make_mode(const Bank& bank, const HeardMode& heard, std::size_t i, c
   mode["regime"] = find_regime(decay, omega);
   mode["residual"] = bank.residual[i];
   const auto get_cents = [&](const std::vector<double>& cents) {
-    return i < cents.size() && std::isfinite(cents[i]) ? Json::Value(cents[i]) : Json::Value();
+    return i < cents.size() && std::isfinite(cents[i]) ? base::Json(cents[i]) : base::Json();
   };
   mode["algebraic_error_cents"] = get_cents(bank.algebraic_error_cents);
   mode["discretisation_error_cents"] = get_cents(bank.discretisation_error_cents);
-  mode["facet_error_cents"] = bank.facet_error_cents.empty() ? Json::Value(0.0) : get_cents(bank.facet_error_cents);
+  mode["facet_error_cents"] = bank.facet_error_cents.empty() ? base::Json(0.0) : get_cents(bank.facet_error_cents);
   if (const Corrected& corrected = bank.corrected; !corrected.is_empty()) {
     mode["corrected_frequency_hz"] = corrected.freq_hz[i];
     mode["corrected_decay_per_s"] = corrected.decay_per_s[i];
@@ -237,7 +227,7 @@ Json::Value make_mode(const Bank& bank, const HeardMode& heard, std::size_t i, c
   }
   mode["radiation_gain"] = bank.radiation_gain[i];
   if (const Multipoles& air = bank.multipoles; !air.is_empty()) {
-    Json::Value& radiation = mode["radiation"];
+    base::Json& radiation = mode["radiation"];
     radiation["frequency_hz"] = air.freq_hz[i];
     radiation["order"] = air.order[i];
     radiation["decay_per_s"] = air.decay_per_s[i];
@@ -250,9 +240,9 @@ Json::Value make_mode(const Bank& bank, const HeardMode& heard, std::size_t i, c
   return mode;
 }
 
-Json::Value make_damping(const Bank& bank) {
+base::Json make_damping(const Bank& bank) {
   const Damping& law = bank.damping;
-  Json::Value damping;
+  base::Json damping;
   damping["law"] = law.law;
   if (law.law == "rayleigh") {
     damping["rayleigh"]["alpha1_s"] = bank.material.alpha1_s;
@@ -267,25 +257,57 @@ Json::Value make_damping(const Bank& bank) {
   return damping;
 }
 
-Json::Value make_counts(const std::vector<std::int64_t>& counts) {
-  Json::Value list(Json::arrayValue);
-  for (const std::int64_t count : counts) list.append(Json::Int64(count));
+base::Json make_counts(const std::vector<std::int64_t>& counts) {
+  base::Json list = base::Json::array();
+  for (const std::int64_t count : counts) list.append(count);
   return list;
 }
 
-Json::Value make_proof(const Proof& proof) {
-  Json::Value value;
+base::Json make_proof(const Proof& proof) {
+  base::Json value;
   value["cut_hz"] = make_list(proof.cut_hz);
   value["below"] = make_counts(proof.below);
   value["margin"] = make_list(proof.margin);
   value["rigid_per_component"] = make_counts(proof.rigid_per_component);
-  value["found"] = Json::Int64(proof.found);
+  value["found"] = proof.found;
   value["orthonormality"] = proof.orthonormality;
   value["backward_error"] = proof.backward_error;
   value["cluster_first"] = make_counts(proof.cluster_first);
   value["cluster_count"] = make_counts(proof.cluster_count);
   value["method"] = proof.method;
   return value;
+}
+
+base::Json make_radiation(const Bank& bank) {
+  const Multipoles& air = bank.multipoles;
+  const RadiationFacts facts = find_radiation_facts(bank);
+  base::Json radiation;
+  radiation["method"] = air.method;
+  radiation["centre_m"] = make_list(air.centre_m);
+  radiation["radius_m"] = air.radius_m;
+  radiation["nearest_m"] = air.nearest_m;
+  radiation["air_density_kg_m3"] = air.air_density_kg_m3;
+  radiation["sound_speed_ms"] = air.sound_speed_ms;
+  radiation["bytes"] = facts.bytes;
+  radiation["worst_error_db"] = facts.worst_db;
+  radiation["modes_mostly_damped_by_it"] = facts.strong;
+  radiation["largest_added_mass_cents"] = facts.cents;
+  radiation["most_coupled_modes"] = facts.parts;
+  return radiation;
+}
+
+base::Json make_nonlinear(const QuarticEnergy& energy) {
+  base::Json nonlinear;
+  nonlinear["form"] = get_form(energy);
+  nonlinear["coupled_modes"] = energy.mode_count();
+  nonlinear["rows"] = energy.row_count();
+  nonlinear["points"] = energy.point_count();
+  nonlinear["is_curved"] = !energy.linear.empty();
+  nonlinear["bytes"] = count_bytes(energy);
+  nonlinear["energy_error"] = energy.error;
+  nonlinear["membrane_ratio"] = energy.membrane_ratio;
+  nonlinear["thickness_m"] = energy.thickness_m;
+  return nonlinear;
 }
 
 }  // namespace
@@ -324,9 +346,9 @@ std::string format_info(const Bank& bank, std::span<const HeardMode> heard, cons
   text += fmt::format("inertia   xx {:.5g}, yy {:.5g}, zz {:.5g}, xy {:.3g}, xz {:.3g}, yz {:.3g} kg m^2\n", inertia[0], inertia[4],
                       inertia[8], inertia[1], inertia[2], inertia[5]);
   if (mode_limit > 0 && bank.mode_count() > 0) text += format_modes(bank, heard, mode_limit);
-  const std::optional<Json::Value> provenance = parse_json(bank.provenance);
-  // The record of the run; the job around it is left to --json.
-  const bool is_recorded = provenance && provenance->isObject() && provenance->isMember("run") && (*provenance)["run"].isObject();
+  const std::optional<base::Json> provenance = base::Json::parse(bank.provenance);
+  // Record of the run; the whole job is printed by --json only.
+  const bool is_recorded = provenance && provenance->is_object() && provenance->has("run") && (*provenance)["run"].is_object();
   if (is_recorded && !has_record) text += "the record of its run: --all; the whole job too: --json\n";
   if (is_recorded && has_record) {
     text += "\nprovenance (the whole job: --json)\n";
@@ -337,13 +359,13 @@ std::string format_info(const Bank& bank, std::span<const HeardMode> heard, cons
 
 std::string format_info_json(const Bank& bank, std::span<const HeardMode> heard, const std::filesystem::path& file) {
   const auto [major, minor] = read_version(file);
-  Json::Value root;
+  base::Json root;
   root["file"] = file.string();
   root["format_version"] = fmt::format("{}.{}", major, minor);
-  root["bytes"] = Json::UInt64(std::filesystem::file_size(file));
-  root["mode_count"] = Json::UInt64(bank.mode_count());
-  root["vertex_count"] = Json::UInt64(bank.vertex_count());
-  root["triangle_count"] = Json::UInt64(bank.triangles.size());
+  root["bytes"] = std::filesystem::file_size(file);
+  root["mode_count"] = bank.mode_count();
+  root["vertex_count"] = bank.vertex_count();
+  root["triangle_count"] = bank.triangles.size();
   root["band_hz"] = make_list(bank.band_hz);
   root["complete"] = bank.complete;
   root["shape_bytes"] = bank.shape_bytes;
@@ -353,68 +375,39 @@ std::string format_info_json(const Bank& bank, std::span<const HeardMode> heard,
   }
   root["element"] = bank.element;
   root["mass"] = bank.mass;
-  Json::Value& counts = root["counts"];
-  counts["nodes"] = Json::Int64(bank.counts.nodes);
-  counts["tets"] = Json::Int64(bank.counts.tets);
-  counts["components"] = Json::Int64(bank.counts.components);
-  counts["rigid_modes"] = Json::Int64(bank.counts.rigid_modes);
-  Json::Value& rigid = root["rigid"];
+  base::Json& counts = root["counts"];
+  counts["nodes"] = bank.counts.nodes;
+  counts["tets"] = bank.counts.tets;
+  counts["components"] = bank.counts.components;
+  counts["rigid_modes"] = bank.counts.rigid_modes;
+  base::Json& rigid = root["rigid"];
   rigid["mass_kg"] = bank.rigid.mass_kg;
   rigid["volume_m3"] = bank.rigid.volume_m3;
   rigid["centre_m"] = make_list(bank.rigid.centre_m);
   for (std::size_t i = 0; i < 3; ++i) rigid["inertia_kg_m2"].append(make_list(std::span(bank.rigid.inertia_kg_m2).subspan(3 * i, 3)));
-  Json::Value& material = root["material"];
+  base::Json& material = root["material"];
   material["young_modulus_pa"] = bank.material.young_modulus_pa;
   material["poisson_ratio"] = bank.material.poisson_ratio;
   material["density_kg_m3"] = bank.material.density_kg_m3;
   material["damping"] = make_damping(bank);
-  if (const auto regions = parse_json(bank.regions); !bank.regions.empty())
-    material["regions"] = regions ? *regions : Json::Value(bank.regions);
-  if (const Multipoles& air = bank.multipoles; !air.is_empty()) {
-    const RadiationFacts facts = find_radiation_facts(bank);
-    Json::Value& radiation = root["radiation"];
-    radiation["method"] = air.method;
-    radiation["centre_m"] = make_list(air.centre_m);
-    radiation["radius_m"] = air.radius_m;
-    radiation["nearest_m"] = air.nearest_m;
-    radiation["air_density_kg_m3"] = air.air_density_kg_m3;
-    radiation["sound_speed_ms"] = air.sound_speed_ms;
-    radiation["bytes"] = Json::UInt64(facts.bytes);
-    radiation["worst_error_db"] = facts.worst_db;
-    radiation["modes_mostly_damped_by_it"] = Json::UInt64(facts.strong);
-    radiation["largest_added_mass_cents"] = facts.cents;
-    radiation["most_coupled_modes"] = facts.parts;
-  }
-  if (const QuarticEnergy& energy = bank.quartic; !energy.is_empty()) {
-    Json::Value& nonlinear = root["nonlinear"];
-    nonlinear["form"] = get_form(energy);
-    nonlinear["coupled_modes"] = Json::UInt64(energy.mode_count());
-    nonlinear["rows"] = Json::UInt64(energy.row_count());
-    nonlinear["points"] = Json::UInt64(energy.point_count());
-    nonlinear["is_curved"] = !energy.linear.empty();
-    nonlinear["bytes"] = Json::UInt64(count_bytes(energy));
-    nonlinear["energy_error"] = energy.error;
-    nonlinear["membrane_ratio"] = energy.membrane_ratio;
-    nonlinear["thickness_m"] = energy.thickness_m;
-  }
-  root["proof"] = bank.proof ? make_proof(*bank.proof) : Json::Value();
-  root["frequencies_hz"] = Json::Value(Json::arrayValue);
-  root["corrected_frequencies_hz"] = Json::Value(Json::arrayValue);
+  if (const auto regions = base::Json::parse(bank.regions); !bank.regions.empty())
+    material["regions"] = regions ? *regions : base::Json(bank.regions);
+  if (!bank.multipoles.is_empty()) root["radiation"] = make_radiation(bank);
+  if (!bank.quartic.is_empty()) root["nonlinear"] = make_nonlinear(bank.quartic);
+  root["proof"] = bank.proof ? make_proof(*bank.proof) : base::Json();
+  root["frequencies_hz"] = base::Json::array();
+  root["corrected_frequencies_hz"] = base::Json::array();
   for (const std::size_t mode : sort_modes(bank))
     if (!bank.corrected.is_empty()) root["corrected_frequencies_hz"].append(bank.corrected.freq_hz[mode]);
-  root["modes"] = Json::Value(Json::arrayValue);
+  root["modes"] = base::Json::array();
   const std::vector<ModeKind> kinds = find_kinds(bank);
   for (std::size_t i = 0; i < bank.mode_count(); ++i) {
     root["frequencies_hz"].append(bank.freq_hz(i));
     root["modes"].append(make_mode(bank, heard[i], i, kinds[i]));
   }
-  const auto provenance = parse_json(bank.provenance);
-  root["provenance"] = provenance ? *provenance : Json::Value(bank.provenance);
-
-  Json::StreamWriterBuilder builder;
-  builder["indentation"] = "  ";
-  builder["precision"] = 17;
-  return Json::writeString(builder, root) + "\n";
+  const auto provenance = base::Json::parse(bank.provenance);
+  root["provenance"] = provenance ? *provenance : base::Json(bank.provenance);
+  return root.sorted_text({.indentation = "  ", .breaks_arrays = true}) + "\n";
 }
 
 std::string format_info_csv(const Bank& bank, std::span<const HeardMode> heard) {
@@ -438,8 +431,8 @@ std::string format_info_csv(const Bank& bank, std::span<const HeardMode> heard) 
 Check calc_regions_check(const Bank& bank) {
   Check check{"materials", "one", {}};
   if (bank.regions.empty()) return check;
-  const std::optional<Json::Value> regions = parse_json(bank.regions);
-  if (!regions || !regions->isArray()) {
+  const std::optional<base::Json> regions = base::Json::parse(bank.regions);
+  if (!regions || !regions->is_array()) {
     check.faults.push_back("material/regions is no JSON list");
   } else {
     check.figure = fmt::format("{} by region of the mesh", regions->size());
@@ -451,7 +444,7 @@ Check calc_provenance_check(const Bank& bank) {
   Check check{"provenance", fmt::format("{} bytes of JSON", bank.provenance.size()), {}};
   if (bank.provenance.empty()) {
     check.figure = "none given";
-  } else if (!parse_json(bank.provenance)) {
+  } else if (!base::Json::parse(bank.provenance)) {
     check.faults.push_back("provenance is not JSON text");
   }
   return check;

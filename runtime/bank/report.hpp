@@ -1,4 +1,4 @@
-// What carillon-bank prints. Internal to the program.
+// Output of carillon-bank. Internal to the program.
 #pragma once
 
 #include <filesystem>
@@ -10,17 +10,17 @@
 
 namespace carillon::bank {
 
-/// A page for people; at most `mode_limit` rows of modes. `heard`: mounting::calc_heard(). `has_record`: with the record of its run.
+/// Text page with at most `mode_limit` modes. `heard`: mounting::calc_heard(). `has_record`: with the record of its run.
 std::string format_info(const Bank& bank, std::span<const HeardMode> heard, const std::filesystem::path& file, std::size_t mode_limit,
                         bool has_record);
 
-/// All of a bank but its mesh and shapes as JSON, numbers to full double precision.
+/// Everything but mesh and shapes as JSON, numbers in full double precision.
 std::string format_info_json(const Bank& bank, std::span<const HeardMode> heard, const std::filesystem::path& file);
 
-/// CSV: a line of names, then one line per mode; unknown values are empty.
+/// CSV: header, then one line per mode; unknown values are empty.
 std::string format_info_csv(const Bank& bank, std::span<const HeardMode> heard);
 
-/// The two properties that the library, which cannot read JSON, does not check.
+/// The two properties that need a JSON parser, which the library's checks do not use.
 Check calc_regions_check(const Bank& bank);
 Check calc_provenance_check(const Bank& bank);
 

@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::string_view kMagic = "CARILLON BANK ";
 
-/// The whole of `text` as a decimal number without sign or leading zero.
+/// All of `text` as a decimal number without sign or leading zeros.
 template <class Integer>
 std::optional<Integer> parse_number(std::string_view text) {
   Integer value{};
@@ -33,20 +33,20 @@ std::vector<std::string_view> split(std::string_view text, char separator) {
   return words;
 }
 
-/// a * b, or nothing when that exceeds `limit`.
+/// a * b; nullopt above `limit`.
 std::optional<std::uint64_t> multiply(std::uint64_t a, std::uint64_t b, std::uint64_t limit) {
   if (a != 0 && b > limit / a) return std::nullopt;
   return a * b;
 }
 
-/// "field NAME DTYPE OFFSET [EXTENT ...]": nothing unless it is well-formed and lies between the seal and the end of the file.
+/// "field NAME DTYPE OFFSET [EXTENT ...]"; nullopt unless well-formed and between the seal and the end of the file.
 std::optional<std::pair<std::string, Extent>> parse_extent(const std::vector<std::string_view>& words, std::uint64_t length) {
   if (words.size() < 4 || words.size() > 8) return std::nullopt;
   Extent extent;
   extent.dtype = words[2];
   const auto offset = parse_number<std::uint64_t>(words[3]);
   const std::uint64_t item = find_item_bytes(extent.dtype);
-  // An extent beyond the file's length is refused even where another extent is zero: nothing is ever larger than the file.
+  // Extents beyond the file's length are rejected even if another extent is zero.
   if (!offset || item == 0 || item > length) return std::nullopt;
   extent.offset = *offset;
   extent.bytes = item;
@@ -109,10 +109,10 @@ Seal parse_seal(std::string_view head, std::uint64_t length, const std::string& 
   std::uint64_t total = kSealBytes;
   for (std::size_t i = 2; i < lines.size(); ++i) {
     const auto words = split(lines[i], ' ');
-    if (words[0] != "field") continue;  // padding, or a line of a newer minor version
+    if (words[0] != "field") continue;  // padding, or a newer minor version
     auto extent = parse_extent(words, length);
     if (!extent) throw damaged(i, "gives an array that cannot be in this file");
-    // Arrays do not overlap, so together they are no longer than the file; that bounds the memory a reader takes.
+    // Arrays do not overlap, so their sum is bounded by the file, and so is the reader's memory.
     total += extent->second.bytes;
     if (total > length) throw damaged(i, "gives an array that overlaps another");
     if (!seal.extents.insert(std::move(*extent)).second) throw damaged(i, "gives an array a second time");

@@ -1,5 +1,5 @@
-// The seal of a bank file: its first 4096 bytes, plain text that says what the file is, where each array lies, and the SHA-256 of all
-// other bytes. docs/bank-format.md describes it. Internal to carillon::bank.
+// Seal of a bank file: its first 4096 bytes, plain text with version, position of each array, and the SHA-256 of all other bytes.
+// docs/bank-format.md. Internal to carillon::bank.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ inline constexpr std::size_t kSealBytes = 4096;                       // the HDF
 inline constexpr std::size_t kDigestBytes = 64;                       // hexadecimal SHA-256, the last bytes of the seal
 inline constexpr std::size_t kTextBytes = kSealBytes - kDigestBytes;  // the text, padded with line feeds
 
-/// Where one array lies.
+/// Position of an array.
 struct Extent {
   std::string dtype;
   std::uint64_t offset = 0;  // from the start of the file
@@ -25,7 +25,7 @@ struct Extent {
   std::uint64_t bytes = 0;
 };
 
-/// A seal that was read: known major version, arrays inside the file and no longer together than the file.
+/// Parsed seal: known major version, arrays inside the file, sum of sizes at most the file's length.
 struct Seal {
   int major = 0;
   int minor = 0;
@@ -34,11 +34,11 @@ struct Seal {
   std::string digest;
 };
 
-/// Reads the seal from the first bytes of a file of `length` bytes (`head` holds the first 4096 of them, or fewer when the file is
-/// shorter). Checks, in this order: magic, version, length, table. Not the digest. Throws InputError; `name` is the file.
+/// Parses the seal of a file of `length` bytes (`head`: its first 4096 bytes, or fewer). Checks magic, version, length and table, in this
+/// order, not the digest. Throws InputError; `name` is the file.
 Seal parse_seal(std::string_view head, std::uint64_t length, const std::string& name);
 
-/// The text of a seal, kTextBytes long, for a file of `length` bytes and a version (major, minor). InputError when the table does not fit.
+/// Text of a seal, kTextBytes long, for a file of `length` bytes and a version (major, minor). InputError if the table does not fit.
 std::string format_seal_text(std::uint64_t length, const std::array<int, 2>& version, const std::map<std::string, Extent>& extents);
 
 }  // namespace carillon::bank

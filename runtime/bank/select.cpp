@@ -20,7 +20,7 @@ void select_values(std::vector<T>& values, const std::vector<std::size_t>& chose
   values = std::move(selected);
 }
 
-/// Groups of degenerate modes with the numbers that their modes have now; groups of one are none. kept: ascending.
+/// Renumbers groups of degenerate modes; groups of one are dropped. kept: ascending.
 void renumber_groups(Proof& proof, const std::vector<std::size_t>& kept) {
   std::size_t groups = 0;
   for (std::size_t g = 0; g < proof.cluster_first.size(); ++g) {
@@ -46,7 +46,7 @@ void select_modes(Bank& bank, const std::vector<std::size_t>& chosen) {
   bank.packing.reset();
   const std::size_t before = bank.mode_count();
   std::vector<std::int16_t> row(chosen.size() * 3);
-  for (std::size_t v = 0; v < bank.vertex_count(); ++v) {  // rows do not become longer, so that they may move down in place
+  for (std::size_t v = 0; v < bank.vertex_count(); ++v) {  // in place: rows only shrink
     for (std::size_t i = 0; i < chosen.size(); ++i) std::copy_n(&bank.shape[(v * before + chosen[i]) * 3], 3, &row[3 * i]);
     std::copy(row.begin(), row.end(), bank.shape.begin() + static_cast<std::ptrdiff_t>(v * row.size()));
   }
@@ -68,7 +68,7 @@ void keep_lowest(Bank& bank, std::size_t count) {
   std::vector<std::size_t> kept = sort_modes(bank);
   const std::size_t first_gone = *std::min_element(kept.begin() + static_cast<std::ptrdiff_t>(count), kept.end());
   const double complete_below_hz = bank.freq_hz(first_gone);
-  const bool is_head = first_gone == count;  // the lowest of the mesh, too
+  const bool is_head = first_gone == count;  // also the lowest of the mesh
   kept.resize(count);
   std::sort(kept.begin(), kept.end());
   select_modes(bank, kept);

@@ -1,7 +1,5 @@
-// Method:     triangles that share an edge are joined into shells (union-find); the sign of the volume that a shell encloses, by the
-//             divergence theorem, distinguishes skin from cavity.
-// Source:     textbook.
-// Deviations: none.
+// Method: triangles sharing edges form shells (union-find); the sign of a shell's enclosed volume (divergence theorem) distinguishes outer
+//   surface and cavity.
 #include "runtime/bank/surface.hpp"
 
 #include <algorithm>
@@ -13,7 +11,7 @@
 namespace carillon::bank {
 namespace {
 
-/// Per triangle the smallest triangle that it is connected with through edges.
+/// Per triangle: the smallest triangle connected through edges.
 std::vector<std::int32_t> find_shells(const std::vector<Triangle>& triangles, std::size_t vertices) {
   std::vector<std::int32_t> shell(triangles.size());
   std::iota(shell.begin(), shell.end(), 0);
@@ -35,12 +33,7 @@ std::vector<std::int32_t> find_shells(const std::vector<Triangle>& triangles, st
 
 Vec3 calc_normal(const std::vector<Vec3>& vertices_m, const Triangle& triangle) {
   const Vec3 &a = vertices_m[triangle[0]], &b = vertices_m[triangle[1]], &c = vertices_m[triangle[2]];
-  Vec3 u, v;
-  for (int k = 0; k < 3; ++k) {
-    u[k] = b[k] - a[k];
-    v[k] = c[k] - a[k];
-  }
-  return {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
+  return cross(b - a, c - a);
 }
 
 std::array<Vec3, 2> find_extent(const std::vector<Vec3>& vertices_m) {
@@ -61,7 +54,7 @@ double calc_thickness_m(const std::vector<Vec3>& vertices_m, const std::vector<T
 
 std::vector<Triangle> find_outer_triangles(const std::vector<Vec3>& vertices_m, const std::vector<Triangle>& triangles) {
   const std::vector<std::int32_t> shell = find_shells(triangles, vertices_m.size());
-  std::vector<double> volume(triangles.size(), 0.0);  // of a shell, at its first triangle: six times, about its own first corner
+  std::vector<double> volume(triangles.size(), 0.0);  // per shell, at its first triangle: 6 V about its first corner
   for (std::size_t t = 0; t < triangles.size(); ++t) {
     const Vec3& base = vertices_m[triangles[shell[t]][0]];
     const Vec3 normal = calc_normal(vertices_m, triangles[t]);

@@ -1,4 +1,4 @@
-// The surface of a body: its box, its normals, and which of its triangles face the open air.
+// Surface of a body: bounding box, normals, outer triangles.
 #pragma once
 
 #include <array>
@@ -10,19 +10,18 @@
 
 namespace carillon::bank {
 
-/// Twice the area times the unit normal of a triangle [m^2].
+/// Normal of a triangle with length twice its area [m^2].
 Vec3 calc_normal(const std::vector<Vec3>& vertices_m, const Triangle& triangle);
 
-/// The lowest and the highest corner of the box around the vertices of a bank that has some [m].
+/// Bounding box (lowest, highest corner) of a non-empty set of vertices [m].
 std::array<Vec3, 2> find_extent(const std::vector<Vec3>& vertices_m);
 
-/// Twice the volume over the area of all triangles [m]: the thickness of a sheet or a wall; of a rod half its diameter, of a ball two
-/// thirds of its radius. 0 without volume or area.
+/// Thickness [m]: twice the volume over the area of all triangles. Exact for sheets and walls; half the diameter of a rod, two thirds of
+/// the radius of a ball. 0 without volume or area.
 double calc_thickness_m(const std::vector<Vec3>& vertices_m, const std::vector<Triangle>& triangles, double volume_m3);
 
-/// The triangles that face the open air, in their order: those of closed shells (connected through edges) that enclose a positive volume.
-/// The wall of a closed cavity encloses a negative one; it moves air that cannot get out. A body open to the outside, such as a bowl, is
-/// one shell. Indices must lie inside `vertices_m`. Pure; any thread.
+/// Triangles facing the open air, in order: those of closed shells (connected through edges) with positive enclosed volume. Walls of closed
+/// cavities enclose a negative one. A body open to the outside, such as a bowl, is one shell. Indices must be valid. Thread-safe.
 std::vector<Triangle> find_outer_triangles(const std::vector<Vec3>& vertices_m, const std::vector<Triangle>& triangles);
 
 }  // namespace carillon::bank

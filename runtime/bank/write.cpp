@@ -1,5 +1,4 @@
-// Writing banks so that at every moment the name holds either the old bank or the new one, whole.
-// Method: the bytes are made and sealed in memory; base::write_file gives them the name in one step.
+// Atomic writing of banks: sealed in memory, then base::write_file().
 #include "runtime/bank/write.hpp"
 
 #include <fmt/format.h>
@@ -18,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Where the bytes shall go: links are followed, and only a regular file is ever replaced.
+/// Target of the write: symbolic links are followed, only regular files are replaced.
 fs::path resolve_target(const fs::path& file) {
   if (file.empty() || !file.has_filename()) throw InputError(fmt::format("\"{}\" names no file; give the bank a file name", file.string()));
   std::error_code error;
@@ -35,17 +34,17 @@ fs::path resolve_target(const fs::path& file) {
   return target;
 }
 
-/// Throws InputError for a bank that is not sane; `name` stands for it in the message.
+/// Throws InputError for an invalid bank; `name` stands for it in the message.
 void check_faults(const Bank& bank, const std::string& name) {
-  if (bank.multipoles.is_in_decay)  // a reader would add radiation a second time
-    throw InputError(name + ": this bank is as it is played in air and is not written; write the one that choose_frequencies() was given");
+  if (bank.multipoles.is_in_decay)  // a reader would add radiation again
+    throw InputError(name + ": this bank is prepared for playing in air and is not written; write the input of choose_frequencies()");
   const auto faults = find_faults(bank);
   if (faults.empty()) return;
-  throw InputError(fmt::format("{}: this bank is not sane and is not written: {}{}", name, faults[0],
+  throw InputError(fmt::format("{}: this bank is invalid and is not written: {}{}", name, faults[0],
                                faults.size() > 1 ? fmt::format(" (and {} more)", faults.size() - 1) : ""));
 }
 
-/// Makes the sealed bytes of a bank without faults and hands them on.
+/// Makes the sealed bytes of a valid bank and passes them to `use`.
 template <typename Use>
 void use_bytes(const Bank& bank, const FileForm& form, Use&& use) {
   const Hdf5Image image = make_hdf5_image(bank, form);

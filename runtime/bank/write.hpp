@@ -1,4 +1,4 @@
-// The bytes of a bank file, for outputs that are no files.
+// Bytes of bank files, for outputs other than files.
 #pragma once
 
 #include <filesystem>
@@ -9,10 +9,10 @@
 
 namespace carillon::bank {
 
-/// What write_bank() writes. Throws InputError as it does for a bank that is not sane. On one thread at a time (it uses HDF5).
+/// Output of write_bank(). Throws InputError for an invalid bank. Not thread-safe (HDF5).
 std::string make_bank_bytes(const Bank& bank);
 
-/// The same for a packed bank; written as write_bank() writes.
+/// Writes a packed bank as write_bank() does.
 void write_packed_bank(const PackedBank& packed, const std::filesystem::path& file);
 std::string make_packed_bytes(const PackedBank& packed);
 

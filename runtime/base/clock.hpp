@@ -16,11 +16,11 @@ inline std::uint64_t read_clock_ns(clockid_t clock) noexcept {
 }
 inline double read_clock(clockid_t clock) noexcept { return 1e-9 * static_cast<double>(read_clock_ns(clock)); }
 
-/// Processor time of the calling thread: what others do on a busy machine is not in it.
+/// Processor time of the calling thread.
 inline double get_thread_cpu_s() noexcept { return read_clock(CLOCK_THREAD_CPUTIME_ID); }
-/// Of this process, all its threads.
+/// Processor time of all threads of this process.
 inline double get_process_cpu_s() noexcept { return read_clock(CLOCK_PROCESS_CPUTIME_ID); }
-/// Of the programs that this process started and that have ended.
+/// Processor time of the terminated children of this process.
 inline double get_children_cpu_s() noexcept {
   rusage used{};
   ::getrusage(RUSAGE_CHILDREN, &used);
@@ -28,9 +28,9 @@ inline double get_children_cpu_s() noexcept {
          1e-6 * static_cast<double>(used.ru_utime.tv_usec + used.ru_stime.tv_usec);
 }
 
-/// Since some moment; stands still while the machine is suspended.
+/// Monotonic clock, arbitrary origin; excludes suspended time.
 inline double get_steady_s() noexcept { return read_clock(CLOCK_MONOTONIC); }
-/// Since the boot, suspended time included. Changes of the wall clock do not affect it.
+/// Monotonic clock since boot; includes suspended time.
 inline double get_boot_s() noexcept { return read_clock(CLOCK_BOOTTIME); }
 
 }  // namespace carillon::base

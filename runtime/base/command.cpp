@@ -1,8 +1,7 @@
-// Method: vfork() and exec, with all signals blocked in between; poll() on the pipes until the program has closed them or its time is over,
-//   then waitpid() without blocking: a program may continue without outputs, and one that waits for a dead disk cannot even be killed.
+// Method: vfork() and exec with all signals blocked; poll() on the pipes until the child closes them or times out, then non-blocking
+//   waitpid(): a child may outlive its outputs, and one blocked on a dead disk cannot be killed.
 // Source: POSIX; Linux vfork(2), prctl(2) (PR_SET_PDEATHSIG), proc(5) (oom_score_adj).
-// Deviations: between vfork() and exec the child does more than POSIX allows, and nothing that Linux does not: system calls and writes to
-//   `Plan`, which the parent waits for.
+// Deviations: between vfork() and exec the child makes system calls and writes to `Plan`: more than POSIX permits, safe on Linux.
 #include "runtime/base/command.hpp"
 
 #include <fcntl.h>
@@ -32,13 +31,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr long kLookNs = 2'000'000;     // between two looks whether a program has ended
-constexpr double kAskS = 0.1;           // between two questions to may_stop
-constexpr double kLateS = 1.0;          // for what a late program has printed
-constexpr double kKillPatienceS = 5.0;  // for a program that was killed
+constexpr long kWaitPollNs = 2'000'000;  // interval of waitpid() polls
+constexpr double kMayStopPollS = 0.1;    // interval of may_stop() calls
+constexpr double kOutputGraceS = 1.0;    // grace for reading the output of a late process
+constexpr double kKillPatienceS = 5.0;   // wait after SIGKILL
 constexpr const char* kHelperFolder = "libexec/carillon";
 constexpr const char* kDataFolder = "share/carillon";
-constexpr const char* kOomScore = "500";  // of 1,000
+constexpr const char* kOomScore = "500";  // out of 1,000
 
 struct Pipe {
   Descriptor read, write;
@@ -46,13 +45,13 @@ struct Pipe {
     int ends[2];
     if (::pipe2(ends, O_CLOEXEC) != 0) throw SystemError(fmt::format("cannot make a pipe: {}; close other programs", std::strerror(errno)));
     const Descriptor low_read(ends[0]), low_write(ends[1]);
-    read = Descriptor(::fcntl(ends[0], F_DUPFD_CLOEXEC, 3));  // where a standard stream is closed its number is not for a pipe
+    read = Descriptor(::fcntl(ends[0], F_DUPFD_CLOEXEC, 3));  // not a number of a closed standard stream
     write = Descriptor(::fcntl(ends[1], F_DUPFD_CLOEXEC, 3));
     if (read.get() < 0 || write.get() < 0) throw SystemError("cannot make a pipe: too many files are open");
   }
 };
 
-/// Writing to a program that takes no input is no reason to end.
+/// A child that does not read its input must not end this process.
 class IgnoredPipeSignal {
  public:
   IgnoredPipeSignal() {
@@ -75,13 +74,13 @@ std::vector<char*> to_pointers(const std::vector<std::string>& texts) {
   return pointers;
 }
 
-/// All that the child reads, and the error that it leaves.
+/// Input of the child between vfork() and exec, and its error.
 struct Plan {
   const char* program = nullptr;  // a path
   char* const* words = nullptr;
   char* const* environment = nullptr;
   const char* folder = nullptr;
-  std::array<int, 3> streams{};  // 3 or more
+  std::array<int, 3> streams{};  // descriptors >= 3
   Command::Group group{};
   int signal_at_end = 0;
   bool yields_memory = false, default_signals = false;
@@ -90,12 +89,12 @@ struct Plan {
   int error = 0;
 };
 
-/// In the child, whose memory is that of the parent.
+/// Runs in the child, which shares the parent's memory.
 [[noreturn]] void execute(Plan& plan) {
   if (plan.group == Command::Group::own) ::setpgid(0, 0);
   if (plan.group == Command::Group::session) ::setsid();
   if (plan.signal_at_end != 0) ::prctl(PR_SET_PDEATHSIG, plan.signal_at_end);
-  // No handler of the parent may run here, in its memory, once signals are unblocked.
+  // No handler of the parent may run here once signals are unblocked.
   struct sigaction action {};
   action.sa_handler = SIG_DFL;
   for (int signal = 1; signal < NSIG; ++signal) {
@@ -116,14 +115,14 @@ struct Plan {
   ::_exit(127);
 }
 
-/// A frame of its own: what the caller has in registers is safe from the child.
+/// A stack frame of its own protects the caller's registers from the child.
 [[gnu::noinline]] pid_t fork_and_execute(Plan& plan) {
   const pid_t child = ::vfork();
   if (child == 0) execute(plan);
   return child;
 }
 
-/// Appends what is there; false at the end.
+/// Appends available bytes; false at end of file.
 bool take(int descriptor, std::string& text, const RunOptions& options) {
   std::array<char, 65536> piece;
   const ssize_t got = ::read(descriptor, piece.data(), piece.size());
@@ -132,31 +131,31 @@ bool take(int descriptor, std::string& text, const RunOptions& options) {
   return got > 0 || (got < 0 && errno == EINTR);
 }
 
-/// Gives some more of the input; false when all is given, or the program takes no more.
+/// Writes more of the input; false when all is written or the child closed its end.
 bool give(int descriptor, std::string_view& input) {
   const ssize_t put = ::write(descriptor, input.data(), input.size());
   if (put > 0) input.remove_prefix(put);
   return !input.empty() && (put > 0 || errno == EINTR || errno == EAGAIN);
 }
 
-/// Until the program has taken its input and closed its outputs, or is to be killed. What it has printed is read before it is judged: this
-/// process may have been stopped meanwhile.
+/// Exchanges data until the child has taken its input and closed its outputs, or must be killed. Reads available output before checking
+/// limits: this process may have been suspended meanwhile.
 void talk(Descriptor& in, Descriptor& out, Descriptor& errors, const RunOptions& options, double deadline_s, Finished& finished) {
   std::string_view input = options.input;
   double asked_s = get_boot_s();
   if (in.get() >= 0) ::fcntl(in.get(), F_SETFL, O_NONBLOCK);
   while (in.get() >= 0 || out.get() >= 0 || errors.get() >= 0) {
     std::array<pollfd, 3> all{{{in.get(), POLLOUT, 0}, {out.get(), POLLIN, 0}, {errors.get(), POLLIN, 0}}};
-    const double wait_s = std::clamp(deadline_s - get_boot_s(), 0.0, options.may_stop ? kAskS : 1e3);
+    const double wait_s = std::clamp(deadline_s - get_boot_s(), 0.0, options.may_stop ? kMayStopPollS : 1e3);
     const int ready = ::poll(all.data(), all.size(), static_cast<int>(std::lround(wait_s * 1e3)));
     if (ready < 0) {
       if (errno != EINTR) throw SystemError(fmt::format("cannot wait for a program: {}", std::strerror(errno)));
       continue;
     }
     const double late_s = get_boot_s() - deadline_s;
-    finished.was_slow = ready == 0 ? late_s >= 0.0 : late_s > kLateS;
+    finished.was_slow = ready == 0 ? late_s >= 0.0 : late_s > kOutputGraceS;
     finished.was_long = !options.keeps_tail && std::max(finished.output.size(), finished.errors.size()) > options.max_bytes;
-    const bool is_asked = options.may_stop && (ready == 0 || get_boot_s() - asked_s >= kAskS);
+    const bool is_asked = options.may_stop && (ready == 0 || get_boot_s() - asked_s >= kMayStopPollS);
     if (is_asked) asked_s = get_boot_s();
     finished.was_stopped = is_asked && options.may_stop(finished);
     if (finished.was_slow || finished.was_long || finished.was_stopped) return;
@@ -166,20 +165,20 @@ void talk(Descriptor& in, Descriptor& out, Descriptor& errors, const RunOptions&
   }
 }
 
-/// Its status when it ends before the deadline.
+/// Exit status, if the process ends before the deadline.
 std::optional<int> await(pid_t child, double deadline_s, const std::function<bool()>& may_stop) {
   for (;;) {
     int status = 0;
     const pid_t ended = ::waitpid(child, &status, WNOHANG);
     if (ended == child) return status;
-    if (ended < 0 && errno != EINTR) return W_EXITCODE(kExitSystem, 0);  // waited for elsewhere: its status is lost
+    if (ended < 0 && errno != EINTR) return W_EXITCODE(kExitSystem, 0);  // reaped elsewhere: status lost
     if (get_boot_s() >= deadline_s || (may_stop && may_stop())) return std::nullopt;
-    const timespec pause{0, kLookNs};
+    const timespec pause{0, kWaitPollNs};
     ::nanosleep(&pause, nullptr);
   }
 }
 
-/// Kills a program and takes its status where run() is left by an exception.
+/// Kills and reaps the child when run() exits by an exception.
 class Reaper {
  public:
   explicit Reaper(pid_t child) : child_(child) { note_child(child); }
@@ -200,7 +199,7 @@ class Reaper {
   pid_t child_;
 };
 
-/// The first executable of that name along PATH.
+/// First executable of that name along PATH.
 std::optional<fs::path> find_along_path(const std::string& name) {
   const char* path = std::getenv("PATH");
   std::string_view rest = path != nullptr ? path : "/usr/local/bin:/usr/bin:/bin";
@@ -213,14 +212,14 @@ std::optional<fs::path> find_along_path(const std::string& name) {
   return std::nullopt;
 }
 
-/// Of the program of a command; empty: there is none.
+/// Path of a command's program; empty if not found.
 std::string find_path(const std::string& word) {
   if (word.find('/') != std::string::npos) return word;
   const std::optional<fs::path> program = find_along_path(word);
   return program ? program->string() : std::string();
 }
 
-/// The folder that has bin and libexec.
+/// Installation prefix, the parent of bin and libexec.
 fs::path find_prefix(const fs::path& program) {
   const fs::path folder = program.parent_path();
   return folder.parent_path().filename() == "libexec" ? folder.parent_path().parent_path() : folder.parent_path();
@@ -279,13 +278,13 @@ void become(const std::vector<std::string>& words, const std::optional<std::vect
 }
 
 pid_t start(const Command& command) {
-  // Inherited as ignored, it would have the kernel drop the status of every child.
+  // If SIGCHLD is inherited as ignored, the kernel discards the status of children.
   struct sigaction child_signal {};
   if (::sigaction(SIGCHLD, nullptr, &child_signal) == 0 && child_signal.sa_handler == SIG_IGN) ::signal(SIGCHLD, SIG_DFL);
   const auto refuse = [&](int error) {
     throw StartError(fmt::format("{}: cannot be started: {}", command.words.at(0), std::strerror(error)), error);
   };
-  // Along PATH here and not in the child: what execvp() cannot run it gives to a shell.
+  // Resolve PATH here: execvp() in the child would pass non-executables to a shell.
   const std::string program = find_path(command.words.at(0));
   if (program.empty()) refuse(ENOENT);
   const std::vector<char*> words = to_pointers(command.words);
@@ -303,14 +302,15 @@ pid_t start(const Command& command) {
   plan.parent = ::getpid();
   ::sigemptyset(&plan.mask);
   for (const int signal : command.blocked) ::sigaddset(&plan.mask, signal);
-  // Above the three that they become.
+  // Duplicate to descriptors above the standard ones.
   std::array<Descriptor, 3> streams;
   const std::array<int, 3> given{command.input, command.output, command.errors};
   const Descriptor null(::open("/dev/null", O_RDWR | O_CLOEXEC));
   for (std::size_t k = 0; k < 3; ++k) {
     const int from = given[k] >= 0 ? given[k] : given[k] == kInherit ? static_cast<int>(k) : null.get();
     streams[k] = Descriptor(::fcntl(from, F_DUPFD_CLOEXEC, 3));
-    if (streams[k].get() < 0 && given[k] == kInherit) streams[k] = Descriptor(::fcntl(null.get(), F_DUPFD_CLOEXEC, 3));  // it is closed
+    if (streams[k].get() < 0 && given[k] == kInherit)
+      streams[k] = Descriptor(::fcntl(null.get(), F_DUPFD_CLOEXEC, 3));  // closed in this process
     if (streams[k].get() < 0) refuse(errno);
     plan.streams[k] = streams[k].get();
   }
@@ -347,7 +347,7 @@ Finished run(Command command, const RunOptions& options) {
   give_to.close();
   const auto may_stop = [&] { return options.may_stop && options.may_stop(finished); };
   const bool is_judged = finished.was_slow || finished.was_long || finished.was_stopped;
-  std::optional<int> status = await(child, is_judged ? 0.0 : deadline_s, may_stop);  // it may have ended by now
+  std::optional<int> status = await(child, is_judged ? 0.0 : deadline_s, may_stop);  // may have ended meanwhile
   if (!status) {
     if (!is_judged) (get_boot_s() >= deadline_s ? finished.was_slow : finished.was_stopped) = true;
     ::kill(child, SIGKILL);

@@ -1,4 +1,4 @@
-// Child processes: finding, starting and talking to other programs, never through a shell.
+// Child processes: find, start and communicate, never through a shell.
 #pragma once
 
 #include <sys/types.h>
@@ -16,81 +16,77 @@
 
 namespace carillon::base {
 
-/// The file of this program. SystemError where /proc does not show it.
+/// Executable of this process. Throws SystemError without /proc.
 std::filesystem::path find_self();
-/// A program by its name: in this installation (next to this one; bin, seen from libexec/carillon), else along PATH. None if there is no
-/// executable of that name.
+/// Executable by name: in this installation (same folder, or bin seen from libexec/carillon), else along PATH; nullopt if not found.
 std::optional<std::filesystem::path> find_program(const std::string& name);
-/// A program or library that only the programs of this installation use: PREFIX/libexec/carillon/NAME, for programs in PREFIX/bin and
-/// PREFIX/libexec/carillon. Throws SystemError where there is none.
+/// Private program or library of this installation: PREFIX/libexec/carillon/NAME, for programs in PREFIX/bin and
+/// PREFIX/libexec/carillon. Throws SystemError if missing.
 std::filesystem::path find_helper(const std::string& name);
-/// A folder of files that the programs of this installation read: PREFIX/share/carillon/NAME, likewise. Throws SystemError where there is
-/// none; `remedy` says in the message what makes it.
+/// Data folder of this installation: PREFIX/share/carillon/NAME. Throws SystemError if missing; `remedy` ends the message.
 std::filesystem::path find_data_folder(const std::string& name, std::string_view remedy);
-/// The same as find_program(). Throws SystemError where there is none.
+/// As find_program(); throws SystemError if not found.
 std::filesystem::path require_program(const std::string& name);
-/// Is it a file that may be run?
+/// True for an executable regular file.
 bool is_program(const std::filesystem::path& file);
 
-/// Streams of a program, in place of a descriptor.
+/// Values of Command streams that are not descriptors.
 inline constexpr int kNull = -1;     // /dev/null
-inline constexpr int kInherit = -2;  // that of this process
-inline constexpr int kCapture = -3;  // of run(): kept
+inline constexpr int kInherit = -2;  // inherited from this process
+inline constexpr int kCapture = -3;  // captured by run()
 
-/// How a program is started.
+/// Start parameters of a process.
 struct Command {
-  std::vector<std::string> words;                                      // the program, a path or a name along PATH, and its arguments
+  std::vector<std::string> words;                                      // program (path, or name along PATH) and arguments
   std::optional<std::vector<std::string>> environment = std::nullopt;  // "NAME=value"; none: make_environment()
-  std::filesystem::path folder = {};                                   // working directory; empty: that of this process
+  std::filesystem::path folder = {};                                   // working directory; empty: inherited
   int input = kNull, output = kNull, errors = kNull;                   // kNull, kInherit, kCapture or a descriptor
-  enum class Group { same, own, session } group = Group::same;         // process group or session that it starts in
-  int signal_at_end = 0;          // sent to it when the thread that started it ends; 0: none by start(), SIGKILL by run()
-  std::vector<int> blocked = {};  // signals blocked at its start
-  bool yields_memory = false;     // the kernel's OOM killer takes it before this process
-  bool default_signals =
-      false;  // signals that this process ignores have their default actions there; else, SIGPIPE apart, they stay ignored
+  enum class Group { same, own, session } group = Group::same;         // process group or session
+  int signal_at_end = 0;          // sent when the starting thread ends; 0: none by start(), SIGKILL by run()
+  std::vector<int> blocked = {};  // signals blocked at start
+  bool yields_memory = false;     // preferred victim of the kernel's OOM killer
+  bool default_signals = false;   // resets ignored signals to their default actions; otherwise only SIGPIPE is reset
 };
 
-/// A program that could not be started.
+/// Process start failed.
 class StartError : public SystemError {
  public:
   StartError(const std::string& message, int error) : SystemError(message), error_(error) {}
-  /// The errno: ENOENT where there is no such program.
+  /// errno; ENOENT: no such program.
   int get_error() const { return error_; }
 
  private:
   int error_ = 0;
 };
 
-/// Starts it. Throws StartError "WORD: cannot be started: why". Does not fork, so that no
-/// handler of pthread_atfork() runs (MPI has some) and no memory is copied. kCapture is /dev/null here.
+/// Starts a process. Throws StartError "WORD: cannot be started: REASON". Uses vfork: no pthread_atfork() handlers (MPI registers some), no
+/// copied page tables. kCapture acts as /dev/null.
 pid_t start(const Command& command);
 
-/// Replaces this process by the program words[0], a path, with its own environment or another. Throws StartError.
+/// Replaces this process by words[0] (a path); environment: own if none given. Throws StartError.
 [[noreturn]] void become(const std::vector<std::string>& words, const std::optional<std::vector<std::string>>& environment = std::nullopt);
 
-/// What became of a program.
+/// Outcome of a process.
 struct Finished {
-  int exit_code = 0;         // 128 + signal when a signal ended it
-  int signal = 0;            // that ended it; 0: none
-  bool was_slow = false;     // had not ended in time, and was killed
-  bool was_long = false;     // printed more than max_bytes on one stream, and was killed
-  bool was_stopped = false;  // `may_stop` said so, and it was killed
+  int exit_code = 0;         // 128 + signal after termination by a signal
+  int signal = 0;            // terminating signal; 0: none
+  bool was_slow = false;     // killed after patience_s
+  bool was_long = false;     // killed after more than max_bytes on one stream
+  bool was_stopped = false;  // killed on request of `may_stop`
   std::string output, errors;
 };
 
 struct RunOptions {
-  std::string_view input = {};                                  // on its standard input; empty: that of the command
-  double patience_s = std::numeric_limits<double>::infinity();  // it is killed after this long
+  std::string_view input = {};                                  // bytes for standard input; empty: Command::input
+  double patience_s = std::numeric_limits<double>::infinity();  // killed after this time
   std::size_t max_bytes = std::size_t{128} << 20;
-  bool keeps_tail = false;  // of what is longer than max_bytes the end is kept, and it is not killed
+  bool keeps_tail = false;  // keeps the last max_bytes instead of killing
   std::function<void(pid_t)> started = {};
-  std::function<bool(const Finished& now)> may_stop = {};  // is asked at least every tenth of a second
+  std::function<bool(const Finished& now)> may_stop = {};  // polled at least every 0.1 s
 };
 
-/// Starts it, waits until it ends, and keeps what it prints on the streams that are kCapture. It is sent SIGKILL when the calling thread
-/// ends, unless `signal_at_end` names another signal. One that does not end 5 s after it was killed is left alone. Throws StartError, and
-/// SystemError where this process has no pipes left.
+/// Starts a process, captures the kCapture streams and waits for its end. Sends SIGKILL (or `signal_at_end`) when the calling thread ends.
+/// A process still alive 5 s after SIGKILL is abandoned. Throws StartError, and SystemError if no pipe can be made.
 Finished run(Command command, const RunOptions& options = {});
 
 }  // namespace carillon::base

@@ -1,4 +1,4 @@
-// A POSIX file descriptor that closes itself.
+// RAII for POSIX file descriptors.
 #pragma once
 
 #include <unistd.h>
@@ -8,7 +8,7 @@
 
 namespace carillon::base {
 
-/// Owns one open descriptor, or none (negative). Each descriptor has one owner, and is closed once.
+/// Unique owner of a descriptor; negative: none.
 class Descriptor {
  public:
   explicit Descriptor(int value = -1) : value_(value) {}
@@ -19,7 +19,6 @@ class Descriptor {
   }
   ~Descriptor() { close(); }
 
-  /// Negative: none.
   int get() const { return value_; }
   void close() {
     if (value_ >= 0) ::close(value_);
@@ -30,7 +29,7 @@ class Descriptor {
   int value_;
 };
 
-/// Writes all bytes, in as many calls as that takes. 0, or the errno of what went wrong; ENOSPC where nothing more is taken.
+/// Writes all bytes. Returns 0 or errno; ENOSPC if write() accepts no more.
 int write_all(int descriptor, std::string_view bytes) noexcept;
 
 }  // namespace carillon::base

@@ -1,6 +1,4 @@
-// Views of the values of a document.
-// Method: each Object remembers the keys that it was asked for, so the set of known keys is the set that the reading code really uses and
-// cannot drift from it.
+// Views of a document. Each Object records the requested keys, so the set of known keys is exactly what the code reads.
 #include "runtime/base/document.hpp"
 
 #include <fmt/core.h>
@@ -45,7 +43,7 @@ bool Object::is_empty_list(std::string_view key) {
 namespace {
 
 std::string full_name(const std::string& name, std::string_view key) {
-  const std::string_view shown = key.substr(0, 80);  // a hostile key must not flood the terminal
+  const std::string_view shown = key.substr(0, 80);  // bounds untrusted keys
   return name.empty() ? std::string(shown) : fmt::format("{}.{}", name, shown);
 }
 
@@ -59,7 +57,7 @@ void Object::fail(std::string_view key, const std::string& message) const {
 
 namespace {
 
-/// Damerau-Levenshtein distance (adjacent swaps count one), three rows.
+/// Damerau-Levenshtein distance with adjacent transpositions; three rows.
 std::size_t calc_distance(std::string_view a, std::string_view b) {
   std::vector<std::size_t> before(b.size() + 1), last(b.size() + 1), row(b.size() + 1);
   for (std::size_t j = 0; j <= b.size(); ++j) last[j] = j;
@@ -75,7 +73,7 @@ std::size_t calc_distance(std::string_view a, std::string_view b) {
   return last[b.size()];
 }
 
-/// The key of `present` that `wanted` was probably meant to be: within a quarter of its length, or one name containing the other.
+/// Key of `present` probably meant by `wanted`: distance at most a quarter of its length, or one contains the other.
 std::string find_misspelt(std::string_view wanted, const std::vector<std::string>& present, const std::vector<std::string>& known) {
   for (const std::string& key : present) {
     if (std::find(known.begin(), known.end(), key) != known.end()) continue;
@@ -244,7 +242,7 @@ void Object::ignore(std::string_view key) { has(key); }
 
 namespace {
 
-/// The first byte from `at` on that is neither white space nor part of a comment; the text was parsed before.
+/// Offset of the first byte from `at` on that is neither white space nor comment, in valid text.
 std::size_t skip_space(std::string_view text, std::size_t at) {
   while (at < text.size()) {
     if (std::string_view(" \t\r\n").find(text[at]) != std::string_view::npos)
@@ -259,14 +257,14 @@ std::size_t skip_space(std::string_view text, std::size_t at) {
   return at;
 }
 
-/// The byte behind the text in quotes that begins at `at`.
+/// Offset past the quoted string at `at`.
 std::size_t skip_quoted(std::string_view text, std::size_t at) {
   for (++at; at < text.size() && text[at] != '"'; ++at)
     if (text[at] == '\\') ++at;
   return at + 1;
 }
 
-/// The byte behind the value that begins at `at`.
+/// Offset past the value at `at`.
 std::size_t find_end(std::string_view text, std::size_t at, const Value& value) {
   if (value.is(Value::Kind::kList) || value.is(Value::Kind::kObject)) return value.end;
   if (value.is(Value::Kind::kText)) return skip_quoted(text, at);
@@ -304,7 +302,7 @@ std::vector<std::string> Object::keys() const {
 }
 
 void Object::finish() {
-  // A key that is not there yet is likelier meant than one that is: alpha2_s next to alpha1_s is alpha2_per_s.
+  // Prefer keys that are still unused: next to alpha1_s, alpha2_s means alpha2_per_s.
   std::vector<std::string> open;
   for (const std::string& key : *asked_)
     if (value_->find(key) == nullptr) open.push_back(key);

@@ -1,4 +1,4 @@
-// Strict JSON documents with // comments: every value knows its file and line, every key must be asked for.
+// Strict JSON reader with // comments: values carry file and line; unused keys are errors.
 //
 //   base::Document document = base::read_document("job.json");
 //   base::Object job = document.root();
@@ -7,7 +7,7 @@
 //   double tol = solver.number_or("tolerance", 1e-8, {0.0, 1.0});   // default
 //   job.finish();                                                   // an unused key is an InputError
 //
-// All errors are InputError: "file:line: what is wrong; what would correct it". Not thread-safe; no MPI.
+// All errors are InputError "file:line: fault; remedy". Not thread-safe; no MPI.
 #pragma once
 
 #include <array>
@@ -23,7 +23,7 @@
 
 namespace carillon::base {
 
-/// The open interval (low, high) that a number has to lie in. Finite always; bounds themselves are excluded.
+/// Open interval of permitted finite numbers.
 struct Range {
   double low = -std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();
@@ -31,26 +31,26 @@ struct Range {
 inline constexpr Range kPositive{0.0, std::numeric_limits<double>::infinity()};
 
 struct Value;
-struct DocumentData;  // the parsed text and the line table, shared by all views of one document
+struct DocumentData;  // text, values and line table, shared by all views of a document
 
 struct Entry;
 
-/// A JSON object being read. Asking for a key marks it as known.
+/// View of a JSON object. Requested keys are marked as known.
 class Object {
  public:
   bool has(std::string_view key);
-  /// True when `key` is there and holds a text.
+  /// True if `key` holds a string.
   bool has_string(std::string_view key);
-  /// True when `key` is there and holds a number.
+  /// True if `key` holds a number.
   bool has_number(std::string_view key);
-  /// True when `key` is there and holds an object in braces.
+  /// True if `key` holds an object.
   bool has_object(std::string_view key);
-  /// True when `key` is there and holds a list of nothing.
+  /// True if `key` holds an empty array.
   bool is_empty_list(std::string_view key);
 
   std::string string(std::string_view key);
   std::string string_or(std::string_view key, std::string_view fallback);
-  /// One of `choices`, or an InputError that lists them.
+  /// One of `choices`; the InputError lists them.
   std::string choice(std::string_view key, const std::vector<std::string>& choices);
   std::string choice_or(std::string_view key, const std::vector<std::string>& choices, std::string_view fallback);
 
@@ -61,7 +61,7 @@ class Object {
   std::optional<long long> integer_if(std::string_view key, long long low, long long high);
   bool boolean_or(std::string_view key, bool fallback);
 
-  /// A list of exactly N finite numbers.
+  /// Array of N finite numbers.
   template <std::size_t N>
   std::array<double, N> numbers(std::string_view key) {
     std::array<double, N> values{};
@@ -75,58 +75,58 @@ class Object {
 
   Object object(std::string_view key);
   std::optional<Object> object_if(std::string_view key);
-  /// A list of objects; a missing key gives an empty list.
+  /// Array of objects; empty if the key is missing.
   std::vector<Object> objects(std::string_view key);
 
-  /// A list of finite numbers of any length from 1 to `max`.
+  /// Array of 1 to `max` finite numbers.
   std::vector<double> number_list(std::string_view key, std::size_t max);
-  /// A list of lists of `columns` finite numbers each, row by row; from 1 to `max` rows.
+  /// Array of 1 to `max` rows of `columns` finite numbers.
   std::vector<std::vector<double>> number_rows(std::string_view key, std::size_t columns, std::size_t max);
-  /// One text or object, or a list of at most `max` texts and objects; a missing key gives an empty list.
+  /// A string or an object, or an array of at most `max` of them; empty if the key is missing.
   std::vector<Entry> entries(std::string_view key, std::size_t max);
 
-  /// A file named by `key`, made absolute: relative paths start at the document's folder. The file need not exist.
+  /// Absolute path; relative ones are resolved against the document's folder. The file need not exist.
   std::filesystem::path path(std::string_view key);
 
-  /// Marks `key` as known and skips whatever it holds (recorded facts that are not input).
+  /// Marks `key` as known without reading it (recorded facts that are not input).
   void ignore(std::string_view key);
 
-  /// A document of those of the keys that are here, as they stand in the file, for another program to read: parse_document() of it with
-  /// the same file and `first_line` has every value at its line.
+  /// A document with those of `keys` that are present, as in the file, for another program: parse_document() with the same file and
+  /// `first_line` reproduces the line numbers.
   struct Excerpt {
     std::string text;
     int first_line = 1;
   };
   Excerpt make_excerpt(const std::vector<std::string>& keys);
 
-  /// The keys of this object in the order of the file.
+  /// Keys in file order.
   std::vector<std::string> keys() const;
 
-  /// Throws InputError for the first key that was never asked for, naming its line and the nearest known key.
+  /// Throws InputError for the first unused key, with its line and the nearest known key.
   void finish();
 
-  /// Throws InputError "file:line: message" at the line of `key` (of the object itself when the key is absent).
+  /// Throws InputError "file:line: message" at `key` (at the object if the key is absent).
   [[noreturn]] void fail(std::string_view key, const std::string& message) const;
 
-  /// "file:line" of `key` (of the object itself when the key is absent or empty), for messages of later.
+  /// "file:line" of `key` (of the object if the key is absent or empty), for later messages.
   std::string find_place(std::string_view key) const;
 
   Object(std::shared_ptr<DocumentData> data, const Value* value, std::string name);
 
  private:
-  /// The value of a required key; when it is missing, a similar unused key is named as the likely cause.
+  /// Value of a required key; if missing, the message suggests a similar unused key.
   const Value& require_value(std::string_view key);
   void copy_numbers(std::string_view key, double* values, std::size_t count);
   std::shared_ptr<DocumentData> data_;
-  const Value* value_ = nullptr;  // of *data_
+  const Value* value_ = nullptr;  // in *data_
   std::string name_;              // dotted path, for messages
   std::shared_ptr<std::vector<std::string>> asked_;
 };
 
-/// One entry of a list that holds texts and objects.
+/// Entry of an array of strings and objects.
 struct Entry {
   std::string text;              // empty for an object
-  std::optional<Object> object;  // none for a text
+  std::optional<Object> object;  // nullopt for a string
   std::string place;             // "file:line"
 };
 
@@ -135,7 +135,7 @@ class Document {
  public:
   Object root() const;
   const std::filesystem::path& file() const;
-  /// Bytes that were read so far to find the lines of its values: never more than the text has.
+  /// Bytes scanned so far for line numbers; at most the length of the text.
   std::size_t count_scanned_bytes() const;
 
  private:
@@ -144,14 +144,14 @@ class Document {
   std::shared_ptr<DocumentData> data_;
 };
 
-/// Reads and parses a document of at most 16 MiB. Throws InputError: no such file, not a regular file, too large,
-/// a syntax error (line and column), a duplicate key, a root that is no object.
+/// Parses a file of at most 16 MiB. Throws InputError: missing, not a regular file, too large, syntax error (line and column), duplicate
+/// key, root not an object.
 Document read_document(const std::filesystem::path& file, std::string_view too_long = "check that this is the right file");
 
-/// The same from text; `file` names it in messages and anchors relative paths, `first_line` is the number of its first line there.
+/// Parses text. `file` appears in messages and anchors relative paths; `first_line` numbers the first line.
 Document parse_document(std::string_view text, const std::filesystem::path& file, int first_line = 1);
 
-/// The entry of `known` with the smallest Damerau-Levenshtein distance to `word`; empty when none is within half of the word's length.
+/// Entry of `known` with the smallest Damerau-Levenshtein distance to `word`; empty if above half of the word's length.
 std::string find_nearest(std::string_view word, const std::vector<std::string>& known);
 
 }  // namespace carillon::base

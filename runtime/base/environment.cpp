@@ -1,6 +1,5 @@
-// Source:     Open MPI 4.1: orte/orted/orted_submit.c and mpirun -np 2 env; OpenPMIx 4.2 (PMIX_); PRRTE 3 (PRTE_); MPICH 4, Hydra (PMI_);
-//             srun(1), output environment variables; slurm.h of Slurm 22.05, numbers of steps.
-// Deviations: none.
+// Source: Open MPI 4.1: orte/orted/orted_submit.c and mpirun -np 2 env; OpenPMIx 4.2 (PMIX_); PRRTE 3 (PRTE_); MPICH 4, Hydra (PMI_);
+//   srun(1), output environment variables; slurm.h of Slurm 22.05, numbers of steps.
 #include "runtime/base/environment.hpp"
 
 #include <algorithm>
@@ -17,7 +16,7 @@ extern "C" char** environ;
 namespace carillon::base {
 namespace {
 
-/// Prefixes of the variables of launchers for their ranks. PRTE_MCA_ and most of OMPI_MCA_ belong to the user.
+/// Prefixes of per-rank variables of launchers. PRTE_MCA_ and most OMPI_MCA_ variables belong to the user.
 constexpr std::array<std::string_view, 29> kOfRuns{"OMPI_COMM_WORLD_",
                                                    "OMPI_UNIVERSE_",
                                                    "OMPI_FIRST_RANKS",
@@ -48,7 +47,7 @@ constexpr std::array<std::string_view, 29> kOfRuns{"OMPI_COMM_WORLD_",
                                                    "PRTE_",
                                                    "MPI_LOCAL"};
 
-/// Variables of Open MPI for a single rank without a daemon.
+/// Open MPI settings for a single rank without a daemon.
 constexpr std::array<std::pair<const char*, const char*>, 2> kLone{
     {{"OMPI_MCA_ess_singleton_isolated", "1"}, {"OMPI_MCA_orte_create_session_dirs", "0"}}};
 
@@ -57,8 +56,8 @@ bool is_of_run(std::string_view entry) {
          std::any_of(kOfRuns.begin(), kOfRuns.end(), [&](std::string_view begin) { return entry.starts_with(begin); });
 }
 
-/// True within a step of srun. A job script of sbatch and an interactive shell of salloc are steps as well, with SLURM_PROCID 0: theirs
-/// have no number, or one of the reserved ones.
+/// True within a step of srun. sbatch scripts and salloc shells are steps with SLURM_PROCID 0 too; their step number is missing or
+/// reserved.
 bool is_slurm_step() {
   constexpr std::uint64_t kLastStep = 0xfffffff0;  // SLURM_MAX_NORMAL_STEP_ID
   const char* step = std::getenv("SLURM_STEP_ID");
@@ -70,7 +69,7 @@ bool is_slurm_step() {
   return error == std::errc() && end == text.data() + text.size() && number <= kLastStep;
 }
 
-/// Rank of this process in its launcher of MPI; nullptr without one.
+/// Rank assigned by an MPI launcher; nullptr without one.
 const char* find_rank() {
   for (const char* name : {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK"})
     if (const char* rank = std::getenv(name)) return rank;

@@ -1,21 +1,21 @@
-// The three ways in which a Carillon program can fail, and the exit code of each.
+// Error classes of the programs, each with an exit code.
 #pragma once
 
 #include <stdexcept>
 
 namespace carillon {
 
-/// The user's input cannot be used. The message names the file, the place in it and the remedy. Exit code 2.
+/// Invalid user input. The message names file, place and remedy. Exit code 2.
 class InputError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// The numerics did not deliver what was asked for (a solve that lost modes, a factorisation that broke down). Exit code 3.
+/// Numerical failure (missing modes, breakdown of a factorisation). Exit code 3.
 class SolveError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// The machine refused (disk full, no memory, a file that cannot be written). Exit code 4.
+/// System failure (disk full, out of memory, write error). Exit code 4.
 class SystemError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };

@@ -1,4 +1,4 @@
-// Errors that say to a program what their message says to a person.
+// Errors with machine-readable details.
 #pragma once
 
 #include <cstdint>
@@ -8,23 +8,23 @@
 
 namespace carillon {
 
-/// An InputError at a place of a file.
+/// InputError with the place separated from the message.
 class PlacedError : public InputError {
  public:
   /// `place`: "file:line" or a file; the message is "place: message".
   PlacedError(const std::string& place, const std::string& message) : InputError(place + ": " + message), place_(place) {}
   const std::string& get_place() const { return place_; }
-  /// Without the place.
+  /// Message without the place.
   std::string get_message() const { return std::string(what()).substr(place_.size() + 2); }
 
  private:
   std::string place_;
 };
 
-/// A count of nodes that was asked for cannot be met, and another one can.
+/// The requested number of nodes is not feasible, another one is.
 class CountRefusal : public InputError {
  public:
-  /// `possible_nodes`: what to ask for in its place, about; above 0.
+  /// `possible_nodes`: approximate feasible count; above 0.
   CountRefusal(const std::string& message, std::int64_t possible_nodes) : InputError(message), possible_nodes_(possible_nodes) {}
   std::int64_t get_possible_nodes() const { return possible_nodes_; }
 
@@ -32,10 +32,10 @@ class CountRefusal : public InputError {
   std::int64_t possible_nodes_;
 };
 
-/// There is not as much memory as the work needs.
+/// Insufficient memory.
 class MemoryError : public SystemError {
  public:
-  /// `need_bytes`: on all ranks of the fullest machine; 0: not known.
+  /// `need_bytes`: all ranks of the fullest machine; 0: unknown.
   explicit MemoryError(const std::string& message, double need_bytes = 0.0) : SystemError(message), need_bytes_(need_bytes) {}
   double get_need_bytes() const { return need_bytes_; }
 
@@ -43,16 +43,15 @@ class MemoryError : public SystemError {
   double need_bytes_ = 0.0;
 };
 
-/// The disk, or a user's share of it, takes no more.
+/// Disk or quota full.
 class DiskFullError : public SystemError {
   using SystemError::SystemError;
 };
 
-/// Throws a DiskFullError, MemoryError or SystemError as `error`, a value of errno, says.
+/// Throws DiskFullError, MemoryError or SystemError according to the errno value `error`.
 [[noreturn]] void throw_system_error(int error, const std::string& message);
 
-/// In a handler: throws the exception again, with `before` in front of its message, behind its place, where it is one of
-/// Carillon's.
+/// In a handler: rethrows one of Carillon's exceptions with `before` inserted between place and message.
 [[noreturn]] void rethrow_after(const std::string& before);
 
 }  // namespace carillon

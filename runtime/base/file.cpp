@@ -29,8 +29,8 @@ fs::path find_folder(const fs::path& file) { return file.has_parent_path() ? fil
 
 namespace {
 
-/// Next to `file`, hidden, of this process and call alone: two threads that write one name must not share a temporary file. Never longer
-/// than the name of `file` and some forty bytes, cut where a file system's 255 would end.
+/// Hidden name in the folder of `file`, unique to process and call, since two threads may write one file. Adds some forty bytes to the
+/// name, truncated to a file system's limit of 255.
 fs::path make_temporary_name(const fs::path& file) {
   static std::atomic<unsigned> count{0};
   return find_folder(file) / fmt::format(".{}.tmp.{}.{}", file.filename().string().substr(0, 200), ::getpid(), count++);
@@ -47,9 +47,9 @@ bool is_full_error(int error) { return error == ENOSPC || error == EDQUOT || err
 
 namespace {
 
-/// A regular file to read. `length` gets its bytes.
+/// Opens a regular file for reading; `length`: its size [byte].
 int open_regular(const fs::path& file, std::string_view what, std::uint64_t& length) {
-  // O_NONBLOCK: opening a pipe without a writer must not wait.
+  // O_NONBLOCK: do not wait for a writer of a pipe.
   const int fd = ::open(file.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
   if (fd < 0) {
     throw InputError(
@@ -65,7 +65,7 @@ int open_regular(const fs::path& file, std::string_view what, std::uint64_t& len
   return fd;
 }
 
-/// As many of the bytes as the file has left.
+/// Reads `count` bytes, fewer at end of file.
 std::size_t read_some(int fd, char* bytes, std::size_t count, const fs::path& file, std::string_view what) {
   std::size_t done = 0;
   while (done < count) {
@@ -87,7 +87,7 @@ std::string read_file(const fs::path& file, std::string_view what, std::uint64_t
     throw InputError(fmt::format("{}: {} bytes are too many for a {} (at most {}); {}", find_name(file), length, what, max_bytes, remedy));
   }
   std::string bytes(length, '\0');
-  bytes.resize(read_some(fd.get(), bytes.data(), bytes.size(), file, what));  // shorter when the file shrank meanwhile
+  bytes.resize(read_some(fd.get(), bytes.data(), bytes.size(), file, what));  // shorter if the file shrank meanwhile
   return bytes;
 }
 
@@ -95,7 +95,7 @@ void read_pieces(const fs::path& file, std::string_view what, std::size_t piece_
   std::uint64_t length = 0;
   const Descriptor fd(open_regular(file, what, length));
   std::string piece(piece_bytes, '\0');
-  for (std::uint64_t done = 0; done < length;) {  // what is appended meanwhile is not read
+  for (std::uint64_t done = 0; done < length;) {  // appended bytes are not read
     const std::size_t wanted = std::min<std::uint64_t>(piece_bytes, length - done);
     const std::size_t got = read_some(fd.get(), piece.data(), wanted, file, what);
     if (got == 0) return;
@@ -106,7 +106,7 @@ void read_pieces(const fs::path& file, std::string_view what, std::size_t piece_
 
 namespace {
 
-/// All signals wait while it lives.
+/// Blocks all signals during its lifetime.
 class SignalPause {
  public:
   SignalPause() {
@@ -122,13 +122,13 @@ class SignalPause {
   sigset_t before_{};
 };
 
-/// A file in `folder` that has no name and is gone with its last descriptor; -1 where the file system has no such thing (NFS, FAT).
+/// Nameless file in `folder`, gone with its last descriptor; -1 if unsupported (NFS, FAT).
 int open_nameless(const fs::path& folder) {
-  if (::access("/proc/self/fd", X_OK) != 0) return -1;  // link_nameless() needs it
+  if (::access("/proc/self/fd", X_OK) != 0) return -1;  // needed by link_nameless()
   return ::open(folder.c_str(), O_WRONLY | O_TMPFILE | O_CLOEXEC, 0666);
 }
 
-/// Gives the bytes of a nameless file the name. 0 or errno.
+/// Links a nameless file to `name`. Returns 0 or errno.
 int link_nameless(int descriptor, const fs::path& name) {
   const std::string self = fmt::format("/proc/self/fd/{}", descriptor);
   return ::linkat(AT_FDCWD, self.c_str(), AT_FDCWD, name.c_str(), AT_SYMLINK_FOLLOW) == 0 ? 0 : errno;
@@ -147,7 +147,7 @@ int write_all(int descriptor, std::string_view bytes) noexcept {
 }
 
 WholeFile::WholeFile(fs::path file) : file_(std::move(file)), temporary_(make_temporary_name(file_)) {
-  ::unlink(temporary_.c_str());  // of a process with our number that was killed; O_EXCL then follows no planted link
+  ::unlink(temporary_.c_str());  // left by a killed process of the same PID; O_EXCL follows no planted link
   descriptor_ = open_nameless(find_folder(file_));
   is_nameless_ = descriptor_ >= 0;
   if (!is_nameless_) descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
@@ -174,7 +174,7 @@ void WholeFile::append(std::string_view bytes) {
 void WholeFile::commit() {
   if (::fsync(descriptor_) != 0) refuse(errno);
   {
-    // A process killed by a signal that can be caught leaves no temporary name behind.
+    // A catchable signal must not leave a temporary name behind.
     const SignalPause pause;
     if (is_nameless_) {
       if (const int error = link_nameless(descriptor_, temporary_); error != 0) refuse(error);
@@ -214,13 +214,13 @@ WholeFolder::~WholeFolder() {
   std::error_code error;
   if (path_.empty()) return;
   remove_temporary_folder(path_);
-  for (const std::filesystem::path& above : made_) std::filesystem::remove(above, error);  // only those that are empty
+  for (const std::filesystem::path& above : made_) std::filesystem::remove(above, error);  // removes empty ones only
 }
 
 void WholeFolder::commit() {
   const SignalPause pause;
   std::error_code error;
-  const std::filesystem::path before = path_.string() + ".before";  // an earlier folder is not removed until the new one is there
+  const std::filesystem::path before = path_.string() + ".before";  // keep the old folder until the new one is in place
   const bool has_before = std::filesystem::exists(place_, error);
   if (has_before) std::filesystem::rename(place_, before, error);
   if (error) refuse_folder(place_, error);
@@ -256,12 +256,12 @@ void check_writable(const fs::path& file, std::string_view what) {
     throw InputError(fmt::format("{}: cannot make the folder of the {} ({}); choose another place", find_name(folder), what,
                                  error ? error.message() : "it is not a folder"));
   }
-  if (::lstat(file.c_str(), &info) != 0 && errno != ENOENT) {  // a name too long, a loop of links
+  if (::lstat(file.c_str(), &info) != 0 && errno != ENOENT) {  // name too long, or a symlink loop
     throw InputError(
         fmt::format("{}: the {} cannot be written here: {}; choose another name", find_name(file), what, std::strerror(errno)));
   }
   const fs::path probe = make_temporary_name(file);
-  ::unlink(probe.c_str());  // of a process with our number that was killed; O_EXCL then follows no planted link
+  ::unlink(probe.c_str());  // left by a killed process of the same PID; O_EXCL follows no planted link
   const Descriptor fd(::open(probe.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600));
   if (fd.get() < 0) {
     throw InputError(fmt::format("{}: the {} cannot be written here: {}; choose a folder that you may write to", find_name(file), what,

@@ -1,4 +1,4 @@
-// Files that another program wrote, and files that must appear whole or not at all.
+// Reading of untrusted files; atomic writing.
 #pragma once
 
 #include <cstdint>
@@ -12,33 +12,32 @@
 
 namespace carillon::base {
 
-/// Whether this value of errno is that of a disk, or of a user's share of it, that takes no more.
+/// True for errno values of a full disk or quota.
 bool is_full_error(int error);
 
-/// The folder that a file is in: "." where its name has none.
+/// Parent folder; "." if the name has none.
 std::filesystem::path find_folder(const std::filesystem::path& file);
 
-/// The bytes of a regular file. Throws InputError when there is none, when it is a folder, a pipe or a device (never waits on one), when it
-/// cannot be read, or when it holds more than `max_bytes`. `what` says in messages what was expected ("job file").
+/// Contents of a regular file. Throws InputError if missing, not a regular file (never blocks on pipes), unreadable, or longer than
+/// `max_bytes`. `what` names the expected file in messages ("job file").
 std::string read_file(const std::filesystem::path& file, std::string_view what, std::uint64_t max_bytes,
                       std::string_view remedy = "check that this is the right file");
 
-/// The bytes of a regular file of any length, in pieces of at most `piece_bytes`, in order. Throws as read_file does.
+/// Contents of a regular file of any length, in order, in pieces of at most `piece_bytes`. Throws as read_file does.
 void read_pieces(const std::filesystem::path& file, std::string_view what, std::size_t piece_bytes,
                  const std::function<void(std::string_view)>& take);
 
-/// Writes the bytes to a temporary file next to `file`, fsyncs, renames it to `file` and fsyncs the folder: readers see the old content
-/// or the new. The temporary file has no name until it is whole, where the file system can do that (not on NFS): a process that is ended in
-/// the middle leaves nothing. Throws SystemError when the disk refuses; nothing is left behind then.
+/// Atomic write: temporary file in the same folder, fsync, rename, fsync of the folder. The temporary file is nameless until complete
+/// where the file system supports it (not NFS), so that a killed process leaves nothing behind. Throws SystemError and cleans up.
 void write_file(const std::filesystem::path& file, std::string_view bytes);
 
-/// The same for content that comes in pieces:
+/// Atomic write in pieces:
 ///
 ///   WholeFile file("stiffness.mtx");
 ///   while (more) file.append(piece);
 ///   file.commit();
 ///
-/// One that goes without commit() leaves nothing behind. All throw SystemError when the disk refuses.
+/// Without commit() nothing is left behind. All members throw SystemError on I/O errors.
 class WholeFile {
  public:
   explicit WholeFile(std::filesystem::path file);
@@ -47,7 +46,7 @@ class WholeFile {
   WholeFile& operator=(const WholeFile&) = delete;
 
   void append(std::string_view bytes);
-  /// The name is there, and the old content gone, when it returns.
+  /// On return the name refers to the new content.
   void commit();
 
  private:
@@ -58,29 +57,29 @@ class WholeFile {
   bool is_nameless_ = false;  // the temporary file has no name yet
 };
 
-/// A folder that appears whole or not at all: it is filled under another name next to its place, and renamed by commit().
+/// Atomic folder: filled under a temporary name in the same parent, renamed by commit().
 class WholeFolder {
  public:
-  /// Throws SystemError when the disk refuses.
+  /// Throws SystemError.
   explicit WholeFolder(std::filesystem::path place);
   ~WholeFolder();
   WholeFolder(const WholeFolder&) = delete;
   WholeFolder& operator=(const WholeFolder&) = delete;
 
   const std::filesystem::path& path() const { return path_; }
-  /// What stands at its place is removed. Throws SystemError.
+  /// Replaces an existing folder of that name. Throws SystemError.
   void commit();
 
  private:
   std::filesystem::path place_, path_;
-  std::vector<std::filesystem::path> made_;  // folders above it that were not there, innermost first: they go with it
+  std::vector<std::filesystem::path> made_;  // created parents, innermost first; removed without commit()
 };
 
-/// The extension with its point, in lower case: ".obj" of "Cup.OBJ".
+/// Extension in lower case with its point: ".obj" for "Cup.OBJ".
 std::string find_extension(const std::filesystem::path& file);
 
-/// Throws InputError unless `file` can be written: its folder exists (or can be made) and takes files, and `file` itself is no folder or
-/// device. Meant for before long work. `what` names the output in messages ("bank").
+/// Throws InputError unless `file` can be written: its folder exists or can be created and is writable, and `file` is not a folder or
+/// device. Called before long computations. `what` names the output in messages ("bank").
 void check_writable(const std::filesystem::path& file, std::string_view what);
 
 }  // namespace carillon::base

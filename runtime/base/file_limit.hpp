@@ -1,12 +1,12 @@
-// The limit on the size of files (ulimit -f) as an error.
+// File size limit (ulimit -f) as an error.
 #pragma once
 
 #include <csignal>
 
 namespace carillon::base {
 
-/// At the start of main(): a write beyond the limit fails with EFBIG, reported like a full disk, in place of a silent end by SIGXFSZ.
-/// Child processes inherit it.
+/// Call first in main(): writes beyond the limit then fail with EFBIG, reported like a full disk, instead of ending the process by SIGXFSZ.
+/// Inherited by children.
 inline void report_file_limit() { std::signal(SIGXFSZ, SIG_IGN); }
 
 }  // namespace carillon::base

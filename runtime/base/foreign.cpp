@@ -8,7 +8,7 @@
 namespace carillon::base {
 namespace {
 
-/// True for zero bytes at the odd places of the first characters (`first` 0: little endian) or at the even ones (1).
+/// True if the odd (`first` = 0, little endian) or even (1) bytes of the first characters are zero.
 bool has_zeros(std::string_view bytes, std::size_t first, std::size_t characters) {
   if (bytes.size() < 2 * characters) return false;
   for (std::size_t i = 0; i < characters; ++i)
@@ -19,7 +19,7 @@ bool has_zeros(std::string_view bytes, std::size_t first, std::size_t characters
 }  // namespace
 
 void refuse_utf16(std::string_view bytes, std::string_view name) {
-  constexpr std::size_t kMarked = 1, kUnmarked = 4;  // characters to check, with a byte-order mark and without
+  constexpr std::size_t kMarked = 1, kUnmarked = 4;  // characters to check with and without a byte-order mark
   const bool is_marked = bytes.starts_with("\xFF\xFE") || bytes.starts_with("\xFE\xFF");
   const std::string_view text = is_marked ? bytes.substr(2) : bytes;
   const std::size_t characters = is_marked ? std::min(kMarked, text.size() / 2) : kUnmarked;

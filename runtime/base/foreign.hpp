@@ -1,4 +1,4 @@
-// Errors that name habits of other systems: texts in UTF-16, paths with backslashes.
+// Diagnosis of UTF-16 text and of paths with backslashes.
 #pragma once
 
 #include <filesystem>
@@ -9,10 +9,10 @@
 
 namespace carillon::base {
 
-/// Throws InputError that begins with `name` for text in UTF-16: a byte-order mark, or zeros in every other byte. Any bytes are safe.
+/// Throws InputError beginning with `name` for UTF-16: byte-order mark, or zeros in every other byte.
 void refuse_utf16(std::string_view bytes, std::string_view name);
 
-/// Last part of the message for a missing file: "; use / between folders, not \" for a path with backslashes, else empty.
+/// "; use / between folders, not \" if the path contains a backslash, else empty; appended to messages on missing files.
 std::string hint_backslash(const std::filesystem::path& file);
 
 }  // namespace carillon::base

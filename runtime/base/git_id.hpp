@@ -1,4 +1,4 @@
-// Where the build came from. The value is written by git_id.cmake at every build. Internal to carillon::base.
+// Commit of the build, written by git_id.cmake at every build. Internal to carillon::base.
 #pragma once
 
 namespace carillon::base {

@@ -1,8 +1,6 @@
-// Method:     The least of what machine and control groups say, from the group of this process up to the root.
-// Source:     Linux sched_getaffinity(2), getrlimit(2), proc(5) (meminfo, self/cgroup, self/status),
-//             Documentation/admin-guide/cgroup-v2.rst (cpu.max, memory.max), cgroup-v1/memory.rst, scheduler/sched-bwc.rst
-//             (cpu.cfs_quota_us).
-// Deviations: none.
+// Method: minimum over the machine and all control groups from that of this process up to the root.
+// Source: Linux sched_getaffinity(2), getrlimit(2), proc(5) (meminfo, self/cgroup, self/status),
+//   Documentation/admin-guide/cgroup-v2.rst (cpu.max, memory.max), cgroup-v1/memory.rst, scheduler/sched-bwc.rst (cpu.cfs_quota_us).
 #include "runtime/base/host.hpp"
 
 #include <sched.h>
@@ -22,9 +20,9 @@
 namespace carillon::base {
 namespace {
 
-constexpr double kUnlimited = 1e18;  // what groups of version 1 say is above
+constexpr double kUnlimited = 1e18;  // "no limit" of cgroup v1 is larger
 
-/// The first number of a file; none when there is no file or no number ("max").
+/// First number of a file; nullopt without file or number ("max").
 std::optional<double> read_number(const std::string& file) {
   std::ifstream stream(file);
   double value = 0.0;
@@ -32,7 +30,7 @@ std::optional<double> read_number(const std::string& file) {
   return std::nullopt;
 }
 
-/// The numbers after `names` in a file of lines "name number"; 0 for those that are not there.
+/// Numbers after `names` in a file of lines "name number"; 0 if absent.
 template <std::size_t n>
 std::array<double, n> read_entries(const std::string& file, const std::array<const char*, n>& names) {
   std::array<double, n> values{};
@@ -48,7 +46,7 @@ std::array<double, n> read_entries(const std::string& file, const std::array<con
   return values;
 }
 
-/// The folders of this process's group and of those above it; `controller` "" is version 2.
+/// Folders of this process's group and its ancestors; `controller` "": version 2.
 std::vector<std::string> find_groups(const std::string& controller) {
   std::ifstream stream("/proc/self/cgroup");
   for (std::string line; std::getline(stream, line);) {
@@ -88,7 +86,7 @@ int find_cores() {
   return std::max(1, static_cast<int>(std::floor(cores + 1e-6)));
 }
 
-/// Lessens total and available by what the groups allow.
+/// Reduces total and available memory to the limits of the groups.
 void heed_groups(bool is_v2, double& total, double& available) {
   for (const std::string& group : find_groups(is_v2 ? "" : "memory")) {
     const double max = read_number(group + (is_v2 ? "/memory.max" : "/memory.limit_in_bytes")).value_or(kUnlimited);
@@ -116,7 +114,7 @@ Memory find_memory() {
   const auto to_bytes = [](double size_kb) { return static_cast<std::int64_t>(size_kb) * 1024; };
   Memory memory{.address_space = to_bytes(kb[0]), .resident = to_bytes(kb[1]), .peak = to_bytes(kb[2])};
   if (memory.peak > 0) return memory;
-  rusage used{};  // of the process that started this one, too
+  rusage used{};  // may include the parent process
   ::getrusage(RUSAGE_SELF, &used);
   memory.peak = static_cast<std::int64_t>(used.ru_maxrss) * 1024;
   return memory;

@@ -1,4 +1,4 @@
-// What the machine can give, and what this process has taken of it.
+// Cores and memory available to this process.
 #pragma once
 
 #include <cstdint>
@@ -6,20 +6,20 @@
 namespace carillon::base {
 
 struct Host {
-  int cores = 1;              // that this process may run on: affinity, and what a control group allows
-  double total_gb = 0.0;      // memory of the machine, or of the control group where that is less
-  double available_gb = 0.0;  // of it, what could be taken now without swapping
+  int cores = 1;              // usable by this process: affinity and control group
+  double total_gb = 0.0;      // machine memory, or the control group's limit if lower
+  double available_gb = 0.0;  // available now without swapping
 };
 Host find_host();
 
 /// Memory of this process [byte].
 struct Memory {
   std::int64_t address_space = 0, resident = 0;
-  std::int64_t peak = 0;  // highest `resident` since exec; where /proc lacks VmHWM it may include the program that started this one
+  std::int64_t peak = 0;  // maximum of `resident` since exec; without VmHWM in /proc it may include the parent process
 };
 Memory find_memory();
 
-/// What RLIMIT_AS leaves this process of address space [byte]; the largest number where there is no limit.
+/// Remaining address space under RLIMIT_AS [byte]; the largest number without a limit.
 std::int64_t find_address_space_left();
 
 }  // namespace carillon::base

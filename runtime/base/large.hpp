@@ -1,4 +1,4 @@
-// Memory for arrays of megabytes.
+// Allocation of large arrays.
 #pragma once
 
 #include <sys/mman.h>
@@ -9,8 +9,8 @@
 
 namespace carillon::base {
 
-/// As values.reserve(count). Asks for large pages, where the system has them: a page of 4 KiB that is touched for the first time costs
-/// more than the writing of it. To append what comes then is cheaper than to overwrite zeros.
+/// values.reserve(count) with a request for large pages: first-touch faults of 4 KiB pages cost more than the writes themselves. Append to
+/// the reserved storage instead of overwriting zeros.
 template <class T>
 void reserve_large(std::vector<T>& values, std::size_t count) {
   values.reserve(count);
@@ -18,7 +18,7 @@ void reserve_large(std::vector<T>& values, std::size_t count) {
   constexpr std::uintptr_t kLarge = std::uintptr_t{1} << 21;
   const auto begin = (reinterpret_cast<std::uintptr_t>(values.data()) + kLarge - 1) / kLarge * kLarge;
   const auto end = reinterpret_cast<std::uintptr_t>(values.data() + values.capacity()) / kLarge * kLarge;
-  if (begin < end) ::madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE);  // advice: nothing depends on it
+  if (begin < end) ::madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE);  // advice only
 #endif
 }
 

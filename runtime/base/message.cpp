@@ -17,7 +17,7 @@ constexpr const char* kCut = "...";
 
 bool is_continuation(char c) { return (static_cast<unsigned char>(c) & 0xC0U) == 0x80U; }
 
-/// Keeps two thirds of `max` from the beginning, the rest from the end, and characters of UTF-8 whole.
+/// Keeps two thirds of `max` from the beginning and the rest from the end, at UTF-8 boundaries.
 std::string cut_middle(std::string_view text, std::size_t max) {
   if (text.size() <= max) return std::string(text);
   std::size_t head = 2 * max / 3, tail = text.size() - (max - 2 * max / 3);

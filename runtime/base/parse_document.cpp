@@ -1,6 +1,4 @@
-// The parser of documents, and the places of their values.
-// Method: RapidJSON reads the text event by event; every value and every key is kept with the offset of its place, from which lines are
-// counted.
+// Parser of documents. RapidJSON events become values with text offsets, from which line numbers are computed.
 #include <fmt/core.h>
 #include <rapidjson/error/en.h>
 #include <rapidjson/reader.h>
@@ -40,6 +38,28 @@ void DocumentData::fail(std::ptrdiff_t offset, const std::string& message) const
   throw PlacedError(fmt::format("{}:{}", file.string(), line_at(offset)), message);
 }
 
+// By the standard library: RapidJSON's conversion has undefined behaviour for leading zeros.
+std::optional<double> to_double(std::string_view text) {
+#ifdef __cpp_lib_to_chars
+  double number = 0.0;
+  auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error == std::errc::result_out_of_range) {
+    // Over- or underflow: parse as long double. Beyond its range too, the number is small if its exponent is negative or its integer part
+    // is 0, since RapidJSON rejects exponents above 308.
+    long double wide = 0.0L;
+    const bool is_within = std::from_chars(text.data(), text.data() + text.size(), wide).ec == std::errc();
+    if (!is_within && text.find('-', 1) == std::string_view::npos && text.substr(text.starts_with('-') ? 1 : 0, 1) != "0")
+      return std::nullopt;
+    number = static_cast<double>(wide);
+    error = std::errc();
+  }
+  if (error != std::errc()) return std::nullopt;
+#else
+  const double number = std::strtod(std::string(text).c_str(), nullptr);  // WebAssembly has one locale only
+#endif
+  return std::isfinite(number) ? std::optional(number) : std::nullopt;
+}
+
 std::string kind_of(const Value& value) {
   switch (value.kind) {
     case Value::Kind::kNull:
@@ -63,30 +83,7 @@ namespace {
 constexpr std::uint64_t kMaxBytes = 16u << 20;
 constexpr int kMaxDepth = 100;
 
-/// The double that is nearest to a number of JSON; nothing when it is too large. By the standard library: RapidJSON's own conversion counts
-/// the leading zeros of 0, which is undefined.
-std::optional<double> to_double(std::string_view text) {
-#ifdef __cpp_lib_to_chars
-  double number = 0.0;
-  auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (error == std::errc::result_out_of_range) {
-    // Too large or too small: a long double decides. Beyond that as well, it is small if its exponent is negative or its whole part 0,
-    // since RapidJSON takes no exponent above 308.
-    long double wide = 0.0L;
-    const bool is_within = std::from_chars(text.data(), text.data() + text.size(), wide).ec == std::errc();
-    if (!is_within && text.find('-', 1) == std::string_view::npos && text.substr(text.starts_with('-') ? 1 : 0, 1) != "0")
-      return std::nullopt;
-    number = static_cast<double>(wide);
-    error = std::errc();
-  }
-  if (error != std::errc()) return std::nullopt;
-#else
-  const double number = std::strtod(std::string(text).c_str(), nullptr);  // WebAssembly, where there is but one locale
-#endif
-  return std::isfinite(number) ? std::optional(number) : std::nullopt;
-}
-
-/// Makes Values of the events of a rapidjson::Reader.
+/// Builds Values from rapidjson::Reader events.
 class Builder {
  public:
   Builder(const DocumentData& data, const rapidjson::StringStream& stream, Value& root) : data_(&data), stream_(&stream), open_{&root} {}
@@ -94,7 +91,7 @@ class Builder {
   bool Null() { return add({}); }
   bool Bool(bool is_true) { return add({.kind = Value::Kind::kBoolean, .is_true = is_true}); }
   bool RawNumber(const char* text, rapidjson::SizeType size, bool) { return add_number({text, size}); }
-  // Numbers come as text.
+  // Unused: numbers are read as text.
   bool Int(int) { return false; }
   bool Uint(unsigned) { return false; }
   bool Int64(std::int64_t) { return false; }
@@ -126,7 +123,7 @@ class Builder {
   }
 
  private:
-  /// An offset from the beginning of the last token to the byte behind it, which gives its line: a token lies on one line.
+  /// Offset within the last token, or just past it; tokens do not span lines.
   std::ptrdiff_t get_offset() const { return stream_->src_ - stream_->head_; }
   bool add_number(std::string_view text) {
     std::int64_t integer = 0;
@@ -144,7 +141,7 @@ class Builder {
   bool add(Value value) {
     value.offset = get_offset();
     Value& into = *open_.back();
-    Value* place = &into;  // the root
+    Value* place = &into;  //
     if (is_root_there_) place = into.is(Value::Kind::kList) ? &into.items.emplace_back() : &into.items.back();
     value.key = std::move(place->key);
     value.key_offset = place->key_offset;
@@ -163,7 +160,7 @@ class Builder {
 
   const DocumentData* data_;
   const rapidjson::StringStream* stream_;
-  std::vector<Value*> open_;  // containers, the root first; only the last one grows, so that they stay where they are
+  std::vector<Value*> open_;  // open containers, root first; only the last grows, so pointers stay valid
   bool is_root_there_ = false;
 };
 
@@ -179,7 +176,7 @@ class Builder {
                                                              : "correct the text there"));
 }
 
-/// The fault of a word that begins like a number, as part of a sentence; nullptr for a number by the grammar of JSON.
+/// Fault of a word that begins like a number, for a message; nullptr for a valid JSON number.
 const char* find_number_fault(std::string_view word) {
   const auto skip_digits = [&] {
     const std::size_t digits = std::min(word.find_first_not_of("0123456789"), word.size());
@@ -187,13 +184,13 @@ const char* find_number_fault(std::string_view word) {
     return digits;
   };
   const bool is_signed = word.starts_with('-');
-  if (word.starts_with('+')) return "a number has no plus sign; leave it away";
+  if (word.starts_with('+')) return "a number has no plus sign; remove it";
   if (is_signed) word.remove_prefix(1);
   const bool has_zero = word.starts_with('0');
   const std::size_t whole = skip_digits();
   if (whole == 0) {
     if (word.starts_with('.')) return "there has to be a digit before the point: 0.5, not .5";
-    return is_signed ? "a minus sign is followed by digits" : "this is no number";
+    return is_signed ? "a minus sign is followed by digits" : "this is not a number";
   }
   if (has_zero && whole > 1) return "a number does not begin with a zero (12, not 012); a point may be missing behind it";
   if (has_zero && (word.starts_with('x') || word.starts_with('X') || word.starts_with('b') || word.starts_with('o')))
@@ -210,8 +207,7 @@ const char* find_number_fault(std::string_view word) {
   return word.empty() ? nullptr : "there is something behind the number; separate values by commas, and give units no letters";
 }
 
-/// The check before the parser: the depth of brackets outside strings and comments, so that the parser's recursion is bounded before it
-/// starts, and the form of numbers, with a clearer message.
+/// Checks before parsing: bracket depth, which bounds the parser's recursion, and number syntax, with clearer messages.
 void check_text(const DocumentData& data) {
   constexpr std::string_view kWord = "0123456789+-._abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ";
   const std::string_view text = data.text;

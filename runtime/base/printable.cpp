@@ -1,5 +1,5 @@
 // Source: RFC 3629 (UTF-8); Unicode 15, general categories Cc, Cf, Zl and Zp.
-// Deviations: of Cf, the soft hyphen, the joiners U+200C and U+200D and the marks of single scripts stay: they belong to words.
+// Deviations: of Cf, soft hyphen, joiners U+200C and U+200D and marks of single scripts are kept: they belong to words.
 #include "runtime/base/printable.hpp"
 
 #include <fmt/format.h>
@@ -14,7 +14,7 @@ namespace {
 
 struct Character {
   std::uint32_t code = 0;
-  std::size_t bytes = 0;  // 0: no UTF-8 begins here
+  std::size_t bytes = 0;  // 0: not valid UTF-8
 };
 
 Character decode(std::string_view text) {
@@ -77,7 +77,7 @@ std::string quote(std::string_view text) {
       out += text.substr(0, std::max<std::size_t>(bytes, 1));
     } else if (code <= 0xFFFF) {
       fmt::format_to(std::back_inserter(out), "\\u{:04x}", code);
-    } else {  // a surrogate pair
+    } else {  // surrogate pair
       fmt::format_to(std::back_inserter(out), "\\u{:04x}\\u{:04x}", 0xD7C0 + (code >> 10U), 0xDC00 + (code & 0x3FFU));
     }
     text.remove_prefix(std::max<std::size_t>(bytes, 1));

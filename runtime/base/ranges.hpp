@@ -1,4 +1,4 @@
-// Values of a document within closed bounds. Others are an InputError "file:line: ...".
+// Document values with inclusive bounds; violations are InputError "file:line: ...".
 #pragma once
 
 #include <string_view>
@@ -8,11 +8,11 @@
 
 namespace carillon::base {
 
-/// A required number.
+/// Required number.
 double read_within(Object& object, std::string_view key, double low, double high);
-/// An optional number; the fallback is not checked.
+/// Optional number; the fallback is not checked.
 double read_within(Object& object, std::string_view key, double fallback, double low, double high);
-/// An optional vector with components from -limit to limit.
+/// Three numbers of magnitude at most `limit`.
 Vec3 read_vector(Object& object, std::string_view key, const Vec3& fallback, double limit);
 
 /// Direction, not normalised and not 0, in which a listener at `position_m` looks: "look_at_m", a point, or "facing", a direction;

@@ -28,7 +28,7 @@ EVP_MD_CTX* get(void* context) { return static_cast<EVP_MD_CTX*>(context); }
 Sha256::Sha256() : context_(EVP_MD_CTX_new()) {
   if (context_ != nullptr && EVP_DigestInit_ex(get(context_), EVP_sha256(), nullptr) == 1) return;
   EVP_MD_CTX_free(get(context_));
-  throw SystemError("OpenSSL offers no SHA-256; check its installation");
+  throw SystemError("OpenSSL lacks SHA-256; check its installation");
 }
 
 Sha256::~Sha256() { EVP_MD_CTX_free(get(context_)); }

@@ -1,6 +1,4 @@
-// Method:     64 rounds a block of 64 bytes, as the standard writes them.
-// Source:     FIPS 180-4 (2015), 4.1.2 (functions), 4.2.2 (constants), 5.1.1 (padding), 6.2 (rounds).
-// Deviations: none.
+// Source: FIPS 180-4 (2015), 4.1.2 (functions), 4.2.2 (constants), 5.1.1 (padding), 6.2 (rounds).
 #include "runtime/base/sha256_plain.hpp"
 
 #include <algorithm>
@@ -63,7 +61,7 @@ void PlainSha256::add(std::span<const std::byte> bytes) noexcept {
 std::array<unsigned char, 32> PlainSha256::finish() noexcept {
   const std::uint64_t bits = 8 * size_;
   std::array<std::byte, 72> padding{std::byte{0x80}};
-  const std::size_t zeros = (119 - size_ % 64) % 64;  // up to 8 bytes before the end of a block, behind the 0x80
+  const std::size_t zeros = (119 - size_ % 64) % 64;  // to 8 bytes before the end of a block
   for (std::size_t i = 0; i < 8; ++i) padding[1 + zeros + i] = static_cast<std::byte>(bits >> (56 - 8 * i));
   add(std::span(padding).first(1 + zeros + 8));
   std::array<unsigned char, 32> hash;

@@ -1,4 +1,4 @@
-// SHA-256 without a library, for the build that has none: WebAssembly. Everything else takes sha256.hpp.
+// SHA-256 without OpenSSL, for WebAssembly. Use sha256.hpp.
 #pragma once
 
 #include <array>
@@ -8,12 +8,12 @@
 
 namespace carillon::base {
 
-/// The hash of bytes that come in pieces (FIPS 180-4, 6.2). Invariant: `state_` is the hash of all whole blocks of 64 bytes so
-/// far, and `block_` begins with the bytes after them.
+/// Incremental hash (FIPS 180-4, 6.2). Invariant: `state_` is the hash of all complete blocks of 64 bytes, `block_` begins with the bytes
+/// after them.
 class PlainSha256 {
  public:
   void add(std::span<const std::byte> bytes) noexcept;
-  /// Once only.
+  /// Call once.
   std::array<unsigned char, 32> finish() noexcept;
 
  private:

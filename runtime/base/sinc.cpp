@@ -1,6 +1,5 @@
-// Method:     the value between samples is the sum of 32 samples under a sinc and a Kaiser window, from tables.
-// Source:     Kaiser 1974 (window); Abramowitz and Stegun 9.6.12 (I0, its power series).
-// Deviations: none.
+// Method: convolution of 32 samples with a tabulated Kaiser-windowed sinc.
+// Source: Kaiser 1974 (window); Abramowitz and Stegun 9.6.12 (I0, power series).
 #include "runtime/base/sinc.hpp"
 
 #include <algorithm>
@@ -12,8 +11,8 @@ namespace {
 
 constexpr double kKaiserBeta = 9.0;  // stop band -90 dB
 
-/// The modified Bessel function I0 by its power series (Abramowitz and Stegun 9.6.12), for 0 <= x <= kKaiserBeta: std::cyl_bessel_i is not
-/// in every C++ library.
+/// Modified Bessel function I0 by its power series (Abramowitz and Stegun 9.6.12), 0 <= x <= kKaiserBeta; std::cyl_bessel_i is missing in
+/// some C++ libraries.
 double calc_bessel_i0(double x) {
   double term = 1.0, sum = 1.0;
   for (int k = 1; term > 1e-17 * sum; ++k) {
@@ -23,8 +22,7 @@ double calc_bessel_i0(double x) {
   return sum;
 }
 
-/// sin(pi x) / (pi x) under the window, at x samples from the middle, -half <= x <= half; calc_bessel_i0(kKaiserBeta) in the middle.
-/// Kaiser 1974.
+/// Kaiser-windowed sin(pi x) / (pi x), -half <= x <= half, scaled by I0(kKaiserBeta). Kaiser 1974.
 double calc_kaiser_sinc(double x, double half) {
   const double sinc = x == 0.0 ? 1.0 : std::sin(std::numbers::pi * x) / (std::numbers::pi * x);
   const double within = std::max(0.0, 1.0 - (x / half) * (x / half));

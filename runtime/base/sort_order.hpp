@@ -1,4 +1,4 @@
-// The order that sorts values which stay where they are.
+// Sorting permutation.
 #pragma once
 
 #include <algorithm>
@@ -8,7 +8,7 @@
 
 namespace carillon::base {
 
-/// Numbers of the values, those of the lowest first; equal values keep their order.
+/// Indices in ascending order of the values; stable.
 template <typename T>
 std::vector<std::size_t> find_sort_order(const std::vector<T>& values) {
   std::vector<std::size_t> order(values.size());

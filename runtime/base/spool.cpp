@@ -12,11 +12,11 @@
 namespace carillon::base {
 namespace {
 
-/// A file in `folder` that is gone with its descriptor; -1 and errno when there is none.
+/// Nameless file in `folder`; -1 and errno on failure.
 int open_unlinked(const std::filesystem::path& folder) {
   const int descriptor = ::open(folder.c_str(), O_RDWR | O_TMPFILE | O_CLOEXEC, 0600);
   if (descriptor >= 0) return descriptor;
-  // Where the file system has no files without a name (NFS), the name lives for a moment.
+  // File systems without nameless files (NFS): create and unlink.
   std::string name = (folder / ".carillon-spool-XXXXXX").string();
   const int named = ::mkostemp(name.data(), O_CLOEXEC);
   if (named >= 0) ::unlink(name.c_str());
@@ -69,7 +69,7 @@ void Spool::write_tail() {
     }
     descriptor_ = open_unlinked(folder_);
     if (descriptor_ < 0) refuse(errno);
-    memory_ = std::clamp<std::size_t>(memory_, 1, kTail);  // from now on memory is only there to write in large pieces
+    memory_ = std::clamp<std::size_t>(memory_, 1, kTail);  // memory is now a write buffer only
   }
   std::span<const std::byte> rest(tail_);
   while (!rest.empty()) {

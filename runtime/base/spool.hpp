@@ -1,4 +1,4 @@
-// What is too long for memory and read again in the same run: a list that continues in a file without a name.
+// Append-only lists that move to a nameless temporary file when they outgrow memory.
 #pragma once
 
 #include <algorithm>
@@ -14,14 +14,13 @@
 
 namespace carillon::base {
 
-/// Bytes, written once and in order. Up to `memory` of them stay in memory; once there are more, all go to a file in `folder` (empty:
-/// where temporary files go) that has no name, so that nothing is left behind however the program ends. All throw SystemError, which names
-/// `what` and the folder, when the disk refuses.
+/// Append-only bytes. Up to `memory` bytes stay in memory; beyond that all go to a nameless file in `folder` (empty: temporary folder), so
+/// that nothing is left behind however the process ends. I/O errors throw SystemError naming `what` and the folder.
 class Spool {
  public:
   static constexpr std::size_t kMemory = 4 << 20;
 
-  /// Touches no disk before it has to.
+  /// Performs no I/O.
   explicit Spool(std::filesystem::path folder = {}, std::string what = "list", std::size_t memory = kMemory);
   ~Spool();
   Spool(Spool&& other) noexcept;
@@ -29,7 +28,7 @@ class Spool {
 
   void append(std::span<const std::byte> bytes);
   std::uint64_t size() const { return written_ + tail_.size(); }
-  /// Fills `bytes` from `offset`; both must lie inside.
+  /// Fills `bytes` from `offset`; the range must exist.
   void read(std::uint64_t offset, std::span<std::byte> bytes) const;
 
  private:
@@ -41,10 +40,10 @@ class Spool {
   std::size_t memory_ = 0;
   int descriptor_ = -1;
   std::uint64_t written_ = 0;    // bytes in the file
-  std::vector<std::byte> tail_;  // what follows them
+  std::vector<std::byte> tail_;  // bytes after those
 };
 
-/// A list of plain records in a spool.
+/// List of trivially copyable records in a spool.
 template <class Record>
 class Records {
   static_assert(std::is_trivially_copyable_v<Record>);
@@ -63,11 +62,11 @@ class Records {
     return record;
   }
 
-  /// Goes through the list once, from the beginning. The list must outlive it.
+  /// Sequential reader. The list must outlive it.
   class Reader {
    public:
     explicit Reader(const Records& records) : records_(&records) {}
-    /// Of the next record.
+    /// Index of the next record.
     std::uint64_t get_number() const { return first_ + at_; }
     /// nullptr at the end. Valid until next().
     const Record* peek() {
@@ -84,7 +83,7 @@ class Records {
    private:
     static constexpr std::size_t kBuffered = 512;
     const Records* records_;
-    std::uint64_t first_ = 0;  // number of the first in the buffer
+    std::uint64_t first_ = 0;  // index of buffer_[0]
     std::size_t at_ = 0;
     std::vector<Record> buffer_;
   };
@@ -102,11 +101,11 @@ class Records {
   Spool spool_;
 };
 
-/// Several lists that grow in turns, in one spool.
+/// Several lists appended alternately to one spool.
 template <class Record>
 class RecordLists {
   struct List {
-    std::vector<std::uint64_t> pieces;  // first record of each piece
+    std::vector<std::uint64_t> pieces;  // index of the first record of each piece
     std::vector<Record> tail;
   };
 
@@ -123,7 +122,7 @@ class RecordLists {
     to.tail.clear();
   }
 
-  /// Goes through one list once. The lists must outlive it and grow no more.
+  /// Sequential reader of one list. The lists must outlive it and must not grow meanwhile.
   class Reader {
    public:
     Reader(const RecordLists& lists, std::size_t list) : lists_(&lists), list_(&lists.lists_[list]) {}

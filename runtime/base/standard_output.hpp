@@ -1,4 +1,4 @@
-// "-" as the name of an output: the bytes go to standard output, and what a program says goes to standard error.
+// Output name "-": data to standard output, messages to standard error.
 #pragma once
 
 #include <filesystem>
@@ -8,14 +8,13 @@
 
 namespace carillon::base {
 
-/// Whether an output is named "-".
+/// True for "-".
 bool is_standard_output(const std::filesystem::path& file);
 
-/// Throws InputError when standard output is a terminal, which shows no bytes. Meant for before long work. `what` names the output
-/// ("mesh").
+/// Throws InputError if standard output is a terminal. Called before long computations. `what` names the output ("mesh").
 void check_standard_output(std::string_view what);
 
-/// Writes all bytes and empties the buffer. Throws SystemError when the reader refuses.
+/// Writes and flushes. Throws SystemError.
 void write_standard_output(std::string_view bytes);
 
 }  // namespace carillon::base

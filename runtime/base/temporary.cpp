@@ -1,6 +1,5 @@
-// Method: a table of fixed size, as a handler may neither allocate nor lock. Folders are removed by rm(1), in a process of its own.
+// Method: fixed-size table, since signal handlers may neither allocate nor lock. Folders are removed by rm(1) in a child process.
 // Source: signal-safety(7); glibc 2.34 _Fork(); flock(2).
-// Deviations: poll() in place of a sleep.
 #include "runtime/base/temporary.hpp"
 
 #include <fcntl.h>
@@ -34,14 +33,15 @@ constexpr int kStepMs = 20, kPatienceMs = 3000;
 constexpr std::array kSignals{SIGINT, SIGTERM, SIGHUP};
 
 struct Slot {
-  std::atomic<int> state{0};  // 0: free, 1: being filled or emptied, 2: a folder
+  std::atomic<int> state{0};  // 0: free, 1: changing, 2: in use
   std::array<char, kMaxPath> path{};
   int lock = -1;
 };
 std::array<Slot, kMaxFolders> slots;
 std::array<std::atomic<pid_t>, kMaxChildren> children{};
 std::atomic<int> folder_count{0};
-static_assert(std::atomic<int>::is_always_lock_free && std::atomic<pid_t>::is_always_lock_free, "A handler may touch nothing else.");
+static_assert(std::atomic<int>::is_always_lock_free && std::atomic<pid_t>::is_always_lock_free,
+              "Signal handlers require lock-free atomics.");
 
 void handle(int signal) {
   end_children_and_temporaries();
@@ -56,7 +56,7 @@ bool is_ours(int signal) {
   return ::sigaction(signal, nullptr, &action) == 0 && action.sa_handler == handle;
 }
 
-/// In place from the first folder to the last. Ignored and handled signals stay so.
+/// Installed with the first folder, removed with the last. Signals that are ignored or handled elsewhere stay so.
 void set_handlers(bool is_first) {
   for (const int signal : kSignals) {
     struct sigaction action {};
@@ -70,7 +70,7 @@ void set_handlers(bool is_first) {
   }
 }
 
-/// Removes the folders of dead processes.
+/// Removes folders of dead processes.
 void sweep(const fs::path& parent, const std::string& begin) {
   std::error_code error;
   for (fs::directory_iterator it(parent, error), end; !error && it != end; it.increment(error)) {
@@ -89,7 +89,7 @@ Slot* find_slot(const fs::path& folder) {
   return nullptr;
 }
 
-/// False if something is left. Safe in a signal handler.
+/// False if something remains. Async-signal-safe.
 bool remove_by_rm(const char* folder) {
   const pid_t child = ::_Fork();
   if (child == 0) {
@@ -104,7 +104,7 @@ bool remove_by_rm(const char* folder) {
   return child > 0 && status == 0;
 }
 
-/// Takes a folder out of the table of the handler.
+/// Removes a folder from the handler's table.
 void release(Slot& slot) {
   slot.state.store(1);
   if (slot.lock >= 0) ::close(slot.lock);
@@ -132,7 +132,7 @@ fs::path make_temporary_folder(const fs::path& parent, const std::string& begin)
     slot.state.store(2);
     return path;
   }
-  folder_count.fetch_sub(1);  // table full: removed by its destructor alone
+  folder_count.fetch_sub(1);  // table full: removed only by the destructor
   return path;
 }
 
@@ -189,7 +189,7 @@ void end_children_and_temporaries() noexcept {
   }
   for (Slot& slot : slots) {
     if (slot.state.load() != 2) continue;
-    // Grandchildren, as the mkdir of a shell, may write for a moment after the end of the child: rm then finds a folder that is not empty.
+    // Grandchildren such as a shell's mkdir may outlive the child briefly: rm then finds a folder that is not empty.
     for (int waited_ms = 0; !remove_by_rm(slot.path.data()) && waited_ms < kPatienceMs; waited_ms += kStepMs) ::poll(nullptr, 0, kStepMs);
   }
 }

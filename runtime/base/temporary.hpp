@@ -1,8 +1,8 @@
-// Temporary folders that do not outlive their process.
+// Temporary folders, removed with their process.
 //
-// The process holds a lock on a file in each folder. Leftovers of killed processes have that file without a lock; the next process to make
-// a folder of the same name there removes them. SIGINT, SIGTERM and SIGHUP, unless ignored or handled elsewhere, end the children of the
-// process and remove its folders before its end.
+// The process locks a file in each folder. Folders of killed processes have an unlocked file; the next process that makes a folder of the
+// same prefix there removes them. SIGINT, SIGTERM and SIGHUP, unless ignored or handled elsewhere, end the children and remove the folders
+// before the process ends.
 #pragma once
 
 #include <sys/types.h>
@@ -12,11 +12,11 @@
 
 namespace carillon::base {
 
-/// Makes the folder PARENT/BEGINxxxxxx. Throws SystemError.
+/// Creates PARENT/BEGINxxxxxx. Throws SystemError.
 std::filesystem::path make_temporary_folder(const std::filesystem::path& parent, const std::string& begin);
-/// Removes it with its content.
+/// Removes the folder and its contents.
 void remove_temporary_folder(const std::filesystem::path& folder) noexcept;
-/// Makes it permanent.
+/// Makes the folder permanent.
 void keep_temporary_folder(const std::filesystem::path& folder) noexcept;
 
 /// A temporary folder, removed by the destructor.
@@ -34,7 +34,7 @@ class TemporaryFolder {
   std::filesystem::path path_;
 };
 
-/// Children for end_children_and_temporaries().
+/// Registers children for end_children_and_temporaries().
 void note_child(pid_t child) noexcept;
 void forget_child(pid_t child) noexcept;
 

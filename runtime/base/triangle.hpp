@@ -1,4 +1,4 @@
-// Triangles of surfaces.
+// Surface triangles.
 #pragma once
 
 #include <array>
@@ -8,12 +8,11 @@
 
 namespace carillon {
 
-/// The numbers of its corners among the vertices of a surface.
+/// Vertex indices.
 using Triangle = std::array<std::int32_t, 3>;
 
-/// Barycentric coordinates of the place of a triangle (a, b, c) that is nearest to p, by the products
-/// d1 = ab . ap, d2 = ac . ap, d3 = ab . bp, d4 = ac . bp, d5 = ab . cp, d6 = ac . cp. Not of triangles without area.
-/// Ericson, Real-Time Collision Detection (2005), section 5.1.5.
+/// Barycentric coordinates of the point of a triangle (a, b, c) closest to p, from the products d1 = ab . ap, d2 = ac . ap, d3 = ab . bp,
+/// d4 = ac . bp, d5 = ab . cp, d6 = ac . cp. Undefined for degenerate triangles. Ericson, Real-Time Collision Detection (2005), 5.1.5.
 inline Vec3 weigh_corners(double d1, double d2, double d3, double d4, double d5, double d6) noexcept {
   if (d1 <= 0.0 && d2 <= 0.0) return {1.0, 0.0, 0.0};
   if (d3 >= 0.0 && d4 <= d3) return {0.0, 1.0, 0.0};
@@ -31,7 +30,7 @@ inline Vec3 weigh_corners(double d1, double d2, double d3, double d4, double d5,
   return {over_bc / sum, over_ac / sum, over_ab / sum};
 }
 
-/// The same by its corners.
+/// The same from the vertices.
 inline Vec3 weigh_corners(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) noexcept {
   const Vec3 ab = b - a, ac = c - a, ap = p - a, bp = p - b, cp = p - c;
   return weigh_corners(dot(ab, ap), dot(ac, ap), dot(ab, bp), dot(ac, bp), dot(ab, cp), dot(ac, cp));

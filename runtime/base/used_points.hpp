@@ -1,4 +1,4 @@
-// Points of triangles, without those of none.
+// Points referenced by triangles.
 #pragma once
 
 #include <cstddef>
@@ -12,10 +12,10 @@ namespace carillon::base {
 
 struct UsedPoints {
   std::vector<std::int32_t> points;  // ascending
-  std::vector<std::int32_t> number;  // of each point among them; -1: of no triangle
+  std::vector<std::int32_t> number;  // index of each point in `points`; -1: unused
 };
 
-/// Of `count` points.
+/// `count`: number of all points.
 inline UsedPoints find_used_points(std::span<const Triangle> triangles, std::size_t count) {
   UsedPoints used{{}, std::vector<std::int32_t>(count, -1)};
   for (const Triangle& triangle : triangles)

@@ -1,4 +1,4 @@
-// Vectors and matrices of three, world axes.
+// 3-vectors and 3x3 matrices.
 #pragma once
 
 #include <array>
@@ -17,15 +17,17 @@ inline Vec3 cross(const Vec3& a, const Vec3& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 inline double norm(const Vec3& a) { return std::sqrt(dot(a, a)); }
+/// As norm(), without overflow of the squares.
+inline double calc_length(const Vec3& a) { return std::hypot(a[0], a[1], a[2]); }
 inline Vec3 normalise(const Vec3& a) { return (1.0 / norm(a)) * a; }
-/// normalise(a), and zero of zero.
+/// As normalise(); zero for a zero vector.
 inline Vec3 calc_unit(const Vec3& a) {
   const double length = norm(a);
   return length > 0 ? (1 / length) * a : Vec3{};
 }
-/// The determinant of the matrix with these rows.
+/// Determinant of the matrix with rows a, b, c.
 inline double calc_det(const Vec3& a, const Vec3& b, const Vec3& c) { return dot(a, cross(b, c)); }
-/// The unit vector of the axis that n is least along; the first of several.
+/// Unit vector of the axis with the smallest component of n; the first of several.
 inline Vec3 find_least_axis(const Vec3& n) {
   std::size_t k = 0;
   for (std::size_t i = 1; i < 3; ++i)
@@ -34,10 +36,18 @@ inline Vec3 find_least_axis(const Vec3& n) {
   axis[k] = 1.0;
   return axis;
 }
-/// A unit vector at right angles to n.
+/// Unit vector perpendicular to n.
 inline Vec3 find_across(const Vec3& n) {
   const Vec3 axis = std::abs(n[0]) < 0.6 ? Vec3{1, 0, 0} : Vec3{0, 1, 0};
   return normalise(cross(n, axis));
+}
+
+/// Two unit vectors perpendicular to n and to each other.
+inline std::array<Vec3, 2> find_tangents(const Vec3& n) {
+  Vec3 first = cross(n, find_least_axis(n));
+  const double length = norm(first);
+  for (double& x : first) x /= length;
+  return {first, cross(n, first)};
 }
 
 inline Vec3 operator*(const Mat3& m, const Vec3& a) { return {dot(m[0], a), dot(m[1], a), dot(m[2], a)}; }
@@ -50,7 +60,7 @@ inline Mat3 operator*(const Mat3& a, const Mat3& b) {
   const Mat3 t = transpose(b);
   return {t * a[0], t * a[1], t * a[2]};
 }
-/// Of a symmetric matrix that is not singular.
+/// Inverse of a non-singular symmetric matrix.
 inline Mat3 calc_inverse(const Mat3& m) {
   const Vec3 a = cross(m[1], m[2]), b = cross(m[2], m[0]), c = cross(m[0], m[1]);
   const double s = 1.0 / dot(m[0], a);

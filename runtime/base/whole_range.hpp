@@ -1,4 +1,4 @@
-// Whole numbers as options of command lines.
+// Integers as command-line options.
 #pragma once
 
 #include <fmt/core.h>
@@ -9,7 +9,7 @@
 
 namespace carillon::base {
 
-/// Check of a whole number from low to high for CLI::Option::check(): the fault of a word, or empty.
+/// Validator for CLI::Option::check(): integers from low to high; returns the fault or an empty string.
 inline std::function<std::string(const std::string&)> whole_range(long long low, long long high) {
   return [low, high](const std::string& word) -> std::string {
     long long value = 0;
@@ -20,7 +20,7 @@ inline std::function<std::string(const std::string&)> whole_range(long long low,
   };
 }
 
-/// Type of the option in --help.
+/// Type shown by --help.
 inline std::string describe_whole_range(long long low, long long high) { return fmt::format("INT in [{} - {}]", low, high); }
 
 }  // namespace carillon::base

@@ -8,7 +8,7 @@ namespace {
 
 constexpr double kBarycentricSlack = 1e-6;
 constexpr double kUnitSlack = 1e-3;
-static_assert(kMaxForceSteps == 16, "the number is in the text of a fault");
+static_assert(kMaxForceSteps == 16, "the number is in a message");
 
 template <std::size_t n>
 bool is_finite(const std::array<double, n>& x) noexcept {
@@ -22,10 +22,10 @@ template <std::size_t n>
 bool is_unit(const std::array<double, n>& x) noexcept {
   double sum = 0.0;
   for (const double value : x) sum += value * value;
-  return std::abs(std::sqrt(sum) - 1.0) <= kUnitSlack;  // false for what is not a number
+  return std::abs(std::sqrt(sum) - 1.0) <= kUnitSlack;  // false for NaN
 }
 
-/// A finite number, at least 0.
+/// Finite and non-negative.
 bool is_amount(double x) noexcept { return std::isfinite(x) && x >= 0.0; }
 
 const char* find_place_fault(std::int32_t body, std::int32_t other, std::int32_t triangle, const Vec3& barycentric) noexcept {
@@ -40,7 +40,7 @@ const char* find_place_fault(std::int32_t body, std::int32_t other, std::int32_t
   return nullptr;
 }
 
-/// Position, velocity and attitude: of a BodyMotion or a Listener.
+/// Position, velocity and attitude of a BodyMotion or a Listener.
 template <class Moving>
 const char* find_moving_fault(const Moving& moving) noexcept {
   if (!is_finite(moving.position_m)) return "the position is not finite";

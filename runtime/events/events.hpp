@@ -1,5 +1,5 @@
-// Events from physics to sound, independent of the physics engine: impulses, samples of forces and lasting contacts at points of surfaces,
-// and where bodies and listener are.
+// Events from physics to sound, independent of the physics engine: impulses, sampled forces and lasting contacts at surface points, motions
+// of bodies and listener.
 #pragma once
 
 #include <algorithm>
@@ -15,42 +15,41 @@ namespace carillon::events {
 
 using carillon::Quaternion;
 
-/// Course of a contact force in time: sin^1.5 (Hertz), or the Gaussian of O'Brien, Shen and Gatchalian 2002, of the same variance.
+/// Pulse shape of a contact force: sin^1.5 (Hertz), or a Gaussian of equal variance (O'Brien, Shen and Gatchalian 2002).
 enum class PulseShape : std::uint8_t { kHertz, kGaussian };
 
-/// One contact pulse on one body; a contact between two sounding bodies gives two of these, with opposite impulses. Vectors are in the
-/// frame of the body's mesh.
+/// Contact pulse on one body; a contact between two sounding bodies gives two with opposite impulses. Vectors in mesh axes of the body.
 struct Impulse {
-  double time_s = 0.0;        // centre of the pulse, finer than any step or sample
+  double time_s = 0.0;        // centre of the pulse, sub-sample
   std::int32_t body = 0;      // index in the scene
-  std::int32_t other = -1;    // the other body's index; -1: the ground, or unknown
+  std::int32_t other = -1;    // index of the other body; -1: ground, or unknown
   std::int32_t triangle = 0;  // of the body's bank
   PulseShape shape = PulseShape::kHertz;
-  Vec3 barycentric{1.0, 0.0, 0.0};  // of the contact point in that triangle, sum 1
+  Vec3 barycentric{1.0, 0.0, 0.0};  // contact point in that triangle, sum 1
   Vec3 impulse_n_s{};               // on the body
-  double duration_s = 0.0;          // contact time; 0: an ideal impulse
+  double duration_s = 0.0;          // contact time; 0: ideal impulse
 };
 
-/// Steps of a Force: a pulse of an impact has 20 to 40. An event is copied from queue to queue, so a longer pulse is several events.
+/// Steps of a Force; impact pulses have 20 to 40. Events are copied between queues, so longer pulses are split.
 inline constexpr int kMaxForceSteps = 16;
 
-/// The force of a contact on one body, known step by step: constant in each of `count` steps of equal length. A pulse that has more steps
-/// continues in another Force, which begins where this one ends. Vectors are in the frame of the body's mesh.
+/// Contact force on one body, piecewise constant in `count` steps of equal length. Longer pulses continue in another Force that begins at
+/// the end of this one. Vectors in mesh axes of the body.
 struct Force {
-  double time_s = 0.0;  // when the first step begins
+  double time_s = 0.0;  // start of the first step
   double step_s = 0.0;  // above 0
   std::int32_t body = 0;
   std::int32_t other = -1;
   std::int32_t triangle = 0;
-  std::int16_t count = 0;  // steps, 1 to kMaxForceSteps
-  bool continues = false;  // the pulse of the Force before it of this body and place
+  std::int16_t count = 0;  // 1 to kMaxForceSteps
+  bool continues = false;  // continues the previous Force of this body and place
   Vec3 barycentric{1.0, 0.0, 0.0};
-  std::array<std::array<float, 3>, kMaxForceSteps> impulse_n_s{};  // on the body, of each step; zero beyond `count`
+  std::array<std::array<float, 3>, kMaxForceSteps> impulse_n_s{};  // on the body, per step; zero beyond `count`
 
   double calc_length_s() const noexcept { return count * step_s; }
 };
 
-/// Hands a pulse of any length to `sink` as Forces. `first` has everything but count and samples; `impulses_n_s`: a Vec3 for each step.
+/// Splits a pulse of any length into Forces for `sink`. `first`: all but count and samples; `impulses_n_s`: a Vec3 per step.
 template <class Impulses, class Sink>
 void split_force(Force first, const Impulses& impulses_n_s, Sink&& sink) {
   const double begin_s = first.time_s;
@@ -67,38 +66,38 @@ void split_force(Force first, const Impulses& impulses_n_s, Sink&& sink) {
   }
 }
 
-/// The sum of a Force [N s].
+/// Total impulse [N s].
 Vec3 calc_impulse(const Force& force) noexcept;
 
-/// The same impulse at once, at the middle of the force in time.
+/// Equivalent Impulse at the temporal centroid of the force.
 Impulse to_impulse(const Force& force) noexcept;
 
 enum class ContactState : std::uint8_t { kBegin, kHold, kEnd };
 
-/// One sample of a contact that lasts, on one of its two bodies; both get one, with the same id. Between records values change linearly.
-/// Vectors are in the frame of the body's mesh.
+/// Sample of a lasting contact on one of its two bodies; both get one with the same id. Values are interpolated linearly between samples.
+/// Vectors in mesh axes of the body.
 struct LastingContact {
-  /// As impedance_n_s_m: that of a plane wave into the other body over the patch, by its material (synth::find_impedance).
+  /// impedance_n_s_m by the other body's material: plane wave over the patch (synth::find_impedance).
   static constexpr double kByMaterial = -1.0;
 
   double time_s = 0.0;
-  std::uint64_t id = 0;  // of the pair and the spot; the same while the touch lasts
+  std::uint64_t id = 0;  // of pair and contact point, constant during the contact
   std::int32_t body = 0;
   std::int32_t other = -1;
   std::int32_t triangle = 0;
   ContactState state = ContactState::kHold;
   Vec3 barycentric{1.0, 0.0, 0.0};
-  Vec3 normal{};                         // unit, from the other body into this one
-  Vec3 slip_m_s{};                       // velocity of this surface against the other's
-  double force_n = 0.0;                  // normal, at least 0
-  double sweep_m_s = 0.0;                // speed of the contact over this body's surface; 0 for a box that slides flat
-  double other_sweep_m_s = 0.0;          // over the other's
-  double spin_rad_s = 0.0;               // relative angular speed about the tangents: rolling
-  double patch_radius_m = 0.0;           // Hertz radius of the touch under force_n, above 0
-  double impedance_n_s_m = kByMaterial;  // of the other body at the point, as a dashpot; 0: takes nothing
+  Vec3 normal{};                         // unit, into this body
+  Vec3 slip_m_s{};                       // velocity of this surface relative to the other
+  double force_n = 0.0;                  // normal force, >= 0
+  double sweep_m_s = 0.0;                // speed of the contact over this surface; 0 for a box sliding on its face
+  double other_sweep_m_s = 0.0;          // speed over the other surface
+  double spin_rad_s = 0.0;               // relative angular speed about tangents (rolling)
+  double patch_radius_m = 0.0;           // Hertz contact radius under force_n, > 0
+  double impedance_n_s_m = kByMaterial;  // impedance of the other body at the point (dashpot); 0: no absorption
 };
 
-/// Where a body is: its centre of mass and attitude.
+/// Pose of a body: centre of mass and attitude.
 struct BodyMotion {
   double time_s = 0.0;
   std::int32_t body = 0;
@@ -107,7 +106,7 @@ struct BodyMotion {
   Quaternion rotation{1.0, 0.0, 0.0, 0.0};
 };
 
-/// Where the listener is; microphones lie in this frame (x right, y forward, z up).
+/// Pose of the listener; microphones are given in this frame (x right, y forward, z up).
 struct Listener {
   double time_s = 0.0;
   Vec3 position_m{};
@@ -115,7 +114,7 @@ struct Listener {
   Quaternion rotation{1.0, 0.0, 0.0, 0.0};
 };
 
-/// Physics has run so far: nothing earlier than this follows.
+/// Progress of the physics: all later events have later times.
 struct TimeWatermark {
   double time_s = 0.0;
 };
@@ -124,9 +123,9 @@ using Event = std::variant<TimeWatermark, Impulse, Force, LastingContact, BodyMo
 
 double get_time_s(const Event& event) noexcept;
 
-/// What is wrong with an event, as part of a sentence; nullptr when it can be played: all numbers finite, indices not negative, barycentric
-/// coordinates in [-1e-6, 1 + 1e-6] with sum 1, quaternions of unit length to 1e-3, durations, radii and the normal force of a
-/// LastingContact not negative, a Force of 1 to kMaxForceSteps steps of a positive length.
+/// Fault of an event, for messages; nullptr if playable: numbers finite, indices not negative, barycentric coordinates in [-1e-6, 1 + 1e-6]
+/// with sum 1, unit quaternions to 1e-3, durations, radii and normal force of a LastingContact not negative, 1 to kMaxForceSteps steps of
+/// positive length in a Force.
 const char* find_fault(const Event& event) noexcept;
 
 }  // namespace carillon::events

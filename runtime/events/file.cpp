@@ -1,5 +1,4 @@
-// Method: one JSON object a line, so that a file can be read, cut and corrected with a text editor; numbers in the shortest form that reads
-//   back as the same double.
+// Method: one JSON object per line, editable as text; numbers in the shortest form that reads back as the same double.
 // Source: jsonlines.org for lines; Steele and White (1990) for the shortest form (in fmt, by Dragonbox).
 // Deviations: the first line is a header.
 #include "runtime/events/file.hpp"
@@ -24,20 +23,20 @@
 namespace carillon::events {
 namespace {
 
-constexpr std::size_t kLongestLine = 256u << 20;  // more than that of the most bodies
-constexpr std::size_t kPiece = 1u << 18;          // of a file, read at once
-constexpr double kMaxBack = 1.0;                  // s
-constexpr double kLongestPulse = 10.0;            // s
-constexpr double kLargest = 1e9;                  // of any other amount, in SI units: what is more is a mistake, and would overflow
-constexpr long long kMaxBodies = 1 << 20;         // more than any scene holds
+constexpr std::size_t kMaxLineBytes = 256u << 20;  // more than a header of kMaxBodies
+constexpr std::size_t kReadBytes = 1u << 18;       // read size
+constexpr double kMaxBackS = 1.0;                  // s
+constexpr double kMaxPulseS = 10.0;                // s
+constexpr double kMaxAmount = 1e9;                 // limit of other amounts in SI units: prevents overflow
+constexpr long long kMaxBodies = 1 << 20;          // above all scenes
 constexpr long long kInt32 = std::numeric_limits<std::int32_t>::max();
 constexpr long long kInt64 = std::numeric_limits<std::int64_t>::max();
-const std::vector<std::string> kShapeNames{"hertz", "gaussian"};     // in the order of PulseShape
-const std::vector<std::string> kStateNames{"begin", "hold", "end"};  // in the order of ContactState
+const std::vector<std::string> kShapeNames{"hertz", "gaussian"};     // indexed by PulseShape
+const std::vector<std::string> kStateNames{"begin", "hold", "end"};  // indexed by ContactState
 
 using Out = std::back_insert_iterator<std::string>;
 
-/// A sign and a point or an exponent stay, so that no reader takes it for an integer: -0.0 has to come back.
+/// Keeps sign and decimal point or exponent, so that -0.0 is not read as an integer.
 std::string format_number(double x) {
   std::string text = fmt::format("{}", x);
   if (text.find_first_of(".e") == std::string::npos) text += ".0";
@@ -51,10 +50,10 @@ std::string format_numbers(const std::array<double, n>& x) {
   return text + "]";
 }
 
-/// The shortest text of a number in single precision that is read back to the same by way of a double; nearly always that of its own.
+/// Shortest text that reads back, through a double, as the same float; nearly always that of the float.
 std::string format_number(float x) {
   std::string text = fmt::format("{}", x);
-#if defined(__EMSCRIPTEN__)  // its library reads no floating-point numbers by from_chars, and has one locale
+#if defined(__EMSCRIPTEN__)  // no floating-point from_chars; single locale
   const double read = std::strtod(text.c_str(), nullptr);
 #else
   double read = 0.0;
@@ -113,7 +112,7 @@ void write(Out out, const Listener& e) {
   write_moving(out, e);
 }
 
-/// Reads the keys that `Event` has; who calls it finishes the object.
+/// Reads the keys of `Event`; the caller calls finish().
 class EventReader {
  public:
   EventReader(base::Object object, const std::vector<RecordedBody>& bodies) : in_(std::move(object)), bodies_(bodies) {}
@@ -126,7 +125,7 @@ class EventReader {
     e.impulse_n_s = in_.numbers<3>("impulse_n_s");
     e.duration_s = in_.number("duration_s");
     check_size("impulse_n_s", e.impulse_n_s);
-    check_size("duration_s", e.duration_s, kLongestPulse);
+    check_size("duration_s", e.duration_s, kMaxPulseS);
     e.shape = static_cast<PulseShape>(find(kShapeNames, in_.choice_or("shape", kShapeNames, kShapeNames.front())));
     return finish(e);
   }
@@ -136,7 +135,7 @@ class EventReader {
     read_place(e);
     e.step_s = in_.number("step_s");
     e.continues = in_.boolean_or("continues", false);
-    check_size("step_s", e.step_s, kLongestPulse / kMaxForceSteps);
+    check_size("step_s", e.step_s, kMaxPulseS / kMaxForceSteps);
     for (const std::vector<double>& row : in_.number_rows("impulse_n_s", 3, kMaxForceSteps)) {
       auto& sample = e.impulse_n_s[e.count++];
       for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -224,9 +223,8 @@ class EventReader {
     e.rotation = in_.numbers<4>("rotation");
   }
 
-  void check_size(std::string_view key, double value, double largest = kLargest) {
-    if (!(std::abs(value) <= largest))
-      in_.fail(key, fmt::format("{:g} is more than any that is played; give {:g} at most", value, largest));
+  void check_size(std::string_view key, double value, double largest = kMaxAmount) {
+    if (!(std::abs(value) <= largest)) in_.fail(key, fmt::format("{:g} exceeds the limit; give {:g} at most", value, largest));
   }
   void check_size(std::string_view key, const Vec3& value) {
     for (const double x : value) check_size(key, x);
@@ -258,7 +256,7 @@ Event parse_event(base::Object line, const std::vector<RecordedBody>& bodies) {
   line.fail("", "this line holds no event; give it a mark, an impulse, a force, a contact, a motion or a listener");
 }
 
-/// The bodies, and how many events there are, if the line says.
+/// Reads the bodies; returns the number of events, if stated.
 std::optional<long long> parse_header(base::Object line, std::vector<RecordedBody>& bodies) {
   line.integer("carillon_contacts", 1, 1);
   const std::optional<long long> count = line.integer_if("events", 0, kInt64);
@@ -302,8 +300,8 @@ SurfaceMark mark_surface(std::span<const Vec3> vertices_m, std::span<const std::
 }
 
 bool is_same_surface(const SurfaceMark& a, const SurfaceMark& b) {
-  constexpr double kSlack = 5e-5;  // of the size: the same surface with other rounding, or packed
-  const double size = std::hypot(std::hypot(a.size_m[0], a.size_m[1], a.size_m[2]), std::hypot(b.size_m[0], b.size_m[1], b.size_m[2]));
+  constexpr double kSlack = 5e-5;  // relative to the size: rounding, or a packed surface
+  const double size = std::hypot(calc_length(a.size_m), calc_length(b.size_m));
   for (std::size_t k = 0; k < 3; ++k) {
     if (!(std::abs(a.size_m[k] - b.size_m[k]) <= kSlack * size) || !(std::abs(a.order_m[k] - b.order_m[k]) <= kSlack * size)) return false;
   }
@@ -338,7 +336,7 @@ std::string format_recording(const Recording& recording) {
 
 namespace {
 
-/// A contacts file, line by line.
+/// Line reader of a contacts file.
 class Lines {
  public:
   Lines(std::filesystem::path file, const std::function<void(const Event&)>& sink,
@@ -357,7 +355,7 @@ class Lines {
     }
     const Event event = parse_event(object, bodies_);
     const double time = get_time_s(event);
-    if (time < latest_ - kMaxBack) {
+    if (time < latest_ - kMaxBackS) {
       throw InputError(
           fmt::format("{}:{}: time goes back from {:g} s to {:g} s; put the lines in order", file_.string(), number_, latest_, time));
     }
@@ -370,8 +368,8 @@ class Lines {
     if (!has_header_) throw InputError(fmt::format("{}:1: the file is empty; it has to begin with the line of its bodies", file_.string()));
     if (announced_ && *announced_ != count_) {
       throw InputError(
-          fmt::format("{}:{}: the first line says {} events and there are {}; a part of the file is missing, or its \"events\" has "
-                      "to be changed or left out",
+          fmt::format("{}:{}: the first line states {} events, found {}; a part of the file is missing, or its \"events\" has "
+                      "to be changed or removed",
                       file_.string(), number_, *announced_, count_));
     }
     return std::move(bodies_);
@@ -410,13 +408,13 @@ std::vector<RecordedBody> read_recording(const std::filesystem::path& file, cons
   Lines lines(file, sink, begin);
   std::string line;
   bool is_begun = false;
-  base::read_pieces(file, "contacts file", kPiece, [&](std::string_view piece) {
+  base::read_pieces(file, "contacts file", kReadBytes, [&](std::string_view piece) {
     if (!is_begun) base::refuse_utf16(piece, file.string());
     is_begun = true;
     while (!piece.empty()) {
       const std::size_t end = piece.find('\n');
-      if (line.size() + std::min(end, piece.size()) > kLongestLine) {
-        throw InputError(fmt::format("{}: a line of more than {} bytes; this is no contacts file", file.string(), kLongestLine));
+      if (line.size() + std::min(end, piece.size()) > kMaxLineBytes) {
+        throw InputError(fmt::format("{}: a line of more than {} bytes; this is not a contacts file", file.string(), kMaxLineBytes));
       }
       if (end == std::string_view::npos) {
         line += piece;

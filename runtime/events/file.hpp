@@ -1,4 +1,4 @@
-// Contacts files: the events of a scene, to be played without physics. Reference: docs/howto/contacts-file.md.
+// Contacts files: events of a scene for playback without physics. Reference: docs/howto/contacts-file.md.
 #pragma once
 
 #include <array>
@@ -15,44 +15,44 @@
 
 namespace carillon::events {
 
-/// A fingerprint of a surface, in metres of the mesh: its extent along each axis, and the mean of its triangles' centroids,
-/// triangle i weighted by i + 1, so that another numbering gives another place.
+/// Fingerprint of a surface in mesh axes [m]: extent along each axis, and the mean of the triangle centroids weighted by index + 1, which
+/// depends on the numbering.
 struct SurfaceMark {
   Vec3 size_m{};
   Vec3 order_m{};
 };
 
-/// Of at least one vertex [m] and triangle, whose corners are there.
+/// Requires a vertex [m], a triangle and valid corners.
 SurfaceMark mark_surface(std::span<const Vec3> vertices_m, std::span<const std::array<std::int32_t, 3>> triangles);
 
-/// Whether two marks are of one surface, to 1e-6 of its size.
+/// True if two marks agree to 1e-6 of the size.
 bool is_same_surface(const SurfaceMark& a, const SurfaceMark& b);
 
 struct RecordedBody {
   std::string name;
-  std::int64_t triangles = 0;               // of its bank
-  std::optional<SurfaceMark> surface = {};  // of its bank; files of others, and older ones, do not say
+  std::int64_t triangles = 0;               // triangles of its bank
+  std::optional<SurfaceMark> surface = {};  // missing in older and foreign files
 };
 
 struct Recording {
-  std::vector<RecordedBody> bodies;  // events name them by their number
+  std::vector<RecordedBody> bodies;  // events refer to them by index
   std::vector<Event> events;
 };
 
-/// The first line of a contacts file of so many events, and the line of one event, both with their end of line.
+/// Header line for `events` events; line of an event. Both end with a newline.
 std::string format_header(const std::vector<RecordedBody>& bodies, std::uint64_t events);
 void append_line(std::string& text, const Event& event);
 
-/// The text of a contacts file. Every number is read back as the same bits. The events have no fault (find_fault).
+/// Text of a contacts file; numbers read back bit by bit. Events must be valid (find_fault).
 std::string format_recording(const Recording& recording);
 
-/// Reads the text of a contacts file; `file` names it in messages. Throws InputError "file:line: ..." for everything that could not be
-/// played: no JSON, an unknown or missing key, a number that is none, a body or triangle that there is not, an event that find_fault
-/// refuses, time that goes back by more than a second, fewer or more events than the first line says.
+/// Parses a contacts file; `file` names it in messages. Throws InputError "file:line: ..." for all that cannot be played: invalid JSON,
+/// unknown or missing keys, invalid numbers, unknown bodies or triangles, events refused by find_fault, time that goes back by more than a
+/// second, a number of events other than stated.
 Recording parse_recording(std::string_view text, const std::filesystem::path& file);
 
-/// The same from a file of any length, event by event in the order of the file: memory is that of one line. Returns the bodies, which
-/// `begin` (may be empty) is given before the first event.
+/// Streams a file of any length event by event in file order, one line in memory. Returns the bodies, which are passed to `begin` (may be
+/// empty) before the first event.
 std::vector<RecordedBody> read_recording(const std::filesystem::path& file, const std::function<void(const Event&)>& sink,
                                          const std::function<void(const std::vector<RecordedBody>&)>& begin = {});
 

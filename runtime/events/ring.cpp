@@ -22,7 +22,7 @@ bool EventRing::push(const Event& event) noexcept {
   while (true) {
     cell = &cells_[place & mask_];
     const auto ahead = static_cast<std::int64_t>(cell->turn.load(std::memory_order_acquire) - place);
-    if (ahead < 0) {  // the reader has not come round yet
+    if (ahead < 0) {  // not yet freed by the reader
       overflows_.fetch_add(1, std::memory_order_relaxed);
       return false;
     }

@@ -30,8 +30,8 @@ std::string find_format(const ExportWishes& wishes) {
   const std::string ending = base::find_extension(wishes.out);
   if (ending == ".glb") return "glb";
   if (ending == ".dsp") return "faust";
-  throw InputError(fmt::format("{}: the name of a GLB file ends in .glb, of a Faust program in .dsp; name it so, or give --format",
-                               wishes.out.string()));
+  throw InputError(
+      fmt::format("{}: GLB files end in .glb, Faust programs in .dsp; rename the output, or give --format", wishes.out.string()));
 }
 
 /// "0.01,0,0.05"
@@ -62,7 +62,7 @@ void read_points(const std::vector<std::string>& words, FaustOptions& options) {
   for (const std::string& word : words) options.points_m.push_back(read_point(word));
 }
 
-/// Writes a file whole or not at all, or standard output; messages then go to standard error.
+/// Writes a file atomically, or standard output; then messages go to standard error.
 template <class Fill>
 void write_output(const fs::path& out, const char* what, const Fill& fill) {
   if (base::is_standard_output(out)) {
@@ -89,7 +89,7 @@ void run_export(const ExportWishes& wishes) {
   std::FILE* const notes = base::is_standard_output(wishes.out) ? stderr : stdout;
   const std::string name = wishes.name.empty() ? wishes.bank.stem().string() : wishes.name;
   bank::Bank bank = bank::read_bank(wishes.bank);
-  if (bank.mode_count() == 0) throw InputError(fmt::format("{}: the bank has no modes, and so no sound", wishes.bank.string()));
+  if (bank.mode_count() == 0) throw InputError(fmt::format("{}: the bank has no modes, hence no sound", wishes.bank.string()));
   if (format == "glb") {
     for (const auto& [is_given, option] : {std::pair(!wishes.points.empty(), "--points"), {wishes.radiation != "auto", "--radiation"}})
       if (is_given) throw InputError(fmt::format("{} is for Faust; a GLB file holds the whole surface and no gains", option));

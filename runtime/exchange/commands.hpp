@@ -1,4 +1,4 @@
-// carillon-bank export and import: their options and what they do. Internal to the program.
+// carillon-bank export and import: options and execution. Internal to the program.
 #pragma once
 
 #include <filesystem>
@@ -10,15 +10,15 @@ namespace carillon::exchange {
 
 struct ExportWishes {
   std::filesystem::path bank, out;
-  std::string format;                // "glb", "faust"; empty: by the ending of `out`
-  std::optional<std::size_t> modes;  // glb: all without it; faust: FaustOptions::modes
-  std::vector<std::string> points;   // "X,Y,Z" in metres, or one count
+  std::string format;                // "glb", "faust"; empty: by the extension of `out`
+  std::optional<std::size_t> modes;  // default: all (glb), FaustOptions::modes (faust)
+  std::vector<std::string> points;   // "X,Y,Z" in metres, or a single count
   std::string radiation = "auto";
-  std::string name;  // empty: the stem of the bank's file
+  std::string name;  // empty: stem of the bank's file
   bool is_z_up = false;
 };
 
-/// Writes the file whole, and says what is in it on standard output (on standard error where the file goes there). Throws InputError.
+/// Writes the file and prints a summary to standard output (to standard error if the file goes there). Throws InputError.
 void run_export(const ExportWishes& wishes);
 
 struct ImportWishes {
@@ -28,7 +28,7 @@ struct ImportWishes {
   bool is_plain = false;
 };
 
-/// The bank of a GLB file. Throws InputError.
+/// Imports a GLB file as a bank. Throws InputError.
 void run_import(const ImportWishes& wishes);
 
 }  // namespace carillon::exchange

@@ -1,4 +1,4 @@
-// The frequency of a damped mode.
+// Damped frequency.
 #pragma once
 
 #include <cmath>
@@ -6,8 +6,7 @@
 
 namespace carillon::exchange {
 
-/// Damped frequency sqrt(omega^2 - d^2) / 2 pi [Hz]; 0 for over-damped modes and those within rounding of critical damping (omega - d below
-/// 1e-6 omega).
+/// sqrt(omega^2 - d^2) / 2 pi [Hz]; 0 for over-damped modes and within rounding of critical damping (omega - d below 1e-6 omega).
 inline double calc_damped_hz(double omega_rad_s, double decay_per_s) {
   constexpr double kLost = 1e-6;
   const double gap = omega_rad_s - decay_per_s;

@@ -1,9 +1,9 @@
-// Method:     Of a file with our extras: the arrays there, triangles and shapes from the extension, put together as those of a bank file
-//             are (bank::assemble_bank). Values that are in both must agree. Of another program's: lambda = (2 pi f)^2 + d^2, shapes
-//             rounded to 16 bits; mass properties by the divergence theorem where the model has none.
-// Source:     KHR_audio_rigid_bodies, draft of 2026 (K. Hiner); integrals over a polyhedron: Tonon 2004.
-// Deviations: the scale of the node applies to the body, and to modes and mass given for the unscaled body; its rotation and translation,
-//             the pose of the body, are ignored.
+// Method: files with Carillon's extras: arrays from the extras, triangles and shapes from the extension, assembled as for a bank file
+//   (bank::assemble_bank); values present in both must agree. Other programs' files: lambda = (2 pi f)^2 + d^2, shapes rounded to 16 bits,
+//   mass properties by the divergence theorem if the model has none.
+// Source: KHR_audio_rigid_bodies, draft of 2026 (K. Hiner); integrals over a polyhedron: Tonon 2004.
+// Deviations: the node's scale applies to the body, and to modes and mass given for the unscaled body; its rotation and translation are
+//   ignored.
 #include <fmt/format.h>
 
 #include <Eigen/Dense>
@@ -39,14 +39,14 @@ namespace {
 using gltf::Component;
 
 constexpr std::size_t kMaxFields = 1000, kMaxListed = 10'000'000, kMaxNodes = 10'000'000;
-constexpr double kSameFreq = 1e-6;    // relative error of a frequency in float, through a sum of squares
-constexpr double kSameStep = 0.02;    // steps of a shape: rounding of an integer stored as float
-constexpr double kSameLaw = 1e-5;     // relative error of a decay in float against its law
-constexpr double kSameScale = 1e-4;   // relative difference between the axes of a node
-constexpr double kSameInertia = 0.3;  // relative difference for uneven bodies and coarse surfaces
+constexpr double kFreqTolerance = 1e-6;    // relative error of a frequency in float, through a sum of squares
+constexpr double kStepTolerance = 0.02;    // steps of a shape: rounding of an integer stored as float
+constexpr double kDecayTolerance = 1e-5;   // relative error of a decay in float against its law
+constexpr double kScaleTolerance = 1e-4;   // relative difference between the axes of a node
+constexpr double kInertiaTolerance = 0.3;  // relative difference for uneven bodies and coarse surfaces
 constexpr const char* kChanged = "was changed since carillon-bank wrote it; --plain reads the extension alone";
 
-/// The model, as the extension has it.
+/// Model in the extension.
 struct Model {
   std::vector<double> freq_hz, decay_per_s;            // (M)
   std::vector<Vec3> positions;                         // (P)
@@ -74,7 +74,7 @@ class Reader {
   base::Object find_extension() {
     std::optional<base::Object> extensions = root_.object_if("extensions");
     if (!extensions || !extensions->has(kExtension))
-      throw InputError(fmt::format("{}: it has no {}, and so no modes; compute them with carillon hear", file_.name(), kExtension));
+      throw InputError(fmt::format("{}: it has no {}, hence no modes; compute them with carillon hear", file_.name(), kExtension));
     return extensions->object(kExtension);
   }
 
@@ -137,14 +137,14 @@ class Reader {
     }
   }
 
-  // ---- a bank that was written here ----
+  // ---- files written by Carillon ----
 
-  /// The modes of the bank that the rows of some shapes are.
+  /// Mode indices of the rows of some shapes.
   std::vector<std::size_t> read_modes(base::Object& object, std::size_t count, std::size_t modes) {
     std::vector<std::size_t> list;
     for (const double number : object.number_list("modes", kMaxListed)) {
       if (!(number >= 0.0 && number < static_cast<double>(modes) && number == std::floor(number)))
-        object.fail("modes", fmt::format("{:g} is no mode; there are {}", number, modes));
+        object.fail("modes", fmt::format("{:g} is not a mode; there are {}", number, modes));
       list.push_back(static_cast<std::size_t>(number));
     }
     if (list.size() != count) object.fail("modes", fmt::format("lists {} modes, but there are shapes of {}", list.size(), count));
@@ -157,7 +157,7 @@ class Reader {
     return value;
   }
 
-  /// The field of that name with `count` numbers of 8 bytes.
+  /// Field of that name with `count` numbers of 8 bytes.
   const bank::FieldBytes& find_field(const char* name, std::size_t count) const {
     const auto found = fields_.find(name);
     if (found == fields_.end() || found->second.bytes.size() != count * sizeof(double) || found->second.field.dtype != "<f8")
@@ -171,7 +171,7 @@ class Reader {
       bank::FieldBytes array;
       array.field.name = entry.string("name");
       array.field.dtype = entry.string("type");
-      // An empty list is a single number; Object::number_list() takes none.
+      // An empty shape is a scalar, which Object::number_list() rejects.
       for (const std::int64_t extent : read_extents(entry)) array.field.shape.push_back(static_cast<std::uint64_t>(extent));
       if (entry.has("view")) {
         const std::string_view view = file_.read_view(entry, "view");
@@ -192,7 +192,7 @@ class Reader {
     return extents;
   }
 
-  /// Steps of the shapes of some modes into (V, m, 3).
+  /// Copies the steps of some modes' shapes into (V, m, 3).
   void read_steps(base::Object& owner, const gltf::Numbers& shapes, const std::vector<std::size_t>& modes, std::size_t mode_count,
                   std::vector<std::int16_t>& steps, std::vector<bool>& is_known) {
     const std::size_t points = model_.positions.size();
@@ -206,7 +206,7 @@ class Reader {
         for (std::size_t c = 0; c < 3; ++c) {
           const double exact = scale > 0.0 ? shapes.get(k * points + v, c) / scale : shapes.get(k * points + v, c),
                        step = std::round(exact);
-          if (!(std::abs(exact - step) <= kSameStep && std::abs(step) <= 32767.0))
+          if (!(std::abs(exact - step) <= kStepTolerance && std::abs(step) <= 32767.0))
             owner.fail("shapes", fmt::format("mode {} at point {} is not a whole number of steps: the file {}", k, v, kChanged));
           steps[(v * mode_count + m) * 3 + c] = static_cast<std::int16_t>(step);
         }
@@ -220,16 +220,16 @@ class Reader {
           throw InputError(fmt::format("{}: point {} differs from its extras: the file {}", file_.name(), v, kChanged));
   }
 
-  /// Frequencies and decays of the extension are those with which the bank that comes of the extras is played.
+  /// Frequencies and decays of the extension must equal the playing values of the bank from the extras.
   void compare_modes(const bank::Bank& bank, const std::vector<std::size_t>& modes) {
     const bank::Bank played = bank::calc_corrected(bank);
     const std::vector<std::size_t> order = bank::sort_played_modes(bank);
-    std::vector<std::size_t> place(order.size());  // of a mode of the bank among those that are played
+    std::vector<std::size_t> place(order.size());  // rank of each mode among the played ones
     for (std::size_t i = 0; i < order.size(); ++i) place[order[i]] = i;
     for (std::size_t k = 0; k < modes.size(); ++k) {
       const double omega = std::sqrt(played.eigenvalue_rad2_s2[place[modes[k]]]), decay = played.decay_per_s[place[modes[k]]];
       const double hz = calc_damped_hz(omega, decay);
-      if (!(std::abs(model_.freq_hz[k] - hz) <= kSameFreq * hz && std::abs(model_.decay_per_s[k] - decay) <= kSameFreq * decay))
+      if (!(std::abs(model_.freq_hz[k] - hz) <= kFreqTolerance * hz && std::abs(model_.decay_per_s[k] - decay) <= kFreqTolerance * decay))
         throw InputError(fmt::format("{}: mode {} has {:.7g} Hz, but {:.7g} Hz in its extras: the file {}", file_.name(), k,
                                      model_.freq_hz[k], hz, kChanged));
     }
@@ -275,9 +275,9 @@ class Reader {
     return bank;
   }
 
-  // ---- a model of another program ----
+  // ---- files of other programs ----
 
-  /// Removes points outside all triangles.
+  /// Removes points without triangles.
   void drop_unused_points() {
     base::UsedPoints used = base::find_used_points(model_.triangles, model_.positions.size());
     used_ = std::move(used.points);
@@ -287,7 +287,7 @@ class Reader {
       notes_.push_back(fmt::format("{} of its points belong to no triangle and were dropped", dropped));
   }
 
-  /// The scale of the first node with the model; 1 if there is none.
+  /// Scale of the first node with the model; 1 if there is none.
   double find_scale() {
     std::vector<base::Object> nodes = root_.objects("nodes");
     std::vector<std::size_t> parent(nodes.size(), nodes.size());
@@ -310,7 +310,7 @@ class Reader {
     const std::array<double, 3> along{norm(Vec3{matrix[0], matrix[1], matrix[2]}), norm(Vec3{matrix[4], matrix[5], matrix[6]}),
                                       norm(Vec3{matrix[8], matrix[9], matrix[10]})};
     const auto [low, high] = std::minmax_element(along.begin(), along.end());
-    if (!(*low > 0.0 && *high - *low <= kSameScale * *high))
+    if (!(*low > 0.0 && *high - *low <= kScaleTolerance * *high))
       nodes[*found].fail(
           "", "its node is not scaled by the same along all axes, which changes the modes; apply the scale, and compute them again");
     return *high;
@@ -319,10 +319,10 @@ class Reader {
   struct Solid {
     double volume_m3 = 0.0;
     Vec3 centre_m{};
-    std::array<double, 9> inertia_m5{};  // of unit density, about the centre
+    std::array<double, 9> inertia_m5{};  // unit density, about the centre
   };
 
-  /// Of the volume that a closed surface encloses.
+  /// Volume integrals of a closed surface.
   static Solid calc_solid(const bank::Bank& bank) {
     Solid solid;
     Eigen::Matrix3d second = Eigen::Matrix3d::Zero();  // integral of x x^T
@@ -330,7 +330,7 @@ class Reader {
     for (const auto& triangle : bank.triangles) {
       Eigen::Matrix3d p;
       for (int c = 0; c < 3; ++c) p.col(c) = Eigen::Map<const Eigen::Vector3d>(bank.vertices_m[triangle[c]].data());
-      const double part = p.determinant() / 6.0;  // of the tetrahedron with the origin
+      const double part = p.determinant() / 6.0;  // tetrahedron with the origin
       const Eigen::Vector3d sum = p.rowwise().sum();
       solid.volume_m3 += part;
       first += part / 4.0 * sum;
@@ -366,16 +366,16 @@ class Reader {
     return material;
   }
 
-  /// True for modes and mass of the unscaled body: its density is nearer to the material's than that of the scaled body.
+  /// True if modes and mass belong to the unscaled body: its density is closer to the material's than that of the scaled body.
   bool is_of_unscaled(base::Object& model, double scale, double volume_m3, double density_kg_m3) {
-    constexpr double kSameDensity = 0.1;  // relative error of the volume inside facets
+    constexpr double kDensityTolerance = 0.1;  // relative error of the volume inside facets
     std::optional<base::Object> own = model.object_if("massProperties");
-    if (std::abs(scale - 1.0) <= kSameScale || !(volume_m3 > 0.0)) return false;
+    if (std::abs(scale - 1.0) <= kScaleTolerance || !(volume_m3 > 0.0)) return false;
     const auto note = [&](const std::string& text) {
       notes_.push_back(fmt::format("its node scales the body by {:.6g}, {}", scale, text));
     };
     if (!own || reading_->material != nullptr) {
-      note("and nothing says whether its modes are those of that size; they are taken as they are");
+      note("and it is unknown whether its modes are those of that size; they are used unchanged");
       return false;
     }
     const double mass = own->number("mass", base::kPositive);
@@ -387,7 +387,7 @@ class Reader {
                                                 "{:.6g}, the mass by {:.6g})",
                                                 1.0 / scale, scale * scale * scale)
                                           : "its modes and its mass are those of that size";
-    if (std::min(scaled_off, unscaled_off) > kSameDensity)
+    if (std::min(scaled_off, unscaled_off) > kDensityTolerance)
       note(fmt::format(
           "and its mass contradicts the {:.5g} kg/m^3 of its material: {:.5g} with the scale, {:.5g} without; by the nearer one {}",
           density_kg_m3, scaled, unscaled, taken));
@@ -396,7 +396,7 @@ class Reader {
     return is_unscaled;
   }
 
-  /// Enlarges the body by `scale`.
+  /// Scales the body by `scale`.
   static void scale_body(bank::Bank& bank, std::vector<double>& shapes, double scale) {
     for (std::size_t m = 0; m < bank.mode_count(); ++m) {
       bank.eigenvalue_rad2_s2[m] /= scale * scale;
@@ -411,7 +411,7 @@ class Reader {
     for (double& x : bank.rigid.inertia_kg_m2) x *= std::pow(scale, 5);
   }
 
-  /// The mass properties of the model, or of its surface filled with the material.
+  /// Mass properties of the model, or of its surface filled with the material.
   void read_mass(base::Object& model, double scale, bank::Bank& bank) {
     const Solid solid = calc_solid(bank);
     if (!(solid.volume_m3 > 0.0))
@@ -433,7 +433,7 @@ class Reader {
       const Eigen::Matrix3d inertia =
           axes * Eigen::Vector3d((*diagonal)[0], (*diagonal)[1], (*diagonal)[2]).asDiagonal() * axes.transpose();
       Eigen::Map<Eigen::Matrix3d> of_surface(bank.rigid.inertia_kg_m2.data());  // symmetric
-      if ((inertia - of_surface).norm() > kSameInertia * of_surface.norm())
+      if ((inertia - of_surface).norm() > kInertiaTolerance * of_surface.norm())
         notes_.push_back("its moments of inertia contradict its surface and its mass; those of the surface, filled evenly, were taken");
       else
         of_surface = inertia;
@@ -441,14 +441,14 @@ class Reader {
     bank.material.density_kg_m3 = bank.rigid.mass_kg / solid.volume_m3;
   }
 
-  /// Rayleigh's law where the decays follow it, else decays as they are.
+  /// Rayleigh's law if the decays follow it, else "mixed".
   static void settle_damping(bank::Bank& bank) {
     bank.damping.law = "mixed";
     const double a1 = bank.material.alpha1_s, a2 = bank.material.alpha2_per_s;
     std::vector<double> law;
     for (std::size_t m = 0; m < bank.mode_count(); ++m) law.push_back(0.5 * (a1 * bank.eigenvalue_rad2_s2[m] + a2));
     for (std::size_t m = 0; m < bank.mode_count(); ++m)
-      if (!(std::abs(bank.decay_per_s[m] - law[m]) <= kSameLaw * law[m])) {
+      if (!(std::abs(bank.decay_per_s[m] - law[m]) <= kDecayTolerance * law[m])) {
         bank.material.alpha1_s = bank.material.alpha2_per_s = 0.0;
         return;
       }
@@ -507,9 +507,9 @@ class Reader {
   gltf::File file_;
   const GlbReading* reading_;
   base::Object root_;
-  std::size_t number_ = 0;  // of the model
+  std::size_t number_ = 0;  // index of the model
   Model model_;
-  std::vector<std::int32_t> used_;  // points in triangles, of a model of another program
+  std::vector<std::int32_t> used_;  // used points of another program's model
   std::vector<std::string> notes_;
   std::map<std::string, bank::FieldBytes> fields_;
 };

@@ -1,5 +1,4 @@
-// carillon-bank: what is in a bank; is it whole and sane; another density, stiffness, size or damping; fewer modes, coarser shapes; other
-// formats.
+// carillon-bank: shows, checks, edits, reduces, packs and converts banks.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -17,8 +16,10 @@
 #include <utility>
 #include <vector>
 
+#include "runtime/acoustics/radiation/gains.hpp"
 #include "runtime/bank/bank.hpp"
 #include "runtime/bank/edits.hpp"
+#include "runtime/bank/mounting/heard.hpp"
 #include "runtime/bank/of_material.hpp"
 #include "runtime/bank/pack.hpp"
 #include "runtime/bank/reduce.hpp"
@@ -29,13 +30,11 @@
 #include "runtime/base/message.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/base/standard_output.hpp"
+#include "runtime/base/version.hpp"
 #include "runtime/base/whole_range.hpp"
 #include "runtime/exchange/commands.hpp"
 #include "runtime/material/solids.hpp"
 #include "runtime/material/table.hpp"
-#include "runtime/acoustics/radiation/gains.hpp"
-#include "runtime/bank/mounting/heard.hpp"
-#include "runtime/base/version.hpp"
 
 namespace {
 
@@ -44,10 +43,10 @@ using namespace carillon;
 constexpr int kMost = std::numeric_limits<int>::max();
 const CLI::Validator kCounts(base::whole_range(1, kMost), base::describe_whole_range(1, kMost));
 
-/// Prints every check. InputError when a fault was found, after all lines were printed. `original`: the bank that was packed, or empty.
+/// Prints all checks, then throws InputError if there was a fault. `original`: source of a packed bank, or empty.
 void check(const std::string& file, const std::string& original) {
   const bank::Bank bank = bank::read_bank_unchecked(file);
-  if (!original.empty() && !bank.packing) throw InputError(file + ": is not packed; leave --original out");
+  if (!original.empty() && !bank.packing) throw InputError(file + ": is not packed; omit --original");
   std::optional<bank::Check> against;
   if (!original.empty()) {
     const bank::Bank whole = bank::read_bank(original);
@@ -73,10 +72,10 @@ void check(const std::string& file, const std::string& original) {
   if (faults > 0)
     throw InputError(
         fmt::format("{}: {} fault{}; {} the bank again", file, faults, faults == 1 ? "" : "s", bank.packing ? "pack" : "compute"));
-  fmt::print("{}\n{}\n{}: whole and sane\n", bank::describe_completeness(bank), bank::describe_accuracy(bank), base::printable(file));
+  fmt::print("{}\n{}\n{}: valid\n", bank::describe_completeness(bank), bank::describe_accuracy(bank), base::printable(file));
 }
 
-/// What `carillon-bank edit` does to a bank.
+/// Options of `carillon-bank edit`.
 struct Wishes {
   bank::Edits edits;
   std::string material;
@@ -89,41 +88,36 @@ struct Wishes {
 
 void add_options(CLI::App& editing, Wishes& wishes) {
   editing.add_option("--material", wishes.material,
-                     "Name of another material (carillon materials): takes its density, stiffness and damping; Poisson's ratio stays");
+                     "Another material (carillon materials): its density, stiffness and damping; keeps Poisson's ratio");
   editing.add_option("--density", wishes.edits.density_scale, "Factor of the density")->capture_default_str();
-  editing.add_option("--stiffness", wishes.edits.stiffness_scale, "Factor of the stiffness; Poisson's ratio stays")->capture_default_str();
+  editing.add_option("--stiffness", wishes.edits.stiffness_scale, "Factor of the stiffness; keeps Poisson's ratio")->capture_default_str();
   editing.add_option("--size", wishes.edits.size_scale, "Factor of all lengths")->capture_default_str();
-  editing.add_option("--alphas", wishes.alphas, "Rayleigh damping in place of the bank's law: alpha1 [s] and alpha2 [1/s]")->expected(2);
-  editing.add_option("--tan-phi", wishes.tan_phi,
-                     "The same loss factor at all frequencies, in place of the bank's law (internal friction)");
+  editing.add_option("--alphas", wishes.alphas, "Rayleigh damping instead of the bank's law: alpha1 [s] and alpha2 [1/s]")->expected(2);
+  editing.add_option("--tan-phi", wishes.tan_phi, "Constant loss factor (internal friction) instead of the bank's law");
   editing
-      .add_option(
-          "--loss", wishes.loss,
-          "Loss factors by frequency, in place of the bank's law: HZ:FACTOR, as many as there are, ascending in frequency; linear in "
-          "log f between them, constant beyond")
+      .add_option("--loss", wishes.loss,
+                  "Loss factors by frequency instead of the bank's law: HZ:FACTOR, repeated, ascending in frequency; linear in "
+                  "log f between them, constant beyond")
       ->option_text("HZ:FACTOR ...");
   editing
-      .add_option("--caughey", wishes.caughey,
-                  "Damping as a series of powers of lambda = omega^2, in place of the bank's law: POWER:COEFFICIENT, as many as there are")
+      .add_option("--caughey", wishes.caughey, "Power series of lambda = omega^2 instead of the bank's law: POWER:COEFFICIENT, repeated")
       ->option_text("POWER:COEFFICIENT ...");
   CLI::Option* modes =
-      editing.add_option("--modes", wishes.reduction.modes, "Number of modes to keep; the bank is then no longer complete")->check(kCounts);
+      editing.add_option("--modes", wishes.reduction.modes, "Number of modes to keep; the bank is then incomplete")->check(kCounts);
   editing
-      .add_option(
-          "--keep", wishes.keep,
-          "Which modes to keep: \"loudest\", the most audible for blows all over the body, or \"lowest\" in frequency, whose proof stays")
+      .add_option("--keep", wishes.keep,
+                  "Selection of modes: \"loudest\" for blows all over the body, or \"lowest\" in frequency, which keeps the proof")
       ->check(CLI::IsMember({"loudest", "lowest"}))
       ->capture_default_str()
       ->needs(modes);
   editing
-      .add_option("--shape-bits", wishes.reduction.shape_bits,
-                  "Bits of a component of a mode's shape; up to 8 the bank has one byte for it instead of two")
+      .add_option("--shape-bits", wishes.reduction.shape_bits, "Bits per shape component; up to 8 the bank stores one byte instead of two")
       ->check(base::whole_range(bank::kMinShapeBits, bank::kMaxShapeBits),
               base::describe_whole_range(bank::kMinShapeBits, bank::kMaxShapeBits))
       ->capture_default_str();
 }
 
-/// The two numbers of "100:0.01". Throws InputError that names the option.
+/// Parses "100:0.01". Throws InputError that names the option.
 std::pair<double, double> read_pair(const std::string& word, const char* option, const char* form) {
   std::pair<double, double> pair;
   const char* const end = word.data() + word.size();
@@ -135,7 +129,7 @@ std::pair<double, double> read_pair(const std::string& word, const char* option,
   return pair;
 }
 
-/// The damping that is asked for in place of the bank's.
+/// Damping law of the options, if any.
 void read_damping(Wishes& wishes) {
   const int laws = !wishes.alphas.empty() + wishes.tan_phi.has_value() + !wishes.loss.empty() + !wishes.caughey.empty();
   if (laws > 1) throw InputError("a body has one damping law; give one of --alphas, --tan-phi, --loss and --caughey");
@@ -164,7 +158,7 @@ void read_damping(Wishes& wishes) {
   }
 }
 
-/// Other programs rely on the extension: a name of another kind is refused.
+/// Other programs rely on the extension: refuse other names.
 void check_bank_name(const std::filesystem::path& out) {
   constexpr std::array<std::string_view, 6> kExtensions{"", ".hdf", ".h5", ".hdf5", ".vtkhdf", ".bank"};
   const std::string extension = base::find_extension(out);
@@ -177,7 +171,7 @@ void check_bank_name(const std::filesystem::path& out) {
                     out.string()));
 }
 
-/// Refuses an output that is no place for a bank. True for standard output.
+/// Checks the output path. True for standard output.
 bool check_output(const std::string& out) {
   const bool is_piped = base::is_standard_output(out);
   if (is_piped)
@@ -189,11 +183,11 @@ bool check_output(const std::string& out) {
 
 constexpr double kMaxAudibleHz = 20000.0;
 
-/// --material, with another damping where one is given too.
+/// Applies --material, with another damping if given.
 void take_material(const bank::Bank& bank, Wishes& wishes) {
   constexpr double kAudibleCents = 5.0;
   if (wishes.edits.density_scale != 1.0 || wishes.edits.stiffness_scale != 1.0)
-    throw InputError("--material has a density and a stiffness of its own; leave --density and --stiffness out");
+    throw InputError("--material sets density and stiffness; omit --density and --stiffness");
   const material::Material& material = material::MaterialTable::get().require("--material", wishes.material).material;
   const bank::Edits own = bank::make_edits(bank, material);
   wishes.edits.density_scale = own.density_scale;
@@ -205,35 +199,34 @@ void take_material(const bank::Bank& bank, Wishes& wishes) {
   if (const double cents = bank::calc_poisson_cents(bank, material); cents > kAudibleCents)
     fmt::print(
         stderr,
-        "carillon-bank: note: Poisson's ratio stays {:g}, but {} has {:g}: modes of torsion are off by {:.0f} cents, others by less; a "
+        "carillon-bank: note: Poisson's ratio stays {:g}, but {} has {:g}: torsional modes are off by {:.0f} cents, others by less; a "
         "job with \"material\": \"{}\" takes its own ratio\n",
         bank.material.poisson_ratio, material.name, material.poisson_ratio, cents, material.name);
 }
 
 void add_export(CLI::App& app, exchange::ExportWishes& wishes) {
-  app.add_option("BANK", wishes.bank, "The bank file")->required();
-  app.add_option("-o,--output", wishes.out, "The file to write, .glb or .dsp; - is standard output")->required();
-  app.add_option("--format", wishes.format, "glb or faust; without it by the name of the file")->check(CLI::IsMember({"glb", "faust"}));
-  app.add_option("--modes", wishes.modes, "Number of modes, the most audible; without it all (glb), or 100 (faust)")->check(kCounts);
-  app.add_option("--points", wishes.points, "Points to strike (faust): X,Y,Z in metres each; or their number (4)")
-      ->option_text("X,Y,Z ...");
-  app.add_option("--radiation", wishes.radiation, "Radiation model (faust), as \"radiation\" of a scene")
+  app.add_option("BANK", wishes.bank, "Bank file")->required();
+  app.add_option("-o,--output", wishes.out, "Output file, .glb or .dsp; -: standard output")->required();
+  app.add_option("--format", wishes.format, "glb or faust; default: by the file name")->check(CLI::IsMember({"glb", "faust"}));
+  app.add_option("--modes", wishes.modes, "Number of modes, the most audible ones; default: all (glb), 100 (faust)")->check(kCounts);
+  app.add_option("--points", wishes.points, "Strike points (faust): X,Y,Z in metres each; or their number (4)")->option_text("X,Y,Z ...");
+  app.add_option("--radiation", wishes.radiation, "Radiation model (faust), as \"radiation\" in a scene")
       ->check(CLI::IsMember(radiation::kGainKindNames))
       ->capture_default_str();
-  app.add_option("--name", wishes.name, "Name of the body in the file; without it that of the bank's file");
+  app.add_option("--name", wishes.name, "Name of the body in the file; default: name of the bank's file");
   app.add_option_function<std::string>(
          "--up", [&wishes](const std::string& axis) { wishes.is_z_up = axis == "z"; },
-         "The axis of the body that points up in the other program (glb), y or z; without it y")
+         "Axis of the body that is up in the other program (glb), y or z; default: y")
       ->check(CLI::IsMember({"y", "z"}));
 }
 
 void add_import(CLI::App& app, exchange::ImportWishes& wishes) {
-  app.add_option("GLB", wishes.glb, "The GLB or glTF file (.glb, .gltf with its buffers)")->required();
-  app.add_option("-o,--output", wishes.out, "The bank to write; - is standard output")->required();
-  app.add_option("--model", wishes.model, "Number of the modal model in the file, from 0")
+  app.add_option("GLB", wishes.glb, "GLB or glTF file (.glb, .gltf with its buffers)")->required();
+  app.add_option("-o,--output", wishes.out, "Output bank; -: standard output")->required();
+  app.add_option("--model", wishes.model, "Index of the modal model in the file, from 0")
       ->check(base::whole_range(0, kMost), base::describe_whole_range(0, kMost));
-  app.add_option("--material", wishes.material, "Material of a model without one, by its name (carillon materials)");
-  app.add_flag("--plain", wishes.is_plain, "Read the extension alone, without the extras of carillon-bank export");
+  app.add_option("--material", wishes.material, "Material name (carillon materials) for a model without one");
+  app.add_flag("--plain", wishes.is_plain, "Read only the extension, ignoring the extras of carillon-bank export");
 }
 
 void edit(const std::string& file, const std::string& out, Wishes& wishes) {
@@ -247,7 +240,7 @@ void edit(const std::string& file, const std::string& out, Wishes& wishes) {
   const bool is_edited = e.density_scale != 1.0 || e.stiffness_scale != 1.0 || e.size_scale != 1.0 || e.alphas || e.damping;
   const double old_end_hz = bank.band_hz[1];
   const std::string dropped = bank::describe_dropped(bank, e);
-  if (is_edited || !is_reduced) bank = bank::calc_edited(bank, e);  // first: what is heard most may change
+  if (is_edited || !is_reduced) bank = bank::calc_edited(bank, e);  // first: the ranking may change
   if (const auto question = material::ask_about_solid(bank.material.young_modulus_pa, bank.material.density_kg_m3))
     fmt::print(stderr, "carillon-bank: warning: {}\n", base::show_message(*question));
   const std::size_t coupled = bank.quartic.mode_count();
@@ -262,7 +255,7 @@ void edit(const std::string& file, const std::string& out, Wishes& wishes) {
                bank.quartic.mode_count(), coupled);
   if (bank.band_hz[1] < std::min(old_end_hz, kMaxAudibleHz))
     fmt::print(is_piped ? stderr : stdout,
-               "band      now {:.5g} to {:.5g} Hz: nothing above is in the bank; for more, compute the job again with a \"band_hz\" up to "
+               "band      now {:.5g} to {:.5g} Hz, no modes above; for more, compute the job again with a \"band_hz\" up to "
                "{:.5g} Hz and "
                "edit that\n",
                bank.band_hz[0], bank.band_hz[1], kMaxAudibleHz * old_end_hz / bank.band_hz[1]);
@@ -291,85 +284,83 @@ void unpack(const std::string& file, const std::string& out) {
     bank::write_bank(bank, out);
 }
 
+/// Options of all commands.
+struct Options {
+  std::string file, original, packed, unpacked, edited;
+  bool json = false, csv = false, all = false, keep_numbers = false;
+  std::size_t modes = 20;
+  double error_db = -60.0;
+  Wishes wishes{};
+  exchange::ExportWishes exported{};
+  exchange::ImportWishes imported{};
+};
+
+void add_commands(CLI::App& app, Options& options) {
+  const auto add = [&](const char* name, const char* description, const char* bank = "Bank file") {
+    CLI::App* command = app.add_subcommand(name, description);
+    command->add_option("BANK", options.file, bank)->required();
+    return command;
+  };
+  CLI::App* info = add("info", "Shows a bank: frequencies, damping, residuals, counts");
+  CLI::Option* as_json = info->add_flag("--json", options.json, "Everything but mesh and shapes, as JSON");
+  info->add_flag("--csv", options.csv, "Modes only, as CSV")->excludes(as_json);
+  info->add_flag("--all", options.all, "Add the record of the run: versions, seconds, memory, partition, solver");
+  info->add_option("--modes", options.modes, "Rows of the mode table")->capture_default_str();
+  add("check", "Checks a bank, one line per property; exit code 0 if valid, else 2")
+      ->add_option("--original", options.original, "Original of a packed bank, to measure its error again");
+  CLI::App* pack = add("pack", "Compresses a bank with a stated error, for web pages and games");
+  pack->add_option("OUT", options.packed, "Packed bank; -: standard output")->required();
+  pack->add_option("--error", options.error_db,
+                   "A-weighted error of a hard blow relative to the blow [dB], on 95 % of the surface; from -90 to -10")
+      ->check(CLI::Range(bank::kMinPackError, bank::kMaxPackError))
+      ->capture_default_str();
+  pack->add_flag("--keep-numbers", options.keep_numbers,
+                 "Keep the triangle numbers, to which contacts files and strikes of scenes refer; about two bytes per triangle");
+  add("unpack", "Unpacks a bank for other programs; its errors stay", "Packed bank")
+      ->add_option("OUT", options.unpacked, "Output bank; -: standard output")
+      ->required();
+  CLI::App* edit = add("edit", "Changes density, stiffness, size, damping, number of modes or precision of shapes without a solve");
+  edit->add_option("OUT", options.edited, "Output bank; -: standard output")->required();
+  add_options(*edit, options.wishes);
+  add_export(
+      *app.add_subcommand("export", "Exports to GLB (mesh and modes, KHR_audio_rigid_bodies) or Faust (the loudest modes at a few points)"),
+      options.exported);
+  add_import(*app.add_subcommand("import", "Imports a GLB or glTF file with KHR_audio_rigid_bodies as a bank; lossless for exported files"),
+             options.imported);
+}
+
+void show(const Options& options) {
+  const bank::Bank bank = bank::read_bank(options.file);
+  const std::vector<bank::HeardMode> heard = mounting::calc_heard(bank);
+  fmt::print("{}", options.json  ? bank::format_info_json(bank, heard, options.file)
+                   : options.csv ? bank::format_info_csv(bank, heard)
+                                 : base::printable_lines(bank::format_info(bank, heard, options.file, options.modes, options.all)));
+}
+
 int run(int argc, char** argv) {
-  CLI::App app("Looks at a mode bank, and edits it.");
+  CLI::App app("Shows, checks, edits and converts mode banks.");
   app.name("carillon-bank");
   app.failure_message(
       [](const CLI::App* asked, const CLI::Error& error) { return base::printable_lines(CLI::FailureMessage::simple(asked, error)); });
   app.require_subcommand(1);
   app.set_version_flag("--version", base::describe("carillon-bank"));
-  std::string file;
-  bool json = false, csv = false, all = false;
-  std::size_t modes = 20;
-  CLI::App* info = app.add_subcommand("info", "Shows a bank: frequencies, damping, residuals, counts");
-  info->add_option("BANK", file, "The bank file")->required();
-  CLI::Option* as_json = info->add_flag("--json", json, "Everything but mesh and shapes, as JSON");
-  info->add_flag("--csv", csv, "The modes alone, one line each, as a table with commas")->excludes(as_json);
-  info->add_flag("--all", all, "The record of the run that made it too: versions, seconds, memory, partition, solver");
-  info->add_option("--modes", modes, "Rows of the table of modes")->capture_default_str();
-  CLI::App* checking =
-      app.add_subcommand("check", "Checks a bank, one line per property; exit code 0 if it is whole and sane, 2 otherwise");
-  checking->add_option("BANK", file, "The bank file")->required();
-  std::string original;
-  checking->add_option("--original", original, "The bank that a packed one was made of: its error is measured again");
-  double error_db = -60.0;
-  std::string packed;
-  CLI::App* packing = app.add_subcommand("pack", "Writes a bank with few bytes and a stated error, for pages and games");
-  packing->add_option("BANK", file, "The bank file")->required();
-  packing->add_option("OUT", packed, "The packed bank; - is standard output")->required();
-  packing
-      ->add_option("--error", error_db,
-                   "Error of a hard blow, A-weighted, against the blow itself [dB], on 95 % of the surface; from -90 to -10")
-      ->check(CLI::Range(bank::kMinPackError, bank::kMaxPackError))
-      ->capture_default_str();
-  bool keep_numbers = false;
-  packing->add_flag("--keep-numbers", keep_numbers,
-                    "Triangles keep their numbers, to which recorded contacts and strikes of scenes refer; about two bytes a triangle");
-  std::string unpacked;
-  CLI::App* unpacking = app.add_subcommand("unpack", "Writes a packed bank as one that other programs read; its errors stay");
-  unpacking->add_option("BANK", file, "The packed bank")->required();
-  unpacking->add_option("OUT", unpacked, "The new bank file; - is standard output")->required();
-  Wishes wishes;
-  std::string edited;
-  CLI::App* editing = app.add_subcommand(
-      "edit",
-      "The bank of the same body with another density, stiffness, size or damping, with fewer modes or coarser shapes, without a solve");
-  editing->add_option("BANK", file, "The bank file")->required();
-  editing->add_option("OUT", edited, "The new bank file; - is standard output")->required();
-  add_options(*editing, wishes);
-  exchange::ExportWishes exported;
-  CLI::App* exporting = app.add_subcommand(
-      "export",
-      "Writes the body for other programs: GLB (mesh and modes, KHR_audio_rigid_bodies) or Faust (the loudest modes at a few points)");
-  add_export(*exporting, exported);
-  exchange::ImportWishes imported;
-  CLI::App* importing =
-      app.add_subcommand("import", "Reads a GLB or glTF file with KHR_audio_rigid_bodies as a bank; from a file of export, the same bank");
-  add_import(*importing, imported);
+  Options options;
+  add_commands(app, options);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : kExitInput;
   }
-  if (*checking) {
-    check(file, original);
-  } else if (*packing) {
-    pack(file, packed, error_db, keep_numbers);
-  } else if (*unpacking) {
-    unpack(file, unpacked);
-  } else if (*editing) {
-    edit(file, edited, wishes);
-  } else if (*exporting) {
-    exchange::run_export(exported);
-  } else if (*importing) {
-    if (!base::is_standard_output(imported.out)) check_bank_name(imported.out);
-    exchange::run_import(imported);
-  } else {
-    const bank::Bank bank = bank::read_bank(file);
-    const std::vector<bank::HeardMode> heard = mounting::calc_heard(bank);
-    fmt::print("{}", json  ? bank::format_info_json(bank, heard, file)
-                     : csv ? bank::format_info_csv(bank, heard)
-                           : base::printable_lines(bank::format_info(bank, heard, file, modes, all)));
+  const std::string command = app.get_subcommands().front()->get_name();
+  if (command == "info") show(options);
+  if (command == "check") check(options.file, options.original);
+  if (command == "pack") pack(options.file, options.packed, options.error_db, options.keep_numbers);
+  if (command == "unpack") unpack(options.file, options.unpacked);
+  if (command == "edit") edit(options.file, options.edited, options.wishes);
+  if (command == "export") exchange::run_export(options.exported);
+  if (command == "import") {
+    if (!base::is_standard_output(options.imported.out)) check_bank_name(options.imported.out);
+    exchange::run_import(options.imported);
   }
   if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");
   return 0;

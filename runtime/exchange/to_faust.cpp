@@ -1,9 +1,8 @@
-// Method:     a mode answers a unit impulse with q' = e^(-d t) (cos(v t) - d / v sin(v t)), v = sqrt(omega^2 - d^2): a rotated
-//             pair of states, which stays in tune in single precision, unlike the two poles of a direct form. An over-damped mode is two
-//             exponentials. The gain of a point, g phi . n, is applied before the resonator, so that a body struck at one point keeps
-//             ringing when the next blow comes at another. Modes are ranked by their A-weighted exposure within the ear's own time, at the
-//             point where it is largest.
-// Source:     docs/equations.md E4, E5, E7.
+// Method: the response to a unit impulse is q' = e^(-d t) (cos(v t) - d / v sin(v t)), v = sqrt(omega^2 - d^2): a rotated pair of states,
+//   which stays in tune in single precision, unlike a direct form. An over-damped mode is two exponentials. The gain of a point, g phi . n,
+//   precedes the resonator, so that modes keep ringing when the next blow is elsewhere. Modes are ranked by their A-weighted exposure
+//   within the ear's time constant, at the point where it is largest.
+// Source: docs/equations.md E4, E5, E7.
 // Deviations: within 5e-7 of critical damping a mode is taken 1e-6 stiffer than its damping.
 #include <fmt/format.h>
 
@@ -21,19 +20,19 @@
 #include "runtime/base/error.hpp"
 #include "runtime/base/sort_order.hpp"
 #include "runtime/base/vector.hpp"
-#include "runtime/exchange/faust.hpp"
 #include "runtime/base/version.hpp"
+#include "runtime/exchange/faust.hpp"
 
 namespace carillon::exchange {
 namespace {
 
-constexpr double kCritical = 5e-7;       // of omega: nearer to critical damping
-constexpr std::size_t kGroup = 32;       // modes per partial sum: Faust processes a long sum again for each of its terms
-constexpr double kFarthestShare = 0.25;  // of the body's extent: how far from the surface a point may lie
-constexpr double kUsualNs = 0.01;        // of a blow of the instrument
-constexpr double kUsualScale = 0.25;     // of full scale: the peak of such a blow at most
+constexpr double kCritical = 5e-7;          // relative to omega: distance from critical damping
+constexpr std::size_t kGroup = 32;          // modes per partial sum: Faust's compile time is quadratic in the terms
+constexpr double kMaxPointDistance = 0.25;  // largest distance of a point from the surface, relative to the body's extent
+constexpr double kDefaultBlowNs = 0.01;     // default blow of the instrument
+constexpr double kDefaultPeak = 0.25;       // largest peak of such a blow, relative to full scale
 
-/// Faust as it stands in every file, behind the numbers of the body.
+/// Constant part of each Faust file, after the numbers of the body.
 constexpr const char* kResonators = R"(
 SR = min(192000.0, max(1.0, fconstant(int fSamplingFreq, <math.h>)));
 PI = 3.14159265358979323846;
@@ -92,7 +91,7 @@ std::vector<Vec3> choose_points(const bank::Bank& bank, const FaustOptions& opti
 Place make_place(const bank::Bank& bank, const Vec3& point_m) {
   const bank::NearestPlace found = bank::find_nearest(bank, point_m);
   const auto [low, high] = bank::find_extent(bank.vertices_m);
-  if (found.triangle < 0 || !(found.distance_m <= kFarthestShare * norm(high - low)))
+  if (found.triangle < 0 || !(found.distance_m <= kMaxPointDistance * norm(high - low)))
     throw InputError(fmt::format("[{:g}, {:g}, {:g}] is not near the surface; give metres", point_m[0], point_m[1], point_m[2]));
   const Vec3 across = bank::calc_normal(bank.vertices_m, bank.triangles[found.triangle]);
   Place place{.point_m = found.point_m};
@@ -103,7 +102,7 @@ Place make_place(const bank::Bank& bank, const Vec3& point_m) {
   return place;
 }
 
-/// A-weighted exposure of mode m for a blow of 1 N s there [Pa^2 s].
+/// A-weighted exposure of mode m after a blow of 1 N s there [Pa^2 s].
 double calc_exposure(const bank::Bank& bank, const Place& place, std::size_t m) {
   const double pressure = bank::calc_a_weight(bank.freq_hz(m)) * place.gain[m];
   return pressure * pressure / (2.0 * (2.0 * bank.decay_per_s[m] + 1.0 / bank::kEarS));
@@ -124,7 +123,7 @@ std::string replace(std::string text, const std::string& from, const std::string
   return text.replace(at, from.size(), to);
 }
 
-/// Without characters that end a quoted text or a comment.
+/// Removes characters that end a quoted text or a comment.
 std::string clean(const std::string& name) {
   std::string text;
   for (const char c : name) text += c >= 0x20 && c != 0x7f && c != '"' && c != '\\' ? c : '_';
@@ -196,7 +195,7 @@ FaustProgram make_faust(const bank::Bank& given, const FaustOptions& options) {
     groups += fmt::format("{}group{}(point)", first == 0 ? "" : ", ", first / kGroup);
   }
   text += fmt::format("body(point) = _ <: {} :> _;\n", groups);
-  const double usual = loudest > 0.0 ? kUsualScale / (loudest * kUsualNs) : 1.0;
+  const double usual = loudest > 0.0 ? kDefaultPeak / (loudest * kDefaultBlowNs) : 1.0;
   std::string instrument = kInstrument;
   for (const auto& [word, value] : {std::pair("USUAL_GAIN", usual), {"GREATEST_GAIN", 100.0 * usual}, {"SMALL_GAIN", 0.001 * usual}})
     instrument = replace(instrument, word, fmt::format("{:.6e}", value));

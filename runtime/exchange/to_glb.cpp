@@ -1,8 +1,9 @@
-// Method:     one mesh primitive, whose positions and indices are the sample points and the interpolation surface of the one modal model,
-//             too. The arrays of the bank but surface and shapes go into the buffer as they are in a bank file (runtime/bank/layout.hpp).
-//             Shapes are exact as float: a whole number of up to 15 bits times the mode's scale.
-// Source:     KHR_audio_rigid_bodies, draft of 2026 (K. Hiner); glTF 2.0 specification.
-// Deviations: vertices have one normal, the mean of their triangles' by area: sharp edges are shaded smoothly.
+// Method: one mesh primitive, whose positions and indices are also the sample points and the interpolation surface of the single modal
+// model.
+//   The bank's other arrays are stored as in a bank file (runtime/bank/layout.hpp). Shapes are exact as float: an integer of up to 15 bits
+//   times the mode's scale.
+// Source: KHR_audio_rigid_bodies, draft of 2026 (K. Hiner); glTF 2.0 specification.
+// Deviations: one normal per vertex, the area-weighted mean of its triangles: sharp edges are shaded smoothly.
 #include <fmt/format.h>
 
 #include <Eigen/Dense>
@@ -18,10 +19,10 @@
 #include "runtime/base/json.hpp"
 #include "runtime/base/sort_order.hpp"
 #include "runtime/base/vector.hpp"
+#include "runtime/base/version.hpp"
 #include "runtime/exchange/damped.hpp"
 #include "runtime/exchange/glb.hpp"
 #include "runtime/exchange/gltf/writer.hpp"
-#include "runtime/base/version.hpp"
 
 namespace carillon::exchange {
 namespace {
@@ -36,13 +37,13 @@ std::vector<float> to_floats(const std::vector<Vec3>& rows) {
   return values;
 }
 
-/// A mode of the bank with what is played of it.
+/// Mode with its playing values.
 struct Played {
-  std::size_t mode = 0;  // of the bank
+  std::size_t mode = 0;  // index in the bank
   double omega_rad_s = 0.0, decay_per_s = 0.0;
 };
 
-/// By falling audibility.
+/// By descending audibility.
 std::vector<Played> list_played(const bank::Bank& bank) {
   const std::vector<std::size_t> modes = bank::sort_played_modes(bank);
   const bank::Bank played = bank::choose_frequencies(bank, bank::Frequencies::kCorrected);
@@ -76,7 +77,7 @@ Json describe_material(const bank::Bank& bank, const std::string& name) {
   return material;
 }
 
-/// Adds shapes of modes, mode by mode; gives the accessor.
+/// Adds the shapes of modes, mode by mode; returns the accessor.
 int add_shapes(const bank::Bank& bank, const std::vector<Played>& modes, gltf::Writer& writer) {
   return writer.add_rows(modes.size(), bank.vertex_count(), [&](std::size_t k, std::span<float> numbers) {
     for (std::size_t v = 0; v < bank.vertex_count(); ++v) {
@@ -92,7 +93,7 @@ Json list_modes(const std::vector<Played>& modes) {
   return list;
 }
 
-/// What restores the bank: all arrays of its file except triangles and shapes.
+/// Extras for lossless import: all arrays of the bank file except triangles and shapes.
 Json add_extras(const bank::Bank& bank, const std::vector<Played>& swinging, const std::vector<Played>& still, gltf::Writer& writer) {
   Json own = Json::object(), fields = Json::array();
   own.set("version", fmt::format("{}", fmt::join(bank::find_version(bank), ".")));
@@ -145,7 +146,7 @@ void write_glb(const bank::Bank& bank, const GlbOptions& options, const std::fun
   primitive.set("attributes", attributes).set("indices", indices);
   mesh.set("name", options.name).set("primitives", list(primitive));
   node.set("name", options.name).set("mesh", 0);
-  if (options.is_z_up) {  // a quarter turn about x, against the clock
+  if (options.is_z_up) {  // -90 degrees about x
     const double half = std::numbers::sqrt2 / 2.0;
     node.set("rotation", Json::array(std::vector<double>{-half, 0.0, 0.0, half}));
   }

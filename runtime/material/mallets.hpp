@@ -1,4 +1,4 @@
-// Mallets by name: heads of common mass and size, for programs and scenes.
+// Named mallets for programs and scenes.
 #pragma once
 
 #include <string>
@@ -7,22 +7,22 @@
 
 namespace carillon::material {
 
-/// A solid sphere, or a felt whose force is K y^p at a compression y.
+/// Solid sphere, or felt with the force K y^p at compression y.
 struct NamedMallet {
   std::string name;
   double mass_kg = 0.0;
-  double radius_m = 0.0;         // of a solid head
-  std::string material = {};     // of a solid head: a name of the table
-  double stiffness_n_m_p = 0.0;  // K of a felt
-  double exponent = 0.0;         // p of a felt
-  double restitution = 1.0;      // on something rigid
+  double radius_m = 0.0;         // solid head
+  std::string material = {};     // solid head: name in the material table
+  double stiffness_n_m_p = 0.0;  // felt: K
+  double exponent = 0.0;         // felt: p
+  double restitution = 1.0;      // against a rigid body
 };
 
-/// Its speed where none is given.
+/// Default speed.
 inline constexpr double kMalletSpeedMs = 1.0;
 
 const std::vector<NamedMallet>& get_mallets();
-/// Throws InputError that lists the names and begins with `place`: an option, "file:line".
+/// Throws InputError that lists the names and begins with `place` (an option, "file:line").
 const NamedMallet& require_mallet(std::string_view place, std::string_view name);
 
 }  // namespace carillon::material

@@ -1,8 +1,8 @@
-// Method: compliance of the nine constants, inverted and turned to the mesh's axes as a tensor of the fourth order; averages by Voigt,
-//   Reuss and Hill; damping laws as functions of lambda, split by the energies of a mode.
+// Method: compliance from the nine constants, inverted and rotated to mesh axes as a fourth-order tensor; Voigt, Reuss and Hill averages;
+//   damping laws as functions of lambda, weighted by the energy shares of a mode.
 // Source: Lekhnitskii 1981, "Theory of elasticity of an anisotropic body", section 3 (orthotropy); Hill 1952, Proc. Phys. Soc. A 65, 349;
 //   OSG02 section 3.3; vdDP96; Caughey 1960, J. Appl. Mech. 27, 269; Ungar and Kerwin 1962, J. Acoust. Soc. Am. 34, 954 (energy shares).
-// Deviations: a term of a Caughey series draws on the elastic energy from the power 1/2 on and on the kinetic energy below, so that the
+// Deviations: a term of a Caughey series is weighted by the elastic energy for powers from 1/2 on, by the kinetic energy below, so that the
 //   powers 1, 1/2 and 0 are Rayleigh's alpha1, internal friction and Rayleigh's alpha2.
 #include "runtime/material/material.hpp"
 
@@ -17,7 +17,7 @@ namespace {
 
 using Square3 = std::array<std::array<double, 3>, 3>;
 
-/// Voigt's place of the pair (i, j).
+/// Voigt index of the pair (i, j).
 constexpr int kVoigt[3][3] = {{0, 5, 4}, {5, 1, 3}, {4, 3, 2}};
 
 Square3 invert(const Square3& a) {
@@ -43,7 +43,7 @@ Square3 calc_compliance(const Orthotropic& o) {
   return {{{1 / e[0], s12, s13}, {s12, 1 / e[1], s23}, {s13, s23, 1 / e[2]}}};
 }
 
-/// C in the axes 1, 2, 3 of the material.
+/// C in the material axes 1, 2, 3.
 Elasticity calc_own(const Orthotropic& o) {
   const Square3 normal = invert(calc_compliance(o));
   Elasticity c{};
@@ -55,7 +55,7 @@ Elasticity calc_own(const Orthotropic& o) {
   return c;
 }
 
-/// C'_ijkl = a_pi a_qj a_rk a_sl C_pqrs, a[p] being the axis p of the material in the mesh's axes.
+/// C'_ijkl = a_pi a_qj a_rk a_sl C_pqrs, a[p]: material axis p in mesh axes.
 Elasticity turn(const Elasticity& own, const Square3& a) {
   constexpr int kPairs[6][2] = {{0, 0}, {1, 1}, {2, 2}, {1, 2}, {0, 2}, {0, 1}};
   Elasticity turned{};
@@ -72,12 +72,12 @@ Elasticity turn(const Elasticity& own, const Square3& a) {
   return turned;
 }
 
-/// Bulk and shear modulus of the isotropic solid nearest to a material.
+/// Bulk and shear modulus of the closest isotropic solid.
 struct Moduli {
   double bulk_pa = 0.0, shear_pa = 0.0;
 };
 
-/// Voigt's (equal strain) and Reuss' (equal stress) averages over all orientations.
+/// Orientation averages: Voigt (equal strain), Reuss (equal stress).
 std::array<Moduli, 2> calc_bounds(const Material& material) {
   if (!material.orthotropic) {
     const Moduli m{material.young_modulus_pa / (3 * (1 - 2 * material.poisson_ratio)), material.lame_mu_pa()};
@@ -92,7 +92,7 @@ std::array<Moduli, 2> calc_bounds(const Material& material) {
           Moduli{1 / (s_diagonal + 2 * s_off), 15 / (4 * s_diagonal - 4 * s_off + 3 * s_shear)}};
 }
 
-/// Linear in log f between the rows, constant beyond the ends.
+/// Linear in log f, constant extrapolation.
 double find_loss_factor(const std::vector<LossRow>& table, double freq_hz) {
   const auto above = std::upper_bound(table.begin(), table.end(), freq_hz, [](double f, const LossRow& row) { return f < row.freq_hz; });
   if (above == table.begin()) return table.front().loss_factor;
@@ -104,9 +104,9 @@ double find_loss_factor(const std::vector<LossRow>& table, double freq_hz) {
 
 }  // namespace
 
-// Jacobi's rotations (Golub and Van Loan, section 8.5).
+// Jacobi rotations (Golub and Van Loan, section 8.5).
 std::array<double, 6> calc_eigenvalues(const Elasticity& elasticity_pa) {
-  Elasticity a = elasticity_pa;  // shear rows and columns times sqrt(2): Kelvin's form, whose eigenvalues do not depend on the axes
+  Elasticity a = elasticity_pa;  // Kelvin form (shear rows and columns times sqrt(2)): eigenvalues independent of the axes
   for (int i = 0; i < 6; ++i)
     for (int j = 0; j < 6; ++j) a[6 * i + j] *= (i < 3 ? 1.0 : std::numbers::sqrt2) * (j < 3 ? 1.0 : std::numbers::sqrt2);
   for (int sweep = 0; sweep < 30; ++sweep)
@@ -184,7 +184,7 @@ std::string Material::describe_damping() const {
 
 Equivalent calc_equivalent(std::span<const Material> materials, std::span<const double> volume_m3) {
   double volume = 0.0, mass = 0.0;
-  Moduli voigt, reuss;  // of Reuss the sums of the reciprocals
+  Moduli voigt, reuss;  // Reuss: sums of reciprocals
   for (std::size_t i = 0; i < materials.size(); ++i) {
     const auto [stiff, soft] = calc_bounds(materials[i]);
     volume += volume_m3[i];

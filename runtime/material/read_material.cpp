@@ -16,7 +16,7 @@ namespace carillon::material {
 namespace {
 
 constexpr double kMaxDampingS = 1e6, kMaxDampingPerS = 1e12;
-constexpr double kMaxLossFactor = 2;  // d = omega eta / 2: from here on no mode swings, whatever its frequency
+constexpr double kMaxLossFactor = 2;  // d = omega eta / 2: critical damping at any frequency
 constexpr double kMaxPower = 8;
 
 [[noreturn]] void fail_unit(const base::Object& object, std::string_view key, double value) {
@@ -32,18 +32,18 @@ double read_positive(base::Object& object, std::string_view key, double max) {
   return value;
 }
 
-/// The stiffness matrix loses as many digits as lambda / mu (or K / mu near nu = -1) has; seven are what a solve can spare.
-constexpr double kMargin = 1e-7;
+/// The stiffness matrix loses log10(lambda / mu) digits (K / mu near nu = -1); a solve tolerates seven.
+constexpr double kPoissonMargin = 1e-7;
 
 void check_definite(base::Object& material, std::string_view key, double poisson_ratio) {
-  if (poisson_ratio > 0.5 - kMargin || poisson_ratio < -1.0 + kMargin)
+  if (poisson_ratio > 0.5 - kPoissonMargin || poisson_ratio < -1.0 + kPoissonMargin)
     material.fail(key,
-                  fmt::format("makes a Poisson's ratio of {:.12g}, too near the limits -1 and 0.5 to be solved in double precision; keep "
+                  fmt::format("gives a Poisson's ratio of {:.12g}, too near the limits -1 and 0.5 to be solved in double precision; keep "
                               "{:g} away from them",
-                              poisson_ratio, kMargin));
+                              poisson_ratio, kPoissonMargin));
 }
 
-/// E and nu, or lambda and mu: exactly one pair.  E = mu (3 lambda + 2 mu) / (lambda + mu), nu = lambda / (2 (lambda + mu)).
+/// E and nu, or lambda and mu: exactly one pair. E = mu (3 lambda + 2 mu) / (lambda + mu), nu = lambda / (2 (lambda + mu)).
 void read_isotropic(base::Object& material, Material& result) {
   const bool engineering = material.has("young_modulus_pa") || material.has("poisson_ratio");
   const bool lame = material.has("lame_lambda_pa") || material.has("lame_mu_pa");
@@ -67,7 +67,7 @@ void read_isotropic(base::Object& material, Material& result) {
   check_definite(material, "lame_lambda_pa", result.poisson_ratio);
 }
 
-/// Two or three directions; the first is kept, the second made perpendicular to it, the third follows by the right hand.
+/// Two or three directions, orthonormalised: the first is kept, the second made perpendicular, the third is their cross product.
 void read_axes(base::Object& orthotropic, Orthotropic& result) {
   const auto rows = orthotropic.number_rows("axes", 3, 3);
   if (rows.size() < 2) orthotropic.fail("axes", "give two directions (or three), in the axes of the mesh: [[x, y, z], [x, y, z]]");
@@ -78,14 +78,14 @@ void read_axes(base::Object& orthotropic, Orthotropic& result) {
     if (!(max > 0)) orthotropic.fail("axes", fmt::format("direction {} has no length", r + 1));
     for (double& value : axis[r]) value /= max;
     const double length = std::sqrt(dot(axis[r], axis[r]));
-    // A resolved job holds unit vectors already; those are taken as they are, so that it resolves to itself.
+    // Keep unit vectors of a resolved job unchanged: resolving is idempotent.
     const bool is_unit = max == 1.0 ? std::abs(length - 1) < 1e-15 : std::abs(length * max - 1) < 4e-16;
     for (std::size_t k = 0; k < 3; ++k) axis[r][k] = is_unit ? rows[r][k] : axis[r][k] / length;
   }
-  constexpr double kSkew = 0.02;  // about one degree
+  constexpr double kMaxSkew = 0.02;  // about one degree
   const auto check = [&](std::size_t a, std::size_t b) {
     const double cosine = dot(axis[a], axis[b]);
-    if (std::abs(cosine) > kSkew)
+    if (std::abs(cosine) > kMaxSkew)
       orthotropic.fail("axes", fmt::format("directions {} and {} have to be perpendicular, and meet at {:.1f} degrees", a + 1, b + 1,
                                            std::acos(std::clamp(cosine, -1.0, 1.0)) * 180 / std::numbers::pi));
     return cosine;
@@ -105,7 +105,7 @@ void read_axes(base::Object& orthotropic, Orthotropic& result) {
   result.axes = axis;
 }
 
-/// The compliance, scaled to a unit diagonal, has -nu_ij sqrt(E_j / E_i) off it; its least eigenvalue has to be positive.
+/// The compliance scaled to a unit diagonal has off-diagonals -nu_ij sqrt(E_j / E_i); its smallest eigenvalue must be positive.
 void check_orthotropic(base::Object& object, const Orthotropic& o) {
   const auto& e = o.young_modulus_pa;
   const auto& nu = o.poisson_ratio;
@@ -125,13 +125,13 @@ void check_orthotropic(base::Object& object, const Orthotropic& o) {
     const double angle = std::acos(std::clamp(1.5 * q / p * std::sqrt(3 / p), -1.0, 1.0)) / 3;
     min = 1 + 2 * std::sqrt(p / 3) * std::cos(angle + 2 * std::numbers::pi / 3);
   }
-  if (!(min > 2 * kMargin))  // 1 - 2 nu of an isotropic solid
+  if (!(min > 2 * kPoissonMargin))  // 1 - 2 nu of an isotropic solid
     object.fail(
         "poisson_ratio",
         fmt::format("the elasticity is not positive definite: the least eigenvalue of the compliance (scaled to a unit diagonal) is "
                     "{:.3g}, and has to be above {:g}; multiply the three ratios by less than {:.4g}, or check their order nu12, "
                     "nu23, nu13 with nu_ij / E_i = nu_ji / E_j",
-                    min, 2 * kMargin, 1 / (1 - min)));
+                    min, 2 * kPoissonMargin, 1 / (1 - min)));
 }
 
 void read_orthotropic(base::Object object, Material& result) {
@@ -173,7 +173,7 @@ double read_not_negative(base::Object& object, std::string_view key, double max)
   return value;
 }
 
-/// Fails unless 0 <= loss < 2. what: "tan(phi)", "the loss factor at 100 Hz".
+/// Requires 0 <= loss < 2. what: "tan(phi)", "the loss factor at 100 Hz".
 void check_loss(base::Object& object, std::string_view key, const std::string& what, double loss) {
   if (loss >= 0 && loss < kMaxLossFactor) return;
   object.fail(key,
@@ -210,7 +210,7 @@ void read_loss_table(base::Object& damping, Material& result) {
   }
 }
 
-/// c is a sum of powers, whose sign can change between any two frequencies; the band is searched on a fine grid in log lambda.
+/// c is a sum of powers and may change sign anywhere: checked on a fine grid in log lambda.
 void check_not_negative(base::Object& damping, const Material& material, const std::array<double, 2>& band_hz) {
   constexpr int kSteps = 4000;
   double worst = 0.0, worst_hz = 0.0;
@@ -266,7 +266,7 @@ void read_damping(base::Object damping, Material& result, const std::array<doubl
   damping.finish();
 }
 
-/// The number of the stiffness that the job gives, by its key.
+/// Stiffness given by the job, with its key.
 std::pair<std::string, double> find_stiffness(base::Object& material, const Material& result) {
   if (result.orthotropic) {
     const auto& e = result.orthotropic->young_modulus_pa;
@@ -283,7 +283,7 @@ void ask_about_units(base::Object& material, const Material& result, std::vector
     warnings.push_back(fmt::format("{}: {}", material.find_place(key.substr(0, key.find('.'))), *question));
 }
 
-/// On a grid of the band: no damping at all, or so much that most of the band does not swing.
+/// Warns of zero damping, and of overdamping on most of the band, on a grid.
 void ask_about_damping(base::Object& material, const Material& result, const std::array<double, 2>& band_hz,
                        std::vector<std::string>& warnings) {
   constexpr int kSteps = 60;
@@ -313,7 +313,7 @@ bool has_elasticity(base::Object& material) {
          material.has("lame_lambda_pa") || material.has("lame_mu_pa");
 }
 
-/// The material that this one starts from.
+/// Base material of "from".
 Material read_from(base::Object& material, const MaterialTable* table, const std::string& fallback) {
   const std::string name = material.string_or("from", fallback);
   if (table == nullptr) material.fail("from", "a material of this table cannot start from another; give its constants");
@@ -326,7 +326,7 @@ Material read_from(base::Object& material, const MaterialTable* table, const std
 
 namespace {
 
-/// fallback: what "from" is where the object gives neither that nor constants of its own; empty: nothing.
+/// fallback: default of "from" for objects without constants of their own; empty: none.
 Material read_one(base::Object material, const std::array<double, 2>& band_hz, std::vector<std::string>& warnings,
                   const MaterialTable* table, const std::string& fallback) {
   Material result;

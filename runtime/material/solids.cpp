@@ -1,9 +1,9 @@
-// Method:     a solid has a stiffness, a density and a speed of sound sqrt(E / rho) within what solids have. Where it has not, the units
-//             that people use are tried: the first, or first pair, with which it is an ordinary solid is the likely one.
-// Source:     Ashby, Materials Selection in Mechanical Design (2011), chapter 4, the charts of modulus against density: E from 1e5 Pa (soft
-//             foams) to 1.2e12 Pa (diamond), density from 10 (foams) to 22 600 kg/m^3 (osmium), sqrt(E / rho) from 30 m/s to 20 km/s. Gels
-//             and soft rubbers (1e3 to 1e6 Pa) lie below, where a slip of the unit is as likely: they are asked about, and let pass.
-// Deviations: none.
+// Method: plausible ranges of stiffness, density and speed of sound sqrt(E / rho). Outside them the common units are tried: the first unit,
+//   or pair, that gives an ordinary solid is suggested.
+// Source: Ashby, Materials Selection in Mechanical Design (2011), chapter 4, modulus-density charts: E from 1e5 Pa (soft foams) to 1.2e12
+// Pa
+//   (diamond), density from 10 (foams) to 22 600 kg/m^3 (osmium), sqrt(E / rho) from 30 m/s to 20 km/s. Gels and soft rubbers (1e3 to 1e6
+//   Pa) lie below, where a unit error is as likely: they cause a warning only.
 #include "runtime/material/solids.hpp"
 
 #include <fmt/format.h>
@@ -18,13 +18,13 @@ namespace {
 constexpr double kSoftestPa = 4e3, kStiffestPa = 1.3e12;
 constexpr double kLightestKgM3 = 5.0, kHeaviestKgM3 = 23000.0;
 constexpr double kMinSpeedMs = 30.0, kMaxSpeedMs = 20000.0;
-constexpr double kMinSoftSpeedMs = 1.0;  // a gel's or a soft rubber's
-// No foam, rubber or gel is so heavy, nor is anything so heavy as slow: metals and stones lie far above.
+constexpr double kMinSoftSpeedMs = 1.0;  // gels and soft rubbers
+// No foam, rubber or gel is that dense, no metal or stone that slow.
 constexpr double kHeavyKgM3 = 2000.0, kMinHeavySpeedMs = 200.0;
 
 struct Unit {
   std::string_view name;
-  double factor;  // of the SI unit
+  double factor;  // to SI units
 };
 constexpr std::array kStiffnessUnits{Unit{"", 1.0}, Unit{"GPa", 1e9}, Unit{"MPa (N/mm^2)", 1e6}, Unit{"psi", 6894.757},
                                      Unit{"ksi", 6.894757e6}};
@@ -37,7 +37,7 @@ bool is_solid(double e, double rho) {
          speed >= (rho > kHeavyKgM3 ? kMinHeavySpeedMs : kMinSpeedMs) && speed <= kMaxSpeedMs;
 }
 
-/// What a bell, a table or a cup may be made of.
+/// Ordinary engineering solid.
 bool is_ordinary(double e, double rho) {
   const double speed = std::sqrt(e / rho);
   return e >= 1e8 && e <= kStiffestPa && rho >= 100.0 && rho <= kHeaviestKgM3 && speed >= 300.0 && speed <= 13000.0;
@@ -64,7 +64,7 @@ std::optional<std::string> ask_about_solid(double young_modulus_pa, double densi
         if (!is_ordinary(young_modulus_pa * of_e.factor, density_kg_m3 * of_rho.factor)) continue;
         std::string text = has_e ? ask(stiffness_key, stiffness, of_e, "Pa") : "";
         if (has_rho) text += (has_e ? "; " : "") + ask(density_key, density_kg_m3, of_rho, "kg/m^3");
-        if (is_soft(young_modulus_pa, density_kg_m3)) text += "; nothing is wrong with it if this is a gel or a soft rubber";
+        if (is_soft(young_modulus_pa, density_kg_m3)) text += "; ignore this for a gel or a soft rubber";
         return text;
       }
     }

@@ -1,5 +1,6 @@
-// Source: walls: infinite thin plates (Cremer, Heckl and Petersson, Structure-Borne Sound, 3rd ed., chapter 5) of usual building materials.
-//   Joints, cord, felt and hand are estimates; docs/howto/supports.md says of each number where it comes from.
+// Source: walls: infinite thin plates (Cremer, Heckl and Petersson, Structure-Borne Sound, 3rd ed., chapter 5) of common building
+// materials.
+//   Joints, cord, felt and hand are estimates; sources of all numbers: docs/howto/supports.md.
 #include "runtime/material/supports.hpp"
 
 #include <fmt/format.h>
@@ -16,9 +17,9 @@
 namespace carillon::material {
 namespace {
 
-constexpr double kMaxLoss = 1.0;  // d = omega eta / 2: a mode that loses more hardly swings
+constexpr double kMaxLoss = 1.0;  // d = omega eta / 2: beyond, modes hardly oscillate
 constexpr double kMaxThicknessM = 100.0;
-constexpr double kWallRad2S2 = 4e7;  // lambda at 1 kHz, where the loss of a wall is taken
+constexpr double kWallRad2S2 = 4e7;  // lambda at 1 kHz, reference of wall losses
 constexpr double kMaxMassKg = 1e9, kMaxDampingNsM = 1e12, kMaxStiffnessNM = 1e15;
 
 struct Joint {
@@ -61,7 +62,7 @@ Base read_lumped(base::Object& object) {
   return base;
 }
 
-/// A wall of another thickness or material.
+/// Wall of custom thickness or material.
 Base read_wall(base::Object& object) {
   Base base{.kind = BaseKind::kPlate, .loss_factor = 0.01};
   if (object.has("material")) {
@@ -89,9 +90,10 @@ Base read_base(base::Object& object) {
       return read_wall(base);
     Base lumped = read_lumped(base);
     if (lumped.mass_kg == 0.0 && lumped.damping_n_s_m == 0.0 && lumped.stiffness_n_m == 0.0)
-      object.fail("on",
-                  "an impedance of 0 holds nothing; give \"mass_kg\", \"damping_n_s_m\" or \"stiffness_n_m\", or compute the body without "
-                  "fixed nodes");
+      object.fail(
+          "on",
+          "an impedance of 0 cannot hold a body; give \"mass_kg\", \"damping_n_s_m\" or \"stiffness_n_m\", or compute the body without "
+          "fixed nodes");
     return lumped;
   }
   const std::string name = object.string("on");
@@ -132,7 +134,7 @@ std::optional<Fixing> read_fixing(base::Object& object) {
   Fixing fixing;
   if (object.has("on")) fixing.base = read_base(object);
   if (object.has("joint")) {
-    if (object.has("loss")) object.fail("loss", "says the same thing as \"joint\"; keep one of them");
+    if (object.has("loss")) object.fail("loss", "conflicts with \"joint\"; keep one of them");
     fixing.joint = object.choice("joint", list_joint_names());
     fixing.joint_loss = std::find_if(kJoints.begin(), kJoints.end(), [&](const Joint& joint) { return fixing.joint == joint.name; })->loss;
   } else {

@@ -16,9 +16,9 @@ extern const char* const kTableText;  // materials.json
 namespace {
 
 constexpr std::size_t kMaxRows = 10'000;
-constexpr std::array<double, 2> kBandHz{20.0, 20000.0};  // where a law may not be negative
+constexpr std::array<double, 2> kBandHz{20.0, 20000.0};  // damping must not be negative here
 
-/// The characters of a name that are compared.
+/// Canonical form of a name for comparison.
 std::string fold(std::string_view name) {
   std::string folded;
   for (const char c : name)

@@ -1,4 +1,4 @@
-// Materials by name: the table of the repository (materials.json), and a file of the user's own in front of it.
+// Named materials: the built-in table (materials.json), extended by a user file.
 #pragma once
 
 #include <filesystem>
@@ -13,27 +13,27 @@ namespace carillon::material {
 
 /// One row of the table.
 struct Row {
-  Material material;              // with its first name
+  Material material;              // with its primary name
   std::string group;              // "metal", "wood", ...
-  std::vector<std::string> also;  // other names
+  std::vector<std::string> also;  // aliases
   std::string elasticity_source;
   std::string loss_source;
-  std::string place;  // "file:line" of a file of the user's own; empty: of the repository
+  std::string place;  // "file:line" in the user's file; empty: built in
 };
 
-/// Rows by name. Case, spaces, hyphens and underscores do not matter.
+/// Rows by name. Case, spaces, hyphens and underscores are ignored.
 class MaterialTable {
  public:
-  /// The table of the repository, and in front of it the user's own: the file that $CARILLON_MATERIALS names, else carillon/materials.json
-  /// in $XDG_CONFIG_HOME or ~/.config, if it is there. Read at the first call. Throws InputError for an invalid file.
+  /// Built-in rows, preceded by the user's file: $CARILLON_MATERIALS, else carillon/materials.json in $XDG_CONFIG_HOME or ~/.config, if
+  /// present. Read on the first call. Throws InputError for an invalid file.
   static const MaterialTable& get();
-  /// Rows of a document {"materials": [...]}; a row may start from one of `base`, whose rows follow. Throws InputError.
+  /// Rows of a document {"materials": [...]}, followed by those of `base`, which they may refer to by "from". Throws InputError.
   static MaterialTable read(const base::Document& document, const MaterialTable* base = nullptr);
 
   const std::vector<Row>& rows() const { return rows_; }
-  /// Null where there is none of that name.
+  /// nullptr if unknown.
   const Row* find(std::string_view name) const;
-  /// As find(), or an InputError that names the nearest one; it begins with `place`: an option, "file:line".
+  /// As find(); the InputError names the nearest match and begins with `place` (an option, "file:line").
   const Row& require(std::string_view place, std::string_view name) const;
 
  private:

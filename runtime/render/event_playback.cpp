@@ -39,7 +39,7 @@ EventPlayback::Survey EventPlayback::survey(const scene::Events& events, const s
                                        : force != nullptr ? times.find_body(force->body)
                                                           : nullptr;
     if (body == nullptr) return;
-    const double ahead_s = calc_half_length_s(event) + body->lead_s;
+    const double ahead_s = scene::calc_half_length_s(event) + body->lead_s;
     if (ahead_s < 10.0) margin_s = std::max(margin_s, ahead_s);  // false for NaN
   });
   return {margin_s, has_contacts ? end_s : kNever};

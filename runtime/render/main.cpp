@@ -46,7 +46,7 @@ int main(int argc, char** argv) {
       ->check(carillon::base::whole_range(8000, 192000), carillon::base::describe_whole_range(8000, 192000))
       ->option_text("HZ");
   app.add_option("--format", options.format, "pcm16, pcm24 (default), pcm32 or float, instead of the scene's")
-      ->check(CLI::IsMember(carillon::render::kSampleFormatNames))
+      ->check(CLI::IsMember(carillon::scene::kSampleFormatNames))
       ->option_text("FORMAT");
   app.add_flag("--audit", options.audit,
                "Audit energy (motion, modes, losses, radiation, balance error) and contacts (penetration depth, hit rate)");

@@ -16,13 +16,6 @@
 #include "runtime/base/file.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/base/standard_output.hpp"
-#include "runtime/render/render.hpp"
-#include "runtime/render/report.hpp"
-#include "runtime/render/sound/spectrogram.hpp"
-#include "runtime/render/sound_file.hpp"
-#include "runtime/render/surface_playback.hpp"
-#include "runtime/scene/banks.hpp"
-#include "runtime/scene/effects/costs.hpp"
 #include "runtime/scene/effects/table.hpp"
 #include "runtime/scene/events.hpp"
 #include "runtime/scene/microphones.hpp"
@@ -93,19 +86,19 @@ class Outputs {
   }
   /// `notes`: stream for the file names; may be null.
   void commit(std::FILE* notes) {
-    for (const scene::Output& output : files_) {
+    for (const OutputFile& output : files_) {
       output.file->commit();
       if (notes != nullptr) fmt::print(notes, "{:<18} {}\n", output.what, base::printable(output.path.string()));
     }
   }
 
  private:
-  struct scene::Output {
+  struct OutputFile {
     std::unique_ptr<base::WholeFile> file;
     const char* what;
     fs::path path;
   };
-  std::vector<scene::Output> files_;
+  std::vector<OutputFile> files_;
 };
 
 bool is_same_file(const fs::path& a, const fs::path& b) {
@@ -254,8 +247,8 @@ scene::Scene prepare_scene(const ProgramOptions& options) {
   scene::Scene scene = scene::read_scene(options.scene);
   if (options.rate_hz) scene.sample_rate_hz = *options.rate_hz;
   if (options.format) {
-    const auto name = std::find(kSampleFormatNames.begin(), kSampleFormatNames.end(), *options.format);
-    scene.output.format = static_cast<scene::SampleFormat>(name - kSampleFormatNames.begin());
+    const auto name = std::find(scene::kSampleFormatNames.begin(), scene::kSampleFormatNames.end(), *options.format);
+    scene.output.format = static_cast<scene::SampleFormat>(name - scene::kSampleFormatNames.begin());
   }
   if (options.plan && (options.spectrogram || options.trajectory || options.report || options.record || !options.wav.empty())) {
     throw InputError("--plan makes no sound and writes no files; remove the options that name files");
@@ -304,7 +297,7 @@ class Run {
     figures_.tally = scene::count_impulses(happened_.events, scene_.bodies.size());
     figures_.physics_steps = happened_.steps;
     figures_.blows = happened_.blows;
-    return scene::make_plan(std::move(facts), happened_.events, measures() ? effects::measure_costs() : effects::Costs{});
+    return scene::make_plan(std::move(facts), happened_.events);
   }
 
   /// Renders the sound and writes all outputs; nothing is visible before all are complete.
@@ -314,7 +307,6 @@ class Run {
     const Sound sound = calc_sound(scene_, body_banks_, happened_.events,
                                    {.rate_hz = scene_.sample_rate_hz,
                                     .plan = &plan,
-                                    .measures = measures(),
                                     .audits = options_->audit,
                                     .fades_end = scene_.output.fade_end,
                                     .head = &head_,
@@ -344,7 +336,6 @@ class Run {
   const scene::Scene& get_scene() const { return scene_; }
 
  private:
-  bool measures() const { return options_->plan || options_->report.has_value(); }
   base::Spool make_spool(const char* what) const { return base::Spool(find_spool_folder(options_->wav), what); }
 
   void write(const scene::Plan& plan, const Sound& sound, const sound::SoundStore& store) {

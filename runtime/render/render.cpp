@@ -16,7 +16,6 @@
 #include "runtime/scene/pose.hpp"
 #include "runtime/scene/session.hpp"
 #include "runtime/synth/bending.hpp"
-#include "runtime/synth/cpu_ticks.hpp"
 #include "runtime/synth/texture.hpp"
 
 namespace carillon::render {
@@ -30,8 +29,6 @@ constexpr double kFastS = 0.125;
 constexpr double kFarthestHeardM = 15e3;  // maximum audible distance (-84 dB); bounds the delay lines
 constexpr int kMaxWaitingStrikes = 256;   // per body, waiting or active
 constexpr int kMaxForces = 512;           // per body that receives forces
-
-double calc_distance(const Vec3& a, const Vec3& b) { return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]); }
 
 /// Summary of the events of one body.
 struct BodySummary {
@@ -54,7 +51,7 @@ std::vector<BodySummary> summarise(const scene::Scene& scene, const std::vector<
       const std::size_t i = motion->body;
       BodySummary& body = summaries[i];
       if (!is_placed[i]) body.first = *motion;
-      if (!is_placed[i] || !scene.bodies[i].spec.fixed) body.reach_m = std::max(body.reach_m, calc_distance(motion->position_m, base));
+      if (!is_placed[i] || !scene.bodies[i].spec.fixed) body.reach_m = std::max(body.reach_m, calc_length(motion->position_m - base));
       is_placed[i] = true;
     } else if (const auto* impulse = std::get_if<events::Impulse>(&event)) {
       if (BodySummary* body = find(impulse->body)) body->is_played = true;
@@ -69,53 +66,22 @@ std::vector<BodySummary> summarise(const scene::Scene& scene, const std::vector<
     const physics::Pose& initial = scene.bodies[i].spec.initial;
     summaries[i].first.position_m = scene::calc_world_point(initial, banks[i]->rigid.centre_m);
     summaries[i].first.rotation = initial.rotation;
-    summaries[i].reach_m = calc_distance(summaries[i].first.position_m, base);
+    summaries[i].reach_m = calc_length(summaries[i].first.position_m - base);
   }
   return summaries;
 }
 
-/// Effects of each body over time, from a plan or the scene, sent to the synthesiser when due. Bodies without events have no effects;
-/// bodies without lasting contacts have no contact effects.
-class EffectTimeline {
- public:
-  EffectTimeline(const scene::Scene& scene, const std::vector<BodySummary>& summaries, const scene::Plan* plan)
-      : scene_(&scene), summaries_(&summaries), first_(summaries.size(), scene.effects), all_(first_) {
-    if (plan == nullptr) return;
-    steps_.emplace(plan->steps);
-    std::vector<bool> is_known(summaries.size());
-    plan->steps.for_each([&](const scene::PlanStep& step) {
-      const std::size_t body = step.body;
-      all_[body] = is_known[body] ? all_[body].with(step.effects) : step.effects;
-      if (!is_known[body]) first_[body] = step.effects;
-      is_known[body] = true;
-    });
+/// Effects of each body, by the plan or else by the scene. Bodies without events have none, bodies without lasting contacts none of those.
+std::vector<synth::EffectSet> find_body_effects(const scene::Scene& scene, const std::vector<BodySummary>& summaries,
+                                                const scene::Plan* plan) {
+  std::vector<synth::EffectSet> found(summaries.size());
+  for (std::size_t i = 0; i < summaries.size(); ++i) {
+    if (!summaries[i].is_played) continue;
+    const synth::EffectSet chosen = plan != nullptr ? plan->selector.choose(static_cast<int>(i)) : scene.effects;
+    found[i] = find_effects(scene, i, summaries[i].is_touched ? chosen : chosen.without(synth::kContactEffects));
   }
-  /// Effects at the start, and the union over time.
-  synth::EffectSet find_first(std::size_t body) const { return find(body, first_[body]); }
-  synth::EffectSet find_all(std::size_t body) const { return find(body, all_[body]); }
-  void apply(double until_s, synth::Synthesiser& synthesiser) {
-    if (!steps_) return;
-    synthesiser.collect();
-    for (const scene::PlanStep* step = steps_->peek(); step != nullptr && step->time_s < until_s; step = steps_->peek()) {
-      const synth::EffectSet effects = find(static_cast<std::size_t>(step->body), step->effects);
-      if (effects != synthesiser.get_effects(step->body)) synthesiser.set_effects(step->body, effects);
-      steps_->next();
-    }
-  }
-
- private:
-  synth::EffectSet find(std::size_t body, synth::EffectSet effects) const {
-    const BodySummary& summary = (*summaries_)[body];
-    if (!summary.is_played) return {};
-    if (!summary.is_touched) effects = effects.without(synth::kContactEffects);
-    return find_effects(*scene_, body, effects);
-  }
-
-  const scene::Scene* scene_;
-  const std::vector<BodySummary>* summaries_;
-  std::vector<synth::EffectSet> first_, all_;  // per body
-  std::optional<base::Records<scene::PlanStep>::Reader> steps_;
-};
+  return found;
+}
 
 /// Measures the synthesiser's output on its way into the store. The end is held back until the need for a fade is known.
 class Outlet {
@@ -188,8 +154,8 @@ double find_silence_pa(const scene::Scene& scene, std::size_t body, const scene:
 /// Maximum distance of the microphones from the first one's initial position.
 double calc_reach_m(const scene::Scene& scene, const scene::Microphones& microphones, const Vec3& base) {
   double path_m = 0.0, offset_m = 0.0;
-  for (const synth::PathPoint& place : scene.listener.path) path_m = std::max(path_m, calc_distance(place.position_m, base));
-  for (const Vec3& x : microphones.offset_m) offset_m = std::max(offset_m, std::hypot(x[0], x[1], x[2]));
+  for (const synth::PathPoint& place : scene.listener.path) path_m = std::max(path_m, calc_length(place.position_m - base));
+  for (const Vec3& x : microphones.offset_m) offset_m = std::max(offset_m, calc_length(x));
   // A floor adds at most twice the receiver's height.
   double height_m = 0.0;
   if (const std::optional<synth::Floor> floor = scene::find_floor(scene))
@@ -209,7 +175,7 @@ class Rendering {
         path_(scene::list_listener_path(session_.get_microphones())),
         base_(session_.get_microphones().centre.find(0.0).position_m),
         summaries_(summarise(scene, banks, events, base_)),
-        effects_(scene, summaries_, options.plan),
+        effects_(find_body_effects(scene, summaries_, options.plan)),
         playback_(events, list_scheduled_bodies(), path_),
         synthesiser_(&open()) {
     if (!scene.surfaces.empty()) surfaces_.emplace(scene, session_.get_microphones(), session_.get_head(), options.rate_hz);
@@ -220,7 +186,7 @@ class Rendering {
     sound.rate_hz = options_->rate_hz;
     sound.channels = session_.get_microphones().offset_m.size();
     for (std::size_t i = 0; i < scene_->bodies.size(); ++i) {
-      sound.body_effects.push_back(effects_.find_all(i));
+      sound.body_effects.push_back(effects_[i]);
       sound.body_modes.push_back(session_.get_model(i).get_mode_count());
       sound.modes += sound.body_modes.back();
     }
@@ -236,7 +202,6 @@ class Rendering {
     for (auto& block : blocks) out.push_back(block.data());
     for (std::size_t start = 0; start < samples; start += kBlock) {
       const std::size_t count = std::min(kBlock, samples - start);
-      effects_.apply(static_cast<double>(start + kBlock) / rate_hz, *synthesiser_);
       playback_.push_until(static_cast<double>(start + kBlock) / rate_hz, *synthesiser_);
       synthesiser_->process(out.data(), static_cast<int>(out.size()), static_cast<int>(count));
       if (options_->audits) note_energy();
@@ -262,7 +227,6 @@ class Rendering {
 
   /// Counters of the synthesiser.
   void count(Sound& sound) const {
-    if (options_->measures) sound.seconds_per_tick = 1e-9;
     const synth::SynthesiserCounters counters = synthesiser_->get_counters();
     sound.strikes = counters.strikes;
     sound.refused = counters.refused;
@@ -284,10 +248,10 @@ class Rendering {
   std::vector<scene::ScheduledBody> list_scheduled_bodies() const {
     std::vector<scene::ScheduledBody> bodies;
     for (std::size_t i = 0; i < scene_->bodies.size(); ++i) {
-      const synth::EffectSet effects = effects_.find_all(i);
+      const synth::EffectSet effects = effects_[i];
       bodies.push_back({.number = static_cast<int>(i),
                         .moves = !effects.is_empty() && !scene_->bodies[i].spec.fixed,
-                        .lead_s = calc_strike_lead_s(session_.get_model(i), effects)});
+                        .lead_s = scene::calc_strike_lead_s(session_.get_model(i), effects)});
     }
     return bodies;
   }
@@ -304,12 +268,11 @@ class Rendering {
     synth::SynthesiserOptions room = session_.make_options();
     room.max_strikes = kMaxWaitingStrikes;
     room.max_waypoints = waypoints.back();
-    room.ticks = options_->measures ? &synth::get_cpu_ticks : nullptr;
     synth::Synthesiser& synthesiser = session_.open(room);
     for (std::size_t i = 0; i < summaries_.size(); ++i) {
       // once per process, before playback
-      if (effects_.find_all(i).has_any(synth::kContactEffects)) synth::Texture::make_tables();
-      synth::BodySettings settings = session_.make_settings(i, effects_.find_first(i));
+      if (effects_[i].has_any(synth::kContactEffects)) synth::Texture::make_tables();
+      synth::BodySettings settings = session_.make_settings(i, effects_[i]);
       settings.position_m = summaries_[i].first.position_m;
       settings.rotation = summaries_[i].first.rotation;
       settings.silence_pa = find_silence_pa(*scene_, i, options_->plan);
@@ -328,7 +291,7 @@ class Rendering {
   std::vector<events::Listener> path_;  // path of the listener
   Vec3 base_;                           // initial position of the listener
   std::vector<BodySummary> summaries_;  // per body
-  EffectTimeline effects_;
+  std::vector<synth::EffectSet> effects_;  // per body
   EventPlayback playback_;
   synth::Synthesiser* synthesiser_;
   double max_modes_j_ = 0.0;
@@ -346,10 +309,8 @@ Sound calc_sound(const scene::Scene& scene, const std::vector<const bank::Bank*>
   const std::uint64_t frames = count_frames(scene.duration_s, options.rate_hz);
   Outlet outlet(store, frames, options.fades_end);
   const double began_s = base::get_process_cpu_s();
-  const std::uint64_t ticks_ns = synth::get_cpu_ticks_cost_ns();
   rendering.render(frames + rendering.get_latency(), outlet);
-  sound.seconds_playing_cpu = std::max(0.0, base::get_process_cpu_s() - began_s - outlet.get_seconds_cpu() -
-                                                1e-9 * static_cast<double>(synth::get_cpu_ticks_cost_ns() - ticks_ns));
+  sound.seconds_playing_cpu = std::max(0.0, base::get_process_cpu_s() - began_s - outlet.get_seconds_cpu());
   outlet.finish(sound);
   rendering.count(sound);
   sound.seconds_cpu = base::get_process_cpu_s() - started_s;

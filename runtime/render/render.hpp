@@ -60,18 +60,16 @@ struct Sound {
   std::int64_t refused = 0;                            // events rejected because a queue was full
   std::int64_t faults = 0;                             // invalid events, for example non-finite numbers
   std::int64_t resets = 0;                             // bodies cleared because their state was not finite
-  std::vector<synth::EffectSet> body_effects;          // per body, union over time
+  std::vector<synth::EffectSet> body_effects;          // per body
   std::vector<synth::EffectCounters> effect_counters;  // per body, at the end
   std::vector<SurfaceFigures> surfaces;                // per recorded surface of the scene
-  double seconds_per_tick = 0.0;                       // of the counters' ticks; 0 unless measured
   double seconds_cpu = 0.0;
   double seconds_playing_cpu = 0.0;  // block-by-block synthesis only
 };
 
 struct RenderOptions {
   int rate_hz = 48000;
-  const scene::Plan* plan = nullptr;  // schedule of effects per body; nullptr: the scene's effects for all bodies
-  bool measures = false;              // measure the cost of each effect of each body
+  const scene::Plan* plan = nullptr;  // choice of effects; nullptr: all bodies have the scene's effects
   bool audits = false;                // audit modal energy
   bool fades_end = false;             // fade a sound that is cut off within kFadeS
   /// make_head() of the scene at this rate, if already made; nullptr: made here.

@@ -114,16 +114,11 @@ base::Json make_list_json(const std::vector<double>& values) {
   return list;
 }
 
-/// Plan of a body, with the activity and cost of its effects.
-base::Json make_effects_json(const scene::Plan& plan, const Sound& sound, std::size_t body, double duration_s) {
-  base::Json json = effects::make_plan_json(plan.selector, plan.facts, static_cast<int>(body));
-  const synth::EffectCounters& counters = sound.effect_counters[body];
-  for (const synth::Effect effect : synth::EffectSet::all()) {
-    json.member(synth::get_name(effect))
-        .set("measured_us_per_s",
-             base::significant(1e6 * static_cast<double>(counters.ticks[effect]) * sound.seconds_per_tick / duration_s, 4))
-        .set("units", counters.units[effect]);
-  }
+/// Effects of a body, their reasons and their work.
+base::Json make_effects_json(const scene::Plan& plan, const Sound& sound, std::size_t body) {
+  base::Json json = effects::make_plan_json(plan.selector, static_cast<int>(body));
+  for (const synth::Effect effect : synth::EffectSet::all())
+    json[synth::get_name(effect)].set("units", sound.effect_counters[body].units[effect]);
   return json;
 }
 
@@ -215,8 +210,8 @@ base::Json make_body_json(const scene::Scene& scene, const Sound& sound, const s
   if (sound.body_deflection[i] > 0.0) json.set("deflection_thicknesses", make_figure(sound.body_deflection[i], 4));
   if (!body.mounting.text.empty()) json.set("supports", make_mounting_json(body.mounting));
   if (body.limited.modes != 0)
-    json.member("limited_gains").set("modes", body.limited.modes).set("max_db", make_figure(body.limited.max_db, 4));
-  json.set("effects", make_effects_json(plan, sound, i, scene.duration_s));
+    json["limited_gains"].set("modes", body.limited.modes).set("max_db", make_figure(body.limited.max_db, 4));
+  json.set("effects", make_effects_json(plan, sound, i));
   return json;
 }
 
@@ -410,14 +405,13 @@ std::string make_report_json(const scene::Scene& scene, const Sound& sound, cons
       .set("faded_end_s", make_figure(sound.faded_s));
   if (f.audit) json.set("energy", make_audit_json(*f.audit));
   if (f.audit) json.set("depth_and_hits", make_contacts_json(scene, f.contacts));
-  for (const scene::Blow& blow : f.blows) json.member("mallets").add(make_blow_json(blow));
+  for (const scene::Blow& blow : f.blows) json["mallets"].add(make_blow_json(blow));
   base::Json warnings = base::Json::array(), bodies = base::Json::array();
   for (const std::string& warning : scene.warnings) warnings.add(base::printable(warning));
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) bodies.add(make_body_json(scene, sound, plan, f, i));
   json.set("warnings", warnings).set("per_body", bodies);
   for (std::size_t i = 0; i < scene.surfaces.size(); ++i)
-    json.member("recordings").add(make_surface_json(scene, scene.surfaces[i], sound.surfaces[i]));
-  json.set("changes", effects::make_changes_json(plan.changes, plan.facts, scene::kMaxReported));
+    json["recordings"].add(make_surface_json(scene, scene.surfaces[i], sound.surfaces[i]));
   return json.text();
 }
 

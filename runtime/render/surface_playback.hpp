@@ -24,7 +24,7 @@ void refuse_surfaces(const scene::Scene& scene, const char* who);
 /// Playback of one recorded surface: receivers, conversions, estimated cost.
 struct SurfacePlan {
   std::size_t receivers = 0;  // ears or microphones, including mirror images
-  bool scene::has_head = false, is_reflected = false, is_resampled = false;
+  bool has_head = false, is_reflected = false, is_resampled = false;
   double sounding_s = 0.0;  // sounding time within the scene
   double cost_s = 0.0;      // estimated CPU time
 };

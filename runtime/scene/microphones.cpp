@@ -21,7 +21,7 @@ Microphones make_microphones(const Scene& scene) {
 }
 
 std::optional<synth::ListeningHead> make_head(const Scene& scene, double rate_hz) {
-  if (!synth::kCompiledEffects.has(synth::Effect::kHead) || !has_head(scene)) return std::nullopt;
+  if (!has_head(scene)) return std::nullopt;
   const SceneListener& listener = scene.listener;
   const std::array<Vec3, 2> ears = calc_ears(listener);
   return synth::ListeningHead{.head = listener.sofa.empty() ? head::make_sphere(rate_hz, {.radius_m = 0.5 * listener.ear_distance_m})

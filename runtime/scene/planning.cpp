@@ -57,9 +57,9 @@ effects::SceneFacts make_facts(const Scene& scene, const Microphones& microphone
   return facts;
 }
 
-Plan make_plan(effects::SceneFacts facts, const Events& events, const effects::Costs& costs) {
-  // The selector may decide up to a time that no later event can affect: a strike needs effects half its pulse and the travel time of its
-  // click across the body earlier.
+Plan make_plan(effects::SceneFacts facts, const Events& events) {
+  // Events are judged once no earlier one can follow: a strike begins half its pulse, and the travel time of its click across the body,
+  // before its time.
   constexpr double kDisorderS = 1.0;  // EventPlayback
   constexpr double kLargestCrossingS = 1.0;
   constexpr double kEveryS = 0.1;
@@ -72,17 +72,8 @@ Plan make_plan(effects::SceneFacts facts, const Events& events, const effects::C
     longest_s = std::max(longest_s, 0.5 * synth::calc_pulse_length(impulse->shape, impulse->duration_s));
   });
   const double behind_s = longest_s + kDisorderS + kLargestCrossingS;
-  Plan plan{.facts = facts, .selector = effects::EffectSelector(std::move(facts), costs)};
-  std::size_t switches = 0;
-  const auto decide = [&](double known_s) {
-    for (effects::EffectChange& change : plan.selector.advance(known_s)) {
-      plan.steps.append({change.time_s, change.body, change.effects});
-      if (switches >= kMaxReported) continue;
-      switches += change.switches.size();
-      plan.changes.push_back(std::move(change));
-    }
-  };
-  if (first_listener) plan.selector.watch(*first_listener);  // the listener moves from the beginning
+  Plan plan{.facts = facts, .selector = effects::EffectSelector(std::move(facts))};
+  if (first_listener) plan.selector.watch(*first_listener);  // from the beginning the listener counts as moving
   double decided_s = 0.0;
   events.for_each([&](const events::Event& event) {
     if (first_listener && std::holds_alternative<events::Listener>(event))
@@ -91,10 +82,10 @@ Plan make_plan(effects::SceneFacts facts, const Events& events, const effects::C
       plan.selector.watch(event);
     const double known_s = events::get_time_s(event) - behind_s;
     if (!(known_s > decided_s + kEveryS)) return;
-    decide(known_s);
+    plan.selector.advance(known_s);
     decided_s = known_s;
   });
-  decide(std::numeric_limits<double>::infinity());
+  plan.selector.advance(std::numeric_limits<double>::infinity());
   return plan;
 }
 

@@ -1,10 +1,7 @@
 // Plan of a scene: the effects that its bodies need.
 #pragma once
 
-#include <cstdint>
-#include <vector>
-
-#include "runtime/base/spool.hpp"
+#include "runtime/scene/effects/effect_selector.hpp"
 #include "runtime/events/events.hpp"
 #include "runtime/scene/effects/effect_selector.hpp"
 #include "runtime/scene/events.hpp"
@@ -22,23 +19,13 @@ synth::ContactSurface make_ground(const Scene& scene);
 /// may move.
 effects::SceneFacts make_facts(const Scene& scene, const Microphones& microphones, bool moves);
 
-/// Effects of a body from this time on.
-struct PlanStep {
-  double time_s = 0.0;
-  std::int32_t body = 0;
-  synth::EffectSet effects;
-};
-
-/// A selector that has seen all events of a scene, and its decisions.
+/// Choice of effects for a scene, by a selector that has judged all of its events.
 struct Plan {
   effects::SceneFacts facts;
   effects::EffectSelector selector;
-  base::Records<PlanStep> steps{};               // in order of time; the first of every body at 0
-  std::vector<effects::EffectChange> changes{};  // the same with reasons, at most kMaxReported
 };
-inline constexpr std::size_t kMaxReported = 10000;  // listed changes
 
 /// `events` as in EventPlayback.
-Plan make_plan(effects::SceneFacts facts, const Events& events, const effects::Costs& costs);
+Plan make_plan(effects::SceneFacts facts, const Events& events);
 
 }  // namespace carillon::scene

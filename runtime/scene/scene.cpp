@@ -72,7 +72,7 @@ const base::Keys<Output> kOutput{
     {"fade_end", &Output::fade_end, "fade-out within the last 10 ms if not silent; false for renderings that are added or analysed"}};
 const base::Keys<Quality> kQuality{
     {"planner_db", "-50",
-     "an effect is omitted if it changes a body's A-weighted sound by less; -150 to -10. Lower: more effects, for longer"},
+     "an effect is omitted if it changes a body's A-weighted sound by less; -150 to -10. Lower: more effects"},
     {"silence_pa", &Quality::silence_pa, Limits{1e-15, 1},
      "below this pressure at 1 m bodies sleep and modes are dropped, by default as planned, or 1e-10. Lower: modes ring for longer"},
     {"modes", &Quality::modes, Limits{synth::kGroup, std::numeric_limits<std::int32_t>::max()},
@@ -83,17 +83,14 @@ const base::Keys<Quality> kQuality{
     {"joint_tolerance", &Quality::joint_tolerance, Limits{1e-14, 1e-4},
      "error of a step of free motion on joints [rad, m] ([cost](../decisions/joints.md))"},
     {"modes_in_impacts", &Quality::modes_in_impacts,
-     "impacts include the modes ([cost](../decisions/impact.md)). False: rigid bodies, given restitution and a Hertz pulse; thin plates "
-     "then "
-     "get too much energy"},
+     "impacts include the modes ([cost](../decisions/impact.md)). False: rigid bodies, given restitution and a Hertz pulse; thin "
+     "plates then get too much energy"},
     {"masking", &Quality::masking,
      "omits hits that are masked by earlier ones of the body; inaudible, and 6 to 8 % less CPU time ([figures](../decisions/contact.md))"},
     {"instructions", &Quality::instructions, kInstructionNames, "instruction set; falls back if unsupported"}};
 const base::Keys<effects::SelectionThresholds> kThresholds{
     {"quiet_db", &effects::SelectionThresholds::below_loudest_db, Limits{20, 250},
-     "sound this far below the loudest strike so far is inaudible and needs no effects. More: bodies ring for longer"},
-    {"lead_s", &effects::SelectionThresholds::lead_s, Limits{0.001, 1},
-     "an effect is on this long before it is needed; `carillon-live` plans only with a `--look-ahead` of 40 ms more than this"}};
+     "sound this far below the loudest strike so far is inaudible and needs no effects. More: bodies ring for longer"}};
 
 physics::GroundSpec parse_ground(base::Object& object, std::optional<double>& reflection, std::vector<std::string>& warnings) {
   physics::GroundSpec ground;
@@ -145,7 +142,7 @@ std::vector<synth::PathPoint> read_path(base::Object& object, std::string_view k
 }
 
 /// Ears of a listener: free, on a sphere or on a measured head.
-void parse_ears(base::Object& object, SceneListener& listener, std::vector<std::string>& warnings) {
+void parse_ears(base::Object& object, SceneListener& listener) {
   if (listener.ears == Ears::kFree) {
     if (object.has("sofa")) object.fail("sofa", "needs \"ears\": \"hrtf\"; add that, or leave it out");
     listener.ear_distance_m = read_within(object, "ear_distance_m", listener.ear_distance_m, 0.0, 10.0);
@@ -158,12 +155,9 @@ void parse_ears(base::Object& object, SceneListener& listener, std::vector<std::
   } else {
     listener.ear_distance_m = read_within(object, "ear_distance_m", kHeadWidthM, kMinHeadM, kMaxHeadM);
   }
-  if (kPlayableEffects.has(synth::Effect::kHead)) return;
-  listener.ears = Ears::kFree;
-  warnings.push_back(object.find_place("ears") + ": this build lacks the effect \"head\"; free ears are used");
 }
 
-SceneListener parse_listener(base::Object& object, std::vector<std::string>& warnings) {
+SceneListener parse_listener(base::Object& object) {
   SceneListener listener;
   kListener.read(object, listener);
   if (object.has("path")) {
@@ -171,7 +165,7 @@ SceneListener parse_listener(base::Object& object, std::vector<std::string>& war
     listener.path = read_path(object, "path");
     listener.position_m = listener.path.front().position_m;
   }
-  parse_ears(object, listener, warnings);
+  parse_ears(object, listener);
   const Vec3 direction = base::read_facing(object, listener.position_m, listener.facing, kFarthestM);
   const double length = norm(direction);
   for (int k = 0; k < 3; ++k) listener.facing[k] = direction[k] / length;
@@ -259,7 +253,7 @@ Scene parse_scene(const base::Document& document) {
   const Names names = parse_bodies(root, scene);
   parse_joints(root, names, scene);
   parse_strikes(root, names, scene);
-  if (auto listener = root.object_if("listener")) scene.listener = parse_listener(*listener, scene.warnings);
+  if (auto listener = root.object_if("listener")) scene.listener = parse_listener(*listener);
   if (root.has("microphones")) {
     if (root.has("listener")) root.fail("microphones", "takes the place of \"listener\"; keep one of them");
     for (const std::vector<double>& row : root.number_rows("microphones", 3, kMaxMicrophones)) {

@@ -44,8 +44,7 @@ inline const std::vector<std::string> kEarsNames{"free", "hrtf"};
 /// Names of the key "kind" of a joint, in the order of joints::Kind.
 inline const std::vector<std::string> kJointNames{"weld", "hinge", "slider", "universal", "ball"};
 
-/// Effects available in carillon-render, and those used without planning.
-inline constexpr synth::EffectSet kPlayableEffects = synth::kCompiledEffects;
+/// Default effects without planning.
 inline constexpr synth::EffectSet kDefaultEffects = synth::kDefaultEffects;
 
 /// Effect of supports on a body's modes; filled when the banks are read, empty without losses.

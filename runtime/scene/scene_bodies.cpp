@@ -80,16 +80,12 @@ Quaternion read_rotation(base::Object& body) {
 /// A list of distinct effects.
 synth::EffectSet read_names(base::Object& object, std::string_view key) {
   std::vector<std::string> playable;
-  for (const synth::Effect effect : kPlayableEffects) playable.emplace_back(synth::get_name(effect));
+  for (const synth::Effect effect : synth::EffectSet::all()) playable.emplace_back(synth::get_name(effect));
   synth::EffectSet effects;
   for (const base::Entry& entry : object.entries(key, std::numeric_limits<std::size_t>::max())) {
     const auto refuse = [&](const std::string& what) { throw InputError(fmt::format("{}: \"{}\" {}", entry.place, key, what)); };
     if (entry.object) refuse("must be a list of names of effects, and holds an object");
     const std::optional<synth::Effect> effect = synth::find_effect(entry.text);
-    if (effect && !kPlayableEffects.has(*effect)) {
-      refuse(fmt::format("names \"{}\", which is not in this build (CMake option CARILLON_EFFECTS); there are {}", entry.text,
-                         fmt::join(playable, ", ")));
-    }
     if (!effect) {
       const std::string nearest = base::find_nearest(entry.text, playable);
       refuse(fmt::format("names \"{}\", which is not an available effect{}; there are {}", entry.text,
@@ -120,7 +116,7 @@ effects::EffectOverrides read_effects(base::Object& object) {
   keys.choice_or("base", {"auto"}, "auto");
   if (keys.has("on")) overrides.on = read_names(keys, "on");
   if (keys.has("off")) overrides.off = read_names(keys, "off");
-  for (const synth::Effect effect : kPlayableEffects) {
+  for (const synth::Effect effect : synth::EffectSet::all()) {
     const char* name = synth::get_name(effect);
     if (!keys.has(name)) continue;
     if (keys.has_string(name)) {
@@ -151,8 +147,6 @@ void read_nonlinear(base::Object& body, effects::EffectOverrides& overrides) {
       body.fail("nonlinear", "is \"auto\", but the list in \"effects\" leaves nothing to choose; give true or false");
   }
   const bool is_on = !is_automatic && body.boolean_or("nonlinear", false);
-  if (is_on && !kPlayableEffects.has(kEffect))
-    body.fail("nonlinear", "needs the effect \"nonlinear\", which is not in this build (CMake option CARILLON_EFFECTS)");
   overrides.on = is_on ? overrides.on.with(kEffect) : overrides.on.without(kEffect);
   overrides.off = is_automatic || is_on || !overrides.automatic ? overrides.off.without(kEffect) : overrides.off.with(kEffect);
 }

@@ -73,14 +73,13 @@ synth::Synthesiser& Session::open(const synth::SynthesiserOptions& options) {
 void Session::add_body(const synth::BodySettings& settings) { synthesiser_->add_body(models_[added_++], settings); }
 
 synth::EffectSet find_effects(const Scene& scene, std::size_t body, synth::EffectSet effects) {
-  effects = effects.common(synth::kCompiledEffects);
   const bank::Bank* bank = scene.bodies[body].spec.bank;
   if (bank == nullptr || bank->multipoles.is_empty()) effects = effects.without(synth::Effect::kDirectivity);
   if (bank == nullptr || bank->quartic.is_empty()) effects = effects.without({synth::Effect::kNonlinear, synth::Effect::kCascade});
   if (!find_floor(scene)) effects = effects.without(synth::Effect::kGroundReflection);
   if (!has_head(scene)) effects = effects.without(synth::Effect::kHead);
   if (scene.bodies[body].spec.fixed) effects = effects.without(synth::Effect::kAccelerationNoise);
-  if (!scene.microphones_m.empty()) effects = effects.with(synth::EffectSet{synth::Effect::kTwoEars}.common(synth::kCompiledEffects));
+  if (!scene.microphones_m.empty()) effects = effects.with(synth::Effect::kTwoEars);
   return effects;
 }
 

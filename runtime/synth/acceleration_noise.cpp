@@ -1,11 +1,11 @@
-// Method:     a rigid sphere of velocity U sends the far pressure rho0 c0 (a / r) cos(theta) H(s) U(s), delayed by (r - a) / c0, with T = a
-//             / c0 and H = (sT)^2 / ((sT)^2 + 2 sT + 2). With U' = F / m that is rho0 c0 (a / m) q', q'' + (2 / T) q' + (2 / T^2) q = F:
-//             one oscillator a direction, damped at 1 / sqrt(2) of critical, for which z = (q' + q / T) + i q / T turns by
-//             e^{(-1 + i) h / T} and q' = Re z - Im z. The force acts through its Chebyshev moments as on any mode (pulse.hpp), a sample
-//             being cut where T is short.
+// Method:     a rigid sphere of velocity U radiates the far pressure rho0 c0 (a / r) cos(theta) H(s) U(s), delayed by (r - a) / c0, with T
+//             = a / c0 and H = (sT)^2 / ((sT)^2 + 2 sT + 2). With U' = F / m that is rho0 c0 (a / m) q', q'' + (2 / T) q' + (2 / T^2) q =
+//             F: one oscillator per axis at 1 / sqrt(2) of critical damping, for which z = (q' + q / T) + i q / T rotates by e^{(-1 + i) h
+//             / T} and q' = Re z - Im z. The force acts through its Chebyshev moments as on any mode (pulse.hpp); samples are divided into
+//             substeps if T is short.
 // Source:     Morse & Ingard, Theoretical Acoustics (1968), 7.2, the order l = 1 in closed form; in graphics: Chadwick, Zheng & James 2012.
-// Deviations: bodies are spheres, and only heard from afar. Turning radiates nothing. What is slower than a pulse, such as rolling, is left
-//             out: steady forces accelerate no resting body.
+// Deviations: spheres in the far field; rotation does not radiate. Forces slower than a pulse, such as rolling, are left out: steady forces
+//             do not accelerate a resting body.
 #include "runtime/synth/acceleration_noise.hpp"
 
 #include <algorithm>
@@ -18,8 +18,8 @@
 namespace carillon::synth {
 namespace {
 
-constexpr int kMaxSubsteps = 256;     // a sphere below 0.03 mm at 48 kHz counts as one of that size
-constexpr double kSilencePa = 1e-10;  // as for modes
+constexpr int kMaxSubsteps = 256;     // limits the radius to 0.03 mm at 48 kHz
+constexpr double kSilencePa = 1e-10;  // as ResonatorOptions::silence_pa
 
 }  // namespace
 
@@ -115,7 +115,7 @@ void AccelerationNoise::take_over(const AccelerationNoise& other) noexcept {
   }
 }
 
-/// What one pulse of unit impulse adds to the state over the sample at position_.
+/// State change over the sample at position_ by a pulse of unit impulse.
 AccelerationNoise::Complex AccelerationNoise::calc_answer(const Pulse& pulse) const noexcept {
   const double begin = pulse.begin - static_cast<double>(position_ - 1);  // the interval of sample n is (n - 1, n]
   Complex sum = 0.0;
@@ -128,7 +128,7 @@ AccelerationNoise::Complex AccelerationNoise::calc_answer(const Pulse& pulse) co
   return sum;
 }
 
-/// What a force adds to the state over the sample at position_.
+/// Adds a force over the sample at position_ to the state.
 void AccelerationNoise::add_answer(const Steps& steps) noexcept {
   const double begin = steps.begin - static_cast<double>(position_ - 1);
   std::array<Complex, 3> sum{};
@@ -153,7 +153,7 @@ void AccelerationNoise::process(const std::array<std::span<float>, 3>& dipole_pa
         z *= turn_;
         size += std::abs(z.real()) + std::abs(z.imag());
       }
-      if (!(gain_ * size >= kSilencePa)) {  // no number sleeps as well
+      if (!(gain_ * size >= kSilencePa)) {  // true also for NaN
         state_.fill(0.0);
         awake_ = false;
       }

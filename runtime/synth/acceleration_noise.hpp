@@ -1,4 +1,4 @@
-// Acceleration noise: the click of a body that is suddenly set in motion as a whole, whatever its modes do.
+// Acceleration noise: the click of a body that is suddenly accelerated as a rigid body.
 #pragma once
 
 #include <array>
@@ -14,48 +14,43 @@
 
 namespace carillon::synth {
 
-/// A rigid sphere of the body's outer volume and mass, pushed by the same pulses as the modes. It radiates as a dipole: what a listener
-/// hears is the pressure along the direction to it. Memory is taken in the constructor only. One thread at a time.
+/// Dipole radiation of a rigid sphere with the body's outer volume and mass, driven by the same pulses as the modes. Allocates in the
+/// constructor only. One thread at a time.
 class AccelerationNoise {
  public:
-  /// Throws InputError when radius [m], mass [kg] or rate is not a positive number.
+  /// Throws InputError unless radius [m], mass [kg] and rate are positive.
   AccelerationNoise(double radius_m, double mass_kg, double sample_rate_hz, int max_strikes = 256, int max_forces = 256);
 
-  /// Registers a pulse; the impulse is turned from the body's frame into the world's by `to_world`. Sound comes from the surface that is
-  /// nearest to the listener, radius / c earlier than from the centre, at which receivers place it: the pulse begins to act by so much
-  /// before its time. False when it was refused: not finite, or no room. [audio-thread]: no heap, no lock, no throw.
+  /// Queues a pulse; `to_world` rotates the impulse from the body frame. Sound leaves the surface nearest to the listener, radius / c
+  /// earlier than from the centre, where receivers place it: the pulse acts earlier by as much. False if refused: not finite, or queue
+  /// full. [audio-thread]: no heap, no lock, no throw.
   bool strike(const events::Impulse& impulse, const events::Quaternion& to_world) noexcept;
 
-  /// The same for a force that is known step by step.
+  /// Force known step by step.
   bool push(const events::Force& force, const events::Quaternion& to_world) noexcept;
 
-  /// How long before its beginning a strike has to be known.
+  /// Time before its beginning by which a strike must be known.
   double get_lead_s() const { return radius_s_; }
 
-  /// Writes the next samples of the dipole along x, y and z of the world [Pa at 1 m], the three of one size. Calls of any size give the
-  /// same bits. A body at rest costs nothing but the zeros. [audio-thread]: no heap, no lock, no throw.
+  /// Writes the next samples of the dipole along x, y and z of the world [Pa at 1 m], three spans of one size. The bits do not depend on
+  /// the block sizes. At rest it only writes zeros. [audio-thread]: no heap, no lock, no throw.
   void process(const std::array<std::span<float>, 3>& dipole_pa) noexcept;
 
   bool is_awake() const { return awake_; }
-  /// process() would only give zeros.
+  /// True while process() would only give zeros.
   bool is_idle() const { return !awake_ && pulses_.empty() && forces_.empty(); }
-  /// As process() of so many samples of a click that is idle, without output. [audio-thread]
+  /// process() of an idle object without output. [audio-thread]
   void skip(std::int64_t samples) noexcept { position_ += samples; }
-  /// Silence; no pulse is left. [audio-thread]
+  /// Clears the state and all pulses. [audio-thread]
   void reset() noexcept;
-  /// Takes the place of another click, with its time and its strikes; the sound continues without a step and dies away as this sphere's
-  /// does. [audio-thread]
+  /// Takes over time, strikes and state of another object; the sound continues without a step and decays as this sphere's. [audio-thread]
   void take_over(const AccelerationNoise& other) noexcept;
-  /// Memory that it has taken.
-  std::size_t calc_bytes() const {
-    return sizeof(AccelerationNoise) + pulses_.capacity() * sizeof(Pulse) + forces_.capacity() * sizeof(Steps);
-  }
   std::int64_t get_refused() const { return refused_; }
 
  private:
   using Complex = std::complex<double>;
   struct Pulse {
-    double begin = 0.0, length = 0.0;  // of the time when its force is not zero, in samples
+    double begin = 0.0, length = 0.0;  // samples in which the force is not zero
     events::PulseShape shape = events::PulseShape::kHertz;
     std::array<double, 3> impulse_n_s{};
   };
@@ -72,9 +67,9 @@ class AccelerationNoise {
   double rate_hz_ = 0.0;
   double radius_s_ = 0.0;                // radius / c
   double gain_ = 0.0;                    // Pa at 1 m for unit velocity of the oscillator
-  int substeps_ = 1;                     // per sample, so that the answer within one is smooth
+  int substeps_ = 1;                     // substeps per sample, so that the response within one is smooth
   Complex turn_;                         // e^{(-1 + i) h c / a} of one sample
-  std::array<Complex, kMoments> force_;  // Chebyshev coefficients of the answer within a substep
+  std::array<Complex, kMoments> force_;  // Chebyshev coefficients of the response within a substep
   Complex sub_turn_;
   std::array<Complex, 3> state_{};  // (q' + q c / a) + i q c / a along x, y, z
   std::vector<Pulse> pulses_;       // capacity max_strikes, never grown

@@ -1,8 +1,8 @@
-// Method:     the displacement of a vertex is the sum over modes of phi q, at the antinodes of the lowest modes and at vertices spread over
-//             the surface; at the end of sub-blocks with forces, and every four samples without. The sum at a vertex ends as soon as the
-//             bound on its remaining terms cannot bring it above the maximum.
+// Method:     displacement of a vertex = sum over modes of phi q, at the antinodes of the lowest modes and at vertices spread over the
+//             surface; at the end of sub-blocks with forces, and every four samples without. The sum at a vertex ends once the bound on its
+//             remaining terms cannot exceed the maximum.
 // Source:     docs/equations.md E4, E13.
-// Deviations: under forces, and between these vertices, the true maximum is up to some per cent larger.
+// Deviations: under forces, and between these vertices, the true maximum is up to a few per cent larger.
 #include "runtime/synth/bending.hpp"
 
 #include <algorithm>
@@ -58,7 +58,7 @@ void BendingWatch::look(const ModeState* states, const ColumnStates* starts, int
     }
   }
   const double limit_m = bending.thickness_m * std::max(kLinearThicknesses, largest_);
-  // Modes that do not ring are watched as long as the others may be.
+  // Damped modes are watched as long as the others.
   if (add_up(swing) <= limit_m && damped.empty()) {
     left_ = 0;
     return;
@@ -66,7 +66,7 @@ void BendingWatch::look(const ModeState* states, const ColumnStates* starts, int
   for (int back = 0; back <= (acted ? 0 : ModelBending::kBack); ++back) look_at(back, groups, damped);
 }
 
-/// At `back` steps before the end of the sub-block.
+/// Evaluates at `back` steps before the end of the sub-block.
 void BendingWatch::look_at(int back, int groups, std::span<const DampedState> damped) noexcept {
   const ModelBending& bending = model_->get_bending();
   const std::size_t lanes = im_.size(), turn = static_cast<std::size_t>(std::max(0, back - 1)) * lanes;
@@ -80,7 +80,7 @@ void BendingWatch::look_at(int back, int groups, std::span<const DampedState> da
     }
   }
   double bound_m = add_up(bound);
-  for (std::size_t m = 0; m < damped.size(); ++m) {  // as at the end: they move slowly, or are gone
+  for (std::size_t m = 0; m < damped.size(); ++m) {  // state at the end: they are slow, or decayed
     const std::size_t c = lanes + m;
     move_[c] = bending.step_m[c] * static_cast<float>(damped[m].q);
     bound_m += static_cast<double>(bending.largest[c] * std::abs(move_[c]));
@@ -91,7 +91,7 @@ void BendingWatch::look_at(int back, int groups, std::span<const DampedState> da
   if (found_m > limit_m) largest_ = found_m / bending.thickness_m;
 }
 
-/// Largest displacement of the vertices of ModelBending [m]; `limit_m` where it is not above that.
+/// Largest displacement of the vertices of ModelBending [m]; at least `limit_m`.
 double BendingWatch::calc_deflection_m(int groups, double limit_m) noexcept {
   const ModelBending& bending = model_->get_bending();
   const std::size_t last = groups;
@@ -110,7 +110,7 @@ double BendingWatch::calc_deflection_m(int groups, double limit_m) noexcept {
       for (std::size_t c = im_.size(); c < move_.size(); ++c)
         moved[axis] += static_cast<double>(static_cast<float>(rows[axis][c]) * move_[c]);
     }
-    const auto calc_size = [&] { return std::sqrt(moved[0] * moved[0] + moved[1] * moved[1] + moved[2] * moved[2]); };
+    const auto calc_size = [&] { return norm(moved); };
     std::size_t g = 0;
     for (; g < last && calc_size() + static_cast<double>(rest_[g]) > largest; ++g) {
       for (std::size_t axis = 0; axis < 3; ++axis) {

@@ -1,4 +1,4 @@
-// The largest deflection of a body with linear modes, beyond the range of linear modes.
+// Largest deflection of a body with linear modes, above the linear range.
 #pragma once
 
 #include <cstddef>
@@ -12,14 +12,14 @@
 
 namespace carillon::synth {
 
-/// Linear modes hold up to this deflection, in thicknesses: a plate that is held at its edges is then some 100 cents sharp.
+/// Limit of linear modes in thicknesses: a plate clamped at its edges is then about 100 cents sharp.
 inline constexpr double kLinearThicknesses = 0.5;
 
 /// Reference thickness of deflections [m], bank::calc_thickness_m(). 0, no judgement: nonlinear banks, banks without a volume, and strings
 /// and membranes, whose tension grows with the slope.
 double find_judged_thickness_m(const bank::Bank& bank);
 
-/// Running maximum of a voice's deflection, during and shortly after forces. A bound, the sum over modes of amplitude times largest shape,
+/// Running maximum of the modal deflection, during and shortly after forces. A bound, the sum over modes of amplitude times largest shape,
 /// comes first; above the limit and the maximum, displacements are summed over all modes at the vertices of ModelBending. Allocates in the
 /// constructor only. [audio-thread]
 class BendingWatch {
@@ -29,17 +29,14 @@ class BendingWatch {
 
   /// True for some time after the last force.
   bool is_watching() const noexcept { return left_ > 0; }
-  /// Takes the states at the end of a sub-block with forces, or of one that is watched: at the start of `column`, kColumns for the end of
-  /// the block. Without forces, times within the sub-block as well.
+  /// Evaluates the states at the end of a sub-block with forces, or of a watched one: at the start of `column`, kColumns for the end of the
+  /// block. Without forces also at times within the sub-block.
   void look(const ModeState* states, const ColumnStates* starts, int column, int groups, std::span<const DampedState> damped,
             bool acted) noexcept;
 
-  /// In thicknesses; 0 while it has not been above kLinearThicknesses.
+  /// In thicknesses; 0 up to kLinearThicknesses.
   double get_largest() const noexcept { return largest_; }
   void take_over(const BendingWatch& other) noexcept { largest_ = other.largest_; }
-  std::size_t calc_bytes() const noexcept {
-    return (re_.capacity() + im_.capacity() + move_.capacity() + rest_.capacity()) * sizeof(float);
-  }
 
  private:
   void look_at(int back, int groups, std::span<const DampedState> damped) noexcept;
@@ -47,7 +44,7 @@ class BendingWatch {
 
   const Model* model_;
   double largest_ = 0.0;
-  int left_ = 0;  // sub-blocks that are watched from now on
+  int left_ = 0;  // remaining sub-blocks to watch
   // By column: states of the ringing modes, and the displacement per step of each shape [m].
   std::vector<float> re_, im_, move_;
   std::vector<float> rest_;  // by group: bound on the displacement by it and all later ones [m]

@@ -1,34 +1,36 @@
-// The sound of one body at the ears: microphones, mirrored ears and heads.
+// Sound of one body at the ears: microphones, mirrored ears and heads.
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <span>
-#include <utility>
 
 #include "runtime/synth/sounding_body.hpp"
 
 namespace carillon::synth {
 namespace {
 
-/// From 0 to 1 over a block, or back.
+/// Smooth step from 0 to 1 over a block, or back.
 double calc_fade(Fade fade, std::int64_t sample) noexcept {
-  if (fade == Fade::kNone) return 1.0;
-  if (fade == Fade::kUnheard) return 0.0;
   const double u = static_cast<double>(sample % kBlock) / kBlock, in = u * u * (3.0 - 2.0 * u);
   return fade == Fade::kIn ? in : 1.0 - in;
 }
 
+void apply_fade(Fade fade, std::int64_t sample, std::span<double> sound) noexcept {
+  for (std::size_t n = 0; n < sound.size() && fade != Fade::kNone; ++n) sound[n] *= calc_fade(fade, sample + static_cast<std::int64_t>(n));
+}
+
 }  // namespace
 
-/// Adds the sound at one ear, times a level, to the mix of its microphone, or to all mixes unless `apart`. Returns the number of samples
+/// Adds the sound at one ear, times a level, to the mix of its microphone, or to all mixes without two ears. Returns the number of samples
 /// with a changing travel time.
 int SoundingBody::hear_ear(Receiver& ear, const Source& source, const Trajectory& track, std::size_t microphone, double level,
-                           std::int64_t sample, std::size_t count, Fade fade, bool apart, BodyScratch& scratch, Mix& mix) noexcept {
+                           std::int64_t sample, std::size_t count, Fade fade, BodyScratch& scratch, Mix& mix) noexcept {
+  const bool apart = effects_.has(Effect::kTwoEars);
   if (apart && fade == Fade::kNone && level == 1.0) return ear.process(source, track, sample, std::span(mix[microphone]).first(count));
   const std::span<double> heard = std::span(scratch.heard).first(count);
   std::fill(heard.begin(), heard.end(), 0.0);
   const int moved = ear.process(source, track, sample, heard);
-  for (std::size_t n = 0; n < count && fade != Fade::kNone; ++n) heard[n] *= calc_fade(fade, sample + static_cast<std::int64_t>(n));
+  apply_fade(fade, sample, heard);
   if (level != 1.0)
     for (double& p : heard) p *= level;
   for (std::size_t c = apart ? microphone : 0; c < (apart ? microphone + 1 : mix.size()); ++c)
@@ -36,73 +38,68 @@ int SoundingBody::hear_ear(Receiver& ear, const Source& source, const Trajectory
   return moved;
 }
 
-/// Counts the work and the time of an ear.
-void SoundingBody::count_ear(const Propagation& propagation, Effect sends, std::size_t microphone, bool is_mirrored, int moved,
-                             std::size_t count, std::int64_t ticks) noexcept {
-  const bool has_delay = has(propagation.effects, Effect::kAirDelay);
+/// Counts the work of an ear.
+void SoundingBody::count_ear(std::size_t microphone, bool is_mirrored, int moved, std::size_t count) noexcept {
   if (is_mirrored) {
     work_.units[Effect::kGroundReflection] += static_cast<std::int64_t>(count);
-  } else {
-    if (has_delay) work_.units[Effect::kAirDelay] += static_cast<std::int64_t>(count);
-    if (has(propagation.effects, Effect::kDoppler)) work_.units[Effect::kDoppler] += moved;
-    if (microphone > 0) work_.units[Effect::kTwoEars] += static_cast<std::int64_t>(count);
+    return;
   }
-  const Effect carries = moved > 0 ? Effect::kDoppler : has_delay ? Effect::kAirDelay : sends;
-  work_.ticks[is_mirrored ? Effect::kGroundReflection : microphone > 0 ? Effect::kTwoEars : carries] += ticks;
+  if (effects_.has(Effect::kAirDelay)) work_.units[Effect::kAirDelay] += static_cast<std::int64_t>(count);
+  if (effects_.has(Effect::kDoppler)) work_.units[Effect::kDoppler] += moved;
+  if (microphone > 0) work_.units[Effect::kTwoEars] += static_cast<std::int64_t>(count);
 }
 
-void SoundingBody::hear(Propagation& propagation, std::int64_t sample, std::size_t count, const ListenerTracks& listener, Fade fade,
-                        BodyScratch& scratch, Mix& mix, TickFunction ticks) noexcept {
-  if (propagation.is_silent()) return;
-  if (kCompiledEffects.has(Effect::kHead) && !propagation.head.empty())
-    return hear_by_head(propagation, sample, count, listener, fade, scratch, mix, ticks);
-  if (fade == Fade::kUnheard) return;
-  std::uint64_t started = ticks != nullptr ? ticks() : 0;
-  const bool apart = has(propagation.effects, Effect::kTwoEars);
-  const auto add_work = [&](Effect sends, std::size_t m, bool is_mirrored, int moved) {
-    const std::uint64_t now = ticks != nullptr ? ticks() : 0;
-    count_ear(propagation, sends, m, is_mirrored, moved, count, static_cast<std::int64_t>(now - std::exchange(started, now)));
-  };
-  const Effect sends = propagation.monopole ? Effect::kModal : Effect::kAccelerationNoise;
+void SoundingBody::hear(std::int64_t sample, std::size_t count, const ListenerTracks& listener, BodyScratch& scratch, Mix& mix) noexcept {
+  Propagation& propagation = *propagation_;
+  if (!propagation.head.empty()) return hear_by_head(sample, count, listener, scratch, mix);
   for (std::size_t m = 0; m < propagation.ears.size() && (propagation.monopole || propagation.dipole[0]); ++m) {
-    const Trajectory& track = propagation.find_track(listener, m, false);
-    add_work(sends, m, false, hear_ear(propagation.ears[m], propagation.source, track, m, 1.0, sample, count, fade, apart, scratch, mix));
-    if (!kCompiledEffects.has(Effect::kGroundReflection) || propagation.mirrored.empty()) continue;
-    const Trajectory& mirrored = propagation.find_track(listener, m, true);
-    add_work(sends, m, true,
-             hear_ear(propagation.mirrored[m], propagation.source, mirrored, m, listener.get_floor()->reflection, sample, count, fade,
-                      apart, scratch, mix));
+    for (const bool is_mirrored : {false, true}) {
+      if (is_mirrored && propagation.mirrored.empty()) continue;
+      Receiver& ear = is_mirrored ? propagation.mirrored[m] : propagation.ears[m];
+      const double level = is_mirrored ? listener.get_floor()->reflection : 1.0;
+      const Trajectory& track = propagation.find_track(listener, m, is_mirrored);
+      count_ear(m, is_mirrored, hear_ear(ear, propagation.source, track, m, level, sample, count, Fade::kNone, scratch, mix), count);
+    }
   }
-  if (!kCompiledEffects.has(Effect::kDirectivity) || !propagation.directed) return;
-  DirectedSound& directed = *propagation.directed;
+  if (!propagation.directed) return;
+  const bool fades = swap_ != nullptr;
+  if (fades) hear_directed(*swap_->directed, sample, count, listener, Fade::kOut, scratch, mix);
+  hear_directed(*propagation.directed, sample, count, listener, fades ? Fade::kIn : Fade::kNone, scratch, mix);
+}
+
+void SoundingBody::hear_directed(DirectedSound& directed, std::int64_t sample, std::size_t count, const ListenerTracks& listener, Fade fade,
+                                 BodyScratch& scratch, Mix& mix) noexcept {
   for (std::size_t e = 0; e < directed.get_ear_count(); ++e) {
     const std::size_t m = directed.find_microphone(e);
     const bool is_mirrored = directed.is_mirrored(e);
     const double level = is_mirrored ? listener.get_floor()->reflection : 1.0;
-    add_work(Effect::kDirectivity, m, is_mirrored,
-             hear_ear(directed.get_receiver(e), directed.make_source(e), directed.find_track(listener, e), m, level, sample, count, fade,
-                      apart, scratch, mix));
+    const int moved = hear_ear(directed.get_receiver(e), propagation_->make_source(directed, e), directed.find_track(listener, e), m, level,
+                               sample, count, fade, scratch, mix);
+    if (fade != Fade::kOut) count_ear(m, is_mirrored, moved, count);
   }
 }
 
 /// The straight sound in the middle of the head, then that by way of the floor, each through the head's ears from its own direction. All
-/// sound of a body has one direction: that of its centre of mass, or of its multipoles where they are its only source.
-void SoundingBody::hear_by_head(Propagation& propagation, std::int64_t sample, std::size_t count, const ListenerTracks& listener, Fade fade,
-                                BodyScratch& scratch, Mix& mix, TickFunction ticks) noexcept {
+/// sound of a body has one direction: that of its centre of mass, or of its multipoles if they are its only source.
+void SoundingBody::hear_by_head(std::int64_t sample, std::size_t count, const ListenerTracks& listener, BodyScratch& scratch,
+                                Mix& mix) noexcept {
+  Propagation& propagation = *propagation_;
   const bool has_whole = propagation.monopole || propagation.dipole[0];
-  const Effect sends = propagation.monopole ? Effect::kModal : has_whole ? Effect::kAccelerationNoise : Effect::kDirectivity;
   for (std::size_t way = 0; way < propagation.head.size(); ++way) {
     const bool is_mirrored = way > 0;
     const double level = is_mirrored ? listener.get_floor()->reflection : 1.0;
-    std::uint64_t started = ticks != nullptr ? ticks() : 0;
     const std::span<double> arrived = std::span(scratch.heard).first(count);
     std::fill(arrived.begin(), arrived.end(), 0.0);
     std::array<Vec3, kSubBlocks> direction{};  // from the body, at the end of each sub-block
     int moved = 0;
-    const auto hear_one = [&](Receiver& ear, const Source& source, const Trajectory& track, bool is_first) {
+    const auto hear_one = [&](Receiver& ear, const Source& source, const Trajectory& track, bool is_first, Fade fade) {
       for (std::size_t n = 0; n < count; n += kSubBlock) {
         const std::span<double> piece = arrived.subspan(n, std::min<std::size_t>(kSubBlock, count - n));
-        const int changed = ear.process(source, track, sample + static_cast<std::int64_t>(n), piece);
+        const std::int64_t at = sample + static_cast<std::int64_t>(n);
+        std::array<double, kSubBlock> faded{};
+        const int changed = ear.process(source, track, at, fade == Fade::kNone ? piece : std::span(faded).first(piece.size()));
+        apply_fade(fade, at, faded);
+        for (std::size_t i = 0; i < piece.size() && fade != Fade::kNone; ++i) piece[i] += faded[i];
         if (!is_first) continue;
         moved += changed;
         direction[n / kSubBlock] = ear.get_direction();
@@ -110,23 +107,21 @@ void SoundingBody::hear_by_head(Propagation& propagation, std::int64_t sample, s
     };
     if (has_whole)
       hear_one(is_mirrored ? propagation.mirrored[0] : propagation.ears[0], propagation.source,
-               propagation.find_track(listener, 0, is_mirrored), true);
-    if (kCompiledEffects.has(Effect::kDirectivity) && propagation.directed) {
-      DirectedSound& directed = *propagation.directed;
-      hear_one(directed.get_receiver(way), directed.make_source(way), directed.find_track(listener, way), !has_whole);
+               propagation.find_track(listener, 0, is_mirrored), true, Fade::kNone);
+    for (DirectedSound* directed : {swap_ != nullptr ? swap_->directed.get() : nullptr, propagation.directed.get()}) {
+      if (directed == nullptr) continue;
+      const bool is_new = directed == propagation.directed.get();
+      hear_one(directed->get_receiver(way), propagation.make_source(*directed, way), directed->find_track(listener, way),
+               is_new && !has_whole,
+               swap_ == nullptr ? Fade::kNone
+               : is_new         ? Fade::kIn
+                                : Fade::kOut);
     }
-    std::uint64_t now = ticks != nullptr ? ticks() : 0;
-    count_ear(propagation, sends, 0, is_mirrored, moved, count, static_cast<std::int64_t>(now - std::exchange(started, now)));
+    count_ear(0, is_mirrored, moved, count);
     if (level != 1.0)
       for (double& p : arrived) p *= level;
 
-    std::array<std::span<double>, 2> ears{std::span(mix[0]).first(count), std::span(mix[1]).first(count)};
-    if (fade != Fade::kNone) {
-      for (std::size_t e = 0; e < 2; ++e) {
-        ears[e] = std::span(scratch.by_head[e]).first(count);
-        std::fill(ears[e].begin(), ears[e].end(), 0.0);
-      }
-    }
+    const std::array<std::span<double>, 2> ears{std::span(mix[0]).first(count), std::span(mix[1]).first(count)};
     for (std::size_t n = 0; n < count; n += kSubBlock) {
       const std::size_t size = std::min<std::size_t>(kSubBlock, count - n);
       Vec3 from = -1.0 * direction[n / kSubBlock];
@@ -135,15 +130,7 @@ void SoundingBody::hear_by_head(Propagation& propagation, std::int64_t sample, s
       propagation.head[way].process(listener.find_in_head(from, end_s), arrived.subspan(n, size), ears[0].subspan(n, size),
                                     ears[1].subspan(n, size));
     }
-    if (fade == Fade::kIn || fade == Fade::kOut) {
-      for (std::size_t n = 0; n < count; ++n) {
-        const double share = calc_fade(fade, sample + static_cast<std::int64_t>(n));
-        for (std::size_t e = 0; e < 2; ++e) mix[e][n] += share * ears[e][n];
-      }
-    }
     work_.units[Effect::kHead] += static_cast<std::int64_t>(count);
-    now = ticks != nullptr ? ticks() : 0;
-    work_.ticks[Effect::kHead] += static_cast<std::int64_t>(now - started);
   }
 }
 

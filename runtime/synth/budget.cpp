@@ -1,11 +1,10 @@
-// Method:     a histogram of all groups by the logarithm of their bound, filled from the loud end until the room is used up: one pass, no
-//             sorting. Modes that go do not come back, so a single strike must not cost any: work on top of what rings (strikes, what they
-//             wake, what fades) runs up a debt. Room is what is allowed for a block, less the running mean of that work in proportion to
-//             the debt, wholly at four blocks' worth; beyond these, less an eighth of the rest as well. The floor for strikes is the
-//             threshold of the last choice, raised by a tenth a block while work on top takes more than half of what the first groups
-//             leave, and let down by half an octave a block when a tenth of the room is free.
-// Source:     none: the list is sorted by audibility, and its prefixes are cut as docs/decisions/budget.md says.
-// Deviations: none.
+// Method:     histogram of all groups by the logarithm of their bound, filled from the loud end until the room is used up: one pass, no
+//             sorting. Removed modes do not return, so a single strike must not remove any: work beyond the ringing groups (strikes, woken
+//             groups, fade-outs) accumulates a debt. Room = allowance of a block, minus the running mean of that work in proportion to the
+//             debt (fully at four blocks' worth), minus an eighth of the debt beyond four blocks. The floor for strikes is the last
+//             threshold, raised by a tenth per block while additional work exceeds half of the allowance beyond the first groups, and
+//             lowered by half an octave per block when a tenth of the room is free.
+// Source:     docs/decisions/budget.md.
 #include "runtime/synth/budget.hpp"
 
 #include <algorithm>
@@ -18,9 +17,9 @@
 namespace carillon::synth {
 namespace {
 
-constexpr double kGroupCost = kGroup * kBlock;    // mode-samples of a live group in a block
-constexpr double kSmoothing = 0.125;              // of the running mean: eight blocks
-constexpr double kRepayment = 0.125;              // of the debt, a block
+constexpr double kGroupCost = kGroup * kBlock;    // mode-samples of a ringing group per block
+constexpr double kSmoothing = 0.125;              // running mean over eight blocks
+constexpr double kRepayment = 0.125;              // of the debt per block
 constexpr double kMaxDebt = 16.0, kCredit = 4.0;  // blocks
 constexpr double kExtraShare = 0.5;
 constexpr float kStricter = 1.1F, kMaxStrict = 1e6F;
@@ -28,7 +27,7 @@ constexpr double kReleaseBelow = 0.9;  // of the room
 constexpr float kRelease = 0.7F;
 constexpr float kInaudible = 1e-12F;  // Pa
 
-std::int32_t to_bits(float x) noexcept {  // std::bit_cast, which the library of the WebAssembly build lacks
+std::int32_t to_bits(float x) noexcept {  // std::bit_cast is missing in the WebAssembly library
   std::int32_t bits;
   std::memcpy(&bits, &x, sizeof bits);
   return bits;
@@ -41,7 +40,7 @@ float from_bits(std::int32_t bits) noexcept {
 
 }  // namespace
 
-/// Exponent and first bits of the fraction: monotone, as the pressure is not negative.
+/// Exponent and leading mantissa bits: monotone for non-negative pressures.
 int Budget::find_bin(float pressure_pa) noexcept {
   constexpr int kShift = 23 - std::bit_width(static_cast<unsigned>(kStepsPerOctave - 1));
   return std::clamp(to_bits(pressure_pa) >> kShift, 0, kBins - 1);
@@ -57,14 +56,14 @@ bool Budget::begin(double allowed, double spent, std::int64_t live_groups, int a
   strictness_ = strikes_take_too_much ? std::min(strictness_ * kStricter, kMaxStrict) : std::max(1.0F, strictness_ / kStricter);
   const double predicted = allowed > 0.0 ? extra_ * std::min(1.0, debt_ / (kCredit * allowed)) : 0.0;
   const double room = std::max(0.0, allowed - predicted - kRepayment * overdrawn);
-  planned_ = static_cast<double>(live_groups) * kGroupCost;  // what fades out takes as much for one block more
+  planned_ = static_cast<double>(live_groups) * kGroupCost;  // fading groups cost one more block
   has_room_ = planned_ + extra_ < kReleaseBelow * allowed && debt_ < allowed;
   if (planned_ <= room) {
     if (planned_ < kReleaseBelow * room) threshold_pa_ *= kRelease;
     if (threshold_pa_ < kInaudible) threshold_pa_ = 0.0F;
     return false;
   }
-  if (live_groups <= awake_bodies) {  // only first groups ring, and they stay: nothing to choose among
+  if (live_groups <= awake_bodies) {  // only first groups ring, which all stay
     threshold_pa_ *= kRelease;
     return false;
   }
@@ -81,7 +80,7 @@ void Budget::decide() noexcept {
   last_room_ = room_;
   for (last_bin_ = kBins - 1; last_bin_ > 0 && count_[last_bin_] <= last_room_; --last_bin_) last_room_ -= count_[last_bin_];
   constexpr int kShift = 23 - std::bit_width(static_cast<unsigned>(kStepsPerOctave - 1));
-  // Where only first groups ring there is nothing to choose among, and no reason to let strikes wake more.
+  // If only first groups ring, keep the threshold low so that strikes may wake more.
   threshold_pa_ = std::max(kRelease * threshold_pa_, from_bits(last_bin_ << kShift));
 }
 

@@ -1,12 +1,12 @@
-// Which modes stay when there are more than the budget allows: the most audible ones, over all bodies.
+// Selects the most audible modes of all bodies within a budget.
 //
 //   synth::Budget budget;
 //   if (budget.begin(allowed, spent, live)) {              // at the start of a block
-//     for (each awake body) budget.add(voice.measure(nearness));
+//     for (each awake body) budget.add(modes.measure(nearness));
 //     budget.decide();
-//     for (each awake body) voice.cut(budget.find_limit(voice.get_measured()));
+//     for (each awake body) modes.truncate(budget.find_limit(modes.get_measured()));
 //   }
-//   voice.set_floor(budget.get_floor_pa() / nearness);    // of every body
+//   modes.set_floor(budget.get_floor_pa() / nearness);    // of every body
 #pragma once
 
 #include <array>
@@ -16,45 +16,45 @@
 
 namespace carillon::synth {
 
-/// What it decides depends on what was added and on nothing else: no clock, no order of threads. Takes no memory. One thread.
+/// Deterministic function of its inputs: no clock, no order of threads. Does not allocate. One thread.
 class Budget {
  public:
-  /// At the start of a block: mode-samples that it may take, those that the last block took, and the groups that are live now, of how
-  /// many bodies. True when some must go. Work on top of the live groups (strikes, what they wake, what fades out) is predicted from the
-  /// last blocks; what was taken too much is given back over the next ones.
+  /// At the start of a block. `allowed`: mode-samples of this block, `spent`: of the last block, `live_groups`: ringing groups of
+  /// `awake_bodies` bodies. True if groups must be removed. Additional work (strikes, woken groups, fade-outs) is predicted from the last
+  /// blocks; overdraft is repaid over the next ones.
   bool begin(double allowed, double spent, std::int64_t live_groups, int awake_bodies) noexcept;
 
-  /// After begin(): whether a tenth of what is allowed is to spare, all work taken into account.
+  /// After begin(): true if a tenth of the allowance is unused.
   bool has_room() const noexcept { return has_room_; }
 
-  /// The groups of one awake body: bounds on their pressure at the receivers [Pa], never growing along the list.
+  /// Bounds on the pressure at the receivers [Pa] of the groups of an awake body, non-increasing.
   void add(std::span<const float> bounds_pa) noexcept;
 
-  /// Once all were added: finds the pressure below which groups go.
+  /// After all add() calls: finds the pressure below which groups are removed.
   void decide() noexcept;
 
-  /// How many groups of a body stay, at least one. In the order of add(), once a body.
+  /// Number of groups that a body keeps, at least one. Call once per body, in the order of add().
   int find_limit(std::span<const float> bounds_pa) noexcept;
 
-  /// Strikes shall wake no group that they cannot lift to this pressure at the receivers; 0: no such floor.
+  /// Strikes must not wake groups that they cannot lift to this pressure at the receivers; 0: no floor.
   float get_floor_pa() const noexcept { return threshold_pa_ * strictness_; }
 
  private:
-  static constexpr int kStepsPerOctave = 8;  // of the histogram: 0.75 dB
+  static constexpr int kStepsPerOctave = 8;  // histogram resolution: 0.75 dB
   static constexpr int kBins = 256 * kStepsPerOctave;
   static int find_bin(float pressure_pa) noexcept;
 
-  double planned_ = std::numeric_limits<double>::infinity();  // of the live groups of the last block, mode-samples
-  double allowed_ = std::numeric_limits<double>::infinity();  // in the last block
-  double extra_ = 0.0;                                        // what came on top, smoothed
-  double debt_ = 0.0;                                         // taken too much so far, mode-samples
+  double planned_ = std::numeric_limits<double>::infinity();  // mode-samples of the ringing groups of the last block
+  double allowed_ = std::numeric_limits<double>::infinity();  // of the last block
+  double extra_ = 0.0;                                        // additional work, smoothed
+  double debt_ = 0.0;                                         // overdraft, mode-samples
   bool has_room_ = false;
   float strictness_ = 1.0F;
-  float threshold_pa_ = 0.0F;                // of the last choice
-  std::int64_t room_ = 0;                    // groups that may stay beyond the first of each body
+  float threshold_pa_ = 0.0F;                // last threshold
+  std::int64_t room_ = 0;                    // groups allowed beyond the first of each body
   std::array<std::int32_t, kBins> count_{};  // groups by the logarithm of their bound
-  int last_bin_ = 0;                         // of which some stay; those above all do
-  std::int64_t last_room_ = 0;               // how many of it
+  int last_bin_ = 0;                         // bin of which some groups stay; all groups in higher bins stay
+  std::int64_t last_room_ = 0;               // groups of that bin that may stay
 };
 
 }  // namespace carillon::synth

@@ -1,15 +1,13 @@
-// One class, whose contacts, rows and forces every sub-block changes together; longer than most files.
-// Method:     every border of two sub-blocks, each contact's values are found on the line between its records; from them its
-//             direction, gains and damping. In between, the force is computed sample by sample and handed to the modes through the
-//             contact's rows at both borders, blended, so that nothing steps when the place or the direction changes.
+// Method:     at every border of sub-blocks the values of each contact are interpolated between its records; they give direction, gains and
+//             damping. In between, the force is computed per sample and applied through the contact's rows at both borders, blended, so
+//             that changes of place or direction cause no step.
 // Source:     K. Johnson, Contact Mechanics (1985), 4.2: k = dF/d delta = 2 E* a. Rough surfaces: B. Persson, Phys. Rev. Lett. 99 (2007)
-//             125502: load ~ exp(-separation / u0). Coulomb 1785.
-//             Rough bodies that slide: the level grows evenly with the logarithms of roughness and speed, the sound is that of shocks
-//             between asperities, and what yields is small against the roughness: H. Ben Abdelounis, A. Le Bot, J. Perret-Liaudet and
-//             H. Zahouani, Wear 268 (2010) 335.
-// Deviations: Persson's u0 is 0.4 h_rms or more for bodies that cannot yield; here it is h_rms for what rolls, and one length for what
-//             slides, by which the level keeps to that law. The weight is taken for what presses: of what something else presses the
-//             ride is too slow. The other body's and this body's modes do not yield to the heights.
+//             125502: load ~ exp(-separation / u0). Coulomb 1785. Rough sliding: the level grows with the logarithms of roughness and
+//             speed, the sound is that of shocks between asperities, and the compliance is small against the roughness: H. Ben Abdelounis,
+//             A. Le Bot, J. Perret-Liaudet and H. Zahouani, Wear 268 (2010) 335.
+// Deviations: Persson's u0 is at least 0.4 h_rms for rigid bodies; here it is h_rms for rolling and a constant for sliding, which
+//             reproduces that law. The load is taken as the weight: for bodies pressed by other forces the riding frequency is too low. The
+//             modes of both bodies do not yield to the heights.
 #include "runtime/synth/contact_forces.hpp"
 
 #include <algorithm>
@@ -29,15 +27,14 @@ constexpr double kPatienceS = 20e-3;
 constexpr double kLongestS = 50e-3;
 constexpr double kAtRest = 0.2e-3, kMoving = 2e-3;  // m/s
 constexpr double kGravity = 9.81;                   // m/s^2
-constexpr double kSticking = 1e-3;                  // m/s; below, the direction of friction fades
-constexpr double kSkinM = 10e-6;                    // over which the load of rough bodies that slide grows by its own size
+constexpr double kSticking = 1e-3;                  // below, friction fades out
+constexpr double kSkinM = 10e-6;                    // skin of rough sliding: decay length of the load
 constexpr double kLargestExponent = 3.0;            // 19 loads; heights reach 13
-constexpr double kStronger = 2.0;                   // a new contact takes the place of one that presses less than half as much
+constexpr double kStronger = 2.0;                   // a new contact replaces one with less than half its force
 
 double calc_motion(double speed_m_s) noexcept { return calc_smooth_step((speed_m_s - kAtRest) / (kMoving - kAtRest)); }
 
-/// Of the surface of one of the two bodies along the path of a contact: the same for every caller. `first`: two surfaces of the same
-/// seed are still two.
+/// Profile seed of one surface along the path of a contact: the same for every caller. `first` distinguishes two surfaces of the same seed.
 std::uint64_t make_seed(std::uint64_t contact, std::uint64_t surface, bool first) noexcept {
   return contact * 0x9e3779b97f4a7c15U ^ (2U * surface + (first ? 1U : 2U)) * 0xc2b2ae3d27d4eb4fU;
 }
@@ -46,24 +43,24 @@ double blend(double a, double b, double share) noexcept { return a + share * (b 
 
 bool is_amount(double x) noexcept { return std::isfinite(x) && x >= 0.0; }
 
-/// E* of a pair; nothing touches what has no stiffness.
+/// E* of a pair; 0 if a modulus is 0.
 double calc_pair_modulus(double own_pa, double other_pa) noexcept {
   return own_pa > 0.0 && other_pa > 0.0 ? 1.0 / (1.0 / own_pa + 1.0 / other_pa) : 0.0;
 }
 
-/// Of a body at a contact, by its plane-strain modulus: what is as stiff as metal or stone loses little, wood and plastics ten times that.
+/// Loss factor by plane-strain modulus: low for metal and stone, ten times that for wood and plastics.
 double calc_contact_loss(double modulus_pa) noexcept {
   constexpr double kHardPa = 50e9, kSoftPa = 10e9, kHard = 0.01, kSoft = 0.1;
   const double share = std::clamp(std::log(kHardPa / modulus_pa) / std::log(kHardPa / kSoftPa), 0.0, 1.0);
   return kHard * std::pow(kSoft / kHard, share);
 }
 
-/// Of the movement over the surfaces so much is slip.
+/// Slip ratio.
 double calc_sliding(double slip_m_s, double sweep_m_s, double other_sweep_m_s) noexcept {
   return slip_m_s <= 0.0 ? 0.0 : std::min(1.0, slip_m_s / std::max({sweep_m_s, other_sweep_m_s, slip_m_s}));
 }
 
-/// Root mean square of the heights that are felt.
+/// RMS of the effective heights.
 double calc_moved(const ContactNoise& noise) noexcept {
   return std::hypot(noise.motion * noise.gains.rms_m, noise.other_motion * noise.other_gains.rms_m);
 }
@@ -75,12 +72,12 @@ struct Press {
 ContactNoise calc_noise(const Press& press, const Texture& texture, const Texture& other_texture) noexcept {
   ContactNoise noise;
   noise.sliding = calc_sliding(press.slip_m_s, press.sweep_m_s, press.other_sweep_m_s);
-  // The asperities of each surface run over the other one at the slip, whichever of them the contact stays on.
+  // The asperities of each surface pass over the other one at the slip speed, whichever surface the contact point stays on.
   noise.speed_m_s = std::max(press.sweep_m_s, press.slip_m_s);
   noise.other_speed_m_s = std::max(press.other_sweep_m_s, press.slip_m_s);
   noise.motion = calc_motion(noise.speed_m_s);
   noise.other_motion = calc_motion(noise.other_speed_m_s);
-  // The heights of a surface that is not swept do not count, and count in full before they are heard.
+  // Heights count only on swept surfaces, and fully before they become audible.
   const double own = calc_smooth_step(noise.speed_m_s / kAtRest), other = calc_smooth_step(noise.other_speed_m_s / kAtRest);
   const double stiffness = 2.0 * press.modulus_pa * press.patch_m;
   const double spring_m = stiffness > 0.0 ? press.force_n / stiffness : 0.0;
@@ -89,12 +86,12 @@ ContactNoise calc_noise(const Press& press, const Texture& texture, const Textur
   };
   const double at_first_m = calc_give(texture.get_roughness_m(), other_texture.get_roughness_m());
   const double ride_rad_s = at_first_m > 0.0 ? std::sqrt(kGravity / at_first_m) : 0.0;
-  // What rolls is blunted by the patch; what slides is touched by asperities much smaller than it.
+  // Rolling is blunted by the patch; sliding contacts are much smaller asperities.
   const double blunt_m = (1.0 - noise.sliding) * press.patch_m;
   noise.gains = texture.calc_gains(noise.speed_m_s, blunt_m, ride_rad_s, press.rate_hz);
   noise.other_gains = other_texture.calc_gains(noise.other_speed_m_s, blunt_m, ride_rad_s, press.rate_hz);
   noise.decay_length_m = stiffness > 0.0 ? calc_give(noise.gains.rms_m, noise.other_gains.rms_m) : 0.0;
-  // exp(s x - s^2 / 2) of a normal x has the mean 1 and the rms sqrt(exp(s^2) - 1) about it: that of the linear spring, up to one load.
+  // For normal x, exp(s x - s^2 / 2) has mean 1 and rms sqrt(exp(s^2) - 1): that of the linear spring, up to one load.
   if (noise.decay_length_m > 0.0) noise.spread = 0.5 * std::log1p(std::pow(std::min(1.0, calc_moved(noise) / noise.decay_length_m), 2.0));
   return noise;
 }
@@ -168,7 +165,7 @@ const char* find_fault(const ContactSurface& surface) noexcept {
   if (!is_amount(surface.roughness_m)) return "the roughness is negative or not finite";
   if (!is_amount(surface.friction)) return "the friction is negative or not finite";
   if (!is_amount(surface.modulus_pa)) return "the modulus is negative or not finite";
-  if (!is_amount(surface.wave_impedance_pa_s_m)) return "the impedance of waves is negative or not finite";
+  if (!is_amount(surface.wave_impedance_pa_s_m)) return "the wave impedance is negative or not finite";
   return nullptr;
 }
 
@@ -187,7 +184,7 @@ ContactForces::ContactForces(std::shared_ptr<const Model> model, ContactForcesOp
   records_.resize(options.max_records);
   for (std::size_t i = 0; i < records_.size(); ++i) records_[i].next = i + 1 < records_.size() ? static_cast<std::int32_t>(i + 1) : -1;
   free_ = 0;
-  damped_force_.resize(model_->damped_.size() * (kSubBlock + 2));
+  damped_force_.resize(model_->get_damped_modes().size() * (kSubBlock + 2));
   // Integrals of 1 - u and u times T_j(2 u - 1) over 0..1, times the length of a sample.
   const auto area = [](int j) { return j % 2 == 0 ? 1.0 / (1.0 - static_cast<double>(j) * j) : 0.0; };
   for (int j = 0; j < kMoments; ++j) {
@@ -200,11 +197,7 @@ ContactForces::ContactForces(std::shared_ptr<const Model> model, ContactForcesOp
   }
 }
 
-std::size_t ContactForces::calc_bytes() const noexcept {
-  return sizeof(*this) + slots_.size() * sizeof(Slot) + records_.size() * sizeof(Record) + damped_force_.size() * sizeof(float);
-}
-
-/// The contact's own slot, or one that it may have.
+/// Slot of the contact, or a free one.
 ContactForces::Slot* ContactForces::find_place(const events::LastingContact& contact) noexcept {
   Slot* empty = nullptr;
   Slot* weakest = nullptr;
@@ -219,12 +212,12 @@ ContactForces::Slot* ContactForces::find_place(const events::LastingContact& con
       min = force;
     }
   }
-  if (contact.state == events::ContactState::kEnd) return nullptr;  // of one that was dropped
+  if (contact.state == events::ContactState::kEnd) return nullptr;  // end of a dropped contact
   if (empty == nullptr && weakest != nullptr && contact.force_n > kStronger * min) weakest->ended = true;
   return empty;
 }
 
-/// A record at the end of the slot's queue: a new one, or the last one when there is no room.
+/// New record at the end of the slot's queue, or its last one if there is no space.
 std::int32_t ContactForces::take_free(Slot& slot) noexcept {
   const std::int32_t taken = free_;
   if (taken < 0) {
@@ -242,7 +235,7 @@ std::int32_t ContactForces::take_free(Slot& slot) noexcept {
 }
 
 bool ContactForces::take(const events::LastingContact& contact, const ContactSurface& other) noexcept {
-  if (events::find_fault(events::Event(contact)) != nullptr || contact.triangle >= std::ssize(model_->surface_->triangles) ||
+  if (events::find_fault(events::Event(contact)) != nullptr || contact.triangle >= std::ssize(model_->get_surface()->triangles) ||
       find_fault(other) != nullptr) {
     ++counters_.refused;
     return false;
@@ -265,7 +258,7 @@ bool ContactForces::take(const events::LastingContact& contact, const ContactSur
     ++live_;
   }
   const std::int32_t place = take_free(*slot);
-  if (place < 0) {  // no room, and none of its own that waits
+  if (place < 0) {  // no space, and no waiting record of its own
     if (!slot->acts && slot->head < 0) free(*slot);
     ++counters_.dropped;
     return false;
@@ -295,7 +288,7 @@ void ContactForces::find_modulus(Slot& slot) const noexcept {
 }
 
 void ContactForces::find_rows(Node& node) const noexcept {
-  const auto& triangle = model_->surface_->triangles[node.values.triangle];
+  const auto& triangle = model_->get_surface()->triangles[node.values.triangle];
   for (std::size_t i = 0; i < kStrikeRows; ++i) node.row[i] = model_->get_row(triangle[i / 3], static_cast<int>(i % 3));
 }
 
@@ -307,7 +300,7 @@ void ContactForces::take_over(ContactForces& other) noexcept {
   reached_ = other.reached_;
   looked_ = other.looked_;
   counters_ = other.counters_;
-  const auto fits = [this](const Record& record) { return record.triangle < std::ssize(model_->surface_->triangles); };
+  const auto fits = [this](const Record& record) { return record.triangle < std::ssize(model_->get_surface()->triangles); };
   for (Slot& slot : slots_) {
     if (!slot.used) continue;
     bool all = fits(slot.from) && (!slot.has_to || fits(slot.to)) && fits(slot.node.values);
@@ -318,15 +311,6 @@ void ContactForces::take_over(ContactForces& other) noexcept {
     }
     find_modulus(slot);
     if (slot.acts) find_rows(slot.node);
-  }
-}
-
-void ContactForces::release() noexcept {
-  for (Slot& slot : slots_) {
-    if (slot.used && !slot.acts)
-      free(slot);
-    else
-      slot.ended = slot.ended || slot.used;
   }
 }
 
@@ -350,7 +334,7 @@ void ContactForces::free(Slot& slot) noexcept {
   --live_;
 }
 
-/// The contact's values at a time [samples]. False when it has not begun.
+/// Values of a contact at a time [samples]. False before its begin.
 bool ContactForces::find_values(Slot& slot, double time, Record& values) noexcept {
   const auto pop = [&] {
     const std::int32_t place = slot.head;
@@ -370,7 +354,7 @@ bool ContactForces::find_values(Slot& slot, double time, Record& values) noexcep
     if (!slot.has_to && slot.head >= 0 && !slot.from.ends) {
       slot.to = pop();
       slot.has_to = true;
-      // What has been held until now continues from now.
+      // Held values continue from now.
       if (slot.holds) slot.from.time = std::max(slot.from.time, looked_);
       slot.to.time = std::max(slot.to.time, slot.from.time);
       slot.from.time = std::max(slot.from.time, slot.to.time - kLongestS * rate_hz_);
@@ -419,7 +403,7 @@ ContactForces::Node ContactForces::make_node(const Slot& slot, const Record& val
                             slot.texture, slot.other_texture);
     const Shocks shocks = calc_shocks(node.noise, values.force_n);
     node.values.force_n = shocks.load_n;
-    // Interpolated exponents, so that none exceeds those of both nodes. No load: no heights.
+    // Exponents are interpolated, so that none exceeds those of both nodes. No heights without a load.
     const double per_m = values.force_n > 0.0 && shocks.over_m > 0.0 ? 1.0 / shocks.over_m : 0.0;
     scale(node.noise.gains, node.noise.motion * per_m);
     scale(node.noise.other_gains, node.noise.other_motion * per_m);
@@ -429,7 +413,7 @@ ContactForces::Node ContactForces::make_node(const Slot& slot, const Record& val
   const double damping = effects_.has(Effect::kContactDamping) ? std::sqrt(0.5 * node.level * values.impedance / rate_hz_) : 0.0;
   if (damping > 0.0) {
     const ContactSpring spring = calc_contact_spring(values.patch_m, surface_.modulus_pa, slot.other_modulus_pa);
-    // k phi_n^2 / omega^2 is k / (Z / (2 rate)) times the damping by Z, over the square of the mode's angle, in samples.
+    // k phi_n^2 / omega^2 = k / (Z / (2 rate)) times the damping by Z, over the square of the mode's angle per sample.
     node.give = static_cast<float>(std::min(1e30, 2.0 * spring.stiffness_n_m / (values.impedance * rate_hz_)));
     node.half_loss = static_cast<float>(0.5 * spring.loss_factor);
   }
@@ -444,7 +428,7 @@ ContactForces::Node ContactForces::make_node(const Slot& slot, const Record& val
   return node;
 }
 
-/// Adds what a contact does between two nodes to the drive.
+/// Adds the action of a contact between two nodes to the drive.
 void ContactForces::add_push(Slot& slot, const Node& from, const Node& to) noexcept {
   std::array<ContactEnd, 2>& push = drive_.push[drive_.contacts];
   ++drive_.contacts;
@@ -482,7 +466,7 @@ void ContactForces::add_push(Slot& slot, const Node& from, const Node& to) noexc
     largest = std::max(largest, std::abs(force));
   }
   push[0].forces = push[1].forces = largest > 0.0;
-  // The direction's length is 1 with friction: sqrt(1 + mu^2).
+  // Length of the direction with friction: sqrt(1 + mu^2).
   drive_.strength_n_s += static_cast<float>(largest * std::hypot(1.0, slot.friction) * kSubBlock / rate_hz_);
   drive_.forces = drive_.forces || push[0].forces;
 }
@@ -522,16 +506,16 @@ const ContactBlock* ContactForces::begin_sub_block(std::int64_t sample) noexcept
 }
 
 void ContactForces::calc_damped_force() noexcept {
-  for (std::size_t i = 0; i < model_->damped_.size(); ++i) {
+  for (std::size_t i = 0; i < model_->get_damped_modes().size(); ++i) {
     float* force = &damped_force_[i * (kSubBlock + 2)];
-    force[0] = force[kSubBlock];  // the last sample of the sub-block before
+    force[0] = force[kSubBlock];  // last sample of the previous sub-block
     std::fill(force + 1, force + kSubBlock + 2, 0.0F);
-    const std::size_t column = model_->sound_.size() * kGroup + i;
+    const std::size_t column = model_->get_damped_column(i);
     for (int c = 0; c < drive_.contacts; ++c) {
       for (const ContactEnd& push : drive_.push[c]) {
         double amplitude = 0.0;
         for (int r = 0; r < kStrikeRows; ++r) amplitude += static_cast<double>(push.force[r]) * push.row[r][column];
-        amplitude *= model_->damped_[i].scale;
+        amplitude *= model_->get_damped_modes()[i].scale;
         for (int n = 0; n <= kSubBlock; ++n) force[n + 1] += static_cast<float>(amplitude) * push.signal[n];
       }
     }

@@ -1,8 +1,7 @@
-// Method:     without a force (q, q') goes from sample to sample by its exact map. With one, stiff modes take several substeps a sample,
-//             each with the exact answer to the moments of the force within it; where the fast root dies within a thousandth of a sample,
-//             it follows the force and only the slow root is integrated.
+// Method:     without forces (q, q') follows its exact map per sample. With forces stiff modes take several substeps per sample, each with
+//             the exact response to the moments of the force; if the fast root decays within a thousandth of a sample it follows the force,
+//             and only the slow root is integrated.
 // Source:     docs/equations.md E4 and E5.
-// Deviations: none.
 #include "runtime/synth/damped_modes.hpp"
 
 #include <algorithm>
@@ -38,14 +37,14 @@ std::array<double, 3> calc_amplitudes(const QueuedForce& force, const Model& mod
 
 }  // namespace
 
-/// A sample of a mode whose fast root f dies at once: with A the integral of the force times e^{-s age}, s the slow root, and B that of f
-/// e^{-f age}, q = (A - B / f) / (f - s), q' = (B - s A) / (f - s). B is the force 1 / f before, up to its second derivative over f
-/// squared. `n`: of the sample within the sub-block that contacts drive.
+/// One sample of a mode with a fast root f: with A the integral of the force times e^{-s age}, s the slow root, and B that of f e^{-f age},
+/// q = (A - B / f) / (f - s), q' = (B - s A) / (f - s). B is the force at 1 / f earlier, up to its second derivative over f squared. `n`:
+/// sample within the sub-block of the contacts.
 void DampedModes::follow_force(std::size_t mode, std::int64_t sample, const StrikeQueue& strikes, const ContactForces* contacts,
                                int n) noexcept {
   const Model::DampedMode& m = model_->get_damped_modes()[mode];
   DampedState& state = states_[mode];
-  const double rate_hz = model_->get_rate_hz(), lag = rate_hz / m.fast;  // in samples
+  const double rate_hz = model_->get_rate_hz(), lag = rate_hz / m.fast;  // samples
   double slow = (m.fast * state.q + state.v) * std::exp(-m.slow / rate_hz), fast = 0.0;
   if (contacts != nullptr) {
     const float* force = contacts->get_damped_force(mode) + n;
@@ -77,7 +76,7 @@ void DampedModes::follow_force(std::size_t mode, std::int64_t sample, const Stri
   state = {(slow - fast / m.fast) / width, (fast - m.slow * slow) / width};
 }
 
-/// From the sample before to this one, the force of contacts goes in a line.
+/// The force of contacts is linear over the sample.
 void DampedModes::add_contacts(const Range& range, int step, const ContactForces& contacts, int n) noexcept {
   for (std::size_t i = range.first; i < range.last; ++i) {
     const Model::DampedMode& m = model_->get_damped_modes()[i];
@@ -128,7 +127,7 @@ void DampedModes::add_forces(const Range& range, std::int64_t sample, int step, 
   }
 }
 
-/// A substep of the modes of a range. `n`: of the sample within the sub-block.
+/// Substep of the modes of a range. `n`: sample within the sub-block.
 void DampedModes::step(const Range& range, std::int64_t sample, int step, const StrikeQueue& strikes, const ContactForces* contacts,
                        int n) noexcept {
   for (std::size_t i = range.first; i < range.last; ++i) {
@@ -141,7 +140,7 @@ void DampedModes::step(const Range& range, std::int64_t sample, int step, const 
   add_forces(range, sample, step, strikes.get_forces());
 }
 
-/// The modes that take as many substeps as the first; all that are left where no force acts.
+/// Modes with as many substeps as the first; all remaining ones without a force.
 DampedModes::Range DampedModes::find_range(std::size_t first, bool forced) const noexcept {
   const auto& modes = model_->get_damped_modes();
   if (!forced) return {first, modes.size(), 1};
@@ -177,7 +176,7 @@ void DampedModes::add(std::int64_t sample, const StrikeQueue& strikes, bool stru
 void DampedModes::drop_below(double pressure_pa) noexcept {
   double bound = 0.0;
   for (std::size_t i = 0; i < states_.size(); ++i) {
-    // q' of an unforced mode never exceeds |q'| + 2 omega |q| from here on.
+    // An unforced mode never exceeds |q'| + 2 omega |q|.
     const Model::DampedMode& m = model_->get_damped_modes()[i];
     bound += (std::abs(states_[i].v) + m.bound * std::abs(states_[i].q)) * std::abs(m.gain);
   }

@@ -1,4 +1,4 @@
-// The modes of a voice at, near or above critical damping. They are few and die at once, so they go sample by sample in double precision.
+// Modes at, near or above critical damping. They are few and decay at once, so they run sample by sample in double precision.
 #pragma once
 
 #include <cstddef>
@@ -17,7 +17,7 @@ struct DampedState {
   double q = 0.0, v = 0.0;
 };
 
-/// The states are those at the voice's horizon, and zero while is_live() is false. Memory is taken in the constructor only.
+/// States are those at the horizon of the owner, and zero while is_live() is false. Allocates in the constructor only.
 class DampedModes {
  public:
   /// The model must outlive the result.
@@ -31,19 +31,18 @@ class DampedModes {
     is_live_ = true;
   }
 
-  /// Adds the pressure [Pa at 1 m] of the kSubBlock samples from `sample` on. `struck`: some of `strikes` act; `contacts`: those that last
-  /// and have a force in this sub-block, or nullptr.
+  /// Adds the pressure [Pa at 1 m] of the kSubBlock samples from `sample` on. `struck`: some of `strikes` act; `contacts`: with a force in
+  /// this sub-block, or nullptr.
   void add(std::int64_t sample, const StrikeQueue& strikes, bool struck, const ContactForces* contacts, float* out) noexcept;
 
-  /// Silences the modes where together they stay below a pressure [Pa at 1 m].
+  /// Silences the modes if their total pressure stays below this [Pa at 1 m].
   void drop_below(double pressure_pa) noexcept;
   void reset() noexcept;
   /// Sum of (q'^2 + lambda q^2) / 2 [J].
   double calc_energy_j() const noexcept;
-  std::size_t calc_bytes() const noexcept { return states_.capacity() * sizeof(DampedState); }
 
  private:
-  /// Modes of so many substeps: first <= mode < last.
+  /// Modes of equal substeps: first <= mode < last.
   struct Range {
     std::size_t first, last;
     int substeps;

@@ -1,7 +1,4 @@
-// Method:     a ring of as many samples as the longest way holds, whose beginning stands behind its end once more, so that a window of it
-//             is one piece of memory.
-// Source:     textbook.
-// Deviations: none.
+// Method:     ring buffer of the longest travel time, whose beginning is repeated behind its end, so that a window is contiguous.
 #include "runtime/synth/delay_line.hpp"
 
 #include <algorithm>
@@ -13,22 +10,14 @@
 
 namespace carillon::synth {
 
-namespace {
-
-std::size_t calc_least_size(int block) { return 2 * kTaps + static_cast<std::size_t>(block); }
-std::size_t calc_twice(int block) { return kTaps + static_cast<std::size_t>(block); }
-
-}  // namespace
-
 DelayLine::DelayLine(double longest_m, double sample_rate_hz, int block) {
-  if (!(longest_m >= 0.0) || !(longest_m < 1e5)) throw InputError("a source must stay within 100 km of the listener");
-  if (!(sample_rate_hz > 0.0) || block < 1) throw InputError("a delay_line needs a positive sample rate and block");
-  size_ = static_cast<std::size_t>(std::ceil(longest_m / bank::kSoundSpeedMs * sample_rate_hz)) + calc_least_size(block);
-  twice_ = calc_twice(block);
+  if (!(longest_m >= 0.0) || !(longest_m < 1e5)) throw InputError("delay line: the longest distance must be below 100 km");
+  if (!(sample_rate_hz > 0.0) || block < 1) throw InputError("delay line: the sample rate and the block must be positive");
+  size_ =
+      static_cast<std::size_t>(std::ceil(longest_m / bank::kSoundSpeedMs * sample_rate_hz)) + 2 * kTaps + static_cast<std::size_t>(block);
+  twice_ = kTaps + static_cast<std::size_t>(block);
   samples_.assign(size_ + twice_, 0.0F);
 }
-
-std::size_t DelayLine::calc_least_bytes(int block) noexcept { return (calc_least_size(block) + calc_twice(block)) * sizeof(float); }
 
 void DelayLine::push(std::span<const float> samples) noexcept {
   for (std::size_t n = samples.size(); n > 0; --n) {

@@ -1,33 +1,32 @@
 // Method:     p at an ear is Re(conj(T) v), v = (1 + i d / omega_d) z the analytic velocity of a mode: the state z is multiplied by a
-//             weight, then sounded by the table of a mode whose sound is the real part of its state. A weight W + u D + u (u - 1) / 2 C
-//             over a block gives A + u B + u (u - 1) / 2 E, A the sound by W, B that by D and E that by C, u from 0 to 1: what is heard
-//             has no steps. From block to block W grows by D and D by C, a parabola by forward differences. Next weights are looked up at
-//             a place that is predicted; C is twice the second divided difference, by blocks, of the weights
-//             at both ends of the last way and at the end of this one.
+//             weight, then rendered by the table of a mode whose sound is the real part of its state. A weight W + u D + u (u - 1) / 2 C
+//             over a block gives A + u B + u (u - 1) / 2 E, A the sound by W, B by D and E by C, u from 0 to 1, without steps. From block
+//             to block W grows by D and D by C, a parabola by forward differences. Next weights are evaluated at a predicted place; C is
+//             twice the second divided difference, by blocks, of the weights at both ends of the last segment and at the end of this one.
 // Source:     docs/equations.md E4, E10.
-// Deviations: T is that of a mode that rings for ever at its frequency: a strike's first cycles and a decay within few cycles are not.
+// Deviations: T is that of steady oscillation: the first cycles of a strike and decays within few cycles are not exact.
 #include "runtime/synth/directivity.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "runtime/acoustics/radiation/transfers.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/quaternion.hpp"
 #include "runtime/base/vector.hpp"
-#include "runtime/acoustics/radiation/transfers.hpp"
 #include "runtime/synth/receiver.hpp"
 #include "runtime/synth/trajectory.hpp"
 
 namespace carillon::synth {
 namespace {
 
-constexpr double kStill = 1e-3;      // of kTurn / L: what moves less since a weight was looked up needs no other
-constexpr double kPredicted = 0.15;  // of the way of a plan: what goes further astray was not predicted
-constexpr double kNowhere = 1e30;    // a place that was never looked up
-constexpr double kBends = 1.5;       // rad of a way times L: on longer ones the curvature of the last says nothing
+constexpr double kSettledShare = 1e-3;     // of kTurn / L: smaller movements need no new weight
+constexpr double kPredictionError = 0.15;  // of the predicted distance: larger deviations were not predicted
+constexpr double kUnsetM = 1e30;           // place before the first look-up
+constexpr double kMaxBendRad = 1.5;        // rad times L: the curvature of longer segments is not extrapolated
 
-/// A turn done `times` times.
+/// Rotation applied `times` times.
 events::Quaternion repeat(const events::Quaternion& q, int times) noexcept {
   const double sine = std::sqrt(q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
   if (!(sine > 0.0)) return {1.0, 0.0, 0.0, 0.0};
@@ -35,10 +34,10 @@ events::Quaternion repeat(const events::Quaternion& q, int times) noexcept {
   return {std::cos(half), scale * q[1], scale * q[2], scale * q[3]};
 }
 
-/// Of a curvature at a share of a block.
+/// Factor of the curvature at a fraction of a block.
 float find_bend_share(float u) noexcept { return 0.5F * u * (u - 1.0F); }
 
-/// Share of a block at the first sample of a sub-block.
+/// Fraction of a block at the first sample of a sub-block.
 float find_share(int sub_block) noexcept { return static_cast<float>(sub_block * kSubBlock) / kBlock; }
 
 }  // namespace
@@ -46,7 +45,7 @@ float find_share(int sub_block) noexcept { return static_cast<float>(sub_block *
 Directivity::Directivity(std::shared_ptr<const Model> model, std::size_t ears, int phase)
     : model_(std::move(model)), radiation_(model_->get_directivity()), phase_(phase), ears_(ears) {
   if (radiation_ == nullptr)
-    throw InputError("directivity needs a bank with multipoles; make it with \"radiation\" in its job, or leave the effect out");
+    throw InputError("directivity: the bank has no multipoles; make it with \"radiation\" in its job, or leave the effect out");
   const std::size_t modes = model_->get_ringing_mode_count();
   const std::size_t groups = radiation_->sound.size();
   orders_.reserve(modes);
@@ -69,7 +68,7 @@ Directivity::Directivity(std::shared_ptr<const Model> model, std::size_t ears, i
   for (auto& room : transfers_) room.resize(modes);
 }
 
-/// From the centre of the multipoles, `blocks` blocks after the first sample of this one: as body and ear move in it, on and on.
+/// Place from the centre of the multipoles, `blocks` blocks after the first sample of this one, by extrapolated movement of body and ear.
 Vec3 Directivity::find_place(const Ear& ear, const BlockPoses& poses, int blocks) const noexcept {
   const auto along = [=](const std::array<Vec3, 2>& x) { return x[0] + static_cast<double>(blocks) * (x[1] - x[0]); };
   const auto predict = [&] {
@@ -82,7 +81,7 @@ Vec3 Directivity::find_place(const Ear& ear, const BlockPoses& poses, int blocks
   return distance > 0.0 ? (nearest_m_ / distance) * place : Vec3{0.0, 0.0, nearest_m_};
 }
 
-/// The way of a mode is over, wherever its weight is.
+/// Ends the segment of a mode at its present weight.
 void Directivity::end_way(Ear& ear, std::size_t m) noexcept {
   Mode& mode = ear.modes[m];
   mode.left = 0;
@@ -95,7 +94,7 @@ void Directivity::end_way(Ear& ear, std::size_t m) noexcept {
   --ear.bending;
 }
 
-/// What was under way in the block before is a block further.
+/// Advances all segments by a block.
 void Directivity::finish_block(Ear& ear) noexcept {
   if (ear.ramping == 0) return;
   for (std::size_t m = 0; m < ear.modes.size(); ++m) {
@@ -112,7 +111,7 @@ void Directivity::finish_block(Ear& ear) noexcept {
   }
 }
 
-/// A mode begins its way to a weight, 2^ahead blocks long, with the curvature that its last way and this one have together.
+/// Begins a segment to a weight, 2^ahead blocks long, with the common curvature of the last segment and this one.
 void Directivity::set_out(Ear& ear, std::size_t m, Complex target, int ahead) noexcept {
   Mode& mode = ear.modes[m];
   const int blocks = 1 << ahead;
@@ -121,7 +120,7 @@ void Directivity::set_out(Ear& ear, std::size_t m, Complex target, int ahead) no
   const Complex slope(share * way.real(), share * way.imag());
   Complex step = slope;
   if (ear.steady && mode.ended == block_ && bends_[orders_[m][is_far_]]) {
-    const float between = 2.0F / static_cast<float>(blocks + (1 << mode.ahead));  // of the middles of both ways
+    const float between = 2.0F / static_cast<float>(blocks + (1 << mode.ahead));  // between the centres of both segments
     const Complex change = slope - mode.slope, bend(between * change.real(), between * change.imag());
     const float half = 0.5F * static_cast<float>(blocks - 1);
     step -= Complex(half * bend.real(), half * bend.imag());
@@ -138,7 +137,7 @@ void Directivity::set_out(Ear& ear, std::size_t m, Complex target, int ahead) no
   ++ear.plans[ahead].modes;
 }
 
-/// Looks up the weights of modes at the places of one ear or two and sends them on their way there, 2^ahead blocks; -1: puts them there.
+/// Looks up the weights of modes at the places of one or two ears and begins segments of 2^ahead blocks to them; -1: sets them at once.
 void Directivity::look_up(std::span<Ear> ears, std::span<const int> modes, const std::array<Vec3, 2>& places_m, int ahead) noexcept {
   if (modes.empty()) return;
   bank_modes_.clear();
@@ -166,7 +165,7 @@ void Directivity::look_up(std::span<Ear> ears, std::span<const int> modes, const
   }
 }
 
-/// Puts all weights where they belong, of which it looks up `left` at most; how many it has.
+/// Sets all weights with at most `left` look-ups; returns the number of look-ups.
 int Directivity::begin_again(Ear& ear, int left) noexcept {
   for (std::size_t m = 0; m < ear.modes.size(); ++m) {
     if (ear.modes[m].left > 0) end_way(ear, m);
@@ -181,29 +180,29 @@ int Directivity::begin_again(Ear& ear, int left) noexcept {
     const double rms = radiation_->transfers->get_rms(model_->get_bank_mode(static_cast<int>(m))) * ear.spreading;
     const float re = radiation_->level[m] * static_cast<float>(rms);
     set_weight(ear.weight, m, {re, re * radiation_->tilt[m]});
-    ear.modes[m].place_m = {kNowhere, kNowhere, kNowhere};
+    ear.modes[m].place_m = {kUnsetM, kUnsetM, kUnsetM};
   }
   return count;
 }
 
-/// Ends what is under way in another direction than was predicted.
+/// Ends segments whose movement deviates from the prediction.
 void Directivity::drop_plans(Ear& ear) noexcept {
   for (std::size_t c = 1; c < ear.plans.size(); ++c) {
     Plan& plan = ear.plans[c];
     if (plan.modes == 0) continue;
     const double share = static_cast<double>(block_ + 1 - plan.begin) / static_cast<double>(1 << c);
     const Vec3 way = plan.to_m - plan.from_m, astray = ear.place_m[1] - plan.from_m - share * way;
-    if (norm(astray) <= kPredicted * norm(way) + kStill * kTurn * norm(ear.place_m[1]) / std::max(1, highest_)) continue;
+    if (norm(astray) <= kPredictionError * norm(way) + kSettledShare * kTurn * norm(ear.place_m[1]) / std::max(1, highest_)) continue;
     for (std::size_t m = 0; m < ear.modes.size(); ++m) {
       Mode& mode = ear.modes[m];
       if (mode.left == 0 || mode.ahead != static_cast<int>(c)) continue;
       end_way(ear, m);
-      mode.place_m = {kNowhere, kNowhere, kNowhere};  // the weight is on its way between two
+      mode.place_m = {kUnsetM, kUnsetM, kUnsetM};  // the weight is between two places
     }
   }
 }
 
-/// Finds what is due, at most `left`, at least 2^least blocks ahead; how much that is.
+/// Lists due modes, at most `left`, at least 2^least blocks ahead; returns their number.
 int Directivity::find_due(Ear& ear, int left, int least, const std::array<std::uint8_t, bank::kMaxOrder + 1>& by_order) noexcept {
   for (auto& list : ear.due) list.clear();
   const double r = norm(ear.place_m[0]);
@@ -214,12 +213,12 @@ int Directivity::find_due(Ear& ear, int left, int least, const std::array<std::u
     const std::size_t m = ear.cursor + i < count ? ear.cursor + i : ear.cursor + i - count;
     const Mode& mode = ear.modes[m];
     if (mode.left > 0) continue;
-    // The first way after a change goes straight on: half as far.
+    // The first segment after a change is straight and half as long.
     const bool is_first = !ear.steady || mode.ended != block_;
     const int wanted = by_order[orders_[m][is_far_]];
     const std::size_t c = std::max(wanted - static_cast<int>(is_first && wanted > least), 0);
     const Vec3 moved = ear.to_m[c] - mode.place_m;
-    const double still = kStill * kTurn * r / std::max(1, orders_[m][0]);
+    const double still = kSettledShare * kTurn * r / std::max(1, orders_[m][0]);
     if (dot(moved, moved) <= still * still) continue;
     ++demand_;
     if (found == left) {
@@ -235,9 +234,9 @@ int Directivity::find_due(Ear& ear, int left, int least, const std::array<std::u
   return found;
 }
 
-/// Looks up what is due of one ear or of two, which go together as long as they can, at least 2^least blocks ahead.
+/// Looks up due modes of one or two ears, together if possible, at least 2^least blocks ahead.
 int Directivity::refresh(std::span<Ear> ears, int left, int least, const BlockPoses& poses) noexcept {
-  // A class begins in blocks of its own rhythm, so that all its modes are predicted together.
+  // Classes begin in blocks of their own rhythm, so that all modes of a class share one prediction.
   const std::int64_t rhythm = block_ + phase_;
   int most = 0, found = 0;
   while (most < kLongest && rhythm % (1 << (most + 1)) == 0) ++most;
@@ -258,7 +257,7 @@ int Directivity::refresh(std::span<Ear> ears, int left, int least, const BlockPo
       while (c < most && (change * (2 << c) <= kTurn || c < least)) ++c;
       std::uint8_t& both = by_order[order];
       both = &ear == &ears.front() ? static_cast<std::uint8_t>(c) : std::min(both, static_cast<std::uint8_t>(c));
-      bends_[order] = bends_[order] && change * (1 << c) <= kBends;
+      bends_[order] = bends_[order] && change * (1 << c) <= kMaxBendRad;
     }
   }
   for (std::size_t e = 0; e < ears.size(); ++e)
@@ -285,11 +284,11 @@ void Directivity::begin_block(std::int64_t block, const BlockPoses& poses) noexc
   demand_ = 0;
   const int all = std::max(share_, static_cast<int>(ears_.size()));
   int left = all, least = 0;
-  // Where all together are too many for a block, weights are looked up further ahead.
+  // If all together exceed a block, look farther ahead.
   while (static_cast<std::size_t>(all) << least < ears_.size() * orders_.size() && least < kLongest) ++least;
   for (std::size_t first = 0; first < ears_.size(); first += 2) {
     const std::span<Ear> ears = std::span(ears_).subspan(first, std::min<std::size_t>(2, ears_.size() - first));
-    // The ears that come later have their share, too.
+    // Later ears have their share, too.
     int share = left * static_cast<int>(ears.size()) / static_cast<int>(ears_.size() - first);
     left -= share;
     bool rests = true;
@@ -298,7 +297,7 @@ void Directivity::begin_block(std::int64_t block, const BlockPoses& poses) noexc
       const Vec3 before = ear.place_m[1], way = before - ear.place_m[0];
       ear.place_m = {find_place(ear, poses, 0), find_place(ear, poses, 1)};
       const Vec3 now = ear.place_m[1] - ear.place_m[0];
-      ear.steady = follows && norm(now - way) <= kPredicted * norm(now);
+      ear.steady = follows && norm(now - way) <= kPredictionError * norm(now);
       ear.spreading = 1.0 / norm(ear.place_m[0]);
       ear.spreading_step = 1.0 / norm(ear.place_m[1]) - ear.spreading;
       if (!follows) share -= begin_again(ear, share / static_cast<int>(&ears.back() - &ear + 1));
@@ -323,7 +322,7 @@ void Directivity::take_over(Directivity& other, std::span<const int> from) noexc
     ear.spreading = old.spreading + old.spreading_step;
     ear.spreading_step = 0.0;
     for (std::size_t m = 0; m < ear.modes.size(); ++m) {
-      ear.modes[m].place_m = {kNowhere, kNowhere, kNowhere};
+      ear.modes[m].place_m = {kUnsetM, kUnsetM, kUnsetM};
       if (m >= from.size() || from[m] < 0 || from[m] >= std::ssize(old.modes)) continue;
       set_weight(ear.weight, m, get_weight(old.weight, static_cast<std::size_t>(from[m])));
     }
@@ -338,7 +337,7 @@ void Directivity::silence(int from) noexcept {
   for (Ear& ear : ears_) std::fill(ear.sound.begin() + from, ear.sound.end(), 0.0F);
 }
 
-/// Adds the sound of an ear over sub-blocks, by groups from `group` on, of which `table` and `starts` are the first.
+/// Adds the sound of an ear over sub-blocks, by groups from `group` on, the first of `table` and `starts`.
 void Directivity::sound(const Ear& ear, const Kernels& kernels, const SoundTable* table, const ColumnStates* starts, int group, int groups,
                         int first, int sub_blocks, float* out) const noexcept {
   kernels.emit_weighted(table, starts, ear.weight.data() + group, groups, first, sub_blocks, out);
@@ -407,18 +406,6 @@ void Directivity::add_damped_to_fade(const Directivity& weights, const float* pr
 void Directivity::let_fade_fall() noexcept {
   for (Ear& ear : ears_)
     for (std::size_t n = 0; n < kBlock; ++n) ear.fade[n] *= 1.0F - static_cast<float>(n) / kBlock;
-}
-
-std::size_t Directivity::calc_bytes() const noexcept {
-  std::size_t bytes = sizeof(Directivity) + ears_.capacity() * sizeof(Ear) + kept_.capacity() * sizeof(SampleStates) +
-                      orders_.capacity() * sizeof(orders_[0]) + bank_modes_.capacity() * sizeof(std::int32_t) +
-                      first_.capacity() * sizeof(int);
-  for (const auto& room : transfers_) bytes += room.capacity() * sizeof(Complex);
-  for (const Ear& ear : ears_) {
-    for (const auto& list : ear.due) bytes += list.capacity() * sizeof(int);
-    bytes += (ear.weight.capacity() + ear.step.capacity() + ear.bend.capacity()) * sizeof(ModeWeight) + ear.modes.capacity() * sizeof(Mode);
-  }
-  return bytes;
 }
 
 }  // namespace carillon::synth

@@ -1,12 +1,6 @@
-// Method:     a table of names.
-// Source:     none.
-// Deviations: none.
 #include "runtime/synth/effects.hpp"
 
 #include <array>
-#include <string>
-
-#include "runtime/base/error.hpp"
 
 namespace carillon::synth {
 namespace {
@@ -25,12 +19,6 @@ std::optional<Effect> find_effect(std::string_view name) noexcept {
     if (name == kNames[i]) return static_cast<Effect>(i);
   }
   return std::nullopt;
-}
-
-void check_compiled(EffectSet effects) {
-  for (const Effect effect : effects.without(kCompiledEffects))
-    throw InputError(std::string("the effect \"") + get_name(effect) +
-                     "\" is not in this build; leave it out, or build with it in the CMake option CARILLON_EFFECTS");
 }
 
 }  // namespace carillon::synth

@@ -1,4 +1,4 @@
-// The effects that a scene may call for: the one list of them.
+// List of effects, and sets of them.
 #pragma once
 
 #include <array>
@@ -8,11 +8,6 @@
 #include <initializer_list>
 #include <optional>
 #include <string_view>
-
-// The effects of this build, bit i for effect i; the CMake option CARILLON_EFFECTS gives it.
-#ifndef CARILLON_EFFECTS_MASK
-#define CARILLON_EFFECTS_MASK 0x3fff
-#endif
 
 namespace carillon::synth {
 
@@ -34,12 +29,12 @@ enum class Effect : std::uint8_t {
 };
 inline constexpr int kEffectCount = 14;
 
-/// As scene files call it: "modal", "hertz_pulse", "roughness", "rolling", "contact_damping", "acceleration_noise", "air_delay", "doppler",
+/// Name in scene files: "modal", "hertz_pulse", "roughness", "rolling", "contact_damping", "acceleration_noise", "air_delay", "doppler",
 /// "two_ears", "directivity", "ground_reflection", "head", "nonlinear", "cascade".
 const char* get_name(Effect effect) noexcept;
 std::optional<Effect> find_effect(std::string_view name) noexcept;
 
-/// A set of effects, one bit each. Bits beyond kEffectCount are 0, so that equal sets have equal bits.
+/// Set of effects, one bit each. Bits beyond kEffectCount are 0.
 class EffectSet {
  public:
   constexpr EffectSet() = default;
@@ -62,7 +57,7 @@ class EffectSet {
   static constexpr EffectSet from_mask(unsigned mask) { return make(mask & all().bits_); }
   friend constexpr bool operator==(EffectSet, EffectSet) = default;
 
-  /// Goes through the effects of the set in the order of their list.
+  /// Iterates in the order of enum Effect.
   class Iterator {
    public:
     using value_type = Effect;
@@ -82,7 +77,7 @@ class EffectSet {
     friend constexpr bool operator==(Iterator, Iterator) = default;
 
    private:
-    unsigned left_ = 0;  // bits of those that are still to come
+    unsigned left_ = 0;  // remaining bits
   };
   constexpr Iterator begin() const { return Iterator(bits_); }
   constexpr Iterator end() const { return Iterator(); }
@@ -97,23 +92,13 @@ class EffectSet {
   std::uint16_t bits_ = 0;
 };
 
-/// What this build can play. Code of other effects is not in it.
-inline constexpr EffectSet kCompiledEffects = EffectSet::from_mask(CARILLON_EFFECTS_MASK);
-/// Whether this build and a set have an effect: false without a look at the set where the build has not.
-constexpr bool has(EffectSet effects, Effect effect) { return kCompiledEffects.has(effect) && effects.has(effect); }
-
-/// What contacts that last make of the surfaces that touch.
+/// Effects of lasting contacts.
 inline constexpr EffectSet kContactEffects{Effect::kRoughness, Effect::kRolling, Effect::kContactDamping};
 
-/// Default effects: a body rings, struck by pulses that last, heard late, with Doppler shift, by every microphone at
-/// its own place.
-inline constexpr EffectSet kDefaultEffects =
-    EffectSet{Effect::kModal, Effect::kHertzPulse, Effect::kAirDelay, Effect::kDoppler, Effect::kTwoEars}.common(kCompiledEffects);
+/// Modes, finite pulses, travel time, Doppler shift, one receiver per microphone.
+inline constexpr EffectSet kDefaultEffects{Effect::kModal, Effect::kHertzPulse, Effect::kAirDelay, Effect::kDoppler, Effect::kTwoEars};
 
-/// Throws InputError that names the first effect of `effects` that this build was made without. [main-thread]
-void check_compiled(EffectSet effects);
-
-/// One value for each effect.
+/// One value per effect.
 template <typename T>
 class PerEffect {
  public:

@@ -22,7 +22,7 @@ EnergyBook::EnergyBook(const Model& model) {
     mode.loss = 2.0 * mode.decay * h;
     for (std::size_t n = 0; n < mode.falls.size(); ++n) mode.falls[n] = -std::expm1(-mode.loss * kSubBlock * static_cast<double>(n + 1));
     mode.alone = calc_oscillator_map(mode.lambda, mode.decay, kSubBlock * h);
-    if (m >= model.get_ringing_mode_count()) continue;  // the sound of modes near and above critical damping is left out
+    if (m >= model.get_ringing_mode_count()) continue;  // radiation of damped modes is left out
     mode.share = calc_radiated_share(model.get_gain(m), mode.decay);
     const double omega = std::sqrt(mode.lambda);
     mode.omega_d = std::sqrt((omega - mode.decay) * (omega + mode.decay));

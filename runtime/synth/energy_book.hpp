@@ -30,24 +30,24 @@ struct ModeEnergy {
   }
 };
 
-/// The share of a mode's damping that is sound: d_r = bank::calc_radiation_decay(gain) of the bank's decay d, which counts as all there
-/// is; 1 where d_r is more, as gains that radiation::limit_gains() has not limited may have it.
+/// Radiated share of a mode's damping: d_r / d with d_r = bank::calc_radiation_decay(gain) and d the bank's total decay; 1 if d_r is
+/// larger, which gains not limited by radiation::limit_gains() allow.
 double calc_radiated_share(double gain, double decay_per_s) noexcept;
 
-/// Balance of one voice, from the states before and after each sub-block with forces and at the start of each block. Loss in free motion:
-/// the decrease of energy. Loss under forces: the integral of 2 d q'^2, summed over samples; the rest of the change is work.
+/// Balance of one ResonatorBank, from the states before and after each sub-block with forces and at the start of each block. Loss in free
+/// motion: the decrease of energy. Loss under forces: the integral of 2 d q'^2, summed over samples; the rest of the change is work.
 class EnergyBook {
  public:
   explicit EnergyBook(const Model& model);
 
-  /// States at a sample, after free motion. get(m): of mode m of the model; is_coupled(m): of the nonlinear modes, whose energy is
-  /// `coupled_j` and whose damping counts as that of linear modes.
+  /// States at a sample, after free motion. get(m): of mode m of the model; is_coupled(m): nonlinear modes, whose energy is `coupled_j` and
+  /// whose damping counts as that of linear modes.
   template <class Get, class IsCoupled>
   void note(std::int64_t sample, const Get& get, const IsCoupled& is_coupled, double coupled_j) noexcept {
     note(sample, false, nullptr, 0, false, get, is_coupled, coupled_j);
   }
-  /// The same at the end of a sub-block with forces, after note() at its beginning. `kept`: their part of the states of the ringing modes
-  /// at each sample, of `groups` groups; `is_all`: the whole states.
+  /// End of a sub-block with forces, after note() at its beginning. `kept`: their part of the states of the ringing modes at each sample,
+  /// of `groups` groups; `is_all`: the whole states.
   template <class Get, class IsCoupled>
   void note_acted(std::int64_t sample, const SampleStates* kept, int groups, bool is_all, const Get& get, const IsCoupled& is_coupled,
                   double coupled_j) noexcept {
@@ -60,7 +60,7 @@ class EnergyBook {
     sample_ = sample;
     const double held_j = sums_.held_j;
     sums_ = before;
-    // A model that lacks modes of the one before it, or has more: they go and come with their energy.
+    // Modes missing in one of the models appear and vanish with their energy.
     sums_.lost_j += before.held_j - held_j;
     sums_.held_j = held_j;
   }
@@ -68,16 +68,15 @@ class EnergyBook {
   const ModeEnergy& get() const noexcept { return sums_; }
   /// Buffer for `kept`, one per group.
   SampleStates* get_kept() noexcept { return kept_.data(); }
-  std::size_t calc_bytes() const noexcept { return modes_.capacity() * sizeof(Mode) + kept_.capacity() * sizeof(SampleStates); }
 
  private:
   struct Mode {
     DampedState state;
-    double lambda = 0.0, energy_j = 0.0, share = 0.0;  // share: that is radiated
+    double lambda = 0.0, energy_j = 0.0, share = 0.0;  // share: radiated
     double loss = 0.0;                                 // 2 d over a sample
     double decay = 0.0, omega_d = 0.0;                 // of those that ring
     double turn_re = 0.0, turn_im = 0.0;               // over a sample
-    OscillatorMap alone{};                             // over a sub-block, of those that do not
+    OscillatorMap alone{};                             // damped modes: map over a sub-block
     std::array<double, kSubBlocks> falls{};            // 1 - e^-2 d t over one sub-block to a block
   };
   double calc_lost_j(const Mode& mode, const SampleStates& kept, int lane, bool is_all) const noexcept;

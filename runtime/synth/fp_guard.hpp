@@ -1,4 +1,4 @@
-// Denormal numbers off while sound is made.
+// Flushes denormal numbers during synthesis.
 #pragma once
 
 #if defined(__x86_64__)
@@ -7,9 +7,9 @@
 
 namespace carillon::synth {
 
-/// While one of these lives, results that would be denormal are zero (FTZ) and denormal operands count as zero (DAZ): on many processors
-/// they cost a hundred cycles each. The caller's setting comes back afterwards. Does nothing on processors other than x86-64, and in
-/// WebAssembly, which has no such setting: there Voice clears small states itself.
+/// Scope in which denormal results are flushed to zero (FTZ) and denormal operands count as zero (DAZ): on many processors they cost a
+/// hundred cycles each. Restores the caller's setting. No effect on other processors than x86-64 and in WebAssembly, where ResonatorBank
+/// clears small states itself.
 class FpGuard {
  public:
 #if defined(__x86_64__)

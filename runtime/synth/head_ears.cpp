@@ -1,6 +1,6 @@
 // Method:     head::EarFilter on the grid of sub-blocks.
 // Source:     docs/equations.md.
-// Deviations: a source is as far away as heads are measured; one that is nearer is louder by 1 / r at both ears alike.
+// Deviations: sources have the distance of the head's measurement; nearer ones are louder by 1 / r at both ears alike.
 #include "runtime/synth/head_ears.hpp"
 
 #include <algorithm>
@@ -24,9 +24,5 @@ void HeadEars::process(const Vec3& direction, std::span<const double> input, std
   left_ = std::max(0, left_ - static_cast<int>(input.size()));
   if (left_ == 0) filter_->reset();
 }
-
-int HeadEars::get_length() const noexcept { return filter_->get_length(); }
-
-std::size_t HeadEars::calc_bytes() const noexcept { return sizeof(HeadEars) + filter_->calc_bytes(); }
 
 }  // namespace carillon::synth

@@ -1,4 +1,4 @@
-// A head's two ears for one body.
+// Head filter of one body and one path.
 #pragma once
 
 #include <cstddef>
@@ -14,31 +14,27 @@ class Head;
 
 namespace carillon::synth {
 
-/// What both ears of a head hear of the sound of one body that comes by one way: straight, or from a floor. The sound comes as it would be
-/// in the middle of the head without it, with the delay and the spreading of the way to there; the head's own delays and levels are what
-/// the ears differ by. Invariant: it is silent, and as it was made, once all that came in is out; when that is follows from
-/// the samples alone, not from how many come in one call of who feeds it. [audio-thread] but for the constructor.
+/// Sound at both ears of a head from one body by one path: straight, or by the floor. The input is the sound at the centre of the head
+/// without the head, with delay and spreading of the path; the filter adds the head's own delays and levels. Invariant: silent and in its
+/// initial state once the response to all input has ended, which depends on the samples only, not on the block sizes. [audio-thread] except
+/// the constructor.
 class HeadEars {
  public:
-  /// Takes all memory that it needs.
+  /// Allocates all memory.
   explicit HeadEars(std::shared_ptr<const head::Head> head);
   HeadEars(HeadEars&&) noexcept;
   ~HeadEars();
 
-  /// Adds what both ears hear of a sub-block or less [Pa], get_latency() of the head later. `direction`: to the source at its end, in the
-  /// frame of the head; from the direction of the last call to this one the head's filter fades over the call. Zeros that come when all is
-  /// out cost nothing.
+  /// Adds the sound at both ears of at most a sub-block [Pa], get_latency() of the head later. `direction`: to the source at its end, in
+  /// the frame of the head; the filter cross-fades from the direction of the last call. Zeros cost nothing once the output is silent.
   void process(const Vec3& direction, std::span<const double> input, std::span<double> left, std::span<double> right) noexcept;
 
-  /// All that came in is out.
+  /// The response to all input has ended.
   bool is_silent() const noexcept { return left_ == 0; }
-  /// Samples for which something that came in is heard, with the latency.
-  int get_length() const noexcept;
-  std::size_t calc_bytes() const noexcept;
 
  private:
   std::unique_ptr<head::EarFilter> filter_;
-  int left_ = 0;  // samples until all is out
+  int left_ = 0;  // samples until the output is silent
 };
 
 }  // namespace carillon::synth

@@ -1,7 +1,6 @@
-// Method:     every source file kernels_*.cpp brings one table of functions.
-// Source:     none.
-// Deviations: processors other than x86-64 take the plain kernels. WebAssembly has no question for what a processor has: there are two
-//             builds, of which this file and the kernels are compiled with and without its SIMD.
+// Method:     each kernels_*.cpp defines one table of functions.
+// Deviations: processors other than x86-64 use the plain kernels. WebAssembly cannot query features: there are two builds, with and without
+//             SIMD for this file and the kernels.
 #include "runtime/synth/kernels.hpp"
 
 #include "runtime/base/instructions.hpp"

@@ -1,6 +1,5 @@
-// Method:     kernels_body.inl and kernels_receiver.inl on the SIMD of WebAssembly: 4 lanes, no fused multiply-add.
+// Method:     kernels_body.inl and kernels_receiver.inl in WebAssembly SIMD: 4 lanes, no fused multiply-add.
 // Source:     WebAssembly SIMD proposal; clang's wasm_simd128.h.
-// Deviations: none.
 #include <wasm_simd128.h>
 
 #include "runtime/synth/kernels.hpp"
@@ -13,7 +12,7 @@ struct F {
   v128_t v;
   static F load(const float* at) { return {wasm_v128_load(at)}; }
   static F all(float x) { return {wasm_f32x4_splat(x)}; }
-  static F pair(const float* at) { return {wasm_v128_load64_splat(at)}; }  // two numbers, again and again
+  static F pair(const float* at) { return {wasm_v128_load64_splat(at)}; }  // two numbers, repeated
   static F zero() { return {wasm_f32x4_const(0.0F, 0.0F, 0.0F, 0.0F)}; }
   static F convert(const std::int16_t* at) { return {wasm_f32x4_convert_i32x4(wasm_i32x4_load16x4(at))}; }
   void store(float* at) const { wasm_v128_store(at, v); }

@@ -1,7 +1,5 @@
-// Method:     track k is the listener's place plus R o - o for the microphone's offset o, at every waypoint exactly; in between cubic. The
-//             speed that a turn gives is that of the chord between the last two waypoints.
-// Source:     textbook.
-// Deviations: none.
+// Method:     track k is the listener position plus R o - o for the microphone's offset o, exact at every waypoint; cubic in between. The
+//             velocity of a rotation is that of the chord between the last two waypoints.
 #include "runtime/synth/listener.hpp"
 
 #include <algorithm>
@@ -27,7 +25,7 @@ events::Quaternion calc_head_rotation(const Vec3& forward, const Vec3& left) noe
   const double width = norm(across);
   if (!(width > 0.0) || !std::isfinite(width)) return kNotTurned;
   const Vec3 y = (1.0 / width) * across, z = cross(x, y);
-  // The matrix of columns x, y, z as a quaternion: of four times the squares of its parts the largest is taken first, since it is above 0.
+  // Quaternion of the matrix of columns x, y, z: the largest of four times the squares of its parts first, since it is positive.
   const std::array<double, 4> squares{1.0 + x[0] + y[1] + z[2], 1.0 + x[0] - y[1] - z[2], 1.0 - x[0] + y[1] - z[2],
                                       1.0 - x[0] - y[1] + z[2]};
   events::Quaternion rotation{};
@@ -85,7 +83,7 @@ Vec3 ListenerTracks::find_in_head(const Vec3& direction, double time_s) const no
   return turn_back(head_rotation_, turn_back(attitude_.find(time_s), direction));
 }
 
-/// A cubic way through mirrored waypoints is the mirrored way. Does nothing without a floor.
+/// A cubic through mirrored waypoints is the mirrored cubic. No effect without a floor.
 void ListenerTracks::push_mirrored(Trajectory& mirrored, const Waypoint& waypoint) noexcept {
   if (floor_) mirrored.push({waypoint.time_s, floor_->mirror(waypoint.position_m), floor_->mirror_direction(waypoint.velocity_m_s)});
 }
@@ -97,7 +95,7 @@ bool ListenerTracks::push(const events::Listener& listener) noexcept {
   push_mirrored(mirrored_centre_, {listener.time_s, listener.position_m, listener.velocity_m_s});
   if (!is_turned_ && listener.rotation != kNotTurned) {
     is_turned_ = true;
-    // The waypoint is in centre_ already; it comes again, and of two at one time the last counts.
+    // The waypoint is already in centre_; of two at one time the last counts.
     for (Turned& one : turned_)
       for (std::size_t i = 0; i + 1 < centre_.get_count(); ++i) {
         one.track.push(centre_.get_waypoint(i));

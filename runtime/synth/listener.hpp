@@ -1,4 +1,4 @@
-// The listener with microphones, or a head, that turn with it.
+// Listener: position, rotation, microphones and head.
 #pragma once
 
 #include <cstddef>
@@ -16,45 +16,45 @@ class Head;
 
 namespace carillon::synth {
 
-/// A head in the middle of two microphones, left and right, which it takes the place of.
+/// Head that replaces two microphones, left and right, in their middle.
 struct ListeningHead {
   std::shared_ptr<const head::Head> head;
-  events::Quaternion rotation{1.0, 0.0, 0.0, 0.0};  // of its frame (x forward, y left, z up), of a listener that is not turned
+  events::Quaternion rotation{1.0, 0.0, 0.0, 0.0};  // of its frame (x forward, y left, z up) for an unrotated listener
 };
 
-/// How a head is turned that looks forward and has its left ear there; lengths do not matter, and of `left` only what is across `forward`.
-/// Not turned where they give no frame.
+/// Rotation of a head with this forward direction and left ear; any lengths, only the part of `left` across `forward` counts. Identity if
+/// they define no frame.
 events::Quaternion calc_head_rotation(const Vec3& forward, const Vec3& left) noexcept;
 
-/// How the head of a listener is turned that has its left and its right ear at these places and looks straight on, z being up.
+/// Rotation of a level head with ears at these places, looking straight ahead, z up.
 events::Quaternion calc_level_head_rotation(const Vec3& left_m, const Vec3& right_m) noexcept;
 
-/// This head between microphones, level where those are two, left and right: how a listener is turned that says no more.
+/// Head between microphones, level if there are two, left and right: default rotation of a listener.
 ListeningHead make_level_head(std::shared_ptr<const head::Head> head, const std::vector<Vec3>& microphones_m);
 
-/// Where the listener is over time, and how it is turned. Invariant: microphone m, which is at offset o from a listener that is
-/// not turned, is at get_track(m) + o, so that receivers need not know of turns; as long as no events::Listener was turned all tracks are
-/// one. Between waypoints every microphone goes its own cubic way. With a floor there are the mirrored tracks too, to which the mirrored
-/// offsets belong, and with a head its attitude. [audio-thread] but for the constructor.
+/// Listener position and rotation over time. Invariant: microphone m with offset o from an unrotated listener is at get_track(m) + o, so
+/// receivers need no rotations; before the first rotated events::Listener all tracks are one. Between waypoints every microphone follows
+/// its own cubic. With a floor there are mirrored tracks for the mirrored offsets, with a head its attitude. [audio-thread] except the
+/// constructor.
 class ListenerTracks {
  public:
-  /// Takes memory for `capacity` waypoints of each of the microphones [m from the listener] and of their middle.
+  /// Allocates `capacity` waypoints for each microphone [m from the listener] and for their middle.
   ListenerTracks(std::size_t capacity, const std::vector<Vec3>& microphones_m, const Vec3& position_m,
                  const std::optional<Floor>& floor = std::nullopt, const std::optional<ListeningHead>& head = std::nullopt);
 
-  /// False, and nothing has changed, when it is earlier than the last or not finite.
+  /// False, without change, if earlier than the last or not finite.
   bool push(const events::Listener& listener) noexcept;
 
   const Trajectory& get_track(std::size_t microphone) const noexcept { return is_turned_ ? turned_[microphone].track : centre_; }
-  /// Of the middle of the microphones.
+  /// Track of the middle of the microphones.
   const Trajectory& get_middle_track() const noexcept { return get_track(turned_.size() - 1); }
-  /// The same beyond the floor; for tracks with a floor only.
+  /// Mirrored track; only with a floor.
   const Trajectory& get_mirrored_track(std::size_t microphone) const noexcept {
     return is_turned_ ? turned_[microphone].mirrored : mirrored_centre_;
   }
   const Trajectory& get_mirrored_middle_track() const noexcept { return get_mirrored_track(turned_.size() - 1); }
   const std::optional<Floor>& get_floor() const noexcept { return floor_; }
-  /// A direction of the world in the frame of the head as it is turned at a time; with a head only.
+  /// World direction in the frame of the head at a time; only with a head.
   Vec3 find_in_head(const Vec3& direction, double time_s) const noexcept;
 
  private:
@@ -66,15 +66,15 @@ class ListenerTracks {
 
   std::optional<Floor> floor_;
   Trajectory centre_, mirrored_centre_;
-  std::vector<Turned> turned_;  // of the microphones, then of their middle; empty tracks as long as nothing is turned
+  std::vector<Turned> turned_;  // microphones, then their middle; empty tracks before the first rotation
   bool is_turned_ = false;
   events::Quaternion head_rotation_{1.0, 0.0, 0.0, 0.0};
-  Attitude attitude_;  // of the listener, where there is a head
+  Attitude attitude_;  // of the listener, with a head
   double last_s_ = 0.0;
   events::Quaternion last_rotation_{1.0, 0.0, 0.0, 0.0};
 };
 
-/// The middle of the microphones, where those are who hear a body without two ears.
+/// Middle of the microphones: position of the only ear of bodies without two ears.
 Vec3 calc_middle(const std::vector<Vec3>& places);
 
 }  // namespace carillon::synth

@@ -1,9 +1,6 @@
-// Method:     load is a part that no budget changes (receivers, strikes, what a body costs) and a part in proportion to the work. Neither
-//             is known, so the work that was done is scaled by the load that is wanted over that which was, again and again: each step
-//             leaves of the error the fixed part's share. It goes down at once and up by at most a tenth a step, and not at all while
-//             within a tenth.
-// Source:     none.
-// Deviations: none.
+// Method:     load = fixed part (receivers, strikes, overhead) + part in proportion to the work, both unknown: the work is scaled
+//             repeatedly by wanted over measured load, which reduces the error each time to the fixed part's share. Decreases at once,
+//             increases by at most a tenth per step, and not within a tenth of the target.
 #include "runtime/synth/load_keeper.hpp"
 
 #include <algorithm>
@@ -14,11 +11,11 @@ namespace carillon::synth {
 namespace {
 
 constexpr double kShortestS = 0.02;
-constexpr double kSlack = 0.9;      // of the share: below it there is room
-constexpr double kSteepest = 0.25;  // to which the budget falls in one step
+constexpr double kSlack = 0.9;      // of the share: below it the budget grows
+constexpr double kSteepest = 0.25;  // smallest factor in one step
 constexpr double kRise = 1.1;
-constexpr double kMin = 1e5;       // mode-samples/s: two modes at 48 kHz; a floor from which 1.1 a step leads up again
-constexpr double kUnbound = 64.0;  // times the work that is done: no budget any more
+constexpr double kMin = 1e5;       // mode-samples/s: two modes at 48 kHz; a floor from which factors of 1.1 lead up again
+constexpr double kUnbound = 64.0;  // times the work: no limit any more
 
 }  // namespace
 

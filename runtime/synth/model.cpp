@@ -1,10 +1,8 @@
-// One set of tables, made in one order from a bank; longer than most files.
-// Method:     an under-damped mode is z = (q' + d q) + i omega_d q, so that z(t + h) = e^{(-d + i omega_d) h} z(t), and its pressure
-//             g q' = Re(w z) with w = g (1 + i d / omega_d). Every table is made of exponentials in double precision, never of repeated
-//             products. Modes are sorted by the time after which the reference strike has left them silent, so that those still heard
-//             are always the first ones.
+// Method:     an under-damped mode is z = (q' + d q) + i omega_d q, so z(t + h) = e^{(-d + i omega_d) h} z(t), and its pressure g q' = Re(w
+//             z), w = g (1 + i d / omega_d). Tables are computed from exponentials in double precision, not from repeated products. Modes
+//             are sorted by the time after which the reference strike is inaudible, so the audible ones are always the first ones.
 // Source:     docs/equations.md E4; docs/decisions/resonator-kernel.md.
-// Deviations: the filter to audible modes uses sqrt(lambda), not the damped frequency, which would let over-damped modes vanish.
+// Deviations: the audible band is tested with sqrt(lambda), not the damped frequency, which would drop over-damped modes.
 #include "runtime/synth/model.hpp"
 
 #include <algorithm>
@@ -17,9 +15,9 @@
 #include <unordered_map>
 #include <utility>
 
+#include "runtime/acoustics/radiation/transfers.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/large.hpp"
-#include "runtime/acoustics/radiation/transfers.hpp"
 #include "runtime/synth/bending.hpp"
 #include "runtime/synth/effects.hpp"
 #include "runtime/synth/nonlinear_modes.hpp"
@@ -28,11 +26,11 @@
 namespace carillon::synth {
 namespace {
 
-// Relative distance from critical damping below which q' = re - (d / omega_d) im would lose digits.
+// Relative distance from critical damping below which q' = re - (d / omega_d) im loses digits.
 constexpr double kNearCritical = 0.05;
-// Largest |root| x step for which kMoments Chebyshev terms hold the answer of a mode.
+// Largest |root| x step that kMoments Chebyshev terms resolve.
 constexpr double kStiffest = 4.0;
-// A root that dies within 1/1024 of a sample has no sound of its own.
+// A root that decays within 1/1024 of a sample is not rendered.
 constexpr int kMaxSubsteps = 256;
 
 bool is_positive(double x) { return std::isfinite(x) && x > 0.0; }
@@ -52,15 +50,15 @@ void check(const bank::Bank& bank, const ModelOptions& options) {
   }
   if (!is_positive(options.rate_hz)) throw InputError("the sample rate must be a positive number of Hz");
   if (!is_positive(options.reference_impulse_n_s)) throw InputError("the reference impulse must be a positive number of N s");
-  if (!is_positive(options.silence_pa)) throw InputError("the pressure of silence must be a positive number of Pa");
+  if (!is_positive(options.silence_pa)) throw InputError("silence_pa must be a positive number");
   if (!std::isfinite(options.sphere_radius_m) || options.sphere_radius_m < 0.0)
     throw InputError("the radius of the body's sphere must be a number of m, 0 or more");
-  if (!options.gains.empty() && options.gains.size() != m) throw InputError("there must be one gain a mode of the bank");
+  if (!options.gains.empty() && options.gains.size() != m) throw InputError("gains and modes of the bank differ in number");
   if (options.transfers != nullptr && static_cast<std::size_t>(options.transfers->get_mode_count()) != m)
-    throw InputError("there must be one transfer a mode of the bank");
+    throw InputError("transfers and modes of the bank differ in number");
 }
 
-/// Sets an array of tables to zero, so that lanes without a mode are silent.
+/// Zeroes an array of tables, so that empty lanes are silent.
 template <typename T>
 void add_zero(std::vector<T>& tables) {
   tables.push_back(T{});
@@ -73,7 +71,7 @@ std::shared_ptr<const Model> Model::make(const bank::Bank& bank, const ModelOpti
   struct Sorted {
     Mode mode;
     double level;    // of the reference strike over silence, in nepers
-    double heard_s;  // how long it is heard
+    double heard_s;  // audible time
   };
   std::vector<Sorted> ringing;
   std::vector<Mode> damped;
@@ -96,7 +94,7 @@ std::shared_ptr<const Model> Model::make(const bank::Bank& bank, const ModelOpti
   }
   std::stable_sort(ringing.begin(), ringing.end(),
                    [](const Sorted& a, const Sorted& b) { return a.heard_s != b.heard_s ? a.heard_s > b.heard_s : a.level > b.level; });
-  if (options.like != nullptr) {  // what that model has not comes last
+  if (options.like != nullptr) {  // modes missing in that model come last
     std::unordered_map<int, int> place;
     for (int m = 0; m < options.like->get_ringing_mode_count(); ++m) place.emplace(options.like->get_bank_mode(m), m);
     const auto find_place = [&](const Sorted& sorted) {
@@ -124,9 +122,9 @@ std::shared_ptr<const Model> Model::make(const bank::Bank& bank, const ModelOpti
     model->copy_shapes(bank);
   model->find_bounds();
   model->find_bending(find_judged_thickness_m(bank));
-  if (kCompiledEffects.has(Effect::kDirectivity) && (options.transfers != nullptr || !bank.multipoles.is_empty()))
+  if (options.transfers != nullptr || !bank.multipoles.is_empty())
     model->add_directivity(options.transfers != nullptr ? options.transfers : std::make_shared<const radiation::Transfers>(bank));
-  if (kCompiledEffects.has(Effect::kNonlinear)) model->add_nonlinear(bank.quartic);
+  model->add_nonlinear(bank.quartic);
   return model;
 }
 
@@ -151,7 +149,7 @@ void Model::add_ringing_mode(const Mode& mode) {
     sound_.back().wave[lane / 2][1][k][lane % 2] = static_cast<float>(-wave.imag());
   }
   RotationTable& turn = turn_.back();
-  // The angle of a block is repeated for as long as the mode sounds: half a unit of a double in it is heard after hours.
+  // The angle per block accumulates while the mode sounds: half a unit of double precision becomes audible after hours.
   using Exact = long double;
   const Exact exact_d = d, exact_omega = std::sqrt(static_cast<Exact>(mode.lambda)), period = kBlock / static_cast<Exact>(rate_hz_);
   const Exact angle = std::sqrt((exact_omega - exact_d) * (exact_omega + exact_d)) * period, size = std::exp(-exact_d * period);
@@ -186,7 +184,7 @@ bool Model::has_cascade() const {
   return nonlinear_ != nullptr && nonlinear_->energy.thickness_m > 0.0 && mass_kg_ > 0.0 && !nonlinear_->above.empty();
 }
 
-/// Modes that do not ring, or not below the Nyquist frequency, take no part.
+/// Leaves out modes that do not ring or are above the Nyquist frequency.
 void Model::add_nonlinear(const bank::QuarticEnergy& energy) {
   if (energy.is_empty()) return;
   std::vector<std::pair<std::size_t, int>> ringing;  // number in the bank, here
@@ -259,7 +257,7 @@ void Model::add_damped_modes(const std::vector<Mode>& modes) {
   }
 }
 
-/// Whether the modes are the same, in the same order.
+/// True for the same modes in the same order.
 bool Model::has_modes_of(const Model& other) const {
   return ringing_ == other.ringing_ && std::equal(modes_.begin(), modes_.end(), other.modes_.begin(), other.modes_.end(),
                                                   [](const Mode& a, const Mode& b) { return a.bank_mode == b.bank_mode; });
@@ -271,8 +269,8 @@ void Model::copy_shapes(const bank::Bank& bank) {
   surface->triangles = bank.triangles;
   const std::size_t columns = surface->columns = sound_.size() * kGroup + damped_.size();
   base::reserve_large(surface->shape, bank.vertex_count() * 3 * columns);
-  std::vector<std::int16_t> row(3 * columns, 0);  // of a vertex; lanes without a mode stay 0
-  std::vector<std::uint32_t> first, column;       // of each mode: its place in a vertex's row of the bank, and here
+  std::vector<std::int16_t> row(3 * columns, 0);  // of a vertex; empty lanes stay 0
+  std::vector<std::uint32_t> first, column;       // per mode: column in a vertex's row of the bank, and here
   for (std::size_t i = 0; i < modes_.size(); ++i) {
     first.push_back(3 * static_cast<std::uint32_t>(modes_[i].bank_mode));
     column.push_back(static_cast<std::uint32_t>(
@@ -347,7 +345,7 @@ void Model::find_bending(double thickness_m) {
   bending_.watched = static_cast<int>(std::min(longest_s * rate_hz_ / kSubBlock + 1.0, 1e9));
   order.resize(std::min(order.size(), kLowest));
   for (std::size_t m = 0; m < damped_.size(); ++m) order.push_back(get_damped_column(m));
-  // Antinodes, by rows: shapes are stored vertex by vertex.
+  // Antinodes, row by row: shapes are stored by vertex.
   std::vector<double> most(order.size(), -1.0);
   std::vector<std::int32_t> antinode(order.size(), 0);
   for (std::size_t v = 0; v < vertices; ++v) {
@@ -369,8 +367,7 @@ void Model::find_bending(double thickness_m) {
 }
 
 void Model::add_directivity(std::shared_ptr<const radiation::Transfers> transfers) {
-  // A mode of order L is nowhere louder than L + 1 times its rms over directions (addition theorem); of the many orders that bodies have
-  // none that was looked at comes to four times.
+  // A mode of order L is at most L + 1 times as loud as its rms over directions (addition theorem); no bank examined exceeded four times.
   constexpr double kMostFocused = 4.0;
   const auto made = std::make_shared<ModelDirectivity>();
   made->sound.resize(sound_.size());
@@ -410,7 +407,7 @@ void Model::add_directivity(std::shared_ptr<const radiation::Transfers> transfer
 
 std::shared_ptr<const Model> Model::make_solo(const Model& of, int bank_mode) {
   const auto model = std::make_shared<Model>(Model(of));
-  // What decides which modes are heard, weight_ and reach_, stays: those that are muted live as long as they would.
+  // weight_ and reach_ stay: muted modes are culled as before.
   for (int m = 0; m < of.get_mode_count(); ++m) {
     if (of.get_bank_mode(m) == bank_mode) continue;
     if (m >= of.ringing_) {
@@ -433,7 +430,7 @@ std::shared_ptr<const Model> Model::make_solo(const Model& of, int bank_mode) {
 
 namespace {
 
-/// Numbers and arrays one after the other, each array with its length before it.
+/// Writes numbers and arrays in sequence, each array preceded by its length.
 class TableWriter {
  public:
   template <class Value>
@@ -469,7 +466,7 @@ class TableReader {
     if (!values.empty()) std::memcpy(values.data(), from, values.size() * sizeof(Value));
   }
   bool is_at_end() const { return left_.empty(); }
-  [[noreturn]] static void refuse() { throw InputError("these bytes are no model of this build"); }
+  [[noreturn]] static void refuse() { throw InputError("not a model of this build"); }
 
  private:
   const std::byte* take_bytes(std::size_t count) {
@@ -481,7 +478,7 @@ class TableReader {
   std::span<const std::byte> left_;
 };
 
-// Of a build: another one that lays its tables out in another way has other sizes, or another number here.
+// Build identification: other table layouts have other sizes, or another number here.
 constexpr std::uint64_t kTablesMark = 0x63617272'00000003 + (sizeof(SoundTable) << 8) + (sizeof(StrikeTable) << 16);
 
 }  // namespace

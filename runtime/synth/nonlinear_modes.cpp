@@ -1,8 +1,7 @@
-// Method:     what strikes and contacts do to each mode alone is found for the whole sub-block, as the kernels do it for the modes in
-//             groups, in double precision; then the modes are stepped. A contact's force over the last interval of a sub-block is heard
-//             with the first sample of the next.
+// Method:     the response of each uncoupled mode to strikes and contacts is computed for the whole sub-block, as by the kernels, in double
+//             precision; then the modes are stepped. The force of contacts over the last interval of a sub-block is heard with the first
+//             sample of the next.
 // Source:     docs/equations.md E5, E12.
-// Deviations: none.
 #include "runtime/synth/nonlinear_modes.hpp"
 
 #include <algorithm>
@@ -13,14 +12,14 @@ namespace {
 
 constexpr int kIntervals = kSubBlock + 1;
 
-/// phi . impulse of a mode [N s kg^-1/2], of rows of the model's shapes.
+/// phi . impulse of a mode [N s kg^-1/2], from rows of the model's shapes.
 double calc_amplitude(const std::int16_t* const* row, const float* weight, int mode, double scale) noexcept {
   double amplitude = 0.0;
   for (int r = 0; r < kStrikeRows; ++r) amplitude += static_cast<double>(weight[r]) * row[r][mode];
   return amplitude * scale;
 }
 
-/// A mode's factor over a sample by one end of all contacts, as the contract of Kernels::drive has it: 1 minus this.
+/// Amplitude loss of a mode over a sample by one end of all contacts, 1 - factor, as defined for Kernels::drive.
 double calc_damping(const ContactBlock& drive, std::size_t end, int mode, double scale, double angle) noexcept {
   double x = 0.0;
   for (std::size_t c = 0; c < static_cast<std::size_t>(drive.contacts); ++c) {
@@ -139,7 +138,7 @@ void NonlinearModes::add_contacts(const ContactBlock& drive) noexcept {
           const double amplitude = calc_amplitude(push.row, push.force, mode, scale);
           for (int n = 0; n < kIntervals; ++n) force[n] += amplitude * static_cast<double>(push.signal[n]);
         }
-      double first[2] = {}, second[2] = {};  // answers to 1 - u and u
+      double first[2] = {}, second[2] = {};  // responses to 1 - u and u
       for (int j = 0; j < kTerms; ++j) {
         first[0] += static_cast<double>(drive.ramp[0][j]) * answer_[i].re[j];
         first[1] += static_cast<double>(drive.ramp[0][j]) * answer_[i].im[j];
@@ -202,7 +201,7 @@ void NonlinearModes::add(std::int64_t sample, const StrikeQueue& strikes, bool s
       kept[group].im[n][lane] += static_cast<float>(get_im(static_cast<int>(i)));
     }
   }
-  // The last row is the first one of the next sub-block.
+  // The last row is the first of the next sub-block.
   has_carry_ = drive != nullptr && drive->forces;
   carry_damps_ = damps;
   for (auto* values : {&push_re_, &push_im_}) {
@@ -212,7 +211,7 @@ void NonlinearModes::add(std::int64_t sample, const StrikeQueue& strikes, bool s
   if (damps) std::copy_n(keep_.begin() + static_cast<std::ptrdiff_t>(kSubBlock * count), count, keep_.begin());
 }
 
-/// Turned by one sample, as the lanes of the groups are.
+/// Advanced by one sample, as the lanes of the groups are.
 DampedState NonlinearModes::get_state(int i) const noexcept {
   const nonlinear::ModeConstants& mode = constants_[i];
   const double omega = std::sqrt(mode.eigenvalue_rad2_s2), d = mode.decay_per_s, k = 1.0 / model_->get_rate_hz();
@@ -247,21 +246,7 @@ void NonlinearModes::reset() noexcept {
   std::fill(push_im_.begin(), push_im_.end(), 0.0);
 }
 
-std::size_t NonlinearModes::calc_bytes() const noexcept {
-  return sizeof(NonlinearModes) + modes_.calc_bytes() + (place_.capacity() + mode_.capacity()) * sizeof(int) +
-         constants_.capacity() * sizeof(nonlinear::ModeConstants) + answer_.capacity() * sizeof(ForceAnswer) +
-         (push_re_.capacity() + push_im_.capacity() + keep_.capacity() + gain_.capacity()) * sizeof(double) +
-         strike_.capacity() * sizeof(StrikeTable) + (cascade_ ? cascade_->calc_bytes() : 0);
-}
-
-std::size_t NonlinearModes::calc_cascade_bytes() const noexcept {
-  if (!cascade_) return 0;
-  const std::size_t count = cascade_->get_count();
-  return cascade_->calc_bytes() + strike_.capacity() * sizeof(StrikeTable) +
-         count * (sizeof(int) + sizeof(nonlinear::ModeConstants) + sizeof(ForceAnswer) + (3 * kIntervals + 1) * sizeof(double));
-}
-
-/// At the sample.
+/// Pressure at the sample.
 double NonlinearModes::calc_pressure() const noexcept {
   double pressure = 0.0;
   for (int i = 0; i < get_coupled_count(); ++i) pressure += gain_[i] * modes_.get_velocity(i);

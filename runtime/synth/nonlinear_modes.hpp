@@ -1,4 +1,4 @@
-// The modes of a voice that large motion couples: sample by sample, in place of their lanes among the groups.
+// Coupled modes of a ResonatorBank: sample by sample, in place of their lanes in the groups.
 #pragma once
 
 #include <cstddef>
@@ -7,39 +7,38 @@
 #include <span>
 #include <vector>
 
-#include "runtime/synth/nonlinear/cascade.hpp"
-#include "runtime/synth/nonlinear/coupled_modes.hpp"
 #include "runtime/synth/damped_modes.hpp"
 #include "runtime/synth/kernels.hpp"
 #include "runtime/synth/model.hpp"
+#include "runtime/synth/nonlinear/cascade.hpp"
+#include "runtime/synth/nonlinear/coupled_modes.hpp"
 #include "runtime/synth/strike_queue.hpp"
 
 namespace carillon::synth {
 
-/// What a Model has for Effect::kNonlinear, where the bank has a nonlinear energy. N coupled modes, in the order of the energy: those of
-/// the bank that ring below the Nyquist frequency.
+/// Tables for Effect::kNonlinear, for banks with a nonlinear energy. N coupled modes, in the order of the energy: those that ring below the
+/// Nyquist frequency.
 struct ModelNonlinear {
   bank::QuarticEnergy energy;
   std::vector<int> mode;  // (N) of the model
   std::vector<nonlinear::ModeConstants> constants;
-  std::vector<Moments> force_re, force_im;  // (N) of Chebyshev's moments of a force over a sample: what it makes of the state
-  std::vector<StrikeTable> strike;          // of the model, which no longer strike these
-  int groups = 0;                           // up to the last group with such a mode
-  std::vector<int> above;                   // of the model: those that ring at higher frequencies than these, ascending
+  std::vector<Moments> force_re, force_im;  // (N) response of the state to the Chebyshev moments of a force over a sample
+  std::vector<StrikeTable> strike;          // strike tables of the model without these modes
+  int groups = 0;                           // groups up to the last one with such a mode
+  std::vector<int> above;                   // modes of the model that ring at higher frequencies, ascending
 };
 
-/// Chebyshev's moments of a force over a sample: what it makes of the state of a mode.
+/// Response of a mode's state to the Chebyshev moments of a force over a sample.
 struct ForceAnswer {
   Moments re{}, im{};
 };
 ForceAnswer calc_force_answer(const nonlinear::ModeConstants& mode, double rate_hz);
 
-/// The states are those at the last sample that was rendered. While is_live() is false nothing moves. Memory is taken in the constructor
-/// only.
+/// States are those at the last rendered sample; at rest while is_live() is false. Allocates in the constructor only.
 class NonlinearModes {
  public:
-  /// The model must outlive the result and have a nonlinear energy.
-  /// With a cascade the model must have what it needs, Model::has_cascade(); the modes above are then behind the coupled ones.
+  /// The model must outlive the result and have a nonlinear energy, and Model::has_cascade() with a cascade, whose modes follow the coupled
+  /// ones.
   explicit NonlinearModes(const Model& model, bool has_cascade = false);
 
   bool is_live() const noexcept { return modes_.is_moving() || has_carry_ || (cascade_ && cascade_->is_moving()); }
@@ -48,31 +47,28 @@ class NonlinearModes {
   int get_cascade_count() const noexcept { return cascade_ ? cascade_->get_count() : 0; }
   /// Numbers in the model.
   std::span<const int> get_modes() const noexcept { return mode_; }
-  /// Of the model, without the modes that are here.
+  /// Strike tables of the model without these modes.
   const StrikeTable* get_strike_tables() const noexcept { return cascade_ ? strike_.data() : nonlinear_->strike.data(); }
   int get_group_count() const noexcept;
-  /// Place of a mode of the model among them; -1: not there.
+  /// Index of a mode of the model; -1: none.
   int find_place(int mode) const noexcept { return place_[mode]; }
 
-  /// Adds the pressure [Pa at 1 m] of the kSubBlock samples from `sample` on. `struck`: some of `strikes` act; `drive`: contacts that last,
-  /// or nullptr. `kept`: where states are added of groups below `groups`, or nullptr.
+  /// Adds the pressure [Pa at 1 m] of the kSubBlock samples from `sample` on. `struck`: some of `strikes` act; `drive`: lasting contacts,
+  /// or nullptr. `kept`: receives the states of groups below `groups`, or nullptr.
   void add(std::int64_t sample, const StrikeQueue& strikes, bool struck, const ContactBlock* drive, float* out, SampleStates* kept,
            int groups) noexcept;
 
-  /// Of mode i, at the sample that comes next when nothing couples the modes on the way there.
+  /// State of mode i at the next sample, without coupling on the way.
   DampedState get_state(int i) const noexcept;
   void set_state(int i, const DampedState& state) noexcept;
-  /// Only so many are coupled from now on.
+  /// Limits the number of coupled modes.
   void set_limit(int modes) noexcept { modes_.set_limit(modes); }
-  int get_limit() const noexcept { return modes_.get_limit(); }  // of the coupled ones
-  /// Silences them all when together they cannot sound more than this.
+  int get_limit() const noexcept { return modes_.get_limit(); }  // coupled modes now
+  /// Silences all modes if their total pressure stays below this.
   void drop_below(double pressure_pa) noexcept;
   void reset() noexcept;
   double calc_energy_j() const noexcept { return modes_.get_energy_j() + (cascade_ ? cascade_->calc_energy_j() : 0.0); }
   const nonlinear::CoupledCounters& get_counters() const noexcept { return modes_.get_counters(); }
-  std::size_t calc_bytes() const noexcept;
-  /// Of them, what the cascade adds.
-  std::size_t calc_cascade_bytes() const noexcept;
 
  private:
   double get_re(int i) const noexcept { return i < get_coupled_count() ? modes_.get_re(i) : cascade_->get_re(i - get_coupled_count()); }
@@ -86,17 +82,17 @@ class NonlinearModes {
   const Model* model_;
   const ModelNonlinear* nonlinear_;  // of the model
   nonlinear::CoupledModes modes_;
-  std::vector<int> mode_;  // of the model: the coupled ones, then those above them
+  std::vector<int> mode_;  // modes of the model: coupled ones, then those above
   std::vector<nonlinear::ModeConstants> constants_;
   std::vector<ForceAnswer> answer_;
-  std::vector<double> gain_;  // [Pa at 1 m] of a velocity
+  std::vector<double> gain_;  // [Pa at 1 m] per velocity
   std::unique_ptr<nonlinear::Cascade> cascade_;
   std::vector<StrikeTable> strike_;  // with a cascade
   std::vector<int> place_;
   int groups_ = 0;
-  std::vector<double> push_re_, push_im_, keep_;  // (kSubBlock + 1, N): at the samples of this sub-block, and the first one after it
-  bool pushes_ = false;                           // something does in this sub-block
-  bool has_carry_ = false, carry_damps_ = false;  // what of the last row is for the next one
+  std::vector<double> push_re_, push_im_, keep_;  // (kSubBlock + 1, N): at the samples of this sub-block and the next one
+  bool pushes_ = false;                           // any push in this sub-block
+  bool has_carry_ = false, carry_damps_ = false;  // the last row applies to the next sub-block
 };
 
 }  // namespace carillon::synth

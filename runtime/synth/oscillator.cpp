@@ -1,9 +1,8 @@
-// Method:     with s^2 = d^2 - lambda, C = e^{-dt} cosh(st) and S = e^{-dt} sinh(st) / s the map over t is
-//             q(t) = (C + d S) q0 + S v0,  q'(t) = -lambda S q0 + (C - d S) v0; for s^2 < 0 cosh and sinh become cos and sin.
-//             S is even in s and regular at s = 0, where its series is used. Far above critical damping C - d S is a difference of
-//             nearly equal numbers, so there the two roots r = d + s and lambda / r (not d - s) are used instead.
+// Method:     with s^2 = d^2 - lambda, C = e^{-dt} cosh(st) and S = e^{-dt} sinh(st) / s the map over t is q(t) = (C + d S) q0 + S v0,
+//             q'(t) = -lambda S q0 + (C - d S) v0; for s^2 < 0 cosh and sinh become cos and sin. S is even in s and regular at s = 0, where
+//             its series is used. Far above critical damping C - d S cancels; there the roots r = d + s and lambda / r (not d - s) are
+//             used.
 // Source:     closed form of the damped oscillator; docs/equations.md.
-// Deviations: none.
 #include "runtime/synth/oscillator.hpp"
 
 #include <cmath>

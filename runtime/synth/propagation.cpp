@@ -1,9 +1,8 @@
-// Method:     delay lines that receivers read. A floor is heard by a mirrored receiver for each. With directivity each receiver has a
-//             line of its own, filled for its place (directivity.hpp), whose sound sets out from the sphere of the multipoles. A head has
-//             one receiver in its middle and one for each mirrored way, each with filters of its own: what the floor reflects comes from
-//             below.
+// Method:     delay lines read by receivers. Ground reflection: a mirrored receiver for each receiver. Directivity: a delay line per
+//             receiver, filled by the weights of its place (directivity.hpp); the sound leaves from the sphere of the multipoles. Head: one
+//             receiver in its middle and one mirrored, each with filters of its own, since the reflection comes from below.
 // Source:     J. B. Allen et al. 1979, Image method for efficiently simulating small-room acoustics (the mirrored microphone).
-// Deviations: the floor is rigid but for one factor, and has no end; the radiation of the body itself is that of free space.
+// Deviations: the floor is infinite and rigid except for one factor; the body radiates as in free space.
 #include "runtime/synth/propagation.hpp"
 
 #include <algorithm>
@@ -14,24 +13,32 @@
 namespace carillon::synth {
 namespace {
 
-/// The track to which an ear's offset belongs; one ear stands for all microphones where they are not `apart`.
+/// Track to which an ear's offset belongs; unless `apart`, one ear stands for all microphones.
 const Trajectory& find_ear_track(const ListenerTracks& listener, bool apart, std::size_t microphone, bool is_mirrored) noexcept {
-  if (kCompiledEffects.has(Effect::kGroundReflection) && is_mirrored)
-    return apart ? listener.get_mirrored_track(microphone) : listener.get_mirrored_middle_track();
+  if (is_mirrored) return apart ? listener.get_mirrored_track(microphone) : listener.get_mirrored_middle_track();
   return apart ? listener.get_track(microphone) : listener.get_middle_track();
 }
 
-/// Whether every microphone has an ear.
+/// True with one ear per microphone.
 bool are_apart(EffectSet effects) noexcept { return effects.has(Effect::kTwoEars) && !has_head(effects); }
 
-/// Samples by which receivers of these effects are later than they have to be, so that they are as late as a head.
+/// Additional latency [samples] of receivers without a head, equal to that of the head.
 int calc_more_latency(EffectSet effects, const PropagationOptions& options) {
   return options.head && !has_head(effects) ? options.head->head->get_latency() : 0;
 }
 
-/// What a delay line has to hold.
+/// Length of a delay line.
 double calc_longest_m(EffectSet effects, const PropagationOptions& options) {
   return (effects.has(Effect::kAirDelay) ? options.longest_m : 0.0) + calc_more_latency(effects, options) / options.rate_hz * kSoundSpeedMs;
+}
+
+/// Offsets of the ears from their tracks, the mirrored ones last.
+std::vector<Vec3> list_offsets(EffectSet effects, const PropagationOptions& options) {
+  std::vector<Vec3> offsets = are_apart(effects) ? options.microphones_m : std::vector<Vec3>{calc_middle(options.microphones_m)};
+  const std::size_t straight = offsets.size();
+  for (std::size_t m = 0; m < straight && effects.has(Effect::kGroundReflection); ++m)
+    offsets.push_back(options.floor->mirror_direction(offsets[m]));
+  return offsets;
 }
 
 }  // namespace
@@ -46,14 +53,10 @@ DirectedSound::DirectedSound(const std::shared_ptr<const Model>& model, const st
       offsets_m_(offsets_m),
       attitude_(static_cast<std::size_t>(options.max_waypoints)),
       centre_(static_cast<std::size_t>(options.max_waypoints)) {
-  const double longest_m = calc_longest_m(effects, options);
   const double sphere_m = model->get_directivity()->transfers->get_radius_m();
-  lines_.reserve(offsets_m.size());
   receivers_.reserve(offsets_m.size());
-  for (const Vec3& offset : offsets_m) {
-    lines_.emplace_back(longest_m, options.rate_hz, kBlock);
+  for (const Vec3& offset : offsets_m)
     receivers_.emplace_back(offset, options.rate_hz, effects, Isa::kBest, sphere_m, calc_more_latency(effects, options));
-  }
 }
 
 void DirectedSound::begin(const Trajectory& body, double turned_s, const events::Quaternion& rotation) noexcept {
@@ -97,36 +100,16 @@ void DirectedSound::begin_block(std::int64_t sample, const Trajectory& track, co
   weights->begin_block(block, poses);
 }
 
-bool DirectedSound::is_silent() const noexcept {
-  return std::all_of(lines_.begin(), lines_.end(), [](const DelayLine& line) { return line.is_silent(); });
-}
-
-void DirectedSound::push_silence(std::int64_t samples) noexcept {
-  for (DelayLine& line : lines_) line.push_silence(samples);
-}
-
-void DirectedSound::push_sound(std::size_t samples) noexcept {
-  for (std::size_t e = 0; e < lines_.size(); ++e) lines_[e].push(weights->get_sound(e).first(samples));
-}
-
-std::size_t DirectedSound::calc_bytes() const noexcept {
-  return sizeof(DirectedSound) + weights->calc_bytes() + attitude_.get_bytes() + centre_.get_bytes() +
-         offsets_m_.capacity() * sizeof(Vec3) + lines_.capacity() * sizeof(DelayLine) + receivers_.capacity() * sizeof(Receiver);
-}
-
 bool Propagation::is_silent() const noexcept {
-  return has_silent_lines() && std::all_of(head.begin(), head.end(), [](const HeadEars& ears) { return ears.is_silent(); });
-}
-
-bool Propagation::has_silent_lines() const noexcept {
+  const auto is_quiet = [](const auto& part) { return part.is_silent(); };
   if (monopole && !monopole->is_silent()) return false;
-  if (kCompiledEffects.has(Effect::kDirectivity) && directed && !directed->is_silent()) return false;
-  return !dipole[0] || (dipole[0]->is_silent() && dipole[1]->is_silent() && dipole[2]->is_silent());
+  if (dipole[0] && !(dipole[0]->is_silent() && dipole[1]->is_silent() && dipole[2]->is_silent())) return false;
+  return std::all_of(directed_lines.begin(), directed_lines.end(), is_quiet) && std::all_of(head.begin(), head.end(), is_quiet);
 }
 
 void Propagation::push_silence(std::int64_t samples) noexcept {
   if (monopole) monopole->push_silence(samples);
-  if (kCompiledEffects.has(Effect::kDirectivity) && directed) directed->push_silence(samples);
+  for (DelayLine& line : directed_lines) line.push_silence(samples);
   for (const auto& line : dipole)
     if (line) line->push_silence(samples);
 }
@@ -135,20 +118,12 @@ const Trajectory& Propagation::find_track(const ListenerTracks& listener, std::s
   return find_ear_track(listener, are_apart(effects), ear, is_mirrored);
 }
 
-double Propagation::calc_longest_s(const ListenerTracks& listener, std::int64_t sample) const noexcept {
-  if (!has(effects, Effect::kAirDelay)) return 0.0;
-  double longest_s = 0.0;
-  for (std::size_t m = 0; m < ears.size(); ++m)
-    longest_s = std::max(longest_s, ears[m].calc_delay_s(source, find_track(listener, m, false), sample));
-  for (std::size_t m = 0; m < mirrored.size(); ++m)
-    longest_s = std::max(longest_s, mirrored[m].calc_delay_s(source, find_track(listener, m, true), sample));
-  return longest_s;
-}
+bool has_head(EffectSet effects) noexcept { return effects.has(Effect::kHead) && effects.has(Effect::kTwoEars); }
 
-bool has_head(EffectSet effects) noexcept { return has(effects, Effect::kHead) && effects.has(Effect::kTwoEars); }
-
-std::size_t count_ears(EffectSet effects, const PropagationOptions& options) noexcept {
-  return (are_apart(effects) ? options.microphones_m.size() : 1) * (has(effects, Effect::kGroundReflection) ? 2 : 1);
+std::unique_ptr<DirectedSound> make_directed_sound(EffectSet effects, const PropagationOptions& options,
+                                                   const std::shared_ptr<const Model>& model) {
+  const std::size_t straight = are_apart(effects) ? options.microphones_m.size() : 1;
+  return std::make_unique<DirectedSound>(model, list_offsets(effects, options), straight, options, effects);
 }
 
 std::unique_ptr<Propagation> make_propagation(EffectSet effects, const PropagationOptions& options,
@@ -156,31 +131,24 @@ std::unique_ptr<Propagation> make_propagation(EffectSet effects, const Propagati
   auto propagation = std::make_unique<Propagation>();
   propagation->effects = effects;
   const double longest_m = calc_longest_m(effects, options);
-  const auto make_history = [&] { return std::make_unique<DelayLine>(longest_m, options.rate_hz, kBlock); };
-  const bool is_directed = has(effects, Effect::kDirectivity) && effects.has(Effect::kModal);
-  if (effects.has(Effect::kModal) && !is_directed) propagation->monopole = make_history();
+  const auto make_line = [&] { return std::make_unique<DelayLine>(longest_m, options.rate_hz, kBlock); };
+  const std::vector<Vec3> offsets = list_offsets(effects, options);
+  if (effects.has(Effect::kModal) && effects.has(Effect::kDirectivity)) {
+    propagation->directed = make_directed_sound(effects, options, model);
+    for (std::size_t e = 0; e < offsets.size(); ++e) propagation->directed_lines.emplace_back(longest_m, options.rate_hz, kBlock);
+  } else if (effects.has(Effect::kModal)) {
+    propagation->monopole = make_line();
+  }
   propagation->source.monopole = propagation->monopole.get();
   for (std::size_t k = 0; k < 3 && effects.has(Effect::kAccelerationNoise); ++k) {
-    propagation->dipole[k] = make_history();
+    propagation->dipole[k] = make_line();
     propagation->source.dipole[k] = propagation->dipole[k].get();
   }
-  std::vector<Vec3> offsets = are_apart(effects) ? options.microphones_m : std::vector<Vec3>{calc_middle(options.microphones_m)};
-  const std::size_t straight = offsets.size();
-  propagation->ears.reserve(straight);
-  const auto add = [&](std::vector<Receiver>& ears, const Vec3& place) {
-    ears.emplace_back(place, options.rate_hz, effects, Isa::kBest, 0.0, calc_more_latency(effects, options));
-  };
-  for (const Vec3& place : offsets) add(propagation->ears, place);
-  if (has(effects, Effect::kGroundReflection)) {
-    for (std::size_t m = 0; m < straight; ++m) offsets.push_back(options.floor->mirror_direction(offsets[m]));
-    propagation->mirrored.reserve(straight);
-    for (std::size_t m = straight; m < offsets.size(); ++m) add(propagation->mirrored, offsets[m]);
-  }
-  if (has_head(effects)) {
-    propagation->head.reserve(offsets.size());
-    for (std::size_t way = 0; way < offsets.size(); ++way) propagation->head.emplace_back(options.head->head);
-  }
-  if (is_directed) propagation->directed = std::make_unique<DirectedSound>(model, offsets, straight, options, effects);
+  const std::size_t straight = are_apart(effects) ? options.microphones_m.size() : 1;
+  for (std::size_t e = 0; e < offsets.size(); ++e)
+    (e < straight ? propagation->ears : propagation->mirrored)
+        .emplace_back(offsets[e], options.rate_hz, effects, Isa::kBest, 0.0, calc_more_latency(effects, options));
+  for (std::size_t e = 0; e < offsets.size() && has_head(effects); ++e) propagation->head.emplace_back(options.head->head);
   return propagation;
 }
 

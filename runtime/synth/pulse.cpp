@@ -1,11 +1,11 @@
-// Method:     the answer of a mode to a force f during one sample is the integral of E(1 - u) f(u), E being the mode's answer to an
-//             impulse. E is written as a short Chebyshev series once per mode; then only the moments of f against the Chebyshev polynomials
-//             are needed, the same few numbers for all modes. The moments are Gauss-Legendre sums in theta with x = (1 - cos theta) / 2,
-//             which turns the root singularity of sin^1.5 at both ends of the pulse into a smooth function; where only one end is near, in
-//             s with x = s^2 from it, which takes a third of the sines; inside a pulse, and for the Gaussian, in time itself.
+// Method:     the response of a mode to a force f during one sample is the integral of E(1 - u) f(u), E the mode's impulse response. E is a
+//             short Chebyshev series, computed once per mode; then only the moments of f against the Chebyshev polynomials are needed, the
+//             same for all modes. Moments are Gauss-Legendre sums in theta with x = (1 - cos theta) / 2, which makes the root singularity
+//             of sin^1.5 at both ends smooth; near one end only, in s with x = s^2 from it, at a third of the sines; inside a pulse, and
+//             for the Gaussian, in time itself.
 // Source:     pulse shapes: Hunt & Crossley 1975; OSG02 section 4. Product integration: Davis & Rabinowitz, Methods of Numerical
 //             Integration, 2.5.6.
-// Deviations: OSG02's Gaussian never begins; here it is cut at four standard deviations, 6e-5 of its area left out, and scaled up to it.
+// Deviations: OSG02's Gaussian is infinite; here it is cut at four standard deviations, without 6e-5 of its area, and rescaled.
 #include "runtime/synth/pulse.hpp"
 
 #include <algorithm>
@@ -20,9 +20,9 @@ using std::numbers::pi;
 // 1 / integral of sin(pi x)^1.5 over 0 <= x <= 1 = sqrt(pi) Gamma(7/4) / Gamma(5/4).
 const double kPulseNorm = std::sqrt(pi) * std::tgamma(1.75) / std::tgamma(1.25);
 
-// Standard deviation of the Hertz pulse of length 1, and where the Gaussian of the same is cut.
+// Standard deviation of the Hertz pulse of length 1.
 const double kDeviation = [] {
-  // By the trapezium rule in theta, x - 1/2 = -cos(theta) / 2, in which the integrand is smooth and periodic.
+  // Trapezium rule in theta, x - 1/2 = -cos(theta) / 2: the integrand is smooth and periodic.
   double area = 0.0, square = 0.0;
   for (int i = 1; i < 4096; ++i) {
     const double theta = pi * i / 4096.0, x = -0.5 * std::cos(theta);
@@ -62,19 +62,19 @@ struct GaussRule {
   }
 };
 
-const GaussRule<24> kRule;    // pieces with both ends of the pulse in or near them
-const GaussRule<16> kEnd;     // with one
-const GaussRule<12> kInside;  // intervals inside a pulse
+const GaussRule<24> kRule;    // both ends of the pulse in or near the interval
+const GaussRule<16> kEnd;     // one end
+const GaussRule<12> kInside;  // inside a pulse
 constexpr double kShortest = 1e-9;
 constexpr double kLong = 3.0;  // intervals
 constexpr double kGaussLong = 8.0;
-constexpr double kNearEnd = 1.0;  // no nearer to a rule in time
-constexpr double kFarEnd = 0.75;  // no nearer to a rule of the other end
+constexpr double kNearEnd = 1.0;  // minimum distance of an end from an interval integrated in time
+constexpr double kFarEnd = 0.75;  // minimum distance of the other end
 
-/// sin(pi x) = 4 x (1 - x) P((x - 1/2)^2) for 0 <= x <= 1, to 1e-14 of it, without a branch: P is the series of the cosine over 1 - 4 z.
+/// sin(pi x) = 4 x (1 - x) P((x - 1/2)^2) for 0 <= x <= 1, relative error 1e-14, branch-free: P is the series of the cosine over 1 - 4 z.
 constexpr std::array<double, 10> kSine = [] {
   std::array<double, 10> p{};
-  double term = 1.0, sum = 0.0, power = 1.0;  // of the cosine's series at z = 1/4
+  double term = 1.0, sum = 0.0, power = 1.0;  // of the series of the cosine at z = 1/4
   for (std::size_t k = 0; k < p.size(); ++k) {
     sum += term;
     p[k] = power * sum;
@@ -92,7 +92,7 @@ double calc_sine(double x) {
   return 4.0 * x * (1.0 - x) * p;
 }
 
-/// Sums of weight T_j(2 u - 1) over points of one interval, all points a step of j at a time.
+/// Sums of weight T_j(2 u - 1) over points of one interval, all points per step of j.
 template <std::size_t kPoints>
 Moments calc_sums(const std::array<double, kPoints>& u, const std::array<double, kPoints>& weight) {
   Moments moments{};
@@ -115,7 +115,7 @@ Moments calc_sums(const std::array<double, kPoints>& u, const std::array<double,
   return moments;
 }
 
-/// The moments of a smooth density over from <= u <= to.
+/// Moments of a smooth density over from <= u <= to.
 template <int kPoints, typename Density>
 Moments calc_smooth_moments(const GaussRule<kPoints>& rule, double from, double to, Density density) {
   std::array<double, kPoints> u, weight;
@@ -126,7 +126,7 @@ Moments calc_smooth_moments(const GaussRule<kPoints>& rule, double from, double 
   return calc_sums(u, weight);
 }
 
-/// Near one end of the pulse, the other being far: with x = s^2 from that end the force is s^3 times a smooth function. `sign`: 1 from the
+/// Near one end of the pulse, far from the other: with x = s^2 from that end the force is s^3 times a smooth function. `sign`: 1 from the
 /// beginning on, -1 from the end back; the end lies at u = `origin`.
 Moments calc_end_moments(double origin, double sign, double length) {
   const double near = std::max(0.0, sign > 0.0 ? -origin : origin - 1.0) / length;
@@ -135,7 +135,7 @@ Moments calc_end_moments(double origin, double sign, double length) {
   std::array<double, 16> u, weight;
   for (std::size_t i = 0; i < u.size(); ++i) {
     const double s = s_from + (s_to - s_from) * kEnd.node[i];
-    const double force = std::max(0.0, calc_sine(s * s));  // beyond the end by a rounding: nothing
+    const double force = std::max(0.0, calc_sine(s * s));  // clamps rounding beyond the end
     u[i] = origin + sign * length * s * s;
     weight[i] = kEnd.weight[i] * (s_to - s_from) * 2.0 * s * kPulseNorm * force * std::sqrt(force);
   }

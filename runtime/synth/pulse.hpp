@@ -1,4 +1,4 @@
-// The contact pulse: force over time of one elastic collision, of unit area, and its moments over a sample.
+// Contact pulse: force over time of one elastic collision, of unit area, and its moments over a sample.
 #pragma once
 
 #include <array>
@@ -7,29 +7,27 @@
 
 namespace carillon::synth {
 
-/// Number of Chebyshev moments by which a pulse reaches the modes: enough for -190 dB at the Nyquist frequency.
+/// Chebyshev moments of a pulse: -190 dB at the Nyquist frequency.
 inline constexpr int kMoments = 12;
 using Moments = std::array<double, kMoments>;
 
 using events::PulseShape;
 
-/// How long the force of a contact of this duration differs from zero, in the same unit. kHertz: the duration itself. kGaussian: 1.57
-/// durations, with the same middle: eight standard deviations of the Gaussian that has the variance of the Hertz pulse. Pure; any thread.
+/// Length of the non-zero force of a contact of this duration, in the same unit. kHertz: the duration. kGaussian: 1.57 durations, with the
+/// same centre: eight standard deviations of the Gaussian with the variance of the Hertz pulse. Pure; any thread.
 double calc_pulse_length(PulseShape shape, double duration) noexcept;
 
-/// The force at `x` = time since it began / its length, zero outside 0 <= x <= 1, scaled so that its integral over x is 1.
-/// kHertz: sin(pi x)^1.5; Hertz's contact force is close to this shape (Hunt & Crossley 1975). kGaussian: exp(-(8 (x - 1/2))^2 / 2)
-/// (O'Brien, Shen and Gatchalian 2002). Pure; any thread.
+/// Force at `x` = time since its begin / its length, zero outside 0 <= x <= 1, with integral 1 over x. kHertz: sin(pi x)^1.5, close to
+/// Hertz's contact force (Hunt & Crossley 1975). kGaussian: exp(-(8 (x - 1/2))^2 / 2) (O'Brien, Shen and Gatchalian 2002). Pure; any
+/// thread.
 double calc_pulse(PulseShape shape, double x) noexcept;
 
-/// Moments of the pulse over one interval of time: moment j = integral of T_j(2 u - 1) f(u) du over 0 <= u <= 1, where u runs over the
-/// interval and T_j is the Chebyshev polynomial. `start` and `length` (calc_pulse_length()) place the pulse in the same unit (one interval
-/// = 1); f integrates to 1 over the pulse. A length below 1e-9 is an impulse at `start`, counted in the interval 0 < u <= 1. No heap, no
-/// throw; any thread.
+/// Moments of the pulse over one interval: moment j = integral of T_j(2 u - 1) f(u) du over 0 <= u <= 1, T_j the Chebyshev polynomial.
+/// `start` and `length` (calc_pulse_length()) in units of the interval; f integrates to 1 over the pulse. A length below 1e-9 is an impulse
+/// at `start`, within the interval 0 < u <= 1. No heap, no throw; any thread.
 Moments calc_pulse_moments(PulseShape shape, double start, double length) noexcept;
 
-/// The same of a force that is constant from `start` to `start + length`, in closed form; right to 1e-10 for lengths of at least
-/// kShortestStep.
+/// Constant force from `start` to `start + length`, in closed form; accurate to 1e-10 for lengths of at least kShortestStep.
 inline constexpr double kShortestStep = 1e-6;
 Moments calc_level_moments(double start, double length) noexcept;
 

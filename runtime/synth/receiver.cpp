@@ -1,31 +1,31 @@
-// Method:     the retarded time t' = t - r(t') / c is found by Newton's method at the borders of sub-blocks; between them delay, 1 / r and
-//             direction are cubic in the time of arrival, with their true slopes at both ends. The pressure at t' is read with a
-//             Kaiser-windowed sinc from a table of phases (kernels_receiver.inl). Where nothing moves they stay what they are, and the 32
-//             samples of a sub-block are one convolution. A delay that changes smoothly is a Doppler shift, nothing else is needed.
-// Source:     OCE01 section 4 (delay r / c and 1 / r); Kaiser 1974 (window); Morse & Ingard 1968, 11.2: a source of the pressure p at 1 m
-//             that moves is heard with p / (r (1 - M)^2), M = v.r / r c when it sent that; docs/equations.md.
+// Method:     the emission time t' = t - r(t') / c by Newton's method at the borders of sub-blocks; in between delay, 1 / r and direction
+//             are cubic in the arrival time, with exact slopes at both ends. The pressure at t' is read with a Kaiser-windowed sinc from a
+//             table of phases (kernels_receiver.inl). At rest the 32 samples of a sub-block are one convolution. A smoothly changing delay
+//             is the Doppler shift.
+// Source:     OCE01 section 4 (delay r / c and 1 / r); Kaiser 1974 (window); Morse & Ingard 1968, 11.2: a moving source of the pressure p
+//             at 1 m is heard with p / (r (1 - M)^2), M = v.r / r c at emission; docs/equations.md.
 // Deviations: OCE01 splats every sample into two neighbours with a Gaussian, which costs 2 to 9 dB at 10 kHz; this is flat to 0.4 of the
-//             rate. The source is at the centre of mass; of a moving source and of a dipole the near field is left out, v / (2 pi f r) and
-//             c / (2 pi f r) of the level.
+//             rate. The source is at the centre of mass; the near field of moving sources and dipoles is left out: v / (2 pi f r) and c /
+//             (2 pi f r) of the level.
 #include "runtime/synth/receiver.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "runtime/acoustics/radiation/transfers.hpp"
 #include "runtime/base/sinc.hpp"
 #include "runtime/base/vector.hpp"
-#include "runtime/acoustics/radiation/transfers.hpp"
 
 namespace carillon::synth {
 namespace {
 
 constexpr int kPhases = base::kSincPhases;
-constexpr double kFarthest = 1e12;  // samples; keeps what follows within integers
+constexpr double kFarthest = 1e12;  // samples; keeps the following within integers
 using Taps = std::array<float, kTaps>;
 static_assert(kTaps == base::kSincTaps);
 
-/// A sub-block or less of what comes by one phase. False when all is silence.
+/// Convolves at most a sub-block with constant taps. False for silence.
 bool read_row(const Kernels& kernels, const DelayLine& sent, std::int64_t first, const Taps& taps, std::span<float> row) noexcept {
   const std::int64_t count = kTaps + static_cast<std::int64_t>(row.size()) - 1;
   const float* samples = sent.find(first, count);
@@ -33,7 +33,7 @@ bool read_row(const Kernels& kernels, const DelayLine& sent, std::int64_t first,
     kernels.convolve(taps.data(), samples, row.data());
     return true;
   }
-  // Less than a sub-block, or at one of the ends of what was sent: the same sums over a copy with zeros around.
+  // Less than a sub-block, or at an end of the emitted samples: the same sums over a zero-padded copy.
   std::array<float, kTaps + kSubBlock> copy{};
   bool heard = samples != nullptr;
   for (std::int64_t i = 0; i < count; ++i) {
@@ -49,7 +49,7 @@ bool read_row(const Kernels& kernels, const DelayLine& sent, std::int64_t first,
   return true;
 }
 
-/// The way of a sound that takes no time.
+/// Path without travel time.
 PathState calc_straight_way(const Trajectory& source, const Trajectory& listener, const Vec3& offset_m, double time_s) noexcept {
   const Waypoint here = listener.find(time_s), there = source.find(time_s);
   PathState way;
@@ -71,7 +71,7 @@ PathState calc_straight_way(const Trajectory& source, const Trajectory& listener
 }  // namespace
 
 PathState calc_path_state(const Trajectory& source, const Trajectory& listener, const Vec3& offset_m, double time_s) noexcept {
-  constexpr int kSteps = 20;  // four do for bodies that fall; more for those that leave at the speed of sound
+  constexpr int kSteps = 20;  // four suffice for falling bodies; more near the speed of sound
   const Waypoint here = listener.find(time_s);
   double emission = time_s;
   PathState way;
@@ -93,7 +93,7 @@ PathState calc_path_state(const Trajectory& source, const Trajectory& listener, 
   }
   const double approach = near ? 0.0 : dot(way.direction, velocity) / kSoundSpeedMs;
   const double leave = near ? 0.0 : dot(way.direction, here.velocity_m_s) / kSoundSpeedMs;
-  const double pace = (1.0 - leave) / std::max(1.0 - approach, 0.05);  // of the emission against the arrival
+  const double pace = (1.0 - leave) / std::max(1.0 - approach, 0.05);  // emission time per arrival time
   Vec3 change{};
   for (std::size_t k = 0; k < 3; ++k) change[k] = here.velocity_m_s[k] - velocity[k] * pace;
   const double stretch = near ? 0.0 : dot(way.direction, change);
@@ -130,14 +130,14 @@ Receiver::Receiver(const Vec3& offset_m, double sample_rate_hz, EffectSet effect
   base::Sinc::get();  // built here, not in process()
 }
 
-/// The way of what arrives at a time, through the air or without it; from the sphere, where there is one.
+/// Path of the sound arriving at a time; from the sphere, if any.
 PathState Receiver::calc_way(const Source& source, const Trajectory& listener, double time_s) const noexcept {
-  PathState way = has(effects_, Effect::kAirDelay) ? calc_path_state(*source.track, listener, offset_m_, time_s)
-                                                   : calc_straight_way(*source.track, listener, offset_m_, time_s);
-  if (!kCompiledEffects.has(Effect::kDirectivity) || sphere_m_ == 0.0) return way;
+  PathState way = effects_.has(Effect::kAirDelay) ? calc_path_state(*source.track, listener, offset_m_, time_s)
+                                                  : calc_straight_way(*source.track, listener, offset_m_, time_s);
+  if (sphere_m_ == 0.0) return way;
   way.spreading_1_m = 1.0;
   way.spreading_slope = 0.0;
-  if (!has(effects_, Effect::kAirDelay)) return way;
+  if (!effects_.has(Effect::kAirDelay)) return way;
   way.delay_s -= sphere_m_ / kSoundSpeedMs;
   if (const double least_s = (radiation::kNearestRadii - 1.0) * sphere_m_ / kSoundSpeedMs; way.delay_s < least_s) {
     way.delay_s = least_s;
@@ -147,32 +147,26 @@ PathState Receiver::calc_way(const Source& source, const Trajectory& listener, d
 }
 
 void Receiver::begin(const Source& source, const Trajectory& listener, std::int64_t sample) noexcept {
-  if (!has(effects_, Effect::kAirDelay)) return;
+  if (!effects_.has(Effect::kAirDelay)) return;
   first_delay_s_ = calc_way(source, listener, static_cast<double>(sample - latency_) / rate_hz_).delay_s;
   is_placed_ = true;
 }
 
-double Receiver::calc_delay_s(const Source& source, const Trajectory& listener, std::int64_t sample) const noexcept {
-  if (!has(effects_, Effect::kAirDelay)) return 0.0;
-  if (!has(effects_, Effect::kDoppler) && is_placed_) return first_delay_s_;
-  return calc_way(source, listener, static_cast<double>(sample - latency_) / rate_hz_).delay_s;
-}
-
-/// Of what arrives at a border of sub-blocks, with the effects that this ear has.
+/// Path at a border of sub-blocks, with this ear's effects.
 PathState Receiver::find_path_state(const Source& source, const Trajectory& listener, std::int64_t border, double& travel_s) noexcept {
   const double arrival_s = static_cast<double>(border * kSubBlock - latency_) / rate_hz_;
   travel_s = 0.0;
   PathState way = calc_way(source, listener, arrival_s);
-  if (!has(effects_, Effect::kAirDelay)) return way;
+  if (!effects_.has(Effect::kAirDelay)) return way;
   travel_s = way.delay_s + sphere_m_ / kSoundSpeedMs;
   if (!is_placed_) first_delay_s_ = way.delay_s;
   is_placed_ = true;
-  if (!has(effects_, Effect::kDoppler)) {
+  if (!effects_.has(Effect::kDoppler)) {
     way.delay_s = first_delay_s_;
     way.delay_slope = 0.0;
     return way;
   }
-  // (1 - M)^-2 of the level; of a dipole, two sources side by side of which one is heard 1 / (1 - M) times as much later, (1 - M)^-3.
+  // Level times (1 - M)^-2; for a dipole, two adjacent sources one of which is heard 1 / (1 - M) times as much later, (1 - M)^-3.
   const double more = way.convection, more_slope = way.convection_slope;
   way.spreading_slope = more * (more * way.spreading_slope + 2.0 * more_slope * way.spreading_1_m);
   way.spreading_1_m *= more * more;
@@ -189,7 +183,7 @@ void Receiver::find_path_states(const Source& source, const Trajectory& listener
   else
     from_ = find_path_state(source, listener, sub_block, travel_s_);
   sub_block_ = sub_block;
-  // Where nothing has moved since this was sent, nothing changes until the end.
+  // If nothing moves after the emission, the path is constant to the end.
   const double arrival_s = static_cast<double>(sub_block * kSubBlock - latency_) / rate_hz_;
   const bool rests = from_.delay_slope == 0.0 && from_.spreading_slope == 0.0 && source.track->is_still_from(arrival_s - travel_s_) &&
                      listener.is_still_from(arrival_s);
@@ -258,7 +252,7 @@ void Receiver::process_moving(const Source& source, std::int64_t sample, std::sp
   std::array<double, kSubBlock> delay, spreading;
   delay_.evaluate(begin, std::span(delay).first(count));
   spreading_.evaluate(begin, std::span(spreading).first(count));
-  // Where the taps of each sample lie, and between which phases they are.
+  // First tap and phase of each sample.
   std::array<std::int64_t, kSubBlock> first;
   std::array<Reading, kSubBlock> readings;
   std::int64_t lowest = std::numeric_limits<std::int64_t>::max(), highest = std::numeric_limits<std::int64_t>::min();

@@ -1,4 +1,4 @@
-// From a sounding body to a microphone: spherical spreading, travel time, and the Doppler shift that follows from it.
+// Propagation from a body to a microphone: spherical spreading, travel time, Doppler shift.
 #pragma once
 
 #include <array>
@@ -16,70 +16,65 @@ namespace carillon::synth {
 using bank::kSoundSpeedMs;
 inline constexpr double kNearestM = 0.05;  // a source never counts as nearer than this (1/r has no bound)
 
-/// What a body sends out, and from where. None of it is owned.
+/// Emission of a body. Non-owning.
 struct Source {
   const Trajectory* track = nullptr;
-  const DelayLine* monopole = nullptr;       // Pa at 1 m, all round; Pa at the microphone where the receiver has a sphere
-  std::array<const DelayLine*, 3> dipole{};  // Pa at 1 m along x, y, z of the world, cosine elsewhere; or nullptr
+  const DelayLine* monopole = nullptr;       // Pa at 1 m, omnidirectional; Pa at the microphone if the receiver has a sphere
+  std::array<const DelayLine*, 3> dipole{};  // Pa at 1 m along x, y, z of the world, cosine pattern; or nullptr
 };
 
-/// PathState of a sound that arrives at some time.
+/// Propagation path of the sound that arrives at a time.
 struct PathState {
   double delay_s = 0.0;
-  double delay_slope = 0.0;    // change of the delay per time of arrival
+  double delay_slope = 0.0;    // change of the delay per arrival time
   double spreading_1_m = 0.0;  // 1 / r
   double spreading_slope = 0.0;
   Vec3 direction{};  // from the source to the microphone, unit
   Vec3 direction_slope{};
   double convection = 1.0;        // 1 / (1 - M), M: speed of the source towards the microphone over that of sound
-  double convection_slope = 0.0;  // of what the direction changes; the source's own acceleration is left out
+  double convection_slope = 0.0;  // by the change of direction; the source's own acceleration is left out
 };
 
-/// The path of what arrives at `time_s` at the place `offset_m` from the listener: the source is where it was when it sent it, the
-/// microphone where it is now, t' + |x_source(t') - x_microphone(t)| / c = t. Speeds below that of sound. Pure; any thread.
+/// Path of the sound arriving at `time_s` at `offset_m` from the listener: the source at its emission time t', the microphone at arrival,
+/// t' + |x_source(t') - x_microphone(t)| / c = t. Speeds below that of sound. Pure; any thread.
 PathState calc_path_state(const Trajectory& source, const Trajectory& listener, const Vec3& offset_m, double time_s) noexcept;
 
-/// A number over a sub-block: cubic in the sample.
+/// Cubic polynomial over a sub-block.
 struct Cubic {
   double power[4]{};
 
-  /// Between two values with slopes per sub-block.
+  /// From two values with slopes per sub-block.
   static Cubic make(double a, double slope_a, double b, double slope_b) noexcept;
   bool is_constant() const noexcept { return power[1] == 0.0 && power[2] == 0.0 && power[3] == 0.0; }
-  /// At samples from `first` on of the sub-block.
+  /// Values at samples from `first` on of the sub-block.
   void evaluate(int first, std::span<double> out) const noexcept;
 };
 
-/// One source heard by one microphone. Sample n of the output is what arrives at time (n - get_latency()) / rate. Invariant: delay, level
-/// and direction are exact at the ends of each sub-block and cubic in between, however the calls divide the samples.
+/// One source at one microphone. Output sample n is the sound arriving at time (n - get_latency()) / rate. Invariant: delay, level and
+/// direction are exact at the ends of each sub-block and cubic in between, for any block sizes.
 class Receiver {
  public:
-  static constexpr int kLatency = kTaps / 2;          // samples by which the output lags behind at least
-  static constexpr int kSubBlock = synth::kSubBlock;  // samples between two ways; cubic in time between
+  static constexpr int kLatency = kTaps / 2;          // minimum latency [samples]
+  static constexpr int kSubBlock = synth::kSubBlock;  // samples between exact paths
 
-  /// `offset_m`: of the microphone from the listener, in the axes of the world. Of the effects kAirDelay and kDoppler are looked at:
-  /// without the first sound takes no time, without the second it takes as long as at the beginning, wherever its source goes.
-  /// `sphere_m`: 0, or the radius of the sphere about the source from which the sound sets out with its spreading already in it, as
-  /// radiation::Transfers gives it: it takes (r - R) / c and loses nothing on its way. `more_latency` >= 0: samples by which the output
-  /// lags in addition, so that it comes with that of receivers whose sound goes through something else.
+  /// `offset_m`: of the microphone from the listener, world axes. Effects used: kAirDelay and kDoppler; without the first there is no
+  /// travel time, without the second the initial travel time is kept. `sphere_m`: 0, or the radius of the sphere about the source from
+  /// which the sound is emitted with its spreading included, as by radiation::Transfers: delay (r - R) / c, no loss. `more_latency` >= 0:
+  /// additional latency, to match receivers with filters.
   Receiver(const Vec3& offset_m, double sample_rate_hz, EffectSet effects = {Effect::kAirDelay, Effect::kDoppler}, Isa isa = Isa::kBest,
            double sphere_m = 0.0, int more_latency = 0);
 
-  /// Says where the first sample is: without kDoppler its sound takes as long for ever. Without a call it is the first that is processed.
-  /// [audio-thread]
+  /// Sets the first sample, whose travel time is kept without kDoppler. Default: the first processed sample. [audio-thread]
   void begin(const Source& source, const Trajectory& listener, std::int64_t sample) noexcept;
 
-  /// How long the sound that arrives at this sample took, as this ear hears it. [audio-thread]
-  double calc_delay_s(const Source& source, const Trajectory& listener, std::int64_t sample) const noexcept;
-
-  /// Adds the pressure [Pa] of samples `sample` to `sample + received_pa.size()`. The source's delay lines hold these samples already.
-  /// Calls of any size give the same bits. Returns how many samples came by a way whose length changed; those of a source and a listener
-  /// that stand still are cheap. [audio-thread]: no heap, no lock, no throw.
+  /// Adds the pressure [Pa] of samples `sample` to `sample + received_pa.size()`. The delay lines of the source hold these samples already.
+  /// The bits do not depend on the block sizes. Returns the number of samples with a changing path length; resting sources and listeners
+  /// are cheap. [audio-thread]: no heap, no lock, no throw.
   int process(const Source& source, const Trajectory& listener, std::int64_t sample, std::span<double> received_pa) noexcept;
 
   int get_latency() const noexcept { return latency_; }
-  /// From the source, where it was when it sent what arrives at the end of the sub-block that was processed last, to the microphone; of any
-  /// length, and none where both are at one place. [audio-thread]
+  /// Vector from the source at emission to the microphone, for the end of the last processed sub-block; any length, zero if both coincide.
+  /// [audio-thread]
   const Vec3& get_direction() const noexcept { return to_.direction; }
 
  private:
@@ -95,14 +90,14 @@ class Receiver {
   const Kernels* kernels_ = nullptr;
   double sphere_m_ = 0.0;
   int latency_ = kLatency;
-  std::int64_t sub_block_ = -1;  // of which `from_` is the beginning and `to_` the end
+  std::int64_t sub_block_ = -1;  // sub-block from `from_` to `to_`
   PathState from_, to_;
   Cubic delay_, spreading_;  // between them [samples], [1/m]
   std::array<Cubic, 3> direction_;
   bool is_placed_ = false;      // first_delay_s_ is known
   double first_delay_s_ = 0.0;  // for receivers without kDoppler
-  double travel_s_ = 0.0;       // of what arrives at the end of quantum_, whatever this ear's effects make of it
-  double phase_ = -1.0;         // of taps_
+  double travel_s_ = 0.0;       // of the sound at the end of the sub-block, regardless of effects
+  double phase_ = -1.0;         // phase of taps_
   std::array<float, kTaps> taps_{};
 };
 

@@ -1,4 +1,4 @@
-// A step without corners.
+// Smooth step.
 #pragma once
 
 #include <algorithm>

@@ -1,100 +1,48 @@
-// One body: its effects, the events that act on it, and the sound that it sends.
-// Method:     modes and acceleration noise fill delay lines, which receivers read. A change of effects that touches the propagation makes
-//             a second one: both are fed until the new one holds all that its receivers read, then one fades into the other within a
-//             block, and the old one and the modules that are inaudible go back to the main thread.
-// Source:     none.
-// Deviations: none.
+// Method:     modes and acceleration noise fill delay lines, which receivers read.
 #include "runtime/synth/sounding_body.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <string>
 #include <utility>
 
 #include "runtime/base/error.hpp"
-#include "runtime/acoustics/radiation/transfers.hpp"
 
 namespace carillon::synth {
 namespace {
 
-constexpr EffectSet kOfPropagation{Effect::kModal,   Effect::kAccelerationNoise, Effect::kAirDelay,         Effect::kDoppler,
-                                   Effect::kTwoEars, Effect::kDirectivity,       Effect::kGroundReflection, Effect::kHead};
-
-constexpr EffectSet kOfContacts = kContactEffects.common(kCompiledEffects);
-
 /// True for effects of lasting contacts with modes, on which they act.
-constexpr bool needs_contacts(EffectSet effects) { return has(effects, Effect::kModal) && effects.has_any(kOfContacts); }
-
-/// The first of a set, or another where it is empty.
-constexpr Effect find_first(EffectSet effects, Effect otherwise) { return effects.is_empty() ? otherwise : *effects.begin(); }
-
-/// True for two models of a body with directivity with one sphere of multipoles.
-bool has_same_sphere(const Model& a, const Model& b) {
-  const ModelDirectivity &one = *a.get_directivity(), &other = *b.get_directivity();
-  return one.offset_m == other.offset_m && one.transfers->get_radius_m() == other.transfers->get_radius_m();
-}
+constexpr bool needs_contacts(EffectSet effects) { return effects.has(Effect::kModal) && effects.has_any(kContactEffects); }
 
 }  // namespace
 
-EffectBytes BodyChange::calc_bytes() const {
-  EffectBytes bytes;
-  if (voice) {
-    const auto nonlinear = static_cast<std::int64_t>(voice->calc_nonlinear_bytes());
-    bytes[Effect::kModal] += static_cast<std::int64_t>(voice->calc_bytes()) - nonlinear;
-    const auto cascade = static_cast<std::int64_t>(voice->calc_cascade_bytes());
-    bytes[Effect::kNonlinear] += nonlinear - cascade;
-    bytes[Effect::kCascade] += cascade;
-  }
-  if (acceleration_noise) {
-    bytes[Effect::kAccelerationNoise] +=
-        static_cast<std::int64_t>(sizeof(BodyAccelerationNoise) - sizeof(AccelerationNoise) + acceleration_noise->noise.calc_bytes() +
-                                  acceleration_noise->attitude.get_bytes());
-  }
-  if (directivity) bytes[Effect::kDirectivity] += static_cast<std::int64_t>(directivity->calc_bytes());
-  if (contacts) bytes[Effect::kRoughness] += static_cast<std::int64_t>(contacts->calc_bytes());
-  if (!propagation) return bytes;
-  // The surplus of a delay line over one without travel time counts as travel time, or as the wait for a head.
-  const std::size_t still = DelayLine::calc_least_bytes(kBlock);
-  const Effect waits = propagation->effects.has(Effect::kAirDelay) ? Effect::kAirDelay : Effect::kModal;
-  const auto add = [&](const DelayLine& delay_line, Effect effect) {
-    bytes[effect] += static_cast<std::int64_t>(sizeof(DelayLine) + still);
-    bytes[waits] += static_cast<std::int64_t>(delay_line.get_bytes() - still);
-  };
-  if (propagation->monopole) add(*propagation->monopole, Effect::kModal);
-  for (const auto& delay_line : propagation->dipole)
-    if (delay_line) add(*delay_line, Effect::kAccelerationNoise);
-  const Effect source = propagation->monopole || propagation->directed ? Effect::kModal : Effect::kAccelerationNoise;
-  bytes[source] += static_cast<std::int64_t>(sizeof(Propagation) + sizeof(Receiver));
-  bytes[Effect::kTwoEars] += static_cast<std::int64_t>((propagation->ears.size() - 1) * sizeof(Receiver));
-  bytes[Effect::kGroundReflection] += static_cast<std::int64_t>(propagation->mirrored.size() * sizeof(Receiver));
-  for (const HeadEars& ears : propagation->head) bytes[Effect::kHead] += static_cast<std::int64_t>(ears.calc_bytes());
-  if (!propagation->directed) return bytes;
-  bytes[Effect::kDirectivity] += static_cast<std::int64_t>(propagation->directed->calc_bytes());
-  for (const DelayLine& line : propagation->directed->get_lines()) {
-    bytes[Effect::kDirectivity] += static_cast<std::int64_t>(still);
-    bytes[waits] += static_cast<std::int64_t>(line.get_bytes() - still);
-  }
-  return bytes;
-}
-
-SoundingBody::SoundingBody(std::shared_ptr<const Model> model, BodyFrame frame, const Vec3& position_m, const events::Quaternion& rotation)
-    : model_(std::move(model)), frame_(std::move(frame)), track_(static_cast<std::size_t>(frame_.max_waypoints)), rotation_(rotation) {
+SoundingBody::SoundingBody(std::shared_ptr<const Model> model, BodyFrame frame, EffectSet effects, const Vec3& position_m,
+                           const events::Quaternion& rotation)
+    : model_(std::move(model)),
+      frame_(std::move(frame)),
+      effects_(effects),
+      track_(static_cast<std::size_t>(frame_.max_waypoints)),
+      rotation_(rotation) {
+  check(effects, *model_);
   track_.push({.position_m = position_m});
-  surface_ = frame_.surface;
+  surface_ = make_surface(*model_);
+  modes_ = make_modes(model_);
+  acceleration_noise_ = make_noise(*model_);
+  contacts_ = make_contacts(model_, surface_);
+  if (modes_) modes_->attach(contacts_.get());
+  if (!modes_ && !acceleration_noise_) return;
+  propagation_ = make_propagation(effects, make_propagation_options(), model_);
+  propagation_->source.track = &track_;
+  if (is_directed()) modes_->direct(propagation_->directed->weights.get());
 }
 
 void SoundingBody::check(EffectSet effects, const Model& model) {
-  check_compiled(effects);
-  if (has(effects, Effect::kDirectivity) && model.get_directivity() == nullptr)
-    throw InputError(
-        "directivity needs a bank with multipoles, which this body's has not; make the bank with them, or leave the effect out");
-  if (has(effects, Effect::kNonlinear) && model.get_nonlinear() == nullptr)
-    throw InputError(
-        "nonlinear needs a bank with a nonlinear energy, which this body's has not; make the bank with it, or leave the effect out");
-  if (!effects.has(Effect::kAccelerationNoise)) return;
-  if (!(model.get_sphere_radius_m() > 0.0 && model.get_mass_kg() > 0.0))
-    throw InputError("acceleration_noise needs a body with a mass and a volume; the bank of this one gives none");
+  if (effects.has(Effect::kDirectivity) && model.get_directivity() == nullptr)
+    throw InputError("directivity: this bank has no multipoles; make the bank with them, or leave the effect out");
+  if (effects.has(Effect::kNonlinear) && model.get_nonlinear() == nullptr)
+    throw InputError("nonlinear: this bank has no nonlinear energy; make the bank with it, or leave the effect out");
+  if (effects.has(Effect::kAccelerationNoise) && !(model.get_sphere_radius_m() > 0.0 && model.get_mass_kg() > 0.0))
+    throw InputError("acceleration_noise: this bank has no mass or no volume; leave the effect out");
 }
 
 PropagationOptions SoundingBody::make_propagation_options() const {
@@ -107,159 +55,96 @@ PropagationOptions SoundingBody::make_propagation_options() const {
           .phase = frame_.phase};
 }
 
-std::unique_ptr<BodyChange> SoundingBody::make_change(EffectSet from, EffectSet to, std::shared_ptr<const Model> model) {
-  check(to, *model);
-  auto change = std::make_unique<BodyChange>();
-  change->effects = to;
-  change->inherits = model != model_;
-  const auto lacks = [&](Effect effect) { return to.has(effect) && (change->inherits || !from.has(effect)); };
-  // Modes that large motion couples are in a voice of another make.
-  const auto cascades = [](EffectSet effects, const Model& of) {
-    return has(effects, Effect::kNonlinear) && has(effects, Effect::kCascade) && of.has_cascade();
-  };
-  const bool couples = has(to, Effect::kNonlinear) != has(from, Effect::kNonlinear) || cascades(to, *model) != cascades(from, *model_);
-  if (lacks(Effect::kModal) || (couples && to.has(Effect::kModal))) {
-    change->voice = std::make_unique<Voice>(model, VoiceOptions{.max_strikes = frame_.max_strikes,
-                                                                .max_forces = frame_.max_forces,
-                                                                .silence_pa = frame_.silence_pa,
-                                                                .isa = frame_.isa,
-                                                                .is_nonlinear = has(to, Effect::kNonlinear),
-                                                                .has_cascade = cascades(to, *model),
-                                                                .audits_energy = frame_.audits_energy});
-    if ((change->inherits || couples) && from.has(Effect::kModal)) change->handover = std::make_unique<VoiceHandover>(*model_, *model);
-  }
-  if (lacks(Effect::kAccelerationNoise)) {
-    change->acceleration_noise = std::make_unique<BodyAccelerationNoise>(BodyAccelerationNoise{
-        AccelerationNoise(model->get_sphere_radius_m(), model->get_mass_kg(), frame_.rate_hz, frame_.max_strikes, frame_.max_forces),
-        Attitude(static_cast<std::size_t>(frame_.max_waypoints))});
-  }
-  change->surface = complete(frame_.surface, model->get_plane_strain_modulus_pa(), model->get_wave_impedance_pa_s_m());
-  if (needs_contacts(to) && (change->inherits || !needs_contacts(from))) {
-    change->contacts = std::make_unique<ContactForces>(model, ContactForcesOptions{.surface = change->surface, .effects = to});
-  }
-  const bool sounds = to.has(Effect::kModal) || to.has(Effect::kAccelerationNoise);
-  bool changes_air = to.common(kOfPropagation) != from.common(kOfPropagation);
-  const auto is_directed = [](EffectSet effects) { return has(effects, Effect::kDirectivity) && effects.has(Effect::kModal); };
-  if (change->inherits && is_directed(from)) {
-    change->directivity = std::make_unique<Directivity>(model, count_ears(from, make_propagation_options()), frame_.phase);
-    changes_air = changes_air || (is_directed(to) && !has_same_sphere(*model_, *model));
-  }
-  if (changes_air && sounds) change->propagation = make_propagation(to, make_propagation_options(), model);
+std::unique_ptr<ResonatorBank> SoundingBody::make_modes(const std::shared_ptr<const Model>& model) const {
+  if (!effects_.has(Effect::kModal)) return nullptr;
+  const bool is_nonlinear = effects_.has(Effect::kNonlinear);
+  return std::make_unique<ResonatorBank>(
+      model, ResonatorOptions{.max_strikes = frame_.max_strikes,
+                              .max_forces = frame_.max_forces,
+                              .silence_pa = frame_.silence_pa,
+                              .isa = frame_.isa,
+                              .is_nonlinear = is_nonlinear,
+                              .has_cascade = is_nonlinear && effects_.has(Effect::kCascade) && model->has_cascade(),
+                              .audits_energy = frame_.audits_energy});
+}
+
+std::unique_ptr<BodyAccelerationNoise> SoundingBody::make_noise(const Model& model) const {
+  if (!effects_.has(Effect::kAccelerationNoise)) return nullptr;
+  return std::make_unique<BodyAccelerationNoise>(BodyAccelerationNoise{
+      AccelerationNoise(model.get_sphere_radius_m(), model.get_mass_kg(), frame_.rate_hz, frame_.max_strikes, frame_.max_forces),
+      Attitude(static_cast<std::size_t>(frame_.max_waypoints))});
+}
+
+std::unique_ptr<ContactForces> SoundingBody::make_contacts(const std::shared_ptr<const Model>& model, const ContactSurface& surface) const {
+  if (!needs_contacts(effects_)) return nullptr;
+  return std::make_unique<ContactForces>(model, ContactForcesOptions{.surface = surface, .effects = effects_});
+}
+
+ContactSurface SoundingBody::make_surface(const Model& model) const {
+  return complete(frame_.surface, model.get_plane_strain_modulus_pa(), model.get_wave_impedance_pa_s_m());
+}
+
+std::unique_ptr<ModelSwap> SoundingBody::make_swap(std::shared_ptr<const Model> model) {
+  check(effects_, *model);
+  auto swap = std::make_unique<ModelSwap>();
+  swap->surface = make_surface(*model);
+  swap->modes = make_modes(model);
+  if (swap->modes) swap->handover = std::make_unique<ModeHandover>(*model_, *model);
+  swap->acceleration_noise = make_noise(*model);
+  swap->contacts = make_contacts(model, swap->surface);
+  if (is_directed()) swap->directed = make_directed_sound(effects_, make_propagation_options(), model);
   model_ = std::move(model);
-  return change;
+  return swap;
 }
 
-void SoundingBody::apply(BodyChange& change, const ListenerTracks& listener, std::int64_t sample) noexcept {
-  if (is_asleep()) wake(sample);
-  rendered_ = sample;
-  change_ = &change;
-  effects_ = change.effects;
-  if (change.voice) {
-    if (kCompiledEffects.has(Effect::kDirectivity) && change.directivity && propagation_ && propagation_->directed && change.handover) {
-      // The propagation that is there continues with the modes of the new model.
-      change.directivity->take_over(*propagation_->directed->weights, change.handover->get_old_modes());
-      change.voice->direct(change.directivity.get(), nullptr);
-      std::swap(propagation_->directed->weights, change.directivity);
-    }
-    if (voice_ && change.handover && !change.directivity) change.voice->direct_as(*voice_);
-    if (voice_ && change.handover)
-      change.voice->take_over(*voice_, *change.handover);
-    else
-      first_ = sample;
-    std::swap(voice_, change.voice);
+void SoundingBody::begin(const ListenerTracks& listener, std::int64_t sample) noexcept {
+  rendered_ = first_ = sample;
+  if (acceleration_noise_) acceleration_noise_->attitude.push(turned_s_, rotation_);
+  if (!propagation_) return;
+  propagation_->push_silence(sample);
+  for (const bool is_mirrored : {false, true}) {
+    std::vector<Receiver>& ears = is_mirrored ? propagation_->mirrored : propagation_->ears;
+    for (std::size_t m = 0; m < ears.size(); ++m)
+      ears[m].begin(propagation_->source, propagation_->find_track(listener, m, is_mirrored), sample);
   }
-  if (change.acceleration_noise) {
-    if (acceleration_noise_ && change.inherits) {
-      change.acceleration_noise->noise.take_over(acceleration_noise_->noise);
-      std::swap(change.acceleration_noise->attitude, acceleration_noise_->attitude);
-      change.acceleration_noise->first = acceleration_noise_->first;
-      std::swap(acceleration_noise_, change.acceleration_noise);
-    } else {
-      std::swap(acceleration_noise_, change.acceleration_noise);
-      acceleration_noise_->first = sample;
-      acceleration_noise_->attitude.push(turned_s_, rotation_);
-    }
-  }
-  surface_ = change.surface;
-  put_contacts(change);
-  if (!change.propagation) return direct_voice();
-  std::swap(next_propagation_, change.propagation);
-  next_propagation_->source.track = &track_;
-  next_propagation_->first = sample;
-  next_propagation_->push_silence(sample);
-  Propagation& next = *next_propagation_;
-  for (std::size_t m = 0; m < next.ears.size(); ++m) next.ears[m].begin(next.source, next.find_track(listener, m, false), sample);
-  for (std::size_t m = 0; m < next.mirrored.size(); ++m) next.mirrored[m].begin(next.source, next.find_track(listener, m, true), sample);
-  if (kCompiledEffects.has(Effect::kDirectivity) && next.directed) {
-    DirectedSound& directed = *next.directed;
-    directed.begin(track_, turned_s_, rotation_);
-    for (std::size_t e = 0; e < directed.get_ear_count(); ++e)
-      directed.get_receiver(e).begin(directed.make_source(e), directed.find_track(listener, e), sample);
-  }
-  direct_voice();
+  if (is_directed()) begin_directed(*propagation_->directed, listener, sample);
 }
 
-/// The modes sound to the ears that there are.
-void SoundingBody::direct_voice() noexcept {
-  if (!kCompiledEffects.has(Effect::kDirectivity) || !voice_) return;
-  std::array<Directivity*, 2> weights{};
-  std::size_t count = 0;
-  for (const Propagation* path : {propagation_.get(), next_propagation_.get()})
-    if (path != nullptr && path->directed) weights[count++] = path->directed->weights.get();
-  voice_->direct(weights[0], weights[1]);
+void SoundingBody::begin_directed(DirectedSound& directed, const ListenerTracks& listener, std::int64_t sample) noexcept {
+  directed.begin(track_, turned_s_, rotation_);
+  for (std::size_t e = 0; e < directed.get_ear_count(); ++e)
+    directed.get_receiver(e).begin(propagation_->make_source(directed, e), directed.find_track(listener, e), sample);
 }
 
-/// Contacts begin, change their effects, or fall.
-void SoundingBody::put_contacts(BodyChange& change) noexcept {
-  if (kOfContacts.is_empty()) return;
-  if (change.contacts) {
-    if (contacts_ && change.inherits) change.contacts->take_over(*contacts_);
-    std::swap(contacts_, change.contacts);
-    voice_->attach(contacts_.get());
-  } else if (contacts_ && needs_contacts(effects_)) {
-    contacts_->set_effects(effects_);
-    if (voice_) voice_->attach(contacts_.get());  // which may be another voice of the same model
-  } else if (contacts_ && change.inherits) {      // of the old model
-    change.contacts = std::move(contacts_);
-  } else if (contacts_) {
-    contacts_->release();
-    if (voice_) voice_->attach(contacts_.get());
+void SoundingBody::apply(ModelSwap& swap, const ListenerTracks& listener, std::int64_t sample) noexcept {
+  wake(sample);
+  swap_ = &swap;
+  swap_begin_ = sample;
+  surface_ = swap.surface;
+  if (swap.directed) {
+    begin_directed(*swap.directed, listener, sample);
+    swap.directed->weights->take_over(*propagation_->directed->weights, swap.handover->from_mode);
+    swap.modes->direct(swap.directed->weights.get());
+    std::swap(propagation_->directed, swap.directed);
   }
+  if (modes_) {
+    swap.modes->take_over(*modes_, *swap.handover);
+    std::swap(modes_, swap.modes);
+  }
+  if (acceleration_noise_) {
+    swap.acceleration_noise->noise.take_over(acceleration_noise_->noise);
+    std::swap(swap.acceleration_noise->attitude, acceleration_noise_->attitude);
+    std::swap(acceleration_noise_, swap.acceleration_noise);
+  }
+  if (!contacts_) return;
+  swap.contacts->take_over(*contacts_);
+  std::swap(contacts_, swap.contacts);
+  modes_->attach(contacts_.get());
 }
 
-/// True when the delay lines of a new propagation reach back as far as its receivers read.
-bool SoundingBody::is_filled(const Propagation& propagation, const ListenerTracks& listener, std::int64_t sample) const noexcept {
-  if (!propagation_ || propagation_->is_silent()) return true;
-  const std::int64_t filled = sample - propagation.first;
-  const DelayLine& delay_line = propagation.get_line();
-  const double needed =
-      propagation.calc_longest_s(listener, sample) * frame_.rate_hz + propagation.ears.front().get_latency() + kTaps + kBlock;
-  // The filters of a head need full lines for their whole length.
-  const std::int64_t full = filled - (propagation.head.empty() ? 0 : propagation.head.front().get_length());
-  return static_cast<double>(full) >= needed || full >= delay_line.get_size();
-}
-
-BodyChange* SoundingBody::finish_change(const ListenerTracks& listener, std::int64_t sample) noexcept {
-  if (change_ == nullptr) return nullptr;
-  const bool sounds = has(effects_, Effect::kModal) || has(effects_, Effect::kAccelerationNoise);
-  if (contacts_ && !needs_contacts(effects_) && !contacts_->is_idle()) return nullptr;  // they fall first
-  if (!fading_ && (next_propagation_ || (!sounds && propagation_))) {
-    // The old propagation continues until the new one can take over; with nothing to be heard it does so at once.
-    fading_ = next_propagation_ == nullptr || is_filled(*next_propagation_, listener, sample);
-    const bool is_heard = propagation_ && !(propagation_->is_silent() && (!voice_ || voice_->is_idle()) &&
-                                            (!acceleration_noise_ || acceleration_noise_->noise.is_idle()));
-    if (is_heard) return nullptr;
-  }
-  fading_ = false;
-  if (next_propagation_ || !sounds) change_->propagation = std::exchange(propagation_, std::move(next_propagation_));
-  if (contacts_ && !needs_contacts(effects_)) {
-    voice_->attach(nullptr);
-    change_->contacts = std::move(contacts_);
-  }
-  if (!has(effects_, Effect::kModal)) change_->voice = std::move(voice_);
-  if (!has(effects_, Effect::kAccelerationNoise)) change_->acceleration_noise = std::move(acceleration_noise_);
-  direct_voice();
-  return std::exchange(change_, nullptr);
+ModelSwap* SoundingBody::finish_swap(std::int64_t sample) noexcept {
+  if (swap_ == nullptr || (swap_->directed && sample == swap_begin_)) return nullptr;
+  return std::exchange(swap_, nullptr);
 }
 
 float SoundingBody::calc_nearness(const ListenerTracks& listener, std::int64_t sample) const noexcept {
@@ -276,7 +161,7 @@ float SoundingBody::calc_nearness(const ListenerTracks& listener, std::int64_t s
 }
 
 bool SoundingBody::is_asleep() const noexcept {
-  return change_ == nullptr && (!propagation_ || propagation_->is_silent()) && (!voice_ || voice_->is_idle()) &&
+  return swap_ == nullptr && (!propagation_ || propagation_->is_silent()) && (!modes_ || modes_->is_idle()) &&
          (!acceleration_noise_ || acceleration_noise_->noise.is_idle());
 }
 
@@ -285,23 +170,22 @@ void SoundingBody::wake(std::int64_t sample) noexcept {
   const std::int64_t slept = sample - rendered_;
   if (slept <= 0) return;
   rendered_ = sample;
-  if (voice_) voice_->skip(slept);
+  if (modes_) modes_->skip(slept);
   if (acceleration_noise_) acceleration_noise_->noise.skip(slept);
   if (propagation_) propagation_->push_silence(slept);
 }
 
 bool SoundingBody::take(const events::Impulse& impulse, std::int64_t sample) noexcept {
   events::Impulse own = impulse;
-  if (!has(effects_, Effect::kHertzPulse)) own.duration_s = 0.0;
+  if (!effects_.has(Effect::kHertzPulse)) own.duration_s = 0.0;
   return play(own, own.duration_s > 0.0, true, sample);
 }
 
 bool SoundingBody::take(const events::Force& force, std::int64_t sample) noexcept {
-  if (has(effects_, Effect::kHertzPulse)) return play(force, true, !force.continues, sample);
+  if (effects_.has(Effect::kHertzPulse)) return play(force, true, !force.continues, sample);
   return play(events::to_impulse(force), false, !force.continues, sample);
 }
 
-/// To a voice or an acceleration noise.
 template <class Player, class... Attitudes>
 bool hit(Player& player, const events::Impulse& impulse, const Attitudes&... attitude) noexcept {
   return player.strike(impulse, attitude...);
@@ -311,22 +195,20 @@ bool hit(Player& player, const events::Force& force, const Attitudes&... attitud
   return player.push(force, attitude...);
 }
 
-/// To all players of pulses. The continuation of a pulse is no strike of its own.
+/// `is_new`: false for the continuation of a pulse, which does not count as a strike.
 template <class Strike>
 bool SoundingBody::play(const Strike& strike, bool has_length, bool is_new, std::int64_t sample) noexcept {
   wake(sample);
   Strike own = strike;
+  own.time_s = strike.time_s - static_cast<double>(first_) / frame_.rate_hz;
   bool is_taken = false, is_refused = false;
-  if (has(effects_, Effect::kModal) && voice_) {
-    own.time_s = strike.time_s - static_cast<double>(first_) / frame_.rate_hz;
-    const std::int64_t late = voice_->get_counters().late;
-    (hit(*voice_, own) ? is_taken : is_refused) = true;
-    if (is_new) work_.late += voice_->get_counters().late - late;
+  if (modes_) {
+    const std::int64_t late = modes_->get_counters().late;
+    (hit(*modes_, own) ? is_taken : is_refused) = true;
+    if (is_new) work_.late += modes_->get_counters().late - late;
   }
-  if (has(effects_, Effect::kAccelerationNoise) && acceleration_noise_) {
-    own.time_s = strike.time_s - static_cast<double>(acceleration_noise_->first) / frame_.rate_hz;
+  if (acceleration_noise_)
     (hit(acceleration_noise_->noise, own, acceleration_noise_->attitude.find(strike.time_s)) ? is_taken : is_refused) = true;
-  }
   if (is_taken) {
     work_.strikes += static_cast<std::int64_t>(is_new);
     if (has_length) ++work_.units[Effect::kHertzPulse];
@@ -337,7 +219,7 @@ bool SoundingBody::play(const Strike& strike, bool has_length, bool is_new, std:
 
 bool SoundingBody::take(const events::LastingContact& contact, const ContactSurface& other, std::int64_t sample,
                         ContactRecordCounters& counters) noexcept {
-  if (!needs_contacts(effects_) || !contacts_) {
+  if (!contacts_) {
     ++counters.without_use;
     return false;
   }
@@ -356,71 +238,61 @@ bool SoundingBody::take(const events::LastingContact& contact, const ContactSurf
 }
 
 void SoundingBody::reach(double time_s) noexcept {
-  if (!kOfContacts.is_empty() && contacts_) contacts_->reach(time_s - static_cast<double>(first_) / frame_.rate_hz);
+  if (contacts_) contacts_->reach(time_s - static_cast<double>(first_) / frame_.rate_hz);
 }
 
 bool SoundingBody::take(const events::BodyMotion& motion) noexcept {
   if (!track_.push({motion.time_s, motion.position_m, motion.velocity_m_s})) return false;
   turned_s_ = motion.time_s;
   rotation_ = motion.rotation;
-  if (kCompiledEffects.has(Effect::kAccelerationNoise) && acceleration_noise_)
-    acceleration_noise_->attitude.push(motion.time_s, motion.rotation);
-  if (!kCompiledEffects.has(Effect::kDirectivity)) return true;
-  for (Propagation* path : {propagation_.get(), next_propagation_.get()})
-    if (path != nullptr && path->directed) path->directed->push(motion);
+  if (acceleration_noise_) acceleration_noise_->attitude.push(motion.time_s, motion.rotation);
+  if (is_directed()) propagation_->directed->push(motion);
   return true;
 }
 
-/// The modes' sound, into the delay lines. Returns the effect to which its time counts.
-Effect SoundingBody::make_modal_sound(std::span<float> mono) noexcept {
-  const bool is_idle = voice_->is_idle();
-  Effect acts = Effect::kModal;
-  if (is_idle) {
-    voice_->skip(static_cast<std::int64_t>(mono.size()));
-  } else {
-    std::fill(mono.begin(), mono.end(), 0.0F);
-    const VoiceCounters before = voice_->get_counters();
-    const bool touched = !kOfContacts.is_empty() && contacts_ && !contacts_->is_resting();
-    const std::int64_t contact_samples = touched ? contacts_->get_counters().samples : 0;
-    voice_->process(mono);
-    const VoiceCounters after = voice_->get_counters();
-    work_.resets += after.resets - before.resets;
-    work_.deflection = std::max(work_.deflection, after.deflection);
-    work_.energy_rise = std::max(work_.energy_rise, after.energy_rise);
-    work_.energy.given_j += after.energy.given_j - before.energy.given_j;
-    work_.energy.lost_j += after.energy.lost_j - before.energy.lost_j;
-    work_.energy.radiated_j += after.energy.radiated_j - before.energy.radiated_j;
-    work_.energy.held_j = after.energy.held_j;
-    work_.units[Effect::kModal] += after.mode_samples - before.mode_samples;
-    work_.units[Effect::kNonlinear] += after.coupled_samples - before.coupled_samples;
-    work_.units[Effect::kCascade] += after.cascade_samples - before.cascade_samples;
-    if (touched) {
-      const std::int64_t textured = contacts_->get_counters().samples - contact_samples;
-      if (has(effects_, Effect::kRoughness)) work_.units[Effect::kRoughness] += textured;
-      if (has(effects_, Effect::kRolling)) work_.units[Effect::kRolling] += textured;
-      if (has(effects_, Effect::kContactDamping)) work_.units[Effect::kContactDamping] += static_cast<std::int64_t>(mono.size());
-      acts = find_first(effects_.common(kOfContacts), Effect::kModal);
-    }
-    for (const float p : mono) work_.peak_pa = std::max(work_.peak_pa, std::abs(p));
+/// Adds the work of a call of ResonatorBank::process() that filled `mono`.
+void SoundingBody::count_modal_work(const ResonatorCounters& before, std::int64_t contact_samples, std::span<const float> mono) noexcept {
+  const ResonatorCounters after = modes_->get_counters();
+  work_.resets += after.resets - before.resets;
+  work_.deflection = std::max(work_.deflection, after.deflection);
+  work_.energy_rise = std::max(work_.energy_rise, after.energy_rise);
+  work_.energy.given_j += after.energy.given_j - before.energy.given_j;
+  work_.energy.lost_j += after.energy.lost_j - before.energy.lost_j;
+  work_.energy.radiated_j += after.energy.radiated_j - before.energy.radiated_j;
+  work_.energy.held_j = after.energy.held_j;
+  work_.units[Effect::kModal] += after.mode_samples - before.mode_samples;
+  work_.units[Effect::kNonlinear] += after.coupled_samples - before.coupled_samples;
+  work_.units[Effect::kCascade] += after.cascade_samples - before.cascade_samples;
+  if (contact_samples >= 0) {
+    const std::int64_t textured = contacts_->get_counters().samples - contact_samples;
+    if (effects_.has(Effect::kRoughness)) work_.units[Effect::kRoughness] += textured;
+    if (effects_.has(Effect::kRolling)) work_.units[Effect::kRolling] += textured;
+    if (effects_.has(Effect::kContactDamping)) work_.units[Effect::kContactDamping] += static_cast<std::int64_t>(mono.size());
   }
-  for (Propagation* path : {propagation_.get(), next_propagation_.get()}) {
-    if (path == nullptr) continue;
-    if (kCompiledEffects.has(Effect::kDirectivity) && path->directed) {
-      if (is_idle)
-        path->directed->push_silence(static_cast<std::int64_t>(mono.size()));
-      else
-        path->directed->push_sound(mono.size());
-    }
-    if (!path->monopole) continue;
-    if (is_idle)
-      path->monopole->push_silence(static_cast<std::int64_t>(mono.size()));
-    else
-      path->monopole->push(mono);
-  }
-  return acts;
+  for (const float p : mono) work_.peak_pa = std::max(work_.peak_pa, std::abs(p));
 }
 
-/// The three dipoles of the body as a whole, into the delay lines.
+/// Sound of the modes, into their delay lines.
+void SoundingBody::make_modal_sound(std::span<float> mono) noexcept {
+  const auto count = static_cast<std::int64_t>(mono.size());
+  if (modes_->is_idle()) {
+    modes_->skip(count);
+    for (DelayLine& line : propagation_->directed_lines) line.push_silence(count);
+    if (propagation_->monopole) propagation_->monopole->push_silence(count);
+    return;
+  }
+  std::fill(mono.begin(), mono.end(), 0.0F);
+  const ResonatorCounters before = modes_->get_counters();
+  const bool touched = contacts_ && !contacts_->is_resting();
+  const std::int64_t contact_samples = touched ? contacts_->get_counters().samples : -1;
+  modes_->process(mono);
+  count_modal_work(before, contact_samples, mono);
+  for (std::size_t e = 0; e < propagation_->directed_lines.size(); ++e)
+    propagation_->directed_lines[e].push(propagation_->directed->weights->get_sound(e).first(mono.size()));
+  if (propagation_->monopole) propagation_->monopole->push(mono);
+}
+
+/// Acceleration noise, into the delay lines of its three dipoles.
 void SoundingBody::make_acceleration_noise(const std::array<std::span<float>, 3>& dipole) noexcept {
   AccelerationNoise& noise = acceleration_noise_->noise;
   const auto count = static_cast<std::int64_t>(dipole[0].size());
@@ -439,76 +311,46 @@ void SoundingBody::make_acceleration_noise(const std::array<std::span<float>, 3>
     }
     work_.units[Effect::kAccelerationNoise] += count;
   }
-  for (Propagation* path : {propagation_.get(), next_propagation_.get()}) {
-    for (std::size_t k = 0; k < 3 && path != nullptr && path->dipole[k]; ++k) {
-      if (is_idle)
-        path->dipole[k]->push_silence(count);
-      else
-        path->dipole[k]->push(dipole[k]);
-    }
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (is_idle)
+      propagation_->dipole[k]->push_silence(count);
+    else
+      propagation_->dipole[k]->push(dipole[k]);
   }
-}
-
-bool SoundingBody::is_directed() const noexcept {
-  const auto has_it = [](const std::unique_ptr<Propagation>& path) { return path && path->directed; };
-  return has_it(propagation_) || has_it(next_propagation_);
 }
 
 int SoundingBody::find_transfer_need(std::int64_t sample) noexcept {
-  int demand = 0;
-  for (const Propagation* path : {propagation_.get(), next_propagation_.get()})
-    if (path != nullptr && path->directed && path->directed->weights->get_block() == sample / kBlock - 1)
-      demand += path->directed->weights->get_demand();
-  return transfer_need_ = TransferBudget::find_need(transfer_need_, demand);
+  const Directivity& weights = *propagation_->directed->weights;
+  return transfer_need_ = TransferBudget::find_need(transfer_need_, weights.get_block() == sample / kBlock - 1 ? weights.get_demand() : 0);
 }
 
 void SoundingBody::set_transfer_share(const TransferBudget& budget) noexcept {
-  int paths = 0;
-  for (const Propagation* path : {propagation_.get(), next_propagation_.get()})
-    paths += static_cast<int>(path != nullptr && path->directed);
-  for (const Propagation* path : {propagation_.get(), next_propagation_.get()})
-    if (path != nullptr && path->directed) path->directed->weights->set_share(budget.find_share(transfer_need_) / paths);
+  propagation_->directed->weights->set_share(budget.find_share(transfer_need_));
 }
 
-/// Where the modes sound, weights for this block.
+/// Weights for this block, if the modes sound.
 void SoundingBody::begin_directed_block(std::int64_t sample, const ListenerTracks& listener) noexcept {
-  if (voice_->is_idle()) return;
-  for (Propagation* path : {propagation_.get(), next_propagation_.get()}) {
-    if (path == nullptr || !path->directed) continue;
-    const std::int64_t before = path->directed->weights->get_evaluations();
-    path->directed->begin_block(sample, track_, listener);
-    work_.units[Effect::kDirectivity] += path->directed->weights->get_evaluations() - before;
-  }
+  if (modes_->is_idle()) return;
+  DirectedSound& directed = *propagation_->directed;
+  const std::int64_t before = directed.weights->get_evaluations();
+  directed.begin_block(sample, track_, listener);
+  work_.units[Effect::kDirectivity] += directed.weights->get_evaluations() - before;
 }
 
 /// Modes and acceleration noise, into all delay lines.
-void SoundingBody::make_sound(std::int64_t sample, std::size_t count, const ListenerTracks& listener, BodyScratch& scratch,
-                              TickFunction ticks) noexcept {
-  std::uint64_t started = ticks != nullptr ? ticks() : 0;
-  const auto end_part = [&](Effect effect) {
-    if (ticks == nullptr) return;
-    const std::uint64_t now = ticks();
-    work_.ticks[effect] += static_cast<std::int64_t>(now - std::exchange(started, now));
-  };
-  if (kCompiledEffects.has(Effect::kDirectivity) && voice_ && voice_->is_directed()) {
-    begin_directed_block(sample, listener);
-    end_part(Effect::kDirectivity);
-  }
-  if (kCompiledEffects.has(Effect::kModal) && voice_) end_part(make_modal_sound(std::span(scratch.mono).first(count)));
-  if (kCompiledEffects.has(Effect::kAccelerationNoise) && acceleration_noise_) {
-    std::array<std::span<float>, 3> dipole;
-    for (std::size_t k = 0; k < 3; ++k) dipole[k] = std::span(scratch.dipole[k]).first(count);
-    make_acceleration_noise(dipole);
-    end_part(Effect::kAccelerationNoise);
-  }
+void SoundingBody::make_sound(std::int64_t sample, std::size_t count, const ListenerTracks& listener, BodyScratch& scratch) noexcept {
+  if (is_directed()) begin_directed_block(sample, listener);
+  if (modes_) make_modal_sound(std::span(scratch.mono).first(count));
+  if (!acceleration_noise_) return;
+  std::array<std::span<float>, 3> dipole;
+  for (std::size_t k = 0; k < 3; ++k) dipole[k] = std::span(scratch.dipole[k]).first(count);
+  make_acceleration_noise(dipole);
 }
 
-void SoundingBody::render(std::int64_t sample, std::size_t count, const ListenerTracks& listener, BodyScratch& scratch, Mix& mix,
-                          TickFunction ticks) noexcept {
+void SoundingBody::render(std::int64_t sample, std::size_t count, const ListenerTracks& listener, BodyScratch& scratch, Mix& mix) noexcept {
   wake(sample);
-  make_sound(sample, count, listener, scratch, ticks);
-  if (propagation_) hear(*propagation_, sample, count, listener, fading_ ? Fade::kOut : Fade::kNone, scratch, mix, ticks);
-  if (next_propagation_) hear(*next_propagation_, sample, count, listener, fading_ ? Fade::kIn : Fade::kUnheard, scratch, mix, ticks);
+  make_sound(sample, count, listener, scratch);
+  if (propagation_ && !propagation_->is_silent()) hear(sample, count, listener, scratch, mix);
   rendered_ = sample + static_cast<std::int64_t>(count);
 }
 

@@ -8,7 +8,7 @@
 namespace carillon::synth {
 namespace {
 
-// A direction that the steps of a force have no more of than this share of the largest is rounding of single precision.
+// Relative size below which a direction of a force's steps is rounding of single precision.
 constexpr double kParallel = 3e-7;
 
 using Steps = std::array<Vec3, events::kMaxForceSteps>;
@@ -29,7 +29,7 @@ bool is_playable(const events::Force& force, const Model& model) {
   return sane;
 }
 
-/// Splits the steps along directions, one by one, each that of the largest step of what is left.
+/// Decomposes the steps along axes, each that of the largest remaining step.
 void find_directions(Steps left, QueuedForce& force) {
   const std::size_t count = force.count;
   double largest = 0.0;
@@ -75,7 +75,7 @@ StrikeQueue::StrikeQueue(const Model& model, int max_pulses, int max_forces) : m
   forces_.reserve(std::max(0, max_forces));
 }
 
-/// What happens after the sample before the horizon can still be heard.
+/// Forces after the sample before the horizon are still audible.
 void StrikeQueue::begin_in_time(double& begin, std::int64_t horizon) noexcept {
   const double earliest = static_cast<double>(horizon - 1);
   if (begin > earliest) return;

@@ -1,4 +1,4 @@
-// The strikes of a voice that wait or act: contact pulses of a known shape, and forces known step by step.
+// Waiting and active strikes: contact pulses of known shape, and forces known step by step.
 #pragma once
 
 #include <array>
@@ -14,10 +14,10 @@
 
 namespace carillon::synth {
 
-/// The time in which a force is not zero, in samples of its voice. The interval of sample n is (n - 1, n].
+/// Interval of a non-zero force, in samples of its owner. The interval of sample n is (n - 1, n].
 struct ForceInterval {
   double begin = 0.0, end = 0.0;
-  /// Whether it has a part in the intervals of `count` samples from `sample` on.
+  /// True if it overlaps the intervals of `count` samples from `sample` on.
   bool overlaps(std::int64_t sample, int count) const noexcept {
     return begin <= static_cast<double>(sample + count - 1) && end > static_cast<double>(sample - 1);
   }
@@ -29,67 +29,65 @@ struct QueuedPulse {
   events::PulseShape shape = events::PulseShape::kHertz;
   const std::int16_t* row[kStrikeRows];  // of the model's shapes
   float weight[kStrikeRows];
-  float strength_n_s = 0.0F;  // size of the impulse
+  float strength_n_s = 0.0F;  // magnitude of the impulse
   std::int32_t triangle = 0;
 
   ForceInterval get_interval() const noexcept { return {begin, begin + length}; }
 };
 
-/// A force in steps of equal length. Its directions are those that its steps need: one where all are parallel.
+/// A force in steps of equal length, along as many axes as its steps need: one if all are parallel.
 struct QueuedForce {
   double begin = 0.0, step = 0.0;  // samples
   std::int32_t triangle = 0;
   int count = 0, axes = 0;
-  float strength_n_s = 0.0F;  // no more than this impulse reaches the body
+  float strength_n_s = 0.0F;  // bound on the impulse
   float barycentric[3];
   float axis[3][3];                        // unit
   float along[3][events::kMaxForceSteps];  // impulse of each step along each [N s]
 
   double calc_end() const noexcept { return begin + count * step; }
   ForceInterval get_interval() const noexcept { return {begin, calc_end()}; }
-  /// Weights of the rows of its triangle for a unit impulse along one of its directions.
+  /// Weights of the rows of its triangle for a unit impulse along an axis.
   void find_weights(int direction, float* weight) const noexcept;
 };
 
-/// Moments of a force along each of its directions.
+/// Moments of a force along each of its axes.
 using ForceMoments = std::array<Moments, 3>;
 
-/// Over one interval, the unit of time, in which the first step of the force begins at `begin` and steps have the length `step`.
+/// Over one interval, the unit of time; the first step begins at `begin`, steps have the length `step`.
 ForceMoments calc_force_moments(const QueuedForce& force, double begin, double step) noexcept;
 
-/// What a voice has taken and what not.
+/// Numbers of strikes.
 struct StrikeCounters {
-  std::int64_t accepted = 0;  // strikes taken
-  std::int64_t refused = 0;   // not finite, outside the surface, or no room
-  std::int64_t late = 0;      // began before the horizon and were moved there
+  std::int64_t accepted = 0;  // accepted strikes
+  std::int64_t refused = 0;   // not finite, outside the surface, or queue full
+  std::int64_t late = 0;      // began before the horizon and were moved to it
 };
 
-/// Every strike in it is finite, acts on a triangle of the model and had not begun at the horizon when it came. Memory is taken in the
-/// constructor only. One thread at a time; nothing throws but the constructor.
+/// Invariant: every strike is finite, acts on a triangle of the model and had not begun at the horizon when queued. Allocates in the
+/// constructor only. One thread at a time; only the constructor throws.
 class StrikeQueue {
  public:
   /// The model must outlive the queue.
   StrikeQueue(const Model& model, int max_pulses, int max_forces);
 
-  /// Takes a strike. `horizon`: the first sample that is still to come; what would act before it is moved there. False when it is refused.
+  /// Queues a strike. `horizon`: first sample still to be rendered; earlier begins are moved to it. False if refused.
   bool push(const events::Impulse& impulse, std::int64_t horizon) noexcept;
   bool push(const events::Force& force, std::int64_t horizon) noexcept;
 
-  /// Takes the strikes and counters of the queue of another model. A strike on a triangle that this model has not is refused.
+  /// Takes over the strikes and counters of the queue of another model. Strikes on missing triangles are refused.
   void take_over(const StrikeQueue& other) noexcept;
 
   std::span<const QueuedPulse> get_pulses() const noexcept { return pulses_; }
   std::span<const QueuedForce> get_forces() const noexcept { return forces_; }
   bool is_empty() const noexcept { return pulses_.empty() && forces_.empty(); }
-  /// Whether a strike acts in `count` samples from `sample` on.
+  /// True if a strike acts in `count` samples from `sample` on.
   bool acts(std::int64_t sample, int count) const noexcept;
-  /// Forgets the strikes that are over before a sample.
+  /// Removes the strikes that end before a sample.
   void finish(std::int64_t sample) noexcept;
   void clear() noexcept;
 
   const StrikeCounters& get_counters() const noexcept { return counters_; }
-  /// Without the queue itself.
-  std::size_t calc_bytes() const noexcept { return pulses_.capacity() * sizeof(QueuedPulse) + forces_.capacity() * sizeof(QueuedForce); }
 
  private:
   void begin_in_time(double& begin, std::int64_t horizon) noexcept;

@@ -1,10 +1,8 @@
-// One scene on two threads: bodies, commands and events from the main thread, blocks of sound on the audio thread.
-// Method:     time is cut into blocks of kBlock samples from the first one; a call of the host is served from as many whole sub-blocks as
-//             it asks for, never across a block. Events are taken from the ring before each piece is made, and act at their own times.
-//             Bodies come and go at blocks, and effects change, handed over by two queues with one writer and one reader. Of bodies that
-//             sleep only a bit is looked at, 64 at once.
-// Source:     Lamport 1983, Specifying concurrent program modules (the queue with one writer and one reader).
-// Deviations: none.
+// Method:     blocks of kBlock samples from the first sample; a call of the host is served from as many whole sub-blocks as it asks for,
+//             never across a block. Events are taken from the ring before each piece is rendered, and act at their own times. Bodies are
+//             added, swapped and removed at blocks, through two single-producer single-consumer queues. Sleeping bodies cost one bit,
+//             tested 64 at once.
+// Source:     Lamport 1983, Specifying concurrent program modules (single-producer single-consumer queue).
 #include "runtime/synth/synthesiser.hpp"
 
 #include <algorithm>
@@ -13,8 +11,8 @@
 #include <string>
 #include <utility>
 
-#include "runtime/base/error.hpp"
 #include "runtime/acoustics/head/head.hpp"
+#include "runtime/base/error.hpp"
 #include "runtime/synth/fp_guard.hpp"
 
 namespace carillon::synth {
@@ -32,9 +30,9 @@ SynthesiserOptions check(SynthesiserOptions options) {
   if (options.microphones_m.empty() || options.microphones_m.size() > kMaxMicrophones) refuse("one to 256 microphones");
   for (const Vec3& place : options.microphones_m)
     for (const double x : place)
-      if (!std::isfinite(x)) refuse("microphones at finite places");
+      if (!std::isfinite(x)) refuse("finite microphone positions");
   for (const double x : options.listener_m)
-    if (!std::isfinite(x)) refuse("a listener at a finite place");
+    if (!std::isfinite(x)) refuse("a finite listener position");
   if (const char* fault = find_fault(options.ground); fault != nullptr) throw InputError(std::string("ground: ") + fault);
   if (const auto& floor = options.floor; floor) {
     if (const char* fault = find_fault(*floor); fault != nullptr) throw InputError(std::string("floor: ") + fault);
@@ -42,7 +40,7 @@ SynthesiserOptions check(SynthesiserOptions options) {
       if (floor->calc_height_m(options.listener_m + place) < 0.0) refuse("microphones above its floor");
   }
   if (options.head) {
-    if (options.microphones_m.size() != 2) refuse("two microphones, left and right, where it has a head");
+    if (options.microphones_m.size() != 2) refuse("two microphones, left and right, for a head");
     if (options.head->head == nullptr || options.head->head->get_sample_rate_hz() != options.rate_hz)
       refuse("a head that is made for its sample rate");
   }
@@ -58,7 +56,7 @@ SynthesiserOptions check(SynthesiserOptions options) {
 
 }  // namespace
 
-/// One writer, one reader.
+/// Single-producer single-consumer queue.
 template <typename T>
 class Synthesiser::Pipe {
  public:
@@ -92,7 +90,7 @@ Synthesiser::Synthesiser(SynthesiserOptions options)
                 options_.head),
       allowed_(options_.budget) {
   const std::size_t bodies = options_.max_bodies;
-  // A number comes, changes and goes in at most three commands, and two come back.
+  // Per number at most three commands (add, swap, remove) and two answers.
   commands_ = std::make_unique<Pipe<Command>>(3 * bodies);
   gone_ = std::make_unique<Pipe<Command>>(2 * bodies);
   owned_.resize(bodies);
@@ -125,13 +123,13 @@ int Synthesiser::add_body(std::shared_ptr<const Model> model, const BodySettings
   check_model(model.get());
   check_surroundings(settings.effects);
   if (events::find_fault(events::BodyMotion{.position_m = settings.position_m, .rotation = settings.rotation}) != nullptr)
-    throw InputError("a body must be at a finite place, turned by a unit quaternion");
+    throw InputError("the position of a body must be finite and its rotation a unit quaternion");
   if (!(settings.longest_m >= 0.0 && settings.longest_m < 1e5) || settings.max_waypoints < 0 || settings.max_waypoints > kMaxRoom ||
       settings.max_forces > kMaxRoom)
     throw InputError("a body needs a longest distance below 100 km, and room for at most 16,777,216 waypoints and forces");
-  // A voice is made only once the body has Effect::kModal.
+  // Also checked for bodies without modes.
   if (!(settings.silence_pa > 0.0) || !std::isfinite(settings.silence_pa))
-    throw InputError("a body's pressure of silence must be a positive number of Pa");
+    throw InputError("silence_pa of a body must be a positive number");
   if (const char* fault = find_fault(settings.surface); fault != nullptr) throw InputError(std::string("surface of a body: ") + fault);
   collect();
   const std::size_t free = find_free();
@@ -153,33 +151,21 @@ int Synthesiser::add_body(std::shared_ptr<const Model> model, const BodySettings
                 .floor = options_.floor,
                 .head = options_.head,
                 .phase = number},
-      settings.position_m, settings.rotation);
-  auto change = body->make_change({}, settings.effects);
+      settings.effects, settings.position_m, settings.rotation);
   Published& published = published_bodies_[free];
-  for (const Effect effect : EffectSet::all()) {
-    published.units[effect].store(0, std::memory_order_relaxed);
-    published.ticks[effect].store(0, std::memory_order_relaxed);
-  }
+  for (const Effect effect : EffectSet::all()) published.units[effect].store(0, std::memory_order_relaxed);
   published.peak_pa.store(0.0F, std::memory_order_relaxed);
   published.deflection.store(0.0, std::memory_order_relaxed);
   published.energy_rise.store(0.0, std::memory_order_relaxed);
   for (auto* energy : {&published.given_j, &published.lost_j, &published.held_j, &published.radiated_j})
     energy->store(0.0, std::memory_order_relaxed);
   Owned& owned = owned_[free];
-  owned = Owned{.body = std::move(body),
-                .change = std::move(change),
-                .wanted_model = nullptr,
-                .effects = settings.effects,
-                .wanted = settings.effects,
-                .bytes = {},
-                .is_leaving = false};
-  owned.bytes = owned.change->calc_bytes();
-  publish_bytes(number);
-  commands_->push({.body = owned.body.get(), .change = owned.change.get(), .number = number});
+  owned = Owned{.body = std::move(body), .swap = nullptr, .wanted_model = nullptr, .effects = settings.effects, .is_leaving = false};
+  commands_->push({.body = owned.body.get(), .number = number, .kind = Command::Kind::kAdd});
   return number;
 }
 
-/// The number of a body that is there and stays.
+/// Index of a body that exists and is not being removed.
 std::size_t Synthesiser::check_owned(int body) const {
   const std::size_t i = body;
   if (body < 0 || i >= owned_.size() || owned_[i].body == nullptr || owned_[i].is_leaving)
@@ -187,76 +173,48 @@ std::size_t Synthesiser::check_owned(int body) const {
   return i;
 }
 
-/// The first number that no body has; that of no body when all are taken.
+/// First free number; owned_.size() if there is none.
 std::size_t Synthesiser::find_free() const {
   const auto free = std::find_if(owned_.begin(), owned_.end(), [](const Owned& owned) { return owned.body == nullptr; });
   return free - owned_.begin();
-}
-
-void Synthesiser::set_effects(int body, EffectSet effects) {
-  collect();
-  Owned& owned = owned_[check_owned(body)];
-  check_surroundings(effects);
-  // Refused here, also for a change that has to wait.
-  if (owned.wanted_model != nullptr)
-    SoundingBody::check(effects, *owned.wanted_model);
-  else
-    owned.body->check(effects);
-  const EffectSet before = std::exchange(owned.wanted, effects);
-  try {
-    send_change(body);
-  } catch (...) {
-    owned.wanted = before;
-    throw;
-  }
 }
 
 void Synthesiser::swap_model(int body, std::shared_ptr<const Model> model) {
   check_model(model.get());
   collect();
   Owned& owned = owned_[check_owned(body)];
-  SoundingBody::check(owned.wanted, *model);
+  SoundingBody::check(owned.effects, *model);
   std::shared_ptr<const Model> before = std::exchange(owned.wanted_model, std::move(model));
   try {
-    send_change(body);
+    send_swap(body);
   } catch (...) {
     owned.wanted_model = std::move(before);
     throw;
   }
 }
 
-EffectSet Synthesiser::get_effects(int body) const { return owned_[check_owned(body)].wanted; }
+EffectSet Synthesiser::get_effects(int body) const { return owned_[check_owned(body)].effects; }
 
-/// Makes the wanted change, unless an earlier one is on its way.
-void Synthesiser::send_change(int number) {
+/// Sends the pending swap unless an earlier one is in progress.
+void Synthesiser::send_swap(int number) {
   Owned& owned = owned_[number];
-  if (owned.change != nullptr || owned.is_leaving || (owned.wanted == owned.effects && owned.wanted_model == nullptr)) return;
-  // Directivity goes first where the new model cannot have it.
-  const bool waits = owned.effects.has(Effect::kDirectivity) && !owned.wanted.has(Effect::kDirectivity);
-  if (owned.wanted_model == nullptr || waits) {
-    owned.change = owned.body->make_change(owned.effects, owned.wanted);
-  } else {
-    owned.change = owned.body->make_change(owned.effects, owned.wanted, owned.wanted_model);
-    owned.wanted_model.reset();
-  }
-  owned.effects = owned.wanted;
-  const EffectBytes more = owned.change->calc_bytes();
-  for (const Effect effect : EffectSet::all()) owned.bytes[effect] += more[effect];
-  publish_bytes(number);
-  commands_->push({.body = owned.body.get(), .change = owned.change.get(), .number = number});
+  if (owned.swap != nullptr || owned.is_leaving || owned.wanted_model == nullptr) return;
+  owned.swap = owned.body->make_swap(owned.wanted_model);
+  owned.wanted_model.reset();
+  commands_->push({.body = owned.body.get(), .swap = owned.swap.get(), .number = number, .kind = Command::Kind::kSwap});
 }
 
 void Synthesiser::remove_body(int body) {
   Owned& owned = owned_[check_owned(body)];
   owned.is_leaving = true;
-  commands_->push({.body = owned.body.get(), .number = body, .removes = true});
+  commands_->push({.body = owned.body.get(), .number = body, .kind = Command::Kind::kRemove});
 }
 
 void Synthesiser::collect() noexcept {
   const auto try_to_send = [this](int number) noexcept {
     try {
-      send_change(number);
-    } catch (...) {  // no memory: it waits
+      send_swap(number);
+    } catch (...) {  // out of memory: stays pending
       has_unsent_ = true;
     }
   };
@@ -267,15 +225,11 @@ void Synthesiser::collect() noexcept {
   Command command;
   while (gone_->pop(command)) {
     Owned& owned = owned_[command.number];
-    if (command.removes) {
+    if (command.kind == Command::Kind::kRemove) {
       owned = Owned{};
-      publish_bytes(command.number);
       continue;
     }
-    const EffectBytes less = owned.change->calc_bytes();
-    for (const Effect effect : EffectSet::all()) owned.bytes[effect] -= less[effect];
-    owned.change.reset();
-    publish_bytes(command.number);
+    owned.swap.reset();
     try_to_send(command.number);
   }
 }
@@ -289,17 +243,15 @@ void Synthesiser::set_awake(int number) noexcept {
   awake_[static_cast<std::size_t>(number) / 64] |= std::uint64_t{1} << (static_cast<unsigned>(number) % 64U);
 }
 
-/// Whenever bodies come, change or go.
 void Synthesiser::list_directed() noexcept {
-  if (!kCompiledEffects.has(Effect::kDirectivity)) return;
   directed_.clear();
   for (SoundingBody* body : playing_)
     if (body != nullptr && body->is_directed()) directed_.push_back(body);
 }
 
-/// At the start of a block: the transfers of each body in it.
+/// At the start of a block: distributes the transfer look-ups over the bodies.
 void Synthesiser::share_transfers() noexcept {
-  if (!kCompiledEffects.has(Effect::kDirectivity) || directed_.empty()) return;
+  if (directed_.empty()) return;
   std::int64_t needs = 0;
   for (SoundingBody* body : directed_) needs += body->find_transfer_need(sample_);
   transfers_.begin(options_.transfers_per_s * kBlock / options_.rate_hz, static_cast<int>(directed_.size()), needs);
@@ -311,20 +263,22 @@ void Synthesiser::apply_commands() noexcept {
   bool changes = false;
   while (commands_->pop(command)) {
     changes = true;
-    SoundingBody*& place = playing_[command.number];
-    if (command.removes) {
-      place = nullptr;
+    if (command.kind == Command::Kind::kRemove) {
+      playing_[command.number] = nullptr;
       gone_->push(command);
-    } else {
-      place = command.body;
-      command.body->apply(*command.change, listener_, sample_);
-      set_awake(command.number);
+      continue;
     }
+    playing_[command.number] = command.body;
+    if (command.kind == Command::Kind::kSwap)
+      command.body->apply(*command.swap, listener_, sample_);
+    else
+      command.body->begin(listener_, sample_);
+    set_awake(command.number);
   }
   if (changes) list_directed();
 }
 
-/// Calls `work(number, body)` for every body that is awake, in the order of their numbers; those for which it returns false fall asleep.
+/// Calls `work(number, body)` for every awake body, by number; those for which it returns false fall asleep.
 template <typename Work>
 void Synthesiser::for_awake(Work&& work) noexcept {
   for (std::size_t w = 0; w < awake_.size(); ++w) {
@@ -361,7 +315,7 @@ void Synthesiser::take(const events::TimeWatermark& mark) noexcept {
   has_marks_ = true;
 }
 
-/// At the start of a block: an underrun if physics has not run to its end. Later events come late, or not at all.
+/// At the start of a block: counts an underrun if the physics has not reached its end. Later events are late.
 void Synthesiser::watch_marks() noexcept {
   const bool is_overtaken = has_marks_ && marked_s_ * options_.rate_hz < static_cast<double>(sample_ + kBlock);
   work_.underruns += static_cast<std::int64_t>(is_overtaken && !is_overtaken_);
@@ -412,31 +366,27 @@ void Synthesiser::take_events() noexcept {
   }
 }
 
-/// Changes of effects that are over go back, at the beginning of a block.
-void Synthesiser::finish_changes() noexcept {
-  bool changes = false;
+/// Returns finished swaps to the main thread, at the start of a block.
+void Synthesiser::finish_swaps() noexcept {
   for_awake([&](int number, SoundingBody& body) {
-    if (BodyChange* change = body.finish_change(listener_, sample_)) {
-      gone_->push({.body = &body, .change = change, .number = number});
-      changes = true;
-    }
+    if (ModelSwap* swap = body.finish_swap(sample_))
+      gone_->push({.body = &body, .swap = swap, .number = number, .kind = Command::Kind::kSwap});
     return true;
   });
-  if (changes) list_directed();
 }
 
-/// The floor for strikes in this block, also of a body that wakes within it; and no body wakes more modes than the whole
-/// budget has room for: they would have to go at once, and take others with them for the work that they were.
+/// Sets the audibility floor of strikes in this block, also of a body that wakes within it, and limits the body to as many modes as the
+/// whole budget has room for: more would be removed at once, and their work would remove others.
 void Synthesiser::give_floor(SoundingBody& body) noexcept {
-  Voice* voice = body.get_voice();
-  if (!limited_ || voice == nullptr) return;
-  const double modes = allowed_.load(std::memory_order_relaxed) / options_.rate_hz;
-  voice->set_limit(modes > 0.0 ? static_cast<int>(std::min(modes, kMaxModes)) : 0);
+  ResonatorBank* modes = body.get_modes();
+  if (!limited_ || modes == nullptr) return;
+  const double allowed = allowed_.load(std::memory_order_relaxed) / options_.rate_hz;
+  modes->set_max_modes(allowed > 0.0 ? static_cast<int>(std::min(allowed, kMaxModes)) : 0);
   const std::int64_t begin = sample_ / kBlock * kBlock;
-  voice->set_floor(budget_.get_floor_pa() / body.calc_nearness(listener_, begin));
+  modes->set_floor(budget_.get_floor_pa() / body.calc_nearness(listener_, begin));
 }
 
-/// At the start of a block: lets modes go that the budget has no room for.
+/// At the start of a block: removes modes beyond the budget.
 void Synthesiser::keep_budget() noexcept {
   const double per_s = allowed_.load(std::memory_order_relaxed);
   const std::int64_t spent = work_.mode_samples - spent_before_;
@@ -446,10 +396,10 @@ void Synthesiser::keep_budget() noexcept {
     limited_ = false;
     budget_ = Budget();
     for (SoundingBody* body : playing_)
-      if (body != nullptr && body->get_voice() != nullptr) {
-        body->get_voice()->set_floor(0.0F);
-        body->get_voice()->set_limit(static_cast<int>(kMaxModes));
-        body->get_voice()->allow_driven(body->get_voice()->get_group_count());
+      if (ResonatorBank* modes = body != nullptr ? body->get_modes() : nullptr) {
+        modes->set_floor(0.0F);
+        modes->set_max_modes(static_cast<int>(kMaxModes));
+        modes->allow_contacts(modes->get_group_count());
       }
     return;
   }
@@ -457,8 +407,8 @@ void Synthesiser::keep_budget() noexcept {
   std::int64_t groups = 0;
   int awake = 0;
   for_awake([&](int, SoundingBody& body) {
-    const Voice* voice = body.get_voice();
-    const int live = voice == nullptr ? 0 : voice->get_live_group_count();
+    const ResonatorBank* modes = body.get_modes();
+    const int live = modes == nullptr ? 0 : modes->get_ringing_group_count();
     groups += live;
     awake += static_cast<int>(live > 0);
     return true;
@@ -468,30 +418,30 @@ void Synthesiser::keep_budget() noexcept {
   const bool gives_back = budget_.has_room() && sample_ / kBlock % kGiveBackEvery == 0;
   if (is_too_much) {
     for_awake([&](int, SoundingBody& body) {
-      if (Voice* voice = body.get_voice()) budget_.add(voice->measure(body.calc_nearness(listener_, sample_)));
+      if (ResonatorBank* modes = body.get_modes()) budget_.add(modes->measure(body.calc_nearness(listener_, sample_)));
       return true;
     });
     budget_.decide();
   }
   for_awake([&](int, SoundingBody& body) {
-    Voice* voice = body.get_voice();
+    ResonatorBank* modes = body.get_modes();
     give_floor(body);
-    if (voice != nullptr && gives_back) voice->allow_driven(1);
-    if (!is_too_much || voice == nullptr || voice->get_live_group_count() == 0) return true;
-    const int stay = budget_.find_limit(voice->get_measured());
-    work_.faded += voice->get_live_group_count() - stay;
-    voice->cut(stay);
+    if (modes != nullptr && gives_back) modes->allow_contacts(1);
+    if (!is_too_much || modes == nullptr || modes->get_ringing_group_count() == 0) return true;
+    const int stay = budget_.find_limit(modes->get_measured());
+    work_.faded += modes->get_ringing_group_count() - stay;
+    modes->truncate(stay);
     return true;
   });
 }
 
-/// Fills mix_ with the next samples: whole sub-blocks, all of one block.
+/// Fills mix_ with the next samples: whole sub-blocks within one block.
 void Synthesiser::render(int samples) noexcept {
   const bool begins = sample_ % kBlock == 0;
   if (begins) apply_commands();
   take_events();
   if (begins) {
-    finish_changes();
+    finish_swaps();
     watch_marks();
     keep_budget();
     share_transfers();
@@ -500,7 +450,7 @@ void Synthesiser::render(int samples) noexcept {
   for_awake([&](int number, SoundingBody& body) {
     if (body.is_asleep()) return false;
     body.reach(marked_s_);
-    count(body, [&] { body.render(sample_, static_cast<std::size_t>(samples), listener_, scratch_, mix_, options_.ticks); });
+    count(body, [&] { body.render(sample_, static_cast<std::size_t>(samples), listener_, scratch_, mix_); });
     publish(number);
     return true;
   });

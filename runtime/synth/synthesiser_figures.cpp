@@ -3,33 +3,16 @@
 #include <array>
 #include <atomic>
 #include <tuple>
-#include <utility>
 
 #include "runtime/synth/synthesiser.hpp"
 
 namespace carillon::synth {
 
-void Synthesiser::publish_bytes(int number) {
-  const std::size_t i = number;
-  EffectBytes bytes = owned_[i].bytes;
-  const auto move_contacts_to = [&](Effect effect) { bytes[effect] += std::exchange(bytes[Effect::kRoughness], 0); };
-  if (!owned_[i].effects.has(Effect::kRoughness)) {
-    if (owned_[i].effects.has(Effect::kRolling))
-      move_contacts_to(Effect::kRolling);
-    else if (owned_[i].effects.has(Effect::kContactDamping))
-      move_contacts_to(Effect::kContactDamping);
-  }
-  for (const Effect effect : EffectSet::all()) published_bodies_[i].bytes[effect].store(bytes[effect], std::memory_order_relaxed);
-}
-
 void Synthesiser::publish(int number) noexcept {
   const std::size_t i = number;
   const BodyWork& work = playing_[i]->get_work();
   Published& published = published_bodies_[i];
-  for (const Effect effect : EffectSet::all()) {
-    published.units[effect].store(work.units[effect], std::memory_order_relaxed);
-    if (options_.ticks != nullptr) published.ticks[effect].store(work.ticks[effect], std::memory_order_relaxed);
-  }
+  for (const Effect effect : EffectSet::all()) published.units[effect].store(work.units[effect], std::memory_order_relaxed);
   published.peak_pa.store(work.peak_pa, std::memory_order_relaxed);
   published.deflection.store(work.deflection, std::memory_order_relaxed);
   published.energy_rise.store(work.energy_rise, std::memory_order_relaxed);
@@ -43,11 +26,7 @@ EffectCounters Synthesiser::get_effect_counters(int body) const noexcept {
   EffectCounters counters;
   if (body < 0 || body >= options_.max_bodies) return counters;
   const Published& published = published_bodies_[body];
-  for (const Effect effect : EffectSet::all()) {
-    counters.units[effect] = published.units[effect].load(std::memory_order_relaxed);
-    counters.ticks[effect] = published.ticks[effect].load(std::memory_order_relaxed);
-    counters.bytes[effect] = published.bytes[effect].load(std::memory_order_relaxed);
-  }
+  for (const Effect effect : EffectSet::all()) counters.units[effect] = published.units[effect].load(std::memory_order_relaxed);
   return counters;
 }
 
@@ -59,8 +38,8 @@ double Synthesiser::get_peak_pa(int body) const noexcept {
 bool Synthesiser::measure_amplitudes(int body, std::span<float> by_bank_mode) const noexcept {
   std::fill(by_bank_mode.begin(), by_bank_mode.end(), 0.0F);
   if (body < 0 || body >= options_.max_bodies || playing_[body] == nullptr) return false;
-  const Voice* voice = playing_[body]->get_voice();
-  if (voice != nullptr) voice->measure_amplitudes(by_bank_mode);
+  const ResonatorBank* modes = playing_[body]->get_modes();
+  if (modes != nullptr) modes->measure_amplitudes(by_bank_mode);
   return true;
 }
 

@@ -1,17 +1,15 @@
-// Method:     the profile is a sum of octaves. All octaves read one table at their own scale and from a random place: a sum of cosines with
-//             random phases and wavelengths in 1/2 .. 1, so that an octave has nothing outside its band. The table holds the coefficients
-//             of the cubic B-spline through that sum, with 8 points or more a wavelength (images below -67 dB), so that a height is four
-//             products. Where the contact is on the table is a fixed-point number of 64 bits:
-//             that of the next octave is the same, shifted by one.
-//             An octave that would reach beyond the Nyquist frequency fades out before.
+// Method:     sum of octaves, which all read one table at their own scale and from a random position: a sum of cosines with random phases
+//             and wavelengths in 1/2 .. 1, band-limited to the octave. The table holds the coefficients of the interpolating cubic
+//             B-spline, at least 8 points per wavelength (images below -67 dB), so a height costs four products. The table position is a
+//             64-bit fixed-point number; that of the next octave is the same, shifted by one bit. Octaves fade out before the Nyquist
+//             frequency.
 // Source:     B. Persson, O. Albohr, U. Tartaglino, A. Volokitin and E. Tosatti, J. Phys.: Condens. Matter 17 (2005) R1: most surfaces are
 //             self-affine with a Hurst exponent near 0.8 below a roll-off wavelength; the spectrum of a line over such a surface falls as
 //             q^-(1 + 2 H). Roughness is measured with a cut-off of 0.8 mm (ISO 4288:1996, for Ra from 0.1 to 2 um). A patch of radius a
-//             lets heights of wave number q through as 1 / sqrt(1 + pi/4 (q a)^3): P. Remington, J. Sound Vib. 46 (1976) 419, for wheels on
+//             transmits heights of wave number q by 1 / sqrt(1 + pi/4 (q a)^3): P. Remington, J. Sound Vib. 46 (1976) 419, for wheels on
 //             rails.
-// Deviations: the standard measures rougher surfaces with a longer cut-off and smoother ones with a shorter; with a cut-off that
-//             grows so, level would follow only the power 0.5 of roughness, where 0.8 to 1.16 is measured: here one cut-off serves all.
-//             Filters are taken at the middle of each octave, and without their phase.
+// Deviations: the standard uses longer cut-offs for rougher surfaces; level would then follow only the power 0.5 of roughness, where 0.8 to
+//             1.16 is measured: here one cut-off is used. Filters are evaluated at the centre of each octave, without phase.
 #include "runtime/synth/texture.hpp"
 
 #include <algorithm>
@@ -30,10 +28,10 @@ using std::numbers::pi;
 
 constexpr int kBits = 15;
 constexpr int kPoints = 1 << kBits;
-constexpr int kWaves = 2048;                      // of the longest wavelength in the table
-constexpr double kFadeFrom = 0.4, kFadeTo = 0.5;  // of the rate: where the shortest wavelength of an octave fades out
-constexpr double kHighestM = 1.0;                 // rms height; keeps what follows within floats
-constexpr float kMin = 1e-4F;                     // of an octave: below, it is left out
+constexpr int kWaves = 2048;                      // longest wavelengths in the table
+constexpr double kFadeFrom = 0.4, kFadeTo = 0.5;  // of the rate: fade-out of the shortest wavelength of an octave
+constexpr double kHighestM = 1.0;                 // rms height; keeps the following within floats
+constexpr float kMin = 1e-4F;                     // of an octave: smaller ones are left out
 constexpr float kFraction = 1.0F / static_cast<float>(1U << 24);
 
 /// x[n] = sum over k of X[k] e^{2 pi i k n / N}, in place; N a power of two (Cooley and Tukey 1965).
@@ -58,7 +56,7 @@ void transform(std::vector<std::complex<double>>& x) {
 }
 
 struct Tables {
-  std::array<float, kPoints + 3> coefficient;  // the first three again at the end
+  std::array<float, kPoints + 3> coefficient;  // first three repeated at the end
 
   Tables() {
     std::vector<std::complex<double>> x(kPoints);
@@ -83,7 +81,7 @@ const Tables& get_tables() {
   return tables;
 }
 
-/// Turns of the table of the longest octave, to 2^-64 of a turn.
+/// Position on the table of the longest octave, to 2^-64 of a turn.
 std::uint64_t to_place(double turns) noexcept { return static_cast<std::uint64_t>((turns - std::floor(turns)) * 0x1p64); }
 
 }  // namespace
@@ -97,16 +95,16 @@ void Texture::start(double roughness_m, std::uint64_t seed) noexcept {
 }
 
 Texture::Gains Texture::calc_gains(double speed_m_s, double patch_radius_m, double give_rad_s, double rate_hz) const noexcept {
-  // The squares of all octaves below the cut-off sum to 1.
+  // Squares of all octaves below the cut-off sum to 1.
   static const double kShare = std::sqrt(1.0 - std::pow(2.0, -2.0 * kHurst)) * std::pow(2.0, kHurst * kWavy);
   static const double kStep = std::pow(2.0, -kHurst);
   Gains gains;
   if (!(roughness_m_ > 0.0)) return gains;
   double amplitude = kShare, longest_m = kLongestM, square = 0.0;
   for (float& height : gains.height_m) {
-    const double highest = 2.0 * std::abs(speed_m_s) / (longest_m * rate_hz);  // frequency, of the rate
-    if (highest >= kFadeTo) break;                                             // and so are all shorter ones
-    const double wave_number = 2.0 * pi * std::numbers::sqrt2 / longest_m;     // the middle of the octave
+    const double highest = 2.0 * std::abs(speed_m_s) / (longest_m * rate_hz);  // frequency over rate
+    if (highest >= kFadeTo) break;                                             // and all shorter octaves
+    const double wave_number = 2.0 * pi * std::numbers::sqrt2 / longest_m;     // centre of the octave
     const double qa = wave_number * patch_radius_m, omega = wave_number * std::abs(speed_m_s);
     double gain = 1.0 / std::sqrt(1.0 + 0.25 * pi * qa * qa * qa);
     gain *= 1.0 - calc_smooth_step((highest - kFadeFrom) / (kFadeTo - kFadeFrom));
@@ -124,7 +122,7 @@ Texture::Gains Texture::calc_gains(double speed_m_s, double patch_radius_m, doub
 double Texture::calc_density(const Gains& gains, double speed_m_s, double freq_hz) noexcept {
   const double lowest_hz = std::abs(speed_m_s) / kLongestM;
   if (!(lowest_hz > 0.0)) return 0.0;
-  // Within an octave from f on the density falls as frequency^-(1 + 2 H) from so much over f: below the chord from its begin to its end.
+  // Within an octave from f on the density falls as frequency^-(1 + 2 H): below the chord from its begin to its end.
   static const double kSteep = 2.0 * kHurst / (1.0 - std::pow(2.0, -2.0 * kHurst)), kEnd = std::pow(2.0, -1.0 - 2.0 * kHurst);
   int octave = 0;
   double share = 2.0 * std::frexp(std::max(freq_hz / lowest_hz, 1.0), &octave) - 1.0;  // 0 at the begin, 1 at the end
@@ -134,7 +132,7 @@ double Texture::calc_density(const Gains& gains, double speed_m_s, double freq_h
     return kSteep * height * height / std::ldexp(lowest_hz, i);
   };
   const double own = calc_begin(octave) * (1.0 - (1.0 - kEnd) * share);
-  return octave == 0 ? own : std::max(own, kEnd * calc_begin(octave - 1) * (1.0 - (1.0 - kEnd) * share));  // filters have no sharp borders
+  return octave == 0 ? own : std::max(own, kEnd * calc_begin(octave - 1) * (1.0 - (1.0 - kEnd) * share));  // filters have gradual edges
 }
 
 void Texture::render(double from_m_s, double to_m_s, double rate_hz, const Gains& from, const Gains& to,

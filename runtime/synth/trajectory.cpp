@@ -1,6 +1,4 @@
-// Method:     cubic Hermite segments; velocities that are not given are the slopes between the neighbours.
-// Source:     textbook.
-// Deviations: none.
+// Method:     cubic Hermite segments; missing velocities are the slopes between the neighbours.
 #include "runtime/synth/trajectory.hpp"
 
 #include <algorithm>
@@ -43,7 +41,7 @@ Waypoint Trajectory::find(double time_s) const noexcept {
   if (!(time_s > get(0).time_s)) return {time_s, get(0).position_m, {}};
   if (time_s >= get(count_ - 1).time_s) return {time_s, get(count_ - 1).position_m, {}};
   std::size_t low = 0, high = count_ - 1;  // get(low).time_s <= time_s < get(high).time_s
-  // Where it would be if they came evenly, as they mostly do.
+  // Guess for evenly spaced waypoints.
   const double place = (time_s - get(0).time_s) / (get(high).time_s - get(0).time_s) * static_cast<double>(high);
   const std::size_t guess = place < static_cast<double>(high) ? static_cast<std::size_t>(place) : high - 1;
   if (get(guess).time_s <= time_s) {

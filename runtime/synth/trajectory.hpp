@@ -1,4 +1,4 @@
-// Where a body or the listener is over time.
+// Trajectories and attitudes of bodies and the listener.
 #pragma once
 
 #include <array>
@@ -18,32 +18,31 @@ struct Waypoint {
   Vec3 velocity_m_s{};
 };
 
-/// The last waypoints of something that moves: cubic between them, with their velocities, so that its speed is continuous. Before the first
-/// and after the last it rests there. One thread at a time.
+/// Last waypoints of a motion: cubic in between, with their velocities, so that the speed is continuous. At rest before the first and after
+/// the last. One thread at a time.
 class Trajectory {
  public:
-  /// Takes memory for `capacity` >= 1 waypoints, of which the oldest are forgotten first.
+  /// Allocates `capacity` >= 1 waypoints; the oldest are dropped first.
   explicit Trajectory(std::size_t capacity);
 
-  /// [audio-thread] Adds a waypoint. Two may have one time, before and after an impact; a third replaces the second. False, and nothing has
-  /// changed, when it is earlier than the last or not finite.
+  /// [audio-thread] Adds a waypoint. Two may have one time, before and after an impact; a third replaces the second. False, without change,
+  /// if earlier than the last or not finite.
   bool push(const Waypoint& waypoint) noexcept;
 
-  /// [audio-thread] At the origin, at rest, when there is no waypoint.
+  /// [audio-thread] At rest at the origin without waypoints.
   Waypoint find(double time_s) const noexcept;
 
   bool is_still() const { return count_ < 2; }
 
-  std::size_t get_bytes() const noexcept { return waypoints_.size() * sizeof(Waypoint); }
-  /// How many waypoints it remembers, and one of them: 0 is the oldest.
+  /// Remembered waypoints; 0 is the oldest.
   std::size_t get_count() const { return count_; }
   const Waypoint& get_waypoint(std::size_t i) const { return get(i); }
 
-  /// [audio-thread] Whether it stays where it is from this time on, as far as is known.
+  /// [audio-thread] True if at rest from this time on, as far as known.
   bool is_still_from(double time_s) const noexcept { return rest_begin_s_ <= time_s; }
 
  private:
-  const Waypoint& get(std::size_t i) const {  // i <= count_; a division would cost more than all the rest
+  const Waypoint& get(std::size_t i) const {  // i <= count_; avoids a division
     const std::size_t at = first_ + i;
     return waypoints_[at < waypoints_.size() ? at : at - waypoints_.size()];
   }
@@ -53,20 +52,17 @@ class Trajectory {
   double rest_begin_s_ = -std::numeric_limits<double>::infinity();
 };
 
-/// How something is turned over time: between its last attitudes by the shorter way; before the first and after the last it does not turn.
-/// One thread at a time.
+/// Rotation over time: shortest path between its last attitudes; constant before the first and after the last. One thread at a time.
 class Attitude {
  public:
-  /// Takes memory for `capacity` >= 1 attitudes, of which the oldest are forgotten first.
+  /// Allocates `capacity` >= 1 attitudes; the oldest are dropped first.
   explicit Attitude(std::size_t capacity);
 
-  /// [audio-thread] Adds an attitude, a unit quaternion; one at the time of the last replaces it. One that is earlier is not taken.
+  /// [audio-thread] Adds an attitude, a unit quaternion; replaces the last one at the same time. Earlier ones are ignored.
   void push(double time_s, const events::Quaternion& rotation) noexcept;
 
-  /// [audio-thread] Not turned when nothing was pushed.
+  /// [audio-thread] Identity without attitudes.
   events::Quaternion find(double time_s) const noexcept;
-
-  std::size_t get_bytes() const noexcept { return turns_.size() * sizeof(Turn); }
 
  private:
   struct Turn {
@@ -79,16 +75,16 @@ class Attitude {
   std::size_t first_ = 0, count_ = 0;
 };
 
-/// A vector of something that is turned, in the axes of the world. [any-thread]
+/// Rotates a vector into world axes. [any-thread]
 Vec3 turn(const events::Quaternion& rotation, const Vec3& x) noexcept;
 
-/// A track through places whose velocities are not known: each takes its own from its neighbours.
+/// Point of a path without velocities, which follow from the neighbours.
 struct PathPoint {
   double time_s = 0.0;
   Vec3 position_m{};
 };
 
-/// `places` in order of time, at least one; of several at the same time the last counts. Throws InputError otherwise.
+/// `places` in order of time, at least one; of several at one time the last counts. Throws InputError otherwise.
 Trajectory make_trajectory(std::span<const PathPoint> places);
 
 }  // namespace carillon::synth

@@ -1,7 +1,7 @@
-// Method:     numbers near the normal distribution, sums of four even ones, by a seed and the number of the strike.
-// Source:     that a hand's strikes scatter, less with practice: "Expertise- and tempo-related performance differences in unimanual
-//             drumming", Motor Control 25 (2021) 644.
-// Deviations: how much they scatter is chosen, not measured; strikes do not depend on those before.
+// Method:     approximately normal numbers, sums of four uniform ones, by a seed and the number of the strike.
+// Source:     scatter of strikes by hand, less with practice: "Expertise- and tempo-related performance differences in unimanual drumming",
+//             Motor Control 25 (2021) 644.
+// Deviations: the amount of scatter is chosen, not measured; strikes are independent.
 #include "runtime/synth/variation.hpp"
 
 #include <algorithm>
@@ -14,11 +14,11 @@
 namespace carillon::synth {
 namespace {
 
-// Standard deviations of what strikes of a variation of 1 scatter by.
+// Standard deviations at variation 1.
 constexpr double kEnergyScatter = 0.18;                             // 0.8 dB
 constexpr double kTiltScatter = 0.05;                               // rad, about each of two axes: 3 degrees
 constexpr double kLengthScatter = 0.05;                             // of the pulse, in addition to the effect of its energy
-constexpr double kPlaceScatterM = 2e-3, kPlaceScatterShare = 0.02;  // along the surface, each way; of the body's extent
+constexpr double kPlaceScatterM = 2e-3, kPlaceScatterShare = 0.02;  // along the surface, per axis; share of the body's extent
 
 Vec3 calc_extent(const bank::Bank& bank) {
   Vec3 low = bank.vertices_m.front(), high = low;
@@ -31,7 +31,7 @@ Vec3 calc_extent(const bank::Bank& bank) {
   return high - low;
 }
 
-/// Numbers of mean 0 and variance 1 within 3.5: the same for the same seed and strike.
+/// Numbers of mean 0 and variance 1 within 3.5, by seed and strike.
 class Chance {
  public:
   Chance(std::uint64_t seed, std::uint64_t strike) : state_(seed + strike * 0xd1342543de82ef95U) {}
@@ -45,32 +45,24 @@ class Chance {
   std::uint64_t state_;
 };
 
-/// Any two directions across a unit vector, and across each other.
-std::array<Vec3, 2> make_across(const Vec3& axis) {
-  Vec3 u = cross(axis, find_least_axis(axis));
-  const double length = std::sqrt(dot(u, u));
-  for (double& x : u) x /= length;
-  return {u, cross(axis, u)};
-}
-
 }  // namespace
 
 void vary_strike(const bank::Bank& bank, const std::function<bank::NearestPlace(const Vec3&)>& find, double variation, std::uint64_t seed,
                  std::uint64_t strike, events::Impulse& impulse) {
   if (!(variation > 0.0)) return;
   Chance chance(seed, strike);
-  // The mean of the energy stays.
+  // The mean energy is kept.
   const double energy = 1.0 + variation * kEnergyScatter * chance.draw(), more = std::sqrt(energy);
   const double size = std::sqrt(dot(impulse.impulse_n_s, impulse.impulse_n_s));
   if (size > 0.0) {
     Vec3 axis = impulse.impulse_n_s;
     for (double& x : axis) x /= size;
-    const auto [u, v] = make_across(axis);
+    const auto [u, v] = find_tangents(axis);
     const double a = variation * kTiltScatter * chance.draw(), b = variation * kTiltScatter * chance.draw();
     const double length = std::sqrt(1.0 + a * a + b * b);
     for (std::size_t k = 0; k < 3; ++k) impulse.impulse_n_s[k] = more * size * (axis[k] + a * u[k] + b * v[k]) / length;
   }
-  // A harder hit is shorter, as Hertz has it: tau ~ v^-1/5. It does not begin before the scene.
+  // Harder hits are shorter (Hertz): tau ~ v^-1/5. Not before the start of the scene.
   impulse.duration_s *= std::pow(more, -0.2) * (1.0 + variation * kLengthScatter * chance.draw());
   impulse.duration_s = std::min(impulse.duration_s, 2.0 * impulse.time_s);
   const auto& corner = bank.triangles[impulse.triangle];
@@ -79,7 +71,7 @@ void vary_strike(const bank::Bank& bank, const std::function<bank::NearestPlace(
   const double area = std::sqrt(dot(normal, normal));
   if (!(area > 0.0)) return;
   for (double& x : normal) x /= area;
-  const auto [u, v] = make_across(normal);
+  const auto [u, v] = find_tangents(normal);
   const Vec3 extent = calc_extent(bank);
   const double scatter_m = variation * std::min(kPlaceScatterM, kPlaceScatterShare * std::sqrt(dot(extent, extent)));
   const double a = scatter_m * chance.draw(), b = scatter_m * chance.draw();

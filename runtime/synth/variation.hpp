@@ -1,4 +1,4 @@
-// Strikes that differ as those of a hand.
+// Random variation of strikes.
 #pragma once
 
 #include <cstdint>
@@ -10,9 +10,9 @@
 
 namespace carillon::synth {
 
-/// Changes the energy, the place, the direction and the length of a strike on a body. `variation`, 0 to 1, says by how much; 0 leaves the
-/// strike as it is, to the bit. The same `seed` (of the body) and number of the strike give the same change. The triangle of the strike
-/// must be one of the bank; `find` gives the place of its surface that is nearest to a point. Not for an audio thread.
+/// Varies energy, place, direction and length of a strike on a body. `variation`: 0 (unchanged bits) to 1. Deterministic by `seed` (of the
+/// body) and number of the strike. The triangle of the strike must exist in the bank; `find` returns the nearest place of its surface. Not
+/// for an audio thread.
 void vary_strike(const bank::Bank& bank, const std::function<bank::NearestPlace(const Vec3&)>& find, double variation, std::uint64_t seed,
                  std::uint64_t strike, events::Impulse& impulse);
 

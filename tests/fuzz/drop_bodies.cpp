@@ -1,4 +1,4 @@
-// Sixteen bytes as a drop of a body on the ground, a slab or a slope: never too deep, no energy from nowhere.
+// Sixteen bytes as a drop of a body on the ground, a slab or a slope: bounded penetration, no gain of energy.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>

@@ -221,7 +221,7 @@ def mutate_bytes(draw, data):
 
 def write_json(draw, value, share=0.1):
     text = json.dumps(value)
-    if draw.random() < share:  # a number written as JSON does not have it
+    if draw.random() < share:  # invalid JSON number
         words = [
             i for i, letter in enumerate(text) if letter.isdigit() and (i == 0 or not text[i - 1].isalnum() and text[i - 1] not in ".-_")
         ]
@@ -401,7 +401,7 @@ def main():
             for line in result.stderr.splitlines():
                 if line.startswith("mutant: "):
                     tally[line[8:]] += 1
-            if result.returncode != 0:  # one by one, to name them all
+            if result.returncode != 0:  # one by one, to name all failures
                 for file in files:
                     alone = run_batch(program, [file])
                     if alone.returncode == 0:

@@ -1,4 +1,4 @@
-// What the targets share that play: a folder with a bank, and one run of carillon-render in this process.
+// Shared by the targets that play: a folder with a bank, and a run of carillon-render in this process.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,7 @@
 
 namespace carillon::fuzz {
 
-/// A folder of this process with a bank in it.
+/// Folder of this process with a bank in it.
 class Folder : public tests::Folder {
  public:
   Folder() {
@@ -31,10 +31,10 @@ inline const Folder& get_folder() {
 
 inline std::string_view to_text(const std::uint8_t* data, std::size_t size) { return {reinterpret_cast<const char*>(data), size}; }
 
-/// How far an input came, for the tally of tests/fuzz/mutants.py.
+/// Reports how far an input came, for the tally of tests/fuzz/mutants.py.
 inline void report(const char* what) { std::fprintf(stderr, "mutant: %s\n", what); }
 
-/// Renders with every output there is; the WAV has to be whole. False: refused.
+/// Renders with all outputs; the WAV must be complete. False: rejected.
 inline bool play(render::ProgramOptions options) {
   const Folder& folder = get_folder();
   options.wav = folder / "out.wav";

@@ -1,9 +1,9 @@
-// Bank bytes of any kind, sealed again: checked, edited and played, or refused with an InputError.
+// Arbitrary bank bytes, sealed again: checked, edited and played, or rejected with an InputError.
 #include <span>
 
 #include "runtime/bank/edits.hpp"
-#include "runtime/bank/report.hpp"
 #include "runtime/bank/mounting/heard.hpp"
+#include "runtime/bank/report.hpp"
 #include "tests/fuzz/play.hpp"
 #include "tests/unit/runtime/bank/seal_again.hpp"
 

@@ -1,4 +1,4 @@
-// Any bytes as a contacts file of a scene of two cubes: played, or refused with an InputError.
+// Arbitrary bytes as a contacts file of a scene of two cubes: played, or rejected with an InputError.
 #include "tests/fuzz/play.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -1,4 +1,5 @@
-// Any bytes as a scene: read and played, or refused with an InputError. What is long, or of many bodies or strikes, is only read.
+// Arbitrary bytes as a scene: read and played, or rejected with an InputError. Long scenes and those of many bodies or strikes are read
+// only.
 #include "runtime/scene/scene.hpp"
 #include "tests/fuzz/play.hpp"
 
@@ -11,7 +12,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const bool is_small =
         scene.duration_s <= 0.15 && scene.bodies.size() <= 4 && scene.strikes.size() <= 100 && scene.sample_rate_hz <= 96000;
     for (const scene::SceneBody& body : scene.bodies)
-      if (body.bank.empty()) {  // the solver is another program
+      if (body.bank.empty()) {  // requires the solver
         fuzz::report("only read");
         return 0;
       }

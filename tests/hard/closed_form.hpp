@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "runtime/synth/voice.hpp"
+#include "runtime/synth/resonator_bank.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 
 namespace carillon::hard {
@@ -90,9 +90,11 @@ inline bank::Bank make_bank(const Modes& lambda_and_decay) {
 inline double to_lambda(double freq_hz) { return 4.0 * std::numbers::pi * std::numbers::pi * freq_hz * freq_hz; }
 
 /// An ideal impulse of so many N s at the first sample.
-inline void strike(synth::Voice& voice, double impulse_n_s = 1.0) { ASSERT_TRUE(voice.strike({.impulse_n_s = {0.0, 0.0, impulse_n_s}})); }
+inline void strike(synth::ResonatorBank& voice, double impulse_n_s = 1.0) {
+  ASSERT_TRUE(voice.strike({.impulse_n_s = {0.0, 0.0, impulse_n_s}}));
+}
 
-inline std::vector<float> play(synth::Voice& voice, std::size_t samples) {
+inline std::vector<float> play(synth::ResonatorBank& voice, std::size_t samples) {
   std::vector<float> out(samples, 0.0F);
   voice.process(out);
   return out;

@@ -118,7 +118,7 @@ def glb_damaged(folder):
     hold_refusal(
         "glb_damaged",
         run(BIN / "carillon-bank", "import", bank, "-o", "x.hdf", cwd=folder, code=2).stderr,
-        ["small_plate.hdf", "no GLB file"],
+        ["small_plate.hdf", "not a GLB file"],
         "a bank",
     )
 

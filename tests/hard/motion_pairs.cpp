@@ -47,7 +47,6 @@ void turn_shapes(const tests::ModalBody& body, const std::vector<std::size_t>& p
     x = turn(x, pairs);
     for (std::size_t i = 0; i < kModes; ++i) shapes.column(static_cast<PetscInt>(i))[row] = x[i];
   }
-  la::mark_changed(body.modes.shapes);
 }
 
 std::vector<double> make_blow(std::mt19937& chance, double size) {

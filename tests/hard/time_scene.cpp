@@ -20,8 +20,8 @@ using events::ContactState;
 using std::numbers::pi;
 using synth::Effect;
 using synth::Model;
+using synth::ResonatorBank;
 using synth::Synthesiser;
-using synth::Voice;
 constexpr double kSceneRate = 48000.0;
 constexpr int kMillion = 1000000;
 
@@ -60,7 +60,8 @@ void play_million_hits_with_little_room() {
 TEST(time, million_hits) {
   // With room for them all: a hit a microsecond is a geometric series, which has a closed form at every sample.
   const double freq = 700.0, decay = 12.0;
-  Voice voice(Model::make(make_bank({{to_lambda(freq), decay}}), {.rate_hz = kSceneRate}), {.max_strikes = 4096, .silence_pa = 1e-30});
+  ResonatorBank voice(Model::make(make_bank({{to_lambda(freq), decay}}), {.rate_hz = kSceneRate}),
+                      {.max_strikes = 4096, .silence_pa = 1e-30});
   std::vector<float> heard;
   int hits = 0;
   for (int block = 0; block < 375; ++block) {
@@ -82,7 +83,7 @@ TEST(time, million_hits) {
     peak = std::max(peak, std::abs(1e-3L * sum.real()));
   }
   hold("million_hits", static_cast<double>(largest / peak), 1e-5, "wave against the geometric series");
-  const synth::VoiceCounters& counters = voice.get_counters();
+  const synth::ResonatorCounters& counters = voice.get_counters();
   hold("million_hits", std::abs(static_cast<double>(counters.accepted - kMillion)), 0.0, "hits not played with room for them");
   play_million_hits_with_little_room();
 }
@@ -144,7 +145,7 @@ TEST(time, sample_rate_change) {
   // One strike at six rates: each gives the closed form at its own samples, and a mode beyond half of it not at all.
   const Modes modes{{to_lambda(310.0), 8.0}, {to_lambda(3100.0), 40.0}};
   for (const double rate : {8000.0, 22050.0, 44100.0, 48000.0, 96000.0, 192000.0}) {
-    Voice voice(Model::make(make_bank(modes), {.rate_hz = rate}), {.silence_pa = 1e-30});
+    ResonatorBank voice(Model::make(make_bank(modes), {.rate_hz = rate}), {.silence_pa = 1e-30});
     const double begin = 0.0123, length = 300e-6;
     ASSERT_TRUE(voice.strike({.time_s = begin + 0.5 * length, .impulse_n_s = {0.0, 0.0, 1.0}, .duration_s = length}));
     const std::vector<float> heard = play(voice, static_cast<std::size_t>(0.06 * rate));
@@ -157,8 +158,8 @@ TEST(time, sample_rate_change) {
       largest = std::max(largest, std::abs(static_cast<Real>(heard[n]) - wanted));
     }
     hold("sample_rate_change", static_cast<double>(largest / 2), 5e-6, to_json(rate) + " Hz against the closed form");
-    Voice above(Model::make(make_bank({{to_lambda(0.52 * rate), 8.0}, {to_lambda(3.1 * rate), 8.0}}), {.rate_hz = rate}),
-                {.silence_pa = 1e-30});
+    ResonatorBank above(Model::make(make_bank({{to_lambda(0.52 * rate), 8.0}, {to_lambda(3.1 * rate), 8.0}}), {.rate_hz = rate}),
+                        {.silence_pa = 1e-30});
     strike(above);
     float loudest = 0.0F;
     for (const float p : play(above, 4800)) loudest = std::max(loudest, std::abs(p));
@@ -205,7 +206,7 @@ TEST(time, one_step_contact) {
                                   .impedance_n_s_m = 2.0 * rate_of_loss};
   };
   // It damps: within the step it comes and goes as a triangle of step / 5 ms, so that exp(-loss step^2 / 5 ms) of the wave stays.
-  Voice voice(model, {.silence_pa = 1e-30});
+  ResonatorBank voice(model, {.silence_pa = 1e-30});
   synth::ContactForces brake(model, {.effects = {Effect::kContactDamping}});
   voice.attach(&brake);
   strike(voice);
@@ -225,7 +226,7 @@ TEST(time, one_step_contact) {
                                                                {make(0.01, ContactState::kEnd)},
                                                                {make(0.01, ContactState::kEnd), make(0.01, ContactState::kBegin)}};
   for (const auto& records : forms) {
-    Voice touched(model);
+    ResonatorBank touched(model);
     synth::ContactForces contacts(model, {});
     touched.attach(&contacts);
     for (const events::LastingContact& record : records) contacts.take(record);
@@ -246,7 +247,7 @@ TEST(time, sliding) {
   for (int m = 0; m < 10; ++m) modes.emplace_back(to_lambda(400.0 * std::pow(2.0, 0.5 * m)), 60.0);
   const auto model = Model::make(make_bank(modes), {.rate_hz = kSceneRate});
   const auto calc_level = [&](double floor_m, double speed_m_s, double load_n) {
-    Voice voice(model, {.silence_pa = 1e-30});
+    ResonatorBank voice(model, {.silence_pa = 1e-30});
     synth::ContactForces contacts(model, {.surface = {.roughness_m = 0.0, .modulus_pa = 70e9}});
     voice.attach(&contacts);
     const synth::ContactSurface floor{.roughness_m = floor_m, .friction = 0.5, .modulus_pa = 70e9};

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/synth/voice.hpp"
+#include "runtime/synth/resonator_bank.hpp"
 #include "tests/hard/closed_form.hpp"
 #include "tests/hard/figure.hpp"
 #include "tests/unit/runtime/synth/reference.hpp"
@@ -19,7 +19,7 @@ namespace {
 
 using synth::Isa;
 using synth::Model;
-using synth::Voice;
+using synth::ResonatorBank;
 constexpr double kRate = 48000.0;
 constexpr double kPi = std::numbers::pi;
 
@@ -28,7 +28,7 @@ TEST(time, band_ends) {
     for (const double freq : {20.0, 0.499 * rate}) {
       for (const double decay : {0.0, 0.02, 0.5}) {
         const Modes modes{{to_lambda(freq), decay}};
-        Voice voice(Model::make(make_bank(modes), {.rate_hz = rate}), {.silence_pa = 1e-30});
+        ResonatorBank voice(Model::make(make_bank(modes), {.rate_hz = rate}), {.silence_pa = 1e-30});
         strike(voice);
         const std::string part =
             std::to_string(static_cast<int>(rate)) + " Hz, " + (freq > 20.0 ? "0.499 fs" : "20 Hz") + ", decay " + std::to_string(decay);
@@ -46,7 +46,7 @@ TEST(time, critical_damping) {
   for (const auto& row : testing::read_impulse_reference()) {
     const double rate = 100000.0, sample = row.time_s * rate;
     if (std::abs(sample - std::round(sample)) > 1e-9 || sample > 1e6) continue;
-    Voice voice(Model::make(make_bank({{row.lambda, row.decay_per_s()}}), {.rate_hz = rate}), {.silence_pa = 1e-30});
+    ResonatorBank voice(Model::make(make_bank({{row.lambda, row.decay_per_s()}}), {.rate_hz = rate}), {.silence_pa = 1e-30});
     strike(voice);
     const std::vector<float> heard = play(voice, static_cast<std::size_t>(std::llround(sample)) + 1);
     const double scale = std::max({std::exp(-row.decay_per_s() * row.time_s), std::abs(row.q_dot), 1e-30});
@@ -60,7 +60,7 @@ TEST(time, critical_damping) {
     for (const double ratio :
          {1.0, 1.0 - 1e-12, 1.0 + 1e-12, 1.0 - 1e-8, 1.0 + 1e-8, 1.0 - 1e-4, 1.0 + 1e-4, change * (1.0 - 1e-9), change * (1.0 + 1e-9)}) {
       const Modes modes{{omega * omega, omega * ratio}};
-      Voice voice(Model::make(make_bank(modes), {.rate_hz = kRate}), {.silence_pa = 1e-30});
+      ResonatorBank voice(Model::make(make_bank(modes), {.rate_hz = kRate}), {.silence_pa = 1e-30});
       strike(voice);
       hold("critical_damping", calc_error(play(voice, 4800), 0, kRate, modes), 2e-6,
            std::to_string(freq) + " Hz, ratio " + to_json(ratio - 1.0) + " off");
@@ -73,7 +73,7 @@ TEST(time, over_damping) {
   for (const double ratio : {2.0, 30.0, 1e3, 1e6}) {
     for (const double freq : {20.0, 1000.0, 20000.0}) {
       const double omega = 2.0 * kPi * freq, decay = ratio * omega, length_s = 300e-6;
-      Voice voice(Model::make(make_bank({{omega * omega, decay}}), {.rate_hz = kRate}), {.silence_pa = 1e-300});
+      ResonatorBank voice(Model::make(make_bank({{omega * omega, decay}}), {.rate_hz = kRate}), {.silence_pa = 1e-300});
       ASSERT_TRUE(voice.strike({.time_s = 0.01 + 0.5 * length_s, .impulse_n_s = {0.0, 0.0, 1.0}, .duration_s = length_s}));
       const std::vector<float> heard = play(voice, 4800);
       Real largest = 0, peak = 0;
@@ -92,7 +92,7 @@ TEST(time, over_damping) {
   const double change = 2.0 * 256.0 * kRate;  // decay: 4 of the fast root in a 256th of a sample
   for (const double side : {0.999, 1.001}) {
     const auto model = Model::make(make_bank({{to_lambda(1000.0), side * change}}), {.rate_hz = kRate});
-    Voice voice(model);
+    ResonatorBank voice(model);
     synth::ContactForces contacts(model, {});
     voice.attach(&contacts);
     for (int k = 0; k < 100; ++k) {
@@ -166,13 +166,13 @@ TEST(time, table_turns) {
   const std::vector<Real> late = calc_sound(all, 10 * minute, 4800), loud = calc_sound(dense, 48000, 1024);
   for (const Isa isa : {Isa::kPlain, Isa::kSse2, Isa::kAvx2, Isa::kAvx512}) {
     if (synth::get_kernels(isa).isa != isa) continue;
-    const synth::VoiceOptions options{.silence_pa = 1e-30, .isa = isa};
+    const synth::ResonatorOptions options{.silence_pa = 1e-30, .isa = isa};
     const std::string name = synth::get_name(isa);
     for (const double freq : freqs) {
       for (const double decay : {0.0, 1.0, 1e4, 0.9 * 2.0 * kPi * freq}) {
         const Modes modes{{to_lambda(freq), decay}};
         if (decay > 0.95 * 2.0 * kPi * freq) continue;  // no table: damped_modes.hpp
-        Voice voice(Model::make(make_bank(modes), {.rate_hz = kRate}), options);
+        ResonatorBank voice(Model::make(make_bank(modes), {.rate_hz = kRate}), options);
         strike(voice);
         const std::vector<float> heard = play(voice, 1024);
         const std::vector<Real> wanted = calc_sound(modes, 0, heard.size() + 1);
@@ -181,11 +181,11 @@ TEST(time, table_turns) {
         EXPECT_LT(compare_rms(heard, wanted), 2e-6) << part;
       }
     }
-    Voice voice(Model::make(make_bank(all), {.rate_hz = kRate}), options);
+    ResonatorBank voice(Model::make(make_bank(all), {.rate_hz = kRate}), options);
     strike(voice);
     for (int m = 0; m < 10; ++m) play(voice, static_cast<std::size_t>(minute));
     hold("table_turns", compare_rms(play(voice, late.size()), late), 1e-6, name + ", together, after ten minutes");
-    Voice body(Model::make(make_bank(dense), {.rate_hz = kRate}), options);
+    ResonatorBank body(Model::make(make_bank(dense), {.rate_hz = kRate}), options);
     strike(body);
     play(body, 48000);
     hold("table_turns", compare_rms(play(body, loud.size()), loud), 1e-6, name + ", 4096 modes");
@@ -197,7 +197,7 @@ TEST(time, ten_hours) {
   const std::vector<double> freqs{20.0, 55.0, 440.0, 1000.0, 1500.01, 6000.0, 12345.6, 20000.0, 0.499 * kRate};
   Modes modes;
   for (const double freq : freqs) modes.emplace_back(to_lambda(freq), 0.0);
-  Voice voice(Model::make(make_bank(modes), {.rate_hz = kRate}), {.silence_pa = 1e-30});
+  ResonatorBank voice(Model::make(make_bank(modes), {.rate_hz = kRate}), {.silence_pa = 1e-30});
   strike(voice);
   const std::int64_t samples = 10 * 3600 * static_cast<std::int64_t>(kRate);
   std::vector<float> block(1 << 16);
@@ -217,7 +217,7 @@ TEST(time, ten_hours) {
 TEST(time, denormals) {
   // Down to the smallest float and beyond: right as long as a float can say it, and then nothing.
   const Modes modes{{to_lambda(440.0), 60.0}, {to_lambda(3000.0), 61.0}};
-  Voice voice(Model::make(make_bank(modes), {.rate_hz = kRate}), {.silence_pa = 1e-307});
+  ResonatorBank voice(Model::make(make_bank(modes), {.rate_hz = kRate}), {.silence_pa = 1e-307});
   strike(voice);
   std::int64_t denormal = 0, last = 0;
   for (std::int64_t start = 0; start < 20 * 48000; start += 4800) {
@@ -231,7 +231,7 @@ TEST(time, denormals) {
   }
   hold("denormals", static_cast<double>(denormal), 0.0, "subnormal samples");
   hold("denormals", static_cast<double>(last) / kRate, 1.0 + std::log(1e38) / 60.0, "seconds until the last sample that is not 0");
-  hold("denormals", voice.get_live_mode_count(), 0.0, "modes that are still worked out");
+  hold("denormals", voice.get_active_mode_count(), 0.0, "modes that are still worked out");
   const std::int64_t spent = voice.get_counters().mode_samples;
   play(voice, 48000);
   hold("denormals", static_cast<double>(voice.get_counters().mode_samples - spent), 0.0, "mode-samples of the silence");
@@ -240,13 +240,13 @@ TEST(time, denormals) {
 TEST(time, impulse_sizes) {
   const Modes modes{{to_lambda(440.0), 6.0}, {to_lambda(3000.0), 31.0}, {to_lambda(900.0), 2.0 * kPi * 900.0}, {to_lambda(200.0), 1e5}};
   const auto model = Model::make(make_bank(modes), {.rate_hz = kRate});
-  Voice unit(model, {.silence_pa = 1e-30});
+  ResonatorBank unit(model, {.silence_pa = 1e-30});
   strike(unit);
   const std::vector<float> wanted = play(unit, 9600);
   float peak = 0.0F;
   for (const float p : wanted) peak = std::max(peak, std::abs(p));
   for (const double size : {1e-30, 1e-12, 1e12, 1e30}) {
-    Voice voice(model, {.silence_pa = 1e-45});
+    ResonatorBank voice(model, {.silence_pa = 1e-45});
     strike(voice, size);
     const std::vector<float> heard = play(voice, wanted.size());
     double largest = 0.0;
@@ -256,7 +256,7 @@ TEST(time, impulse_sizes) {
     hold("impulse_sizes", static_cast<double>(voice.get_counters().resets), 0.0, "resets by " + to_json(size) + " N s");
   }
   // Too much for a float: counted and silent; and the next strike sounds as if nothing had been.
-  Voice burst(model, {.silence_pa = 1e-30});
+  ResonatorBank burst(model, {.silence_pa = 1e-30});
   strike(burst, 1e38);
   strike(burst, 1e300);
   for (const float p : play(burst, 128)) EXPECT_TRUE(std::isfinite(p));

@@ -148,17 +148,17 @@ def self_test():
         {"name": "comm.np2", "part": "basic", "sources": ["tests/unit/precompute/comm/exchange_test.cpp"]},
         {"name": "comm.np3", "part": "ranks", "sources": ["tests/unit/precompute/comm/exchange_test.cpp"]},
         {"name": "host.program", "part": "basic", "sources": ["tests/system/host/program_test.py"]},
-        {"name": "structure.words", "part": "basic", "sources": ["tests/structure/words.py"]},
+        {"name": "structure.size", "part": "basic", "sources": ["tests/structure/size.py"]},
     ]
 
     def names(*changed):
         return set(choose(changed, tests, source))
 
-    assert names("runtime/bank/pack.cpp") == {"bank", "host.program", "structure.words"}
-    assert names("precompute/comm/communicator.cpp") == {"comm.np2", "structure.words"}
-    assert names("tests/unit/precompute/comm/exchange_test.cpp") == {"comm.np2", "comm.np3", "structure.words"}
-    assert names("docs/tutorial.md") == {"structure.words"}
-    assert names("deploy/cmake/Carillon.cmake") == {"bank", "comm.np2", "host.program", "structure.words"}
+    assert names("runtime/bank/pack.cpp") == {"bank", "host.program", "structure.size"}
+    assert names("precompute/comm/communicator.cpp") == {"comm.np2", "structure.size"}
+    assert names("tests/unit/precompute/comm/exchange_test.cpp") == {"comm.np2", "comm.np3", "structure.size"}
+    assert names("docs/tutorial.md") == {"structure.size"}
+    assert names("deploy/cmake/Carillon.cmake") == {"bank", "comm.np2", "host.program", "structure.size"}
     assert find_reached({"runtime/base"}) >= {"runtime/bank", "precompute/run", "jobs/cli"}
     assert "runtime/base" not in find_reached({"runtime/scene"})
 

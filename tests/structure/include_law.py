@@ -10,7 +10,6 @@ import sys
 
 # Third-party headers, by prefix of the include path, and the name the table below uses for them.
 LIBRARIES = {
-    "json": ["json/"],
     "rapidjson": ["rapidjson/"],
     "fmt": ["fmt/"],
     "cli": ["CLI/"],
@@ -41,7 +40,7 @@ LAW = {
     "partition": (["runtime/base"], ["fmt", "metis"]),
     "runtime/base": ([], ["rapidjson", "fmt", "openssl"]),
     "runtime/material": (["runtime/base"], ["fmt"]),
-    "runtime/bank": (["runtime/base", "runtime/material"], ["json", "fmt", "hdf5", "eigen", "deflate", "stb"]),
+    "runtime/bank": (["runtime/base", "runtime/material"], ["fmt", "hdf5", "eigen", "deflate", "stb"]),
     "runtime/events": (["runtime/base"], ["fmt"]),
     "runtime/acoustics": (["runtime/base", "runtime/bank"], ["fmt", "mysofa"]),
     "runtime/exchange": (["runtime/base", "runtime/material", "runtime/bank", "runtime/acoustics"], ["fmt", "cli", "eigen"]),
@@ -77,7 +76,7 @@ LAW = {
         ],
         ["fmt", "pybind11"],
     ),
-    "precompute/job": (["runtime/base", "runtime/material"], ["fmt", "json"]),
+    "precompute/job": (["runtime/base", "runtime/material"], ["fmt"]),
     "precompute/comm": (["runtime/base"], ["fmt", "mpi"]),
     "precompute/mesh": (["runtime/base", "partition", "precompute/comm"], ["fmt", "xml", "zlib", "mpi", "eigen", "hdf5"]),
     "precompute/mesher": (["runtime/base", "runtime/exchange", "precompute/mesh"], ["fmt", "cli", "eigen", "cgal"]),
@@ -128,7 +127,7 @@ LAW = {
             "precompute/analytic",
             "precompute/air",
         ],
-        ["fmt", "json", "mpi", "petsc", "hdf5", "cli"],
+        ["fmt", "mpi", "petsc", "hdf5", "cli"],
     ),
     "precompute/simulation": (
         [
@@ -144,15 +143,12 @@ LAW = {
         ],
         ["fmt", "cli", "mpi", "hdf5", "eigen"],
     ),
-    "jobs/store": (["runtime/base", "runtime/material", "runtime/bank", "precompute/job"], ["fmt", "json", "sqlite"]),
-    "jobs/front": (
-        ["runtime/base", "runtime/material", "runtime/bank", "runtime/scene", "precompute/job", "jobs/store"],
-        ["fmt", "json", "zlib"],
-    ),
+    "jobs/store": (["runtime/base", "runtime/material", "runtime/bank", "precompute/job"], ["fmt", "sqlite"]),
+    "jobs/front": (["runtime/base", "runtime/material", "runtime/bank", "runtime/scene", "precompute/job", "jobs/store"], ["fmt", "zlib"]),
     "jobs/queue": (["runtime/base", "runtime/bank", "precompute/job", "jobs/store", "jobs/front"], ["fmt"]),
     "jobs/cli": (
         ["runtime/base", "runtime/material", "runtime/bank", "precompute/job", "jobs/store", "jobs/front", "jobs/queue"],
-        ["fmt", "cli", "json"],
+        ["fmt", "cli"],
     ),
 }
 # Private parts of folders, in the order in which they may be included; "." is the folder itself.
@@ -181,7 +177,7 @@ PUBLIC = {
     "runtime/acoustics": ["radiation/", "head/", "recording/"],
     "runtime/exchange": ["gltf/"],
     "runtime/physics": ["impact/impact.hpp", "impact/predict.hpp"],
-    "runtime/scene": ["effects/effect_selector.hpp", "effects/costs.hpp", "effects/table.hpp"],
+    "runtime/scene": ["effects/effect_selector.hpp", "effects/table.hpp"],
     "runtime/render": ["sound/sound_store.hpp", "sound/spectrogram.hpp"],
     "precompute/job": ["cost/"],
     "precompute/mesh": ["shapes/shapes.hpp", "distributed/", "parallel/read_parallel.hpp"],

@@ -1,4 +1,4 @@
-// Structured boxes of tetrahedra for tests: nx x ny x nz cells, each cut into the six tetrahedra of Kuhn that share its main diagonal.
+// Structured boxes of tetrahedra: nx x ny x nz cells, each cut into the six tetrahedra of Kuhn that share its main diagonal.
 #pragma once
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 
 namespace carillon::tests {
 
-/// A box [0, size] of order 1 or 2 (mid-side nodes at the middle of the edges), positively oriented.
+/// Box [0, size] of order 1 or 2 (mid-side nodes at the edge midpoints), positively oriented.
 inline mesh::TetMesh make_box(std::array<int, 3> cells, std::array<double, 3> size_m, int order = 1, std::array<double, 3> origin_m = {}) {
   mesh::TetMesh box;
   const auto id = [&](int i, int j, int k) { return static_cast<std::int32_t>((k * (cells[1] + 1) + j) * (cells[0] + 1) + i); };
@@ -27,7 +27,7 @@ inline mesh::TetMesh make_box(std::array<int, 3> cells, std::array<double, 3> si
     for (int j = 0; j < cells[1]; ++j)
       for (int i = 0; i < cells[0]; ++i) {
         std::array<int, 3> axes{0, 1, 2};
-        do {  // one tetrahedron per path along the axes from one end of the diagonal to the other
+        do {  // one tetrahedron per axis path between the ends of the diagonal
           std::array<int, 3> at{i, j, k};
           std::array<std::int32_t, 4> tet{id(i, j, k)};
           for (int step = 0; step < 3; ++step) {

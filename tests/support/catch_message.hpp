@@ -1,11 +1,11 @@
-// What an error says.
+// Message of an exception.
 #pragma once
 
 #include <string>
 
 namespace carillon::tests {
 
-/// The message of the Error that `call` throws; another kind of exception passes.
+/// Message of the Error thrown by `call`; other exceptions pass.
 template <typename Error, typename Call>
 std::string catch_message(Call&& call) {
   try {

@@ -1,4 +1,4 @@
-// The cases of some source files of a GoogleTest program: one program has the tests of many modules.
+// Selection of the cases of some source files of a GoogleTest program with the tests of many modules.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -11,7 +11,7 @@
 
 namespace carillon::tests {
 
-/// The words behind `option`, "--sources=" for one, separated by commas.
+/// Comma-separated words after `option` ("--sources=").
 inline std::set<std::string> read_words(int argc, char** argv, std::string_view option) {
   std::set<std::string> words;
   for (int i = 1; i < argc; ++i) {
@@ -29,7 +29,7 @@ inline std::set<std::string> read_words(int argc, char** argv, std::string_view 
 
 /// Narrows --gtest_filter by `--sources=tests/unit/runtime/bank/pack_test.cpp,...`, `--only=Suite.Case,...` and
 /// `--without=Suite.Case,...`. Call it after InitGoogleTest.
-/// @return false, and a line on standard error, where a source has no case or a case is not there.
+/// @return false, with a line on standard error, if a source has no case or a case does not exist.
 inline bool choose_sources(int argc, char** argv) {
   const std::set<std::string> sources = read_words(argc, argv, "--sources="), only = read_words(argc, argv, "--only="),
                               without = read_words(argc, argv, "--without=");
@@ -41,7 +41,7 @@ inline bool choose_sources(int argc, char** argv) {
   for (int i = 0; i < tests.total_test_suite_count(); ++i) {
     const testing::TestSuite& suite = *tests.GetTestSuite(i);
     for (int j = 0; j < suite.total_test_count(); ++j) {
-      const std::string_view file = suite.GetTestInfo(j)->file();  // may begin with the path to the clone
+      const std::string_view file = suite.GetTestInfo(j)->file();  // may begin with the path of the clone
       const std::size_t root = file.rfind("tests/");
       const std::string source(root == std::string_view::npos ? file : file.substr(root));
       const std::string name = std::string(suite.name()) + "." + suite.GetTestInfo(j)->name();

@@ -21,10 +21,10 @@ import subprocess
 import sys
 
 PLATE = {"shape": "rectangle", "length_m": 0.4, "width_m": 0.3, "thickness_m": 0.004}
-# File: what makes it. A mesh: the words of carillon-mesh. A bank: the job.
+# File: recipe. A mesh: arguments of carillon-mesh. A bank: the job.
 RECIPES = {
     "bar.msh": "--shape bar --length 0.2 --width 0.03 --thickness 0.01 --nodes 900".split(),
-    # Known modes.
+    # Analytic modes.
     "glass_plate.hdf": {"body": {"plate": PLATE, "grid": 24}, "material": "glass"},
     "small_plate.hdf": {"body": {"plate": PLATE, "grid": 8}, "material": "glass", "max_modes": 12},
     "aluminium_bar.hdf": {
@@ -48,7 +48,7 @@ RECIPES = {
         "band_hz": [20, 8000],
         "max_modes": 40,
     },
-    # Solved.
+    # Solved by FEM.
     "glass_bowl.hdf": {
         "body": {"shape": "bowl", "outer_radius_m": 0.06, "wall_m": 0.004, "nodes": 3000},
         "material": "glass",
@@ -92,7 +92,7 @@ def get(name):
     stamp = folder / f"{name}.made"
     made = json.dumps({"recipe": recipe, "programs": describe_programs(bin_dir)})
     with open(folder / f"{name}.lock", "w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)  # tests run side by side
+        fcntl.flock(lock, fcntl.LOCK_EX)  # tests run in parallel
         if stamp.exists() and stamp.read_text() == made and (folder / name).exists():
             return folder / name
         stamp.unlink(missing_ok=True)

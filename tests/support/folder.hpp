@@ -1,4 +1,4 @@
-// A folder for the life of a test.
+// Temporary folder of a test.
 #pragma once
 
 #include <cstdlib>
@@ -9,10 +9,10 @@
 
 namespace carillon::tests {
 
-/// Is there, empty, when it is made, and removed with all that is in it at the end.
+/// Created empty; removed with its contents by the destructor.
 class Folder {
  public:
-  /// Below `parent`, by default where temporary files go.
+  /// Below `parent`, by default the temporary folder.
   explicit Folder(const std::filesystem::path& parent = std::filesystem::temp_directory_path()) {
     std::string name = (parent / "carillon-test-XXXXXX").string();
     if (::mkdtemp(name.data()) == nullptr) throw std::filesystem::filesystem_error("no temporary folder", parent, {});

@@ -6,7 +6,7 @@
 namespace carillon::tests {
 namespace {
 
-/// False: it is to fail.
+/// False: the allocation must fail.
 bool count_allocation(std::size_t size) noexcept {
   ++g_allocations;
   g_bytes += static_cast<long>(size);
@@ -16,7 +16,7 @@ bool count_allocation(std::size_t size) noexcept {
 }  // namespace
 }  // namespace carillon::tests
 
-// Those for arrays, and the aligned one that does not throw, call these (C++20, [new.delete]).
+// The array forms and the aligned non-throwing form call these (C++20, [new.delete]).
 [[gnu::noinline]] void* operator new(std::size_t size) {
   const bool succeeds = carillon::tests::count_allocation(size);
   if (void* memory = succeeds ? std::malloc(size) : nullptr) return memory;
@@ -24,7 +24,7 @@ bool count_allocation(std::size_t size) noexcept {
 }
 [[gnu::noinline]] void* operator new(std::size_t size, std::align_val_t align) {
   const bool succeeds = carillon::tests::count_allocation(size);
-  const std::size_t a = align;
+  const auto a = static_cast<std::size_t>(align);
   if (void* memory = succeeds ? std::aligned_alloc(a, (size + a - 1) / a * a) : nullptr) return memory;
   throw std::bad_alloc();
 }

@@ -1,4 +1,4 @@
-// operator new replaced by one that counts, and fails where a test asks for it: in test_heap alone, which links heap_counter.cpp.
+// operator new that counts, and fails on request: only in test_heap, which links heap_counter.cpp.
 #pragma once
 
 #include <atomic>
@@ -6,9 +6,9 @@
 
 namespace carillon::tests {
 
-/// Since the start of the program; what is given back does not count.
+/// Since program start; deallocations are not subtracted.
 inline std::atomic<long> g_allocations{0}, g_bytes{0};
-/// Allocations that still succeed; the one after them fails, once. Below 0: all succeed.
+/// Successful allocations before one fails, once; negative: none fails.
 inline std::atomic<long> g_until_failure{-1};
 
 }  // namespace carillon::tests

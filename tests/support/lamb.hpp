@@ -7,7 +7,7 @@
 
 namespace carillon::tests {
 
-/// The frequency equation of the spheroidal modes of degree n at k.
+/// Frequency equation of the spheroidal modes of degree n at k.
 inline double calc_spheroidal(unsigned n, double k, double nu) {
   const auto j = [](unsigned degree, double x) { return std::sph_bessel(degree, x); };
   const double h = k * std::sqrt((1 - 2 * nu) / (2 - 2 * nu));
@@ -26,12 +26,12 @@ double find_root(double low, double high, Function&& f) {
   return low;
 }
 
-/// The lowest spheroidal mode of degree 2.
+/// Lowest spheroidal mode of degree 2.
 inline double find_s2(double nu) {
   return find_root(2.2, 3.2, [&](double k) { return calc_spheroidal(2, k, nu); });
 }
 
-/// The lowest torsional mode of degree 2, whatever nu is.
+/// Lowest torsional mode of degree 2, independent of nu.
 inline constexpr double kT2 = 2.5011326204094;
 
 }  // namespace carillon::tests

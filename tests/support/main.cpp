@@ -1,4 +1,4 @@
-// The main of the GoogleTest programs without MPI.
+// main() of the GoogleTest programs without MPI.
 #include <gtest/gtest.h>
 
 #include "tests/support/choose_sources.hpp"

@@ -1,4 +1,4 @@
-// The main of the test programs that run under mpirun: starts and ends MPI, PETSc and SLEPc once; a failure on any rank fails the run.
+// main() of the test programs run by mpirun: initialises and finalises MPI, PETSc and SLEPc once; a failure on any rank fails the run.
 #include <gtest/gtest.h>
 #include <mpi.h>
 

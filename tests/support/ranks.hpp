@@ -1,4 +1,4 @@
-// Who this test process is among those of mpirun.
+// Rank of this test process and number of ranks.
 #pragma once
 
 #include <mpi.h>

@@ -1,4 +1,4 @@
-// The lowest modes of K and M as one rank holds them, by Eigen alone: subspace iteration with (K + shift M)^-1 M and Rayleigh-Ritz.
+// Lowest modes of K and M on one rank by Eigen alone: subspace iteration with (K + shift M)^-1 M and Rayleigh-Ritz.
 #pragma once
 
 #include <petscmat.h>
@@ -13,7 +13,7 @@ namespace carillon::tests {
 
 using SparseMatrix = Eigen::SparseMatrix<double>;
 
-/// The rows and columns of one rank's matrix for which `number` is not negative.
+/// Rows and columns of one rank's matrix with non-negative `number`.
 inline SparseMatrix reduce(const Mat matrix, const std::vector<int>& number, int size) {
   std::vector<Eigen::Triplet<double>> entries;
   for (PetscInt row = 0; row < static_cast<PetscInt>(number.size()); ++row) {
@@ -43,7 +43,7 @@ struct Eigenpairs {
   Eigen::MatrixXd shapes;
 };
 
-/// The `wanted` lowest eigenpairs of K x = lambda M x, ascending; `shift` > 0 where K is singular.
+/// The `wanted` lowest eigenpairs of K x = lambda M x, ascending; `shift` > 0 for a singular K.
 inline Eigenpairs iterate_subspace(const SparseMatrix& k, const SparseMatrix& m, int wanted, double shift = 0, int passes = 25) {
   const SparseMatrix shifted = k + shift * m;
   const Eigen::SimplicialLLT<SparseMatrix> factor(shifted);

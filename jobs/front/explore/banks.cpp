@@ -40,11 +40,11 @@ const material::Row* find_nearest(const material::MaterialTable& table, const ba
 /// ("shelf_wood"); else the row of the table whose stiffness and density are nearest.
 void find_material(const bank::Bank& bank, const fs::path& file, BankFacts& facts) {
   const material::MaterialTable& table = material::MaterialTable::get();
-  const Json::Value job = report::parse_json(bank.provenance);
-  const Json::Value& given = job.isObject() ? job["material"] : Json::Value::nullSingleton();
+  const base::Json job = report::parse_json(bank.provenance);
+  const base::Json& given = job["material"];
   const material::Row* row = nullptr;
-  if (given.isString()) row = table.find(given.asString());
-  if (given.isObject() && given["name"].isString()) row = table.find(given["name"].asString());
+  if (given.is_string()) row = table.find(given.as_string());
+  if (given.is_object() && given["name"].is_string()) row = table.find(given["name"].as_string());
   std::string word;
   for (const char c : file.stem().string() + " ") {
     if (std::isalpha(static_cast<unsigned char>(c)) != 0) {

@@ -1,8 +1,6 @@
 // The banks of a page: small enough to be fetched, with the data of each that the page needs before it is loaded.
 #pragma once
 
-#include <json/json.h>
-
 #include <array>
 #include <cstddef>
 #include <filesystem>

@@ -13,12 +13,12 @@
 #include "jobs/front/explore/banks.hpp"
 #include "jobs/front/explore/files.hpp"
 #include "jobs/front/explore/scenes.hpp"
-#include "jobs/store/process/programs.hpp"
 #include "jobs/front/report/record.hpp"
+#include "jobs/store/process/programs.hpp"
 #include "runtime/base/command.hpp"
 #include "runtime/base/file.hpp"
-#include "runtime/scene/job_keys.hpp"
 #include "runtime/base/version.hpp"
+#include "runtime/scene/job_keys.hpp"
 
 namespace carillon::explore {
 namespace {
@@ -65,63 +65,64 @@ std::string find_title(const PageOrder& order) {
 }
 
 /// Takes effects by name out of a key "effects", in each of its forms: a list, {"on": [...], "off": [...]}, {"head": true}.
-void remove_effects(Json::Value& owner, const std::vector<std::string>& names) {
-  if (!owner.isObject() || !owner.isMember("effects")) return;
-  Json::Value& effects = owner["effects"];
-  const auto take_from = [&](Json::Value& list) {
-    if (!list.isArray()) return;
-    Json::Value kept(Json::arrayValue);
-    for (const Json::Value& one : list)
-      if (!one.isString() || std::find(names.begin(), names.end(), one.asString()) == names.end()) kept.append(one);
+void remove_effects(base::Json& owner, const std::vector<std::string>& names) {
+  if (!owner.is_object() || !owner.has("effects")) return;
+  base::Json& effects = owner["effects"];
+  const auto take_from = [&](base::Json& list) {
+    if (!list.is_array()) return;
+    base::Json kept = base::Json::array();
+    for (const base::Json& one : list)
+      if (!one.is_string() || std::find(names.begin(), names.end(), one.as_string()) == names.end()) kept.append(one);
     list = kept;
   };
   take_from(effects);
-  if (!effects.isObject()) return;
+  if (!effects.is_object()) return;
   for (const char* key : {"on", "off"})
-    if (effects.isMember(key)) take_from(effects[key]);
-  for (const std::string& name : names) effects.removeMember(name);
+    if (effects.has(key)) take_from(effects[key]);
+  for (const std::string& name : names) effects.erase(name);
 }
 
 /// The same of a scene and of each of its bodies.
-void remove_effects_of_all(Json::Value& scene, const std::vector<std::string>& names) {
+void remove_effects_of_all(base::Json& scene, const std::vector<std::string>& names) {
   remove_effects(scene, names);
-  for (Json::Value& body : scene["bodies"]) remove_effects(body, names);
+  for (base::Json& body : scene["bodies"]) remove_effects(body, names);
 }
 
 /// Frees the ears of a listener with a head, which the sound engine has not. Whether there was one.
-bool take_head(Json::Value& scene) {
-  if (!scene.isMember("listener")) return false;
-  Json::Value& listener = scene["listener"];
-  const bool has_head = listener["ears"] == "hrtf";
-  listener.removeMember("ears");
-  listener.removeMember("sofa");
+bool take_head(base::Json& scene) {
+  if (!scene.has("listener")) return false;
+  base::Json& listener = scene["listener"];
+  const base::Json& ears = std::as_const(listener)["ears"];
+  const bool has_head = ears.is_string() && ears.as_string() == "hrtf";
+  listener.erase("ears");
+  listener.erase("sofa");
   if (has_head) remove_effects_of_all(scene, {"head"});
   return has_head;
 }
 
 /// Whether a body is described in place of its bank. What is no scene has none: carillon-render says so.
-bool has_described_body(const Json::Value& scene) {
-  const Json::Value bodies = scene.isObject() ? scene["bodies"] : Json::Value();
-  return bodies.isArray() &&
-         std::any_of(bodies.begin(), bodies.end(), [](const Json::Value& body) { return body.isObject() && !body.isMember("bank"); });
+bool has_described_body(const base::Json& scene) {
+  const base::Json bodies = scene.is_object() ? scene["bodies"] : base::Json();
+  return bodies.is_array() &&
+         std::any_of(bodies.begin(), bodies.end(), [](const base::Json& body) { return body.is_object() && !body.has("bank"); });
 }
 
 /// Pages play modes, and a recorded surface has none.
-void refuse_recordings(const Json::Value& scene, const fs::path& file) {
-  const Json::Value bodies = scene.isObject() ? scene["bodies"] : Json::Value();
-  if (!bodies.isArray()) return;
-  for (const Json::Value& body : bodies)
-    if (body.isObject() && body.isMember("recording"))
+void refuse_recordings(const base::Json& scene, const fs::path& file) {
+  const base::Json bodies = scene.is_object() ? scene["bodies"] : base::Json();
+  if (!bodies.is_array()) return;
+  for (const base::Json& body : bodies)
+    if (body.is_object() && body.has("recording"))
       throw InputError(fmt::format(
           "{}: a body is a recording, which pages cannot play; take it out, or play the scene with carillon-render", file.string()));
 }
 
 /// Gives described bodies the banks that carillon-render has played, as its trajectory names them.
-void name_banks(Json::Value& scene, const Json::Value& trajectory) {
-  for (Json::ArrayIndex i = 0; i < scene["bodies"].size(); ++i) {
-    Json::Value& body = scene["bodies"][i];
-    if (body.isMember("bank")) continue;
-    for (const char* key : scene::kJobKeys) body.removeMember(key);
+void name_banks(base::Json& scene, const base::Json& trajectory) {
+  for (std::size_t i = 0; i < scene["bodies"].size(); ++i) {
+    base::Json& body = scene["bodies"][i];
+    if (body.has("bank")) continue;
+    for (const char* key : scene::kJobKeys) body.erase(key);
     body["bank"] = trajectory["bodies"][i]["bank"];
   }
 }
@@ -164,7 +165,7 @@ class Work {
     }
     const fs::path& file = order_.subjects.front();
     scene_ = record(file);
-    for (const Json::Value& body : scene_["bodies"]) add_bank(fs::absolute(file).parent_path() / body["bank"].asString());
+    for (const base::Json& body : scene_["bodies"]) add_bank(fs::absolute(file).parent_path() / body["bank"].as_string());
   }
 
   void add_bank(const fs::path& file) {
@@ -174,8 +175,8 @@ class Work {
   }
 
   /// Simulates a scene file, which is checked by that, and keeps what happened. The scene that is returned names the bank of each body.
-  Json::Value record(const fs::path& file) {
-    Json::Value scene = report::parse_json(base::read_file(file, "scene", kMaxSceneBytes));
+  base::Json record(const fs::path& file) {
+    base::Json scene = report::parse_json(base::read_file(file, "scene", kMaxSceneBytes));
     refuse_recordings(scene, file);
     const fs::path trajectory = path(".trajectory.json");
     std::vector<std::string> words{"--record", path(kContactsFile).string()};
@@ -186,12 +187,12 @@ class Work {
       name_banks(scene, report::parse_json(base::read_file(trajectory, "trajectory of carillon-render", kMaxTrajectoryBytes)));
       fs::remove(trajectory);
     }
-    done_.duration_s = report_["duration_s"].asDouble();
-    for (const Json::Value& warning : report_["warnings"]) done_.warnings.push_back(warning.asString());
+    done_.duration_s = report_["duration_s"].as_double();
+    for (const base::Json& warning : report_["warnings"]) done_.warnings.push_back(warning.as_string());
     for (const std::string& note : programs_.get_notes())  // of banks made for this page
       if (std::find(done_.warnings.begin(), done_.warnings.end(), note) == done_.warnings.end()) done_.warnings.push_back(note);
     if (take_head(scene)) done_.warnings.emplace_back("listener: pages have no heads; on this one the ears are free");
-    done_.has_recording = report_["peak_pa"].isNumeric() && report_["peak_pa"].asDouble() > 0.0;
+    done_.has_recording = report_["peak_pa"].is_number() && report_["peak_pa"].as_double() > 0.0;
     std::error_code error;
     if (done_.has_recording)
       compress_file(path(kContactsFile));
@@ -201,11 +202,11 @@ class Work {
   }
 
   /// The report of carillon-render on a scene file.
-  Json::Value render(const fs::path& scene, std::vector<std::string> words) {
+  base::Json render(const fs::path& scene, std::vector<std::string> words) {
     const fs::path sound = path(".sound.wav"), report = path(".report.json");
     words.insert(words.begin(), {fs::absolute(scene).string(), "-q", "-o", sound.string(), "--report", report.string()});
     (void)programs_.run("carillon-render", words, false);
-    Json::Value root = report::parse_json(base::read_file(report, "report of carillon-render", kMaxSceneBytes));
+    base::Json root = report::parse_json(base::read_file(report, "report of carillon-render", kMaxSceneBytes));
     std::error_code error;
     fs::remove(sound, error);
     fs::remove(report, error);
@@ -214,31 +215,31 @@ class Work {
 
   /// Full scale per pascal.
   double find_gain() {
-    if (done_.has_recording) return report_["gain_per_pa"].asDouble();
+    if (done_.has_recording) return report_["gain_per_pa"].as_double();
     const fs::path probe = path(".probe.json");
     base::write_file(probe, to_text(make_probe(scene_, files_, facts_)));
     report_ = render(probe, {});
     std::error_code error;
     fs::remove(probe, error);
-    return kProbeGain * report_["gain_per_pa"].asDouble();
+    return kProbeGain * report_["gain_per_pa"].as_double();
   }
 
   void write(double gain) {
-    Json::Value about(Json::objectValue);
+    base::Json about = base::Json::object();
     about["carillon_explore"] = kVersion;
     about["made_by"] = base::describe("carillon");
     about["title"] = find_title(order_);
     about["scene"] = kSceneFile;
-    about["contacts"] = done_.has_recording ? Json::Value(kPackedContactsFile) : Json::Value();
+    about["contacts"] = done_.has_recording ? base::Json(kPackedContactsFile) : base::Json();
     about["duration_s"] = done_.duration_s;
     about["gain_per_pa"] = gain;
-    for (Json::ArrayIndex i = 0; i < scene_["bodies"].size(); ++i) {
+    for (std::size_t i = 0; i < scene_["bodies"].size(); ++i) {
       const BankFacts& facts = *facts_[i];
       scene_["bodies"][i]["bank"] = fmt::format("{}/{}", kBankFolder, facts.kept.name);
-      Json::Value body(Json::objectValue);
-      body["bank_bytes"] = Json::UInt64(facts.kept.bytes);
-      body["full_bytes"] = Json::UInt64(facts.kept.full_bytes);
-      body["change"] = facts.kept.change.empty() ? Json::Value() : Json::Value(facts.kept.change);
+      base::Json body = base::Json::object();
+      body["bank_bytes"] = facts.kept.bytes;
+      body["full_bytes"] = facts.kept.full_bytes;
+      body["change"] = facts.kept.change.empty() ? base::Json() : base::Json(facts.kept.change);
       body["material"] = facts.material;
       body["group"] = facts.group;
       body["loudest"]["triangle"] = facts.loudest[0];
@@ -258,7 +259,7 @@ class Work {
   base::WholeFolder folder_;
   PageBanks banks_;
   process::Programs programs_;
-  Json::Value scene_, report_;
+  base::Json scene_, report_;
   std::vector<fs::path> files_;          // per body: its bank
   std::vector<const BankFacts*> facts_;  // per body
   Explored done_;

@@ -37,13 +37,7 @@ std::string make_name(std::string_view text) {
   return cut_name(name.empty() || name[0] == '.' ? "body" + name : name);
 }
 
-std::string to_text(const Json::Value& value) {
-  Json::StreamWriterBuilder writer;
-  writer["indentation"] = " ";
-  writer["commentStyle"] = "None";
-  writer["emitUTF8"] = true;
-  return Json::writeString(writer, value) + "\n";
-}
+std::string to_text(const base::Json& value) { return value.sorted_text({.indentation = " ", .is_ascii = false}) + "\n"; }
 
 void put_file(const fs::path& from, const fs::path& to) {
   std::error_code error;

@@ -1,13 +1,12 @@
 // Files of the page's folder.
 #pragma once
 
-#include <json/json.h>
-
 #include <filesystem>
 #include <string>
 #include <string_view>
 
 #include "runtime/base/error.hpp"
+#include "runtime/base/json.hpp"
 
 namespace carillon::explore {
 
@@ -15,7 +14,7 @@ namespace carillon::explore {
 std::string make_name(std::string_view text);
 
 /// With all digits of numbers, on many lines.
-std::string to_text(const Json::Value& value);
+std::string to_text(const base::Json& value);
 
 /// Throw SystemError when the disk refuses.
 void put_file(const std::filesystem::path& from, const std::filesystem::path& to);

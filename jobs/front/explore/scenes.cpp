@@ -18,8 +18,8 @@ constexpr double kNearestM = 0.3;  // that the listener comes
 constexpr double kStrikeS = 0.15;  // between two blows of the probe
 constexpr const char* kMallet = "hard-wood";
 
-Json::Value to_json(const Vec3& v) {
-  Json::Value list(Json::arrayValue);
+base::Json to_json(const Vec3& v) {
+  base::Json list = base::Json::array();
   for (const double x : v) list.append(x);
   return list;
 }
@@ -36,8 +36,8 @@ Box find_box(const BankFacts& facts, Up up) {
 
 }  // namespace
 
-Json::Value make_row(const std::vector<std::filesystem::path>& files, const std::vector<const BankFacts*>& facts, Up up) {
-  Json::Value scene(Json::objectValue);
+base::Json make_row(const std::vector<std::filesystem::path>& files, const std::vector<const BankFacts*>& facts, Up up) {
+  base::Json scene = base::Json::object();
   scene["duration_s"] = 1.0;
   std::set<std::string> taken;
   double x = 0.0, height = 0.0, depth = 0.0, last = 0.0;
@@ -45,7 +45,7 @@ Json::Value make_row(const std::vector<std::filesystem::path>& files, const std:
     const Box box = find_box(*facts[i], up);
     const double width = box.high[0] - box.low[0];
     if (i > 0) x += kGap * 0.5 * (width + last);
-    Json::Value body(Json::objectValue);
+    base::Json body = base::Json::object();
     const std::string stem = cut_name(files[i].stem().string());
     std::string name = stem;
     for (int k = 2; !taken.insert(name).second; ++k) name = fmt::format("{} {}", stem, k);
@@ -66,15 +66,15 @@ Json::Value make_row(const std::vector<std::filesystem::path>& files, const std:
   return scene;
 }
 
-Json::Value make_probe(Json::Value scene, const std::vector<std::filesystem::path>& files, const std::vector<const BankFacts*>& facts) {
-  for (const char* happening : {"strikes", "joints", "cords", "gravity_m_s2", "variation"}) scene.removeMember(happening);
+base::Json make_probe(base::Json scene, const std::vector<std::filesystem::path>& files, const std::vector<const BankFacts*>& facts) {
+  for (const char* happening : {"strikes", "joints", "cords", "gravity_m_s2", "variation"}) scene.erase(happening);
   double time_s = 0.05;
-  for (Json::ArrayIndex i = 0; i < scene["bodies"].size(); ++i) {
-    Json::Value& body = scene["bodies"][i];
+  for (std::size_t i = 0; i < scene["bodies"].size(); ++i) {
+    base::Json& body = scene["bodies"][i];
     body["fixed"] = true;
     body["bank"] = files[i].string();
-    for (const char* motion : {"velocity_m_s", "angular_velocity_rad_s"}) body.removeMember(motion);
-    Json::Value strike(Json::objectValue);
+    for (const char* motion : {"velocity_m_s", "angular_velocity_rad_s"}) body.erase(motion);
+    base::Json strike = base::Json::object();
     strike["time_s"] = time_s;
     strike["body"] = body["name"];
     strike["point_m"] = to_json(facts[i]->loudest_m);

@@ -1,20 +1,19 @@
 // Scene files for a page: one with banks side by side, one that probes how loud bodies are.
 #pragma once
 
-#include <json/json.h>
-
 #include <filesystem>
 #include <vector>
 
 #include "jobs/front/explore/banks.hpp"
+#include "runtime/base/json.hpp"
 
 namespace carillon::explore {
 
 /// Bodies in a row along x, on the ground, and a listener in front of them. `names` and `facts` have one entry a body.
-Json::Value make_row(const std::vector<std::filesystem::path>& files, const std::vector<const BankFacts*>& facts, Up up);
+base::Json make_row(const std::vector<std::filesystem::path>& files, const std::vector<const BankFacts*>& facts, Up up);
 
 /// The scene with all bodies fixed and, instead of its events, one blow of a mallet on each at its loudest point. `files`:
 /// the banks of its bodies.
-Json::Value make_probe(Json::Value scene, const std::vector<std::filesystem::path>& files, const std::vector<const BankFacts*>& facts);
+base::Json make_probe(base::Json scene, const std::vector<std::filesystem::path>& files, const std::vector<const BankFacts*>& facts);
 
 }  // namespace carillon::explore

@@ -22,13 +22,14 @@
 #include "jobs/front/explore/names.hpp"
 #include "jobs/front/hear/assume.hpp"
 #include "jobs/front/hear/strikes.hpp"
-#include "jobs/store/process/programs.hpp"
 #include "jobs/front/report/report.hpp"
+#include "jobs/store/process/programs.hpp"
 #include "precompute/job/preview.hpp"
 #include "precompute/job/read_body.hpp"
 #include "runtime/bank/bank.hpp"
 #include "runtime/bank/blows.hpp"
 #include "runtime/bank/corrected.hpp"
+#include "runtime/bank/mounting/heard.hpp"
 #include "runtime/bank/of_material.hpp"
 #include "runtime/bank/surface.hpp"
 #include "runtime/base/descriptor.hpp"
@@ -41,7 +42,6 @@
 #include "runtime/base/vector.hpp"
 #include "runtime/material/mallets.hpp"
 #include "runtime/material/table.hpp"
-#include "runtime/bank/mounting/heard.hpp"
 
 namespace carillon::hear {
 namespace {
@@ -417,12 +417,12 @@ class Listening {
     base::Json scene = base::Json::object(), body = base::Json::object(), listener = base::Json::object();
     scene.set("duration_s", begin + gap * static_cast<double>(strikes.size() - 1) + std::clamp(ring, 0.5, 4.0));
     body.set("name", stem_).set("bank", sound.bank.filename().string()).set("fixed", true);
-    scene.set("bodies", base::Json::array()).member("bodies").add(body);
+    scene.set("bodies", base::Json::array())["bodies"].add(body);
     for (std::size_t k = 0; k < strikes.size(); ++k) {
       base::Json strike = base::Json::object();
       strike.set("time_s", begin + gap * static_cast<double>(k)).set("body", stem_);
       strike.set("point_m", base::Json::array(bank.vertices_m[strikes[k]])).set("mallet", order_.mallet);
-      scene.member("strikes").add(strike);
+      scene["strikes"].add(strike);
     }
     listener.set("position_m", base::Json::array(Vec3{middle[0], middle[1] - std::clamp(2.0 * size, 1.0, 500.0), middle[2]}));
     listener.set("look_at_m", base::Json::array(middle));

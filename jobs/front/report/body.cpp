@@ -91,12 +91,8 @@ std::vector<Bar> make_size_bars(const Subject& subject) {
 }
 
 /// A text of JSON as lines.
-std::string write_lines(const Json::Value& value) {
-  Json::StreamWriterBuilder writer;
-  writer["indentation"] = "  ";
-  writer["precision"] = 17;
-  writer["emitUTF8"] = true;
-  return Json::writeString(writer, value);
+std::string write_lines(const base::Json& value) {
+  return value.sorted_text({.indentation = "  ", .is_ascii = false, .breaks_arrays = true});
 }
 
 }  // namespace
@@ -106,7 +102,7 @@ bool Subject::is_sane() const {
 }
 
 std::string explain_missing(const Subject& subject, std::string_view what) {
-  if (subject.record.run.isNull()) return fmt::format("there is no record of the run, and so no {}.", what);
+  if (subject.record.run.is_null()) return fmt::format("there is no record of the run, and so no {}.", what);
   return fmt::format("the record of the run holds no {}; it is of an older version, or damaged.", what);
 }
 
@@ -152,9 +148,9 @@ Html make_check_section(const Subject& subject) {
 }
 
 Html make_job_section(const Subject& subject) {
-  Json::Value job = subject.record.job;
-  if (!job.isObject()) return leave_out("job", "Job", "neither the file of the resolved job nor the bank holds it.");
-  job.removeMember("run");
+  base::Json job = subject.record.job;
+  if (!job.is_object()) return leave_out("job", "Job", "neither the file of the resolved job nor the bank holds it.");
+  job.erase("run");
   Html out = html("<pre>{}</pre>\n", escape(write_lines(job), kMaxJobBytes));
   return make_section("job", "Job", out);
 }

@@ -15,12 +15,12 @@ namespace {
 constexpr double kSliverDeg = 5.0;  // of the mesh check
 constexpr std::size_t kBins = 6;    // of 10 degrees: no triangle has a smallest angle above 60
 
-void add_count(Facts& facts, const Json::Value& in, const char* key, const char* what, const char* remark = "") {
+void add_count(Facts& facts, const base::Json& in, const char* key, const char* what, const char* remark = "") {
   if (const auto count = find_count(in, key)) facts.add(what, html("{}", format_count(*count)), remark);
 }
 
 /// Only where there were any.
-void add_if_any(Facts& facts, const Json::Value& in, const char* key, const char* what, const char* remark) {
+void add_if_any(Facts& facts, const base::Json& in, const char* key, const char* what, const char* remark) {
   if (find_count(in, key).value_or(0) > 0) add_count(facts, in, key, what, remark);
 }
 
@@ -81,7 +81,7 @@ Html make_surface_part(const bank::Bank& bank) {
 }  // namespace
 
 Html make_mesh_section(const Subject& subject) {
-  const Json::Value& mesh = find(subject.record.run, "mesh");
+  const base::Json& mesh = find(subject.record.run, "mesh");
   const bank::Bank& bank = subject.bank;
   Facts quality;
   if (const auto angle = find_amount(mesh, "min_dihedral_deg"))

@@ -234,10 +234,10 @@ Html make_error_section(const Subject& subject) {
   if (const auto asked = find_amount(subject.record.job, "accuracy_cents")) facts.add("asked for", html("{} cent", format_plain(*asked)));
   Html out = facts.finish();
   out += draw_errors(subject);
-  const Json::Value& trials = find(find(subject.record.run, "accuracy"), "trials");
+  const base::Json& trials = find(find(subject.record.run, "accuracy"), "trials");
   Table table({{"trial", true}, {"element"}, {"nodes", true}, {"worst error bar [cent]", true}, {"CPU time", true}});
-  for (Json::ArrayIndex i = 0; trials.isArray() && i < std::min<Json::ArrayIndex>(trials.size(), 100); ++i) {
-    const Json::Value& trial = trials[i];
+  for (std::size_t i = 0; trials.is_array() && i < std::min<std::size_t>(trials.size(), 100); ++i) {
+    const base::Json& trial = trials[i];
     const auto nodes = find_count(trial, "nodes");
     const auto cents = find_amount(trial, "worst_cents"), seconds = find_amount(trial, "cpu_seconds");
     table.add({html("{}", i + 1), html("{}", find_text(trial, "element").value_or("-")), html("{}", nodes ? format_count(*nodes) : "-"),
@@ -265,7 +265,7 @@ Html make_residual_section(const Subject& subject) {
   } else {
     chart.lines.push_back({kResidualLimit, "limit of a sane bank"});
   }
-  const Json::Value& solver = find(subject.record.run, "solver");
+  const base::Json& solver = find(subject.record.run, "solver");
   if (const auto above = find_count(solver, "above_tolerance"))
     facts.add("above the tolerance", html("{}", *above), "modes for which rounding allows no better");
   if (const auto error = find_amount(solver, "orthonormality_error")) facts.add("orthonormality", html("{:.1e}", *error), "largest error");

@@ -16,56 +16,43 @@ namespace carillon::report {
 namespace {
 
 constexpr std::uint64_t kMaxBytes = 64 << 20;
-constexpr Json::ArrayIndex kMaxTexts = 50;
+constexpr std::size_t kMaxTexts = 50;
 constexpr double kMaxCount = 9e15;  // below 2^53
 
 }  // namespace
 
-Json::Value parse_json(std::string_view text) {
-  Json::CharReaderBuilder builder;
-  builder["stackLimit"] = 64;
-  builder["failIfExtra"] = true;
-  const std::unique_ptr<Json::CharReader> reader(builder.newCharReader());
-  Json::Value value;
-  std::string errors;
-  try {
-    if (reader->parse(text.data(), text.data() + text.size(), &value, &errors)) return value;
-  } catch (const Json::Exception&) {  // jsoncpp throws where it is nested too deep
-  }
-  return {};
+base::Json parse_json(const std::string& text) { return base::Json::parse(text).value_or(base::Json()); }
+
+const base::Json& find(const base::Json& in, const char* key) { return in[key]; }
+
+std::optional<double> find_number(const base::Json& in, const char* key) {
+  const base::Json& value = find(in, key);
+  if (!value.is_number() || !std::isfinite(value.as_double())) return std::nullopt;
+  return value.as_double();
 }
 
-const Json::Value& find(const Json::Value& in, const char* key) {
-  return in.isObject() && in.isMember(key) ? in[key] : Json::Value::nullSingleton();
-}
-
-std::optional<double> find_number(const Json::Value& in, const char* key) {
-  const Json::Value& value = find(in, key);
-  if (!value.isNumeric() || !std::isfinite(value.asDouble())) return std::nullopt;
-  return value.asDouble();
-}
-
-std::optional<double> find_amount(const Json::Value& in, const char* key) {
+std::optional<double> find_amount(const base::Json& in, const char* key) {
   const std::optional<double> value = find_number(in, key);
   return value && *value >= 0.0 ? value : std::nullopt;
 }
 
-std::optional<std::int64_t> find_count(const Json::Value& in, const char* key) {
+std::optional<std::int64_t> find_count(const base::Json& in, const char* key) {
   const std::optional<double> value = find_amount(in, key);
   if (!value || *value > kMaxCount || *value != std::floor(*value)) return std::nullopt;
   return static_cast<std::int64_t>(*value);
 }
 
-std::optional<std::string> find_text(const Json::Value& in, const char* key) {
-  const Json::Value& value = find(in, key);
-  if (!value.isString()) return std::nullopt;
-  return value.asString();
+std::optional<std::string> find_text(const base::Json& in, const char* key) {
+  const base::Json& value = find(in, key);
+  if (!value.is_string()) return std::nullopt;
+  return value.as_string();
 }
 
-std::vector<std::string> find_texts(const Json::Value& list) {
+std::vector<std::string> find_texts(const base::Json& list) {
   std::vector<std::string> texts;
-  for (Json::ArrayIndex i = 0; list.isArray() && i < std::min(list.size(), kMaxTexts); ++i)
-    if (list[i].isString() && std::find(texts.begin(), texts.end(), list[i].asString()) == texts.end()) texts.push_back(list[i].asString());
+  for (std::size_t i = 0; list.is_array() && i < std::min(list.size(), kMaxTexts); ++i)
+    if (list[i].is_string() && std::find(texts.begin(), texts.end(), list[i].as_string()) == texts.end())
+      texts.push_back(list[i].as_string());
   return texts;
 }
 
@@ -74,22 +61,22 @@ Record read_record(const std::filesystem::path& resolved_job, const std::string&
   if (!resolved_job.empty()) {
     try {
       record.job = parse_json(base::read_file(resolved_job, "resolved job", kMaxBytes));
-      if (!record.job.isObject()) record.remarks.emplace_back("The file of the resolved job is no JSON object.");
+      if (!record.job.is_object()) record.remarks.emplace_back("The file of the resolved job is no JSON object.");
     } catch (const InputError&) {
       record.remarks.emplace_back("The file of the resolved job cannot be read.");
     }
   }
-  if (!find(record.job, "run").isObject()) {
-    if (record.job.isObject()) record.remarks.emplace_back("The file of the resolved job holds no record of the run.");
-    Json::Value own = parse_json(provenance);
-    if (!record.job.isObject() && own.isObject()) record.job = own;
+  if (!find(record.job, "run").is_object()) {
+    if (record.job.is_object()) record.remarks.emplace_back("The file of the resolved job holds no record of the run.");
+    base::Json own = parse_json(provenance);
+    if (!record.job.is_object() && own.is_object()) record.job = own;
     record.run = find(own, "run");
-    if (!resolved_job.empty() && record.run.isObject()) record.remarks.emplace_back("The bank's own copy of the record is shown.");
+    if (!resolved_job.empty() && record.run.is_object()) record.remarks.emplace_back("The bank's own copy of the record is shown.");
   } else {
     record.run = record.job["run"];
   }
-  if (!record.job.isObject()) record.job = Json::Value();
-  if (!record.run.isObject()) record.run = Json::Value();
+  if (!record.job.is_object()) record.job = base::Json();
+  if (!record.run.is_object()) record.run = base::Json();
   return record;
 }
 

@@ -8,8 +8,8 @@
 
 #include "jobs/front/report/draw.hpp"
 #include "jobs/front/report/sections.hpp"
-#include "runtime/base/file.hpp"
 #include "runtime/bank/mounting/heard.hpp"
+#include "runtime/base/file.hpp"
 
 namespace carillon::report {
 namespace {
@@ -43,8 +43,8 @@ Subject read_subject(const fs::path& file, const fs::path& resolved_job) {
 
 /// What the job calls its body, else the name of the bank.
 std::string find_title(const Subject& subject) {
-  const Json::Value& job = subject.record.job;
-  const Json::Value& body = find(job, "body");
+  const base::Json& job = subject.record.job;
+  const base::Json& body = find(job, "body");
   for (const auto& name : {find_text(job, "mesh"), find_text(body, "surface"), find_text(body, "shape")}) {
     if (name && !fs::path(*name).filename().empty()) return fs::path(*name).filename().string();
   }

@@ -15,14 +15,14 @@ constexpr std::size_t kMaxBars = 32;
 constexpr std::size_t kMaxTableRows = 200;
 
 /// The phases of a record in the order in which they happen, others behind them.
-std::vector<std::string> order_phases(const Json::Value& phases) {
+std::vector<std::string> order_phases(const base::Json& phases) {
   const std::vector<std::string> known{"trials", "read",          "partition", "assemble", "factor",
                                        "solve",  "orthogonalise", "errors",    "write",    "other"};
   std::vector<std::string> names;
-  if (!phases.isObject()) return names;
+  if (!phases.is_object()) return names;
   for (const std::string& name : known)
-    if (phases.isMember(name)) names.push_back(name);
-  for (const std::string& name : phases.getMemberNames())
+    if (phases.has(name)) names.push_back(name);
+  for (const std::string& name : phases.keys())
     if (std::find(known.begin(), known.end(), name) == known.end() && names.size() < kMaxBars) names.push_back(name);
   return names;
 }
@@ -33,7 +33,7 @@ struct Phase {
 };
 
 std::vector<Phase> find_phases(const Subject& subject) {
-  const Json::Value& recorded = find(subject.record.run, "phase_seconds");
+  const base::Json& recorded = find(subject.record.run, "phase_seconds");
   std::vector<Phase> phases;
   for (const std::string& name : order_phases(recorded))
     if (const auto seconds = find_amount(recorded, name.c_str())) phases.push_back({name, *seconds});
@@ -43,11 +43,11 @@ std::vector<Phase> find_phases(const Subject& subject) {
 Html format_or_dash(const std::optional<double>& value, std::string (*format)(double)) { return html("{}", value ? format(*value) : "-"); }
 
 Html make_phase_table(const Subject& subject) {
-  const Json::Value& recorded = find(subject.record.run, "stations");
+  const base::Json& recorded = find(subject.record.run, "stations");
   Table table(
       {{"phase"}, {"wall clock", true}, {"CPU, all ranks", true}, {"peak so far, largest rank", true}, {"peak so far, all ranks", true}});
-  for (Json::ArrayIndex i = 0; recorded.isArray() && i < std::min<Json::ArrayIndex>(recorded.size(), kMaxTableRows); ++i) {
-    const Json::Value& phase = recorded[i];
+  for (std::size_t i = 0; recorded.is_array() && i < std::min<std::size_t>(recorded.size(), kMaxTableRows); ++i) {
+    const base::Json& phase = recorded[i];
     const auto name = find_text(phase, "name");
     if (!name) continue;
     table.add({html("{}", *name), format_or_dash(find_amount(phase, "seconds"), format_seconds),
@@ -59,12 +59,12 @@ Html make_phase_table(const Subject& subject) {
 }
 
 std::vector<double> find_rank_bytes(const Subject& subject) {
-  const Json::Value& recorded = find(subject.record.run, "peak_bytes_by_rank");
+  const base::Json& recorded = find(subject.record.run, "peak_bytes_by_rank");
   std::vector<double> bytes;
-  if (!recorded.isArray()) return bytes;
-  for (const Json::Value& value : recorded) {
-    if (!value.isNumeric() || !std::isfinite(value.asDouble()) || value.asDouble() < 0.0) return {};  // damaged
-    bytes.push_back(value.asDouble());
+  if (!recorded.is_array()) return bytes;
+  for (const base::Json& value : recorded) {
+    if (!value.is_number() || !std::isfinite(value.as_double()) || value.as_double() < 0.0) return {};  // damaged
+    bytes.push_back(value.as_double());
   }
   return bytes;
 }
@@ -82,14 +82,14 @@ std::vector<Bar> make_rank_bars(const std::vector<double>& bytes) {
 }
 
 Html make_rank_table(const Subject& subject) {
-  const Json::Value& partition = find(subject.record.run, "partition");
-  const Json::Value& ranks = find(partition, "ranks");
+  const base::Json& partition = find(subject.record.run, "partition");
+  const base::Json& ranks = find(partition, "ranks");
   Table table({{"rank", true}, {"elements", true}, {"own nodes", true}, {"nodes of neighbours", true}});
-  const auto cell = [](const Json::Value& rank, const char* key) {
+  const auto cell = [](const base::Json& rank, const char* key) {
     const auto count = find_count(rank, key);
     return html("{}", count ? format_count(*count) : "-");
   };
-  for (Json::ArrayIndex i = 0; ranks.isArray() && i < std::min<Json::ArrayIndex>(ranks.size(), kMaxTableRows); ++i)
+  for (std::size_t i = 0; ranks.is_array() && i < std::min<std::size_t>(ranks.size(), kMaxTableRows); ++i)
     table.add({html("{}", i), cell(ranks[i], "elements"), cell(ranks[i], "owned_nodes"), cell(ranks[i], "halo_nodes")});
   if (table.empty()) return {};
   Facts facts;
@@ -156,8 +156,8 @@ Html make_memory_section(const Subject& subject) {
 }
 
 Html make_work_section(const Subject& subject) {
-  const Json::Value& work = find(subject.record.run, "work");
-  const Json::Value& solver = find(subject.record.run, "solver");
+  const base::Json& work = find(subject.record.run, "work");
+  const base::Json& solver = find(subject.record.run, "solver");
   Facts facts;
   const auto add = [&](const char* what, const char* key, const char* remark) {
     if (const auto count = find_count(solver, key)) facts.add(what, html("{}", format_count(*count)), remark);
@@ -170,17 +170,17 @@ Html make_work_section(const Subject& subject) {
   add("factorisations", "factorisations", "those of the proof among them");
   add("solves", "solves", "right-hand sides");
   Html out = facts.finish();
-  const bool is_profiled = std::any_of(work.begin(), work.end(), [](const Json::Value& phase) { return find_amount(phase, "messages"); });
+  const bool is_profiled = std::any_of(work.begin(), work.end(), [](const base::Json& phase) { return find_amount(phase, "messages"); });
   std::vector<Column> columns{{"phase"}, {"operations", true}};
   if (is_profiled)
     columns.insert(columns.end(), {{"messages", true}, {"bytes", true}, {"collectives", true}, {"bytes of collectives", true}});
   Table table(columns);
-  const auto cell = [](const Json::Value& of, const char* key, std::string (*format)(double)) {
+  const auto cell = [](const base::Json& of, const char* key, std::string (*format)(double)) {
     return format_or_dash(find_amount(of, key), format);
   };
   for (const std::string& name : order_phases(work)) {
-    const Json::Value& of = work[name];
-    if (!of.isObject()) continue;
+    const base::Json& of = work[name];
+    if (!of.is_object()) continue;
     std::vector<Html> row{html("{}", name), cell(of, "flops", format_large)};
     if (is_profiled)
       row.insert(row.end(), {cell(of, "messages", format_large), cell(of, "bytes", format_bytes), cell(of, "collectives", format_large),
@@ -193,16 +193,16 @@ Html make_work_section(const Subject& subject) {
 }
 
 Html make_program_section(const Subject& subject) {
-  const Json::Value& run = subject.record.run;
+  const base::Json& run = subject.record.run;
   Facts facts;
   if (const auto program = find_text(run, "program")) facts.add("program", html("{}", *program));
   if (const auto git = find_text(run, "git")) facts.add("revision", html("{}", *git));
   if (const auto time = find_text(run, "finished_utc")) facts.add("finished", html("{}", *time), "UTC");
   if (const auto ranks = find_count(run, "ranks")) facts.add("ranks", html("{}", *ranks));
-  const Json::Value& versions = find(run, "versions");
+  const base::Json& versions = find(run, "versions");
   std::size_t shown = 0;
-  if (versions.isObject()) {
-    for (const std::string& name : versions.getMemberNames()) {
+  if (versions.is_object()) {
+    for (const std::string& name : versions.keys()) {
       const auto version = find_text(versions, name.c_str());
       if (version && ++shown <= kMaxBars) facts.add(name, html("{}", *version));
     }

@@ -12,7 +12,7 @@ EFFECTS = ("modal", "hertz_pulse", "roughness", "rolling", "contact_damping", "a
 INSTRUCTIONS = ("plain", "sse2", "avx2", "avx512")
 SOUND_SPEED = 343.0  # m/s
 # The strictest thresholds of effect selection that a scene may set, and the most accurate: the reference of what selection leaves out.
-STRICTEST = {"planner_db": -150, "quiet_db": 250, "silence_pa": 1e-15, "lead_s": 0.2}
+STRICTEST = {"planner_db": -150, "quiet_db": 250, "silence_pa": 1e-15}
 SOFT_DB = 40.0  # a blow that is just heard in a living room
 BALL = {
     "body": {"shape": "sphere", "radius_m": 0.05},
@@ -81,13 +81,6 @@ KNOBS = (
         "chute",
     ),
     Knob("quiet_db", "Effect selection: what is so far below the loudest strike is not heard", (250, 120, 90, 70, 50, 40, 30), 70, "chute"),
-    Knob(
-        "lead_s",
-        "Effect selection: look-ahead, by which an effect is on before it is needed",
-        (0.2, 0.1, 0.05, 0.02, 0.01, 0.001),
-        0.05,
-        "chute",
-    ),
     Knob("contact_step_s", "Physics: longest step while bodies touch and move", (1e-4, 2.5e-4, 5e-4, 1e-3, 2e-3), 2.5e-4, "roll", True),
 )
 

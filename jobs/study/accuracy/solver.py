@@ -18,7 +18,6 @@ FACTORISATIONS = (
     ("MUMPS, PORD", "mumps", ("-mumps_ordering", "pord")),
     ("MUMPS, AMF", "mumps", ("-mumps_ordering", "amf")),
     ("MUMPS, AMD", "mumps", ("-mumps_ordering", "amd")),
-    ("CHOLMOD, METIS", "cholmod", ()),
 )
 MAX_DENSE_NODES = 400  # a dense solve of 1,000 takes most of a minute; the section of the papers does that once
 METHODS = ("block-lanczos", "krylov-schur", "dense")

@@ -38,10 +38,6 @@ MassBounds find_element_bounds(const std::array<Vec3, 10>& x) {
   return find_bounds(Eigen::Map<const la::Matrix>(element.mass.data(), 10, 10));
 }
 
-double calc_determinant(const Vec3& a, const Vec3& b, const Vec3& c) {
-  return a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
-}
-
 /// det(dx / dL) of a quadratic element is a cubic: twenty points fix it, and its Bernstein coefficients enclose it.
 struct Cubic {
   static constexpr int kTerms = 20;
@@ -82,7 +78,7 @@ std::array<double, 2> enclose_jacobian(const std::array<Vec3, 10>& x) {
     }
     for (int i = 1; i < 4; ++i)
       for (int k = 0; k < 3; ++k) d[i][k] -= d[0][k];
-    values[p] = calc_determinant(d[1], d[2], d[3]);
+    values[p] = calc_det(d[1], d[2], d[3]);
   }
   const Eigen::Matrix<double, Cubic::kTerms, 1> coefficients = kCubic.to_bernstein * values;
   return {coefficients.minCoeff(), coefficients.maxCoeff()};

@@ -1,11 +1,9 @@
-// Method: all elements are one group for all ranks. As long as a group is meant for several ranks, it is cut across the longest axis of its
-//   inertia into two groups of elements in the ratio of their ranks; all groups are cut at the same time, so that a level costs two sums
-//   over all ranks, for the centres and for the moments, and a fixed number for the places of the cuts. A place is found by bisection on
-//   the 64 bits of (coordinate, as an ordered integer), and what lies exactly there is parted by the element's number: so parts differ by
-//   one element at most, and the cut does not depend on the order in the file nor, but for rounding in the moments, on the blocks of the
-//   ranks.
+// Method: Starts with one group of all elements for all ranks. A group for several ranks is cut across the longest axis of its inertia into
+// two groups in the ratio of their ranks. All groups are cut at the same time, so that a level costs two global sums, for centres and
+// moments, and a fixed number for the cut positions. A cut position is found by bisection on the 64 bits of the coordinate as an ordered
+// integer, ties are resolved by element number: parts differ by at most one element, and the cut does not depend on the order in the file
+// nor, except for rounding of the moments, on the blocks of the ranks.
 // Source: Simon 1991, "Partitioning of unstructured problems for parallel processing" (recursive inertial bisection).
-// Deviations: none.
 #include "precompute/mesh/distributed/bisect.hpp"
 
 #include <Eigen/Dense>
@@ -18,18 +16,17 @@
 namespace carillon::mesh {
 namespace {
 
-/// A group of elements, meant for the ranks first_rank ... first_rank + ranks - 1.
+/// A group of elements for ranks first_rank ... first_rank + ranks - 1.
 struct Group {
   int first_rank = 0;
   int ranks = 1;
   Eigen::Vector3d axis = Eigen::Vector3d::UnitX();
-  std::int64_t left = 0;  // elements that go to the left
+  std::int64_t left = 0;  // number of elements of the left half
 
   int left_ranks() const { return ranks / 2; }
 };
 
-/// The places where the groups are cut: of group g, elements go left whose key is below cut[g], and of those with that very key the ones
-/// whose number is below tie[g].
+/// Cut positions: elements of group g go left if their key is below cut[g], or equal to it with a number below tie[g].
 struct Cuts {
   std::vector<std::uint64_t> cut, tie;
 
@@ -38,7 +35,7 @@ struct Cuts {
   }
 };
 
-/// Keeps the order of doubles.
+/// Monotonic map of doubles to integers.
 std::uint64_t make_key(double value) {
   const auto bits = std::bit_cast<std::uint64_t>(value + 0.0);
   return bits >> 63 != 0 ? ~bits : bits | std::uint64_t{1} << 63;
@@ -72,7 +69,7 @@ void find_axes(const comm::Communicator& comm, const std::vector<Vec3>& centres,
     groups[g].left = count / groups[g].ranks * left_ranks + std::min<std::int64_t>(count % groups[g].ranks, left_ranks);
     const Eigen::Matrix3d moment = Eigen::Map<Eigen::Matrix3d>(moments.data() + 9 * g);
     if (moment.trace() > 0) groups[g].axis = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(moment).eigenvectors().col(2);
-    // The sign of an eigenvector is arbitrary.
+    // Fix the arbitrary sign of the eigenvector.
     Eigen::Index largest = 0;
     groups[g].axis.cwiseAbs().maxCoeff(&largest);
     if (groups[g].axis[largest] < 0) groups[g].axis = -groups[g].axis;
@@ -107,7 +104,7 @@ Cuts find_cuts(const comm::Communicator& comm, const std::vector<std::uint64_t>&
   return cuts;
 }
 
-/// Both halves of every group, and which of them each element is in. Groups of one rank stay.
+/// Both halves of every group, and the half of each element. Groups of one rank stay.
 std::vector<Group> split(const std::vector<Group>& groups, const Cuts& cuts, const std::vector<std::uint64_t>& key,
                          std::int64_t first_element, std::vector<std::int32_t>& group_of) {
   std::vector<Group> halves;

@@ -1,7 +1,7 @@
-// Method: Elements go to ranks as the caller says, or by METIS k-way on the dual graph; a node goes to one of the ranks of its elements: to
-//   the one with fewest so far where the caller has cut, otherwise to the highest. Rank 0 makes and sends one rank's part at a time.
+// Method: Elements are distributed as given by the caller, or by METIS k-way on the dual graph. A node belongs to one of the ranks of its
+// elements: with a given distribution to the one with the fewest so far, otherwise to the highest. Rank 0 makes and sends the parts one at
+// a time.
 // Source: Karypis and Kumar 1998 (METIS).
-// Deviations: none.
 #include "precompute/mesh/distributed/distribute.hpp"
 
 #include <fmt/core.h>
@@ -18,10 +18,10 @@
 namespace carillon::mesh {
 namespace {
 
-/// Everything that rank 0 decides before it sends.
+/// Decisions of rank 0 before it sends the parts.
 struct Plan {
-  std::vector<std::vector<std::int32_t>> elements;  // (ranks) of each, ascending
-  std::vector<std::int32_t> owner;                  // (N) rank of each node, -1: no element uses it
+  std::vector<std::vector<std::int32_t>> elements;  // (ranks) elements of each rank, ascending
+  std::vector<std::int32_t> owner;                  // (N) rank of each node, -1: unused node
   std::vector<std::int32_t> component;              // (N)
   std::vector<bool> is_fixed;                       // (N)
   std::vector<std::int32_t> row;                    // (N), -1: fixed or unused
@@ -29,7 +29,7 @@ struct Plan {
   std::vector<std::int32_t> local;                  // (N) scratch of make_local_mesh(): all -1 before and after
 };
 
-/// Components in the order of their first nodes; -1: no element uses the node.
+/// Components in the order of their first nodes; -1: unused node.
 std::vector<std::int32_t> find_components(const mesh::TetMesh& mesh, std::int32_t& count) {
   mesh::Parts parts(mesh.nodes_m.size());
   std::vector<bool> used(mesh.nodes_m.size(), false);
@@ -49,8 +49,8 @@ std::vector<std::int32_t> find_components(const mesh::TetMesh& mesh, std::int32_
   return component;
 }
 
-/// The highest rank that touches each node. Dealing the nodes of a seam out evenly instead would balance the rows to the node, but widen
-/// the separator of a factorisation that is ordered by the ranks' rows by half (measured: bunny, 2 ranks, 794 nodes instead of 540).
+/// Highest rank that touches each node. Distributing the nodes of an interface evenly would balance the rows exactly, but enlarge the
+/// separator of a factorisation ordered by rank by half (bunny, 2 ranks: 794 nodes instead of 540).
 std::vector<std::int32_t> find_node_owners(const mesh::TetMesh& mesh, const std::vector<std::int32_t>& part) {
   std::vector<std::int32_t> owner(mesh.nodes_m.size(), -1);
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
@@ -58,13 +58,13 @@ std::vector<std::int32_t> find_node_owners(const mesh::TetMesh& mesh, const std:
   return owner;
 }
 
-/// Counts the nodes that only one rank touches, then gives each other node to whichever of its ranks has fewest so far.
+/// Counts the nodes touched by one rank only, then gives each other node to its rank with the fewest so far.
 void level_node_owners(const mesh::TetMesh& mesh, const std::vector<std::int32_t>& part, int ranks, std::vector<std::int32_t>& owner) {
   struct Touch {
     std::int32_t node, rank;
     auto operator<=>(const Touch&) const = default;
   };
-  std::vector<Touch> seams;  // for all ranks of a node but the highest
+  std::vector<Touch> seams;  // all ranks of a node except the highest
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
     for (const std::int32_t node : mesh.tet(e))
       if (part[e] != owner[node]) seams.push_back({node, part[e]});
@@ -155,7 +155,7 @@ Plan make_plan(const mesh::TetMesh& mesh, const std::vector<std::int32_t>& fixed
   return plan;
 }
 
-/// The part of `rank`; what its elements touch in LocalMesh's order.
+/// Part of `rank`, with its nodes in the order of LocalMesh.
 LocalMesh make_local_mesh(const mesh::TetMesh& mesh, Plan& plan, int rank) {
   const std::vector<std::int32_t>& elements = plan.elements[rank];
   LocalMesh local;
@@ -190,7 +190,7 @@ LocalMesh make_local_mesh(const mesh::TetMesh& mesh, Plan& plan, int rank) {
   return local;
 }
 
-/// What rank 0 knows of the whole, to all. Collective.
+/// Broadcasts the totals known on rank 0. Collective.
 void broadcast_totals(const comm::Communicator& comm, DistributedMesh& out) {
   struct Totals {
     std::int64_t nodes, tets, free_nodes, edge_cut;

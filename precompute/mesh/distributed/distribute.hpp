@@ -1,4 +1,4 @@
-// From a mesh on rank 0 to a distributed one: each rank gets its own tetrahedra and the nodes they touch.
+// Distribution of a mesh from rank 0: each rank gets its tetrahedra and their nodes.
 #pragma once
 
 #include <cstdint>
@@ -10,18 +10,16 @@
 namespace carillon::mesh {
 
 struct DistributeOptions {
-  std::vector<std::int32_t> part = {};  // rank 0: (E) the rank of each element; empty: METIS cuts
-  bool elimination_order = false;  // order the whole graph on rank 0, for factorisations that cannot order a distributed matrix themselves
+  std::vector<std::int32_t> part = {};  // rank 0: (E) rank of each element; empty: METIS
+  bool elimination_order = false;       // order the whole graph on rank 0, for factorisations that cannot order a distributed matrix
 };
 
-/// The nodes that elements use and that are not fixed, ascending. Throws InputError when a fixed node is not in the mesh, or every node is
-/// fixed.
+/// Nodes that are used by elements and not fixed, ascending. Throws InputError if a fixed node is not in the mesh, or all nodes are fixed.
 std::vector<std::int32_t> list_free_nodes(const mesh::TetMesh& mesh, const std::vector<std::int32_t>& fixed_nodes);
 
-/// Cuts the mesh, numbers the free nodes so that each rank's are contiguous, and sends each rank its part. The mesh and the
-/// fixed nodes are read on rank 0 only; afterwards the mesh is not needed any more.
-/// Collective. Throws on every rank: InputError when there are fewer tetrahedra than ranks, a fixed node is not in the mesh, or every node
-/// is fixed; SystemError when memory runs out.
+/// Cuts the mesh, numbers the free nodes contiguously per rank, and sends each rank its part. The mesh and the fixed nodes are read on rank
+/// 0 only; the mesh is not needed afterwards. Collective. Throws on every rank: InputError if there are fewer tetrahedra than ranks, a
+/// fixed node is not in the mesh, or all nodes are fixed; SystemError if memory runs out.
 DistributedMesh distribute(const comm::Communicator& comm, const mesh::TetMesh& mesh, const std::vector<std::int32_t>& fixed_nodes,
                            const DistributeOptions& options = {});
 

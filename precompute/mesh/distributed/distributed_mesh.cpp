@@ -10,12 +10,12 @@
 namespace carillon::mesh {
 namespace {
 
-/// What a LocalMesh has apart from arrays.
+/// Scalar members of a LocalMesh.
 struct Header {
   std::int32_t order, free_nodes, owned_nodes, first_row;
 };
 
-/// Visits all arrays, in the order in which they travel.
+/// Visits all arrays in the order of serialisation.
 template <typename Mesh, typename Visit>
 void for_each_array(Mesh& local, const Visit& visit) {
   visit(local.tets);
@@ -122,8 +122,7 @@ std::vector<FixedPoint> list_points(const std::vector<std::vector<Vec3>>& points
 }
 
 void check_free_nodes(std::int64_t free_nodes, const std::string& begin) {
-  if (free_nodes == 0)
-    throw InputError(begin + "'fixed' names every node of the mesh, so that nothing can move; fix fewer nodes (a smaller box or node set)");
+  if (free_nodes == 0) throw InputError(begin + "'fixed' names every node of the mesh; fix fewer nodes (a smaller box or node set)");
   if (free_nodes > INT32_MAX / 3)
     throw InputError(
         fmt::format("{}the mesh has {} free nodes, 32-bit matrix rows end at 715827882; use a coarser mesh", begin, free_nodes));

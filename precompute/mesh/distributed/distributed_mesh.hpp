@@ -1,4 +1,4 @@
-// A mesh that is cut into one part per rank.
+// A mesh distributed over ranks.
 #pragma once
 
 #include <array>
@@ -13,8 +13,8 @@
 
 namespace carillon::mesh {
 
-/// What one rank has of the mesh: its own tetrahedra, the nodes it owns and the halo, which is the other nodes of its tetrahedra. A node
-/// that several ranks touch is owned by one of them.
+/// Part of the mesh on one rank: its tetrahedra, the nodes it owns, and the halo, the other nodes of its tetrahedra. A node touched by
+/// several ranks is owned by one of them.
 struct LocalMesh {
   int order = 1;                           // 1 or 2
   std::vector<std::int32_t> tets;          // (e, 4) or (e, 10), local node numbers
@@ -25,13 +25,13 @@ struct LocalMesh {
   std::vector<std::int32_t> node_in_mesh;  // (n) number in the whole mesh
   std::vector<std::int32_t> row;           // (n) global number among the free nodes of all ranks; -1: fixed
   std::vector<std::int32_t> component;     // (n) connected component
-  std::vector<std::int32_t> fixed_by;      // (n) which entry of the job's "fixed" fixes the node, -1: free; empty: nothing is fixed
-  std::int32_t free_nodes = 0;             // the leading nodes that are owned and free; their rows are first_row, first_row + 1, ...
-  std::int32_t owned_nodes = 0;            // the leading nodes that are owned
+  std::vector<std::int32_t> fixed_by;  // (n) index of the entry of the job's "fixed" that fixes the node, -1: free; empty: nothing is fixed
+  std::int32_t free_nodes = 0;         // leading nodes that are owned and free; their rows are first_row, first_row + 1, ...
+  std::int32_t owned_nodes = 0;        // leading nodes that are owned
   std::int32_t first_row = 0;
 
   int nodes_per_tet() const { return order == 1 ? 4 : 10; }
-  /// The nodes of tetrahedron e, in this rank's numbers.
+  /// Nodes of tetrahedron e, in local numbers.
   std::span<const std::int32_t> get_tet(std::int32_t e) const {
     const std::size_t width = nodes_per_tet();
     return {&tets[static_cast<std::size_t>(e) * width], width};
@@ -39,11 +39,11 @@ struct LocalMesh {
   std::int32_t tet_count() const { return static_cast<std::int32_t>(tet_in_mesh.size()); }
 };
 
-/// A LocalMesh as bytes, for a message, and back.
+/// Serialisation of a LocalMesh for messages.
 std::vector<std::byte> serialise(const LocalMesh& local);
 LocalMesh deserialise(const std::vector<std::byte>& bytes);
 
-/// How well the mesh was cut; the same on every rank.
+/// Quality of the distribution; the same on every rank.
 struct PartitionReport {
   struct Rank {
     std::int64_t elements = 0;
@@ -53,25 +53,25 @@ struct PartitionReport {
   std::vector<Rank> ranks;
   double element_balance = 1.0;  // largest / mean
   double node_balance = 1.0;     // owned nodes, largest / mean
-  std::int64_t edge_cut = 0;     // pairs of tetrahedra that share a face and not a rank
-  bool contiguous = true;        // every rank's tetrahedra are connected through faces
+  std::int64_t edge_cut = 0;     // pairs of tetrahedra that share a face across two ranks
+  bool contiguous = true;        // the tetrahedra of every rank are connected through faces
 };
 
 struct DistributedMesh {
   LocalMesh local;
   PartitionReport report;
-  std::int64_t nodes = 0;  // of the whole mesh, those that a tetrahedron uses
+  std::int64_t nodes = 0;  // of the whole mesh, without unused nodes
   std::int64_t tets = 0;
   std::int64_t free_nodes = 0;  // of all ranks
   std::int32_t components = 0;  // connected through common nodes
-  /// Per component up to three of its fixed nodes [m] that stop the same rigid motions as all of them, the same on every rank; empty when
-  /// no node is fixed at all.
+  /// Per component up to three of its fixed nodes [m] that prevent the same rigid motions as all of them, the same on every rank; empty if
+  /// no node is fixed.
   std::vector<std::vector<Vec3>> fixed_m;
   std::vector<std::int32_t> row_of_node;           // rank 0 only: (N) row of each node of the mesh, -1: fixed or unused
-  std::vector<std::int32_t> elimination_position;  // rank 0 only: (free nodes), by row: METIS' nested dissection order, if wanted
+  std::vector<std::int32_t> elimination_position;  // rank 0 only: (free nodes), by row: nested dissection order of METIS, if requested
 };
 
-/// Fills what the report says of each rank, and the balance. Collective.
+/// Fills the entries per rank and the balance of the report. Collective.
 void report_ranks(const comm::Communicator& comm, DistributedMesh& mesh);
 
 /// A fixed node and its component.
@@ -80,20 +80,20 @@ struct FixedPoint {
   std::int32_t component;
 };
 
-/// Of points [m], up to three that stop the same rigid motions as all of them: the first, the one farthest from it, and the one farthest
+/// Up to three of these points [m] that prevent the same rigid motions as all: the first, the one farthest from it, and the one farthest
 /// from the line through both. Pure.
 std::vector<Vec3> find_supporting_points(const std::vector<Vec3>& points_m);
 
-/// The supporting points of each component (components), of points in any order of the components. Pure.
+/// Supporting points of each component (components); points in any order. Pure.
 std::vector<std::vector<Vec3>> find_supporting_points(const std::vector<FixedPoint>& points, std::int32_t components);
 
-/// The same as a list.
+/// The same as a flat list.
 std::vector<FixedPoint> list_points(const std::vector<std::vector<Vec3>>& points_m);
 
-/// Throws InputError, whose text begins with `begin`, when no node is free or the rows of the matrices are beyond 32 bits. Pure.
+/// Throws InputError, with text starting with `begin`, if no node is free or the rows of the matrices exceed 32 bits. Pure.
 void check_free_nodes(std::int64_t free_nodes, const std::string& begin);
 
-/// The report as a few lines of text for people.
+/// The report as a few lines of text.
 std::string describe(const PartitionReport& report);
 
 }  // namespace carillon::mesh

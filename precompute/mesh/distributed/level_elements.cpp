@@ -29,7 +29,7 @@ void level_elements(const comm::Communicator& comm, std::vector<std::int32_t>& r
   const auto make_key = [](std::int32_t place) {
     return static_cast<std::uint64_t>(std::int64_t{place} - std::numeric_limits<std::int32_t>::min());
   };
-  std::vector<std::vector<std::uint64_t>> keys;  // (ranks) of the elements of each, ascending
+  std::vector<std::vector<std::uint64_t>> keys;  // (ranks) keys of their elements, ascending
   std::vector<std::int64_t> counts;
   comm.agree([&] {
     keys.resize(comm.size());
@@ -42,7 +42,7 @@ void level_elements(const comm::Communicator& comm, std::vector<std::int32_t>& r
   comm.sum(counts);
   std::vector<Transfer> transfers;
   std::vector<std::int64_t> wanted;
-  std::vector<std::size_t> first(comm.size() + 1, 0);  // transfer of each rank
+  std::vector<std::size_t> first(comm.size() + 1, 0);  // first transfer of each rank
   comm.agree([&] {
     transfers = plan_transfers(counts);
     for (const Transfer& one : transfers) {

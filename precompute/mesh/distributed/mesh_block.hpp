@@ -1,4 +1,4 @@
-// One rank's block of a mesh that no rank has whole: a run of the elements and a run of the nodes.
+// Block of a distributed mesh: a contiguous range of elements and one of nodes.
 #pragma once
 
 #include <cstdint>
@@ -9,14 +9,14 @@
 
 namespace carillon::mesh {
 
-/// A run of nodes and a run of elements, nowhere near each other in general. Nodes are numbered over the whole mesh: the corners of the
-/// file first, then mid nodes that were added; each kind is in one run per rank. nodes_m and fixed have this rank's corners, then its mids.
+/// A range of nodes and a range of elements, generally unrelated. Nodes are numbered over the whole mesh: corners of the file first, then
+/// added mid nodes; each kind is contiguous per rank. nodes_m and fixed contain this rank's corners, then its mids.
 struct MeshBlock {
   int order = 1;
-  comm::IndexPartition corners;     // who has the nodes of the file that are in use
-  comm::IndexPartition mids;        // and those that were added, numbered from corners.total()
-  std::vector<Vec3> nodes_m;        // (n) this rank's
-  std::vector<std::int32_t> fixed;  // (n) 0 free, else 1 + the first entry of ReadOptions::fixed that names the node
+  comm::IndexPartition corners;     // ownership of the used nodes of the file
+  comm::IndexPartition mids;        // ownership of added nodes, numbered from corners.total()
+  std::vector<Vec3> nodes_m;        // (n) of this rank
+  std::vector<std::int32_t> fixed;  // (n) 0 free, otherwise 1 + the first entry of ReadOptions::fixed that names the node
   comm::IndexPartition elements;
   std::vector<std::int32_t> tets;  // (e, 4) or (e, 10) numbers of nodes
   std::vector<std::int32_t> regions;
@@ -28,7 +28,7 @@ struct MeshBlock {
   int find_owner(std::int64_t node) const {
     return node < corners.total() ? corners.find_owner(node) : mids.find_owner(node - corners.total());
   }
-  /// Where a node that this rank has is in nodes_m.
+  /// Index in nodes_m of a node of this rank.
   std::size_t to_local(std::int64_t node) const {
     if (node < corners.total()) return corners.to_local(node);
     return static_cast<std::size_t>(corners.own_count()) + mids.to_local(node - corners.total());

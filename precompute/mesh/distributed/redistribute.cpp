@@ -1,9 +1,7 @@
-// Method: elements travel to their parts. Every rank asks the rank that has a node in its block for the node's place and owner; that rank
-//   gives the node to the highest of those that ask. Owners number their free nodes in ascending order, and the ranks of the blocks pass
-//   the numbers on to the halos. Components: each rank joins its own nodes to groups; the ranks of the blocks find which groups meet in one
-//   node; these pairs, which are few, go to all ranks.
-// Source: own.
-// Deviations: none.
+// Method: Elements are sent to their parts. Every rank asks the holder of each node (the rank with the node in its block) for position and
+// owner; the holder assigns the node to the highest of the asking ranks. Owners number their free nodes in ascending order, and the holders
+// pass the numbers on to the halos. Components: each rank joins its own nodes to groups; the holders find groups that share a node; these
+// few pairs are sent to all ranks.
 #include "precompute/mesh/distributed/redistribute.hpp"
 
 #include <algorithm>
@@ -19,7 +17,7 @@ namespace {
 
 /// This rank's elements in the order of their numbers.
 struct Elements {
-  std::vector<std::int32_t> tets;    // (e, width) numbers of nodes; indices into Nodes, once these are found
+  std::vector<std::int32_t> tets;    // (e, width) node numbers; later indices into Nodes
   std::vector<std::int32_t> number;  // (e)
   std::vector<std::int32_t> region;  // (e)
 };
@@ -60,14 +58,14 @@ Elements move_elements(const comm::Communicator& comm, MeshBlock& block, const s
   });
 }
 
-/// The nodes of this rank's elements, and their groups: nodes joined by its elements.
+/// Nodes of this rank's elements, and groups of nodes connected by them.
 struct Nodes {
   std::vector<std::int32_t> number;  // (n) ascending
   std::vector<std::int32_t> group;   // (n)
-  std::vector<std::int32_t> lowest;  // (groups) number of each group's first node
+  std::vector<std::int32_t> lowest;  // (groups) lowest node number of each group
 };
 
-/// Turns the numbers in elements.tets into indices.
+/// Replaces the node numbers in elements.tets by indices.
 Nodes find_nodes(Elements& elements, std::size_t width) {
   Nodes nodes;
   nodes.number = elements.tets;
@@ -79,7 +77,7 @@ Nodes find_nodes(Elements& elements, std::size_t width) {
   mesh::Parts parts(nodes.number.size());
   for (std::size_t i = 0; i < elements.tets.size(); ++i) parts.join(elements.tets[i / width * width], elements.tets[i]);
   nodes.group.resize(nodes.number.size());
-  for (std::size_t i = 0; i < nodes.number.size(); ++i) {  // the root is the lowest, and comes first
+  for (std::size_t i = 0; i < nodes.number.size(); ++i) {  // the root is the lowest index, so it comes first
     const std::size_t root = parts.find(static_cast<std::int32_t>(i));
     if (root == i) nodes.lowest.push_back(nodes.number[i]);
     nodes.group[i] = root == i ? static_cast<std::int32_t>(nodes.lowest.size()) - 1 : nodes.group[root];
@@ -87,12 +85,12 @@ Nodes find_nodes(Elements& elements, std::size_t width) {
   return nodes;
 }
 
-/// A node that a rank touches, and its group there.
+/// A node touched by a rank, and its group there.
 struct Touch {
   std::int32_t node, group;
 };
 
-/// What the rank that has the node in its block answers.
+/// Answer of the holder of a node.
 struct NodeAnswer {
   Vec3 x_m;
   std::int32_t owner;
@@ -100,13 +98,14 @@ struct NodeAnswer {
   std::int32_t fixed;  // MeshBlock::fixed
 };
 
-/// Groups of any ranks, numbered over all, that have a node in common.
+/// Groups of any ranks, numbered globally, that share a node.
 struct Link {
   std::int32_t a, b;
   auto operator<=>(const Link&) const = default;
 };
 
-/// Answers for the nodes of this rank's block, which go to the highest rank that touches them; `links` gets the groups that meet there.
+/// Answers for the nodes of this rank's block, which are assigned to the highest rank that touches them; `links` gets the groups that share
+/// a node.
 std::vector<NodeAnswer> answer_touches(const MeshBlock& block, const comm::IndexPartition& groups, const comm::ByRank<Touch>& touches,
                                        std::vector<Link>& links) {
   std::vector<NodeAnswer> at(block.nodes_m.size());
@@ -127,7 +126,7 @@ std::vector<NodeAnswer> answer_touches(const MeshBlock& block, const comm::Index
   return answers;
 }
 
-/// The component of every group of all ranks, numbered by their lowest nodes, the same on every rank.
+/// Component of every group of all ranks, numbered by lowest node, the same on every rank.
 std::vector<std::int32_t> join_groups(const std::vector<Link>& links, const std::vector<std::int32_t>& lowest_node, std::int32_t& count) {
   mesh::Parts parts(lowest_node.size());
   for (const Link& link : links) parts.join(link.a, link.b);
@@ -160,13 +159,13 @@ std::vector<std::int32_t> find_components(const comm::Communicator& comm, const 
   return comm.agree([&] { return join_groups(all_links, all_lowest, count); });
 }
 
-/// Everything of a node that this rank touches.
+/// Data of a node touched by this rank.
 struct LocalNode {
   std::int32_t number, component;
   NodeAnswer answer;
 };
 
-/// Puts the nodes in LocalMesh's order and counts; rows are left out.
+/// Sorts and counts the nodes as required by LocalMesh; does not set rows.
 LocalMesh make_local_mesh(int rank, int order, Elements& elements, const std::vector<LocalNode>& nodes, std::vector<char>& on_seam) {
   LocalMesh local;
   local.order = order;
@@ -197,7 +196,7 @@ LocalMesh make_local_mesh(int rank, int order, Elements& elements, const std::ve
   return local;
 }
 
-/// Numbers the free nodes of all ranks; the ranks of the blocks pass the rows of shared nodes on to the halos. Collective.
+/// Numbers the free nodes of all ranks; the holders pass the rows of shared nodes on to the halos. Collective.
 void number_rows(const comm::Communicator& comm, const MeshBlock& block, const std::vector<char>& on_seam, LocalMesh& local) {
   struct Row {
     std::int32_t node, row;
@@ -222,7 +221,7 @@ void number_rows(const comm::Communicator& comm, const MeshBlock& block, const s
   std::copy(rows.begin(), rows.end(), local.row.begin() + local.owned_nodes);
 }
 
-/// Of this rank's fixed nodes, per component.
+/// Supporting points of this rank's fixed nodes, per component.
 std::vector<FixedPoint> list_own_points(const LocalMesh& local, std::int32_t components) {
   std::vector<FixedPoint> points;
   for (auto i = static_cast<std::size_t>(local.free_nodes); i < static_cast<std::size_t>(local.owned_nodes); ++i)

@@ -1,4 +1,4 @@
-// From blocks in the order of a file to a distributed mesh: elements to their ranks, owners and rows of nodes, components.
+// From blocks in file order to a distributed mesh: moves elements, assigns node owners and rows, finds components.
 #pragma once
 
 #include <string>
@@ -9,10 +9,10 @@
 
 namespace carillon::mesh {
 
-/// Moves every element to the rank that `part` (e) names and numbers the nodes; the block is empty afterwards, but for its IndexPartitions.
-/// Fills all of DistributedMesh but the report's cut, and `on_seam` (n): which local nodes other ranks touch too. has_fixed: whether any
-/// node may be fixed, the same on every rank. `name` begins messages.
-/// Collective. Throws on every rank: InputError when no node is free, SystemError when memory runs out.
+/// Moves every element to rank `part` (e) and numbers the nodes; the block is empty afterwards, except for its IndexPartitions. Fills
+/// DistributedMesh except the cut in the report, and `on_seam` (n): local nodes also touched by other ranks. has_fixed: true if any node
+/// may be fixed, the same on every rank. `name` starts messages. Collective. Throws on every rank: InputError if no node is free,
+/// SystemError if memory runs out.
 DistributedMesh redistribute(const comm::Communicator& comm, const std::string& name, MeshBlock& block,
                              const std::vector<std::int32_t>& part, bool has_fixed, std::vector<char>& on_seam);
 

@@ -14,9 +14,9 @@
 #include <utility>
 
 #include "precompute/comm/exchange.hpp"
-#include "precompute/mesh/read.hpp"
 #include "precompute/mesh/parallel/fixed_nodes.hpp"
 #include "precompute/mesh/parallel/source.hpp"
+#include "precompute/mesh/read.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::parallel_mesh {
@@ -169,7 +169,7 @@ std::vector<std::int64_t> orient(MeshBlock& block, const Touched& touched, const
       longest = std::max(longest, edge[m][0] * edge[m][0] + edge[m][1] * edge[m][1] + edge[m][2] * edge[m][2]);
     }
     const Vec3 &a = edge[0], &b = edge[2], &c = edge[3];
-    const double determinant = a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
+    const double determinant = calc_det(a, b, c);
     for (std::size_t k = 0; k < 3; ++k) block.centres_m[e][k] = (at(0)[k] + at(1)[k] + at(2)[k] + at(3)[k]) / 4;
     if (!(std::abs(determinant) > kFlat * longest * std::sqrt(longest))) {
       flat.push_back(block.elements.own_begin() + static_cast<std::int64_t>(e));

@@ -20,10 +20,6 @@ namespace {
 // The six orders in which a monotone path takes the three axes, and whether the order is an odd permutation.
 constexpr std::array<std::array<int, 4>, 6> kPaths{{{0, 1, 2, 0}, {1, 2, 0, 0}, {2, 0, 1, 0}, {0, 2, 1, 1}, {2, 1, 0, 1}, {1, 0, 2, 1}}};
 
-double calc_distance(const Vec3& a, const Vec3& b) {
-  return std::sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
-}
-
 void append_tet(mesh::TetMesh& mesh, std::int32_t a, std::int32_t b, std::int32_t c, std::int32_t d) {
   const auto from_a = [&](std::int32_t n) {
     return Vec3{mesh.nodes_m[n][0] - mesh.nodes_m[a][0], mesh.nodes_m[n][1] - mesh.nodes_m[a][1], mesh.nodes_m[n][2] - mesh.nodes_m[a][2]};
@@ -38,7 +34,7 @@ void append_octahedron(mesh::TetMesh& mesh, const std::array<std::int32_t, 6>& o
   int best = 0;
   double best_length = HUGE_VAL;
   for (int i = 0; i < 3; ++i) {
-    const double length = calc_distance(mesh.nodes_m[o[i]], mesh.nodes_m[o[i + 3]]);
+    const double length = norm(mesh.nodes_m[o[i]] - mesh.nodes_m[o[i + 3]]);
     if (length < best_length * (1.0 - 1e-9)) {
       best_length = length;
       best = i;

@@ -1,5 +1,5 @@
-// Source:     OpenBLAS 0.3.21, driver/others/dynamic.c (names of kernels, what each needs); README, "Run-time environment variables".
-// Deviations: kernels with a name that is not in the list below are newer than the list.
+// Source: OpenBLAS 0.3.21, driver/others/dynamic.c (names of kernels and their requirements); README, "Run-time environment variables".
+// Unlisted kernels are assumed to be newer than the list.
 #include "precompute/petsc/launch/blas_kernels.hpp"
 
 #include <algorithm>

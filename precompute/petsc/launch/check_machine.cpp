@@ -22,17 +22,16 @@ constexpr rlim_t kFileBytes = 8U << 20;  // Open MPI starts within 4.2 MB; its l
 void check_machine() {
   std::error_code error;
   std::string probe = (std::filesystem::temp_directory_path(error) / "carillon-XXXXXX").string();
-  if (!error) {  // Open MPI creates a missing folder, or takes another
+  if (!error) {  // Open MPI creates a missing folder, or uses another
     if (::mkdtemp(probe.data()) == nullptr)
-      throw SystemError(fmt::format("{}: no temporary file can be made here: {}; make room there, or name another folder by TMPDIR",
+      throw SystemError(fmt::format("{}: cannot create temporary files: {}; free space there, or set TMPDIR to another folder",
                                     std::filesystem::path(probe).parent_path().string(), std::strerror(errno)));
     ::rmdir(probe.c_str());
   }
   rlimit limit{};
   if (::getrlimit(RLIMIT_FSIZE, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY && limit.rlim_cur < kFileBytes)
-    throw SystemError(
-        fmt::format("files may have at most {} bytes here (ulimit -f, in KiB), too few for MPI to start; raise the limit to {} MiB",
-                    limit.rlim_cur, kFileBytes >> 20));
+    throw SystemError(fmt::format("the file size limit is {} bytes (ulimit -f, in KiB), too low for MPI to start; raise it to {} MiB",
+                                  limit.rlim_cur, kFileBytes >> 20));
 }
 
 }  // namespace carillon::launch

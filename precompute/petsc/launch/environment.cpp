@@ -1,6 +1,6 @@
-// Method: OpenBLAS picks its kernels while it is loaded, so the library that a program would get is loaded here and asked.
+// Method: OpenBLAS selects its kernels when it is loaded, so the library that a program would get is loaded here and queried.
 // Source: OpenBLAS 0.3.21, README, "Run-time environment variables"; Open MPI 4.1, ompi_info --param; hwloc 2.9, HWLOC_COMPONENTS;
-//         ld.so(8), LD_PRELOAD; GNU C Library 2.36 manual, 38.1 (glibc.malloc.hugetlb).
+// ld.so(8), LD_PRELOAD; GNU C Library 2.36 manual, 38.1 (glibc.malloc.hugetlb).
 #include "precompute/petsc/launch/environment.hpp"
 
 #include <dlfcn.h>
@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Ranks that all run on this host, by what their launcher says.
+/// True if the launcher reports all ranks on this host.
 bool is_on_one_host() {
   const char* all = std::getenv("OMPI_COMM_WORLD_SIZE");
   const char* here = std::getenv("OMPI_COMM_WORLD_LOCAL_SIZE");
@@ -25,7 +25,7 @@ bool is_on_one_host() {
   return !base::is_launched();
 }
 
-/// What OpenBLAS takes on this processor by itself; empty where the BLAS is another, or was built for one processor only.
+/// Kernels that OpenBLAS selects on this processor; empty for another BLAS, or a build for one processor only.
 std::string find_default_kernels() {
   void* blas = ::dlopen("libblas.so.3", RTLD_LAZY | RTLD_LOCAL);
   if (blas == nullptr) return {};

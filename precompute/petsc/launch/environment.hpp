@@ -1,24 +1,23 @@
-// What has to be in the environment before MPI, PETSc and the BLAS are loaded.
+// Environment that must be set before MPI, PETSc and the BLAS are loaded.
 #pragma once
 
 #include <filesystem>
 
 namespace carillon::launch {
 
-/// Sets, where the user has not:
-/// - one BLAS thread and one OpenMP thread a rank (always): the panels of the factor are small, and idle threads would slow other ranks;
-/// - OPENBLAS_CORETYPE, where OpenBLAS would take kernels for older processors than this one: its releases know processors by number, and
-///   every later one is a Pentium 4 to them;
-/// - Open MPI's transport ob1, where all ranks are on this host: asking each network library takes 0.2 s;
-/// - one rank without a launcher starts by itself: no daemon, no network, no session folder, and 0.15 s less;
+/// Sets, unless set by the user, for this process and its children:
+/// - one BLAS thread and one OpenMP thread per rank (always): the panels of the factor are small, and idle threads slow other ranks;
+/// - OPENBLAS_CORETYPE, if OpenBLAS would select kernels for older processors: its releases know processors by number, and treat every
+/// later one as a Pentium 4;
+/// - the ob1 transport of Open MPI if all ranks are on this host: querying each network library takes 0.2 s;
+/// - a single rank without a launcher starts isolated: no daemon, no network, no session folder, and 0.15 s less;
 /// - HWLOC_COMPONENTS without displays: hwloc opens :0 to :9 to list graphics cards, and Xlib ends the process when such a server ends;
-/// - GLIBC_TUNABLES: large allocations ask for pages of 2 MB; K, M and the basis are touched from end to end, and on a virtual machine a
-///   fresh page of 4 kB cost as much as all that is done with it (docs/decisions/launcher.md);
-/// - no PETSC_OPTIONS (always): what a run does is in its job file and its command line.
-/// For this process and those it starts or becomes.
+/// - GLIBC_TUNABLES: large allocations request 2 MB pages; K, M and the basis are used completely, and on a virtual machine a fresh 4 kB
+/// page costs as much as the computation on it (docs/decisions/launcher.md);
+/// - no PETSC_OPTIONS (always): a run depends on its job file and command line only.
 void prepare_environment();
 
-/// Has the programs that this one becomes load `library` before all others.
+/// Preloads `library` in programs started by or replacing this process.
 void preload(const std::filesystem::path& library);
 
 }  // namespace carillon::launch

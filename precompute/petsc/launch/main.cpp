@@ -1,4 +1,4 @@
-// carillon-precompute, as users and mpirun start it: does what must be done before MPI starts, and becomes the solver.
+// carillon-precompute, as started by users and mpirun: prepares the environment before MPI starts, then becomes the solver.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -24,7 +24,7 @@ int main(int argc, char** argv) {
     launch::prepare_environment();
     if (std::find(argv, own_end, std::string_view("--profile")) != own_end)
       launch::preload(base::find_helper("libcarillon_mpi_profile.so"));
-    // By the solver's path, whose last part is the launcher's: lists of processes show the name that was typed.
+    // Keeps the typed name in process lists: the solver has the same file name as the launcher.
     std::vector<std::string> words(argv, argv + argc);
     words.at(0) = base::find_helper("carillon-precompute").string();
     base::become(words);

@@ -1,9 +1,8 @@
-// Counts the messages of a run. A library of its own, which carillon-precompute --profile preloads.
+// Counts the messages of a run. A separate library preloaded by carillon-precompute --profile.
 //
-// Method:     It defines MPI_Send and so on; each counts and calls the next definition: MPI's, or that of another profiler.
-// Source:     MPI 3.1, chapter 14 (profiling interface).
-// Deviations: the next definition by dlsym(RTLD_NEXT) in place of PMPI_Send, so that other profilers see the calls as well; calls from
-// Fortran (MUMPS) and on several threads are not seen.
+// Method: Defines MPI_Send etc.; each counts and calls the next definition by dlsym(RTLD_NEXT) instead of PMPI_Send, so that other
+// profilers see the calls as well. Calls from Fortran (MUMPS) and from several threads are not counted.
+// Source: MPI 3.1, chapter 14 (profiling interface).
 #include <dlfcn.h>
 #include <mpi.h>
 
@@ -16,7 +15,7 @@ namespace {
 
 CarillonMpiCounts totals{};
 
-/// Counts the time of its life as inside MPI.
+/// Adds its lifetime to the time inside MPI.
 class Inside {
  public:
   Inside() : start_s_(carillon::base::get_steady_s()) {}
@@ -59,7 +58,7 @@ bool is_root(int root, MPI_Comm comm) {
 }
 
 std::unordered_map<MPI_Request, double>& get_persistent() {
-  static auto* const sends = new std::unordered_map<MPI_Request, double>;  // as long as the process: requests may outlive static objects
+  static auto* const sends = new std::unordered_map<MPI_Request, double>;  // never destroyed: requests may outlive static objects
   return *sends;
 }
 
@@ -70,7 +69,7 @@ void book_start(MPI_Request request) {
   totals.bytes += found->second;
 }
 
-/// The definition that comes after this library's.
+/// The next definition after that of this library.
 template <typename Function>
 Function* find_next(const char* name) {
   return reinterpret_cast<Function*>(::dlsym(RTLD_NEXT, name));
@@ -78,7 +77,7 @@ Function* find_next(const char* name) {
 
 }  // namespace
 
-// CARILLON_COUNT(what is booked, name, (parameters), (arguments))
+// CARILLON_COUNT(count statement, name, (parameters), (arguments))
 #define CARILLON_COUNT(booked, name, parameters, arguments)    \
   int name parameters {                                        \
     static const auto next = find_next<decltype(name)>(#name); \

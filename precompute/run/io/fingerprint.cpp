@@ -4,13 +4,11 @@
 // Deviations: the sums guard against mistakes and damage; two meshes with the same sum can be made on purpose.
 #include "precompute/run/io/fingerprint.hpp"
 
-#include <json/json.h>
-
 #include <bit>
-#include <sstream>
 
 #include "precompute/petsc/noise.hpp"
 #include "runtime/base/error.hpp"
+#include "runtime/base/json.hpp"
 #include "runtime/base/version.hpp"
 
 namespace carillon::io {
@@ -43,13 +41,10 @@ Setting read_setting(eigen::NumberReader& from) {
 }
 
 Fingerprint find_job_fingerprint(const job::JobSpec& job, const std::vector<std::string>& solver_options) {
-  std::istringstream stream(job::resolved_json(job, "/", ""));
-  Json::Value root;
-  std::string errors;
-  if (!Json::parseFromStream(Json::CharReaderBuilder(), stream, &root, &errors)) throw SolveError("internal: the resolved job is not JSON");
-  for (const char* key : {"mesh", "bank", "resources"}) root.removeMember(key);
-  if (root.isMember("body")) root["body"].removeMember("surface");
-  std::string text = find_program_version() + "\n" + Json::writeString(Json::StreamWriterBuilder(), root);
+  base::Json root = base::Json::parse(job::resolved_json(job, "/", "")).value();
+  for (const char* key : {"mesh", "bank", "resources"}) root.erase(key);
+  if (root.has("body")) root["body"].erase("surface");
+  std::string text = find_program_version() + "\n" + root.sorted_text({.indentation = "\t", .breaks_arrays = true});
   for (const std::string& word : solver_options) text += "\n" + word;
   return base::calc_sha256(text);
 }

@@ -43,6 +43,13 @@ struct Surfaces {
   std::vector<std::int64_t> gathered_vertices;  // of the vertices
   std::size_t vertex_total = 0, triangle_total = 0;
   SurfaceTables tables;  // of all ranks
+
+ private:
+  /// Slots of this rank's triangles, body after body. vertex_of: (nodes) index into `node`. numbers: of all triangles, ascending.
+  void fill_slots(const SurfacePart& part, const std::vector<std::int32_t>& vertex_of, const std::vector<std::int64_t>& numbers);
+  void add_slot(const Triangle& corner, std::int64_t at, std::int32_t of_twin);
+  /// Fills up to a multiple of kLane; the new number of slots.
+  std::size_t pad();
 };
 
 inline Vec3 get_vertex(const double* rows, std::int32_t row) { return {rows[row], rows[row + 1], rows[row + 2]}; }

@@ -135,6 +135,109 @@ void append_body(const SolidBody& solid, Assembly& assembly, std::vector<Numbers
                      straight, static_cast<std::int32_t>(width), static_cast<std::int32_t>(number.size())});
 }
 
+/// An assembly as rank 0 knows it, in arrays that can be broadcast.
+struct Draft {
+  Assembly assembly;
+  std::vector<Numbers> numbers;  // (bodies)
+  std::vector<std::string> names;
+  std::vector<std::int32_t> node_of_mesh;  // of all bodies
+  std::vector<SheetNumbers> sheets;
+  std::vector<Vec3> vertices_m;       // of all sheets
+  std::vector<std::int32_t> corners;  // (triangles of all sheets, 3)
+  std::vector<char> clamped;          // (vertices of all sheets)
+};
+
+void append_sheet(const SheetBody& sheet, Draft& draft) {
+  check_sheet(sheet);
+  if (sheet.mesh.triangles.empty()) throw InputError(fmt::format("body '{}' has no triangles", sheet.name));
+  Assembly& assembly = draft.assembly;
+  const double alpha1 = sheet.law.alpha1_s;
+  const SheetElements elements = make_elements(sheet.mesh, sheet.clamped);
+  const std::int32_t first = assembly.node_count();
+  for (const Vec3& x : elements.rest_m) assembly.nodes_m.push_back(x);
+  for (std::size_t t = 0; t < elements.nodes.size(); ++t) {
+    for (const std::int32_t node : elements.nodes[t]) assembly.tets.push_back(node < 0 ? -1 : first + node);
+    assembly.element_of_mesh.push_back(static_cast<std::int32_t>(t));
+  }
+  for (std::int32_t n = 0; n < elements.vertices; ++n) draft.node_of_mesh.push_back(first + n);
+  const auto triangles = static_cast<std::int32_t>(elements.nodes.size());
+  draft.numbers.push_back(
+      {{sheet.law.lambda_pa, sheet.law.mu_pa, alpha1 * sheet.law.lambda_pa, alpha1 * sheet.law.mu_pa, sheet.law.density_kg_m3},
+       sheet.mass_damping_per_s,
+       elements.count_nodes(),
+       triangles,
+       triangles,
+       9,
+       elements.vertices});
+  draft.sheets.push_back({sheet.law, static_cast<std::int32_t>(draft.names.size()), elements.vertices, triangles});
+  draft.vertices_m.insert(draft.vertices_m.end(), sheet.mesh.vertices_m.begin(), sheet.mesh.vertices_m.end());
+  for (const Triangle& triangle : sheet.mesh.triangles) draft.corners.insert(draft.corners.end(), triangle.begin(), triangle.end());
+  for (const bool is_clamped : sheet.clamped) draft.clamped.push_back(is_clamped ? 1 : 0);
+  draft.names.push_back(sheet.name);
+}
+
+/// From rank 0 to all. Collective.
+void broadcast(const comm::Communicator& comm, Draft& draft) {
+  const auto share = [&](auto& values) { values = comm.broadcast(std::move(values)); };
+  share(draft.names);
+  share(draft.sheets);
+  share(draft.vertices_m);
+  share(draft.corners);
+  share(draft.clamped);
+  share(draft.numbers);
+  share(draft.node_of_mesh);
+  share(draft.assembly.nodes_m);
+  share(draft.assembly.tets);
+  share(draft.assembly.element_of_mesh);
+}
+
+void fill_bodies(Draft& draft) {
+  std::int32_t node = 0, element = 0;
+  std::size_t at = 0;
+  auto of_mesh = draft.node_of_mesh.begin();
+  for (std::size_t b = 0; b < draft.numbers.size(); ++b) {
+    const Numbers& n = draft.numbers[b];
+    Assembly::Body body{draft.names[b],
+                        n.law,
+                        n.mass_damping_per_s,
+                        node,
+                        node + n.nodes,
+                        element,
+                        element + n.elements,
+                        element + n.straight,
+                        at,
+                        n.width,
+                        {},
+                        false,
+                        {},
+                        {}};
+    body.node_of_mesh.assign(of_mesh, of_mesh + n.mesh_nodes);
+    of_mesh += n.mesh_nodes;
+    node += n.nodes;
+    element += n.elements;
+    at += static_cast<std::size_t>(n.elements) * static_cast<std::size_t>(n.width);
+    draft.assembly.bodies.push_back(std::move(body));
+  }
+}
+
+void fill_sheets(Draft& draft) {
+  std::size_t vertex = 0, corner = 0;
+  for (const SheetNumbers& sheet : draft.sheets) {
+    SheetMesh mesh;
+    std::vector<bool> is_clamped;
+    for (std::int32_t v = 0; v < sheet.vertices; ++v, ++vertex) {
+      mesh.vertices_m.push_back(draft.vertices_m[vertex]);
+      is_clamped.push_back(draft.clamped[vertex] != 0);
+    }
+    for (std::int32_t t = 0; t < sheet.triangles; ++t, corner += 3)
+      mesh.triangles.push_back({draft.corners[corner], draft.corners[corner + 1], draft.corners[corner + 2]});
+    Assembly::Body& body = draft.assembly.bodies[sheet.body];
+    body.is_sheet = true;
+    body.sheet = make_elements(mesh, is_clamped);
+    body.sheet_law = sheet.law;
+  }
+}
+
 }  // namespace
 
 std::int32_t Assembly::find_body_of_node(std::int32_t node) const {
@@ -178,105 +281,25 @@ Assembly make_assembly(const comm::Communicator& comm, const std::vector<SolidBo
 }
 
 Assembly make_assembly(const comm::Communicator& comm, const std::vector<AnyBody>& bodies) {
-  Assembly assembly;
-  std::vector<Numbers> numbers;
-  std::vector<std::int32_t> node_of_mesh;
-  std::vector<std::string> names;
-  std::vector<SheetNumbers> sheets;
-  std::vector<Vec3> vertices_m;
-  std::vector<std::int32_t> corners;
-  std::vector<char> clamped;
+  Draft draft;
   comm.agree([&] {
     if (!comm.is_root()) return;
     if (bodies.empty()) throw InputError("there is no body to move");
     for (const AnyBody& body : bodies) {
       if (const auto* solid = std::get_if<SolidBody>(&body)) {
-        append_body(*solid, assembly, numbers, node_of_mesh);
-        names.push_back(solid->name);
-        continue;
+        append_body(*solid, draft.assembly, draft.numbers, draft.node_of_mesh);
+        draft.names.push_back(solid->name);
+      } else {
+        append_sheet(std::get<SheetBody>(body), draft);
       }
-      const auto& sheet = std::get<SheetBody>(body);
-      check_sheet(sheet);
-      if (sheet.mesh.triangles.empty()) throw InputError(fmt::format("body '{}' has no triangles", sheet.name));
-      const double alpha1 = sheet.law.alpha1_s;
-      const SheetElements elements = make_elements(sheet.mesh, sheet.clamped);
-      const std::int32_t first = assembly.node_count();
-      for (const Vec3& x : elements.rest_m) assembly.nodes_m.push_back(x);
-      for (std::size_t t = 0; t < elements.nodes.size(); ++t) {
-        for (const std::int32_t node : elements.nodes[t]) assembly.tets.push_back(node < 0 ? -1 : first + node);
-        assembly.element_of_mesh.push_back(static_cast<std::int32_t>(t));
-      }
-      for (std::int32_t n = 0; n < elements.vertices; ++n) node_of_mesh.push_back(first + n);
-      const auto triangles = static_cast<std::int32_t>(elements.nodes.size());
-      numbers.push_back(
-          {{sheet.law.lambda_pa, sheet.law.mu_pa, alpha1 * sheet.law.lambda_pa, alpha1 * sheet.law.mu_pa, sheet.law.density_kg_m3},
-           sheet.mass_damping_per_s,
-           elements.count_nodes(),
-           triangles,
-           triangles,
-           9,
-           elements.vertices});
-      sheets.push_back({sheet.law, static_cast<std::int32_t>(names.size()), elements.vertices, triangles});
-      vertices_m.insert(vertices_m.end(), sheet.mesh.vertices_m.begin(), sheet.mesh.vertices_m.end());
-      for (const Triangle& triangle : sheet.mesh.triangles) corners.insert(corners.end(), triangle.begin(), triangle.end());
-      for (const bool is_clamped : sheet.clamped) clamped.push_back(is_clamped ? 1 : 0);
-      names.push_back(sheet.name);
     }
   });
-  names = comm.broadcast(std::move(names));
-  sheets = comm.broadcast(std::move(sheets));
-  vertices_m = comm.broadcast(std::move(vertices_m));
-  corners = comm.broadcast(std::move(corners));
-  clamped = comm.broadcast(std::move(clamped));
-  numbers = comm.broadcast(std::move(numbers));
-  node_of_mesh = comm.broadcast(std::move(node_of_mesh));
-  assembly.nodes_m = comm.broadcast(std::move(assembly.nodes_m));
-  assembly.tets = comm.broadcast(std::move(assembly.tets));
-  assembly.element_of_mesh = comm.broadcast(std::move(assembly.element_of_mesh));
+  broadcast(comm, draft);
   comm.agree([&] {
-    std::int32_t node = 0, element = 0;
-    std::size_t at = 0;
-    auto of_mesh = node_of_mesh.begin();
-    for (std::size_t b = 0; b < numbers.size(); ++b) {
-      const Numbers& n = numbers[b];
-      Assembly::Body body{names[b],
-                          n.law,
-                          n.mass_damping_per_s,
-                          node,
-                          node + n.nodes,
-                          element,
-                          element + n.elements,
-                          element + n.straight,
-                          at,
-                          n.width,
-                          {},
-                          false,
-                          {},
-                          {}};
-      body.node_of_mesh.assign(of_mesh, of_mesh + n.mesh_nodes);
-      of_mesh += n.mesh_nodes;
-      node += n.nodes;
-      element += n.elements;
-      at += static_cast<std::size_t>(n.elements) * static_cast<std::size_t>(n.width);
-      assembly.bodies.push_back(std::move(body));
-    }
-    std::size_t vertex = 0, corner = 0;
-    for (const SheetNumbers& sheet : sheets) {
-      SheetMesh mesh;
-      std::vector<bool> is_clamped;
-      for (std::int32_t v = 0; v < sheet.vertices; ++v, ++vertex) {
-        mesh.vertices_m.push_back(vertices_m[vertex]);
-        is_clamped.push_back(clamped[vertex] != 0);
-      }
-      for (std::int32_t t = 0; t < sheet.triangles; ++t, corner += 3)
-        mesh.triangles.push_back({corners[corner], corners[corner + 1], corners[corner + 2]});
-      Assembly::Body& body = assembly.bodies[sheet.body];
-      body.is_sheet = true;
-      body.sheet = make_elements(mesh, is_clamped);
-      body.sheet_law = sheet.law;
-    }
+    fill_bodies(draft);
+    fill_sheets(draft);
   });
-  return assembly;
+  return std::move(draft.assembly);
 }
 
 std::vector<std::array<std::int32_t, 6>> list_skin(const Assembly& assembly, std::int32_t body_number) {

@@ -40,8 +40,10 @@ void add(Quad& f, const Vec3& force) {
   f.z += force[2];
 }
 
+}  // namespace
+
 /// Cells of a grid as keys.
-struct Grid {
+struct Contacts::Grid {
   double cell_m;
   std::unordered_map<std::int64_t, std::vector<std::int32_t>> at;
   std::array<std::int64_t, 3> find(const Vec3& p) const {
@@ -50,8 +52,6 @@ struct Grid {
   }
   static std::int64_t hash(const std::array<std::int64_t, 3>& c) { return (c[0] * 73856093) ^ (c[1] * 19349663) ^ (c[2] * 83492791); }
 };
-
-}  // namespace
 
 double calc_hunt_crossley(double restitution) {
   if (restitution >= 1.0) return 0.0;
@@ -152,8 +152,30 @@ void Contacts::check_start() const {
 }
 
 void Contacts::search(const Quad* u) {
-  // Positions of all, on every rank: those that others own are 0 here.
-  std::vector<double> all(3 * surface_.nodes.size());
+  gather_positions(u);
+  near_obstacles_.clear();
+  for (const std::int32_t i : own_)
+    for (std::size_t o = 0; o < obstacles_.size(); ++o) {
+      const std::size_t s = i;
+      if (find_clearance(obstacles_[o], found_at_m_[s]).distance_m < surface_.nodes[s].reach_m + margin_m_)
+        near_obstacles_.push_back({i, static_cast<std::int32_t>(o)});
+    }
+  candidates_.clear();
+  active_index_.assign(surface_.nodes.size(), -1);
+  if (strikers_.empty() && bodies_ < 2) return;
+  const Grid grid = make_grid();
+  std::vector<bool> is_active(surface_.nodes.size());
+  for (std::size_t s = 0; s < strikers_.size(); ++s)
+    find_candidates(grid, -1 - static_cast<std::int32_t>(s), -1, strikers_[s].position_m, strikers_[s].radius_m + margin_m_, is_active);
+  if (bodies_ > 1)
+    for (std::size_t i = 0; i < surface_.nodes.size(); ++i)
+      find_candidates(grid, static_cast<std::int32_t>(i), surface_.nodes[i].body, found_at_m_[i], surface_.nodes[i].reach_m + margin_m_,
+                      is_active);
+  order_active(is_active);
+}
+
+void Contacts::gather_positions(const Quad* u) {
+  std::vector<double> all(3 * surface_.nodes.size());  // 0: owned by another rank
   for (const std::int32_t i : own_) {
     const std::size_t s = i;
     const Vec3 at = surface_.nodes[s].rest_m + to_vector(u[place_[s]]);
@@ -163,18 +185,9 @@ void Contacts::search(const Quad* u) {
   for (std::size_t i = 0; i < surface_.nodes.size(); ++i) found_at_m_[i] = {all[3 * i], all[3 * i + 1], all[3 * i + 2]};
   strikers_at_m_.clear();
   for (const BallStriker& striker : strikers_) strikers_at_m_.push_back(striker.position_m);
+}
 
-  near_obstacles_.clear();
-  for (const std::int32_t i : own_)
-    for (std::size_t o = 0; o < obstacles_.size(); ++o) {
-      const std::size_t s = i;
-      if (find_clearance(obstacles_[o], found_at_m_[s]).distance_m < surface_.nodes[s].reach_m + margin_m_)
-        near_obstacles_.push_back({i, static_cast<std::int32_t>(o)});
-    }
-
-  candidates_.clear();
-  active_index_.assign(surface_.nodes.size(), -1);
-  if (strikers_.empty() && bodies_ < 2) return;
+Contacts::Grid Contacts::make_grid() const {
   double longest = edge_m_;
   for (const auto& triangle : surface_.triangles)
     for (std::size_t c = 0; c < 3; ++c) longest = std::max(longest, norm(found_at_m_[triangle[(c + 1) % 3]] - found_at_m_[triangle[c]]));
@@ -192,39 +205,38 @@ void Contacts::search(const Quad* u) {
       for (std::int64_t j = from[1]; j <= to[1]; ++j)
         for (std::int64_t k = from[2]; k <= to[2]; ++k) grid.at[Grid::hash({i, j, k})].push_back(static_cast<std::int32_t>(t));
   }
-  std::vector<bool> is_active(surface_.nodes.size());
-  const auto find_near = [&](std::int32_t vertex, std::int32_t body, const Vec3& p, double reach) {
-    const auto from = grid.find(p - Vec3{reach, reach, reach}), to = grid.find(p + Vec3{reach, reach, reach});
-    std::map<std::int32_t, std::vector<std::int32_t>> near;  // by body
-    for (std::int64_t i = from[0]; i <= to[0]; ++i)
-      for (std::int64_t j = from[1]; j <= to[1]; ++j)
-        for (std::int64_t k = from[2]; k <= to[2]; ++k) {
-          const auto cell = grid.at.find(Grid::hash({i, j, k}));
-          if (cell == grid.at.end()) continue;
-          for (const std::int32_t t : cell->second) {
-            const auto& triangle = surface_.triangles[t];
-            const std::size_t a = triangle[0], b = triangle[1], c = triangle[2];
-            if (surface_.nodes[a].body == body) continue;
-            const Vec3 w = weigh_corners(p, found_at_m_[a], found_at_m_[b], found_at_m_[c]);
-            const Vec3 at = w[0] * found_at_m_[a] + w[1] * found_at_m_[b] + w[2] * found_at_m_[c];
-            if (norm(p - at) < reach + surface_.nodes[a].reach_m) near[surface_.nodes[a].body].push_back(t);
-          }
-        }
-    for (auto& [other, triangles] : near) {
-      std::sort(triangles.begin(), triangles.end());
-      triangles.erase(std::unique(triangles.begin(), triangles.end()), triangles.end());
-      for (const std::int32_t t : triangles)
-        for (const std::int32_t node : surface_.triangles[t]) is_active[node] = true;
-      if (vertex >= 0) is_active[vertex] = true;
-      candidates_.push_back({vertex, other, std::move(triangles)});
-    }
-  };
-  for (std::size_t s = 0; s < strikers_.size(); ++s)
-    find_near(-1 - static_cast<std::int32_t>(s), -1, strikers_[s].position_m, strikers_[s].radius_m + margin_m_);
-  if (bodies_ > 1)
-    for (std::size_t i = 0; i < surface_.nodes.size(); ++i)
-      find_near(static_cast<std::int32_t>(i), surface_.nodes[i].body, found_at_m_[i], surface_.nodes[i].reach_m + margin_m_);
+  return grid;
+}
 
+void Contacts::find_candidates(const Grid& grid, std::int32_t vertex, std::int32_t body, const Vec3& p, double reach,
+                               std::vector<bool>& is_active) {
+  const auto from = grid.find(p - Vec3{reach, reach, reach}), to = grid.find(p + Vec3{reach, reach, reach});
+  std::map<std::int32_t, std::vector<std::int32_t>> near;  // by body
+  for (std::int64_t i = from[0]; i <= to[0]; ++i)
+    for (std::int64_t j = from[1]; j <= to[1]; ++j)
+      for (std::int64_t k = from[2]; k <= to[2]; ++k) {
+        const auto cell = grid.at.find(Grid::hash({i, j, k}));
+        if (cell == grid.at.end()) continue;
+        for (const std::int32_t t : cell->second) {
+          const auto& triangle = surface_.triangles[t];
+          const std::size_t a = triangle[0], b = triangle[1], c = triangle[2];
+          if (surface_.nodes[a].body == body) continue;
+          const Vec3 w = weigh_corners(p, found_at_m_[a], found_at_m_[b], found_at_m_[c]);
+          const Vec3 at = w[0] * found_at_m_[a] + w[1] * found_at_m_[b] + w[2] * found_at_m_[c];
+          if (norm(p - at) < reach + surface_.nodes[a].reach_m) near[surface_.nodes[a].body].push_back(t);
+        }
+      }
+  for (auto& [other, triangles] : near) {
+    std::sort(triangles.begin(), triangles.end());
+    triangles.erase(std::unique(triangles.begin(), triangles.end()), triangles.end());
+    for (const std::int32_t t : triangles)
+      for (const std::int32_t node : surface_.triangles[t]) is_active[node] = true;
+    if (vertex >= 0) is_active[vertex] = true;
+    candidates_.push_back({vertex, other, std::move(triangles)});
+  }
+}
+
+void Contacts::order_active(const std::vector<bool>& is_active) {
   active_.clear();
   std::vector<std::vector<std::int32_t>> by_rank(comm_.size());
   for (std::size_t i = 0; i < is_active.size(); ++i) {

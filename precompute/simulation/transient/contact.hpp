@@ -78,6 +78,12 @@ class Contacts : public ExternalForces {
 
   void check_start() const;
   void search(const Quad* u);
+  struct Grid;
+  void gather_positions(const Quad* u);
+  Grid make_grid() const;
+  /// Triangles of other bodies within reach of a vertex, or of striker -1 - vertex.
+  void find_candidates(const Grid& grid, std::int32_t vertex, std::int32_t body, const Vec3& p, double reach, std::vector<bool>& is_active);
+  void order_active(const std::vector<bool>& is_active);
   void look_around(const StepTime& time, const Quad* u, const Quad* v);
   void gather_active(const Quad* u, const Quad* v);
   void add_obstacles(const StepTime& time, const Quad* u, const Quad* v, Quad* f);

@@ -1,8 +1,8 @@
-// Method:     the convex hull of the directions, one by one: the triangles that see a new point go, and their border is joined to it. Where
-//             four directions lie in one plane (every regular grid has many such) a shift outwards of less than 1e-7, another for each,
-//             says which diagonal is taken. Shares are those of the direction in its triangle, d = sum of share_i u_i, by Cramer's rule.
+// Method:     incremental convex hull: faces that see a new point are removed, and their border is joined to it. Coplanar quadruples (every
+//             regular grid has many) are broken by outward shifts below 1e-7, different for each point. Weights by Cramer's rule: d = sum
+//             of weight_i u_i.
 // Source:     Preparata and Hong 1977 (hull); Devillers, Pion and Teillaud 2002 (walk in a triangulation).
-// Deviations: all triangles are looked at for every point, without a graph of conflicts: a second for 20 000 directions.
+// Deviations: no conflict graph: every point tests all faces; 1 s for 20 000 directions.
 #include "runtime/acoustics/head/directions.hpp"
 
 #include <algorithm>
@@ -17,18 +17,18 @@
 namespace carillon::head {
 namespace {
 
-constexpr double kShift = 1e-7;      // of a corner; directions kNearestRad apart bulge by 1.5e-6
-constexpr int kMaxSteps = 256;       // of a walk
-constexpr double kMinVolume = 1e-3;  // six times that of the first tetrahedron
+constexpr double kShift = 1e-7;      // of a point; points kNearestRad apart bulge by 1.5e-6
+constexpr int kMaxSteps = 256;       // per walk
+constexpr double kMinVolume = 1e-3;  // six times the volume of the first tetrahedron
 
-/// A plane through three points of the hull.
+/// Face of the hull with its plane.
 struct Face {
   std::array<int, 3> corner{};
   Vec3 normal{};
   double offset = 0.0;
 };
 
-/// Numbers in 0 to 1 that look random and are always the same.
+/// Deterministic pseudo-random number in 0..1.
 double scatter(std::uint64_t i) {
   std::uint64_t z = (i + 1) * 0x9E3779B97F4A7C15U;
   z = (z ^ (z >> 30U)) * 0xBF58476D1CE4E5B9U;
@@ -42,7 +42,7 @@ Face make_face(const std::vector<Vec3>& points, int a, int b, int c) {
   return {{a, b, c}, normal, dot(normal, at(a))};
 }
 
-/// Four points that are far from lying in one plane, the first faces of the hull; none where there are no such points.
+/// Faces of a tetrahedron of four points far from coplanar; empty if there are none.
 std::vector<Face> make_first_faces(const std::vector<Vec3>& points) {
   const auto find_most = [&](const auto& measure) {
     std::size_t best = 0;
@@ -64,7 +64,7 @@ std::vector<Face> make_first_faces(const std::vector<Vec3>& points) {
           make_face(points, t[2], t[3], t[0])};
 }
 
-/// Takes a point into the hull. `seen` is room that is used again.
+/// Adds a point to the hull. `seen`: reused buffer.
 void add_point(const std::vector<Vec3>& points, int p, std::vector<Face>& faces, std::vector<Face>& seen) {
   const Vec3& place = points[p];
   seen.clear();
@@ -77,7 +77,7 @@ void add_point(const std::vector<Vec3>& points, int p, std::vector<Face>& faces,
       ++f;
     }
   }
-  // The border of what is seen is one loop: its edges are those whose other side is not among the seen ones.
+  // The border is one loop: edges of visible faces whose other face is not visible.
   std::vector<std::array<int, 2>> edges;
   edges.reserve(3 * seen.size());
   for (const Face& face : seen)
@@ -115,9 +115,9 @@ Directions::Directions(const std::vector<Vec3>& unit, const std::string& name) :
   const bool is_closed = !faces.empty() && std::all_of(faces.begin(), faces.end(),
                                                        [&](const Face& face) { return face.offset > nearest * norm(face.normal); });
   if (!is_closed)
-    throw InputError(name + ": its directions leave out too much of the sphere around the head; a set that goes all round is needed");
+    throw InputError(name + ": its directions leave a gap on the sphere around the head; give a set that covers all directions");
   triangles_.reserve(faces.size());
-  std::vector<std::pair<std::array<int, 2>, int>> sides;  // an edge as a triangle goes along it, and which triangle
+  std::vector<std::pair<std::array<int, 2>, int>> sides;  // directed edge, and its triangle
   sides.reserve(3 * faces.size());
   for (const Face& face : faces) {
     const int t = static_cast<int>(triangles_.size());
@@ -129,7 +129,7 @@ Directions::Directions(const std::vector<Vec3>& unit, const std::string& name) :
     for (std::size_t i = 0; i < 3; ++i) {
       const std::array<int, 2> back{triangle.corner[(i + 2) % 3], triangle.corner[(i + 1) % 3]};
       const auto found = std::lower_bound(sides.begin(), sides.end(), std::pair{back, 0});
-      if (found == sides.end() || found->first != back) throw SolveError(name + ": the triangles between its directions do not close");
+      if (found == sides.end() || found->first != back) throw SolveError(name + ": the triangulation of its directions is not closed");
       triangle.neighbour[i] = found->second;
     }
   }

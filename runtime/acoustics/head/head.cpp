@@ -24,7 +24,7 @@ Blend find_by_angle(const ByAngle& head, const Vec3& direction, const Vec3& ear)
 
 Head::Head(Content content) : content_(std::move(content)) {
   max_delay_ = *std::max_element(content_.delays.begin(), content_.delays.end());
-  base::Sinc::get();  // so that no audio thread makes it
+  base::Sinc::get();  // built here, not on the audio thread
 }
 
 int Head::get_latency() const noexcept { return kOnset + base::kSincHalf - 1 + content_.origin_samples; }

@@ -1,11 +1,11 @@
-// What a head does to sound on its way to two ears: an impulse response and a delay for every direction and ear.
+// Head-related transfer: an impulse response and a delay per direction and ear.
 //
 //   auto head = head::make_sphere(48000.0);            // sphere.hpp: a rigid sphere, no file
 //   auto head = head::read_sofa("mine.sofa", 48000.0); // sofa.hpp: a measured head
-//   head::EarFilter filter(head);                      // ear_filter.hpp: one for each body and listener
+//   head::EarFilter filter(head);                      // ear_filter.hpp: one per body and listener
 //
-// Frame of the head: x forward, y left, z up; its origin is between the ears. A direction points from the head to the source. It is the
-// frame of SOFA files. Responses are pressures at an ear over the pressure that would be at the origin without the head.
+// Frame of the head (as in SOFA files): x forward, y left, z up, origin between the ears. Directions point from the head to the source.
+// Responses are the pressure at an ear over the pressure at the origin without the head.
 #pragma once
 
 #include <array>
@@ -14,49 +14,47 @@
 #include <variant>
 #include <vector>
 
-#include "runtime/base/vector.hpp"
 #include "runtime/acoustics/head/directions.hpp"
+#include "runtime/base/vector.hpp"
 
 namespace carillon::head {
 
-/// The sample of a response at which its sound begins, about; what comes before is ripple of the band limit.
+/// Approximate onset of a response [samples]; earlier samples are ripple of the band limit.
 inline constexpr int kOnset = 16;
 inline constexpr int kMaxTaps = 8192;
 inline constexpr double kMinRateHz = 8000.0, kMaxRateHz = 384000.0;
 
-/// What makes the response of one ear: the sum of three of a head's responses by their weights, which sum to 1.
+/// Response of one ear: weighted sum of three responses of the head, weights sum 1.
 struct Blend {
   std::array<int, 3> response{};
   std::array<float, 3> weight{};
   bool operator==(const Blend&) const = default;
 };
 
-/// A head that is the same from all sides: responses depend on the angle between source and ear alone. Response i is that of the angle
-/// i pi / steps.
+/// Rotationally symmetric head: responses depend on the angle between source and ear. Response i: angle i pi / steps.
 struct ByAngle {
   std::array<Vec3, 2> ears{};  // unit vectors, left and right
   int steps = 0;
 };
 
-/// Directions of a measured head: response 2 i is that of the left ear for direction i, 2 i + 1 that of the right one.
+/// Measured directions: response 2 i is that of the left ear for direction i, 2 i + 1 that of the right ear.
 struct ByDirection {
   Directions directions;
 };
 
-/// One head at one sample rate. Invariant: it does not change; all responses have as many taps, a multiple of kTapUnit, and begin
-/// at kOnset, so that they may be blended; delays are not negative. All that is heard lags by get_latency() behind what arrives at the
-/// origin. Any thread, several at once.
+/// A head at one sample rate. Immutable; all responses have the same number of taps, a multiple of kTapUnit, and begin at kOnset, so they
+/// can be blended; delays are not negative. Output lags by get_latency() behind arrival at the origin. Any thread, several at once.
 class Head {
  public:
   struct Content {
     double sample_rate_hz = 0.0;
     int taps = 0;
-    int origin_samples = 0;        // the delay of what arrives at the origin
+    int origin_samples = 0;        // delay of the origin
     std::vector<float> responses;  // (count, taps), row-major
     std::vector<double> delays;    // (count) [samples]
     std::variant<ByAngle, ByDirection> lookup;
   };
-  /// make_sphere() and read_sofa() make it.
+  /// Use make_sphere() or read_sofa().
   explicit Head(Content content);
 
   double get_sample_rate_hz() const noexcept { return content_.sample_rate_hz; }
@@ -66,14 +64,13 @@ class Head {
     const std::size_t taps = content_.taps;
     return std::span(content_.responses).subspan(static_cast<std::size_t>(i) * taps, taps);
   }
-  /// [samples], with origin_samples for what arrives at an ear when it would arrive at the origin.
+  /// Delay [samples]; origin_samples for arrival at an ear at the same time as at the origin.
   double get_delay(int i) const noexcept { return content_.delays[i]; }
   double get_max_delay() const noexcept { return max_delay_; }
-  /// Samples by which an EarFilter's output lags: sample n is what would arrive at the origin at sample n - get_latency(), earlier or later
-  /// by what the head makes of it.
+  /// Latency of an EarFilter [samples]: output n belongs to arrival at the origin at n - get_latency().
   int get_latency() const noexcept;
 
-  /// Left and right. `direction`: frame of the head, any length; of no length or not finite: straight ahead. [audio-thread]
+  /// Left and right response. `direction`: frame of the head, any length; zero or non-finite: straight ahead. [audio-thread]
   std::array<Blend, 2> find(const Vec3& direction) const noexcept;
 
  private:

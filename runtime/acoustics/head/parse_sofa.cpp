@@ -1,7 +1,6 @@
-// Method:     the child process calls libmysofa, checks all sizes and writes the numbers, or the reason why there are none, to a pipe. What
-//             the parent takes from there is bounded, and only counted, never interpreted.
+// Method:     the child process calls libmysofa, checks all sizes and writes the numbers, or an error text, to a pipe. The parent bounds
+//             and counts what it reads from the pipe and does not interpret it.
 // Source:     AES69-2015 (SOFA).
-// Deviations: none.
 #include "runtime/acoustics/head/parse_sofa.hpp"
 
 #include <fcntl.h>
@@ -24,22 +23,22 @@
 #include <span>
 #include <string_view>
 
-#include "runtime/base/descriptor.hpp"
-#include "runtime/base/error.hpp"
 #include "runtime/acoustics/head/head.hpp"
 #include "runtime/acoustics/head/sofa.hpp"
+#include "runtime/base/descriptor.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::head {
 namespace {
 
-constexpr std::uint64_t kMaxMemory = std::uint64_t{4} << 30U;  // bytes that the child takes in addition to what is there
-constexpr std::size_t kBytesPerS = 2000000;                    // a tenth of what libmysofa reads of a compressed file
-constexpr std::size_t kMaxWords = 1000;                        // bytes of a reason
+constexpr std::uint64_t kMaxMemory = std::uint64_t{4} << 30U;  // bytes that the child may allocate
+constexpr std::size_t kBytesPerS = 2000000;                    // a tenth of the speed of libmysofa with compressed files
+constexpr std::size_t kMaxWords = 1000;                        // bytes of an error text
 
 std::string_view explain(int error) {
   switch (error) {
     case MYSOFA_UNSUPPORTED_FORMAT:
-      return "it uses parts of HDF5 that libmysofa cannot read; write it again by a SOFA library";
+      return "it uses HDF5 features that libmysofa cannot read; write it again with a SOFA library";
     case MYSOFA_INVALID_ATTRIBUTES:
       return "it is not of the convention SimpleFreeFieldHRIR with responses in time (DataType FIR)";
     case MYSOFA_INVALID_DIMENSIONS:
@@ -51,18 +50,18 @@ std::string_view explain(int error) {
     case MYSOFA_ONLY_THE_SAME_SAMPLING_RATE_SUPPORTED:
       return "it has more than one sample rate";
     case MYSOFA_NO_MEMORY:
-      return "there is not enough memory for it";
+      return "not enough memory for it";
     case MYSOFA_INVALID_FORMAT:
     case MYSOFA_READ_ERROR:
-      return "it is no SOFA file, or it is damaged, or one of its arrays is larger than libmysofa takes (256 MB)";
+      return "not a SOFA file, or damaged, or an array larger than the limit of libmysofa (256 MB)";
     default:
-      return "libmysofa refuses it";
+      return "libmysofa cannot read it";
   }
 }
 
 [[noreturn]] void refuse(const std::string& name, std::string_view why) { throw InputError(fmt::format("{}: {}", name, why)); }
 
-/// The attribute of an array; empty where there is none.
+/// Attribute of an array; empty if missing.
 std::string_view find_attribute(const MYSOFA_ARRAY& array, std::string_view name) {
   for (const MYSOFA_ATTRIBUTE* at = array.attributes; at != nullptr; at = at->next)
     if (at->name != nullptr && at->value != nullptr && name == at->name) return at->value;
@@ -77,29 +76,29 @@ bool is_finite(std::span<const float> values) {
   return std::all_of(values.begin(), values.end(), [](float value) { return std::isfinite(value); });
 }
 
-/// Throws InputError unless every array has the size that its dimensions say.
+/// Throws InputError unless all array sizes match the dimensions.
 void check_sizes(const MYSOFA_HRTF& hrtf, const std::string& name) {
   const std::size_t M = hrtf.M, R = hrtf.R, N = hrtf.N;
   if (hrtf.C != 3 || hrtf.I != 1 || R != 2 || M == 0 || N == 0) refuse(name, explain(MYSOFA_INVALID_DIMENSIONS));
-  if (M > kMaxDirections) refuse(name, fmt::format("it has {} directions, and there may be {}", M, kMaxDirections));
-  if (N > kMaxTaps) refuse(name, fmt::format("its responses have {} taps, and there may be {}", N, kMaxTaps));
+  if (M > kMaxDirections) refuse(name, fmt::format("it has {} directions; at most {} are supported", M, kMaxDirections));
+  if (N > kMaxTaps) refuse(name, fmt::format("its responses have {} taps; at most {} are supported", N, kMaxTaps));
   if (M * R * N > kMaxSamples)
-    refuse(name, fmt::format("it holds {} samples, and there may be {}; shorten its responses", M * R * N, kMaxSamples));
+    refuse(name, fmt::format("it has {} samples, at most {} are supported; shorten its responses", M * R * N, kMaxSamples));
   const auto is_of = [](const MYSOFA_ARRAY& array, std::initializer_list<std::size_t> sizes) {
     return std::find(sizes.begin(), sizes.end(), get_values(array).size()) != sizes.end();
   };
   if (!is_of(hrtf.DataIR, {M * R * N}) || !is_of(hrtf.SourcePosition, {3 * M}) || !is_of(hrtf.DataSamplingRate, {1}) ||
       !is_of(hrtf.DataDelay, {0, R, M * R}) || !is_of(hrtf.ReceiverPosition, {3 * R, 3 * R * M}) ||
       !is_of(hrtf.EmitterPosition, {3, 3 * M}) || !is_of(hrtf.ListenerView, {0, 3, 3 * M}))
-    refuse(name, "one of its arrays is missing or has not the size that its dimensions say");
+    refuse(name, "an array is missing, or its size does not match its dimensions");
 }
 
-/// Of what comes through the pipe.
+/// Header of the data in the pipe.
 struct Header {
   double sample_rate_hz = 0.0;
   std::uint64_t measurements = 0, taps = 0, delays = 0;
   std::uint64_t is_cartesian = 0;
-  std::uint64_t words = 0;  // bytes of the reason why there is nothing; 0: there is
+  std::uint64_t words = 0;  // bytes of the error text; 0: success
 };
 
 bool write_all(int pipe, const void* bytes, std::size_t count) noexcept {
@@ -122,10 +121,10 @@ bool write_values(int pipe, const MYSOFA_ARRAY& array) noexcept {
   return write_all(pipe, values.data(), values.size_bytes());
 }
 
-/// In the child.
+/// Runs in the child.
 void parse_into(int pipe, const std::string& bytes, const std::string& name) {
   int error = MYSOFA_OK;
-  MYSOFA_HRTF* const hrtf = mysofa_load_data(bytes.data(), bytes.size(), &error);  // the process ends before it would be freed
+  MYSOFA_HRTF* const hrtf = mysofa_load_data(bytes.data(), bytes.size(), &error);  // freed by the end of the process
   if (hrtf == nullptr || error != MYSOFA_OK) refuse(name, explain(error));
   check_sizes(*hrtf, name);
   if (const int wrong = mysofa_check(hrtf); wrong != MYSOFA_OK) refuse(name, explain(wrong));
@@ -148,7 +147,7 @@ void limit(Resource resource, std::uint64_t value) noexcept {
   ::setrlimit(resource, &now);
 }
 
-/// Bytes of addresses that this process has; 0 where the system does not say.
+/// Address space of this process [bytes]; 0 if unknown.
 std::uint64_t find_memory() noexcept {
   std::uint64_t pages = 0;
   if (std::FILE* const file = std::fopen("/proc/self/statm", "r")) {
@@ -161,7 +160,8 @@ std::uint64_t find_memory() noexcept {
 
 [[noreturn]] void run_child(int pipe, const std::string& bytes, const std::string& name) noexcept {
   for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGXCPU, SIGPIPE}) ::signal(signal, SIG_DFL);
-  if (const int nowhere = ::open("/dev/null", O_WRONLY); nowhere >= 0) ::dup2(nowhere, STDERR_FILENO);  // last words of the C library
+  if (const int nowhere = ::open("/dev/null", O_WRONLY); nowhere >= 0)
+    ::dup2(nowhere, STDERR_FILENO);  // discards messages of the C library
   limit(RLIMIT_CORE, 0);
   limit(RLIMIT_CPU, 2 + bytes.size() / kBytesPerS);
   if (const std::uint64_t memory = find_memory(); memory > 0) limit(RLIMIT_AS, memory + kMaxMemory);
@@ -175,7 +175,7 @@ std::uint64_t find_memory() noexcept {
   ::_exit(0);
 }
 
-/// What the child says. Throws InputError.
+/// Reads the result of the child. Throws InputError.
 SofaFile receive(int pipe, const std::string& name) {
   constexpr std::string_view kDamaged = "it is damaged: libmysofa fails on it";
   Header header;
@@ -205,9 +205,9 @@ SofaFile receive(int pipe, const std::string& name) {
 }  // namespace
 
 SofaFile parse_sofa(const std::string& bytes, const std::string& name) {
-  if (!bytes.starts_with("\x89HDF\r\n\x1a\n")) refuse(name, "it is no SOFA file: those are HDF5 files");
+  if (!bytes.starts_with("\x89HDF\r\n\x1a\n")) refuse(name, "not a SOFA file: SOFA files are HDF5 files");
   std::array<int, 2> pipe{};
-  if (::pipe2(pipe.data(), O_CLOEXEC) != 0) throw SystemError(name + ": no pipe can be made to read it through");
+  if (::pipe2(pipe.data(), O_CLOEXEC) != 0) throw SystemError(name + ": cannot create a pipe to read it");
   const pid_t child = ::fork();
   if (child == 0) {
     ::close(pipe[0]);
@@ -216,13 +216,13 @@ SofaFile parse_sofa(const std::string& bytes, const std::string& name) {
   ::close(pipe[1]);
   const auto end = [&] {
     ::close(pipe[0]);
-    if (child > 0) ::kill(child, SIGKILL);  // it has said what it had to say
+    if (child > 0) ::kill(child, SIGKILL);  // its result was read
     while (child > 0 && ::waitpid(child, nullptr, 0) < 0 && errno == EINTR) {
     }
   };
   if (child < 0) {
     end();
-    throw SystemError(name + ": no process can be made to read it in");
+    throw SystemError(name + ": cannot create a process to read it");
   }
   try {
     SofaFile file = receive(pipe[0], name);

@@ -1,4 +1,4 @@
-// The numbers of a SOFA file.
+// Contents of a SOFA file.
 #pragma once
 
 #include <cstddef>
@@ -7,9 +7,9 @@
 
 namespace carillon::head {
 
-inline constexpr std::size_t kMaxSamples = std::size_t{1} << 27U;  // of all responses
+inline constexpr std::size_t kMaxSamples = std::size_t{1} << 27U;  // total samples of the responses
 
-/// What a file of SimpleFreeFieldHRIR holds; all finite, and as many as the sizes say.
+/// Contents of a SimpleFreeFieldHRIR file; all numbers are finite, sizes agree.
 struct SofaFile {
   double sample_rate_hz = 0.0;
   std::size_t measurements = 0, taps = 0;  // both above 0
@@ -19,9 +19,9 @@ struct SofaFile {
   std::vector<float> delays{};     // [samples], (measurements, 2) or (2) or empty
 };
 
-/// Reads the bytes of a file by libmysofa, in a process of its own with bounds on its time and memory: damaged files can crash libmysofa or
-/// keep it busy for ever, and here that is an error like any other. Throws InputError, its message beginning with `name`, for what is no
-/// such file, is damaged, or is larger than kMaxDirections and kMaxTaps allow; SystemError where no process can be made.
+/// Parses a file with libmysofa in a child process with limits on time and memory, because damaged files can crash libmysofa or keep it
+/// busy forever. Throws InputError (message begins with `name`) for files that are not SimpleFreeFieldHRIR, damaged, or larger than
+/// kMaxDirections and kMaxTaps; SystemError if no process can be created.
 SofaFile parse_sofa(const std::string& bytes, const std::string& name);
 
 }  // namespace carillon::head

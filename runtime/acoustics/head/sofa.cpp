@@ -1,7 +1,6 @@
-// Method:     a response begins where it first passes 0.15 of its peak, found on a raster of 1/16 sample. One sum under a windowed sinc
-//             both resamples it and moves its beginning to sample kOnset; the sinc ends at the lower one of both Nyquist frequencies.
+// Method:     the onset of a response is where it first exceeds 0.15 of its peak, on a grid of 1/16 sample. One windowed sinc both
+//             resamples it and moves its onset to sample kOnset; the sinc is limited to the lower Nyquist frequency.
 // Source:     AES69-2015 (SOFA); Andreopoulou and Katz 2017 (onsets by a threshold, among others).
-// Deviations: none.
 #include "runtime/acoustics/head/sofa.hpp"
 
 #include <fmt/format.h>
@@ -19,13 +18,13 @@
 #include <utility>
 #include <vector>
 
+#include "runtime/acoustics/head/convolve.hpp"
+#include "runtime/acoustics/head/parse_sofa.hpp"
+#include "runtime/acoustics/head/sphere.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/file.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/base/sinc.hpp"
-#include "runtime/acoustics/head/convolve.hpp"
-#include "runtime/acoustics/head/parse_sofa.hpp"
-#include "runtime/acoustics/head/sphere.hpp"
 
 namespace carillon::head {
 
@@ -34,25 +33,25 @@ namespace carillon::head {
 namespace {
 
 constexpr std::uint64_t kMaxBytes = std::uint64_t{1} << 29U;
-constexpr double kThreshold = 0.15;  // of the peak: here a response begins
-constexpr int kRaster = 16;          // places a sample that are looked at
-constexpr double kTail = 1e-6;       // of the energy of a response
+constexpr double kThreshold = 0.15;  // onset threshold, share of the peak
+constexpr int kRaster = 16;          // grid points per sample
+constexpr double kTail = 1e-6;       // share of the energy of a response
 constexpr double kLevelFromHz = 400.0, kLevelToHz = 800.0;
 constexpr double kPoleRad = 0.2618;  // 15 degrees
-constexpr double kRingRad = 0.0175;  // a ring is no thicker than 1 degree
+constexpr double kRingRad = 0.0175;  // thickness of a ring, 1 degree
 
-/// What a file says, with the sizes that it must have.
+/// Measured responses with checked sizes.
 struct Measured {
   double sample_rate_hz = 0.0;
   std::size_t taps = 0;
   std::vector<Vec3> directions{};            // unit
-  std::vector<std::span<const float>> of{};  // responses, in the memory of the SofaFile: left and right of every direction
-  std::vector<double> delays{};              // [samples] of them, in addition to what the responses hold
+  std::vector<std::span<const float>> of{};  // responses in the memory of the SofaFile: left and right per direction
+  std::vector<double> delays{};              // [samples], in addition to the delay within the responses
 };
 
 [[noreturn]] void refuse(const std::string& name, std::string_view why) { throw InputError(fmt::format("{}: {}", name, why)); }
 
-/// The sources, frame of the head [m].
+/// Sources in the frame of the head [m].
 std::vector<Vec3> find_sources(const SofaFile& sofa, const std::string& name) {
   constexpr double kRad = std::numbers::pi / 180.0;
   std::vector<Vec3> sources(sofa.measurements);
@@ -67,7 +66,7 @@ std::vector<Vec3> find_sources(const SofaFile& sofa, const std::string& name) {
   return sources;
 }
 
-/// The measurements at the farthest distance, one for each direction.
+/// Measurements at the farthest distance, one per direction.
 Measured select_measured(const SofaFile& sofa, const std::string& name) {
   const std::vector<Vec3> sources = find_sources(sofa, name);
   double farthest = 0.0;
@@ -75,7 +74,7 @@ Measured select_measured(const SofaFile& sofa, const std::string& name) {
   Measured measured{.sample_rate_hz = sofa.sample_rate_hz, .taps = sofa.taps};
   if (!(measured.sample_rate_hz >= kMinRateHz && measured.sample_rate_hz <= kMaxRateHz))
     refuse(name, fmt::format("its sample rate, {} Hz, is outside {} to {} Hz", measured.sample_rate_hz, kMinRateHz, kMaxRateHz));
-  // By height, so that directions that are one, as those of a pole may be, are found near each other.
+  // Sorted by height, so that equal directions, such as those of a pole, are neighbours.
   std::vector<std::pair<double, std::size_t>> order;
   for (std::size_t m = 0; m < sources.size(); ++m)
     if (norm(sources[m]) > 0.99 * farthest) order.emplace_back(normalise(sources[m])[2], m);
@@ -96,7 +95,7 @@ Measured select_measured(const SofaFile& sofa, const std::string& name) {
   return measured;
 }
 
-/// Where the response first passes a part of its peak [samples]. 0 for silence.
+/// Onset of a response [samples]. 0 for silence.
 double find_onset(std::span<const float> response) {
   float peak = 0.0F;
   for (const float value : response) peak = std::max(peak, std::abs(value));
@@ -110,7 +109,7 @@ double find_onset(std::span<const float> response) {
     return std::abs(sum);
   };
   const double wanted = kThreshold * static_cast<double>(peak);
-  std::size_t first = 0;  // the first sample that is certainly beyond
+  std::size_t first = 0;  // first sample beyond the threshold
   while (static_cast<double>(std::abs(response[first])) < wanted) ++first;
   double place = std::max(static_cast<double>(first) - 1.0, -1.0), before = read(place);
   for (int step = 0; step < kRaster; ++step) {
@@ -136,16 +135,16 @@ void resample(std::span<const float> response, double onset, double ratio, std::
   }
 }
 
-/// All responses (directions, 2, taps) and delays [samples], aligned, at the rate of playing.
+/// All responses (directions, 2, taps) and delays [samples], aligned, at the playback rate.
 Head::Content align(const Measured& measured, double sample_rate_hz, const std::string& name) {
   const double ratio = sample_rate_hz / measured.sample_rate_hz;
   const auto taps =
       static_cast<std::size_t>(kTapUnit * std::ceil((std::ceil(static_cast<double>(measured.taps) * ratio) + kOnset) / kTapUnit));
   if (taps > kMaxTaps)
-    refuse(name, fmt::format("its responses have {} taps at {} Hz, and there may be {}", taps, sample_rate_hz, kMaxTaps));
+    refuse(name, fmt::format("its responses have {} taps at {} Hz; at most {} are supported", taps, sample_rate_hz, kMaxTaps));
   const std::size_t count = measured.of.size();
   if (count * taps > kMaxSamples)
-    refuse(name, fmt::format("it holds {} samples at {} Hz, and there may be {}; shorten its responses", count * taps, sample_rate_hz,
+    refuse(name, fmt::format("it has {} samples at {} Hz, at most {} are supported; shorten its responses", count * taps, sample_rate_hz,
                              kMaxSamples));
   Head::Content head{.sample_rate_hz = sample_rate_hz, .taps = static_cast<int>(taps), .responses = {}, .delays = {}, .lookup = ByAngle{}};
   head.responses.resize(count * taps);
@@ -157,7 +156,7 @@ Head::Content align(const Measured& measured, double sample_rate_hz, const std::
   return head;
 }
 
-/// Where a pole is left out: a direction there, with the mean of the ring that is next to it.
+/// Adds a missing pole with the mean of the nearest ring.
 void add_poles(std::vector<Vec3>& directions, Head::Content& head) {
   const std::size_t taps = head.taps;
   for (const double up : {-1.0, 1.0}) {
@@ -181,7 +180,7 @@ void add_poles(std::vector<Vec3>& directions, Head::Content& head) {
   }
 }
 
-/// Drops the end of all responses where nothing is in it.
+/// Truncates the silent tail of all responses.
 void trim(Head::Content& head) {
   const auto taps = static_cast<std::size_t>(head.taps), count = head.delays.size();
   std::size_t needed = kTapUnit;
@@ -204,7 +203,7 @@ void trim(Head::Content& head) {
   head.taps = static_cast<int>(needed);
 }
 
-/// The mean power over responses from kLevelFromHz to kLevelToHz is made that of a sphere.
+/// Scales the mean power from kLevelFromHz to kLevelToHz to that of a sphere.
 void set_level(Head::Content& head, const std::string& name) {
   constexpr int kFrequencies = 9;
   const Sphere sphere;
@@ -225,15 +224,15 @@ void set_level(Head::Content& head, const std::string& name) {
   for (float& value : head.responses) value = static_cast<float>(gain * static_cast<double>(value));
 }
 
-/// Delays from the mean of all on, none of them negative.
+/// Sets the delay of the origin to the mean delay; delays stay non-negative.
 void set_origin(Head::Content& head, const std::string& name) {
   double mean = 0.0;
   for (const double delay : head.delays) mean += delay / static_cast<double>(head.delays.size());
   const auto [least, most] = std::minmax_element(head.delays.begin(), head.delays.end());
   const double spread_s = (*most - *least) / head.sample_rate_hz;
   if (!(spread_s <= kMaxSpreadS))
-    refuse(name,
-           fmt::format("its delays differ by {:.1f} ms, and a head makes 1; {:.0f} ms are allowed", 1e3 * spread_s, 1e3 * kMaxSpreadS));
+    refuse(name, fmt::format("its delays differ by {:.1f} ms; a head causes about 1 ms, at most {:.0f} ms are allowed", 1e3 * spread_s,
+                             1e3 * kMaxSpreadS));
   head.origin_samples = static_cast<int>(std::ceil(mean - *least));
   for (double& delay : head.delays) delay = std::max(0.0, delay - mean + head.origin_samples);
 }

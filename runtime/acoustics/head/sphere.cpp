@@ -1,9 +1,9 @@
 // Method:     p on a rigid sphere in a plane wave is (-i / (ka)^2) sum over m of i^m (2 m + 1) P_m(cos angle) / h_m'(ka), h the spherical
-//             Hankel function of the second kind. Ratios h_m / h_(m-1) are recurred upwards, which is stable, and 1 / h_m is their product,
-//             which goes to 0 where h_m would overflow. The first sound is moved to sample kOnset, the band ends by a cosine from 0.4 to
-//             0.5 of the rate, and the response is the inverse DFT at twice its length: after that a sphere is quiet (exp(-c t / a)).
+//             Hankel function of the second kind. Ratios h_m / h_(m-1) by stable upward recurrence; 1 / h_m is their product, which
+//             underflows to 0 where h_m would overflow. The onset is moved to sample kOnset, the band ends with a cosine from 0.4 to 0.5 of
+//             the rate, and the response is the inverse DFT at twice its length, after which a sphere is silent (exp(-c t / a)).
 // Source:     Duda and Martens 1998, appendix A; Abramowitz and Stegun 10.1.19, 10.1.21 (recurrences).
-// Deviations: the source is far away.
+// Deviations: plane wave only (distant source).
 #include "runtime/acoustics/head/sphere.hpp"
 
 #include <fmt/format.h>
@@ -15,8 +15,8 @@
 #include <numbers>
 #include <utility>
 
-#include "runtime/base/error.hpp"
 #include "runtime/acoustics/head/convolve.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::head {
 namespace {
@@ -24,12 +24,12 @@ namespace {
 using Complex = std::complex<double>;
 using std::numbers::pi;
 
-constexpr int kSteps = 360;                   // of the angle: half a degree
+constexpr int kSteps = 360;                   // angles: half a degree
 constexpr double kLengthS = 128.0 / 48000.0;  // of a response
 constexpr double kBandEnd = 0.4;              // of the sample rate
-constexpr double kEnough = 1e-14;             // terms of the series below are left out
+constexpr double kEnough = 1e-14;             // relative size of omitted terms of the series
 
-/// P_m(x), the first `terms` of them.
+/// P_m(x) for m < terms.
 std::vector<double> calc_legendre(double x, std::size_t terms) {
   std::vector<double> p(std::max<std::size_t>(terms, 2));
   p[0] = 1.0;

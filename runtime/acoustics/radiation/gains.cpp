@@ -1,12 +1,11 @@
-// Method:     the outer surface is taken as a sphere of the same area, each triangle seen in its direction from the centre of the enclosed
-//             volume. U_lm = (1 / a^2) sum over triangles of (phi . n) A Y_lm, phi the mean of its corners; a sphere that moves with
-//             U_lm Y_lm sends the far pressure rho0 c0 U_lm Y_lm / (k |h_l'(ka)| r), and different (l, m) are orthogonal over directions,
-//             so that g^2 = (rho0 c0)^2 / 4 pi  sum_l U_l^2 / (k |h_l'(ka)|)^2 with U_l^2 = sum_m U_lm^2. What Parseval's sum leaves of
-//             (phi . n)^2 goes to the next order. All modes are summed at once, a block of triangles as a product of
-//             matrices.
+// Method:     the outer surface is replaced by a sphere of the same area; each triangle is seen in its direction from the centre of the
+//             enclosed volume. U_lm = (1 / a^2) sum over triangles of (phi . n) A Y_lm, phi the mean of its corners. A sphere that moves
+//             with U_lm Y_lm radiates the far pressure rho0 c0 U_lm Y_lm / (k |h_l'(ka)| r), and different (l, m) are orthogonal over
+//             directions: g^2 = (rho0 c0)^2 / 4 pi  sum_l U_l^2 / (k |h_l'(ka)|)^2 with U_l^2 = sum_m U_lm^2. The remainder of (phi . n)^2
+//             in Parseval's sum is assigned to the next order. All modes are summed at once, a block of triangles as a matrix product.
 // Source:     Morse & Ingard, Theoretical Acoustics (1968), 7.2; Pierce, Acoustics (1981), 4.1-4.2.
-// Deviations: exact for spheres; any other body radiates as if its surface lay on one. The monopole is the true flow of volume, for every
-//             body, and so is the level of what it sends at wavelengths long against it.
+// Deviations: exact for spheres only. The monopole is the true volume flow for every body, hence also its level at wavelengths long against
+//             the body.
 #include "runtime/acoustics/radiation/gains.hpp"
 
 #include <algorithm>
@@ -17,13 +16,13 @@
 #include <numbers>
 #include <utility>
 
+#include "runtime/acoustics/radiation/flow.hpp"
 #include "runtime/bank/air.hpp"
 #include "runtime/bank/multipoles.hpp"
 #include "runtime/bank/surface.hpp"
 #include "runtime/base/hankel.hpp"
 #include "runtime/base/instructions.hpp"
 #include "runtime/base/vector.hpp"
-#include "runtime/acoustics/radiation/flow.hpp"
 
 namespace carillon::radiation {
 namespace {
@@ -33,7 +32,7 @@ using std::numbers::pi;
 constexpr std::size_t kOrders = kMaxLobes + 1;
 constexpr std::size_t kHarmonics = kOrders * kOrders;
 
-/// The factors of the recurrences of calc_harmonics.
+/// Recurrence factors of calc_harmonics.
 struct Recurrence {
   std::array<std::array<double, kOrders>, kOrders> a{}, b{};  // [m][l]
   std::array<double, kOrders> diagonal{};
@@ -86,19 +85,19 @@ std::array<double, kOrders + 1> calc_radiation_factors(double x) {
   return factors;
 }
 
-/// The outer skin as a sphere.
+/// Outer surface and its equivalent sphere.
 struct Skin {
   std::vector<Triangle> triangles;
   std::vector<Vec3> normals_m2;  // area times unit normal
   Vec3 centre_m{};               // of the enclosed volume
-  double radius_m = 0.0;         // of the sphere of the same area
-  double volume_m3 = 0.0;        // cavities and all
+  double radius_m = 0.0;         // sphere of the same area
+  double volume_m3 = 0.0;        // including cavities
 };
 
 Skin make_skin(const bank::Bank& bank) {
   Skin skin;
   skin.triangles = bank::find_outer_triangles(bank.vertices_m, bank.triangles);
-  if (skin.triangles.empty()) throw InputError("the surface of the bank has no outside: no closed shell of it encloses a volume");
+  if (skin.triangles.empty()) throw InputError("the surface of the bank has no outside: no closed part encloses a volume");
   const Vec3 base = bank.vertices_m[skin.triangles[0][0]];
   double area = 0.0, volume = 0.0;  // volume: six times
   Vec3 moment{};
@@ -136,7 +135,7 @@ Loops find_loops() {
   return {};
 }
 
-/// What one mode sends out in each order: U_l^2 summed over m, and the rest.
+/// Radiated power of a mode per order: U_l^2 summed over m, and the remainder.
 using Power = std::array<double, kOrders + 1>;
 
 std::vector<Power> calc_powers(const bank::Bank& bank, const Skin& skin) {
@@ -208,10 +207,10 @@ void check_sizes(const bank::Bank& bank) {
   bool inside = bank.shape.size() == 3 * vertices * modes && bank.shape_scale.size() == modes && bank.radiation_gain.size() == modes;
   for (const Triangle& triangle : bank.triangles)
     for (const std::int32_t v : triangle) inside = inside && v >= 0 && static_cast<std::size_t>(v) < vertices;
-  if (!inside) throw InputError("the arrays of the bank disagree: shapes, gains and triangles do not belong together");
+  if (!inside) throw InputError("the arrays of the bank disagree: sizes of shapes, gains and triangles do not match");
 }
 
-/// What makes q of q': a mode of unit velocity swings with amplitude 1 / omega.
+/// Gains of the coordinate q: amplitude 1 / omega at unit velocity.
 std::vector<double> calc_gains_of_coordinates(const bank::Bank& bank) {
   std::vector<double> gains;
   for (const double lambda : bank.eigenvalue_rad2_s2) gains.push_back(1.0 / std::sqrt(lambda));
@@ -254,7 +253,7 @@ Radiation calc_radiation(const bank::Bank& bank, GainKind kind) {
 }
 
 Limited limit_gains(std::span<double> gains, std::span<const double> decay_per_s) {
-  if (gains.size() != decay_per_s.size()) throw InputError("there must be one decay for every radiation gain");
+  if (gains.size() != decay_per_s.size()) throw InputError("decays and radiation gains differ in number");
   Limited limited;
   for (std::size_t m = 0; m < gains.size(); ++m) {
     const double share = bank::calc_radiation_decay(gains[m]) / decay_per_s[m];

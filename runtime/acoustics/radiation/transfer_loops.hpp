@@ -1,5 +1,5 @@
-// The inner loops of Transfers, once for each instruction set. Each source file of an instruction set is compiled with flags of its own, so
-// nothing here may be an inline function.
+// Inner loops of Transfers, one per instruction set. Source files of instruction sets are compiled with their own flags, so this header has
+// no inline functions.
 #pragma once
 
 #include <cstddef>
@@ -7,8 +7,8 @@
 
 namespace carillon::radiation {
 
-inline constexpr int kTransferLanes = 16;  // modes that are evaluated together
-inline constexpr int kTransferPlaces = 2;  // places that are; more need more registers than there are
+inline constexpr int kTransferLanes = 16;  // modes evaluated together
+inline constexpr int kTransferPlaces = 2;  // places evaluated together; more exceed the registers
 
 /// One multipole of every mode of a group, in steps: 65536 times the imaginary part plus the real part.
 struct alignas(64) MultipoleLine {
@@ -21,42 +21,42 @@ struct alignas(64) RadialLine {
   float level[kTransferLanes];                             // sqrt(sum over m of |a_lm|^2 / 4 pi), in steps
 };
 
-/// Modes that are evaluated together. Lanes that hold none have multipoles and scales of zero.
+/// Modes evaluated together. Empty lanes have zero multipoles and scales.
 struct alignas(64) TransferGroup {
   float inverse_k_m[kTransferLanes];
   float scale[kTransferLanes];  // Pa s m^-1 kg^-1/2 per 1 / 65536 of a step
-  std::size_t first_line;       // of (order + 1)^2 lines: l by l, m = 0, then the cosines m = 1 .. l, then the sines
+  std::size_t first_line;       // of (order + 1)^2 lines: l by l, m = 0, then cosines m = 1 .. l, then sines
   std::size_t first_radial;     // of order + 1
-  int order;                    // the highest of its modes
+  int order;                    // highest order of its modes
 };
 
-inline constexpr int kHarmonicsPadding = 8;  // numbers that vectors reach beyond the end
+inline constexpr int kHarmonicsPadding = 8;  // numbers read beyond the end by vector loads
 
-/// A direction, and the factors of the recurrence of the normalised associated Legendre functions: row l of `ahead` and `behind` begins at
-/// l (l - 1) / 2 and has m = 0 .. l - 1; P_lm = ahead cos P_(l-1)m - behind P_(l-2)m, P_ll = diagonal[l] sin P_(l-1)(l-1). Both
-/// are finite for kHarmonicsPadding numbers more.
+/// A direction, and recurrence factors of the normalised associated Legendre functions: row l of `ahead` and `behind` begins at l (l - 1) /
+/// 2 and has m = 0 .. l - 1; P_lm = ahead cos P_(l-1)m - behind P_(l-2)m, P_ll = diagonal[l] sin P_(l-1)(l-1). Both are finite for
+/// kHarmonicsPadding further numbers.
 struct HarmonicWork {
   const double* ahead;
   const double* behind;
   const double* diagonal;
-  double cosine, sine;            // of the angle to the z axis
-  double turn_cosine, turn_sine;  // of the angle about it
+  double cosine, sine;            // of the polar angle
+  double turn_cosine, turn_sine;  // of the azimuth
   int order;
 };
 
-/// The real orthonormal harmonics of all orders to work.order, (order + 1)^2 in the sequence of TransferGroup, and room for
-/// kHarmonicsPadding more. What is below 1e-20 is 0.
+/// Real orthonormal harmonics up to work.order, (order + 1)^2 in the sequence of TransferGroup, with space for kHarmonicsPadding more.
+/// Values below 1e-20 are 0.
 using CalcHarmonics = void (*)(const HarmonicWork& work, float* harmonics);
 
-/// A place. `radial` has room for (order + 1, 3, kTransferLanes), `re` and `im` for T of every mode of the group.
+/// A place. `radial`: buffer (order + 1, 3, kTransferLanes); `re`, `im`: T of every mode of the group.
 struct TransferPlace {
-  const float* harmonics;     // to the order of the group
+  const float* harmonics;     // up to the order of the group
   float nearness, inverse_r;  // R / r, 1 / r [1/m]
   float* radial;
   float *re, *im;
 };
 
-/// A group at one place or two.
+/// A group at one or two places.
 struct TransferWork {
   const TransferGroup* group;
   const MultipoleLine* lines;  // of the group

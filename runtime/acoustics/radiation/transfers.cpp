@@ -1,12 +1,11 @@
-// Method:     T = sum over l of F_l(r) sum over m of a_lm Y_lm(d), F_l = h_l(k r) / h_l(k R) e^{-i k (r - R)}. Harmonics once
-//             for all modes: rows of normalised Legendre functions by recurrence in l. 16 modes at a time, one in a lane, at one place or
-//             two: their multipoles lie side by side as 16-bit steps, and those of a row are multiplied by the same harmonic. F_l by the
-//             recurrence of h_l upward in l, which is stable for it, divided by h_l(k R) at each step, so that nothing overflows: the steps
-//             u_l = h_{l-1}(k R) / h_l(k R) are made in double precision (runtime/base/hankel.hpp).
+// Method:     T = sum over l of F_l(r) sum over m of a_lm Y_lm(d), F_l = h_l(k r) / h_l(k R) e^{-i k (r - R)}. Harmonics once for all
+//             modes: rows of normalised Legendre functions by recurrence in l. 16 modes at a time, one per lane, at one or two places:
+//             their multipoles are contiguous 16-bit steps, and those of a row are multiplied by the same harmonic. F_l by the upward
+//             recurrence of h_l in l, which is stable, divided by h_l(k R) at each step to avoid overflow: the steps u_l = h_{l-1}(k R) /
+//             h_l(k R) are computed in double precision (runtime/base/hankel.hpp).
 // Source:     DLMF 10.51 (recurrences of spherical Bessel functions); Holmes & Featherstone, J. Geodesy 76 (2002), eq. 11 (Legendre
 //             functions by rows).
-// Deviations: the highest orders of a group of modes are omitted where they are 86 dB below the rest, as most of those are far away that
-//             the field needs near the sphere.
+// Deviations: the highest orders of a group of modes are omitted if they are 86 dB below the rest, as most near-field orders are far away.
 #include "runtime/acoustics/radiation/transfers.hpp"
 
 #include <algorithm>
@@ -24,7 +23,7 @@ using Complex = std::complex<double>;
 using std::numbers::pi;
 
 void check(const bank::Multipoles& air, std::size_t modes) {
-  if (air.is_empty()) throw InputError("the bank has no multipoles: its modes were solved without the air");
+  if (air.is_empty()) throw InputError("the bank has no multipoles: its modes were solved without air");
   bool fits = air.order.size() == modes && air.freq_hz.size() == modes && air.scale.size() == modes && air.radius_m > 0.0 &&
               air.sound_speed_ms > 0.0;
   std::size_t needed = 0;
@@ -36,7 +35,7 @@ void check(const bank::Multipoles& air, std::size_t modes) {
   if (!fits || air.coefficient.size() != needed) throw InputError("the arrays of the bank's multipoles disagree");
 }
 
-/// Where harmonic number i of order l, m = i - l, lies in the row of a group.
+/// Position in the row of a group of harmonic i of order l, m = i - l.
 std::size_t find_place(int l, int i) { return i >= l ? i - l : l + (l - i); }
 
 }  // namespace
@@ -62,7 +61,7 @@ Transfers::Transfers(const bank::Bank& bank, [[maybe_unused]] base::Instructions
   rms_.resize(modes);
   turn_orders_.resize(modes);
   slots_.resize(modes);
-  std::vector<std::size_t> first(modes), sorted(modes);  // the first coefficient of each mode; modes by window and order
+  std::vector<std::size_t> first(modes), sorted(modes);  // first coefficient of each mode; modes by window and order
   for (std::size_t m = 0, at = 0; m < modes; ++m) {
     first[m] = at;
     at += 2 * bank::count_coefficients(orders_[m]);
@@ -72,53 +71,59 @@ Transfers::Transfers(const bank::Bank& bank, [[maybe_unused]] base::Instructions
     std::stable_sort(sorted.begin() + static_cast<std::ptrdiff_t>(window),
                      sorted.begin() + static_cast<std::ptrdiff_t>(std::min(window + kWindow, modes)),
                      [&](std::size_t a, std::size_t b) { return orders_[a] < orders_[b]; });
-  for (std::size_t begin = 0; begin < modes; begin += kTransferLanes) {
-    const std::size_t end = std::min(begin + kTransferLanes, modes);
-    const int order = orders_[sorted[end - 1]];
-    TransferGroup group{.inverse_k_m = {}, .scale = {}, .first_line = lines_.size(), .first_radial = radial_.size(), .order = order};
-    lines_.resize(lines_.size() + bank::count_coefficients(order));
-    radial_.resize(radial_.size() + static_cast<std::size_t>(order) + 1);
-    for (std::size_t lane = 0; lane < kTransferLanes; ++lane) {
-      const bool is_mode = begin + lane < end;
-      const std::size_t mode = sorted[is_mode ? begin + lane : begin];
-      const double k = 2.0 * pi * air.freq_hz[mode] / air.sound_speed_ms, x = k * radius_m_;
-      const std::vector<Complex> steps = base::calc_hankel_quotients(x, order);
-      group.inverse_k_m[lane] = static_cast<float>(1.0 / k);
-      RadialLine* const radial = &radial_[group.first_radial];
-      for (std::size_t l = 0; l < steps.size(); ++l) {
-        radial[l].step_re[lane] = static_cast<float>(steps[l].real());
-        radial[l].step_im[lane] = static_cast<float>(steps[l].imag());
-      }
-      if (!is_mode) continue;
-      slots_[mode] = static_cast<std::int32_t>(begin + lane);
-      group.scale[lane] = static_cast<float>(air.scale[mode] / 65536.0);
-      const std::int16_t* from = &air.coefficient[first[mode]];
-      double power = 0.0;
-      double decay = 1.0;  // |F_l| r / R far away, which the steps multiply up, as h_l there differ by their phases only
-      double near = 1.0;   // the same at kTurnRadii
-      const std::vector<Complex> outer = base::calc_hankel_quotients(kTurnRadii * x, order);
-      double turned = 0.0, all = 0.0;
-      for (int l = 0; l <= orders_[mode]; ++l) {
-        double sum = 0.0;
-        for (int i = 0; i <= 2 * l; ++i, from += 2) {
-          // What a file may have below -32767, which no bank that is written has, would leave the range of the sum.
-          lines_[group.first_line + static_cast<std::size_t>(l * l) + find_place(l, i)].steps[lane] =
-              std::max<std::int32_t>(from[1], -32767) * 65536 + from[0];
-          sum += static_cast<double>(from[0]) * from[0] + static_cast<double>(from[1]) * from[1];
-        }
-        radial[l].level[lane] = static_cast<float>(std::sqrt(sum / (4.0 * pi)));
-        if (l > 0) decay *= std::abs(steps[l]);
-        power += sum / (4.0 * pi) * decay * decay;
-        if (l > 0) near *= std::abs(steps[l] / outer[l]);
-        turned += sum * near * near * l * l;
-        all += sum * near * near;
-      }
-      turn_orders_[mode] = all > 0.0 ? std::sqrt(turned / all) : 0.0;
-      rms_[mode] = radius_m_ * air.scale[mode] * std::sqrt(power);
+  for (std::size_t begin = 0; begin < modes; begin += kTransferLanes)
+    add_group(air, first, std::span(sorted).subspan(begin, std::min<std::size_t>(kTransferLanes, modes - begin)));
+  set_recurrences(modes == 0 ? 0 : *std::max_element(orders_.begin(), orders_.end()));
+}
+
+void Transfers::add_group(const bank::Multipoles& air, std::span<const std::size_t> first, std::span<const std::size_t> modes) {
+  const int order = orders_[modes.back()];
+  TransferGroup group{.inverse_k_m = {}, .scale = {}, .first_line = lines_.size(), .first_radial = radial_.size(), .order = order};
+  const std::size_t first_slot = groups_.size() * kTransferLanes;
+  lines_.resize(lines_.size() + bank::count_coefficients(order));
+  radial_.resize(radial_.size() + static_cast<std::size_t>(order) + 1);
+  for (std::size_t lane = 0; lane < kTransferLanes; ++lane) {
+    const bool is_mode = lane < modes.size();
+    const std::size_t mode = modes[is_mode ? lane : 0];
+    const double k = 2.0 * pi * air.freq_hz[mode] / air.sound_speed_ms, x = k * radius_m_;
+    const std::vector<Complex> steps = base::calc_hankel_quotients(x, order);
+    group.inverse_k_m[lane] = static_cast<float>(1.0 / k);
+    RadialLine* const radial = &radial_[group.first_radial];
+    for (std::size_t l = 0; l < steps.size(); ++l) {
+      radial[l].step_re[lane] = static_cast<float>(steps[l].real());
+      radial[l].step_im[lane] = static_cast<float>(steps[l].imag());
     }
-    groups_.push_back(group);
+    if (!is_mode) continue;
+    slots_[mode] = static_cast<std::int32_t>(first_slot + lane);
+    group.scale[lane] = static_cast<float>(air.scale[mode] / 65536.0);
+    const std::int16_t* from = &air.coefficient[first[mode]];
+    double power = 0.0;
+    double decay = 1.0;  // |F_l| r / R far away: product of the steps, since far h_l differ by phases only
+    double near = 1.0;   // |F_l| r / R at kTurnRadii
+    const std::vector<Complex> outer = base::calc_hankel_quotients(kTurnRadii * x, order);
+    double turned = 0.0, all = 0.0;
+    for (int l = 0; l <= orders_[mode]; ++l) {
+      double sum = 0.0;
+      for (int i = 0; i <= 2 * l; ++i, from += 2) {
+        // Values below -32767, which no written bank has, would overflow the sum.
+        lines_[group.first_line + static_cast<std::size_t>(l * l) + find_place(l, i)].steps[lane] =
+            std::max<std::int32_t>(from[1], -32767) * 65536 + from[0];
+        sum += static_cast<double>(from[0]) * from[0] + static_cast<double>(from[1]) * from[1];
+      }
+      radial[l].level[lane] = static_cast<float>(std::sqrt(sum / (4.0 * pi)));
+      if (l > 0) decay *= std::abs(steps[l]);
+      power += sum / (4.0 * pi) * decay * decay;
+      if (l > 0) near *= std::abs(steps[l] / outer[l]);
+      turned += sum * near * near * l * l;
+      all += sum * near * near;
+    }
+    turn_orders_[mode] = all > 0.0 ? std::sqrt(turned / all) : 0.0;
+    rms_[mode] = radius_m_ * air.scale[mode] * std::sqrt(power);
   }
-  const int highest = modes == 0 ? 0 : *std::max_element(orders_.begin(), orders_.end());
+  groups_.push_back(group);
+}
+
+void Transfers::set_recurrences(int highest) {
   diagonal_.assign(1, 0.0);
   for (int l = 1; l <= highest; ++l) {
     diagonal_.push_back(std::sqrt((2.0 * l + 1.0) / (2.0 * l)));
@@ -153,7 +158,7 @@ void Transfers::evaluate_at(std::span<const Vec3> places_m, std::span<const std:
   struct Room {
     alignas(64) std::array<float, (bank::kMaxOrder + 1) * (bank::kMaxOrder + 1) + kHarmonicsPadding> harmonics;
     alignas(64) std::array<float, (bank::kMaxOrder + 1) * 3 * kTransferLanes> radial;
-    alignas(64) std::array<float, kWindow> re, im;  // of the window of the last mode, where `done` has the bit of the group
+    alignas(64) std::array<float, kWindow> re, im;  // of the window of the last mode; valid for the groups in `done`
   };
   std::array<Room, kTransferPlaces> rooms;
   TransferWork work;

@@ -1,4 +1,4 @@
-// The header is text: one "name value" a line.
+// Text header: one "name value" per line.
 #include "runtime/acoustics/recording/header.hpp"
 
 #include <fmt/format.h>
@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::string_view kMagic = "CARILLON SURFACE ";
 constexpr std::string_view kAgain = "copy the file or run carillon-simulate again";
-constexpr std::uint64_t kMost = std::uint64_t{1} << 40;  // of any count: products of three stay below 2^127, and are checked
+constexpr std::uint64_t kMost = std::uint64_t{1} << 40;  // largest count: products of three stay below 2^127, and are checked
 
 template <class Number>
 std::optional<Number> parse_number(std::string_view text) {
@@ -80,13 +80,13 @@ Header parse_header(std::string_view head, std::uint64_t length, const std::stri
         name));
   }
   if (length < kHeaderBytes || head.size() < kHeaderBytes)
-    throw InputError(fmt::format("{}: truncated: {} bytes, and its header alone has {}; {}", name, length, kHeaderBytes, kAgain));
+    throw InputError(fmt::format("{}: truncated: {} bytes, the header alone has {}; {}", name, length, kHeaderBytes, kAgain));
 
   std::map<std::string_view, std::string_view> values;
   std::string_view text = head.substr(kMagic.size(), kTextBytes - kMagic.size());
   const std::string_view version = text.substr(0, text.find('\n'));
   const std::string_view major = version.substr(0, version.find('.'));
-  if (!parse_number<unsigned>(major)) throw InputError(fmt::format("{}: damaged header: line 1 names no version; {}", name, kAgain));
+  if (!parse_number<unsigned>(major)) throw InputError(fmt::format("{}: damaged header: no version in line 1; {}", name, kAgain));
   if (major != "1")
     throw InputError(fmt::format("{}: written as version {}, this reader knows 1.x; update Carillon", name, version.substr(0, 20)));
   while (!text.empty()) {
@@ -96,7 +96,7 @@ Header parse_header(std::string_view head, std::uint64_t length, const std::stri
     const std::size_t blank = line.find(' ');
     if (blank == line.npos) continue;
     if (!values.emplace(line.substr(0, blank), line.substr(blank + 1)).second)
-      throw InputError(fmt::format("{}: damaged header: a line stands there twice; {}", name, kAgain));
+      throw InputError(fmt::format("{}: damaged header: duplicate line; {}", name, kAgain));
   }
   const auto damaged = [&](const char* key) {
     return InputError(fmt::format("{}: damaged header: {} is missing or out of range; {}", name, key, kAgain));
@@ -132,10 +132,10 @@ Header parse_header(std::string_view head, std::uint64_t length, const std::stri
   for (std::size_t i = 0; i < kArrays; ++i) {
     const Header::Shape shape = header.get_shape(static_cast<Array>(i));
     header.offset[i] = get_count(shape.name);
-    // Arrays do not overlap, so together they are no longer than the file; that bounds the memory a reader takes.
+    // Arrays do not overlap, so their sum is at most the file length, which bounds the reader's memory.
     total += std::min(shape.bytes, length);
     if (header.offset[i] < kHeaderBytes || shape.bytes > length || header.offset[i] > length - shape.bytes || total > length) {
-      throw InputError(fmt::format("{}: damaged header: the array {} cannot be in this file; {}", name, shape.name, kAgain));
+      throw InputError(fmt::format("{}: damaged header: the array {} exceeds the file; {}", name, shape.name, kAgain));
     }
   }
   return header;

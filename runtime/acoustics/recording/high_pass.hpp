@@ -3,10 +3,10 @@
 
 namespace carillon::recording {
 
-/// Of a corner (-3 dB) in Hz: alpha = 1 - exp(-2 pi f / fs); 0 Hz lets everything pass.
+/// alpha of a corner frequency (-3 dB): 1 - exp(-2 pi f / fs); 0 Hz: pass-through.
 double calc_alpha(double corner_hz, double sample_rate_hz);
 
-/// One signal: p_i = (1 - alpha) p_{i-1} + g_i - g_{i-1}, and p_0 = 0: what is constant from the beginning is never heard.
+/// p_i = (1 - alpha) p_{i-1} + g_i - g_{i-1}, p_0 = 0: a constant from the beginning is silent.
 struct HighPass {
   double g = 0.0, p = 0.0;
   bool has_begun = false;

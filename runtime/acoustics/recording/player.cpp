@@ -1,10 +1,9 @@
-// Method:     for each triangle and sample p = rho / (4 pi r) [ g + cos (g - (c/a) P) ], heard r / c later: the sample is spread over 32 at
-//             its arrival (runtime/base/sinc.hpp). Places between keys: cubic (Catmull and Rom); distances and cosines are linear over
-//             16 samples. A receiver that moves is where it is at the arrival: found for the middle of the surface by iteration, for a
-//             triangle by its velocity. Samples that arrive denser because it comes nearer are no louder: they are divided by their
-//             density, 1 / (1 - n . v / c).
+// Method:     for each triangle and sample p = rho / (4 pi r) [ g + cos (g - (c/a) P) ], delayed by r / c: spread over 32 samples at its
+//             arrival (runtime/base/sinc.hpp). Positions between keys: cubic (Catmull and Rom); distances and cosines are linear over 16
+//             samples. A moving receiver is at its place of arrival: found for the centre of the surface by iteration, for a triangle by
+//             its velocity. Samples compressed in time by an approaching receiver are divided by their density, 1 / (1 - n . v / c), so
+//             that the level does not rise.
 // Source:     docs/equations.md E14.
-// Deviations: none.
 #include "runtime/acoustics/recording/player.hpp"
 
 #include <algorithm>
@@ -36,7 +35,7 @@ void Player::find_places(std::uint64_t frame, std::vector<Vec3>& places_m) {
       recording_->read_places(static_cast<std::uint64_t>(std::clamp<std::int64_t>(first_key_ + i, 0, last)), keys_m_[i]);
   }
   const double u = static_cast<double>(frame % header.key_frames) / static_cast<double>(header.key_frames);
-  // At the ends the neighbour that is missing continues the motion.
+  // At the ends the missing neighbour continues the motion.
   const bool is_first = key == 0, is_last = key + 2 > last;
   const double a = -0.5 * u + u * u - 0.5 * u * u * u, d = -0.5 * u * u + 0.5 * u * u * u;
   double b = 1.0 - 2.5 * u * u + 1.5 * u * u * u, c = 0.5 * u + 2.0 * u * u - 1.5 * u * u * u;
@@ -61,9 +60,9 @@ float Player::get_acceleration(std::int64_t frame, std::size_t triangle) {
   return blocks_[block - first_block_][triangle * kBlockFrames + static_cast<std::size_t>(frame) % kBlockFrames];
 }
 
-/// The time of the last segment's arrival is a good first guess of this one's.
+/// Initial guess: delay of the last segment.
 void Player::find_ears(const Way& way, double time_s, const std::vector<Vec3>& places_m, std::vector<Ear>& ears) const {
-  constexpr int kRounds = 4;  // each leaves a share of v / c of the error
+  constexpr int kRounds = 4;  // each reduces the error by v / c
   Vec3 middle{};
   for (const Vec3& place : places_m) middle = middle + place;
   middle = (1.0 / static_cast<double>(std::max<std::size_t>(1, places_m.size()))) * middle;
@@ -108,7 +107,7 @@ void Player::look(const Ear& ear, std::size_t triangle, const std::vector<Vec3>&
 void Player::emit_segment(const Way& way) {
   const Header& header = recording_->get_header();
   const auto frame = static_cast<std::int64_t>(emitted_);
-  // Samples from 15 before to 32 behind.
+  // Samples 15 before to 32 after.
   const std::int64_t block = frame / kBlockFrames - 1;
   if (block != first_block_) {
     const bool is_next = block == first_block_ + 1;
@@ -157,7 +156,7 @@ void Player::emit_segment(const Way& way) {
         const double pressure = mix(&Spot::gain) * source + mix(&Spot::turned) * turned;
         const double arrival = static_cast<double>(emitted_ + k - time_) + mix(&Spot::delay);
         const double whole = std::floor(arrival);
-        if (whole > 4e6) continue;  // beyond 28 km: a file that is not trusted takes no more memory
+        if (whole > 4e6) continue;  // beyond 28 km: bounds the memory for untrusted files
         sinc.make_delay(arrival - whole, taps);
         const auto first = static_cast<std::int64_t>(whole) - base::kSincHalf + 1;
         auto& heard = arriving_[i];

@@ -1,4 +1,4 @@
-// The sound of a recorded surface at any place.
+// Sound of a recorded surface at any place.
 #pragma once
 
 #include <cstddef>
@@ -7,46 +7,46 @@
 #include <span>
 #include <vector>
 
-#include "runtime/base/vector.hpp"
 #include "runtime/acoustics/recording/pole.hpp"
 #include "runtime/acoustics/recording/recording.hpp"
+#include "runtime/base/vector.hpp"
 
 namespace carillon::recording {
 
-/// Where it is heard. 0: from everywhere alike; 1: a figure of eight about the axis (a unit vector); between: (1 - q) + q cos.
+/// Receiver. Directivity q: 0 omnidirectional, 1 figure of eight about the axis (unit vector), in general (1 - q) + q cos.
 struct Microphone {
   Vec3 place_m{};
   double directivity = 0.0;
   Vec3 axis{0.0, 1.0, 0.0};
 };
 
-/// A receiver at one time, and how it moves: slower than sound.
+/// Receiver at one time with its velocity, below the speed of sound.
 struct MovingMicrophone {
   Microphone receiver;
   Vec3 velocity_m_s{};
 };
-/// Where a receiver is, seconds after the recording began; continuous in time.
+/// Receiver at a time since the start of the recording; continuous in time.
 using Way = std::function<MovingMicrophone(std::size_t receiver, double time_s)>;
 
-/// Plays a recording once, from its beginning. Invariant: the pressure of any two receivers is that of the same surface; samples
-/// come in order; the pressure at a receiver that moves is that at one at rest where it is at that time. Reads the file and takes memory
-/// while it plays: not for an audio thread. Costs some 45 ns for each triangle and sample of the recording, and 65 ns for each receiver.
+/// Plays a recording once, from its beginning. Invariant: all receivers hear the same surface; samples are in order; the pressure at a
+/// moving receiver is that at a resting one at its current place. Reads the file and allocates while playing: not for an audio thread.
+/// Cost: about 45 ns per triangle and sample, and 65 ns per receiver in addition.
 class Player {
  public:
-  /// The recording must outlive it. receivers: how many.
+  /// The recording must outlive the player.
   Player(const RecordedSurface& recording, std::size_t receivers);
 
-  /// Adds the next samples [Pa] at each receiver to out (receivers, count), at the rate of the recording. Beyond the end of the recording
-  /// what is still in the air arrives, then silence. `way` is asked for times up to the arrival of what leaves now. Throws InputError when
-  /// the file is cut off meanwhile.
+  /// Adds the next samples [Pa] at each receiver to out (receivers, count), at the rate of the recording. After the end of the recording
+  /// the sound still in the air arrives, then silence. `way` is called for times up to the arrival of the sound emitted now. Throws
+  /// InputError if the file is truncated meanwhile.
   void play(const Way& way, std::size_t count, std::span<double> out);
-  /// The same for receivers that stay where they are.
+  /// Resting receivers.
   void play(std::span<const Microphone> receivers, std::size_t count, std::span<double> out);
 
-  /// Nothing will arrive any more.
+  /// All sound has arrived.
   bool is_over() const;
 
-  /// Samples that were played.
+  /// Number of played samples.
   std::uint64_t get_time() const { return time_; }
 
  private:
@@ -55,7 +55,7 @@ class Player {
   struct Spot {
     double delay, gain, turned;  // in samples; 1 / (4 pi r) times directivity; that times the cosine
   };
-  /// A receiver when the sound of the middle of the surface arrives, which left `delay_s` before.
+  /// Receiver at the arrival of the sound of the centre of the surface, emitted `delay_s` earlier.
   struct Ear {
     MovingMicrophone at;
     bool moves = false;
@@ -75,7 +75,7 @@ class Player {
   std::vector<Vec3> places_m_[2];              // (V) at the ends of a segment
   std::vector<Vec3> keys_m_[4];                // (V) around the segment
   std::int64_t first_key_ = -100;              // of keys_m_
-  std::vector<float> blocks_[3];               // (T, kBlockFrames): those around the frame
+  std::vector<float> blocks_[3];               // blocks around the frame
   std::int64_t first_block_ = -100;            // of blocks_
   std::vector<Ear> ears_[2];                   // (receivers) at the ends of a segment
   std::vector<std::vector<double>> arriving_;  // (receivers): from sample time_ on

@@ -1,7 +1,6 @@
-// Method:     over one sample the pole is integrated against the sinc between samples (runtime/base/sinc.hpp), by Simpson's rule on its
-//             table; the weights are scaled so that a constant g gives exactly the constant answer.
+// Method:     the pole integrated over one sample against the interpolating sinc (runtime/base/sinc.hpp), by Simpson's rule on its table;
+//             weights are scaled so that a constant g gives exactly the constant answer.
 // Source:     docs/equations.md E14.
-// Deviations: none.
 #include "runtime/acoustics/recording/pole.hpp"
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// The pressure on a surface that moves, by one pole (docs/equations.md E14).
+// Surface pressure of a moving surface by a one-pole model (docs/equations.md E14).
 #pragma once
 
 #include <array>
@@ -7,9 +7,9 @@ namespace carillon::recording {
 
 inline constexpr int kPoleTaps = 32;
 
-/// Of a body whose surface is that of a sphere of radius a. P, the part of the volume velocity that makes pressure, follows the volume
-/// acceleration g of a triangle by dP/dt + (c/a) P = g [m3/s]; the surface pressure times the area is z P. Exact for g without content
-/// near half the sample rate: P_{k+1} = keep P_k + the sum over j of weight[j] g_{k - 15 + j}.
+/// For a body with the surface area of a sphere of radius a: P, the part of the volume velocity that makes pressure, follows the volume
+/// acceleration g of a triangle by dP/dt + (c/a) P = g [m3/s]; surface pressure times area is z P. Exact for g without content near half
+/// the sample rate: P_{k+1} = keep P_k + the sum over j of weight[j] g_{k - 15 + j}.
 struct Pole {
   double rate_per_s = 0.0;  // c / a
   double keep = 0.0;

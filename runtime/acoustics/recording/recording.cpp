@@ -1,8 +1,6 @@
-// Reading recorded surfaces from untrusted bytes.
-// Method:     as of banks: the header says where each array lies, all bytes are hashed once, tables are checked before they are used. HDF5
-//             is not asked.
+// Reader of recorded surfaces, from untrusted bytes.
+// Method:     as for banks: array positions from the header, one digest of all bytes, tables checked before use. Without HDF5.
 // Source:     docs/surface-format.md.
-// Deviations: none.
 #include "runtime/acoustics/recording/recording.hpp"
 
 #include <fcntl.h>
@@ -24,7 +22,7 @@ namespace carillon::recording {
 namespace {
 
 static_assert(std::endian::native == std::endian::little);
-constexpr double kFarthest = 1e6;  // m, of a vertex
+constexpr double kFarthest = 1e6;  // m, largest coordinate
 
 }  // namespace
 
@@ -89,7 +87,7 @@ void RecordedSurface::open() {
   }
   if (base::to_hex(sha.finish()) != std::string_view(head).substr(kTextBytes)) {
     throw InputError(
-        fmt::format("{}: damaged: the digest of its bytes is another than the one in its header; copy the file or run "
+        fmt::format("{}: damaged: its digest differs from the one in its header; copy the file or run "
                     "carillon-simulate again",
                     name_));
   }
@@ -107,21 +105,21 @@ void RecordedSurface::open() {
   area_m2_ = read_array<double>(Array::kArea, header_.triangles);
   radius_m_ = read_array<double>(Array::kRadius, header_.bodies);
   const auto is_body = [&](std::int32_t body) { return body >= 0 && static_cast<std::uint64_t>(body) < header_.bodies; };
-  check_list(triangles_, "triangle", "names a vertex that is not there", [&](const Triangle& corners) {
+  check_list(triangles_, "triangle", "names a missing vertex", [&](const Triangle& corners) {
     return std::all_of(corners.begin(), corners.end(),
                        [&](std::int32_t vertex) { return vertex >= 0 && static_cast<std::uint64_t>(vertex) < header_.vertices; });
   });
-  check_list(triangle_body_, "triangle_body", "names a body that is not there", is_body);
-  check_list(vertex_body_, "vertex_body", "names a body that is not there", is_body);
-  check_list(area_m2_, "area", "is no area in m2", [](double area) { return area > 0.0 && area < 1e12; });
-  check_list(radius_m_, "radius", "is no radius in m", [](double radius) { return radius > 1e-9 && radius < 1e6; });
-  // The rows of keys and blocks are checked here once, so that playing need not.
+  check_list(triangle_body_, "triangle_body", "names a missing body", is_body);
+  check_list(vertex_body_, "vertex_body", "names a missing body", is_body);
+  check_list(area_m2_, "area", "is not an area in m2", [](double area) { return area > 0.0 && area < 1e12; });
+  check_list(radius_m_, "radius", "is not a radius in m", [](double radius) { return radius > 1e-9 && radius < 1e6; });
+  // Rows of keys and blocks are checked here once, not during playback.
   const auto centre = read_array<double>(Array::kCentre, header_.count_keys() * header_.bodies * 3);
   const auto step = read_array<double>(Array::kStep, header_.count_keys() * header_.bodies);
   const auto scale = read_array<float>(Array::kScale, header_.count_blocks() * header_.triangles);
-  check_list(centre, "centre", "is no place in m", [](double value) { return std::abs(value) <= kFarthest; });
-  check_list(step, "step", "is no step in m", [](double value) { return value >= 0.0 && value <= kFarthest; });
-  check_list(scale, "scale", "is no acceleration in m/s2", [](float value) { return value >= 0.0F && value <= 1e12F; });
+  check_list(centre, "centre", "is not a position in m", [](double value) { return std::abs(value) <= kFarthest; });
+  check_list(step, "step", "is not a step in m", [](double value) { return value >= 0.0 && value <= kFarthest; });
+  check_list(scale, "scale", "is not an acceleration in m/s2", [](float value) { return value >= 0.0F && value <= 1e12F; });
 }
 
 Vec3 RecordedSurface::read_centre(std::uint64_t key) const {

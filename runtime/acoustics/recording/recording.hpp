@@ -1,4 +1,4 @@
-// A recorded surface: how the surfaces of a simulation moved, from a file that is not trusted.
+// Recorded surface of a simulation, from an untrusted file.
 #pragma once
 
 #include <cstdint>
@@ -8,21 +8,20 @@
 #include <string_view>
 #include <vector>
 
+#include "runtime/acoustics/recording/header.hpp"
 #include "runtime/base/descriptor.hpp"
 #include "runtime/base/triangle.hpp"
 #include "runtime/base/vector.hpp"
-#include "runtime/acoustics/recording/header.hpp"
 
 namespace carillon::recording {
 
-/// The file, open; tables in memory, blocks read when they are asked for. Invariant: every byte was checked against the digest
-/// when it was opened; every number in its tables is in range and finite. A file that is changed afterwards gives wrong sound, never a
-/// crash.
+/// Open file: tables in memory, blocks read on demand. Invariant: all bytes matched the digest when the file was opened; all numbers of the
+/// tables are finite and in range. A file changed afterwards gives wrong sound but no crash.
 class RecordedSurface {
  public:
-  /// Throws InputError, one clear message, unless the file is whole and sane.
+  /// Throws InputError unless the file is complete and valid.
   explicit RecordedSurface(const std::filesystem::path& file);
-  /// Of bytes in memory, which must outlive it.
+  /// From memory, which must outlive it.
   RecordedSurface(std::string_view bytes, std::string name);
 
   const Header& get_header() const { return header_; }
@@ -32,11 +31,12 @@ class RecordedSurface {
   const std::vector<double>& get_areas_m2() const { return area_m2_; }
   const std::vector<double>& get_radii_m() const { return radius_m_; }
 
-  /// The mean of the middles of its bodies [m] at sample key * key_frames. key < count_keys().
+  /// Mean of the centres of its bodies [m] at sample key * key_frames. key < count_keys().
   Vec3 read_centre(std::uint64_t key) const;
   /// places (V): vertices [m] at sample key * key_frames. key < count_keys().
   void read_places(std::uint64_t key, std::span<Vec3> places_m) const;
-  /// acceleration (T, kBlockFrames): of normals [m/s2], samples block * kBlockFrames on; zero behind the end. block < count_blocks().
+  /// acceleration (T, kBlockFrames): normal accelerations [m/s2] from sample block * kBlockFrames on; zero after the end. block <
+  /// count_blocks().
   void read_accelerations(std::uint64_t block, std::span<float> acceleration_m_s2) const;
 
  private:
@@ -47,7 +47,7 @@ class RecordedSurface {
   std::uint64_t find_offset(Array array, std::uint64_t row) const;
 
   std::string name_;
-  std::string_view bytes_;  // empty: from the file
+  std::string_view bytes_;  // empty: read from the file
   base::Descriptor descriptor_;
   Header header_;
   std::vector<Triangle> triangles_;

@@ -1,6 +1,5 @@
 // Method:     y(t) = sum over k of x_k h((t - k) / stretch), divided by the sum of the weights.
 // Source:     docs/equations.md E14 (the sinc).
-// Deviations: none.
 #include "runtime/acoustics/recording/resampler.hpp"
 
 #include <algorithm>

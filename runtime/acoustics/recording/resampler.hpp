@@ -1,4 +1,4 @@
-// A signal at another sample rate.
+// Streaming sample-rate converter.
 #pragma once
 
 #include <cstddef>
@@ -8,15 +8,15 @@
 
 namespace carillon::recording {
 
-/// One signal, sample by sample as it comes: what lies between samples is read by the windowed sinc of runtime/base/sinc.hpp, stretched to
-/// the lower of the two rates. Invariant: a constant passes as it is; sample n of the output is the input at the same time, n /
-/// to_hz; before its first sample and after its last the input is 0. Flat within 0.01 dB to 0.4 of the lower rate, -90 dB from 0.6 on.
+/// One signal: interpolation by the windowed sinc of runtime/base/sinc.hpp, stretched to the lower of the two rates. Invariant: constants
+/// are preserved; output sample n is the input at time n / to_hz; the input is 0 before its first and after its last sample. Flat within
+/// 0.01 dB to 0.4 of the lower rate, -90 dB from 0.6 on.
 class Resampler {
  public:
-  /// Rates that are positive. Costs 32 products a sample of the output, or of the input where that is faster.
+  /// Positive rates. Cost: 32 products per output sample, or per input sample when downsampling.
   Resampler(double from_hz, double to_hz);
 
-  /// Samples that must be added before so many can be taken.
+  /// Input samples needed for so many outputs.
   std::size_t count_missing(std::size_t outputs) const;
   void add(std::span<const double> input);
   /// The next samples. Pre: count_missing() of them is 0.
@@ -24,10 +24,10 @@ class Resampler {
 
  private:
   double step_ = 1.0;       // input samples from one output sample to the next
-  double stretch_ = 1.0;    // of the sinc, in input samples
+  double stretch_ = 1.0;    // stretch of the sinc, in input samples
   std::int64_t reach_ = 0;  // input samples to either side
   std::vector<double> input_;
-  std::int64_t first_ = 0;  // of input_, counted from the beginning
+  std::int64_t first_ = 0;  // index of input_[0] in the signal
   std::uint64_t taken_ = 0;
 };
 

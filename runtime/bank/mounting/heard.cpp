@@ -7,7 +7,7 @@
 namespace carillon::mounting {
 namespace {
 
-/// Without surface and shapes: most of a bank, and no part of frequencies and decays.
+/// Copy without surface and shapes, which do not affect frequencies and decays.
 bank::Bank copy_modes(const bank::Bank& bank) {
   bank::Bank modes;
   modes.eigenvalue_rad2_s2 = bank.eigenvalue_rad2_s2;

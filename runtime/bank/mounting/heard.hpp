@@ -1,4 +1,4 @@
-// The modes of a bank as heard.
+// Audible modes of a mounted bank.
 #pragma once
 
 #include <vector>
@@ -9,15 +9,15 @@
 
 namespace carillon::mounting {
 
-/// Puts the supports into decays and frequencies of a bank for playing (bank::choose_frequencies()), and returns its modes as heard. Throws
-/// InputError as calc_losses() does.
+/// Applies the supports to decays and frequencies of a bank prepared for playing (bank::choose_frequencies()); returns its audible modes.
+/// Throws InputError as calc_losses() does.
 std::vector<bank::HeardMode> mount(bank::Bank& played, const MountingRequest& request = {});
 
-/// Result of mount(); the bank is not changed.
+/// Result of mount() without changing the bank.
 std::vector<bank::HeardMode> calc_heard_as_played(const bank::Bank& played);
 
-/// In a scene of default settings, by number in the file: corrected, in air for a bank with multipoles, on the bank's supports. Modes
-/// coupled by the air: the mode in air at the same rank. Throws as mount() does.
+/// Audible modes under default scene settings, by index in the file: corrected, in air if the bank has multipoles, on the bank's supports.
+/// Modes coupled by the air: the mode in air of equal rank. Throws as mount() does.
 std::vector<bank::HeardMode> calc_heard(const bank::Bank& bank);
 
 }  // namespace carillon::mounting

@@ -1,10 +1,11 @@
-// Method: the velocity of a support under a mode's reaction r q is Y r q; the power that goes into it, over twice the mode's energy, is the
-//   decay, and the imaginary part shifts the frequency. Y is diagonal in the frame of the patch's normal: force and couple along it and
-//   across it. Time goes as exp(i omega t).
-// Source: thin plate: Cremer, Heckl and Petersson, Structure-Borne Sound (2005), chapter 5, for the force; couples and forces in the plane
-//   are worked out in docs/equations.md. Half space under a disc: Lysmer's analogue as in Richart, Hall and Woods, Vibrations of Soils and
-//   Foundations (1970), table 7-1 to 7-5.
-// Deviations: the plate is infinite and thin, and does not yield under the patch; of the analogue's couples the added mass is left out.
+// Method: under a mode's reaction r q a support moves with velocity Y r q; the absorbed power over twice the mode's energy is the decay,
+// the
+//   imaginary part shifts the frequency. Y is diagonal in the frame of the patch normal: force and couple along it and across it. Time
+//   factor exp(i omega t).
+// Source: thin plate: Cremer, Heckl and Petersson, Structure-Borne Sound (2005), chapter 5, for the force; couples and in-plane forces are
+//   derived in docs/equations.md. Half space under a disc: Lysmer's analogue as in Richart, Hall and Woods, Vibrations of Soils and
+//   Foundations (1970), tables 7-1 to 7-5.
+// Deviations: the plate is infinite, thin and rigid under the patch; the added mass of the analogue's couples is neglected.
 #include "runtime/bank/mounting/losses.hpp"
 
 #include <fmt/format.h>
@@ -29,34 +30,35 @@ namespace {
 using Complex = std::complex<double>;
 constexpr Complex kI{0.0, 1.0};
 constexpr double kEuler = std::numbers::egamma;
-constexpr double kMinRadiusM = 1e-3;  // of a patch without area: a screw
-constexpr double kFew = 0.2;          // of the modes: so many beyond first order, not the lowest, are bounded without a warning
-constexpr double kNearness = 0.5;     // modes share their loss when what couples them is more than this part of their distance
+constexpr double kMinRadiusM = 1e-3;     // patch without area: a screw
+constexpr double kMaxBeyondShare = 0.2;  // fraction of modes beyond first order, not the lowest, bounded without a warning
+constexpr double kMixingRatio = 0.5;     // modes mix if their coupling exceeds this fraction of their distance
 constexpr std::size_t kMaxSupports = 100000;
 
-/// How fast a support moves for a unit of force or couple: force along the normal, across it (two), couple about it, across it (two).
+/// Velocity of a support per unit force or couple: force along the normal, across it (two), couple about it, across it (two).
 using Admittance = std::array<Complex, 6>;
 
-/// The patch of a support.
+/// Patch of a support.
 struct Patch {
   Vec3 normal{};
   bool has_normal = false;
-  double radius_m = kMinRadiusM;  // of the disc of its area
+  double radius_m = kMinRadiusM;  // disc of equal area
   double area_m2 = 0.0;
-  double length_m = 0.0;  // of its long side
+  double length_m = 0.0;  // long side
 };
 
 Complex calc_impedance(const material::Base& base, double omega) {
   return kI * omega * base.mass_kg + base.damping_n_s_m + base.stiffness_n_m * (1.0 + kI * base.loss_factor) / (kI * omega);
 }
 
-/// -(2 / pi) (ln(k a / 2) + Euler's constant), where the wave is longer than the patch; else 0.
+/// -(2 / pi) (ln(k a / 2) + Euler's constant) for wavelengths above the patch size, else 0.
 Complex calc_near_field(Complex k_a) {
   const Complex log = std::log(0.5 * k_a) + kEuler;
   return log.real() < 0.0 ? -2.0 / std::numbers::pi * log : Complex(0.0);
 }
 
-/// Of what moves alike over a length of several waves: a plate driven along a line. `limit` is k l where point and line answer alike.
+/// Reduction for in-phase motion over several wavelengths: a plate driven along a line. `limit`: k l where point and line response are
+/// equal.
 double calc_line_share(double limit, Complex k, double length_m) { return std::min(1.0, limit / std::max(limit, std::abs(k) * length_m)); }
 
 Admittance calc_plate(const material::Base& wall, const Patch& patch, double omega) {
@@ -87,16 +89,16 @@ Admittance calc_half_space(const material::Base& block, const Patch& patch, doub
   };
   const Complex normal = calc(4.0 * shear * a / (1.0 - nu), 3.4 * a * a * wave / (1.0 - nu));
   const Complex across = calc(8.0 * shear * a / (2.0 - nu), 4.6 * a * a * wave / (2.0 - nu));
-  // Long waves hardly carry couples away: of these only the material's loss counts.
+  // At long waves couples radiate little: only the material's loss counts.
   const Complex tilt = calc(8.0 * shear * a * a * a / (3.0 * (1.0 - nu)), 0.0), twist = calc(16.0 * shear * a * a * a / 3.0, 0.0);
   if (!patch.has_normal) return {normal, normal, normal, tilt, tilt, tilt};
   return {normal, across, across, twist, tilt, tilt};
 }
 
-/// An impedance that is spread evenly over the patch.
+/// Impedance distributed evenly over the patch.
 Admittance calc_lumped(const material::Base& base, const Patch& patch, double omega) {
   const Complex force = 1.0 / calc_impedance(base, omega);
-  const double tilting = patch.area_m2 / (4.0 * std::numbers::pi);  // radius of gyration, squared
+  const double tilting = patch.area_m2 / (4.0 * std::numbers::pi);  // squared radius of gyration
   const Complex tilt = tilting > 0.0 ? force / tilting : Complex(0.0);
   return {force, force, force, 0.5 * tilt, tilt, tilt};
 }
@@ -115,16 +117,7 @@ Admittance calc_admittance(const material::Base& base, const Patch& patch, doubl
   return {};
 }
 
-/// Two unit vectors across a third one.
-std::array<Vec3, 2> find_across(const Vec3& n) {
-  Vec3 first = cross(n, find_least_axis(n));
-  const double size = norm(first);
-  for (double& x : first) x /= size;
-  return {first, cross(n, first)};
-}
-
-/// A reaction along the axes of the patch, as Admittance has them. A wall turns about its middle plane: forces in its plane have the arm
-/// h/2.
+/// Reaction in the axes of Admittance. A wall rotates about its mid-plane: in-plane forces have the lever arm h/2.
 std::array<double, 6> find_components(const double* reaction, const Patch& patch, const material::Base& base) {
   Vec3 force{reaction[0], reaction[1], reaction[2]}, couple{reaction[3], reaction[4], reaction[5]};
   if (!patch.has_normal) return {force[0], force[1], force[2], couple[0], couple[1], couple[2]};
@@ -133,7 +126,7 @@ std::array<double, 6> find_components(const double* reaction, const Patch& patch
     const Vec3 moved = cross(n, force);
     for (std::size_t k = 0; k < 3; ++k) couple[k] -= 0.5 * base.thickness_m * moved[k];
   }
-  const auto [a, b] = find_across(n);
+  const auto [a, b] = find_tangents(n);
   return {dot(force, n), dot(force, a), dot(force, b), dot(couple, n), dot(couple, a), dot(couple, b)};
 }
 
@@ -142,14 +135,14 @@ struct Given {
   material::Fixing fixing;
 };
 
-/// What the bank says of its supports.
+/// Supports recorded in the bank.
 std::vector<Given> read_given(const bank::Bank& bank) {
   std::vector<Given> list;
   if (bank.supports.count() == 0) return list;
   const base::Document document = base::parse_document(bank.supports.text, "supports/text of the bank");
   base::Object root = document.root();
   for (base::Entry& entry : root.entries("supports", kMaxSupports)) {
-    if (!entry.object) throw InputError(fmt::format("{}: a support is no object; compute the bank again", entry.place));
+    if (!entry.object) throw InputError(fmt::format("{}: a support is not an object; compute the bank again", entry.place));
     Given& given = list.emplace_back();
     given.name = entry.object->string("name");
     given.fixing = material::read_fixing(*entry.object).value_or(material::Fixing{});
@@ -160,7 +153,7 @@ std::vector<Given> read_given(const bank::Bank& bank) {
   return list;
 }
 
-/// The complex shift of every mode, d - i delta omega, and what couples it with the next one.
+/// Complex shift of each mode, d - i delta omega, and its coupling to the next.
 struct Sums {
   std::vector<Complex> own;
   std::vector<double> with_next;
@@ -264,7 +257,7 @@ Losses calc_losses(const bank::Bank& bank, const MountingRequest& request) {
     losses.is_lowest_beyond = losses.is_lowest_beyond || (is_beyond && m == 0);
     losses.decay_per_s.push_back(std::isfinite(shift.real()) ? std::clamp(shift.real(), 0.0, kMaxDecay * omega) : kMaxDecay * omega);
     losses.shift_rad_s.push_back(is_beyond ? 0.0 : -shift.imag());
-    if (m + 1 < bank.mode_count() && sums.with_next[m] > kNearness * (std::sqrt(bank.eigenvalue_rad2_s2[m + 1]) - omega)) ++losses.mixed;
+    if (m + 1 < bank.mode_count() && sums.with_next[m] > kMixingRatio * (std::sqrt(bank.eigenvalue_rad2_s2[m + 1]) - omega)) ++losses.mixed;
   }
   return losses;
 }
@@ -275,12 +268,12 @@ void apply(const Losses& losses, bank::Bank& bank) {
   for (std::size_t m = 0; m < bank.mode_count(); ++m) {
     bank.decay_per_s[m] += losses.decay_per_s[m];
     const double omega = std::sqrt(bank.eigenvalue_rad2_s2[m]) + losses.shift_rad_s[m];
-    // Modes stay in their order: first order has no say where shifts are larger than distances.
+    // Keep the modes in order: first order is not valid where shifts exceed distances.
     last = bank.eigenvalue_rad2_s2[m] = std::max(last, omega * omega);
   }
   bank.damping = {};
   bank.damping.law = "mixed";
-  bank.proof.reset();  // it counts the modes of the body as it was solved
+  bank.proof.reset();  // counts the modes of the solve
 }
 
 std::string write_key(const MountingRequest& request) {
@@ -317,10 +310,11 @@ std::string describe(const Losses& losses, const bank::Bank& before) {
 }
 
 std::string describe_limits(const Losses& losses, const bank::Bank& before) {
-  if (!losses.is_lowest_beyond && static_cast<double>(losses.beyond) <= kFew * static_cast<double>(before.mode_count())) return {};
+  if (!losses.is_lowest_beyond && static_cast<double>(losses.beyond) <= kMaxBeyondShare * static_cast<double>(before.mode_count()))
+    return {};
   return fmt::format(
-      "{} of {} modes give their support more than first order can say (they would shift by more than {:g} % of their frequency): their "
-      "frequency is left as it is, and they decay by {:g} of it at most; a stiffer support, or a solve without these fixed nodes and "
+      "{} of {} modes are beyond first order (their support would shift them by more than {:g} % of their frequency): their "
+      "frequency is kept, and their decay is at most {:g} of it; a stiffer support, or a solve without these fixed nodes and "
       "\"held\" in the scene, is exact",
       losses.beyond, before.mode_count(), 100 * kMaxShift, kMaxDecay);
 }

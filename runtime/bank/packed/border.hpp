@@ -1,4 +1,4 @@
-// The border of a surface that grows by one triangle at a time.
+// Border of a surface that grows by one triangle at a time.
 #pragma once
 
 #include <array>
@@ -10,39 +10,39 @@
 
 namespace carillon::packed {
 
-/// An edge of a triangle whose other side is still open. The triangle that closes it has the edge turned round.
+/// Edge with one side open. The closing triangle has it reversed.
 struct Gate {
   std::int32_t from = 0, to = 0;
-  std::int32_t opposite = 0;  // third corner of the triangle that has the edge
+  std::int32_t opposite = 0;  // third corner of the edge's triangle
   bool is_open = true;
-  std::int32_t next_out = -1, next_in = -1;  // other open gates that leave `from`, that enter `to`
+  std::int32_t next_out = -1, next_in = -1;  // other open gates leaving `from`, entering `to`
 };
 
-/// How the third corner of the next triangle is named.
+/// Encoding of the third corner of the next triangle.
 enum class Corner : std::uint8_t {
-  kNew = 0,    // the next vertex
-  kRight = 1,  // where the border continues behind the gate
-  kLeft = 2,   // where it comes from before the gate
-  kOther = 3,  // by its number
+  kNew = 0,    // next new vertex
+  kRight = 1,  // next along the border
+  kLeft = 2,   // previous along the border
+  kOther = 3,  // by its index
 };
 
-/// The gates of the triangles so far, in the order in which they opened: the oldest open one is where the surface grows next (breadth
-/// first, so that the border stays short). Keeps: the lists of a vertex hold exactly the open gates that leave and enter it.
+/// Open gates in opening order: the surface grows at the oldest one (breadth first, which keeps the border short). Invariant: the lists of
+/// a vertex hold exactly the open gates leaving and entering it.
 class Border {
  public:
-  /// The oldest open gate; null when there is none. Valid until the next add().
+  /// Oldest open gate; nullptr if none. Valid until the next add().
   const Gate* find_gate() {
     while (first_ < gates_.size() && !gates_[first_].is_open) ++first_;
     return first_ < gates_.size() ? &gates_[first_] : nullptr;
   }
-  /// The vertex that kRight or kLeft names at a gate; -1 when there is none.
+  /// Vertex of kRight or kLeft at a gate; -1 if none.
   std::int32_t find_right(const Gate& gate) const { return is_known(gate.to) && out_[gate.to] >= 0 ? gates_[out_[gate.to]].to : -1; }
   std::int32_t find_left(const Gate& gate) const { return is_known(gate.from) && in_[gate.from] >= 0 ? gates_[in_[gate.from]].from : -1; }
 
-  /// Gates that were passed in lists so far. A few for each triangle, unless very many gates are open at one vertex at once.
+  /// List nodes visited so far: a few per triangle, unless very many gates are open at one vertex.
   std::size_t count_passed() const { return passed_; }
 
-  /// Its edges close the gates that they meet and open others. Corners are at least 0.
+  /// Closes the gates that its edges match and opens the others. Corners are at least 0.
   void add(const Triangle& corners) {
     for (std::size_t k = 0; k < 3; ++k) {
       const std::int32_t from = corners[k], to = corners[(k + 1) % 3];
@@ -88,7 +88,7 @@ class Border {
   }
 
   std::vector<Gate> gates_;
-  std::vector<std::int32_t> out_, in_;  // of a vertex, the last open gate that leaves and enters it; -1: none
+  std::vector<std::int32_t> out_, in_;  // per vertex: last open gate leaving, entering; -1: none
   std::size_t first_ = 0, passed_ = 0;
 };
 

@@ -13,18 +13,19 @@
 namespace carillon::packed {
 namespace {
 
-// From the finest level up; the last values serve all coarser ones. In steps of the modes, and shares of a step that are rounded to it.
+// From the finest level up; the last values apply to all coarser ones. Quantisation steps in steps of the modes, and fractions that round
+// to 0.
 constexpr std::array kResidualSteps{1.6F, 1.2F, 0.7F, 0.45F, 0.35F};
 constexpr std::array kRounding{0.1F, 0.2F, 0.4F, 0.5F, 0.5F};
-constexpr double kCoefficientStep = 0.5;  // error of the prediction by the rounding of coefficients, over that of the residual
+constexpr double kCoefficientStep = 0.5;  // prediction error by coefficient rounding over that of the residual
 constexpr double kPrior = 0.02;
-// Bits of a number q: at 0, and a + 2 log2 |q| elsewhere; and what a bit may take of the squared error, in squared steps.
+// Bits of a number q: constant at 0, a + 2 log2 |q| elsewhere; squared error [squared steps] traded for one bit.
 constexpr float kZeroResidual = 0.25F, kOneResidual = 2.5F, kZeroCoefficient = 1.0F, kOneCoefficient = 1.8F, kPerError = 3.0F;
-constexpr std::size_t kSampled = 400;  // vertices of a level that say how large features are
+constexpr std::size_t kFeatureSamples = 400;  // vertices per level sampled for feature sizes
 constexpr int kGradients = 9, kFeatures = 9 + 3 * static_cast<int>(kNeighbours);
-constexpr float kMostSteps = 1e9F;  // of a number; finest steps are 46,000 times shorter than those of the level
+constexpr float kMaxSteps = 1e9F;  // limit of a number; the finest steps are 46,000 times smaller than those of the level
 
-using Field = Eigen::Matrix<float, Eigen::Dynamic, 3>;  // (padded, 3): a row of Rows, as it lies
+using Field = Eigen::Matrix<float, Eigen::Dynamic, 3>;  // (padded, 3): a row of Rows in memory order
 using FieldMap = Eigen::Map<const Field>;
 
 template <std::size_t N>
@@ -32,15 +33,15 @@ float find_of_level(const std::array<float, N>& values, std::size_t from_finest)
   return values[std::min(from_finest, N - 1)];
 }
 
-/// Bits of a number other than 0, less their constant.
+/// Bits of a number other than 0, without the constant.
 float calc_size_bits(float q) { return 2.0F * std::log2(q); }
 
-/// Of a vertex: the fields of its neighbours by the stencil. Columns: gradient along j of component c at 3 c + j, and behind those the
-/// difference of neighbour k at kGradients + kNeighbours c + k.
+/// Neighbourhood of a vertex. Columns: gradient along j of component c at 3 c + j, then the difference of neighbour k at
+/// kGradients + kNeighbours c + k.
 struct Features {
   Field value;             // prediction by kriging alone
   Eigen::MatrixXf fields;  // (padded, kFeatures)
-  float energy = 0.0F;     // mean of the neighbours' squares
+  float energy = 0.0F;     // mean square of the neighbours
 };
 
 class Fitter {
@@ -62,11 +63,11 @@ class Fitter {
   }
 
  private:
-  /// Numbers of one way to predict a vertex, and what is left of it.
+  /// One candidate prediction of a vertex: coefficients and residual.
   struct Trial {
     Fit fit = Fit::kNone;
     Eigen::MatrixXi numbers;  // (features, 3)
-    float cost = 0.0F;        // bits, and the error at their price
+    float cost = 0.0F;        // bits plus weighted error
   };
 
   void begin_vertex(std::size_t v) {
@@ -138,10 +139,10 @@ class Fitter {
     }
   }
 
-  /// The steps with which coefficients, rounded, change the prediction by kCoefficientStep of the residual's step in the mean.
+  /// Coefficient steps whose rounding changes the prediction by kCoefficientStep of the residual's step on average.
   void set_coefficient_steps(const std::vector<Neighbours>& neighbours, const std::vector<Stencil>& stencils, LevelSteps& steps) {
     double gradient = 0.0, differences = 0.0, count = 0.0;
-    const std::size_t stride = std::max<std::size_t>(neighbours.size() / kSampled, 1);
+    const std::size_t stride = std::max<std::size_t>(neighbours.size() / kFeatureSamples, 1);
     for (std::size_t i = 0; i < neighbours.size(); i += stride) {
       calc_features(neighbours[i], stencils[i]);
       const auto calc_log = [&](Eigen::Index first, Eigen::Index columns) {
@@ -157,7 +158,7 @@ class Fitter {
     steps.differences = static_cast<float>(error / std::sqrt(kFeatures) * std::exp(0.5 * differences / count));
   }
 
-  /// Bits of what is left, and the error at their price.
+  /// Bits of the residual plus weighted error.
   float calc_cost(const Field& left) const {
     float bits = 0.0F, error = 0.0F;
     const float per_step = 1.0F / step_;
@@ -190,7 +191,7 @@ class Fitter {
       for (Eigen::Index j = count; j-- > 0;) {
         const Eigen::Index rest = count - 1 - j;
         const double x = (target(j, to) - upper.row(j).tail(rest).dot(coefficients.col(to).tail(rest))) / upper(j, j);
-        const double rounded = std::clamp(std::nearbyint(x / step[j]), -static_cast<double>(kMostSteps), static_cast<double>(kMostSteps));
+        const double rounded = std::clamp(std::nearbyint(x / step[j]), -static_cast<double>(kMaxSteps), static_cast<double>(kMaxSteps));
         trial.numbers(j, to) = static_cast<int>(rounded);
         coefficients(j, to) = rounded * step[j];
         trial.cost += rounded == 0.0 ? kZeroCoefficient : kOneCoefficient + calc_size_bits(static_cast<float>(std::abs(rounded)));
@@ -206,7 +207,7 @@ class Fitter {
     begin_vertex(v);
     const Field left = FieldMap(wanted_.get(v), padded_, 3) - features_.value;
     Trial best{Fit::kNone, {}, calc_cost(left)};
-    // Less than this no trial costs: all its coefficients and all that is left are 0.
+    // Lower bound of a trial's cost: all coefficients and residuals are 0.
     const auto find_least = [&](int features) {
       return 3.0F * (static_cast<float>(features) * kZeroCoefficient + static_cast<float>(modes_) * kZeroResidual);
     };
@@ -226,7 +227,7 @@ class Fitter {
     numbers.kinds.push_back({best.fit, add_residual(v, numbers), fineness_[v]});
   }
 
-  /// As read_shapes() does it.
+  /// Same arithmetic as read_shapes().
   void predict(const Trial& trial, const Neighbours& neighbours, const Stencil& stencil, LevelNumbers& numbers) {
     std::array<const float*, kNeighbours> from;
     for (std::size_t k = 0; k < kNeighbours; ++k) from[k] = rows_.get(static_cast<std::size_t>(neighbours[k]));
@@ -234,7 +235,7 @@ class Fitter {
     const float unit = share_ / std::sqrt(1.0F + features_.energy);
     std::array<float, kGradientNumbers> of_gradient;
     std::array<float, kDifferenceNumbers> of_differences;
-    // By field, then what it adds to, then its component.
+    // By field, then contribution, then component.
     const auto take = [&](Eigen::Index first, Eigen::Index fields, float step, std::span<float> scaled, std::vector<std::int32_t>& said) {
       std::size_t i = 0;
       for (Eigen::Index f = 0; f < fields; ++f)
@@ -253,7 +254,7 @@ class Fitter {
     loops_.multiply(from.data(), matrix.data(), static_cast<std::size_t>(padded_), row_.data());
   }
 
-  /// Adds to row_ what is missing of the vertex, in steps, and keeps the row. False when that is nothing.
+  /// Adds the quantised residual of the vertex to row_ and keeps the row. False if the residual is 0.
   bool add_residual(std::size_t v, LevelNumbers& numbers) {
     const std::size_t padded = padded_;
     const float* wanted = wanted_.get(v);
@@ -263,7 +264,7 @@ class Fitter {
       for (std::size_t c = 0; c < 3; ++c) {
         float& value = row_[c * padded + m];
         const float x = (wanted[c * padded + m] - value) / step_;
-        const float size = std::min(std::floor(std::abs(x) + rounding_), kMostSteps);
+        const float size = std::min(std::floor(std::abs(x) + rounding_), kMaxSteps);
         const float q = std::copysign(size, x);
         value += step_ * q;
         is_any = is_any || size > 0.0F;
@@ -285,8 +286,8 @@ class Fitter {
   std::vector<float> row_;
   Features features_;
   Eigen::MatrixXf gathered_, gram_;
-  float level_step_ = 1.0F, rounding_ = 0.5F;  // of the level
-  float share_ = 1.0F, step_ = 1.0F;           // of the vertex: its steps are `share_` of the level's
+  float level_step_ = 1.0F, rounding_ = 0.5F;  // per level
+  float share_ = 1.0F, step_ = 1.0F;           // per vertex: its steps are `share_` of the level's
 };
 
 }  // namespace

@@ -1,4 +1,4 @@
-// What is to be said of shapes so that read_shapes() finds them again.
+// Encoder of shapes for read_shapes().
 #pragma once
 
 #include <vector>
@@ -9,18 +9,18 @@
 
 namespace carillon::packed {
 
-/// Numbers for write_shapes(), with which read_shapes() gives `wanted` (V), in the order of the surface and in steps of each mode, back to
-/// about 2^(-fineness / 2) steps, with the fineness (V) of each vertex; and what it gives, (V). `modes` of the rows count.
+/// Numbers for write_shapes() with which read_shapes() reproduces `wanted` (V), in surface order and in steps of each mode, to about
+/// 2^(-fineness / 2) steps, fineness (V) per vertex; and the decoded result, (V). `modes`: used columns of the rows.
 ///
-/// Method: of each vertex three predictions are tried, kriging alone and with coefficients of either kind (Fit), and the one is taken whose
-///   numbers take the fewest bits for the error that stays (Lagrange's multiplier, with costs in bits of a geometric law). Coefficients are
-///   the least-squares solution over all modes with a prior of their own size, rounded one after the other, each for what the others leave
-///   (Babai's nearest plane 1986). Finer levels, from which less is predicted, are quantised more coarsely.
+/// Method: three predictions per vertex, kriging alone and with coefficients of either kind (Fit); the one with the lowest rate-distortion
+///   cost (Lagrange multiplier, bits of a geometric distribution) is chosen. Coefficients: regularised least squares over all modes,
+///   rounded in turn, each compensating those before (Babai's nearest plane 1986). Finer levels, which predict fewer vertices, are
+///   quantised more coarsely.
 struct FittedShapes {
   std::vector<LevelNumbers> levels;
   Rows rows;
 };
-/// sampled: of the finest level only the vertices with numbers divisible by it are fitted, the others stay at rest; for trials.
+/// sampled: fits only every sampled-th vertex of the finest level, for trials; the others stay 0.
 FittedShapes fit_shapes(const Surface& surface, const Rows& wanted, std::size_t modes, std::span<const std::uint8_t> fineness,
                         std::size_t sampled = 1);
 

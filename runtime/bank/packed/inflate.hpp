@@ -1,4 +1,4 @@
-// Bytes of the zlib format (RFC 1950), the one that every system and every browser can read.
+// Inflate for zlib streams (RFC 1950).
 #pragma once
 
 #include <cstdint>
@@ -6,18 +6,18 @@
 
 namespace carillon::packed {
 
-/// No stream of the format holds more than so many times its length (Deutsch, RFC 1951: a match of 258 bytes takes two bits).
+/// Maximum expansion of a deflate stream (Deutsch, RFC 1951: a match of 258 bytes takes two bits).
 inline constexpr std::size_t kMaxInflation = 1032;
 
-/// What so many packed bytes may become in memory, at most: a file of some kilobytes cannot take all memory of a machine. Shapes of a
-/// smooth body with ten modes become a hundred times what they were.
+/// Memory limit for unpacking so many bytes, so that a small file cannot exhaust memory. Smooth bodies with ten modes expand about 100
+/// times.
 constexpr std::uint64_t find_most_unpacked(std::uint64_t packed) {
   constexpr std::uint64_t kAlways = 64 << 20, kTimes = 4096;
   return packed > kAlways / kTimes ? kTimes * packed : kAlways;
 }
 
-/// Fills `bytes` with what a zlib stream holds. False when the stream is damaged or holds another number of bytes. Any thread. Uses
-/// libdeflate, and in WebAssembly the decoder of stb_image, which its compiler brings along.
+/// Inflates a zlib stream into `bytes`. False if it is damaged or of another length. Thread-safe. Uses libdeflate; in WebAssembly the
+/// decoder of stb_image, which comes with its compiler.
 bool inflate(std::span<const std::uint8_t> stream, std::span<std::uint8_t> bytes);
 
 }  // namespace carillon::packed

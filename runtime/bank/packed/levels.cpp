@@ -12,11 +12,11 @@
 namespace carillon::packed {
 namespace {
 
-constexpr double kLastShare = 2.7;     // vertices over those of all levels but the last
-constexpr double kPerSquare = 0.7;     // vertices that are taken on a square of the distance
-constexpr std::size_t kCoarsest = 64;  // vertices that the first level shall have at least
+constexpr double kLastShare = 2.7;                // all vertices over those of all levels but the last
+constexpr double kVerticesPerSquare = 0.7;        // vertices taken per square of the distance
+constexpr std::size_t kMinCoarsestVertices = 64;  // minimum number of vertices of the first level
 
-/// Points that keep a distance, in cells as wide as it is.
+/// Points with a minimum distance, in cells of that width.
 class Darts {
  public:
   explicit Darts(double distance_m) : distance_m_(distance_m) {}
@@ -41,7 +41,7 @@ class Darts {
     for (std::size_t k = 0; k < 3; ++k) cell[k] = static_cast<std::int64_t>(std::floor(x[k] / distance_m_));
     return cell;
   }
-  /// Cells of one hash share their points.
+  /// Cells of equal hash share a bucket.
   static std::uint64_t hash(const Cell& cell) {
     return static_cast<std::uint64_t>(cell[0]) * 0x9e3779b97f4a7c15U ^ static_cast<std::uint64_t>(cell[1]) * 0xc2b2ae3d27d4eb4fU ^
            static_cast<std::uint64_t>(cell[2]) * 0x165667b19e3779f9U;
@@ -54,11 +54,11 @@ class Darts {
 }  // namespace
 
 std::vector<std::uint8_t> find_levels(std::span<const Vec3> vertices_m, double area_m2) {
-  // Distances from the finest up, then levels from the coarsest down.
+  // Distances from the finest level up, then levels from the coarsest down.
   std::vector<double> distances_m;
   for (double count = static_cast<double>(vertices_m.size()) / kLastShare;
-       count >= static_cast<double>(kCoarsest) && distances_m.size() + 1 < kMaxLevels; count /= 4.0)
-    distances_m.push_back(std::sqrt(kPerSquare * area_m2 / count));
+       count >= static_cast<double>(kMinCoarsestVertices) && distances_m.size() + 1 < kMaxLevels; count /= 4.0)
+    distances_m.push_back(std::sqrt(kVerticesPerSquare * area_m2 / count));
   constexpr std::uint8_t kNone = std::numeric_limits<std::uint8_t>::max();
   std::vector<std::uint8_t> level(vertices_m.size(), kNone);
   std::size_t taken = 0;

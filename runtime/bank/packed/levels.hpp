@@ -1,4 +1,4 @@
-// Which vertices of a surface come first.
+// Hierarchy of a surface's vertices.
 #pragma once
 
 #include <cstdint>
@@ -9,11 +9,10 @@
 
 namespace carillon::packed {
 
-/// The level (V) of each vertex, 0 for the coarsest, none empty: vertices of a level and of those before it keep a distance from each other
-/// that halves with each level, and the last level has what remains. The coarsest has kNeighbours or more vertices. `area_m2` > 0 of the
-/// surface that they lie on.
+/// Level (V) of each vertex, 0: coarsest, none empty. Vertices up to a level keep a minimum distance that halves with each level; the last
+/// level has the remainder. The coarsest has at least kNeighbours vertices. `area_m2` > 0: area of the surface.
 ///
-/// Method: each vertex in turn is taken if no vertex that was taken is nearer than the level's distance (dart throwing, Cook 1986).
+/// Method: dart throwing (Cook 1986): a vertex is taken if no taken one is within the level's distance.
 std::vector<std::uint8_t> find_levels(std::span<const Vec3> vertices_m, double area_m2);
 
 }  // namespace carillon::packed

@@ -1,5 +1,6 @@
-// Method: cells of a lattice, in buckets by a hash. Two by two by two cells hold every place within half their width, and most within
-//   their width: prediction needs good neighbours that reader and writer agree on, and not the very nearest.
+// Method: lattice cells in hash buckets. 2x2x2 cells contain all vertices within half a cell width and most within one: prediction needs
+// good
+//   neighbours on which reader and writer agree, not the exact nearest ones.
 #include "runtime/bank/packed/neighbours.hpp"
 
 #include <algorithm>
@@ -14,8 +15,8 @@
 namespace carillon::packed {
 namespace {
 
-constexpr double kPerCell = 1.5;            // vertices of a cell, where the surface passes it
-constexpr int kWidest = kMaxCellShift + 2;  // two cells of this width hold the whole lattice
+constexpr double kVerticesPerCell = 1.5;          // mean vertices of a cell that the surface crosses
+constexpr int kMaxGridShift = kMaxCellShift + 2;  // two cells of this width cover the lattice
 
 std::uint32_t mix(const Place& cell) {
   std::uint32_t hash = static_cast<std::uint32_t>(cell[0]) * 0x9e3779b1U;
@@ -26,7 +27,7 @@ std::uint32_t mix(const Place& cell) {
 
 Place find_cell(const Place& place, int shift) { return {place[0] >> shift, place[1] >> shift, place[2] >> shift}; }
 
-/// The sides of the box around them, in steps, at least 1.
+/// Sides of the bounding box, in steps, at least 1.
 std::array<double, 3> calc_box(std::span<const Place> places) {
   std::array<double, 3> size{};
   for (std::size_t k = 0; k < 3; ++k) {
@@ -40,7 +41,7 @@ std::array<double, 3> calc_box(std::span<const Place> places) {
 
 int find_cell_shift(std::span<const Place> places) {
   const auto [a, b, c] = calc_box(places);
-  const double width = std::sqrt(kPerCell * 2.0 * (a * b + b * c + c * a) / static_cast<double>(places.size()));
+  const double width = std::sqrt(kVerticesPerCell * 2.0 * (a * b + b * c + c * a) / static_cast<double>(places.size()));
   return std::clamp(static_cast<int>(std::lround(std::log2(width))), 0, kMaxCellShift);
 }
 
@@ -67,7 +68,7 @@ NeighbourSearch::Grid NeighbourSearch::make_grid(int shift) const {
   return grid;
 }
 
-/// near_ of the eight cells from `low` on.
+/// Gathers the 2x2x2 cells from `low` into near_.
 void NeighbourSearch::gather(const Grid& grid, const Place& low) {
   std::size_t& count = near_->count;
   count = 0;
@@ -99,11 +100,11 @@ Neighbours NeighbourSearch::find(const Place& place) {
     }
     Neighbours found;
     if (near_->count >= kNeighbours) {
-      find_loops().find_nearest(*near_, place, grid.shift + 2, found);  // one and a half cells away at most
+      find_loops().find_nearest(*near_, place, grid.shift + 2, found);  // at most 1.5 cells away
       return found;
     }
-    if (grid.shift < kWidest) continue;
-    std::iota(found.begin(), found.end(), 0);  // of a crowd that is cut: any will do
+    if (grid.shift < kMaxGridShift) continue;
+    std::iota(found.begin(), found.end(), 0);  // truncated bucket: any will do
     return found;
   }
 }

@@ -12,16 +12,16 @@
 namespace carillon::packed {
 namespace {
 
-constexpr std::size_t kGroup = 32;  // vertices that are read at once: numbers lie across the vertices in the file
+constexpr std::size_t kGroup = 32;  // vertices decoded at once: the file is transposed
 
-/// The numbers that one byte says.
+/// Decoded values of a byte.
 constexpr std::array<float, 256> kUnfolded = [] {
   std::array<float, 256> numbers{};
   for (std::uint32_t i = 0; i < 256; ++i) numbers[i] = static_cast<float>(unfold(i));
   return numbers;
 }();
 
-/// Numbers of vertices, all first ones of all vertices, then all second ones ...
+/// Numbers of vertices, transposed: all first ones, then all second ones ...
 class Numbers {
  public:
   Numbers(Reader& reader, std::size_t vertices, std::size_t numbers) : vertices_(vertices), numbers_(numbers), tile_(kGroup * numbers) {
@@ -29,11 +29,11 @@ class Numbers {
     if (planes > 4) reader.fail(fmt::format("numbers of {} bytes", planes));
     for (int plane = 0; plane < planes; ++plane) planes_.push_back(reader.get_block(vertices * numbers));
   }
-  /// Takes the numbers of the next `count` vertices, at most kGroup; get() has them in order.
+  /// Decodes the next `count` vertices, at most kGroup, for get().
   void take(std::size_t count) {
     for (std::size_t j = 0; j < numbers_; ++j) {
       const std::size_t from = j * vertices_ + first_;
-      if (planes_.size() == 1) {  // as a rule
+      if (planes_.size() == 1) {  // usual case
         for (std::size_t v = 0; v < count; ++v) tile_[v * numbers_ + j] = kUnfolded[planes_[0][from + v]];
         continue;
       }
@@ -54,13 +54,13 @@ class Numbers {
   std::vector<float> tile_;  // (kGroup, numbers)
 };
 
-/// Residuals of which most are zero: of each vertex how many are not, and of each of those how many zeros stand before it.
+/// Sparse residuals: per vertex the number of nonzero ones, and for each the preceding zeros.
 class SparseResidual {
  public:
   SparseResidual(Reader& reader, std::size_t vertices, std::size_t numbers) : reader_(reader), numbers_(numbers) {
     counts_ = reader.get_numbers(vertices);
     const std::size_t total = reader.get<std::uint32_t>();
-    // None of them is 0, so that they take bytes.
+    // Nonzero, so each takes at least a byte.
     if (total > vertices * numbers || total / kMaxInflation > reader.get_left()) reader.fail("there are more residuals than numbers");
     gaps_ = reader.get_numbers(total);
     values_ = reader.get_numbers(total);
@@ -69,14 +69,14 @@ class SparseResidual {
   void take(Add&& add) {
     std::size_t place = 0;
     for (std::uint32_t i = 0; i < counts_[vertex_]; ++i, ++at_, ++place) {
-      if (at_ >= values_.size() || gaps_[at_] >= numbers_ - place) reader_.fail("a residual lies outside of its vertex");
+      if (at_ >= values_.size() || gaps_[at_] >= numbers_ - place) reader_.fail("a residual lies outside its vertex");
       place += gaps_[at_];
       add(place, static_cast<float>(unfold(values_[at_])));
     }
     ++vertex_;
   }
   void finish() const {
-    if (at_ != values_.size()) reader_.fail("residuals are left over");
+    if (at_ != values_.size()) reader_.fail("there are excess residuals");
   }
 
  private:
@@ -212,8 +212,8 @@ class ShapeReader {
   std::size_t modes_;
   std::span<const float> factor_;
   const Loops& loops_ = find_loops();
-  Rows rows_;                    // of all levels but the last
-  std::vector<float> energies_;  // of the rows
+  Rows rows_;                    // all levels but the last
+  std::vector<float> energies_;  // per row
   std::vector<float> row_;
   std::vector<std::int16_t> shape_row_, shape_;
 };
@@ -231,7 +231,7 @@ std::vector<std::int16_t> read_shapes(std::span<const std::byte> bytes, const Su
     reader.fail(fmt::format("they have {} levels, and the surface {}", levels, surface.level_count()));
   if (surface.level_count() > 1 && surface.level_begin[1] < kNeighbours)
     reader.fail(fmt::format("their coarsest level has {} vertices; {} are needed", surface.level_begin[1], kNeighbours));
-  // 18 bytes a vertex and mode, 6 of the shape and 12 of its row, and 24 a vertex of each grid of a search.
+  // Per vertex and mode 18 bytes (6 of the shape, 12 of its row), and 24 per vertex of each search grid.
   const auto most = static_cast<double>(find_most_unpacked(bytes.size()));
   if (18.0 * (static_cast<double>(vertices) + 256.0) * (static_cast<double>(modes) + kRowUnit) +
           24.0 * (kMaxCellShift + 3) * static_cast<double>(vertices) >

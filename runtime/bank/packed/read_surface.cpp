@@ -9,24 +9,24 @@
 namespace carillon::packed {
 namespace {
 
-constexpr std::size_t kMostPassed = 256;  // gates that are passed for a triangle, in the mean: time shall be as the length
+constexpr std::size_t kMaxMeanVisits = 256;  // mean list nodes visited per triangle: bounds the time by the length
 
-/// The streams of the triangles, taken one symbol at a time.
+/// Streams of the triangles, one symbol at a time.
 class Corners {
  public:
   Corners(Reader& reader, std::size_t triangles, std::size_t seeds) : reader_(reader), count_(triangles + 2 * seeds) {
     symbols_ = reader.get_block((count_ + 3) / 4);
     const std::size_t others = reader.get<std::uint32_t>();
-    if (others > count_) reader.fail("more corners are named by number than there are");
+    if (others > count_) reader.fail("more corners have an index than exist");
     others_ = reader.get_numbers(others);
   }
   Corner next() {
-    if (at_ >= count_) reader_.fail("its triangles begin more often than is said");
+    if (at_ >= count_) reader_.fail("its triangles begin more often than declared");
     const std::uint8_t four = symbols_[at_ / 4];
     return static_cast<Corner>((four >> (2 * (at_++ % 4))) & 3U);
   }
   std::uint32_t next_other() {
-    if (at_other_ >= others_.size()) reader_.fail("a corner has no number");
+    if (at_other_ >= others_.size()) reader_.fail("a corner has no index");
     return others_[at_other_++];
   }
   void finish() {
@@ -40,7 +40,7 @@ class Corners {
   std::vector<std::uint32_t> others_;
 };
 
-/// The vertices in the order of the triangles.
+/// Vertices in traversal order.
 class Vertices {
  public:
   Vertices(Reader& reader, std::size_t count) : reader_(reader) {
@@ -61,7 +61,7 @@ class Vertices {
   const Place& operator[](std::int32_t vertex) const { return places_[vertex]; }
   Place get_last() const { return used_ > 0 ? places_[used_ - 1] : Place{}; }
   std::int32_t find_other(std::uint32_t back) {
-    if (back >= used_) reader_.fail("a corner is a vertex that is not there yet");
+    if (back >= used_) reader_.fail("a corner refers to a later vertex");
     return static_cast<std::int32_t>(used_ - 1 - back);
   }
   std::vector<Place> take() {
@@ -71,11 +71,11 @@ class Vertices {
 
  private:
   Reader& reader_;
-  std::vector<Place> places_;  // differences from the prediction behind used_
+  std::vector<Place> places_;  // from used_ on: differences from the prediction
   std::size_t used_ = 0;
 };
 
-/// Of the fourth corner of the parallelogram whose diagonal is the gate.
+/// Parallelogram prediction across the gate.
 Place predict(const Vertices& vertices, const Gate& gate) {
   Place place;
   for (std::size_t k = 0; k < 3; ++k) place[k] = vertices[gate.from][k] + vertices[gate.to][k] - vertices[gate.opposite][k];
@@ -105,11 +105,11 @@ Triangle cross_gate(const Gate& gate, const Border& border, Corners& corners, Ve
       third = vertices.find_other(corners.next_other());
       break;
   }
-  if (third < 0) reader.fail("a triangle continues where no border is");
+  if (third < 0) reader.fail("a triangle continues without a border");
   return {gate.to, gate.from, third};
 }
 
-/// Puts the vertices into the order of find_order().
+/// Sorts the vertices into the order of find_order().
 void sort_vertices(Surface& surface, const std::vector<std::uint8_t>& level, std::size_t levels, const Reader& reader) {
   surface.level_begin.assign(levels + 1, 0);
   for (const std::uint8_t l : level) {
@@ -132,7 +132,7 @@ void sort_vertices(Surface& surface, const std::vector<std::uint8_t>& level, std
     for (std::int32_t& corner : triangle) corner = moved[corner];
 }
 
-/// The lowest 19 bits with two zeros behind each.
+/// Spreads the lowest 19 bits, two zeros after each.
 std::uint64_t spread(std::uint64_t x) {
   x &= 0x7ffffU;
   x = (x | x << 32) & 0x1f00000000ffffU;
@@ -193,15 +193,15 @@ Surface read_surface(std::span<const std::byte> bytes, const std::string& name) 
   const std::size_t levels = reader.get<std::uint8_t>();
   const std::size_t vertex_count = reader.get<std::uint32_t>(), triangle_count = reader.get<std::uint32_t>();
   const std::size_t seeds = reader.get<std::uint32_t>();
-  // 12 bytes of a place, again while they are sorted, and 24 of its order; 12 of a triangle, and three gates of 24 while their list grows.
+  // Per vertex 12 bytes of position, 12 while sorting and 24 of order; per triangle 12 bytes and three gates of 24 while their list grows.
   if (48 * std::uint64_t{vertex_count} + 156 * std::uint64_t{triangle_count} > find_most_unpacked(bytes.size()))
-    reader.fail("it would become larger than any bank of its length");
+    reader.fail("it would expand beyond the limit for its length");
   if (seeds > triangle_count) reader.fail("it begins more often than it has triangles");
   if (levels == 0 || levels > kMaxLevels) reader.fail(fmt::format("it has {} levels; 1 to {} are possible", levels, kMaxLevels));
   Surface surface;
   for (double& x : surface.origin_m) {
     x = reader.get<double>();
-    if (!std::isfinite(x)) reader.fail("its origin is no place");
+    if (!std::isfinite(x)) reader.fail("its origin is not finite");
   }
   surface.step_m = reader.get_positive("step");
 
@@ -218,7 +218,7 @@ Surface read_surface(std::span<const std::byte> bytes, const std::string& name) 
     if (triangle[0] == triangle[1] || triangle[1] == triangle[2] || triangle[2] == triangle[0])
       reader.fail(fmt::format("triangle {} has a vertex twice", t));
     border.add(triangle);
-    if (border.count_passed() > kMostPassed * (t + kMostPassed)) reader.fail("too many of its edges are open at one vertex");
+    if (border.count_passed() > kMaxMeanVisits * (t + kMaxMeanVisits)) reader.fail("too many of its edges are open at one vertex");
     surface.triangles.push_back(triangle);
   }
   corners.finish();

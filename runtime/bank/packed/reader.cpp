@@ -5,13 +5,13 @@
 #include <bit>
 #include <cmath>
 
+#include "runtime/bank/packed/inflate.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/large.hpp"
-#include "runtime/bank/packed/inflate.hpp"
 
 namespace carillon::packed {
 
-static_assert(std::endian::native == std::endian::little, "Numbers are copied between file and memory as they are.");
+static_assert(std::endian::native == std::endian::little, "Numbers are copied unchanged between file and memory.");
 
 void Reader::fail(std::string_view fault) const {
   throw InputError(fmt::format("{}: {}: {}; copy or pack the bank again", name_, what_, fault));
@@ -32,7 +32,7 @@ double Reader::get_positive(std::string_view name) {
 
 std::vector<std::uint8_t> Reader::get_block(std::size_t size) {
   const auto stream = take(get<std::uint32_t>());
-  if (size / kMaxInflation > stream.size()) fail("a block is too short for what it shall hold");
+  if (size / kMaxInflation > stream.size()) fail("a block is too short for its content");
   std::vector<std::uint8_t> block;
   base::reserve_large(block, size);
   block.resize(size);
@@ -54,7 +54,7 @@ std::vector<std::uint32_t> Reader::get_numbers(std::size_t count) {
 }
 
 void Reader::finish() {
-  if (!bytes_.empty()) fail(fmt::format("{} bytes too many", bytes_.size()));
+  if (!bytes_.empty()) fail(fmt::format("{} excess bytes", bytes_.size()));
 }
 
 }  // namespace carillon::packed

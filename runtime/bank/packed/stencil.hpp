@@ -1,4 +1,4 @@
-// How a vertex follows from its neighbours by their places alone, and what can be said beyond that.
+// Prediction of a vertex from its neighbours.
 #pragma once
 
 #include <array>
@@ -9,23 +9,23 @@
 
 namespace carillon::packed {
 
-/// The best linear prediction of a smooth field at a vertex from its neighbours, and of its gradient there times their mean distance h.
+/// Best linear prediction of a smooth field at a vertex from its neighbours, and of its gradient there times their mean distance h.
 ///
-/// Method:  kriging with the covariance 1 / (1 + (0.3 r)^2) + 100 (1 + x . x'), r and x in units of h about the vertex; the second term is
-///          for linear fields. 1e-4 on the diagonal stands for the rounding of the neighbours.
-/// Source:  kriging: Matheron 1963; the covariance, an inverse multiquadric: Hardy 1971, positive definite by Schoenberg 1938.
+/// Method: kriging with the covariance 1 / (1 + (0.3 r)^2) + 100 (1 + x . x'), r and x in units of h about the vertex; the second term
+///   reproduces linear fields. 1e-4 on the diagonal represents the rounding of the neighbours.
+/// Source: kriging: Matheron 1963; covariance, an inverse multiquadric: Hardy 1971, positive definite by Schoenberg 1938.
 struct Stencil {
   std::array<float, kNeighbours> value{};                    // weights of the neighbours
   std::array<std::array<float, kNeighbours>, 3> gradient{};  // along each axis
   std::array<std::array<float, kNeighbours>, 3> offset{};    // of the neighbours along each axis, in units of h
 };
 
-/// The stencils of vertices at `centres` (n) with `neighbours` (n), which are among `places`. Any thread.
+/// Stencils of vertices at `centres` (n) with `neighbours` (n) among `places`. Thread-safe.
 void calc_stencils(std::span<const Place> centres, std::span<const Neighbours> neighbours, std::span<const Place> places,
                    std::span<Stencil> stencils);
 
-/// What is added to the kriging of a vertex: linear functions of what its neighbours do, as the local form of the body makes them (near an
-/// edge or a change of thickness all slow fields bend alike). Coefficients are 3x3 matrices, row-major.
+/// Correction of the kriging prediction: linear functions of the neighbours' motion, which adapt to the local geometry (near an edge or a
+/// change of thickness all slow fields bend alike). Coefficients are 3x3 matrices, row-major.
 enum class Fit : std::uint8_t {
   kNone = 0,        // kriging alone
   kGradient = 1,    // plus sum over axes j of C_j (gradient along j)
@@ -33,8 +33,8 @@ enum class Fit : std::uint8_t {
 };
 inline constexpr std::size_t kGradientNumbers = 27, kDifferenceNumbers = 9 * kNeighbours;
 
-/// What makes the prediction of a vertex of the rows of its neighbours: weights of the neighbours (K) for what each component of theirs
-/// gives to x, y and z, by component, then by x, y and z.
+/// Prediction matrix: weights of the neighbours (K) for the contribution of each of their components to x, y and z; by component, then by
+/// x, y and z.
 using Matrix = std::array<float, 3 * 3 * kNeighbours>;
 
 }  // namespace carillon::packed

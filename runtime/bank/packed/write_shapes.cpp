@@ -7,7 +7,7 @@
 namespace carillon::packed {
 namespace {
 
-/// values: (vertices, numbers). As Numbers reads them.
+/// values: (vertices, numbers), transposed for Numbers.
 void put_across(Writer& writer, std::span<const std::int32_t> values, std::size_t numbers) {
   const std::size_t vertices = values.empty() ? 0 : values.size() / numbers;
   std::vector<std::uint32_t> folded(values.size());
@@ -38,7 +38,7 @@ void put_sparse(Writer& writer, std::span<const std::int32_t> values, std::size_
   writer.put_numbers(folded);
 }
 
-/// The shorter of the two forms, behind its number.
+/// The shorter of the two forms, preceded by its number.
 void put_residual(Writer& writer, std::span<const std::int32_t> values, std::size_t numbers) {
   Writer dense, sparse;
   put_across(dense, values, numbers);

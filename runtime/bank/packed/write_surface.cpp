@@ -8,7 +8,7 @@
 namespace carillon::packed {
 namespace {
 
-/// Which triangle has an edge, by the vertex where it begins.
+/// Edges by their first vertex.
 class EdgeTable {
  public:
   EdgeTable(const std::vector<Triangle>& triangles, std::size_t vertices) : triangles_(triangles), begin_(vertices + 1, 0) {
@@ -20,7 +20,7 @@ class EdgeTable {
     for (std::size_t t = 0; t < triangles.size(); ++t)
       for (std::size_t k = 0; k < 3; ++k) edges_[next[triangles[t][k]]++] = static_cast<std::int32_t>(3 * t + k);
   }
-  /// Three times the triangle, plus the corner where the edge begins, of the first triangle that is not done. There is one.
+  /// First unfinished triangle with this edge, which exists: three times its index, plus the corner where the edge begins.
   std::int32_t find(std::int32_t from, std::int32_t to, const std::vector<bool>& is_done) const {
     std::size_t i = begin_[from];
     while (triangles_[edges_[i] / 3][(edges_[i] + 1) % 3] != to || is_done[edges_[i] / 3]) ++i;
@@ -33,7 +33,7 @@ class EdgeTable {
   std::vector<std::int32_t> edges_;
 };
 
-/// What read_surface() takes, as it is collected. Vertices have their new numbers here.
+/// Streams for read_surface(). Vertices have their new indices.
 struct Streams {
   std::vector<std::uint8_t> corners;
   std::vector<std::uint32_t> others;
@@ -105,8 +105,8 @@ class Traversal {
   const std::vector<Place>& places_;
   const std::vector<Triangle>& triangles_;
   EdgeTable edges_;
-  std::vector<std::int32_t> number_;            // of a vertex, in the order of the traversal
-  std::vector<std::int32_t> vertices_, order_;  // the vertices and triangles that it has seen
+  std::vector<std::int32_t> number_;            // index of each vertex in traversal order
+  std::vector<std::int32_t> vertices_, order_;  // visited vertices and triangles
   Border border_;
   Streams streams_;
 };

@@ -10,12 +10,12 @@
 namespace carillon::packed {
 namespace {
 
-constexpr int kEffort = 12;  // the most: a bank is packed once
+constexpr int kCompressionLevel = 12;  // maximum: banks are packed once
 
 }  // namespace
 
 void Writer::put_block(std::span<const std::uint8_t> block) {
-  const std::unique_ptr<libdeflate_compressor, void (*)(libdeflate_compressor*)> compressor(libdeflate_alloc_compressor(kEffort),
+  const std::unique_ptr<libdeflate_compressor, void (*)(libdeflate_compressor*)> compressor(libdeflate_alloc_compressor(kCompressionLevel),
                                                                                             libdeflate_free_compressor);
   if (!compressor) throw SystemError("there is no memory to compress with");
   std::vector<std::uint8_t> stream(libdeflate_zlib_compress_bound(compressor.get(), block.size()));

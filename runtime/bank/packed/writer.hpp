@@ -1,4 +1,4 @@
-// Numbers and compressed blocks as bytes.
+// Writer of numbers and compressed blocks.
 #pragma once
 
 #include <concepts>
@@ -9,7 +9,7 @@
 
 namespace carillon::packed {
 
-/// Bytes as Reader takes them; the two change together.
+/// Counterpart of Reader.
 class Writer {
  public:
   template <class T>
@@ -22,9 +22,9 @@ class Writer {
   void put_list(std::span<const T> values) {
     for (const T value : values) put(value);
   }
-  /// SystemError when there is no memory.
+  /// SystemError if out of memory.
   void put_block(std::span<const std::uint8_t> block);
-  /// As Reader::get_numbers() reads them.
+  /// Counterpart of Reader::get_numbers().
   void put_numbers(std::span<const std::uint32_t> values);
 
   const std::vector<std::uint8_t>& get_bytes() const { return bytes_; }

@@ -224,10 +224,6 @@ CARILLON_API void carillon_body_options_init_sized(carillon_body_options* option
 CARILLON_API carillon_status carillon_add_body_with(carillon_synth* synth, const carillon_model* model,
                                                     const carillon_body_options* options, int32_t* body, char* message,
                                                     size_t message_size);
-/* [main] Sets the effects of a body from one of the next periods of 128 frames on, without a click. Disabled effects cost no time, and no
- * memory after carillon_collect. */
-CARILLON_API carillon_status carillon_set_effects(carillon_synth* synth, int32_t body, uint32_t effects, char* message,
-                                                  size_t message_size);
 /* [main] 0 for an unknown body. */
 CARILLON_API uint32_t carillon_get_effects(const carillon_synth* synth, int32_t body);
 /* [main] The body keeps ringing with another model, usually that of an edited bank: every mode keeps its energy and phase and
@@ -397,20 +393,15 @@ CARILLON_API void carillon_counters_init_sized(carillon_counters* counters, size
 /* [any] `counters->size` must be set. */
 CARILLON_API carillon_status carillon_get_counters(const carillon_synth* synth, carillon_counters* counters);
 
-/* Work and memory of one body's effects, in the order of carillon_effect. */
+/* Work of one body's effects, in the order of carillon_effect. */
 typedef struct carillon_effect_counters {
   uint32_t size;
   uint32_t reserved;
   int64_t units[CARILLON_EFFECT_COUNT]; /* modal: mode-samples; hertz_pulse: pulses; the others: samples */
-  int64_t bytes[CARILLON_EFFECT_COUNT];
   int64_t later_units[CARILLON_LATER_EFFECT_COUNT]; /* directivity: transfers looked up; ground_reflection: samples */
-  int64_t later_bytes[CARILLON_LATER_EFFECT_COUNT];
   int64_t head_units; /* samples */
-  int64_t head_bytes;
   int64_t nonlinear_units; /* coupled modes times samples */
-  int64_t nonlinear_bytes;
   int64_t cascade_units; /* modes above the coupled ones times samples */
-  int64_t cascade_bytes;
 } carillon_effect_counters;
 
 #define carillon_effect_counters_init(counters) carillon_effect_counters_init_sized((counters), sizeof(carillon_effect_counters))

@@ -162,11 +162,6 @@ carillon_status carillon_add_body_with(carillon_synth* synth, const carillon_mod
   });
 }
 
-carillon_status carillon_set_effects(carillon_synth* synth, int32_t body, uint32_t effects, char* message, size_t message_size) {
-  if (synth == nullptr) return refuse("carillon_set_effects: synth must not be NULL", message, message_size);
-  return run(message, message_size, [&] { synth->synthesiser.set_effects(body, to_effects(effects)); });
-}
-
 uint32_t carillon_get_effects(const carillon_synth* synth, int32_t body) {
   uint32_t bits = 0;
   if (synth != nullptr) (void)run(nullptr, 0, [&] { bits = to_bits(synth->synthesiser.get_effects(body)); });
@@ -244,18 +239,11 @@ carillon_status carillon_get_effect_counters(const carillon_synth* synth, int32_
   if (synth == nullptr || !read(counters)) return CARILLON_BAD_ARGUMENT;
   const synth::EffectCounters ours = synth->synthesiser.get_effect_counters(body);
   carillon_effect_counters given{};
-  const auto put = [](const synth::PerEffect<std::int64_t>& values, std::int64_t* first, std::int64_t* later) {
-    std::copy_n(values.begin(), CARILLON_EFFECT_COUNT, first);
-    std::copy_n(values.begin() + CARILLON_EFFECT_COUNT, CARILLON_LATER_EFFECT_COUNT, later);
-  };
-  put(ours.units, given.units, given.later_units);
-  put(ours.bytes, given.bytes, given.later_bytes);
+  std::copy_n(ours.units.begin(), CARILLON_EFFECT_COUNT, given.units);
+  std::copy_n(ours.units.begin() + CARILLON_EFFECT_COUNT, CARILLON_LATER_EFFECT_COUNT, given.later_units);
   given.head_units = ours.units[synth::Effect::kHead];
-  given.head_bytes = ours.bytes[synth::Effect::kHead];
   given.nonlinear_units = ours.units[synth::Effect::kNonlinear];
-  given.nonlinear_bytes = ours.bytes[synth::Effect::kNonlinear];
   given.cascade_units = ours.units[synth::Effect::kCascade];
-  given.cascade_bytes = ours.bytes[synth::Effect::kCascade];
   write(given, counters);
   return CARILLON_OK;
 }

@@ -48,7 +48,7 @@ Rendered render(scene::Scene scene) {
   effects::SceneFacts facts = scene::make_facts(scene, scene::make_microphones(scene), scene::has_physics(scene));
   const bool has_contacts = effects::EffectSelector(facts).needs_contacts();
   const scene::SceneEvents happened = scene::simulate(scene, has_contacts, false, look_for_signals);
-  const scene::Plan plan = scene::make_plan(std::move(facts), happened.events, {});
+  const scene::Plan plan = scene::make_plan(std::move(facts), happened.events);
   Rendered rendered{sound::SoundStore(scene.sample_rate_hz, scene::count_channels(scene)), std::move(scene.warnings)};
   const render::Sound sound = render::calc_sound(
       scene, body_banks, happened.events,

@@ -70,9 +70,8 @@ class Instrument {
   int add_body(const SharedBank& bank, const Vec3& position_m, const events::Quaternion& rotation, const std::string& radiation,
                const std::optional<std::vector<std::string>>& effects) {
     synth::BodySettings settings{.position_m = position_m, .rotation = rotation};
-    if (has_head_) settings.effects = settings.effects.with(synth::EffectSet{synth::Effect::kHead}.common(synth::kCompiledEffects));
-    if (has_floor_)
-      settings.effects = settings.effects.with(synth::EffectSet{synth::Effect::kGroundReflection}.common(synth::kCompiledEffects));
+    if (has_head_) settings.effects = settings.effects.with(synth::Effect::kHead);
+    if (has_floor_) settings.effects = settings.effects.with(synth::Effect::kGroundReflection);
     if (effects) settings.effects = to_effects(*effects);
     const int body = get().add_body(make_model(*bank.played, radiation, rate_hz_), settings);
     banks_[body] = bank;

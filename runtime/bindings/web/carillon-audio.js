@@ -214,20 +214,6 @@ export class Body {
     this.isMoved = true;
     this.audio.push(makeMotion(this.number, motion));
   }
-  /** Sets effects as in scene files: "auto", a list, or {on, off}. */
-  async setEffects(effects) {
-    const before = this.spec;
-    this.spec = { ...before, effects };
-    try {
-      const facts = await this.make(this.edits);
-      await this.audio.engine.ask({ type: 'swap', body: this.number, model: facts.model });
-      this.take(facts);
-    } catch (error) {
-      this.spec = before;
-      throw error;
-    }
-    this.audio.engine.tell({ name: 'web_set_effects', numbers: [this.number, this.possible] });
-  }
   /** Includes its modal amplitudes and largest deflection so far [thicknesses; 0 up to half a thickness] in 'state' events. */
   watch(isWatched) {
     this.audio.engine.tell({ type: 'watch', body: this.number, modes: isWatched ? this.bank.mode_count : 0 });
@@ -437,10 +423,10 @@ export class CarillonAudio extends EventTarget {
     const facing = rotate(this.listener.rotation, [0, 1, 0]), { position_m } = this.listener;
     return JSON.stringify({ ...this.makeScene(), duration_s: Math.min(3600, Math.max(0.01, duration_s)), listener: { position_m, facing }, bodies: described });
   }
-  /** Effects needed by the bodies after the events so far, with reasons: {bodies: [{name, effects: {modal: {on, why, ...}, ...}}], changes}. */
+  /** Effects needed by the bodies after the events so far, with reasons: {bodies: [{name, effects: {modal: {on, why}, ...}}]}. */
   plan() {
     const bodies = [...this.bodies], numbers = bodies.map(({ number }) => number);
-    if (bodies.length === 0) return Promise.resolve({ bodies: [], changes: [] });
+    if (bodies.length === 0) return Promise.resolve({ bodies: [] });
     return this.worker.ask({ type: 'plan', scene: this.makePlanScene(bodies, this.time_s), bodies: bodies.map(({ id }) => id), numbers });
   }
 

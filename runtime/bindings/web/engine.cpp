@@ -25,8 +25,6 @@ constexpr double kFarAheadS = 0.5;
 constexpr double kStillS = 0.06;                          // a contact without an update for this long has no slip
 constexpr std::size_t kMostBytes = std::size_t{3} << 30;  // maximum size of a surface
 
-double calc_distance(const Vec3& a, const Vec3& b) { return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]); }
-
 }  // namespace
 
 Engine::Engine(const synth::SynthesiserOptions& options) : rate_hz_(options.rate_hz), synthesiser_(options) {
@@ -107,12 +105,6 @@ void Engine::set_solo(int body, int bank_mode) {
   played.solo = std::max(-1, bank_mode);
 }
 
-void Engine::set_effects(int body, synth::EffectSet effects) {
-  PlayedBody& played = find_body(body);
-  synthesiser_.set_effects(body, effects);
-  played.effects = effects;
-}
-
 void Engine::remove_body(int body) {
   find_body(body);
   synthesiser_.remove_body(body);
@@ -142,7 +134,7 @@ bool Engine::move_soon(Way& way, Waypoint waypoint) {
     if (!push_event(rest)) return false;
     way.time_s = now_s;
   }
-  const double distance_m = calc_distance(waypoint.position_m, way.position_m);
+  const double distance_m = calc_length(waypoint.position_m - way.position_m);
   const double takes_s = way.time_s < now_s + kFarAheadS ? distance_m / kFastestMs : 0.0;
   waypoint.time_s = std::max(now_s + kSoonS + waypoint.time_s, way.time_s + std::max(kStepS, takes_s));
   if (norm(waypoint.velocity_m_s) == 0.0)
@@ -255,7 +247,7 @@ void Engine::add_to_playback(int playback, std::span<const double> words) {
     const int body = request.bodies[motion.body];
     const auto way = ways_.find(body);
     if (body < 0 || way == ways_.end() || events::find_fault(motion) != nullptr) return;
-    const bool is_there = calc_distance(way->second.position_m, motion.position_m) < 1e-9;
+    const bool is_there = calc_length(way->second.position_m - motion.position_m) < 1e-9;
     events::BodyMotion there = motion;
     there.body = body;
     there.time_s = 0.0;

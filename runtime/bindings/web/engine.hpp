@@ -61,7 +61,6 @@ class Engine {
   void swap_model(int body, int model);
   /// Solo of one mode of a body, by its number in the bank; -1: all modes.
   void set_solo(int body, int bank_mode);
-  void set_effects(int body, synth::EffectSet effects);
   void remove_body(int body);
 
   /// Pushes interactive events (event_words.hpp). Returns the number of rejected events; find_fault() has the last reason. Throws

@@ -141,9 +141,6 @@ WEB_EXPORT(int, web_swap_model)(int body, int model) {
 WEB_EXPORT(int, web_set_solo)(int body, int mode) {
   return run([&] { return get_engine().set_solo(body, mode), 0; });
 }
-WEB_EXPORT(int, web_set_effects)(int body, int effects) {
-  return run([&] { return get_engine().set_effects(body, to_effects(effects)), 0; });
-}
 WEB_EXPORT(int, web_remove_body)(int body) {
   return run([&] { return get_engine().remove_body(body), 0; });
 }

@@ -179,24 +179,23 @@ Workshop::Workshop(double rate_hz) : rate_hz_(rate_hz) {
 std::string Workshop::list_choices() const {
   Json choices = Json::object();
   for (const material::NamedMallet& mallet : material::get_mallets()) {
-    choices.member("mallets").add(Json::object()
-                                      .set("name", mallet.name)
-                                      .set("mass_kg", mallet.mass_kg)
-                                      .set("speed_m_s", material::kMalletSpeedMs)
-                                      .set("is_soft", mallet.radius_m == 0.0)
-                                      .set("restitution", mallet.restitution));
+    choices["mallets"].add(Json::object()
+                               .set("name", mallet.name)
+                               .set("mass_kg", mallet.mass_kg)
+                               .set("speed_m_s", material::kMalletSpeedMs)
+                               .set("is_soft", mallet.radius_m == 0.0)
+                               .set("restitution", mallet.restitution));
   }
   for (const material::Row& row : material::MaterialTable::get().rows()) {
     if (row.material.orthotropic) continue;  // edits keep materials isotropic
-    choices.member("materials")
-        .add(Json::object()
-                 .set("name", row.material.name)
-                 .set("group", row.group)
-                 .set("density_kg_m3", row.material.density_kg_m3)
-                 .set("young_modulus_pa", row.material.young_modulus_pa)
-                 .set("damping", row.material.describe_damping()));
+    choices["materials"].add(Json::object()
+                                 .set("name", row.material.name)
+                                 .set("group", row.group)
+                                 .set("density_kg_m3", row.material.density_kg_m3)
+                                 .set("young_modulus_pa", row.material.young_modulus_pa)
+                                 .set("damping", row.material.describe_damping()));
   }
-  for (const synth::Effect effect : synth::EffectSet::all()) choices.member("effects").add(synth::get_name(effect));
+  for (const synth::Effect effect : synth::EffectSet::all()) choices["effects"].add(synth::get_name(effect));
   choices.set("default_effects", to_mask(synth::kDefaultEffects));
   return choices.line();
 }
@@ -230,7 +229,7 @@ std::string Workshop::add_bank(int bank, std::span<const std::byte> bytes, const
       .set("complete", b.complete)
       .set("completeness", bank::describe_completeness(b))
       .set("accuracy", bank::describe_accuracy(b));
-  facts.member("material")
+  facts["material"]
       .set("young_modulus_pa", b.material.young_modulus_pa)
       .set("poisson_ratio", b.material.poisson_ratio)
       .set("density_kg_m3", b.material.density_kg_m3)
@@ -257,18 +256,20 @@ std::string Workshop::make_body(int body, int bank, std::string_view scene, std:
   const std::shared_ptr<const bank::Bank>& as_read = find_bank(bank);
   MadeBody made{.bank = bank, .scene = read_scene(scene, 1), .played = nullptr, .model = nullptr};
   scene::SceneBody& described = made.scene.bodies[0];
-  std::vector<bank::HeardMode> heard;
+  Json modes;
   try {
     // As in scene::read_banks, for an edited bank.
     const std::optional<bank::Edits> wanted = read_edits(*as_read, edits);
     auto played = std::make_shared<bank::Bank>(
         bank::choose_frequencies(wanted ? bank::calc_edited(*as_read, *wanted) : *as_read, made.scene.frequencies));
-    heard = mounting::mount(*played, described.support);
+    const std::vector<bank::HeardMode> heard = mounting::mount(*played, described.support);
     const radiation::PutGains put = radiation::put_gains(*played, made.scene.radiation);
     described.sphere_radius_m = put.sphere_radius_m;
     described.limited = put.limited;
     double radius_m = put.sphere_radius_m;
     if (radius_m == 0.0 && made.scene.radiation == radiation::GainKind::kOsg02) radius_m = radiation::calc_sphere_radius_m(*played);
+    modes = list_modes(*played, heard);
+    played->multipoles = {};  // no directivity in pages
     // Bodies of one bank share its surface.
     const auto own = bodies_.find(body);
     const synth::Model* like = own != bodies_.end() ? own->second.model.get() : nullptr;
@@ -289,7 +290,7 @@ std::string Workshop::make_body(int body, int bank, std::string_view scene, std:
       .set("rotation", Json::array(described.spec.initial.rotation))
       .set("centre_m", to_json(b.rigid.centre_m))
       .set("mass_kg", b.rigid.mass_kg)
-      .set("modes", list_modes(b, heard))
+      .set("modes", std::move(modes))
       .set("sounding_modes", made.model->get_mode_count())
       .set("limited_modes", static_cast<std::int64_t>(described.limited.modes))
       .set("silence_pa", made.scene.quality.silence_pa.value_or(synth::BodySettings{}.silence_pa))
@@ -311,10 +312,20 @@ std::string Workshop::make_body(int body, int bank, std::string_view scene, std:
 
 namespace {
 
+/// Models read from tables have neither transfers nor nonlinear energy; pages have neither reflecting floors nor heads.
+constexpr synth::EffectSet kNotInPages{synth::Effect::kDirectivity, synth::Effect::kGroundReflection, synth::Effect::kHead,
+                                       synth::Effect::kNonlinear, synth::Effect::kCascade};
+
 /// Scene facts with the banks that the bodies play.
 effects::SceneFacts make_scene_facts(const scene::Scene& scene) {
   const auto moves = [](const scene::SceneBody& body) { return !body.spec.fixed; };
-  return scene::make_facts(scene, scene::make_microphones(scene), std::any_of(scene.bodies.begin(), scene.bodies.end(), moves));
+  const bool any_moves = std::any_of(scene.bodies.begin(), scene.bodies.end(), moves);
+  effects::SceneFacts facts = scene::make_facts(scene, scene::make_microphones(scene), any_moves);
+  for (effects::BodyFacts& body : facts.bodies) {
+    body.overrides.on = body.overrides.on.without(kNotInPages);
+    body.overrides.off = body.overrides.off.with(kNotInPages);
+  }
+  return facts;
 }
 
 }  // namespace
@@ -329,10 +340,7 @@ synth::EffectSet Workshop::find_possible(int body) const {
     for (const synth::Effect effect : synth::kDefaultEffects.with(synth::kContactEffects))
       if (!overrides.off.has(effect)) possible = possible.with(effect);
   }
-  // Models read from tables have neither transfers nor nonlinear energy; pages have neither reflecting floors nor heads.
-  return scene::find_effects(scene, 0,
-                             possible.without({synth::Effect::kDirectivity, synth::Effect::kGroundReflection, synth::Effect::kHead,
-                                               synth::Effect::kNonlinear, synth::Effect::kCascade}));
+  return scene::find_effects(scene, 0, possible.without(kNotInPages));
 }
 
 std::string Workshop::make_blow(int body, std::string_view scene, std::int32_t triangle, const Vec3& barycentric,
@@ -430,21 +438,12 @@ std::string Workshop::make_plan(std::string_view scene, std::span<const int> bod
   effects::SceneFacts facts = make_scene_facts(described);
   facts.moves = facts.moves || is_touched;
   for (std::size_t i = 0; i < bodies.size(); ++i) facts.bodies[i].struck = facts.bodies[i].struck || struck[i];
-  const scene::Plan plan = scene::make_plan(std::move(facts), happened, {});
-  std::vector<synth::EffectSet> now(bodies.size());
-  for (std::uint64_t i = 0; i < plan.steps.size(); ++i) {
-    const scene::PlanStep step = plan.steps.get(i);
-    now[step.body] = step.effects;
-  }
+  const scene::Plan plan = scene::make_plan(std::move(facts), happened);
   Json json = Json::object();
-  for (std::size_t i = 0; i < bodies.size(); ++i) {
-    Json effects = effects::make_plan_json(plan.selector, plan.facts, static_cast<int>(i));
-    const effects::BodyPlan of = plan.selector.get_plan(static_cast<int>(i));
-    for (const synth::Effect effect : synth::EffectSet::all())
-      effects.member(synth::get_name(effect)).set("on", of[effect].ever).set("now", now[i].has(effect));
-    json.member("bodies").add(Json::object().set("name", described.bodies[i].name).set("effects", std::move(effects)));
-  }
-  json.set("changes", effects::make_changes_json(plan.changes, plan.facts, 1000));
+  for (std::size_t i = 0; i < bodies.size(); ++i)
+    json["bodies"].add(Json::object()
+                                  .set("name", described.bodies[i].name)
+                                  .set("effects", effects::make_plan_json(plan.selector, static_cast<int>(i))));
   return json.line();
 }
 
@@ -467,7 +466,7 @@ std::string Workshop::add_recording(int recording, std::string_view text, const 
       .set("events", static_cast<std::int64_t>(made.events.events.size()))
       .set("words", static_cast<std::int64_t>(made.words.size()))
       .set("warnings", Json::array(warnings));
-  for (const events::RecordedBody& body : made.events.bodies) facts.member("bodies").add(body.name);
+  for (const events::RecordedBody& body : made.events.bodies) facts["bodies"].add(body.name);
   recordings_[recording] = std::move(made);
   return facts.line();
 }

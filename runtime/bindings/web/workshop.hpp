@@ -69,8 +69,7 @@ class Workshop {
   std::vector<float> calc_levels(int body, std::int32_t triangle, const Vec3& barycentric) const;
 
   /// Effects needed by the bodies of a scene, with reasons: `scene` with the bodies `bodies`, in its order; `words`: the events so far, in
-  /// order of time. {"bodies": [{"name", "effects": {NAME: {"on", "now", "on_s", "switched", "predicted_us_per_s", "why"}}}],
-  /// "changes": [...]}.
+  /// order of time. {"bodies": [{"name", "effects": {NAME: {"on", "why"}}}]}.
   std::string make_plan(std::string_view scene, std::span<const int> bodies, std::span<const double> words) const;
   /// All effects that the body can need.
   synth::EffectSet find_possible(int body) const;

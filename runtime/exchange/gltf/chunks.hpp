@@ -1,4 +1,4 @@
-// The container of a GLB file, as reader and writer share it. Internal to carillon::gltf.
+// Container of GLB files. Internal to carillon::gltf.
 #pragma once
 
 #include <cstddef>

@@ -1,6 +1,6 @@
-// Method:     base::Document reads the JSON. Indices, offsets and lengths are checked before they are used.
-// Source:     glTF 2.0 specification, Khronos 2021 (ISO/IEC 12113:2022): chapters 3.6 (buffers, views, accessors) and 4 (GLB).
-// Deviations: sparse accessors and compressed buffers are refused.
+// Method: base::Document parses the JSON; indices, offsets and lengths are checked before use.
+// Source: glTF 2.0 specification, Khronos 2021 (ISO/IEC 12113:2022): chapters 3.6 (buffers, views, accessors) and 4 (GLB).
+// Deviations: sparse accessors and compressed buffers are rejected.
 #include "runtime/exchange/gltf/file.hpp"
 
 #include <fmt/format.h>
@@ -19,11 +19,11 @@
 namespace carillon::gltf {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "glTF is little-endian and is read as it is.");
+static_assert(std::endian::native == std::endian::little, "glTF is little-endian and is read unchanged.");
 
 constexpr long long kHuge = 1LL << 40;
-constexpr std::uint64_t kMaxBufferBytes = 4ULL << 30;                      // of all buffers
-constexpr std::size_t kMaxTextBytes = 256U << 20, kMaxValues = 3'000'000;  // of the JSON: what it takes in memory is in proportion
+constexpr std::uint64_t kMaxBufferBytes = 4ULL << 30;                      // all buffers
+constexpr std::size_t kMaxTextBytes = 256U << 20, kMaxValues = 3'000'000;  // JSON limits, which bound its memory
 
 std::uint32_t read_u32(std::string_view bytes, std::size_t at) {
   std::uint32_t value = 0;
@@ -31,7 +31,7 @@ std::uint32_t read_u32(std::string_view bytes, std::size_t at) {
   return value;
 }
 
-/// The bytes of a base64 text; nothing if it is invalid.
+/// Decoded base64; nullopt if invalid.
 std::optional<std::string> decode_base64(std::string_view text) {
   while (text.ends_with('=')) text.remove_suffix(1);
   std::string bytes;
@@ -67,7 +67,7 @@ base::Document parse_json(std::string_view json, const std::string& name) {
   return base::parse_document(json, name);
 }
 
-/// As find_index(), of a number that has to be there.
+/// As find_index(), for a required index.
 std::size_t require_index(base::Object& object, const char* key, std::size_t size, const char* what) {
   const std::optional<std::size_t> index = find_index(object, key, size, what);
   if (!index) object.fail("", fmt::format("\"{}\" is missing, the index of a {}; export it again", key, what));
@@ -85,7 +85,7 @@ std::optional<std::size_t> find_index(base::Object& object, const char* key, std
   const std::optional<long long> index =
       object.integer_if(key, std::numeric_limits<long long>::min(), std::numeric_limits<long long>::max());
   if (index && (*index < 0 || static_cast<unsigned long long>(*index) >= size))
-    object.fail(key, fmt::format("is {}, and no {} has this number (there are {}); export it again", *index, what, size));
+    object.fail(key, fmt::format("is {}, but no {} has this index (there are {}); export it again", *index, what, size));
   return index ? std::optional(static_cast<std::size_t>(*index)) : std::nullopt;
 }
 
@@ -131,7 +131,7 @@ void File::open_buffers(std::optional<std::string_view> binary) {
   }
 }
 
-/// A file next to this one, or bytes in the text itself.
+/// A file in the same folder, or inline data.
 std::string File::read_uri(base::Object& buffer) const {
   const std::string uri = buffer.string("uri");
   if (uri.starts_with("data:")) {
@@ -144,7 +144,7 @@ std::string File::read_uri(base::Object& buffer) const {
   const std::filesystem::path file = decoded.value_or("");
   if (!decoded || decoded->empty() || file.is_absolute() || std::find(file.begin(), file.end(), "..") != file.end() ||
       decoded->find("://") != std::string::npos)
-    buffer.fail("uri", "is no file next to this one; put it there, or export a single .glb file");
+    buffer.fail("uri", "is not a file in the same folder; put it there, or export a single .glb file");
   const std::filesystem::path place = std::filesystem::path(name_).parent_path() / file;
   std::error_code error;
   if (!std::filesystem::exists(place, error))
@@ -175,7 +175,7 @@ Numbers File::read(base::Object& owner, const char* key, const char* type, std::
   const long long component = accessor.integer("componentType", 5120, 5126);
   numbers.component_ = static_cast<Component>(component);
   if (std::find(components.begin(), components.end(), numbers.component_) == components.end())
-    accessor.fail("componentType", fmt::format("{} is no type of {} (\"{}\")", component,
+    accessor.fail("componentType", fmt::format("{} is not a type of {} (\"{}\")", component,
                                                components.size() == kIndexTypes.size() ? "an index" : "a position", key));
   numbers.is_normalised_ = accessor.boolean_or("normalized", false);
   numbers.count_ = accessor.integer("count", 1, kHuge);
@@ -196,7 +196,7 @@ Numbers File::read(base::Object& owner, const char* key, const char* type, std::
 }
 
 File parse_text(std::string_view text, const std::string& name) {
-  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);  // a byte-order mark of UTF-8
+  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);  // UTF-8 byte-order mark
   return File(text, std::nullopt, name);
 }
 
@@ -208,13 +208,12 @@ File parse(std::string_view bytes, const std::string& name) {
 
 File parse_glb(std::string_view bytes, const std::string& name) {
   const auto refuse = [&](const std::string& message) { throw InputError(fmt::format("{}: {}", name, message)); };
-  if (!bytes.starts_with(kMagic)) refuse("no GLB file: it does not begin with \"glTF\"");
+  if (!bytes.starts_with(kMagic)) refuse("not a GLB file: it does not begin with \"glTF\"");
   if (bytes.size() < kHeaderBytes + kChunkBytes) refuse("the file ends inside its header");
   if (read_u32(bytes, 4) != kGlbVersion)
     refuse(fmt::format("a GLB file of version {}; version 2 is read, convert it first", read_u32(bytes, 4)));
   if (read_u32(bytes, 8) != bytes.size())
-    refuse(
-        fmt::format("it says that it has {} bytes, and has {}: it was cut off, or something was added", read_u32(bytes, 8), bytes.size()));
+    refuse(fmt::format("it states {} bytes, but has {}: truncated or extended", read_u32(bytes, 8), bytes.size()));
   std::optional<std::string_view> json, binary;
   for (std::size_t at = kHeaderBytes; at < bytes.size();) {
     if (bytes.size() - at < kChunkBytes) refuse("it ends inside the header of a chunk");

@@ -1,11 +1,11 @@
-// A glTF 2 file being read: its JSON, its buffers, and the numbers of its accessors. Lengths and offsets are checked before
-// bytes are read; the caller interprets the rest of the JSON.
+// Reader of glTF 2 files: JSON, buffers and accessors. Lengths and offsets are checked before bytes are read; the caller interprets the
+// rest of the JSON.
 //
 //   gltf::File file = gltf::parse_glb(bytes, "body.glb");
-//   base::Object attributes = ...;                                   // of file.root()
+//   base::Object attributes = ...;                                   // from file.root()
 //   const gltf::Numbers points = file.read(attributes, "POSITION", "VEC3", gltf::kVertexTypes);
 //
-// All errors are InputError that begins with the name of the file. One thread.
+// All errors are InputError that begins with the file name. Not thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -24,10 +24,10 @@ namespace carillon::gltf {
 
 inline constexpr const char* kDraco = "KHR_draco_mesh_compression";
 
-/// The index that `key` of `object` holds, if it is there: below `size`, of a `what`. Throws InputError for an index out of range.
+/// Optional index `key` of `object` into `size` elements called `what`. Throws InputError if out of range.
 std::optional<std::size_t> find_index(base::Object& object, const char* key, std::size_t size, const char* what);
 
-/// Types of the numbers in an accessor, by their numbers in the file.
+/// Component types, values as in the file.
 enum class Component : std::uint16_t {
   kByte = 5120,
   kUnsignedByte = 5121,
@@ -40,11 +40,11 @@ inline constexpr std::initializer_list<Component> kIndexTypes{Component::kUnsign
 inline constexpr std::initializer_list<Component> kVertexTypes{Component::kByte,          Component::kUnsignedByte, Component::kShort,
                                                                Component::kUnsignedShort, Component::kUnsignedInt,  Component::kFloat};
 
-/// View of the numbers of an accessor: `count` entries of one (SCALAR), three (VEC3) ... numbers. Valid as long as the file.
+/// View of an accessor: `count` entries of one (SCALAR), three (VEC3) ... numbers. Valid as long as the file.
 class Numbers {
  public:
   std::size_t count() const { return count_; }
-  /// Component `c` of entry `i`, both in range; normalised ones are within -1 and 1.
+  /// Component `c` of entry `i`, both in range; normalised types give -1 to 1.
   double get(std::size_t i, std::size_t c) const {
     const char* at = bytes_.data() + i * stride_;
     switch (component_) {
@@ -82,16 +82,15 @@ class Numbers {
   bool is_normalised_ = false;
 };
 
-/// Every buffer, view and accessor that it returns lies within its bytes.
+/// Returned buffers, views and accessors lie within the file's bytes.
 class File {
  public:
   base::Object root() const { return root_; }
   const std::string& name() const { return name_; }
 
-  /// The accessor whose number `key` of `owner` holds: of that type and one of these components. Throws InputError for one that is not
-  /// there, is sparse, or has more numbers than its bytes hold.
+  /// Accessor `key` of `owner`, of that type and one of these component types. Throws InputError if missing, sparse or beyond its bytes.
   Numbers read(base::Object& owner, const char* key, const char* type, std::initializer_list<Component> components);
-  /// The bytes of the view whose number `key` of `owner` holds.
+  /// Bytes of the buffer view `key` of `owner`.
   std::string_view read_view(base::Object& owner, const char* key);
 
  private:
@@ -111,12 +110,12 @@ class File {
   std::vector<std::unique_ptr<std::string>> owned_;
 };
 
-/// A GLB file, whose bytes outlive the result; `name` is that of the file, and files that it names are next to it.
-/// Throws InputError for bytes that are no GLB file, for glTF 1, for compressed meshes, and for buffers whose bytes are not there.
+/// Opens a GLB file; `bytes` must outlive the result. `name`: its path, also for files it refers to. Throws InputError for other bytes,
+/// glTF 1, compressed meshes and missing buffer data.
 File parse_glb(std::string_view bytes, const std::string& name);
-/// The same of a .gltf file.
+/// The same for a .gltf file.
 File parse_text(std::string_view text, const std::string& name);
-/// Either of them, by its first bytes.
+/// Either, by the first bytes.
 File parse(std::string_view bytes, const std::string& name);
 
 }  // namespace carillon::gltf

@@ -1,5 +1,5 @@
-// Method:     T R S, as matrices that multiply columns from the left.
-// Source:     glTF 2.0 specification, chapter 3.5.3.
+// Method: column-vector matrices T R S.
+// Source: glTF 2.0 specification, chapter 3.5.3.
 // Deviations: rotations are normalised to unit quaternions.
 #include "runtime/exchange/gltf/nodes.hpp"
 
@@ -29,7 +29,7 @@ Matrix read_transform(base::Object& node) {
   const auto t = node.numbers_or<3>("translation", {0, 0, 0}), s = node.numbers_or<3>("scale", {1, 1, 1});
   auto q = node.numbers_or<4>("rotation", {0, 0, 0, 1});
   const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-  if (!(length > 0)) node.fail("rotation", "is no rotation; it must be a unit quaternion");
+  if (!(length > 0)) node.fail("rotation", "is not a rotation; it must be a unit quaternion");
   for (double& x : q) x /= length;
   const auto [x, y, z, w] = q;
   return {s[0] * (1 - 2 * (y * y + z * z)),

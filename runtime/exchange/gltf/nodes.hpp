@@ -1,4 +1,4 @@
-// Transforms of the nodes of a glTF file.
+// Node transforms of glTF files.
 #pragma once
 
 #include <array>
@@ -8,15 +8,15 @@
 
 namespace carillon::gltf {
 
-using Matrix = std::array<double, 16>;  // column by column
+using Matrix = std::array<double, 16>;  // column-major
 inline constexpr Matrix kIdentity{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
 
 Matrix multiply(const Matrix& a, const Matrix& b);
 Vec3 move(const Matrix& m, const Vec3& p);
-/// Determinant of the first three rows and columns: negative for a reflection.
+/// Determinant of the upper left 3x3 block; negative for a reflection.
 double calc_determinant(const Matrix& m);
 
-/// A node's own "matrix", or its "translation", "rotation" and "scale". Throws InputError for an invalid rotation.
+/// Local transform of a node: "matrix", or "translation", "rotation" and "scale". Throws InputError for an invalid rotation.
 Matrix read_transform(base::Object& node);
 
 }  // namespace carillon::gltf

@@ -1,6 +1,5 @@
-// Method:     views lie one after the other in one buffer, each at a multiple of its numbers' size.
-// Source:     glTF 2.0 specification, Khronos 2021 (ISO/IEC 12113:2022): chapters 3.6 and 4.
-// Deviations: none.
+// Method: views follow one another in one buffer, each aligned to the size of its numbers.
+// Source: glTF 2.0 specification, Khronos 2021 (ISO/IEC 12113:2022): chapters 3.6 and 4.
 #include "runtime/exchange/gltf/writer.hpp"
 
 #include <fmt/format.h>
@@ -19,9 +18,9 @@
 namespace carillon::gltf {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "glTF is little-endian and is written as it is.");
+static_assert(std::endian::native == std::endian::little, "glTF is little-endian and is written unchanged.");
 
-constexpr int kVertexTarget = 34962, kIndexTarget = 34963;  // of a view that a mesh uses
+constexpr int kVertexTarget = 34962, kIndexTarget = 34963;  // targets of mesh views
 constexpr std::size_t kMaxShortVertices = 65535;            // index 65535 would restart a primitive
 
 template <class T>

@@ -1,5 +1,4 @@
-// A glTF 2 file being made: one buffer, views and accessors that are added one after the other, and the rest of the JSON, which is the
-// caller's.
+// Writer of glTF 2 files: one buffer with views and accessors; the rest of the JSON is set by the caller.
 //
 //   gltf::Writer writer("carillon-bank 0.2.0");
 //   const int points = writer.add_vertices(positions);
@@ -18,28 +17,28 @@
 
 namespace carillon::gltf {
 
-/// Lengths and offsets are consistent at any time. Memory: the bytes of the buffer.
+/// Lengths and offsets are always consistent. Memory: the bytes of the buffer.
 class Writer {
  public:
-  /// `generator`: the program, for "asset".
+  /// `generator`: program name for "asset".
   explicit Writer(const std::string& generator);
 
-  /// Each adds a view and an accessor, and returns the accessor's number.
-  /// Rows of three, attributes of vertices. `has_bounds`: with "min" and "max", which positions need.
+  /// The add functions append a view and an accessor and return the accessor's index.
+  /// Vertex attributes, rows of three. `has_bounds`: with "min" and "max", required for positions.
   int add_vertices(std::span<const float> rows, bool has_bounds);
-  /// Corners of triangles, below `vertices`: 16 bits each where that many fit, else 32.
+  /// Triangle corners below `vertices`: 16 bits each if possible, else 32.
   int add_indices(std::span<const std::int32_t> corners, std::size_t vertices);
-  /// Numbers that are no vertex attribute.
+  /// Scalars other than vertex attributes.
   int add_scalars(std::span<const float> values);
-  /// Rows of three, in blocks: fill(block, numbers) writes all numbers of one block.
+  /// Rows of three, in blocks: fill(block, numbers) writes all numbers of a block.
   int add_rows(std::size_t blocks, std::size_t rows, const std::function<void(std::size_t block, std::span<float> numbers)>& fill);
-  /// Bytes as they are, at a multiple of 8; gives the view's number.
+  /// Raw bytes, aligned to 8; returns the view's index.
   int add_bytes(std::span<const std::byte> bytes);
 
-  /// The JSON except "asset", "buffers", "bufferViews" and "accessors".
+  /// JSON without "asset", "buffers", "bufferViews" and "accessors".
   base::Json& json() { return json_; }
 
-  /// Writes the file to the sink in pieces, in order. Throws InputError for more than the 4 GiB that GLB can hold.
+  /// Writes the file to `sink` in pieces, in order. Throws InputError above the 4 GiB limit of GLB.
   void write_glb(const std::function<void(std::string_view)>& sink) const;
 
  private:

@@ -14,8 +14,8 @@
 #include <stop_token>
 #include <thread>
 
+#include "runtime/base/clock.hpp"
 #include "runtime/base/error.hpp"
-#include "runtime/synth/cpu_ticks.hpp"
 
 namespace carillon::live {
 namespace {
@@ -98,9 +98,9 @@ struct Device::State {
     if ((flags & paOutputUnderflow) != 0) state.underflows.fetch_add(1, std::memory_order_relaxed);
     state.callbacks.fetch_add(1, std::memory_order_relaxed);
     state.frames.fetch_add(static_cast<std::int64_t>(frames), std::memory_order_relaxed);
-    const std::uint64_t started_ns = synth::get_cpu_ticks();
+    const std::uint64_t started_ns = base::read_clock_ns(CLOCK_THREAD_CPUTIME_ID);
     state.synthesiser->process(static_cast<float* const*>(out), state.synthesiser->get_microphone_count(), static_cast<int>(frames));
-    state.busy_ns.fetch_add(static_cast<std::int64_t>(synth::get_cpu_ticks() - started_ns), std::memory_order_relaxed);
+    state.busy_ns.fetch_add(static_cast<std::int64_t>(base::read_clock_ns(CLOCK_THREAD_CPUTIME_ID) - started_ns), std::memory_order_relaxed);
     return paContinue;
   }
 };

@@ -17,7 +17,6 @@
 #include "runtime/events/events.hpp"
 #include "runtime/physics/world.hpp"
 #include "runtime/render/live/device.hpp"
-#include "runtime/render/live/schedule.hpp"
 #include "runtime/render/render.hpp"
 #include "runtime/render/surface_playback.hpp"
 #include "runtime/scene/banks.hpp"
@@ -34,7 +33,6 @@ namespace carillon::live {
 namespace {
 
 constexpr double kSliceS = 0.01;   // CPU time of physics between two checks of the ring
-constexpr double kChangeS = 0.03;  // lead of a change of effects over the events that need it
 constexpr double kMarginS = 0.01;  // lead of waypoints and contact records over strikes
 // Longest time that a pushed event waits; bounds the synthesiser's queues, however far ahead the physics is.
 constexpr double kPushedS = 0.25;
@@ -45,11 +43,11 @@ void warn(const std::vector<std::string>& warnings) {
   for (const std::string& warning : warnings) fmt::print(stderr, "carillon-live: warning: {}\n", base::printable(warning));
 }
 
-/// Physics of a scene, advanced in slices ahead of the sound. Every event goes once, in order of time, to the selector and the scheduler.
+/// Physics of a scene, advanced in slices ahead of the sound. Its events go to the scheduler in order of time.
 class Physics {
  public:
-  Physics(const scene::Scene& scene, effects::EffectSelector& selector, scene::EventScheduler& scheduler)
-      : selector_(&selector), scheduler_(&scheduler), end_s_(scene.duration_s) {
+  Physics(const scene::Scene& scene, bool has_contacts, scene::EventScheduler& scheduler)
+      : scheduler_(&scheduler), end_s_(scene.duration_s) {
     if (!scene::has_physics(scene)) return;
     try {
       world_ =
@@ -58,7 +56,7 @@ class Physics {
                                                                                            .end_s = scene.duration_s,
                                                                                            .modes = scene.quality.modes_in_impacts,
                                                                                            .masks_hits = scene.quality.masking,
-                                                                                           .lasting_contacts = selector.needs_contacts()});
+                                                                                           .lasting_contacts = has_contacts});
     } catch (const InputError& error) {
       throw InputError(fmt::format("{}: {}", scene.file.string(), error.what()));
     }
@@ -71,7 +69,6 @@ class Physics {
     const double began_s = counted_s_ = base::get_thread_cpu_s(), was_s = time_s_;
     time_s_ = world_->advance(std::min(until_s, end_s_), kSliceS, [this](const events::Event& event) {
       scheduler_->add(event);
-      selector_->watch(event);
       if (std::holds_alternative<events::TimeWatermark>(event)) end_window();
     });
     const double now_s = base::get_thread_cpu_s();
@@ -92,72 +89,47 @@ class Physics {
     counted_s_ = now_s;
   }
 
-  effects::EffectSelector* selector_;
   scene::EventScheduler* scheduler_;
   std::unique_ptr<physics::World> world_;
   double time_s_ = 0.0, end_s_ = 0.0;
   double window_cpu_s_ = 0.0, worst_window_s_ = 0.0, counted_s_ = 0.0;
 };
 
-/// Lead times over the sound. Effects of a body are set kChangeS before the first event that needs them is pushed.
-struct Lead {
-  double look_ahead_s;  // physics
-  bool plans;           // the lead suffices for the selector; else each body has all effects it may need
-  double changed_s;     // effects: planned lead_s before the events that need them, sent this much ahead
-  double pushed_s;      // events
-
-  Lead(double look_ahead, double selector_lead_s)
-      : look_ahead_s(look_ahead),
-        plans(look_ahead >= selector_lead_s + effects::kTickS + kChangeS + kMarginS),
-        changed_s(std::max(0.0, std::min(look_ahead - selector_lead_s, kPushedS + kChangeS + kMarginS - selector_lead_s))),
-        pushed_s(std::min(kPushedS, plans ? changed_s + selector_lead_s - kChangeS - kMarginS : look_ahead)) {}
-};
-
-/// Playback pipeline: physics, plan, events, sound, each ahead of the next by the times in Lead.
+/// Plays a scene: physics ahead of the events, events ahead of the sound. Bodies have all effects that they may need.
 class Player {
  public:
   Player(const scene::Scene& scene, const std::vector<const bank::Bank*>& banks, const PlayerOptions& options)
       : scene_(&scene),
-        lead_(options.look_ahead_s, scene.quality.thresholds.lead_s),
+        look_ahead_s_(options.look_ahead_s),
+        pushed_s_(std::min(kPushedS, options.look_ahead_s)),
         session_(scene, banks, scene.sample_rate_hz, true, scene::make_head(scene, scene.sample_rate_hz)),
         selector_(scene::make_facts(scene, session_.get_microphones(), scene::has_physics(scene))),
         scheduler_(list_scheduled_bodies(), kMarginS),
-        physics_(scene, selector_, scheduler_),
-        schedule_(scene.bodies.size()),
+        physics_(scene, selector_.needs_contacts(), scheduler_),
         synthesiser_(&open()) {
     synthesiser_->set_gain(options.gain_per_pa > 0.0 ? options.gain_per_pa : scene.output.gain_per_pa.value_or(1.0));
     const scene::Strikes strikes = scene::make_strikes(scene, banks);
     warn(strikes.warnings);
-    for (const events::Event& strike : strikes.events) {
-      selector_.watch(strike);
-      scheduler_.add(strike);
-    }
+    for (const events::Event& strike : strikes.events) scheduler_.add(strike);
     const std::vector<events::Listener> path = scene::list_listener_path(session_.get_microphones());
     scheduler_.add_listener(path);
   }
 
   synth::Synthesiser& get_synthesiser() { return *synthesiser_; }
 
-  /// Adds the bodies with their initial effects and pushes the first events.
+  /// Adds the bodies and pushes the first events.
   void begin() {
-    while (advance(lead_.look_ahead_s)) {
+    while (physics_.advance(look_ahead_s_)) {
     }
-    std::vector<synth::EffectSet> first;  // without planning: all effects that a body might need
-    for (std::size_t i = 0; i < scene_->bodies.size(); ++i) first.push_back(selector_.get_possible(static_cast<int>(i)));
-    if (lead_.plans) schedule_.apply(0.0, lead_.changed_s, [&](std::size_t body, synth::EffectSet effects) { first[body] = effects; });
-    for (std::size_t i = 0; i < first.size(); ++i) session_.add_body(session_.make_settings(i, scene::find_effects(*scene_, i, first[i])));
+    for (std::size_t i = 0; i < scene_->bodies.size(); ++i) session_.add_body(session_.make_settings(i, find_effects(i)));
     push(0.0);
   }
 
   /// Work when the sound has reached a time. False if the physics need not advance.
   bool step(double now_s) {
-    const bool advanced = advance(now_s + lead_.look_ahead_s);
+    const bool advanced = physics_.advance(now_s + look_ahead_s_);
     min_lead_s_ = std::min(min_lead_s_, physics_.get_time_s() - synthesiser_->get_time_s());
     synthesiser_->collect();
-    if (lead_.plans)
-      schedule_.apply(now_s, now_s + lead_.changed_s, [&](std::size_t body, synth::EffectSet effects) {
-        synthesiser_->set_effects(static_cast<int>(body), scene::find_effects(*scene_, body, effects));
-      });
     push(now_s);
     return advanced;
   }
@@ -168,13 +140,16 @@ class Player {
   std::int64_t get_faults() const { return scheduler_.get_faults(); }
 
  private:
+  synth::EffectSet find_effects(std::size_t body) const {
+    return scene::find_effects(*scene_, body, selector_.get_possible(static_cast<int>(body)));
+  }
+
   std::vector<scene::ScheduledBody> list_scheduled_bodies() const {
     std::vector<scene::ScheduledBody> bodies;
     for (std::size_t i = 0; i < scene_->bodies.size(); ++i) {
-      const synth::EffectSet effects = scene::find_effects(*scene_, i, selector_.get_possible(static_cast<int>(i)));
       bodies.push_back({.number = static_cast<int>(i),
                         .moves = !scene_->bodies[i].spec.fixed,
-                        .lead_s = scene::calc_strike_lead_s(session_.get_model(i), effects)});
+                        .lead_s = scene::calc_strike_lead_s(session_.get_model(i), find_effects(i))});
     }
     return bodies;
   }
@@ -188,27 +163,19 @@ class Player {
     return session_.open(room);
   }
 
-  /// The selector decides as the physics advances, so few events are kept.
-  bool advance(double until_s) {
-    const bool advanced = physics_.advance(until_s);
-    if (!lead_.plans) return advanced;
-    for (const effects::EffectChange& change : selector_.advance(std::min(physics_.get_time_s(), until_s))) schedule_.add(change);
-    return advanced;
-  }
-
   /// Events that do not fit into the ring wait.
   void push(double now_s) {
-    scheduler_.push_until(now_s + lead_.pushed_s, physics_.get_time_s(),
+    scheduler_.push_until(now_s + pushed_s_, physics_.get_time_s(),
                           [this](const events::Event& event) { return synthesiser_->push(event); });
   }
 
   const scene::Scene* scene_;
-  Lead lead_;
+  double look_ahead_s_;  // of the physics
+  double pushed_s_;      // of the events
   scene::Session session_;
   effects::EffectSelector selector_;
   scene::EventScheduler scheduler_;
   Physics physics_;
-  Schedule schedule_;
   synth::Synthesiser* synthesiser_;
   double min_lead_s_ = std::numeric_limits<double>::infinity();
 };

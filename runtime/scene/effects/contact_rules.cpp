@@ -14,10 +14,10 @@ namespace carillon::effects {
 namespace {
 
 using Rule = SelectionReason::Rule;
-constexpr double kRingS = 0.05;
-constexpr double kRecordGapS = 0.01;  // longest time between two records of a contact that moves
+constexpr double kRingS = 0.05;        // interval at which the driven ring is updated
+constexpr double kDrivenHoldS = 0.25;  // audible time after a record of a moving contact
 
-/// The surfaces of a contact with their moduli: of the body of the record, and of the other one.
+/// Surfaces of a contact with their moduli: of the body of the record, and of the other one.
 std::array<synth::ContactSurface, 2> find_surfaces(const SceneFacts& facts, const events::LastingContact& contact) {
   const bool has_other = contact.other >= 0 && contact.other < std::ssize(facts.bodies);
   const auto complete = [](const BodyFacts& body) {
@@ -30,7 +30,7 @@ std::array<synth::ContactSurface, 2> find_surfaces(const SceneFacts& facts, cons
   return {own, other};
 }
 
-/// The growth a second of the mean square of each mode's velocity by a lasting contact: a quarter of the density of its force.
+/// Growth rate of the mean square velocity of each mode under a lasting contact: a quarter of the density of its force.
 std::vector<double> calc_power(const SelectedBody& body, const events::LastingContact& contact, Hearing& hearing) {
   const std::span<const BankLevels::Mode> modes = body.bank->get_modes();
   std::vector<double> power(modes.size(), 0.0);
@@ -46,8 +46,8 @@ std::vector<double> calc_power(const SelectedBody& body, const events::LastingCo
   return power;
 }
 
-/// The ring of the modes that a contact drives, up to this record; every kRingS, and when the contact rests or ends. Returns the end of
-/// its audible sound at the body.
+/// Ring of the modes driven by a contact, up to this record; every kRingS, and when the contact rests or ends. Returns the end of its
+/// audible sound at the body.
 double ring(SelectedBody& body, const events::LastingContact& contact, Hearing& hearing) {
   const double speed_m_s = std::max({contact.sweep_m_s, contact.other_sweep_m_s, norm(contact.slip_m_s)});
   const double size = contact.force_n * speed_m_s;
@@ -86,47 +86,45 @@ double ring(SelectedBody& body, const events::LastingContact& contact, Hearing& 
   const double quiet_pa = hearing.calc_quiet_pa(hearing.calc_inaudible_db(), distance, modes.size());
   std::vector<double> levels(modes.size());
   for (std::size_t m = 0; m < modes.size(); ++m)
-    levels[m] = kChance * std::sqrt(2.0 * body.ring_m2_s2[m]) * modes[m].gain_pa * modes[m].weight / quiet_pa;
-  return body.ring_out(hearing, contact.time_s, levels);
+    levels[m] = kPeakFactor * std::sqrt(2.0 * body.ring_m2_s2[m]) * modes[m].gain_pa * modes[m].weight / quiet_pa;
+  return body.ring_out(contact.time_s, levels);
 }
 
-/// The calls of a contact until that time; false for one at rest.
+/// Calls of a contact at a time; false for a contact at rest.
 bool call_motion(SelectedBody& body, const events::LastingContact& contact, double time_s, Hearing& hearing) {
   const double slip = norm(contact.slip_m_s);
   const double sweep = std::max(contact.sweep_m_s, contact.other_sweep_m_s);
   const bool presses = contact.force_n > 0.0;
   const auto offer = [&](Effect effect, double speed) {
     const bool goes = presses && speed > kCreepMs;
-    body.call(effect, goes ? 1.0 + speed : 0.0, time_s, {.rule = goes ? Rule::kSlip : Rule::kNoSlip, .value = speed, .limit = kCreepMs});
+    body.call(effect, goes ? 1.0 + speed : 0.0, {.rule = goes ? Rule::kSlip : Rule::kNoSlip, .value = speed, .limit = kCreepMs});
     return goes;
   };
-  // The share of slip in the movement over the surfaces (docs/decisions/contact-sound.md); the rest is rolling.
+  // Slip ratio (docs/decisions/contact-sound.md); the rest is rolling.
   const double sliding = sweep > slip ? slip / sweep : 1.0;
   const bool slides = offer(Effect::kRoughness, std::min(slip, sweep)), rolls = offer(Effect::kRolling, sweep * (1.0 - sliding));
   if (slides || rolls) {
-    body.call(Effect::kModal, 1.0, time_s, {.rule = Rule::kSlip, .value = std::max(slip, sweep), .limit = kCreepMs});
-    body.call_directivity(body.bank->get_spread_db(), time_s);
-    body.sounds_until_s = std::max(body.sounds_until_s, time_s + kHoldS);
-    body.driven_until_s = time_s + kRecordGapS;
-    if (body.mean_hz == 0.0) body.mean_hz = 4000.0;  // unknown: the best frequency of the ear
+    body.call(Effect::kModal, 1.0, {.rule = Rule::kSlip, .value = std::max(slip, sweep), .limit = kCreepMs});
+    body.call_directivity(body.bank->get_spread_db());
+    body.sounds_until_s = std::max(body.sounds_until_s, time_s + kDrivenHoldS);
+    if (body.mean_hz == 0.0) body.mean_hz = 4000.0;  // unknown: the most sensitive frequency of the ear
     body.call_propagation(hearing, time_s);
   }
   return slides || rolls;
 }
 
-void call_damping(SelectedBody& body, double share, double time_s) {
-  body.call(Effect::kContactDamping, share, time_s, {.rule = Rule::kChange, .value = to_db(share), .limit = to_db(body.audible_share)});
+void call_damping(SelectedBody& body, double share) {
+  body.call(Effect::kContactDamping, share, {.rule = Rule::kChange, .value = to_db(share), .limit = to_db(body.audible_share)});
 }
 
 }  // namespace
 
 void judge(SelectedBody& body, const events::LastingContact& contact, Hearing& hearing) {
   std::erase_if(body.lasting, [&](const SelectedBody::Lasting& one) { return one.id == contact.id; });
-  // Without a strike the contact's ring is the only measure of the modes after it.
+  // Without a strike the contact's ring alone determines the level of the modes.
   if (const double end_s = ring(body, contact, hearing); end_s > contact.time_s) {
-    const double until_s = end_s + hearing.find_ways(body.position_m, contact.time_s) / bank::kSoundSpeedMs;
-    body.call(Effect::kModal, 1.0, until_s, {.rule = Rule::kSlip, .value = norm(contact.slip_m_s), .limit = kCreepMs});
-    body.call_directivity(body.bank->get_spread_db(), until_s);
+    body.call(Effect::kModal, 1.0, {.rule = Rule::kSlip, .value = norm(contact.slip_m_s), .limit = kCreepMs});
+    body.call_directivity(body.bank->get_spread_db());
     body.sounds_until_s = std::max(body.sounds_until_s, end_s);
     body.call_propagation(hearing, contact.time_s);
   }
@@ -136,7 +134,7 @@ void judge(SelectedBody& body, const events::LastingContact& contact, Hearing& h
   const auto [own, other] = find_surfaces(hearing.facts, contact);
   const double impedance = synth::find_impedance(contact, other);
   if (!(impedance > 0.0)) return;
-  // A dashpot z at the point adds z (phi . n)^2 / 2 to a decay; a decay that is wrong by the part e changes an exposure by e^2 / 2.
+  // A dashpot z adds z (phi . n)^2 / 2 to a decay; a relative error e of a decay changes the exposure by e^2 / 2.
   if (!body.bank->calc_projections(contact.triangle, contact.barycentric, contact.normal, hearing.projection)) return;
   double max = 0.0, sounding = 0.0;
   const synth::ContactSpring spring = synth::calc_contact_spring(contact.patch_radius_m, own.modulus_pa, other.modulus_pa);
@@ -150,13 +148,13 @@ void judge(SelectedBody& body, const events::LastingContact& contact, Hearing& h
   }
   const auto calc_share = [](double part) { return std::min(1.0, 0.5 * part * part); };
   body.lasting.push_back({contact.id, calc_share(max)});
-  if (contact.time_s <= body.sounds_until_s) call_damping(body, calc_share(sounding), contact.time_s);
+  if (contact.time_s <= body.sounds_until_s) call_damping(body, calc_share(sounding));
 }
 
 void hold_contacts(SelectedBody& body, double time_s, Hearing& hearing) {
   for (const SelectedBody::Driving& one : body.driving) call_motion(body, one.last, time_s, hearing);
   if (time_s > body.sounds_until_s) return;
-  for (const SelectedBody::Lasting& one : body.lasting) call_damping(body, one.share, time_s);
+  for (const SelectedBody::Lasting& one : body.lasting) call_damping(body, one.share);
 }
 
 }  // namespace carillon::effects

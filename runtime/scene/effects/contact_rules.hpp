@@ -1,4 +1,4 @@
-// The effects that lasting contacts call for: roughness, rolling and damping, and the modes that they drive.
+// Effects of lasting contacts: roughness, rolling and damping, and the modes that they drive.
 #pragma once
 
 #include "runtime/scene/effects/selected_body.hpp"
@@ -6,7 +6,7 @@
 namespace carillon::effects {
 
 void judge(SelectedBody& body, const events::LastingContact& contact, Hearing& hearing);
-/// The calls of contacts without a new record at that time.
+/// Repeats the calls of contacts without a new record.
 void hold_contacts(SelectedBody& body, double time_s, Hearing& hearing);
 
 }  // namespace carillon::effects

@@ -1,9 +1,7 @@
-// Method:     every event calls for effects until a time: a strike, while its modes and its click are heard; a motion, when a path to a
-//             microphone has changed audibly; a lasting contact, while it slides, rolls or takes energy. Events wait for their decisions;
-//             on a grid of time each body has the effects of its calls, and kHoldS longer. All rules compare an A-weighted share of
-//             exposure with one threshold.
-// Source:     Zwislocki 1969 (the ear's time); the equations of each rule in docs/effects.md.
-// Deviations: none.
+// Method:     every event may call for effects: a strike for its modes and its acceleration noise, a motion if the path to a microphone
+//             changes audibly while the body sounds, a lasting contact if it slides, rolls or takes energy. A body gets all effects that
+//             were called for. The rules compare an A-weighted share of exposure with one threshold.
+// Source:     Zwislocki 1969 (integration time of the ear); the equations of each rule in docs/effects.md.
 #include "runtime/scene/effects/effect_selector.hpp"
 
 #include <fmt/format.h>
@@ -28,11 +26,6 @@ namespace {
 
 using Rule = SelectionReason::Rule;
 using synth::kContactEffects;
-// While a contact lasts: one of its effects in addition to Costs::force_sample_ns, and one mode that it drives, one sample. Of a bunny of
-// 251 modes and shelves of 63 and 95 (carillon-render --report of the demo's scene, AMD EPYC, Zen 5), not measured again by
-// measure_costs().
-constexpr double kContactSampleNs = 35.0;
-constexpr double kDrivenModeSampleNs = 1.2;
 
 /// The effect on which another one acts.
 std::optional<Effect> find_base(Effect effect) {
@@ -44,16 +37,15 @@ std::optional<Effect> find_base(Effect effect) {
   return std::nullopt;
 }
 
-/// The effects of a body by the rules that need no events.
+/// Effects of a body by the rules that need no events.
 void find_possible(SelectedBody& body, const Hearing& hearing) {
   const BodyFacts& of = *body.facts;
   const SceneFacts& facts = hearing.facts;
-  body.possible = synth::kCompiledEffects;
+  body.possible = EffectSet::all();
   if (of.fixed) body.refuse(Effect::kAccelerationNoise, {.rule = Rule::kFixed});
   if (of.bank->multipoles.is_empty()) body.refuse(Effect::kDirectivity, {.rule = Rule::kNoMultipoles});
   if (of.bank->quartic.is_empty()) body.refuse(Effect::kNonlinear, {.rule = Rule::kNoEnergy});
-  if (!(body.cascade_ns > 0.0))
-    body.refuse(Effect::kCascade, {.rule = of.bank->quartic.is_empty() ? Rule::kNoEnergy : Rule::kNothingAbove});
+  if (!body.has_cascade) body.refuse(Effect::kCascade, {.rule = of.bank->quartic.is_empty() ? Rule::kNoEnergy : Rule::kNothingAbove});
   if (!facts.floor) body.refuse(Effect::kGroundReflection, {.rule = Rule::kNoFloor});
   if (!facts.has_head) body.refuse(Effect::kHead, {.rule = Rule::kNoHead});
   if (facts.microphones_m.size() < 2) body.refuse(Effect::kTwoEars, {.rule = Rule::kOneMicrophone});
@@ -70,19 +62,14 @@ void find_possible(SelectedBody& body, const Hearing& hearing) {
   }
 }
 
-/// The effects of a body at a time of the grid.
-EffectSet decide(const SelectedBody& body, double time_s) {
+/// Effects of a body by its calls.
+EffectSet decide(const SelectedBody& body) {
   const EffectOverrides& overrides = body.facts->overrides;
-  EffectSet set = overrides.on;
-  if (overrides.automatic) {
-    for (const Effect effect : EffectSet::all()) {
-      const auto base = find_base(effect);
-      if (overrides.on.has(effect) && base) set = set.with(*base);  // forced effects bring their bases
-      if (body.until_s[effect] + kHoldS >= time_s) set = set.with(effect);
-    }
-  }
+  if (!overrides.automatic) return overrides.on.without(overrides.off);
+  EffectSet set = overrides.on.with(body.called);
+  for (const Effect effect : overrides.on)
+    if (const auto base = find_base(effect)) set = set.with(*base);  // forced effects bring their bases
   set = set.without(overrides.off);
-  if (!overrides.automatic) return set;
   for (const Effect effect : EffectSet::all()) {
     const auto base = find_base(effect);
     if (base && !set.has(*base) && !overrides.on.has(effect)) set = set.without(effect);
@@ -96,64 +83,9 @@ EffectSet decide(const SelectedBody& body, double time_s) {
   return set;
 }
 
-/// The change of a body to these effects, with its reasons; counts in the plan.
-EffectChange make_change(SelectedBody& body, int number, EffectSet set, double time_s) {
-  const EffectOverrides& overrides = body.facts->overrides;
-  EffectChange change{time_s, number, set, {}};
-  for (const Effect effect : EffectSet::all()) {
-    const bool on = set.has(effect);
-    if (body.decided && on == body.now.has(effect)) continue;
-    EffectPlan& plan = body.plan.effects[effect];
-    if (on && !plan.ever) plan.first_s = time_s;
-    plan.ever = plan.ever || on;
-    plan.switched += on;
-    const bool forced = !overrides.automatic || overrides.on.has(effect) || overrides.off.has(effect);
-    SelectionReason reason = on ? body.call_reason[effect] : body.decided ? SelectionReason{.rule = Rule::kSilent} : body.reason[effect];
-    if (forced) reason = {.rule = overrides.automatic || on ? Rule::kForced : Rule::kNotOffered};
-    change.switches.push_back({effect, on, reason});
-  }
-  return change;
-}
-
-/// The costs of one tick with the present effects of the body.
-void add_costs(SelectedBody& body, const Hearing& hearing, double time_s) {
-  const SceneFacts& facts = hearing.facts;
-  const Costs& costs = hearing.costs;
-  const double travel_s = body.nearest_m / bank::kSoundSpeedMs;
-  if (time_s > body.sounds_until_s + travel_s || time_s >= facts.duration_s) return;
-  const double samples = kTickS * facts.rate_hz, all = static_cast<double>(facts.microphones_m.size());
-  const bool has_head = synth::has_head(body.now);
-  const double ears = body.now.has(Effect::kTwoEars) && !has_head ? all : 1.0;
-  const auto add = [&](Effect effect, double ns) {
-    if (body.now.has(effect)) body.plan.effects[effect].cost_us += 1e-3 * samples * ns;
-  };
-  add(Effect::kModal, costs.voice_sample_ns);
-  add(Effect::kAirDelay, costs.ear_sample_ns);
-  add(Effect::kTwoEars, (ears - 1.0) * costs.ear_sample_ns);
-  add(Effect::kDoppler, ears * (costs.moving_ear_sample_ns - costs.ear_sample_ns));
-  const bool moves = body.now.has(Effect::kDoppler);
-  const double reflected = body.now.has(Effect::kGroundReflection) ? 2.0 : 1.0, modes = static_cast<double>(body.bank->get_modes().size());
-  const double dipoles_ns = body.now.has(Effect::kAccelerationNoise) ? costs.dipole_ear_sample_ns : 0.0;
-  add(Effect::kGroundReflection, ears * ((moves ? costs.moving_ear_sample_ns : costs.ear_sample_ns) + dipoles_ns));
-  if (has_head) add(Effect::kHead, reflected * (moves ? costs.moving_head_sample_ns : costs.head_sample_ns));
-  // Every ear sounds the modes by itself; with changing weights twice, and with one look-up a block.
-  add(Effect::kDirectivity,
-      ears * reflected * modes * (moves ? 2.0 * costs.mode_sample_ns + costs.transfer_ns / synth::kBlock : costs.mode_sample_ns));
-  add(Effect::kNonlinear, body.coupling_ns);
-  add(Effect::kCascade, body.cascade_ns);
-  add(Effect::kAccelerationNoise, ears * costs.dipole_ear_sample_ns + costs.click_sample_ns);
-  // The cost of driven modes counts to the first of the effects, as in the measurement.
-  double driven_ns = kDrivenModeSampleNs * static_cast<double>(body.bank->get_modes().size());
-  for (const Effect effect : kContactEffects) {
-    if (time_s > body.driven_until_s) break;
-    add(effect, std::max(1.0, static_cast<double>(body.driving.size())) * (costs.force_sample_ns + kContactSampleNs + driven_ns));
-    if (body.now.has(effect)) driven_ns = 0.0;
-  }
-}
-
 }  // namespace
 
-/// Invariant: all events up to `tick` have been applied, so that its decisions do not depend on later ones.
+/// Invariant: all events up to `tick` have been judged.
 struct EffectSelector::State {
   struct Pending {
     double from_s = 0.0;
@@ -162,7 +94,7 @@ struct EffectSelector::State {
     bool operator<(const Pending& other) const { return from_s != other.from_s ? from_s > other.from_s : order > other.order; }
   };
 
-  State(SceneFacts facts, const Costs& costs) : hearing(std::move(facts), costs) {}
+  explicit State(SceneFacts facts) : hearing(std::move(facts)) {}
 
   Hearing hearing;
   std::map<const bank::Bank*, std::unique_ptr<BankLevels>> banks;
@@ -174,12 +106,12 @@ struct EffectSelector::State {
   void apply(const events::Event& event);
 };
 
-EffectSelector::EffectSelector(SceneFacts facts, const Costs& costs) : state_(std::make_unique<State>(std::move(facts), costs)) {
+EffectSelector::EffectSelector(SceneFacts facts) : state_(std::make_unique<State>(std::move(facts))) {
   State& s = *state_;
   const std::vector<BodyFacts>& bodies = s.hearing.facts.bodies;
   s.bodies.reserve(bodies.size());
   for (const BodyFacts& of : bodies) {
-    if (of.bank == nullptr) throw InputError(fmt::format("the plan of \"{}\" needs its bank", of.name));
+    if (of.bank == nullptr) throw InputError(fmt::format("\"{}\": no bank to choose effects by", of.name));
     auto& levels = s.banks[of.bank];
     if (!levels) levels = std::make_unique<BankLevels>(*of.bank, s.hearing.facts.rate_hz, of.sphere_radius_m, of.transfers.get());
     find_possible(s.bodies.emplace_back(of, *levels, s.hearing), s.hearing);
@@ -189,7 +121,7 @@ EffectSelector::EffectSelector(SceneFacts facts, const Costs& costs) : state_(st
 EffectSelector::~EffectSelector() = default;
 EffectSelector::EffectSelector(EffectSelector&&) noexcept = default;
 
-/// Motion of the listener by events from now on, which makes Doppler possible.
+/// The listener moves by events from now on, which makes Doppler possible.
 void EffectSelector::State::begin_walk(double time_s) {
   hearing.begin_walk(time_s);
   for (SelectedBody& body : bodies) {
@@ -253,65 +185,49 @@ void EffectSelector::watch(const events::Event& event) {
   s.pending.push({from_s, s.order++, event});
 }
 
-std::vector<EffectChange> EffectSelector::advance(double known_s) {
+void EffectSelector::advance(double known_s) {
   State& s = *state_;
-  std::vector<EffectChange> changes;
   for (;; ++s.tick) {
-    const double time_s = static_cast<double>(s.tick) * kTickS, seen_s = time_s + kTickS + s.hearing.facts.thresholds.lead_s;
+    const double time_s = static_cast<double>(s.tick) * kTickS, seen_s = time_s + kTickS;
     if (!(time_s <= s.hearing.facts.duration_s) || !(seen_s <= known_s)) break;
     while (!s.pending.empty() && s.pending.top().from_s <= seen_s) {
       s.apply(s.pending.top().event);
       s.pending.pop();
     }
-    for (std::size_t i = 0; i < s.bodies.size(); ++i) {
-      SelectedBody& body = s.bodies[i];
+    for (SelectedBody& body : s.bodies) {
       if (!s.hearing.listener.is_still()) body.call_propagation(s.hearing, seen_s);
       hold_contacts(body, seen_s, s.hearing);
-      const EffectSet set = decide(body, time_s);
-      if (set != body.now || !body.decided) {
-        changes.push_back(make_change(body, static_cast<int>(i), set, time_s));
-        body.now = set;
-        body.decided = true;
-      }
-      for (const Effect effect : set) {
-        EffectPlan& plan = body.plan.effects[effect];
-        plan.last_s = std::min(time_s + kTickS, s.hearing.facts.duration_s);
-        plan.on_s += std::max(0.0, plan.last_s - time_s);
-      }
-      add_costs(body, s.hearing, time_s);
     }
   }
-  return changes;
 }
 
-double EffectSelector::get_time_s() const { return static_cast<double>(state_->tick) * kTickS; }
+EffectSet EffectSelector::choose(int body) const { return decide(state_->bodies.at(body)); }
 
 BodyPlan EffectSelector::get_plan(int number) const {
-  const std::size_t i = number;
-  const SelectedBody& body = state_->bodies.at(i);
-  const EffectOverrides& overrides = state_->hearing.facts.bodies[i].overrides;
-  BodyPlan plan = body.plan;
+  const SelectedBody& body = state_->bodies.at(number);
+  const EffectOverrides& overrides = body.facts->overrides;
+  const EffectSet set = decide(body);
+  BodyPlan plan;
   for (const Effect effect : EffectSet::all()) {
-    EffectPlan& of = plan.effects[effect];
-    of.reason = body.reason[effect];
-    if (!of.ever) of.cost_us = 0.0;
+    SelectionReason& reason = plan[effect].reason;
+    plan[effect].on = set.has(effect);
+    reason = body.reason[effect];
     const bool forced = overrides.on.has(effect) || overrides.off.has(effect);
     if (forced || !overrides.automatic) {
-      of.reason = {.rule = forced && (overrides.automatic || overrides.on.has(effect)) ? Rule::kForced : Rule::kNotOffered};
+      reason = {.rule = forced && (overrides.automatic || overrides.on.has(effect)) ? Rule::kForced : Rule::kNotOffered};
       continue;
     }
     const auto base = find_base(effect);
-    if (base && (overrides.off.has(*base) || (!plan[*base].ever && body.possible.has(effect)))) {
-      of.reason = {.rule = Rule::kNeedsOther, .other = *base};
-    }
-    if (of.ever && of.reason.rule == Rule::kNotStruck) of.reason = {.rule = Rule::kForced};  // as a base
+    if (base && (overrides.off.has(*base) || (!set.has(*base) && body.possible.has(effect))))
+      reason = {.rule = Rule::kNeedsOther, .other = *base};
+    if (set.has(effect) && reason.rule == Rule::kNotStruck) reason = {.rule = Rule::kForced};  // base of a forced effect
   }
   return plan;
 }
 
 double EffectSelector::calc_silence_pa(int number) const {
-  constexpr double kStandardPa = 1e-10;  // of VoiceOptions
-  constexpr double kMargin = 0.5;        // of the inaudible level, for bodies that come nearer and modes that add up
+  constexpr double kStandardPa = 1e-10;  // ResonatorOptions::silence_pa
+  constexpr double kMargin = 0.5;        // for bodies that come nearer and modes that add up
   const SelectedBody& body = state_->bodies.at(number);
   if (!(state_->hearing.loudest_pa2_s > 0.0)) return kStandardPa;
   const double quiet_pa = kReferencePa * std::pow(10.0, state_->hearing.calc_inaudible_db() / 20.0);

@@ -9,10 +9,10 @@
 
 namespace carillon::effects {
 
-Hearing::Hearing(SceneFacts scene, const Costs& unit_costs) : facts(std::move(scene)), costs(unit_costs) {
+Hearing::Hearing(SceneFacts scene) : facts(std::move(scene)) {
   if (facts.listener.empty()) facts.listener.push_back({});
   listener = synth::make_trajectory(facts.listener);
-  if (facts.microphones_m.empty()) throw InputError("a plan needs at least one microphone");
+  if (facts.microphones_m.empty()) throw InputError("a choice of effects needs at least one microphone");
   for (const Vec3& place : facts.microphones_m)
     for (std::size_t k = 0; k < 3; ++k) middle[k] += place[k] / static_cast<double>(facts.microphones_m.size());
 }

@@ -1,4 +1,4 @@
-// The listener of an EffectSelector: its ways to a body, and the levels that it does not hear.
+// Listener of an EffectSelector: distances to a body, inaudible levels.
 #pragma once
 
 #include <algorithm>
@@ -13,33 +13,32 @@ namespace carillon::effects {
 
 inline constexpr double kNever = -std::numeric_limits<double>::infinity();
 
-/// Of a share of exposure.
+/// dB of a share of exposure.
 inline double to_db(double share) { return 10.0 * std::log10(std::max(share, 1e-30)); }
 
-/// The scene of a selector, its listener and its loudest strike so far.
+/// Scene, listener and loudest strike so far.
 struct Hearing {
   /// Throws InputError without microphones.
-  Hearing(SceneFacts scene, const Costs& unit_costs);
+  explicit Hearing(SceneFacts scene);
 
-  /// Level below which nothing is heard [dB(A)].
+  /// Inaudible level [dB(A)].
   double calc_inaudible_db() const;
-  /// Pressure of that level at 1 m [Pa], for each of so many modes together at a distance.
+  /// Pressure at 1 m [Pa] of each of `modes` modes that together have the inaudible level at `distance_m`.
   double calc_quiet_pa(double inaudible_db, double distance_m, std::size_t modes) const;
 
-  /// The ways from a place to every microphone and to their middle, as if sound took no time; the shortest of the microphones.
+  /// Sets way_m and middle_m for a place at a time, without travel time; returns the shortest distance to a microphone.
   double find_ways(const Vec3& place_m, double time_s);
-  /// The listener's place by events from now on; its waypoints before that time stay.
+  /// From now on the listener moves by events; its waypoints before that time are kept.
   void begin_walk(double time_s);
 
   SceneFacts facts;
-  Costs costs;
   synth::Trajectory listener{1};
   bool has_walk = false;       // given by events
-  double loudest_pa2_s = 0.0;  // of all strikes so far
+  double loudest_pa2_s = 0.0;  // largest exposure of a strike so far
   Vec3 middle{};               // of the microphones
-  // Working space of one call.
-  std::vector<double> way_m;  // find_ways(): to the microphones
-  double middle_m = 0.0;      // and to their middle
+  // Results of the last call.
+  std::vector<double> way_m;  // distances to the microphones
+  double middle_m = 0.0;      // distance to their middle
   std::vector<double> projection, amplitude_pa;
 };
 

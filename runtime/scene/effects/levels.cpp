@@ -1,10 +1,8 @@
-// Method:     a mode of amplitude p and decay d has the exposure p^2 / 4 d. A pulse multiplies each mode by its spectrum, and its own
-//             spectrum by the transfer function of a pushed sphere gives the click; exposures of both by A-weighted sums over frequency
-//             (Parseval).
-//             How much louder a mode is in some directions than in others: its transfers at points of a spiral on a sphere, which have the
-//             same area each.
+// Method:     a mode of amplitude p and decay d has the exposure p^2 / 4 d. A pulse multiplies each mode by its spectrum; its own spectrum
+//             times the transfer function of a pushed sphere gives the acceleration noise; exposures of both by A-weighted sums over
+//             frequency (Parseval). Directional spread of a mode: its transfers at equal-area points of a spiral on a sphere.
 // Source:     transform of sin^nu: Gradshteyn & Ryzhik 3.631.1; A-weighting: IEC 61672-1:2013; sphere: Morse & Ingard 1968, 7.2.
-// Deviations: modes are taken to be orthogonal, which their beats are not within a short time.
+// Deviations: modes are treated as orthogonal, which beats violate over short times.
 #include "runtime/scene/effects/levels.hpp"
 
 #include <algorithm>
@@ -13,10 +11,9 @@
 #include <complex>
 #include <numbers>
 
-#include "runtime/base/vector.hpp"
 #include "runtime/acoustics/radiation/gains.hpp"
 #include "runtime/acoustics/radiation/transfers.hpp"
-#include "runtime/synth/effects.hpp"
+#include "runtime/base/vector.hpp"
 
 namespace carillon::effects {
 namespace {
@@ -25,7 +22,7 @@ using std::numbers::pi;
 
 constexpr double kMaxCycles = 64.0;
 constexpr int kStepsPerCycle = 128;
-constexpr int kBands = 64;  // of the click, even in log f
+constexpr int kBands = 64;  // of the acceleration noise, even in log f
 
 /// Gamma(7/4)^2 / (Gamma(7/4 + x) Gamma(7/4 - x)) without its sign.
 double calc_hertz_spectrum(double x) {
@@ -80,7 +77,7 @@ BankLevels::BankLevels(const bank::Bank& bank, double rate_hz, double sphere_rad
     const double slow = d > omega ? d - std::sqrt((d - omega) * (d + omega)) : d;
     modes_.push_back({static_cast<int>(m), freq, std::max(slow, 1e-9), std::abs(bank.radiation_gain[m]), calc_a_weight(freq)});
   }
-  if (synth::kCompiledEffects.has(synth::Effect::kDirectivity) && !bank.multipoles.is_empty()) {
+  if (!bank.multipoles.is_empty()) {
     if (transfers != nullptr)
       find_spreads(*transfers);
     else
@@ -105,7 +102,7 @@ BankLevels::BankLevels(const bank::Bank& bank, double rate_hz, double sphere_rad
   }
 }
 
-/// Far away; nulls count as 20 dB below the mean power of a mode, where others would fill them.
+/// In the far field; nulls count as 20 dB below the mean power of a mode, since other modes fill them.
 void BankLevels::find_spreads(const radiation::Transfers& transfers) {
   constexpr int kDirections = 96;
   constexpr double kDeepest = 0.01;

@@ -1,6 +1,4 @@
-// Method:     a sentence for each rule, with its numbers.
-// Source:     none.
-// Deviations: none.
+// Reasons of the choice of effects as sentences.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -10,7 +8,7 @@
 namespace carillon::effects {
 namespace {
 
-/// "34.2 dB(A)"; what makes no sound has no level.
+/// "34.2 dB(A)", or "no sound".
 std::string format_level(double level_db) { return std::isfinite(level_db) ? fmt::format("{:.1f} dB(A)", level_db) : "no sound"; }
 
 }  // namespace
@@ -19,47 +17,44 @@ std::string describe(const SelectionReason& r) {
   using Rule = SelectionReason::Rule;
   switch (r.rule) {
     case Rule::kForced:
-      return "the scene says so";
+      return "set by the scene";
     case Rule::kNotOffered:
       return "not in the scene's list";
     case Rule::kNeedsOther:
-      return fmt::format("has nothing to act on without {}", synth::get_name(r.other));
+      return fmt::format("has no effect without {}", synth::get_name(r.other));
     case Rule::kNotStruck:
-      return "nothing happens to the body";
+      return "no event for this body";
     case Rule::kNoModes:
       return "no mode between 20 Hz and half the sample rate";
     case Rule::kTooQuiet:
       if (!std::isfinite(r.value) || !std::isfinite(r.limit)) return "makes no sound";
       return fmt::format("{}, inaudible below {}", format_level(r.value), format_level(r.limit));
     case Rule::kHeard:
-      return fmt::format("heard with {} at {:.2f} m", format_level(r.value), r.distance_m);
-    case Rule::kSilent:
-      return fmt::format("nothing has called for it for {:g} s", kHoldS);
+      return fmt::format("audible, {} at {:.2f} m", format_level(r.value), r.distance_m);
     case Rule::kChange:
-      if (!std::isfinite(r.value)) return "without it the sound would not differ";
-      return fmt::format("without it the sound would differ by {:.1f} dB, {} than {:.0f} dB", r.value, r.value > r.limit ? "more" : "less",
-                         r.limit);
+      if (!std::isfinite(r.value)) return "no difference without it";
+      return fmt::format("difference without it: {:.1f} dB, {} than {:.0f} dB", r.value, r.value > r.limit ? "more" : "less", r.limit);
     case Rule::kThump:
-      if (!std::isfinite(r.value)) return "makes no thump in the sound of so large a body";
-      return fmt::format("a thump of {:.1f} dB in the sound of so large a body, audible above {:.1f} dB", r.value, r.limit);
+      if (!std::isfinite(r.value)) return "no thump (large body)";
+      return fmt::format("thump of {:.1f} dB (large body), audible above {:.1f} dB", r.value, r.limit);
     case Rule::kFixed:
-      return "a body that cannot move has none";
+      return "the body is fixed";
     case Rule::kOneMicrophone:
-      return "there is one microphone";
+      return "one microphone";
     case Rule::kStill:
-      return r.limit > 0.0 ? fmt::format("way to the microphones changes by {:.3f} mm while it sounds, less than {:.3f} mm", 1e3 * r.value,
-                                         1e3 * r.limit)
-                           : "neither the body nor the listener moves";
+      return r.limit > 0.0 ? fmt::format("distance to the microphones changes by {:.3f} mm while it sounds, less than {:.3f} mm",
+                                         1e3 * r.value, 1e3 * r.limit)
+                           : "body and listener are at rest";
     case Rule::kMoving:
-      return fmt::format("way to a microphone changes while it sounds, by more than {:.3f} mm", 1e3 * r.limit);
+      return fmt::format("distance to a microphone changes while it sounds, by more than {:.3f} mm", 1e3 * r.limit);
     case Rule::kSameWay:
-      return fmt::format("ways to the microphones differ from that to their middle by {:.3f} mm, less than {:.3f} mm", 1e3 * r.value,
-                         1e3 * r.limit);
+      return fmt::format("distances to the microphones differ from the distance to their middle by {:.3f} mm, less than {:.3f} mm",
+                         1e3 * r.value, 1e3 * r.limit);
     case Rule::kOtherWay:
-      return fmt::format("ways to the microphones differ from that to their middle by {:.1f} mm, more than {:.3f} mm", 1e3 * r.value,
-                         1e3 * r.limit);
+      return fmt::format("distances to the microphones differ from the distance to their middle by {:.1f} mm, more than {:.3f} mm",
+                         1e3 * r.value, 1e3 * r.limit);
     case Rule::kNoContact:
-      return "no contact lasts";
+      return "no lasting contact";
     case Rule::kNoSlip:
       return fmt::format("{:.2g} mm/s at most, less than {:g} mm/s", 1e3 * r.value, 1e3 * r.limit);
     case Rule::kSlip:
@@ -73,14 +68,14 @@ std::string describe(const SelectionReason& r) {
       return fmt::format("level varies over directions by {:.1f} dB, {} than {:.0f} dB", r.value, r.value > r.limit ? "more" : "less",
                          r.limit);
     case Rule::kFaint:
-      return fmt::format("{} at {:.2f} m, too faint for directions below {}", format_level(r.value), r.distance_m, format_level(r.limit));
+      return fmt::format("{} at {:.2f} m, directions inaudible below {}", format_level(r.value), r.distance_m, format_level(r.limit));
     case Rule::kNoFloor:
-      return "no ground reflects";
+      return "no reflecting ground";
     case Rule::kReflected:
-      return fmt::format("the ground adds {:.1f} dB of the straight sound, {} than {:.0f} dB", r.value, r.value > r.limit ? "more" : "less",
-                         r.limit);
+      return fmt::format("reflection of {:.1f} dB relative to the direct sound, {} than {:.0f} dB", r.value,
+                         r.value > r.limit ? "more" : "less", r.limit);
     case Rule::kNoHead:
-      return "the listener's ears are free";
+      return "the listener has no head";
     case Rule::kByHead:
       return "the listener has a head";
     case Rule::kNoEnergy:

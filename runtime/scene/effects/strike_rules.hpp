@@ -1,4 +1,4 @@
-// The effects that strikes call for: modes, acceleration noise, pulse length, directivity and nonlinear motion.
+// Effects of strikes: modes, acceleration noise, pulse length, directivity and nonlinear motion.
 #pragma once
 
 #include "runtime/scene/effects/selected_body.hpp"

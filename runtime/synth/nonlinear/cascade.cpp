@@ -1,14 +1,15 @@
 // Method:     wave turbulence in a plate passes energy to higher frequencies at the power eps = kappa f e^2 (-de/df) / (m^2 h^4 df^3), e
 //             the energy of a mode, df the spacing of modes; integrated between two bands, kappa (e1^3 - e2^3) / (3 ln(f2 / f1)) over the
-//             same. Its steady state is e^3 ~ ln(f* / f), the spectrum of Kolmogorov and Zakharov. Modes above the coupled ones are in
-//             bands; the lowest band takes from the upper third of the coupled modes, as a viscosity on their velocity; the highest gives
-//             to none. What a band gains comes as kicks of random sign and size on its modes, and the band is then scaled to the energy of
-//             the book. Mean tension turns all modes by the same angle more: lambda + tau omega is omega + tau / 2, to first order.
-// Source:     Duering, Josserand and Rica, Phys. Rev. Lett. 97 (2006) 025503 (spectrum); Humbert, Josserand, Touze and Cadot, Physica D
-//             316 (2016) 34 (diffusion); Cirio, Qu, Drettakis, Grinspun and Zheng, ACM Trans. Graph. 37 (2018) 100 (diffusion in sound);
+//             same. Its steady state is e^3 ~ ln(f* / f), the spectrum of Kolmogorov and Zakharov. Modes above the coupled ones are grouped
+//             into bands; the lowest band takes energy from the upper third of the coupled modes, as a viscosity on their velocity; the
+//             highest passes none on. The gain of a band is applied as kicks of random sign and size to its modes, and the band is then
+//             scaled to its energy balance. The mean tension rotates all modes by the same additional angle: lambda + tau omega is omega +
+//             tau / 2, to first order.
+// Source:     Duering, Josserand and Rica, Phys. Rev. Lett. 97 (2006) 025503 (spectrum); Humbert, Josserand, Touze and Cadot, Physica D 316
+//             (2016) 34 (diffusion); Cirio, Qu, Drettakis, Grinspun and Zheng, ACM Trans. Graph. 37 (2018) 100 (diffusion in sound);
 //             docs/equations.md E12.
-// Deviations: kappa is fitted to runs of full order (tests/bench/nonlinear/cascade). Tension is a scalar, the stress of the coupled modes
-//             being known in their own shapes only, and does no work on these modes. Nothing flows back to the coupled modes.
+// Deviations: kappa is fitted to full-order runs (tests/bench/nonlinear/cascade). Tension is a scalar, since the stress of the coupled
+//             modes is known in their own shapes only, and does no work on these modes. No energy flows back to the coupled modes.
 #include "runtime/synth/nonlinear/cascade.hpp"
 
 #include <fmt/format.h>
@@ -23,16 +24,16 @@
 namespace carillon::nonlinear {
 namespace {
 
-constexpr double kBandRatio = 1.1225;     // 2^(1/6), of the frequencies of neighbouring bands
+constexpr double kBandRatio = 1.1225;     // 2^(1/6), ratio of neighbouring band frequencies
 constexpr std::size_t kSmallestBand = 4;  // modes
 
-constexpr double kTopShare = 1.0 / 3.0;   // of the coupled modes: those that feed
-constexpr double kBeyond = 1.12;          // frequency beyond the last band where nothing is left, over that of the band
-constexpr double kMostShare = 0.1;        // of its energy that a band gives in one exchange
-constexpr double kEqualising = 0.2;       // of what would make two bands equal
-constexpr double kNothing = 1e-10;        // of its energy: less is not passed on
-constexpr double kSmallestAngle = 1e-10;  // rad
-constexpr double kLargestAngle = 0.4;     // rad a sample, 3 kHz at 48 kHz
+constexpr double kTopShare = 1.0 / 3.0;      // of the coupled modes: sources
+constexpr double kCutoffRatio = 1.12;        // frequency ratio beyond the last band at which the energy vanishes
+constexpr double kMostShare = 0.1;           // of the energy of a band, per exchange
+constexpr double kEqualising = 0.2;          // of the exchange that would equalise two bands
+constexpr double kMinTransferShare = 1e-10;  // of the energy of a band: smaller transfers are skipped
+constexpr double kSmallestAngle = 1e-10;     // rad
+constexpr double kLargestAngle = 0.4;        // rad a sample, 3 kHz at 48 kHz
 constexpr double kSmallestJ = 1e-200;
 
 double to_hz(double eigenvalue) { return std::sqrt(eigenvalue) / (2.0 * std::numbers::pi); }
@@ -46,14 +47,14 @@ Cascade::Cascade(std::span<const ModeConstants> coupled, std::span<const ModeCon
   if (!is_positive(rate_hz)) throw InputError("cascade: the sample rate must be a positive number of Hz");
   if (!is_positive(body.mass_kg) || !is_positive(body.thickness_m) || !is_positive(options.constant))
     throw InputError("cascade: the mass, the thickness and the constant must be positive numbers");
-  if (coupled.empty() || above.empty()) throw InputError("cascade: there must be coupled modes, and modes above them");
+  if (coupled.empty() || above.empty()) throw InputError("cascade: no coupled modes, or no modes above them");
   for (auto* values : {&vv_, &vy_, &yv_, &yy_, &tilt_, &damped_share_, &omega_, &v_, &y_, &noise_}) values->assign(above.size(), 0.0);
   double largest = 0.0;
   for (std::size_t m = 0; m < above.size(); ++m) {
     const double lambda = above[m].eigenvalue_rad2_s2, d = above[m].decay_per_s, omega = std::sqrt(lambda);
     const double damped = std::sqrt((omega - d) * (omega + d)), angle = damped * period_s_, keep = std::exp(-d * period_s_);
     if (!(d >= 0.0) || !(damped > 0.0) || !std::isfinite(damped) || !(omega * period_s_ < std::numbers::pi))
-      throw InputError(fmt::format("cascade: mode {} has {:.6g} Hz and a decay of {:.6g} 1/s; it must swing, below {:.6g} Hz", m,
+      throw InputError(fmt::format("cascade: mode {} has {:.6g} Hz and a decay of {:.6g} 1/s; it must oscillate, below {:.6g} Hz", m,
                                    omega / (2.0 * std::numbers::pi), d, 0.5 * rate_hz));
     const double c = std::cos(angle), s = std::sin(angle), tilt = d / damped, share = damped / omega;
     vv_[m] = keep * (c - tilt * s);
@@ -84,11 +85,10 @@ Cascade::Cascade(std::span<const ModeConstants> coupled, std::span<const ModeCon
   const double h2 = body.thickness_m * body.thickness_m;
   flux_per_j3_ = options.constant / (3.0 * body.mass_kg * body.mass_kg * h2 * h2 * spacing_hz * spacing_hz * spacing_hz);
   strong_j_ = options.strong * body.mass_kg * h2 * spacing_hz * spacing_hz;
-  if (!is_positive(flux_per_j3_) || !is_positive(strong_j_))
-    throw InputError("cascade: the modes must ascend, and the numbers of the body be those of one");
+  if (!is_positive(flux_per_j3_) || !is_positive(strong_j_)) throw InputError("cascade: the modes must be ascending");
 }
 
-/// All modes to the next sample, and by an angle more.
+/// Advances all modes by one sample and an additional angle.
 void Cascade::turn(double angle) noexcept {
   const std::size_t count = count_;
   const double t = std::tan(0.5 * angle), c = (1.0 - t * t) / (1.0 + t * t), s = 2.0 * t / (1.0 + t * t);
@@ -124,13 +124,13 @@ void Cascade::step(CoupledModes& coupled, std::span<const double> push_re, std::
   if (coupled.is_moving() || is_moving_) exchange(coupled);
 }
 
-/// [W] from a mean energy of a mode to another, ratio_log: of the frequencies.
+/// Flux [W] between mean energies of modes; ratio_log: log of the frequency ratio.
 double Cascade::find_flux(double low_j, double high_j, double ratio_log) const noexcept {
   const auto drive = [this](double e) { return e * e * e / (1.0 + e / strong_j_); };
   return flux_per_j3_ * (drive(low_j) - drive(high_j)) / ratio_log;
 }
 
-/// What the lowest band gets of the coupled modes [J].
+/// Energy that the lowest band takes from the coupled modes [J].
 double Cascade::feed(CoupledModes& coupled, const Band& band) noexcept {
   const int limit = coupled.get_limit(), top = std::max(1, static_cast<int>(kTopShare * limit));
   if (limit == 0) return 0.0;
@@ -144,13 +144,13 @@ double Cascade::feed(CoupledModes& coupled, const Band& band) noexcept {
   const double step_s = kFeedSamples * period_s_, modes = static_cast<double>(band.last - band.first);
   const double wanted = std::min({step_s * find_flux(mean, other, std::log(std::max(kBandRatio, band.freq_hz / freq))), kMostShare * energy,
                                   kEqualising * (mean - other) * top * modes / (top + modes)});
-  if (!(wanted > kNothing * energy)) return 0.0;
+  if (!(wanted > kMinTransferShare * energy)) return 0.0;
   std::fill(share_.begin(), share_.end(), 0.0);
   std::fill(share_.begin() + (limit - top), share_.begin() + limit, wanted / energy);
   return coupled.take_velocity(share_);
 }
 
-/// Changes the modes of a band so that it has the energy of the book.
+/// Scales the modes of a band to its energy balance.
 void Cascade::settle(Band& band) noexcept {
   if (band.in_j == 0.0 && band.out_j == 0.0) return;
   const double wanted = band.energy_j - band.out_j + band.in_j;
@@ -185,7 +185,7 @@ void Cascade::exchange(CoupledModes& coupled) noexcept {
     const bool is_last = b + 1 == bands_.size();
     Band* low = &bands_[b];
     Band* high = is_last ? nullptr : &bands_[b + 1];
-    const double ratio_log = is_last ? std::log(kBeyond) : std::log(high->freq_hz / low->freq_hz);
+    const double ratio_log = is_last ? std::log(kCutoffRatio) : std::log(high->freq_hz / low->freq_hz);
     double flux = step_s * find_flux(low->calc_mean_j(), is_last ? 0.0 : high->calc_mean_j(), ratio_log);
     if (flux < 0.0) {
       std::swap(low, high);
@@ -197,7 +197,7 @@ void Cascade::exchange(CoupledModes& coupled) noexcept {
       most = std::min(most, kEqualising * (low->calc_mean_j() - high->calc_mean_j()) * a * c / (a + c));
     }
     flux = std::min(flux, most);
-    if (!(flux > kNothing * low->energy_j)) continue;
+    if (!(flux > kMinTransferShare * low->energy_j)) continue;
     low->out_j += flux;
     if (high != nullptr)
       high->in_j += flux;

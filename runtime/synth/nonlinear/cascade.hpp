@@ -1,5 +1,5 @@
-// The modes above the coupled ones in strong motion: an approximation. They take energy from the coupled modes and pass it on, by a law of
-// wave turbulence, and follow the mean tension.
+// Approximate modes above the coupled ones in strong motion: they take energy from the coupled modes and pass it on by a law of wave
+// turbulence, and follow the mean tension.
 //
 //   nonlinear::Cascade cascade(constants_of_coupled, constants_above, {.mass_kg = 0.24, .thickness_m = 5e-4}, 48000.0);
 //   coupled.step(push_re, push_im);
@@ -22,36 +22,34 @@ struct CascadeBody {
 
 struct CascadeOptions {
   double constant = 0.3;          // kappa of docs/equations.md E12
-  double strong = 0.3;            // sigma there
-  std::uint64_t seed = 20130915;  // of the phases of what is passed on
+  double strong = 0.3;            // sigma of docs/equations.md E12
+  std::uint64_t seed = 20130915;  // of the phases of transferred energy
 };
 
-/// The book of what has been passed on, since the start or the last reset() [J].
+/// Energy balance since the start or the last reset() [J].
 struct CascadeBook {
-  double taken_j = 0.0;   // from the coupled modes
+  double taken_j = 0.0;   // taken from the coupled modes
   double gained_j = 0.0;  // by these modes
-  double lost_j = 0.0;    // by these modes, to modes beyond the last one, which are not there
+  double lost_j = 0.0;    // lost to modes beyond the last one
 };
 
-/// M linear modes in motion. The state is v = q' and y = sqrt(lambda) q, of energy (v^2 + y^2) / 2: a turn by any angle keeps it. What it
-/// keeps true: what the coupled modes lose these gain, to rounding, and no mode gives more than it has. Without strong motion, each is the
-/// linear mode. The same steps give the same bits. Memory is taken in the constructor only; one thread at a time; nothing throws but the
-/// constructor. docs/equations.md E12.
+/// M linear modes. State v = q' and y = sqrt(lambda) q, energy (v^2 + y^2) / 2, conserved by any rotation. Invariant: these modes gain
+/// exactly the loss of the coupled modes, to rounding, and no mode gives more than it has. Without strong motion each is the linear mode.
+/// Deterministic. Allocates in the constructor only; one thread at a time; only the constructor throws. docs/equations.md E12.
 class Cascade {
  public:
-  /// `above`: ascending. Throws InputError when there are none, when one does not swing below the Nyquist frequency, or when a number of
-  /// the body or the constant is not finite and positive.
+  /// `above`: ascending. Throws InputError if empty, for a mode that does not oscillate below the Nyquist frequency, and if a number of the
+  /// body or the constant is not finite and positive.
   Cascade(std::span<const ModeConstants> coupled, std::span<const ModeConstants> above, const CascadeBody& body, double rate_hz,
           const CascadeOptions& options = {});
 
-  /// To the sample at which `coupled` has just arrived. The pushes and `keep` are as of CoupledModes::step(), (M) each; empty: none.
-  /// [audio-thread]
+  /// Advances to the sample of `coupled`. Pushes and `keep` as in CoupledModes::step(), (M) each; empty: none. [audio-thread]
   void step(CoupledModes& coupled, std::span<const double> push_re, std::span<const double> push_im, std::span<const double> keep) noexcept;
 
   int get_count() const noexcept { return count_; }
   double get_velocity(int i) const noexcept { return v_[i]; }
   std::span<const double> get_velocities() const noexcept { return std::span(v_).first(count_); }
-  /// As of CoupledModes.
+  /// As CoupledModes.
   double get_re(int i) const noexcept { return v_[i] + tilt_[i] * get_im(i); }
   double get_im(int i) const noexcept { return y_[i] * damped_share_[i]; }
   void set_state(int i, double q, double velocity) noexcept;
@@ -82,7 +80,7 @@ class Cascade {
   int count_ = 0, samples_ = 0;
   bool is_moving_ = false;
   std::uint64_t chance_ = 0;
-  std::vector<double> vv_, vy_, yv_, yy_, tilt_, damped_share_, omega_;  // of the turn over a sample; d / omega_d; omega_d / omega
+  std::vector<double> vv_, vy_, yv_, yy_, tilt_, damped_share_, omega_;  // of the rotation over a sample; d / omega_d; omega_d / omega
   std::vector<double> v_, y_, noise_, share_, coupled_hz_;
   std::vector<Band> bands_;
   CascadeBook book_;

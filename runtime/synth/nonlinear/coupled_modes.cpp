@@ -1,15 +1,14 @@
-// Method:     a nonlinear force is a kick at each sample, between which modes turn exactly. Verlet's kick is the gradient of V at the
-//             sample. Its energy is found at the sample, with the two terms of second order by which a kicked motion keeps another energy
-//             than the true one (Hairer, Lubich, Wanner, IX.8): with A the linear motion and d/dt along it,
-//               H = A + V + k^2 / 12 d/dt (v . grad V) - k^2 / 24 |grad V|^2,    d/dt (v . grad V) = v . d grad V / dt - lambda q . grad V
-//             and d grad V / dt from the sample before. The guard: the auxiliary variable psi stands for sqrt(2 (V + rest)); the kick is
-//             g psi, g = grad V / sqrt(2 (V + rest)), psi in the middle of both samples, and psi changes by k g . v, so that what modes
-//             gain psi loses to the last bit, whatever g is. One evaluation of V a sample either way. A push is what forces do to modes
-//             that are alone. Its velocity acts as the kick does, half before and half after; its amplitude at once, and what V gains by it
-//             counts as work.
+// Method:     the nonlinear force is a kick at each sample, between which modes rotate exactly. Verlet's kick is the gradient of V at the
+//             sample. Its energy is evaluated at the sample, with the two second-order terms by which kicked motion conserves a modified
+//             energy (Hairer, Lubich, Wanner, IX.8): with A the linear motion and d/dt along it,
+//     H = A + V + k^2 / 12 d/dt (v . grad V) - k^2 / 24 |grad V|^2,    d/dt (v . grad V) = v . d grad V / dt - lambda q . grad V
+// and d grad V / dt from the previous sample. Guard: the auxiliary variable psi stands for sqrt(2 (V + rest)); the kick is g psi, g = grad
+// V / sqrt(2 (V + rest)), psi the mean of both samples, and psi changes by k g . v, so that energy is exchanged exactly for any g. One
+// evaluation of V per sample in both cases. A push is the response to forces of uncoupled modes. Its velocity acts as the kick does, half
+// before and half after; its amplitude at once, and the change of V counts as work.
 // Source:     Bilbao, Ducceschi and Zama, J. Comput. Phys. 472 (2023) 111697 (auxiliary variable); docs/equations.md E12.
-// Deviations: linear parts are exact, and kicks act on them; psi is made again from each step of Verlet, and goes back to the energy that
-//             it stands for within relaxation_s, with no more energy than damping took in the step.
+// Deviations: linear parts are exact, and kicks act on them; psi is reset by each Verlet step, and relaxes to the energy that it stands for
+//             within relaxation_s, with at most the energy lost to damping in the step.
 #include "runtime/synth/nonlinear/coupled_modes.hpp"
 
 #include <fmt/format.h>
@@ -24,10 +23,10 @@
 namespace carillon::nonlinear {
 namespace {
 
-constexpr double kTiny = 1e-200;     // J: 0 / 0 of a body at rest
-constexpr double kRestMargin = 1.5;  // rest energy over the energy that a curved body holds
-constexpr double kCredit = 0.1;      // of what damping takes, to a bound that has fallen below the energy
-constexpr double kStale = 1.05;      // a bound above so many times the energy falls
+constexpr double kTiny = 1e-200;     // J: avoids 0 / 0 at rest
+constexpr double kRestMargin = 1.5;  // rest energy over the energy stored by a curved body
+constexpr double kCredit = 0.1;      // of the damping losses, for a bound below the energy
+constexpr double kStale = 1.05;      // a bound above this many times the energy falls
 constexpr double kStaleS = 0.05;     // within this time
 constexpr double kLargestJ = 1e60;
 
@@ -43,14 +42,14 @@ const CoupledKernels& get_kernels() noexcept {
   return kPlainKernels;
 }
 
-/// Sums at a sample, after the turn and the push, before the kick.
+/// Sums at a sample, after rotation and push, before the kick.
 struct CoupledModes::Step {
   double potential_j = 0.0;
   double root = 0.0;        // sqrt(2 (V + rest))
   TurnSums turn{};          // with half of the push
   GradientSums gradient{};  // likewise
-  double lost_j = 0.0;      // what damping took in the turn
-  double work_j = 0.0;      // what the push did without its velocity
+  double lost_j = 0.0;      // damping loss of the rotation
+  double work_j = 0.0;      // work of the push without its velocity
   bool is_pushed = false;
   double push_speed = 0.0, push_gradient = 0.0, push_square = 0.0;  // half the push times v, times the gradient, squared
 };
@@ -90,7 +89,7 @@ CoupledModes::CoupledModes(const bank::QuarticEnergy& energy, std::span<const Mo
     const double lambda = modes[m].eigenvalue_rad2_s2, d = modes[m].decay_per_s;
     const double omega = std::sqrt(lambda), damped = std::sqrt((omega - d) * (omega + d)), angle = damped * period_s_;
     if (!(d >= 0.0) || !(damped > 0.0) || !std::isfinite(damped) || !(omega * period_s_ < std::numbers::pi))
-      throw InputError(fmt::format("coupled modes: mode {} has {:.6g} Hz and a decay of {:.6g} 1/s; it must swing, below {:.6g} Hz", m,
+      throw InputError(fmt::format("coupled modes: mode {} has {:.6g} Hz and a decay of {:.6g} 1/s; it must oscillate, below {:.6g} Hz", m,
                                    omega / (2.0 * std::numbers::pi), d, 0.5 * rate_hz));
     half_tangent_[m] = std::tan(0.5 * angle);
     sine_[m] = std::sin(angle);
@@ -104,7 +103,7 @@ CoupledModes::CoupledModes(const bank::QuarticEnergy& energy, std::span<const Mo
   start();
 }
 
-/// At rest.
+/// Sets the state at rest.
 void CoupledModes::start() noexcept {
   rest_j_ = first_rest_j_;
   psi_ = std::sqrt(2.0 * rest_j_);
@@ -117,7 +116,7 @@ void CoupledModes::reset() noexcept {
   start();
 }
 
-/// H of the states at the sample, whose kick is taken again: half of it stands behind `middle`.
+/// H of the states at the sample, whose kick is recomputed: half of it follows `middle`.
 double CoupledModes::restart() noexcept {
   for (std::size_t n = 0; n < static_cast<std::size_t>(count_); ++n) q_[n] = static_cast<float>(to_q_[n] * im_[n]);
   const double potential = evaluator_.evaluate(q_.data(), im_.data(), to_q_.data(), gradient_.data());
@@ -180,12 +179,12 @@ void CoupledModes::set_limit(int modes) noexcept {
   limit_ = modes;
   evaluator_.set_count(modes);
   for (int i = 0; i < count_; ++i) to_q_[i] = i < modes ? evaluator_.get_scale() / omega_[i] : 0.0;
-  // The book continues with the energy of those that are coupled still.
+  // The balance continues with the energy of the modes still coupled.
   const double before = get_energy_j();
   bound_j_ += restart() - before;
 }
 
-/// Keeps V + rest positive: V is no less than minus the linear energy, which the bound holds but for the tolerance.
+/// Keeps V + rest positive: V is at least minus the linear energy, which the bound limits up to the tolerance.
 void CoupledModes::raise_rest(double potential_j) noexcept {
   if (!is_curved_) return;
   const double wanted = std::max(kRestMargin * std::max(bound_j_, linear_j_), -kRestMargin * potential_j);
@@ -195,7 +194,7 @@ void CoupledModes::raise_rest(double potential_j) noexcept {
   rest_j_ += more;
 }
 
-/// Adds the amplitudes of a push, and half of its velocities; the work of the former against the linear forces.
+/// Adds the amplitudes of a push and half of its velocities; returns the work of the amplitudes against the linear forces.
 double CoupledModes::push_amplitudes(const double* push_re, const double* push_im) noexcept {
   double work = 0.0;
   for (std::size_t m = 0; m < static_cast<std::size_t>(count_); ++m) {
@@ -210,7 +209,7 @@ double CoupledModes::push_amplitudes(const double* push_re, const double* push_i
   return work;
 }
 
-/// What contacts take of the turned states.
+/// Damping by contacts of the rotated states.
 void CoupledModes::damp(const double* keep, Step& step) noexcept {
   double after = 0.0;
   for (std::size_t m = 0; m < static_cast<std::size_t>(count_); ++m) {
@@ -250,7 +249,7 @@ void CoupledModes::advance(const double* push_re, const double* push_im, const d
     }
     step.turn.speed = speed;
     step.turn.amplitude = amplitude;
-    if (!is_curved_) along = std::min(along, step.potential_j);  // V was not below 0 before
+    if (!is_curved_) along = std::min(along, step.potential_j);  // V was not negative before
     const double square = std::max(0.0, psi_ * psi_ + 2.0 * along);
     step.work_j += 0.5 * (square - psi_ * psi_);
     psi_ = std::sqrt(square);
@@ -264,7 +263,7 @@ void CoupledModes::advance(const double* push_re, const double* push_im, const d
   take_auxiliary(step);
 }
 
-/// The kick of `pull` gradients, and the second half of the push.
+/// Kick of `pull` gradients, and the second half of the push.
 void CoupledModes::finish(const Step& step, double pull) noexcept {
   const double k = period_s_, turned = step.turn.speed, amplitude = step.turn.amplitude;
   kernels_->kick(padded_ - kUnit, 0.5 * k * pull, gradient_.data(), re_.data(), middle_.data());
@@ -276,7 +275,7 @@ void CoupledModes::finish(const Step& step, double pull) noexcept {
     work += 2.0 * step.push_speed - k * pull * step.push_gradient;
     for (std::size_t m = 0; m < static_cast<std::size_t>(count_); ++m) {
       re_[m] += shift_[m];
-      middle_[m] += shift_[m];  // at the sample all of the push has acted
+      middle_[m] += shift_[m];  // at the sample the whole push has acted
     }
   }
   linear_j_ = 0.5 * (std::max(0.0, speed) + amplitude);
@@ -284,7 +283,7 @@ void CoupledModes::finish(const Step& step, double pull) noexcept {
   work_j_ += work;
 }
 
-/// A bound that rounding or the guard have left below the energy comes up as damping takes energy; one that is far above comes down.
+/// A bound below the energy (rounding, guard) rises with the damping losses; one far above falls.
 void CoupledModes::settle_bound(double book_j, double lost_j) noexcept {
   if (book_j > bound_j_)
     bound_j_ -= (1.0 - kCredit) * lost_j;
@@ -320,21 +319,21 @@ void CoupledModes::take_auxiliary(const Step& step) noexcept {
   ++counters_.guarded;
   const double k = period_s_;
   if (options_.relaxation_s > 0.0) {
-    // Half a sample ago, as psi is.
+    // Half a sample earlier, as psi.
     const double root = std::max(0.0, step.root - 0.5 * k * step.gradient.speed_gradient / step.root);
     const double most = std::sqrt(psi_ * psi_ + 2.0 * step.lost_j);
     psi_ = std::clamp(psi_ - (psi_ - root) * std::min(1.0, k / options_.relaxation_s), -most, most);
   }
   const double square = step.gradient.square / (step.root * step.root);
   const double along = step.gradient.speed_gradient / step.root;
-  const double middle = (along - 0.5 * k * square * psi_) / (1.0 + 0.25 * k * k * square);  // g . v in the middle
+  const double middle = (along - 0.5 * k * square * psi_) / (1.0 + 0.25 * k * k * square);  // g . v at the middle
   const double pull = (psi_ + 0.5 * k * middle) / step.root;
   psi_ += k * middle;
   finish(step, pull);
   settle_bound(get_energy_j(), step.lost_j);
 }
 
-/// Without the nonlinear force; psi stays, so that the book does too.
+/// Step without the nonlinear force; psi is kept, so the balance is kept.
 void CoupledModes::take_linear(const Step& step) noexcept {
   ++counters_.linear;
   std::fill(gradient_.begin(), gradient_.end(), 0.0);

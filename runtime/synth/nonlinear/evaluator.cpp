@@ -1,9 +1,8 @@
-// Method:     rows: eta = A . (q q^T), one product of a matrix whose columns are the pairs of modes with the vector of the pairs; the
-//             gradient is the matrix sum of (l_r + eta_r) A_r times 2 q. Entries: the same, of rows that are 0 but for some; both products
-//             gather, by rows for eta and by pairs for the sum, so that nothing is scattered. Points: the gradients at the points, their
-//             strains, eta, and the same way back. Diagonals are half in a triangle, since it is applied with its transpose.
+// Method:     rows: eta = A . (q q^T), a product of a matrix whose columns are the pairs of modes with the vector of pairs; the gradient is
+//             the matrix sum of (l_r + eta_r) A_r times 2 q. Entries: the same for sparse rows; both products gather, by rows for eta and
+//             by pairs for the sum, without scattering. Points: gradients at the points, their strains, eta, and the adjoint. Diagonals are
+//             halved in a triangle, since it is applied with its transpose.
 // Source:     docs/equations.md E12.
-// Deviations: none.
 #include "runtime/synth/nonlinear/evaluator.hpp"
 
 #include <algorithm>
@@ -20,7 +19,7 @@ double find_largest(const std::vector<float>& values) {
   return largest;
 }
 
-/// From here on gathers cost more than passing over zeros: see tests/bench/nonlinear.
+/// Fill ratio above which dense products are cheaper: see tests/bench/nonlinear.
 constexpr double kMostEntries = 0.2;
 
 bool is_sparse(const bank::QuarticEnergy& energy) {
@@ -96,7 +95,7 @@ void Evaluator::add_rows(const bank::QuarticEnergy& energy) {
   sum_.assign(stride_, 0.0F);
 }
 
-/// kUnit rows are as long as the longest of them: the others are filled up by zeros.
+/// kUnit rows are padded with zeros to the longest of them.
 void Evaluator::Entries::append(const std::vector<std::pair<std::int32_t, float>>* rows, int count) {
   std::size_t longest = 0;
   for (int r = 0; r < count; ++r) longest = std::max(longest, rows[r].size());
@@ -125,7 +124,7 @@ void Evaluator::add_entries(const bank::QuarticEnergy& energy) {
         const auto pair = static_cast<std::int32_t>(find_column(static_cast<int>(j)) + static_cast<std::ptrdiff_t>(i));
         by_row[r].emplace_back(pair, static_cast<float>(entry / (scale_ * scale_) * (i == j ? 0.5 : 1.0)));
       }
-  // Rows of one length lie together.
+  // Sort rows by length.
   std::vector<std::size_t> order(by_row.size());
   for (std::size_t r = 0; r < order.size(); ++r) order[r] = r;
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return by_row[a].size() > by_row[b].size(); });
@@ -181,7 +180,7 @@ void Evaluator::add_points(const bank::QuarticEnergy& energy) {
 
 void Evaluator::set_count(int modes) noexcept {
   count_ = std::clamp(modes, 0, modes_);
-  std::fill(pairs_.begin(), pairs_.end(), 0.0F);  // of pairs that are no more
+  std::fill(pairs_.begin(), pairs_.end(), 0.0F);  // pairs no longer coupled
 }
 
 double Evaluator::evaluate_diagonals(const double* im, const double* to_q, double* gradient) noexcept {

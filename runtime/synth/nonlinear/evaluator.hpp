@@ -1,4 +1,4 @@
-// The nonlinear energy of coupled modes and its gradient, sample by sample. Internal to carillon::nonlinear.
+// Nonlinear energy of coupled modes and its gradient at a sample. Internal to carillon::nonlinear.
 #pragma once
 
 #include <utility>
@@ -9,22 +9,20 @@
 
 namespace carillon::nonlinear {
 
-/// The matrices of an energy as the kernels take them, padded by zeros and scaled so that motion of a thickness or so is of the size of 1:
-/// in single precision nothing overflows that a body survives. Matrices without anything off their diagonals (strings, mean stresses) are
-/// kept as their diagonals, and all of it goes in double precision. Of such as are 0 almost everywhere (plates in closed form have four
-/// entries for a pair of modes, whatever the rows) the entries are kept. Memory is taken in the constructor only.
+/// Matrices of an energy in kernel layout, zero-padded and scaled so that motion of about one thickness has size 1: single precision does
+/// not overflow for physical motion. Diagonal matrices (strings, mean stresses) are kept as diagonals, in double precision; sparse ones
+/// (plates in closed form have four entries per pair of modes) as entries. Allocates in the constructor only.
 class Evaluator {
  public:
-  /// The sizes of the energy agree, and its numbers are finite.
+  /// Pre: the sizes of the energy agree, and its numbers are finite.
   Evaluator(const bank::QuarticEnergy& energy, const CoupledKernels& kernels);
 
-  /// Scaled q over q.
+  /// Factor from q to scaled q.
   double get_scale() const noexcept { return scale_; }
-  /// Only the first `modes` are coupled from now on; of the others q is 0. [audio-thread]
+  /// Couples only the first `modes` from now on; q of the others is 0. [audio-thread]
   void set_count(int modes) noexcept;
-  /// V [J] at q, given twice: scaled, in single precision, zeros behind the last; and as im and to_q, whose products are q [m kg^1/2], for
-  /// diagonals in double precision. Fills `gradient`, with regard to q that is not scaled [N kg^-1/2]; 0 of modes that are not coupled.
-  /// [audio-thread]
+  /// V [J] at q, given twice: scaled, in single precision, zero-padded; and as im and to_q, whose products are q [m kg^1/2], for diagonals
+  /// in double precision. Fills `gradient` with respect to unscaled q [N kg^-1/2]; 0 for uncoupled modes. [audio-thread]
   double evaluate(const float* q, const double* im, const double* to_q, double* gradient) noexcept;
   std::size_t calc_bytes() const noexcept;
 
@@ -36,7 +34,7 @@ class Evaluator {
   void add_points(const bank::QuarticEnergy& energy);
 
   enum class Form { kDiagonals, kEntries, kRows, kPoints };
-  /// The entries of a sparse matrix, by its rows in groups of kUnit: see CoupledKernels::sum_up.
+  /// Entries of a sparse matrix, by rows in groups of kUnit: see CoupledKernels::sum_up.
   struct Entries {
     std::vector<std::int32_t> begin, index;
     std::vector<float> values;
@@ -49,9 +47,9 @@ class Evaluator {
   bool is_curved_ = false;
   std::ptrdiff_t stride_ = 0;
   std::vector<double> diagonals_, exact_linear_;    // (R, N)
-  std::vector<std::size_t> places_;                 // entries: the row of the energy that each row is
+  std::vector<std::size_t> places_;                 // entries: row of the energy for each row
   std::vector<float> matrices_, columns_, linear_;  // (R, stride), (N, parts, P), (R, padded N)
-  Entries of_rows_, of_pairs_;                      // of A_r by rows, and of the same by pairs of modes
+  Entries of_rows_, of_pairs_;                      // A_r by rows, and by pairs of modes
   std::vector<float> eta_, weight_, of_linear_, pairs_, sum_, gradient_, back_, forces_, more_;
 };
 

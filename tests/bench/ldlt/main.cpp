@@ -1,4 +1,4 @@
-// What L D L^T costs on a body: mpirun -np N bench_ldlt MESH [--mumps]. The mesh is taken as it is (T4 or T10), ceramic, consistent mass;
+// Cost of L D L^T on a body: mpirun -np N bench_ldlt MESH [--mumps]. The mesh is used as it is (T4 or T10), ceramic, consistent mass;
 // seconds are CPU seconds of the slowest rank.
 #include <fmt/core.h>
 #include <petscksp.h>
@@ -26,7 +26,7 @@ using namespace carillon;
 
 double find_cpu_s() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
-/// Runs `work` and gives the CPU seconds of the slowest rank. Collective.
+/// Runs `work` and returns the CPU seconds of the slowest rank. Collective.
 template <typename Work>
 double measure_s(Work&& work) {
   MPI_Barrier(PETSC_COMM_WORLD);

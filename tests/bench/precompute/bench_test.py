@@ -1,6 +1,5 @@
 #!/usr/bin/python3
-"""The bench's own functions: medians, tables, phases, pictures, the system that the rivals get. Oracles: closed forms and hand-made
-records."""
+"""Functions of the bench: medians, tables, phases, pictures, the system passed to the rivals, against closed forms and manual records."""
 import pathlib
 import subprocess
 import sys
@@ -39,7 +38,7 @@ class Measuring(unittest.TestCase):
         self.assertGreaterEqual(cost.cpu_s, 0.39)
 
     def test_kernels_fit_the_processor(self):
-        """The flags of real processors, shortened: Sapphire Rapids, Zen 3, Zen 4, Haswell, Nehalem, and a processor that is no x86."""
+        """Shortened flags of real processors: Sapphire Rapids, Zen 3, Zen 4, Haswell, Nehalem, and a non-x86 processor."""
         wide = "flags\t\t: fpu sse2 fma avx avx2 avx512f avx512dq avx512cd avx512bw avx512vl\n"
         for vendor, flags, kernels in (
             ("GenuineIntel", wide, "SkylakeX"),
@@ -93,7 +92,7 @@ class Measuring(unittest.TestCase):
         extras = measuring.find_extras({"stations": recorded, "solver": solver}, 8.0)
         self.assertEqual([row[1] for row in extras[1:]], ["0.50", "0.50", "0.00"])
 
-    def test_frequencies_that_differ_in_number_never_agree(self):
+    def test_different_numbers_of_frequencies_never_agree(self):
         self.assertEqual(measuring.compare_frequencies([100.0], [100.0, 200.0]), float("inf"))
         self.assertAlmostEqual(measuring.compare_frequencies([100.0, 200.2], [100.0, 200.0]), 0.001, 6)
 
@@ -112,12 +111,12 @@ class Measuring(unittest.TestCase):
         lengths = [float(bar.getAttribute("width")) for bar in bars]
         self.assertEqual([round(length / lengths[0], 3) for length in lengths], [1.0, 2.0, 1.0, 2.0])
 
-    def test_a_page_without_the_place_is_refused(self):
+    def test_a_page_without_markers_is_rejected(self):
         self.assertEqual(measuring.replace_between("x\n<!-- t -->\nold\n<!-- /t -->\n", "t", "new"), "x\n<!-- t -->\nnew\n<!-- /t -->\n")
         with self.assertRaises(ValueError):
             measuring.replace_between("x", "t", "new")
 
-    def test_the_page_has_a_place_for_everything_that_is_renewed(self):
+    def test_the_page_has_markers_for_all_generated_parts(self):
         page = (pathlib.Path(__file__).resolve().parents[3] / "docs/reports/performance.md").read_text()
         for name in ("table", "goals", "phases", "proof", "table-800", "goals-800"):
             self.assertIn("x", measuring.replace_between(page, name, "x"))
@@ -143,7 +142,7 @@ class System(unittest.TestCase):
         self.assertLess(abs(values[:6]).max(), 1e-12 * values[-1])
         self.assertGreater(values[6], 1e-3 * values[-1])
 
-    def test_both_masses_weigh_the_cube_and_the_consistent_one_gets_linear_fields_right(self):
+    def test_both_masses_sum_to_the_cube_and_the_consistent_one_is_exact_for_linear_fields(self):
         for kind in ("lumped", "consistent"):
             _, mass = system.assemble(self.nodes, self.tets, *STEEL, kind)
             self.assertAlmostEqual(mass.sum() / 3 / STEEL[2], 1.0, 12)
@@ -151,7 +150,7 @@ class System(unittest.TestCase):
         field[:, 0] = self.nodes[:, 0]
         self.assertAlmostEqual(field.ravel() @ mass @ field.ravel() / STEEL[2], 1 / 3, 12)
 
-    def test_files_come_back_as_they_went_and_errors_are_seen(self):
+    def test_files_round_trip_and_errors_are_detected(self):
         with tempfile.TemporaryDirectory() as folder:
             stiffness, mass = system.scale(*system.assemble(self.nodes, self.tets, *STEEL, "consistent"), 2e4)
             system.write_matrix(f"{folder}/K", stiffness)

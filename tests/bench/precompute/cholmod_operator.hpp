@@ -1,4 +1,4 @@
-// (K - sigma M)^-1 by CHOLMOD's supernodal L L^T, ordered by METIS: the quickest direct solver of Debian on one core.
+// (K - sigma M)^-1 by the supernodal L L^T of CHOLMOD, ordered by METIS: the fastest direct solver of Debian on one core.
 #pragma once
 
 #include <cholmod.h>
@@ -38,7 +38,7 @@ class CholmodOperator {
   CholmodOperator(const CholmodOperator&) = delete;
   CholmodOperator& operator=(const CholmodOperator&) = delete;
 
-  /// x = (K - sigma M)^-1 b; the workspace is kept from call to call.
+  /// x = (K - sigma M)^-1 b; the workspace is reused.
   void solve(const double* b, double* x) {
     cholmod_dense right{};
     right.nrow = right.nzmax = right.d = n_;
@@ -54,7 +54,7 @@ class CholmodOperator {
   int get_solves() const { return solves_; }
 
  private:
-  /// The lower triangle in CHOLMOD's column order is the upper one of our rows; the matrices are symmetric.
+  /// The lower triangle by CHOLMOD's columns is the upper one by our rows; the matrices are symmetric.
   cholmod_sparse* make_shifted(const Matrix& stiffness, const Matrix& mass, double sigma) {
     std::int64_t count = 0;
     for (std::int64_t row = 0; row < n_; ++row)

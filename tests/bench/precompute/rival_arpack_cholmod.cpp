@@ -37,7 +37,7 @@ void run(const bench::Arguments& arguments) {
       phases.end("solve");
     } else if (ido == 1) {
       phases.end("orthogonalise");
-      inverse.solve(work.data() + pointers[2] - 1, y);  // M x is there already
+      inverse.solve(work.data() + pointers[2] - 1, y);  // M x is already available
       phases.end("solve");
     } else if (ido == 2) {
       bench::multiply(mass, x, y);

@@ -1,6 +1,5 @@
 // Plain SLEPc: EPS with its default solver (Krylov-Schur) and default subspace, shift-invert by MUMPS with its defaults, or by CHOLMOD;
-// eigenvectors are not purified.
-// All of SLEPc's and PETSc's options may follow the arguments (-eps_mpd 100, -st_mat_mumps_icntl_7 2, ...).
+// eigenvectors are not purified. All options of SLEPc and PETSc may follow the arguments (-eps_mpd 100, -st_mat_mumps_icntl_7 2, ...).
 #include <fmt/core.h>
 #include <slepceps.h>
 
@@ -40,7 +39,7 @@ void run(const bench::Arguments& arguments, bool is_cholmod) {
   check(EPSSetTarget(eps, arguments.sigma));
   check(EPSSetDimensions(eps, arguments.modes, PETSC_DEFAULT, PETSC_DEFAULT));
   check(EPSSetTolerances(eps, arguments.tolerance, 1000));
-  // A favour: by default SLEPc solves once more per eigenvector, which a singular M would need.
+  // In its favour: by default SLEPc solves once more per eigenvector, which only a singular M requires.
   check(EPSSetPurify(eps, PETSC_FALSE));
   ST st = nullptr;
   KSP ksp = nullptr;

@@ -1,5 +1,5 @@
-// Spectra's SymGEigsShiftSolver. Two operators: Eigen's SimplicialLDLT, and CHOLMOD's supernodal factor. Spectra's own SymShiftInvert
-// factorises with Eigen's SparseLU, which is slower than either.
+// SymGEigsShiftSolver of Spectra with two operators: SimplicialLDLT of Eigen, and the supernodal factor of CHOLMOD. Spectra's own
+// SymShiftInvert uses SparseLU of Eigen, which is slower than either.
 #include <Spectra/MatOp/SparseSymMatProd.h>
 #include <Spectra/SymGEigsShiftSolver.h>
 #include <fmt/core.h>
@@ -20,7 +20,7 @@ View view(const bench::Matrix& matrix) {
   return {matrix.n, matrix.n, matrix.nnz, matrix.first.data(), matrix.column.data(), matrix.value.data()};
 }
 
-/// What Spectra asks of an operator of its own kind.
+/// Operator interface required by Spectra.
 class SimplicialOperator {
  public:
   using Scalar = double;

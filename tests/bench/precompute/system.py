@@ -1,6 +1,6 @@
-"""K and M of a body of linear tetrahedra, assembled here, by nothing of ours: what the rivals get, and what every answer is measured with.
+"""K and M of a body of linear tetrahedra, assembled independently of carillon: input of the rivals and reference for every answer.
 
-Files as system_file.hpp describes them.
+File formats: system_file.hpp.
 """
 import json
 import re
@@ -46,7 +46,7 @@ def assemble(nodes, tets, lame_lambda, lame_mu, density, mass):
 
 
 def read_mesh(path):
-    """By Gmsh's own reader: nodes (n, 3) that a tetrahedron uses, by their tags, and linear tetrahedra (e, 4)."""
+    """Reads a mesh with Gmsh: nodes (n, 3) used by tetrahedra, in the order of their tags, and linear tetrahedra (e, 4)."""
     import gmsh
 
     gmsh.initialize()
@@ -64,7 +64,7 @@ def read_mesh(path):
 
 
 def scale(stiffness, mass, high_hz):
-    """So that lambda = 1 is the upper end of the band, and K of the order of one: solvers' thresholds are meant for such numbers."""
+    """Scales to lambda = 1 at the upper end of the band and K of order one, as expected by absolute thresholds of solvers."""
     size = stiffness.diagonal().mean()
     return stiffness / size, mass * ((2 * numpy.pi * high_hz) ** 2 / size)
 
@@ -106,7 +106,7 @@ def read_answer(path):
 
 
 def measure_answer(stiffness, mass, values, vectors, rigid=6):
-    """Of the elastic modes: the residuals ||K x - lambda M x|| / (lambda ||M x||), and of all: max |X' M X - I|."""
+    """Residuals ||K x - lambda M x|| / (lambda ||M x||) of the elastic modes, and max |X' M X - I| of all."""
     images = mass @ vectors
     residual = (
         numpy.linalg.norm(stiffness @ vectors - images * values, axis=0)[rigid:] / (values * numpy.linalg.norm(images, axis=0))[rigid:]

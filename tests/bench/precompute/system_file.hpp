@@ -1,5 +1,5 @@
-// K, M and the answers as files: what every rival of the bench reads and writes. Written and read by rivals.py too; native byte order.
-//   matrix: int64 n, int64 nnz, int32 first[n + 1], int32 column[nnz], float64 value[nnz]   (CSR, both triangles; CSC just as well)
+// K, M and the answers as files, read and written by every rival of the bench and by rivals.py; native byte order.
+//   matrix: int64 n, int64 nnz, int32 first[n + 1], int32 column[nnz], float64 value[nnz]   (CSR, both triangles; equally CSC)
 //   answer: int64 n, int64 k, float64 lambda[k], float64 vector[k][n]
 #pragma once
 
@@ -67,10 +67,10 @@ inline void multiply(const Matrix& a, const double* x, double* y) {
   }
 }
 
-/// The command line that all rivals have in common.
+/// Command line shared by all rivals.
 struct Arguments {
   std::string stiffness, mass, answer, phases;
-  int modes = 0;     // eigenvalues wanted, the lowest, rigid ones included
+  int modes = 0;     // number of lowest eigenvalues wanted, rigid ones included
   double sigma = 0;  // shift, below all eigenvalues
   double tolerance = 1e-8;
 };
@@ -83,7 +83,7 @@ inline Arguments parse_arguments(int argc, char** argv) {
 /// CPU seconds of this process (user + system) by phase, written as JSON at the end.
 class Phases {
  public:
-  /// Time since the last call, or since the start of the process, belongs to `name`.
+  /// Assigns the time since the last call, or since the start of the process, to `name`.
   void end(const std::string& name) {
     const double now = get_cpu_seconds();
     seconds_[name] += now - last_;
@@ -114,7 +114,7 @@ class Phases {
            1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
   }
 
-  /// Of this program alone; what wait4() gives is at least the size of the process that started it.
+  /// Of this program only; wait4() reports at least the size of the parent process.
   static double find_peak_bytes() {
     double kilobytes = 0;
     std::FILE* stream = std::fopen("/proc/self/status", "r");

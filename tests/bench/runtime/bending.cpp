@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "runtime/base/clock.hpp"
-#include "runtime/synth/voice.hpp"
+#include "runtime/synth/resonator_bank.hpp"
 #include "tests/unit/runtime/bank/example_bank.hpp"
 
 namespace {
@@ -34,7 +34,7 @@ struct Played {
 };
 
 Played play(const std::shared_ptr<const synth::Model>& model, const Case& one) {
-  synth::Voice voice(model, {.max_strikes = 8});
+  synth::ResonatorBank voice(model, {.max_strikes = 8});
   std::array<float, 128> block{};
   Played played;
   const double began_s = base::get_thread_cpu_s();

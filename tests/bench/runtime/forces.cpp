@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "runtime/base/clock.hpp"
-#include "runtime/synth/voice.hpp"
+#include "runtime/synth/resonator_bank.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 
 namespace {
@@ -27,13 +27,13 @@ using namespace carillon;
 constexpr double kRate = 48000.0;
 constexpr std::int64_t kFrames = 128;
 
-using Strike = std::function<void(synth::Voice&, double)>;
+using Strike = std::function<void(synth::ResonatorBank&, double)>;
 
 /// Microseconds that a pulse takes, begun `time_s` after each other block: median of the differences to blocks without.
 double measure(int modes, const Strike& strike, double length_s, int blocks, int rounds) {
   std::vector<testing::InventedMode> invented;
   for (int m = 0; m < modes; ++m) invented.push_back({50.0 * std::pow(400.0, m / (modes + 1.0)), 0.0, 1e-3, {0.3, -0.2, 1.0}});
-  synth::Voice voice(synth::Model::make(testing::make_cube_bank(invented), {.rate_hz = kRate}), {.max_forces = 1024});
+  synth::ResonatorBank voice(synth::Model::make(testing::make_cube_bank(invented), {.rate_hz = kRate}), {.max_forces = 1024});
   voice.strike({.impulse_n_s = {0.0, 0.0, 1.0}});
   std::array<float, kFrames> block{};
   const auto gap = static_cast<std::int64_t>(std::ceil((length_s * kRate + 1.0) / kFrames));  // blocks from pulse to pulse
@@ -80,7 +80,7 @@ int main(int argc, char** argv) {
       }
       us[i] = measure(
           modes,
-          [&](synth::Voice& voice, double time_s) {
+          [&](synth::ResonatorBank& voice, double time_s) {
             if (c.steps == 0) {
               voice.strike({.time_s = time_s + 0.5 * c.length_s, .impulse_n_s = {0.0, 0.0, 1e-3}, .duration_s = c.length_s});
             } else {

@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "runtime/base/clock.hpp"
-#include "runtime/synth/voice.hpp"
+#include "runtime/synth/resonator_bank.hpp"
 #include "tests/bench/runtime/fma_limit.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 
@@ -41,13 +41,13 @@ std::shared_ptr<const synth::Model> make_model(int modes, int number) {
 }
 
 /// Voices that share models in turn, all struck.
-std::vector<std::unique_ptr<synth::Voice>> make_voices(const std::vector<std::shared_ptr<const synth::Model>>& models, int voices,
-                                                       synth::Isa isa) {
-  std::vector<std::unique_ptr<synth::Voice>> made;
+std::vector<std::unique_ptr<synth::ResonatorBank>> make_voices(const std::vector<std::shared_ptr<const synth::Model>>& models, int voices,
+                                                               synth::Isa isa) {
+  std::vector<std::unique_ptr<synth::ResonatorBank>> made;
   std::array<float, kFrames> block{};
   for (int i = 0; i < voices; ++i) {
-    made.push_back(std::make_unique<synth::Voice>(models[static_cast<std::size_t>(i) % models.size()],
-                                                  synth::VoiceOptions{.max_strikes = 1, .isa = isa}));
+    made.push_back(std::make_unique<synth::ResonatorBank>(models[static_cast<std::size_t>(i) % models.size()],
+                                                          synth::ResonatorOptions{.max_strikes = 1, .isa = isa}));
     made.back()->strike({.impulse_n_s = {0.0, 0.0, 1.0}});
     made.back()->process(block);
   }
@@ -56,7 +56,7 @@ std::vector<std::unique_ptr<synth::Voice>> make_voices(const std::vector<std::sh
 
 /// Mode-samples per second of CPU time, for at least `seconds` of it. The clock is a call of the system, which takes as long as 60 modes
 /// and more: it is read once in kBlocksPerReading blocks.
-double measure(std::vector<std::unique_ptr<synth::Voice>>& voices, double seconds) {
+double measure(std::vector<std::unique_ptr<synth::ResonatorBank>>& voices, double seconds) {
   std::array<float, kFrames> block{};
   double mode_samples = 0.0;
   const double started = base::get_thread_cpu_s();
@@ -66,7 +66,7 @@ double measure(std::vector<std::unique_ptr<synth::Voice>>& voices, double second
       for (auto& voice : voices) {
         block.fill(0.0F);
         voice->process(block);
-        mode_samples += static_cast<double>(voice->get_live_mode_count()) * kFrames;
+        mode_samples += static_cast<double>(voice->get_active_mode_count()) * kFrames;
       }
     }
     spent = base::get_thread_cpu_s() - started;
@@ -79,7 +79,7 @@ struct Result {
 };
 
 Result compare(synth::Isa isa, const std::vector<std::shared_ptr<const synth::Model>>& models, int voices, int rounds, double seconds) {
-  std::vector<std::unique_ptr<synth::Voice>> made = make_voices(models, voices, isa);
+  std::vector<std::unique_ptr<synth::ResonatorBank>> made = make_voices(models, voices, isa);
   measure(made, seconds);
   std::vector<double> limits, rates, shares;
   for (int round = 0; round < rounds; ++round) {

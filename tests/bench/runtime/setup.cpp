@@ -9,11 +9,11 @@
 #include <string>
 #include <vector>
 
+#include "runtime/acoustics/radiation/gains.hpp"
 #include "runtime/base/clock.hpp"
 #include "runtime/physics/world.hpp"
-#include "runtime/acoustics/radiation/gains.hpp"
 #include "runtime/synth/model.hpp"
-#include "runtime/synth/voice.hpp"
+#include "runtime/synth/resonator_bank.hpp"
 #include "tests/unit/runtime/acoustics/radiation/sphere_bank.hpp"
 
 namespace {
@@ -56,7 +56,7 @@ void print_row(const std::string& name, bank::Bank& bank, double read_ms) {
   const double world = time_ms([&] { physics::World made(spec); });
   double playing = 1e300;
   for (int round = 0; round < 3; ++round) {
-    synth::Voice voice(model, {.silence_pa = 1e-30});
+    synth::ResonatorBank voice(model, {.silence_pa = 1e-30});
     voice.strike({.time_s = 1e-4, .impulse_n_s = {0.3, 0.5, 1}});
     std::array<float, synth::kBlock> block{};
     const double begin = 1e3 * base::get_thread_cpu_s();

@@ -154,7 +154,7 @@ def make_voices(source):
 
 
 def make_effects(source):
-    rows = read_rows(read_between((source / "docs/reports/effects.md").read_text(), "study"), 9)
+    rows = read_rows(read_between((source / "docs/reports/effects.md").read_text(), "study"), 8)
     return write_table(["scene", "difference, dB(A)", "CPU, auto : all on"], [[row[0].split(":")[0], row[2], row[5]] for row in rows])
 
 

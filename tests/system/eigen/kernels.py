@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""The ways back and the orthogonality of the eigensolver with every set of OpenBLAS kernels that this processor can run: each rounds in its
-own way, and none may decide.
+"""Fallbacks and orthogonality of the eigensolver with every set of OpenBLAS kernels supported by this processor: results must not depend on
+their rounding.
 
 usage: kernels.py TEST_RANKS
 """

@@ -161,10 +161,10 @@ class GlbTest(unittest.TestCase):
 
     def test_mistakes_end_in_a_sentence(self):
         for words, said in (
-            (["export", self.bank, "-o", "bowl.obj"], "name it so, or give --format"),
+            (["export", self.bank, "-o", "bowl.obj"], "rename the output, or give --format"),
             (["export", self.bank, "-o", "x.glb", "--points", "3"], "--points is for Faust"),
             (["export", "none.hdf", "-o", "x.glb"], "no such file"),
-            (["import", self.bank, "-o", "x.hdf"], "no GLB file"),
+            (["import", self.bank, "-o", "x.hdf"], "not a GLB file"),
             (["import", "bowl.glb", "-o", "x.wav"], "a bank is an HDF5 file"),
             (["import", "bowl.glb", "-o", "bowl.glb"], "bowl.glb"),
         ):

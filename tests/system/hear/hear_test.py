@@ -217,7 +217,7 @@ class Hear(unittest.TestCase):
             self.assertLess(abs(1200 * math.log2(one["freq_hz"] / other["freq_hz"])), 1)
         whole = (self.folder / "game.glb").read_bytes()
         (self.folder / "cut.glb").write_bytes(whole[: len(whole) // 2])
-        self.refuse("cut.glb", contains=("cut.glb", "cut off"))
+        self.refuse("cut.glb", contains=("cut.glb", "truncated"))
         (self.folder / "bent.glb").write_bytes(whole.replace(b'[{"mesh": 0}]', b'[{"skin": 0}]'))
         self.refuse("bent.glb", contains=("bent.glb", "bones"))
 

@@ -1,13 +1,13 @@
 // One answer whatever the ranks, the pieces and the way back from a resolved job.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <json/json.h>
 
 #include <algorithm>
 #include <cmath>
 #include <sstream>
 
 #include "precompute/mesh/shapes/shapes.hpp"
+#include "runtime/base/json.hpp"
 #include "tests/system/path/run_program.hpp"
 
 namespace carillon::tests {
@@ -41,12 +41,11 @@ TEST(Ranks, give_one_answer_on_1_2_and_3) {
 }
 
 /// The job of a resolved JSON, without what its run took.
-Json::Value find_job(const std::string& text) {
-  Json::Value root;
-  std::istringstream(text) >> root;
-  Json::Value run;
-  EXPECT_TRUE(root.removeMember("run", &run));
-  return root;
+std::string find_job(const std::string& text) {
+  base::Json root = base::Json::parse(text).value();
+  EXPECT_TRUE(root.has("run"));
+  root.erase("run");
+  return root.sorted_text();
 }
 
 TEST(ResolvedJob, next_to_the_bank_runs_again_and_gives_the_same_bank) {

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""Which kernels of OpenBLAS carillon-precompute runs on, by the record of a run; OpenBLAS's own word (its configuration, in the same line)
-is the witness. What fits the processor comes from /proc/cpuinfo, by the bench's functions, which share nothing with the program."""
+"""OpenBLAS kernels used by carillon-precompute, from the record of a run, against the configuration reported by OpenBLAS. The fitting
+kernels are found from /proc/cpuinfo by functions of the bench, independent of the program."""
 import json
 import os
 import pathlib
@@ -34,7 +34,7 @@ JOB = {
 
 
 def read_blas_line(environment, launcher=()):
-    """(what the record says of the BLAS, kernels by OpenBLAS's configuration, standard output, standard error) of a small run."""
+    """(BLAS line of the record, kernels by OpenBLAS's configuration, standard output, standard error) of a small run."""
     with tempfile.TemporaryDirectory() as folder:
         pathlib.Path(folder, "job.json").write_text(json.dumps(JOB))
         child = subprocess.run(
@@ -51,7 +51,7 @@ def read_blas_line(environment, launcher=()):
 class Kernels(unittest.TestCase):
     def test_they_fit_the_processor(self):
         line, kernels, printed, warned = read_blas_line({})
-        self.assertNotIn("BLAS", printed + warned)  # nothing is wrong
+        self.assertNotIn("BLAS", printed + warned)  # no warning
         self.assertEqual(kernels.lower(), KERNELS.lower())
         self.assertIn(f"kernels {kernels}, " + ("OpenBLAS's own choice" if "own choice" in WHY else "which fit this processor"), line)
 
@@ -69,7 +69,7 @@ class Kernels(unittest.TestCase):
             self.assertIn(f"kernels {chosen}, named by OPENBLAS_CORETYPE", line)
         self.assertEqual("would fit this processor" in line, KERNELS not in ("Haswell", "Zen"), line)
 
-    def test_what_an_outer_run_chose_is_no_choice_of_the_user(self):
+    def test_the_choice_of_an_outer_run_is_not_the_users(self):
         line, kernels, _, _ = read_blas_line({"CARILLON_DEFAULT_KERNELS": "Prescott"})
         self.assertEqual(kernels.lower(), KERNELS.lower())
         self.assertIn(f"kernels {kernels}, " + ("OpenBLAS's own choice" if "own choice" in WHY else "which fit this processor"), line)

@@ -66,7 +66,7 @@ class Listening(unittest.TestCase):
             self.assertGreater(float(row["error_dba"]), -200.0, row)
 
     def test_every_knob_has_its_default_and_its_reference(self):
-        for key in ("silence_pa", "modes", "sample_rate_hz", "planner_db", "quiet_db", "lead_s", "contact_step_s"):
+        for key in ("silence_pa", "modes", "sample_rate_hz", "planner_db", "quiet_db", "contact_step_s"):
             rows = read(self.out, f"playing-{key}")
             self.assertGreaterEqual(len(rows), 2, key)
             self.assertEqual(rows[0]["audible"], "", key)

@@ -34,7 +34,7 @@ Graph make_grid(std::int32_t nx, std::int32_t ny, std::int32_t nz) {
   return graph;
 }
 
-/// The vertices of each connected piece that is left when the last `removed` places of the order are taken away.
+/// Vertices of each connected component that remains when the last `removed` positions of the order are removed.
 Ints measure_pieces(const Graph& graph, const Ints& position, std::int32_t removed) {
   const std::int32_t kept = graph.vertex_count() - removed;
   std::vector<bool> seen(position.size(), false);
@@ -107,7 +107,7 @@ TEST(Dissect, any_number_of_parts_is_parted_by_as_many_separators_but_one) {
     if (parts > 1) {
       EXPECT_GE(measure_pieces(block, tree.position, tree.separator.back()).size(), 2U) << parts;
     }
-    EXPECT_EQ(tree.position, dissect(block, parts, largest).position) << "the same input gives the same answer";
+    EXPECT_EQ(tree.position, dissect(block, parts, largest).position) << "not deterministic";
   }
 }
 

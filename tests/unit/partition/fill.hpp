@@ -1,4 +1,4 @@
-// What an order of elimination costs, found the slow way.
+// Cost of an elimination order, computed by brute force.
 #pragma once
 
 #include <cstddef>
@@ -10,7 +10,7 @@
 
 namespace carillon::partition {
 
-/// Vertices behind each place of an order in its column of the Cholesky factor, by symbolic elimination.
+/// Vertices behind each position of an order in its column of the Cholesky factor, by symbolic elimination.
 inline std::vector<std::size_t> count_below(const Graph& graph, const std::vector<std::int32_t>& position) {
   const int n = graph.vertex_count();
   std::vector<std::set<std::int32_t>> later(n);  // by position
@@ -34,7 +34,7 @@ inline std::size_t count_factor_entries(const Graph& graph, const std::vector<st
   return entries;
 }
 
-/// Sum of the squares of its columns' lengths.
+/// Sum of the squared column lengths.
 inline double count_factor_operations(const Graph& graph, const std::vector<std::int32_t>& position) {
   double operations = 0;
   for (const std::size_t below : count_below(graph, position)) operations += static_cast<double>(below * below);

@@ -24,7 +24,7 @@ namespace {
 
 using testing::HasSubstr;
 
-/// Number of face-sharing pairs of a mesh by the definition: three common corners. Quadratic in the elements.
+/// Number of face-sharing pairs of a mesh by definition: three common corners. Quadratic in the elements.
 std::set<std::pair<int, int>> slow_dual(const std::vector<std::int32_t>& corners) {
   std::set<std::pair<int, int>> pairs;
   const int n = static_cast<int>(corners.size() / 4);
@@ -71,13 +71,13 @@ TEST(Partition, of_a_long_bar_is_balanced_contiguous_and_cuts_about_one_cross_se
     EXPECT_EQ(std::accumulate(cut.quality.elements.begin(), cut.quality.elements.end(), std::int64_t{0}), bar.tet_count());
     EXPECT_LT(cut.quality.balance, 1.04) << parts;
     EXPECT_TRUE(cut.quality.contiguous) << parts;
-    // A flat seam across the bar crosses 4 x 4 cells with two faces each; METIS finds seams near that.
+    // A flat interface across the bar crosses 4 x 4 cells with two faces each; METIS finds interfaces close to that.
     EXPECT_LE(cut.quality.edge_cut, 3 * 32 * (parts - 1)) << parts;
     EXPECT_GE(cut.quality.edge_cut, 24 * (parts - 1)) << parts;
   }
 }
 
-TEST(Partition, reports_the_edge_cut_that_counting_finds) {
+TEST(Partition, reports_the_counted_edge_cut) {
   const auto box = tests::make_box({4, 3, 2}, {1, 1, 1});
   const Partition cut = partition_elements(box.tets, 3);
   std::int64_t crossing = 0;
@@ -134,7 +134,7 @@ TEST(NestedDissection, is_a_permutation_with_far_less_fill_than_a_random_order) 
   EXPECT_LT(count_factor_entries(graph, position), count_factor_entries(graph, natural));
 }
 
-TEST(NestedDissection, that_is_stopped_from_outside_ends_as_the_program_wants_it) {
+TEST(NestedDissection, leaves_signals_to_the_program) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   const auto box = tests::make_box({28, 28, 28}, {1, 1, 1});
   const Graph graph = make_node_graph(box.tets, 4, static_cast<std::int32_t>(box.nodes_m.size()));
@@ -151,9 +151,9 @@ TEST(NestedDissection, that_is_stopped_from_outside_ends_as_the_program_wants_it
       testing::ExitedWithCode(42), "");
 }
 
-/// METIS would answer the signal by longjmp, out of malloc too, which then never opens its lock again; or in the other thread, where it has
-/// nowhere to go. Its k-way partition calls itself.
-TEST(Metis, gives_the_same_while_signals_come_to_any_thread) {
+/// METIS would answer the signal by longjmp, also out of malloc, which then stays locked; or in the other thread, where it has no target.
+/// Its k-way partition is recursive.
+TEST(Metis, is_unaffected_by_signals_to_any_thread) {
   static std::atomic<int> caught;
   caught = 0;
   const auto box = tests::make_box({16, 16, 16}, {1, 1, 1});
@@ -187,10 +187,10 @@ TEST(Metis, gives_the_same_while_signals_come_to_any_thread) {
   EXPECT_EQ(wrong, 0);
   EXPECT_GE(caught, 100);
   EXPECT_EQ(after.sa_handler, action.sa_handler);
-  EXPECT_TRUE(sigismember(&after.sa_mask, SIGUSR2)) << "METIS put it back with other flags";
+  EXPECT_TRUE(sigismember(&after.sa_mask, SIGUSR2)) << "METIS restored it with other flags";
 }
 
-/// METIS raises SIGTERM for its own errors, by the functions that it is given here, and leaves its work by longjmp.
+/// METIS raises SIGTERM for its own errors, through the functions overridden here, and leaves by longjmp.
 TEST(Metis, that_raises_its_own_error_fails_and_leaves_the_handler_alone) {
   static std::jmp_buf place;
   struct sigaction before {};
@@ -208,7 +208,7 @@ TEST(Metis, that_raises_its_own_error_fails_and_leaves_the_handler_alone) {
   EXPECT_EQ(after.sa_handler, before.sa_handler);
 }
 
-/// Out of METIS the two are those of the C library.
+/// Outside METIS the two functions behave as in the C library.
 TEST(Metis, leaves_signals_of_others_alone) {
   static std::atomic<int> caught;
   caught = 0;

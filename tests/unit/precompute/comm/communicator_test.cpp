@@ -1,4 +1,4 @@
-// Agreement, reductions, broadcast and gathering. The oracle is the rule by which each rank makes its part.
+// Agreement, reductions, broadcast and gathering. The expected values follow from the rule by which each rank makes its part.
 #include "precompute/comm/communicator.hpp"
 
 #include <gmock/gmock.h>
@@ -55,21 +55,21 @@ TEST(Agree, keeps_the_kind_of_the_error) {
   EXPECT_EQ(catch_message<DiskFullError>([&] { world().agree(fail(DiskFullError("no room"))); }), "no room");
   try {
     world().agree(fail(MemoryError("needs 3 GB", 3e9)));
-    ADD_FAILURE() << "nothing was thrown";
+    ADD_FAILURE() << "no exception";
   } catch (const MemoryError& error) {
     EXPECT_STREQ(error.what(), "needs 3 GB");
     EXPECT_EQ(error.get_need_bytes(), 3e9);
   }
   try {
     world().agree(fail(PlacedError("job.json:3", "bad key")));
-    ADD_FAILURE() << "nothing was thrown";
+    ADD_FAILURE() << "no exception";
   } catch (const PlacedError& error) {
     EXPECT_STREQ(error.what(), "job.json:3: bad key");
     EXPECT_EQ(error.get_place(), "job.json:3");
   }
   try {
     world().agree(fail(CountRefusal("too few nodes", 7000)));
-    ADD_FAILURE() << "nothing was thrown";
+    ADD_FAILURE() << "no exception";
   } catch (const CountRefusal& error) {
     EXPECT_STREQ(error.what(), "too few nodes");
     EXPECT_EQ(error.get_possible_nodes(), 7000);
@@ -124,13 +124,13 @@ TEST(Broadcast, runs_its_work_on_rank_0_alone_and_throws_its_error_on_all) {
 TEST(AllGather, keeps_the_order_of_the_ranks_and_takes_empty_ranks) {
   std::vector<int> expected;
   for (int r = 0; r < world().size(); ++r) expected.insert(expected.end(), static_cast<std::size_t>(r), 10 * r);
-  const std::vector<int> own(world().rank(), 10 * world().rank());  // none of rank 0
+  const std::vector<int> own(world().rank(), 10 * world().rank());  // none on rank 0
   EXPECT_EQ(world().all_gather(own), expected);
   EXPECT_EQ(world().all_gather([&] { return own; }), expected);
   EXPECT_TRUE(world().all_gather(std::vector<double>()).empty());
 }
 
-TEST(AllGather, throws_on_every_rank_what_one_rank_throws) {
+TEST(AllGather, throws_the_error_of_one_rank_on_every_rank) {
   EXPECT_EQ(catch_message<InputError>([] {
               world().all_gather([] {
                 if (is_last()) throw InputError("bad element");
@@ -143,8 +143,9 @@ TEST(AllGather, throws_on_every_rank_what_one_rank_throws) {
 TEST(AllGather, refuses_more_bytes_than_mpi_can_count) {
   EXPECT_THAT(catch_message<SystemError>([] { world().plan_gathering(is_last() ? std::size_t{1} << 31 : 0); }),
               HasSubstr("2147483648 bytes"));
-  const std::size_t share = (std::size_t{1} << 31) / static_cast<std::size_t>(world().size());  // fits one rank's count, but for one rank
-  EXPECT_THAT(catch_message<SystemError>([&] { world().plan_gathering(share + 1); }), HasSubstr("too many to bring to every rank"));
+  const std::size_t share =
+      (std::size_t{1} << 31) / static_cast<std::size_t>(world().size());  // within the count of one rank, except for a single rank
+  EXPECT_THAT(catch_message<SystemError>([&] { world().plan_gathering(share + 1); }), HasSubstr("too many to gather on every rank"));
 }
 
 TEST(IndexPartition, of_equal_runs_covers_every_number_once) {

@@ -1,5 +1,5 @@
-// Items between ranks: each arrives once, at the right rank, in order, also in messages of a few bytes (what messages beyond MPI's counts
-// take) and with ranks that have nothing to send. The oracle is the rule by which the test makes them.
+// Items between ranks: each arrives once, at the right rank, in order, also in messages of a few bytes (the blocks used beyond the counts
+// of MPI) and with ranks that send nothing. The expected values follow from the rule by which the test makes them.
 #include "precompute/comm/exchange.hpp"
 
 #include <gmock/gmock.h>
@@ -64,7 +64,7 @@ TEST(AllToAll, takes_ranks_that_send_or_get_nothing) {
   EXPECT_TRUE(all_to_all(world(), std::vector<int>(), [](int) { return 0; }).items.empty());
 }
 
-TEST(AllToAll, throws_on_every_rank_what_one_rank_throws) {
+TEST(AllToAll, throws_the_error_of_one_rank_on_every_rank) {
   EXPECT_EQ(catch_message<InputError>([] {
               all_to_all(
                   world(),
@@ -86,7 +86,7 @@ TEST(AllToAll, throws_on_every_rank_what_one_rank_throws) {
 
 class ExchangeInBlocks : public testing::TestWithParam<std::size_t> {};
 
-TEST_P(ExchangeInBlocks, goes_forth_and_back_again_and_again) {
+TEST_P(ExchangeInBlocks, repeats_forward_and_backward) {
   const auto sent = make_items();
   Exchange exchange(world(), sent.begin, GetParam());
   exchange.reserve(2 * sizeof(Item));
@@ -122,7 +122,7 @@ TEST(QueryOwners, answers_every_question_in_order) {
   const auto owners = IndexPartition::make_even(world(), 23);
   std::vector<std::int32_t> questions;
   for (int i = 0; i < (is_last() ? 0 : 40); ++i)
-    questions.push_back((7 * i + world().rank()) % 23);  // with repetitions; none of the last rank
+    questions.push_back((7 * i + world().rank()) % 23);  // with repetitions; none on the last rank
   const auto find_owner = [&](std::int32_t number) { return owners.find_owner(number); };
   std::vector<double> squares, ranks;
   for (const std::int32_t number : questions) squares.push_back(number * number);
@@ -140,7 +140,7 @@ TEST(QueryOwners, answers_every_question_in_order) {
   EXPECT_EQ(order, std::vector<std::int32_t>(questions.size(), world().rank()));
 }
 
-TEST(QueryOwners, throws_on_every_rank_what_the_answering_rank_throws) {
+TEST(QueryOwners, throws_the_error_of_the_answering_rank_on_every_rank) {
   EXPECT_EQ(catch_message<InputError>([] {
               query_owners<int>(
                   world(), std::vector<int>{1}, [](int) { return world().size() - 1; },
@@ -154,7 +154,7 @@ TEST(ReportToOwners, brings_each_value_to_the_owner_of_its_number) {
   const auto values = report_to_owners<double>(
       world(),
       [&] {
-        std::vector<Reported<double>> list;  // even numbers, dealt to the ranks in turn, the last first
+        std::vector<Reported<double>> list;  // even numbers, distributed over the ranks in turn, the last first
         for (std::int32_t number = static_cast<std::int32_t>(owners.total()) - 1; number >= 0; --number)
           if (number % 2 == 0 && number / 2 % world().size() == world().rank()) list.push_back({number, 0.5 * number});
         return list;
@@ -167,7 +167,7 @@ TEST(ReportToOwners, brings_each_value_to_the_owner_of_its_number) {
   }
 }
 
-TEST(FindOwners, finds_numbers_that_are_owned_in_no_order) {
+TEST(FindOwners, finds_owners_of_unordered_numbers) {
   std::vector<std::int32_t> owned, wanted, expected;
   const auto owner_of = [](std::int32_t number) { return (number * 5 + number / 7) % world().size(); };
   for (std::int32_t number = 0; number < 60; number += 2) {
@@ -189,13 +189,13 @@ std::vector<int> deserialise(const std::vector<std::byte>& bytes) {
   return values;
 }
 
-TEST(ScatterInTurn, gives_every_rank_what_rank_0_made_for_it) {
+TEST(ScatterInTurn, gives_every_rank_its_result) {
   int made = 0;
   const auto own = scatter_in_turn(
       world(),
       [&](int rank) {
         ++made;
-        return std::vector<int>(rank, 10 * rank);  // nothing for rank 0
+        return std::vector<int>(rank, 10 * rank);  // empty for rank 0
       },
       serialise, deserialise);
   EXPECT_EQ(own, std::vector<int>(world().rank(), 10 * world().rank()));

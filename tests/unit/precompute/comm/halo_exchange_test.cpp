@@ -1,5 +1,5 @@
-// Values of shared numbers: copied from their owner and summed there, also in messages of a few bytes. The oracle is the rule by which the
-// test fills them.
+// Values of shared numbers: copied from their owner and summed there, also in messages of a few bytes. The expected values follow from the
+// rule by which the test fills them.
 #include "precompute/comm/halo_exchange.hpp"
 
 #include <gtest/gtest.h>
@@ -64,7 +64,7 @@ TEST_P(HaloInBlocks, copies_and_sums_shared_values) {
 
 INSTANTIATE_TEST_SUITE_P(Blocks, HaloInBlocks, testing::Values(1, 7, 24, kBlockBytes));
 
-// Runs of rows, as matrices have them: rank r owns r rows, and every rank keeps one copy of each other row behind its own.
+// Contiguous rows, as in matrices: rank r owns r rows, and every rank keeps a copy of each other row behind its own.
 TEST(Halo, of_runs_is_stored_behind_the_own_values_during_other_work) {
   const IndexPartition owners(world(), world().rank());
   std::vector<std::int32_t> numbers, places;
@@ -81,7 +81,7 @@ TEST(Halo, of_runs_is_stored_behind_the_own_values_during_other_work) {
   for (std::size_t i = 0; i < numbers.size(); ++i) EXPECT_EQ(values[places[i]], 100.0 * numbers[i]);
 }
 
-TEST(Halo, of_no_one_does_nothing) {
+TEST(Halo, without_neighbours_does_nothing) {
   HaloExchange exchange(world(), Halo{}, [](std::int32_t) { return 0; });
   EXPECT_FALSE(exchange.has_neighbours());
   double value = 7.0;

@@ -1,4 +1,4 @@
-// Bodies whose eigenvalues are known in closed form.
+// Bodies with closed-form eigenvalues.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -16,8 +16,8 @@ namespace {
 constexpr double kRate = 4e6;  // [N/m]
 constexpr double kMass = 0.5;  // [kg]
 
-// side^3 free masses between fixed walls, coupled to their neighbours alike in x, y and z:
-// lambda = 4 k/m sum_d sin^2(pi j_d / (2 (side + 1))), j_d = 1 ... side, each three times. Symmetry makes up to 18 of them equal.
+// side^3 free masses between fixed walls, coupled isotropically to their neighbours: lambda = 4 k/m sum_d sin^2(pi j_d / (2 (side + 1))),
+// j_d = 1 ... side, each three times. Symmetry makes up to 18 of them equal.
 Network make_cube_between_walls(int side, double rate = kRate) {
   Network network;
   const int width = side + 2;
@@ -54,7 +54,7 @@ std::vector<double> calc_cube_eigenvalues(int side, double rate = kRate) {
   return lambda;
 }
 
-// Compares with the closed form's eigenvalues of the band.
+// Compares with the closed-form eigenvalues of the band.
 void expect_band(const Modes& modes, const std::vector<double>& all, const Options& options) {
   std::vector<double> expected;
   for (const double lambda : all) {
@@ -68,7 +68,7 @@ void expect_band(const Modes& modes, const std::vector<double>& all, const Optio
 }
 
 TEST(SolveModes, gives_a_molecule_of_four_masses_its_six_vibrations) {
-  Network network;  // A regular tetrahedron of springs: lambda = k/m twice, 2 k/m three times, 4 k/m once.
+  Network network;  // regular tetrahedron of springs: lambda = k/m twice, 2 k/m three times, 4 k/m once
   network.nodes = {{1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}};
   network.mass_kg.assign(4, kMass);
   network.component.assign(4, 0);
@@ -110,7 +110,7 @@ TEST(SolveModes, finds_every_copy_when_blocks_are_narrower_than_the_multiplicity
   options.low_hz = 10;
   options.high_hz = to_hz(0.5 * (all[280] + *std::upper_bound(all.begin(), all.end(), all[280] * (1 + 1e-9))));
   const Modes modes = solve_modes(system.problem, options);
-  EXPECT_GT(modes.factor.solves, 0) << "the sparse path was meant to be tested";
+  EXPECT_GT(modes.factor.solves, 0) << "not solved by the sparse solver";
   expect_band(modes, all, options);
   std::int64_t largest = 0;
   for (const Cluster& cluster : modes.proof.clusters) largest = std::max(largest, cluster.count);
@@ -121,7 +121,7 @@ TEST(SolveModes, finds_every_copy_when_blocks_are_narrower_than_the_multiplicity
 TEST(SolveModes, counts_a_mode_on_the_end_of_the_band_as_in_it) {
   const test::System system = test::make_system(make_cube_between_walls(8));
   const std::vector<double> all = calc_cube_eigenvalues(8);
-  Options options;  // Both ends hit clusters of equal eigenvalues exactly.
+  Options options;  // both ends hit clusters of equal eigenvalues exactly
   options.low_hz = to_hz(all[3]);
   options.high_hz = to_hz(all[60]);
   for (const auto how : {Factorisation::kAutomatic, Factorisation::kMumps}) {
@@ -152,11 +152,11 @@ TEST(SolveModes, leaves_out_modes_that_lie_just_outside_the_band) {
   }
 }
 
-// Below the last shift of a slice all copies are found before the next slice begins, and a group larger than any slice is no obstacle.
+// All copies below the last shift of a slice are found before the next slice begins; a group larger than a slice is handled.
 TEST(SolveModes, finds_more_degenerate_modes_than_a_slice_holds) {
   int size = 1;
   MPI_Comm_size(PETSC_COMM_WORLD, &size);
-  if (size > 2) GTEST_SKIP() << "two ranks show it, more take long on fewer cores";
+  if (size > 2) GTEST_SKIP() << "two ranks suffice; more are slow on few cores";
   constexpr int kEqual = 145;
   constexpr int kOthers = 40;
   Network many;
@@ -183,7 +183,7 @@ TEST(SolveModes, finds_more_degenerate_modes_than_a_slice_holds) {
 TEST(SolveModes, joins_slices_without_a_gap_or_a_double) {
   int size = 1;
   MPI_Comm_size(PETSC_COMM_WORLD, &size);
-  if (size > 1) GTEST_SKIP() << "slices know nothing of ranks, and 600 modes take long on more ranks than cores";
+  if (size > 1) GTEST_SKIP() << "slices do not depend on ranks, and 600 modes are slow on more ranks than cores";
   const test::System system = test::make_system(make_cube_between_walls(9));  // 2187 unknowns
   const std::vector<double> all = calc_cube_eigenvalues(9);
   Options options;
@@ -196,7 +196,7 @@ TEST(SolveModes, joins_slices_without_a_gap_or_a_double) {
 TEST(SolveModes, keeps_the_tolerance_over_seven_decades_of_eigenvalues) {
   int size = 1;
   MPI_Comm_size(PETSC_COMM_WORLD, &size);
-  if (size > 2) GTEST_SKIP() << "two ranks show it, more take long on fewer cores";
+  if (size > 2) GTEST_SKIP() << "two ranks suffice; more are slow on few cores";
   const test::System system = test::make_system(test::join(make_cube_between_walls(8), make_cube_between_walls(3, 1e-6 * kRate)));
   std::vector<double> all = calc_cube_eigenvalues(8);
   for (const double lambda : calc_cube_eigenvalues(3, 1e-6 * kRate)) all.push_back(lambda);
@@ -207,7 +207,7 @@ TEST(SolveModes, keeps_the_tolerance_over_seven_decades_of_eigenvalues) {
   options.factorisation = Factorisation::kMumps;
   const Modes modes = solve_modes(system.problem, options);
   EXPECT_GT(modes.lambda.back() / modes.lambda.front(), 1e6);
-  EXPECT_GT(modes.factor.solves, 0) << "the sparse path was meant to be tested";
+  EXPECT_GT(modes.factor.solves, 0) << "not solved by the sparse solver";
   EXPECT_EQ(modes.above_tolerance_count, 0);
   expect_band(modes, all, options);
 }

@@ -1,4 +1,4 @@
-// The parts of block Lanczos, each against dense matrices that every rank has.
+// Parts of block Lanczos against dense matrices known on every rank.
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
@@ -15,8 +15,7 @@
 #include "precompute/eigen/ritz.hpp"
 #include "precompute/eigen/shift_invert.hpp"
 #include "precompute/eigen/shifted_factor.hpp"
-#include "precompute/la/local_columns.hpp"
-#include "precompute/petsc/guard.hpp"
+#include "precompute/la/node_matrix.hpp"
 #include "precompute/petsc/noise.hpp"
 #include "tests/unit/precompute/eigen/spring_network.hpp"
 
@@ -50,21 +49,12 @@ Matrix gather(Mat sparse) {
 
 double find_largest(const Matrix& a) { return a.size() == 0 ? 0 : a.cwiseAbs().maxCoeff(); }
 
-PetscErrorCode apply_factor(PC pc, Mat b, Mat x) {
-  return petsc::guard([&] {
-    ShiftedFactor* factor = nullptr;
-    check(PCShellGetContext(pc, &factor));
-    const la::LocalColumns from(b), to(x);
-    for (PetscInt j = 0; j < from.columns; ++j) factor->solve(from.column(j), to.column(j), std::max<PetscInt>(from.rows, 1), 1);
-  });
-}
-
 // A small free body, dense and distributed, its shift-invert operator, and memory for a basis.
 class Rig {
  public:
   static constexpr int kBlock = 4;
 
-  explicit Rig(int room) : system(test::make_system(make_block(2, 3, 4))), room_(room) {
+  explicit Rig(int room) : system(test::make_system(make_block(2, 3, 4))), mass(system.mass), room_(room) {
     k = gather(system.stiffness);
     m = gather(system.mass);
     const Eigen::GeneralizedSelfAdjointEigenSolver<Matrix> dense(k, m);
@@ -74,11 +64,11 @@ class Rig {
     inverse = (k - sigma * m).partialPivLu().inverse();
     check(MatGetOwnershipRange(system.stiffness, &first, &last));
     rows = last - first;
-    make_transformation();
+    factor_ = make_ldlt_factor({system.stiffness, system.mass});
+    EXPECT_TRUE(factor_->factorise(sigma));
     memory_.assign(rows * (room + kBlock), 0.0);
     fill_at_random(view().part(0, kBlock));
   }
-  ~Rig() { (void)STDestroy(&st); }
   Rig(const Rig&) = delete;
   Rig& operator=(const Rig&) = delete;
 
@@ -94,103 +84,80 @@ class Rig {
     for (int j = 0; j < columns.count; ++j) std::copy_n(columns.column(j), rows, all.col(j).data() + first);
     return sum_over_ranks(all);
   }
-  /// This rank's rows of column j of a dense matrix, into a column.
+  /// Copies this rank's rows of column j of a dense matrix into a column.
   void scatter(const Matrix& all, Eigen::Index j, double* column) const { std::copy_n(all.col(j).data() + first, rows, column); }
   RitzGoal make_goal(double low, double high, int wanted) const {
     RitzGoal goal;
-    goal.is_interval = true;
     goal.low = low;
     goal.high = high;
     goal.wanted = wanted;
     goal.sigma = sigma;
     goal.tolerance = 1e-10;
-    goal.error = [](double theta, double residual) { return residual / std::abs(theta); };
-    goal.to_lambda = [this](double theta) { return sigma + 1 / theta; };
     return goal;
   }
 
+  ShiftInvert make_inverse() const { return {*factor_, sigma}; }
+
   test::System system;
+  la::NodeMatrix mass;
   Matrix k, m, vectors, inverse;
   la::Vector lambda;
   double sigma = 0;
   PetscInt first = 0, last = 0, rows = 0;
-  ST st = nullptr;
 
  private:
-  void make_transformation() {
-    Mat matrices[2] = {system.stiffness, system.mass};
-    KSP ksp = nullptr;
-    PC pc = nullptr;
-    check(STCreate(world(), &st));
-    check(STSetType(st, STSINVERT));
-    check(STSetMatrices(st, 2, matrices));
-    check(STSetShift(st, sigma));
-    check(STGetKSP(st, &ksp));
-    check(KSPSetType(ksp, KSPPREONLY));
-    check(KSPGetPC(ksp, &pc));
-    factor_ = make_ldlt_factor({system.stiffness, system.mass});
-    ASSERT_TRUE(factor_->factorise(sigma));
-    check(PCSetType(pc, PCSHELL));
-    check(PCShellSetContext(pc, factor_.get()));
-    check(PCShellSetMatApply(pc, apply_factor));
-    check(STSetUp(st));
-    check(MatDuplicate(system.stiffness, MAT_COPY_VALUES, shifted_.out()));
-    check(MatAXPY(shifted_, -sigma, system.mass, SUBSET_NONZERO_PATTERN));
-    check(KSPSetOperators(ksp, shifted_, shifted_));
-  }
-
   int room_;
-  petsc::MatHandle shifted_;
   std::unique_ptr<ShiftedFactor> factor_;
   std::vector<double> memory_;
 };
 
 TEST(ShiftInvert, is_the_dense_inverse) {
-  Rig rig(Rig::kBlock);
-  InnerProduct inner(world(), rig.system.mass, rig.rows, static_cast<PetscInt>(rig.k.rows()), Rig::kBlock);
-  inner.place(rig.view());
-  inner.multiply();
-  const Matrix z = rig.gather_columns(inner.z());
-  const ShiftInvert inverse(rig.st);
+  Rig rig(2 * Rig::kBlock);
+  const Columns b = rig.view().part(0, Rig::kBlock), x = rig.view().part(Rig::kBlock, Rig::kBlock);
+  const Matrix expected = rig.inverse * rig.gather_columns(b);
+  ShiftInvert inverse = rig.make_inverse();
   EXPECT_EQ(inverse.get_sigma(), rig.sigma);
-  inverse.apply(inner.z_mat(), inner.w_mat());
-  const Matrix expected = rig.inverse * z;
-  EXPECT_LT(find_largest(rig.gather_columns(inner.w()) - expected), 1e-10 * find_largest(expected));
+  inverse.apply(b, x);
+  EXPECT_LT(find_largest(rig.gather_columns(x) - expected), 1e-10 * find_largest(expected));
+  inverse.apply(b, b);
+  EXPECT_LT(find_largest(rig.gather_columns(b) - expected), 1e-10 * find_largest(expected));
+  EXPECT_EQ(inverse.get_solves(), 2 * Rig::kBlock);
 }
 
-TEST(InnerProduct, multiplies_by_the_mass_wherever_its_block_is) {
+TEST(InnerProduct, multiplies_by_the_mass_at_every_place_of_its_block) {
   Rig rig(2 * Rig::kBlock);
-  const auto n = static_cast<PetscInt>(rig.k.rows());
   rig.fill_at_random(rig.view());
-  for (const bool is_identity : {false, true}) {
-    InnerProduct inner(world(), is_identity ? nullptr : rig.system.mass.get(), rig.rows, n, Rig::kBlock);
-    for (const int at : {0, 3, Rig::kBlock}) {
-      inner.place(rig.view().part(at, Rig::kBlock));
-      inner.multiply();
-      const Matrix v = rig.gather_columns(rig.view()), w = v.middleCols(at, Rig::kBlock);
-      const Matrix z = is_identity ? w : Matrix(rig.m * w);
-      EXPECT_LT(find_largest(rig.gather_columns(inner.z()) - z), 1e-14);
-      const Matrix products = v.transpose() * z;
-      EXPECT_LT(find_largest(inner.calc_products(rig.view(), inner.z()) - products), 1e-13);
-    }
+  InnerProduct inner(world(), rig.mass, rig.rows, Rig::kBlock);
+  for (const int at : {0, 3, Rig::kBlock}) {
+    inner.place(rig.view().part(at, Rig::kBlock));
+    inner.multiply();
+    const Matrix v = rig.gather_columns(rig.view());
+    const Matrix z = rig.m * v.middleCols(at, Rig::kBlock);
+    EXPECT_LT(find_largest(rig.gather_columns(inner.z()) - z), 1e-14);
+    const Matrix products = v.transpose() * z;
+    EXPECT_LT(find_largest(inner.calc_products(rig.view(), inner.z()) - products), 1e-13);
   }
 }
 
-// With a mass matrix of any kind, and with a diagonal one, against Eigen's products.
+// With a general and a diagonal mass matrix, against products of Eigen.
 TEST(InnerProduct, subtracts_multiplies_and_combines_in_one_pass) {
   Rig rig(2 * Rig::kBlock);
-  const auto n = static_cast<PetscInt>(rig.k.rows());
   for (const bool is_diagonal : {false, true}) {
     rig.fill_at_random(rig.view());
     petsc::MatHandle mass;
     check(MatDuplicate(rig.system.mass, MAT_COPY_VALUES, mass.out()));
-    std::vector<double> diagonal(rig.rows);
     Matrix m = rig.m;
     if (is_diagonal) {
+      petsc::VecHandle diagonal;
+      check(MatCreateVecs(mass, nullptr, diagonal.out()));
+      check(MatGetDiagonal(mass, diagonal));
+      check(MatZeroEntries(mass));
+      check(MatDiagonalSet(mass, diagonal, INSERT_VALUES));
       m = Matrix(rig.m.diagonal().asDiagonal());
-      for (PetscInt i = 0; i < rig.rows; ++i) diagonal[i] = m(rig.first + i, rig.first + i);
     }
-    InnerProduct inner(world(), mass, rig.rows, n, Rig::kBlock, is_diagonal ? diagonal.data() : nullptr);
+    const la::NodeMatrix blocks(mass);
+    ASSERT_EQ(blocks.is_diagonal(), is_diagonal);
+    InnerProduct inner(world(), blocks, rig.rows, Rig::kBlock);
     inner.place(rig.view().part(Rig::kBlock, Rig::kBlock));
     const Columns a = rig.view().part(0, Rig::kBlock);
     const Matrix v = rig.gather_columns(a), old = rig.gather_columns(inner.w());
@@ -226,7 +193,7 @@ TEST(LockedModes, are_projected_out_by_range) {
     locked.lambda.push_back(rig.lambda[j]);
   }
   locked.sets = {{values.data(), rig.rows, rig.rows, 3}, {values.data() + 3 * rig.rows, rig.rows, rig.rows, 4}};
-  InnerProduct inner(world(), rig.system.mass, rig.rows, static_cast<PetscInt>(rig.k.rows()), Rig::kBlock);
+  InnerProduct inner(world(), rig.mass, rig.rows, Rig::kBlock);
   inner.place(rig.view());
   inner.multiply();
   const Matrix w = rig.gather_columns(inner.w());
@@ -252,10 +219,10 @@ void expect_krylov_relation(const Rig& rig, const LanczosBasis& basis, const cha
 TEST(LanczosBasis, keeps_the_krylov_relation_through_steps_and_restarts) {
   constexpr int kRoom = 32;
   Rig rig(kRoom);
-  const ShiftInvert inverse(rig.st);
+  ShiftInvert inverse = rig.make_inverse();
   const auto n = static_cast<PetscInt>(rig.k.rows());
-  InnerProduct inner(world(), rig.system.mass, rig.rows, n, Rig::kBlock);
-  LanczosBasis basis(rig.view(), 0, kRoom, Rig::kBlock);
+  InnerProduct inner(world(), rig.mass, rig.rows, Rig::kBlock);
+  LanczosBasis basis(rig.view(), kRoom, Rig::kBlock);
   const LockedModes none;
   BlockLanczos lanczos({inverse, inner, basis, none, n, rig.first}, rig.make_goal(rig.lambda[15], rig.lambda[25], 11), 100, nullptr);
   ASSERT_TRUE(lanczos.start());
@@ -274,12 +241,12 @@ TEST(LanczosBasis, keeps_the_krylov_relation_through_steps_and_restarts) {
   EXPECT_GE(restarts, 2);
 }
 
-TEST(RitzStep, finds_what_a_dense_solver_finds_and_its_residuals_are_true) {
+TEST(RitzStep, agrees_with_a_dense_solver_and_has_true_residuals) {
   Rig rig(72 + Rig::kBlock);
-  const ShiftInvert inverse(rig.st);
+  ShiftInvert inverse = rig.make_inverse();
   const auto n = static_cast<PetscInt>(rig.k.rows());
-  InnerProduct inner(world(), rig.system.mass, rig.rows, n, Rig::kBlock);
-  LanczosBasis basis(rig.view(), 0, n, Rig::kBlock);
+  InnerProduct inner(world(), rig.mass, rig.rows, Rig::kBlock);
+  LanczosBasis basis(rig.view(), n, Rig::kBlock);
   const LockedModes none;
   BlockLanczos lanczos({inverse, inner, basis, none, n, rig.first}, rig.make_goal(0, 1, 1), 100, nullptr);
   ASSERT_TRUE(lanczos.start());
@@ -303,16 +270,13 @@ TEST(RitzStep, finds_what_a_dense_solver_finds_and_its_residuals_are_true) {
   for (PetscInt j = 0; j < n; ++j) EXPECT_NEAR(pairs.theta[j], expected[j], 1e-12 * scale) << j;
 }
 
-TEST(RitzStep, selects_an_interval_and_sees_when_it_is_complete) {
+TEST(RitzStep, selects_an_interval_and_detects_completion) {
   RitzGoal goal;
-  goal.is_interval = true;
   goal.low = 2;
   goal.high = 4;
   goal.wanted = 3;
   goal.sigma = 3.1;
   goal.tolerance = 1e-8;
-  goal.error = [](double, double residual) { return residual; };
-  goal.to_lambda = [](double theta) { return 3.1 + 1 / theta; };
   const std::vector<double> lambda{3.0, 2.2, 1.0, 9.0, 5.2, 3.6};  // by ascending theta
   RitzPairs pairs;
   pairs.theta.resize(6);
@@ -325,7 +289,7 @@ TEST(RitzStep, selects_an_interval_and_sees_when_it_is_complete) {
   pairs.residual[5] = 1e-15;
   EXPECT_TRUE(select(pairs, goal).is_complete);
   goal.wanted = 7;
-  EXPECT_TRUE(select(pairs, goal).is_complete) << "1.0 and 5.2 lie beyond the interval, and have settled";
+  EXPECT_TRUE(select(pairs, goal).is_complete) << "1.0 and 5.2 are outside the interval and have converged";
   pairs.residual = {1e-15, 1e-15, 1, 1, 1, 1e-15};
   EXPECT_FALSE(select(pairs, goal).is_complete);
 }
@@ -334,10 +298,10 @@ TEST(Orthogonaliser, replaces_dependent_columns_of_the_starting_block) {
   Rig rig(20);
   std::copy_n(rig.view().column(0), rig.rows, rig.view().column(2));
   std::fill_n(rig.view().column(3), rig.rows, 0.0);
-  const ShiftInvert inverse(rig.st);
+  ShiftInvert inverse = rig.make_inverse();
   const auto n = static_cast<PetscInt>(rig.k.rows());
-  InnerProduct inner(world(), rig.system.mass, rig.rows, n, Rig::kBlock);
-  LanczosBasis basis(rig.view(), 0, 20, Rig::kBlock);
+  InnerProduct inner(world(), rig.mass, rig.rows, Rig::kBlock);
+  LanczosBasis basis(rig.view(), 20, Rig::kBlock);
   const LockedModes none;
   BlockLanczos lanczos({inverse, inner, basis, none, n, rig.first}, rig.make_goal(0, 1, 1), 100, nullptr);
   ASSERT_TRUE(lanczos.start());
@@ -346,8 +310,8 @@ TEST(Orthogonaliser, replaces_dependent_columns_of_the_starting_block) {
   EXPECT_LT(find_largest(v.transpose() * rig.m * v - Matrix::Identity(Rig::kBlock, Rig::kBlock)), 1e-12);
 }
 
-// Hard cases of the Gram matrix that comes with the products: nearly dependent columns, where it is not enough; and locked modes that make
-// up nearly all of a column, where w^T M w - c^T c would be cancellation. Bound: still orthonormal to 1e-12.
+// Hard cases for the Gram matrix computed with the products: nearly dependent columns, where it is insufficient; and locked modes that make
+// up nearly all of a column, where w^T M w - c^T c cancels. Bound: orthonormal to 1e-12.
 TEST(Orthogonaliser, keeps_nearly_dependent_and_nearly_locked_columns_orthonormal) {
   for (const double rest : {1e-1, 1e-3, 1e-6, 1e-9}) {
     Rig rig(20);
@@ -362,10 +326,10 @@ TEST(Orthogonaliser, keeps_nearly_dependent_and_nearly_locked_columns_orthonorma
       rig.view().column(1)[i] = rig.view().column(0)[i] + rest * rig.view().column(1)[i];
       rig.view().column(2)[i] = known[i] + rest * rig.view().column(2)[i];
     }
-    const ShiftInvert inverse(rig.st);
+    ShiftInvert inverse = rig.make_inverse();
     const auto n = static_cast<PetscInt>(rig.k.rows());
-    InnerProduct inner(world(), rig.system.mass, rig.rows, n, Rig::kBlock);
-    LanczosBasis basis(rig.view(), 0, 20, Rig::kBlock);
+    InnerProduct inner(world(), rig.mass, rig.rows, Rig::kBlock);
+    LanczosBasis basis(rig.view(), 20, Rig::kBlock);
     BlockLanczos lanczos({inverse, inner, basis, locked, n, rig.first}, rig.make_goal(0, 1, 1), 100, nullptr);
     ASSERT_TRUE(lanczos.start());
     ASSERT_TRUE(lanczos.step());

@@ -1,4 +1,4 @@
-// The estimated loss of orthogonality against the true one, V^T V_j in quadruple precision.
+// Estimated loss of orthogonality against the true one, V^T V_j in quadruple precision.
 #include "precompute/eigen/orthogonality.hpp"
 
 #include <gtest/gtest.h>
@@ -17,11 +17,11 @@ __extension__ typedef __float128 Quad;
 
 constexpr int kRows = 300, kBlock = 4, kSteps = 34;
 
-// Block Lanczos on a diagonal operator in double precision, with the projections that the estimate asks for, and no more.
+// Block Lanczos on a diagonal operator in double precision, with exactly the projections requested by the estimate.
 class PlainLanczos {
  public:
   PlainLanczos() : v_(kRows, kBlock * (kSteps + 2)), t_(Matrix::Zero(v_.cols(), v_.cols())) {
-    for (int i = 0; i < kRows; ++i) theta_[i] = 1 / (0.37 + 0.01 * i - 1.0004);  // shift and invert, with a near eigenvalue
+    for (int i = 0; i < kRows; ++i) theta_[i] = 1 / (0.37 + 0.01 * i - 1.0004);  // shift and invert, with a close eigenvalue
     Matrix first(kRows, kBlock);
     for (int j = 0; j < kBlock; ++j)
       for (int i = 0; i < kRows; ++i) first(i, j) = petsc::make_noise(static_cast<std::uint64_t>(i), static_cast<std::uint64_t>(j));
@@ -29,7 +29,7 @@ class PlainLanczos {
     v_.leftCols(kBlock) = first;
   }
 
-  /// may_skip(estimate's opinion): whether the projection is left out. True if it was.
+  /// may_skip(answer of the estimate): true to skip the projection. Returns true if it was skipped.
   template <class MaySkip>
   bool step(const MaySkip& may_skip) {
     const LanczosStep here{t_, size_, kBlock, std::max(size_ - 2 * kBlock, 0)};
@@ -59,7 +59,7 @@ class PlainLanczos {
     return is_skipped;
   }
 
-  /// The largest entry of V^T V_j, V_j the last block and V what was before it.
+  /// Largest entry of V^T V_j, V_j: last block, V: preceding blocks.
   double calc_true_loss() const {
     double largest = 0;
     for (int i = 0; i < size_ - kBlock; ++i)
@@ -103,8 +103,8 @@ TEST(OrthogonalityEstimate, keeps_the_basis_semi_orthogonal_with_few_projections
   EXPECT_LT(skipped, kSteps - 4) << "some projections are due";
 }
 
-// Where nothing is projected from some block on, orthogonality is lost; no later than it is, the estimate refuses to skip.
-TEST(OrthogonalityEstimate, sees_the_loss_before_it_happens) {
+// Without projections from some block on, orthogonality is lost; the estimate refuses to skip before that.
+TEST(OrthogonalityEstimate, predicts_the_loss) {
   PlainLanczos lanczos;
   bool has_refused = false;
   double loss = 0;
@@ -117,7 +117,7 @@ TEST(OrthogonalityEstimate, sees_the_loss_before_it_happens) {
     loss = std::max(loss, lanczos.calc_true_loss());
     EXPECT_TRUE(has_refused || loss < 2e-8) << "block " << i << " lost " << loss;
   }
-  EXPECT_GT(loss, 1e-6) << "a run that loses nothing tests nothing";
+  EXPECT_GT(loss, 1e-6) << "the run must lose orthogonality";
 }
 
 TEST(OrthogonalityEstimate, forgets_all_on_reset) {

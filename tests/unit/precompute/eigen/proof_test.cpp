@@ -1,4 +1,4 @@
-// What the proof says, and that ranks, partitions and rounding have no say in the modes.
+// The proof, and independence of the modes from ranks, partition and rounding.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -18,7 +18,7 @@ namespace {
 
 using la::LocalColumns;
 
-TEST(Proof, counts_what_dense_lapack_counts) {
+TEST(Proof, agrees_with_dense_lapack) {
   const Network two = test::join(make_block(4, 4, 9), make_block(3, 4, 8, {50, 0, 0}));
   const std::vector<double> all = test::calc_all_eigenvalues(two);
   const test::System system = test::make_system(two);
@@ -47,7 +47,7 @@ TEST(Proof, counts_what_dense_lapack_counts) {
   EXPECT_NE(proof.method.find("L D L^T"), std::string::npos) << proof.method;
 }
 
-// Below a low end of the band nothing is counted: the shift inside shows that the rigid modes alone are there.
+// A low end of the band is not counted: the shift inside proves that only the rigid modes are below.
 TEST(Proof, leaves_a_low_end_to_the_shift_inside) {
   const Network block = make_block(4, 5, 9);
   const std::vector<double> all = test::calc_all_eigenvalues(block);
@@ -71,9 +71,10 @@ TEST(Proof, leaves_a_low_end_to_the_shift_inside) {
   }
 }
 
-// Two blocks on threads: six modes below the band that are not rigid. What was assumed of the lower end is wrong, and it is counted.
+// Two blocks connected by threads: six modes below the band that are not rigid. The assumption about the lower end is wrong, so it is
+// counted.
 TEST(Proof, counts_a_low_end_with_modes_below_it) {
-  constexpr double kThread = 1e-6;  // [N/m], of 1 inside the blocks
+  constexpr double kThread = 1e-6;  // [N/m], 1 inside the blocks
   Network two = test::join(make_block(4, 4, 9), make_block(3, 4, 8, {12, 0.5, 0.7}));
   const int first = 4 * 4 * 9;
   std::fill(two.component.begin(), two.component.end(), 0);
@@ -109,7 +110,7 @@ TEST(Proof, counts_a_small_body_by_its_whole_spectrum) {
   EXPECT_EQ(modes.proof.counts.back().below, 6 + modes.proof.found);
 }
 
-// Shapes of all modes on every rank, (nodes, 3, modes) by the network's first order of nodes.
+// Shapes of all modes on every rank, (nodes, 3, modes) in the original order of nodes.
 std::vector<double> gather_shapes(const Modes& modes, MPI_Comm comm, const std::vector<int>& place) {
   const LocalColumns shapes(modes.shapes);
   const auto nodes = place.size();
@@ -131,7 +132,7 @@ std::vector<double> gather_shapes(const Modes& modes, MPI_Comm comm, const std::
 }
 
 TEST(Canonical, modes_are_the_same_for_any_ranks_and_partition) {
-  // Three equal bodies: every mode three times; one more that differs by a billionth is degenerate with them.
+  // Three equal bodies: every mode three times; a fourth that differs by a billionth is degenerate with them.
   Network network = test::join(test::join(make_block(4, 4, 6), make_block(4, 4, 6, {30, 0, 0})), make_block(4, 4, 6, {0, 40, 0}));
   Options options;
   options.low_hz = 1;
@@ -172,7 +173,7 @@ TEST(Canonical, part_of_a_group_that_max_modes_cuts_is_the_same_as_in_the_whole_
   options.low_hz = 1;
   options.high_hz = to_hz(test::calc_all_eigenvalues(make_block(4, 4, 6))[12] * 1.0001);
   const Modes whole = solve_modes(system.problem, options);
-  options.max_modes = 4;  // one of the second group of three
+  options.max_modes = 4;  // cuts the second group of three
   const Modes part = solve_modes(system.problem, options);
   ASSERT_EQ(part.lambda.size(), 4u);
   ASSERT_EQ(part.proof.clusters.size(), 1u);
@@ -189,7 +190,7 @@ TEST(Canonical, part_of_a_group_that_max_modes_cuts_is_the_same_as_in_the_whole_
   EXPECT_LT(difference, 1e-6 * largest);
 }
 
-TEST(Memory, that_does_not_suffice_is_named_before_the_work) {
+TEST(Memory, shortage_is_an_error_before_the_work) {
   const test::System system = test::make_system(make_block(5, 5, 10));
   Options options;
   options.low_hz = 1;

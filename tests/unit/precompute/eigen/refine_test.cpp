@@ -1,4 +1,4 @@
-// The pieces behind solve_modes that a good solve hardly uses: correcting bad modes, cutting a band.
+// Correction of bad modes, and division of a band into slices.
 #include "precompute/eigen/refine.hpp"
 
 #include <gtest/gtest.h>
@@ -15,7 +15,7 @@
 namespace carillon::eigen {
 namespace {
 
-// Adds to every mode an error of this size relative to its largest entry, of all frequencies and the same on any number of ranks.
+// Adds an error of this size, relative to the largest entry, with all frequencies, to every mode; the same for any number of ranks.
 void spoil(Mat shapes, double size) {
   PetscInt first = 0;
   PetscInt last = 0;
@@ -68,7 +68,7 @@ TEST(RefineModes, brings_spoiled_modes_back_within_the_tolerance) {
   }
 }
 
-// Solves whose entries are wrong by one part in ten million, as those of a bad factorisation are.
+// Solves with entries wrong by one part in ten million, as from a bad factorisation.
 class RoundingFactor : public ShiftedFactor {
  public:
   explicit RoundingFactor(ShiftedFactor& exact) : exact_(exact) {}
@@ -89,7 +89,7 @@ class RoundingFactor : public ShiftedFactor {
   ShiftedFactor& exact_;
 };
 
-TEST(RefineModes, needs_no_factorisation_where_solves_at_hand_are_rounded_more_than_the_tolerance) {
+TEST(RefineModes, uses_the_available_factor_for_rounding_of_solves) {
   const test::Network block = test::make_block(4, 4, 8);
   const std::vector<double> all = test::calc_all_eigenvalues(block);
   const test::System system = test::make_system(block);
@@ -108,7 +108,7 @@ TEST(RefineModes, needs_no_factorisation_where_solves_at_hand_are_rounded_more_t
   request.tolerance = 1e-9;
   request.at_hand = &at_hand;
   request.get_factor = [&]() -> ShiftedFactor& { return *factor; };
-  spoil(modes.shapes, 1e-10);  // what fast motions make of it is above the tolerance, and nothing else is
+  spoil(modes.shapes, 1e-10);  // only its amplification by fast motions is above the tolerance
   ModeErrors errors = normalise_and_measure(operators, modes.lambda, modes.shapes);
   ASSERT_GT(*std::max_element(errors.residual.begin(), errors.residual.end()), 2 * request.tolerance);
   const RefineCost cost = refine_modes(request, modes.lambda, modes.shapes, errors);
@@ -121,7 +121,7 @@ TEST(RefineModes, needs_no_factorisation_where_solves_at_hand_are_rounded_more_t
   }
 }
 
-// Goes through a band of these eigenvalues as a solver would that finds all of every slice; returns the modes per slice.
+// Sweeps a band of these eigenvalues like a solver that finds all modes of every slice; returns the modes per slice.
 std::vector<std::int64_t> sweep_through(const std::vector<double>& lambda, const Slice& band, std::int64_t max, int& counts) {
   const CountBelow count = [&](double x) { return std::lower_bound(lambda.begin(), lambda.end(), x) - lambda.begin(); };
   Sweep sweep(band, max, [&](double x) {
@@ -149,7 +149,7 @@ std::vector<std::int64_t> sweep_through(const std::vector<double>& lambda, const
 }
 
 TEST(Sweep, covers_the_band_in_slices_of_about_equal_size_at_one_count_each) {
-  for (const double power : {1.0, 2.0, 0.5}) {  // of frequency: plates, half-way to solids, strings in bending
+  for (const double power : {1.0, 2.0, 0.5}) {  // of frequency: plates, between plates and solids, strings in bending
     std::vector<double> lambda;
     for (int j = 1; j <= 1000; ++j) lambda.push_back(std::pow(j, 2 / power));
     int counts = 0;

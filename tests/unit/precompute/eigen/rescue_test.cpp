@@ -1,4 +1,4 @@
-// The ways back: another factorisation where ours breaks down, another search where a run has missed modes, slices over ranks.
+// Fallbacks: MUMPS if our factorisation breaks down, another search for missing modes, slices on several ranks.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "precompute/eigen/checkpoint.hpp"
-#include "precompute/eigen/solve_estimate.hpp"
+#include "precompute/eigen/predict_cost.hpp"
 #include "precompute/eigen/solve_modes.hpp"
 #include "precompute/la/local_columns.hpp"
 #include "precompute/ldlt/factor.hpp"
@@ -23,8 +23,8 @@ namespace {
 
 using la::LocalColumns;
 
-// Bunches of masses, each tied to all others of its bunch, on a hub: an elimination takes every bunch alone before the hub. Their masses
-// are such that, with the hub fixed, the lowest eigenvalue of bunch j is `tuned` (1 + j spacing), j = -count/2 ... count/2.
+// Bunches of masses, each connected to all others of its bunch, on a hub: an elimination takes every bunch alone before the hub. With the
+// hub fixed, the lowest eigenvalue of bunch j is `tuned` (1 + j spacing), j = -count/2 ... count/2.
 Network make_bunches(int count, double tuned, double spacing) {
   constexpr int kBunch = 24;
   constexpr int kHub = 20;
@@ -66,23 +66,23 @@ Network make_bunches(int count, double tuned, double spacing) {
   return network;
 }
 
-// A pivot within a bunch vanishes near the upper end of the band, and again near every shift that is tried instead, though no eigenvalue of
-// the whole is near: what a factorisation that pivots across fronts does not mind, and one that stays within them cannot pass.
+// A pivot within a bunch vanishes near the upper end of the band, and again near every other shift tried, though no eigenvalue of the whole
+// is near: pivoting across fronts handles this, pivoting within fronts cannot.
 TEST(Fallback, goes_to_mumps_where_pivoting_within_fronts_breaks_down) {
   constexpr double kTuned = 1000;
   const Network network = make_bunches(25, kTuned, 4e-8);
   const std::vector<double> all = test::calc_all_eigenvalues(network);
-  for (const double lambda : all) ASSERT_GT(std::abs(lambda / kTuned - 1), 1e-5) << "an eigenvalue of the whole";
+  for (const double lambda : all) ASSERT_GT(std::abs(lambda / kTuned - 1), 1e-5) << "an eigenvalue of the whole network";
   const test::System system = test::make_system(network);
 
   ldlt::Factor ours({system.problem.stiffness, system.problem.mass});
-  for (const double step : {-4e-7, -2e-7, 0.0, 2e-7, 4e-7})  // the five shifts that a count tries
-    EXPECT_FALSE(ours.factorise(kTuned * (1 + step))) << step << " of the way breaks nothing";
+  for (const double step : {-4e-7, -2e-7, 0.0, 2e-7, 4e-7})  // the five shifts tried by a count
+    EXPECT_FALSE(ours.factorise(kTuned * (1 + step))) << step << " relative to the shift: no breakdown";
   EXPECT_TRUE(ours.factorise(kTuned * (1 + 1e-5)));
 
   Options options;
   options.low_hz = to_hz(100);
-  options.high_hz = to_hz(kTuned * (1 - 1.4e-6));  // counts are taken a millionth above, and up to another millionth from there
+  options.high_hz = to_hz(kTuned * (1 - 1.4e-6));  // counts are taken a millionth above, and up to another millionth beyond
   const Modes modes = solve_modes(system.problem, options);
   const std::vector<double> expected = pick(all, options.low_hz, options.high_hz);
   EXPECT_GT(expected.size(), 10u);
@@ -90,7 +90,7 @@ TEST(Fallback, goes_to_mumps_where_pivoting_within_fronts_breaks_down) {
   EXPECT_NE(modes.factor.solver.find("MUMPS"), std::string::npos) << modes.factor.solver;
   EXPECT_NE(modes.proof.method.find("MUMPS"), std::string::npos) << modes.proof.method;
 
-  options.factorisation = Factorisation::kLdlt;  // who insists on ours hears of it
+  options.factorisation = Factorisation::kLdlt;  // explicit choice: error instead of fallback
   try {
     solve_modes(system.problem, options);
     ADD_FAILURE() << "solved";
@@ -101,11 +101,11 @@ TEST(Fallback, goes_to_mumps_where_pivoting_within_fronts_breaks_down) {
 
 constexpr int kNever = 0;
 
-// A checkpoint in memory, of solves on as many ranks as before; asks every solve to stop at its safe point number `stop_at`, from 1, or
+// A checkpoint in memory, for solves on the same number of ranks; requests a stop at safe point number `stop_at` of every solve, from 1, or
 // kNever.
 class MemoryCheckpoint {
  public:
-  /// What to hand to the next solve, which resumes from what the last one has saved.
+  /// Checkpoint for the next solve, which resumes from the last saved state.
   Checkpoint& begin(int stop_at) {
     asked_ = 0;
     rejected_.clear();
@@ -123,7 +123,7 @@ class MemoryCheckpoint {
       columns_ = std::move(copy);
       return true;
     };
-    // The solve may save before it has read all: what it began with stays as it was.
+    // The solve may save before it has read everything: the initial state is copied.
     checkpoint_.read = [from = columns_](std::int64_t first, const Columns& into) {
       for (int j = 0; j < into.count; ++j) std::ranges::copy(from.at(first + j), into.column(j));
     };
@@ -142,7 +142,7 @@ class MemoryCheckpoint {
   int asked_ = 0;
 };
 
-// The modes, or none where the solve was stopped.
+// The modes, or nullopt if the solve was stopped.
 std::optional<Modes> solve_until_stopped(const Problem& problem, Options options, Checkpoint& checkpoint) {
   options.checkpoint = &checkpoint;
   try {
@@ -152,7 +152,7 @@ std::optional<Modes> solve_until_stopped(const Problem& problem, Options options
   }
 }
 
-// The same bank: modes, proof, and whose pivots it rests on.
+// Same bank: modes, proof, and solver.
 void expect_same_modes(const Modes& modes, const Modes& expected) {
   ASSERT_EQ(modes.lambda.size(), expected.lambda.size());
   for (std::size_t j = 0; j < modes.lambda.size(); ++j) EXPECT_NEAR(modes.lambda[j] / expected.lambda[j], 1.0, 1e-12) << j;
@@ -180,9 +180,9 @@ void expect_same_modes(const Modes& modes, const Modes& expected) {
   }
 }
 
-// A count turns to MUMPS: the first one, at the upper end of the band, or the second, at the lower, after ours has counted once. Whether
-// a solve is stopped before or after that, resumes once or is stopped at every safe point: its modes and its proof are those of a solve
-// that was left alone, and once turned it does not try ours again.
+// A count switches to MUMPS: the first one, at the upper end of the band, or the second, at the lower end, after one count by our
+// factorisation. A solve stopped before or after that, once or at every safe point, gives the same modes and proof as an uninterrupted one,
+// and does not try our factorisation again after the switch.
 TEST(Fallback, resumes_from_a_checkpoint) {
   const Network block = make_block(6, 7, 11);
   const std::vector<double> all = test::calc_all_eigenvalues(block);
@@ -212,7 +212,7 @@ TEST(Fallback, resumes_from_a_checkpoint) {
       ASSERT_TRUE(modes.has_value());
       EXPECT_EQ(memory.why_rejected(), "");
       expect_same_modes(*modes, whole);
-      const int in_vain = is_upper || stop_at > 1 ? 5 : 0;  // The state has turned.
+      const int in_vain = is_upper || stop_at > 1 ? 5 : 0;  // the saved state has switched
       EXPECT_LT(modes->factor.factorisations, whole.factor.factorisations - in_vain);
     }
     EXPECT_TRUE(was_iterating);
@@ -225,7 +225,7 @@ TEST(Fallback, resumes_from_a_checkpoint) {
     ASSERT_TRUE(modes.has_value());
     expect_same_modes(*modes, whole);
 
-    // What is refused leaves nothing behind: the solve begins with our factorisation again, and turns again.
+    // A rejected state has no effect: the solve begins with our factorisation again, and switches again.
     MemoryCheckpoint damaged;
     EXPECT_FALSE(solve_until_stopped(system.problem, options, damaged.begin(3)).has_value());
     damaged.append("x");
@@ -237,37 +237,30 @@ TEST(Fallback, resumes_from_a_checkpoint) {
   }
 }
 
-// Runs of too few steps leave out what is far from their shift, and two of them in a row that find nothing end the search there. What is
-// missing between two counts is then sought with a shift between them, which the proof shows: it has a count more.
-TEST(Missing, modes_are_sought_between_two_counts) {
+// Runs with too few steps miss modes far from their shift, and two successive runs without new modes end the search there. The missing
+// modes are then searched with a shift between two counts, which adds a count to the proof.
+TEST(Missing, modes_are_searched_between_two_counts) {
   const Network block = make_block(4, 5, 8);
   const std::vector<double> all = test::calc_all_eigenvalues(block);
   const test::System system = test::make_system(block);
   Options options;
   options.low_hz = 1;
   options.high_hz = to_hz(0.5 * (all[60] + all[61]));
-  int size = 1;
-  MPI_Comm_size(PETSC_COMM_WORLD, &size);
-  for (const char* type : {"blocklanczos", "subspace"}) {
-    if (size > 1 && std::string(type) == "subspace") continue;  // slow where ranks share cores
-    check(PetscOptionsSetValue(nullptr, "-eps_type", type));
-    bool is_solved = false;
-    for (int steps = 8; steps < 40 && !is_solved; ++steps) {  // the fewest that suffice
-      check(PetscOptionsSetValue(nullptr, "-eps_max_it", std::to_string(steps).c_str()));
-      try {
-        const Modes modes = solve_modes(system.problem, options);
-        is_solved = true;
-        expect_eigenvalues(modes, pick(all, options.low_hz, options.high_hz));
-        EXPECT_GT(modes.proof.counts.size(), 3u) << type << ": the ends and the first shift were enough with " << steps << " steps";
-      } catch (const SolveError&) {
-      }
+  bool is_solved = false;
+  for (options.max_steps = 8; options.max_steps < 40 && !is_solved; ++options.max_steps) {  // the fewest sufficient steps
+    try {
+      const Modes modes = solve_modes(system.problem, options);
+      is_solved = true;
+      expect_eigenvalues(modes, pick(all, options.low_hz, options.high_hz));
+      EXPECT_GT(modes.proof.counts.size(), 3u) << "the counts at the ends and the first shift sufficed with " << options.max_steps
+                                               << " steps";
+    } catch (const SolveError&) {
     }
-    EXPECT_TRUE(is_solved) << type;
   }
-  for (const char* name : {"-eps_type", "-eps_max_it"}) check(PetscOptionsClearValue(nullptr, name));
+  EXPECT_TRUE(is_solved);
 }
 
-// No two eigenvalues of the irregular block are equal, so that shapes can be compared one by one.
+// The irregular block has distinct eigenvalues, so shapes can be compared individually.
 TEST(Slices, on_all_ranks_give_the_modes_of_one) {
   const Network block = make_block(6, 7, 25);
   const test::System alone = test::make_system(block, PETSC_COMM_SELF);

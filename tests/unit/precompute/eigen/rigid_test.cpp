@@ -11,7 +11,7 @@
 namespace carillon::eigen {
 namespace {
 
-// Rigid modes must be M-orthonormal and free of force; returns how many there are.
+// Checks that rigid modes are M-orthonormal and free of force; returns their number.
 std::size_t count_and_check(const test::System& system) {
   std::vector<std::int64_t> per_component;
   const auto modes = make_rigid_modes({system.stiffness, system.mass}, system.problem.nodes, per_component);

@@ -147,7 +147,7 @@ Network make_block(int nx, int ny, int nz, Vec3 origin, double spacing) {
           for (int dy = -1; dy <= 1; ++dy) {
             for (int dz = 0; dz <= 1; ++dz) {
               const int steps = std::abs(dx) + std::abs(dy) + dz;
-              const bool is_half = dz > 0 || dy > 0 || (dy == 0 && dx > 0);  // Each spring once.
+              const bool is_half = dz > 0 || dy > 0 || (dy == 0 && dx > 0);  // each spring once
               if (steps < 1 || steps > 2 || !is_half) continue;
               if (x + dx < 0 || x + dx >= nx || y + dy < 0 || y + dy >= ny || z + dz >= nz) continue;
               network.springs.push_back({index(x, y, z), index(x + dx, y + dy, z + dz), 1e6 * (steps == 1 ? 1.0 : 0.5), false});

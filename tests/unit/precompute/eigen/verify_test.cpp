@@ -1,4 +1,4 @@
-// Counts against modes, without a solve.
+// Comparison of counts and modes, without a solve.
 #include <gtest/gtest.h>
 
 #include <limits>
@@ -15,7 +15,7 @@ const std::vector<double> kModes{4.0, 1.0, 2.0, 2.0, 3.0};
 
 double keep(double lambda) { return lambda; }
 
-TEST(Verify, accepts_counts_that_the_modes_meet) {
+TEST(Verify, accepts_counts_that_match_the_modes) {
   const std::vector<Inertia> counts{{4.5, 11}, {0.5, 6}, {2.5, 9}};  // in any order; six lie below
   EXPECT_NO_THROW(verify(counts, kModes, 5, keep));
   EXPECT_EQ(count_found(kModes, 0.5, 2.5), 3);

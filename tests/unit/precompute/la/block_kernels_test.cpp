@@ -1,4 +1,4 @@
-// Tall blocks of columns against plain loops.
+// Products of tall column blocks against plain loops.
 #include "precompute/la/block_kernels.hpp"
 
 #include <gtest/gtest.h>
@@ -56,7 +56,7 @@ TEST(BlockKernels, agree_with_plain_loops_at_odd_sizes) {
   }
 }
 
-/// (rows, columns), numbers that nothing else has, and the columns of it.
+/// (rows, columns) with distinct numbers.
 struct Block {
   Block(int rows, int columns, double seed) : values(rows + 3, columns), rows_(rows) {
     for (Eigen::Index i = 0; i < values.size(); ++i) values.data()[i] = std::sin(seed * static_cast<double>(i + 1));
@@ -68,7 +68,7 @@ struct Block {
   int rows_;
 };
 
-// Products of several passes in one, against Eigen's.
+// Fused products against products of Eigen.
 TEST(BlockKernels, agree_in_one_pass_with_the_products_one_after_the_other) {
   for (const int rows : {0, 1, 25, 2047, 2053, 4100}) {
     for (const int wide : {0, 1, 6, 13}) {

@@ -1,4 +1,4 @@
-// Dense decompositions against their definitions, and a matrix whose rank and singular values are known.
+// Dense decompositions against their definitions, and a matrix of known rank and singular values.
 #include "precompute/la/decompositions.hpp"
 
 #include <gtest/gtest.h>

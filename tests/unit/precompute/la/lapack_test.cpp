@@ -1,4 +1,4 @@
-// LAPACK's wrappers against closed forms: a chain of springs and masses, whose eigenvalues are known.
+// LAPACK wrappers against closed forms: a chain of springs and masses with known eigenvalues.
 #include "precompute/la/lapack.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// The rows and products of a matrix of 3x3 node blocks over the ranks, against PETSc's own.
+// Rows and products of a distributed matrix of 3x3 node blocks, against PETSc.
 #include "precompute/la/node_matrix.hpp"
 
 #include <gtest/gtest.h>
@@ -18,8 +18,8 @@ using petsc::check;
 
 constexpr PetscInt kNodes = 37;
 
-// Symmetric. Every node is linked to those next to it and to the sixth on both sides, so that each rank needs nodes of others.
-// is_mass: one number for each pair of nodes on the diagonal of its block.
+// Symmetric. Every node is linked to its neighbours and to the sixth node on both sides, so that each rank needs nodes of others. is_mass:
+// one number per pair of nodes on the diagonal of its block.
 petsc::MatHandle make_matrix(bool is_mass, PetscInt nodes = kNodes) {
   const comm::Communicator comm(PETSC_COMM_WORLD);
   const PetscInt own = nodes / comm.size() + (comm.rank() < nodes % comm.size() ? 1 : 0);
@@ -73,7 +73,7 @@ TEST(NodeMatrix, multiplies_as_petsc_does) {
   }
 }
 
-// Every entry is visited once: as many, and with the same sums, as PETSc has over all ranks.
+// Every entry is visited once: count and sums equal those of PETSc over all ranks.
 TEST(NodeRows, visits_every_entry_once) {
   for (const bool is_mass : {false, true}) {
     const petsc::MatHandle matrix = make_matrix(is_mass);

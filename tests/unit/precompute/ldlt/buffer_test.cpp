@@ -1,4 +1,4 @@
-// Large buffers: what is kept for later ones, and what is zero.
+// Large buffers: pages kept for reuse, and zero-initialisation.
 #include "precompute/ldlt/buffer.hpp"
 
 #include <gtest/gtest.h>
@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::int64_t kMillion = 1 << 20;  // numbers: 8 MB
 
-/// Begins with no pages that wait.
+/// Starts without kept pages.
 class Buffers : public testing::Test {
  protected:
   void SetUp() override { BufferReuse::give_back_waiting(); }
@@ -40,18 +40,18 @@ TEST_F(Buffers, serves_smaller_ones_piece_by_piece_while_reuse_lives) {
   EXPECT_EQ(second.data(), begin + kMillion);
   EXPECT_EQ(first.data()[0], 7.0) << "not cleared";
   EXPECT_TRUE(std::all_of(second.data(), second.data() + second.size(), [](double x) { return x == 0; }));
-  Buffer third(2 * kMillion);  // more than is left, which goes back
+  Buffer third(2 * kMillion);  // larger than the rest, which is returned
   EXPECT_TRUE(std::all_of(third.data(), third.data() + third.size(), [](double x) { return x == 0; })) << "not fresh";
 }
 
-/// Bytes of memory that the process has mapped.
+/// Bytes mapped by the process.
 std::int64_t find_mapped() {
   std::int64_t pages = 0;
   std::ifstream("/proc/self/statm") >> pages;
   return pages * sysconf(_SC_PAGESIZE);
 }
 
-TEST_F(Buffers, joins_pieces_that_are_given_back_in_any_order) {
+TEST_F(Buffers, joins_pieces_returned_in_any_order) {
   const BufferReuse reuse;
   double* begin = nullptr;
   {
@@ -72,8 +72,8 @@ TEST_F(Buffers, joins_pieces_that_are_given_back_in_any_order) {
   }
 }
 
-TEST_F(Buffers, maps_no_more_than_was_in_use_at_most_and_gives_all_of_it_back) {
-  constexpr std::int64_t kSlack = std::int64_t{8} << 20;  // of the heap
+TEST_F(Buffers, maps_no_more_than_the_peak_and_returns_it) {
+  constexpr std::int64_t kSlack = std::int64_t{8} << 20;  // heap
   const std::int64_t before = find_mapped();
   {
     const BufferReuse reuse;
@@ -88,7 +88,7 @@ TEST_F(Buffers, maps_no_more_than_was_in_use_at_most_and_gives_all_of_it_back) {
       EXPECT_LE(find_mapped() - before, most + kSlack) << round;
       a = Buffer();
       b = Buffer();
-      const Buffer c = Buffer::make_zero(40 * kMillion);  // neither of the two had enough
+      const Buffer c = Buffer::make_zero(40 * kMillion);  // neither of the two was sufficient
       EXPECT_EQ(std::count(c.data(), c.data() + c.size(), 0.0), c.size());
       std::fill_n(c.data(), c.size(), 3.0);
       EXPECT_LE(find_mapped() - before, most + kSlack) << round;
@@ -98,7 +98,7 @@ TEST_F(Buffers, maps_no_more_than_was_in_use_at_most_and_gives_all_of_it_back) {
   EXPECT_NEAR(static_cast<double>(find_mapped() - before), 0, kSlack);
 }
 
-TEST_F(Buffers, keeps_pages_for_the_next_reuse_until_they_are_given_back) {
+TEST_F(Buffers, keeps_pages_for_the_next_reuse_until_returned) {
   double* begin = nullptr;
   {
     const BufferReuse reuse;
@@ -112,7 +112,7 @@ TEST_F(Buffers, keeps_pages_for_the_next_reuse_until_they_are_given_back) {
     EXPECT_EQ(early.data(), begin) << "before the next reuse begins";
     EXPECT_EQ(early.data()[5], 7.0) << "fresh pages";
   }
-  EXPECT_LE(find_mapped(), waiting - 8 * kMillion) << "what is freed outside of a reuse does not wait";
+  EXPECT_LE(find_mapped(), waiting - 8 * kMillion) << "pages freed outside of a reuse are not kept";
   BufferReuse::give_back_waiting();
   EXPECT_LE(find_mapped(), waiting - 8 * 4 * kMillion);
 }
@@ -132,32 +132,32 @@ TEST_F(Buffers, lends_its_tail_and_gets_it_back) {
       const Buffer first(6 * kMillion);
       EXPECT_EQ(first.data(), room.data() + 8 * kMillion);
       std::fill_n(first.data(), first.size(), 3.0);
-      const Buffer second(12 * kMillion, Pages::kAtOnce);  // more than waits: what does loses its memory
+      const Buffer second(12 * kMillion, Pages::kAtOnce);  // larger than the kept pages, which are returned
       EXPECT_TRUE(second.data() + second.size() <= room.data() || second.data() >= room.data() + room.size());
       EXPECT_LE(base::find_memory().resident, resident + 8 * 2 * kMillion + kSlack) << "6 + 12 are in use where 16 were lent";
     }
     BufferReuse::give_back_waiting();
-    EXPECT_LE(base::find_memory().resident, resident + kSlack) << "more than the buffer's own";
+    EXPECT_LE(base::find_memory().resident, resident + kSlack) << "more than the buffer itself";
     room.populate();
-    EXPECT_GE(base::find_memory().resident, resident - kSlack) << "the tail is its own again";
+    EXPECT_GE(base::find_memory().resident, resident - kSlack) << "the tail was not returned";
     room.give_back_tail(8 * kMillion);
     EXPECT_LE(base::find_memory().resident, resident - 8 * 16 * kMillion + kSlack);
     room.populate();
     EXPECT_GE(base::find_memory().resident, resident - kSlack);
     std::fill_n(room.data() + 8 * kMillion, 16 * kMillion, 5.0);
-    EXPECT_EQ(std::count(room.data(), room.data() + 8 * kMillion, 7.0), 8 * kMillion) << "what is not lent stays";
+    EXPECT_EQ(std::count(room.data(), room.data() + 8 * kMillion, 7.0), 8 * kMillion) << "pages that are not lent changed";
     EXPECT_EQ(std::count(room.data() + 8 * kMillion, room.data() + room.size(), 5.0), 16 * kMillion);
   }
-  EXPECT_NEAR(static_cast<double>(find_mapped() - before), 0, kSlack) << "all of it goes with the buffer";
+  EXPECT_NEAR(static_cast<double>(find_mapped() - before), 0, kSlack) << "memory remains after the buffer";
 }
 
-TEST_F(Buffers, stays_whole_when_one_other_takes_all_that_is_lent) {
+TEST_F(Buffers, is_intact_after_lending_all_to_one_buffer) {
   constexpr std::int64_t kKept = 8 * kMillion;
   const Buffer room(24 * kMillion, Pages::kAtOnce);
   {
     const BufferReuse reuse;
     room.lend_tail(kKept);
-    const Buffer other(16 * kMillion);  // to the page what is lent
+    const Buffer other(16 * kMillion);  // exactly the lent pages
     ASSERT_EQ(other.data(), room.data() + kKept);
   }
   room.populate();

@@ -1,4 +1,4 @@
-// L D L^T against Eigen's dense solvers, on any number of ranks. One class on the same few pencils; longer than most files.
+// L D L^T against dense solvers of Eigen, on any number of ranks.
 #include "precompute/ldlt/factor.hpp"
 
 #include <gtest/gtest.h>
@@ -28,7 +28,7 @@ int collectives = 0;  // calls over all ranks of a communicator
 
 }  // namespace
 
-// MPI's profiling interface: the library's calls come here first.
+// Profiling interface of MPI: intercepts the calls of the library.
 extern "C" {
 int(MPI_Allreduce)(const void* from, void* to, int count, MPI_Datatype type, MPI_Op op, MPI_Comm comm) {
   ++collectives;
@@ -61,12 +61,12 @@ using test::make_random;
 using test::MassKind;
 using test::Pencil;
 
-// A random block of three rows may be nearly singular, and pivots are not sought outside the blocks.
+// A random 3x3 block may be nearly singular, and pivots are sought within blocks only.
 constexpr double kRandomTolerance = 1e-10;
-// Of 600 lattices and shifts the factorisation alone has 1e-15 at the median, 99 % lie below 1.3e-13, and the worst had 1.4e-12: it is
-// refined, and what is measured then is the refined solve.
+// Of 600 lattices and shifts, the factorisation alone has a median of 1e-15, 99 % below 1.3e-13, and at worst 1.4e-12: then solves are
+// refined, and the refined solve is measured.
 constexpr double kLatticeTolerance = 1e-12;
-constexpr double kSolveTolerance = 1e-12;  // Solves are refined where the factorisation is bad.
+constexpr double kSolveTolerance = 1e-12;  // bad factorisations have refined solves
 
 int find_ranks() {
   int ranks = 1;
@@ -80,14 +80,14 @@ Eigen::VectorXd calc_eigenvalues(const Pencil& pencil) {
 
 std::int64_t count_below(const Eigen::VectorXd& lambda, double sigma) { return (lambda.array() < sigma).count(); }
 
-/// Solves for random right-hand sides and returns max|B - A X| / (||A|| max|X| + max|B|), all of it dense on every rank.
+/// Solves for random right-hand sides and returns max|B - A X| / (||A|| max|X| + max|B|), dense on every rank.
 double solve_and_measure(Factor& factor, const Pencil& pencil, double sigma, int columns) {
   const Eigen::Index n = pencil.dense_k.rows();
   std::mt19937 random(7);
   std::normal_distribution<double> value;
   Eigen::MatrixXd b(n, columns);
   for (double& entry : b.reshaped()) entry = value(random);
-  const int stride = pencil.rows + 5;  // columns need not be packed
+  const int stride = pencil.rows + 5;  // columns need not be contiguous
   std::vector<double> x(static_cast<std::size_t>(stride) * columns, 99.0);
   for (int c = 0; c < columns; ++c)
     for (PetscInt i = 0; i < pencil.rows; ++i) x[static_cast<std::size_t>(c) * stride + i] = b(pencil.first_row + i, c);
@@ -104,7 +104,7 @@ double solve_and_measure(Factor& factor, const Pencil& pencil, double sigma, int
          (a.cwiseAbs().rowwise().sum().maxCoeff() * solution.cwiseAbs().maxCoeff() + b.cwiseAbs().maxCoeff());
 }
 
-/// Shifts between eigenvalues all over the spectrum.
+/// Shifts between eigenvalues across the spectrum.
 std::vector<double> pick_shifts(const Eigen::VectorXd& lambda, int count) {
   std::vector<double> shifts{-0.3};
   for (int i = 1; i < count; ++i) {
@@ -157,7 +157,7 @@ TEST(factor, counts_and_solves_as_dense_solvers_do_when_the_mass_has_links_that_
   expect_counts_and_solves(pencil, 6);
 }
 
-// D K D and D M D have the eigenvalues of K and M, and here stiffness over sixteen decades.
+// D K D and D M D have the eigenvalues of K and M; here stiffness spans sixteen decades.
 TEST(factor, counts_and_solves_at_every_shift_where_stiffness_spans_many_decades) {
   Pencil pencil = make_lattice(6, 5, 4, 1, MassKind::kConsistent, 15);
   const Eigen::MatrixXd even_k = pencil.dense_k, even_m = pencil.dense_m;
@@ -193,8 +193,8 @@ TEST(factor, solves_any_number_of_columns_alike) {
     EXPECT_LT(solve_and_measure(factor, pencil, 1.7, columns), 1e-13) << columns;
 }
 
-// Each collective would make all ranks wait for the slowest. A factorisation has three: the agreement that there is room, the sum of the
-// inertia with which it ends, and the agreement that memory sufficed; the others here belong to the measure of its error.
+// A collective makes all ranks wait for the slowest. A factorisation has three: agreement on memory, the sum of the inertia at its end, and
+// agreement that memory sufficed; others counted here belong to the measurement of its error.
 TEST(factor, solves_without_a_collective) {
   const Pencil pencil = make_lattice(12, 6, 4, 1, MassKind::kConsistent, 16);
   Factor factor({pencil.k, pencil.m});
@@ -206,7 +206,7 @@ TEST(factor, solves_without_a_collective) {
   ASSERT_TRUE(factor.factorise(1.4));
   const int first = std::exchange(collectives, 0);
   ASSERT_TRUE(factor.factorise(1.5));
-  EXPECT_EQ(collectives, first) << "as many for every shift, whatever the fronts";
+  EXPECT_EQ(collectives, first) << "the same number for every shift";
   EXPECT_LE(first, 16);
 }
 
@@ -227,7 +227,7 @@ TEST(factor, works_when_most_ranks_have_no_node) {
 }
 
 TEST(factor, works_when_neighbours_lie_on_all_ranks) {
-  // Nodes dealt out so that nearly every node touches another rank: hardly any interior is left.
+  // Nodes distributed so that nearly every node has a neighbour on another rank: almost no interior.
   Pencil pencil = make_random(60, 12, 21);
   std::vector<int> nodes_of_rank(find_ranks(), 1);
   nodes_of_rank.back() = 60 - (find_ranks() - 1);
@@ -296,7 +296,7 @@ TEST(factor, gives_the_same_bits_twice_and_in_place) {
   }
 }
 
-TEST(factor, says_before_the_work_what_it_will_take) {
+TEST(factor, predicts_its_cost) {
   const Pencil pencil = make_lattice(8, 8, 4, 1, MassKind::kDiagonal, 9);
   const Factor factor({pencil.k, pencil.m});
   const Analysis& analysis = factor.get_analysis();
@@ -338,7 +338,7 @@ TEST(factor, names_the_need_when_one_rank_runs_out_of_memory) {
   long pages = 0;
   std::ifstream("/proc/self/statm") >> pages;
   const rlimit tight{static_cast<rlim_t>(pages) * static_cast<rlim_t>(sysconf(_SC_PAGESIZE)) + 64 * 1024, before.rlim_max};
-  // What earlier tests have freed is still this process's: it is taken up first, all but small pieces.
+  // Memory freed by earlier tests still belongs to the process: allocate it first, except small blocks.
   std::vector<void*> hoard;
   hoard.reserve(100'000);
   if (rank == find_ranks() - 1) {
@@ -379,7 +379,7 @@ Eigen::MatrixXd make_numbers(int rows, int columns, std::mt19937& random) {
   return Eigen::MatrixXd::NullaryExpr(rows, columns, [&] { return value(random); });
 }
 
-/// Tiles as kernels.hpp defines them; `is_triangle`: each only as far as its last row reaches.
+/// Tiles as defined in kernels.hpp; `is_triangle`: each only up to the diagonal of its last row.
 std::vector<double> make_tiles(const Eigen::MatrixXd& a, bool is_triangle) {
   std::vector<double> tiles;
   for (int i = 0; i < a.rows(); i += kTileRows) {
@@ -387,7 +387,7 @@ std::vector<double> make_tiles(const Eigen::MatrixXd& a, bool is_triangle) {
     for (int k = 0; k < (is_triangle ? behind : a.cols()); ++k)
       for (int r = i; r < behind; ++r) tiles.push_back(a(r, k));
   }
-  tiles.resize(tiles.size() + 2048);  // memory is called ahead
+  tiles.resize(tiles.size() + 2048);  // prefetched beyond the end
   return tiles;
 }
 
@@ -410,7 +410,7 @@ TEST(kernels, of_every_instruction_set_multiply_tiles_as_the_definition_says) {
           const int width = 8 * vectors;
           const Eigen::MatrixXd a = make_numbers(m, n, random);
           const std::vector<double> tiles = make_tiles(a, false);
-          // Node i of the block has rows 3 nodes[i] and on of X; the others must stay as they are.
+          // Node i of the block refers to rows 3 nodes[i] ... of X; the others must not change.
           std::vector<int> nodes(m / 3), row_of(m);
           for (int i = 0; i < m / 3; ++i) nodes[i] = (5 * i + 3) % 17;
           for (int i = 0; i < m; ++i) row_of[i] = 3 * nodes[i / 3] + i % 3;
@@ -511,7 +511,7 @@ TEST(factor, refuses_rows_that_are_not_whole_nodes) {
 }
 
 TEST(Factor, keeps_the_memory_of_a_factorisation_for_the_next_and_gives_it_back_at_the_first_solve) {
-  if (find_ranks() > 1) GTEST_SKIP() << "MPI's own memory changes as much";
+  if (find_ranks() > 1) GTEST_SKIP() << "memory of MPI changes by the same amount";
   const Pencil lattice = make_lattice(11, 11, 11, 1, MassKind::kDiagonal, 5);
   const la::Pencil pencil{lattice.k, lattice.m};
   const auto find_resident = [] { return static_cast<double>(base::find_memory().resident); };
@@ -529,14 +529,14 @@ TEST(Factor, keeps_the_memory_of_a_factorisation_for_the_next_and_gives_it_back_
       ASSERT_TRUE(factor.factorise(-1.0 - round));
       kept = find_resident();
       ASSERT_TRUE(factor.factorise(-1.5 - round));
-      EXPECT_NEAR(find_resident(), kept, kSlack) << "another factorisation takes the same pages";
+      EXPECT_NEAR(find_resident(), kept, kSlack) << "another factorisation uses the same pages";
       solve();
       EXPECT_NEAR(find_resident(), solved, kSlack) << "round " << round;
     }
-    EXPECT_GT(kept - solved, kSlack) << "nothing was kept that could be given back";
+    EXPECT_GT(kept - solved, kSlack) << "no memory was kept";
     ASSERT_TRUE(factor.factorise(-1.0));
   }
-  EXPECT_LT(find_resident() - before, kept - before) << "what waits goes with the factor";
+  EXPECT_LT(find_resident() - before, kept - before) << "kept memory must be freed with the factor";
 }
 
 }  // namespace

@@ -15,7 +15,7 @@ using partition::Graph;
 
 double sum(const std::vector<double>& values) { return std::accumulate(values.begin(), values.end(), 0.0); }
 
-/// A block of n^3 nodes, each a neighbour of the 26 around it, in the order of elimination.
+/// A block of n^3 nodes with 26 neighbours each, in elimination order.
 std::vector<FrontCost> make_block(std::int32_t n, int parts) {
   Graph graph;
   graph.offsets.push_back(0);
@@ -81,7 +81,7 @@ TEST(Mapping, a_chain_of_fronts_is_shared_by_two_ranks) {
   EXPECT_LE(counts.path_operations, counts.gang_operations * (1 + 1e-12));
 }
 
-TEST(Mapping, what_two_ranks_send_to_a_root_that_they_share_is_half_of_each_update_matrix) {
+TEST(Mapping, two_ranks_send_half_of_each_contribution_block_to_a_shared_root) {
   Forest forest = make_leaves(3);
   forest.supernodes[2].width = 4;  // one panel, so nothing is sent inside the root
   for (const int leaf : {0, 1}) {
@@ -95,7 +95,7 @@ TEST(Mapping, what_two_ranks_send_to_a_root_that_they_share_is_half_of_each_upda
   EXPECT_NEAR(sum(counts.bytes), 2 * 0.5 * 8 * (12 * 13 / 2), 1e-9);
 }
 
-/// Operations of the fronts that each rank has alone.
+/// Operations of the fronts owned by each rank alone.
 std::vector<double> list_own(const std::vector<FrontCost>& fronts, const Mapping& mapping) {
   std::vector<double> own(mapping.ranks(), 0.0);
   for (std::size_t s = 0; s < fronts.size(); ++s)
@@ -103,8 +103,8 @@ std::vector<double> list_own(const std::vector<FrontCost>& fronts, const Mapping
   return own;
 }
 
-TEST(Mapping, subtrees_are_exchanged_until_two_ranks_have_the_same_to_do_alone) {
-  // Below a root that both share: 6 + 5 and 4 + 3 + 2, which an exchange of 5 for 4 levels to 10 and 10.
+TEST(Mapping, subtrees_are_exchanged_until_two_ranks_are_level) {
+  // Below a root shared by both ranks: 6 + 5 and 4 + 3 + 2; exchanging 5 for 4 levels to 10 and 10.
   std::vector<FrontCost> fronts;
   for (const double operations : {6.0, 5.0, 4.0, 3.0, 2.0}) fronts.push_back({5, 10, 10, operations, operations});
   fronts.push_back({-1, 100, 0, 20, 20});
@@ -117,8 +117,8 @@ TEST(Mapping, subtrees_are_exchanged_until_two_ranks_have_the_same_to_do_alone) 
   EXPECT_EQ(mapping.owner(5), -1);
 }
 
-TEST(Mapping, a_subtree_that_is_too_large_to_be_given_away_is_shared_at_its_root) {
-  // 7 of the 12 below the root of all are one subtree of three fronts: 3 + 3 and 1 above them.
+TEST(Mapping, a_subtree_too_large_to_move_is_shared_at_its_root) {
+  // 7 of the 12 below the root are one subtree of three fronts: 3 + 3 and 1 above them.
   std::vector<FrontCost> fronts{{2, 10, 10, 3, 3}, {2, 10, 10, 3, 3}, {4, 30, 10, 1, 1}, {4, 10, 10, 5, 5}, {-1, 100, 0, 20, 20}};
   Mapping mapping(fronts, 2, 1);
   for (const int s : {0, 1, 2}) mapping.set_owner(s, 0);
@@ -127,16 +127,16 @@ TEST(Mapping, a_subtree_that_is_too_large_to_be_given_away_is_shared_at_its_root
   level_subtrees(fronts, mapping);
   EXPECT_EQ(mapping.owner(2), -1);
   EXPECT_EQ(mapping.list_shares(2).size(), 2U);
-  EXPECT_EQ(list_own(fronts, mapping), (std::vector<double>{6, 5})) << "no exchange brings 6 and 5 closer";
+  EXPECT_EQ(list_own(fronts, mapping), (std::vector<double>{6, 5})) << "no exchange levels 6 and 5";
 }
 
-TEST(Mapping, what_cannot_be_levelled_stays) {
+TEST(Mapping, keeps_what_cannot_be_levelled) {
   for (const int ranks : {1, 2, 3}) {
     std::vector<FrontCost> fronts{{-1, 10, 0, 5, 5}};  // one front
     Mapping one(fronts, ranks, 1);
     level_subtrees(fronts, one);
     EXPECT_EQ(count_mapping(fronts, one).path_operations, count_mapping(fronts, Mapping(fronts, ranks, 1)).path_operations);
-    const std::vector<FrontCost> leaves = list_costs(make_leaves(7));  // none has a front above it
+    const std::vector<FrontCost> leaves = list_costs(make_leaves(7));  // no front has a parent
     Mapping many(leaves, ranks, 1);
     level_subtrees(leaves, many);
     EXPECT_EQ(list_own(leaves, many), list_own(leaves, Mapping(leaves, ranks, 1)));
@@ -159,7 +159,7 @@ TEST(Mapping, ranks_of_a_front_are_among_those_of_the_front_above) {
   }
 }
 
-TEST(Mapping, what_is_shared_out_is_what_there_is) {
+TEST(Mapping, shares_add_up_to_the_total) {
   const std::vector<FrontCost> forest = make_block(15, 16);
   for (const int ranks : {1, 2, 3, 7, 16, 64, 200}) {
     const Mapping mapping = choose_mapping(forest, ranks);
@@ -191,8 +191,8 @@ TEST(Mapping, path_and_memory_of_a_block_stay_near_an_equal_share) {
     const std::vector<FrontCost> forest = make_block(24, ranks);
     const MappingCounts counts = count_mapping(forest, choose_mapping(forest, ranks));
     EXPECT_LE(counts.path_ratio(), ranks <= 16 ? 1.5 : 2.5) << ranks;
-    EXPECT_LE(counts.fullest_ratio(), ranks <= 32 ? 1.3 : 1.35) << ranks << " ranks; on 64 each has but 216 nodes, and tiles are coarse";
-    EXPECT_LE(counts.most_planned_fronts, 40 * std::log2(ranks)) << "a rank plans its way to the root, not the whole tree";
+    EXPECT_LE(counts.fullest_ratio(), ranks <= 32 ? 1.3 : 1.35) << ranks << " ranks; on 64 each has only 216 nodes, and tiles are coarse";
+    EXPECT_LE(counts.most_planned_fronts, 40 * std::log2(ranks)) << "a rank plans its path to the root, not the whole tree";
   }
 }
 
@@ -203,7 +203,7 @@ TEST(Mapping, ranks_end_the_fronts_that_they_share_together) {
     const MappingCounts proportional = count_mapping(forest, Mapping(forest, ranks, 1));
     EXPECT_LE(chosen.path_operations, proportional.path_operations);
     EXPECT_LE(chosen.path_ratio(), ranks == 2 ? 1.02 : 1.25) << ranks << " ranks";
-    EXPECT_LE(chosen.gang_operations, proportional.gang_operations) << ranks << " ranks: who is free early waits less too";
+    EXPECT_LE(chosen.gang_operations, proportional.gang_operations) << ranks << " ranks: waiting times are lower too";
   }
 }
 

@@ -1,4 +1,4 @@
-// Rows that lie where they are eliminated, on any number of ranks.
+// Rows located where they are eliminated, on any number of ranks.
 #include "precompute/ldlt/mesh_order.hpp"
 
 #include <gtest/gtest.h>
@@ -23,7 +23,7 @@ using comm::Communicator;
 using comm::IndexPartition;
 using test::Pencil;
 
-/// A lattice whose springs are elements of two nodes, dealt to the ranks in turn.
+/// A lattice whose springs are elements of two nodes, distributed over the ranks in turn.
 class OrderedLattice {
  public:
   OrderedLattice(int nx, int ny, int nz, int copies)
@@ -80,7 +80,7 @@ class OrderedLattice {
   MeshOrder order_;
 };
 
-TEST(MeshOrder, only_rows_of_shared_fronts_travel) {
+TEST(MeshOrder, only_rows_of_shared_fronts_are_sent) {
   const OrderedLattice lattice(12, 9, 4, 1);
   const Plan plan = make_plan(lattice.pencil().k, lattice.pencil().m, &lattice.order());
   std::int64_t travel = 0;
@@ -88,10 +88,10 @@ TEST(MeshOrder, only_rows_of_shared_fronts_travel) {
   EXPECT_LE(lattice.comm().sum(travel), plan.analysis.shared_nodes);
   std::int64_t blocks = 0;
   for (const ReceivedBlocks& received : plan.received) blocks += static_cast<std::int64_t>(received.columns.size());
-  EXPECT_EQ(lattice.comm().sum(blocks), 0) << "columns of own fronts come from no other rank";
+  EXPECT_EQ(lattice.comm().sum(blocks), 0) << "columns of own fronts were received";
 }
 
-TEST(MeshOrder, panels_and_the_columns_that_they_are_made_of_fill_the_memory_that_is_planned_for_them) {
+TEST(MeshOrder, panels_and_columns_fill_the_planned_memory) {
   const OrderedLattice lattice(12, 9, 7, 1);
   const Plan plan = make_plan(lattice.pencil().k, lattice.pencil().m, &lattice.order());
   const Numbers numbers = make_numbers(plan);
@@ -116,7 +116,7 @@ TEST(MeshOrder, panels_and_the_columns_that_they_are_made_of_fill_the_memory_tha
       EXPECT_EQ(panel.tiles, at);
       at += 3 * n * (front.own_nodes() - front.row_begin[k + 1]);
       column += 3 * n * (front.own_nodes() - front.row_begin[k]);
-      EXPECT_LE(at, column) << "panel " << k << " lies where the next columns are in work";
+      EXPECT_LE(at, column) << "panel " << k << " overlaps the columns of the next panel";
     }
     at = column;
   }

@@ -1,4 +1,4 @@
-// The order of elimination and its fronts against elimination by sets, on any number of ranks.
+// Elimination order and fronts against elimination by sets, on any number of ranks.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -17,7 +17,7 @@ namespace {
 using comm::Communicator;
 using comm::IndexPartition;
 
-/// A block of nx x ny x nz nodes, `copies` of them apart, each node a neighbour of the 26 around it.
+/// `copies` separate blocks of nx x ny x nz nodes with 26 neighbours each.
 std::vector<Ints> make_block(std::int32_t nx, std::int32_t ny, std::int32_t nz, std::int32_t copies) {
   std::vector<Ints> links;
   for (std::int32_t copy = 0; copy < copies; ++copy)
@@ -33,7 +33,7 @@ std::vector<Ints> make_block(std::int32_t nx, std::int32_t ny, std::int32_t nz, 
   return links;
 }
 
-/// A front with everything about it, on every rank.
+/// All data of a front, on every rank.
 struct Known {
   std::int32_t first = 0;
   std::int32_t width = 0;
@@ -43,7 +43,7 @@ struct Known {
 
 class Case {
  public:
-  /// Rows lie on the ranks in runs; the first rank has none if `is_first_empty`.
+  /// Rows are contiguous per rank; the first rank has none if `is_first_empty`.
   Case(const std::vector<Ints>& graph, std::int32_t largest_gathered, bool is_first_empty = false)
       : graph_(graph), comm_(PETSC_COMM_WORLD) {
     const auto total = static_cast<std::int64_t>(graph.size());
@@ -68,7 +68,7 @@ class Case {
     take(eliminate_on_paper(comm_, nodes, IndexPartition(comm_, nodes.own_nodes), largest_gathered), nodes.own_nodes);
   }
 
-  /// Rank 0 has all elements; graph: the links that they make.
+  /// Rank 0 has all elements; graph: their links.
   Case(const std::vector<Ints>& graph, const Ints& elements, int width) : graph_(graph), comm_(PETSC_COMM_WORLD) {
     const auto nodes = comm_.is_root() ? static_cast<std::int32_t>(graph.size()) : 0;
     take(eliminate_elements(comm_, comm_.is_root() ? elements : Ints(), width, nodes), nodes);
@@ -80,7 +80,7 @@ class Case {
   void expect_every_node_once() const {
     Ints sorted = position_;
     std::sort(sorted.begin(), sorted.end());
-    for (std::size_t v = 0; v < sorted.size(); ++v) ASSERT_EQ(sorted[v], static_cast<std::int32_t>(v)) << "positions are no permutation";
+    for (std::size_t v = 0; v < sorted.size(); ++v) ASSERT_EQ(sorted[v], static_cast<std::int32_t>(v)) << "positions are not a permutation";
     ASSERT_EQ(nodes_of_fronts_.size(), graph_.size()) << "each node is a pivot of one front";
     for (std::size_t k = 0; k < nodes_of_fronts_.size(); ++k)
       EXPECT_EQ(position_[nodes_of_fronts_[k]], places_of_nodes_[k]) << "holder and owner disagree";
@@ -105,12 +105,12 @@ class Case {
           ASSERT_TRUE(row < front.first + front.width || std::binary_search(front.rows.begin(), front.rows.end(), row))
               << "row " << row << " of pivot " << p << " is missing";
       const std::set<std::int32_t>& last = behind[front.first + front.width - 1];
-      EXPECT_EQ(front.rows, Ints(last.begin(), last.end())) << "rows of a front are those of its last pivot";
+      EXPECT_EQ(front.rows, Ints(last.begin(), last.end())) << "rows of a front differ from those of its last pivot";
       if (front.rows.empty()) {
         EXPECT_EQ(front.parent, -1);
         continue;
       }
-      ASSERT_GT(front.parent, static_cast<std::int32_t>(f)) << "children stand before their parents";
+      ASSERT_GT(front.parent, static_cast<std::int32_t>(f)) << "children must precede parents";
       const Known& parent = fronts_[front.parent];
       EXPECT_GE(front.rows.front(), parent.first);
       EXPECT_LT(front.rows.front(), parent.first + parent.width);
@@ -126,7 +126,7 @@ class Case {
   }
 
  private:
-  /// What all ranks know, on every rank. Collective.
+  /// Gathers the data of all ranks on every rank. Collective.
   void take(const Elimination& all, std::int32_t own_nodes) {
     position_ = comm_.all_gather(Ints(all.position.begin(), all.position.begin() + own_nodes));
     Ints packed;
@@ -173,7 +173,7 @@ TEST(order, holds_every_node_once_and_the_fill_of_its_elimination) {
   whole.expect_fronts_hold_the_fill();
 }
 
-// Where a piece is too large to be gathered it is cut by its quotient graph, as a mesh of many millions of nodes is.
+// A piece too large to be gathered is cut by its quotient graph, as a mesh of many million nodes is.
 TEST(order, the_same_where_no_rank_may_gather_the_graph) {
   const std::vector<Ints> graph = make_block(16, 12, 10, 1);
   const Case whole(graph, kAll);
@@ -206,7 +206,7 @@ TEST(order, the_same_for_fewer_nodes_than_ranks) {
   }
 }
 
-/// The links of a graph as lists.
+/// Links of a graph as lists.
 std::vector<Ints> list_links(const partition::Graph& graph) {
   std::vector<Ints> links;
   for (std::int32_t v = 0; v < graph.vertex_count(); ++v)
@@ -214,13 +214,13 @@ std::vector<Ints> list_links(const partition::Graph& graph) {
   return links;
 }
 
-// Rank 0 condenses them, and links nodes of an element only to the first that is eliminated.
+// Rank 0 compresses the graph, and links nodes of an element only to its first eliminated node.
 TEST(order, the_same_from_elements_as_from_the_links_of_all_their_nodes) {
-  Ints pairs;  // elements of two nodes and a gap, which no node dominates
+  Ints pairs;  // elements of two nodes and a gap; no node dominates another
   for (std::int32_t v = 0; v < 20; ++v) pairs.insert(pairs.end(), {v, -1, (v + 1) % 20});
-  Ints apart = {0, 1, 2, 3, 4, 5, 6, 7, -1, -1, -1, -1};  // and node 8 in none
+  Ints apart = {0, 1, 2, 3, 4, 5, 6, 7, -1, -1, -1, -1};  // node 8 is in no element
   const mesh::TetMesh t10 = tests::make_box({7, 5, 4}, {1, 1, 1}, 2);
-  Ints fixed = t10.tets;  // the first face is not there
+  Ints fixed = t10.tets;  // without the first face
   for (std::int32_t& node : fixed) node -= 300;
   const auto count_nodes = [](const Ints& elements) { return *std::max_element(elements.begin(), elements.end()) + 1; };
   struct Body {
@@ -239,7 +239,7 @@ TEST(order, the_same_from_elements_as_from_the_links_of_all_their_nodes) {
     double operations = 0;
     for (const Supernode& front : find_supernodes(partition::renumber(graph, body.position()), 0, nodes).supernodes)
       operations += count_flops(front.width, front.size());
-    EXPECT_DOUBLE_EQ(body.count_operations(), operations) << "other fronts than those of the whole graph in this order";
+    EXPECT_DOUBLE_EQ(body.count_operations(), operations) << "fronts differ from those of the whole graph in this order";
   }
 }
 

@@ -1,4 +1,4 @@
-// The memory of own fronts: nothing overlaps, nothing is unused, and no other order of children takes less.
+// Memory of own fronts: no overlap, no unused memory, and no better order of children.
 #include "precompute/ldlt/room.hpp"
 
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ using Random = std::mt19937;
 
 int draw(Random& random, int low, int high) { return std::uniform_int_distribution(low, high)(random); }
 
-/// A forest in postorder; roots may have rows, which a shared front gets.
+/// A forest in postorder; roots may have rows, which go to a shared front.
 std::vector<Front> make_forest(Random& random, int count) {
   std::vector<Front> fronts(count);
   std::vector<std::int32_t> open;  // roots of the subtrees so far
@@ -44,13 +44,13 @@ struct Span {
   std::int64_t begin, end;
 };
 
-TEST(Room, has_a_place_of_its_own_for_all_that_lives_at_a_time) {
+TEST(Room, live_data_does_not_overlap) {
   Random random(5);
   for (int round = 0; round < 200; ++round) {
     const std::vector<Front> fronts = make_forest(random, draw(random, 1, 40));
     const std::int64_t block = draw(random, 1, 20'000);
     const Room room = plan_room(fronts, 0, 2, block);
-    std::vector<Span> updates(fronts.size(), {0, 0});  // empty: none that lives
+    std::vector<Span> updates(fronts.size(), {0, 0});  // empty: not live
     std::int64_t panels = 0;
     std::int64_t least_gap = std::numeric_limits<std::int64_t>::max();
     for (std::size_t s = 0; s < fronts.size(); ++s) {
@@ -61,7 +61,7 @@ TEST(Room, has_a_place_of_its_own_for_all_that_lives_at_a_time) {
       std::int64_t& own_top = top[front.depth % 2];
       updates[s] = {own_top - count_update_of(front.rows), own_top};
       own_top = updates[s].begin;
-      std::vector<Span> live{{0, panels + count_front_room(front.width, front.size())}};  // panels, and columns of the front in work
+      std::vector<Span> live{{0, panels + count_front_room(front.width, front.size())}};  // panels, and columns of the current front
       for (const Span& update : updates)
         if (update.end > update.begin) live.push_back(update);
       std::sort(live.begin(), live.end(), [](const Span& a, const Span& b) { return a.begin < b.begin; });
@@ -73,13 +73,13 @@ TEST(Room, has_a_place_of_its_own_for_all_that_lives_at_a_time) {
       if (front.parent < 0) updates[s] = {0, 0};  // sent to a shared front
     }
     EXPECT_EQ(panels, room.panels);
-    for (const Span& update : updates) EXPECT_EQ(update.begin, update.end) << "each update matrix was added to a parent or sent";
-    EXPECT_EQ(least_gap, 0) << "room that is never used, in round " << round;
+    for (const Span& update : updates) EXPECT_EQ(update.begin, update.end) << "a contribution block was neither added nor sent";
+    EXPECT_EQ(least_gap, 0) << "unused room, in round " << round;
     EXPECT_LE(room.solve_begin() + room.solve_blocks * block, std::max(room.numbers, room.solve_begin()));
   }
 }
 
-TEST(Room, holds_right_hand_sides_where_it_has_what_solves_do_not_need) {
+TEST(Room, reuses_memory_for_right_hand_sides) {
   Front leaf;
   leaf.width = 50;
   leaf.rows.assign(100, 0);
@@ -90,12 +90,12 @@ TEST(Room, holds_right_hand_sides_where_it_has_what_solves_do_not_need) {
   EXPECT_GT(spare, 0);
   EXPECT_EQ(plan_room(fronts, 0, 2, spare).solve_blocks, 1);
   EXPECT_EQ(plan_room(fronts, 0, 2, spare / 2).solve_blocks, 2);
-  EXPECT_EQ(plan_room(fronts, 0, 2, spare / 5).solve_blocks, 2) << "no more than asked for";
+  EXPECT_EQ(plan_room(fronts, 0, 2, spare / 5).solve_blocks, 2) << "more than requested";
   EXPECT_EQ(plan_room(fronts, 1'000'000, 2, spare).numbers, plan_room(fronts, 0, 2, spare).panels + 1'000'000) << "shared panels fill it";
   EXPECT_EQ(plan_room({}, 0, 2, 1).numbers, 0);
 }
 
-/// Panels, update matrices and the front in work at their most, with children in this order.
+/// Peak of panels, contribution blocks and current front for this order of children.
 std::int64_t play(const std::vector<DealtFront>& dealt, const std::vector<Ints>& children, const Ints& roots) {
   std::int64_t now = 0;
   std::int64_t most = 0;
@@ -116,7 +116,7 @@ TEST(Room, no_other_order_of_children_takes_less) {
   Random random(11);
   int improved = 0;
   for (int round = 0; round < 60; ++round) {
-    // Two roots of up to three children, each of two leaves: every order of all of them is tried.
+    // Two roots of up to three children with two leaves each: tries every order.
     std::vector<DealtFront> dealt;
     std::vector<Ints> children;
     Ints roots;
@@ -156,7 +156,7 @@ TEST(Room, no_other_order_of_children_takes_less) {
     EXPECT_EQ(play(dealt, children, roots), least) << round;
     improved += before > least ? 1 : 0;
   }
-  EXPECT_GT(improved, 20) << "orders that make no difference show nothing";
+  EXPECT_GT(improved, 20) << "all orders are equal";
 }
 
 }  // namespace

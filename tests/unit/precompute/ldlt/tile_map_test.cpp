@@ -29,7 +29,7 @@ TEST(TileMap, every_node_is_in_one_tile_and_every_tile_has_one_owner) {
         std::int32_t nodes = 0;
         for (int i = 0; i < map.tiles(); ++i) {
           EXPECT_GT(map.nodes(i), 0);
-          EXPECT_LE(3 * map.nodes(i), kMaxBlock) << "the kernels eliminate and update so much at once";
+          EXPECT_LE(3 * map.nodes(i), kMaxBlock) << "limit of the kernels";
           EXPECT_EQ(map.find_tile(map.start(i)), i);
           EXPECT_EQ(map.find_tile(map.start(i + 1) - 1), i);
           nodes += map.nodes(i);
@@ -41,7 +41,7 @@ TEST(TileMap, every_node_is_in_one_tile_and_every_tile_has_one_owner) {
           }
         }
         EXPECT_EQ(nodes, width + rows);
-        EXPECT_EQ(map.start(map.pivot_tiles()), width) << "a tile is of pivots or of rows behind them";
+        EXPECT_EQ(map.start(map.pivot_tiles()), width) << "a tile mixes pivots and other rows";
       }
 }
 
@@ -92,14 +92,14 @@ TEST(TileMap, knows_the_last_column_where_a_rank_has_a_tile) {
   }
 }
 
-/// A child of 40 pivots whose 130 rows lie here and there in a parent of 90 pivots and 150 rows.
+/// A child of 40 pivots whose 130 rows are scattered in a parent of 90 pivots and 150 rows.
 SharedChild make_child(const std::vector<FrontShare>& shares) {
   SharedChild child{TileMap(40, 130, shares), 40, {}, {}, -1, -1};
   for (std::int32_t a = 0; a < 130; ++a) child.node_of_row.push_back(a < 60 ? a : 60 + (a - 60) * 5 / 2);
   return child;
 }
 
-TEST(TileMap, an_update_matrix_goes_to_the_parent_whole_and_each_number_once) {
+TEST(TileMap, a_contribution_block_goes_to_the_parent_completely_and_once) {
   for (const int below : {1, 2, 4, 9})
     for (const int above : {2, 5, 16}) {
       const SharedChild child = make_child(make_equal(below));
@@ -123,7 +123,7 @@ TEST(TileMap, an_update_matrix_goes_to_the_parent_whole_and_each_number_once) {
     }
 }
 
-TEST(TileMap, every_part_of_a_sum_goes_to_one_place_of_the_parent) {
+TEST(TileMap, every_partial_sum_goes_to_one_place_of_the_parent) {
   const SharedChild child = make_child(make_equal(9));
   const TileMap parent(90, 150, make_equal(16));
   for (int from = 0; from < 9; ++from) {

@@ -168,10 +168,11 @@ TEST(Gltf, reads_text_with_its_buffer_inside_or_next_to_it) {
   EXPECT_NEAR(calc_volume(read_surface(write_text("b.gltf", model.json(R"(, "uri": "my%20part%20%C3%a4.bin")")))), 1, 1e-6);
   EXPECT_NEAR(calc_volume(read_surface(write_text("b.gltf", model.json(", \"uri\": \"my part \xC3\xA4.bin\"")))), 1, 1e-6);
   for (const char* uri : {"%2e%2e/part.bin", "%2Fetc/passwd", "part%.bin", "part%0.bin", "part%zz.bin", "part.bin%00"})
-    EXPECT_THAT(find_error(model.json(", \"uri\": \"" + std::string(uri) + "\""), "gltf"), ::testing::HasSubstr("no file next to this one"))
+    EXPECT_THAT(find_error(model.json(", \"uri\": \"" + std::string(uri) + "\""), "gltf"),
+                ::testing::HasSubstr("not a file in the same folder"))
         << uri;
-  EXPECT_THAT(find_error(model.json(R"(, "uri": "/etc/passwd")"), "gltf"), ::testing::HasSubstr("no file next to this one"));
-  EXPECT_THAT(find_error(model.json(R"(, "uri": "../part.bin")"), "gltf"), ::testing::HasSubstr("no file next to this one"));
+  EXPECT_THAT(find_error(model.json(R"(, "uri": "/etc/passwd")"), "gltf"), ::testing::HasSubstr("not a file in the same folder"));
+  EXPECT_THAT(find_error(model.json(R"(, "uri": "../part.bin")"), "gltf"), ::testing::HasSubstr("not a file in the same folder"));
   EXPECT_THAT(find_error(model.json(R"(, "uri": "data:text/plain,hello")"), "gltf"), ::testing::HasSubstr("not base64"));
   EXPECT_THAT(find_error(model.json(), "gltf"), ::testing::HasSubstr("has no bytes"));
 }
@@ -197,7 +198,7 @@ TEST(Gltf, refuses_what_bends_moves_or_is_compressed_in_a_sentence) {
            {with("", R"(, "targets": [{"POSITION": 0}])", ""), "morph targets"},
            {with("", "", R"(, "extensionsRequired": ["KHR_draco_mesh_compression"])"), "without compression"},
            {with(R"([{"mesh": 0, "children": [0]}])", "", ""), "inside itself"},
-           {with(R"([{"mesh": 1}])", "", ""), "is 1, and no mesh has this number (there are 1)"},
+           {with(R"([{"mesh": 1}])", "", ""), "is 1, but no mesh has this index (there are 1)"},
            {with(R"([{"mesh": -1}])", "", ""), "is -1, and no mesh has this number"},
            {with(R"([{"mesh": 0, "extensions": {"EXT_mesh_gpu_instancing": {}}}])", "", ""), "in many places"},
            {with("", R"(, "extensions": {"KHR_draco_mesh_compression": {"bufferView": 0}})", ""), "without compression"},
@@ -212,7 +213,7 @@ TEST(Gltf, refuses_what_bends_moves_or_is_compressed_in_a_sentence) {
            {replace(R"("POSITION": 0)", R"("POSITION": 70)"), "no accessor has this number"},
            {replace(R"("scene": 0)", R"("scene": 4)"), "no scene has this number"},
            {with(R"([{"mesh": 0, "children": [7]}])", "", ""), "7 is no node"},
-           {with(R"([{"mesh": 0, "rotation": [0, 0, 0, 0]}])", "", ""), "no rotation"},
+           {with(R"([{"mesh": 0, "rotation": [0, 0, 0, 0]}])", "", ""), "not a rotation"},
            {with(R"([{"mesh": 0, "scale": [1e300, 1, 1]}])", "", ""), "is not finite or too large"},
            {with(R"([{"camera": 0}])", "", ""), "no triangles in its scene"},
            {replace(R"("count": 8)", R"("count": 800000000000)"), "more than its bufferView"},
@@ -230,7 +231,7 @@ TEST(Gltf, refuses_what_bends_moves_or_is_compressed_in_a_sentence) {
     EXPECT_THAT(said, ::testing::AllOf(::testing::StartsWith("body.glb:"), ::testing::HasSubstr(words)));
   const std::string whole = to_glb(box.json(), box.binary);
   EXPECT_THAT(find_error("hello"), ::testing::HasSubstr("does not begin with"));
-  EXPECT_THAT(find_error(whole + "x"), ::testing::HasSubstr("cut off, or something was added"));
+  EXPECT_THAT(find_error(whole + "x"), ::testing::HasSubstr("truncated or extended"));
   EXPECT_THAT(find_error(to_glb("{", "")), ::testing::HasSubstr("body.glb"));
   EXPECT_THAT(find_error(to_glb(R"({"asset": {"version": "2.0"}, "images": [{"uri": "a.png"}]})", "")),
               ::testing::HasSubstr("no triangles"));

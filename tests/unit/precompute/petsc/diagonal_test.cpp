@@ -9,7 +9,7 @@
 namespace carillon::petsc {
 namespace {
 
-// Rank r has r rows, so that the first has none.
+// Rank r has r rows, so the first has none.
 TEST(ReadDiagonal, gives_every_rank_its_own_rows) {
   const int rank = tests::get_rank();
   MatHandle matrix;

@@ -34,7 +34,7 @@ TEST(Check, turns_a_petsc_error_into_an_exception_with_its_words) {
   EXPECT_NE(text.find('7'), std::string::npos) << text;
 }
 
-TEST(Check, calls_a_missing_file_an_error_of_the_system) {
+TEST(Check, maps_a_missing_file_to_a_system_error) {
   FILE* file = nullptr;
   const std::string text = catch_message<SystemError>([&] { check(PetscFOpen(PETSC_COMM_SELF, "/no/such/file", "r", &file)); });
   EXPECT_NE(text.find("/no/such/file"), std::string::npos) << text;
@@ -65,14 +65,14 @@ TEST(Handle, owns_one_reference_and_moves_it) {
   check(VecDestroy(&plain));
 }
 
-TEST(ToPetscInt, refuses_what_does_not_fit) {
+TEST(ToPetscInt, rejects_values_out_of_range) {
   EXPECT_EQ(to_petsc_int(2'000'000'000), 2'000'000'000);
   if constexpr (sizeof(PetscInt) == 4) {
     EXPECT_THROW(to_petsc_int(std::int64_t{1} << 31), SystemError);
   }
 }
 
-// Of this process, now.
+// Of this process, currently.
 std::int64_t get_resident_bytes() {
   std::int64_t whole = 0, resident = 0;
   std::ifstream("/proc/self/statm") >> whole >> resident;
@@ -82,20 +82,20 @@ std::int64_t get_resident_bytes() {
 constexpr std::size_t kLarge = 64 << 20;
 constexpr std::int64_t kLittle = 8 << 20;
 
-TEST(Memory, of_large_pieces_goes_back_when_they_are_freed) {
+TEST(Memory, of_large_blocks_is_returned_when_freed) {
   const std::int64_t before = get_resident_bytes();
   for (int repeat = 0; repeat < 3; ++repeat) {
     char* piece = nullptr;
     check(PetscMalloc1(kLarge, &piece));
     std::fill_n(piece, kLarge, '\1');
     EXPECT_GT(get_resident_bytes(), before + static_cast<std::int64_t>(kLarge) - kLittle);
-    std::vector<char> behind(1 << 20, '\1');  // keeps the heap from shrinking, if the piece is of it
+    std::vector<char> behind(1 << 20, '\1');  // keeps the heap from shrinking, if the block is in it
     check(PetscFree(piece));
     EXPECT_LT(get_resident_bytes(), before + kLittle);
   }
 }
 
-TEST(Memory, that_petsc_clears_is_not_taken_before_it_is_used) {
+TEST(Memory, cleared_by_petsc_is_not_resident_before_use) {
   const std::int64_t before = get_resident_bytes();
   for (int repeat = 0; repeat < 2; ++repeat) {
     char* piece = nullptr;
@@ -121,13 +121,13 @@ TEST(Memory, is_given_back_in_whole_pages_and_no_more) {
   EXPECT_EQ(std::count(end, piece + kLarge, '\1'), piece + kLarge - end);
   EXPECT_EQ(std::count(begin + page, end - page, '\0'), end - begin - 2 * page);
   piece[4 * page] = '\2';
-  give_back_pages(piece + 4 * page, piece + 4 * page);          // nothing,
-  give_back_pages(piece + 4 * page - 1, piece + 5 * page - 1);  // and no whole page
+  give_back_pages(piece + 4 * page, piece + 4 * page);          // empty range
+  give_back_pages(piece + 4 * page - 1, piece + 5 * page - 1);  // no whole page
   EXPECT_EQ(piece[4 * page], '\2');
   check(PetscFree(piece));
 }
 
-TEST(Blas, has_a_name_that_agrees_with_its_verdict) {
+TEST(Blas, has_a_name_consistent_with_its_kind) {
   EXPECT_EQ(blas_is_reference(), blas_name().find("reference") != std::string::npos) << blas_name();
   EXPECT_NE(blas_name().find(".so"), std::string::npos) << blas_name();
 }

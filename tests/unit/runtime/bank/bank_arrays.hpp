@@ -1,4 +1,4 @@
-// Arrays and bytes of banks, for tests that change them.
+// Arrays and bytes of banks, for tests that modify them.
 #pragma once
 
 #include <algorithm>
@@ -16,13 +16,13 @@ namespace carillon::bank {
 
 inline std::span<const std::byte> bytes_of(std::string_view text) { return std::as_bytes(std::span(text)); }
 
-/// The arrays of a bank, each open to a change before they are put together.
+/// Modifiable arrays of a bank.
 struct Arrays {
   Bank bank;
   FileForm form;
   std::vector<FieldBytes> list;
 
-  Arrays(const Arrays&) = delete;  // the list refers to the bank
+  Arrays(const Arrays&) = delete;  // the list points into the bank
   explicit Arrays(Bank of) : bank(std::move(of)), form(make_file_form(bank)) {
     for (const Field& field : list_fields(bank, form))
       list.push_back({field, {static_cast<const std::byte*>(field.data), calc_bytes(field)}});
@@ -30,7 +30,7 @@ struct Arrays {
   FieldBytes& find(const std::string& name) {
     return *std::find_if(list.begin(), list.end(), [&](const FieldBytes& array) { return array.field.name == name; });
   }
-  /// The message, or "".
+  /// Error message, or "".
   std::string find_error() const {
     try {
       (void)assemble_bank(list, "arrays");

@@ -9,7 +9,7 @@
 namespace carillon::bank {
 namespace {
 
-/// Modes at rest but for a few vertices of one mode, along the normal of the upper side of the box.
+/// Modes at rest except at a few vertices of one mode, along the normal of the upper side of the box.
 Bank make_still(const std::vector<std::pair<std::size_t, double>>& moving) {
   Bank bank = example::make_bank(4, 3);
   std::vector<double> shapes(bank.vertex_count() * 9, 0.0);
@@ -18,7 +18,7 @@ Bank make_still(const std::vector<std::pair<std::size_t, double>>& moving) {
   return bank;
 }
 
-/// A vertex in the middle of a side of the box, and the one farthest from it that is in the middle of the same side, too.
+/// Central vertex of a side of the box, and the farthest vertex inside the same side.
 std::vector<std::size_t> list_upper(const Bank& bank) {
   std::vector<std::size_t> found;
   for (std::size_t v = 0; v < bank.vertex_count(); ++v) {
@@ -41,7 +41,7 @@ TEST(Strikes, TheFirstIsWhereABlowIsHeardMost) {
 
 TEST(Strikes, OthersAreFarAndHeardToo) {
   const std::vector<std::size_t> upper = list_upper(make_still({}));
-  // A tenth of the power is 0.32 of the motion: the vertex of 0.3 is left out, although it is farthest.
+  // A tenth of the power is 0.32 of the motion: the vertex with 0.3 is excluded, although it is farthest.
   const Bank bank = make_still({{upper[0], 1.0}, {upper[1], 0.6}, {upper[4], 0.5}, {upper[8], 0.3}});
   EXPECT_EQ(find_strikes(bank, 4), (std::vector<std::size_t>{upper[0], upper[4], upper[1]}));
 }
@@ -52,7 +52,7 @@ TEST(Strikes, LevelsAreGainTimesMotionAlongTheNormal) {
   const std::vector<double> levels = calc_blow_amplitudes(bank, vertex, calc_vertex_normals(bank)[vertex]);
   ASSERT_EQ(levels.size(), 6u);
   for (std::size_t m = 0; m < 6; ++m) {
-    // IEC 61672-1, E.4.2, written out.
+    // IEC 61672-1, E.4.2.
     const double f2 = std::pow(bank.freq_hz(m), 2);
     const double weight = std::pow(10.0, 0.1) * 148.693636e6 * f2 * f2 /
                           ((f2 + 424.36) * (f2 + 148.693636e6) * std::sqrt((f2 + 11599.29) * (f2 + 544496.41)));

@@ -1,4 +1,4 @@
-// What a bank holds: quantised shapes, and what is called sane.
+// Content of banks: quantised shapes, and validity checks.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -15,7 +15,7 @@ namespace {
 
 TEST(Edges, AreThoseThatASearchOfAllFinds) {
   std::mt19937 random(7);
-  for (const std::int32_t vertices : {4, 9, 60}) {  // crowded ones, too
+  for (const std::int32_t vertices : {4, 9, 60}) {  // including dense surfaces
     std::vector<std::array<std::int32_t, 3>> triangles(100);
     for (auto& corners : triangles)
       for (std::int32_t& v : corners) v = static_cast<std::int32_t>(random() % static_cast<std::uint32_t>(vertices));
@@ -58,7 +58,7 @@ TEST(Quantise, TheStepIsTheLargestComponentOver32767) {
   EXPECT_EQ(bank.shape_scale[0], 0.0);
   EXPECT_DOUBLE_EQ(bank.shape_scale[1], 8.0 / 32767.0);
   EXPECT_EQ(bank.shape[3], -32767);
-  EXPECT_EQ(bank.shape[4], 16384);  // 16383.5 goes away from zero
+  EXPECT_EQ(bank.shape[4], 16384);  // 16383.5 rounds away from zero
   EXPECT_DOUBLE_EQ(bank.shape_at(0, 1)[0], -8.0);
 }
 
@@ -106,7 +106,7 @@ TEST(Faults, ABankWithoutProofOrCutByMaxModesHasNone) {
   bank.proof->below[2] = 300;
   bank.proof->found = 8;
   EXPECT_EQ(find_faults(bank), std::vector<std::string>{});
-  bank.proof->below[1] += 1;  // below the last mode nothing may be missing
+  bank.proof->below[1] += 1;  // no mode may be missing below the last one
   EXPECT_FALSE(find_faults(bank).empty());
 }
 
@@ -167,7 +167,7 @@ void scale_lengths(Bank& bank, double scale) {
 }
 
 const Spoiled kSpoiled[] = {
-    {"short_decay", [](Bank& b) { b.decay_per_s.pop_back(); }, "decay holds 5 values and 6 are wanted"},
+    {"short_decay", [](Bank& b) { b.decay_per_s.pop_back(); }, "decay holds 5 values, 6 are required"},
     {"short_residual", [](Bank& b) { b.residual.clear(); }, "residual holds 0 values"},
     {"short_gain", [](Bank& b) { b.radiation_gain.pop_back(); }, "radiation_gain holds 5"},
     {"long_scale", [](Bank& b) { b.shape_scale.push_back(1); }, "shape_scale holds 7"},
@@ -217,7 +217,7 @@ const Spoiled kSpoiled[] = {
        b.rigid.volume_m3 *= 3;
        b.material.density_kg_m3 /= 3;
      },
-     "and the volume is said to be"},
+     "the recorded volume is"},
     {"no_mass", [](Bank& b) { b.rigid.mass_kg = 0; }, "mass_kg is 0, not positive"},
     {"other_mass", [](Bank& b) { b.rigid.mass_kg *= 1.1; }, "density times volume gives"},
     {"millimetres",
@@ -239,8 +239,7 @@ const Spoiled kSpoiled[] = {
        for (int k : {0, 4, 8}) b.rigid.inertia_kg_m2[k] += 1.0;
      },
      "too large for a surface"},
-    {"short_reaction", [](Bank& b) { b.supports = example::make_supported_bank(3, 5).supports; },
-     "support_reaction holds 60 values and 72"},
+    {"short_reaction", [](Bank& b) { b.supports = example::make_supported_bank(3, 5).supports; }, "support_reaction holds 60 values, 72"},
     {"nan_reaction",
      [](Bank& b) {
        b.supports = example::make_supported_bank(3, 6).supports;
@@ -319,7 +318,7 @@ const Spoiled kSpoiled[] = {
     {"a_mode_too_many", [](Bank& b) { b.proof->below[2] -= 1; }, "and the bank holds 3"},
     {"a_mode_in_the_wrong_slice", [](Bank& b) { b.proof->below[1] += 1; },
      "4 modes lie between 20 and 7000 Hz by the counts, and the bank holds 3"},
-    {"found_too_few", [](Bank& b) { b.proof->found = 5; }, "5 modes were found, 6 are here, and the counts give 12 - 6 = 6"},
+    {"found_too_few", [](Bank& b) { b.proof->found = 5; }, "5 modes were found, 6 are stored, and the counts give 12 - 6 = 6"},
     {"counts_fall", [](Bank& b) { b.proof->below[1] = 5; }, "counts cannot fall"},
     {"cuts_fall", [](Bank& b) { std::swap(b.proof->cut_hz[0], b.proof->cut_hz[1]); }, "is not above the one before"},
     {"one_cut",
@@ -361,8 +360,8 @@ const Spoiled kSpoiled[] = {
        for (auto& below : b.proof->below) below -= 1;
      },
      "5 eigenvalues below the band are fewer than 6 rigid motions"},
-    {"not_orthogonal", [](Bank& b) { b.proof->orthonormality = 1e-3; }, "some modes may be one mode twice"},
-    {"bad_factor", [](Bank& b) { b.proof->backward_error = 1e-5; }, "its counts are not sure"},
+    {"not_orthogonal", [](Bank& b) { b.proof->orthonormality = 1e-3; }, "modes may be duplicated"},
+    {"bad_factor", [](Bank& b) { b.proof->backward_error = 1e-5; }, "its counts are uncertain"},
     {"group_out_of_range",
      [](Bank& b) {
        b.proof->cluster_first = {5};
@@ -400,13 +399,13 @@ const Spoiled kSpoiled[] = {
        b.eigenvalue_rad2_s2.back() = 1e40;
        b.band_hz[1] = 1e30;
      },
-     "beyond the 1e+12 Hz"},
+     "above the limit of 1e+12 Hz"},
     {"giant_decay",
      [](Bank& b) {
        b.damping.law = "mixed";
        b.decay_per_s[3] = 1e200;
      },
-     "decay[3] is 1e+200 1/s, more than any damping makes"},
+     "decay[3] is 1e+200 1/s, above the limit of"},
     {"atom", [](Bank& b) { scale_lengths(b, 1e-10); }, "bodies have 1e-09 to 1e+07 m"},
     {"galaxy", [](Bank& b) { scale_lengths(b, 1e21); }, "bodies have 1e-09 to 1e+07 m"},
     {"no_stiffness", [](Bank& b) { b.material.young_modulus_pa = 0; }, "young_modulus_pa is 0"},

@@ -1,4 +1,4 @@
-// What becomes of a bank when its corrected frequencies are played, and which modes are the lowest.
+// Banks played at their corrected frequencies; order of the modes.
 #include "runtime/bank/corrected.hpp"
 
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::size_t kModes = 9;
 
-/// What the gain of a pulsating sphere of the example's area has of the frequency (Pierce 1981, section 4.1), but for a constant.
+/// Frequency dependence of the gain of a pulsating sphere of the example's area (Pierce 1981, section 4.1), up to a constant.
 double calc_sphere(double freq_hz) {
   const auto [a, b, c] = example::kSidesM;
   const double radius = std::sqrt((a * b + b * c + c * a) / (2 * std::numbers::pi));
@@ -116,7 +116,7 @@ TEST(Corrected, DecideWhichModesAreTheLowestAndTheProofSaysHowFarItReaches) {
     std::sort(all.begin(), all.end());
     std::sort(here.begin(), here.end());
     EXPECT_TRUE(std::equal(here.begin(), here.end(), all.begin())) << count;
-    // Every mode of the mesh below the bound is here, and the next one is not.
+    // All modes of the mesh below the bound are present, and the next one is not.
     const double bound = kept.proof->complete_below_hz;
     const auto count_below = [&](const Bank& of) {
       return std::count_if(of.eigenvalue_rad2_s2.begin(), of.eigenvalue_rad2_s2.end(),

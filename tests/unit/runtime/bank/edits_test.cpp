@@ -37,7 +37,7 @@ TEST(Edits, ReactionsFollowAsMassTimesAccelerationAndCouplesHaveAnArm) {
   const Bank there = calc_edited(bank, {.density_scale = s, .stiffness_scale = k, .size_scale = g});
   EXPECT_EQ(find_faults(there), std::vector<std::string>{});
   for (std::size_t i = 0; i < bank.supports.reaction.size(); ++i) {
-    // lambda times the integral of rho phi: with phi of unit modal mass that goes with lambda sqrt(mass).
+    // lambda times the integral of rho phi: for unit modal mass it scales with lambda sqrt(mass).
     const double scale = there.eigenvalue_rad2_s2[i / 12] / bank.eigenvalue_rad2_s2[i / 12] *
                          std::sqrt(there.rigid.mass_kg / bank.rigid.mass_kg) * (i % 6 < 3 ? 1.0 : g);
     EXPECT_NEAR(there.supports.reaction[i] / bank.supports.reaction[i], scale, 1e-12 * scale);

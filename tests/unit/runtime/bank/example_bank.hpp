@@ -1,4 +1,4 @@
-// A bank that no solver made: a box of n x n squares a side, with closed-form rigid data and smooth made-up shapes.
+// Synthetic bank: a box with n x n squares per side, closed-form rigid data and smooth artificial shapes.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@ namespace carillon::bank::example {
 inline constexpr Vec3 kSidesM{0.3, 0.02, 0.01};
 inline constexpr Vec3 kCornerM{0.05, -0.1, 0.2};
 
-/// The surface of the box, outward: n x n squares of two triangles on each of its six sides, vertices shared.
+/// Outward surface of the box: n x n squares of two triangles on each of its six sides, shared vertices.
 inline void add_box(Bank& bank, int n) {
   std::map<std::tuple<int, int, int>, std::int32_t> numbers;
   const auto vertex = [&](std::array<int, 3> at) {
@@ -53,7 +53,7 @@ inline void add_box(Bank& bank, int n) {
   }
 }
 
-/// phi of mode k at x: a plane wave whose direction turns with k [kg^-1/2].
+/// phi of mode k at x: a plane wave with a direction depending on k [kg^-1/2].
 inline Vec3 calc_shape(std::size_t mode, const Vec3& x) {
   const double k = static_cast<double>(mode + 1);
   const double phase = 20.0 * k * x[0] + 7.0 * x[1] * k * k + 3.0 * x[2];
@@ -76,7 +76,7 @@ inline double calc_margin(const Bank& bank, double cut_hz) {
   return margin;
 }
 
-/// A proof as a solver would give it: counts at 20 Hz, 7 kHz and 20 kHz.
+/// Proof with counts at 20 Hz, 7 kHz and 20 kHz.
 inline Proof make_proof(const Bank& bank) {
   Proof proof;
   proof.cut_hz = {20.0, 7000.0, 20000.0};
@@ -94,7 +94,7 @@ inline Proof make_proof(const Bank& bank) {
   return proof;
 }
 
-/// The bank as version 1.0 knew it.
+/// Bank of version 1.0.
 inline Bank make_first_bank(int n, std::size_t modes) {
   Bank bank;
   add_box(bank, n);
@@ -132,8 +132,8 @@ inline Bank make_bank(int n = 2, std::size_t modes = 5) {
   return bank;
 }
 
-/// The same with corrected frequencies, as version 1.4 has it: every third mode 30 %, the others 1 % lower than on the mesh, so that some
-/// change places; the fifth is not corrected.
+/// The same with corrected frequencies (version 1.4): every third mode 30 %, the others 1 % below the mesh's, so that the order changes;
+/// the fifth is not corrected.
 inline Bank make_corrected_bank(int n = 2, std::size_t modes = 9) {
   Bank bank = make_bank(n, modes);
   Corrected& corrected = bank.corrected;
@@ -147,14 +147,14 @@ inline Bank make_corrected_bank(int n = 2, std::size_t modes = 9) {
   return bank;
 }
 
-/// The same with multipoles, as version 1.5 has it.
+/// The same with multipoles (version 1.5).
 inline Bank make_radiating_bank(int n = 2, std::size_t modes = 9) {
   Bank bank = make_corrected_bank(n, modes);
   add_multipoles(bank);
   return bank;
 }
 
-/// Fixes the ends x = 0 and x = 0.3 m: made-up reactions, the second end half of the first.
+/// Fixes the ends x = 0 and x = 0.3 m with artificial reactions, the second half of the first.
 inline void add_supports(Bank& bank) {
   Supports& supports = bank.supports;
   supports.text = R"({"supports": [{"name": "x-min", "on": "brick wall", "joint": "screwed"}, {"name": "x-max"}]})";
@@ -172,14 +172,14 @@ inline void add_supports(Bank& bank) {
   }
 }
 
-/// The bank of make_bank() on supports, as version 1.3 has it.
+/// make_bank() with supports (version 1.3).
 inline Bank make_supported_bank(int n = 2, std::size_t modes = 5) {
   Bank bank = make_bank(n, modes);
   add_supports(bank);
   return bank;
 }
 
-/// Every part of the decay: material, radiation and supports.
+/// All contributions to the decay: material, radiation and supports.
 inline Bank make_mounted_bank(int n = 2, std::size_t modes = 9) {
   Bank bank = make_radiating_bank(n, modes);
   add_supports(bank);

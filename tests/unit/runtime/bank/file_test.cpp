@@ -1,4 +1,4 @@
-// Bank files: round trip, truncated and changed bytes, rows, and what becomes of a file when its writer is killed or the disk refuses.
+// Bank files: round trip, truncated and modified bytes, rows, killed writers and full disks.
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -101,7 +101,7 @@ void expect_equal(const Bank& a, const Bank& b) {
   EXPECT_EQ(a.proof->method, b.proof->method);
 }
 
-/// Sines and roots of other libraries may have another last bit.
+/// Sines and roots of other libraries may differ in the last bit.
 void expect_near(const Multipoles& a, const Multipoles& b) {
   ASSERT_EQ(a.order, b.order);
   ASSERT_EQ(a.coefficient.size(), b.coefficient.size());
@@ -134,7 +134,7 @@ TEST_F(BankFile, ComesBackExactly) {
   bank.provenance.clear();
   bank.material.alpha1_s = bank.material.alpha2_per_s = bank.decay_per_s[0] = 0.0;
   bank.proof->below[2] = 40;  // the band holds 33 more
-  write_bank(bank, file_);    // over the other one
+  write_bank(bank, file_);    // replaces the other one
   expect_equal(read_bank(file_), bank);
   EXPECT_EQ(count_files(), 1u);
 }
@@ -172,7 +172,7 @@ TEST_F(BankFile, EveryLawAndWhatMayBeAbsentComeBack) {
 }
 
 TEST_F(BankFile, EveryReleasedVersionIsStillRead) {
-  // Written when the version was new, by: make_example_bank version_1_0.hdf 1 2
+  // Written by the first release of the version: make_example_bank version_1_0.hdf 1 2
   expect_equal(read_bank(carillon::tests::get_source_dir() + "/tests/unit/runtime/bank/pinned/version_1_0.hdf"),
                example::make_first_bank(1, 2));
   expect_equal(read_bank(carillon::tests::get_source_dir() + "/tests/unit/runtime/bank/pinned/version_1_1.hdf"), example::make_bank(1, 2));
@@ -217,7 +217,7 @@ TEST_F(BankFile, MayHoldNoModes) {
 TEST_F(BankFile, TheSameBankGivesTheSameBytes) {
   write_bank(example::make_bank(), file_);
   const std::string first = get();
-  ::sleep(1);  // a time stamp would have seconds
+  ::sleep(1);  // a time stamp would change
   write_bank(example::make_bank(), file_);
   EXPECT_TRUE(get() == first);
 }
@@ -265,7 +265,7 @@ TEST_F(BankFile, AnyHeaderByteWithAnyValueIsRefused) {
   }
 }
 
-/// What read(2) and pread(2) have delivered to this process.
+/// Bytes read by this process through read(2) and pread(2).
 std::uint64_t read_so_far() {
   std::ifstream stream("/proc/self/io");
   std::string name;
@@ -350,7 +350,7 @@ TEST_F(BankFile, IsWrittenThroughALink) {
   EXPECT_EQ(read_bank(file_).mode_count(), 3u);
 }
 
-/// Runs `work` in a process of its own; its exit code, or minus the signal that ended it.
+/// Runs `work` in a child process; returns its exit code, or minus the terminating signal.
 template <class Work>
 pid_t start(Work work) {
   const pid_t child = ::fork();
@@ -377,7 +377,7 @@ TEST_F(BankFile, AFullDiskLeavesTheOldBankAndNothingElse) {
   const Bank larger = example::make_bank(12, 100);
   for (const rlim_t room : {0, 1, 4095, 100'000, 500'000}) {
     const int code = finish(start([&] {
-      // A limit on the length of files stands in for a full disk: write(2) fails part of the way.
+      // A file size limit replaces a full disk: write(2) fails half-way.
       ::signal(SIGXFSZ, SIG_IGN);
       const rlimit limit{room, room};
       ::setrlimit(RLIMIT_FSIZE, &limit);
@@ -412,7 +412,7 @@ TEST_F(BankFile, AKilledWriterLeavesAWholeBank) {
     const Bank bank = read_bank(file_);
     ASSERT_TRUE(bank.shape == a.shape || bank.shape == b.shape);
   }
-  // What a killed writer leaves is a file of its own that is not taken for the bank.
+  // A killed writer leaves at most a file of another name.
   for (const auto& entry : fs::directory_iterator(folder_)) {
     const std::string name = entry.path().filename();
     EXPECT_TRUE(name == "bank.hdf" || name.find(".tmp") != std::string::npos) << name;

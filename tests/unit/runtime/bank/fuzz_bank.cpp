@@ -1,5 +1,5 @@
-// Bank bytes of any kind give a bank or an InputError. Every input is tried as it is, which tries the seal, and sealed again, which tries
-// everything behind the seal.
+// Arbitrary bytes give a bank or an InputError. Each input is tried unchanged, which tests the seal, and sealed again, which tests the
+// rest.
 #include <cstring>
 #include <string>
 
@@ -15,7 +15,7 @@ using namespace carillon;
 void read(std::span<const std::byte> bytes) {
   try {
     const bank::Bank bank = bank::parse_bank(bytes);
-    // What the reader calls sane can be used without looking.
+    // A valid bank can be used without further checks.
     double sum = 0.0;
     for (std::size_t mode = 0; mode < bank.mode_count(); ++mode) {
       sum += bank.freq_hz(mode);

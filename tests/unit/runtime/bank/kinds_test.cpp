@@ -1,4 +1,4 @@
-// Known kinds: shapes of textbooks on lattices of points.
+// Known kinds of motion: textbook shapes on lattices of points.
 #include "runtime/bank/kinds.hpp"
 
 #include <gtest/gtest.h>
@@ -28,7 +28,7 @@ void add_patch(Bank& bank, int rows, int columns, const std::function<Vec3(doubl
     }
 }
 
-/// A box about `centre`, its edges along the rows of `axes`.
+/// Box about `centre` with edges along the rows of `axes`.
 Bank make_box(const Vec3& sides, const std::array<int, 3>& cells, const Mat3& axes = {Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}}) {
   Bank bank;
   for (int k = 0; k < 3; ++k)
@@ -45,7 +45,7 @@ Bank make_box(const Vec3& sides, const std::array<int, 3>& cells, const Mat3& ax
   return bank;
 }
 
-/// A surface of revolution about z: from (radius, height) of 0 to 1.
+/// Surface of revolution about z with meridian (radius, height) of 0 to 1.
 Bank make_round(const std::function<std::array<double, 2>(double)>& meridian, int rows = 40, int around = 48) {
   Bank bank;
   add_patch(bank, rows, around, [&](double s, double t) {
@@ -105,7 +105,7 @@ TEST(Kinds, of_a_bar_are_those_of_beam_theory_in_any_position) {
       }));
       wanted.push_back("longitudinal, " + nodes);
     }
-    // Unknown: a mixture of two kinds, and a section that changes its shape.
+    // Unknown: a mixture of two kinds, and a deforming section.
     fields.push_back(along([](const Vec3& p) { return Vec3{0, bend(1, p[0])[0], bend(2, p[0])[0]}; }));
     wanted.push_back("-");
     fields.push_back(along([](const Vec3& p) { return Vec3{0, 0, std::cos(30 * kPi * p[1])}; }));

@@ -1,5 +1,4 @@
-// make_example_bank OUT [squares a side] [modes] [supports|corrected|radiation|mounted]: writes the example bank, for the scripts among the
-// tests.
+// make_example_bank OUT [squares a side] [modes] [supports|corrected|radiation|mounted]: writes the example bank for test scripts.
 #include <cstdio>
 #include <cstdlib>
 #include <exception>

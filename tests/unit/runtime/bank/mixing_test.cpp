@@ -1,4 +1,4 @@
-// Modes that the air couples: what is sane of them, their way through files and edits, and what is played.
+// Modes coupled by the air: validity, files, edits and playing.
 #include "runtime/bank/mixing.hpp"
 
 #include <gtest/gtest.h>
@@ -28,7 +28,7 @@ namespace {
 
 constexpr std::size_t kModes = 9;
 
-/// Each mode with its neighbours and two rigid motions, normalised to the added mass that is stated.
+/// Each mode mixed with its neighbours and two rigid motions, normalised to the recorded added mass.
 Bank make_coupled_bank(int n = 2, std::size_t modes = kModes) {
   Bank bank = example::make_radiating_bank(n, modes);
   Mixing& mixing = bank.multipoles.mixing;
@@ -50,7 +50,7 @@ Bank make_coupled_bank(int n = 2, std::size_t modes = kModes) {
   return bank;
 }
 
-/// Of a mode from a motion; 0 where it has none.
+/// Part of `motion` in `mode`; 0 if absent.
 double find_part(const Mixing& mixing, std::size_t mode, std::size_t motion) {
   std::size_t at = 0;
   for (std::size_t m = 0; m < mode; ++m) at += static_cast<std::size_t>(mixing.count[m]);
@@ -66,7 +66,7 @@ void expect_same(const Mixing& a, const Mixing& b) {
 }
 
 TEST(RigidMotions, HaveUnitModalMassAndAreOrthogonal) {
-  // Eight masses at corners of a box that is turned: their sums are the inertia.
+  // Eight masses at the corners of a rotated box: their sums are the inertia.
   const double turn = 0.5;
   RigidBody rigid{.mass_kg = 0.0, .centre_m = {1.0, -2.0, 0.5}};
   std::vector<Vec3> places;
@@ -114,7 +114,7 @@ const Spoiled kSpoiled[] = {
     {"too_many_parts", [](Mixing& m) { m.count[8] += 1; }, "radiation/mixing_count[8] is"},
     {"largest_count", [](Mixing& m) { m.count[3] = std::numeric_limits<std::int32_t>::max(); }, "radiation/mixing_count[3] is"},
     {"part_left", [](Mixing& m) { m.count[8] -= 1; }, "radiation/mixing_motion holds"},
-    {"mode_missing", [](Mixing& m) { m.count.pop_back(); }, "radiation/mixing_count holds 8 values and 9 are wanted"},
+    {"mode_missing", [](Mixing& m) { m.count.pop_back(); }, "radiation/mixing_count holds 8 values, 9 are required"},
     {"value_missing", [](Mixing& m) { m.part.pop_back(); }, "radiation/mixing_part holds"},
     {"motion_negative", [](Mixing& m) { m.motion[0] = -1; }, "radiation/mixing_motion[0] is -1"},
     {"motion_beyond", [](Mixing& m) { m.motion[3] = 15; }, "radiation/mixing_motion[3] is 15"},
@@ -189,7 +189,7 @@ TEST(PlayedCoupled, HasTheShapesAndDecaysOfTheSums) {
       }
       EXPECT_NEAR(played.decay_per_s[m], decay + bank.multipoles.decay_per_s[of], 1e-9 * played.decay_per_s[m]);
       EXPECT_NEAR(played.supports.reaction[12 * m + 2], reaction, 1e-9 * std::abs(reaction));
-      // Each mode moves less by what the air takes; rigid motions by hand, of a box along the axes of the mesh.
+      // Each mode moves less by the added mass; rigid motions explicitly, for a box along the mesh axes.
       for (const std::size_t vertex : {0U, 7U, 25U}) {
         Vec3 wanted{};
         for (std::size_t j = 0; j < kModes; ++j) wanted = wanted + find_part(bank.multipoles.mixing, of, j) * bank.shape_at(vertex, j);
@@ -204,7 +204,7 @@ TEST(PlayedCoupled, HasTheShapesAndDecaysOfTheSums) {
         for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(found[c], wanted[c], 0.51 * played.shape_scale[m]) << m << " " << vertex;
       }
     }
-    // A second call changes nothing.
+    // Idempotent.
     const Bank twice = choose_frequencies(played, frequencies);
     EXPECT_EQ(twice.shape, played.shape);
     EXPECT_EQ(twice.decay_per_s, played.decay_per_s);
@@ -229,14 +229,14 @@ TEST(PlayedCoupled, NonlinearEnergyIsThatOfTheCorrectedSums) {
   for (std::size_t i = 0; i < 2 * count_pairs(kModes); ++i)
     bank.quartic.rows.push_back(static_cast<float>(1e6 * std::sin(0.7 * static_cast<double>(i * i))));
   const Bank played = calc_corrected(bank);
-  // Modes that all are c times lower are softer by c^2, in large motion too; then the motion of the modes in air is that of the sums.
+  // Modes lower by the factor c are softer by c^2, also in large motion; then the motion of the modes in air is that of the sums.
   std::vector<double> q(kModes), sums(kModes), none(kModes);
   for (std::size_t i = 0; i < kModes; ++i) q[i] = 1e-3 * std::cos(2.0 * static_cast<double>(i));
   for (std::size_t i = 0; i < kModes; ++i)
     for (std::size_t j = 0; j < kModes; ++j) sums[j] += find_part(bank.multipoles.mixing, i, j) * q[i];
   const double wanted = kFactor * kFactor * calc_energy_j(bank.quartic, sums, none);
   EXPECT_NEAR(calc_energy_j(played.quartic, q, none) / wanted, 1.0, 1e-5);
-  // At the frequencies of the mesh modes harden by as much, and on the way over them nothing is lost.
+  // At the frequencies of the mesh the relative hardening is equal, and the way over them is lossless.
   const Bank mesh = choose_frequencies(bank, Frequencies::kMesh), twice = calc_corrected(mesh);
   const std::vector<double> in_air = calc_self_coupling(played.quartic), by_mesh = calc_self_coupling(mesh.quartic);
   for (std::size_t m = 0; m < kModes; ++m)

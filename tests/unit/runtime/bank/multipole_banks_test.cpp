@@ -162,7 +162,7 @@ TEST(MultipoleFile, ChangedInsideItsArraysIsRefusedOrSane) {
   for (const bool is_packed : {false, true}) {
     const Bank bank = example::make_radiating_bank(1, kModes);
     const std::string bytes = is_packed ? make_packed_bytes(calc_packed(bank, -40.0)) : make_bank_bytes(bank);
-    // Where the seal has the group's arrays.
+    // Positions of the group's arrays in the seal.
     std::vector<std::size_t> places;
     for (std::size_t at = bytes.find("field radiation/"); at != std::string::npos; at = bytes.find("field radiation/", at + 1)) {
       const std::size_t type = bytes.find(' ', at + 6) + 1, offset = bytes.find(' ', type) + 1;
@@ -192,7 +192,7 @@ TEST(MultipoleFile, ChangedInsideItsArraysIsRefusedOrSane) {
 
 // ---- fewer modes, other orders ----
 
-/// The coefficients of a mode [Pa s m^-1 kg^-1/2].
+/// Coefficients of a mode [Pa s m^-1 kg^-1/2].
 std::vector<double> list_coefficients(const Multipoles& air, std::size_t mode) {
   std::size_t first = 0;
   for (std::size_t m = 0; m < mode; ++m) first += static_cast<std::size_t>(2 * (air.order[m] + 1) * (air.order[m] + 1));
@@ -239,7 +239,7 @@ TEST(MultipoleSelection, ReducedBanksAreSane) {
   }
 }
 
-// ---- what is played ----
+// ---- playing ----
 
 TEST(PlayedInAir, HasFrequenciesInAirWithTheDecaysOfRadiation) {
   const Bank bank = example::make_radiating_bank(2, kModes), played = calc_corrected(bank);
@@ -254,7 +254,7 @@ TEST(PlayedInAir, HasFrequenciesInAirWithTheDecaysOfRadiation) {
     EXPECT_NEAR(played.freq_hz(m) / wanted[m], 1.0, 1e-14);
     EXPECT_NEAR(played.decay_per_s[m], bank.corrected.decay_per_s[of] + bank.multipoles.decay_per_s[of], 1e-12);
     expect_mode(played.multipoles, m, bank.multipoles, of);
-    // The power of the gain over a sphere of 1 m, over twice the energy 1/2.
+    // Power of the gain over a sphere of 1 m, over twice the energy 1/2.
     const double power = 4.0 * std::numbers::pi * std::pow(played.radiation_gain[m], 2) / (2.0 * 1.21 * 343.0);
     EXPECT_NEAR(power / bank.multipoles.decay_per_s[of], 1.0, 1e-12);
     EXPECT_EQ(played.discretisation_error_cents[m], bank.corrected.error_cents[of]);
@@ -307,7 +307,7 @@ TEST(PlayedInAir, TheMeshsFrequenciesStayWhereTheyAreWanted) {
   }
 }
 
-// The elastic body gives its supports what its shape strains; air around it changes the frequency alone.
+// Supports see the elastic body's shape; the surrounding air changes the frequency only.
 TEST(PlayedInAir, ReactionsAreThoseOfTheCorrectedBody) {
   Bank bank = example::make_radiating_bank(2, kModes);
   bank.supports = example::make_supported_bank(2, kModes).supports;
@@ -333,7 +333,7 @@ TEST(PlayedInAir, ADecayBelowThatOfRadiationIsAFault) {
   played.decay_per_s[4] = 0.99 * played.multipoles.decay_per_s[4];
   const std::vector<std::string> faults = find_faults(played);
   ASSERT_EQ(faults.size(), 1u);
-  EXPECT_NE(faults[0].find("radiation alone takes"), std::string::npos) << faults[0];
+  EXPECT_NE(faults[0].find("radiation alone gives"), std::string::npos) << faults[0];
 }
 
 // ---- edits ----

@@ -1,4 +1,4 @@
-// Multipoles of a bank: their decays and rounding in closed form, and their faults.
+// Multipoles of a bank: decays and rounding in closed form, and faults.
 #include "runtime/bank/multipoles.hpp"
 
 #include <gtest/gtest.h>
@@ -67,7 +67,7 @@ TEST(CoefficientDecays, AreTheClosedFormsOfASphereThatPulsatesAndTrembles) {
   }
 }
 
-// What rounding takes of the decay, against the sum of the coefficients as they were.
+// Rounding error of the decay, against the unrounded sum.
 TEST(CoefficientDecays, RoundingIsBoundedAndTheBoundIsOfItsSize) {
   std::mt19937 random(3);
   std::normal_distribution<double> normal;
@@ -82,7 +82,7 @@ TEST(CoefficientDecays, RoundingIsBoundedAndTheBoundIsOfItsSize) {
     for (std::int32_t l = 0; l <= order; ++l)
       for (std::int32_t i = 0; i < 2 * l + 1; ++i) {
         a.emplace_back(normal(random), normal(random));
-        if (l < order) a.back() *= 2e-4;  // the steps are those of the highest order
+        if (l < order) a.back() *= 2e-4;  // the highest order sets the step
         sum += std::norm(a.back()) / static_cast<double>(calc_hankel_square(k * air.radius_m, l));
       }
     air.freq_hz = {hz};
@@ -110,7 +110,7 @@ TEST(Multipoles, CoefficientsAreRoundedToTheNearestStepAndOthersAreRefused) {
   EXPECT_EQ(air.order.size(), 2u);
 }
 
-// ---- what is sane ----
+// ---- validity ----
 
 struct Spoiled {
   const char* name;
@@ -136,7 +136,7 @@ const Spoiled kSpoiled[] = {
     {"decay_of_another_mode", [](Bank& b) { std::swap(b.multipoles.decay_per_s[1], b.multipoles.decay_per_s[2]); }, "radiate"},
     {"other_coefficient", [](Bank& b) { b.multipoles.coefficient[1] = static_cast<std::int16_t>(b.multipoles.coefficient[1] + 40); },
      "radiation/decay[0] is"},
-    {"other_air", [](Bank& b) { b.multipoles.air_density_kg_m3 = 1.2; }, "and the coefficients radiate"},
+    {"other_air", [](Bank& b) { b.multipoles.air_density_kg_m3 = 1.2; }, "the coefficients give"},
     {"negative_decay", [](Bank& b) { b.multipoles.decay_per_s[2] = -1e-3; }, "radiation/decay[2] is -0.001"},
     {"radius_zero", [](Bank& b) { b.multipoles.radius_m = 0.0; }, "radiation/radius_m is 0"},
     {"radius_nan", [](Bank& b) { b.multipoles.radius_m = kNan; }, "radiation/radius_m[0] is nan"},
@@ -159,7 +159,7 @@ const Spoiled kSpoiled[] = {
      "radiation/order[8] is 2147483647"},
     {"order_of_other_coefficients", [](Bank& b) { b.multipoles.order[8] += 1; }, "radiation/coefficient holds"},
     {"coefficients_missing", [](Bank& b) { b.multipoles.coefficient.resize(b.multipoles.coefficient.size() - 2); }, "coefficient holds"},
-    {"mode_missing", [](Bank& b) { b.multipoles.added_mass.pop_back(); }, "radiation/added_mass holds 8 values and 9 are wanted"},
+    {"mode_missing", [](Bank& b) { b.multipoles.added_mass.pop_back(); }, "radiation/added_mass holds 8 values, 9 are required"},
 };
 
 INSTANTIATE_TEST_SUITE_P(, MultipoleFaults, testing::ValuesIn(kSpoiled), [](const auto& info) { return std::string(info.param.name); });
@@ -182,7 +182,7 @@ TEST(Multipoles, InAHalfSpaceAllDecaysAreHalfThoseOfTheField) {
   bank.multipoles.decay_per_s[7] *= 2.0;
   const std::vector<std::string> faults = find_faults(bank);
   ASSERT_FALSE(faults.empty());
-  EXPECT_NE(faults[0].find("and the coefficients radiate"), std::string::npos) << faults[0];
+  EXPECT_NE(faults[0].find("the coefficients give"), std::string::npos) << faults[0];
 }
 
 TEST(Multipoles, AreSaneOnASurfaceThatPackingHasMoved) {
@@ -190,7 +190,7 @@ TEST(Multipoles, AreSaneOnASurfaceThatPackingHasMoved) {
   const Bank packed = calc_packed(bank, -40.0).bank;
   double farthest = 0.0;
   for (const Vec3& x : packed.vertices_m) farthest = std::max(farthest, norm(x - bank.multipoles.centre_m));
-  EXPECT_GT(farthest, bank.multipoles.radius_m) << "the case is the one in question";
+  EXPECT_GT(farthest, bank.multipoles.radius_m) << "precondition of the case";
   EXPECT_EQ(find_faults(packed), std::vector<std::string>{});
 }
 

@@ -1,4 +1,4 @@
-// The nearest place of a surface, against the definition: no other place of the surface is nearer.
+// Closest surface point against its definition: no other surface point is closer.
 #include "runtime/bank/nearest.hpp"
 
 #include <gtest/gtest.h>
@@ -22,7 +22,7 @@ Vec3 calc_place(const Bank& bank, std::size_t triangle, const Vec3& weight) {
   return place;
 }
 
-/// Triangles without order: some of no area, some of no length.
+/// Random triangles, some of zero area or zero length.
 Bank make_heap(int triangles, std::mt19937& random) {
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
   Bank bank;

@@ -1,4 +1,4 @@
-// Packed banks: the error that they state, what else they keep, and damaged ones.
+// Packed banks: stated error, invariants, damaged files.
 #include "runtime/bank/pack.hpp"
 
 #include <gtest/gtest.h>
@@ -15,13 +15,13 @@
 #include "tests/support/folder.hpp"
 #include "tests/unit/runtime/bank/bank_arrays.hpp"
 #include "tests/unit/runtime/bank/example_bank.hpp"
-#include "tests/unit/runtime/bank/seal_again.hpp"
 #include "tests/unit/runtime/bank/packed/surfaces.hpp"
+#include "tests/unit/runtime/bank/seal_again.hpp"
 
 namespace carillon::bank {
 namespace {
 
-/// A ball of steel of 100 mm with smooth shapes, which may be fixed where z > 80 mm.
+/// Steel ball of 100 mm with smooth shapes, optionally fixed for z > 80 mm.
 Bank make_ball_bank(int divisions, std::size_t modes, bool is_fixed = false) {
   Bank bank = example::make_first_bank(1, modes);
   const packed::example::Mesh mesh = packed::example::shuffle(packed::example::make_ball(divisions, 0.1), 5);
@@ -47,7 +47,7 @@ Bank make_ball_bank(int divisions, std::size_t modes, bool is_fixed = false) {
   return bank;
 }
 
-/// The vertex of the original at each place of a packed bank: the only one within a 20,000th of the body's size.
+/// Original vertex of each packed one: the only one within a 20,000th of the body's size.
 std::vector<std::size_t> find_original(const Bank& packed, const Bank& original, double size_m) {
   std::vector<std::size_t> from;
   for (const Vec3& x : packed.vertices_m) {
@@ -64,7 +64,7 @@ struct Error {
   double of_95_percent_db, worst_db;
 };
 
-/// Computed again: of a bank whose whole surface faces the air.
+/// Independent calculation, for a bank whose whole surface faces the air.
 Error calc_error(const Bank& packed, const Bank& original, double size_m) {
   const std::vector<std::size_t> from = find_original(packed, original, size_m);
   const std::vector<double> exposure = calc_blow_exposure(original);
@@ -77,7 +77,7 @@ Error calc_error(const Bank& packed, const Bank& original, double size_m) {
       areas[v] += norm(twice) / 6.0;
     }
   }
-  // Of a blow three degrees off the normal; nothing is heard less than 2^-20 of the loudest place.
+  // Blow three degrees off the normal; floor at 2^-20 of the loudest place.
   const auto weigh = [&](const Vec3& x, const Vec3& n) { return std::pow(dot(x, n), 2) + 0.0027 * dot(x, x); };
   std::vector<double> heard(packed.vertex_count(), 0.0), missed(packed.vertex_count(), 0.0);
   for (std::size_t v = 0; v < packed.vertex_count(); ++v) {
@@ -143,7 +143,7 @@ TEST(Pack, a_ball_takes_less_than_a_fifth_of_its_bytes_and_fewer_for_a_greater_e
   EXPECT_LT(coarse, fine);
 }
 
-// What goes in comes out: what is heard of blows all over the body, the triangles, the area and the volume.
+// Conserved: total audible energy of blows, triangles, area and volume.
 TEST(Pack, conserves_what_is_heard_in_all_and_the_volume) {
   const Bank bank = make_ball_bank(3, 9);
   const auto calc_volume_m3 = [](const Bank& of) {
@@ -161,13 +161,13 @@ TEST(Pack, conserves_what_is_heard_in_all_and_the_volume) {
     EXPECT_EQ(packed.vertex_count(), bank.vertex_count());
     EXPECT_EQ(packed.mode_count(), bank.mode_count());
     EXPECT_NEAR(calc_volume_m3(packed) / calc_volume_m3(bank), 1.0, 1e-5);
-    // |E' - E| <= 2 sqrt(E e) + e, with the error e of all places.
+    // |E' - E| <= 2 sqrt(E e) + e, with e the error over all places.
     const double error = std::pow(10.0, packed.packing->worst_db / 20.0);
     EXPECT_NEAR(calc_heard(packed) / calc_heard(bank), 1.0, 2.0 * error + error * error) << asked_db;
   }
 }
 
-// What is not heard at a place that cannot move must not become heard.
+// Places at rest must remain inaudible.
 TEST(Pack, places_that_are_fixed_stay_at_rest) {
   const Bank bank = make_ball_bank(3, 9, true);
   ASSERT_EQ(find_faults(bank), std::vector<std::string>{});
@@ -211,7 +211,7 @@ TEST(Pack, bodies_with_cavities_are_packed_and_their_walls_are_near_to_what_they
 // ---- files ----
 
 void expect_same(const Bank& a, const Bank& b) {
-  EXPECT_EQ(make_bank_bytes(a), make_bank_bytes(b));  // all but the packing
+  EXPECT_EQ(make_bank_bytes(a), make_bank_bytes(b));  // except the packing
   EXPECT_EQ(a.shape, b.shape);
   EXPECT_EQ(a.shape_bytes, b.shape_bytes);
   EXPECT_EQ(a.vertices_m, b.vertices_m);
@@ -370,12 +370,12 @@ TEST(Pack, whose_shapes_contradict_its_witnesses_is_read_by_no_program) {
   const Bank bank = make_ball_bank(3, 9);
   PackedBank packed = calc_packed(bank, -60.0);
   EXPECT_NO_THROW((void)parse_bank(bytes_of(make_packed_bytes(packed))));
-  packed.shape = calc_packed(bank, -12.0).shape;  // under the errors and witnesses of the finer packing
+  packed.shape = calc_packed(bank, -12.0).shape;  // with the errors and witnesses of the finer packing
   try {
     (void)parse_bank(bytes_of(make_packed_bytes(packed)));
     FAIL() << "it was read";
   } catch (const InputError& error) {
-    EXPECT_NE(std::string(error.what()).find("not a sane bank: the error is"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("not a valid bank: the error is"), std::string::npos) << error.what();
   }
 }
 
@@ -398,7 +398,7 @@ TEST(Pack, is_described_in_words) {
 
 // ---- damaged files ----
 
-/// False when the bytes are refused.
+/// False if the bytes are rejected.
 bool try_read(std::string_view bytes) {
   try {
     const Bank bank = parse_bank(bytes_of(bytes));
@@ -426,11 +426,11 @@ TEST(Pack, files_that_are_cut_or_changed_are_refused_or_sane) {
     EXPECT_FALSE(try_read(changed)) << at;
     sane += try_read(seal_again(changed)) ? 1 : 0;
   }
-  EXPECT_GT(sane, 50u);  // HDF5's own structure is not looked at
+  EXPECT_GT(sane, 50u);  // HDF5's own structure is not checked
   EXPECT_LT(sane, 600u);
 }
 
-// What a bank says of its packed parts is in the right place and damaged: flips inside of the two packed arrays alone.
+// Bit flips inside the two packed arrays only.
 TEST(Pack, files_with_damaged_surfaces_and_shapes_are_refused_or_sane) {
   const PackedBank packed = calc_packed(example::make_bank(2, 5), -40.0);
   std::mt19937 random(18);

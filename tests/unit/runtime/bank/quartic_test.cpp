@@ -1,4 +1,4 @@
-// The nonlinear energy of a bank: its sums, its way through files, and what becomes of it when a bank is cut, edited and played.
+// Nonlinear energy of a bank: sums, files, selection, edits and playing.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -115,7 +115,7 @@ TEST(QuarticEnergy, OfPointsIsTheEnergyOfGreensStrain) {
     energy.weight = {0.5};
     energy.stress = parts == 6 ? std::vector<float>{3.0F, -1.0F, 2.0F} : std::vector<float>{3.0F, -1.0F, 2.0F, 5.0F, -4.0F, 1.0F};
     double eta = 3.0 * find_strain(0, 0) - find_strain(1, 1);
-    // Shear strains are those of engineers: twice the tensor's.
+    // Engineering shear strains: twice the tensor's.
     eta += parts == 6 ? 2.0 * 2.0 * find_strain(0, 1)
                       : 2.0 * find_strain(2, 2) + 2.0 * (5.0 * find_strain(1, 2) - 4.0 * find_strain(0, 2) + find_strain(0, 1));
     EXPECT_NEAR(find_energy(energy, {0.3}), 0.5 * std::pow(0.5 * eta * 0.09, 2), 1e-12) << parts;
@@ -231,7 +231,7 @@ TEST(QuarticFile, ArraysOfOtherSizesAndTypesAreRefused) {
       if (!name.starts_with("nonlinear/")) continue;
       Arrays missing(bank);
       missing.list.erase(missing.list.begin() + static_cast<std::ptrdiff_t>(i));
-      if (name != "nonlinear/linear") {  // of a flat body, then
+      if (name != "nonlinear/linear") {  // a flat body without it
         EXPECT_NE(missing.find_error(), "") << name;
       }
       for (const std::vector<std::uint64_t>& shape :
@@ -262,7 +262,7 @@ TEST(QuarticFile, ChangedBytesGiveABankOrAnError) {
     for (int trial = 0; trial < 400; ++trial) {
       std::string bytes = whole;
       for (unsigned i = 0; i < 1 + chance() % 3; ++i) {
-        // Half of them in the lines of the seal for these arrays.
+        // Half of the flips in the seal's lines for these arrays.
         const std::size_t at = trial % 2 == 0 ? line + chance() % 600 : kSealBytes + chance() % (bytes.size() - kSealBytes);
         bytes[at] = static_cast<char>(trial % 2 == 0 ? "0123456789 \n<fi"[chance() % 15] : chance() % 256);
       }
@@ -286,7 +286,7 @@ TEST(QuarticEdits, CutKeepsTheEnergyOfTheModesThatStay) {
   for (const Kind kind : kKinds) {
     Bank bank = make_nonlinear_bank(kind);
     const QuarticEnergy whole = bank.quartic;
-    select_modes(bank, {7, 0, 4, 1, 8});  // in another order: coupled are numbers 0, 2 and 3 now
+    select_modes(bank, {7, 0, 4, 1, 8});  // reordered: indices 0, 2 and 3 are coupled now
     EXPECT_EQ(bank.quartic.modes, (std::vector<std::int32_t>{0, 2, 3}));
     EXPECT_EQ(find_size_fault(bank.quartic), "");
     const double q1 = 1e-3, q4 = -7e-4, q7 = 4e-4;
@@ -301,18 +301,17 @@ TEST(QuarticEdits, CutKeepsTheEnergyOfTheModesThatStay) {
 }
 
 TEST(QuarticEdits, FollowDensityStiffnessAndSize) {
-  // eta goes with the root of modulus and volume times a strain, which is phi q over a length squared: by hand, another way than the
-  // code's.
+  // eta scales with the root of modulus and volume times a strain, phi q over a length squared: derived independently of the code.
   for (const Kind kind : kKinds) {
     const Bank bank = make_nonlinear_bank(kind);
     const double s = 1.7, k = 2.3, g = 0.6;
     const Bank edited = calc_edited(bank, {.density_scale = s, .stiffness_scale = k, .size_scale = g});
     EXPECT_EQ(find_faults(edited), std::vector<std::string>{});
-    // The same motion in units of the size: phi' q' = g phi q, phi' = phi / sqrt(s g^3).
+    // The same motion relative to the size: phi' q' = g phi q, phi' = phi / sqrt(s g^3).
     const std::vector<double> q{1e-3, -2e-3, 5e-4, 1.5e-3};
     std::vector<double> larger;
     for (const double x : q) larger.push_back(x * g * std::sqrt(s * g * g * g));
-    // Strains are the same, and the energy is the modulus times the volume.
+    // Equal strains: the energy scales with modulus times volume.
     EXPECT_NEAR(find_energy(edited.quartic, larger) / find_energy(bank.quartic, q), k * g * g * g, 1e-6 * k);
     EXPECT_NEAR(edited.quartic.rest_energy_j, bank.quartic.rest_energy_j * k * g * g * g, 1e-15);
     EXPECT_NEAR(edited.quartic.thickness_m, g * 1e-3, 1e-15);
@@ -324,7 +323,7 @@ TEST(QuarticEdits, HardeningIsTheSameAtThePlayedFrequencies) {
   const Bank bank = make_nonlinear_bank(Kind::kCurvedRows);
   const Bank played = calc_corrected(bank);
   EXPECT_EQ(find_faults(played), std::vector<std::string>{});
-  // Of each coupled mode, V at the same motion over its linear energy.
+  // V of each coupled mode at the same motion over its linear energy.
   const std::vector<double> before = calc_self_coupling(bank.quartic), after = calc_self_coupling(played.quartic);
   const std::vector<std::size_t> order = sort_played_modes(bank);
   int found = 0;

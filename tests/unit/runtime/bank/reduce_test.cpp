@@ -51,7 +51,7 @@ TEST(Reduce, AGroupOfDegenerateModesEndsWhereTheListEnds) {
   EXPECT_EQ(four.proof->cluster_count, (std::vector<std::int64_t>{3}));
 }
 
-// A mode's mean square over the surface and its exposure, by sums over the triangles written out here.
+// Mean square of a mode over the surface and its exposure, by explicit sums over the triangles.
 TEST(Reduce, TheLoudestModesAreThoseOfTheMostExposureWithinTheEarsTime) {
   const Bank bank = example::make_bank(3, 12);
   const std::vector<double> audibility = calc_audibility(bank);
@@ -70,8 +70,8 @@ TEST(Reduce, TheLoudestModesAreThoseOfTheMostExposureWithinTheEarsTime) {
       }
       area += twice;
     }
-    // The exposure by quadrature of p(t)^2 e^(-t / 0.2 s) over whole periods: half of that of the envelope.
-    // A Gaussian pulse of the variance of sin^1.5 over 0.1 ms, by quadrature: its spectrum is exp(-(omega sigma)^2 / 2).
+    // Exposure by quadrature of p(t)^2 e^(-t / 0.2 s) over whole periods: half of that of the envelope. Spectrum of a Gaussian pulse with
+    // the variance of sin^1.5 over 0.1 ms, by quadrature: exp(-(omega sigma)^2 / 2).
     double weight = 0.0, second = 0.0;
     for (int n = 0; n < 10000; ++n) {
       const double x = (n + 0.5) / 10000.0, force = std::pow(std::sin(3.14159265358979 * x), 1.5);
@@ -105,7 +105,7 @@ TEST(Reduce, ShapesAreRoundedToTheNearestStepAndKeptInOneByte) {
     const Bank reduced = calc_reduced(bank, {.shape_bits = bits});
     EXPECT_EQ(find_faults(reduced), std::vector<std::string>{});
     EXPECT_TRUE(reduced.complete && reduced.proof.has_value());
-    const double half = 0.5 * 32767.0 / ((1 << (bits - 1)) - 1);  // of a coarse step, in fine ones
+    const double half = 0.5 * 32767.0 / ((1 << (bits - 1)) - 1);  // half a coarse step, in fine ones
     for (std::size_t v = 0; v < bank.vertex_count(); ++v) {
       for (std::size_t m = 0; m < bank.mode_count(); ++m) {
         const Vec3 fine = bank.shape_at(v, m), coarse = reduced.shape_at(v, m);
@@ -131,7 +131,7 @@ TEST(Reduce, WhatMeansNothingIsRefused) {
   EXPECT_TRUE(whole.complete && whole.proof.has_value());
   EXPECT_EQ(whole.shape, bank.shape);
   Bank wide = bank;
-  wide.shape_bytes = 1;  // its shapes go to 32767
+  wide.shape_bytes = 1;  // shapes reach 32767
   ASSERT_FALSE(find_faults(wide).empty());
   EXPECT_NE(find_faults(wide)[0].find("one byte"), std::string::npos);
   EXPECT_EQ(calc_reduced(example::make_bank(2, 0), {.modes = 3, .shape_bits = 8}).mode_count(), 0u);

@@ -1,4 +1,4 @@
-// The seal of bank bytes that were changed, made to match them again.
+// Renewal of the seal of modified bank bytes.
 #pragma once
 
 #include <span>
@@ -9,14 +9,14 @@
 
 namespace carillon::bank {
 
-/// The length in line 2 and the SHA-256 made right.
+/// Corrects the length in line 2 and the SHA-256.
 inline std::string seal_again(std::string bytes) {
   const std::size_t line = bytes.find('\n') + 1;
   const std::size_t end = bytes.find('\n', line);
   if (line == 0 || end == std::string::npos || end >= kTextBytes || bytes.size() < kSealBytes) return bytes;
   std::string length = "length " + std::to_string(bytes.size());
   if (line + length.size() > kTextBytes) return bytes;
-  // The text keeps its place: a length of other digits is cut from, or put into, the padding at its end.
+  // The text keeps its position: a change of digits is taken from the padding at its end.
   std::string text = bytes.substr(0, line) + length + bytes.substr(end, kTextBytes - end);
   text.resize(kTextBytes, '\n');
   bytes.replace(0, kTextBytes, text);

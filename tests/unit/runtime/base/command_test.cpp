@@ -1,4 +1,4 @@
-// Programs are started, fed, listened to, stopped, and never leave a zombie. With real programs.
+// Child processes with real programs: start, input, output, termination, no zombies.
 #include "runtime/base/command.hpp"
 
 #include <fcntl.h>
@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 
 Command make_shell(const std::string& script) { return {.words = {"sh", "-c", script}, .output = kCapture, .errors = kCapture}; }
 
-/// Descriptors that this process has open.
+/// Open descriptors of this process.
 std::ptrdiff_t count_descriptors() { return std::distance(fs::directory_iterator("/proc/self/fd"), fs::directory_iterator()); }
 
 TEST(Command, gives_what_a_program_prints_and_how_it_ended) {
@@ -36,7 +36,7 @@ TEST(Command, gives_what_a_program_prints_and_how_it_ended) {
 }
 
 TEST(Command, is_no_rank_of_the_run_that_this_process_is_in) {
-  // Variables of mpirun (Open MPI 4.1) for a rank, and settings of its users.
+  // Per-rank variables of mpirun (Open MPI 4.1), and user settings.
   for (const char* name : {"OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_RANK", "OMPI_MCA_ess", "OMPI_MCA_orte_hnp_uri", "PMIX_RANK", "PMIX_ID",
                            "PRTE_LAUNCHED", "PMI_RANK", "OMPI_MCA_btl", "PRTE_MCA_rmaps_default_mapping_policy", "SLURM_JOB_ID"})
     ::setenv(name, "x", 1);
@@ -90,7 +90,7 @@ TEST(Command, what_cannot_be_started_is_an_error_with_its_reason) {
   EXPECT_EQ(::waitpid(-1, nullptr, WNOHANG), -1) << "a zombie";
 }
 
-TEST(Command, slow_long_and_stopped_programs_are_killed) {  // one that is not outlives the time limit of this test
+TEST(Command, slow_long_and_stopped_programs_are_killed) {  // a survivor exceeds the time limit of this test
   EXPECT_TRUE(run({.words = {"sleep", "1000"}, .output = kCapture}, {.patience_s = 0.2}).was_slow);
   EXPECT_TRUE(run(make_shell("exec >&- 2>&-; sleep 1000"), {.patience_s = 0.2}).was_slow) << "it has closed its outputs";
   EXPECT_TRUE(run(make_shell("yes"), {.max_bytes = 100000}).was_long);
@@ -139,7 +139,7 @@ TEST(Command, signals_that_this_process_ignores_stay_ignored_unless_asked) {
   EXPECT_EQ(by_default.output, "");
 }
 
-// As under a parent that ignores the ends of its children: the kernel would drop their status.
+// As under a parent that ignores SIGCHLD: the kernel would discard the status.
 TEST(Command, the_status_of_a_child_is_never_lost) {
   ::signal(SIGCHLD, SIG_IGN);
   const Finished failed = run(make_shell("exit 7"));

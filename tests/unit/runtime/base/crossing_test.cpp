@@ -1,4 +1,4 @@
-// Where functions with known roots change their sign.
+// Roots of functions with known roots.
 #include "runtime/base/crossing.hpp"
 
 #include <gtest/gtest.h>

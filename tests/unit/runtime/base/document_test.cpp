@@ -11,7 +11,7 @@ namespace base = carillon::base;
 
 base::Object parse(const std::string& text) { return base::parse_document(text, "some/dir/file.json").root(); }
 
-/// The message that `act` throws; the test fails when it throws nothing.
+/// Message thrown by `act`; fails the test if none is thrown.
 template <class Act>
 std::string message_of(Act act) {
   try {
@@ -126,7 +126,7 @@ TEST(Document, numbers_are_those_of_json_and_nothing_else) {
 }
 
 TEST(Document, numbers_are_the_nearest_doubles) {
-  // C's strtod is the oracle; zeros in long forms, halves between two doubles, and both ends of the range.
+  // Reference: C's strtod. Zeros in long forms, midpoints between doubles, and both ends of the range.
   for (const char* text : {"0",
                            "-0.0",
                            "0e-30",
@@ -197,7 +197,7 @@ TEST(Document, an_excerpt_has_its_values_at_their_lines_of_the_file) {
   EXPECT_NE(message_of([&] { bowl.finish(); }).find("file.json:6:"), std::string::npos);
   whole.string("name");
   whole.boolean_or("fixed", false);
-  whole.finish();  // what is in the excerpt was asked for
+  whole.finish();  // all keys of the excerpt were requested
   EXPECT_EQ(parse("{}").make_excerpt({"a"}).text, "{}\n");
 }
 

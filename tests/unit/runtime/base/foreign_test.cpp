@@ -1,4 +1,4 @@
-// Texts in UTF-16, paths with backslashes, and files beyond the limit on their size.
+// UTF-16 text, paths with backslashes, and files beyond the size limit.
 #include "runtime/base/foreign.hpp"
 
 #include <gtest/gtest.h>
@@ -73,7 +73,7 @@ TEST(Foreign, a_backslash_in_the_name_of_a_file_that_is_there_is_no_fault) {
   EXPECT_EQ(job.path("mesh"), folder / "a\\b.msh");
 }
 
-/// Exit code 0: an error that names the limit, and no file.
+/// Exit code 0: the error names the limit, and there is no file.
 [[noreturn]] void write_beyond_limit(const std::filesystem::path& file) {
   report_file_limit();
   const rlimit limit{20'000, 20'000};

@@ -27,7 +27,7 @@ TEST(HankelQuotients, AreThoseOfTheFunctionsOfTheLibrary) {
   }
 }
 
-// W(j, y) = 1 / x^2 (DLMF 10.50.1) is Im(h_{l-1} / h_l) |h_l|^2: neither sizes nor phases are taken from elsewhere.
+// W(j, y) = 1 / x^2 (DLMF 10.50.1) is Im(h_{l-1} / h_l) |h_l|^2: tests sizes and phases.
 TEST(HankelQuotients, KeepTheWronskian) {
   for (const double x : {1e-3, 0.1, 2.0, 37.0, 300.0}) {
     double square = 1.0 / (x * x);  // |h_l|^2

@@ -59,11 +59,11 @@ TEST(Memory, a_limit_leaves_what_is_not_taken) {
 
 TEST(CpuClock, of_the_process_holds_that_of_the_thread) {
   volatile double x = 0.0;
-  // The readings of the process enclose those of the thread: on a busy machine time passes between any two of them.
+  // Process readings enclose the thread's: on a busy machine time passes between readings.
   const double process_s = get_process_cpu_s(), thread_s = get_thread_cpu_s();
   double used_s = 0.0;
   while ((used_s = get_thread_cpu_s() - thread_s) < 0.02) x = x + 1.0;
-  EXPECT_GE(get_process_cpu_s() - process_s, used_s - 1e-9);  // clocks of 1 ns
+  EXPECT_GE(get_process_cpu_s() - process_s, used_s - 1e-9);  // clock resolution 1 ns
 }
 
 }  // namespace

@@ -10,7 +10,7 @@
 namespace carillon::base {
 namespace {
 
-/// What another process with this environment finds.
+/// Result of another process with this environment.
 int find_with(const std::string& entry) {
   const Finished finished =
       run({.words = {find_self(), "--gtest_filter=Instructions.DISABLED_are_printed", "--gtest_also_run_disabled_tests"},

@@ -20,7 +20,7 @@ base::Object parse(const std::string& text) { return base::parse_document(text, 
 TEST(Json, writes_members_in_the_order_in_which_they_were_set) {
   Json value = Json::object();
   value.set("b", 1).set("a", true).set("c", "text").set("d", Json());
-  value.member("list").add(1).add(2.5).add("x");
+  value["list"].add(1).add(2.5).add("x");
   value.set("b", -3);
   EXPECT_EQ(value.line(), R"({"b": -3, "a": true, "c": "text", "d": null, "list": [1, 2.5, "x"]})");
   EXPECT_EQ(Json::object().line() + Json::array().line() + Json().line(), "{}[]null");
@@ -29,7 +29,7 @@ TEST(Json, writes_members_in_the_order_in_which_they_were_set) {
 TEST(Json, breaks_only_what_does_not_fit_into_a_line) {
   Json value = Json::object();
   value.set("name", "bar").set("box_m", Json::array(std::vector{1.0, 2.0, 3.0}));
-  for (int i = 0; i < 3; ++i) value.member("modes").add(Json::object().set("freq_hz", 100 + i).set("is_rigid", false));
+  for (int i = 0; i < 3; ++i) value["modes"].add(Json::object().set("freq_hz", 100 + i).set("is_rigid", false));
   EXPECT_EQ(value.text(50), R"({
   "name": "bar",
   "box_m": [1, 2, 3],
@@ -85,7 +85,7 @@ TEST(Json, texts_are_read_back_as_they_were) {
     const std::string line = Json::object().set("x", text).line();
     auto read = parse(line);
     EXPECT_EQ(read.string_or("x", ""), text);
-    EXPECT_EQ(base::printable(line), line);  // a terminal obeys nothing in it
+    EXPECT_EQ(base::printable(line), line);  // free of control characters
   }
   EXPECT_EQ(base::quote("\x1b\u202E"), "\"\\u001b\\u202e\"");
 }
@@ -100,8 +100,64 @@ TEST(Json, a_value_that_may_be_absent_is_null_then) {
 
 TEST(Json, only_objects_have_members_and_only_arrays_take_values) {
   EXPECT_THROW(Json(1).set("a", 1), std::logic_error);
-  EXPECT_THROW(Json::array().member("a"), std::logic_error);
+  EXPECT_THROW(Json::array()["a"], std::logic_error);
   EXPECT_THROW(Json::object().add(1), std::logic_error);
+}
+
+TEST(Json, parses_values_and_gives_nothing_for_other_texts) {
+  const Json value =
+      Json::parse("{\"b\": [1, -2.5e3, true, null], // comment\n \"a\": \"\\u00e4\\n\", \"b\": {\"c\": 18446744073709551615}}").value();
+  EXPECT_EQ(value.line(), R"({"a": "ä\u000a", "b": {"c": 18446744073709551615}})");  // the last of equal keys
+  EXPECT_EQ(value["a"].as_string(), "ä\n");
+  EXPECT_EQ(value["b"]["c"].as_double(), 18446744073709551616.0);
+  EXPECT_TRUE(value["none"]["deeper"].is_null());
+  EXPECT_EQ(value.keys(), (std::vector<std::string>{"a", "b"}));
+  EXPECT_THROW((void)value["a"].as_double(), std::logic_error);
+  EXPECT_THROW((void)value["b"].as_string(), std::logic_error);
+  for (const char* text : {"", "[1,]", "[1] 2", "{\"a\" 1}", "[01]", "[1e999]", "'a'", "NaN"}) EXPECT_FALSE(Json::parse(text)) << text;
+  EXPECT_FALSE(Json::parse(std::string("[1\0]", 4)));
+}
+
+TEST(Json, nests_to_a_limit) {
+  const auto nest = [](std::size_t depth) { return std::string(depth, '[') + std::string(depth, ']'); };
+  EXPECT_EQ(Json::parse(nest(100)).value().line(), nest(100));
+  EXPECT_FALSE(Json::parse(nest(101)));
+  EXPECT_FALSE(Json::parse(std::string(1'000'000, '[')));
+}
+
+TEST(Json, sorted_text_has_the_layout_of_records) {
+  Json value = Json::object();
+  value.set("b", Json::array(std::vector{0.1, 2.0}))
+      .set("a", 1)
+      .set("c", "ä\x01\"")
+      .set("d", Json::object())
+      .set("e", base::decimals(0.1, 1));
+  value["f"]["g"].add(Json::array(std::vector{1, 2}));
+  EXPECT_EQ(value.sorted_text(),
+            R"({"a":1,"b":[0.10000000000000001,2.0],"c":"\u00e4\u0001\"","d":{},"e":0.10000000000000001,"f":{"g":[[1,2]]}})");
+  EXPECT_EQ(value.sorted_text({.indentation = "  ", .is_ascii = false}), R"({
+  "a" : 1,
+  "b" : [ 0.10000000000000001, 2.0 ],
+  "c" : "ä\u0001\"",
+  "d" : {},
+  "e" : 0.10000000000000001,
+  "f" : 
+  {
+    "g" : 
+    [
+      [ 1, 2 ]
+    ]
+  }
+})");
+  EXPECT_EQ(Json::array(std::vector{1, 2}).sorted_text({.indentation = " ", .breaks_arrays = true}), "[\n 1,\n 2\n]");
+}
+
+TEST(Json, members_are_removed) {
+  Json value = Json::object().set("a", 1).set("b", 2);
+  value.erase("a");
+  value.erase("c");
+  EXPECT_EQ(value.line(), R"({"b": 2})");
+  EXPECT_FALSE(value.has("a"));
 }
 
 }  // namespace

@@ -15,7 +15,7 @@ namespace {
 using carillon::base::printable;
 using carillon::base::printable_lines;
 
-/// The UTF-8 of one character, written out by the table of RFC 3629.
+/// UTF-8 of a character by the table of RFC 3629.
 std::string encode(std::uint32_t c) {
   const auto byte = [](std::uint32_t value) { return static_cast<char>(value); };
   if (c < 0x80) return {byte(c)};
@@ -85,7 +85,7 @@ TEST(Message, is_cut_where_it_is_too_long_for_a_person) {
   const std::string cut = show_message(words + "; name another");
   EXPECT_LT(cut.size(), 4100U);
   EXPECT_TRUE(cut.ends_with("; name another"));
-  EXPECT_EQ(cut.find("\\x"), std::string::npos);  // whole characters
+  EXPECT_EQ(cut.find("\\x"), std::string::npos);  // cut at characters
 }
 
 TEST(Message, names_a_file_and_not_its_descriptor) {

@@ -10,7 +10,7 @@
 namespace carillon {
 namespace {
 
-/// x turned by q, by the formula of Rodrigues.
+/// Rotation of x by q, by Rodrigues' formula.
 Vec3 turn_by(const Quaternion& q, const Vec3& x) {
   const Vec3 v{q[1], q[2], q[3]};
   return x + 2.0 * cross(v, cross(v, x) + q[0] * x);
@@ -27,7 +27,7 @@ TEST(Quaternion, AProductTurnsAsTheSecondAndThenTheFirst) {
     const Vec3 wanted = turn_by(a, turn_by(b, x)), found = turn_by(multiply(a, b), x);
     for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(found[k], wanted[k], 1e-14);
   }
-  // A quarter about z, then one about x: x goes to y and on to z.
+  // 90 degrees about z, then about x: x goes to y and on to z.
   const double quarter = 0.5 * std::numbers::pi;
   const Vec3 up = turn_by(multiply(turn_about({1, 0, 0}, quarter), turn_about({0, 0, 1}, quarter)), {1, 0, 0});
   EXPECT_NEAR(up[2], 1.0, 1e-15);

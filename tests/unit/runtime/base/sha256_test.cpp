@@ -1,4 +1,4 @@
-// Against the published values of NIST (FIPS 180-4 examples, and the message of a million letters).
+// Published values of NIST: FIPS 180-4 examples, and the message of a million letters.
 #include "runtime/base/sha256.hpp"
 
 #include <gtest/gtest.h>
@@ -28,7 +28,7 @@ TEST(Sha256, knows_no_pieces) {
   EXPECT_EQ(sha.finish(), calc_sha256(text));
 }
 
-// Against OpenSSL: every length around the ends of blocks, and in pieces of every length.
+// Against OpenSSL: all lengths around block boundaries, in pieces of all lengths.
 TEST(PlainSha256, is_that_of_openssl) {
   std::string text(1000, ' ');
   for (std::size_t i = 0; i < text.size(); ++i) text[i] = static_cast<char>(i * 89 + i / 7);

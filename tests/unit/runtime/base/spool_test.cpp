@@ -41,7 +41,7 @@ TEST_F(SpoolTest, what_is_written_is_read_back_from_memory_and_from_the_file) {
         ASSERT_EQ(back, all.substr(from, count)) << memory;
       }
     }
-    EXPECT_TRUE(fs::is_empty(folder_));  // while it is in use as well: a program that is killed leaves nothing
+    EXPECT_TRUE(fs::is_empty(folder_));  // also while in use: a killed program leaves nothing
   }
 }
 
@@ -70,7 +70,7 @@ TEST_F(SpoolTest, records_and_lists_keep_their_order) {
 }
 
 TEST_F(SpoolTest, a_disk_that_is_full_is_one_error_that_names_the_folder) {
-  // A limit on the size of files stands for the disk.
+  // A file size limit replaces a full disk.
   const auto before = std::signal(SIGXFSZ, SIG_IGN);
   rlimit old{};
   ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &old), 0);

@@ -1,4 +1,4 @@
-// Temporary folders after every end of a process, with real signals to real processes.
+// Temporary folders after all ways of ending a process, with real signals.
 #include "runtime/base/temporary.hpp"
 
 #include <fcntl.h>
@@ -27,7 +27,7 @@ class Temporary : public testing::Test {
   }
   ~Temporary() override { fs::remove_all(parent_); }
 
-  /// Status of a process with a full folder that gets the signal inside `wait`.
+  /// Exit status of a process with a full folder that receives the signal inside `wait`.
   template <class Wait>
   int end_one(int signal, const Wait& wait) {
     int ready[2];
@@ -70,13 +70,13 @@ TEST_F(Temporary, goes_with_its_scope_and_stays_when_it_is_kept) {
   std::ofstream(kept / "index.html") << "content";
   keep_temporary_folder(kept);
   (void)TemporaryFolder(parent_, ".page.");
-  EXPECT_EQ(std::distance(fs::directory_iterator(kept), fs::directory_iterator()), 1);  // without the file of the lock
+  EXPECT_EQ(std::distance(fs::directory_iterator(kept), fs::directory_iterator()), 1);  // without the lock file
 }
 
 TEST_F(Temporary, goes_when_a_signal_ends_the_process) {
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
     const int status = end_one(signal, sleep_for_long);
-    EXPECT_TRUE(WIFSIGNALED(status) && WTERMSIG(status) == signal) << status;  // the signal itself, for the caller
+    EXPECT_TRUE(WIFSIGNALED(status) && WTERMSIG(status) == signal) << status;  // terminated by the signal itself
     EXPECT_TRUE(is_empty()) << signal;
   }
 }
@@ -99,7 +99,7 @@ TEST_F(Temporary, of_a_killed_process_goes_with_the_next_one) {
 }
 
 TEST_F(Temporary, spares_what_others_have) {
-  fs::create_directory(parent_ / ".page.backup");  // a user's own folder of a similar name
+  fs::create_directory(parent_ / ".page.backup");  // a user's folder of similar name
   const TemporaryFolder mine(parent_, ".page.");   // in use
   (void)TemporaryFolder(parent_, ".page.");
   EXPECT_TRUE(fs::exists(parent_ / ".page.backup"));

@@ -1,4 +1,4 @@
-// Identities of vector algebra that no component formula is used for.
+// Identities of vector algebra, independent of component formulas.
 #include "runtime/base/vector.hpp"
 
 #include <gtest/gtest.h>

@@ -26,7 +26,7 @@ std::string find(const Event& event) {
   return fault == nullptr ? "" : fault;
 }
 
-/// Spoils one member of an event that is right, and asks what is wrong.
+/// Fault of a valid event after `spoil` changed one member.
 template <class T, class Spoil>
 std::string spoil(T event, Spoil change) {
   EXPECT_EQ(find(event), "");
@@ -52,7 +52,7 @@ TEST(Force, WithAFaultIsFound) {
     EXPECT_EQ(change([&](Force& e) { e.impulse_n_s[2][1] = static_cast<float>(bad); }), "an impulse is not finite");
     EXPECT_EQ(change([&](Force& e) { e.time_s = bad; }), "the time is not finite");
   }
-  EXPECT_EQ(change([](Force& e) { e.impulse_n_s[3][0] = static_cast<float>(kNan); }), "") << "beyond the count nothing is looked at";
+  EXPECT_EQ(change([](Force& e) { e.impulse_n_s[3][0] = static_cast<float>(kNan); }), "") << "values beyond the count are ignored";
   EXPECT_EQ(change([](Force& e) { e.triangle = -1; }), "the index of the triangle is negative");
 }
 

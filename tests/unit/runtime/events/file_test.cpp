@@ -21,7 +21,7 @@ const std::string kImpulse =
     R"({"impulse": {"time_s": 0.5, "body": 0, "triangle": 3, "barycentric": [0.25, 0.25, 0.5], "impulse_n_s": [0, 0, 1e-3], "duration_s": 1e-4}})"
     "\n";
 
-/// A number of any size that is read and any sign, often an awkward one.
+/// Random number of any readable magnitude and sign, often a special value.
 double draw(std::mt19937_64& random) {
   switch (random() % 8) {
     case 0:
@@ -184,9 +184,9 @@ TEST(Recording, ReadsAForceAndRefusesWhatIsNone) {
     expect_error(kHeader + replace(kForce, from, to), says);
   };
   refuse("1e-5", "0", "run.jsonl:2: the length of a step is not above 0");
-  refuse("1e-5", "1", "is more than any that is played");
+  refuse("1e-5", "1", "exceeds the limit");
   refuse("[[0, 0, 1e-3], [0, 0, 2e-3]]", "[]", "impulse_n_s");
-  refuse("2e-3]", "2e10]", "is more than any that is played");
+  refuse("2e-3]", "2e10]", "exceeds the limit");
   refuse("2e-3]", "2e-3, 1]", "impulse_n_s");
   std::string many = "[[0, 0, 1e-3]";
   for (int k = 0; k < kMaxForceSteps; ++k) many += ", [0, 0, 1e-3]";
@@ -282,7 +282,7 @@ TEST(Recording, EveryPieceOfItIsRefusedButTheWhole) {
   const std::string text = format_recording(recording);
   EXPECT_EQ(find_error(text), "");
   for (std::size_t length = 0; length + 1 < text.size(); ++length) {
-    EXPECT_NE(find_error(text.substr(0, length)), "") << length;  // without the last line feed it is whole as well
+    EXPECT_NE(find_error(text.substr(0, length)), "") << length;  // complete without the last line feed, too
   }
 }
 
@@ -312,7 +312,7 @@ TEST(Recording, BadLinesAreNamed) {
   expect_error(kHeader + "{}\n", "run.jsonl:2: this line holds no event");
   expect_bad("}}", "}, \"mark\": {\"time_s\": 1}}", "run.jsonl:2: ");
   expect_error(kHeader + "{\"mark\": {\"time_s\": 2}}\n" + kImpulse, "run.jsonl:3: time goes back from 2 s to 0.5 s");
-  expect_error(replace(kHeader, "1, ", "1, \"events\": 2, ") + kImpulse, "the first line says 2 events and there are 1");
+  expect_error(replace(kHeader, "1, ", "1, \"events\": 2, ") + kImpulse, "the first line states 2 events, found 1");
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Any bytes as a contacts file: read and written again to the same events, or refused with an InputError.
+// Arbitrary bytes as a contacts file: round trip to the same events, or an InputError.
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>

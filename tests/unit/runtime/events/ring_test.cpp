@@ -43,7 +43,7 @@ TEST(EventRing, RefusesAndCountsWhatCannotBePlayed) {
   EXPECT_EQ(get_time_s(event), 1.0);
 }
 
-// Nothing is lost, doubled, torn, or out of its producer's order, whichever other threads push.
+// No event is lost, duplicated, torn or out of its producer's order under concurrent pushes.
 TEST(EventRing, TakesFromManyThreadsAtOnce) {
   constexpr int kProducers = 4;
   constexpr std::int64_t kEach = 100000;

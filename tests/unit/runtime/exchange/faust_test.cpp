@@ -1,4 +1,4 @@
-// Which modes a Faust program has, at which points, and what is said of the others. How it sounds: tests/system/exchange.
+// Selection of modes and points of a Faust program, and the omitted energy. Its sound: tests/system/exchange.
 #include "runtime/exchange/faust.hpp"
 
 #include <gmock/gmock.h>
@@ -20,7 +20,7 @@ std::size_t count(const std::string& text, const std::string& word) {
 }
 
 TEST(Faust, has_the_loudest_modes_and_says_what_it_left_out) {
-  // Three modes alike but in gain: with two of them 1 / (1 + 4 + 100) of the energy is left out.
+  // Three modes that differ in gain only: two of them omit 1 / (1 + 4 + 100) of the energy.
   const auto make = [](double freq, double gain) { return testing::InventedMode{freq, 10.0, gain, {0.0, 0.0, 1.0}}; };
   const bank::Bank bank = testing::make_cube_bank({make(1000.0, 1e-3), make(1000.001, 2e-3), make(1000.002, 1e-2)});
   const FaustProgram program =
@@ -39,7 +39,7 @@ TEST(Faust, knows_modes_that_do_not_swing) {
   bank::Bank bank = testing::make_cube_bank({{100.0, 900.0, 0.02}, {200.0, 400.0 * M_PI, 0.02}, {820.0, 12.0, 0.3}});
   const FaustProgram program = make_faust(bank, {.point_count = 2});
   EXPECT_EQ(count(program.text, "  creep("), 1);
-  EXPECT_EQ(count(program.text, "  swing("), 2);  // the critical one among them
+  EXPECT_EQ(count(program.text, "  swing("), 2);  // including the critical one
 }
 
 TEST(Faust, names_are_no_code) {

@@ -1,4 +1,4 @@
-// Any bytes as a GLB file with modes: a bank, or an InputError; with what carillon-bank adds to such a file, and without.
+// Arbitrary bytes as a GLB file with modes: a bank, or an InputError; with and without carillon-bank's extras.
 #include <cstddef>
 #include <cstdint>
 #include <string_view>

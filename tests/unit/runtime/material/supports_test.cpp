@@ -1,4 +1,4 @@
-// The words that jobs and scenes have for supports.
+// Supports in jobs and scenes.
 #include "runtime/material/supports.hpp"
 
 #include <gmock/gmock.h>
@@ -27,7 +27,7 @@ std::string fail(const std::string& members) {
   return "no error";
 }
 
-/// As read_supports() takes them.
+/// Input of read_supports().
 std::string write_members(const Fixing& fixing) {
   const std::string object = write_fixing(fixing).line();
   return object.substr(1, object.size() - 2);

@@ -1,4 +1,4 @@
-// Materials by name: the table of the repository is one of solids with sources, and a file of the user's own stands in front of it.
+// Named materials: plausible values with sources; extension by a user file.
 #include "runtime/material/table.hpp"
 
 #include <gmock/gmock.h>
@@ -48,7 +48,7 @@ TEST(MaterialTable, has_solids_of_every_kind_with_sources) {
     const bool is_panel = row.group == "wood" && (row.material.name == "plywood" || row.material.name == "chipboard" ||
                                                   row.material.name == "mdf" || row.material.name == "cork");
     EXPECT_EQ(row.material.orthotropic.has_value(), (row.group == "wood" && !is_panel) || row.material.name == "bone");
-    // Its fastest waves: no solid has faster ones than diamond, and soft rubber has about 70 m/s.
+    // Fastest waves: diamond is the upper limit, soft rubber has about 70 m/s.
     const Elasticity c = row.material.calc_elasticity_pa();
     const double fast = std::sqrt(calc_eigenvalues(c)[5] / row.material.density_kg_m3);
     EXPECT_GT(fast, 60);
@@ -66,7 +66,7 @@ TEST(MaterialTable, has_solids_of_every_kind_with_sources) {
 
 TEST(MaterialTable, lies_within_the_charts_of_each_group) {
   // Ashby, Materials Selection in Mechanical Design, 4th ed., 2011, chapter 4: modulus, density and loss coefficient of the families, and
-  // Poisson's ratio, each as [least, greatest]. A wrong power of ten or exchanged columns fall outside.
+  // Poisson's ratio, each as [min, max]. Detects wrong powers of ten and exchanged columns.
   struct Chart {
     const char* group;
     double young_gpa[2], density[2], poisson[2], loss[2];
@@ -77,7 +77,7 @@ TEST(MaterialTable, lies_within_the_charts_of_each_group) {
                              {"stone", {3, 100}, {1100, 3000}, {0.1, 0.3}, {1e-3, 3e-2}},
                              {"wood", {0.015, 10}, {100, 1300}, {0.0, 0.4}, {5e-3, 0.2}},
                              {"plastic", {1e-3, 150}, {850, 2300}, {0.29, 0.49999}, {1e-3, 0.3}},
-                             {"nature", {5, 25}, {900, 2100}, {0.25, 0.47}, {1e-3, 5e-2}}}) {  // of bone the isotropic equivalent
+                             {"nature", {5, 25}, {900, 2100}, {0.25, 0.47}, {1e-3, 5e-2}}}) {  // bone: isotropic equivalent
     for (const Row& row : MaterialTable::get().rows()) {
       if (row.group != chart.group) continue;
       SCOPED_TRACE(row.material.name);
@@ -182,7 +182,7 @@ TEST(MaterialTable, has_the_woods_of_instrument_makers_under_their_usual_names) 
     }
   }
   // Density at 12 % moisture [kg/m^3] and bending modulus [GPa] of the sources, 10 % below E along the grain. The Wood Handbook gives
-  // oven-dry mass over the volume at 12 %: density is 1.12 of that, to 5 kg/m^3. Its table in inch-pound units for birch to basswood.
+  // oven-dry mass over the volume at 12 %: density is 1.12 of that, to 5 kg/m^3; from birch to basswood, its table in inch-pound units.
   for (const auto& [name, density, bending] : {std::tuple{"rosewood", 830, 11.50},
                                                {"brazilian rosewood", 835, 13.93},
                                                {"honduran rosewood", 1025, 22.0},
@@ -223,7 +223,7 @@ TEST(MaterialTable, has_the_woods_of_instrument_makers_under_their_usual_names) 
 }
 
 TEST(MaterialTable, has_the_elastic_ratios_of_the_wood_handbook) {
-  // Tables 5-1 and 5-2: ET, ER, GLR, GLT, GRT over EL; nu LR, LT, RT. 0: not in the table, or not compared.
+  // Tables 5-1 and 5-2: ET, ER, GLR, GLT, GRT over EL; nu LR, LT, RT. 0: missing, or not compared.
   struct Ratios {
     const char* name;
     double et, er, glr, glt, grt, lr, lt, rt;
@@ -248,7 +248,7 @@ TEST(MaterialTable, has_the_elastic_ratios_of_the_wood_handbook) {
 }
 
 TEST(MaterialTable, knows_what_everybody_knows) {
-  // Speed of sound in a rod [m/s], of tables of physics.
+  // Speed of sound in a rod [m/s] from physics tables.
   for (const auto& [name, speed] : {std::pair{"steel", 5050}, {"aluminium", 5090}, {"glass", 5370}, {"lead", 1190}, {"copper", 3740}}) {
     const Material& m = MaterialTable::get().find(name)->material;
     EXPECT_NEAR(std::sqrt(m.young_modulus_pa / m.density_kg_m3) / speed, 1, 0.02) << name;

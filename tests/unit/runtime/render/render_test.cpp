@@ -23,7 +23,7 @@
 #include "tests/support/folder.hpp"
 #include "tests/support/paths.hpp"
 #include "tests/unit/runtime/acoustics/head/oracle.hpp"
-#include "tests/unit/runtime/scene/heard.hpp"
+#include "tests/unit/runtime/render/heard.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 #include "tests/unit/runtime/synth/multipole_cube.hpp"
 
@@ -154,7 +154,7 @@ TEST(Render, NumberOfRingingModesIsLimited) {
   std::vector<testing::InventedMode> modes;
   for (int i = 0; i < 64; ++i) modes.push_back({400.0 + 150.0 * i, 2.0, 1.0 / (1.0 + i)});
   Case c(modes, {3.0, 0.0, 0.0}, 0.01);
-  const RenderOptions options{.rate_hz = 48000, .measures = true};
+  const RenderOptions options{.rate_hz = 48000};
   const auto count_mode_samples = [&](const Sound& sound) { return sound.effect_counters[0].units[synth::Effect::kModal]; };
   const auto all = count_mode_samples(calc_sound(c.scene, {&c.bank}, c.list_events(), options));
   c.scene.quality.modes = 16;
@@ -277,7 +277,7 @@ TEST(Render, AccelerationNoiseIsADipoleAlongTheImpulse) {
   c.simulation.impulses[0].duration_s = 2e-4;
   c.scene.microphones_m = {{2.0, 0.0, 0.0}, {0.0, 2.0, 0.0}, {-2.0, 0.0, 0.0}, {1.2, 1.6, 0.0}};
   EXPECT_EQ(c.render().peak_pa, 0.0);  // off by default
-  c.scene.effects = scene::kPlayableEffects;
+  c.scene.effects = synth::EffectSet::all();
   const Heard sound = c.render();
   const double radius = 0.1 * std::cbrt(3.0 / (4.0 * pi)), lag = radius / 343.0;
   double scale = 0.0;

@@ -68,7 +68,7 @@ TEST_F(Report, JsonHasAuditAndMalletsOnRequestAndNullForSilence) {
   scene_.warnings.push_back("a warning");
   Sound sound;
   sound.levels.mean_db = sound.levels.loudest_db = -std::numeric_limits<double>::infinity();
-  const scene::Plan plan{{}, effects::EffectSelector({}, {}), {}, {}};
+  const scene::Plan plan{{}, effects::EffectSelector({})};
   Figures figures;
   const auto read = [&] { return make_report_json(scene_, sound, plan, figures); };
   const std::string plain = read();

@@ -14,6 +14,7 @@
 #include "runtime/scene/scene.hpp"
 #include "tests/support/catch_message.hpp"
 #include "tests/support/folder.hpp"
+#include "tests/unit/runtime/render/heard.hpp"
 #include "tests/unit/runtime/acoustics/recording/make_surface.hpp"
 #include "tests/unit/runtime/scene/heard.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"

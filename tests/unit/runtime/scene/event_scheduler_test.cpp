@@ -19,7 +19,7 @@ events::Impulse make_impulse(std::int32_t body, double time_s, double duration_s
   return {.time_s = time_s, .body = body, .impulse_n_s = {0.0, 0.0, 1e-3}, .duration_s = duration_s};
 }
 
-void play(synth::Synthesiser& synthesiser, EventPlayback& playback, double until_s) {
+void play(synth::Synthesiser& synthesiser, render::EventPlayback& playback, double until_s) {
   std::array<float, synth::kBlock> left{}, right{};
   const std::array<float*, 2> out{left.data(), right.data()};
   for (int period = 0; period * synth::kBlock < until_s * kRate; ++period) {
@@ -43,7 +43,7 @@ TEST(EventPlayback, PushesMoreThanTheRingHolds) {
   events.emplace_back(make_impulse(-1, 0.01));
   events.emplace_back(make_impulse(1, std::numeric_limits<double>::quiet_NaN()));
   const Events kept = make_events(events);
-  EventPlayback playback(kept, {{.number = 0, .moves = true}, {.number = 1, .moves = true}, {.number = 2, .moves = true}}, {});
+  render::EventPlayback playback(kept, {{.number = 0, .moves = true}, {.number = 1, .moves = true}, {.number = 2, .moves = true}}, {});
   play(synthesiser, playback, 0.2);
   const synth::SynthesiserCounters counters = synthesiser.get_counters();
   EXPECT_EQ(counters.overflows, 0);
@@ -66,7 +66,7 @@ TEST(EventPlayback, PushesForcesInTime) {
   for (int i = 0; i < 200; ++i) events.emplace_back(events::Force{.time_s = 0.05 + 5e-4 * i, .step_s = 1e-4, .count = 1});
   events.emplace_back(events::Force{.time_s = 0.2, .step_s = 1e-4, .body = 3, .count = 1});
   const Events kept = make_events(events);
-  EventPlayback playback(kept, {{.number = body, .moves = true, .lead_s = model->get_sphere_radius_m() / synth::kSoundSpeedMs}}, {});
+  render::EventPlayback playback(kept, {{.number = body, .moves = true, .lead_s = model->get_sphere_radius_m() / synth::kSoundSpeedMs}}, {});
   play(synthesiser, playback, 0.2);
   const synth::SynthesiserCounters counters = synthesiser.get_counters();
   EXPECT_EQ(counters.strikes, 1 + 200);
@@ -85,7 +85,7 @@ TEST(EventPlayback, CountsTheWaypointsToStore) {
   events.emplace_back(events::BodyMotion{0.5, 1, {}, {}});
   const std::vector<events::Listener> walk{{.time_s = 0.0}, {.time_s = 1.0}, {.time_s = 2.0}};
   const Events kept = make_events(events);
-  const EventPlayback playback(kept, {{.number = 0, .moves = true}, {.number = 1, .moves = true}}, walk);
+  const render::EventPlayback playback(kept, {{.number = 0, .moves = true}, {.number = 1, .moves = true}}, walk);
   const std::vector<int> far = playback.count_waypoints(std::array{1.0, 1.0}), near = playback.count_waypoints(std::array{0.0, 0.0});
   ASSERT_EQ(far.size(), 3U);
   EXPECT_GE(far[0], 1002);
@@ -107,7 +107,7 @@ TEST(EventPlayback, CountedWaypointsSuffice) {
   for (int i = 0; i < 20; ++i) events.emplace_back(make_impulse(0, 0.05 + 0.06 * i));
   const auto render = [&](int waypoints) {
     const Events kept = make_events(events);
-    EventPlayback playback(kept, {{.number = 0, .moves = true}}, {});
+    render::EventPlayback playback(kept, {{.number = 0, .moves = true}}, {});
     synth::Synthesiser synthesiser({.rate_hz = kRate, .microphones_m = {{}}});
     synthesiser.add_body(model, {.position_m = {3.0, 100.0, 0.0},
                                  .longest_m = 110.0,
@@ -190,7 +190,7 @@ TEST(EventPlayback, EventsDueLongBeforeTheirTimeAreInTime) {
     std::stable_sort(events.begin(), events.end(),
                      [](const auto& a, const auto& b) { return events::get_time_s(a) < events::get_time_s(b); });
     const Events kept = make_events(events);
-    EventPlayback playback(kept, {{.number = 0, .moves = true}}, {});
+    render::EventPlayback playback(kept, {{.number = 0, .moves = true}}, {});
     synth::Synthesiser synthesiser({.rate_hz = kRate, .microphones_m = {{}}});
     synthesiser.add_body(model, {.position_m = {0.0, 5.0, 0.0}, .longest_m = 60.0, .max_waypoints = 5000});
     std::vector<float> sound(static_cast<std::size_t>(35 * kRate) / synth::kBlock * synth::kBlock);

@@ -10,7 +10,7 @@
 #include "runtime/bank/mounting/heard.hpp"
 #include "runtime/bank/write.hpp"
 #include "runtime/scene/banks.hpp"
-#include "runtime/synth/voice.hpp"
+#include "runtime/synth/resonator_bank.hpp"
 #include "tests/unit/runtime/bank/example_bank.hpp"
 
 namespace carillon::scene {
@@ -20,7 +20,7 @@ constexpr double kHeardRateHz = 48000.0;
 
 /// Decay of one mode of a body [1/s], from its energy in two windows.
 double fit_decay(const bank::Bank& played, int mode, double about_per_s) {
-  synth::Voice voice(synth::Model::make_solo(*synth::Model::make(played, {.rate_hz = kHeardRateHz}), mode));
+  synth::ResonatorBank voice(synth::Model::make_solo(*synth::Model::make(played, {.rate_hz = kHeardRateHz}), mode));
   voice.strike({.time_s = 0.001, .triangle = 3, .barycentric = {0.3, 0.3, 0.4}, .impulse_n_s = {1.0, 2.0, 3.0}});
   const double apart_s = std::min(2.0, 1.5 / about_per_s), window_s = std::max(0.02, 0.2 * apart_s);
   std::vector<float> sound(static_cast<std::size_t>((0.002 + apart_s + window_s) * kHeardRateHz) + 128, 0.0F);

@@ -13,7 +13,7 @@
 #include "runtime/base/error.hpp"
 #include "runtime/physics/impact/spring.hpp"
 #include "runtime/scene/strikes.hpp"
-#include "runtime/synth/voice.hpp"
+#include "runtime/synth/resonator_bank.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 
 namespace carillon::scene {
@@ -83,7 +83,7 @@ void expect_closed(const std::vector<Blow>& blows, double slack = 1e-9) {
 
 /// Final energy of a voice, for a bank without damping.
 double play(const bank::Bank& bank, const std::vector<events::Event>& events, double until_s) {
-  synth::Voice voice(synth::Model::make(bank, {.rate_hz = 48000.0}), {.max_forces = 8000, .silence_pa = 1e-30});
+  synth::ResonatorBank voice(synth::Model::make(bank, {.rate_hz = 48000.0}), {.max_forces = 8000, .silence_pa = 1e-30});
   for (const events::Event& event : events) EXPECT_TRUE(voice.push(std::get<events::Force>(event)));
   std::vector<float> block(128);
   for (int i = 0; i * 128 < until_s * 48000.0; ++i) voice.process(block);

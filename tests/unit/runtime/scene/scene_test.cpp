@@ -235,7 +235,7 @@ TEST(Scene, EffectsAreThoseOfTheList) {
       parse_effects(R"(["modal", "hertz_pulse", "acceleration_noise", "air_delay", "doppler", "two_ears", "roughness", "rolling",
     "contact_damping"])");
   EXPECT_FALSE(list.automatic);
-  EXPECT_EQ(list.on, kPlayableEffects.without(
+  EXPECT_EQ(list.on, synth::EffectSet::all().without(
                          {Effect::kDirectivity, Effect::kGroundReflection, Effect::kHead, Effect::kNonlinear, Effect::kCascade}));
   EXPECT_EQ(parse_effects(R"(["doppler"])").on, synth::EffectSet{Effect::kDoppler});
   EXPECT_FALSE(parse_effects("[]").automatic);
@@ -285,7 +285,6 @@ TEST(Scene, BodyMayHaveItsOwnEffects) {
 
 TEST(Scene, BodyMayHaveItsOwnNonlinear) {
   using synth::Effect;
-  if (!kPlayableEffects.has(Effect::kNonlinear)) GTEST_SKIP() << "built without it";
   const auto parse_all = [](const std::string& effects) {
     return parse(R"({"duration_s": 2, "effects": )" + effects + R"(, "bodies": [
       {"name": "a", "bank": "a.h5"}, {"name": "b", "bank": "a.h5", "nonlinear": true}, {"name": "c", "bank": "a.h5", "nonlinear": false}]})")
@@ -334,16 +333,14 @@ TEST(Scene, RoughnessIsRead) {
 TEST(Scene, QualityIsReadAndHasDefaults) {
   const Quality usual = parse("{\"duration_s\": 2, " + kBody + "}").quality;
   EXPECT_EQ(usual.thresholds.audible_share, effects::kAudibleShare);
-  EXPECT_EQ(usual.thresholds.lead_s, effects::kLeadS);
   EXPECT_FALSE(usual.silence_pa.has_value() || usual.modes.has_value());
   EXPECT_EQ(usual.contact_step_s, physics::WorldOptions{}.contact_step_s);
   EXPECT_EQ(usual.instructions, synth::Isa::kBest);
-  const Quality quality = parse("{\"duration_s\": 2, " + kBody + R"(, "quality": {"planner_db": -70, "quiet_db": 90, "lead_s": 0.1,
+  const Quality quality = parse("{\"duration_s\": 2, " + kBody + R"(, "quality": {"planner_db": -70, "quiet_db": 90,
     "silence_pa": 1e-6, "modes": 320, "contact_step_s": 1e-4, "instructions": "avx2"}})")
                               .quality;
   EXPECT_NEAR(quality.thresholds.audible_share, 1e-7, 1e-16);
   EXPECT_EQ(quality.thresholds.below_loudest_db, 90.0);
-  EXPECT_EQ(quality.thresholds.lead_s, 0.1);
   EXPECT_EQ(quality.silence_pa, 1e-6);
   EXPECT_EQ(quality.modes, 320);
   EXPECT_EQ(quality.contact_step_s, 1e-4);

@@ -1,4 +1,4 @@
-// Ten minutes of ringing against the closed form, for every instruction set: pitch, level and what is no sinusoid at all.
+// Ten minutes of ringing against the closed form, for every instruction set: pitch, level and residual.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -6,7 +6,7 @@
 #include <numbers>
 #include <vector>
 
-#include "runtime/synth/voice.hpp"
+#include "runtime/synth/resonator_bank.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 
 namespace carillon::synth {
@@ -17,12 +17,12 @@ constexpr double kRate = 48000.0;
 constexpr std::int64_t kMinutes = 10;
 constexpr int kSeen = 96000;  // samples at the end that are looked at: two seconds
 
-/// What is left at the end of a sinusoid that began with q' = 1: against 1 cos(...) of the closed form.
+/// Result at the end of a sinusoid that began with q' = 1, against 1 cos(...).
 struct Fit {
   double level_db, cents, residual_db;
 };
 
-/// Least squares of exp(-d t) times a cosine and a sine of the known frequency, over two halves: their phases give the frequency.
+/// Least squares of exp(-d t) times cosine and sine of the known frequency, over two halves: their phases give the frequency.
 Fit fit(const std::vector<float>& seen, std::int64_t from, double freq_hz, double decay) {
   const long double omega_d =
       std::sqrt(4.0L * std::numbers::pi_v<long double> * std::numbers::pi_v<long double> * freq_hz * freq_hz - decay * decay);
@@ -65,7 +65,7 @@ TEST(Accuracy, TenMinutesAreInTuneAndOnLevel) {
       // With 1 / s nothing is left after ten minutes: the end is then where it is 60 dB down.
       const std::int64_t samples = decay > 0.5 ? static_cast<std::int64_t>(7.0 * kRate) : kMinutes * 60 * static_cast<std::int64_t>(kRate);
       for (const double freq : freqs) {
-        Voice voice(Model::make(testing::make_cube_bank({{freq, decay}}), {.rate_hz = kRate}), {.silence_pa = 1e-30, .isa = isa});
+        ResonatorBank voice(Model::make(testing::make_cube_bank({{freq, decay}}), {.rate_hz = kRate}), {.silence_pa = 1e-30, .isa = isa});
         ASSERT_TRUE(voice.strike({.impulse_n_s = {0.0, 0.0, 1.0}}));
         std::vector<float> seen(kSeen, 0.0F), block(48000);
         for (std::int64_t n = 0; n < samples - kSeen; n += 48000) voice.process(block);

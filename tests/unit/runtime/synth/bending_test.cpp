@@ -1,5 +1,5 @@
-// Deflections beyond the range of linear modes, against a plate's closed form and against the whole displacement field (all modes, all
-// vertices of one side, every second sample).
+// Deflections above the linear range, against a plate's closed form and the whole displacement field (all modes, all vertices of one side,
+// every second sample).
 #include "runtime/synth/bending.hpp"
 
 #include <gtest/gtest.h>
@@ -10,8 +10,8 @@
 #include <random>
 #include <vector>
 
+#include "runtime/synth/resonator_bank.hpp"
 #include "runtime/synth/synthesiser.hpp"
-#include "runtime/synth/voice.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 
 namespace carillon::synth {

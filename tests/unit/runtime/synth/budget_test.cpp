@@ -1,4 +1,4 @@
-// The budget: the least audible modes go first, over all bodies, without a click, and the work stays within what is allowed.
+// Budget: removes the least audible modes of all bodies, without a click, and bounds the work.
 #include "runtime/synth/budget.hpp"
 
 #include <gtest/gtest.h>
@@ -24,7 +24,7 @@ using std::numbers::pi;
 constexpr double kRate = 48000.0;
 constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 
-/// A bank whose modes lie in `lowest_hz` to `highest_hz`, the amplitude of mode m falling with 10^(-m * slope).
+/// Bank with modes from `lowest_hz` to `highest_hz`, amplitude of mode m ~ 10^(-m * slope).
 bank::Bank make_bank(int modes, double lowest_hz, double highest_hz, double decay_per_s, double slope) {
   std::vector<testing::InventedMode> invented;
   for (int m = 0; m < modes; ++m)
@@ -131,7 +131,7 @@ TEST(Budget, IsKeptUnderAHail) {
   }
 }
 
-// Contacts that last drive all modes all the time, and cost several times what ringing costs.
+// Lasting contacts drive all modes continuously, at several times the cost of ringing.
 TEST(Budget, IsKeptWhileBodiesSlide) {
   constexpr int kBodies = 12;
   const auto model = Model::make(make_bank(100, 150.0, 18000.0, 12.0, 0.02), {.rate_hz = kRate});
@@ -221,7 +221,7 @@ TEST(Budget, GivesTheSameBitsInBlocksOfAnySize) {
   }
 }
 
-/// One body struck at 10 ms, alone; the budget falls to `groups` groups at 40 ms.
+/// One body struck at 10 ms; the budget falls to `groups` groups at 40 ms.
 std::vector<float> play_cut(const std::shared_ptr<const Model>& model, int groups, int frames) {
   Synthesiser synthesiser({.rate_hz = kRate, .microphones_m = {{0, 0, 0}}});
   const int body = synthesiser.add_body(model, {.position_m = {0.0, 1.0, 0.0}});
@@ -235,8 +235,8 @@ std::vector<float> play_cut(const std::shared_ptr<const Model>& model, int group
   return sound;
 }
 
-// What is lost is the faded modes and nothing else: by their closed forms, integrated from the cut on.
-TEST(Budget, WhatIsLostIsTheEnergyOfTheFadedModes) {
+// The lost energy is that of the faded modes: by closed forms, integrated from the cut on.
+TEST(Budget, LosesOnlyTheEnergyOfTheFadedModes) {
   constexpr double kDecay = 8.0, kSlope = 0.02;
   constexpr int kModes = 128, kStay = 3;
   const bank::Bank bank = make_bank(kModes, 200.0, 16000.0, kDecay, kSlope);
@@ -258,7 +258,7 @@ TEST(Budget, WhatIsLostIsTheEnergyOfTheFadedModes) {
   EXPECT_NEAR(stays, sounding, 0.1 * sounding);
 }
 
-/// Level of one frequency in a Hann window of 2048 samples that begins at `first`.
+/// Level of one frequency in a Hann window of 2048 samples from `first` on.
 double calc_level_db(const std::vector<float>& sound, std::size_t first, double freq_hz) {
   std::complex<double> sum = 0.0;
   for (std::size_t n = 0; n < 2048; ++n)
@@ -267,7 +267,7 @@ double calc_level_db(const std::vector<float>& sound, std::size_t first, double 
   return 20.0 * std::log10(std::abs(sum) / 512.0 + 1e-30);
 }
 
-// All modes lie below 3 kHz: what is above it around the cut is the click.
+// All modes are below 3 kHz: anything above around the cut is a click.
 TEST(Budget, FadesWithoutAClick) {
   const auto model = Model::make(make_bank(96, 300.0, 3000.0, 3.0, 0.0), {.rate_hz = kRate});
   const std::vector<float> sound = play_cut(model, 1, 9600);
@@ -312,7 +312,7 @@ TEST(Budget, ModesComeBackWithTheNextStrikeWhenThereIsRoomAgain) {
   EXPECT_EQ(strike_and_count(3), 320.0);
 }
 
-// Of two like bodies the one that is far away gives its modes up first.
+// Of two equal bodies the farther one loses its modes first.
 TEST(Budget, DistanceCounts) {
   const bank::Bank bank = make_bank(96, 300.0, 3000.0, 1.0, 0.0);
   const auto model = Model::make(bank, {.rate_hz = kRate});
@@ -328,7 +328,7 @@ TEST(Budget, DistanceCounts) {
   };
   const std::vector<float> both = play({0, 1}, 7.5 * kGroup * kRate), near = play({1}, kUnlimited), far = play({0}, kUnlimited);
   std::vector<float> rest(both.size());
-  for (std::size_t n = 0; n < both.size(); ++n) rest[n] = both[n] - near[n];  // what is left of the far one
+  for (std::size_t n = 0; n < both.size(); ++n) rest[n] = both[n] - near[n];  // remainder of the far one
   const double left = calc_energy(rest, std::vector<float>(rest.size())), of_far = calc_energy(far, std::vector<float>(far.size()));
   EXPECT_LT(left, 0.35 * of_far);
   EXPECT_GT(left, 0.05 * of_far);

@@ -1,4 +1,4 @@
-// Records of lasting contacts, and voices that play them.
+// Records of lasting contacts, and modes that play them.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "runtime/synth/contact_forces.hpp"
-#include "runtime/synth/voice.hpp"
+#include "runtime/synth/resonator_bank.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 
 namespace carillon::testing {
@@ -28,7 +28,7 @@ inline const ContactSurface kRigidOther{.roughness_m = 2e-6, .friction = 0.5, .m
 inline const EffectSet kNoise{Effect::kRoughness, Effect::kRolling};
 inline const EffectSet kBrake{Effect::kContactDamping};
 
-/// Flat sliding: the contact moves over the other surface alone.
+/// Flat sliding: the contact moves over the other surface only.
 inline LastingContact make_sliding(double time_s, double speed_m_s, double force_n = 1.0) {
   LastingContact c;
   c.time_s = time_s;
@@ -42,7 +42,7 @@ inline LastingContact make_sliding(double time_s, double speed_m_s, double force
   return c;
 }
 
-/// One record every 2 ms from 0 on; begin and end are marked.
+/// One record every 2 ms from 0 on, with begin and end.
 inline std::vector<LastingContact> make_records(double end_s, const std::function<LastingContact(double)>& make) {
   std::vector<LastingContact> records;
   for (int i = 0; 2e-3 * i <= end_s; ++i) records.push_back(make(2e-3 * i));
@@ -51,8 +51,8 @@ inline std::vector<LastingContact> make_records(double end_s, const std::functio
   return records;
 }
 
-/// Plays the records, each given 100 ms before its time.
-inline std::vector<float> play(Voice& voice, ContactForces& contacts, std::vector<LastingContact> records, double seconds,
+/// Plays the records, each queued 100 ms before its time.
+inline std::vector<float> play(ResonatorBank& voice, ContactForces& contacts, std::vector<LastingContact> records, double seconds,
                                std::size_t block = 480, const ContactSurface& other = kOther) {
   std::vector<float> out(seconds * kRate, 0.0F);
   voice.attach(&contacts);

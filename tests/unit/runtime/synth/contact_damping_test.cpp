@@ -1,4 +1,4 @@
-// The damping of modes by contacts that last, against the dense equation of motion.
+// Damping of modes by lasting contacts, against the dense equation of motion.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -17,7 +17,7 @@ namespace {
 
 using namespace testing;
 
-/// q'' + 2 D q' + Lambda q + Z(t) phi phi^T q' = 0, by Runge and Kutta's fourth order.
+/// q'' + 2 D q' + Lambda q + Z(t) phi phi^T q' = 0, by fourth-order Runge-Kutta.
 double calc_dense_energy(const std::vector<InventedMode>& modes, const std::vector<double>& phi, double impulse,
                          const std::function<double(double)>& impedance, double seconds) {
   const std::size_t n = modes.size();
@@ -67,7 +67,7 @@ TEST(ContactForces, TakeTheImpedanceOfTheOthersMaterialWhereTheRecordHasNone) {
   EXPECT_EQ(find_impedance(contact, kGroundSurface), 0.0);
 }
 
-TEST(ContactForces, TakeTheEnergyThatTheDenseEquationsSay) {
+TEST(ContactForces, TakeTheEnergyOfTheDenseEquations) {
   const std::vector<InventedMode> modes{{310.0, 1.0, 1.0, {0.0, 0.0, 0.9}},
                                         {870.0, 2.0, 1.0, {0.0, 0.0, -0.6}},
                                         {2100.0, 3.0, 1.0, {0.0, 0.0, 1.1}},
@@ -75,7 +75,7 @@ TEST(ContactForces, TakeTheEnergyThatTheDenseEquationsSay) {
   const auto model = Model::make(make_cube_bank(modes));
   for (const double impedance : {0.5, 5.0, 40.0}) {
     ContactForces contacts(model, {.effects = kBrake});
-    Voice voice(model);
+    ResonatorBank voice(model);
     voice.strike({.time_s = 1e-9, .impulse_n_s = {0.0, 0.0, 1e-3}});
     play(voice, contacts,
          make_records(0.2,
@@ -96,14 +96,14 @@ TEST(ContactForces, TakeTheEnergyThatTheDenseEquationsSay) {
   }
 }
 
-TEST(ContactForces, TakeWhatTheContactsSpringLosesHoweverLittleItMoves) {
+TEST(ContactForces, TakeTheLossOfTheContactSpring) {
   // A spring k (1 + i eta) at the point, weak against the mode: omega'^2 = omega^2 + k (1 + i eta) phi^2, so d = eta k phi^2 / (2 omega).
   // Steel on steel loses 0.01; wood and plastics ten times that, by the part of the give that is theirs.
   const double freq = 1000.0, phi = 0.9, omega = 2.0 * pi * freq;
   const auto model = Model::make(make_cube_bank({{freq, 1e-3, 1.0, {0.0, 0.0, phi}}}));
   const auto play_at = [&](double impulse, double own_pa, double other_pa, double patch_m, double seconds) {
     ContactForces contacts(model, {.surface = {.modulus_pa = own_pa}, .effects = kBrake});
-    Voice voice(model);
+    ResonatorBank voice(model);
     voice.strike({.time_s = 1e-9, .impulse_n_s = {0.0, 0.0, impulse}});
     const auto rest = [&](double t) {
       LastingContact c = make_sliding(t, 0.0);
@@ -142,7 +142,7 @@ TEST(ContactForces, NeverAddEnergyByDamping) {
     std::sort(modes.begin(), modes.end(), [](const auto& a, const auto& b) { return a.freq_hz < b.freq_hz; });
     const auto model = Model::make(make_cube_bank(modes));
     ContactForces contacts(model, {.effects = kBrake});
-    Voice voice(model, {.isa = trial % 2 == 0 ? Isa::kBest : Isa::kPlain});
+    ResonatorBank voice(model, {.isa = trial % 2 == 0 ? Isa::kBest : Isa::kPlain});
     voice.attach(&contacts);
     voice.strike({.time_s = 1e-9, .triangle = trial % 12, .impulse_n_s = {0.3, 0.2, 1.0}});
     const double size = std::pow(10.0, 8.0 * any(random) - 3.0);
@@ -173,11 +173,11 @@ TEST(ContactForces, NeverAddEnergyByDamping) {
   }
 }
 
-TEST(ContactForces, LeaveTheRingingExactWhenTheyHaveGone) {
+TEST(ContactForces, LeaveTheRingingExactAfterwards) {
   const double freq = 987.6, decay = 1.5, gain = 2.0;
   const auto model = Model::make(make_cube_bank({{freq, decay, gain}}));
   ContactForces contacts(model, {.effects = kBrake});
-  Voice voice(model);
+  ResonatorBank voice(model);
   voice.strike({.time_s = 1e-3, .impulse_n_s = {0.0, 0.0, 1e-2}});
   const std::vector<float> heard = play(voice, contacts,
                                         make_records(0.5,
@@ -211,7 +211,7 @@ TEST(ContactForces, DampWithoutZipperNoise) {
   // A pure tone under a contact that comes, changes at every record, and goes: the rest of the spectrum stays far below it.
   const auto model = Model::make(make_cube_bank({{500.0, 0.5, 1.0}}));
   ContactForces contacts(model, {.effects = kBrake});
-  Voice voice(model);
+  ResonatorBank voice(model);
   voice.strike({.time_s = 1e-3, .impulse_n_s = {0.0, 0.0, 1e-2}});
   std::mt19937 random(3);
   const std::vector<float> heard =

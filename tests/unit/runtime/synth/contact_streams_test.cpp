@@ -1,4 +1,4 @@
-// Any stream of contact records: bounded forces, and sound no louder than a push by them.
+// Arbitrary streams of contact records: bounded forces, and sound no louder than under a push.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -20,7 +20,7 @@ using namespace testing;
 float find_push_peak(const std::shared_ptr<const Model>& model) {
   const LastingContact at = make_sliding(0.0, 0.0);
   const std::vector<Vec3> steps(500, Vec3{0.0, 0.0, 1e-4});
-  Voice voice(model);
+  ResonatorBank voice(model);
   events::split_force({.time_s = 0.0, .step_s = 1e-4, .triangle = at.triangle, .barycentric = at.barycentric}, steps,
                       [&](const events::Force& piece) { voice.push(piece); });
   std::vector<float> out(4800);
@@ -64,7 +64,7 @@ TEST(ContactStreams, OfAnyStreamAreBoundedAndNoLouderThanAPlainPushByThem) {
     double load = 0.0, lowest = 0.0, highest = 0.0;
     for (const LastingContact& record : records) load = std::max(load, record.force_n);
     ContactForces traced(model, {.surface = own}), contacts(model, {.surface = own});
-    Voice voice(model);
+    ResonatorBank voice(model);
     const double seconds = records.back().time_s + 6e-3;
     for (const double force : trace(traced, records, seconds, other)) lowest = std::min(lowest, force), highest = std::max(highest, force);
     ASSERT_GE(lowest, -shocks * load * (1.0 + 1e-6)) << stream;
@@ -92,7 +92,7 @@ TEST(ContactStreams, OfATouchThatEndsWithZerosDoNotBurst) {
         records.push_back(c);
       }
       ContactForces contacts(model, {.surface = {.roughness_m = 2e-6, .modulus_pa = 10e9}});
-      Voice voice(model);
+      ResonatorBank voice(model);
       float& peak = loudest[has_zeros ? 1 : 0];
       peak = std::max(peak, calc_peak(play(voice, contacts, records, 0.02, 480, kGroundSurface)));
     }

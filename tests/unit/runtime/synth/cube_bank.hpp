@@ -1,4 +1,4 @@
-// A bank made by hand: a cube of 10 cm with invented modes, to hear the synthesis without a solver.
+// Bank of a cube of 10 cm with invented modes, without a solver.
 #pragma once
 
 #include <cmath>
@@ -17,8 +17,7 @@ struct InventedMode {
   double slope = 0.0;
 };
 
-/// A cube of side 0.1 m about the origin, corners numbered by the bits x, y, z; its mass is that of `density`. Modes ascending in
-/// frequency.
+/// Cube of side 0.1 m about the origin, corners numbered by the bits x, y, z; mass by `density`. Modes ascending in frequency.
 inline bank::Bank make_cube_bank(const std::vector<InventedMode>& modes, double density = 1000.0) {
   bank::Bank bank;
   for (int corner = 0; corner < 8; ++corner) {
@@ -65,7 +64,7 @@ inline bank::Bank make_cube_bank(const std::vector<InventedMode>& modes, double 
   return bank;
 }
 
-/// 100 Hz to 23 kHz, in even steps of pitch.
+/// 100 Hz to 23 kHz, evenly spaced in pitch.
 inline std::vector<InventedMode> make_many_modes(int count) {
   std::vector<InventedMode> modes;
   for (int m = 0; m < count; ++m) {

@@ -1,4 +1,4 @@
-// One body of a bank and what happens to it, played to microphones: scenes of directivity and ground reflection.
+// Scenes of directivity and ground reflection: one body, its events and microphones.
 #pragma once
 
 #include <algorithm>
@@ -26,7 +26,7 @@ inline constexpr double kC = bank::kSoundSpeedMs;
 inline constexpr int kStruck = 480;  // sample at which a body is struck
 inline constexpr EffectSet kDirected = kDefaultEffects.with(Effect::kDirectivity);
 
-/// One body of a bank with its place, its events and its microphones.
+/// One body with its position, events and microphones.
 struct Scene {
   bank::Bank bank;
   std::vector<Vec3> microphones_m;
@@ -38,7 +38,7 @@ struct Scene {
   int frames = 4800, block = 128;
   double budget = std::numeric_limits<double>::infinity();
   Isa isa = Isa::kBest;
-  std::function<void(Synthesiser&, int)> meddle = nullptr;  // after half of the frames
+  std::function<void(Synthesiser&, int)> meddle = nullptr;  // called after half of the frames
 };
 
 inline Sound play(const Scene& scene, EffectCounters* counters = nullptr) {
@@ -72,14 +72,14 @@ inline events::Impulse make_blow(double duration_s = 0.0, int sample = kStruck) 
   return {.time_s = sample / kRate, .body = 0, .impulse_n_s = {0.0, 0.0, 1.0}, .duration_s = duration_s};
 }
 
-/// A mode that rings for ever after a blow, with velocity cos(omega t).
+/// Undamped mode after a strike, velocity cos(omega t).
 inline Scene make_tone(double freq_hz, const ModeMultipoles& multipoles, double radius_m, std::vector<Vec3> microphones_m) {
   Scene scene{.bank = make_cube_bank({{freq_hz, 0.0}}), .microphones_m = std::move(microphones_m), .events = {make_blow()}};
   give_multipoles(scene.bank, {multipoles}, radius_m);
   return scene;
 }
 
-/// The amplitude of a steady tone, times e^{i phase} of its cosine since the blow and the latency, by least squares.
+/// Amplitude of a steady tone, times e^{i phase} of its cosine since the strike and the latency, by least squares.
 inline Complex measure(const std::vector<float>& sound, double freq_hz, std::size_t from = 2400) {
   double cc = 0.0, cs = 0.0, ss = 0.0, pc = 0.0, ps = 0.0;
   for (std::size_t n = from; n < sound.size(); ++n) {
@@ -110,7 +110,7 @@ inline events::Quaternion turn_about(const Vec3& axis, double angle) {
   return {std::cos(0.5 * angle), s * axis[0], s * axis[1], s * axis[2]};
 }
 
-/// Many modes, some of them overdamped, whose transfers are their gains over the distance: a sphere so small that all is real.
+/// Many modes, some over-damped, whose transfers are their gains over the distance: a sphere so small that all is real.
 inline Scene make_gains_scene() {
   std::vector<InventedMode> modes = make_many_modes(60);
   for (std::size_t m = 0; m < modes.size(); m += 20) modes[m].decay_per_s = 3.0 * 2.0 * pi * modes[m].freq_hz;

@@ -23,7 +23,7 @@ TEST(Effects, EveryEffectHasANameThatFindsIt) {
   EXPECT_EQ(find_effect(""), std::nullopt);
 }
 
-TEST(Effects, ASetHoldsWhatWasPutIn) {
+TEST(Effects, SetsHoldTheirEffects) {
   constexpr EffectSet set{Effect::kModal, Effect::kTwoEars};
   static_assert(set.has(Effect::kTwoEars) && !set.has(Effect::kDoppler));
   EXPECT_EQ(set.with(Effect::kDoppler).without(Effect::kTwoEars), (EffectSet{Effect::kDoppler, Effect::kModal}));
@@ -32,7 +32,7 @@ TEST(Effects, ASetHoldsWhatWasPutIn) {
   EXPECT_EQ(EffectSet{}.with(set).without(set), EffectSet{});
 }
 
-TEST(Effects, ASetIsGoneThroughInTheOrderOfTheList) {
+TEST(Effects, SetsIterateInTheOrderOfTheList) {
   const auto list = [](EffectSet set) { return std::vector<Effect>(set.begin(), set.end()); };
   EXPECT_EQ(list({}), std::vector<Effect>{});
   EXPECT_EQ(list({Effect::kTwoEars, Effect::kModal, Effect::kRolling}),
@@ -47,7 +47,7 @@ TEST(Effects, ASetIsGoneThroughInTheOrderOfTheList) {
   }
 }
 
-TEST(Effects, AValueForEach) {
+TEST(Effects, PerEffectHoldsAValueForEach) {
   PerEffect<int> values;
   values.fill(3);
   values[Effect::kTwoEars] = 5;

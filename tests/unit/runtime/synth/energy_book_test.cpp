@@ -1,4 +1,4 @@
-// Energy books of the modes against the work of blows in closed form, and against losses and radiation derived from the sound.
+// Energy balance of the modes against the work of strikes in closed form, and against losses and radiation derived from the sound.
 #include "runtime/synth/energy_book.hpp"
 
 #include <gtest/gtest.h>
@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "runtime/bank/air.hpp"
+#include "runtime/synth/resonator_bank.hpp"
 #include "runtime/synth/synthesiser.hpp"
 #include "runtime/synth/texture.hpp"
-#include "runtime/synth/voice.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 
 namespace carillon::synth {
@@ -23,7 +23,7 @@ constexpr double kRate = 48000.0, kPi = std::numbers::pi;
 
 TEST(EnergyBook, ABlowOnABodyAtRestGivesHalfOfItsSquaredShare) {
   const bank::Bank bank = make_cube_bank({{300.0, 5.0}, {1200.0, 900.0}, {2500.0, 40.0}, {800.0, 6000.0}});
-  Voice voice(Model::make(bank), {.audits_energy = true});
+  ResonatorBank voice(Model::make(bank), {.audits_energy = true});
   // At the start of a sub-block: all of its decay is in the book's law.
   ASSERT_TRUE(voice.strike({.time_s = 320.0 / kRate, .impulse_n_s = {0.0, 0.0, 0.02}}));
   std::vector<float> sound(kBlock);
@@ -35,7 +35,7 @@ TEST(EnergyBook, ABlowOnABodyAtRestGivesHalfOfItsSquaredShare) {
   EXPECT_NEAR(energy.given_j, expected, 0.35 * expected);
   EXPECT_NEAR(energy.given_j, energy.held_j + energy.lost_j, 1e-12 * expected);
   const bank::Bank slow = make_cube_bank({{300.0, 5.0}, {2500.0, 40.0}});
-  Voice rings(Model::make(slow), {.audits_energy = true});
+  ResonatorBank rings(Model::make(slow), {.audits_energy = true});
   ASSERT_TRUE(rings.strike({.time_s = 320.0 / kRate, .impulse_n_s = {0.0, 0.0, 0.02}}));
   for (int b = 0; b < 4; ++b) rings.process(sound);
   EXPECT_NEAR(rings.get_counters().energy.given_j, 2.0 * 0.5 * 0.02 * 0.02, 0.03 * 0.02 * 0.02);
@@ -73,7 +73,7 @@ std::vector<events::Event> make_events(std::mt19937_64& random, int kinds, doubl
   return events;
 }
 
-TEST(EnergyBook, OfRandomScenesIsThatOfTheSoundAtEveryStep) {
+TEST(EnergyBook, OfRandomScenesIsThatOfTheSound) {
   Texture::make_tables();
   std::mt19937_64 random(3);
   const auto pick = [&](double low, double high) { return std::uniform_real_distribution(low, high)(random); };

@@ -1,5 +1,4 @@
-// Forces that are known step by step, against the closed form of modes (that of the impact stage, which shares no code with voices) and
-// against whole impacts.
+// Forces known step by step, against the closed form of modes (that of the impact stage, which shares no code) and whole impacts.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -14,8 +13,8 @@
 
 #include "runtime/physics/impact/impact.hpp"
 #include "runtime/synth/acceleration_noise.hpp"
+#include "runtime/synth/resonator_bank.hpp"
 #include "runtime/synth/synthesiser.hpp"
-#include "runtime/synth/voice.hpp"
 #include "tests/unit/runtime/physics/impact/scenes.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 
@@ -27,7 +26,7 @@ using testing::InventedMode;
 using testing::make_cube_bank;
 constexpr double kRate = 48000.0, kPi = std::numbers::pi;
 
-/// The force of a whole pulse, in the mesh's frame.
+/// Force of a whole pulse, mesh axes.
 struct Course {
   double begin_s = 0.0, step_s = 0.0;
   std::vector<Vec3> impulses;
@@ -40,7 +39,7 @@ std::vector<Force> make_pieces(const Course& course, std::int32_t triangle = 0, 
   return pieces;
 }
 
-/// Sum of gain q' at every sample, in double precision, by exact steps from one border of a step or sample to the next.
+/// Sum of gain q' at every sample, in double precision, by exact maps between borders of steps and samples.
 std::vector<double> calc_sound(const bank::Bank& bank, const std::vector<Course>& courses, std::size_t samples) {
   const std::size_t modes = bank.mode_count();
   std::vector<double> omega, q(modes), v(modes), sound;
@@ -76,13 +75,13 @@ std::vector<double> calc_sound(const bank::Bank& bank, const std::vector<Course>
   return sound;
 }
 
-std::vector<float> play(Voice& voice, std::size_t samples, std::size_t block = 256) {
+std::vector<float> play(ResonatorBank& voice, std::size_t samples, std::size_t block = 256) {
   std::vector<float> pressure(samples, 0.0F);
   for (std::size_t n = 0; n < samples; n += block) voice.process(std::span(pressure).subspan(n, std::min(block, samples - n)));
   return pressure;
 }
 
-/// Root of the squared difference over that of the expected sound.
+/// Relative root mean square difference.
 double calc_error(const std::vector<float>& heard, const std::vector<double>& expected) {
   double difference = 0.0, size = 0.0;
   for (std::size_t n = 0; n < expected.size(); ++n) {
@@ -93,7 +92,7 @@ double calc_error(const std::vector<float>& heard, const std::vector<double>& ex
   return std::sqrt(difference / size);
 }
 
-/// Vertex 0 is struck: triangle 0 begins there.
+/// Strike at vertex 0 in triangle 0.
 std::vector<InventedMode> make_modes(int count) {
   std::vector<InventedMode> modes;
   std::mt19937_64 random(7);
@@ -132,7 +131,7 @@ TEST(Force, IsAnsweredExactlyByModesOfAllKinds) {
   const bank::Bank bank = make_cube_bank(make_modes(40));
   for (const Case& c : cases) {
     const Course course = make_course(c.begin_s, c.step_s, c.steps, c.rubs);
-    Voice voice(Model::make(bank, {.rate_hz = kRate}), {.silence_pa = 1e-30});
+    ResonatorBank voice(Model::make(bank, {.rate_hz = kRate}), {.silence_pa = 1e-30});
     for (const Force& piece : make_pieces(course)) ASSERT_TRUE(voice.push(piece)) << c.name;
     const double error = calc_error(play(voice, 2400, 61), calc_sound(bank, {course}, 2400));
     EXPECT_LT(error, 1e-6) << c.name;
@@ -147,7 +146,7 @@ TEST(Force, IsAnsweredByModesNearAndAboveCriticalDamping) {
     bank.decay_per_s[0] = share * 2.0 * kPi * 2000.0;
     for (const double step_s : {3.7e-6, 5.0e-5}) {
       const Course course = make_course(1.00013e-3, step_s, 40, true);
-      Voice voice(Model::make(bank, {.rate_hz = kRate}), {.silence_pa = 1e-30});
+      ResonatorBank voice(Model::make(bank, {.rate_hz = kRate}), {.silence_pa = 1e-30});
       for (const Force& piece : make_pieces(course)) ASSERT_TRUE(voice.push(piece));
       EXPECT_LT(calc_error(play(voice, 480), calc_sound(bank, {course}, 480)), share > 1000.0 ? 1e-3 : 1e-6) << share << " " << step_s;
     }
@@ -160,11 +159,11 @@ TEST(Force, OfNoLengthIsAnImpulse) {
     for (const double begin_s : {1e-3, 1.00007e-3, 48.0 / kRate}) {
       Force force = make_pieces(make_course(begin_s, step_s, 16, false)).front();
       for (auto& j : force.impulse_n_s) j = {0.0F, 0.0F, 1e-3F};
-      Voice by_force(Model::make(bank, {.rate_hz = kRate})), by_impulse(Model::make(bank, {.rate_hz = kRate}));
+      ResonatorBank by_force(Model::make(bank, {.rate_hz = kRate})), by_impulse(Model::make(bank, {.rate_hz = kRate}));
       ASSERT_TRUE(by_force.push(force));
       ASSERT_TRUE(by_impulse.strike({.time_s = begin_s, .impulse_n_s = {0.0, 0.0, 16e-3}}));
       std::vector<float> expected = play(by_impulse, 480), heard = play(by_force, 480);
-      heard[48] = expected[48] = 0.0F;  // an impulse at a sample is heard there, what begins there is not yet
+      heard[48] = expected[48] = 0.0F;  // an impulse at a sample is audible there, a force beginning there is not yet
       EXPECT_LT(calc_error(heard, std::vector<double>(expected.begin(), expected.end())), 1e-5) << step_s << " " << begin_s;
     }
   }
@@ -172,7 +171,7 @@ TEST(Force, OfNoLengthIsAnImpulse) {
 
 TEST(Force, AThousandAtOnceAddUp) {
   const bank::Bank bank = make_cube_bank(make_modes(20));
-  Voice voice(Model::make(bank, {.rate_hz = kRate}), {.max_forces = 1000, .silence_pa = 1e-30});
+  ResonatorBank voice(Model::make(bank, {.rate_hz = kRate}), {.max_forces = 1000, .silence_pa = 1e-30});
   std::vector<Course> courses;
   for (int i = 0; i < 1000; ++i) {
     courses.push_back(make_course(1e-3 + 1.37e-6 * i, 3e-6 + 1e-8 * i, 16, i % 2 == 0));
@@ -189,7 +188,7 @@ TEST(Force, SoundsTheSameInBlocksOfAnySizeAndOnAnyInstructionSetToRounding) {
   for (const Isa isa : {Isa::kPlain, Isa::kSse2, Isa::kAvx2, Isa::kAvx512}) {
     std::vector<float> own;
     for (const std::size_t block : {1U, 31U, 128U, 1000U}) {
-      Voice voice(Model::make(bank, {.rate_hz = kRate}), {.isa = isa});
+      ResonatorBank voice(Model::make(bank, {.rate_hz = kRate}), {.isa = isa});
       for (const Force& piece : make_pieces(course)) ASSERT_TRUE(voice.push(piece));
       const std::vector<float> heard = play(voice, 2000, block);
       if (own.empty()) own = heard;
@@ -200,9 +199,9 @@ TEST(Force, SoundsTheSameInBlocksOfAnySizeAndOnAnyInstructionSetToRounding) {
   }
 }
 
-TEST(Force, ThatCannotBePlayedIsRefused) {
+TEST(Force, UnplayableForcesAreRefused) {
   const bank::Bank bank = make_cube_bank(make_modes(5));
-  Voice voice(Model::make(bank, {.rate_hz = kRate}), {.max_forces = 4});
+  ResonatorBank voice(Model::make(bank, {.rate_hz = kRate}), {.max_forces = 4});
   AccelerationNoise click(0.05, 1.0, kRate, 2, 4);
   const Force good = make_pieces(make_course(1e-3, 1e-5, 10, true)).front();
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
@@ -229,14 +228,14 @@ TEST(Force, ThatCannotBePlayedIsRefused) {
   EXPECT_EQ(voice.get_counters().refused, 8);
   Force nothing = good;
   nothing.impulse_n_s = {};
-  Voice still(Model::make(bank, {.rate_hz = kRate}));
+  ResonatorBank still(Model::make(bank, {.rate_hz = kRate}));
   EXPECT_TRUE(still.push(nothing));
   EXPECT_TRUE(still.is_idle()) << "no force, no work";
 }
 
-TEST(Force, ThatIsLateKeepsItsImpulse) {
+TEST(Force, LateForcesKeepTheirImpulse) {
   const bank::Bank bank = make_cube_bank({{50.0, 0.0}});
-  Voice voice(Model::make(bank, {.rate_hz = kRate}));
+  ResonatorBank voice(Model::make(bank, {.rate_hz = kRate}));
   play(voice, 4800);
   const Course course = make_course(0.01, 1e-5, 10, false);
   ASSERT_TRUE(voice.push(make_pieces(course).front()));
@@ -252,7 +251,7 @@ TEST(Force, MovesAClickAsTheSamePulseInOnePiece) {
   Course course = make_course(kBegin, kLength / 4000.0, 4000, false);
   const double sum = std::accumulate(course.impulses.begin(), course.impulses.end(), 0.0, [](double s, const auto& j) { return s + j[2]; });
   for (auto& j : course.impulses) j = {0.6e-3 * j[2] / sum, 0.0, -0.8e-3 * j[2] / sum};
-  // The smallest sounds as the slope of the force, which a stair has not.
+  // The smallest body follows the slope of the force, which steps lack.
   for (const double radius : {0.0005, 0.02, 0.2}) {
     const events::Quaternion turned{std::sqrt(0.5), 0.0, 0.0, std::sqrt(0.5)};
     AccelerationNoise by_steps(radius, 0.3, kRate, 1, 300), by_pulse(radius, 0.3, kRate);
@@ -268,8 +267,8 @@ TEST(Force, MovesAClickAsTheSamePulseInOnePiece) {
   }
 }
 
-/// A ball on a plate, with and without friction: what the synthesiser rings with afterwards is what the world knows.
-TEST(Force, OfAWholeImpactLeavesTheModesAsTheWorldKnowsThem) {
+/// Ball on a plate, with and without friction: the modes after the impact are those of the world.
+TEST(Force, OfAWholeImpactLeavesTheModesOfTheWorld) {
   for (const double friction : {0.0, 0.3}) {
     const impact::tests::Plate plate = impact::tests::make_plate(0.5, 0.4, 0.006, 19000.0, 0.21, 0.17, 4.0);
     bank::Bank bank = make_cube_bank(std::vector<InventedMode>(plate.omega.size(), {1000.0, 4.0}));
@@ -297,7 +296,7 @@ TEST(Force, OfAWholeImpactLeavesTheModesAsTheWorldKnowsThem) {
     const double end_s = impact.get_time();
     impact::Body after = impact.get_bodies()[1];
     constexpr double kBegin = 0.0030041;
-    Voice voice(Model::make(bank, {.rate_hz = kRate}), {.silence_pa = 1e-30});
+    ResonatorBank voice(Model::make(bank, {.rate_hz = kRate}), {.silence_pa = 1e-30});
     for (const impact::Pulse& pulse : impact.take_pulses()) {
       Course course{kBegin + pulse.start_s, pulse.step_s, {}};
       for (const Vec3& j : pulse.impulse_n_s) course.impulses.push_back({-j[0], -j[1], -j[2]});
@@ -322,8 +321,8 @@ TEST(Force, OfAWholeImpactLeavesTheModesAsTheWorldKnowsThem) {
   }
 }
 
-/// A floor keeps groups asleep that a strike cannot lift above it: a pulse in pieces wakes those that it wakes in one.
-TEST(Force, InPiecesWakesWhatItWakesInOne) {
+/// Audibility floor: a pulse in pieces wakes the groups of the whole pulse.
+TEST(Force, InPiecesWakesTheSameGroups) {
   std::vector<InventedMode> modes = make_modes(200);
   for (std::size_t m = 0; m < modes.size(); ++m) modes[m].gain = std::pow(0.95, static_cast<double>(m));
   const auto model = Model::make(make_cube_bank(modes), {.rate_hz = kRate});
@@ -331,19 +330,19 @@ TEST(Force, InPiecesWakesWhatItWakesInOne) {
   double sum = 0.0;
   for (const auto& j : course.impulses) sum += j[2];
   for (const float floor_pa : {1e-6F, 1e-5F, 1e-4F}) {
-    Voice whole(model), pieces(model);
+    ResonatorBank whole(model), pieces(model);
     whole.set_floor(floor_pa);
     pieces.set_floor(floor_pa);
     ASSERT_TRUE(whole.strike({.time_s = 1.8e-3, .impulse_n_s = {0.0, 0.0, sum}, .duration_s = 1.6e-3}));
     for (const Force& piece : make_pieces(course)) ASSERT_TRUE(pieces.push(piece));
     play(whole, 128);
     play(pieces, 128);
-    EXPECT_EQ(pieces.get_live_group_count(), whole.get_live_group_count()) << floor_pa;
-    EXPECT_LT(pieces.get_live_group_count(), pieces.get_group_count());
+    EXPECT_EQ(pieces.get_ringing_group_count(), whole.get_ringing_group_count()) << floor_pa;
+    EXPECT_LT(pieces.get_ringing_group_count(), pieces.get_group_count());
   }
 }
 
-/// The body is exchanged for an equal one in the middle of a long force, with a click and a change of effects.
+/// The model is swapped for an equal one during a long force, with acceleration noise.
 TEST(Force, ContinuesWhenTheBodyIsExchanged) {
   const bank::Bank bank = make_cube_bank(make_modes(20));
   const Course course = make_course(5e-3, 1e-5, 1300, true);
@@ -366,7 +365,7 @@ TEST(Force, ContinuesWhenTheBodyIsExchanged) {
   EXPECT_LT(calc_error(swapped, std::vector<double>(alone.begin(), alone.end())), 1e-4);
 }
 
-TEST(Force, ReachesASynthesiserAsItReachesAVoice) {
+TEST(Force, ReachesASynthesiserAsAResonatorBank) {
   const bank::Bank bank = make_cube_bank(make_modes(20));
   const Course course = make_course(2.0e-3, 1.1e-5, 40, true);
   const auto listen = [&](EffectSet effects, bool as_impulses) {
@@ -390,11 +389,9 @@ TEST(Force, ReachesASynthesiserAsItReachesAVoice) {
   EXPECT_GT(*std::max_element(whole.begin(), whole.end()), 0.0F);
   EXPECT_NE(whole, at_once);
   EXPECT_EQ(at_once, listen(all.without(Effect::kHertzPulse), true)) << "without the length of pulses a piece is an impulse";
-  // Who gets none needs no room for any.
+  // Without room for forces they are refused.
   Synthesiser roomy({.rate_hz = kRate, .max_forces = 200});
-  const int with = roomy.add_body(Model::make(bank, {.rate_hz = kRate})),
-            without = roomy.add_body(Model::make(bank, {.rate_hz = kRate}), {.max_forces = 0});
-  EXPECT_GT(roomy.get_effect_counters(with).bytes[Effect::kModal], roomy.get_effect_counters(without).bytes[Effect::kModal] + 200 * 200);
+  const int without = roomy.add_body(Model::make(bank, {.rate_hz = kRate}), {.max_forces = 0});
   Force piece = make_pieces(course).front();
   piece.body = without;
   EXPECT_TRUE(roomy.push(piece));

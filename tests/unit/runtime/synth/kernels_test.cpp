@@ -1,4 +1,4 @@
-// Every instruction set against plain loops in double precision, for every count of modes around the widths of the vectors.
+// Every instruction set against plain loops in double precision, for all counts of modes around the vector widths.
 #include "runtime/synth/kernels.hpp"
 
 #include <gtest/gtest.h>
@@ -25,7 +25,7 @@ std::vector<Isa> list_isas() {
   return isas;
 }
 
-/// `modes` modes with random numbers in every table; lanes beyond are zero, as the kernels' contract wants it.
+/// `modes` modes with random tables; empty lanes zero.
 struct Invented {
   std::vector<SoundTable> sound;
   std::vector<RotationTable> turn;
@@ -73,13 +73,13 @@ struct Invented {
 
 constexpr int kEach = kSubBlock / kColumn;  // columns of a sub-block
 
-/// The state of a mode at the start of a column; after the last one, at the start of the next block.
+/// State of a mode at the start of a column; after the last one, at the start of the next block.
 Complex get_start(const Invented& of, std::size_t g, int l, int column) {
   if (column == kColumns) return {of.state[g].re[l], of.state[g].im[l]};
   return {of.starts[g].re[column][l], of.starts[g].im[column][l]};
 }
 
-/// A state `columns` later, left to itself: the turns of its binary digits.
+/// State `columns` later, free motion, by the binary digits.
 Complex turn_on(const Invented& of, std::size_t g, int l, Complex x, int columns) {
   for (int i = 0; i < 3; ++i) {
     if ((columns >> i) % 2 != 0) x *= Complex(of.turn[g].columns_re[i][l], of.turn[g].columns_im[i][l]);
@@ -89,7 +89,7 @@ Complex turn_on(const Invented& of, std::size_t g, int l, Complex x, int columns
 
 const std::array<int, 12> kCounts{0, 1, 2, 3, 4, 7, 8, 15, 16, 17, 33, 160};
 
-TEST(Kernels, TheBestIsOneThatThereIs) {
+TEST(Kernels, TheBestExists) {
   EXPECT_EQ(get_kernels(Isa::kBest).isa, find_best_isa());
   EXPECT_EQ(list_isas().front(), Isa::kPlain);
   EXPECT_EQ(list_isas().back(), find_best_isa());
@@ -146,7 +146,7 @@ TEST(Kernels, EmitSumsTheSoundOfAllModes) {
   }
 }
 
-TEST(Kernels, HowAPeriodIsCutDoesNotChangeABit) {
+TEST(Kernels, TheDivisionOfABlockDoesNotChangeABit) {
   for (const Isa isa : list_isas()) {
     const Kernels& kernels = get_kernels(isa);
     for (const int count : {16, 33, 160, 400}) {
@@ -212,7 +212,7 @@ TEST(Kernels, AStrikeAddsItsAnswerAndLeavesItToTheRestOfThePeriod) {
   }
 }
 
-// What is weighted before it is emitted.
+// emit_weighted() equals emit() of weighted states.
 TEST(Kernels, EmitWeightedIsEmitOfTheProducts) {
   for (const Isa isa : list_isas()) {
     const Kernels& kernels = get_kernels(isa);
@@ -246,7 +246,7 @@ TEST(Kernels, EmitWeightedIsEmitOfTheProducts) {
   }
 }
 
-/// The weight that is the sound of a mode's table, out_re re + out_im im.
+/// Weight equivalent to a mode's table, out_re re + out_im im.
 std::vector<ModeWeight> make_weight(const Invented& of) {
   std::vector<ModeWeight> weight(of.strike.size());
   for (std::size_t g = 0; g < weight.size(); ++g) {
@@ -255,8 +255,8 @@ std::vector<ModeWeight> make_weight(const Invented& of) {
   return weight;
 }
 
-// The states that are kept, two pulses together, weighed as the table has it, are the sound that is made from them; all else is as without.
-TEST(Kernels, WhatAStrikeKeepsIsWhatItSounds) {
+// The kept states of two pulses, weighed like the table, give the rendered sound; all else is unchanged.
+TEST(Kernels, KeptStatesOfAStrikeAreItsSound) {
   for (const Isa isa : list_isas()) {
     const Kernels& kernels = get_kernels(isa);
     for (const int count : kCounts) {
@@ -284,7 +284,7 @@ TEST(Kernels, WhatAStrikeKeepsIsWhatItSounds) {
   }
 }
 
-TEST(Kernels, ADriveAddsItsForcesAndTakesItsShareOfWhatRings) {
+TEST(Kernels, ADriveAddsItsForcesAndDampsTheRinging) {
   std::mt19937 random(11);
   std::uniform_real_distribution<float> number(-1.0F, 1.0F);
   for (const Isa isa : list_isas()) {

@@ -10,8 +10,8 @@
 #include "runtime/bank/edits.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/synth/model.hpp"
+#include "runtime/synth/resonator_bank.hpp"
 #include "runtime/synth/synthesiser.hpp"
-#include "runtime/synth/voice.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 
 namespace carillon::synth {
@@ -65,7 +65,7 @@ TEST(ListenerTracks, the_first_turn_begins_where_the_listener_was) {
   EXPECT_NEAR(listener.get_track(0).find(1.1).position_m[0], -0.2, 1e-12);
 }
 
-TEST(Voice, amplitudes_are_those_of_the_oscillators) {
+TEST(ResonatorBank, amplitudes_are_those_of_the_oscillators) {
   // An ideal impulse J gives q' = phi J; q then swings by phi J / omega_d, and dies away as exp(-d t).
   const bank::Bank bank = testing::make_cube_bank({{500.0, 20.0, 1.0, {0, 0, 2.0}}, {30000.0, 1.0}, {900.0, 3.0, 0.0, {0, 0, 0.5}}});
   Synthesiser synthesiser({.rate_hz = kRate, .microphones_m = {{0, 0, 0}}});
@@ -89,7 +89,7 @@ TEST(Voice, amplitudes_are_those_of_the_oscillators) {
 }
 
 std::vector<float> ring(std::shared_ptr<const Model> model) {
-  Voice voice(std::move(model));
+  ResonatorBank voice(std::move(model));
   EXPECT_TRUE(voice.strike({.time_s = 0.001, .triangle = 4, .impulse_n_s = {0.01, 0.02, 0.03}, .duration_s = 1e-4}));
   std::vector<float> sound(9600, 0.0F);
   voice.process(sound);
@@ -135,13 +135,12 @@ TEST(Model, a_model_like_another_shares_its_surface_and_sounds_as_one_of_its_own
     off += std::pow(static_cast<double>(a[n]) - b[n], 2);
   }
   EXPECT_LT(off, 1e-11 * power);
-  // Of another body, and where modes have gone beyond what can be heard, it has a surface of its own.
+  // Models of other bodies, and those with fewer audible modes, have their own surface.
   const auto smaller = bank::calc_edited(bank, {.size_scale = 0.2});
   EXPECT_NE(Model::make(smaller, {.rate_hz = kRate, .like = first.get()})->get_surface(), first->get_surface());
 }
 
 TEST(Model, all_that_a_nonlinear_energy_holds_counts_as_memory) {
-  if (!kCompiledEffects.has(Effect::kNonlinear)) GTEST_SKIP() << "built without it";
   bank::Bank bank = testing::make_cube_bank({{300.0, 5.0}, {700.0, 5.0}, {1100.0, 5.0}});
   const std::size_t linear = Model::make(bank, {.rate_hz = kRate})->calc_bytes();
   bank.quartic.modes = {0, 1, 2};

@@ -1,4 +1,4 @@
-// The way from a share of a core to a budget, on a machine whose cost is known.
+// LoadKeeper on a machine of known cost.
 #include "runtime/synth/load_keeper.hpp"
 
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 
-/// A machine on which sound costs `fixed` of a core and `per_mode_sample` seconds for work, of which there is `wanted` a second.
+/// Machine with a load of `fixed` cores plus `per_mode_sample` seconds for work, of which `wanted` per second are requested.
 struct Machine {
   double fixed = 0.0, per_mode_sample = 0.0, wanted = 0.0;
   LoadSample now{};
@@ -54,7 +54,7 @@ TEST(LoadKeeper, ComesToTheShareAndStays) {
   }
 }
 
-TEST(LoadKeeper, LeavesAloneWhatHasRoomAndGivesBackWhatItTook) {
+TEST(LoadKeeper, KeepsAndRestoresTheBudgetWithRoom) {
   Machine machine{.fixed = 0.02, .per_mode_sample = 2e-10, .wanted = 5e8};
   LoadKeeper keeper;
   for (int i = 0; i < 20; ++i) EXPECT_EQ(machine.keep(keeper, 0.3, kUnlimited, 1), kUnlimited);
@@ -66,7 +66,7 @@ TEST(LoadKeeper, LeavesAloneWhatHasRoomAndGivesBackWhatItTook) {
   EXPECT_EQ(budget, kUnlimited);
 }
 
-TEST(LoadKeeper, SurvivesWhatCannotBeKeptAndClocksThatErr) {
+TEST(LoadKeeper, SurvivesImpossibleSharesAndWrongClocks) {
   Machine machine{.fixed = 0.7, .per_mode_sample = 2e-10, .wanted = 1e9};
   LoadKeeper keeper;
   double budget = machine.keep(keeper, 0.3, kUnlimited, 100);

@@ -1,4 +1,4 @@
-// Multipoles by hand for the bank of cube_bank.hpp.
+// Multipoles for the bank of cube_bank.hpp.
 #pragma once
 
 #include <cmath>
@@ -11,12 +11,12 @@
 
 namespace carillon::testing {
 
-/// a_lm of a mode: number l^2 + l + m, signs of e^{-i omega t}.
+/// a_lm of a mode at l^2 + l + m, sign convention e^{-i omega t}.
 using ModeMultipoles = std::vector<std::complex<double>>;
 
 inline constexpr double kAirDensity = 1.2;
 
-/// Gives a bank multipoles about `centre_m`, on the sphere of this radius. Their rounding is 1 / 32767 of the largest of a mode.
+/// Sets multipoles about `centre_m`, on the sphere of this radius, rounded to 1 / 32767 of the largest of a mode.
 inline void give_multipoles(bank::Bank& bank, const std::vector<ModeMultipoles>& modes, double radius_m, const Vec3& centre_m = {}) {
   bank::Multipoles& air = bank.multipoles;
   air = {};
@@ -34,13 +34,13 @@ inline void give_multipoles(bank::Bank& bank, const std::vector<ModeMultipoles>&
   air.method = "by hand";
 }
 
-/// A monopole that is heard at 1 m like a gain.
+/// Monopole equivalent to a gain at 1 m.
 inline ModeMultipoles make_monopole(double gain, double freq_hz, double radius_m) {
   const double k = 2.0 * std::numbers::pi * freq_hz / bank::kSoundSpeedMs;
   return {gain / radius_m * std::sqrt(4.0 * std::numbers::pi) * std::polar(1.0, k * radius_m)};
 }
 
-/// A dipole along z whose pressure on the sphere is `pressure` times the cosine.
+/// Dipole along z, pressure on the sphere `pressure` times the cosine.
 inline ModeMultipoles make_dipole(std::complex<double> pressure) {
   return {0.0, 0.0, pressure * std::sqrt(4.0 * std::numbers::pi / 3.0), 0.0};
 }

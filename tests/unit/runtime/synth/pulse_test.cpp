@@ -54,7 +54,7 @@ TEST(Pulse, TheGaussianHasTheAreaTheMiddleAndTheVarianceOfTheHertzPulse) {
   };
   EXPECT_NEAR(moment(0), 1.0, 1e-12);
   EXPECT_NEAR(moment(1), 0.0, 1e-12);
-  EXPECT_NEAR(std::sqrt(moment(2)), calc_reference_deviation() * tau, 1e-3 * tau);  // less what the cut takes
+  EXPECT_NEAR(std::sqrt(moment(2)), calc_reference_deviation() * tau, 1e-3 * tau);  // up to the cut
   EXPECT_NEAR(length, 8.0 * calc_reference_deviation() * tau, 1e-9);
 }
 
@@ -64,7 +64,7 @@ TEST(Pulse, TheGaussiansSpectrumIsGaussian) {
     const double spectrum = testing::integrate(
         [&](double x) { return calc_pulse(PulseShape::kGaussian, x) * std::cos(omega_tau * length * (x - 0.5)); }, 0.0, 1.0);
     const double s = omega_tau * calc_reference_deviation();
-    EXPECT_NEAR(spectrum, std::exp(-0.5 * s * s), 2.0 * std::erfc(4.0 / std::sqrt(2.0))) << omega_tau;  // what the cut leaves out, twice
+    EXPECT_NEAR(spectrum, std::exp(-0.5 * s * s), 2.0 * std::erfc(4.0 / std::sqrt(2.0))) << omega_tau;  // twice the area beyond the cut
   }
 }
 

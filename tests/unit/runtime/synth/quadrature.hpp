@@ -1,4 +1,4 @@
-// Slow and plain integration, the independent oracle of the pulse tests.
+// Numerical integration: oracle of the pulse tests.
 #pragma once
 
 #include <cmath>
@@ -7,7 +7,7 @@
 
 namespace carillon::testing {
 
-/// Integral of f over a..b by the double-exponential rule, which does not mind roots at the ends.
+/// Integral of f over a..b by the double-exponential rule, for root singularities at the ends.
 template <typename F>
 auto integrate(F f, double a, double b) {
   const double step = 1.0 / 64.0;
@@ -22,7 +22,7 @@ auto integrate(F f, double a, double b) {
   return sum;
 }
 
-/// sin(pi x)^1.5 of unit area; the area is itself found by quadrature.
+/// sin(pi x)^1.5 of unit area, by quadrature.
 inline double calc_reference_pulse(double x) {
   static const double area = integrate([](double y) { return std::pow(std::sin(std::numbers::pi * y), 1.5); }, 0.0, 1.0);
   return x <= 0.0 || x >= 1.0 ? 0.0 : std::pow(std::sin(std::numbers::pi * x), 1.5) / area;

@@ -1,4 +1,4 @@
-// Every stage between a body and two ears, in the order of the sound's way, on one set of signals: longer than most files.
+// Stages between a body and two ears on one set of signals.
 #include "runtime/synth/receiver.hpp"
 
 #include <gtest/gtest.h>
@@ -29,7 +29,7 @@ std::vector<double> make_tone(double freq_hz, std::size_t samples) {
   return tone;
 }
 
-/// What arrives at an ear, with the latency taken off.
+/// Sound at an ear, without the latency.
 std::vector<double> receive(const Trajectory& path, const Trajectory& listener, const std::vector<double>& pressure,
                             std::size_t block = 100) {
   std::vector<float> sent(pressure.begin(), pressure.end());
@@ -144,7 +144,7 @@ TEST(Ears, APathPassesItsPointsWithoutJumpsOfSpeed) {
   EXPECT_THROW(make_path({{std::nan(""), {}}}), InputError);
 }
 
-// A ball that falls and leaves the floor with another velocity: both sides of the impact keep their own.
+// A bouncing ball: both sides of the impact keep their velocity.
 TEST(Ears, ATrackKeepsBothSidesOfAnImpact) {
   constexpr double kImpact = 0.01;
   Trajectory track(8);
@@ -165,7 +165,7 @@ TEST(Ears, ATrackKeepsBothSidesOfAnImpact) {
   }
 }
 
-TEST(Ears, ATrackForgetsTheOldestAndRefusesWhatIsNoWaypoint) {
+TEST(Ears, ATrackDropsTheOldestAndRefusesBadWaypoints) {
   Trajectory track(3);
   EXPECT_TRUE(track.is_still());
   EXPECT_EQ(track.find(5.0).position_m[0], 0.0);
@@ -183,7 +183,7 @@ TEST(Ears, ATrackForgetsTheOldestAndRefusesWhatIsNoWaypoint) {
   EXPECT_NEAR(track.find(3.25).position_m[0], 3.25 * 3.25, 1e-12);
 }
 
-/// A track that follows a function of time, with its true velocities.
+/// Track of a function of time with exact velocities.
 template <class Motion>
 Trajectory make_motion(double step_s, double until_s, Motion motion) {
   Trajectory track(static_cast<std::size_t>(until_s / step_s) + 2);
@@ -196,7 +196,7 @@ Trajectory make_motion(double step_s, double until_s, Motion motion) {
   return with_velocity;
 }
 
-/// Frequency about `centre_hz` over time: phase of the signal turned back by it, seen through a window of 10 ms that hops by 1 ms.
+/// Frequency about `centre_hz` over time: phase of the demodulated signal in a window of 10 ms every 1 ms.
 std::vector<double> calc_frequency_hz(const std::vector<double>& x, double centre_hz) {
   constexpr std::size_t kWindow = 480, kHop = 48;
   std::vector<double> freq;
@@ -209,7 +209,7 @@ std::vector<double> calc_frequency_hz(const std::vector<double>& x, double centr
   return freq;
 }
 
-TEST(Ears, OneKilohertzPassingAt20MetresPerSecondIsHeardAsTheoryHasItEverywhere) {
+TEST(Ears, OneKilohertzPassingAt20MetresPerSecondHasTheExactDopplerShift) {
   // On the line y = 2 m past the listener. Retarded time by the quadratic equation, frequency 1000 dt'/dt.
   constexpr double kSpeed = 20.0, kAside = 2.0, kC = 343.0, kPassing = 1.0;
   const Trajectory path = make_motion(0.002, 2.0, [](double t) { return Vec3{kSpeed * (t - kPassing), kAside, 0.0}; });
@@ -231,7 +231,7 @@ TEST(Ears, OneKilohertzPassingAt20MetresPerSecondIsHeardAsTheoryHasItEverywhere)
   }
   EXPECT_LT(worst, 1e-3);
   RecordProperty("worst", std::to_string(worst));
-  EXPECT_LT(worst, 1e-4);  // what the delay line itself keeps
+  EXPECT_LT(worst, 1e-4);  // error of the interpolation
   EXPECT_GT(highest, 1060.0);
   EXPECT_LT(lowest, 947.0);
 }
@@ -261,7 +261,7 @@ TEST(Ears, APendulumSwingsInPitchAndLevel) {
   EXPECT_NEAR(20 * std::log10(loudest / softest), 20 * std::log10(max / min), 0.005);
 }
 
-/// Discrete Fourier transform in place; the size is a power of two.
+/// Discrete Fourier transform in place; power-of-two size.
 void transform(std::vector<std::complex<double>>& x) {
   if (x.size() == 1) return;
   std::vector<std::complex<double>> even, odd;
@@ -311,9 +311,9 @@ TEST(Ears, ASourceThatGathersSpeedIsHeardAsTheClosedForm) {
   }
 }
 
-/// What is heard of a moving volume source, seen through a short window: the wave equation's integral over all times of sending,
-/// p = d/dt of the integral of Q(s) delta(t - s - r(s) / c) / r(s), where Q' is the pressure at 1 m of the source at rest. `side_m`: of two
-/// opposite sources so far apart along x, over that distance; 0: of one.
+/// Sound of a moving volume source in a short window, by the wave equation's integral over emission times, p = d/dt of the integral of Q(s)
+/// delta(t - s - r(s) / c) / r(s), Q' the pressure at 1 m of the resting source. `side_m`: two opposite sources this far apart along x,
+/// over that distance; 0: one.
 std::vector<double> calc_windowed(const std::vector<double>& times_s, double width_s, double freq_hz, double side_m,
                                   const std::function<Vec3(double)>& way) {
   std::vector<double> seen;
@@ -334,7 +334,7 @@ std::vector<double> calc_windowed(const std::vector<double>& times_s, double wid
   return seen;
 }
 
-TEST(Ears, WhatComesNearerIsLouderAsTheWaveEquationHasIt) {
+TEST(Ears, ApproachingSourcesAreLouderByTheWaveEquation) {
   constexpr double kFreq = 1000.0, kWidth = 0.2e-3;
   for (const double speed : {5.0, 20.0, 60.0}) {
     const auto way_of = [&](double t) { return Vec3{speed * (t - 0.5), 3.0, 1.0}; };
@@ -367,7 +367,7 @@ TEST(Ears, WhatComesNearerIsLouderAsTheWaveEquationHasIt) {
     for (const double x : one) largest = std::max(largest, std::abs(x));
     for (std::size_t i = 0; i < times.size(); ++i) {
       const double distance = std::hypot(way_of(times[i])[0], 3.0, 1.0);
-      const double slack = speed / (2 * pi * kFreq * distance) * 2.0 + 1e-3;  // the near field of what moves
+      const double slack = speed / (2 * pi * kFreq * distance) * 2.0 + 1e-3;  // near field of a moving source
       EXPECT_NEAR(see(heard, times[i]), one[i], slack * largest) << speed << " m/s, " << times[i] << " s";
       EXPECT_NEAR(unit * see(felt, times[i]), two[i], (slack + 1.5 / (unit * distance)) * unit * largest) << speed << " m/s, " << times[i];
     }
@@ -388,8 +388,7 @@ TEST(Ears, AMovingListenerHearsTheClosedForm) {
 }
 
 TEST(Ears, AMovingListenerIsAMovingSourceMirroredInTime) {
-  // What leaves a source at X(s) and reaches the origin at t takes as long as what leaves the origin at -t and reaches a listener at X(s)
-  // at -s.
+  // Sound from a source at X(s) to the origin at t takes as long as sound from the origin at -t to a listener at X(s) at -s.
   const auto way_of = [](double t) { return Vec3{-3.0 + 20.0 * t, 2.0 - t * t, 0.5}; };
   const Trajectory moving = make_motion(0.002, 1.0, way_of);
   const Trajectory mirrored = make_motion(0.002, 1.0, [&](double t) { return way_of(1.0 - t); });  // runs from s = 1 back to 0
@@ -471,15 +470,15 @@ TEST(Ears, EveryInstructionSetHearsTheSame) {
   }
 }
 
-TEST(Ears, MemoryThatCannotBeIsRefused) {
+TEST(Ears, ImpossibleSizesAreRefused) {
   EXPECT_THROW(DelayLine(1e6, kRate, 512), InputError);
   EXPECT_THROW(DelayLine(-1.0, kRate, 512), InputError);
   EXPECT_THROW(DelayLine(10.0, 0.0, 512), InputError);
   EXPECT_THROW(DelayLine(10.0, kRate, 0), InputError);
 }
 
-// The same place, said once, said twice with speeds of an atom a year, and after a walk: the first and the last take the cheap way.
-TEST(Ears, WhatStandsStillSoundsAsWhatHardlyMoves) {
+// The same place given once, twice with negligible velocities, and after a walk: the first and the last use the cheap path.
+TEST(Ears, RestingSourcesSoundAsBarelyMovingOnes) {
   std::vector<double> noise(6000);
   std::mt19937 random(2);
   std::normal_distribution<double> normal;
@@ -505,7 +504,7 @@ TEST(Ears, WhatStandsStillSoundsAsWhatHardlyMoves) {
   EXPECT_GT(*std::max_element(a.begin(), a.end()), 0.5);
 }
 
-TEST(Ears, SayHowManySamplesCameByAWayThatChanged) {
+TEST(Ears, CountSamplesWithAChangingPath) {
   Trajectory track(8), listener(1);
   track.push({0.0, {0.0, 1.0, 0.0}, {}});
   DelayLine delay_line(100.0, kRate, 32);
@@ -527,7 +526,7 @@ TEST(Ears, SayHowManySamplesCameByAWayThatChanged) {
   EXPECT_EQ(run(14400, 19200), 0);
 }
 
-TEST(DelayLine, HoldsWhatWasPushedAsLongAsTheWayIs) {
+TEST(DelayLine, HoldsSamplesForTheTravelTime) {
   for (const double longest_m : {0.0, 1.0, 7.7}) {
     constexpr int kBlock = 50;
     DelayLine delay_line(longest_m, kRate, kBlock);

@@ -1,4 +1,4 @@
-// The table of impulse answers in data/oscillator_impulse.csv.
+// Table of impulse responses in data/oscillator_impulse.csv.
 #pragma once
 
 #include <fstream>

@@ -1,10 +1,10 @@
 // Method:     every mode is an oscillator q'' + 2 d q' + lambda q = phi(x) . F(t), advanced by its exact map from sample to sample: a
-//             complex rotation for under-damped modes, the real 2 x 2 map at, near and above critical damping. While a pulse acts, each
-//             sample adds the exact answer to the part of the force inside that sample (pulse.hpp), so that timing is not bound to samples
-//             and nothing sounds before the pulse begins. Pressure p = sum g_m q'_m.
+//             complex rotation for under-damped modes, the real 2 x 2 map at, near and above critical damping. During a pulse each sample
+//             adds the exact response to the part of the force within it (pulse.hpp), so timing is not quantised and nothing sounds before
+//             the pulse. Pressure p = sum g_m q'_m.
 // Source:     OSG02 section 4 (one complex multiply per mode and sample), corrected by its missing factor 1/2 in eq. 16-18;
-// docs/equations.md. Deviations: the filter to audible modes uses sqrt(lambda), not the damped frequency, which would let over-damped modes
-// vanish.
+//             docs/equations.md.
+// Deviations: the audible band is tested with sqrt(lambda), not the damped frequency, which would drop over-damped modes.
 #include "tests/unit/runtime/synth/reference_body.hpp"
 
 #include <algorithm>
@@ -26,13 +26,13 @@ using synth::OscillatorMap;
 
 namespace {
 
-// Relative distance from critical damping below which q' = re - (d / omega_d) im would lose digits.
+// Relative distance from critical damping below which q' = re - (d / omega_d) im loses digits.
 constexpr double kNearCritical = 0.05;
-// Largest |root| x step for which kMoments Chebyshev terms hold the answer of a mode.
+// Largest |root| x step that kMoments Chebyshev terms resolve.
 constexpr double kStiffest = 4.0;
-// A mode that dies within 1/1024 of a sample has no sound of its own.
+// A mode that decays within 1/1024 of a sample is not rendered.
 constexpr int kMaxSubsteps = 256;
-// States below this are set to zero, long before they could become denormal numbers.
+// States below this are zeroed, long before they become denormal.
 constexpr double kNothing = 1e-60;
 
 bool is_finite(const Vec3& v) { return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]); }
@@ -152,7 +152,7 @@ bool ReferenceBody::strike(const Strike& strike) noexcept {
   Pulse pulse;
   pulse.duration = strike.duration_s * rate_hz_;
   pulse.begin = strike.sample - 0.5 * pulse.duration;
-  // The sample at position_ is still to come: what happens after position_ - 1 can still be heard.
+  // The sample at position_ is the next one: forces after position_ - 1 are still audible.
   const double earliest = static_cast<double>(position_ - 1);
   if (!(pulse.begin > earliest)) {
     pulse.begin = std::nextafter(earliest, earliest + 1.0);
@@ -204,7 +204,7 @@ void ReferenceBody::process_chunk(std::span<double> pressure_pa) noexcept {
   if (awake_ && acting == 0 && position_ % kChunk == 0) fall_asleep_if_silent();
 }
 
-/// Lists the pulses that touch this chunk, with their moments for each of its samples.
+/// Lists the pulses in this chunk, with their moments for each sample.
 int ReferenceBody::find_acting_pulses(int samples) noexcept {
   acting_.clear();
   for (std::size_t i = 0; i < pulses_.size(); ++i) {
@@ -219,7 +219,7 @@ int ReferenceBody::find_acting_pulses(int samples) noexcept {
   return static_cast<int>(acting_.size());
 }
 
-/// phi(x) . J of one mode, phi interpolated between the corners of the triangle.
+/// phi(x) . J of one mode, phi interpolated in the triangle.
 double ReferenceBody::calc_projection(const Pulse& pulse, std::int32_t mode) const noexcept {
   double sum = 0.0;
   for (int corner = 0; corner < 3; ++corner) {
@@ -323,7 +323,7 @@ void ReferenceBody::advance_damped_modes(std::span<double> pressure, bool driven
   }
 }
 
-/// Forgets the pulses that ended before the samples to come.
+/// Removes the pulses that ended before the next samples.
 void ReferenceBody::retire_pulses() noexcept {
   const double heard = static_cast<double>(position_ - 1);
   std::erase_if(pulses_, [heard](const Pulse& pulse) { return pulse.begin + pulse.duration <= heard; });

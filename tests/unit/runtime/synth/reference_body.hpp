@@ -1,4 +1,4 @@
-// One body that rings, in double precision and sample by sample: slow, plain, and the oracle of synth::Voice.
+// One ringing body in double precision, sample by sample: oracle of synth::ResonatorBank.
 //
 //   testing::ReferenceBody body(bank, 48000.0);
 //   body.strike({.sample = 100.37, .duration_s = 80e-6, .triangle = 12, .barycentric = {0.2, 0.3, 0.5}, .impulse_n_s = {0, 0, 0.01}});
@@ -39,8 +39,8 @@ struct ReferenceBodyCounters {
   std::int64_t resets = 0;    // times that the state was not finite and was cleared
 };
 
-/// All modes of one bank below the Nyquist frequency, in double precision. Every mode is advanced by its exact map.
-/// Memory is taken in the constructor only. Not thread-safe: one thread calls strike() and process().
+/// All modes of one bank below the Nyquist frequency, in double precision, each by its exact map. Allocates in the constructor only. One
+/// thread calls strike() and process().
 class ReferenceBody {
  public:
   /// The bank is not owned and must outlive the body. Throws InputError when arrays of the bank disagree or the rate is not positive.

@@ -29,8 +29,7 @@ std::shared_ptr<const Model> make_model(int modes, double decay_per_s = 20.0) {
 
 using Channels = std::vector<std::vector<float>>;
 
-/// Plays `frames` frames in blocks that `next_block` gives; before each block everything of `events` that begins before the block's end and
-/// half a second more is pushed.
+/// Plays `frames` frames in blocks of next_block(); before each block pushes the `events` that begin up to half a second after it.
 template <typename NextBlock>
 Channels play(Synthesiser& synthesiser, const std::vector<events::Event>& events, int frames, NextBlock&& next_block) {
   const int channels = synthesiser.get_microphone_count();
@@ -59,7 +58,7 @@ events::Impulse make_impulse(int body, double time_s, double impulse_n_s = 1e-3)
           .duration_s = 2e-4};
 }
 
-/// A hail of strikes on bodies that fly past.
+/// Many strikes on passing bodies.
 std::vector<events::Event> make_hail(int bodies, double seconds) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> unit(0.0, 1.0);
@@ -107,9 +106,9 @@ TEST(Synthesiser, GivesTheSameBitsInBlocksOfAnySize) {
   }
 }
 
-// A body 343 m * k / 48000 away is heard k samples later, 1 / r as loud: what its voice alone plays, to the rounding of single precision
-// and the ripple of the sinc.
-TEST(Synthesiser, IsItsVoicesByWayOfTheAir) {
+// A body 343 m * k / 48000 away is heard k samples later, 1 / r as loud: its ResonatorBank alone, up to single precision and the ripple of
+// the sinc.
+TEST(Synthesiser, IsItsResonatorBanksWithPropagation) {
   const auto model = make_model(30);
   constexpr int kDelay = 280;
   const double distance = kDelay * kSoundSpeedMs / kRate;
@@ -117,7 +116,7 @@ TEST(Synthesiser, IsItsVoicesByWayOfTheAir) {
   const int body = synthesiser.add_body(model, {.position_m = {0.0, distance, 0.0}});
   const events::Impulse impulse = make_impulse(body, 0.003);
   const Channels out = play(synthesiser, {impulse}, 20000, [] { return 480; });
-  Voice voice(model);
+  ResonatorBank voice(model);
   EXPECT_TRUE(voice.strike(impulse));
   std::vector<float> alone(20000, 0.0F);
   voice.process(alone);
@@ -166,7 +165,7 @@ TEST(Synthesiser, RemovedBodiesFallSilentAndTheirNumbersComeBack) {
   EXPECT_THROW(synthesiser.remove_body(7), InputError);
 }
 
-TEST(Synthesiser, CountsWhatItCannotPlay) {
+TEST(Synthesiser, CountsUnplayableEvents) {
   Synthesiser synthesiser({.rate_hz = kRate, .ring_events = 4});
   const int body = synthesiser.add_body(make_model(4));
   EXPECT_TRUE(synthesiser.push(make_impulse(9, 0.0)));  // of no body
@@ -204,8 +203,8 @@ TEST(Synthesiser, SleepingBodiesDoNoWork) {
   EXPECT_EQ(synthesiser.get_counters().mode_samples, before);
 }
 
-// The clock of a bank that has died away is its counters: not one mode-sample more, for each of many bodies.
-TEST(Synthesiser, ABankThatHasDiedAwayCostsNothing) {
+// No mode-sample is counted for decayed bodies.
+TEST(Synthesiser, ADecayedBodyCostsNothing) {
   Synthesiser synthesiser({.rate_hz = kRate, .max_bodies = 40});
   const auto model = make_model(100, 60.0);
   std::vector<events::Event> events;
@@ -229,8 +228,8 @@ TEST(Synthesiser, ABankThatHasDiedAwayCostsNothing) {
   EXPECT_EQ(*std::max_element(out[0].begin(), out[0].end()), 0.0F);
 }
 
-// Physics stops in the middle of a touch and says nothing more: the sound continues for the 20 ms that are allowed for it, then falls
-// silent within 5 ms, but for what rings; and again when physics continues.
+// Physics stops during a contact: the sound continues for 20 ms, then fades out within 5 ms except for ringing modes; again when physics
+// continues.
 TEST(Synthesiser, AContactWithoutFurtherRecordsFallsSilent) {
   const auto model = Model::make(testing::make_cube_bank({{800.0, 500.0, 1.0, {0.0, 0.0, 1.0}}, {3100.0, 500.0, 1.0, {0.0, 0.0, 1.0}}}),
                                  {.rate_hz = kRate});
@@ -280,8 +279,8 @@ TEST(Synthesiser, CountsHowOftenItOvertakesPhysics) {
   EXPECT_EQ(synthesiser.get_counters().underruns, 2);
 }
 
-// By way of the modes, the click, the way through the air and the gain.
-TEST(Synthesiser, WhatIsNoNumberNeverReachesTheOutput) {
+// By the modes, acceleration noise, propagation and the gain.
+TEST(Synthesiser, NonFiniteNumbersNeverReachTheOutput) {
   std::vector<testing::InventedMode> modes{{300.0, 20.0, 1.0, {0.3, 0.2, 1.0}}, {20000.0, 1e6, 1.0, {0.3, 0.2, 1.0}}};
   const auto model = Model::make(testing::make_cube_bank(modes), {.rate_hz = kRate, .sphere_radius_m = 0.05});
   for (const EffectSet effects : {EffectSet{Effect::kModal}, EffectSet{Effect::kAccelerationNoise},
@@ -332,7 +331,7 @@ TEST(Synthesiser, FurtherChannelsAreSilentAndFewerAreEnough) {
   EXPECT_DOUBLE_EQ(synthesiser.get_time_s(), 2600 / kRate);
 }
 
-TEST(Synthesiser, RefusesWhatMakesNoSense) {
+TEST(Synthesiser, RefusesImpossibleOptions) {
   EXPECT_THROW(Synthesiser({.rate_hz = 0.0}), InputError);
   EXPECT_THROW(Synthesiser({.microphones_m = {}}), InputError);
   EXPECT_THROW(Synthesiser({.microphones_m = {{0.0, std::nan(""), 0.0}}}), InputError);
@@ -343,7 +342,7 @@ TEST(Synthesiser, RefusesWhatMakesNoSense) {
   EXPECT_THROW(synthesiser.add_body(make_model(3)), InputError);  // for 48 kHz
 }
 
-// Other threads push, and bodies and effects come and go while it plays. (For a data race detector: what is heard is tested above.)
+// Other threads push, and bodies and models change during playback (for a data race detector).
 TEST(Synthesiser, TakesEventsFromManyThreadsWhileItPlays) {
   Synthesiser synthesiser({.rate_hz = kRate, .max_bodies = 8});
   const auto model = make_model(16), edited = make_model(17);
@@ -374,9 +373,8 @@ TEST(Synthesiser, TakesEventsFromManyThreadsWhileItPlays) {
   const std::array<EffectSet, 4> kSets{EffectSet{}, {Effect::kModal}, kDefaultEffects.with(Effect::kAccelerationNoise), kDefaultEffects};
   std::size_t turn = 0;
   while (!stops) {
-    if (!synthesiser.is_full()) bodies.push_back(synthesiser.add_body(model, {.position_m = {1.0, 2.0, 0.0}}));
-    ++turn;
-    synthesiser.set_effects(bodies[turn % bodies.size()], kSets[turn % kSets.size()]);
+    if (!synthesiser.is_full())
+      bodies.push_back(synthesiser.add_body(model, {.position_m = {1.0, 2.0, 0.0}, .effects = kSets[++turn % kSets.size()]}));
     (void)synthesiser.get_effect_counters(bodies.front());
     if (!bodies.empty()) {
       synthesiser.swap_model(bodies.back(), bodies.size() % 2 == 0 ? model : edited);

@@ -1,4 +1,4 @@
-// The profile of a rough surface against the spectrum that it is said to have.
+// Profile of a rough surface against its specified spectrum.
 #include "runtime/synth/texture.hpp"
 
 #include <gtest/gtest.h>
@@ -28,7 +28,7 @@ std::vector<double> read(Texture& texture, double speed_m_s, std::size_t samples
   return out;
 }
 
-/// Power between two frequencies, in windows of 4096 samples (Blackman), by plain sums: no library of ours.
+/// Power between two frequencies in windows of 4096 samples (Blackman), by plain sums.
 double calc_power(const std::vector<double>& x, double from_hz, double to_hz, double rate_hz) {
   constexpr int kWindow = 4096;
   double sum = 0.0, weights = 0.0;
@@ -51,7 +51,7 @@ double calc_power(const std::vector<double>& x, double from_hz, double to_hz, do
   return sum / windows / weights / kWindow;
 }
 
-/// Of a line over a self-affine surface: C(q) ~ q^-(1 + 2 H) from the longest wave on, beyond 1 / cut-off the square of the rms height.
+/// Line over a self-affine surface: C(q) ~ q^-(1 + 2 H) from the longest wave on; beyond 1 / cut-off the square of the rms height.
 double calc_prescribed(double from_per_m, double to_per_m) {
   const double cutoff = 0.8e-3, h = Texture::kHurst;
   const auto beyond = [&](double per_m) { return std::pow(std::max(1.0 / kLongestM, per_m) * cutoff, -2.0 * h); };
@@ -70,11 +70,11 @@ TEST(Texture, HasTheSpectrumOfASelfAffineSurfaceReadAtTheSpeed) {
       EXPECT_NEAR(10.0 * std::log10(calc_power(height, from, to, kRate) / expected), 0.0, 1.2) << speed << " m/s, " << from << " Hz";
     }
     const double below = calc_power(height, 0.0, 0.7 * speed / kLongestM - 3.0 * kRate / 4096.0, kRate);
-    EXPECT_LT(below, 1e-3 * kRoughness * kRoughness) << "there are no longer waves";
+    EXPECT_LT(below, 1e-3 * kRoughness * kRoughness) << "no longer waves";
   }
 }
 
-TEST(Texture, HasTheRoughnessThatIsAskedFor) {
+TEST(Texture, HasTheRequestedRoughness) {
   for (const double roughness : {0.01e-6, 1e-6, 20e-6}) {
     Texture texture;
     texture.start(roughness, 8);
@@ -109,7 +109,7 @@ TEST(Texture, MovesNothingFasterThanTheNyquistFrequency) {
   }
   Texture texture;
   texture.start(kRoughness, 5);
-  EXPECT_EQ(texture.calc_gains(300.0, 1e-8, 0.0, kRate).rms_m, 0.0) << "all of it is beyond";
+  EXPECT_EQ(texture.calc_gains(300.0, 1e-8, 0.0, kRate).rms_m, 0.0) << "all beyond the band";
 }
 
 TEST(Texture, IsBluntedByThePatchThatTouchesIt) {
@@ -126,7 +126,7 @@ TEST(Texture, IsBluntedByThePatchThatTouchesIt) {
   }
 }
 
-TEST(Texture, IsNotFeltWhereTheBodiesYield) {
+TEST(Texture, IsFilteredByTheComplianceOfTheBodies) {
   Texture texture;
   texture.start(kRoughness, 6);
   const double give = 2.0 * std::numbers::pi * 1000.0;

@@ -8,10 +8,10 @@
 namespace carillon::synth {
 namespace {
 
-TEST(TransferBudget, SharesAreWhatBodiesNeedAndTheRestIsForAll) {
+TEST(TransferBudget, SharesAreNeedsPlusTheRest) {
   TransferBudget budget;
   budget.begin(1000.0, 4, 400);
-  EXPECT_EQ(budget.find_share(0), 150);  // a quarter of what is left
+  EXPECT_EQ(budget.find_share(0), 150);  // a quarter of the rest
   EXPECT_EQ(budget.find_share(300), 450);
 }
 
@@ -33,7 +33,7 @@ TEST(TransferBudget, TogetherTheyNeverExceedFiveQuarters) {
   }
 }
 
-TEST(TransferBudget, ANeedIsForgottenInTime) {
+TEST(TransferBudget, NeedsDecay) {
   int need = TransferBudget::find_need(0, 456);
   EXPECT_EQ(need, 456);
   for (int block = 0; block < 16; ++block) need = TransferBudget::find_need(need, 0);

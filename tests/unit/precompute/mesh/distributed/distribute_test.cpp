@@ -1,4 +1,4 @@
-// A mesh on rank 0 put on 1, 2 and 3 ranks: every element and node arrives once, and errors reach all ranks alike.
+// Distribution of a mesh from rank 0 to 1, 2 and 3 ranks: every element and node arrives once, and errors reach all ranks alike.
 #include "precompute/mesh/distributed/distribute.hpp"
 
 #include <gmock/gmock.h>
@@ -84,7 +84,7 @@ TEST(Distribute, numbers_two_separate_bodies_and_lists_the_fixed_nodes_of_each) 
   const auto other = tests::make_box({3, 2, 2}, kSize, 1, {1, 0, 0});
   const auto shift = static_cast<std::int32_t>(both.nodes_m.size());
   both.nodes_m.insert(both.nodes_m.end(), other.nodes_m.begin(), other.nodes_m.end());
-  both.nodes_m.push_back({9, 9, 9});  // no element uses this node
+  both.nodes_m.push_back({9, 9, 9});  // unused node
   for (const auto node : other.tets) both.tets.push_back(node + shift);
   const DistributedMesh pieces = distribute_box(both, {shift, shift + 1});
   EXPECT_EQ(pieces.components, 2);
@@ -146,7 +146,7 @@ TEST(SupportingPoints, span_as_much_as_all_points_do) {
   EXPECT_EQ(list_points(find_supporting_points(two, 3)).size(), 3u);
 }
 
-// Points of a long bar in no order; ranks bring uneven runs of them, the last one none.
+// Points of a long bar in random order; ranks have different numbers of them, the last none.
 TEST(Bisect, gives_every_rank_a_stretch_of_a_bar_of_nearly_equal_count) {
   constexpr int kCount = 101;
   std::vector<int> order(kCount);
@@ -173,7 +173,7 @@ TEST(Bisect, gives_every_rank_a_stretch_of_a_bar_of_nearly_equal_count) {
   for (int r = 0; r + 1 < ranks; ++r) EXPECT_TRUE(high[r] < low[r + 1] || high[r + 1] < low[r]) << r;
 }
 
-// All elements in one place: their numbers alone decide.
+// All elements at one place: only their numbers decide.
 TEST(Bisect, separates_elements_in_one_place_by_their_numbers) {
   constexpr int kOwn = 4;
   const auto part = bisect(world(), std::vector<Vec3>(kOwn, Vec3{1, 1, 1}), kOwn * world().rank());

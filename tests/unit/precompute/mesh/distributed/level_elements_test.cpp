@@ -1,4 +1,4 @@
-// Elements that change their ranks: none is lost, and all ranks have the same number, however many there are.
+// Elements that change ranks: none is lost, and all ranks have the same number.
 #include "precompute/mesh/distributed/level_elements.hpp"
 
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@ namespace {
 using Counts = std::vector<std::int64_t>;
 using Ints = std::vector<std::int32_t>;
 
-/// The counts after all transfers; of a rank that gives, each transfer ends behind the one before.
+/// Counts after all transfers; transfers of a sender are consecutive.
 Counts carry_out(Counts counts) {
   int from = -1;
   std::int64_t gone = 0;
@@ -50,12 +50,12 @@ TEST(PlanTransfers, levels_any_number_of_ranks_and_loses_nothing) {
 
 TEST(LevelElements, gives_the_first_of_a_rank_and_none_twice) {
   const comm::Communicator world(MPI_COMM_WORLD);
-  // Dealt out in turn: element g of rank g * ranks / all, but the last rank has half of all; three elements at a position.
+  // Distributed in turn: element g on rank g * ranks / all, except that the last rank has half of all; three elements per position.
   const std::int32_t all = 600;
   Ints rank, position;
   for (std::int32_t g = world.rank(); g < all; g += world.size()) {
     rank.push_back(g < all / 2 ? 2 * g * (world.size() - 1) / all : world.size() - 1);
-    position.push_back(g / 3 - 50);  // negative ones, too
+    position.push_back(g / 3 - 50);  // including negative ones
   }
   const Ints before = rank;
   level_elements(world, rank, position);
@@ -65,7 +65,7 @@ TEST(LevelElements, gives_the_first_of_a_rank_and_none_twice) {
   EXPECT_EQ(std::accumulate(counts.begin(), counts.end(), std::int64_t{0}), all);
   const auto [least, most] = std::minmax_element(counts.begin(), counts.end());
   EXPECT_LE(*most - *least, 2 * 3) << "elements at one position go together";
-  // What stays of a rank comes after what goes.
+  // Elements that stay come after those that move.
   for (std::int32_t r = 0; r < world.size(); ++r) {
     std::int32_t last_gone = -1000;
     std::int32_t first_left = 1000;

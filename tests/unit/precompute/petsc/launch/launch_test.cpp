@@ -1,4 +1,4 @@
-// The environment that the launcher prepares. What OpenBLAS then runs on this processor: tests/system/petsc/kernels.py.
+// Environment prepared by the launcher. The resulting kernels of OpenBLAS: tests/system/petsc/kernels.py.
 #include <gmock/gmock.h>
 
 #include <array>
@@ -15,7 +15,7 @@ namespace {
 using testing::AnyOf;
 using testing::StrEq;
 
-/// Names to values for the life of a test; null takes a variable away.
+/// Environment variables for the duration of a test; null removes a variable.
 class Environment {
  public:
   Environment(const char* name, const char* value) : name_(name) {
@@ -45,7 +45,7 @@ TEST(Kernels, that_fit_are_never_older_than_the_processor) {
   EXPECT_EQ(are_older_than_processor("Prescott"), !find_fitting_kernels().empty());
 }
 
-TEST(Environment, has_one_thread_and_what_the_user_chose) {
+TEST(Environment, has_one_thread_and_keeps_the_users_choices) {
   const std::array<Environment, 6> all{{{"OMP_NUM_THREADS", "7"},
                                         {"OPENBLAS_CORETYPE", "Nehalem"},
                                         {"CARILLON_DEFAULT_KERNELS", "Prescott"},
@@ -56,7 +56,7 @@ TEST(Environment, has_one_thread_and_what_the_user_chose) {
   EXPECT_THAT(std::getenv("OMP_NUM_THREADS"), StrEq("1"));
   EXPECT_THAT(std::getenv("OPENBLAS_NUM_THREADS"), StrEq("1"));
   EXPECT_THAT(std::getenv("OPENBLAS_CORETYPE"), StrEq("Nehalem"));
-  EXPECT_EQ(std::getenv("CARILLON_DEFAULT_KERNELS"), nullptr);  // the choice is the user's
+  EXPECT_EQ(std::getenv("CARILLON_DEFAULT_KERNELS"), nullptr);  // set by the user
   EXPECT_THAT(std::getenv("OMPI_MCA_pml"), StrEq("cm"));
   EXPECT_THAT(std::getenv("HWLOC_COMPONENTS"), StrEq("-gl"));
   EXPECT_THAT(std::getenv("GLIBC_TUNABLES"), StrEq("glibc.malloc.hugetlb=1"));
@@ -89,10 +89,10 @@ TEST(Environment, isolates_a_rank_that_no_launcher_started) {
   EXPECT_THAT(std::getenv("OMPI_MCA_ess_singleton_isolated"), StrEq("1"));
   ::setenv("OMPI_MCA_ess_singleton_isolated", "0", 1);
   prepare_environment();
-  EXPECT_THAT(std::getenv("OMPI_MCA_ess_singleton_isolated"), StrEq("0"));  // the choice is the user's
+  EXPECT_THAT(std::getenv("OMPI_MCA_ess_singleton_isolated"), StrEq("0"));  // set by the user
 }
 
-TEST(Environment, takes_a_job_script_of_sbatch_for_no_rank) {
+TEST(Environment, ignores_a_job_script_of_sbatch) {
   const std::array<Environment, 6> none{{{"OMPI_COMM_WORLD_RANK", nullptr},
                                          {"PMIX_RANK", nullptr},
                                          {"PMI_RANK", nullptr},
@@ -114,7 +114,7 @@ TEST(Environment, takes_a_job_script_of_sbatch_for_no_rank) {
   EXPECT_TRUE(base::is_launched());
 }
 
-TEST(Environment, preloads_before_what_the_user_preloads) {
+TEST(Environment, preloads_before_the_users_libraries) {
   const Environment before("LD_PRELOAD", "/lib/other.so");
   preload("/lib/ours.so");
   EXPECT_THAT(std::getenv("LD_PRELOAD"), StrEq("/lib/ours.so:/lib/other.so"));

@@ -1,4 +1,4 @@
-// The search for surrounding directions against what defines it: a triangle with the direction in it, and no other direction beyond it.
+// Directions::find() against its definition: a triangle that contains the direction, and no direction beyond it.
 #include "runtime/acoustics/head/directions.hpp"
 
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ namespace {
 
 using testing::make_direction;
 
-/// Azimuths and elevations in steps, each pole once: most squares of it lie in a plane.
+/// Grid of azimuths and elevations, each pole once: most quadrangles are planar.
 std::vector<Vec3> make_grid(int step_deg) {
   std::vector<Vec3> unit{{0.0, 0.0, -1.0}, {0.0, 0.0, 1.0}};
   for (int elevation = -90 + step_deg; elevation < 90; elevation += step_deg)
@@ -91,7 +91,7 @@ TEST(Directions, SharesAreContinuous) {
   }
 }
 
-TEST(Directions, WhatIsNoDirectionIsStraightAhead) {
+TEST(Directions, InvalidDirectionsAreStraightAhead) {
   const Directions directions(make_grid(10), "set");
   const Surrounding ahead = directions.find({1.0, 0.0, 0.0});
   const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
@@ -104,7 +104,7 @@ TEST(Directions, WhatIsNoDirectionIsStraightAhead) {
   for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(far.share[k], near.share[k], 1e-12);
 }
 
-TEST(Directions, RefusesWhatDoesNotGoRound) {
+TEST(Directions, RefusesSetsWithAGap) {
   std::vector<Vec3> half, ring;
   for (const Vec3& d : make_random(200, 5))
     if (d[0] > 0.0) half.push_back(d);

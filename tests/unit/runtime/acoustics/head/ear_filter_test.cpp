@@ -1,4 +1,4 @@
-// A filter against a plain sum of its definition, and what must not be heard when a source moves.
+// EarFilter against its definition, and artefacts of moving sources.
 #include "runtime/acoustics/head/ear_filter.hpp"
 
 #include <gtest/gtest.h>
@@ -10,8 +10,8 @@
 #include <random>
 #include <vector>
 
-#include "runtime/base/instructions.hpp"
 #include "runtime/acoustics/head/sphere.hpp"
+#include "runtime/base/instructions.hpp"
 #include "tests/unit/runtime/acoustics/head/oracle.hpp"
 
 namespace carillon::head {
@@ -35,7 +35,7 @@ struct Sound {
   bool operator==(const Sound&) const = default;
 };
 
-/// In blocks of these sizes, over and over; `direct` gives the direction at a sample.
+/// Cycles through these block sizes; `direct`: direction at a sample.
 template <class Direct>
 Sound play(EarFilter& filter, const std::vector<double>& input, const std::vector<std::size_t>& sizes, const Direct& direct) {
   Sound sound{std::vector<double>(input.size()), std::vector<double>(input.size())};
@@ -62,7 +62,7 @@ TEST(EarFilter, BlocksOfAnySizeGiveTheSameBits) {
   }
 }
 
-// The sum that the header promises, in double precision and in any order; the delay as a phase of every frequency of a period.
+// Definition in double precision; the delay as a phase per frequency of a period.
 TEST(EarFilter, IsTheResponseAndTheDelay) {
   const auto head = make_sphere(kRate);
   const Vec3 direction = make_direction(-63.0, 11.0);
@@ -85,7 +85,7 @@ TEST(EarFilter, IsTheResponseAndTheDelay) {
   }
 }
 
-TEST(EarFilter, AddsToWhatIsThere) {
+TEST(EarFilter, AddsToTheOutput) {
   const auto head = make_sphere(kRate);
   const std::vector<double> noise = make_noise(300);
   EarFilter one(head), other(head);
@@ -98,8 +98,8 @@ TEST(EarFilter, AddsToWhatIsThere) {
   }
 }
 
-/// The most that a tone is not one, y[n] - 2 cos(omega) y[n - 1] + y[n - 2], after `from`, over its amplitude: a step of the level or a
-/// click shows there as it is, a slow change as a small part of it.
+/// Largest deviation from a tone, y[n] - 2 cos(omega) y[n - 1] + y[n - 2], after `from`, over its amplitude: steps and clicks appear fully,
+/// slow changes are attenuated.
 double find_step(const std::vector<double>& y, double omega, std::size_t from) {
   double most = 0.0, peak = 0.0;
   for (std::size_t n = from; n < y.size(); ++n) {
@@ -109,7 +109,7 @@ double find_step(const std::vector<double>& y, double omega, std::size_t from) {
   return most / peak;
 }
 
-TEST(EarFilter, ASourceThatGoesRoundTheHeadMakesNoSteps) {
+TEST(EarFilter, ACirclingSourceMakesNoSteps) {
   const auto head = make_sphere(kRate);
   for (const double freq : {250.0, 1000.0, 3000.0}) {
     const double omega = 2.0 * pi * freq / kRate;
@@ -125,8 +125,7 @@ TEST(EarFilter, ASourceThatGoesRoundTheHeadMakesNoSteps) {
   }
 }
 
-// From one side to the other within a block: the fade is as long as the block; the same jump without it, between two filters that stay, is
-// a step of the level itself.
+// From one side to the other within a block: the fade lasts a block; a jump between two constant filters is a step of the level.
 TEST(EarFilter, AJumpFades) {
   const auto head = make_sphere(kRate);
   const double omega = 2.0 * pi * 500.0 / kRate;
@@ -150,7 +149,7 @@ TEST(EarFilter, ASecondOfSilenceEndsInSilence) {
   noise.resize(4000);
   const Sound sound = play(filter, noise, {32}, [](std::size_t n) { return make_direction(static_cast<double>(n) / 50.0, 0.0); });
   EXPECT_TRUE(std::isnan(sound.left[600]));
-  for (std::size_t n = 2000; n < 4000; ++n) ASSERT_EQ(sound.left[n], 0.0);  // what is not a number is gone, too
+  for (std::size_t n = 2000; n < 4000; ++n) ASSERT_EQ(sound.left[n], 0.0);  // non-finite numbers are gone, too
 }
 
 TEST(EarFilter, AllInstructionSetsAgree) {

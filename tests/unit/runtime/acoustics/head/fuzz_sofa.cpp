@@ -1,6 +1,5 @@
-// Any bytes as a SOFA file: a head that makes finite sound of finite sound, or an InputError that begins with the file's name.
-// libmysofa reads in a process of its own, whose end is such an error; the sanitizers write down what it fails on as sofa-crash-*, and the
-// target continues.
+// Arbitrary bytes as a SOFA file: a head with finite output, or an InputError that begins with the file's name. libmysofa runs in a child
+// process, whose crash is such an error; the sanitizers write the input as sofa-crash-*, and the target continues.
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -8,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "runtime/base/error.hpp"
 #include "runtime/acoustics/head/ear_filter.hpp"
 #include "runtime/acoustics/head/sofa.hpp"
+#include "runtime/base/error.hpp"
 #include "tests/support/folder.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

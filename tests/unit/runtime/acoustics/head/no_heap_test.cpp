@@ -1,4 +1,4 @@
-// EarFilter::process takes no memory. A program of its own, as tests/support/heap_counter.hpp asks.
+// EarFilter::process does not allocate. A separate program, see tests/support/heap_counter.hpp.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -13,7 +13,7 @@ namespace {
 
 using tests::g_allocations;
 
-/// Six directions along the axes: a head that is looked up by direction, without a file.
+/// Head by direction with six directions along the axes, without a file.
 std::shared_ptr<const Head> make_cross() {
   Head::Content head{.sample_rate_hz = 48000.0, .taps = 32, .responses = {}, .delays = {}, .lookup = ByAngle{}};
   std::vector<Vec3> unit;

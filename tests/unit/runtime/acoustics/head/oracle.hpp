@@ -1,5 +1,4 @@
-// What the tests of heads compare with: the field around a rigid sphere by the special functions of the C++ library, and the spectrum of
-// what comes out of a filter.
+// Oracles of head tests: the field around a rigid sphere by the special functions of the C++ library, and spectra of filter outputs.
 #pragma once
 
 #include <cmath>
@@ -16,8 +15,8 @@ namespace carillon::head::testing {
 using Complex = std::complex<double>;
 inline constexpr double kSoundSpeedMs = 343.0;
 
-/// The pressure at an angle from the source on a rigid sphere in a plane wave, incident and scattered waves summed (Morse and Ingard 1968,
-/// 8.2), over that at its centre. Time as exp(+i omega t).
+/// Pressure on a rigid sphere in a plane wave at an angle from the source, incident plus scattered (Morse and Ingard 1968, 8.2), over that
+/// at its centre. Time as exp(+i omega t).
 inline Complex calc_rigid_sphere(double ka, double angle_rad) {
   const Complex i(0.0, 1.0);
   Complex sum = 0.0, turn = 1.0;
@@ -31,7 +30,7 @@ inline Complex calc_rigid_sphere(double ka, double angle_rad) {
   return sum;
 }
 
-/// What both ears hear of one sample of 1 Pa from a direction that stays.
+/// Response of both ears to one sample of 1 Pa from a constant direction.
 struct Heard {
   std::vector<double> left, right;
 };
@@ -45,7 +44,7 @@ inline Heard hear_pulse(const std::shared_ptr<const Head>& head, const Vec3& dir
   return heard;
 }
 
-/// Of the samples, the sample `latency` being time 0.
+/// Spectrum with sample `latency` at time 0.
 inline Complex calc_spectrum(std::span<const double> samples, double freq_hz, double sample_rate_hz, double latency) {
   Complex sum = 0.0;
   for (std::size_t n = 0; n < samples.size(); ++n)
@@ -53,7 +52,7 @@ inline Complex calc_spectrum(std::span<const double> samples, double freq_hz, do
   return sum;
 }
 
-/// Of a source at an azimuth to the left and an elevation [degrees].
+/// Direction of a source at an azimuth to the left and an elevation [degrees].
 inline Vec3 make_direction(double azimuth_deg, double elevation_deg) {
   constexpr double kRad = std::numbers::pi / 180.0;
   return {std::cos(elevation_deg * kRad) * std::cos(azimuth_deg * kRad), std::cos(elevation_deg * kRad) * std::sin(azimuth_deg * kRad),

@@ -1,4 +1,4 @@
-// SOFA files that write_sofa.py makes of a law: read back they must follow it, at any rate; and files that cannot be read.
+// SOFA files with known laws from write_sofa.py, read at several rates; unreadable files.
 #include "runtime/acoustics/head/sofa.hpp"
 
 #include <gtest/gtest.h>
@@ -26,7 +26,7 @@ std::string read_bytes(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// The message of the InputError; empty without one.
+/// Message of the InputError, or empty.
 std::string find_refusal(const std::filesystem::path& file, double rate = 48000.0) {
   try {
     read_sofa(file, rate);
@@ -56,7 +56,7 @@ class Sofa : public ::testing::Test {
   const tests::Folder folder_;
 };
 
-/// Level and delay between the ears, as the law of write_sofa.py says.
+/// Interaural level and delay by the law of write_sofa.py.
 void expect_law(const std::shared_ptr<const Head>& head, const Vec3& direction, double level_tolerance, double delay_tolerance_s) {
   const Heard heard = hear_pulse(head, direction);
   const double y = direction[1] / norm(direction);
@@ -80,13 +80,13 @@ TEST_F(Sofa, MeasuredDirectionsAreAsTheyWereMeasured) {
   }
 }
 
-TEST_F(Sofa, BetweenDirectionsItIsBetweenThem) {
+TEST_F(Sofa, InterpolatesBetweenDirections) {
   const auto head = read_sofa(write("head.sofa"), 48000.0);
   for (const auto& [azimuth, elevation] : {std::array{5.0, 0.0}, {93.0, 2.0}, {283.0, 47.0}, {201.0, -66.0}, {30.0, 86.0}})
     expect_law(head, make_direction(azimuth, elevation), 0.02, 4e-6);
 }
 
-TEST_F(Sofa, CoordinatesDelaysAndDistancesSayTheSame) {
+TEST_F(Sofa, EquivalentFilesGiveTheSameHead) {
   for (const char* options : {"type=cartesian", "delay=4", "near=1", "rate=48000", "level=0.01", "taps=200", "step=3"}) {
     const auto head = read_sofa(write("head.sofa", options), 48000.0);
     for (const auto& [azimuth, elevation] : {std::array{0.0, 0.0}, {90.0, 0.0}, {230.0, 40.0}})
@@ -94,8 +94,8 @@ TEST_F(Sofa, CoordinatesDelaysAndDistancesSayTheSame) {
   }
 }
 
-// The mean over the directions of a grid with the weight of their areas is near the plain one here.
-TEST_F(Sofa, LevelIsThatOfASphereWhateverTheFileSays) {
+// The plain mean over the grid is close to the area-weighted mean here.
+TEST_F(Sofa, LevelIsThatOfASphere) {
   double wanted = 0.0;
   for (int i = 0; i < 400; ++i)
     wanted += std::norm(calc_rigid_sphere(2.0 * std::numbers::pi * 600.0 * 0.0875 / 343.0, std::acos((2.0 * i + 1.0) / 400 - 1.0))) / 400;
@@ -110,7 +110,7 @@ TEST_F(Sofa, LevelIsThatOfASphereWhateverTheFileSays) {
   }
 }
 
-TEST_F(Sofa, PolesThatAreLeftOutAreTheMeanOfTheNextRing) {
+TEST_F(Sofa, MissingPolesAreTheMeanOfTheNextRing) {
   const auto head = read_sofa(write("head.sofa", "low=-40 high=60"), 48000.0);
   expect_law(head, make_direction(90.0, -40.0), 2e-3, 0.3e-6);
   expect_law(head, {0.0, 0.0, -1.0}, 2e-3, 0.3e-6);
@@ -119,14 +119,14 @@ TEST_F(Sofa, PolesThatAreLeftOutAreTheMeanOfTheNextRing) {
   expect_law(flat, {0.0, 0.0, 1.0}, 2e-3, 0.3e-6);
 }
 
-TEST_F(Sofa, ResponsesAreCutWhereNothingIsLeft) {
+TEST_F(Sofa, SilentTailsAreTruncated) {
   const auto head = read_sofa(write("head.sofa", "taps=1024 step=30"), 44100.0);
   EXPECT_LT(head->get_taps(), 64);
   EXPECT_GT(head->get_taps(), kOnset);
   expect_law(head, make_direction(90.0, 30.0), 3e-3, 0.5e-6);
 }
 
-TEST_F(Sofa, WhatCannotBeUsedIsRefusedByName) {
+TEST_F(Sofa, UnusableFilesAreRefusedByName) {
   const auto expect_refusal = [&](const std::string& options, const std::string& words) {
     const auto file = write("bad.sofa", options);
     const std::string said = find_refusal(file);
@@ -141,13 +141,13 @@ TEST_F(Sofa, WhatCannotBeUsedIsRefusedByName) {
   expect_refusal("fault=late taps=2048 step=30", "delays differ");
   expect_refusal("taps=8193 step=45", "8192");
   expect_refusal("taps=4 step=1 low=-60 high=0", "20000");
-  expect_refusal("span=90", "all round");
+  expect_refusal("span=90", "gap on the sphere");
   expect_refusal("rate=100", "sample rate");
   EXPECT_NE(find_refusal(write("long.sofa", "taps=8000 step=45"), 96000.0).find("96000"), std::string::npos);
   EXPECT_NE(find_refusal(write("good.sofa"), 10.0).find("sample rate"), std::string::npos);
 }
 
-TEST_F(Sofa, FilesThatAreNoneAreRefused) {
+TEST_F(Sofa, OtherFilesAreRefused) {
   EXPECT_NE(find_refusal(folder_ / "none.sofa").find("none.sofa"), std::string::npos);
   EXPECT_NE(find_refusal(folder_.path()), "");
   EXPECT_NE(find_refusal(folder_.write("empty.sofa", "")), "");
@@ -167,7 +167,7 @@ TEST_F(Sofa, TruncatedFilesAreRefused) {
   }
 }
 
-// Whatever a byte becomes, the file is read or refused.
+// Any changed byte: the file is read or refused.
 TEST_F(Sofa, DamagedFilesAreReadOrRefused) {
   const std::string bytes = read_bytes(write("head.sofa", "step=30 taps=16"));
   std::mt19937 chance(3);

@@ -1,4 +1,4 @@
-// The sphere against the field around a rigid sphere by other functions, and against the laws of interaural delay.
+// make_sphere() against the field around a rigid sphere, and laws of interaural delay.
 #include "runtime/acoustics/head/sphere.hpp"
 
 #include <gtest/gtest.h>
@@ -46,7 +46,7 @@ TEST(Sphere, SeriesIsTheFieldOfARigidSphere) {
   EXPECT_NEAR(std::abs(calc_rigid_sphere(60.0, 0.0)), 2.0, 0.01);  // a wall
 }
 
-// Quadrature over all directions; low frequencies pass a sphere as if it were not there.
+// Quadrature over all directions; a sphere is transparent at low frequencies.
 TEST(Sphere, MeanPowerIsThatOverAllDirections) {
   for (const double ka : {0.1, 1.0, 5.0}) {
     double sum = 0.0;
@@ -57,7 +57,7 @@ TEST(Sphere, MeanPowerIsThatOverAllDirections) {
   EXPECT_NEAR(calc_sphere_mean_power(1e-3), 1.0, 1e-5);
 }
 
-/// At the rates of sound cards: level within 0.5 dB to 16 kHz wherever it is above -40 dB, and phase with it.
+/// Common sample rates: level within 0.5 dB to 16 kHz if above -40 dB, and phase.
 class Rates : public ::testing::TestWithParam<double> {};
 TEST_P(Rates, EarsHearTheFieldOfARigidSphere) {
   const double rate = GetParam();
@@ -143,7 +143,7 @@ TEST(Sphere, LeftAndRightAreMirrored) {
   EXPECT_GT(near, 5.0 * far);
 }
 
-TEST(Sphere, RefusesWhatCannotBe) {
+TEST(Sphere, RefusesImpossibleParameters) {
   EXPECT_THROW(make_sphere(0.0), InputError);
   EXPECT_THROW(make_sphere(std::numeric_limits<double>::quiet_NaN()), InputError);
   EXPECT_THROW(make_sphere(1e9), InputError);

@@ -1,4 +1,4 @@
-// Which gains a bank is played with.
+// Choice of gains for playback.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -7,16 +7,16 @@
 #include <string>
 #include <vector>
 
+#include "runtime/acoustics/radiation/gains.hpp"
 #include "runtime/bank/corrected.hpp"
 #include "runtime/base/error.hpp"
-#include "runtime/acoustics/radiation/gains.hpp"
 #include "tests/unit/runtime/acoustics/radiation/multipole_bank.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 
 namespace carillon::radiation {
 namespace {
 
-/// A cube of two modes in air: radiation takes 1 and 200 per second of them, in addition to what the cube loses.
+/// Cube of two modes in air: radiation adds 1 and 200 per second to their decays.
 bank::Bank make_cube_in_air() {
   bank::Bank bank = testing::make_cube_bank({{500.0, 3.0, 2.0}, {900.0, 5.0, 3.0}});
   const bank::Multipoles sphere = testing::make_empty_multipoles().multipoles;
@@ -31,7 +31,7 @@ bank::Bank make_cube_in_air() {
   return bank;
 }
 
-/// g^2 = rho0 c0 d / 2 pi, written out.
+/// g^2 = rho0 c0 d / 2 pi.
 double calc_gain(double decay_per_s) { return std::sqrt(1.21 * 343.0 * decay_per_s / (2.0 * std::numbers::pi)); }
 
 TEST(GainKinds, ABankWithMultipolesIsPlayedWithThem) {

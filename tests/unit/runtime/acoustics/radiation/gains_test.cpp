@@ -6,8 +6,8 @@
 #include <numbers>
 #include <random>
 
-#include "runtime/base/error.hpp"
 #include "runtime/acoustics/radiation/flow.hpp"
+#include "runtime/base/error.hpp"
 #include "tests/support/paths.hpp"
 #include "tests/unit/runtime/acoustics/radiation/sphere_bank.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
@@ -25,7 +25,7 @@ std::vector<SphereRow> read_rows() {
   return testing::read_sphere_rows(carillon::tests::get_source_dir() + "/tests/unit/runtime/acoustics/radiation/data/spheres.csv");
 }
 
-/// What a pulsating sphere of velocity 1 sends to 1 m.
+/// Pressure at 1 m of a pulsating sphere of velocity 1.
 double calc_pulsating(double ka) { return bank::kAirDensityKgM3 * bank::kSoundSpeedMs * kRadius * ka / std::hypot(1.0, ka); }
 
 double to_db(double ratio) { return 20.0 * std::log10(ratio); }
@@ -49,7 +49,7 @@ TEST(Gains, ASphereSoundsAsItsClosedFormUpToFourLobes) {
   EXPECT_LE(below_floor, 3);
 }
 
-TEST(Gains, ATremblingSphereIsOneThatMovesAsAWhole) {
+TEST(Gains, ATremblingSphereIsARigidTranslation) {
   auto bank = testing::make_sphere_surface(kRadius, kLevel);
   std::vector<double> ka;
   std::vector<double> exact;
@@ -63,7 +63,7 @@ TEST(Gains, ATremblingSphereIsOneThatMovesAsAWhole) {
   for (std::size_t m = 0; m < ka.size(); ++m) EXPECT_NEAR(to_db(gains[m] / exact[m]), 0.0, 0.05) << ka[m];
 }
 
-TEST(Gains, ASphereThatOnlyTurnsIsSilent) {
+TEST(Gains, ARotatingSphereIsSilent) {
   auto bank = testing::make_sphere_surface(kRadius, kLevel);
   testing::set_modes(bank, {0.3, 1.0, 3.0}, kRadius, [](const Vec3& x, std::size_t) { return Vec3{-x[1] / kRadius, x[0] / kRadius, 0.0}; });
   const auto gains = calc_gains(bank, GainKind::kSphere);
@@ -72,7 +72,7 @@ TEST(Gains, ASphereThatOnlyTurnsIsSilent) {
   EXPECT_LT(gains[2], 2e-3 * calc_pulsating(3.0));  // the flat triangles' own pattern, which is fine
 }
 
-TEST(Gains, AtLongWavelengthsAnyBodyIsTheFlowOfItsVolume) {
+TEST(Gains, AtLongWavelengthsAnyBodyIsItsVolumeFlow) {
   // A cube that breathes, x -> x: it displaces 3 V per unit, and p = rho0 omega (3 V) / 4 pi at 1 m. Off centre, where it counts the same.
   for (const double shift : {0.0, 0.3}) {
     bank::Bank bank = testing::make_cube_bank({});
@@ -86,16 +86,16 @@ TEST(Gains, AtLongWavelengthsAnyBodyIsTheFlowOfItsVolume) {
   }
 }
 
-TEST(Gains, WhatMovesToAndFroDoesNotSoundAtLongWavelengths) {
+TEST(Gains, RigidMotionIsSilentAtLongWavelengths) {
   // A bar bends: its upper and its lower face move alike, so that the flows cancel; without sign they would add.
   bank::Bank bank = testing::make_sphere_surface(kRadius, 3);
   for (Vec3& x : bank.vertices_m) x = {10.0 * x[0], x[1], 0.5 * x[2]};
   testing::set_modes(bank, {0.01}, kRadius, [](const Vec3& x, std::size_t) { return Vec3{0.0, 0.0, std::cos(2.0 * pi * x[0])}; });
-  // Of 1 m^2 of faces some 0.4 move, at 34.3 rad/s: 1.3 Pa if they did not cancel. What is left is a dipole.
+  // About 0.4 of 1 m^2 of faces move, at 34.3 rad/s: 1.3 Pa without cancellation. The remainder is a dipole.
   EXPECT_LT(calc_gains(bank, GainKind::kSphere)[0], 0.01 * 1.3);
 }
 
-TEST(Gains, ThePatternsThatAreNotResolvedLoseNoPowerAtShortWavelengths) {
+TEST(Gains, UnresolvedPatternsLoseNoPowerAtShortWavelengths) {
   // Far above ka = l every order radiates alike: g^2 = (rho0 c0 a)^2 times the mean square of the velocity, here of 12 lobes.
   auto bank = testing::make_sphere_surface(kRadius, 5);
   double mean = 0.0;
@@ -184,7 +184,7 @@ TEST(Gains, Osg02IsTheFieldOfTheBank) {
   EXPECT_EQ(calc_gains(bank, GainKind::kOsg02), (std::vector<double>{2.0, 3.0}));
 }
 
-TEST(Gains, BanksThatAreNotWholeAreRefused) {
+TEST(Gains, InconsistentBanksAreRefused) {
   const bank::Bank good = testing::make_cube_bank({{500.0, 1.0}});
   bank::Bank bank = good;
   bank.shape.pop_back();

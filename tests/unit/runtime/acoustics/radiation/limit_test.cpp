@@ -1,13 +1,13 @@
-// What is radiated against what modes hold: energy through a sphere of 1 m, of the pressure that is played.
+// Radiated energy through a sphere of 1 m against the energy of the modes.
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <numbers>
 #include <vector>
 
-#include "runtime/base/error.hpp"
 #include "runtime/acoustics/radiation/gains.hpp"
-#include "runtime/synth/voice.hpp"
+#include "runtime/base/error.hpp"
+#include "runtime/synth/resonator_bank.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 
 namespace carillon::radiation {
@@ -18,9 +18,9 @@ using std::numbers::pi;
 constexpr double kRate = 48000.0;
 constexpr double kAirKgM2S = 1.21 * 343.0;
 
-/// Energy [J] through a sphere of 1 m, of what a strike of 1 N s at the first instant lets ring. The modes have 1/2 J each of it.
+/// Energy [J] through a sphere of 1 m after a strike of 1 N s at time 0. Each mode has 1/2 J.
 double calc_radiated(const bank::Bank& bank, double length_s) {
-  synth::Voice voice(synth::Model::make(bank, {.rate_hz = kRate}));
+  synth::ResonatorBank voice(synth::Model::make(bank, {.rate_hz = kRate}));
   voice.strike({.time_s = 0.5 / kRate, .triangle = 0, .barycentric = {1, 0, 0}, .impulse_n_s = {0, 0, 1}});
   std::vector<float> pressure(length_s * kRate, 0.0F);
   voice.process(pressure);
@@ -29,7 +29,7 @@ double calc_radiated(const bank::Bank& bank, double length_s) {
   return 4.0 * pi * square / kRate / kAirKgM2S;
 }
 
-TEST(LimitGains, WhatAFreeDecaySendsOutIsItsShareAndNeverMoreThanTheModeHad) {
+TEST(LimitGains, AFreeDecayRadiatesItsShareAndNeverMoreThanTheModeHad) {
   for (const double decay : {1.0, 8.0, 60.0}) {
     const double allowed = std::sqrt(kAirKgM2S * decay / (2.0 * pi));
     for (const double times : {0.01, 0.5, 0.999, 1.001, 3.0, 1000.0}) {
@@ -50,7 +50,7 @@ TEST(LimitGains, WhatAFreeDecaySendsOutIsItsShareAndNeverMoreThanTheModeHad) {
   }
 }
 
-TEST(LimitGains, OfManyModesTogetherNoMoreIsSentOutThanAllHad) {
+TEST(LimitGains, ManyModesRadiateNoMoreThanTheyHad) {
   std::vector<testing::InventedMode> modes;
   for (int m = 0; m < 40; ++m) modes.push_back({150.0 * std::pow(1.12, m), 0.5 + 0.3 * m, 0.02 * std::pow(1.4, m)});
   bank::Bank bank = testing::make_cube_bank(modes);

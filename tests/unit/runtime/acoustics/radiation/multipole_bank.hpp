@@ -1,4 +1,4 @@
-// Banks with multipoles of known fields, and what those are in closed form.
+// Banks with multipoles of known fields in closed form.
 #pragma once
 
 #include <algorithm>
@@ -18,7 +18,7 @@ using Complex = std::complex<double>;
 inline constexpr double kSphereRadius = 0.1;
 inline constexpr Vec3 kSphereCentre{0.3, -0.2, 0.1};
 
-/// h_l(x) e^{-i x} as its finite sum (DLMF 10.49.6), so far as its terms do not cancel: x below 1, or l below 20.
+/// h_l(x) e^{-i x} as its finite sum (DLMF 10.49.6), where its terms do not cancel: x below 1, or l below 20.
 inline std::complex<long double> calc_hankel(int l, long double x) {
   using Long = std::complex<long double>;
   const Long i(0.0L, 1.0L);
@@ -31,7 +31,7 @@ inline std::complex<long double> calc_hankel(int l, long double x) {
   return sum / x;
 }
 
-/// Real orthonormal harmonic of a unit vector, by the C++ library, whose functions have a sign (-1)^m of their own.
+/// Real orthonormal harmonic of a unit vector by the C++ library, whose functions include (-1)^m.
 inline double calc_harmonic(int l, int m, const Vec3& direction) {
   const double turn = std::atan2(direction[1], direction[0]), angle = std::acos(std::clamp(direction[2], -1.0, 1.0));
   const int order = std::abs(m);
@@ -40,7 +40,7 @@ inline double calc_harmonic(int l, int m, const Vec3& direction) {
   return std::numbers::sqrt2 * legendre * (m > 0 ? std::cos(order * turn) : std::sin(order * turn));
 }
 
-/// A bank of no modes whose multipoles lie about kSphereCentre.
+/// Bank without modes, multipoles about kSphereCentre.
 inline bank::Bank make_empty_multipoles() {
   bank::Bank bank;
   bank.multipoles.centre_m = kSphereCentre;
@@ -50,7 +50,7 @@ inline bank::Bank make_empty_multipoles() {
   return bank;
 }
 
-/// Appends a mode with these (L + 1)^2 coefficients, rounded to 16 bits of the largest component, and a decay that is no part of the test.
+/// Appends a mode with these (L + 1)^2 coefficients, rounded to 16 bits of the largest component, and an arbitrary decay.
 inline void add_multipoles(bank::Bank& bank, double ka, std::span<const Complex> coefficients) {
   bank::Multipoles& air = bank.multipoles;
   const double freq_hz = ka / kSphereRadius * bank::kSoundSpeedMs / (2.0 * std::numbers::pi);
@@ -63,8 +63,8 @@ inline void add_multipoles(bank::Bank& bank, double ka, std::span<const Complex>
   air.error_db.push_back(-60.0);
 }
 
-/// The multipoles of e^{i k s} / (4 pi s), s the distance from `source`, a place relative to the centre and inside the sphere: by the
-/// addition theorem i k sum of j_l(k |source|) h_l(k r) Y_lm(source) Y_lm(place).
+/// Multipoles of e^{i k s} / (4 pi s), s the distance from `source`, relative to the centre and inside the sphere: by the addition theorem
+/// i k sum of j_l(k |source|) h_l(k r) Y_lm(source) Y_lm(place).
 inline std::vector<Complex> calc_monopole(double ka, const Vec3& source, int order) {
   const double k = ka / kSphereRadius, size = norm(source);
   std::vector<Complex> coefficients;

@@ -16,7 +16,7 @@
 
 namespace carillon::testing {
 
-/// The outside of a sphere about the origin: an icosahedron, every triangle cut in four `level` times (20 * 4^level triangles).
+/// Sphere about the origin: an icosahedron, every triangle divided `level` times in four (20 * 4^level triangles).
 inline bank::Bank make_sphere_surface(double radius_m, int level) {
   const double g = std::numbers::phi;
   bank::Bank bank;
@@ -48,7 +48,7 @@ inline bank::Bank make_sphere_surface(double radius_m, int level) {
   return bank;
 }
 
-/// Gives a bank its modes: frequency by k times `radius_m`, and the motion of each vertex as a function of its place.
+/// Sets the modes of a bank: frequency by k times `radius_m`, motion of each vertex as a function of its position.
 template <class Motion>
 void set_modes(bank::Bank& bank, const std::vector<double>& ka, double radius_m, Motion motion) {
   const std::size_t modes = ka.size();
@@ -62,7 +62,7 @@ void set_modes(bank::Bank& bank, const std::vector<double>& ka, double radius_m,
   bank::quantise_shapes(bank, shapes);
 }
 
-/// P_l(x), l = 0 .. 4, written out.
+/// P_l(x), l = 0 .. 4.
 inline double calc_legendre(int l, double x) {
   const double x2 = x * x;
   return std::array{1.0, x, (3 * x2 - 1) / 2, (5 * x2 - 3) * x / 2, ((35 * x2 - 30) * x2 + 3) / 8}.at(l);
@@ -92,7 +92,7 @@ inline std::vector<SphereRow> read_sphere_rows(const std::string& file) {
   return rows;
 }
 
-/// One mode a row: the surface moves radially as P_l about an axis that is none of the mesh's, with velocity 1 for unit modal velocity.
+/// One mode per row: radial motion P_l about a generic axis, velocity 1 for unit modal velocity.
 inline bank::Bank make_lobed_sphere(const std::vector<SphereRow>& rows, double radius_m, int level) {
   bank::Bank bank = make_sphere_surface(radius_m, level);
   std::vector<double> ka;
@@ -105,7 +105,7 @@ inline bank::Bank make_lobed_sphere(const std::vector<SphereRow>& rows, double r
   return bank;
 }
 
-/// The gain of such a row: root mean square over directions, for P_l that is 1 / sqrt(2 l + 1).
+/// Gain of such a row: root mean square over directions, 1 / sqrt(2 l + 1) for P_l.
 inline double calc_exact_gain(const SphereRow& row, double radius_m) {
   return bank::kAirDensityKgM3 * bank::kSoundSpeedMs * radius_m * row.far_factor / std::sqrt(2.0 * row.l + 1.0);
 }

@@ -2,8 +2,8 @@
 #include <cstdio>
 #include <exception>
 
-#include "runtime/bank/surface.hpp"
 #include "runtime/acoustics/radiation/gains.hpp"
+#include "runtime/bank/surface.hpp"
 #include "tests/support/paths.hpp"
 #include "tests/unit/runtime/acoustics/radiation/sphere_bank.hpp"
 
@@ -14,7 +14,7 @@ using namespace carillon;
 constexpr double kRadius = 0.1;
 constexpr int kLevel = 4;
 
-/// The formula of docs/equations.md E6 for a bank, as carillon-precompute writes it into banks.
+/// Formula E6 of docs/equations.md, as carillon-precompute writes it into banks.
 double calc_osg02_gain(const bank::Bank& bank, std::size_t mode) {
   double flow = 0.0, area = 0.0;
   for (const Triangle& triangle : bank.triangles) {
@@ -30,7 +30,8 @@ double calc_osg02_gain(const bank::Bank& bank, std::size_t mode) {
 }
 
 void print_table() {
-  const auto rows = testing::read_sphere_rows(carillon::tests::get_source_dir() + "/tests/unit/runtime/acoustics/radiation/data/spheres.csv");
+  const auto rows =
+      testing::read_sphere_rows(carillon::tests::get_source_dir() + "/tests/unit/runtime/acoustics/radiation/data/spheres.csv");
   const bank::Bank bank = testing::make_lobed_sphere(rows, kRadius, kLevel);
   const std::vector<double> sphere = radiation::calc_gains(bank, radiation::GainKind::kSphere);
   std::printf("| ka | l = 0 | l = 1 | l = 2 | l = 3 | l = 4 |\n|---|---|---|---|---|---|\n");

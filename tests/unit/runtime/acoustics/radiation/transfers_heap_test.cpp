@@ -1,4 +1,4 @@
-// Transfers::evaluate() takes no memory. A program of its own, as tests/support/heap_counter.hpp asks.
+// Transfers::evaluate() does not allocate. A separate program, see tests/support/heap_counter.hpp.
 #include <gtest/gtest.h>
 
 #include <complex>
@@ -20,7 +20,7 @@ TEST(TransfersHeap, EvaluatingTakesNoMemoryAndNeverThrows) {
     testing::add_multipoles(bank, 1.0 + order, std::vector<testing::Complex>((order + 1) * (order + 1), 0.1));
   const long before_making = g_allocations;
   const Transfers transfers(bank);
-  EXPECT_GT(g_allocations - before_making, 0) << "the counter sees nothing";
+  EXPECT_GT(g_allocations - before_making, 0) << "the counter counts nothing";
   std::vector<std::int32_t> modes(4);
   std::iota(modes.begin(), modes.end(), 0);
   std::vector<std::complex<float>> transfer(4);

@@ -12,9 +12,9 @@
 #include <string>
 #include <vector>
 
+#include "runtime/acoustics/radiation/gains.hpp"
 #include "runtime/bank/multipoles.hpp"
 #include "runtime/base/error.hpp"
-#include "runtime/acoustics/radiation/gains.hpp"
 #include "tests/unit/runtime/acoustics/radiation/multipole_bank.hpp"
 
 namespace carillon::radiation {
@@ -92,8 +92,8 @@ TEST(Transfers, EachMultipoleIsItsClosedFormAtEveryDistance) {
   RecordProperty("worst_db", std::to_string(20.0 * std::log10(worst)));
 }
 
-/// The largest error of a monopole off centre, relative to the root mean square of its field over directions at that distance, which is
-/// about 1 / (4 pi r); `ka` and order of a mode each.
+/// Largest error of a monopole off centre, relative to the root mean square of its field over directions at that distance, about 1 / (4 pi
+/// r); `ka` and order per mode.
 double find_monopole_error(const std::vector<std::pair<double, int>>& modes, const Vec3& source, const std::vector<double>& distances,
                            int directions) {
   bank::Bank bank = testing::make_empty_multipoles();
@@ -211,7 +211,7 @@ TEST(Transfers, TwoPlacesAtOnceAreTheSame) {
   }
 }
 
-// One order alone is its own; of two orders of equal power at twice the radius the mean square counts.
+// One order alone is itself; two orders of equal power at twice the radius give their mean square.
 TEST(Transfers, TheOrderOfTurnsIsThatOfThePowerAtTwiceTheRadius) {
   bank::Bank bank = testing::make_empty_multipoles();
   std::vector<Complex> alone(36), two(36);
@@ -230,7 +230,7 @@ TEST(Transfers, TheOrderOfTurnsIsThatOfThePowerAtTwiceTheRadius) {
   EXPECT_EQ(transfers.get_order(1), 5);
 }
 
-TEST(Transfers, InsideTheSphereThePlaceOnItCounts) {
+TEST(Transfers, InsideTheSphereTheSurfacePointCounts) {
   const Transfers transfers(make_random_bank(40, 12));
   for (const Vec3& direction : make_directions(10)) {
     const auto expected = evaluate(transfers, 1.05 * kSphereRadius * direction);
@@ -243,7 +243,7 @@ TEST(Transfers, InsideTheSphereThePlaceOnItCounts) {
   for (const Complex& one : evaluate(transfers, {})) EXPECT_TRUE(std::isfinite(std::abs(one)));
 }
 
-/// Nodes and weights of Gauss and Legendre on -1 .. 1.
+/// Gauss-Legendre nodes and weights on -1 .. 1.
 std::vector<std::pair<double, double>> make_gauss(int count) {
   std::vector<std::pair<double, double>> nodes;
   for (int i = 0; i < count; ++i) {
@@ -260,7 +260,7 @@ std::vector<std::pair<double, double>> make_gauss(int count) {
 
 TEST(Transfers, TheMeanOverDirectionsFarAwayIsTheGainOfTheDecay) {
   bank::Bank bank = make_random_bank(30, 9);
-  // What the far field carries off, from the coefficients in closed form: sum of |a / h|^2 / (2 rho c k^2).
+  // Power of the far field, from the coefficients in closed form: sum of |a / h|^2 / (2 rho c k^2).
   const std::int16_t* steps = bank.multipoles.coefficient.data();
   for (std::size_t i = 0; i < bank.mode_count(); ++i) {
     const double k = 2.0 * pi * bank.multipoles.freq_hz[i] / bank::kSoundSpeedMs;
@@ -290,8 +290,8 @@ TEST(Transfers, TheMeanOverDirectionsFarAwayIsTheGainOfTheDecay) {
   }
 }
 
-// A body above a rigid plane makes half of the power that its field and the mirrored one carry: the mean over the half space is that of the
-// whole field, and so is the gain. In another air as much decay is another pressure.
+// Above a rigid plane a body radiates half of the power that its field and the mirrored one carry: the mean over the half space is that of
+// the whole field, and so is the gain. In another air the same decay is another pressure.
 TEST(Transfers, TheGainIsTheMeanOfAHalfSpaceAndInTheAirOfTheBank) {
   for (const bool is_half : {false, true}) {
     bank::Bank bank = make_random_bank(30, 9);
@@ -317,7 +317,7 @@ TEST(Transfers, TheGainIsTheMeanOfAHalfSpaceAndInTheAirOfTheBank) {
   }
 }
 
-TEST(Transfers, SaysWhatItHolds) {
+TEST(Transfers, ReportsItsMemory) {
   const bank::Bank bank = make_random_bank(20, 9);
   const Transfers transfers(bank);
   EXPECT_EQ(transfers.get_mode_count(), 20);
@@ -329,7 +329,7 @@ TEST(Transfers, SaysWhatItHolds) {
   for (int m = 0; m < 20; ++m) EXPECT_EQ(transfers.get_order(m), bank.multipoles.order[m]);
 }
 
-TEST(Transfers, BanksWithoutMultipolesAndTornOnesAreRefused) {
+TEST(Transfers, BanksWithoutMultipolesAndInconsistentOnesAreRefused) {
   EXPECT_THROW(Transfers(bank::Bank{}), InputError);
   const bank::Bank good = make_random_bank(3, 4);
   const auto refuses = [&](auto&& change) {

@@ -1,14 +1,14 @@
-// Bytes of any kind are a recorded surface that plays, or an InputError. Every input is tried as it is, which tries the header, and with
-// its length and digest set right, which tries everything behind them.
+// Arbitrary bytes: a recorded surface that plays, or an InputError. Every input is tried as it is (header), and with correct length and
+// digest (everything after them).
 #include <cstddef>
 #include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "runtime/base/error.hpp"
 #include "runtime/acoustics/recording/player.hpp"
 #include "runtime/acoustics/recording/recording.hpp"
+#include "runtime/base/error.hpp"
 #include "tests/unit/runtime/acoustics/recording/seal_again.hpp"
 
 namespace {

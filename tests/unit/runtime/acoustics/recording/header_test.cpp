@@ -1,4 +1,4 @@
-// Headers of recorded surfaces, from bytes that are not trusted.
+// Headers of recorded surfaces from untrusted bytes.
 #include "runtime/acoustics/recording/header.hpp"
 
 #include <gtest/gtest.h>
@@ -43,13 +43,13 @@ TEST(Header, IsReadAsItWasWritten) {
   EXPECT_EQ(read.count_blocks(), 4U);
 }
 
-TEST(Header, CountsAndOffsetsThatCannotBeAreRefused) {
+TEST(Header, ImpossibleCountsAndOffsetsAreRefused) {
   for (const char* count : {"frames", "vertices", "triangles", "bodies", "key_frames", "place", "acceleration"})
     for (const char* value : {"0", "-1", "", "x", "1e3", "18446744073709551615", "1099511627776", "99999999999999999999"})
       EXPECT_EQ(change(count, value).find("f: "), 0U) << count << " " << value;
   for (const char* value : {"nan", "inf", "-1", "0", "x"}) EXPECT_EQ(change("sample_rate_hz", value).find("f: "), 0U) << value;
-  EXPECT_NE(change("triangles", "1000000").find("cannot be in this file"), std::string::npos);
-  EXPECT_NE(change("triangle", "4095").find("the array triangle cannot be in this file"), std::string::npos);
+  EXPECT_NE(change("triangles", "1000000").find("exceeds the file"), std::string::npos);
+  EXPECT_NE(change("triangle", "4095").find("the array triangle exceeds the file"), std::string::npos);
   EXPECT_NE(change("length", "5").find("bytes were added"), std::string::npos);
 }
 

@@ -1,4 +1,4 @@
-// Recorded surfaces of small balls, made without carillon-simulate.
+// Recorded surfaces of small balls, without carillon-simulate.
 #pragma once
 
 #include <algorithm>
@@ -12,18 +12,17 @@
 #include <string>
 #include <vector>
 
-#include "runtime/base/vector.hpp"
 #include "runtime/acoustics/recording/header.hpp"
+#include "runtime/base/vector.hpp"
 #include "tests/unit/runtime/acoustics/recording/seal_again.hpp"
 
 namespace carillon::recording::testing {
 
-/// An octahedron about a centre that moves, whose facets all move outwards with the same acceleration [m/s2] at a time [s].
+/// Octahedron about a moving centre, whose facets move outwards with the same acceleration [m/s2] at a time [s].
 struct Ball {
   double corner_m = 1e-3;
   std::function<Vec3(double)> centre_m = [](double) { return Vec3{}; };
   std::function<double(double)> acceleration_m_s2;
-  /// Of its surface.
   double calc_area_m2() const { return 4.0 * std::sqrt(3.0) * corner_m * corner_m; }
 };
 
@@ -33,7 +32,7 @@ struct BallOptions {
   std::uint64_t key_frames = 48;
 };
 
-/// The bytes of a file of one ball, of version 1.0, without the structure of HDF5 around its arrays.
+/// File of one ball, version 1.0, without the HDF5 structure around its arrays.
 inline std::string make_ball_surface(const Ball& ball, const BallOptions& options = {}) {
   Header header;
   header.sample_rate_hz = options.rate_hz;
@@ -89,7 +88,7 @@ inline std::string make_ball_surface(const Ball& ball, const BallOptions& option
   return seal_again(format_header(header) + std::string(kDigestBytes, '0') + body);
 }
 
-/// What a small ball at a place makes at another: rho a A / (4 pi r), r / c later.
+/// Pressure of a small ball: rho a A / (4 pi r), r / c later.
 inline double calc_ball_pressure(const Ball& ball, const Vec3& at_m, double time_s) {
   const double r = norm(at_m - ball.centre_m(0.0));
   const double left_s = time_s - r / 343.0;

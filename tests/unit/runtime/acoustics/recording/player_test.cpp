@@ -1,4 +1,4 @@
-// Receivers that move, against receivers at rest and against the closed form of a small ball.
+// Moving receivers against resting ones and the closed form of a small ball.
 #include "runtime/acoustics/recording/player.hpp"
 
 #include <gtest/gtest.h>
@@ -31,7 +31,7 @@ std::vector<double> play(const RecordedSurface& recording, const Way& way, std::
   return sound;
 }
 
-/// A listener that hurries past in a curve, at 10 to 25 m/s.
+/// Listener passing on a curve at 10 to 25 m/s.
 MovingMicrophone find_listener(double t) {
   MovingMicrophone at;
   at.receiver.place_m = {-0.6 + 15.0 * t + 50.0 * t * t, 0.5, 0.1 + 10.0 * t};
@@ -39,7 +39,7 @@ MovingMicrophone find_listener(double t) {
   return at;
 }
 
-TEST(Player, AMovingReceiverHearsWhatOneAtRestHearsWhereItIs) {
+TEST(Player, AMovingReceiverHearsTheRestingOneAtItsPlace) {
   Ball ball = make_tone(1500.0);
   ball.centre_m = [](double t) { return Vec3{0.3 * std::sin(20.0 * t), 8.0 * t, 0.0}; };
   const std::string bytes = testing::make_ball_surface(ball);

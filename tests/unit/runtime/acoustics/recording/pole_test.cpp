@@ -1,4 +1,4 @@
-// The pole against its answer to a tone in closed form.
+// One-pole filter against its response to a tone in closed form.
 #include "runtime/acoustics/recording/pole.hpp"
 
 #include <gtest/gtest.h>

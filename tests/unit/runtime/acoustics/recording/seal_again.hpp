@@ -1,15 +1,15 @@
-// Damage behind a good seal.
+// Damaged files with a valid seal.
 #pragma once
 
 #include <string>
 #include <string_view>
 
-#include "runtime/base/sha256.hpp"
 #include "runtime/acoustics/recording/header.hpp"
+#include "runtime/base/sha256.hpp"
 
 namespace carillon::recording::testing {
 
-/// The bytes with the length and the digest that they ought to have; others than those of a header stay as they are.
+/// Bytes with correct length and digest; unchanged if not a header.
 inline std::string seal_again(std::string bytes) {
   if (bytes.size() < kHeaderBytes) return bytes;
   const std::size_t at = bytes.find("\nlength "), end = at == bytes.npos ? at : bytes.find('\n', at + 1);

@@ -1,4 +1,4 @@
-// Losses at supports against closed forms, against exact oscillators with their support, and at their limits.
+// Losses at supports against closed forms and exact oscillators on their support, and at their limits.
 #include "runtime/bank/mounting/losses.hpp"
 
 #include <gmock/gmock.h>
@@ -17,7 +17,7 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 constexpr double kPi = std::numbers::pi;
 
-/// A bank of a few modes with one patch whose normal is x.
+/// Bank of a few modes with one patch of normal x.
 bank::Bank make_bank(const std::vector<double>& reaction, double share = 0.0, double area_m2 = 1e-4) {
   bank::Bank bank = bank::example::make_bank();
   const std::size_t modes = bank.mode_count();
@@ -48,7 +48,7 @@ TEST(Plate, takes_of_a_normal_force_what_the_point_impedance_of_a_thin_plate_say
   for (std::size_t m = 0; m < bank.mode_count(); ++m) {
     const double lambda = bank.eigenvalue_rad2_s2[m];
     EXPECT_NEAR(losses.decay_per_s[m], 300.0 * 300.0 / z / (2 * lambda), 1e-12 * losses.decay_per_s[m]);
-    EXPECT_EQ(losses.shift_rad_s[m], 0.0) << "an infinite plate is a pure resistance";
+    EXPECT_EQ(losses.shift_rad_s[m], 0.0) << "an infinite plate is purely resistive";
   }
 }
 
@@ -57,7 +57,7 @@ TEST(Plate, turns_under_a_couple_as_omega_over_16_B_and_takes_forces_in_its_plan
       R"("on": {"young_modulus_pa": 30e9, "poisson_ratio": 0.2, "density_kg_m3": 2300, "thickness_m": 0.1, "loss_factor": 0})";
   const double b = 30e9 * 1e-3 / (12.0 * 0.96), g = 30e9 / 2.4 * 0.1, e = 30e9 / 0.96 * 0.1;
   const bank::Bank couple = make_bank({0, 0, 0, 0, 2.0, 0}), shear = make_bank({0, 0, 300.0, 0, 0, 0});
-  // A force across the normal x, along z, turns the wall about y: M = -(h / 2) n x F = (h / 2) F y. A couple against it takes that away.
+  // A force along z, across the normal x, rotates the wall about y: M = -(h / 2) n x F = (h / 2) F y. An opposing couple cancels it.
   const bank::Bank balanced = make_bank({0, 0, 300.0, 0, -0.05 * 300.0, 0});
   const Losses of_couple = calc_losses(couple, wish(wall)), of_shear = calc_losses(shear, wish(wall)),
                rest = calc_losses(balanced, wish(wall));
@@ -99,7 +99,7 @@ TEST(HalfSpace, takes_what_a_disc_radiates_and_what_its_spring_loses) {
     const double lambda = bank.eigenvalue_rad2_s2[m], w = std::sqrt(lambda);
     const double re = c + 0.006 * k / w, im = -k / w;
     EXPECT_NEAR(losses.decay_per_s[m], re / (re * re + im * im) * 9e4 / (2 * lambda), 1e-9 * losses.decay_per_s[m]);
-    EXPECT_LT(losses.shift_rad_s[m], 0.0) << "a spring makes the body slower";
+    EXPECT_LT(losses.shift_rad_s[m], 0.0) << "a spring lowers the frequency";
   }
 }
 
@@ -112,7 +112,7 @@ TEST(Joint, takes_its_loss_factor_of_the_energy_within_one_thickness) {
   }
 }
 
-/// x'' of a mass on a spring whose other end moves on mass, dashpot and spring: integrated in small steps.
+/// Oscillator whose spring is attached to mass, dashpot and spring, integrated in small steps.
 struct Ringing {
   double decay_per_s = 0.0, omega = 0.0;
   double lost_j = 0.0, dissipated_j = 0.0, start_j = 0.0;
@@ -177,8 +177,8 @@ TEST(FirstOrder, is_what_an_oscillator_on_its_support_does_and_the_books_of_ener
     const Ringing exact = ring(mass, stiffness, base, 40);
     EXPECT_NEAR(losses.decay_per_s[0] / exact.decay_per_s, 1.0, 3.0 / ratio);
     EXPECT_NEAR(losses.shift_rad_s[0] / (exact.omega - omega), 1.0, 3.0 / ratio);
-    EXPECT_NEAR(exact.lost_j, exact.dissipated_j, 1e-6 * exact.start_j) << "what the modes lose is what the support dissipates";
-    // The same by the modal decay: energy falls as exp(-2 d t), over the same 40 periods to first order.
+    EXPECT_NEAR(exact.lost_j, exact.dissipated_j, 1e-6 * exact.start_j) << "energy balance: loss equals dissipation in the support";
+    // The same by modal decay: energy falls as exp(-2 d t), over the same 40 periods to first order.
     const double left = std::exp(-2 * losses.decay_per_s[0] * 40 * 2 * kPi / exact.omega);
     EXPECT_NEAR((1 - left) * exact.start_j / exact.dissipated_j, 1.0, 0.05);
   }
@@ -233,7 +233,7 @@ TEST(Limits, a_scene_that_asks_for_nothing_changes_no_bit) {
 TEST(Limits, walls_a_million_times_too_soft_end_in_a_bounded_decay_and_one_warning) {
   for (const double softer : {1e2, 1e6, 1e12}) {
     for (const double area : {1e-4, 1e-12, 0.0}) {
-      bank::Bank before = make_bank({0.4, 0.3, 0.2, 0.01, 0.01, 0.02}, 0.3, area);  // parts of the mass's root
+      bank::Bank before = make_bank({0.4, 0.3, 0.2, 0.01, 0.01, 0.02}, 0.3, area);  // fractions of sqrt(mass)
       for (std::size_t i = 0; i < before.supports.reaction.size(); ++i) before.supports.reaction[i] *= before.eigenvalue_rad2_s2[i / 6];
       material::Fixing fixing = on(R"("on": "plasterboard wall", "joint": "glued")");
       fixing.base.young_modulus_pa /= softer;
@@ -272,7 +272,7 @@ TEST(Limits, modes_stay_in_their_order_and_the_bank_stays_sane) {
   bank.eigenvalue_rad2_s2[1] = bank.eigenvalue_rad2_s2[0] * (1 + 1e-9);
   bank.decay_per_s[1] = bank::calc_decay(bank.damping, bank.material, bank.eigenvalue_rad2_s2[1]);
   bank.proof.reset();
-  bank.supports.reaction[6] *= 3;  // the second one is shifted further down
+  bank.supports.reaction[6] *= 3;  // shifts the second mode further down
   const Losses losses = calc_losses(bank, wish(R"("on": {"stiffness_n_m": 1e9, "loss_factor": 0.1})"));
   EXPECT_LT(losses.shift_rad_s[1], losses.shift_rad_s[0]);
   EXPECT_GT(losses.mixed, 0U);
@@ -298,8 +298,8 @@ TEST(Names, choose_one_support_of_several_and_unknown_ones_are_refused) {
   EXPECT_THROW(calc_losses(free, wish(R"("on": "brick wall")")), InputError);
   EXPECT_TRUE(calc_losses(free, {}).is_empty());
   bank.supports.text = R"({"supports": [{"name": "end", "on": "brick wall", "joint": "screwed"}]})";
-  EXPECT_GT(calc_losses(bank, {}).decay_per_s[0], 0.0) << "the bank's own";
-  EXPECT_TRUE(calc_losses(bank, wish(R"("on": "rigid")")).is_empty()) << "the scene outranks it";
+  EXPECT_GT(calc_losses(bank, {}).decay_per_s[0], 0.0) << "supports of the bank";
+  EXPECT_TRUE(calc_losses(bank, wish(R"("on": "rigid")")).is_empty()) << "the scene overrides the bank";
   bank.supports.text = R"({"supports": [{"name": "end"}, {"name": "more"}]})";
   EXPECT_THROW(calc_losses(bank, {}), InputError);
   bank.supports.text = "{";

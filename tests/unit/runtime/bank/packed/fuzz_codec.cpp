@@ -1,15 +1,15 @@
-// Packed bytes of any kind give a surface and shapes that can be used, or an InputError. Every input is tried as it is, and, as no change
-// of an input keeps the checksums of its blocks, as the numbers that blocks hold.
+// Arbitrary packed bytes give a usable surface and shapes, or an InputError. Each input is tried unchanged and, since mutations break the
+// checksums of the blocks, as the numbers inside blocks.
 #include <algorithm>
 #include <cstring>
 #include <span>
 #include <string>
 #include <vector>
 
-#include "runtime/base/error.hpp"
 #include "runtime/bank/packed/shapes.hpp"
 #include "runtime/bank/packed/surface.hpp"
 #include "runtime/bank/packed/writer.hpp"
+#include "runtime/base/error.hpp"
 
 namespace {
 
@@ -28,7 +28,7 @@ void check(const packed::Surface& surface) {
       if (v < 0 || v >= std::ssize(surface.places)) __builtin_trap();
 }
 
-/// An order of triangles, of which the surface has some.
+/// Triangle order for a surface with triangles.
 void restore(std::span<const std::byte> order, std::vector<Triangle> triangles) {
   try {
     packed::restore_order(order, triangles, "input");
@@ -39,7 +39,7 @@ void restore(std::span<const std::byte> order, std::vector<Triangle> triangles) 
     if (triangle[0] < 0) __builtin_trap();
 }
 
-/// A length of two bytes, a number of modes, a surface of this length, and shapes.
+/// Surface length (two bytes), number of modes, surface, shapes.
 void read_as_it_is(std::span<const std::uint8_t> input) {
   if (input.size() < 3) return;
   const std::size_t modes = input[2];
@@ -52,7 +52,7 @@ void read_as_it_is(std::span<const std::uint8_t> input) {
   use(surface, bytes.subspan(length), modes);
 }
 
-/// Takes numbers from an input until it ends, and zeros from then on.
+/// Takes numbers from an input; zeros after its end.
 class Source {
  public:
   explicit Source(std::span<const std::uint8_t> input) : input_(input) {}
@@ -62,7 +62,7 @@ class Source {
     input_ = input_.subspan(1);
     return byte;
   }
-  /// Small as a rule.
+  /// Usually small.
   std::int32_t take_number() {
     const std::int32_t low = static_cast<std::int8_t>(take());
     if (low != -128) return low;
@@ -79,7 +79,7 @@ class Source {
   std::span<const std::uint8_t> input_;
 };
 
-/// A surface of the input's symbols and places, and shapes of its numbers.
+/// Surface from the input's symbols and places, shapes from its numbers.
 void read_as_numbers(std::span<const std::uint8_t> input) {
   Source source(input);
   const std::size_t triangles = 1 + source.take(), seeds = 1 + source.take() % 4, levels = 1 + source.take() % 3,

@@ -9,9 +9,9 @@
 #include <limits>
 #include <set>
 
-#include "runtime/base/instructions.hpp"
 #include "runtime/bank/packed/loops.hpp"
 #include "runtime/bank/packed/rows.hpp"
+#include "runtime/base/instructions.hpp"
 #include "tests/unit/runtime/bank/packed/surfaces.hpp"
 
 namespace carillon::packed {
@@ -74,7 +74,7 @@ TEST(CodecNeighbours, of_crowds_are_found_at_once) {
     one_cell.push_back({static_cast<std::int32_t>(random() % 64), static_cast<std::int32_t>(random() % 64), 0});
   for (std::int32_t i = 0; i < 12; ++i)
     far_apart.push_back({i % 2 ? kMaxPlace : -kMaxPlace, i % 3 ? kMaxPlace : -kMaxPlace, i % 5 ? kMaxPlace : -kMaxPlace});
-  const std::clock_t begin = std::clock();  // CPU time: the machine may be busy
+  const std::clock_t begin = std::clock();  // CPU time, independent of load
   for (const std::vector<Place>& known : {one_place, one_cell, far_apart})
     for (const int shift : {0, 6, find_cell_shift(known), kMaxCellShift}) {
       NeighbourSearch search(known, shift);
@@ -112,7 +112,7 @@ TEST(CodecNeighbours, have_cells_that_hold_a_few_places) {
 
 struct Stencils {
   Surface surface;
-  std::size_t first = 0;  // vertices from here on have stencils
+  std::size_t first = 0;  // first vertex with a stencil
   std::vector<Neighbours> neighbours;
   std::vector<Stencil> stencils;
 
@@ -150,7 +150,7 @@ TEST(CodecStencil, lets_linear_fields_pass_with_their_gradients) {
         EXPECT_NEAR(static_cast<double>(all.stencils[i].offset[c][k]), (x[c] - centre[c]) / h, 1e-4);
       }
     }
-    // The nugget and the prior of linear fields keep it from being exact.
+    // Nugget and prior of linear fields prevent an exact result.
     EXPECT_NEAR(value, 0.3, 0.01) << i;
     EXPECT_NEAR(one, 1.0, 0.01) << i;
     const Vec3 normal = normalise(Vec3{1.0 * centre[0], 1.0 * centre[1], 1.0 * centre[2]});
@@ -225,7 +225,7 @@ TEST(CodecLoops, of_all_instruction_sets_find_the_same_neighbours_in_the_same_or
 
 TEST(CodecLoops, of_all_instruction_sets_make_the_same_stencils) {
   const Stencils all(example::make_ball(3));
-  const std::size_t count = all.stencils.size() - 1;  // no multiple of a vector
+  const std::size_t count = all.stencils.size() - 1;  // not a multiple of the vector length
   std::vector<Stencil> plain(count), found(count);
   kLoopsPlain.calc_stencils(&all.surface.places[all.first], all.neighbours.data(), all.surface.places.data(), count, plain.data());
   for (const auto& [name, loops] : list_others()) {
@@ -241,7 +241,7 @@ TEST(CodecLoops, of_all_instruction_sets_make_the_same_stencils) {
   }
 }
 
-// Against sums in double precision.
+// Against double-precision sums.
 TEST(CodecLoops, multiply_weigh_and_add_as_sums_that_are_written_out) {
   std::mt19937 random(5);
   std::uniform_real_distribution<float> draw(-1.0F, 1.0F);

@@ -1,4 +1,4 @@
-// Numbers and blocks come back, and what does not fit is refused before it takes memory.
+// Round trip of numbers and blocks; invalid data is rejected before memory is allocated.
 #include "runtime/bank/packed/reader.hpp"
 
 #include <gtest/gtest.h>
@@ -7,9 +7,9 @@
 #include <limits>
 #include <random>
 
-#include "runtime/base/error.hpp"
 #include "runtime/bank/packed/inflate.hpp"
 #include "runtime/bank/packed/writer.hpp"
+#include "runtime/base/error.hpp"
 #include "tests/support/catch_message.hpp"
 
 namespace carillon::packed {
@@ -54,7 +54,7 @@ TEST(CodecReader, gives_what_the_writer_was_given) {
   EXPECT_EQ(reader.get_list<float>(2), (std::vector<float>{1.0F, -2.0F}));
   for (const auto& list : lists) EXPECT_EQ(reader.get_numbers(list.size()), list);
   EXPECT_EQ(reader.get_block(block.size()), block);
-  EXPECT_TRUE(message_of([&] { reader.finish(); }).ends_with(" bytes too many; copy or pack the bank again"));
+  EXPECT_TRUE(message_of([&] { reader.finish(); }).ends_with(" excess bytes; copy or pack the bank again"));
   EXPECT_TRUE(reader.get_block(0).empty());
   EXPECT_NO_THROW(reader.finish());
 }
@@ -92,7 +92,7 @@ TEST(CodecReader, refuses_blocks_of_another_length_and_damaged_ones) {
     bytes[i] = static_cast<std::uint8_t>(bytes[i] ^ 0x10U);
     Reader reader(std::as_bytes(std::span(bytes)), "file.hdf", "packed part");
     try {
-      EXPECT_EQ(reader.get_block(block.size()), block) << i;  // bits between the stream and its checksum mean nothing
+      EXPECT_EQ(reader.get_block(block.size()), block) << i;  // padding bits before the checksum are ignored
     } catch (const InputError&) {
       ++refused;
     }
@@ -104,7 +104,7 @@ TEST(CodecReader, refuses_a_block_that_no_stream_of_its_length_holds) {
   const std::vector<std::uint8_t> zeros(1 << 22, 0);
   Writer writer;
   writer.put_block(zeros);
-  ASSERT_LE(zeros.size() / kMaxInflation, writer.get_bytes().size());  // the bound is one
+  ASSERT_LE(zeros.size() / kMaxInflation, writer.get_bytes().size());  // kMaxInflation is a bound
   EXPECT_EQ(make_reader(writer).get_block(zeros.size()), zeros);
   EXPECT_NE(message_of([&] { make_reader(writer).get_block(std::size_t{1} << 40); }).find("too short"), std::string::npos);
 }

@@ -1,4 +1,4 @@
-// Shapes come back within the steps that were asked for, as the writer predicts, and damaged bytes are refused or give numbers.
+// Shapes are reproduced within the requested steps, as the writer predicts; damaged bytes are rejected or give numbers.
 #include "runtime/bank/packed/shapes.hpp"
 
 #include <gtest/gtest.h>
@@ -7,24 +7,24 @@
 #include <cmath>
 #include <limits>
 
-#include "runtime/base/error.hpp"
 #include "runtime/bank/packed/fit_shapes.hpp"
+#include "runtime/base/error.hpp"
 #include "tests/unit/runtime/bank/packed/surfaces.hpp"
 
 namespace carillon::packed {
 namespace {
 
-// The finest level has the widest steps: 1.6, of which 0.9 may be left.
+// The finest level has the widest steps, 1.6, with a residual of up to 0.9.
 constexpr double kMostLeft = 1.44;
 
-/// A smooth field: plane waves of lengths from several times the body's size to half of it.
+/// Smooth field: plane waves of lengths from several body sizes to half of one.
 Vec3 calc_field(std::size_t mode, const Vec3& x) {
   const double k = 0.5 + 0.35 * static_cast<double>(mode);
   const double phase = k * (x[0] + 0.3 * x[1]) - 0.6 * k * x[2] + static_cast<double>(mode);
   return {std::sin(phase), 0.7 * std::cos(1.1 * phase), std::sin(x[0] * x[1]) + 0.2 * std::sin(0.8 * phase)};
 }
 
-/// Shapes at the vertices of a surface, as much as they move and as finely as `steps_per_unit` says; modes may be at rest.
+/// Shapes at the vertices of a surface, with motion and precision by `steps_per_unit`; modes may be at rest.
 struct Shapes {
   std::size_t modes;
   std::vector<float> step;
@@ -35,7 +35,7 @@ struct Shapes {
   Shapes(const Surface& surface, std::size_t count, double step_of_all, bool is_any_at_rest = false)
       : modes(count), wanted(surface.places.size(), count), fineness(surface.places.size(), 0) {
     for (std::size_t m = 0; m < modes; ++m) {
-      const double size = std::pow(10.0, static_cast<double>(m % 5) - 2.0);  // modes move as much as they like
+      const double size = std::pow(10.0, static_cast<double>(m % 5) - 2.0);  // amplitudes over five decades
       step.push_back(is_rest(m, is_any_at_rest) ? 0.0F : static_cast<float>(size * step_of_all));
       scale.push_back(is_rest(m, is_any_at_rest) ? 0.0 : size * 1.3 / 32767.0);
     }
@@ -57,7 +57,7 @@ struct Shapes {
   }
 };
 
-/// What comes back, and what is wrong with it [steps].
+/// Decoded shapes and their error [steps].
 struct Result {
   std::vector<std::uint8_t> bytes;
   std::vector<std::int16_t> shape;
@@ -80,7 +80,7 @@ Result pack(const Surface& surface, const Shapes& shapes) {
           continue;
         }
         const double per_step = shapes.scale[m] / static_cast<double>(shapes.step[m]);
-        // What the writer predicts, rounded to the shape's own steps; sums of single precision come before.
+        // Writer's prediction, rounded to the shape's steps, from single-precision sums.
         const double predicted = static_cast<double>(fitted.rows.get(v)[c * fitted.rows.get_padded() + m]);
         EXPECT_NEAR(found * per_step, predicted, 0.5 * per_step + 1e-4 * (1.0 + 1e-2 * std::abs(predicted))) << v << " " << m;
         const double share = static_cast<double>(LevelSteps::calc_share(shapes.fineness[v]));
@@ -141,7 +141,7 @@ TEST(CodecShapes, are_kept_finer_at_the_vertices_that_are_to_be_finer) {
   EXPECT_LT(pack(surface, shapes).worst, 1.02 * kMostLeft);  // in steps of each vertex
 }
 
-// Of a mode that rests at a vertex and moves next to it by thousands of steps nothing may be left there.
+// A mode at rest at a vertex that moves by thousands of steps next to it must decode to exactly zero.
 TEST(CodecShapes, at_the_finest_are_exact_whatever_the_neighbours_do) {
   const Surface surface = example::make_surface(example::make_ball(3));
   Shapes shapes(surface, 5, 1e-4);
@@ -196,7 +196,7 @@ TEST(CodecShapes, of_a_sample_are_those_of_the_coarser_levels_and_of_the_sampled
 
 // ---- damaged bytes ----
 
-/// Reads; false when the bytes are refused.
+/// False if the bytes are rejected.
 bool try_read(std::span<const std::byte> bytes, const Surface& surface, const std::vector<double>& scale) {
   try {
     const std::vector<std::int16_t> shape = read_shapes(bytes, surface, scale, "damaged");
@@ -243,7 +243,7 @@ TEST(CodecShapes, with_any_one_byte_changed_are_refused_or_are_numbers) {
         changed[i] = static_cast<std::uint8_t>(changed[i] ^ flip);
         read += sample.try_read(changed) ? 1 : 0;
       }
-    EXPECT_GT(read, 10u);  // steps may be others
+    EXPECT_GT(read, 10u);  // steps may differ
     EXPECT_LT(read, bytes.size());
   }
 }

@@ -1,4 +1,4 @@
-// Surfaces come back as they were, and damaged bytes are refused or give a surface that can be used.
+// Round trip of surfaces; damaged bytes are rejected or give a usable surface.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -6,10 +6,10 @@
 #include <limits>
 #include <set>
 
-#include "runtime/base/error.hpp"
 #include "runtime/bank/packed/inflate.hpp"
 #include "runtime/bank/packed/neighbours.hpp"
 #include "runtime/bank/packed/writer.hpp"
+#include "runtime/base/error.hpp"
 #include "tests/unit/runtime/bank/packed/surfaces.hpp"
 
 namespace carillon::packed {
@@ -188,7 +188,7 @@ TEST(CodecLevels, none_is_empty_in_a_crowd) {
 
 // ---- damaged bytes ----
 
-/// Reads; a surface that is read can be used without looking. False when it is refused.
+/// False if rejected; accepted surfaces must be usable without further checks.
 bool try_read(std::span<const std::byte> bytes) {
   try {
     const Surface surface = read_surface(bytes, "damaged");
@@ -228,12 +228,12 @@ TEST(CodecSurface, with_any_one_bit_changed_is_refused_or_can_be_used) {
         changed[i] = static_cast<std::uint8_t>(changed[i] ^ (1 << bit));
         read += try_read(example::as_bytes(changed)) ? 1 : 0;
       }
-    EXPECT_GT(read, 100u);  // the origin may be another
+    EXPECT_GT(read, 100u);  // the origin may differ
     EXPECT_LT(read, 4 * bytes.size());
   }
 }
 
-/// What read_surface() takes, from streams that need not belong together.
+/// Input of read_surface() from independent streams.
 struct Streams {
   std::uint8_t form = 1, levels = 1;
   std::uint32_t vertices = 0, triangles = 0, seeds = 1;
@@ -327,15 +327,14 @@ TEST(CodecSurface, with_a_wrong_header_is_refused) {
       expect_refused("a huge count", [&](Streams& s) { s.*count = many; });
 }
 
-/// Of the gates that do not touch the first vertex every second one is closed by a triangle with it, so that ever more edges are open
-/// there.
+/// Closes every second gate that does not touch the first vertex by a triangle with it, so that the number of open edges there grows.
 Streams make_knot(std::uint32_t triangles) {
   Streams knot;
   knot.corners = {0, 0, 0};
   knot.triangles = triangles;
   knot.vertices = 3;
   std::set<std::pair<std::int32_t, std::int32_t>> open;
-  std::vector<std::pair<std::int32_t, std::int32_t>> gates;  // in the order in which they opened
+  std::vector<std::pair<std::int32_t, std::int32_t>> gates;  // in opening order
   const auto add = [&](std::int32_t from, std::int32_t to) {
     if (open.erase({to, from}) > 0) return;
     open.emplace(from, to);
@@ -364,7 +363,7 @@ Streams make_knot(std::uint32_t triangles) {
 
 TEST(CodecSurface, with_ever_more_open_edges_at_one_vertex_does_not_take_the_square_of_its_length) {
   const std::vector<std::uint8_t> bytes = make_knot(200000).write();
-  const std::clock_t begin = std::clock();  // CPU time: the machine may be busy
+  const std::clock_t begin = std::clock();  // CPU time, independent of load
   try_read(example::as_bytes(bytes));
   EXPECT_LT(std::clock() - begin, 5 * CLOCKS_PER_SEC) << bytes.size() << " bytes";
 }

@@ -1,4 +1,4 @@
-// Closed surfaces, and what the codec makes of them.
+// Closed surfaces for codec tests.
 #pragma once
 
 #include <algorithm>
@@ -24,7 +24,7 @@ struct Mesh {
 
 inline Mesh make_tetrahedron() { return {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}}}; }
 
-/// 10 * 4^divisions + 2 vertices on a sphere.
+/// Sphere of 10 * 4^divisions + 2 vertices.
 inline Mesh make_ball(int divisions, double radius_m = 1.0) {
   const bank::Bank bank = testing::make_sphere_surface(radius_m, divisions);
   return {bank.vertices_m, bank.triangles};
@@ -44,7 +44,7 @@ inline Mesh make_torus(std::int32_t around, std::int32_t across) {
   return mesh;
 }
 
-/// A ball with a ball-shaped cavity: two shells, the inner one inside out.
+/// Ball with a spherical cavity: two shells, the inner one inward.
 inline Mesh make_hollow_ball(int divisions) {
   Mesh mesh = make_ball(divisions);
   const Mesh inner = make_ball(divisions, 0.6);
@@ -54,7 +54,7 @@ inline Mesh make_hollow_ball(int divisions) {
   return mesh;
 }
 
-/// Two balls that touch along an edge, which belongs to four triangles: each direction of it twice.
+/// Two balls sharing an edge, which belongs to four triangles, twice per direction.
 inline Mesh make_touching_balls(int divisions) {
   Mesh mesh = make_ball(divisions);
   const std::size_t count = mesh.vertices_m.size(), triangles = mesh.triangles.size();
@@ -77,7 +77,7 @@ inline Mesh make_touching_balls(int divisions) {
   return mesh;
 }
 
-/// A closed plate of n x n squares and the thickness of 1/200 of its side.
+/// Closed plate of n x n squares with a thickness of 1/200 of its side.
 inline Mesh make_plate(std::int32_t n) {
   Mesh mesh;
   for (std::int32_t side = 0; side < 2; ++side)
@@ -102,7 +102,7 @@ inline Mesh make_plate(std::int32_t n) {
   return mesh;
 }
 
-/// The same surface with vertices, triangles and the corners where they begin in any order.
+/// The same surface with shuffled vertices, triangles and first corners.
 inline Mesh shuffle(const Mesh& mesh, unsigned seed) {
   std::mt19937 random(seed);
   std::vector<std::int32_t> order(mesh.vertices_m.size());

@@ -1,4 +1,4 @@
-// What is written is read back as it was; GLB by its specification, byte by byte.
+// Round trip of glTF; GLB bytes by the specification.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -83,7 +83,7 @@ TEST(Gltf, nodes_turn_as_quaternions_do) {
   const base::Document document = base::parse_document(
       R"({"rotation": [0.70710678118654752, 0, 0, 0.70710678118654752], "translation": [1, 2, 3], "scale": [2, 2, 2]})", "node");
   base::Object node = document.root();
-  const Vec3 moved = move(read_transform(node), {0.0, 1.0, 0.0});  // a quarter turn about x: y goes to z
+  const Vec3 moved = move(read_transform(node), {0.0, 1.0, 0.0});  // 90 degrees about x: y goes to z
   EXPECT_NEAR(moved[0], 1.0, 1e-12);
   EXPECT_NEAR(moved[1], 2.0, 1e-12);
   EXPECT_NEAR(moved[2], 5.0, 1e-12);

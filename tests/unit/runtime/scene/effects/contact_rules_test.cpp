@@ -1,4 +1,4 @@
-// Effects that lasting contacts call for.
+// Effects of lasting contacts.
 #include "runtime/scene/effects/contact_rules.hpp"
 
 #include <gtest/gtest.h>
@@ -11,7 +11,7 @@
 namespace carillon::effects {
 namespace {
 
-TEST(EffectSelector, ContactsThatLastCallForWhatTheyDo) {
+TEST(EffectSelector, LastingContactsCallForTheirEffects) {
   Stage stage;
   stage.facts.moves = true;
   stage.body().fixed = false;
@@ -24,9 +24,9 @@ TEST(EffectSelector, ContactsThatLastCallForWhatTheyDo) {
     std::vector<events::Event> events;
     if (struck) events.emplace_back(make_strike(0.9, 0.01));
     events.emplace_back(contact);
-    return find_effects(play(stage.facts, events), 1.0);
+    return play(stage.facts, events);
   };
-  EXPECT_EQ(touch({}, false), EffectSet{}) << "a body that lies still makes no sound";
+  EXPECT_EQ(touch({}, false), EffectSet{}) << "a body at rest makes no sound";
   EXPECT_TRUE(touch({.slip_m_s = {0.05, 0, 0}, .other_sweep_m_s = 0.05}, false).has(Effect::kRoughness));
   EXPECT_TRUE(touch({.slip_m_s = {0.05, 0, 0}, .other_sweep_m_s = 0.05}, false).has(Effect::kModal));
   EXPECT_FALSE(touch({.slip_m_s = {0.0001, 0, 0}, .other_sweep_m_s = 0.0001}, false).has(Effect::kRoughness));
@@ -38,26 +38,25 @@ TEST(EffectSelector, ContactsThatLastCallForWhatTheyDo) {
   stage.facts.ground.modulus_pa = 0.0;  // no spring
   EXPECT_FALSE(touch({.impedance_n_s_m = 0.9 * limit}, true).has(Effect::kContactDamping));
   EXPECT_TRUE(touch({.impedance_n_s_m = 1.1 * limit}, true).has(Effect::kContactDamping));
-  EXPECT_FALSE(touch({.impedance_n_s_m = 1e3}, false).has(Effect::kContactDamping)) << "of a body that is silent";
+  EXPECT_FALSE(touch({.impedance_n_s_m = 1e3}, false).has(Effect::kContactDamping)) << "silent body";
 }
 
-TEST(EffectSelector, WhatLiesDampsUntilItIsLifted) {
-  // Of a contact at rest no more records come; it still damps, until its end.
+TEST(EffectSelector, AContactAtRestDampsLaterStrikesUntilItEnds) {
+  // A contact at rest has no further records.
   Stage stage;
   stage.facts.moves = true;
   stage.body().fixed = false;
   events::LastingContact contact{
-      .time_s = 0.5, .id = 7, .triangle = 3, .normal = {0, 0, 1}, .force_n = 2.0, .patch_radius_m = 1e-4, .impedance_n_s_m = 5.0};
-  std::vector<events::Event> events{make_strike(0.4, 3.0), contact};
-  EXPECT_TRUE(find_effects(play(stage.facts, events), 1.0).has(Effect::kContactDamping));
-  contact.time_s = 0.6;
-  contact.state = events::ContactState::kEnd;
-  events.emplace_back(contact);
-  EXPECT_TRUE(find_effects(play(stage.facts, events), 0.6).has(Effect::kContactDamping));
-  EXPECT_FALSE(find_effects(play(stage.facts, events), 1.0).has(Effect::kContactDamping));
+      .time_s = 0.2, .id = 7, .triangle = 3, .normal = {0, 0, 1}, .force_n = 2.0, .patch_radius_m = 1e-4, .impedance_n_s_m = 5.0};
+  EXPECT_FALSE(play(stage.facts, {contact}).has(Effect::kContactDamping)) << "silent body";
+  EXPECT_TRUE(play(stage.facts, {contact, make_strike(0.4, 3.0)}).has(Effect::kContactDamping));
+  events::LastingContact end = contact;
+  end.time_s = 0.3;
+  end.state = events::ContactState::kEnd;
+  EXPECT_FALSE(play(stage.facts, {contact, end, make_strike(0.4, 3.0)}).has(Effect::kContactDamping));
 }
 
-TEST(EffectSelector, ADecayThatIsALittleWrongChangesTheSoundAsTheRuleSays) {
+TEST(EffectSelector, ExposureChangesByHalfTheSquareOfTheErrorOfADecay) {
   // The exposure of e^{-t} - e^{-(1 + e) t} against that of e^{-t}: e^2 / 2.
   const double e = 0.01;
   double difference = 0.0, whole = 0.0;

@@ -67,7 +67,7 @@ TEST(Levels, ExposureOfAModeIsTheIntegralOfItsSquare) {
   EXPECT_FALSE(levels.calc_projections(12, {1, 0, 0}, {0, 0, 1}, projections));
 }
 
-TEST(Levels, ModesBeyondHearingFollowAPush) {
+TEST(Levels, UltrasonicModesFollowAPush) {
   // One mode at 22 kHz, strongly damped, under a pulse of 0.4 ms, at 384 kHz by its equation of motion; its Fourier transform up to 15.4
   // kHz.
   const bank::Bank bank = testing::make_cube_bank({{22000.0, 4000.0, 0.03}});
@@ -101,7 +101,7 @@ TEST(Levels, ModesBeyondHearingFollowAPush) {
   EXPECT_NEAR(pushed, sum, 0.1 * sum);
 }
 
-TEST(Levels, OnlyModesThatAreHeardCount) {
+TEST(Levels, OnlyAudibleModesCount) {
   const bank::Bank bank = testing::make_cube_bank({{12.0, 1.0}, {500.0, 5.0}, {11000.0, 5.0}, {21000.0, 5.0}});
   EXPECT_EQ(BankLevels(bank, 48000.0).get_modes().size(), 2u);
   EXPECT_EQ(BankLevels(bank, 16000.0).get_modes().size(), 1u);

@@ -1,4 +1,4 @@
-// A struck cube before two ears, its events and its effects: scenes of an EffectSelector.
+// Scenes of an EffectSelector: a struck cube in front of two ears.
 #pragma once
 
 #include <limits>
@@ -13,7 +13,7 @@ using testing::make_cube_bank;
 
 inline constexpr double kC = 343.0;
 
-/// A cube of 10 cm, 2 m in front of two ears, that is struck and does not move.
+/// A fixed cube of 10 cm, 2 m in front of two ears.
 struct Stage {
   bank::Bank bank = make_cube_bank({{1000.0, 20.0, 0.05}});
   SceneFacts facts;
@@ -31,19 +31,12 @@ inline events::Impulse make_strike(double time_s, double impulse_n_s, double dur
   return {.time_s = time_s, .triangle = 3, .impulse_n_s = {0, 0, impulse_n_s}, .duration_s = duration_s};
 }
 
-/// The effects of a body at a time.
-inline EffectSet find_effects(const std::vector<EffectChange>& changes, double time_s, int body = 0) {
-  EffectSet effects;
-  for (const EffectChange& change : changes) {
-    if (change.body == body && change.time_s <= time_s) effects = change.effects;
-  }
-  return effects;
-}
-
-inline std::vector<EffectChange> play(const SceneFacts& facts, const std::vector<events::Event>& events) {
+/// Effects of the body after these events.
+inline EffectSet play(const SceneFacts& facts, const std::vector<events::Event>& events) {
   EffectSelector selector(facts);
   for (const events::Event& event : events) selector.watch(event);
-  return selector.advance(std::numeric_limits<double>::infinity());
+  selector.advance(std::numeric_limits<double>::infinity());
+  return selector.choose(0);
 }
 
 }  // namespace carillon::effects

@@ -1,4 +1,4 @@
-// Effects that strikes call for.
+// Effects of strikes.
 #include "runtime/scene/effects/strike_rules.hpp"
 
 #include <gtest/gtest.h>
@@ -26,19 +26,13 @@ double calc_spectrum(double cycles) {
   return sum / area;
 }
 
-TEST(EffectSelector, ABodyThatIsStruckHasWhatItsStrikeCallsFor) {
+TEST(EffectSelector, AStrikeCallsForModesPulseDelayAndEars) {
   Stage stage;
-  const auto changes = play(stage.facts, {make_strike(1.0, 0.01, 1e-3)});
-  ASSERT_FALSE(changes.empty());
-  EXPECT_EQ(changes[0].time_s, 0.0);
-  EXPECT_EQ(changes[0].effects, EffectSet{}) << "nothing has happened yet";
-  EXPECT_EQ(find_effects(changes, 1.0), (EffectSet{Effect::kModal, Effect::kHertzPulse, Effect::kAirDelay, Effect::kTwoEars}));
-  EXPECT_EQ(find_effects(changes, 0.5), EffectSet{});
-  EXPECT_EQ(changes.size(), 3u) << "once on and once off";
-  EXPECT_LE(changes[1].time_s, 1.0 - kLeadS);
+  EXPECT_EQ(play(stage.facts, {make_strike(1.0, 0.01, 1e-3)}),
+            (EffectSet{Effect::kModal, Effect::kHertzPulse, Effect::kAirDelay, Effect::kTwoEars}));
 }
 
-// Two thousand steps of 1 us each: a Hertz pulse of 2 ms. Each piece of it alone is 40 dB less.
+// 2000 steps of 1 us: a Hertz pulse of 2 ms. Each piece alone is 40 dB less.
 TEST(EffectSelector, APulseInPiecesIsJudgedAsOne) {
   constexpr double kLength = 2e-3;
   constexpr int kSteps = 2000;
@@ -55,52 +49,11 @@ TEST(EffectSelector, APulseInPiecesIsJudgedAsOne) {
   };
   Stage stage;
   for (const double impulse_n_s : {0.01, 1e-6, 1e-9}) {
-    const auto as_one = play(stage.facts, {make_strike(1.0, impulse_n_s, kLength)}),
-               in_pieces = play(stage.facts, make_pieces(impulse_n_s));
-    ASSERT_EQ(in_pieces.size(), as_one.size()) << impulse_n_s;
-    for (std::size_t i = 0; i < as_one.size(); ++i) {
-      EXPECT_EQ(in_pieces[i].effects, as_one[i].effects) << impulse_n_s;
-      EXPECT_NEAR(in_pieces[i].time_s, as_one[i].time_s, 0.011) << impulse_n_s;
-    }
+    EXPECT_EQ(play(stage.facts, make_pieces(impulse_n_s)), play(stage.facts, {make_strike(1.0, impulse_n_s, kLength)})) << impulse_n_s;
   }
 }
 
-TEST(EffectSelector, APulseInPiecesCostsWhatItsLengthAndItsStepsDo) {
-  // Sixteen steps an event: 125 events of one pulse of 2 ms. Each of them pays for itself alone.
-  constexpr double kLength = 2e-3;
-  constexpr int kSteps = 2000;
-  Stage stage;
-  const Costs costs{.mode_sample_ns = 0.0,
-                    .voice_sample_ns = 0.0,
-                    .event_ns = 11.0,
-                    .strike_mode_ns = 0.0,
-                    .pulse_mode_sample_ns = 3.0,
-                    .force_mode_ns = 7.0,
-                    .step_mode_ns = 5.0,
-                    .ear_sample_ns = 0.0};
-  EffectSelector selector(stage.facts, costs);
-  events::split_force({.time_s = 1.0 - 0.5 * kLength, .step_s = kLength / kSteps, .triangle = 3},
-                      std::vector<Vec3>(kSteps, {0, 0, 1.0 / kSteps}), [&](const events::Force& piece) { selector.watch(piece); });
-  selector.advance(stage.facts.duration_s);
-  const double modes = static_cast<double>(stage.facts.bodies[0].bank->mode_count());
-  // Of the first pieces it is not known yet that the pulse will be long enough to be audibly different from a blow.
-  EXPECT_NEAR(selector.get_plan(0)[Effect::kHertzPulse].cost_us, 1e-3 * modes * kLength * 48000.0 * 3.0, 5e-2 * modes * kLength * 144.0);
-  EXPECT_NEAR(selector.get_plan(0)[Effect::kModal].cost_us, 1e-3 * modes * kSteps * (5.0 + (11.0 + 7.0) / 16.0), 1e-4 * modes * kSteps);
-}
-
-TEST(EffectSelector, ItIsOffWhenItHasDiedAwayAndTheSoundHasArrived) {
-  Stage stage;
-  const auto changes = play(stage.facts, {make_strike(1.0, 0.01)});
-  // p = g phi J at 1 m: 0.05 x 0.01 Pa; less than 20 uPa is inaudible, at 2.04 m, and by kBelowLoudestDb not earlier.
-  const double distance = std::hypot(0.3, 2.0), amplitude = 0.05 * 0.01 / distance;
-  const double exposure = amplitude * amplitude / 80.0;
-  const double limit_db = std::min(0.0, 10.0 * std::log10(exposure / (0.2 * 4e-10)) - 70.0);
-  const double quiet_s = 1.0 + std::log(amplitude / (20e-6 * std::pow(10.0, limit_db / 20.0))) / 20.0 + distance / kC;
-  EXPECT_NEAR(changes.back().time_s, quiet_s + kHoldS, 0.011);
-  EXPECT_EQ(changes.back().effects, EffectSet{});
-}
-
-TEST(EffectSelector, WhatIsInaudibleIsOff) {
+TEST(EffectSelector, InaudibleBodiesHaveNoEffects) {
   Stage stage;
   stage.facts.bodies.push_back(stage.body());
   std::vector<events::Event> events{make_strike(0.5, 0.01)};
@@ -109,15 +62,15 @@ TEST(EffectSelector, WhatIsInaudibleIsOff) {
   events.emplace_back(faint);
   EffectSelector selector(stage.facts);
   for (const auto& event : events) selector.watch(event);
-  const auto changes = selector.advance(10.0);
-  EXPECT_EQ(find_effects(changes, 0.6, 1), EffectSet{});
+  selector.advance(10.0);
+  EXPECT_EQ(selector.choose(1), EffectSet{});
   EXPECT_EQ(selector.get_plan(1)[Effect::kModal].reason.rule, SelectionReason::Rule::kTooQuiet);
   // By hand: exposure (0.05 x 1e-9 / r)^2 / 80 within 0.2 s.
   const double distance = std::hypot(0.3, 2.0), amplitude = 0.05e-9 / distance;
   EXPECT_NEAR(selector.get_plan(1)[Effect::kModal].reason.value, 10.0 * std::log10(amplitude * amplitude / 80.0 / 0.2 / 4e-10), 0.1);
-  // The same strike alone is the loudest of its scene, and played: files are made as loud as they can be.
+  // Alone it is the loudest strike of its scene, and audible: files are normalised.
   faint.body = 0;
-  EXPECT_TRUE(find_effects(play(stage.facts, {faint}), 0.6).has(Effect::kModal));
+  EXPECT_TRUE(play(stage.facts, {faint}).has(Effect::kModal));
 }
 
 TEST(EffectSelector, BodiesWithoutAudibleModesDoNotRing) {
@@ -125,30 +78,28 @@ TEST(EffectSelector, BodiesWithoutAudibleModesDoNotRing) {
   stage.bank = make_cube_bank({{12.0, 1.0}, {26000.0, 5.0}});
   EffectSelector selector(stage.facts);
   selector.watch(make_strike(0.5, 0.01));
-  const auto changes = selector.advance(10.0);
-  EXPECT_EQ(find_effects(changes, 0.5), EffectSet{});
+  selector.advance(10.0);
+  EXPECT_EQ(selector.choose(0), EffectSet{});
   EXPECT_EQ(selector.get_plan(0)[Effect::kModal].reason.rule, SelectionReason::Rule::kNoModes);
 }
 
-TEST(EffectSelector, PulsesLastWhereTheirLengthIsHeard) {
+TEST(EffectSelector, PulseLengthNeedsAnAudibleDifference) {
   Stage stage;
-  // (1 - P)^2 of the sound is what an ideal impulse adds: the threshold by bisection on the quadrature.
+  // An ideal impulse adds (1 - P)^2 of the sound: threshold by bisection on the quadrature.
   double low = 1e-6, high = 1e-3;
   for (int i = 0; i < 60; ++i) {
     const double middle = 0.5 * (low + high), pulse = calc_spectrum(1000.0 * middle);
     (std::pow((1.0 - pulse) / pulse, 2.0) < kAudibleShare ? low : high) = middle;
   }
   EXPECT_NEAR(low, 6.5e-5, 0.5e-5) << "65 us for 1 kHz";
-  const auto has = [&](double duration) {
-    return find_effects(play(stage.facts, {make_strike(0.5, 0.01, duration)}), 0.5).has(Effect::kHertzPulse);
-  };
+  const auto has = [&](double duration) { return play(stage.facts, {make_strike(0.5, 0.01, duration)}).has(Effect::kHertzPulse); };
   EXPECT_FALSE(has(0.98 * low));
   EXPECT_TRUE(has(1.02 * low));
   EXPECT_FALSE(has(0.0));
 }
 
 TEST(EffectSelector, ADieClicksAndABoxDoesNot) {
-  // A solid die of 2 cm has no mode that is heard; a hollow box of 50 cm does, from 100 Hz on (docs/examples/blocks).
+  // A solid die of 2 cm has no audible mode; a hollow box of 50 cm has modes from 100 Hz on (docs/examples/blocks).
   Stage stage;
   stage.facts.moves = true;
   stage.body().fixed = false;
@@ -159,9 +110,9 @@ TEST(EffectSelector, ADieClicksAndABoxDoesNot) {
   stage.body().bank = &die;
   EffectSelector of_die(stage.facts);
   of_die.watch(make_strike(0.5, 0.01 * 1.5, 6e-5));  // 10 g stopped and thrown back from 1 m/s
-  EXPECT_TRUE(find_effects(of_die.advance(10.0), 0.5).has(Effect::kAccelerationNoise));
-  EXPECT_TRUE(of_die.get_plan(0)[Effect::kAirDelay].ever);
-  EXPECT_FALSE(of_die.get_plan(0)[Effect::kModal].ever);
+  of_die.advance(10.0);
+  EXPECT_TRUE(of_die.choose(0).has(Effect::kAccelerationNoise) && of_die.choose(0).has(Effect::kAirDelay));
+  EXPECT_FALSE(of_die.choose(0).has(Effect::kModal));
 
   bank::Bank box = make_cube_bank({{100.0, 27.0, 12.0}, {160.0, 30.0, 24.0}, {320.0, 40.0, 60.0}, {700.0, 120.0, 120.0}}, 150.0);
   for (auto& vertex : box.vertices_m)
@@ -171,17 +122,16 @@ TEST(EffectSelector, ADieClicksAndABoxDoesNot) {
   const auto knock = [&] {
     EffectSelector selector(stage.facts);
     selector.watch(make_strike(0.5, 19.0 * 1.5, 2e-3));
-    const auto changes = selector.advance(10.0);
-    EXPECT_TRUE(find_effects(changes, 0.5).has(Effect::kModal));
-    return std::make_pair(find_effects(changes, 0.5).has(Effect::kAccelerationNoise),
-                          selector.get_plan(0)[Effect::kAccelerationNoise].reason);
+    selector.advance(10.0);
+    EXPECT_TRUE(selector.choose(0).has(Effect::kModal));
+    return std::pair(selector.choose(0).has(Effect::kAccelerationNoise), selector.get_plan(0)[Effect::kAccelerationNoise].reason);
   };
-  // Its thump is 10 to 40 dB below what rings: inaudible next to it. As much of a click of a smaller body is audible.
+  // Its thump is 10 to 40 dB below its ring: inaudible. A click of a smaller body would be audible at this level.
   EXPECT_FALSE(knock().first);
   EXPECT_EQ(knock().second.rule, SelectionReason::Rule::kThump);
   EXPECT_LT(knock().second.value, -10.0);
   EXPECT_GT(knock().second.value, -40.0);
-  // Without a sound of its own the thump is all that is heard of it.
+  // Without a ring the thump is audible.
   for (double& gain : box.radiation_gain) gain *= 1e-3;
   EXPECT_TRUE(knock().first);
   for (double& gain : box.radiation_gain) gain *= 1e3;
@@ -210,8 +160,8 @@ void give_multipoles(bank::Bank& bank, const std::vector<double>& multipoles) {
   bank.multipoles.error_db = {-60.0};
 }
 
-// The level of a dipole has 20 log |cos|, evenly over the cosine, cut at -20 dB of its mean power: its standard deviation by quadrature.
-TEST(EffectSelector, DirectivityIsForBodiesThatSendMoreOneWayThanAnother) {
+// The level of a dipole is 20 log |cos|, uniform over the cosine, cut at -20 dB of its mean power: its standard deviation by quadrature.
+TEST(EffectSelector, DirectivityNeedsALevelThatVariesOverDirections) {
   double sum = 0.0, squares = 0.0;
   constexpr int kSteps = 100000;
   for (int i = 0; i < kSteps; ++i) {
@@ -224,10 +174,9 @@ TEST(EffectSelector, DirectivityIsForBodiesThatSendMoreOneWayThanAnother) {
   const auto play_blow = [&](double impulse_n_s) {
     EffectSelector selector(stage.facts);
     selector.watch(make_strike(0.5, impulse_n_s));
-    const bool is_on = find_effects(selector.advance(10.0), 0.5).has(Effect::kDirectivity);
+    selector.advance(10.0);
     const EffectPlan plan = selector.get_plan(0)[Effect::kDirectivity];
-    EXPECT_EQ(plan.cost_us > 0.0, is_on);
-    return std::pair(is_on, plan.reason);
+    return std::pair(plan.on, plan.reason);
   };
   EXPECT_EQ(describe(play_blow(0.01).second), "the bank has no multipoles");
   give_multipoles(stage.bank, {1.0, 0.02, 0.02, 0.0});
@@ -239,7 +188,7 @@ TEST(EffectSelector, DirectivityIsForBodiesThatSendMoreOneWayThanAnother) {
   EXPECT_TRUE(dipole_on);
   EXPECT_EQ(dipole.rule, SelectionReason::Rule::kDirected);
   EXPECT_NEAR(dipole.value, spread_db, 0.25);
-  // Next to one that is 65 dB louder no direction of it is heard.
+  // Next to a body that is 65 dB louder its directivity is inaudible.
   bank::Bank other = make_cube_bank({{1000.0, 20.0, 0.05}});
   SceneFacts two = stage.facts;
   two.bodies.push_back(two.bodies[0]);
@@ -251,9 +200,9 @@ TEST(EffectSelector, DirectivityIsForBodiesThatSendMoreOneWayThanAnother) {
     loud.body = 1;
     selector.watch(loud);
     selector.watch(make_strike(0.5, loud_n_s * std::pow(10.0, -below_db / 20.0)));
-    const auto changes = selector.advance(10.0);
-    EXPECT_TRUE(find_effects(changes, 0.5).has(Effect::kModal));
-    EXPECT_EQ(find_effects(changes, 0.5).has(Effect::kDirectivity), below_db < 60.0);
+    selector.advance(10.0);
+    EXPECT_TRUE(selector.choose(0).has(Effect::kModal));
+    EXPECT_EQ(selector.choose(0).has(Effect::kDirectivity), below_db < 60.0);
     EXPECT_EQ(selector.get_plan(0)[Effect::kDirectivity].reason.rule,
               below_db < 60.0 ? SelectionReason::Rule::kDirected : SelectionReason::Rule::kFaint);
   }
@@ -261,15 +210,15 @@ TEST(EffectSelector, DirectivityIsForBodiesThatSendMoreOneWayThanAnother) {
   EXPECT_FALSE(play_blow(0.01).first);
 }
 
-/// The effects behind a blow at 0.5 s, and the plan of one of them.
+/// Effects by a strike at 0.5 s, and the plan of one of them.
 auto select_for_strike(const Stage& stage, double impulse_n_s, Effect effect) {
   EffectSelector selector(stage.facts);
   selector.watch(make_strike(0.5, impulse_n_s));
-  const auto changes = selector.advance(10.0);
-  return std::pair(find_effects(changes, 0.5), selector.get_plan(0)[effect]);
+  selector.advance(10.0);
+  return std::pair(selector.choose(0), selector.get_plan(0)[effect]);
 }
 
-TEST(EffectSelector, NonlinearMotionIsThatOfABlowThatRaisesAMode) {
+TEST(EffectSelector, NonlinearMotionNeedsAnAudibleRiseOfAMode) {
   Stage stage;
   const auto play_strike = [&](double impulse_n_s) { return select_for_strike(stage, impulse_n_s, Effect::kNonlinear); };
   const auto [linear, none] = play_strike(1.0);
@@ -282,23 +231,18 @@ TEST(EffectSelector, NonlinearMotionIsThatOfABlowThatRaisesAMode) {
   const auto [hard, high] = play_strike(1.0);
   EXPECT_TRUE(hard.has(Effect::kNonlinear) && hard.has(Effect::kModal));
   EXPECT_EQ(high.reason.rule, SelectionReason::Rule::kHardens);
-  EXPECT_GT(high.cost_us, 0.0);
-  // Cents go with the square of the blow: where it is just too soft it is off, and it costs nothing.
+  // The rise is proportional to the square of the impulse.
   const double just = std::sqrt(kHardeningCents / high.reason.value);
   EXPECT_TRUE(play_strike(1.01 * just).first.has(Effect::kNonlinear));
   const auto [soft, low] = play_strike(0.99 * just);
   EXPECT_FALSE(soft.has(Effect::kNonlinear));
   EXPECT_NEAR(low.reason.value, 0.99 * 0.99 * kHardeningCents, 1e-6);
-  EXPECT_EQ(low.cost_us, 0.0);
   EXPECT_EQ(describe(low.reason), "a strike raises a mode by 2.94 cents, less than 3");
-  // Twice as hard: longer, by the time in which the amplitude falls to a half.
-  const double decay_per_s = bank.decay_per_s[0];
-  EXPECT_NEAR(play_strike(16.0 * just).second.on_s - play_strike(8.0 * just).second.on_s, std::log(2.0) / decay_per_s, 2.0 * kTickS);
   stage.body().overrides.off = {Effect::kNonlinear};
   EXPECT_FALSE(play_strike(1.0).first.has(Effect::kNonlinear));
 }
 
-TEST(EffectSelector, ACascadeIsThatOfAHardBlowOnABankWithModesAbove) {
+TEST(EffectSelector, ACascadeNeedsAHardStrikeAndModesAbove) {
   Stage stage;
   const auto play_strike = [&](double impulse_n_s) { return select_for_strike(stage, impulse_n_s, Effect::kCascade); };
   EXPECT_EQ(describe(play_strike(1.0).second.reason), "the bank has no nonlinear energy");
@@ -312,11 +256,9 @@ TEST(EffectSelector, ACascadeIsThatOfAHardBlowOnABankWithModesAbove) {
   const double just = std::sqrt(kCascadeCents / play_strike(1.0).second.reason.value);
   const auto [hard, high] = play_strike(1.01 * just);
   EXPECT_TRUE(hard.has(Effect::kCascade) && hard.has(Effect::kNonlinear));
-  EXPECT_GT(high.cost_us, 0.0);
   const auto [soft, low] = play_strike(0.99 * just);
   EXPECT_FALSE(soft.has(Effect::kCascade));
   EXPECT_TRUE(soft.has(Effect::kNonlinear));
-  EXPECT_EQ(low.cost_us, 0.0);
   stage.body().overrides.off = {Effect::kNonlinear};
   EXPECT_FALSE(play_strike(1.01 * just).first.has(Effect::kCascade));
 }

@@ -12,7 +12,7 @@ namespace carillon::nonlinear::bodies {
 
 inline double decay_as_steel(double omega) { return 6.0 * (1.0 + 2e-8 * omega * omega); }
 
-/// Of mode (1, 1) in windows of 0.1 s.
+/// Frequencies of mode (1, 1) in windows of 0.1 s.
 struct Glide {
   std::vector<double> window_hz;
   std::int64_t guarded = 0;

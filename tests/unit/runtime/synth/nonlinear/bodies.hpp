@@ -1,4 +1,4 @@
-// Bodies whose nonlinear energy is known in closed form, and what is measured of their motion.
+// Bodies with a nonlinear energy in closed form, and measures of their motion.
 #pragma once
 
 #include <algorithm>

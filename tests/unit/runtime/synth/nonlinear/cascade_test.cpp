@@ -1,4 +1,4 @@
-// The modes above the coupled ones: the book of energy, hostile blows, soft blows, the same bits for the same steps.
+// Cascade: energy balance, extreme strikes, soft strikes, determinism.
 #include "runtime/synth/nonlinear/cascade.hpp"
 
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ constexpr CascadeBody kSheet{.mass_kg = 0.4 * 0.3 * 1e-3 * 7850.0, .thickness_m 
 double keep_all(double) { return 0.0; }
 double lose(double omega) { return 1.0 + 1e-9 * omega * omega; }
 
-/// A plate of which the lowest modes are coupled.
+/// Plate with its lowest modes coupled.
 struct Sheet {
   explicit Sheet(double (*decay)(double), CoupledOptions options = {})
       : body(bodies::Plate{}.make(kLow, decay)),
@@ -61,7 +61,7 @@ struct Sheet {
   std::vector<double> push, none;
 };
 
-TEST(Cascade, WhatTheCoupledModesLoseTheModesAboveGain) {
+TEST(Cascade, ModesAboveGainTheLossOfTheCoupledModes) {
   Sheet sheet(keep_all, {.integrator = Integrator::kAuxiliary, .relaxation_s = 0.0});
   const double given = sheet.strike(1.0, 0.1);
   const double before = sheet.coupled.get_work_j() + given;
@@ -83,7 +83,7 @@ TEST(Cascade, ModesAtRestAreFilledFromBelow) {
   for (int i = 0; i < sheet.cascade.get_count(); ++i) EXPECT_NE(sheet.cascade.get_velocity(i), 0.0) << i;
 }
 
-TEST(Cascade, HostileBlowsGiveNoMoreThanTheyPutIn) {
+TEST(Cascade, ExtremeStrikesGiveNoMoreThanTheirWork) {
   for (const double impulse : {1.0, 1e2, 1e4})
     for (auto* decay : {keep_all, lose}) {
       Sheet sheet(decay);
@@ -180,7 +180,7 @@ TEST(Cascade, AnotherLimitMakesNoStep) {
   EXPECT_LE(at_change, largest);
 }
 
-TEST(Cascade, RefusesWhatItCannotPlay) {
+TEST(Cascade, RefusesUnplayableModes) {
   const bodies::Body body = bodies::Plate{}.make(4, lose);
   const std::vector<ModeConstants> above{{bodies::to_eigenvalue(4000.0), 1.0}}, fast{{bodies::to_eigenvalue(25000.0), 1.0}};
   EXPECT_THROW(Cascade(body.modes, {}, kSheet, kRate), InputError);

@@ -1,4 +1,4 @@
-// One mode alone is the oscillator of Duffing, whose frequency is known exactly.
+// One mode: Duffing's oscillator, whose frequency is known exactly.
 #include <gtest/gtest.h>
 
 #include "tests/unit/runtime/synth/nonlinear/bodies.hpp"

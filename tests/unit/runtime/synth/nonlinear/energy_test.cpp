@@ -1,4 +1,4 @@
-// What is kept, whatever the blows: the energy, the bound on it, silence.
+// Invariants under any strikes: energy, its bound, silence.
 #include <gtest/gtest.h>
 
 #include <limits>
@@ -18,7 +18,7 @@ constexpr double kRateHz = 48000.0;
 
 double have_no_decay(double) { return 0.0; }
 
-/// The energy of the states themselves, by the sums in double precision; between the samples psi stands for V.
+/// Energy of the states by sums in double precision; between samples psi stands for V.
 double calc_linear_j(const CoupledModes& modes, const Body& body) {
   double energy = 0.0;
   for (std::size_t i = 0; i < body.modes.size(); ++i) {
@@ -101,7 +101,7 @@ Body make_random(std::mt19937& chance, bool is_curved) {
   return body;
 }
 
-TEST(Energy, IsNeverMoreThanForcesPutInWhateverTheBodyAndTheBlow) {
+TEST(Energy, IsNeverMoreThanTheWorkOfForces) {
   std::mt19937 chance(11);
   std::int64_t guarded = 0, accepted = 0;
   for (int trial = 0; trial < 1000; ++trial) {
@@ -109,7 +109,7 @@ TEST(Energy, IsNeverMoreThanForcesPutInWhateverTheBodyAndTheBlow) {
     const Body body = make_random(chance, is_curved);
     const std::size_t n = body.modes.size();
     CoupledModes modes(body.energy, body.modes, kRateHz);
-    // Where the nonlinear force of the first mode is as large as the linear one; every other blow is ten thousand times that.
+    // Strength at which the nonlinear force of the first mode equals the linear one; every other strike is 10^4 times that.
     const double self = std::max(1e-3, bank::calc_self_coupling(body.energy)[0]);
     const double sane = body.modes[0].eigenvalue_rad2_s2 / std::sqrt(2.0 * self);
     std::vector<double> re(n), im(n, 0.0);
@@ -233,7 +233,7 @@ TEST(Limit, LetsModesContinueWithoutAJump) {
   EXPECT_EQ(modes.get_limit(), 30);
 }
 
-TEST(CoupledModes, RefuseWhatDoesNotSwing) {
+TEST(CoupledModes, RefuseModesThatDoNotOscillate) {
   Body body = bodies::make_duffing(100.0, 1.0);
   EXPECT_THROW(CoupledModes(body.energy, body.modes, 150.0), InputError);
   EXPECT_THROW(CoupledModes(body.energy, body.modes, 0.0), InputError);

@@ -1,4 +1,4 @@
-// The energy as it is played against the sums in double precision, in every form.
+// Evaluator against sums in double precision, in every form.
 #include "runtime/synth/nonlinear/evaluator.hpp"
 
 #include <gtest/gtest.h>
@@ -26,7 +26,7 @@ bank::QuarticEnergy make_rows(std::size_t n, std::size_t rows, bool is_diagonal,
   return energy;
 }
 
-/// Four entries for each pair, in rows drawn at random, and two rows that are diagonal.
+/// Four entries per pair in random rows, and two diagonal rows.
 bank::QuarticEnergy make_entries(std::size_t n, std::size_t rows, bool is_curved) {
   Chance chance;
   bank::QuarticEnergy energy = make_rows(n, rows, true, is_curved, 1e6);

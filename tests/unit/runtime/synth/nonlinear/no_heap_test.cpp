@@ -1,4 +1,4 @@
-// Coupled modes in motion take no memory. A program of its own, as tests/support/heap_counter.hpp asks.
+// Coupled modes do not allocate in motion. A separate program, see tests/support/heap_counter.hpp.
 #include <gtest/gtest.h>
 
 #include "runtime/synth/nonlinear/cascade.hpp"

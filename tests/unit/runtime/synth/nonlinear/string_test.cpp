@@ -1,4 +1,4 @@
-// Strings by Kirchhoff and Carrier: one row of mean stress, both planes in it.
+// Kirchhoff-Carrier strings: one row of mean stress, both planes.
 #include <gtest/gtest.h>
 
 #include "tests/unit/runtime/synth/nonlinear/bodies.hpp"

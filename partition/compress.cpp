@@ -1,11 +1,10 @@
-// Method:     Who dominates a vertex is among the neighbours of each of its neighbours, so of two with few that are not neighbours
-//             themselves; each candidate is compared row by row. In a mesh it is a node of all elements of the vertex. A vertex that is
-//             dominated at all is dominated by one of the core, as domination is transitive; the vertices of the core that dominate it are
-//             neighbours of each other, so no separator has them on two sides.
-// Source:     George and Liu 1989, "The evolution of the minimum degree ordering algorithm" (who may wait when neighbourhoods contain each
-//             other); Barmak and Minian 2012 (dominated vertices); Liu 1990, "The role of elimination trees in sparse factorization".
-// Deviations: none.
-#include "partition/condense.hpp"
+// Method: A dominator of v is a neighbour of every neighbour of v. Candidates are the common neighbours of two neighbours of v with few
+// neighbours that are not adjacent; each candidate is compared row by row. In a mesh, a dominator is a node of all elements of v. Each
+// dominated vertex is dominated by a core vertex, as domination is transitive; the core vertices that dominate it are adjacent, so no
+// separator has them on both sides.
+// Source: George and Liu 1989, "The evolution of the minimum degree ordering algorithm" (postponed elimination by outmatching); Barmak and
+// Minian 2012 (dominated vertices); Liu 1990, "The role of elimination trees in sparse factorization".
+#include "partition/compress.hpp"
 
 #include <algorithm>
 #include <numeric>
@@ -17,7 +16,7 @@ namespace {
 
 using Ints = std::vector<std::int32_t>;
 
-/// All that dominate each vertex, in compressed rows.
+/// All dominators of each vertex, in compressed rows.
 class Dominators {
  public:
   explicit Dominators(const Graph& graph) : graph_(graph), mark_(static_cast<std::size_t>(graph.vertex_count()), 0) {
@@ -38,7 +37,7 @@ class Dominators {
     const std::int32_t first = find_least(near, 1);
     mark(first) = 2;
     for (const std::int32_t u : graph_.list_neighbours(first)) mark(u) *= 2;
-    // Who dominates v is a neighbour of the first, and of a second which is not: few are that.
+    // A dominator of v is adjacent to the first neighbour, and to a second one that is not adjacent to the first: few vertices are.
     const std::int32_t second = find_least(near, 1);
     if (second < 0) {
       for (const std::int32_t u : near)
@@ -51,7 +50,7 @@ class Dominators {
   }
 
   char& mark(std::int32_t vertex) { return mark_[vertex]; }
-  /// Of the vertices with this mark the one with the fewest neighbours; -1: none.
+  /// Vertex with this mark and the fewest neighbours; -1: none.
   std::int32_t find_least(std::span<const std::int32_t> vertices, char wanted) {
     std::int32_t least = -1;
     std::size_t fewest = 0;
@@ -65,7 +64,7 @@ class Dominators {
     return least;
   }
 
-  /// The neighbours of v are marked, and no other vertex is.
+  /// Requires exactly the neighbours of v to be marked.
   bool may_dominate(std::int32_t u, std::int32_t v) const {
     const auto near = graph_.list_neighbours(u);
     const std::size_t count = graph_.list_neighbours(v).size();
@@ -76,7 +75,7 @@ class Dominators {
   }
 
   const Graph& graph_;
-  std::vector<char> mark_;  // (vertices) 1: a neighbour of v; 2: the first, or a neighbour of it too
+  std::vector<char> mark_;  // (vertices) 1: a neighbour of v; 2: the first neighbour, or also adjacent to it
 };
 
 /// All nodes that are in every element of a node, in compressed rows; of two nodes in the same elements only the lower-numbered dominates
@@ -114,12 +113,13 @@ class ElementDominators {
   std::span<const std::int32_t> elements_;
   std::size_t width_;
   const ElementLists& lists_;
-  Ints shared_;  // (nodes) how many elements of v have the node, of which it is in all up to the last of them
+  Ints shared_;  // (nodes) number of elements of v that contain the node, counted while it is in all of them so far
 };
 
 }  // namespace
 
-Condensation::Condensation(const Graph& graph, std::int32_t smallest_core) : number_(static_cast<std::size_t>(graph.vertex_count()), -1) {
+CompressedGraph::CompressedGraph(const Graph& graph, std::int32_t smallest_core)
+    : number_(static_cast<std::size_t>(graph.vertex_count()), -1) {
   for (std::int32_t v = 0; v < graph.vertex_count(); ++v) degree_.push_back(static_cast<std::int32_t>(graph.list_neighbours(v).size()));
   const Dominators all(graph);
   const Ints kept = choose_core(all.offsets, all.list, smallest_core);
@@ -127,7 +127,7 @@ Condensation::Condensation(const Graph& graph, std::int32_t smallest_core) : num
   core_ = kept.empty() ? graph : take_part(graph, kept, scratch);
 }
 
-Condensation::Condensation(std::span<const std::int32_t> elements, int width, std::int32_t nodes, std::int32_t smallest_core)
+CompressedGraph::CompressedGraph(std::span<const std::int32_t> elements, int width, std::int32_t nodes, std::int32_t smallest_core)
     : number_(static_cast<std::size_t>(nodes), -1) {
   const ElementLists lists = list_elements(elements, width, nodes);
   for (std::int32_t v = 0; v < nodes; ++v) degree_.push_back(static_cast<std::int32_t>(lists.of(v).size()));
@@ -143,7 +143,7 @@ Condensation::Condensation(std::span<const std::int32_t> elements, int width, st
   core_ = make_node_graph(of_core, width, static_cast<std::int32_t>(kept.size()));
 }
 
-Ints Condensation::choose_core(const Ints& offsets, const Ints& dominators, std::int32_t smallest_core) {
+Ints CompressedGraph::choose_core(const Ints& offsets, const Ints& dominators, std::int32_t smallest_core) {
   Ints kept;
   for (std::size_t v = 0; v < number_.size(); ++v) {
     if (offsets[v] < offsets[v + 1]) continue;
@@ -165,12 +165,12 @@ Ints Condensation::choose_core(const Ints& offsets, const Ints& dominators, std:
   return kept;
 }
 
-double Condensation::dominated_per_edge() const {
+double CompressedGraph::dominated_per_edge() const {
   const auto dominated = static_cast<double>(number_.size()) - core_.vertex_count();
   return core_.neighbours.empty() ? 0 : dominated / (0.5 * static_cast<double>(core_.neighbours.size()));
 }
 
-Ints Condensation::expand_sides(const Ints& side) const {
+Ints CompressedGraph::expand_sides(const Ints& side) const {
   Ints result(number_.size(), 2);
   for (std::size_t v = 0; v < number_.size(); ++v) {
     if (number_[v] >= 0) result[v] = side[number_[v]];
@@ -179,15 +179,15 @@ Ints Condensation::expand_sides(const Ints& side) const {
   return result;
 }
 
-/// The place of the first vertex of the core that dominates this one.
-std::int32_t Condensation::find_first_host(std::int32_t vertex, const Ints& position) const {
+/// Position of the first core vertex that dominates this vertex.
+std::int32_t CompressedGraph::find_first_host(std::int32_t vertex, const Ints& position) const {
   auto first = static_cast<std::int32_t>(position.size());
   for (std::int32_t k = offsets_[vertex]; k < offsets_[vertex + 1]; ++k) first = std::min(first, position[hosts_[k]]);
   return first;
 }
 
-Ints Condensation::expand_order(const Ints& position) const {
-  // By the place of the first host, those that it dominates before it.
+Ints CompressedGraph::expand_order(const Ints& position) const {
+  // Grouped by the position of the first dominator, dominated vertices before it.
   std::vector<Ints> dominated(position.size());
   Ints last(position.size());
   for (std::size_t v = 0; v < number_.size(); ++v) {
@@ -213,16 +213,16 @@ int find_tries(const Graph& core, double dominated_per_edge) {
   return dominated >= 3.0 * core.vertex_count() ? 4 : 1;
 }
 
-double estimate_operations(const Graph& core, double dominated_per_edge, const Ints& position) {
+double predict_operations(const Graph& core, double dominated_per_edge, const Ints& position) {
   const std::size_t count = position.size();
   Ints at(count);
-  std::vector<double> width(count, 1.0);  // (places) what is eliminated there
+  std::vector<double> width(count, 1.0);  // (positions) vertices eliminated there
   for (std::size_t v = 0; v < count; ++v) {
     at[position[v]] = static_cast<std::int32_t>(v);
     for (const std::int32_t u : core.list_neighbours(static_cast<std::int32_t>(v)))
       if (position[u] > position[v]) width[position[v]] += dominated_per_edge;
   }
-  // Row by row of the factor: the places on the ways up the elimination tree from the neighbours before (Liu 1990).
+  // Row by row of the factor: the paths up the elimination tree from the earlier neighbours (Liu 1990).
   std::vector<double> below(count, 0.0);
   Ints parent(count, -1);
   Ints seen_from(count, -1);

@@ -8,10 +8,10 @@
 #include "runtime/physics/world.hpp"
 #include "runtime/render/render.hpp"
 #include "tests/unit/runtime/physics/bodies.hpp"
-#include "tests/unit/runtime/scene/heard.hpp"
+#include "tests/unit/runtime/render/heard.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 
-namespace carillon::scene {
+namespace carillon::render {
 namespace {
 
 constexpr double kReferencePa = 20e-6;
@@ -28,14 +28,14 @@ events::LastingContact make_contact(double time_s, std::uint64_t id, double slip
 struct Stage {
   // Between 1 and 4 kHz, where A-weighting is within 1.3 dB of 0; decays of metal.
   bank::Bank bank = testing::make_cube_bank({{1010.0, 3.0, 1.8}, {1730.0, 4.5, 1.2}, {2620.0, 7.0, -1.2}, {3900.0, 14.0, 0.6}});
-  Scene scene;
+  scene::Scene scene;
 
   explicit Stage(std::vector<std::string> names = {"bar"}) {
     scene.file = "contacts.json";
     scene.duration_s = 6.0;
     scene.ground.emplace();
     for (const std::string& name : names) {
-      SceneBody body;
+      scene::SceneBody body;
       body.name = name;
       body.spec.name = name;
       body.spec.bank = &bank;
@@ -45,7 +45,7 @@ struct Stage {
   }
   std::vector<const bank::Bank*> list_banks() const { return std::vector<const bank::Bank*>(scene.bodies.size(), &bank); }
   Heard play_all(const std::vector<events::Event>& events) const {
-    Scene all = scene;
+    scene::Scene all = scene;
     all.effects = synth::EffectSet::all();
     return calc_sound(all, list_banks(), events, {});
   }
@@ -122,7 +122,7 @@ TEST(PlannedContacts, AreOmittedOnceInaudible) {
   for (const Contacts& of : kCases) {
     const Stage stage;
     const std::vector<events::Event> events = of.list_events();
-    const Plan plan = make_plan(make_facts(stage.scene, make_microphones(stage.scene), true), make_events(events), {});
+    const scene::Plan plan = scene::make_plan(scene::make_facts(stage.scene, scene::make_microphones(stage.scene), true), scene::make_events(events), {});
     const Heard all = stage.play_all(events), planned = calc_sound(stage.scene, stage.list_banks(), events, {.plan = &plan});
     const Difference difference = compare(planned, all);
     EXPECT_GT(difference.whole_pa2_s, 0.2 * std::pow(10.0, 4.0) * kReferencePa * kReferencePa) << of.name << ": 40 dB are not to be heard";
@@ -148,7 +148,7 @@ TEST(Superposition, HoldsForBodiesThatNeverMeet) {
   Stage both({"bar", "plate"}), turned({"plate", "bar"}), bar({"bar"}), plate({"plate"});
   for (Stage* stage : {&both, &turned, &bar, &plate}) {
     stage->scene.duration_s = 0.6;
-    for (SceneBody& body : stage->scene.bodies) body.spec.initial.position_m = {body.name == "bar" ? 0.0 : 0.8, 0.0, 0.0};
+    for (scene::SceneBody& body : stage->scene.bodies) body.spec.initial.position_m = {body.name == "bar" ? 0.0 : 0.8, 0.0, 0.0};
   }
   const auto join = [](std::vector<events::Event> a, const std::vector<events::Event>& b) {
     a.insert(a.end(), b.begin(), b.end());
@@ -171,7 +171,7 @@ TEST(Superposition, HoldsForBodiesThatNeverMeet) {
 TEST(RestingContacts, AreSilentBeforeTheHit) {
   const bank::Bank box = physics::tests::add_modes(physics::tests::make_box({0.06, 0.05, 0.04}), 24),
                    ball = physics::tests::make_ball(0.03, 3);
-  Scene scene;
+  scene::Scene scene;
   scene.file = "stack.json";
   scene.duration_s = 0.7;
   scene.ground.emplace();
@@ -180,7 +180,7 @@ TEST(RestingContacts, AreSilentBeforeTheHit) {
   physics::WorldSpec world_spec;
   world_spec.ground = physics::GroundSpec{};
   const auto add = [&](const std::string& name, const bank::Bank& bank, const Vec3& position) -> physics::BodySpec& {
-    SceneBody body;
+    scene::SceneBody body;
     body.name = name;
     body.spec = physics::tests::make_body(name, bank, position);
     scene.bodies.push_back(body);
@@ -223,4 +223,4 @@ TEST(RestingContacts, AreSilentBeforeTheHit) {
 }
 
 }  // namespace
-}  // namespace carillon::scene
+}  // namespace carillon::render

@@ -1,5 +1,5 @@
-// A voice against closed forms, quadrature and the slow body in double precision, and what it promises its host.
-#include "runtime/synth/voice.hpp"
+// ResonatorBank against closed forms, quadrature and the reference body in double precision; its guarantees to the host.
+#include "runtime/synth/resonator_bank.hpp"
 
 #include <gtest/gtest.h>
 #if defined(__x86_64__)
@@ -33,7 +33,7 @@ const Vec3 kUnitImpulse{0.0, 0.0, 1.0};
 
 std::shared_ptr<const Model> make_model(const bank::Bank& bank, double rate_hz = kRate) { return Model::make(bank, {.rate_hz = rate_hz}); }
 
-std::vector<float> play(Voice& voice, std::size_t samples, std::size_t block = 256) {
+std::vector<float> play(ResonatorBank& voice, std::size_t samples, std::size_t block = 256) {
   std::vector<float> pressure(samples, 0.0F);
   for (std::size_t n = 0; n < samples; n += block) voice.process(std::span(pressure).subspan(n, std::min(block, samples - n)));
   return pressure;
@@ -43,12 +43,12 @@ double calc_level(const std::vector<float>& sound) {
   return std::sqrt(std::inner_product(sound.begin(), sound.end(), sound.begin(), 0.0) / static_cast<double>(sound.size()));
 }
 
-TEST(Voice, AnImpulseRingsLikeTheClosedFormInAllRegimes) {
+TEST(ResonatorBank, AnImpulseRingsLikeTheClosedFormInAllRegimes) {
   for (const auto& row : testing::read_impulse_reference()) {
     bank::Bank bank = make_cube_bank({{1000.0, 0.0}});
     bank.eigenvalue_rad2_s2[0] = row.lambda;
     bank.decay_per_s[0] = row.decay_per_s();
-    Voice voice(make_model(bank));
+    ResonatorBank voice(make_model(bank));
     ASSERT_EQ(voice.get_model().get_mode_count(), 1) << row;
     const auto n = static_cast<std::size_t>(std::ceil(row.time_s * kRate)) + 5;
     ASSERT_TRUE(voice.strike({.time_s = static_cast<double>(n) / kRate - row.time_s, .impulse_n_s = kUnitImpulse}));
@@ -56,10 +56,10 @@ TEST(Voice, AnImpulseRingsLikeTheClosedFormInAllRegimes) {
   }
 }
 
-TEST(Voice, AnImpulseBetweenSamplesHasItsAnalyticPhase) {
+TEST(ResonatorBank, AnImpulseBetweenSamplesHasItsAnalyticPhase) {
   const bank::Bank bank = make_cube_bank({{440.0, 3.0}, {9876.5, 40.0}, {23900.0, 0.0}});
   for (const double at : {0.0, 100.37, 100.0, 100.999, 127.5, 128.0001}) {
-    Voice voice(make_model(bank));
+    ResonatorBank voice(make_model(bank));
     voice.strike({.time_s = at / kRate, .impulse_n_s = kUnitImpulse});
     const std::vector<float> pressure = play(voice, 400);
     for (int n = 0; n < 400; ++n) {
@@ -73,12 +73,12 @@ TEST(Voice, AnImpulseBetweenSamplesHasItsAnalyticPhase) {
   }
 }
 
-TEST(Voice, BothPulsesMatchQuadratureBeforeDuringAndAfter) {
+TEST(ResonatorBank, BothPulsesMatchQuadratureBeforeDuringAndAfter) {
   for (const PulseShape shape : {PulseShape::kHertz, PulseShape::kGaussian}) {
     for (const auto& [freq, decay] : {std::pair{440.0, 3.0}, {5000.0, 30.0}, {19900.0, 100.0}, {3000.0, 18000.0}}) {
       const bank::Bank bank = make_cube_bank({{freq, decay}});
       for (const double tau : {4e-6, 30e-6, 100e-6, 1.1e-3}) {
-        Voice voice(make_model(bank));
+        ResonatorBank voice(make_model(bank));
         const double at = 80.37, length = calc_pulse_length(shape, tau);
         voice.strike({.time_s = at / kRate, .shape = shape, .impulse_n_s = kUnitImpulse, .duration_s = tau});
         const std::vector<float> pressure = play(voice, 200, 17);
@@ -103,12 +103,12 @@ TEST(Voice, BothPulsesMatchQuadratureBeforeDuringAndAfter) {
   }
 }
 
-TEST(Voice, SoundsLikeTheSlowBodyInDoublePrecision) {
+TEST(ResonatorBank, SoundsLikeTheReferenceBody) {
   std::vector<InventedMode> modes = make_many_modes(75);
   modes.push_back({23500.0, 4e5, 0.3, {0.2, 0.1, -0.4}, 0.05});  // over-damped
   const bank::Bank bank = make_cube_bank(modes);
   for (const Isa isa : {Isa::kPlain, Isa::kSse2, Isa::kAvx2, Isa::kAvx512}) {
-    Voice voice(make_model(bank), {.isa = isa});
+    ResonatorBank voice(make_model(bank), {.isa = isa});
     testing::ReferenceBody body(bank, kRate);
     std::mt19937 random(3);
     std::uniform_real_distribution<double> number(0.0, 1.0);
@@ -135,11 +135,11 @@ TEST(Voice, SoundsLikeTheSlowBodyInDoublePrecision) {
   }
 }
 
-TEST(Voice, EnergyIsThatOfTheImpulseAndStaysWithoutDamping) {
+TEST(ResonatorBank, EnergyIsThatOfTheImpulseAndStaysWithoutDamping) {
   std::vector<InventedMode> modes = make_many_modes(21);
   for (auto& mode : modes) mode.decay_per_s = 0.0;
   const bank::Bank bank = make_cube_bank(modes);
-  Voice voice(make_model(bank));
+  ResonatorBank voice(make_model(bank));
   const Vec3 impulse{0.01, 0.02, -0.03};
   voice.strike({.time_s = 3.3 / kRate, .triangle = 4, .barycentric = {0.2, 0.3, 0.5}, .impulse_n_s = impulse});
   play(voice, kBlock);
@@ -158,12 +158,12 @@ TEST(Voice, EnergyIsThatOfTheImpulseAndStaysWithoutDamping) {
   EXPECT_NEAR(voice.calc_energy_j(), before, 1e-9 * before);
 }
 
-TEST(Voice, BlockSizesDoNotChangeABit) {
+TEST(ResonatorBank, BlockSizesDoNotChangeABit) {
   std::vector<InventedMode> modes = make_many_modes(137);
   modes.push_back({23600.0, 3e5});
   const auto model = make_model(make_cube_bank(modes));
   const auto render = [&](auto next_block) {
-    Voice voice(model);
+    ResonatorBank voice(model);
     for (int i = 0; i < 40; ++i) {
       voice.strike({.time_s = (10.0 + 1431.7 * i) / kRate,
                     .triangle = i % 12,
@@ -191,7 +191,7 @@ TEST(Voice, BlockSizesDoNotChangeABit) {
   EXPECT_EQ(std::memcmp(sound.data(), expected.data(), sizeof(float) * sound.size()), 0);
 }
 
-TEST(Voice, ModesAtOrAboveNyquistAreNeverSounded) {
+TEST(ResonatorBank, ModesAtOrAboveNyquistAreNeverSounded) {
   const bank::Bank bank = make_cube_bank({{1000.0, 1.0}, {23999.0, 1.0}, {24000.0, 1.0}, {24001.0, 1.0}, {60000.0, 1.0}});
   EXPECT_EQ(make_model(bank, 48000.0)->get_mode_count(), 2);
   EXPECT_EQ(make_model(bank, 44100.0)->get_mode_count(), 1);
@@ -200,10 +200,10 @@ TEST(Voice, ModesAtOrAboveNyquistAreNeverSounded) {
   EXPECT_EQ(make_model(make_cube_bank({{30000.0, 2 * pi * std::sqrt(8e8)}}))->get_mode_count(), 0);
 }
 
-TEST(Voice, TheDirectionOfTheImpulseIsKept) {
+TEST(ResonatorBank, TheDirectionOfTheImpulseIsKept) {
   const auto model = make_model(make_cube_bank({{1000.0, 1.0, 1.0, {1.0, 0.0, 0.0}}}));
   const auto first = [&](const Vec3& impulse) {
-    Voice voice(model);
+    ResonatorBank voice(model);
     voice.strike({.impulse_n_s = impulse});
     return play(voice, 1)[0];
   };
@@ -213,7 +213,7 @@ TEST(Voice, TheDirectionOfTheImpulseIsKept) {
   EXPECT_EQ(first({-0.6, 0.8, 0.0}), -first({0.6, -0.8, 0.0}));
 }
 
-TEST(Voice, ModesAreInTheOrderOfAudibility) {
+TEST(ResonatorBank, ModesAreInTheOrderOfAudibility) {
   // By hand: level over silence in nepers / decay.
   const bank::Bank bank =
       make_cube_bank({{100.0, 50.0, 1.0}, {200.0, 5.0, 1.0}, {300.0, 1.0, 1e-9}, {400.0, 0.0, 1.0}, {500.0, 5.0, 0.0}, {600.0, 4e4, 1.0}});
@@ -226,17 +226,17 @@ TEST(Voice, ModesAreInTheOrderOfAudibility) {
   EXPECT_NEAR(model->get_eigenvalue_rad2_s2(0), std::pow(2 * pi * 400.0, 2), 1e-3);
 }
 
-TEST(Voice, WhatIsStillHeardIsAlwaysTheFirstModes) {
+TEST(ResonatorBank, TheAudibleModesAreTheFirstOnes) {
   const bank::Bank bank = make_cube_bank(make_many_modes(320));
   const auto model = make_model(bank);
   const double silence = 1e-10;
-  Voice voice(model, {.silence_pa = silence});
+  ResonatorBank voice(model, {.silence_pa = silence});
   voice.strike({.impulse_n_s = {0.0, 0.0, 1e-3}});
   int before = model->get_mode_count();
   for (int turn = 1; turn <= 400; ++turn) {
     play(voice, 1024, 128);
     const double t = turn * 1024 / kRate;
-    const int live = voice.get_live_mode_count();
+    const int live = voice.get_active_mode_count();
     EXPECT_LE(live, before);
     before = live;
     double lost = 0.0;  // of the modes that are gone, by the closed form
@@ -248,15 +248,15 @@ TEST(Voice, WhatIsStillHeardIsAlwaysTheFirstModes) {
   EXPECT_LT(before, 33);
 }
 
-TEST(Voice, FallsAsleepAndWakesAgain) {
-  Voice voice(make_model(make_cube_bank(make_many_modes(40))));
+TEST(ResonatorBank, FallsAsleepAndWakesAgain) {
+  ResonatorBank voice(make_model(make_cube_bank(make_many_modes(40))));
   EXPECT_FALSE(voice.is_awake());
   voice.strike({.time_s = 100.0 / kRate, .impulse_n_s = kUnitImpulse});
   play(voice, 1024);
-  EXPECT_EQ(voice.get_live_mode_count(), 40);
+  EXPECT_EQ(voice.get_active_mode_count(), 40);
   play(voice, 48000);
-  EXPECT_LT(voice.get_live_mode_count(), 40);
-  EXPECT_GT(voice.get_live_mode_count(), 0);
+  EXPECT_LT(voice.get_active_mode_count(), 40);
+  EXPECT_GT(voice.get_active_mode_count(), 0);
   play(voice, 48000 * 20);
   EXPECT_FALSE(voice.is_awake());
   EXPECT_EQ(voice.calc_energy_j(), 0.0);
@@ -268,16 +268,16 @@ TEST(Voice, FallsAsleepAndWakesAgain) {
   EXPECT_TRUE(voice.is_awake());
 }
 
-TEST(Voice, ALimitFadesTheLastModesOutAndKeepsTheFirst) {
+TEST(ResonatorBank, ALimitFadesTheLastModesOutAndKeepsTheFirst) {
   const bank::Bank bank = make_cube_bank(make_many_modes(96));
   const auto model = make_model(bank);
   const auto render = [&](bool limited) {
-    Voice voice(model);
+    ResonatorBank voice(model);
     voice.strike({.impulse_n_s = kUnitImpulse});
     std::vector<float> sound = play(voice, 1280);
-    if (limited) voice.set_limit(40);  // three groups
+    if (limited) voice.set_max_modes(40);  // three groups
     const std::vector<float> later = play(voice, 1280, 96);
-    EXPECT_EQ(voice.get_live_mode_count(), limited ? 48 : 96);
+    EXPECT_EQ(voice.get_active_mode_count(), limited ? 48 : 96);
     sound.insert(sound.end(), later.begin(), later.end());
     return sound;
   };
@@ -296,20 +296,20 @@ TEST(Voice, ALimitFadesTheLastModesOutAndKeepsTheFirst) {
   EXPECT_NE(whole, limited);
 }
 
-TEST(Voice, TheLimitStaysForLaterStrikesAndOneGroupAlwaysPlays) {
-  Voice voice(make_model(make_cube_bank(make_many_modes(96))));
-  voice.set_limit(0);
+TEST(ResonatorBank, TheLimitStaysForLaterStrikesAndOneGroupAlwaysPlays) {
+  ResonatorBank voice(make_model(make_cube_bank(make_many_modes(96))));
+  voice.set_max_modes(0);
   voice.strike({.impulse_n_s = kUnitImpulse});
   play(voice, 256);
-  EXPECT_EQ(voice.get_live_mode_count(), 16);
-  voice.set_limit(1000);
+  EXPECT_EQ(voice.get_active_mode_count(), 16);
+  voice.set_max_modes(1000);
   voice.strike({.time_s = 300.0 / kRate, .impulse_n_s = kUnitImpulse});
   play(voice, 256);
-  EXPECT_EQ(voice.get_live_mode_count(), 96);
+  EXPECT_EQ(voice.get_active_mode_count(), 96);
 }
 
-TEST(Voice, BadStrikesAreRefusedAndOverflowIsCleared) {
-  Voice voice(make_model(make_cube_bank({{1000.0, 1.0}, {2000.0, 1.0, 1e30}})), {.max_strikes = 4});
+TEST(ResonatorBank, BadStrikesAreRefusedAndOverflowIsCleared) {
+  ResonatorBank voice(make_model(make_cube_bank({{1000.0, 1.0}, {2000.0, 1.0, 1e30}})), {.max_strikes = 4});
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_FALSE(voice.strike({.time_s = nan}));
   EXPECT_FALSE(voice.strike({.duration_s = -1.0}));
@@ -326,8 +326,8 @@ TEST(Voice, BadStrikesAreRefusedAndOverflowIsCleared) {
   EXPECT_NE(play(voice, 200)[150], 0.0F);
 }
 
-TEST(Voice, ALateStrikeSoundsAtTheHorizonWithItsWholeImpulse) {
-  Voice voice(make_model(make_cube_bank({{1000.0, 0.0}})));
+TEST(ResonatorBank, ALateStrikeSoundsAtTheHorizonWithItsWholeImpulse) {
+  ResonatorBank voice(make_model(make_cube_bank({{1000.0, 0.0}})));
   play(voice, 1000, 1000);
   EXPECT_EQ(voice.get_position(), 1000);
   EXPECT_EQ(voice.get_horizon(), 1024);
@@ -339,9 +339,9 @@ TEST(Voice, ALateStrikeSoundsAtTheHorizonWithItsWholeImpulse) {
   EXPECT_NEAR(voice.calc_energy_j(), 0.5, 1e-6);
 }
 
-TEST(Voice, AddsToWhatIsInTheBlock) {
+TEST(ResonatorBank, AddsToTheBlock) {
   const auto model = make_model(make_cube_bank(make_many_modes(20)));
-  Voice voice(model), again(model);
+  ResonatorBank voice(model), again(model);
   voice.strike({.impulse_n_s = kUnitImpulse});
   again.strike({.impulse_n_s = kUnitImpulse});
   std::vector<float> zero(200, 0.0F), two(200, 2.0F);
@@ -351,10 +351,10 @@ TEST(Voice, AddsToWhatIsInTheBlock) {
 }
 
 #if defined(__x86_64__)
-TEST(Voice, DenormalsAreFlushedInsideAndTheCallersSettingComesBack) {
-  Voice voice(make_model(make_cube_bank({{1000.0, 2000.0}})), {.silence_pa = 1e-300});
+TEST(ResonatorBank, DenormalsAreFlushedInsideAndTheCallersSettingComesBack) {
+  ResonatorBank voice(make_model(make_cube_bank({{1000.0, 2000.0}})), {.silence_pa = 1e-300});
   voice.strike({.impulse_n_s = kUnitImpulse});
-  const unsigned before = _mm_getcsr() & ~0x3FU;  // without the flags that say what happened
+  const unsigned before = _mm_getcsr() & ~0x3FU;  // without the exception flags
   for (int i = 0; i < 400; ++i) {
     for (const float p : play(voice, 128)) ASSERT_NE(std::fpclassify(p), FP_SUBNORMAL);
   }
@@ -362,7 +362,7 @@ TEST(Voice, DenormalsAreFlushedInsideAndTheCallersSettingComesBack) {
 }
 #endif
 
-TEST(Voice, BadBanksAndNumbersAreRefused) {
+TEST(ResonatorBank, BadBanksAndNumbersAreRefused) {
   const bank::Bank good = make_cube_bank({{1000.0, 1.0}});
   bank::Bank bank = good;
   bank.shape.pop_back();
@@ -375,13 +375,13 @@ TEST(Voice, BadBanksAndNumbersAreRefused) {
   const std::vector<double> two{1.0, 2.0};
   EXPECT_THROW(Model::make(good, {.gains = two}), InputError);
   EXPECT_THROW(Model::make(good, {.silence_pa = 0.0}), InputError);
-  EXPECT_THROW(Voice(make_model(good), {.silence_pa = -1.0}), InputError);
+  EXPECT_THROW(ResonatorBank(make_model(good), {.silence_pa = -1.0}), InputError);
 }
 
-TEST(Voice, OtherGainsTakeThePlaceOfTheBanks) {
+TEST(ResonatorBank, OtherGainsReplaceThoseOfTheBank) {
   const bank::Bank bank = make_cube_bank({{1000.0, 1.0, 1.0}});
   const std::vector<double> gains{0.25};
-  Voice own(make_model(bank)), other(Model::make(bank, {.gains = gains}));
+  ResonatorBank own(make_model(bank)), other(Model::make(bank, {.gains = gains}));
   own.strike({.impulse_n_s = kUnitImpulse});
   other.strike({.impulse_n_s = kUnitImpulse});
   const std::vector<float> a = play(own, 300), b = play(other, 300);

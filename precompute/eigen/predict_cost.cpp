@@ -1,6 +1,6 @@
-// Method:     The analysis of the factorisation says what it takes; Sylvester's law of inertia counts the modes (inertia.cpp).
-// Source:     Parlett, The symmetric eigenvalue problem, 1998, section 3.3. Deviations: none.
-#include "precompute/eigen/solve_estimate.hpp"
+// Method: The symbolic analysis gives the cost of the factorisation; Sylvester's law of inertia counts the modes (inertia.cpp).
+// Source: Parlett, The symmetric eigenvalue problem, 1998, section 3.3.
+#include "precompute/eigen/predict_cost.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -19,8 +19,8 @@ namespace {
 
 using petsc::check;
 
-constexpr double kZeroFraction = 1e-7;  // Of high_hz: what is below is lost in the rounding of what is up there.
-constexpr double kLowEnd = 1e-4;        // Of the upper end, in lambda: a lower end below need not be counted.
+constexpr double kZeroFraction = 1e-7;  // Relative to high_hz: lower frequencies vanish in the rounding of the highest.
+constexpr double kLowEnd = 1e-4;        // Relative to the upper end, in lambda: a lower end below this need not be counted.
 
 double calc_lambda(double freq_hz) {
   const double omega_rad_s = 2 * std::numbers::pi * freq_hz;
@@ -35,7 +35,7 @@ BandEnds find_ends(const Options& options) {
 
 bool can_assume_low_end(const Options& options) {
   const BandEnds ends = find_ends(options);
-  return !options.max_modes && options.factorisation != Factorisation::kCholmod && ends.low <= kLowEnd * ends.high;
+  return !options.max_modes && ends.low <= kLowEnd * ends.high;
 }
 
 Inertia count_below_low(const TakeCount& take, double low) { return take(find_count_below_low(low), kEdgeNudge, ShiftRule::kMayMoveUp); }
@@ -56,7 +56,7 @@ std::int64_t calc_copies_bytes(const Problem& problem) {
 }
 
 std::int64_t calc_kept_bytes(const Problem& problem) {
-  // Blocks of nine numbers, or one number, and the place of each.
+  // Blocks of nine numbers, or one number, each with its column index.
   MatInfo k, m;
   check(MatGetInfo(problem.stiffness, MAT_LOCAL, &k));
   check(MatGetInfo(problem.mass, MAT_LOCAL, &m));
@@ -67,7 +67,7 @@ std::int64_t calc_kept_bytes(const Problem& problem) {
 
 std::int64_t calc_search_bytes(std::int64_t rows, std::int64_t modes, std::int64_t rigid_count) {
   const bool is_cut = modes > kSliceModes;
-  const std::int64_t locked = rigid_count + (is_cut ? kSliceModes : 0);  // They are where they were found.
+  const std::int64_t locked = rigid_count + (is_cut ? kSliceModes : 0);  // Locked modes stay where they were found.
   const std::int64_t basis = calc_basis_size(std::min(modes, kSliceModes), locked, !is_cut);
   return rows * 8 * (modes + rigid_count + basis);
 }
@@ -76,9 +76,9 @@ std::int64_t calc_dense_bytes(std::int64_t unknowns, bool is_root) {
   return static_cast<std::int64_t>(8 * (cost::kDenseCopies + (is_root ? cost::kDenseWork : 0))) * unknowns * unknowns;
 }
 
-SolveEstimate estimate_solve(const Problem& problem, const Options& options, const std::function<bool(const SolveEstimate&)>& may_count) {
+SolveCost predict_cost(const Problem& problem, const Options& options, const std::function<bool(const SolveCost&)>& may_count) {
   check_input(problem, options);
-  SolveEstimate estimate;
+  SolveCost cost;
   PetscInt n = 0;
   check(MatGetSize(problem.stiffness, &n, nullptr));
   const BandEnds ends = find_ends(options);
@@ -86,31 +86,30 @@ SolveEstimate estimate_solve(const Problem& problem, const Options& options, con
   const la::Pencil pencil = scaling.scale(problem.stiffness, problem.mass);
   std::vector<std::int64_t> per_component;
   const std::vector<petsc::VecHandle> rigid = make_rigid_modes(pencil, problem.nodes, per_component);
-  estimate.rigid_count = static_cast<std::int64_t>(rigid.size());
-  estimate.is_dense = n <= kDenseRows || options.method == Method::kDense;
-  estimate.copies_bytes = calc_copies_bytes(problem);
-  estimate.copies_kept_bytes = calc_kept_bytes(problem);
+  cost.rigid_count = static_cast<std::int64_t>(rigid.size());
+  cost.is_dense = n <= kDenseRows || options.method == Method::kDense;
+  cost.copies_bytes = calc_copies_bytes(problem);
+  cost.copies_kept_bytes = calc_kept_bytes(problem);
   Options unlimited = options;
   unlimited.memory_limit_bytes = 0;
-  if (unlimited.factorisation == Factorisation::kCholmod) unlimited.factorisation = Factorisation::kAutomatic;
   Seconds seconds;
   FactorStatistics statistics;
   InertiaCounter counter(pencil, problem, unlimited, rigid, seconds, statistics,
                          [&](double lambda) { return std::sqrt(std::max(scaling.from_scaled(lambda), 0.0)) / (2 * std::numbers::pi); });
   const ShiftedFactor& factor = counter.analyse();
-  estimate.entries = factor.get_entries();
-  estimate.flops = factor.get_flops();
-  estimate.factor_bytes = factor.get_peak_bytes();
-  estimate.factor_kept_bytes = 8 * estimate.entries;
-  if (!may_count(estimate)) return estimate;
+  cost.entries = factor.get_entries();
+  cost.flops = factor.get_flops();
+  cost.factor_bytes = factor.get_peak_bytes();
+  cost.factor_kept_bytes = 8 * cost.entries;
+  if (!may_count(cost)) return cost;
   const double start = base::get_process_cpu_s();
   const auto take = [&](double lambda, double reach, ShiftRule rule) { return counter.count_below(lambda, reach, rule); };
   const Inertia above = count_below_high(take, scaling.to_scaled(ends.high));
   const Inertia below = count_below_low(take, scaling.to_scaled(ends.low));
-  estimate.factor_seconds = (base::get_process_cpu_s() - start) / static_cast<double>(std::max<std::int64_t>(statistics.factorisations, 1));
+  cost.factor_seconds = (base::get_process_cpu_s() - start) / static_cast<double>(std::max<std::int64_t>(statistics.factorisations, 1));
   const std::int64_t modes = above.below - below.below;
-  estimate.modes = std::min(modes, options.max_modes.value_or(modes));
-  return estimate;
+  cost.modes = std::min(modes, options.max_modes.value_or(modes));
+  return cost;
 }
 
 }  // namespace carillon::eigen

@@ -1,4 +1,4 @@
-#include "partition/condense.hpp"
+#include "partition/compress.hpp"
 
 #include <gtest/gtest.h>
 
@@ -49,10 +49,10 @@ bool dominates(const Graph& graph, std::int32_t u, std::int32_t v) {
   return u != v && of_u.contains(v) && std::includes(of_u.begin(), of_u.end(), of_v.begin(), of_v.end()) && (of_u != of_v || u < v);
 }
 
-/// The core by the definition, if it is used: whether it is; and every dominated vertex in a separator that its core asks for, and in no
-/// other.
+/// Checks the core against the definition: whether it is used, and that a dominated vertex is in a separator exactly if its core requires
+/// it.
 bool expect_core_of_definition(const Graph& graph) {
-  const Condensation condensed(graph, 1);
+  const CompressedGraph compressed(graph, 1);
   const std::int32_t n = graph.vertex_count();
   Vertices kept;
   std::vector<Vertices> hosts(n);
@@ -62,10 +62,10 @@ bool expect_core_of_definition(const Graph& graph) {
     if (hosts[v].empty()) kept.push_back(v);
   }
   if (2 * static_cast<std::int32_t>(kept.size()) > n) {
-    EXPECT_EQ(condensed.core().neighbours, graph.neighbours) << "hardly anything would be gained";
+    EXPECT_EQ(compressed.core().neighbours, graph.neighbours) << "compression is not worthwhile";
     return false;
   }
-  EXPECT_EQ(condensed.core().vertex_count(), static_cast<std::int32_t>(kept.size()));
+  EXPECT_EQ(compressed.core().vertex_count(), static_cast<std::int32_t>(kept.size()));
   if (testing::Test::HasFailure()) return true;
   Vertices number(n, -1);
   for (std::size_t c = 0; c < kept.size(); ++c) number[kept[c]] = static_cast<std::int32_t>(c);
@@ -73,14 +73,14 @@ bool expect_core_of_definition(const Graph& graph) {
     std::set<std::int32_t> expected;
     for (const std::int32_t u : list_closed(graph, kept[c]))
       if (u != kept[c] && number[u] >= 0) expected.insert(number[u]);
-    const Graph& core = condensed.core();
+    const Graph& core = compressed.core();
     EXPECT_EQ(Vertices(core.neighbours.begin() + core.offsets[c], core.neighbours.begin() + core.offsets[c + 1]),
               Vertices(expected.begin(), expected.end()));
   }
   Vertices position(kept.size());
   std::iota(position.begin(), position.end(), 0);
   std::shuffle(position.begin(), position.end(), std::mt19937(5));
-  const Vertices order = condensed.expand_order(position);
+  const Vertices order = compressed.expand_order(position);
   Vertices sorted = order;
   std::sort(sorted.begin(), sorted.end());
   for (std::int32_t v = 0; v < n; ++v) {
@@ -96,7 +96,7 @@ bool expect_core_of_definition(const Graph& graph) {
   return true;
 }
 
-TEST(Condensation, has_the_core_of_the_definition) {
+TEST(CompressedGraph, matches_the_definition) {
   EXPECT_TRUE(expect_core_of_definition(make_t10_graph({2, 2, 2})));
   EXPECT_TRUE(expect_core_of_definition(make_t10_graph({4, 1, 1})));
   const auto t4 = tests::make_box({3, 3, 1}, {1, 1, 1});
@@ -116,7 +116,7 @@ TEST(Condensation, has_the_core_of_the_definition) {
   EXPECT_GT(used, 10);
 }
 
-/// The core of elements by the definition: a node is dominated by one that is in all of its elements.
+/// Core of elements by the definition: a node is dominated by one that is in all of its elements.
 void expect_core_of_elements(const Vertices& elements, int width, std::int32_t nodes) {
   std::vector<std::set<std::int32_t>> of(nodes);
   for (std::size_t k = 0; k < elements.size(); ++k)
@@ -130,27 +130,27 @@ void expect_core_of_elements(const Vertices& elements, int width, std::int32_t n
                                       (of[u] != of[v] || u < v));
     if (!is_dominated) number[v] = kept++;
   }
-  const Condensation condensed(elements, width, nodes, 1);
+  const CompressedGraph compressed(elements, width, nodes, 1);
   const Graph graph = make_node_graph(elements, width, nodes);
   if (2 * kept > nodes) {
-    EXPECT_EQ(condensed.core().neighbours, graph.neighbours);
-    EXPECT_EQ(condensed.dominated_per_edge(), 0);
+    EXPECT_EQ(compressed.core().neighbours, graph.neighbours);
+    EXPECT_EQ(compressed.dominated_per_edge(), 0);
     return;
   }
-  EXPECT_EQ(condensed.numbers(), number);
+  EXPECT_EQ(compressed.numbers(), number);
   Vertices list;
   for (std::int32_t v = 0; v < nodes; ++v)
     if (number[v] >= 0) list.push_back(v);
   Vertices scratch(nodes, -1);
   const Graph core = take_part(graph, list, scratch);
-  EXPECT_EQ(condensed.core().offsets, core.offsets);
-  EXPECT_EQ(condensed.core().neighbours, core.neighbours);
+  EXPECT_EQ(compressed.core().offsets, core.offsets);
+  EXPECT_EQ(compressed.core().neighbours, core.neighbours);
   if (!core.neighbours.empty()) {
-    EXPECT_NEAR(kept + condensed.dominated_per_edge() * 0.5 * static_cast<double>(core.neighbours.size()), nodes, 1e-9);
+    EXPECT_NEAR(kept + compressed.dominated_per_edge() * 0.5 * static_cast<double>(core.neighbours.size()), nodes, 1e-9);
   }
 }
 
-TEST(Condensation, of_elements_needs_no_graph_of_all_nodes) {
+TEST(CompressedGraph, of_elements_needs_no_graph_of_all_nodes) {
   const auto t10 = tests::make_box({4, 3, 3}, {1, 1, 1}, 2);
   expect_core_of_elements(t10.tets, 10, static_cast<std::int32_t>(t10.nodes_m.size()));
   const auto t4 = tests::make_box({3, 3, 2}, {1, 1, 1});
@@ -175,16 +175,16 @@ TEST(Condensation, of_elements_needs_no_graph_of_all_nodes) {
   expect_core_of_elements({}, 10, 3);
 }
 
-TEST(Condensation, of_elements_and_of_their_graph_give_the_same_separators) {
+TEST(CompressedGraph, of_elements_and_of_their_graph_give_the_same_separators) {
   const auto box = tests::make_box({9, 8, 7}, {1, 1, 1}, 2);
   const auto nodes = static_cast<std::int32_t>(box.nodes_m.size());
   const Graph graph = make_node_graph(box.tets, 10, nodes);
-  const Condensation of_elements(box.tets, 10, nodes);
-  ASSERT_EQ(of_elements.numbers(), Condensation(graph).numbers());
+  const CompressedGraph of_elements(box.tets, 10, nodes);
+  ASSERT_EQ(of_elements.numbers(), CompressedGraph(graph).numbers());
   EXPECT_EQ(of_elements.expand_sides(separate(of_elements.core(), 1, 0, of_elements.dominated_per_edge())), separate(graph, 1));
 }
 
-TEST(Condensation, of_hard_graphs_is_what_it_has_to_be) {
+TEST(CompressedGraph, handles_hard_graphs) {
   std::set<std::pair<std::int32_t, std::int32_t>> clique, star, path;
   for (std::int32_t a = 0; a < 12; ++a)
     for (std::int32_t b = a + 1; b < 12; ++b) {
@@ -193,28 +193,28 @@ TEST(Condensation, of_hard_graphs_is_what_it_has_to_be) {
       if (b == a + 1) path.emplace(a, b);
     }
   for (const auto& edges : {clique, star, path, {}}) expect_core_of_definition(make_graph(12, edges));
-  EXPECT_EQ(Condensation(make_graph(12, clique), 1).core().vertex_count(), 1);
-  EXPECT_EQ(Condensation(make_graph(12, star), 1).core().vertex_count(), 1);
-  EXPECT_EQ(Condensation(make_graph(12, path), 1).core().vertex_count(), 12) << "10 would not be worth it";
-  EXPECT_EQ(Condensation(make_graph(12, {}), 1).core().vertex_count(), 12);
+  EXPECT_EQ(CompressedGraph(make_graph(12, clique), 1).core().vertex_count(), 1);
+  EXPECT_EQ(CompressedGraph(make_graph(12, star), 1).core().vertex_count(), 1);
+  EXPECT_EQ(CompressedGraph(make_graph(12, path), 1).core().vertex_count(), 12) << "10 is not worthwhile";
+  EXPECT_EQ(CompressedGraph(make_graph(12, {}), 1).core().vertex_count(), 12);
   const Graph few = make_graph(12, clique);
-  EXPECT_EQ(Condensation(few).core().neighbours, few.neighbours) << "too few to be cut";
+  EXPECT_EQ(CompressedGraph(few).core().neighbours, few.neighbours) << "too few to be cut";
   const Graph none;
-  EXPECT_EQ(Condensation(none).core().vertex_count(), 0);
-  EXPECT_TRUE(Condensation(none).expand_order({}).empty());
+  EXPECT_EQ(CompressedGraph(none).core().vertex_count(), 0);
+  EXPECT_TRUE(CompressedGraph(none).expand_order({}).empty());
   for (const auto& edges : {clique, star, path, {}}) {
     const Vertices order = order_nested_dissection(make_graph(12, edges));
     EXPECT_EQ(std::set<std::int32_t>(order.begin(), order.end()).size(), 12U);
   }
 }
 
-TEST(Condensation, of_second_order_is_the_corners_and_its_separators_separate) {
+TEST(CompressedGraph, of_second_order_keeps_the_corners_and_separates) {
   const std::array<int, 3> cells{8, 7, 6};
   const Graph graph = make_t10_graph(cells);
-  const Condensation condensed(graph);
-  // Without the eight corners of the box: what lies in one cell only is dominated by an end of the cell's diagonal.
-  EXPECT_EQ(condensed.core().vertex_count(), (cells[0] + 1) * (cells[1] + 1) * (cells[2] + 1) - 8);
-  EXPECT_EQ(find_tries(condensed.core(), condensed.dominated_per_edge()), 4);
+  const CompressedGraph compressed(graph);
+  // Without the eight corners of the box: a node in one cell only is dominated by an end of the cell's diagonal.
+  EXPECT_EQ(compressed.core().vertex_count(), (cells[0] + 1) * (cells[1] + 1) * (cells[2] + 1) - 8);
+  EXPECT_EQ(find_tries(compressed.core(), compressed.dominated_per_edge()), 4);
   const Vertices side = separate(graph);
   std::array<int, 3> counts{};
   for (std::int32_t v = 0; v < graph.vertex_count(); ++v) {
@@ -229,25 +229,25 @@ TEST(Condensation, of_second_order_is_the_corners_and_its_separators_separate) {
   EXPECT_LE(counts[2], 1.3 * (2 * cells[1] + 1) * (2 * cells[2] + 1)) << "a plane of nodes across the shorter sides";
 }
 
-TEST(Condensation, estimates_operations_as_an_elimination_counts_them) {
+TEST(CompressedGraph, predicts_the_operations_of_an_elimination) {
   const Graph graph = make_t10_graph({5, 4, 4});
-  const Condensation condensed(graph, 1);
-  Vertices position(condensed.core().vertex_count());
+  const CompressedGraph compressed(graph, 1);
+  Vertices position(compressed.core().vertex_count());
   std::iota(position.begin(), position.end(), 0);
   std::vector<Vertices> orders(3, position);
   for (unsigned k = 0; k < 3; ++k) std::shuffle(orders[k].begin(), orders[k].end(), std::mt19937(k));
-  orders.push_back(order_nested_dissection(condensed.core()));
-  const auto estimate = [&](const Vertices& one) { return estimate_operations(condensed.core(), condensed.dominated_per_edge(), one); };
+  orders.push_back(order_nested_dissection(compressed.core()));
+  const auto estimate = [&](const Vertices& one) { return predict_operations(compressed.core(), compressed.dominated_per_edge(), one); };
   std::vector<double> counted;
   for (const Vertices& one : orders) {
-    counted.push_back(count_factor_operations(graph, condensed.expand_order(one)));
-    EXPECT_GT(estimate(one), counted.back()) << "what is eliminated at a place counts as if it had all its rows";
+    counted.push_back(count_factor_operations(graph, compressed.expand_order(one)));
+    EXPECT_GT(estimate(one), counted.back()) << "vertices eliminated at a position count with all its rows";
     EXPECT_LT(estimate(one), 2 * counted.back());
   }
   for (std::size_t k = 0; k < 3; ++k) EXPECT_GT(estimate(orders[k]), 2 * estimate(orders[3]));
 }
 
-/// What METIS makes of all vertices.
+/// METIS on all vertices.
 Vertices order_all(const Graph& graph) {
   Graph copy = graph;
   idx_t count = graph.vertex_count();
@@ -260,7 +260,7 @@ Vertices order_all(const Graph& graph) {
   return position;
 }
 
-TEST(Condensation, gives_an_order_with_hardly_more_entries_than_one_of_all_vertices) {
+TEST(CompressedGraph, gives_an_order_with_hardly_more_entries_than_one_of_all_vertices) {
   for (const auto& cells : {std::array{8, 8, 8}, std::array{40, 6, 1}, std::array{3, 3, 30}}) {
     const Graph graph = make_t10_graph(cells);
     const double ratio = static_cast<double>(count_factor_entries(graph, order_nested_dissection(graph))) /

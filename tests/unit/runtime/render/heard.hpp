@@ -5,7 +5,7 @@
 
 #include "runtime/render/render.hpp"
 
-namespace carillon::scene {
+namespace carillon::render {
 
 /// A sound with all samples by channel.
 struct Heard : Sound {
@@ -21,11 +21,11 @@ inline Heard read_all(const Sound& sound, const sound::SoundStore& store) {
   return heard;
 }
 
-inline Heard calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks, const std::vector<events::Event>& events,
+inline Heard calc_sound(const scene::Scene& scene, const std::vector<const bank::Bank*>& banks, const std::vector<events::Event>& events,
                         const RenderOptions& options) {
-  sound::SoundStore store(options.rate_hz, count_channels(scene));
-  const Sound sound = render::calc_sound(scene, banks, make_events(events), options, store);
+  sound::SoundStore store(options.rate_hz, scene::count_channels(scene));
+  const Sound sound = render::calc_sound(scene, banks, scene::make_events(events), options, store);
   return read_all(sound, store);
 }
 
-}  // namespace carillon::scene
+}  // namespace carillon::render
