@@ -99,6 +99,9 @@ struct CommandLine {
                    "instead of a job: solve the exterior air for the modes of this bank, and write it with multipoles to --bank")
         ->check(named)
         ->excludes("JOB", "--matrices", "--progress", "--validate", "--at", "--estimate");
+    app.add_flag_callback(
+        "--keys", [] { throw CLI::CallForVersion(base::write_key_tables(job::describe_job_keys()), 0); },
+        "print the keys of jobs with defaults, ranges and meaning");
     app.set_version_flag("--version", base::describe("carillon-precompute"));
     // Words after "--" are for PETSc and SLEPc.
     const int own = static_cast<int>(std::find(argv, argv + argc, std::string_view("--")) - argv);

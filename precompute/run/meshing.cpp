@@ -72,7 +72,7 @@ std::vector<std::string> make_mesher_words(const job::Body& body, int order, con
   if (!body.close_holes && !body.wall_m) words.emplace_back("--refuse-open");
   if (body.facets) words.emplace_back("--facets");
   add("--result", file + ".result");
-  add("--up", std::string(1, body.up));
+  add("--up", body.up);
   add("--method", body.method);
   if (fineness.nodes) add("--nodes", std::to_string(*fineness.nodes));
   if (fineness.edge_m) add("--edge", format_length(*fineness.edge_m));
