@@ -260,6 +260,18 @@ void Skin::make_groups() {
   }
 }
 
+double Skin::calc_rim_radius_m(int vertex) const {
+  if (vertex < 0 || kinds_[vertex] != VertexKind::ridge) return 0.0;
+  std::array<Vec3, 2> ways{};
+  int count = 0, e = mesh_.any_half_edge[vertex];
+  do {
+    if (sharp_[e] != 0) ways[count++] = mesh_.vertices[mesh_.vertex_of(Mesh::next(e))] - mesh_.vertices[vertex];
+    e = Mesh::next(mesh_.opposite[e]);
+  } while (e != mesh_.any_half_edge[vertex]);
+  const double bend = calc_angle(ways[0], -1.0 * ways[1]);
+  return bend > kCoplanar ? std::min(0.5 * (norm(ways[0]) + norm(ways[1])) / bend, 0.5 * size_m_) : 0.0;
+}
+
 int Skin::find_face(int vertex) const {
   const int start = mesh_.any_half_edge[vertex];
   int e = start;

@@ -53,6 +53,8 @@ class Skin {
   int count_regions() const { return regions_; }
   bool is_sharp(int half_edge) const { return sharp_[half_edge] != 0; }
   VertexKind kind(int vertex) const { return kinds_[vertex]; }
+  /// Of the rim that a vertex of a ridge is on [m]; 0: another vertex.
+  double calc_rim_radius_m(int vertex) const;
   /// A face at a vertex: a curved one, if there is one.
   int find_face(int vertex) const;
   /// The smoothing group of a face: faces joined over edges that are not sharp.

@@ -66,7 +66,9 @@ TEST(shape, rim_of_a_cylinder_is_a_ridge_and_its_mantle_is_round) {
   const Skin& skin = cylinder->skin();
   for (int v = 0; v < cylinder->mesh().count_vertices(); ++v) {
     const Vec3& x = cylinder->mesh().vertices[v];
-    EXPECT_EQ(skin.kind(v), std::hypot(x[0], x[1]) > 0.5 ? VertexKind::ridge : VertexKind::none);
+    const bool is_on_rim = std::hypot(x[0], x[1]) > 0.5;
+    EXPECT_EQ(skin.kind(v), is_on_rim ? VertexKind::ridge : VertexKind::none);
+    EXPECT_NEAR(skin.calc_rim_radius_m(v), is_on_rim ? 1.0 : 0.0, 2e-3);
   }
   for (int f = 0; f < cylinder->mesh().count_faces(); ++f) {
     const bool cap = std::abs(cylinder->mesh().normals[f][2]) > 0.5;
