@@ -14,11 +14,7 @@
 namespace carillon::geometry {
 
 /// Gap of x over the skin [m], from the nearest place of the mesh; negative: inside.
-inline double calc_skin_gap(const Shape& shape, const Vec3& x, const Nearest& at, bool is_inside) {
-  const Skin& skin = shape.skin();
-  if (skin.is_flat(at.face)) return (is_inside ? -1.0 : 1.0) * std::sqrt(at.distance2);
-  return dot(skin.calc_normal(at.face, at.weights), x - skin.calc_point(at.face, at.weights));
-}
+double calc_skin_gap(const Shape& shape, const Vec3& x, const Nearest& at, bool is_inside);
 
 /// Distances of places to the surface of a body, in its own frame.
 class SurfaceProbe {

@@ -117,6 +117,7 @@ Touch Pass::make_touch(int place) const {
   t.axis_b = mesh.normals[at.face];
   if (is_curved) t.side_b = Side::skin, t.face_b = at.face, t.smooth = true;
   t.curvature_a_per_m = get_sharp_curvature(mine_, sample.kind);
+  t.rim_m = mine_.skin().calc_rim_radius_m(sample.vertex);
   if (sample.kind == VertexKind::smooth) {
     const Spot spot = mine_.skin().locate(sample.point, sample.face);
     t.curvature_a_per_m = mine_.skin().calc_mean_curvature(spot.face, spot.weights);
@@ -174,6 +175,7 @@ void Pass::add_point(const Sample& sample) {
   if (t.side_b == Side::plane && sample.kind != VertexKind::corner && !mine_.skin().is_flat(sample.face) && add_rim(sample, t)) return;
   if (t.side_b != Side::skin) settle(t, mine_, fm_, &theirs_, ft_, reach_);
   t.curvature_a_per_m = get_sharp_curvature(mine_, sample.kind);
+  t.rim_m = mine_.skin().calc_rim_radius_m(sample.vertex);
   t.id = make_id(Feature::corner_a, sample.vertex, 0);
   if (t.gap_m <= reach_) out_.push_back(t);
 }
@@ -221,6 +223,7 @@ void Pass::add_end(int vertex) {
   std::optional<Touch> t = begin_ridge(mine_.mesh().vertices[vertex]);
   if (!t || !settle(*t, mine_, fm_, &theirs_, ft_, 0.05 * mine_.get_size_m(), kFirst) || t->gap_m > reach_) return;
   t->id = make_id(Feature::corner_a, vertex, 0);
+  t->rim_m = mine_.skin().calc_rim_radius_m(vertex);
   out_.push_back(*t);
 }
 

@@ -35,11 +35,7 @@ Skin::Skin(const Mesh& mesh) : mesh_(mesh) {
   find_sharp_edges();
   make_fans();
   make_groups();
-  for (int f = 0; f < mesh.count_faces(); ++f) {
-    if (flat_[f] != 0) continue;
-    const Patch patch = make_patch(f);
-    for (int k = 0; k < 3; ++k) sag_m_ = std::max(sag_m_, 2.0 / 3.0 * norm(patch.c[k] - 0.5 * (patch.p[k] + patch.p[(k + 1) % 3])));
-  }
+  make_controls();
   all_curved_ = std::find(flat_.begin(), flat_.end(), 1) == flat_.end() &&
                 std::all_of(kinds_.begin(), kinds_.end(), [](VertexKind kind) { return kind == VertexKind::smooth; });
 }
@@ -264,6 +260,18 @@ void Skin::make_groups() {
   }
 }
 
+double Skin::calc_rim_radius_m(int vertex) const {
+  if (vertex < 0 || kinds_[vertex] != VertexKind::ridge) return 0.0;
+  std::array<Vec3, 2> ways{};
+  int count = 0, e = mesh_.any_half_edge[vertex];
+  do {
+    if (sharp_[e] != 0) ways[count++] = mesh_.vertices[mesh_.vertex_of(Mesh::next(e))] - mesh_.vertices[vertex];
+    e = Mesh::next(mesh_.opposite[e]);
+  } while (e != mesh_.any_half_edge[vertex]);
+  const double bend = calc_angle(ways[0], -1.0 * ways[1]);
+  return bend > kCoplanar ? std::min(0.5 * (norm(ways[0]) + norm(ways[1])) / bend, 0.5 * size_m_) : 0.0;
+}
+
 int Skin::find_face(int vertex) const {
   const int start = mesh_.any_half_edge[vertex];
   int e = start;
@@ -274,16 +282,29 @@ int Skin::find_face(int vertex) const {
   return start / 3;
 }
 
+/// Of the edges of curved faces. A sharp edge bends in the plane of its tangents, which the normals of both sides give: so both meet.
+void Skin::make_controls() {
+  for (int e = 0; e < 3 * mesh_.count_faces(); ++e) {
+    const int next = Mesh::next(e), other = mesh_.opposite[e];
+    const Vec3 &p = mesh_.vertices[mesh_.vertex_of(e)], &q = mesh_.vertices[mesh_.vertex_of(next)], d = q - p;
+    Vec3 control = 0.5 * (p + q);
+    const auto lift = [&](int corner, int across) {  // from the tangent plane or line at a corner to the other end
+      const Vec3& n = fan_normals_[fan_[corner]];
+      const Vec3 t = cross(n, fan_normals_[fan_[across]]);
+      if (sharp_[e] == 0) return dot(d, n) * n;
+      return norm2(t) > kCoplanar ? d - (dot(d, t) / norm2(t)) * t : Vec3{};
+    };
+    if (flat_[e / 3] == 0) control = control - (0.5 * kAlpha) * lift(e, Mesh::next(other)) + (0.5 * kAlpha) * lift(next, other);
+    controls_.push_back(control);
+    sag_m_ = std::max(sag_m_, 2.0 / 3.0 * norm(control - 0.5 * (p + q)));
+  }
+}
+
 Patch Skin::make_patch(int face) const {
   Patch patch;
-  for (int k = 0; k < 3; ++k) patch.p[k] = mesh_.corner(face, k);
   for (int k = 0; k < 3; ++k) {
-    const int l = (k + 1) % 3;
-    patch.c[k] = 0.5 * (patch.p[k] + patch.p[l]);
-    if (flat_[face] != 0) continue;
-    const Vec3 d = patch.p[l] - patch.p[k];
-    const Vec3 &nk = fan_normals_[fan_[3 * face + k]], &nl = fan_normals_[fan_[3 * face + l]];
-    patch.c[k] = patch.c[k] - (0.5 * kAlpha * dot(d, nk)) * nk + (0.5 * kAlpha * dot(d, nl)) * nl;
+    patch.p[k] = mesh_.corner(face, k);
+    patch.c[k] = controls_[3 * face + k];
   }
   return patch;
 }

@@ -53,6 +53,8 @@ class Skin {
   int count_regions() const { return regions_; }
   bool is_sharp(int half_edge) const { return sharp_[half_edge] != 0; }
   VertexKind kind(int vertex) const { return kinds_[vertex]; }
+  /// Of the rim that a vertex of a ridge is on [m]; 0: another vertex.
+  double calc_rim_radius_m(int vertex) const;
   /// A face at a vertex: a curved one, if there is one.
   int find_face(int vertex) const;
   /// The smoothing group of a face: faces joined over edges that are not sharp.
@@ -79,6 +81,7 @@ class Skin {
   void find_sharp_edges();
   void make_fans();
   void make_groups();
+  void make_controls();
   bool is_tip(const std::vector<int>& corners, const Vec3& mean) const;  // of half-edges about a vertex that leave it
   void fit_tensor(int vertex, const std::vector<int>& corners, int fan);
   Spot find_lowest(const Vec3& up, int face, const Vec3& centre, double spring) const;
@@ -90,6 +93,7 @@ class Skin {
   std::vector<double> region_area_;
   std::vector<char> sharp_, flat_, plane_;  // half-edges; faces; regions that are plane among curved ones
   std::vector<Vec3> fan_normals_;
+  std::vector<Vec3> controls_;  // of half-edges
   std::vector<Tensor> fan_tensors_;
   std::vector<char> fan_curved_;
   std::vector<VertexKind> kinds_;

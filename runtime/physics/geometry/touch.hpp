@@ -26,6 +26,7 @@ struct Touch {
   Vec3 station_a{}, station_b{};  // surface points in the mesh frames (b: world for the ground)
   double curvature_a_per_m = 0.0, curvature_b_per_m = 0.0;  // mean, for Hertz; 0 flat
   double steepest_per_m = 0.0;                              // the largest curvature of curved sides together: of what rolls; 0 flat
+  double rim_m = 0.0;                                       // radius of a rim that touches with a corner of its polygon; 0: none
   bool smooth = false;                                      // the point travels over a curved surface while it rolls: refresh() moves it
   // What refresh() continues from:
   Side side_a = Side::point, side_b = Side::plane;

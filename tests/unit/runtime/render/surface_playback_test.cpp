@@ -15,11 +15,7 @@
 #include "tests/support/catch_message.hpp"
 #include "tests/support/folder.hpp"
 #include "tests/unit/runtime/acoustics/recording/make_surface.hpp"
-<<<<<<< HEAD
 #include "tests/unit/runtime/render/heard.hpp"
-=======
-#include "tests/unit/runtime/scene/heard.hpp"
->>>>>>> a_scene
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 
 namespace carillon::render {
