@@ -55,7 +55,8 @@ class SurfaceProbe {
     return !is_inside && on.distance2 > far * far ? std::sqrt(on.distance2) - sag : calc_skin_gap(shape_, x, on, is_inside);
   }
   Nearest find_nearest(const Vec3& x) const {
-    return shape_.mesh().find_nearest(x, Box::kFar, body_ != nullptr ? -1 : grid_->find_near(x).face);
+    const int face = body_ != nullptr ? -1 : grid_->find_near(x).face;
+    return face >= 0 && !thin_ ? shape_.mesh().walk_nearest(x, face) : shape_.mesh().find_nearest(x, Box::kFar, face);
   }
 
  private:

@@ -1,10 +1,8 @@
 // Method: of the samples near the other body, corners and ridge points that no neighbour is lower than, and samples of curved parts that
-// are
-//   the nearest among their neighbours; each against the nearest place of the other's fine mesh, and settled there. Ridges against curved
-//   parts: the lowest place of each straight piece, and ends that both pieces rise from.
+//   are the nearest among their neighbours; each against the nearest place of the other's fine mesh, and settled there. Ridges against
+//   curved parts: the lowest place of each straight piece, and ends that both pieces rise from.
 // Source: C. Ericson, "Real-Time Collision Detection" (2005), 5.1.9.
-// Deviations: estimates from the grid's face by way of neighbours, not the nearest face of all, decide which sample is the nearest among
-//   its neighbours, but for bodies with walls thinner than four cells.
+// Deviations: the nearest place is found from the grid's face by way of neighbours, but for bodies with walls thinner than four cells.
 #include "runtime/physics/geometry/pass.hpp"
 
 namespace carillon::geometry {

@@ -61,7 +61,7 @@ class Skin {
   int group(int face) const { return group_[face]; }
   int count_smooth_edges() const { return smooth_edges_; }  // between different regions
 
-  Patch make_patch(int face) const;
+  Patch get_patch(int face) const { return {{mesh_.corner(face, 0), mesh_.corner(face, 1), mesh_.corner(face, 2)}, bends_[face]}; }
   Vec3 calc_point(int face, const Vec3& w) const;
   /// The patch's own normal.
   Vec3 calc_normal(int face, const Vec3& w) const;
@@ -84,7 +84,9 @@ class Skin {
   void make_controls();
   bool is_tip(const std::vector<int>& corners, const Vec3& mean) const;  // of half-edges about a vertex that leave it
   void fit_tensor(int vertex, const std::vector<int>& corners, int fan);
-  Spot find_lowest(const Vec3& up, int face, const Vec3& centre, double spring) const;
+  void make_bends();
+  void lower(const Vec3& up, int face, const Vec3& centre, double spring, double below, Spot& spot) const;
+  void place(Spot& spot) const;
 
   const Mesh& mesh_;
   bool all_curved_ = false;
@@ -96,6 +98,7 @@ class Skin {
   std::vector<Vec3> controls_;  // of half-edges
   std::vector<Tensor> fan_tensors_;
   std::vector<char> fan_curved_;
+  std::vector<std::array<Vec3, 3>> bends_;  // Patch::c of the faces
   std::vector<VertexKind> kinds_;
   double sag_m_ = 0.0, tiny_ = 0.0, size_m_ = 0.0;
 };

@@ -51,8 +51,10 @@ class PairMemory {
  public:
   bool known = false;
   Frame searched;                   // a in b, at the last search
+  Frame a, b;                       // at that search
   double reach_m = 0.0;             // margin of that search and what was added to it
-  std::vector<Touch> candidates;    // of it, nearer than reach_m
+  std::vector<Touch> candidates;    // of it, nearer than reach_m,
+  bool are_followed = false;        // and moved since
   std::vector<Touch> last;          // touches given at the last call, to name those of the next
   std::uint64_t serial = 0;         // of names given
   std::array<int, 2> axis{-1, -1};  // that separated or carried last: kind, index
