@@ -35,16 +35,7 @@ Skin::Skin(const Mesh& mesh) : mesh_(mesh) {
   find_sharp_edges();
   make_fans();
   make_groups();
-<<<<<<< HEAD:runtime/physics/geometry/skin.cpp
-  make_controls();
-=======
   make_bends();
-  for (int f = 0; f < mesh.count_faces(); ++f) {
-    if (flat_[f] != 0) continue;
-    const Patch patch = get_patch(f);
-    for (int k = 0; k < 3; ++k) sag_m_ = std::max(sag_m_, 2.0 / 3.0 * norm(patch.c[k] - 0.5 * (patch.p[k] + patch.p[(k + 1) % 3])));
-  }
->>>>>>> cost:runtime/physics/geometry/skin.cpp
   all_curved_ = std::find(flat_.begin(), flat_.end(), 1) == flat_.end() &&
                 std::all_of(kinds_.begin(), kinds_.end(), [](VertexKind kind) { return kind == VertexKind::smooth; });
 }
@@ -291,13 +282,14 @@ int Skin::find_face(int vertex) const {
   return start / 3;
 }
 
-<<<<<<< HEAD:runtime/physics/geometry/skin.cpp
-/// Of the edges of curved faces. A sharp edge bends in the plane of its tangents, which the normals of both sides give: so both meet.
-void Skin::make_controls() {
+/// Control points of curved edges. A sharp edge bends in the plane of its tangents, given by the normals of both sides, so both sides meet.
+void Skin::make_bends() {
+  bends_.resize(mesh_.faces.size());
   for (int e = 0; e < 3 * mesh_.count_faces(); ++e) {
     const int next = Mesh::next(e), other = mesh_.opposite[e];
     const Vec3 &p = mesh_.vertices[mesh_.vertex_of(e)], &q = mesh_.vertices[mesh_.vertex_of(next)], d = q - p;
-    Vec3 control = 0.5 * (p + q);
+    Vec3& control = bends_[e / 3][e % 3];
+    control = 0.5 * (p + q);
     const auto lift = [&](int corner, int across) {  // from the tangent plane or line at a corner to the other end
       const Vec3& n = fan_normals_[fan_[corner]];
       const Vec3 t = cross(n, fan_normals_[fan_[across]]);
@@ -305,31 +297,7 @@ void Skin::make_controls() {
       return norm2(t) > kCoplanar ? d - (dot(d, t) / norm2(t)) * t : Vec3{};
     };
     if (flat_[e / 3] == 0) control = control - (0.5 * kAlpha) * lift(e, Mesh::next(other)) + (0.5 * kAlpha) * lift(next, other);
-    controls_.push_back(control);
     sag_m_ = std::max(sag_m_, 2.0 / 3.0 * norm(control - 0.5 * (p + q)));
-  }
-}
-
-Patch Skin::make_patch(int face) const {
-  Patch patch;
-  for (int k = 0; k < 3; ++k) {
-    patch.p[k] = mesh_.corner(face, k);
-    patch.c[k] = controls_[3 * face + k];
-=======
-void Skin::make_bends() {
-  bends_.resize(mesh_.faces.size());
-  for (int f = 0; f < mesh_.count_faces(); ++f) {
-    for (int k = 0; k < 3; ++k) {
-      const int l = (k + 1) % 3;
-      const Vec3 &from = mesh_.corner(f, k), &to = mesh_.corner(f, l);
-      Vec3& c = bends_[f][k];
-      c = 0.5 * (from + to);
-      if (flat_[f] != 0) continue;
-      const Vec3 d = to - from;
-      const Vec3 &nk = fan_normals_[fan_[3 * f + k]], &nl = fan_normals_[fan_[3 * f + l]];
-      c = c - (0.5 * kAlpha * dot(d, nk)) * nk + (0.5 * kAlpha * dot(d, nl)) * nl;
-    }
->>>>>>> cost:runtime/physics/geometry/skin.cpp
   }
 }
 

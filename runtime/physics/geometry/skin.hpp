@@ -81,7 +81,6 @@ class Skin {
   void find_sharp_edges();
   void make_fans();
   void make_groups();
-  void make_controls();
   bool is_tip(const std::vector<int>& corners, const Vec3& mean) const;  // of half-edges about a vertex that leave it
   void fit_tensor(int vertex, const std::vector<int>& corners, int fan);
   void make_bends();
@@ -95,7 +94,6 @@ class Skin {
   std::vector<double> region_area_;
   std::vector<char> sharp_, flat_, plane_;  // half-edges; faces; regions that are plane among curved ones
   std::vector<Vec3> fan_normals_;
-  std::vector<Vec3> controls_;  // of half-edges
   std::vector<Tensor> fan_tensors_;
   std::vector<char> fan_curved_;
   std::vector<std::array<Vec3, 3>> bends_;  // Patch::c of the faces
