@@ -35,7 +35,7 @@ TRIAL_TOLERANCE = 1e-6
 START_S = 0.15  # CPU seconds of the start, in no phase of the record
 BUDGET_MARGIN = 0.85  # fraction of --seconds that is used
 CHECK_GROWTH = 2.5  # factor of the nodes for --check
-PATIENCE_S = 6.0  # limit of --validate; longer ones are estimated
+PATIENCE_S = 20.0  # limit of --validate
 LONG_S, MANY_NODES = (
     10.0,
     45000,
@@ -188,8 +188,8 @@ class Adviser:
             return None
         # A surface that is not thin has a few thousand nodes in its first trial, whatever its usual mesh takes.
         is_thin = self.target.kind == "surface" and found["mesh"]["nodes"] > MANY_NODES
-        is_unmade = self.target.kind == "mesh" or found["mesh"]["how"] == "estimated"
-        return found if is_thin or is_unmade and found["cpu_seconds"] > LONG_S else None
+        is_long = self.target.kind == "mesh" and found["cpu_seconds"] > LONG_S
+        return found if is_thin or is_long else None
 
     def look(self):
         setting = forecast.Setting("T10", PROBE_NODES["surface"], TRIAL_TOLERANCE)
@@ -198,8 +198,13 @@ class Adviser:
         with tempfile.TemporaryDirectory(dir=self.lab.runs) as folder:
             file = pathlib.Path(folder) / "job.json"
             file.write_text(json.dumps(job))
-            command = [self.lab.find_program("carillon-precompute"), "--validate", "--json", "--quiet", "--patience", str(PATIENCE_S), file]
-            done = subprocess.run(command, capture_output=True, text=True, errors="surrogateescape", stdin=subprocess.DEVNULL)
+            command = [self.lab.find_program("carillon-precompute"), "--validate", "--json", "--quiet", file]
+            try:
+                done = subprocess.run(
+                    command, capture_output=True, text=True, errors="surrogateescape", stdin=subprocess.DEVNULL, timeout=PATIENCE_S
+                )
+            except subprocess.TimeoutExpired:
+                return None
         if done.returncode != 0:
             return None  # the first trial says why, in the words of a run
         return json.loads(done.stdout)

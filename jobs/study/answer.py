@@ -50,22 +50,17 @@ def describe_estimate(adviser, found, options):
     asked = " and ".join(f"{value:g} {unit}" for value, unit in ((options.cents, "cents"), (options.seconds, "CPU s")) if value is not None)
     memory = found["memory_bytes"]["1"] * 1e-9
     lines = [f"{adviser.target.name}: {note}" for note in adviser.target.notes or [f"a {adviser.target.kind}, as the job has it"]]
-    modes = (
-        "modes that are not known before it is read"
-        if found["modes"]["how"] == "unknown"
-        else f"{'' if found['modes']['how'] == 'counted' else 'about '}{found['modes']['count']} modes in the band"
-    )
+    modes = f"{'' if found['modes']['how'] == 'counted' else 'about '}{found['modes']['count']} modes in the band"
     what = (
         "so many nodes take long to solve. The mesh has"
         if adviser.target.kind == "mesh"
         else "so thin a body takes long to mesh and to solve. Its coarsest mesh has"
     )
-    by = "by its size alone and to a factor of two" if found["mesh"]["how"] == "estimated" else "without a solve"
     lines += [
         f"asked:     {asked}",
         (
             f"estimate:  {what} about {found['mesh']['nodes']:,} nodes (T10), {modes}, {found['cpu_seconds']:.0f} CPU s and"
-            f" {memory:.1f} GB, {by}"
+            f" {memory:.1f} GB, without a solve"
         ),
     ]
     if options.dry_run:

@@ -1,6 +1,6 @@
 // Method: indices, welding, orientation, volume, twins of elements, then the faces: two elements on a face run through its corners in
 //   opposite senses when they lie on opposite sides of it; faces that stay alone form the boundary, whose edges must pair up.
-// Source: own; orientation by the sign of det(x1 - x0, x2 - x0, x3 - x0).
+// orientation by the sign of det(x1 - x0, x2 - x0, x3 - x0).
 // Deviations: elements that interpenetrate without sharing a face are not found (that would need a search for intersections).
 
 #include "precompute/mesh/check.hpp"

@@ -1,7 +1,5 @@
 // Method: dihedral angles from the outward area vectors of the faces; mean ratio; volume.
 // Source: Liu and Joe 1994, "Relationship between tetrahedron shape measures", BIT 34, eq. (mean ratio eta).
-// Deviations: none.
-
 #include <algorithm>
 #include <cmath>
 #include <limits>

@@ -1,6 +1,5 @@
 // Method: nodes are sorted into cells of a grid a thousand times coarser than the tolerance; twins are joined transitively. Twins are
 //   welded only where two boundary faces coincide corner by corner, so that bodies touching at a point or along an edge stay apart.
-// Source: own.
 // Deviations: the tolerance is 1e-6 of the diagonal of the box of the nodes in use, but 0.01 of the shortest edge at most, and
 //   calc_place_tolerance at least.
 

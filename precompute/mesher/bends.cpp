@@ -3,7 +3,6 @@
 //   than three times wider or a polygon, and where the turn changes its sign or its size by more than a factor. Its length distinguishes an
 //   arc cut into facets from a bevel.
 // Source: our own. The thresholds are measured: docs/decisions/surface-meshing.md.
-// Deviations: none.
 #include "precompute/mesher/bends.hpp"
 
 #include <algorithm>

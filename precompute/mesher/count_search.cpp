@@ -3,7 +3,6 @@
 //   count no longer falls as edges grow, the body's own thickness sets it and the search ends. Counts of coarse meshes jump, so a row of
 //   edges is tried there too.
 // Source: our own.
-// Deviations: none.
 #include "precompute/mesher/count_search.hpp"
 
 #include <algorithm>

@@ -2,7 +2,6 @@
 //   Balls around edges that are longer than this would reach into each other, and the mesher would shrink them again and again.
 // Source: our own; the condition is the one on protecting balls of Cheng, Dey and Ramos, "Delaunay refinement for piecewise smooth
 //   complexes", SODA 2007.
-// Deviations: none.
 #include "precompute/mesher/curve_sizes.hpp"
 
 #include <algorithm>

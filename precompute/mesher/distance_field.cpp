@@ -3,7 +3,6 @@
 //   closed cavities and needs a watertight surface; the winding number needs neither and takes overlapping parts as one body.
 // Source: the tie rule of the crossings is the "simulation of simplicity" of Edelsbrunner and Muecke 1990 (the line is moved by an
 //   infinitesimal).
-// Deviations: none.
 #include "precompute/mesher/distance_field.hpp"
 
 #include <fmt/core.h>

@@ -4,7 +4,6 @@
 //   mean of the two edges above and below, so that the sides of prisms are ruled.
 // Source: Dompierre, Labbe, Vallet and Camarero, "How to subdivide pyramids, prisms and hexahedra into tetrahedra", 8th International
 //   Meshing Roundtable, 1999 (the diagonals); Vlachos, Peters, Boyd and Mitchell, "Curved PN triangles", I3D 2001 (the arcs).
-// Deviations: none.
 #include "precompute/mesher/extrude.hpp"
 
 #include <fmt/core.h>

@@ -1,7 +1,6 @@
 // Method: signal handlers on a stack of their own, so that they run after a stack overflow too. They only write a line that was made before
 //   and end the process: nothing else is safe in them. Nothing is lost, for outputs have no name before they are whole.
 // Source: POSIX.1-2017, signal concepts (async-signal-safe functions), setrlimit (RLIMIT_CPU, SIGXCPU).
-// Deviations: none.
 #include "precompute/mesher/guard.hpp"
 
 #include <fmt/format.h>

@@ -1,7 +1,6 @@
 // Method: the boundary faces around a node form one fan on a surface. Where they form several, the cheapest place for a second node is
 //   sought over each of the fans, and the space between fan and node filled with one element per face.
 // Source: our own; the inverse of the edge collapse that would have pinched a sound mesh.
-// Deviations: none.
 #include "precompute/mesher/part_nodes.hpp"
 
 #include <algorithm>

@@ -3,7 +3,6 @@
 //   triangles. The skins of a shell come from a sampled distance, which is linear between its samples and so lies off a curved skin by up
 //   to an eighth of the square of their spacing over the radius; there the way leads to no distance, or to that of the wall.
 // Source: our own.
-// Deviations: none.
 #include "precompute/mesher/place_nodes.hpp"
 
 #include <fmt/core.h>

@@ -1,7 +1,6 @@
 // Method: least-area hole filling and alpha wrapping.
 // Source: Liepa, "Filling holes in meshes", SGP 2003; Portaneri et al., "Alpha wrapping with an offset", ACM TOG 41(4), 2022;
 //   both as CGAL 5.5 has them.
-// Deviations: none.
 #include "precompute/mesher/repair.hpp"
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>

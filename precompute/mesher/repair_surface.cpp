@@ -1,7 +1,6 @@
 // Method: points at one place are joined; each patch is oriented across its edges; the boundary of the triangles, taken with
 //   their signs, is a set of loops, and each small enough loop is filled. A heap that this does not close is wrapped.
 // Source: the boundary of a chain is a cycle (any text on simplicial homology).
-// Deviations: none.
 #include <fmt/core.h>
 
 #include <algorithm>

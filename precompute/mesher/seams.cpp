@@ -1,7 +1,5 @@
 // Method: borders are the edges of one triangle. A grid for each length of border finds near ones. Two borders run along each other if they
 //   share two distant points, within the tolerance. Ends that meet become one point; an end inside the other border cuts its triangle.
-// Source: own.
-// Deviations: none.
 #include "precompute/mesher/seams.hpp"
 
 #include <algorithm>

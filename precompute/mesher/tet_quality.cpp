@@ -1,7 +1,6 @@
 // Method: an edge or a node at which the boundary is no surface is the meeting of several groups of elements that share no face
 //   there; all but the largest group are removed, and again, until there is none.
 // Source: our own.
-// Deviations: none.
 #include "precompute/mesher/tet_quality.hpp"
 
 #include <algorithm>

@@ -1,6 +1,5 @@
 // Method: curves end where they turn back; segments sorted along an axis; each is compared with those whose boxes it meets.
 // Source: distance of two segments: Ericson, Real-Time Collision Detection, 2005, section 5.1.9.
-// Deviations: none.
 #include "precompute/mesher/untangle_curves.hpp"
 
 #include <algorithm>

@@ -3,7 +3,6 @@
 //   the parts of the body and of the space around it, found in the distance field by rows of samples, are one more than the surfaces
 //   between them (in space, each closed surface parts one region in two).
 // Source: our own; the last is the tree of regions that nested surfaces make (Alexander duality).
-// Deviations: none.
 #include "precompute/mesher/verify.hpp"
 
 #include <fmt/core.h>

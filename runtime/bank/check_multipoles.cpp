@@ -100,7 +100,7 @@ std::string find_mixing_fault(const Mixing& mixing) {
   std::size_t at = 0;
   for (std::size_t i = 0; i < mixing.count.size(); ++i) {
     const std::int32_t count = mixing.count[i];
-    if (count < 1 || count > std::ssize(mixing.motion) - at)
+    if (count < 1 || count > std::ssize(mixing.motion) - static_cast<std::ptrdiff_t>(at))
       return fmt::format("radiation/mixing_count[{}] is {}, and {} parts are left", i, count, mixing.motion.size() - at);
     for (std::int64_t k = 0, before = -1; k < count; ++k, before = mixing.motion[at++])
       if (mixing.motion[at] <= before || mixing.motion[at] >= motions)

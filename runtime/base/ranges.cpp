@@ -23,4 +23,14 @@ Vec3 read_vector(Object& object, std::string_view key, const Vec3& fallback, dou
   return v;
 }
 
+Vec3 read_facing(Object& listener, const Vec3& position_m, const Vec3& fallback, double limit) {
+  const bool looks = listener.has("look_at_m");
+  if (looks && listener.has("facing")) listener.fail("look_at_m", "says the same thing as \"facing\"; keep one of them");
+  const char* key = looks ? "look_at_m" : "facing";
+  const Vec3 given = read_vector(listener, key, fallback, limit);
+  const Vec3 direction = looks ? given - position_m : given;
+  if (!(norm(direction) > 1e-9)) listener.fail(key, "gives the listener no direction to look in; name another place or direction");
+  return direction;
+}
+
 }  // namespace carillon::base

@@ -15,4 +15,8 @@ double read_within(Object& object, std::string_view key, double fallback, double
 /// Three numbers of magnitude at most `limit`.
 Vec3 read_vector(Object& object, std::string_view key, const Vec3& fallback, double limit);
 
+/// Direction, not normalised and not 0, in which a listener at `position_m` looks: "look_at_m", a point, or "facing", a direction;
+/// components up to `limit`.
+Vec3 read_facing(Object& listener, const Vec3& position_m, const Vec3& fallback, double limit);
+
 }  // namespace carillon::base

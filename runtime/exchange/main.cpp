@@ -344,7 +344,7 @@ int run(int argc, char** argv) {
       [](const CLI::App* asked, const CLI::Error& error) { return base::printable_lines(CLI::FailureMessage::simple(asked, error)); });
   app.require_subcommand(1);
   app.set_version_flag("--version", base::describe("carillon-bank"));
-  Options options;
+  Options options{};
   add_commands(app, options);
   try {
     app.parse(argc, argv);

@@ -131,7 +131,7 @@ Launch make_launch(const Options& options, const std::string& token, const Scrat
   } else if (options.is_simulation) {
     add({"--checkpoint", store::kCheckpointFile, "--progress", store::kProgressFile});  // its outputs are in the job
   } else if (options.is_prediction) {
-    add({"--validate", "--json", "--patience", "1000000", "--count", "20"});  // from the mesh itself
+    add({"--validate", "--json"});
   } else {
     add({"--bank", store::kBankFile, "--checkpoint", store::kCheckpointFile, "--progress", store::kProgressFile});
   }

@@ -1,7 +1,5 @@
 // Method: faces are first brought together within a rank; those left alone, and those whose corners all lie on a seam, go to the owner of
 //   their lowest corner, which sees all elements of a face. What is alone there too is boundary; its rank sends it to rank 0.
-// Source: own.
-// Deviations: none.
 #include "precompute/mesh/parallel/boundary.hpp"
 
 #include <fmt/format.h>

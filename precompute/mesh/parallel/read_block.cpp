@@ -1,8 +1,6 @@
 // Method: every rank reads an even run of nodes and of elements by their places in the file, and asks the owners of its elements' nodes for
 //   what it needs of them. Mid nodes are numbered by the order of their edges (low corner, then high corner), which the owners of the low
 //   corners sort among themselves.
-// Source: own.
-// Deviations: none.
 #include "precompute/mesh/parallel/read_block.hpp"
 
 #include <fmt/format.h>

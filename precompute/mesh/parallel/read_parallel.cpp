@@ -1,7 +1,6 @@
 // Method: find the arrays (layout), read blocks (read_block), cut (mesh::bisect), move elements and number nodes
 //   (mesh::redistribute), once more if the caller has a better cut, bring faces together (boundary).
 // Source: the steps name theirs.
-// Deviations: none.
 #include "precompute/mesh/parallel/read_parallel.hpp"
 
 #include <fmt/format.h>

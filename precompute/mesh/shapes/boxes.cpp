@@ -3,8 +3,6 @@
 // Method: Whole numbers of cells; the hollow box leaves the cells of its cavity out. The radii of the tube grow geometrically, so that the
 //   cells of a thick wall stay as long as wide. Mid-side nodes of the tube lie at the mean radius and mean angle of their corners: exactly
 //   on the cylinders where both corners do, and blended across the wall, so that no element folds.
-// Source: own.
-// Deviations: none.
 #include <fmt/core.h>
 
 #include <algorithm>

@@ -4,7 +4,6 @@
 //   diagonals that start at the smallest index, which conforms by construction.
 // Source: Kuhn 1960, IBM J. Res. Dev. 4; Todd 1976, "The Computation of Fixed Points and Applications" (J1); Dompierre et al. 1999,
 //   "How to subdivide pyramids, prisms and hexahedra into tetrahedra".
-// Deviations: none.
 #include "precompute/mesh/shapes/lattice.hpp"
 
 #include <algorithm>

@@ -1,8 +1,6 @@
 // Method: Cells as near to the wanted edge as whole numbers allow. For a node count the edge is found by bisection, then all divisions near
 //   it are compared: what misses the count by more than 3 % pays ten times its miss, what is longer than wide pays the square of the
 //   logarithm of its aspect.
-// Source: own.
-// Deviations: none.
 #include "precompute/mesh/shapes/plan.hpp"
 
 #include <fmt/core.h>

@@ -6,8 +6,6 @@
 //   axis, each refined, so that the section at level i has i rings; layers of prisms may follow, so that levels and rings are chosen apart.
 //   Mid-side nodes lie at the mean radius of their corners about the axis of the section: exactly on the surface where both corners do, the
 //   bulge fading with the square of the radius towards the axis.
-// Source: own.
-// Deviations: none.
 #include <algorithm>
 #include <cmath>
 #include <numbers>

@@ -8,7 +8,6 @@
 //   Mid-side nodes: on the mean radius of their corners, exactly on the spheres where both corners are; in the ball the bulge fades with
 //   the square of the radius towards the straight-sided centre.
 // Source: refinement: Bey 1995, Computing 55, 355. The rest is own.
-// Deviations: none.
 #include <algorithm>
 #include <cmath>
 #include <numbers>

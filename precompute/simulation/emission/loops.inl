@@ -1,6 +1,5 @@
 // Method:     elementwise; see loops.hpp.
 // Source:     docs/equations.md E14.
-// Deviations: none.
 //
 // Included by loops_*.cpp inside an unnamed namespace; nothing of std is used, so that no function compiled for one processor can be linked
 // in place of another's.

@@ -1,7 +1,6 @@
 // Method:     a value that lies between two samples is added to the samples before and behind it, with the weights of the kernel at their
 //             distances (polyphase). No step is ever convolved twice, and no history of steps is kept.
 // Source:     OCE01 eq. 6 to 8.
-// Deviations: none.
 #include "precompute/simulation/emission/low_pass.hpp"
 
 #include <algorithm>

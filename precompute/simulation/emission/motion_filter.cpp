@@ -2,7 +2,6 @@
 //             half-samples with weights that also take out the droop of the first stage. Many steps a sample are first summed in boxes. A
 //             velocity is the difference of two steps, whose images at multiples of the rate of boxes are thus down by two factors.
 // Source:     docs/equations.md E14.
-// Deviations: none.
 #include "precompute/simulation/emission/motion_filter.hpp"
 
 #include <algorithm>

@@ -1,6 +1,5 @@
 // Method:     see paper_filter.hpp.
 // Source:     OCE01 eq. 5 to 8.
-// Deviations: none.
 #include "precompute/simulation/emission/paper_filter.hpp"
 
 #include <algorithm>

@@ -1,6 +1,5 @@
 // Method:     whole blocks of samples, and keys, are gathered from all ranks and written by rank 0.
 // Source:     docs/surface-format.md.
-// Deviations: none.
 #include "precompute/simulation/emission/recorder.hpp"
 
 #include <algorithm>

@@ -1,7 +1,6 @@
 // Method:     rays from every triangle to every receiver, 1000 times a second, past the places at the beginning of a sample; delta is faded
 //             from one look to the next.
 // Source:     OCE01 eq. 10; docs/equations.md E14.
-// Deviations: none.
 #include "precompute/simulation/emission/screens.hpp"
 
 #include <algorithm>

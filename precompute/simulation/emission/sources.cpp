@@ -1,6 +1,5 @@
 // Method:     fluxes of triangles once a sample; their derivative over 33 samples; one pole a body over 32.
 // Source:     docs/equations.md E14.
-// Deviations: none.
 #include "precompute/simulation/emission/sources.hpp"
 
 #include <algorithm>

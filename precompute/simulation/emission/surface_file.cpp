@@ -1,7 +1,6 @@
 // Method:     HDF5 lays the arrays out once, each in one piece and at its final length; from then on rows are written to where they belong
 //             without HDF5, so that a process that ends in the middle leaves a file that can be continued.
 // Source:     HDF5 1.10 reference manual; docs/surface-format.md.
-// Deviations: none.
 #include "precompute/simulation/emission/surface_file.hpp"
 
 #include <fcntl.h>

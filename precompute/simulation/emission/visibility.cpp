@@ -1,7 +1,6 @@
 // Method:     boxes are cut at the median of the centres along their longest side; the way is cut with boxes by slabs and with triangles by
 //             Moeller and Trumbore.
 // Source:     OCE01 eq. 10 (delta); Moeller and Trumbore 1997; Kay and Kajiya 1986.
-// Deviations: none.
 #include "precompute/simulation/emission/visibility.hpp"
 
 #include <algorithm>

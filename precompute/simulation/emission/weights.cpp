@@ -2,7 +2,6 @@
 //             stages together for the motion, relative for derivatives, with a weight of 1e-7 on other frequencies, which keeps the weights
 //             small; normal equations, L D L^T.
 // Source:     Kaiser 1974; docs/equations.md E14.
-// Deviations: none.
 #include "precompute/simulation/emission/weights.hpp"
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 // Method: rank 0 sorts nodes along a Morton curve and elements by kind and lowest nodes, and broadcasts the result. Nodes that follow each
 //   other are near each other, so that the values of an element's nodes are in few lines of the cache.
-// Source: Morton 1966. Deviations: none.
+// Source: Morton 1966.
 #include "precompute/simulation/transient/assembly.hpp"
 
 #include <fmt/format.h>

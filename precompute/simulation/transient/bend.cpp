@@ -2,7 +2,6 @@
 //             (Curtis, Powell and Reid); Newton's method for an equilibrium, with load steps if it does not converge; subspace iteration
 //             with a negative shift for modes; sparse L D L^T.
 // Source:     Curtis, Powell and Reid 1974; Bathe 1996, 8.4 and 11.6; docs/equations.md E11.
-// Deviations: none.
 #include "precompute/simulation/transient/bend.hpp"
 
 #include <fmt/format.h>

@@ -1,5 +1,5 @@
 // Method: every rank has the assembly, keeps its part of the nodes, and lists the elements that touch one of them.
-// Source: docs/equations.md E11. Deviations: none.
+// Source: docs/equations.md E11.
 #include "precompute/simulation/transient/domain.hpp"
 
 #include <fmt/format.h>

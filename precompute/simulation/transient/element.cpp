@@ -2,7 +2,6 @@
 // conical
 //   product of Gauss's rule of five points, which is exact for it, scaled to the volume.
 // Source: docs/equations.md E11; Hinton, Rock and Zienkiewicz 1976, Earthquake Eng. Struct. Dyn. 4, 245; Stroud 1971 (conical product).
-// Deviations: none.
 #include "precompute/simulation/transient/element.hpp"
 
 #include <cmath>

@@ -3,7 +3,6 @@
 //             and w_k = u_q where k = q and u_kq elsewhere, the derivative with respect to L_k is s_k + 4 (a - b) w_k. The part of s is the
 //             same at all points, and w are the nodes of the small tetrahedron at corner q. Forces by the transpose of the same.
 // Source:     docs/equations.md E11. O'Brien, Cook and Essl 2001; Miller, Joldes, Lance and Wittek 2007 (total Lagrangian, explicit).
-// Deviations: none.
 //
 // Included by solids_*.cpp inside an unnamed namespace behind kLanes; nothing of std is used, so that no function compiled for one
 // processor can be linked in place of another's. What a lane computes does not depend on the other lanes.

@@ -1,5 +1,5 @@
 // Method: every double is a whole number of 2^-1074; its bits are added to digits of 32 bits in words of 64, and carries are taken at the
-// end. Source: Kulisch 1971 (exact accumulator). Deviations: none.
+// end. Source: Kulisch 1971 (exact accumulator).
 #include "precompute/simulation/transient/order_free_sum.hpp"
 
 #include <bit>

@@ -1,4 +1,4 @@
-// Method: quintic Hermite pieces. Source: docs/equations.md E11; Flash and Hogan 1985. Deviations: none.
+// Method: quintic Hermite pieces. Source: docs/equations.md E11; Flash and Hogan 1985.
 #include "precompute/simulation/transient/path.hpp"
 
 #include <fmt/format.h>

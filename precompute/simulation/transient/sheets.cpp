@@ -1,6 +1,5 @@
 // Method:     constants of a triangle in its own frame; energies in plain arithmetic, for the energy book.
 // Source:     docs/equations.md E11.
-// Deviations: none.
 #include "precompute/simulation/transient/sheets.hpp"
 
 #include <algorithm>

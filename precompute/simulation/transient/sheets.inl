@@ -2,7 +2,6 @@
 //             of each edge, M = B (s - s0 + alpha1 s'); each triangle takes its own side of a hinge, so that an edge needs no pass of
 //             its own.
 // Source:     docs/equations.md E11; Grinspun, Gingold, Reisman and Zorin 2006 (mid-edge normals), with 2 tan(theta / 2) for theta.
-// Deviations: none.
 //
 // Included by sheets_*.cpp inside an unnamed namespace; nothing of std is used.
 

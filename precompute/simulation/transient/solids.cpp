@@ -1,6 +1,6 @@
 // Method: elements that follow each other with the same kind and law are a run; a run is cut into blocks of as many elements as the
 //   processor has lanes, and the last block is filled up with its own last element at weight 0.
-// Source: docs/equations.md E11; the loops are in kernel.inl. Deviations: none.
+// Source: docs/equations.md E11; the loops are in kernel.inl.
 #include "precompute/simulation/transient/solids.hpp"
 
 #include <algorithm>

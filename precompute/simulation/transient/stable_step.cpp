@@ -1,6 +1,6 @@
 // Method: p <- M^-1 (f(u - e p) - f(u + e p)) / 2 e for all bodies at once, each scaled by itself, with e p at most 1e-6 of the body's
 //   shortest edge; omega^2 is Rayleigh's quotient.
-// Source: docs/equations.md E11. Deviations: none.
+// Source: docs/equations.md E11.
 #include "precompute/simulation/transient/stable_step.hpp"
 
 #include <algorithm>

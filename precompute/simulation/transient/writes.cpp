@@ -1,4 +1,4 @@
-// Method: see WritePlan. Source: none. Deviations: none.
+// Method: see WritePlan.
 #include "precompute/simulation/transient/writes.hpp"
 
 #include <algorithm>

@@ -4,7 +4,6 @@
 //   touched.
 // Source: A. Jain, "Robot and multibody dynamics" (2011), spatial operators; M. Sherman, A. Seth, S. Delp, "Simbody: multibody dynamics for
 //   biomedical research" (2011); E. Hairer, G. Wanner, "Solving ordinary differential equations I" (1993), II.4, Merson.
-// Deviations: none.
 #include "runtime/physics/joints/engine.hpp"
 
 #include <SimTKsimbody.h>

@@ -4,8 +4,6 @@
 //
 // Method:     two voices of one box, one of them with a bank of the kind that is not judged (a membrane); both get the same strikes of 1 ms
 //             and play the same second in turns. CPU time of the thread; the median of the ratios of the rounds.
-// Source:     none.
-// Deviations: none.
 #include <algorithm>
 #include <array>
 #include <cstdio>

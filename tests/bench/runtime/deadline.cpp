@@ -5,8 +5,6 @@
 // Method:     bodies of 200 modes that share a bank, two microphones, blocks of 64 frames at 48 kHz (1.333 ms); every body is struck 200
 //             times a second, by pulses of 0.05 to 0.5 ms at random times; every second body moves. Each call is timed by the clock, which
 //             sees what a host would: other programs too. Events are pushed between the calls.
-// Source:     none.
-// Deviations: none.
 #include <algorithm>
 #include <array>
 #include <chrono>

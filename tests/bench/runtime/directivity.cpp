@@ -5,8 +5,6 @@
 // Method:     modes from 0.8 to 20 kHz in even steps of pitch, of orders as the bunny has them (L = k R + 4, R = 84 mm); the body stands
 //             still or turns at 1 or 10 rad/s. The median and the 99.9 % quantile of the CPU time of a block of 128 samples, the first
 //             blocks, in which everything sets in, left out.
-// Source:     none.
-// Deviations: none.
 #include <algorithm>
 #include <array>
 #include <cmath>

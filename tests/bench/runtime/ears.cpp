@@ -4,8 +4,6 @@
 //
 // Method:     a source that stands still or swings with up to 6 m/s two metres away, with what it sends all round alone or with its three
 //             dipoles, noise in all; CPU time, medians of the rounds, the instruction sets in turns.
-// Source:     none.
-// Deviations: none.
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -1,6 +1,4 @@
 // Method:     chains of multiply-adds that do not wait for each other, more of them than latency times ports, nothing but registers.
-// Source:     none.
-// Deviations: none.
 #include "tests/bench/runtime/fma_limit.hpp"
 
 #include <immintrin.h>

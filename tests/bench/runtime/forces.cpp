@@ -4,8 +4,6 @@
 //
 // Method:     a voice that rings plays blocks of 128 frames with a pulse in each, and the same blocks without; CPU time of the thread,
 //             medians of rounds that alternate.
-// Source:     none.
-// Deviations: none.
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -4,8 +4,6 @@
 // usage: bench_head [--quick] [SOFA]     the sphere, and the head of the file
 //
 // Method:     noise; CPU time of a second of sound, the least of the rounds. The bodies have 30 modes each that ring for ever.
-// Source:     none.
-// Deviations: none.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>

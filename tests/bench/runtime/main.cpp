@@ -5,7 +5,6 @@
 // Method:     a mode-sample is one mode advanced and summed for one sample; an exact linear form takes at least two multiply-adds for it,
 //             so the limit is half the lanes of multiply-adds per second. Limit and voices alternate, CPU time of the thread, medians.
 // Source:     docs/decisions/resonator-kernel.md.
-// Deviations: none.
 #include <algorithm>
 #include <array>
 #include <cmath>

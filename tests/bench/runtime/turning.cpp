@@ -10,8 +10,6 @@
 //             away. The state of the mode over time is that of two bodies which send one monopole, in phase and 90 degrees ahead;
 //             multiplied with transfers that are looked up every 16 samples and go by cubics between, it is the reference. The rms of the
 //             difference over that of what is heard of the mode over all directions.
-// Source:     none.
-// Deviations: none.
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -32,14 +32,14 @@ std::vector<std::size_t> list_upper(const Bank& bank) {
   return found;
 }
 
-TEST(Strikes, TheFirstIsWhereABlowIsHeardMost) {
+TEST(Strikes, TheFirstIsTheLoudest) {
   const std::vector<std::size_t> upper = list_upper(make_still({}));
   ASSERT_EQ(upper.size(), 9u);
   const Bank bank = make_still({{upper[2], 0.5}, {upper[6], -1.0}});
   EXPECT_EQ(find_strikes(bank, 1), std::vector<std::size_t>{upper[6]});
 }
 
-TEST(Strikes, OthersAreFarAndHeardToo) {
+TEST(Strikes, OthersAreDistantAndAudible) {
   const std::vector<std::size_t> upper = list_upper(make_still({}));
   // A tenth of the power is 0.32 of the motion: the vertex with 0.3 is excluded, although it is farthest.
   const Bank bank = make_still({{upper[0], 1.0}, {upper[1], 0.6}, {upper[4], 0.5}, {upper[8], 0.3}});

@@ -13,7 +13,7 @@
 namespace carillon::bank {
 namespace {
 
-TEST(Edges, AreThoseThatASearchOfAllFinds) {
+TEST(Edges, MatchAnExhaustiveSearch) {
   std::mt19937 random(7);
   for (const std::int32_t vertices : {4, 9, 60}) {  // including dense surfaces
     std::vector<std::array<std::int32_t, 3>> triangles(100);
@@ -37,7 +37,7 @@ TEST(Edges, AreThoseThatASearchOfAllFinds) {
   }
 }
 
-TEST(Quantise, NoComponentIsOffByMoreThanHalfAStep) {
+TEST(Quantise, ErrorIsAtMostHalfAStep) {
   Bank bank = example::make_bank(4, 20);
   const std::vector<double> shapes = example::calc_shapes(bank);
   for (std::size_t v = 0, i = 0; v < bank.vertex_count(); ++v) {
@@ -74,7 +74,7 @@ TEST(Quantise, TinyAndHugeShapesKeepTheErrorBound) {
   }
 }
 
-TEST(Quantise, ShapesThatAreNotFiniteOrNotAsManyAreRefused) {
+TEST(Quantise, InvalidShapesAreRejected) {
   Bank bank = example::make_bank(1, 2);
   std::vector<double> shapes = example::calc_shapes(bank);
   shapes[6 * 3 + 4] = std::nan("");
@@ -93,7 +93,7 @@ TEST(Bank, FrequencyIsTheRootOfTheEigenvalueOverTwoPi) {
   EXPECT_NEAR(bank.freq_hz(0), 318.30988618379067, 1e-12);
 }
 
-TEST(Faults, ASaneBankHasNone) {
+TEST(Faults, AValidBankHasNone) {
   EXPECT_EQ(find_faults(example::make_bank()), std::vector<std::string>{});
   EXPECT_EQ(find_faults(example::make_bank(3, 0)), std::vector<std::string>{}) << "a body may have no mode in the band";
   EXPECT_EQ(find_faults(example::make_bank(5, 40)), std::vector<std::string>{});
@@ -110,14 +110,14 @@ TEST(Faults, ABankWithoutProofOrCutByMaxModesHasNone) {
   EXPECT_FALSE(find_faults(bank).empty());
 }
 
-TEST(Faults, CorrectedFrequenciesAndBarsThatAreUnknownAreNone) {
+TEST(Faults, UnknownCorrectionsAndBarsAreNone) {
   Bank bank = example::make_corrected_bank(3, 9);
   EXPECT_EQ(find_faults(bank), std::vector<std::string>{});
   bank.discretisation_error_cents[1] = bank.corrected.error_cents[1] = std::numeric_limits<double>::infinity();
   EXPECT_EQ(find_faults(bank), std::vector<std::string>{});
 }
 
-TEST(Faults, AHollowBodyWithItsInnerSkinHasNone) {
+TEST(Faults, AHollowBodyHasNone) {
   Bank bank = example::make_bank(2, 3);
   const std::vector<Vec3> outer = bank.vertices_m;
   const auto skin = bank.triangles;

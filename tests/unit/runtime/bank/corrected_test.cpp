@@ -27,7 +27,7 @@ double calc_sphere(double freq_hz) {
   return freq_hz / std::hypot(1.0, 2 * std::numbers::pi * freq_hz / 343.0 * radius);
 }
 
-TEST(Corrected, AreReadAsTheyWereWrittenAndRaiseTheVersion) {
+TEST(Corrected, ReadBackExactlyAndRaiseTheVersion) {
   const std::filesystem::path file = testing::TempDir() + "corrected.hdf";
   const Bank bank = example::make_corrected_bank(2, kModes);
   write_bank(bank, file);
@@ -39,7 +39,7 @@ TEST(Corrected, AreReadAsTheyWereWrittenAndRaiseTheVersion) {
   EXPECT_EQ(read.corrected.correction, bank.corrected.correction);
 }
 
-TEST(Facets, InDoubtAreReadAsTheyWereWrittenRaiseTheVersionAndFollowTheirModes) {
+TEST(Facets, InDoubtReadBackRaiseTheVersionAndFollowTheirModes) {
   const std::filesystem::path file = testing::TempDir() + "facets.hdf";
   Bank bank = example::make_corrected_bank(2, kModes);
   for (std::size_t m = 0; m < kModes; ++m) bank.facet_error_cents.push_back(10.0 * static_cast<double>(m + 1));
@@ -60,7 +60,7 @@ TEST(Facets, InDoubtAreReadAsTheyWereWrittenRaiseTheVersionAndFollowTheirModes) 
   EXPECT_TRUE(describe_facets(bank).empty());
 }
 
-TEST(Corrected, AreInAscendingOrderAndEveryModeKeepsWhatIsItsOwn) {
+TEST(Corrected, AreAscendingAndModesKeepTheirArrays) {
   const Bank bank = example::make_corrected_bank(2, kModes), played = calc_corrected(bank);
   EXPECT_EQ(find_faults(played), std::vector<std::string>{});
   ASSERT_EQ(played.mode_count(), kModes);
@@ -81,7 +81,7 @@ TEST(Corrected, AreInAscendingOrderAndEveryModeKeepsWhatIsItsOwn) {
   EXPECT_FALSE(played.proof.has_value()) << "it is about the mesh";
 }
 
-TEST(Corrected, KeepWhatEveryModeGivesItsSupportsPerAcceleration) {
+TEST(Corrected, KeepReactionsPerAcceleration) {
   Bank bank = example::make_corrected_bank(2, kModes);
   bank.supports = example::make_supported_bank(2, kModes).supports;
   const Bank played = calc_corrected(bank);
@@ -96,7 +96,7 @@ TEST(Corrected, KeepWhatEveryModeGivesItsSupportsPerAcceleration) {
   }
 }
 
-TEST(Corrected, LeaveABankAloneThatHasNone) {
+TEST(Corrected, AbsentLeaveTheBankUnchanged) {
   const Bank bank = example::make_bank(2, 5), played = calc_corrected(bank);
   EXPECT_EQ(played.eigenvalue_rad2_s2, bank.eigenvalue_rad2_s2);
   EXPECT_EQ(played.decay_per_s, bank.decay_per_s);
@@ -105,7 +105,7 @@ TEST(Corrected, LeaveABankAloneThatHasNone) {
   EXPECT_EQ(mesh.eigenvalue_rad2_s2, example::make_corrected_bank(2, 5).eigenvalue_rad2_s2);
 }
 
-TEST(Corrected, DecideWhichModesAreTheLowestAndTheProofSaysHowFarItReaches) {
+TEST(Corrected, DetermineTheLowestModes) {
   const Bank bank = example::make_corrected_bank(2, kModes);
   for (std::size_t count = 1; count < kModes; ++count) {
     Bank kept = bank;
@@ -131,7 +131,7 @@ TEST(Corrected, DecideWhichModesAreTheLowestAndTheProofSaysHowFarItReaches) {
   }
 }
 
-TEST(Corrected, ABankThatIsCutTwiceIsTheOneThatIsCutOnce) {
+TEST(Corrected, TruncationIsIdempotent) {
   const Bank bank = example::make_corrected_bank(2, kModes);
   for (std::size_t first = 2; first < kModes; ++first) {
     for (std::size_t second = 1; second < first; ++second) {
@@ -147,7 +147,7 @@ TEST(Corrected, ABankThatIsCutTwiceIsTheOneThatIsCutOnce) {
   }
 }
 
-TEST(Corrected, AModeThatIsMissingBelowTheBoundIsAFault) {
+TEST(Corrected, AMissingModeBelowTheBoundIsAFault) {
   Bank kept = example::make_corrected_bank(2, kModes);
   keep_lowest(kept, 5);
   ASSERT_GT(kept.proof->complete_below_hz, 0.0);
@@ -157,7 +157,7 @@ TEST(Corrected, AModeThatIsMissingBelowTheBoundIsAFault) {
   EXPECT_NE(faults[0].find("by the counts, and the bank holds"), std::string::npos) << faults[0];
 }
 
-TEST(Corrected, FollowEditsAsTheMeshsDo) {
+TEST(Corrected, FollowEdits) {
   const Bank bank = example::make_corrected_bank(2, kModes);
   Edits edits;
   edits.stiffness_scale = 4.0;

@@ -13,7 +13,7 @@
 namespace carillon::bank {
 namespace {
 
-TEST(Edits, AnEditedBankIsSaneAndTheWayBackIsTheBankItself) {
+TEST(Edits, AreValidAndInvertible) {
   const Bank bank = example::make_bank(3, 12);
   const Bank there = calc_edited(bank, {.density_scale = 0.3, .stiffness_scale = 4.0, .size_scale = 2.5});
   EXPECT_EQ(find_faults(there), std::vector<std::string>{});
@@ -31,7 +31,7 @@ TEST(Edits, AnEditedBankIsSaneAndTheWayBackIsTheBankItself) {
   EXPECT_NE(there.provenance.find("\"size_scale\": 2.5"), std::string::npos);
 }
 
-TEST(Edits, ReactionsFollowAsMassTimesAccelerationAndCouplesHaveAnArm) {
+TEST(Edits, ReactionsScaleWithMassAndAcceleration) {
   const Bank bank = example::make_supported_bank(3, 4);
   const double s = 0.3, k = 4.0, g = 2.5;
   const Bank there = calc_edited(bank, {.density_scale = s, .stiffness_scale = k, .size_scale = g});
@@ -48,7 +48,7 @@ TEST(Edits, ReactionsFollowAsMassTimesAccelerationAndCouplesHaveAnArm) {
   EXPECT_NEAR(there.supports.thickness_m[1] / bank.supports.thickness_m[1], g, 1e-12);
 }
 
-TEST(Edits, OtherAlphasTakeThePlaceOfTheLaw) {
+TEST(Edits, AlphasReplaceTheLaw) {
   const Bank edited = calc_edited(example::make_bank(2, 5), {.alphas = {{2e-8, 7.0}}});
   for (std::size_t m = 0; m < edited.mode_count(); ++m) {
     EXPECT_NEAR(edited.decay_per_s[m], 0.5 * (2e-8 * edited.eigenvalue_rad2_s2[m] + 7.0), 1e-9);
@@ -56,7 +56,7 @@ TEST(Edits, OtherAlphasTakeThePlaceOfTheLaw) {
   EXPECT_EQ(find_faults(edited), std::vector<std::string>{});
 }
 
-TEST(Edits, AnotherLawGivesTheDecaysOfItsFormulaAndStandsInTheProvenance) {
+TEST(Edits, ALawGivesItsDecaysAndIsRecorded) {
   const Bank bank = example::make_bank(2, 9);
   Damping friction, table, series;
   friction.law = "internal_friction";
@@ -87,7 +87,7 @@ TEST(Edits, AnotherLawGivesTheDecaysOfItsFormulaAndStandsInTheProvenance) {
   }
 }
 
-TEST(Edits, ALawThatIsNoneIsRefused) {
+TEST(Edits, AnInvalidLawIsRejected) {
   const Bank bank = example::make_bank(2, 5);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const auto make = [](const char* name, std::vector<double> coefficient, std::vector<double> power, std::vector<double> freq_hz,
@@ -112,7 +112,7 @@ TEST(Edits, ALawThatIsNoneIsRefused) {
   EXPECT_THROW(calc_edited(bank, {.alphas = {{0.0, 1.0}}, .damping = make("internal_friction", {0.1}, {}, {}, {})}), InputError);
 }
 
-TEST(Edits, WhatMeansNothingIsRefused) {
+TEST(Edits, InvalidEditsAreRejected) {
   const Bank bank = example::make_bank(2, 5);
   for (const double scale : {0.0, -1.0, 1e-7, 1e7, std::numeric_limits<double>::quiet_NaN()}) {
     EXPECT_THROW(calc_edited(bank, {.density_scale = scale}), InputError);
@@ -126,7 +126,7 @@ TEST(Edits, WhatMeansNothingIsRefused) {
   EXPECT_THROW(calc_edited(several, {.size_scale = 2.0}), InputError);
 }
 
-TEST(Edits, WoodTakesAnotherSizeAndNothingElse) {
+TEST(Edits, WoodPermitsScalingOnly) {
   Bank wood = example::make_bank(2, 5);
   wood.regions = R"([{"region":"","volume_m3":0.25,"orthotropic":{"poisson_ratio":[0.3,0.4,0.4]}}, {"volume_m3": 1e-3}, {"volume_m3":)";
   const Bank larger = calc_edited(wood, {.size_scale = 2.0});

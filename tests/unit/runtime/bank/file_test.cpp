@@ -120,7 +120,7 @@ void expect_near(const Multipoles& a, const Multipoles& b) {
   EXPECT_EQ(a.method, b.method);
 }
 
-TEST_F(BankFile, ComesBackExactly) {
+TEST_F(BankFile, ReadsBackExactly) {
   Bank bank = example::make_bank(4, 17);
   write_bank(bank, file_);
   expect_equal(read_bank(file_), bank);
@@ -139,7 +139,7 @@ TEST_F(BankFile, ComesBackExactly) {
   EXPECT_EQ(count_files(), 1u);
 }
 
-TEST_F(BankFile, EveryLawAndWhatMayBeAbsentComeBack) {
+TEST_F(BankFile, AllLawsAndOptionalArraysReadBack) {
   Bank bank = example::make_first_bank(2, 4);
   write_bank(bank, file_);
   expect_equal(read_bank(file_), bank);
@@ -194,7 +194,7 @@ TEST_F(BankFile, EveryReleasedVersionIsStillRead) {
               radiating.multipoles);
 }
 
-TEST_F(BankFile, SupportsComeBackAndRaiseTheVersionOnlyWhereThereAreSome) {
+TEST_F(BankFile, SupportsReadBackAndRaiseTheVersion) {
   for (const std::size_t modes : {0u, 1u, 9u}) {
     write_bank(example::make_supported_bank(2, modes), file_);
     expect_equal(read_bank(file_), example::make_supported_bank(2, modes));
@@ -222,7 +222,7 @@ TEST_F(BankFile, TheSameBankGivesTheSameBytes) {
   EXPECT_TRUE(get() == first);
 }
 
-TEST_F(BankFile, AnyTruncationIsRefused) {
+TEST_F(BankFile, AnyTruncationIsRejected) {
   write_bank(example::make_bank(), file_);
   const std::string whole = get();
   for (std::size_t length = 0; length < whole.size(); ++length) {
@@ -238,7 +238,7 @@ TEST_F(BankFile, AnyTruncationIsRefused) {
   EXPECT_NE(message_of(file_).find("bytes were added"), std::string::npos);
 }
 
-TEST_F(BankFile, AnyChangedByteIsRefused) {
+TEST_F(BankFile, AnyChangedByteIsRejected) {
   write_bank(example::make_bank(), file_);
   std::string bytes = get();
   std::mt19937 random(1);
@@ -251,7 +251,7 @@ TEST_F(BankFile, AnyChangedByteIsRefused) {
   EXPECT_NO_THROW(parse_bank(bytes_of(bytes)));
 }
 
-TEST_F(BankFile, AnyHeaderByteWithAnyValueIsRefused) {
+TEST_F(BankFile, AnyChangedHeaderByteIsRejected) {
   write_bank(example::make_bank(), file_);
   std::string bytes = get();
   for (std::size_t i = 0; i < 128; ++i) {
@@ -286,7 +286,7 @@ TEST_F(BankFile, EveryByteIsReadOnce) {
   EXPECT_EQ(back.shape, bank.shape);
 }
 
-TEST_F(BankFile, ArraysThatOverlapAreRefused) {
+TEST_F(BankFile, OverlappingArraysAreRejected) {
   write_bank(example::make_bank(), file_);
   std::string bytes = get();
   const auto find_offset = [&](const std::string& field) {
@@ -316,7 +316,7 @@ TEST_F(BankFile, ARowIsReadWithoutTheRest) {
   EXPECT_THROW(read_shape_row(file_, bank.vertex_count()), InputError);
 }
 
-TEST_F(BankFile, WhatIsNoBankIsNamed) {
+TEST_F(BankFile, OtherFilesAreReported) {
   EXPECT_NE(message_of(folder_ / "none.hdf").find("no such file"), std::string::npos);
   EXPECT_NE(message_of(folder_).find("is a folder"), std::string::npos);
   EXPECT_NE(message_of("/dev/zero").find("not a regular file"), std::string::npos);
@@ -331,7 +331,7 @@ TEST_F(BankFile, WhatIsNoBankIsNamed) {
   EXPECT_NE(message_of(file_).find("an HDF5 file of another kind"), std::string::npos);
 }
 
-TEST_F(BankFile, CannotBeWrittenWhereThereIsNoPlace) {
+TEST_F(BankFile, CannotBeWrittenToInvalidPaths) {
   const Bank bank = example::make_bank();
   EXPECT_THROW(write_bank(bank, folder_), InputError);
   EXPECT_THROW(write_bank(bank, ""), InputError);

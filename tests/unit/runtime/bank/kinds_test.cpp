@@ -151,7 +151,7 @@ TEST(Kinds, of_round_bodies_are_their_nodal_diameters) {
   EXPECT_EQ(find(make_round(disc), {drum(2), drum(3), drum(5)}), (std::vector<std::string>{"2 diameters", "3 diameters", "5 diameters"}));
 }
 
-TEST(Kinds, of_a_sphere_that_swells_is_breathing_and_no_other_is_known) {
+TEST(Kinds, of_a_sphere_are_breathing_or_unknown) {
   const auto sphere = [](double s) { return std::array{std::sin(kPi * s), -std::cos(kPi * s)}; };
   const auto centred = [](const std::function<Vec3(const Vec3&)>& f) { return [f](const Vec3& q) { return f(q + Vec3{0.3, -0.2, 1.0}); }; };
   const Field swell = centred([](const Vec3& p) { return p; });
@@ -173,7 +173,7 @@ TEST(Kinds, of_a_plate_are_its_nodal_lines) {
                                       "plate bending, 3 x 1 lines", "in plane", "plate bending"}));
 }
 
-TEST(Kinds, of_an_irregular_body_are_not_known) {
+TEST(Kinds, of_an_irregular_body_are_unknown) {
   Bank bank = make_box({1, 0.9, 0.7}, {10, 9, 7});
   for (Vec3& p : bank.vertices_m) p = p + 0.2 * Vec3{std::sin(3 * p[1]), std::sin(4 * p[2] + 1), std::sin(5 * p[0])};
   const Field wild = [](const Vec3& p) { return Vec3{std::sin(3 * p[1] + p[2]), std::cos(2 * p[0]), std::sin(4 * p[0] * p[1])}; };

@@ -123,7 +123,7 @@ const Spoiled kSpoiled[] = {
 
 INSTANTIATE_TEST_SUITE_P(, MixingFaults, testing::ValuesIn(kSpoiled), [](const auto& info) { return std::string(info.param.name); });
 
-TEST(MixingFile, ComesBackExactlyAndRaisesTheVersion) {
+TEST(MixingFile, ReadsBackExactlyAndRaisesTheVersion) {
   const Bank bank = make_coupled_bank();
   EXPECT_EQ(find_version(bank, false), (std::array<int, 2>{1, 6}));
   EXPECT_EQ(find_version(bank, true), (std::array<int, 2>{2, 2}));
@@ -157,7 +157,7 @@ TEST(MixingSelection, EveryModeKeepsItsPartsInAnyOrder) {
   EXPECT_TRUE(std::is_sorted(mixing.motion.begin(), mixing.motion.begin() + mixing.count[0]));
 }
 
-TEST(MixingSelection, WhatIsLeftHasUnitMass) {
+TEST(MixingSelection, RemainingPartsHaveUnitMass) {
   Bank bank = make_coupled_bank();
   keep_lowest(bank, 4);
   EXPECT_EQ(find_faults(bank), std::vector<std::string>{});
@@ -211,7 +211,7 @@ TEST(PlayedCoupled, HasTheShapesAndDecaysOfTheSums) {
   }
 }
 
-TEST(PlayedCoupled, MeshFirstIsAsGoodAsCorrectedAtOnce) {
+TEST(PlayedCoupled, OrderOfMeshAndCorrectionIsIrrelevant) {
   const Bank bank = make_coupled_bank();
   const Bank once = calc_corrected(bank), twice = calc_corrected(choose_frequencies(bank, Frequencies::kMesh));
   EXPECT_EQ(find_faults(choose_frequencies(bank, Frequencies::kMesh)), std::vector<std::string>{});
@@ -244,7 +244,7 @@ TEST(PlayedCoupled, NonlinearEnergyIsThatOfTheCorrectedSums) {
   EXPECT_NEAR(calc_energy_j(twice.quartic, q, none) / wanted, 1.0, 1e-5);
 }
 
-TEST(MixingEdits, AnotherSizeScalesWhatIsPlayedAndAnotherStiffnessLeavesModesAlone) {
+TEST(MixingEdits, SizeScalesCoupledModesAndStiffnessDropsThem) {
   const Bank bank = make_coupled_bank();
   const Bank large = calc_edited(bank, {.size_scale = 2.0});
   EXPECT_EQ(find_faults(large), std::vector<std::string>{});

@@ -48,7 +48,7 @@ void expect_same(const Multipoles& a, const Multipoles& b) {
   EXPECT_EQ(a.is_in_decay, b.is_in_decay);
 }
 
-TEST(MultipoleFile, ComesBackExactlyAndRaisesTheVersion) {
+TEST(MultipoleFile, ReadsBackExactlyAndRaisesTheVersion) {
   const tests::Folder folder;
   const std::filesystem::path file = folder.path() / "bank.hdf";
   Bank everything = example::make_radiating_bank(2, kModes);
@@ -69,7 +69,7 @@ TEST(MultipoleFile, ComesBackExactlyAndRaisesTheVersion) {
   }
 }
 
-TEST(MultipoleFile, PackedKeepsThemToTheBit) {
+TEST(MultipoleFile, PackingKeepsThemExactly) {
   const tests::Folder folder;
   const std::filesystem::path file = folder.path() / "packed.hdf";
   const Bank bank = example::make_radiating_bank(2, kModes);
@@ -81,7 +81,7 @@ TEST(MultipoleFile, PackedKeepsThemToTheBit) {
   expect_same(parse_bank(bytes_of(make_bank_bytes(packed))).multipoles, bank.multipoles);
 }
 
-TEST(MultipoleFile, ABankWithoutThemIsOfTheVersionsBefore) {
+TEST(MultipoleFile, ABankWithoutThemHasAnOlderVersion) {
   const tests::Folder folder;
   const std::filesystem::path file = folder.path() / "bank.hdf";
   write_bank(example::make_corrected_bank(2, kModes), file);
@@ -107,7 +107,7 @@ TEST(MultipoleFile, HoldsAllOfItsArraysOrNone) {
   EXPECT_EQ(none.find_error(), "");
 }
 
-TEST(MultipoleFile, ArraysOfOtherSizesAndTypesAreRefused) {
+TEST(MultipoleFile, WrongSizesAndTypesAreRejected) {
   ASSERT_EQ(make_arrays().find_error(), "");
   for (const char* name : {"freq_hz", "scale", "decay", "added_mass", "error_db", "order"}) {
     Arrays fewer = make_arrays();
@@ -140,7 +140,7 @@ TEST(MultipoleFile, ArraysOfOtherSizesAndTypesAreRefused) {
   expect_refused("radiation/method", "|u1", {19});
 }
 
-TEST(MultipoleFile, ABankWithoutModesLosesAnEmptyGroup) {
+TEST(MultipoleFile, ABankWithoutModesDropsTheEmptyGroup) {
   const Bank bank = example::make_bank(2, 0);
   const FileForm form = make_file_form(bank);
   std::vector<FieldBytes> arrays;
@@ -158,7 +158,7 @@ TEST(MultipoleFile, ABankWithoutModesLosesAnEmptyGroup) {
   EXPECT_EQ(make_bank_bytes(read), make_bank_bytes(bank));
 }
 
-TEST(MultipoleFile, ChangedInsideItsArraysIsRefusedOrSane) {
+TEST(MultipoleFile, DamagedArraysAreRejectedOrValid) {
   for (const bool is_packed : {false, true}) {
     const Bank bank = example::make_radiating_bank(1, kModes);
     const std::string bytes = is_packed ? make_packed_bytes(calc_packed(bank, -40.0)) : make_bank_bytes(bank);
@@ -211,7 +211,7 @@ void expect_mode(const Multipoles& a, std::size_t mode, const Multipoles& b, std
   EXPECT_EQ(a.error_db.at(mode), b.error_db[of]);
 }
 
-TEST(MultipoleSelection, EveryModeKeepsItsOwn) {
+TEST(MultipoleSelection, ModesKeepTheirMultipoles) {
   const Bank bank = example::make_radiating_bank(2, kModes);
   const std::vector<std::size_t> chosen{8, 2, 3, 0};
   Bank some = bank;
@@ -225,7 +225,7 @@ TEST(MultipoleSelection, EveryModeKeepsItsOwn) {
   EXPECT_EQ(none.multipoles.radius_m, 0.0);
 }
 
-TEST(MultipoleSelection, ReducedBanksAreSane) {
+TEST(MultipoleSelection, ReducedBanksAreValid) {
   const Bank bank = example::make_radiating_bank(2, kModes);
   for (const Keep keep : {Keep::kLoudest, Keep::kLowest}) {
     const Bank reduced = calc_reduced(bank, {.modes = 4, .keep = keep, .shape_bits = 8});
@@ -280,7 +280,7 @@ TEST(PlayedInAir, RadiationIsAddedOnce) {
   }
 }
 
-TEST(PlayedInAir, WithoutCorrectedFrequenciesTheDecaysAreTheMeshs) {
+TEST(PlayedInAir, WithoutCorrectionDecaysAreThoseOfTheMesh) {
   Bank bank = example::make_radiating_bank(2, kModes);
   bank.corrected = {};
   bank.multipoles = {};
@@ -296,7 +296,7 @@ TEST(PlayedInAir, WithoutCorrectedFrequenciesTheDecaysAreTheMeshs) {
   }
 }
 
-TEST(PlayedInAir, TheMeshsFrequenciesStayWhereTheyAreWanted) {
+TEST(PlayedInAir, MeshFrequenciesAreKeptOnRequest) {
   const Bank bank = example::make_radiating_bank(2, kModes), played = choose_frequencies(bank, Frequencies::kMesh);
   EXPECT_EQ(find_faults(played), std::vector<std::string>{});
   EXPECT_EQ(played.eigenvalue_rad2_s2, bank.eigenvalue_rad2_s2);
@@ -328,7 +328,7 @@ TEST(PlayedInAir, IsNotWritten) {
   EXPECT_THROW(write_bank(played, folder.path() / "played.hdf"), InputError);
 }
 
-TEST(PlayedInAir, ADecayBelowThatOfRadiationIsAFault) {
+TEST(PlayedInAir, ADecayBelowRadiationIsAFault) {
   Bank played = calc_corrected(example::make_radiating_bank(2, kModes));
   played.decay_per_s[4] = 0.99 * played.multipoles.decay_per_s[4];
   const std::vector<std::string> faults = find_faults(played);
@@ -338,7 +338,7 @@ TEST(PlayedInAir, ADecayBelowThatOfRadiationIsAFault) {
 
 // ---- edits ----
 
-TEST(MultipoleEdits, AnotherSizeIsThatOfTheSphereComputedAgain) {
+TEST(MultipoleEdits, SizeMatchesARecomputedSphere) {
   const Bank bank = example::make_radiating_bank(2, kModes);
   for (const double g : {0.3, 2.0, 17.0}) {
     const Bank edited = calc_edited(bank, {.size_scale = g});
@@ -365,7 +365,7 @@ TEST(MultipoleEdits, AnotherSizeIsThatOfTheSphereComputedAgain) {
   }
 }
 
-TEST(MultipoleEdits, AnotherDampingLeavesThemAndAnotherMaterialDropsThem) {
+TEST(MultipoleEdits, DampingKeepsAndMaterialDropsThem) {
   const Bank bank = example::make_radiating_bank(2, kModes);
   const Edits damped{.alphas = {{2e-8, 7.0}}};
   EXPECT_EQ(describe_dropped(bank, damped), "");
@@ -382,7 +382,7 @@ TEST(MultipoleEdits, AnotherDampingLeavesThemAndAnotherMaterialDropsThem) {
   }
 }
 
-TEST(MultipoleEdits, ABankThatIsPlayedStaysOneInAnotherSize) {
+TEST(MultipoleEdits, APlayedBankMayBeScaled) {
   Bank bank = example::make_radiating_bank(2, kModes);
   const Bank played = choose_frequencies(bank, Frequencies::kMesh), edited = calc_edited(played, {.size_scale = 2.0});
   const Bank wanted = choose_frequencies(calc_edited(bank, {.size_scale = 2.0}), Frequencies::kMesh);
@@ -398,7 +398,7 @@ TEST(MultipoleEdits, ABankThatIsPlayedStaysOneInAnotherSize) {
 
 // ---- info ----
 
-TEST(MultipoleInfo, SaysOrdersErrorDampingAndAddedMass) {
+TEST(MultipoleInfo, ShowsOrdersErrorDampingAndAddedMass) {
   const tests::Folder folder;
   const std::filesystem::path file = folder.path() / "bank.hdf";
   const Bank bank = example::make_radiating_bank(2, kModes);

@@ -34,7 +34,7 @@ long double calc_hankel_square(double x, int l) {
   return sum / (static_cast<long double>(x) * x);
 }
 
-TEST(HankelSizes, AreThoseOfTheFiniteSumOfPositiveTerms) {
+TEST(HankelSizes, MatchTheFiniteSum) {
   int infinite = 0;
   for (const double x : {1e-6, 1e-3, 0.05, 0.7, 1.0, 3.3, 12.0, 45.6, 100.0, 119.5, 250.0, 4000.0}) {
     const std::vector<double> sizes = calc_hankel_sizes(x, kMaxOrder);
@@ -53,7 +53,7 @@ TEST(HankelSizes, AreThoseOfTheFiniteSumOfPositiveTerms) {
   EXPECT_EQ(calc_hankel_sizes(2.0, 0), std::vector<double>{0.5});
 }
 
-TEST(CoefficientDecays, AreTheClosedFormsOfASphereThatPulsatesAndTrembles) {
+TEST(CoefficientDecays, MatchAPulsatingAndOscillatingSphere) {
   for (const double hz : {3.0, 40.0, 900.0, 20000.0}) {
     Multipoles air = example::make_air(example::make_bank(2, 0));
     example::add_sphere_mode(air, hz, {0.7, {}}, 0);
@@ -68,7 +68,7 @@ TEST(CoefficientDecays, AreTheClosedFormsOfASphereThatPulsatesAndTrembles) {
 }
 
 // Rounding error of the decay, against the unrounded sum.
-TEST(CoefficientDecays, RoundingIsBoundedAndTheBoundIsOfItsSize) {
+TEST(CoefficientDecays, RoundingIsTightlyBounded) {
   std::mt19937 random(3);
   std::normal_distribution<double> normal;
   double nearest = 0.0;
@@ -96,7 +96,7 @@ TEST(CoefficientDecays, RoundingIsBoundedAndTheBoundIsOfItsSize) {
   EXPECT_GT(nearest, 0.2);
 }
 
-TEST(Multipoles, CoefficientsAreRoundedToTheNearestStepAndOthersAreRefused) {
+TEST(Multipoles, CoefficientsAreRoundedAndChecked) {
   Multipoles air;
   add_coefficients(air, 1, std::vector<std::complex<double>>{{1.0, 0.0}, {-4.0, 2.0}, {0.0, 1e-5}, {0.0, 0.0}});
   add_coefficients(air, 0, std::vector<std::complex<double>>{{0.0, 0.0}});
@@ -164,7 +164,7 @@ const Spoiled kSpoiled[] = {
 
 INSTANTIATE_TEST_SUITE_P(, MultipoleFaults, testing::ValuesIn(kSpoiled), [](const auto& info) { return std::string(info.param.name); });
 
-TEST(Multipoles, OfAModeThatRadiatesNothingAreSane) {
+TEST(Multipoles, OfASilentModeAreValid) {
   Bank bank = example::make_bank(2, 1);
   bank.multipoles = example::make_air(bank);
   example::add_sphere_mode(bank.multipoles, bank.freq_hz(0), {}, 0);
@@ -185,7 +185,7 @@ TEST(Multipoles, InAHalfSpaceAllDecaysAreHalfThoseOfTheField) {
   EXPECT_NE(faults[0].find("the coefficients give"), std::string::npos) << faults[0];
 }
 
-TEST(Multipoles, AreSaneOnASurfaceThatPackingHasMoved) {
+TEST(Multipoles, AreValidOnAPackedSurface) {
   const Bank bank = example::make_radiating_bank(3, kModes);
   const Bank packed = calc_packed(bank, -40.0).bank;
   double farthest = 0.0;

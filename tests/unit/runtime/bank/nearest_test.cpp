@@ -71,7 +71,7 @@ void expect_nearest(const Bank& bank, const SurfaceTree& tree, const Vec3& point
   EXPECT_EQ(place.distance_m, plain.distance_m);
 }
 
-TEST(Nearest, NoPlaceOfTheSurfaceIsNearerAndTheTreeFindsWhatTheLoopFinds) {
+TEST(Nearest, IsNearestAndTreeMatchesLinearSearch) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> unit(-1.5, 1.5);
   for (const int triangles : {1, 2, 6, 7, 13, 300}) {
@@ -82,7 +82,7 @@ TEST(Nearest, NoPlaceOfTheSurfaceIsNearerAndTheTreeFindsWhatTheLoopFinds) {
   }
 }
 
-TEST(Nearest, OfPlacesEquallyNearTheFirstTriangleIsTaken) {
+TEST(Nearest, TiesGoToTheFirstTriangle) {
   Bank bank;
   example::add_box(bank, 6);
   const SurfaceTree tree(bank);
@@ -99,7 +99,7 @@ TEST(Nearest, OfPlacesEquallyNearTheFirstTriangleIsTaken) {
   EXPECT_EQ(tree.find(centre).triangle, find_nearest(bank, centre).triangle);
 }
 
-TEST(Nearest, WhatIsNoPlaceHasNone) {
+TEST(Nearest, InvalidPointsHaveNone) {
   Bank bank;
   const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
   EXPECT_EQ(SurfaceTree(bank).find({0, 0, 0}).triangle, -1);

@@ -119,13 +119,11 @@ void expect_stated_error(const Bank& bank, double size_m) {
   }
 }
 
-TEST(Pack, the_error_is_the_stated_one_on_95_percent_of_a_box_and_at_its_worst_place) {
-  expect_stated_error(example::make_bank(6, 9), 0.3);
-}
+TEST(Pack, error_of_a_box_is_as_stated) { expect_stated_error(example::make_bank(6, 9), 0.3); }
 
-TEST(Pack, the_error_is_the_stated_one_on_95_percent_of_a_ball_and_at_its_worst_place) { expect_stated_error(make_ball_bank(4, 20), 0.2); }
+TEST(Pack, error_of_a_ball_is_as_stated) { expect_stated_error(make_ball_bank(4, 20), 0.2); }
 
-TEST(Pack, small_banks_and_single_modes_have_the_error_that_is_asked_for) {
+TEST(Pack, small_banks_and_single_modes_have_the_requested_error) {
   for (const int n : {1, 2, 3})
     for (const std::size_t modes : {1u, 5u, 16u})
       for (const double asked_db : {kMinPackError, -70.0, -33.0, kMaxPackError}) {
@@ -135,7 +133,7 @@ TEST(Pack, small_banks_and_single_modes_have_the_error_that_is_asked_for) {
       }
 }
 
-TEST(Pack, a_ball_takes_less_than_a_fifth_of_its_bytes_and_fewer_for_a_greater_error) {
+TEST(Pack, a_ball_is_compressed_to_a_fifth) {
   const Bank bank = make_ball_bank(4, 30);
   const std::size_t raw = make_bank_bytes(bank).size();
   const std::size_t coarse = make_packed_bytes(calc_packed(bank, -30.0)).size(), fine = make_packed_bytes(calc_packed(bank, -50.0)).size();
@@ -144,7 +142,7 @@ TEST(Pack, a_ball_takes_less_than_a_fifth_of_its_bytes_and_fewer_for_a_greater_e
 }
 
 // Conserved: total audible energy of blows, triangles, area and volume.
-TEST(Pack, conserves_what_is_heard_in_all_and_the_volume) {
+TEST(Pack, conserves_audible_energy_and_volume) {
   const Bank bank = make_ball_bank(3, 9);
   const auto calc_volume_m3 = [](const Bank& of) {
     double six = 0.0;
@@ -168,7 +166,7 @@ TEST(Pack, conserves_what_is_heard_in_all_and_the_volume) {
 }
 
 // Places at rest must remain inaudible.
-TEST(Pack, places_that_are_fixed_stay_at_rest) {
+TEST(Pack, fixed_places_stay_at_rest) {
   const Bank bank = make_ball_bank(3, 9, true);
   ASSERT_EQ(find_faults(bank), std::vector<std::string>{});
   for (const double asked_db : {-30.0, -60.0, -80.0}) {
@@ -181,7 +179,7 @@ TEST(Pack, places_that_are_fixed_stay_at_rest) {
   }
 }
 
-TEST(Pack, bodies_with_cavities_are_packed_and_their_walls_are_near_to_what_they_were) {
+TEST(Pack, walls_of_cavities_are_accurate) {
   Bank bank = make_ball_bank(3, 5);
   const auto outer = static_cast<std::int32_t>(bank.vertex_count());
   const std::size_t triangles = bank.triangles.size();
@@ -244,7 +242,7 @@ TEST(Pack, a_file_gives_the_bank_that_the_packer_predicts) {
   }
 }
 
-TEST(Pack, triangles_keep_their_numbers_and_first_corners_when_asked) {
+TEST(Pack, triangle_numbers_are_kept_on_request) {
   const Bank bank = make_ball_bank(2, 5);
   const PackedBank packed = calc_packed(bank, -40.0, true);
   const std::vector<std::size_t> from = find_original(packed.bank, bank, 0.2);
@@ -259,7 +257,7 @@ TEST(Pack, triangles_keep_their_numbers_and_first_corners_when_asked) {
   EXPECT_THROW(parse_bank(bytes_of(make_packed_bytes(bad))), InputError);
 }
 
-TEST(Pack, all_but_surface_and_shapes_stays_to_the_bit) {
+TEST(Pack, other_arrays_are_unchanged) {
   Bank bank = example::make_supported_bank(2, 9);
   bank.corrected = example::make_corrected_bank(2, 9).corrected;
   Bank packed = calc_packed(bank, -30.0).bank;
@@ -274,7 +272,7 @@ TEST(Pack, all_but_surface_and_shapes_stays_to_the_bit) {
   EXPECT_EQ(make_bank_bytes(packed), make_bank_bytes(bank));
 }
 
-TEST(Pack, vertices_without_a_triangle_are_left_out) {
+TEST(Pack, unused_vertices_are_removed) {
   Bank bank = example::make_bank(2, 5);
   const std::size_t used = bank.vertex_count();
   bank.vertices_m.insert(bank.vertices_m.begin() + 3, bank.vertices_m[0]);
@@ -313,7 +311,7 @@ TEST(Pack, a_packed_bank_can_be_packed_again) {
   EXPECT_GT(make_packed_bytes(calc_packed(bank, -50.0)).size(), make_packed_bytes(twice).size());
 }
 
-TEST(Pack, what_changes_a_bank_drops_what_is_known_of_its_packing) {
+TEST(Pack, edits_drop_the_packing) {
   const Bank packed = calc_packed(example::make_bank(2, 5), -40.0).bank;
   ASSERT_TRUE(packed.packing.has_value());
   EXPECT_FALSE(calc_reduced(packed, {.modes = 3}).packing.has_value());
@@ -322,7 +320,7 @@ TEST(Pack, what_changes_a_bank_drops_what_is_known_of_its_packing) {
   EXPECT_FALSE(parse_bank(bytes_of(make_bank_bytes(packed))).packing.has_value());
 }
 
-TEST(Pack, the_error_is_found_again_from_the_original_and_no_other) {
+TEST(Pack, the_error_is_reproduced_from_the_original) {
   const Bank bank = make_ball_bank(3, 9);
   const Bank packed = parse_bank(bytes_of(make_packed_bytes(calc_packed(bank, -40.0))));
   const Packing found = compare_packed(packed, bank);
@@ -339,7 +337,7 @@ TEST(Pack, the_error_is_found_again_from_the_original_and_no_other) {
   EXPECT_NEAR(compare_packed(louder, bank).error_db, -6.0, 0.5);
 }
 
-TEST(Pack, witnesses_say_whether_the_shapes_are_those_that_were_packed) {
+TEST(Pack, witnesses_detect_other_shapes) {
   const Bank packed = calc_packed(make_ball_bank(3, 9), -40.0).bank;
   const std::vector<std::int32_t>& witness = packed.packing->witness;
   EXPECT_EQ(witness.size(), 24u);
@@ -366,7 +364,7 @@ TEST(Pack, witnesses_say_whether_the_shapes_are_those_that_were_packed) {
   EXPECT_GT(check_packing(better).faults.size(), 20u);
 }
 
-TEST(Pack, whose_shapes_contradict_its_witnesses_is_read_by_no_program) {
+TEST(Pack, contradicting_witnesses_are_rejected) {
   const Bank bank = make_ball_bank(3, 9);
   PackedBank packed = calc_packed(bank, -60.0);
   EXPECT_NO_THROW((void)parse_bank(bytes_of(make_packed_bytes(packed))));
@@ -385,7 +383,7 @@ TEST(Pack, a_bank_without_modes_has_nothing_to_check) {
   EXPECT_EQ(check_packing(bank).faults, std::vector<std::string>{});
 }
 
-TEST(Pack, what_means_nothing_is_refused) {
+TEST(Pack, invalid_requests_are_rejected) {
   const Bank bank = example::make_bank(2, 5);
   for (const double asked_db : {kMinPackError - 0.1, kMaxPackError + 0.1, 0.0, 60.0, std::nan(""), -HUGE_VAL})
     EXPECT_THROW(calc_packed(bank, asked_db), InputError) << asked_db;
@@ -410,7 +408,7 @@ bool try_read(std::string_view bytes) {
   }
 }
 
-TEST(Pack, files_that_are_cut_or_changed_are_refused_or_sane) {
+TEST(Pack, damaged_files_are_rejected_or_valid) {
   const std::string bytes = make_packed_bytes(calc_packed(example::make_bank(2, 5), -40.0));
   ASSERT_TRUE(try_read(bytes));
   ASSERT_TRUE(try_read(seal_again(bytes)));
@@ -431,7 +429,7 @@ TEST(Pack, files_that_are_cut_or_changed_are_refused_or_sane) {
 }
 
 // Bit flips inside the two packed arrays only.
-TEST(Pack, files_with_damaged_surfaces_and_shapes_are_refused_or_sane) {
+TEST(Pack, damaged_surfaces_and_shapes_are_rejected_or_valid) {
   const PackedBank packed = calc_packed(example::make_bank(2, 5), -40.0);
   std::mt19937 random(18);
   std::size_t refused = 0;

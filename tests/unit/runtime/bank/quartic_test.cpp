@@ -86,7 +86,7 @@ double find_energy(const QuarticEnergy& energy, const std::vector<double>& q) {
 
 // ---- sums ----
 
-TEST(QuarticEnergy, IsTheSumThatItsHeaderStates) {
+TEST(QuarticEnergy, MatchesItsDefinition) {
   QuarticEnergy energy;
   energy.modes = {0, 1};
   energy.rows = {2.0F, -1.0F, 3.0F, 0.5F, 4.0F, 0.0F};  // (0, 0), (0, 1), (1, 1) of two rows
@@ -122,7 +122,7 @@ TEST(QuarticEnergy, OfPointsIsTheEnergyOfGreensStrain) {
   }
 }
 
-TEST(QuarticEnergy, HasTheGradientOfItsDifferences) {
+TEST(QuarticEnergy, GradientMatchesFiniteDifferences) {
   for (const Kind kind : kKinds) {
     const QuarticEnergy energy = make_nonlinear_bank(kind).quartic;
     std::vector<double> q{1e-3, -2e-3, 5e-4, 1.5e-3}, gradient(4);
@@ -141,7 +141,7 @@ TEST(QuarticEnergy, HasTheGradientOfItsDifferences) {
 
 // ---- files ----
 
-TEST(QuarticFile, ComesBackExactlyAndRaisesTheVersion) {
+TEST(QuarticFile, ReadsBackExactlyAndRaisesTheVersion) {
   const tests::Folder folder;
   const std::filesystem::path file = folder.path() / "bank.hdf";
   for (const Kind kind : kKinds) {
@@ -209,7 +209,7 @@ const Spoiled kSpoiled[] = {
 
 class QuarticFaults : public testing::TestWithParam<Spoiled> {};
 
-TEST_P(QuarticFaults, AreNamedAndNotWritten) {
+TEST_P(QuarticFaults, AreReportedAndNotWritten) {
   const tests::Folder folder;
   Bank bank = make_nonlinear_bank(GetParam().kind);
   ASSERT_EQ(find_faults(bank), std::vector<std::string>{});
@@ -222,7 +222,7 @@ TEST_P(QuarticFaults, AreNamedAndNotWritten) {
 
 INSTANTIATE_TEST_SUITE_P(, QuarticFaults, testing::ValuesIn(kSpoiled), [](const auto& info) { return std::string(info.param.name); });
 
-TEST(QuarticFile, ArraysOfOtherSizesAndTypesAreRefused) {
+TEST(QuarticFile, WrongSizesAndTypesAreRejected) {
   for (const Kind kind : kKinds) {
     const Bank bank = make_nonlinear_bank(kind);
     ASSERT_EQ(Arrays(bank).find_error(), "");
@@ -282,7 +282,7 @@ TEST(QuarticFile, ChangedBytesGiveABankOrAnError) {
 
 // ---- edits ----
 
-TEST(QuarticEdits, CutKeepsTheEnergyOfTheModesThatStay) {
+TEST(QuarticEdits, SelectionKeepsTheEnergyOfKeptModes) {
   for (const Kind kind : kKinds) {
     Bank bank = make_nonlinear_bank(kind);
     const QuarticEnergy whole = bank.quartic;
@@ -339,7 +339,7 @@ TEST(QuarticEdits, HardeningIsTheSameAtThePlayedFrequencies) {
   EXPECT_EQ(found, 4);
 }
 
-TEST(QuarticEdits, OfModesThatAreSumsIsTheEnergyOfTheSameMotion) {
+TEST(QuarticEdits, CombinedModesHaveTheEnergyOfTheSameMotion) {
   for (const Kind kind : kKinds) {
     QuarticEnergy energy = make_nonlinear_bank(kind).quartic;
     const QuarticEnergy before = energy;

@@ -11,7 +11,7 @@
 namespace carillon::bank {
 namespace {
 
-TEST(Reduce, TheLowestModesKeepTheirProofAndAreAsTheyWere) {
+TEST(Reduce, TheLowestModesKeepTheProof) {
   const Bank bank = example::make_bank(2, 9);
   const Bank reduced = calc_reduced(bank, {.modes = 4, .keep = Keep::kLowest});
   EXPECT_EQ(find_faults(reduced), std::vector<std::string>{});
@@ -40,7 +40,7 @@ TEST(Reduce, ModesKeepTheirReactions) {
   }
 }
 
-TEST(Reduce, AGroupOfDegenerateModesEndsWhereTheListEnds) {
+TEST(Reduce, DegenerateGroupsAreTruncatedWithTheList) {
   Bank bank = example::make_bank(2, 6);
   for (const std::size_t first : {0u, 3u})
     bank.eigenvalue_rad2_s2[first + 1] = bank.eigenvalue_rad2_s2[first + 2] = bank.eigenvalue_rad2_s2[first];
@@ -52,7 +52,7 @@ TEST(Reduce, AGroupOfDegenerateModesEndsWhereTheListEnds) {
 }
 
 // Mean square of a mode over the surface and its exposure, by explicit sums over the triangles.
-TEST(Reduce, TheLoudestModesAreThoseOfTheMostExposureWithinTheEarsTime) {
+TEST(Reduce, TheLoudestModesHaveTheGreatestExposure) {
   const Bank bank = example::make_bank(3, 12);
   const std::vector<double> audibility = calc_audibility(bank);
   ASSERT_EQ(audibility.size(), 12u);
@@ -99,7 +99,7 @@ TEST(Reduce, TheLoudestModesAreThoseOfTheMostExposureWithinTheEarsTime) {
   EXPECT_GT(min, largest);
 }
 
-TEST(Reduce, ShapesAreRoundedToTheNearestStepAndKeptInOneByte) {
+TEST(Reduce, ShapesAreRoundedAndStoredInOneByte) {
   const Bank bank = example::make_bank(3, 5);
   for (const int bits : {2, 6, 8, 12, 16}) {
     const Bank reduced = calc_reduced(bank, {.shape_bits = bits});
@@ -123,7 +123,7 @@ TEST(Reduce, ShapesAreRoundedToTheNearestStepAndKeptInOneByte) {
   }
 }
 
-TEST(Reduce, WhatMeansNothingIsRefused) {
+TEST(Reduce, InvalidRequestsAreRejected) {
   const Bank bank = example::make_bank(2, 5);
   EXPECT_THROW(calc_reduced(bank, {.modes = 0}), InputError);
   for (const int bits : {-1, 0, 1, 17}) EXPECT_THROW(calc_reduced(bank, {.shape_bits = bits}), InputError);

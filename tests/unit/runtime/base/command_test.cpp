@@ -24,7 +24,7 @@ Command make_shell(const std::string& script) { return {.words = {"sh", "-c", sc
 /// Open descriptors of this process.
 std::ptrdiff_t count_descriptors() { return std::distance(fs::directory_iterator("/proc/self/fd"), fs::directory_iterator()); }
 
-TEST(Command, gives_what_a_program_prints_and_how_it_ended) {
+TEST(Command, returns_output_and_exit_status) {
   const Finished finished = run(make_shell("echo out; echo err >&2; exit 3"));
   EXPECT_EQ(finished.output, "out\n");
   EXPECT_EQ(finished.errors, "err\n");
@@ -35,7 +35,7 @@ TEST(Command, gives_what_a_program_prints_and_how_it_ended) {
   EXPECT_EQ(killed.exit_code, 128 + SIGSEGV);
 }
 
-TEST(Command, is_no_rank_of_the_run_that_this_process_is_in) {
+TEST(Command, is_not_a_rank_of_this_run) {
   // Per-rank variables of mpirun (Open MPI 4.1), and user settings.
   for (const char* name : {"OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_RANK", "OMPI_MCA_ess", "OMPI_MCA_orte_hnp_uri", "PMIX_RANK", "PMIX_ID",
                            "PRTE_LAUNCHED", "PMI_RANK", "OMPI_MCA_btl", "PRTE_MCA_rmaps_default_mapping_policy", "SLURM_JOB_ID"})
@@ -60,13 +60,13 @@ TEST(Command, is_no_rank_of_the_run_that_this_process_is_in) {
     ::unsetenv(name);
 }
 
-TEST(Command, words_reach_the_program_as_they_are) {
+TEST(Command, arguments_are_passed_unchanged) {
   const std::string odd = "a b'c\"$HOME `x` * \\ \n;";
   const Finished finished = run({.words = {"printf", "%s", odd}, .output = kCapture});
   EXPECT_EQ(finished.output, odd);
 }
 
-TEST(Command, input_larger_than_a_pipe_comes_back_whole) {
+TEST(Command, input_may_exceed_the_pipe_buffer) {
   std::string input(10 << 20, 'x');
   for (std::size_t i = 0; i < input.size(); i += 1009) input[i] = static_cast<char>('a' + i % 26);
   const Finished finished = run({.words = {"cat"}, .output = kCapture}, {.input = input});
@@ -74,7 +74,7 @@ TEST(Command, input_larger_than_a_pipe_comes_back_whole) {
   EXPECT_EQ(run({.words = {"true"}, .output = kCapture}, {.input = input}).exit_code, 0) << "one that takes none";
 }
 
-TEST(Command, what_cannot_be_started_is_an_error_with_its_reason) {
+TEST(Command, start_errors_state_the_reason) {
   const std::ptrdiff_t before = count_descriptors();
   for (const std::string& program :
        {std::string("/no/such/program"), std::string("no-such-program-anywhere"), std::string("/etc/passwd")}) {
@@ -102,7 +102,7 @@ TEST(Command, slow_long_and_stopped_programs_are_killed) {  // a survivor exceed
   EXPECT_EQ(::waitpid(-1, nullptr, WNOHANG), -1) << "a zombie";
 }
 
-TEST(Command, the_tail_is_kept_of_what_is_long) {
+TEST(Command, the_tail_of_long_output_is_kept) {
   const Finished finished =
       run(make_shell("i=0; while [ $i -lt 3000 ]; do echo line $i; i=$((i+1)); done"), {.max_bytes = 50, .keeps_tail = true});
   EXPECT_EQ(finished.exit_code, 0);
@@ -110,7 +110,7 @@ TEST(Command, the_tail_is_kept_of_what_is_long) {
   EXPECT_TRUE(finished.output.ends_with("line 2998\nline 2999\n"));
 }
 
-TEST(Command, folder_environment_session_and_signals_are_as_asked) {
+TEST(Command, folder_environment_session_and_signals_are_applied) {
   Command command = make_shell("pwd; echo $WORD; echo $HOME; cut -d ' ' -f 6 /proc/$$/stat; echo $$");
   command.folder = "/";
   command.environment = {"WORD=given", "PATH=/usr/bin:/bin"};
@@ -147,7 +147,7 @@ TEST(Command, the_status_of_a_child_is_never_lost) {
   EXPECT_EQ(failed.exit_code, 7);
 }
 
-TEST(Command, a_program_that_prints_all_the_time_is_stopped_too) {
+TEST(Command, a_continuously_printing_program_is_stopped) {
   const auto begin = std::chrono::steady_clock::now();
   const auto is_late = [&](const Finished&) { return std::chrono::steady_clock::now() - begin > std::chrono::milliseconds(300); };
   const Finished stopped = run(make_shell("yes"), {.patience_s = 20.0, .max_bytes = 1000, .keeps_tail = true, .may_stop = is_late});
@@ -155,7 +155,7 @@ TEST(Command, a_program_that_prints_all_the_time_is_stopped_too) {
   EXPECT_FALSE(stopped.was_slow);
 }
 
-TEST(Command, a_file_that_is_no_program_is_not_given_to_a_shell) {
+TEST(Command, a_non_executable_is_not_passed_to_a_shell) {
   const fs::path file = fs::temp_directory_path() / "carillon-no-program";
   std::ofstream(file) << "exit 0\n";
   fs::permissions(file, fs::perms::owner_all);
@@ -168,7 +168,7 @@ TEST(Command, a_file_that_is_no_program_is_not_given_to_a_shell) {
   fs::remove(file);
 }
 
-TEST(Command, input_is_taken_where_no_output_is_kept) {
+TEST(Command, input_works_without_captured_output) {
   const fs::path file = fs::temp_directory_path() / "carillon-input";
   EXPECT_EQ(run({.words = {"sh", "-c", "exec >&- 2>&-; cat > " + file.string()}}, {.input = "all of it", .patience_s = 20.0}).exit_code, 0);
   std::string text;
@@ -177,14 +177,14 @@ TEST(Command, input_is_taken_where_no_output_is_kept) {
   fs::remove(file);
 }
 
-TEST(Command, an_exception_leaves_no_program_behind) {
+TEST(Command, an_exception_kills_the_program) {
   pid_t child = 0;
   EXPECT_THROW(run({.words = {"sleep", "60"}}, {.started = [&](pid_t pid) { child = pid, throw SystemError("stop"); }}), SystemError);
   EXPECT_EQ(::kill(child, 0), -1);
   EXPECT_EQ(::waitpid(-1, nullptr, WNOHANG), -1) << "a zombie";
 }
 
-TEST(Command, a_program_ends_with_the_one_that_started_it) {
+TEST(Command, a_program_ends_with_its_parent) {
   // A child of this process starts one, and is killed.
   int ends[2];
   ASSERT_EQ(::pipe(ends), 0);
@@ -211,7 +211,7 @@ TEST(Command, a_program_ends_with_the_one_that_started_it) {
   ::close(ends[1]);
 }
 
-TEST(Command, a_closed_standard_stream_is_no_obstacle) {
+TEST(Command, closed_standard_streams_are_permitted) {
   const int kept = ::fcntl(0, F_DUPFD, 10);
   ::close(0);
   const Finished finished = run({.words = {"sh", "-c", "cat; echo done"}, .input = kInherit, .output = kCapture});

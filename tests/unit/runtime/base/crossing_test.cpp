@@ -8,7 +8,7 @@
 namespace carillon::base {
 namespace {
 
-TEST(Crossing, IsFoundWhereTheFunctionIsSteepOrFlat) {
+TEST(Crossing, IsFoundForSteepAndFlatFunctions) {
   for (const double power : {0.2, 1.0, 3.0}) {
     int values = 0;
     const auto calc = [&](double x) { return ++values, std::copysign(std::pow(std::abs(x - 0.3), power), x - 0.3); };
@@ -18,7 +18,7 @@ TEST(Crossing, IsFoundWhereTheFunctionIsSteepOrFlat) {
   }
 }
 
-TEST(Crossing, EndsWhereTheValueIsSmallEnoughAndAfterSoManyValues) {
+TEST(Crossing, StopsAtToleranceAndLimit) {
   int values = 0;
   const auto calc = [&](double x) { return ++values, x * x - 2.0; };
   const double root = find_crossing(calc, 0.0, -2.0, 2.0, 2.0, 1e-6, 0.0, 50);

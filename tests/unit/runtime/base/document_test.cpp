@@ -35,7 +35,7 @@ TEST(Document, reads_every_kind_of_value_and_comments) {
   object.finish();
 }
 
-TEST(Document, slashes_inside_texts_are_no_comments) { EXPECT_EQ(parse(R"({"url": "a//b"})").string("url"), "a//b"); }
+TEST(Document, slashes_in_strings_are_not_comments) { EXPECT_EQ(parse(R"({"url": "a//b"})").string("url"), "a//b"); }
 
 TEST(Document, relative_paths_start_at_the_folder_of_the_file) {
   const auto path = parse(R"({"mesh": "../m.msh"})").path("mesh");
@@ -53,7 +53,7 @@ TEST(Document, an_unknown_key_names_itself_its_line_and_the_nearest_known_key) {
   EXPECT_NE(message.find("did you mean \"density_kg_m3\""), std::string::npos) << message;
 }
 
-TEST(Document, an_unknown_key_is_likelier_a_key_that_is_absent_than_one_that_is_there) {
+TEST(Document, suggestions_prefer_absent_keys) {
   auto object = parse("{\"alpha1_s\": 1,\n\"alpha2_s\": 2}");
   object.number_or("alpha1_s", 0);
   object.number_or("alpha2_per_s", 0);
@@ -68,7 +68,7 @@ TEST(Document, a_mistyped_required_key_is_reported_at_its_line) {
   EXPECT_NE(message.find("messh"), std::string::npos) << message;
 }
 
-TEST(Document, a_missing_key_is_not_blamed_on_a_key_that_is_near_by_chance) {
+TEST(Document, suggestions_ignore_accidental_similarity) {
   const auto message = message_of([] { parse("{\n\"mass\": 1}").string("mesh"); });
   EXPECT_NE(message.find("\"mesh\" is missing"), std::string::npos) << message;
   EXPECT_EQ(message.find("mass"), std::string::npos) << message;
@@ -86,7 +86,7 @@ struct BadText {
   const char* words;
 };
 class BadDocument : public testing::TestWithParam<BadText> {};
-TEST_P(BadDocument, is_refused_in_words) {
+TEST_P(BadDocument, is_rejected_with_a_message) {
   const auto message = message_of([&] {
     auto object = parse(GetParam().text);
     object.number("a", base::kPositive);
@@ -105,7 +105,7 @@ INSTANTIATE_TEST_SUITE_P(Table, BadDocument,
                                          BadText{"nan", "{\"a\": NaN}", "not JSON"}, BadText{"list", "{\"a\": [1]}", "a list of 1"}),
                          [](const auto& info) { return info.param.name; });
 
-TEST(Document, numbers_are_those_of_json_and_nothing_else) {
+TEST(Document, numbers_follow_the_grammar_of_json) {
   for (const char* good : {"0", "-0", "12", "-12.5", "0.5", "1e3", "1E+3", "2.5e-07", "100", "10.01", "1e007"}) {
     EXPECT_NO_THROW(parse(std::string("{\"a\": ") + good + "}").number("a")) << good;
     EXPECT_NO_THROW(parse(std::string("{\"a\":[") + good + "," + good + "]}").numbers<2>("a")) << good;
@@ -156,7 +156,7 @@ TEST(Document, numbers_are_the_nearest_doubles) {
         << text;
 }
 
-TEST(Document, what_looks_like_a_number_in_texts_keys_and_comments_is_left_alone) {
+TEST(Document, numbers_in_strings_keys_and_comments_are_ignored) {
   auto object = parse("{ // 012 and +1\n \"01\": \"007\", /* .5 \" 1. */ \"a\": \"\\\"012\", \"b\": true, \"c\": 1 /*012*/, \"d\": [1,2]}");
   EXPECT_EQ(object.string("01"), "007");
   EXPECT_EQ(object.string("a"), "\"012");
@@ -182,7 +182,7 @@ TEST(Document, finding_the_lines_of_all_values_reads_the_text_once) {
   EXPECT_LE(document.count_scanned_bytes(), text.size());
 }
 
-TEST(Document, an_excerpt_has_its_values_at_their_lines_of_the_file) {
+TEST(Document, an_excerpt_keeps_line_numbers) {
   auto whole = parse(
       "{\n\"name\": \"a\", // the body\n\"material\":\n  \"glass\", \"fixed\": true,\n\"shape\": {\"bowl\": {\n\"wall_m\": "
       "1e-3}},\n\"end\": [1, \"}\"]}");
@@ -201,24 +201,24 @@ TEST(Document, an_excerpt_has_its_values_at_their_lines_of_the_file) {
   EXPECT_EQ(parse("{}").make_excerpt({"a"}).text, "{}\n");
 }
 
-TEST(Document, deep_nesting_is_refused_before_it_can_exhaust_the_stack) {
+TEST(Document, deep_nesting_is_rejected) {
   const auto message = message_of([] { parse("{\"a\": " + std::string(1000000, '[')); });
   EXPECT_NE(message.find("brackets"), std::string::npos);
 }
 
-TEST(Document, a_key_of_a_megabyte_given_twice_is_one_short_message) {
+TEST(Document, messages_on_long_keys_are_short) {
   const std::string key = "\"" + std::string(1 << 20, 'k') + "\": 1";
   const auto message = message_of([&] { parse("{" + key + ", " + key + "}"); });
   EXPECT_LT(message.size(), 1000u);
 }
 
-TEST(FindNearest, counts_swaps_and_gives_up_on_strangers) {
+TEST(FindNearest, counts_transpositions_and_rejects_distant_words) {
   EXPECT_EQ(base::find_nearest("mesch", {"mesh", "mass"}), "mesh");
   EXPECT_EQ(base::find_nearest("msah", {"mesh", "mash"}), "mash");
   EXPECT_EQ(base::find_nearest("zzzz", {"mesh", "mass"}), "");
 }
 
-TEST(FindNearest, takes_a_part_of_a_name_for_the_name) {
+TEST(FindNearest, matches_parts_of_names) {
   EXPECT_EQ(base::find_nearest("box", {"node_set", "box_m"}), "box_m");
   EXPECT_EQ(base::find_nearest("modes", {"mesh", "max_modes"}), "max_modes");
 }

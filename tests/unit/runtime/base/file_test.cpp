@@ -23,7 +23,7 @@ class File : public testing::Test {
   const fs::path& folder_ = scratch_.path();
 };
 
-TEST_F(File, what_is_written_is_read_back_and_nothing_else_is_left) {
+TEST_F(File, reads_back_and_leaves_no_other_file) {
   const std::string bytes("a\0b\n", 4);
   base::write_file(folder_ / "x", "old");
   base::write_file(folder_ / "x", bytes);
@@ -31,7 +31,7 @@ TEST_F(File, what_is_written_is_read_back_and_nothing_else_is_left) {
   EXPECT_EQ(count_entries(), 1u);
 }
 
-TEST_F(File, a_pipe_a_folder_a_device_and_a_missing_file_are_refused_at_once) {
+TEST_F(File, only_regular_files_are_read) {
   ASSERT_EQ(::mkfifo((folder_ / "pipe").c_str(), 0600), 0);
   for (const fs::path& path : {folder_ / "pipe", folder_, fs::path("/dev/zero"), folder_ / "missing"}) {
     EXPECT_THROW(base::read_file(path, "test file", 100), InputError) << path;
@@ -39,7 +39,7 @@ TEST_F(File, a_pipe_a_folder_a_device_and_a_missing_file_are_refused_at_once) {
   }
 }
 
-TEST_F(File, a_link_loop_and_a_file_that_is_too_large_are_refused) {
+TEST_F(File, link_loops_and_large_files_are_rejected) {
   fs::create_symlink(folder_ / "b", folder_ / "a");
   fs::create_symlink(folder_ / "a", folder_ / "b");
   EXPECT_THROW(base::read_file(folder_ / "a", "test file", 100), InputError);
@@ -47,7 +47,7 @@ TEST_F(File, a_link_loop_and_a_file_that_is_too_large_are_refused) {
   EXPECT_THROW(base::read_file(folder_ / "big", "test file", 100), InputError);
 }
 
-TEST_F(File, a_place_that_cannot_be_written_is_found_before_the_work) {
+TEST_F(File, unwritable_paths_are_found_early) {
   base::check_writable(folder_ / "new" / "x.bank", "bank");
   EXPECT_EQ(count_entries(), 1u);  // the new folder, no probe
   EXPECT_THROW(base::check_writable(folder_, "bank"), InputError);
@@ -57,7 +57,7 @@ TEST_F(File, a_place_that_cannot_be_written_is_found_before_the_work) {
   EXPECT_THROW(base::check_writable(folder_ / std::string(256, 'x'), "bank"), InputError);
 }
 
-TEST_F(File, a_name_as_long_as_the_file_system_takes_is_written) {
+TEST_F(File, the_longest_name_is_written) {
   const fs::path file = folder_ / std::string(255, 'x');
   base::check_writable(file, "bank");
   base::write_file(file, "long");
@@ -65,7 +65,7 @@ TEST_F(File, a_name_as_long_as_the_file_system_takes_is_written) {
   EXPECT_EQ(count_entries(), 1u);
 }
 
-TEST_F(File, a_write_that_the_machine_cuts_short_leaves_the_old_file_and_no_rest) {
+TEST_F(File, a_failed_write_leaves_the_old_file) {
   base::write_file(folder_ / "x", "old");
   std::signal(SIGXFSZ, SIG_IGN);
   rlimit before{};

@@ -31,7 +31,7 @@ std::string find_error(const std::string& text) {
   return "";
 }
 
-TEST(Foreign, a_text_in_utf16_is_named_as_such) {
+TEST(Foreign, utf16_is_recognised) {
   const std::string job = R"({"mesh": "bar.msh"})";
   for (const std::string& text : {"\xFF\xFE" + widen(job, true), "\xFE\xFF" + widen(job, false), widen(job, true), widen(job, false)}) {
     EXPECT_EQ(find_error(text).rfind("job.json: this text is UTF-16", 0), 0u) << find_error(text);
@@ -39,7 +39,7 @@ TEST(Foreign, a_text_in_utf16_is_named_as_such) {
   }
 }
 
-TEST(Foreign, other_bytes_are_no_utf16) {
+TEST(Foreign, other_bytes_are_not_utf16) {
   EXPECT_NO_THROW(refuse_utf16("", "a"));
   EXPECT_NO_THROW(refuse_utf16("{}", "a"));
   EXPECT_NO_THROW(refuse_utf16("\xEF\xBB\xBF{}", "a"));
@@ -48,7 +48,7 @@ TEST(Foreign, other_bytes_are_no_utf16) {
   EXPECT_NO_THROW(refuse_utf16("\xFF\xFEsolid", "a"));
 }
 
-TEST(Foreign, backslashes_in_paths_are_named) {
+TEST(Foreign, backslashes_in_paths_are_reported) {
   EXPECT_NE(find_error(R"({"mesh": "C:\meshes\cup.msh"})").find("use / between the folders"), std::string::npos);
   try {
     Object job = parse_document(R"({"mesh": "..\\in\\bar.msh"})", "job.json").root();
@@ -66,7 +66,7 @@ TEST(Foreign, backslashes_in_paths_are_named) {
   EXPECT_EQ(hint_backslash("in/bar.msh"), "");
 }
 
-TEST(Foreign, a_backslash_in_the_name_of_a_file_that_is_there_is_no_fault) {
+TEST(Foreign, a_backslash_in_an_existing_name_is_accepted) {
   const tests::Folder folder;
   write_file(folder / "a\\b.msh", "x");
   Object job = parse_document(R"({"mesh": "a\\b.msh"})", folder / "job.json").root();
@@ -88,7 +88,7 @@ TEST(Foreign, a_backslash_in_the_name_of_a_file_that_is_there_is_no_fault) {
   std::_Exit(4);
 }
 
-TEST(Foreign, a_file_beyond_the_limit_is_an_error_and_no_signal) {
+TEST(Foreign, exceeding_the_file_size_limit_is_an_error) {
   const tests::Folder folder;
   EXPECT_EXIT(write_beyond_limit(folder / "sound.wav"), ::testing::ExitedWithCode(0), "");
 }

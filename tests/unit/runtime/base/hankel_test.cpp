@@ -14,7 +14,7 @@ Complex calc_hankel(int order, double x) {
   return {std::sph_bessel(l, x), std::sph_neumann(l, x)};
 }
 
-TEST(HankelQuotients, AreThoseOfTheFunctionsOfTheLibrary) {
+TEST(HankelQuotients, MatchTheStandardLibrary) {
   for (const double x : {0.3, 1.0, 4.0, 20.0, 60.0}) {
     const auto quotients = calc_hankel_quotients(x, 40);
     ASSERT_EQ(quotients.size(), 41U);

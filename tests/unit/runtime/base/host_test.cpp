@@ -12,7 +12,7 @@
 namespace carillon::base {
 namespace {
 
-TEST(Host, gives_no_more_cores_than_the_process_may_run_on) {
+TEST(Host, cores_respect_affinity) {
   cpu_set_t before, one;
   ASSERT_EQ(::sched_getaffinity(0, sizeof before, &before), 0);
   EXPECT_LE(find_host().cores, CPU_COUNT(&before));
@@ -32,7 +32,7 @@ TEST(Host, has_memory) {
   EXPECT_LT(host.total_gb, 1e6);
 }
 
-TEST(Memory, grows_with_what_is_touched_and_its_peak_stays) {
+TEST(Memory, grows_with_touched_pages_and_keeps_the_peak) {
   constexpr std::int64_t kBytes = 64 << 20;
   const Memory before = find_memory();
   EXPECT_GE(before.address_space, before.resident);
@@ -44,7 +44,7 @@ TEST(Memory, grows_with_what_is_touched_and_its_peak_stays) {
   EXPECT_GE(find_memory().peak, kBytes);
 }
 
-TEST(Memory, a_limit_leaves_what_is_not_taken) {
+TEST(Memory, a_limit_leaves_the_remainder) {
   EXPECT_EQ(find_address_space_left(), std::numeric_limits<std::int64_t>::max()) << "ulimit -v is set";
   rlimit before{};
   ::getrlimit(RLIMIT_AS, &before);
@@ -57,7 +57,7 @@ TEST(Memory, a_limit_leaves_what_is_not_taken) {
   EXPECT_NEAR(static_cast<double>(left), 0x1p30, 0x1p24);
 }
 
-TEST(CpuClock, of_the_process_holds_that_of_the_thread) {
+TEST(CpuClock, of_the_process_includes_the_thread) {
   volatile double x = 0.0;
   // Process readings enclose the thread's: on a busy machine time passes between readings.
   const double process_s = get_process_cpu_s(), thread_s = get_thread_cpu_s();

@@ -22,7 +22,7 @@ int find_with(const std::string& entry) {
 
 TEST(Instructions, DISABLED_are_printed) { std::printf("found: %d\n", static_cast<int>(find_instructions())); }
 
-TEST(Instructions, are_at_most_what_the_environment_allows) {
+TEST(Instructions, are_limited_by_the_environment) {
   const int best = find_with("NOTHING=1");
   ASSERT_GE(best, 0);
   EXPECT_EQ(find_with("CARILLON_INSTRUCTIONS=plain"), static_cast<int>(Instructions::kPlain));

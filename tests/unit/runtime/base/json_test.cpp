@@ -17,7 +17,7 @@ namespace base = carillon::base;
 
 base::Object parse(const std::string& text) { return base::parse_document(text, "written.json").root(); }
 
-TEST(Json, writes_members_in_the_order_in_which_they_were_set) {
+TEST(Json, keeps_the_insertion_order) {
   Json value = Json::object();
   value.set("b", 1).set("a", true).set("c", "text").set("d", Json());
   value["list"].add(1).add(2.5).add("x");
@@ -26,7 +26,7 @@ TEST(Json, writes_members_in_the_order_in_which_they_were_set) {
   EXPECT_EQ(Json::object().line() + Json::array().line() + Json().line(), "{}[]null");
 }
 
-TEST(Json, breaks_only_what_does_not_fit_into_a_line) {
+TEST(Json, breaks_only_long_lines) {
   Json value = Json::object();
   value.set("name", "bar").set("box_m", Json::array(std::vector{1.0, 2.0, 3.0}));
   for (int i = 0; i < 3; ++i) value["modes"].add(Json::object().set("freq_hz", 100 + i).set("is_rigid", false));
@@ -43,7 +43,7 @@ TEST(Json, breaks_only_what_does_not_fit_into_a_line) {
   EXPECT_EQ(value.text(50), Json(value).text(50));
 }
 
-TEST(Json, numbers_are_read_back_as_they_were) {
+TEST(Json, numbers_read_back_exactly) {
   std::mt19937_64 random(7);
   for (int i = 0; i < 10000; ++i) {
     const auto bits = random();
@@ -60,14 +60,14 @@ TEST(Json, numbers_are_read_back_as_they_were) {
   EXPECT_EQ(Json(std::numeric_limits<std::uint64_t>::max()).line(), "18446744073709551615");
 }
 
-TEST(Json, numbers_have_the_digits_that_were_asked_for) {
+TEST(Json, numbers_have_the_requested_digits) {
   EXPECT_EQ(base::significant(1234.5678, 6).line(), "1234.57");
   EXPECT_EQ(base::significant(2.0, 6).line(), "2");
   EXPECT_EQ(base::decimals(2.0 / 3.0, 4).line(), "0.6667");
   EXPECT_EQ(Json(0.1).line(), "0.1");
 }
 
-TEST(Json, refuses_what_is_no_number) {
+TEST(Json, rejects_infinity_and_nan) {
   const double nan = std::nan(""), infinity = std::numeric_limits<double>::infinity();
   for (const double value : {nan, infinity, -infinity}) {
     EXPECT_THROW(Json{value}, std::invalid_argument);
@@ -78,7 +78,7 @@ TEST(Json, refuses_what_is_no_number) {
   EXPECT_EQ(base::finite_or_null(1.25, base::decimals, 1).line(), "1.2");
 }
 
-TEST(Json, texts_are_read_back_as_they_were) {
+TEST(Json, strings_read_back_exactly) {
   std::string every;
   for (int byte = 1; byte < 0x80; ++byte) every += static_cast<char>(byte);
   for (const std::string& text : {every, std::string("\"\\\n\t"), std::string("Glöckchen \u202E\u009b \U000E0041 \U0001F514")}) {
@@ -90,21 +90,21 @@ TEST(Json, texts_are_read_back_as_they_were) {
   EXPECT_EQ(base::quote("\x1b\u202E"), "\"\\u001b\\u202e\"");
 }
 
-TEST(Json, keys_are_escaped_too) { EXPECT_EQ(Json::object().set("a\"b", 1).line(), R"({"a\"b": 1})"); }
+TEST(Json, keys_are_escaped) { EXPECT_EQ(Json::object().set("a\"b", 1).line(), R"({"a\"b": 1})"); }
 
-TEST(Json, a_value_that_may_be_absent_is_null_then) {
+TEST(Json, an_empty_optional_is_null) {
   Json value = Json::object();
   value.set("some", std::optional<double>(0.5)).set("none", std::optional<double>());
   EXPECT_EQ(value.line(), R"({"some": 0.5, "none": null})");
 }
 
-TEST(Json, only_objects_have_members_and_only_arrays_take_values) {
+TEST(Json, members_need_objects_and_elements_arrays) {
   EXPECT_THROW(Json(1).set("a", 1), std::logic_error);
   EXPECT_THROW(Json::array()["a"], std::logic_error);
   EXPECT_THROW(Json::object().add(1), std::logic_error);
 }
 
-TEST(Json, parses_values_and_gives_nothing_for_other_texts) {
+TEST(Json, parses_valid_json_only) {
   const Json value =
       Json::parse("{\"b\": [1, -2.5e3, true, null], // comment\n \"a\": \"\\u00e4\\n\", \"b\": {\"c\": 18446744073709551615}}").value();
   EXPECT_EQ(value.line(), R"({"a": "ä\u000a", "b": {"c": 18446744073709551615}})");  // the last of equal keys
@@ -118,7 +118,7 @@ TEST(Json, parses_values_and_gives_nothing_for_other_texts) {
   EXPECT_FALSE(Json::parse(std::string("[1\0]", 4)));
 }
 
-TEST(Json, nests_to_a_limit) {
+TEST(Json, nesting_is_limited) {
   const auto nest = [](std::size_t depth) { return std::string(depth, '[') + std::string(depth, ']'); };
   EXPECT_EQ(Json::parse(nest(100)).value().line(), nest(100));
   EXPECT_FALSE(Json::parse(nest(101)));

@@ -24,13 +24,13 @@ std::string encode(std::uint32_t c) {
   return {byte(0xF0 + c / 262144), byte(0x80 + c / 4096 % 64), byte(0x80 + c / 64 % 64), byte(0x80 + c % 64)};
 }
 
-TEST(Printable, ordinary_text_of_any_script_stays_as_it_is) {
+TEST(Printable, text_of_any_script_is_unchanged) {
   for (const std::string text :
        {"", "plain", "Glockenspiel \u00e4\u00f6\u00fc\u00df", "\u0431\u0435\u043b\u043b", "\u9418", "\U0001F514", "~ \u00a0"})
     EXPECT_EQ(printable(text), text);
 }
 
-TEST(Printable, no_control_or_bidirectional_mark_comes_through) {
+TEST(Printable, controls_and_bidirectional_marks_are_escaped) {
   std::set<std::uint32_t> hidden{0x7F, 0x61C, 0x200E, 0x200F, 0x2028, 0x2029, 0xFEFF};
   for (std::uint32_t c = 0; c < 0x20; ++c) hidden.insert(c);
   for (std::uint32_t c = 0x80; c <= 0x9F; ++c) hidden.insert(c);
@@ -45,7 +45,7 @@ TEST(Printable, no_control_or_bidirectional_mark_comes_through) {
   EXPECT_EQ(printable("one\r\n\ttwo"), "one\\r\\n\\ttwo");
 }
 
-TEST(Printable, whatever_the_bytes_the_result_is_utf8_without_controls) {
+TEST(Printable, arbitrary_bytes_give_utf8_without_controls) {
   std::uint32_t state = 1;
   for (int round = 0; round < 2000; ++round) {
     std::string text;
@@ -61,7 +61,7 @@ TEST(Printable, whatever_the_bytes_the_result_is_utf8_without_controls) {
   }
 }
 
-TEST(Printable, bytes_that_are_no_utf8_are_written_as_numbers) {
+TEST(Printable, invalid_utf8_is_written_in_hexadecimal) {
   EXPECT_EQ(printable("a\x9b\x80z"), "a\\x9b\\x80z");
   EXPECT_EQ(printable("\xC0\xAF"), "\\xc0\\xaf");                    // overlong
   EXPECT_EQ(printable("\xE0\x80\xAF"), "\\xe0\\x80\\xaf");           // overlong
@@ -71,9 +71,9 @@ TEST(Printable, bytes_that_are_no_utf8_are_written_as_numbers) {
   EXPECT_EQ(printable(std::string("nul\0l", 5)), "nul\\u0000l");
 }
 
-TEST(Printable, texts_of_several_lines_keep_their_lines) { EXPECT_EQ(printable_lines("a\n\tb\x1b"), "a\n\tb\\u001b"); }
+TEST(Printable, line_breaks_are_kept) { EXPECT_EQ(printable_lines("a\n\tb\x1b"), "a\n\tb\\u001b"); }
 
-TEST(Message, is_cut_where_it_is_too_long_for_a_person) {
+TEST(Message, is_shortened) {
   using carillon::base::show_message;
   EXPECT_EQ(show_message("job.json:3: no such key; give another"), "job.json:3: no such key; give another");
   const std::string message = show_message("scene.json:7: body \"" + std::string(9000, 'a') + "\" is unknown; name another");
@@ -88,7 +88,7 @@ TEST(Message, is_cut_where_it_is_too_long_for_a_person) {
   EXPECT_EQ(cut.find("\\x"), std::string::npos);  // cut at characters
 }
 
-TEST(Message, names_a_file_and_not_its_descriptor) {
+TEST(Message, names_the_file_of_a_descriptor) {
   using carillon::base::find_name;
   EXPECT_EQ(find_name("a/b.json"), "a/b.json");
   const int folder = ::open("/usr", O_RDONLY | O_DIRECTORY);

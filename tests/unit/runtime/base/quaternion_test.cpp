@@ -21,7 +21,7 @@ Quaternion turn_about(const Vec3& axis, double angle) {
   return {std::cos(0.5 * angle), v[0], v[1], v[2]};
 }
 
-TEST(Quaternion, AProductTurnsAsTheSecondAndThenTheFirst) {
+TEST(Quaternion, AProductRotatesBySecondThenFirst) {
   const Quaternion a = turn_about({1.0, 2.0, -0.5}, 0.7), b = turn_about({-0.3, 0.4, 1.0}, 2.1);
   for (const Vec3& x : {Vec3{1.0, 0.0, 0.0}, Vec3{0.2, -3.0, 0.5}}) {
     const Vec3 wanted = turn_by(a, turn_by(b, x)), found = turn_by(multiply(a, b), x);
@@ -33,7 +33,7 @@ TEST(Quaternion, AProductTurnsAsTheSecondAndThenTheFirst) {
   EXPECT_NEAR(up[2], 1.0, 1e-15);
 }
 
-TEST(Quaternion, TheInverseTurnsBack) {
+TEST(Quaternion, TheInverseRotatesBack) {
   const Quaternion q = turn_about({1.0, 2.0, -0.5}, 0.7), one = multiply(q, find_inverse(q));
   EXPECT_NEAR(one[0], 1.0, 1e-15);
   for (std::size_t k = 1; k < 4; ++k) EXPECT_NEAR(one[k], 0.0, 1e-16);

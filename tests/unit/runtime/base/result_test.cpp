@@ -28,7 +28,7 @@ Result describe(const Error& error) {
   return base::describe_error(std::make_exception_ptr(error), "no memory");
 }
 
-TEST_F(ResultFile, is_read_back_as_it_was_written) {
+TEST_F(ResultFile, reads_back_exactly) {
   for (int kind = 0; kind <= static_cast<int>(ResultKind::checkpointed); ++kind) {
     const Result wanted{static_cast<ResultKind>(kind), "it \"needs\"\n more", "a.json:3", 12.5e9, kind % 2 == 1, 7000};
     ASSERT_TRUE(base::write_result(file_, wanted));
@@ -43,7 +43,7 @@ TEST_F(ResultFile, is_read_back_as_it_was_written) {
   }
 }
 
-TEST_F(ResultFile, that_is_cut_is_none) {
+TEST_F(ResultFile, truncated_gives_nothing) {
   base::write_result(file_, {ResultKind::memory, "out of memory", "", 1e9, true});
   std::ifstream stream(file_);
   const std::string whole{std::istreambuf_iterator<char>(stream), {}};

@@ -12,7 +12,7 @@
 namespace carillon::base {
 namespace {
 
-TEST(Sha256, is_that_of_the_standard) {
+TEST(Sha256, matches_the_standard) {
   EXPECT_EQ(to_hex(calc_sha256("")), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
   EXPECT_EQ(to_hex(calc_sha256("abc")), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
   EXPECT_EQ(to_hex(calc_sha256("abcdbcdecdefdefgefghfghighijhijkijkljklmklmnlmnomnopnopq")),
@@ -20,7 +20,7 @@ TEST(Sha256, is_that_of_the_standard) {
   EXPECT_EQ(to_hex(calc_sha256(std::string(1'000'000, 'a'))), "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
 }
 
-TEST(Sha256, knows_no_pieces) {
+TEST(Sha256, is_independent_of_the_pieces) {
   const std::string text(100'003, 'x');
   Sha256 sha;
   for (std::size_t at = 0, size = 1; at < text.size(); at += size, size = size * 3 % 1009 + 1)
@@ -29,7 +29,7 @@ TEST(Sha256, knows_no_pieces) {
 }
 
 // Against OpenSSL: all lengths around block boundaries, in pieces of all lengths.
-TEST(PlainSha256, is_that_of_openssl) {
+TEST(PlainSha256, matches_openssl) {
   std::string text(1000, ' ');
   for (std::size_t i = 0; i < text.size(); ++i) text[i] = static_cast<char>(i * 89 + i / 7);
   for (std::size_t size = 0; size <= text.size(); size += size < 300 ? 1 : 37) {

@@ -22,7 +22,7 @@ class SpoolTest : public testing::Test {
   const fs::path& folder_ = scratch_.path();
 };
 
-TEST_F(SpoolTest, what_is_written_is_read_back_from_memory_and_from_the_file) {
+TEST_F(SpoolTest, reads_back_from_memory_and_file) {
   for (const std::size_t memory : {std::size_t{0}, std::size_t{1}, std::size_t{7}, std::size_t{100}, std::size_t{1} << 20}) {
     Spool spool(folder_, "test", memory);
     std::string all;
@@ -69,7 +69,7 @@ TEST_F(SpoolTest, records_and_lists_keep_their_order) {
   EXPECT_EQ(none.peek(), nullptr);
 }
 
-TEST_F(SpoolTest, a_disk_that_is_full_is_one_error_that_names_the_folder) {
+TEST_F(SpoolTest, a_full_disk_is_an_error_that_names_the_folder) {
   // A file size limit replaces a full disk.
   const auto before = std::signal(SIGXFSZ, SIG_IGN);
   rlimit old{};

@@ -59,7 +59,7 @@ class Temporary : public testing::Test {
   fs::path parent_;
 };
 
-TEST_F(Temporary, goes_with_its_scope_and_stays_when_it_is_kept) {
+TEST_F(Temporary, ends_with_its_scope_unless_kept) {
   {
     const TemporaryFolder folder(parent_, "carillon-");
     std::ofstream(folder.path() / "file") << "content";
@@ -73,7 +73,7 @@ TEST_F(Temporary, goes_with_its_scope_and_stays_when_it_is_kept) {
   EXPECT_EQ(std::distance(fs::directory_iterator(kept), fs::directory_iterator()), 1);  // without the lock file
 }
 
-TEST_F(Temporary, goes_when_a_signal_ends_the_process) {
+TEST_F(Temporary, is_removed_after_a_signal) {
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
     const int status = end_one(signal, sleep_for_long);
     EXPECT_TRUE(WIFSIGNALED(status) && WTERMSIG(status) == signal) << status;  // terminated by the signal itself
@@ -81,7 +81,7 @@ TEST_F(Temporary, goes_when_a_signal_ends_the_process) {
   }
 }
 
-TEST_F(Temporary, goes_with_the_program_that_writes_there) {
+TEST_F(Temporary, is_removed_with_a_writing_child) {
   const int status = end_one(SIGTERM, [](const TemporaryFolder& folder) {
     (void)run({.words = {"sh", "-c", "i=0; while :; do i=$((i+1)); mkdir -p d$i; : >d$i/f; done"}, .folder = folder.path()});
   });
@@ -89,7 +89,7 @@ TEST_F(Temporary, goes_with_the_program_that_writes_there) {
   EXPECT_TRUE(is_empty());
 }
 
-TEST_F(Temporary, of_a_killed_process_goes_with_the_next_one) {
+TEST_F(Temporary, of_a_killed_process_is_removed_by_the_next) {
   end_one(SIGKILL, sleep_for_long);
   EXPECT_FALSE(is_empty());
   (void)TemporaryFolder(parent_, ".other.");
@@ -98,7 +98,7 @@ TEST_F(Temporary, of_a_killed_process_goes_with_the_next_one) {
   EXPECT_TRUE(is_empty());
 }
 
-TEST_F(Temporary, spares_what_others_have) {
+TEST_F(Temporary, leaves_other_folders) {
   fs::create_directory(parent_ / ".page.backup");  // a user's folder of similar name
   const TemporaryFolder mine(parent_, ".page.");   // in use
   (void)TemporaryFolder(parent_, ".page.");
@@ -106,7 +106,7 @@ TEST_F(Temporary, spares_what_others_have) {
   EXPECT_TRUE(fs::exists(mine.path()));
 }
 
-TEST_F(Temporary, leaves_signals_to_who_ignores_them) {
+TEST_F(Temporary, leaves_ignored_signals) {
   ::signal(SIGHUP, SIG_IGN);  // nohup
   {
     const TemporaryFolder folder(parent_, "carillon-");

@@ -25,7 +25,7 @@ TEST(Vector, products_satisfy_lagrange_and_jacobi) {
   }
 }
 
-TEST(Vector, an_inverse_undoes_its_matrix) {
+TEST(Vector, inverse_times_matrix_is_identity) {
   std::uint64_t state = 7;
   for (int n = 0; n < 1000; ++n) {
     const Vec3 a = draw(state), b = draw(state), c = draw(state), x = draw(state);

@@ -56,7 +56,7 @@ TEST(Force, WithAFaultIsFound) {
   EXPECT_EQ(change([](Force& e) { e.triangle = -1; }), "the index of the triangle is negative");
 }
 
-TEST(Force, IsCutIntoPiecesThatFollowEachOther) {
+TEST(Force, IsSplitIntoConsecutivePieces) {
   for (const std::size_t steps : {1U, 16U, 17U, 1300U}) {
     std::vector<Vec3> impulses;
     for (std::size_t k = 0; k < steps; ++k) impulses.push_back({1e-6 * static_cast<double>(k), -0.5, 0.25});
@@ -78,7 +78,7 @@ TEST(Force, IsCutIntoPiecesThatFollowEachOther) {
   }
 }
 
-TEST(Force, AtOnceActsInTheMiddleOfItsSteps) {
+TEST(Force, AsImpulseActsAtItsCentroid) {
   Force force = make_force(4);
   force.time_s = 1.0;
   force.impulse_n_s[3] = {};
@@ -104,7 +104,7 @@ TEST(Events, HaveATime) {
   EXPECT_EQ(get_time_s(TimeWatermark{-1.0}), -1.0);
 }
 
-TEST(Events, ThatAreRightHaveNoFault) {
+TEST(Events, ValidHaveNoFault) {
   EXPECT_EQ(find(TimeWatermark{1.0}), "");
   EXPECT_EQ(find(Impulse{}), "");
   EXPECT_EQ(find(make_contact()), "");
@@ -112,7 +112,7 @@ TEST(Events, ThatAreRightHaveNoFault) {
   EXPECT_EQ(find(Listener{}), "");
 }
 
-TEST(Events, WithATimeThatIsNoNumberAreFound) {
+TEST(Events, WithNonFiniteTimeAreFound) {
   for (const double bad : {kNan, kInfinity, -kInfinity}) {
     EXPECT_EQ(find(TimeWatermark{bad}), "the time is not finite");
     EXPECT_EQ(spoil(Impulse{}, [&](Impulse& e) { e.time_s = bad; }), "the time is not finite");

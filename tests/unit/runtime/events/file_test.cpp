@@ -176,7 +176,7 @@ const std::string kForce =
     R"({"force": {"time_s": 0.5, "step_s": 1e-5, "body": 0, "triangle": 3, "barycentric": [1, 0, 0], "impulse_n_s": [[0, 0, 1e-3], [0, 0, 2e-3]]}})"
     "\n";
 
-TEST(Recording, ReadsAForceAndRefusesWhatIsNone) {
+TEST(Recording, ReadsAForceAndRejectsInvalidOnes) {
   const Recording read = parse_recording(kHeader + kForce, "run.jsonl");
   const auto& force = std::get<Force>(read.events[0]);
   EXPECT_TRUE(force.count == 2 && !force.continues && force.other == -1 && force.step_s == 1e-5 && force.impulse_n_s[1][2] == 2e-3F);
@@ -194,7 +194,7 @@ TEST(Recording, ReadsAForceAndRefusesWhatIsNone) {
   refuse("\"step_s\"", "\"steps\"", "step_s");
 }
 
-TEST(Recording, RefusesAmountsThatNothingHas) {
+TEST(Recording, RejectsAbsurdAmounts) {
   const auto refuse = [](const std::string& from, const std::string& to, const std::string& key) {
     const std::string text = replace(kHeader + kImpulse, from, to);
     try {
@@ -211,7 +211,7 @@ TEST(Recording, RefusesAmountsThatNothingHas) {
   parse_recording(replace(kHeader + kImpulse, "1e-3]", "-1e9]"), "run.jsonl");
 }
 
-TEST(Recording, ComesBackBitForBit) {
+TEST(Recording, ReadsBackExactly) {
   std::mt19937_64 random(7);
   Recording recording{{{"ball", 20}, {"a \"shelf\" \\ \n", 12}}, {}};
   while (recording.events.size() < 4000) {
@@ -277,7 +277,7 @@ TEST(Recording, AContactMayLeaveTheImpedanceToTheMaterial) {
   expect_error(replace(text, R"("patch_radius_m")", R"("impedance_n_s_m": -1, "patch_radius_m")"), "impedance_n_s_m");
 }
 
-TEST(Recording, EveryPieceOfItIsRefusedButTheWhole) {
+TEST(Recording, TruncationIsRejected) {
   const Recording recording{{{"ball", 20}}, {TimeWatermark{0.25}, Impulse{}, TimeWatermark{0.5}}};
   const std::string text = format_recording(recording);
   EXPECT_EQ(find_error(text), "");
@@ -286,7 +286,7 @@ TEST(Recording, EveryPieceOfItIsRefusedButTheWhole) {
   }
 }
 
-TEST(Recording, BadLinesAreNamed) {
+TEST(Recording, BadLinesAreReported) {
   const auto expect_bad = [](const std::string& from, const std::string& to, const std::string& says) {
     expect_error(kHeader + replace(kImpulse, from, to), says);
   };

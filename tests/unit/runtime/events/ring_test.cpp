@@ -14,7 +14,7 @@ Event make_event(int producer, std::int64_t number) {
   return Impulse{.time_s = static_cast<double>(number), .body = producer, .impulse_n_s = {static_cast<double>(number), 0.0, -1.0}};
 }
 
-TEST(EventRing, GivesWhatItTookInOrder) {
+TEST(EventRing, KeepsTheOrder) {
   EventRing ring(5);
   EXPECT_EQ(ring.get_room(), 8U);
   Event event;
@@ -31,7 +31,7 @@ TEST(EventRing, GivesWhatItTookInOrder) {
   EXPECT_EQ(ring.get_overflows(), 100);
 }
 
-TEST(EventRing, RefusesAndCountsWhatCannotBePlayed) {
+TEST(EventRing, RejectsAndCountsInvalidEvents) {
   EventRing ring(4);
   EXPECT_FALSE(ring.push(TimeWatermark{std::numeric_limits<double>::quiet_NaN()}));
   EXPECT_FALSE(ring.push(Impulse{.body = -1}));

@@ -19,7 +19,7 @@ std::size_t count(const std::string& text, const std::string& word) {
   return n;
 }
 
-TEST(Faust, has_the_loudest_modes_and_says_what_it_left_out) {
+TEST(Faust, has_the_loudest_modes_and_states_the_rest) {
   // Three modes that differ in gain only: two of them omit 1 / (1 + 4 + 100) of the energy.
   const auto make = [](double freq, double gain) { return testing::InventedMode{freq, 10.0, gain, {0.0, 0.0, 1.0}}; };
   const bank::Bank bank = testing::make_cube_bank({make(1000.0, 1e-3), make(1000.001, 2e-3), make(1000.002, 1e-2)});
@@ -35,19 +35,19 @@ TEST(Faust, has_the_loudest_modes_and_says_what_it_left_out) {
   EXPECT_TRUE(std::isinf(all.left_out_db));
 }
 
-TEST(Faust, knows_modes_that_do_not_swing) {
+TEST(Faust, includes_overdamped_modes) {
   bank::Bank bank = testing::make_cube_bank({{100.0, 900.0, 0.02}, {200.0, 400.0 * M_PI, 0.02}, {820.0, 12.0, 0.3}});
   const FaustProgram program = make_faust(bank, {.point_count = 2});
   EXPECT_EQ(count(program.text, "  creep("), 1);
   EXPECT_EQ(count(program.text, "  swing("), 2);  // including the critical one
 }
 
-TEST(Faust, names_are_no_code) {
+TEST(Faust, names_are_sanitised) {
   const FaustProgram program = make_faust(testing::make_cube_bank({{820.0, 12.0, 0.3}}), {.name = "a\"; process = 1;\n\\"});
   EXPECT_THAT(program.text, ::testing::HasSubstr("declare name \"a_; process = 1;__\";\n"));
 }
 
-TEST(Faust, refuses_what_makes_no_sound) {
+TEST(Faust, rejects_silent_requests) {
   EXPECT_THROW(make_faust(testing::make_cube_bank({}), {}), InputError);
   EXPECT_THROW(make_faust(testing::make_cube_bank({{820.0, 12.0, 0.3}}), {.modes = 0}), InputError);
   EXPECT_THROW(make_faust(testing::make_cube_bank({{820.0, 12.0, 0.3}}), {.points_m = std::vector<Vec3>(65)}), InputError);

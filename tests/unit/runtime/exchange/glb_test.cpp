@@ -74,7 +74,7 @@ bank::Bank make_damped() {
 }
 
 // The extension has the order and decays in air; the bank returns without them.
-TEST(Glb, of_a_bank_with_multipoles_is_the_same_bank_and_sounds_as_in_air) {
+TEST(Glb, of_a_bank_with_multipoles_is_lossless) {
   const bank::Bank bank = bank::example::make_radiating_bank(2, 9), played = bank::calc_corrected(bank);
   const std::string glb = to_glb(bank);
   EXPECT_EQ(bank::make_bank_bytes(parse_glb(glb, "body.glb")), bank::make_bank_bytes(bank));
@@ -87,7 +87,7 @@ TEST(Glb, of_a_bank_with_multipoles_is_the_same_bank_and_sounds_as_in_air) {
   }
 }
 
-TEST(Glb, of_every_released_bank_is_the_same_bank) {
+TEST(Glb, of_released_banks_is_lossless) {
   int count = 0;
   for (const auto& entry :
        std::filesystem::directory_iterator(std::filesystem::path(carillon::tests::get_source_dir()) / "tests/unit/runtime/bank/pinned")) {
@@ -98,7 +98,7 @@ TEST(Glb, of_every_released_bank_is_the_same_bank) {
   EXPECT_GE(count, 5);
 }
 
-TEST(Glb, keeps_modes_that_do_not_swing_narrow_shapes_and_single_modes) {
+TEST(Glb, keeps_overdamped_modes_and_narrow_shapes) {
   const bank::Bank damped = make_damped();
   EXPECT_EQ(bank::make_bank_bytes(parse_glb(to_glb(damped), "body.glb")), bank::make_bank_bytes(damped));
   EXPECT_EQ(parse_glb(to_glb(damped), "body.glb", {.model = {}, .ignores_extras = true, .material = nullptr}).mode_count(), 2);
@@ -112,7 +112,7 @@ TEST(Glb, keeps_modes_that_do_not_swing_narrow_shapes_and_single_modes) {
   EXPECT_THROW(to_glb(still), InputError);
 }
 
-TEST(Glb, of_more_vertices_than_16_bits_hold_is_the_same_bank) {
+TEST(Glb, of_many_vertices_is_lossless) {
   bank::Bank bank = bank::example::make_bank(105, 2);
   ASSERT_GT(bank.vertex_count(), 65535);
   const std::string bytes = to_glb(bank);
@@ -120,7 +120,7 @@ TEST(Glb, of_more_vertices_than_16_bits_hold_is_the_same_bank) {
   EXPECT_LT(bytes.size(), bank.vertex_count() * (2 * 12 + 24 + 2 * 12) + bank.triangles.size() * 12 + 100000);
 }
 
-TEST(Glb, taken_plainly_is_the_body_to_what_floats_hold) {
+TEST(Glb, read_plainly_has_single_precision) {
   const bank::Bank bank = make_damped();
   const bank::Bank plain = parse_glb(to_glb(bank), "body.glb", {.model = {}, .ignores_extras = true, .material = nullptr});
   ASSERT_EQ(plain.mode_count(), 2);
@@ -135,7 +135,7 @@ TEST(Glb, taken_plainly_is_the_body_to_what_floats_hold) {
   EXPECT_EQ(plain.damping.law, "mixed");
 }
 
-TEST(Glb, of_another_program_may_scale_its_node_and_leave_the_mass_out) {
+TEST(Glb, of_another_program_may_scale_and_omit_mass) {
   const bank::Bank bank = testing::make_cube_bank({{820.0, 12.0, 0.3, {0.4, -0.7, 1.1}, 0.07}});
   std::string bytes = replace_json(to_glb(bank), R"("massProperties")", R"("ignored")");
   bytes = replace_json(bytes, R"("nodes": [{"name": "body", )", R"("nodes": [{"children": [1], "scale": [2, 2, 2]}, {"name": "body", )");
@@ -175,7 +175,7 @@ std::string to_base64(const std::string& bytes) {
   return text;
 }
 
-TEST(Glb, as_text_with_its_buffer_inside_or_next_to_it_is_the_same_bank) {
+TEST(Glb, as_text_is_lossless) {
   const bank::Bank bank = make_damped();
   const std::string glb = to_glb(bank);
   const std::string data = to_base64(to_gltf(glb, "").second);
@@ -198,7 +198,7 @@ TEST(Glb, as_text_with_its_buffer_inside_or_next_to_it_is_the_same_bank) {
   EXPECT_THAT(find_error(wide), ::testing::HasSubstr("UTF-16"));
 }
 
-TEST(Glb, of_another_program_is_called_imported_and_its_accuracy_unknown) {
+TEST(Glb, of_another_program_is_imported) {
   const bank::Bank plain = parse_glb(to_glb(make_damped()), "body.glb", {.model = {}, .ignores_extras = true, .material = nullptr});
   EXPECT_EQ(plain.element, "imported");
   EXPECT_THAT(bank::describe_accuracy(plain), ::testing::StartsWith("unknown"));
@@ -219,7 +219,7 @@ std::string make_scaled(double scale, double mass_kg, double size_of_mass = 1.0)
   return replace_json(bytes, bytes.substr(at, bytes.find(',', at) - at), R"("density": 1000)");
 }
 
-TEST(Glb, whose_node_scales_the_body_has_the_modes_of_the_size_that_fits_its_mass) {
+TEST(Glb, scaled_node_is_resolved_by_mass) {
   const GlbReading plain{.model = {}, .ignores_extras = true, .material = nullptr};
   std::vector<std::string> notes;
   for (const double scale : {0.5, 2.0, 3.0}) {
@@ -249,13 +249,13 @@ TEST(Glb, whose_node_scales_the_body_has_the_modes_of_the_size_that_fits_its_mas
   EXPECT_THAT(notes[0], ::testing::HasSubstr("moments of inertia contradict"));
 }
 
-TEST(Glb, whose_provenance_is_no_json_is_refused) {
+TEST(Glb, with_invalid_provenance_is_rejected) {
   bank::Bank bank = make_damped();
   bank.provenance = "{no JSON";
   EXPECT_THAT(find_error(to_glb(bank)), ::testing::HasSubstr("provenance is not JSON text"));
 }
 
-TEST(Glb, without_a_material_takes_the_one_that_is_named) {
+TEST(Glb, without_a_material_uses_the_given_one) {
   const std::string bytes = replace_json(to_glb(make_damped()), R"(, "material": 0)", "");
   GlbReading plain{.model = {}, .ignores_extras = true, .material = nullptr};
   EXPECT_THAT(find_error(bytes, plain), ::testing::HasSubstr("--material NAME"));
@@ -263,7 +263,7 @@ TEST(Glb, without_a_material_takes_the_one_that_is_named) {
   EXPECT_EQ(parse_glb(bytes, "body.glb", plain).material.young_modulus_pa, plain.material->young_modulus_pa);
 }
 
-TEST(Glb, that_is_none_damaged_or_changed_ends_in_a_sentence) {
+TEST(Glb, damaged_files_are_rejected_with_a_message) {
   const std::string whole = to_glb(make_damped());
   const auto change = [&](const std::string& from, const std::string& to) { return find_error(replace_json(whole, from, to)); };
   for (const auto& [said, words] : {
@@ -287,7 +287,7 @@ TEST(Glb, that_is_none_damaged_or_changed_ends_in_a_sentence) {
     EXPECT_THAT(said, ::testing::AllOf(::testing::StartsWith("body.glb"), ::testing::HasSubstr(words)));
 }
 
-TEST(Glb, cut_or_changed_at_any_byte_ends_in_the_bank_or_an_error) {
+TEST(Glb, mutations_give_a_bank_or_an_error) {
   const bank::Bank bank = testing::make_cube_bank({{820.0, 12.0, 0.3, {0.4, -0.7, 1.1}, 0.07}});
   const std::string whole = to_glb(bank);
   for (std::size_t n = 0; n < whole.size(); n += n < 64 ? 1 : 7) EXPECT_NE(find_error(whole.substr(0, n)), "") << n;

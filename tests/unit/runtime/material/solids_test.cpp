@@ -37,12 +37,12 @@ constexpr Solid kReal[]{{"steel", 2.1e11, 7850},
                         {"bone", 1.8e10, 1900},
                         {"silicon carbide", 4.5e11, 3200}};
 
-TEST(Solids, what_exists_is_not_asked_about) {
+TEST(Solids, existing_solids_cause_no_warning) {
   for (const Solid& solid : kReal)
     EXPECT_FALSE(ask_about_solid(solid.e_pa, solid.rho)) << solid.name << ": " << *ask_about_solid(solid.e_pa, solid.rho);
 }
 
-TEST(Solids, a_slip_of_the_unit_is_named) {
+TEST(Solids, wrong_units_are_recognised) {
   constexpr Solid kOrdinary[]{
       {"steel", 2.1e11, 7850}, {"aluminium", 7e10, 2700}, {"glass", 7.2e10, 2500}, {"brass", 1e11, 8500}, {"concrete", 3e10, 2400}};
   for (const Solid& solid : kOrdinary) {
@@ -63,7 +63,7 @@ TEST(Solids, a_slip_of_the_unit_is_named) {
   }
 }
 
-TEST(Solids, gels_and_soft_rubbers_are_asked_about_and_called_possible) {
+TEST(Solids, gels_and_soft_rubbers_cause_a_warning) {
   for (const auto& [e, rho] : {std::pair(1e4, 1000.0), {3e3, 1010.0}, {1e5, 1100.0}}) {
     const auto text = ask_about_solid(e, rho);
     ASSERT_TRUE(text) << e;
@@ -74,7 +74,7 @@ TEST(Solids, gels_and_soft_rubbers_are_asked_about_and_called_possible) {
   EXPECT_NE(ask_about_solid(4e5, 1200.0)->find("psi"), std::string::npos);
 }
 
-TEST(Solids, what_no_unit_explains_is_still_asked_about) {
+TEST(Solids, unexplained_values_cause_a_warning) {
   for (const auto& [e, rho] : {std::pair(1e-3, 1e-3), {1e15, 1e3}, {1e-6, 1e8}, {2e11, 1e7}, {1e300, 1.0}}) {
     const auto text = ask_about_solid(e, rho);
     ASSERT_TRUE(text);
@@ -82,7 +82,7 @@ TEST(Solids, what_no_unit_explains_is_still_asked_about) {
   }
 }
 
-TEST(Solids, the_number_that_was_written_is_the_one_that_is_named) {
+TEST(Solids, warnings_name_the_given_number) {
   const auto text = ask_about_solid(72.0, 2500.0, "lame_mu_pa", "density_kg_m3", 29.5);
   ASSERT_TRUE(text);
   EXPECT_NE(text->find("lame_mu_pa is 29.5"), std::string::npos) << *text;

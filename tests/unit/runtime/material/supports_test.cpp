@@ -33,7 +33,7 @@ std::string write_members(const Fixing& fixing) {
   return object.substr(1, object.size() - 2);
 }
 
-TEST(Words, of_every_name_come_back_as_they_were_written) {
+TEST(Words, of_all_names_read_back) {
   for (const std::string& wall : list_base_names()) {
     for (const std::string& joint : list_joint_names()) {
       const auto fixing = read_supports("\"on\": " + base::quote(wall) + ", \"joint\": " + base::quote(joint));
@@ -46,7 +46,7 @@ TEST(Words, of_every_name_come_back_as_they_were_written) {
   }
 }
 
-TEST(Words, of_numbers_come_back_to_the_last_bit) {
+TEST(Words, of_numbers_read_back_exactly) {
   const auto wall =
       read_supports(R"("on": {"young_modulus_pa": 1.23456789012345e10, "density_kg_m3": 1801, "thickness_m": 0.2401}, "loss": 0.0123)");
   ASSERT_TRUE(wall);
@@ -59,13 +59,13 @@ TEST(Words, of_numbers_come_back_to_the_last_bit) {
   EXPECT_EQ(read_supports(write_members(*lumped))->base.stiffness_n_m, 1e6);
 }
 
-TEST(Words, that_are_not_there_ask_for_nothing) {
+TEST(Words, missing_give_nothing) {
   EXPECT_FALSE(read_supports(""));
   EXPECT_EQ(write_fixing(Fixing{}).line(), "{}");
   EXPECT_EQ(write_fixing(*read_supports(R"("on": "rigid")")).line(), "{}");
 }
 
-TEST(Words, that_cannot_be_meant_are_refused_with_the_correction) {
+TEST(Words, invalid_are_rejected_with_a_suggestion) {
   EXPECT_THAT(fail(R"("on": "brik wall")"), HasSubstr("did you mean \"brick wall\"?"));
   EXPECT_THAT(fail(R"("on": "felt")"), HasSubstr("\"held\""));
   EXPECT_THAT(fail(R"("joint": "nailed")"), HasSubstr("screwed"));

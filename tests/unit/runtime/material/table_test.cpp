@@ -94,7 +94,7 @@ TEST(MaterialTable, lies_within_the_charts_of_each_group) {
   }
 }
 
-TEST(MaterialTable, has_woods_that_are_stiffest_along_the_grain_and_could_exist) {
+TEST(MaterialTable, woods_are_physically_possible) {
   int woods = 0;
   for (const Row& row : MaterialTable::get().rows()) {
     if (!row.material.orthotropic) continue;
@@ -247,7 +247,7 @@ TEST(MaterialTable, has_the_elastic_ratios_of_the_wood_handbook) {
   }
 }
 
-TEST(MaterialTable, knows_what_everybody_knows) {
+TEST(MaterialTable, has_the_known_speeds_of_sound) {
   // Speed of sound in a rod [m/s] from physics tables.
   for (const auto& [name, speed] : {std::pair{"steel", 5050}, {"aluminium", 5090}, {"glass", 5370}, {"lead", 1190}, {"copper", 3740}}) {
     const Material& m = MaterialTable::get().find(name)->material;
@@ -259,7 +259,7 @@ TEST(MaterialTable, knows_what_everybody_knows) {
   EXPECT_GT(oak.orthotropic->young_modulus_pa[1], oak.orthotropic->young_modulus_pa[2]) << "radial and tangential";
 }
 
-TEST(MaterialTable, finds_names_however_they_are_written) {
+TEST(MaterialTable, ignores_case_and_separators) {
   for (const char* name : {"stainless steel", "Stainless-Steel", "STAINLESS_STEEL", "stainlesssteel"})
     EXPECT_EQ(read('"' + std::string(name) + '"').name, "stainless steel");
   EXPECT_EQ(read("\"PMMA\"").name, "acrylic");
@@ -269,7 +269,7 @@ TEST(MaterialTable, finds_names_however_they_are_written) {
   EXPECT_THAT(find_error("\" - \""), testing::HasSubstr("no known material"));
 }
 
-TEST(MaterialTable, gives_materials_that_a_job_may_change_in_part) {
+TEST(MaterialTable, materials_may_be_overridden) {
   const Material steel = read("\"steel\""), damped = read(R"({"from": "steel", "damping": {"rayleigh": {"alpha2_per_s": 3}}})");
   EXPECT_EQ(damped.young_modulus_pa, steel.young_modulus_pa);
   EXPECT_EQ(damped.law, DampingLaw::rayleigh);
@@ -288,7 +288,7 @@ TEST(MaterialTable, gives_materials_that_a_job_may_change_in_part) {
   EXPECT_FALSE(plain.orthotropic);
 }
 
-TEST(MaterialTable, refuses_what_makes_no_sense) {
+TEST(MaterialTable, rejects_invalid_materials) {
   EXPECT_THAT(find_error(R"({"from": "steel", "axes": [[0, 0, 1], [1, 0, 0]]})"), testing::HasSubstr("same in all directions"));
   EXPECT_THAT(find_error(R"({"from": "stel"})"), testing::HasSubstr("did you mean \"steel\"?"));
   EXPECT_THAT(find_error(R"({"from": "steel", "young_modulus_pa": 1e10})"), testing::HasSubstr("poisson_ratio"));
@@ -315,7 +315,7 @@ TEST(MaterialTable, is_extended_by_a_file_that_comes_first) {
   EXPECT_EQ(table.find("brass")->place, "");
 }
 
-TEST(MaterialTable, names_the_line_of_what_is_wrong_in_such_a_file) {
+TEST(MaterialTable, reports_lines_of_user_files) {
   for (const auto& [text, words] : {
            std::pair{R"({"materials": [{"name": "a", "from": "b"}]})", "no known material"},
            {R"({"materials": [{"from": "steel"}]})", "name"},

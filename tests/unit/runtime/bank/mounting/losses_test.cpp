@@ -38,7 +38,7 @@ material::Fixing on(const std::string& members) {
 
 MountingRequest wish(const std::string& members) { return {.all = on(members)}; }
 
-TEST(Plate, takes_of_a_normal_force_what_the_point_impedance_of_a_thin_plate_says) {
+TEST(Plate, absorbs_normal_forces_by_its_point_impedance) {
   // Cremer and Heckl: Z = 8 sqrt(B m'').
   const bank::Bank bank = make_bank({300.0, 0, 0, 0, 0, 0});
   const Losses losses = calc_losses(
@@ -52,7 +52,7 @@ TEST(Plate, takes_of_a_normal_force_what_the_point_impedance_of_a_thin_plate_say
   }
 }
 
-TEST(Plate, turns_under_a_couple_as_omega_over_16_B_and_takes_forces_in_its_plane_with_the_arm_of_half_its_thickness) {
+TEST(Plate, couple_and_in_plane_admittances_match_closed_forms) {
   const std::string wall =
       R"("on": {"young_modulus_pa": 30e9, "poisson_ratio": 0.2, "density_kg_m3": 2300, "thickness_m": 0.1, "loss_factor": 0})";
   const double b = 30e9 * 1e-3 / (12.0 * 0.96), g = 30e9 / 2.4 * 0.1, e = 30e9 / 0.96 * 0.1;
@@ -72,7 +72,7 @@ TEST(Plate, turns_under_a_couple_as_omega_over_16_B_and_takes_forces_in_its_plan
   }
 }
 
-TEST(Plate, answers_a_long_edge_as_a_line_drives_it) {
+TEST(Plate, long_edges_match_line_excitation) {
   // A line of length l in an infinite plate: force per length on a beam of unit width, k / (4 m omega), couple omega / (4 B k); over l.
   const std::string wall =
       R"("on": {"young_modulus_pa": 30e9, "poisson_ratio": 0.2, "density_kg_m3": 2300, "thickness_m": 0.1, "loss_factor": 0})";
@@ -87,7 +87,7 @@ TEST(Plate, answers_a_long_edge_as_a_line_drives_it) {
   }
 }
 
-TEST(HalfSpace, takes_what_a_disc_radiates_and_what_its_spring_loses) {
+TEST(HalfSpace, absorbs_radiation_and_material_loss) {
   // Concrete under a disc of 5 mm: the spring 3.1e8 N/m, Re Y about 1e-8 at 214 Hz without the material's loss.
   const double a = 5e-3, g = 30e9 / 2.4, omega = 2 * kPi * 214.0;
   const double k = 4 * g * a / 0.8, c = 3.4 * a * a * std::sqrt(2300 * g) / 0.8;
@@ -103,7 +103,7 @@ TEST(HalfSpace, takes_what_a_disc_radiates_and_what_its_spring_loses) {
   }
 }
 
-TEST(Joint, takes_its_loss_factor_of_the_energy_within_one_thickness) {
+TEST(Joint, absorbs_energy_within_one_thickness) {
   const bank::Bank bank = make_bank({300.0, 0, 0, 0, 0, 0}, 0.25);
   const Losses losses = calc_losses(bank, wish(R"("loss": 0.02)"));
   for (std::size_t m = 0; m < bank.mode_count(); ++m) {
@@ -163,7 +163,7 @@ Ringing ring(double mass, double stiffness, const material::Base& base, int peri
   return result;
 }
 
-TEST(FirstOrder, is_what_an_oscillator_on_its_support_does_and_the_books_of_energy_close) {
+TEST(FirstOrder, matches_an_oscillator_on_its_support) {
   // r = omega^2 sqrt(M): the whole mass moves. Springs 100 and 1000 times as stiff as the body's.
   const double mass = 0.4, omega = 2 * kPi * 300.0, stiffness = mass * omega * omega;
   for (const double ratio : {30.0, 300.0}) {
@@ -184,7 +184,7 @@ TEST(FirstOrder, is_what_an_oscillator_on_its_support_does_and_the_books_of_ener
   }
 }
 
-TEST(Holder, is_what_an_oscillator_with_a_dashpot_or_a_spring_does) {
+TEST(Holder, matches_an_oscillator_with_dashpot_or_spring) {
   const bank::Bank bank = bank::example::make_bank();
   const std::size_t vertex = bank.triangles[5][1];
   const Vec3 at = bank.vertices_m[vertex];
@@ -205,7 +205,7 @@ TEST(Holder, is_what_an_oscillator_with_a_dashpot_or_a_spring_does) {
   }
 }
 
-TEST(Limits, a_support_at_a_node_and_an_impedance_of_zero_take_nothing) {
+TEST(Limits, nodes_and_zero_impedance_absorb_nothing) {
   const bank::Bank bank = make_bank({0, 0, 0, 0, 0, 0});
   for (const std::string& name : material::list_base_names()) {
     const Losses losses = calc_losses(bank, wish("\"on\": " + base::quote(name)));
@@ -216,7 +216,7 @@ TEST(Limits, a_support_at_a_node_and_an_impedance_of_zero_take_nothing) {
   for (const double d : none.decay_per_s) EXPECT_EQ(d, 0.0);
 }
 
-TEST(Limits, a_scene_that_asks_for_nothing_changes_no_bit) {
+TEST(Limits, an_empty_request_changes_nothing) {
   const bank::Bank before = make_bank({300.0, 20.0, 1.0, 2.0, 3.0, 4.0}, 0.3);
   for (const MountingRequest& wanted : {MountingRequest{}, wish(R"("on": "rigid")")}) {
     const Losses losses = calc_losses(before, wanted);
@@ -230,7 +230,7 @@ TEST(Limits, a_scene_that_asks_for_nothing_changes_no_bit) {
   }
 }
 
-TEST(Limits, walls_a_million_times_too_soft_end_in_a_bounded_decay_and_one_warning) {
+TEST(Limits, soft_walls_give_a_bounded_decay_and_a_warning) {
   for (const double softer : {1e2, 1e6, 1e12}) {
     for (const double area : {1e-4, 1e-12, 0.0}) {
       bank::Bank before = make_bank({0.4, 0.3, 0.2, 0.01, 0.01, 0.02}, 0.3, area);  // fractions of sqrt(mass)
@@ -253,7 +253,7 @@ TEST(Limits, walls_a_million_times_too_soft_end_in_a_bounded_decay_and_one_warni
   }
 }
 
-TEST(Limits, tiny_patches_and_patches_without_a_normal_give_numbers) {
+TEST(Limits, degenerate_patches_give_finite_results) {
   for (const double area : {0.0, 1e-30, 1e-4, 1e6}) {
     bank::Bank bank = make_bank({3.0, 2.0, 1.0, 0.1, 0.2, 0.3}, 0.1, area);
     for (const bool has_normal : {true, false}) {
@@ -267,7 +267,7 @@ TEST(Limits, tiny_patches_and_patches_without_a_normal_give_numbers) {
   }
 }
 
-TEST(Limits, modes_stay_in_their_order_and_the_bank_stays_sane) {
+TEST(Limits, modes_keep_their_order) {
   bank::Bank bank = make_bank({3000.0, 0, 0, 0, 1.0, 0}, 0.3);
   bank.eigenvalue_rad2_s2[1] = bank.eigenvalue_rad2_s2[0] * (1 + 1e-9);
   bank.decay_per_s[1] = bank::calc_decay(bank.damping, bank.material, bank.eigenvalue_rad2_s2[1]);
@@ -280,7 +280,7 @@ TEST(Limits, modes_stay_in_their_order_and_the_bank_stays_sane) {
   EXPECT_THAT(bank::find_faults(bank), IsEmpty());
 }
 
-TEST(Names, choose_one_support_of_several_and_unknown_ones_are_refused) {
+TEST(Names, select_supports_and_unknown_ones_are_rejected) {
   bank::Bank bank = make_bank({300.0, 0, 0, 0, 0, 0}, 0.25);
   EXPECT_THAT(list_names(bank), testing::ElementsAre("end"));
   MountingRequest wanted;

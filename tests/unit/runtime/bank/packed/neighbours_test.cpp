@@ -31,7 +31,7 @@ void expect_valid(const Neighbours& neighbours, std::size_t known) {
   ASSERT_EQ(std::set(neighbours.begin(), neighbours.end()).size(), kNeighbours);
 }
 
-TEST(CodecNeighbours, are_nearly_the_nearest_on_an_even_surface_and_come_in_order) {
+TEST(CodecNeighbours, are_nearly_the_nearest_and_sorted) {
   for (const example::Mesh& mesh : {example::make_ball(4), example::make_torus(80, 30)}) {
     const Surface surface = example::make_surface(example::shuffle(mesh, 8));
     const std::size_t first = surface.level_begin[surface.level_count() - 1];
@@ -58,7 +58,7 @@ TEST(CodecNeighbours, are_nearly_the_nearest_on_an_even_surface_and_come_in_orde
   }
 }
 
-TEST(CodecNeighbours, depend_on_places_and_cells_alone) {
+TEST(CodecNeighbours, depend_on_places_and_cells_only) {
   const Surface surface = example::make_surface(example::make_ball(3));
   const std::span<const Place> known = std::span(surface.places).first(surface.level_begin[surface.level_count() - 1]);
   NeighbourSearch forward(known, 10), backward(known, 10);
@@ -67,7 +67,7 @@ TEST(CodecNeighbours, depend_on_places_and_cells_alone) {
   for (std::size_t v = surface.places.size(); v-- > 0;) EXPECT_EQ(backward.find(surface.places[v]), found[v]) << v;
 }
 
-TEST(CodecNeighbours, of_crowds_are_found_at_once) {
+TEST(CodecNeighbours, of_dense_vertices_are_found_quickly) {
   std::mt19937 random(3);
   std::vector<Place> one_place(20000, Place{5, -7, 1000}), one_cell, far_apart;
   for (int i = 0; i < 20000; ++i)
@@ -87,7 +87,7 @@ TEST(CodecNeighbours, of_crowds_are_found_at_once) {
   EXPECT_LT(std::clock() - begin, 4 * CLOCKS_PER_SEC);
 }
 
-TEST(CodecNeighbours, may_be_all_that_there_are) {
+TEST(CodecNeighbours, may_be_all_vertices) {
   const std::vector<Place> known{{0, 0, 0}, {9, 0, 0}, {0, 9, 0}, {0, 0, 9}, {9, 9, 0},
                                  {9, 0, 9}, {0, 9, 9}, {9, 9, 9}, {4, 4, 0}, {4, 4, 9}};
   NeighbourSearch search(known, find_cell_shift(known));
@@ -96,7 +96,7 @@ TEST(CodecNeighbours, may_be_all_that_there_are) {
   EXPECT_EQ(found[0], 8);
 }
 
-TEST(CodecNeighbours, have_cells_that_hold_a_few_places) {
+TEST(CodecNeighbours, have_cells_of_a_few_vertices) {
   for (const double step_m : {1.0 / 512.0, 1.0 / 65536.0}) {
     const std::vector<Place> places = example::find_places(example::make_ball(4), step_m);
     const double width = std::exp2(find_cell_shift(places)) * step_m;
@@ -126,7 +126,7 @@ struct Stencils {
   }
 };
 
-TEST(CodecStencil, lets_linear_fields_pass_with_their_gradients) {
+TEST(CodecStencil, reproduces_linear_fields_and_gradients) {
   const Stencils all(example::make_ball(4));
   ASSERT_GT(all.stencils.size(), 100u);
   for (std::size_t i = 0; i < all.stencils.size(); ++i) {
@@ -159,7 +159,7 @@ TEST(CodecStencil, lets_linear_fields_pass_with_their_gradients) {
   }
 }
 
-TEST(CodecStencil, is_finite_where_neighbours_are_at_one_place) {
+TEST(CodecStencil, is_finite_for_coincident_neighbours) {
   std::vector<Place> places(12, Place{100, 100, 100});
   Neighbours neighbours;
   std::iota(neighbours.begin(), neighbours.end(), 0);
@@ -242,7 +242,7 @@ TEST(CodecLoops, of_all_instruction_sets_make_the_same_stencils) {
 }
 
 // Against double-precision sums.
-TEST(CodecLoops, multiply_weigh_and_add_as_sums_that_are_written_out) {
+TEST(CodecLoops, match_double_precision_sums) {
   std::mt19937 random(5);
   std::uniform_real_distribution<float> draw(-1.0F, 1.0F);
   std::vector<std::pair<const char*, const Loops*>> all = list_others();
@@ -308,7 +308,7 @@ TEST(CodecLoops, multiply_weigh_and_add_as_sums_that_are_written_out) {
   }
 }
 
-TEST(CodecLoops, round_to_the_nearest_step_and_hold_what_is_no_number) {
+TEST(CodecLoops, round_to_nearest_and_clamp) {
   constexpr float kInf = std::numeric_limits<float>::infinity(), kNan = std::numeric_limits<float>::quiet_NaN();
   constexpr std::size_t kPadded = 80;
   std::vector<float> row(3 * kPadded), factor(kPadded, 2.0F);

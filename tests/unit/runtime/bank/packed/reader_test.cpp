@@ -22,7 +22,7 @@ std::string message_of(Call&& call) {
   return tests::catch_message<InputError>(std::forward<Call>(call));
 }
 
-TEST(CodecReader, folded_numbers_unfold_and_are_small_where_they_are_small) {
+TEST(CodecReader, zigzag_code_is_invertible_and_small) {
   for (std::int32_t value = -1000; value <= 1000; ++value) {
     EXPECT_EQ(unfold(fold(value)), value);
     EXPECT_LE(fold(value), 2U * static_cast<std::uint32_t>(std::abs(value)));
@@ -32,7 +32,7 @@ TEST(CodecReader, folded_numbers_unfold_and_are_small_where_they_are_small) {
   EXPECT_EQ(fold(-1), 1U);
 }
 
-TEST(CodecReader, gives_what_the_writer_was_given) {
+TEST(CodecReader, reads_back_exactly) {
   std::mt19937 random(1);
   Writer writer;
   writer.put(std::uint8_t{200});
@@ -59,7 +59,7 @@ TEST(CodecReader, gives_what_the_writer_was_given) {
   EXPECT_NO_THROW(reader.finish());
 }
 
-TEST(CodecReader, refuses_what_is_not_there) {
+TEST(CodecReader, rejects_missing_data) {
   Writer writer;
   writer.put(std::uint32_t{5});
   EXPECT_NE(message_of([&] { make_reader(writer).get<double>(); }).find("ends too early"), std::string::npos);
@@ -71,7 +71,7 @@ TEST(CodecReader, refuses_what_is_not_there) {
   EXPECT_EQ(make_reader(writer).get_list<std::uint16_t>(2).size(), 2u);
 }
 
-TEST(CodecReader, refuses_numbers_that_are_not_positive) {
+TEST(CodecReader, rejects_nonpositive_numbers) {
   for (const double bad :
        {0.0, -0.0, -1.0, std::nan(""), std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()}) {
     Writer writer;
@@ -80,7 +80,7 @@ TEST(CodecReader, refuses_numbers_that_are_not_positive) {
   }
 }
 
-TEST(CodecReader, refuses_blocks_of_another_length_and_damaged_ones) {
+TEST(CodecReader, rejects_damaged_blocks) {
   std::vector<std::uint8_t> block(600);
   for (std::size_t i = 0; i < block.size(); ++i) block[i] = static_cast<std::uint8_t>(i * i % 251);
   Writer writer;
@@ -100,7 +100,7 @@ TEST(CodecReader, refuses_blocks_of_another_length_and_damaged_ones) {
   EXPECT_GE(refused + 1, writer.get_bytes().size());
 }
 
-TEST(CodecReader, refuses_a_block_that_no_stream_of_its_length_holds) {
+TEST(CodecReader, rejects_impossible_expansion) {
   const std::vector<std::uint8_t> zeros(1 << 22, 0);
   Writer writer;
   writer.put_block(zeros);
@@ -109,13 +109,13 @@ TEST(CodecReader, refuses_a_block_that_no_stream_of_its_length_holds) {
   EXPECT_NE(message_of([&] { make_reader(writer).get_block(std::size_t{1} << 40); }).find("too short"), std::string::npos);
 }
 
-TEST(CodecReader, refuses_numbers_of_five_bytes) {
+TEST(CodecReader, rejects_numbers_of_five_bytes) {
   Writer writer;
   writer.put(std::uint8_t{5});
   EXPECT_NE(message_of([&] { make_reader(writer).get_numbers(0); }).find("numbers of 5 bytes"), std::string::npos);
 }
 
-TEST(CodecReader, small_files_may_become_64_MiB_and_longer_ones_4096_times_what_they_are) {
+TEST(CodecReader, expansion_is_limited) {
   EXPECT_EQ(find_most_unpacked(0), 64u << 20);
   EXPECT_EQ(find_most_unpacked(16384), 64u << 20);
   EXPECT_EQ(find_most_unpacked(1 << 20), std::uint64_t{4096} << 20);

@@ -95,7 +95,7 @@ Result pack(const Surface& surface, const Shapes& shapes) {
   return result;
 }
 
-TEST(CodecShapes, of_any_number_of_modes_come_back_within_their_steps) {
+TEST(CodecShapes, of_any_number_of_modes_read_back_within_steps) {
   const Surface surface = example::make_surface(example::shuffle(example::make_ball(3), 1));
   ASSERT_GE(surface.level_count(), 2u);
   for (const std::size_t modes : {1u, 2u, 15u, 16u, 17u, 33u}) {
@@ -106,7 +106,7 @@ TEST(CodecShapes, of_any_number_of_modes_come_back_within_their_steps) {
   }
 }
 
-TEST(CodecShapes, of_every_surface_come_back_within_their_steps) {
+TEST(CodecShapes, of_all_surfaces_read_back_within_steps) {
   for (const example::Mesh& mesh : {example::make_tetrahedron(), example::make_ball(1), example::make_plate(20),
                                     example::make_torus(40, 20), example::make_hollow_ball(2), example::make_touching_balls(2)}) {
     const Surface surface = example::make_surface(example::shuffle(mesh, 2));
@@ -121,7 +121,7 @@ TEST(CodecShapes, may_have_modes_at_rest_and_no_mode) {
   EXPECT_TRUE(pack(surface, Shapes(surface, 0, 0.01)).shape.empty());
 }
 
-TEST(CodecShapes, are_better_and_longer_with_finer_steps) {
+TEST(CodecShapes, are_more_accurate_and_longer_with_finer_steps) {
   const Surface surface = example::make_surface(example::make_ball(3));
   double worst_before = std::numeric_limits<double>::infinity();
   std::size_t bytes_before = 0;
@@ -134,7 +134,7 @@ TEST(CodecShapes, are_better_and_longer_with_finer_steps) {
   }
 }
 
-TEST(CodecShapes, are_kept_finer_at_the_vertices_that_are_to_be_finer) {
+TEST(CodecShapes, are_finer_at_requested_vertices) {
   const Surface surface = example::make_surface(example::make_ball(3));
   Shapes shapes(surface, 6, 0.1);
   for (std::size_t v = 0; v < surface.places.size(); ++v) shapes.fineness[v] = static_cast<std::uint8_t>(v % 10);
@@ -142,7 +142,7 @@ TEST(CodecShapes, are_kept_finer_at_the_vertices_that_are_to_be_finer) {
 }
 
 // A mode at rest at a vertex that moves by thousands of steps next to it must decode to exactly zero.
-TEST(CodecShapes, at_the_finest_are_exact_whatever_the_neighbours_do) {
+TEST(CodecShapes, at_the_finest_are_exact) {
   const Surface surface = example::make_surface(example::make_ball(3));
   Shapes shapes(surface, 5, 1e-4);
   Rows wanted(surface.places.size(), 5);
@@ -161,14 +161,14 @@ TEST(CodecShapes, at_the_finest_are_exact_whatever_the_neighbours_do) {
     for (std::size_t i = 0; shapes.fineness[v] > 0 && i < 15; ++i) ASSERT_EQ(shape[15 * v + i], 0) << v;
 }
 
-TEST(CodecShapes, of_smooth_fields_take_less_than_a_fifth_of_what_they_are) {
+TEST(CodecShapes, of_smooth_fields_are_compressed_to_a_fifth) {
   const Surface surface = example::make_surface(example::make_ball(4));
   const Result result = pack(surface, Shapes(surface, 20, 0.02));
   EXPECT_LT(result.worst, 1.01 * kMostLeft);
   EXPECT_LT(5 * result.bytes.size(), 6 * surface.places.size() * 20);
 }
 
-TEST(CodecShapes, of_noise_come_back_within_their_steps) {
+TEST(CodecShapes, of_noise_read_back_within_steps) {
   const Surface surface = example::make_surface(example::make_ball(3));
   Shapes shapes(surface, 4, 0.05);
   std::mt19937 random(4);
@@ -183,7 +183,7 @@ TEST(CodecShapes, of_noise_come_back_within_their_steps) {
   EXPECT_LT(pack(surface, shapes).worst, 1.01 * kMostLeft);
 }
 
-TEST(CodecShapes, of_a_sample_are_those_of_the_coarser_levels_and_of_the_sampled_vertices) {
+TEST(CodecShapes, of_a_sample_cover_coarse_levels_and_sampled_vertices) {
   const Surface surface = example::make_surface(example::make_ball(3));
   const Shapes shapes(surface, 5, 0.02);
   const FittedShapes all = fit_shapes(surface, shapes.wanted, 5, shapes.fineness),
@@ -222,7 +222,7 @@ struct Sample {
   bool try_read(const std::vector<std::uint8_t>& bytes) const { return packed::try_read(example::as_bytes(bytes), surface, shapes.scale); }
 };
 
-TEST(CodecShapes, cut_short_or_lengthened_are_refused) {
+TEST(CodecShapes, of_wrong_length_are_rejected) {
   const Sample sample(3);
   std::vector<std::uint8_t> bytes = sample.write();
   ASSERT_TRUE(sample.try_read(bytes));
@@ -232,7 +232,7 @@ TEST(CodecShapes, cut_short_or_lengthened_are_refused) {
   EXPECT_FALSE(sample.try_read(bytes));
 }
 
-TEST(CodecShapes, with_any_one_byte_changed_are_refused_or_are_numbers) {
+TEST(CodecShapes, with_a_changed_byte_are_rejected_or_finite) {
   for (const int divisions : {2, 3}) {
     const Sample sample(divisions);
     const std::vector<std::uint8_t> bytes = sample.write();
@@ -248,7 +248,7 @@ TEST(CodecShapes, with_any_one_byte_changed_are_refused_or_are_numbers) {
   }
 }
 
-TEST(CodecShapes, of_huge_numbers_and_steps_are_numbers) {
+TEST(CodecShapes, of_huge_numbers_and_steps_are_finite) {
   const Sample sample(3, 24, 1e-2);
   ASSERT_EQ(sample.levels.size(), 2u);
   std::mt19937 random(8);
@@ -269,7 +269,7 @@ TEST(CodecShapes, of_huge_numbers_and_steps_are_numbers) {
   }
 }
 
-TEST(CodecShapes, that_say_what_cannot_be_are_refused) {
+TEST(CodecShapes, with_invalid_headers_are_rejected) {
   const Sample sample(3, 64, 1e-2);
   ASSERT_GT(sample.levels[1].residual.size(), 2 * 192u);
   ASSERT_GT(sample.levels[1].gradient.size(), 0u);
@@ -311,7 +311,7 @@ TEST(CodecShapes, that_say_what_cannot_be_are_refused) {
   EXPECT_FALSE(sample.try_read(bytes)) << "form";
 }
 
-TEST(CodecShapes, of_more_modes_than_the_bytes_can_hold_are_refused_before_memory_is_taken) {
+TEST(CodecShapes, of_too_many_modes_are_rejected_before_allocation) {
   const Surface surface = example::make_surface(example::make_ball(4));
   const std::vector<double> scale(1 << 20, 1.0);
   std::vector<std::uint8_t> bytes{1, 0, 0, 0x10, 0, static_cast<std::uint8_t>(surface.level_count())};
@@ -320,7 +320,7 @@ TEST(CodecShapes, of_more_modes_than_the_bytes_can_hold_are_refused_before_memor
   EXPECT_FALSE(try_read(example::as_bytes(bytes), surface, scale));
 }
 
-TEST(CodecShapes, on_a_coarsest_level_of_too_few_vertices_are_refused) {
+TEST(CodecShapes, on_too_few_coarse_vertices_are_rejected) {
   Surface surface = example::make_surface(example::make_ball(2));
   surface.level_begin = {0, kNeighbours - 1, surface.places.size()};
   const Shapes shapes(surface, 1, 0.1);

@@ -57,7 +57,7 @@ void expect_round_trip(const Mesh& mesh, unsigned levels) {
   }
 }
 
-TEST(CodecSurface, of_every_form_comes_back_as_it_was_in_the_order_that_is_given) {
+TEST(CodecSurface, reads_back_exactly_in_the_stated_order) {
   const std::vector<std::pair<const char*, Mesh>> meshes{{"tetrahedron", example::make_tetrahedron()},
                                                          {"ball", example::make_ball(3)},
                                                          {"torus", example::make_torus(24, 11)},
@@ -77,7 +77,7 @@ TEST(CodecSurface, may_have_several_vertices_at_one_place) {
   expect_round_trip(example::shuffle(mesh, 5), 2);
 }
 
-TEST(CodecSurface, takes_the_whole_lattice) {
+TEST(CodecSurface, uses_the_whole_lattice) {
   const Mesh mesh = example::make_tetrahedron();
   const std::vector<Place> places{
       {-kMaxPlace, -kMaxPlace, kMaxPlace}, {kMaxPlace, kMaxPlace, -kMaxPlace}, {0, kMaxPlace, kMaxPlace}, {kMaxPlace, -kMaxPlace, 1}};
@@ -87,12 +87,12 @@ TEST(CodecSurface, takes_the_whole_lattice) {
 }
 
 // Raw, a vertex of a closed surface takes 12 bytes and its two triangles 24.
-TEST(CodecSurface, of_a_fine_ball_takes_six_bytes_a_vertex) {
+TEST(CodecSurface, of_a_fine_ball_takes_six_bytes_per_vertex) {
   const Mesh mesh = example::shuffle(example::make_ball(5), 9);
   EXPECT_LT(static_cast<double>(example::write_mesh(mesh).size()), 6.0 * static_cast<double>(mesh.vertices_m.size()));
 }
 
-TEST(CodecSurface, has_its_vertices_by_levels_and_within_a_level_along_a_curve_of_short_steps) {
+TEST(CodecSurface, vertices_are_ordered_by_level_and_curve) {
   const Surface surface = example::make_surface(example::shuffle(example::make_ball(4), 2), 1.0 / 8192.0);
   double sum = 0.0;
   const std::size_t first = surface.level_begin[surface.level_count() - 1];
@@ -100,7 +100,7 @@ TEST(CodecSurface, has_its_vertices_by_levels_and_within_a_level_along_a_curve_o
   EXPECT_LT(sum / static_cast<double>(surface.places.size() - first), 0.15);  // 4/3 between random places of a unit sphere
 }
 
-TEST(CodecSurface, gives_triangles_their_numbers_back) {
+TEST(CodecSurface, restores_triangle_numbers) {
   const Mesh mesh = example::shuffle(example::make_ball(2), 6);
   std::vector<Triangle> packed;
   TriangleOrder order;
@@ -136,7 +136,7 @@ TEST(CodecSurface, gives_triangles_their_numbers_back) {
   }
 }
 
-TEST(CodecLevels, keep_a_distance_that_no_further_vertex_could_keep_and_that_halves) {
+TEST(CodecLevels, keep_a_maximal_distance_that_halves) {
   for (const Mesh& mesh : {example::shuffle(example::make_ball(4), 3), example::shuffle(example::make_plate(40), 4)}) {
     const std::vector<std::uint8_t> level = find_levels(mesh.vertices_m, example::calc_area_m2(mesh));
     ASSERT_EQ(level.size(), mesh.vertices_m.size());
@@ -168,14 +168,14 @@ TEST(CodecLevels, keep_a_distance_that_no_further_vertex_could_keep_and_that_hal
   }
 }
 
-TEST(CodecLevels, are_one_where_there_are_few_vertices) {
+TEST(CodecLevels, are_one_for_few_vertices) {
   for (const Mesh& mesh : {example::make_tetrahedron(), example::make_ball(0), example::make_ball(1), example::make_ball(2)}) {
     const std::vector<std::uint8_t> level = find_levels(mesh.vertices_m, example::calc_area_m2(mesh));
     EXPECT_EQ(level, std::vector<std::uint8_t>(mesh.vertices_m.size(), 0));
   }
 }
 
-TEST(CodecLevels, none_is_empty_in_a_crowd) {
+TEST(CodecLevels, none_is_empty_for_dense_vertices) {
   std::vector<Vec3> vertices_m(4000, Vec3{0.3, 0.2, 0.1});
   for (std::size_t v = 0; v < 40; ++v)
     vertices_m[100 * v] = {std::cos(static_cast<double>(v)), std::sin(static_cast<double>(v)), 0.01 * static_cast<double>(v)};
@@ -210,7 +210,7 @@ bool try_read(std::span<const std::byte> bytes) {
   }
 }
 
-TEST(CodecSurface, cut_short_or_lengthened_is_refused) {
+TEST(CodecSurface, of_wrong_length_is_rejected) {
   std::vector<std::uint8_t> bytes = example::write_mesh(example::make_ball(2));
   ASSERT_TRUE(try_read(example::as_bytes(bytes)));
   for (std::size_t length = 0; length < bytes.size(); ++length) EXPECT_FALSE(try_read(example::as_bytes(bytes).first(length))) << length;
@@ -218,7 +218,7 @@ TEST(CodecSurface, cut_short_or_lengthened_is_refused) {
   EXPECT_FALSE(try_read(example::as_bytes(bytes)));
 }
 
-TEST(CodecSurface, with_any_one_bit_changed_is_refused_or_can_be_used) {
+TEST(CodecSurface, with_a_flipped_bit_is_rejected_or_usable) {
   for (const Mesh& mesh : {example::make_tetrahedron(), example::make_touching_balls(1)}) {
     const std::vector<std::uint8_t> bytes = example::write_mesh(mesh);
     std::size_t read = 0;
@@ -264,7 +264,7 @@ struct Streams {
   }
 };
 
-TEST(CodecSurface, of_random_symbols_is_refused_or_can_be_used) {
+TEST(CodecSurface, of_random_symbols_is_rejected_or_usable) {
   std::mt19937 random(11);
   std::size_t read = 0;
   for (int round = 0; round < 3000; ++round) {
@@ -291,7 +291,7 @@ TEST(CodecSurface, of_random_symbols_is_refused_or_can_be_used) {
   EXPECT_LT(read, 2900u);
 }
 
-TEST(CodecSurface, with_a_wrong_header_is_refused) {
+TEST(CodecSurface, with_a_wrong_header_is_rejected) {
   Streams good;
   good.vertices = 3;
   good.triangles = 2;
@@ -361,7 +361,7 @@ Streams make_knot(std::uint32_t triangles) {
   return knot;
 }
 
-TEST(CodecSurface, with_ever_more_open_edges_at_one_vertex_does_not_take_the_square_of_its_length) {
+TEST(CodecSurface, time_is_bounded_for_many_open_edges) {
   const std::vector<std::uint8_t> bytes = make_knot(200000).write();
   const std::clock_t begin = std::clock();  // CPU time, independent of load
   try_read(example::as_bytes(bytes));

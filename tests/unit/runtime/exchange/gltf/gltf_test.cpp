@@ -25,7 +25,7 @@ std::uint32_t get_u32(const std::string& bytes, std::size_t at) {
   return value;
 }
 
-TEST(Gltf, what_is_written_is_read_back) {
+TEST(Gltf, reads_back_exactly) {
   Writer writer("a test");
   const std::vector<float> rows{0.5F, -1.0F, 3.0F, 7.0F, 1e-7F, -2.0F}, scalars{1.0F, 2.5F, 1e30F};
   const int points = writer.add_vertices(rows, true), numbers = writer.add_scalars(scalars);
@@ -65,7 +65,7 @@ TEST(Gltf, what_is_written_is_read_back) {
   EXPECT_EQ(views.back().integer("byteOffset", 0, 1000) % 8, 0);
 }
 
-TEST(Gltf, indices_take_32_bits_where_16_do_not_hold_the_vertices) {
+TEST(Gltf, indices_take_32_bits_if_needed) {
   for (const auto& [vertices, component] : {std::pair<std::size_t, long long>(65535, 5123), {65536, 5125}, {70000, 5125}}) {
     Writer writer("a test");
     const auto last = static_cast<std::int32_t>(vertices - 1);
@@ -79,7 +79,7 @@ TEST(Gltf, indices_take_32_bits_where_16_do_not_hold_the_vertices) {
   }
 }
 
-TEST(Gltf, nodes_turn_as_quaternions_do) {
+TEST(Gltf, nodes_rotate_like_quaternions) {
   const base::Document document = base::parse_document(
       R"({"rotation": [0.70710678118654752, 0, 0, 0.70710678118654752], "translation": [1, 2, 3], "scale": [2, 2, 2]})", "node");
   base::Object node = document.root();

@@ -1,4 +1,4 @@
-#include "precompute/run/estimate.hpp"
+#include "precompute/run/predict_cost.hpp"
 
 #include <array>
 #include <cmath>
@@ -41,7 +41,7 @@ base::Json describe_seconds(const cost::PhaseSeconds& seconds) {
 
 }  // namespace
 
-std::string estimate_costs(const std::string& text) {
+std::string predict_cost(const std::string& text) {
   const cost::ProblemSize size = parse_size(text);
   const cost::PhaseSeconds seconds = cost::predict_seconds(size);
   base::Json root = base::Json::object();

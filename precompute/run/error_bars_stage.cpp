@@ -1,4 +1,4 @@
-#include "precompute/run/errors.hpp"
+#include "precompute/run/error_bars_stage.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -18,10 +18,10 @@ error_bars::ErrorBars calc_bars(Run& run, const Body& body, const AssembledSyste
   const bool is_cut = modes.band_count > static_cast<std::int64_t>(modes.lambda.size());
   const double last_hz = modes.lambda.empty() ? 0.0 : std::sqrt(modes.lambda.back()) / (2 * std::numbers::pi);
   error_bars::Solution solution{modes.lambda, modes.residual, modes.shapes, find_low_hz(run.job, modes),
-                              is_cut ? last_hz : run.job.band_hz[1]};
+                                is_cut ? last_hz : run.job.band_hz[1]};
   solution.below = std::max<std::int64_t>(0, modes.count_below_low - modes.rigid_count - modes.mechanism_count);
   return error_bars::calc_error_bars(run.comm, body.pieces.local, system.matrices.stiffness, system.matrices.mass, solids, materials.of_tet,
-                                   run.job.mass, solution);
+                                     run.job.mass, solution);
 }
 
 }  // namespace
