@@ -1,4 +1,4 @@
-// carillon bank-for: the bank of a body, made if it is missing. carillon-render and carillon-live start it for bodies without a bank.
+// carillon bank-for: the bank of a body, computed if missing. Started by carillon-render and carillon-live for bodies without a bank.
 #include <fmt/core.h>
 
 #include <iostream>
@@ -40,7 +40,7 @@ int make(const Shared& shared, const BankForOptions& options) {
 
 int run_bank_for(Shared& shared, const BankForOptions& options) {
   if (options.result.empty()) return make(shared, options);
-  // The calling program prints the message, once.
+  // The calling program prints the message.
   base::Result result;
   int code = 0;
   try {

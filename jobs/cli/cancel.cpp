@@ -14,7 +14,7 @@
 namespace carillon::cli {
 namespace {
 
-/// Does `act` to each job, and says what came of it. Exit code 1 when one of them was not as asked for.
+/// Calls `act` for each job and prints the results. Exit code 1 if one was not successful.
 template <class Act>
 int do_to_all(Shared& shared, const std::vector<registry::Job>& jobs, const Act& act) {
   bool is_done = true;
@@ -50,7 +50,7 @@ int run_cancel(Shared& shared, const CancelOptions& options) {
 int run_retry(Shared& shared, const RetryOptions& options) {
   shared.settle();
   if (options.words.empty() && !options.all_failed)
-    throw InputError("which job? Name an id or a job file, or give --failed for all that failed");
+    throw InputError("no job given; give an id or a job file, or --failed for all failed jobs");
   std::vector<registry::Job> jobs = find_jobs(shared, options.words);
   if (options.all_failed) {
     for (registry::Job& job : shared.registry().list({registry::JobState::failed})) jobs.push_back(std::move(job));

@@ -1,4 +1,4 @@
-// The command line: all commands with their options and help. No other file of this folder includes CLI11, which is slow to compile.
+// Command line: all commands with options and help. The only file with CLI11, which is slow to compile.
 #include "jobs/cli/command_line.hpp"
 
 #include <fmt/core.h>
@@ -17,27 +17,26 @@
 #include "precompute/job/read_body.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/base/error.hpp"
-#include "runtime/base/whole_range.hpp"
 #include "runtime/base/version.hpp"
+#include "runtime/base/whole_range.hpp"
 
 namespace carillon::cli {
 namespace {
 
 constexpr const char* kAbout =
-    "From an object to its sound: carillon hear OBJECT --material steel. Of many: carillon submit JOB.json --run.\n"
-    "A bank is kept under the hash of the job, its mesh and the version of the solver, and never computed twice.";
+    "The sound of an object: carillon hear OBJECT --material steel. Many banks: carillon submit JOB.json --run.\n"
+    "Banks are stored under the hash of job, mesh and solver version, and never computed twice.";
 constexpr const char* kShortFooter = "IDs, exit codes, store and profile: carillon --help";
 constexpr const char* kFooter =
-    "ID is an id or its beginning, the job file, or a name of carillon status (sweep.txt#21). Exit codes: 0 done, 1 not done yet, 2 the "
-    "input cannot be used, 3 a job failed, 4 the "
-    "machine\n"
-    "refused, 128 + n stopped by signal n. The store: --store, else \"store\" of the profile, else $XDG_DATA_HOME/carillon, else\n"
-    "~/.local/share/carillon. The profile: --profile, else ~/.config/carillon/profile.json, {\"store\": DIR, \"on\": \"local\" or "
-    "\"slurm\"}.";
+    "ID is an id or its beginning, a job file, or a name of carillon status (sweep.txt#21). Exit codes: 0 done, 1 not done yet, 2 bad "
+    "input,\n"
+    "3 a job failed, 4 system error, 128 + n stopped by signal n. Store: --store, else \"store\" of the profile, else\n"
+    "$XDG_DATA_HOME/carillon, else ~/.local/share/carillon. Profile: --profile, else ~/.config/carillon/profile.json,\n"
+    "{\"store\": DIR, \"on\": \"local\" or \"slurm\"}.";
 constexpr int kMaxRanks = 1'000'000;
 constexpr double kMaxGb = 1e9;
 
-/// Gigabytes of memory, `min` or more. Not-a-number lies outside, which CLI::Range does not see.
+/// Gigabytes, at least `min`. Rejects NaN, which CLI::Range accepts.
 CLI::Validator make_gb_check(double min) {
   return {[min](const std::string& text) {
             double value = 0.0;
@@ -51,17 +50,16 @@ CLI::Validator make_gb_check(double min) {
 CLI::Validator make_engine_check() { return CLI::IsMember({"local", "slurm"}); }
 
 void add_resources(CLI::App& command, ResourceOptions& options) {
-  command.add_option("--ranks", options.ranks, "MPI ranks of each job; without it, predicted from the mesh")
+  command.add_option("--ranks", options.ranks, "MPI ranks of each job; default: chosen from the mesh")
       ->check(base::whole_range(1, kMaxRanks), base::describe_whole_range(1, kMaxRanks));
-  command
-      .add_option("--memory-gb", options.memory_gb, "Memory of each job, all ranks together: what needs more ends; without it, predicted")
+  command.add_option("--memory-gb", options.memory_gb, "Memory limit of each job, all ranks together; default: predicted")
       ->check(make_gb_check(1e-6));
   command.add_option("--time-limit", options.time_limit,
-                     "Of one attempt: seconds, or 15m, 2h; the next resumes from what is saved by then");
-  command.add_option("--on", options.engine, "Where they run: local (this machine) or slurm")->check(make_engine_check());
+                     "Time limit of one attempt: seconds, or 15m, 2h; the next attempt resumes from its checkpoint");
+  command.add_option("--on", options.engine, "Where jobs run: local (this machine) or slurm")->check(make_engine_check());
 }
 
-/// When the words ask for `command`, `run` becomes `work` with the options that they have filled.
+/// Sets `run` to `work` with the parsed options if `command` is given.
 template <class Options>
 void set_work(CLI::App& command, Shared& shared, Run& run, const std::shared_ptr<Options>& options, int (*work)(Shared&, const Options&)) {
   command.callback([&shared, &run, options, work] { run = [&shared, options, work] { return work(shared, *options); }; });
@@ -69,58 +67,56 @@ void set_work(CLI::App& command, Shared& shared, Run& run, const std::shared_ptr
 
 void add_submit(CLI::App& app, Shared& shared, Run& run) {
   auto options = std::make_shared<SubmitOptions>();
-  CLI::App* command = app.add_subcommand("submit",
-                                         "Asks for banks. JOB.json is a job, a folder stands for its *.json, any other file is a manifest: "
-                                         "one job file a line, or one job as JSON on one\n"
-                                         "line; \"-\" reads a manifest from standard input. What is in the store already is not computed "
-                                         "again. All jobs are read before any is submitted.");
+  CLI::App* command =
+      app.add_subcommand("submit",
+                         "Submits jobs. JOB.json is a job, a folder stands for its *.json, any other file is a manifest: one "
+                         "job file or one job as JSON\n"
+                         "per line; \"-\" reads a manifest from standard input. Existing banks are not computed again. All "
+                         "jobs are checked before any is submitted.");
   command->add_option("JOB", options->words, "Job files, folders, manifests")->required();
   add_resources(*command, options->resources);
-  command->add_flag("--keep-going", options->keep_going, "Submit the others when some jobs cannot be used (the exit code is still 2)");
-  command->add_flag("-q,--quiet", options->is_quiet, "Print nothing but warnings and errors");
-  command->add_flag("--wait", options->wait, "Wait until they have ended; carillon run or Slurm has to work through the queue");
-  CLI::Option* runs = command->add_flag("--run", options->run, "Work through the queue here until they have ended");
+  command->add_flag("--keep-going", options->keep_going, "Submit the valid jobs if some are invalid (exit code 2)");
+  command->add_flag("-q,--quiet", options->is_quiet, "Print only warnings and errors");
+  command->add_flag("--wait", options->wait, "Wait until they have ended; carillon run or Slurm must run the queue");
+  CLI::Option* runs = command->add_flag("--run", options->run, "Run the queue here until they have ended");
   command->add_flag("--pictures", options->has_pictures, "With --run: as carillon run --pictures")->needs(runs);
   set_work(*command, shared, run, options, run_submit);
 }
 
 void add_status(CLI::App& app, Shared& shared, Run& run) {
   auto options = std::make_shared<StatusOptions>();
-  CLI::App* command =
-      app.add_subcommand("status", "Where jobs stand: state, phase, percent, modes, time left, and why one failed or waits.");
-  command->add_option("ID", options->words,
-                      "Ids, job files, folders, manifests, or names as this command shows them; without any, all jobs");
-  command->add_flag("--watch", options->watch,
-                    "Until they have ended: bars on a terminal, elsewhere one JSON object a line for every change. Exit code 0 when all "
-                    "are done, 3 when one failed or was cancelled, also earlier where no ID is given");
-  command->add_flag("--all", options->all, "Every job, however many there are");
+  CLI::App* command = app.add_subcommand("status", "Shows jobs: state, phase, percent, modes, time left, and why a job failed or waits.");
+  command->add_option("ID", options->words, "Ids, job files, folders, manifests, or names in this list; default: all jobs");
+  command->add_flag(
+      "--watch", options->watch,
+      "Follow until they have ended: bars on a terminal, else one JSON object per line and change. Exit code 0: all are done, "
+      "3: one failed or was cancelled (without ID also earlier ones)");
+  command->add_flag("--all", options->all, "Show every job");
   set_work(*command, shared, run, options, run_status);
 }
 
 void add_log(CLI::App& app, Shared& shared, Run& run) {
   auto options = std::make_shared<LogOptions>();
-  CLI::App* command =
-      app.add_subcommand("log", "What the solver printed for a job, all attempts one after the other. Exit code 1: nothing yet.");
+  CLI::App* command = app.add_subcommand("log", "Prints the solver output of a job, all attempts in order. Exit code 1: no output yet.");
   command->add_option("ID", options->word, "Id (or its beginning), job file, or name of carillon status")->required();
-  command->add_flag("-f,--follow", options->follow, "Continue until the job has ended");
+  command->add_flag("-f,--follow", options->follow, "Follow until the job has ended");
   set_work(*command, shared, run, options, run_log);
 }
 
 void add_cancel(CLI::App& app, Shared& shared, Run& run) {
   auto options = std::make_shared<CancelOptions>();
   CLI::App* command = app.add_subcommand("cancel",
-                                         "Ends jobs that are queued, wait or run; what a running one has computed so far is kept for a "
-                                         "retry. Exit code 1: one was done already.");
+                                         "Cancels jobs that are queued, waiting or running; checkpoints are kept for a retry. Exit code 1: "
+                                         "one was already done.");
   command->add_option("ID", options->words, "Ids, job files, folders, manifests, or names of carillon status")->required();
   set_work(*command, shared, run, options, run_cancel);
 }
 
 void add_retry(CLI::App& app, Shared& shared, Run& run) {
   auto options = std::make_shared<RetryOptions>();
-  CLI::App* command =
-      app.add_subcommand("retry", "Queues failed and cancelled jobs again, from their checkpoints; waiting ones need wait no longer.");
+  CLI::App* command = app.add_subcommand("retry", "Requeues failed and cancelled jobs, from their checkpoints, and waiting jobs at once.");
   command->add_option("ID", options->words, "Ids, job files, folders, manifests, or names of carillon status");
-  command->add_flag("--failed", options->all_failed, "All jobs that failed");
+  command->add_flag("--failed", options->all_failed, "All failed jobs");
   add_resources(*command, options->resources);
   set_work(*command, shared, run, options, run_retry);
 }
@@ -128,7 +124,7 @@ void add_retry(CLI::App& app, Shared& shared, Run& run) {
 void add_explain(CLI::App& app, Shared& shared, Run& run) {
   auto options = std::make_shared<ExplainOptions>();
   CLI::App* command =
-      app.add_subcommand("explain", "Would this job run, and why: which part of it changed since it was submitted last. Changes nothing.");
+      app.add_subcommand("explain", "Shows whether a job would run, and which parts changed since its last submission. Changes nothing.");
   command->add_option("JOB", options->word, "Job file, folder, manifest or one of its lines (sweep.txt#21)")->required();
   set_work(*command, shared, run, options, run_explain);
 }
@@ -136,36 +132,34 @@ void add_explain(CLI::App& app, Shared& shared, Run& run) {
 void add_run(CLI::App& app, Shared& shared, Run& run) {
   auto options = std::make_shared<QueueOptions>();
   queue::RunOptions& queue = options->queue;
-  CLI::App* command = app.add_subcommand("run",
-                                         "Works through the queue on this machine until it is empty: as many jobs at once as cores and "
-                                         "memory allow. Any number may run on one store.\n"
-                                         "Ctrl-C saves what runs and puts it back into the queue; once more ends it. Exit code 0: all "
-                                         "are done, 3: one failed or was cancelled. With --json one object a line, else text.");
-  command->add_flag("--keep", queue.runner.keep, "Stay and wait for more jobs when the queue is empty");
-  command->add_option("--cores", queue.runner.cores, "Use at most so many")
+  CLI::App* command =
+      app.add_subcommand("run",
+                         "Runs the queue on this machine until it is empty, with as many concurrent jobs as cores and memory "
+                         "allow. Several processes may run on one store.\n"
+                         "Ctrl-C saves and requeues running jobs; a second one ends them. Exit code 0: all are done, 3: one "
+                         "failed or was cancelled. With --json one object per line.");
+  command->add_flag("--keep", queue.runner.keep, "Wait for more jobs when the queue is empty");
+  command->add_option("--cores", queue.runner.cores, "Use at most this many cores")
       ->check(base::whole_range(1, kMaxRanks), base::describe_whole_range(1, kMaxRanks));
-  command->add_option("--memory-gb", queue.runner.memory_gb, "Use at most so much")->check(make_gb_check(1e-3));
-  command->add_flag("-q,--quiet", queue.quiet, "Print nothing");
+  command->add_option("--memory-gb", queue.runner.memory_gb, "Use at most this much memory")->check(make_gb_check(1e-3));
+  command->add_flag("-q,--quiet", queue.quiet, "No output");
   command->add_flag("--pictures", queue.attempt.has_pictures,
-                    "Draw the first modes of each bank for its report at once, not when the report is asked for");
-  command
-      ->add_option("--on", options->engine, "local: the queue of this machine; slurm: hand over to Slurm and follow, until all have ended")
+                    "Draw the first modes for the report of each bank at once, not at the first carillon report");
+  command->add_option("--on", options->engine, "local: the queue of this machine; slurm: submit to Slurm and follow until all have ended")
       ->check(make_engine_check());
   set_work(*command, shared, run, options, run_queue);
 }
 
 void add_get(CLI::App& app, Shared& shared, Run& run) {
   auto options = std::make_shared<GetOptions>();
-  CLI::App* command = app.add_subcommand(
-      "get",
-      "Prints the path of each finished bank, or of each file of a simulation, read-only in the store. Exit code 1: one is not there yet, "
-      "with its state.");
-  command->add_option("JOB", options->words, "Job files (what they hold now), folders, manifests, ids or names of carillon status")
+  CLI::App* command = app.add_subcommand("get",
+                                         "Prints the path of each finished bank, or of each file of a simulation, in the store "
+                                         "(read-only). Exit code 1: one is not done yet.");
+  command->add_option("JOB", options->words, "Job files (current content), folders, manifests, ids or names of carillon status")
       ->required();
   command->add_option(
       "--to", options->to,
-      "Copy the bank to this file or into this folder; several banks into this folder, each named as its job, and the files "
-      "of a simulation into it");
+      "Copy the bank to this file or folder; several banks, named by their jobs, and the files of a simulation into this folder");
   set_work(*command, shared, run, options, run_get);
 }
 
@@ -173,14 +167,13 @@ void add_gc(CLI::App& app, Shared& shared, Run& run) {
   auto options = std::make_shared<GcOptions>();
   CLI::App* command = app.add_subcommand(
       "gc",
-      "Lists what no job refers to: banks and failed jobs whose job file is gone or asks for something else by now, inputs of neither, and "
-      "what\n"
-      "processes that were killed left behind. Removes nothing without --delete, and nothing that is queued, waits or runs.");
-  command->add_flag("--delete", options->is_deleting, "Remove it");
+      "Lists unreferenced entries: banks and failed jobs whose job file was removed or changed, unused inputs, and leftovers of killed\n"
+      "processes. Removes nothing without --delete, and never open jobs.");
+  command->add_flag("--delete", options->is_deleting, "Remove them");
   set_work(*command, shared, run, options, run_gc);
 }
 
-/// The dimensions of all shapes, once each, by carillon-mesh's names.
+/// Dimensions of all shapes, by their names in carillon-mesh.
 std::vector<std::string> list_dimensions() {
   std::vector<std::string> names;
   for (const job::ShapeKeys& shape : job::get_shape_keys())
@@ -195,7 +188,7 @@ void add_hear(CLI::App& app, Shared& shared, Run& run) {
   CLI::App* command = app.add_subcommand(
       "hear",
       "Computes the sound of an object: meshes it, computes its modes, strikes it at four points, and writes a WAV, a spectrogram and a "
-      "report.\nWhat is not given (size, solid or wall, material) is assumed, and the assumptions are printed.");
+      "report.\nMissing data (size, solid or wall, material) are assumed, and the assumptions printed.");
   command->add_option("OBJECT", hear.object, "A surface (OBJ, STL, PLY, OFF, glTF, GLB) or a mesh (.msh, .vtu)");
   command->add_option("--shape", hear.shape, "A parametric body instead of a file, with its dimensions: see carillon-mesh --help");
   command->add_option("-o,--output", hear.out, "The folder for all files (default: NAME-sound)");
@@ -205,13 +198,13 @@ void add_hear(CLI::App& app, Shared& shared, Run& run) {
       ->delimiter(',');
   command
       ->add_option("--height", hear.heights_m,
-                   "Height of the object in metres (y is up; of a shape: its dimension); several, separated by commas")
+                   "Height of the object in metres (y is up; for a shape: its dimension); several, separated by commas")
       ->delimiter(',');
   command->add_option("--scale", hear.scale, "Metres per unit of the file");
   command->add_flag("--facets", hear.facets,
-                    "The facets are planes of the body, not samples of a smooth surface (as carillon-mesh --facets)");
+                    "The facets are planes of the body, not samples of a smooth surface (as in carillon-mesh --facets)");
   command->add_option("--mallet", hear.mallet, "steel, hard-wood, plastic, rubber, hard-felt, soft-felt or yarn")->capture_default_str();
-  command->add_option("--accuracy", hear.accuracy_cents, "Refines until every error bar is within this many cents; without it a preview");
+  command->add_option("--accuracy", hear.accuracy_cents, "Refine until every error bar is within this many cents; default: a preview");
   command->add_flag("-q,--quiet", hear.is_quiet, "No progress");
   for (const std::string& name : list_dimensions()) {
     if (name == "height") continue;
@@ -227,10 +220,11 @@ void add_explore(CLI::App& app, Shared& shared, Run& run) {
   explore::PageOrder& explore = options->explore;
   CLI::App* command = app.add_subcommand(
       "explore",
-      "Makes a web page on which bodies are struck, scraped and heard: a folder that any web server can serve. A scene is also\n"
-      "simulated, and the page plays it. With --serve, an existing folder is served as it is.");
+      "Writes a web page on which bodies can be struck and scraped: a folder for any web server. A scene is also simulated, and the page\n"
+      "plays it. With --serve, an existing folder is served unchanged.");
   command
-      ->add_option("BANK|SCENE|FOLDER", explore.subjects, "Banks, side by side; or one scene file (JSON); or a folder made by this command")
+      ->add_option("BANK|SCENE|FOLDER", explore.subjects,
+                   "Banks, shown side by side; or one scene file (JSON); or a folder written by this command")
       ->required();
   command->add_option("-o,--output", explore.folder, "The folder (default: NAME-explore)");
   command->add_option("--title", explore.title, "Title of the page (default: the name of the bank or scene)");
@@ -238,8 +232,8 @@ void add_explore(CLI::App& app, Shared& shared, Run& run) {
       ->transform(CLI::CheckedTransformer(std::map<std::string, explore::Up>{{"y", explore::Up::kY}, {"z", explore::Up::kZ}}))
       ->option_text("AXIS");
   command->add_flag("--whole", explore.keeps_banks,
-                    "Keep banks as they are; without it those above 4 MB are packed, with an error of -60 dB(A)");
-  CLI::Option* serves = command->add_flag("--serve", options->is_serving, "Serve it on this machine, until Ctrl-C");
+                    "Copy banks unchanged; default: those above 4 MB are packed with an error of -60 dB(A)");
+  CLI::Option* serves = command->add_flag("--serve", options->is_serving, "Serve it on this machine until Ctrl-C");
   command->add_option("--port", options->port, "With --serve: the port (default: a free one)")
       ->check(base::whole_range(1, 65535), base::describe_whole_range(1, 65535))
       ->needs(serves);
@@ -248,27 +242,26 @@ void add_explore(CLI::App& app, Shared& shared, Run& run) {
 
 void add_bank_for(CLI::App& app, Shared& shared, Run& run) {
   auto options = std::make_shared<BankForOptions>();
-  CLI::App* command =
-      app.add_subcommand("bank-for",
-                         "Prints the path of the bank of a body, and computes the bank if it is missing. JOB is a job without \"bank\", "
-                         "like a body of a scene.\n"
-                         "A body without \"nodes\" and \"accuracy_cents\" is a preview. Banks are kept in $XDG_CACHE_HOME/carillon, else "
-                         "~/.cache/carillon,\nwhich may be removed at any time.");
-  command->add_option("JOB", options->word, "Job file; - is standard input")->required();
-  command->add_option("--cache", options->cache, "Keep banks in this folder");
-  command->add_option("--name", options->name, "Name of the file on standard input, for messages; paths are relative to its folder");
-  command->add_option("--first-line", options->first_line, "Line of that file on which standard input begins")->check(CLI::PositiveNumber);
-  command->add_option("--result", options->result, "Write the result to this file, a JSON object, instead of printing a message");
+  CLI::App* command = app.add_subcommand(
+      "bank-for",
+      "Prints the path of the bank of a body, computed if missing. JOB is a job without \"bank\", like a body of a scene.\n"
+      "A body without \"nodes\" and \"accuracy_cents\" is a preview. Banks are cached in $XDG_CACHE_HOME/carillon, else "
+      "~/.cache/carillon,\nwhich may be removed at any time.");
+  command->add_option("JOB", options->word, "Job file; -: standard input")->required();
+  command->add_option("--cache", options->cache, "Folder of the cache");
+  command->add_option("--name", options->name, "File name of standard input, for messages; paths are relative to its folder");
+  command->add_option("--first-line", options->first_line, "Line of that file at which standard input begins")->check(CLI::PositiveNumber);
+  command->add_option("--result", options->result, "Write the result to this file (JSON) instead of printing a message");
   command->add_flag("-q,--quiet", options->is_quiet, "No progress");
   set_work(*command, shared, run, options, run_bank_for);
 }
 
 void add_materials(CLI::App& app, Shared& shared, Run& run) {
   auto options = std::make_shared<MaterialsOptions>();
-  CLI::App* command = app.add_subcommand(
-      "materials",
-      "Lists the names for \"material\" in jobs and scenes. Those of your own file come first: $CARILLON_MATERIALS, else\n"
-      "~/.config/carillon/materials.json. With names: all constants and their sources.");
+  CLI::App* command =
+      app.add_subcommand("materials",
+                         "Lists the names for \"material\" in jobs and scenes; those of your own file first ($CARILLON_MATERIALS, else\n"
+                         "~/.config/carillon/materials.json). With names: all constants and their sources.");
   command->add_option("NAME", options->names, "Show only these, with all constants");
   set_work(*command, shared, run, options, run_materials);
 }
@@ -277,28 +270,25 @@ void add_verify(CLI::App& app, Shared& shared, Run& run) {
   auto options = std::make_shared<VerifyOptions>();
   CLI::App* command = app.add_subcommand(
       "verify",
-      "Reads every bank, input and folder of work of the store, or of the jobs named, and compares them with what was computed and "
-      "submitted. "
-      "Exit code 3:\n"
-      "something is damaged. With --repair, damaged banks are set aside and queued again, and damaged inputs copied again.");
-  command->add_option("ID", options->words,
-                      "Ids, job files, folders, manifests, or names of carillon status; without any, the whole store");
-  command->add_flag("--repair", options->repairs, "Make again what is damaged");
+      "Checks every bank, input and folder of work of the store, or of the given jobs, against the published and submitted data.\n"
+      "Exit code 3: something is damaged. With --repair, damaged banks are set aside and requeued, and damaged inputs copied again.");
+  command->add_option("ID", options->words, "Ids, job files, folders, manifests, or names of carillon status; default: the whole store");
+  command->add_flag("--repair", options->repairs, "Repair damaged entries");
   set_work(*command, shared, run, options, run_verify);
 }
 
 void add_validate(CLI::App& app, Shared& shared, Run& run) {
   auto options = std::make_shared<ValidateOptions>();
-  CLI::App* command = app.add_subcommand("validate",
-                                         "Checks a job and its mesh without solving, and predicts its modes, its memory by ranks and its "
-                                         "time. Exit code 2: it cannot be used.");
+  CLI::App* command =
+      app.add_subcommand("validate",
+                         "Checks a job and its mesh without solving, and predicts modes, memory by ranks and time. Exit code "
+                         "2: invalid.");
   command->add_option("JOB", options->word, "Job file")->required();
   set_work(*command, shared, run, options, run_validate);
 }
 
 void add_study(CLI::App& app, Shared& shared, Run& run) {
-  CLI::App* command = app.add_subcommand(
-      "study", "Studies: scaling JOB.json, accuracy -o REPORT, advise BODY --cents 5; carillon study --help lists them and their options");
+  CLI::App* command = app.add_subcommand("study", "Studies: scaling JOB.json, advise BODY --cents 5; see carillon study --help");
   command->prefix_command();
   command->set_help_flag();
   command->callback(
@@ -309,12 +299,12 @@ void add_report(CLI::App& app, Shared& shared, Run& run) {
   auto options = std::make_shared<ReportOptions>();
   CLI::App* command = app.add_subcommand("report",
                                          "Prints the path of a bank's report (HTML): mesh, modes and proof, error bars, time and memory, "
-                                         "pictures, which are drawn when it is asked for first. With -o, writes it again: of "
-                                         "a job that is done, or of any bank.\nExit code 1: not there yet.");
-  command->add_option("JOB|BANK", options->word, "Job file (what it holds now), an id or its beginning, or, with -o, the file of a bank")
+                                         "pictures (drawn by the first call). With -o, writes the report of a job or of any bank into a "
+                                         "folder.\nExit code 1: not done yet.");
+  command->add_option("JOB|BANK", options->word, "Job file (current content), an id or its beginning, or, with -o, a bank file")
       ->required();
-  command->add_option("-o,--output", options->folder, "Write report.html, its pictures and the page of carillon explore into this folder");
-  command->add_flag("--no-pictures", options->no_pictures, "Draw no pictures of the first modes");
+  command->add_option("-o,--output", options->folder, "Write report.html, pictures and the page of carillon explore into this folder");
+  command->add_flag("--no-pictures", options->no_pictures, "No pictures of the first modes");
   command->add_flag("--no-page", options->no_page, "With -o: omit the page of carillon explore");
   set_work(*command, shared, run, options, run_report);
 }
@@ -323,14 +313,14 @@ void add_attempt(CLI::App& app, Run& run) {
   auto options = std::make_shared<AttemptOptions>();
   attempt::Options& attempt = options->attempt;
   CLI::App* command =
-      app.add_subcommand("attempt", "One attempt at the job of a folder of work, for carillon run and the scripts of Slurm")->group("");
+      app.add_subcommand("attempt", "One attempt at the job of a folder of work, for carillon run and Slurm scripts")->group("");
   command->add_option("WORK", attempt.work, "work/ab/ID of a store")->required();
   command->add_option("--ranks", attempt.ranks)->check(base::whole_range(1, kMaxRanks), base::describe_whole_range(1, kMaxRanks));
   command->add_option("--memory-gb", attempt.memory_gb);
   command->add_option("--memory-limit-gb", attempt.memory_limit_gb);
   command->add_option("--time-limit-s", attempt.time_limit_s);
   command->add_option("--token", attempt.token);
-  command->add_option("--mpirun-option", attempt.mpirun_options, "A word for mpirun; can be given many times")->allow_extra_args(false);
+  command->add_option("--mpirun-option", attempt.mpirun_options, "Argument of mpirun; repeatable")->allow_extra_args(false);
   command->add_option("--engine", options->engine)->check(make_engine_check());
   command->add_option("--launcher", options->launcher)->check(CLI::IsMember({"alone", "mpirun", "srun"}));
   command->add_flag("--predict", attempt.is_prediction);
@@ -342,16 +332,16 @@ void add_attempt(CLI::App& app, Run& run) {
 
 void add_task(CLI::App& app, Run& run) {
   auto options = std::make_shared<slurm::TaskOptions>();
-  CLI::App* command = app.add_subcommand("task", "One task of a packed array, for the scripts of Slurm")->group("");
+  CLI::App* command = app.add_subcommand("task", "One task of a packed array, for Slurm scripts")->group("");
   command->add_option("STORE", options->root)->required();
   command->add_option("BATCH", options->batch)->required();
   command->add_option("TASK", options->task)->required();
-  command->add_option("--mpirun-option", options->mpirun_options, "A word for mpirun; can be given many times")->allow_extra_args(false);
+  command->add_option("--mpirun-option", options->mpirun_options, "Argument of mpirun; repeatable")->allow_extra_args(false);
   command->add_flag("--pictures", options->has_pictures);
   command->callback([&run, options] { run = [options] { return slurm::run_task(*options); }; });
 }
 
-/// Throws InputError for a word that is no command, with the nearest one.
+/// InputError for an unknown command, with the nearest one.
 void check_command(CLI::App& app, int argc, char** argv) {
   const int at = find_command(argc, argv);
   if (at == argc) return;
@@ -361,7 +351,7 @@ void check_command(CLI::App& app, int argc, char** argv) {
     if (!command->get_group().empty()) known.push_back(command->get_name());
   }
   const std::string near = base::find_nearest(argv[at], known);
-  throw InputError(fmt::format("\"{}\" is no command{}; carillon --help lists them", show(argv[at]),
+  throw InputError(fmt::format("\"{}\": unknown command{}; carillon --help lists them", show(argv[at]),
                                near.empty() ? "" : ", did you mean \"" + near + "\"?"));
 }
 
@@ -385,9 +375,9 @@ Run parse_command_line(int argc, char** argv, Shared& shared) {
   app.require_subcommand(1);
   app.fallthrough();
   Run run;
-  app.add_option("--store", shared.store_option, "Folder of the store; made when there is none");
+  app.add_option("--store", shared.store_option, "Folder of the store, created if necessary");
   app.add_option("--profile", shared.profile_option, "Profile file");
-  app.add_flag("--json", shared.json, "One JSON document (of commands that keep running: one object a line)");
+  app.add_flag("--json", shared.json, "One JSON document (from commands that keep running: one object per line)");
   app.set_version_flag("--version", base::describe("carillon"));
   for (const auto add : {add_hear, add_explore, add_materials, add_submit, add_status, add_log, add_cancel, add_retry, add_explain, add_run,
                          add_get, add_gc, add_verify, add_validate, add_study, add_report, add_bank_for})

@@ -1,4 +1,4 @@
-// The words of the command line: which command they ask for, with which options.
+// Parser of the command line.
 #pragma once
 
 #include <functional>
@@ -7,14 +7,14 @@
 
 namespace carillon::cli {
 
-/// What a command line asks for; gives the exit code.
+/// A parsed command; returns the exit code.
 using Run = std::function<int()>;
 
-/// Where the name of the command stands, after the options that all commands share; argc when there is none.
+/// Index of the command name, after the global options; argc if there is none.
 int find_command(int argc, char** argv);
 
-/// Reads the words: options of all commands into `shared`, which must outlive what is returned. For --help and --version it prints the text
-/// and returns a function that does nothing and gives 0. Throws InputError for words that cannot be read, with `shared.json` as it was.
+/// Parses global options into `shared`, which must outlive the result. For --help and --version prints the text and returns a function with
+/// exit code 0. InputError for invalid arguments, with `shared.json` unchanged.
 Run parse_command_line(int argc, char** argv, Shared& shared);
 
 }  // namespace carillon::cli

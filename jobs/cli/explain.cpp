@@ -1,4 +1,4 @@
-// carillon explain: would a job run, and why: what differs from what this job file asked for last.
+// carillon explain: whether a job would run, and its differences from the last submission of the job file.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -12,11 +12,11 @@
 namespace carillon::cli {
 namespace {
 
-/// One part of the id that is another than before.
+/// A changed part of the id.
 struct Change {
   std::string part;    // "mesh", "surface", "solver", "job"
   std::string key;     // of the job: "material.density_kg_m3"; else empty
-  std::string before;  // as JSON; empty: there was none
+  std::string before;  // JSON; empty: none
   std::string after;
 };
 
@@ -34,7 +34,7 @@ std::map<std::string, std::string> read_leaves(const std::string& job) {
   return leaves;
 }
 
-/// The files of a simulation, in the order of its bodies.
+/// Input files of a simulation, in the order of its bodies.
 void add_input_changes(const std::vector<store::Input>& before, const std::vector<store::Input>& after, std::vector<Change>& changes) {
   for (std::size_t i = 0; i < std::min(before.size(), after.size()); ++i)
     if (before[i].sha256 != after[i].sha256)
@@ -69,23 +69,23 @@ std::vector<Change> find_changes(const store::Request& before, const store::Requ
 }
 
 std::string format_change(const Change& change, const store::Request& request) {
-  const std::string before = change.before.empty() ? "not there" : show(change.before),
-                    after = change.after.empty() ? "not there" : show(change.after);
+  const std::string before = change.before.empty() ? "missing" : show(change.before),
+                    after = change.after.empty() ? "missing" : show(change.after);
   if (change.part == "job") return fmt::format("{}: was {}, is {}", show(change.key), before, after);
   if (change.part == "solver") return fmt::format("solver: was {}, is {}", before, after);
   if (change.part == "input") return fmt::format("input: was a {}, is a {}", before, after);
   const std::string& file = change.key.empty() ? request.input_file : change.key;
-  return fmt::format("{} {}: its content was {}, is {}", change.part, show(file), before, after);
+  return fmt::format("{} {}: content was {}, is {}", change.part, show(file), before, after);
 }
 
-/// What would happen on submit, in one word for programs and one line for people.
+/// Effect of a submission, as a word for programs and a line for display.
 struct Explanation {
   std::string word;  // "done", "running", "queued", "waiting", "failed", "cancelled", "new"
   std::string line;
   bool would_run = false;
 };
 
-/// Where the results are, in words.
+/// Location of the results, for display.
 std::string describe_results(const store::Store& store, const store::Id& id) {
   const auto results = list_results(store, id);
   if (const auto bank = results.find("bank"); bank != results.end()) return "its bank is " + show(bank->second.string(), 4000);
@@ -101,18 +101,17 @@ Explanation explain(Shared& shared, const store::Id& id, const std::optional<reg
             fmt::format("it would run: {}; carillon submit, or retry, computes it again",
                         show_message(shared.store().find_bank_fault(id, store::Look::quick).value_or("its bank is damaged"))),
             true};
-  if (!job) return {"new", "it would run: the store has no bank of these inputs", true};
+  if (!job) return {"new", "it would run: the store has no bank for these inputs", true};
   const std::string state = to_text(job->state), reason = show_message(find_reason(shared, *job));
-  if (job->state == registry::JobState::cancelled)
-    return {state, "it would run: it was cancelled, and carillon submit asks for it again", true};
+  if (job->state == registry::JobState::cancelled) return {state, "it would run: it was cancelled; carillon submit requeues it", true};
   if (is_submitted_again(*job, shared.store().has_work(id)))
-    return {state, fmt::format("it would run: it failed before it ran, {}; carillon submit asks for it again", reason), true};
+    return {state, fmt::format("it would run: it failed before it ran, {}; carillon submit requeues it", reason), true};
   if (job->state == registry::JobState::failed)
     return {state, fmt::format("nothing would run: it failed, {}; carillon retry {} tries again", reason, id.short_text()), false};
-  return {state, fmt::format("nothing new would run: it is {} already", state), false};
+  return {state, fmt::format("nothing new would run: it is already {}", state), false};
 }
 
-/// JSON of one job; null after printing text.
+/// JSON of one job; null in text mode.
 base::Json explain_one(Shared& shared, const Source& source) {
   if (!source.error.empty()) throw InputError(source.error);
   const store::Id id = store::require_id(source.request.id, source.job_file);
@@ -144,11 +143,11 @@ base::Json explain_one(Shared& shared, const Source& source) {
   }
   fmt::print("{}  {}\n{}\n", id.short_text(), show(source.job_file), explanation.line);
   if (!last)
-    fmt::print("this job file was not submitted to this store before\n");
+    fmt::print("this job file has not been submitted to this store\n");
   else if (changes.empty())
-    fmt::print("nothing has changed since this job file was submitted last\n");
+    fmt::print("no changes since the last submission of this job file\n");
   else
-    fmt::print("since this job file was submitted last (as {}) these changed:\n", last->request.id.substr(0, 12));
+    fmt::print("changes since the last submission of this job file (as {}):\n", last->request.id.substr(0, 12));
   for (const Change& change : changes) fmt::print("  {}\n", format_change(change, source.request));
   return {};
 }

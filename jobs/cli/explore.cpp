@@ -1,4 +1,4 @@
-// carillon explore: a page on which bodies are struck.
+// carillon explore: a web page with playable bodies.
 #include "jobs/front/explore/explore.hpp"
 
 #include <fmt/core.h>
@@ -56,8 +56,8 @@ int run_explore(Shared& shared, const ExploreOptions& options) {
     order.folder = order.subjects[0];
     if (!options.is_serving || !explore::is_explorer(order.folder))
       throw InputError(fmt::format("{}: {}", order.folder.string(),
-                                   options.is_serving ? "this folder was not made by carillon explore; give banks or a scene"
-                                                      : "a folder can only be served, with --serve; give banks or a scene to make one"));
+                                   options.is_serving ? "this folder was not written by carillon explore; give banks or a scene"
+                                                      : "a folder can only be served, with --serve; give banks or a scene to write one"));
     root["folder"] = to_json(order.folder.string());
   } else {
     const explore::Explored made = explore::explore(order);

@@ -33,7 +33,7 @@ bool has_ended(const registry::Job& job) {
   return job.state == registry::JobState::done || job.state == registry::JobState::failed || job.state == registry::JobState::cancelled;
 }
 
-/// The screen's picture of the jobs; as many rows as it has.
+/// Redraws the jobs in place, limited to the rows of the terminal.
 class Screen {
  public:
   void draw(Shared& shared, const std::vector<registry::Job>& jobs) {
@@ -54,7 +54,7 @@ class Screen {
   std::size_t lines_ = 0;
 };
 
-/// Prints the jobs whose picture has changed.
+/// Prints changed jobs.
 void print_changes(Shared& shared, const std::vector<registry::Job>& jobs, std::map<store::Id, std::string>& before) {
   for (const registry::Job& job : jobs) {
     if (has_ended(job) && before.count(job.id) > 0 && before[job.id] == to_text(job.state)) continue;

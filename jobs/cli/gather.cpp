@@ -26,7 +26,7 @@ std::string name_of(const fs::path& file) { return store::to_text(fs::absolute(f
 
 bool ends_with(const fs::path& file, std::string_view ending) { return file.filename().string().ends_with(ending); }
 
-/// Runs `read`, and keeps what it throws about the job itself. A disk that refuses ends it all.
+/// Calls `read` and stores an InputError in the source.
 template <class Read>
 Source keep_error(const std::string& job_file, const Read& read) {
   Source source;
@@ -49,8 +49,8 @@ std::vector<Source> read_folder(const fs::path& folder) {
   for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
     if (ends_with(it->path(), ".json") && !ends_with(it->path(), ".resolved.json")) files.push_back(it->path());
   }
-  if (error) throw InputError(fmt::format("{}: this folder cannot be read: {}; check its rights", folder.string(), error.message()));
-  if (files.empty()) throw InputError(fmt::format("{}: there is no job in this folder; jobs are files that end in .json", folder.string()));
+  if (error) throw InputError(fmt::format("{}: cannot read this folder: {}; check its rights", folder.string(), error.message()));
+  if (files.empty()) throw InputError(fmt::format("{}: no jobs in this folder; jobs are files that end in .json", folder.string()));
   std::sort(files.begin(), files.end());
   std::vector<Source> sources;
   for (const fs::path& file : files) sources.push_back(read_file_source(file));
@@ -79,10 +79,10 @@ std::vector<Source> read_manifest(const std::string& word, int only = 0) {
   const fs::path manifest = is_stdin ? fs::current_path() / "standard input" : fs::absolute(word);
   std::string text =
       is_stdin ? std::string(std::istreambuf_iterator<char>(std::cin), {})
-               : base::read_file(word, "manifest", kMaxManifestBytes, "a job file ends in .json, and a manifest names one on each line");
+               : base::read_file(word, "manifest", kMaxManifestBytes, "a job file ends in .json, and a manifest names one per line");
   base::refuse_utf16(text, word);
   if (text.find('\0') != std::string::npos)
-    throw InputError(fmt::format("{}: this is no text; a job file ends in .json, and a manifest names one on each line", word));
+    throw InputError(fmt::format("{}: not a text file; a job file ends in .json, and a manifest names one per line", word));
   std::vector<Source> sources;
   int number = 0;
   for (std::size_t at = 0; at < text.size(); ++number) {
@@ -91,8 +91,8 @@ std::vector<Source> read_manifest(const std::string& word, int only = 0) {
     at = end + 1;
     if (!line.empty() && line[0] != '#' && (only == 0 || only == number + 1)) sources.push_back(read_line(line, manifest, number + 1));
   }
-  if (sources.empty() && only > 0) throw InputError(fmt::format("{}: there is no job on line {}", word, only));
-  if (sources.empty()) throw InputError(fmt::format("{}: this manifest names no job; write one job file on each line", word));
+  if (sources.empty() && only > 0) throw InputError(fmt::format("{}: no job on line {}", word, only));
+  if (sources.empty()) throw InputError(fmt::format("{}: this manifest has no jobs; write one job file per line", word));
   return sources;
 }
 
@@ -125,7 +125,7 @@ void add_request(Source& source, store::RequestMaker& maker) {
   }
 }
 
-/// The version of carillon-simulate, which is started only where it is needed.
+/// The version of carillon-simulate; empty without simulations.
 std::string find_simulator(const std::vector<Source>& sources) {
   const bool is_needed = std::any_of(sources.begin(), sources.end(), [](const Source& source) { return source.order.is_simulation(); });
   return is_needed ? read_program_version("carillon-simulate") : "";
@@ -158,7 +158,7 @@ bool is_of_many(const std::string& word) {
 
 std::vector<std::string> list_job_files(const std::string& word) {
   const std::vector<Source> sources = read_word(word);
-  // A file other than a job or a manifest.
+  // Neither a job nor a manifest.
   if (std::none_of(sources.begin(), sources.end(), [](const Source& source) { return source.error.empty(); }))
     throw InputError(sources.front().error);
   std::vector<std::string> files;
@@ -201,7 +201,7 @@ std::vector<Named> find_all_by_content(Shared& shared, const std::vector<std::st
 
 std::pair<store::Id, std::optional<registry::Job>> find_by_content(Shared& shared, const std::string& word) {
   const std::vector<Named> found = find_all_by_content(shared, {word});
-  if (found.size() != 1) throw InputError(fmt::format("{}: this stands for {} jobs; name one of them", word, found.size()));
+  if (found.size() != 1) throw InputError(fmt::format("{}: matches {} jobs; name one of them", word, found.size()));
   return {found.front().id, found.front().job};
 }
 

@@ -1,4 +1,4 @@
-// carillon get: the banks of jobs, or the files of simulations.
+// carillon get: paths or copies of banks and of files of simulations.
 #include <fcntl.h>
 #include <fmt/core.h>
 #include <unistd.h>
@@ -21,11 +21,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Copies a file whole: it has no name before it is on the disk.
+/// Atomic copy.
 void copy_to(const fs::path& from, const fs::path& wanted) {
   std::error_code error;
   const fs::path to = fs::is_directory(wanted, error) ? wanted / from.filename() : wanted;
-  if (fs::equivalent(from, to, error)) throw InputError(fmt::format("{}: this is the file in the store; name another", to.string()));
+  if (fs::equivalent(from, to, error)) throw InputError(fmt::format("{}: this is the file in the store; give another path", to.string()));
   base::check_writable(to, "copy");
   const fs::path temporary = to.parent_path() / fmt::format(".{}.tmp.{}", to.filename().string().substr(0, 200), ::getpid());
   const auto refuse = [&](int code) {
@@ -46,7 +46,7 @@ void copy_to(const fs::path& from, const fs::path& wanted) {
   if (error) refuse(error.value());
 }
 
-/// Present state of one job: its files, or the reason for their absence.
+/// Current state of one job: its files, or the reason for their absence.
 struct Got {
   Named named;
   std::string state, why;
@@ -57,7 +57,7 @@ struct Got {
   bool is_bank() const { return results.count("bank") > 0; }
 };
 
-/// Checks the bank's digest and its job before serving it.
+/// Checks digest and job of the bank.
 Got look_at(Shared& shared, Named named) {
   Got got{std::move(named), {}, {}, {}, {}, {}};
   const store::Id& id = got.named.id;
@@ -75,7 +75,7 @@ Got look_at(Shared& shared, Named named) {
   got.state = is_damaged ? "failed" : job ? to_text(job->state) : "new";
   got.why = is_damaged ? fmt::format("{}; carillon retry {} computes it again", *fault, id.short_text())
             : job      ? find_reason(shared, *job)
-                       : "carillon submit asks for it";
+                       : "not submitted; use carillon submit";
   return got;
 }
 
@@ -91,9 +91,9 @@ void choose_places(std::vector<Got>& all, const fs::path& to) {
   std::error_code error;
   const bool is_one = all.size() == 1;
   if (is_one && !all[0].is_bank() && all[0].is_done() && !fs::is_directory(to, error))
-    throw InputError(fmt::format("{}: is no folder, and a simulation has several files; name a folder that is there", to.string()));
+    throw InputError(fmt::format("{}: not a folder, but a simulation has several files; give an existing folder", to.string()));
   if (!is_one && fs::exists(to, error) && !fs::is_directory(to, error))
-    throw InputError(fmt::format("{}: is no folder, and these are {} jobs; name a folder", to.string(), all.size()));
+    throw InputError(fmt::format("{}: not a folder, but these are {} jobs; give a folder", to.string(), all.size()));
   std::set<std::string> taken;
   for (Got& got : all) {
     std::string stem = make_stem(got.named.name);

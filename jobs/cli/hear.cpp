@@ -1,4 +1,4 @@
-// carillon hear: an object, and how it sounds.
+// carillon hear: the sound of an object.
 #include "jobs/front/hear/hear.hpp"
 
 #include <fmt/core.h>
@@ -57,8 +57,8 @@ void print(const hear::Sound& sound) {
   }
   if (is_doubtful)
     fmt::print(
-        "+-facets     facets in doubt: planes of the body, or samples of a smooth surface? Up to {} cents more if they are not what they\n"
-        "             were taken for. --facets takes them for planes; a surface in finer facets settles it too\n",
+        "+-facets     facets may be planes of the body or samples of a smooth surface: up to {} cents more if the assumption is wrong.\n"
+        "             --facets declares planes; a surface with finer facets also resolves it\n",
         hear::format_cents(sound.facet_cents));
   fmt::print("sound        {}\nspectrogram  {}\n", show(sound.wav.string(), 1000), show(sound.spectrogram.string(), 1000));
 }
@@ -74,7 +74,7 @@ int run_hear(Shared& shared, const HearOptions& options) {
       wanted.dimensions.erase(wall);
     }
     if (!wanted.dimensions.empty())
-      throw InputError(fmt::format("--{} is a dimension of a shape; leave it out, or give --shape", wanted.dimensions.begin()->first));
+      throw InputError(fmt::format("--{} is a dimension of a shape; remove it, or give --shape", wanted.dimensions.begin()->first));
   } else if (wanted.heights_m.size() == 1) {
     wanted.dimensions["height"] = wanted.heights_m[0];
     wanted.heights_m.clear();

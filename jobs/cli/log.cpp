@@ -1,4 +1,4 @@
-// carillon log: what the solver printed.
+// carillon log: output of the solver.
 #include <fcntl.h>
 #include <fmt/core.h>
 #include <sys/stat.h>
@@ -22,10 +22,10 @@ namespace fs = std::filesystem;
 constexpr auto kPause = std::chrono::milliseconds(300);
 constexpr off_t kMaxJsonBytes = 16 << 20;
 
-/// The bytes from `from` on, at most `max`; advances `from`. Empty when there are none.
+/// Reads at most `max` bytes at offset `from` and advances it. Empty at the end.
 std::string read_from(const fs::path& file, off_t& from, off_t max) {
   std::string bytes;
-  const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOFOLLOW);
+  const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (fd < 0 && (errno == EACCES || errno == EPERM))
     throw InputError(fmt::format("{}: you may not read this log; ask the owner of the store", file.string()));
   if (fd < 0) return bytes;
@@ -59,9 +59,9 @@ int print_log(Shared& shared, registry::Job job, bool follows) {
     return 0;
   }
   for (;;) {
-    const bool is_last = !follows || has_ended(job);  // read before the log: the log is complete after the end of the job
+    const bool is_last = !follows || has_ended(job);  // checked before reading: the log is complete after the end
     for (std::string bytes; !(bytes = read_from(shared.store().find_folder(job.id) / store::kLogFile, at, 1 << 20)).empty();) {
-      // A character may be cut where this piece ends; its other bytes come with the next.
+      // Keep an incomplete UTF-8 character for the next piece.
       std::size_t whole = bytes.size();
       while (whole > 0 && bytes.size() - whole < 3 && (static_cast<unsigned char>(bytes[whole - 1]) & 0xC0U) == 0x80U) --whole;
       if (whole > 0 && (static_cast<unsigned char>(bytes[whole - 1]) & 0xC0U) == 0xC0U) --whole;
@@ -77,7 +77,7 @@ int print_log(Shared& shared, registry::Job job, bool follows) {
     shared.settle();
     job = shared.registry().find(job.id).value_or(job);
   }
-  if (at == 0) fmt::print(stderr, "carillon: {} has printed nothing yet; it is {}\n", job.id.short_text(), to_text(job.state));
+  if (at == 0) fmt::print(stderr, "carillon: {} has no output yet; it is {}\n", job.id.short_text(), to_text(job.state));
   return at == 0 ? kExitNotYet : 0;
 }
 
@@ -89,7 +89,7 @@ int run_log(Shared& shared, const LogOptions& options) {
   const std::vector<registry::Job> jobs = find_jobs(shared, {options.word});
   if (jobs.size() == 1) return print_log(shared, jobs.front(), options.follow);
   if (options.follow || shared.json)
-    throw InputError(fmt::format("{}: this stands for {} jobs, and {} is for one; name one of them", show(options.word), jobs.size(),
+    throw InputError(fmt::format("{}: matches {} jobs, but {} needs one; name one of them", show(options.word), jobs.size(),
                                  options.follow ? "--follow" : "--json"));
   int code = 0;
   for (const registry::Job& job : jobs) {

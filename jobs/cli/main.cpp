@@ -1,4 +1,4 @@
-// carillon: asks for banks, works through the queue, shows the state of jobs, and returns banks.
+// carillon: the command line program of the job service.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -30,7 +30,7 @@ int fail(bool json, const std::string& what, int code) {
   return code;
 }
 
-/// What follows "study" belongs to another program, its own --help too; of what stands before it, only --json does.
+/// Passes the arguments after "study", including --help, to carillon-study; of those before, only --json.
 void hand_over_study(int argc, char** argv) {
   const int at = find_command(argc, argv);
   if (at == argc || std::string_view(argv[at]) != "study") return;

@@ -1,4 +1,4 @@
-// carillon materials: the materials that can be named.
+// carillon materials: the table of materials.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kAtHz = 1000.0;
 
-/// At 1 kHz, whatever the law.
+/// Loss factor at 1 kHz, for any damping law.
 double calc_loss_factor(const material::Material& material) {
   const double omega = 2 * std::numbers::pi * kAtHz;
   return 2 * material.calc_decay_per_s(omega * omega) / omega;
@@ -90,7 +90,7 @@ int run_materials(Shared& shared, const MaterialsOptions& options) {
     fmt::print("{:<18} {:<8} {:>9.4g} {:>6.3g} {:>8.5g} {:>9.2g}  {}\n", show(m.name), show(row->group), 1e-9 * m.young_modulus_pa,
                m.poisson_ratio, m.density_kg_m3, calc_loss_factor(m), m.orthotropic && names.empty() ? "" : names);
   }
-  fmt::print("Wood and bone: constants of the nearest isotropic solid; `carillon materials oak` shows all constants and their sources.\n");
+  fmt::print("Wood and bone: constants of the nearest isotropic solid; `carillon materials oak` shows all constants and sources.\n");
   return 0;
 }
 

@@ -43,7 +43,7 @@ bool ResourceOptions::apply(registry::Job& job) const {
   apply(request);
   job.resources = request.resources;
   if (!engine.empty() && job.slurm_job.empty())
-    job.engine = store::find_engine(engine).value_or(job.engine);  // What Slurm has is Slurm's until it is cancelled.
+    job.engine = store::find_engine(engine).value_or(job.engine);  // jobs in Slurm keep their engine until cancelled
   return ranks > 0 || memory_gb > 0 || !time_limit.empty() || !engine.empty();
 }
 

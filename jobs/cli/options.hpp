@@ -1,10 +1,10 @@
-// Options that several commands have.
+// Options shared by several commands.
 #pragma once
 
 #include <string>
 
-#include "jobs/store/registry/registry.hpp"
 #include "jobs/store/records.hpp"
+#include "jobs/store/registry/registry.hpp"
 
 namespace carillon::cli {
 
@@ -15,9 +15,9 @@ struct ResourceOptions {
   std::string time_limit;  // "90", "90s", "15m", "2h"
   std::string engine;
 
-  /// What was given takes the place of what the job file says.
+  /// Overrides the values of the job file.
   void apply(store::Request& request) const;
-  /// The same for a row; false when nothing was given.
+  /// The same for a row; false without options.
   bool apply(registry::Job& job) const;
 };
 

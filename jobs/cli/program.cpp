@@ -31,7 +31,7 @@ std::string read_program_version(const std::string& name) {
 
 void become(const std::string& program, std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), base::require_program(program).string());
-  // Programs that check a job or measure start outside the MPI run of this process.
+  // Started outside of an MPI run of this process.
   base::become(arguments, program == "carillon-study" ? base::make_environment() : base::make_lone_environment());
 }
 

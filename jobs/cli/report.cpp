@@ -1,4 +1,4 @@
-// carillon report: the page about a bank, of the store or of any file.
+// carillon report: the report of a bank in the store or in a file.
 #include "jobs/front/report/report.hpp"
 
 #include <fmt/core.h>
@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kExplorer = "explore";  // folder of the page next to the report
 
-/// The page next to a report; empty for a bank that cannot be played, of which the report says why.
+/// The page of carillon explore next to a report; empty for a bank that cannot be played.
 std::string make_explorer(const fs::path& bank, const fs::path& folder, const std::string& title) {
   try {
     (void)explore::explore({.subjects = {bank}, .folder = folder / kExplorer, .title = title});
@@ -36,7 +36,7 @@ fs::path write(const ReportOptions& options, const fs::path& bank, const fs::pat
   return options.folder / report::kPageFile;
 }
 
-/// The mesh or surface as the user named it; empty where the folder does not say.
+/// Name of the submitted mesh or surface; empty if unknown.
 std::string find_title(const fs::path& folder) {
   try {
     const std::optional<store::Request> request = store::read_request(folder);
@@ -46,7 +46,7 @@ std::string find_title(const fs::path& folder) {
   }
 }
 
-/// Puts a page with pictures of the first modes next to the bank. A page without is still a report: what went wrong is said and no more.
+/// Replaces the report in the store by one with pictures. On failure prints a message and keeps the old one.
 void draw_in_store(const store::Store& store, const store::Id& id, const std::string& title) {
   try {
     const store::Lock lock = store.lock_shared();  // gc waits
@@ -69,10 +69,10 @@ void print(Shared& shared, base::Json root, const fs::path& page) {
   if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");
 }
 
-/// Of a file, which is no matter of the store.
+/// Report of a bank file outside the store.
 int report_file(Shared& shared, const ReportOptions& options) {
   const fs::path bank = options.word;
-  if (options.folder.empty()) throw InputError(fmt::format("{}: say with -o into which folder the report of a bank goes", bank.string()));
+  if (options.folder.empty()) throw InputError(fmt::format("{}: the report of a bank file needs -o FOLDER", bank.string()));
   std::error_code error;
   fs::path record = bank.string() + ".resolved.json";
   if (!fs::exists(record, error)) record = bank.parent_path() / store::kJobFile;
@@ -94,7 +94,7 @@ int report_job(Shared& shared, const ReportOptions& options) {
   fs::path page;
   std::error_code error;
   if (is_done && list_results(shared.store(), id).count("bank") == 0)
-    throw InputError(fmt::format("{}: is a simulation, and reports are of banks; carillon get prints its files", options.word));
+    throw InputError(fmt::format("{}: a simulation has no report; carillon get prints its files", options.word));
   if (is_done) {
     const std::string title = find_title(folder);
     const bool has_pictures = fs::exists(folder / report::kPictureFile, error);
@@ -109,7 +109,7 @@ int report_job(Shared& shared, const ReportOptions& options) {
   if (!page.empty()) return 0;
   if (!shared.json)
     fmt::print(stderr, "carillon: no report{}: {} is {}{}\n", is_done ? "" : " yet", id.short_text(), root["state"].as_string(),
-               is_done ? ", but its report could not be made then; carillon report -o FOLDER makes one" : "");
+               is_done ? ", but writing its report failed; carillon report -o FOLDER writes one" : "");
   return kExitNotYet;
 }
 

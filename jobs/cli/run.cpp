@@ -1,12 +1,12 @@
-// carillon run: the queue of this machine; and carillon attempt, which it and the scripts of Slurm start.
+// carillon run and carillon attempt.
 #include "jobs/queue/run.hpp"
 
 #include <fmt/core.h>
 
-#include "jobs/queue/attempt/attempt.hpp"
 #include "jobs/cli/commands.hpp"
 #include "jobs/cli/follow.hpp"
 #include "jobs/cli/slurm.hpp"
+#include "jobs/queue/attempt/attempt.hpp"
 #include "jobs/queue/local.hpp"
 #include "jobs/queue/settle.hpp"
 #include "jobs/queue/slurm/inside.hpp"
@@ -39,7 +39,7 @@ int run_until_done(Shared& shared, const std::vector<store::Id>& ids, bool has_p
   options.quiet = shared.json || is_quiet;
   options.attempt.mpirun_options = shared.profile().mpirun_options;
   if (const int code = queue::run(shared.store(), options); code != 0 && code != kExitSolve)
-    return code;  // 3: failure of any job in the queue
+    return code;  // 3: some job failed, not necessarily one of these
   std::vector<registry::Job> jobs;
   for (const store::Id& id : ids) {
     if (auto job = shared.registry().find(id)) jobs.push_back(std::move(*job));

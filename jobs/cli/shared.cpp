@@ -1,4 +1,3 @@
-// The store and the jobs that words name.
 #include "jobs/cli/shared.hpp"
 
 #include <fmt/format.h>
@@ -40,7 +39,7 @@ Profile read_profile(const std::string& option) {
   if (root.has("store")) profile.store = root.path("store");
   profile.engine = *store::find_engine(root.choice_or("on", {"local", "slurm"}, "local"));
   for (const base::Entry& entry : root.entries("mpirun_options", kMaxOptions)) {
-    if (entry.object) throw InputError(entry.place + ": \"mpirun_options\" is a list of words for mpirun");
+    if (entry.object) throw InputError(entry.place + ": \"mpirun_options\" is a list of arguments of mpirun");
     profile.mpirun_options.push_back(entry.text);
   }
   profile.slurm = slurm::read_settings(root.object_if("slurm"));
@@ -53,13 +52,13 @@ bool is_hex(const std::string& word) {
   return std::all_of(word.begin(), word.end(), [](char c) { return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f'); });
 }
 
-/// The last submission with this Source::job_file.
+/// The job of the last submission with this Source::job_file.
 std::optional<registry::Job> find_submitted(Shared& shared, const std::string& job_file) {
   const auto submission = shared.registry().find_last_submission(job_file);
   return submission ? shared.registry().find(store::require_id(submission->request.id, "registry")) : std::nullopt;
 }
 
-/// The job of a file: of its last submission from there, else that of what it holds now.
+/// The job of a file: of its last submission, else of its content.
 std::optional<registry::Job> find_by_file(Shared& shared, const std::string& word) {
   std::optional<registry::Job> job = find_submitted(shared, store::to_text(fs::absolute(word).lexically_normal()));
   if (!job && is_of_jobs(word)) job = shared.registry().find(store::require_id(gather_one(word, read_solver_version()).request.id, word));
@@ -70,11 +69,11 @@ std::optional<registry::Job> find_by_file(Shared& shared, const std::string& wor
   std::vector<std::string> names;
   for (const registry::Job& job : jobs)
     if (names.size() < kMaxNamed) names.push_back(job.id.short_text());
-  throw InputError(fmt::format("{}: fits several jobs ({}{}); give one of these ids, or more of its digits", show(word),
-                               fmt::join(names, ", "), jobs.size() >= kMaxNamed ? " ..." : ""));
+  throw InputError(fmt::format("{}: matches several jobs ({}{}); give one of these ids, or more digits", show(word), fmt::join(names, ", "),
+                               jobs.size() >= kMaxNamed ? " ..." : ""));
 }
 
-/// By the name in the table of carillon status.
+/// By the name in carillon status.
 std::optional<registry::Job> find_by_name(Shared& shared, const std::string& word) {
   std::vector<registry::Job> jobs = shared.registry().list();
   std::erase_if(jobs, [&](const registry::Job& job) { return job.name != word; });
@@ -120,7 +119,7 @@ bool Shared::fall_back(const SystemError& error) {
   is_disk_full_ = true;
   registry_.reset();
   if (!is_full_shown_)
-    fmt::print(stderr, "carillon: the disk or quota is full ({}); states are as the files of the store show them\n",
+    fmt::print(stderr, "carillon: the disk or quota is full ({}); states are read from the files of the store\n",
                show_message(error.what()));
   is_full_shown_ = true;
   return true;
@@ -141,15 +140,13 @@ registry::Job find_job(Shared& shared, const std::string& word) {
     if (jobs.size() > 1) refuse_many(word, jobs);
   }
   const bool is_file = is_of_jobs(word);
-  if (is_file && is_of_many(word)) throw InputError(fmt::format("{}: this stands for several jobs; name one of them", word));
+  if (is_file && is_of_many(word)) throw InputError(fmt::format("{}: matches several jobs; name one of them", word));
   if (auto job = find_by_file(shared, word)) return *job;
   // An existing file takes precedence over a job of the same name elsewhere.
   if (auto job = is_file ? std::nullopt : find_by_name(shared, word)) return *job;
   if (is_file || word.find('/') != std::string::npos || word.ends_with(".json"))
-    throw InputError(fmt::format("{}: no job of this store; carillon submit adds it", word));
-  throw InputError(
-      fmt::format("{}: neither the beginning of an id (at least {} digits) nor a job file nor a name that carillon status lists",
-                  show(word), kMinPrefix));
+    throw InputError(fmt::format("{}: not a job of this store; carillon submit adds it", word));
+  throw InputError(fmt::format("{}: not an id (at least {} digits), a job file or a name of carillon status", show(word), kMinPrefix));
 }
 
 std::vector<registry::Job> find_jobs(Shared& shared, const std::vector<std::string>& words) {
@@ -195,7 +192,7 @@ std::string find_reason(Shared& shared, const registry::Job& job) {
       for (std::size_t at = reason.find(copy); at != std::string::npos; at = reason.find(copy, at + input.file.size()))
         reason.replace(at, copy.size(), input.file);
     }
-  } catch (const InputError&) {  // a damaged record costs the name, not the reason
+  } catch (const InputError&) {  // damaged record: keep the path of the copy
   }
   return reason;
 }
@@ -230,7 +227,7 @@ base::Json describe(Shared& shared, const registry::Job& job) {
   root["reason"] = to_json(find_reason(shared, job));
   root["attempts"] = job.attempts;
   root["failures"] = job.failures;
-  root["ranks"] = job.given.ranks > 0 ? job.given.ranks : job.resources.ranks;  // as chosen, once it was
+  root["ranks"] = job.given.ranks > 0 ? job.given.ranks : job.resources.ranks;  // as chosen by the queue
   root["memory_gb"] = job.given.ranks > 0 ? job.given.memory_gb : job.resources.memory_gb;
   root["time_limit_s"] = job.resources.time_limit_s;
   root["slurm_job"] = job.slurm_job.empty() ? base::Json() : to_json(job.slurm_job);

@@ -1,4 +1,4 @@
-// Texts of strangers, numbers for people, JSON for programs.
+// Escaping of untrusted text, number formats, JSON output.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -20,7 +20,7 @@ namespace {
 std::string escape(const std::string& raw, std::size_t max) {
   const std::string text = base::printable(store::to_text(raw));
   std::size_t end = std::min(max, text.size());
-  while (end < text.size() && (static_cast<unsigned char>(text[end]) & 0xC0U) == 0x80U) ++end;  // cut only where a character begins
+  while (end < text.size() && (static_cast<unsigned char>(text[end]) & 0xC0U) == 0x80U) ++end;  // at a character boundary
   return end < text.size() ? text.substr(0, end) + "..." : text;
 }
 

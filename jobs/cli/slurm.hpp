@@ -1,4 +1,4 @@
-// The commands' side of jobs in Slurm.
+// Commands for jobs in Slurm.
 #pragma once
 
 #include <filesystem>
@@ -9,18 +9,17 @@
 
 namespace carillon::cli {
 
-/// Brings the rows of jobs in Slurm up to date. Asks Slurm only when there are any, and not more often than the profile says.
+/// Updates the rows of jobs in Slurm, at most once per poll interval of the profile.
 void follow_slurm(Shared& shared);
 
-/// Hands over what is ready for Slurm. Returns how many jobs Slurm took.
+/// Submits ready jobs to Slurm. Returns the number of accepted jobs.
 std::size_t hand_over_to_slurm(Shared& shared);
 
-/// As queue::cancel, for a job of the engine "slurm".
+/// queue::cancel() for a job of the engine "slurm".
 queue::CommandResult cancel_in_slurm(Shared& shared, const store::Id& id);
 
-/// carillon run --on slurm: hands over, follows, and hands over again what can be tried again, until no job of Slurm's is open (`keep`: for
-/// ever). Options used: keep, quiet, has_pictures; the others concern this machine. The exit code: 0, or 3 when a job
-/// failed or was cancelled.
+/// carillon run --on slurm: submits and follows jobs until none is open (`keep`: forever). Uses only the options keep, quiet and
+/// has_pictures. Exit code: 0, or 3 if a job failed or was cancelled.
 int run_with_slurm(Shared& shared, const queue::RunOptions& options);
 
 }  // namespace carillon::cli

@@ -1,4 +1,4 @@
-// carillon status: where jobs stand.
+// carillon status: states of jobs.
 #include "jobs/cli/status.hpp"
 
 #include <fmt/core.h>
@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::size_t kMaxRows = 50, kWideColumns = 1000, kBarWidth = 20, kMaxKinds = 10;
 
-/// Running first, then what waits, what failed, what is done; the newest first among those that have ended.
+/// Order: running, waiting, queued, failed, cancelled, done; ended jobs newest first.
 void sort_for_people(std::vector<registry::Job>& jobs) {
   const auto rank = [](registry::JobState state) {
     const std::map<registry::JobState, int> order{{registry::JobState::running, 0},   {registry::JobState::waiting, 1},
@@ -59,7 +59,7 @@ std::string format_progress(Shared& shared, const registry::Job& job) {
   return text;
 }
 
-/// The sentence next to a state: why it failed or waits, and until when.
+/// Reason of a state, and the remaining wait.
 std::string format_reason(Shared& shared, const registry::Job& job) {
   std::string reason = show_message(find_reason(shared, job));
   if (job.state == registry::JobState::waiting) {
@@ -94,7 +94,7 @@ int run_status(Shared& shared, const StatusOptions& options) {
     }
     const int code = ids.empty() ? 0 : follow(shared, ids, true);
     if (!options.words.empty()) return code;
-    // All jobs were asked for: those too that had ended before.
+    // Without ids: also jobs that ended before.
     return std::max(code, find_exit_code(shared.registry().list({registry::JobState::failed, registry::JobState::cancelled})));
   }
   if (shared.json) {
@@ -119,7 +119,7 @@ int run_status(Shared& shared, const StatusOptions& options) {
   for (const std::string& line : format_bars(shared, jobs, rows, kWideColumns)) fmt::print("{}\n", line);
   if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");
   if (shared.is_disk_full()) return 0;
-  if (!shared.store().may_write()) fmt::print(stderr, "carillon: this store may only be read; states are as its files show them\n");
+  if (!shared.store().may_write()) fmt::print(stderr, "carillon: read-only store; states are read from its files\n");
   return 0;
 }
 

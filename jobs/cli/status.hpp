@@ -1,4 +1,4 @@
-// Jobs as lines for people.
+// Jobs as text lines.
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@
 
 namespace carillon::cli {
 
-/// A line a job (and one for its reason), those that run first, at most `rows` lines of `columns` characters, and a line of counts.
+/// One line per job (and one for its reason), running jobs first, at most `rows` lines of `columns` characters, and a line of counts.
 std::vector<std::string> format_bars(Shared& shared, const std::vector<registry::Job>& jobs, std::size_t rows, std::size_t columns);
 
 }  // namespace carillon::cli

@@ -1,4 +1,4 @@
-// carillon submit: jobs into the store and the registry. What is in the store already is not asked for again.
+// carillon submit: adds jobs to store and registry.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -22,10 +22,10 @@ constexpr std::size_t kMaxShown = 20;
 struct SubmitResult {
   const Source* source = nullptr;
   std::optional<registry::Job> job;  // none: its source has an error
-  bool is_new = false;               // this call made it
+  bool is_new = false;               // created by this call
 };
 
-/// A row that was there: cancelled and lost ones are wanted again, and what was asked for explicitly counts from now on.
+/// Updates an existing row: requeues cancelled and lost jobs, applies explicit resource requests.
 void renew(Shared& shared, const SubmitOptions& options, const Source& source, bool was_made) {
   shared.registry().update(store::require_id(source.request.id, "request"), [&](registry::Job& job) {
     if (job.state == registry::JobState::running || (job.state == registry::JobState::done && !was_made)) return false;
@@ -36,7 +36,7 @@ void renew(Shared& shared, const SubmitOptions& options, const Source& source, b
       job.cancel_wanted = false;
       job.failures = 0;
     }
-    const double memory_gb = source.request.resources.memory_gb;  // of the present job file or the command line
+    const double memory_gb = source.request.resources.memory_gb;  // of the job file or the command line
     const bool is_other = memory_gb > 0.0 && memory_gb != job.resources.memory_gb;
     if (is_other) job.resources.memory_gb = memory_gb;
     return options.resources.apply(job) || is_wanted || is_other;
@@ -44,7 +44,7 @@ void renew(Shared& shared, const SubmitOptions& options, const Source& source, b
 }
 
 std::vector<SubmitResult> enter(Shared& shared, const SubmitOptions& options, const std::vector<Source>& sources) {
-  shared.registry();  // brought up to date before there are new folders
+  shared.registry();  // reconciled before new folders exist
   const store::Lock lock = shared.store().lock_shared();
   std::vector<registry::Submission> submissions;
   std::vector<store::Asked> asked;
@@ -77,7 +77,7 @@ void print_errors(const std::vector<Source>& sources) {
   if (count > kMaxShown) fmt::print(stderr, "carillon: ... and {} more\n", count - kMaxShown);
 }
 
-/// What the solver warned of: with the lines of the job file that was submitted, where its numbers are meant.
+/// Warnings of the solver, with line numbers of the submitted job file.
 std::vector<std::string> find_own_warnings(Shared& shared, const SubmitResult& result) {
   std::vector<std::string> warnings = find_warnings(shared, *result.job, result.source->job_file);
   std::vector<std::string> own = result.source->order.warnings();
@@ -143,7 +143,7 @@ void print_lines(Shared& shared, const std::vector<SubmitResult>& results) {
       ++shown;
       fmt::print("{}  {:<22} {}\n", job.id.short_text(), state, show(result.source->job_file));
       if (job.state == registry::JobState::failed)
-        fmt::print("              it failed before: {}; carillon retry {} tries again\n", show_message(find_reason(shared, job)),
+        fmt::print("              it failed before: {}; carillon retry {} requeues it\n", show_message(find_reason(shared, job)),
                    job.id.short_text());
     }
   }
@@ -159,7 +159,7 @@ bool is_open(const registry::Job& job) {
   return job.state == registry::JobState::queued || job.state == registry::JobState::waiting || job.state == registry::JobState::running;
 }
 
-/// To Slurm, and what became of it into the results.
+/// Submits to Slurm and updates the results.
 void hand_over(Shared& shared, std::vector<SubmitResult>& results) {
   follow_slurm(shared);
   hand_over_to_slurm(shared);
@@ -214,7 +214,7 @@ int run_submit(Shared& shared, const SubmitOptions& options) {
     }
     if (shared.json)
       print_json(describe_results(shared, results));
-    else if (!options.run || is_for_slurm || options.is_quiet)  // printed by the queue already
+    else if (!options.run || is_for_slurm || options.is_quiet)  // already printed by the queue
       print_warnings(shared, results);
   } else {
     if (!shared.json) print_warnings(shared, results);

@@ -1,4 +1,4 @@
-// carillon validate and carillon study: other programs, started in place of this one.
+// carillon validate and carillon study: replace this process by another program.
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -13,7 +13,7 @@ namespace carillon::cli {
 int run_validate(Shared& shared, const ValidateOptions& options) {
   std::vector<std::string> arguments{"--validate"};
   if (shared.json) arguments.emplace_back("--json");
-  // A name that begins with a dash is also a file.
+  // File names may begin with a dash.
   arguments.push_back(options.word.starts_with('-') ? "./" + options.word : options.word);
   std::error_code error;
   const bool is_file = std::filesystem::is_regular_file(options.word, error);

@@ -1,4 +1,4 @@
-// carillon verify: is every bank, every input and every folder of work what it was, and what can be made again of what is not.
+// carillon verify: checks and repairs banks, records, inputs and folders of work.
 #include <fmt/core.h>
 #include <unistd.h>
 
@@ -19,11 +19,11 @@ struct Finding {
   std::string kind;  // "bank", "record", "work", "input"
   store::Id id;      // of the job
   std::string fault;
-  std::string repair;  // what was done, or why it could not be; empty: nothing was tried
+  std::string repair;  // what was done, or why it failed; empty: not tried
   bool is_repaired = false;
 };
 
-/// How far it is, on a terminal.
+/// Progress on a terminal.
 class Progress {
  public:
   Progress(std::size_t total, bool quiet) : total_(total), is_shown_(!quiet && ::isatty(STDERR_FILENO) == 1) {}
@@ -39,13 +39,7 @@ class Progress {
   bool is_shown_;
 };
 
-bool is_worked_on(const store::Store& store, const store::Id& id) {
-  try {
-    return process::Lock::is_held(store.open_work(id).path() / "lock");
-  } catch (const SystemError&) {
-    return false;
-  }
-}
+bool is_worked_on(const store::Store& store, const store::Id& id) { return process::Lock::is_held(store.work_folder(id) / "lock"); }
 
 void check_job(Shared& shared, const store::Id& id, std::map<std::string, std::optional<std::string>>& inputs,
                std::vector<Finding>& findings) {
@@ -58,19 +52,19 @@ void check_job(Shared& shared, const store::Id& id, std::map<std::string, std::o
   }
   if (!store.has_bank_folder(id) && !store.has_work(id)) findings.push_back({"bank", id, "its bank is missing", "", false});
   if (store.has_work(id) && !is_worked_on(store, id)) {
-    if (const auto fault = store::find_job_fault(store, id, store.work_folder(id))) findings.push_back({"work", id, *fault, "", false});
+    if (const auto fault = store::find_job_fault(store, id)) findings.push_back({"work", id, *fault, "", false});
   }
   const auto request = queue::find_request(store, shared.registry(), id);
   for (const store::Input& input : request ? store::list_inputs(*request) : std::vector<store::Input>()) {
     const auto [entry, is_new] = inputs.try_emplace(input.sha256 + "." + input.format);
     if (is_new) entry->second = store::find_input_fault(store, input);
-    // Of a bank that is whole the input is not needed; one that gc took away is no damage.
+    // A valid bank does not need its input, which gc may have removed.
     const bool is_gone = entry->second && entry->second->ends_with("is missing");
     if (entry->second && is_new && !(is_gone && store.has_bank(id))) findings.push_back({"input", id, *entry->second, "", false});
   }
 }
 
-/// Puts a job back into the queue, or says in its row what is damaged.
+/// Requeues a job, or writes the fault to its row.
 void repair(Shared& shared, Finding& finding) {
   const auto refusal = queue::restore(shared.store(), shared.registry(), finding.id);
   shared.registry().update(finding.id, [&](registry::Job& row) {
@@ -81,23 +75,23 @@ void repair(Shared& shared, Finding& finding) {
     return true;
   });
   finding.is_repaired = !refusal;
-  finding.repair = refusal ? *refusal : "queued again; carillon run computes it";
+  finding.repair = refusal ? *refusal : "requeued; carillon run computes it";
 }
 
-/// What lies next to a bank that is whole: rebuilt from the bank if possible, else the bank is computed again.
+/// Rebuilds records from the bank if possible, else requeues the job.
 void repair_record(Shared& shared, Finding& finding) {
   const auto request = queue::find_request(shared.store(), shared.registry(), finding.id);
   if (!request || !attempt::repair_records(shared.store(), *request)) return repair(shared, finding);
   finding.is_repaired = true;
-  finding.repair = "written again from what the bank and the submission hold";
+  finding.repair = "rebuilt from the bank and the submission";
 }
 
-/// An input alone: what is done stays done.
+/// Copies an input again; does not change the state of the job.
 void repair_input(Shared& shared, Finding& finding) {
   const auto request = queue::find_request(shared.store(), shared.registry(), finding.id);
   finding.is_repaired = request && store::restore_input(shared.store(), *request);
-  finding.repair = finding.is_repaired ? "copied again from where it was submitted from"
-                                       : "the file that it was copied from has been removed or changed; submit a job with that file again";
+  finding.repair = finding.is_repaired ? "copied again from its original path"
+                                       : "the original file has been removed or changed; submit a job with that file again";
 }
 
 }  // namespace
@@ -112,7 +106,7 @@ int run_verify(Shared& shared, const VerifyOptions& options) {
     for (const store::Id& id : store.list_banks()) ids.insert(id);
     for (const store::Id& id : store.list_work()) ids.insert(id);
     for (const registry::Job& job : shared.registry().list({registry::JobState::done})) ids.insert(job.id);
-    // A job that was done and whose folder is gone.
+    // Jobs that were done and whose folder is missing.
     for (const registry::Job& job : shared.registry().list({registry::JobState::failed})) {
       if (!store.has_work(job.id)) ids.insert(job.id);
     }
@@ -154,8 +148,8 @@ int run_verify(Shared& shared, const VerifyOptions& options) {
   if (shared.json)
     print_json(root);
   else
-    fmt::print("{} job{} verified, {} thing{} damaged{}\n", ids.size(), ids.size() == 1 ? "" : "s", findings.size(),
-               findings.size() == 1 ? "" : "s", findings.empty() || options.repairs ? "" : "; carillon verify --repair restores them");
+    fmt::print("{} job{} verified, {} fault{}{}\n", ids.size(), ids.size() == 1 ? "" : "s", findings.size(),
+               findings.size() == 1 ? "" : "s", findings.empty() || options.repairs ? "" : "; carillon verify --repair repairs them");
   if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");
   return is_whole ? 0 : kExitSolve;
 }

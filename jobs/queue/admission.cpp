@@ -1,8 +1,7 @@
-// Method:     See the header. Free memory is the lesser of what is not promised to running jobs and of what is available now less what
-//             running jobs have been promised and do not hold yet.
-// Source:     own choice; docs/howto/when-jobs-die.md states the rule. Backfilling with a reservation for the first: Lifka 1995 (EASY),
-//             with a fixed patience in place of estimates of run times.
-// Deviations: none.
+// Method:     Free memory: the smaller of (a) memory not admitted to running jobs, and (b) available memory minus memory that running jobs
+//             were admitted but do not hold yet. Backfilling with a reservation for the first job (EASY), with a fixed patience instead of
+//             run time estimates. docs/howto/when-jobs-die.md
+// Source:     Lifka 1995 (EASY).
 #include "jobs/queue/admission.hpp"
 
 #include <algorithm>
@@ -11,7 +10,7 @@
 namespace carillon::queue {
 namespace {
 
-constexpr double kUnknownGb = 0.5;  // of a job without a prediction
+constexpr double kUnknownGb = 0.5;  // without a prediction
 
 struct Room {
   int cores = 0;
@@ -30,7 +29,7 @@ Room calc_room(const Host& host, const std::vector<Admitted>& running) {
   return room;
 }
 
-/// Whether it fits as soon as our own jobs have ended.
+/// True if it fits as soon as all running jobs have ended.
 bool will_fit(const Host& host, const std::vector<Admitted>& running, double memory_gb) {
   double free_gb = host.available_gb - (1.0 - kMemoryShare) * host.total_gb;
   for (const Admitted& job : running) free_gb += job.used_gb;
@@ -52,7 +51,7 @@ int choose_ranks(const Host& host, const Need& need, std::size_t competitors) {
 double calc_memory(const Need& need, int ranks) {
   if (need.memory_gb > 0.0) return need.memory_gb;
   if (need.predicted_gb.empty()) return std::max(kUnknownGb, need.min_gb);
-  // Between the powers of two that were predicted the larger of both; beyond them the last.
+  // Between two predictions the larger one; beyond the last prediction the last.
   const std::size_t place = std::max(0.0, std::log2(std::max(1, ranks)));
   const std::size_t last = need.predicted_gb.size() - 1;
   const bool is_power = (ranks & (ranks - 1)) == 0;
@@ -65,7 +64,7 @@ std::vector<Admission> choose(const Host& host, const std::vector<Admitted>& run
   Room room = calc_room(host, running);
   std::vector<Admitted> all = running;
   std::vector<Admission> admissions;
-  bool is_kept = false;  // for one that has waited long enough
+  bool is_kept = false;  // the rest is reserved for a job that has waited long enough
   for (const Candidate& candidate : candidates) {
     Admission admission;
     admission.ranks = choose_ranks(host, candidate.need, running.size() + candidates.size());

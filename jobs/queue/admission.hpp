@@ -1,9 +1,9 @@
-// Which jobs start now, on how many ranks. Pure: no clock, no disk, no registry.
+// Admission: which jobs start now, and on how many ranks. Pure functions.
 //
-// Ranks: what the job asks for, at most the cores. A job that does not ask and is small (under kSmallSeconds on one rank) gets one; a large
-// one gets cores / n ranks, where n is how many jobs could run side by side: as many as run or are ready, at most the cores, and at most as
-// many of its size as the memory holds. Memory: asked for, or predicted for these ranks.
-// Order: as submitted. A job that does not fit now may be passed by later ones for kPatienceSeconds; then cores and memory are kept for it.
+// Ranks: as requested, at most the cores. Without a request a small job (under kSmallSeconds on one rank) gets one rank, a large job cores
+// / n, where n is the number of jobs that can run concurrently: running plus ready jobs, limited by cores and by memory. Memory: as
+// requested, or predicted for these ranks. Order: as submitted. Later jobs may overtake a job that does not fit for kPatienceSeconds; then
+// cores and memory are reserved for it.
 #pragma once
 
 #include <functional>
@@ -17,35 +17,35 @@ namespace carillon::queue {
 using base::Host;
 
 inline constexpr double kSmallSeconds = 30.0;
-inline constexpr double kSecondsPerRank = 10.0;  // no rank is worth its start for less
+inline constexpr double kSecondsPerRank = 10.0;  // minimum work per rank
 inline constexpr double kPatienceSeconds = 60.0;
-inline constexpr double kMemoryShare = 0.95;  // of the machine's memory; the rest is for what is not ours
+inline constexpr double kMemoryShare = 0.95;  // usable share of the machine's memory
 
-/// What a job takes.
+/// Resources of a job.
 struct Need {
-  int ranks = 0;                          // asked for; 0: to be chosen
-  double memory_gb = 0.0;                 // asked for, or more after an attempt that ran out of it; 0: as predicted
-  double seconds = 0.0;                   // on one rank, predicted; 0: not known, and small
-  std::vector<double> predicted_gb = {};  // on 1, 2, 4, 8 ... ranks; empty: not known
-  double min_gb = 0.0;                    // whatever is predicted, so much is given: for what follows the solve
-  double serial_seconds = 0.0;            // of `seconds`, what does not fall with ranks
+  int ranks = 0;                          // requested; 0: chosen here
+  double memory_gb = 0.0;                 // requested, or raised after an attempt ran out of memory; 0: as predicted
+  double seconds = 0.0;                   // on one rank, predicted; 0: unknown, treated as small
+  std::vector<double> predicted_gb = {};  // on 1, 2, 4, 8 ... ranks; empty: unknown
+  double min_gb = 0.0;                    // minimum, e.g. for pictures after the solve
+  double serial_seconds = 0.0;            // serial part of `seconds`
 };
 
-/// Memory of a job on so many ranks [GB].
+/// Memory of a job on `ranks` ranks [GB].
 double calc_memory(const Need& need, int ranks);
 
 struct Admitted {
   int ranks = 1;
   double memory_gb = 0.0;
-  double used_gb = 0.0;  // of it, what its processes hold now
+  double used_gb = 0.0;  // currently held by its processes
 };
 
 struct Candidate {
   Need need;
-  double blocked_s = 0.0;  // for how long it would have been started but for room
+  double blocked_s = 0.0;  // time since it first did not fit
 };
 
-/// What happens to a candidate now. never: no moment of this machine has the memory.
+/// Decision about a candidate. never: needs more memory than this machine has.
 struct Admission {
   enum class Decision { start, wait, never };
   Decision decision = Decision::wait;
@@ -53,7 +53,7 @@ struct Admission {
   double memory_gb = 0.0;  // start and never
 };
 
-/// One for each candidate, in their order.
+/// One result per candidate, in order.
 std::vector<Admission> choose(const Host& host, const std::vector<Admitted>& running, const std::vector<Candidate>& candidates);
 
 }  // namespace carillon::queue

@@ -36,7 +36,7 @@ std::string format_left(double seconds) {
   return fmt::format(", {}:{:02}:{:02} left", whole / 3600, whole / 60 % 60, whole % 60);
 }
 
-/// At most `columns` letters of UTF-8.
+/// At most `columns` characters of UTF-8.
 std::string cut(const std::string& text, int columns) {
   std::string out;
   int letters = 0;

@@ -12,8 +12,8 @@
 
 namespace carillon::queue {
 
-/// Writes to the standard output alone, whole lines at a time. On a terminal the last line may be the bar; it is cleared before any other
-/// line, and at the end. In text, one warning of each kind is shown at its first job; all are counted at the end.
+/// Writes complete lines to standard output. On a terminal the last line may be the progress bar, which is cleared before any other line
+/// and at the end. Text output shows the first warning of each kind, and counts at the end.
 class Display {
  public:
   using ReadProgress = std::function<std::optional<store::Progress>(const store::Id&)>;
@@ -21,15 +21,14 @@ class Display {
   Display(bool json, bool quiet, ReadProgress read_progress);
   ~Display();
 
-  /// Where the warnings of a job that is done come from; without this none are shown.
+  /// Sets the source of warnings of finished jobs; without it none are shown.
   void show_warnings_by(FindWarnings find_warnings) { find_warnings_ = std::move(find_warnings); }
 
-  /// A job was started, ended, or waits: one line. `event`: "start", "predict", "adopt", "done", "failed", "cancelled", "waiting",
-  /// "queued".
+  /// One line about a job. `event`: "start", "predict", "adopt", "done", "failed", "cancelled", "waiting", "queued".
   void print_event(const std::string& event, const registry::Job& job);
-  /// Something about the whole run: one line.
+  /// One line about the whole run.
   void print_note(const std::string& text);
-  /// How far everything is: the bar, or a line for each job that got further.
+  /// Updates the bar, or prints a line for each job with progress.
   void show(const std::vector<registry::Job>& jobs);
 
  private:
@@ -41,7 +40,7 @@ class Display {
   bool json_ = false, quiet_ = false, is_terminal_ = false;
   bool has_bar_ = false;
   store::WarningKinds kinds_;
-  bool has_repeated_ = false;  // a repeated kind of warning: the end has the counts
+  bool has_repeated_ = false;  // a kind of warning occurred again
   std::map<std::string, double> shown_percent_;
   std::size_t ended_ = 0;
 };

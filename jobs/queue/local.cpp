@@ -14,9 +14,7 @@
 
 #include "jobs/queue/attempt/attempt.hpp"
 #include "jobs/queue/attempt/processes.hpp"
-#include "jobs/queue/attempt/publish.hpp"
 #include "jobs/store/files.hpp"
-#include "jobs/store/open_folder.hpp"
 #include "runtime/base/clock.hpp"
 #include "runtime/base/command.hpp"
 #include "runtime/base/descriptor.hpp"
@@ -58,12 +56,10 @@ pid_t LocalLauncher::start(const registry::Job& job, const StartOptions& options
   attempt.is_prediction = options.is_prediction;
   attempt.mpirun_options = command_.mpirun_options;
   attempt.has_pictures = command_.has_pictures;
-  const store::OpenFolder work = store_.open_work(job.id);
-  attempt::clear_way(work.path(), store::kLogFile);
-  const std::filesystem::path log = work.path() / store::kLogFile;
-  const base::Descriptor output(::open(log.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, 0666));
-  if (output.get() < 0) throw SystemError(fmt::format("{}: cannot write this: {}", log.string(), std::strerror(errno)));
-  // What asks an attempt to stop waits until it is ready to hear it.
+  const std::filesystem::path log = attempt.work / store::kLogFile;
+  const base::Descriptor output(::open(log.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC, 0666));
+  if (output.get() < 0) throw SystemError(fmt::format("{}: cannot write: {}", log.string(), std::strerror(errno)));
+  // Signals stay pending until the attempt handles them.
   return base::start({.words = attempt::make_arguments(command_.program, attempt),
                       .output = output.get(),
                       .errors = output.get(),

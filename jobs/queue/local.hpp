@@ -1,4 +1,4 @@
-// The environment of the queue on this machine: folders of a store, the clock since boot, processes.
+// The environment of the queue on this machine.
 #pragma once
 
 #include <filesystem>
@@ -10,7 +10,7 @@
 
 namespace carillon::queue {
 
-/// Reads the folders of a store at each call, and keeps nothing.
+/// Folders of a store, read at each call.
 class LocalDisk final : public Disk {
  public:
   explicit LocalDisk(const store::Store& store) : store_(store) {}
@@ -25,23 +25,23 @@ class LocalDisk final : public Disk {
   const store::Store& store_;
 };
 
-/// CLOCK_BOOTTIME of this machine. Keeps nothing.
+/// CLOCK_BOOTTIME of this machine.
 class LocalClock final : public Clock {
  public:
   double get_boot_s() const override;
   std::string get_boot_id() const override;
-  /// Sees SIGTERM, SIGINT and SIGHUP where they are blocked.
+  /// SIGTERM, SIGINT and SIGHUP must be blocked.
   int wait(double seconds) override;
 };
 
-/// What attempts are started with.
+/// Command line options of attempts.
 struct AttemptCommand {
-  std::filesystem::path program;            // carillon itself
-  bool has_pictures = false;                // draw the first modes for the report of each bank when it is done
-  std::vector<std::string> mpirun_options;  // words for mpirun: which hosts, by which network
+  std::filesystem::path program;            // carillon
+  bool has_pictures = false;                // draw the first modes for the report of each bank
+  std::vector<std::string> mpirun_options;  // arguments of mpirun
 };
 
-/// Attempts are children of this process until reap_child() returns them; each has a session of its own.
+/// Starts attempts as children of this process, each in its own session.
 class LocalLauncher final : public Launcher {
  public:
   LocalLauncher(const store::Store& store, AttemptCommand command) : store_(store), command_(std::move(command)) {}
@@ -60,7 +60,7 @@ class LocalLauncher final : public Launcher {
   const AttemptCommand command_;
 };
 
-/// The three together.
+/// Disk, clock and launcher.
 class LocalEnvironment {
  public:
   explicit LocalEnvironment(const store::Store& store, AttemptCommand command = {}) : disk_(store), launcher_(store, std::move(command)) {}

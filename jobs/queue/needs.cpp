@@ -1,6 +1,5 @@
-// Method:     A job is predicted by precompute/job/cost from the nodes that it asks for or the size of its mesh file. Larger jobs, and those
-//             whose size is unknown, are predicted by carillon-precompute --validate instead, and simulations by carillon-simulate.
-// Source:     precompute/job/cost. Deviations: none.
+// Method:     The cost model (precompute/job/cost) estimates from the requested nodes or the size of the mesh file. Large jobs and jobs of
+//             unknown size are predicted by carillon-precompute --validate, simulations by carillon-simulate --validate.
 #include "jobs/queue/needs.hpp"
 
 #include <algorithm>
@@ -25,7 +24,7 @@ namespace fs = std::filesystem;
 constexpr double kLargeNodes = 30000.0;
 constexpr int kMaxGuessedRanks = 1024;
 
-/// Size as solved; unknown: an upper bound for most jobs.
+/// Problem size; unknown: an upper bound for most jobs.
 struct Size {
   cost::ProblemSize problem = cost::estimate_meshed_size(cost::kUnknownNodes, true);
   bool is_known = false;
@@ -61,10 +60,10 @@ Size find_size(const store::Store& store, const store::Request& request) {
   return size;
 }
 
-/// What does not fall with ranks, of so many seconds on one that become so many on two.
+/// Serial part of a run that takes `one_s` on one rank and `two_s` on two.
 double find_serial(double one_s, double two_s) { return std::clamp(2.0 * two_s - one_s, 0.0, one_s); }
 
-/// False when there is none that can be used.
+/// False if there is no usable prediction.
 bool read_prediction(const fs::path& folder, Need& need) {
   std::error_code error;
   if (!fs::exists(folder / attempt::kPredictionFile, error)) return false;
@@ -86,7 +85,7 @@ bool read_prediction(const fs::path& folder, Need& need) {
   }
 }
 
-/// More memory than the last attempt had, after its end for lack of memory; else 0.
+/// More than the memory of an attempt that ran out of memory; else 0.
 double find_least_gb(const fs::path& folder, const registry::Job& job) {
   const std::optional<outcome::Outcome> before = outcome::read_outcome(folder);
   if (!before || before->cause != outcome::Cause::memory) return 0.0;
@@ -121,7 +120,7 @@ JobNeeds find_needs(const store::Store& store, const registry::Job& job) {
                            (!size.is_known || static_cast<double>(cost::complete(size.problem).nodes) > kLargeNodes);
   needs.need.min_gb = find_least_gb(folder, job);
   set_asked(needs, job);
-  // Its checkpoint is of so many ranks.
+  // A checkpoint can be resumed only on the same number of ranks.
   std::error_code error;
   if (is_simulation && needs.need.ranks == 0 && fs::exists(folder / store::kCheckpointFile, error))
     if (const auto before = outcome::read_attempt(folder)) needs.need.ranks = before->ranks;

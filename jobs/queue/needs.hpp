@@ -1,4 +1,4 @@
-// What a job will need: what it asks for, what its prediction says, or a guess by its size.
+// Resource needs of a job: requested, predicted by the solver, or estimated from its size.
 #pragma once
 
 #include "jobs/queue/admission.hpp"
@@ -11,17 +11,17 @@ namespace carillon::queue {
 struct JobNeeds {
   Need need;
   double time_limit_s = 0.0;
-  bool wants_prediction = false;  // too large to guess, and nothing was asked for
+  bool wants_prediction = false;  // too large to estimate, and no memory requested
   bool is_simulation = false;
 };
 
-/// Reads request.json and prediction.json of the job's folder. A damaged one is as none.
+/// From request.json and prediction.json of the job's folder; damaged files are ignored.
 JobNeeds find_needs(const store::Store& store, const registry::Job& job);
 
-/// What the row asks for, which may have changed since the needs were found.
+/// Updates the requests from the row.
 void set_asked(JobNeeds& needs, const registry::Job& job);
 
-/// The need of a problem of which no more than the size is known, by the cost model.
+/// Estimate from the problem size by the cost model.
 Need guess_need(const cost::ProblemSize& size);
 
 }  // namespace carillon::queue

@@ -1,6 +1,3 @@
-// Method:     The id shows which record of a job is complete; the folder of work is rebuilt from it.
-// Source:     own.
-// Deviations: none.
 #include "jobs/queue/repair.hpp"
 
 #include <fmt/core.h>
@@ -26,9 +23,9 @@ std::optional<store::Request> find_request(const store::Store& store, const regi
 }
 
 std::optional<std::string> restore(const store::Store& store, const registry::Registry& registry, const store::Id& id) {
-  const bool is_whole = store.has_work(id) && !store::find_job_fault(store, id, store.work_folder(id));
+  const bool is_whole = store.has_work(id) && !store::find_job_fault(store, id);
   const std::optional<store::Request> request = find_request(store, registry, id);
-  if (!request) return "what it was to work on is gone from the store; submit it again";
+  if (!request) return "its request is no longer in the store; submit it again";
   const std::optional<std::string> fault = store::find_input_fault(store, *request);
   if (fault && !store::restore_input(store, *request))
     return fmt::format("{}, and {} has been removed or changed; submit the job with its {}", *fault,

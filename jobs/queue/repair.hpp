@@ -1,4 +1,4 @@
-// What is damaged in a store is made again from what is whole.
+// Repair of damaged jobs in a store.
 #pragma once
 
 #include <optional>
@@ -9,12 +9,12 @@
 
 namespace carillon::queue {
 
-/// The request of a job, from its folder of work, from that of its bank, else from the log of submissions: the first that gives this id.
+/// The request of a job, from its folder of work, its bank, or the log of submissions: the first with this id.
 std::optional<store::Request> find_request(const store::Store& store, const registry::Registry& registry, const store::Id& id);
 
-/// Makes a job without a running attempt ready to be computed: sets a damaged bank aside, copies a damaged input again from where it was
-/// submitted from, and makes a missing or damaged folder of work again. Its row stays as it is. Why that cannot be, in one sentence; none
-/// when it is ready. SystemError when the disk refuses.
+/// Prepares a job without a running attempt for computation: sets a damaged bank aside, copies damaged inputs again from their original
+/// paths, rebuilds a missing or damaged folder of work. Does not change its row. Returns the reason if impossible, in one sentence.
+/// SystemError when the disk refuses.
 std::optional<std::string> restore(const store::Store& store, const registry::Registry& registry, const store::Id& id);
 
 }  // namespace carillon::queue

@@ -17,7 +17,7 @@ namespace {
 
 using registry::Job;
 
-constexpr double kDrawingHosts = 4;  // Smaller machines than so many drawings take give no job memory for them.
+constexpr double kDrawingHosts = 4;  // no memory is reserved for drawing on machines with less than this many times kDrawGb
 
 void block_signals() {
   sigset_t set;
@@ -27,7 +27,7 @@ void block_signals() {
   ::signal(SIGPIPE, SIG_IGN);
 }
 
-/// They name the file that the job was submitted from.
+/// With the name of the submitted job file.
 std::vector<std::string> find_warnings(const store::Store& store, const registry::Registry& registry, const Job& job) {
   const std::optional<store::Request> request = find_request(store, registry, job.id);
   return store::read_warnings(store, job.id, request && !request->job_file.empty() ? request->job_file : "the job");

@@ -1,6 +1,5 @@
-// Method:     One thread: reap children, settle rows, claim and start, show, and wait until a signal or a second has passed. Attempts live
-//             in sessions of their own and outlive this process; rows and locks say all that the next one has to know.
-// Source:     docs/howto/when-jobs-die.md. Deviations: none.
+// Method:     One thread: reap children, settle rows, claim and start jobs, update the display, wait for a signal or one second. Attempts
+//             run in sessions of their own and outlive this process; rows and locks hold the complete state. docs/howto/when-jobs-die.md
 #include "jobs/queue/runner.hpp"
 
 #include <fmt/core.h>
@@ -19,10 +18,10 @@ using registry::Job;
 using registry::JobState;
 
 constexpr std::size_t kMaxCandidates = 256;
-constexpr int kMaxRounds = 3;  // of reading what new jobs need, before the next step uses it
+constexpr int kMaxRounds = 3;  // of claims per step, while needs of new jobs are read
 constexpr double kStepS = 1.0, kAskAgainS = 5.0, kDiskPatienceS = 2.0, kLostPatienceS = 60.0;
 
-/// A prediction runs in a slot of its own: one rank, and memory for the mesh and what is assembled of it.
+/// Resources of a prediction: one rank, and memory for mesh and matrices.
 Need make_prediction_need(const Need& guess, const Host& host) {
   Need need;
   need.ranks = 1;
@@ -30,7 +29,7 @@ Need make_prediction_need(const Need& guess, const Host& host) {
   return need;
 }
 
-/// Why a job runs on fewer ranks than it requests; empty when it does not.
+/// Why a job runs on fewer ranks than requested; empty if it does not.
 std::string describe_ranks(int requested, int given) {
   return requested > given ? fmt::format("requested {} ranks, using {}: no more cores available", requested, given) : "";
 }
@@ -43,10 +42,10 @@ int Runner::run() {
     try {
       if (step()) return find_exit_code();
     } catch (const SystemError& error) {
-      // A full disk passes; whatever else the registry cannot do ends this.
+      // Wait only for a full disk.
       if (!at_.disk.is_full(&error)) throw;
       if (!is_disk_shown_)
-        display_.print_note(fmt::format("the disk or quota is full ({}); the queue continues when there is room", error.what()));
+        display_.print_note(fmt::format("the disk or quota is full ({}); the queue continues when space is free", error.what()));
       is_disk_shown_ = true;
       if (stops_ > 0 && list_attempts().empty()) return exit_code_;
       wait_s = kDiskPatienceS;
@@ -55,7 +54,7 @@ int Runner::run() {
   }
 }
 
-/// Reads the rows of the jobs: another process may have settled them.
+/// From the rows: other processes may have settled them.
 int Runner::find_exit_code() const {
   if (exit_code_ != 0) return exit_code_;
   const bool has_failed = std::any_of(worked_.begin(), worked_.end(), [&](const store::Id& id) {
@@ -89,10 +88,10 @@ void Runner::stop(int signal) {
   ++stops_;
   exit_code_ = 128 + signal;
   if (stops_ == 1)
-    display_.print_note(fmt::format("stopping: {} running job{} save{} and go back into the queue; once more to end them now",
+    display_.print_note(fmt::format("stopping: {} running job{} save{} and return to the queue; again to end them now",
                                     children_.size(), children_.size() == 1 ? "" : "s", children_.size() == 1 ? "s" : ""));
   for (const pid_t pid : list_attempts()) {
-    // An attempt that was asked before ends at once by SIGTERM.
+    // SIGTERM after SIGUSR1 ends an attempt at once.
     at_.launcher.send_signal(pid, SIGUSR1);
     if (stops_ > 1) at_.launcher.send_signal(pid, SIGTERM);
   }
@@ -114,7 +113,7 @@ void Runner::reap_children() {
     const std::optional<Job> row = table_.find(job.id);
     const bool is_other = !row || row->state != JobState::running || row->token != job.token;
     if (is_other || ended->exit_code == attempt::kExitBusy || at_.disk.has_bank(job.id)) continue;
-    // Starting: its row still names this process, where the child's identity could not be written.
+    // starting: name_worker() could not write the child's identity.
     const AttemptState state = find_attempt_state(at_, *row);
     if (state != AttemptState::not_begun && state != AttemptState::starting) continue;
     settle_not_begun(at_, table_, *row, ended->exit_code);
@@ -135,7 +134,7 @@ void Runner::show_adopted(const std::vector<Job>& jobs) {
   }
 }
 
-/// The attempts that this process started, and those whose starter is gone.
+/// Attempts of this process, and orphans.
 std::vector<pid_t> Runner::list_attempts() const {
   std::vector<pid_t> pids;
   for (const auto& [pid, job] : children_) pids.push_back(pid);
@@ -148,7 +147,7 @@ std::vector<pid_t> Runner::list_attempts() const {
   return pids;
 }
 
-/// Running jobs that are to be cancelled; SIGUSR1 may be sent again and again.
+/// Asks running jobs with cancel_wanted to stop, repeatedly.
 void Runner::ask_cancelled(const std::vector<Job>& jobs) {
   const double now_s = at_.clock.get_boot_s();
   for (const Job& job : jobs) {
@@ -167,7 +166,7 @@ Host Runner::find_room() const {
   return host;
 }
 
-/// What a running job was promised and what it holds.
+/// Admitted and current resources of a running job.
 Admitted Runner::find_admitted(const Job& job) const {
   const std::optional<outcome::Attempt> attempt = at_.disk.read_attempt(job.id);
   const bool has_begun = attempt && attempt->token == job.token;
@@ -185,7 +184,7 @@ void Runner::start_what_fits() {
   const Host host = find_room();
   const double now_s = at_.clock.get_boot_s();
   std::vector<std::pair<Job, double>> never;
-  std::vector<Job> unknown;  // Their needs are read from files and from the solver, for which no transaction waits.
+  std::vector<Job> unknown;  // needs are read outside the transaction
   const auto pick = [&](const std::vector<Job>& running, const std::vector<Job>& ready) {
     for (const Job& job : ready) {
       if (needs_.count(job.id) == 0) unknown.push_back(job);
@@ -233,7 +232,7 @@ std::vector<Job> Runner::pick_jobs(const Host& host, double now_s, const std::ve
 
 void Runner::refuse(const Job& job, double memory_gb, const Host& host) {
   const std::string reason =
-      fmt::format("needs {:.2f} GB of memory, and this machine can give {:.2f} GB at most; use a coarser mesh or a larger machine",
+      fmt::format("needs {:.2f} GB of memory, and this machine has {:.2f} GB for jobs; use a coarser mesh or a larger machine",
                   memory_gb, kMemoryShare * host.total_gb);
   const bool is_changed = table_.update(job.id, [&](Job& row) {
     if (row.state != JobState::queued && row.state != JobState::waiting) return false;
@@ -246,7 +245,7 @@ void Runner::refuse(const Job& job, double memory_gb, const Host& host) {
   if (is_changed && now) show_end(*now);
 }
 
-/// A row that was claimed must be started, or given back: this runner answers for it until then.
+/// Starts every claimed row or gives it back.
 void Runner::start_claimed() {
   while (!claimed_.empty()) {
     const Job job = claimed_.back();
@@ -270,7 +269,7 @@ void Runner::start(const Job& job) {
   display_.print_event(needs.wants_prediction ? "predict" : "start", job);
 }
 
-/// Until attempt.json names the process, the row does. Where the disk is full it does not.
+/// Writes the process of the attempt to its row. Best effort on a full disk.
 void Runner::name_worker(const Job& job, pid_t pid) {
   const std::optional<process::Identity> child = at_.launcher.find_process(pid);
   if (!child) return;
@@ -292,7 +291,7 @@ void Runner::give_back(const Job& job) {
   });
 }
 
-/// Claimed by this process, neither started nor waiting to be: its end could not be written (a full disk).
+/// A row claimed by this process that is in neither list: its end could not be written (full disk).
 bool Runner::is_forgotten(const Job& job) const {
   const auto is_same = [&](const Job& other) { return other.id == job.id; };
   const process::Identity self = *at_.launcher.find_process(0);
@@ -301,7 +300,7 @@ bool Runner::is_forgotten(const Job& job) const {
          std::none_of(children_.begin(), children_.end(), [&](const auto& child) { return is_same(child.second); });
 }
 
-/// Rows that were claimed in another container or under another name of this machine, whose attempt never began.
+/// Gives back rows claimed elsewhere (another container or host name) whose attempt never began.
 void Runner::release_lost(const std::vector<Job>& jobs) {
   const double now_s = at_.clock.get_boot_s();
   for (const Job& job : jobs) {

@@ -1,5 +1,4 @@
-// The loop of `carillon run`: which jobs start, what became of those that ran, and what the user sees of it. Uses rows and an Environment
-// alone.
+// The loop of `carillon run` on rows and an Environment: starts jobs, settles ended ones, reports to the display.
 #pragma once
 
 #include <functional>
@@ -18,26 +17,25 @@
 namespace carillon::queue {
 
 struct RunnerOptions {
-  bool keep = false;       // stay and wait for more when the queue is empty
-  int cores = 0;           // at most so many; 0: all that this process may use
-  double memory_gb = 0.0;  // at most so much; 0: what the machine has
+  bool keep = false;       // wait for more jobs when the queue is empty
+  int cores = 0;           // limit; 0: all cores of this process
+  double memory_gb = 0.0;  // limit; 0: the memory of the machine
 };
 
-/// The state of one `carillon run`. A row that it has claimed is in claimed_ until it is started or given back; then its child is in
-/// children_ until it is reaped. So no claimed row is forgotten.
+/// The state of one `carillon run`. A claimed row is in claimed_ until it is started or given back; its child is in children_ until reaped.
 class Runner {
  public:
-  /// `find_needs` may read files and ask the solver; it is called outside transactions.
+  /// `find_needs` may read files and run the solver; it is called outside transactions.
   using FindNeeds = std::function<JobNeeds(const registry::Job&)>;
   Runner(registry::JobTable& table, const Environment& at, Display& display, FindNeeds find_needs, RunnerOptions options)
       : table_(table), at_(at), display_(display), calc_needs_(std::move(find_needs)), options_(options) {}
 
-  /// Steps and waits until the queue is empty, a second signal arrives, or all attempts have ended after a first one. Exit code: 0, 3 when
-  /// a job failed or was cancelled meanwhile, or 128 + the signal.
+  /// Steps until the queue is empty or, after a signal, all attempts have ended. Exit code: 0, 3 if a job failed or was cancelled, or 128 +
+  /// signal.
   int run();
-  /// One round; true when there is nothing left to do.
+  /// One round; true if nothing is left to do.
   bool step();
-  /// SIGTERM, SIGINT or SIGHUP came: attempts save and go back into the queue; the second time they end at once.
+  /// On SIGTERM, SIGINT or SIGHUP: attempts save and are requeued; on the second signal they end at once.
   void stop(int signal);
 
  private:
@@ -69,11 +67,11 @@ class Runner {
   const RunnerOptions options_;
   std::map<pid_t, registry::Job> children_;
   std::set<store::Id> worked_;                 // open jobs of this run
-  std::map<store::Id, JobNeeds> needs_;        // until an attempt has ended
+  std::map<store::Id, JobNeeds> needs_;        // until the attempt has ended
   std::map<store::Id, double> blocked_since_;  // boot seconds
   std::map<store::Id, double> lost_since_;
   std::map<store::Id, double> asked_s_;
-  std::vector<registry::Job> claimed_;  // and not started yet
+  std::vector<registry::Job> claimed_;  // not started yet
   int stops_ = 0;
   int exit_code_ = 0;
   bool is_first_step_ = true;

@@ -1,7 +1,6 @@
-// Method:     Whether a process works on a job follows from the lock on its folder, which the kernel releases when the process dies;
-//             attempt.json shows whether the claimed attempt began. Wall clocks are not asked. Changes are made in write transactions that
-//             look again first.
-// Source:     docs/howto/when-jobs-die.md. Deviations: none.
+// Method:     A running attempt holds the lock of its folder, which the kernel releases at its end; attempt.json shows whether the claimed
+//             attempt began. Wall clocks are not used. Every change is a transaction that checks the row again.
+//             docs/howto/when-jobs-die.md
 #include "jobs/queue/settle.hpp"
 
 #include <fmt/core.h>
@@ -10,14 +9,27 @@
 #include <algorithm>
 #include <optional>
 
-#include "jobs/store/outcome/policy.hpp"
 #include "jobs/queue/repair.hpp"
+#include "jobs/store/outcome/policy.hpp"
 
 namespace carillon::queue {
 namespace {
 
 using registry::Job;
 using registry::JobState;
+
+/// The end of the attempt of this row.
+outcome::Outcome find_outcome(const Disk& disk, const Job& job) {
+  if (std::optional<outcome::Outcome> outcome = disk.read_outcome(job.id); outcome && outcome->token == job.token) return *outcome;
+  outcome::Outcome outcome = outcome::make_killed(job.token);
+  if (disk.is_full(nullptr)) {
+    outcome.cause = outcome::Cause::disk_full;
+    outcome.reason = "the disk of the store is full, and the outcome of the attempt could not be written";
+  }
+  return outcome;
+}
+
+}  // namespace
 
 void end(Job& job, JobState state, const std::string& reason) {
   job.state = state;
@@ -33,18 +45,6 @@ void wait(Job& job, double delay_s, const std::string& reason, const Clock& cloc
   job.ready_boot_id = clock.get_boot_id();
 }
 
-/// The end of the attempt of this row.
-outcome::Outcome find_outcome(const Disk& disk, const Job& job) {
-  if (std::optional<outcome::Outcome> outcome = disk.read_outcome(job.id); outcome && outcome->token == job.token) return *outcome;
-  outcome::Outcome outcome = outcome::make_killed(job.token);
-  if (disk.is_full(nullptr)) {
-    outcome.cause = outcome::Cause::disk_full;
-    outcome.reason = "the disk of the store is full, and how the attempt ended could not be written";
-  }
-  return outcome;
-}
-
-/// Changes the row of `job` unless another process did meanwhile; true when this call did.
 bool change_running(registry::JobTable& table, const Job& job, const std::function<void(Job&)>& change, std::vector<Job>* changed) {
   return table.update(job.id, [&](Job& row) {
     if (row.state != JobState::running || row.token != job.token) return false;
@@ -53,8 +53,6 @@ bool change_running(registry::JobTable& table, const Job& job, const std::functi
     return true;
   });
 }
-
-}  // namespace
 
 bool ask_to_stop(const Environment& at, const Job& job) {
   const std::optional<outcome::Attempt> attempt = at.disk.read_attempt(job.id);
@@ -80,7 +78,7 @@ void apply(Job& job, const outcome::Outcome& outcome, const Clock& clock) {
   if (outcome.cause == outcome::Cause::done) return end(job, JobState::done, "");
   const outcome::RetryDecision decision = outcome::decide(outcome.cause, job.failures, outcome.is_further);
   job.failures = decision.failures;
-  if (job.cancel_wanted) return end(job, JobState::cancelled, "cancelled while it ran; what it had saved is kept for a retry");
+  if (job.cancel_wanted) return end(job, JobState::cancelled, "cancelled while running; its checkpoint is kept for a retry");
   if (decision.next == outcome::Next::failed) {
     const bool has_tried = decision.failures > outcome::kMaxRetries;
     return end(job, JobState::failed,
@@ -100,7 +98,7 @@ std::vector<Job> settle(const Environment& at, registry::JobTable& table) {
       change([](Job& row) { end(row, JobState::done, ""); });
       try {
         at.disk.remove_work(job.id);
-      } catch (const SystemError&) {  // it is only left over, for `carillon gc`
+      } catch (const SystemError&) {  // left to carillon gc
       }
     } else if (state == AttemptState::ended) {
       const outcome::Outcome outcome = find_outcome(at.disk, job);
@@ -118,7 +116,7 @@ std::vector<Job> settle(const Environment& at, registry::JobTable& table) {
 void settle_not_begun(const Environment& at, registry::JobTable& table, const Job& job, int exit_code) {
   outcome::Outcome outcome = find_outcome(at.disk, job);
   if (outcome.cause == outcome::Cause::killed && exit_code < 128)
-    outcome.reason = fmt::format("the attempt could not begin (exit code {}); its log says why", exit_code);
+    outcome.reason = fmt::format("the attempt could not begin (exit code {}); see its log", exit_code);
   change_running(
       table, job, [&](Job& row) { apply(row, outcome, at.clock); }, nullptr);
 }
@@ -151,7 +149,7 @@ CommandResult request_cancel(registry::JobTable& table, const store::Id& id) {
         return false;
       case JobState::running:
         row.cancel_wanted = true;
-        result = {true, "it runs, and is asked to stop"};
+        result = {true, "it is running, and was asked to stop"};
         return true;
       default:
         cancel_not_started(row);
@@ -186,11 +184,11 @@ CommandResult requeue(registry::JobTable& table, const store::Id& id, bool has_w
   CommandResult result{false, "there is no such job"};
   table.update(id, [&](Job& row) {
     if (row.state == JobState::running || row.state == JobState::queued) {
-      result = {false, row.state == JobState::running ? "it runs already" : "it is queued already"};
+      result = {false, row.state == JobState::running ? "it is running already" : "it is queued already"};
       return false;
     }
     if (!has_work) {
-      result = {false, "what it was to work on is gone from the store; submit it again"};
+      result = {false, "its folder of work is no longer in the store; submit it again"};
       return false;
     }
     row.state = JobState::queued;
@@ -210,7 +208,7 @@ CommandResult retry(const store::Store& store, registry::Registry& registry, con
   if (!known) return {false, "there is no such job"};
   if (known->state == JobState::done && !store.find_bank_fault(id, store::Look::content))
     return {false, "it is done; there is nothing to do again"};
-  // A job that a process works on is not changed.
+  // A running job is not changed.
   if (known->state == JobState::done || known->state == JobState::failed || known->state == JobState::cancelled) {
     if (const std::optional<std::string> refusal = restore(store, registry, id)) return {false, *refusal};
   }

@@ -1,4 +1,3 @@
-// Hashes and names.
 #include "jobs/store/id.hpp"
 
 #include <fmt/core.h>
@@ -28,7 +27,7 @@ std::optional<Id> parse_id(std::string_view text) {
 
 Id require_id(std::string_view text, const std::string& where) {
   if (auto id = parse_id(text)) return *id;
-  throw InputError(fmt::format("{}: an id is {} hex digits, and this is none", where, kIdDigits));
+  throw InputError(fmt::format("{}: not an id of {} hex digits", where, kIdDigits));
 }
 
 std::string make_input_name(const Id& sha256, const std::string& format) {
@@ -50,7 +49,7 @@ Id hash_file(const std::filesystem::path& file, std::string_view what, const std
 
 std::string make_random_name() {
   std::array<unsigned char, 16> bytes{};
-  if (::getentropy(bytes.data(), bytes.size()) != 0) throw SystemError("the system has no random numbers; check the machine");
+  if (::getentropy(bytes.data(), bytes.size()) != 0) throw SystemError("getentropy fails; check the machine");
   return base::to_hex(bytes);
 }
 

@@ -1,4 +1,4 @@
-// Ids: SHA-256 in hex. Whatever names a folder or a file of the store is one of these, so that no path can lead out of it.
+// Ids: SHA-256 in hex, the names of folders and files in the store. No id can lead out of the store.
 #pragma once
 
 #include <cstdint>
@@ -10,11 +10,11 @@
 
 namespace carillon::store {
 
-/// 64 lower-case hex digits; there is no other way to make one than parse_id(), require_id() and the hashes below.
+/// 64 lower-case hex digits; created only by parse_id(), require_id() and the hashes below.
 class Id {
  public:
   const std::string& text() const { return text_; }
-  /// The first twelve digits, for people.
+  /// The first twelve digits, for display.
   std::string short_text() const { return text_.substr(0, 12); }
   auto operator<=>(const Id&) const = default;
 
@@ -31,14 +31,14 @@ Id require_id(std::string_view text, const std::string& where);
 
 Id hash_text(std::string_view text);
 
-/// SHA-256 of a regular file, in bounded memory. `what` says in messages what was expected ("mesh"); `take` (may be empty) sees every
-/// piece. Throws InputError for what is missing, no regular file (a pipe or a device is never waited on), a loop of links or not readable.
+/// SHA-256 of a regular file, in bounded memory. `what`: the kind of file for messages ("mesh"); `take`: called with every piece.
+/// InputError if the file is missing, unreadable or not a regular file (never waits on a pipe or device).
 Id hash_file(const std::filesystem::path& file, std::string_view what, const std::function<void(std::string_view)>& take = {});
 
-/// 16 random bytes as 32 hex digits: the name of an attempt, of a temporary folder.
+/// 16 random bytes as 32 hex digits.
 std::string make_random_name();
 
-/// The name of an input in the store, of its SHA-256 and its format ("tetgen": that of the .node file).
+/// Name of an input in the store ("tetgen": of its .node file).
 std::string make_input_name(const Id& sha256, const std::string& format);
 
 }  // namespace carillon::store

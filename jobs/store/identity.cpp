@@ -1,7 +1,7 @@
-// Method:     The id is SHA-256 over the resolved job in one canonical line, the kind, format and SHA-256 of the input's bytes, and the
-//             solver's version. Jobs that ask for the same in other words resolve to the same line.
-// Source:     own; FIPS 180-4 for the hash.
-// Deviations: none.
+// Method:     The id is the SHA-256 of the resolved job as one canonical line, the kind, format and SHA-256 of the input, and the version
+// of
+//             the solver. Equivalent jobs resolve to the same line.
+// Source:     FIPS 180-4 (hash).
 #include "jobs/store/identity.hpp"
 
 #include <fcntl.h>
@@ -40,7 +40,7 @@ base::Json parse_resolved(const std::string& text) {
   return std::move(*root);
 }
 
-/// -0 is 0.
+/// Replaces -0 by 0.
 void drop_signs_of_zero(base::Json& value) {
   if (value.is_real() && value.as_double() == 0.0) value = 0.0;
   if (value.is_array() || value.is_object()) {
@@ -48,7 +48,7 @@ void drop_signs_of_zero(base::Json& value) {
   }
 }
 
-/// A resolved job without paths on one line.
+/// A resolved job as one line, without paths.
 std::string make_canonical(base::Json root) {
   if (root.has("simulate")) return make_canonical_simulation(std::move(root));
   root.erase("mesh");
@@ -59,22 +59,22 @@ std::string make_canonical(base::Json root) {
   return root.sorted_text({.is_ascii = false});
 }
 
-/// What a record of a run (JSON) has in common with a request.
+/// Comparison of the record of a run (JSON) with a request.
 enum class Origin { same, unknown, another_job, another_input };
 
-/// An object of JSON; null for anything else.
+/// A JSON object; null for anything else.
 base::Json parse_object(const std::string& text) {
   auto root = base::Json::parse(text);
   return root && root->is_object() ? std::move(*root) : base::Json();
 }
 
-/// Where a job names its input.
+/// The key of a job with the path of its input.
 base::Json& get_input_key(base::Json& root, InputKind kind) {
   if (kind == InputKind::surface) return root["body"]["surface"];
   return kind == InputKind::table ? root["body"]["modes_csv"] : root["mesh"];
 }
 
-/// As JSON, not as a job: the words of the schema at that time are those of the request.
+/// Compares JSON, not parsed jobs: the record has the schema of its time, as the request does.
 Origin compare_origin(base::Json root, const Request& request) {
   if (!root.is_object()) return Origin::unknown;
   try {
@@ -94,7 +94,7 @@ std::string lower_ending(const fs::path& file) {
   return extension.empty() ? extension : extension.substr(1);
 }
 
-/// As the reader of meshes finds it: by the content if that is conclusive, else by the file extension.
+/// By the same rule as the mesh reader: from the content if conclusive, else from the file extension.
 std::string find_mesh_format(const std::string& head, const std::string& ending) {
   std::string_view text = head;
   if (text.starts_with("\x89HDF\r\n")) return "hdf";
@@ -106,7 +106,7 @@ std::string find_mesh_format(const std::string& head, const std::string& ending)
   return ending;
 }
 
-/// The two files of a TetGen mesh, of which either may be named.
+/// The two files of a TetGen mesh, from the path of either.
 std::array<fs::path, 2> find_tetgen_pair(const fs::path& file) {
   const auto partner = [&](const char* ending) { return lower_ending(file) == ending ? file : fs::path(file).replace_extension(ending); };
   return {partner("node"), partner("ele")};
@@ -122,9 +122,9 @@ std::string find_user() {
   return found != nullptr ? to_text(found->pw_name) : fmt::format("{}", ::geteuid());
 }
 
-/// Copies a file to `target` while it is hashed.
+/// Copies a file to `target` and returns its hash.
 Id copy_hashed(const fs::path& file, std::string_view what, const fs::path& target) {
-  const int fd = ::open(target.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0444);
+  const int fd = ::open(target.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0444);
   if (fd < 0) throw_errno(target, "write", errno);
   int error = 0;
   const auto write_all = [&](std::string_view bytes) {
@@ -146,7 +146,7 @@ Id copy_hashed(const fs::path& file, std::string_view what, const fs::path& targ
   }
 }
 
-/// Puts the files of an input into inputs/ under the names that follow from their hash.
+/// Copies the files of an input into inputs/.
 void take_snapshot(const Store& store, const fs::path& file, const Input& input) {
   const Id wanted = require_id(input.sha256, "the input's hash");
   const fs::path target = store.input_file(wanted, input.format);
@@ -157,24 +157,20 @@ void take_snapshot(const Store& store, const fs::path& file, const Input& input)
   Id found = copy_hashed(is_pair ? pair[0] : file, what, temporary / "first");
   if (is_pair) found = hash_pair(found, copy_hashed(pair[1], what, temporary / "second"));
   if (found != wanted)
-    throw InputError(fmt::format("{}: this {} changes while it is read; submit the job when it is whole", file.string(), what));
-  const OpenFolder shard = store.open_inputs(wanted);
+    throw InputError(fmt::format("{}: this {} changed while it was read; submit the job when it is complete", file.string(), what));
+  make_folder(target.parent_path());
   const auto name = [&](const char* from, const fs::path& to) {
-    const std::string last = to.filename().string();
-    if (::renameat(temporary.content().get(), from, shard.get(), last.c_str()) == 0) return;
-    if (errno != EISDIR) throw_errno(to, "write", errno);
-    shard.remove(last);  // a folder where an input belongs
-    if (::renameat(temporary.content().get(), from, shard.get(), last.c_str()) != 0) throw_errno(to, "write", errno);
+    if (::rename((temporary / from).c_str(), to.c_str()) != 0) throw_errno(to, "write", errno);
   };
   if (is_pair) name("second", fs::path(target).replace_extension("ele"));
   name("first", target);
-  shard.sync();
+  sync_folder(target.parent_path());
 }
 
-/// Inputs that were found whole, and those that were copied, by hash and format.
+/// Checked inputs by hash and format; true: copied by this call.
 using Inputs = std::map<std::string, bool>;
 
-/// True when the input was not there, or damaged, and is whole now.
+/// Copies missing and damaged inputs into the store. True if any was copied.
 bool ensure_inputs(const Store& store, const JobOrder& order, const Request& request, Inputs& known) {
   const std::vector<NamedInput> named = order.list_inputs();
   const std::vector<Input> inputs = list_inputs(request);
@@ -196,7 +192,7 @@ std::vector<fs::path> find_input_files(const Store& store, const Request& reques
   return files;
 }
 
-/// What is not synced yet: publish_work() does that.
+/// Without sync: publish_work() syncs.
 void write_unsynced(const fs::path& file, const std::string& text) {
   std::ofstream stream(file, std::ios::binary);
   errno = 0;
@@ -205,14 +201,14 @@ void write_unsynced(const fs::path& file, const std::string& text) {
   if (!stream) throw_errno(file, "write", errno != 0 ? errno : EIO);
 }
 
-/// Writes the files of a job into its folder, which is to become work/ab/<id>.
+/// Writes the files of a new folder work/ab/<id>.
 void fill_work(const std::string& job, const Request& request, const fs::path& folder) {
   write_unsynced(folder / kJobFile, job);
   write_unsynced(folder / kRequestFile, format_request(request));
   write_unsynced(folder / kStateFile, format_state({}));
 }
 
-/// The job of a request, with its inputs in the store and its bank where carillon-precompute is to write it.
+/// The job of a request, with inputs in the store and its bank in the folder of work.
 std::string make_job(const Store& store, const Request& request, const Id& id) {
   base::Json root = parse_resolved(request.job);
   const fs::path work = store.work_folder(id);
@@ -223,28 +219,24 @@ std::string make_job(const Store& store, const Request& request, const Id& id) {
   return job::resolved_json(job::parse_job(root.sorted_text({.indentation = "  ", .is_ascii = false}), work / kJobFile), work, "");
 }
 
-/// Why a job file in a folder of work is not that of its request.
+/// Why the job file of a folder of work differs from its request.
 std::optional<std::string> find_text_fault(const Store& store, const Request& request, const Id& id, const std::string& text) {
-  constexpr const char* kAnother = "its job.json asks for something else than was submitted";
+  constexpr const char* kAnother = "its job.json differs from the submitted job";
   if (request.input_kind == InputKind::simulation)
     return text == make_job(store, request, id) ? std::nullopt : std::optional(std::string(kAnother));
   const job::JobSpec job = job::parse_job(text, store.work_folder(id) / kJobFile);
   if (make_canonical_job(job) != request.job) return kAnother;
-  if (job.bank != store.work_folder(id) / kBankFile) return "its job.json names another bank than was submitted";
+  if (job.bank != store.work_folder(id) / kBankFile) return "its job.json names another bank";
   const std::vector<fs::path> files = find_input_files(store, request);
   if (get_input(job) != (files.empty() ? fs::path() : files[0]))
-    return fmt::format("its job.json names another {} than was submitted", to_text(request.input_kind));
+    return fmt::format("its job.json names another {}", to_text(request.input_kind));
   return std::nullopt;
 }
 
-/// A folder of work that is not what was submitted, and in which no attempt runs.
+/// True for a damaged folder of work without a running attempt.
 bool is_spoilt(const Store& store, const Id& id) {
-  try {
-    const OpenFolder work = store.open_work(id);
-    return find_job_fault(store, id, work.path()) && !process::Lock::is_held(work.path() / "lock");
-  } catch (const SystemError&) {
-    return false;
-  }
+  const fs::path work = store.work_folder(id);
+  return store.has_work(id) && find_job_fault(store, id) && !process::Lock::is_held(work / "lock");
 }
 
 }  // namespace
@@ -336,12 +328,9 @@ std::optional<std::string> find_input_fault(const Store& store, const Input& inp
   const std::string what =
       fmt::format("the copy of its {} in the store, {},", to_text(input.kind), file.lexically_relative(store.root()).string());
   try {
-    const auto inputs = OpenFolder::open(store.root()).find("inputs");
-    const auto shard = inputs ? inputs->find(wanted.text().substr(0, 2)) : std::nullopt;
     const auto hash = [&](const fs::path& name) -> std::optional<Id> {
-      const auto info = shard ? shard->look_at(name.filename().string()) : std::nullopt;
-      if (!info || !S_ISREG(info->st_mode)) return std::nullopt;
-      return hash_file(shard->path() / name.filename(), to_text(input.kind));
+      std::error_code error;
+      return fs::is_regular_file(name, error) ? std::optional(hash_file(name, to_text(input.kind))) : std::nullopt;
     };
     std::optional<Id> found = hash(file);
     if (found && input.format == "tetgen") {
@@ -349,7 +338,7 @@ std::optional<std::string> find_input_fault(const Store& store, const Input& inp
       found = other ? std::optional(hash_pair(*found, *other)) : std::nullopt;
     }
     if (!found) return what + " is missing";
-    if (*found != wanted) return what + " is damaged: its bytes are not those that were submitted";
+    if (*found != wanted) return what + " is damaged: its bytes have changed since submission";
     return std::nullopt;
   } catch (const SystemError& error) {
     return error.what();
@@ -358,11 +347,12 @@ std::optional<std::string> find_input_fault(const Store& store, const Input& inp
   }
 }
 
-std::optional<std::string> find_job_fault(const Store& store, const Id& id, const fs::path& folder) {
+std::optional<std::string> find_job_fault(const Store& store, const Id& id) {
+  const fs::path folder = store.work_folder(id);
   try {
     const std::optional<Request> request = read_request(folder);
     if (!request) return "its request.json is missing";
-    if (request->id != id.text() || calc_id(*request) != id) return "its request.json is not what was submitted";
+    if (request->id != id.text() || calc_id(*request) != id) return "its request.json is not the submitted one";
     return find_text_fault(store, *request, id, base::read_file(folder / kJobFile, "job file", kMaxJobBytes));
   } catch (const InputError& error) {
     return fmt::format("its files cannot be read: {}", error.what());
@@ -374,7 +364,7 @@ std::optional<std::string> find_output_fault(const fs::path& folder, const Reque
     for (const std::string& name : list_outputs(request.job)) {
       const fs::file_status status = fs::symlink_status(folder / name);
       if (!fs::exists(status)) return fmt::format("its {} is missing", name);
-      if (!fs::is_regular_file(status)) return fmt::format("its {} is no regular file", name);
+      if (!fs::is_regular_file(status)) return fmt::format("its {} is not a regular file", name);
     }
     const std::string record = base::read_file(folder / kRecordFile, "record", kMaxJobBytes);
     return find_record_fault(record, base::read_file(folder / kJobFile, "job file", kMaxJobBytes));
@@ -390,13 +380,13 @@ std::optional<std::string> find_origin_fault(const std::string& provenance, cons
     case Origin::same:
       return std::nullopt;
     case Origin::unknown:
-      return "the bank does not say which job it was made of";
+      return "the bank does not record its job";
     case Origin::another_job:
-      return "the bank was made of another job than this one";
+      return "the bank was computed from another job";
     case Origin::another_input:
       break;
   }
-  return fmt::format("the bank was made of another {} than this job's", to_text(request.input_kind));
+  return fmt::format("the bank was computed from another {}", to_text(request.input_kind));
 }
 
 std::optional<std::string> find_resolved_fault(const fs::path& folder, const Id& id) {
@@ -407,20 +397,20 @@ std::optional<std::string> find_resolved_fault(const fs::path& folder, const Id&
     return "its request.json cannot be read";
   }
   if (!request) return "its request.json is missing";
-  if (request->id != id.text() || calc_id(*request) != id) return "its request.json is not what was submitted";
+  if (request->id != id.text() || calc_id(*request) != id) return "its request.json is not the submitted one";
   std::string text;
   try {
     text = base::read_file(folder / kJobFile, "record", kMaxJobBytes);
   } catch (const InputError&) {
-    return "its job.json is missing, or cannot be read";
+    return "its job.json is missing or unreadable";
   }
   switch (compare_origin(parse_object(text), *request)) {
     case Origin::same:
       return std::nullopt;
     case Origin::unknown:
-      return text.empty() ? "its job.json is empty" : "its job.json is cut or damaged";
+      return text.empty() ? "its job.json is empty" : "its job.json is truncated or damaged";
     default:
-      return "its job.json is that of another job";
+      return "its job.json belongs to another job";
   }
 }
 
@@ -462,7 +452,7 @@ bool restore_input(const Store& store, const Request& request) {
     if (input.file.empty()) return false;
     try {
       take_snapshot(store, from_text(input.file), input);
-    } catch (const InputError&) {  // gone, or another by now
+    } catch (const InputError&) {  // removed or changed
       return false;
     }
   }
@@ -472,15 +462,15 @@ bool restore_input(const Store& store, const Request& request) {
 bool restore_work(const Store& store, const Request& request) {
   const Id id = calc_id(request);
   const Temporary temporary = store.make_temporary();
-  const OpenFolder folder = temporary.content().make(id.text());
-  fill_work(make_job(store, request, id), request, folder.path());
+  make_folder(temporary / id.text());
+  fill_work(make_job(store, request, id), request, temporary / id.text());
   if (is_spoilt(store, id)) store.remove_work(id);
   return store.publish_work(temporary, {{id, id.text()}}).front();
 }
 
 std::vector<bool> prepare_work(const Store& store, const std::vector<Asked>& asked) {
   std::vector<bool> was_made(asked.size(), false);
-  std::vector<std::size_t> index;  // of what lies in `folders`
+  std::vector<std::size_t> index;  // into `asked`, of `folders`
   std::vector<Store::Prepared> folders;
   std::set<Id> seen;
   Inputs inputs;
@@ -499,8 +489,9 @@ std::vector<bool> prepare_work(const Store& store, const std::vector<Asked>& ask
     if (!temporary) temporary.emplace(store.make_temporary());
     folders.push_back({id, id.text()});
     index.push_back(i);
-    const OpenFolder folder = temporary->content().make(id.text());
-    fill_work(asked[i].order->write(store.work_folder(id), find_input_files(store, *asked[i].request)), *asked[i].request, folder.path());
+    make_folder(*temporary / id.text());
+    fill_work(asked[i].order->write(store.work_folder(id), find_input_files(store, *asked[i].request)), *asked[i].request,
+              *temporary / id.text());
   }
   if (folders.empty()) return was_made;
   const std::vector<bool> was_published = store.publish_work(*temporary, folders);

@@ -1,5 +1,4 @@
-// Method:     A simulation is kept as JSON, not as a struct: a key that is new in its schema counts for the identity without a line here.
-// Source:     own. Deviations: none.
+// Method:     A simulation is kept as JSON, not as a struct, so that new keys of its schema become part of the id without code here.
 #include "jobs/store/order.hpp"
 
 #include <fmt/core.h>
@@ -31,7 +30,7 @@ base::Json parse_job_json(const std::string& text) {
   return std::move(*root);
 }
 
-/// 1 and 1.0 are the same number, and so are 0 and -0.
+/// Same representation for 1 and 1.0, and for 0 and -0.
 void unify_numbers(base::Json& value) {
   constexpr double kMaxWhole = 1e15;
   if (value.is_number()) {
@@ -42,7 +41,7 @@ void unify_numbers(base::Json& value) {
     for (base::Json& member : value) unify_numbers(member);
 }
 
-/// Where a job of a simulation names files of bodies, in their order.
+/// Values of a simulation job that name files of bodies, in order.
 std::vector<base::Json*> find_input_values(base::Json& root) {
   std::vector<base::Json*> found;
   base::Json& bodies = root["simulate"]["bodies"];
@@ -55,7 +54,7 @@ std::vector<base::Json*> find_input_values(base::Json& root) {
   return found;
 }
 
-/// A material with all its constants, as jobs have it: the table that it was taken from may change.
+/// A material with all its constants, as in a resolved job: the table of materials may change.
 base::Json write_material(const material::Material& material) {
   job::JobSpec spec;
   spec.mesh = "/mesh";
@@ -117,7 +116,7 @@ JobOrder read_order(const fs::path& file) {
   std::string text;
   try {
     text = base::read_file(file, "job file", kMaxJobBytes);
-  } catch (const InputError&) {  // read_job() says why
+  } catch (const InputError&) {  // read_job() reports it
   }
   if (!job::is_simulation(text)) return {job::read_job(file, job::BankKey::optional)};
   return parse_order(text, fs::absolute(file).lexically_normal());
@@ -125,7 +124,7 @@ JobOrder read_order(const fs::path& file) {
 
 JobOrder parse_order(std::string_view text, const fs::path& file, int first_line) {
   if (!job::is_simulation(text)) return {job::parse_job(text, file, job::BankKey::optional, first_line)};
-  // Empty lines bring every value to its line of the file.
+  // Empty lines keep the line numbers of messages.
   const std::string moved = std::string(first_line - 1, '\n') + std::string(text);
   return JobOrder(make_simulation(job::parse_simulation(moved, file), moved));
 }
@@ -147,17 +146,18 @@ std::string make_canonical_simulation(base::Json root) {
 std::string write_simulation(base::Json root, const std::vector<fs::path>& inputs) {
   const std::vector<base::Json*> values = find_input_values(root);
   if (values.size() != inputs.size())
-    throw InputError(fmt::format("the job names {} files of bodies, and {} are known", values.size(), inputs.size()));
+    throw InputError(fmt::format("the job names {} files of bodies instead of {}", values.size(), inputs.size()));
   for (std::size_t i = 0; i < inputs.size(); ++i) *values[i] = inputs[i].string();
   return root.sorted_text({.indentation = "  ", .is_ascii = false}) + "\n";
 }
 
 std::optional<std::string> find_record_fault(const std::string& record, const std::string& job_text) {
   const auto root = base::Json::parse(record);
-  if (!root || !root->is_object()) return "its record is no JSON";
-  if (!(*root)["job_sha256"].is_string()) return "its record does not say of which job it is";
-  return (*root)["job_sha256"].as_string() == base::to_hex(base::calc_sha256(job_text)) ? std::nullopt
-                                                                                        : std::optional("its record is of another job");
+  if (!root || !root->is_object()) return "its record is not JSON";
+  if (!(*root)["job_sha256"].is_string()) return "its record does not name its job";
+  return (*root)["job_sha256"].as_string() == base::to_hex(base::calc_sha256(job_text))
+             ? std::nullopt
+             : std::optional("its record belongs to another job");
 }
 
 }  // namespace carillon::store

@@ -1,4 +1,4 @@
-// What a job file asks for: the modes of a body, which become a bank, or a simulation, whose files are kept as one.
+// The content of a job file: a bank to compute, or a simulation.
 #pragma once
 
 #include <cstdint>
@@ -14,26 +14,26 @@
 
 namespace carillon::store {
 
-/// A job file that is larger is refused.
+/// Size limit of job files.
 inline constexpr std::uint64_t kMaxJobBytes = 64 << 20;
 
-/// A file that a job names.
+/// An input file named by a job.
 struct NamedInput {
   InputKind kind = InputKind::mesh;
   std::filesystem::path file;  // absolute
 };
 
-/// A simulation as the store keeps it: the job as written, with its materials resolved and the files that it makes under the store's names
-/// (kOutputs). Every key of the job counts for the identity, defaults that are written out too.
+/// A simulation: the job as written, with resolved materials and with the store's names (kOutputs) for its output files. Every key of the
+/// job is part of the id, including keys with default values.
 struct SimulationOrder {
-  std::filesystem::path file;  // where it was read from
-  std::string text;            // JSON; inputs by absolute paths
+  std::filesystem::path file;  // source
+  std::string text;            // JSON; inputs as absolute paths
   std::vector<NamedInput> inputs;
   Resources resources;
   std::vector<std::string> warnings;
 };
 
-/// One of the two.
+/// A bank or a simulation.
 class JobOrder {
  public:
   JobOrder() = default;
@@ -47,9 +47,9 @@ class JobOrder {
   const std::vector<std::string>& warnings() const { return simulation_ ? simulation_->warnings : bank_.warnings; }
   std::vector<NamedInput> list_inputs() const;
 
-  /// The job as text, to be carried out in the folder of work `folder`: inputs at these paths, one for each of list_inputs().
+  /// The job as text for the folder of work `folder`; `inputs`: paths of list_inputs() in the store.
   std::string write(const std::filesystem::path& folder, const std::vector<std::filesystem::path>& inputs) const;
-  /// The job in one line, which is the same wherever its files are. A simulation has the names of `inputs` in it.
+  /// The job as one line, independent of the location of its files; of a simulation, with the file names of `inputs`.
   std::string make_canonical(const std::vector<std::filesystem::path>& inputs) const;
 
  private:
@@ -57,12 +57,12 @@ class JobOrder {
   std::optional<SimulationOrder> simulation_;
 };
 
-/// Reads and validates a job of either kind. Throws InputError; a simulation has to name a file that it makes.
+/// Reads and validates a job of either kind. InputError, also for a simulation without an output file.
 JobOrder read_order(const std::filesystem::path& file);
 /// The same from text; `first_line` is the number of its first line in `file`.
 JobOrder parse_order(std::string_view text, const std::filesystem::path& file, int first_line = 1);
 
-/// The files that a simulation makes, by the key of the job that asks for them. The record is always made, and written last.
+/// Output files of a simulation and their keys in the job. The record is always written, and last.
 struct Output {
   const char* key;
   const char* file;
@@ -74,14 +74,14 @@ inline constexpr Output kOutputs[] = {{"sound", "sound.wav"},
                                       {"motion", "motion.vtkhdf"},
                                       {"record", kRecordFile}};
 
-/// Of a resolved job of a simulation (JSON): the files that it makes.
+/// Output files of a resolved simulation job (JSON).
 std::vector<std::string> list_outputs(const std::string& job);
 
-/// Of a job of a simulation as JSON: its line as in make_canonical(), with the file names of its inputs.
+/// The line of JobOrder::make_canonical() for a simulation.
 std::string make_canonical_simulation(base::Json root);
-/// The same job with inputs at these paths, to be carried out.
+/// The simulation job with inputs at these paths.
 std::string write_simulation(base::Json root, const std::vector<std::filesystem::path>& inputs);
-/// Why a record of a run (JSON) is not that of the job with this text, in one sentence; none when it is.
+/// Why a record (JSON) does not belong to the job with this text, in one sentence; none if it does.
 std::optional<std::string> find_record_fault(const std::string& record, const std::string& job_text);
 
 }  // namespace carillon::store

@@ -1,4 +1,4 @@
-// Where the registry lies: SQLite's WAL needs memory that all its users share, so never on a file system of several hosts.
+// Location of the registry: SQLite's WAL needs shared memory, so it is never on a network file system.
 #include <fcntl.h>
 #include <fmt/core.h>
 #include <sys/stat.h>
@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// statfs(2), linux/magic.h and the file systems' own headers.
+/// Magic numbers: statfs(2), linux/magic.h.
 const std::map<unsigned long, const char*> kShared{
     {0x6969, "nfs"},      {0x517B, "smb"},          {0xFF534D42, "cifs"},  {0xFE534D42, "smb2"}, {0x0BD00BD0, "lustre"},
     {0x47504653, "gpfs"}, {0x19830326, "beegfs"},   {0x00C36400, "ceph"},  {0x5346414F, "afs"},  {0x6B414653, "afs"},
@@ -32,14 +32,14 @@ fs::path find_state_home() {
   return home != nullptr && fs::path(home).is_absolute() ? fs::path(home) / ".local/state" : fs::path();
 }
 
-/// The nearest parent that exists.
+/// The nearest existing parent.
 fs::path find_existing(fs::path folder) {
   std::error_code error;
   while (!fs::exists(folder, error) && folder.has_relative_path()) folder = folder.parent_path();
   return folder;
 }
 
-/// A folder in /var/tmp, where anybody may have made one of that name before: it has to be ours, or the group's that the store is.
+/// A folder in the world-writable /var/tmp. SystemError if it exists and belongs neither to this user nor to the group of the store.
 fs::path make_local_folder(const fs::path& folder, const fs::path& root) {
   struct stat info {
   }, store{};
@@ -49,13 +49,13 @@ fs::path make_local_folder(const fs::path& folder, const fs::path& root) {
     if (is_group && (::chown(folder.c_str(), static_cast<uid_t>(-1), store.st_gid) != 0 || ::chmod(folder.c_str(), 02770) != 0))
       throw_errno(folder, "give to the group of the store", errno);
   } else if (errno != EEXIST) {
-    throw_errno(folder, "make this folder", errno);
+    throw_errno(folder, "create this folder", errno);
   }
   if (::lstat(folder.c_str(), &info) != 0) throw_errno(folder, "read", errno);
   const bool is_ours = info.st_uid == ::geteuid() || (is_group && info.st_gid == store.st_gid && info.st_uid != 0);
   if (!S_ISDIR(info.st_mode) || !is_ours || (info.st_mode & S_IWOTH) != 0)
     throw SystemError(fmt::format(
-        "{}: the registry of {} should lie here, and this belongs to another user; set XDG_STATE_HOME to a folder of a local disk",
+        "{}: the folder for the registry of {} belongs to another user; set XDG_STATE_HOME to a folder on a local disk",
         folder.string(), root.string()));
   return folder;
 }
@@ -79,7 +79,7 @@ fs::path Store::registry_folder() const {
   const fs::path home = is_group ? fs::path() : find_state_home();
   if (home.empty() || !find_network_file_system(find_existing(home)).empty()) return make_local_folder(fs::path("/var/tmp") / name, root_);
   fs::create_directories(home / "carillon" / name, error);
-  if (error) throw_errno(home / "carillon" / name, "make this folder", error.value());
+  if (error) throw_errno(home / "carillon" / name, "create this folder", error.value());
   return home / "carillon" / name;
 }
 

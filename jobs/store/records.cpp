@@ -1,4 +1,3 @@
-// The small JSON files of a job's folder.
 #include "jobs/store/records.hpp"
 
 #include <fcntl.h>
@@ -46,7 +45,7 @@ auto find_word(const Words& words, std::string_view word) {
   return found == words.end() ? std::nullopt : std::optional(found->value);
 }
 
-/// Values are in the order of their enumeration.
+/// `words`: in the order of the enumeration.
 template <class Words, class Value>
 std::string get_word(const Words& words, Value value) {
   return std::string(words.at(static_cast<std::size_t>(value)).word);
@@ -90,10 +89,10 @@ Request read_request_root(base::Object root, const std::string& where) {
   return request;
 }
 
-/// The last `most` bytes of a regular file; empty when there is none.
+/// The last `max` bytes of a regular file; empty if there is none.
 std::string read_tail(const fs::path& file, off_t max) {
   std::string text;
-  const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOFOLLOW);
+  const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (fd < 0) return text;
   struct stat info {};
   if (::fstat(fd, &info) == 0 && S_ISREG(info.st_mode)) {
@@ -137,7 +136,7 @@ std::vector<Input> list_inputs(const Request& request) {
 std::string format_request(const Request& request, bool one_line) {
   base::Json root = base::Json::object();
   const auto set_text = [&](const char* key, const std::string& text) {
-    if (!text.empty()) root.set(key, text);  // a text of a document of ours is never empty
+    if (!text.empty()) root.set(key, text);
   };
   root.set("id", request.id).set("job", request.job).set("input_kind", to_text(request.input_kind));
   set_text("input_format", request.input_format);

@@ -8,7 +8,7 @@
 namespace carillon::store {
 namespace {
 
-/// Length of the UTF-8 character at `at`; 0 when there is none.
+/// Length of the UTF-8 character at `at`; 0 if invalid.
 std::size_t find_character(std::string_view text, std::size_t at) {
   const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0U; };
   const unsigned first = byte(at);
@@ -22,15 +22,15 @@ std::size_t find_character(std::string_view text, std::size_t at) {
     if ((byte(at + i) & 0xC0U) != 0x80U) return 0;
   }
   const unsigned second = byte(at + 1);
-  // Overlong forms, surrogates and what lies beyond U+10FFFF (RFC 3629, section 4).
+  // Overlong forms, surrogates, above U+10FFFF (RFC 3629, section 4).
   if ((first == 0xE0 && second < 0xA0) || (first == 0xED && second > 0x9F) || (first == 0xF0 && second < 0x90) ||
       (first == 0xF4 && second > 0x8F))
     return 0;
   return length;
 }
 
-/// Characters that move the cursor, colour, or turn the direction of writing: C0, DEL, C1 (U+0080 - U+009F), U+061C, U+200E, U+200F,
-/// U+2028 - U+202E, U+2066 - U+2069. Length in bytes at `at`, 0 for others.
+/// Length in bytes of a control or bidirectional character at `at`, else 0: C0, DEL, C1 (U+0080 - U+009F), U+061C, U+200E, U+200F,
+/// U+2028 - U+202E, U+2066 - U+2069.
 std::size_t find_control(std::string_view text, std::size_t at) {
   const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0U; };
   const unsigned a = byte(at), b = byte(at + 1), c = byte(at + 2);

@@ -1,11 +1,10 @@
-"""carillon-study: how a job's cost grows with its mesh and falls with the ranks, and what accuracy costs.
+"""carillon-study: scaling of a job with its mesh and with ranks, and mesh settings for a given accuracy.
 
     carillon-study scaling JOB.json [-o FOLDER] [--ranks 1,2,4] [--nodes 2500,5000,10000] [--repeats 3]
     carillon-study scaling JOB.json --quick --record FILE | --check FILE
-    carillon-study accuracy [--quick] [--on BODY...] [--only SECTION...] -o REPORT
     carillon-study advise BODY --cents 5 [--seconds 10]
 
-Exit codes: 0 done, 2 the input cannot be used, 3 the work has grown, 4 the machine refused.
+Exit codes: 0 done, 2 bad input, 3 the work has grown, 4 system error.
 """
 import argparse
 import contextlib
@@ -13,14 +12,14 @@ import json
 import signal
 import sys
 
+import advise
 import programs
 import report
 import scaling
 import work
-from accuracy import advise, study
 from errors import InputError, RunError, printable
 
-VERSION = "unknown"  # what the build writes here
+VERSION = "unknown"  # set by the build
 
 
 def read_numbers(name, least):
@@ -28,7 +27,7 @@ def read_numbers(name, least):
         try:
             numbers = sorted({int(word) for word in text.split(",")})
         except ValueError:
-            raise argparse.ArgumentTypeError(f"{text!r}: give whole numbers with commas between them, like 1,2,4")
+            raise argparse.ArgumentTypeError(f"{text!r}: give whole numbers separated by commas, like 1,2,4")
         if numbers[0] < least:
             raise argparse.ArgumentTypeError(f"{numbers[0]}: {name} are {least} or more")
         return numbers
@@ -45,7 +44,7 @@ def read_count(text):
 
 class Parser(argparse.ArgumentParser):
     def error(self, message):
-        raise InputError(f"{message}; {self.prog} --help says what there is")
+        raise InputError(f"{message}; {self.prog} see --help")
 
 
 def make_parser():
@@ -59,12 +58,9 @@ def make_parser():
         '(report.md, cases.csv and SVG pictures). A job with a "mesh" file has one mesh, and gets strong scaling only.',
     )
     one.add_argument("job", metavar="JOB.json", help="a job of carillon-precompute")
-    one.add_argument("-o", "--out", metavar="FOLDER", default="study", help="where everything goes (default: study)")
+    one.add_argument("-o", "--out", metavar="FOLDER", default="study", help="output folder (default: study)")
     one.add_argument(
-        "--ranks",
-        type=read_numbers("ranks", 1),
-        metavar="1,2,4",
-        help="numbers of ranks (default: 1,2,4); more than there are cores are marked",
+        "--ranks", type=read_numbers("ranks", 1), metavar="1,2,4", help="numbers of ranks (default: 1,2,4); more than the cores are marked"
     )
     one.add_argument(
         "--nodes",
@@ -74,30 +70,25 @@ def make_parser():
         metavar="N,N,N",
         help="meshes of the body; the largest serves for strong scaling (default: a quarter, half and all of the job's)",
     )
-    one.add_argument("--repeats", type=read_count, help="of every case, all cases in turn (default: 3)")
+    one.add_argument("--repeats", type=read_count, help="repeats of every case, all cases in turn (default: 3)")
     one.add_argument("--quick", action="store_true", help="meshes of 600 and 1200 nodes, 1 and 2 ranks, one repeat, unless given otherwise")
-    one.add_argument("--record", metavar="FILE", help="keep the work per phase (operations, messages, bytes) in this file")
+    one.add_argument("--record", metavar="FILE", help="write the work per phase (operations, messages, bytes) to this file")
     one.add_argument(
-        "--check", metavar="FILE", help="compare the work per phase with this file's, and fail where it has grown by more than 5 %%"
+        "--check", metavar="FILE", help="compare the work per phase with this file, and fail if it has grown by more than 5 %%"
     )
-    one.add_argument("--timeout", type=programs.read_seconds, default=3600, help="seconds that one run may take (default: 3600)")
-    one.add_argument("--bin", metavar="FOLDER", help="where carillon-precompute is (default: next to this program)")
+    one.add_argument("--timeout", type=programs.read_seconds, default=3600, help="limit of one run in seconds (default: 3600)")
+    one.add_argument("--bin", metavar="FOLDER", help="folder of carillon-precompute (default: next to this program)")
     one.add_argument(
         "--json",
         action="store_true",
-        help="one JSON document on standard output: the report's path and the work of every case; the rest on standard error",
+        help="print one JSON document: path of the report and work of every case; other output goes to standard error",
     )
-    study.add_command(commands, read_count)
     advise.add_command(commands)
     return parser
 
 
 def run(arguments):
     options = make_parser().parse_args(arguments)
-    if options.command == "accuracy":
-        made = study.run(options)
-        print(json.dumps(made, indent=2) if options.json else made["report"], flush=True)
-        return 0
     if options.command == "advise":
         return advise.run(options)
     if not options.json:

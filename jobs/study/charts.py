@@ -1,4 +1,4 @@
-"""Charts as SVG text: lines on logarithmic axes, and bars in parts."""
+"""SVG charts: lines on logarithmic axes, stacked bars."""
 import math
 
 import measuring
@@ -42,7 +42,7 @@ def describe_number(value):
 
 
 def find_ticks(low, high):
-    """1, 2 and 5 times powers of ten where there is room, else the powers alone."""
+    """1, 2 and 5 times powers of ten for up to two decades, else powers of ten."""
     first, last = math.floor(math.log10(low)), math.ceil(math.log10(high))
     factors = (1, 2, 5) if last - first <= 2 else (1,)
     return [
@@ -53,7 +53,7 @@ def find_ticks(low, high):
 
 
 class Axes:
-    """A frame on a picture and the way from values to places in it. Ranges are (low, high); logarithmic unless said otherwise."""
+    """A frame and its coordinate transform. Ranges are (low, high); axes are logarithmic by default."""
 
     def __init__(self, left, top, width, height, x_range, y_range, x_log=True, y_log=True, margin=0):
         self.left, self.top, self.width, self.height, self.margin = left, top, width, height, margin
@@ -73,7 +73,7 @@ class Axes:
         return self.top + self.height * (1 - self.find_share(y, self.y_range, self.y_log))
 
     def draw_frame(self, x_label, y_label, x_ticks, y_ticks, marks=()):
-        """Grid, ticks and labels as lines of SVG. marks: ticks of x that get a star."""
+        """Grid, ticks and labels. marks: x ticks with a star."""
         out = []
         for tick in y_ticks:
             y = self.place_y(tick)
@@ -111,7 +111,7 @@ class Axes:
 
 
 def draw_lines(curves, title, subtitle, x_label, y_label, x_ticks, marks=(), dashed=()):
-    """curves: {name: [(x, y)]}, logarithmic axes. marks: x whose points are hollow. dashed: names of guides."""
+    """curves: {name: [(x, y)]}, logarithmic axes. marks: x of hollow points. dashed: names of guides."""
     left, top, width, height = 84, 70, 520, 380
     curves = {name: [(x, y) for x, y in points if y > 0] for name, points in curves.items()}
     curves = {name: points for name, points in curves.items() if points}
@@ -131,7 +131,7 @@ def draw_lines(curves, title, subtitle, x_label, y_label, x_ticks, marks=(), das
     for before, label in zip(labels, labels[1:]):
         label[0] = max(label[0], before[0] + 16)
     excess = labels[-1][0] - (top + height + 6) if labels else 0
-    if excess > 0:  # the lowest ones move up again
+    if excess > 0:  # shift the lowest labels up
         limit = top + height + 6
         for label in reversed(labels):
             label[0] = min(label[0], limit)
@@ -146,8 +146,7 @@ def draw_lines(curves, title, subtitle, x_label, y_label, x_ticks, marks=(), das
 
 
 def draw_bars(bars, title, subtitle, unit="s"):
-    """bars: [(label, [(name, value, paler value)])]: parts in the colours of their names; the pale end of each is what was spent inside MPI
-    (0: not asked)."""
+    """bars: [(label, [(name, value, MPI value)])]: parts in the colours of their names, the part inside MPI paler."""
     width, height, top = 560, 26, 104
     left = max(190, 40 + round(7.2 * max(len(label) for label, _ in bars)))
     longest = max(sum(a + b for _, a, b in parts) for _, parts in bars) or 1.0

@@ -1,13 +1,13 @@
-"""What ends a study early, and with which exit code."""
+"""Errors of a study and their exit codes."""
 import unicodedata
 
 
 class InputError(Exception):
-    """What the user can correct."""
+    """An error that the user can correct."""
 
 
 class RunError(Exception):
-    """A run that failed, with its exit code. possible_nodes: of a mesh, a count of nodes that can be met, where another was asked for."""
+    """A failed run with its exit code. possible_nodes: a node count that the mesher can meet, if it refused another."""
 
     def __init__(self, code, text, possible_nodes=None):
         super().__init__(text)
@@ -15,11 +15,10 @@ class RunError(Exception):
 
 
 def printable(text):
-    """`text` on one line, without what a terminal obeys: control and format characters as escapes (as config::printable does for the other
-    programs)."""
+    """`text` on one line with control and format characters escaped, as base::printable() does."""
 
     def show(letter):
-        if 0xDC80 <= ord(letter) <= 0xDCFF:  # a byte of a file name that is no UTF-8
+        if 0xDC80 <= ord(letter) <= 0xDCFF:  # an invalid byte of a file name
             return f"\\x{ord(letter) - 0xDC00:02x}"
         hidden = unicodedata.category(letter) in ("Cc", "Cf", "Cs", "Zl", "Zp") and letter not in "\u00ad\u200c\u200d"
         return f"\\u{ord(letter):04x}" if hidden else letter

@@ -1,4 +1,4 @@
-"""Running programs and judging what comes out: CPU seconds, medians, tables, ratios."""
+"""Runs programs and evaluates CPU seconds, medians, tables, ratios."""
 import dataclasses
 import functools
 import json
@@ -18,7 +18,7 @@ PHASES = ("read", "partition", "assemble", "factor", "solve", "orthogonalise", "
 
 @dataclasses.dataclass
 class Cost:
-    """What one run of one program took. CPU is user + system time of the process and of every child that it waited for."""
+    """Cost of one run. CPU: user + system time of the process and its children."""
 
     cpu_s: float
     wall_s: float
@@ -26,8 +26,8 @@ class Cost:
 
 @functools.cache
 def find_kernels():
-    """(kernels, text): OpenBLAS's kernels for every program that is measured, and why these. A release of OpenBLAS that is older than the
-    processor takes kernels without AVX: carillon-precompute corrects that by itself, its rivals would be slow for no fault of theirs."""
+    """(kernels, reason): OpenBLAS kernels for all measured programs. An OpenBLAS older than the processor selects kernels without AVX;
+    carillon-precompute corrects that itself, other programs do not."""
     environment = {name: value for name, value in os.environ.items() if not name.startswith("OPENBLAS_")}
     child = subprocess.run([sys.executable, "-c", ASK_KERNELS], env=environment, capture_output=True, text=True)
     if child.returncode != 0:
@@ -35,7 +35,7 @@ def find_kernels():
     own = child.stdout.strip()
     fitting, rank = find_fitting_kernels(pathlib.Path("/proc/cpuinfo").read_text())
     if rank > KERNEL_RANKS.get(own.lower(), 9):
-        return fitting, f"for all programs, as they fit the processor; OpenBLAS alone takes {own}"
+        return fitting, f"for all programs, matching the processor; OpenBLAS selects {own}"
     return own, "OpenBLAS's own choice"
 
 
@@ -43,7 +43,7 @@ ASK_KERNELS = """import ctypes
 library = ctypes.CDLL("libopenblas.so.0")
 library.openblas_get_corename.restype = ctypes.c_char_p
 print(library.openblas_get_corename().decode())"""
-# By the vector instructions they use: 2 is AVX2 with FMA; names that are not here are newer.
+# Rank by vector instructions: 2 is AVX2 with FMA; unlisted names are newer.
 KERNEL_RANKS = dict.fromkeys(
     (
         "generic",
@@ -72,7 +72,7 @@ KERNEL_RANKS |= dict.fromkeys(("sandybridge", "bulldozer", "piledriver", "steamr
 
 
 def find_fitting_kernels(cpuinfo):
-    """(kernels, rank) for the processor that the text of /proc/cpuinfo is of; ("", 0) when it is not known."""
+    """(kernels, rank) for a processor from the text of /proc/cpuinfo; ("", 0) if unknown."""
     fields = dict(line.split(":", 1) for line in cpuinfo.splitlines() if ":" in line)
     fields = {name.strip(): value.split() for name, value in fields.items()}
     flags = set(fields.get("flags", []))
@@ -84,7 +84,7 @@ def find_fitting_kernels(cpuinfo):
 
 
 def make_environment():
-    """That of every program that is measured: one thread, MPI on any machine, and the same kernels of OpenBLAS."""
+    """Environment of all measured programs: one thread, MPI on any machine, the same OpenBLAS kernels."""
     kept = {name: value for name, value in os.environ.items() if not name.startswith("OPENBLAS_")}
     kernels, _ = find_kernels()
     if kernels:
@@ -99,12 +99,12 @@ def make_environment():
         "OMPI_MCA_hwloc_base_binding_policy": "none",
         "OMPI_MCA_mpi_yield_when_idle": "1",
         "HWLOC_COMPONENTS": "-gl",
-        "GLIBC_TUNABLES": "glibc.malloc.hugetlb=1",  # as carillon-precompute sets it: rivals have the same pages
+        "GLIBC_TUNABLES": "glibc.malloc.hugetlb=1",  # as in carillon-precompute
     }
 
 
 class Failed(RuntimeError):
-    """A program that did not end with 0: its exit code (negative: the signal that ended it) and its last lines."""
+    """A program with a non-zero exit code (negative: signal), and its last lines."""
 
     def __init__(self, program, code, lines):
         super().__init__(f"{program}: exit code {code}\n" + "".join(lines))
@@ -112,7 +112,7 @@ class Failed(RuntimeError):
 
 
 def run_measured(command, cwd, environment=None, timeout_s=3600):
-    """Runs the command; its output goes nowhere unless it fails. Raises Failed when it does."""
+    """Runs the command without output. Raises Failed with its output."""
     with tempfile.TemporaryFile("w+") as log:
         start = time.monotonic()
         child = subprocess.Popen(
@@ -132,7 +132,7 @@ def run_measured(command, cwd, environment=None, timeout_s=3600):
                 if time.monotonic() - start > timeout_s:
                     os.killpg(child.pid, signal.SIGKILL)
                 time.sleep(0.005)
-        except BaseException:  # who stops the study stops what it runs
+        except BaseException:  # end the children of an interrupted study
             os.killpg(child.pid, signal.SIGKILL)
             raise
         wall = time.monotonic() - start
@@ -144,8 +144,7 @@ def run_measured(command, cwd, environment=None, timeout_s=3600):
 
 
 def run_part(command, cwd, what, environment=None, timeout_s=3600):
-    """run_measured of a part of a study. RunError names it and has the program's own error line and exit code; 4, where that is none of
-    those that say whose fault it was."""
+    """run_measured() for a part of a study. RunError with the error line and exit code of the program, else code 4."""
     try:
         return run_measured(command, cwd, environment, timeout_s)
     except Failed as error:
@@ -153,7 +152,7 @@ def run_part(command, cwd, what, environment=None, timeout_s=3600):
         if error.code in (2, 3) and said:
             raise RunError(error.code, f"{what}: {said[0]}") from None
         ended = f"{error.program} ended with exit code {error.code}"
-        raise RunError(4, f"{what}: {ended} and said: {said[0]}" if said else f"{what}: {ended}") from None
+        raise RunError(4, f"{what}: {ended}: {said[0]}" if said else f"{what}: {ended}") from None
 
 
 def find_median(values):
@@ -161,7 +160,7 @@ def find_median(values):
 
 
 def find_spread(values):
-    """Half the distance of the extremes over the median."""
+    """Half the range / median."""
     return (max(values) - min(values)) / 2 / find_median(values) if len(values) > 1 else 0.0
 
 
@@ -179,9 +178,9 @@ PHASE_OF_RECORDED = {
 
 
 def to_phases(record, total_s):
-    """The `run` record of a resolved job as CPU seconds by PHASES, {phase: s}, that add up to total_s; what no phase claims is "other".
+    """CPU seconds {phase: s} of the `run` record of a resolved job, adding up to total_s; the rest is "other".
 
-    Phases of the record give their CPU seconds (all ranks); inside "modes" the wall seconds of its parts say how they are shared out."""
+    CPU seconds of the record are over all ranks; those of "modes" are divided by the wall seconds of its parts."""
     seconds = dict.fromkeys(PHASES, 0.0)
     solver = record["solver"]["seconds"]
     for phase in record["stations"]:
@@ -196,17 +195,17 @@ def to_phases(record, total_s):
         seconds["orthogonalise"] += max(cpu_s - share * sum(parts.values()), 0.0)
     claimed = sum(value for name, value in seconds.items() if name != "other")
     seconds["other"] = max(total_s - claimed, 0.0)
-    excess = max(claimed / total_s, 1.0)  # clocks of different grain, and records of before that have wall seconds alone
+    excess = max(claimed / total_s, 1.0)  # clocks of different resolution, and older records with wall seconds only
     return {name: value / excess for name, value in seconds.items()}
 
 
 def find_extras(record, total_s):
-    """What trust costs: rows (part, CPU s, share of the run) of counting, checking and error bars; as to_phases() shares them out."""
+    """Rows (part, CPU s, share of the run) of proof, checks and error bars, from to_phases()."""
     solver = record["solver"]["seconds"]
     phase = next(s for s in record["stations"] if s["name"] == "modes")
     share = phase.get("cpu_seconds", phase["seconds"]) / max(phase["seconds"], 1e-9)
     factorisations = max(record["solver"]["factorisations"], 1)
-    ends = 1 if "first shift" in record["solver"].get("proof", "") else 2  # a low end is left to the shift inside
+    ends = 1 if "first shift" in record["solver"].get("proof", "") else 2  # a low end is counted by the shift inside
     rows = [("part of the run", "CPU s", "share")]
 
     def add(name, cpu_s):
@@ -222,14 +221,14 @@ def find_extras(record, total_s):
 
 
 def compare_frequencies(reference_hz, other_hz):
-    """Largest relative difference; infinite when the counts differ."""
+    """Largest relative difference; infinite if the counts differ."""
     if len(reference_hz) != len(other_hz):
         return float("inf")
     return max((abs(a / b - 1) for a, b in zip(reference_hz, other_hz)), default=0.0)
 
 
 def format_table(rows, is_markdown=False):
-    """rows[0] is the head; the first column to the left, the others to the right."""
+    """rows[0] is the head; first column left-aligned, others right-aligned."""
     widths = [max(len(str(row[i])) for row in rows) for i in range(len(rows[0]))]
     cells = [[str(c).ljust(w) if i == 0 else str(c).rjust(w) for i, (c, w) in enumerate(zip(row, widths))] for row in rows]
     if not is_markdown:
@@ -242,7 +241,7 @@ def format_table(rows, is_markdown=False):
 
 def make_rows(results, ours):
     """results: {name: {"cpu_s": [...], "wall_s": [...], "peak_bytes": int, "modes": int, "residual": x, "frequency_error": x, "label":
-    text}} -> rows of the table, quickest first, with each program's CPU time over that of `ours`; a single run has no spread."""
+    text}} -> rows of the table, fastest first, with the CPU time relative to `ours`."""
     base = find_median(results[ours]["cpu_s"])
     rows = [("program", "CPU s", "spread", "times ours", "wall s", "peak GB", "modes", "worst residual", "frequencies agree to")]
     for name, result in sorted(results.items(), key=lambda item: (not item[0].startswith("carillon"), find_median(item[1]["cpu_s"]))):
@@ -268,12 +267,12 @@ def escape(text):
 
 
 def split_page(text, name):
-    """What is before, between and after the lines <!-- name --> and <!-- /name --> of a page. ValueError when they are not there."""
+    """Text before, between and after <!-- name --> and <!-- /name -->. ValueError without these marks."""
     start, end = f"<!-- {name} -->\n", f"<!-- /{name} -->"
     before, found, rest = text.partition(start)
     between, closed, after = rest.partition(end)
     if not found or not closed:
-        raise ValueError(f"the page has no place for {name}")
+        raise ValueError(f"the page has no marks <!-- {name} -->")
     return before + start, between, end + after
 
 

@@ -1,4 +1,4 @@
-"""The programs that a study starts: given, next to this program, or on the way of commands."""
+"""Programs started by a study: in a given folder, next to this program, or in PATH."""
 import argparse
 import math
 import os
@@ -10,7 +10,7 @@ from errors import InputError
 
 
 def read_seconds(text):
-    """Of --timeout."""
+    """Type of --timeout."""
     try:
         value = float(text)
     except ValueError:
@@ -21,7 +21,7 @@ def read_seconds(text):
 
 
 def leave_run():
-    """In an MPI run, replaces this process by `carillon study`, which starts its children outside the run."""
+    """Inside an MPI run, replaces this process by `carillon study`, whose children start outside the run."""
     if not {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK"}.isdisjoint(os.environ):
         os.execv(find_program(None, "carillon"), ["carillon", "study", *sys.argv[1:]])
 
@@ -40,5 +40,5 @@ def find_program(given, name="carillon-precompute"):
 
 
 def find_all(given, names):
-    """{name: path}. InputError names the first that is missing."""
+    """{name: path}. InputError for the first missing program."""
     return {name: find_program(given, name) for name in sorted(set(names))}

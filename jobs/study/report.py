@@ -1,4 +1,4 @@
-"""What a study writes: report.md, cases.csv and pictures."""
+"""Output of a scaling study: report.md, cases.csv and SVG charts."""
 import csv
 
 import charts
@@ -63,7 +63,7 @@ def to_table(rows):
 
 
 def find_phases(study, cases):
-    """Those that take a thousandth of the time of some case."""
+    """Phases with at least a thousandth of the time of some case."""
     return [phase for phase in scaling.PHASES if any(study.calc_phase(case, phase)[0] > 1e-3 * study.calc_seconds(case) for case in cases)]
 
 
@@ -73,11 +73,7 @@ def save(study, name, picture):
 
 def draw_cases(study, name, title, cases, labels):
     bars = [(label, [(phase, *study.calc_phase(case, phase)[1:]) for phase in scaling.PHASES]) for case, label in zip(cases, labels)]
-    save(
-        study,
-        name,
-        charts.draw_bars(bars, title, "seconds of wall clock by phase; the pale end of each is spent inside MPI, in messages or waiting"),
-    )
+    save(study, name, charts.draw_bars(bars, title, "wall seconds by phase; the pale part of each is inside MPI (messages and waiting)"))
 
 
 def write_strong(study):
@@ -86,7 +82,7 @@ def write_strong(study):
     draw_cases(study, "strong.svg", title, cases, [f"{star(study, case.ranks)} rank{'s' if case.ranks > 1 else ''}" for case in cases])
     base = scaling.Case(cases[0].nodes, 1)
     has_base = base in study.runs
-    rows = [("phase", *(f"{star(study, case.ranks)}: s (in MPI)" for case in cases), "times as fast", "what limits it")]
+    rows = [("phase", *(f"{star(study, case.ranks)}: s (in MPI)" for case in cases), "times as fast", "limit")]
     last = max((case for case in cases if not study.is_crowded(case.ranks)), default=cases[-1])
     for phase in find_phases(study, cases):
         cells = [
@@ -180,7 +176,7 @@ def write_growth(study):
         charts.draw_lines(
             curves,
             "Growth with the mesh, on one rank",
-            "seconds of wall clock by phase; dashed: guides of slope 1 and 2",
+            "wall seconds by phase; dashed: slopes 1 and 2",
             "unknowns",
             "seconds",
             unknowns,

@@ -1,4 +1,4 @@
-"""The runs of a scaling study, and what is made of them."""
+"""Runs and evaluation of a scaling study."""
 import dataclasses
 import json
 import math
@@ -17,30 +17,30 @@ QUICK_NODES = [600, 1200]
 
 
 def read_text(path, what, remedy):
-    """The text of a regular file of modest size. InputError says what cannot be read, and the remedy."""
+    """The text of a regular file of limited size. InputError with the remedy."""
     try:
         status = os.stat(path)
         if not stat.S_ISREG(status.st_mode):
-            raise InputError(f"{path}: this is no regular file; {remedy}")
+            raise InputError(f"{path}: not a regular file; {remedy}")
         if status.st_size > MAX_BYTES:
             raise InputError(f"{path}: a {what} of {status.st_size} bytes; at most {MAX_BYTES} are read")
         return pathlib.Path(path).read_text()
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: the {what} cannot be read: {error}; {remedy}") from None
+        raise InputError(f"{path}: cannot read the {what}: {error}; {remedy}") from None
 
 
 def parse(text, path, remedy):
-    """The JSON value of a text. InputError names the line."""
+    """Parses JSON. InputError with the line."""
     try:
         return json.loads(text)
     except json.JSONDecodeError as error:
-        raise InputError(f"{path}:{error.lineno}: this is no JSON: {error.msg}; {remedy}") from None
-    except (ValueError, RecursionError) as error:  # numbers of thousands of digits, thousands of brackets
-        raise InputError(f"{path}: this is no JSON that can be read: {error}; {remedy}") from None
+        raise InputError(f"{path}:{error.lineno}: not valid JSON: {error.msg}; {remedy}") from None
+    except (ValueError, RecursionError) as error:  # e.g. thousands of digits or brackets
+        raise InputError(f"{path}: not valid JSON: {error}; {remedy}") from None
 
 
 def read_job(path):
-    """The job's object; comments and all errors are carillon-precompute's own business, which says them better."""
+    """The object of a job. Its content is checked by carillon-precompute."""
     remedy = "give a job of carillon-precompute"
     job = parse(strip_comments(read_text(path, "job", remedy)), path, remedy)
     if not isinstance(job, dict):
@@ -49,13 +49,13 @@ def read_job(path):
 
 
 def strip_comments(text):
-    """// to the end of the line, outside strings."""
+    """Removes // comments outside strings."""
     return re.sub(r'("(?:[^"\\\n]|\\.)*")|//[^\n]*', lambda match: match.group(1) or "", text)
 
 
 @dataclasses.dataclass(frozen=True, order=True)
 class Case:
-    nodes: int  # asked for; 0: the mesh of the job
+    nodes: int  # requested; 0: the mesh of the job
     ranks: int
 
 
@@ -77,7 +77,7 @@ class Study:
         try:
             self.out.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise InputError(f"{self.out}: the folder cannot be made: {error.strerror}") from None
+            raise InputError(f"{self.out}: cannot create folder: {error.strerror}") from None
 
     def check_job(self):
         if "accuracy_cents" in self.job:
@@ -105,7 +105,7 @@ class Study:
         return [nodes // 4, nodes // 2, nodes]
 
     def plan(self):
-        """Growth on one rank, strong scaling at the largest size, weak scaling from a size that leaves room to grow."""
+        """Cases: growth on one rank, strong scaling at the largest size, weak scaling from the second largest."""
         most = self.sizes[-1]
         self.strong = [Case(most, ranks) for ranks in self.ranks]
         self.growth = [Case(nodes, 1) for nodes in self.sizes]
@@ -116,7 +116,7 @@ class Study:
         return sorted({*self.strong, *self.growth, *self.weak})
 
     def is_crowded(self, ranks):
-        """More ranks than this machine has cores for."""
+        """True for more ranks than cores."""
         return ranks > self.cores
 
     def make_job(self, case):
@@ -134,7 +134,7 @@ class Study:
 
     def find_path(self, path):
         if not isinstance(path, str):
-            raise InputError(f"{self.job_file}: {path!r} is no path")
+            raise InputError(f"{self.job_file}: {path!r} is not a path")
         return str((self.job_file.resolve().parent / path).resolve())
 
     def name(self, case):
@@ -146,7 +146,7 @@ class Study:
         if not self.weak and len(self.ranks) > 1:
             print('a mesh file cannot be meshed again: strong scaling only; give the job a "body" for weak scaling and growth', flush=True)
         for repeat in range(self.repeats):
-            # In turn, and every other time backwards: other load on the machine affects all of them.
+            # Alternating order, so that other load affects all cases.
             for case in self.cases if repeat % 2 == 0 else reversed(self.cases):
                 self.runs.setdefault(case, []).append(self.run_case(case))
 
@@ -169,7 +169,7 @@ class Study:
         text = f"{case.ranks} rank{'' if case.ranks == 1 else 's'}{' (crowded)' if self.is_crowded(case.ranks) else ''}"
         return (f"{case.nodes:,} nodes, " if case.nodes else "") + text
 
-    # --- what the runs say
+    # --- evaluation
 
     def get_unknowns(self, case):
         return 3 * self.runs[case][0]["mesh"]["free_nodes"]
@@ -182,7 +182,7 @@ class Study:
         return statistics.median(find(record) for record in self.runs[case])
 
     def calc_phase(self, case, phase):
-        """(seconds of wall clock, of these in computing, inside MPI), means over the ranks, medians over the repeats."""
+        """(wall seconds, of these computing, inside MPI): means over ranks, medians over repeats."""
         wall = self.calc_median(case, lambda record: record["effort"][phase]["wall_seconds"]) / case.ranks
         inside = (
             self.calc_median(case, lambda record: min(record["effort"][phase]["mpi_seconds"], record["effort"][phase]["wall_seconds"]))
@@ -200,18 +200,17 @@ class Study:
         return measuring.find_spread([record["cost"]["wall_s"] for record in self.runs[case]])
 
     def calc_share(self):
-        """The part of the processor that runs on one rank got; less than all of it: others were at work, or the disk."""
+        """CPU / wall time of runs on one rank; below 1: other load, or disk waits."""
         ones = [case for case in self.cases if case.ranks == 1]
         return min((sum(self.calc_cpu(case, phase) for phase in PHASES) / self.calc_seconds(case) for case in ones), default=1.0)
 
     def is_repeatable(self):
-        """Whether all repeats of a case did the same work."""
+        """True if all repeats of a case did the same work."""
         return all(len({json.dumps(record["work"], sort_keys=True) for record in records}) == 1 for records in self.runs.values())
 
 
 def fit_power(x, y):
-    """(exponent, largest factor between a value and the fit) of y = a x^p by least squares of logarithms; None without two sizes of
-    positive values."""
+    """(p, largest factor between a value and the fit) of y = a x^p by least squares of logarithms; None without two sizes."""
     points = [(math.log(a), math.log(b)) for a, b in zip(x, y) if a > 0 and b > 0]
     if len({a for a, _ in points}) < 2:
         return None
@@ -220,20 +219,20 @@ def fit_power(x, y):
     return power, math.exp(max(abs(b - mean_y - power * (a - mean_x)) for a, b in points))
 
 
-LATENCY_S, BYTES_PER_S = 2e-6, 4e9  # of a message between two ranks of one machine, on the careful side
+LATENCY_S, BYTES_PER_S = 2e-6, 4e9  # conservative, between two ranks of one machine
 
 
 @dataclasses.dataclass
 class Limit:
-    """Where the rank-seconds go that p ranks take beyond those of one."""
+    """Causes of the additional rank-seconds on p ranks."""
 
-    lost: float  # seconds on every rank beyond a p-th of one rank's
+    lost: float  # seconds per rank above ideal scaling
     shares: dict  # {reason: seconds of all ranks}
     text: str
 
 
 def find_limit(study, phase, case):
-    """What keeps a phase from being p times as fast on p ranks, by the largest share of what was lost."""
+    """The main cause of non-ideal scaling of a phase on p ranks."""
     one = Case(case.nodes, 1)
     if one not in study.runs or case.ranks == 1:
         return None
@@ -253,5 +252,5 @@ def find_limit(study, phase, case):
     }
     lost = wall - wall_1 / p
     if wall < 0.005 or lost < 0.1 * wall:
-        return Limit(lost, shares, "nothing: it scales" if wall >= 0.005 else "too short to say")
+        return Limit(lost, shares, "none: it scales" if wall >= 0.005 else "too short")
     return Limit(lost, shares, max(shares, key=shares.get))

@@ -1,4 +1,4 @@
-"""The work of a study, kept in a file and compared with it: operations, messages and bytes per phase."""
+"""Records of the work of a study (operations, messages and bytes per phase), and comparison with them."""
 import json
 import os
 import pathlib
@@ -37,12 +37,12 @@ def write(path, study):
         os.replace(fresh, path)
     except OSError as error:
         fresh.unlink(missing_ok=True)
-        raise scaling.InputError(f"{path}: the record cannot be written: {error.strerror}") from None
+        raise scaling.InputError(f"{path}: cannot write the record: {error.strerror}") from None
 
 
 def read(path):
-    """A record as write() made it. InputError names what is missing in it."""
-    remedy = f"make it again with --record {path}"
+    """A record of write(). InputError for missing parts."""
+    remedy = f"record it again with --record {path}"
     record = scaling.parse(scaling.read_text(path, "record", remedy), path, remedy)
     if (
         not isinstance(record, dict)
@@ -50,7 +50,7 @@ def read(path):
         or not isinstance(record.get("job"), dict)
         or not isinstance(record.get("cases"), list)
     ):
-        raise scaling.InputError(f"{path}: this is no record of a study; {remedy}")
+        raise scaling.InputError(f"{path}: not a record of a study; {remedy}")
     for number, case in enumerate(record["cases"], 1):
         if fault := find_fault(case):
             raise scaling.InputError(f"{path}: case {number} of the record {fault}; {remedy}")
@@ -58,9 +58,9 @@ def read(path):
 
 
 def find_fault(case):
-    """What a case of a record lacks, in words; None when it is whole."""
+    """The fault of a case of a record; None if complete."""
     if not isinstance(case, dict):
-        return "is no object"
+        return "is not an object"
     for key in ("nodes", "ranks"):
         if type(case.get(key)) is not int:
             return f'has no whole number "{key}"'
@@ -77,7 +77,7 @@ def find_fault(case):
 
 
 def compare(recorded, cases):
-    """[(case, phase, quantity, recorded, now)] of all that differ by more than the growth allowed, worst first."""
+    """[(case, phase, quantity, recorded, now)] of all differences above MAX_GROWTH, worst first."""
     found = {(case["nodes"], case["ranks"]): case for case in cases}
     differences = []
     for old in recorded:
@@ -96,9 +96,9 @@ def compare(recorded, cases):
 
 
 def check(record, study, options):
-    """Raises HasGrown with all that has; says what has shrunk."""
+    """Raises HasGrown for growth; prints reductions."""
     if record["job"] != study.job:
-        raise scaling.InputError(f"{options.check}: the record is of another job than {study.job_file}; make it again with --record")
+        raise scaling.InputError(f"{options.check}: the record is of another job than {study.job_file}; record it again with --record")
     differences = compare(record["cases"], collect(study))
     lines = {True: [], False: []}
     for case, phase, quantity, before, now in differences:
@@ -116,6 +116,6 @@ def check(record, study, options):
         raise HasGrown(
             f"the work has grown by more than {100 * MAX_GROWTH:.0f} % against {options.check}:\n"
             + "\n".join(lines[True])
-            + f"\nIf that is meant, record it in the same commit:\n  {command}"
+            + f"\nIf intended, record it in the same commit:\n  {command}"
         )
     print(f"{options.check}: the work is as recorded, within {100 * MAX_GROWTH:.0f} %", flush=True)

@@ -33,7 +33,7 @@ std::string read_bytes(const std::filesystem::path& file) {
   throw SystemError(fmt::format("{}: cannot be written: {}", file.string(), std::strerror(error)));
 }
 
-/// The answers of the file in order, and where the last whole one ends; 0 when the file is not of this fingerprint.
+/// Complete answers in order and the end of the last one; 0 if the fingerprint differs.
 std::pair<std::vector<WaveAnswer>, std::size_t> parse(std::string_view bytes, std::string_view fingerprint) {
   std::vector<WaveAnswer> answers;
   if (bytes.size() < kHead || !bytes.starts_with(kMagic) || bytes.substr(kMagic.size(), 32) != fingerprint) return {answers, 0};
@@ -70,7 +70,7 @@ void AnswersFile::save(const WaveAnswer& answer) {
   const bool is_new = whole_bytes_ == 0;
   const base::Descriptor descriptor(::open(file_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666));
   if (descriptor.get() < 0) refuse(file_, errno);
-  // What is behind the last whole answer, of a run that was killed while it wrote, goes.
+  // Drop an incomplete answer of a run that was killed while writing.
   if (::ftruncate(descriptor.get(), static_cast<off_t>(whole_bytes_)) != 0 || ::lseek(descriptor.get(), 0, SEEK_END) < 0)
     refuse(file_, errno);
   const std::vector<double> numbers = pack(answer);
@@ -87,7 +87,7 @@ void AnswersFile::save(const WaveAnswer& answer) {
 }
 
 void AnswersFile::remove() {
-  std::error_code ignored;  // a file that is not there is removed
+  std::error_code ignored;  // a missing file is no error
   std::filesystem::remove(file_, ignored);
   whole_bytes_ = 0;
 }

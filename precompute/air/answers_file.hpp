@@ -1,4 +1,4 @@
-// The wave numbers that a run has solved, on disk.
+// Solved wave numbers on disk.
 #pragma once
 
 #include <array>
@@ -10,27 +10,27 @@
 
 namespace carillon::air {
 
-/// A file to which answers are appended one by one, each with its own checksum: what is whole is read again, whenever the run ended. What
-/// it keeps true: all answers in it are of one radiator in one setting. Rank 0 alone.
+/// Append-only file of answers, each with its own checksum; complete answers are read again after a crash. Invariant: all answers have the
+/// same radiator and settings. Rank 0 only.
 class AnswersFile {
  public:
-  /// `fingerprint`: of what is solved and how. A file of another one, and what is damaged of it, counts as empty.
+  /// `fingerprint`: hash of radiator and settings. A mismatched or corrupt file is treated as empty.
   AnswersFile(std::filesystem::path file, const std::array<unsigned char, 32>& fingerprint);
 
-  /// In the order in which they were saved.
+  /// In the order of save().
   std::vector<WaveAnswer> read() const;
-  /// Throws SystemError when the disk refuses.
+  /// Throws SystemError when the write fails.
   void save(const WaveAnswer& answer);
-  /// The solve is over.
+  /// Removes the file.
   void remove();
 
  private:
   std::filesystem::path file_;
   std::array<unsigned char, 32> fingerprint_{};
-  std::size_t whole_bytes_ = 0;  // 0: no file, or none of ours
+  std::size_t whole_bytes_ = 0;  // 0: missing or mismatched file
 };
 
-/// Of the radiator and what of the options and of the program decides the answers.
+/// Hash of the radiator, the options and the program version that determine the answers.
 std::array<unsigned char, 32> calc_fingerprint(const Radiator& radiator, const AirSolveOptions& options);
 
 }  // namespace carillon::air

@@ -1,8 +1,7 @@
-// Method:     the symmetric eigenproblem of all modes with what is known of the mass matrix, then of the few that mix with a mode, with
-//             their mass at its own wave number. Eigenvectors of one eigenvalue are a basis that rounding chooses: there the mode before is
-//             projected, so that two modes never become the same.
+// Method:     symmetric eigenproblem of all modes with the approximate mass matrix, then of the few modes in one mixture with the mass at
+//   its own wave number. Eigenvectors of equal eigenvalues are arbitrary: the previous mixture is projected onto their space, so that two
+//   modes never become equal.
 // Source:     docs/equations.md E10.
-// Deviations: none.
 #include "precompute/air/coupling.hpp"
 
 #include <algorithm>
@@ -15,7 +14,7 @@
 namespace carillon::air {
 namespace {
 
-constexpr double kOneWave = 1e-4;  // relative, of k^2
+constexpr double kOneWave = 1e-4;  // relative difference of k^2 of degenerate modes
 constexpr std::size_t kRunFacets = 128;
 
 using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
@@ -35,7 +34,7 @@ struct Problem {
     la::Matrix destroyed = inertia;
     if (n == 0 || la::calc_generalised_eigenpairs(vectors, destroyed, values) != 0)
       throw InputError(
-          "the air takes more than the whole mass of a motion of the modes, as in a resonance of a cavity that this method cannot couple; "
+          "the added mass of a mode is below minus its modal mass, as in a cavity resonance, which this method cannot couple; "
           "end the band lower, or leave the air out with \"radiation\": \"none\"");
   }
 };
@@ -55,7 +54,7 @@ std::vector<Mixture> couple_modes(std::span<const double> wave_number_1_m, std::
   const Problem problem(wave_number_1_m, mass);
   const la::Matrix& vectors = problem.vectors;
   const std::size_t n = vectors.cols();
-  // By falling part: each motion gets the mode that is most of it.
+  // By decreasing part: each motion gets the mode in which it is largest.
   std::vector<std::size_t> order(n * n);
   std::iota(order.begin(), order.end(), 0U);
   std::stable_sort(order.begin(), order.end(),
@@ -63,7 +62,7 @@ std::vector<Mixture> couple_modes(std::span<const double> wave_number_1_m, std::
   std::vector<bool> is_taken(n);
   std::vector<Mixture> mixtures(n);
   for (const std::size_t at : order) {
-    const std::size_t motion = at % n, mode = at / n;  // column by column
+    const std::size_t motion = at % n, mode = at / n;  // column-major
     if (is_taken[mode] || !mixtures[motion].is_empty()) continue;
     is_taken[mode] = true;
     Eigen::VectorXd parts = vectors.col(static_cast<Eigen::Index>(mode));
@@ -105,7 +104,7 @@ std::vector<std::complex<double>> calc_reaction_rows(const BoundaryEquations& eq
   Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(columns, static_cast<Eigen::Index>(count));
   for (std::size_t first = 0; first < facets.size(); first += kRunFacets) {
     const std::size_t run = std::min(kRunFacets, facets.size() - first);
-    Rows loads(static_cast<Eigen::Index>(3 * run), columns);  // pressure times the mass matrix of the facet, at its corners
+    Rows loads(static_cast<Eigen::Index>(3 * run), columns);  // pressure times the facet's mass matrix, at its corners
     for (std::size_t t = 0; t < run; ++t) {
       const Facet& facet = facets[first + t];
       const auto share = static_cast<float>(facet.area_m2 / 12.0);

@@ -1,8 +1,8 @@
-// Method:     Galerkin, hat functions; the midpoint rule for all pairs of facets, sixteen that test against a patch at a time (tile.hpp),
-//             and the sparse static part (static_part.hpp). No right side is ever a matrix: velocities pass over the kernels while those
-//             are in the cache.
-// Source:     A. Burton, G. Miller (1971); by parts: A. Maue (1949), docs/equations.md E10.
-// Deviations: alpha is capped at low wave numbers, where i / k would spoil the pressure on the surface.
+// Method:     Galerkin with hat functions; midpoint rule for all pairs of facets, sixteen test facets against one patch at a time
+//   (tile.hpp), plus the sparse static part (static_part.hpp). The right-hand side is applied to the velocities while the kernels are in
+//   the cache and never stored as a matrix.
+// Source:     A. Burton, G. Miller (1971); integration by parts: A. Maue (1949), docs/equations.md E10.
+// Deviations: alpha is capped at low wave numbers, where i / k would degrade the surface pressure.
 #include "precompute/air/equations.hpp"
 
 #include <Eigen/Core>
@@ -21,7 +21,7 @@
 namespace carillon::air {
 namespace {
 
-constexpr std::size_t kPatchFacets = 192;  // rows of its midpoints stay in the second cache
+constexpr std::size_t kPatchFacets = 192;  // rows of its midpoints fit into the L2 cache
 
 CalcTile find_tile() {
 #if defined(__x86_64__)
@@ -46,7 +46,7 @@ struct Free {
 };
 using Room = std::unique_ptr<float[], Free>;
 
-/// Floats on a line of the cache.
+/// Floats aligned to a cache line.
 Room make_room(std::size_t count) {
   const std::size_t bytes = (count * sizeof(float) + 63) / 64 * 64;
   Room room(static_cast<float*>(std::aligned_alloc(64, std::max<std::size_t>(bytes, 64))));
@@ -54,7 +54,7 @@ Room make_room(std::size_t count) {
   return room;
 }
 
-/// Numbers in `items`, in order, of each distinct one; `local` says where each of `items` went.
+/// Numbers the distinct values of `items` in order; `local`: number of each item.
 std::vector<std::int32_t> number_locally(std::span<const std::int32_t> items, std::vector<std::int32_t>& local) {
   std::vector<std::int32_t> distinct(items.begin(), items.end());
   std::sort(distinct.begin(), distinct.end());
@@ -196,7 +196,7 @@ TestBlock BoundaryEquations::make_block(std::size_t first) const {
   return block;
 }
 
-/// (points, padded): what PatchPoint's facets of the patch send out, a third of the area times the velocity at the midpoint.
+/// (points, padded) sources: a third of the area times the velocity at the midpoint, summed over the facets of the patch.
 std::vector<float> BoundaryEquations::make_sources(const PatchData& patch, std::span<const std::int32_t> sides, std::size_t padded) const {
   std::vector<float> sources(patch.points.size() * padded);
   for (std::size_t t = patch.first_facet; t < patch.last_facet; ++t) {
@@ -245,7 +245,7 @@ void BoundaryEquations::assemble(double k, std::span<const std::int32_t> sides, 
       for (const std::int32_t node : facet.corners) corners.push_back(surface_.get_nodes()[node]);
       size = std::max(size, facet.size_m);
     }
-    Sphere around{corners[0], 0.0};  // a rough one
+    Sphere around{corners[0], 0.0};  // approximate
     for (const Vec3& corner : corners) around.radius_m = std::max(around.radius_m, norm(corner - around.centre_m));
     std::fill(right_room.get(), right_room.get() + padded * 6 * kLanes, 0.0F);
     for (std::size_t p = 0; p < patches_.size(); ++p) {
@@ -289,7 +289,7 @@ void BoundaryEquations::assemble(double k, std::span<const std::int32_t> sides, 
   add_sparse(k, coupling, sides, system);
 }
 
-/// The static part, the terms 1/2 p and alpha 1/2 q, and the division of each row.
+/// Adds the static part and the terms 1/2 p and alpha 1/2 q, then scales each row.
 void BoundaryEquations::add_sparse(double k, double coupling, std::span<const std::int32_t> sides, LinearSystem& system) const {
   using Complex = std::complex<double>;
   const Complex alpha(0.0, coupling);

@@ -1,4 +1,4 @@
-// The boundary element equations of a surface outside which the air is, at any wave number.
+// Boundary element equations of the air outside a surface.
 #pragma once
 
 #include <array>
@@ -15,50 +15,49 @@
 
 namespace carillon::air {
 
-/// Rows of one block of the preconditioner; ranks have whole blocks.
+/// Rows of one block of the preconditioner; ranks own whole blocks.
 inline constexpr std::size_t kBlockRows = 128;
 
-/// Rows first .. last - 1 of the equations at one wave number, with N unknowns and some right sides. Each row is divided by half its lumped
-/// mass, so that the matrix is near the identity for a large smooth body; first and last are whole blocks.
+/// Rows first .. last - 1 of the equations at one wave number, with N unknowns and several right-hand sides. Rows are divided by half their
+/// lumped mass, so the matrix is close to the identity for a large smooth body; first and last are multiples of kBlockRows.
 struct LinearSystem {
   std::size_t unknowns = 0, first = 0, last = 0, sides = 0;
   std::vector<std::complex<float>> matrix;  // (last - first, N)
   std::vector<std::complex<float>> right;   // (last - first, sides)
 
   std::size_t count_rows() const { return last - first; }
-  /// The rows of A x.
+  /// Rows of A x.
   void multiply(const Sides& x, Sides& y) const;
 };
 
-/// Solves a system of all rows by LU with one step of refinement, for where an iteration does not converge: at the resonances of open
-/// cavities. Returns the residual of the worst side, relative to its right side.
+/// Solves a complete system by LU with one step of iterative refinement; used where GMRES fails, at resonances of open cavities. Returns
+/// the largest relative residual.
 double solve_directly(const LinearSystem& system, Sides& solution);
 
-/// The inverses of the diagonal blocks of a system, kBlockRows each: nodes of a block are neighbours, so that they hold most of the
-/// hypersingular part. A block that is singular counts as the identity.
+/// Inverses of the diagonal blocks of kBlockRows rows. Nodes of a block are neighbours, so the blocks hold most of the hypersingular part.
+/// A singular block counts as the identity.
 class BlockInverse {
  public:
   explicit BlockInverse(const LinearSystem& system);
-  /// The same rows that the system has.
+  /// Applies it to the rows of the system.
   void apply(Sides& rows) const;
 
  private:
   std::vector<std::vector<std::complex<float>>> blocks_;
 };
 
-/// The Galerkin form of the equation of Burton and Miller for sound that goes out from a closed surface, e^{-i omega t}:
+/// Galerkin form of the Burton-Miller equation for outgoing sound of a closed surface, e^{-i omega t}:
 ///   [ 1/2 - K - alpha W ] p = - [ V + alpha (1/2 + K') ] q,      alpha = i / max(k, 1 / R),      q = dp / dn,
 /// p linear and continuous, q linear on each facet, W by parts (equation E10 in docs/equations.md). Unique at every wave number; with the
-/// other sign of alpha, or without it, the iteration does not converge or the solution is not unique. Invariant: all that is
-/// independent of the wave number is made once, in the constructor. n velocities.
+/// other sign of alpha GMRES does not converge, without it the solution is not unique. Invariant: everything independent of the wave number
+/// is computed in the constructor. n velocities.
 class BoundaryEquations {
  public:
-  /// `velocity`: (T, 3, n) normal velocities at the corners of the facets of `surface`; `sphere` is around it. The surface must outlive
+  /// `velocity`: (T, 3, n) normal velocities at the corners of the facets of `surface`; `sphere` encloses it. The surface must outlive
   /// this.
   BoundaryEquations(const RadiatingSurface& surface, const Sphere& sphere, std::vector<float> velocity, std::size_t count);
 
-  /// The rows first .. last - 1 at wave number k > 0 [1/m] with q = v of the velocities `sides`. A row has the same bits whatever the
-  /// range.
+  /// Rows first .. last - 1 at wave number k > 0 [1/m] with q = v of the velocities `sides`. A row has the same bits in every range.
   void assemble(double k, std::span<const std::int32_t> sides, std::size_t first, std::size_t last, LinearSystem& system) const;
 
   const RadiatingSurface& get_surface() const { return surface_; }
@@ -94,7 +93,7 @@ class BoundaryEquations {
   CalcTile calc_tile_ = calc_tile_plain;
 };
 
-/// 1 / max(k, 1 / R): the size of alpha.
+/// 1 / max(k, 1 / R): magnitude of alpha.
 double calc_coupling(double k, double radius_m);
 
 }  // namespace carillon::air

@@ -1,8 +1,7 @@
 // Method:     Green's theorem with j_l Y_lm. Y_lm as polynomials in the unit vector: q_lm(z) Re or Im (x + i y)^m, q_lm the normalised
-//             derivatives of Legendre's polynomials, so that gradients have no poles. Midpoints are taken in runs; all fields at once.
-//             j_l downwards from the ratio that a continued fraction gives (Lentz), h_l upwards by ratios h_l / h_{l-1}.
+//   derivatives of Legendre polynomials, so gradients are regular at the poles. Midpoints in runs; all fields at once. j_l by downward
+//   recurrence from a continued fraction (Lentz), h_l by upward ratios h_l / h_{l-1}.
 // Source:     docs/equations.md E10; Morse & Ingard, Theoretical Acoustics (1968), 7.2.
-// Deviations: none.
 #include "precompute/air/expansion.hpp"
 
 #include <algorithm>
@@ -19,7 +18,7 @@ using Complex = std::complex<double>;
 
 /// j_l / j_{l-1} at x > 0.
 double calc_bessel_ratio(double x, int l) {
-  // (2l+1)/x - 1 / ((2l+3)/x - ...), whose inverse is the ratio
+  // Continued fraction (2l+1)/x - 1 / ((2l+3)/x - ...); the ratio is its inverse.
   constexpr double kTiny = 1e-300;
   double f = (2 * l + 1) / x, c = f, d = 0.0;
   for (int n = 1; n < 100000; ++n) {
@@ -43,7 +42,7 @@ std::vector<Complex> calc_hankel_ratios(double x, int order) {
   return ratio;
 }
 
-/// The harmonics of one unit vector, with their derivatives by its components as if those were free.
+/// Harmonics of one unit vector, with derivatives by its three components as independent variables.
 class Harmonics {
  public:
   explicit Harmonics(int order) : order_(order), a_(count()), b_(count()), value_(count()), cosine_(size()), sine_(size()) {
@@ -79,7 +78,7 @@ class Harmonics {
   /// Y_lm for m >= 0 (cosine) and -m (sine), with gradients.
   void find(int l, int m, double& even, double& odd, Vec3& even_slope, Vec3& odd_slope) const {
     const double scale = m == 0 ? 1.0 : std::numbers::sqrt2, q = scale * value_[at(l, m)];
-    // the derivative of q_lm is that of m + 1 times this factor
+    // The derivative of q_lm is q_l,m+1 times this factor.
     const double slope = scale * (m < l ? value_[at(l, m + 1)] * std::sqrt((l - m) * (l + m + 1.0)) : 0.0);
     const std::size_t i = m;
     even = q * cosine_[i];
@@ -97,7 +96,7 @@ class Harmonics {
   std::vector<double> a_, b_, value_, cosine_, sine_;
 };
 
-/// Waves that are regular at the centre, and their flow through a surface element, (harmonics, points).
+/// Regular waves about the centre and their flux through a surface element, (harmonics, points).
 struct Waves {
   std::vector<double> value, flow;
 };
@@ -110,7 +109,7 @@ std::vector<double> calc_bessel(double x, int order) {
     j[0] = 1.0;
     return j;
   }
-  // Ratios downwards are stable at every l; the first function fixes the rest, or the second where that is near a zero.
+  // Downward ratios are stable for every l; j_0 fixes the scale, or j_1 near a zero of j_0.
   std::vector<double> ratio(order + 2);
   ratio[order + 1] = calc_bessel_ratio(x, order + 1);
   std::vector<double> down(order + 1);

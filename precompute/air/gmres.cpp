@@ -1,6 +1,5 @@
-// Method:     Arnoldi by classical Gram-Schmidt done twice, Givens rotations; each right side has a Krylov space of its own.
+// Method:     Arnoldi by classical Gram-Schmidt with reorthogonalisation, Givens rotations; one Krylov space per right-hand side.
 // Source:     Y. Saad, M. Schultz (1986).
-// Deviations: none.
 #include "precompute/air/gmres.hpp"
 
 #include <algorithm>
@@ -12,7 +11,7 @@ namespace {
 
 using Double = std::complex<double>;
 
-/// Sum over the unknowns of conj(a) b, for each side.
+/// Sum over the unknowns of conj(a) b, per side.
 void calc_products(const Sides& a, const Sides& b, std::vector<Double>& products) {
   std::vector<double> re(a.padded), im(a.padded);
   for (std::size_t i = 0; i < a.unknowns; ++i) {
@@ -26,7 +25,7 @@ void calc_products(const Sides& a, const Sides& b, std::vector<Double>& products
   for (std::size_t m = 0; m < a.count; ++m) products[m] = {re[m], im[m]};
 }
 
-/// b += factor a, for each side.
+/// b += factor a, per side.
 void add_scaled(const Sides& a, const std::vector<Double>& factors, Sides& b) {
   std::vector<float> re(a.padded), im(a.padded);
   for (std::size_t m = 0; m < a.count; ++m) {
@@ -62,7 +61,7 @@ void subtract(const Sides& a, const Sides& b, Sides& difference) {
   for (std::size_t i = 0; i < a.values.size(); ++i) difference.values[i] = a.values[i] - b.values[i];
 }
 
-/// The small least-squares problem of one side: R of the rotated Hessenberg matrix and the rotated right side.
+/// Least-squares problem of one side: R of the rotated Hessenberg matrix and the rotated right-hand side.
 struct Small {
   std::vector<std::vector<Double>> columns;
   std::vector<Double> cosine, sine, right;
@@ -119,7 +118,7 @@ GmresResult solve_gmres(const Multiply& multiply, const Sides& right, const Gmre
     result.residual = 0.0;
     for (std::size_t m = 0; m < sides; ++m) {
       if (wanted[m] == 0.0) continue;
-      const double share = norms[m] / wanted[m];  // no number where any of the side is none
+      const double share = norms[m] / wanted[m];  // NaN if the right-hand side is 0
       result.residual = std::max(result.residual, std::isfinite(share) ? share : std::numeric_limits<double>::infinity());
     }
     result.is_converged = result.residual <= options.tolerance;

@@ -1,4 +1,4 @@
-// Many right sides of one matrix, by GMRES.
+// GMRES for one matrix and many right-hand sides.
 #pragma once
 
 #include <functional>
@@ -11,19 +11,19 @@ namespace carillon::air {
 using Multiply = std::function<void(const Sides& x, Sides& y)>;
 
 struct GmresOptions {
-  double tolerance = 1e-4;  // of the residual, relative to the right side
+  double tolerance = 1e-4;  // relative residual
   int max_products = 300;
   int restart = 60;
 };
 
 struct GmresResult {
   int products = 0;
-  double residual = 0.0;  // of the worst side, relative, as the iteration knows it
+  double residual = 0.0;  // largest relative residual, as estimated by the iteration
   bool is_converged = false;
 };
 
-/// Solves for each side alone; all share the products. `solution` is zero at first or a guess. Sums over unknowns are in double precision
-/// and in their order. Deterministic.
+/// Solves all sides with shared matrix products. `solution`: initial guess, may be zero. Sums over unknowns are in double precision and in
+/// order. Deterministic.
 GmresResult solve_gmres(const Multiply& multiply, const Sides& right, const GmresOptions& options, Sides& solution);
 
 }  // namespace carillon::air

@@ -1,8 +1,6 @@
-// Method:     integrals over the triangle become integrals over its edges by Gauss's theorem in its plane: along each, f = integral of dl /
-// R
-//             and beta, its part of the solid angle.
+// Method:     Gauss's theorem in the plane turns integrals over the triangle into integrals over its edges: f = integral of dl / R along
+//   each edge and beta, the edge's part of the solid angle.
 // Source:     Wilton 1984 (constant and linear densities), Graglia 1993 (their gradients); docs/equations.md E10.
-// Deviations: none.
 #include "precompute/air/potentials.hpp"
 
 #include <cmath>
@@ -10,8 +8,8 @@
 namespace carillon::air {
 namespace {
 
-/// Integral of dl / R from s0 to s1, r0 and r1 the distances of the ends, `near` the squared distance of the line. Differences of equals
-/// are avoided on both sides and, by (r0 + s0) (r0 - s0) = near, next to the edge.
+/// Integral of dl / R from s0 to s1; r0, r1: distances of the ends; `near`: squared distance of the line. Avoids cancellation on both sides
+/// and, by (r0 + s0) (r0 - s0) = near, next to the edge.
 double integrate_edge(double s0, double s1, double r0, double r1, double near) {
   if (s0 < 0.0 && s1 > 0.0) return std::log((r1 + s1) * (r0 - s0) / near);
   if (s0 + s1 >= 0.0) return std::log((r1 + s1) / (r0 + s0));

@@ -1,7 +1,6 @@
-// Method:     power by the multipoles, which is exact where the surface's p v* cancels to nothing; added mass by the mean of p v over the
-//             surface. A plane that reflects: the body and its mirror image, which move alike.
+// Method:     power from the multipoles, since the surface integral of p v* can cancel; added mass from the surface integral of p v. A
+//   reflecting plane: the body and its mirror image, moving in phase.
 // Source:     docs/equations.md E10.
-// Deviations: none.
 #include "precompute/air/radiate.hpp"
 
 #include <fmt/core.h>
@@ -23,17 +22,17 @@ namespace {
 
 using Double = std::complex<double>;
 
-constexpr double kNearTop = 0.7;  // of the highest frequency: modes that lie as near to others beyond the band
+constexpr double kNearTop = 0.7;  // of the highest frequency: above it, missing modes beyond the band may mix in
 
-/// Behind the plane, as far as it is before it.
+/// Mirrors a point at the plane.
 Vec3 mirror(const Plane& plane, const Vec3& place) { return place - (2.0 * dot(place - plane.point_m, plane.normal)) * plane.normal; }
 
-/// The mirror image next to the body: a closed surface again, that moves alike.
+/// Appends the mirror image, moving in phase: again a closed surface.
 void add_mirror_image(const Plane& plane, Radiator& radiator) {
   const std::size_t nodes = radiator.nodes_m.size(), facets = radiator.triangles.size(), row = radiator.count_motions();
   for (std::size_t i = 0; i < nodes; ++i) {
     if (!(dot(radiator.nodes_m[i] - plane.point_m, plane.normal) > 0.0))
-      throw InputError("\"half_space\": the body is not wholly on the side of the plane that its normal shows to; move the plane");
+      throw InputError("\"half_space\": part of the body is behind the plane; move the plane, or reverse its normal");
     radiator.nodes_m.push_back(mirror(plane, radiator.nodes_m[i]));
   }
   const auto shift = static_cast<std::int32_t>(nodes);
@@ -46,7 +45,7 @@ void add_mirror_image(const Plane& plane, Radiator& radiator) {
   radiator.sphere = find_enclosing_sphere(radiator.nodes_m);
 }
 
-/// Facets are as long as the edge of an even triangle of their mean area.
+/// Edge length of an equilateral triangle of the mean facet area.
 void check_facets(const Radiator& radiator, const AirOptions& options) {
   double area = 0.0;
   for (const auto& [a, b, c] : radiator.triangles)
@@ -65,7 +64,7 @@ void check_facets(const Radiator& radiator, const AirOptions& options) {
   if (options.warn) options.warn(text);
 }
 
-/// [l]: what the orders above l make of the whole, squared; the larger of far away and at the nearest distance.
+/// [l]: squared share of the orders above l; the larger of far field and nearest distance.
 std::vector<double> calc_tail(const Sounding& mode, const Spread& spread) {
   std::vector<double> tail(spread.far.size());
   for (const std::vector<double>* counts : {&spread.far, &spread.near}) {
@@ -80,10 +79,10 @@ std::vector<double> calc_tail(const Sounding& mode, const Spread& spread) {
   return tail;
 }
 
-/// Added mass over minus a reaction. A half space is solved with the mirror image, which takes as much.
+/// Ratio of added mass to -reaction. A half space is solved with the mirror image, which doubles the reaction.
 double find_density(const AirOptions& options) { return (options.half_space ? 0.5 : 1.0) * options.air_density_kg_m3; }
 
-/// The added mass of a mode over its modal mass.
+/// Added mass of a mode relative to its modal mass.
 double calc_added_mass(const Sounding& mode, const AirOptions& options) {
   return mode.mixture.is_empty() ? -find_density(options) * mode.reaction.real() : mode.mixture.added_mass;
 }
@@ -95,21 +94,21 @@ void add_mixture(const Sounding& mode, bank::Mixing& mixing) {
   mixing.part.insert(mixing.part.end(), mode.mixture.parts.begin(), mode.mixture.parts.end());
 }
 
-/// Rigid motions with which modes may be coupled: those of one free body.
+/// Rigid motions that can couple to modes: those of one free body.
 std::size_t count_rigid(const bank::Bank& bank) {
   return bank.counts.components == 1 && bank.counts.rigid_modes == static_cast<std::int64_t>(bank::kRigidMotions) ? bank::kRigidMotions : 0;
 }
 
-/// Refuses what moves with the air rather than in it.
+/// Rejects bodies whose motion is dominated by the air (membranes).
 void check_mass(std::size_t mode, double freq_hz, double mass) {
   if (mass > kMostMass)
     throw InputError(
-        fmt::format("mode {} at {:.1f} Hz: the air adds {:.2f} of its own mass: a membrane or a sheet this light moves with "
-                    "the air, which this method cannot do; leave the air out with \"radiation\": \"none\"",
+        fmt::format("mode {} at {:.1f} Hz: the air adds {:.2f} of its own mass: a membrane or sheet this light moves with "
+                    "the air, which this method cannot solve; omit the air with \"radiation\": \"none\"",
                     mode + 1, freq_hz, mass));
 }
 
-/// Warns of modes with much air near the end of the band: those beyond it, which the bank has not, would mix in.
+/// Warns of modes with much added mass near the end of the band: modes beyond it, missing in the bank, would mix in.
 void warn_of_band(const bank::Multipoles& multipoles, std::span<const double> freq_hz, const AirOptions& options) {
   const double top = *std::max_element(freq_hz.begin(), freq_hz.end());
   double most = 0.0, lowest = top;
@@ -119,13 +118,13 @@ void warn_of_band(const bank::Multipoles& multipoles, std::span<const double> fr
     lowest = std::min(lowest, freq_hz[m]);
   }
   if (options.warn && most > 0.0)
-    options.warn(fmt::format(
-        "modes from {:.4g} Hz on, near the end of the band, have an added mass of up to {:.2f}: modes beyond the band, which the "
-        "bank has not, would mix with them in air; end the band an octave above what you need",
-        lowest, most));
+    options.warn(
+        fmt::format("modes from {:.4g} Hz on, near the end of the band, have an added mass of up to {:.2f}: missing modes "
+                    "beyond the band would mix with them in air; end the band an octave higher",
+                    lowest, most));
 }
 
-/// Appends a mode that was solved at k to a residual. Its error is still a ratio of powers, without rounding, and its decay not yet there.
+/// Appends a mode that was solved at k to a residual. The error is still a power ratio without rounding; the decay is set later.
 void add_mode(const Sounding& mode, double k, double residual, const AirOptions& options, bank::Multipoles& multipoles) {
   const double radius = multipoles.radius_m, target = std::pow(10.0, options.order_db / 10.0);
   const std::vector<double> tail = calc_tail(mode, calc_spread(k, radius, multipoles.nearest_m, mode.order));
@@ -143,9 +142,9 @@ void add_mode(const Sounding& mode, double k, double residual, const AirOptions&
   multipoles.error_db.push_back(std::pow(10.0, mode.interpolation_db / 10.0) + tail[order] + residual * residual);
 }
 
-/// Decays by the coefficients as they are kept, and errors in decibels, with what rounding adds to them far away.
+/// Decays from the stored coefficients; errors in decibels, including far-field rounding.
 void add_decays(const AirOptions& options, bank::Multipoles& multipoles) {
-  const double half = options.half_space ? 0.5 : 1.0;  // the image sends out as much, into the other side
+  const double half = options.half_space ? 0.5 : 1.0;  // the image radiates half of the power
   const std::vector<bank::CoefficientDecay> decays = bank::calc_coefficient_decays(multipoles);
   for (std::size_t m = 0; m < decays.size(); ++m) {
     const double root = decays[m].root_rounding, decay = decays[m].decay_per_s;
@@ -165,7 +164,7 @@ std::vector<double> find_played_freq_hz(const bank::Bank& bank) {
 }
 
 double calc_mass_bound(const Radiator& radiator, const AirOptions& options) {
-  std::vector<double> squares(radiator.count_motions());  // integrals over the surface, of linear functions
+  std::vector<double> squares(radiator.count_motions());  // surface integrals, of linear functions
   for (std::size_t t = 0; t < radiator.triangles.size(); ++t) {
     const auto& [a, b, c] = radiator.triangles[t];
     const double area = 0.5 * norm(cross(radiator.nodes_m[b] - radiator.nodes_m[a], radiator.nodes_m[c] - radiator.nodes_m[a]));
@@ -183,7 +182,7 @@ double calc_mass_bound(const Radiator& radiator, const AirOptions& options) {
 Radiator make_radiator(const bank::Bank& bank, std::span<const double> freq_hz, const AirOptions& options) {
   Radiator radiator;
   const std::vector<Triangle> outer = bank::find_outer_triangles(bank.vertices_m, bank.triangles);
-  if (outer.empty()) throw InputError("the surface of the body has no outside: no closed shell of it encloses a volume");
+  if (outer.empty()) throw InputError("the surface of the body has no outside: no closed part of it encloses a volume");
   std::vector<std::int32_t> number(bank.vertex_count(), -1);
   const std::size_t modes = bank.mode_count();
   radiator.rigid = count_rigid(bank);
@@ -245,7 +244,7 @@ double calc_roundness(const bank::Bank& bank) {
 bank::Multipoles calc_multipoles(const comm::Communicator& comm, const bank::Bank& bank, const AirOptions& options, Keeper keeper,
                                  const std::filesystem::path& answers) {
   const std::vector<double> played = find_played_freq_hz(bank);
-  bool may_couple = false;  // on rank 0 first
+  bool may_couple = false;  // on rank 0 at first
   const Radiator whole = comm.agree([&] { return comm.is_root() ? make_radiator(bank, played, options) : Radiator{}; });
   const Radiator modes_alone = comm.agree([&] {
     if (comm.is_root()) may_couple = calc_mass_bound(whole, options) >= kCoupleMass;
@@ -278,9 +277,9 @@ bank::Multipoles calc_multipoles(const comm::Communicator& comm, const bank::Ban
   const Radiator& first = may_couple ? whole : modes_alone;
   comm.agree([&] { keep_in(file, answers, first); });
   AirSolution solution = solve_air(comm, first, solve, keeper);
-  if (comm.broadcast(static_cast<std::int32_t>(solution.lacks_rows)) != 0) {  // a resonance of the air: once more, with all that it takes
+  if (comm.broadcast(static_cast<std::int32_t>(solution.lacks_rows)) != 0) {  // cavity resonance: solve again with coupling rows
     solve.coupling->has_rows = true;
-    // A file of its own: a run that resumes comes past the first solve again.
+    // A separate file, so that a resumed run can skip the first solve.
     comm.agree([&] { keep_in(coupled_file, std::filesystem::path(answers) += ".coupled", whole); });
     solution = solve_air(comm, whole, solve, keeper);
   }
@@ -301,8 +300,8 @@ bank::Multipoles calc_multipoles(const comm::Communicator& comm, const bank::Ban
     if (is_coupled) warn_of_band(multipoles, played, options);
     if (solution.unsettled > solve.coupling->settled && options.warn)
       options.warn(
-          fmt::format("modes that the air couples were still moving by {:.1e} of their frequency when they were solved for the last "
-                      "time; their frequencies in air are right to that",
+          fmt::format("the frequencies of modes coupled by the air still changed by {:.1e} (relative) in the last iteration, "
+                      "which is their uncertainty",
                       solution.unsettled));
     add_decays(options, multipoles);
     for (auto* kept : {&file, &coupled_file})

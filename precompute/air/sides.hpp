@@ -1,4 +1,4 @@
-// Many complex vectors side by side.
+// Blocks of complex vectors.
 #pragma once
 
 #include <complex>
@@ -10,8 +10,8 @@ namespace carillon::air {
 
 inline constexpr std::size_t kSideLanes = 16;
 
-/// Vectors of `unknowns` complex numbers, one for each side. Invariant: of each unknown first all real parts, then all imaginary
-/// ones, filled up with zeros to a multiple of kSideLanes.
+/// Vectors of `unknowns` complex numbers, one per side. Invariant: for each unknown all real parts, then all imaginary parts, zero-padded
+/// to a multiple of kSideLanes.
 struct Sides {
   std::size_t unknowns = 0, count = 0, padded = 0;
   std::vector<float> values;  // (unknowns, 2, padded)

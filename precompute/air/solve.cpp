@@ -1,10 +1,8 @@
-// One march over the wave numbers, whose matrix, solutions and moments every step shares; longer than most files.
-// Method:     a wave number at a time: matrix in single precision, GMRES for the modes that read it, multipoles; LU where GMRES fails.
-//             Modes are interpolated over the wave number; where three and four wave numbers disagree by more than is asked, one more is
-//             put between. Modes that the air couples are sums of solutions at the wave number of the sum: what moves with a mode is
-//             found from the modes' own wave numbers first, then solved at the mode's in air, which moves until it stays.
+// Method:     one wave number at a time: matrix in single precision, GMRES for the modes that read it, multipoles; LU where GMRES fails.
+//   Modes are interpolated over the wave number; where three-point and four-point interpolation differ by more than the tolerance, a wave
+//   number is inserted. Modes coupled by the air are sums of solutions at the wave number of the sum: partners are found from the modes'
+//   own wave numbers, then solved at the mode's wave number in air, iterated until it settles.
 // Source:     docs/equations.md E10.
-// Deviations: none.
 #include "precompute/air/solve.hpp"
 
 #include <fmt/core.h>
@@ -28,12 +26,12 @@ namespace {
 using Single = std::complex<float>;
 using Double = std::complex<double>;
 
-constexpr double kDirectResidual = 1e-3;  // of a solve by LU, in single precision
-constexpr int kRounds = 40;               // of refinement
-constexpr int kSteps = 20;                // after coupled modes that move
+constexpr double kDirectResidual = 1e-3;  // relative residual of LU in single precision
+constexpr int kRounds = 40;               // refinements of the wave numbers
+constexpr int kSteps = 20;                // iterations of shifted or coupled modes
 constexpr std::int32_t kMostOrder = 110;
 
-/// Ranks that share wave numbers: each has some of the rows.
+/// Ranks that share wave numbers; each rank owns some of the rows.
 class Group {
  public:
   Group(const comm::Communicator& comm, std::size_t unknowns, double matrix_bytes, std::size_t wave_numbers)
@@ -58,12 +56,12 @@ class Group {
   int count() const { return count_; }
   bool is_first() const { return comm_->is_root(); }
   bool has_all_rows() const { return comm_->size() == 1; }
-  /// Each rank may take the whole matrix.
+  /// True if each rank may hold the whole matrix.
   bool fits_one_rank() const { return fits_one_rank_; }
   std::size_t get_first() const { return first_[comm_->rank()]; }
   std::size_t get_last() const { return first_[comm_->rank() + 1]; }
 
-  /// All rows of what each rank has its own of.
+  /// Gathers all rows from the ranks.
   void gather(const Sides& mine, Sides& all) const { all.values = comm_->all_gather(mine.values); }
 
  private:
@@ -71,10 +69,10 @@ class Group {
   std::optional<comm::Communicator> comm_;
   bool fits_one_rank_;
   int number_ = 0, count_ = 1;
-  std::vector<std::size_t> first_;  // row of each rank, and the end
+  std::vector<std::size_t> first_;  // first row of each rank, and the end
 };
 
-/// Integral of p v over the surface, for each side.
+/// Surface integral of p v, per side.
 std::vector<Double> calc_reactions(const BoundaryEquations& equations, const std::vector<Single>& pressure,
                                    std::span<const std::int32_t> sides) {
   std::vector<Double> reactions(sides.size());
@@ -110,7 +108,7 @@ WaveAnswer solve_wave(const BoundaryEquations& equations, const Group& group, do
   };
   GmresResult result = solve_gmres(multiply, right, {.tolerance = tolerance}, pressures);
   if (!result.is_converged && (group.has_all_rows() || group.fits_one_rank())) {
-    if (!group.has_all_rows()) equations.assemble(k, sides, 0, unknowns, system);  // each of the group alike
+    if (!group.has_all_rows()) equations.assemble(k, sides, 0, unknowns, system);  // every rank of the group assembles all rows
     result.residual = solve_directly(system, pressures);
     result.is_converged = result.residual <= kDirectResidual;
   }
@@ -119,8 +117,8 @@ WaveAnswer solve_wave(const BoundaryEquations& equations, const Group& group, do
   if (!result.is_converged)
     throw SolveError(
         fmt::format("the pressure on the surface does not converge at k = {:.6g} 1/m: residual {:.1e} after {} products of GMRES, asked "
-                    "{:.0e}; a skin too coarse for the wave can do that (\"skin_nodes\"), and slivers or folds of the surface: mesh it "
-                    "again, or leave the air out with "
+                    "{:.0e}; possible causes: a surface mesh too coarse for the wavelength (\"skin_nodes\"), slivers or folds: remesh the "
+                    "surface, or omit the air with "
                     "\"radiation\": \"none\"",
                     k, result.residual, result.products, tolerance));
   if (!group.is_first()) return answer;
@@ -182,7 +180,7 @@ Sounding interpolate(const std::vector<const Answer*>& answers, const Stencil& s
 
 // ---- coupling ----
 
-/// What a wave number gave to a mixture. All of its motions were solved there.
+/// Solutions at one wave number for a mixture. All of its motions were solved there.
 Answer combine(const WaveAnswer& wave, const Mixture& mixture) {
   Answer sum;
   for (const std::int32_t i : mixture.motions) sum.order = std::max(sum.order, wave.modes.at(i).order);
@@ -197,8 +195,8 @@ Answer combine(const WaveAnswer& wave, const Mixture& mixture) {
   return sum;
 }
 
-/// The air's mass between all modes, (n, n) symmetric: what each makes of the others at its own wave number, in the mean of both ways.
-/// `mine`: the answers that a mode reads.
+/// Air mass matrix of all modes, (n, n) symmetric: each pair at the two modes' own wave numbers, averaged. `mine`: the answers that a mode
+/// reads.
 template <typename Mine>
 std::vector<double> calc_masses(std::size_t modes, const std::vector<Stencil>& stencils, double density, const Mine& mine) {
   std::vector<double> mass(modes * modes);
@@ -214,7 +212,7 @@ std::vector<double> calc_masses(std::size_t modes, const std::vector<Stencil>& s
   return mass;
 }
 
-/// The same between the motions of a mixture alone, at its wave number.
+/// Mass matrix of the motions of one mixture at its wave number.
 std::vector<double> calc_masses_within(const std::vector<const WaveAnswer*>& waves, const Stencil& stencil, double density,
                                        const std::vector<std::int32_t>& motions) {
   const std::size_t count = motions.size();
@@ -231,7 +229,7 @@ std::vector<double> calc_masses_within(const std::vector<const WaveAnswer*>& wav
   return mass;
 }
 
-/// The mixture with the rigid motions on which the mode's pressure works as much as counts.
+/// The mixture plus the rigid motions that are coupled to it above the threshold.
 void add_rigid_motions(const std::vector<const WaveAnswer*>& waves, const Stencil& stencil, const CouplingOptions& options,
                        std::int32_t mode, std::size_t modes, Mixture& mixture) {
   const std::size_t motions = waves[0]->modes.at(mode).row.size();
@@ -245,7 +243,7 @@ void add_rigid_motions(const std::vector<const WaveAnswer*>& waves, const Stenci
   }
 }
 
-/// The largest difference of both ways between two motions, relative to the mean of what they have alone.
+/// Largest asymmetry between two motions, relative to the mean of their own masses.
 double calc_reciprocity(const std::map<double, WaveAnswer>& answers) {
   double worst = 0.0;
   for (const auto& [k, wave] : answers)
@@ -264,7 +262,7 @@ Radiator share(const comm::Communicator& comm, const Radiator& radiator) {
           comm.broadcast(radiator.sphere),   static_cast<std::size_t>(comm.broadcast(static_cast<std::int64_t>(radiator.rigid)))};
 }
 
-/// The velocities in the order of the surface's facets and corners.
+/// Velocities in the order of the surface's facets and corners.
 std::vector<float> reorder(const RadiatingSurface& surface, const Radiator& radiator) {
   const std::size_t row = radiator.count_motions();
   std::vector<float> velocity(surface.count_facets() * 3 * row);
@@ -318,6 +316,203 @@ std::optional<WaveAnswer> unpack(std::span<const double> packed) {
 
 std::int32_t find_order(double k_radius) { return std::min(kMostOrder, static_cast<std::int32_t>(std::ceil(k_radius)) + 12); }
 
+namespace {
+
+// ---- the solve ----
+
+/// Input of all steps, the same on all ranks.
+struct Problem {
+  const comm::Communicator& comm;
+  const Radiator& radiator;
+  const AirSolveOptions& options;
+  const Keeper& keeper;
+  const BoundaryEquations& equations;
+  const Group& group;
+  double radius_m = 0.0;
+  bool has_rows = false;
+};
+
+struct State {
+  std::vector<double> modes;  // (n) wave numbers at which they are solved
+  WaveNumbers waves;
+  std::vector<Stencil> stencils;         // (n) of `modes` in `waves`
+  std::vector<Mixture> mixtures;         // (n); empty: uncoupled modes. On ranks other than 0 the motions only
+  std::map<double, WaveAnswer> answers;  // by wave number, on rank 0
+
+  const WaveAnswer& get_answer(std::size_t mode, std::size_t n) const { return answers.at(waves.get()[stencils[mode].nodes[n]]); }
+  std::vector<const WaveAnswer*> list_answers(std::size_t mode) const {
+    std::vector<const WaveAnswer*> list;
+    for (std::size_t n = 0; n < stencils[mode].nodes.size(); ++n) list.push_back(&get_answer(mode, n));
+    return list;
+  }
+  void add(WaveAnswer answer) {
+    WaveAnswer& all = answers[answer.k];
+    all.k = answer.k;
+    all.products = std::max(all.products, answer.products);
+    all.residual = std::max(all.residual, answer.residual);
+    all.modes.merge(answer.modes);
+  }
+};
+
+/// Motions to be solved at one wave number.
+struct WaveTask {
+  std::int32_t node = 0, order = 0;
+  std::vector<std::int32_t> motions;
+};
+
+/// The missing solves, by wave number; sets the stencils. The same on all ranks. Collective.
+std::vector<WaveTask> find_tasks(const Problem& problem, State& state) {
+  struct Request {
+    std::int32_t node, motion;
+  };
+  std::set<std::pair<std::int32_t, std::int32_t>> wanted;  // (wave number, motion)
+  std::vector<std::int32_t> orders(state.waves.get().size());
+  state.stencils.clear();
+  for (std::size_t m = 0; m < state.modes.size(); ++m) {
+    state.stencils.push_back(state.waves.find_stencil(state.modes[m]));
+    for (const std::int32_t node : state.stencils.back().nodes) {
+      wanted.emplace(node, static_cast<std::int32_t>(m));
+      if (!state.mixtures.empty())
+        for (const std::int32_t motion : state.mixtures[m].motions) wanted.emplace(node, motion);
+      orders[node] = std::max(orders[node], find_order(state.modes[m] * problem.radius_m));
+    }
+  }
+  const std::vector<Request> missing = problem.comm.broadcast([&] {
+    std::vector<Request> list;
+    for (const auto& [node, motion] : wanted) {
+      const auto known = state.answers.find(state.waves.get()[node]);
+      if (known == state.answers.end() || !known->second.modes.contains(motion)) list.push_back({node, motion});
+    }
+    return list;
+  });
+  std::vector<WaveTask> tasks;
+  for (const Request& request : missing) {
+    if (tasks.empty() || tasks.back().node != request.node) tasks.push_back({request.node, orders[request.node], {}});
+    tasks.back().motions.push_back(request.motion);
+  }
+  return tasks;
+}
+
+/// Sends an answer of each group to rank 0, which saves it. `own`: null on ranks without one. Collective.
+void collect_answers(const Problem& problem, const WaveAnswer* own, State& state) {
+  const comm::Communicator& comm = problem.comm;
+  const std::vector<double> packed = comm.agree([&] { return own != nullptr ? pack(*own) : std::vector<double>{}; });
+  const std::vector<std::int64_t> sizes = comm.all_gather(std::vector<std::int64_t>{std::ssize(packed)});
+  const std::vector<double> all = comm.all_gather(packed);
+  comm.agree([&] {
+    if (!comm.is_root()) return;
+    std::span<const double> rest(all);
+    for (const std::int64_t size : sizes) {
+      if (size == 0) continue;
+      WaveAnswer answer = unpack(rest.first(static_cast<std::size_t>(size))).value();
+      rest = rest.subspan(static_cast<std::size_t>(size));
+      if (problem.keeper.save) problem.keeper.save(answer);
+      state.add(std::move(answer));
+    }
+  });
+}
+
+/// Solves what the modes read, a wave number per group at a time. Collective. Throws SolveStopped.
+void solve_missing(const Problem& problem, int round, State& state) {
+  const comm::Communicator& comm = problem.comm;
+  const auto groups = static_cast<std::size_t>(problem.group.count());
+  const std::vector<WaveTask> tasks = find_tasks(problem, state);
+  for (std::size_t first = 0; first < tasks.size(); first += groups) {
+    const std::size_t own = first + static_cast<std::size_t>(problem.group.get_number());
+    const WaveAnswer answer = comm.agree([&] {
+      if (own >= tasks.size()) return WaveAnswer{};
+      return solve_wave(problem.equations, problem.group, state.waves.get()[tasks[own].node], tasks[own].order, tasks[own].motions,
+                        problem.options.tolerance, problem.has_rows);
+    });
+    collect_answers(problem, own < tasks.size() && problem.group.is_first() ? &answer : nullptr, state);
+    const std::size_t done = std::min(tasks.size(), first + groups);
+    if (comm.is_root() && problem.keeper.report)
+      problem.keeper.report(fmt::format("{}{} of {} wave numbers", round == 0 ? "" : "refinement, ", done, tasks.size()),
+                            static_cast<double>(done) / static_cast<double>(tasks.size()));
+    const bool is_stopped =
+        comm.broadcast(static_cast<std::int32_t>(comm.is_root() && problem.keeper.is_stop_asked && problem.keeper.is_stop_asked())) != 0;
+    if (is_stopped) throw SolveStopped();
+  }
+}
+
+/// Updates the mixtures at their wave numbers. Returns the wave numbers of modes that are to be solved again. Collective.
+std::vector<double> follow_mixtures(const Problem& problem, State& state, AirSolution& solution) {
+  return problem.comm.broadcast([&] {
+    std::vector<double> moved = state.modes;
+    solution.unsettled = 0.0;
+    for (std::size_t m = 0; m < moved.size(); ++m) {
+      Mixture& mixture = state.mixtures[m];
+      std::vector<double> wave_numbers;
+      for (const std::int32_t i : mixture.motions)
+        wave_numbers.push_back(i < std::ssize(moved) ? problem.radiator.wave_number_1_m[i] : 0.0);
+      const std::vector<double> mass =
+          calc_masses_within(state.list_answers(m), state.stencils[m], problem.options.coupling->density_kg_m3, mixture.motions);
+      mixture = follow_mode(wave_numbers, mass, mixture);
+      const double distance = std::abs(mixture.wave_number_1_m / state.modes[m] - 1.0);
+      solution.unsettled = std::max(solution.unsettled, distance);
+      if (distance > problem.options.coupling->settled) moved[m] = mixture.wave_number_1_m;
+    }
+    return moved;
+  });
+}
+
+/// Interpolates all modes on rank 0. Returns the modes with too large an error. Collective.
+std::vector<bool> interpolate_modes(const Problem& problem, const State& state, AirSolution& solution) {
+  const double nearest_m = problem.options.nearest_over_radius * problem.radius_m;
+  const std::vector<std::int32_t> wrong = problem.comm.broadcast([&] {
+    std::vector<std::int32_t> list(state.modes.size());
+    for (std::size_t m = 0; m < state.modes.size(); ++m) {
+      std::vector<Answer> sums;
+      std::vector<const Answer*> read;
+      for (const WaveAnswer* wave : state.list_answers(m)) {
+        if (state.mixtures.empty())
+          read.push_back(&wave->modes.at(static_cast<std::int32_t>(m)));
+        else
+          sums.push_back(combine(*wave, state.mixtures[m]));
+      }
+      for (const Answer& sum : sums) read.push_back(&sum);
+      std::int32_t order = 0;
+      for (const Answer* one : read) order = std::max(order, one->order);
+      solution.modes[m] = interpolate(read, state.stencils[m], calc_spread(state.modes[m], problem.radius_m, nearest_m, order));
+      if (!state.mixtures.empty()) solution.modes[m].mixture = state.mixtures[m];
+      list[m] = static_cast<std::int32_t>(solution.modes[m].interpolation_db > problem.options.error_db);
+    }
+    return list;
+  });
+  return {wrong.begin(), wrong.end()};
+}
+
+/// Makes the mixtures from uncoupled modes, and moves the modes to their wave numbers. Collective.
+void couple(const Problem& problem, State& state) {
+  struct Part {
+    std::int32_t mode, motion;
+  };
+  std::vector<double> wave_numbers;
+  const std::vector<Part> parts = problem.comm.broadcast([&] {
+    const std::size_t count = state.modes.size();
+    const CouplingOptions& options = *problem.options.coupling;
+    const std::vector<double> mass = calc_masses(count, state.stencils, options.density_kg_m3,
+                                                 [&](std::size_t m, std::size_t n) -> const WaveAnswer& { return state.get_answer(m, n); });
+    state.mixtures = couple_modes(state.modes, mass, options.kept);
+    std::vector<Part> list;
+    for (std::size_t m = 0; m < count; ++m) {
+      Mixture& mixture = state.mixtures[m];
+      add_rigid_motions(state.list_answers(m), state.stencils[m], options, static_cast<std::int32_t>(m), count, mixture);
+      wave_numbers.push_back(mixture.wave_number_1_m);
+      for (const std::int32_t motion : mixture.motions) list.push_back({static_cast<std::int32_t>(m), motion});
+    }
+    return list;
+  });
+  state.modes = problem.comm.broadcast(std::move(wave_numbers));
+  problem.comm.agree([&] {
+    if (problem.comm.is_root()) return;
+    state.mixtures.resize(state.modes.size());
+    for (const Part& part : parts) state.mixtures[part.mode].motions.push_back(part.motion);
+  });
+}
+
+}  // namespace
+
 AirSolution solve_air(const comm::Communicator& comm, const Radiator& radiator_of_root, const AirSolveOptions& options,
                       const Keeper& keeper) {
   const Radiator radiator = share(comm, radiator_of_root);
@@ -327,141 +522,33 @@ AirSolution solve_air(const comm::Communicator& comm, const Radiator& radiator_o
   const auto equations = comm.agree([&] {
     return std::make_unique<BoundaryEquations>(*surface, radiator.sphere, reorder(*surface, radiator), radiator.count_motions());
   });
-  std::vector<double> modes = radiator.wave_number_1_m;
   solution.sphere = equations->get_sphere();
   solution.unknowns = surface->count_nodes();
-  const double radius = solution.sphere.radius_m, nearest = options.nearest_over_radius * radius;
-  WaveNumbers waves(modes, radius, options.step);
-  const Group group(comm, solution.unknowns, options.matrix_bytes, waves.get().size());
-  std::map<double, WaveAnswer> answers;  // on rank 0
-  const auto add_answer = [&](WaveAnswer answer) {
-    WaveAnswer& all = answers[answer.k];
-    all.k = answer.k;
-    all.products = std::max(all.products, answer.products);
-    all.residual = std::max(all.residual, answer.residual);
-    all.modes.merge(answer.modes);
-  };
+  solution.modes.resize(radiator.count_modes());
+  const double radius_m = solution.sphere.radius_m;
+  State state{.modes = radiator.wave_number_1_m, .waves = WaveNumbers(radiator.wave_number_1_m, radius_m, options.step)};
+  const Group group(comm, solution.unknowns, options.matrix_bytes, state.waves.get().size());
+  const bool has_rows = options.coupling && options.coupling->has_rows;
+  const Problem problem{comm, radiator, options, keeper, *equations, group, radius_m, has_rows};
   comm.agree([&] {
     if (!comm.is_root() || !keeper.read) return;
-    for (WaveAnswer& kept : keeper.read()) add_answer(std::move(kept));
+    for (WaveAnswer& kept : keeper.read()) state.add(std::move(kept));
   });
-  solution.modes.resize(modes.size());
-  const bool has_rows = options.coupling && options.coupling->has_rows;
-  enum class Stage : std::uint8_t { kAlone, kShifted, kCoupled } stage = Stage::kAlone;
-  int steps = 0;                  // after coupled modes that move
-  std::vector<Mixture> mixtures;  // (n) once modes are coupled; of other ranks the motions alone
-  for (int round = 0;; ++round) {
-    // What is still to be solved: (wave number, modes). The same on all ranks.
-    std::vector<Stencil> stencils;
-    std::map<std::int32_t, std::set<std::int32_t>> readers;
-    std::vector<std::int32_t> orders(waves.get().size());
-    for (std::size_t m = 0; m < modes.size(); ++m) {
-      stencils.push_back(waves.find_stencil(modes[m]));
-      for (const std::int32_t node : stencils.back().nodes) {
-        readers[node].insert(static_cast<std::int32_t>(m));
-        if (!mixtures.empty()) readers[node].insert(mixtures[m].motions.begin(), mixtures[m].motions.end());
-        orders[node] = std::max(orders[node], find_order(modes[m] * radius));
-      }
-    }
-    std::vector<std::int32_t> wanted = comm.broadcast([&] {
-      std::vector<std::int32_t> list;  // wave number, count, modes ...
-      for (const auto& [node, who] : readers) {
-        const auto known = answers.find(waves.get()[node]);
-        std::vector<std::int32_t> lacking;
-        for (const std::int32_t m : who)
-          if (known == answers.end() || !known->second.modes.contains(m)) lacking.push_back(m);
-        if (lacking.empty()) continue;
-        list.insert(list.end(), {node, static_cast<std::int32_t>(lacking.size())});
-        list.insert(list.end(), lacking.begin(), lacking.end());
-      }
-      return list;
-    });
-    std::vector<std::pair<std::int32_t, std::vector<std::int32_t>>> work;
-    for (std::size_t at = 0; at < wanted.size(); at += 2 + static_cast<std::size_t>(wanted[at + 1]))
-      work.emplace_back(wanted[at], std::vector<std::int32_t>(wanted.begin() + static_cast<std::ptrdiff_t>(at) + 2,
-                                                              wanted.begin() + static_cast<std::ptrdiff_t>(at) + 2 + wanted[at + 1]));
-    for (std::size_t first = 0; first < work.size(); first += static_cast<std::size_t>(group.count())) {
-      const std::size_t own_work = first + static_cast<std::size_t>(group.get_number());
-      const WaveAnswer answer = comm.agree([&] {
-        if (own_work >= work.size()) return WaveAnswer{};
-        const std::size_t node = work[own_work].first;
-        return solve_wave(*equations, group, waves.get()[node], orders[node], work[own_work].second, options.tolerance, has_rows);
-      });
-      const std::vector<double> packed = comm.all_gather([&] {
-        std::vector<double> own;
-        if (own_work >= work.size() || !group.is_first()) return own;
-        own = pack(answer);
-        own.insert(own.begin(), static_cast<double>(own.size()));
-        return own;
-      });
-      comm.agree([&] {
-        if (!comm.is_root()) return;
-        for (std::size_t at = 0; at < packed.size(); at += 1 + static_cast<std::size_t>(packed[at])) {
-          WaveAnswer home = unpack(std::span(packed).subspan(at + 1, packed[at])).value();
-          if (keeper.save) keeper.save(home);
-          add_answer(std::move(home));
-        }
-      });
-      const std::size_t done = std::min(work.size(), first + static_cast<std::size_t>(group.count()));
-      if (comm.is_root() && keeper.report)
-        keeper.report(fmt::format("{}{} of {} wave numbers", round == 0 ? "" : "refinement, ", done, work.size()),
-                      static_cast<double>(done) / static_cast<double>(work.size()));
-      const bool is_stopped =
-          comm.broadcast(static_cast<std::int32_t>(comm.is_root() && keeper.is_stop_asked && keeper.is_stop_asked())) != 0;
-      if (is_stopped) throw SolveStopped();
-    }
-    // What a mode reads, on rank 0.
-    const auto mine = [&](std::size_t m, std::size_t n) -> const WaveAnswer& { return answers.at(waves.get()[stencils[m].nodes[n]]); };
-    const auto list_mine = [&](std::size_t m) {
-      std::vector<const WaveAnswer*> list;
-      for (std::size_t n = 0; n < stencils[m].nodes.size(); ++n) list.push_back(&mine(m, n));
-      return list;
-    };
-    if (stage == Stage::kCoupled) {
-      std::vector<double> moved = comm.broadcast([&] {
-        std::vector<double> list = modes;
-        solution.unsettled = 0.0;
-        for (std::size_t m = 0; m < modes.size(); ++m) {
-          std::vector<double> wave_numbers;
-          for (const std::int32_t i : mixtures[m].motions)
-            wave_numbers.push_back(i < std::ssize(modes) ? radiator.wave_number_1_m[i] : 0.0);
-          mixtures[m] =
-              follow_mode(wave_numbers, calc_masses_within(list_mine(m), stencils[m], options.coupling->density_kg_m3, mixtures[m].motions),
-                          mixtures[m]);
-          const double distance = std::abs(mixtures[m].wave_number_1_m / modes[m] - 1.0);
-          solution.unsettled = std::max(solution.unsettled, distance);
-          if (distance > options.coupling->settled) list[m] = mixtures[m].wave_number_1_m;
-        }
-        return list;
-      });
-      if (steps < kSteps && moved != modes) {
+  bool is_at_own_frequencies = true;  // of the modes without air
+  for (int round = 0, steps = 0;; ++round) {
+    solve_missing(problem, round, state);
+    if (!state.mixtures.empty()) {
+      std::vector<double> moved = follow_mixtures(problem, state, solution);
+      if (steps < kSteps && moved != state.modes) {
         ++steps;
-        modes = std::move(moved);
+        state.modes = std::move(moved);
         continue;
       }
     }
-    std::vector<std::int32_t> wrong = comm.broadcast([&] {
-      std::vector<std::int32_t> list(modes.size());
-      for (std::size_t m = 0; m < modes.size(); ++m) {
-        std::vector<Answer> sums;
-        std::vector<const Answer*> read;
-        for (const WaveAnswer* wave : list_mine(m)) {
-          if (stage == Stage::kCoupled)
-            sums.push_back(combine(*wave, mixtures[m]));
-          else
-            read.push_back(&wave->modes.at(static_cast<std::int32_t>(m)));
-        }
-        for (const Answer& sum : sums) read.push_back(&sum);
-        std::int32_t order = 0;
-        for (const Answer* one : read) order = std::max(order, one->order);
-        solution.modes[m] = interpolate(read, stencils[m], calc_spread(modes[m], radius, nearest, order));
-        if (stage == Stage::kCoupled) solution.modes[m].mixture = mixtures[m];
-        list[m] = static_cast<std::int32_t>(solution.modes[m].interpolation_db > options.error_db);
-      }
-      return list;
-    });
-    if (round < kRounds && waves.refine(modes, std::vector<bool>(wrong.begin(), wrong.end()))) continue;
-    if (stage != Stage::kAlone) break;
+    const std::vector<bool> wrong = interpolate_modes(problem, state, solution);
+    if (round < kRounds && state.waves.refine(state.modes, wrong)) continue;
+    if (!is_at_own_frequencies) break;
+    is_at_own_frequencies = false;
     const bool is_coupled = comm.broadcast([&] {
       return static_cast<std::int32_t>(options.coupling && options.coupling->is_called_for &&
                                        options.coupling->is_called_for(solution.modes));
@@ -469,44 +556,21 @@ AirSolution solve_air(const comm::Communicator& comm, const Radiator& radiator_o
     if (is_coupled) {
       solution.lacks_rows = !has_rows;
       if (!has_rows) break;
-      stage = Stage::kCoupled;
-      // Of each mode its wave number, how many motions it has, and which.
-      const std::vector<double> list = comm.broadcast([&] {
-        std::vector<double> numbers;
-        const std::vector<double> mass = calc_masses(modes.size(), stencils, options.coupling->density_kg_m3, mine);
-        mixtures = couple_modes(modes, mass, options.coupling->kept);
-        for (std::size_t m = 0; m < modes.size(); ++m) {
-          add_rigid_motions(list_mine(m), stencils[m], *options.coupling, static_cast<std::int32_t>(m), modes.size(), mixtures[m]);
-          numbers.insert(numbers.end(), {mixtures[m].wave_number_1_m, static_cast<double>(mixtures[m].motions.size())});
-          numbers.insert(numbers.end(), mixtures[m].motions.begin(), mixtures[m].motions.end());
-        }
-        return numbers;
-      });
-      comm.agree([&] {
-        mixtures.resize(modes.size());
-        std::size_t at = 0;
-        for (std::size_t m = 0; m < modes.size(); ++m) {
-          modes[m] = list[at];
-          const auto first = list.begin() + static_cast<std::ptrdiff_t>(at) + 2, last = first + static_cast<std::ptrdiff_t>(list[at + 1]);
-          mixtures[m].motions.assign(first, last);
-          at += 2 + mixtures[m].motions.size();
-        }
-      });
+      couple(problem, state);
       continue;
     }
-    stage = Stage::kShifted;
     if (!options.shift) break;
     std::vector<double> shifted = comm.broadcast([&] {
       std::vector<double> list;
-      for (std::size_t m = 0; m < modes.size(); ++m) list.push_back(options.shift(modes[m], solution.modes[m]));
+      for (std::size_t m = 0; m < state.modes.size(); ++m) list.push_back(options.shift(state.modes[m], solution.modes[m]));
       return list;
     });
-    if (shifted == modes) break;
-    modes = std::move(shifted);
+    if (shifted == state.modes) break;
+    state.modes = std::move(shifted);
   }
-  solution.wave_number_1_m = modes;
-  if (stage == Stage::kCoupled) solution.reciprocity = calc_reciprocity(answers);
-  for (const auto& [k, answer] : answers) {
+  solution.wave_number_1_m = state.modes;
+  if (!state.mixtures.empty()) solution.reciprocity = calc_reciprocity(state.answers);
+  for (const auto& [k, answer] : state.answers) {
     ++solution.wave_numbers;
     solution.products = std::max(solution.products, answer.products);
     solution.residual = std::max(solution.residual, answer.residual);

@@ -1,7 +1,6 @@
-// Method:     for each facet all that are near it, found on a grid; inner integrals in closed form, outer ones by seven points of the facet
-//             or of its four quarters, the same points for all that are very near, so that jumps between neighbours cancel.
+// Method:     all facets near each facet, found on a grid; inner integrals in closed form, outer ones by seven points on the facet or on
+//   its four quarters; all very near neighbours share points, so jumps between neighbours cancel.
 // Source:     docs/equations.md E10; seven points of degree five: Radon 1948.
-// Deviations: none.
 #include "precompute/air/static_part.hpp"
 
 #include <algorithm>
@@ -16,12 +15,12 @@ namespace carillon::air {
 namespace {
 
 constexpr double kPerSphere = 1.0 / (4.0 * std::numbers::pi);
-constexpr double kNear = 2.5;      // between centroids, in the larger longest edge: what is corrected
-constexpr double kVeryNear = 1.5;  // what takes the finer rule
+constexpr double kNear = 2.5;      // centroid distance over the larger longest edge: corrected
+constexpr double kVeryNear = 1.5;  // the same: finer rule
 
 struct OuterPoint {
   std::array<double, 3> hat{};
-  double weight = 0.0;  // share of the area
+  double weight = 0.0;  // fraction of the area
 };
 
 std::vector<OuterPoint> make_rule(bool is_fine) {
@@ -50,7 +49,7 @@ std::vector<OuterPoint> make_rule(bool is_fine) {
   return fine;
 }
 
-/// The facets whose centroids are near a place: buckets of facets of one size class each.
+/// Facets by centroid: one grid per size class.
 class Neighbours {
  public:
   explicit Neighbours(const RadiatingSurface& surface) : facets_(surface.get_facets()) {
@@ -67,7 +66,7 @@ class Neighbours {
 
   const Vec3& get_centroid(std::size_t facet) const { return centroids_[facet]; }
 
-  /// All whose centroid is nearer than kNear times the larger of both sizes, ascending.
+  /// Facets whose centroid is nearer than kNear times the larger of both sizes, ascending.
   void find(std::size_t facet, std::vector<std::int32_t>& found) const {
     found.clear();
     const double size = facets_[facet].size_m;
@@ -85,7 +84,7 @@ class Neighbours {
           }
     }
     std::sort(found.begin(), found.end());
-    found.erase(std::unique(found.begin(), found.end()), found.end());  // cells may share a key
+    found.erase(std::unique(found.begin(), found.end()), found.end());  // cells may share a hash
   }
 
  private:
@@ -107,7 +106,7 @@ class Neighbours {
   int lowest_ = 4096, highest_ = -4096;
 };
 
-/// Whether the plain rule leaves the static kernels of this pair of points to others; in single precision, as the plain rule works.
+/// True if the midpoint rule omits the static kernels of this pair of points; in single precision, like the midpoint rule.
 bool are_near(const EdgePoint& a, const EdgePoint& b) {
   float squared = 0.0F;
   for (std::size_t k = 0; k < 3; ++k) {
@@ -118,7 +117,7 @@ bool are_near(const EdgePoint& a, const EdgePoint& b) {
   return squared < reach * reach;
 }
 
-/// The integrals over one pair of facets, without 1 / 4 pi.
+/// Integrals over one pair of facets, without 1 / 4 pi.
 struct Pair {
   double plain = 0.0;              // of 1 / R
   double single[3][3] = {};        // of lambda_i lambda_j / R

@@ -1,4 +1,4 @@
-// What the midpoint rule misses of the static kernels 1 / 4 pi r near a facet: made once for a surface, whatever the wave number.
+// Correction of the midpoint rule for the static kernels 1 / 4 pi r of near facets; independent of the wave number.
 #pragma once
 
 #include <cstddef>
@@ -10,12 +10,12 @@
 
 namespace carillon::air {
 
-/// Midpoints nearer than this times the larger of their sizes take part in the plain rule with G - 1 / 4 pi r alone. No ratio of lengths in
-/// a regular mesh.
+/// Midpoints nearer than this times the larger of their sizes use G - 1 / 4 pi r in the midpoint rule. Chosen to equal no ratio of lengths
+/// of a regular mesh.
 inline constexpr float kNearPoints = 0.8123F;
 
-/// The sparse rest of the static Galerkin integrals over pairs of facets that are near each other, exact minus the midpoint rule. N nodes,
-/// n velocities. Rows have ascending columns and are the same for all three; (first[i] .. first[i + 1]) are those of node i.
+/// Sparse correction of the static Galerkin integrals over near pairs of facets, exact minus midpoint rule. N nodes, n velocities. Rows
+/// have ascending columns, the same for all three matrices; (first[i] .. first[i + 1]): row of node i.
 struct StaticPart {
   std::vector<std::size_t> first;    // (N + 1)
   std::vector<std::int32_t> column;  // nodes
@@ -28,8 +28,8 @@ struct StaticPart {
   std::size_t calc_bytes() const;
 };
 
-/// `velocity`: (T, 3, n) at the corners of each facet, linear between them. The inner integrals are in closed form, so that walls much
-/// thinner than a facet are no harder than others.
+/// `velocity`: (T, 3, n) at the corners of each facet, linear between them. Inner integrals are in closed form, so walls may be much
+/// thinner than a facet.
 StaticPart make_static_part(const RadiatingSurface& surface, std::span<const float> velocity, std::size_t count);
 
 }  // namespace carillon::air

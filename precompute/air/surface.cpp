@@ -1,8 +1,6 @@
-// Method:     facets are ordered by recursive halving of their centroids; nodes and edges are numbered as the facets meet them. The
-// smallest
-//             sphere: Welzl's recursion in its iterative form, points that lie outside move to the front.
+// Method:     facets are ordered by recursive bisection of their centroids; nodes and edges are numbered in that order. Smallest sphere:
+//   iterative form of Welzl's algorithm with move-to-front.
 // Source:     E. Welzl, Smallest enclosing disks (1991).
-// Deviations: none.
 #include "precompute/air/surface.hpp"
 
 #include <algorithm>
@@ -16,7 +14,7 @@
 namespace carillon::air {
 namespace {
 
-constexpr double kFlat = 1e-10;  // area over squared longest edge below which a triangle is none
+constexpr double kFlat = 1e-10;  // area over squared longest edge of a degenerate triangle
 
 void order_range(std::span<const Vec3> places, std::span<std::int32_t> items, std::size_t run) {
   if (items.size() <= run) return;
@@ -39,7 +37,7 @@ void order_range(std::span<const Vec3> places, std::span<std::int32_t> items, st
   order_range(places, items.subspan(cut), run);
 }
 
-/// The sphere through the points of the support, in the space that they span.
+/// Sphere through the support points, in their affine span.
 Sphere make_sphere(std::span<const Vec3> support) {
   if (support.empty()) return {};
   const Vec3 base = support[0];
@@ -70,7 +68,7 @@ Sphere make_sphere(std::span<const Vec3> support) {
 
 bool is_outside(const Sphere& sphere, const Vec3& point) { return norm(point - sphere.centre_m) > sphere.radius_m * (1.0 + 1e-11); }
 
-/// Of the first `count` points, with the support on its surface. Moves points that matter to the front.
+/// Smallest sphere of the first `count` points with the support on its surface. Moves significant points to the front.
 Sphere enclose(std::vector<Vec3>& points, std::size_t count, std::vector<Vec3>& support) {
   Sphere sphere = support.empty() ? Sphere{points[0], 0.0} : make_sphere(support);
   if (support.size() == 4 || sphere.radius_m < 0.0) return sphere;

@@ -1,4 +1,4 @@
-// The surface that radiates, as boundary elements see it: flat facets with the midpoints of their edges.
+// Radiating surface for boundary elements: flat facets with the midpoints of their edges.
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@
 
 namespace carillon::air {
 
-/// A triangle of the surface. The curl of the hat function of corner c on it is the constant curl[c] [1/m].
+/// Surface triangle. The curl of the hat function of corner c on it is the constant curl[c] [1/m].
 struct Facet {
   Triangle corners{};                    // nodes
   std::array<std::int32_t, 3> points{};  // midpoint of the edge opposite each corner
@@ -21,24 +21,24 @@ struct Facet {
   std::array<Vec3, 3> curl{};
 };
 
-/// Midpoint of an edge. Products of two hat functions are integrated exactly by the midpoints of a facet, each with a third of its area.
+/// Edge midpoint. Products of two hat functions are integrated exactly by the three midpoints, each with a third of the area.
 struct EdgePoint {
   Vec3 place_m{};
   std::array<std::int32_t, 2> nodes{};
-  double size_m = 0.0;  // the smallest of the facets there
+  double size_m = 0.0;  // smallest size of the adjacent facets
 };
 
-/// Closed, oriented surfaces with N nodes, T facets and E = 3 T / 2 edges. Invariant: facets that are near in the list are near in
-/// space; nodes and edges are numbered in the order in which the facets meet them; there is no facet without an area.
+/// Closed, oriented surfaces with N nodes, T facets and E = 3 T / 2 edges. Invariant: facets close in the list are close in space; nodes
+/// and edges are numbered in the order of the facets; no facet has zero area.
 class RadiatingSurface {
  public:
-  /// Gives nodes and facets other numbers. Throws InputError when a number is not finite, and when no facet has an area.
+  /// Renumbers nodes and facets. Throws InputError for non-finite numbers and if all facets are degenerate.
   RadiatingSurface(std::span<const Vec3> nodes_m, std::span<const Triangle> triangles);
 
   const std::vector<Vec3>& get_nodes() const { return nodes_m_; }
   const std::vector<Facet>& get_facets() const { return facets_; }
   const std::vector<EdgePoint>& get_points() const { return points_; }
-  /// (N), (T) numbers in what the constructor was given.
+  /// (N), (T) numbers in the constructor's input.
   const std::vector<std::int32_t>& get_node_sources() const { return node_source_; }
   const std::vector<std::int32_t>& get_facet_sources() const { return facet_source_; }
   std::size_t count_nodes() const { return nodes_m_.size(); }
@@ -55,16 +55,16 @@ class RadiatingSurface {
   std::vector<std::int32_t> node_source_, facet_source_;
 };
 
-/// A sphere around points.
+/// Sphere around points.
 struct Sphere {
   Vec3 centre_m{};
   double radius_m = 0.0;
 };
 
-/// The smallest sphere around the points, to 1e-9 of its radius; a point at least.
+/// Smallest sphere around the points, to 1e-9 of its radius; at least one point.
 Sphere find_enclosing_sphere(std::span<const Vec3> points_m);
 
-/// Orders items so that each run of `run` of them, counted from the first, is compact: recursive halving along the longest side.
+/// Orders items so that each consecutive run of `run` items is compact: recursive bisection along the longest side.
 std::vector<std::int32_t> order_by_place(std::span<const Vec3> places_m, std::size_t run);
 
 }  // namespace carillon::air

@@ -1,7 +1,6 @@
-// Method:     four points of each fine facet go to the nearest coarse facet; there a linear function is fitted by least squares with the
-//             facet's own Gram matrix, and a constant added that restores the flow.
+// Method:     four points of each fine facet are assigned to the nearest coarse facet; least-squares fit of a linear function there with
+//   the facet's own Gram matrix, plus a constant that restores the flux.
 // Source:     docs/equations.md E10.
-// Deviations: none.
 #include "precompute/air/transfer.hpp"
 
 #include <algorithm>
@@ -16,11 +15,11 @@
 namespace carillon::air {
 namespace {
 
-/// Barycentric middles of the four quarters of a triangle.
+/// Centroids of the four quarters of a triangle, barycentric.
 constexpr std::array<Vec3, 4> kMiddles{Vec3{2.0 / 3, 1.0 / 6, 1.0 / 6}, Vec3{1.0 / 6, 2.0 / 3, 1.0 / 6}, Vec3{1.0 / 6, 1.0 / 6, 2.0 / 3},
                                        Vec3{1.0 / 3, 1.0 / 3, 1.0 / 3}};
 
-constexpr double kSingular = 1e-3;  // determinant over that of an evenly covered facet: the part of it that is covered is a strip
+constexpr double kSingular = 1e-3;  // minimum determinant relative to an evenly covered facet: the covered part is nearly a line
 
 double calc_area(const std::vector<Vec3>& nodes, const Triangle& t) {
   return 0.5 * norm(cross(nodes[t[1]] - nodes[t[0]], nodes[t[2]] - nodes[t[0]]));
@@ -29,7 +28,7 @@ double calc_area(const std::vector<Vec3>& nodes, const Triangle& t) {
 }  // namespace
 
 Radiator transfer(const Radiator& fine, std::vector<Vec3> nodes_m, std::vector<Triangle> triangles) {
-  bank::Bank coarse;  // as a surface to search
+  bank::Bank coarse;  // surface to search
   coarse.vertices_m = std::move(nodes_m);
   coarse.triangles = std::move(triangles);
   const bank::SurfaceTree tree(coarse);

@@ -1,4 +1,4 @@
-// Velocities from a fine surface to a coarse one.
+// Transfer of velocities from a fine surface to a coarse one.
 #pragma once
 
 #include <vector>
@@ -7,9 +7,8 @@
 
 namespace carillon::air {
 
-/// `fine` on the surface of `nodes_m` and `triangles`, which lies close to its own. On each coarse facet the velocity is the linear one
-/// nearest to the fine one there, in the mean square; each facet keeps its flow, so that the body does. A coarse facet that no part of the
-/// fine surface is nearest to stays at rest.
+/// Velocities `fine` on the surface of `nodes_m` and `triangles`, transferred to a surface close to it. Linear least-squares fit on each
+/// coarse facet; each facet keeps its flux, and so does the body. Coarse facets without nearest fine points stay at rest.
 Radiator transfer(const Radiator& fine, std::vector<Vec3> nodes_m, std::vector<Triangle> triangles);
 
 }  // namespace carillon::air

@@ -1,7 +1,6 @@
-// Method:     k = a + (b - a) (0.6 t + 0.4 t^2): finer at the lower end, where fields change by powers of k. Lagrange through the four
-//             wave numbers around a mode; the difference from the three nearest of them is what is stated as the error, which is larger.
+// Method:     k = a + (b - a) (0.6 t + 0.4 t^2): finer at the lower end, where fields vary as powers of k. Lagrange interpolation on the
+//   four wave numbers around a mode; error bound: difference from the three nearest.
 // Source:     docs/equations.md E10.
-// Deviations: none.
 #include "precompute/air/wave_numbers.hpp"
 
 #include <algorithm>

@@ -12,7 +12,7 @@ namespace {
 using job::Edge;
 using std::numbers::pi;
 
-/// One of the equations of the table, in a form without overflow, and where its n-th root is about (n from 1).
+/// One characteristic equation, in a form without overflow, and a guess of its n-th root (n from 1).
 struct Characteristic {
   enum Kind { cos_cosh_1, cos_cosh_minus_1, tan_tanh, tan_minus_tanh, sine, cosine } kind;
 
@@ -58,10 +58,10 @@ Characteristic choose(std::array<Edge, 2> ends) {
   if (is(Edge::free, Edge::hinged) || is(Edge::hinged, Edge::clamped)) return {Characteristic::tan_tanh};
   if (is(Edge::free, Edge::sliding) || is(Edge::clamped, Edge::sliding)) return {Characteristic::tan_minus_tanh};
   if (is(Edge::hinged, Edge::sliding)) return {Characteristic::cosine};
-  return {Characteristic::sine};  // hinged twice, sliding twice
+  return {Characteristic::sine};  // both hinged, both sliding
 }
 
-/// The two derivatives that are zero at an end.
+/// The two vanishing derivatives at an end.
 std::array<int, 2> get_conditions(Edge end) {
   switch (end) {
     case Edge::free:
@@ -75,14 +75,14 @@ std::array<int, 2> get_conditions(Edge end) {
   }
 }
 
-/// The four functions' derivatives of one order over beta^order.
+/// Derivatives of one order of the four functions, over beta^order.
 std::array<double, 4> calc_parts(double beta, double x, int order) {
   const double c = std::cos(beta * x), s = std::sin(beta * x);
   const std::array<double, 4> cosine{c, -s, -c, s}, sine{s, c, -s, -c};
   return {cosine[order], sine[order], (order % 2 == 0 ? 1.0 : -1.0) * std::exp(-beta * x), std::exp(-beta * (1.0 - x))};
 }
 
-/// The integral of w^2 over the length, in closed form.
+/// Integral of w^2 over the length, in closed form.
 double calc_mean_square(double b, const std::array<double, 4>& k) {
   const double c = std::cos(b), s = std::sin(b), e = std::exp(-b), half = 1.0 / (2.0 * b);
   const double cc = 0.5 + c * s * half, ss = 0.5 - c * s * half, cs = s * s * half;
@@ -113,7 +113,7 @@ std::vector<double> find_beam_roots(const std::array<Edge, 2>& ends, double max_
   const Characteristic equation = choose(ends);
   std::vector<double> roots;
   for (int n = 1;; ++n) {
-    // From the second root on the guess is exact to exp(-beta); the first is within 0.35 of it.
+    // From the second root on, the guess is exact to exp(-beta); the first is within 0.35.
     double low = equation.guess(n) - 0.4, high = equation.guess(n) + 0.4;
     const bool is_rising = equation.calc(high) > 0.0;
     while (high - low > 4e-16 * high) {
@@ -139,7 +139,7 @@ BeamFunction make_beam_function(const std::array<Edge, 2>& ends, double beta) {
   const la::Matrix v = la::calc_svd(conditions).v;
   BeamFunction function{beta, {}};
   for (int k = 0; k < 4; ++k) function.coefficients[k] = v(k, 3);
-  // Largest at the first end where it moves there, so that a shape has one sign for all who compute it.
+  // Normalise the sign: positive maximum at the first end if it moves there.
   double sign = function.calc(0.0);
   if (std::abs(sign) < 1e-3) sign = function.calc(0.0, 1);
   if (std::abs(sign) < 1e-3) sign = function.calc(0.0, 2);

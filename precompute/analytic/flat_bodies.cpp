@@ -15,14 +15,14 @@ namespace {
 
 using std::numbers::pi;
 
-/// Intervals along the longest side for a number of half-waves along it: a multiple of ten.
+/// Grid intervals along the longest side for a number of half-waves along it: a multiple of ten.
 int choose_flat_grid(double half_waves) {
   const int wanted = 10 * static_cast<int>(std::ceil(0.4 * half_waves));
   return std::clamp(wanted, 40, kMaxDefaultGrid);
 }
 
 void warn_if_thick(double thickness_m, double rate, double high_hz, std::vector<std::string>& warnings) {
-  constexpr double kWaves = 10.0;  // thicknesses in a wavelength below which Kirchhoff's theory is more than about 3 per cent sharp
+  constexpr double kWaves = 10.0;  // wavelength over thickness below which Kirchhoff's theory is more than about 3 per cent sharp
   const double hz = 2.0 * pi * std::sqrt(rate) / square(kWaves * thickness_m);
   if (hz < high_hz)
     warnings.push_back(
@@ -31,11 +31,11 @@ void warn_if_thick(double thickness_m, double rate, double high_hz, std::vector<
                     hz));
 }
 
-/// Z_(m+1)/Z_m and the like come from these; the standard library's are exact to about 1e-13 here.
+/// Source of Z_(m+1)/Z_m and similar ratios; std::cyl_bessel_* are exact to about 1e-13 here.
 double calc_j(int m, double x) { return std::cyl_bessel_j(m, x); }
 double calc_i(int m, double x) { return std::cyl_bessel_i(m, x); }
 
-constexpr double kMaxRoot = 600.0;  // I_m of more overflows
+constexpr double kMaxRoot = 600.0;  // I_m overflows beyond it
 
 }  // namespace
 
@@ -133,13 +133,13 @@ la::Matrix SineRectangle::calc_slope_products(std::span<const Mode> modes) const
   return products;
 }
 
-/// del^4 F = E h (w_xy^2 - w_xx w_yy) with F a sum of cos(k pi x / a) cos(l pi y / b). For modes (m, n) and (m', n') the right side has the
-/// four products k = |m -+ m'|, l = |n -+ n'|; eta of one is its part of the right side over (k pi / a)^2 + (l pi / b)^2, in the norm.
+/// del^4 F = E h (w_xy^2 - w_xx w_yy) with F a sum of cos(k pi x / a) cos(l pi y / b). For modes (m, n) and (m', n') the right-hand side
+/// has the four products k = |m -+ m'|, l = |n -+ n'|; eta: coefficient over (k pi / a)^2 + (l pi / b)^2, normalised.
 void SineRectangle::add_stress_functions(std::span<const Mode> modes, double rigidity_n_m, bank::QuarticEnergy& energy) const {
   const double area = length_m_ * width_m_, factor = 1.0 / (density_kg_m2_ * area);  // a quarter of the square of the amplitude
   std::map<std::array<int, 2>, std::size_t> places;
   const std::size_t pairs = bank::count_pairs(modes.size());
-  for (const bool fills : {false, true}) {  // first the rows are counted
+  for (const bool fills : {false, true}) {  // first pass counts the rows
     if (fills) {
       std::size_t row = energy.rows.size() / pairs;
       for (auto& [number, place] : places) place = row++;
@@ -155,7 +155,7 @@ void SineRectangle::add_stress_functions(std::span<const Mode> modes, double rig
             const int k = sums_x ? one[0] + other[0] : std::abs(one[0] - other[0]);
             const int l = sums_y ? one[1] + other[1] : std::abs(one[1] - other[1]);
             const double part = sums_x == sums_y ? -square(ax * by - bx * ay) : square(ax * by + bx * ay);
-            if (part == 0.0) continue;  // and k = l = 0 among them
+            if (part == 0.0) continue;  // includes k = l = 0
             std::size_t& place = places[{k, l}];
             if (!fills) continue;
             const double norm = area * (k > 0 ? 0.5 : 1.0) * (l > 0 ? 0.5 : 1.0);
@@ -171,7 +171,7 @@ bank::QuarticEnergy SineRectangle::calc_coupling(std::span<const Mode> modes, co
   bank::QuarticEnergy energy = FlatBody::calc_coupling(modes, material, is_stretch);
   if (!is_plate_) return energy;
   const double nu = material.poisson_ratio, area = length_m_ * width_m_, rigidity = material.young_modulus_pa * thickness_m_;
-  // What a mode alone has of Airy's function is E h a b (e_x^2 + e_y^2) / 4.
+  // Self-coupling by the Airy function alone is E h a b (e_x^2 + e_y^2) / 4.
   const double airy = is_stretch ? 0.25 : 0.0;
   std::vector<double> sum, difference;
   for (const Mode& mode : modes) {
@@ -184,7 +184,8 @@ bank::QuarticEnergy SineRectangle::calc_coupling(std::span<const Mode> modes, co
   append_diagonal_row(sum, energy);
   append_diagonal_row(difference, energy);
   if (!is_stretch) add_stress_functions(modes, rigidity, energy);
-  const double longest = std::max(length_m_, width_m_);  // sides move along themselves: a wave of pressure from side to side is slower
+  const double longest = std::max(
+      length_m_, width_m_);  // the sides move along themselves, so in-plane modes are slower than a pressure wave between the sides
   const double pressure_m_s = std::sqrt(material.young_modulus_pa / ((1.0 - nu * nu) * material.density_kg_m3));
   energy.membrane_ratio = std::min(energy.membrane_ratio, 0.5 * pressure_m_s / longest);
   return energy;
@@ -227,8 +228,8 @@ Circle::Circle(const job::PlateBody& body, const material::Material& material)
   set_rigid(density_kg_m2_);
 }
 
-/// The rim's two conditions on J_m(k r) and I_m(k r) / I_m(k R), in r / R: {J of the first, I of the first, J of the second, I of the
-/// second}. With Z for either: slope k Z'; moment -+ k^2 Z - (1 - nu) (k Z' - m^2 Z); shear -+ k^3 Z' - (1 - nu) m^2 (k Z' - Z).
+/// Boundary conditions at the rim for J_m(k r) and I_m(k r) / I_m(k R), in r / R: {J in the first, I in the first, J in the second, I in
+/// the second}. With Z for either: slope k Z'; moment -+ k^2 Z - (1 - nu) (k Z' - m^2 Z); shear -+ k^3 Z' - (1 - nu) m^2 (k Z' - Z).
 std::array<double, 4> Circle::calc_conditions(int m, double k) const {
   const double j = calc_j(m, k), j_next = calc_j(m + 1, k);
   const double i_ratio = calc_i(m + 1, k) / calc_i(m, k);
@@ -256,7 +257,7 @@ Circle::Radial Circle::make_radial(int m, double k) const {
   double square_mean = 0.5 * square(j_next);  // integral of r w^2 over 0 <= r <= 1
   if (is_plate_) {
     const std::array<double, 4> c = calc_conditions(m, k);
-    // The larger entry of the second function says best how much of it there is.
+    // The larger I entry determines the amplitude ratio more accurately.
     const bool is_first = std::abs(c[1]) > std::abs(c[3]) * 1e-3 && edge_ != job::Edge::sliding;
     radial.modified = is_first ? -c[0] / c[1] : -c[2] / c[3];
     const double i_ratio = calc_i(m + 1, k) / calc_i(m, k), m2 = square(m / k);
@@ -278,7 +279,7 @@ ModeList Circle::list_modes(double high_hz, std::int64_t) {
   if (max_root > kMaxRoot)
     throw InputError(fmt::format("the circle has about {:.0f} half-waves across at {:g} Hz, more than {:.0f}; lower the end of \"band_hz\"",
                                  max_root / pi * 2.0, high_hz, kMaxRoot / pi * 2.0));
-  // The first root of each m lies above 0.7 m, and roots of one m are further apart than 2.
+  // The first root of each m lies above 0.7 m, and roots of the same m are more than 2 apart.
   constexpr double kStep = 0.25, kFirst = 0.7;
   for (int m = 0; kFirst * m <= max_root; ++m) {
     double low = std::max(0.5, kFirst * m), value = calc_determinant(m, low);
@@ -332,7 +333,7 @@ void Circle::calc_deflections(const Point2& point_m, std::span<const Mode> modes
   }
 }
 
-/// By parts, since w is 0 on the rim: the integral of -w_i times the Laplacian of w_j, of equal m and part.
+/// Integration by parts, since w = 0 at the rim: integral of -w_i times the Laplacian of w_j, of equal m and part.
 la::Matrix Circle::calc_slope_products(std::span<const Mode> modes) const {
   const auto count = static_cast<Eigen::Index>(modes.size());
   la::Matrix products = la::Matrix::Zero(count, count);

@@ -9,41 +9,40 @@
 
 namespace carillon::analytic {
 
-/// What all flat bodies share: they move along z, and their surface is a slab.
+/// Base of flat bodies: motion along z, slab surface.
 class FlatBody : public KnownBody {
  public:
   /// grid intervals along the longest side.
   ClosedSurface make_surface(int grid) const override { return make_slab(make_net(grid), thickness_m_); }
   void calc_shapes(const Vec3& point_m, std::span<const Mode> modes, std::span<Vec3> phi) const override;
-  /// One row, of the mean of both strains: sqrt(E h / (4 A (1 - nu^2))) times the integrals of grad w_i . grad w_j over the area A (Berger
-  /// 1955). The rim is held. The lowest frequency of stretching is a lower bound: no body of this area that is held along its rim has a
-  /// lower one than a disc has (Faber 1923, Krahn 1925) where no wave is faster than shear.
+  /// One row from the mean of both strains: sqrt(E h / (4 A (1 - nu^2))) times the integrals of grad w_i . grad w_j over the area A (Berger
+  /// 1955). Held rim. The stretching frequency is a lower bound: a disc has the lowest one among all bodies of equal area held along the
+  /// rim (Faber 1923, Krahn 1925), and no wave is slower than shear.
   bank::QuarticEnergy calc_coupling(std::span<const Mode> modes, const material::Material& material, bool is_stretch) const override;
 
  protected:
-  /// Integrals over the body of grad w_i . grad w_j [1/kg], (modes, modes).
+  /// Surface integrals of grad w_i . grad w_j [1/kg], (modes, modes).
   virtual la::Matrix calc_slope_products(std::span<const Mode> modes) const = 0;
   virtual Net make_net(int grid) const = 0;
   /// w of each mode [kg^-1/2], (modes).
   virtual void calc_deflections(const Point2& point_m, std::span<const Mode> modes, std::span<double> w) const = 0;
-  /// Mass and inertia of a body of this mass per area.
+  /// Mass and inertia for this mass per area.
   void set_rigid(double density_kg_m2);
 
   double thickness_m_ = 0.0;
 };
 
-/// A rectangle whose modes are products of sines: f = c / 2 sqrt((m / a)^2 + (n / b)^2) of a membrane, pi / 2 sqrt(D / (rho h)) ((m / a)^2
-/// + (n / b)^2) of a plate hinged on all sides; phi = 2 / sqrt(sigma a b) sin sin (Rayleigh, The Theory of Sound, sections 194 to 200 and
-/// 225). Mode::index: m, n.
+/// Rectangle with product-of-sines modes: f = c / 2 sqrt((m / a)^2 + (n / b)^2) of a membrane, pi / 2 sqrt(D / (rho h)) ((m / a)^2 + (n /
+/// b)^2) of a plate hinged on all sides; phi = 2 / sqrt(sigma a b) sin sin (Rayleigh, The Theory of Sound, sections 194 to 200 and 225).
+/// Mode::index: m, n.
 class SineRectangle : public FlatBody {
  public:
   SineRectangle(const job::MembraneBody& body, const material::Material& material);
   SineRectangle(const job::PlateBody& body, const material::Material& material);
   ModeList list_modes(double high_hz, std::int64_t max_modes) override;
   int choose_grid(std::span<const Mode> modes) const override;
-  /// Of a plate, whose sides stay straight and do not move: a row for each product of cosines of Airy's stress function, and two for the
-  /// mean strains (Chu and Herrmann 1956; Ducceschi and others 2014). The mean stretch alone: two rows, by which each mode alone hardens as
-  /// by all of them.
+  /// For a plate with straight, fixed sides: one row for each product of cosines of Airy's stress function, and two for the mean strains
+  /// (Chu and Herrmann 1956; Ducceschi and others 2014). Mean stretch only: two rows that give each mode alone its full hardening.
   bank::QuarticEnergy calc_coupling(std::span<const Mode> modes, const material::Material& material, bool is_stretch) const override;
 
  private:
@@ -57,8 +56,8 @@ class SineRectangle : public FlatBody {
   double rate_;  // membrane: c^2 [m^2/s^2]; plate: D / (rho h) [m^4/s^2]
 };
 
-/// Radial functions of a circle: J_m, and for a plate I_m, which meet the rim's conditions. Mode::index: m, s, 0 for cos and 1 for sin, and
-/// the place in radials_.
+/// Radial functions of a circle that meet the rim's conditions: J_m, and for a plate I_m. Mode::index: m, s, 0 for cos and 1 for sin, and
+/// index into radials_.
 class Circle : public FlatBody {
  public:
   /// f = j_ms / (2 pi R) c, phi = J_m(j r / R) cos or sin / (|J_(m+1)(j)| sqrt(sigma pi R^2 (m ? 1/2 : 1))) (Rayleigh, section 204).
@@ -90,8 +89,8 @@ class Circle : public FlatBody {
   mutable std::vector<double> cached_;
 };
 
-/// A rectangular plate with any edges: Ritz's method on products of polynomials that meet the conditions on deflection and slope
-/// (Bhat 1985; here Legendre polynomials, turned into the modes of a beam in each direction). Mode::index: place in shapes_.
+/// Rectangular plate with arbitrary edge conditions: Ritz's method on products of polynomials that meet the conditions on deflection and
+/// slope (Bhat 1985; here Legendre polynomials, transformed to beam modes in each direction). Mode::index: index into shapes_.
 class RitzPlate : public FlatBody {
  public:
   RitzPlate(const job::PlateBody& body, const material::Material& material);
@@ -99,7 +98,7 @@ class RitzPlate : public FlatBody {
   int choose_grid(std::span<const Mode> modes) const override;
 
  private:
-  /// Functions of one direction and parity: coefficients of Legendre polynomials, and their integrals.
+  /// Functions of one direction and parity: Legendre coefficients and their integrals.
   struct Line {
     la::Matrix functions;             // (polynomials, k)
     la::Matrix slopes, bends, mixed;  // integrals of f' f', f'' f'', f f''
@@ -125,11 +124,11 @@ class RitzPlate : public FlatBody {
   std::vector<Shape> shapes_;
 };
 
-/// Mass per area and thickness of a membrane, of which the job gives one or both.
+/// Mass per area and thickness of a membrane, from one or both in the job.
 std::array<double, 2> find_sheet(const job::MembraneBody& body, const material::Material& material);
 
-/// The wave number [1/m] below which there are at least that many modes, for a membrane or plate of this area and rim: Weyl's law with its
-/// second term, N = A k^2 / 4 pi - rim k / 4 pi, which is that of a fixed rim and the least of all.
+/// Wave number [1/m] with at least that many modes below it, for a membrane or plate of this area and rim: Weyl's law with its second term,
+/// N = A k^2 / 4 pi - rim k / 4 pi, for a fixed rim (the smallest count).
 double find_wave_number(double area_m2, double rim_m, double modes);
 
 /// Flexural rigidity D = E h^3 / (12 (1 - nu^2)) over the mass per area [m^4/s^2].

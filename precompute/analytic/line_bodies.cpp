@@ -17,8 +17,8 @@ using std::numbers::pi;
 
 constexpr int kDiscSides = 12;
 constexpr int kMinLineGrid = 40, kMaxLineGrid = 400;
-constexpr int kPerHalfWave = 8;       // intervals of the grid
-constexpr double kThickWaves = 0.25;  // depth over half a wavelength from which on Euler-Bernoulli is several per cent off
+constexpr int kPerHalfWave = 8;       // grid intervals
+constexpr double kThickWaves = 0.25;  // depth over half a wavelength above which Euler-Bernoulli is several per cent off
 constexpr int kMaxPolynomials = 600;
 
 std::vector<Point2> make_disc_section(double diameter_m) {
@@ -171,15 +171,15 @@ void Beam::add_bending(Motion motion, double second_moment_m4, double high_hz, s
   }
 }
 
-/// Unknowns: the deflection w and L times the shear angle g = w' - slope, in Legendre polynomials of x / L. With g in place of the slope no
-/// large terms cancel in a thin beam: E I / L^3 (w'' - g')^2 + k G A / L g^2 of strain, rho A L w^2 + rho I / L (w' - g)^2 of mass.
+/// Unknowns: the deflection w and L times the shear angle g = w' - slope, in Legendre polynomials of x / L. With g instead of the slope, no
+/// large terms cancel in a thin beam: strain energy E I / L^3 (w'' - g')^2 + k G A / L g^2, mass rho A L w^2 + rho I / L (w' - g)^2.
 void Beam::add_timoshenko(Motion motion, double second_moment_m4, double high_hz, std::vector<Mode>& modes) {
   const double length = body_.length_m, nu = poisson_ratio_;
   const double correction = body_.diameter_m ? 6.0 * (1.0 + nu) / (7.0 + 6.0 * nu) : 10.0 * (1.0 + nu) / (12.0 + 11.0 * nu);  // Cowper 1966
   const double mass = density_kg_m3_ * area_m2_ * length, turning = density_kg_m3_ * second_moment_m4 / length;
   const double bending = young_pa_ * second_moment_m4 / (length * length * length), shear = correction * shear_pa_ * area_m2_ / length;
   const double rate = std::sqrt(young_pa_ * second_moment_m4 / (density_kg_m3_ * area_m2_)) / square(length);
-  // Waves with shear are shorter than those without; up to where half a wavelength is the depth this is enough.
+  // Shear shortens waves; the number of functions suffices up to half a wavelength equal to the depth.
   const double slow_m_s = std::sqrt(correction * shear_pa_ / density_kg_m3_);
   const double waves = std::max(std::sqrt(2.0 * pi * high_hz / rate), 2.0 * pi * high_hz * length / slow_m_s) / pi;
   const int wanted = 20 + static_cast<int>(std::ceil(1.8 * std::min(waves, 1e6)));
@@ -206,7 +206,7 @@ void Beam::add_timoshenko(Motion motion, double second_moment_m4, double high_hz
       if (edge == job::Edge::sliding || edge == job::Edge::clamped) conditions.push_back(slope);
     }
     const la::Matrix basis = make_null_space(2 * n, conditions);
-    // Of (K + shift M)^-1 M the lowest modes are the largest eigenvalues, which keep their digits however stiff the shear is.
+    // The lowest modes are the largest eigenvalues of (K + shift M)^-1 M, which stay accurate for high shear stiffness.
     la::Matrix vectors = basis.transpose() * weight * basis, shifted = basis.transpose() * stiffness * basis + shift * vectors;
     la::Vector values;
     if (la::calc_generalised_eigenpairs_by_division(vectors, shifted, values) != 0)

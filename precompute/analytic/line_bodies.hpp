@@ -17,15 +17,15 @@ class String : public KnownBody {
   void calc_shapes(const Vec3& point_m, std::span<const Mode> modes, std::span<Vec3> phi) const override;
   ClosedSurface make_surface(int grid) const override;
   int choose_grid(std::span<const Mode> modes) const override;
-  /// The mean stretch by both planes (Kirchhoff 1876, Carrier 1945).
+  /// Mean stretch, with both planes (Kirchhoff 1876, Carrier 1945).
   bank::QuarticEnergy calc_coupling(std::span<const Mode> modes, const material::Material& material, bool is_stretch) const override;
 
  private:
   double length_m_, mass_kg_m_, diameter_m_, tension_n_, stiffness_;  // stiffness: B
 };
 
-/// Bending along y and z by Euler and Bernoulli, or by Timoshenko (Ritz's method on Legendre polynomials); torsion with Saint-Venant's
-/// constant; axial waves. An end that is not free fixes torsion and axial motion. Mode::index: motion, number, place in shapes_.
+/// Bending along y and z by Euler-Bernoulli or by Timoshenko (Ritz's method on Legendre polynomials); torsion with Saint-Venant's constant;
+/// axial waves. An end that is not free fixes torsion and axial motion. Mode::index: motion, number, index into shapes_.
 class Beam : public KnownBody {
  public:
   Beam(const job::BeamBody& body, const material::Material& material);
@@ -34,7 +34,7 @@ class Beam : public KnownBody {
   ClosedSurface make_surface(int grid) const override;
   int choose_grid(std::span<const Mode> modes) const override;
   bool is_coupled(const Mode& mode) const override { return mode.index[0] == kBendingY || mode.index[0] == kBendingZ; }
-  /// As String. Both ends are held, and do not move along the beam (Woinowsky-Krieger 1950).
+  /// As String. Both ends are held and fixed along the beam (Woinowsky-Krieger 1950).
   bank::QuarticEnergy calc_coupling(std::span<const Mode> modes, const material::Material& material, bool is_stretch) const override;
 
  private:
@@ -51,7 +51,7 @@ class Beam : public KnownBody {
 
   job::BeamBody body_;
   double young_pa_, shear_pa_, density_kg_m3_, poisson_ratio_;
-  double area_m2_, moment_y_m4_, moment_z_m4_, torsion_m4_;  // moment_y: of bending along y
+  double area_m2_, moment_y_m4_, moment_z_m4_, torsion_m4_;  // moment_y: for bending along y
   std::vector<Shape> shapes_;
 };
 

@@ -19,29 +19,29 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr double kEdge = 1e-9;          // of a frequency: rounding at the ends of the band
+constexpr double kEdge = 1e-9;          // relative frequency tolerance at the ends of the band
 constexpr double kDegenerate = 1e-9;    // relative distance of equal eigenvalues
-constexpr double kBeyond = 1.0 + 1e-6;  // further than the band
+constexpr double kBeyond = 1.0 + 1e-6;  // search limit relative to the end of the band
 constexpr std::int64_t kNoLimit = std::numeric_limits<std::int64_t>::max() / 4;
-constexpr double kMaxNumbers = 6e8;  // components of shapes that a bank may have
+constexpr double kMaxNumbers = 6e8;  // maximum number of shape components in a bank
 
 double to_hz(double lambda) { return std::sqrt(lambda) / (2.0 * pi); }
 
-/// The modes of the band, and the counts that show that none is missing.
+/// Modes of the band, and the counts that prove completeness.
 struct Band {
   std::vector<Mode> modes;
-  std::optional<bank::Proof> proof;  // none of a table: what was not measured is not known
+  std::optional<bank::Proof> proof;  // none for a table: unmeasured modes are unknown
   std::array<double, 2> band_hz{};
   bool is_complete = true;
 };
 
-/// Half-way between two modes, or at the end of the band where none is near.
+/// Midpoint between two modes, or the end of the band if no mode is near.
 double choose_cut(double end_hz, double below_hz, double above_hz) {
   const bool is_clear = below_hz < end_hz * (1.0 - kEdge) && above_hz > end_hz * (1.0 + kEdge);
   return is_clear ? end_hz : 0.5 * (below_hz + above_hz);
 }
 
-/// The modes up to the end of the band, somewhat further to see where the next one is, or as far as the lowest max_modes of the band take.
+/// Modes up to slightly above the end of the band (to locate the next one), or the lowest max_modes of the band.
 ModeList list_band(KnownBody& body, const job::JobSpec& job, std::int64_t max_modes) {
   const double high_hz = job.band_hz[1] * kBeyond;
   for (std::int64_t wanted = max_modes;; wanted *= 2) {
@@ -53,7 +53,7 @@ ModeList list_band(KnownBody& body, const job::JobSpec& job, std::int64_t max_mo
   }
 }
 
-/// One mode more than max_modes is known wherever there is one.
+/// One mode more than max_modes is known if it exists.
 Band find_band(KnownBody& body, const job::JobSpec& job) {
   const auto max_modes = job.max_modes ? static_cast<std::int64_t>(*job.max_modes) : kNoLimit;
   ModeList list = list_band(body, job, max_modes);
@@ -109,7 +109,7 @@ Band find_band(KnownBody& body, const job::JobSpec& job) {
   return band;
 }
 
-/// The material's law; of a table of measured decays the loss factors that give them.
+/// The material's law, or loss factors fitted to a table of measured decays.
 void set_damping(bank::Bank& bank, const KnownBody& body, const job::JobSpec& job, const std::vector<Mode>& modes) {
   const auto* measured = dynamic_cast<const MeasuredObject*>(&body);
   if (measured == nullptr) {
@@ -135,7 +135,7 @@ void set_damping(bank::Bank& bank, const KnownBody& body, const job::JobSpec& jo
     bank.damping.loss_factor.push_back(table.decay_per_s[row] / (pi * hz));
   }
   bank.damping.law = "loss_table";
-  if (has_twins || modes.empty()) {  // two decays at one frequency are no law
+  if (has_twins || modes.empty()) {  // two decays at one frequency define no law
     bank.damping = {};
     bank.damping.law = "mixed";
   }
@@ -146,19 +146,19 @@ struct Found {
   Band band;
 };
 
-/// Throws InputError of what is wrong with the body, after the place of the body in the job.
+/// Throws InputError, prefixed with the place of the body in the job.
 Found find(const job::JobSpec& job) {
   try {
     Found found{make_known_body(*job.analytic, job.material), {}};
     found.band = find_band(*found.body, job);
     return found;
   } catch (const InputError& error) {
-    if (std::holds_alternative<job::MeasuredBody>(job.analytic->kind)) throw;  // has the place in the table
+    if (std::holds_alternative<job::MeasuredBody>(job.analytic->kind)) throw;  // already names the line of the table
     throw InputError(fmt::format("{}: {}", job.analytic->place, error.what()));
   }
 }
 
-/// The lowest modes that large motion couples, as the job has them: numbers among those of the band. Modes of one frequency go together.
+/// The lowest modes that the job couples, as numbers among those of the band. Degenerate modes stay together.
 std::vector<std::int32_t> choose_coupled(const KnownBody& body, const job::Nonlinear& asked, const std::vector<Mode>& modes) {
   std::vector<std::int32_t> chosen;
   for (std::size_t m = 0; m < modes.size(); ++m)
@@ -176,8 +176,7 @@ std::vector<std::int32_t> choose_coupled(const KnownBody& body, const job::Nonli
 void couple(const KnownBody& body, const job::JobSpec& job, const std::vector<Mode>& modes, Made& made) {
   const std::vector<std::int32_t> chosen = choose_coupled(body, *job.nonlinear, modes);
   if (chosen.empty()) {
-    made.warnings.push_back(
-        fmt::format("no mode that large motion couples lies below {:g} Hz: the bank stays linear", job.nonlinear->below_hz));
+    made.warnings.push_back(fmt::format("large motion couples no mode below {:g} Hz: the bank stays linear", job.nonlinear->below_hz));
     return;
   }
   std::vector<Mode> coupled;
@@ -189,8 +188,8 @@ void couple(const KnownBody& body, const job::JobSpec& job, const std::vector<Mo
   energy.membrane_ratio = top_hz / membrane_hz;
   if (energy.membrane_ratio > bank::kMaxMembraneRatio)
     made.warnings.push_back(
-        fmt::format("stretching begins at {:.0f} Hz, and the highest coupled mode has {:.0f} Hz: above half of it the inertia of "
-                    "stretching, which is left out, is heard; lower \"nonlinear.below_hz\"",
+        fmt::format("stretching begins at {:.0f} Hz, and the highest coupled mode has {:.0f} Hz: above half of it the neglected "
+                    "inertia of stretching is audible; lower \"nonlinear.below_hz\"",
                     membrane_hz, top_hz));
   made.coupling = fmt::format("{} coupled modes up to {:.0f} Hz, {} {}", energy.mode_count(), top_hz, energy.row_count(),
                               energy.row_count() == 1 ? "row" : "rows");

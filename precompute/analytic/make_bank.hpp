@@ -1,4 +1,4 @@
-// The bank of a body whose modes are known.
+// Banks of bodies with known modes.
 #pragma once
 
 #include "precompute/job/job_spec.hpp"
@@ -7,24 +7,24 @@
 namespace carillon::analytic {
 
 struct Made {
-  bank::Bank bank;  // without its provenance
+  bank::Bank bank;  // provenance is empty
   std::string theory, method;
-  std::vector<std::string> names;     // (m) of the modes: "(1, 2)"
-  std::vector<std::string> warnings;  // where the theory does not describe the body
-  std::string coupling;               // what large motion couples; empty: nothing
+  std::vector<std::string> names;     // (m) mode names: "(1, 2)"
+  std::vector<std::string> warnings;  // limits of the theory for this body
+  std::string coupling;               // description of the coupling; empty: none
 };
 
-/// The bank of job.analytic: the modes of its band, their shapes on its surface, gains and decays. Throws InputError, SolveError.
+/// Bank of job.analytic: modes of its band, shapes on its surface, gains and decays. Throws InputError, SolveError.
 Made make_bank(const job::JobSpec& job);
 
-/// One mode at one point, to all digits of the theory.
+/// One mode at one point, unrounded.
 struct ModeAtPoint {
   double freq_hz = 0.0;
   Vec3 phi{};  // [kg^-1/2]
   std::string name;
 };
 
-/// The modes of the band at a point of the body; what make_bank() rounds to the bank's steps.
+/// Modes of the band at a point of the body, before rounding to the bank's steps.
 std::vector<ModeAtPoint> calc_modes_at(const job::JobSpec& job, const Vec3& point_m);
 
 }  // namespace carillon::analytic

@@ -21,9 +21,9 @@ namespace {
 
 constexpr std::uint64_t kMaxBytes = 64 << 20;
 constexpr std::size_t kMaxRows = 40000, kMaxPoints = 10000;
-constexpr double kT60 = 6.907755278982137;  // ln 1000: decay times T60
+constexpr double kT60 = 6.907755278982137;  // ln 1000: T60 times decay
 constexpr double kMaxGain = 1e9, kFarthestM = 1e4;
-constexpr std::size_t kMaxShown = 80;  // characters of a cell, in a message
+constexpr std::size_t kMaxShown = 80;  // characters of a cell in a message
 
 std::string_view trim(std::string_view text) {
   const auto is_blank = [](char c) { return c == ' ' || c == '\t' || c == '\r' || c == '"'; };
@@ -60,7 +60,7 @@ std::optional<Vec3> parse_point(std::string_view name) {
   return found == 3 ? std::optional(point) : std::nullopt;
 }
 
-/// What each column holds.
+/// Column roles.
 struct Columns {
   int freq = -1, decay = -1, t60 = -1;
   std::vector<int> gains;
@@ -86,7 +86,7 @@ Columns read_names(const std::vector<std::string_view>& names, const std::string
       columns.gains.push_back(i);
     } else if (const std::optional<Vec3> point = parse_point(name)) {
       if (std::find(table.points_m.begin(), table.points_m.end(), *point) != table.points_m.end())
-        throw InputError(fmt::format("{}: the point \"{}\" is there twice; remove one", place, base::printable(name.substr(0, kMaxShown))));
+        throw InputError(fmt::format("{}: the point \"{}\" occurs twice; remove one", place, base::printable(name.substr(0, kMaxShown))));
       if (std::any_of(point->begin(), point->end(), [](double x) { return std::abs(x) > kFarthestM; }))
         throw InputError(fmt::format("{}: the point \"{}\" is too far away; its numbers are metres, up to {:g}", place,
                                      base::printable(name.substr(0, kMaxShown)), kFarthestM));
@@ -99,7 +99,7 @@ Columns read_names(const std::vector<std::string_view>& names, const std::string
                       place, base::printable(name.substr(0, kMaxShown))));
     }
   }
-  if (columns.freq < 0) throw InputError(fmt::format("{}: there is no column frequency_hz", place));
+  if (columns.freq < 0) throw InputError(fmt::format("{}: column frequency_hz is missing", place));
   if ((columns.decay < 0) == (columns.t60 < 0)) throw InputError(fmt::format("{}: give one of the columns decay_per_s and t60_s", place));
   if (columns.gains.empty() || (everywhere >= 0 && !table.points_m.empty()))
     throw InputError(fmt::format("{}: give a column gain, or columns of points such as \"0.1 0 0.02\", not both", place));
@@ -138,7 +138,7 @@ ModesTable read_modes_table(const std::filesystem::path& file) {
     const auto get = [&](int column) {
       const std::string_view cell = cells[column];
       const std::optional<double> value = parse_number(cell);
-      if (!value) throw InputError(fmt::format("{}: \"{}\" is no finite number", place, base::printable(cell.substr(0, kMaxShown))));
+      if (!value) throw InputError(fmt::format("{}: \"{}\" is not a finite number", place, base::printable(cell.substr(0, kMaxShown))));
       return *value;
     };
     Row row{get(columns->freq), 0.0, {}};
@@ -152,8 +152,8 @@ ModesTable read_modes_table(const std::filesystem::path& file) {
       row.decay_per_s = get(columns->decay);
     }
     if (!(row.decay_per_s >= 0.0 && row.decay_per_s < 2.0 * std::numbers::pi * row.freq_hz))
-      throw InputError(fmt::format("{}: the decay is {:g} 1/s, but a mode of {:g} Hz swings from 0 to {:g} 1/s", place, row.decay_per_s,
-                                   row.freq_hz, 2.0 * std::numbers::pi * row.freq_hz));
+      throw InputError(fmt::format("{}: the decay is {:g} 1/s, but a mode of {:g} Hz is oscillatory from 0 to {:g} 1/s only", place,
+                                   row.decay_per_s, row.freq_hz, 2.0 * std::numbers::pi * row.freq_hz));
     for (const int column : columns->gains) {
       row.gains.push_back(get(column));
       if (std::abs(row.gains.back()) > kMaxGain)
@@ -163,7 +163,7 @@ ModesTable read_modes_table(const std::filesystem::path& file) {
     rows.push_back(std::move(row));
   }
   if (!columns || rows.empty())
-    throw InputError(fmt::format("{}: give a line of column names and a line per mode; there is no mode", file.string()));
+    throw InputError(fmt::format("{}: no modes; give a line of column names and a line per mode", file.string()));
   std::stable_sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.freq_hz < b.freq_hz; });
   for (Row& row : rows) {
     table.freq_hz.push_back(row.freq_hz);
@@ -213,7 +213,7 @@ void MeasuredObject::calc_shapes(const Vec3& point_m, std::span<const Mode> mode
     const Vec3 apart = table_.points_m[p] - point_m;
     if (const double now = dot(apart, apart); now < least) least = now, nearest = p;
   }
-  // Along the normal of the side that the point is nearest to.
+  // Motion along the normal of the nearest side.
   std::size_t axis = 0;
   double out = -1.0;
   for (std::size_t c = 0; c < 3; ++c)

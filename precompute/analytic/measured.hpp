@@ -1,4 +1,4 @@
-// Modes from a table of measurements (vdDP96, section 3: parameters may be measured instead).
+// Modes from a table of measurements (vdDP96, section 3: parameters may be measured).
 #pragma once
 
 #include <filesystem>
@@ -7,20 +7,20 @@
 
 namespace carillon::analytic {
 
-/// A table of modes as text, with commas: a line of names, then a line a mode; lines that begin with # are left out. Columns:
+/// Comma-separated table of modes: a line of column names, then one line per mode; lines that begin with # are skipped. Columns:
 ///   frequency_hz, and decay_per_s or t60_s
-///   gain                the motion along the normal for unit modal mass [kg^-1/2], the same everywhere, or
-///   "x y z"             the gain at that point [m], any number of such columns
+///   gain                motion along the normal for unit modal mass [kg^-1/2], the same everywhere, or
+///   "x y z"             gain at that point [m], any number of such columns
 struct ModesTable {
   std::vector<double> freq_hz, decay_per_s;
   std::vector<Vec3> points_m;              // empty: one gain everywhere
   std::vector<std::vector<double>> gains;  // (modes)(points, or 1)
 };
 
-/// Reads and validates one. Throws InputError "file:line: ...".
+/// Reads and validates a table. Throws InputError "file:line: ...".
 ModesTable read_modes_table(const std::filesystem::path& file);
 
-/// A box about the points, or about the origin, with the modes of the table: each vertex has the gain of the nearest point.
+/// Box around the points, or around the origin, with the modes of the table; each vertex has the gain of the nearest point.
 class MeasuredObject : public KnownBody {
  public:
   MeasuredObject(const job::MeasuredBody& body);

@@ -12,13 +12,13 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr int kRimPoints = 90;  // on each side, Chebyshev's
+constexpr int kRimPoints = 90;  // Chebyshev points per side
 constexpr int kInsidePoints = 60;
-constexpr double kRegular = 1e-12;  // of pi / angle from a whole number
-constexpr double kLimit = 1e-10;    // sine of the least angle that counts as zero
-constexpr double kMaxWaves = 60.0;  // wave number times reach beyond which the rim's points are too few
+constexpr double kRegular = 1e-12;  // tolerance of pi / angle from an integer
+constexpr double kLimit = 1e-10;    // sine of the smallest angle that counts as zero
+constexpr double kMaxWaves = 60.0;  // wave number times reach beyond which kRimPoints are too few
 
-/// J at the orders first, first + 1, ..., (count), by Miller's downward recurrence, matched to the library's value at the larger of the two
+/// J at the orders first, first + 1, ..., (count), by Miller's downward recurrence, scaled to the library's value at the larger of the two
 /// lowest.
 std::vector<double> calc_bessel(double first, int count, double x) {
   std::vector<double> values(count, 0.0);
@@ -46,14 +46,14 @@ std::vector<double> calc_bessel(double first, int count, double x) {
   return values;
 }
 
-/// The rank-th smallest singular value (1: the smallest) of a matrix of more rows than columns, by inverse iteration of some vectors more:
-/// a tenth of the work of all singular values. Too large where no gap follows the small ones.
+/// The rank-th smallest singular value (1: the smallest) of a matrix with more rows than columns, by inverse subspace iteration: a tenth of
+/// the cost of all singular values. Too large if no gap follows the small ones.
 double calc_small_singular_value(const la::Matrix& a, int rank) {
   const Eigen::Index n = a.cols(), width = std::min<Eigen::Index>(n, rank + 2);
   la::Matrix r = la::calc_qr(a, 0).r, v(n, width);
   for (Eigen::Index i = 0; i < n; ++i) {
     if (r(i, i) == 0.0) r(i, i) = 1e-300;
-    for (Eigen::Index j = 0; j < width; ++j) v(i, j) = std::cos((2.0 * j + 1.0) * (i + 0.5));  // anything that is no special vector
+    for (Eigen::Index j = 0; j < width; ++j) v(i, j) = std::cos((2.0 * j + 1.0) * (i + 0.5));  // arbitrary start vectors
   }
   for (int step = 0; step < 4; ++step) {
     v = la::calc_qr(v, width).q;
@@ -97,7 +97,7 @@ std::optional<ParticularSolutions> ParticularSolutions::make(const std::vector<P
       solutions.rim_.push_back(to_polar({a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1])}));
     }
   }
-  // Points inside need no order: corners of a net serve, thinned out.
+  // Interior points need no order: thinned corners of a mesh.
   double longest = 0.0;
   for (const Point2& x : p) longest = std::max(longest, std::hypot(x[0] - centre[0], x[1] - centre[1]));
   const Net net = triangulate(p, 0.08 * longest);
@@ -113,11 +113,11 @@ std::optional<ParticularSolutions> ParticularSolutions::make(const std::vector<P
 
 double ParticularSolutions::calc_sine(double kappa, int rank) const {
   const double k = std::sqrt(kappa);
-  // Orders up to somewhat beyond k reach, from where on J falls faster than any power.
+  // Orders up to slightly beyond k reach, where J decays faster than any power.
   const int count = static_cast<int>(std::ceil((k * reach_ + 8.0 * std::cbrt(k * reach_) + 26.0) / alpha_));
   const auto rows = static_cast<Eigen::Index>(rim_.size() + inside_.size());
   la::Matrix a(rows, count);
-  // Orders k alpha with one fractional part follow each other by steps of one where alpha is a fraction p / q: chains of q.
+  // Orders k alpha with equal fractional part differ by integers if alpha is a fraction p / q: q chains.
   int q = 1;
   while (q < 64 && std::abs(q * alpha_ - std::round(q * alpha_)) > 1e-12 * q) ++q;
   const bool has_chains = q < 64;
@@ -141,13 +141,13 @@ double ParticularSolutions::calc_sine(double kappa, int rank) const {
     if (norm > 0.0) a.col(c) /= norm;
   }
   const la::Matrix basis = la::calc_qr(a, count).q;
-  // Singular values of the rim's part are sines of the angles; the small ones come from it with all their digits.
+  // Singular values of the rim part are sines of the angles; the small ones keep full precision.
   return calc_small_singular_value(basis.topRows(static_cast<Eigen::Index>(rim_.size())), rank);
 }
 
 std::optional<ParticularSolutions::Refined> ParticularSolutions::refine(double kappa, double error, int multiplicity) const {
   if (std::sqrt(kappa) * reach_ > kMaxWaves) return std::nullopt;
-  // The sine falls to zero like a V: where the lines from both sides meet is the next estimate, and its error is of second order.
+  // The sine falls to zero like a V: the intersection of the two lines is the next estimate, with an error of second order.
   double centre = kappa, width = std::max(error, 1e-9) * kappa;
   Refined refined{kappa, error, 1.0};
   for (int round = 0; round < 8; ++round) {
@@ -155,7 +155,7 @@ std::optional<ParticularSolutions::Refined> ParticularSolutions::refine(double k
     const double at_low = calc_sine(low, multiplicity), at_high = calc_sine(high, multiplicity);
     const double meet = (low * at_high + high * at_low) / (at_low + at_high), there = calc_sine(meet, multiplicity);
     if (!(there < 0.9 * std::min(at_low, at_high))) {
-      if (round == 0) return std::nullopt;  // no V here
+      if (round == 0) return std::nullopt;  // not V-shaped
       break;
     }
     const double slope = (at_low + at_high) / (high - low);

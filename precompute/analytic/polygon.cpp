@@ -15,19 +15,19 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr double kMaxWanted = 20000;         // modes: hours
-constexpr std::size_t kMaxElements = 60000;  // 18 GB; what so many modes take of a polygon that is not narrow
-constexpr double kSlow = 4.0;                // at a singular corner the last order gained as little as a fifth of the error
+constexpr double kMaxWanted = 20000;         // modes: takes hours
+constexpr std::size_t kMaxElements = 60000;  // 18 GB; enough for kMaxWanted modes of a polygon that is not narrow
+constexpr double kSlow = 4.0;                // error ratio of the last two orders at a singular corner, at most 5
 constexpr double kMinError = 1e-12;          // relative, of the eigensolver
-constexpr double kDegenerate = 1e-7;         // relative distance of eigenvalues that may be one
-constexpr int kMaxRefined = 200;             // modes: what follows costs more than the elements do
+constexpr double kDegenerate = 1e-7;         // relative distance of eigenvalues that may be equal
+constexpr int kMaxRefined = 200;             // modes: beyond, refinement costs more than the elements
 
 bool is_singular(double angle) {
   const double n = pi / angle;
   return std::abs(n - std::round(n)) > 1e-9 * n || n < 0.75;
 }
 
-/// Rings of elements after which a corner leaves less than corner_error in an eigenvalue: what r^alpha has of it in an element of size h is
+/// Rings of elements that reduce a corner's error in an eigenvalue to corner_error: the contribution of r^alpha in an element of size h is
 /// about c^2 (k h)^(2 alpha) / p^(4 alpha) (Babuska and Suri 1987), c the distance of alpha from the next regular exponent.
 int count_rings(double angle, double k_h, const PolygonSetting& setting) {
   const double alpha = pi / angle, distance = alpha - std::max(1.0, std::round(alpha));
@@ -64,15 +64,15 @@ Net Polygon::make_elements(double k, double edge_m) const {
   const std::vector<double> angles = calc_angles(corners_m_);
   std::vector<bool> singular;
   for (std::size_t c = 0; c < angles.size(); ++c) {
-    // Elements are no longer than the sides that meet at a corner. A corner that costs nothing at that size, as those of a polygon that is
-    // almost round, is no singular one.
+    // Elements are no longer than the sides that meet at a corner. A corner that needs no rings at that size (nearly round polygons) is not
+    // singular.
     const Point2 &before = corners_m_[(c + angles.size() - 1) % angles.size()], &at = corners_m_[c],
                  &after = corners_m_[(c + 1) % angles.size()];
     const double side =
         std::min({edge_m, std::hypot(before[0] - at[0], before[1] - at[1]), std::hypot(after[0] - at[0], after[1] - at[1])});
     singular.push_back(is_singular(angles[c]) && count_rings(angles[c], k * side, setting_) > 0);
   }
-  Net net = triangulate(corners_m_, edge_m, singular, kMaxElements);  // a triangle with two singular corners could not be graded to both
+  Net net = triangulate(corners_m_, edge_m, singular, kMaxElements);  // a triangle with two singular corners cannot be graded towards both
   std::vector<double> longest(corners_m_.size(), 0.0);
   for (const Triangle& t : net.triangles)
     for (int c = 0; c < 3; ++c) {
@@ -105,7 +105,7 @@ Polygon::Solved Polygon::solve(double max_kappa) {
   return solved;
 }
 
-/// Eigenvalues, not shapes: those are exact to the bank's steps already.
+/// Refines eigenvalues only: shapes are already exact to the bank's steps.
 void Polygon::refine(Solved& solved) {
   refined_ = 0;
   if (!setting_.uses_particular_solutions) return;
@@ -120,7 +120,7 @@ void Polygon::refine(Solved& solved) {
     const double middle = 0.5 * (solved.kappa[m] + solved.kappa[end - 1]);
     double error = 0.5 * (solved.kappa[end - 1] - solved.kappa[m]) / middle;
     for (std::size_t i = m; i < end; ++i) error = std::max(error, solved.error[i]);
-    // All of a group that are equal vanish together; a group that is not is left as it is.
+    // Equal eigenvalues of a group vanish together; other groups stay as they are.
     const auto found = solutions->refine(middle, error, static_cast<int>(end - m));
     if (found && std::abs(found->kappa / middle - 1.0) <= 2.0 * error)
       for (std::size_t i = m; i < end; ++i, ++refined_) {
@@ -133,7 +133,7 @@ void Polygon::refine(Solved& solved) {
 
 ModeList Polygon::list_modes(double high_hz, std::int64_t max_modes) {
   if (lowest_hz_) {
-    // kappa_1 of the disc of this area is the least that any membrane has (Faber, Krahn); four times that of a narrow one is enough.
+    // kappa_1 of the disc of this area is a lower bound (Faber, Krahn); four times that suffices for a narrow polygon.
     double kappa = 1.5 * square(2.404825557695773) * pi / area_m2_;
     Solved lowest = solve(kappa);
     while (lowest.kappa.empty()) lowest = solve(kappa *= 2.0);
@@ -155,7 +155,7 @@ ModeList Polygon::list_modes(double high_hz, std::int64_t max_modes) {
   return list;
 }
 
-/// The element that a point lies in, or is nearest to.
+/// The element that contains a point or is nearest to it.
 std::size_t Polygon::find_element(const Point2& x, double& r, double& s) const {
   std::size_t best = 0;
   double outside = 1e300;
@@ -199,7 +199,7 @@ la::Matrix Polygon::calc_slope_products(std::span<const Mode> modes) const {
 
 Net Polygon::make_net(int grid) const {
   if (side_m_ <= 0.0) return triangulate(corners_m_, 1.5 * longest_m_ / grid);
-  // Three squares of a regular net.
+  // L shape: three squares of a regular mesh.
   const int half = std::max(1, grid / 2);
   const Net whole = make_rectangle_net(2.0 * side_m_, 2.0 * side_m_, 2 * half, 2 * half);
   Net net;

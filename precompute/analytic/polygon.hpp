@@ -1,4 +1,4 @@
-// A membrane on any polygon.
+// Membranes on polygons.
 #pragma once
 
 #include "precompute/analytic/flat_bodies.hpp"
@@ -6,17 +6,17 @@
 
 namespace carillon::analytic {
 
-/// How fine the elements of a polygon are. The defaults are those of tests/bench/analytic.
+/// Resolution of the elements of a polygon. Defaults from tests/bench/analytic.
 struct PolygonSetting {
   int order = 8;
   double edge_radians = 6.0;   // longest edge times the largest wave number
-  double corner_error = 1e-8;  // relative, that a singular corner may leave in an eigenvalue: its rings of elements follow
-  double ratio = 0.2;          // of the sizes of two rings
+  double corner_error = 1e-8;  // relative eigenvalue error allowed per singular corner: determines its rings of elements
+  double ratio = 0.2;          // size ratio of successive rings
   bool uses_particular_solutions = true;
 };
 
-/// Finite elements of high order, graded towards corners that are no whole part of a half turn; error bars from those of one order less.
-/// Where only one corner is such, as of an L, eigenvalues are refined by particular solutions. Mode::index: place in modes_.
+/// High-order finite elements, graded towards corners whose angle is not pi / n; error bars from the next lower order. With only one such
+/// corner (an L), eigenvalues are refined by particular solutions. Mode::index: index into modes_.
 class Polygon : public FlatBody {
  public:
   Polygon(const job::MembraneBody& body, const material::Material& material, const PolygonSetting& setting = {});

@@ -16,8 +16,8 @@ using job::Edge;
 using std::numbers::pi;
 
 constexpr int kMaxUnknowns = 3600;  // of one dense eigenproblem: about a minute
-constexpr double kSlowRitz = 3.0;  // where a clamped edge meets a free one an eighth more functions gains as little as a third of the error
-constexpr double kZero = 1e-9;     // of the largest eigenvalue wanted: mechanisms
+constexpr double kSlowRitz = 3.0;   // error ratio for an eighth more functions where a clamped edge meets a free one, at most 3
+constexpr double kZero = 1e-9;      // mechanisms: relative to the largest requested eigenvalue
 
 EndConditions get_conditions(Edge edge) {
   return {edge == Edge::hinged || edge == Edge::clamped, edge == Edge::clamped || edge == Edge::sliding};
@@ -34,17 +34,17 @@ RitzPlate::RitzPlate(const job::PlateBody& body, const material::Material& mater
   set_rigid(density_kg_m2_);
 }
 
-/// The functions are the modes of a beam with these ends among the polynomials, of each parity where both ends are alike, so that a
-/// symmetric plate falls into four small problems.
+/// The functions are polynomial beam modes with these end conditions, split by parity if both ends are alike, so a symmetric plate splits
+/// into four small problems.
 std::vector<RitzPlate::Line> RitzPlate::make_lines(int polynomials, Edge first, Edge last) const {
   const la::Matrix slopes = calc_products(polynomials, 1, 1), mixed = calc_products(polynomials, 0, 2);
-  const la::Matrix bending = calc_weighted(polynomials, 2);  // squared last: the products of low functions keep their digits
+  const la::Matrix bending = calc_weighted(polynomials, 2);  // squared last to keep the precision of products of low functions
   std::vector<Line> lines;
   const bool is_symmetric = first == last;
   for (int parity = 0; parity < (is_symmetric ? 2 : 1); ++parity) {
     la::Matrix basis = make_conditioned_basis(polynomials, {get_conditions(first), get_conditions(last)});
     if (is_symmetric) {
-      // Conditions of alike ends do not mix parities: the part of the space of one parity is what its polynomials span.
+      // Equal end conditions preserve parity: the subspace of one parity is spanned by its polynomials.
       la::Matrix even = basis;
       for (int k = 0; k < polynomials; ++k)
         if (k % 2 != parity) even.row(k).setZero();
@@ -65,7 +65,7 @@ std::vector<RitzPlate::Line> RitzPlate::make_lines(int polynomials, Edge first, 
   return lines;
 }
 
-/// The energy D / 2 integral of w_xx^2 + w_yy^2 + 2 nu w_xx w_yy + 2 (1 - nu) w_xy^2 over products of functions whose mass is the identity.
+/// Energy D / 2 integral of w_xx^2 + w_yy^2 + 2 nu w_xx w_yy + 2 (1 - nu) w_xy^2 over products of functions with identity mass.
 RitzPlate::Solved RitzPlate::solve(int x_polynomials, int y_polynomials, double high_lambda) {
   const double a = body_.length_m, b = body_.width_m, nu = poisson_ratio_;
   x_lines_ = make_lines(x_polynomials, body_.edges[0], body_.edges[1]);
@@ -95,7 +95,7 @@ RitzPlate::Solved RitzPlate::solve(int x_polynomials, int y_polynomials, double 
       la::Vector values(k.rows());
       if (la::calc_eigenpairs_by_division(k, values) != 0) throw SolveError("the dense eigensolver failed on the plate");
       for (Eigen::Index m = 0; m < values.size() && values(m) <= high_lambda; ++m) {
-        // The solver's error is of the size of the highest eigenvalue's rounding; the quotient's is of this one's.
+        // The solver's rounding error scales with the highest eigenvalue, that of the Rayleigh quotient with this one.
         const auto shape = k.col(m);
         const double lambda = shape.dot(energy.selfadjointView<Eigen::Upper>() * shape) / shape.squaredNorm();
         found.push_back({lambda, {i, j, Eigen::Map<const la::Matrix>(shape.data(), nx, ny)}});

@@ -15,7 +15,7 @@ Net make_rectangle_net(double length_m, double width_m, int columns, int rows) {
   const auto at = [&](int i, int j) { return static_cast<std::int32_t>(j * (columns + 1) + i); };
   for (int j = 0; j < rows; ++j)
     for (int i = 0; i < columns; ++i) {
-      // Diagonals take turns, so that the net has no direction of its own.
+      // Alternating diagonals avoid a preferred direction.
       if ((i + j) % 2 == 0) {
         net.triangles.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1)});
         net.triangles.push_back({at(i, j), at(i + 1, j + 1), at(i, j + 1)});

@@ -1,4 +1,4 @@
-// Surfaces of thin flat bodies and of straight ones.
+// Surfaces of thin flat bodies and of straight bodies.
 #pragma once
 
 #include <array>
@@ -16,18 +16,18 @@ struct Net {
   std::vector<Triangle> triangles;
 };
 
-/// A rectangle from the origin, cut into columns by rows and each cell in two.
+/// Rectangle from the origin, in columns by rows, each cell cut in two.
 Net make_rectangle_net(double length_m, double width_m, int columns, int rows);
-/// A disc about the origin: ring k of `rings` has 6 k points.
+/// Disc about the origin: ring k of `rings` has 6 k points.
 Net make_disc_net(double radius_m, int rings);
 
-/// Both sides of a net at z = +-thickness / 2, and the rim between them.
+/// Both faces of a planar mesh at z = +-thickness / 2, and the rim between them.
 ClosedSurface make_slab(const Net& net, double thickness_m);
 
-/// A straight body along x from the origin: `section` is a convex polygon in (y, z), counter-clockwise seen from +x.
+/// Straight body along x from the origin: `section` is a convex polygon in (y, z), counter-clockwise seen from +x.
 ClosedSurface make_prism(double length_m, const std::vector<Point2>& section, int intervals);
 
-/// Of a slab of uniform density: mass, centre, inertia. Area, first and second moments are those of the net's triangles.
+/// Mass, centre and inertia of a slab of uniform density, from the moments of the triangles.
 bank::RigidBody calc_slab_rigid(const Net& net, double thickness_m, double mass_kg);
 
 }  // namespace carillon::analytic

@@ -1,4 +1,4 @@
-// Rows of the energy of large motion of bodies whose shapes are known (docs/equations.md E12).
+// Rows of the large-motion energy of bodies with known shapes (docs/equations.md E12).
 #pragma once
 
 #include <span>
@@ -8,9 +8,10 @@
 
 namespace carillon::analytic {
 
-/// Appends the row A_r, symmetric (N, N) [J^1/2 m^-2 kg^-1]. What is rounding of the diagonal is 0: players keep diagonal rows apart.
+/// Appends the row A_r, symmetric (N, N) [J^1/2 m^-2 kg^-1]. Rounding off the diagonal is set to 0, since the player stores diagonal rows
+/// separately.
 void append_row(const la::Matrix& a, bank::QuarticEnergy& energy);
-/// The same of a row without anything off its diagonal, (N).
+/// Appends a diagonal row, (N).
 void append_diagonal_row(std::span<const double> a, bank::QuarticEnergy& energy);
 
 }  // namespace carillon::analytic

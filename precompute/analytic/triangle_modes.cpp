@@ -19,15 +19,15 @@ namespace {
 using petsc::check;
 using Sparse = Eigen::SparseMatrix<double, Eigen::RowMajor, PetscInt>;
 
-constexpr double kTolerance = 1e-10;  // of residuals; eigenvalues are good to its square
+constexpr double kTolerance = 1e-10;  // residual; the eigenvalue error is its square
 
-/// Where the nodes of each element are, and which nodes the rim fixes.
+/// Node positions of each element, and the fixed nodes of the rim.
 struct Numbering {
   std::vector<std::vector<std::int32_t>> elements;
   std::vector<bool> is_fixed;
 };
 
-/// Nodes of corners are those of the net; those of edges are shared by the two triangles at the edge, counted from its smaller end.
+/// Corner nodes are those of the mesh; edge nodes are shared by two triangles and counted from the end with the smaller number.
 Numbering number_nodes(const Net& net, const TriangleBasis& basis) {
   const int p = basis.order();
   Numbering numbering;
@@ -71,8 +71,8 @@ petsc::MatHandle wrap(Sparse& matrix) {
   return handle;
 }
 
-/// Unknowns in the order in which the elements, along a curve through their middles, meet them first: three that follow each other are
-/// near each other, as those of one node of a solid are, for which the solver is made. -1: fixed.
+/// Unknowns in the order of first use by the elements along a space-filling curve: three consecutive unknowns are neighbours, like those of
+/// one solid node, as the solver expects. -1: fixed.
 std::vector<PetscInt> number_unknowns(const Net& net, const Numbering& numbering, PetscInt& count) {
   Point2 low{1e300, 1e300}, high{-1e300, -1e300};
   for (const Point2& point : net.points_m)
@@ -99,7 +99,7 @@ std::vector<PetscInt> number_unknowns(const Net& net, const Numbering& numbering
   return unknown;
 }
 
-/// A point of the triangle as the mean of those that its place has on the three sides, each weighted by how near that side is.
+/// Point of the triangle: mean of its points on the three sides, weighted by proximity.
 Point2 place_point(const std::array<int, 3>& place, const std::vector<std::vector<double>>& lobatto) {
   const int order = place[0] + place[1] + place[2];
   std::array<double, 3> sum{};
@@ -117,7 +117,7 @@ Point2 place_point(const std::array<int, 3>& place, const std::vector<std::vecto
 }  // namespace
 
 TriangleBasis::TriangleBasis(int order) : order_(order) {
-  std::vector<std::vector<double>> lobatto;  // of each order up to this one
+  std::vector<std::vector<double>> lobatto;  // by order, up to this one
   for (int n = 0; n <= order; ++n) lobatto.push_back(make_lobatto_points(n));
   for (int j = 0; j <= order; ++j)
     for (int i = 0; i + j <= order; ++i) {
@@ -128,7 +128,7 @@ TriangleBasis::TriangleBasis(int order) : order_(order) {
   for (int q = 0; q < size(); ++q) values.row(q) = calc_polynomials(points_[q][0], points_[q][1]).col(0).transpose();
   inverse_ = la::calc_inverse(values);
   mass = inverse_.transpose() * inverse_;
-  // The square (x, y) -> (r, s) = (x (1 - y), y) makes Gauss's rule one of the triangle.
+  // The map (x, y) -> (r, s) = (x (1 - y), y) of the square turns Gauss's rule into one for the triangle.
   const GaussRule rule = make_gauss_rule(order + 1);
   la::Matrix rr = la::Matrix::Zero(size(), size()), rs = rr, ss = rr;
   for (std::size_t a = 0; a < rule.x.size(); ++a)
@@ -144,7 +144,7 @@ TriangleBasis::TriangleBasis(int order) : order_(order) {
   stiffness_ss = inverse_.transpose() * ss * inverse_;
 }
 
-/// sqrt(2 (2 i + 1) (i + j + 1)) t^i P_i(x / t) P_j^(2 i + 1, 0)(2 s - 1), t = 1 - s, x = 2 r - t; both factors by their recurrences.
+/// sqrt(2 (2 i + 1) (i + j + 1)) t^i P_i(x / t) P_j^(2 i + 1, 0)(2 s - 1), t = 1 - s, x = 2 r - t; both factors by recurrence.
 Eigen::Matrix<double, Eigen::Dynamic, 3> TriangleBasis::calc_polynomials(double r, double s) const {
   using Row = Eigen::RowVector3d;  // value, by r, by s
   const auto times = [](const Row& a, const Row& b) { return Row(a[0] * b[0], a[0] * b[1] + a[1] * b[0], a[0] * b[2] + a[2] * b[0]); };
@@ -158,7 +158,7 @@ Eigen::Matrix<double, Eigen::Dynamic, 3> TriangleBasis::calc_polynomials(double 
     for (int i = 0; i + j <= order_; ++i) {
       const double a = 2 * i + 1;
       Row before = one, now = j == 0 ? one : Row(0.5 * ((a + 2.0) * z + a * one));
-      for (int n = 2; n <= j; ++n) {  // Jacobi's polynomials with beta = 0 (Abramowitz and Stegun 1964, 22.7.1)
+      for (int n = 2; n <= j; ++n) {  // Jacobi polynomials with beta = 0 (Abramowitz and Stegun 1964, 22.7.1)
         const double c = 2.0 * n + a;
         const Row next = ((c - 1.0) * (c * (c - 2.0) * times(z, now) + a * a * now) - 2.0 * (n + a - 1.0) * (n - 1.0) * c * before) /
                          (2.0 * n * (n + a) * (c - 2.0));
@@ -193,7 +193,7 @@ TriangleModes solve_triangles(const Net& net, const TriangleBasis& basis, double
         heavy.emplace_back(row, column, twice * basis.mass(i, j));
       }
   }
-  // What fills up the last three is far above the band.
+  // Padding unknowns lie far above the band.
   for (PetscInt n = used; n < unknowns; ++n) {
     stiff.emplace_back(n, n, 1.0);
     heavy.emplace_back(n, n, 1e-6 / max_kappa);
@@ -213,7 +213,7 @@ TriangleModes solve_triangles(const Net& net, const TriangleBasis& basis, double
         const Point2& at = net.points_m[net.triangles[t][0]];
         layout.nodes_m[static_cast<std::size_t>(unknown[n]) / 3] = {at[0], at[1], 0.0};
       }
-  layout.fixed.resize(1);  // three points that are no line: no rigid modes
+  layout.fixed.resize(1);  // three points not on a line: no rigid modes
   for (const std::int32_t v : net.triangles[0]) layout.fixed[0].push_back({net.points_m[v][0], net.points_m[v][1], 0.0});
   eigen::Options options;
   options.low_hz = 0.0;

@@ -1,4 +1,4 @@
-// Eigenvalues of -Laplace on a net of triangles, zero along its rim, by finite elements of high order.
+// Eigenvalues of -Laplace on a triangle mesh, zero along the rim, by high-order finite elements.
 #pragma once
 
 #include <vector>
@@ -8,15 +8,15 @@
 
 namespace carillon::analytic {
 
-/// Lagrange's functions of one order on the unit triangle, at points that on each side are those of Gauss and Lobatto (Isaac 2020,
-/// Recursive, parameter-free, explicitly defined interpolation nodes for simplices): at equispaced ones order eight would lose five digits.
+/// Lagrange functions of one order on the unit triangle, at nodes that are Gauss-Lobatto points on each side (Isaac 2020, Recursive,
+/// parameter-free, explicitly defined interpolation nodes for simplices): equispaced nodes would lose five digits at order eight.
 class TriangleBasis {
  public:
   explicit TriangleBasis(int order);
   int size() const { return static_cast<int>(points_.size()); }
   int order() const { return order_; }
   const std::vector<Point2>& points() const { return points_; }
-  /// Of each point the place in the lattice of barycentric numbers that add up to the order.
+  /// Lattice indices of each point: barycentric numbers that add up to the order.
   const std::vector<std::array<int, 3>>& places() const { return places_; }
   /// Values at (r, s), r, s >= 0, r + s <= 1.
   la::Vector calc(double r, double s) const;
@@ -24,12 +24,12 @@ class TriangleBasis {
   la::Matrix mass, stiffness_rr, stiffness_rs, stiffness_ss;
 
  private:
-  /// Orthonormal polynomials of Dubiner (1991) and their derivatives, columns: value, by r, by s.
+  /// Dubiner's (1991) orthonormal polynomials and their derivatives, columns: value, by r, by s.
   Eigen::Matrix<double, Eigen::Dynamic, 3> calc_polynomials(double r, double s) const;
   int order_;
   std::vector<Point2> points_;
   std::vector<std::array<int, 3>> places_;
-  la::Matrix inverse_;  // of Vandermonde's matrix in orthonormal polynomials
+  la::Matrix inverse_;  // of the Vandermonde matrix in orthonormal polynomials
 };
 
 /// Modes with unit integral of the square.
@@ -40,8 +40,8 @@ struct TriangleModes {
   std::vector<double> residuals;                    // (m) relative
 };
 
-/// All eigenvalues up to `max_kappa`, by the solver of solids (eigen::solve_modes), which counts them by inertia. Not collective. Throws as
-/// that does.
+/// All eigenvalues up to `max_kappa`, by the solver of solids (eigen::solve_modes), counted by inertia. Not collective. Throws as that
+/// does.
 TriangleModes solve_triangles(const Net& net, const TriangleBasis& basis, double max_kappa);
 
 }  // namespace carillon::analytic

@@ -23,7 +23,7 @@ long double cross(const Point2& o, const Point2& a, const Point2& b) {
 
 double calc_length(const Point2& a, const Point2& b) { return std::hypot(b[0] - a[0], b[1] - a[1]); }
 
-/// Of the ears that can be cut off, the one whose least angle is greatest goes first.
+/// Cuts off the ear with the largest minimum angle first.
 std::vector<Triangle> cut_ears(const std::vector<Point2>& p) {
   std::vector<std::int32_t> ring;
   for (std::size_t i = 0; i < p.size(); ++i) ring.push_back(static_cast<std::int32_t>(i));
@@ -38,7 +38,7 @@ std::vector<Triangle> cut_ears(const std::vector<Point2>& p) {
     const double longest = std::max({calc_length(p[a], p[b]), calc_length(p[b], p[c]), calc_length(p[c], p[a])});
     return static_cast<double>(area) / (longest * longest);
   };
-  std::vector<double> quality;  // of the ear at each place of the ring, as it was judged last
+  std::vector<double> quality;  // of the ear at each place of the ring, at its last evaluation
   const auto judge_all = [&] {
     quality.clear();
     for (std::size_t i = 0; i < ring.size(); ++i) quality.push_back(judge(i));
@@ -47,7 +47,7 @@ std::vector<Triangle> cut_ears(const std::vector<Point2>& p) {
   judge_all();
   while (ring.size() > 3) {
     auto best = std::max_element(quality.begin(), quality.end());
-    if (*best < 0.0) best = judge_all();  // corners that were in the way may have been removed
+    if (*best < 0.0) best = judge_all();  // blocking corners may have been removed
     if (*best < 0.0) throw InputError("the polygon is too thin to be divided into triangles; move its corners apart");
     const std::size_t at = best - quality.begin();
     const std::size_t n = ring.size();
@@ -60,7 +60,7 @@ std::vector<Triangle> cut_ears(const std::vector<Point2>& p) {
   return triangles;
 }
 
-/// Which triangle lies to the left of each directed edge.
+/// The triangle to the left of each directed edge.
 std::map<NodePair, std::size_t> list_edges(const std::vector<Triangle>& triangles) {
   std::map<NodePair, std::size_t> edges;
   for (std::size_t t = 0; t < triangles.size(); ++t)
@@ -73,8 +73,8 @@ double calc_angle(const Point2& tip, const Point2& a, const Point2& b) {
   return std::atan2(std::abs(static_cast<double>(cross(tip, a, b))), dot);
 }
 
-/// Lawson's flips: an inner edge whose opposite angles add up to more than a half turn is exchanged for the other diagonal, unless that
-/// joins two points that are to be apart.
+/// Lawson's flips: an inner edge whose opposite angles add up to more than 180 degrees is replaced by the other diagonal, unless that joins
+/// two points of `apart`.
 void flip_edges(Net& net, const std::vector<bool>& apart) {
   const auto is_marked = [&](std::int32_t v) { return v < std::ssize(apart) && apart[v]; };
   constexpr double kSlack = 1e-9;
@@ -108,8 +108,7 @@ void flip_edges(Net& net, const std::vector<bool>& apart) {
   }
 }
 
-/// Halves the longest edge of a triangle, and before that those of neighbours that are longer, until none is too long and no triangle has
-/// two of the points that are to be apart.
+/// Bisects longest edges, those of neighbours with longer edges first, until no edge is too long and no triangle has two points of `apart`.
 void halve_edges(Net& net, double max_edge_m, const std::vector<bool>& apart, std::size_t max_triangles) {
   std::map<NodePair, std::size_t> edges = list_edges(net.triangles);
   const auto longest = [&](std::size_t t) {
@@ -117,7 +116,7 @@ void halve_edges(Net& net, double max_edge_m, const std::vector<bool>& apart, st
     int best = 0;
     double length = -1.0;
     for (int k = 0; k < 3; ++k) {
-      const std::int32_t a = std::min(v[k], v[(k + 1) % 3]), b = std::max(v[k], v[(k + 1) % 3]);  // the same number from both sides
+      const std::int32_t a = std::min(v[k], v[(k + 1) % 3]), b = std::max(v[k], v[(k + 1) % 3]);  // the same for both sides
       if (const double now = calc_length(net.points_m[a], net.points_m[b]); now > length) length = now, best = k;
     }
     return std::pair(best, length);
@@ -148,7 +147,7 @@ void halve_edges(Net& net, double max_edge_m, const std::vector<bool>& apart, st
           fmt::format("the polygon takes more than {} triangles; make its narrowest part wider, or lower the end of "
                       "\"band_hz\" or \"max_modes\"",
                       max_triangles));
-    // Rivara's path: from neighbour to neighbour across longest edges that are longer still, to an edge that is the longest on both sides.
+    // Rivara's path: across longest edges from neighbour to neighbour, to an edge that is the longest on both sides.
     std::size_t t = work.back();
     auto [k, length] = longest(t);
     NodePair e{net.triangles[t][k], net.triangles[t][(k + 1) % 3]};

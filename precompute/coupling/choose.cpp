@@ -1,7 +1,6 @@
-// Method: A plate of thickness h that bends with the wave number k has rotation / strain = sqrt(24) / (h k); a wave of shear in the body
-// has
-//   1, one of compression 0.
-// Source: docs/equations.md E13. Deviations: none.
+// Method: In a plate of thickness h, bending with the wave number k has rotation / strain = sqrt(24) / (h k); bulk shear waves have 1,
+//   compression waves 0.
+// Source: docs/equations.md E13.
 #include "precompute/coupling/choose.hpp"
 
 #include <algorithm>
@@ -44,7 +43,7 @@ std::vector<double> calc_slenderness(const comm::Communicator& comm, const Strai
 
 Choice choose_modes(std::span<const double> freq_hz, std::span<const double> slenderness, std::span<const std::int32_t> eligible, int count,
                     double below_hz) {
-  constexpr double kSame = 1e-6;  // of the frequency: modes of one frequency
+  constexpr double kSame = 1e-6;  // relative frequency difference of degenerate modes
   Choice choice;
   std::vector<std::int32_t> bending;
   const auto find_freq = [&](std::int32_t mode) { return freq_hz[mode]; };

@@ -1,4 +1,4 @@
-// Which modes of a body are coupled by its nonlinear strain.
+// Choice of the modes coupled by nonlinear strain.
 #pragma once
 
 #include <cstdint>
@@ -11,8 +11,8 @@
 
 namespace carillon::coupling {
 
-/// Modes whose rotation is three times their strain or more, in the root of the mean square over the body, bend or twist something slender:
-/// waves longer than 3.8 thicknesses of a plate. The others stretch or shear it.
+/// Minimum ratio of rms rotation to rms strain of modes that bend or twist a slender part: wavelengths above 3.8 thicknesses of a plate.
+/// The others stretch or shear it.
 inline constexpr double kSlender = 3.0;
 
 /// (modes) root of the integral of rotation² over that of strain². Collective.
@@ -21,14 +21,14 @@ std::vector<double> calc_slenderness(const comm::Communicator& comm, const Strai
 
 struct Choice {
   std::vector<std::int32_t> modes;  // ascending
-  double top_hz = 0;                // of the highest one
-  double membrane_hz = 0;           // of the lowest mode that stretches or shears; 0: none is known
-  std::int64_t bending_count = 0;   // modes that bend or twist up to the limit, chosen or not
-  bool splits_pair = false;         // the last was left out because its like, of the same frequency, did not fit
+  double top_hz = 0;                // frequency of the highest coupled mode
+  double membrane_hz = 0;           // lowest mode that stretches or shears; 0: unknown
+  std::int64_t bending_count = 0;   // bending or twisting modes up to the limit, chosen or not
+  bool splits_pair = false;         // the last mode was omitted because its degenerate partner did not fit
 };
 
-/// The lowest `count` modes of `eligible` (ascending) that bend or twist, up to below_hz: with the same blow they move furthest, and they
-/// are what is heard to glide. Two modes of one frequency go together. freq_hz, slenderness: of all modes. Pure.
+/// The lowest `count` bending or twisting modes of `eligible` (ascending) up to below_hz: they have the largest displacement for a given
+/// impulse and dominate the pitch glide. Degenerate modes stay together. freq_hz, slenderness: of all modes. Pure.
 Choice choose_modes(std::span<const double> freq_hz, std::span<const double> slenderness, std::span<const std::int32_t> eligible, int count,
                     double below_hz);
 

@@ -1,6 +1,6 @@
-// Method:     Which modes (choose.hpp); the fields that their pairs span (stresses.hpp); few points, where they cost less than rows
-//             (points.hpp).
-// Source:     docs/equations.md E13. Deviations: none.
+// Method:     choice of the modes (choose.hpp); fields spanned by their pairs (stresses.hpp); integration points, where cheaper than rows
+//   (points.hpp).
+// Source:     docs/equations.md E13.
 #include "precompute/coupling/condense.hpp"
 
 #include <fmt/core.h>
@@ -15,13 +15,14 @@
 #include "precompute/coupling/static_answer.hpp"
 #include "precompute/coupling/stresses.hpp"
 #include "precompute/coupling/stretch.hpp"
+#include "precompute/job/cost/calibration.hpp"
 #include "precompute/la/local_columns.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::coupling {
 namespace {
 
-constexpr double kFieldsShare = 0.5;  // of the error that is asked for: for leaving fields out; the points have the rest
+constexpr double kFieldsShare = 0.5;  // share of the error budget for omitted fields; the rest is for the points
 
 /// Multiply-adds of one evaluation of the energy and its gradient.
 double count_rows_cost(double rows, double modes) { return rows * modes * (modes + 1); }
@@ -29,8 +30,8 @@ double count_points_cost(double points, double rows, double modes) { return 2 * 
 
 void check(const SolvedModes& solved, const CondenseOptions& options) {
   if (solved.components != 1)
-    throw InputError(fmt::format("nonlinear motion couples the modes of one piece, and the body has {}: solve each as a body of its own",
-                                 solved.components));
+    throw InputError(
+        fmt::format("nonlinear coupling needs a connected body, and this one has {} parts: solve each part separately", solved.components));
   const std::size_t eligible = options.eligible.empty() ? solved.lambda.size() : options.eligible.size();
   if (static_cast<std::size_t>(options.modes) > eligible)
     throw InputError(
@@ -45,7 +46,7 @@ std::vector<double> calc_freq_hz(std::span<const double> lambda) {
   return freq;
 }
 
-/// The columns of the chosen modes, one behind the other.
+/// Columns of the chosen modes, one after the other.
 std::vector<double> copy_columns(const la::Columns& shapes, std::span<const std::int32_t> modes) {
   std::vector<double> copied;
   copied.reserve(static_cast<std::size_t>(shapes.rows) * modes.size());
@@ -109,16 +110,16 @@ Condensed condense_modes(const comm::Communicator& comm, const SolvedModes& solv
     if (options.report) options.report(fmt::format("{:.0f} % of the pairs of {} modes", 100 * share, modes), share);
   };
   const CoupledBody body{comm, strains, answer, nodal, omega, Pairs{modes}, proceed};
-  const bool wants_points = modes > kModesOfAllPairs && !options.is_stretch;
+  const bool wants_points = modes > cost::kModesOfAllPairs && !options.is_stretch;
   const double fields_error = kFieldsShare * options.energy_error;
-  StressFields fields =
-      modes > kModesOfAllPairs ? calc_fields_of_samples(body, fields_error) : calc_fields_of_pairs(body, fields_error, options.is_stretch);
+  StressFields fields = modes > cost::kModesOfAllPairs ? calc_fields_of_samples(body, fields_error)
+                                                       : calc_fields_of_pairs(body, fields_error, options.is_stretch);
   if (options.is_stretch) {
     keep_stretch(body, fields);
     if (fields.form.rows() == 0)
       throw InputError(
-          "\"nonlinear\": \"stretch\" is the mean stretch of a body that is held on opposite sides, and no stress of this one has a mean: "
-          "hold it so by \"fixed\", or couple its modes in full, {\"modes\": 30}");
+          "\"nonlinear\": \"stretch\" needs a body held on opposite sides, and no stress field of this one has a nonzero mean: "
+          "fix opposite sides (\"fixed\"), or couple the modes in full, {\"modes\": 30}");
   }
   result.solves = fields.solves;
   result.curvature = fields.curvature;
@@ -146,7 +147,7 @@ Condensed condense_modes(const comm::Communicator& comm, const SolvedModes& solv
     if (fields.curvature < kCurved) return;
     for (std::ptrdiff_t r = 0; r < fields.linear.rows(); ++r)
       for (std::ptrdiff_t i = 0; i < fields.linear.cols(); ++i) energy.linear.push_back(fields.linear(r, i));
-    // Of the lowest mode at a thousandth of the thickness
+    // For the lowest mode at a thousandth of the thickness
     const double q = 1e-3 * options.thickness_m / first_peak;
     energy.rest_energy_j = 0.5 * omega.front() * omega.front() * q * q;
   });

@@ -1,7 +1,7 @@
-// Method:     Active sets: the entry whose increase lowers the residual fastest joins; a least-squares solution on the entries that joined
-//             replaces x, cut where an entry would become negative, which then leaves. Normal equations of the columns that joined.
+// Method:     Active set: the entry with the steepest descent joins; the least-squares solution on the active entries replaces x, stopped
+//   where an entry would become negative, which then leaves. Normal equations of the active columns.
 // Source:     Lawson, Hanson, Solving Least Squares Problems, 1974, chapter 23.
-// Deviations: It stops early: what is wanted is few entries.
+// Deviations: early stopping, to keep few entries.
 #include "precompute/coupling/nonnegative.hpp"
 
 #include <Eigen/Dense>
@@ -11,10 +11,10 @@ namespace carillon::coupling {
 
 namespace {
 
-/// A^T A and A^T b of the columns that joined.
+/// A^T A and A^T b of the active columns.
 struct Normal {
   std::vector<std::ptrdiff_t> joined;
-  la::Matrix products;  // (room, room), the first joined.size() used
+  la::Matrix products;  // (capacity, capacity), the first joined.size() used
   la::Vector sides;
 
   std::ptrdiff_t size() const { return static_cast<std::ptrdiff_t>(joined.size()); }
@@ -36,7 +36,7 @@ struct Normal {
   la::Vector solve() const { return products.topLeftCorner(size(), size()).ldlt().solve(sides.head(size())); }
 };
 
-/// Moves x towards the least-squares solution on the joined columns, those that would become negative leaving one after the other.
+/// Moves x towards the least-squares solution on the active columns; entries that would become negative leave one by one.
 void settle(Normal& normal, la::Vector& x) {
   while (normal.size() > 0) {
     const la::Vector wanted = normal.solve();
@@ -61,10 +61,10 @@ void settle(Normal& normal, la::Vector& x) {
 }  // namespace
 
 la::Vector solve_nonnegative(const la::Matrix& a, const la::Vector& b, double tolerance, std::ptrdiff_t most) {
-  constexpr double kSlope = 1e-12;  // of |b|: no way down
+  constexpr double kSlope = 1e-12;  // relative to |b|: stationary
   la::Vector x = la::Vector::Zero(a.cols());
   const la::Vector norms = a.colwise().norm().transpose();
-  std::vector<char> barred(a.cols(), 0);  // those that left as soon as they had joined
+  std::vector<char> barred(a.cols(), 0);  // entries that left immediately after joining
   Normal normal{{}, la::Matrix(most, most), la::Vector(most)};
   la::Vector residual = b;
   while (normal.size() < most && residual.norm() > tolerance * b.norm()) {

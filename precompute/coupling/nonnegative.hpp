@@ -1,4 +1,4 @@
-// Least squares with coefficients that are not negative.
+// Nonnegative least squares.
 #pragma once
 
 #include <cstddef>
@@ -8,8 +8,8 @@
 
 namespace carillon::coupling {
 
-/// x >= 0 with few entries that are not 0 so that |A x - b| is small: the method of Lawson and Hanson, stopped when |A x - b| <= tolerance
-/// |b|, `most` entries are not 0, or no other improves it. Returns x. Not collective.
+/// Sparse x >= 0 with small |A x - b|: Lawson and Hanson's method, stopped at |A x - b| <= tolerance |b|, at `most` nonzero entries, or
+/// without further improvement. Not collective.
 la::Vector solve_nonnegative(const la::Matrix& a, const la::Vector& b, double tolerance, std::ptrdiff_t most);
 
 }  // namespace carillon::coupling

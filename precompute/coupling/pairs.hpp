@@ -1,4 +1,4 @@
-// The products q_i q_j of the coordinates of N modes, i <= j.
+// Index of the products q_i q_j of N modal coordinates, i <= j.
 #pragma once
 
 #include <cstddef>
@@ -7,7 +7,7 @@
 
 namespace carillon::coupling {
 
-/// N (N + 1) / 2 pairs, in the order of bank::QuarticEnergy: by columns of the upper triangle.
+/// N (N + 1) / 2 pairs, in the order of bank::QuarticEnergy: columns of the upper triangle.
 struct Pairs {
   std::ptrdiff_t modes = 0;
 

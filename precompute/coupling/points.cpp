@@ -1,10 +1,10 @@
-// Method:     Cubature of energy: weights x >= 0, few of them not 0, with sum over p of x_p c_p = c, c_p what a point adds to <s(q_l),
-//             E2(q_k)> of pairs of motions drawn at random, c the whole. With the points chosen, stress is fitted to all pairs of modes
-//             (ridge regression). Candidates are ordered by the numbers of the elements in the mesh: they do not depend on the ranks.
+// Method:     Cubature of the energy: weights x >= 0, few of them nonzero, with sum over p of x_p c_p = c, where c_p is the contribution of
+//   a point to <s(q_l), E2(q_k)> for random pairs of motions and c the total. At the chosen points, stress is fitted to all pairs of modes
+//   (ridge regression). Candidates are ordered by element numbers of the mesh, so results do not depend on the partition.
 // Source:     An, Kim, James, ACM Trans. Graph. 27, 165, 2008 (cubature); Farhat, Avery, Chapman, Cortial, Int. J. Numer. Meth. Eng. 98,
-//             2014 (energy-conserving weights); docs/equations.md E13.
-// Deviations: The sum is of each field's coupling, not of the energy: squares of what is summed make the energy, so that it cannot be
-//             negative whatever the points.
+//   2014 (energy-conserving weights); docs/equations.md E13.
+// Deviations: The cubature is applied to each field's coupling, not to the energy: the energy is a sum of squares and stays nonnegative for
+//   any points.
 #include "precompute/coupling/points.hpp"
 
 #include <Eigen/Dense>
@@ -23,16 +23,16 @@ namespace {
 
 constexpr std::int64_t kCandidates = 4000;
 constexpr std::uint64_t kTrainingSeed = 1000;
-constexpr double kRidge = 1e-9;   // of the mean square of the strains
-constexpr double kGrowth = 1.25;  // of the number of points from one attempt to the next
+constexpr double kRidge = 1e-9;   // relative to the mean square of the strains
+constexpr double kGrowth = 1.25;  // of the number of points per attempt
 
-/// Candidates of all ranks, in the order of the mesh. Rank 0.
+/// Candidates of all ranks, in mesh order. Rank 0.
 struct Candidates {
   la::Matrix gradient;  // (9 C, N)
   la::Matrix stress;    // (6 C, R), times the volume of the point
 };
 
-/// Gradients and stresses of a candidate, one number after the other, behind its number.
+/// Gradients and stresses of a candidate, preceded by its number.
 std::vector<double> list_candidates(const CoupledBody& body, const mesh::LocalMesh& local, const StressFields& fields,
                                     std::int64_t all_points) {
   const Strains& strains = body.strains;
@@ -112,14 +112,14 @@ la::Matrix calc_pair_strains(const la::Matrix& gradient, const Pairs& pairs) {
   return strain;
 }
 
-/// The sums that the weights are to reproduce: (equations, candidates), and the whole of each.
+/// The sums that the weights have to reproduce: (equations, candidates), and their totals.
 struct Equations {
   la::Matrix parts;
   la::Vector whole;
 };
 
 Equations make_equations(const CoupledBody& body, const StressFields& fields, const Candidates& candidates) {
-  constexpr int kPartners = 4;  // of each motion: itself, and fields drawn at random
+  constexpr int kPartners = 4;  // per motion: itself, and random fields
   const auto motions = static_cast<int>(3 * body.pairs.modes);
   const Samples samples = make_samples(body.omega, motions, kTrainingSeed);
   const la::Matrix eta = fields.form * samples.products;  // (R, motions)
@@ -146,7 +146,7 @@ Equations make_equations(const CoupledBody& body, const StressFields& fields, co
   return equations;
 }
 
-/// The points of the weights that are not 0, with the stress that suits all pairs best.
+/// The points with nonzero weight, with the stress that fits all pairs best.
 CouplingPoints fit(const CoupledBody& body, const StressFields& fields, const Candidates& candidates, const la::Vector& x) {
   CouplingPoints points;
   const std::ptrdiff_t count = (x.array() > 0).count();

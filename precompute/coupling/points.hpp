@@ -1,4 +1,4 @@
-// Few points of a body at which the coupling of its modes can be summed up.
+// Cubature points for the coupling of modes.
 #pragma once
 
 #include <vector>
@@ -12,12 +12,11 @@ struct CouplingPoints {
   la::Matrix gradient;  // (9 P, N), row 9 p + 3 k + a
   la::Matrix stress;    // (6 P, R)
   la::Vector weight;    // (P)
-  double error = 0;     // of the energy on the tests: see calc_error()
+  double error = 0;     // energy error on the tests: see calc_error()
 };
 
-/// Chooses points of integration by least squares with weights that are not negative, so that the sums are those of the fields on motions
-/// drawn at random; then fits the stress at the points. As many points as `error` wants, `most` at most; error says whether that was
-/// enough. fields: with values. Collective; empty but on rank 0.
+/// Chooses integration points by nonnegative least squares on random motions, then fits the stress at the points. Adds points until `error`
+/// is met, at most `most`; the result's error shows which. fields: with values. Collective; empty except on rank 0.
 CouplingPoints choose_points(const CoupledBody& body, const mesh::LocalMesh& local, const StressFields& fields, double error,
                              std::ptrdiff_t most);
 

@@ -1,4 +1,4 @@
-// Products of dense matrices by BLAS.
+// Dense matrix products by BLAS.
 #pragma once
 
 #include "precompute/la/lapack.hpp"

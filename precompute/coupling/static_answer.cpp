@@ -1,7 +1,8 @@
-// Method:     One factorisation of K - sigma M, sigma = -1e-5 lambda, for free and held bodies alike: on modes of lambda_j the answer is
-//             1 / (lambda_j + 1e-5 lambda) instead of 1 / lambda_j. What is left over of a quadratic strain is least at the right theta, so
-//             that an error of 1e-5 of theta is one of 1e-10 of its energy.
-// Source:     docs/equations.md E13. Deviations: the shift.
+// Method:     One factorisation of K - sigma M, sigma = -1e-5 lambda, for free and held bodies alike: the response on modes of lambda_j is
+//   1 / (lambda_j + 1e-5 lambda) instead of 1 / lambda_j. The remaining quadratic strain is minimal at the exact theta, so a relative error
+//   of 1e-5 in theta is 1e-10 in its energy.
+// Source:     docs/equations.md E13.
+// Deviations: the shift.
 #include "precompute/coupling/static_answer.hpp"
 
 #include <algorithm>
@@ -55,8 +56,8 @@ Nodal spread(const comm::Communicator& comm, comm::HaloExchange& halo, const mes
   return nodal;
 }
 
-StaticAnswer::StaticAnswer(const comm::Communicator& comm, const mesh::LocalMesh& local, Mat stiffness, Mat mass,
-                           const la::Columns& kept, double lambda)
+StaticAnswer::StaticAnswer(const comm::Communicator& comm, const mesh::LocalMesh& local, Mat stiffness, Mat mass, const la::Columns& kept,
+                           double lambda)
     : comm_(comm),
       local_(&local),
       halo_(make_halo(comm, local)),

@@ -1,8 +1,8 @@
-// Method:     The rule of each element is the one that integrates its stiffness: then the linear strains of the mesh's displacements are a
-//             subspace of the strains at the points, B^T B = K, and what K^-1 takes off a quadratic strain is its projection on it.
-// Source:     docs/equations.md E1, E13; quadrature and mean dilatation as precompute/fem/element.cpp.
-// Deviations: Of the quadratic strain of nearly incompressible T10, too, only the mean dilatation meets the part of lambda above
-//             fem::kMaxDisplacementLambda mu.
+// Method:     Each element uses the quadrature rule of its stiffness: the linear strains of the mesh's displacements are then a subspace of
+//   the strains at the points, B^T B = K, and static condensation is the projection onto it.
+// Source:     docs/equations.md E1, E13; quadrature and mean dilatation as in precompute/fem/element.cpp.
+// Deviations: For nearly incompressible T10, quadratic strain too meets the part of lambda above fem::kMaxDisplacementLambda mu by its mean
+//   dilatation only.
 #include "precompute/coupling/strains.hpp"
 
 #include <Eigen/Dense>
@@ -17,11 +17,11 @@
 namespace carillon::coupling {
 namespace {
 
-constexpr double kShear = std::numbers::sqrt2;  // of the shear components in Mandel's form
+constexpr double kShear = std::numbers::sqrt2;  // factor of shear components in Mandel notation
 
 using Points = std::vector<fem::Point>;
 
-/// Exact for polynomials of degree 2 on a straight tetrahedron.
+/// Exact to degree 2 on a straight tetrahedron.
 const Points& get_rule_of_degree_2() {
   static const Points rule = [] {
     const double a = (5 + 3 * std::sqrt(5.0)) / 20, b = (5 - std::sqrt(5.0)) / 20;
@@ -36,7 +36,7 @@ const Points& get_rule_of_degree_2() {
   return rule;
 }
 
-/// C in Mandel's form, less the mean dilatation's part.
+/// C in Mandel notation, without the mean dilatation's part.
 Matrix6 make_stiffness(const fem::Solid& solid) {
   Matrix6 c;
   for (int a = 0; a < 6; ++a)
@@ -83,7 +83,7 @@ void Strains::calc_points(std::int32_t e, ElementPoints& out) const {
   std::array<Vec3, 10> x;
   for (std::size_t i = 0; i < numbers.size(); ++i) x[i] = local_->nodes_m[numbers[i]];
   out.nodes = static_cast<int>(numbers.size());
-  if (out.nodes == 4) {  // as a T10 with straight sides, whose corners' slopes of the barycentric coordinates are those of the T4
+  if (out.nodes == 4) {  // stored as a straight T10, whose corner slopes of the barycentric coordinates equal those of the T4
     for (std::size_t i = 0; i < 6; ++i)
       for (std::size_t k = 0; k < 3; ++k) x[4 + i][k] = (x[mesh::kEdges[i][0]][k] + x[mesh::kEdges[i][1]][k]) / 2;
     const fem::Jacobian jacobian = fem::calc_jacobian(x, fem::calc_shape({0.25, 0.25, 0.25, 0.25}));
@@ -130,7 +130,7 @@ void Strains::scale(std::int32_t e, const ElementPoints& points, RowMatrix& stra
   }
   for (int p = 0; p < points.point_count(); ++p) {
     const double w = std::sqrt(points.volume_m3[p]);
-    for (int a = 0; a < 6; ++a) {  // U is upper: rows above are done, those below are still strains
+    for (int a = 0; a < 6; ++a) {  // U is upper triangular: rows above are done, those below are still strains
       auto row = strains.row(6 * p + a);
       row *= w * solid.root(a, a);
       for (int b = a + 1; b < 6; ++b)
@@ -177,7 +177,7 @@ void Strains::calc_pair_strains(std::int32_t e, const ElementPoints& points, con
     for (int c = 0; c < 6; ++c) {
       const auto [k, l] = kComponents[c];
       const double factor = c < 3 ? 0.5 : 0.5 * kShear;
-      for (std::ptrdiff_t j = 0; j < pairs.modes; ++j) {  // pairs (0, j) ... (j, j) follow each other
+      for (std::ptrdiff_t j = 0; j < pairs.modes; ++j) {  // pairs (0, j) ... (j, j) are consecutive
         const std::ptrdiff_t column = pairs.find(0, j);
         const std::ptrdiff_t from = std::max(first, column), end = std::min(first + count, column + j + 1);
         if (from >= end) continue;

@@ -1,4 +1,4 @@
-// Strains of the elements, scaled so that the product of two is an energy.
+// Element strains, scaled so that the product of two is an energy.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,21 +7,20 @@
 #include <span>
 #include <vector>
 
-#include "precompute/mesh/distributed/distributed_mesh.hpp"
 #include "precompute/coupling/pairs.hpp"
 #include "precompute/fem/materials.hpp"
 #include "precompute/la/lapack.hpp"
+#include "precompute/mesh/distributed/distributed_mesh.hpp"
 
 namespace carillon::coupling {
 
 using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
-/// Components of a symmetric tensor, in this order: xx, yy, zz, yz, xz, xy.
+/// Components of a symmetric tensor: xx, yy, zz, yz, xz, xy.
 inline constexpr std::array<std::array<int, 2>, 6> kComponents{{{0, 0}, {1, 1}, {2, 2}, {1, 2}, {0, 2}, {0, 1}}};
 
-/// One element at its points of integration, which are those that make its stiffness exact: one of a T4, four of a straight T10, fourteen
-/// of a curved one.
+/// One element at the integration points of its stiffness: one of a T4, four of a straight T10, fourteen of a curved one.
 struct ElementPoints {
   int nodes = 0;                              // 4 or 10
   std::vector<double> volume_m3;              // (points) weights
@@ -30,24 +29,24 @@ struct ElementPoints {
   int point_count() const { return static_cast<int>(volume_m3.size()); }
 };
 
-/// What the strains of this rank's elements are, in rows. A point has six rows, sqrt(w) U E with E in Mandel's form and U^T U = C; an
-/// element whose solid resists a mean dilatation (fem::Solid) has one more, sqrt(kappa / V) times its integral. The product of two such
-/// columns, summed over all elements, is <E_a, C E_b>, and B^T B is the stiffness matrix of the element as fem has it.
-/// Borrows the mesh, which must outlive it. Not collective.
+/// Scaled strains of this rank's elements by rows. A point has six rows, sqrt(w) U E with E in Mandel notation and U^T U = C; an element
+/// with a mean dilatation modulus (fem::Solid) has one more, sqrt(kappa / V) times its integral. The product of two such columns, summed
+/// over all elements, is <E_a, C E_b>, and B^T B is the element's stiffness matrix as in fem. References the mesh, which must outlive it.
+/// Not collective.
 class Strains {
  public:
-  /// Pre: the Jacobians of all elements are positive (fem::assemble() has checked that).
+  /// Pre: the Jacobians of all elements are positive (checked by fem::assemble()).
   Strains(const mesh::LocalMesh& local, const fem::Materials& materials);
 
   std::int32_t element_count() const { return static_cast<std::int32_t>(first_row_.size()) - 1; }
-  /// Rows of the elements before e; of all of this rank at element_count().
+  /// Rows of the elements before e; with element_count(): all rows of this rank.
   std::int64_t first_row(std::int32_t e) const { return first_row_[e]; }
   int row_count(std::int32_t e) const { return static_cast<int>(first_row(e + 1) - first_row(e)); }
   std::span<const std::int32_t> nodes(std::int32_t e) const;
 
   void calc_points(std::int32_t e, ElementPoints& out) const;
 
-  /// b: (rows, 3 nodes): the linear strain of the displacements of the nodes.
+  /// b: (rows, 3 nodes): linear strain of nodal displacements.
   void calc_linear(std::int32_t e, const ElementPoints& points, RowMatrix& b) const;
   /// Values at the nodes of the element, (3 nodes, width), of an array (local nodes, 3, width).
   void gather(std::int32_t e, const double* nodal, std::ptrdiff_t width, RowMatrix& values) const;
@@ -59,8 +58,8 @@ class Strains {
                          std::ptrdiff_t count, RowMatrix& z) const;
   /// z: (rows, columns): 1/2 H^T H of every column.
   void calc_square_strains(std::int32_t e, const ElementPoints& points, const RowMatrix& gradients, RowMatrix& z) const;
-  /// The stress of scaled rows at a point, times its volume: the product with engineering strains (kComponents) is what the point adds to
-  /// that of the rows. values: (rows, columns) of the element; returns (6, columns).
+  /// Stress of scaled rows at a point, times its volume: its product with engineering strains (kComponents) is the point's contribution to
+  /// the product of the rows. values: (rows, columns) of the element; returns (6, columns).
   la::Matrix calc_stress(std::int32_t e, const ElementPoints& points, int point, const Eigen::Ref<const la::Matrix>& values) const;
 
  private:
@@ -69,7 +68,7 @@ class Strains {
     double mean_dilatation_modulus_pa = 0;
   };
   std::size_t material(std::int32_t e) const { return materials_->find(e); }
-  /// Scales rows of Mandel's strains in place and adds the row of the mean.
+  /// Scales rows of Mandel strains in place and adds the row of the mean.
   void scale(std::int32_t e, const ElementPoints& points, RowMatrix& strains) const;
 
   const mesh::LocalMesh* local_;

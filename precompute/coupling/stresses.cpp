@@ -1,9 +1,9 @@
-// Method:     Of all pairs: the Gram matrix of s_ij, in units of equal energy (q_i = g_i / omega_i), by its eigenvectors. Of many modes:
-//             the fields of random motions, orthonormalised block by block, until the fields of other motions lie in what they span. There
-//             <s_r, s_ij> = <s_r, E_ij>, since s_r does no work on what was condensed: no pair needs a solve.
+// Method:     All pairs: eigenvectors of the Gram matrix of s_ij, in units of equal energy (q_i = g_i / omega_i). Many modes: fields of
+//   random motions, orthonormalised block by block, until they span the fields of held-out motions. Then <s_r, s_ij> = <s_r, E_ij>, since
+//   s_r does no work on condensed displacements: no pair needs its own solve.
 // Source:     docs/equations.md E13; Halko, Martinsson, Tropp, SIAM Review 53, 2011 (randomised range finder).
-// Deviations: Of the work of stresses on displacements that are condensed, what the stresses of the modes themselves do on products of a
-//             mode's rotation and a condensed one's is left out: of order (thickness x wave number)² in flat bodies.
+// Deviations: In the work on condensed displacements, the modes' own linear stresses on products of modal and condensed rotations are
+//   neglected: of order (thickness x wave number)² in flat bodies.
 #include "precompute/coupling/stresses.hpp"
 
 #include <algorithm>
@@ -17,11 +17,11 @@
 namespace carillon::coupling {
 namespace {
 
-constexpr double kLeastShare = 1e-12;      // of the trace: fields below are rounding
+constexpr double kLeastShare = 1e-12;      // of the trace: smaller fields are rounding
 constexpr int kPairsAtOnce = 64;           // right-hand sides of a solve
-constexpr std::int64_t kRowsAtOnce = 768;  // of the elements whose stresses are multiplied together
+constexpr std::int64_t kRowsAtOnce = 768;  // of elements whose stresses are multiplied in one block
 constexpr int kHeldOut = 48;
-constexpr std::uint64_t kTest = 1;  // seeds: of the motions held out; others follow
+constexpr std::uint64_t kTest = 1;  // seed of the held-out motions; later seeds are for training
 
 std::ptrdiff_t to_index(std::size_t value) { return static_cast<std::ptrdiff_t>(value); }
 
@@ -36,7 +36,7 @@ void for_chunks(const Strains& strains, Visit&& visit) {
   }
 }
 
-/// Strains of pairs of modes, an element at a time, and the room that they take.
+/// Strains of pairs of modes, one element at a time, with buffers.
 struct PairStrains {
   const CoupledBody& body;
   ElementPoints points;
@@ -50,7 +50,7 @@ struct PairStrains {
   }
 };
 
-/// The strains of all pairs, for runs of elements: change(element, strains) may alter them, then use(chunk, first row, rows).
+/// Strains of all pairs, in runs of elements: change(element, strains) may modify them, then use(chunk, first row, rows).
 template <typename Change, typename Use>
 void for_pair_strains(const CoupledBody& body, Change&& change, Use&& use) {
   const Strains& strains = body.strains;
@@ -66,7 +66,7 @@ void for_pair_strains(const CoupledBody& body, Change&& change, Use&& use) {
   });
 }
 
-/// c += a^T b, c symmetric in the end: the upper part of its blocks.
+/// c += a^T b for a result c known to be symmetric: computes the upper blocks.
 void add_products(const la::Matrix& a, std::ptrdiff_t rows, la::Matrix& c) {
   constexpr std::ptrdiff_t kBlock = 256;
   for (std::ptrdiff_t j = 0; j < c.cols(); j += kBlock) {
@@ -93,8 +93,8 @@ std::size_t count_nodal(const CoupledBody& body, std::ptrdiff_t width) {
   return body.shapes.size() / static_cast<std::size_t>(body.pairs.modes) * static_cast<std::size_t>(width);
 }
 
-/// Eigenvalues, ascending, of a symmetric matrix that every rank has; its eigenvectors take its place. The first rank's are every rank's:
-/// all decide alike by them. Collective.
+/// Eigenvalues, ascending, of a symmetric matrix known to all ranks; overwrites it with the eigenvectors. Rank 0's result is broadcast, so
+/// that all ranks decide alike. Collective.
 la::Vector diagonalise(const comm::Communicator& comm, la::Matrix& matrix, const char* failure) {
   la::Vector values = comm.agree([&] { return la::Vector(la::Vector::Zero(matrix.rows())); });
   comm.agree([&] {
@@ -105,7 +105,7 @@ la::Vector diagonalise(const comm::Communicator& comm, la::Matrix& matrix, const
   return values;
 }
 
-/// find_rank() as the first rank has it. Collective.
+/// find_rank() on rank 0, broadcast. Collective.
 std::ptrdiff_t agree_on_rank(const comm::Communicator& comm, StressFields& fields) {
   std::ptrdiff_t rank = 0;
   comm.agree([&] {
@@ -123,7 +123,7 @@ void fill_products(Samples& samples) {
       samples.products.row(pairs.find(i, j)) = samples.q.row(i).cwiseProduct(samples.q.row(j));
 }
 
-/// The entry of largest magnitude of each row becomes positive: eigenvectors have no sign of their own.
+/// Fixes signs of eigenvectors: the entry of largest magnitude of each row becomes positive.
 void fix_signs(StressFields& fields) {
   for (std::ptrdiff_t r = 0; r < fields.form.rows(); ++r) {
     std::ptrdiff_t at = 0;
@@ -135,7 +135,7 @@ void fix_signs(StressFields& fields) {
   }
 }
 
-/// Flat bodies have no cubic part: what the mesh has of it is set to nothing.
+/// Flat bodies have no cubic part: residual values from the mesh are set to 0.
 void set_curvature(const comm::Communicator& comm, StressFields& fields, const std::vector<double>& omega, double error) {
   fields.curvature =
       comm.broadcast([&] { return calc_curvature(fields.linear, multiply(fields.form, fields.tests.products), omega, error); });
@@ -149,7 +149,7 @@ void keep_first(StressFields& fields, std::ptrdiff_t count) {
   fields.linear.conservativeResize(count, Eigen::NoChange);
 }
 
-/// The fields of the motions q, (rows, columns of q), and their work on the kept modes.
+/// Fields of the motions q, (rows, columns of q), and their work on the kept modes.
 la::Matrix calc_sample_fields(const CoupledBody& body, const la::Matrix& q, la::Matrix* work, std::int64_t& solves) {
   const auto width = static_cast<int>(q.cols());
   const Strains& strains = body.strains;
@@ -187,13 +187,13 @@ la::Matrix calc_sample_fields(const CoupledBody& body, const la::Matrix& q, la::
 
 la::Columns to_columns(la::Matrix& m) { return {m.data(), m.rows(), std::max<std::ptrdiff_t>(m.rows(), 1), static_cast<int>(m.cols())}; }
 
-/// What of `fields` is not yet in `basis` is added to it, orthonormal.
+/// Appends to `basis` the part of `fields` orthogonal to it, orthonormalised.
 void extend(const comm::Communicator& comm, la::Matrix fields, double least, la::Matrix& basis) {
   for (int pass = 0; pass < 2 && basis.cols() > 0; ++pass) {
     const la::Matrix products = la::multiply_transposed(comm, to_columns(basis), to_columns(fields));
     la::subtract_product(to_columns(basis), products.data(), static_cast<int>(products.rows()), to_columns(fields));
   }
-  for (int pass = 0; pass < 2; ++pass) {  // the first leaves what rounding of large fields did to small ones
+  for (int pass = 0; pass < 2; ++pass) {  // the second pass removes rounding errors of large fields in small ones
     la::Matrix gram = la::multiply_transposed(comm, to_columns(fields), to_columns(fields));
     const la::Vector values = diagonalise(comm, gram, "internal: the fields of sampled motions have no orthonormal basis");
     const std::ptrdiff_t count = (values.array() > (pass == 0 ? least : 0.0)).count(), drop = values.size() - count;
@@ -207,7 +207,7 @@ void extend(const comm::Communicator& comm, la::Matrix fields, double least, la:
   });
 }
 
-/// The scaled linear strains of the modes, (rows of this rank, N).
+/// Scaled linear strains of the modes, (rows of this rank, N).
 la::Matrix calc_mode_strains(const CoupledBody& body) {
   const Strains& strains = body.strains;
   la::Matrix values = body.comm.agree([&] { return la::Matrix(strains.first_row(strains.element_count()), body.pairs.modes); });
@@ -224,7 +224,7 @@ la::Matrix calc_mode_strains(const CoupledBody& body) {
   return values;
 }
 
-/// <basis, E_ij> of all pairs and all ranks: (columns of basis, pairs).
+/// <basis, E_ij> for all pairs, summed over ranks: (columns of basis, pairs).
 la::Matrix calc_form(const CoupledBody& body, const la::Matrix& basis) {
   const std::ptrdiff_t pairs = body.pairs.count();
   la::Matrix sums = body.comm.agree([&] { return la::Matrix(la::Matrix::Zero(basis.cols(), pairs)); });
@@ -280,14 +280,14 @@ Samples join(const Samples& a, const Samples& b) {
 }
 
 double calc_error(const la::Vector& energy, const la::Vector& cubic, const la::Vector& full, const la::Vector& full_cubic) {
-  constexpr double kLeastEnergy = 0.01;  // of the mean: what is softer is not heard among the others
+  constexpr double kLeastEnergy = 0.01;  // of the mean: softer motions are inaudible among the others
   const double least = kLeastEnergy * full.mean(), norm = full_cubic.norm();
   const double worst = ((energy - full).array().abs() / full.array().max(least)).maxCoeff();
   return norm > 0 ? std::max(worst, (cubic - full_cubic).norm() / norm) : worst;
 }
 
 double calc_curvature(const la::Matrix& linear, const la::Matrix& eta, const std::vector<double>& omega, double error) {
-  // The principal directions of eta, by the eigenvectors of its products: U = eta W / S.
+  // Principal directions of eta, from the eigenvectors of its Gram matrix: U = eta W / S.
   la::Matrix vectors = multiply_transposed(eta, eta);
   la::Vector squares;
   if (la::calc_eigenpairs(vectors, squares) != 0) throw SolveError("internal: the fields of motions have no principal directions");
@@ -366,7 +366,7 @@ StressFields calc_fields_of_pairs(const CoupledBody& body, double error, bool wa
   StressFields fields;
   fields.solves = pairs;
   const std::ptrdiff_t rank = (values.array() > kLeastShare * trace).count();
-  // s_r = sum of s_ij x_ij,r: coordinates of equal energy, so that the fields are orthonormal
+  // s_r = sum of s_ij x_ij,r in coordinates of equal energy, so the fields are orthonormal
   la::Matrix combine(pairs, rank);
   fields.form.resize(rank, pairs);
   for (std::ptrdiff_t r = 0; r < rank; ++r) {
@@ -424,7 +424,7 @@ StressFields calc_fields_of_samples(const CoupledBody& body, double error) {
   const la::Vector cubic = fields.cubic.tail(kHeldOut);
   double start = 0;
   for (std::uint64_t seed = 0; basis.cols() < pairs; ++seed) {
-    // What is left of the motions that are held out, relative to their energy
+    // Residual of the held-out motions, relative to their energy
     const la::Matrix eta = la::multiply_transposed(body.comm, to_columns(basis), to_columns(held_out));
     fields.linear = la::multiply_transposed(body.comm, to_columns(basis), to_columns(mode_strains));
     double left = ((2 * energy - eta.colwise().squaredNorm().transpose()).array() / (2 * energy).array()).maxCoeff();
@@ -444,7 +444,7 @@ StressFields calc_fields_of_samples(const CoupledBody& body, double error) {
   fields.form = calc_form(body, basis);
   fields.linear = la::multiply_transposed(body.comm, to_columns(basis), to_columns(mode_strains));
   set_curvature(body.comm, fields, body.omega, error);
-  // The fields in the order of their energy
+  // Sort the fields by energy
   const la::Vector scale = calc_pair_scale(body.omega);
   const la::Matrix scaled = fields.form * scale.asDiagonal();
   const la::Matrix columns = scaled.transpose();

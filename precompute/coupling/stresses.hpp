@@ -1,4 +1,4 @@
-// The self-equilibrated stresses of pairs of modes, and few fields that span them.
+// Self-equilibrated stresses of pairs of modes, and a small basis of them.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace carillon::coupling {
 
-/// What both ways to the fields need. Borrows all.
+/// Input of both methods. Non-owning.
 struct CoupledBody {
   const comm::Communicator& comm;
   const Strains& strains;
@@ -18,7 +18,7 @@ struct CoupledBody {
   const Nodal& shapes;               // (local nodes, 3, N) of the kept modes
   const std::vector<double>& omega;  // (N) [rad/s]
   Pairs pairs;
-  /// Called before each block of solves, on every rank, with the share that is done; may throw on all ranks alike.
+  /// Called on every rank before each block of solves, with the fraction done; may throw on all ranks alike.
   std::function<void(double)> proceed;
 };
 
@@ -28,42 +28,42 @@ struct Samples {
   la::Matrix products;  // (pairs, samples): q_i q_j
 };
 Samples make_samples(const std::vector<double>& omega, int count, std::uint64_t seed);
-/// The motions of one mode each.
+/// Motions of one mode each.
 Samples make_single_samples(const std::vector<double>& omega);
 Samples join(const Samples& a, const Samples& b);
-/// (pairs) units in which all modes have the same energy: what a pair's products are multiplied by.
+/// (pairs) factors of the pairs' products in units of equal modal energy.
 la::Vector calc_pair_scale(const std::vector<double>& omega);
 
-/// R fields of scaled stress (Strains), orthonormal over the body: eta_r(q) = <s_r, E2(q)> = sum over the pairs of form(r, ij) q_i q_j.
-/// The condensed energy is 1/2 sum of (linear q + eta)_r² less 1/2 sum of (linear q)_r².
+/// R fields of scaled stress (Strains), orthonormal over the body: eta_r(q) = <s_r, E2(q)> = sum over the pairs of form(r, ij) q_i q_j. The
+/// condensed energy is 1/2 sum of (linear q + eta)_r² less 1/2 sum of (linear q)_r².
 struct StressFields {
-  la::Matrix form;       // (R, pairs) [J^1/2 / (m² kg)], fields in the order of what they hold of the energy, with the same in all modes
-  la::Matrix linear;     // (R, N) <s_r, eps(phi_i)>; zero of flat bodies
+  la::Matrix form;       // (R, pairs) [J^1/2 / (m² kg)], fields in decreasing order of energy at equal modal energies
+  la::Matrix linear;     // (R, N) <s_r, eps(phi_i)>; zero for flat bodies
   double curvature = 0;  // calc_curvature() on the tests
-  la::Matrix values;     // (rows of this rank, R); empty unless asked for
+  la::Matrix values;     // (rows of this rank, R); empty unless requested
   std::int64_t solves = 0;
-  double error = 0;  // of the energy, as find_rank() measures it
-  Samples tests;     // motions of single modes and of all: what the energy is measured on, with its
+  double error = 0;  // energy error as measured by find_rank()
+  Samples tests;     // test motions of single modes and of all modes, with their energies:
   la::Vector full;   // (tests) quartic energy of all fields [J]
   la::Vector cubic;  // (tests) <eps(q), s(q)> [J]
 };
 
-/// The root of the largest part of the linear energy of a motion that lies in the fields: 0 of a flat body, 1 where all of it does. Of the
-/// fields only the directions count that hold all but `error` of the energy of some motions: in others the mesh, which is never quite
-/// symmetric, is as large as the body. linear: (R, N); eta: (R, motions).
+/// Root of the largest fraction of a motion's linear energy that lies in the fields: 0 for a flat body, 1 if all of it does. Uses only the
+/// directions of the fields that hold all but `error` of the energy of the motions; in the others mesh asymmetry dominates. linear: (R, N);
+/// eta: (R, motions).
 double calc_curvature(const la::Matrix& linear, const la::Matrix& eta, const std::vector<double>& omega, double error);
-/// From here on a body is curved. A flat one has up to half of it by its mesh; what it does to the pitch goes with its square.
+/// Bodies are curved above it. Mesh asymmetry gives flat ones up to half of it; its effect on pitch is quadratic.
 inline constexpr double kCurved = 0.02;
 
-/// The largest error of energies of motions: relative to each, or to a hundredth of their mean, where that is more; and that of the cubic
-/// part in the mean square.
+/// Largest energy error of motions, relative to each one's energy or a hundredth of the mean, if larger; and the rms error of the cubic
+/// part.
 double calc_error(const la::Vector& energy, const la::Vector& cubic, const la::Vector& full, const la::Vector& full_cubic);
 
-/// The least number of leading fields whose error on the tests is at most `error`, which becomes theirs: see calc_error().
+/// Smallest number of leading fields whose error on the tests is at most `error`; sets `error` to theirs: see calc_error().
 std::ptrdiff_t find_rank(const StressFields& fields, double& error);
 
-/// G_(ij)(kl) = <E_ij, C E_kl> - f_ij^T K^-1 f_kl, in the form <s_ij, s_kl> with s_ij = E_ij - eps(theta_ij): positive semidefinite but for
-/// rounding. work (N, pairs): <eps(phi), s_ij>.
+/// G_(ij)(kl) = <E_ij, C E_kl> - f_ij^T K^-1 f_kl, as <s_ij, s_kl> with s_ij = E_ij - eps(theta_ij): positive semidefinite up to rounding.
+/// work (N, pairs): <eps(phi), s_ij>.
 struct Gram {
   la::Matrix values;  // (pairs, pairs)
   la::Matrix work;
@@ -71,10 +71,10 @@ struct Gram {
 };
 Gram calc_gram(const CoupledBody& body);
 
-/// All pairs are condensed: one solve each. error: of the energy, at most. Collective.
+/// Condenses all pairs: one solve each. error: maximum, of the energy. Collective.
 StressFields calc_fields_of_pairs(const CoupledBody& body, double error, bool wants_values);
 
-/// Random motions are condensed until those that were not used are spanned (a randomised range finder): about R solves. Collective.
+/// Condenses random motions until unused ones are spanned (randomised range finder): about R solves. Collective.
 StressFields calc_fields_of_samples(const CoupledBody& body, double error);
 
 }  // namespace carillon::coupling

@@ -1,7 +1,7 @@
-// Method:     the mean of the stress of a body without loads is the sum of position times traction over its surface, which is 0 where
-//             nothing holds it. So a field with a mean is one that edges hold against, and those of the largest energy are the tension that
-//             rises as the body bends.
-// Source:     docs/equations.md E13. Deviations: none.
+// Method:     the mean stress of a body without loads is the sum of position times traction over its surface, 0 if nothing holds it. A
+//   field with a nonzero mean is therefore due to held edges, and the ones with the largest energy are the tension that rises as the body
+//   bends.
+// Source:     docs/equations.md E13.
 #include "precompute/coupling/stretch.hpp"
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 namespace carillon::coupling {
 
 la::Vector calc_mean_shares(const CoupledBody& body, const StressFields& fields, std::ptrdiff_t count) {
-  std::vector<double> sums(6 * count + 1, 0.0);  // of each field, and the volume
+  std::vector<double> sums(6 * count + 1, 0.0);  // per field, and the volume
   body.comm.agree([&] {
     ElementPoints points;
     for (std::int32_t e = 0; e < body.strains.element_count(); ++e) {

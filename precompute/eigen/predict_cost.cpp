@@ -12,7 +12,6 @@
 #include "precompute/eigen/rigid_modes.hpp"
 #include "precompute/eigen/scaling.hpp"
 #include "precompute/petsc/session.hpp"
-#include "runtime/base/clock.hpp"
 
 namespace carillon::eigen {
 namespace {
@@ -102,11 +101,9 @@ SolveCost predict_cost(const Problem& problem, const Options& options, const std
   cost.factor_bytes = factor.get_peak_bytes();
   cost.factor_kept_bytes = 8 * cost.entries;
   if (!may_count(cost)) return cost;
-  const double start = base::get_process_cpu_s();
   const auto take = [&](double lambda, double reach, ShiftRule rule) { return counter.count_below(lambda, reach, rule); };
   const Inertia above = count_below_high(take, scaling.to_scaled(ends.high));
   const Inertia below = count_below_low(take, scaling.to_scaled(ends.low));
-  cost.factor_seconds = (base::get_process_cpu_s() - start) / static_cast<double>(std::max<std::int64_t>(statistics.factorisations, 1));
   const std::int64_t modes = above.below - below.below;
   cost.modes = std::min(modes, options.max_modes.value_or(modes));
   return cost;

@@ -61,7 +61,6 @@ struct SolveCost {
   std::int64_t copies_bytes = 0;
   std::int64_t copies_kept_bytes = 0;
   std::int64_t rigid_count = 0;
-  double factor_seconds = 0;          // CPU time of one factorisation; 0 if none was made
   std::optional<std::int64_t> modes;  // modes in the band, at most max_modes; empty if not counted
 };
 

@@ -1,7 +1,7 @@
-// Method: element matrices are added into rows whose pattern is known before (block_rows). Rigid-body data: sums of element moments about a
-//   common point.
+// Method: element matrices are added into rows of a known pattern (block_rows). Rigid-body data: sums of element moments about a common
+//   point.
 // Source: OSG02 section 3.2.
-// Deviations: fixed nodes are left out (no row, no column) instead of being penalised.
+// Deviations: fixed nodes are eliminated (no row, no column) instead of penalised.
 #include "precompute/fem/assemble.hpp"
 
 #include <fmt/core.h>
@@ -21,14 +21,14 @@ namespace {
 
 using mesh::LocalMesh;
 
-/// The positions of the nodes of tetrahedron e.
+/// Node positions of tetrahedron e.
 std::span<const Vec3> copy_positions(const LocalMesh& local, std::int32_t e, std::array<Vec3, kMaxNodes>& x) {
   const auto nodes = local.get_tet(e);
   for (std::size_t i = 0; i < nodes.size(); ++i) x[i] = local.nodes_m[nodes[i]];
   return {x.data(), nodes.size()};
 }
 
-/// The tetrahedra by the lowest row of their nodes, so that the rows being summed stay in the cache whatever order the mesh file has.
+/// Tetrahedra by the lowest row of their nodes, so that active rows stay in the cache for any order of the mesh file.
 std::vector<std::int32_t> order_by_row(const LocalMesh& local) {
   std::vector<std::int32_t> lowest(local.tet_count()), order(local.tet_count());
   std::vector<std::int64_t> begin(local.nodes_m.size() + 1, 0);
@@ -45,7 +45,7 @@ std::vector<std::int32_t> order_by_row(const LocalMesh& local) {
 [[noreturn]] void fail_element(const LocalMesh& local, std::int32_t e) {
   const std::int32_t node = local.get_tet(e)[0];
   const Vec3& x = local.nodes_m[node];
-  // Elements and nodes are counted from 1, as the mesh check does.
+  // Numbers from 1, like the mesh check.
   throw InputError(
       fmt::format("element {} of the mesh (first node {} at {:.6g} {:.6g} {:.6g} m) is inside out or flat: its Jacobian is not "
                   "positive everywhere{}",
@@ -77,7 +77,7 @@ System assemble(const comm::Communicator& comm, const LocalMesh& local, const Ma
 }
 
 RigidBody calc_rigid_body(const comm::Communicator& comm, const LocalMesh& local, const Materials& materials) {
-  // Moments are taken about the centre of the nodes' box, so that a body far from the origin keeps its digits.
+  // Moments about the centre of the bounding box keep precision for a body far from the origin.
   Vec3 low, high, origin;
   low.fill(1e300);
   high.fill(-1e300);

@@ -1,8 +1,7 @@
-// Method: the neighbours of a node are the nodes of its elements; as neighbourhood is mutual, handing each node to its neighbours in
-//   ascending order gives every row sorted. Blocks of own nodes are summed in the upper triangle and copied to the lower once. Rows of
-//   other ranks' nodes are summed apart and sent. The arrays become PETSc's without a copy.
+// Method: the neighbours of a node are the nodes of its elements; since neighbourhood is symmetric, appending each node to its neighbours
+//   in ascending order yields sorted rows. Blocks of own nodes are summed in the upper triangle and mirrored once. Rows of other ranks'
+//   nodes are summed separately and sent. PETSc takes over the arrays without a copy.
 // Source: PETSc manual, MatCreateSeqAIJWithArrays, MatCreateMPIAIJWithSplitArrays.
-// Deviations: none.
 #include "precompute/fem/block_rows.hpp"
 
 #include <algorithm>
@@ -20,7 +19,7 @@ namespace {
 
 using mesh::LocalMesh;
 
-/// The tetrahedra of each local node.
+/// Tetrahedra of each local node.
 struct Incidence {
   std::vector<std::int64_t> begin;
   std::vector<std::int32_t> tet;
@@ -36,7 +35,7 @@ Incidence find_incidence(const LocalMesh& local) {
   return incidence;
 }
 
-/// Calls visit(neighbour) once for each free node that shares a tetrahedron with `node`, itself included.
+/// Calls visit(neighbour) once for each free node that shares a tetrahedron with `node`, including itself.
 class Neighbours {
  public:
   explicit Neighbours(const LocalMesh& local) : local_(local), incidence_(find_incidence(local)), stamp_(local.nodes_m.size(), -1) {}
@@ -61,7 +60,7 @@ class Neighbours {
   std::vector<std::int32_t> stamp_;
 };
 
-/// The symmetric pattern with each row sorted, from one whose rows are in any order.
+/// Symmetric pattern with sorted rows, from unsorted rows.
 void sort_by_transposing(BlockRows& rows) {
   std::vector<std::int64_t> next(rows.begin.begin(), rows.begin.end() - 1);
   std::vector<std::int32_t> sorted(rows.column.size());
@@ -106,7 +105,7 @@ void find_halo_pattern(const LocalMesh& local, Neighbours& neighbours, LocalRows
   }
 }
 
-/// The first halo row of each rank, and their number behind the last.
+/// First halo row of each rank, then the number of halo rows.
 std::vector<std::int64_t> find_halo_ranges(const LocalRows& rows) {
   std::vector<std::int64_t> at;
   for (const std::int32_t first : rows.first_row)
@@ -122,7 +121,7 @@ void for_each_row(const std::vector<std::int32_t>& list, Visit&& visit) {
 
 using Place = std::pair<std::int32_t, std::int32_t>;  // row, column
 
-/// Adds the places that are not there yet. `places` ascending, unique.
+/// Inserts missing entries. `places` ascending, unique.
 void insert(BlockRows& rows, const std::vector<Place>& places) {
   if (places.empty()) return;
   BlockRows merged;
@@ -139,7 +138,7 @@ void insert(BlockRows& rows, const std::vector<Place>& places) {
   rows = std::move(merged);
 }
 
-/// Sends the owners of halo rows the columns that these rows have here. Collective.
+/// Sends the owners of halo rows their columns. Collective.
 void share_pattern(const comm::Communicator& comm, LocalRows& rows) {
   const std::vector<std::int64_t> halo_at = find_halo_ranges(rows);
   const auto list_halo_rows = [&] {
@@ -174,7 +173,7 @@ void share_pattern(const comm::Communicator& comm, LocalRows& rows) {
   });
 }
 
-/// Copies the upper triangle, as it was summed, to the lower.
+/// Mirrors the upper triangle to the lower.
 void mirror(BlockRows& rows) {
   std::vector<std::int64_t> next(rows.begin.begin(), rows.begin.end() - 1);  // the next column below the diagonal of each row
   for (std::int64_t i = 0; i < rows.row_count(); ++i) {
@@ -192,14 +191,14 @@ void mirror(BlockRows& rows) {
   }
 }
 
-/// The arrays of one sequential AIJ matrix.
+/// Arrays of one sequential AIJ matrix.
 struct Arrays {
   std::vector<PetscInt> begin;
   std::unique_ptr<PetscInt[]> column;
   std::vector<double> value;
 };
 
-/// `per_node` scalar columns for each column of blocks: 3 for the stiffness, 1 (in the row's own direction) for the mass.
+/// `per_node` scalar columns per block column: 3 for the stiffness, 1 (the row's own direction) for the mass.
 void number_columns(const BlockRows& rows, int per_node, Arrays& out) {
   const std::int64_t nodes = rows.row_count();
   out.begin.resize(3 * nodes + 1);
@@ -243,12 +242,12 @@ Arrays take_lumped_arrays(const std::vector<double>& lumped, std::int64_t rows, 
   return arrays;
 }
 
-/// A matrix on the arrays, which live as long as it. Collective.
+/// Matrix on arrays whose lifetime is tied to it. Collective.
 petsc::MatHandle make_matrix(const comm::Communicator& comm, Arrays own, Arrays off) {
   using Both = std::array<Arrays, 2>;
   auto* arrays = new Both{std::move(own), std::move(off)};
   const auto rows = static_cast<PetscInt>((*arrays)[0].begin.size()) - 1;
-  // PETSc needs arrays that are allocated even when empty.
+  // PETSc requires non-null arrays.
   for (Arrays& part : *arrays) part.value.reserve(1);
   petsc::MatHandle matrix;
   auto& [a, b] = *arrays;
@@ -277,7 +276,7 @@ petsc::MatHandle make_matrix(const comm::Communicator& comm, Arrays own, Arrays 
 
 void BlockRows::add(std::int64_t row, std::int32_t c, const double* k, int stride, double m) {
   const std::int64_t first = begin[row], count = begin[row + 1] - first;
-  // Bisection without branches: where a column lies in its row is a coin toss to the processor.
+  // Branchless bisection: the position of a column in its row is unpredictable for the processor.
   const std::int32_t* at = &column[first];
   for (std::int64_t left = count; left > 1;) {
     const std::int64_t half = left / 2;

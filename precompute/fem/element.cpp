@@ -1,15 +1,15 @@
-// Method: everything an element's stiffness needs of its shape are the integrals of products of gradients, P_ij = integral b_i b_j^T dV.
-//   They are constant for T4; a straight T10 is a fixed combination of its T4; a curved one takes a rule of 14 points. The material then
-//   contracts them. The mass of a curved T10 is exact: its Jacobian is a cubic, known by 20 values, and integral N_i N_j (cubic k) is a
-//   table. Nearly incompressible T10: of the dilatation in an element only the mean meets a lambda above kMaxDisplacementLambda mu. Ten
-//   nodes cannot keep the whole field free of dilatation and bend as well; one condition an element they can.
+// Method: the stiffness depends on the element's shape by the integrals P_ij = integral b_i b_j^T dV of products of gradients. They are
+//   constant for T4; a straight T10 is a fixed combination of T4 ones; a curved one uses a 14-point rule. The material contracts them. The
+//   mass of a curved T10 is exact: its Jacobian is a cubic with 20 coefficients, and integral N_i N_j (cubic k) is a table. Nearly
+//   incompressible T10: only the mean dilatation of an element meets the part of lambda above kMaxDisplacementLambda mu. Ten nodes can
+//   satisfy one volume constraint per element and still bend, but not a constraint at every point.
 // Source: OSG02 section 3.2; Zienkiewicz and Taylor, "The Finite Element Method", vol. 1 (T10); Hinton, Rock and Zienkiewicz 1976,
 //   Earthquake Eng. Struct. Dyn. 4, 245 (HRZ lumping); Nagtegaal, Parks and Rice 1974, CMAME 4, 153, and Malkus and Hughes 1978, CMAME 15,
 //   63 (mean dilatation, selective integration).
 // Deviations: OSG02 eq. 12 is printed with -vol/2; stiffness is minus the Jacobian of the force, which gives +vol. OSG02's row-sum lumping
-//   (eq. 15) is negative at the corners of a T10, so T10 is lumped by HRZ: the diagonal of the consistent mass scaled to the true mass.
-//   Mean dilatation replaces the whole of lambda in those papers; here it takes what lambda is above a multiple of mu, so that every nu up
-//   to 0.4545 keeps its usual form and quadratic elements keep their order.
+//   (eq. 15) is negative at the corners of a T10, so T10 uses HRZ: the diagonal of the consistent mass scaled to the true mass. Those
+//   papers apply mean dilatation to all of lambda; here it applies to the part above a multiple of mu, so that nu up to 0.4545 keeps the
+//   standard form and quadratic elements keep their order.
 #include "precompute/fem/element.hpp"
 
 #include <algorithm>
@@ -28,7 +28,7 @@ struct Products {
   const double* at(int i, int j) const { return value.data() + 9 * (i * nodes + j); }
 };
 
-/// The 3 x 3 block of stiffness that belongs to the block `p` of products. Isotropic: lambda P + mu (P^T + tr P I); else C contracted.
+/// Stiffness block for the block `p` of products. Isotropic: lambda P + mu (P^T + tr P I); otherwise C contracted.
 inline void contract(const double* p, const Solid& solid, double lambda, double* k) {
   if (solid.isotropic) {
     const double mu = solid.lame_mu_pa, trace = mu * (p[0] + p[4] + p[8]);
@@ -76,10 +76,10 @@ double calc_linear(std::span<const Vec3> x, std::array<Vec3, 4>& b) {
   return determinant / 6.0;
 }
 
-/// Integral of L_a L_b over the element, by its volume.
+/// Integral of L_a L_b over the element, relative to its volume.
 constexpr double find_moment(int a, int b) { return a == b ? 0.1 : 0.05; }
 
-/// The products of a straight tetrahedron with four nodes, all blocks.
+/// Products of a straight four-node tetrahedron, all blocks.
 Products calc_linear_products(const std::array<Vec3, 4>& b, double volume) {
   Products products;
   products.nodes = 4;
@@ -256,7 +256,7 @@ double calc_curved_mass(std::span<const Vec3> x, std::array<double, kMaxNodes * 
 /// Integral of div u over the element per degree of freedom.
 using Divergence = std::array<double, 3 * kMaxNodes>;
 
-/// Adds what the bulk modulus is stiffer than the products have it, for the mean dilatation only: excess (integral div u)^2 / V.
+/// Adds the excess of the bulk modulus for the mean dilatation only: excess (integral div u)^2 / V.
 void add_mean_dilatation(const Divergence& divergence, double volume, double excess, ElementMatrices& out) {
   const int width = 3 * out.nodes;
   for (int row = 0; row < width; ++row)
@@ -286,7 +286,7 @@ void calc_t4(const std::array<Vec3, 4>& b, double volume, const Solid& solid, El
     for (int j = 0; j < 4; ++j) out.mass[i * 4 + j] = mass_kg / 20.0 * (i == j ? 2 : 1);
 }
 
-/// The same of a T10 with straight sides.
+/// K and M of a straight T10.
 void calc_straight_t10(const std::array<Vec3, 4>& b, double volume, const Solid& solid, ElementMatrices& out) {
   set_straight_stiffness(b, volume, solid, out);
   set_straight_mass(solid.density_kg_m3 * volume, out);
@@ -298,7 +298,7 @@ void calc_straight_t10(const std::array<Vec3, 4>& b, double volume, const Solid&
   add_mean_dilatation(divergence, volume, solid.mean_dilatation_modulus_pa, out);
 }
 
-/// The same of a curved T10; mass_kg becomes that of the element. False when the Jacobian is not positive everywhere.
+/// K and M of a curved T10; mass_kg becomes that of the element. False when the Jacobian is not positive everywhere.
 bool calc_curved_t10(std::span<const Vec3> x, const Solid& solid, double& mass_kg, ElementMatrices& out) {
   Gradients gradients;
   if (!calc_gradients(x, gradients)) return false;
@@ -381,12 +381,12 @@ bool calc_element(std::span<const Vec3> x, const Solid& solid, job::Mass mass, E
     if (!(volume > 0.0)) return false;
     out.nodes == 4 ? calc_t4(b, volume, solid, out) : calc_straight_t10(b, volume, solid, out);
   }
-  if (mass == job::Mass::lumped) lump_hrz(out, mass_kg);  // for the T4, whose diagonal is constant, this is the row sum
+  if (mass == job::Mass::lumped) lump_hrz(out, mass_kg);  // for the T4, with a constant diagonal, this equals row-sum lumping
   return true;
 }
 
 ElementMoments calc_moments(std::span<const Vec3> x, double density_kg_m3) {
-  // Positions are fields of the shape functions, x = sum N_i x_i, so the mass matrix integrates them and their products.
+  // Isoparametric: x = sum N_i x_i, so the mass matrix integrates positions and their products.
   ElementMatrices m;
   const int n = static_cast<int>(x.size());
   ElementMoments moments;

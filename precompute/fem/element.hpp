@@ -17,7 +17,7 @@ struct ElementMatrices {
   std::array<double, kMaxNodes * kMaxNodes> mass{};           // (n, n) row-major [kg], the same for x, y and z; diagonal when lumped
 };
 
-/// Integrals of density over one element: what a rigid body needs.
+/// Integrals of the density over one element.
 struct ElementMoments {
   double volume_m3 = 0.0;
   double mass_kg = 0.0;
@@ -25,40 +25,40 @@ struct ElementMoments {
   std::array<double, 9> second_kg_m2{};  // (3, 3) integral rho x x^T
 };
 
-/// Of the dilatation within a T10 only its mean is resisted by the part of lambda above this many mu; docs/elements.md has the figures
-/// behind the number. Poisson's ratios up to kMaxDisplacementLambda / (2 (kMaxDisplacementLambda + 1)) = 0.4545 are not touched.
+/// Only the mean dilatation of a T10 meets the part of lambda above this many mu; see docs/elements.md. Poisson ratios up to
+/// kMaxDisplacementLambda / (2 (kMaxDisplacementLambda + 1)) = 0.4545 are unaffected.
 inline constexpr double kMaxDisplacementLambda = 10.0;
 
-/// The modulus that resists the mean of the dilatation alone in a T10 [Pa]: the part of the bulk modulus (Reuss' average) above
-/// (kMaxDisplacementLambda + 2/3) times the shear modulus (Voigt's average), for an isotropic solid lambda - kMaxDisplacementLambda mu; 0
-/// if there is none. C less this part of every normal pair is still positive definite.
+/// Modulus of the mean dilatation of a T10 [Pa]: the part of the bulk modulus (Reuss average) above (kMaxDisplacementLambda + 2/3) times
+/// the shear modulus (Voigt average), for an isotropic solid lambda - kMaxDisplacementLambda mu; 0 if negative. C less this part in every
+/// normal pair stays positive definite.
 double calc_mean_dilatation_modulus_pa(const material::Elasticity& elasticity_pa);
 
-/// A material as the elements use it, made once for many elements.
+/// Material in the form used by the elements, made once for many elements.
 struct Solid {
-  /// full: no mean dilatation; all of lambda resists all of the dilatation, near incompressibility too.
+  /// full: no mean dilatation; standard displacement form even near incompressibility.
   Solid(const material::Material& material, bool full = false);  // NOLINT(google-explicit-constructor): a material is a solid
 
   bool isotropic = true;
-  double displacement_lambda_pa = 0.0;      // of isotropic solids: resists all of the dilatation in a T10;
-  double mean_dilatation_modulus_pa = 0.0;  // of all solids: resists its mean over the element only
+  double displacement_lambda_pa = 0.0;      // of isotropic solids: acts on all of the dilatation in a T10;
+  double mean_dilatation_modulus_pa = 0.0;  // of all solids: acts on its mean over the element only
   double lame_mu_pa = 0.0;
   double density_kg_m3 = 0.0;
   std::array<double, 81>
       tensor_pa{};  // C_rbcd at 27 r + 9 c + 3 b + d: stress_rb from strain_cd, less mean_dilatation_modulus_pa; of anisotropic ones
 };
 
-/// Whether every mid-side node of a T10, nodes x (10), lies in the middle of its edge, to 1e-6 of the edge's length, which is
-/// mesh::is_curved's measure. Not collective.
+/// True if every mid-side node of a T10, nodes x (10), is within 1e-6 of the edge's length from its middle, like mesh::is_curved. Not
+/// collective.
 bool is_straight(std::span<const Vec3> x);
 
-/// Calculates K and M of the element with node positions x, (4) or (10) in the order of mesh::TetMesh. Mid-side nodes are used where they
-/// are (isoparametric) unless all lie within 1e-6 of an edge's length from its middle. Straight-sided T10 are integrated exactly; the mass
-/// of curved ones too, their stiffness by a rule of degree 5.
-/// T4: OSG02 eqs. 12 (corrected: + vol), 14, 15; T10: the same strain energy, HRZ lumping (Hinton, Rock and Zienkiewicz 1976).
-/// T10 of nearly incompressible solids: mean dilatation for Solid::mean_dilatation_modulus_pa.
-/// Returns false, with `out` unusable, when the Jacobian is not positive at every node and integration point of the stiffness; each of them
-/// is one that mesh::is_folded tests. Not collective.
+/// Calculates K and M of the element with node positions x, (4) or (10) in the order of mesh::TetMesh. Isoparametric, unless all mid-side
+/// nodes lie within 1e-6 of an edge's length from the middle. Straight T10 are integrated exactly; curved ones have an exact mass and a
+/// stiffness of degree 5.
+/// T4: OSG02 eqs. 12 (corrected: + vol), 14, 15; T10: the same strain energy, HRZ lumping (Hinton, Rock and Zienkiewicz 1976). Nearly
+/// incompressible T10: mean dilatation, Solid::mean_dilatation_modulus_pa.
+/// Returns false, with `out` unusable, when the Jacobian is not positive at every node and integration point of the stiffness (a subset of
+/// the points of mesh::is_folded). Not collective.
 [[nodiscard]] bool calc_element(std::span<const Vec3> x, const Solid& solid, job::Mass mass, ElementMatrices& out);
 
 /// Calculates the moments of the element; exact for straight and curved T10. Not collective.

@@ -1,6 +1,5 @@
-// Method: K_r and M_r of the elements of one material at a time, multiplied with the shapes in blocks.
+// Method: K_r and M_r of the elements of one material at a time, multiplied with blocks of shapes.
 // Source: Ungar and Kerwin 1962, J. Acoust. Soc. Am. 34, 954 (loss of a composite from the shares of its strain energy); OSG02 section 3.3.
-// Deviations: none.
 #include "precompute/fem/energy.hpp"
 
 #include <algorithm>
@@ -11,7 +10,7 @@
 namespace carillon::fem {
 namespace {
 
-/// The same nodes with the tetrahedra of one material only.
+/// The mesh reduced to the tetrahedra of one material, with all nodes.
 mesh::LocalMesh take_material(const mesh::LocalMesh& local, const Materials& materials, std::int32_t wanted) {
   mesh::LocalMesh part = local;
   part.tets.clear();
@@ -52,7 +51,7 @@ std::vector<double> calc_forms(const comm::Communicator& comm, Mat a, Mat shapes
   return forms;
 }
 
-/// (modes, materials), each row divided by its sum.
+/// (modes, materials), rows normalised to sum 1.
 std::vector<double> normalise(const std::vector<std::vector<double>>& by_material, std::int64_t modes) {
   std::vector<double> shares;
   for (std::int64_t j = 0; j < modes; ++j) {

@@ -1,4 +1,4 @@
-// Where the energy of a mode sits, and how fast the mode decays for it.
+// Energy shares of modes by material, and modal decay rates.
 #pragma once
 
 #include <petscmat.h>
@@ -11,7 +11,7 @@
 
 namespace carillon::fem {
 
-/// Parts of a mode's energy by material; each sums to 1 over the materials.
+/// Fractions of a mode's energy by material; each sums to 1.
 struct EnergyShares {
   std::int32_t materials = 0;
   std::vector<double> elastic;  // (modes, materials) phi^T K_r phi / phi^T K phi
@@ -20,16 +20,16 @@ struct EnergyShares {
 
 struct Decay {
   std::vector<double> decay_per_s;  // (modes) d
-  EnergyShares shares;              // empty when there is one material: then no energy was integrated
+  EnergyShares shares;              // empty for a single material (not computed)
 };
 
-/// The decay rates [1/s] at these eigenvalues, which may be others than those of the shapes behind `shares`: (modes). Pure.
+/// Decay rates [1/s] at these eigenvalues, which may differ from those of the shapes behind `shares`: (modes). Pure.
 std::vector<double> calc_decay_per_s(const Materials& materials, const EnergyShares& shares, std::span<const double> lambda);
 
-/// Calculates the decay rate of every mode, d = c / 2. One material: c(lambda) of its law. Several: the sum over the materials of what each
-/// law draws from its share of the mode's elastic and kinetic energy (material::Material::calc_damping_per_s), which is the diagonal of the
-/// modal damping matrix; docs/equations.md, damping. `lambda` (modes) [rad^2/s^2]; `shapes` (3n, modes) dense, rows as those of the system
-/// of `local`, null when there are no modes. Collective. Throws on every rank what assemble() throws.
+/// Decay rate of every mode, d = c / 2. One material: c(lambda) of its law. Several: the sum over the materials of each law's damping on
+/// its share of the mode's elastic and kinetic energy (material::Material::calc_damping_per_s), the diagonal of the modal damping matrix;
+/// docs/equations.md, damping. `lambda` (modes) [rad^2/s^2]; `shapes` (3n, modes) dense, rows as in the system of `local`, null without
+/// modes. Collective. Throws on every rank as assemble().
 Decay calc_decay(const comm::Communicator& comm, const mesh::LocalMesh& local, const Materials& materials, job::Mass mass,
                  std::span<const double> lambda, Mat shapes);
 

@@ -13,7 +13,7 @@ namespace {
 
 using mesh::LocalMesh;
 
-/// The regions of all ranks, ascending. Collective.
+/// Region tags of all ranks, ascending. Collective.
 std::vector<std::int32_t> find_regions(const comm::Communicator& comm, const LocalMesh& local) {
   auto all = comm.all_gather([&] {
     if (std::ssize(local.region) != local.tet_count())
@@ -26,7 +26,7 @@ std::vector<std::int32_t> find_regions(const comm::Communicator& comm, const Loc
   return all;
 }
 
-/// Rank 0's names on every rank. Collective.
+/// Broadcasts rank 0's names. Collective.
 std::map<std::int32_t, std::string> broadcast_names(const comm::Communicator& comm, const std::map<std::int32_t, std::string>& names) {
   const auto tags = comm.broadcast([&] {
     std::vector<std::int32_t> keys;
@@ -57,7 +57,7 @@ std::string describe(const std::vector<std::int32_t>& tags, const std::map<std::
   return tags.size() > kMax ? fmt::format("{} and {} more", text, tags.size() - kMax) : text;
 }
 
-/// The material of each region by its place in the list. Throws InputError.
+/// Material index of each region. Throws InputError.
 std::map<std::int32_t, std::int32_t> match(const std::vector<std::int32_t>& regions, const std::map<std::int32_t, std::string>& names,
                                            const job::JobSpec& job, Materials& out) {
   std::map<std::int32_t, std::int32_t> place;
@@ -71,13 +71,13 @@ std::map<std::int32_t, std::int32_t> match(const std::vector<std::int32_t>& regi
       if (!is_named(tag)) continue;
       found = true;
       if (!place.emplace(tag, static_cast<std::int32_t>(out.list.size())).second)
-        throw InputError(fmt::format("{}: \"materials.{}\": region {} has a material already, as \"{}\"; remove one", material.place, key,
+        throw InputError(fmt::format("{}: \"materials.{}\": region {} already has a material, as \"{}\"; remove one", material.place, key,
                                      describe(tag, names), out.region[place[tag]]));
     }
     if (!found)
       throw InputError(
-          fmt::format("{}: \"materials.{}\": the mesh has no such region; there is {}", material.place, key,
-                      regions.size() == 1 && regions[0] == 0 ? "none at all: its elements carry no region tag" : describe(regions, names)));
+          fmt::format("{}: \"materials.{}\": no such region in the mesh, which has {}", material.place, key,
+                      regions.size() == 1 && regions[0] == 0 ? "none: its elements have no region tags" : describe(regions, names)));
     out.list.push_back(material);
     out.region.push_back(key);
   }

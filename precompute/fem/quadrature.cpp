@@ -1,6 +1,5 @@
 // Source: Walkington 2000, "Quadrature on simplices of arbitrary dimension" (degree 5); Stroud 1971, "Approximate calculation of multiple
 //   integrals" (conical product).
-// Deviations: none.
 #include "precompute/fem/quadrature.hpp"
 
 #include <cmath>

@@ -1,8 +1,7 @@
-// Method: fixed nodes of one entry that a chain of tetrahedra joins are one support: every rank joins those of its own elements, rank 0
-//   what meets in one node. The reaction is summed over the elements that touch fixed nodes, a few modes at a time: their shapes are
-//   fetched for the nodes of these elements only.
+// Method: fixed nodes of one entry that are connected by tetrahedra form one support: every rank joins those of its own elements, rank 0
+//   merges across ranks. The reaction is summed over the elements that touch fixed nodes, a few modes at a time; only the shapes at the
+//   nodes of these elements are fetched.
 // Source: the reaction of a mode, e.g. Meirovitch, Principles and Techniques of Vibrations (1997), 7.16 (constraint forces).
-// Deviations: none.
 #include "precompute/fem/supports.hpp"
 
 #include <algorithm>
@@ -25,23 +24,23 @@ namespace {
 
 using mesh::LocalMesh;
 
-constexpr PetscInt kBlock = 16;             // modes at a time
-constexpr std::size_t kMaxSupports = 1000;  // more patches than this are one for each entry
-constexpr double kOpenShare = 0.05;         // of the area: a patch whose faces sum up to less is closed and has no normal
+constexpr PetscInt kBlock = 16;             // modes per block
+constexpr std::size_t kMaxSupports = 1000;  // beyond it, one support per entry
+constexpr double kOpenShare = 0.05;         // of the area: a patch whose face normals sum to less is closed and has no normal
 
-/// A fixed node that a rank's elements touch, as rank 0 gets it. `root`: a node of the mesh that it is joined with.
+/// A fixed node of a rank's elements, sent to rank 0. `root`: a node of the mesh connected to it.
 struct NodeRecord {
   std::int32_t node, entry, root, pad;
   Vec3 x;
 };
 
-/// A face of an element whose corners are all fixed by one entry, counter-clockwise from outside the element.
+/// A face with all corners fixed by one entry, counter-clockwise from outside the element.
 struct FaceRecord {
   std::array<std::int32_t, 3> node;
   std::int32_t entry;
 };
 
-/// The fixed nodes of this rank's elements, joined by them.
+/// Fixed nodes of this rank's elements, joined by the elements.
 std::vector<NodeRecord> list_nodes(const LocalMesh& local) {
   mesh::Parts joined(local.nodes_m.size());
   std::vector<char> is_used(local.nodes_m.size(), 0);
@@ -81,7 +80,7 @@ std::vector<FaceRecord> list_faces(const LocalMesh& local) {
   return list;
 }
 
-/// What rank 0 finds for all: which node of the mesh belongs to which support, and where it is.
+/// Result of rank 0: support and position of each node.
 struct Member {
   std::int32_t node, support;
   Vec3 x;
@@ -92,7 +91,7 @@ struct Layout {
   std::vector<Member> members;  // by node
 };
 
-/// The nodes, each once, with the supports that they belong to; rank 0.
+/// Unique nodes with their supports; rank 0.
 Layout find_members(std::vector<NodeRecord> nodes) {
   std::sort(nodes.begin(), nodes.end(), [](const NodeRecord& a, const NodeRecord& b) { return a.node < b.node; });
   Layout layout;
@@ -107,7 +106,7 @@ Layout find_members(std::vector<NodeRecord> nodes) {
   };
   mesh::Parts joined(layout.members.size());
   for (const NodeRecord& record : nodes) joined.join(find(record.node), find(record.root));
-  // The lowest node of a set is its root, so that supports come by entry and lowest node whatever the partition was.
+  // The lowest node of a set is its root, so the order by entry and lowest node does not depend on the partition.
   std::vector<std::pair<std::int32_t, std::int32_t>> roots;  // entry, place
   for (std::size_t i = 0; i < layout.members.size(); ++i) {
     if (joined.find(static_cast<std::int32_t>(i)) == static_cast<std::int32_t>(i))
@@ -128,7 +127,7 @@ Layout find_members(std::vector<NodeRecord> nodes) {
   return layout;
 }
 
-/// The middle one of the eigenvalues of a symmetric matrix: of a flat patch the smaller of the two in its plane.
+/// Middle eigenvalue of a symmetric matrix: for a flat patch the smaller one in its plane.
 double calc_middle_eigenvalue(const std::array<double, 9>& c) {
   const double mean = (c[0] + c[4] + c[8]) / 3.0;
   std::array<double, 9> b = c;
@@ -144,7 +143,7 @@ double calc_middle_eigenvalue(const std::array<double, 9>& c) {
   return mean + p * (0.0 - max - min);
 }
 
-/// Faces of the body's surface only: what two elements share is inside.
+/// Keeps faces of the body's surface: drops those shared by two elements.
 std::vector<FaceRecord> find_outer(std::vector<FaceRecord> faces) {
   const auto key = [](const FaceRecord& face) {
     std::array<std::int32_t, 3> sorted = face.node;
@@ -233,7 +232,7 @@ Layout find_layout(const comm::Communicator& comm, const LocalMesh& local) {
   return layout;
 }
 
-/// The fixed nodes of a support in cells as wide as its thickness.
+/// Fixed nodes of a support in grid cells as wide as its thickness.
 class Nearby {
  public:
   Nearby(const Layout& layout, std::int32_t support) : width_m_(layout.list[support].thickness_m) {
@@ -249,7 +248,7 @@ class Nearby {
     }
   }
 
-  /// Distance to the nearest node, where it is at most one thickness; else infinite.
+  /// Distance to the nearest node if at most one thickness; else infinite.
   double find_distance(const Vec3& x) const {
     double nearest = 1e300;
     if (!(width_m_ > 0.0)) return nearest;
@@ -280,13 +279,13 @@ class Nearby {
   std::unordered_map<std::uint64_t, std::vector<Vec3>> cells_;
 };
 
-/// An element that touches fixed nodes or is near some.
+/// An element that touches fixed nodes or is near them.
 struct Near {
   std::int32_t tet;
-  std::int32_t support;  // whose share its energy counts to
+  std::int32_t support;  // support that gets its energy
 };
 
-/// The support that is nearest to every element: those that touch fixed nodes, and those whose middle is within one thickness of some.
+/// Nearest support of every element that touches fixed nodes or whose centre is within one thickness of some.
 std::vector<Near> find_near(const LocalMesh& local, const Layout& layout, const std::vector<std::int32_t>& support_of) {
   std::vector<Nearby> nearby;
   for (std::size_t s = 0; s < layout.list.size(); ++s) nearby.emplace_back(layout, static_cast<std::int32_t>(s));
@@ -314,7 +313,7 @@ std::vector<Near> find_near(const LocalMesh& local, const Layout& layout, const 
   return list;
 }
 
-/// Rows of the shapes at some nodes, a few modes at a time.
+/// Rows of the shapes at selected nodes, a few modes at a time.
 class Fetch {
  public:
   /// Collective.
@@ -332,7 +331,7 @@ class Fetch {
     count_ = wanted.size();
   }
 
-  /// values: (count of modes, 3 nodes). Collective.
+  /// values: (modes, 3 nodes). Collective.
   void get(PetscInt first, PetscInt count, std::vector<double>& values) {
     values.resize(static_cast<std::size_t>(count) * count_);
     const double* columns = nullptr;
@@ -358,16 +357,16 @@ class Fetch {
   petsc::ScatterHandle scatter_;
 };
 
-/// What the sums over the elements need to know.
+/// Input of the sums over the elements.
 struct Sums {
   const LocalMesh& local;
   const Layout& layout;
   const std::vector<std::int32_t>& support_of;  // (n), -1: free
-  const std::vector<std::int32_t>& place;       // (n) of a free node among those fetched
+  const std::vector<std::int32_t>& place;       // (n) index of a free node among those fetched
   std::size_t width = 0;                        // 3 times the nodes fetched
 };
 
-/// Adds one element's part for one mode.
+/// Adds one element's contribution for one mode.
 void add_element(const Sums& sums, const Near& near, const ElementMatrices& element, const double* phi, double lambda, double* reaction,
                  double* energy) {
   const auto nodes = sums.local.get_tet(near.tet);
@@ -446,7 +445,7 @@ Supports calc_supports(const comm::Communicator& comm, const LocalMesh& local, c
     for (const Near& one : near) {
       const auto nodes = local.get_tet(one.tet);
       for (std::size_t i = 0; i < nodes.size(); ++i) x[i] = local.nodes_m[nodes[i]];
-      // The assembly has been through every element; a bad one ended it.
+      // The Jacobians were checked by the assembly.
       if (!calc_element({x.data(), nodes.size()}, solids[materials.find(one.tet)], mass, element)) continue;
       for (std::size_t j = 0; j < block; ++j) {
         add_element(sums, one, element, phi.data() + j * sums.width, lambda[first + j], &supports.reaction[(first + j) * count * 6],

@@ -11,57 +11,79 @@ namespace {
 
 namespace fs = std::filesystem;
 
+using base::kAboveZero;
+using base::Limits;
+using base::required;
+
 constexpr double kMinLength = 1e-6, kMaxLength = 1e4;  // [m]
-constexpr double kMinMass = 1e-15, kMaxMass = 1e12;    // [kg], [kg/m], [kg/m^2]
-constexpr int kMinGrid = 2, kMaxGrid = 1000;
+constexpr Limits kKnownLength{kMinLength, kMaxLength};
+constexpr Limits kKnownMass{1e-15, 1e12};  // [kg], [kg/m], [kg/m^2]
 constexpr std::size_t kMaxCorners = 1000;
 constexpr std::array<const char*, 5> kKeys{"string", "beam", "membrane", "plate", "modes_csv"};
-constexpr std::array<const char*, 4> kEdgeNames{"free", "hinged", "clamped", "sliding"};
+const std::vector<std::string> kEdgeNames{"free", "hinged", "clamped", "sliding"};  // in the order of Edge
 
-double read_length(base::Object& object, const char* key) {
-  const double value = object.number(key, base::kPositive);
-  if (value < kMinLength || value > kMaxLength)
-    object.fail(key, fmt::format("must be from {:g} to {:g} m, and is {:g}", kMinLength, kMaxLength, value));
-  return value;
+const base::Keys<StringBody> kString{
+    {"length_m", &StringBody::length_m, kKnownLength, "length", required},
+    {"tension_n", &StringBody::tension_n, kAboveZero, "or `lowest_hz`: tension"},
+    {"lowest_hz", &StringBody::lowest_hz, kAboveZero, "or `tension_n`: lowest frequency without stiffness"},
+    {"mass_kg_m", &StringBody::mass_kg_m, kKnownMass, "mass per length; default from `diameter_m` and the material"},
+    {"diameter_m", &StringBody::diameter_m, kKnownLength, "makes the string stiff; required without `mass_kg_m`"}};
+const base::Keys<BeamBody> kBeam{
+    {"length_m", &BeamBody::length_m, kKnownLength, "length", required},
+    {"width_m", &BeamBody::width_m, kKnownLength, "of a rectangular section"},
+    {"thickness_m", &BeamBody::thickness_m, kKnownLength, "of a rectangular section"},
+    {"diameter_m", &BeamBody::diameter_m, kKnownLength, "of a circular section"},
+    {"ends", "`\"free\"`",
+     "`free`, `hinged`, `clamped` or `sliding`: one word, or two for x = 0 and x = length; all but `free` stop torsion and axial motion"},
+    {"theory", &BeamBody::is_timoshenko, {"euler-bernoulli", "timoshenko"}, "`timoshenko` has shear and rotary inertia"},
+    {"motions", "all", "list of `bending`, `torsion`, `axial`"}};
+const base::Keys<MembraneBody> kMembrane{
+    {"shape", &MembraneBody::shape, {"rectangle", "circle", "L", "polygon"}, "outline", required},
+    {"tension_n_m", &MembraneBody::tension_n_m, kAboveZero, "or `lowest_hz`: force per length of the rim"},
+    {"lowest_hz", &MembraneBody::lowest_hz, kAboveZero, "or `tension_n_m`: lowest frequency"},
+    {"density_kg_m2", &MembraneBody::density_kg_m2, kKnownMass, "mass per area; default from `thickness_m` and the material"},
+    {"thickness_m", &MembraneBody::thickness_m, kKnownLength, "required without `density_kg_m2`"}};
+const base::Keys<MembraneBody> kRectangularMembrane{
+    {"length_m", &MembraneBody::length_m, kKnownLength, "of a rectangle, along x", required},
+    {"width_m", &MembraneBody::width_m, kKnownLength, "of a rectangle, along y", required}};
+const base::Keys<MembraneBody> kCircularMembrane{{"radius_m", &MembraneBody::radius_m, kKnownLength, "of a circle", required}};
+const base::Keys<MembraneBody> kLMembrane{
+    {"side_m", &MembraneBody::side_m, kKnownLength, "of each of the three squares of an L", required}};
+const base::Keys<MembraneBody> kPolygonalMembrane{{"corners_m", "required", "of a polygon: 3 to 1000 rows `[x, y]` along the rim"}};
+const base::Keys<PlateBody> kPlate{
+    {"shape", &PlateBody::shape, {"rectangle", "circle"}, "outline", required},
+    {"thickness_m", &PlateBody::thickness_m, kKnownLength, "at most a quarter of the plate", required},
+    {"edges", "`\"free\"`", "as `ends`: one word, or four for x = 0, x = length, y = 0, y = width of a rectangle"}};
+const base::Keys<PlateBody> kRectangularPlate{{"length_m", &PlateBody::length_m, kKnownLength, "of a rectangle, along x", required},
+                                              {"width_m", &PlateBody::width_m, kKnownLength, "of a rectangle, along y", required}};
+const base::Keys<PlateBody> kCircularPlate{{"radius_m", &PlateBody::radius_m, kKnownLength, "of a circle", required}};
+const base::Keys<MeasuredBody> kMeasured{{"modes_csv", "required", "[file of the modes](#measured-modes)"},
+                                         {"mass_kg", &MeasuredBody::mass_kg, kKnownMass, "mass", required},
+                                         {"size_m", &MeasuredBody::size_m, kKnownLength, "sides of the box about the points", required}};
+const base::Keys<AnalyticBody> kAnyBody{
+    {"grid", &AnalyticBody::grid, Limits{2, 1000}, "intervals of the bank's surface along the longest side"}};
+
+const base::Keys<MembraneBody>& find_sides(const MembraneBody& body) {
+  return body.shape == "rectangle" ? kRectangularMembrane
+         : body.shape == "circle"  ? kCircularMembrane
+         : body.shape == "L"       ? kLMembrane
+                                   : kPolygonalMembrane;
 }
+const base::Keys<PlateBody>& find_sides(const PlateBody& body) { return body.shape == "rectangle" ? kRectangularPlate : kCircularPlate; }
 
-double read_mass(base::Object& object, const char* key) {
-  const double value = object.number(key, base::kPositive);
-  if (value < kMinMass || value > kMaxMass)
-    object.fail(key, fmt::format("masses are kilograms, from {:g} to {:g}, and this is {:g}", kMinMass, kMaxMass, value));
-  return value;
-}
-
-std::optional<double> read_mass_if(base::Object& object, const char* key) {
-  return object.has(key) ? std::optional(read_mass(object, key)) : std::nullopt;
-}
-
-std::optional<double> read_length_if(base::Object& object, const char* key) {
-  return object.has(key) ? std::optional(read_length(object, key)) : std::nullopt;
-}
-
-/// Exactly one of two keys that give the same thing.
-void read_one_of(base::Object& object, const char* first, std::optional<double>& one, const char* second, std::optional<double>& other) {
+/// Throws unless exactly one of two alternative keys is given.
+void check_one_of(base::Object& object, const char* first, const char* second) {
   if (object.has(first) == object.has(second))
     object.fail(object.has(second) ? second : "", fmt::format("give one of \"{}\" and \"{}\"", first, second));
-  one = object.number_if(first, base::kPositive);
-  other = object.number_if(second, base::kPositive);
-}
-
-Edge read_edge(base::Object& object, const char* key) {
-  const std::string word = object.choice(key, {kEdgeNames.begin(), kEdgeNames.end()});
-  return static_cast<Edge>(std::find(kEdgeNames.begin(), kEdgeNames.end(), word) - kEdgeNames.begin());
 }
 
 /// One word for all edges, or a list of N.
 template <std::size_t N>
-std::array<Edge, N> read_edges(base::Object& object, const char* key, const std::string& order, Edge fallback) {
-  std::array<Edge, N> edges;
-  edges.fill(fallback);
-  if (!object.has(key)) return edges;
-  if (object.has_string(key)) {
-    edges.fill(read_edge(object, key));
-    return edges;
+void read_edges(base::Object& object, const char* key, const char* order, std::array<Edge, N>& edges) {
+  if (!object.has(key)) return;
+  if (order == nullptr || object.has_string(key)) {
+    edges.fill(static_cast<Edge>(base::read_word(object, key, kEdgeNames)));
+    return;
   }
   const std::vector<base::Entry> entries = object.entries(key, N);
   for (std::size_t i = 0; i < entries.size(); ++i) {
@@ -70,49 +92,45 @@ std::array<Edge, N> read_edges(base::Object& object, const char* key, const std:
       object.fail(key, fmt::format("must be one word for all, or {} for {}: free, hinged, clamped or sliding", N, order));
     edges[i] = static_cast<Edge>(found - kEdgeNames.begin());
   }
-  return edges;
 }
 
 StringBody read_string(base::Object object) {
   StringBody body;
-  body.length_m = read_length(object, "length_m");
-  read_one_of(object, "tension_n", body.tension_n, "lowest_hz", body.lowest_hz);
-  body.mass_kg_m = read_mass_if(object, "mass_kg_m");
-  body.diameter_m = read_length_if(object, "diameter_m");
+  check_one_of(object, "tension_n", "lowest_hz");
+  kString.read(object, body);
   if (!body.mass_kg_m && !body.diameter_m)
     object.fail("", "give \"mass_kg_m\" (an ideal string), \"diameter_m\" (a stiff one, its mass from the material's density), or both");
   if (body.diameter_m && *body.diameter_m > 0.5 * body.length_m)
-    object.fail("diameter_m", "is more than half of the length, so it is no string; check the units");
+    object.fail("diameter_m", "is more than half of the length, too thick for a string; check the units");
   object.finish();
   return body;
 }
 
+void read_motions(base::Object& object, BeamBody& body) {
+  if (!object.has("motions")) return;
+  body.has_bending = body.has_torsion = body.has_axial = false;
+  for (const base::Entry& entry : object.entries("motions", 3)) {
+    bool* const flag = entry.text == "bending"   ? &body.has_bending
+                       : entry.text == "torsion" ? &body.has_torsion
+                       : entry.text == "axial"   ? &body.has_axial
+                                                 : nullptr;
+    if (flag == nullptr) object.fail("motions", "must be a list of bending, torsion and axial");
+    *flag = true;
+  }
+  if (!body.has_bending && !body.has_torsion && !body.has_axial) object.fail("motions", "is empty; give bending, torsion or axial");
+}
+
 BeamBody read_beam(base::Object object) {
   BeamBody body;
-  body.length_m = read_length(object, "length_m");
-  body.width_m = read_length_if(object, "width_m");
-  body.thickness_m = read_length_if(object, "thickness_m");
-  body.diameter_m = read_length_if(object, "diameter_m");
+  kBeam.read(object, body);
   if (body.diameter_m ? body.width_m || body.thickness_m : !(body.width_m && body.thickness_m))
     object.fail(body.diameter_m ? "diameter_m" : "",
                 "give the section as \"width_m\" and \"thickness_m\" (a rectangle), or \"diameter_m\" (a circle)");
   const double depth = body.diameter_m ? *body.diameter_m : std::max(*body.width_m, *body.thickness_m);
   if (depth > 0.5 * body.length_m)
     object.fail("", "the section is more than half of the length, too thick for beam theory; use \"shape\": \"box\"");
-  body.ends = read_edges<2>(object, "ends", "x = 0 and x = length", Edge::free);
-  body.is_timoshenko = object.choice_or("theory", {"euler-bernoulli", "timoshenko"}, "euler-bernoulli") == "timoshenko";
-  if (object.has("motions")) {
-    body.has_bending = body.has_torsion = body.has_axial = false;
-    for (const base::Entry& entry : object.entries("motions", 3)) {
-      bool* const flag = entry.text == "bending"   ? &body.has_bending
-                         : entry.text == "torsion" ? &body.has_torsion
-                         : entry.text == "axial"   ? &body.has_axial
-                                                   : nullptr;
-      if (flag == nullptr) object.fail("motions", "must be a list of bending, torsion and axial");
-      *flag = true;
-    }
-    if (!body.has_bending && !body.has_torsion && !body.has_axial) object.fail("motions", "is empty; give bending, torsion or axial");
-  }
+  read_edges(object, "ends", "x = 0 and x = length", body.ends);
+  read_motions(object, body);
   object.finish();
   return body;
 }
@@ -121,7 +139,7 @@ double cross(const std::array<double, 2>& o, const std::array<double, 2>& a, con
   return (a[0] - o[0]) * (b[1] - o[1]) - (a[1] - o[1]) * (b[0] - o[0]);
 }
 
-/// Sides that meet without being neighbours, or neighbours that fold back.
+/// True if sides intersect, or adjacent sides fold back on each other.
 bool has_crossing(const std::vector<std::array<double, 2>>& p) {
   const std::size_t n = p.size();
   for (std::size_t i = 0; i < n; ++i)
@@ -168,20 +186,10 @@ void read_corners(base::Object& object, MembraneBody& body) {
 
 MembraneBody read_membrane(base::Object object) {
   MembraneBody body;
-  body.shape = object.choice("shape", {"rectangle", "circle", "L", "polygon"});
-  if (body.shape == "rectangle") {
-    body.length_m = read_length(object, "length_m");
-    body.width_m = read_length(object, "width_m");
-  } else if (body.shape == "circle") {
-    body.radius_m = read_length(object, "radius_m");
-  } else if (body.shape == "L") {
-    body.side_m = read_length(object, "side_m");
-  } else {
-    read_corners(object, body);
-  }
-  read_one_of(object, "tension_n_m", body.tension_n_m, "lowest_hz", body.lowest_hz);
-  body.density_kg_m2 = read_mass_if(object, "density_kg_m2");
-  body.thickness_m = read_length_if(object, "thickness_m");
+  check_one_of(object, "tension_n_m", "lowest_hz");
+  kMembrane.read(object, body);
+  find_sides(body).read(object, body);
+  if (body.shape == "polygon") read_corners(object, body);
   if (!body.density_kg_m2 && !body.thickness_m)
     object.fail("", "give \"density_kg_m2\", or \"thickness_m\" and a material, for its density");
   object.finish();
@@ -190,20 +198,11 @@ MembraneBody read_membrane(base::Object object) {
 
 PlateBody read_plate(base::Object object) {
   PlateBody body;
-  body.shape = object.choice("shape", {"rectangle", "circle"});
-  double size = 0.0;
-  if (body.shape == "rectangle") {
-    body.length_m = read_length(object, "length_m");
-    body.width_m = read_length(object, "width_m");
-    size = std::min(body.length_m, body.width_m);
-    body.edges = read_edges<4>(object, "edges", "x = 0, x = length, y = 0 and y = width", Edge::free);
-  } else {
-    body.radius_m = read_length(object, "radius_m");
-    size = 2.0 * body.radius_m;
-    if (object.has("edges")) body.edges.fill(read_edge(object, "edges"));
-  }
-  body.thickness_m = read_length(object, "thickness_m");
-  if (body.thickness_m > 0.25 * size)
+  kPlate.read(object, body);
+  find_sides(body).read(object, body);
+  const bool is_rectangle = body.shape == "rectangle";
+  read_edges(object, "edges", is_rectangle ? "x = 0, x = length, y = 0 and y = width" : nullptr, body.edges);
+  if (body.thickness_m > 0.25 * (is_rectangle ? std::min(body.length_m, body.width_m) : 2.0 * body.radius_m))
     object.fail("thickness_m", "is more than a quarter of the plate, too thick for plate theory; use \"shape\": \"plate\"");
   object.finish();
   return body;
@@ -216,11 +215,7 @@ MeasuredBody read_measured(base::Object& object) {
         "modes_csv",
         "names the file, with the other keys next to it: {\"modes_csv\": \"modes.csv\", \"mass_kg\": 0.4, \"size_m\": [0.1, 0.1, 0.1]}");
   body.csv = object.path("modes_csv");
-  body.mass_kg = read_mass(object, "mass_kg");
-  body.size_m = object.numbers<3>("size_m");
-  for (const double length : body.size_m)
-    if (!(length >= kMinLength && length <= kMaxLength))
-      object.fail("size_m", fmt::format("must be from {:g} to {:g} m each, and one is {:g}", kMinLength, kMaxLength, length));
+  kMeasured.read(object, body);
   return body;
 }
 
@@ -230,57 +225,31 @@ base::Json write_edges(const auto& edges) {
   return list;
 }
 
-base::Json write_kind(const StringBody& body) {
-  base::Json json = base::Json::object();
-  json.set("length_m", body.length_m);
-  if (body.tension_n) json.set("tension_n", *body.tension_n);
-  if (body.lowest_hz) json.set("lowest_hz", *body.lowest_hz);
-  if (body.mass_kg_m) json.set("mass_kg_m", *body.mass_kg_m);
-  if (body.diameter_m) json.set("diameter_m", *body.diameter_m);
-  return json;
-}
+base::Json write_kind(const StringBody& body) { return kString.write(body); }
 
 base::Json write_kind(const BeamBody& body) {
-  base::Json json = base::Json::object(), motions = base::Json::array();
-  json.set("length_m", body.length_m);
-  if (body.diameter_m)
-    json.set("diameter_m", *body.diameter_m);
-  else
-    json.set("width_m", *body.width_m).set("thickness_m", *body.thickness_m);
-  json.set("ends", write_edges(body.ends)).set("theory", body.is_timoshenko ? "timoshenko" : "euler-bernoulli");
+  base::Json motions = base::Json::array();
   if (body.has_bending) motions.add("bending");
   if (body.has_torsion) motions.add("torsion");
   if (body.has_axial) motions.add("axial");
-  return json.set("motions", motions);
+  return kBeam.write(body).set("ends", write_edges(body.ends)).set("motions", motions);
 }
 
 base::Json write_kind(const MembraneBody& body) {
-  base::Json json = base::Json::object();
-  json.set("shape", body.shape);
-  if (body.shape == "rectangle") json.set("length_m", body.length_m).set("width_m", body.width_m);
-  if (body.shape == "circle") json.set("radius_m", body.radius_m);
-  if (body.shape == "L") json.set("side_m", body.side_m);
+  base::Json json = kMembrane.write(body, find_sides(body).write(body));
   for (const auto& corner : body.corners_m) json["corners_m"].add(base::Json::array(corner));
-  if (body.tension_n_m) json.set("tension_n_m", *body.tension_n_m);
-  if (body.lowest_hz) json.set("lowest_hz", *body.lowest_hz);
-  if (body.density_kg_m2) json.set("density_kg_m2", *body.density_kg_m2);
-  if (body.thickness_m) json.set("thickness_m", *body.thickness_m);
   return json;
 }
 
 base::Json write_kind(const PlateBody& body) {
-  base::Json json = base::Json::object();
-  json.set("shape", body.shape);
-  if (body.shape == "rectangle")
-    json.set("length_m", body.length_m).set("width_m", body.width_m).set("edges", write_edges(body.edges));
-  else
-    json.set("radius_m", body.radius_m).set("edges", to_text(body.edges[0]));
-  return json.set("thickness_m", body.thickness_m);
+  const bool is_rectangle = body.shape == "rectangle";
+  return kPlate.write(body, find_sides(body).write(body))
+      .set("edges", is_rectangle ? write_edges(body.edges) : base::Json(to_text(body.edges[0])));
 }
 
 }  // namespace
 
-const char* to_text(Edge edge) { return kEdgeNames[static_cast<std::size_t>(edge)]; }
+const char* to_text(Edge edge) { return kEdgeNames[static_cast<std::size_t>(edge)].c_str(); }
 
 const char* get_key(const AnalyticBody& body) { return kKeys[body.kind.index()]; }
 
@@ -308,7 +277,7 @@ AnalyticBody read_analytic(base::Object object) {
   if (key == "membrane") body.kind = read_membrane(object.object(key));
   if (key == "plate") body.kind = read_plate(object.object(key));
   if (key == "modes_csv") body.kind = read_measured(object);
-  if (const auto grid = object.integer_if("grid", kMinGrid, kMaxGrid)) body.grid = static_cast<int>(*grid);
+  kAnyBody.read(object, body);
   object.finish();
   return body;
 }
@@ -317,8 +286,7 @@ base::Json write_analytic(const AnalyticBody& body, const fs::path& folder) {
   base::Json json = base::Json::object();
   if (const auto* measured = std::get_if<MeasuredBody>(&body.kind)) {
     const fs::path relative = measured->csv.lexically_relative(folder);
-    json.set("modes_csv", (relative.empty() ? measured->csv : relative).string()).set("mass_kg", measured->mass_kg);
-    json.set("size_m", base::Json::array(measured->size_m));
+    json = kMeasured.write(*measured).set("modes_csv", (relative.empty() ? measured->csv : relative).string());
   } else {
     std::visit(
         [&](const auto& kind) {
@@ -328,6 +296,20 @@ base::Json write_analytic(const AnalyticBody& body, const fs::path& folder) {
   }
   if (body.grid) json.set("grid", *body.grid);
   return json;
+}
+
+std::vector<base::KeyTable> describe_analytic_keys() {
+  std::vector<base::KeyTable> tables;
+  for (const char* title : kKeys) tables.push_back({title, {}});
+  kString.describe(tables[0]);
+  kBeam.describe(tables[1]);
+  kMembrane.describe(tables[2]);
+  for (const auto* sides : {&kRectangularMembrane, &kCircularMembrane, &kLMembrane, &kPolygonalMembrane}) sides->describe(tables[2]);
+  kPlate.describe(tables[3]);
+  for (const auto* sides : {&kRectangularPlate, &kCircularPlate}) sides->describe(tables[3]);
+  kMeasured.describe(tables[4]);
+  for (base::KeyTable& table : tables) kAnyBody.describe(table);
+  return tables;
 }
 
 }  // namespace carillon::job

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "precompute/job/keys.hpp"
 #include "precompute/job/read_body.hpp"
 #include "runtime/material/read_material.hpp"
 
@@ -13,54 +14,20 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kMaxHz = 1e12;
 constexpr std::size_t kMaxFixed = 1000, kMaxRegions = 10000;
 constexpr std::size_t kLongestName = 200;  // bytes
 constexpr double kMinScale = 1e-9, kMaxScale = 1e6;
-constexpr long long kMinSkin = 100, kMaxSkin = 200'000;
-constexpr double kMinAirDb = -80.0, kMaxAirDb = -20.0;
 constexpr double kMinNormal = 1e-100, kMaxNormal = 1e100;
-constexpr double kMinEnergyError = 1e-6, kMaxEnergyError = 0.1;
-constexpr double kMinCents = 1e-3, kMaxCents = 1200;
-
-/// The words of a schema and their meaning; a job may write `words` only.
-template <class Choice>
-struct Words {
-  std::vector<std::pair<std::string, Choice>> list;
-
-  std::vector<std::string> words() const {
-    std::vector<std::string> names;
-    for (const auto& [word, choice] : list) names.push_back(word);
-    return names;
-  }
-  std::string find(Choice wanted) const {
-    return std::find_if(list.begin(), list.end(), [&](const auto& entry) { return entry.second == wanted; })->first;
-  }
-  Choice read(base::Object& object, std::string_view key, Choice fallback) const {
-    const std::string word = object.choice_or(key, words(), find(fallback));
-    return std::find_if(list.begin(), list.end(), [&](const auto& entry) { return entry.first == word; })->second;
-  }
-};
-
-const Words<Element> kElements{{{"T4", Element::T4}, {"T10", Element::T10}}};
-const Words<Mass> kMasses{{{"consistent", Mass::consistent}, {"lumped", Mass::lumped}}};
-const Words<Method> kMethods{{{"automatic", Method::automatic},
-                              {"block-lanczos", Method::block_lanczos},
-                              {"krylov-schur", Method::krylov_schur},
-                              {"dense", Method::dense}}};
-const Words<Factorisation> kFactorisations{
-    {{"automatic", Factorisation::automatic}, {"ldlt", Factorisation::ldlt}, {"mumps", Factorisation::mumps}}};
-const Words<AirMethod> kAirMethods{{{"none", AirMethod::none}, {"auto", AirMethod::automatic}, {"bem", AirMethod::bem}}};
 
 Fixed read_fixed(base::Object fixed) {
   Fixed result;
-  if (fixed.has("node_set")) result.node_set = fixed.string("node_set");
+  kFixedKeys.read(fixed, result);
   if (auto box = fixed.object_if("box_m")) result.box_m = read_box(*box);
   if (fixed.has("name")) {
     result.name = fixed.string("name");
     if (result.name.size() > kLongestName ||
         std::any_of(result.name.begin(), result.name.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }))
-      fixed.fail("name", fmt::format("is no name: at most {} bytes, and none of them a control character", kLongestName));
+      fixed.fail("name", fmt::format("is not a valid name: at most {} bytes, no control characters", kLongestName));
   }
   if (auto fixing = material::read_fixing(fixed)) result.fixing = *fixing;
   fixed.finish();
@@ -70,7 +37,7 @@ Fixed read_fixed(base::Object fixed) {
   return result;
 }
 
-/// A node set's name, an object, or a list of both.
+/// Node set names and objects, one or a list.
 std::vector<Fixed> read_all_fixed(base::Object& job) {
   std::vector<Fixed> list;
   for (base::Entry& entry : job.entries("fixed", kMaxFixed)) {
@@ -88,8 +55,8 @@ void read_materials(base::Object& job, JobSpec& spec) {
   if (auto materials = job.object_if("materials")) {
     if (materials->keys().empty() || materials->keys().size() > kMaxRegions)
       job.fail("materials",
-               fmt::format("holds one material for each region of the mesh, by its tag or name: {{\"1\": {{...}}, \"2\": {{...}}}}; "
-                           "give 1 to {}",
+               fmt::format("must have one material for each region of the mesh, 1 to {}, by tag or name: {{\"1\": {{...}}, \"2\": "
+                           "{{...}}}}",
                            kMaxRegions));
     for (const std::string& region : materials->keys()) {
       if (region.empty()) materials->fail("", "a region's name is empty; give its tag or its name");
@@ -105,21 +72,18 @@ void read_solver(base::Object& job, JobSpec& spec) {
   if (!solver) return;
   if (spec.accuracy_cents && solver->has("tolerance"))
     solver->fail("tolerance", "\"accuracy_cents\" chooses the tolerance; give one of the two");
-  spec.tolerance = solver->number_or("tolerance", spec.tolerance, {1e-14, 1e-4});
-  spec.method = kMethods.read(*solver, "method", spec.method);
-  spec.factorisation = kFactorisations.read(*solver, "factorisation", spec.factorisation);
+  kSolverKeys.read(*solver, spec);
   solver->finish();
 }
 
 void read_air(base::Object& job, JobSpec& spec) {
   if (!job.has_object("radiation")) {
-    spec.air.method = kAirMethods.read(job, "radiation", spec.air.method);
+    if (job.has("radiation")) spec.air.method = static_cast<AirMethod>(base::read_word(job, "radiation", kAirNames));
     return;
   }
   base::Object air = job.object("radiation");
-  spec.air.method = kAirMethods.read(air, "method", AirMethod::bem);
-  if (auto nodes = air.integer_if("skin_nodes", kMinSkin, kMaxSkin)) spec.air.skin_nodes = static_cast<int>(*nodes);
-  spec.air.error_db = air.number_or("error_db", spec.air.error_db, {kMinAirDb, kMaxAirDb});
+  spec.air.method = AirMethod::bem;
+  kAirKeys.read(air, spec.air);
   if (auto half = air.object_if("half_space")) {
     spec.air.half_space = HalfSpace{half->numbers<3>("point_m"), half->numbers<3>("normal")};
     const auto& n = spec.air.half_space->normal;
@@ -131,35 +95,33 @@ void read_air(base::Object& job, JobSpec& spec) {
   air.finish();
 }
 
-/// Which bodies have what "nonlinear" asks for.
+/// Throws unless the body has the coupling requested by "nonlinear".
 void check_stretch(base::Object& job, const JobSpec& spec) {
   const bool is_stretch = spec.nonlinear->is_stretch;
   if (!spec.analytic) {
     if (is_stretch && spec.fixed.empty())
-      job.fail("nonlinear",
-               "the stretch is that of a body whose edges are held, and this one is held nowhere: give \"fixed\", or couple its modes "
-               "in full, {\"modes\": 30}");
+      job.fail("nonlinear", "\"stretch\" needs fixed edges, and this body is free: give \"fixed\", or full coupling, {\"modes\": 30}");
     return;
   }
   const auto is_held = [](const auto& edges) {
     return std::all_of(edges.begin(), edges.end(), [](Edge edge) { return edge == Edge::hinged || edge == Edge::clamped; });
   };
   if (std::holds_alternative<MeasuredBody>(spec.analytic->kind))
-    job.fail("nonlinear", "needs the equations of a body, and this one is a table of measured modes; remove it");
+    job.fail("nonlinear", "is not available for tables of measured modes; remove it");
   const auto* beam = std::get_if<BeamBody>(&spec.analytic->kind);
   const auto* plate = std::get_if<PlateBody>(&spec.analytic->kind);
   const bool is_circle = plate != nullptr && plate->shape == "circle";
   if ((beam != nullptr && !is_held(beam->ends)) || (is_circle && !is_held(std::array{plate->edges[0]})) ||
       (plate != nullptr && !is_circle && !is_held(plate->edges)))
-    job.fail("nonlinear", fmt::format("a {} with {} that are free or slide has no mean stretch: hold them all (\"hinged\" or \"clamped\"), "
-                                      "or take finite elements (\"shape\") and {{\"modes\": 30}}",
+    job.fail("nonlinear", fmt::format("a {} with free or sliding {} has no mean stretch: make them all \"hinged\" or \"clamped\", or use "
+                                      "finite elements (\"shape\") and {{\"modes\": 30}}",
                                       get_key(*spec.analytic), beam != nullptr ? "ends" : "edges"));
   const bool has_formula = plate != nullptr && !is_circle &&
                            std::all_of(plate->edges.begin(), plate->edges.end(), [](Edge edge) { return edge == Edge::hinged; });
   if (!is_stretch && !has_formula)
-    job.fail("nonlinear", fmt::format("all coupling of a {} is no formula here, but for a rectangular plate hinged on all sides: ask for "
+    job.fail("nonlinear", fmt::format("a {} has a formula for full coupling only if it is a rectangular plate hinged on all sides: use "
                                       "\"stretch\"{}",
-                                      get_key(*spec.analytic), plate != nullptr ? ", or take finite elements (\"shape\")" : ""));
+                                      get_key(*spec.analytic), plate != nullptr ? ", or finite elements (\"shape\")" : ""));
 }
 
 void read_nonlinear(base::Object& job, JobSpec& spec) {
@@ -174,37 +136,34 @@ void read_nonlinear(base::Object& job, JobSpec& spec) {
   }
   if (!job.has_object("nonlinear"))
     job.fail("nonlinear",
-             "is \"stretch\", or an object: {\"modes\": 30, \"below_hz\": 3000, \"energy_error\": 1e-3}, each of which may be left out");
+             "must be \"stretch\" or an object with the optional keys {\"modes\": 30, \"below_hz\": 3000, \"energy_error\": 1e-3}");
   base::Object nonlinear = job.object("nonlinear");
-  found.is_stretch = nonlinear.choice_or("form", {"full", "stretch"}, "full") == "stretch";
+  kNonlinearKeys.read(nonlinear, found);
   check_stretch(job, spec);
   if (nonlinear.has("energy_error") && (spec.analytic || found.is_stretch))
-    nonlinear.fail("energy_error", found.is_stretch ? "is of all stress fields, and the stretch is a few of them; remove it"
-                                                    : "is of energies by elements, and this one is a formula; remove it");
-  const bool is_formula = spec.analytic && !found.is_stretch;
-  if (auto modes = nonlinear.integer_if("modes", 1, is_formula ? kMaxPlateModes : kMaxCoupledModes)) found.modes = static_cast<int>(*modes);
+    nonlinear.fail("energy_error", found.is_stretch ? "is for full coupling, not for \"stretch\"; remove it"
+                                                    : "is for finite elements, and this body has a formula; remove it");
+  if (spec.analytic && !found.is_stretch && found.modes > kMaxPlateModes)
+    nonlinear.fail("modes", fmt::format("must be from 1 to {} for a plate, and is {}", kMaxPlateModes, found.modes));
   if (spec.max_modes && found.modes > *spec.max_modes) {
     if (nonlinear.has("modes"))
       nonlinear.fail(
           "modes", fmt::format("couples {} modes, and \"max_modes\" keeps {}; ask for fewer, or keep more", found.modes, *spec.max_modes));
     found.modes = *spec.max_modes;
   }
-  found.below_hz = nonlinear.number_or("below_hz", found.below_hz, base::kPositive);
   if (found.below_hz <= spec.band_hz[0] || found.below_hz > kMaxHz)
-    nonlinear.fail("below_hz",
-                   fmt::format("is the highest frequency of a coupled mode, in Hz, above {:g} where \"band_hz\" begins, and is {:g}",
-                               spec.band_hz[0], found.below_hz));
-  found.energy_error = nonlinear.number_or("energy_error", found.energy_error, {kMinEnergyError, kMaxEnergyError});
+    nonlinear.fail("below_hz", fmt::format("must be above {:g} Hz, where \"band_hz\" begins, and at most {:g} Hz, and is {:g}",
+                                           spec.band_hz[0], kMaxHz, found.below_hz));
   nonlinear.finish();
 }
 
 void read_geometry(base::Object& job, JobSpec& spec) {
   if (job.has("shape")) {
     for (const char* key : {"body", "mesh", "mesh_scale"})
-      if (job.has(key)) job.fail(key, "\"shape\" is the body already; give one of them");
+      if (job.has(key)) job.fail(key, "\"shape\" already gives the body; give one of them");
     spec.body = read_short_shape(job.object("shape"));
   } else if (job.has("body")) {
-    if (job.has("mesh")) job.fail("body", "\"mesh\" names the body already; give one of \"mesh\" (a file) and \"body\"");
+    if (job.has("mesh")) job.fail("body", "\"mesh\" already gives the body; give one of \"mesh\" (a file) and \"body\"");
     if (job.has("mesh_scale"))
       job.fail("mesh_scale", "is for a \"mesh\" file; a surface has \"scale\" inside \"body\", and shapes are in metres");
     base::Object body = job.object("body");
@@ -222,7 +181,7 @@ void read_geometry(base::Object& job, JobSpec& spec) {
   if (spec.analytic) {
     for (const char* key : {"accuracy_cents", "element", "mass", "solver", "fixed", "materials", "radiation"})
       if (job.has(key))
-        job.fail(key, fmt::format("is for bodies of elements, but the modes of a \"{}\" are known; remove it", get_key(*spec.analytic)));
+        job.fail(key, fmt::format("is for finite elements, and the modes of a \"{}\" are known; remove it", get_key(*spec.analytic)));
     return;
   }
   if (!spec.accuracy_cents) return;
@@ -233,7 +192,7 @@ void read_geometry(base::Object& job, JobSpec& spec) {
   }
 }
 
-/// The same name, or two names of one file that exists.
+/// Equal paths, or two names of one existing file.
 bool is_same_file(const fs::path& a, const fs::path& b) {
   std::error_code none;
   return fs::absolute(a).lexically_normal() == fs::absolute(b).lexically_normal() || fs::equivalent(a, b, none);
@@ -254,11 +213,7 @@ void check_outputs(base::Object& job, const JobSpec& spec) {
 JobSpec read_root(base::Object job, const fs::path& file, BankKey bank) {
   JobSpec spec;
   spec.file = file;
-  if (job.has("accuracy_cents")) {
-    spec.accuracy_cents = job.number("accuracy_cents", base::kPositive);
-    if (*spec.accuracy_cents < kMinCents || *spec.accuracy_cents > kMaxCents)
-      job.fail("accuracy_cents", fmt::format("must be from {:g} to {:g} cents, and is {:g}", kMinCents, kMaxCents, *spec.accuracy_cents));
-  }
+  kJobKeys.read(job, spec);
   read_geometry(job, spec);
   if (bank == BankKey::required || job.has("bank")) spec.bank = job.path("bank");
   spec.band_hz = job.numbers_or<2>("band_hz", spec.band_hz);
@@ -267,9 +222,6 @@ JobSpec read_root(base::Object job, const fs::path& file, BankKey bank) {
   }
   if (spec.band_hz[1] > kMaxHz) job.fail("band_hz", fmt::format("must end at {:g} Hz at most, and ends at {:g}", kMaxHz, spec.band_hz[1]));
   read_materials(job, spec);
-  spec.element = kElements.read(job, "element", spec.element);
-  spec.mass = kMasses.read(job, "mass", spec.mass);
-  if (auto count = job.integer_if("max_modes", 1, 40000)) spec.max_modes = static_cast<int>(*count);
   spec.fixed = read_all_fixed(job);
   read_solver(job, spec);
   read_air(job, spec);
@@ -280,10 +232,6 @@ JobSpec read_root(base::Object job, const fs::path& file, BankKey bank) {
   check_outputs(job, spec);
   return spec;
 }
-
-}  // namespace
-
-namespace {
 
 template <class Job>
 auto& find_input(Job& job) {
@@ -310,10 +258,7 @@ JobSpec parse_job(std::string_view text, const fs::path& file, BankKey bank, int
 
 JobSpec read_job(const fs::path& file, BankKey bank) { return read_root(base::read_document(file).root(), file, bank); }
 
-std::string to_text(Element element) { return kElements.find(element); }
-std::string to_text(Mass mass) { return kMasses.find(mass); }
-std::string to_text(Method method) { return kMethods.find(method); }
-std::string to_text(Factorisation factorisation) { return kFactorisations.find(factorisation); }
-std::string to_text(AirMethod method) { return kAirMethods.find(method); }
+std::string to_text(Element element) { return kElementNames[static_cast<std::size_t>(element)]; }
+std::string to_text(Mass mass) { return kMassNames[static_cast<std::size_t>(mass)]; }
 
 }  // namespace carillon::job

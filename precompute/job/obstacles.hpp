@@ -1,4 +1,4 @@
-// Rigid things that deformable bodies meet.
+// Rigid bodies that deformable bodies can touch.
 #pragma once
 
 #include <variant>
@@ -20,7 +20,7 @@ struct BoxObstacle {
 };
 using RigidObstacle = std::variant<PlaneObstacle, BallObstacle, BoxObstacle>;
 
-/// A homogeneous ball that flies freely; friction turns it, so that it can roll.
+/// A homogeneous ball in free flight that rolls by friction.
 struct BallStriker {
   double radius_m = 0, mass_kg = 0;
   Vec3 position_m{}, velocity_m_s{}, spin_rad_s{};

@@ -1,4 +1,4 @@
-// A preview: a body meshed so that its modes take seconds, where no accuracy is given.
+// Previews: meshes for a solve in seconds, for bodies without a given accuracy.
 #pragma once
 
 #include <cstdint>
@@ -12,12 +12,12 @@ inline constexpr std::int64_t kPreviewSolidNodes = 16000, kPreviewWallNodes = 15
 inline constexpr std::int64_t kMaxPreviewNodes = 80000;
 inline constexpr int kPreviewModes = 200;
 
-/// Gives a job without a mesh size and an accuracy the nodes and the number of modes of a preview. True: it is one. Jobs with a mesh, and
-/// bodies whose modes are known, stay as they are.
+/// Sets nodes and number of modes of a preview if the job has neither mesh size nor accuracy; returns true then. Jobs with a mesh file or
+/// known modes are unchanged.
 bool make_preview(JobSpec& job);
 
-/// Runs `work` with a count of nodes, and once more with the count that is possible where the mesher refuses the first. The count that was
-/// met. Throws what `work` throws, and InputError where more than kMaxPreviewNodes would be needed; `remedy` ends its message.
+/// Runs `work` with a node count, and again with the possible count if the mesher refuses the first; returns the count used. Throws the
+/// exceptions of `work`, and InputError if more than kMaxPreviewNodes are needed; `remedy` ends its message.
 std::int64_t run_at_possible_count(std::int64_t nodes, const char* remedy, const std::function<void(std::int64_t nodes)>& work);
 
 }  // namespace carillon::job

@@ -6,26 +6,14 @@
 #include <algorithm>
 #include <limits>
 
+#include "precompute/job/keys.hpp"
+#include "runtime/base/ranges.hpp"
+
 namespace carillon::job {
 namespace {
 
-// As carillon-mesh has them.
-constexpr double kMinBodyM = 1e-6, kMaxBodyM = 1e4;        // [m]
-constexpr double kMinOpening = 20.0, kMaxOpening = 340.0;  // [degrees]
+constexpr double kMinOpening = 20.0, kMaxOpening = 340.0;  // [degrees], as in carillon-mesh
 constexpr long long kMaxNodes = 20'000'000;
-constexpr long long kMaxRanks = 1'000'000;
-constexpr double kMaxGb = 1e9, kMaxLimitS = 1e9;
-
-double read_body_length(base::Object& body, const std::string& key) {
-  const double value = body.number(key, base::kPositive);
-  if (value < kMinBodyM || value > kMaxBodyM)
-    body.fail(key, fmt::format("lengths are metres, from {:g} to {:g}, and this is {:g}", kMinBodyM, kMaxBodyM, value));
-  return value;
-}
-
-std::optional<double> read_body_length_if(base::Object& body, const std::string& key) {
-  return body.has(key) ? std::optional(read_body_length(body, key)) : std::nullopt;
-}
 
 std::vector<std::string> list_shapes() {
   std::vector<std::string> names;
@@ -40,7 +28,7 @@ void read_dimensions(base::Object& body, Body& result) {
       const std::string key = find_dimension_key(dimension);
       if (!body.has(key)) continue;
       if (dimension != "opening-angle") {
-        result.dimensions[dimension] = read_body_length(body, key);
+        result.dimensions[dimension] = base::read_within(body, key, kMinBodyM, kMaxBodyM);
         continue;
       }
       const double angle = body.number(key);
@@ -51,32 +39,21 @@ void read_dimensions(base::Object& body, Body& result) {
   }
 }
 
-/// How fine the mesh is.
-void read_fineness(base::Object& body, Body& result) {
+/// Number of nodes or edge length.
+void read_mesh_size(base::Object& body, Body& result) {
   result.nodes = body.integer_if("nodes", 4, std::numeric_limits<long long>::max());
   if (result.nodes.value_or(0) > kMaxNodes)
-    body.fail("nodes", fmt::format("the mesher makes at most {} nodes, and this asks for {}; larger bodies come as a \"mesh\" file",
-                                   kMaxNodes, *result.nodes));
-  result.edge_m = read_body_length_if(body, "edge_m");
+    body.fail("nodes",
+              fmt::format("the mesher makes at most {} nodes, not {}; give larger bodies as a \"mesh\" file", kMaxNodes, *result.nodes));
+  kMeshSizeKeys.read(body, result);
   if (result.nodes && result.edge_m) body.fail("edge_m", "\"nodes\" is given already; give one of the two");
 }
 
 void read_surface(base::Object& body, Body& result) {
   result.surface = body.path("surface");
-  result.wall_m = read_body_length_if(body, "wall_m");
-  if (body.has("side")) {
-    result.side = body.choice("side", {"middle", "outside", "inside"});
-    if (!result.wall_m) body.fail("side", "is for walls; give the thickness with \"wall_m\"");
-  }
-  result.height_m = read_body_length_if(body, "height_m");
-  result.scale = body.number_if("scale", base::kPositive);
-  result.close_holes = body.number_if("close_holes");
-  if (result.close_holes && !(*result.close_holes >= 0.0 && *result.close_holes <= 1.0))
-    body.fail("close_holes", fmt::format("is a part of the body's diagonal, from 0 to 1, and this is {:g}", *result.close_holes));
-  result.facets = body.boolean_or("facets", false);
+  kSurfaceKeys.read(body, result);
+  if (!result.side.empty() && !result.wall_m) body.fail("side", "is for walls; give the thickness with \"wall_m\"");
   if (result.height_m && result.scale) body.fail("scale", "\"height_m\" gives the size already; give one of them");
-  result.up = body.choice_or("up", {"x", "y", "z"}, "y")[0];
-  result.method = body.choice_or("method", {"auto", "delaunay", "stuffing", "extrude"}, "auto");
 }
 
 }  // namespace
@@ -93,9 +70,7 @@ Resources read_resources(base::Object& job) {
   Resources read;
   auto resources = job.object_if("resources");
   if (!resources) return read;
-  if (auto ranks = resources->integer_if("ranks", 1, kMaxRanks)) read.ranks = static_cast<int>(*ranks);
-  read.memory_gb = resources->number_if("memory_gb", {0.0, kMaxGb}).value_or(0.0);
-  read.time_limit_s = resources->number_if("time_limit_s", {0.0, kMaxLimitS}).value_or(0.0);
+  kResourceKeys.read(*resources, read);
   resources->finish();
   return read;
 }
@@ -133,7 +108,7 @@ Body read_body(base::Object body) {
   } else {
     read_surface(body, result);
   }
-  read_fineness(body, result);
+  read_mesh_size(body, result);
   body.finish();
   return result;
 }
@@ -141,10 +116,10 @@ Body read_body(base::Object body) {
 Body read_short_shape(base::Object shape) {
   const std::vector<std::string> keys = shape.keys(), names = list_shapes();
   if (keys.size() != 1)
-    shape.fail("", fmt::format("must name one shape with its dimensions, {{\"bowl\": {{...}}}}, and names {}", keys.size()));
+    shape.fail("", fmt::format("must have one shape with its dimensions, {{\"bowl\": {{...}}}}, and has {}", keys.size()));
   if (std::find(names.begin(), names.end(), keys[0]) == names.end()) {
     const std::string near = base::find_nearest(keys[0], names);
-    shape.fail(keys[0], fmt::format("is no shape{}; there are {}", near.empty() ? "" : fmt::format(", did you mean \"{}\"?", near),
+    shape.fail(keys[0], fmt::format("is not a shape{}; shapes: {}", near.empty() ? "" : fmt::format(", did you mean \"{}\"?", near),
                                     fmt::join(names, ", ")));
   }
   Body result;
@@ -152,7 +127,7 @@ Body read_short_shape(base::Object shape) {
   result.place = body.find_place("");
   result.shape = keys[0];
   read_dimensions(body, result);
-  read_fineness(body, result);
+  read_mesh_size(body, result);
   body.finish();
   return result;
 }

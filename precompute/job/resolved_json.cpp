@@ -1,8 +1,8 @@
-// The job as text again.
+// Writes a job with all values used.
 
 #include <optional>
 
-#include "precompute/job/job_spec.hpp"
+#include "precompute/job/keys.hpp"
 #include "precompute/job/read_body.hpp"
 #include "runtime/base/json.hpp"
 
@@ -19,7 +19,7 @@ base::Json to_json(const std::array<double, 3>& v) {
   return list;
 }
 
-/// `path` relative to `folder` when both share a root below "/", else absolute.
+/// `path` relative to `folder` if both share a root below "/", else absolute.
 std::string relative_to(const fs::path& path, const fs::path& folder) {
   const fs::path relative = path.lexically_relative(folder);
   return relative.empty() ? path.string() : relative.string();
@@ -78,21 +78,14 @@ base::Json write_body(const Body& body, const fs::path& base) {
     for (const auto& [dimension, value] : body.dimensions) root[find_dimension_key(dimension)] = value;
   } else {
     root["surface"] = relative_to(body.surface, base);
-    if (body.wall_m) root["wall_m"] = *body.wall_m;
-    if (!body.side.empty()) root["side"] = body.side;
-    if (body.height_m) root["height_m"] = *body.height_m;
-    if (body.scale) root["scale"] = *body.scale;
-    if (body.close_holes) root["close_holes"] = *body.close_holes;
-    if (body.facets) root["facets"] = true;
-    root["up"] = std::string(1, body.up);
-    root["method"] = body.method;
+    root = kSurfaceKeys.write(body, root);
+    if (!body.facets) root.erase("facets");
   }
   if (body.nodes) root["nodes"] = *body.nodes;
-  if (body.edge_m) root["edge_m"] = *body.edge_m;
-  return root;
+  return kMeshSizeKeys.write(body, root);
 }
 
-/// The members of a JSON object, added to `entry`.
+/// Adds the members of a JSON object to `entry`.
 void add_members(const base::Json& members, base::Json& entry) {
   const base::Json added = base::Json::parse(members.line()).value();  // numbers as they are read from a file
   for (const std::string& key : added.keys()) entry[key] = added[key];
@@ -101,8 +94,7 @@ void add_members(const base::Json& members, base::Json& entry) {
 base::Json write_fixed(const std::vector<Fixed>& list) {
   base::Json root = base::Json::array();
   for (const Fixed& fixed : list) {
-    base::Json& entry = root.append(base::Json::object());
-    if (fixed.node_set) entry["node_set"] = *fixed.node_set;
+    base::Json& entry = root.append(kFixedKeys.write(fixed));
     if (fixed.box_m) {
       entry["box_m"]["min"] = to_json((*fixed.box_m)[0]);
       entry["box_m"]["max"] = to_json((*fixed.box_m)[1]);
@@ -114,10 +106,7 @@ base::Json write_fixed(const std::vector<Fixed>& list) {
 }
 
 base::Json write_air(const Air& air) {
-  base::Json root;
-  root["method"] = to_text(air.method);
-  root["skin_nodes"] = air.skin_nodes;
-  root["error_db"] = air.error_db;
+  base::Json root = kAirKeys.write(air);
   if (air.half_space) {
     root["half_space"]["point_m"] = to_json(air.half_space->point_m);
     root["half_space"]["normal"] = to_json(air.half_space->normal);
@@ -126,26 +115,23 @@ base::Json write_air(const Air& air) {
 }
 
 base::Json write_nonlinear(const Nonlinear& nonlinear, bool has_energy_error) {
-  base::Json root;
-  if (nonlinear.is_stretch) root["form"] = "stretch";
-  root["modes"] = nonlinear.modes;
-  root["below_hz"] = nonlinear.below_hz;
-  if (has_energy_error) root["energy_error"] = nonlinear.energy_error;
+  base::Json root = kNonlinearKeys.write(nonlinear);
+  if (!nonlinear.is_stretch) root.erase("form");
+  if (!has_energy_error) root.erase("energy_error");
   return root;
 }
 
-/// How the modes of a body of elements are found.
+/// Keys of bodies of finite elements.
 void write_solve(const JobSpec& job, base::Json& root) {
   root["mass"] = to_text(job.mass);
   if (!job.fixed.empty()) root["fixed"] = write_fixed(job.fixed);
+  root["solver"] = kSolverKeys.write(job);
   if (job.accuracy_cents) {
     root["accuracy_cents"] = *job.accuracy_cents;
+    root["solver"].erase("tolerance");
   } else {
     root["element"] = to_text(job.element);
-    root["solver"]["tolerance"] = job.tolerance;
   }
-  root["solver"]["method"] = to_text(job.method);
-  root["solver"]["factorisation"] = to_text(job.factorisation);
   if (job.air.method != AirMethod::none) root["radiation"] = write_air(job.air);
 }
 

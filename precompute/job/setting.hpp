@@ -1,4 +1,4 @@
-// How a body is cut into elements, and how exactly its modes are found.
+// Discretisation and solver tolerance.
 #pragma once
 
 #include <cstdint>
@@ -10,13 +10,13 @@ namespace carillon::job {
 
 struct Setting {
   Element element = Element::T10;
-  double tolerance = 1e-8;            // of the eigensolver: relative residual
-  std::optional<std::int64_t> nodes;  // of a body that is meshed by the run: target count, mid-side nodes included,
+  double tolerance = 1e-8;            // eigensolver: relative residual
+  std::optional<std::int64_t> nodes;  // body meshed by the run: target count, mid-side nodes included,
   std::optional<double> edge_m;       // or target edge length; neither: the mesher's default
-  int refinements = 0;                // of a mesh file: uniform refinements, each cuts a tetrahedron into eight
+  int refinements = 0;                // mesh file: uniform refinements, each splits a tetrahedron into eight
 };
 
-/// The setting of a job without "accuracy_cents".
+/// Setting of a job without "accuracy_cents".
 inline Setting get_setting(const JobSpec& job) {
   Setting setting;
   setting.element = job.element;

@@ -9,6 +9,7 @@
 #include <numbers>
 #include <set>
 
+#include "precompute/job/keys.hpp"
 #include "precompute/job/read_body.hpp"
 #include "runtime/base/ranges.hpp"
 #include "runtime/material/read_material.hpp"
@@ -17,17 +18,97 @@ namespace carillon::job {
 namespace {
 
 namespace fs = std::filesystem;
-using base::read_vector;
-using base::read_within;
+using base::Limits;
+using base::required;
+using base::within;
 
 constexpr double kFarthestM = 1e4, kMaxSpeedMs = 343.0;  // of sound in air
-constexpr double kMaxSpinRadS = 1e5, kMaxGravity = 1e5;
 constexpr double kMaxSeconds = 3600.0, kMinStepS = 1e-12, kMaxStepS = 1e-3;
-constexpr double kMinLengthM = 1e-6, kMaxMassKg = 1e9;
-constexpr int kMaxCells = 2000, kMaxBendMode = 20;
+constexpr Limits kPlace = within(kFarthestM), kSpeed = within(kMaxSpeedMs), kSpin = within(1e5);
+constexpr Limits kExtent{1e-6, kFarthestM}, kTime{0.0, kMaxSeconds};
 constexpr std::size_t kMaxBodies = 100, kMaxBlows = 10000, kMaxRows = 100'000, kMaxGroups = 1000, kMaxMicrophones = 16;
-/// Where a law of loss that is not Rayleigh's has the same loss as the one that is simulated.
+/// Other damping laws are replaced by Rayleigh damping with the same loss at these frequencies.
 constexpr double kFitLowHz = 200.0, kFitHighHz = 5000.0;
+
+const std::vector<std::string> kSoundNames{"kirchhoff", "rayleigh", "paper2001"};  // in the order of SurfaceSound
+
+const base::Keys<SimulationSpec> kSimulation{
+    {"duration_s", &SimulationSpec::duration_s, Limits{1e-6, kMaxSeconds}, "simulated time", required},
+    {"sample_rate_hz", &SimulationSpec::sample_rate_hz, Limits{8000, 192'000}, "sample rate of the sound"},
+    {"step_s", "`\"automatic\"`", "upper limit of the time step; the stability limit still applies"},
+    {"gravity_m_s2", &SimulationSpec::gravity_m_s2, within(1e5), "acceleration of gravity"},
+    {"settle_s", &SimulationSpec::settle_s, kTime, "gravity grows from 0 in this time, to avoid a jerk of hanging bodies"},
+    {"bodies", "required", "1 to 100 bodies"},
+    {"strikers", "none", "rigid balls in free flight"},
+    {"obstacles", "none", "rigid bodies at rest, each a `plane`, a `sphere` or a `box`"},
+    {"impulses", "none", "blows on bodies"},
+    {"contact", "none", "parameters of all contacts"},
+    {"listener", "1.5 m in front", "two ears"},
+    {"microphones", "none", "replaces `listener`: 1 to 16 positions `[x, y, z]`"},
+    {"radiation", &SimulationSpec::radiation, kSoundNames, "radiation formula ([E14](../equations.md))"},
+    {"visibility", "false; true without `\"kirchhoff\"`",
+     "triangles that face away from a receiver or are hidden by a body, striker or obstacle are silent; not with `\"kirchhoff\"`"},
+    {"high_pass_hz", &SimulationSpec::high_pass_hz, Limits{0, 1000}, "high-pass of the sound; not for `\"paper2001\"`, which has its own"},
+    {"motion_hz", "60", "frames per second of `motion`; 1 to `sample_rate_hz`"}};
+const base::Keys<SimulatedBody> kBody{
+    {"name", &SimulatedBody::name, "unique, at most 200 bytes", required},
+    {"mesh", "one form", "file of tetrahedra"},
+    {"mesh_scale", "1", "metres per unit of the mesh file"},
+    {"shape", "one form", "a parametric shape, as in [a job of modes](make-a-bank.md)"},
+    {"body", "one form", "a meshed body, as in [a job of modes](make-a-bank.md)"},
+    {"sheet", "one form", "a thin sheet"},
+    {"element", "`\"T10\"`", "of solids, or `\"T4\"`, which is far too stiff in bending ([choose-a-mesh](choose-a-mesh.md))"},
+    {"model", "`\"stvk\"`", "Saint Venant and Kirchhoff: large rotation, moderate strain"},
+    {"material", "required", "isotropic; losses other than Rayleigh's are fitted by Rayleigh damping at 200 and 5000 Hz"},
+    {"fixed", "none", "node groups without displacement; of a sheet: clamped"},
+    {"hinged", "none", "node groups of a sheet without displacement that rotate freely"},
+    {"drive", "none", "list of nodes that follow a path"},
+    {"bend", "none", "[initial bending](#bend-it-and-let-it-go)"},
+    {"position_m", &SimulatedBody::position_m, kPlace, "of the mesh's origin"},
+    {"rotation_deg", &SimulatedBody::rotation_deg, within(1e6), "about the fixed axes x, then y, then z"},
+    {"velocity_m_s", &SimulatedBody::velocity_m_s, kSpeed, "initial velocity of the centre of mass"},
+    {"angular_velocity_rad_s", &SimulatedBody::angular_velocity_rad_s, kSpin, "initial angular velocity about the centre of mass"},
+    {"sounds", &SimulatedBody::sounds, "false: silent, but still hides other bodies (`visibility`)"}};
+const base::Keys<Sheet> kSheet{{"shape",
+                                &Sheet::shape,
+                                {"rectangle", "disc"},
+                                "in the plane z = 0, with node sets `x-min`, `x-max`, `y-min`, `y-max`, `rim`, or `rim`, `centre`",
+                                required},
+                               {"thickness_m", &Sheet::thickness_m, kExtent, "thickness", required},
+                               {"cells", &Sheet::cells, Limits{2, 2000}, "cells along the longer side or the diameter"}};
+const base::Keys<Sheet> kRectangle{
+    {"length_m", &Sheet::length_m, kExtent, "of a rectangle, along x", required},
+    {"width_m", &Sheet::width_m, kExtent, "of a rectangle, along y", required},
+    {"bow_m", &Sheet::bow_m, Limits{0, kFarthestM}, "of a rectangle: stress-free rise of the middle over its ends at -x and +x"}};
+const base::Keys<Sheet> kDisc{{"radius_m", &Sheet::radius_m, kExtent, "of a disc", required}};
+const base::Keys<Drive> kDrive{{"node_set", "one of two", "name of the driven nodes"},
+                               {"box_m", "one of two", "box of the driven nodes"},
+                               {"path", "required", "rows `[t, x, y, z]` of displacements from the start, smooth between rows"},
+                               {"release_s", &Drive::release_s, kTime, "the nodes are free from this time on"}};
+const base::Keys<BallStriker> kStriker{{"sphere_m", &BallStriker::radius_m, kExtent, "radius", required},
+                                       {"mass_kg", &BallStriker::mass_kg, Limits{1e-9, 1e9}, "mass", required},
+                                       {"position_m", &BallStriker::position_m, kPlace, "initial position"},
+                                       {"velocity_m_s", &BallStriker::velocity_m_s, kSpeed, "initial velocity"},
+                                       {"angular_velocity_rad_s", &BallStriker::spin_rad_s, kSpin, "initial spin"}};
+const base::Keys<PlaneObstacle> kPlane{{"point_m", &PlaneObstacle::point_m, kPlace, "a point of the plane"},
+                                       {"normal", &PlaneObstacle::normal, within(1e100), "direction to the free side"}};
+const base::Keys<BallObstacle> kBall{{"centre_m", &BallObstacle::centre_m, kPlace, "centre"},
+                                     {"radius_m", &BallObstacle::radius_m, kExtent, "radius", required}};
+const base::Keys<Blow> kBlow{{"body", "required", "name of the body"},
+                             {"time_s", &Blow::time_s, kTime, "middle of the blow", required},
+                             {"point_m", &Blow::point_m, kPlace, "near the surface, in the axes of the mesh"},
+                             {"impulse_n_s", &Blow::impulse_n_s, "impulse, in the axes of the mesh", required},
+                             {"duration_s", &Blow::duration_s, Limits{1e-7, kMaxSeconds}, "duration of the raised cosine"}};
+const base::Keys<ContactSpec> kContact{
+    {"stiffness", &ContactSpec::stiffness, Limits{1e-6, 100}, "penalty over the contact modulus per local edge length"},
+    {"restitution", &ContactSpec::restitution, Limits{0.05, 1}, "of a slow impact on a rigid body"},
+    {"friction", &ContactSpec::friction, Limits{0, 10}, "Coulomb coefficient"}};
+const base::Keys<Receivers> kListener{
+    {"position_m", &Receivers::position_m, kPlace, "between the ears"},
+    {"look_at_m", "none", "point to look at"},
+    {"facing", "`[0, 1, 0]`", "replaces `look_at_m`: direction"},
+    {"ear_distance_m", &Receivers::ear_distance_m, Limits{0, 10}, "distance of the ears"},
+    {"directional", &Receivers::cardioid, Limits{0, 1}, "q of the directivity (1 - q) + q cos: 0 omnidirectional, 0.5 cardioid"}};
 
 NodeGroup read_group(base::Object group) {
   NodeGroup result;
@@ -44,7 +125,7 @@ NodeGroup read_group(base::Object group) {
   return result;
 }
 
-/// Names of node sets, objects, or a list of both.
+/// Node set names and objects, one or a list.
 std::vector<NodeGroup> read_groups(base::Object& body, std::string_view key) {
   std::vector<NodeGroup> list;
   for (base::Entry& entry : body.entries(key, kMaxGroups)) {
@@ -82,7 +163,7 @@ std::vector<Drive> read_drives(base::Object& body) {
       drive.path.push_back(at);
     }
     if (drive.path.size() < 2) object.fail("path", "has one row; a motion needs two or more");
-    if (object.has("release_s")) drive.release_s = read_within(object, "release_s", 0.0, kMaxSeconds);
+    kDrive.read(object, drive);
     object.finish();
   }
   return drives;
@@ -97,16 +178,14 @@ Bend read_bend(base::Object& object) {
                 "a body is bent by a \"mode\" (with \"amplitude_m\"), a \"force_n\" (with \"point_m\"), a \"node_set\" or \"box_m\" (with "
                 "\"displacement_m\"), or a \"table_m\" of rows [x, y, z, ux, uy, uz]; give one");
   if (object.has("mode")) {
-    bend.mode = static_cast<int>(*object.integer_if("mode", 1, kMaxBendMode));
-    bend.amplitude_m = read_within(object, "amplitude_m", -kFarthestM, kFarthestM);
-    if (bend.amplitude_m == 0) object.fail("amplitude_m", "is 0, and bends nothing; give the largest displacement of the mode");
+    bend.mode = static_cast<int>(*object.integer_if("mode", 1, 20));
+    bend.amplitude_m = base::read_within(object, "amplitude_m", -kFarthestM, kFarthestM);
+    if (bend.amplitude_m == 0) object.fail("amplitude_m", "is 0; give the largest displacement of the mode");
   } else if (object.has("force_n")) {
     bend.force_n = object.numbers<3>("force_n");
-    bend.point_m = read_vector(object, "point_m", {}, kFarthestM);
+    bend.point_m = base::read_vector(object, "point_m", {}, kFarthestM);
   } else if (is_group) {
-    bend.displacement_m = object.numbers<3>("displacement_m");
-    for (const double x : bend.displacement_m)
-      if (!(std::abs(x) <= kFarthestM)) object.fail("displacement_m", fmt::format("{:g} is out of range; give metres", x));
+    bend.displacement_m = base::read_vector(object, "displacement_m", object.numbers<3>("displacement_m"), kFarthestM);
     bend.nodes = read_group(object);
   } else {
     for (const std::vector<double>& row : object.number_rows("table_m", 6, kMaxRows)) {
@@ -130,22 +209,12 @@ std::vector<Bend> read_bends(base::Object& body) {
   return bends;
 }
 
-double read_scene_length(base::Object& object, std::string_view key) { return read_within(object, key, kMinLengthM, kFarthestM); }
-
 Sheet read_sheet(base::Object object) {
   Sheet sheet;
-  sheet.thickness_m = read_scene_length(object, "thickness_m");
-  sheet.shape = object.choice("shape", {"rectangle", "disc"});
-  if (sheet.shape == "disc") {
-    sheet.radius_m = read_scene_length(object, "radius_m");
-  } else {
-    sheet.length_m = read_scene_length(object, "length_m");
-    sheet.width_m = read_scene_length(object, "width_m");
-    sheet.bow_m = read_within(object, "bow_m", 0.0, 0.0, kFarthestM);
-    if (sheet.bow_m > 0.4 * sheet.length_m)
-      object.fail("bow_m", fmt::format("is more than 0.4 of the length; give {:g} at most", 0.4 * sheet.length_m));
-  }
-  if (auto cells = object.integer_if("cells", 2, kMaxCells)) sheet.cells = static_cast<int>(*cells);
+  kSheet.read(object, sheet);
+  (sheet.shape == "disc" ? kDisc : kRectangle).read(object, sheet);
+  if (sheet.bow_m > 0.4 * sheet.length_m)
+    object.fail("bow_m", fmt::format("is more than 0.4 of the length; give {:g} at most", 0.4 * sheet.length_m));
   object.finish();
   return sheet;
 }
@@ -170,7 +239,7 @@ void read_form(base::Object& object, SimulatedBody& body) {
     object.fail("", "a body is one of \"mesh\" (a file), \"body\" or \"shape\" (as in a job of modes), and \"sheet\"; give one");
   if (object.has("mesh")) {
     body.mesh = object.path("mesh");
-    body.mesh_scale = read_within(object, "mesh_scale", 1.0, 1e-9, 1e6);
+    body.mesh_scale = base::read_within(object, "mesh_scale", 1.0, 1e-9, 1e6);
   } else if (object.has("shape")) {
     body.body = read_short_shape(object.object("shape"));
   } else if (object.has("body")) {
@@ -179,9 +248,9 @@ void read_form(base::Object& object, SimulatedBody& body) {
     body.sheet = read_sheet(object.object("sheet"));
   }
   if (!body.sheet) {
-    body.element = object.choice_or("element", {"T4", "T10"}, "T10") == "T4" ? Element::T4 : Element::T10;
+    if (object.has("element")) body.element = static_cast<Element>(base::read_word(object, "element", kElementNames));
   } else if (object.has("element")) {
-    object.fail("element", "is for solids; a sheet has elements of its own");
+    object.fail("element", "is for solids; sheets have their own elements");
   }
   if (body.sheet)
     body.hinged = read_groups(object, "hinged");
@@ -191,31 +260,21 @@ void read_form(base::Object& object, SimulatedBody& body) {
 
 SimulatedBody read_simulated_body(base::Object& object, std::vector<std::string>& warnings) {
   SimulatedBody body;
-  body.name = object.string("name");
   body.place = object.find_place("");
+  kBody.read(object, body);
   read_form(object, body);
   object.choice_or("model", {"stvk"}, "stvk");
   body.material = read_solid(object, warnings);
   body.fixed = read_groups(object, "fixed");
   body.drives = read_drives(object);
   body.bends = read_bends(object);
-  body.position_m = read_vector(object, "position_m", {}, kFarthestM);
-  body.rotation_deg = read_vector(object, "rotation_deg", {}, 1e6);
-  body.velocity_m_s = read_vector(object, "velocity_m_s", {}, kMaxSpeedMs);
-  body.angular_velocity_rad_s = read_vector(object, "angular_velocity_rad_s", {}, kMaxSpinRadS);
-  body.sounds = object.boolean_or("sounds", true);
   object.finish();
   return body;
 }
 
 Striker read_striker(base::Object& object) {
-  Striker striker;
-  striker.place = object.find_place("");
-  striker.ball.radius_m = read_scene_length(object, "sphere_m");
-  striker.ball.mass_kg = read_within(object, "mass_kg", 1e-9, kMaxMassKg);
-  striker.ball.position_m = read_vector(object, "position_m", {}, kFarthestM);
-  striker.ball.velocity_m_s = read_vector(object, "velocity_m_s", {}, kMaxSpeedMs);
-  striker.ball.spin_rad_s = read_vector(object, "angular_velocity_rad_s", {}, kMaxSpinRadS);
+  Striker striker{object.find_place(""), {}};
+  kStriker.read(object, striker.ball);
   object.finish();
   return striker;
 }
@@ -227,15 +286,18 @@ Obstacle read_obstacle(base::Object& object) {
   for (const char* key : {"plane", "sphere", "box"}) forms += object.has(key) ? 1 : 0;
   if (forms != 1) object.fail("", "an obstacle is a \"plane\", a \"sphere\" or a \"box\"; give one");
   if (auto plane = object.object_if("plane")) {
-    PlaneObstacle made{read_vector(*plane, "point_m", {}, kFarthestM), read_vector(*plane, "normal", {0, 0, 1}, 1e100)};
+    PlaneObstacle made;
+    kPlane.read(*plane, made);
     const double length = norm(made.normal);
     if (!(length > 1e-100)) plane->fail("normal", "is 0; give the direction to the free side");
     made.normal = (1.0 / length) * made.normal;
     plane->finish();
     obstacle.form = made;
   } else if (auto sphere = object.object_if("sphere")) {
-    obstacle.form = BallObstacle{read_vector(*sphere, "centre_m", {}, kFarthestM), read_scene_length(*sphere, "radius_m")};
+    BallObstacle made;
+    kBall.read(*sphere, made);
     sphere->finish();
+    obstacle.form = made;
   } else {
     const std::array<Vec3, 2> box = read_box(object.object("box"));
     obstacle.form = BoxObstacle{box[0], box[1]};
@@ -256,12 +318,9 @@ Blow read_blow(base::Object& object, const std::vector<SimulatedBody>& bodies) {
     object.fail("body", fmt::format("there is no body \"{}\"{}", name, near.empty() ? "" : fmt::format(", did you mean \"{}\"?", near)));
   }
   blow.body = body - bodies.begin();
-  blow.time_s = read_within(object, "time_s", 0.0, kMaxSeconds);
-  blow.point_m = read_vector(object, "point_m", {}, kFarthestM);
-  blow.impulse_n_s = object.numbers<3>("impulse_n_s");
-  blow.duration_s = read_within(object, "duration_s", 1e-4, 1e-7, kMaxSeconds);
+  kBlow.read(object, blow);
   if (blow.time_s < 0.5 * blow.duration_s)
-    object.fail("time_s", "is the middle of the blow, which would begin before the simulation; give half of its duration or more");
+    object.fail("time_s", "the blow would begin before the simulation; its middle must be at least half of its duration");
   object.finish();
   return blow;
 }
@@ -269,16 +328,8 @@ Blow read_blow(base::Object& object, const std::vector<SimulatedBody>& bodies) {
 Receivers read_receivers(base::Object& root) {
   Receivers receivers;
   if (auto listener = root.object_if("listener")) {
-    receivers.position_m = read_vector(*listener, "position_m", receivers.position_m, kFarthestM);
-    receivers.ear_distance_m = read_within(*listener, "ear_distance_m", receivers.ear_distance_m, 0.0, 10.0);
-    receivers.cardioid = read_within(*listener, "directional", 0.0, 0.0, 1.0);
-    if (listener->has("look_at_m") && listener->has("facing"))
-      listener->fail("look_at_m", "says the same thing as \"facing\"; keep one of them");
-    const std::string key = listener->has("look_at_m") ? "look_at_m" : "facing";
-    const Vec3 direction = key == "look_at_m" ? read_vector(*listener, key, {}, kFarthestM) - receivers.position_m
-                                              : read_vector(*listener, key, receivers.facing, kFarthestM);
-    if (!(norm(direction) > 1e-9)) listener->fail(key, "gives the listener no direction to look in; name another place or direction");
-    receivers.facing = normalise(direction);
+    kListener.read(*listener, receivers);
+    receivers.facing = normalise(base::read_facing(*listener, receivers.position_m, receivers.facing, kFarthestM));
     listener->finish();
   }
   if (root.has("microphones")) {
@@ -310,12 +361,11 @@ SimulationSpec read_root(base::Object root, const fs::path& file) {
   SimulationSpec spec;
   spec.file = file;
   base::Object job = root.object("simulate");
-  spec.duration_s = read_within(job, "duration_s", 1e-6, kMaxSeconds);
-  if (auto rate = job.integer_if("sample_rate_hz", 8000, 192'000)) spec.sample_rate_hz = static_cast<int>(*rate);
-  if (job.has("step_s") && !job.has_string("step_s")) spec.step_s = read_within(job, "step_s", kMinStepS, kMaxStepS);
-  if (job.has_string("step_s")) job.choice("step_s", {"automatic"});
-  spec.gravity_m_s2 = read_vector(job, "gravity_m_s2", {}, kMaxGravity);
-  spec.settle_s = read_within(job, "settle_s", 0.0, 0.0, kMaxSeconds);
+  kSimulation.read(job, spec);
+  if (job.has_string("step_s"))
+    job.choice("step_s", {"automatic"});
+  else if (job.has("step_s"))
+    spec.step_s = base::read_within(job, "step_s", kMinStepS, kMaxStepS);
   for (base::Object& body : job.objects("bodies")) spec.bodies.push_back(read_simulated_body(body, spec.warnings));
   check_names(job, spec.bodies);
   for (base::Object& striker : job.objects("strikers")) spec.strikers.push_back(read_striker(striker));
@@ -323,21 +373,14 @@ SimulationSpec read_root(base::Object root, const fs::path& file) {
   for (base::Object& blow : job.objects("impulses")) spec.blows.push_back(read_blow(blow, spec.bodies));
   if (spec.blows.size() > kMaxBlows) job.fail("impulses", fmt::format("give {} at most", kMaxBlows));
   if (auto contact = job.object_if("contact")) {
-    spec.contact.stiffness = read_within(*contact, "stiffness", spec.contact.stiffness, 1e-6, 100.0);
-    spec.contact.restitution = read_within(*contact, "restitution", spec.contact.restitution, 0.05, 1.0);
-    spec.contact.friction = read_within(*contact, "friction", spec.contact.friction, 0.0, 10.0);
+    kContact.read(*contact, spec.contact);
     contact->finish();
   }
   spec.receivers = read_receivers(job);
-  const std::string radiation = job.choice_or("radiation", {"kirchhoff", "rayleigh", "paper2001"}, "kirchhoff");
-  spec.radiation = radiation == "kirchhoff"  ? SurfaceSound::kirchhoff
-                   : radiation == "rayleigh" ? SurfaceSound::rayleigh
-                                             : SurfaceSound::paper2001;
   spec.visibility = job.boolean_or("visibility", spec.radiation != SurfaceSound::kirchhoff);
   if (spec.visibility && spec.radiation == SurfaceSound::kirchhoff)
     job.fail("visibility", "hides triangles, and \"kirchhoff\" needs all of a closed surface; take \"rayleigh\", or leave it out");
-  spec.high_pass_hz = read_within(job, "high_pass_hz", 20.0, 0.0, 1000.0);
-  spec.motion_hz = read_within(job, "motion_hz", 60.0, 1.0, spec.sample_rate_hz);
+  spec.motion_hz = base::read_within(job, "motion_hz", 60.0, 1.0, spec.sample_rate_hz);
   job.finish();
   read_outputs(root, spec);
   spec.resources = read_resources(root);
@@ -346,6 +389,21 @@ SimulationSpec read_root(base::Object root, const fs::path& file) {
 }
 
 }  // namespace
+
+std::vector<base::KeyTable> describe_simulation_keys() {
+  std::vector<base::KeyTable> tables{{"simulation", {}}, {"simulated body", {}}, {"sheet", {}}, {"drive", {}}};
+  kSimulation.describe(tables[0]);
+  kStriker.describe(tables[0], "strikers[].");
+  kPlane.describe(tables[0], "obstacles[].plane.");
+  kBall.describe(tables[0], "obstacles[].sphere.");
+  kBlow.describe(tables[0], "impulses[].");
+  kContact.describe(tables[0], "contact.");
+  kListener.describe(tables[0], "listener.");
+  kBody.describe(tables[1]);
+  for (const base::Keys<Sheet>* keys : {&kSheet, &kRectangle, &kDisc}) keys->describe(tables[2]);
+  kDrive.describe(tables[3]);
+  return tables;
+}
 
 bool is_simulation(std::string_view text) {
   try {

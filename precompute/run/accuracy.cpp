@@ -1,16 +1,13 @@
-// One loop from trial to trial, whose error bars and costs decide the next; longer than most files.
-// Method:     A coarse solve gives every mode's error bar in parts whose rates of convergence are known. They say how much finer the mesh
-//             must be; its cost follows from the last trial's by the cost model, or by the exponent between two trials. What is predicted
-//             is then solved, its corrected frequencies are compared with those of the coarser mesh, and their error bars decide; where
-//             they fall short the rate that was measured between two trials takes the place of the known one.
-// Source:     precompute/fem/error_bars/correct.hpp (docs/error-bars.md); precompute/job/cost.
-// Deviations: none.
+// Method: a coarse solve gives every mode's error bar in parts with known convergence rates, which predict the required mesh size; its cost
+//   follows from the last trial's by the cost model, or by the exponent between two trials. The predicted setting is solved and its
+//   corrected frequencies are compared with those of the coarser mesh; if the bars miss the target, the rate measured between two trials
+//   replaces the known one.
+// Source: precompute/fem/error_bars/correct.hpp (docs/error-bars.md); precompute/job/cost.
 #include "precompute/run/accuracy.hpp"
 
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -22,7 +19,9 @@
 #include "precompute/job/cost/seconds.hpp"
 #include "precompute/mesh/parallel/read_parallel.hpp"
 #include "precompute/petsc/session.hpp"
+#include "precompute/run/body.hpp"
 #include "precompute/run/io/checkpoint_file.hpp"
+#include "precompute/run/solve_body.hpp"
 #include "runtime/base/failure.hpp"
 
 namespace carillon::run {
@@ -30,14 +29,14 @@ namespace {
 
 constexpr std::size_t kMaxTrials = 7;
 constexpr std::int64_t kCoarseShapeNodes = 1500, kCoarseSurfaceNodes = 6000;
-constexpr double kGoal = 0.85;        // of what was asked: aimed at, so that the next trial is the last
-constexpr double kFinestStep = 0.25;  // the rates hold for edges so much shorter, see predict_parts()
-constexpr double kMinStep = 0.9;      // at most this: a trial with nearly the same edges gives no new information
-constexpr double kLinearFrom = 20e3;  // nodes with T10 above which T4 is tried, too
-constexpr int kMaxCounts = 4;         // asked of the mesher for one trial
-constexpr int kMaxRefinements = 4;    // of a mesh file: 4,096 elements of each
+constexpr double kGoal = 0.85;        // safety factor of the target, so that the next trial is the last
+constexpr double kFinestStep = 0.25;  // range of the convergence rates, see predict_level()
+constexpr double kMinStep = 0.9;      // maximum: nearly equal edges give no new information
+constexpr double kLinearFrom = 20e3;  // T10 nodes above which T4 is tried too
+constexpr int kMaxCounts = 4;         // node counts tried per trial
+constexpr int kMaxRefinements = 4;    // of a mesh file: 4,096 elements per element
 
-/// What all ranks do next; decided on rank 0.
+/// Next step of all ranks, decided on rank 0.
 struct Decision {
   int is_done = 0;
   Setting setting;
@@ -46,7 +45,7 @@ struct Decision {
 static_assert(std::is_trivially_copyable_v<Decision>, "Decisions are sent as bytes.");
 
 double calc_mean_edge(const comm::Communicator& comm, const mesh::LocalMesh& local) {
-  std::array<double, 2> sum{};  // of lengths, of edges
+  std::array<double, 2> sum{};  // of lengths; number of edges
   for (auto tet = local.tets.begin(); tet != local.tets.end(); tet += local.nodes_per_tet())
     for (const auto& [a, b] : mesh::kEdges) {
       const Vec3 &p = local.nodes_m[tet[a]], &q = local.nodes_m[tet[b]];
@@ -63,7 +62,7 @@ class Search {
     report_.asked_cents = asked_;
     tolerance_ = find_first_setting(run).tolerance;
   }
-  AccurateBody solve();
+  Solution solve(AccuracyReport& report);
 
  private:
   void attempt(const Setting& setting);
@@ -91,42 +90,41 @@ class Search {
   Run& run_;
   double asked_;
   double tolerance_;
-  bool is_refinable_ = false;       // the mesh file can be refined: rank 0 reads it
-  double order_ = 4.0;              // by which power of the edges the errors of the last trial fall
-  std::optional<Trial> quadratic_;  // while the linear trial is looked at: what ten nodes are predicted to need
+  bool is_refinable_ = false;       // the mesh file can be refined: it is read by rank 0
+  double order_ = 4.0;              // convergence order of the errors of the last trial
+  std::optional<Trial> quadratic_;  // the T10 trial, during the T4 trial that follows it
   Forecast quadratic_forecast_;
   AccuracyReport report_;
-  AccurateBody current_;
+  Solution current_;
 };
 
-/// The trial before, of the same element.
+/// The previous trial with the same element.
 const Trial* Search::find_before(const Trial& trial) const {
   for (auto before = report_.trials.rbegin(); before != report_.trials.rend(); ++before)
     if (before->setting.element == trial.setting.element && before->nodes < trial.nodes) return &*before;
   return nullptr;
 }
 
-/// The modes that the bank will have.
+/// Modes of the bank.
 std::vector<std::size_t> Search::find_listed(const error_bars::Corrections& corrections) const {
   return error_bars::find_lowest(corrections, static_cast<std::size_t>(run_.job.max_modes.value_or(std::numeric_limits<int>::max())));
 }
 
-/// The widest bar of them.
+/// The widest bar of these.
 double Search::find_worst(const error_bars::Corrections& corrections) const {
   double worst = 0.0;
   for (const std::size_t m : find_listed(corrections)) worst = std::max(worst, corrections.cents[m]);
   return worst;
 }
 
-/// The largest bar that is predicted on a mesh with edges `ratio` times as long, which is compared with this one. A refined mesh file keeps
-/// its facets.
+/// Largest bar predicted on a mesh with edges `ratio` times as long, compared with this one. A refined mesh file keeps its facets.
 double Search::predict_worst(bool keeps_geometry, double ratio) const {
   const error_bars::Level& level = current_.solved.errors.bars.level;
   if (level.parts.empty()) return 0.0;
   return find_worst(error_bars::calc_corrections(error_bars::predict_level(level, order_, keeps_geometry, ratio), &level));
 }
 
-/// The longest edges, as a part of those now, that are predicted to meet the goal; `min` if none above it does.
+/// Largest edge ratio predicted to meet the goal; `min` if none above it does.
 double Search::find_ratio(double goal_cents, double min) const {
   if (predict_worst(false, min) > goal_cents) return min;
   double low = min, high = 1.0;
@@ -137,7 +135,7 @@ double Search::find_ratio(double goal_cents, double min) const {
   return low;
 }
 
-/// The last trial against the one before it: which corrections both agree on, and how fast the errors fall.
+/// Compares the last trial with the previous one: corrections on which both agree, and the convergence order.
 void Search::compare_levels() {
   error_bars::ErrorBars& bars = current_.solved.errors.bars;
   const Trial& last = report_.trials.back();
@@ -155,10 +153,10 @@ double Search::measure_exponent(double Trial::*quantity, double fallback, double
   return std::clamp(std::log(last.*quantity / before->*quantity) / nodes, min, max);
 }
 
-/// The power of 1 / edges by which nodes grow: thin bodies refine in two directions.
+/// Growth exponent of the nodes with 1 / edge length: thin bodies refine in two directions.
 double Search::find_dimension() const { return -1.0 / measure_exponent(&Trial::edge_m, -1.0 / 3, -1.0 / 2, -1.0 / 3.3); }
 
-/// Peak of memory of all ranks for `size`, from that of a trial.
+/// Peak memory of all ranks for `size`, scaled from a trial.
 double calc_bytes(const Trial& trial, const cost::ProblemSize& size) {
   return static_cast<double>(trial.peak_bytes) * cost::predict_bytes(size, 1) / cost::predict_bytes(trial.size, 1);
 }
@@ -189,7 +187,7 @@ Setting Search::make_setting(job::Element element, double ratio) const {
 }
 
 std::string Search::describe_reached() const {
-  std::string text = fmt::format("{:g} cents were asked for", asked_);
+  std::string text = fmt::format("{:g} cents were requested", asked_);
   const Trial* best = nullptr;
   for (const Trial& trial : report_.trials)
     if (trial.modes > 0 && (best == nullptr || trial.worst_cents < best->worst_cents)) best = &trial;
@@ -201,8 +199,8 @@ std::string Search::describe_reached() const {
 std::string describe_forecast(const Forecast& next) {
   return fmt::format("next stricter: {}, about {:.0f} nodes, {}, {:.1f} CPU s, {:.2g} GB",
                      next.needs_new_mesh ? "a mesh file with edges half as long" : run::describe(next.setting), next.nodes,
-                     next.worst_cents > 0 ? fmt::format("{:.2g} cents", next.worst_cents) : std::string("cents unknown before it is tried"),
-                     next.cpu_seconds, next.bytes / 1e9);
+                     next.worst_cents > 0 ? fmt::format("{:.2g} cents", next.worst_cents) : std::string("cents unknown"), next.cpu_seconds,
+                     next.bytes / 1e9);
 }
 
 void Search::give_up(const std::string& why) const {
@@ -210,31 +208,32 @@ void Search::give_up(const std::string& why) const {
                                describe_forecast(forecast_next())));
 }
 
-/// Why a mesh file whose surface is not that of the body ends at `cents`, and what would correct it.
+/// Why a mesh file with an inexact surface converges to `cents`, and the remedy.
 std::string Search::describe_surface(double cents) const {
   const mesh::CheckReport& check = current_.body.check;
   const std::string end =
-      fmt::format("refined without end this mesh would come to {:.3g}, because its surface is not that of the body", cents);
+      fmt::format("with infinite refinement this mesh would reach {:.3g}, because its surface is not that of the body", cents);
   if (check.straightened > 0)
     return end + fmt::format(
-                     ": it is of second order, but {} of its {} elements folded over and were made straight-sided, which leaves "
-                     "their faces flat; make the elements smaller where the surface bends, or give the surface itself (\"body\")",
+                     ": it has ten-node elements, but {} of its {} elements folded over and were straightened, which leaves "
+                     "their faces flat; use smaller elements where the surface bends, or give the surface itself (\"body\")",
                      check.straightened, check.tets);
   if (check.order == 2 && check.curved == 0)
     return end +
-           ": it is of second order, but all its edges are straight; move the mid-side nodes onto the true surface, or give the surface "
+           ": it has ten-node elements, but all its edges are straight; move the mid-side nodes onto the true surface, or give the surface "
            "itself (\"body\")";
   if (check.order == 2)
-    return end + " between its nodes, although it is of second order; take a finer mesh of second order, or the surface itself (\"body\")";
-  return end + "; take a finer mesh, one of second order on the true surface, or the surface itself (\"body\")";
+    return end +
+           " between its nodes, despite its ten-node elements; use a finer mesh with ten-node elements, or the surface itself (\"body\")";
+  return end + "; use a finer mesh, ten-node elements on the true surface, or the surface itself (\"body\")";
 }
 
-/// Rank 0 decides on a body that is meshed here.
+/// Rank 0: next setting of a body meshed by the run.
 Decision Search::decide_on_body() {
   const Trial& last = report_.trials.back();
   if (last.modes == 0) return {0, make_setting(last.setting.element, 0.5)};
   if (last.setting.element == job::Element::T4 && quadratic_) {
-    // Ten nodes were tried first; the cheaper of the two forecasts is used.
+    // T10 was tried first; use the cheaper of the two forecasts.
     const double ratio = find_ratio(kGoal * asked_, kFinestStep / 4);
     const Forecast linear = forecast(make_setting(job::Element::T4, ratio), ratio);
     const bool is_linear_cheaper = linear.worst_cents <= asked_ && linear.cpu_seconds < quadratic_forecast_.cpu_seconds;
@@ -255,7 +254,7 @@ Decision Search::decide_on_body() {
   return {0, next.setting};
 }
 
-/// Rank 0 decides on a mesh file: T4, T10, T10 refined.
+/// Rank 0: next setting of a mesh file: T4, T10, T10 refined.
 Decision Search::decide_on_file() {
   const Trial& last = report_.trials.back();
   Setting setting = last.setting;
@@ -264,15 +263,15 @@ Decision Search::decide_on_file() {
     setting.element = job::Element::T10;
     return {0, setting};
   }
-  if (!is_refinable_) give_up("this mesh file is read by all ranks in parts and is not refined; make a finer one");
+  if (!is_refinable_) give_up("this mesh file is read in parallel and cannot be refined; make a finer one");
   int more = 1;
   while (more < kMaxRefinements && predict_worst(true, std::pow(0.5, more)) > asked_) ++more;
   const double facets = predict_worst(true, 1e-3);
   if (last.modes > 0 && facets > asked_) give_up(describe_surface(facets));
   setting.refinements += more;
   if (setting.refinements > kMaxRefinements)
-    give_up(
-        fmt::format("{} uniform refinements would not do; take a finer mesh where the body is thin or has sharp corners", kMaxRefinements));
+    give_up(fmt::format("{} uniform refinements would not suffice; use a finer mesh where the body is thin or has sharp corners",
+                        kMaxRefinements));
   return {0, setting};
 }
 
@@ -280,13 +279,13 @@ Decision Search::decide() {
   const Trial& last = report_.trials.back();
   if (last.modes > 0 && last.worst_cents <= asked_) return {1, last.setting};
   if (const Trial* before = find_before(last); last.modes == 0 && before != nullptr && before->modes == 0)
-    return {1, last.setting};  // twice none: there is none
+    return {1, last.setting};  // no modes on two meshes: the band is empty
   if (last.modes > 0 && last.algebraic_cents > 0.2 * asked_) tolerance_ = std::max(tolerance_ * 1e-2, 1e-12);
-  if (report_.trials.size() >= kMaxTrials) give_up(fmt::format("{} settings were tried; ask for less, or give the mesh", kMaxTrials));
+  if (report_.trials.size() >= kMaxTrials) give_up(fmt::format("{} settings were tried; relax the target, or give the mesh", kMaxTrials));
   return run_.job.body ? decide_on_body() : decide_on_file();
 }
 
-/// Refuses what the machine cannot hold before it is begun.
+/// Rejects settings beyond the memory of the machine.
 void Search::check_forecast(const Setting& setting) {
   double bytes = 0.0;
   if (run_.comm.is_root()) {
@@ -321,7 +320,7 @@ Trial Search::judge(const Setting& setting, std::size_t first_phase) {
   return trial;
 }
 
-/// The widest bar of the last trial, and where.
+/// Sets the widest bar of the last trial and its frequency.
 void Search::judge_bars(Trial& trial) const {
   const error_bars::ErrorBars& bars = current_.solved.errors.bars;
   for (const std::size_t k : find_listed(bars.corrected)) {
@@ -335,7 +334,7 @@ void Search::judge_bars(Trial& trial) const {
 }
 
 void Search::attempt(const Setting& setting) {
-  current_ = {};  // before the next body needs the room
+  current_ = {};  // frees memory for the next body
   const std::size_t first_phase = run_.log.get_phases().size();
   current_.setting = setting;
   current_.body = make_trial_body(run_, current_.setting);
@@ -345,13 +344,13 @@ void Search::attempt(const Setting& setting) {
   Trial& trial = report_.trials.back();
   judge_bars(trial);
   run_.log.print(trial.modes == 0 ? std::string("no mode in the band")
-                                  : fmt::format("error bars up to {:.3g} cents (at {:.1f} Hz); {:g} are asked", trial.worst_cents,
+                                  : fmt::format("error bars up to {:.3g} cents (at {:.1f} Hz); {:g} requested", trial.worst_cents,
                                                 trial.worst_hz, asked_));
 }
 
 Forecast Search::forecast_next() const {
   const Trial& last = report_.trials.back();
-  constexpr double kHalf = 0.5;  // of the edges, where the error bars do not say how much finer
+  constexpr double kHalf = 0.5;  // edge ratio if the error bars predict none
   if (run_.job.body) {
     const double ratio = last.modes == 0 ? kHalf : std::min(find_ratio(0.5 * last.worst_cents, kFinestStep), kMinStep);
     return forecast(make_setting(last.setting.element, ratio), ratio);
@@ -364,14 +363,13 @@ Forecast Search::forecast_next() const {
     return {setting, false, static_cast<double>(quadratic.nodes), 0.0, slower * last.cpu_seconds, calc_bytes(last, quadratic)};
   }
   const bool is_refined = is_refinable_ && setting.refinements < kMaxRefinements;
-  if (is_refined) ++setting.refinements;  // keeps the facets, which forecast() knows
+  if (is_refined) ++setting.refinements;  // keeps the facets, as forecast() assumes
   Forecast next = forecast(setting, kHalf);
   next.needs_new_mesh = !is_refined;
   return next;
 }
 
-AccurateBody Search::solve() {
-  if (run_.progress) run_.progress->begin_trials();
+Solution Search::solve(AccuracyReport& report) {
   const Setting setting = find_first_setting(run_);
   if (!run_.job.body) {
     run_.comm.agree([&] { is_refinable_ = run_.comm.is_root() && !parallel_mesh::is_parallel_format(run_.job.mesh); });
@@ -386,7 +384,7 @@ AccurateBody Search::solve() {
     }
     run_.comm.agree([&] {
       if (run_.comm.is_root()) decision = decide();
-      // The decision depends on CPU seconds, which differ from run to run; a resumed run takes the mesh of the interrupted one.
+      // CPU seconds, and so decisions, differ between runs; a resumed run takes the setting of the interrupted one.
       if (const Setting* kept = run_.checkpoint ? run_.checkpoint->find_setting(report_.trials.size()) : nullptr;
           kept != nullptr && decision.is_done == 0)
         decision.setting = *kept;
@@ -397,12 +395,12 @@ AccurateBody Search::solve() {
     report_.next = forecast_next();
     const Trial& last = report_.trials.back();
     const std::string reached = last.modes == 0 ? std::string("no mode in the band, and none on the coarser meshes")
-                                                : fmt::format("error bars up to {:.3g} cents of {:g} asked", last.worst_cents, asked_);
+                                                : fmt::format("error bars up to {:.3g} cents of {:g} requested", last.worst_cents, asked_);
     run_.log.print(
         fmt::format("chosen: {}, {} nodes: {}, {:.1f} CPU s", run::describe(last.setting), last.nodes, reached, last.cpu_seconds));
     run_.log.print(describe_forecast(report_.next));
   }
-  current_.report = report_;
+  report = std::move(report_);
   return std::move(current_);
 }
 
@@ -428,9 +426,9 @@ Setting find_first_setting(const Run& run) {
 
 namespace {
 
-/// Refuses a count of the mesher's own that this machine surely cannot solve, before the mesh is made.
+/// Rejects a node count suggested by the mesher that this machine cannot solve, before meshing.
 void check_count(const Run& run, const Setting& setting) {
-  constexpr double kSurely = 0.5;  // of a factor that is estimated by a power of the unknowns, to a factor of two
+  constexpr double kSurely = 0.5;  // lower bound of a factor extrapolated to a factor of two
   const cost::ProblemSize size = cost::estimate_meshed_size(setting.nodes.value_or(0), setting.element == job::Element::T10);
   const auto bytes = static_cast<std::int64_t>(kSurely * cost::predict_parts(size).factor);
   eigen::check_memory(run.comm, bytes / run.comm.size(), run.options.get_memory_limit_bytes(),
@@ -439,25 +437,21 @@ void check_count(const Run& run, const Setting& setting) {
 
 }  // namespace
 
-Body make_trial_body(Run& run, Setting& setting, Patience* patience) {
-  const bool is_body = run.job.body.has_value();
+Body make_trial_body(Run& run, Setting& setting) {
   for (int count = 1;; ++count) {
-    const auto start = std::chrono::steady_clock::now();
     try {
-      return make_body(run, setting, is_body ? patience : nullptr);
+      return make_body(run, setting);
     } catch (const CountRefusal& refusal) {
       const std::int64_t nodes = refusal.get_possible_nodes();
       if (nodes == setting.nodes || count == kMaxCounts) throw;
-      const std::chrono::duration<double> gone = std::chrono::steady_clock::now() - start;
-      if (patience != nullptr) patience->seconds = std::max(patience->seconds - gone.count(), 0.0);
       run.log.print(fmt::format("{} nodes cannot be met on this body; {} are tried", setting.nodes.value_or(0), nodes));
       setting.nodes = nodes;
-      if (patience == nullptr) check_count(run, setting);
+      check_count(run, setting);
     }
   }
 }
 
-AccurateBody solve_to_accuracy(Run& run) { return Search(run).solve(); }
+Solution solve_to_accuracy(Run& run, AccuracyReport& report) { return Search(run).solve(report); }
 
 std::string describe(const Setting& setting) {
   std::string text = job::to_text(setting.element);

@@ -5,32 +5,34 @@
 #include <string>
 #include <vector>
 
-#include "precompute/run/solve_body.hpp"
+#include "precompute/job/cost/problem_size.hpp"
+#include "precompute/run/run.hpp"
+#include "precompute/run/stages.hpp"
 #include "runtime/base/json.hpp"
 
 namespace carillon::run {
 
-/// One setting that was solved, and what came of it.
+/// A solved setting and its results.
 struct Trial {
   Setting setting;
   std::int64_t nodes = 0;
   std::int64_t tets = 0;
   cost::ProblemSize size;
-  double edge_m = 0.0;  // mean length of the edges of all elements
+  double edge_m = 0.0;  // mean length of all element edges
   std::size_t modes = 0;
-  double worst_cents = 0.0;      // largest error bar, algebraic and discretisation together
-  double worst_hz = 0.0;         // of the mode that has it
-  double algebraic_cents = 0.0;  // largest of that part
-  double facet_cents = 0.0;      // largest addition by facets in doubt; not part of a bar
+  double worst_cents = 0.0;      // largest error bar, algebraic plus discretisation
+  double worst_hz = 0.0;         // its mode
+  double algebraic_cents = 0.0;  // largest algebraic part
+  double facet_cents = 0.0;      // largest addition by ambiguous facets; not part of a bar
   double cpu_seconds = 0.0;      // all ranks
   std::int64_t peak_bytes = 0;   // all ranks, the process so far
-  error_bars::Level level;       // its modes and what the estimate says of them
+  error_bars::Level level;       // its modes and error estimates
 };
 
 /// The next stricter setting and its predicted cost.
 struct Forecast {
   Setting setting;
-  bool needs_new_mesh = false;  // edges half as long, in another mesh file: the run cannot refine this one (further)
+  bool needs_new_mesh = false;  // another mesh file with half the edge length: the run cannot refine this one further
   double nodes = 0.0;
   double worst_cents = 0.0;  // 0: unknown
   double cpu_seconds = 0.0;
@@ -43,29 +45,22 @@ struct AccuracyReport {
   Forecast next;
 };
 
-struct AccurateBody {
-  Setting setting;
-  Body body;
-  SolvedBody solved;
-  AccuracyReport report;
-};
+/// Solves the job's body in the cheapest setting whose largest error bar is at most accuracy_cents. A coarse trial predicts the mesh size
+/// for T4 and T10 from its error bars and their convergence rates; then that one is solved, then finer ones until the target is met. Bodies
+/// are meshed as needed; a mesh file is used with either element and refined uniformly, which keeps its facets. The additional error of
+/// ambiguous facets is recorded separately. Logs every trial and the cost of the next stricter setting. Collective. Throws on every rank
+/// the errors of the solve, and SolveError if no setting meets the target, with the accuracy reached, the reason, and the cost of the next
+/// stricter setting.
+Solution solve_to_accuracy(Run& run, AccuracyReport& report);
 
-/// Solves the job's body in the cheapest setting whose largest error bar is no more than the job's accuracy_cents: a coarse one first,
-/// whose error bars and their rates of convergence predict the mesh size, with tetrahedra of four and of ten nodes; then that
-/// one; then finer ones while they do not meet it. Bodies are meshed as fine as is needed; a mesh file is taken with either element and
-/// refined uniformly, which cannot correct the facets it was made with. The additional error by facets in doubt is recorded, not part of a
-/// bar. Logs every trial, and at the end the cost of the next stricter setting. Collective. Throws on every rank the errors of the solve,
-/// and SolveError if no setting within reach meets it, with the accuracy reached, the reason, and the cost of the next stricter setting.
-AccurateBody solve_to_accuracy(Run& run);
-
-/// What solve_to_accuracy() tries first.
+/// First trial of solve_to_accuracy().
 Setting find_first_setting(const Run& run);
 
-/// make_body() for a trial: where the mesher cannot meet the count of nodes, which thin walls do not let be small, with the count that it
-/// names in its place; `setting` has that count then. Collective. Throws as make_body().
-Body make_trial_body(Run& run, Setting& setting, Patience* patience = nullptr);
+/// make_body() for a trial. If the mesher cannot meet the node count (thin walls), uses the count that it suggests and stores it in
+/// `setting`. Collective. Throws as make_body().
+Body make_trial_body(Run& run, Setting& setting);
 
-/// The setting in words: "T10, meshed with edges of 0.0021 m, tolerance 1e-07".
+/// "T10, meshed with edges of 0.0021 m, tolerance 1e-07".
 std::string describe(const Setting& setting);
 
 base::Json describe_accuracy(const AccuracyReport& report);

@@ -13,19 +13,19 @@
 #include "precompute/eigen/checkpoint.hpp"
 #include "precompute/run/interrupt.hpp"
 #include "precompute/run/meshing.hpp"
+#include "runtime/acoustics/radiation/gains.hpp"
 #include "runtime/bank/air.hpp"
 #include "runtime/base/file.hpp"
-#include "runtime/acoustics/radiation/gains.hpp"
 
 namespace carillon::run {
 namespace {
 
-/// From this ratio of the decay by radiation to that by the material on, "auto" takes boundary elements: without them the mode would ring
-/// 1.3 times as long. Measured by tests/bench/air (docs/reports/radiation.md).
+/// "auto" uses boundary elements above this ratio of radiation to material damping: without them the mode would ring 1.3 times as long.
+/// Measured by tests/bench/air (docs/reports/radiation.md).
 constexpr double kLostToAir = 0.3;
 
-/// The largest ratio of the decay by radiation to that by the material, of all modes, by the gains of a sphere of the same surface: within
-/// a factor of two of the true one for compact bodies.
+/// Largest ratio of radiation to material damping of all modes, from the gains of a sphere of the same surface: within a factor of two for
+/// compact bodies.
 double calc_loss_ratio(const bank::Bank& bank) {
   const std::vector<double>& decay_per_s = bank.corrected.is_empty() ? bank.decay_per_s : bank.corrected.decay_per_s;
   const std::vector<double> gains = radiation::calc_gains(bank, radiation::GainKind::kSphere);
@@ -37,20 +37,20 @@ double calc_loss_ratio(const bank::Bank& bank) {
   return ratio;
 }
 
-/// Whether boundary elements are called for, and why; of rank 0.
+/// Decision on boundary elements, with the reason; rank 0.
 AirReport choose(const Run& run, const bank::Bank& bank) {
   if (run.job.air.method == job::AirMethod::bem) return {true, "the job asks for it", {}};
   const double roundness = air::calc_roundness(bank);
-  const std::string measure = fmt::format("its surface is that of a body of roundness {:.2f}", roundness);
-  if (bank.mode_count() == 0) return {false, "there is no mode", {}};
+  const std::string measure = fmt::format("the surface has a roundness of {:.2f}", roundness);
+  if (bank.mode_count() == 0) return {false, "no modes", {}};
   if (roundness < air::kCompact)
-    return {true, fmt::format("{}, below {:g}: flat, thin or open bodies do not radiate as a sphere does", measure, air::kCompact), {}};
+    return {true, fmt::format("{}, below {:g}: flat, thin or open bodies do not radiate like a sphere", measure, air::kCompact), {}};
   const double ratio = calc_loss_ratio(bank);
-  const std::string loss =
-      fmt::format("by the gains of a sphere the air takes up to {:.2g} times what the material takes from a mode", ratio);
+  const std::string loss = fmt::format("by the gains of a sphere, radiation damping is up to {:.2g} times material damping", ratio);
   if (ratio > kLostToAir)
-    return {true, fmt::format("{}, but {}, above {:g}: without it modes ring too long", measure, loss, kLostToAir), {}};
-  return {false, fmt::format("{}, and from {:g} on the gains of a sphere do; {}", measure, air::kCompact, loss), {}};
+    return {
+        true, fmt::format("{}, but {}, above {:g}: without boundary elements modes would ring too long", measure, loss, kLostToAir), {}};
+  return {false, fmt::format("{}, and the gains of a sphere suffice above {:g}; {}", measure, air::kCompact, loss), {}};
 }
 
 air::AirOptions make_air_options(const job::Air& air) {
@@ -125,7 +125,7 @@ AirReport add_air(Run& run, bank::Bank& bank) {
   std::filesystem::path answers;
   if (!run.options.checkpoint.empty()) {
     answers = run.options.checkpoint;
-    if (run.checkpoint) answers += ".air";  // that of the modes has the name
+    if (run.checkpoint) answers += ".air";  // the modes' checkpoint has the plain name
     keeper.is_stop_asked = is_stop_asked;
     set_news(true);
   }

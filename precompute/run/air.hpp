@@ -1,24 +1,15 @@
-// The stage from a bank to its sound in the air.
+// Stage "air": sound of the modes in the air.
 #pragma once
 
-#include <string>
-
 #include "precompute/run/run.hpp"
-#include "precompute/run/run_job.hpp"
+#include "precompute/run/stages.hpp"
 #include "runtime/bank/bank.hpp"
 
 namespace carillon::run {
 
-/// What the stage did and why, in words; empty where the job asks for nothing.
-struct AirReport {
-  bool is_solved = false;
-  std::string why;
-  std::string result;  // "boundary elements ..., error -41 dB"
-};
-
-/// Adds the multipoles of all modes to the bank, which rank 0 alone has, as the job's "radiation" says. Wave numbers that are solved are
-/// kept next to the checkpoint, if there is one, until all are solved. Phase "air". Collective. Throws on every rank: InputError,
-/// SolveError, SystemError; eigen::Stopped when a signal asked for a checkpoint.
+/// Adds the multipoles of all modes to the bank (rank 0 only), as the job's "radiation" says. With a checkpoint, solved wave numbers are
+/// kept in a file next to it. Phase "air". Collective. Throws on every rank: InputError, SolveError, SystemError; eigen::Stopped when a
+/// signal requested a checkpoint.
 AirReport add_air(Run& run, bank::Bank& bank);
 
 /// Reads the bank options.radiate, adds the multipoles of all modes by boundary elements, and writes it to options.bank, which may be the

@@ -24,7 +24,7 @@ bank::Damping make_damping(const fem::Materials& materials) {
   return damping;
 }
 
-/// One material as it is, several or an orthotropic one as their isotropic equivalent. The density is that of the whole.
+/// A single material unchanged; several as their isotropic equivalent, with the mean density.
 bank::Material make_material(const SolvedBody& solved) {
   const auto& list = solved.properties.materials.list;
   bank::Material material;
@@ -47,7 +47,7 @@ std::string make_regions(const SolvedBody& solved) {
   return is_plain ? std::string() : describe_materials(materials, solved.properties.volume_m3).sorted_text();
 }
 
-/// Names are those of the job, or what the nodes are; of several patches of one entry each has a number.
+/// Names from the job, the node set or the box; several patches of one entry are numbered.
 bank::Supports make_supports(const job::JobSpec& job, const fem::Supports& found) {
   bank::Supports supports;
   base::Json supports_json = base::Json::object();
@@ -109,8 +109,9 @@ bank::Proof make_proof(const eigen::Modes& modes) {
 
 }  // namespace
 
-bank::Bank make_bank(const job::JobSpec& job, const Setting& setting, Body& body, const SolvedBody& solved,
-                     io::SurfaceModes& surface_modes) {
+bank::Bank make_bank(const job::JobSpec& job, Solution& found, io::SurfaceModes& surface_modes) {
+  Body& body = found.body;
+  const SolvedBody& solved = found.solved;
   const eigen::Modes& modes = solved.modes;
   bank::Bank bank;
   bank.vertices_m = std::move(body.surface.vertices_m);
@@ -135,7 +136,7 @@ bank::Bank make_bank(const job::JobSpec& job, const Setting& setting, Body& body
   bank.counts = {body.pieces.nodes, body.pieces.tets, body.pieces.components, modes.rigid_count};
   bank.band_hz = {find_low_hz(job, modes), job.band_hz[1]};
   bank.complete = modes.band_count == static_cast<std::int64_t>(modes.lambda.size());
-  bank.element = job::to_text(setting.element);
+  bank.element = job::to_text(found.setting.element);
   bank.mass = job::to_text(job.mass);
   if (job.max_modes) bank::keep_lowest(bank, static_cast<std::size_t>(*job.max_modes));
   return bank;

@@ -3,14 +3,11 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <filesystem>
-#include <system_error>
 #include <utility>
 #include <vector>
 
 #include "precompute/eigen/predict_cost.hpp"
 #include "precompute/fem/error_bars/correct.hpp"
-#include "precompute/job/cost/calibration.hpp"
 #include "precompute/mesh/distributed/distribute.hpp"
 #include "precompute/mesh/parallel/read_parallel.hpp"
 #include "precompute/mesh/read.hpp"
@@ -23,15 +20,15 @@
 namespace carillon::run {
 namespace {
 
-constexpr const char* kByMetis = "elements go to ranks by METIS, k-way on the dual graph";
-constexpr const char* kByOrder = "elements go to ranks by the separator tree of the nodes";
+constexpr const char* kByMetis = "elements are distributed by METIS, k-way on the dual graph";
+constexpr const char* kByOrder = "elements are distributed by the separator tree of the nodes";
 
-/// A fixed node, and the first entry of the job's "fixed" that names it.
+/// A fixed node and the first entry of the job's "fixed" that contains it.
 struct FixedNode {
   std::int32_t node, entry;
 };
 
-/// The nodes of all sets and boxes that the job fixes, each once, ascending.
+/// Unique nodes of all fixed sets and boxes, ascending.
 std::vector<FixedNode> find_fixed_nodes(const mesh::TetMesh& mesh, const job::JobSpec& job) {
   std::vector<FixedNode> list;
   for (std::size_t entry = 0; entry < job.fixed.size(); ++entry) {
@@ -50,7 +47,7 @@ std::vector<FixedNode> find_fixed_nodes(const mesh::TetMesh& mesh, const job::Jo
   return list;
 }
 
-/// Sets on every rank which entry of the job fixes its nodes. `list` is read on rank 0. Collective.
+/// Sets local.fixed_by on every rank. `list` is read on rank 0. Collective.
 void broadcast_fixed_nodes(const comm::Communicator& comm, std::vector<FixedNode> list, mesh::LocalMesh& local) {
   list = comm.broadcast(std::move(list));
   if (list.empty()) return;
@@ -62,32 +59,31 @@ void broadcast_fixed_nodes(const comm::Communicator& comm, std::vector<FixedNode
   }
 }
 
-/// What the check of the mesh found; of an odd size, with the key of the job that corrects it. Rank 0.
+/// Warnings of the mesh check; for an implausible size, with the job's key that corrects it. Rank 0.
 void warn_of_mesh(Run& run, const Body& body) {
   const std::vector<std::string>& warnings = body.check.warnings;
   for (std::size_t i = 0; i < warnings.size(); ++i)
     run.log.warn(i == 0 && body.check.has_odd_size ? warnings[i] + "; " + describe_scale_key(run.job) : warnings[i]);
 }
 
-/// Warns once, for any number of meshes of the surface.
+/// Once per run, even if the surface is meshed repeatedly.
 void warn_of_facets(Run& run) {
   run.log.warn_once(fmt::format(
-      "some facets of the surface are so coarse that they may be planes of the body or samples of a smooth surface; what that changes is "
-      "stated next to the error bars (facets in doubt); a surface in finer facets settles it, or {} if they are planes",
+      "some facets of the surface are so coarse that they may be planes of the body or samples of a smooth surface; the difference is "
+      "stated next to the error bars (facets in doubt); a finer surface resolves it, or {} if they are planes",
       run.job.body ? "\"facets\": true inside \"body\"" : "carillon-mesh --facets"));
 }
 
-/// Rank 0 only: the mesh of the element's order, checked, and what stays of it on this rank.
-mesh::TetMesh read_checked_mesh(Run& run, const Setting& setting, Body& body, Patience* patience) {
+/// Rank 0 only: the checked mesh of the element's order; sets the parts of `body` kept on rank 0.
+mesh::TetMesh read_checked_mesh(Run& run, const Setting& setting, Body& body) {
   const bool quadratic = setting.element == job::Element::T10;
   const job::JobSpec& job = run.job;
   MesherWords words;
   mesh::TetMesh mesh =
-      job.body ? make_body_mesh(*job.body, quadratic ? 2 : 1, {setting.nodes, setting.edge_m}, words, patience) : mesh::read_mesh(job.mesh);
+      job.body ? make_body_mesh(*job.body, quadratic ? 2 : 1, {setting.nodes, setting.edge_m}, words) : mesh::read_mesh(job.mesh);
   body.mesher_warnings = std::move(words.warnings);
   for (const std::string& warning : body.mesher_warnings) run.log.warn_once(warning);
   for (const std::string& remark : words.remarks) run.log.print(remark);
-  if (patience != nullptr && patience->estimate) return {};
   if (job.mesh_scale != 1.0) {
     for (std::vector<Vec3>* lengths : {&mesh.nodes_m, &mesh.doubt_m}) {
       for (Vec3& length : *lengths) {
@@ -99,7 +95,7 @@ mesh::TetMesh read_checked_mesh(Run& run, const Setting& setting, Body& body, Pa
   body.region_names = mesh.region_names;
   warn_of_mesh(run, body);
   if (job.body && job.body->shape.empty() && body.check.components > 1)
-    run.log.warn_once(fmt::format("the surface has {} parts that are not connected: each vibrates by itself", body.check.components));
+    run.log.warn_once(fmt::format("the surface has {} disconnected parts, which vibrate independently", body.check.components));
   if (!mesh.doubt_m.empty()) warn_of_facets(run);
   for (int i = 0; i < setting.refinements; ++i) mesh = refine_mesh(mesh);
   if (quadratic && mesh.order == 1) mesh = mesh::to_quadratic(mesh);
@@ -108,7 +104,7 @@ mesh::TetMesh read_checked_mesh(Run& run, const Setting& setting, Body& body, Pa
   body.surface.vertices_m.reserve(boundary.nodes.size());
   for (const std::int32_t node : boundary.nodes) body.surface.vertices_m.push_back(mesh.nodes_m[node]);
   body.surface.triangles = std::move(boundary.triangles);
-  body.surface.row = std::move(boundary.nodes);  // nodes here; make_body() turns them into rows
+  body.surface.row = std::move(boundary.nodes);  // nodes; make_body() converts them to rows
   return mesh;
 }
 
@@ -117,14 +113,14 @@ void log_size(const Run& run, std::int64_t nodes, std::int64_t tets, int compone
                             fixed_nodes));
 }
 
-/// MUMPS uses the elimination order of the whole graph, which costs rank 0 time and memory; our factorisation orders by itself, and MUMPS
-/// does so with more fill as its fallback.
+/// MUMPS needs the elimination order of the whole graph, which costs rank 0 time and memory; our factorisation orders by itself, and MUMPS
+/// as its fallback does so with more fill.
 bool wants_elimination_order(const job::JobSpec& job) { return job.factorisation == job::Factorisation::mumps; }
 
-/// A factorisation of this project solves the job, so the mesh is best cut where it will have its separators.
+/// For our factorisation the mesh is best cut at its separators.
 bool wants_cut_by_order(const job::JobSpec& job) { return !wants_elimination_order(job) && job.method != job::Method::dense; }
 
-/// Every rank reads its part of the file.
+/// Each rank reads its part of the file.
 Body read_in_parallel(Run& run, const Setting& setting) {
   Body body;
   body.source = run.job.mesh.string();
@@ -154,8 +150,9 @@ bool is_parallel_format(const Run& run) {
   return run.comm.broadcast([&] { return !run.job.body && parallel_mesh::is_parallel_format(run.job.mesh); });
 }
 
-Body make_pieces(Run& run, const Setting& setting, Patience* patience) {
-  if (run.progress) run.progress->set_size(estimate_size(run.job, setting));
+}  // namespace
+
+Body make_body(Run& run, const Setting& setting) {
   if (is_parallel_format(run)) return read_in_parallel(run, setting);
   Body body;
   body.source = run.job.body ? describe(*run.job.body, {setting.nodes, setting.edge_m}) : run.job.mesh.string();
@@ -165,19 +162,13 @@ Body make_pieces(Run& run, const Setting& setting, Patience* patience) {
   std::vector<std::int32_t> fixed_nodes;
   comm::Communicator(run.comm).agree([&] {
     if (!run.comm.is_root()) return;
-    mesh = read_checked_mesh(run, setting, body, patience);
-    if (patience != nullptr && patience->estimate) return;
+    mesh = read_checked_mesh(run, setting, body);
     fixed = find_fixed_nodes(mesh, run.job);
     for (const FixedNode& one : fixed) fixed_nodes.push_back(one.node);
     body.fixed_nodes = static_cast<std::int64_t>(fixed_nodes.size());
     log_size(run, static_cast<std::int64_t>(mesh.nodes_m.size()), mesh.tet_count(), body.check.components, body.fixed_nodes);
   });
   run.log.end();
-  if (patience != nullptr && patience->estimate) {
-    body.estimate = patience->estimate;
-    return body;
-  }
-
   run.log.begin("partition", "the mesh over the ranks");
   name_errors(body.source, run, [&] {
     if (wants_cut_by_order(run.job)) {
@@ -198,18 +189,17 @@ Body make_pieces(Run& run, const Setting& setting, Patience* patience) {
   return body;
 }
 
-}  // namespace
-
 std::string describe_scale_key(const job::JobSpec& job) {
   if (!job.body)
-    return job.mesh_scale == 1.0 ? "\"mesh_scale\": 0.001 in the job takes the mesh file's numbers for millimetres"
-                                 : fmt::format("\"mesh_scale\" of the job, metres per unit of the mesh file, is {:g}: {:g} for that",
-                                               job.mesh_scale, 0.001 * job.mesh_scale);
+    return job.mesh_scale == 1.0
+               ? "\"mesh_scale\": 0.001 in the job reads the mesh file in millimetres"
+               : fmt::format("\"mesh_scale\" of the job, metres per unit of the mesh file, is {:g}: for millimetres give {:g}",
+                             job.mesh_scale, 0.001 * job.mesh_scale);
   if (!job.body->shape.empty()) return "the dimensions of a shape are metres";
   if (job.body->height_m) return fmt::format("\"height_m\" inside \"body\" is {:g}, in metres", *job.body->height_m);
   const double scale = job.body->scale.value_or(1.0);
-  if (scale == 1.0) return "\"scale\": 0.001 inside \"body\" takes the surface's numbers for millimetres, and \"height_m\" gives it a size";
-  return fmt::format("\"scale\" inside \"body\", metres per unit of the surface, is {:g}: {:g} for that", scale, 0.001 * scale);
+  if (scale == 1.0) return "\"scale\": 0.001 inside \"body\" reads the surface in millimetres, and \"height_m\" sets its size";
+  return fmt::format("\"scale\" inside \"body\", metres per unit of the surface, is {:g}: for millimetres give {:g}", scale, 0.001 * scale);
 }
 
 std::optional<std::int64_t> find_computed_count(const job::JobSpec& job) {
@@ -219,14 +209,14 @@ std::optional<std::int64_t> find_computed_count(const job::JobSpec& job) {
 
 namespace {
 
-/// Of a job that asks for the air; "auto" may leave it out.
+/// Upper bound: "auto" may skip the air.
 std::int64_t find_air_nodes(const job::JobSpec& job, std::int64_t surface_nodes) {
   if (job.air.method == job::AirMethod::none) return 0;
   const std::int64_t nodes = std::min<std::int64_t>(job.air.skin_nodes, surface_nodes > 0 ? surface_nodes : job.air.skin_nodes);
   return job.air.half_space ? 2 * nodes : nodes;
 }
 
-/// What the job asks for, of a mesh whose size is known as far as it is.
+/// Sets what the job requests: modes, air, coupled modes.
 void set_demand(const job::JobSpec& job, const Setting& setting, cost::ProblemSize& size) {
   size.modes = find_computed_count(job);
   size.counts_low_end = !eigen::can_assume_low_end(make_options(job, setting));
@@ -235,21 +225,6 @@ void set_demand(const job::JobSpec& job, const Setting& setting, cost::ProblemSi
 }
 
 }  // namespace
-
-cost::ProblemSize estimate_size(const job::JobSpec& job, const Setting& setting) {
-  const bool is_quadratic = setting.element == job::Element::T10;
-  cost::ProblemSize size;
-  if (job.body) {
-    size = cost::estimate_meshed_size(setting.nodes.value_or(cost::kDefaultNodes), is_quadratic);
-    if (job.body->shape.empty()) size.read_seconds = cost::kSurfaceMeshSeconds;
-  } else {
-    std::error_code error;
-    const auto bytes = static_cast<std::int64_t>(std::filesystem::file_size(job.mesh, error));
-    size = cost::estimate_file_size(error ? 0 : bytes, is_quadratic, setting.refinements);
-  }
-  set_demand(job, setting, size);
-  return size;
-}
 
 cost::ProblemSize find_problem_size(const Run& run, const Setting& setting, const Body& body) {
   cost::ProblemSize size;
@@ -262,12 +237,6 @@ cost::ProblemSize find_problem_size(const Run& run, const Setting& setting, cons
   for (const RunPhase& phase : run.log.get_phases())
     if (phase.name == "read") size.read_seconds = phase.seconds;
   return size;
-}
-
-Body make_body(Run& run, const Setting& setting, Patience* patience) {
-  Body body = make_pieces(run, setting, patience);
-  if (run.progress) run.progress->set_size(find_problem_size(run, setting, body));
-  return body;
 }
 
 }  // namespace carillon::run

@@ -19,7 +19,7 @@ namespace {
 
 static_assert(job::kMaxCoupledModes == coupling::kMaxModes && static_cast<std::size_t>(coupling::kMaxModes) <= bank::kMaxCoupledModes);
 
-/// The modes that the bank will have, ascending: bank::keep_lowest() leaves those of the lowest corrected frequencies.
+/// Mode numbers of the bank, ascending, as bank::keep_lowest() selects them: the lowest corrected frequencies.
 std::vector<std::int32_t> find_kept_modes(const Run& run, const SolvedBody& solved) {
   std::vector<double> freq_hz;
   for (const double lambda : solved.errors.bars.corrected.lambda) freq_hz.push_back(std::sqrt(lambda) / (2 * std::numbers::pi));
@@ -31,7 +31,7 @@ std::vector<std::int32_t> find_kept_modes(const Run& run, const SolvedBody& solv
   return kept;
 }
 
-coupling::CondenseOptions make_condense_options(Run& run, const AccurateBody& found, std::vector<std::int32_t> kept) {
+coupling::CondenseOptions make_condense_options(Run& run, const Solution& found, std::vector<std::int32_t> kept) {
   coupling::CondenseOptions options;
   options.is_stretch = run.job.nonlinear->is_stretch;
   options.modes = std::min(run.job.nonlinear->modes, static_cast<int>(kept.size()));
@@ -59,29 +59,28 @@ std::string describe_condensed(const coupling::Condensed& result) {
 void warn(Run& run, const coupling::Condensed& result) {
   const job::Nonlinear& asked = *run.job.nonlinear;
   if (result.energy.is_empty()) {
-    run.log.warn(
-        fmt::format("no mode below {:g} Hz bends or twists something slender: the bank stays linear, and \"nonlinear\" can be removed",
-                    asked.below_hz));
+    run.log.warn(fmt::format(
+        "no mode below {:g} Hz bends or twists a slender part: the bank stays linear, and \"nonlinear\" can be removed", asked.below_hz));
     return;
   }
   if (static_cast<int>(result.energy.mode_count()) < asked.modes && !result.splits_pair)
     run.log.print(fmt::format("{} modes bend or twist below {:g} Hz, fewer than the {} that \"nonlinear\" asks for",
                               result.energy.mode_count(), asked.below_hz, asked.modes));
-  if (result.splits_pair) run.log.print("one mode fewer is coupled than asked for: the next two have one frequency, and go together");
+  if (result.splits_pair) run.log.print("one mode fewer is coupled than requested: the next two are degenerate and stay together");
   if (result.energy.membrane_ratio > bank::kMaxMembraneRatio) {
     const std::string cause =
         result.membrane_hz > 0
             ? fmt::format("stretching begins at {:.0f} Hz, and the highest coupled mode has {:.0f} Hz", result.membrane_hz, result.top_hz)
             : fmt::format("no mode of the band stretches the body, and the highest coupled mode has {:.0f} Hz", result.top_hz);
     run.log.warn(
-        fmt::format("{}: above half of it the inertia of stretching, which is left out, is heard; {}", cause,
+        fmt::format("{}: above half of it the neglected inertia of stretching is audible; {}", cause,
                     result.membrane_hz > 0 ? "lower \"nonlinear.below_hz\"" : "a wider \"band_hz\" or more \"max_modes\" would show it"));
   }
 }
 
 }  // namespace
 
-CouplingReport couple_modes(Run& run, const AccurateBody& found) {
+CouplingReport couple_modes(Run& run, const Solution& found) {
   CouplingReport report;
   if (!run.job.nonlinear) return report;
   run.log.begin("coupling", fmt::format("quartic energy of {} modes below {:g} Hz", run.job.nonlinear->modes, run.job.nonlinear->below_hz));
@@ -89,7 +88,7 @@ CouplingReport couple_modes(Run& run, const AccurateBody& found) {
   const std::vector<std::int32_t> kept = find_kept_modes(run, solved);
   const coupling::CondenseOptions options = make_condense_options(run, found, kept);
   coupling::Condensed result = name_errors(found.body.source, run, [&] {
-    if (solved.modes.lambda.empty()) throw InputError("\"nonlinear\" couples modes, and none lies in the band: widen \"band_hz\"");
+    if (solved.modes.lambda.empty()) throw InputError("\"nonlinear\" couples modes, and there are none in the band: widen \"band_hz\"");
     const fem::Materials& materials = solved.properties.materials;
     const fem::System system = fem::assemble(run.comm, found.body.pieces.local, materials, run.job.mass);
     return coupling::condense_modes(run.comm,

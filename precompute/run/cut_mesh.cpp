@@ -5,26 +5,26 @@
 #include <span>
 #include <utility>
 
-#include "precompute/mesh/distributed/level_elements.hpp"
 #include "precompute/comm/exchange.hpp"
 #include "precompute/comm/index_partition.hpp"
 #include "precompute/ldlt/mesh_order.hpp"
+#include "precompute/mesh/distributed/level_elements.hpp"
 
 namespace carillon::run {
 namespace {
 
 using Ints = std::vector<std::int32_t>;
 
-constexpr std::int64_t kNodesOfARank = 300;  // fewer: what travels in a solve is less than what the second cut costs
+constexpr std::int64_t kNodesOfARank = 300;  // minimum: below it the second cut costs more than it saves
 
 bool is_worth_it(const comm::Communicator& comm, std::int64_t nodes) { return comm.size() > 1 && nodes >= kNodesOfARank * comm.size(); }
 
 struct OrderedPieces {
-  std::shared_ptr<ldlt::MeshOrder> order;  // by the numbers that nodes have before the cut
-  Ints ranks;                              // of each of this rank's elements in the cut
+  std::shared_ptr<ldlt::MeshOrder> order;  // by the node numbers before the cut
+  Ints ranks;                              // of each of this rank's elements after the cut
 };
 
-/// tets: nodes of this rank's elements; numbers: of these nodes, -1: fixed; own_nodes: how many this rank answers for. Collective.
+/// tets: nodes of this rank's elements; numbers: of these nodes, -1: fixed; own_nodes: number owned by this rank. Collective.
 OrderedPieces order_pieces(const comm::Communicator& comm, const Ints& tets, int width, const Ints& numbers, std::int64_t own_nodes) {
   const Ints elements = comm.agree([&] {
     Ints list;
@@ -36,7 +36,7 @@ OrderedPieces order_pieces(const comm::Communicator& comm, const Ints& tets, int
   pieces.order = std::make_shared<ldlt::MeshOrder>(comm, elements, width, comm::IndexPartition(comm, own_nodes));
   ldlt::ElementRanks ranks = pieces.order->find_ranks(comm, elements, width);
   for (std::size_t e = 0; e < ranks.rank.size(); ++e)
-    if (ranks.rank[e] < 0) {  // all nodes are fixed: it may go anywhere, and alone
+    if (ranks.rank[e] < 0) {  // all nodes are fixed: any rank will do
       ranks.rank[e] = 0;
       ranks.position[e] = -1 - static_cast<std::int32_t>(e);
     }
@@ -49,7 +49,7 @@ OrderedPieces order_pieces(const comm::Communicator& comm, const mesh::LocalMesh
   return order_pieces(comm, first.tets, first.nodes_per_tet(), first.row, first.free_nodes);
 }
 
-/// Rank 0: the rank of each element of the mesh. Collective.
+/// Rank 0: target rank of each element of the mesh. Collective.
 Ints gather_ranks(const comm::Communicator& comm, const mesh::DistributedMesh& first, const Ints& ranks) {
   return comm::report_to_owners<std::int32_t>(
       comm,
@@ -61,7 +61,7 @@ Ints gather_ranks(const comm::Communicator& comm, const mesh::DistributedMesh& f
       comm::IndexPartition(comm, comm.is_root() ? first.tets : 0));
 }
 
-/// A mesh that rank 0 orders as it is. free_nodes: on rank 0. Collective.
+/// Rank 0 orders the undistributed mesh. free_nodes: on rank 0. Collective.
 CutMesh cut_once(const comm::Communicator& comm, const mesh::TetMesh& mesh, const Ints& fixed_nodes, const Ints& free_nodes) {
   const Ints numbers = comm.agree([&] {
     Ints list(comm.is_root() ? mesh.nodes_m.size() : 0, -1);
@@ -84,7 +84,7 @@ CutMesh cut_once(const comm::Communicator& comm, const mesh::TetMesh& mesh, cons
   return cut;
 }
 
-/// A mesh that no rank can order alone: METIS cuts it first. Collective.
+/// For meshes too large for one rank: METIS distributes them first. Collective.
 CutMesh cut_twice(const comm::Communicator& comm, const mesh::TetMesh& mesh, const Ints& fixed_nodes) {
   CutMesh cut;
   cut.pieces = mesh::distribute(comm, mesh, fixed_nodes);
@@ -104,8 +104,7 @@ CutMesh cut_twice(const comm::Communicator& comm, const mesh::TetMesh& mesh, con
 }  // namespace
 
 CutMesh cut_by_order(const comm::Communicator& comm, const mesh::TetMesh& mesh, const Ints& fixed_nodes, std::int32_t largest_ordered) {
-  const Ints free_nodes =
-      comm.agree([&] { return comm.is_root() && comm.size() > 1 ? mesh::list_free_nodes(mesh, fixed_nodes) : Ints(); });
+  const Ints free_nodes = comm.agree([&] { return comm.is_root() && comm.size() > 1 ? mesh::list_free_nodes(mesh, fixed_nodes) : Ints(); });
   const auto count = comm.broadcast(static_cast<std::int64_t>(free_nodes.size()));
   if (!is_worth_it(comm, count)) {
     CutMesh cut;

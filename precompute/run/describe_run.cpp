@@ -66,7 +66,7 @@ base::Json describe_solver(const eigen::Modes& modes) {
   solver["rigid_modes"] = modes.rigid_count;
   solver["mechanisms"] = modes.mechanism_count;
   solver["orthonormality_error"] = modes.orthonormality_error;
-  solver["above_tolerance"] = modes.above_tolerance_count;  // rounding allows no better, see eigen::Modes::residual
+  solver["above_tolerance"] = modes.above_tolerance_count;  // limited by rounding, see eigen::Modes::residual
   solver["proof"] = modes.proof.method;
   solver["seconds"]["rigid"] = modes.seconds.rigid;
   solver["seconds"]["analyse"] = modes.seconds.analyse;
@@ -77,8 +77,8 @@ base::Json describe_solver(const eigen::Modes& modes) {
   return solver;
 }
 
-/// Wall clock of the slowest rank by what was done: read, partition, assemble, factor, solve, orthogonalise, errors, write; and what went
-/// before the last body was read (trials of other settings).
+/// Wall clock of the slowest rank by phase: read, partition, assemble, factor, solve, orthogonalise, errors, write; "trials": everything
+/// before the last body was read.
 base::Json describe_phases(const Run& run, const eigen::Modes& modes) {
   base::Json sums = base::Json::object();
   const auto add = [&](const std::string& name, double seconds) { sums[name] = sums[name].as_double() + seconds; };
@@ -100,8 +100,8 @@ base::Json describe_phases(const Run& run, const eigen::Modes& modes) {
   return sums;
 }
 
-/// What all ranks together did so far; unlike seconds it does not depend on the machine's load. Messages are there in a profiled run.
-/// Phases are those of describe_phases(), trials of other settings among them, and "other" is what lies between.
+/// Operation counts of all ranks, independent of the machine's load; messages in profiled runs only. Phases as in describe_phases(),
+/// including trials; "other": between phases.
 base::Json describe_work(const petsc::WorkTable& table) {
   base::Json phases = base::Json::object();
   for (std::size_t i = 0; i < table.size(); ++i) {
@@ -117,7 +117,7 @@ base::Json describe_work(const petsc::WorkTable& table) {
   return phases;
 }
 
-/// What it took them, in seconds of all ranks together.
+/// Seconds of all ranks together.
 base::Json describe_effort(const petsc::WorkTable& table) {
   base::Json phases = base::Json::object();
   for (std::size_t i = 0; i < table.size(); ++i) {
@@ -204,18 +204,19 @@ base::Json describe_program(const Run& run) {
   return root;
 }
 
-base::Json describe_run(const Run& run, const Setting& setting, const Body& body, const SolvedBody& solved, const Measured& measured) {
+base::Json describe_run(const Run& run, const Solution& found, const Measured& measured) {
+  const SolvedBody& solved = found.solved;
   base::Json root = describe_program(run);
   root["phase_seconds"] = describe_phases(run, solved.modes);
   root["work"] = describe_work(measured.work);
   root["effort"] = describe_effort(measured.work);
   for (const std::int64_t bytes : measured.peak_bytes) root["peak_bytes_by_rank"].append(bytes);
   root["solver_options"] = make_list(run.options.solver_options);
-  root["chosen"]["element"] = job::to_text(setting.element);
-  root["chosen"]["tolerance"] = setting.tolerance;
-  root["mesh"] = describe_mesh(body, setting);
+  root["chosen"]["element"] = job::to_text(found.setting.element);
+  root["chosen"]["tolerance"] = found.setting.tolerance;
+  root["mesh"] = describe_mesh(found.body, found.setting);
   root["materials"] = describe_materials(solved.properties.materials, solved.properties.volume_m3);
-  root["partition"] = describe_partition(body.pieces.report);
+  root["partition"] = describe_partition(found.body.pieces.report);
   root["solver"] = describe_solver(solved.modes);
   root["warnings"] = describe_warnings(run);
   return root;

@@ -1,6 +1,5 @@
-// Method:     openat() name by name with O_NOFOLLOW, then fchdir(): a folder that is replaced by a link meanwhile is not entered.
-// Source:     POSIX.1-2008.
-// Deviations: none.
+// Method: openat() component by component with O_NOFOLLOW, then fchdir(): a folder replaced by a link meanwhile is not entered.
+// Source: POSIX.1-2008.
 #include "precompute/run/enter_folder.hpp"
 
 #include <fcntl.h>
@@ -22,18 +21,18 @@ void enter_folder(const std::filesystem::path& root, const std::filesystem::path
     if (folder >= 0) ::close(folder);
     throw SystemError(fmt::format("{}: cannot work in this folder: {}; {}", place.string(), std::strerror(error), correction));
   };
-  if (folder < 0) refuse(errno, "check that it is there on every machine of the job");
+  if (folder < 0) refuse(errno, "check that it exists on every machine of the job");
   for (const std::filesystem::path& step : name) {
     place /= step;
     if (step == ".." || step.is_absolute()) refuse(EINVAL, "name a folder below the first one");
     const int next = ::openat(folder, step.c_str(), kFolder | O_NOFOLLOW);
     const int error = errno;
     if (next < 0)
-      refuse(error, error == ENOTDIR || error == ELOOP ? "a link or a file is in its place: remove it" : "check that it is there");
+      refuse(error, error == ENOTDIR || error == ELOOP ? "a link or a file is in its place: remove it" : "check that it exists");
     ::close(folder);
     folder = next;
   }
-  if (::fchdir(folder) != 0) refuse(errno, "check its rights");
+  if (::fchdir(folder) != 0) refuse(errno, "check its permissions");
   ::close(folder);
 }
 

@@ -1,6 +1,6 @@
 // Method: the handler calls only async-signal-safe functions (signal-safety(7)): write, poll, unlink, _exit, and those of
 //   runtime/base/temporary.
-// Source: POSIX.1-2008, 2.4.3. Deviations: none.
+// Source: POSIX.1-2008, 2.4.3.
 #include "precompute/run/interrupt.hpp"
 
 #include <poll.h>
@@ -52,7 +52,7 @@ void handle(int signal) {
     print(is_to_save ? "the run can be resumed from the checkpoint" : untouched_text);
     print("\n");
   } else {
-    poll(nullptr, 0, kFirstRankMs);  // mpirun ends all ranks with the first that ends, which is to be the one that prints
+    poll(nullptr, 0, kFirstRankMs);  // mpirun ends all ranks after the first exit, which should be that of the printing rank
   }
   _exit(is_to_save ? kExitCheckpointed : 128 + signal);
 }
@@ -69,10 +69,10 @@ void end_on_signals(const char* program, const char* untouched) {
   action.sa_flags = SA_RESTART;
   for (const int signal : {SIGTERM, SIGINT, SIGHUP}) {
     struct sigaction before {};
-    // nohup and shells without job control have a process ignore some of them: that stays.
+    // Keep signals ignored that were ignored at the start (nohup, shells without job control).
     if (sigaction(signal, nullptr, &before) == 0 && before.sa_handler != SIG_IGN) sigaction(signal, &action, nullptr);
   }
-  ::signal(SIGXFSZ, SIG_IGN);  // A file that grows beyond the limit is an error of the write, with a message.
+  ::signal(SIGXFSZ, SIG_IGN);  // exceeding the file size limit becomes a write error with a message
 }
 
 void save_on_signals() {

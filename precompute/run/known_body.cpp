@@ -7,7 +7,6 @@
 
 #include "precompute/analytic/make_bank.hpp"
 #include "precompute/run/describe_run.hpp"
-#include "precompute/run/heartbeat.hpp"
 #include "precompute/run/open_job.hpp"
 #include "runtime/base/clock.hpp"
 #include "runtime/base/file.hpp"
@@ -21,10 +20,10 @@ namespace fs = std::filesystem;
 
 void check_options(const Run& run) {
   if (!run.options.matrices.empty())
-    throw InputError(fmt::format("{}: the modes of a \"{}\" are known, and there are no matrices; leave --matrices away",
-                                 run.job.file.string(), job::get_key(*run.job.analytic)));
+    throw InputError(fmt::format("{}: the modes of a \"{}\" are known, and there are no matrices; remove --matrices", run.job.file.string(),
+                                 job::get_key(*run.job.analytic)));
   if (!run.options.solver_options.empty())
-    throw InputError(fmt::format("the solver option \"{}\" was not used: the modes of a \"{}\" are known, and no solver runs",
+    throw InputError(fmt::format("the solver option \"{}\" is not used: the modes of a \"{}\" are known, and no solver runs",
                                  run.options.solver_options[0], job::get_key(*run.job.analytic)));
 }
 
@@ -76,7 +75,7 @@ std::string validate_known_body(const Run& run) {
   const auto modes = static_cast<std::int64_t>(made.bank.mode_count());
   const std::int64_t bytes = base::find_memory().peak + 2 * static_cast<std::int64_t>(made.bank.shape.size());
   if (!run.options.json) {
-    std::string text = fmt::format("{}: well\n{}, {} vertices\n{} modes in {:g} .. {:g} Hz: {}\n1 rank: at most {:.2f} GB, about {:.1f} s",
+    std::string text = fmt::format("{}: ok\n{}, {} vertices\n{} modes in {:g} .. {:g} Hz: {}\n1 rank: at most {:.2f} GB, about {:.1f} s",
                                    run.job.file.string(), made.theory, made.bank.vertex_count(), modes, made.bank.band_hz[0],
                                    made.bank.band_hz[1], made.method, 1e-9 * static_cast<double>(bytes), seconds);
     for (const std::string& warning : made.warnings) text += "\n" + warning;
@@ -85,7 +84,6 @@ std::string validate_known_body(const Run& run) {
   base::Json root;
   root["ok"] = true;
   root["mesh"]["source"] = made.theory;
-  root["mesh"]["how"] = "made";
   root["mesh"]["nodes"] = made.bank.vertex_count();
   for (const char* key : {"count", "estimate", "low", "high"}) root["modes"][key] = modes;
   root["modes"]["how"] = "counted";
@@ -94,7 +92,6 @@ std::string validate_known_body(const Run& run) {
     root["wall_seconds"][ranks] = seconds;
   }
   root["cpu_seconds"] = seconds;
-  root["seconds_taken"] = find_process_seconds();
   root["fits_here"] = true;
   for (const std::string& warning : run.log.get_warnings()) root["warnings"].append(warning);
   for (const std::string& warning : made.warnings) root["warnings"].append(warning);

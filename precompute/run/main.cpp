@@ -1,4 +1,4 @@
-// The solver: one job to one mode bank, on as many ranks as mpirun starts. carillon-precompute becomes it (precompute/petsc/launch).
+// The solver: one job to one mode bank, on the ranks started by mpirun. Executed by carillon-precompute (precompute/petsc/launch).
 #include <fmt/core.h>
 #include <mpi.h>
 
@@ -16,9 +16,9 @@
 #include "precompute/run/air.hpp"
 #include "precompute/run/end_in_error.hpp"
 #include "precompute/run/enter_folder.hpp"
-#include "precompute/run/estimate.hpp"
 #include "precompute/run/interrupt.hpp"
 #include "precompute/run/known_body.hpp"
+#include "precompute/run/predict_cost.hpp"
 #include "precompute/run/run_job.hpp"
 #include "precompute/run/run_log.hpp"
 #include "precompute/run/same_start.hpp"
@@ -47,7 +47,7 @@ void print_start(const petsc::Session& session, bool quiet) {
     fmt::print(stderr, "carillon-precompute: warning: {} (BLAS: {})\n", slow, petsc::blas_name());
 }
 
-/// What the command line asks for.
+/// The parsed command line.
 struct CommandLine {
   CLI::App app{
       "Computes the vibration modes of a solid body and writes them as a mode bank.\n"
@@ -56,7 +56,7 @@ struct CommandLine {
       "carillon-precompute"};
   std::string job;
   std::string result;    // file; empty: none
-  std::string estimate;  // the size of a problem; empty: not asked for
+  std::string estimate;  // problem size; empty: none
   run::RunOptions options;
   std::optional<CLI::ParseError> error;
 
@@ -65,49 +65,45 @@ struct CommandLine {
     app.failure_message(
         [](const CLI::App* asked, const CLI::Error& error) { return base::printable_lines(CLI::FailureMessage::simple(asked, error)); });
     app.add_option("JOB", job, "job file (JSON with // comments)");
-    app.add_flag("-q,--quiet", options.quiet, "nothing on standard output; warnings and errors are on standard error");
-    app.add_option("--progress", options.progress, "append how far the run is to this file, a JSON object a line")->check(named);
+    app.add_flag("-q,--quiet", options.quiet, "no output except warnings and errors on standard error");
+    app.add_option("--progress", options.progress, "append the progress of the run to this file, one JSON object per line")->check(named);
     app.add_option("--checkpoint", options.checkpoint,
-                   "resume from this file if it exists, and save to it; SIGUSR1 and SIGTERM then save and end with 85")
+                   "resume from this file if it exists, and save to it; SIGUSR1 and SIGTERM save and exit with 85")
         ->check(named);
     app.add_option("--checkpoint-every", options.checkpoint_every_s, "seconds between two saves")
         ->check(CLI::Range(0.0, 1e9))
         ->capture_default_str();
-    app.add_option("--bank", options.bank, "write the bank to this file, whatever the job says")->check(named);
-    app.add_option("--result", result, "write how the run ended to this file, a JSON object (docs/howto/when-jobs-die.md)")->check(named);
-    app.add_option("--folder", options.folder, "work in folder NAME below ROOT, to which no link below ROOT leads")
+    app.add_option("--bank", options.bank, "write the bank to this file instead of the job's \"bank\"")->check(named);
+    app.add_option("--result", result, "write the outcome of the run to this file, a JSON object (docs/howto/when-jobs-die.md)")
+        ->check(named);
+    app.add_option("--folder", options.folder, "working directory NAME below ROOT; links below ROOT are refused")
         ->expected(2)
         ->type_name("ROOT NAME");
     CLI::Option* matrices =
-        app.add_option("--matrices", options.matrices, "write K and M to this folder too, as Matrix Market files")->check(named);
+        app.add_option("--matrices", options.matrices, "also write K and M to this folder, as Matrix Market files")->check(named);
     CLI::Option* validate =
-        app.add_flag("--validate", options.validate, "check the job and its mesh, predict modes, memory and time, and solve nothing")
+        app.add_flag("--validate", options.validate, "check the job and its mesh, and predict modes and memory, without solving")
             ->excludes(matrices);
-    app.add_option("--patience", options.patience_s,
-                   "with --validate: seconds for the answer; what would take longer (mesh, analysis, count) is estimated, and that is said")
-        ->check(CLI::Range(0.0, 1e6))
-        ->capture_default_str()
-        ->needs(validate);
-    app.add_option("--count", options.count_s, "with --validate: most seconds for the count of the modes [what --patience leaves]")
-        ->check(CLI::Range(0.0, 1e6))
-        ->needs(validate);
-    app.add_option("--at", options.at_m, "print the modes of a string, beam, membrane, plate or table at a point, and write no bank")
+    app.add_option("--at", options.at_m, "print the modes of a string, beam, membrane, plate or table at a point; writes no bank")
         ->delimiter(',')
         ->type_name("X,Y,Z")
         ->excludes(validate);
     app.add_flag("--json", options.json, "with --validate: print one JSON object")->needs(validate);
-    app.add_option("--memory-gb", options.memory_gb, "refuse a solve for which all ranks of a machine together need more than so many GB")
+    app.add_option("--memory-gb", options.memory_gb, "refuse a solve that needs more memory for all ranks of a machine together [GB]")
         ->check(CLI::Range(1e-6, 1e9));
-    app.add_flag("--profile", options.profile, "count messages and the time inside MPI too, and write them to the record of the run");
+    app.add_flag("--profile", options.profile, "also count messages and time inside MPI, for the record of the run");
     app.add_option("--estimate", estimate,
-                   "print what a problem of this size would cost, as JSON: '{\"element\": \"T10\", \"nodes\": 9000, \"modes\": 100}'")
+                   "print the cost of a problem of this size, as JSON: '{\"element\": \"T10\", \"nodes\": 9000, \"modes\": 100}'")
         ->type_name("SIZE");
     app.add_option("--radiate", options.radiate,
-                   "in place of a job: solve the air outside the body of this bank, and write the bank with its multipoles to --bank")
+                   "instead of a job: solve the exterior air for the modes of this bank, and write it with multipoles to --bank")
         ->check(named)
         ->excludes("JOB", "--matrices", "--progress", "--validate", "--at", "--estimate");
+    app.add_flag_callback(
+        "--keys", [] { throw CLI::CallForVersion(base::write_key_tables(job::describe_job_keys()), 0); },
+        "print the keys of jobs with defaults, ranges and meaning");
     app.set_version_flag("--version", base::describe("carillon-precompute"));
-    // What follows "--" is for PETSc and SLEPc.
+    // Words after "--" are for PETSc and SLEPc.
     const int own = static_cast<int>(std::find(argv, argv + argc, std::string_view("--")) - argv);
     options.solver_options.assign(argv + std::min(own + 1, argc), argv + argc);
     try {
@@ -118,9 +114,9 @@ struct CommandLine {
     }
   }
 
-  /// The work that must be equal on all ranks. Options of output and of rank 0's result files may differ.
+  /// Work that must be equal on all ranks; options of output and of rank 0's result files may differ.
   run::Given describe_work() const {
-    std::string work = error                         ? "a command line that cannot be read"
+    std::string work = error                         ? "an invalid command line"
                        : !options.radiate.empty()    ? "--radiate"
                        : options.validate            ? "--validate"
                        : options.at_m                ? "--at"
@@ -134,7 +130,7 @@ struct CommandLine {
   bool only_asks() const { return error && error->get_exit_code() == 0; }  // --help or --version
 };
 
-/// Does what was asked for.
+/// Executes the command line.
 base::Result carry_out(const petsc::Session& session, const CommandLine& words) {
   const bool speaks = session.rank() == 0;
   print_start(session, words.options.quiet || words.options.validate || words.options.at_m);
@@ -164,7 +160,7 @@ base::Result carry_out(const petsc::Session& session, const CommandLine& words) 
   return {};
 }
 
-/// Turns every way of ending that the program itself knows into a result, its file and the exit code.
+/// Turns success and all errors into a result, its file and the exit code.
 int run_program(const petsc::Session& session, const CommandLine& words) {
   MPI_Comm failures = MPI_COMM_NULL;
   MPI_Comm_dup(MPI_COMM_WORLD, &failures);
@@ -174,7 +170,7 @@ int run_program(const petsc::Session& session, const CommandLine& words) {
     run::check_same(PETSC_COMM_WORLD, "work", words.describe_work());
     if (!words.error) result = carry_out(session, words);
   } catch (...) {
-    result = base::describe_error(std::current_exception(), "out of memory; use a coarser mesh or a machine with more");
+    result = base::describe_error(std::current_exception(), "out of memory; use a coarser mesh or a machine with more memory");
     has_failed = true;
   }
   if (words.error && !has_failed) {
@@ -195,12 +191,12 @@ int run_program(const petsc::Session& session, const CommandLine& words) {
   return code;
 }
 
-/// Of one process: under mpirun the first prints.
+/// Under mpirun the first process prints.
 int print_estimate(const CommandLine& words) {
   if (!base::is_first_of_all()) return 0;
   base::Result result;
   try {
-    fmt::print("{}\n", run::estimate_costs(words.estimate));
+    fmt::print("{}\n", run::predict_cost(words.estimate));
   } catch (const InputError& error) {
     fmt::print(stderr, "carillon-precompute: error: {}\n", base::show_message(error.what()));
     result = {base::ResultKind::bad_input, error.what()};
@@ -220,7 +216,7 @@ int main(int argc, char** argv) {
     if (!words.error && !words.estimate.empty()) return print_estimate(words);
     if (!words.error && !words.options.folder.empty()) run::enter_folder(words.options.folder[0], words.options.folder[1]);
     if (base::is_first_of_all()) result = words.result;
-    run::end_on_signals("carillon-precompute", "the bank was not touched, or it is whole");
+    run::end_on_signals("carillon-precompute", "the bank is unchanged or complete");
     if (!words.options.checkpoint.empty()) run::save_on_signals();
     const petsc::Session session(argc, argv, words.options.solver_options);
     return run_program(session, words);

@@ -3,23 +3,16 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <array>
-#include <cerrno>
-#include <chrono>
 #include <csignal>
-#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <functional>
 #include <sstream>
-#include <string_view>
 #include <vector>
 
 #include "precompute/mesh/read.hpp"
 #include "precompute/mesh/shapes/shapes.hpp"
 #include "runtime/base/command.hpp"
-#include "runtime/base/document.hpp"
 #include "runtime/base/failure.hpp"
 #include "runtime/base/file.hpp"
 #include "runtime/base/result.hpp"
@@ -30,18 +23,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Beyond the time for the mesh: for the surface as it was read, should its repair not end, and for its reading.
-constexpr double kLonger = 1.2, kRoughSeconds = 1.5, kReadSeconds = 2.5, kMinReadSeconds = 8;
+constexpr std::size_t kKeptBytes = 1 << 16;  // of standard error
 
-constexpr std::size_t kKeptBytes = 1 << 16;  // of carillon-mesh's standard error
-
-/// Runs carillon-mesh and keeps the end of its standard error. Once `may_stop` says so it is killed.
-base::Finished run_mesher(const std::vector<std::string>& words, const std::function<bool(const std::string& errors)>& may_stop) {
-  base::RunOptions options{.max_bytes = kKeptBytes, .keeps_tail = true};
-  if (may_stop) options.may_stop = [&](const base::Finished& now) { return may_stop(now.errors); };
+/// Runs carillon-mesh and keeps the end of its standard error.
+base::Finished run_mesher(const std::vector<std::string>& words) {
   base::Finished finished;
   try {
-    finished = base::run({.words = words, .errors = base::kCapture}, options);
+    finished = base::run({.words = words, .errors = base::kCapture}, {.max_bytes = kKeptBytes, .keeps_tail = true});
   } catch (const base::StartError& error) {
     throw SystemError(fmt::format("{}; it belongs next to this program", error.what()));
   }
@@ -51,40 +39,7 @@ base::Finished run_mesher(const std::vector<std::string>& words, const std::func
 
 std::string format_length(double metres) { return fmt::format("{:.17g}", metres); }
 
-// What carillon-mesh --estimate prints, each on a line of its own, before an object.
-constexpr std::string_view kRoughWord = "rough {", kEstimateWord = "estimate {";
-
-bool has_line(const std::string& errors, std::string_view word) {
-  return errors.starts_with(word) || errors.find("\n" + std::string(word)) != std::string::npos;
-}
-
-/// The object of the line that begins with `word`, which is taken away.
-std::optional<base::Document> take_object(std::string& errors, std::string_view word) {
-  if (!has_line(errors, word)) return std::nullopt;
-  const std::size_t begin = errors.starts_with(word) ? 0 : errors.find("\n" + std::string(word)) + 1;
-  const std::size_t end = std::min(errors.find('\n', begin), errors.size());
-  const std::size_t brace = begin + word.size() - 1;
-  const std::string text = errors.substr(brace, end - brace);
-  errors.erase(begin, end + 1 - begin);
-  return base::parse_document(text, "carillon-mesh --estimate");
-}
-
-constexpr std::int64_t kMaxCount = 1'000'000'000'000'000;
-
-std::optional<BodyEstimate> take_estimate(std::string& errors, std::string_view word) {
-  std::optional<base::Document> object = take_object(errors, word);
-  if (!object) return std::nullopt;
-  base::Object root = object->root();
-  BodyEstimate estimate;
-  estimate.volume_m3 = root.number("volume_m3", base::kPositive);
-  estimate.area_m2 = root.number("area_m2", base::kPositive);
-  estimate.thickness_m = root.number("thickness_m", base::kPositive);
-  estimate.nodes = root.integer("nodes", 1, kMaxCount);
-  estimate.is_rough = word == kRoughWord;
-  return estimate;
-}
-
-/// Moves the mesher's sentences about the mesh from its standard error to `said`, without repetitions.
+/// Moves the mesher's notes and remarks from its standard error to `said`, without repetitions.
 void take_words(std::string& errors, MesherWords& said) {
   std::istringstream lines(errors);
   std::string rest;
@@ -102,9 +57,7 @@ void take_words(std::string& errors, MesherWords& said) {
   errors = std::move(rest);
 }
 
-mesh::TetMesh mesh_surface(const job::Body& body, int order, const Fineness& fineness, MesherWords& said, Patience* patience) {
-  const base::TemporaryFolder folder("carillon-mesh-");
-  const std::string file = (folder.path() / "body.msh").string();
+std::vector<std::string> make_mesher_words(const job::Body& body, int order, const Fineness& fineness, const std::string& file) {
   std::vector<std::string> words{
       base::require_program("carillon-mesh").string(), body.surface.string(), "-o", file, "--order", std::to_string(order), "--quiet"};
   const auto add = [&](const char* option, const std::string& value) {
@@ -118,50 +71,27 @@ mesh::TetMesh mesh_surface(const job::Body& body, int order, const Fineness& fin
   if (body.close_holes) add("--close-holes", format_length(*body.close_holes));
   if (!body.close_holes && !body.wall_m) words.emplace_back("--refuse-open");
   if (body.facets) words.emplace_back("--facets");
-  const std::string result_file = file + ".result";
-  add("--result", result_file);
-  add("--up", std::string(1, body.up));
+  add("--result", file + ".result");
+  add("--up", body.up);
   add("--method", body.method);
   if (fineness.nodes) add("--nodes", std::to_string(*fineness.nodes));
   if (fineness.edge_m) add("--edge", format_length(*fineness.edge_m));
-  std::function<bool(const std::string&)> may_stop;
-  double max_s = 0;
-  if (patience != nullptr) {
-    words.push_back("--estimate");
-    max_s = std::max(kLonger * patience->seconds + kReadSeconds, kMinReadSeconds);
-    may_stop = [seconds = patience->seconds, max_s, start = std::chrono::steady_clock::now()](const std::string& errors) {
-      const double taken = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-      if (taken > seconds && has_line(errors, kEstimateWord)) return true;
-      return taken > max_s || (taken > kLonger * seconds + kRoughSeconds && has_line(errors, kRoughWord));
-    };
-  }
-  base::Finished ended = run_mesher(words, may_stop);
-  const std::optional<base::Result> result = base::read_result(result_file);
-  take_words(ended.errors, said);
-  if (patience != nullptr) {
-    const std::optional<BodyEstimate> rough = take_estimate(ended.errors, kRoughWord), good = take_estimate(ended.errors, kEstimateWord);
-    if (ended.was_stopped) {
-      if (!good && !rough)
-        throw InputError(fmt::format(
-            "{}: the surface is not even read after {:.0f} s; give more time (--patience), decimate it, or mesh it beforehand by "
-            "carillon-mesh and name the \"mesh\"",
-            body.place, max_s));
-      patience->estimate = good ? good : rough;
-      return {};
-    }
-  }
-  if (ended.exit_code == 0) return mesh::read_mesh(file);
+  return words;
+}
+
+/// Throws for a failed carillon-mesh.
+[[noreturn]] void fail(const job::Body& body, const base::Finished& ended, const std::optional<base::Result>& result) {
   const std::string failed = fmt::format("{}: the body cannot be meshed", body.place);
   if (ended.signal == 0) {
     base::Result reason =
         result.value_or(base::Result{.kind = ended.exit_code == kExitInput ? base::ResultKind::bad_input : base::ResultKind::system});
     if (reason.message.empty()) reason.message = ended.errors.empty() ? "carillon-mesh gave no reason" : ended.errors;
     reason.message = fmt::format("{}: {}", failed, reason.message);
-    reason.place.clear();  // the job's is in front
+    reason.place.clear();  // the job's place is already in front
     base::throw_error(reason);
   }
   const int signal = ended.signal;
-  // It says itself where it broke down, if it still can; a signal that it sends itself comes from the surface, one from outside does not.
+  // Signals raised by the process itself are caused by the surface, others come from outside.
   const bool is_own =
       signal == SIGSEGV || signal == SIGBUS || signal == SIGABRT || signal == SIGFPE || signal == SIGILL || signal == SIGXCPU;
   const std::string printed = ended.errors.empty() ? "" : fmt::format(" after it wrote '{}'", ended.errors);
@@ -170,14 +100,24 @@ mesh::TetMesh mesh_surface(const job::Body& body, int order, const Fineness& fin
         fmt::format("{}: carillon-mesh crashed on {}, by signal {} ({}){}; ask for another number of nodes, try \"method\": "
                     "\"stuffing\", or repair the surface in a modeller",
                     failed, body.surface.string(), signal, ::strsignal(signal), printed));
-  throw SystemError(fmt::format("{}: carillon-mesh was ended from outside, by signal {} ({}){}; did memory run out?", failed, signal,
+  throw SystemError(fmt::format("{}: carillon-mesh was ended from outside, by signal {} ({}){}; out of memory?", failed, signal,
                                 ::strsignal(signal), printed));
+}
+
+mesh::TetMesh mesh_surface(const job::Body& body, int order, const Fineness& fineness, MesherWords& said) {
+  const base::TemporaryFolder folder("carillon-mesh-");
+  const std::string file = (folder.path() / "body.msh").string();
+  base::Finished ended = run_mesher(make_mesher_words(body, order, fineness, file));
+  const std::optional<base::Result> result = base::read_result(file + ".result");
+  take_words(ended.errors, said);
+  if (ended.exit_code != 0) fail(body, ended, result);
+  return mesh::read_mesh(file);
 }
 
 }  // namespace
 
-mesh::TetMesh make_body_mesh(const job::Body& body, int order, const Fineness& fineness, MesherWords& words, Patience* patience) {
-  if (body.shape.empty()) return mesh_surface(body, order, fineness, words, patience);
+mesh::TetMesh make_body_mesh(const job::Body& body, int order, const Fineness& fineness, MesherWords& words) {
+  if (body.shape.empty()) return mesh_surface(body, order, fineness, words);
   shapes::ShapeOptions options{.shape = body.shape, .dimensions = body.dimensions, .order = order};
   options.target_nodes = fineness.nodes;
   options.edge_m = fineness.edge_m;
@@ -197,7 +137,7 @@ std::pair<std::vector<Vec3>, std::vector<Triangle>> coarsen_surface(const std::v
   for (const Triangle& t : triangles) text += fmt::format("3 {} {} {}\n", t[0], t[1], t[2]);
   base::write_file(file, text);
   const base::Finished ended =
-      run_mesher({base::require_program("carillon-mesh").string(), file, "--coarsen", std::to_string(nodes), "-o", coarse, "--quiet"}, {});
+      run_mesher({base::require_program("carillon-mesh").string(), file, "--coarsen", std::to_string(nodes), "-o", coarse, "--quiet"});
   std::ifstream stream(coarse);
   std::pair<std::vector<Vec3>, std::vector<Triangle>> made;
   std::string word;

@@ -8,14 +8,15 @@
 #include <optional>
 #include <utility>
 
+#include "precompute/eigen/solve_modes.hpp"
+#include "precompute/run/body.hpp"
 #include "precompute/run/io/checkpoint_file.hpp"
-#include "precompute/run/phase_names.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::run {
 namespace {
 
-/// A line of the log whenever the phase changes or another tenth of the modes is done; all to the progress file.
+/// Logs phase changes and every tenth of the modes; forwards all steps to the progress file.
 class ProgressLines {
  public:
   explicit ProgressLines(const Run& run) : log_(&run.log), reporter_(run.progress.get()) {}
@@ -49,7 +50,7 @@ eigen::Modes solve(Run& run, const Setting& setting, const fem::System& matrices
   return modes;
 }
 
-/// The user's options of PETSc and SLEPc that can change the result.
+/// The user's solver options that can change the result.
 std::string list_changes(const Run& run) {
   std::string text;
   bool counts = false;
@@ -61,7 +62,7 @@ std::string list_changes(const Run& run) {
   return text;
 }
 
-/// A failure under options of the user is blamed on them, not on the body.
+/// A failure with solver options of the user is attributed to them.
 eigen::Modes solve_named(Run& run, const Setting& setting, const Body& body, const AssembledSystem& system, eigen::NodeLayout layout) {
   const std::string changes = list_changes(run);
   const auto step = [&] { return solve(run, setting, system.matrices, std::move(layout)); };
@@ -70,7 +71,7 @@ eigen::Modes solve_named(Run& run, const Setting& setting, const Body& body, con
     return step();
   } catch (const SolveError& error) {
     throw InputError(
-        fmt::format("the solve failed under the solver options \"{}\": {} Without the options it may not.", changes, error.what()));
+        fmt::format("the solve failed with the solver options \"{}\": {} Remove them to use the defaults.", changes, error.what()));
   }
 }
 
@@ -78,13 +79,13 @@ double calc_diagonal(const mesh::CheckReport& check) {
   return std::hypot(check.box_high[0] - check.box_low[0], check.box_high[1] - check.box_low[1], check.box_high[2] - check.box_low[2]);
 }
 
-/// A band without the fundamental is seldom intended; often the mesh is in millimetres.
+/// Often the mesh is in millimetres.
 void warn_of_low_modes(Run& run, const Body& body, const eigen::Modes& modes) {
   const std::int64_t below = modes.count_below_low - modes.rigid_count - modes.mechanism_count;
   if (below <= 0 || find_low_hz(run.job, modes) > run.job.band_hz[0]) return;
   run.log.warn(
       fmt::format("the fundamental is out of the band: {} mode{} below the band, which begins at {:g} Hz; the body measures {:.3g} m "
-                  "across: if it was made in millimetres, {}",
+                  "across: if it is in millimetres, {}",
                   below, below == 1 ? " lies" : "s lie", run.job.band_hz[0], calc_diagonal(body.check), describe_scale_key(run.job)));
 }
 
@@ -95,11 +96,35 @@ void warn_of_band(Run& run, const Body& body, const eigen::Modes& modes) {
                              low_hz, modes.count_below_low - modes.rigid_count));
   } else if (modes.mechanism_count > 0) {
     run.log.warn(
-        fmt::format("the body has {} motions without stiffness in addition to the rigid ones (parts that hang on a point, on an edge or on "
-                    "next to nothing)",
+        fmt::format("the body has {} motions without stiffness in addition to the rigid ones (parts connected by a point, an edge or "
+                    "a very thin link)",
                     modes.mechanism_count));
   }
-  if (modes.lambda.empty()) run.log.warn("no mode lies in the band: the bank will be silent");
+  if (modes.lambda.empty()) run.log.warn("no mode in the band: the bank will be silent");
+}
+
+eigen::Factorisation to_eigen(job::Factorisation factorisation) {
+  switch (factorisation) {
+    case job::Factorisation::ldlt:
+      return eigen::Factorisation::kLdlt;
+    case job::Factorisation::mumps:
+      return eigen::Factorisation::kMumps;
+    default:
+      return eigen::Factorisation::kAutomatic;
+  }
+}
+
+eigen::Method to_eigen(job::Method method) {
+  switch (method) {
+    case job::Method::block_lanczos:
+      return eigen::Method::kBlockLanczos;
+    case job::Method::krylov_schur:
+      return eigen::Method::kKrylovSchur;
+    case job::Method::dense:
+      return eigen::Method::kDense;
+    default:
+      return eigen::Method::kAutomatic;
+  }
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
-// Method:     Regular refinement: every edge is halved; the octahedron in the middle is cut along its shortest diagonal.
-// Source:     Bey, Tetrahedral grid refinement, Computing 55, 1995, section 2.
-// Deviations: the shortest diagonal instead of a fixed one: elements stay as well shaped as they are, and neighbours are not affected.
+// Method: regular refinement: every edge is halved; the inner octahedron is cut along its shortest diagonal.
+// Source: Bey, Tetrahedral grid refinement, Computing 55, 1995, section 2.
+// Deviations: the shortest diagonal instead of a fixed one preserves element quality and does not affect neighbours.
 #include "precompute/run/refine_mesh.hpp"
 
 #include <algorithm>
@@ -16,7 +16,7 @@ namespace {
 
 using Barycentric = std::array<double, 4>;
 
-/// The four tetrahedra at the corners, in nodes of the old element.
+/// The four corner tetrahedra, in nodes of the old element.
 constexpr std::array<std::array<int, 4>, 4> kCornerTets{{{0, 4, 6, 7}, {4, 1, 5, 8}, {6, 5, 2, 9}, {7, 8, 9, 3}}};
 /// A diagonal of the octahedron and the ring of the other four nodes.
 struct Diagonal {
@@ -24,7 +24,7 @@ struct Diagonal {
   std::array<int, 4> ring;
 };
 constexpr std::array<Diagonal, 3> kDiagonals{{{4, 9, {5, 6, 7, 8}}, {5, 7, {4, 6, 9, 8}}, {6, 8, {4, 5, 9, 7}}}};
-/// The nodes of an edge and of a face of the old element, as sets of bits.
+/// Nodes of each edge and face of the old element, as bit sets.
 constexpr std::array<std::uint32_t, 6> kEdgeBits{0x013, 0x026, 0x045, 0x089, 0x10A, 0x20C};
 constexpr std::array<std::uint32_t, 4> kFaceBits{0x32E, 0x2CD, 0x19B, 0x077};
 
@@ -48,7 +48,7 @@ double calc_determinant(const std::array<int, 4>& nodes) {
   return calc_det(u[0], u[1], u[2]);
 }
 
-/// Where the quadratic map of the element puts a point.
+/// Quadratic map of the element.
 Vec3 map_point(std::span<const Vec3, 10> x, const Barycentric& l) {
   std::array<double, 10> shape{};
   for (int i = 0; i < 4; ++i) shape[i] = l[i] * (2 * l[i] - 1);
@@ -79,7 +79,7 @@ std::array<std::array<int, 4>, 8> find_children(std::span<const Vec3, 10> x) {
   return children;
 }
 
-/// Nodes half way along the edges of children, one for each pair of old nodes.
+/// Mid-nodes of the children's edges, one per pair of old nodes.
 class MiddleNodes {
  public:
   explicit MiddleNodes(mesh::TetMesh& fine) : fine_(fine) {
@@ -90,7 +90,7 @@ class MiddleNodes {
     }
   }
 
-  /// `element`: nodes of the old element; i, j: two of its ten; x: their places.
+  /// `element`: nodes of the old element; i, j: two of its ten; x: node positions.
   std::int32_t find(std::span<const std::int32_t> element, std::span<const Vec3, 10> x, int i, int j) {
     const auto [low, high] = std::minmax(element[i], element[j]);
     const std::uint64_t key = (static_cast<std::uint64_t>(low) << 32) | static_cast<std::uint32_t>(high);

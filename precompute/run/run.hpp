@@ -1,4 +1,4 @@
-// One run of carillon-precompute as its steps see it.
+// State of one run of carillon-precompute.
 #pragma once
 
 #include <mpi.h>
@@ -9,7 +9,7 @@
 
 #include "precompute/comm/communicator.hpp"
 #include "precompute/job/job_spec.hpp"
-#include "precompute/run/progress_reporter.hpp"
+#include "precompute/run/progress.hpp"
 #include "precompute/run/run_log.hpp"
 #include "precompute/run/run_options.hpp"
 #include "runtime/base/error.hpp"
@@ -26,14 +26,14 @@ struct Run {
 
   comm::Communicator comm;
   job::JobSpec job;            // the same on every rank
-  std::filesystem::path bank;  // job.bank as it is opened
+  std::filesystem::path bank;  // job.bank as opened
   RunOptions options;
   RunLog log;
-  std::unique_ptr<ProgressReporter> progress;      // on rank 0, if it is asked for
-  std::shared_ptr<io::CheckpointFile> checkpoint;  // if it is asked for
+  std::unique_ptr<ProgressReporter> progress;      // on rank 0, if requested
+  std::shared_ptr<io::CheckpointFile> checkpoint;  // if requested
 };
 
-/// Runs a collective step whose errors cannot know what it works on, and names it in them. All ranks throw alike.
+/// Runs a collective step and prefixes its errors with the source. All ranks throw alike.
 template <class Step>
 auto name_errors(const std::string& source, const Run& run, Step&& step) {
   try {

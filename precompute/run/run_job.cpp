@@ -35,23 +35,22 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Opens the progress file; from now on every phase is reported to it.
+/// Opens the progress file and registers it with the log.
 void open_progress(Run& run) {
   comm::Communicator(run.comm).agree([&] {
     const fs::path& file = run.options.progress;
     if (!run.comm.is_root() || file.empty()) return;
     for (const fs::path& other : {run.job.file, job::get_input(run.job), run.job.bank, job::find_resolved_path(run.job.bank)}) {
-      std::error_code error;  // One of them that does not exist is none of the others.
+      std::error_code error;  // missing files are equal to none
       if (!other.empty() && (file == other || fs::equivalent(file, other, error)))
-        throw InputError(
-            fmt::format("{}: progress would be appended to a file of the job's own; give another with --progress", file.string()));
+        throw InputError(fmt::format("{}: progress would be appended to a file of this job; give another with --progress", file.string()));
     }
-    run.progress = std::make_unique<ProgressReporter>(file, run.comm.size());
+    run.progress = std::make_unique<ProgressReporter>(file);
     run.log.set_listener([progress = run.progress.get()](const std::string& name) { progress->begin(name); });
   });
 }
 
-/// An option that nothing asked for is misspelt, or belongs to a solver that did not run.
+/// Rejects unused solver options.
 void check_options_used(const comm::Communicator& comm) {
   comm::Communicator(comm).agree([] {
     const std::vector<std::string> unused = petsc::find_unused_options();
@@ -61,8 +60,8 @@ void check_options_used(const comm::Communicator& comm) {
   });
 }
 
-/// The bank of the solved body; rank 0 only has it. The shapes of all nodes are gone afterwards.
-bank::Bank collect_bank(Run& run, AccurateBody& found) {
+/// The bank of the solution, on rank 0 only. Frees the shapes of all nodes.
+bank::Bank collect_bank(Run& run, Solution& found) {
   SolvedBody& solved = found.solved;
   run.log.begin("collect", "shapes on the surface, radiation gains");
   std::vector<double> omega;
@@ -71,7 +70,7 @@ bank::Bank collect_bank(Run& run, AccurateBody& found) {
   solved.modes.shapes.reset();
   bank::Bank bank;
   comm::Communicator(run.comm).agree([&] {
-    if (run.comm.is_root()) bank = make_bank(run.job, found.setting, found.body, solved, surface_modes);
+    if (run.comm.is_root()) bank = make_bank(run.job, found, surface_modes);
   });
   run.log.end();
   return bank;
@@ -79,14 +78,13 @@ bank::Bank collect_bank(Run& run, AccurateBody& found) {
 
 constexpr double kAudibleCents = 50.0;
 
-/// What to say of error bars against the body that are wide, with the correction; empty when they are not. `is_asked`: the job has
-/// accuracy_cents, and got what it asked for.
+/// Warning of wide error bars, with the remedy; empty: none. is_asked: the job has accuracy_cents, which was met.
 std::string describe_wide_bars(const bank::Bank& bank, const Setting& setting, bool is_asked) {
   const std::vector<double>& cents = bank.corrected.error_cents;
   if (cents.empty() || is_asked) return {};
   if (std::isinf(*std::max_element(cents.begin(), cents.end())))
-    return "frequencies have no error bars: of so few modes of T4 with a lumped mass a whole kind may be missing; a consistent mass, "
-           "\"element\": \"T10\", or a wider band brings them";
+    return "frequencies have no error bars: among so few modes of T4 with a lumped mass a whole family may be missing; use a consistent "
+           "mass, \"element\": \"T10\", or a wider band";
   // Errors within the width of a strongly damped mode's resonance are inaudible.
   std::size_t worst = 0, wide = 0;
   double worst_cents = 0.0;
@@ -100,9 +98,7 @@ std::string describe_wide_bars(const bank::Bank& bank, const Setting& setting, b
   if (wide == 0) return {};
   return fmt::format(
       "frequencies can be wrong by {:.0f} cents (estimate, mode {}; {} of {} modes by more than {:g} and than half the width of their "
-      "resonance): "
-      "{}a "
-      "finer mesh, or \"accuracy_cents\" in the job, improves them",
+      "resonance): use {}a finer mesh, or \"accuracy_cents\" in the job",
       worst_cents, worst + 1, wide, cents.size(), kAudibleCents,
       setting.element == job::Element::T4 ? "\"element\": \"T10\" (--order 2), " : "");
 }
@@ -113,22 +109,23 @@ std::string describe_result(const bank::Bank& bank) {
     std::vector<double> played_hz;
     for (std::size_t m = 0; m < bank.mode_count(); ++m) played_hz.push_back(bank::find_played_hz(bank, m));
     const auto [low, high] = std::minmax_element(played_hz.begin(), played_hz.end());
-    text += fmt::format("\n{:.2f} Hz to {:.2f} Hz as they are played; {:.2f} Hz to {:.2f} Hz of the mesh", *low, *high, bank.freq_hz(0),
+    text += fmt::format("\n{:.2f} Hz to {:.2f} Hz as played; {:.2f} Hz to {:.2f} Hz on the mesh", *low, *high, bank.freq_hz(0),
                         bank.freq_hz(bank.mode_count() - 1));
   }
   return text;
 }
 
-/// The time of writing the bank is in <bank>.resolved.json only: the record in the bank is made before.
-RunSummary write_outputs(Run& run, const AccurateBody& found, const AirReport& air, const CouplingReport& coupling, bank::Bank bank) {
+/// The record in the bank is made before the bank is written; <bank>.resolved.json includes the time of writing.
+RunSummary write_outputs(Run& run, const Solution& found, const AccuracyReport& accuracy, const AirReport& air,
+                         const CouplingReport& coupling, bank::Bank bank) {
   RunSummary summary;
   summary.bank = run.job.bank;
   summary.resolved = job::find_resolved_path(run.job.bank);
   if (run.comm.is_root()) summary.warning = describe_wide_bars(bank, found.setting, run.job.accuracy_cents.has_value());
   const fs::path folder = fs::absolute(summary.bank).parent_path();
   const auto make_record = [&](const Measured& measured) {
-    base::Json record = describe_run(run, found.setting, found.body, found.solved, measured);
-    if (run.job.accuracy_cents) record["accuracy"] = describe_accuracy(found.report);
+    base::Json record = describe_run(run, found, measured);
+    if (run.job.accuracy_cents) record["accuracy"] = describe_accuracy(accuracy);
     if (!air.why.empty()) {
       record["air"]["solved"] = air.is_solved;
       record["air"]["why"] = air.why;
@@ -155,7 +152,7 @@ RunSummary write_outputs(Run& run, const AccurateBody& found, const AirReport& a
   return summary;
 }
 
-/// The files of the job itself must outlive the checkpoint.
+/// The checkpoint must not replace a file of the job.
 void check_checkpoint(const Run& run) {
   const fs::path& file = run.options.checkpoint;
   base::check_writable(file, "checkpoint");
@@ -165,7 +162,7 @@ void check_checkpoint(const Run& run) {
     std::error_code ignored;
     if (other.empty()) continue;
     if (fs::absolute(file).lexically_normal() == fs::absolute(other).lexically_normal() || fs::equivalent(file, other, ignored))
-      throw InputError(fmt::format("{}: the checkpoint would overwrite a file of this job; give it a name of its own", file.string()));
+      throw InputError(fmt::format("{}: the checkpoint would overwrite a file of this job; give it another name", file.string()));
   }
 }
 
@@ -180,9 +177,9 @@ void open_checkpoint(Run& run) {
                                                         io::find_job_fingerprint(run.job, run.options.solver_options), std::move(host));
 }
 
-/// In the setting that the job gives.
-AccurateBody solve_once(Run& run) {
-  AccurateBody found;
+/// Solves the setting of the job.
+Solution solve_once(Run& run) {
+  Solution found;
   found.setting = job::get_setting(run.job);
   found.body = make_body(run, found.setting);
   found.solved = solve_body(run, found.setting, found.body);
@@ -199,27 +196,28 @@ RunSummary carry_out(Run& run, const fs::path& job_file) {
     return summary;
   }
   open_checkpoint(run);
-  AccurateBody found = run.job.accuracy_cents ? solve_to_accuracy(run) : solve_once(run);
+  AccuracyReport accuracy;
+  Solution found = run.job.accuracy_cents ? solve_to_accuracy(run, accuracy) : solve_once(run);
   check_options_used(run.comm);
-  if (run.checkpoint && !is_more_to_come(run.job)) run.checkpoint->finish();
+  if (run.checkpoint && !has_later_stages(run.job)) run.checkpoint->finish();
   CouplingReport coupling = couple_modes(run, found);
   bank::Bank bank = collect_bank(run, found);
   bank.quartic = std::move(coupling.energy);
   const AirReport air = add_air(run, bank);
   if (run.checkpoint) run.checkpoint->finish();
-  RunSummary summary = write_outputs(run, found, air, coupling, std::move(bank));
+  RunSummary summary = write_outputs(run, found, accuracy, air, coupling, std::move(bank));
   if (run.checkpoint) run.checkpoint->remove();
   if (run.progress) run.progress->finish();
   return summary;
 }
 
-/// The summary of a run that a signal stopped.
+/// Summary of a run stopped by a signal.
 RunSummary describe_stop(const Run& run) {
   RunSummary summary;
   summary.is_stopped = true;
   summary.result = fmt::format("stopped by {}; {}", find_stop_name(),
                                run.checkpoint->was_saved() ? "the same command resumes from " + run.options.checkpoint.string()
-                                                           : "the run can be resumed from the checkpoint there was before, if any");
+                                                           : "the run can be resumed from an earlier checkpoint, if any");
   return summary;
 }
 

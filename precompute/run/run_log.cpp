@@ -24,7 +24,7 @@
 namespace carillon::run {
 namespace {
 
-/// "PETSc 3.18.5" without its first word or words: the version alone.
+/// "PETSc 3.18.5" -> "3.18.5".
 std::string strip_name(const std::string& text) {
   const auto digit = text.find_first_of("0123456789");
   return digit == std::string::npos ? text : text.substr(digit);
@@ -34,7 +34,7 @@ std::string strip_name(const std::string& text) {
 
 namespace {
 
-/// What is done in a phase, where nothing says otherwise.
+/// Default work phase of a run phase.
 petsc::WorkPhase find_work_phase(const std::string& phase) {
   if (phase == "read") return petsc::WorkPhase::kRead;
   if (phase == "partition") return petsc::WorkPhase::kPartition;
@@ -80,7 +80,7 @@ void RunLog::warn_once(const std::string& text) {
 const RunPhase& RunLog::end() {
   RunPhase phase;
   phase.name = name_;
-  // All of it is read before the ranks wait for each other, which takes CPU time too.
+  // Read everything before the collective calls, which use CPU time.
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
   const double cpu_seconds = base::get_process_cpu_s() - start_cpu_s_;
   const std::int64_t peak = base::find_memory().peak;

@@ -1,4 +1,4 @@
-// The log of a run: its progress lines, and time and memory of each phase.
+// Log of a run: progress lines, time and memory of each phase.
 #pragma once
 
 #include <mpi.h>
@@ -15,30 +15,30 @@
 
 namespace carillon::run {
 
-/// One finished phase of the run.
+/// A finished phase.
 struct RunPhase {
   std::string name;
   double seconds = 0.0;             // wall clock of the slowest rank
   double cpu_seconds = 0.0;         // user and system, all ranks together
-  std::int64_t peak_bytes = 0;      // so far, of the rank that used most
-  std::int64_t peak_sum_bytes = 0;  // so far, of all ranks together
+  std::int64_t peak_bytes = 0;      // up to now, largest rank
+  std::int64_t peak_sum_bytes = 0;  // up to now, sum over ranks
 };
 
 /// Prints progress lines on rank 0 and times the phases.
 class RunLog {
  public:
-  /// quiet: nothing is printed.
+  /// quiet: prints nothing.
   RunLog(const comm::Communicator& comm, bool quiet);
 
   /// Called at the start of every phase, on rank 0.
   void set_listener(std::function<void(const std::string& name)> listener) { listener_ = std::move(listener); }
-  /// Starts a phase; `what` says what it works on. Not collective.
+  /// Starts a phase; `what`: its input. Not collective.
   void begin(const std::string& name, const std::string& what);
-  /// Prints a line, or several, inside the phase, on rank 0. Not collective.
+  /// Prints one or several lines in the phase, on rank 0. Not collective.
   void print(const std::string& text) const;
-  /// Prints a warning to standard error, on rank 0, and keeps it for the record. Not collective.
+  /// Prints a warning to standard error, on rank 0, and records it. Not collective.
   void warn(const std::string& text);
-  /// The same without repetitions, for a body meshed several times.
+  /// The same, skipping repetitions.
   void warn_once(const std::string& text);
   /// Ends the phase and prints its seconds and memory. Collective.
   const RunPhase& end();
@@ -57,10 +57,10 @@ class RunLog {
   std::function<void(const std::string& name)> listener_;
 };
 
-/// The same of every rank, on rank 0; empty on the others. Collective.
+/// Peak bytes of every rank, on rank 0; empty on the others. Collective.
 std::vector<std::int64_t> gather_peak_bytes(const comm::Communicator& comm);
 
-/// What a run has taken and done so far.
+/// Resources used so far.
 struct Measured {
   std::vector<std::int64_t> peak_bytes;  // of each rank; on rank 0
   petsc::WorkTable work{};               // of all ranks
@@ -69,7 +69,7 @@ struct Measured {
 /// Collective.
 Measured measure(const comm::Communicator& comm);
 
-/// The commit that this build was made from, "-dirty" appended when tracked files differ from it; "unknown" outside git.
+/// Commit of this build, "-dirty" if tracked files differ from it; "unknown" outside git.
 std::string git_id();
 
 /// Name and version of the libraries at run time, as (name, version) pairs: PETSc, SLEPc, METIS, HDF5, Open MPI, BLAS.

@@ -3,10 +3,12 @@
 #include <utility>
 
 #include "precompute/eigen/search_checkpoint.hpp"
+#include "precompute/run/error_bars_stage.hpp"
 #include "precompute/run/io/checkpoint_file.hpp"
 #include "precompute/run/io/fingerprint.hpp"
 #include "precompute/run/io/matrices.hpp"
 #include "precompute/run/modes.hpp"
+#include "precompute/run/system.hpp"
 
 namespace carillon::run {
 namespace {
@@ -25,7 +27,7 @@ void begin_checkpoint(Run& run, const Setting& setting, const Body& body) {
   run.checkpoint->begin(setting, io::find_system_fingerprint(run.comm, job, setting, body.pieces.local), body.pieces.local);
 }
 
-/// Between two stages, with all modes; `must` saves them in any case. Throws eigen::Stopped when the run was asked to stop.
+/// Between stages, with all modes. must: save in any case. Throws eigen::Stopped when a signal requested it.
 void save_if_requested(Run& run, const eigen::Modes& modes, bool must = false) {
   if (!run.checkpoint) return;
   const eigen::CheckpointRequest request = run.checkpoint->vote();
@@ -35,7 +37,7 @@ void save_if_requested(Run& run, const eigen::Modes& modes, bool must = false) {
 
 }  // namespace
 
-bool is_more_to_come(const job::JobSpec& job) { return job.air.method != job::AirMethod::none || job.nonlinear.has_value(); }
+bool has_later_stages(const job::JobSpec& job) { return job.air.method != job::AirMethod::none || job.nonlinear.has_value(); }
 
 SolvedBody solve_body(Run& run, const Setting& setting, Body& body) {
   AssembledSystem system = assemble_system(run, setting, body);
@@ -45,7 +47,7 @@ SolvedBody solve_body(Run& run, const Setting& setting, Body& body) {
   solved.modes = find_modes(run, setting, body, system);
   save_if_requested(run, solved.modes);
   solved.errors = calc_errors(run, body, system, solved.modes);
-  save_if_requested(run, solved.modes, is_more_to_come(run.job));  // which may take longer than the modes did
+  save_if_requested(run, solved.modes, has_later_stages(run.job));  // later stages may take longer than the modes
   if (run.checkpoint) run.checkpoint->end();
   solved.properties = std::move(system.properties);
   return solved;

@@ -9,23 +9,23 @@
 namespace carillon::run {
 namespace {
 
-/// Refuses before anything is assembled.
+/// Before the assembly.
 void check_method(const Run& run, std::int64_t unknowns) {
   if (run.job.method != job::Method::dense || unknowns <= eigen::kMaxDenseUnknowns) return;
   throw InputError(fmt::format("{}: \"solver.method\": \"dense\" solves up to {} unknowns, and the body has {}; take \"automatic\"",
                                run.job.file.string(), eigen::kMaxDenseUnknowns, unknowns));
 }
 
-/// Refuses before anything is solved.
+/// Before the solve.
 void check_pieces(const Run& run, const Body& body) {
   if (!run.job.nonlinear || body.pieces.components == 1) return;
   throw InputError(
-      fmt::format("{}: \"nonlinear\" couples the modes of one piece, and the body has {}: solve each as a body of its own, or "
-                  "leave \"nonlinear\" out",
+      fmt::format("{}: \"nonlinear\" needs a connected body, and this one has {} parts: solve each part separately, or "
+                  "remove \"nonlinear\"",
                   run.job.file.string(), body.pieces.components));
 }
 
-/// Elements that cannot bend without straining in the one way that the solid hardly allows are too stiff; docs/elements.md.
+/// Elements that cannot bend without the strain to which the solid is stiffest are too stiff; docs/elements.md.
 void warn_of_locking(Run& run, const material::Material& material, bool is_linear) {
   constexpr double kStiff = 50;
   if (is_linear && material.poisson_ratio > 0.4)
@@ -39,10 +39,10 @@ void warn_of_locking(Run& run, const material::Material& material, bool is_linea
     for (int j = 0; j < 3; ++j) c[6 * i + j] -= mean;
   const auto stiffness = material::calc_eigenvalues(c);
   if (stiffness[5] > kStiff * stiffness[4])
-    run.log.warn(
-        fmt::format("{}: the solid is {:.0f} times as stiff in one strain as in any other: coarse meshes lock and are some per cent sharp; "
-                    "compare with a finer one",
-                    material.place, stiffness[5] / stiffness[4]));
+    run.log.warn(fmt::format(
+        "{}: the solid is {:.0f} times stiffer in one strain than in any other: coarse meshes lock and are some per cent sharp; "
+        "compare with a finer one",
+        material.place, stiffness[5] / stiffness[4]));
 }
 
 }  // namespace

@@ -73,6 +73,9 @@ struct CommandLine {
         ->capture_default_str()
         ->needs(validate);
     app.add_flag("--json", options.json, "with --validate: print one JSON object")->needs(validate);
+    app.add_flag_callback(
+        "--keys", [] { throw CLI::CallForVersion(base::write_key_tables(job::describe_simulation_keys()), 0); },
+        "print the keys of jobs with defaults, ranges and meaning");
     app.set_version_flag("--version", base::describe("carillon-simulate"));
   }
 };

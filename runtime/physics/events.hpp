@@ -90,16 +90,14 @@ struct Statistics {
   std::int64_t sweeps = 0;      // over the contacts of a group
   std::int64_t mechanisms = 0;  // groups of bodies on joints
   std::int64_t flights = 0;     // integrations of their free motion
-  double seconds_cpu = 0.0;
-  EnergyAudit energy;     // zeros unless asked for
-  ContactAudit contacts;  // likewise
+  EnergyAudit energy;           // zeros unless asked for
+  ContactAudit contacts;        // likewise
 };
 
 /// A finished simulation: impulses in order of time; per body, poses in order of time (at least at 0 and at the end).
 struct Simulation {
   std::vector<Impulse> impulses;
   std::vector<std::vector<Pose>> poses;
-  double seconds_cpu = 0.0;
   std::int64_t steps = 0;
 };
 

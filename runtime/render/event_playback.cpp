@@ -9,13 +9,13 @@ namespace {
 
 constexpr double kNever = -std::numeric_limits<double>::infinity();
 
-/// The waypoints of one track that count at the same time.
+/// Waypoints of one track that are in use at the same time.
 struct PathMemory {
   double reach_s = 0.0;
-  std::deque<double> times_s;  // of those that may still count
+  std::deque<double> times_s;  // times still in use
   std::size_t largest = 2;
 
-  /// The waypoint `last` is known when what left `reach_s` before the one before it is still under way.
+  /// Waypoint `last` is needed once sound that left `reach_s` before its predecessor is still travelling.
   void add(double time_s) {
     while (times_s.size() > 1 && times_s[1] < times_s.back() - reach_s) times_s.pop_front();
     times_s.push_back(time_s);
@@ -36,20 +36,21 @@ EventPlayback::Survey EventPlayback::survey(const scene::Events& events, const s
     const auto* impulse = std::get_if<events::Impulse>(&event);
     const auto* force = std::get_if<events::Force>(&event);
     const scene::ScheduledBody* body = impulse != nullptr ? times.find_body(impulse->body)
-                                : force != nullptr ? times.find_body(force->body)
-                                                   : nullptr;
+                                       : force != nullptr ? times.find_body(force->body)
+                                                          : nullptr;
     if (body == nullptr) return;
     const double ahead_s = scene::calc_half_length_s(event) + body->lead_s;
-    if (ahead_s < 10.0) margin_s = std::max(margin_s, ahead_s);  // false for what is no number
+    if (ahead_s < 10.0) margin_s = std::max(margin_s, ahead_s);  // false for NaN
   });
   return {margin_s, has_contacts ? end_s : kNever};
 }
 
-EventPlayback::EventPlayback(const scene::Events& events, const std::vector<scene::ScheduledBody>& bodies, std::span<const events::Listener> path)
+EventPlayback::EventPlayback(const scene::Events& events, const std::vector<scene::ScheduledBody>& bodies,
+                             std::span<const events::Listener> path)
     : EventPlayback(events, bodies, path, survey(events, bodies)) {}
 
-EventPlayback::EventPlayback(const scene::Events& events, const std::vector<scene::ScheduledBody>& bodies, std::span<const events::Listener> path,
-                             Survey survey)
+EventPlayback::EventPlayback(const scene::Events& events, const std::vector<scene::ScheduledBody>& bodies,
+                             std::span<const events::Listener> path, Survey survey)
     : events_(&events), path_(path), bodies_(bodies), survey_(survey), scheduler_(bodies, survey.margin_s), reader_(events) {
   scene::DueTimes times(bodies_, survey.margin_s);
   events.for_each([&](const events::Event& event) {
@@ -81,13 +82,13 @@ std::vector<int> EventPlayback::count_waypoints(std::span<const double> longest_
   return counts;
 }
 
-/// Whatever is due before a time happens at most kAheadS later, or is early, or comes out of order.
+/// Events due before a time occur at most kAheadS later, or are early, or out of order.
 void EventPlayback::read_until(double until_s) {
   for (; next_early_ < early_.size() && early_[next_early_].due_s < until_s; ++next_early_)
     scheduler_.add(early_[next_early_], events_->get(early_[next_early_].number));
   for (const events::Event* event = reader_.peek(); event != nullptr && read_s_ < until_s + kAheadS + kDisorderS; event = reader_.peek()) {
     const double time_s = events::get_time_s(*event);
-    if (time_s > read_s_) read_s_ = time_s;  // false for what is no number
+    if (time_s > read_s_) read_s_ = time_s;  // false for NaN
     scheduler_.add(*event, [&](const scene::DueEvent& due) { return !(time_s - due.due_s > kAheadS); });
     reader_.next();
   }
@@ -101,7 +102,7 @@ void EventPlayback::push_until(double until_s, synth::Synthesiser& synthesiser) 
       synthesiser.process(nullptr, 0, 0);
       waiting = 0;
     }
-    (void)synthesiser.push(event);  // what cannot be played is counted there
+    (void)synthesiser.push(event);  // rejected events are counted by the synthesiser
     ++waiting;
     return true;
   });

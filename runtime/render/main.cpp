@@ -10,10 +10,10 @@
 #include "runtime/base/file_limit.hpp"
 #include "runtime/base/message.hpp"
 #include "runtime/base/printable.hpp"
+#include "runtime/base/version.hpp"
 #include "runtime/base/whole_range.hpp"
 #include "runtime/render/program.hpp"
 #include "runtime/scene/scene.hpp"
-#include "runtime/base/version.hpp"
 
 namespace {
 
@@ -41,18 +41,20 @@ int main(int argc, char** argv) {
   app.add_option("--report", options.report, "Figures of the run: counts, seconds, level, gain")->option_text("OUT.json");
   app.add_option("--contacts", options.contacts, "Contacts file to play instead of the scene's physics and strikes")
       ->option_text("IN.jsonl");
-  app.add_option("--record", options.record, "Contacts file to write: all that happens, to be played again")->option_text("OUT.jsonl");
+  app.add_option("--record", options.record, "Contacts file to write: all events, for replay")->option_text("OUT.jsonl");
   app.add_option("--rate", options.rate_hz, "Sample rate instead of the scene's, 8000 to 192000")
       ->check(carillon::base::whole_range(8000, 192000), carillon::base::describe_whole_range(8000, 192000))
       ->option_text("HZ");
   app.add_option("--format", options.format, "pcm16, pcm24 (default), pcm32 or float, instead of the scene's")
       ->check(CLI::IsMember(carillon::scene::kSampleFormatNames))
       ->option_text("FORMAT");
-  app.add_flag(
-      "--audit", options.audit,
-      "Keep the books of energy: motion, modes, losses, radiation, and energy from nowhere; measure depths of contacts and count hits");
-  app.add_flag("--plan", options.plan, "Say for each body which effects are on, why, and what they will cost; no sound is made");
-  app.add_flag("-q,--quiet", options.quiet, "Print nothing but warnings and errors");
+  app.add_flag("--audit", options.audit,
+               "Audit energy (motion, modes, losses, radiation, balance error) and contacts (penetration depth, hit rate)");
+  app.add_flag("--plan", options.plan, "Print the effects of each body with reasons and estimated cost; no sound is made");
+  app.add_flag("-q,--quiet", options.quiet, "Print warnings and errors only");
+  app.add_flag_callback(
+      "--keys", [] { throw CLI::CallForVersion(carillon::base::write_key_tables(carillon::scene::describe_scene_keys()), 0); },
+      "Print the keys of scene files with defaults, ranges and meaning");
   app.set_version_flag("--version", carillon::base::describe("carillon-render"));
   try {
     app.parse(argc, argv);

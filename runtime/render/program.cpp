@@ -16,17 +16,17 @@
 #include "runtime/base/file.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/base/standard_output.hpp"
-#include "runtime/scene/effects/table.hpp"
+#include "runtime/render/render.hpp"
+#include "runtime/render/report.hpp"
+#include "runtime/render/sound/spectrogram.hpp"
+#include "runtime/render/sound_file.hpp"
+#include "runtime/render/surface_playback.hpp"
 #include "runtime/scene/banks.hpp"
+#include "runtime/scene/effects/table.hpp"
 #include "runtime/scene/events.hpp"
 #include "runtime/scene/microphones.hpp"
 #include "runtime/scene/planning.hpp"
-#include "runtime/render/render.hpp"
-#include "runtime/render/report.hpp"
 #include "runtime/scene/scene.hpp"
-#include "runtime/render/sound_file.hpp"
-#include "runtime/render/surface_playback.hpp"
-#include "runtime/render/sound/spectrogram.hpp"
 
 namespace carillon::render {
 namespace {
@@ -38,7 +38,7 @@ constexpr double kMaxAudibleHz = 20000.0;
 
 double get_seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-/// Prints "what: 40 %" on stderr: in place on a terminal, every quarter elsewhere.
+/// Prints "LABEL: 40 %" on stderr: in place on a terminal, otherwise every 25 %.
 class Progress {
  public:
   Progress(std::string what, bool quiet) : what_(std::move(what)), quiet_(quiet), terminal_(isatty(STDERR_FILENO) != 0) {}
@@ -61,13 +61,13 @@ class Progress {
 
 using base::is_standard_output;
 
-/// Where what the sound is made of waits until it is written.
+/// Folder of intermediate files.
 fs::path find_spool_folder(const fs::path& wav) {
   if (wav.empty() || is_standard_output(wav)) return {};
   return base::find_folder(wav);
 }
 
-/// Throws SystemError when the sound cannot fit on the disk: better now than after hours.
+/// Throws SystemError before the work if the sound does not fit on the disk.
 void check_room(const scene::Scene& scene, const fs::path& wav) {
   const std::uint64_t frames = count_frames(scene.duration_s, scene.sample_rate_hz);
   const std::size_t channels = scene::count_channels(scene);
@@ -83,14 +83,14 @@ void check_room(const scene::Scene& scene, const fs::path& wav) {
                   folder.string(), 1e-9 * static_cast<double>(space.available), 1e-9 * (kept + whole), 1e-9 * whole, 1e-9 * kept));
 }
 
-/// Files that appear together, when all of them are whole.
+/// Output files that appear together once all are complete.
 class Outputs {
  public:
   base::WholeFile& add(const fs::path& file, const char* what) {
     files_.push_back({std::make_unique<base::WholeFile>(file), what, file});
     return *files_.back().file;
   }
-  /// `notes`: where each is named; may be null.
+  /// `notes`: stream for the file names; may be null.
   void commit(std::FILE* notes) {
     for (const OutputFile& output : files_) {
       output.file->commit();
@@ -113,14 +113,14 @@ bool is_same_file(const fs::path& a, const fs::path& b) {
   return fs::weakly_canonical(fs::absolute(a), error) == fs::weakly_canonical(fs::absolute(b), error);
 }
 
-/// WAV is what is written, so that is what the name says.
+/// Only WAV is written; other extensions are refused.
 void check_sound_name(const fs::path& file) {
   const std::string extension = base::find_extension(file);
   if (file == "-" || extension == ".wav" || extension == ".wave") return;
   throw InputError(fmt::format("{}: the sound is written as WAV; give the output a name that ends in .wav", file.string()));
 }
 
-/// Every output: can be written, is none of the inputs, and is not named twice.
+/// Checks that every output is writable, differs from all inputs, and is named once.
 void check_outputs(const ProgramOptions& options, const scene::Scene& scene) {
   std::vector<std::pair<fs::path, std::string>> outputs;
   if (!options.plan && !is_standard_output(options.wav)) outputs.emplace_back(options.wav, "WAV file");
@@ -132,7 +132,8 @@ void check_outputs(const ProgramOptions& options, const scene::Scene& scene) {
   if (options.contacts) taken.emplace_back(*options.contacts, "contacts file to play");
   for (const scene::SceneBody& body : scene.bodies)
     if (!body.bank.empty()) taken.emplace_back(body.bank, fmt::format("bank of \"{}\"", body.name));
-  for (const scene::SceneSurface& surface : scene.surfaces) taken.emplace_back(surface.file, fmt::format("recording of \"{}\"", surface.name));
+  for (const scene::SceneSurface& surface : scene.surfaces)
+    taken.emplace_back(surface.file, fmt::format("recording of \"{}\"", surface.name));
   for (const auto& [file, what] : outputs) {
     for (const auto& [other, name] : taken) {
       if (is_same_file(file, other)) {
@@ -145,12 +146,12 @@ void check_outputs(const ProgramOptions& options, const scene::Scene& scene) {
   if (!options.plan) check_sound_name(options.wav);
 }
 
-/// A line for each body whose bank leaves out some of what is heard.
+/// One line per body whose bank ends below the audible range.
 void print_bands(std::FILE* notes, const scene::Scene& scene, double rate_hz) {
   for (const scene::SceneBody& body : scene.bodies) {
     const double end_hz = body.spec.bank->band_hz[1];
     if (end_hz < std::min(kMaxAudibleHz, 0.5 * rate_hz))
-      fmt::print(notes, "  {:<16} nothing above {:.5g} Hz, where its bank ends; compute one with a higher \"band_hz\" to hear more\n",
+      fmt::print(notes, "  {:<16} no modes above {:.5g} Hz, the limit of its bank; compute one with a higher \"band_hz\" to hear more\n",
                  base::printable(body.name), end_hz);
   }
 }
@@ -247,7 +248,7 @@ void print_warnings(const scene::Scene& scene, const Sound& sound, const Figures
   if (sound.resets > 0) fmt::print(stderr, "warning: {} times a body's state was no number and was cleared\n", sound.resets);
 }
 
-/// The scene with what the command line says instead of the file. Throws InputError.
+/// The scene with the overrides of the command line. Throws InputError.
 scene::Scene prepare_scene(const ProgramOptions& options) {
   scene::Scene scene = scene::read_scene(options.scene);
   if (options.rate_hz) scene.sample_rate_hz = *options.rate_hz;
@@ -256,7 +257,7 @@ scene::Scene prepare_scene(const ProgramOptions& options) {
     scene.output.format = static_cast<scene::SampleFormat>(name - scene::kSampleFormatNames.begin());
   }
   if (options.plan && (options.spectrogram || options.trajectory || options.report || options.record || !options.wav.empty())) {
-    throw InputError("--plan makes no sound and writes no files; leave the options that name files away");
+    throw InputError("--plan makes no sound and writes no files; remove the options that name files");
   }
   return scene;
 }
@@ -271,7 +272,7 @@ void print_plan(const scene::Scene& scene, const scene::Plan& plan) {
     fmt::print("{}: {}\n", base::printable(surface.name), describe_surface(scene, surface));
 }
 
-/// A run of the program: a scene, what happens in it, and its sound, each made from the one before.
+/// One run: scene, events, sound; each step uses the previous one.
 class Run {
  public:
   explicit Run(const ProgramOptions& options) : options_(&options), scene_(prepare_scene(options)) {
@@ -280,12 +281,12 @@ class Run {
     if (!options.plan) check_room(scene_, options.wav);
     read_surfaces(scene_);
     banks_ = scene::read_banks(scene_, options.quiet);
-    head_ = scene::make_head(scene_, scene_.sample_rate_hz);  // before the physics, for its errors
+    head_ = scene::make_head(scene_, scene_.sample_rate_hz);  // before the physics, to report its errors early
     for (const scene::SceneBody& body : scene_.bodies) body_banks_.push_back(body.spec.bank);
     figures_.bodies = scene_.bodies.size() + scene_.surfaces.size();
   }
 
-  /// What happens, and which effects the bodies need for it.
+  /// Events, and the effects that they need.
   scene::Plan find_events() {
     effects::SceneFacts facts =
         scene::make_facts(scene_, scene::make_microphones(scene_), options_->contacts.has_value() || scene::has_physics(scene_));
@@ -305,7 +306,7 @@ class Run {
     return scene::make_plan(std::move(facts), happened_.events);
   }
 
-  /// Renders the sound and writes all outputs: everything is made before anything is seen.
+  /// Renders the sound and writes all outputs; nothing is visible before all are complete.
   void render(const scene::Plan& plan) {
     const auto started = Clock::now();
     sound::SoundStore store(scene_.sample_rate_hz, scene::count_channels(scene_), make_spool("sound"));
@@ -364,7 +365,7 @@ class Run {
     if (!options_->quiet) print_summary(notes, scene_, sound, figures_);
     print_warnings(scene_, sound, figures_);
     if (to_standard_output) {
-      std::signal(SIGPIPE, SIG_IGN);  // a reader that goes is an error with a name
+      std::signal(SIGPIPE, SIG_IGN);  // a closed pipe is reported as an error
       write_sound(base::write_standard_output);
     }
     outputs.commit(options_->quiet ? nullptr : notes);
@@ -374,7 +375,7 @@ class Run {
   scene::Scene scene_;
   scene::Banks banks_;
   std::vector<const bank::Bank*> body_banks_;
-  std::optional<synth::ListeningHead> head_;  // of the listener
+  std::optional<synth::ListeningHead> head_;  // head of the listener
   scene::SceneEvents happened_;
   Figures figures_;
 };

@@ -11,18 +11,18 @@ struct ProgramOptions {
   std::filesystem::path scene;
   std::filesystem::path wav;  // "-" is standard output
   std::optional<std::filesystem::path> spectrogram, trajectory, report;
-  std::optional<std::filesystem::path> contacts;  // played instead of the scene's physics and strikes
+  std::optional<std::filesystem::path> contacts;  // replaces the scene's physics and strikes
   std::optional<std::filesystem::path> record;
-  std::optional<int> rate_hz;         // instead of the scene's
-  std::optional<std::string> format;  // instead of the scene's
-  bool audit = false;                 // books of energy
-  bool plan = false;                  // say which effects are called for and why, instead of everything else
-  bool quiet = false;                 // print nothing but warnings
+  std::optional<int> rate_hz;         // overrides the scene's
+  std::optional<std::string> format;  // overrides the scene's
+  bool audit = false;                 // energy balance
+  bool plan = false;                  // print the planned effects with reasons; no sound
+  bool quiet = false;                 // print warnings only
 };
 
-/// Reads everything, simulates, renders, writes everything; prints what it does on stdout (on stderr where the sound goes to stdout),
-/// progress and warnings on stderr. Files appear whole or not at all, and all together. Memory does not grow with the length of the scene.
-/// Throws InputError before any work when an input is bad or an output cannot be written.
+/// Reads all inputs, simulates, renders and writes all outputs. Notes go to stdout (stderr if the sound goes to stdout), progress and
+/// warnings to stderr. Outputs appear together and complete, or not at all. Memory does not grow with the length of the scene. Throws
+/// InputError before any work for an invalid input or an unwritable output.
 void run(const ProgramOptions& options);
 
 }  // namespace carillon::render

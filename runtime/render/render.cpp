@@ -1,7 +1,4 @@
-// Method:     the bodies of the scene in a synthesiser, to which the events are pushed block by block; its latency is cut off the
-//             beginning.
-// Source:     OCE01 (two receivers 20 cm apart or a list of them).
-// Deviations: heads do not shade.
+// Method: a synthesiser with the bodies of the scene; events are pushed block by block, and the latency is cut off at the beginning.
 #include "runtime/render/render.hpp"
 
 #include <fmt/format.h>
@@ -29,17 +26,17 @@ using synth::Effect;
 constexpr std::size_t kBlock = synth::kBlock;
 constexpr double kReferencePa = 20e-6;
 constexpr double kFastS = 0.125;
-constexpr double kFarthestHeardM = 15e3;  // what a body sends from further away is not heard (84 dB down, and memory has an end)
-constexpr int kMaxWaitingStrikes = 256;   // of a body, waiting or acting at once
-constexpr int kMaxForces = 512;           // of a body that gets any
+constexpr double kFarthestHeardM = 15e3;  // maximum audible distance (-84 dB); bounds the delay lines
+constexpr int kMaxWaitingStrikes = 256;   // per body, waiting or active
+constexpr int kMaxForces = 512;           // per body that receives forces
 
-/// What the events say about one body.
+/// Summary of the events of one body.
 struct BodySummary {
-  bool is_played = false;    // something happens to it
-  bool is_touched = false;   // by a contact that lasts
-  bool is_pushed = false;    // by forces known step by step
-  events::BodyMotion first;  // where it is at the beginning
-  double reach_m = 0.0;      // how far from the first microphone's place it ever gets
+  bool is_played = false;    // has events
+  bool is_touched = false;   // has a lasting contact
+  bool is_pushed = false;    // has time-stepped forces
+  events::BodyMotion first;  // pose at the start
+  double reach_m = 0.0;      // maximum distance from the first microphone's initial position
 };
 
 std::vector<BodySummary> summarise(const scene::Scene& scene, const std::vector<const bank::Bank*>& banks, const scene::Events& events,
@@ -86,8 +83,7 @@ std::vector<synth::EffectSet> find_body_effects(const scene::Scene& scene, const
   return found;
 }
 
-/// What comes out of the synthesiser on its way into the store: measured, and with its end held back until it is known whether it has to
-/// fade.
+/// Measures the synthesiser's output on its way into the store. The end is held back until the need for a fade is known.
 class Outlet {
  public:
   Outlet(sound::SoundStore& store, std::uint64_t frames, bool fades)
@@ -96,7 +92,7 @@ class Outlet {
         tail_begin_(fades ? frames - std::min<std::uint64_t>(frames, static_cast<std::uint64_t>(std::llround(kFadeS * store.get_rate_hz())))
                           : frames) {}
 
-  /// The next frames, by channels.
+  /// Next frames, one span per channel.
   void add(const std::vector<const float*>& channels, std::size_t count) {
     for (std::size_t n = 0; n < count; ++n)
       for (const float* channel : channels) frames_.push_back(channel[n]);
@@ -118,11 +114,11 @@ class Outlet {
     sound.levels = meter_.calc_levels();
     sound.frames = store_->get_frames();
   }
-  /// CPU time of what is not playing: of measuring and storing, up to now.
+  /// CPU time spent measuring and storing so far.
   double get_seconds_cpu() const { return seconds_cpu_; }
 
  private:
-  static constexpr std::size_t kHeld = 8192;  // frames: the clock is asked twice for so many
+  static constexpr std::size_t kHeld = 8192;  // frames per reading of the clock
 
   void pass_on() {
     const double began = base::get_process_cpu_s();
@@ -148,26 +144,26 @@ class Outlet {
   double seconds_cpu_ = 0.0;
 };
 
-/// Below which pressure at 1 m a body sleeps: where the selector is free to choose, what is inaudible.
+/// Sleep threshold, pressure at 1 m: inaudible if the selector is free to choose.
 double find_silence_pa(const scene::Scene& scene, std::size_t body, const scene::Plan* plan) {
   if (scene.quality.silence_pa) return *scene.quality.silence_pa;
   const bool is_planned = plan != nullptr && scene.bodies[body].overrides.automatic && !scene.bodies[body].overrides.on.has(Effect::kModal);
   return is_planned ? plan->selector.calc_silence_pa(static_cast<int>(body)) : synth::BodySettings{}.silence_pa;
 }
 
-/// How far the microphones ever get from where the first of them starts.
+/// Maximum distance of the microphones from the first one's initial position.
 double calc_reach_m(const scene::Scene& scene, const scene::Microphones& microphones, const Vec3& base) {
   double path_m = 0.0, offset_m = 0.0;
   for (const synth::PathPoint& place : scene.listener.path) path_m = std::max(path_m, calc_length(place.position_m - base));
   for (const Vec3& x : microphones.offset_m) offset_m = std::max(offset_m, calc_length(x));
-  // By way of a floor it is farther by at most twice the height of who hears.
+  // A floor adds at most twice the receiver's height.
   double height_m = 0.0;
   if (const std::optional<synth::Floor> floor = scene::find_floor(scene))
     height_m = std::max(0.0, floor->calc_height_m(base)) + path_m + offset_m;
   return path_m + offset_m + 2.0 * height_m + 1.0;
 }
 
-/// A scene whose events are all known, rendered block by block.
+/// Renders a scene whose events are all known, block by block.
 class Rendering {
  public:
   Rendering(const scene::Scene& scene, const std::vector<const bank::Bank*>& banks, const scene::Events& events,
@@ -185,7 +181,7 @@ class Rendering {
     if (!scene.surfaces.empty()) surfaces_.emplace(scene, session_.get_microphones(), session_.get_head(), options.rate_hz);
   }
 
-  /// What is known before anything is rendered.
+  /// State before the first sample.
   void describe(Sound& sound) const {
     sound.rate_hz = options_->rate_hz;
     sound.channels = session_.get_microphones().offset_m.size();
@@ -196,7 +192,7 @@ class Rendering {
     }
   }
 
-  /// Renders so many samples, without those of the latency at the beginning, into the outlet.
+  /// Renders `count` samples, excluding the initial latency, into the outlet.
   void render(std::size_t samples, Outlet& outlet) {
     const std::size_t latency = synthesiser_->get_latency();
     const auto rate_hz = static_cast<double>(options_->rate_hz);
@@ -229,7 +225,7 @@ class Rendering {
     max_modes_j_ = std::max(max_modes_j_, held_j);
   }
 
-  /// What the synthesiser has counted.
+  /// Counters of the synthesiser.
   void count(Sound& sound) const {
     const synth::SynthesiserCounters counters = synthesiser_->get_counters();
     sound.strikes = counters.strikes;
@@ -260,7 +256,7 @@ class Rendering {
     return bodies;
   }
 
-  /// The synthesiser with its bodies and as much room as these events need.
+  /// The synthesiser with its bodies and the capacity that these events need.
   synth::Synthesiser& open() {
     const double ears_reach_m = calc_reach_m(*scene_, session_.get_microphones(), base_);
     std::vector<double> longest_m, longest_s;
@@ -274,7 +270,7 @@ class Rendering {
     room.max_waypoints = waypoints.back();
     synth::Synthesiser& synthesiser = session_.open(room);
     for (std::size_t i = 0; i < summaries_.size(); ++i) {
-      // Once a process, and not while the sound plays.
+      // once per process, before playback
       if (effects_[i].has_any(synth::kContactEffects)) synth::Texture::make_tables();
       synth::BodySettings settings = session_.make_settings(i, effects_[i]);
       settings.position_m = summaries_[i].first.position_m;
@@ -292,14 +288,14 @@ class Rendering {
   const scene::Scene* scene_;
   const RenderOptions* options_;
   scene::Session session_;
-  std::vector<events::Listener> path_;  // the listener's
-  Vec3 base_;                           // where the listener starts
+  std::vector<events::Listener> path_;  // path of the listener
+  Vec3 base_;                           // initial position of the listener
   std::vector<BodySummary> summaries_;  // per body
   std::vector<synth::EffectSet> effects_;  // per body
   EventPlayback playback_;
   synth::Synthesiser* synthesiser_;
   double max_modes_j_ = 0.0;
-  std::optional<SurfacePlayback> surfaces_;  // none where the scene has no recorded surfaces
+  std::optional<SurfacePlayback> surfaces_;  // empty without recorded surfaces
 };
 
 }  // namespace

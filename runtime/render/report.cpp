@@ -15,11 +15,11 @@ namespace carillon::render {
 namespace {
 
 constexpr double kPosesPerS = 200.0;
-constexpr std::size_t kPiece = 1 << 16;  // bytes that are handed on at once
+constexpr std::size_t kPiece = 1 << 16;  // bytes per write
 
 using Paths = base::RecordLists<physics::Pose>;
 
-/// Where each body has been. After an impact it is where it was before.
+/// Path of each body. At the time of an impact: the pose before it.
 Paths collect_paths(const std::vector<const bank::Bank*>& banks, const scene::Events& events, base::Spool spool) {
   Paths paths(banks.size(), std::move(spool));
   std::vector<std::optional<double>> last_s(banks.size());
@@ -34,11 +34,11 @@ Paths collect_paths(const std::vector<const bank::Bank*>& banks, const scene::Ev
   return paths;
 }
 
-/// Every pose that lies at least 1 / 200 s after the one kept before it, and the last, which takes the place of the one before.
+/// Keeps poses at least 1 / 200 s apart, and the last one, which replaces its predecessor.
 template <class Work>
 void for_kept_poses(const Paths& paths, std::size_t body, Work&& work) {
   Paths::Reader reader(paths, body);
-  std::optional<physics::Pose> waiting, last;  // kept, yet the last may replace it; read
+  std::optional<physics::Pose> waiting, last;  // kept unless replaced by the last pose; most recent
   std::size_t kept = 0;
   double kept_s = 0.0;
   for (const physics::Pose* pose = reader.peek(); pose != nullptr; pose = reader.peek()) {
@@ -56,7 +56,7 @@ void for_kept_poses(const Paths& paths, std::size_t body, Work&& work) {
   if (!is_kept) work(*last);
 }
 
-/// Follows a path as time advances.
+/// Looks up poses at increasing times.
 class PathCursor {
  public:
   PathCursor(const Paths& paths, std::size_t body) : reader_(paths, body) {
@@ -66,7 +66,7 @@ class PathCursor {
     reader_.next();
   }
   bool is_empty() const { return around_.empty(); }
-  /// As find_pose of the whole path, for times that hardly go back.
+  /// find_pose() of the whole path, for nearly monotonic times.
   physics::Pose find(double time_s) {
     while (around_.back().time_s <= time_s) {
       const physics::Pose* next = reader_.peek();
@@ -79,12 +79,12 @@ class PathCursor {
   }
 
  private:
-  static constexpr std::size_t kKept = 512;  // poses before the time asked for last; a second of physics
+  static constexpr std::size_t kKept = 512;  // poses kept before the last requested time: one second of physics
   Paths::Reader reader_;
   std::vector<physics::Pose> around_;
 };
 
-/// What an event pushes by; a piece of a pulse counts as one.
+/// Impulse of an event; pieces of one pulse count as one.
 std::optional<events::Impulse> find_impulse(const events::Event& event) {
   if (const auto* impulse = std::get_if<events::Impulse>(&event)) return *impulse;
   const auto* force = std::get_if<events::Force>(&event);
@@ -103,7 +103,7 @@ Vec3 find_contact_point(const bank::Bank& bank, const physics::Impulse& impulse)
   return point;
 }
 
-/// JSON has no infinity: silence has the level null.
+/// Silence has the level null: JSON has no infinity.
 base::Json make_level_json(double db) { return base::finite_or_null(db, base::decimals, 2); }
 
 base::Json make_figure(double value, int digits = 6) { return base::finite_or_null(value, base::significant, digits); }
@@ -122,7 +122,7 @@ base::Json make_effects_json(const scene::Plan& plan, const Sound& sound, std::s
   return json;
 }
 
-/// What supports take of a body's modes.
+/// Effect of supports on the modes of a body.
 base::Json make_mounting_json(const scene::Mounting& mounting) {
   return base::Json::object()
       .set("text", base::printable(mounting.text))
@@ -236,8 +236,8 @@ base::Json describe_impulse(const events::Impulse& impulse, const Vec3& world_m)
       .set("duration_s", base::significant(impulse.duration_s, 6));
 }
 
-/// A JSON object of long lists, handed to a sink in pieces, so that memory does not grow with their lengths. Keeps which objects and lists
-/// are open; each member and element stands on a line of its own.
+/// Streams a JSON object with long lists to a sink in pieces; memory does not grow with their lengths. Tracks the open objects and lists;
+/// one line per member and element.
 class JsonPieces {
  public:
   explicit JsonPieces(const std::function<void(std::string_view)>& sink) : sink_(&sink) { open('{', '}'); }
@@ -258,7 +258,7 @@ class JsonPieces {
     place("");
     open('{', '}');
   }
-  /// Of what was begun last.
+  /// of the innermost open object or list
   void end() {
     const Level level = levels_.back();
     levels_.pop_back();
@@ -318,12 +318,12 @@ std::string describe_pair(const scene::Scene& scene, int body, int other) {
 
 std::vector<std::string> list_contact_warnings(const scene::Scene& scene, const physics::ContactAudit& contacts,
                                                const physics::EnergyAudit& energy) {
-  constexpr double kMaxLifted = 0.01;  // of the largest kinetic energy
-  constexpr double kMaxHits = 500.0;   // per s, of two bodies, for half a second
+  constexpr double kMaxLifted = 0.01;  // share of the largest kinetic energy
+  constexpr double kMaxHits = 500.0;   // per second and pair of bodies, over half a second
   std::vector<std::string> warnings;
   if (const physics::Depth& d = contacts.unexplained; d.calc_excess() > 1.0)
     warnings.push_back(fmt::format(
-        "{} were {:.3g} mm inside each other at {:.4g} s, beyond what their impacts explain (0.1 mm, or 5 % of the thickness, are right)",
+        "{} were {:.3g} mm inside each other at {:.4g} s, more than their impacts explain (0.1 mm, or 5 % of the thickness, are right)",
         describe_pair(scene, d.body, d.other), 1e3 * d.unexplained_m, d.time_s));
   if (energy.lifted_j > kMaxLifted * energy.kinetic_j)
     warnings.push_back(fmt::format("bodies that were moved apart gained {:.3g} J, {:.2g} % of the largest kinetic energy", energy.lifted_j,

@@ -1,7 +1,5 @@
-// Method:     the header is ours, since libsndfile writes its own twice and so needs a file that it can go back in; the samples are
-//             libsndfile's, as a file without a header.
-// Source:     Microsoft, Multimedia Programming Interface and Data Specifications 1.0 (1991); EBU Tech 3306 (2009) for RF64.
-// Deviations: none.
+// Method: the header is written here because libsndfile needs a seekable file for its own; the samples come from libsndfile, headerless.
+// Source: Microsoft, Multimedia Programming Interface and Data Specifications 1.0 (1991); EBU Tech 3306 (2009) for RF64.
 #include "runtime/render/sound_file.hpp"
 
 #include <fmt/format.h>
@@ -17,7 +15,7 @@ namespace {
 constexpr std::uint64_t kMax32 = 0xffffffffU;
 
 struct Encoding {
-  int subtype;  // of libsndfile
+  int subtype;  // libsndfile's code
   unsigned tag, bits;
 };
 
@@ -35,7 +33,7 @@ Encoding get_encoding(scene::SampleFormat format) {
   return {SF_FORMAT_PCM_24, 1, 24};
 }
 
-/// Little-endian bytes.
+/// Appends little-endian bytes.
 void add(std::string& bytes, std::uint64_t value, int count) {
   for (int i = 0; i < count; ++i) bytes += static_cast<char>(value >> (8 * i) & 0xff);
 }
@@ -44,7 +42,7 @@ std::uint64_t calc_data_bytes(std::size_t channels, scene::SampleFormat format, 
   return frames * channels * (get_encoding(format).bits / 8);
 }
 
-/// What libsndfile writes is passed on to the sink; what the sink throws waits here, since libsndfile is C.
+/// Forwards libsndfile's output to the sink; exceptions are stored and rethrown outside C code.
 struct Passage {
   const std::function<void(std::string_view)>* sink = nullptr;
   sf_count_t at = 0;
@@ -115,7 +113,8 @@ std::uint64_t calc_wav_bytes(std::size_t channels, scene::SampleFormat format, s
   return make_wav_header(1, channels, format, frames).size() + data + data % 2;
 }
 
-void write_wav(const sound::SoundStore& sound, double gain_per_pa, scene::SampleFormat format, const std::function<void(std::string_view)>& sink) {
+void write_wav(const sound::SoundStore& sound, double gain_per_pa, scene::SampleFormat format,
+               const std::function<void(std::string_view)>& sink) {
   sink(make_wav_header(sound.get_rate_hz(), sound.get_channels(), format, sound.get_frames()));
   Passage passage{.sink = &sink};
   SF_VIRTUAL_IO io{get_length, seek, read, write, get_position};
@@ -126,7 +125,7 @@ void write_wav(const sound::SoundStore& sound, double gain_per_pa, scene::Sample
   const auto close = [](SNDFILE* file) { sf_close(file); };
   std::unique_ptr<SNDFILE, decltype(close)> file(sf_open_virtual(&io, SFM_WRITE, &info, &passage), close);
   if (!file) throw SystemError(fmt::format("cannot make a WAV file: {}", sf_strerror(nullptr)));
-  sf_command(file.get(), SFC_SET_CLIPPING, nullptr, SF_TRUE);  // a sample at full scale exactly must not wrap round
+  sf_command(file.get(), SFC_SET_CLIPPING, nullptr, SF_TRUE);  // clips instead of wrapping at full scale
   std::vector<double> scaled;
   sound.for_each_piece([&](std::uint64_t, std::span<const float> frames) {
     scaled.resize(frames.size());

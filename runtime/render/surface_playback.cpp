@@ -1,8 +1,7 @@
-// Method:     a Player for each time that a recording is played, with the ears, microphones and their images under a ground that reflects
-//             as receivers, all turned into the world of the recording. Behind it: the scene's sample rate, the DC blocker of simulations,
-//             the gain, and a head that hears it from the middle of its bodies.
-// Source:     docs/equations.md E14; docs/surface-format.md.
-// Deviations: bodies of the scene do not shade or reflect it; with a head all bodies of one recording come from one direction.
+// Method: one Player per pass of a recording; receivers are the ears or microphones and their images under a reflecting ground, in the
+// coordinates of the recording. Then resampling to the scene's rate, the DC blocker of simulations, gain, and optionally the head.
+// With a head, all bodies of one recording come from one direction, their centre. Other bodies neither shade nor reflect.
+// Source: docs/equations.md E14; docs/surface-format.md.
 #include "runtime/render/surface_playback.hpp"
 
 #include <fmt/format.h>
@@ -13,26 +12,26 @@
 #include <list>
 #include <map>
 
-#include "runtime/base/clock.hpp"
-#include "runtime/base/error.hpp"
-#include "runtime/base/quaternion.hpp"
 #include "runtime/acoustics/head/head.hpp"
 #include "runtime/acoustics/recording/high_pass.hpp"
 #include "runtime/acoustics/recording/player.hpp"
 #include "runtime/acoustics/recording/recording.hpp"
 #include "runtime/acoustics/recording/resampler.hpp"
+#include "runtime/base/clock.hpp"
+#include "runtime/base/error.hpp"
+#include "runtime/base/quaternion.hpp"
 #include "runtime/synth/head_ears.hpp"
 #include "runtime/synth/trajectory.hpp"
 
 namespace carillon::render {
 namespace {
 
-constexpr std::size_t kPiece = 1024;    // samples that are made at once
-constexpr std::size_t kTurn = 32;       // samples over which the direction from a head fades
-constexpr int kTailPieces = 4;          // of what resamplers hold: 16 samples of a recording, 3072 of the scene at most
-constexpr double kShortestLoopS = 0.1;  // each round is a player of its own
-constexpr double kLoudestPa = 1e6;      // ten bar: no sound
-// CPU time for a triangle and a sample of the recording, and more for each receiver (one core, AMD EPYC, Zen 5).
+constexpr std::size_t kPiece = 1024;    // samples per piece
+constexpr std::size_t kTurn = 32;       // samples over which the head's direction fades
+constexpr int kTailPieces = 4;          // tail of the resamplers: 16 samples of a recording, at most 3072 of the scene
+constexpr double kShortestLoopS = 0.1;  // each pass has a player of its own
+constexpr double kLoudestPa = 1e6;      // ten bar: implausible
+// CPU time per triangle and sample of the recording, and per additional receiver (one core, AMD EPYC, Zen 5).
 constexpr double kTriangleSampleNs = 45.0;
 constexpr double kReceiverSampleNs = 65.0;
 
@@ -46,7 +45,7 @@ bool is_heard_by_head(const scene::Scene& scene) {
   return scene::has_head(scene) && scene.effects.has(synth::Effect::kHead) && scene.effects.has(synth::Effect::kTwoEars);
 }
 
-/// Of the scene: [s].
+/// Scene time [s].
 double calc_start_s(const scene::SceneSurface& surface, double rate_hz) { return std::round(surface.start_s * rate_hz) / rate_hz; }
 
 std::string format_rate(double rate_hz) { return fmt::format("{:.6g} Hz", rate_hz); }
@@ -95,11 +94,11 @@ std::string describe_surface(const scene::Scene& scene, const scene::SceneSurfac
   const std::size_t channels = scene::count_channels(scene);
   std::string text = fmt::format("recorded surface, {} triangles of {} {}, {:.4g} s from {:g} s on{}", header.triangles, header.bodies,
                                  header.bodies == 1 ? "body" : "bodies", surface.recording->get_duration_s(), surface.start_s,
-                                 surface.loop ? ", again and again" : "");
-  text += plan.has_head                  ? "; by a head, since the listener has one"
+                                 surface.loop ? ", looped" : "");
+  text += plan.has_head                  ? "; heard through the listener's head"
           : !scene.microphones_m.empty() ? fmt::format("; at {} {}", channels, channels == 1 ? "microphone" : "microphones")
-                                         : "; at two free ears, since the listener has no head";
-  text += plan.is_reflected ? fmt::format("; by way of the ground, too, which reflects {:g} of the pressure", *scene.reflection) : "";
+                                         : "; heard at two free ears";
+  text += plan.is_reflected ? fmt::format("; with ground reflection, {:g} of the pressure", *scene.reflection) : "";
   text += plan.is_resampled ? fmt::format("; from {} to {}, since the scene has that rate", format_rate(header.sample_rate_hz),
                                           format_rate(scene.sample_rate_hz))
                             : "";
@@ -128,11 +127,11 @@ base::Json make_surface_json(const scene::Scene& scene, const scene::SceneSurfac
       .set("peak_pa", base::finite_or_null(figures.peak_pa, base::significant, 6));
 }
 
-/// A recorded surface at all ears. Invariant: pieces come in order; a round of the recording that is over takes no memory.
+/// Playback of one recorded surface at all receivers. Invariant: pieces come in order; finished passes free their memory.
 class SurfacePlayback::Voice {
  public:
-  Voice(const scene::Scene& scene, const scene::SceneSurface& surface, const scene::Microphones& microphones, const std::optional<synth::ListeningHead>& head,
-        int rate_hz)
+  Voice(const scene::Scene& scene, const scene::SceneSurface& surface, const scene::Microphones& microphones,
+        const std::optional<synth::ListeningHead>& head, int rate_hz)
       : surface_(&surface),
         recording_(surface.recording.get()),
         microphones_(&microphones),
@@ -148,10 +147,10 @@ class SurfacePlayback::Voice {
     for (std::size_t way = 0; head_ && way < ways; ++way) ears_.emplace_back(head_->head);
   }
 
-  /// Samples from the beginning that are not heard: those of the head's latency.
+  /// Latency of the head: samples not heard at the beginning.
   std::size_t get_latency() const { return head_ ? static_cast<std::size_t>(head_->head->get_latency()) : 0; }
 
-  /// Adds the next kPiece samples, which a head makes later by its latency, to out (channels, kPiece).
+  /// Adds the next kPiece samples to out (channels, kPiece), delayed by the head's latency.
   void add(std::vector<std::vector<double>>& out) {
     const std::size_t receivers = blockers_.size();
     heard_.assign(receivers * kPiece, 0.0);
@@ -161,7 +160,7 @@ class SurfacePlayback::Voice {
       for (double& p : get_heard(i)) {
         if (!(std::abs(p) <= kLoudestPa))
           throw InputError(
-              fmt::format("{}: the recording {} of body \"{}\" makes {:.3g} Pa about {:.3g} s, which is no sound; give it "
+              fmt::format("{}: the recording {} of body \"{}\" makes {:.3g} Pa about {:.3g} s, which is implausible; give it "
                           "another place, or run carillon-simulate again",
                           surface_->place, surface_->file.string(), surface_->name, p, static_cast<double>(at_) / rate_hz_));
         p = gain * blockers_[i].next(p, alpha_);
@@ -176,17 +175,17 @@ class SurfacePlayback::Voice {
   }
 
  private:
-  /// A time that the recording is played.
+  /// One pass of the recording.
   struct Round {
     std::uint64_t begin;  // sample of the scene
     recording::Player player;
-    std::vector<recording::Resampler> resamplers;  // per receiver; none where the rates are the same
-    int left = kTailPieces;                        // pieces that follow when the player is over
+    std::vector<recording::Resampler> resamplers;  // per receiver; empty at equal rates
+    int left = kTailPieces;                        // pieces left after the player's end
   };
 
   std::span<double> get_heard(std::size_t receiver) { return std::span(heard_).subspan(receiver * kPiece, kPiece); }
 
-  /// A receiver in the world of the recording, at a time of the scene.
+  /// Position of a receiver in the recording's coordinates, at scene time.
   recording::MovingMicrophone find(std::size_t receiver, double time_s) const {
     const bool is_mirrored = receiver >= offsets_m_.size();
     const synth::Waypoint listener = microphones_->centre.find(time_s);
@@ -202,7 +201,7 @@ class SurfacePlayback::Voice {
     return at;
   }
 
-  /// The rounds that sound in this piece, into heard_.
+  /// Renders the passes that sound in this piece into heard_.
   void play() {
     const std::size_t receivers = blockers_.size();
     const double length = recording_->get_duration_s() * rate_hz_;
@@ -236,14 +235,14 @@ class SurfacePlayback::Voice {
     rounds_.remove_if([](Round& round) { return round.player.is_over() && round.left-- == 0; });
   }
 
-  /// Straight, and then by way of the ground, each from its direction.
+  /// Direct sound, then ground reflection, each from its direction.
   void hear_by_head(std::vector<std::vector<double>>& out) {
     const recording::Header& header = recording_->get_header();
     for (std::size_t n = 0; n < kPiece; n += kTurn) {
       const double time_s = static_cast<double>(at_ + n + kTurn) / rate_hz_;
       const Vec3 listener = microphones_->centre.find(time_s).position_m + offsets_m_[0];
       for (std::size_t way = 0; way < ears_.size(); ++way) {
-        // The middle of the bodies when what arrives now left; a round before is enough to find its distance.
+        // Centre of the bodies at the retarded time; one iteration suffices.
         double age_s = 0.0;
         Vec3 to{};
         for (int round = 0; round < 3; ++round) {
@@ -258,7 +257,7 @@ class SurfacePlayback::Voice {
     }
   }
 
-  /// Of the bodies of the recording, in the scene, at a time of it.
+  /// Centre of the bodies of the recording in scene coordinates, at scene time.
   Vec3 find_middle(double time_s) const {
     const recording::Header& header = recording_->get_header();
     double played_s = std::max(0.0, time_s - static_cast<double>(start_) / rate_hz_);
@@ -275,25 +274,26 @@ class SurfacePlayback::Voice {
   std::uint64_t start_;
   double alpha_;
   std::optional<synth::ListeningHead> head_;
-  std::optional<synth::Floor> floor_;          // where it is heard by way of it
-  std::vector<Vec3> offsets_m_;                // of ears or microphones, or of the middle of the head
-  std::vector<recording::HighPass> blockers_;  // per receiver: those at offsets_m_, then their images
-  std::vector<synth::HeadEars> ears_;          // of a head: straight, then by way of the ground
+  std::optional<synth::Floor> floor_;          // if the ground reflects
+  std::vector<Vec3> offsets_m_;                // of ears or microphones; of the head's centre
+  std::vector<recording::HighPass> blockers_;  // per receiver: offsets_m_, then their images
+  std::vector<synth::HeadEars> ears_;          // of a head: direct, then reflected
   std::list<Round> rounds_;
-  std::uint64_t count_ = 0, at_ = 0;                // rounds that began; samples that were made
+  std::uint64_t count_ = 0, at_ = 0;                // passes started; samples made
   std::vector<double> heard_, played_, resampled_;  // heard_ (receivers, kPiece)
 };
 
-SurfacePlayback::SurfacePlayback(const scene::Scene& scene, const scene::Microphones& microphones, const std::optional<synth::ListeningHead>& head,
-                                 int rate_hz)
+SurfacePlayback::SurfacePlayback(const scene::Scene& scene, const scene::Microphones& microphones,
+                                 const std::optional<synth::ListeningHead>& head, int rate_hz)
     : channels_(scene::count_channels(scene)), figures_(scene.surfaces.size()), ready_(channels_) {
-  for (const scene::SceneSurface& surface : scene.surfaces) voices_.push_back(std::make_unique<Voice>(scene, surface, microphones, head, rate_hz));
-  if (!voices_.empty()) latency_left_ = voices_[0]->get_latency();  // of all: a head is the scene's
+  for (const scene::SceneSurface& surface : scene.surfaces)
+    voices_.push_back(std::make_unique<Voice>(scene, surface, microphones, head, rate_hz));
+  if (!voices_.empty()) latency_left_ = voices_[0]->get_latency();  // same for all voices: one head per scene
 }
 
 SurfacePlayback::~SurfacePlayback() = default;
 
-/// The next piece, without the samples of a head's latency at the beginning.
+/// Next piece, without the head's latency at the beginning.
 void SurfacePlayback::fill() {
   for (std::vector<float>& channel : ready_) channel.erase(channel.begin(), channel.begin() + static_cast<std::ptrdiff_t>(used_));
   used_ = 0;

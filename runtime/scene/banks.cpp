@@ -2,14 +2,14 @@
 
 #include <fmt/format.h>
 
+#include "runtime/acoustics/radiation/transfers.hpp"
 #include "runtime/bank/corrected.hpp"
 #include "runtime/scene/missing_banks.hpp"
-#include "runtime/acoustics/radiation/transfers.hpp"
 
 namespace carillon::scene {
 namespace {
 
-/// What the supports take of the body's bank.
+/// Applies the support losses to the body's bank.
 void mount(Scene& scene, SceneBody& body, bank::Bank& bank) {
   const mounting::Losses losses = mounting::calc_losses(bank, body.support);
   if (losses.is_empty()) return;
@@ -26,7 +26,7 @@ void mount(Scene& scene, SceneBody& body, bank::Bank& bank) {
 Banks read_banks(Scene& scene, bool is_quiet) {
   find_missing_banks(scene, is_quiet);
   Banks banks;
-  std::map<std::filesystem::path, int> left;  // bodies that still need the bank as it is in the file
+  std::map<std::filesystem::path, int> left;  // bodies that still need the unmodified bank
   for (const SceneBody& body : scene.bodies) ++left[body.bank];
   std::map<std::filesystem::path, bank::Bank> files;
   std::map<const ReadBank*, const Mounting*> mountings;

@@ -1,4 +1,4 @@
-// The banks that a scene names.
+// Reads the banks of a scene.
 #pragma once
 
 #include <filesystem>
@@ -18,13 +18,12 @@ struct ReadBank {
   radiation::Limited limited;
   std::shared_ptr<const radiation::Transfers> transfers;  // nullptr without multipoles
 };
-/// By file, and what carries the body (mounting::write_key()).
+/// Key: file and support (mounting::write_key()).
 using Banks = std::map<std::pair<std::filesystem::path, std::string>, std::unique_ptr<ReadBank>>;
 
-/// Reads every bank once for every way in which its bodies are mounted, puts in what the supports take, and gives it the gains that the
-/// scene asks for; those of `"sphere"` are limited to what damping takes. The scene's bodies point into the result, and know its radius and
-/// in words how they are mounted; warnings about supports join the scene's. Throws InputError, which names scene and body.
-/// Banks that are missing are found or computed first (find_missing_banks()).
+/// Reads every bank once per way of support, applies the support losses and computes the gains of the scene; those of `"sphere"` are
+/// limited by damping. The scene's bodies point into the result and receive its radius and support summary; warnings about supports join
+/// the scene's. Missing banks are found or computed first (find_missing_banks()). Throws InputError naming scene and body.
 Banks read_banks(Scene& scene, bool is_quiet = false);
 
 }  // namespace carillon::scene

@@ -58,7 +58,7 @@ int DueTimes::find(const events::Event& event, DueEvent* due) {
   return find_waypoint(last_s_[motion->body], motion->time_s, number, due);
 }
 
-/// The first waypoint also says that the body rested there until then.
+/// The first waypoint is also pushed as a state of rest before it.
 int DueTimes::find_waypoint(double& last_s, double time_s, std::uint64_t number, DueEvent* due) const {
   const bool is_first = last_s == kFromTheStart;
   const double due_s = is_first ? kFromTheStart : last_s - margin_s_;
@@ -76,7 +76,7 @@ void EventScheduler::add_listener(std::span<const events::Listener> path) {
   for (const events::Listener& waypoint : path) times_.find_listener(waypoint, [&](const DueEvent& due) { add(due, waypoint); });
 }
 
-/// With the bodies' numbers in the synthesiser.
+/// Translates body numbers to those of the synthesiser.
 events::Event EventScheduler::make_event(const Queued& queued) const {
   events::Event event = queued.event;
   const auto get_number = [this](std::int32_t body) { return bodies_[body].number; };

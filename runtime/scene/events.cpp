@@ -14,7 +14,7 @@
 namespace carillon::scene {
 namespace {
 
-/// Where no body can move there is no physics: every body stays where the scene puts it.
+/// Without moving bodies there is no physics: every body stays at its initial pose.
 std::vector<events::Event> make_still(const Scene& scene) {
   std::vector<events::Event> events;
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
@@ -28,7 +28,7 @@ std::vector<events::Event> make_still(const Scene& scene) {
   return events;
 }
 
-/// Puts what a world says in order of time, and strikes between it: of what happens at one time, first what the world says, as it came.
+/// Merges events of the physics with strikes in order of time; at equal times those of the physics come first.
 class InOrder {
  public:
   InOrder(std::vector<events::Event> strikes, Events& out) : strikes_(std::move(strikes)), out_(&out) {}
@@ -50,7 +50,7 @@ class InOrder {
     bool operator>(const Waiting& other) const { return time_s != other.time_s ? time_s > other.time_s : order > other.order; }
   };
 
-  /// Nothing before that time will come.
+  /// No earlier event follows.
   void release(double until_s) {
     for (; !waiting_.empty() && waiting_.top().time_s < until_s; waiting_.pop()) {
       for (; next_ < strikes_.size() && events::get_time_s(strikes_[next_]) < waiting_.top().time_s; ++next_) out_->append(strikes_[next_]);
@@ -140,7 +140,7 @@ SceneEvents simulate(const Scene& scene, bool has_contacts, bool audits, const s
   SceneEvents happened{.bodies = list_bodies(scene), .events = Events(std::move(spool))};
   std::vector<const bank::Bank*> banks;
   for (const SceneBody& body : scene.bodies) banks.push_back(body.spec.bank);
-  Strikes strikes = make_strikes(scene, banks);  // they are refused before the physics, if at all
+  Strikes strikes = make_strikes(scene, banks);  // throws before the physics starts
   happened.blows = std::move(strikes.blows);
   happened.warnings = std::move(strikes.warnings);
   InOrder events(std::move(strikes.events), happened.events);
@@ -151,7 +151,7 @@ SceneEvents simulate(const Scene& scene, bool has_contacts, bool audits, const s
       for (std::string& question : physics::ask_about_links(make_world(scene))) happened.warnings.push_back(std::move(question));
       run_physics(scene, has_contacts, audits, progress, events, happened);
     } catch (const InputError& error) {
-      if (std::string_view(error.what()).starts_with(scene.file.string() + ":")) throw;  // of a key, with its line
+      if (std::string_view(error.what()).starts_with(scene.file.string() + ":")) throw;  // already names a line of the scene
       throw InputError(fmt::format("{}: {}", scene.file.string(), error.what()));
     } catch (const SolveError& error) {
       throw SolveError(fmt::format("{}: {}", scene.file.string(), error.what()));

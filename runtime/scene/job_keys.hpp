@@ -1,4 +1,4 @@
-// The keys of a job that a body of a scene may have in place of "bank".
+// Keys of a job that a body of a scene may have instead of "bank".
 #pragma once
 
 #include <array>

@@ -1,9 +1,7 @@
-// Method:     an impact of runtime/physics/impact in the frame of the mesh: the head is a body without spin or modes, what it strikes a body with
-//             the bank's modes, and its mass and inertia unless it is fixed. Springs: Hertz of head and body, or the felt's power law.
-//             Forces go out as samples.
-// Source:     runtime/physics/impact/impact.hpp; docs/equations.md E5a.
-// Deviations: the struck surface is taken as flat within the head's contact. A body that moves is struck as if it did not: speeds are
-//             relative to it.
+// Method: an impact (runtime/physics/impact) in the frame of the mesh. The head has neither spin nor modes; the struck body has the bank's
+// modes, and its mass and inertia unless fixed. Springs: Hertz contact of head and body, or the felt's power law. Forces are output as
+// samples. The surface is flat within the contact; speeds are relative to a moving body.
+// Source: docs/equations.md E5a.
 #include "runtime/scene/mallets.hpp"
 
 #include <fmt/format.h>
@@ -21,13 +19,13 @@
 namespace carillon::scene {
 namespace {
 
-constexpr double kLongestBlowS = 1.0;  // of one blow, and of what overlaps with it
-constexpr double kMinCosine = 0.05;    // of the way to the surface: flatter is past it
-constexpr double kDeepM = 0.05;        // that a felt goes in
+constexpr double kLongestBlowS = 1.0;  // of one blow and those that overlap it
+constexpr double kMinCosine = 0.05;    // of the angle of incidence; below it the head misses
+constexpr double kDeepM = 0.05;        // compression of a felt
 
 double calc_energy(double mass_kg, const Vec3& v) { return 0.5 * mass_kg * dot(v, v); }
 
-/// Place, normal out of the body and mode shapes there.
+/// Place, outward normal and mode shapes.
 struct Spot {
   Vec3 where_m{}, normal{};
   std::vector<double> shape;  // (n, 3)
@@ -62,7 +60,7 @@ impact::Body make_struck(const SceneBody& body, const bank::Bank& bank, const im
   return struck;
 }
 
-/// One head on its way to the body.
+/// One head approaching the body.
 struct Head {
   const Mallets::Strike* strike = nullptr;
   Spot spot;
@@ -93,7 +91,7 @@ Head make_head(const Mallets::Strike& strike, const bank::Bank& bank, int index)
   return head;
 }
 
-/// Of a rigid body with velocity and spin, at a place.
+/// Separation speed of the head and a rigid body with spin, at a place.
 double calc_parting(const impact::Body& head, const impact::Body& struck, const Spot& spot) {
   const Vec3 turned = cross(struck.spin_rad_s, spot.where_m - struck.centre_m);
   return dot(spot.normal, head.velocity_m_s - struck.velocity_m_s - turned);
@@ -107,8 +105,8 @@ std::span<const double> find_shape(const Head& head, const impact::Modes* modes)
   return modes != nullptr ? std::span<const double>(head.spot.shape) : std::span<const double>();
 }
 
-/// Lets the impact run to its end. A blow that comes meanwhile joins it: its head is so far away as it flies until its time. `next`: of the
-/// strikes, sorted by time. False when a head still presses after kLongestBlowS.
+/// Runs the impact to its end. Blows that start meanwhile join it, at the distance of their remaining flight. `next`: index into the
+/// strikes sorted by time. False if a head is still in contact after kLongestBlowS.
 bool run_to_end(impact::Impact& impact, std::vector<Head>& heads, const std::vector<Mallets::Strike>& strikes, std::size_t& next,
                 const bank::Bank& bank, const impact::Modes* modes) {
   const double begin_s = heads[0].strike->from->time_s;
@@ -125,7 +123,7 @@ bool run_to_end(impact::Impact& impact, std::vector<Head>& heads, const std::vec
   }
 }
 
-/// What came of the blow of one head; `after`: the bodies of the impact, the struck one first.
+/// Result of one head's blow; `after`: the bodies of the impact, the struck one first.
 Blow make_blow(const std::string& body, const impact::Impact& impact, const std::vector<Head>& heads, std::size_t i,
                const std::vector<impact::Body>& after, std::vector<std::string>& warnings) {
   const Head& head = heads[i];
@@ -133,8 +131,9 @@ Blow make_blow(const std::string& body, const impact::Impact& impact, const std:
   const impact::ElasticPulse pulse = impact::calc_elastic_pulse(head.contact.spring, head.body.mass_kg, came_m_s);
   const Mallet& mallet = *head.strike->from->mallet;
   if (const double deep_m = mallet.felt ? kDeepM : mallet.radius_m; pulse.compression_m > deep_m) {
-    warnings.push_back(fmt::format("{}: on something rigid the head would be pressed in by {:.3g} m; make it stiffer, lighter or slower",
-                                   head.strike->from->place, pulse.compression_m));
+    warnings.push_back(
+        fmt::format("{}: against a rigid surface the head would be compressed by {:.3g} m; make it stiffer, lighter or slower",
+                    head.strike->from->place, pulse.compression_m));
   }
   return {.body = body,
           .time_s = head.strike->from->time_s,
@@ -145,7 +144,7 @@ Blow make_blow(const std::string& body, const impact::Impact& impact, const std:
           .together = static_cast<int>(heads.size())};
 }
 
-/// The forces of the impact as events, and what they say of the blows, one for each head.
+/// Appends the forces of the impact as events, and one result per head.
 void add_forces(impact::Impact& impact, const std::vector<Head>& heads, std::span<Blow> blows, std::vector<events::Event>& events) {
   for (const impact::Pulse& pulse : impact.take_pulses()) {
     const Head& head = heads[pulse.contact];
@@ -172,7 +171,7 @@ void Mallets::play(const SceneBody& body, const bank::Bank& bank, std::vector<St
                    std::vector<Blow>& blows, std::vector<std::string>& warnings) {
   std::stable_sort(strikes.begin(), strikes.end(), [](const Strike& a, const Strike& b) { return a.from->time_s < b.from->time_s; });
   const impact::Modes* modes = modes_.find(bank).get();
-  std::vector<double> q, q_dot;  // how it rings, at `state_s`
+  std::vector<double> q, q_dot;  // modal state at `state_s`
   double state_s = 0.0;
   for (std::size_t next = 0; next < strikes.size();) {
     const double begin_s = strikes[next].from->time_s;
@@ -188,7 +187,7 @@ void Mallets::play(const SceneBody& body, const bank::Bank& bank, std::vector<St
     heads[0].contact.shape_b = find_shape(heads[0], modes);
     impact::Impact impact({struck, heads[0].body}, {heads[0].contact});
     if (!run_to_end(impact, heads, strikes, next, bank, modes)) {
-      warnings.push_back(fmt::format("{}: the mallet still presses on \"{}\" after {:g} s; the rest is left out",
+      warnings.push_back(fmt::format("{}: the mallet is still in contact with \"{}\" after {:g} s; the rest is omitted",
                                      heads[0].strike->from->place, body.name, kLongestBlowS));
     }
     const std::vector<impact::Body> after = impact.get_bodies();

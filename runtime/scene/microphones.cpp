@@ -38,7 +38,7 @@ std::vector<events::Listener> list_listener_path(const Microphones& microphones)
   for (std::size_t i = 0; i < microphones.centre.get_count(); ++i) {
     const synth::Waypoint& at = microphones.centre.get_waypoint(i);
     if (at.time_s < 0.0) continue;
-    if (path.empty()) add(microphones.centre.find(at.time_s));  // at rest until it sets out; or in the middle of its way
+    if (path.empty()) add(microphones.centre.find(at.time_s));  // at rest before the path starts, or on the path
     add(at);
   }
   return path;

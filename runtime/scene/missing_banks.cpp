@@ -41,7 +41,7 @@ fs::path make_bank(const Scene& scene, const SceneBody& body, bool is_quiet) {
   if (is_quiet) command.words.emplace_back("-q");
   command.output = base::kCapture;
   command.errors = base::kInherit;
-  command.signal_at_end = SIGTERM;  // removes its temporary folders
+  command.signal_at_end = SIGTERM;  // lets it remove its temporary folders
   const base::Finished finished = base::run(command, {.input = body.job.text, .max_bytes = kMaxPathBytes});
   if (finished.exit_code == 0) return finished.output.substr(0, finished.output.find('\n'));
   base::Result result = base::read_result(result_file).value_or(base::Result{.kind = base::ResultKind::system});
@@ -55,7 +55,7 @@ fs::path make_bank(const Scene& scene, const SceneBody& body, bool is_quiet) {
 }  // namespace
 
 void find_missing_banks(Scene& scene, bool is_quiet) {
-  std::map<std::string, fs::path> made;  // by what describes the body, without the place
+  std::map<std::string, fs::path> made;  // by the description of the body, without its place
   for (SceneBody& body : scene.bodies) {
     if (!body.bank.empty()) continue;
     std::string words;

@@ -1,13 +1,13 @@
-// Banks of bodies that a scene describes in place of naming a bank.
+// Banks of bodies that a scene describes instead of naming a bank.
 #pragma once
 
 #include "runtime/scene/scene.hpp"
 
 namespace carillon::scene {
 
-/// Gives every body without a bank the file of one. `carillon bank-for`, a program of the precompute side, finds or computes it, once for
-/// bodies that are described alike. Its progress goes to standard error. Throws InputError with the place in the scene for what it refuses
-/// and where it is not installed, SolveError and SystemError as it does.
+/// Sets the bank file of every body without one. `carillon bank-for`, a program of the precompute side, finds or computes it, once per
+/// distinct description. Progress goes to standard error. Throws InputError with the place in the scene if it is refused or not installed,
+/// SolveError and SystemError as reported.
 void find_missing_banks(Scene& scene, bool is_quiet);
 
 }  // namespace carillon::scene

@@ -77,7 +77,7 @@ Plan make_plan(effects::SceneFacts facts, const Events& events) {
   double decided_s = 0.0;
   events.for_each([&](const events::Event& event) {
     if (first_listener && std::holds_alternative<events::Listener>(event))
-      first_listener.reset();  // seen
+      first_listener.reset();  // already seen
     else
       plan.selector.watch(event);
     const double known_s = events::get_time_s(event) - behind_s;

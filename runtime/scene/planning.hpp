@@ -1,21 +1,22 @@
-// The plan of a scene: which effects its bodies call for, from the scene and from what happens in it.
+// Plan of a scene: the effects that its bodies need.
 #pragma once
 
 #include "runtime/scene/effects/effect_selector.hpp"
 #include "runtime/events/events.hpp"
+#include "runtime/scene/effects/effect_selector.hpp"
 #include "runtime/scene/events.hpp"
 #include "runtime/scene/microphones.hpp"
 #include "runtime/scene/scene.hpp"
 
 namespace carillon::scene {
 
-/// A body and the ground as those feel them who slide on them. The seed of a body's surface comes from its name: other bodies of the scene
-/// change nothing of it.
+/// Contact surfaces of a body and of the ground. The seed of a body's roughness profile comes from its name, so it does not depend on other
+/// bodies.
 synth::ContactSurface make_surface(const SceneBody& body);
 synth::ContactSurface make_ground(const Scene& scene);
 
-/// What is known before anything moves. Every body's spec has its bank, and the scene outlives the result. `moves`: bodies that are not
-/// fixed may move.
+/// Facts known before the simulation. Every body's spec has its bank, and the scene outlives the result. `moves`: bodies that are not fixed
+/// may move.
 effects::SceneFacts make_facts(const Scene& scene, const Microphones& microphones, bool moves);
 
 /// Choice of effects for a scene, by a selector that has judged all of its events.
@@ -24,7 +25,7 @@ struct Plan {
   effects::EffectSelector selector;
 };
 
-/// `events` as EventPlayback takes them.
+/// `events` as in EventPlayback.
 Plan make_plan(effects::SceneFacts facts, const Events& events);
 
 }  // namespace carillon::scene

@@ -25,13 +25,13 @@ std::vector<events::RecordedBody> list_bodies(const Scene& scene) {
 void check_bodies(const std::filesystem::path& file, const std::vector<events::RecordedBody>& theirs,
                   const std::vector<events::RecordedBody>& ours, std::vector<std::string>& warnings) {
   if (theirs.size() != ours.size()) {
-    throw InputError(fmt::format("{}: is of {} bodies, and the scene has {}; play it with the scene that it was made for", file.string(),
-                                 theirs.size(), ours.size()));
+    throw InputError(
+        fmt::format("{}: has {} bodies, and the scene has {}; play it with its own scene", file.string(), theirs.size(), ours.size()));
   }
   for (std::size_t i = 0; i < ours.size(); ++i) {
     if (theirs[i].name != ours[i].name) {
-      throw InputError(fmt::format("{}: body {} is \"{}\", and \"{}\" in the scene; play it with the scene that it was made for",
-                                   file.string(), i, theirs[i].name, ours[i].name));
+      throw InputError(fmt::format("{}: body {} is \"{}\", and \"{}\" in the scene; play it with its own scene", file.string(), i,
+                                   theirs[i].name, ours[i].name));
     }
     if (theirs[i].triangles != ours[i].triangles) {
       throw InputError(
@@ -41,7 +41,7 @@ void check_bodies(const std::filesystem::path& file, const std::vector<events::R
     if (theirs[i].surface && !events::is_same_surface(*theirs[i].surface, *ours[i].surface)) {
       const std::string were = format_size(theirs[i].surface->size_m), are = format_size(ours[i].surface->size_m);
       throw InputError(were == are
-                           ? fmt::format("{}: was made for another surface of \"{}\", of the same size and number of triangles; use "
+                           ? fmt::format("{}: was made for a different surface of \"{}\" of the same size and number of triangles; use "
                                          "a bank of the same mesh",
                                          file.string(), ours[i].name)
                            : fmt::format("{}: was made for a body \"{}\" of {}, and the scene's bank measures {}; use a bank of the "
@@ -51,10 +51,10 @@ void check_bodies(const std::filesystem::path& file, const std::vector<events::R
   }
   const auto is_unmarked = [](const events::RecordedBody& body) { return !body.surface; };
   if (std::any_of(theirs.begin(), theirs.end(), is_unmarked)) {
-    warnings.push_back(fmt::format(
-        "{}: does not say how large its bodies are (\"size_m\", \"order_m\"); that they have as many triangles as the scene's is all "
-        "that was compared",
-        file.string()));
+    warnings.push_back(
+        fmt::format("{}: does not give the size of its bodies (\"size_m\", \"order_m\"); only the numbers of triangles "
+                    "were compared",
+                    file.string()));
   }
 }
 

@@ -1,4 +1,4 @@
-// For which bodies a contacts file was made.
+// Compatibility of a contacts file with the bodies of a scene.
 #pragma once
 
 #include <filesystem>
@@ -10,11 +10,11 @@
 
 namespace carillon::scene {
 
-/// The bodies of a scene, whose specs have their banks, as a contacts file names them.
+/// Bodies of a scene, whose specs have their banks, as written to a contacts file.
 std::vector<events::RecordedBody> list_bodies(const Scene& scene);
 
-/// Throws InputError, which begins with `file`, unless the bodies of a file are these, in their order, with the same surfaces. A file that
-/// does not say which surfaces it was made for is compared by their numbers of triangles, with a warning.
+/// Throws InputError "FILE: ..." unless the bodies of the file are these, in this order, with the same surfaces. Files without surface data
+/// are compared by numbers of triangles, with a warning.
 void check_bodies(const std::filesystem::path& file, const std::vector<events::RecordedBody>& theirs,
                   const std::vector<events::RecordedBody>& ours, std::vector<std::string>& warnings);
 

@@ -10,45 +10,105 @@
 #include <utility>
 
 #include "runtime/acoustics/head/sphere.hpp"
+#include "runtime/material/solids.hpp"
 #include "runtime/scene/scene_bodies.hpp"
 #include "runtime/scene/scene_joints.hpp"
 #include "runtime/scene/scene_strikes.hpp"
 #include "runtime/scene/scene_values.hpp"
-#include "runtime/material/solids.hpp"
 
 namespace carillon::scene {
 namespace {
 
-constexpr double kShortestS = 1e-3;
-constexpr double kMaxEarDistanceM = 10.0;
+using base::kAboveZero;
+using base::Limits;
+using base::required;
+using base::within;
+
 constexpr double kHeadWidthM = 2.0 * head::Sphere{}.radius_m;
-constexpr double kNarrowestHeadM = 2.0 * head::kMinRadiusM, kWidestHeadM = 2.0 * head::kMaxRadiusM;
+constexpr double kMinHeadM = 2.0 * head::kMinRadiusM, kMaxHeadM = 2.0 * head::kMaxRadiusM;
 constexpr std::size_t kMaxWaypoints = 100000;
 constexpr std::size_t kMaxMicrophones = 16;
+
+const base::Keys<Scene> kScene{
+    {"duration_s", &Scene::duration_s, Limits{1e-3, kLongestS}, "length of the simulation and of the sound", required},
+    {"sample_rate_hz", &Scene::sample_rate_hz, Limits{8000, 192000}, "modes at or above half of it are silent; `--rate` overrides it"},
+    {"gravity_m_s2", &Scene::gravity_m_s2, within(1e4), "acceleration of gravity"},
+    {"ground", "none", "hard floor with the keys below"},
+    {"bodies", "required", "1 to 1000 bodies"},
+    {"variation", "0", "variation of equal strikes ([Strikes](#strikes)); 0 to 1"},
+    {"joints", "none", "hinges, ball joints, sliders ([joints](joints.md))"},
+    {"cords", "none", "strings ([joints](joints.md))"},
+    {"strikes", "none", "blows in addition to those of the physics"},
+    {"listener", "none", "two ears, with the keys below"},
+    {"microphones", "none", "replaces `listener`: 1 to 16 positions `[x, y, z]`, one per channel"},
+    {"effects", "`\"auto\"`", "chosen automatically; a list: exactly these; `{\"on\": [...], \"off\": [...]}` ([Effects](#effects))"},
+    {"radiation", &Scene::radiation, radiation::kGainKindNames, "loudness of modes ([Radiation](#radiation))"},
+    {"frequencies", &Scene::frequencies, kFrequenciesNames,
+     "without or with the [error of the mesh](../error-bars.md#corrected-frequencies)"},
+    {"output", "none", "level and format, with the keys below"},
+    {"quality", "none", "accuracy against CPU time ([Quality](#quality))"}};
+const base::Keys<physics::GroundSpec> kGround{
+    {"height_m", &physics::GroundSpec::height_m, within(kFarthestM), "height of the floor"},
+    {"material", "concrete", "name of a [material](materials.md); the next three keys replace its constants"},
+    {"young_modulus_pa", &physics::GroundSpec::young_modulus_pa, kAboveZero, "100 to 1e13"},
+    {"poisson_ratio", &physics::GroundSpec::poisson_ratio, Limits{-1, 0.5, true}, "Poisson's ratio"},
+    {"density_kg_m3", &physics::GroundSpec::density_kg_m3, Limits{1, 3e4}, "density"},
+    {"restitution", &physics::GroundSpec::restitution, Limits{0, 1}, "as of a body"},
+    {"friction", &physics::GroundSpec::friction, Limits{0, 10}, "as of a body"},
+    {"roughness_m", &physics::GroundSpec::roughness_m, Limits{0, kRoughestM}, "as of a body"},
+    {"reflection", "none", "reflected share of the pressure; 0 to 1"}};
+const base::Keys<SceneListener> kListener{
+    {"position_m", &SceneListener::position_m, within(kFarthestM), "between the ears"},
+    {"path", "none", "replaces `position_m`: rows `[t, x, y, z]` in order of time; smooth between, at rest before and after"},
+    {"look_at_m", "none", "point to look at"},
+    {"facing", "`[0, 1, 0]`", "replaces `look_at_m`: direction"},
+    {"ears", &SceneListener::ears, kEarsNames, "two points, or a head between them ([Heads](#heads))"},
+    {"sofa", "none", "with `\"hrtf\"`: SOFA file of a measured head; without it the head is a rigid sphere"},
+    {"ear_distance_m", "0.2", "0 to 10; with `\"hrtf\"` the width of the sphere, 0.175 by default, 0.06 to 0.6"}};
+const base::Keys<Output> kOutput{
+    {"gain", "`\"auto\"`", "the peak is at `peak_dbfs`; or full scale per pascal, reduced with a warning if it would clip"},
+    {"peak_dbfs", &Output::peak_dbfs, Limits{-120, 0}, "peak level"},
+    {"format", &Output::format, kSampleFormatNames, "`--format` overrides it; above 4 GiB an RF64"},
+    {"fade_end", &Output::fade_end, "fade-out within the last 10 ms if not silent; false for renderings that are added or analysed"}};
+const base::Keys<Quality> kQuality{
+    {"planner_db", "-50",
+     "an effect is omitted if it changes a body's A-weighted sound by less; -150 to -10. Lower: more effects"},
+    {"silence_pa", &Quality::silence_pa, Limits{1e-15, 1},
+     "below this pressure at 1 m bodies sleep and modes are dropped, by default as planned, or 1e-10. Lower: modes ring for longer"},
+    {"modes", &Quality::modes, Limits{synth::kGroup, std::numeric_limits<std::int32_t>::max()},
+     "maximum number of ringing modes; the least audible fade out ([budget](../decisions/budget.md))"},
+    {"contact_step_s", &Quality::contact_step_s, Limits{1e-5, 2e-3},
+     "maximum time step of the physics during contact; twice that between flat bodies. Shorter: CPU time in inverse proportion. Longer: "
+     "rolling and tipping are less exact ([by how much](../decisions/contact.md))"},
+    {"joint_tolerance", &Quality::joint_tolerance, Limits{1e-14, 1e-4},
+     "error of a step of free motion on joints [rad, m] ([cost](../decisions/joints.md))"},
+    {"modes_in_impacts", &Quality::modes_in_impacts,
+     "impacts include the modes ([cost](../decisions/impact.md)). False: rigid bodies, given restitution and a Hertz pulse; thin "
+     "plates then get too much energy"},
+    {"masking", &Quality::masking,
+     "omits hits that are masked by earlier ones of the body; inaudible, and 6 to 8 % less CPU time ([figures](../decisions/contact.md))"},
+    {"instructions", &Quality::instructions, kInstructionNames, "instruction set; falls back if unsupported"}};
+const base::Keys<effects::SelectionThresholds> kThresholds{
+    {"quiet_db", &effects::SelectionThresholds::below_loudest_db, Limits{20, 250},
+     "sound this far below the loudest strike so far is inaudible and needs no effects. More: bodies ring for longer"}};
 
 physics::GroundSpec parse_ground(base::Object& object, std::optional<double>& reflection, std::vector<std::string>& warnings) {
   physics::GroundSpec ground;
   if (const material::Material* material = read_material(object, ground.young_modulus_pa, ground.poisson_ratio))
     ground.density_kg_m3 = material->density_kg_m3;
-  ground.height_m = read_within(object, "height_m", ground.height_m, -kFarthestM, kFarthestM);
-  ground.young_modulus_pa = object.number_or("young_modulus_pa", ground.young_modulus_pa, base::kPositive);
-  ground.density_kg_m3 = read_within(object, "density_kg_m3", ground.density_kg_m3, 1.0, 3e4);
+  kGround.read(object, ground);
   const auto question = material::ask_about_solid(ground.young_modulus_pa, ground.density_kg_m3);
   if (!(ground.young_modulus_pa >= kSoftestPa && ground.young_modulus_pa <= kStiffestPa)) {
-    object.fail("young_modulus_pa", fmt::format("{:g} Pa is no plausible ground stiffness; give {:g} to {:g}{}", ground.young_modulus_pa,
+    object.fail("young_modulus_pa", fmt::format("{:g} Pa is not a plausible ground stiffness; give {:g} to {:g}{}", ground.young_modulus_pa,
                                                 kSoftestPa, kStiffestPa, question ? ": " + *question : ""));
   }
   if (question) warnings.push_back(fmt::format("{}: \"ground\": {}", object.find_place("young_modulus_pa"), *question));
-  ground.poisson_ratio = object.number_or("poisson_ratio", ground.poisson_ratio, {-1.0, 0.5});
-  ground.restitution = read_within(object, "restitution", ground.restitution, 0.0, 1.0);
-  ground.friction = read_within(object, "friction", ground.friction, 0.0, 10.0);
-  ground.roughness_m = read_within(object, "roughness_m", ground.roughness_m, 0.0, kRoughestM);
-  if (object.has("reflection")) reflection = read_within(object, "reflection", 1.0, 0.0, 1.0);
+  if (object.has("reflection")) reflection = read_within(object, "reflection", 0.0, 1.0);
   object.finish();
   return ground;
 }
 
-/// A place in the world by a row of numbers.
+/// A checked position.
 Vec3 read_place(const base::Object& object, std::string_view key, std::span<const double> row) {
   for (const double x : row) {
     if (!(std::abs(x) <= kFarthestM)) {
@@ -81,51 +141,33 @@ std::vector<synth::PathPoint> read_path(base::Object& object, std::string_view k
   return path;
 }
 
-/// The index of the name at `key`.
-std::size_t read_name(base::Object& object, std::string_view key, const std::vector<std::string>& names, const std::string& fallback) {
-  const std::string name = object.choice_or(key, names, fallback);
-  return std::find(names.begin(), names.end(), name) - names.begin();
-}
-
-/// The ears of a listener: free, on a sphere or on a measured head.
+/// Ears of a listener: free, on a sphere or on a measured head.
 void parse_ears(base::Object& object, SceneListener& listener) {
-  listener.ears = static_cast<Ears>(read_name(object, "ears", kEarsNames, "free"));
   if (listener.ears == Ears::kFree) {
-    if (object.has("sofa")) object.fail("sofa", "is a head's file; it goes with \"ears\": \"hrtf\", or leave it out");
-    listener.ear_distance_m = read_within(object, "ear_distance_m", listener.ear_distance_m, 0.0, kMaxEarDistanceM);
+    if (object.has("sofa")) object.fail("sofa", "needs \"ears\": \"hrtf\"; add that, or leave it out");
+    listener.ear_distance_m = read_within(object, "ear_distance_m", listener.ear_distance_m, 0.0, 10.0);
     return;
   }
   if (object.has("sofa")) {
     listener.sofa = object.path("sofa");
-    if (object.has("ear_distance_m")) object.fail("ear_distance_m", "is that of the head in \"sofa\"; leave it out");
+    if (object.has("ear_distance_m")) object.fail("ear_distance_m", "follows from the head in \"sofa\"; leave it out");
     listener.ear_distance_m = kHeadWidthM;
   } else {
-    listener.ear_distance_m = read_within(object, "ear_distance_m", kHeadWidthM, kNarrowestHeadM, kWidestHeadM);
+    listener.ear_distance_m = read_within(object, "ear_distance_m", kHeadWidthM, kMinHeadM, kMaxHeadM);
   }
 }
 
 SceneListener parse_listener(base::Object& object) {
   SceneListener listener;
+  kListener.read(object, listener);
   if (object.has("path")) {
     if (object.has("position_m")) object.fail("path", "says the same thing as \"position_m\"; keep one of them");
     listener.path = read_path(object, "path");
     listener.position_m = listener.path.front().position_m;
-  } else {
-    listener.position_m = read_vector(object, "position_m", listener.position_m, kFarthestM);
   }
   parse_ears(object, listener);
-  Vec3 direction = listener.facing;
-  std::string key = "facing";
-  if (object.has("look_at_m")) {
-    if (object.has("facing")) object.fail("look_at_m", "says the same thing as \"facing\"; keep one of them");
-    key = "look_at_m";
-    const Vec3 target = read_vector(object, key, {0.0, 0.0, 0.0}, kFarthestM);
-    for (int k = 0; k < 3; ++k) direction[k] = target[k] - listener.position_m[k];
-  } else {
-    direction = read_vector(object, key, direction, kFarthestM);
-  }
+  const Vec3 direction = base::read_facing(object, listener.position_m, listener.facing, kFarthestM);
   const double length = norm(direction);
-  if (!(length > 1e-9)) object.fail(key, "gives the listener no direction to look in; name another place or direction");
   for (int k = 0; k < 3; ++k) listener.facing[k] = direction[k] / length;
   object.finish();
   return listener;
@@ -138,43 +180,34 @@ Output parse_output(base::Object& object) {
     if (!automatic && !object.has_number("gain")) object.fail("gain", "must be \"auto\" or a number, full scale per pascal");
     if (!automatic) output.gain_per_pa = object.number("gain");
     if (output.gain_per_pa && !(*output.gain_per_pa > 0.0 && *output.gain_per_pa < 1e12)) {
-      object.fail("gain", fmt::format("{}, and is {}", "must be greater than 0 and below 1e12", *output.gain_per_pa));
+      object.fail("gain", fmt::format("must be greater than 0 and below 1e12, and is {}", *output.gain_per_pa));
     }
   }
-  output.peak_dbfs = read_within(object, "peak_dbfs", output.peak_dbfs, -120.0, 0.0);
-  output.format = static_cast<SampleFormat>(read_name(object, "format", kSampleFormatNames, "pcm24"));
-  output.fade_end = object.boolean_or("fade_end", output.fade_end);
+  kOutput.read(object, output);
   object.finish();
   return output;
 }
 
 Quality parse_quality(base::Object& object) {
   Quality quality;
-  effects::SelectionThresholds& thresholds = quality.thresholds;
-  if (object.has("planner_db")) thresholds.audible_share = std::pow(10.0, 0.1 * read_within(object, "planner_db", 0.0, -150.0, -10.0));
-  thresholds.below_loudest_db = read_within(object, "quiet_db", thresholds.below_loudest_db, 20.0, 250.0);
-  if (object.has("silence_pa")) quality.silence_pa = read_within(object, "silence_pa", 0.0, 1e-15, 1.0);
-  quality.modes = object.integer_if("modes", synth::kGroup, std::numeric_limits<std::int32_t>::max());
-  quality.contact_step_s = read_within(object, "contact_step_s", quality.contact_step_s, 1e-5, 2e-3);
-  quality.joint_tolerance = read_within(object, "joint_tolerance", quality.joint_tolerance, 1e-14, 1e-4);
-  quality.modes_in_impacts = object.boolean_or("modes_in_impacts", quality.modes_in_impacts);
-  quality.masking = object.boolean_or("masking", quality.masking);
-  quality.instructions = static_cast<synth::Isa>(read_name(object, "instructions", kInstructionNames, "best"));
+  if (object.has("planner_db")) quality.thresholds.audible_share = std::pow(10.0, 0.1 * read_within(object, "planner_db", -150.0, -10.0));
+  kThresholds.read(object, quality.thresholds);
+  kQuality.read(object, quality);
   object.finish();
   return quality;
 }
 
-/// Refuses the effect "head" without a head; with one, bodies without planned effects have it.
+/// Refuses the effect "head" without a head; with one, it is on for bodies without planning.
 void check_head(base::Object& root, Scene& scene) {
   const bool is_wanted = std::any_of(scene.bodies.begin(), scene.bodies.end(),
                                      [](const SceneBody& body) { return body.overrides.on.has(synth::Effect::kHead); });
   if (is_wanted && !has_head(scene))
-    root.fail("effects", "names \"head\", and the listener has none; give it \"ears\": \"hrtf\", or leave \"head\" out");
+    root.fail("effects", "names \"head\", and the listener has no head; give it \"ears\": \"hrtf\", or leave \"head\" out");
   if (has_head(scene) && scene.overrides.automatic && !scene.overrides.off.has(synth::Effect::kHead))
     scene.effects = scene.effects.with(synth::Effect::kHead);
 }
 
-/// The ground reflects by its own key or by the effect of a body; the listener must be above such a ground.
+/// The ground reflects by its own key or by the effect of a body; receivers must be above a reflecting ground.
 void check_floor(base::Object& root, Scene& scene) {
   const auto wants = [](const effects::EffectOverrides& overrides) { return overrides.on.has(synth::Effect::kGroundReflection); };
   const bool is_wanted =
@@ -186,7 +219,7 @@ void check_floor(base::Object& root, Scene& scene) {
   if (!floor) return;
   const auto check = [&](const char* key, const Vec3& place) {
     if (floor->calc_height_m(place) < 0.0)
-      root.fail(key, fmt::format("is below the ground, which reflects, at a height of {:g} m; put it above", place[2]));
+      root.fail(key, fmt::format("is below the reflecting ground, at a height of {:g} m; move it above", place[2]));
   };
   for (const Vec3& place : scene.microphones_m) check("microphones", place);
   if (!scene.microphones_m.empty()) return;
@@ -209,14 +242,14 @@ Scene parse_scene(const base::Document& document) {
   Scene scene;
   scene.file = document.file();
   base::Object root = document.root();
-  scene.duration_s = root.number("duration_s", base::kPositive);
-  if (scene.duration_s < kShortestS || scene.duration_s > kLongestS) {
-    root.fail("duration_s", fmt::format("{} is out of range; give {} to {} s", scene.duration_s, kShortestS, kLongestS));
-  }
-  scene.sample_rate_hz = static_cast<int>(root.integer_if("sample_rate_hz", 8000, 192000).value_or(scene.sample_rate_hz));
-  scene.gravity_m_s2 = read_vector(root, "gravity_m_s2", scene.gravity_m_s2, 1e4);
+  kScene.read(root, scene);
   if (auto ground = root.object_if("ground")) scene.ground = parse_ground(*ground, scene.reflection, scene.warnings);
 
+  if (root.objects("bodies").empty()) {
+    kScene.expect(root);
+    root.finish();  // a misspelt key is the likeliest reason
+    root.fail("bodies", "is missing or empty; list at least one body with a \"name\" and a \"bank\", or a \"recording\"");
+  }
   const Names names = parse_bodies(root, scene);
   parse_joints(root, names, scene);
   parse_strikes(root, names, scene);
@@ -233,12 +266,24 @@ Scene parse_scene(const base::Document& document) {
                                    surface.name, surface.start_s, scene.duration_s));
   check_head(root, scene);
   check_floor(root, scene);
-  scene.frequencies = static_cast<bank::Frequencies>(read_name(root, "frequencies", kFrequenciesNames, "corrected"));
-  scene.radiation = static_cast<radiation::GainKind>(read_name(root, "radiation", radiation::kGainKindNames, "auto"));
   if (auto output = root.object_if("output")) scene.output = parse_output(*output);
   if (auto quality = root.object_if("quality")) scene.quality = parse_quality(*quality);
   root.finish();
   return scene;
+}
+
+std::vector<base::KeyTable> describe_scene_keys() {
+  std::vector<base::KeyTable> tables{{"scene", {}}, {"quality", {}}};
+  kScene.describe(tables[0]);
+  kGround.describe(tables[0], "ground.");
+  kListener.describe(tables[0], "listener.");
+  kOutput.describe(tables[0], "output.");
+  kQuality.describe(tables[1]);
+  kThresholds.describe(tables[1]);
+  describe_body_keys(tables);
+  describe_strike_keys(tables);
+  describe_joint_keys(tables);
+  return tables;
 }
 
 bool has_head(const Scene& scene) { return scene.microphones_m.empty() && scene.listener.ears == Ears::kHrtf; }
@@ -246,7 +291,7 @@ bool has_head(const Scene& scene) { return scene.microphones_m.empty() && scene.
 std::size_t count_channels(const Scene& scene) { return scene.microphones_m.empty() ? 2 : scene.microphones_m.size(); }
 
 std::array<Vec3, 2> calc_ears(const SceneListener& listener) {
-  // Left is up x facing; for a listener who looks straight up or down it is -x.
+  // Left is up x facing, or -x for a listener looking straight up or down.
   Vec3 left{-listener.facing[1], listener.facing[0], 0.0};
   const double length = norm(left);
   left = length > 1e-6 ? Vec3{left[0] / length, left[1] / length, 0.0} : Vec3{-1.0, 0.0, 0.0};

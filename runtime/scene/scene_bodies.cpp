@@ -9,19 +9,51 @@
 #include <utility>
 
 #include "runtime/base/quaternion.hpp"
+#include "runtime/material/supports.hpp"
 #include "runtime/scene/job_keys.hpp"
 #include "runtime/scene/scene_values.hpp"
-#include "runtime/material/supports.hpp"
 
 namespace carillon::scene {
 namespace {
 
-constexpr std::size_t kLongestName = 200;  // bytes
-constexpr double kMaxSpinRadS = 1e4;
-constexpr std::size_t kMaxHolders = 1000;
-constexpr double kLoudestGain = 1e6;  // 120 dB
+using base::Limits;
+using base::within;
 
-/// Turns about the fixed axes of the world, x first, then y, then z.
+constexpr std::size_t kLongestName = 200;  // bytes
+constexpr std::size_t kMaxHolders = 1000;
+
+const base::Keys<SceneBody> kBody{
+    {"name", "required", "unique, at most 200 bytes"},
+    {"bank", "one of these", "mode bank; bodies may share one"},
+    {"shape", "one of these", "or `body`, or `mesh`: [description of the body](#bodies-without-a-bank)"},
+    {"recording", "one of these", "a recorded surface, with [other keys](#recordings)"},
+    {"position_m", "`[0, 0, 0]`", "of the mesh's origin"},
+    {"rotation_deg", "`[0, 0, 0]`", "about the fixed axes x, then y, then z"},
+    {"quaternion", "none", "replaces `rotation_deg`: unit `[w, x, y, z]`"},
+    {"on", "the bank's", "with `joint`, `loss`: what is behind its fixed nodes, such as `\"brick wall\"` ([supports](supports.md))"},
+    {"supports", "none", "the same per support by name: `{\"left\": {\"on\": \"concrete wall\"}}`"},
+    {"held", "none", "contact with a holder, or a list: `{\"by\": \"cord\", \"point_m\": [x, y, z]}` in the axes of the mesh"},
+    {"variation", "the scene's", "variation of equal strikes; 0 to 1"},
+    {"effects", "the scene's", "[effects](#effects) of this body"},
+    {"nonlinear", "its effects", "[large motion](nonlinear-bodies.md): `\"auto\"`, true (needs a bank with a nonlinear energy) or false"}};
+const base::Keys<physics::BodySpec> kMotion{
+    {"fixed", &physics::BodySpec::fixed, "does not move, but is struck and sounds"},
+    {"velocity_m_s", &physics::BodySpec::velocity_m_s, within(kMaxSpeedMs), "initial velocity of the centre of mass"},
+    {"angular_velocity_rad_s", &physics::BodySpec::angular_velocity_rad_s, within(1e4), "initial angular velocity"},
+    {"restitution", &physics::BodySpec::restitution, Limits{0, 1},
+     "upper limit of the rebound: ringing bodies may keep more. Contacts use the geometric mean of both bodies"},
+    {"friction", &physics::BodySpec::friction, Limits{0, 10}, "Coulomb coefficient. Contacts use the geometric mean of both bodies"},
+    {"roughness_m", &physics::BodySpec::roughness_m, Limits{0, kRoughestM}, "rms height of the surface ([Roughness](#roughness))"}};
+const base::Keys<SceneSurface> kSurface{
+    {"recording", "required", "the file; bodies may share one"},
+    {"position_m", "`[0, 0, 0]`", "of the simulation's world in the scene"},
+    {"rotation_deg", "`[0, 0, 0]`", "or `quaternion`, of the simulation's world in the scene"},
+    {"start_s", &SceneSurface::start_s, Limits{0, kLongestS}, "start, to the nearest sample"},
+    {"loop", &SceneSurface::loop, "repeats without a crossfade; for recordings of 0.1 s and more"},
+    {"gain", &SceneSurface::gain, Limits{0, 1e6}, "factor of the pressure"},
+    {"high_pass_hz", &SceneSurface::high_pass_hz, Limits{0, 1000}, "high-pass as in a simulation; 0: none"}};
+
+/// Rotations about the fixed axes of the world: x first, then y, then z.
 Quaternion calc_rotation(const Vec3& degrees) {
   Quaternion rotation{1.0, 0.0, 0.0, 0.0};
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -45,7 +77,7 @@ Quaternion read_rotation(base::Object& body) {
   return q;
 }
 
-/// The effects in the list of `key`, none twice.
+/// A list of distinct effects.
 synth::EffectSet read_names(base::Object& object, std::string_view key) {
   std::vector<std::string> playable;
   for (const synth::Effect effect : synth::EffectSet::all()) playable.emplace_back(synth::get_name(effect));
@@ -56,7 +88,7 @@ synth::EffectSet read_names(base::Object& object, std::string_view key) {
     const std::optional<synth::Effect> effect = synth::find_effect(entry.text);
     if (!effect) {
       const std::string nearest = base::find_nearest(entry.text, playable);
-      refuse(fmt::format("names \"{}\", which is no effect that can be played{}; there are {}", entry.text,
+      refuse(fmt::format("names \"{}\", which is not an available effect{}; there are {}", entry.text,
                          nearest.empty() ? "" : fmt::format(" (did you mean \"{}\"?)", nearest), fmt::join(playable, ", ")));
     }
     if (effects.has(*effect)) refuse(fmt::format("names \"{}\" twice", entry.text));
@@ -102,29 +134,29 @@ effects::EffectOverrides read_effects(base::Object& object) {
   return overrides;
 }
 
-/// A body's own "nonlinear", over its effects: "auto", on or off.
+/// A body's "nonlinear", which overrides its effects: "auto", true or false.
 void read_nonlinear(base::Object& body, effects::EffectOverrides& overrides) {
   constexpr synth::Effect kEffect = synth::Effect::kNonlinear;
   if (!body.has("nonlinear")) return;
   if (body.has("effects") && (overrides.on.has(kEffect) || overrides.off.has(kEffect)))
-    body.fail("nonlinear", "says what \"effects\" of this body say already; keep one of them");
+    body.fail("nonlinear", "repeats \"effects\" of this body; keep one of them");
   const bool is_automatic = body.has_string("nonlinear");
   if (is_automatic) {
     body.choice_or("nonlinear", {"auto"}, "auto");
     if (!overrides.automatic)
-      body.fail("nonlinear", "is \"auto\", and its effects are a list, so that nothing is chosen; give true or false");
+      body.fail("nonlinear", "is \"auto\", but the list in \"effects\" leaves nothing to choose; give true or false");
   }
   const bool is_on = !is_automatic && body.boolean_or("nonlinear", false);
   overrides.on = is_on ? overrides.on.with(kEffect) : overrides.on.without(kEffect);
   overrides.off = is_automatic || is_on || !overrides.automatic ? overrides.off.without(kEffect) : overrides.off.with(kEffect);
 }
 
-/// The effects of bodies without selection.
+/// Effects of bodies without planning.
 synth::EffectSet find_usual(const effects::EffectOverrides& overrides) {
   return overrides.automatic ? kDefaultEffects.with(overrides.on).without(overrides.off) : overrides.on;
 }
 
-/// The fixings and holders of a body.
+/// Fixings and holders of a body.
 mounting::MountingRequest read_support(base::Object& body) {
   mounting::MountingRequest overrides;
   overrides.all = material::read_fixing(body);
@@ -133,13 +165,14 @@ mounting::MountingRequest read_support(base::Object& body) {
       base::Object one = supports->object(name);
       const auto fixing = material::read_fixing(one);
       one.finish();
-      if (!fixing) supports->fail(name, "says nothing; give \"on\", \"joint\" or \"loss\"");
+      if (!fixing) supports->fail(name, "is empty; give \"on\", \"joint\" or \"loss\"");
       overrides.by_name.emplace(name, *fixing);
     }
   }
   for (base::Entry& entry : body.entries("held", kMaxHolders)) {
     if (!entry.object)
-      throw InputError(fmt::format("{}: \"held\": say where as well: {{\"by\": \"{}\", \"point_m\": [x, y, z]}}", entry.place, entry.text));
+      throw InputError(
+          fmt::format("{}: \"held\": give the point as well: {{\"by\": \"{}\", \"point_m\": [x, y, z]}}", entry.place, entry.text));
     mounting::Holder holder{.by = material::read_holder(*entry.object, "by")};
     holder.point_m = read_required_vector(*entry.object, "point_m");
     entry.object->finish();
@@ -148,7 +181,7 @@ mounting::MountingRequest read_support(base::Object& body) {
   return overrides;
 }
 
-/// The bank of a body, or the keys of a job for the solver's side.
+/// The bank of a body, or the keys of a job that computes it.
 void read_bank_or_job(base::Object& object, SceneBody& body) {
   static const std::vector<std::string> kBodies{"shape", "body", "mesh"};
   static const std::vector<std::string> kKeys(kJobKeys.begin(), kJobKeys.end());
@@ -156,7 +189,7 @@ void read_bank_or_job(base::Object& object, SceneBody& body) {
   if (!is_described || object.has("bank")) {
     for (const std::string& key : kKeys)
       if (object.has("bank") && object.has(key))
-        object.fail(key, "describes the body to be computed, and \"bank\" names it computed; keep one of them");
+        object.fail(key, "describes a body to be computed, and \"bank\" is a computed one; keep one of them");
     body.bank = object.path("bank");
     return;
   }
@@ -166,8 +199,7 @@ void read_bank_or_job(base::Object& object, SceneBody& body) {
 std::string read_body_name(base::Object& object) {
   std::string name = object.string("name");
   if (name.size() > kLongestName || std::any_of(name.begin(), name.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; })) {
-    object.fail("name",
-                fmt::format("is no name: at most {} bytes, and none of them a line feed or another control character", kLongestName));
+    object.fail("name", fmt::format("is not a valid name: at most {} bytes, no control characters", kLongestName));
   }
   return name;
 }
@@ -180,19 +212,14 @@ SceneBody parse_body(base::Object& object, const effects::EffectOverrides& overr
   body.variation = read_within(object, "variation", variation, 0.0, 1.0);
   physics::BodySpec& spec = body.spec;
   spec.name = body.name;
-  spec.fixed = object.boolean_or("fixed", false);
+  kMotion.read(object, spec);
   spec.initial.position_m = read_vector(object, "position_m", {0.0, 0.0, 0.0}, kFarthestM);
   spec.initial.rotation = read_rotation(object);
-  spec.velocity_m_s = read_vector(object, "velocity_m_s", {0.0, 0.0, 0.0}, kMaxSpeedMs);
-  spec.angular_velocity_rad_s = read_vector(object, "angular_velocity_rad_s", {0.0, 0.0, 0.0}, kMaxSpinRadS);
   if (spec.fixed) {
     for (const char* key : {"velocity_m_s", "angular_velocity_rad_s"}) {
-      if (object.has(key)) object.fail(key, "a fixed body does not move; take this key away or set \"fixed\" to false");
+      if (object.has(key)) object.fail(key, "a fixed body does not move; remove this key or set \"fixed\" to false");
     }
   }
-  spec.restitution = read_within(object, "restitution", spec.restitution, 0.0, 1.0);
-  spec.friction = read_within(object, "friction", spec.friction, 0.0, 10.0);
-  spec.roughness_m = read_within(object, "roughness_m", spec.roughness_m, 0.0, kRoughestM);
   body.support = read_support(object);
   for (const char* key : {"on", "joint", "loss", "supports", "held"}) {
     if (body.support_place.empty() && object.has(key)) body.support_place = object.find_place(key);
@@ -203,20 +230,16 @@ SceneBody parse_body(base::Object& object, const effects::EffectOverrides& overr
   return body;
 }
 
-/// A recorded surface.
 SceneSurface parse_surface(base::Object& object) {
   SceneSurface surface;
   surface.name = read_body_name(object);
   surface.place = object.find_place("recording");
   surface.file = object.path("recording");
   for (const char* key : {"bank", "shape", "body", "mesh"})
-    if (object.has(key)) object.fail(key, "describes a body that is struck, and \"recording\" one that was recorded; keep one of them");
+    if (object.has(key)) object.fail(key, "describes a vibrating body, and \"recording\" a recorded one; keep one of them");
   surface.pose.position_m = read_vector(object, "position_m", {0.0, 0.0, 0.0}, kFarthestM);
   surface.pose.rotation = read_rotation(object);
-  surface.start_s = read_within(object, "start_s", surface.start_s, 0.0, kLongestS);
-  surface.loop = object.boolean_or("loop", surface.loop);
-  surface.gain = read_within(object, "gain", surface.gain, 0.0, kLoudestGain);
-  surface.high_pass_hz = read_within(object, "high_pass_hz", surface.high_pass_hz, 0.0, 1000.0);
+  kSurface.read(object, surface);
   object.finish();
   return surface;
 }
@@ -225,16 +248,8 @@ SceneSurface parse_surface(base::Object& object) {
 
 Names parse_bodies(base::Object& root, Scene& scene) {
   std::vector<base::Object> bodies = root.objects("bodies");
-  if (bodies.empty()) {
-    for (const char* later :
-         {"joints", "cords", "strikes", "listener", "microphones", "effects", "variation", "radiation", "frequencies", "output", "quality"})
-      root.has(later);
-    root.finish();  // a mistyped key is the likeliest reason
-    root.fail("bodies", "is missing or empty; list at least one body with a \"name\" and a \"bank\", or a \"recording\"");
-  }
   if (bodies.size() > kMaxBodies)
-    root.fail("bodies",
-              fmt::format("lists {} bodies; a scene may hold {}: leave some out, or make several scenes of it", bodies.size(), kMaxBodies));
+    root.fail("bodies", fmt::format("has {} bodies, at most {} are allowed: split the scene", bodies.size(), kMaxBodies));
   if (root.has("effects")) scene.overrides = read_effects(root);
   scene.effects = find_usual(scene.overrides);
   const double variation = read_within(root, "variation", 0.0, 0.0, 1.0);
@@ -252,11 +267,18 @@ Names parse_bodies(base::Object& root, Scene& scene) {
   return names;
 }
 
+void describe_body_keys(std::vector<base::KeyTable>& tables) {
+  base::KeyTable& body = tables.emplace_back(base::KeyTable{"body", {}});
+  kBody.describe(body);
+  kMotion.describe(body);
+  kSurface.describe(tables.emplace_back(base::KeyTable{"recording", {}}));
+}
+
 std::size_t find_body(base::Object& object, const Names& bodies, std::string_view key) {
   const std::string name = object.string(key);
   if (const auto found = bodies.find(name); found != bodies.end()) {
     if (found->second != kNotModal) return found->second;
-    object.fail(key, fmt::format("\"{}\" is a recording, which nothing strikes, joins or holds; name a body that has a bank", name));
+    object.fail(key, fmt::format("\"{}\" is a recording, which cannot be struck, joined or held; name a body with a bank", name));
   }
   std::vector<std::string> names;
   for (const auto& [known, index] : bodies) names.push_back(known);

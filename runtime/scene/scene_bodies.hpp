@@ -1,4 +1,4 @@
-// The bodies of a scene file, modal and recorded, with their effects and supports.
+// Bodies of a scene file, modal and recorded, with their effects and supports.
 #pragma once
 
 #include <cstddef>
@@ -14,12 +14,15 @@ namespace carillon::scene {
 
 inline constexpr std::size_t kMaxBodies = 1000;
 inline constexpr std::size_t kNotModal = std::numeric_limits<std::size_t>::max();
-using Names = std::map<std::string, std::size_t>;  // of bodies, with their indices in Scene::bodies; kNotModal: a recorded surface
+using Names = std::map<std::string, std::size_t>;  // body to index in Scene::bodies; kNotModal: a recorded surface
 
 /// Reads the keys "bodies", "effects" and "variation" of a scene. Throws InputError "file:line: ...".
 Names parse_bodies(base::Object& root, Scene& scene);
 
-/// The modal body that a key names.
+/// Appends the tables "body" and "recording" of the reference.
+void describe_body_keys(std::vector<base::KeyTable>& tables);
+
+/// Index of the modal body named by a key.
 std::size_t find_body(base::Object& object, const Names& bodies, std::string_view key = "body");
 
 }  // namespace carillon::scene

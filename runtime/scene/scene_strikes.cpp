@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "runtime/scene/scene_values.hpp"
 #include "runtime/material/mallets.hpp"
 #include "runtime/material/table.hpp"
+#include "runtime/scene/scene_values.hpp"
 
 namespace carillon::scene {
 
@@ -30,24 +30,51 @@ Mallet make_mallet(const material::NamedMallet& named) {
 
 namespace {
 
-constexpr double kMaxImpulseNs = 1e6;  // a ton at 1000 m/s
-constexpr double kLongestPulseS = 1.0;
-constexpr double kFeltRestitution = 0.7;  // our estimate; piano hammers lose about half of their energy
+using base::Limits;
+using base::required;
+
+constexpr double kMaxImpulseNs = 1e6;     // a ton at 1000 m/s
+constexpr double kFeltRestitution = 0.7;  // own estimate; piano hammers lose about half of their energy
 constexpr double kDensestKgM3 = 22600.0;  // osmium
 
-/// The mallet of the name at `key`.
+const base::Keys<SceneStrike> kStrike{
+    {"time_s", &SceneStrike::time_s, "middle of the pulse; the start is within the scene, too", required},
+    {"body", "required", "name of a body"},
+    {"point_m", &SceneStrike::point_m, base::within(kFarthestM),
+     "or `triangle`: point near the surface, in the axes of the mesh, at most a quarter of the body's extent off"},
+    {"triangle", &SceneStrike::triangle, Limits{0, std::numeric_limits<std::int32_t>::max()}, "or centre of this triangle of the bank"},
+    {"impulse_n_s", "one of them", "integral of the force, in the axes of the mesh"},
+    {"mallet", "one of them", "name or object: [mallet](#mallets), which gives impulse and duration"},
+    {"duration_s", &SceneStrike::duration_s, Limits{0, 1},
+     "length of the pulse (`sin^1.5`); 0 is an ideal impulse, with a warning above 1 N s or 20 J in the modes"}};
+const base::Keys<Mallet> kMallet{
+    {"from", "none", "name of a mallet, whose numbers the other keys replace"},
+    {"mass_kg", &Mallet::mass_kg, Limits{1e-6, 1e3}, "required without `from`: of the head; a loosely held stick adds little"},
+    {"speed_m_s", &Mallet::speed_m_s, Limits{1e-6, kMaxSpeedMs}, "required without `from`: relative to the body"},
+    {"felt", "none", "soft head: `{\"stiffness_n_m_p\": K, \"exponent\": p}` of F = K y^p, p 2.5 by default, of felts 2.2 to 3.5"},
+    {"material", "none", "hard head: [material](materials.md) of its elasticity"},
+    {"young_modulus_pa", "none", "or Young's modulus"},
+    {"poisson_ratio", "0.3", "of a hard head"},
+    {"radius_m", "required for hard heads", "of the sphere at the contact (Hertz's law)"},
+    {"restitution", &Mallet::restitution, Limits{0, 1},
+     "on a rigid surface: loss in the head (Hunt and Crossley); 0.7 with `felt`, own estimate"},
+    {"friction", &Mallet::friction, Limits{0, 10}, "Coulomb; matters for oblique blows"},
+    {"direction", "into the surface", "of the head's motion, in the axes of the mesh"}};
+const base::Keys<Felt> kFelt{{"stiffness_n_m_p", &Felt::stiffness_n_m_p, Limits{1e-3, 1e30}, "K", required},
+                             {"exponent", &Felt::exponent, Limits{1, 6}, "p"}};
+
+/// A named mallet.
 Mallet read_named_mallet(base::Object& object, std::string_view key) {
   return make_mallet(material::require_mallet(object.find_place(key), object.string(key)));
 }
 
-/// A head by numbers: a felt, or a sphere of a solid.
+/// A felt or an elastic sphere.
 void read_head(base::Object& object, Mallet& mallet) {
   if (auto felt = object.object_if("felt")) {
     for (const char* key : {"radius_m", "material", "young_modulus_pa", "poisson_ratio"}) {
-      if (object.has(key)) object.fail(key, "is of a hard head, and there is a \"felt\"; keep one of them");
+      if (object.has(key)) object.fail(key, "is for hard heads, and there is a \"felt\"; keep one of them");
     }
-    mallet.felt = Felt{.stiffness_n_m_p = read_within(*felt, "stiffness_n_m_p", 1e-3, 1e30)};
-    mallet.felt->exponent = read_within(*felt, "exponent", mallet.felt->exponent, 1.0, 6.0);
+    kFelt.read(*felt, mallet.felt.emplace());
     mallet.restitution = kFeltRestitution;
     felt->finish();
     return;
@@ -55,7 +82,7 @@ void read_head(base::Object& object, Mallet& mallet) {
   mallet.felt.reset();
   if (read_material(object, mallet.young_modulus_pa, mallet.poisson_ratio) == nullptr && !object.has("young_modulus_pa"))
     object.fail("young_modulus_pa",
-                "is missing; say how hard the head is: \"material\" or \"young_modulus_pa\", and \"radius_m\", or \"felt\"");
+                "is missing; give the hardness of the head: \"material\" or \"young_modulus_pa\", and \"radius_m\", or \"felt\"");
   if (object.has("young_modulus_pa")) mallet.young_modulus_pa = read_within(object, "young_modulus_pa", kSoftestPa, kStiffestPa);
   mallet.radius_m = read_within(object, "radius_m", 1e-4, 10.0);
   mallet.poisson_ratio = object.number_or("poisson_ratio", mallet.poisson_ratio, {-1.0, 0.5});
@@ -65,19 +92,17 @@ Mallet read_mallet(base::Object& object, std::vector<std::string>& warnings) {
   Mallet mallet;
   const bool is_derived = object.has("from");
   if (is_derived) mallet = read_named_mallet(object, "from");
-  if (!is_derived || object.has("mass_kg")) mallet.mass_kg = read_within(object, "mass_kg", 1e-6, 1e3);
-  if (!is_derived || object.has("speed_m_s")) mallet.speed_m_s = read_within(object, "speed_m_s", 1e-6, kMaxSpeedMs);
+  for (const char* key : {"mass_kg", "speed_m_s"})
+    if (!is_derived) (void)object.number(key);
   const bool has_head = object.has("felt") || object.has("material") || object.has("young_modulus_pa") || object.has("radius_m");
   if (!is_derived || has_head) read_head(object, mallet);
+  kMallet.read(object, mallet);
   const double sphere_kg_m3 = mallet.felt ? 0.0 : mallet.mass_kg / (4.0 / 3.0 * std::numbers::pi * std::pow(mallet.radius_m, 3));
   if (sphere_kg_m3 > kDensestKgM3) {
     warnings.push_back(
-        fmt::format("{}: a sphere of {:g} m that weighs {:g} kg would be denser than osmium; \"radius_m\" is that of the "
-                    "head where it touches, in metres",
+        fmt::format("{}: a sphere of {:g} m and {:g} kg would be denser than osmium; \"radius_m\" is the radius at the contact, in metres",
                     object.find_place("radius_m"), mallet.radius_m, mallet.mass_kg));
   }
-  mallet.restitution = read_within(object, "restitution", mallet.restitution, 0.0, 1.0);
-  mallet.friction = read_within(object, "friction", mallet.friction, 0.0, 10.0);
   if (object.has("direction")) mallet.direction = read_direction(object, "direction");
   object.finish();
   return mallet;
@@ -87,20 +112,13 @@ SceneStrike read_strike(base::Object& object, Scene& scene, const Names& names) 
   SceneStrike strike;
   strike.place = object.find_place("");
   strike.body = find_body(object, names);
-  strike.time_s = object.number("time_s");
-  strike.duration_s = read_within(object, "duration_s", strike.duration_s, 0.0, kLongestPulseS);
+  kStrike.read(object, strike);
   if (!(strike.time_s - 0.5 * strike.duration_s >= 0.0 && strike.time_s <= scene.duration_s)) {
-    object.fail("time_s",
-                fmt::format("{} s is out of range; the middle of a pulse lies within the {} s of the scene, and its beginning too",
-                            strike.time_s, scene.duration_s));
+    object.fail("time_s", fmt::format("{} s is out of range; the middle of a pulse and its beginning must be within the {} s of the scene",
+                                      strike.time_s, scene.duration_s));
   }
   if (object.has("point_m") == object.has("triangle")) {
-    object.fail(object.has("point_m") ? "triangle" : "point_m", "say where the body is struck: either \"point_m\" or \"triangle\"");
-  }
-  if (object.has("point_m")) {
-    strike.point_m = read_vector(object, "point_m", {}, kFarthestM);
-  } else {
-    strike.triangle = static_cast<std::int32_t>(object.integer("triangle", 0, std::numeric_limits<std::int32_t>::max()));
+    object.fail(object.has("point_m") ? "triangle" : "point_m", "give the place: either \"point_m\" or \"triangle\"");
   }
   if (object.has("mallet")) {
     for (const char* key : {"impulse_n_s", "duration_s"}) {
@@ -124,9 +142,14 @@ SceneStrike read_strike(base::Object& object, Scene& scene, const Names& names) 
 void parse_strikes(base::Object& root, const Names& names, Scene& scene) {
   std::vector<base::Object> strikes = root.objects("strikes");
   if (strikes.size() > kMaxStrikes) {
-    root.fail("strikes", fmt::format("lists {} strikes; a scene may hold {}", strikes.size(), kMaxStrikes));
+    root.fail("strikes", fmt::format("has {} strikes, at most {} are allowed", strikes.size(), kMaxStrikes));
   }
   for (base::Object& object : strikes) scene.strikes.push_back(read_strike(object, scene, names));
+}
+
+void describe_strike_keys(std::vector<base::KeyTable>& tables) {
+  kStrike.describe(tables.emplace_back(base::KeyTable{"strike", {}}));
+  kMallet.describe(tables.emplace_back(base::KeyTable{"mallet", {}}));
 }
 
 }  // namespace carillon::scene

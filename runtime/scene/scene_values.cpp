@@ -12,7 +12,7 @@ Vec3 read_required_vector(base::Object& object, std::string_view key, double lim
 Vec3 read_direction(base::Object& object, std::string_view key) {
   Vec3 v = read_required_vector(object, key);
   const double length = norm(v);
-  if (!(length > 1e-9)) object.fail(key, "is no direction; give three numbers that are not all 0");
+  if (!(length > 1e-9)) object.fail(key, "is no direction; give three numbers, not all 0");
   for (double& x : v) x /= length;
   return v;
 }

@@ -1,4 +1,4 @@
-// Values of a scene's keys, within their ranges. A refusal is an InputError "file:line: ...".
+// Values of a scene's keys and their ranges. Invalid values are an InputError "file:line: ...".
 #pragma once
 
 #include <cstddef>
@@ -11,11 +11,11 @@
 namespace carillon::scene {
 
 inline constexpr double kLongestS = 3600.0;
-inline constexpr double kFarthestM = 1e4;     // of positions; half a minute of sound
+inline constexpr double kFarthestM = 1e4;     // of positions; half a minute at the speed of sound
 inline constexpr double kMaxSpeedMs = 300.0;  // below the speed of sound in air
-inline constexpr double kRoughestM = 1e-3;    // a higher roughness is a shape
-inline constexpr double kSoftestPa = 100.0;   // a jelly; the touch of a body lasts as long as a person's step on less
-inline constexpr double kStiffestPa = 1e13;   // ten times a diamond
+inline constexpr double kRoughestM = 1e-3;    // larger heights belong to the shape
+inline constexpr double kSoftestPa = 100.0;   // a jelly
+inline constexpr double kStiffestPa = 1e13;   // ten times diamond
 
 using base::read_vector;
 using base::read_within;
@@ -24,7 +24,7 @@ using base::read_within;
 Vec3 read_required_vector(base::Object& object, std::string_view key, double limit = kFarthestM);
 /// A direction, of length 1.
 Vec3 read_direction(base::Object& object, std::string_view key);
-/// The elastic constants of the key "material", which the object's own constants may follow; nullptr without the key.
+/// Reads elastic constants from the key "material"; nullptr without the key.
 const material::Material* read_material(base::Object& object, double& young_modulus_pa, double& poisson_ratio);
 
 }  // namespace carillon::scene

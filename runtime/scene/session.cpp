@@ -4,10 +4,10 @@
 #include <limits>
 #include <map>
 
+#include "runtime/acoustics/radiation/gains.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/scene/planning.hpp"
 #include "runtime/scene/pose.hpp"
-#include "runtime/acoustics/radiation/gains.hpp"
 
 namespace carillon::scene {
 namespace {
@@ -30,17 +30,17 @@ Session::Session(const Scene& scene, const std::vector<const bank::Bank*>& banks
     models_.push_back(model);
     if (scene.bodies[i].overrides.on.has(synth::Effect::kDirectivity) && model->get_directivity() == nullptr)
       throw InputError(scene.bodies[i].place +
-                       ": \"effects\" names \"directivity\", which needs a bank with multipoles, and this body's has none; make its bank "
-                       "with them, or leave the effect out");
+                       ": \"effects\" names \"directivity\", which needs a bank with multipoles, and this bank has none; compute its bank "
+                       "with them, or remove the effect");
     if (scene.bodies[i].overrides.on.has(synth::Effect::kCascade) && !model->has_cascade())
       throw InputError(
           scene.bodies[i].place +
           ": \"effects\" names \"cascade\", which needs a bank with a nonlinear energy, a thickness and modes above the coupled "
-          "ones, and this body's has not; make its bank so, or leave the effect out");
+          "ones, and this bank lacks one of them; compute the bank with \"nonlinear\", or remove the effect");
     if (scene.bodies[i].overrides.on.has(synth::Effect::kNonlinear) && model->get_nonlinear() == nullptr)
       throw InputError(scene.bodies[i].place +
-                       ": the effect \"nonlinear\" is asked for, which needs a bank with a nonlinear energy, and this body's has none; "
-                       "make its bank with it, or leave the effect out");
+                       ": the effect \"nonlinear\" is asked for, which needs a bank with a nonlinear energy, and this bank has none; "
+                       "compute its bank with it, or remove the effect");
   }
 }
 

@@ -1,4 +1,4 @@
-// A scene made ready to sound, offline or live: where it is heard, the models of its banks, and a synthesiser with its bodies.
+// Prepares a scene for playback, offline or live: microphones, models of the banks, a synthesiser with its bodies.
 #pragma once
 
 #include <cstddef>
@@ -15,12 +15,12 @@
 
 namespace carillon::scene {
 
-/// Body i of the scene is body i of the synthesiser and sounds by a model that all bodies of its bank share. What is the same however a
-/// scene is played is decided here; how much room events need is the caller's.
+/// Body i of the scene is body i of the synthesiser; bodies with the same bank share a model. Contains the decisions common to offline and
+/// live playback; the caller chooses the event capacity.
 class Session {
  public:
-  /// Makes the models. banks[i] belongs to scene.bodies[i]; scene and banks must outlive the result. `has_clicks`: models know the radius
-  /// that acceleration noise needs. `head`: make_head() of the scene at that rate.
+  /// Makes the models. banks[i] belongs to scene.bodies[i]; scene and banks must outlive the result. `has_clicks`: models include the
+  /// radius for acceleration noise. `head`: make_head() of the scene at this rate.
   Session(const Scene& scene, const std::vector<const bank::Bank*>& banks, double rate_hz, bool has_clicks,
           std::optional<synth::ListeningHead> head);
 
@@ -28,14 +28,14 @@ class Session {
   const std::optional<synth::ListeningHead>& get_head() const { return head_; }
   const synth::Model& get_model(std::size_t body) const { return *models_[body]; }
 
-  /// Rate, microphones, head, listener, number of bodies, budget and ground of the scene.
+  /// Rate, microphones, head, listener, number of bodies, budget and ground.
   synth::SynthesiserOptions make_options() const;
-  /// Place at the start, silence, surface and instructions of a body with these effects.
+  /// Initial pose, silence threshold, surface and instruction set of a body with these effects.
   synth::BodySettings make_settings(std::size_t body, synth::EffectSet effects) const;
 
   /// Makes the synthesiser. Throws as synth::Synthesiser does.
   synth::Synthesiser& open(const synth::SynthesiserOptions& options);
-  /// Adds the next body.
+  /// Adds the next body of the scene.
   void add_body(const synth::BodySettings& settings);
 
  private:
@@ -49,14 +49,14 @@ class Session {
   std::size_t added_ = 0;
 };
 
-/// What of its effects a body of the scene can have: nothing pushes one that is fixed, and microphones stay where they are put; directivity
-/// is of banks with multipoles, ground_reflection of scenes whose ground reflects, head of listeners that have one.
+/// Effects that a body of the scene can have. Fixed bodies and fixed microphones have no Doppler shift; directivity needs multipoles,
+/// ground_reflection a reflecting ground, head a listener with a head.
 synth::EffectSet find_effects(const Scene& scene, std::size_t body, synth::EffectSet effects);
 
-/// By how much a strike must be known before it begins: a click starts at the side of the body that is nearest to the listener.
+/// Time by which a strike must be known before it begins: a click starts at the side of the body nearest to the listener.
 double calc_strike_lead_s(const synth::Model& model, synth::EffectSet effects);
 
-/// Mode-samples that a second of sound may take: quality.modes at all times, or as many as there are.
+/// Mode-samples per second of sound: quality.modes at all times, or unlimited.
 double calc_budget(const Quality& quality, double rate_hz);
 
 }  // namespace carillon::scene

@@ -1,6 +1,4 @@
-// Method:     the nearest place of the surface by runtime/bank/nearest.hpp; variation by runtime/synth/variation.hpp.
-// Source:     none.
-// Deviations: none.
+// Method: nearest point of the surface by runtime/bank/nearest.hpp; variation by runtime/synth/variation.hpp.
 #include "runtime/scene/strikes.hpp"
 
 #include <fmt/format.h>
@@ -19,10 +17,10 @@
 namespace carillon::scene {
 namespace {
 
-constexpr double kQuestionedNs = 1.0, kQuestionedJ = 20.0;  // of a strike without length
-constexpr double kFarthestShare = 0.25;                     // of the body's extent: how far from the surface a point may lie
+constexpr double kQuestionedNs = 1.0, kQuestionedJ = 20.0;  // limits of plausible ideal impulses
+constexpr double kFarthestShare = 0.25;                     // largest distance of a point from the surface, share of the body's extent
 
-/// The nearest places of a bank's surface: by its tree when there are many strikes, which is then worth making.
+/// Nearest points of a bank's surface; uses a tree for many strikes.
 class Finder {
  public:
   Finder(const bank::Bank& bank, std::size_t strikes) : bank_(&bank) {
@@ -45,7 +43,7 @@ class Finder {
   Vec3 low_{}, high_{};
 };
 
-/// The triangle and the place on it that are nearest to the strike's point.
+/// Triangle and point on it nearest to the strike's point.
 void find_nearest_place(const Finder& finder, const SceneStrike& strike, const std::string& name, events::Impulse& impulse) {
   const bank::NearestPlace nearest = finder.find(*strike.point_m);
   if (nearest.triangle < 0) throw InputError(fmt::format("{}: \"point_m\" is too far away; its numbers are too large", strike.place));
@@ -58,7 +56,7 @@ void find_nearest_place(const Finder& finder, const SceneStrike& strike, const s
   impulse.barycentric = nearest.barycentric;
 }
 
-/// Of the head before the blow, in the frame of the mesh.
+/// Velocity of the head before the blow, in the frame of the mesh.
 Vec3 find_velocity(const Mallet& mallet, const bank::Bank& bank, std::int32_t triangle) {
   Vec3 way{};
   if (mallet.direction) {
@@ -72,7 +70,7 @@ Vec3 find_velocity(const Mallet& mallet, const bank::Bank& bank, std::int32_t tr
   return mallet.speed_m_s * way;
 }
 
-/// A large impulse without length gives energy to all modes alike, which no blow does.
+/// An ideal impulse excites all modes alike, which no real blow does; warns if it is large.
 std::optional<std::string> question_strike(const SceneStrike& strike, const std::string& name, const bank::Bank& bank,
                                            const events::Impulse& impulse) {
   if (strike.duration_s > 0.0) return std::nullopt;
@@ -98,14 +96,14 @@ std::optional<std::string> question_strike(const SceneStrike& strike, const std:
 }  // namespace
 
 Strikes make_strikes(const Scene& scene, const std::vector<const bank::Bank*>& banks) {
-  std::map<const bank::Bank*, std::size_t> wanted;  // strikes whose place is to be found
+  std::map<const bank::Bank*, std::size_t> wanted;  // number of strikes whose point must be located
   for (const SceneStrike& strike : scene.strikes) {
     if (!strike.triangle) ++wanted[banks[strike.body]];
   }
   std::map<const bank::Bank*, Finder> finders;
   for (const auto& [bank, strikes] : wanted) finders.try_emplace(bank, *bank, strikes);
   Strikes made;
-  std::vector<std::uint64_t> strikes(scene.bodies.size());  // of each body so far
+  std::vector<std::uint64_t> strikes(scene.bodies.size());  // strikes per body so far
   std::map<std::size_t, std::vector<Mallets::Strike>> by_mallet;
   for (const SceneStrike& strike : scene.strikes) {
     const bank::Bank& bank = *banks[strike.body];
@@ -124,7 +122,7 @@ Strikes make_strikes(const Scene& scene, const std::vector<const bank::Bank*>& b
     } else {
       find_nearest_place(finders.at(&bank), strike, name, impulse);
     }
-    // Variation changes the velocity of a head as it does an impulse.
+    // Varies the velocity of a head like an impulse.
     if (strike.mallet) impulse.impulse_n_s = find_velocity(*strike.mallet, bank, impulse.triangle);
     const double variation = scene.bodies[strike.body].variation;
     const std::uint64_t number = strikes[strike.body]++;

@@ -1,4 +1,4 @@
-// The blows of a scene file as events on triangles of the banks.
+// Strikes of a scene file as events on triangles of the banks.
 #pragma once
 
 #include <string>
@@ -11,16 +11,15 @@
 
 namespace carillon::scene {
 
-/// What the strikes of a scene come to.
+/// Events of the strikes of a scene.
 struct Strikes {
-  std::vector<events::Event> events;  // in order of time: an Impulse a strike, some Forces a mallet
-  std::vector<Blow> blows;            // of mallets, body by body
-  std::vector<std::string> warnings;  // of strikes that may not be meant
+  std::vector<events::Event> events;  // in order of time: one Impulse per strike, several Forces per mallet
+  std::vector<Blow> blows;            // mallets, body by body
+  std::vector<std::string> warnings;  // suspicious values
 };
 
-/// banks[i] belongs to scene.bodies[i].
-/// Throws InputError "file:line: ..." for a triangle that the bank does not have, and for a point further from the surface than a quarter
-/// of the body's extent (the diagonal of its box): it is likelier a mistake of units than a blow; for a mallet that flies away.
+/// banks[i] belongs to scene.bodies[i]. Throws InputError "file:line: ..." for an unknown triangle, a point further from the surface than a
+/// quarter of the body's extent (diagonal of its box; probably a mistake of units), and a mallet that moves away from the surface.
 Strikes make_strikes(const Scene& scene, const std::vector<const bank::Bank*>& banks);
 
 }  // namespace carillon::scene

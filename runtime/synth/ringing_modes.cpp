@@ -11,7 +11,7 @@ double calc_damped_omega(const Model& model, int mode) noexcept {
   return std::sqrt((omega - decay) * (omega + decay));
 }
 
-RingingModes::RingingModes(const Model& model, Isa isa) : model_(&model), kernels_(&get_kernels(isa)) {
+RingingModes::RingingModes(const Model& model, Isa isa) : model_(&model), kernels_(&synth::get_kernels(isa)) {
   const std::size_t groups = model.get_sound_tables().size();
   max_groups_ = static_cast<int>(groups);
   states_.resize(groups);

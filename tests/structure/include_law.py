@@ -95,6 +95,7 @@ LAW = {
         [
             "runtime/base",
             "runtime/bank",
+            "precompute/job",
             "precompute/comm",
             "precompute/mesh",
             "precompute/petsc",

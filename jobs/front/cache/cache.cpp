@@ -1,8 +1,6 @@
-// Method:     the id of jobs/store; carillon-precompute in a temporary folder of the cache, which then gets its name in one rename. Two
-//             that miss the same bank both solve it, and one of them publishes. If the mesher refuses the number of nodes of a
-//             preview and proposes another, that number is stored, so that the same body starts from it next time.
-// Source:     own.
-// Deviations: none.
+// Method:     Ids of jobs/store; carillon-precompute runs in a temporary folder of the cache, published by one rename. Concurrent misses of
+//             the same bank both solve it. If the mesher refuses the node count of a preview and proposes another, the proposal is stored
+//             for the next time.
 #include "jobs/front/cache/cache.hpp"
 
 #include <fmt/format.h>
@@ -12,8 +10,8 @@
 #include <optional>
 #include <system_error>
 
-#include "jobs/store/process/programs.hpp"
 #include "jobs/store/identity.hpp"
+#include "jobs/store/process/programs.hpp"
 #include "jobs/store/store.hpp"
 #include "precompute/job/preview.hpp"
 #include "runtime/base/document.hpp"
@@ -27,7 +25,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kCountFolder = "counts";  // of nodes, by the id of the preview that was asked for
+constexpr const char* kCountFolder = "counts";  // node counts by the id of the requested preview
 constexpr std::uint64_t kMaxCountBytes = 100;
 
 /// Name of the body for messages.
@@ -38,14 +36,14 @@ std::string describe(const job::JobSpec& job) {
   return job.material.name.empty() ? body : fmt::format("{} of {}", body, job.material.name);
 }
 
-/// The place in the scene or job that was read, for messages about the copy that the solver reads.
+/// Place in the scene or job, for messages about the copy that the solver reads.
 std::string find_place(const job::JobSpec& job) {
   if (job.body && !job.body->place.empty()) return job.body->place;
   if (job.analytic && !job.analytic->place.empty()) return job.analytic->place;
   return job.file.string();
 }
 
-/// `message` with `place` for "COPY:LINE" or "COPY" at its beginning.
+/// Replaces "COPY:LINE" or "COPY" at the beginning of a message by `place`.
 std::string name_place(const std::string& message, const fs::path& copy, const std::string& place) {
   if (!message.starts_with(copy.string())) return fmt::format("{}: {}", place, message);
   std::size_t end = copy.string().size();
@@ -56,7 +54,7 @@ std::string name_place(const std::string& message, const fs::path& copy, const s
   return place + message.substr(end);
 }
 
-/// Differences between a bank's mesh and its description. No warnings about the roughness of previews.
+/// Warnings about differences between mesh and description.
 std::vector<std::string> read_mesh_warnings(const fs::path& folder) {
   constexpr std::size_t kMaxWarnings = 100;
   std::vector<std::string> warnings;
@@ -65,7 +63,7 @@ std::vector<std::string> read_mesh_warnings(const fs::path& folder) {
     std::optional<base::Object> run = root.object_if("run"), mesh = run ? run->object_if("mesh") : std::nullopt;
     if (!mesh || !mesh->has("warnings")) return warnings;
     for (const base::Entry& entry : mesh->entries("warnings", kMaxWarnings)) warnings.push_back(entry.text);
-  } catch (const InputError&) {  // a damaged record loses its warnings; the bank is still served
+  } catch (const InputError&) {  // without warnings if the record is damaged
   }
   return warnings;
 }
@@ -97,7 +95,7 @@ class Maker {
       return;
     }
     const std::int64_t wanted = *job_.body->nodes;
-    const std::int64_t met = job::run_at_possible_count(wanted, "\"accuracy_cents\" takes what it needs", [&](std::int64_t nodes) {
+    const std::int64_t met = job::run_at_possible_count(wanted, "\"accuracy_cents\" chooses the count itself", [&](std::int64_t nodes) {
       job_.body->nodes = nodes;
       made.bank = solve();
     });
@@ -111,7 +109,7 @@ class Maker {
       try {
         const store::Store store = store::Store::open_to_read(own);
         if (!store.find_bank_fault(id, store::Look::content)) return store.bank_folder(id) / store::kBankFile;
-      } catch (const InputError&) {  // a store that cannot be read has nothing
+      } catch (const InputError&) {  // unreadable store: not found
       }
     }
     if (!cache_.find_bank_fault(id, store::Look::content)) return cache_.bank_folder(id) / store::kBankFile;
@@ -122,7 +120,7 @@ class Maker {
   store::Request make_request() {
     try {
       return requests_.make(job_);
-    } catch (const InputError& error) {  // a file that cannot be read
+    } catch (const InputError& error) {  // unreadable file
       throw InputError(fmt::format("{}: {}", find_place(job_), error.what()));
     }
   }
@@ -152,8 +150,8 @@ class Maker {
     const store::Id id = store::require_id(request.id, "the job");
     const auto start = std::chrono::steady_clock::now();
     say(fmt::format("computing the modes of {}, once", describe(job_)));
-    const store::Temporary temporary = cache_.make_temporary();
-    const fs::path folder = temporary.content().shared_path(), file = folder / store::kJobFile;
+    store::Temporary temporary = cache_.make_temporary();
+    const fs::path folder = temporary.path(), file = folder / store::kJobFile;
     job_.bank = folder / store::kBankFile;
     base::write_file(file, job::resolved_json(job_, folder, ""));
     std::vector<std::string> words{file.string()};
@@ -167,12 +165,12 @@ class Maker {
     } catch (const SolveError& error) {
       throw SolveError(name_place(error.what(), file, find_place(job_)));
     }
-    // The solver writes the job with every value that it used next to the bank.
+    // The resolved job, written by the solver next to the bank.
     fs::rename(job::find_resolved_path(job_.bank), file);
     store::write_request(folder, request);
     cache_.publish(id, temporary);
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    say(fmt::format("{:.1f} s; it is kept in {}{}", seconds, cache_.root().string(),
+    say(fmt::format("{:.1f} s; cached in {}{}", seconds, cache_.root().string(),
                     is_preview_ ? " (a preview: \"accuracy_cents\" refines it)" : ""));
     return cache_.bank_folder(id) / store::kBankFile;
   }
@@ -190,14 +188,14 @@ fs::path find_default_cache() {
   if (cache != nullptr && fs::path(cache).is_absolute()) return fs::path(cache) / "carillon";
   const char* home = std::getenv("HOME");
   if (home != nullptr && fs::path(home).is_absolute()) return fs::path(home) / ".cache" / "carillon";
-  throw SystemError("there is no folder for the cache of banks: neither XDG_CACHE_HOME nor HOME names one; set one of them");
+  throw SystemError("no folder for the cache of banks: set XDG_CACHE_HOME or HOME");
 }
 
 Made find_or_make(const job::JobSpec& job, const std::string& solver, const fs::path& cache, bool is_quiet) {
   std::error_code error;
   fs::create_directories(cache, error);
   if (error)
-    throw SystemError(fmt::format("{}: the cache of banks cannot be made: {}; set XDG_CACHE_HOME", cache.string(), error.message()));
+    throw SystemError(fmt::format("{}: cannot create the cache of banks: {}; set XDG_CACHE_HOME", cache.string(), error.message()));
   return Maker(job, solver, cache, is_quiet).run();
 }
 

@@ -22,8 +22,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::uintmax_t kSmallBytes = 4'000'000;  // as it is
-constexpr double kPackErrorDb = -60.0;             // of larger ones
+constexpr std::uintmax_t kSmallBytes = 4'000'000;  // not packed below
+constexpr double kPackErrorDb = -60.0;             // for larger ones
 
 const material::Row* find_nearest(const material::MaterialTable& table, const bank::Material& material) {
   const material::Row* nearest = nullptr;
@@ -36,8 +36,8 @@ const material::Row* find_nearest(const material::MaterialTable& table, const ba
   return nearest;
 }
 
-/// The material for the look of the body: the named one of the job behind the bank; else a material or group in the name of the file
-/// ("shelf_wood"); else the row of the table whose stiffness and density are nearest.
+/// The material for the look of the body: that of the job, else one in the file name ("shelf_wood"), else the table row with the nearest
+/// stiffness and density.
 void find_material(const bank::Bank& bank, const fs::path& file, BankFacts& facts) {
   const material::MaterialTable& table = material::MaterialTable::get();
   const base::Json job = report::parse_json(bank.provenance);

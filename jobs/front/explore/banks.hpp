@@ -1,4 +1,4 @@
-// The banks of a page: small enough to be fetched, with the data of each that the page needs before it is loaded.
+// Banks of a page: packed if large, with the data that the page needs before loading them.
 #pragma once
 
 #include <array>
@@ -15,21 +15,21 @@ namespace carillon::explore {
 
 struct BankFacts {
   PageBank kept;
-  Vec3 low_m{}, high_m{};        // of the surface, in the frame of the mesh
-  std::string material, group;   // the name of the table that it has or is nearest to, and its group
-  Vec3 loudest_m{};              // the vertex where a blow is loudest
-  std::array<int, 2> loudest{};  // the same place: a triangle, and which of its corners
+  Vec3 low_m{}, high_m{};        // bounding box of the surface, in the frame of the mesh
+  std::string material, group;   // nearest row of the material table, and its group
+  Vec3 loudest_m{};              // vertex with the loudest response
+  std::array<int, 2> loudest{};  // the same vertex as triangle and corner
 };
 
-/// Puts banks into a folder, each once. Large ones are packed; their triangles keep the numbers that recorded contacts name.
+/// Puts banks into a folder, each once. Large ones are packed without renumbering triangles, which recorded contacts refer to.
 class PageBanks {
  public:
-  /// keeps_all: they are copied as they are.
+  /// `keeps_all`: copies all banks unchanged.
   PageBanks(std::filesystem::path folder, bool keeps_all) : folder_(std::move(folder)), keeps_all_(keeps_all) {}
 
-  /// Throws InputError for files that are no whole bank or have no modes.
+  /// InputError for invalid banks and banks without modes.
   const BankFacts& add(const std::filesystem::path& file);
-  /// In the order in which they were added.
+  /// In the order of add().
   std::vector<PageBank> list() const;
 
  private:

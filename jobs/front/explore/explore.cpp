@@ -1,8 +1,8 @@
-// Method:     what is asked for becomes a scene; carillon-render checks it, simulates it and records its contacts; the folder gets scene,
-//             contacts, banks, page and sound engine. explore.json says what belongs to what. For a scene that is silent by itself, a probe
-//             with a blow on each body determines the gain.
-// Source:     the Sonic Explorer of van den Doel and Pai 1996.
-// Deviations: theirs synthesised on the machine of the listener, in a program of its own; this one is a page.
+// Method:     Banks become a scene; carillon-render checks and simulates it and records its contacts; the folder gets scene, contacts,
+// banks,
+//             page and sound engine, and explore.json, which connects them. For a silent scene a probe with a blow on each body determines
+//             the gain.
+// Source:     van den Doel and Pai 1996 (Sonic Explorer).
 #include "jobs/front/explore/explore.hpp"
 
 #include <fmt/core.h>
@@ -29,7 +29,7 @@ constexpr int kVersion = 1;  // of explore.json
 constexpr std::uint64_t kMaxSceneBytes = 16 << 20, kMaxTrajectoryBytes = std::uint64_t{1} << 30;
 constexpr const char *kAboutFile = "explore.json", *kSceneFile = "scene.json", *kContactsFile = "contacts.jsonl",
                      *kPackedContactsFile = "contacts.jsonl.gz", *kBankFolder = "banks";
-constexpr double kProbeGain = 0.35;  // of the gain that brings the probe's blows to full scale: headroom for harder strikes
+constexpr double kProbeGain = 0.35;  // fraction of the full-scale gain of the probe: headroom for harder strikes
 
 bool is_bank(const fs::path& file) {
   std::array<char, 13> begin{};
@@ -40,7 +40,7 @@ bool is_bank(const fs::path& file) {
   return std::string_view(begin.data(), read) == "CARILLON BANK";
 }
 
-/// The folder of an order, with what stands there now judged.
+/// The output folder. InputError if it holds other content.
 fs::path find_place(const PageOrder& order) {
   fs::path folder = order.folder;
   if (folder.empty()) folder = make_name(fs::absolute(order.subjects.front()).stem().string()) + "-explore";
@@ -56,7 +56,7 @@ fs::path find_engine() {
   return base::find_data_folder("web", "install Carillon with its page, or build it where emscripten is installed");
 }
 
-/// The name of what is shown: of a file "scene.json" the folder says more.
+/// Default title; for "scene.json" the name of its folder.
 std::string find_title(const PageOrder& order) {
   if (!order.title.empty()) return order.title;
   const fs::path first = fs::absolute(order.subjects.front());
@@ -64,7 +64,7 @@ std::string find_title(const PageOrder& order) {
   return first.filename() == "scene.json" ? first.parent_path().filename().string() : first.stem().string();
 }
 
-/// Takes effects by name out of a key "effects", in each of its forms: a list, {"on": [...], "off": [...]}, {"head": true}.
+/// Removes effects from a key "effects" of any form: a list, {"on": [...], "off": [...]}, {"head": true}.
 void remove_effects(base::Json& owner, const std::vector<std::string>& names) {
   if (!owner.is_object() || !owner.has("effects")) return;
   base::Json& effects = owner["effects"];
@@ -82,13 +82,13 @@ void remove_effects(base::Json& owner, const std::vector<std::string>& names) {
   for (const std::string& name : names) effects.erase(name);
 }
 
-/// The same of a scene and of each of its bodies.
+/// The same for a scene and each of its bodies.
 void remove_effects_of_all(base::Json& scene, const std::vector<std::string>& names) {
   remove_effects(scene, names);
   for (base::Json& body : scene["bodies"]) remove_effects(body, names);
 }
 
-/// Frees the ears of a listener with a head, which the sound engine has not. Whether there was one.
+/// Removes the head of a listener (the sound engine has none). True if there was one.
 bool take_head(base::Json& scene) {
   if (!scene.has("listener")) return false;
   base::Json& listener = scene["listener"];
@@ -100,24 +100,24 @@ bool take_head(base::Json& scene) {
   return has_head;
 }
 
-/// Whether a body is described in place of its bank. What is no scene has none: carillon-render says so.
+/// True if a body has a description instead of a bank. False for invalid scenes, which carillon-render reports.
 bool has_described_body(const base::Json& scene) {
   const base::Json bodies = scene.is_object() ? scene["bodies"] : base::Json();
   return bodies.is_array() &&
          std::any_of(bodies.begin(), bodies.end(), [](const base::Json& body) { return body.is_object() && !body.has("bank"); });
 }
 
-/// Pages play modes, and a recorded surface has none.
+/// InputError for recorded surfaces, which have no modes.
 void refuse_recordings(const base::Json& scene, const fs::path& file) {
   const base::Json bodies = scene.is_object() ? scene["bodies"] : base::Json();
   if (!bodies.is_array()) return;
   for (const base::Json& body : bodies)
     if (body.is_object() && body.has("recording"))
-      throw InputError(fmt::format(
-          "{}: a body is a recording, which pages cannot play; take it out, or play the scene with carillon-render", file.string()));
+      throw InputError(fmt::format("{}: a body is a recording, which pages cannot play; remove it, or play the scene with carillon-render",
+                                   file.string()));
 }
 
-/// Gives described bodies the banks that carillon-render has played, as its trajectory names them.
+/// Sets the banks of described bodies from the trajectory of carillon-render.
 void name_banks(base::Json& scene, const base::Json& trajectory) {
   for (std::size_t i = 0; i < scene["bodies"].size(); ++i) {
     base::Json& body = scene["bodies"][i];
@@ -174,7 +174,7 @@ class Work {
     facts_.push_back(&facts);
   }
 
-  /// Simulates a scene file, which is checked by that, and keeps what happened. The scene that is returned names the bank of each body.
+  /// Checks and simulates a scene file and keeps its contacts. Returns the scene with the bank of each body.
   base::Json record(const fs::path& file) {
     base::Json scene = report::parse_json(base::read_file(file, "scene", kMaxSceneBytes));
     refuse_recordings(scene, file);
@@ -189,9 +189,9 @@ class Work {
     }
     done_.duration_s = report_["duration_s"].as_double();
     for (const base::Json& warning : report_["warnings"]) done_.warnings.push_back(warning.as_string());
-    for (const std::string& note : programs_.get_notes())  // of banks made for this page
+    for (const std::string& note : programs_.get_notes())
       if (std::find(done_.warnings.begin(), done_.warnings.end(), note) == done_.warnings.end()) done_.warnings.push_back(note);
-    if (take_head(scene)) done_.warnings.emplace_back("listener: pages have no heads; on this one the ears are free");
+    if (take_head(scene)) done_.warnings.emplace_back("listener: pages have no heads; the ears of this one are in free field");
     done_.has_recording = report_["peak_pa"].is_number() && report_["peak_pa"].as_double() > 0.0;
     std::error_code error;
     if (done_.has_recording)
@@ -247,7 +247,8 @@ class Work {
       if (done_.has_recording) body["effects"] = report_["per_body"][i]["effects"];
       about["bodies"].append(body);
     }
-    remove_effects_of_all(scene_, {"head", "nonlinear", "cascade", "directivity", "ground_reflection"});  // not in the engine of pages
+    remove_effects_of_all(scene_,
+                          {"head", "nonlinear", "cascade", "directivity", "ground_reflection"});  // not supported by the sound engine
     base::write_file(path(kSceneFile), to_text(scene_));
     base::write_file(path(kAboutFile), to_text(about));
     put_folder(page_, folder_.path());
@@ -260,7 +261,7 @@ class Work {
   PageBanks banks_;
   process::Programs programs_;
   base::Json scene_, report_;
-  std::vector<fs::path> files_;          // per body: its bank
+  std::vector<fs::path> files_;          // banks, per body
   std::vector<const BankFacts*> facts_;  // per body
   Explored done_;
 };

@@ -1,4 +1,4 @@
-// carillon explore: a folder that any web server can serve, a page on which bodies are struck and heard.
+// carillon explore: a folder with a web page on which bodies are struck and heard.
 #pragma once
 
 #include <cstdint>
@@ -14,17 +14,17 @@ enum class Up { kZ, kY };
 
 struct PageOrder {
   std::vector<std::filesystem::path> subjects = {};  // banks, side by side; or one scene
-  std::filesystem::path folder;                      // made, or made again; empty: NAME-explore here
+  std::filesystem::path folder;                      // created or replaced; empty: NAME-explore
   std::string title = {};                            // of the page; empty: the name of the subject
   Up up = Up::kZ;                                    // axis of the meshes of banks that points up
-  bool keeps_banks = false;                          // banks as they are, however large
+  bool keeps_banks = false;                          // do not pack large banks
 };
 
-/// A bank as the folder has it.
+/// A bank in the folder.
 struct PageBank {
   std::string name;                          // of the file in the folder
-  std::uintmax_t bytes = 0, full_bytes = 0;  // of the file, and of the one that was given
-  std::string change;                        // what was done to it; empty: nothing
+  std::uintmax_t bytes = 0, full_bytes = 0;  // of the file, and of the original
+  std::string change;                        // description of the packing; empty: unchanged
 };
 
 struct Explored {
@@ -36,15 +36,15 @@ struct Explored {
   std::vector<std::string> warnings;  // of carillon-render, a line each
 };
 
-/// Makes the folder: page, sound engine, banks, scene and, for a scene with motion or strikes, the contacts of its simulation by
-/// carillon-render. It appears whole or not at all, in place of an earlier one of this program. Throws InputError for subjects that
-/// cannot be played and for a folder that holds something else, SystemError when page or engine are not installed or the disk refuses.
+/// Writes the folder: page, sound engine, banks, scene and, for a scene with motion or strikes, the contacts simulated by carillon-render.
+/// Atomic; replaces only folders of this program. InputError for subjects that cannot be played and for a folder with other content,
+/// SystemError if page or engine are not installed or the disk refuses.
 Explored explore(const PageOrder& order);
 
-/// Whether page and sound engine are installed with this program; otherwise other commands omit the page.
+/// True if page and sound engine are installed; other commands omit the page otherwise.
 bool is_installed();
 
-/// Whether explore() made this folder.
+/// True for a folder written by explore().
 bool is_explorer(const std::filesystem::path& folder);
 
 }  // namespace carillon::explore

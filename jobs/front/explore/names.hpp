@@ -1,11 +1,11 @@
-// Names as parts of longer names.
+// Truncation of names.
 #pragma once
 
 #include <string>
 
 namespace carillon::explore {
 
-/// Cuts a name to 100 bytes at a character boundary: room for suffixes of file names, and the limit of a body's name.
+/// Truncates to 100 bytes at a character boundary: space for suffixes, and the limit of body names.
 std::string cut_name(std::string name);
 
 }  // namespace carillon::explore

@@ -1,6 +1,5 @@
-// Method:     one pass over the lines; keeps only the headers needed to serve files.
 // Source:     RFC 9110 (semantics: 14.1 and 14.2 ranges), RFC 9112 (message syntax: 3 request line, 5 headers, 9.3 persistence).
-// Deviations: targets in absolute form ("GET http://...") are refused; only proxies need them.
+// Deviations: targets in absolute form ("GET http://...") are refused.
 #include "jobs/front/explore/request.hpp"
 
 #include <algorithm>
@@ -32,7 +31,7 @@ std::string_view take(std::string_view& text, char separator) {
   return first;
 }
 
-/// A number of digits alone; none for other characters and for overflow of 64 bits.
+/// A decimal number; none for other characters and on overflow.
 std::optional<std::uint64_t> parse_count(std::string_view text) {
   std::uint64_t value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);

@@ -1,4 +1,4 @@
-// Requests of HTTP/1.1 for files.
+// HTTP/1.1 requests for files.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@ struct FileRequest {
   std::string range;  // value of the header; empty: none
 };
 
-/// Parses request line and headers, without the final empty line. A request with a body is not reusable: its body is never read.
+/// Parses request line and headers, without the final empty line. A request with a body is not reusable: the body is never read.
 FileRequest parse_request(std::string_view head);
 
 /// A range of bytes of a file.

@@ -12,10 +12,10 @@
 namespace carillon::explore {
 namespace {
 
-constexpr double kGap = 0.25;      // between neighbours, in the mean of their widths
-constexpr double kView = 1.6;      // distance of the listener, in the length of the row's diagonal
-constexpr double kNearestM = 0.3;  // that the listener comes
-constexpr double kStrikeS = 0.15;  // between two blows of the probe
+constexpr double kGap = 0.25;      // gap between neighbours / mean width
+constexpr double kView = 1.6;      // distance of the listener / diagonal of the row
+constexpr double kNearestM = 0.3;  // minimum distance of the listener
+constexpr double kStrikeS = 0.15;  // interval between blows of the probe
 constexpr const char* kMallet = "hard-wood";
 
 base::Json to_json(const Vec3& v) {
@@ -24,14 +24,14 @@ base::Json to_json(const Vec3& v) {
   return list;
 }
 
-/// The corners of the surface's box in the world, about the origin of the mesh.
+/// Bounding box of the surface in world axes, relative to the origin of the mesh.
 struct Box {
   Vec3 low, high;
 };
 Box find_box(const BankFacts& facts, Up up) {
   const Vec3 &low = facts.low_m, &high = facts.high_m;
   if (up == Up::kZ) return {low, high};
-  return {{low[0], -high[2], low[1]}, {high[0], -low[2], high[1]}};  // a quarter turn about x
+  return {{low[0], -high[2], low[1]}, {high[0], -low[2], high[1]}};  // rotation by 90 degrees about x
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Scene files for a page: one with banks side by side, one that probes how loud bodies are.
+// Scenes for a page: banks side by side, and a loudness probe.
 #pragma once
 
 #include <filesystem>
@@ -9,11 +9,10 @@
 
 namespace carillon::explore {
 
-/// Bodies in a row along x, on the ground, and a listener in front of them. `names` and `facts` have one entry a body.
+/// Bodies in a row along x on the ground, and a listener in front of them. `names` and `facts`: one entry per body.
 base::Json make_row(const std::vector<std::filesystem::path>& files, const std::vector<const BankFacts*>& facts, Up up);
 
-/// The scene with all bodies fixed and, instead of its events, one blow of a mallet on each at its loudest point. `files`:
-/// the banks of its bodies.
+/// The scene with all bodies fixed and, instead of its events, one blow on each at its loudest point. `files`: banks of its bodies.
 base::Json make_probe(base::Json scene, const std::vector<std::filesystem::path>& files, const std::vector<const BankFacts*>& facts);
 
 }  // namespace carillon::explore

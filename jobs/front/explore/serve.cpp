@@ -1,8 +1,6 @@
-// Method:     one thread, poll(2), non-blocking sockets. A connection holds a head of at most kMaxHead bytes, or one piece of a file,
-//             with a deadline for the whole head and one for the next piece. Without free places a new connection replaces the idle one
-//             with the longest wait.
-// Source:     RFC 9112 9.6 (lingering close while the client still sends).
-// Deviations: none.
+// Method:     One thread, poll(2), non-blocking sockets. A connection holds a head of at most kMaxHead bytes or one piece of a file, with a
+//             deadline for each. At the limit a new connection replaces the longest idle one.
+// Source:     RFC 9112 9.6 (lingering close).
 #include "jobs/front/explore/serve.hpp"
 
 #include <fcntl.h>
@@ -34,12 +32,12 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxHead = 16 << 10, kPiece = 256 << 10;
-constexpr std::size_t kMaxConnections = 200;  // two descriptors each, of the usual 1024
-constexpr double kHeadS = 10.0;               // for a request, since the connection or the last answer
-constexpr double kPieceS = 600.0;             // a browser that renders may pause its reading for long
+constexpr std::size_t kMaxConnections = 200;  // two descriptors each; the usual limit is 1024
+constexpr double kHeadS = 10.0;               // for a request
+constexpr double kPieceS = 600.0;             // for the next piece: browsers may pause reading
 constexpr double kEndS = 10.0;                // for the rest of a refused request
 
-/// SIGINT and SIGTERM as a descriptor; blocked in this thread and in threads started by it.
+/// SIGINT and SIGTERM as a descriptor; blocked in this thread and its children.
 class BlockedSignals {
  public:
   BlockedSignals() {
@@ -105,7 +103,7 @@ const char* find_type(const fs::path& file) {
   return "application/octet-stream";
 }
 
-/// An answer: a head, then a part of a file.
+/// A response: a head, then a part of a file.
 struct Answer {
   std::string head;
   std::size_t head_sent = 0;
@@ -141,7 +139,7 @@ class Folder {
     return answer;
   }
 
-  /// An answer of one line of text, without a file.
+  /// A response of one line of text.
   static Answer refuse(const FileRequest& request, int status, const std::string& more = {}) {
     const std::string text = fmt::format("{} {}\n", status, find_reason(status));
     Answer answer = begin(request, status, text.size(),
@@ -173,7 +171,7 @@ class Folder {
   std::vector<std::string> hosts_;
 };
 
-/// One connection: reads a head, sends its answer, and reads the next or ends.
+/// One connection: reads a head, sends the response, and reads the next or ends.
 class Connection {
  public:
   explicit Connection(base::Descriptor socket) : socket_(std::move(socket)), until_s_(base::get_steady_s() + kHeadS) {}
@@ -203,7 +201,7 @@ class Connection {
 
   static bool is_early() { return errno == EAGAIN || errno == EINTR; }
 
-  /// Begins the answer to a complete or oversized head.
+  /// Starts the response to a complete or oversized head.
   void find_request(const Folder& folder) {
     const std::size_t begin = std::min(taken_.find_first_not_of("\r\n"), taken_.size());
     std::size_t end = taken_.find("\n\r\n", begin), length = 3;
@@ -222,7 +220,7 @@ class Connection {
     until_s_ = base::get_steady_s() + kPieceS;
   }
 
-  /// Sends a piece of the answer.
+  /// Sends a piece of the response.
   bool send(const Folder& folder, std::vector<char>& buffer) {
     const char* from = answer_.head.data() + answer_.head_sent;
     std::size_t length = answer_.head.size() - answer_.head_sent;
@@ -230,7 +228,7 @@ class Connection {
     if (!is_head && answer_.left > 0) {
       const ssize_t count =
           ::pread(answer_.file.get(), buffer.data(), std::min<std::uint64_t>(kPiece, answer_.left), static_cast<off_t>(answer_.at));
-      if (count <= 0) return false;  // a file cut meanwhile
+      if (count <= 0) return false;  // the file was truncated meanwhile
       from = buffer.data();
       length = count;
     }
@@ -256,7 +254,7 @@ class Connection {
 
   base::Descriptor socket_;
   State state_ = State::kReading;
-  std::string taken_;  // bytes read and not yet answered
+  std::string taken_;  // unanswered input
   Answer answer_;
   double until_s_;  // deadline
 };
@@ -273,10 +271,9 @@ std::pair<base::Descriptor, int> listen_at(int port) {
   socklen_t size = sizeof(address);
   if (::bind(socket.get(), reinterpret_cast<const sockaddr*>(&address), size) != 0 || ::listen(socket.get(), SOMAXCONN) != 0 ||
       ::getsockname(socket.get(), reinterpret_cast<sockaddr*>(&address), &size) != 0)
-    throw SystemError(port == 0 ? fmt::format("no port of the loopback address is free: {}", std::strerror(errno))
-                      : errno == EADDRINUSE
-                          ? fmt::format("port {} of the loopback address is taken; give another one with --port", port)
-                          : fmt::format("port {} of the loopback address: {}; give another one with --port", port, std::strerror(errno)));
+    throw SystemError(port == 0             ? fmt::format("no free port: {}", std::strerror(errno))
+                      : errno == EADDRINUSE ? fmt::format("port {} is in use; give another one with --port", port)
+                                            : fmt::format("port {}: {}; give another one with --port", port, std::strerror(errno)));
   return {std::move(socket), ntohs(address.sin_port)};
 }
 
@@ -284,7 +281,7 @@ class Server {
  public:
   Server(const fs::path& folder, base::Descriptor socket, int port) : folder_(folder, port), socket_(std::move(socket)), buffer_(kPiece) {}
 
-  /// Serves until a signal; returns its number.
+  /// Serves until a signal; returns it.
   int run(const BlockedSignals& signals) {
     for (std::vector<pollfd> waited;;) {
       waited.assign({{signals.descriptor(), POLLIN, 0}, {socket_.get(), POLLIN, 0}});
@@ -295,7 +292,7 @@ class Server {
       }
       const double wait_s = std::max(0.0, until_s - base::get_steady_s());
       if (::poll(waited.data(), waited.size(), static_cast<int>(1e3 * wait_s) + 1) < 0 && errno != EINTR)
-        throw SystemError(fmt::format("the server cannot wait for requests: {}", std::strerror(errno)));
+        throw SystemError(fmt::format("poll fails: {}", std::strerror(errno)));
       if (const int signal = signals.take(); signal != 0) return signal;
       const double now_s = base::get_steady_s();
       auto ready = waited.begin() + 2;
@@ -308,7 +305,7 @@ class Server {
   }
 
  private:
-  /// Accepts at most kMaxConnections at a time, so that a flood of connections cannot starve the answers.
+  /// Accepts at most kMaxConnections at a time, so that new connections cannot starve responses.
   void accept() {
     for (std::size_t count = 0; count < kMaxConnections; ++count) {
       base::Descriptor socket(::accept4(socket_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
@@ -319,7 +316,7 @@ class Server {
     }
   }
 
-  /// Ends the idle connection with the earliest deadline; one with an unfinished answer only if none is idle.
+  /// Closes the idle connection with the earliest deadline; an active one only if none is idle.
   bool make_room() {
     const auto first = std::min_element(connections_.begin(), connections_.end(), [](const Connection& a, const Connection& b) {
       return std::pair(a.is_sending(), a.until_s()) < std::pair(b.is_sending(), b.until_s());
@@ -340,7 +337,7 @@ class Server {
 int serve(const fs::path& folder, int port, const std::function<void(const std::string& address)>& on_ready) {
   const BlockedSignals signals;
   std::error_code error;
-  if (!fs::is_directory(folder, error)) throw SystemError(fmt::format("{}: this folder does not exist any more", folder.string()));
+  if (!fs::is_directory(folder, error)) throw SystemError(fmt::format("{}: this folder no longer exists", folder.string()));
   auto [socket, bound] = listen_at(port);
   Server server(folder, std::move(socket), bound);
   on_ready(fmt::format("http://127.0.0.1:{}/", bound));

@@ -1,4 +1,4 @@
-// A web server for this machine alone.
+// A web server on the loopback interface.
 #pragma once
 
 #include <filesystem>
@@ -9,10 +9,9 @@
 
 namespace carillon::explore {
 
-/// Serves the files of a folder at http://127.0.0.1:PORT/ until SIGINT or SIGTERM; returns the number of that signal. Port 0: a free one.
-/// `on_ready` gets the address of the open port. Serves only files of the folder, only to this machine, and only requests for that host
-/// name (against DNS rebinding by pages of other origins). Bounded memory and connections: a request has one range of a file or the whole
-/// of it, and an idle connection makes room for a new one. Throws SystemError for an occupied port.
+/// Serves the files of a folder at http://127.0.0.1:PORT/ until SIGINT or SIGTERM; returns the signal. Port 0: a free port. `on_ready` gets
+/// the address. Accepts only requests with a host name of this machine (against DNS rebinding). Memory and connections are bounded; new
+/// connections replace idle ones. SystemError for an occupied port.
 int serve(const std::filesystem::path& folder, int port, const std::function<void(const std::string& address)>& on_ready);
 
 }  // namespace carillon::explore

@@ -11,17 +11,17 @@ namespace carillon::hear {
 
 /// The output of `carillon-mesh --look` for a surface or a mesh.
 struct SurfaceFacts {
-  bool is_mesh = false;  // of tetrahedra: extent is all that is known
+  bool is_mesh = false;  // tetrahedra; only the extent is known
   long long triangles = 0, parts = 0, openings = 0;
   std::array<double, 3> extent{};  // in the file's units
-  double thickness = 0.0;          // of a surface that is both sides of a wall, in the file's units
+  double thickness = 0.0;          // of a surface with both sides of a wall, in the file's units; 0: none
 };
 
-/// Metres per unit of the file: as given, else guessed from the extent; a guess is added to `assumed`. `height_m` has precedence. Throws
-/// InputError where no unit gives a plausible size.
+/// Metres per unit of the file: as given (`height_m` takes precedence), else guessed from the extent and added to `assumed`. InputError if
+/// no unit gives a plausible size.
 double find_scale(const Order& options, const SurfaceFacts& look, double height_m, std::vector<std::string>& assumed);
 
-/// Throws InputError for an open surface without a wall, and for a wall too thick or too thin for the body.
+/// InputError for an open surface without a wall, and for a wall too thick or too thin for the body.
 void check_wall(const Order& options, const SurfaceFacts& look, double scale);
 
 }  // namespace carillon::hear

@@ -1,7 +1,5 @@
-// Method:     carillon-mesh, carillon-precompute and carillon-render, one after the other, on files in one folder. The body of the slowest
-//             waves is solved; those that differ from it by density, stiffness, loss and size alone are scaled (docs/equations.md E6).
-// Source:     own.
-// Deviations: none.
+// Method:     Runs carillon-mesh, carillon-precompute and carillon-render on files in one folder. The body with the lowest wave speed is
+//             solved; bodies that differ only in density, stiffness, loss and size are scaled from it (docs/equations.md E6).
 #include "jobs/front/hear/hear.hpp"
 
 #include <fcntl.h>
@@ -49,17 +47,17 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-constexpr int kMaxModes = 600;                // of what is not a preview
+constexpr int kMaxModes = 600;                // with accuracy_cents
 constexpr const char* kExplorer = "explore";  // folder of the page
 constexpr std::size_t kStrikes = 4, kListed = 12;
 constexpr long long kMaxUnused = 1'000'000'000'000;
-constexpr double kSameCents = 5.0;                       // an edit that leaves Poisson's ratio may be so far off
+constexpr double kSameCents = 5.0;                       // allowed error of scaling with unchanged Poisson's ratio
 constexpr double kMinCents = 0.001, kMaxCents = 1200.0;  // of a job's accuracy_cents
 constexpr std::array<double, 2> kBandHz{20.0, 20000.0};
 
-/// The characters that are safe in the name of a file: letters and digits of any script, points and underscores.
+/// Keeps characters that are safe in file names: letters and digits of any script, points and underscores.
 std::string clean(const std::string& name) {
-  const bool is_text = base::printable(name) == name;  // bytes that are no UTF-8 would be no JSON
+  const bool is_text = base::printable(name) == name;  // invalid UTF-8 is not valid in JSON
   std::string text;
   for (const char c : name) {
     const auto byte = static_cast<unsigned char>(c);
@@ -78,7 +76,7 @@ bool is_surface_file(const fs::path& file) {
   return std::find(kEndings.begin(), kEndings.end(), base::find_extension(file)) != kEndings.end();
 }
 
-/// Throws InputError if the object is no surface or mesh, with a remedy for files of other kinds.
+/// InputError if the object is neither a surface nor a mesh, with a remedy for other kinds of files.
 void check_object(const fs::path& object) {
   constexpr const char* kTakes = "a surface (.obj, .stl, .ply, .off, .gltf, .glb) or a mesh (.msh, .vtu, .mesh)";
   const std::string name = object.string(), ending = base::find_extension(object);
@@ -88,29 +86,28 @@ void check_object(const fs::path& object) {
   if (is_surface_file(object) || is_mesh_file(object)) return;
   if (ending == ".json" || ending == ".jsonl")
     throw InputError(
-        fmt::format("{}: by its name no object, but a scene (play it: carillon-render {} -o sound.wav) or a job "
+        fmt::format("{}: by its name not an object, but a scene (play it: carillon-render {} -o sound.wav) or a job "
                     "(solve it: carillon-precompute {}); give {}",
                     name, name, name, kTakes));
   if (ending == ".hdf" || ending == ".h5" || ending == ".hdf5" || ending == ".bank")
-    throw InputError(fmt::format(
-        "{}: a bank, by its name; play it with carillon explore, name it in a scene for carillon-render, or give {}", name, kTakes));
-  throw InputError(fmt::format("{}: by its name no surface or mesh; give {}, and convert other formats first", name, kTakes));
+    throw InputError(fmt::format("{}: by its name a bank; play it with carillon explore, use it in a scene for carillon-render, or give {}",
+                                 name, kTakes));
+  throw InputError(fmt::format("{}: by its name neither a surface nor a mesh; give {}, and convert other formats first", name, kTakes));
 }
 
-/// A folder that one run at a time writes to. If it was made here and is still empty, it is removed at the end.
+/// The output folder, locked. Removed at the end if created here and still empty.
 class OutFolder {
  public:
-  /// Throws InputError or SystemError where it cannot be made, or another run writes to it.
+  /// InputError, SystemError: cannot be created, or locked by another run.
   explicit OutFolder(fs::path folder) : folder_(std::move(folder)) {
     std::error_code error;
     is_new_ = fs::create_directories(folder_, error);
-    if (error)
-      throw SystemError(fmt::format("{}: the folder cannot be made: {}; give another one with -o", folder_.string(), error.message()));
+    if (error) throw SystemError(fmt::format("{}: cannot create folder: {}; give another one with -o", folder_.string(), error.message()));
     base::check_writable(folder_ / "report.html", "sound");
     lock_ = base::Descriptor(::open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
     if (lock_.get() >= 0 && ::flock(lock_.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
       throw InputError(
-          fmt::format("{}: another `carillon hear` writes to this folder; wait for it, or give another one with -o", folder_.string()));
+          fmt::format("{}: another `carillon hear` uses this folder; wait for it, or give another one with -o", folder_.string()));
   }
   ~OutFolder() {
     std::error_code error;
@@ -125,7 +122,7 @@ class OutFolder {
   base::Descriptor lock_;
 };
 
-/// One material and height, and where it stands among the others.
+/// One material and height.
 struct Wish {
   const material::Material* material = nullptr;
   double height_m = 0.0;
@@ -161,13 +158,13 @@ class Listening {
   /// Since the beginning.
   double calc_seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
 
-  /// The page on which all that was asked for stands side by side.
+  /// The page with all sounds side by side.
   void make_explorer() {
     if (!explore::is_installed()) return;
     explore::PageOrder order{.folder = heard_.folder / kExplorer, .title = stem_};
     for (const Sound& sound : heard_.sounds) order.subjects.push_back(sound.bank);
     if (!is_shape() && !is_mesh()) order.up = explore::Up::kY;
-    say("making the page");
+    say("writing the page");
     heard_.explorer = explore::explore(order).folder;
   }
 
@@ -182,8 +179,8 @@ class Listening {
     if (order_.wall_m && is_mesh()) throw InputError("--wall is for surfaces; a mesh is already a volume");
     if (order_.wall_m && !(*order_.wall_m > 0.0)) throw InputError("--wall is a thickness in metres, above 0");
     if (order_.facets && (is_shape() || is_mesh()))
-      throw InputError(fmt::format("--facets is for surfaces; {}",
-                                   is_shape() ? "a shape has no facets" : "a mesh keeps those that `carillon-mesh --facets` made"));
+      throw InputError(
+          fmt::format("--facets is for surfaces; {}", is_shape() ? "a shape has no facets" : "for a mesh give it to carillon-mesh"));
     for (const double height : order_.heights_m)
       if (!(height > 0.0) || !std::isfinite(height)) throw InputError("--height is in metres, above 0");
     if (order_.scale && !(*order_.scale > 0.0)) throw InputError("--scale is metres per unit of the file, above 0");
@@ -195,19 +192,19 @@ class Listening {
     (void)material::require_mallet("--mallet", order_.mallet);
   }
 
-  /// Reads the file and notes what is assumed.
+  /// Reads the file and collects assumptions.
   void look() {
     stem_ = explore::cut_name(clean(is_shape() ? order_.shape : order_.object.stem().string()));
     heard_.folder = fs::absolute(order_.out.empty() ? fs::path(stem_ + "-sound") : order_.out);
     if (order_.materials.empty()) {
       materials_ = {kDefaultMaterial};
       heard_.assumed.push_back(fmt::format(
-          "material: {}, since none is given; choose another with --material NAME (`carillon materials` lists them)", kDefaultMaterial));
+          "material: {} (none given); choose another with --material NAME (`carillon materials` lists them)", kDefaultMaterial));
     } else {
       materials_ = order_.materials;
     }
     if (is_shape()) return;
-    say("looking at " + order_.object.filename().string());
+    say("reading " + order_.object.filename().string());
     facts_.is_mesh = is_mesh();
     const std::string text = programs_.run("carillon-mesh", {fs::absolute(order_.object).string(), "--look"}, true);
     const base::Document document = base::parse_document(text, "carillon-mesh --look");
@@ -215,8 +212,8 @@ class Listening {
     facts_.extent = root.numbers<3>("extent");
     facts_.parts = root.integer("parts", 0, std::numeric_limits<long long>::max());
     if (facts_.parts > 1)
-      heard_.assumed.push_back(fmt::format(
-          "parts: {} separate bodies, which do not touch, are one object here; give one file each to hear them apart", facts_.parts));
+      heard_.assumed.push_back(
+          fmt::format("parts: {} separate bodies are treated as one object; use one file each to hear them separately", facts_.parts));
     if (const long long unused = root.integer_if(is_mesh() ? "unused_nodes" : "unused_points", 0, kMaxUnused).value_or(0); unused > 0)
       heard_.assumed.push_back(fmt::format("unused: {} point{} of the file belong{} to no element and {} left out", unused,
                                            unused == 1 ? "" : "s", unused == 1 ? "s" : "", unused == 1 ? "is" : "are"));
@@ -225,8 +222,8 @@ class Listening {
     facts_.openings = root.integer("openings", 0, std::numeric_limits<long long>::max());
     facts_.thickness = root.has_number("thickness") ? root.number("thickness") : 0.0;
     if (!order_.wall_m && facts_.openings == 0)
-      heard_.assumed.push_back(facts_.thickness > 0.0 ? std::string("body: a wall, since the file has both of its sides")
-                                                      : std::string("body: solid; --wall T makes it a shell, T metres thick"));
+      heard_.assumed.push_back(facts_.thickness > 0.0 ? std::string("body: a wall, since the file has both sides")
+                                                      : std::string("body: solid; --wall T makes it a shell of T metres"));
   }
 
   std::vector<Wish> list_wishes() {
@@ -239,7 +236,7 @@ class Listening {
         Wish wish{.material = &material::MaterialTable::get().find(name)->material, .height_m = height};
         wish.slowness = std::max(height, 1e-9) * std::sqrt(wish.material->density_kg_m3 / wish.material->young_modulus_pa);
         wish.name = fmt::format("{}-{}{}", stem_, clean(wish.material->name), has_many_heights ? fmt::format("-{:g}m", height) : "");
-        if (!place_.emplace(wish.name, place_.size()).second) throw InputError(fmt::format("{} is asked for twice", wish.name));
+        if (!place_.emplace(wish.name, place_.size()).second) throw InputError(fmt::format("{} is given twice", wish.name));
         wishes.push_back(wish);
       }
     std::stable_sort(wishes.begin(), wishes.end(), [](const Wish& a, const Wish& b) { return a.slowness > b.slowness; });
@@ -262,7 +259,7 @@ class Listening {
       *earlier = std::move(sound);
   }
 
-  /// The sounds again, of meshes that are fine enough. What was heard before stays where that fails.
+  /// The sounds again from finer meshes. On failure the preview stays.
   void refine(const std::vector<Wish>& wishes) {
     double worst_cents = 0.0;
     for (const Sound& sound : heard_.sounds) worst_cents = std::max(worst_cents, sound.worst_cents);
@@ -282,7 +279,7 @@ class Listening {
     }
   }
 
-  /// What shows the sounds.
+  /// Report and page.
   void write_page() {
     heard_.page = heard_.folder / report::kPageFile;
     const fs::path& bank = heard_.sounds.front().bank;
@@ -291,11 +288,11 @@ class Listening {
     report::write_report(bank, bank.string() + ".resolved.json", heard_.folder, {.title = stem_, .drawn_modes = 0, .explorer = explorer});
   }
 
-  /// The bank of a body that was solved, scaled; false where none is like it.
+  /// Scales the bank of a similar solved body; false if there is none.
   bool edit(const Wish& wish, Sound& sound) {
     for (const auto& [solved, bank_file] : solved_) {
       const bool is_scaled = solved.height_m != wish.height_m, is_same = solved.material == wish.material;
-      if (is_scaled && order_.wall_m) continue;  // the wall stays as thick
+      if (is_scaled && order_.wall_m) continue;  // the wall thickness is not scaled
       std::vector<std::string> words{"edit", bank_file.string(), sound.bank.string()};
       if (!is_same) {
         if (wish.material->orthotropic || solved.material->orthotropic) continue;
@@ -324,7 +321,7 @@ class Listening {
     job.set("band_hz", base::Json::array(kBandHz)).set("max_modes", is_refining_ ? kMaxModes : job::kPreviewModes);
     const fs::path file = heard_.folder / (wish.name + ".json");
     base::write_file(file, job.text());
-    say(fmt::format("{}: {}finding the modes", wish.name, is_refining_ ? "meshing finer and " : ""));
+    say(fmt::format("{}: {}computing the modes", wish.name, is_refining_ ? "meshing finer and " : ""));
     std::vector<std::string> words{file.string()};
     if (!is_refining_) words.emplace_back("-q");
     (void)programs_.run("carillon-precompute", words, true, is_refining_);
@@ -353,7 +350,7 @@ class Listening {
     return body;
   }
 
-  /// Of this height; made once.
+  /// The mesh for this height, cached.
   fs::path make_mesh(const Wish& wish) {
     if (const auto made = meshes_.find(wish.height_m); made != meshes_.end()) return made->second;
     const fs::path file =
@@ -371,7 +368,7 @@ class Listening {
     }
     words.insert(words.end(), {"--order", "2", "-q", "-o", file.string()});
     say(fmt::format("meshing {}", stem_));
-    (void)job::run_at_possible_count(nodes, "mesh it by `carillon-mesh` and give the mesh, or make it thicker", [&](std::int64_t count) {
+    (void)job::run_at_possible_count(nodes, "mesh it with `carillon-mesh` and give the mesh, or make it thicker", [&](std::int64_t count) {
       std::vector<std::string> all = words;
       all.insert(all.end(), {"--nodes", std::to_string(count)});
       (void)programs_.run("carillon-mesh", all, true);
@@ -386,8 +383,7 @@ class Listening {
     bank::Bank bank = bank::choose_frequencies(bank::read_bank(sound.bank), bank::Frequencies::kCorrected);
     const std::vector<bank::HeardMode> modes = mounting::mount(bank);
     if (bank.mode_count() == 0 || bank.freq_hz(0) > kBandHz[1])
-      throw InputError(fmt::format("{}: it has no mode from {:g} to {:g} Hz, so it is inaudible; make it larger ({})", sound.name,
-                                   kBandHz[0], kBandHz[1],
+      throw InputError(fmt::format("{}: no mode from {:g} to {:g} Hz: inaudible; make it larger ({})", sound.name, kBandHz[0], kBandHz[1],
                                    is_shape()  ? "its dimensions"
                                    : is_mesh() ? "--scale"
                                                : "--height, --scale"));
@@ -439,7 +435,7 @@ class Listening {
   std::vector<std::string> materials_;
   std::map<double, fs::path> meshes_;              // by height
   std::vector<std::pair<Wish, fs::path>> solved_;  // with their banks
-  std::map<std::string, std::size_t> place_;       // in which sounds were asked for
+  std::map<std::string, std::size_t> place_;       // order of the sounds
   bool is_size_said_ = false;
   bool is_refining_ = false;  // after the preview
   Heard heard_;

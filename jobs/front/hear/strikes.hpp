@@ -1,4 +1,4 @@
-// How loud the modes of a body are where it is struck.
+// Levels of the modes of a struck body.
 #pragma once
 
 #include <cstddef>
@@ -9,7 +9,7 @@
 
 namespace carillon::hear {
 
-/// The first `count` modes as a blow at a vertex makes them. `heard`: of mounting::mount().
+/// The first `count` modes excited by an impulse at a vertex. `heard`: of mounting::mount().
 std::vector<StruckMode> list_modes(const bank::Bank& bank, const std::vector<bank::HeardMode>& heard, std::size_t vertex,
                                    std::size_t count);
 

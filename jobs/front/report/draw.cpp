@@ -1,4 +1,4 @@
-// Source: PNG Specification 5.2 (the signature), 11.2.5 (how it ends).
+// Source: PNG Specification 5.2 (signature), 11.2.5 (IEND).
 #include "jobs/front/report/draw.hpp"
 
 #include <fmt/format.h>
@@ -26,7 +26,7 @@ bool is_whole_png(const fs::path& file) {
   return in && std::memcmp(first.data(), "\x89PNG\r\n\x1a\n", 8) == 0 && std::memcmp(last.data(), "IEND\xae\x42\x60\x82", 8) == 0;
 }
 
-/// Why it failed, or nothing.
+/// Why it failed; empty: success.
 std::string run(const fs::path& program, const fs::path& bank, int modes, const fs::path& picture, double limit_s) {
   std::string numbers = "1";
   for (int mode = 2; mode <= modes; ++mode) numbers += fmt::format(",{}", mode);
@@ -53,12 +53,12 @@ Drawing draw_modes(const fs::path& given, const fs::path& bank, int modes, const
   fs::remove(picture, error);
   const std::optional<fs::path> program = given.empty() ? base::find_program("carillon-draw") : std::optional(fs::absolute(given, error));
   if (!program || !base::is_program(*program)) return {"carillon-draw is not installed here"};
-  // In a folder of its own, which is removed with its content, however the program ends.
+  // In a temporary folder, removed with all files of the program.
   std::optional<base::TemporaryFolder> place;
   try {
     place.emplace(fs::absolute(picture, error).parent_path(), ".drawing-");
   } catch (const SystemError& failure) {
-    return {fmt::format("there is no place to draw: {}", failure.what())};
+    return {fmt::format("no temporary folder: {}", failure.what())};
   }
   const fs::path drawn = place->path() / picture.filename();
   Drawing drawing{run(*program, fs::absolute(bank, error), modes, drawn, limit_s)};

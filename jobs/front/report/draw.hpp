@@ -7,11 +7,11 @@
 namespace carillon::report {
 
 struct Drawing {
-  std::string fault;  // why there is no picture, a sentence without a full stop; empty: there is one
+  std::string fault;  // why there is no picture, one sentence without a full stop; empty: drawn
 };
 
-/// Starts `program` (empty: carillon-draw next to this program, else in PATH; never a shell) and waits for it, at most `limit_s`, then it
-/// is ended; it ends with us as well. The picture is a whole PNG or is not there.
+/// Runs `program` (empty: carillon-draw next to this program, else in PATH) with a time limit; it ends with this process. The picture is a
+/// complete PNG or missing.
 Drawing draw_modes(const std::filesystem::path& program, const std::filesystem::path& bank, int modes, const std::filesystem::path& picture,
                    double limit_s);
 

@@ -1,9 +1,7 @@
-// Method:     fork and exec, never a shell: nothing of a job is ever read as a command. One thread a rank, no binding to cores (two runs
-//             side by side would be bound to the same), keep-alive probes between mpirun's daemons (a lost machine is noticed in 11 s, not
-//             in 8 minutes), temporary files and shared memory in folders of the attempt. One rank needs no mpirun and starts faster
-//             without.
+// Method:     fork and exec without a shell. One thread per rank; no binding to cores (concurrent runs would share the same cores);
+//             keep-alive probes between mpirun's daemons (a lost host is detected in 11 s instead of 8 minutes); temporary files and shared
+//             memory in folders of the attempt. A single rank is started without mpirun, which is faster.
 // Source:     Open MPI 4.1, mpirun(1), ompi_info --all; Linux prctl(2), proc(5) (oom_score_adj).
-// Deviations: none.
 #include "jobs/queue/attempt/launch.hpp"
 
 #include <fcntl.h>
@@ -29,7 +27,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Sockets lie in the temporary folder, and their paths must be short.
+// Paths of sockets in the temporary folder are limited to about 100 bytes.
 constexpr std::size_t kMaxTemporaryPath = 60;
 
 fs::path find_temporary_base() {
@@ -51,7 +49,7 @@ std::vector<std::string> make_environment(const std::string& token, const Scratc
     if (const std::size_t equal = entry.find('='); equal != std::string::npos) values[entry.substr(0, equal)] = entry.substr(equal + 1);
   values["CARILLON_ATTEMPT"] = token;
   values["OMP_NUM_THREADS"] = values["OPENBLAS_NUM_THREADS"] = "1";
-  values["HWLOC_COMPONENTS"] = "-gl";  // Open MPI would ask every X server for graphics cards, and end with one that ends just then
+  values["HWLOC_COMPONENTS"] = "-gl";  // else hwloc queries X servers for GPUs, and Open MPI fails if one exits meanwhile
   values["OMPI_MCA_hwloc_base_binding_policy"] = "none";
   if (::geteuid() == 0) values["OMPI_ALLOW_RUN_AS_ROOT"] = values["OMPI_ALLOW_RUN_AS_ROOT_CONFIRM"] = "1";
   values.try_emplace("OMPI_MCA_oob_tcp_keepalive_time", "5");
@@ -67,10 +65,10 @@ std::vector<std::string> make_environment(const std::string& token, const Scratc
 }
 
 base::Descriptor open_output(const fs::path& file, int mode) {
-  base::Descriptor output(::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK | mode, 0666));
+  base::Descriptor output(::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | mode, 0666));
   if (output.get() < 0)
     throw SystemError(
-        fmt::format("{}: cannot write this: {}; check the folder's rights and the space on the disk", file.string(), std::strerror(errno)));
+        fmt::format("{}: cannot write: {}; check the folder's rights and the space on the disk", file.string(), std::strerror(errno)));
   return output;
 }
 
@@ -83,7 +81,7 @@ Scratch::Scratch(const std::string& token) {
   };
   temporary_ = make(find_temporary_base());
   if (temporary_.empty()) {
-    throw SystemError(fmt::format("{}: cannot make a temporary folder here: {}; make room there, or name another by TMPDIR",
+    throw SystemError(fmt::format("{}: cannot create a temporary folder: {}; make room there, or set TMPDIR",
                                   find_temporary_base().string(), std::strerror(errno)));
   }
   shared_memory_ = make("/dev/shm");
@@ -125,19 +123,15 @@ Launch make_launch(const Options& options, const std::string& token, const Scrat
   const auto add = [&](std::initializer_list<const char*> words) {
     launch.arguments.insert(launch.arguments.end(), words.begin(), words.end());
   };
-  // What starts ranks knows the folder by its name, and does so on other machines too: each rank goes there step by step.
-  const std::string folder = fmt::format("work/{}/{}", options.id.substr(0, 2), options.id);
-  if (launcher != Launcher::alone) add({"--folder", options.root.c_str(), folder.c_str()});
   add({"--result", store::kResultFile});
   if (options.memory_limit_gb > 0.0 && !options.is_simulation)
     launch.arguments.insert(launch.arguments.end(), {"--memory-gb", fmt::format("{}", options.memory_limit_gb)});
   if (options.is_simulation && options.is_prediction) {
-    add({"--validate", "--json", "--patience", "1000000", "--checkpoint",
-         store::kCheckpointFile});  // predicts the memory of checkpoints as well
+    add({"--validate", "--json", "--patience", "1000000", "--checkpoint", store::kCheckpointFile});  // includes the memory of checkpoints
   } else if (options.is_simulation) {
-    add({"--checkpoint", store::kCheckpointFile, "--progress", store::kProgressFile});  // what it writes is in the job
+    add({"--checkpoint", store::kCheckpointFile, "--progress", store::kProgressFile});  // its outputs are in the job
   } else if (options.is_prediction) {
-    add({"--validate", "--json", "--patience", "1000000", "--count", "20"});  // what is reserved rests on the mesh, not on an estimate
+    add({"--validate", "--json"});
   } else {
     add({"--bank", store::kBankFile, "--checkpoint", store::kCheckpointFile, "--progress", store::kProgressFile});
   }
@@ -154,7 +148,7 @@ pid_t start(const Launch& launch, const fs::path& folder, const fs::path& log, c
                       .errors = errors.get(),
                       .group = base::Command::Group::own,
                       .signal_at_end = SIGTERM,
-                      .yields_memory = true,  // the solver goes, not the service
+                      .yields_memory = true,  // the kernel kills the solver first
                       .default_signals = true});
 }
 

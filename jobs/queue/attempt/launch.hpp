@@ -1,4 +1,4 @@
-// How the solver is started.
+// Start of the solver.
 #pragma once
 
 #include <sys/types.h>
@@ -16,7 +16,7 @@ struct Launch {
   std::vector<std::string> environment;  // "NAME=value"
 };
 
-/// Folders for the temporary files of one attempt, with its token in their names, so that the next attempt can remove them.
+/// Temporary folders of one attempt, named by its token so that the next attempt can remove them.
 class Scratch {
  public:
   explicit Scratch(const std::string& token);
@@ -26,21 +26,21 @@ class Scratch {
   const std::filesystem::path& temporary() const { return temporary_; }
   const std::filesystem::path& shared_memory() const { return shared_memory_; }  // empty: none
 
-  /// Removes what an attempt with this token left.
+  /// Removes the folders of an ended attempt.
   static void remove_left(const std::string& token);
 
  private:
   std::filesystem::path temporary_, shared_memory_;
 };
 
-/// Whether a batch system gave us the machine.
+/// True inside a job of Slurm.
 bool is_under_slurm();
 
-/// The command and the environment. `scratch` may be null (under Slurm). SystemError when a program is not installed.
+/// Command and environment. `scratch`: null under Slurm. SystemError if a program is not installed.
 Launch make_launch(const Options& options, const std::string& token, const Scratch* scratch);
 
-/// Starts it in `folder`, in a process group of its own, with output appended to `log` and no input. The kernel sends it SIGTERM when this
-/// process dies. SystemError when it cannot be started.
+/// Starts the command in `folder`, in its own process group, without input; standard output goes to `output` (empty: appended to `log`),
+/// errors to `log`. It gets SIGTERM when this process dies. SystemError if it cannot be started.
 pid_t start(const Launch& launch, const std::filesystem::path& folder, const std::filesystem::path& log,
             const std::filesystem::path& output = {});
 

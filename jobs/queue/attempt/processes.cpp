@@ -1,6 +1,4 @@
-// Method:     One look at /proc/*/stat gives all parents; descendants are found from there.
 // Source:     Linux proc(5); Documentation/scheduler/sched-stats.rst (schedstat).
-// Deviations: none.
 #include "jobs/queue/attempt/processes.hpp"
 
 #include <fmt/core.h>
@@ -25,7 +23,7 @@ Number parse(const std::string& text) {
   return value;
 }
 
-/// False for a zombie and for what is gone.
+/// False for zombies and ended processes.
 bool read_usage(pid_t pid, Usage& usage) {
   const std::string text = process::read_proc(fmt::format("/proc/{}/stat", pid));
   const std::size_t open = text.find('('), close = text.rfind(')');
@@ -62,7 +60,7 @@ std::map<pid_t, Usage> find_below(pid_t root) {
     if (at == root) below.emplace(pid, usage);
   }
   for (auto& [pid, usage] : below) {
-    // Finer than ticks: a process that sleeps and looks now and then uses less than one.
+    // Finer than clock ticks: a polling process may use less than one.
     if (const std::string text = process::read_proc(fmt::format("/proc/{}/schedstat", pid)); !text.empty())
       usage.cpu_ns = parse<std::uint64_t>(text);
   }

@@ -1,4 +1,4 @@
-// The processes below one: what they are, what they use.
+// Resource usage of a process and its descendants.
 #pragma once
 
 #include <sys/types.h>
@@ -11,18 +11,18 @@ namespace carillon::attempt {
 
 struct Usage {
   pid_t parent = 0;
-  std::string name;  // at most 15 letters
+  std::string name;  // at most 15 characters
   std::uint64_t resident_bytes = 0;
-  std::uint64_t cpu_ns = 0;  // its own, ended children not counted
+  std::uint64_t cpu_ns = 0;  // without ended children
 };
 
-/// All processes of this machine that descend from `root`, and itself. Zombies are left out.
+/// `root` and its descendants, without zombies.
 std::map<pid_t, Usage> find_below(pid_t root);
 
-/// CPU time of `pid` and all below it in `all` [ns].
+/// CPU time of `pid` and its descendants in `all` [ns].
 std::uint64_t calc_cpu_below(const std::map<pid_t, Usage>& all, pid_t pid);
 
-/// How often the kernel has killed a process for lack of memory since it started; 0 where it is not known.
+/// Number of processes killed by the kernel for lack of memory since boot; 0 if unknown.
 std::uint64_t find_memory_kills();
 
 }  // namespace carillon::attempt

@@ -1,6 +1,5 @@
-// Method:     Lock the folder; a bank that is there already is published; end what the attempt before left running; say who works here
-//             (attempt.json) before anything is started; start, watch, classify; verify and publish; say how it ended, last.
-// Source:     docs/howto/when-jobs-die.md. Deviations: none.
+// Method:     Lock the folder; end processes of the previous attempt; write attempt.json; publish an existing bank, else start the solver,
+//             watch it, classify its end, verify and publish; write outcome.json last. docs/howto/when-jobs-die.md
 #include <fmt/core.h>
 #include <sys/stat.h>
 #include <time.h>
@@ -18,13 +17,12 @@
 #include "jobs/queue/attempt/processes.hpp"
 #include "jobs/queue/attempt/publish.hpp"
 #include "jobs/queue/attempt/watch.hpp"
+#include "jobs/store/files.hpp"
+#include "jobs/store/identity.hpp"
+#include "jobs/store/order.hpp"
 #include "jobs/store/outcome/outcome.hpp"
 #include "jobs/store/outcome/policy.hpp"
 #include "jobs/store/process/process.hpp"
-#include "jobs/store/files.hpp"
-#include "jobs/store/identity.hpp"
-#include "jobs/store/open_folder.hpp"
-#include "jobs/store/order.hpp"
 #include "jobs/store/store.hpp"
 #include "runtime/base/clock.hpp"
 #include "runtime/base/result.hpp"
@@ -35,19 +33,18 @@ namespace {
 namespace fs = std::filesystem;
 using outcome::Cause;
 
-constexpr std::uintmax_t kMaxLog = 1 << 16;  // what is read of it
+constexpr std::uintmax_t kMaxLogBytes = 1 << 16;
 constexpr double kMaxDrawSeconds = 60.0;
 
 fs::path find_root(const fs::path& work) {
-  // work/ab/<id> of a store, as named: a link on the way is refused when the folder is opened
   const fs::path root = work.parent_path().parent_path().parent_path();
   std::error_code error;
   if (!fs::is_regular_file(root / "VERSION", error) || work.parent_path().parent_path().filename() != "work")
-    throw InputError(fmt::format("{}: this is no folder of work of a store; name work/ab/ID of a store", work.string()));
+    throw InputError(fmt::format("{}: not a folder of work; name work/ab/ID of a store", work.string()));
   return root;
 }
 
-/// Size and moment of a file: they change when it is written again. Zeros when there is none.
+/// Inode and time of a file: they change when it is written again. Zeros if it does not exist.
 std::pair<long long, long long> find_mark(const fs::path& file) {
   struct stat info {};
   if (::stat(file.c_str(), &info) != 0) return {0, 0};
@@ -59,11 +56,11 @@ std::string read_end(const fs::path& file, std::uintmax_t from) {
   const std::uintmax_t size = fs::file_size(file, error);
   if (error || size <= from) return {};
   std::ifstream stream(file, std::ios::binary);
-  stream.seekg(static_cast<std::streamoff>(std::max(from, size > kMaxLog ? size - kMaxLog : 0)));
+  stream.seekg(static_cast<std::streamoff>(std::max(from, size > kMaxLogBytes ? size - kMaxLogBytes : 0)));
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-/// Whom mpirun names in its sentence on a rank that a signal ended: "rank 1 on node3"; empty when it names none. No decision rests on it.
+/// The rank that mpirun reports as ended by a signal, "rank 1 on node3", for display only; empty if none.
 std::string find_dead_rank(std::string_view log) {
   constexpr std::string_view kMark = "mpirun noticed that process ";
   const std::size_t at = log.rfind(kMark);
@@ -75,7 +72,7 @@ std::string find_dead_rank(std::string_view log) {
   return fmt::format("{} on {}", line.substr(0, pid), host.substr(0, host.find(' ')));
 }
 
-/// Pictures where the job asks for them now and has the memory to draw them.
+/// Pictures if requested and if the job has the memory to draw them.
 report::Options find_report_options(const Options& attempt) {
   report::Options wanted;
   wanted.draw_limit_s = kMaxDrawSeconds;
@@ -83,37 +80,29 @@ report::Options find_report_options(const Options& attempt) {
   if (!attempt.has_pictures || !has_room) wanted.drawn_modes = 0;
   if (attempt.has_pictures && !has_room)
     wanted.undrawn_reason =
-        fmt::format("drawing takes about {:g} GB, and the job had {:g}; carillon report JOB draws them", kDrawGb, attempt.memory_gb);
+        fmt::format("drawing needs about {:g} GB, and the job had {:g}; carillon report JOB draws them", kDrawGb, attempt.memory_gb);
   return wanted;
 }
 
-/// Others look at the lock for a moment now and then.
-std::optional<process::Lock> take_lock(const store::OpenFolder& work) {
-  try {
-    // A link or a folder of this name is no lock of anybody's.
-    if (const auto found = work.look_at("lock"); found && !S_ISREG(found->st_mode)) work.remove("lock");
-    for (int round = 0; round < 20; ++round) {
-      if (std::optional<process::Lock> lock = process::Lock::take(work.path() / "lock")) return lock;
-      std::this_thread::sleep_for(std::chrono::milliseconds(50));
-    }
-    return std::nullopt;
-  } catch (const SystemError& error) {
-    store::throw_with_names(work, error);
+/// Retries: other processes test the lock for short moments.
+std::optional<process::Lock> take_lock(const fs::path& work) {
+  for (int round = 0; round < 20; ++round) {
+    if (std::optional<process::Lock> lock = process::Lock::take(work / "lock")) return lock;
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
   }
+  return std::nullopt;
 }
 
 class Attempt {
  public:
-  Attempt(const Options& options, const store::Store& store, const store::Id& id, const store::OpenFolder& folder)
-      : options_(options), folder_(folder), work_(folder.shared_path()), store_(store), id_(id) {
+  Attempt(const Options& options, const store::Store& store, const store::Id& id)
+      : options_(options), work_(store.work_folder(id)), store_(store), id_(id) {
     outcome_.token = options.token.empty() ? store::make_random_name() : options.token;
     outcome_.ranks = options.ranks;
     outcome_.host = process::find_host();
     outcome_.started = outcome::find_utc();
     options_.work = work_;
-    options_.root = store.root();
-    options_.id = id.text();
-    // For what this process itself starts (the pictures of the report); its own entry in /proc stays as it is.
+    // For child processes such as carillon-draw.
     ::setenv("CARILLON_ATTEMPT", outcome_.token.c_str(), 1);
   }
 
@@ -141,11 +130,11 @@ class Attempt {
  private:
   void set(Cause cause, const std::string& reason, double need_gb = 0.0) {
     outcome_.cause = cause;
-    outcome_.reason = store::show_names(folder_, reason);
+    outcome_.reason = reason;
     outcome_.memory_need_gb = need_gb;
   }
 
-  /// What an attempt before this one left behind, processes and files; then it is we who work here.
+  /// Ends processes and removes files of the previous attempt, then writes attempt.json.
   void clean() {
     const std::optional<outcome::Attempt> before = outcome::read_attempt(work_);
     if (before) ranks_before_ = before->ranks;
@@ -154,13 +143,11 @@ class Attempt {
       Scratch::remove_left(before->token);
     }
     remove_temporary_files();
-    for (const char* name : {store::kLogFile, store::kProgressFile, store::kCheckpointFile, "prediction.new", store::kResultFile})
-      clear_way(work_, name);
     outcome::write_attempt(work_, {outcome_.token, process::find_self(), options_.ranks, options_.memory_gb, outcome_.started});
     make_reserve(work_);
   }
 
-  /// Files that were being written when their writer was killed.
+  /// Temporary files of killed writers.
   void remove_temporary_files() const {
     std::error_code error;
     for (fs::directory_iterator it(work_, error), end; !error && it != end; it.increment(error)) {
@@ -169,10 +156,10 @@ class Attempt {
     }
   }
 
-  /// What is solved is what the id says: the job and every byte of its input.
+  /// Checks the job and every byte of its inputs against the id.
   store::Request check_inputs() {
-    if (const auto fault = store::find_job_fault(store_, id_, work_))
-      throw InputError(*fault + "; submit the job again, or carillon verify --repair makes its folder again");
+    if (const auto fault = store::find_job_fault(store_, id_))
+      throw InputError(*fault + "; submit the job again, or repair its folder with carillon verify --repair");
     const store::Request request = *store::read_request(work_);
     if (const auto fault = store::find_input_fault(store_, request))
       throw InputError(fmt::format("{}; submit the job again, which copies its {} again", *fault,
@@ -180,13 +167,13 @@ class Attempt {
     return request;
   }
 
-  /// A checkpoint of a simulation belongs to a number of ranks.
+  /// A checkpoint of a simulation can be resumed only on the same number of ranks.
   void drop_other_ranks() {
     std::error_code error;
     if (ranks_before_ == 0 || ranks_before_ == options_.ranks || !fs::exists(work_ / store::kCheckpointFile, error)) return;
     fs::remove(work_ / store::kCheckpointFile, error);
     store::append_text(work_ / store::kLogFile,
-                       fmt::format("carillon attempt: the checkpoint is of {} ranks and these are {}; it starts from the beginning\n",
+                       fmt::format("carillon attempt: the checkpoint has {} ranks and this attempt {}; it starts from the beginning\n",
                                    ranks_before_, options_.ranks));
   }
 
@@ -196,13 +183,13 @@ class Attempt {
     if (options_.is_simulation) drop_other_ranks();
     bool has_bank = false;
     if (!find_bank_fault(work_, request, has_bank)) {
-      // What that attempt printed may be lost with it; a job that is done has a log, under Slurm too, where this error stream is not it.
+      // A finished job always has a log.
       store::append_text(work_ / store::kLogFile,
-                         fmt::format("carillon attempt: the {} was solved by an attempt that ended before it was published\n",
+                         fmt::format("carillon attempt: the {} was computed by an attempt that ended before publication\n",
                                      options_.is_simulation ? "simulation" : "bank"));
       return set(Cause::done, "");
     }
-    if (has_bank) store::OpenFolder::open(work_).remove(options_.is_simulation ? store::kRecordFile : store::kBankFile);
+    if (has_bank) store::remove_tree(work_ / (options_.is_simulation ? store::kRecordFile : store::kBankFile));
     const fs::path log = work_ / store::kLogFile, checkpoint = work_ / store::kCheckpointFile;
     std::optional<Scratch> scratch;
     if (!is_under_slurm()) scratch.emplace(outcome_.token);
@@ -235,15 +222,15 @@ class Attempt {
     if (found.cause != Cause::done) return;
     if (options_.is_prediction) {
       fs::rename(printed, work_ / kPredictionFile);
-      return set(Cause::predicted, "what it needs is predicted; waits for room");
+      return set(Cause::predicted, "its needs are predicted; waits for resources");
     }
     if (const std::optional<std::string> fault = find_bank_fault(work_, request, has_bank))
-      return set(Cause::bad_bank, "the solver exited with 0, but its result cannot be used: " + *fault);
+      return set(Cause::bad_bank, "the solver exited with 0, but its result is unusable: " + *fault);
     if (const auto fault = store::find_input_fault(store_, request))
-      set(Cause::bad_input, fmt::format("while it was solved {}; submit the job again", *fault));
+      set(Cause::bad_input, fmt::format("during the solve {}; submit the job again", *fault));
   }
 
-  /// Publishes or says why not; returns the exit code.
+  /// Publishes, or writes outcome.json; returns the exit code.
   int finish() {
     remove_reserve(work_);
     outcome_.ended = outcome::find_utc();
@@ -255,7 +242,7 @@ class Attempt {
         store_.remove_work(id_);
         return 0;
       } catch (const std::exception& error) {
-        if (store_.has_bank(id_)) return 0;  // only the work could not be removed
+        if (store_.has_bank(id_)) return 0;  // published; only the removal of the work failed
         set(store::is_disk_full(work_, error) ? Cause::disk_full : Cause::system, error.what());
       }
     }
@@ -274,11 +261,10 @@ class Attempt {
   }
 
   Options options_;
-  const store::OpenFolder& folder_;
-  const fs::path work_;  // that folder, whatever its name leads to
+  const fs::path work_;
   const store::Store& store_;
   const store::Id id_;
-  int ranks_before_ = 0;  // of the attempt before
+  int ranks_before_ = 0;  // of the previous attempt
   outcome::Outcome outcome_;
 };
 
@@ -289,16 +275,15 @@ int run_attempt(const Options& options) {
   if (!work.has_filename()) work = work.parent_path();
   const store::Store store = store::Store::open(find_root(work));
   const store::Id id = store::require_id(work.filename().string(), work.string());
-  if (work != store.work_folder(id)) throw InputError(fmt::format("{}: no folder of work; name work/ab/ID of a store", work.string()));
-  // Published and cleared away meanwhile by another attempt: nothing is left to do.
-  if (!store.has_work(id)) throw InputError(fmt::format("{}: there is no such folder of work", work.string()));
-  const store::OpenFolder folder = store.open_work(id);
-  const std::optional<process::Lock> lock = take_lock(folder);
+  if (work != store.work_folder(id)) throw InputError(fmt::format("{}: not a folder of work; name work/ab/ID of a store", work.string()));
+  // E.g. published and removed by another attempt.
+  if (!store.has_work(id)) throw InputError(fmt::format("{}: no such folder of work", work.string()));
+  const std::optional<process::Lock> lock = take_lock(work);
   if (!lock) {
-    fmt::print(stderr, "{}: another attempt works here; nothing was done\n", work.string());
+    fmt::print(stderr, "{}: another attempt is running in this folder; nothing was done\n", work.string());
     return kExitBusy;
   }
-  return Attempt(options, store, id, folder).run();
+  return Attempt(options, store, id).run();
 }
 
 std::vector<std::string> make_arguments(const fs::path& program, const Options& options) {

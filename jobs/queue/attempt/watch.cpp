@@ -1,10 +1,9 @@
-// Method:     One thread that waits for signals with a timeout. Asked to stop: SIGUSR1 ("save and stop"; mpirun hands it on, and unlike
-//             SIGTERM it keeps the ranks' own exit code), again every ten seconds as mpirun loses it while it starts, SIGTERM after the
-//             grace, SIGKILL to all that carries the attempt's token five seconds later. A rank hangs when it used no CPU time at all while
-//             no process wrote a line: ranks that wait for others poll, and use some. Time is counted in short steps of the monotonic
-//             clock, so that neither a suspended machine nor a change of the wall clock ends a job.
+// Method:     One thread waits for signals with a timeout. To stop a job: SIGUSR1 ("save and stop"; mpirun forwards it and, unlike SIGTERM,
+//             keeps the exit code of the ranks), repeated every ten seconds because mpirun loses it during startup; SIGTERM after the grace
+//             period; SIGKILL to all processes with the attempt's token five seconds later. Hang: a rank used no CPU time while no process
+//             wrote output (waiting ranks poll and use CPU time). Time is counted in short steps of the monotonic clock, so that suspending
+//             the machine does not end a job.
 // Source:     Open MPI 4.1 mpirun(1), signal forwarding; Linux prctl(2), sigtimedwait(2).
-// Deviations: none.
 #include "jobs/queue/attempt/watch.hpp"
 
 #include <signal.h>
@@ -26,7 +25,7 @@ namespace carillon::attempt {
 namespace {
 
 constexpr double kStepS = 0.5, kMaxStepS = 2.0, kLookS = 2.0, kAskAgainS = 10.0, kTermS = 5.0;
-/// As the kernel cuts them.
+/// Names as truncated by the kernel.
 bool is_rank_name(const std::string& name) { return name == "carillon-precom" || name == "carillon-simula"; }
 
 sigset_t make_signals() {
@@ -63,13 +62,13 @@ class Watcher {
     return ::sigtimedwait(&set, nullptr, &step);
   }
 
-  /// True when the child has ended. Orphans that became ours are reaped on the way.
+  /// True when the child has ended. Also reaps adopted orphans.
   bool reap() {
     for (;;) {
       int status = 0;
       const pid_t ended = ::waitpid(-1, &status, WNOHANG);
       if (ended < 0 && errno == EINTR) continue;
-      if (ended < 0) watched_.exit_code = kExitSystem;  // no child at all: its status was taken elsewhere
+      if (ended < 0) watched_.exit_code = kExitSystem;  // no child: its status was taken elsewhere
       if (ended <= 0) return ended < 0;
       if (ended != child_) continue;
       watched_.exit_code = WIFSIGNALED(status) ? 128 + WTERMSIG(status) : WEXITSTATUS(status);
@@ -89,12 +88,12 @@ class Watcher {
     if (watched_.was_asked_to_stop || watched_.was_out_of_time) stop(step);
     look_s_ += step;
     const double pause_s = options_.memory_limit_gb > 0.0 ? kStepS : kLookS;
-    if (look_s_ < std::min(pause_s, 0.5 * elapsed_s_)) return;  // short intervals at first, for small jobs
+    if (look_s_ < std::min(pause_s, 0.5 * elapsed_s_)) return;  // short intervals first, for small jobs
     look(look_s_);
     look_s_ = 0.0;
   }
 
-  /// Save and stop; later, stop; at last, die.
+  /// SIGUSR1, then SIGTERM, then SIGKILL.
   void stop(double step) {
     const double before = stopping_s_;
     stopping_s_ += step;
@@ -108,7 +107,7 @@ class Watcher {
     }
   }
 
-  /// Memory, and whether anything moves.
+  /// Checks memory and progress.
   void look(double since_s) {
     const std::map<pid_t, Usage> all = find_below(child_);
     double bytes = 0.0;
@@ -138,7 +137,7 @@ class Watcher {
     process::end_with_environment(entry_);
   }
 
-  /// Whether the log or the progress grew since the last look.
+  /// True if the log or the progress file has grown since the last call.
   bool find_news() {
     long long sizes = 0;
     for (const char* name : {store::kLogFile, store::kProgressFile}) {

@@ -1,6 +1,7 @@
-// Method:     Slurm's commands, run as words without a shell. Their output is asked for in formats that have not changed since Slurm 20.
+// Method:     Slurm's commands are run without a shell, with output formats that are stable since Slurm 20. Their JSON is not used:
+// scontrol
+//             of 22.05 has none, and squeue --json prints all fields of all jobs.
 // Source:     squeue(1), scontrol(1), sacct(1), sbatch(1) of Slurm 22.05.
-// Deviations: none.
 #include "jobs/queue/slurm/client.hpp"
 
 #include <fmt/core.h>
@@ -17,7 +18,7 @@
 namespace carillon::slurm {
 namespace {
 
-constexpr std::size_t kMaxAtOnce = 500;  // names on one command line
+constexpr std::size_t kMaxAtOnce = 500;  // jobs per command line
 
 std::vector<std::string_view> split(std::string_view text, char at) {
   std::vector<std::string_view> parts;
@@ -36,7 +37,7 @@ std::string strip(std::string_view text) {
   return line;
 }
 
-/// What Slurm says when it is not there, busy, or being restarted.
+/// True for the errors of a missing, busy or restarting controller.
 bool is_unreachable(const Finished& finished) {
   constexpr std::array<std::string_view, 12> kPhrases{"nable to contact slurm controller",
                                                       "Connection refused",
@@ -56,19 +57,19 @@ bool is_unreachable(const Finished& finished) {
 }
 
 bool is_unknown_job(const Finished& finished) {
-  // The second, on standard output, of a task of an array that was cancelled while all of it waited.
+  // The second, on standard output, for a task of an array that was cancelled while pending.
   return finished.errors.find("nvalid job id") != std::string::npos || finished.output.ends_with(" not found\n");
 }
 
-/// Runs one of Slurm's commands. Unreachable when it is not there or gets no answer.
+/// Runs a command of Slurm. Unreachable if it is missing or gets no answer.
 Finished ask(const std::vector<std::string>& words, std::string_view input = {}) {
   Finished finished = run_command(words, input);
   if (finished.exit_code == 127)
-    throw Unreachable(fmt::format("{} is not in PATH; install Slurm's commands (slurm-client), or load the site's module", words[0]));
+    throw Unreachable(fmt::format("{} is not in PATH; install slurm-client, or load the site's module", words[0]));
   if (finished.exit_code != 0 && is_unreachable(finished))
     throw Unreachable(fmt::format("Slurm does not answer ({}: {})", words[0],
-                                  finished.was_slow   ? "no word for a minute"
-                                  : finished.was_long ? "words without end"
+                                  finished.was_slow   ? "no answer for a minute"
+                                  : finished.was_long ? "too much output"
                                                       : strip(finished.errors)));
   return finished;
 }
@@ -96,14 +97,14 @@ std::string_view find_value(std::string_view line, std::string_view key) {
   return {};
 }
 
-/// "0:9", exit code and signal.
+/// Parses "0:9", exit code and signal.
 void take_exit_code(std::string_view text, SlurmStatus& seen) {
   const std::size_t colon = text.find(':');
   seen.exit_code = parse_int(text.substr(0, colon));
   if (colon != std::string_view::npos) seen.signal = parse_int(text.substr(colon + 1));
 }
 
-/// What accounting remembers of a job that the controller has forgotten; none where there is no accounting.
+/// The status of a job from accounting; none without accounting.
 std::optional<SlurmStatus> find_in_accounting(const std::string& job) {
   const Finished finished =
       run_command({"sacct", "--noheader", "--parsable2", "--allocations", "--jobs=" + job, "--format=State,ExitCode"});
@@ -150,7 +151,7 @@ std::map<std::string, SlurmStatus> parse_list(std::string_view text) {
 }
 
 std::optional<Machine> parse_nodes(std::string_view text, std::string_view partition) {
-  constexpr double kMemoryShare = 0.95;                             // of a node: the rest is the system's
+  constexpr double kMemoryShare = 0.95;                             // usable share of a node
   std::map<std::pair<int, int>, std::set<std::string_view>> alike;  // by cores and MiB
   for (const std::string_view line : split(text, '\n')) {
     const std::vector<std::string_view> fields = split(line, '|');
@@ -254,7 +255,7 @@ std::optional<Machine> SlurmClient::find_machine() const {
   if (settings_.pack_cores > 0 && !machine) machine.emplace();
   if (!machine) return machine;
   if (settings_.pack_cores > 0) {
-    // Several tasks on a node.
+    // Several tasks per node.
     machine->nodes *= std::max(1, machine->cores / settings_.pack_cores);
     machine->memory_gb *= std::min(1.0, static_cast<double>(settings_.pack_cores) / machine->cores);
     machine->cores = settings_.pack_cores;

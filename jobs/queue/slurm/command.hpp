@@ -1,4 +1,4 @@
-// Programs that answer within seconds (squeue, sbatch ...).
+// Runs short programs (squeue, sbatch ...).
 #pragma once
 
 #include <string>
@@ -11,12 +11,11 @@ namespace carillon::slurm {
 
 using base::Finished;
 
-/// What a program may print on each of its outputs: squeue's lines of a million jobs.
+/// Output limit: squeue lines of a million jobs.
 inline constexpr std::size_t kMaxOutputBytes = 128 << 20;
 
-/// Runs words[0] (by PATH) with `input`, and waits at most `patience_s`, and some seconds more for a program that was killed. Never throws
-/// for what the program does, nor where there is none: then its exit code is 127. SystemError when this process has no pipes or processes
-/// left. The program ends with this process.
+/// Runs words[0] (from PATH) with `input`; kills it after `patience_s`. Exit code 127 if there is no such program. SystemError only if no
+/// pipe or process can be created. The program ends with this process.
 Finished run_command(const std::vector<std::string>& words, std::string_view input = {}, double patience_s = 60.0,
                      std::size_t max_bytes = kMaxOutputBytes);
 

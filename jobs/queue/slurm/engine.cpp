@@ -1,7 +1,5 @@
-// Method:     Rows are claimed in one transaction; jobs are written to their folders, then sbatch is called, then the number is written: a
-//             process that dies in between leaves enough to find the job in Slurm by its name, or to know that it is not there.
-// Source:     docs/howto/slurm.md.
-// Deviations: none.
+// Method:     Rows are claimed in one transaction; submissions are recorded in the job folders, then sbatch is called, then the number is
+//             written. After a crash in between, the job is found in Slurm by its name, or known to be missing. docs/howto/slurm.md
 #include "jobs/queue/slurm/engine.hpp"
 
 #include <fmt/core.h>
@@ -13,13 +11,12 @@
 #include <set>
 #include <tuple>
 
-#include "jobs/store/outcome/policy.hpp"
-#include "jobs/store/process/process.hpp"
 #include "jobs/queue/local.hpp"
 #include "jobs/queue/settle.hpp"
 #include "jobs/queue/slurm/task.hpp"
 #include "jobs/store/files.hpp"
-#include "jobs/store/open_folder.hpp"
+#include "jobs/store/outcome/policy.hpp"
+#include "jobs/store/process/process.hpp"
 #include "runtime/base/clock.hpp"
 #include "runtime/base/failure.hpp"
 
@@ -32,9 +29,9 @@ using registry::JobState;
 
 constexpr double kMemoryGrowth = 1.5;
 constexpr double kCancelPatienceS = 5.0;
-constexpr std::size_t kMinPacked = 4;  // fewer jobs are not worth a task of their own kind
-constexpr double kRunnerGb = 0.1;      // of the process that starts the jobs of a task
-constexpr double kTimeMargin = 2.0;    // of a predicted time
+constexpr std::size_t kMinPacked = 4;  // minimum number of jobs for packing
+constexpr double kRunnerGb = 0.1;      // memory of the task runner
+constexpr double kTimeMargin = 2.0;    // factor for a predicted time
 
 bool is_open(const Job& job) { return job.state == JobState::queued || job.state == JobState::running || job.state == JobState::waiting; }
 
@@ -49,7 +46,7 @@ void make_queued(Job& row, const std::string& reason) {
   row.reason = reason;
 }
 
-/// What Slurm said goes to the end of the job's own log, where people look.
+/// Appends Slurm's output to the log of the job.
 void append_output(const fs::path& root, const fs::path& work, const SubmittedJob& submitted) {
   const std::string output = read_output(root, submitted);
   if (output.empty()) return;
@@ -59,16 +56,13 @@ void append_output(const fs::path& root, const fs::path& work, const SubmittedJo
 }
 
 void remove_submitted_job(const store::Store& store, const store::Id& id) {
-  if (store.has_work(id)) slurm::remove_submitted_job(store.open_work(id).path());
+  if (store.has_work(id)) slurm::remove_submitted_job(store.work_folder(id));
 }
 
-/// As queue::apply(). Memory that the user named is not raised behind his back; memory that was predicted is, beyond what was given.
+/// queue::apply(). After an end for lack of memory, predicted memory is raised; memory requested by the user is not.
 void apply(Job& row, const outcome::Outcome& outcome, bool has_asked_memory) {
-  if (outcome.cause == outcome::Cause::memory && has_asked_memory && !row.cancel_wanted) {
-    row.state = JobState::failed;
-    row.reason = outcome.reason + "; ask for more by \"resources\": {\"memory_gb\": ...} in the job";
-    return;
-  }
+  if (outcome.cause == outcome::Cause::memory && has_asked_memory && !row.cancel_wanted)
+    return queue::end(row, JobState::failed, outcome.reason + "; request more by \"resources\": {\"memory_gb\": ...} in the job");
   const double given_gb = row.given.memory_gb;
   queue::apply(row, outcome, queue::LocalClock());
   if (outcome.cause == outcome::Cause::memory)
@@ -105,7 +99,7 @@ Engine::Engine(const store::Store& store, Settings settings, fs::path program, s
 }
 
 void Engine::show_unreachable(const Unreachable& error) {
-  if (!is_unreachable_shown_) say_(fmt::format("{}; the jobs stay as they are until it does", error.what()));
+  if (!is_unreachable_shown_) say_(fmt::format("{}; states of jobs are not updated", error.what()));
   is_unreachable_shown_ = true;
 }
 
@@ -197,8 +191,8 @@ void Engine::submit_packed(registry::Registry& registry, const Machine& machine,
   if (plan.memory_gb > 0.0) batch.memory_gb = plan.memory_gb + kRunnerGb;
   if (limit_s > 0.0) batch.time_limit_s = limit_s + kTimeMargin * plan.seconds;
   say_(fmt::format(
-      "{} jobs of less than {:.0f} minutes on one rank are packed into {} {} of {} {} (predicted: {:.0f} s, {:.0f} % idle), as Slurm "
-      "would start a task for each of them; \"pack\": false in the profile's \"slurm\" turns it off",
+      "{} jobs of less than {:.0f} minutes on one rank are packed into {} {} of {} {} (predicted: {:.0f} s, {:.0f} % idle); disable by "
+      "\"pack\": false in \"slurm\" of the profile",
       jobs.size(), kShortSeconds / 60.0, batch.tasks, batch.tasks == 1 ? "task" : "tasks", plan.cores, plan.cores == 1 ? "core" : "cores",
       plan.seconds, 100.0 * plan.idle_share));
   const Packed packed{plan.tasks, plan.memory_gb};
@@ -206,24 +200,17 @@ void Engine::submit_packed(registry::Registry& registry, const Machine& machine,
 }
 
 void Engine::submit(registry::Registry& registry, const Batch& batch, const Rows& jobs, const Packed* packed, Rows& changed) {
-  const auto change = [&](const Job& job, const std::function<void(Job&)>& act) {
-    registry.update(job.id, [&](Job& row) {
-      if (row.state != JobState::running || row.token != job.token) return false;
-      act(row);
-      changed.push_back(row);
-      return true;
-    });
-  };
+  const auto change = [&](const Job& job, const std::function<void(Job&)>& act) { queue::change_running(registry, job, act, &changed); };
   const auto give_up = [&](JobState state, const std::string& reason, double delay_s = 0.0) {
     for (const Job& job : jobs) {
       remove_submitted_job(store_, job.id);
       change(job, [&](Job& row) {
-        make_queued(row, reason);
-        row.state = row.cancel_wanted ? JobState::cancelled : state;
+        row.slurm_job.clear();
         row.attempts -= 1;
-        row.ready_boot_s = base::get_boot_s() + delay_s;
-        row.ready_boot_id = process::find_boot();
-        if (row.state == JobState::failed || row.state == JobState::cancelled) row.ended_unix_s = registry::find_unix_seconds();
+        if (row.cancel_wanted || state == JobState::failed)
+          queue::end(row, row.cancel_wanted ? JobState::cancelled : state, reason);
+        else
+          queue::wait(row, delay_s, reason, queue::LocalClock());
       });
     }
     remove_batch_folder(batch.root, batch.name);
@@ -244,8 +231,7 @@ void Engine::submit(registry::Registry& registry, const Batch& batch, const Rows
     const std::string script = make_script(batch, client_.settings());
     std::vector<store::Id> ids;
     for (std::size_t i = 0; i < jobs.size(); ++i) {
-      const store::OpenFolder opened = store_.open_work(jobs[i].id);
-      const fs::path work = opened.path();
+      const fs::path work = store_.work_folder(jobs[i].id);
       ids.push_back(jobs[i].id);
       if (jobs[i].failures != read_failures(work)) write_failures(work, jobs[i].failures);
       const std::optional<outcome::Attempt> before = outcome::read_attempt(work);
@@ -255,7 +241,7 @@ void Engine::submit(registry::Registry& registry, const Batch& batch, const Rows
     make_batch_folder(store_, batch.name, script, ids, lists);
     number = client_.submit(batch);
   } catch (const Unreachable& error) {
-    // Slurm may still have accepted the batch: then adopt() finds it by its name.
+    // Slurm may have accepted the batch: adopt() finds it by its name.
     return show_unreachable(error);
   } catch (const DiskFullError& error) {
     return give_up(JobState::waiting, error.what(), outcome::decide(outcome::Cause::disk_full, 0, false).delay_s);
@@ -264,14 +250,14 @@ void Engine::submit(registry::Registry& registry, const Batch& batch, const Rows
   } catch (const InputError& error) {
     return give_up(JobState::failed, error.what());
   }
-  // Slurm has it. Where this cannot be written any more (a full disk) adopt() finds it later, as after a kill.
+  // Accepted. If writing fails (full disk), adopt() finds it later.
   write_number(batch.root, batch.name, number);
   for (std::size_t i = 0; i < jobs.size(); ++i) {
     change(jobs[i], [&](Job& row) {
       row.state = JobState::queued;
       row.slurm_job = make_name(submitted[i], number);
       row.given = jobs[i].given;
-      row.reason = packed == nullptr ? "handed to Slurm" : "handed to Slurm, in a task with other jobs";
+      row.reason = packed == nullptr ? "submitted to Slurm" : "submitted to Slurm, in a task with other jobs";
     });
   }
 }
@@ -288,7 +274,7 @@ std::vector<Job> Engine::follow(registry::Registry& registry) {
     cancel_left(registry);
     end_unwanted(jobs);
     const std::map<std::string, SlurmStatus> all = names.empty() ? std::map<std::string, SlurmStatus>() : client_.list(names);
-    std::map<std::string, std::optional<SlurmStatus>> ends;  // by task: a packed one has many jobs
+    std::map<std::string, std::optional<SlurmStatus>> ends;  // by task
     for (const Job& job : jobs) {
       if (job.slurm_job.empty()) continue;
       const std::string task = find_task(job.slurm_job);
@@ -296,7 +282,7 @@ std::vector<Job> Engine::follow(registry::Registry& registry) {
       if (seen == all.end() || seen->second.phase == SlurmPhase::ended) {
         if (!ends.contains(task)) {
           ends[task] = client_.find_end(task);
-          // squeue knows an array that was cancelled while all of it waited by its number alone.
+          // squeue lists an array that was cancelled while pending by its number only.
           const auto known = seen == all.end() ? all.find(find_array(task)) : seen;
           if (!ends[task] && known != all.end() && known->second.phase == SlurmPhase::ended) ends[task] = known->second;
         }
@@ -313,8 +299,7 @@ std::vector<Job> Engine::follow(registry::Registry& registry) {
   return changed;
 }
 
-/// Cancelled jobs: Slurm ends those that have a task of their own, and tasks all of whose jobs are cancelled. Of a task that others need,
-/// the job's folder says that it is unwanted.
+/// Cancels tasks all of whose jobs are unwanted; in other tasks the job's folder is marked as unwanted.
 void Engine::end_unwanted(const Rows& jobs) {
   std::set<std::string> needed, unwanted;
   for (const Job& job : jobs) {
@@ -326,7 +311,7 @@ void Engine::end_unwanted(const Rows& jobs) {
     std::optional<SubmittedJob> submitted = read_submitted_job(work);
     if (!submitted || submitted->is_unwanted) continue;
     submitted->is_unwanted = true;
-    write_submitted_job(store_.open_work(job.id).path(), *submitted);
+    write_submitted_job(work, *submitted);
   }
   std::vector<std::string> names;
   std::set_difference(unwanted.begin(), unwanted.end(), needed.begin(), needed.end(), std::back_inserter(names));
@@ -339,8 +324,7 @@ void Engine::adopt(registry::Registry& registry, Rows& jobs) {
     if (!job.slurm_job.empty()) continue;
     const bool is_claimed = job.state == JobState::running;
     const std::optional<SubmittedJob> submitted = read_submitted_job(store_.work_folder(job.id));
-    // A registry that was made again names the attempt itself, wherever it runs; else the process that claimed the job may be about to hand
-    // it over.
+    // After a rebuild of the registry the row names the attempt itself; otherwise the claiming process may be about to submit the job.
     const auto attempt = outcome::read_attempt(store_.work_folder(job.id));
     const bool is_attempt = submitted && attempt && attempt->token == job.token;
     if (is_claimed && !is_attempt && process::find_life(job.worker) != process::Life::gone && !process::is_self(job.worker)) continue;
@@ -350,7 +334,7 @@ void Engine::adopt(registry::Registry& registry, Rows& jobs) {
       if (number.empty()) number = numbers[submitted->batch] = client_.find_by_title(submitted->title, submitted->batch).value_or("none");
       if (number != "none") write_number(store_.root(), submitted->batch, number);
     }
-    if (!submitted && !is_claimed) continue;  // waits to be handed over
+    if (!submitted && !is_claimed) continue;  // not submitted yet
     if (submitted && number == "none") remove_submitted_job(store_, job.id);
     registry.update(job.id, [&](Job& row) {
       if (!row.slurm_job.empty() || row.state != job.state || row.token != job.token) return false;
@@ -362,7 +346,7 @@ void Engine::adopt(registry::Registry& registry, Rows& jobs) {
   }
 }
 
-/// While its task waits or runs; the task may have run before.
+/// A job whose task is pending or running.
 void Engine::look_at_packed(registry::Registry& registry, const Job& job, const SlurmStatus& seen, Rows& changed) {
   const fs::path work = store_.work_folder(job.id);
   const SubmittedJob submitted = read_submitted_job(work).value_or(SubmittedJob{});
@@ -371,7 +355,7 @@ void Engine::look_at_packed(registry::Registry& registry, const Job& job, const 
   if (is_over) return settle_ended(registry, job, submitted, std::nullopt, changed);
   SlurmStatus own = seen;
   if (state != PackedState::runs) own.phase = SlurmPhase::waits;
-  // Thousands of rows are not written because the task that they wait for has begun.
+  // Rows of waiting jobs are not rewritten when their task begins.
   if (own.phase == SlurmPhase::runs || job.state == JobState::running) show_phase(registry, job, own, changed);
 }
 
@@ -384,7 +368,7 @@ void Engine::show_phase(registry::Registry& registry, const Job& job, const Slur
   const bool is_running = seen.phase == SlurmPhase::runs;
   const JobState state = is_running ? JobState::running : JobState::queued;
   const bool has_reason = !seen.reason.empty() && seen.reason != "None";
-  const std::string reason = is_running ? "" : fmt::format("waits in Slurm{}", has_reason ? " (" + seen.reason + ")" : "");
+  const std::string reason = is_running ? "" : fmt::format("pending in Slurm{}", has_reason ? " (" + seen.reason + ")" : "");
   if (job.state == state && job.reason == reason) return;
   registry.update(job.id, [&](Job& row) {
     if (row.slurm_job != job.slurm_job || !is_open(row)) return false;
@@ -406,7 +390,7 @@ void Engine::settle(registry::Registry& registry, const Job& job, const std::opt
 
 void Engine::settle_ended(registry::Registry& registry, const Job& job, const SubmittedJob& submitted,
                           const std::optional<SlurmStatus>& seen, Rows& changed) {
-  // Another command may have settled it while Slurm was asked, and submitted it over again.
+  // Another command may have settled and resubmitted it meanwhile.
   const std::optional<Job> now = registry.find(job.id);
   if (!now || now->slurm_job != job.slurm_job || !is_open(*now)) return;
   const fs::path work = store_.work_folder(job.id);
@@ -419,10 +403,10 @@ void Engine::settle_ended(registry::Registry& registry, const Job& job, const Su
   if (!is_done) {
     judgement = judge(store_, job.id, submitted, seen);
     failures = read_failures(work);
-    if (store_.has_work(job.id) && !is_shared) append_output(store_.root(), store_.open_work(job.id).path(), submitted);
+    if (store_.has_work(job.id) && !is_shared) append_output(store_.root(), work, submitted);
     has_asked_memory = find_asked(work).memory_gb > 0.0;
     if (is_shared) state = find_packed_state(store_, job.id, submitted);
-    // It ended by itself before its task did.
+    // It ended before its task.
     if (is_shared && state == PackedState::ended) judgement.is_cancelled = false;
   }
   registry.update(job.id, [&](Job& row) {
@@ -430,16 +414,13 @@ void Engine::settle_ended(registry::Registry& registry, const Job& job, const Su
     remove_submitted_job(store_, job.id);
     row.slurm_job.clear();
     row.attempts += seen && !is_shared ? seen->restarts : 0;
-    row.ended_unix_s = registry::find_unix_seconds();
     if (is_done) {
-      row.state = JobState::done;
-      row.reason.clear();
+      queue::end(row, JobState::done, "");
     } else if (judgement.is_cancelled || (row.cancel_wanted && state == PackedState::waits)) {
-      row.state = JobState::cancelled;
-      row.reason = row.cancel_wanted ? "cancelled" : "cancelled in Slurm (scancel)";
+      queue::end(row, JobState::cancelled, row.cancel_wanted ? "cancelled" : "cancelled in Slurm (scancel)");
     } else if (state == PackedState::waits && has_begun(store_.root(), submitted)) {
-      // What ended its task was no fault of a job that had not begun.
-      make_queued(row, "its task in Slurm ended before it began: " + judgement.outcome.reason);
+      // The end of the task is not a failure of a job that had not begun.
+      make_queued(row, "its Slurm task ended before it began: " + judgement.outcome.reason);
       row.attempts -= 1;
     } else {
       row.failures = failures;

@@ -1,7 +1,7 @@
-// Jobs of the engine "slurm": handed to Slurm in batches, followed through Slurm's own commands, settled by what they left in the store.
+// Jobs of the engine "slurm": submitted to Slurm in batches, followed by Slurm's commands, settled by their outcomes in the store.
 //
-// A row of theirs is running without a number while it is being handed over, queued with one while it waits in Slurm, running with one
-// while it runs there. What was handed over stands in the job's folder too (records.hpp), so that nothing is submitted twice.
+// A row is running without a Slurm job number while it is being submitted, queued with a number while pending, running with a number while
+// running. The submission is also recorded in the job's folder (records.hpp), so that nothing is submitted twice.
 #pragma once
 
 #include <filesystem>
@@ -10,43 +10,42 @@
 #include <string>
 #include <vector>
 
-#include "jobs/store/outcome/outcome.hpp"
-#include "jobs/store/registry/registry.hpp"
 #include "jobs/queue/slurm/client.hpp"
 #include "jobs/queue/slurm/needs.hpp"
 #include "jobs/queue/slurm/records.hpp"
 #include "jobs/queue/slurm/settings.hpp"
+#include "jobs/store/outcome/outcome.hpp"
+#include "jobs/store/registry/registry.hpp"
 #include "jobs/store/store.hpp"
 
 namespace carillon::slurm {
 
-/// Hands jobs to Slurm and follows them. What was handed over is in the job's folder before sbatch is called, so that no job is submitted
-/// twice, whenever this process ends.
+/// Submits jobs to Slurm and follows them. A submission is recorded in the job's folder before sbatch is called, so that no job is
+/// submitted twice even if this process is killed.
 class Engine {
  public:
-  /// What is asked of Slurm for a job. Asked outside of transactions.
+  /// Resources of a job. Called outside of transactions.
   using FindNeeds = std::function<Needs(const registry::Job&)>;
 
-  /// `program`: carillon, unless the settings name it. `say`: lines about Slurm itself, e.g. that it does not answer.
+  /// `program`: path of carillon, unless set in the settings. `say`: messages about Slurm itself.
   Engine(const store::Store& store, Settings settings, std::filesystem::path program, std::function<void(const std::string&)> say);
 
-  /// Hands over all that is ready: short jobs packed into the tasks of one array (packing.hpp), of the others those that ask for the same
-  /// in one array. What Slurm refuses has failed, and why is in its row; when Slurm does not answer they stay queued. Returns the rows that
-  /// Slurm took or refused. Call follow() first.
+  /// Submits all ready jobs: short jobs packed into the tasks of one array (packing.hpp), others with equal resources in one array. Refused
+  /// jobs fail with the reason; if Slurm does not answer, jobs stay queued. Returns accepted and refused rows. Call follow() first.
   std::vector<registry::Job> hand_over(registry::Registry& registry, const FindNeeds& find_needs);
 
-  /// Brings the rows up to date: waits, runs, ended and why, to be handed over again. Ends those that are to be cancelled. Rows stay as
-  /// they are while Slurm does not answer. Returns those whose state changed.
+  /// Updates the rows from Slurm and settles ended jobs; cancels jobs with cancel_wanted. Rows are unchanged while Slurm does not answer.
+  /// Returns the rows whose state changed.
   std::vector<registry::Job> follow(registry::Registry& registry);
 
-  /// Cancels a job that Slurm has or may get: now when Slurm answers, else as soon as it does. False: later.
+  /// Cancels a job: at once if Slurm answers, else by a later follow(). False: later.
   bool cancel(registry::Registry& registry, const store::Id& id);
 
  private:
   using Rows = std::vector<registry::Job>;
-  /// How the jobs of a batch lie in its tasks; none: a task each.
+  /// Assignment of the jobs of a batch to tasks.
   struct Packed {
-    std::vector<std::vector<Placed>> tasks;  // by indices into the jobs
+    std::vector<std::vector<Placed>> tasks;  // indices into the jobs
     double memory_gb = 0.0;
   };
   Batch make_batch(std::size_t jobs) const;
@@ -72,7 +71,7 @@ class Engine {
   bool is_unreachable_shown_ = false;
 };
 
-/// What became of a job that Slurm has ended, from what it left in its folder and what Slurm says. Reads files only.
+/// The outcome of a job that Slurm has ended, from its folder and its Slurm status. Reads files only.
 struct SlurmOutcome {
   bool is_cancelled = false;  // by scancel
   outcome::Outcome outcome;

@@ -1,6 +1,5 @@
-// Method:     `scontrol requeue` from inside the job. Slurm then kills what is left of it, this process too: it is the last thing done.
+// Method:     `scontrol requeue` from inside the job is the last action: Slurm then kills this process too.
 // Source:     scontrol(1) of Slurm 22.05.
-// Deviations: none.
 #include "jobs/queue/slurm/inside.hpp"
 
 #include <fmt/core.h>
@@ -10,17 +9,16 @@
 #include <string>
 
 #include "jobs/queue/attempt/attempt.hpp"
-#include "jobs/store/outcome/policy.hpp"
 #include "jobs/queue/slurm/client.hpp"
 #include "jobs/queue/slurm/records.hpp"
 #include "jobs/store/files.hpp"
-#include "jobs/store/open_folder.hpp"
+#include "jobs/store/outcome/policy.hpp"
 #include "jobs/store/store.hpp"
 
 namespace carillon::slurm {
 namespace {
 
-/// For what another run with the same memory will not cure, the row's keeper decides.
+/// Causes for which a repetition with the same resources is useless: the submitting host decides.
 bool is_for_outside(outcome::Cause cause) { return cause == outcome::Cause::memory; }
 
 }  // namespace
@@ -29,19 +27,13 @@ outcome::Outcome explain_stop(outcome::Outcome outcome) {
   if (outcome.cause != outcome::Cause::stopped && outcome.cause != outcome::Cause::checkpointed) return outcome;
   outcome.cause = outcome::Cause::time_limit;
   outcome.reason = outcome.is_further ? fmt::format("saved at {:.0f} % before the time limit of the Slurm job", outcome.percent)
-                                      : "the time limit of the Slurm job came before there was anything new to save; ask for more time";
+                                      : "the time limit of the Slurm job was reached without progress to save; request more time";
   return outcome;
 }
 
-int end_attempt(const std::filesystem::path& named, int exit_code) {
+int end_attempt(const std::filesystem::path& work, int exit_code) {
   const char* job = std::getenv("SLURM_JOB_ID");
   if (job == nullptr || exit_code != kExitCheckpointed) return exit_code;
-  // work/ab/<id>: each opened in the one above.
-  const std::filesystem::path shard = named.parent_path();
-  const auto opened = store::OpenFolder::open(shard.parent_path()).find(shard.filename().string());
-  const auto folder = opened ? opened->find(named.filename().string()) : std::nullopt;
-  if (!folder) return exit_code;
-  const std::filesystem::path work = folder->path();
   const std::optional<outcome::Outcome> left = outcome::read_outcome(work);
   if (!left || is_for_outside(left->cause)) return exit_code;
   const SlurmClient client{Settings{}};

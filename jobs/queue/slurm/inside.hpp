@@ -1,4 +1,4 @@
-// What an attempt does about Slurm when it runs inside one of its jobs.
+// The end of an attempt inside a job of Slurm.
 #pragma once
 
 #include <filesystem>
@@ -7,12 +7,12 @@
 
 namespace carillon::slurm {
 
-/// What the outcome of an attempt means here: it is Slurm that asks to save and stop, before the time limit.
+/// Inside Slurm a request to save and stop means that the time limit is near: stopped becomes time_limit.
 outcome::Outcome explain_stop(outcome::Outcome outcome);
 
-/// After run_attempt() ended with `exit_code`: a job that continues is queued again in Slurm, with the back-off of its cause, unless Slurm
-/// is ending it itself (cancelled, time over, node taken away). Returns the exit code for Slurm: the same, or 4 when the job has failed too
-/// often. When Slurm does not queue it again the row's keeper hands it over again. Outside Slurm nothing is done.
+/// After run_attempt() ended with `exit_code`: requeues a job that continues, with the back-off of its cause, unless Slurm itself is ending
+/// it (cancelled, timeout, preempted). Returns the exit code for Slurm: the same, or 4 after too many failures. If Slurm refuses, the
+/// submitting host hands the job over again. No effect outside Slurm.
 int end_attempt(const std::filesystem::path& work, int exit_code);
 
 }  // namespace carillon::slurm

@@ -1,7 +1,6 @@
-// Method:     The attempt's own word comes first, if it is from the attempt that Slurm ran last; then Slurm's state, which knows of
-//             machines and limits; then what Slurm wrote next to the job.
-// Source:     squeue(1), "JOB STATE CODES" of Slurm 22.05; slurmstepd's messages.
-// Deviations: none.
+// Method:     The outcome of the last attempt takes precedence; then the state of Slurm, which covers nodes and limits; then the output of
+//             slurmstepd.
+// Source:     squeue(1), "JOB STATE CODES" of Slurm 22.05; messages of slurmstepd.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -13,7 +12,7 @@ namespace {
 
 using outcome::Cause;
 
-/// The last line that says something, without the head that slurmstepd gives it.
+/// The last non-empty line, without the prefix of slurmstepd.
 std::string find_last_line(std::string text) {
   while (!text.empty() && (text.back() == '\n' || text.back() == ' ')) text.pop_back();
   const std::size_t start = text.rfind('\n');
@@ -31,22 +30,21 @@ bool is_out_of_memory(const std::optional<SlurmStatus>& seen, const std::string&
          output.find("exceeded job memory limit") != std::string::npos || output.find("oom-kill") != std::string::npos;
 }
 
-/// By Slurm alone: the attempt left no word.
+/// Without an outcome of the attempt.
 std::pair<Cause, std::string> find_cause(const std::optional<SlurmStatus>& seen, const std::string& output) {
   const std::string last = find_last_line(output), said = last.empty() ? "" : ": " + last;
-  if (is_out_of_memory(seen, output)) return {Cause::memory, "Slurm ended it for using more memory than it had been given" + said};
-  if (!seen) return {Cause::killed, "Slurm no longer knows the job, and the job left no word of how it ended" + said};
+  if (is_out_of_memory(seen, output)) return {Cause::memory, "Slurm ended it for exceeding its memory" + said};
+  if (!seen) return {Cause::killed, "Slurm no longer knows the job, and it left no outcome" + said};
   if (seen->state == "TIMEOUT" || seen->state == "DEADLINE") return {Cause::time_limit, "Slurm ended it at its time limit"};
-  if (seen->state == "NODE_FAIL" || seen->state == "BOOT_FAIL") return {Cause::node_lost, "Slurm lost the node that it ran on"};
-  if (seen->state == "PREEMPTED") return {Cause::stopped, "Slurm took its node for a job of higher priority"};
-  if (seen->state == "COMPLETED")
-    return {Cause::killed, "Slurm's job ended well and left no bank; what stands before carillon in the script?" + said};
+  if (seen->state == "NODE_FAIL" || seen->state == "BOOT_FAIL") return {Cause::node_lost, "Slurm lost its node"};
+  if (seen->state == "PREEMPTED") return {Cause::stopped, "preempted by a job of higher priority"};
+  if (seen->state == "COMPLETED") return {Cause::killed, "the Slurm job completed without a bank; check the prologue of the script" + said};
   if (seen->exit_code == 126 || seen->exit_code == 127) return {Cause::no_program, "carillon could not be started on the node" + said};
-  if (seen->exit_code == 75) return {Cause::killed, "another attempt was still at work in its folder"};
+  if (seen->exit_code == 75) return {Cause::killed, "another attempt was still running in its folder"};
   if (seen->signal > 0)
     return {Cause::killed, fmt::format("killed by signal {} (Slurm: {}, {}){}", seen->signal, seen->state, seen->reason, said)};
   return {Cause::killed,
-          fmt::format("Slurm's job ended with exit code {} (Slurm: {}, {}){}", seen->exit_code, seen->state, seen->reason, said)};
+          fmt::format("the Slurm job ended with exit code {} (Slurm: {}, {}){}", seen->exit_code, seen->state, seen->reason, said)};
 }
 
 }  // namespace

@@ -1,12 +1,11 @@
-// Method:     As jobs/queue admits on one machine, but for a machine of its own for each job.
-// Source:     jobs/queue/needs.hpp, jobs/queue/admission.hpp. Deviations: none.
+// Method:     As in queue/admission.hpp, for one job per machine.
 #include "jobs/queue/slurm/needs.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include "jobs/queue/attempt/attempt.hpp"
 #include "jobs/queue/admission.hpp"
+#include "jobs/queue/attempt/attempt.hpp"
 #include "jobs/queue/needs.hpp"
 #include "jobs/queue/slurm/command.hpp"
 #include "precompute/job/cost/calibration.hpp"

@@ -1,26 +1,26 @@
-// What is asked of Slurm for a job.
+// Slurm resources of a job.
 #pragma once
 
 #include <filesystem>
 
-#include "jobs/store/registry/registry.hpp"
 #include "jobs/queue/slurm/packing.hpp"
 #include "jobs/queue/slurm/settings.hpp"
+#include "jobs/store/registry/registry.hpp"
 #include "jobs/store/store.hpp"
 
 namespace carillon::slurm {
 
-/// A body that takes longer on one rank has a task of its own.
+/// Limit of jobs for packing, on one rank.
 inline constexpr double kShortSeconds = 600.0;
 
 struct Needs {
-  store::Resources resources;  // in a task of its own
-  PackJob pack;                // in a task with others
+  store::Resources resources;  // in its own task
+  PackJob pack;                // in a shared task
   bool is_short = false;       // may be packed: a solve of less than kShortSeconds
 };
 
-/// As the job says; else ranks by the time that it will take on one (at most settings.max_ranks), memory as predicted for them. A job too
-/// large to be guessed is predicted first by `program` attempt --predict, here; where that fails the guess has to do.
+/// As requested by the job; else ranks from the predicted time on one rank (at most settings.max_ranks), memory as predicted for them.
+/// Large jobs are predicted by `program` attempt --predict on this host; if that fails the estimate is used.
 Needs find_needs(const store::Store& store, const registry::Job& job, const Settings& settings, const std::filesystem::path& program);
 
 }  // namespace carillon::slurm

@@ -1,7 +1,6 @@
 // Method:     Longest processing time first, by area (ranks times seconds) or by memory, whichever fills a task sooner; list scheduling
 //             inside a task.
-// Source:     Graham, Bounds on multiprocessing timing anomalies, SIAM J. Appl. Math. 17, 1969.
-// Deviations: jobs of several ranks.
+// Source:     Graham, Bounds on multiprocessing timing anomalies, SIAM J. Appl. Math. 17, 1969; here with jobs of several ranks.
 #include "jobs/queue/slurm/packing.hpp"
 
 #include <algorithm>
@@ -14,10 +13,10 @@
 namespace carillon::slurm {
 namespace {
 
-constexpr double kStartsWorth = 20.0;    // a task lasts at least so many times its own start
-constexpr double kLongestShare = 0.5;    // of a task's time, for one job: it may take twice what was predicted
-constexpr double kSecondsPerRank = 2.0;  // no rank is worth its start for less
-constexpr double kMemoryMargin = 1.25;   // jobs run in another order than predicted
+constexpr double kStartsWorth = 20.0;    // minimum duration of a task / its start time
+constexpr double kLongestShare = 0.5;    // maximum share of one job in the time of a task
+constexpr double kSecondsPerRank = 2.0;  // minimum work per rank
+constexpr double kMemoryMargin = 1.25;   // for a start order other than predicted
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 double find_memory(const PackJob& job, int ranks) {
@@ -38,7 +37,7 @@ std::size_t count_tasks(const std::vector<PackJob>& jobs, double work_s, const M
   return std::min({machine.nodes * rounds, worth, max});
 }
 
-/// The fewest that keep the job within `limit_s`, as far as more are worth it.
+/// The smallest worthwhile number of ranks within `limit_s`.
 int choose_ranks(const PackJob& job, double limit_s, int cores, int max_ranks) {
   if (job.ranks > 0) return std::min(job.ranks, cores);
   int ranks = 1;
@@ -53,9 +52,9 @@ double find_end(const std::vector<Span>& spans) {
   return end_s;
 }
 
-/// The most that jobs held at a time.
+/// Peak memory of concurrent jobs.
 double find_peak(const std::vector<Placed>& task, const std::vector<Span>& spans) {
-  std::vector<std::pair<double, double>> changes;  // at the same moment what ends goes first
+  std::vector<std::pair<double, double>> changes;  // at equal times ends come first
   for (const Span& span : spans) {
     const auto placed = std::find_if(task.begin(), task.end(), [&](const Placed& other) { return other.job == span.job; });
     changes.emplace_back(span.start_s, placed->memory_gb);
@@ -148,7 +147,7 @@ PackPlan plan_packs(const std::vector<PackJob>& jobs, const Machine& machine, co
     least->jobs += 1;
   }
 
-  // All tasks of an array are alike.
+  // All tasks of an array have the same size.
   int cores = 1;
   for (std::vector<Placed>& task : plan.tasks) {
     std::stable_sort(task.begin(), task.end(), [](const Placed& a, const Placed& b) {

@@ -7,7 +7,7 @@
 #include <system_error>
 
 #include "jobs/queue/slurm/script.hpp"
-#include "jobs/store/open_folder.hpp"
+#include "jobs/store/files.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/base/file.hpp"
 #include "runtime/base/json.hpp"
@@ -26,7 +26,7 @@ constexpr std::streamoff kOutputTailBytes = 4096;
 
 bool is_name(const std::string& text) { return text.size() == 32 && text.find_first_not_of("0123456789abcdef") == std::string::npos; }
 
-/// Cores and memory, then one job a line: id, ranks, GB, predicted seconds, time limit.
+/// Cores and memory, then one job per line: id, ranks, GB, predicted seconds, time limit.
 std::string format_task(const TaskList& list) {
   std::string text = fmt::format("{} {}\n", list.cores, list.memory_gb);
   for (const TaskJob& job : list.jobs)
@@ -100,9 +100,7 @@ std::optional<TaskList> read_task(const fs::path& root, const std::string& batch
 }
 
 void write_begun(const fs::path& root, const std::string& batch, int task) {
-  const auto all = store::OpenFolder::open(root).find("slurm");
-  const auto folder = all && is_name(batch) ? all->find(batch) : std::nullopt;
-  if (folder) base::write_file(folder->path() / fmt::format("{}.begun", task), "");
+  base::write_file(root / "slurm" / batch / fmt::format("{}.begun", task), "");
 }
 
 bool has_begun(const fs::path& root, const SubmittedJob& submitted) {
@@ -112,7 +110,7 @@ bool has_begun(const fs::path& root, const SubmittedJob& submitted) {
 
 void make_batch_folder(const store::Store& store, const std::string& batch, const std::string& script, const std::vector<store::Id>& jobs,
                        const std::vector<TaskList>& tasks) {
-  const store::Temporary temporary = store.make_temporary();
+  store::Temporary temporary = store.make_temporary();
   std::string ids;
   for (const store::Id& id : jobs) ids += id.text() + "\n";
   base::write_file(temporary / kJobsFile, ids);
@@ -132,9 +130,8 @@ std::vector<store::Id> read_jobs(const fs::path& root, const std::string& batch)
 }
 
 void write_number(const fs::path& root, const std::string& batch, const std::string& number) {
-  const auto all = store::OpenFolder::open(root).find("slurm");
-  const auto folder = all && is_name(batch) ? all->find(batch) : std::nullopt;
-  if (folder) base::write_file(folder->path() / kNumberFile, number + "\n");
+  std::error_code error;
+  if (fs::exists(root / "slurm" / batch, error)) base::write_file(root / "slurm" / batch / kNumberFile, number + "\n");
 }
 
 std::string read_number(const fs::path& root, const std::string& batch) {
@@ -146,9 +143,8 @@ std::string read_number(const fs::path& root, const std::string& batch) {
 
 void remove_batch_folder(const fs::path& root, const std::string& batch) {
   try {
-    const auto all = store::OpenFolder::open(root).find("slurm");
-    if (all && is_name(batch)) all->remove(batch);
-  } catch (const SystemError&) {  // its owner removes it
+    if (is_name(batch)) store::remove_tree(root / "slurm" / batch);
+  } catch (const SystemError&) {  // removed later by its owner
   }
 }
 

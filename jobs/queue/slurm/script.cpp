@@ -1,7 +1,6 @@
-// Method:     deploy/slurm/job.sh with what stands between @ signs put in, every path in single quotes; all that is said to sbatch as words
-//             of its command line, which no shell reads.
+// Method:     The templates deploy/slurm/job.sh and task.sh with @NAME@ replaced, paths in single quotes; options of sbatch as command line
+//             arguments, without a shell.
 // Source:     POSIX 2.2.2; sbatch(1), "filename pattern".
-// Deviations: none.
 #include "jobs/queue/slurm/script.hpp"
 
 #include <fmt/core.h>
@@ -17,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// All at once, from left to right: what is put in is not looked at again.
+/// Single pass from left to right: replaced text is not scanned again.
 std::string fill(std::string_view text, const std::vector<std::pair<std::string_view, std::string>>& values) {
   std::string result;
   while (!text.empty()) {
@@ -37,11 +36,11 @@ std::string fill(std::string_view text, const std::vector<std::pair<std::string_
   return result;
 }
 
-/// Of sbatch's file names: a percent sign begins a pattern, a backslash turns patterns off.
+/// Escapes % in file names of sbatch. InputError for a backslash, which disables patterns.
 std::string escape_pattern(const std::string& path) {
   std::string result;
   for (const char c : path) {
-    if (c == '\\') throw InputError(fmt::format("{}: Slurm takes no backslash in the path of its output; choose another store", path));
+    if (c == '\\') throw InputError(fmt::format("{}: Slurm does not allow a backslash in the output path; choose another store", path));
     result += c;
     if (c == '%') result += c;
   }
@@ -50,7 +49,7 @@ std::string escape_pattern(const std::string& path) {
 
 long long round_up(double value) { return static_cast<long long>(std::ceil(value)); }
 
-/// Long enough for Slurm, which looks every half a minute, and never more than half of what there is.
+/// At most half of the time limit.
 long long calc_signal_s(const Batch& batch, const Settings& settings) {
   const double max_s = batch.time_limit_s > 0.0 ? batch.time_limit_s / 2.0 : settings.signal_before_s;
   return std::max(1LL, round_up(std::min(settings.signal_before_s, max_s)));
@@ -62,7 +61,7 @@ std::string quote_word(std::string_view word) {
   std::string result = "'";
   for (const char c : word) {
     if (c == '\n' || c == '\r' || c == '\0')
-      throw InputError(fmt::format("'{}': line ends cannot be part of a path in a job script; choose another path", word));
+      throw InputError(fmt::format("'{}': newlines are not allowed in paths of a job script; choose another path", word));
     if (c == '\'')
       result += "'\\''";
     else
@@ -112,7 +111,7 @@ std::vector<std::string> make_sbatch(const Batch& batch, const Settings& setting
   if (is_packed) add("--nodes=1");
   add(fmt::format("--ntasks={}", batch.ranks));
   add("--cpus-per-task=1");
-  // By core, as the ranks may be on several nodes.
+  // Per core: the ranks may be on several nodes.
   if (batch.memory_gb > 0.0) add(fmt::format("--mem-per-cpu={}M", round_up(batch.memory_gb * 1e9 / 1048576.0 / batch.ranks)));
   if (batch.time_limit_s > 0.0) add(fmt::format("--time={}", round_up(batch.time_limit_s / 60.0)));
   return words;

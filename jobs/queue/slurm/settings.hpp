@@ -10,24 +10,24 @@
 namespace carillon::slurm {
 
 struct Settings {
-  std::string partition, account, qos;  // empty: Slurm's default
-  std::string launcher = "mpirun";      // or "srun": how the ranks are started inside the allocation
-  double signal_before_s = 120.0;       // this long before the time limit the job gets the signal to save
-  int max_ranks = 16;                   // of a job that does not ask
-  int max_running = 0;                  // tasks of one array at a time; 0: no limit
-  int max_in_array = 1000;              // longer batches become several arrays; never more than the site allows
-  bool packs = true;                    // short jobs share tasks (packing.hpp)
-  int pack_nodes = 0, pack_cores = 0;   // tasks at a time and cores of each to plan for; 0: nodes, as sinfo says
-  double pack_minutes = 30.0;           // of a task, about
-  std::vector<std::string> options;     // words for sbatch, before ours: {"--constraint=zen3"}
-  std::vector<std::string> prologue;    // lines of shell at the start of every job: "module load openmpi". The profile is the user's own.
-  std::vector<std::string> mpirun_options;  // words for mpirun or srun, from the profile's own "mpirun_options"
-  bool has_pictures = false;                // draw the first modes for the report of each bank when it is done
-  double poll_s = 10.0;                     // Slurm is not asked more often by one command that waits
-  std::string program;                      // carillon as the nodes know it; empty: the one that submits
+  std::string partition, account, qos;      // empty: default of Slurm
+  std::string launcher = "mpirun";          // or "srun": starts the ranks inside the allocation
+  double signal_before_s = 120.0;           // time of the signal to save before the time limit
+  int max_ranks = 16;                       // of a job without a request
+  int max_running = 0;                      // tasks of one array at a time; 0: no limit
+  int max_in_array = 1000;                  // limit of tasks per array, also limited by the site
+  bool packs = true;                        // short jobs share tasks (packing.hpp)
+  int pack_nodes = 0, pack_cores = 0;       // concurrent tasks and cores of each for packing; 0: nodes from sinfo
+  double pack_minutes = 30.0;               // target duration of a task
+  std::vector<std::string> options;         // arguments of sbatch: {"--constraint=zen3"}
+  std::vector<std::string> prologue;        // shell lines at the start of every job: "module load openmpi"
+  std::vector<std::string> mpirun_options;  // arguments of mpirun or srun, from "mpirun_options" of the profile
+  bool has_pictures = false;                // draw the first modes for the report of each bank
+  double poll_s = 10.0;                     // minimum interval of queries by one command
+  std::string program;                      // path of carillon on the nodes; empty: the submitting program
 };
 
-/// Throws InputError "file:line: ...". `object` may be none: all defaults.
+/// InputError "file:line: ...". Without `object` all defaults.
 Settings read_settings(std::optional<base::Object> object);
 
 }  // namespace carillon::slurm

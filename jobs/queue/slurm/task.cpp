@@ -1,6 +1,4 @@
-// Method:     One thread that waits for signals with a timeout; what starts next is choose_next() of what is wanted.
 // Source:     Linux sigtimedwait(2); sbatch(1), --signal.
-// Deviations: none.
 #include "jobs/queue/slurm/task.hpp"
 
 #include <fmt/core.h>
@@ -15,12 +13,12 @@
 #include <set>
 
 #include "jobs/queue/attempt/attempt.hpp"
-#include "jobs/store/outcome/outcome.hpp"
-#include "jobs/store/outcome/policy.hpp"
 #include "jobs/queue/local.hpp"
 #include "jobs/queue/slurm/client.hpp"
 #include "jobs/queue/slurm/inside.hpp"
 #include "jobs/store/files.hpp"
+#include "jobs/store/outcome/outcome.hpp"
+#include "jobs/store/outcome/policy.hpp"
 #include "runtime/base/clock.hpp"
 #include "runtime/base/command.hpp"
 
@@ -31,7 +29,7 @@ namespace fs = std::filesystem;
 using outcome::Cause;
 
 constexpr double kStepS = 0.5;
-constexpr double kLookS = 1.0;  // for jobs that are cancelled
+constexpr double kLookS = 1.0;  // interval of checks for cancelled jobs
 constexpr double kBusyPatienceS = 120.0;
 
 sigset_t make_signals() {
@@ -41,7 +39,7 @@ sigset_t make_signals() {
   return set;
 }
 
-/// The jobs of one task. Each is waiting, running, or none of its business any more.
+/// State of one task.
 class TaskRunner {
  public:
   TaskRunner(const TaskOptions& options, const store::Store& store, const TaskList& list)
@@ -73,7 +71,7 @@ class TaskRunner {
  private:
   const TaskJob& job_of(const Placed& placed) const { return list_.jobs[placed.job]; }
 
-  /// That this task has to do it, as its folder says now.
+  /// True if this task has to run the job.
   bool is_wanted(const TaskJob& job) const {
     if (!store_.has_work(job.id)) return false;
     const std::optional<SubmittedJob> submitted = read_submitted_job(store_.work_folder(job.id));
@@ -100,7 +98,7 @@ class TaskRunner {
       waiting_.erase(waiting_.begin() + static_cast<std::ptrdiff_t>(*next));
       if (is_wanted(job_of(placed))) start(placed);
     }
-    if (running_.empty() && !waiting_.empty()) {  // larger than the task: by itself, then
+    if (running_.empty() && !waiting_.empty()) {  // larger than the task: run it alone
       const Placed placed = waiting_.front();
       waiting_.erase(waiting_.begin());
       if (is_wanted(job_of(placed))) start(placed);
@@ -137,7 +135,7 @@ class TaskRunner {
       asked_.erase(ended->pid);
       room_.cores += placed.ranks;
       room_.memory_gb += placed.memory_gb;
-      // Another attempt still works in its folder, one that is being stopped: later.
+      // Retry while a stopping attempt holds the lock of the folder.
       const double now_s = base::get_steady_s();
       if (ended->exit_code == attempt::kExitBusy && now_s - busy_since_s_.try_emplace(placed.job, now_s).first->second < kBusyPatienceS)
         waiting_.push_back(placed);
@@ -147,16 +145,16 @@ class TaskRunner {
   void stop_unwanted() {
     for (const auto& [pid, placed] : running_) {
       const std::optional<SubmittedJob> submitted = read_submitted_job(store_.work_folder(job_of(placed).id));
-      // It is gone too when a job is done, and its folder with it.
+      // Missing too when the job is done.
       const bool is_ours = submitted && submitted->batch == options_.batch && !submitted->is_unwanted;
       if (!is_ours && asked_.insert(pid).second) launcher_.send_signal(pid, SIGUSR1);
     }
   }
 
-  /// Saved before the time limit: each of these jobs counts its own attempts without progress, as one with a task of its own does.
+  /// True if a job stopped before the time limit shall continue; counts attempts without progress.
   bool keep_stopped(const TaskJob& job) const {
     if (!is_wanted(job)) return false;
-    const fs::path work = store_.open_work(job.id).path();
+    const fs::path work = store_.work_folder(job.id);
     const std::optional<outcome::Outcome> left = outcome::read_outcome(work);
     if (!left || (left->cause != Cause::stopped && left->cause != Cause::checkpointed)) return true;
     const outcome::Outcome explained = explain_stop(*left);
@@ -192,7 +190,7 @@ class TaskRunner {
   Room room_;
   std::vector<Placed> waiting_;
   std::map<pid_t, Placed> running_;
-  std::set<pid_t> asked_;  // of them, to stop
+  std::set<pid_t> asked_;  // asked to stop
   std::map<std::size_t, double> busy_since_s_;
   bool is_stopping_ = false, has_begun_ = false;
   int exit_code_ = 0;
@@ -214,7 +212,7 @@ int run_task(const TaskOptions& options) {
   const store::Store store = store::Store::open(options.root);
   const std::optional<TaskList> list = read_task(store.root(), options.batch, options.task);
   if (!list)
-    throw InputError(fmt::format("{}: batch {} has no task {} whose list can be read; its jobs may have ended already: carillon status",
+    throw InputError(fmt::format("{}: batch {} has no readable list for task {}; its jobs may have ended: carillon status",
                                  options.root.string(), options.batch, options.task));
   return TaskRunner(options, store, *list).run();
 }

@@ -1,8 +1,8 @@
-// A task of a packed array: starts its jobs one after the other, as many at a time as it has cores and memory for.
+// A task of a packed array: runs its jobs, as many at a time as cores and memory allow.
 //
-// A job is wanted while WORK/slurm.json names this task and is not marked as unwanted; who cancels it marks it, and the task does not start
-// it, or asks its attempt to save and stop. What ends, in whatever way, touches no other job: the row's keeper settles each by its folder.
-// Before the task's own time limit Slurm sends SIGUSR1: all that runs saves and stops, and the task is queued again with what is left.
+// A job is run while WORK/slurm.json names this task and is not marked as unwanted. A cancelled job is marked: the task does not start it,
+// or asks its attempt to save and stop. Jobs are independent; the submitting host settles each from its folder. Before the time limit of
+// the task Slurm sends SIGUSR1: running jobs save and stop, and the task is requeued with the remaining ones.
 #pragma once
 
 #include <filesystem>
@@ -14,12 +14,12 @@
 
 namespace carillon::slurm {
 
-/// Where a job of a task stands, by its folder.
+/// State of a job of a task, from its folder.
 enum class PackedState {
-  waits,    // no attempt of this submission yet
-  runs,     // an attempt has begun and left no word: it runs, or was killed
-  stopped,  // it was asked to save and stop; its task resumes it when it runs again
-  ended     // it has its bank, or its attempt ended otherwise
+  waits,    // no attempt yet
+  runs,     // an attempt without outcome: running, or killed
+  stopped,  // saved and stopped; resumed when the task runs again
+  ended     // has a bank, or its attempt ended otherwise
 };
 PackedState find_packed_state(const store::Store& store, const store::Id& id, const SubmittedJob& submitted);
 
@@ -31,9 +31,8 @@ struct TaskOptions {
   bool has_pictures = false;
 };
 
-/// Runs until all its jobs have ended or Slurm wants the node. Takes over the signals of the process: for a process of its own. Returns the
-/// exit code for Slurm: 0 also when jobs failed, 4 when one could not be started, 85 when jobs are left. InputError when there is no such
-/// task.
+/// Runs until all jobs have ended or Slurm sends a signal. Takes over the signals of the process. Returns the exit code for Slurm: 0 (even
+/// if jobs failed), 4 if one could not be started, 85 if jobs are left. InputError for a missing task.
 int run_task(const TaskOptions& options);
 
 }  // namespace carillon::slurm

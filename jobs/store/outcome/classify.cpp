@@ -1,7 +1,6 @@
-// Method:     What the solver wrote in its result file comes first; where a signal ended it there is none, and the exit code and what this
-//             attempt did to it give the cause.
-// Source:     exit codes: docs/howto/when-jobs-die.md; those of mpirun: Open MPI 4.1, tried one by one.
-// Deviations: none.
+// Method:     The result file of the solver takes precedence; without one (ended by a signal) the exit code and the actions of the attempt
+//             give the cause.
+// Source:     exit codes: docs/howto/when-jobs-die.md; of mpirun: measured with Open MPI 4.1.
 #include <fmt/core.h>
 
 #include <csignal>
@@ -18,7 +17,7 @@ using base::ResultKind;
 constexpr int kExitNodeLost = 205;  // of mpirun
 constexpr std::size_t kMaxReason = 1000;
 
-/// One line fit for a table: no control characters, no full stop at its end, not too long.
+/// One line for a table: no control characters, no final full stop, limited length.
 std::string make_sentence(std::string_view line) {
   std::string text;
   for (const char letter : line.substr(0, kMaxReason)) text += static_cast<unsigned char>(letter) < 0x20 || letter == 0x7f ? ' ' : letter;
@@ -63,26 +62,25 @@ bool is_error(const std::optional<base::Result>& result) {
   return result && result->kind != ResultKind::done && result->kind != ResultKind::checkpointed;
 }
 
-/// By the exit code alone.
+/// From the exit code alone.
 FailureCause classify_code(const Ending& ending) {
   const int code = ending.exit_code;
-  if (code == kExitInput) return {Cause::bad_input, "the solver refused its input; its log says why", 0.0};
-  if (code == kExitSolve) return {Cause::no_solution, "the solver found no solution; its log says why", 0.0};
-  if (code == kExitSystem) return {Cause::system, "the solver could not run; its log says why", 0.0};
-  if (code == kExitNodeLost) return {Cause::node_lost, "contact with a machine of the job was lost", 0.0};
+  if (code == kExitInput) return {Cause::bad_input, "the solver refused its input; see its log", 0.0};
+  if (code == kExitSolve) return {Cause::no_solution, "the solver found no solution; see its log", 0.0};
+  if (code == kExitSystem) return {Cause::system, "the solver could not run; see its log", 0.0};
+  if (code == kExitNodeLost) return {Cause::node_lost, "lost contact with a host of the job", 0.0};
   if (code > 128 && code < 128 + NSIG) return classify_signal(ending);
   return {Cause::node_lost,
-          ending.dead_rank.empty() ? fmt::format("the solver ended with exit code {}{}", code, ending.result ? "" : " and left no result")
-                                   : make_sentence(ending.dead_rank + " ended before its time"),
+          ending.dead_rank.empty() ? fmt::format("the solver ended with exit code {}{}", code, ending.result ? "" : " and no result")
+                                   : make_sentence(ending.dead_rank + " ended early"),
           0.0};
 }
 
 /// Advice on a memory limit set by the user.
 std::string describe_limit(double need_gb, double limit_gb) {
   return fmt::format(
-      "\"memory_gb\" of the job is {:g}, and it needs at least {:.2g}: carillon validate predicts how much, and \"resources\" of the job, "
-      "or "
-      "carillon retry --memory-gb, give it more",
+      "\"memory_gb\" of the job is {:g}, and it needs at least {:.2g}: carillon validate predicts the need; raise it in \"resources\" of "
+      "the job or by carillon retry --memory-gb",
       limit_gb, need_gb);
 }
 
@@ -92,14 +90,14 @@ FailureCause classify(const Ending& ending) {
   const int code = ending.exit_code;
   const bool has_error = is_error(ending.result);
   if (code == 0) return {Cause::done, "", 0.0};
-  // What this attempt did explains whatever code follows from it; an error that the solver names does not come from a signal.
+  // Actions of this attempt explain the exit code, unless the solver reported an error itself.
   if (!has_error && ending.held_gb > 0.0)
     return {Cause::memory_limit,
             fmt::format("it held {:.2f} GB of memory and was ended; {}", ending.held_gb,
                         describe_limit(ending.held_gb, ending.memory_limit_gb)),
             ending.held_gb};
   if (!has_error && ending.was_hung)
-    return {Cause::hung, fmt::format("hung: no progress and no work for {:.0f} s, and was killed", ending.hang_s), 0.0};
+    return {Cause::hung, fmt::format("hung: no output and no CPU time for {:.0f} s; killed", ending.hang_s), 0.0};
   if (!has_error && ending.was_out_of_time) {
     const char* saved = code == kExitCheckpointed ? "saved, and resumes from there"
                         : ending.has_saved        ? "resumes from the last checkpoint"

@@ -96,7 +96,7 @@ Outcome make_killed(const std::string& token) {
   Outcome o;
   o.token = token;
   o.cause = Cause::killed;
-  o.reason = "killed: the process of the attempt is gone and left no word (kill -9, or the machine went down)";
+  o.reason = "killed: the process of the attempt is gone without an outcome (kill -9, or the machine went down)";
   return o;
 }
 

@@ -1,5 +1,5 @@
-// How an attempt at a job ended (outcome.json) and who works on it (attempt.json): two small files in the folder of the work, written by
-// the process of the attempt, wherever it runs; read by the program that keeps the registry.
+// attempt.json (the process of an attempt) and outcome.json (how it ended): files in the folder of work, written by the attempt on any
+// host, read by the queue.
 #pragma once
 
 #include <filesystem>
@@ -12,63 +12,63 @@
 namespace carillon::outcome {
 
 enum class Cause {
-  done,          // the bank is in the store
-  bad_input,     // the job or its mesh cannot be used (exit code 2)
-  no_solution,   // the numerics found none (3)
-  memory_limit,  // above the job's "memory_gb"
-  memory,        // not enough: said by the program (4), or it was killed for it
-  disk_full,     // no room on a disk
-  system,        // the machine refused something else (4)
-  checkpointed,  // saved and stopped (85), on a request that was not ours
-  stopped,       // we were asked to stop, saved or not
-  time_limit,    // the time of the job was over, saved or not
-  killed,        // by a signal from elsewhere
-  crashed,       // by a signal of its own making: SIGSEGV, SIGABRT ...
-  node_lost,     // mpirun lost a machine or a rank
-  hung,          // neither progress nor work for too long
-  bad_bank,      // the program said that all is well, and the bank is not
-  no_program,    // what has to be started is not here
-  predicted,     // nothing was solved: what it needs is known now
+  done,          // the bank is published
+  bad_input,     // unusable job or mesh (exit code 2)
+  no_solution,   // no numerical solution (3)
+  memory_limit,  // above "memory_gb" of the job
+  memory,        // out of memory: reported by the program (4), or killed
+  disk_full,     // disk or quota full
+  system,        // another system error (4)
+  checkpointed,  // saved and stopped (85), not requested by Carillon
+  stopped,       // stopped on request, saved or not
+  time_limit,    // time limit reached, saved or not
+  killed,        // by an external signal
+  crashed,       // SIGSEGV, SIGABRT ...
+  node_lost,     // mpirun lost a host or a rank
+  hung,          // neither output nor CPU time for too long
+  bad_bank,      // exit code 0, but the bank is invalid
+  no_program,    // a program is not installed
+  predicted,     // prediction only: time and memory are known now
 };
-/// The word of a cause in outcome.json ("disk-full"), and back; none for a word that is not known.
+/// Words of outcome.json ("disk-full"); none for an unknown word.
 std::string to_text(Cause cause);
 std::optional<Cause> find_cause(std::string_view word);
 
-/// The process that works on a job, written by it before it starts anything. Stays when it dies.
+/// The process of an attempt; written before the solver starts, never removed.
 struct Attempt {
-  std::string token;  // 32 hex digits; everything it starts has CARILLON_ATTEMPT=<token> in its environment
+  std::string token;  // 32 hex digits; its children have CARILLON_ATTEMPT=<token> in their environment
   process::Identity process;
   int ranks = 1;
-  double memory_gb = 0.0;  // admitted; 0: not known
-  std::string started;     // UTC, for people
+  double memory_gb = 0.0;  // admitted; 0: unknown
+  std::string started;     // UTC, for display
 };
 
 struct Outcome {
   std::string token;  // of the attempt
   Cause cause = Cause::killed;
-  std::string reason;  // one true sentence without a full stop; empty when done
+  std::string reason;  // one sentence without a full stop; empty if done
   int exit_code = 0;   // of the solver or mpirun; 128 + signal when a signal ended it
   int ranks = 1;
   double seconds = 0.0;         // of this attempt
-  double peak_memory_gb = 0.0;  // of all its processes together, as looked at while it ran
-  double memory_need_gb = 0.0;  // cause memory: what the program said that it needs; 0: it did not say
-  double percent = 0.0;         // how far it came, 0 to 100
-  bool is_further = false;      // further than any attempt before, and that is saved in its checkpoint
+  double peak_memory_gb = 0.0;  // of all processes together, sampled
+  double memory_need_gb = 0.0;  // cause memory: need reported by the program; 0: unknown
+  double percent = 0.0;         // progress, 0 to 100
+  bool is_further = false;      // its checkpoint is further than that of any attempt before
   std::string host;
-  std::string started, ended;  // UTC, for people
+  std::string started, ended;  // UTC, for display
 };
 
-/// WORK/outcome.json and WORK/attempt.json, written whole. SystemError when the disk refuses.
+/// Atomic replacement of WORK/outcome.json and WORK/attempt.json. SystemError when the disk refuses.
 void write_outcome(const std::filesystem::path& work, const Outcome& outcome);
 void write_attempt(const std::filesystem::path& work, const Attempt& attempt);
-/// None when there is none, or none that can be read.
+/// None if the file is missing or damaged.
 std::optional<Outcome> read_outcome(const std::filesystem::path& work);
 std::optional<Attempt> read_attempt(const std::filesystem::path& work);
 
-/// What is assumed of an attempt that is gone without an outcome.
+/// The outcome of an attempt whose process is gone without outcome.json.
 Outcome make_killed(const std::string& token);
 
-/// This moment as "2026-11-20T20:22:30Z", for people.
+/// The current time as "2026-11-20T20:22:30Z", for display.
 std::string find_utc();
 
 }  // namespace carillon::outcome

@@ -1,7 +1,5 @@
-// Method:     Causes that cannot pass end a job at once. Causes that can pass are tried again after 10, 40 and 160 s; an attempt that saved
-//             more than all before it resets the count. A full disk is waited for, however long.
-// Source:     own choice; docs/howto/when-jobs-die.md has the table.
-// Deviations: none.
+// Method:     Permanent causes fail the job at once. Transient causes are retried after 10, 40 and 160 s; an attempt with progress resets
+//             the count. A full disk is waited for without limit. Table: docs/howto/when-jobs-die.md.
 #include "jobs/store/outcome/policy.hpp"
 
 #include <algorithm>

@@ -1,7 +1,6 @@
-// Method:     A process is its number, its start in clock ticks since the boot, and the boot. What belongs together carries the same entry
-//             in its environment, which is inherited and which the kernel shows (/proc/PID/environ).
+// Method:     A process is identified by number, start time and boot id. The processes of an attempt share an environment entry, which
+//             children inherit and /proc/PID/environ shows.
 // Source:     Linux proc(5), random(4) (boot_id), namespaces(7), flock(2), clock_gettime(2).
-// Deviations: none.
 #include "jobs/store/process/process.hpp"
 
 #include <fcntl.h>
@@ -27,14 +26,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// JobState letter and start of a process; none when there is no such process.
+/// State letter and start of a process; none if it does not exist.
 struct Stat {
   char state = 'X';
   std::uint64_t start_ticks = 0;
 };
 std::optional<Stat> find_stat(pid_t pid) {
   const std::string text = read_proc(fmt::format("/proc/{}/stat", pid));
-  const std::size_t end = text.rfind(')');  // the name before it may hold anything
+  const std::size_t end = text.rfind(')');  // the name may contain any character
   if (end == std::string::npos) return std::nullopt;
   std::istringstream fields(text.substr(end + 1));
   const std::vector<std::string> words{std::istream_iterator<std::string>(fields), {}};
@@ -68,7 +67,7 @@ void wait_ms(long milliseconds) {
 std::string read_proc(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
   std::ostringstream text;
-  text << stream.rdbuf();  // a process that ends between the two costs its text, not an exception, as with an iterator
+  text << stream.rdbuf();  // no exception if the process ends meanwhile
   return text.str();
 }
 
@@ -108,7 +107,7 @@ Life find_life(const Identity& identity) {
   if (identity.pid <= 0) return Life::gone;
   const std::string boot = find_boot();
   if (identity.boot != boot) {
-    // The same kernel shows another namespace: a container. Another kernel of the same name: an earlier boot.
+    // Same boot id: another PID namespace (container). Another boot id on the same host: an earlier boot.
     const bool is_same_kernel = identity.boot.substr(0, identity.boot.find(':')) == boot.substr(0, boot.find(':'));
     return is_same_kernel || identity.host != find_host() ? Life::elsewhere : Life::gone;
   }
@@ -130,13 +129,13 @@ std::vector<pid_t> find_with_environment(std::string_view entry) {
 
 int end_with_environment(std::string_view entry, double patience_s, double grace_s) {
   std::vector<pid_t> seen;
-  int empty_looks = 0;  // two in a row: a process in the middle of its exec shows no environment
+  int empty_looks = 0;  // two in a row: during exec a process has no environment
   for (double waited_s = 0.0;; waited_s += 0.02) {
     const std::vector<pid_t> left = find_with_environment(entry);
     empty_looks = left.empty() ? empty_looks + 1 : 0;
     if (empty_looks == 2) return static_cast<int>(seen.size());
     if (waited_s > grace_s + patience_s && !left.empty())
-      throw SystemError(fmt::format("process {} does not end, not even by SIGKILL; look at it with ps", left[0]));
+      throw SystemError(fmt::format("process {} does not end after SIGKILL; look at it with ps", left[0]));
     for (const pid_t pid : left) {
       if (std::find(seen.begin(), seen.end(), pid) == seen.end()) seen.push_back(pid);
       if (waited_s >= grace_s) ::kill(pid, SIGKILL);
@@ -150,8 +149,8 @@ std::optional<Lock> Lock::take(const fs::path& file) {
     throw SystemError(fmt::format("{}: cannot {}: {}; {}", file.string(), what, std::strerror(errno), base::find_advice(errno)));
   };
   for (;;) {
-    const int descriptor = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
-    if (descriptor < 0) refuse("make this lock");
+    const int descriptor = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+    if (descriptor < 0) refuse("create this lock");
     Lock lock(descriptor);
     while (::flock(descriptor, LOCK_EX | LOCK_NB) != 0) {
       if (errno == EINTR) continue;
@@ -160,14 +159,14 @@ std::optional<Lock> Lock::take(const fs::path& file) {
     }
     struct stat mine {
     }, named{};
-    if (::fstat(descriptor, &mine) != 0) refuse("look at this file");
-    // The one who held it may have removed the file, or its folder.
+    if (::fstat(descriptor, &mine) != 0) refuse("stat this file");
+    // The previous holder may have removed the file.
     if (::stat(file.c_str(), &named) == 0 && named.st_ino == mine.st_ino && named.st_dev == mine.st_dev) return lock;
   }
 }
 
 bool Lock::is_held(const fs::path& file) {
-  const int descriptor = ::open(file.c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW);
+  const int descriptor = ::open(file.c_str(), O_RDWR | O_CLOEXEC);
   if (descriptor < 0) return false;
   const bool is_free = ::flock(descriptor, LOCK_SH | LOCK_NB) == 0;
   ::close(descriptor);

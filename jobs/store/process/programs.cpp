@@ -23,8 +23,7 @@
 namespace carillon::process {
 namespace {
 
-/// The last line of what a program said of itself, without its name: "carillon-mesh: cup.obj: ..." or "carillon-precompute: error: ...";
-/// without one, the last line.
+/// The last line "carillon-mesh: cup.obj: ..." or "carillon-precompute: error: ..." of a program, without its name; else the last line.
 std::string find_message(const std::string& errors, const std::string& program) {
   const std::string mark = program + ": ";
   const std::size_t at = errors.rfind(mark);
@@ -38,7 +37,7 @@ std::string find_message(const std::string& errors, const std::string& program) 
   return message.starts_with("error: ") ? message.substr(7) : message;
 }
 
-/// The sentences of "carillon-mesh: note: 1 hole was closed", "carillon: warning: ...".
+/// The texts after "carillon-mesh: note: " and "carillon: warning: ".
 std::vector<std::string> find_notes(const std::string& errors) {
   std::vector<std::string> notes;
   std::istringstream lines(errors);
@@ -54,12 +53,12 @@ std::vector<std::string> find_notes(const std::string& errors) {
   return notes;
 }
 
-constexpr double kDaemonGraceS = 10.0;  // Open MPI's daemon removes its session folder in some 0.05 s where nothing else runs
+constexpr double kDaemonGraceS = 10.0;  // Open MPI's daemon needs about 0.05 s for its session folder on an idle machine
 constexpr double kEndPatienceS = 5.0;
-/// In the environment of what programs are started with, and so of all that these start.
+/// Environment entry of started programs and their children.
 constexpr std::string_view kMark = "CARILLON_PROGRAMS=";
 
-/// What an exit code says without a result.
+/// The kind of an exit code without a result file.
 base::ResultKind find_kind(int exit_code) {
   if (exit_code == kExitInput) return base::ResultKind::bad_input;
   if (exit_code == kExitSolve) return base::ResultKind::no_solution;
@@ -105,12 +104,12 @@ std::string Programs::run(const std::string& program, std::vector<std::string> w
   command.environment = base::make_lone_environment();
   std::erase_if(*command.environment, [](const std::string& entry) { return entry.starts_with(kMark); });
   command.environment->push_back(mark);
-  command.signal_at_end = SIGTERM;  // lets the program remove its temporary folders
+  command.signal_at_end = SIGTERM;  // the program removes its temporary folders
   command.output = shows && !is_quiet_ ? STDERR_FILENO : base::kCapture;
   command.errors = base::kCapture;
   const base::Finished finished = base::run(command, {.may_stop = [](const base::Finished&) { return SignalWatch::get_signal() != 0; }});
   if (SignalWatch::get_signal() != 0) {
-    // Open MPI's daemon outlives a program of one rank that was killed until it has removed its session folder.
+    // Open MPI's daemon outlives a killed program until it has removed its session folder.
     end_with_environment(mark, kEndPatienceS, kDaemonGraceS);
     throw SystemError(fmt::format("ended by signal {}", SignalWatch::get_signal()));
   }
@@ -121,7 +120,7 @@ std::string Programs::run(const std::string& program, std::vector<std::string> w
   if (result.message.empty()) result.message = find_message(finished.errors, program);
   if (result.message.empty())
     result.message = finished.signal != 0 ? fmt::format("{} was ended by signal {}", program, finished.signal)
-                                          : fmt::format("{} ended with exit code {} and without a message", program, finished.exit_code);
+                                          : fmt::format("{} ended with exit code {} and no message", program, finished.exit_code);
   base::throw_error(result);
 }
 

@@ -1,4 +1,4 @@
-// Programs of this installation, started one after the other, whose refusals are errors of the caller.
+// Runs programs of this installation; their errors become exceptions.
 #pragma once
 
 #include <filesystem>
@@ -9,8 +9,8 @@
 
 namespace carillon::process {
 
-/// While it lives, the signals that ask a program to end (SIGINT, SIGTERM, SIGHUP) are noted. When it goes, a signal that came does what it
-/// does by default: this process ends by it. One at a time.
+/// Records SIGINT, SIGTERM and SIGHUP during its lifetime. The destructor raises a recorded signal again with its default action. One
+/// instance at a time.
 class SignalWatch {
  public:
   SignalWatch();
@@ -18,21 +18,21 @@ class SignalWatch {
   SignalWatch(const SignalWatch&) = delete;
   SignalWatch& operator=(const SignalWatch&) = delete;
 
-  /// 0: none came.
+  /// 0: none.
   static int get_signal();
 };
 
-/// Runs programs in a temporary folder, which the destructor removes; an error of a program is thrown with its message.
+/// Runs programs in a temporary folder, which the destructor removes.
 class Programs {
  public:
-  /// is_quiet: their progress is not shown. Throws SystemError where no folder can be made.
+  /// `is_quiet`: their progress is not shown. SystemError if the folder cannot be created.
   explicit Programs(bool is_quiet);
 
-  /// The standard output of a program of this installation. Files among the words are absolute. `has_result`: it takes --result. `shows`:
-  /// its progress goes to standard error. It is killed once SignalWatch has a signal, and gone with all that it started when this returns.
-  /// Throws InputError, SolveError, SystemError.
+  /// Returns the standard output. Paths in `words` must be absolute. `has_result`: the program accepts --result. `shows`: its progress goes
+  /// to standard error. Ended with all its children when SignalWatch has a signal. InputError, SolveError, SystemError with the message of
+  /// the program.
   std::string run(const std::string& program, std::vector<std::string> words, bool has_result, bool shows = false);
-  /// Notes and warnings of the last program and of its children, one sentence each.
+  /// Notes and warnings of the last program and its children, one sentence each.
   const std::vector<std::string>& get_notes() const { return notes_; }
 
  private:

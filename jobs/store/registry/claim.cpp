@@ -9,7 +9,7 @@ constexpr double kMaxWaitS = 600.0;
 
 bool is_ready(const Job& job, const std::string& boot, double now_s) {
   if (job.state != JobState::waiting) return job.state == JobState::queued;
-  // Later than anybody waits: written by another clock (a container may have its own).
+  // Beyond the longest wait: written by another clock (e.g. of a container).
   return job.ready_boot_id != boot || job.ready_boot_s <= now_s || job.ready_boot_s > now_s + kMaxWaitS;
 }
 

@@ -1,13 +1,11 @@
-// Method:     SQLite in WAL mode; every commit is synced before it returns (synchronous=FULL).
-// Source:     sqlite.org: wal.html, pragma.html, rescode.html, vfs.html, fileformat2.html (the rollback journal).
-// Deviations: none.
+// Method:     SQLite in WAL mode with synchronous=FULL: every commit is synced before it returns.
+// Source:     sqlite.org: wal.html, pragma.html, rescode.html.
 #include "jobs/store/registry/database.hpp"
 
 #include <fmt/core.h>
 #include <unistd.h>
 
 #include <cstring>
-#include <string_view>
 
 #include "jobs/store/files.hpp"
 #include "runtime/base/failure.hpp"
@@ -17,47 +15,18 @@ namespace carillon::registry {
 namespace {
 
 constexpr int kBusyMs = 60'000;
-constexpr const char* kFilesName = "carillon-registry";
-
-/// SQLite's own access to files, but for what a journal that another user put next to the registry could ask for: it may name a "super
-/// journal", any file at all, which SQLite reads and then removes. The registry never has one.
-const char* find_files() {
-  static sqlite3_vfs& system = *sqlite3_vfs_find(nullptr);
-  static sqlite3_vfs own = system;
-  static const int code = [] {
-    own.zName = kFilesName;
-    own.pNext = nullptr;
-    own.xOpen = [](sqlite3_vfs*, const char* name, sqlite3_file* file, int flags, int* flags_out) {
-      file->pMethods = nullptr;
-      return (flags & SQLITE_OPEN_SUPER_JOURNAL) != 0 ? SQLITE_CORRUPT : system.xOpen(&system, name, file, flags, flags_out);
-    };
-    own.xDelete = [](sqlite3_vfs*, const char* name, int syncs_folder) {
-      const std::string_view text = name;
-      const bool is_ours = text.ends_with("-journal") || text.ends_with("-wal") || text.ends_with("-shm");
-      return is_ours ? system.xDelete(&system, name, syncs_folder) : SQLITE_CORRUPT;
-    };
-    return sqlite3_vfs_register(&own, 0);
-  }();
-  return code == SQLITE_OK ? own.zName : nullptr;
-}
 
 }  // namespace
 
 Database::Database(const std::filesystem::path& file) : file_(file) {
-  // SQLite refuses a link anywhere in the name; the folder is the user's own matter.
-  std::error_code none;
-  const std::filesystem::path folder = std::filesystem::canonical(file.parent_path(), none);
-  const std::filesystem::path name = none ? file : folder / file.filename();
-  const int code =
-      sqlite3_open_v2(name.c_str(), &handle_, SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX | SQLITE_OPEN_NOFOLLOW, find_files());
+  const int code = sqlite3_open_v2(file.c_str(), &handle_, SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX, nullptr);
   try {
     if (code != SQLITE_OK) fail(code);
     sqlite3_extended_result_codes(handle_, 1);
     sqlite3_busy_timeout(handle_, kBusyMs);
-    run("pragma trusted_schema = off");
     Statement mode(*this, "pragma journal_mode = wal");
     if (!mode.step() || mode.text(0) != "wal")
-      throw SystemError(fmt::format("{}: SQLite gives no write-ahead log here (it says \"{}\"); keep the store on a local disk",
+      throw SystemError(fmt::format("{}: SQLite cannot use a write-ahead log here (journal mode \"{}\"); keep the store on a local disk",
                                     file.string(), mode.text(0)));
     run("pragma synchronous = full");
   } catch (...) {
@@ -83,7 +52,7 @@ void Database::run(const char* sql) {
 
 void Database::fail(int code) const {
   std::string what = fmt::format("{}: {}", file_.string(), handle_ != nullptr ? sqlite3_errmsg(handle_) : sqlite3_errstr(code));
-  // A full disk shows itself in many ways: no log, no shared memory, no journal. Only errno shows a full quota.
+  // A full disk gives many codes (no log, no shared memory); a full quota only errno.
   const int number = handle_ != nullptr ? sqlite3_system_errno(handle_) : 0;
   const bool is_refused = (code & 0xFF) == SQLITE_IOERR && base::is_full_error(number);
   if (is_refused) what += fmt::format(" ({})", std::strerror(number));
@@ -96,7 +65,7 @@ void Database::fail(int code) const {
       throw DiskFullError(fmt::format("{}; {}", what, store::kFullAdvice));
     case SQLITE_BUSY:
     case SQLITE_LOCKED:
-      throw SystemError(what + " by another process for a minute; find out what it does, and try again");
+      throw SystemError(what + " by another process for a minute; find that process, and try again");
     case SQLITE_IOERR:
       throw SystemError(fmt::format("{} ({}); check the disk and the room on it", what, sqlite3_errstr(code)));
     case SQLITE_NOMEM:
@@ -120,35 +89,22 @@ Statement::Statement(const Database& database, const char* sql) : database_(data
 
 Statement::~Statement() { sqlite3_finalize(handle_); }
 
+Statement& Statement::check(int code) {
+  if (code != SQLITE_OK) database_.fail(code);
+  return *this;
+}
+
 Statement& Statement::bind(std::string_view text) {
-  const int code = sqlite3_bind_text(handle_, next_++, text.data(), static_cast<int>(text.size()), SQLITE_TRANSIENT);
-  if (code != SQLITE_OK) database_.fail(code);
-  return *this;
+  return check(sqlite3_bind_text(handle_, next_++, text.data(), static_cast<int>(text.size()), SQLITE_TRANSIENT));
 }
 
-Statement& Statement::bind(long long value) {
-  const int code = sqlite3_bind_int64(handle_, next_++, value);
-  if (code != SQLITE_OK) database_.fail(code);
-  return *this;
-}
-
-Statement& Statement::bind(double value) {
-  const int code = sqlite3_bind_double(handle_, next_++, value);
-  if (code != SQLITE_OK) database_.fail(code);
-  return *this;
-}
+Statement& Statement::bind(double value) { return check(sqlite3_bind_double(handle_, next_++, value)); }
 
 bool Statement::step() {
   const int code = sqlite3_step(handle_);
   if (code == SQLITE_ROW) return true;
   if (code != SQLITE_DONE) database_.fail(code);
   return false;
-}
-
-void Statement::reset() {
-  sqlite3_reset(handle_);
-  sqlite3_clear_bindings(handle_);
-  next_ = 1;
 }
 
 std::string Statement::text(int column) const {

@@ -1,8 +1,9 @@
-// SQLite behind two small classes, and its errors sorted into ours.
+// SQLite connections, statements and transactions, with errors as exceptions.
 #pragma once
 
 #include <sqlite3.h>
 
+#include <concepts>
 #include <filesystem>
 #include <stdexcept>
 #include <string>
@@ -10,17 +11,17 @@
 
 namespace carillon::registry {
 
-/// The file is no database, or not as we wrote it: set it aside and make another.
+/// The file is not a usable registry: remove it and rebuild it from the store.
 class Damaged : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// One connection to SQLite, open as long as this exists. Every error of SQLite leaves as Damaged or SystemError.
+/// One connection to SQLite. Every error is thrown as Damaged or SystemError.
 class Database {
  public:
-  /// Opens a file that exists: WAL, synchronous=FULL, waits up to a minute for others. Throws Damaged, SystemError.
+  /// Opens an existing file: WAL, synchronous=FULL, waits for other writers up to a minute.
   explicit Database(const std::filesystem::path& file);
-  /// An empty one in memory.
+  /// An empty database in memory.
   Database();
   Database(const Database&) = delete;
   Database& operator=(const Database&) = delete;
@@ -28,7 +29,7 @@ class Database {
 
   void run(const char* sql);
   sqlite3* get() const { return handle_; }
-  /// Throws what `code`, an error of SQLite, means: Damaged, or SystemError with the remedy.
+  /// Throws Damaged or SystemError for `code`, an error of SQLite.
   [[noreturn]] void fail(int code) const;
 
  private:
@@ -45,24 +46,23 @@ class Statement {
   ~Statement();
 
   Statement& bind(std::string_view text);
-  Statement& bind(long long value);
   Statement& bind(double value);
+  Statement& bind(std::integral auto value) { return check(sqlite3_bind_int64(handle_, next_++, static_cast<sqlite3_int64>(value))); }
   /// True while there is a row.
   bool step();
-  /// Ready to be bound and stepped again.
-  void reset();
 
   std::string text(int column) const;
   long long integer(int column) const { return sqlite3_column_int64(handle_, column); }
   double number(int column) const { return sqlite3_column_double(handle_, column); }
 
  private:
+  Statement& check(int code);
   const Database& database_;
   sqlite3_stmt* handle_ = nullptr;
   int next_ = 1;
 };
 
-/// A write transaction that is rolled back unless commit() was called. It waits for other writers.
+/// A write transaction, rolled back unless commit() was called. Waits for other writers.
 class Transaction {
  public:
   explicit Transaction(Database& database);

@@ -1,12 +1,8 @@
-// Method:     banks/ and work/ are the truth. A job of banks/ is done; one of work/ stands where its state.json says; order and names come
-//             from the log of submissions.
-// Source:     own.
-// Deviations: none.
+// Method:     A job in banks/ is done; the state of a job in work/ is in its state.json; order and names come from the log of submissions.
 #include "jobs/store/registry/recover.hpp"
 
 #include <fcntl.h>
 #include <fmt/core.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -16,9 +12,9 @@
 #include <map>
 #include <set>
 
+#include "jobs/store/files.hpp"
 #include "jobs/store/outcome/outcome.hpp"
 #include "jobs/store/registry/rows.hpp"
-#include "jobs/store/files.hpp"
 #include "runtime/base/descriptor.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/file.hpp"
@@ -31,7 +27,7 @@ namespace fs = std::filesystem;
 constexpr const char* kLogName = "submissions.jsonl";
 constexpr std::size_t kMaxLineBytes = 32 << 20;
 
-/// A job whose attempt lives is running, whatever the registry has forgotten. Whether a node of Slurm is gone is not known here.
+/// A job with a live attempt is running. Attempts on other hosts count as live for jobs of Slurm until they have left an outcome.
 bool adopt_attempt(Job& job, const fs::path& work) {
   const auto attempt = outcome::read_attempt(work);
   if (!attempt) return false;
@@ -45,10 +41,9 @@ bool adopt_attempt(Job& job, const fs::path& work) {
   return true;
 }
 
-/// Of a bank that was done.
 std::string describe_fault(const std::string& fault) { return fault + "; carillon retry, or submit, computes it again"; }
 
-/// What a folder of the store says of its job. A damaged record costs what it held, not the job.
+/// The row of a job from its folder. The content of damaged records is lost, the job is not.
 Job make_job(const store::Store& store, const store::Id& id) {
   Job job{id};
   const fs::path folder = store.find_folder(id);
@@ -85,11 +80,11 @@ Job make_job(const store::Store& store, const store::Id& id) {
   return job;
 }
 
-/// Finds what differs without a lock, then looks again under one.
+/// Differences of rows and folders.
 struct Differences {
-  std::vector<store::Id> unknown;            // a folder, no row
-  std::vector<store::Id> finished, missing;  // rows whose bank is there; rows with no folder at all
-  std::vector<store::Id> alive;              // rows that wait while a process works on them
+  std::vector<store::Id> unknown;            // folder without row
+  std::vector<store::Id> finished, missing;  // rows with a bank; rows without any folder
+  std::vector<store::Id> alive;              // queued rows with a live attempt
   bool is_empty() const { return unknown.empty() && finished.empty() && missing.empty() && alive.empty(); }
 };
 
@@ -99,7 +94,7 @@ Differences find_differences(Database& database, const store::Store& store) {
   while (row.step()) {
     const auto id = store::parse_id(row.text(0));
     const auto state = store::find_state(row.text(1));
-    if (!id || !state) throw Damaged("a row of the registry names no job or no state");
+    if (!id || !state) throw Damaged("a row of the registry has no valid id or state");
     rows.emplace(*id, *state);
   }
   const std::vector<store::Id> work = store.list_work(), banks = store.list_banks();  // in this order: a job moves from work to banks
@@ -124,7 +119,7 @@ Differences find_differences(Database& database, const store::Store& store) {
   return found;
 }
 
-/// False when there is nothing to change any more.
+/// False if the row needs no change any more.
 bool settle_missing(Job& job, const store::Store& store) {
   const std::optional<std::string> fault = store.find_bank_fault(job.id, store::Look::quick);
   if (!fault || job.state == JobState::running || job.state == JobState::failed) return false;
@@ -147,19 +142,6 @@ std::string find_name(const std::string& job_file) {
   return slash == std::string::npos ? job_file : job_file.substr(slash + 1);
 }
 
-fs::path set_aside(const fs::path& file) {
-  std::error_code error;
-  fs::path target;
-  for (int n = 1; target.empty() || fs::exists(target, error); ++n)
-    target = file.parent_path() / fmt::format("registry.damaged-{}.sqlite", n);
-  for (const char* ending : {"-journal", "-wal", "-shm", ""}) {  // the file itself last: until then the damage is seen again
-    fs::rename(fs::path(file) += ending, fs::path(target) += ending, error);
-    if (error && error != std::errc::no_such_file_or_directory) store::throw_errno(file, "set aside this damaged registry", error.value());
-  }
-  store::sync_folder(file.parent_path());
-  return target;
-}
-
 void append_submissions(const store::Store& store, const std::vector<Submission>& submissions) {
   const fs::path file = store.root() / kLogName;
   std::string text;
@@ -168,28 +150,19 @@ void append_submissions(const store::Store& store, const std::vector<Submission>
     request.job_file = submission.job_file;
     text += store::format_request(request, true);
   }
-  const int fd = ::open(file.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0666);
-  if (fd < 0) store::throw_errno(file, "write", errno);
-  struct stat info {};
+  const base::Descriptor log(::open(file.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0666));
+  if (log.get() < 0) store::throw_errno(file, "write", errno);
   char last = '\n';
-  if (::fstat(fd, &info) != 0 || !S_ISREG(info.st_mode)) {
-    ::close(fd);
-    throw SystemError(fmt::format("{}: the log of submissions must be a regular file; remove what is there", file.string()));
-  }
-  if (info.st_size > 0) [[maybe_unused]]
-    const ssize_t got = ::pread(fd, &last, 1, info.st_size - 1);
-  if (last != '\n') text.insert(0, "\n");  // behind a line that was cut
-  int error = base::write_all(fd, text);
-  if (error == 0 && ::fsync(fd) != 0) error = errno;
-  ::close(fd);
+  if (const off_t size = ::lseek(log.get(), 0, SEEK_END); size > 0) (void)!::pread(log.get(), &last, 1, size - 1);
+  if (last != '\n') text.insert(0, "\n");  // after a truncated line
+  int error = base::write_all(log.get(), text);
+  if (error == 0 && ::fsync(log.get()) != 0) error = errno;
   if (error != 0) store::throw_errno(file, "write", error);
 }
 
 std::vector<Submission> read_submission_log(const store::Store& store) {
   std::vector<Submission> submissions;
   std::map<std::string, std::size_t> newest;
-  std::error_code error;
-  if (!fs::is_regular_file(store.root() / kLogName, error)) return submissions;
   std::ifstream stream(store.root() / kLogName, std::ios::binary);
   for (std::string line; std::getline(stream, line);) {
     if (line.empty() || line.size() > kMaxLineBytes) continue;
@@ -257,7 +230,7 @@ void reconcile(Database& database, const store::Store& store, const Say& say) {
   }
   transaction.commit();
   if (missing > 0)
-    say(fmt::format("{} job{} of the registry had lost folders in the store, or damaged banks; carillon status names them", missing,
+    say(fmt::format("{} job{} of the registry had lost their folders, or have damaged banks; carillon status lists them", missing,
                     missing == 1 ? "" : "s"));
 }
 

@@ -1,7 +1,6 @@
-// Method:     Every change is one write transaction of SQLite that reads the row, changes it and writes it whole. What could not be
-//             read from the store again (reasons, counts) is written next to the job, in state.json, before the transaction is committed.
+// Method:     Every change is one write transaction that reads a row, changes it and writes it. Reasons and counts are also written to
+//             state.json of the job, before the transaction is committed, so that a rebuilt registry has them.
 // Source:     sqlite.org, lang_transaction.html, wal.html.
-// Deviations: none.
 #include "jobs/store/registry/registry.hpp"
 
 #include <fcntl.h>
@@ -13,11 +12,12 @@
 #include <algorithm>
 #include <cerrno>
 
+#include "jobs/store/files.hpp"
 #include "jobs/store/registry/database.hpp"
 #include "jobs/store/registry/recover.hpp"
 #include "jobs/store/registry/rows.hpp"
-#include "jobs/store/files.hpp"
 #include "runtime/base/clock.hpp"
+#include "runtime/base/descriptor.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::registry {
@@ -26,62 +26,29 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kFileName = "registry.sqlite";
-constexpr int kMaxRepairs = 3;
 
-/// Device and number of a file; zeros when there is none.
+/// Device and inode of a file; zeros if it does not exist.
 std::pair<dev_t, ino_t> find_file(const fs::path& file) {
   struct stat info {};
   return ::stat(file.c_str(), &info) == 0 ? std::pair(info.st_dev, info.st_ino) : std::pair<dev_t, ino_t>(0, 0);
 }
 
-/// Makes the file unless it is there: its group gets the rights of the store, and SQLite gives the same to the files next to it.
+/// Creates an empty file with the umask of the store's group; SQLite gives the same mode to the files next to it.
 void make_file(const fs::path& file) {
-  struct stat info {};
-  for (const char* ending : {"-journal", "-wal", "-shm"}) {
-    const fs::path companion = fs::path(file) += ending;
-    if (::lstat(companion.c_str(), &info) != 0 || S_ISREG(info.st_mode)) continue;
-    throw InputError(fmt::format("{}: {}, and the registry keeps a file of its own here; find out who put it there, and remove it",
-                                 companion.string(), S_ISLNK(info.st_mode) ? "this is a link" : "this is something else"));
-  }
-  if (::lstat(file.c_str(), &info) == 0) {
-    if (!S_ISREG(info.st_mode))
-      throw InputError(fmt::format("{}: the registry must be a regular file; remove what is there", file.string()));
-    return;
-  }
-  const int fd = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0666);
-  if (fd < 0) store::throw_errno(file, "make the registry", errno);
-  ::close(fd);
+  const base::Descriptor made(::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666));
+  if (made.get() < 0) store::throw_errno(file, "create the registry", errno);
 }
 
-/// Held while the registry is opened, so that one process alone sets a damaged one aside.
-class Gate {
- public:
-  explicit Gate(const fs::path& folder)
-      : descriptor_(::open((folder / "registry.lock").c_str(), O_RDONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0664)) {
-    if (descriptor_ < 0) store::throw_errno(folder / "registry.lock", "open", errno);
-    while (::flock(descriptor_, LOCK_EX) != 0) {
-      if (errno != EINTR) store::throw_errno(folder / "registry.lock", "lock", errno);
-    }
+void remove_file(const fs::path& file) {
+  for (const char* ending : {"", "-journal", "-wal", "-shm"}) {
+    if (::unlink((fs::path(file) += ending).c_str()) != 0 && errno != ENOENT)
+      store::throw_errno(file, "remove this damaged registry", errno);
   }
-  ~Gate() { ::close(descriptor_); }
-  Gate(const Gate&) = delete;
-  Gate& operator=(const Gate&) = delete;
+}
 
- private:
-  int descriptor_;
-};
-
-store::SavedState make_saved_state(const Job& job) { return {job.state, job.reason, job.attempts, job.failures}; }
-
-/// Next to the job, for a registry that has to be made again.
 void write_state(const store::Store& store, const Job& job) {
   if (job.state == JobState::running || job.state == JobState::done || !store.has_work(job.id)) return;
-  const store::OpenFolder work = store.open_work(job.id);
-  try {
-    store::write_state(work.path(), make_saved_state(job));
-  } catch (const SystemError& error) {
-    store::throw_with_names(work, error);
-  }
+  store::write_state(store.work_folder(job.id), {job.state, job.reason, job.attempts, job.failures});
 }
 
 }  // namespace
@@ -93,54 +60,53 @@ struct Registry::Data {
   std::unique_ptr<Database> database;
   std::pair<dev_t, ino_t> opened{};
 
-  /// Opens, checks, and rebuilds what is damaged.
-  void open() {
+  /// Opens the file; removes and rebuilds a damaged one. `damage`: found in the open one; empty: none.
+  void open(std::string damage = "") {
     database.reset();
-    const Gate gate(file.parent_path());
-    std::string damage;
-    for (int repairs = 0; repairs < kMaxRepairs; ++repairs) {
+    const store::Lock lock(file.parent_path() / "registry.lock", LOCK_EX);  // one process rebuilds
+    if (!damage.empty() && find_file(file) == opened) remove_file(file);
+    for (int round = 0; round < 2; ++round) {
       try {
         make_file(file);
         database = std::make_unique<Database>(file);
-        const bool is_new = fill_if_empty(damage);
-        if (!is_new) check_tables(*database);
+        fill_if_empty(damage);
         opened = find_file(file);
         return;
       } catch (const Damaged& error) {
         database.reset();
-        damage = fmt::format("{}; it is kept as {}", error.what(), set_aside(file).filename().string());
+        remove_file(file);
+        damage = error.what();
       }
     }
-    throw SystemError(fmt::format("{}: the registry is damaged as soon as it is made ({}); check the disk", file.string(), damage));
+    throw SystemError(fmt::format("{}: the new registry is damaged too ({}); check the disk", file.string(), damage));
   }
 
-  bool fill_if_empty(const std::string& damage) {
+  void fill_if_empty(const std::string& damage) {
     Transaction transaction(*database);
-    if (!make_tables(*database)) return false;
+    if (!make_tables(*database)) return;
     const std::size_t jobs = fill_from_store(*database, store);
     transaction.commit();
     if (!damage.empty())
-      say(fmt::format("the registry was damaged ({}) and is made again from the store: {} job{}", damage, jobs, jobs == 1 ? "" : "s"));
+      say(fmt::format("the registry was damaged ({}) and is rebuilt from the store: {} job{}", damage, jobs, jobs == 1 ? "" : "s"));
     else if (jobs > 0)
-      say(fmt::format("the registry was gone and is made again from the store: {} job{}", jobs, jobs == 1 ? "" : "s"));
-    return true;
+      say(fmt::format("the registry was missing and is rebuilt from the store: {} job{}", jobs, jobs == 1 ? "" : "s"));
   }
 
   void require_writing() const {
     if (!file.empty()) return;
-    throw InputError(fmt::format("{}: this store may only be read; ask its owner for the right to write, or choose another with --store",
-                                 store.root().string()));
+    throw InputError(
+        fmt::format("{}: read-only store; ask its owner for write access, or choose another with --store", store.root().string()));
   }
 
-  /// Runs `act` on the registry of now; when that proves damaged or was replaced meanwhile, on the one that is made in its place.
+  /// Runs `act` on the registry; on the new one if the file was replaced by another process or proves damaged.
   template <class Act>
   auto guard(const Act& act) {
     if (file.empty()) return act(*database);
     if (find_file(file) != opened) open();
     try {
       return act(*database);
-    } catch (const Damaged&) {
-      open();
+    } catch (const Damaged& error) {
+      open(error.what());
       return act(*database);
     }
   }
@@ -211,7 +177,7 @@ std::vector<Job> Registry::list(const std::vector<JobState>& states) const {
     const bool is_open = std::none_of(states.begin(), states.end(), [](JobState state) {
       return state == JobState::done || state == JobState::failed || state == JobState::cancelled;
     });
-    if (is_open) condition += ") and state in ('queued', 'waiting', 'running'";  // so that the index serves
+    if (is_open) condition += ") and state in ('queued', 'waiting', 'running'";  // uses the index
     return read_jobs(database, condition + ")");
   });
 }

@@ -1,6 +1,6 @@
-// The registry: which jobs there are, what state they are in, who asked for them. An index over the store: banks/ and work/ are the truth,
-// and a registry that is lost or damaged is set aside and made again from them. SQLite in WAL mode, synchronous=FULL; one host only.
-// One Registry per thread; any number of processes.
+// The registry: the jobs of a store with their states and submissions, in SQLite (WAL, synchronous=FULL). It is only an index over banks/,
+// work/ and submissions.jsonl: it may be deleted at any time, and is rebuilt when missing or damaged. One host; one Registry per thread;
+// any number of processes.
 #pragma once
 
 #include <functional>
@@ -10,10 +10,10 @@
 #include <string_view>
 #include <vector>
 
-#include "jobs/store/process/process.hpp"
-#include "jobs/store/registry/job_table.hpp"
 #include "jobs/store/id.hpp"
+#include "jobs/store/process/process.hpp"
 #include "jobs/store/records.hpp"
+#include "jobs/store/registry/job_table.hpp"
 #include "jobs/store/store.hpp"
 
 namespace carillon::registry {
@@ -24,29 +24,27 @@ struct Submission {
   store::Request request;
 };
 
-/// The rows of all jobs of a store. Every change is one transaction, so that other processes see rows before or after it. All of it can be
-/// made again from the store but times, ranks given and numbers of Slurm.
+/// The rows of all jobs of a store. Every change is one transaction. Times, given ranks and Slurm job numbers are lost in a rebuild.
 class Registry final : public JobTable {
  public:
-  /// Opens the store's registry; a damaged one is set aside and rebuilt, and `say` gets one line about it. Then brings it up to date with
-  /// the store: folders without a row get one, a row whose bank is there is done, a done row whose bank is gone is failed.
+  /// Opens the registry of a store; rebuilds a missing or damaged one and reports that in one line to `say`. Then updates it: folders
+  /// without a row get one, rows with a bank become done, done rows without a bank failed.
   static Registry open(const store::Store& store, const std::function<void(const std::string&)>& say);
-  /// For who may only read the store: its jobs as its folders and its log of submissions show them now, in memory; the registry's own file
-  /// is neither opened nor made. What folders do not record (ranks given, times, numbers of Slurm) is as in a new row. What changes jobs
-  /// throws InputError.
+  /// For read-only stores: a registry in memory, built from the folders and the log of submissions. Calls that change jobs throw
+  /// InputError.
   static Registry open_to_read(const store::Store& store);
   Registry(Registry&&) noexcept;
   ~Registry() override;
 
-  /// Inserts each job unless there is a row; a failed or cancelled row stays. One transaction. Per submission: true when a row was made.
+  /// Inserts each job that has no row, in one transaction. Per submission: true if a row was inserted.
   std::vector<bool> submit(const std::vector<Submission>& submissions);
 
   std::optional<Job> find(const store::Id& id) const override;
-  /// All rows whose id begins with `prefix` (hex digits), at most `most`.
+  /// At most `max` rows whose id begins with `prefix` (hex digits).
   std::vector<Job> find_by_prefix(std::string_view prefix, std::size_t max = 10) const;
   std::vector<Job> list(const std::vector<JobState>& states) const override;
   std::vector<Job> list() const { return list({}); }
-  /// The newest submission of a job file; of all job files, the newest of each.
+  /// The newest submission of a job file, and of every job file.
   std::optional<Submission> find_last_submission(const std::string& job_file) const;
   std::vector<Submission> list_last_submissions() const;
 
@@ -54,9 +52,9 @@ class Registry final : public JobTable {
   std::vector<Job> claim(store::JobEngine engine, const process::Identity& worker, const Choose& choose, std::size_t max = 1000) override;
   bool update(const store::Id& id, const std::function<bool(Job&)>& change) override;
 
-  /// Forgets rows that have ended (gc); others stay.
+  /// Deletes rows that have ended (gc).
   void remove(const std::vector<store::Id>& ids);
-  /// Forgets all submissions but these (gc); the caller holds store::Store::lock_exclusive().
+  /// Deletes all other submissions (gc). The caller holds store::Store::lock_exclusive().
   void keep_submissions(const std::vector<Submission>& submissions);
 
  private:

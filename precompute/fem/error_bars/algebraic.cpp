@@ -1,11 +1,11 @@
-// Method: with r = K phi - lambda M phi and phi^T M phi = 1 an eigenvalue lies within rho = ||r||_{M^-1} of lambda. Both norms come from
-//   the residual that is known: ||r||_{M^-1} <= ||r||_2 / sqrt(least eigenvalue of M), ||M phi||_2 <= sqrt(greatest eigenvalue of M), and M
-//   lies between multiples of its diagonal. k-th against k-th: modes whose intervals touch are one group; its eigenvalues pair with those
-//   of K phi = lambda M phi within sqrt(sum rho^2), or within sum rho^2 / gap where the gap to whatever else there can be is wider.
-//   Rounding: entries of K are wrong by parts of eps |K_ij|, which moves lambda by phi^T dK phi.
+// Method: with r = K phi - lambda M phi and phi^T M phi = 1 an eigenvalue lies within rho = ||r||_{M^-1} of lambda. Both norms follow from
+//   the known residual: ||r||_{M^-1} <= ||r||_2 / sqrt(least eigenvalue of M), ||M phi||_2 <= sqrt(greatest eigenvalue of M), and M lies
+//   between multiples of its diagonal. k-th against k-th: modes with overlapping intervals form a group; its eigenvalues pair with those of
+//   K phi = lambda M phi within sqrt(sum rho^2), or within sum rho^2 / gap if the gap to all other eigenvalues is wider. Rounding: relative
+//   errors eps of |K_ij| move lambda by phi^T dK phi.
 // Source: Fried 1972, SIAM J. Numer. Anal. 9, 448 (element eigenvalues bound those of the whole); Parlett 1998, The Symmetric Eigenvalue
 //   Problem, ch. 10 and 11 (Kahan's bound for groups, Kato and Temple's for gaps).
-// Deviations: the rounding term is a multiple of eps phi^T diag(K) phi, which is what it grows like, not a strict bound.
+// Deviations: the rounding term is a multiple of eps phi^T diag(K) phi, which has the right growth but is not a strict bound.
 #include "precompute/fem/error_bars/algebraic.hpp"
 
 #include <algorithm>
@@ -38,7 +38,7 @@ MassBounds find_element_bounds(const std::array<Vec3, 10>& x) {
   return find_bounds(Eigen::Map<const la::Matrix>(element.mass.data(), 10, 10));
 }
 
-/// det(dx / dL) of a quadratic element is a cubic: twenty points fix it, and its Bernstein coefficients enclose it.
+/// det(dx / dL) of a quadratic element is a cubic, determined by twenty points; its Bernstein coefficients enclose it.
 struct Cubic {
   static constexpr int kTerms = 20;
   std::vector<std::array<int, 4>> powers;
@@ -60,7 +60,7 @@ struct Cubic {
   }
 };
 
-/// The least and the greatest value that the Jacobian can have in the element, or wider.
+/// Lower and upper bound of the Jacobian in the element.
 std::array<double, 2> enclose_jacobian(const std::array<Vec3, 10>& x) {
   static const Cubic kCubic;
   Eigen::Matrix<double, Cubic::kTerms, 1> values;
@@ -85,14 +85,14 @@ std::array<double, 2> enclose_jacobian(const std::array<Vec3, 10>& x) {
 }
 
 double to_cents(double lambda, double error) {
-  constexpr double kNoUse = 1e6;  // the bound leaves no frequency at all
+  constexpr double kNoUse = 1e6;  // larger bounds exclude no frequency
   return error < 0.999 * lambda ? std::min(kNoUse, -600.0 * std::log2(1.0 - error / lambda)) : kNoUse;
 }
 
-/// The bounds on |lambda_k - k-th eigenvalue|, from the bounds rho of the single residuals. low, high: nothing else lies between them.
+/// Bounds on |lambda_k - k-th eigenvalue|, from the bounds rho of the single residuals. low, high: no other eigenvalue lies between them.
 std::vector<double> calc_bounds(std::span<const double> lambda, const std::vector<double>& rho, double low, double high) {
   const std::size_t count = lambda.size();
-  std::vector<double> bound(count), next(count + 1, high);  // next[i]: the least that modes i, i + 1, ... and what follows can be
+  std::vector<double> bound(count), next(count + 1, high);  // next[i]: lower bound of modes i, i + 1, ... and all above
   for (std::size_t i = count; i-- > 0;) next[i] = std::min(next[i + 1], lambda[i] - rho[i]);
   double below = low;
   for (std::size_t first = 0, last; first < count; first = last) {
@@ -165,7 +165,7 @@ std::vector<double> calc_algebraic_cents(const comm::Communicator& comm, Mat sti
   const double low = solution.low_hz > 0 ? square(kTwoPi * solution.low_hz) : 0.0, high = square(kTwoPi * solution.high_hz);
   const std::vector<double> bound = calc_bounds(solution.lambda, rho, low, high);
 
-  constexpr double kRoundings = 8.0;  // of an entry of K: a sum over some elements of products of four numbers
+  constexpr double kRoundings = 8.0;  // relative error of an entry of K in eps: a sum over several elements of products of four numbers
   std::vector<double> cents(count);
   for (std::size_t m = 0; m < count; ++m) {
     const double rounding = kRoundings * std::numeric_limits<double>::epsilon() * scale[m];

@@ -1,4 +1,4 @@
-// How far the computed eigenvalues can be from those of K phi = lambda M phi: bounds, not estimates.
+// Rigorous bounds on the distance of computed eigenvalues from those of K phi = lambda M phi.
 #pragma once
 
 #include <mpi.h>

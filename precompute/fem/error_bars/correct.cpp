@@ -1,12 +1,12 @@
-// Method: lambda_h - lambda is the energy of the error, for a consistent mass and to first order, and the recovered strains give that
-//   energy: a share I of lambda_h. T10: lambda = lambda_h (1 + G) / (1 + I), without a constant that was fitted; G is Hadamard's shift to
-//   the smooth surface. T4 recover less, and less on coarser meshes: two polynomials in I and the share L that a lumped mass takes, of
-//   first order 1 - I + L but for the constant of I, fitted to the bodies of docs/error-bars.md. Modes that are one eigenvalue to rounding
-//   have shapes that are any basis of a space: they get the mean of their parts, which does not depend on the basis. Bars: half of the
-//   mesh's bar around the corrected value, 0.4 of it for T4. Where the estimate is a large share of lambda the mesh's interval itself is
-//   kept, which lies below the mesh's frequency but for what lumping and geometry leave open (of T4 what of it is within 0.45 of the bar).
-//   Two meshes agree where |lambda' - lambda'_coarser| is less than half of what their corrections differ by. For the part that recovery
-//   cannot detect in curved elements that are wide compared with their wall, see parts.hpp, calc_excess().
+// Method: for a consistent mass and to first order, lambda_h - lambda is the energy of the error, estimated from recovered strains as a
+//   share I of lambda_h. T10: lambda = lambda_h (1 + G) / (1 + I), without a fitted constant; G is Hadamard's shift to the smooth surface.
+//   T4 recover less, and less on coarser meshes: two polynomials in I and the share L of a lumped mass, 1 - I + L to first order except for
+//   the coefficient of I, fitted to the bodies of docs/error-bars.md. Shapes of modes that are degenerate to rounding are an arbitrary
+//   basis: they get the mean of their parts, which is independent of the basis. Bars: half of the mesh's bar around the corrected value,
+//   0.4 of it for T4. If the estimate is a large share of lambda, the mesh's own interval is kept, which lies below the mesh's frequency
+//   except for the uncertainty of lumping and geometry (of T4, its part within 0.45 of the bar). Two meshes agree if |lambda' -
+//   lambda'_coarser| is less than half of the difference of their corrections. For the undetectable part in curved elements that are wide
+//   compared with their wall, see parts.hpp, calc_excess().
 // Source: Naga, Zhang and Zhou 2006, SIAM J. Sci. Comput. 28, 1289 (eigenvalues less the energy of the recovered error); Zienkiewicz and
 //   Zhu 1992.
 // Deviations: strains are recovered (error_bars.cpp), not displacements; the rational form instead of the difference keeps lambda > 0.
@@ -23,7 +23,7 @@ namespace {
 
 using bank::Correction;
 
-// Shares of lambda. Above the first the estimate is rough, above the second it is unreliable.
+// Shares of lambda. Above the first limit the estimate is rough, above the second unreliable.
 constexpr double kRoughT4 = 0.5, kStiffT4 = 1.0, kRoughT10 = 0.3, kStiffT10 = 0.6;
 constexpr double kRoughWidthT4 = 0.45, kRoughWidthLumped = 0.5;                  // of the mesh's bar
 constexpr double kSingularShare = 0.25;                                          // of the estimate's energy
@@ -41,7 +41,7 @@ Correction find_correction(const ErrorParts& parts, Kind kind, bool is_lumped) {
   return Correction::kOneMesh;
 }
 
-/// Modes of one eigenvalue get the mean of their parts.
+/// Averages the parts of degenerate modes.
 std::vector<ErrorParts> share_parts(const Level& level) {
   std::vector<ErrorParts> shared = level.parts;
   for (std::size_t first = 0, end = 0; first < shared.size(); first = end) {
@@ -56,13 +56,13 @@ std::vector<ErrorParts> share_parts(const Level& level) {
   return shared;
 }
 
-/// The verdict on each mode, and the least length of its bar.
+/// Verdict on each mode, and the minimum length of its bar.
 struct Verdict {
   std::vector<Correction> correction;  // (m)
-  std::vector<double> least_cents;     // (m) by which a coarser mesh contradicts, of disputed modes; else 0
+  std::vector<double> least_cents;     // (m) distance to a contradicting coarser mesh, of disputed modes; else 0
 };
 
-/// Where each mode can be by itself around what is stated.
+/// Interval of each mode around its stated value.
 OwnIntervals find_intervals(const Level& level, const std::vector<ErrorParts>& parts, const Corrections& corrections,
                             const std::vector<double>& least_cents) {
   OwnIntervals own;
@@ -108,7 +108,7 @@ double calc_share_left(const ErrorParts& parts, Kind kind, bool is_lumped) {
 
 namespace {
 
-/// The corrections that follow from the verdicts.
+/// Corrections for the verdicts.
 Corrections correct(const Level& level, const std::vector<ErrorParts>& parts, const Verdict& verdict) {
   Corrections corrections;
   corrections.correction = verdict.correction;
@@ -123,8 +123,8 @@ Corrections correct(const Level& level, const std::vector<ErrorParts>& parts, co
   return corrections;
 }
 
-/// The verdict on the modes of a mesh after a look at a coarser one, k-th against k-th. Where they contradict each other the estimate is
-/// wrong, and so is the bar that follows from it: the finer mesh is then nearer to the truth than to the coarser mesh.
+/// Verdict on the modes of a mesh compared with a coarser one, k-th against k-th. On contradiction the estimate and its bar are wrong: the
+/// finer mesh is then closer to the truth than to the coarser mesh.
 Verdict compare(const Level& level, const Corrections& corrections, const Level& coarser) {
   const Corrections other = calc_corrections(coarser);
   const std::vector<std::size_t> order = base::find_sort_order(corrections.lambda), before = base::find_sort_order(other.lambda);
@@ -214,7 +214,7 @@ bool is_too_short(const Level& level) {
 }
 
 std::size_t find_computed_count(std::size_t wanted) {
-  constexpr std::size_t kLeast = 12, kMost = 20;  // modes in a short list; more than wanted
+  constexpr std::size_t kLeast = 12, kMost = 20;  // additional modes of a short list
   return std::max(wanted + std::min((wanted + 4) / 5, kMost), kLeast);
 }
 

@@ -1,11 +1,10 @@
-// Method: discretisation: the strains of a mode are smoothed over patches of elements; the energy of the difference is about lambda_h -
-//   lambda, since lambda_h - lambda = |u - u_h|_E^2 - lambda |u - u_h|_M^2 for a consistent mass and the second term is of higher order.
-//   What smoothed strains cannot show is an error that they share: tractions on the free surface (recovery.cpp), added for T10. A
-//   lumped mass adds lambda phi^T (M_l - M) phi, known exactly. A smooth surface that the mesh cuts short changes lambda by Hadamard's
-//   formula, integral (2 W - lambda rho |u|^2) V_n dS. Cents: predict.cpp. Modes may change places: from the interval of each mode follow
-//   those of the k-th lowest.
+// Method: discretisation: modal strains are smoothed over patches of elements; the energy of the difference is about lambda_h - lambda,
+//   since lambda_h - lambda = |u - u_h|_E^2 - lambda |u - u_h|_M^2 for a consistent mass and the second term is of higher order. Smoothed
+//   strains miss errors common to a patch: the tractions on the free surface (recovery.cpp) are added for T10. A lumped mass adds lambda
+//   phi^T (M_l - M) phi, known exactly. A smooth surface cut short by the mesh changes lambda by Hadamard's formula, integral (2 W - lambda
+//   rho |u|^2) V_n dS. Cents: predict.cpp. Modes may change order: intervals of the k-th lowest follow from those of the modes.
 // Source: Zienkiewicz and Zhu 1992, IJNME 33, 1331; Strang and Fix 1973, ch. 6; Hadamard 1908; algebraic part: algebraic.cpp.
-// Deviations: the error energies are estimates, with safety factors found by measurement (docs/error-bars.md).
+// Deviations: the error energies are estimates, with measured safety factors (docs/error-bars.md).
 #include "precompute/fem/error_bars/error_bars.hpp"
 
 #include <fmt/core.h>
@@ -14,10 +13,10 @@
 #include <array>
 #include <cmath>
 
+#include "precompute/fem/element.hpp"
 #include "precompute/fem/error_bars/algebraic.hpp"
 #include "precompute/fem/error_bars/order.hpp"
 #include "precompute/fem/error_bars/recovery.hpp"
-#include "precompute/fem/element.hpp"
 #include "precompute/petsc/session.hpp"
 
 namespace carillon::error_bars {
@@ -45,10 +44,10 @@ void check_arguments(const comm::Communicator& comm, const mesh::LocalMesh& loca
   });
 }
 
-/// What the blocks of modes work in.
+/// Buffers of a block of modes.
 struct Room {
   std::vector<FloatLanes> displacement;    // (nodes, 3), divided by omega; T4
-  std::vector<DoubleLanes> displacement2;  // the same of T10
+  std::vector<DoubleLanes> displacement2;  // T10
   std::vector<Strain> strains;             // (e, s); T10
   std::vector<Strain> patches;             // (vertices * materials, t)
   std::vector<Strain> values;              // (nodes * materials); T4: the patches themselves
@@ -59,7 +58,7 @@ template <typename Number>
 void load_displacement(const mesh::LocalMesh& local, const std::vector<std::int32_t>& place, const double* shapes, std::size_t stride,
                        std::size_t first, std::size_t count, const Solution& solution, Number* to) {
   std::array<const double*, kLanes> column{};
-  std::array<double, kLanes> scale{};  // 0: an empty lane
+  std::array<double, kLanes> scale{};  // 0: an unused lane
   for (std::size_t m = 0; m < kLanes; ++m) {
     column[m] = shapes + (first + std::min(m, count - 1)) * stride;
     if (m < count) scale[m] = 1 / std::sqrt(solution.lambda[first + m]);
@@ -71,8 +70,8 @@ void load_displacement(const mesh::LocalMesh& local, const std::vector<std::int3
   }
 }
 
-/// The sums of one block of modes over this rank's elements: error, energy, lumping, change, magnitude, the last two again for the surface
-/// that the body may have as well, the error of singular elements, and that of bent ones.
+/// Sums of one block of modes over this rank's elements: error, energy, lumping, change, magnitude, the last two again for the alternative
+/// surface, the error of singular elements, and that of bent ones.
 constexpr int kSums = 9;
 using Sums = std::array<DoubleLanes, kSums>;
 

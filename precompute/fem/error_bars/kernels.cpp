@@ -1,4 +1,4 @@
-// Which loops run: decided by what the processor says of itself.
+// Kernel dispatch by processor features.
 #include "precompute/fem/error_bars/kernels.hpp"
 
 #include "runtime/base/instructions.hpp"

@@ -1,10 +1,9 @@
-// Method:     the k-th lowest of numbers that lie in intervals lies between the k-th lowest of all lower and of all
-//             upper ends. Modes that are not in the list take part: one above it, computed at F or higher, is really at F 2^(-b/1200) or
-//             higher, b being the bar of a mode there; one below it, at F or lower, really at F 2^(b/1200) or lower.
-// Source:     -
-// Deviations: b is an estimate. Modes of different kinds (bending, stretching) differ in their bars a hundredfold and lie far apart, so b
-//             is the widest bar of a whole octave next to the end, and where bars grow from octave to octave it grows on. F is where such
-//             a mode comes down furthest as long as b < 1731 cents times the power by which it grows; wider bars are off the scale anyhow.
+// Method:     the k-th lowest of numbers in intervals lies between the k-th lowest of all lower and of all upper ends. Unlisted modes take
+//   part: one above the list, computed at F or higher, has a true value of at least F 2^(-b/1200), b being the bar of a mode there; one
+//   below, computed at F or lower, at most F 2^(b/1200).
+// Deviations: b is an estimate. Bars of different kinds of modes (bending, stretching) differ a hundredfold and are far apart in frequency,
+//   so b is the widest bar within an octave of the end of the list, extrapolated if bars grow from octave to octave. F is the worst case as
+//   long as b < 1731 cents times the growth exponent; wider bars are useless anyway.
 #include "precompute/fem/error_bars/order.hpp"
 
 #include <algorithm>
@@ -18,14 +17,14 @@ namespace {
 
 constexpr double kOctave = 1200.0;  // cents
 
-/// The bar that a mode at `top` can have, which is not below the last. at: places of the modes [cents], ascending.
+/// Bar of a mode at `top`, at or above the last. at: positions of the modes [cents], ascending.
 double predict(std::span<const double> at, std::span<const double> cents, double top) {
   const std::size_t count = at.size();
   const std::size_t octave = std::upper_bound(at.begin(), at.end(), top - kOctave) - at.begin();
   const std::size_t first = std::min(octave, count - (count + 3) / 4);  // at least a quarter of the list
   const auto begin = cents.begin();
   const auto near = std::max_element(begin + static_cast<std::ptrdiff_t>(first), cents.end());
-  // Bars grow at most with the frequency, as those of bending do. Of a list within one octave nothing is known but that.
+  // Bars grow at most with the frequency, as for bending. A list within one octave determines no growth.
   double power = 1.0;
   if (octave > 0) {
     const auto far = std::max_element(begin, begin + static_cast<std::ptrdiff_t>(octave));
@@ -56,8 +55,8 @@ std::vector<double> widen_for_order(std::span<const double> lambda, const OwnInt
   std::sort(low.begin(), low.end());
   std::sort(high.begin(), high.end());
   const double top = unlisted.high_hz > 0 ? std::max(at[count - 1], place_hz(unlisted.high_hz)) : at[count - 1];
-  const double min = top - predict(at, reach, top);  // of all above
-  double max = at[0] - 1e9;                          // of all below
+  const double min = top - predict(at, reach, top);  // lower bound of all modes above
+  double max = at[0] - 1e9;                          // upper bound of all modes below
   if (unlisted.below > 0 && unlisted.low_hz > 0) {
     const double bottom = std::min(at[0], place_hz(unlisted.low_hz));
     const auto octave = std::upper_bound(at.begin(), at.end(), bottom + kOctave) - at.begin();

@@ -1,4 +1,4 @@
-// From how wrong each mode is to how wrong the k-th of the sorted frequencies is.
+// From errors of single modes to errors of the k-th sorted frequency.
 #pragma once
 
 #include <cstdint>
@@ -7,23 +7,23 @@
 
 namespace carillon::error_bars {
 
-/// What is stated of each mode by itself, and where its true frequency can be; cents above its frequency on the mesh.
+/// Stated value and interval of each mode by itself; cents above its frequency on the mesh.
 struct OwnIntervals {
   std::vector<double> stated;  // (m) 0: the mesh's frequency; otherwise the correction
   std::vector<double> low;     // (m) lower end of the interval, <= stated
   std::vector<double> high;    // (m) upper end, >= stated
-  std::vector<double> above;   // (m) upper end for a mode that is not corrected: what a lumped mass and a surface cut short leave open
+  std::vector<double> above;   // (m) upper end without correction: uncertainty of a lumped mass and of a surface cut short
 };
 
-/// The modes of the mesh that are not in the list.
+/// Unlisted modes of the mesh.
 struct Unlisted {
-  double high_hz = 0.0;    // those above lie at least here; or above the last of the list, if that is higher
-  double low_hz = 0.0;     // those below lie at most here
-  std::int64_t below = 0;  // how many, rigid ones left out
+  double high_hz = 0.0;    // lower bound of those above, or the last listed one, if higher
+  double low_hz = 0.0;     // upper bound of those below
+  std::int64_t below = 0;  // number below, without rigid modes
 };
 
-/// The bars [cents] of the stated frequencies: the k-th lowest of them is within its bar of the k-th true one, k counting what is unlisted
-/// below too. lambda: (m) of the mesh, ascending, m > 0. Returns (m), in the order of lambda. Pure.
+/// Bars [cents] of the stated frequencies: the k-th lowest of them is within its bar of the k-th true one, k counting unlisted modes below
+/// too. lambda: (m) of the mesh, ascending, m > 0. Returns (m), in the order of lambda. Pure.
 std::vector<double> widen_for_order(std::span<const double> lambda, const OwnIntervals& own, const Unlisted& unlisted);
 
 }  // namespace carillon::error_bars

@@ -1,6 +1,5 @@
-// Method: the parts of the estimate, added without letting them cancel, each with a safety factor, as a ratio of frequencies.
+// Method: sum of the parts without cancellation, each with a safety factor, as a ratio of frequencies.
 // Source: rates: Strang and Fix 1973, An Analysis of the Finite Element Method, ch. 6. Factors: measured, docs/error-bars.md.
-// Deviations: none.
 #include <algorithm>
 #include <cmath>
 
@@ -9,7 +8,7 @@
 namespace carillon::error_bars {
 namespace {
 
-/// Bound on the relative shift of lambda by the other surface.
+/// Bound on the relative shift of lambda by the alternative surface.
 double calc_shift(double shift, double noise) {
   constexpr double kShift = 1.5, kNoise = 0.15;
   return kShift * std::abs(shift) + kNoise * noise;
@@ -32,9 +31,8 @@ ErrorParts predict_parts(const ErrorParts& parts, Kind kind, double order, doubl
   return then;
 }
 
-// Elements of one layer that rise by q of the wall's thickness stretch with the wall where it only bends, and so do all their neighbours,
-// so that recovered strains show a part of the error only. Measured on hollow spheres and tubes of the table: 1 + (3.5 to 6) q^2 times as
-// much.
+// Single-layer elements that rise by q of the wall's thickness stretch where the wall only bends, and so do their neighbours: recovered
+// strains show only part of the error. Measured on hollow spheres and tubes of the table: a factor of 1 + (3.5 to 6) q^2.
 double calc_excess(const ErrorParts& parts, Kind kind) {
   constexpr double kBent = 4.0;
   return parts.interpolation + (kind == Kind::kT4 ? 0.0 : kBent * parts.bent);
@@ -43,16 +41,16 @@ double calc_excess(const ErrorParts& parts, Kind kind) {
 double calc_cents(const ErrorParts& parts, Kind kind) {
   constexpr double kMaxOfEnergy = 0.99, kT10 = 3.5, kT10Lumped = 4.5;
   const double interpolation = calc_excess(parts, kind), lumping = std::abs(parts.lumping);
-  // A share of the computed lambda as a share of the true one, which is smaller, times a safety factor.
+  // Converts a share of the computed lambda to one of the true, smaller lambda, times a safety factor.
   const auto enlarge = [&](double factor, double share) {
     const double s = std::clamp(share, 0.0, kMaxOfEnergy);
     return factor * s / (1.0 - s);
   };
-  // Interpolation raises lambda and a lumped mass lowers it. Where both matter they are trusted to cancel within limits only.
+  // Interpolation raises lambda, a lumped mass lowers it; cancellation is trusted within limits only.
   double mesh = enlarge(kind == Kind::kT4 ? 2.0 : kT10, interpolation);
   if (lumping > 0.0 && kind == Kind::kT4)
     mesh = enlarge(2.0, std::abs(interpolation - lumping)) + 0.4 * std::min(interpolation, lumping);
-  else if (lumping > 0.0)  // how far up, and how far down
+  else if (lumping > 0.0)  // upward and downward
     mesh = std::max(enlarge(kT10Lumped, interpolation) - lumping, 1.75 * lumping - 0.65 * interpolation);
   return 600.0 * std::log2(1.0 + mesh + calc_shift(parts.geometry, parts.geometry_noise));
 }

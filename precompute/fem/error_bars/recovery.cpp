@@ -1,17 +1,17 @@
-// Method: at every vertex a polynomial (linear for T4, quadratic for T10) is fitted by least squares to the strains that the elements
-//   around have at their best points (centroid; the four points of degree 2). The fit is linear in the strains, so it is kept as weights.
-//   Where the samples do not fix a term of the highest degree (a corner with one element), a small ridge lets it be zero. Terms of lower
-//   degree have none: what one element can follow is recovered exactly in every patch, or bending, whose strains are linear through the
-//   thickness, would be taken for an error wherever patches are one-sided, as on all of a slender bar.
-//   A fit to strains sees only errors that differ from element to element. Elements that are wider than the layer in which a stress turns
-//   round at a free edge (torsion of a strip: as wide as the strip is thick) all lack the layer and agree, so the fit agrees with them.
-//   What the fit then has left is traction on a surface where none acts. The energy of the layer that would take a traction t away is
-//   t . A^-1 . t times a depth, A = n . C . n being the elasticity along the normal n: for a traction linear through a strip of thickness h
-//   the depth is 0.315 h (St Venant: J = b h^3 / 3 (1 - 0.63 h / b)). What of a scaled strain makes traction is a projection.
+// Method: at every vertex a polynomial (linear for T4, quadratic for T10) is fitted by least squares to the strains of the surrounding
+//   elements at their superconvergent points (centroid; the four points of degree 2). The fit is linear in the strains and stored as
+//   weights. If the samples leave a term of the highest degree undetermined (a corner with one element), a small ridge sets it to zero.
+//   Terms of lower degree have no ridge: linear strains must be recovered exactly in every patch, or bending would be taken for an error
+//   wherever patches are one-sided, as on all of a slender bar.
+//   Fitted strains show only errors that differ between elements. Elements wider than the boundary layer at a free edge (torsion of a
+//   strip: as wide as the strip is thick) all lack the layer and agree. The fit then leaves a traction on the free surface. The energy of
+//   the layer that would cancel a traction t is t . A^-1 . t times a depth, A = n . C . n being the elasticity along the normal n: for a
+//   traction linear through a strip of thickness h the depth is 0.315 h (St Venant: J = b h^3 / 3 (1 - 0.63 h / b)). The traction part of a
+//   scaled strain is a projection.
 // Source: Zienkiewicz and Zhu 1992, IJNME 33, 1331 ("superconvergent patch recovery"); Timoshenko and Goodier 1970, Theory of Elasticity,
 //   ch. 10 (torsion of a strip).
-// Deviations: ridge instead of wider patches, which would reach beyond the neighbours' ranks; strains scaled by the root of the elasticity.
-//   Tractions are not counted for T4 and lumped masses, whose bars hold without: their errors there are many times greater.
+// Deviations: ridge instead of wider patches, which would need more than one layer of halo elements; strains scaled by the root of the
+//   elasticity. Tractions are omitted for T4 and lumped masses, whose other errors are many times greater.
 #include "precompute/fem/error_bars/recovery.hpp"
 
 #include <fmt/core.h>
@@ -24,8 +24,8 @@
 #include <memory>
 #include <numeric>
 
-#include "precompute/fem/error_bars/surface.hpp"
 #include "precompute/fem/element.hpp"
+#include "precompute/fem/error_bars/surface.hpp"
 #include "precompute/la/decompositions.hpp"
 #include "precompute/mesh/faces.hpp"
 #include "precompute/petsc/session.hpp"
@@ -33,24 +33,24 @@
 namespace carillon::error_bars {
 namespace {
 
-constexpr double kRidgeT4 = 1e-3, kRidgeT10 = 1e-2;  // of 1e-4 ... 1: the least scatter on the training bodies of docs/error-bars.md
-// Depth of the layer in sizes of an element over the surface, which has seen a part of it: the least scatter on strips and training bodies.
+constexpr double kRidgeT4 = 1e-3, kRidgeT10 = 1e-2;  // from 1e-4 ... 1: smallest scatter on the training bodies of docs/error-bars.md
+// Depth of the layer relative to the size of an element at the surface: smallest scatter on strips and training bodies.
 constexpr double kLayer = 0.125;
-constexpr double kFlatness = 1e-10;  // what flat elements may be short of in the terms without ridge
+constexpr double kFlatness = 1e-10;  // tolerance for flat elements in the terms without ridge
 
-/// 1, x, y, z, xx, yy, zz, xy, yz, xz of the place seen from the patch's vertex, in units of `scale`.
+/// 1, x, y, z, xx, yy, zz, xy, yz, xz relative to the patch's vertex, in units of `scale`.
 std::array<double, 10> calc_monomials(const Vec3& at, const Vec3& vertex, double scale) {
   const double x = (at[0] - vertex[0]) / scale, y = (at[1] - vertex[1]) / scale, z = (at[2] - vertex[2]) / scale;
   return {1, x, y, z, x * x, y * y, z * z, x * y, y * z, x * z};
 }
 
-/// Gradients of the shape functions and volume of one sample.
+/// Shape function gradients and volume of one sample.
 struct Sample {
   std::array<Vec3, 10> gradient{};
   double volume_m3 = 0.0;
 };
 
-/// One sample of an element: T4 ignores `l`.
+/// One sample of an element: `l` is ignored for T4.
 Sample calc_sample(std::span<const Vec3> x, const std::array<double, 4>& l) {
   const int n = static_cast<int>(x.size());
   std::array<std::array<double, 4>, 10> by_l{};  // d N_i / d L_j
@@ -76,7 +76,7 @@ Sample calc_sample(std::span<const Vec3> x, const std::array<double, 4>& l) {
   return sample;
 }
 
-/// Where a sample is: calc_sample's `at` alone.
+/// Position of a sample: calc_sample's `at` only.
 Vec3 calc_place(std::span<const Vec3> x, const std::array<double, 4>& l) {
   Vec3 at{};
   const auto add = [&](const Vec3& node, double value) {
@@ -106,8 +106,7 @@ std::array<float, 36> calc_root(const Solid& solid) {
   return root;
 }
 
-/// sqrt(K_full / K) of the bulk moduli that the variation and the mean of the dilatation of a T10 meet;
-/// fem::Solid::mean_dilatation_modulus_pa.
+/// sqrt(K_full / K) of the bulk moduli for the variation and the mean of a T10's dilatation; fem::Solid::mean_dilatation_modulus_pa.
 float find_dilatation(const Solid& solid) {
   const double mean = fem::calc_mean_dilatation_modulus_pa(solid.elasticity_pa);
   if (mean == 0.0) return 1.0F;
@@ -115,7 +114,7 @@ float find_dilatation(const Solid& solid) {
   return static_cast<float>(std::sqrt(full / (full + mean)));
 }
 
-/// The normal matrices of all patches, summed over the ranks, then their regularised inverses.
+/// Normal matrices of all patches, summed over the ranks, then their regularised inverses.
 class Patches {
  public:
   Patches(int terms, std::size_t count, double scale) : terms_(terms), scale_(scale), normal_(count * terms * terms, 0.0) {}
@@ -132,7 +131,7 @@ class Patches {
     vertices.sum(normal_.data(), static_cast<std::size_t>(terms_) * terms_ * materials);
   }
 
-  /// N becomes D (D N D + ridge)^-1 D with D = diag(N)^-1/2; the ridge is on the terms of the highest degree alone.
+  /// N becomes D (D N D + ridge)^-1 D with D = diag(N)^-1/2; ridge on the terms of the highest degree only.
   void invert() {
     const double ridge = terms_ == 4 ? kRidgeT4 : kRidgeT10;
     const int first = terms_ == 4 ? 1 : 4;  // of the highest degree
@@ -147,7 +146,7 @@ class Patches {
     }
   }
 
-  /// What a sample with monomials p adds to term t of the patch's polynomial.
+  /// Contribution of a sample with monomials p to term t of the patch polynomial.
   double weight(std::size_t patch, const std::array<double, 10>& p, int t) const {
     const double* row = &normal_[(patch * terms_ + t) * terms_];
     return std::inner_product(row, row + terms_, p.begin(), 0.0);
@@ -159,7 +158,7 @@ class Patches {
   std::vector<double> normal_;
 };
 
-/// Elements along a curve that fills space (Morton's), so that neighbours in the arrays are neighbours in the body.
+/// Elements along a Morton curve, so that neighbours in the arrays are neighbours in the body.
 std::vector<std::int32_t> order_elements(const mesh::LocalMesh& local) {
   const int n = local.nodes_per_tet();
   Vec3 low{}, high{};
@@ -187,7 +186,7 @@ std::vector<std::int32_t> order_elements(const mesh::LocalMesh& local) {
   return order;
 }
 
-/// (nodes) a running number for the nodes in the order in which the elements touch them; corners_only: -1 for mid-side nodes.
+/// (nodes) numbers in the order of first use by the elements; corners_only: -1 for mid-side nodes.
 std::vector<std::int32_t> find_places(const mesh::LocalMesh& local, const std::vector<std::int32_t>& order, bool corners_only) {
   const int n = local.nodes_per_tet();
   std::vector<std::int32_t> place(local.nodes_m.size(), -1);
@@ -278,7 +277,7 @@ void find_middles(const mesh::LocalMesh& local, const Patches& patches, Recovery
     }
 }
 
-/// How many elements are flat and have all corners on the surface.
+/// Number of elements that are flat and have all corners on the surface.
 double count_one_layer(const mesh::LocalMesh& local, const std::vector<char>& is_outer) {
   constexpr double kFlat = 4.0;  // longest edge over least height: 1.2 of a regular tetrahedron, 2.5 in a lattice of cubes
   double count = 0.0;
@@ -296,7 +295,7 @@ double count_one_layer(const mesh::LocalMesh& local, const std::vector<char>& is
   return count;
 }
 
-/// Both faces of an edge in one entry, in the order of the elements.
+/// Merges both faces of an edge into one entry, in the order of the elements.
 std::vector<Shift> find_shifts(const std::vector<SurfaceEdge>& edges, const mesh::LocalMesh& local,
                                std::span<const std::int32_t> material_of_tet, const Recovery& recovery) {
   const Elements& elements = recovery.elements;
@@ -325,16 +324,16 @@ std::vector<Shift> find_shifts(const std::vector<SurfaceEdge>& edges, const mesh
   return shifts;
 }
 
-/// The parts of a scaled strain that make traction on a face with this normal: an orthonormal basis of U N, N v being the strain of a
-/// displacement v that grows along the normal.
+/// Traction parts of a scaled strain on a face with this normal: an orthonormal basis of U N, N v being the strain of a displacement v that
+/// grows along the normal.
 Eigen::Matrix<double, 6, 3> find_traction_parts(const std::array<float, 36>& root, const std::array<float, 3>& n) {
   Eigen::Matrix<double, 6, 3> strain;
   strain << n[0], 0, 0, 0, n[1], 0, 0, 0, n[2], 0, n[2], n[1], n[2], 0, n[0], n[1], n[0], 0;
   return la::calc_qr(Eigen::Map<const Eigen::Matrix<float, 6, 6, Eigen::RowMajor>>(root.data()).cast<double>() * strain, 3).q;
 }
 
-/// Of T10, at the middles of the edges, where three of them integrate squares of linear fields exactly. Neighbours on one smooth surface
-/// share theirs.
+/// For T10, at the middles of the edges, where three points integrate squares of linear fields exactly. Neighbours on one smooth surface
+/// share points.
 void find_tractions(const std::vector<FreeFace>& faces, const mesh::LocalMesh& local, std::span<const std::int32_t> material_of_tet,
                     Recovery& recovery) {
   const Elements& elements = recovery.elements;
@@ -365,9 +364,8 @@ void find_tractions(const std::vector<FreeFace>& faces, const mesh::LocalMesh& l
   }
 }
 
-/// The exchange of values at the nodes that have a place: place (nodes), -1: none, on any rank. Collective.
-comm::HaloExchange make_exchange(const comm::Communicator& comm, const mesh::LocalMesh& local,
-                                 const std::vector<std::int32_t>& place) {
+/// Exchange of values at nodes with a place on any rank: place (nodes), -1: none. Collective.
+comm::HaloExchange make_exchange(const comm::Communicator& comm, const mesh::LocalMesh& local, const std::vector<std::int32_t>& place) {
   if (comm.size() == 1) return {};
   const auto own_end = local.node_in_mesh.begin() + local.owned_nodes;
   comm::Halo halo;
@@ -403,7 +401,7 @@ Recovery make_recovery(const comm::Communicator& comm, const mesh::LocalMesh& lo
   elements.materials = static_cast<int>(solids.size());
   elements.count = local.tet_count();
   const Surface surface = find_surface(comm, local);
-  std::array<double, 3> size{0.0, static_cast<double>(elements.count), 0.0};  // volume, elements, those of a thin wall of one layer
+  std::array<double, 3> size{0.0, static_cast<double>(elements.count), 0.0};  // volume, elements, single-layer elements
   comm.agree([&] {
     recovery.vertex_node.resize(*std::max_element(vertex_place.begin(), vertex_place.end()) + 1);
     for (std::size_t n = 0; n < place.size(); ++n)

@@ -1,10 +1,8 @@
-// Method: the normal of the smooth surface at a vertex is the weighted mean of the normals of the faces around it that turn less than 50
-//   degrees from the face asked about. An arc over an edge of length t with normals n_a, n_b rises (n_b - n_a) . t / 8 above the chord;
-//   what the mid-side node already rises is taken off. Of T10 that rise is taken to the fourth order: it lies in the middle between what
-//   sines (the formula) and tangents of the arc's ends give, and a share of the distance between these two is the mean gap that a parabolic
-//   triangle with its mid-side nodes on the surface leaves.
+// Method: the normal of the smooth surface at a vertex is the weighted mean of the normals of the surrounding faces within 50 degrees of
+//   the face in question. An arc over an edge of length t with normals n_a, n_b rises (n_b - n_a) . t / 8 above the chord; the rise of the
+//   mid-side node is subtracted. For T10 the rise is to fourth order: midway between the values from sines (the formula) and tangents of
+//   the arc's ends; a fraction of their difference is the mean gap left by a parabolic triangle with its mid-side nodes on the surface.
 // Source: weights: Max 1999, J. Graphics Tools 4(2), 1 (exact on a sphere). Arc: Vlachos et al. 2001, "Curved PN triangles".
-// Deviations: none.
 #include "precompute/fem/error_bars/surface.hpp"
 
 #include <algorithm>
@@ -32,7 +30,7 @@ Vec3 normalise(const Vec3& a) {
 
 struct Face {
   std::int32_t tet = 0;
-  int face = 0;  // of mesh::kFaces
+  int face = 0;  // index into mesh::kFaces
 };
 
 using FaceKey = std::array<std::int32_t, 3>;  // node numbers in the whole mesh, ascending
@@ -56,11 +54,11 @@ FaceKey find_key(const mesh::LocalMesh& local, const Face& face) {
   return key;
 }
 
-/// Faces of one element only of this rank's, by element.
+/// Faces of only one element of this rank, by element.
 std::vector<Face> find_own_faces(const mesh::LocalMesh& local) {
-  // Faces fall into buckets by their lowest corner: a face then meets its twin among the few faces of one node.
+  // Faces are bucketed by their lowest corner, so that a face is compared with the few faces of one node.
   struct Sided {
-    std::int64_t rest;  // of its corners, ascending, as one number
+    std::int64_t rest;  // other corners, ascending, packed
     Face face;
   };
   const auto sort_corners = [&](std::int32_t e, int f) {
@@ -95,7 +93,7 @@ std::vector<Face> find_own_faces(const mesh::LocalMesh& local) {
   return faces;
 }
 
-/// The same over all ranks. Two ranks' faces meet at a rank that their corners name. Collective.
+/// The same over all ranks; a hash of the corners selects the rank that matches two faces. Collective.
 std::vector<Face> find_faces(const comm::Communicator& comm, const mesh::LocalMesh& local) {
   auto faces = comm.agree([&] { return find_own_faces(local); });
   if (comm.size() == 1) return faces;
@@ -126,7 +124,7 @@ struct Corner {
   double weight = 0.0;
 };
 
-/// The tangent of the surface at corner a towards corner b: of the parabola through the mid-side node where there is one.
+/// Tangent of the surface at corner a towards corner b: of the parabola through the mid-side node if present.
 Vec3 find_tangent(const mesh::LocalMesh& local, const Face& face, int a, int b) {
   const Vec3 &xa = local.nodes_m[get_node(local, face.tet, a)], &xb = local.nodes_m[get_node(local, face.tet, b)];
   if (local.order == 1) return xb - xa;
@@ -134,7 +132,7 @@ Vec3 find_tangent(const mesh::LocalMesh& local, const Face& face, int a, int b) 
   return {4 * xm[0] - 3 * xa[0] - xb[0], 4 * xm[1] - 3 * xa[1] - xb[1], 4 * xm[2] - 3 * xa[2] - xb[2]};
 }
 
-/// The corners of the faces, (faces, 3).
+/// Corners of the faces, (faces, 3).
 std::vector<Corner> list_corners(const mesh::LocalMesh& local, const std::vector<Face>& faces) {
   std::vector<Corner> corners;
   for (const Face& face : faces)
@@ -151,7 +149,7 @@ std::vector<Corner> list_corners(const mesh::LocalMesh& local, const std::vector
   return corners;
 }
 
-/// For each corner the mean normal of all corners at its vertex that turn little from it.
+/// For each corner the mean normal of all corners at its vertex within the smoothing angle.
 std::vector<Vec3> smooth_normals(const std::vector<Corner>& corners) {
   std::unordered_map<std::int32_t, std::vector<const Corner*>> around;
   for (const Corner& corner : corners) around[corner.vertex].push_back(&corner);
@@ -166,7 +164,7 @@ std::vector<Vec3> smooth_normals(const std::vector<Corner>& corners) {
   return normals;
 }
 
-/// The smooth normals at the corners of the faces, (faces, 3). Collective.
+/// Smooth normals at the corners of the faces, (faces, 3). Collective.
 std::vector<Vec3> find_normals(const comm::Communicator& comm, const mesh::LocalMesh& local, const std::vector<Face>& faces) {
   const auto corners = comm.agree([&] { return list_corners(local, faces); });
   return comm::query_owners<Vec3>(
@@ -174,7 +172,7 @@ std::vector<Vec3> find_normals(const comm::Communicator& comm, const mesh::Local
       [](const comm::ByRank<Corner>& met) { return smooth_normals(met.items); });
 }
 
-/// What Surface says of a node.
+/// Surface flags of a node.
 struct Mark {
   std::int32_t node = 0;  // in the whole mesh
   float bend = 0.0F;
@@ -187,12 +185,12 @@ struct Mark {
   }
 };
 
-/// The marks of the nodes, bend: (faces) that of each face. Collective.
+/// Sets the node flags; bend: (faces) value of each face. Collective.
 std::vector<Mark> find_marks(const comm::Communicator& comm, const mesh::LocalMesh& local, const std::vector<Face>& faces,
                              const std::vector<float>& bend) {
   struct Side {
     std::array<std::int32_t, 2> key;  // node numbers in the whole mesh, ascending
-    Vec3 normal, across;              // unit: of the face; from the middle of the edge to the corner opposite
+    Vec3 normal, across;              // unit: of the face; from the middle of the edge to the opposite corner
     char is_fixed;
   };
   std::vector<std::array<std::int32_t, 2>> ends;  // local nodes of the sides
@@ -228,11 +226,11 @@ std::vector<Mark> find_marks(const comm::Communicator& comm, const mesh::LocalMe
             }
         return answers;
       });
-  // Ranks that have an element at such a node but no face must know, too.
+  // Ranks with an element but no face at such a node need the flags too.
   const auto marks = comm.agree([&] {
     std::vector<Mark> list(local.nodes_m.size());
     for (std::size_t n = 0; n < list.size(); ++n) list[n].node = local.node_in_mesh[n];
-    for (std::size_t s = 0; s < ends.size(); ++s)  // three of each face
+    for (std::size_t s = 0; s < ends.size(); ++s)  // three per face
       for (const std::int32_t node : ends[s]) list[node].join({0, bend[s / 3], 1, is_singular[s]});
     return list;
   });
@@ -273,7 +271,7 @@ Surface find_surface(const comm::Communicator& comm, const mesh::LocalMesh& loca
       double gap = dot(nb - na, along) / 8;
       if (free.height_m > 0) bend[f] = std::max(bend[f], static_cast<float>(std::abs(gap) / free.height_m));
       if (local.order == 2) {
-        const double across = dot(na, mean);  // the same for nb
+        const double across = dot(na, mean);  // same for nb
         if (across > 0.5) gap = (gap + gap / across) / 2 + kParabola * (gap / across - gap);
         const Vec3& xm = local.nodes_m[get_node(local, faces[f].tet, 4 + edge)];
         const Vec3 rise{xm[0] - (xa[0] + xb[0]) / 2, xm[1] - (xa[1] + xb[1]) / 2, xm[2] - (xa[2] + xb[2]) / 2};

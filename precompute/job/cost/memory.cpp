@@ -1,6 +1,5 @@
-// Method:     What is allocated in the order of the run: mesh and matrices, their copies by nodes, then the larger of a factorisation and a
-//             search with its basis. Several ranks: over one rank by factors that were measured on the bodies of tests/bench/predict.
-// Source:     none. Deviations: none.
+// Method: allocations in the order of the run: mesh and matrices, their node-block copies, then the larger of a factorisation and a search
+// with its basis. Several ranks: scaled from one rank by factors measured on the bodies of tests/bench/predict.
 #include "precompute/job/cost/memory.hpp"
 
 #include <algorithm>
@@ -15,22 +14,22 @@ namespace {
 
 constexpr double kNumber = 8, kEntry = 12;  // bytes: a double, and one with its column
 
-/// Modes found, those deflated, and the basis of the search.
+/// Modes found, deflated modes, and the search basis.
 double calc_search_bytes(const ProblemSize& size) {
   const std::int64_t m = *size.modes;
-  // Of the room that a slice's basis has, what is not used takes no memory.
+  // Unused columns of a slice's basis take no memory.
   const std::int64_t columns =
       m > kSliceModes ? 5 * predict_solves(m) / (4 * count_slices(m)) : 2 * m + 160 + std::min(size.rigid_modes, m / 2) + size.rigid_modes;
   return kNumber * static_cast<double>(size.unknowns) * static_cast<double>(m + columns);
 }
 
-/// Of one rank: the matrix in single precision, twenty directions of GMRES for thirty-two modes, the velocities.
+/// One rank: matrix in single precision, twenty GMRES directions for thirty-two modes, velocities.
 double calc_air_bytes(const ProblemSize& size) {
   const auto nodes = static_cast<double>(size.air_nodes), modes = static_cast<double>(*size.modes);
   return std::min(8 * nodes * nodes, kAirMatrixBytes) + nodes * (20 * 32 * 8 + 60 * modes);
 }
 
-/// Of all ranks together: answers of all pairs at the nodes and their products, or the fields of sampled motions at the points.
+/// All ranks: responses of all pairs at the nodes and their products, or the fields of sampled motions at the points.
 double calc_coupling_bytes(const ProblemSize& size) {
   const double n = size.coupled_modes, pairs = n * (n + 1) / 2;
   if (size.coupled_modes <= kModesOfAllPairs) return kNumber * pairs * (static_cast<double>(size.unknowns) + pairs);
@@ -70,7 +69,7 @@ MemoryParts predict_parts(const ProblemSize& known) {
 
 double calc_peak_bytes(const MemoryParts& parts, const ProblemSize& known, int ranks) {
   const ProblemSize size = complete(known);
-  // Update matrices and basis never meet; modes that were found stay while the next slice is factorised.
+  // Update matrices and basis do not coexist; found modes remain during the next factorisation.
   const auto unknowns = static_cast<double>(size.unknowns);
   const double found = *size.modes > kSliceModes ? kNumber * unknowns * static_cast<double>(*size.modes) : 0;
   const double sparse = std::max(

@@ -1,10 +1,9 @@
-// Method:     Solids: N(f) = V 4 pi/3 (1/cL^3 + 2/cT^3) f^3 + S pi/4 (2 cT^4 - 3 cT^2 cL^2 + 3 cL^4) / (cT^2 cL^2 (cL^2 - cT^2)) f^2, free
-//             surface. Thin walls of thickness h = 2 V / S: bending, N(f) = A/2 sqrt(12 (1 - nu^2)) f / (cE h), c_E = sqrt(E / rho), and
-//             waves in the plane, N(f) = A pi (1/cP^2 + 1/cT^2) f^2, A = S / 2. The larger one is taken: the first lacks bending, the
-//             second thickness.
-// Source:     Dupuis, Mazo, Onsager, Surface specific heat of an isotropic solid at low temperatures, J. Chem. Phys. 33, 1960 (solids);
-//             Courant, Hilbert, Methods of mathematical physics I, 1953, section VI.4 (plates).
-// Deviations: anisotropic solids by Voigt's averages; a body of several materials by shares of the volume.
+// Method: Solids: N(f) = V 4 pi/3 (1/cL^3 + 2/cT^3) f^3 + S pi/4 (2 cT^4 - 3 cT^2 cL^2 + 3 cL^4) / (cT^2 cL^2 (cL^2 - cT^2)) f^2, free
+// surface. Thin walls of thickness h = 2 V / S: bending, N(f) = A/2 sqrt(12 (1 - nu^2)) f / (cE h), c_E = sqrt(E / rho), and in-plane
+// waves, N(f) = A pi (1/cP^2 + 1/cT^2) f^2, A = S / 2. The larger of the two laws is used: the first lacks bending, the second thickness.
+// Anisotropic solids by Voigt's averages; bodies of several materials by shares of the volume.
+// Source: Dupuis, Mazo, Onsager, Surface specific heat of an isotropic solid at low temperatures, J. Chem. Phys. 33, 1960 (solids);
+// Courant, Hilbert, Methods of mathematical physics I, 1953, section VI.4 (plates).
 #include "precompute/job/cost/modes.hpp"
 
 #include <algorithm>
@@ -21,7 +20,7 @@ namespace {
 struct Speeds {
   double longitudinal = 0;
   double shear = 0;
-  double plate = 0;    // in the plane of a wall
+  double plate = 0;    // in-plane, thin wall
   double bending = 0;  // sqrt(E / (rho (1 - nu^2)))
 };
 
@@ -68,7 +67,7 @@ ModeEstimate estimate_modes(const std::vector<material::Material>& materials, co
     estimate.count += std::max(count(high_hz) - count(low_hz), 0.0);
     estimate.is_thin = estimate.is_thin || (estimate.slenderness > kWallSlenderness && 2 * volume_m3[i] / area < c.shear / (2 * high_hz));
   }
-  constexpr double kFew = 6;  // where counting by waves is no law yet
+  constexpr double kFew = 6;  // below this count the asymptotic law is unreliable
   estimate.low = std::max(estimate.count / (estimate.is_thin ? kCurvedFactor : kSolidFactor) - kFew, 0.0);
   estimate.high = estimate.count * (estimate.is_thin ? kThinFactor : kSolidFactor) + kFew;
   return estimate;

@@ -1,5 +1,5 @@
-// Method:     Powers of the unknowns, as nested dissection of solids fills; counts of slices as precompute/eigen cuts them.
-// Source:     George, Nested dissection of a regular finite element mesh, 1973 (4/3 and 2). Deviations: measured powers.
+// Method: powers of the unknowns, as for nested dissection of solids (exponents measured); slice counts as in precompute/eigen.
+// Source: George, Nested dissection of a regular finite element mesh, 1973 (4/3 and 2).
 #include "precompute/job/cost/problem_size.hpp"
 
 #include <algorithm>
@@ -34,7 +34,7 @@ ProblemSize complete(ProblemSize size) {
   if (size.nodes == 0) size.nodes = static_cast<std::int64_t>(static_cast<double>(size.tets) * nodes_per_tet);
   if (size.unknowns == 0) size.unknowns = 3 * size.nodes;
   if (size.surface_nodes == 0) size.surface_nodes = size.nodes / 2;
-  const double hundreds = static_cast<double>(std::max<std::int64_t>(size.unknowns, 1)) / 1e5;  // of thousands
+  const double hundreds = static_cast<double>(std::max<std::int64_t>(size.unknowns, 1)) / 1e5;  // in units of 100,000
   if (size.factor_flops == 0) size.factor_flops = kFlops * std::pow(hundreds, kFlopPower);
   if (size.factor_entries == 0) size.factor_entries = static_cast<std::int64_t>(kEntries * std::pow(hundreds, kEntryPower));
   if (!size.modes) size.modes = kDefaultModes;

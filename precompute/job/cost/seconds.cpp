@@ -1,6 +1,5 @@
-// Method:     Counts of what grows (elements, entries and operations of the factor, columns of the basis) times the rates of the table,
-//             fitted by least squares to the runs of tests/bench/predict; another machine is scaled by one number, its update rate.
-// Source:     none. Deviations: none.
+// Method: counts (elements, entries and operations of the factor, columns of the basis) times calibrated rates, fitted by least squares to
+// the runs of tests/bench/predict; other machines are scaled by their update rate.
 #include "precompute/job/cost/seconds.hpp"
 
 #include <algorithm>
@@ -16,7 +15,7 @@ double calc_factorisation(const ProblemSize& size) {
   return kFactorFlop * size.factor_flops + kFactorEntry * to_double(size.factor_entries);
 }
 
-/// Static integrals once; then each wave number has the matrix, and the products with the modes that read it.
+/// Static integrals once; per wave number: the matrix, and products with the modes that use it.
 double predict_air(const ProblemSize& size) {
   if (size.air_nodes == 0) return 0.0;
   const double nodes = to_double(size.air_nodes), modes = to_double(*size.modes), waves = std::min(modes, kAirWaves);
@@ -24,7 +23,7 @@ double predict_air(const ProblemSize& size) {
   return kAirNode * nodes + nodes * nodes * (kAirEntry * waves + kAirProduct * readers);
 }
 
-/// One factorisation, and loads, solves and products of the fields.
+/// One factorisation; loads, solves and products of the fields.
 double predict_coupling(const ProblemSize& size) {
   if (size.coupled_modes == 0) return 0.0;
   const double n = size.coupled_modes, pairs = n * (n + 1) / 2, tets = to_double(size.tets);

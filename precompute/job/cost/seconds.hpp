@@ -1,11 +1,11 @@
-// Seconds of a run, predicted from the size of its problem.
+// Predicted run time.
 #pragma once
 
 #include "precompute/job/cost/problem_size.hpp"
 
 namespace carillon::cost {
 
-/// CPU seconds of all ranks, or seconds of wall clock, by phase.
+/// CPU seconds of all ranks, or wall-clock seconds, by phase.
 struct PhaseSeconds {
   double read = 0;
   double partition = 0;
@@ -25,17 +25,17 @@ struct PhaseSeconds {
   double sum() const { return read + partition + assemble + sum_modes() + errors + coupling + collect + air + write; }
 };
 
-/// CPU seconds on the machine of the calibrated table; another takes kUpdateRate / ldlt::measure_update_rate() times as long. What is
-/// unknown of the size is estimated.
+/// CPU seconds on the calibration machine; another takes kUpdateRate / ldlt::measure_update_rate() times as long. Unknown sizes are
+/// estimated.
 PhaseSeconds predict_seconds(const ProblemSize& size);
 
-/// Right-hand sides of the quartic energy of so many coupled modes.
+/// Right-hand sides for the quartic energy of this many coupled modes.
 double predict_coupling_solves(int modes);
 
-/// One factorisation of it.
+/// One factorisation for it.
 double predict_factorisation_seconds(const ProblemSize& size);
 
-/// CPU seconds as wall clock on `ranks` ranks with a core each: what one rank does alone stays, the rest is divided.
+/// Wall clock of CPU seconds on `ranks` ranks with a core each: single-rank work stays, the rest is divided.
 PhaseSeconds calc_wall(const PhaseSeconds& cpu, const ProblemSize& size, int ranks);
 
 }  // namespace carillon::cost

@@ -1,10 +1,10 @@
-// Method:     Bytes 0..255 header, then the settings that were tried, the numbers of the solve, zeros up to a multiple of 4,096, and the
-//             columns by groups of 16: of each group node after node, of each node x, y, z, of each the group's columns. SHA-256 guards all
-//             but the columns, whose records are mixed one by one and summed, so that each rank does it for its own. A new file is
-//             written in the same folder, synchronised to the disk, and renamed.
-// Source:     POSIX.1-2008 (open, pread, pwrite, fcntl, rename, fsync); nfs(5), "data and metadata coherence".
-// Deviations: no HDF5: a truncated or altered file can crash its reader. No MPI-IO: it opens
-//             files by name on every rank, follows links, and creates files of its own in the same folder.
+// Method: bytes 0..255 header, then the settings tried, the numbers of the solve, zeros up to a multiple of 4,096, and the columns in
+//   groups of 16: per group node after node, per node x, y, z, each with the group's columns. SHA-256 covers everything but the columns,
+//   whose records are hashed one by one and summed, so that each rank checks its own. A new file is written in the same folder, synced, and
+//   renamed.
+// Source: POSIX.1-2008 (open, pread, pwrite, fcntl, rename, fsync); nfs(5), "data and metadata coherence".
+// Deviations: no HDF5: a truncated or altered file can crash its reader. No MPI-IO: it opens files by name on every rank, follows links,
+//   and creates other files in the same folder.
 #include "precompute/run/io/checkpoint_file.hpp"
 
 #include <fcntl.h>
@@ -39,7 +39,7 @@ constexpr std::int64_t kAlign = 4096;         // of the first column
 constexpr std::int64_t kMaxText = 1LL << 32;  // bytes of settings and numbers
 constexpr std::int64_t kMaxRows = 1LL << 31, kMaxColumns = 1LL << 24;
 constexpr std::size_t kMaxSettings = 100;
-constexpr double kMinPause = 20;  // times what the last save took, until the next
+constexpr double kMinPause = 20;  // minimum interval of saves, in durations of the last save
 
 struct RawHeader {
   char magic[24];
@@ -80,7 +80,7 @@ std::uint64_t sum_records(const std::vector<double>& records, std::int64_t first
   return sum;
 }
 
-/// Opens, does, closes. Throws SystemError with errno's words.
+/// Opens, calls, closes. Throws SystemError with the text of errno.
 void with_descriptor(const fs::path& file, int flags, const std::function<bool(int)>& work) {
   const int descriptor = ::open(file.c_str(), flags | O_CLOEXEC | ((flags & O_DIRECTORY) != 0 ? 0 : O_NOFOLLOW), 0666);
   const bool ok = descriptor >= 0 && work(descriptor);
@@ -95,14 +95,14 @@ int find_width(std::int64_t columns, std::int64_t group) {
 
 }  // namespace
 
-/// A file of all ranks, each with a descriptor of its own. Others may write to its folder: a new file is made by rank 0 alone, no link is
-/// followed, and every rank makes sure that it has opened that file. Making one and sync() are collective.
+/// A file shared by all ranks, each with its own descriptor. Others may write to its folder: rank 0 alone creates a new file, links are not
+/// followed, and every rank verifies that it has opened that file. Creation and sync() are collective.
 class SharedFile {
  public:
   enum class Use { create, read };
   SharedFile(const comm::Communicator& comm, const fs::path& file, Use use) : comm_(comm) {
     const bool creates = use == Use::create;
-    // A name without a folder is a file of this folder, and a link there was made by another program; what the user names may be one.
+    // A name without a folder is in the current folder, where another program may have made a link; a path given by the user may be a link.
     const int links = creates || !file.has_parent_path() ? O_NOFOLLOW : 0;
     comm.agree([&] {
       if (comm.is_root()) open(file, links | (creates ? O_WRONLY | O_CREAT | O_EXCL : O_RDONLY));
@@ -116,20 +116,20 @@ class SharedFile {
   SharedFile(const SharedFile&) = delete;
   SharedFile& operator=(const SharedFile&) = delete;
 
-  static constexpr const char* kReplaced = "another file has taken its name";
+  static constexpr const char* kReplaced = "its name now refers to another file";
 
   /// Local. Throws SystemError.
   void write(std::int64_t at, const void* bytes, std::size_t count) { move(at, count, true, static_cast<char*>(const_cast<void*>(bytes))); }
   void read(std::int64_t at, void* bytes, std::size_t count) { move(at, count, false, static_cast<char*>(bytes)); }
-  /// Synchronises this rank's writes to the disk. Local.
+  /// Syncs this rank's writes to the disk. Local.
   void flush() {
     if (::fsync(own_.descriptor) != 0) throw SystemError(std::strerror(errno));
   }
-  /// Synchronises all ranks' writes to the disk. Collective.
+  /// Syncs all ranks' writes to the disk. Collective.
   void sync() {
     comm_.agree([&] { flush(); });
   }
-  /// Whether `name` leads to this file, and is no link. Local.
+  /// True if `name` is this file and not a link. Local.
   bool has_name(const fs::path& name) const {
     struct stat info {};
     return ::lstat(name.c_str(), &info) == 0 && S_ISREG(info.st_mode) && info.st_ino == number_;
@@ -146,8 +146,8 @@ class SharedFile {
     locks_ = ::fstatfs(own_.descriptor, &system) == 0 && system.f_type == kNfs;
   }
 
-  /// Hosts that write to one page of a file on NFS lose each other's bytes unless each has locked its own. Where there are no locks, it
-  /// goes without.
+  /// Hosts that write to one page of a file on NFS lose each other's bytes unless each has locked its own. Continues without locks if
+  /// unsupported.
   void lock(std::int64_t at, std::size_t count, short kind) {
     struct flock range {};
     range.l_type = kind;
@@ -173,10 +173,10 @@ class SharedFile {
     }
     lock(at, count, F_UNLCK);
     if (error != 0) throw SystemError(std::strerror(error));
-    if (done < count) throw SystemError(writes ? "the disk takes no more" : "the file ends early");
+    if (done < count) throw SystemError(writes ? "the disk is full" : "the file ends early");
   }
 
-  static constexpr std::size_t kPiece = 32 << 20;  // bytes to or from the disk at once
+  static constexpr std::size_t kPiece = 32 << 20;  // bytes per disk access
   static constexpr long kNfs = 0x6969;             // statfs(2)
   comm::Communicator comm_;
   struct Own {
@@ -206,9 +206,9 @@ CheckpointFile::CheckpointFile(const comm::Communicator& comm, fs::path file, do
 
 CheckpointFile::~CheckpointFile() = default;
 
-/// Rank 0 only: what is wrong with the file, or nothing; an empty content where there is no file.
+/// Rank 0 only: the fault of the file, or nullopt; empty content if there is no file.
 std::string CheckpointFile::read_content(Content& content) const {
-  const int links = file_.has_parent_path() ? 0 : O_NOFOLLOW;  // as of SharedFile
+  const int links = file_.has_parent_path() ? 0 : O_NOFOLLOW;  // as SharedFile
   const int descriptor = ::open(file_.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC | links);
   if (descriptor < 0) return errno == ENOENT ? "" : std::string("it cannot be opened: ") + std::strerror(errno);
   struct Closer {
@@ -216,7 +216,7 @@ std::string CheckpointFile::read_content(Content& content) const {
     ~Closer() { ::close(descriptor); }
   } closer{descriptor};
   struct stat info {};
-  if (::fstat(descriptor, &info) != 0 || !S_ISREG(info.st_mode)) return "it is no regular file";
+  if (::fstat(descriptor, &info) != 0 || !S_ISREG(info.st_mode)) return "it is not a regular file";
   RawHeader header{};
   const auto read_all = [&](void* to, std::size_t size, std::int64_t at) {
     for (std::size_t done = 0; done < size;) {
@@ -228,14 +228,15 @@ std::string CheckpointFile::read_content(Content& content) const {
     return true;
   };
   if (!read_all(&header, sizeof header, 0)) return "it is too short";
-  if (std::memcmp(header.magic, kMagic, sizeof kMagic) != 0 || header.byte_order != kByteOrder) return "it is no checkpoint of this format";
+  if (std::memcmp(header.magic, kMagic, sizeof kMagic) != 0 || header.byte_order != kByteOrder)
+    return "it is not a checkpoint of this format";
   const auto within = [](std::int64_t value, std::int64_t max) { return value >= 0 && value <= max; };
   if (!within(header.rows, kMaxRows) || !within(header.columns, kMaxColumns) || !within(header.settings_bytes, kMaxText) ||
       !within(header.numbers_bytes, kMaxText))
     return "it is damaged";
   const std::int64_t data_at = find_data_start(header.settings_bytes, header.numbers_bytes);
   const auto total = static_cast<std::int64_t>(data_at + 24.0 * static_cast<double>(header.rows) * static_cast<double>(header.columns));
-  if (header.total_bytes != total || info.st_size != total) return "it is cut short or damaged";
+  if (header.total_bytes != total || info.st_size != total) return "it is truncated or damaged";
   std::string text(header.settings_bytes + header.numbers_bytes, '\0');
   if (!read_all(text.data(), text.size(), sizeof header) || seal(header, text) != header.sha256) return "it is damaged";
   const std::string version(header.version, strnlen(header.version, sizeof header.version));
@@ -268,7 +269,7 @@ void CheckpointFile::look() {
   content.system = sizes.system;
   content.numbers = comm_.broadcast(std::move(content.numbers));
   content.settings = comm_.broadcast(std::move(content.settings));
-  if (content.data_at == 0) return;  // there is none
+  if (content.data_at == 0) return;  // no file
   content_ = std::move(content);
   try {
     eigen::NumberReader from(content_.settings);
@@ -299,7 +300,7 @@ void CheckpointFile::begin(const Setting& setting, const Fingerprint& system, co
   host_.log(fmt::format("resumes from {}", file_.string()));
 }
 
-/// Whether the columns are what they were.
+/// True if the columns are unchanged.
 std::string CheckpointFile::verify() {
   if (content_.rows != order_->all()) return "it is of another mesh";
   std::uint64_t sum = 0;
@@ -348,7 +349,7 @@ void CheckpointFile::read_columns(std::int64_t first, const eigen::Columns& into
   }
 }
 
-/// Warns why the file is not resumed from, and renames it, so that its owner can still use it.
+/// Warns of the reason why the file is not used, and renames it, so that its owner keeps it.
 void CheckpointFile::set_aside(const std::string& why) {
   is_there_ = false;
   checkpoint_.numbers.clear();
@@ -363,7 +364,7 @@ void CheckpointFile::set_aside(const std::string& why) {
 }
 
 bool CheckpointFile::save(const std::string& numbers, const std::vector<eigen::Columns>& columns) {
-  if (is_ahead()) return true;  // The file is of a later setting: keep it.
+  if (is_ahead()) return true;  // the file is of a later setting: keep it
   const petsc::WorkScope scope(petsc::WorkPhase::kWrite);
   const auto start = Clock::now();
   std::string trouble;
@@ -375,7 +376,7 @@ bool CheckpointFile::save(const std::string& numbers, const std::vector<eigen::C
   last_save_ = Clock::now();
   save_seconds_ = std::chrono::duration<double>(last_save_ - start).count();
   if (trouble.empty()) {
-    is_there_ = false;  // The content of the former run is replaced.
+    is_there_ = false;  // the content of the former run is replaced
     was_saved_ = true;
     last_trouble_.clear();
     return true;
@@ -395,7 +396,7 @@ void CheckpointFile::write(const std::string& numbers, const std::vector<eigen::
   RawHeader header{};
   std::string text;
   comm_.agree([&] {
-    if (comm_.is_root()) ::unlink(temporary_.c_str());  // of a run that was killed
+    if (comm_.is_root()) ::unlink(temporary_.c_str());  // of a killed run
   });
   eigen::NumberWriter settings;
   settings.add(static_cast<std::int64_t>(settings_.size()));
@@ -429,15 +430,15 @@ void CheckpointFile::write(const std::string& numbers, const std::vector<eigen::
     const fs::path folder = base::find_folder(file_);
     try {
       with_descriptor(folder, O_RDONLY | O_DIRECTORY, [](int descriptor) { return ::fsync(descriptor) == 0; });
-    } catch (const SystemError&) {  // Some file systems cannot; the name is there.
+    } catch (const SystemError&) {  // unsupported by some file systems; the name is in place
     }
   });
 }
 
-/// Every rank its stretch of every group. Returns the sum of all records. Throws SystemError on every rank.
+/// Every rank writes its range of every group. Returns the sum of all record hashes. Throws SystemError on every rank.
 std::uint64_t CheckpointFile::write_columns(SharedFile& file, std::int64_t data_at, std::int64_t count,
                                             const std::vector<eigen::Columns>& columns) const {
-  std::vector<const double*> all;  // where each column begins
+  std::vector<const double*> all;  // start of each column
   for (const eigen::Columns& part : columns)
     for (int j = 0; j < part.count; ++j) all.push_back(part.column(j));
   NodeOrder::Room room;
@@ -448,7 +449,7 @@ std::uint64_t CheckpointFile::write_columns(SharedFile& file, std::int64_t data_
     const int width = find_width(count, group);
     order_->to_records({all.data() + group * kGroup, static_cast<std::size_t>(width)}, room);
     sum += sum_records(room.records, order_->first(), static_cast<int>(group), width);
-    if (trouble) continue;  // The others wait for what this rank sends.
+    if (trouble) continue;  // the others wait for data of this rank
     try {
       file.write(find_place(data_at, group, width), room.records.data(), room.records.size() * sizeof(double));
     } catch (...) {

@@ -19,39 +19,39 @@ namespace carillon::io {
 
 class SharedFile;
 
-/// What a checkpoint file asks of the run that it belongs to, and reports to it. None may be empty.
+/// Callbacks to the run. None may be empty.
 struct CheckpointHost {
-  std::function<void(const std::string&)> log, warn;  // one line; on every rank, printed on rank 0
+  std::function<void(const std::string&)> log, warn;  // one line; called on every rank, printed on rank 0
   std::function<bool()> is_stop_requested;            // by a signal to this process; local
-  std::function<void(bool)> set_unsaved;              // whether a save would keep something new; local
+  std::function<void(bool)> set_unsaved;              // presence of unsaved work; local
 };
 
-/// One file for one run: a header, the settings that the run tried, the numbers of the solve, and its columns in the order of the mesh's
-/// nodes, written and read by all ranks at once (pwrite, pread). docs/decisions/checkpoint.md has the layout. It appears whole or not at
-/// all: the old one stays until the new one is on the disk. A file that is damaged or of another job, mesh or version is warned of in one
-/// line and renamed to <file>.aside. Everything is collective unless it says otherwise.
+/// One file per run: a header, the settings tried, the numbers of the solve, and its columns in the order of the mesh's nodes, written and
+/// read by all ranks at once (pwrite, pread). Layout: docs/decisions/checkpoint.md. Replaced atomically: the old file stays until the new
+/// one is on the disk. A file that is damaged or of another job, mesh or version gives a one-line warning and is renamed to <file>.aside.
+/// Collective unless stated otherwise.
 class CheckpointFile {
  public:
-  /// job: fingerprint of what is asked for and of who solves. Looks at the file, if there is one.
+  /// job: fingerprint of the job and the program. Reads the file if it exists.
   CheckpointFile(const comm::Communicator& comm, std::filesystem::path file, double every_s, const Fingerprint& job, CheckpointHost host);
   ~CheckpointFile();
   CheckpointFile(const CheckpointFile&) = delete;
   CheckpointFile& operator=(const CheckpointFile&) = delete;
 
-  /// The setting that the saved run tried after `trials` others; null: unknown.
+  /// Setting that the saved run tried after `trials` others; null: unknown.
   const Setting* find_setting(std::size_t trials) const;
-  /// A solve begins: of this setting and system, the nodes as they lie on the ranks. Until it ends, get() may be used.
+  /// Begins a solve of this setting and system, with the nodes of this rank. get() is valid until end().
   void begin(const Setting& setting, const Fingerprint& system, const mesh::LocalMesh& local);
   eigen::Checkpoint& get() { return checkpoint_; }
-  /// The solve is over; what comes next belongs to another.
+  /// Ends the solve.
   void end();
-  /// The requests of all ranks, combined.
+  /// Combined requests of all ranks.
   eigen::CheckpointRequest vote() const;
-  /// No more requests to stop are honoured: the run is about to end.
+  /// Ignores stop requests from now on: the run is about to end.
   void finish();
   /// Removes the file: the bank is complete.
   void remove();
-  /// Whether this run has saved something.
+  /// True if this run has saved.
   bool was_saved() const { return was_saved_; }
 
  private:
@@ -83,15 +83,15 @@ class CheckpointFile {
   double every_s_;
   Fingerprint job_;
   CheckpointHost host_;
-  bool is_there_ = false;               // the file can be resumed from by this job,
-  Content content_;                     // which is this,
-  std::vector<Setting> kept_settings_;  // and what was tried before it, itself the last
-  std::vector<Setting> settings_;       // the same of this run
+  bool is_there_ = false;               // the file is valid for this job,
+  Content content_;                     // its content,
+  std::vector<Setting> kept_settings_;  // and the settings that it tried, the last one included
+  std::vector<Setting> settings_;       // of this run
   Fingerprint system_{};
   std::unique_ptr<NodeOrder> order_;
   eigen::Checkpoint checkpoint_;
   std::chrono::steady_clock::time_point last_save_;
-  double save_seconds_ = 0;  // what the last save took
+  double save_seconds_ = 0;  // duration of the last save
   bool was_saved_ = false;
   std::string last_trouble_;
 };

@@ -1,7 +1,7 @@
-// Method:     What lies on one rank or is the same on all goes through SHA-256. Nodes and elements lie where the partition put them: each
-//             is mixed to 64 bits by itself, its number in the mesh included, and their sum does not depend on the order.
-// Source:     Bellare, Micciancio, A new paradigm for collision-free hashing, EUROCRYPT 1997 (sums). FIPS 180-4 (SHA-256).
-// Deviations: the sums guard against mistakes and damage; two meshes with the same sum can be made on purpose.
+// Method: SHA-256 for data on one rank or equal on all. Nodes and elements are distributed: each is hashed to 64 bits with its number in
+//   the mesh, and the sum is independent of the partition.
+// Source: Bellare, Micciancio, A new paradigm for collision-free hashing, EUROCRYPT 1997 (sums). FIPS 180-4 (SHA-256).
+// Deviations: the sums guard against mistakes and damage, not against deliberate collisions.
 #include "precompute/run/io/fingerprint.hpp"
 
 #include <bit>
@@ -51,7 +51,7 @@ Fingerprint find_job_fingerprint(const job::JobSpec& job, const std::vector<std:
 
 Fingerprint find_system_fingerprint(const comm::Communicator& comm, const Fingerprint& job, const Setting& setting,
                                     const mesh::LocalMesh& local) {
-  std::array<std::uint64_t, 4> sums{};  // of nodes, of elements; how many
+  std::array<std::uint64_t, 4> sums{};  // of nodes, of elements; counts
   for (std::int32_t i = 0; i < local.owned_nodes; ++i) {
     const std::size_t at = i;
     Mixer node(static_cast<std::uint64_t>(local.node_in_mesh[at]));

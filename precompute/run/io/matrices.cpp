@@ -1,6 +1,5 @@
-// Method:     Every rank writes the lower triangle of its rows as text, a piece at a time; rank 0 puts the pieces into the file.
-// Source:     Boisvert, Pozo, Remington, The Matrix Market exchange formats, NISTIR 5935, 1996.
-// Deviations: none.
+// Method: every rank formats the lower triangle of its rows in pieces; rank 0 writes them to the file.
+// Source: Boisvert, Pozo, Remington, The Matrix Market exchange formats, NISTIR 5935, 1996.
 #include "precompute/run/io/matrices.hpp"
 
 #include <fmt/core.h>
@@ -16,8 +15,8 @@
 #include <string>
 #include <vector>
 
-#include "precompute/run/io/node_order.hpp"
 #include "precompute/petsc/session.hpp"
+#include "precompute/run/io/node_order.hpp"
 #include "runtime/base/file.hpp"
 
 namespace carillon::io {
@@ -31,7 +30,7 @@ constexpr std::size_t kPieceBytes = std::size_t{1} << 22;
 /// Appends the next piece of this rank's text; an empty one is the last.
 using NextPiece = std::function<void(std::string& piece)>;
 
-/// The pieces of rank 0, then those of rank 1 and so on, in one file. Collective; fails on all ranks alike.
+/// Writes the pieces of rank 0, then those of rank 1 and so on, to one file. Collective; fails on all ranks alike.
 void write_in_turn(const comm::Communicator& comm, const fs::path& file, const std::string& head, const NextPiece& next_piece) {
   const int rank = comm.rank();
   std::exception_ptr error;
@@ -71,7 +70,7 @@ void write_in_turn(const comm::Communicator& comm, const fs::path& file, const s
   });
 }
 
-/// By row of K and M in nodes: the place of the node among the free nodes in the order of the mesh. The same on every rank.
+/// For each node row of K and M: index of the node among the free nodes in mesh order. The same on every rank.
 std::vector<std::int32_t> find_places(const comm::Communicator& comm, const mesh::LocalMesh& local) {
   const auto in_mesh =
       comm.all_gather([&] { return std::vector(local.node_in_mesh.begin(), local.node_in_mesh.begin() + local.free_nodes); });
@@ -82,7 +81,7 @@ std::vector<std::int32_t> find_places(const comm::Communicator& comm, const mesh
   return places;
 }
 
-/// Calls visit(row, column, value) for what of one row of the matrix is in the lower triangle, in the order of the mesh and from 1 on.
+/// Calls visit(row, column, value) for the lower-triangle entries of a row, in mesh order, counted from 1.
 template <class Visit>
 void visit_row(Mat matrix, PetscInt row, const std::vector<std::int32_t>& places, Visit&& visit) {
   const auto find = [&](PetscInt i) { return 3 * static_cast<std::int64_t>(places[i / 3]) + i % 3 + 1; };

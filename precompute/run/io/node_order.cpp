@@ -1,6 +1,5 @@
-// Method:     Numbers of nodes are cut into as many stretches as there are ranks; each rank sorts those that come into its own, and
-//             remembers who sent which. The same ways serve all columns.
-// Source:     none. Deviations: none.
+// Method: node numbers are cut into one range per rank; each rank sorts the nodes of its range and stores their senders. The same exchange
+//   serves all columns.
 #include "precompute/run/io/node_order.hpp"
 
 #include <algorithm>

@@ -18,13 +18,13 @@ base::Descriptor open_to_append(const std::filesystem::path& file) {
   const auto refuse = [&](const char* why) -> InputError {
     return InputError(fmt::format("{}: the progress file cannot be written: {}; give another with --progress", file.string(), why));
   };
-  // O_NONBLOCK: a pipe without a reader would block open(). A name without a folder is a file of this folder, where another user may have
-  // put a link.
+  // O_NONBLOCK: a pipe without a reader would block open(). A name without a folder is in the current folder, where another user may have
+  // made a link.
   const int links = file.has_parent_path() ? 0 : O_NOFOLLOW;
   base::Descriptor descriptor(::open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC | O_NONBLOCK | O_NOCTTY | links, 0666));
   if (descriptor.get() < 0) throw refuse(std::strerror(errno));
   struct stat info {};
-  if (::fstat(descriptor.get(), &info) != 0 || !(S_ISREG(info.st_mode) || S_ISCHR(info.st_mode))) throw refuse("it is no regular file");
+  if (::fstat(descriptor.get(), &info) != 0 || !(S_ISREG(info.st_mode) || S_ISCHR(info.st_mode))) throw refuse("not a regular file");
   return descriptor;
 }
 

@@ -1,4 +1,4 @@
-// The file of --progress: one JSON object a line, which others read during the run.
+// The file of --progress: JSON lines, read by others during the run.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace carillon::io {
 
-/// What a line says. Unknown members are left out.
+/// One line. Unknown members are omitted.
 struct ProgressLine {
   std::string phase;
   double percent = 0;  // of the whole run
@@ -23,15 +23,15 @@ struct ProgressLine {
 /// {"phase": "factor", "percent": 31.40, "modes_done": 0, "modes_wanted": 228, "seconds_left": 8.1, "seconds": 3.70} and a line break.
 std::string format_progress(const ProgressLine& line);
 
-/// Appends whole lines, each by one write(2), so that a reader never sees a line of two runs mixed. A line equal to the one before, but for
-/// its times, is left out. Not thread-safe.
+/// Appends whole lines, each by one write(2), so that lines of two runs never mix. A line that differs from the last one only in its times
+/// is skipped. Not thread-safe.
 class ProgressFile {
  public:
-  /// Throws InputError when the file is no regular file or character device, or cannot be appended to. A name without a folder may be no
+  /// Throws InputError if the file is not a regular file or character device, or cannot be opened. A name without a folder must not be a
   /// symbolic link.
   explicit ProgressFile(const std::filesystem::path& file);
 
-  /// False when the disk refuses for the first time; errno says why. Later lines are dropped.
+  /// False at the first failed write; errno has the reason. Later lines are dropped.
   bool append(const ProgressLine& line);
 
  private:

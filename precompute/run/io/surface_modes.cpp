@@ -1,7 +1,6 @@
-// Method: rank 0 sends each rank its rows on the surface and hands out the outer triangles; what a triangle needs of another
-//   rank's rows is fetched once per block of modes. A block is read from the columns once: its largest components give the steps (maximum
-//   over the ranks), its flow through the triangles the gains (sum over the ranks). Rank 0 then takes the steps, one rank after the other.
-// Source: none needed; the flow is that of runtime/bank/radiation_gain.hpp. Deviations: none.
+// Method: rank 0 sends each rank its surface rows and distributes the outer triangles; values at other ranks' rows are exchanged once per
+//   block of modes. A block is read from the columns once: its largest components give the steps (maximum over the ranks), its flow through
+//   the triangles the gains (sum over the ranks). Rank 0 then receives the steps from one rank after the other.
 #include "precompute/run/io/surface_modes.hpp"
 
 #include <fmt/core.h>
@@ -16,8 +15,8 @@ namespace carillon::io {
 namespace {
 
 constexpr int kStepsTag = 12;
-constexpr std::size_t kBlock = 16;                       // modes at a time: a row of them fills whole cache lines
-constexpr std::size_t kMessage = std::size_t{32} << 20;  // steps of one message
+constexpr std::size_t kBlock = 16;                       // modes at a time: a row fills whole cache lines
+constexpr std::size_t kMessage = std::size_t{32} << 20;  // bytes of steps per message
 
 /// Triangle of rows: corners as rows of the shapes (-1: at rest), twice the area times the normal.
 struct Panel {
@@ -43,12 +42,12 @@ class SurfaceWork {
   std::size_t modes_ = 0;
   comm::IndexPartition owners_;  // of the rows of nodes
 
-  std::vector<std::size_t> vertex_;  // rank 0: (free surface vertices) by ascending row, which is by rank
-  std::vector<int> vertex_count_;    // rank 0: of each rank
+  std::vector<std::size_t> vertex_;  // rank 0: (free surface vertices) by ascending row, hence by rank
+  std::vector<int> vertex_count_;    // rank 0: per rank
   std::size_t vertices_ = 0;         // rank 0: V, fixed ones included
   double area_m2_ = 0.0;
 
-  std::vector<std::int32_t> rows_;              // own rows on the surface, ascending, then rows of others that panels need
+  std::vector<std::int32_t> rows_;              // own surface rows, ascending, then the panels' rows of other ranks
   std::size_t own_ = 0;                         // of rows_
   std::vector<Panel> panels_;                   // their rows index rows_
   comm::HaloExchange halo_;                     // values at the rows of others
@@ -110,7 +109,7 @@ void SurfaceWork::deal(const Surface& surface) {
   area_m2_ = comm_.broadcast(area_m2_);
 }
 
-/// Finds the rows of others that panels need, and turns rows into indices.
+/// Finds the panels' rows of other ranks, and converts rows to indices.
 void SurfaceWork::find_halo() {
   const auto find_place = [&](std::int32_t row) {
     const auto begin = owners_.is_own(row) ? rows_.begin() : rows_.begin() + static_cast<std::ptrdiff_t>(own_);
@@ -137,7 +136,7 @@ void SurfaceWork::find_halo() {
   halo_ = comm::HaloExchange(comm_, halo, find_place);
 }
 
-/// Copies `count` columns from `mode` on at the own rows and keeps their largest components.
+/// Copies `count` columns from `mode` on at the own rows and updates their largest components.
 void SurfaceWork::load(std::size_t mode, std::size_t count) {
   PetscInt leading = 0;
   const double* array = nullptr;
@@ -155,7 +154,7 @@ void SurfaceWork::load(std::size_t mode, std::size_t count) {
     for (std::size_t k = 0; k < count; ++k) {
       const double size = std::abs(values_[i * kBlock + k]);
       double& largest = largest_[mode + k];
-      largest = std::isnan(largest) || size <= largest ? largest : size;  // a NaN comes in and stays
+      largest = std::isnan(largest) || size <= largest ? largest : size;  // keeps a NaN
     }
 }
 
@@ -184,7 +183,7 @@ void SurfaceWork::quantise(std::size_t mode, std::size_t count) {
     }
 }
 
-/// Rank 0 puts the steps of all ranks in the order of its vertices; fixed ones rest.
+/// Rank 0 orders the steps of all ranks by its vertices; fixed ones are 0.
 std::vector<std::int16_t> SurfaceWork::collect() {
   const std::size_t row = modes_ * 3;
   const std::size_t rows_at_a_time = std::max<std::size_t>(1, kMessage / row);

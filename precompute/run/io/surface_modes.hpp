@@ -1,4 +1,4 @@
-// Modes as a bank keeps them: shapes on the surface as 16-bit steps, and how loud each mode is.
+// Modes in the bank's form: 16-bit shapes on the surface, and radiation gains.
 #pragma once
 
 #include <petscmat.h>
@@ -17,7 +17,7 @@ namespace carillon::io {
 struct Surface {
   std::vector<Vec3> vertices_m;     // (V) in the order of the mesh's nodes
   std::vector<Triangle> triangles;  // (T) of vertices, counter-clockwise from outside
-  std::vector<std::int32_t> row;    // (V) r stands for the rows 3 r, 3 r + 1, 3 r + 2 of the shapes; -1: fixed, at rest
+  std::vector<std::int32_t> row;    // (V) r: rows 3 r, 3 r + 1, 3 r + 2 of the shapes; -1: fixed
 };
 
 struct SurfaceModes {

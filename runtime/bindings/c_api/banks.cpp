@@ -7,12 +7,12 @@
 #include <string>
 #include <vector>
 
-#include "runtime/bindings/c_api/calls.hpp"
-#include "runtime/bindings/c_api/structures.hpp"
+#include "runtime/acoustics/radiation/gains.hpp"
 #include "runtime/bank/corrected.hpp"
 #include "runtime/bank/edits.hpp"
-#include "runtime/acoustics/radiation/gains.hpp"
 #include "runtime/bank/mounting/losses.hpp"
+#include "runtime/bindings/c_api/calls.hpp"
+#include "runtime/bindings/c_api/structures.hpp"
 
 namespace carillon::c_api {
 
@@ -33,7 +33,7 @@ carillon_edits make_default() {
 
 namespace {
 
-/// For the acceleration noise of the body; 0 for a surface without an inside.
+/// Radius for acceleration noise; 0 for an open surface.
 double find_sphere_radius_m(const bank::Bank& bank) {
   try {
     return radiation::calc_sphere_radius_m(bank);
@@ -174,7 +174,7 @@ carillon_status carillon_model_make(const carillon_bank* bank, const carillon_mo
   return run(message, message_size, [&] {
     const radiation::GainKind kind = radiation::choose_gain_kind(bank->bank, kKinds[ours->radiation]);
     std::vector<double> gains = radiation::calc_gains(bank->bank, kind);
-    // The losses by the bank's own supports; a bank without losses is not copied.
+    // Support losses of the bank; a bank without losses is not copied.
     std::optional<bank::Bank> mounted;
     if (const mounting::Losses losses = mounting::calc_losses(bank->bank, {}); !losses.is_empty())
       mounting::apply(losses, mounted.emplace(bank->bank));

@@ -1,4 +1,4 @@
-// Calls of the C interface: opaque handles around the C++ classes; exceptions end here as a status and a message.
+// Calls of the C interface: opaque handles to C++ classes; exceptions become a status and a message.
 #pragma once
 
 #include <algorithm>
@@ -13,11 +13,11 @@
 #include <string_view>
 #include <utility>
 
-#include "runtime/bindings/c_api/carillon.h"
 #include "runtime/bank/bank.hpp"
 #include "runtime/bank/nearest.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/vector.hpp"
+#include "runtime/bindings/c_api/carillon.h"
 #include "runtime/events/events.hpp"
 #include "runtime/synth/load_keeper.hpp"
 #include "runtime/synth/model.hpp"
@@ -27,7 +27,7 @@ struct carillon_bank {
   explicit carillon_bank(carillon::bank::Bank given) : bank(std::move(given)) {}
   carillon::bank::Bank bank;
 
-  /// Made by the first call. Throws std::bad_alloc.
+  /// Created by the first call. Throws std::bad_alloc.
   const carillon::bank::SurfaceTree& get_tree() const {
     const carillon::bank::SurfaceTree* made = ready.load(std::memory_order_acquire);
     if (made != nullptr) return *made;
@@ -60,7 +60,7 @@ inline void write_message(std::string_view text, char* message, size_t message_s
   message[length] = '\0';
 }
 
-/// Runs `work`; the status and message of its exception.
+/// Runs `work` and translates exceptions to status and message.
 template <typename Work>
 carillon_status run(char* message, size_t message_size, Work&& work) noexcept {
   try {

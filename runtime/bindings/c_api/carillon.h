@@ -1,12 +1,12 @@
-/* Carillon for programs in C, and for those of other languages and compilers: a scene of bodies that ring, played block by block.
+/* C interface of Carillon, also for other languages and compilers: a scene of ringing bodies, rendered block by block.
  *
  * Every structure begins with its own size: set it with the *_init macro, and programs built against this header continue to work with
  * later libraries, which add fields at the end only. (Other languages call the *_init_sized function with the size of the structure as they
  * know it.) Functions that can fail return a status, and write a message of at most message_size bytes, zero included, when `message` is
- * not NULL; what they were to make is then NULL and nothing has changed. Pointers must not be NULL unless it says so; NULL gives
+ * not NULL; their output is then NULL and nothing has changed. Pointers must not be NULL unless stated; NULL gives
  * CARILLON_BAD_ARGUMENT.
  *
- * Threads: [main] one thread at a time; [audio] one thread at a time, never waits, takes no memory, makes no system call; [any] any thread
+ * Threads: [main] one thread at a time; [audio] one thread at a time, never waits, allocates or makes a system call; [any] any thread
  * at any time, never waits. Units are SI; vectors x y z. */
 #ifndef CARILLON_H
 #define CARILLON_H
@@ -24,11 +24,11 @@
 extern "C" {
 #endif
 
-/* Grows with every function and field that is added. The number in the name of libcarillon.so.2 is another one, which changes only when
- * programs would have to be compiled again. */
+/* Incremented with every added function or field. The number in the name of libcarillon.so.2 differs: it changes only when
+ * programs must be recompiled. */
 #define CARILLON_ABI_VERSION 10
 
-/* That of the library. */
+/* ABI version of the library. */
 CARILLON_API uint32_t carillon_abi_version(void);
 
 typedef enum carillon_status {
@@ -46,42 +46,42 @@ typedef struct carillon_bank carillon_bank;
 typedef struct carillon_model carillon_model;
 typedef struct carillon_synth carillon_synth;
 
-/* ---- Banks: what carillon-precompute writes. [any], not on an audio thread. */
+/* ---- Banks, as written by carillon-precompute. [any], not on an audio thread. */
 
 typedef enum carillon_frequencies {
-  CARILLON_FREQUENCIES_CORRECTED = 0, /* the mesh's with its estimated error taken off; as they are where the bank has no others */
-  CARILLON_FREQUENCIES_MESH = 1       /* those of the mesh that was solved */
+  CARILLON_FREQUENCIES_CORRECTED = 0, /* with the estimated mesh error removed; uncorrected if the bank has none */
+  CARILLON_FREQUENCIES_MESH = 1       /* frequencies of the mesh */
 } carillon_frequencies;
 
 /* Reads a bank, with its corrected frequencies. Files are untrusted: a damaged one gives CARILLON_BAD_INPUT. */
 CARILLON_API carillon_status carillon_bank_open(const char* file, carillon_bank** bank, char* message, size_t message_size);
-/* The same from memory, which is not needed afterwards. */
+/* The same from memory, which may be freed afterwards. */
 CARILLON_API carillon_status carillon_bank_parse(const void* bytes, size_t size, carillon_bank** bank, char* message, size_t message_size);
-/* Both with the frequencies that are asked for: a carillon_frequencies. Modes are in their ascending order. */
+/* Both with a choice of carillon_frequencies. Modes are in ascending order of them. */
 CARILLON_API carillon_status carillon_bank_open_as(const char* file, int32_t frequencies, carillon_bank** bank, char* message,
                                                    size_t message_size);
 CARILLON_API carillon_status carillon_bank_parse_as(const void* bytes, size_t size, int32_t frequencies, carillon_bank** bank,
                                                     char* message, size_t message_size);
-/* NULL is allowed. Models that were made of the bank stay. */
+/* NULL is allowed. Models made from the bank remain valid. */
 CARILLON_API void carillon_bank_close(carillon_bank* bank);
 CARILLON_API int32_t carillon_bank_mode_count(const carillon_bank* bank);
 CARILLON_API int32_t carillon_bank_triangle_count(const carillon_bank* bank);
-/* The undamped frequency [Hz] of a mode, 0 when there is no such mode. */
+/* The undamped frequency [Hz] of a mode, 0 for an unknown mode. */
 CARILLON_API double carillon_bank_frequency_hz(const carillon_bank* bank, int32_t mode);
 
-/* The surface, in the frame of the body's mesh, in which strikes are given. It belongs to the bank and stays until it is closed. NULL for a
+/* The surface, in the frame of the body's mesh, as used by strikes. Valid until the bank is closed. NULL for a
  * NULL bank. */
 CARILLON_API int32_t carillon_bank_vertex_count(const carillon_bank* bank);
-/* x y z [m] of one vertex after the other: 3 * carillon_bank_vertex_count numbers. */
+/* x y z [m] per vertex: 3 * carillon_bank_vertex_count numbers. */
 CARILLON_API const double* carillon_bank_vertices_m(const carillon_bank* bank);
-/* The corners of one triangle after the other, counter-clockwise from outside: 3 * carillon_bank_triangle_count indices of vertices, the
- * first of which is 0. */
+/* Three vertices per triangle, counter-clockwise from outside: 3 * carillon_bank_triangle_count indices, starting
+ * at 0. */
 CARILLON_API const int32_t* carillon_bank_triangles(const carillon_bank* bank);
-/* The centre of mass in that frame, which carillon_motion moves about the world. Zeros for a NULL bank. */
+/* The centre of mass in that frame; carillon_motion gives its position in the world. Zeros for a NULL bank. */
 CARILLON_API void carillon_bank_centre_m(const carillon_bank* bank, double centre_m[3]);
-/* What physics needs of the body. `inertia_kg_m2` is about the centre of mass, row by row, in the axes of the mesh. Of a body of several
- * materials, or of one that is not the same in all directions, the moduli are those of its isotropic equivalent, and the density is mass
- * over volume. Zeros where the bank does not know: bodies with known modes may have no volume. */
+/* Data for rigid-body physics. `inertia_kg_m2` is about the centre of mass, row by row, in the axes of the mesh. For a body of several
+ * materials, or an anisotropic one, the moduli are those of its isotropic equivalent, and the density is mass
+ * over volume. Unknown values are 0: bodies with known modes may have no volume. */
 typedef struct carillon_body_facts {
   uint32_t size;
   uint32_t reserved;
@@ -97,15 +97,15 @@ typedef struct carillon_body_facts {
 CARILLON_API void carillon_body_facts_init_sized(carillon_body_facts* facts, size_t size);
 /* `facts->size` must be set. */
 CARILLON_API carillon_status carillon_bank_get_facts(const carillon_bank* bank, carillon_body_facts* facts);
-/* The place on the surface that is nearest to a point [m], as carillon_impulse and carillon_contact take it: the triangle and the
- * barycentric coordinates of its corners. closest_m, the place itself, and distance_m may be NULL. O(log triangles). [any], several at
- * once; the first call of a bank makes a tree, which takes memory and 0.2 to 0.5 ms for 1,000 triangles, and others wait for it:
- * call it once before an audio thread does, and from then on it never waits and takes no memory. CARILLON_BAD_INPUT for a point that is
+/* The surface point nearest to a point [m], as used by carillon_impulse and carillon_contact: triangle and
+ * barycentric coordinates. closest_m, the point itself, and distance_m may be NULL. O(log triangles). [any], several at
+ * once; the first call for a bank builds a tree, which allocates and takes 0.2 to 0.5 ms for 1,000 triangles, and others wait for it:
+ * call it once before an audio thread does; later calls neither wait nor allocate. CARILLON_BAD_INPUT for a point that is
  * not finite or further than 1e100 m: triangle is then -1. */
 CARILLON_API carillon_status carillon_bank_nearest_point(const carillon_bank* bank, const double point_m[3], int32_t* triangle,
                                                          double barycentric[3], double closest_m[3], double* distance_m);
 
-/* Another density, stiffness, size or damping of a body, without a solve. */
+/* Changes density, stiffness, size or damping of a body without a solve. */
 typedef struct carillon_edits {
   uint32_t size;
   int32_t sets_damping;   /* not 0: Rayleigh damping of alpha1_s, alpha2_per_s in place of the bank's law */
@@ -116,19 +116,19 @@ typedef struct carillon_edits {
   double alpha2_per_s;
 } carillon_edits;
 
-/* All scales 1, the damping as it is. */
+/* All scales 1, damping unchanged. */
 #define carillon_edits_init(edits) carillon_edits_init_sized((edits), sizeof(carillon_edits))
 CARILLON_API void carillon_edits_init_sized(carillon_edits* edits, size_t size);
 /* The bank of the edited body. CARILLON_BAD_INPUT for scales out of range, alphas below 0, and bodies of several materials. */
 CARILLON_API carillon_status carillon_bank_edit(const carillon_bank* bank, const carillon_edits* edits, carillon_bank** edited,
                                                 char* message, size_t message_size);
 
-/* ---- Models: a bank made ready for a sample rate. [any], not on an audio thread. */
+/* ---- Models: a bank prepared for a sample rate. [any], not on an audio thread. */
 
 typedef enum carillon_radiation {
-  CARILLON_RADIATION_SPHERE = 0, /* as if the body's surface lay on a sphere */
-  CARILLON_RADIATION_OSG02 = 1,  /* of a pulsating sphere: the bank's own gains (O'Brien, Shen, Gatchalian 2002) */
-  CARILLON_RADIATION_BEM = 2,    /* of the bank's multipoles; CARILLON_BAD_INPUT where it has none */
+  CARILLON_RADIATION_SPHERE = 0, /* radiation of an equivalent sphere */
+  CARILLON_RADIATION_OSG02 = 1,  /* pulsating sphere: the bank's gains (O'Brien, Shen, Gatchalian 2002) */
+  CARILLON_RADIATION_BEM = 2,    /* the bank's multipoles; CARILLON_BAD_INPUT without */
   CARILLON_RADIATION_AUTO = 3    /* CARILLON_RADIATION_BEM for a bank with multipoles, CARILLON_RADIATION_SPHERE for others */
 } carillon_radiation;
 
@@ -143,7 +143,7 @@ typedef struct carillon_model_options {
 CARILLON_API void carillon_model_options_init_sized(carillon_model_options* options, size_t size);
 CARILLON_API carillon_status carillon_model_make(const carillon_bank* bank, const carillon_model_options* options, carillon_model** model,
                                                  char* message, size_t message_size);
-/* NULL is allowed. Bodies that play the model keep it. */
+/* NULL is allowed. Bodies keep the model they play. */
 CARILLON_API void carillon_model_release(carillon_model* model);
 /* Modes below the Nyquist frequency. */
 CARILLON_API int32_t carillon_model_mode_count(const carillon_model* model);
@@ -153,37 +153,37 @@ CARILLON_API int32_t carillon_model_mode_count(const carillon_model* model);
 typedef struct carillon_options {
   uint32_t size;
   int32_t max_bodies;
-  int32_t max_strikes; /* that a body may have waiting or acting at once */
-  int32_t ring_events; /* that may wait between two blocks */
+  int32_t max_strikes; /* per body, waiting or active */
+  int32_t ring_events; /* event capacity between two blocks */
   double rate_hz;
-  double longest_m; /* bodies further away are not heard */
+  double longest_m; /* maximum audible distance */
   double listener_m[3];
   const double (*microphones_m)[3]; /* from the listener, axes of the world; NULL: two ears 20 cm apart along x */
   int32_t microphone_count;
-  int32_t max_waypoints;     /* of a body's way that are remembered */
+  int32_t max_waypoints;     /* stored per body */
   double budget;             /* carillon_set_budget */
-  double ground_roughness_m; /* rms height of what contacts touch whose other body is none */
+  double ground_roughness_m; /* rms height of the ground, for contacts without another body */
   double ground_friction;    /* Coulomb */
   double head_radius_m;  /* of a head in the middle of two microphones, left and right, for CARILLON_HEAD: a rigid sphere with ears, upright
-                            (z) as long as the listener is not turned; 0.03 to 0.3, of an average head 0.0875; 0: none */
+                            (z) unless the listener is rotated; 0.03 to 0.3, of an average head 0.0875; 0: none */
   double floor_height_m; /* z of a rigid floor, for CARILLON_GROUND_REFLECTION; bodies and microphones are above */
-  double floor_reflection; /* the share of the pressure that it throws back, 0..1; 0: there is no floor */
+  double floor_reflection; /* reflected share of the pressure, 0..1; 0: no floor */
 } carillon_options;
 
-/* 48 kHz, two ears, 64 bodies, 64 strikes a body, 4096 events, 60 m, 64 waypoints, no limit to the work, smooth concrete, no head, no
+/* 48 kHz, two ears, 64 bodies, 64 strikes a body, 4096 events, 60 m, 64 waypoints, unlimited work, smooth concrete, no head, no
  * floor. */
 #define carillon_options_init(options) carillon_options_init_sized((options), sizeof(carillon_options))
 CARILLON_API void carillon_options_init_sized(carillon_options* options, size_t size);
 
 /* [main] */
 CARILLON_API carillon_status carillon_create(const carillon_options* options, carillon_synth** synth, char* message, size_t message_size);
-/* [main], once no other thread uses it. NULL is allowed. */
+/* [main], no other thread may use it. NULL is allowed. */
 CARILLON_API void carillon_destroy(carillon_synth* synth);
-/* [main] A new body at a place, heard from the next 128 frames on; its number, which events name. */
+/* [main] Adds a body, audible from the next 128 frames on; events use its number. */
 CARILLON_API carillon_status carillon_add_body(carillon_synth* synth, const carillon_model* model, const double position_m[3],
                                                int32_t* body, char* message, size_t message_size);
 
-/* What a body does; a set of them is their sum. docs/howto/scene-files.md says what each is. */
+/* Effects of a body, combined as a sum; described in docs/howto/scene-files.md. */
 typedef enum carillon_effect {
   CARILLON_MODAL = 1,
   CARILLON_HERTZ_PULSE = 2,
@@ -194,56 +194,56 @@ typedef enum carillon_effect {
   CARILLON_AIR_DELAY = 64,
   CARILLON_DOPPLER = 128,
   CARILLON_TWO_EARS = 256,
-  CARILLON_DIRECTIVITY = 512,        /* of a bank with multipoles; CARILLON_BAD_INPUT for a model without */
-  CARILLON_GROUND_REFLECTION = 1024, /* CARILLON_BAD_INPUT where floor_reflection is 0 */
-  CARILLON_HEAD = 2048,              /* with CARILLON_TWO_EARS; CARILLON_BAD_INPUT where head_radius_m is 0 */
-  CARILLON_NONLINEAR = 4096,         /* of a bank with a nonlinear energy; CARILLON_BAD_INPUT for a model without */
-  CARILLON_CASCADE = 8192            /* with CARILLON_NONLINEAR; nothing for a model without modes above the coupled ones */
+  CARILLON_DIRECTIVITY = 512,        /* needs a bank with multipoles, else CARILLON_BAD_INPUT */
+  CARILLON_GROUND_REFLECTION = 1024, /* CARILLON_BAD_INPUT if floor_reflection is 0 */
+  CARILLON_HEAD = 2048,              /* with CARILLON_TWO_EARS; CARILLON_BAD_INPUT if head_radius_m is 0 */
+  CARILLON_NONLINEAR = 4096,         /* needs a bank with a nonlinear energy, else CARILLON_BAD_INPUT */
+  CARILLON_CASCADE = 8192            /* with CARILLON_NONLINEAR; no effect without modes above the coupled ones */
 } carillon_effect;
 #define CARILLON_EFFECT_COUNT 9       /* the first ones, to CARILLON_TWO_EARS */
-#define CARILLON_LATER_EFFECT_COUNT 2 /* those behind them, to CARILLON_GROUND_REFLECTION */
+#define CARILLON_LATER_EFFECT_COUNT 2 /* the next ones, to CARILLON_GROUND_REFLECTION */
 
 typedef struct carillon_body_options {
   uint32_t size;
   uint32_t effects; /* sum of carillon_effect */
   double position_m[3];
   double rotation[4];    /* of the frame of the mesh: w x y z, unit */
-  double longest_m;      /* as in carillon_options; 0: what it says there */
-  double silence_pa;     /* a body below this at 1 m sleeps */
+  double longest_m;      /* as in carillon_options; 0: the value there */
+  double silence_pa;     /* below this pressure at 1 m a body sleeps */
   int32_t max_waypoints; /* 0: as in carillon_options */
   int32_t reserved;
   double roughness_m; /* rms height of the surface, for CARILLON_ROUGHNESS and CARILLON_ROLLING */
-  double friction;    /* Coulomb; a contact of two takes the geometric mean of theirs */
+  double friction;    /* Coulomb; contacts use the geometric mean of both bodies */
 } carillon_body_options;
 
-/* At the origin, not turned, fine machined metal, the usual effects: all that this library can play but those of contacts that last, which
-   take memory, CARILLON_ACCELERATION_NOISE, and those that need something of the bank or the scene. */
+/* At the origin, unrotated, fine machined metal, default effects: all available ones except those of lasting contacts, which
+   take memory, CARILLON_ACCELERATION_NOISE, and those with requirements on bank or scene. */
 #define carillon_body_options_init(options) carillon_body_options_init_sized((options), sizeof(carillon_body_options))
 CARILLON_API void carillon_body_options_init_sized(carillon_body_options* options, size_t size);
-/* [main] carillon_add_body with all that can be chosen. */
+/* [main] carillon_add_body with all options. */
 CARILLON_API carillon_status carillon_add_body_with(carillon_synth* synth, const carillon_model* model,
                                                     const carillon_body_options* options, int32_t* body, char* message,
                                                     size_t message_size);
-/* [main] 0 for a body that is not there. */
+/* [main] 0 for an unknown body. */
 CARILLON_API uint32_t carillon_get_effects(const carillon_synth* synth, int32_t body);
-/* [main] The body continues to ring with another model, usually that of an edited bank: every mode keeps its energy and its phase and
- * continues at its new frequency and decay, without a click. The body keeps the model; the old one's memory comes back with
+/* [main] The body keeps ringing with another model, usually that of an edited bank: every mode keeps its energy and phase and
+ * continues at its new frequency and decay, without a click. The body keeps the model; the old one is freed by
  * carillon_collect. */
 CARILLON_API carillon_status carillon_swap_model(carillon_synth* synth, int32_t body, const carillon_model* model, char* message,
                                                  size_t message_size);
-/* [main] It falls silent; its number is free once carillon_collect has given its memory back. */
+/* [main] Silences the body; its number is reusable after carillon_collect. */
 CARILLON_API carillon_status carillon_remove_body(carillon_synth* synth, int32_t body);
-/* [main] Gives back the memory of removed bodies; call it now and then. */
+/* [main] Frees removed bodies; call it regularly. */
 CARILLON_API void carillon_collect(carillon_synth* synth);
-/* [any] Full scale per pascal; 1 at first. */
+/* [any] Full scale per pascal; initially 1. */
 CARILLON_API void carillon_set_gain(carillon_synth* synth, double per_pa);
-/* [any] Work that a second of sound may take, in mode-samples (modes times samples, as carillon_counters counts them); INFINITY: no limit,
- * as at first. When there is more to do, the least audible modes of all bodies fade out; no body and no strike is ever dropped. Not a
+/* [any] Limit of the work per second of sound, in mode-samples (modes times samples, as carillon_counters counts them); INFINITY: no limit,
+ * the initial value. Above it, the least audible modes of all bodies fade out; no body or strike is dropped. Not a
  * number: 0. */
 CARILLON_API void carillon_set_budget(carillon_synth* synth, double mode_samples_per_s);
 CARILLON_API double carillon_get_budget(const carillon_synth* synth);
-/* [main] Sets the budget so that carillon_process takes this share of one core, 0.01 to 1. Call it some ten times a second with the time
- * [s] that carillon_process has taken altogether, by a clock of yours: nothing in the library looks at one. */
+/* [main] Sets the budget so that carillon_process uses this share of one core, 0.01 to 1. Call it about ten times a second with the total
+ * time [s] spent in carillon_process by a clock of yours: the library reads none. */
 CARILLON_API carillon_status carillon_keep_load(carillon_synth* synth, double share, double busy_s);
 
 /* One contact pulse. Point and impulse are in the frame of the body's mesh. */
@@ -252,7 +252,7 @@ typedef struct carillon_impulse {
   int32_t body;
   int32_t triangle; /* of the bank */
   int32_t gaussian; /* 0: sin^1.5 (Hertz); else Gaussian */
-  double time_s;    /* the middle of the pulse, since the first frame */
+  double time_s;    /* middle of the pulse, since the first frame */
   double duration_s;
   double barycentric[3];
   double impulse_n_s[3];
@@ -260,18 +260,18 @@ typedef struct carillon_impulse {
   int32_t reserved;
 } carillon_impulse;
 
-/* The force of one contact pulse, known step by step: constant in each of `count` steps of `step_s`. Played exactly. A pulse may be given
+/* The force of one contact pulse as samples: constant in each of `count` steps of `step_s`. Played exactly. A pulse may be given
  * in one piece or in several, of any length. Point and impulses are in the frame of the body's mesh. */
 typedef struct carillon_force {
   uint32_t size;
   int32_t body;
   int32_t triangle;               /* of the bank */
   int32_t other;                  /* the other body; -1: the ground, or unknown */
-  double time_s;                  /* when the first step begins, since the first frame */
+  double time_s;                  /* start of the first step, since the first frame */
   double step_s;                  /* above 0 */
-  const double (*impulse_n_s)[3]; /* on the body, of each step */
-  int32_t count;                  /* of the steps, at least 1 */
-  int32_t continues;              /* not 0: a further piece of the pulse before */
+  const double (*impulse_n_s)[3]; /* on the body, per step */
+  int32_t count;                  /* number of steps, at least 1 */
+  int32_t continues;              /* not 0: continues the previous pulse */
   double barycentric[3];
 } carillon_force;
 
@@ -283,13 +283,13 @@ typedef enum carillon_contact_state {
 
 #define CARILLON_BY_MATERIAL (-1.0)
 
-/* One moment of a contact that lasts, as one of its two bodies feels it; the other body gets one too, with the same id. Between two of them
- * all values change linearly. Vectors are in the frame of the body's mesh. */
+/* State of a lasting contact at one time, as seen by one of its two bodies; the other body gets one too, with the same id. Between two of
+ * them all values are interpolated linearly. Vectors are in the frame of the body's mesh. */
 typedef struct carillon_contact {
   uint32_t size;
   int32_t state; /* carillon_contact_state */
-  uint64_t id;   /* of the touch, the same while it lasts; it chooses the profiles of both surfaces, so give a touch the same id whatever
-                    else there is, and it sounds the same */
+  uint64_t id;   /* of the contact, constant while it lasts; seeds the profiles of both surfaces: the same id gives the same
+                    sound */
   int32_t body;
   int32_t other;    /* the other body; -1: the ground, or unknown */
   int32_t triangle; /* of the bank */
@@ -297,17 +297,17 @@ typedef struct carillon_contact {
   double time_s;
   double barycentric[3];
   double normal[3];       /* unit, from the other body into this one */
-  double slip_m_s[3];     /* velocity of this surface against the other's */
+  double slip_m_s[3];     /* velocity of this surface relative to the other */
   double force_n;         /* normal, at least 0 */
-  double sweep_m_s;       /* speed of the contact over this body's surface; 0 for a box that slides flat */
+  double sweep_m_s;       /* speed of the contact point over this body's surface; 0 for a box sliding flat */
   double other_sweep_m_s; /* over the other's */
   double spin_rad_s;      /* relative angular speed about the tangents: rolling */
-  double patch_radius_m;  /* Hertz radius of the touch under force_n */
-  double impedance_n_s_m; /* of the other body at the point, as a dashpot; 0: takes nothing; CARILLON_BY_MATERIAL, the default: of a
+  double patch_radius_m;  /* Hertz radius under force_n */
+  double impedance_n_s_m; /* of the other body at the point, as a dashpot; 0: absorbs nothing; CARILLON_BY_MATERIAL, the default: of a
                              plane wave into its material over the patch, rho c pi patch_radius_m^2 */
 } carillon_contact;
 
-/* Where a body is: its centre of mass in the world. */
+/* Position of a body: its centre of mass in the world. */
 typedef struct carillon_motion {
   uint32_t size;
   int32_t body;
@@ -317,7 +317,7 @@ typedef struct carillon_motion {
   double rotation[4]; /* of the frame of its mesh: w x y z, unit */
 } carillon_motion;
 
-/* Where the listener is. */
+/* Position of the listener. */
 typedef struct carillon_listener {
   uint32_t size;
   double time_s;
@@ -336,35 +336,35 @@ CARILLON_API void carillon_motion_init_sized(carillon_motion* motion, size_t siz
 #define carillon_listener_init(listener) carillon_listener_init_sized((listener), sizeof(carillon_listener))
 CARILLON_API void carillon_listener_init_sized(carillon_listener* listener, size_t size);
 
-/* [any], not on an audio thread. Changes a strike as a hand would, so that equal strikes differ: its energy, place, direction and length.
- * `variation`, 0 to 1, says by how much (docs/howto/scene-files.md); 0 leaves it as it is, to the bit. The same `seed` and number of the
- * strike give the same change: those of a scene file are carillon_name_seed of the body's name, and 0 for its first strike. The bank is
- * that of the body; its first strike makes the tree of carillon_bank_nearest_point. CARILLON_BAD_INPUT for another variation, a triangle
- * that the bank does not have, and an impulse that cannot be played. */
+/* [any], not on an audio thread. Varies a strike like a human player: energy, place, direction and duration.
+ * `variation`, 0 to 1, is the amount (docs/howto/scene-files.md); 0 leaves it unchanged, to the bit. The same `seed` and number of the
+ * strike give the same variation; scene files use carillon_name_seed of the body's name, and 0 for its first strike. The bank is
+ * that of the body; the first call builds the tree of carillon_bank_nearest_point. CARILLON_BAD_INPUT for another variation, a triangle
+ * that the bank lacks, and an invalid impulse. */
 CARILLON_API carillon_status carillon_vary_impulse(const carillon_bank* bank, double variation, uint64_t seed, uint64_t strike,
                                                    carillon_impulse* impulse);
 /* 64-bit FNV-1a of a name; 0 for NULL. [any] */
 CARILLON_API uint64_t carillon_name_seed(const char* name);
 
-/* [any] Events, in any order; those before carillon_horizon_s act late. CARILLON_BAD_INPUT for numbers that are not finite, and the like.
+/* [any] Events, in any order; those before carillon_horizon_s act late. CARILLON_BAD_INPUT for invalid events.
  */
 CARILLON_API carillon_status carillon_push_impulse(carillon_synth* synth, const carillon_impulse* impulse);
-/* A force of more than 16 steps takes several places of the ring and of the body's strikes, of which it has twice max_strikes for forces;
- * CARILLON_FULL when the ring has no room for all of it, which is then played up to there. */
+/* A force of more than 16 steps occupies several slots of the ring and of the body's strikes, which has twice max_strikes for forces;
+ * CARILLON_FULL if the ring has no room for all of it; the part that fits is played. */
 CARILLON_API carillon_status carillon_push_force(carillon_synth* synth, const carillon_force* force);
 CARILLON_API carillon_status carillon_push_contact(carillon_synth* synth, const carillon_contact* contact);
 CARILLON_API carillon_status carillon_push_motion(carillon_synth* synth, const carillon_motion* motion);
 CARILLON_API carillon_status carillon_push_listener(carillon_synth* synth, const carillon_listener* listener);
 
-/* [any] Physics has run up to this time: nothing earlier follows. Optional; with it contacts are held until then, and what the sound had to
- * do without it is counted (carillon_counters.underruns). */
+/* [any] Physics is complete up to this time: no earlier events follow. Optional; contacts are then held until this time, and overruns of
+ * the sound are counted (carillon_counters.underruns). */
 CARILLON_API carillon_status carillon_push_mark(carillon_synth* synth, double time_s);
 
-/* [audio] The next frames: out[c] takes `frames` numbers for each of `channels` channels, the first ones the microphones'. Nothing happens
- * when synth or out is NULL or a count is not positive. */
+/* [audio] Renders the next frames: out[c] receives `frames` samples for each of `channels` channels, the microphones' first. Does nothing
+ * if synth or out is NULL or a count is not positive. */
 CARILLON_API void carillon_process(carillon_synth* synth, float* const* out, int32_t channels, int32_t frames);
 
-/* [any] Time of the next frame, and the time from which on events are in time. */
+/* [any] Time of the next frame, and the earliest time at which an event is not late. */
 CARILLON_API double carillon_time_s(const carillon_synth* synth);
 CARILLON_API double carillon_horizon_s(const carillon_synth* synth);
 
@@ -372,19 +372,19 @@ typedef struct carillon_counters {
   uint32_t size;
   uint32_t reserved;
   int64_t strikes;              /* played */
-  int64_t refused;              /* for a body or a place on it that is not there, or without room */
+  int64_t refused;              /* unknown body or triangle, or no room */
   int64_t late;                 /* strikes moved to the horizon */
-  int64_t faults;               /* events that cannot be played */
-  int64_t overflows;            /* events for which the ring had no room */
-  int64_t resets;               /* bodies silenced because their state was no number */
+  int64_t faults;               /* invalid events */
+  int64_t overflows;            /* events lost because the ring was full */
+  int64_t resets;               /* bodies silenced because their state was not finite */
   int64_t mode_samples;         /* work: modes times samples */
-  int64_t faded;                /* groups of 16 modes that had to go for the budget */
-  int64_t underruns;            /* times that the sound overtook the last carillon_push_mark */
-  int64_t zeroed;               /* numbers of the output that were none, and are 0 */
-  int64_t contacts_accepted;    /* carillon_contacts that are played */
-  int64_t contacts_refused;     /* for a triangle that is not there */
-  int64_t contacts_dropped;     /* of touches that are weaker than the eight of the body that are played */
-  int64_t contacts_thinned;     /* that took the place of the one before, for lack of room */
+  int64_t faded;                /* groups of 16 modes faded out to meet the budget */
+  int64_t underruns;            /* number of times the sound overtook the last carillon_push_mark */
+  int64_t zeroed;               /* output samples that were not finite and were set to 0 */
+  int64_t contacts_accepted;    /* carillon_contacts played */
+  int64_t contacts_refused;     /* unknown triangle */
+  int64_t contacts_dropped;     /* weaker than the eight contacts played per body */
+  int64_t contacts_thinned;     /* replaced their predecessor for lack of room */
   int64_t contacts_without_use; /* for a body without CARILLON_ROUGHNESS, CARILLON_ROLLING and CARILLON_CONTACT_DAMPING */
 } carillon_counters;
 
@@ -406,12 +406,12 @@ typedef struct carillon_effect_counters {
 
 #define carillon_effect_counters_init(counters) carillon_effect_counters_init_sized((counters), sizeof(carillon_effect_counters))
 CARILLON_API void carillon_effect_counters_init_sized(carillon_effect_counters* counters, size_t size);
-/* [any] `counters->size` must be set. Zeros for a body that is not there. */
+/* [any] `counters->size` must be set. Zeros for an unknown body. */
 CARILLON_API carillon_status carillon_get_effect_counters(const carillon_synth* synth, int32_t body, carillon_effect_counters* counters);
-/* [any] The loudest that its modes have been [Pa at 1 m]; 0 for a body that is not there. */
+/* [any] Largest pressure of its modes so far [Pa at 1 m]; 0 for an unknown body. */
 CARILLON_API double carillon_peak_pa(const carillon_synth* synth, int32_t body);
-/* [any] Largest deflection by its modes so far, in thicknesses (twice the volume over the surface). 0 up to half a thickness, the range of
- * linear modes; for banks with a nonlinear energy, strings and membranes; and for a body that is not there. */
+/* [any] Largest modal deflection so far, in thicknesses (twice the volume over the surface). 0 up to half a thickness, the range of
+ * linear modes; for banks with a nonlinear energy, strings and membranes; and for an unknown body. */
 CARILLON_API double carillon_deflection(const carillon_synth* synth, int32_t body);
 
 #ifdef __cplusplus

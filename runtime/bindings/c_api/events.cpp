@@ -7,9 +7,9 @@
 #include <cstdint>
 #include <span>
 
+#include "runtime/base/chance.hpp"
 #include "runtime/bindings/c_api/calls.hpp"
 #include "runtime/bindings/c_api/structures.hpp"
-#include "runtime/base/chance.hpp"
 #include "runtime/synth/variation.hpp"
 
 namespace carillon::c_api {
@@ -66,7 +66,7 @@ events::Impulse to_event(const carillon_impulse& impulse) {
 
 carillon_status push(carillon_synth* synth, const events::Event& event) noexcept {
   if (events::find_fault(event) != nullptr) {
-    (void)synth->synthesiser.push(event);  // counts it
+    (void)synth->synthesiser.push(event);  // counted there
     return CARILLON_BAD_INPUT;
   }
   return synth->synthesiser.push(event) ? CARILLON_OK : CARILLON_FULL;
@@ -102,7 +102,7 @@ carillon_status carillon_push_force(carillon_synth* synth, const carillon_force*
                       .triangle = ours->triangle,
                       .continues = ours->continues != 0,
                       .barycentric = to_vector(ours->barycentric)};
-  // The first pass only checks, so that a force is played as a whole or not at all.
+  // The first pass validates, so that a force is played completely or not at all.
   for (int pass = 0; pass < 2; ++pass) {
     for (std::int32_t done = 0; done < ours->count; done += events::kMaxForceSteps) {
       std::array<Vec3, events::kMaxForceSteps> impulses{};

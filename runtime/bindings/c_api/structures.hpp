@@ -1,4 +1,4 @@
-// Structures of the C interface, of any version of the caller: they begin with their size, and later versions have more fields.
+// Structures of the C interface across versions: each begins with its size, and later versions append fields.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,7 @@
 
 namespace carillon::c_api {
 
-/// The first size of a structure, below those of all callers: for a structure that has grown, up to its first new field.
+/// Size of a structure's first version: up to the first field added later.
 template <typename T>
 inline constexpr std::size_t kMinSize = sizeof(T);
 template <>
@@ -21,13 +21,13 @@ inline constexpr std::size_t kMinSize<carillon_effect_counters> = offsetof(caril
 template <>
 inline constexpr std::size_t kMinSize<carillon_counters> = offsetof(carillon_counters, contacts_accepted);
 
-/// The defaults of a structure; those other than 0 by specialisations.
+/// Defaults of a structure; specialised where they are not 0.
 template <typename T>
 T make_default() {
   return T{};
 }
 
-/// Writes the defaults of as many fields as the caller's structure has.
+/// Writes the defaults of the fields that the caller's structure has.
 template <typename T>
 void init(T* given, size_t size) {
   if (given == nullptr || size < kMinSize<T>) return;
@@ -36,7 +36,7 @@ void init(T* given, size_t size) {
   std::memcpy(given, &ours, ours.size);
 }
 
-/// A structure of the caller's, with defaults for its missing fields; nothing for one that was not initialised.
+/// The caller's structure with defaults for missing fields; empty if uninitialised.
 template <typename T>
 std::optional<T> read(const T* given) {
   if (given == nullptr || given->size < kMinSize<T>) return std::nullopt;
@@ -45,7 +45,7 @@ std::optional<T> read(const T* given) {
   return ours;
 }
 
-/// Fills the fields of the caller's structure, which must have been initialised.
+/// Fills the fields of the caller's structure, which must be initialised.
 template <typename T>
 void write(T ours, T* given) {
   ours.size = given->size;

@@ -6,9 +6,9 @@
 #include <string>
 #include <utility>
 
+#include "runtime/acoustics/head/sphere.hpp"
 #include "runtime/bindings/c_api/calls.hpp"
 #include "runtime/bindings/c_api/structures.hpp"
-#include "runtime/acoustics/head/sphere.hpp"
 
 namespace carillon::c_api {
 namespace {
@@ -48,7 +48,7 @@ static_assert(CARILLON_EFFECT_COUNT + CARILLON_LATER_EFFECT_COUNT + 3 == synth::
 
 template <>
 carillon_options make_default() {
-  const synth::SynthesiserOptions ours{.microphones_m = {}};  // takes no memory, as carillon_options_init cannot fail
+  const synth::SynthesiserOptions ours{.microphones_m = {}};  // does not allocate: carillon_options_init cannot fail
   carillon_options options{};
   options.rate_hz = ours.rate_hz;
   options.max_bodies = ours.max_bodies;

@@ -1,6 +1,4 @@
-// Method:     numpy arrays are read-only views of the memory of the bank (no copies).
-// Source:     none.
-// Deviations: none.
+// Method: numpy arrays are read-only views of the bank's memory (no copies).
 #include <fmt/format.h>
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
@@ -18,13 +16,13 @@
 
 #include "runtime/bank/corrected.hpp"
 #include "runtime/bank/edits.hpp"
+#include "runtime/bank/mounting/heard.hpp"
 #include "runtime/bank/of_material.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/base/printable.hpp"
-#include "runtime/material/table.hpp"
 #include "runtime/bindings/python/module.hpp"
 #include "runtime/bindings/python/shared_bank.hpp"
-#include "runtime/bank/mounting/heard.hpp"
+#include "runtime/material/table.hpp"
 
 namespace carillon::python {
 namespace {
@@ -33,7 +31,7 @@ namespace py = pybind11;
 
 using Shape = std::vector<py::ssize_t>;
 
-/// Read-only view of numbers that `owner` keeps alive.
+/// Read-only view of numbers kept alive by `owner`.
 template <typename T>
 py::array view(const T* numbers, const Shape& shape, const py::handle& owner) {
   py::array array(py::dtype::of<T>(), shape, numbers, owner);
@@ -50,7 +48,7 @@ py::array view(const std::vector<std::array<T, N>>& rows, const py::handle& owne
   return view(rows.empty() ? nullptr : rows.front().data(), {static_cast<py::ssize_t>(rows.size()), static_cast<py::ssize_t>(N)}, owner);
 }
 
-/// One number a mode.
+/// One number per mode.
 template <class Find>
 py::array_t<double> make_per_mode(const bank::Bank& bank, Find&& find) {
   py::array_t<double> array(static_cast<py::ssize_t>(bank.mode_count()));
@@ -59,7 +57,7 @@ py::array_t<double> make_per_mode(const bank::Bank& bank, Find&& find) {
   return array;
 }
 
-/// Error bars of every mode; infinite where they are unknown.
+/// Error bar per mode; infinite if unknown.
 py::array_t<double> make_bars(const bank::Bank& bank, const std::vector<double>& bars) {
   return make_per_mode(bank, [&](std::size_t m) { return m < bars.size() ? bars[m] : std::numeric_limits<double>::infinity(); });
 }
@@ -113,7 +111,7 @@ SharedBank edit(const SharedBank& of, const std::optional<std::string>& material
                      of.name);
 }
 
-/// (V, 3) of one mode, (V, k, 3) of several [kg^-1/2]: whatever numpy takes as an index of modes.
+/// (V, 3) for one mode, (V, k, 3) for several [kg^-1/2]; any numpy index of modes.
 py::object calc_shapes(const py::object& self, const py::object& modes) {
   const py::object steps = self.attr("shape_steps"), scale = self.attr("shape_scale");
   const py::object wanted = modes.is_none() ? py::slice(std::nullopt, std::nullopt, std::nullopt) : modes;
@@ -152,7 +150,7 @@ py::dict list_materials() {
   for (const material::Row& row : material::MaterialTable::get().rows()) {
     const material::Material& m = row.material;
     const py::str name = base::printable(m.name);
-    if (all.contains(name)) continue;  // a row of the user's own stands in front
+    if (all.contains(name)) continue;  // user tables take precedence
     all[name] =
         py::dict("group"_a = base::printable(row.group), "young_modulus_pa"_a = m.young_modulus_pa, "poisson_ratio"_a = m.poisson_ratio,
                  "density_kg_m3"_a = m.density_kg_m3, "is_orthotropic"_a = m.orthotropic.has_value(), "damping"_a = m.describe_damping(),
@@ -161,27 +159,16 @@ py::dict list_materials() {
   return all;
 }
 
-/// The key "bank" of a job, made absolute; nothing where it has none. `text`: the job; empty: what the file holds.
+/// The key "bank" of a job as an absolute path; empty if absent. `text`: the job; empty: contents of the file.
 std::optional<std::filesystem::path> find_bank(const std::filesystem::path& file, const std::string& text) {
   const base::Document document = text.empty() ? base::read_document(file) : base::parse_document(text, file);
   base::Object job = document.root();
   return job.has("bank") ? std::optional(job.path("bank")) : std::nullopt;
 }
 
-}  // namespace
+using Class = py::class_<SharedBank>;
 
-void bind_bank(py::module_& module) {
-  using py::literals::operator""_a;
-  using Class = py::class_<SharedBank>;
-  Class type(
-      module, "Bank",
-      "The modes of a body, as carillon-precompute writes them. m modes, V vertices and T triangles of the surface, in the frame of the "
-      "mesh. Stored arrays are read-only views.");
-  type.def(
-      py::init(&open), "file"_a, "frequencies"_a = "corrected",
-      "Reads a bank. frequencies: \"corrected\" has the estimated error of the mesh removed, where the bank has it; \"mesh\" takes those "
-      "of the mesh. Raises InputError for a file that is no whole bank.");
-  type.def_static("parse", &parse, "data"_a, "frequencies"_a = "corrected", "The same from the bytes of a file.");
+void bind_arrays(Class& type) {
   const auto array = [&](const char* name, auto&& find, const char* text) {
     type.def_property_readonly(
         name, [find](const py::object& self) { return find(*py::cast<const SharedBank&>(self).played, self); }, text);
@@ -203,9 +190,7 @@ void bind_bank(py::module_& module) {
         const std::vector<bank::HeardMode> heard = mounting::calc_heard_as_played(b);
         return make_per_mode(b, [&](std::size_t m) { return heard[m].calc_t60_s(); });
       },
-      "(m) float64 [s]: the time in which a mode falls by 60 dB, as carillon-bank info has it: with the decay by the bank's supports, "
-      "which "
-      "decay_per_s is without.");
+      "(m) float64 [s]: time to decay by 60 dB, as in carillon-bank info: including support losses, unlike decay_per_s.");
   array(
       "radiation_gain", [](const bank::Bank& b, const py::object& self) { return view(b.radiation_gain, self); },
       "(m) float64: pressure [Pa] at 1 m for unit modal velocity (1 m kg^1/2 / s), by O'Brien, Shen and Gatchalian 2002.");
@@ -220,8 +205,8 @@ void bind_bank(py::module_& module) {
       [](const bank::Bank& b, const py::object&) {
         return make_per_mode(b, [&](std::size_t m) { return b.facet_error_cents.empty() ? 0.0 : b.facet_error_cents[m]; });
       },
-      "(m) float64 [cent]: estimated extra of error_cents in the other case of facets in doubt (planes of the body, or samples of a smooth "
-      "surface); 0 without doubt.");
+      "(m) float64 [cent]: additional error_cents if ambiguous facets (true planes, or samples of a smooth "
+      "surface) are of the other kind; 0 if there are none.");
   array(
       "algebraic_error_cents", [](const bank::Bank& b, const py::object&) { return make_bars(b, b.algebraic_error_cents); },
       "(m) float64 [cent]: bound on the distance of the solver from the modes of the mesh; infinite where it is unknown.");
@@ -234,9 +219,18 @@ void bind_bank(py::module_& module) {
   array(
       "shape_scale", [](const bank::Bank& b, const py::object& self) { return view(b.shape_scale, self); },
       "(m) float64 [kg^-1/2]: one step of shape_steps.");
+}
+
+void bind_operations(Class& type) {
+  using py::literals::operator""_a;
+  type.def(
+      py::init(&open), "file"_a, "frequencies"_a = "corrected",
+      "Reads a bank. frequencies: \"corrected\" has the estimated error of the mesh removed, where the bank has it; \"mesh\" takes those "
+      "of the mesh. Raises InputError for an invalid or incomplete bank.");
+  type.def_static("parse", &parse, "data"_a, "frequencies"_a = "corrected", "The same from the bytes of a file.");
   type.def("shapes", &calc_shapes, "modes"_a = py::none(),
-           "Shapes on the surface, mass-normalised [kg^-1/2], float64: (V, 3) of one mode, (V, k, 3) of a slice or list of them, all "
-           "without. A blow J [N s] at vertex v starts mode k with the velocity shapes(k)[v] @ J.");
+           "Shapes on the surface, mass-normalised [kg^-1/2], float64: (V, 3) of one mode, (V, k, 3) of a slice or list; default: all. "
+           "A blow J [N s] at vertex v starts mode k with the velocity shapes(k)[v] @ J.");
   type.def("nearest", &find_nearest, "point_m"_a,
            "The point of the surface nearest to a point: (triangle, barycentric (3), point_m (3), distance_m).");
   type.def("edited", &edit, py::kw_only(), "material"_a = py::none(), "density"_a = 1.0, "stiffness"_a = 1.0, "size"_a = 1.0,
@@ -247,7 +241,12 @@ void bind_bank(py::module_& module) {
       [](const SharedBank& bank, const std::filesystem::path& file) {
         bank::write_bank(*bank.stored, file);
       },  // HDF5: one thread at a time
-      "file"_a, "Writes the bank as it was read or edited, whole or not at all.");
+      "file"_a, "Writes the bank as it was read or edited, complete or not at all.");
+  type.def("__len__", [](const SharedBank& bank) { return bank.played->mode_count(); });
+  type.def("__repr__", &describe);
+}
+
+void bind_facts(Class& type) {
   type.def_property_readonly(
       "name", [](const SharedBank& bank) { return base::printable(bank.name); }, "The file that it was read from.");
   const auto number = [&](const char* name, auto&& find, const char* text) {
@@ -278,8 +277,19 @@ void bind_bank(py::module_& module) {
       "complete", [](const bank::Bank& b) { return b.complete; }, "Whether every mode of band_hz is in the bank.");
   number(
       "element", [](const bank::Bank& b) { return b.element; }, "\"T4\", \"T10\", \"analytic\" or \"imported\".");
-  type.def("__len__", [](const SharedBank& bank) { return bank.played->mode_count(); });
-  type.def("__repr__", &describe);
+}
+
+}  // namespace
+
+void bind_bank(py::module_& module) {
+  using py::literals::operator""_a;
+  Class type(module, "Bank",
+             "The modes of a body, as written by carillon-precompute: m modes, V vertices and T triangles of the surface, in the frame of "
+             "the mesh. "
+             "Stored arrays are read-only views.");
+  bind_operations(type);
+  bind_arrays(type);
+  bind_facts(type);
   module.def("find_bank", &find_bank, "file"_a, "text"_a, "The bank file of a job; None if it names none.");
   module.def("materials", &list_materials, "All known materials, by name: dicts of SI values with their sources.");
 }

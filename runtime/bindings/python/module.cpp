@@ -1,4 +1,4 @@
-// The Python module: errors become exceptions with the same one message.
+// The Python module: errors become exceptions with the same one-line message.
 #include "runtime/bindings/python/module.hpp"
 
 #include <exception>
@@ -16,7 +16,7 @@ namespace {
 
 namespace py = pybind11;
 
-/// A class carillon.NAME, which lives as long as the interpreter.
+/// An exception class carillon.NAME, never freed.
 PyObject* make_exception(py::module_& module, const char* name, PyObject* base, const char* text) {
   const std::string full = std::string("carillon.") + name;
   PyObject* const type = PyErr_NewExceptionWithDoc(full.c_str(), text, base, nullptr);
@@ -27,7 +27,7 @@ PyObject* make_exception(py::module_& module, const char* name, PyObject* base, 
 
 PyObject *input_error = nullptr, *solve_error = nullptr, *system_error = nullptr;
 
-/// Names of files may be no UTF-8, of which Python would make an exception of its own.
+/// File names may not be valid UTF-8, which would raise a different exception.
 void set_error(PyObject* type, const std::exception& error) {
   PyErr_SetString(type, base::printable_lines(base::shorten(error.what())).c_str());
 }
@@ -64,7 +64,7 @@ PYBIND11_MODULE(_carillon, module) {
         return entries;
       },
       py::arg("is_alone"),
-      "The environment of this process, NAME=value, without the variables of mpirun for its ranks; is_alone: for a solver of one rank.");
+      "The environment of this process, NAME=value, without mpirun's variables for ranks; is_alone: for a single-rank solver.");
   bind_bank(module);
   bind_render(module);
   bind_synthesiser(module);

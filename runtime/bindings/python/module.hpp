@@ -1,15 +1,15 @@
-// The parts of the Python module _carillon; users import the package carillon (carillon/__init__.py).
+// Parts of the Python module _carillon; users import the package carillon (carillon/__init__.py).
 #pragma once
 
 #include <pybind11/pybind11.h>
 
 namespace carillon::python {
 
-/// Bank, and the materials that can be named.
+/// Bank, and the table of materials.
 void bind_bank(pybind11::module_& module);
-/// Scenes from their beginning to their end.
+/// Rendering of scenes.
 void bind_render(pybind11::module_& module);
-/// Synthesiser: bodies that are struck by calls.
+/// Synthesiser driven by calls.
 void bind_synthesiser(pybind11::module_& module);
 
 }  // namespace carillon::python

@@ -1,7 +1,4 @@
-// Method:     what carillon-render does, in this process: scene, banks, events, plan, sound. Python's other threads run meanwhile, and its
-//             signals (Ctrl-C) end it.
-// Source:     none.
-// Deviations: none.
+// Method: as carillon-render, in this process: scene, banks, events, plan, sound. The GIL is released; signals (Ctrl-C) end it.
 #include "runtime/render/render.hpp"
 
 #include <pybind11/numpy.h>
@@ -17,12 +14,12 @@
 
 #include "runtime/base/document.hpp"
 #include "runtime/base/printable.hpp"
+#include "runtime/bindings/python/module.hpp"
+#include "runtime/render/surface_playback.hpp"
 #include "runtime/scene/banks.hpp"
 #include "runtime/scene/events.hpp"
 #include "runtime/scene/planning.hpp"
 #include "runtime/scene/scene.hpp"
-#include "runtime/render/surface_playback.hpp"
-#include "runtime/bindings/python/module.hpp"
 
 namespace carillon::python {
 namespace {
@@ -31,13 +28,13 @@ namespace py = pybind11;
 
 constexpr int kMinRateHz = 8000, kMaxRateHz = 192000;
 
-/// Is called without Python's lock, now and then.
+/// Called periodically without the GIL.
 void look_for_signals(double) {
   const py::gil_scoped_acquire lock;
   if (PyErr_CheckSignals() != 0) throw py::error_already_set();
 }
 
-/// A scene's sound before it is an array.
+/// Sound of a scene before conversion to an array.
 struct Rendered {
   sound::SoundStore store;
   std::vector<std::string> warnings;
@@ -73,7 +70,7 @@ py::array_t<float> to_array(const sound::SoundStore& store) {
   return samples;
 }
 
-/// `text`: a scene; empty: what the file holds. The file anchors relative paths and stands in messages.
+/// `text`: a scene; empty: contents of the file. The file anchors relative paths and appears in messages.
 py::tuple render_scene(const std::filesystem::path& file, const std::string& text, std::optional<int> rate_hz) {
   if (rate_hz && (*rate_hz < kMinRateHz || *rate_hz > kMaxRateHz))
     throw InputError("rate_hz: give 8000 to 192000, and not " + std::to_string(*rate_hz));

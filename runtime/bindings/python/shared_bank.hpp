@@ -1,4 +1,4 @@
-// A bank as Python holds it.
+// A bank held by Python objects.
 #pragma once
 
 #include <memory>
@@ -10,13 +10,13 @@
 
 namespace carillon::python {
 
-/// A bank that does not change: arrays of Python look into it, and keep it.
+/// An immutable bank; numpy arrays view it and keep it alive.
 struct SharedBank {
-  std::shared_ptr<const bank::Bank> stored;         // as it is in the file
-  std::shared_ptr<const bank::Bank> played;         // with the frequencies that were asked for; may be the same
-  std::string name;                                 // for people: the file
-  bool is_corrected = false;                        // corrected frequencies are played where the bank has them
-  std::shared_ptr<const bank::SurfaceTree> tree{};  // of `played`; made when it is asked for first
+  std::shared_ptr<const bank::Bank> stored;         // as in the file
+  std::shared_ptr<const bank::Bank> played;         // with the requested frequencies; may be the same
+  std::string name;                                 // file name for display
+  bool is_corrected = false;                        // prefers corrected frequencies
+  std::shared_ptr<const bank::SurfaceTree> tree{};  // of `played`; created on first use
 
   const bank::SurfaceTree& get_tree() {
     if (!tree) tree = std::make_shared<bank::SurfaceTree>(*played);

@@ -1,6 +1,4 @@
-// Method:     synth::Synthesiser with both of its threads in one caller: events and blocks in turn.
-// Source:     none.
-// Deviations: none.
+// Method: synth::Synthesiser with both of its threads in one caller: events and blocks alternate.
 #include "runtime/synth/synthesiser.hpp"
 
 #include <fmt/format.h>
@@ -17,12 +15,12 @@
 #include <utility>
 #include <vector>
 
-#include "runtime/events/events.hpp"
 #include "runtime/acoustics/head/sphere.hpp"
-#include "runtime/bindings/python/module.hpp"
-#include "runtime/bindings/python/shared_bank.hpp"
 #include "runtime/acoustics/radiation/gains.hpp"
 #include "runtime/bank/mounting/losses.hpp"
+#include "runtime/bindings/python/module.hpp"
+#include "runtime/bindings/python/shared_bank.hpp"
+#include "runtime/events/events.hpp"
 #include "runtime/synth/effects.hpp"
 #include "runtime/synth/model.hpp"
 
@@ -43,7 +41,7 @@ synth::EffectSet to_effects(const std::vector<std::string>& names) {
   return effects;
 }
 
-/// A bank as a body of it sounds: what fixes it takes of its modes what the bank says, as in carillon-render.
+/// A bank with the support losses that it specifies, as in carillon-render.
 std::shared_ptr<const synth::Model> make_model(const bank::Bank& bank, const std::string& kind_name, double rate_hz) {
   const radiation::GainKind kind = radiation::choose_gain_kind(bank, radiation::require_gain_kind("radiation", kind_name));
   const py::gil_scoped_release others_run;
@@ -55,7 +53,7 @@ std::shared_ptr<const synth::Model> make_model(const bank::Bank& bank, const std
   return synth::Model::make(played, {.rate_hz = rate_hz, .gains = radiation.gains, .sphere_radius_m = radiation.sphere_radius_m});
 }
 
-/// A synthesiser, and the surfaces that are struck. Calls of process() wait for each other; all others hold Python's lock.
+/// A synthesiser and the surfaces of its bodies. Calls of process() exclude each other; all others hold the GIL.
 class Instrument {
  public:
   Instrument(double rate_hz, std::vector<Vec3> microphones_m, const Vec3& listener_m, int max_bodies,
@@ -171,7 +169,7 @@ class Instrument {
   double rate_hz_;
   bool has_head_, has_floor_;
   std::unique_ptr<synth::Synthesiser> synthesiser_;
-  std::map<int, SharedBank> banks_;  // of the bodies, by number
+  std::map<int, SharedBank> banks_;  // by body number
   std::mutex playing_;
 };
 

@@ -1,4 +1,4 @@
-// The sound engine of a web page: bodies that sound when they are struck, by Carillon's synthesiser in WebAssembly.
+// The sound engine of a web page: struck bodies, synthesised by Carillon in WebAssembly.
 //
 //   const audio = await CarillonAudio.open();
 //   const bank = await audio.addBank(await (await fetch('cup.hdf')).arrayBuffer(), 'cup.hdf');
@@ -10,11 +10,11 @@
 
 const kNotTurned = [1, 0, 0, 0], kCentre = [1 / 3, 1 / 3, 1 / 3];
 const kExact = 0, kSoon = 1;
-const kLead_s = 0.15; // by which the events of a recorded scene are sent before it begins
+const kLead_s = 0.15; // lead of a recorded scene's events over its start
 const kState = { begin: 0, hold: 1, end: 2 };
 const kHandImpedance_n_s_m = 1; // impedance of hand and mallet at the contact; an estimate
 
-/** Whether the browser has SIMD of WebAssembly: validates a module with one such instruction. */
+/** True if the browser supports WebAssembly SIMD: validates a module with one such instruction. */
 function hasSimd() {
   return WebAssembly.validate(Uint8Array.of(0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 10, 1, 8, 0, 65, 0, 253, 15, 253, 98, 11));
 }
@@ -48,7 +48,7 @@ function rotate([w, a, b, c], x) {
   return [x[0] + w * t[0] + b * t[2] - c * t[1], x[1] + w * t[1] + c * t[0] - a * t[2], x[2] + w * t[2] + a * t[1] - b * t[0]];
 }
 
-/** Sends requests to another thread and matches the answers to them. */
+/** Sends requests to another thread and matches their answers. */
 class Line {
   constructor(port, onMessage) {
     this.port = port;
@@ -74,7 +74,7 @@ class Line {
   }
 }
 
-/** A mode bank: what a body is made of. */
+/** A mode bank. */
 export class Bank {
   constructor(audio, id, facts) {
     const { modes, vertices_m, triangles, ...rest } = facts;
@@ -90,7 +90,7 @@ export class Bank {
   }
 }
 
-/** A contact that lasts: a head that lies on a body, slides over it or is pressed against it. */
+/** A lasting contact: a head that rests on, slides over or presses against a body. */
 class Touch {
   constructor(body, fields) {
     this.body = body;
@@ -103,7 +103,7 @@ class Touch {
     const { triangle, barycentric = kCentre, normal, force_n, slip_m_s, other_sweep_m_s, spin_rad_s, impedance_n_s_m, mallet, time_s } = this.fields;
     const sweep_m_s = this.fields.sweep_m_s ?? Math.hypot(...slip_m_s), { patches } = this.body;
     const patch_m = this.fields.patch_radius_m ?? (patches[mallet] ?? patches.steel) * Math.cbrt(Math.max(force_n, 1e-6));
-    // The upper half of the id separates contacts by hand from those of recordings.
+    // The upper half of the id distinguishes interactive contacts from recorded ones.
     this.body.audio.push(
       makeRow(3, time_s, [
         0x68616e64, this.id, this.body.number, -1, triangle, kState[state], ...barycentric, ...normal, ...slip_m_s, force_n, sweep_m_s, other_sweep_m_s,
@@ -121,13 +121,13 @@ class Touch {
   }
 }
 
-/** A body that sounds. */
+/** A sounding body. */
 export class Body {
   constructor(audio, id, spec) {
     Object.assign(this, { audio, id, spec, name: spec.name, bank: spec.bank });
   }
 
-  /** The body as a scene file describes it. */
+  /** The body as described in a scene file. */
   describe() {
     const { name, position_m, rotation, fixed, effects, roughness_m, friction, supports = {} } = this.spec;
     const said = { name, bank: 'bank', position_m, quaternion: rotation, fixed, roughness_m, friction, ...supports };
@@ -139,7 +139,7 @@ export class Body {
     return JSON.stringify({ ...this.audio.makeScene(), radiation, frequencies, bodies: [this.describe()], ...more });
   }
 
-  /** Makes the body as it is described, in the workshop. */
+  /** Makes or remakes the body in the workshop. */
   async make(edits) {
     const facts = await this.audio.worker.ask({ type: 'body', body: this.id, bank: this.bank.id, scene: this.makeScene(), edits: JSON.stringify(edits) });
     this.edits = edits;
@@ -152,11 +152,11 @@ export class Body {
     this.possible = facts.effects;
   }
 
-  /** A contact pulse, sin^1.5 of this length; impulse in the frame of the mesh. Without time_s as soon as possible. */
+  /** A contact pulse, sin^1.5 of this duration; impulse in the frame of the mesh. Default time_s: as soon as possible. */
   strike(pulse) {
     this.audio.push(makeImpulse(this.number, pulse));
   }
-  /** A force known step by step: impulse_n_s has a row for each of its steps. */
+  /** A sampled force: impulse_n_s has one row per step. */
   push(force) {
     this.audio.push(makeForce(this.number, force));
   }
@@ -168,21 +168,21 @@ export class Body {
     const scene = this.makeScene({ strikes: [{ time_s: 1, body: this.name, triangle, mallet: head }] });
     return this.audio.worker.ask({ type: 'blow', body: this.id, scene, triangle, barycentric, time_s, number: this.number });
   }
-  /** A contact that lasts: {triangle, barycentric, normal, force_n, slip_m_s, mallet, ...}, in the frame of the mesh. */
+  /** Starts a lasting contact: {triangle, barycentric, normal, force_n, slip_m_s, mallet, ...}, in the frame of the mesh. */
   touch(fields) {
     return new Touch(this, fields);
   }
-  /** How loud each mode is when it is struck there, Float32Array(m): Pa at 1 m for 1 N s. */
+  /** Response of each mode to a strike there, Float32Array(m): Pa at 1 m for 1 N s. */
   levels(triangle, barycentric = kCentre) {
     return this.audio.worker.ask({ type: 'levels', body: this.id, triangle, barycentric });
   }
 
-  /** Another material, size, density, stiffness or damping, while it rings. The last request applies; resolves with the modes after it. */
+  /** Changes material, size, density, stiffness or damping while it rings. The last request applies; resolves with the new modes. */
   async edit(edits) {
     this.wish = edits;
     this.editing ??= (async () => {
       try {
-        // Earlier requests that still wait resolve with the last one.
+        // Earlier pending requests resolve with the last one.
         while (this.wish !== undefined) {
           const wish = this.wish;
           this.wish = undefined;
@@ -199,26 +199,26 @@ export class Body {
     return this.editing;
   }
 
-  /** One mode alone, by its number, or all again: null. */
+  /** Solo of one mode by its number; null: all modes. */
   solo(mode) {
     this.audio.engine.tell({ name: 'web_set_solo', numbers: [this.number, mode ?? -1] });
   }
-  /** Has a mode ring by itself, `level` times a quarter of full scale at 1 m. */
+  /** Excites one mode at `level` times a quarter of full scale at 1 m. */
   ping(mode, level = 1) {
     const pressure_pa = (0.25 * level) / this.audio.gain_per_pa;
     this.audio.worker.ask({ type: 'ping', body: this.id, mode, pressure_pa, number: this.number }).catch((error) => this.audio.report(error.message));
   }
 
-  /** Where its centre of mass is: {position_m, velocity_m_s, rotation, time_s}. Without time_s it moves there at once, along a smooth path. */
+  /** Sets its centre of mass: {position_m, velocity_m_s, rotation, time_s}. Default time_s: now, along a smooth path. */
   setPosition(motion) {
     this.isMoved = true;
     this.audio.push(makeMotion(this.number, motion));
   }
-  /** Whether 'state' events have the amplitudes of its modes and its largest deflection so far [thicknesses], 0 up to half a thickness. */
+  /** Includes its modal amplitudes and largest deflection so far [thicknesses; 0 up to half a thickness] in 'state' events. */
   watch(isWatched) {
     this.audio.engine.tell({ type: 'watch', body: this.number, modes: isWatched ? this.bank.mode_count : 0 });
   }
-  /** The amplitudes of its modes now, Float32Array(m) [m kg^1/2]. */
+  /** Current modal amplitudes, Float32Array(m) [m kg^1/2]. */
   measure() {
     return this.audio.engine.ask({ type: 'measure', body: this.number, modes: this.bank.mode_count });
   }
@@ -229,13 +229,13 @@ export class Body {
   }
 }
 
-/** A contacts file: what happened in a simulation. */
+/** A contacts file: a recorded simulation. */
 export class Recording {
   constructor(audio, id, bodies, facts) {
     const { poses, ...rest } = facts;
     Object.assign(this, { audio, id, bodies, poses, facts: rest, duration_s: facts.duration_s, playback: 0 });
   }
-  /** Plays it from a time of it on, at a time of the engine; without at_s as soon as it can be. Resolves with that time. */
+  /** Plays it from a recording time, at an engine time; default at_s: as soon as possible. Resolves with the start time. */
   async start({ at_s, from_s = 0 } = {}) {
     this.stop();
     const playback = ++this.audio.playbacks, bodies = this.bodies.map((body) => body.number);
@@ -253,16 +253,16 @@ export class Recording {
     this.audio.engine.tell({ name: 'web_end_playback', numbers: [this.playback] });
     this.playback = 0;
   }
-  /** Of the recording, what is heard at this moment. */
+  /** Recording time heard now. */
   get time_s() {
     if (this.playback === 0) return this.stopped_s ?? 0;
     return this.at_s === undefined ? this.from_s : Math.max(this.from_s, this.from_s + this.audio.heard_s - this.at_s);
   }
-  /** Where a body is at a time of the recording: {position_m of its centre of mass, rotation}, or undefined if it does not say. */
+  /** Pose of a body at a recording time: {position_m of its centre of mass, rotation}, or undefined if not recorded. */
   pose(body, time_s) {
     const rows = this.poses[body], count = rows.length / 8;
     if (count === 0) return undefined;
-    let low = 0, high = count; // the first row that is later
+    let low = 0, high = count; // the first later row
     while (low < high) {
       const middle = (low + high) >> 1;
       if (rows[8 * middle] <= time_s) low = middle + 1;
@@ -275,7 +275,7 @@ export class Recording {
     const rotation = [4, 5, 6, 7].map((k) => between(k, sign)), size = Math.hypot(...rotation);
     return { position_m: [between(1), between(2), between(3)], rotation: rotation.map((x) => x / size) };
   }
-  /** As CarillonAudio.plan(), of the whole of it. */
+  /** CarillonAudio.plan() of the whole recording. */
   plan() {
     return this.audio.worker.ask({ type: 'planRecording', recording: this.id, scene: this.audio.makePlanScene(this.bodies, this.duration_s) });
   }
@@ -285,12 +285,12 @@ export class Recording {
   }
 }
 
-/** The engine of a page. Events: 'state', some thirty a second while a page sounds in real time, and 'error', with {message}. */
+/** The engine of a page. Events: 'state', about 30 per second in real time, and 'error', with {message}. */
 export class CarillonAudio extends EventTarget {
   /**
-   * context: an AudioContext or OfflineAudioContext (a new one). connect: to its destination (true). simd: 'auto', true or false.
-   * microphones_m: from the listener, in its frame, a channel each (two ears 20 cm apart). listener: {position_m, rotation}. gain_per_pa:
-   * full scale per pascal (1). max_bodies (64). ground: {roughness_m, friction}. load_share: of one core that sound may take, then the least
+   * context: an AudioContext or OfflineAudioContext (a new one). connect: connects to its destination (true). simd: 'auto', true or false.
+   * microphones_m: relative to the listener, in its frame, one per channel (two ears 20 cm apart). listener: {position_m, rotation}. gain_per_pa:
+   * full scale per pascal (1). max_bodies (64). ground: {roughness_m, friction}. load_share: share of one core, above which the least
    * audible modes fade (0.6; null: no limit, as in an OfflineAudioContext).
    */
   static async open(options = {}) {
@@ -305,7 +305,7 @@ export class CarillonAudio extends EventTarget {
     Object.assign(this, { context, gain_per_pa, ground, bodies: new Set(), touches: 0, playbacks: 0, ids: 0, offset_s: 0 });
     this.listener = { position_m: [0, -1.5, 0.5], rotation: kNotTurned, ...listener };
     if (!context.audioWorklet) throw new Error('the browser has no AudioWorklet for this page; open it by https or from localhost');
-    // Bundlers include the files of literal URLs. The module without SIMD has none, as it is rarely built.
+    // Bundlers include files of literal URLs; the module without SIMD is not included.
     const [module] = await Promise.all([
       this.compile(new URL('./carillon.wasm', import.meta.url), simd === 'auto' ? hasSimd() : simd),
       context.audioWorklet.addModule(new URL('./carillon-worklet.js', import.meta.url)),
@@ -367,24 +367,24 @@ export class CarillonAudio extends EventTarget {
     this.dispatchEvent(new CustomEvent('state', { detail: { time_s, context_time_s, load, peak_pa, counters, bodies } }));
   }
 
-  /** Seconds that the engine has played: the time of all events. */
+  /** Engine time in seconds, as used by events. */
   get time_s() {
     return this.context.currentTime - this.offset_s;
   }
-  /** Of the engine, what comes out of the loudspeakers now. */
+  /** Engine time of the sound at the loudspeakers now. */
   get heard_s() {
     const stamp = this.context.getOutputTimestamp?.(), { contextTime = this.context.currentTime, performanceTime = 0 } = stamp ?? {};
     const since_s = performanceTime > 0 ? (performance.now() - performanceTime) / 1000 : 0;
     return Math.min(this.context.currentTime, contextTime + since_s) - this.offset_s;
   }
 
-  /** Events to the audio thread and to what plans remember. */
+  /** Sends events to the audio thread and the log of plans. */
   push(words) {
     if (words[1] > 0 && words[1] < 4) this.worker.tell({ type: 'log', words: words.slice(), now_s: this.time_s });
     this.engine.tell({ type: 'push', words }, [words.buffer]);
   }
 
-  /** bytes: of a bank file, whole. */
+  /** bytes: a complete bank file. */
   async addBank(bytes, name = 'bank') {
     const buffer = bytes instanceof ArrayBuffer ? bytes : bytes.slice().buffer, id = ++this.ids;
     return new Bank(this, id, await this.worker.ask({ type: 'bank', bank: id, bytes: buffer, name }, bytes instanceof ArrayBuffer ? [] : [buffer]));
@@ -404,7 +404,7 @@ export class CarillonAudio extends EventTarget {
     return body;
   }
 
-  /** text: of a contacts file; bodies: those that it was made for, in its order. */
+  /** text: a contacts file; bodies: its bodies, in its order. */
   async addRecording(text, bodies, name = 'contacts file') {
     const id = ++this.ids;
     return new Recording(this, id, bodies, await this.worker.ask({ type: 'recording', recording: id, text, name, bodies: bodies.map((body) => body.id) }));
@@ -423,14 +423,14 @@ export class CarillonAudio extends EventTarget {
     const facing = rotate(this.listener.rotation, [0, 1, 0]), { position_m } = this.listener;
     return JSON.stringify({ ...this.makeScene(), duration_s: Math.min(3600, Math.max(0.01, duration_s)), listener: { position_m, facing }, bodies: described });
   }
-  /** Which effects the bodies need by the events so far, and why: {bodies: [{name, effects: {modal: {on, why}, ...}}]}. */
+  /** Effects needed by the bodies after the events so far, with reasons: {bodies: [{name, effects: {modal: {on, why}, ...}}]}. */
   plan() {
     const bodies = [...this.bodies], numbers = bodies.map(({ number }) => number);
     if (bodies.length === 0) return Promise.resolve({ bodies: [] });
     return this.worker.ask({ type: 'plan', scene: this.makePlanScene(bodies, this.time_s), bodies: bodies.map(({ id }) => id), numbers });
   }
 
-  /** Where the ears are: {position_m, velocity_m_s, rotation, time_s}; x right, y forward, z up. Without time_s there at once, smoothly. */
+  /** Sets the ears: {position_m, velocity_m_s, rotation, time_s}; x right, y forward, z up. Default time_s: now, along a smooth path. */
   setListener(listener) {
     this.listener = { ...this.listener, ...listener };
     this.push(makeListener(listener));
@@ -439,16 +439,16 @@ export class CarillonAudio extends EventTarget {
     this.gain_per_pa = per_pa;
     this.engine.tell({ type: 'gain', per_pa });
   }
-  /** Work that a second of sound may take: modes times samples. load_share: see open(); it then sets the budget again and again. */
+  /** Limit of work per second of sound: modes times samples. load_share (see open()) adjusts the budget continuously. */
   setBudget(mode_samples_per_s, load_share = null) {
     this.engine.tell({ type: 'budget', mode_samples_per_s, load_share });
   }
 
-  /** Resolves when the audio thread has received all messages so far. */
+  /** Resolves when the audio thread has received all messages sent so far. */
   async settled() {
     await this.engine.ask({ type: 'settle' });
   }
-  /** What the engine has done: strikes, refused, late, faults, overflows, resets, mode_samples, faded, underruns, zeroed, budget, and by the
+  /** Counters: strikes, refused, late, faults, overflows, resets, mode_samples, faded, underruns, zeroed, budget, and by the
    * clock quanta, over_budget, gaps, worst_ms, busy_ms. */
   counters() {
     return this.engine.ask({ type: 'count' });

@@ -43,7 +43,7 @@ export class Wasm {
     this.exports._initialize();
   }
 
-  /** There are no files, no environment and no arguments; there is a clock, and a root. */
+  /** WASI imports: a clock and a root folder; no files, environment or arguments. */
   makeImport(from, name) {
     if (name === 'emscripten_notify_memory_growth') return () => {};
     if (name === 'proc_exit')
@@ -61,7 +61,7 @@ export class Wasm {
     if (name === '__syscall_getcwd')
       return (address, size) => {
         if (size < 2) return -kNotThere;
-        new Uint8Array(this.exports.memory.buffer).set([0x2f, 0], address >>> 0); // "/": paths of scenes become whole by it
+        new Uint8Array(this.exports.memory.buffer).set([0x2f, 0], address >>> 0); // "/": root of relative paths in scenes
         return 2;
       };
     if (name === 'clock_time_get')
@@ -72,7 +72,7 @@ export class Wasm {
     return from === 'env' ? () => -kNotThere : () => kNotThere;
   }
 
-  /** Calls a function with numbers, texts and typed arrays; of the last two it gets address and length. Throws Refusal with its message. */
+  /** Calls a function with numbers, texts and typed arrays; texts and arrays are passed by address and length. Throws Refusal with its message. */
   call(name, ...args) {
     const { exports } = this, given = [], taken = [];
     try {
@@ -96,7 +96,7 @@ export class Wasm {
     }
   }
 
-  /** The last text that the module made. */
+  /** The module's last text. */
   text() {
     const { exports } = this;
     return decode(new Uint8Array(exports.memory.buffer, exports.web_text() >>> 0, exports.web_text_size()));
@@ -104,7 +104,7 @@ export class Wasm {
   json() {
     return JSON.parse(this.text());
   }
-  /** A copy of what lies at an address. */
+  /** A copy of the bytes at an address. */
   copy(Type, address, length) {
     return new Type(this.exports.memory.buffer, address >>> 0, length).slice();
   }

@@ -1,18 +1,18 @@
-// The workshop: banks, models, blows of mallets, plans and recorded scenes, away from the page's thread and the audio thread.
+// The workshop: banks, models, mallet blows, plans and recorded scenes, off the page's thread and the audio thread.
 import { Refusal, Wasm } from './carillon-wasm.js';
 
-const kPiece = 12 << 14; // bytes of a surface at once, whole triangles: some tens of microseconds of the audio thread
-const kRows = 1 << 15; // words of a recording at once, about
-const kLogged = 1 << 20; // words of what has happened, for the plan
+const kPiece = 12 << 14; // bytes of a surface per message, whole triangles: some tens of microseconds of the audio thread
+const kRows = 1 << 15; // words of a recording per message, approximately
+const kLogged = 1 << 20; // words of past events kept for the plan
 
 let wasm, engine; // engine: the port to the audio thread
-const waiting = new Map(); // of messages to the engine
+const waiting = new Map(); // messages to the engine by id
 let messages = 0, surfaces = 0, models = 0;
 const surfaceOf = new Map(); // address -> {surface, bodies: Set}
 const made = new Map(); // body -> {address, model}
-let log = []; // Float64Array each: what has happened
+let log = []; // Float64Array each: past events
 
-/** A message to the audio thread; a promise of its answer. */
+/** Sends a message to the audio thread; returns a promise of its answer. */
 function ask(message, transfer = []) {
   return new Promise((resolve, reject) => {
     waiting.set(++messages, { resolve, reject });
@@ -33,7 +33,7 @@ function letGo(body) {
   made.delete(body);
 }
 
-/** Sends the model of a body, and its surface where the engine does not have it; the number of the model. */
+/** Sends the model of a body, and its surface if the engine lacks it; returns the model's number. */
 async function sendModel(body) {
   const { exports } = wasm, address = exports.web_surface_address(body) >>> 0, model = ++models;
   const tables = (wasm.call('web_write_tables', body), wasm.bytes());
@@ -91,7 +91,7 @@ const obey = {
     wasm.call('web_calc_shape', bank, mode);
     return wasm.numbers();
   },
-  /** Makes a body, or makes it again; its facts, and its model's number. */
+  /** Makes or remakes a body; returns its facts and its model's number. */
   async body({ body, bank, scene, edits }) {
     wasm.call('web_make_body', body, bank, scene, edits);
     const facts = wasm.json(), before = made.get(body), sent = await sendModel(body);
@@ -129,13 +129,13 @@ const obey = {
     wasm.call('web_calc_levels', body, triangle, ...barycentric);
     return wasm.numbers();
   },
-  /** What has happened to the engine's bodies; times of what came as soon as possible are those at which it was sent. */
+  /** Logs events of the engine's bodies; events without a time get the time of sending. */
   log({ words, now_s }) {
     if (now_s !== undefined) for (let at = 0; at < words.length; at += words[at]) if (words[at + 2] === 1) words[at + 3] += now_s;
     log.push(words);
     for (let held = log.reduce((sum, { length }) => sum + length, 0); held > kLogged; held -= log.shift().length);
   },
-  /** bodies: of the workshop; numbers: the same of the engine, as the log names them. */
+  /** bodies: workshop numbers; numbers: engine numbers, as used in the log. */
   plan({ scene, bodies, numbers }) {
     const place = new Map(numbers.map((number, i) => [number, i])), kBody = [0, 4, 5, 6, 4, 0];
     const rows = [];
@@ -200,7 +200,7 @@ async function answer(data) {
   }
 }
 
-// Requests to the audio thread are sent one after the other, so that versions of a body arrive in order; blows do not wait for them.
+// Requests to the audio thread are serialised, so versions of a body arrive in order; blows do not wait for them.
 const kInTurn = new Set(['body', 'closeBody', 'closeBank', 'play']);
 let last = Promise.resolve();
 onmessage = ({ data }) => {

@@ -1,4 +1,4 @@
-// The audio thread: carillon.wasm makes the sound, this file passes messages to it and counts time.
+// The audio thread: carillon.wasm renders, this file forwards messages and measures time.
 import { Refusal, Wasm } from './carillon-wasm.js';
 
 const kStateS = 1 / 30, kKeepS = 0.1;
@@ -25,7 +25,7 @@ class CarillonProcessor extends AudioWorkletProcessor {
     }, this.port);
   }
 
-  /** Runs a request. A Refusal is reported; any other error, a trap, stops the engine, which is silent from then on. */
+  /** Runs a request. A Refusal is reported; any other error is a trap, which stops and silences the engine. */
   try(work, port, id) {
     try {
       const result = work();
@@ -97,7 +97,7 @@ class CarillonProcessor extends AudioWorkletProcessor {
         return this.measure(data.body, data.modes);
       case 'settle':
         return wasm.exports.web_time_s();
-      case 'fail': // for tests of what a trap does
+      case 'fail': // tests of a trap
         throw new Error('as asked');
       default: // of one number or two
         wasm.call(data.name, ...data.numbers);
@@ -121,7 +121,7 @@ class CarillonProcessor extends AudioWorkletProcessor {
     if (this.dead || this.wasm === undefined) return true;
     if (this.expected !== undefined && this.expected !== currentFrame) ++this.counts.gaps;
     this.expected = currentFrame + frames;
-    // Of a millisecond's steps the mean is right, however short the work is.
+    // The mean over millisecond clock steps is right even for short work.
     const began_ms = Date.now();
     try {
       const { exports } = this.wasm;
@@ -145,7 +145,7 @@ class CarillonProcessor extends AudioWorkletProcessor {
     return true;
   }
 
-  /** Thirty times a second: what a page shows. */
+  /** State of the engine for display, 30 times a second. */
   report(now_s) {
     if (this.loadShare !== null && now_s - (this.kept_s ?? 0) >= kKeepS) {
       this.kept_s = now_s;

@@ -1,9 +1,6 @@
-// Method:     a synth::Synthesiser with interactive input. What is moved by hand (the listener, a body) gets waypoints a little
-//             ahead of the sound, so that the way to the next one is known when the sound comes to the last; after a rest the place of the
-//             rest is a waypoint first. Recorded scenes are scene::EventSchedulers, pushed kPushedS before they are due. One mark a block
-//             says that nothing earlier follows.
-// Source:     none.
-// Deviations: none.
+// Method: a synth::Synthesiser with interactive input. Listener and bodies moved by hand get waypoints slightly ahead of the sound, so that
+// the next one is known in time; after a pause the resting place is a waypoint first. Recorded scenes are scene::EventSchedulers, pushed
+// kPushedS before they are due. One watermark per block.
 #include "runtime/bindings/web/engine.hpp"
 
 #include <algorithm>
@@ -19,14 +16,14 @@
 namespace carillon::web {
 namespace {
 
-constexpr double kPushedS = 0.1;     // by which events of recordings are pushed before they are due
-constexpr double kMarginS = 0.01;    // by which waypoints and records of contacts are pushed earlier than strikes
-constexpr double kSoonS = 0.03;      // by which interactive waypoints are ahead of the sound: two frames of a display
-constexpr double kStepS = 0.002;     // between two waypoints at least
-constexpr double kFastestMs = 60.0;  // of interactive motion; waypoints more than kFarAheadS ahead may be faster
+constexpr double kPushedS = 0.1;     // lead of recorded events over their due time
+constexpr double kMarginS = 0.01;    // lead of waypoints and contact records over strikes
+constexpr double kSoonS = 0.03;      // lead of interactive waypoints over the sound: two display frames
+constexpr double kStepS = 0.002;     // minimum interval of waypoints
+constexpr double kFastestMs = 60.0;  // maximum speed of interactive motion; waypoints more than kFarAheadS ahead may be faster
 constexpr double kFarAheadS = 0.5;
-constexpr double kStillS = 0.06;                          // without an update for this long, a contact has no slip
-constexpr std::size_t kMostBytes = std::size_t{3} << 30;  // of a surface
+constexpr double kStillS = 0.06;                          // a contact without an update for this long has no slip
+constexpr std::size_t kMostBytes = std::size_t{3} << 30;  // maximum size of a surface
 
 }  // namespace
 
@@ -42,7 +39,7 @@ void Engine::begin_surface(int surface, const SurfaceSizes& sizes) {
   arriving.surface->columns = sizes.columns;
   arriving.surface->triangles.reserve(sizes.triangles);
   arriving.surface->largest.reserve(sizes.largest);
-  arriving.surface->shape.reserve(sizes.shape);  // filled as it comes: no pass over all of it at once
+  arriving.surface->shape.reserve(sizes.shape);  // filled on arrival, avoiding one long pass
   surfaces_[surface] = std::move(arriving);
 }
 
@@ -50,7 +47,7 @@ void Engine::add_to_surface(int surface, std::span<const std::byte> bytes) {
   const auto found = surfaces_.find(surface);
   if (found == surfaces_.end()) throw InputError("there is no surface " + std::to_string(surface));
   Arriving& to = found->second;
-  // Pieces end where they end, but not within a number or a triangle.
+  // Pieces are split arbitrarily, but not within a number or a triangle.
   const auto add = [&](auto& values, std::size_t count) {
     using Value = typename std::remove_reference_t<decltype(values)>::value_type;
     const std::size_t more = std::min(count - values.size(), bytes.size() / sizeof(Value));
@@ -115,20 +112,20 @@ void Engine::remove_body(int body) {
   ways_.erase(body);
 }
 
-/// False for what cannot be played; find_fault() then says why.
+/// False for an invalid event; find_fault() has the reason.
 bool Engine::push_event(const events::Event& event) {
   const char* fault = events::find_fault(event);
   if (fault == nullptr && synthesiser_.push(event)) return true;
   fault_ = fault != nullptr ? fault : "there are too many events at once";
-  if (fault != nullptr) (void)synthesiser_.push(event);  // counts it
+  if (fault != nullptr) (void)synthesiser_.push(event);  // counted there
   return false;
 }
 
-/// A waypoint of what is moved by hand, kSoonS ahead.
+/// A waypoint of an interactively moved body or listener, kSoonS ahead.
 template <class Waypoint>
 bool Engine::move_soon(Way& way, Waypoint waypoint) {
   const double now_s = synthesiser_.get_horizon_s();
-  if (way.time_s < now_s) {  // it rests
+  if (way.time_s < now_s) {  // at rest
     Waypoint rest = waypoint;
     rest.time_s = now_s;
     rest.position_m = way.position_m;
@@ -169,14 +166,14 @@ bool Engine::push_soon(events::Event event) {
   return push_event(event);
 }
 
-/// Between records values are interpolated, so each has to be known before the sound comes to the one before it.
+/// Values are interpolated, so each record must be known before the sound reaches its predecessor.
 bool Engine::touch_soon(const events::LastingContact& contact) {
   const ContactKey key{contact.body, contact.id};
   const double now_s = synthesiser_.get_horizon_s();
   events::LastingContact record = contact;
   const auto last = hand_contacts_.find(key);
   if (last == hand_contacts_.end()) {
-    if (contact.state == events::ContactState::kEnd) return true;  // it has ended already
+    if (contact.state == events::ContactState::kEnd) return true;  // already ended
     record.state = events::ContactState::kBegin;
     record.time_s += now_s;
   } else {
@@ -191,7 +188,7 @@ bool Engine::touch_soon(const events::LastingContact& contact) {
   return true;
 }
 
-/// Prolongs each interactive contact with its last record; without slip once no update came for kStillS.
+/// Repeats the last record of each interactive contact; without slip after kStillS without an update.
 void Engine::hold_contacts() {
   const double now_s = synthesiser_.get_horizon_s();
   for (auto& [key, contact] : hand_contacts_) {
@@ -242,7 +239,7 @@ void Engine::begin_playback(int playback, const PlaybackRequest& request) {
 
 void Engine::add_to_playback(int playback, std::span<const double> words) {
   const auto found = playbacks_.find(playback);
-  if (found == playbacks_.end()) return;  // it has ended
+  if (found == playbacks_.end()) return;  // already ended
   Playback& to = found->second;
   const PlaybackRequest& request = to.request;
   const auto place = [&](const events::BodyMotion& motion) {
@@ -265,7 +262,7 @@ void Engine::add_to_playback(int playback, std::span<const double> words) {
       if (motion != nullptr) to.before[motion->body] = *motion;
       return;
     }
-    // Where the bodies are when it begins, whatever happened to them before.
+    // Initial poses of the bodies at the start of the recording.
     if (!to.has_begun)
       for (const auto& [number, before] : to.before) place(before);
     to.has_begun = true;
@@ -287,7 +284,7 @@ void Engine::end_playback(int playback) {
   playbacks_.erase(found);
 }
 
-/// Passes one event of a recording on, in the numbers of the engine. False when there is no room.
+/// Forwards one event of a recording with the engine's body numbers. False: no room.
 bool Engine::play(Playback& playback, const events::Event& event) noexcept {
   if (std::holds_alternative<events::TimeWatermark>(event)) return true;
   if (!synthesiser_.push(event)) return events::find_fault(event) != nullptr;
@@ -315,7 +312,7 @@ void Engine::process(float* const* out, int channels, int frames) {
   const double now_s = synthesiser_.get_time_s();
   if (!playbacks_.empty()) advance_playbacks(now_s);
   if (!hand_contacts_.empty()) hold_contacts();
-  // Interactive events are pushed at the horizon or later, recordings long before: no event before the end of this block follows.
+  // Interactive events are pushed at the horizon or later, recordings earlier: nothing before the end of this block follows.
   (void)synthesiser_.push(events::TimeWatermark{now_s + (std::max(frames, synth::kBlock) + 1) / rate_hz_});
   synthesiser_.process(out, channels, frames);
   synthesiser_.collect();

@@ -1,5 +1,5 @@
-// The sound engine of a page, on the audio thread of a browser: models made by the workshop, bodies that are struck, touched, edited and
-// moved interactively, and recorded scenes.
+// Sound engine of a page, on the browser's audio thread: models from the workshop, interactive strikes, contacts, edits and motion, and
+// recorded scenes.
 //
 //   web::Engine engine({.rate_hz = 48000.0});
 //   engine.begin_surface(1, sizes), engine.add_to_surface(1, bytes), engine.add_model(1, 1, tables);
@@ -19,60 +19,60 @@
 #include <tuple>
 #include <vector>
 
+#include "runtime/bindings/web/event_words.hpp"
 #include "runtime/events/events.hpp"
 #include "runtime/scene/event_scheduler.hpp"
 #include "runtime/synth/load_keeper.hpp"
 #include "runtime/synth/model.hpp"
 #include "runtime/synth/synthesiser.hpp"
-#include "runtime/bindings/web/event_words.hpp"
 
 namespace carillon::web {
 
-/// Numbers of bytes of the parts of a surface, in the order in which they come: triangles, largest motions, shapes.
+/// Sizes of the parts of a surface in their order of transfer: triangles, largest motions, shapes.
 struct SurfaceSizes {
   std::size_t triangles = 0, columns = 0, largest = 0, shape = 0;  // counts of triangles, columns, numbers, numbers
 };
 
-/// A recorded scene that plays, from some time of it on.
+/// Playback of a recorded scene from a given time.
 struct PlaybackRequest {
-  std::vector<int> bodies;  // of the engine, by number in the recording; -1: not played
-  double at_s = 0.0;        // of the engine: when it begins
-  double from_s = 0.0;      // of the recording
+  std::vector<int> bodies;  // engine's body by number in the recording; -1: not played
+  double at_s = 0.0;        // start in engine time
+  double from_s = 0.0;      // start in the recording
 };
 
-/// Invariants: the caller numbers models and surfaces, the synthesiser bodies. What is moved interactively follows a path without jumps,
-/// not faster than kFastestMs where possible. Every interactive contact, and every contact of a stopped recording, gets an end.
+/// Invariants: the caller numbers models and surfaces, the synthesiser numbers bodies. Interactive motion is continuous and not faster than
+/// kFastestMs where possible. Every interactive contact, and every contact of a stopped recording, is ended.
 class Engine {
  public:
-  /// Throws InputError as synth::Synthesiser does.
+  /// Throws InputError like synth::Synthesiser.
   explicit Engine(const synth::SynthesiserOptions& options);
 
-  /// Models arrive in pieces, each of which takes little time. All throw InputError for unknown numbers and for bytes of a wrong size.
+  /// Models arrive in short pieces. Throw InputError for unknown numbers and wrong sizes.
   void begin_surface(int surface, const SurfaceSizes& sizes);
   void add_to_surface(int surface, std::span<const std::byte> bytes);
   void add_model(int model, int surface, std::span<const std::byte> tables);
-  /// Bodies that use them keep them.
+  /// Bodies keep the models that they use.
   void release_surface(int surface) { surfaces_.erase(surface); }
   void release_model(int model) { models_.erase(model); }
 
-  /// Throws InputError as the synthesiser does.
+  /// Throws InputError like the synthesiser.
   int add_body(int model, const synth::BodySettings& settings);
   /// The body continues with another model.
   void swap_model(int body, int model);
-  /// One mode of a body alone, by its number in the bank; -1: all.
+  /// Solo of one mode of a body, by its number in the bank; -1: all modes.
   void set_solo(int body, int bank_mode);
   void remove_body(int body);
 
-  /// Interactive events (event_words.hpp). Returns how many could not be played; find_fault() has the reason of the last one. Throws
+  /// Pushes interactive events (event_words.hpp). Returns the number of rejected events; find_fault() has the last reason. Throws
   /// InputError for malformed rows.
   int push(std::span<const double> words);
   const std::string& find_fault() const { return fault_; }
 
-  /// Starts a recorded scene. Its events come in pieces, in the order of the file, at any time; those before from_s are left out. Throws
-  /// InputError for unknown bodies.
+  /// Starts a recorded scene. Its events arrive in pieces, in file order, at any time; those before from_s are skipped. Throws InputError
+  /// for unknown bodies.
   void begin_playback(int playback, const PlaybackRequest& request);
   void add_to_playback(int playback, std::span<const double> words);
-  /// Ringing modes continue; contacts end. An unknown number is ignored.
+  /// Stops a playback: modes keep ringing, contacts end. Unknown numbers are ignored.
   void end_playback(int playback);
 
   /// The next frames, any number.
@@ -88,11 +88,11 @@ class Engine {
     std::shared_ptr<synth::ModelSurface> surface;
   };
   struct PlayedBody {
-    std::shared_ptr<const synth::Model> model;  // without a solo
+    std::shared_ptr<const synth::Model> model;  // without solo
     int solo = -1;
     synth::EffectSet effects;
   };
-  /// The last waypoint of a body or listener that is moved by hand.
+  /// Last waypoint of an interactively moved body or listener.
   struct Way {
     double time_s = -1e300;
     Vec3 position_m{};
@@ -100,13 +100,13 @@ class Engine {
   };
   using ContactKey = std::tuple<std::int32_t, std::uint64_t>;
   struct HandContact {
-    events::LastingContact record;  // the last one
-    double asked_s = 0.0;           // of the engine: last update from the page
+    events::LastingContact record;  // last record
+    double asked_s = 0.0;           // engine time of the page's last update
   };
   struct Playback {
     PlaybackRequest request;
     std::unique_ptr<scene::EventScheduler> scheduler;
-    std::map<int, events::BodyMotion> before;  // the last motion before from_s, by number in the recording
+    std::map<int, events::BodyMotion> before;  // last motion before from_s, by number in the recording
     std::map<ContactKey, events::LastingContact> touching;
     bool has_begun = false;
   };

@@ -1,6 +1,4 @@
-// Method:     one function lists the fields of each event, for both ways.
-// Source:     none.
-// Deviations: none.
+// Method: one function lists the fields of each event, for both directions.
 #include "runtime/bindings/web/event_words.hpp"
 
 #include <cmath>
@@ -18,9 +16,9 @@ namespace {
 constexpr std::size_t kHead = 4;  // length, kind, timing, time
 constexpr double kHalf = 4294967296.0;
 
-[[noreturn]] void refuse(const char* what) { throw InputError(std::string("this is no row of an event: ") + what); }
+[[noreturn]] void refuse(const char* what) { throw InputError(std::string("invalid event row: ") + what); }
 
-/// Fields to words.
+/// Writes fields as words.
 struct Writer {
   std::vector<double>* words;
   void field(double x) { words->push_back(x); }
@@ -43,19 +41,19 @@ struct Writer {
   }
 };
 
-/// Words to fields.
+/// Reads fields from words.
 struct Reader {
   std::span<const double> left;
   double take() {
-    if (left.empty()) refuse("it is too short");
+    if (left.empty()) refuse("too short");
     const double x = left.front();
     left = left.subspan(1);
     return x;
   }
-  /// A whole number from `low` to `high`.
+  /// An integer from `low` to `high`.
   double take_whole(double low, double high) {
     const double x = take();
-    if (!(x >= low && x <= high) || x != std::floor(x)) refuse("an index or a choice is out of range");
+    if (!(x >= low && x <= high) || x != std::floor(x)) refuse("index or choice out of range");
     return x;
   }
   void field(double& x) { x = take(); }
@@ -110,7 +108,7 @@ events::Event read_event(std::span<const double> fields, double time_s) {
   Reader reader{fields};
   event.time_s = time_s;
   pass_fields(reader, event);
-  if (!reader.left.empty()) refuse("it is too long");
+  if (!reader.left.empty()) refuse("too long");
   return event;
 }
 
@@ -128,10 +126,10 @@ void read_words(std::span<const double> words, const std::function<void(const ev
   while (!words.empty()) {
     const double length = words[0];
     if (!(length >= static_cast<double>(kHead) && length <= static_cast<double>(words.size())) || length != std::floor(length))
-      refuse("its length does not fit");
+      refuse("wrong length");
     const std::span<const double> row = words.first(length), fields = row.subspan(kHead);
     words = words.subspan(row.size());
-    if (row[2] != 0.0 && row[2] != 1.0) refuse("its timing is unknown");
+    if (row[2] != 0.0 && row[2] != 1.0) refuse("unknown timing");
     const Timing timing = row[2] == 0.0 ? Timing::kExact : Timing::kSoon;
     if (row[1] == 0.0)
       sink(read_event<0>(fields, row[3]), timing);
@@ -146,7 +144,7 @@ void read_words(std::span<const double> words, const std::function<void(const ev
     else if (row[1] == 5.0)
       sink(read_event<5>(fields, row[3]), timing);
     else
-      refuse("its kind is unknown");
+      refuse("unknown kind");
   }
 }
 

@@ -1,7 +1,5 @@
-// What JavaScript calls: numbers in, numbers out; texts and arrays at addresses of the module's memory.
-// Method:     one Engine or one Workshop per module. An exception returns -1, and its message is the text.
-// Source:     none.
-// Deviations: none.
+// Functions called from JavaScript: numbers in and out; strings and arrays by address in the module's memory.
+// Method: one Engine or one Workshop per module. Exceptions return -1 with the message as text.
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
@@ -28,9 +26,9 @@ constexpr int kChannels = 16, kFrames = 1024;
 
 std::unique_ptr<web::Engine> engine;
 std::unique_ptr<web::Workshop> workshop;
-std::string text;            // the last result, or what went wrong
-std::vector<double> words;   // the last rows of events, or poses
-std::vector<float> numbers;  // the last list of numbers
+std::string text;            // last result, or error message
+std::vector<double> words;   // last event rows or poses
+std::vector<float> numbers;  // last list of numbers
 std::vector<std::byte> bytes;
 float channels[kChannels][kFrames];
 float* const channel_at[kChannels] = {channels[0],  channels[1],  channels[2],  channels[3], channels[4],  channels[5],
@@ -71,7 +69,7 @@ std::optional<double> to_time(double time_s, int is_exact) { return is_exact != 
 
 }  // namespace
 
-// ---- of both
+// ---- common
 
 WEB_EXPORT(const char*, web_text)() { return text.data(); }
 WEB_EXPORT(int, web_text_size)() { return static_cast<int>(text.size()); }
@@ -87,9 +85,9 @@ WEB_EXPORT(int, web_instructions)() {
   return 0;
 }
 
-// ---- the engine, on the audio thread
+// ---- engine, on the audio thread
 
-/// microphones_m: `count` numbers, three a place.
+/// microphones_m: `count` numbers, three per position.
 WEB_EXPORT(int, web_open)(double rate_hz, const double* microphones_m, int count, int max_bodies, double roughness_m, double friction) {
   return run([&] {
     if (count < 3 || count > 3 * kChannels || count % 3 != 0) throw InputError("give 1 to 16 microphones, three numbers each");
@@ -123,7 +121,7 @@ WEB_EXPORT(int, web_release_model)(int model) {
 WEB_EXPORT(int, web_release_surface)(int surface) {
   return run([&] { return get_engine().release_surface(surface), 0; });
 }
-/// pose: place of the centre of mass (3), rotation (4), silence_pa, roughness_m, friction, upper and lower 32 bits of the seed.
+/// pose: centre of mass (3), rotation (4), silence_pa, roughness_m, friction, upper and lower 32 bits of the seed.
 WEB_EXPORT(int, web_add_body)(int model, const double* pose, int count, int effects) {
   return run([&] {
     if (count != 12) throw InputError("a body is described by twelve numbers");
@@ -146,7 +144,7 @@ WEB_EXPORT(int, web_set_solo)(int body, int mode) {
 WEB_EXPORT(int, web_remove_body)(int body) {
   return run([&] { return get_engine().remove_body(body), 0; });
 }
-/// How many events were refused; the text then says why the last was.
+/// Number of rejected events; the text has the last reason.
 WEB_EXPORT(int, web_push)(const double* at, int count) {
   return run([&] {
     const int refused = get_engine().push(to_span(at, count));
@@ -154,7 +152,7 @@ WEB_EXPORT(int, web_push)(const double* at, int count) {
     return refused;
   });
 }
-/// bodies: of the engine, by number in the recording.
+/// bodies: engine numbers, by number in the recording.
 WEB_EXPORT(int, web_begin_playback)(int playback, const int* bodies, int count, double at_s, double from_s) {
   return run([&] {
     const auto all = to_span(bodies, count);
@@ -168,7 +166,7 @@ WEB_EXPORT(int, web_end_playback)(int playback) {
   return run([&] { return get_engine().end_playback(playback), 0; });
 }
 WEB_EXPORT(const float*, web_channel)(int channel) { return channels[std::clamp(channel, 0, kChannels - 1)]; }
-/// Fills the first `count` channels with the next frames, at most 1024.
+/// Renders the next frames (at most 1024) into the first `count` channels.
 WEB_EXPORT(int, web_process)(int count, int frames) {
   return run([&] { return get_engine().process(channel_at, std::clamp(count, 0, kChannels), std::clamp(frames, 0, kFrames)), 0; });
 }
@@ -183,18 +181,18 @@ WEB_EXPORT(int, web_set_budget)(double mode_samples_per_s) {
 WEB_EXPORT(int, web_keep_load)(double share, double busy_s) {
   return run([&] { return get_engine().keep_load(std::clamp(share, 0.01, 1.0), busy_s), 0; });
 }
-/// The amplitudes of a body's modes, by number in the bank, are then the numbers.
+/// Writes the amplitudes of a body's modes, by number in the bank, to the numbers.
 WEB_EXPORT(int, web_measure)(int body, int modes) {
   return run([&] {
     numbers.resize(std::clamp(modes, 0, 1 << 20));
     return get_engine().get_synthesiser().measure_amplitudes(body, numbers) ? 0 : 1;
   });
 }
-/// The loudest that a body has been [Pa at 1 m].
+/// Largest pressure of a body so far [Pa at 1 m].
 WEB_EXPORT(double, web_peak_pa)(int body) { return engine == nullptr ? 0.0 : engine->get_synthesiser().get_peak_pa(body); }
 /// See synth::Synthesiser::get_deflection().
 WEB_EXPORT(double, web_deflection)(int body) { return engine == nullptr ? 0.0 : engine->get_synthesiser().get_deflection(body); }
-/// strikes, refused, late, faults, overflows, resets, mode_samples, faded, underruns, zeroed and the budget are then the words.
+/// Writes strikes, refused, late, faults, overflows, resets, mode_samples, faded, underruns, zeroed and the budget to the words.
 WEB_EXPORT(int, web_count)() {
   return run([&] {
     const synth::SynthesiserCounters c = get_engine().get_synthesiser().get_counters();
@@ -207,7 +205,7 @@ WEB_EXPORT(int, web_count)() {
   });
 }
 
-// ---- the workshop, on a worker
+// ---- workshop, on a worker
 
 WEB_EXPORT(int, web_open_workshop)(double rate_hz) {
   return run([&] {
@@ -225,7 +223,7 @@ WEB_EXPORT(int, web_add_bank)(int bank, const std::byte* at, int size, const cha
 WEB_EXPORT(int, web_remove_bank)(int bank) {
   return run([&] { return get_workshop().remove_bank(bank), 0; });
 }
-/// The vertices of a bank (V, 3) [m] are then the numbers.
+/// Writes the vertices of a bank (V, 3) [m] to the numbers.
 WEB_EXPORT(int, web_list_vertices)(int bank) {
   return run([&] {
     numbers.clear();
@@ -234,7 +232,7 @@ WEB_EXPORT(int, web_list_vertices)(int bank) {
     return 0;
   });
 }
-/// (T, 3) indices as they lie in memory are then the bytes.
+/// Writes the (T, 3) indices to the bytes, in memory order.
 WEB_EXPORT(int, web_list_triangles)(int bank) {
   return run([&] {
     const auto& triangles = get_workshop().get_bank(bank).triangles;
@@ -258,15 +256,14 @@ WEB_EXPORT(int, web_make_body)(int body, int bank, const char* scene, int scene_
 WEB_EXPORT(int, web_remove_made_body)(int body) {
   return run([&] { return get_workshop().remove_body(body), 0; });
 }
-/// The tables of a body's model are then the bytes.
+/// Writes the tables of a body's model to the bytes.
 WEB_EXPORT(int, web_write_tables)(int body) {
   return run([&] {
     bytes = get_workshop().get_body(body).model->write_tables();
     return 0;
   });
 }
-/// Part 0 triangles, 1 largest motions, 2 shapes: how many bytes of the surface of a body's model, and where. The address says whether two
-/// bodies share it.
+/// Part 0 triangles, 1 largest motions, 2 shapes: size and address of a part of a model's surface. Equal addresses: two bodies share it.
 WEB_EXPORT(int, web_surface_bytes)(int body, int part) {
   return run([&] {
     const synth::ModelSurface& surface = *get_workshop().get_body(body).model->get_surface();
@@ -297,7 +294,7 @@ WEB_EXPORT(const void*, web_surface_address)(int body) {
   });
   return at;
 }
-/// Its events are then the words, what came of it the text.
+/// Writes its events to the words, its result to the text.
 WEB_EXPORT(int, web_make_blow)
 (int body, const char* scene, int scene_size, int triangle, double a, double b, double c, double time_s, int is_exact, int number) {
   return run([&] {
@@ -325,7 +322,7 @@ WEB_EXPORT(int, web_make_plan)(const char* scene, int scene_size, const int* bod
     return 0;
   });
 }
-/// The plan of a recording, by the bodies that it was read for.
+/// Plan of a recording for the bodies it was read with.
 WEB_EXPORT(int, web_plan_recording)(const char* scene, int scene_size, int recording) {
   return run([&] {
     text = get_workshop().plan_recording(to_text(scene, scene_size), recording);
@@ -341,7 +338,7 @@ WEB_EXPORT(int, web_add_recording)(int recording, const char* at, int size, cons
 WEB_EXPORT(int, web_remove_recording)(int recording) {
   return run([&] { return get_workshop().remove_recording(recording), 0; });
 }
-/// All its events are then the words.
+/// Writes all its events to the words.
 WEB_EXPORT(int, web_list_recording)(int recording) {
   return run([&] {
     const auto all = get_workshop().get_recording(recording);
@@ -349,7 +346,7 @@ WEB_EXPORT(int, web_list_recording)(int recording) {
     return 0;
   });
 }
-/// The poses of a body are then the words, 8 each.
+/// Writes the poses of a body to the words, 8 each.
 WEB_EXPORT(int, web_list_poses)(int recording, int body) {
   return run([&] {
     words = get_workshop().list_poses(recording, body);

@@ -1,8 +1,5 @@
-// Method:     scenes are read by scene::parse_scene, blows made by scene::make_strikes, plans by scene::make_plan, so that all of it is
-// what
-//             carillon-render does; a body's bank is the file's as edited, then what scene::read_banks makes of it.
-// Source:     none.
-// Deviations: a blow meets a body at rest: what rings is in the memory of the engine. A plan is made of what has happened so far.
+// Method: scenes, blows and plans use scene::parse_scene, scene::make_strikes and scene::make_plan, as carillon-render does. A body's bank
+// is the edited file after scene::read_banks. Blows meet a body at rest, since its ringing state is in the engine. Plans cover past events.
 #include "runtime/bindings/web/workshop.hpp"
 
 #include <fmt/format.h>
@@ -45,7 +42,7 @@ constexpr std::size_t kMostEvents = std::size_t{1} << 30;  // bytes of a plan's 
 
 Json to_json(const Vec3& x) { return Json::array(x); }
 
-/// The modes of a bank for playing, as JSON; unknown `error_cents` and `radiation_per_s` are null. `heard`: of mounting::mount().
+/// Modes of a bank for playback, as JSON; unknown `error_cents` and `radiation_per_s` are null. `heard`: of mounting::mount().
 Json list_modes(const bank::Bank& bank, const std::vector<bank::HeardMode>& heard) {
   Json modes = Json::array();
   for (std::size_t m = 0; m < bank.mode_count(); ++m) {
@@ -66,7 +63,7 @@ Json list_modes(const bank::Bank& bank, const std::vector<bank::HeardMode>& hear
   return modes;
 }
 
-/// A law with all its losses times `scale`; of Rayleigh's the constants are those of the edits or of the material.
+/// A damping law with all losses times `scale`; Rayleigh constants come from the edits or the material.
 void scale_damping(double scale, const bank::Bank& bank, bank::Edits& edits) {
   if (scale == 1.0) return;
   if (!edits.damping && !edits.alphas) {
@@ -82,7 +79,7 @@ void scale_damping(double scale, const bank::Bank& bank, bank::Edits& edits) {
   for (double& loss : edits.damping->loss_factor) loss *= scale;
 }
 
-/// Nothing: the bank as it is.
+/// Empty: the unmodified bank.
 std::optional<bank::Edits> read_edits(const bank::Bank& bank, std::string_view text) {
   const base::Document document = base::parse_document(text, "edit");
   base::Object object = document.root();
@@ -147,18 +144,18 @@ Vec3 find_point(const bank::Bank& bank, std::int32_t triangle, const Vec3& baryc
   return point;
 }
 
-/// Out of the body; not of unit length where the triangle has no area.
+/// Outward, not of unit length; degenerate triangles included.
 Vec3 find_normal(const bank::Bank& bank, std::int32_t triangle) {
   const Vec3 across = bank::calc_normal(bank.vertices_m, bank.triangles[triangle]);
   return (1.0 / std::max(norm(across), 1e-300)) * across;
 }
 
-/// The radius of the patch under 1 N of each mallet's head; it grows with the cube root of the force (Hertz).
+/// Contact radius under 1 N for each mallet head; it grows with the cube root of the force (Hertz).
 Json list_patches(const bank::Bank& bank) {
   Json patches = Json::object();
   const bank::Material& body = bank.material;
   for (const material::NamedMallet& mallet : material::get_mallets()) {
-    double radius_m = mallet.radius_m, modulus_pa = 1e7;  // of felt: about that of dense felt
+    double radius_m = mallet.radius_m, modulus_pa = 1e7;  // felt: modulus of dense felt
     if (mallet.radius_m > 0.0) {
       const material::Material& head = material::MaterialTable::get().require("mallet", mallet.material).material;
       modulus_pa = head.young_modulus_pa / (1.0 - head.poisson_ratio * head.poisson_ratio);
@@ -190,7 +187,7 @@ std::string Workshop::list_choices() const {
                                .set("restitution", mallet.restitution));
   }
   for (const material::Row& row : material::MaterialTable::get().rows()) {
-    if (row.material.orthotropic) continue;  // no edit makes them of another
+    if (row.material.orthotropic) continue;  // edits keep materials isotropic
     choices["materials"].add(Json::object()
                                  .set("name", row.material.name)
                                  .set("group", row.group)
@@ -261,7 +258,7 @@ std::string Workshop::make_body(int body, int bank, std::string_view scene, std:
   scene::SceneBody& described = made.scene.bodies[0];
   Json modes;
   try {
-    // As scene::read_banks does it, of an edited bank.
+    // As in scene::read_banks, for an edited bank.
     const std::optional<bank::Edits> wanted = read_edits(*as_read, edits);
     auto played = std::make_shared<bank::Bank>(
         bank::choose_frequencies(wanted ? bank::calc_edited(*as_read, *wanted) : *as_read, made.scene.frequencies));
@@ -315,11 +312,11 @@ std::string Workshop::make_body(int body, int bank, std::string_view scene, std:
 
 namespace {
 
-/// Models that are read from tables have no transfers and no nonlinear energy, and a page has no reflecting floor and no head.
+/// Models read from tables have neither transfers nor nonlinear energy; pages have neither reflecting floors nor heads.
 constexpr synth::EffectSet kNotInPages{synth::Effect::kDirectivity, synth::Effect::kGroundReflection, synth::Effect::kHead,
                                        synth::Effect::kNonlinear, synth::Effect::kCascade};
 
-/// Facts of a scene with the banks that bodies are played with.
+/// Scene facts with the banks that the bodies play.
 effects::SceneFacts make_scene_facts(const scene::Scene& scene) {
   const auto moves = [](const scene::SceneBody& body) { return !body.spec.fixed; };
   const bool any_moves = std::any_of(scene.bodies.begin(), scene.bodies.end(), moves);
@@ -336,7 +333,7 @@ effects::SceneFacts make_scene_facts(const scene::Scene& scene) {
 synth::EffectSet Workshop::find_possible(int body) const {
   scene::Scene scene = get_body(body).scene;
   const effects::EffectSelector selector(make_scene_facts(scene));
-  // The listener of a page moves and bodies are touched, even where the scene has neither.
+  // A page's listener moves and bodies are touched, even if the scene has neither.
   synth::EffectSet possible = selector.get_possible(0);
   const effects::EffectOverrides& overrides = scene.bodies[0].overrides;
   if (overrides.automatic) {
@@ -401,7 +398,7 @@ void Workshop::make_ping(int body, int mode, double pressure_pa, int number, std
     }
   }
   const double per_n_s = std::abs(b.radiation_gain[mode]) * largest;
-  if (!(per_n_s > 0.0)) return;  // it is not heard
+  if (!(per_n_s > 0.0)) return;  // inaudible
   impulse.impulse_n_s = (std::min(pressure_pa / per_n_s, kHardestPing) / largest) * shape;
   append_words(words, impulse, Timing::kSoon);
 }

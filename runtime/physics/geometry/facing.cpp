@@ -4,6 +4,20 @@
 
 namespace carillon::geometry {
 
+double calc_skin_gap(const Shape& shape, const Vec3& x, const Nearest& at, bool is_inside) {
+  const Skin& skin = shape.skin();
+  const Mesh& mesh = shape.mesh();
+  const auto calc_height = [&](int face, const Vec3& w) { return dot(skin.calc_normal(face, w), x - skin.calc_point(face, w)); };
+  double gap = skin.is_flat(at.face) ? (is_inside ? -1.0 : 1.0) * std::sqrt(at.distance2) : calc_height(at.face, at.weights);
+  // Next to a round hole the mesh stands out of the skin: inside is what is under both sides of its edge.
+  for (int e = 3 * at.face; e < 3 * at.face + 3 && gap < 0.0; ++e) {
+    const int other = mesh.opposite[e] / 3;
+    if (skin.is_sharp(e) && !skin.is_flat(other) && mesh.is_convex(e))
+      gap = std::max(gap, calc_height(other, mesh.find_nearest_on_face(x, other).weights));
+  }
+  return gap;
+}
+
 Facing describe(const Mesh& mesh, const Skin& skin, const Nearest& at) {
   int zeros = 0, zero = 0, whole = 0;
   for (int k = 0; k < 3; ++k) {

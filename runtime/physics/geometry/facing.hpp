@@ -14,11 +14,7 @@
 namespace carillon::geometry {
 
 /// Gap of x over the skin [m], from the nearest place of the mesh; negative: inside.
-inline double calc_skin_gap(const Shape& shape, const Vec3& x, const Nearest& at, bool is_inside) {
-  const Skin& skin = shape.skin();
-  if (skin.is_flat(at.face)) return (is_inside ? -1.0 : 1.0) * std::sqrt(at.distance2);
-  return dot(skin.calc_normal(at.face, at.weights), x - skin.calc_point(at.face, at.weights));
-}
+double calc_skin_gap(const Shape& shape, const Vec3& x, const Nearest& at, bool is_inside);
 
 /// Distances of places to the surface of a body, in its own frame.
 class SurfaceProbe {
@@ -59,7 +55,8 @@ class SurfaceProbe {
     return !is_inside && on.distance2 > far * far ? std::sqrt(on.distance2) - sag : calc_skin_gap(shape_, x, on, is_inside);
   }
   Nearest find_nearest(const Vec3& x) const {
-    return shape_.mesh().find_nearest(x, Box::kFar, body_ != nullptr ? -1 : grid_->find_near(x).face);
+    const int face = body_ != nullptr ? -1 : grid_->find_near(x).face;
+    return face >= 0 && !thin_ ? shape_.mesh().walk_nearest(x, face) : shape_.mesh().find_nearest(x, Box::kFar, face);
   }
 
  private:

@@ -102,15 +102,12 @@ void find_touches(const Shape& a, const Frame& fa, const Shape& b, const Frame& 
     return;
   }
   const Frame pose = calc_relative(fa, fb);
-  if (recall(memory, pose, a, margin) && answer(a, fa, &b, fb, margin, true, memory, out)) return;
+  if (recall(memory, pose, a, margin) && answer(a, fa, &b, fb, margin, memory, out)) return;
   const double size = std::min(a.get_size_m(), b.get_size_m());
-  memory.known = true;
-  memory.searched = pose;
-  memory.reach_m = margin + choose_slack(margin, size);
-  memory.candidates.clear();
+  begin_search(memory, pose, fa, fb, margin, size);
   find_candidates(a, fa, b, fb, memory.reach_m, memory.near, memory.candidates);
   thin(memory.candidates, 0.02 * size, kPatch * size);
-  answer(a, fa, &b, fb, margin, false, memory, out);
+  answer(a, fa, &b, fb, margin, memory, out);
 }
 
 }  // namespace carillon::geometry

@@ -122,6 +122,16 @@ double calc_way(const Frame& from, const Frame& to, const Shape& a) {
   return norm(moved) + std::min(std::sqrt(turned) * a.get_radius_m(), norm(swept));
 }
 
+void begin_search(PairMemory& memory, const Frame& pose, const Frame& fa, const Frame& fb, double margin, double size) {
+  memory.known = true;
+  memory.searched = pose;
+  memory.a = fa;
+  memory.b = fb;
+  memory.reach_m = margin + choose_slack(margin, size);
+  memory.candidates.clear();
+  memory.are_followed = false;
+}
+
 bool recall(const PairMemory& memory, const Frame& pose, const Shape& a, double margin) {
   return memory.known && margin + calc_way(memory.searched, pose, a) <= memory.reach_m;
 }
@@ -146,8 +156,9 @@ void thin(std::vector<Touch>& touches, double spacing, double patch) {
   reduce(touches, patch);
 }
 
-bool answer(const Shape& a, const Frame& fa, const Shape* b, const Frame& fb, double margin, bool moved, PairMemory& memory,
-            std::vector<Touch>& out) {
+bool answer(const Shape& a, const Frame& fa, const Shape* b, const Frame& fb, double margin, PairMemory& memory, std::vector<Touch>& out) {
+  const bool moved = memory.are_followed || memory.a != fa || memory.b != fb;
+  memory.are_followed = moved;
   const double size = b != nullptr ? std::min(a.get_size_m(), b->get_size_m()) : a.get_size_m();
   for (Touch& candidate : memory.candidates) {
     if (moved && !follow(candidate, a, fa, b, fb, 0.1 * size)) return out.clear(), false;
@@ -180,14 +191,11 @@ void find_ground_touches(const Shape& a, const Frame& fa, double height, double 
   }
   // Sideways and about the vertical nothing changes, but stations do.
   const Frame pose{{Vec3{}, Vec3{}, fa.rotation[2]}, {0.0, 0.0, fa.position_m[2] - height}};
-  if (recall(memory, pose, a, margin) && answer(a, fa, nullptr, fa, margin, true, memory, out)) return;
-  memory.known = true;
-  memory.searched = pose;
-  memory.reach_m = margin + choose_slack(margin, a.get_size_m());
-  memory.candidates.clear();
+  if (recall(memory, pose, a, margin) && answer(a, fa, nullptr, fa, margin, memory, out)) return;
+  begin_search(memory, pose, fa, fa, margin, a.get_size_m());
   find_candidates(a, fa, height, memory.reach_m, memory.candidates);
   thin(memory.candidates, a.samples().spacing_m, kPatch * a.get_size_m());
-  answer(a, fa, nullptr, fa, margin, false, memory, out);
+  answer(a, fa, nullptr, fa, margin, memory, out);
 }
 
 }  // namespace carillon::geometry

@@ -117,11 +117,8 @@ bool may_tip(const Shape& a, const Frame& frame, const Vec3& normal, const Vec3&
     return norm2(from - part * along) > far_m * far_m;
   };
   // `up` may leave its cell within the time.
-  const auto tips_any = [&](const Vec3& way) {
-    const std::vector<int>& low = a.low_vertices().list(a, way);
-    return std::any_of(low.begin(), low.end(), tips);
-  };
-  return tips_any(up) || tips_any(normalise(up + time_s * lever));
+  const std::vector<int>&now = a.low_vertices().list(a, up), &then = a.low_vertices().list(a, normalise(up + time_s * lever));
+  return std::any_of(now.begin(), now.end(), tips) || (&then != &now && std::any_of(then.begin(), then.end(), tips));
 }
 
 double calc_vertex_curvature(const Shape& shape, int vertex) {

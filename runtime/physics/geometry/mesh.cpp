@@ -157,7 +157,7 @@ Nearest Mesh::find_nearest(const Vec3& x, double within2, int hint, double slack
   Nearest best;
   best.distance2 = within2;
   if (hint >= 0) {
-    const Nearest on = find_nearest_on_face(x, hint);
+    const Nearest on = walk_nearest(x, hint);
     if (on.distance2 <= within2) best = on;
   }
   double bound2 = best.distance2;
@@ -198,25 +198,32 @@ Nearest Mesh::walk_nearest(const Vec3& x, int face) const {
   constexpr int kMax = 100;
   Nearest best = find_nearest_on_face(x, face);
   for (int step = 0; step < kMax; ++step) {
-    Nearest better = best;
+    int whole = 0, zero = 0, zeros = 0;
     for (int k = 0; k < 3; ++k) {
-      if (best.weights[k] > 0.0) continue;
-      const Nearest beyond = find_nearest_on_face(x, opposite[3 * best.face + (k + 1) % 3] / 3);
-      if (beyond.distance2 < better.distance2) better = beyond;
-    }
-    int whole = -1, zeros = 0;
-    for (int k = 0; k < 3; ++k) {
-      if (best.weights[k] > 0.0) {
+      if (best.weights[k] > 0.0)
         whole = k;
-      } else {
-        ++zeros;
-      }
+      else
+        zero = k, ++zeros;
     }
-    if (zeros == 2) {
+    if (zeros == 0) break;
+    Nearest better = best;
+    const Vec3 out = x - best.place;
+    const auto try_face = [&](int f) {
+      const Nearest beyond = find_nearest_on_face(x, f);
+      if (beyond.distance2 < better.distance2) better = beyond;
+    };
+    // A face beyond has a nearer place only where its corner is less than a right angle from the way to x.
+    const auto leads = [&](int half_edge) { return dot(out, vertices[vertex_of(half_edge)] - best.place) > 0.0; };
+    if (zeros == 1) {
+      const int e = opposite[3 * best.face + (zero + 1) % 3];
+      if (leads(next(next(e)))) try_face(e / 3);
+    } else {
       const int start = 3 * best.face + whole;
-      for (int e = Mesh::next(opposite[start]); e != start; e = Mesh::next(opposite[e])) {
-        const Nearest beyond = find_nearest_on_face(x, e / 3);
-        if (beyond.distance2 < better.distance2) better = beyond;
+      bool before = leads(next(start));  // the end of the last edge
+      for (int e = next(opposite[start]); e != start; e = next(opposite[e])) {
+        const bool now = leads(next(e));
+        if (before || now) try_face(e / 3);
+        before = now;
       }
     }
     if (!(better.distance2 < best.distance2 * (1.0 - 1e-12))) break;

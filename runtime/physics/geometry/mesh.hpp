@@ -33,6 +33,11 @@ class Mesh {
   static int next(int half_edge) { return half_edge % 3 == 2 ? half_edge - 2 : half_edge + 1; }
   Vec3 place(int face, const Vec3& w) const { return w[0] * corner(face, 0) + w[1] * corner(face, 1) + w[2] * corner(face, 2); }
 
+  bool is_convex(int half_edge) const {
+    const Vec3 along = vertices[vertex_of(next(half_edge))] - vertices[vertex_of(half_edge)];
+    return dot(cross(normals[half_edge / 3], normals[opposite[half_edge] / 3]), along) > 0.0;
+  }
+
   Nearest find_nearest_on_face(const Vec3& x, int face) const;
   /// The nearest place within a squared distance; `hint`: a face that may be near, or -1.
   /// With a `slack` the one found may be further than the nearest by that much, sooner.

@@ -1,10 +1,8 @@
 // Method: of the samples near the other body, corners and ridge points that no neighbour is lower than, and samples of curved parts that
-// are
-//   the nearest among their neighbours; each against the nearest place of the other's fine mesh, and settled there. Ridges against curved
-//   parts: the lowest place of each straight piece, and ends that both pieces rise from.
+//   are the nearest among their neighbours; each against the nearest place of the other's fine mesh, and settled there. Ridges against
+//   curved parts: the lowest place of each straight piece, and ends that both pieces rise from.
 // Source: C. Ericson, "Real-Time Collision Detection" (2005), 5.1.9.
-// Deviations: estimates from the grid's face by way of neighbours, not the nearest face of all, decide which sample is the nearest among
-//   its neighbours, but for bodies with walls thinner than four cells.
+// Deviations: the nearest place is found from the grid's face by way of neighbours, but for bodies with walls thinner than four cells.
 #include "runtime/physics/geometry/pass.hpp"
 
 namespace carillon::geometry {
@@ -117,6 +115,7 @@ Touch Pass::make_touch(int place) const {
   t.axis_b = mesh.normals[at.face];
   if (is_curved) t.side_b = Side::skin, t.face_b = at.face, t.smooth = true;
   t.curvature_a_per_m = get_sharp_curvature(mine_, sample.kind);
+  t.rim_m = mine_.skin().calc_rim_radius_m(sample.vertex);
   if (sample.kind == VertexKind::smooth) {
     const Spot spot = mine_.skin().locate(sample.point, sample.face);
     t.curvature_a_per_m = mine_.skin().calc_mean_curvature(spot.face, spot.weights);
@@ -174,6 +173,7 @@ void Pass::add_point(const Sample& sample) {
   if (t.side_b == Side::plane && sample.kind != VertexKind::corner && !mine_.skin().is_flat(sample.face) && add_rim(sample, t)) return;
   if (t.side_b != Side::skin) settle(t, mine_, fm_, &theirs_, ft_, reach_);
   t.curvature_a_per_m = get_sharp_curvature(mine_, sample.kind);
+  t.rim_m = mine_.skin().calc_rim_radius_m(sample.vertex);
   t.id = make_id(Feature::corner_a, sample.vertex, 0);
   if (t.gap_m <= reach_) out_.push_back(t);
 }
@@ -221,6 +221,7 @@ void Pass::add_end(int vertex) {
   std::optional<Touch> t = begin_ridge(mine_.mesh().vertices[vertex]);
   if (!t || !settle(*t, mine_, fm_, &theirs_, ft_, 0.05 * mine_.get_size_m(), kFirst) || t->gap_m > reach_) return;
   t->id = make_id(Feature::corner_a, vertex, 0);
+  t->rim_m = mine_.skin().calc_rim_radius_m(vertex);
   out_.push_back(*t);
 }
 

@@ -8,6 +8,8 @@
 namespace carillon::geometry {
 namespace {
 
+constexpr int kMostGrown = 2;  // steps between two curved sides that are longer than the ones before
+
 /// One side of a touch, in the world.
 struct Half {
   const Shape* shape = nullptr;
@@ -143,7 +145,14 @@ bool settle_curved(Touch& touch, Half& a, Half& b, double reach, int max) {
   const Vec3 start_a = a.point, start_b = b.point;
   const double close = 1e-5 * reach;
   bool settled = false;
-  for (int i = 0; i < max && !settled; ++i) settled = step(a, b, n, reach) < close;
+  // On bumps the steps do not shrink: they wander.
+  double before = Box::kFar;
+  for (int i = 0, grown = 0; i < max && !settled && grown < kMostGrown; ++i) {
+    const double moved = step(a, b, n, reach);
+    settled = moved < close;
+    grown += moved > before ? 1 : 0;
+    before = moved;
+  }
   touch.normal = n;
   touch.gap_m = dot(n, a.point - b.point);
   touch.where_m = 0.5 * (a.point + b.point);

@@ -51,10 +51,7 @@ std::vector<std::vector<int>> find_chains(const Mesh& mesh, const Skin& skin) {
   std::vector<char> open(edges, 0);
   std::vector<int> leaving(mesh.vertices.size(), 0);  // convex sharp half-edges, both ways, at a vertex
   for (int e = 0; e < edges; ++e) {
-    if (!skin.is_sharp(e)) continue;
-    const int f = e / 3, g = mesh.opposite[e] / 3;
-    const Vec3 along = mesh.vertices[mesh.vertex_of(Mesh::next(e))] - mesh.vertices[mesh.vertex_of(e)];
-    if (dot(cross(mesh.normals[f], mesh.normals[g]), along) <= 0.0) continue;
+    if (!skin.is_sharp(e) || !mesh.is_convex(e)) continue;
     open[e] = 1;
     ++leaving[mesh.vertex_of(e)];
   }

@@ -53,12 +53,15 @@ bool is_level(const Touch& touch, const Shape& a, const Frame& frame_a, const Sh
 Frame calc_relative(const Frame& a, const Frame& b);
 /// Upper bound of the movement of any point of a between two poses [m].
 double calc_way(const Frame& from, const Frame& to, const Shape& a);
-/// Is all that is nearer than margin_m now among the candidates of the last search?
+/// Notes a new search.
+void begin_search(PairMemory& memory, const Frame& pose, const Frame& frame_a, const Frame& frame_b, double margin_m, double size_m);
+/// Is all that is nearer than margin_m now among the candidates of the last search? `pose`: of a in b.
 bool recall(const PairMemory& memory, const Frame& pose, const Shape& a, double margin_m);
 /// Keeps of touches that travel and have met one, the deepest; then few of a patch.
 void thin(std::vector<Touch>& touches, double spacing_m, double patch_m);
-/// Candidates of the memory within the margin, with names; `moved`: to be settled first. False, without touches: a lost candidate.
-bool answer(const Shape& a, const Frame& frame_a, const Shape* b, const Frame& frame_b, double margin_m, bool moved, PairMemory& memory,
+/// Candidates of the memory within the margin, with names, settled where the bodies have moved since the search. False, without touches: a
+/// lost candidate.
+bool answer(const Shape& a, const Frame& frame_a, const Shape* b, const Frame& frame_b, double margin_m, PairMemory& memory,
             std::vector<Touch>& out);
 
 /// Of two bodies at a distance of 0 to `size`: how far a search looks beyond the margin, so that the next ones can be spared.

@@ -35,11 +35,7 @@ Skin::Skin(const Mesh& mesh) : mesh_(mesh) {
   find_sharp_edges();
   make_fans();
   make_groups();
-  for (int f = 0; f < mesh.count_faces(); ++f) {
-    if (flat_[f] != 0) continue;
-    const Patch patch = make_patch(f);
-    for (int k = 0; k < 3; ++k) sag_m_ = std::max(sag_m_, 2.0 / 3.0 * norm(patch.c[k] - 0.5 * (patch.p[k] + patch.p[(k + 1) % 3])));
-  }
+  make_bends();
   all_curved_ = std::find(flat_.begin(), flat_.end(), 1) == flat_.end() &&
                 std::all_of(kinds_.begin(), kinds_.end(), [](VertexKind kind) { return kind == VertexKind::smooth; });
 }
@@ -264,6 +260,18 @@ void Skin::make_groups() {
   }
 }
 
+double Skin::calc_rim_radius_m(int vertex) const {
+  if (vertex < 0 || kinds_[vertex] != VertexKind::ridge) return 0.0;
+  std::array<Vec3, 2> ways{};
+  int count = 0, e = mesh_.any_half_edge[vertex];
+  do {
+    if (sharp_[e] != 0) ways[count++] = mesh_.vertices[mesh_.vertex_of(Mesh::next(e))] - mesh_.vertices[vertex];
+    e = Mesh::next(mesh_.opposite[e]);
+  } while (e != mesh_.any_half_edge[vertex]);
+  const double bend = calc_angle(ways[0], -1.0 * ways[1]);
+  return bend > kCoplanar ? std::min(0.5 * (norm(ways[0]) + norm(ways[1])) / bend, 0.5 * size_m_) : 0.0;
+}
+
 int Skin::find_face(int vertex) const {
   const int start = mesh_.any_half_edge[vertex];
   int e = start;
@@ -274,23 +282,28 @@ int Skin::find_face(int vertex) const {
   return start / 3;
 }
 
-Patch Skin::make_patch(int face) const {
-  Patch patch;
-  for (int k = 0; k < 3; ++k) patch.p[k] = mesh_.corner(face, k);
-  for (int k = 0; k < 3; ++k) {
-    const int l = (k + 1) % 3;
-    patch.c[k] = 0.5 * (patch.p[k] + patch.p[l]);
-    if (flat_[face] != 0) continue;
-    const Vec3 d = patch.p[l] - patch.p[k];
-    const Vec3 &nk = fan_normals_[fan_[3 * face + k]], &nl = fan_normals_[fan_[3 * face + l]];
-    patch.c[k] = patch.c[k] - (0.5 * kAlpha * dot(d, nk)) * nk + (0.5 * kAlpha * dot(d, nl)) * nl;
+/// Control points of curved edges. A sharp edge bends in the plane of its tangents, given by the normals of both sides, so both sides meet.
+void Skin::make_bends() {
+  bends_.resize(mesh_.faces.size());
+  for (int e = 0; e < 3 * mesh_.count_faces(); ++e) {
+    const int next = Mesh::next(e), other = mesh_.opposite[e];
+    const Vec3 &p = mesh_.vertices[mesh_.vertex_of(e)], &q = mesh_.vertices[mesh_.vertex_of(next)], d = q - p;
+    Vec3& control = bends_[e / 3][e % 3];
+    control = 0.5 * (p + q);
+    const auto lift = [&](int corner, int across) {  // from the tangent plane or line at a corner to the other end
+      const Vec3& n = fan_normals_[fan_[corner]];
+      const Vec3 t = cross(n, fan_normals_[fan_[across]]);
+      if (sharp_[e] == 0) return dot(d, n) * n;
+      return norm2(t) > kCoplanar ? d - (dot(d, t) / norm2(t)) * t : Vec3{};
+    };
+    if (flat_[e / 3] == 0) control = control - (0.5 * kAlpha) * lift(e, Mesh::next(other)) + (0.5 * kAlpha) * lift(next, other);
+    sag_m_ = std::max(sag_m_, 2.0 / 3.0 * norm(control - 0.5 * (p + q)));
   }
-  return patch;
 }
 
 Vec3 Skin::calc_point(int face, const Vec3& w) const {
   if (flat_[face] != 0) return mesh_.place(face, w);
-  const Patch q = make_patch(face);
+  const Patch q = get_patch(face);
   Vec3 x{};
   for (int k = 0; k < 3; ++k) x = x + (w[k] * w[k]) * q.p[k] + (2.0 * w[k] * w[(k + 1) % 3]) * q.c[k];
   return x;
@@ -298,7 +311,7 @@ Vec3 Skin::calc_point(int face, const Vec3& w) const {
 
 Vec3 Skin::calc_normal(int face, const Vec3& w) const {
   if (flat_[face] != 0) return mesh_.normals[face];
-  const Patch q = make_patch(face);
+  const Patch q = get_patch(face);
   std::array<Vec3, 3> d;  // by each weight
   for (int k = 0; k < 3; ++k) d[k] = w[k] * q.p[k] + w[(k + 1) % 3] * q.c[k] + w[(k + 2) % 3] * q.c[(k + 2) % 3];
   return normalise(cross(d[1] - d[0], d[2] - d[0]));
@@ -314,21 +327,23 @@ Tensor Skin::calc_tensor(int face, const Vec3& w) const {
 
 double Skin::calc_mean_curvature(int face, const Vec3& w) const { return calc_mean(calc_tensor(face, w)); }
 
-Spot Skin::find_lowest(const Vec3& up, int face, const Vec3& centre, double spring) const {
-  const Patch q = make_patch(face);
+/// Replaces a place by the lowest one of another face, if that is lower and below `below`; place() follows.
+void Skin::lower(const Vec3& up, int face, const Vec3& centre, double spring, double below, Spot& spot) const {
+  const Patch q = get_patch(face);
   const Vec3 d0 = q.p[0] - centre, d1 = q.p[1] - centre, d2 = q.p[2] - centre;
   const double a0 = dot(up, q.p[0]) + spring * norm2(d0), a1 = dot(up, q.p[1]) + spring * norm2(d1),
                a2 = dot(up, q.p[2]) + spring * norm2(d2);
   const double c01 = dot(up, q.c[0]) + spring * dot(d0, d1), c12 = dot(up, q.c[1]) + spring * dot(d1, d2),
                c20 = dot(up, q.c[2]) + spring * dot(d2, d0);
-  Spot spot;
-  spot.face = face;
-  spot.height = Box::kFar;
+  // No place is lower than all coefficients, rounding apart.
+  if (std::min({a0, a1, a2, c01, c12, c20}) >= below + tiny_) return;
+  double lowest = Box::kFar;
+  Vec3 weights{};
   const auto take = [&](double w0, double w1, double w2) {
     const double h = w0 * w0 * a0 + w1 * w1 * a1 + w2 * w2 * a2 + 2.0 * (w0 * w1 * c01 + w1 * w2 * c12 + w2 * w0 * c20);
-    if (h < spot.height) {
-      spot.height = h;
-      spot.weights = {w0, w1, w2};
+    if (h < lowest) {
+      lowest = h;
+      weights = {w0, w1, w2};
     }
   };
   take(1, 0, 0);
@@ -354,17 +369,29 @@ Spot Skin::find_lowest(const Vec3& up, int face, const Vec3& centre, double spri
       if (u > 0.0 && v > 0.0 && u + v < 1.0) take(1.0 - u - v, u, v);
     }
   }
+  if (!(lowest < below && lowest < spot.height)) return;
+  spot.face = face;
+  spot.height = lowest;
+  spot.weights = weights;
+}
+
+/// The point of a spot on the patch, of a flat face as well.
+void Skin::place(Spot& spot) const {
+  const Patch q = get_patch(spot.face);
   const Vec3& w = spot.weights;
   spot.point = Vec3{};
   for (int k = 0; k < 3; ++k) spot.point = spot.point + (w[k] * w[k]) * q.p[k] + (2.0 * w[k] * w[(k + 1) % 3]) * q.c[k];
-  return spot;
 }
 
 Spot Skin::walk_lowest(const Vec3& up, int face, const Vec3& centre, double reach, bool stays) const {
   constexpr int kMax = 400;
   const double spring = 0.5 * (stays ? kStays : kSpring) / size_m_;
-  Spot best = find_lowest(up, face, centre, spring);
+  Spot best;
+  best.face = face;
+  best.height = Box::kFar;
+  lower(up, face, centre, spring, Box::kFar, best);
   for (int step = 0; step < kMax; ++step) {
+    place(best);
     if (norm2(best.point - centre) > reach * reach) {
       best.settled = false;
       return best;
@@ -379,21 +406,19 @@ Spot Skin::walk_lowest(const Vec3& up, int face, const Vec3& centre, double reac
       }
     }
     if (zeros == 0) return best;
-    Spot better = best;
     const double below = best.height - tiny_;
+    Spot better = best;
     if (zeros == 1) {
-      const Spot beyond = find_lowest(up, mesh_.opposite[3 * best.face + (zero + 1) % 3] / 3, centre, spring);
-      if (beyond.height < below) better = beyond;
+      lower(up, mesh_.opposite[3 * best.face + (zero + 1) % 3] / 3, centre, spring, below, better);
     } else {
       const int start = 3 * best.face + whole;
-      for (int e = Mesh::next(mesh_.opposite[start]); e != start; e = Mesh::next(mesh_.opposite[e])) {
-        const Spot beyond = find_lowest(up, e / 3, centre, spring);
-        if (beyond.height < below && beyond.height < better.height) better = beyond;
-      }
+      for (int e = Mesh::next(mesh_.opposite[start]); e != start; e = Mesh::next(mesh_.opposite[e]))
+        lower(up, e / 3, centre, spring, below, better);
     }
     if (!(better.height < below)) return best;
     best = better;
   }
+  place(best);
   return best;
 }
 

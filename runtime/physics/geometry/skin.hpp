@@ -53,13 +53,15 @@ class Skin {
   int count_regions() const { return regions_; }
   bool is_sharp(int half_edge) const { return sharp_[half_edge] != 0; }
   VertexKind kind(int vertex) const { return kinds_[vertex]; }
+  /// Of the rim that a vertex of a ridge is on [m]; 0: another vertex.
+  double calc_rim_radius_m(int vertex) const;
   /// A face at a vertex: a curved one, if there is one.
   int find_face(int vertex) const;
   /// The smoothing group of a face: faces joined over edges that are not sharp.
   int group(int face) const { return group_[face]; }
   int count_smooth_edges() const { return smooth_edges_; }  // between different regions
 
-  Patch make_patch(int face) const;
+  Patch get_patch(int face) const { return {{mesh_.corner(face, 0), mesh_.corner(face, 1), mesh_.corner(face, 2)}, bends_[face]}; }
   Vec3 calc_point(int face, const Vec3& w) const;
   /// The patch's own normal.
   Vec3 calc_normal(int face, const Vec3& w) const;
@@ -81,7 +83,9 @@ class Skin {
   void make_groups();
   bool is_tip(const std::vector<int>& corners, const Vec3& mean) const;  // of half-edges about a vertex that leave it
   void fit_tensor(int vertex, const std::vector<int>& corners, int fan);
-  Spot find_lowest(const Vec3& up, int face, const Vec3& centre, double spring) const;
+  void make_bends();
+  void lower(const Vec3& up, int face, const Vec3& centre, double spring, double below, Spot& spot) const;
+  void place(Spot& spot) const;
 
   const Mesh& mesh_;
   bool all_curved_ = false;
@@ -92,6 +96,7 @@ class Skin {
   std::vector<Vec3> fan_normals_;
   std::vector<Tensor> fan_tensors_;
   std::vector<char> fan_curved_;
+  std::vector<std::array<Vec3, 3>> bends_;  // Patch::c of the faces
   std::vector<VertexKind> kinds_;
   double sag_m_ = 0.0, tiny_ = 0.0, size_m_ = 0.0;
 };

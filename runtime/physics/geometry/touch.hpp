@@ -26,6 +26,7 @@ struct Touch {
   Vec3 station_a{}, station_b{};  // surface points in the mesh frames (b: world for the ground)
   double curvature_a_per_m = 0.0, curvature_b_per_m = 0.0;  // mean, for Hertz; 0 flat
   double steepest_per_m = 0.0;                              // the largest curvature of curved sides together: of what rolls; 0 flat
+  double rim_m = 0.0;                                       // radius of a rim that touches with a corner of its polygon; 0: none
   bool smooth = false;                                      // the point travels over a curved surface while it rolls: refresh() moves it
   // What refresh() continues from:
   Side side_a = Side::point, side_b = Side::plane;
@@ -50,8 +51,10 @@ class PairMemory {
  public:
   bool known = false;
   Frame searched;                   // a in b, at the last search
+  Frame a, b;                       // at that search
   double reach_m = 0.0;             // margin of that search and what was added to it
-  std::vector<Touch> candidates;    // of it, nearer than reach_m
+  std::vector<Touch> candidates;    // of it, nearer than reach_m,
+  bool are_followed = false;        // and moved since
   std::vector<Touch> last;          // touches given at the last call, to name those of the next
   std::uint64_t serial = 0;         // of names given
   std::array<int, 2> axis{-1, -1};  // that separated or carried last: kind, index

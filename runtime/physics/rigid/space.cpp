@@ -144,7 +144,7 @@ void Space::step_island(Island& island, double start_s, double length_s) {
       if (instants_.confirm(step_, first, length_s - done, kDeep * (1 + missed))) {
         strike(first);
         if (++impacts == max_impacts) instants_.set_crowded(island, start_s + length_s);
-      } else if (++missed > kMaxMissed) {
+      } else if ((missed += at > kShortest ? 1 : missed + 1) > kMaxMissed) {  // an instant that is now would be missed again
         impacts = max_impacts;
       }
     }

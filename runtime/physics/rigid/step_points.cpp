@@ -127,10 +127,11 @@ double StepProblem::calc_patch_radius(const Contact& c) const {
   return impact::calc_patch_radius(push, bodies_.calc_contact_radius(c.touch, c.a, c.b), bodies_.calc_compliance(c.a, c.b));
 }
 
-/// Way of a touch over the more curved surface for an angle of rolling [m]; at rest the radius of the largest curvature.
+/// Way of a touch over the more curved surface for an angle of rolling [m]; at rest the radius of the largest curvature. A polygonal rim
+/// goes from corner to corner, as far as a round one.
 double StepProblem::calc_rolling_radius(const Step& step, const Point& p, const Contact& c, const geometry::Touch& moved) const {
   const geometry::Touch& t = c.touch;
-  const double at_rest = 1.0 / std::max(t.curvature_a_per_m + t.curvature_b_per_m, t.steepest_per_m);
+  const double at_rest = std::max(t.rim_m, 1.0 / std::max(t.curvature_a_per_m + t.curvature_b_per_m, t.steepest_per_m));
   const Vec3 spin = (p.a >= 0 ? step.free[p.a].placed.spin : Vec3{}) - (p.b >= 0 ? step.free[p.b].placed.spin : Vec3{});
   const double turned = step.length_s * norm(spin - dot(spin, t.normal) * t.normal);
   if (turned < kAtRestTurned) return at_rest;

@@ -83,6 +83,10 @@ void TouchSets::search(Pair& pair, double step_s) {
   pair.searched = true;
   const std::vector<Contact> old = std::exchange(pair.contacts, {});
   pair.ahead.touches.clear();
+  for (geometry::Touch& last : pair.memory.last) {  // names follow touches on their way
+    const auto at = std::find_if(old.begin(), old.end(), [&](const Contact& c) { return c.touch.id == last.id; });
+    if (at != old.end()) last = move(at->touch, pair.apart_m);
+  }
   found_.clear();
   const geometry::Shape& a = *bodies_.get_shape(pair.a);
   const geometry::Frame frame_a = bodies_.get_frame(pair.a);

@@ -1,7 +1,5 @@
-// Method:     PortAudio's callback with separate channels, which is what process() fills. The null device is a thread that sleeps until
-//             the next block is due; when it is a block or more late, the time is lost, as a card would lose it.
-// Source:     PortAudio V19 reference, portaudio.h.
-// Deviations: none.
+// Method: PortAudio's callback with non-interleaved channels, as process() fills them. The null device is a thread that sleeps until the
+// next block is due; a delay of a block or more is lost time, as on a card. Source: PortAudio V19 reference, portaudio.h.
 #include "runtime/render/live/device.hpp"
 
 #include <fcntl.h>
@@ -22,11 +20,11 @@
 namespace carillon::live {
 namespace {
 
-/// PortAudio, started once for as long as it is used.
+/// PortAudio, initialised while in use.
 class Library {
  public:
   Library() {
-    // Its back ends print a line on standard error for every sound system that is not there.
+    // Back ends print to standard error for every missing sound system.
     const int kept = dup(STDERR_FILENO);
     const int nothing = open("/dev/null", O_WRONLY | O_CLOEXEC);
     if (kept >= 0 && nothing >= 0) dup2(nothing, STDERR_FILENO);
@@ -43,7 +41,7 @@ class Library {
   Library& operator=(const Library&) = delete;
 };
 
-/// Index of every output device, the default one first.
+/// Indices of the output devices, default first.
 std::vector<PaDeviceIndex> find_outputs() {
   std::vector<PaDeviceIndex> outputs;
   const PaDeviceIndex preferred = Pa_GetDefaultOutputDevice();
@@ -68,10 +66,10 @@ PaDeviceIndex find_device(const std::string& name) {
 }  // namespace
 
 struct Device::State {
-  std::optional<Library> library;  // not on the null device
-  double period_s = 0.0;           // of a block, on the null device
+  std::optional<Library> library;  // unset for the null device
+  double period_s = 0.0;           // of a block, null device only
   int frames_of_block = 0;
-  std::vector<std::vector<float>> channels;  // where the null device's blocks go
+  std::vector<std::vector<float>> channels;  // buffers of the null device
   std::jthread clock;
   synth::Synthesiser* synthesiser = nullptr;
   PaStream* stream = nullptr;

@@ -1,7 +1,7 @@
-// A synthesiser on a sound card, or on a clock alone.
+// A synthesiser on a sound card or on a clock.
 //
 //   live::Device device(synthesiser, {.frames = 256});
-//   device.start();  // from now on the card calls process()
+// the card then calls process()
 #pragma once
 
 #include <cstdint>
@@ -13,34 +13,32 @@
 
 namespace carillon::live {
 
-/// What a program says where nothing can be heard.
+/// Message without an audio device.
 inline constexpr const char* kNoCardText =
     "there is no sound card, and no sound server runs; --null plays without sound, and carillon-render writes a WAV file";
 
 struct DeviceOptions {
-  std::string name;        // of list_devices(); empty: the system's default
-  bool null = false;       // no sound system is asked for: a thread takes the blocks at the pace of real time and drops them
-  double rate_hz = 48000;  // that of the synthesiser
-  int frames = 256;        // of a block; the card may take others
+  std::string name;        // one of list_devices(); empty: the system's default
+  bool null = false;       // no sound system: a thread takes blocks in real time and drops them
+  double rate_hz = 48000;  // the synthesiser's
+  int frames = 256;        // per block; the card may use others
 };
 
 struct DeviceStatistics {
   std::int64_t callbacks = 0;
   std::int64_t frames = 0;
-  std::int64_t underflows = 0;  // blocks that came too late, as the card says; without a card, by a block or more
-  double latency_s = 0.0;       // of the output, as the card says; without a card, of a block
-  double busy_s = 0.0;          // CPU time that process() took
+  std::int64_t underflows = 0;  // late blocks as reported by the card; without a card: late by a block or more
+  double latency_s = 0.0;       // output latency as reported by the card; without a card: one block
+  double busy_s = 0.0;          // CPU time of process()
 };
 
-/// Output devices by name, the default one first. Throws SystemError when there is no sound system. [main-thread]
+/// Names of the output devices, default first. Throws SystemError without a sound system. [main-thread]
 std::vector<std::string> list_devices();
 
-/// One output stream, a channel for each microphone. All members [main-thread]; the card's thread calls Synthesiser::process() and nothing
-/// else.
+/// One output stream, one channel per microphone. All members [main-thread]; the card's thread calls only Synthesiser::process().
 class Device {
  public:
-  /// Opens the device; the synthesiser must outlive it. Throws InputError for a name that no device has, SystemError when there is none or
-  /// it does not open.
+  /// Opens the device; the synthesiser must outlive it. Throws InputError for an unknown name, SystemError if no device opens.
   Device(synth::Synthesiser& synthesiser, const DeviceOptions& options);
   ~Device();  // stops
   Device(const Device&) = delete;

@@ -1,4 +1,4 @@
-// carillon-live: a scene file to a sound card.
+// carillon-live: plays a scene file on a sound card.
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
@@ -11,10 +11,10 @@
 #include "runtime/base/file_limit.hpp"
 #include "runtime/base/message.hpp"
 #include "runtime/base/printable.hpp"
+#include "runtime/base/version.hpp"
 #include "runtime/base/whole_range.hpp"
 #include "runtime/render/live/device.hpp"
 #include "runtime/render/live/player.hpp"
-#include "runtime/base/version.hpp"
 
 namespace {
 
@@ -29,29 +29,29 @@ int main(int argc, char** argv) {
   carillon::base::report_file_limit();
   carillon::live::PlayerOptions options;
   bool lists = false;
-  CLI::App app("Plays a scene of falling bodies while it happens.", "carillon-live");
+  CLI::App app("Simulates and plays a scene in real time.", "carillon-live");
   app.failure_message([](const CLI::App* asked, const CLI::Error& error) {
     return carillon::base::printable_lines(CLI::FailureMessage::simple(asked, error));
   });
   auto* scene = app.add_option("scene", options.scene, "Scene file (JSON)")->option_text("SCENE.json");
-  app.add_flag("--list", lists, "List the sound cards' outputs, the default one first")->excludes(scene);
+  app.add_flag("--list", lists, "List output devices, default first")->excludes(scene);
   auto* device = app.add_option("--device", options.device, "Output to play on, by its name")->option_text("NAME");
-  app.add_flag("--null", options.null, "Play to nothing, at the pace of real time: works without a sound card")->excludes(device);
+  app.add_flag("--null", options.null, "Play in real time without a sound card")->excludes(device);
   app.set_version_flag("--version", carillon::base::describe("carillon-live"));
-  app.add_option("--frames", options.frames, "Frames of a block, 16 to 8192")
+  app.add_option("--frames", options.frames, "Frames per block, 16 to 8192")
       ->check(carillon::base::whole_range(16, 8192), carillon::base::describe_whole_range(16, 8192))
       ->option_text("N");
-  app.add_option("--look-ahead", options.look_ahead_s, "Seconds by which physics runs ahead of the sound, 0.02 to 10")
+  app.add_option("--look-ahead", options.look_ahead_s, "Lead of the physics over the sound in seconds, 0.02 to 10")
       ->check(CLI::Range(0.02, 10.0))
       ->option_text("S");
   app.add_option("--gain", options.gain_per_pa, "Full scale per pascal, instead of the scene's (or 1)")
       ->check(CLI::Range(1e-12, 1e12))
       ->option_text("G");
   app.add_option("--cpu", options.cpu_share,
-                 "Share of one core that the sound may take, 0.01 to 1; the least audible modes fade out for it")
+                 "Share of one core available to the sound, 0.01 to 1; the least audible modes fade out to meet it")
       ->check(CLI::Range(0.01, 1.0))
       ->option_text("SHARE");
-  app.add_flag("-q,--quiet", options.quiet, "Print nothing but warnings and errors");
+  app.add_flag("-q,--quiet", options.quiet, "Print warnings and errors only");
   try {
     app.parse(argc, argv);
     if (!lists && scene->empty()) throw CLI::RequiredError("scene");

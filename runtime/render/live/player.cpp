@@ -1,7 +1,5 @@
-// Method:     one thread runs the physics in slices until it is `look_ahead_s` ahead of the card and pushes its events as they fall due;
-//             the card's thread plays them. Where physics falls behind, impulses act late, which is counted.
-// Source:     none.
-// Deviations: none.
+// Method: one thread advances the physics in slices until it is `look_ahead_s` ahead of the card, and pushes events when due; the card's
+// thread plays them. If physics falls behind, impulses act late and are counted.
 #include "runtime/render/live/player.hpp"
 
 #include <fmt/core.h>
@@ -34,12 +32,11 @@
 namespace carillon::live {
 namespace {
 
-constexpr double kSliceS = 0.01;   // of CPU time for physics, between two looks at the ring
-constexpr double kMarginS = 0.01;  // by which waypoints and records of contacts are pushed earlier than strikes
-// Events are pushed at most this long before they are due, however far physics is in front: the synthesiser has room for what waits so
-// long.
+constexpr double kSliceS = 0.01;   // CPU time of physics between two checks of the ring
+constexpr double kMarginS = 0.01;  // lead of waypoints and contact records over strikes
+// Longest time that a pushed event waits; bounds the synthesiser's queues, however far ahead the physics is.
 constexpr double kPushedS = 0.25;
-constexpr int kMaxStrikes = 1024, kMaxForces = 2048;  // of a body that wait or act
+constexpr int kMaxStrikes = 1024, kMaxForces = 2048;  // per body, waiting or active
 constexpr int kMaxWaypoints = 1024, kRingEvents = 1 << 14;
 
 void warn(const std::vector<std::string>& warnings) {
@@ -65,7 +62,7 @@ class Physics {
     }
   }
 
-  /// Advances towards a time, for a slice of CPU time. False when there is nothing to do: physics goes by whole windows, the last of which
+  /// Advances towards a time for one slice of CPU time. False if nothing is to be done: physics advances by whole windows, and the last one
   /// may have to wait.
   bool advance(double until_s) {
     if (world_ == nullptr || time_s_ >= std::min(until_s, end_s_)) return false;
@@ -78,13 +75,13 @@ class Physics {
     window_cpu_s_ += now_s - counted_s_;
     return time_s_ > was_s || now_s - began_s >= kSliceS;
   }
-  /// The most CPU time that a window of the physics, 2 ms of the scene, has taken.
+  /// Largest CPU time of one window of physics (2 ms of scene time).
   double get_worst_window_s() const { return worst_window_s_; }
-  /// Up to where all events are known.
+  /// Time up to which all events are known.
   double get_time_s() const { return world_ == nullptr || time_s_ >= end_s_ ? std::numeric_limits<double>::infinity() : time_s_; }
 
  private:
-  /// The physics marks the end of each window.
+  /// Physics marks the end of each window.
   void end_window() {
     const double now_s = base::get_thread_cpu_s();
     worst_window_s_ = std::max(worst_window_s_, window_cpu_s_ + now_s - counted_s_);
@@ -98,7 +95,7 @@ class Physics {
   double window_cpu_s_ = 0.0, worst_window_s_ = 0.0, counted_s_ = 0.0;
 };
 
-/// Plays a scene: physics ahead of the events, events ahead of the sound. Bodies have all effects that they may call for.
+/// Plays a scene: physics ahead of the events, events ahead of the sound. Bodies have all effects that they may need.
 class Player {
  public:
   Player(const scene::Scene& scene, const std::vector<const bank::Bank*>& banks, const PlayerOptions& options)
@@ -128,7 +125,7 @@ class Player {
     push(0.0);
   }
 
-  /// What is to be done when the sound has come to a time. False when physics need not advance.
+  /// Work when the sound has reached a time. False if the physics need not advance.
   bool step(double now_s) {
     const bool advanced = physics_.advance(now_s + look_ahead_s_);
     min_lead_s_ = std::min(min_lead_s_, physics_.get_time_s() - synthesiser_->get_time_s());
@@ -137,7 +134,7 @@ class Player {
     return advanced;
   }
 
-  /// How far physics was in front of the sound at the worst; infinite for a scene without physics.
+  /// Smallest lead of the physics over the sound; infinite without physics.
   double get_min_lead_s() const { return min_lead_s_; }
   double get_worst_window_s() const { return physics_.get_worst_window_s(); }
   std::int64_t get_faults() const { return scheduler_.get_faults(); }
@@ -166,7 +163,7 @@ class Player {
     return session_.open(room);
   }
 
-  /// What does not fit into the ring waits.
+  /// Events that do not fit into the ring wait.
   void push(double now_s) {
     scheduler_.push_until(now_s + pushed_s_, physics_.get_time_s(),
                           [this](const events::Event& event) { return synthesiser_->push(event); });

@@ -1,4 +1,4 @@
-// A scene played while it happens: physics runs a little ahead of the sound card.
+// Live playback of a scene: physics runs slightly ahead of the sound card.
 #pragma once
 
 #include <cstdint>
@@ -10,16 +10,16 @@ namespace carillon::live {
 struct PlayerOptions {
   std::filesystem::path scene;
   std::string device;         // empty: the system's default
-  bool null = false;          // no device: nothing is heard, and real time is the clock
-  int frames = 256;           // of a block
-  double look_ahead_s = 0.1;  // by which physics runs ahead of the sound
-  double cpu_share = 0.0;     // of a core that the sound may take; 0: all that it needs
+  bool null = false;          // no device; blocks are timed by the clock
+  int frames = 256;           // per block
+  double look_ahead_s = 0.1;  // lead of the physics over the sound
+  double cpu_share = 0.0;     // share of a core available to the sound; 0: unlimited
   double gain_per_pa = 0.0;   // 0: the scene's gain_per_pa, or 1
   bool quiet = false;
 };
 
-/// Plays a scene to its end on a device; prints what it did. Throws InputError before any sound for a bad scene, bank or device, SolveError
-/// when the physics breaks down, SystemError when there is no sound card.
+/// Plays a scene to its end on a device and prints figures. Throws InputError before any sound for an invalid scene, bank or device,
+/// SolveError if the physics fails, SystemError without a sound card.
 void play(const PlayerOptions& options);
 
 }  // namespace carillon::live

@@ -12,9 +12,9 @@
 #include "runtime/base/file_limit.hpp"
 #include "runtime/base/message.hpp"
 #include "runtime/base/printable.hpp"
+#include "runtime/base/version.hpp"
 #include "runtime/base/whole_range.hpp"
 #include "runtime/render/samples/samples.hpp"
-#include "runtime/base/version.hpp"
 
 namespace {
 
@@ -43,7 +43,7 @@ void run(samples::SampleOptions& options, bool is_quiet) {
   for (const auto& file : set.instruments) fmt::print("instrument  {}\n", base::printable(file.string()));
 }
 
-/// The numbers of --at, three a point.
+/// Parses --at, three numbers per point.
 void take_points(const std::vector<double>& numbers, samples::SampleOptions& options) {
   if (numbers.size() % 3 != 0) throw InputError(fmt::format("--at has {} numbers; give three for each point, in metres", numbers.size()));
   for (std::size_t i = 0; i < numbers.size(); i += 3) options.points_m.push_back({numbers[i], numbers[i + 1], numbers[i + 2]});
@@ -87,9 +87,11 @@ int main(int argc, char** argv) {
   app.add_option("--rate", options.rate_hz, "Sample rate in Hz")
       ->check(base::whole_range(8000, 192000), base::describe_whole_range(8000, 192000))
       ->capture_default_str();
-  app.add_option("--format", format, "pcm16, pcm24, pcm32 or float")->check(CLI::IsMember(scene::kSampleFormatNames))->capture_default_str();
+  app.add_option("--format", format, "pcm16, pcm24, pcm32 or float")
+      ->check(CLI::IsMember(scene::kSampleFormatNames))
+      ->capture_default_str();
   app.add_option("--seconds", options.max_seconds, "Longest sample, in s; a sample ends 80 dB below its peak")->capture_default_str();
-  app.add_flag("-q,--quiet", is_quiet, "Print nothing but errors");
+  app.add_flag("-q,--quiet", is_quiet, "Print errors only");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

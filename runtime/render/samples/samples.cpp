@@ -1,9 +1,8 @@
-// Method:     each sample is a scene of one blow (runtime/scene), heard at 1 m without delay. A layer is struck at the speed of its middle
-//             velocity, v = v127 (velocity / 127)^2, since samplers play a velocity at (velocity / 127)^2 of full scale (SFZ's
-//             amp_veltrack): what is written is the sound over that factor, times one gain for all. Within a layer the level is then that
-//             of the blow as far as the blow is linear; brightness changes from layer to layer.
-// Source:     SFZ 1 (Cakewalk 2004); docs/equations.md E5a.
-// Deviations: the body does not move: no click of its acceleration. A blow is along the normal.
+// Method: each sample is a scene of one blow along the normal (runtime/scene), heard at 1 m without delay; the body does not move, so there
+// is no acceleration noise. A layer is struck at the speed of its middle velocity, v = v127 (velocity / 127)^2, because samplers play a
+// velocity at (velocity / 127)^2 of full scale (SFZ's amp_veltrack): samples are the sound over that factor, times one common gain. Within
+// a layer the level follows the blow as far as it is linear; brightness changes from layer to layer. Source: SFZ 1 (Cakewalk 2004);
+// docs/equations.md E5a.
 #include "runtime/render/samples/samples.hpp"
 
 #include <fmt/format.h>
@@ -21,13 +20,13 @@
 #include "runtime/base/error.hpp"
 #include "runtime/base/file.hpp"
 #include "runtime/base/vector.hpp"
+#include "runtime/material/mallets.hpp"
+#include "runtime/render/render.hpp"
+#include "runtime/render/sound/sound_store.hpp"
+#include "runtime/render/sound_file.hpp"
 #include "runtime/scene/banks.hpp"
 #include "runtime/scene/events.hpp"
-#include "runtime/render/render.hpp"
-#include "runtime/render/sound_file.hpp"
 #include "runtime/scene/strikes.hpp"
-#include "runtime/material/mallets.hpp"
-#include "runtime/render/sound/sound_store.hpp"
 
 namespace carillon::samples {
 namespace {
@@ -39,15 +38,15 @@ constexpr int kVelocities = 127, kKeyCount = 128;
 constexpr std::size_t kMaxPlaces = 64, kMaxMallets = 16;
 constexpr int kMaxLayers = 16, kMaxRoundRobin = 16;
 constexpr double kPeakDbfs = -1.0;
-constexpr double kSilence = 1e-4;  // of the peak, where a sample ends
+constexpr double kSilence = 1e-4;  // end of a sample, share of its peak
 constexpr double kShortestS = 0.05;
-constexpr double kAround = 0.05;  // of the body's extent: how far from a place its other strikes are
-constexpr int kVelocityStep = 3;  // of those at which layers are compared with the blow itself: no divisor of usual layers
+constexpr double kAround = 0.05;  // distance of alternating strikes from their place, share of the body's extent
+constexpr int kVelocityStep = 3;  // step of velocities at which layers are compared with exact blows; not a divisor of usual layer widths
 
-/// Of full scale, at which a sampler plays a velocity.
+/// Level at which a sampler plays a velocity, relative to full scale.
 double calc_share(int velocity) { return std::pow(static_cast<double>(velocity) / kVelocities, 2); }
 
-/// A layer of velocities, and the one that is struck.
+/// A range of velocities and the one that is struck.
 struct Layer {
   int low = 1, high = kVelocities, middle = 64;
   double share() const { return calc_share(middle); }
@@ -98,7 +97,7 @@ class Maker {
   }
 
  private:
-  /// The folder, which may be there with an instrument of an earlier call and nothing else.
+  /// The folder: new, or replaced if it holds only an instrument of an earlier call.
   fs::path find_place() const {
     fs::path place = fs::absolute(options_->folder).lexically_normal();
     if (place.filename().empty()) place = place.parent_path();
@@ -109,9 +108,8 @@ class Maker {
       for (const fs::directory_entry& entry : fs::directory_iterator(place, error))
         is_ours = is_ours && (entry.path().filename() == kSampleFolder || base::find_extension(entry.path()) == ".sfz");
     if (!is_ours || error)
-      throw InputError(
-          fmt::format("{}: other files are there, and the folder of an instrument is replaced as a whole; give another one with -o",
-                      options_->folder.string()));
+      throw InputError(fmt::format("{}: contains other files, and an instrument folder is replaced as a whole; give another one with -o",
+                                   options_->folder.string()));
     return place;
   }
 
@@ -166,7 +164,7 @@ class Maker {
                                    points_.size(), options_->mallets.size(), options_->first_key, kKeyCount - 1));
   }
 
-  /// The place itself, or the surface next to it.
+  /// The place itself, or a neighbouring point of the surface.
   Vec3 find_point(std::size_t place, int turn) const {
     if (turn == 0) return points_[place];
     const bank::NearestPlace at = bank::find_nearest(*bank_, points_[place]);
@@ -187,7 +185,7 @@ class Maker {
     return strike;
   }
 
-  /// What a blow leaves in each mode, A-weighted (m) [Pa at 1 m], over what the sampler makes of its velocity.
+  /// Excitation of each mode by a blow, A-weighted (m) [Pa at 1 m], over the sampler's level at its velocity.
   std::vector<double> calc_amplitudes(const std::vector<events::Event>& events, int velocity) const {
     std::vector<double> amplitudes(bank_->mode_count());
     for (std::size_t m = 0; m < amplitudes.size(); ++m) {
@@ -217,7 +215,7 @@ class Maker {
     return shapes_;
   }
 
-  /// Adds up how far the sample of its layer is from the blow of each velocity, in this place.
+  /// Accumulates the difference between each velocity's blow and its layer's sample, at this place.
   void compare(std::size_t mallet, const Vec3& point_m) {
     std::vector<std::vector<double>> of_layer;
     for (const Layer& layer : layers_) of_layer.push_back(calc_amplitudes(make_blow(mallet, point_m, layer.middle), layer.middle));
@@ -277,7 +275,7 @@ class Maker {
     return sample;
   }
 
-  /// Full scale per pascal, of what velocity 127 plays.
+  /// Full scale per pascal at velocity 127.
   double write_waves(SampleSet& set) const {
     double loudest = 0.0;
     const auto share = [&](const Sample& sample) { return layers_[sample.layer].share(); };
@@ -306,7 +304,7 @@ class Maker {
     return text + "\n";
   }
 
-  /// The key and the cents of the mode that is heard most at the first place.
+  /// Key and cents of the loudest mode at the first place.
   std::pair<int, double> find_pitch() const {
     const bank::NearestPlace at = bank::find_nearest(*bank_, points_[0]);
     const std::size_t vertex = bank_->triangles[at.triangle][0];
@@ -357,7 +355,7 @@ class Maker {
   }
 
   const SampleOptions* options_;
-  fs::path folder_;  // where it is filled, until it is whole
+  fs::path folder_;  // temporary until complete
   std::string name_;
   std::vector<Layer> layers_;
   scene::Scene scene_;

@@ -8,7 +8,7 @@
 namespace carillon::sound {
 namespace {
 
-/// With so many decimals at most, and never an exponent: 0.047, 4.7, 470.
+/// At most this many decimals, no exponent: 0.047, 4.7, 470.
 std::string format_plain(double value, int decimals) {
   std::string text = fmt::format("{:.{}f}", value, std::max(0, decimals));
   if (text.find('.') == std::string::npos) return text;
@@ -17,10 +17,10 @@ std::string format_plain(double value, int decimals) {
   return text;
 }
 
-/// Of a number's first digit: 0 for 4.7, 2 for 470.
+/// Decimal exponent: 0 for 4.7, 2 for 470.
 int find_exponent(double value) { return static_cast<int>(std::floor(std::log10(value) + 1e-9)); }
 
-/// To so many digits, so that 999.6 is 1000 before its unit is chosen.
+/// Rounds to significant digits, so 999.6 becomes 1000 before the unit is chosen.
 double round_to(double value, int digits) {
   if (!(value > 0.0)) return 0.0;
   const double step = std::pow(10.0, find_exponent(value) - digits + 1);

@@ -1,4 +1,4 @@
-// How the axes of pictures are labelled: round marks, short numbers, the unit that suits them.
+// Axis labels: round tick values, short numbers, suitable units.
 #pragma once
 
 #include <string>
@@ -6,12 +6,12 @@
 
 namespace carillon::sound {
 
-/// A number as it stands next to an axis: no exponent, at most six characters, in the unit named.
+/// Tick label without exponent, at most six characters, in the given unit.
 struct Label {
   std::string text, unit;
 };
 
-/// A pressure >= 0 [Pa] to two digits, in µPa, mPa, Pa or kPa: 0.01 to 999 Pa stay in Pa.
+/// A pressure >= 0 [Pa] with two digits, in µPa, mPa, Pa or kPa (Pa from 0.01 to 999).
 Label make_pressure_label(double pressure_pa);
 
 struct AxisTick {
@@ -24,7 +24,7 @@ struct TimeAxis {
   std::vector<AxisTick> marks;
 };
 
-/// Marks from 0 to `duration_s` (> 0) in steps of 1, 2 or 5 times a power of ten, five to eleven of them; seconds from half a second on.
+/// Ticks from 0 to `duration_s` (> 0) in steps of 1, 2 or 5 times a power of ten, five to eleven of them; in seconds from 0.5 s on.
 TimeAxis make_time_axis(double duration_s);
 
 }  // namespace carillon::sound

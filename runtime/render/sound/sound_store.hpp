@@ -1,4 +1,4 @@
-// The sound of a whole scene or simulation, however long.
+// Sound of a scene or simulation of any length, kept on disk.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,7 @@
 
 namespace carillon::sound {
 
-/// Pressure [Pa], frame by frame: sample n of all channels, then sample n + 1. Memory does not grow with the number of frames.
+/// Pressure [Pa], interleaved frames. Memory does not grow with the number of frames.
 class SoundStore {
  public:
   SoundStore(int rate_hz, std::size_t channels, base::Spool spool = base::Spool())
@@ -21,12 +21,12 @@ class SoundStore {
   std::size_t get_channels() const { return channels_; }
   std::uint64_t get_frames() const { return samples_.size() / channels_; }
 
-  /// Whole frames. Throws SystemError when the disk refuses.
+  /// Appends whole frames. Throws SystemError for a disk error.
   void append(std::span<const float> frames) { samples_.append(frames); }
-  /// Whole frames from `first` on, which are there.
+  /// Reads whole frames from `first` on; they must exist.
   void read(std::uint64_t first, std::span<float> frames) const { samples_.read(first * channels_, frames); }
 
-  /// All frames in order, a piece at a time: work(first frame, samples of whole frames).
+  /// All frames in order, in pieces: work(first frame, samples of whole frames).
   template <class Work>
   void for_each_piece(Work&& work) const {
     std::vector<float> piece(kPiece * channels_);

@@ -1,7 +1,5 @@
-// Method:     Hann-windowed Fourier transforms, mean square of all channels, scaled so that a steady tone shows its level; colour by level.
-// Source:     Harris 1978 (windows); the colour map is "magma" of matplotlib (van der Walt & Smith 2015, CC0), perceptually uniform, by
-//             nine of its points.
-// Deviations: none.
+// Method: Hann-windowed Fourier transforms, mean square over channels, scaled to the level of a steady tone.
+// Source: Harris 1978 (windows); colour map "magma" of matplotlib (van der Walt & Smith 2015, CC0), nine of its points.
 #include "runtime/render/sound/spectrogram.hpp"
 
 #include <cairo.h>
@@ -38,7 +36,7 @@ constexpr std::array<Color, 9> kMagma{{{0, 0, 4},
                                        {254, 194, 135},
                                        {252, 253, 191}}};
 
-/// The colour at 0 (quiet) to 1 (loud), components 0..255.
+/// Colour at 0 (quiet) to 1 (loud), components 0..255.
 Color calc_color(double level) {
   const double x = std::clamp(level, 0.0, 1.0) * (kMagma.size() - 1);
   const auto i = std::min<std::size_t>(static_cast<std::size_t>(x), kMagma.size() - 2);
@@ -79,7 +77,7 @@ void draw_frame(cairo_t* cr, double x, double y, double width, double height) {
   cairo_stroke(cr);
 }
 
-/// Level of the picture's row: the loudest bin that it covers, or the level between the two nearest bins.
+/// Level of a picture row: the loudest bin it covers, or interpolated between the two nearest bins.
 double find_row_level(const ShortTimeSpectrum& spectrum, std::size_t frame, double low_bin, double high_bin) {
   const double* row = &spectrum.level_db[frame * spectrum.bins];
   const auto first = static_cast<std::size_t>(std::ceil(low_bin));
@@ -166,7 +164,7 @@ void draw_color_bar(cairo_t* cr, const SpectrogramLayout& at, double top_db) {
   draw_upright_text(cr, x + width + 80, at.top + at.plot_height / 2, "Level (dB re 20 µPa)");
 }
 
-/// Pressure over time, all channels together: the span from the lowest to the highest sample of every column.
+/// Waveform over all channels: minimum to maximum per column.
 struct Spans {
   explicit Spans(std::size_t columns) : low(columns, 0.0), high(columns, 0.0) {}
   std::vector<double> low, high;
@@ -178,7 +176,7 @@ Spans find_spans(const SoundStore& sound, std::size_t columns) {
   const std::uint64_t samples = sound.get_frames();
   const std::size_t channels = sound.get_channels();
   const auto find_first = [&](std::size_t x) { return samples * x / columns; };
-  std::size_t begin = 0;  // the first column that may still get samples
+  std::size_t begin = 0;  // first column that may still receive samples
   sound.for_each_piece([&](std::uint64_t first, std::span<const float> frames) {
     const std::uint64_t end = first + frames.size() / channels;
     while (begin < columns && std::max(find_first(begin) + 1, find_first(begin + 1)) <= first) ++begin;
@@ -228,8 +226,7 @@ ShortTimeSpectrum calc_short_time_spectrum(const SoundStore& sound, std::size_t 
   const std::size_t channels = sound.get_channels();
   const int rate_hz = sound.get_rate_hz();
   ShortTimeSpectrum spectrum;
-  // About 23 Hz to a bin: separate modes of a bowl, sharp impacts. Short sounds: a shorter window, for their onset, zero-padded to the same
-  // bins.
+  // About 23 Hz per bin separates the modes of a bowl and sharp impacts. Short sounds: a shorter, zero-padded window with the same bins.
   int length = 256;
   while (length < 16384 && length * 23.5 < rate_hz) length *= 2;
   spectrum.window = length;
@@ -248,7 +245,7 @@ ShortTimeSpectrum calc_short_time_spectrum(const SoundStore& sound, std::size_t 
   const int parts = std::max(1, static_cast<int>(std::ceil(hop / (0.5 * window))));
   Eigen::FFT<double> fft;
   std::vector<double> piece(length, 0.0);
-  std::vector<float> heard;  // of one window, all channels
+  std::vector<float> heard;  // one window, all channels
   std::vector<std::complex<double>> transform;
   std::vector<double> power(spectrum.bins);
   for (std::size_t frame = 0; frame < frames; ++frame) {
@@ -267,7 +264,7 @@ ShortTimeSpectrum calc_short_time_spectrum(const SoundStore& sound, std::size_t 
       }
     }
     for (std::size_t bin = 0; bin < spectrum.bins; ++bin) {
-      // A tone of amplitude A has |X| = A total / 2 and the mean square A^2 / 2.
+      // A tone of amplitude A has |X| = A total / 2 and mean square A^2 / 2.
       const double mean_square = 2.0 * power[bin] / (total * total) / (static_cast<double>(channels) * parts);
       const double level = 10.0 * std::log10(mean_square / (kReferencePa * kReferencePa));
       spectrum.level_db[frame * spectrum.bins + bin] = std::max(level, kFloorDb);

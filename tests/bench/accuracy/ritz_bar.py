@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Frequencies of the undercut vibraphone bar without any finite-element mesh: the rows "vibraphone" of jobs/study/accuracy/known.csv.
+"""Frequencies of the undercut vibraphone bar without any finite-element mesh: the rows "vibraphone" of jobs/study/known.csv.
 
 usage: ritz_bar.py [ALONG ACROSS THROUGH]      degrees of the polynomials, default 48 15 5; compared with 44 13 4
 

@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <limits>
 
+#include "runtime/base/clock.hpp"
 #include "runtime/physics/world.hpp"
 #include "tests/unit/runtime/physics/solids.hpp"
 
@@ -30,10 +31,15 @@ physics::WorldSpec make_rain(const bank::Bank& box, int count) {
   return w;
 }
 
-physics::Statistics run(const physics::WorldSpec& spec, double end_s, bool islands) {
+struct Cost : physics::Statistics {
+  double seconds_cpu = 0.0;
+};
+
+Cost run(const physics::WorldSpec& spec, double end_s, bool islands) {
   physics::World world(spec, {.end_s = end_s, .islands = islands});
+  const double began_s = base::get_thread_cpu_s();
   world.advance(end_s, std::numeric_limits<double>::infinity(), [](const events::Event&) {});
-  return world.get_statistics();
+  return {world.get_statistics(), base::get_thread_cpu_s() - began_s};
 }
 
 }  // namespace
@@ -43,8 +49,8 @@ int main(int argc, char** argv) {
   const double end_s = argc > 2 ? std::atof(argv[2]) : 2.0;
   const bank::Bank box = physics::tests::make_box({0.06, 0.05, 0.04}, {4, 4, 4});
   const physics::WorldSpec spec = make_rain(box, boxes);
-  const physics::Statistics together = run(spec, end_s, false), apart = run(spec, end_s, true);
-  const auto print = [&](const char* name, const physics::Statistics& cost) {
+  const Cost together = run(spec, end_s, false), apart = run(spec, end_s, true);
+  const auto print = [&](const char* name, const Cost& cost) {
     fmt::print("{:<11} {:8.3f} CPU s/s  {:8} steps  {:8} steps of a body  {} searches\n", name, cost.seconds_cpu / end_s, cost.steps,
                cost.body_steps, cost.searches);
   };

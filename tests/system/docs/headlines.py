@@ -51,7 +51,7 @@ def say_range(values, form):
 def make_goals(source):
     """Of each body the cheapest measured mesh whose worst mode is within the goal. Bodies whose true frequencies are less certain than
     the goal are left out."""
-    bodies = json.loads((source / "jobs/study/accuracy/advice.json").read_text())["bodies"]
+    bodies = json.loads((source / "jobs/study/advice.json").read_text())["bodies"]
     rows = []
     for cents, text in GOALS:
         for element in ("T10", "T4"):

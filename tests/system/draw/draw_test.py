@@ -1,8 +1,7 @@
 #!/usr/bin/python3
-"""Draws small banks and a small scene, and reads the pictures back: they have to show what was put into them."""
+"""Draws small banks and a small scene, and checks the pictures against their content."""
 import contextlib
-import importlib.machinery
-import importlib.util
+import importlib
 import io
 import json
 import math
@@ -37,7 +36,7 @@ def run(*arguments, folder):
 
 def run_in_process(*arguments, folder):
     """The same in this process, for errors before drawing."""
-    program, before, errors = load_program(), (os.getcwd(), sys.argv), io.StringIO()
+    program, before, errors = load("program"), (os.getcwd(), sys.argv), io.StringIO()
     os.chdir(folder)
     sys.argv = [str(PROGRAM), *arguments]
     try:
@@ -53,37 +52,36 @@ def run_in_process(*arguments, folder):
 
 def split_panels(image, count):
     """Panels of a picture of directivity, without their labels, as carillon-draw arranges them."""
-    columns, width, height = load_program().choose_panels(count, 1.0)
+    columns, width, height = load("picture").choose_panels(count, 1.0)
     corners = [(index // columns * height, index % columns * width) for index in range(count)]
     return [image[y : y + height - 112, x : x + width] for y, x in corners]
 
 
 def measure_ink(image):
-    """Width and height of all that is not grey, in pixels: balloon and body, not the rings."""
+    """Width and height of the coloured pixels: balloon and body, without the rings."""
     ink = numpy.ptp(image.astype(int), axis=2) > 40
     return numpy.ptp(numpy.flatnonzero(ink.any(axis=0))) + 1, numpy.ptp(numpy.flatnonzero(ink.any(axis=1))) + 1
 
 
 def spoil(source, target, change):
-    """A copy of a bank with `change` made to its HDF5 part, sealed again."""
+    """A copy of a bank with `change` applied to its HDF5 part and a new checksum."""
     shutil.copy(folder / source, folder / target)
     with h5py.File(folder / target, "r+") as bank:
         change(bank)
     make_bank.seal(folder / target)
 
 
-def load_program():
-    """The program as a module, for what it computes before it draws."""
+def load(name):
+    """A module of the program."""
     sys.dont_write_bytecode = True
-    loader = importlib.machinery.SourceFileLoader("carillon_draw", str(PROGRAM))
-    module = importlib.util.module_from_spec(importlib.util.spec_from_loader("carillon_draw", loader))
-    loader.exec_module(module)
-    return module
+    if str(PROGRAM) not in sys.path:
+        sys.path.insert(0, str(PROGRAM))
+    return importlib.import_module(name)
 
 
 def check_patterns():
     """Far patterns against closed forms: (-i)^(l + 1) / h_l of orders 0 to 2 and real harmonics, both written out."""
-    draw = load_program()
+    draw = load("far_field")
     polar, azimuth = numpy.linspace(0, math.pi, 181), 2 * math.pi * numpy.arange(360) / 360
     x = numpy.sin(polar)[:, None] * numpy.cos(azimuth)
     y = numpy.sin(polar)[:, None] * numpy.sin(azimuth)
@@ -105,7 +103,7 @@ def check_patterns():
             error = numpy.abs(found - wanted).max() / numpy.abs(wanted).max()
             expect(error < 1e-12, f"pattern of number {index} at kR {waves}: off by {error:.1e}")
 
-    # High orders: on the axis only m = 0 is left, with sqrt((2 l + 1) / 4 pi); the squares of an order add up to (2 l + 1) / 4 pi.
+    # High orders: on the axis only m = 0 contributes, sqrt((2 l + 1) / 4 pi); the squares of an order sum to (2 l + 1) / 4 pi.
     order = 60
     inverse = draw.calc_inverse_hankels(70.0, order)
     for l in (3, 20, 60):
@@ -121,7 +119,7 @@ def check_patterns():
         expect(numpy.abs(square - (2 * l + 1) / (4 * math.pi)).max() < 1e-10, f"Unsoeld's sum of the harmonics of order {l}")
     expect(numpy.isfinite(draw.calc_inverse_hankels(1e-3, 120)).all(), "orders that send nothing are no numbers")
 
-    # ln |cos| over directions has the standard deviation 1, along any axis: no null may count for more than its share.
+    # ln |cos| over directions has standard deviation 1 along any axis: a null must not dominate.
     for number, (coefficient, order, wanted) in enumerate(
         [([1], 0, 0.0), ([0, 0, 1, 0], 1, 8.6859), ([0, 0, 0, 1], 1, 8.6859), ([0, 1, 0, 0], 1, 8.6859), ([0, 1, -2, 0.5], 1, 8.6859)]
     ):
@@ -130,9 +128,9 @@ def check_patterns():
         expect(abs(spread - wanted) < 0.1, f"spread of pattern {number}: {spread:.3f} dB, not {wanted}")
     expect(draw.calc_levels(0j * z) is None, "a mode that sends nothing has levels")
 
-    # The closed surface: outward, and the volume of what its radii enclose.
+    # The closed surface: oriented outward, with the volume enclosed by its radii.
     for levels, volume in [(0 * z, 4 / 3 * math.pi), (-15 + 0 * z, 4 / 3 * math.pi / 8), (-15 * (1 - z), math.pi / 3)]:
-        vertices, triangles, colour = draw.make_balloon(levels, polar, azimuth)
+        vertices, triangles, colour = load("directivity").make_balloon(levels, polar, azimuth)
         a, b, c = (vertices[triangles[:, corner]] for corner in range(3))
         found = numpy.einsum("ij,ij->", a, numpy.cross(b, c)) / 6
         expect(abs(found / volume - 1) < 1e-3, f"balloon: volume {found:.4f}, not {volume:.4f}")
@@ -152,7 +150,7 @@ with tempfile.TemporaryDirectory() as name:
     make_bank.write_ball_bank(folder / "ball.hdf")
     make_bank.write_box_bank(folder / "shelf.hdf", (0.3, 0.2, 0.005))
 
-    # The first three modes: three bodies in three columns, purple where they rest and yellow where they move most.
+    # The first three modes: three bodies in three columns, purple at nodes and yellow at antinodes.
     done = run("modes", "ball.hdf", "-o", "modes.png", folder=folder)
     expect(done.returncode == 0, f"modes: exit code {done.returncode}: {done.stderr}")
     if done.returncode == 0:
@@ -168,7 +166,7 @@ with tempfile.TemporaryDirectory() as name:
         edges = numpy.concatenate([image[0], image[-1], image[:, 0], image[:, -1]])
         expect(edges.min() > 240, "modes: something is cut off at the edge of the picture")
 
-    # What modes send: a dipole along the axis that points up, one across it, a monopole, nothing.
+    # Radiation patterns: a dipole along the vertical axis, a horizontal dipole, a monopole, none.
     check_patterns()
     shutil.copy(AIR_BANK, folder / "air.hdf")
     spoil("air.hdf", "dipoles.hdf", write_dipoles)
@@ -184,7 +182,7 @@ with tempfile.TemporaryDirectory() as name:
         expect(abs(round_[0] / round_[1] - 1) < 0.03, f"directivity: a monopole covers {round_[0]} x {round_[1]} pixels")
         expect(silent[0] < 0.5 * round_[0], f"directivity: a silent mode covers {silent[0]} x {silent[1]} pixels")
 
-    # A ball that falls on a shelf above the ground.
+    # A ball falls on a shelf above the ground.
     poses = [[t, 0.0, 0.0, 0.5 - 4.9 * t * t, 1, 0, 0, 0] for t in numpy.linspace(0, 0.3, 40)]
     scene = {
         "up": "z",
@@ -226,7 +224,7 @@ with tempfile.TemporaryDirectory() as name:
         expect(part.std() > 15, "modes at rest: the picture is blank")
         expect(count_like(part, (253, 231, 37)) < 100, "modes at rest: something moves")
 
-    # What cannot be drawn.
+    # Invalid input.
     spoil("ball.hdf", "nan.hdf", lambda bank: bank["mesh/vertices"].__setitem__((0, 0), numpy.nan))
     spoil("ball.hdf", "far.hdf", lambda bank: bank["mesh/vertices"].__setitem__((0, 0), 1e300))
     spoil("ball.hdf", "wild.hdf", lambda bank: bank["mesh/triangles"].__setitem__((0, 0), 10**6))
@@ -266,7 +264,7 @@ with tempfile.TemporaryDirectory() as name:
     before = sorted(folder.iterdir())
     for arguments, words in [
         (["modes", "absent.hdf", "-o", "x.png"], ["absent.hdf", "No such file"]),
-        (["modes", "text.hdf", "-o", "x.png"], ["text.hdf", "no mode bank"]),
+        (["modes", "text.hdf", "-o", "x.png"], ["text.hdf", "not a mode bank"]),
         (["modes", "short.hdf", "-o", "x.png"], ["short.hdf", "SHA-256"]),
         (["modes", "newer.hdf", "-o", "x.png"], ["newer.hdf", "version 3.0"]),
         (["modes", "packed.hdf", "-o", "x.png"], ["packed.hdf", "carillon-bank unpack"]),
@@ -289,7 +287,7 @@ with tempfile.TemporaryDirectory() as name:
         (["scene", "broken.json", "-o", "x.png"], ["broken.json", "line 2"]),
         (["scene", "empty.json", "-o", "x.png"], ["empty.json", "no bodies"]),
         (["scene", "poor.json", "-o", "x.png"], ["poor.json", "body 'a'", "poses"]),
-        (["scene", "list.json", "-o", "x.png"], ["list.json", "no trajectory"]),
+        (["scene", "list.json", "-o", "x.png"], ["list.json", "not a trajectory"]),
         (["scene", "far.json", "-o", "x.png"], ["absent.hdf", "No such file"]),
         (["modes", "nan.hdf", "-o", "x.png"], ["nan.hdf", "finite"]),
         (["modes", "far.hdf", "-o", "x.png"], ["far.hdf", "finite"]),
@@ -300,7 +298,7 @@ with tempfile.TemporaryDirectory() as name:
         (["modes", "words.hdf", "-o", "x.png"], ["words.hdf", "numbers"]),
         (["modes", "flat.hdf", "-o", "x.png"], ["flat.hdf", "triangles"]),
         (["scene", "infinite.json", "-o", "x.png"], ["infinite.json", "finite"]),
-        (["scene", "remote.json", "-o", "x.png"], ["remote.json", "farther"]),
+        (["scene", "remote.json", "-o", "x.png"], ["remote.json", "too far"]),
         (["scene", "deep.json", "-o", "x.png"], ["deep.json"]),
         (["scene", "escape.json", "-o", "x.png"], ["escape.json", "\\u001b]0;x"]),
         (["scenes", "far.json", "-o", "x.png"], ["scenes", "--help"]),

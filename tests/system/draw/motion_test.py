@@ -1,9 +1,7 @@
 #!/usr/bin/python3
-"""Simulates a bar that is struck, draws its motion, and reads the pictures back: outline and colour have to be those of the points in the
-file, projected here."""
+"""Simulates a struck bar, draws its motion, and compares outline and colour of the pictures with the projected points of the file."""
 import contextlib
-import importlib.machinery
-import importlib.util
+import importlib
 import io
 import json
 import math
@@ -61,14 +59,12 @@ def run(*arguments):
 
 def load_program():
     sys.dont_write_bytecode = True
-    loader = importlib.machinery.SourceFileLoader("carillon_draw", str(PROGRAMS / "carillon-draw"))
-    module = importlib.util.module_from_spec(importlib.util.spec_from_loader("carillon_draw", loader))
-    loader.exec_module(module)
-    return module
+    sys.path.insert(0, str(PROGRAMS / "carillon-draw"))
+    return importlib.import_module("program")
 
 
 def run_here(program, arguments):
-    """Exit code and standard error of the program in this process: a start of Python for each bad input would be most of the test."""
+    """Exit code and standard error of the program in this process: starting Python for each invalid input would dominate the test."""
     sys.argv = ["carillon-draw", "motion", *arguments]
     with contextlib.redirect_stderr(io.StringIO()) as errors:
         code = program.main()
@@ -84,7 +80,7 @@ def project(points):
 
 
 def find_outline(image):
-    """First and last column and row of what is not white above the time, in pixels: left, right, top, bottom."""
+    """Bounding box of the non-white pixels above the time: left, right, top, bottom."""
     ink = image.min(axis=2) < 200
     columns, rows = numpy.flatnonzero(ink.any(axis=0)), numpy.flatnonzero(ink.any(axis=1))
     return numpy.array([columns[0], columns[-1] + 1, rows[0], rows[-1] + 1], float)
@@ -101,7 +97,7 @@ def check_frames(times_s, points, speed):
         wanted.append([seen[:, 0].min(), seen[:, 0].max(), -seen[:, 1].max(), -seen[:, 1].min()])
     wanted = numpy.array(wanted)
     found = numpy.array([find_outline(image[:-150]) for image in images])
-    # One scale and one place for all frames: the width at rest gives them, the rest must follow.
+    # All frames share scale and position: both follow from the width at rest.
     pixel = (wanted[0, 1] - wanted[0, 0]) / (found[0, 1] - found[0, 0])
     shift = found[0, [0, 2]] - wanted[0, [0, 2]] / pixel
     error = numpy.abs(found - (wanted / pixel + shift[[0, 0, 1, 1]])).max()
@@ -139,7 +135,7 @@ with tempfile.TemporaryDirectory() as name:
         first, last = (count_like(image[:-150, side], YELLOW) for side in (slice(third), slice(-third, None)))
         expect(first == 0 and last > 100, f"the strip has {first} and {last} pixels of the largest speed")
 
-    # What cannot be drawn.
+    # Invalid input.
     data = (folder / "bar.vtkhdf").read_bytes()
     (folder / "cut.vtkhdf").write_bytes(data[: len(data) // 2])
     (folder / "text.vtkhdf").write_text("hello")
@@ -152,9 +148,9 @@ with tempfile.TemporaryDirectory() as name:
     program = load_program()
     for arguments, words in [
         (["absent.vtkhdf", "-o", "x.png"], ["absent.vtkhdf", "No such file"]),
-        (["cut.vtkhdf", "-o", "x.png"], ["cut.vtkhdf", "cut"]),
-        (["text.vtkhdf", "-o", "x.png"], ["text.vtkhdf", "no HDF5 file"]),
-        (["other.vtkhdf", "-o", "x.png"], ["other.vtkhdf", "no motion", "carillon-simulate --motion"]),
+        (["cut.vtkhdf", "-o", "x.png"], ["cut.vtkhdf", "truncated"]),
+        (["text.vtkhdf", "-o", "x.png"], ["text.vtkhdf", "not an HDF5 file"]),
+        (["other.vtkhdf", "-o", "x.png"], ["other.vtkhdf", "not a motion", "carillon-simulate --motion"]),
         (["nan.vtkhdf", "--frames", "new"], ["nan.vtkhdf", "frame 3", "finite"]),
         (["bar.vtkhdf"], ["-o OUT.png", "--frames"]),
         (["bar.vtkhdf", "-o", "x.png", "--frames", "film"], ["film", "not empty"]),

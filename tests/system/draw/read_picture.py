@@ -1,4 +1,4 @@
-"""What a picture shows, read without the program that drew it."""
+"""Reading of pictures, independent of the program that drew them."""
 import numpy
 from PIL import Image
 

@@ -102,7 +102,7 @@ class PageTest(unittest.TestCase):
         blow = self.wait_for_log(page, 1)[0]
         self.assertEqual((blow["kind"], blow["mallet"], blow["speed_m_s"]), ("strike", "hard-wood", 1))
 
-        # The place is on the surface, and where the pixel is, by a pinhole camera of our own.
+        # The point is on the surface and under the pixel, by an independent pinhole camera.
         with h5py.File(self.root / "bar.hdf") as bank:
             corners = bank["mesh/vertices"][:][bank["mesh/triangles"][:][blow["triangle"]]]
         numpy.testing.assert_allclose(numpy.array(blow["barycentric"]) @ corners, blow["point_m"], atol=1e-6)
@@ -126,7 +126,7 @@ class PageTest(unittest.TestCase):
         seen_y = height / 2 * (1 - view["covered"]["below"]) - focal * (way @ numpy.cross(right, forward)) / ahead
         self.assertLess(math.hypot(seen_x - x, seen_y - y), 0.5)
 
-        # The sound, against the same blow by carillon-render, shifted by whole frames.
+        # The sound equals the same blow by carillon-render, shifted by whole frames.
         time.sleep(1.5)
         taken = page.evaluate(
             "window.taken.stop().then(({samples, rate_hz}) => { const bytes = new Uint8Array(samples.buffer); let text = '';"
@@ -165,7 +165,7 @@ class PageTest(unittest.TestCase):
 
     def test_keys_and_screen_readers(self):
         page = self.open("room")
-        # What a screen reader has: the roles and names of the tree.
+        # Accessibility tree: roles and names.
         nodes = page.call("Accessibility.getFullAXTree")["nodes"]
         tree = {(node["role"]["value"], node.get("name", {}).get("value", "")) for node in nodes if not node.get("ignored")}
         for wanted in (
@@ -184,7 +184,7 @@ class PageTest(unittest.TestCase):
         self.assertTrue(any(role == "status" for role, _ in tree))
         described = next(node for node in nodes if node["role"]["value"] == "application")
         self.assertIn("Enter or Space strikes", described["description"]["value"])
-        # Arrows move the place, Enter strikes there, and it is announced.
+        # Arrows move the point, Enter strikes, with an announcement.
         page.evaluate("document.getElementById('view').focus()")
         before = page.evaluate("carillon.view.project(carillon.hands.place.point)")
         for _ in range(2):
@@ -198,13 +198,13 @@ class PageTest(unittest.TestCase):
         page.press("6")
         page.press(" ")
         self.assertEqual(self.wait_for_log(page, 2)[1]["mallet"], "soft-felt")
-        # The list of places strikes, too.
+        # The list of points strikes.
         page.evaluate("document.getElementById('places').focus()")
         self.press(page, "ArrowDown")
         self.press(page, "Enter")
         blow = self.wait_for_log(page, 3)[2]
         self.assertEqual(blow["triangle"], page.evaluate("carillon.panel.body.places[1].triangle"))
-        # A mode of the list moves the body and sounds alone; leaving it ends that.
+        # A mode of the list is animated and solo; leaving it ends both.
         page.evaluate("document.getElementById('modes').focus()")
         page.wait_for("carillon.panel.body.shown.isBent")
         self.press(page, "ArrowDown")
@@ -227,7 +227,7 @@ class PageTest(unittest.TestCase):
             self.assertEqual([float(text) for text in rates], [float(text) for text in row[at - 5 : at - 1]])
             self.assertEqual(float(times[0]), float(row[at - 1]))
             self.press(page, "ArrowDown")
-        # Radiation that a bank does not know is no number.
+        # Unknown radiation is not shown as a number.
         page.evaluate("carillon.panel.select(1)")
         self.assertEqual(page.evaluate(read)[1][2:], ["–", "0"])
         self.assertEqual(page.errors, [])
@@ -286,7 +286,7 @@ class PageTest(unittest.TestCase):
         )
         page.evaluate("document.getElementById('reset').click()")
         page.wait_for(f"Math.abs(carillon.panel.body.sound.modes[0].freq_hz / {first[0]} - 1) < 1e-9")
-        # Why each effect is on or off is shown.
+        # Reasons of the effect selection.
         page.wait_for("document.querySelectorAll('#plan dt').length === 14")
         self.assertIn("modal", page.evaluate("document.querySelector('#plan dt.on').textContent"))
         self.assertEqual(page.errors, [])
@@ -304,7 +304,7 @@ class PageTest(unittest.TestCase):
         )
         page.evaluate("document.getElementById('play').click()")
         page.wait_for("carillon.transport.isPlaying && carillon.transport.recording.time_s > 0.2", timeout_s=60)
-        # The picture is at the time that is heard, to the time of a slow frame.
+        # Picture and sound are in sync, within a slow frame.
         off = page.evaluate("Math.abs(carillon.transport.recording.time_s - Number(document.getElementById('position').value))")
         self.assertLess(off, 0.5)
         page.wait_for("!carillon.transport.isPlaying", timeout_s=60)
@@ -370,7 +370,7 @@ class PageTest(unittest.TestCase):
             for word in words:
                 self.assertIn(word, said)
             self.assertEqual(len(said.splitlines()), 1)
-            self.assertEqual(page.evaluate("document.getElementById('card-title').textContent"), "This cannot be played")
+            self.assertEqual(page.evaluate("document.getElementById('card-title').textContent"), "Cannot play this")
 
 
 if __name__ == "__main__":

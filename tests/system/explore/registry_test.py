@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Without npm's registry the page is left out, with one line of output, and the build succeeds."""
+"""Without npm's registry the build succeeds without the page, with one line of output."""
 import os
 import pathlib
 import subprocess

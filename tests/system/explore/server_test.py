@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The server of carillon explore under hostile requests: bounded memory, and answers to other visitors.
+"""The server of carillon explore under hostile requests: bounded memory, responses to other clients.
 
 Finds the programs in $CARILLON_BIN_DIR.
 """
@@ -17,13 +17,13 @@ import serving
 
 LARGE = 8 << 20  # bytes of the requested file
 MEMORY = 64 << 20  # limit of the server's memory in bytes
-WAIT_S = 60  # for one answer, on a busy machine
+WAIT_S = 60  # for one response, on a busy machine
 
 
 class Served(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)  # the clients' ends need descriptors as well
+        soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)  # for the clients' sockets
         resource.setrlimit(resource.RLIMIT_NOFILE, (min(hard, max(soft, 4096)), hard))
         cls.scratch = tempfile.TemporaryDirectory(prefix="carillon-server-")
         cls.folder = pathlib.Path(cls.scratch.name)
@@ -44,7 +44,7 @@ class Served(unittest.TestCase):
         self.held = []
 
     def tearDown(self):
-        # Ends at once, with any number of open connections.
+        # Ends at once with open connections.
         self.server.send_signal(signal.SIGINT)
         self.assertEqual(self.server.wait(timeout=WAIT_S), 0)
         self.server.stdout.close()
@@ -56,7 +56,7 @@ class Served(unittest.TestCase):
         self.held.append(connection)
         try:
             connection.sendall(data)
-        except OSError:  # ended by the server before all was sent
+        except OSError:  # closed by the server
             pass
         return connection
 
@@ -165,7 +165,7 @@ class Served(unittest.TestCase):
         self.assertEqual(self.send(f"POST / HTTP/1.1\r\nHOST\r\nContent-Length: {len(body)}\r\n\r\n", body), 405)
         self.assertEqual(self.send("PUT /x HTTP/1.1\r\nHOST\r\nTransfer-Encoding: chunked\r\n\r\n", b"1000000\r\n" + body), 405)
         self.assertEqual(self.send(f"GET / HTTP/1.1\r\nHOST\r\nContent-Length: {len(body)}\r\n\r\n", body), 200)
-        self.connect(b"G" * (16 << 20))  # a line without an end
+        self.connect(b"G" * (16 << 20))  # an endless line
         self.assert_well()
 
 

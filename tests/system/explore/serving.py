@@ -8,7 +8,7 @@ BIN = pathlib.Path(os.environ["CARILLON_BIN_DIR"])
 
 
 def start(*words, **options):
-    """The process, once it answers, and what it said."""
+    """The process after its first response, and its output."""
     process = subprocess.Popen([BIN / "carillon", "--json", "explore", *words, "--serve"], stdout=subprocess.PIPE, text=True, **options)
     said = ""
     while not said.endswith("\n}\n"):

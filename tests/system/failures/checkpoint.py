@@ -1,6 +1,5 @@
 #!/usr/bin/python3
-"""A run that is stopped or killed resumes from its checkpoint, on another number of ranks, and its bank is that of a run that was left
-alone.
+"""A stopped or killed run resumes from its checkpoint, on another number of ranks, with the bank of an uninterrupted run.
 
 usage: checkpoint.py BIN_DIR stops|slices|kills|damage|disk|accuracy|replaced
 """
@@ -29,7 +28,7 @@ def read_frequencies(folder, bank):
 
 
 def heed(text):
-    """Without what is said of the body: that it has no damping, and that its mesh is coarse."""
+    """Removes warnings about missing damping and the coarse mesh."""
     return "\n".join(line for line in text.splitlines() if '"damping" is zero' not in line and "frequencies can be wrong by" not in line)
 
 
@@ -44,7 +43,7 @@ def check_bank(folder, bank, expected, name):
 
 
 class Body:
-    """A job, its bank without a stop, and what it says on the way."""
+    """A job, its bank without interruption, and its output."""
 
     def __init__(self, folder, name="job.json", ranks=1, **more):
         self.folder, self.job = folder, name
@@ -81,7 +80,7 @@ class Body:
         return text, worst
 
     def stop(self, ranks, line, delay_s, number=signal.SIGUSR1, at_rank=None, *more):
-        """Starts, waits for a line that has `line` in it and so long, and sends the signal. (text, exit code)"""
+        """Starts a run, waits for a line containing `line` plus a delay, and sends the signal. Returns (text, exit code)."""
         with subprocess.Popen(
             self.command(ranks, *more),
             cwd=self.folder.path,
@@ -121,7 +120,7 @@ def make_plate(folder, nodes=9000):
 
 
 def stops(folder):
-    """Asked to stop early, on the way, late; on 1, 2, 3 ranks in turn, and resumed on others."""
+    """Stopped early, halfway and late, on 1, 2, 3 ranks in turn, and resumed on others."""
     make_plate(folder)
     body = Body(folder, band_hz=[20, 45000])
     print(f"{len(body.expected)} modes, {body.seconds:.1f} s")
@@ -142,7 +141,7 @@ def stops(folder):
         text, code = body.stop(ranks, line, delay_s)
         name = f"{ranks} ranks, {delay_s} s after '{line}'"
         check(code in (STOPPED, 0), f"{name}: exit code {code}:\n{text}")
-        if code == 0:  # The machine was faster.
+        if code == 0:  # finished before the signal
             check_bank(folder, "out.bank", body.expected, name)
             (folder / "out.bank").unlink()
             continue
@@ -155,11 +154,11 @@ def stops(folder):
         check("warning" not in heed(resumed), resumed)
         print(f"{name}, then {then}: {'resumed' if has_saved else 'from the start'}, frequencies equal to {worst:.1e}")
     check(was_stopped >= 6, f"only {was_stopped} runs were stopped")
-    # Several times on the way to one bank, on all numbers of ranks; a single process without mpirun, by SIGTERM.
+    # Several interruptions until the bank is complete, on all numbers of ranks; a single process without mpirun, by SIGTERM.
     for turn in range(4):
         text, code = body.stop(1 + turn % 3, "modes     ", 0.1 + 0.1 * turn)
         check(code in (STOPPED, 0), text)
-        if code == 0:  # What was left took less than that.
+        if code == 0:  # the rest took less than that
             check_bank(folder, "out.bank", body.expected, f"stop {turn + 1} of four")
             (folder / "out.bank").unlink()
     if code == STOPPED:
@@ -184,7 +183,7 @@ def stops(folder):
 
 
 def slices(folder):
-    """More modes than a slice holds: stopped in the first, between, and in the last."""
+    """More modes than one slice: stopped in the first, between slices, and in the last."""
     folder.mesh("--shape", "bar", "--length", 0.2, "--width", 0.1, "--thickness", 0.1, "--nodes", 3500, "--order", 1, "-o", "body.msh")
     body = Body(folder, element="T4", band_hz=[20, 110000], ranks=2)
     check(len(body.expected) > 420, f"{len(body.expected)} modes fit into one slice")
@@ -234,7 +233,7 @@ def kills(folder):
 
 
 def catch_checkpoint(folder, body):
-    """The largest that a run was seen to leave on its way; empty where none was."""
+    """The largest checkpoint seen during a run; empty if none was seen."""
     with subprocess.Popen(
         body.command(1, "--checkpoint-every", 0), cwd=folder.path, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     ) as run:
@@ -250,12 +249,11 @@ def catch_checkpoint(folder, body):
 
 
 def damage(folder):
-    """Cut at many lengths, bytes flipped, of another job, mesh or program, no checkpoint at all: said in one line, and the bank is
-    right."""
+    """Truncated, altered, of another job, mesh or program, or another kind of file: one line of warning, and the bank is right."""
     folder.mesh("--shape", "plate", "--length", 0.3, "--width", 0.21, "--thickness", 0.02, "--nodes", 1500, "--order", 2, "-o", "body.msh")
     body = Body(folder, band_hz=[20, 30000])
     whole = b""
-    for _ in range(20):  # The solve is short, and where cores are busy all that it saves may come and go between two looks.
+    for _ in range(20):  # the solve is short; on a busy machine a checkpoint may appear and vanish between two polls
         seen = catch_checkpoint(folder, body)
         whole = seen if len(seen) > len(whole) else whole
         (folder / "out.bank").unlink()
@@ -305,14 +303,14 @@ def damage(folder):
         check(said == 1 or (kind == "flipped" and place < 4096), f"{kind} at {place}: nothing was said:\n{text}")
         if said:
             check((folder / "state.aside").read_bytes() == bytes(spoilt), "it was not set aside")
-    check(silent <= 1, f"{silent} flipped bytes were not seen")  # one may lie in the zeros before the columns
-    # Two ranks with damage that only the second reads.
+    check(silent <= 1, f"{silent} flipped bytes were not seen")  # one may lie in the padding before the columns
+    # Two ranks, with damage in the part read by the second only.
     spoilt = bytearray(whole)
     spoilt[-5] ^= 64
     (folder / "state").write_bytes(spoilt)
     text, _ = body.resume(2, "damage of the second rank")
     check("because it is damaged" in text, text)
-    # Of another job, mesh, program.
+    # Checkpoint of another job, mesh, program.
     for change, words in ((dict(band_hz=[20, 29000]), "another job"), (dict(band_hz=[20, 30000], mass="lumped"), "another job")):
         other = Body(folder, name="other.json", **change)
         (folder / "state").write_bytes(whole)
@@ -323,7 +321,7 @@ def damage(folder):
     (folder / "state").write_bytes(whole)
     text, _ = other.resume(2, "another mesh")
     check("because it is of another mesh" in text, text)
-    # What is no file for a checkpoint.
+    # Not a regular file.
     (folder / "state").mkdir()
     text, code = folder.run(2, command=body.command(2))
     check(code == 2 and text.count("carillon-precompute: error:") == 1, text)
@@ -342,10 +340,10 @@ def damage(folder):
 
 
 def disk(folder):
-    """No room for the checkpoint: a warning, the older one stays, the solve continues."""
+    """Disk full: a warning, the older checkpoint stays, the solve continues."""
     make_plate(folder)
     body = Body(folder, band_hz=[20, 45000])
-    limit = 16_000_000  # bytes: more than the bank and MPI's own files take, less than the basis
+    limit = 16_000_000  # bytes: more than the bank and MPI's own files, less than the basis
     for ranks in (1, 2):
         command = body.command(ranks, "--checkpoint-every", 0)
         at = command.index(str(folder.bin / "carillon-precompute"))
@@ -374,7 +372,7 @@ def disk(folder):
 
 
 def replaced(folder):
-    """A user who may write to the folder puts a link where the temporary file was made: what it leads to is not written to."""
+    """A user with write access to the folder replaces the temporary file by a link: its target is not written."""
     folder.mesh("--shape", "plate", "--length", 0.3, "--width", 0.21, "--thickness", 0.02, "--nodes", 1500, "--order", 2, "-o", "body.msh")
     body = Body(folder, band_hz=[20, 30000])
     victim = folder / "victim"
@@ -394,7 +392,7 @@ def replaced(folder):
         check_bank(folder, "out.bank", body.expected, f"{ranks} ranks")
         (folder / "out.bank").unlink()
         (folder / ".state.new.taken").unlink()
-    # A link that was there before is no checkpoint, and one in place of the temporary file is removed.
+    # A pre-existing link is not a checkpoint; one in place of the temporary file is removed.
     for name in ("state", ".state.new"):
         (folder / name).symlink_to(victim)
         text, code = folder.run(2, command=body.command(2, "--checkpoint-every", 0), timeout_s=200)
@@ -404,7 +402,7 @@ def replaced(folder):
 
 
 def accuracy(folder):
-    """A job that asks for accuracy tries several meshes: it resumes the one at which it was stopped."""
+    """With "accuracy_cents" a run resumes the trial in which it was stopped."""
     job = {
         "body": {"shape": "plate", "length_m": 0.3, "width_m": 0.21, "thickness_m": 0.02},
         "bank": "out.bank",

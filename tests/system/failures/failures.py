@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""What goes wrong on one rank ends all ranks: one message, the right exit code, nothing left behind, no hang.
+"""An error on one rank ends all ranks: one message, the right exit code, no files left behind, no hang.
 
 usage: failures.py BIN_DIR bad_element|out_of_memory|rank_out_of_memory|killed_rank|disk|damaged_file
 """
@@ -16,10 +16,10 @@ from runs import Folder, add_mid_nodes, check, fail, is_running, list_ranks, mak
 
 
 def bad_element(folder):
-    """One element whose mid node folds it: the file is well formed, and only the rank of that element finds out, while it assembles."""
+    """One element folded by its mid-side node: the file is well formed, and only the rank of that element detects it, during assembly."""
     nodes, tets = add_mid_nodes(*make_box((12, 3, 3), (0.12, 0.03, 0.03)))
     write_vtkhdf(folder / "good.vtkhdf", nodes, tets)
-    # The middle of an edge inside the last cell is moved beyond the edge's end: the elements around fold there.
+    # A mid-side node of the last cell is moved beyond the end of its edge: the surrounding elements fold.
     middle = tets[-1, 4]
     ends = nodes[tets[-1, :2]]
     nodes[middle] = ends[0] + 1.6 * (ends[1] - ends[0])
@@ -30,7 +30,7 @@ def bad_element(folder):
         text = folder.expect(ranks, 2, ["bad.vtkhdf", "Jacobian"])
         named = text.split(" of the mesh (first node")[0].split()[-1]
         check(named in folded, f"element {named} is none of the folded {folded}")
-    # The same with an element without volume, which the reader finds.
+    # The same with an element without volume, detected by the reader.
     nodes, tets = make_box((12, 3, 3), (0.12, 0.03, 0.03))
     extra = len(nodes)
     nodes = list(map(list, nodes)) + [[1, 0, 0], [1, 1, 0], [1, 0, 1], [1, 1, 1]]
@@ -39,7 +39,7 @@ def bad_element(folder):
 
 
 def out_of_memory(folder):
-    """The need is named beforehand, in GB, under a limit on the address space; a small job runs under the same limit."""
+    """Under an address space limit the error states the need in GB beforehand; a small job runs under the same limit."""
     folder.mesh("--shape", "bar", "--length", 0.3, "--width", 0.1, "--thickness", 0.1, "--nodes", 60000, "--order", 2, "-o", "large.msh")
     folder.mesh("--shape", "bar", "--length", 0.3, "--width", 0.1, "--thickness", 0.1, "--nodes", 2000, "--order", 2, "-o", "small.msh")
     limit = ("prlimit", f"--as={1400 << 20}")
@@ -55,7 +55,7 @@ def out_of_memory(folder):
 
 
 def rank_out_of_memory(folder):
-    """One rank alone runs out of memory, early and late: all end, with one message."""
+    """A single rank runs out of memory, early or late: all ranks end, with one message."""
     folder.mesh("--shape", "bar", "--length", 0.3, "--width", 0.1, "--thickness", 0.1, "--nodes", 20000, "--order", 2, "-o", "bar.msh")
     folder.write_job("bar.msh", band_hz=[20, 8000])
     program = str(folder.bin / "carillon-precompute")
@@ -81,7 +81,7 @@ def rank_out_of_memory(folder):
 
 
 def killed_rank(folder):
-    """A rank that the system kills (as it does when memory runs out) ends the run; an older bank stays."""
+    """A rank killed by the system (as when out of memory) ends the run; an older bank stays."""
     folder.mesh("--shape", "bar", "--length", 0.3, "--width", 0.1, "--thickness", 0.05, "--nodes", 30000, "--order", 2, "-o", "bar.msh")
     folder.write_job("bar.msh", band_hz=[20, 60000])
     (folder / "out.bank").write_text("an older bank")
@@ -117,9 +117,9 @@ def killed_rank(folder):
 
 
 def disk(folder):
-    """A disk that is full when the bank is written: the error is reported, and no half bank stays."""
+    """The disk is full when the bank is written: an error, and no partial bank."""
     folder.mesh("--shape", "bar", "--length", 0.2, "--width", 0.05, "--thickness", 0.05, "--nodes", 6000, "--order", 2, "-o", "bar.msh")
-    # A folder in the place of the bank, which no one may write, not even root.
+    # A folder in place of the bank cannot be written, not even by root.
     folder.write_job("bar.msh", bank="taken", band_hz=[20, 20000])
     (folder / "taken").mkdir()
     folder.expect(2, 2, ["taken"])
@@ -137,7 +137,7 @@ def disk(folder):
 
 
 def damaged_file(folder):
-    """Truncated and spoilt files of the parallel format, under mpirun: HDF5 may crash on them, the program does not."""
+    """Truncated and corrupt files of the parallel format under mpirun: HDF5 may crash on them, the program must not."""
     nodes, tets = make_box((4, 2, 2), (0.04, 0.02, 0.02))
     write_vtkhdf(folder / "mesh.vtkhdf", nodes, tets)
     good = (folder / "mesh.vtkhdf").read_bytes()

@@ -13,7 +13,7 @@ from runs import Folder, check, make_box, write_vtkhdf
 
 
 def read_bank(path):
-    """The arrays of a bank by HDF5 itself; the seal stands in front as a user block."""
+    """The arrays of a bank by HDF5 itself; the header is a user block."""
     arrays = {}
     with h5py.File(path, "r") as file:
         file.visititems(lambda name, item: arrays.__setitem__(name, item[()]) if isinstance(item, h5py.Dataset) else None)

@@ -1,5 +1,5 @@
-// Loaded in front of the C library: as soon as the temporary file of a checkpoint is made, its name leads to another file, as if another
-// user who may write to the folder had replaced it in that moment.
+// LD_PRELOAD library: once the temporary file of a checkpoint exists, its name is redirected to another file, as if another user with write
+// access to the folder had replaced it.
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <unistd.h>
@@ -37,5 +37,5 @@ extern "C" int open(const char* name, int flags, ...) {
   return open_and_replace(name, flags, mode);
 }
 
-/// The same on 64-bit systems, where a file's length needs no other call.
+/// The same for 64-bit systems, where a file's length needs no other call.
 extern "C" int open64(const char* name, int flags, ...) __attribute__((alias("open")));

@@ -1,4 +1,4 @@
-"""Starts carillon-precompute under mpirun and looks at what it leaves."""
+"""Runs carillon-precompute under mpirun and checks its output files."""
 import json
 import pathlib
 import subprocess
@@ -33,7 +33,7 @@ class Folder:
         return ["mpirun", "-np", str(ranks), "--oversubscribe", "--bind-to", "none", *before, str(self.bin / "carillon-precompute"), job]
 
     def run(self, ranks, before=(), job="job.json", timeout_s=100, command=None):
-        """(exit code, both streams); a run that hangs fails the test."""
+        """Returns (exit code, both streams); a hang fails the test."""
         with subprocess.Popen(
             command or self.command(ranks, before, job),
             cwd=self.path,
@@ -49,7 +49,7 @@ class Folder:
                 fail(f"the run hangs:\n{run.communicate()[0]}")
 
     def expect(self, ranks, code, words, **how):
-        """Runs, and expects the exit code, one error message with all words, and no file more or less."""
+        """Runs, and expects the exit code, one error message with all words, and unchanged files."""
         before = self.list()
         text, got = self.run(ranks, **how)
         check(got == code, f"exit code {got} instead of {code} on {ranks} ranks:\n{text}")
@@ -71,7 +71,7 @@ def check(is_true, text):
 
 
 def list_ranks(mpirun):
-    """The processes of carillon-precompute below mpirun, in the order of their start."""
+    """Processes of carillon-precompute below mpirun, in starting order."""
     found = []
     for entry in pathlib.Path("/proc").iterdir():
         try:

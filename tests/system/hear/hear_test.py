@@ -23,14 +23,14 @@ BIN = pathlib.Path(os.environ["CARILLON_BIN_DIR"])
 
 
 def find_processes(entry):
-    """The numbers of the processes that were started with "NAME=value" in their environment."""
+    """Processes with "NAME=value" in their environment."""
     found = []
     for file in pathlib.Path("/proc").glob("[0-9]*/environ"):
         try:
             if entry.encode() in file.read_bytes().split(b"\0"):
                 found.append(file.parent.name)
         except OSError:
-            continue  # it has ended, or belongs to another user
+            continue  # ended, or of another user
     return found
 
 
@@ -188,7 +188,7 @@ class Hear(unittest.TestCase):
         rate, samples = read_wave(sound["wav"])
         self.assertEqual((rate, samples.shape[1]), (48000, 2))
         self.assertTrue(0.5 < numpy.abs(samples).max() < 1 and numpy.all(numpy.isfinite(samples)))
-        # What is heard are the modes: the strongest line is one of the table.
+        # The strongest line of the sound is a mode of the table.
         spectrum = numpy.abs(numpy.fft.rfft(samples[: 2 * rate, 0] * numpy.hanning(2 * rate)))
         strongest = numpy.argmax(spectrum) / 2
         self.assertLess(min(abs(strongest - mode["freq_hz"]) for mode in sound["modes"]), 2)
@@ -257,7 +257,7 @@ class Hear(unittest.TestCase):
         (self.folder / "rod.obj").write_text(make_rod())
         wish = ("rod.obj", "--scale", 1)
         said = self.call("hear", "-q", *wish, "-o", "smooth", "--accuracy", 20)  # applies to the bars, without facets in doubt
-        for words in ("+-facets", "facets in doubt", "--facets takes them for planes"):
+        for words in ("+-facets", "facets in doubt", "--facets declares planes"):
             self.assertIn(words, said)
         info = subprocess.run([BIN / "carillon-bank", "info", "--json", self.folder / "smooth/rod-steel.hdf"], capture_output=True)
         smooth = sorted(json.loads(info.stdout)["modes"], key=lambda mode: mode["corrected_frequency_hz"])
@@ -298,7 +298,7 @@ class Hear(unittest.TestCase):
         self.refuse(".", contains=(".: a folder",))
         for name, words in (
             ("s.json", "a scene (play it: carillon-render"),
-            ("b.hdf", "a bank, by its name"),
+            ("b.hdf", "by its name a bank"),
             ("c.3ds", "convert other formats first"),
         ):
             (self.folder / name).write_text("{}")
@@ -319,14 +319,14 @@ class Hear(unittest.TestCase):
         self.refuse("ball.off", "--scale", "1e-9", contains=("--scale",))
         self.refuse("ball.off", "--height", "0.1", "--scale", "0.001", contains=("exclude each other",))
         self.refuse("ball.off", "--length", "1", contains=("--length", "--shape"))
-        self.refuse("ball.off", "--material", "steel,steel", contains=("asked for twice",))
+        self.refuse("ball.off", "--material", "steel,steel", contains=("given twice",))
         self.refuse("far.off", contains=("far.off", "--height"))
         self.refuse("tiny.off", "--scale", "1", "--material", "alumina", contains=("no mode from 20 to 20000 Hz", "larger"))
         self.refuse("--shape", "bar", "--scale", "1", contains=("--scale",))
         self.refuse("--shape", "barr", contains=("barr",))
         (self.folder / "text.obj").write_text("hello\n")
         self.refuse("text.obj", contains=("text.obj",))
-        # A run that was refused before it had anything to write has left no folder.
+        # A refused run leaves no folder.
         self.assertFalse(
             [f for f in self.folder.iterdir() if f.name in ("empty-sound", "ball-sound", "far-sound", "text-sound", "cup-sound")]
         )
@@ -357,13 +357,13 @@ class Hear(unittest.TestCase):
         environment = os.environ | {"HOME": str(self.folder), "TMPDIR": str(temporary)}
         with subprocess.Popen(words, cwd=self.folder, env=environment, stderr=subprocess.PIPE, text=True) as run:
             for line in run.stderr:
-                if "finding the modes" in line:
+                if "computing the modes" in line:
                     break
             run.send_signal(signal.SIGINT)
             run.stderr.read()
             self.assertEqual(run.wait(30), -signal.SIGINT)
         self.assertEqual(sorted(f.name for f in (self.folder / "ball-sound").iterdir()), ["ball-oak.json", "ball.msh"])
-        # Of Open MPI empty folders may stay.
+        # Open MPI may leave empty folders.
         self.assertFalse([f for f in temporary.rglob("*") if not f.is_dir() or f.name.startswith("carillon-")])
         self.assertFalse(find_processes(f"TMPDIR={temporary}"))
         subprocess.run([BIN / "carillon-mesh", "ball-sound/ball.msh", "--look"], cwd=self.folder, check=True, stdout=subprocess.DEVNULL)

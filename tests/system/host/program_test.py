@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""carillon-render from outside: a cube with known modes falls, the WAV is read by Python's wave module and looked at with numpy.
+"""carillon-render as a program: a cube with known modes falls; the WAV is read with Python's wave module and analysed with numpy.
 
 One program on the same scene and bank; longer than most files."""
 import json
@@ -62,7 +62,7 @@ class RenderProgram(unittest.TestCase):
         cls.folder.cleanup()
 
     def scene(self, name, **changes):
-        """A cube that falls on the floor for half a second, changed."""
+        """A cube that falls on the floor for half a second, with changed keys."""
         scene = {
             "duration_s": 0.5,
             "ground": {"height_m": 0.0},
@@ -83,14 +83,14 @@ class RenderProgram(unittest.TestCase):
     def test_the_spectrum_has_its_peaks_at_the_frequencies_of_the_bank(self):
         rate, width, sound = read_wav(self.root / "drop.wav")
         self.assertEqual((rate, width, len(sound)), (48000, 3, 72000))
-        # Between the first hit and the second: sounds of several hits interfere.
+        # Between the first two hits, since several hits interfere.
         ringing = sound[int(0.22 * rate) : int(0.32 * rate), 0]
         spectrum = np.abs(np.fft.rfft(ringing * np.hanning(len(ringing)), 1 << 19))
         frequency = np.fft.rfftfreq(1 << 19, 1 / rate)
         for expected in MODES_HZ:
             near = (frequency > expected - 150) & (frequency < expected + 150)
             found = frequency[near][np.argmax(spectrum[near])]
-            # Rising at about 1.5 m/s, seen from the side, the cube keeps its pitch to 0.1 %.
+            # Rising at about 1.5 m/s, seen from the side: pitch within 0.1 %.
             self.assertLess(abs(found - expected), 0.001 * expected)
             self.assertGreater(spectrum[near].max(), 20 * np.median(spectrum[near]))
 
@@ -118,12 +118,12 @@ class RenderProgram(unittest.TestCase):
         self.assertLessEqual(len(poses), 302)
         self.assertTrue((np.diff(poses[:, 0]) > 0).all())
         self.assertAlmostEqual(poses[-1, 0], 1.5, places=3)
-        # Free fall at the beginning: z = 0.4 - 0.5 t - 9.81 t^2 / 2.
+        # Free fall: z = 0.4 - 0.5 t - 9.81 t^2 / 2.
         early = poses[poses[:, 0] < 0.1]
         np.testing.assert_allclose(early[:, 3], 0.4 - 0.5 * early[:, 0] - 4.905 * early[:, 0] ** 2, atol=2e-4)
         np.testing.assert_allclose(np.linalg.norm(poses[:, 4:], axis=1), 1.0, atol=1e-6)
         for impulse in path["impulses"]:
-            self.assertLess(abs(impulse["world_m"][2]), 0.02)  # the floor is at 0
+            self.assertLess(abs(impulse["world_m"][2]), 0.02)  # floor height 0
             self.assertGreater(impulse["impulse_n_s"], 0.0)
 
     def test_the_report_and_the_printed_figures_agree(self):
@@ -150,7 +150,7 @@ class RenderProgram(unittest.TestCase):
         self.assertEqual(png[:8], b"\x89PNG\r\n\x1a\n")
         self.assertEqual(struct.unpack(">II", png[16:24]), (1400, 900))
 
-    def test_another_format_by_name_is_refused_and_quiet_says_nothing(self):
+    def test_other_file_formats_are_refused_and_quiet_is_quiet(self):
         for name in ("out.mp3", "out.flac", "out"):
             run = render(self.scene("named.json"), "-o", self.root / name)
             self.assertEqual(run.returncode, 2)
@@ -174,7 +174,7 @@ class RenderProgram(unittest.TestCase):
             self.assertEqual(render(scene, "-o", self.root / name, "-q").returncode, 0)
         self.assertEqual((self.root / "one.wav").read_bytes(), (self.root / "two.wav").read_bytes())
 
-    def test_formats_and_rates_are_as_asked(self):
+    def test_formats_and_rates_are_as_requested(self):
         scene = self.scene("formats.json")
         cases = [
             (["--format", "pcm16"], (48000, 2)),
@@ -200,7 +200,7 @@ class RenderProgram(unittest.TestCase):
         self.assertTrue(np.isfinite(sound).all())
         self.assertAlmostEqual(20 * math.log10(np.abs(sound).max()), -1.0, places=3)
 
-    def test_a_rate_that_is_no_whole_number_and_a_limit_of_files_are_named(self):
+    def test_an_invalid_rate_and_a_file_limit_are_reported(self):
         scene = self.scene("limits.json")
         run = render(scene, "-o", self.root / "limits.wav", "--rate", "47999.5")
         self.assertEqual(run.returncode, 2)
@@ -211,7 +211,7 @@ class RenderProgram(unittest.TestCase):
         self.assertIn("File too large", run.stderr)
         self.assertFalse((self.root / "limits.wav").exists())
 
-    def test_radiation_chooses_whose_gains_are_heard(self):
+    def test_radiation_selects_the_gains(self):
         levels = {}
         for kind in ("osg02", "sphere"):
             scene = self.scene(f"{kind}.json", radiation=kind, output={"gain": 1e-6})
@@ -223,9 +223,8 @@ class RenderProgram(unittest.TestCase):
             levels[kind] = [spectrum[abs(frequency - hz) < 0.05 * hz].max() for hz in MODES_HZ]
         with h5py.File(self.root / "cube.h5") as bank:
             osg02 = bank["modes/radiation_gain"][()]
-        # Cube of side s, phi = a (1 + 0.07 corner): it trembles and, a little, breathes. At its first mode, ka = 1, it is louder than the
-        # flow of its volume alone, s^2 0.07 a . (1, 2, 4), and softer than if the flow through both sides added up (both as rho0 omega flow
-        # / 4 pi).
+        # Cube of side s, phi = a (1 + 0.07 corner): it translates and slightly breathes. At its first mode, ka = 1, it is louder than the
+        # flow of its volume alone, s^2 0.07 a . (1, 2, 4), and softer than if the flow through both sides added up (both as rho0 omega flow / 4 pi).
         a, hz = np.array([0.4, 0.7, 1.1]), MODES_HZ[0]
         per_flow = 1.21 * hz / 2 / np.hypot(1, 2 * np.pi * hz / 343 * np.sqrt(6 * 0.01 / (4 * np.pi)))
         ratio = levels["sphere"][0] / levels["osg02"][0] * osg02[0] / per_flow
@@ -285,7 +284,7 @@ class RenderProgram(unittest.TestCase):
         self.assertEqual(cube["doppler"]["why"], "set by the scene")
         self.assertTrue(cube["modal"]["on"])
 
-    def test_every_microphone_has_its_channel_and_walks_and_effects_are_played(self):
+    def test_microphones_paths_and_effects_are_rendered(self):
         for name, channels in (("microphones", 5), ("walk", 2)):
             (self.root / f"{name}.json").write_text((SOURCE / f"tests/unit/runtime/scene/scenes/{name}.json").read_text())
             run = render(self.root / f"{name}.json", "-o", self.root / f"{name}.wav", "--report", self.root / f"{name}-report.json", "-q")
@@ -311,7 +310,7 @@ class RenderProgram(unittest.TestCase):
         _, _, sound = read_wav(self.root / "loud.wav")
         self.assertLess(np.abs(sound).max(), 0.9)
 
-    def test_a_scene_without_contacts_gives_a_silent_file_and_says_so(self):
+    def test_a_scene_without_contacts_is_silent_with_a_note(self):
         run = render(self.silent_scene(), "-o", self.root / "silent.wav", "--spectrogram", self.root / "silent.png")
         self.assertEqual(run.returncode, 0, run.stderr)
         self.assertIn("the file is silent", run.stdout)
@@ -319,9 +318,9 @@ class RenderProgram(unittest.TestCase):
         self.assertEqual(len(sound), 24000)
         self.assertEqual(np.abs(sound).max(), 0.0)
 
-    def test_a_strike_sounds_without_physics_as_its_closed_form_says(self):
-        # The cube of write_cube_bank hangs still at 1 m; all its modes move alike, so an ideal impulse J in z at the corner (-, -, -) gives
-        # p = gain 1.1 J sum e^(-d t) (cos w t - d / w sin w t) / r, a distance of r / 343 m/s later.
+    def test_a_strike_without_physics_matches_its_closed_form(self):
+        # The cube of write_cube_bank is fixed at 1 m; all its modes move alike, so an ideal impulse J in z at the corner (-, -, -) gives
+        # p = gain 1.1 J sum e^(-d t) (cos w t - d / w sin w t) / r, delayed by r / 343 m/s.
         strike = {"time_s": 0.1, "body": "cube", "point_m": [-0.05, -0.05, -0.05], "impulse_n_s": [0, 0, 2e-3]}
         scene = self.scene(
             "struck.json",
@@ -350,7 +349,7 @@ class RenderProgram(unittest.TestCase):
             w, d = 2 * math.pi * freq, 12.0
             wd = math.sqrt(w * w - d * d)
             expected += np.where(t >= 0, 0.3 * 1.1 * 2e-3 * np.exp(-d * np.abs(t)) * (np.cos(wd * t) - d / wd * np.sin(wd * t)), 0)
-        late = t > 0.005  # the delay's band limit rings about the jump
+        late = t > 0.005  # ringing of the delay's band limit at the jump
         np.testing.assert_allclose(sound[late, 0], expected[late], atol=2e-3 * np.abs(expected).max())
         self.assertEqual(np.abs(sound[t < -0.005]).max(), 0.0)
         report, path = (json.loads((self.root / name).read_text()) for name in ("struck-report.json", "struck-path.json"))
@@ -358,7 +357,7 @@ class RenderProgram(unittest.TestCase):
         self.assertEqual(path["bodies"][0]["poses"], [[0, 0, 0, 0, 1, 0, 0, 0]])
         self.assertEqual((path["impulses"][0]["other"], path["impulses"][0]["world_m"]), (-1, [-0.05, -0.05, -0.05]))
 
-    def test_books_of_energy_balance_and_are_printed(self):
+    def test_energy_balances_and_is_printed(self):
         scene = self.scene("books.json", duration_s=1.0)
         self.assertEqual(render(scene, "-o", self.root / "books-without.wav", "-q").returncode, 0)
         run = render(scene, "-o", self.root / "books.wav", "--report", self.root / "books-report.json", "--audit")
@@ -369,7 +368,7 @@ class RenderProgram(unittest.TestCase):
             mass_kg = float(bank["rigid/mass_kg"][()])
         self.assertAlmostEqual(
             books["start_j"] / (mass_kg * 9.81 * 0.15), 1.0, delta=1e-6
-        )  # it is let go at rest with its centre at that height
+        )  # released at rest with its centre at that height
         self.assertGreater(books["max_modes_j"], 1e-6 * books["start_j"])
         self.assertGreater(books["lost_j"], 0.5 * books["start_j"])
         self.assertLess(abs(books["motion_j"] + books["modes_j"] + books["lost_j"] - books["start_j"]), 0.01 * books["start_j"])
@@ -393,9 +392,9 @@ class RenderProgram(unittest.TestCase):
         self.assertGreater(audit["deepest"]["depth_m"], 0.0)
         self.assertGreater(audit["longest_impact_s"], 0.0)
 
-    def test_what_is_radiated_is_the_share_of_the_radiation_in_the_damping(self):
-        # An ideal impulse J at the corner (-, -, -) gives each of the five modes (1.1 J)^2 / 2. Of it 2 pi g^2 / (rho c d) is radiated, all
-        # where that is above 1.
+    def test_radiated_energy_is_the_share_of_radiation_damping(self):
+        # An ideal impulse J at the corner (-, -, -) gives each of the five modes (1.1 J)^2 / 2.
+        # The radiated share is 2 pi g^2 / (rho c d), at most 1.
         strike = {"time_s": 0.1, "body": "cube", "point_m": [-0.05, -0.05, -0.05], "impulse_n_s": [0, 0, 2e-3]}
         given_j, decay_per_s = 5 * (1.1 * 2e-3) ** 2 / 2, 12.0
         for gain in (0.3, 3.0, 300.0):
@@ -461,7 +460,7 @@ class RenderProgram(unittest.TestCase):
             "towards the surface",
         )
 
-    def test_equal_strikes_are_equal_unless_they_are_to_vary(self):
+    def test_equal_strikes_are_equal_without_variation(self):
         def hear(name, **changes):
             strikes = [
                 {"time_s": t, "body": "cube", "point_m": [0.01, 0.02, 0.05], "impulse_n_s": [0, 0, -0.01], "duration_s": 2e-4}
@@ -479,13 +478,13 @@ class RenderProgram(unittest.TestCase):
             self.assertEqual(run.returncode, 0, run.stderr)
             return read_wav(self.root / f"{name}.wav")[2][4800:]
 
-        def compare(pressure):  # of each strike to the first, dB
+        def compare(pressure):  # level of each strike relative to the first, dB
             first = pressure[:47000]
             return [
                 10 * np.log10(np.sum((pressure[n : n + 47000] - first) ** 2) / np.sum(first**2) + 1e-30) for n in (48000, 96000, 144000)
             ]
 
-        self.assertLess(max(compare(hear("equal.json"))), -90)  # what is left of the strikes before
+        self.assertLess(max(compare(hear("equal.json"))), -90)  # residue of earlier strikes
         varied = hear("varied.json", variation=1)
         self.assertGreater(min(compare(varied)), -30)
         self.assertLess(max(compare(varied)), 0)
@@ -505,7 +504,7 @@ class RenderProgram(unittest.TestCase):
         self.assertEqual(run.returncode, 0, run.stderr)
         impulses = json.loads((self.root / "struck-drop-path.json").read_text())["impulses"]
         times = [i["time_s"] for i in impulses]
-        # Each is found by its start; pulses that overlap have their middles in another order.
+        # Found by start time; overlapping pulses have their middles in another order.
         self.assertTrue(all(b >= a - 0.5 * max(i["duration_s"] for i in impulses) for a, b in zip(times, times[1:])))
         self.assertEqual(times[0], 0.01)
         self.assertGreater(len(times), 2)
@@ -517,7 +516,7 @@ class RenderProgram(unittest.TestCase):
         return self.root / "silent.json"
 
     def test_a_recording_replays_to_the_same_bytes_without_physics(self):
-        # Two bodies that move, one fixed, and a strike: all of it comes back from the file.
+        # Two moving bodies, a fixed one and a strike are all restored from the file.
         scene = self.scene(
             "recorded.json",
             bodies=[
@@ -536,7 +535,7 @@ class RenderProgram(unittest.TestCase):
         file = self.root / "recorded.jsonl"
         run = render(scene, "-o", self.root / "recorded.wav", "--record", file, "--trajectory", self.root / "recorded_path.json")
         self.assertEqual(run.returncode, 0, run.stderr)
-        # Physics that would be heard: in the replay the scene drops its cubes from elsewhere, and strikes nothing.
+        # Audible physics: in the replay, the scene drops its cubes from elsewhere, without strikes.
         moved = json.loads(scene.read_text())
         moved["bodies"][0]["position_m"] = [0, 0, 0.4]
         del moved["strikes"]
@@ -561,7 +560,7 @@ class RenderProgram(unittest.TestCase):
             json.loads((self.root / "replayed_path.json").read_text()), json.loads((self.root / "recorded_path.json").read_text())
         )
         self.assertEqual(json.loads((self.root / "replayed_report.json").read_text())["physics_steps"], 0)
-        # Every line is plain JSON, of the kinds that the page names.
+        # Every line is plain JSON of the documented kinds.
         lines = [json.loads(line) for line in file.read_text().splitlines()]
         self.assertEqual(lines[0]["events"], len(lines) - 1)
         self.assertEqual(
@@ -569,8 +568,8 @@ class RenderProgram(unittest.TestCase):
             {"mark", "force", "motion", "contact"} | {key for line in lines[1:] for key in line if key == "impulse"},
         )
 
-    def test_a_contacts_file_by_hand_strikes_as_its_closed_form_says(self):
-        # One impulse of a body that nothing moves: the pulse and what the scene's own strike of it gives are the same sound.
+    def test_a_handwritten_contacts_file_matches_a_strike(self):
+        # One impulse on a fixed body equals the same strike in the scene.
         strike = {"time_s": 0.05, "triangle": 2, "impulse_n_s": [0, 0, 0.01], "duration_s": 3e-4}
         body = {"name": "cube", "bank": "cube.h5", "position_m": [0, 0, 0.5], "fixed": True}
         struck = self.scene("struck.json", bodies=[body], strikes=[{**strike, "body": "cube"}])
@@ -616,13 +615,13 @@ class RenderProgram(unittest.TestCase):
         run = render(stiff, "--contacts", file, "-o", wav)  # another material, the same surface
         self.assertEqual(run.returncode, 0, run.stderr)
         self.assertNotIn("warning", run.stderr)
-        # The same size, but the triangles have other numbers.
+        # The same size, with other triangle numbers.
         lines = file.read_text().splitlines(keepends=True)
         header = json.loads(lines[0])
         header["bodies"][0]["order_m"][1] += 0.001
         file.write_text(json.dumps(header) + "\n" + "".join(lines[1:]))
         self.assert_refused(render(scene, "--contacts", file, "-o", wav), 2, "sized.jsonl", "another surface")
-        # A file that does not say plays, with a word about it.
+        # A file without sizes plays with a warning.
         for key in ("size_m", "order_m"):
             del header["bodies"][0][key]
         file.write_text(json.dumps(header) + "\n" + "".join(lines[1:]))
@@ -631,7 +630,7 @@ class RenderProgram(unittest.TestCase):
         self.assertIn("warning: " + str(file), run.stderr)
         self.assertIn("size_m", json.loads((self.root / "sized_report.json").read_text())["warnings"][0])
 
-    def test_a_ground_of_another_unit_is_asked_about(self):
+    def test_a_ground_in_other_units_is_a_warning(self):
         wav = self.root / "ground.wav"
         run = render(
             self.scene("soil.json", ground={"height_m": 0, "young_modulus_pa": 5e7, "density_kg_m3": 1800}, duration_s=0.05), "-o", wav
@@ -650,7 +649,7 @@ class RenderProgram(unittest.TestCase):
                 "young_modulus_pa",
             )
 
-    def test_bad_contacts_files_are_refused_and_named(self):
+    def test_invalid_contacts_files_are_refused_and_named(self):
         scene = self.scene("bad_contacts.json", quality={"modes_in_impacts": False})
         file = self.root / "bad.jsonl"
         wav = self.root / "bad_contacts.wav"
@@ -688,7 +687,7 @@ class RenderProgram(unittest.TestCase):
         self.assert_refused(render(scene, "--contacts", file, "--record", file, "-o", wav), 2, "would overwrite")
         self.assertEqual(file.read_text(), good)
 
-    def test_bad_inputs_are_refused_before_anything_is_written(self):
+    def test_invalid_inputs_are_refused_before_any_output(self):
         out = self.root / "never.wav"
         scene = self.scene("bad-bank.json", bodies=[{"name": "cube", "bank": "missing.h5"}])
         self.assert_refused(render(scene, "-o", out), 2, "bad-bank.json", '"cube"', "missing.h5")
@@ -712,14 +711,14 @@ class RenderProgram(unittest.TestCase):
             self.assert_refused(render(scene, "-o", out), 2, "strike.json:", word)
         self.assertFalse(out.exists())
 
-    def test_hostile_scenes_are_one_clear_error_each(self):
+    def test_hostile_scenes_are_one_error_each(self):
         out = self.root / "never.wav"
 
         def refuse(text, *words):
             (self.root / "hostile.json").write_text(text)
             run = render(self.root / "hostile.json", "-o", out)
             self.assert_refused(run, 2, "hostile.json", *words)
-            self.assertEqual(run.stderr.count("\n"), 1, run.stderr)  # one error, nothing before it
+            self.assertEqual(run.stderr.count("\n"), 1, run.stderr)  # exactly one line
             self.assertLess(len(run.stderr), 700)
             self.assertFalse(out.exists())
 
@@ -775,7 +774,7 @@ class RenderProgram(unittest.TestCase):
         refuse("[" * 100000, "brackets")
         refuse("", "not JSON")
 
-    def test_a_crowd_of_bodies_is_refused_in_a_moment_with_the_limit(self):
+    def test_too_many_bodies_are_refused_quickly(self):
         out = self.root / "never.wav"
         for count, words in (
             (1001, ["1001 bodies", "may hold 1000"]),
@@ -788,7 +787,7 @@ class RenderProgram(unittest.TestCase):
             self.assert_refused(render(self.root / "crowd.json", "-o", out), 2, "crowd.json", *words)
             after = resource.getrusage(resource.RUSAGE_CHILDREN)
             self.assertLess(after.ru_utime - before.ru_utime, 10.0)
-            self.assertLess(after.ru_maxrss, 600 * 1024)  # KiB, of the largest child so far
+            self.assertLess(after.ru_maxrss, 600 * 1024)  # KiB, largest child so far
         (self.root / "crowd.json").unlink()
 
     def test_a_microphone_in_the_middle_of_a_body_hears_a_finite_sound(self):
@@ -807,12 +806,11 @@ class RenderProgram(unittest.TestCase):
         report = json.loads((self.root / "inside-report.json").read_text())
         self.assertTrue(math.isfinite(report["peak_pa"]))
         _, _, sound = read_wav(self.root / "inside.wav")
-        # Nothing counts as nearer than 5 cm: 20 times the pressure at 1 m.
+        # Distances are at least 5 cm: 20 times the pressure at 1 m.
         self.assertAlmostEqual(np.abs(sound[:, 0]).max() / np.abs(sound[:, 1]).max(), 20.0, delta=1.0)
 
-    def test_what_lies_is_silent(self):
-        # Modes of 60 1/s: 100 dB in 0.2 s. The cube falls, rattles and lies after a second at the latest; from 0.3 s later on there is
-        # nothing.
+    def test_resting_bodies_are_silent(self):
+        # Modes of 60 1/s decay by 100 dB in 0.2 s. The cube comes to rest within a second; 0.3 s later it must be silent.
         subprocess.run([BIN / "write_cube_bank", self.root / "damped.h5", "0.3", "60"], check=True)
         for name, turn, restitution in (("flat", [0, 0, 0], 0.5), ("edge", [30, 0, 0], 0.3), ("corner", [20, 30, 10], 0.6)):
             scene = self.scene(
@@ -830,8 +828,8 @@ class RenderProgram(unittest.TestCase):
             quiet = np.abs(sound[int((last + 0.3) * 48000) :]).max()
             self.assertLess(quiet, 1e-5 * np.abs(sound).max(), name)
 
-    def test_bodies_that_never_meet_sound_as_each_does_alone(self):
-        # Thrown along the floor, so that they slide, rattle and roll: with all effects, in either order.
+    def test_bodies_that_never_meet_superpose(self):
+        # Thrown along the floor to slide, rattle and roll, with all effects, in either order.
         cube = {"name": "cube", "bank": "cube.h5", "position_m": [0, 0, 0.12], "rotation_deg": [20, 30, 0], "velocity_m_s": [0.3, 0, 0]}
         other = {**cube, "name": "other", "position_m": [1, 0.3, 0.15], "rotation_deg": [10, 50, 40], "angular_velocity_rad_s": [2, 1, 0]}
 
@@ -850,10 +848,10 @@ class RenderProgram(unittest.TestCase):
         whole = np.sum(both**2)
         self.assertGreater(np.sum(one**2), 0.01 * whole)
         self.assertGreater(np.sum(two**2), 0.01 * whole)
-        self.assertLess(np.sum((both - one - two) ** 2), 1e-13 * whole)  # -130 dB; what single precision rounds
+        self.assertLess(np.sum((both - one - two) ** 2), 1e-13 * whole)  # -130 dB; rounding of single precision
         self.assertLess(np.sum((both - turned) ** 2), 1e-13 * whole)
 
-    def test_a_fall_of_half_a_millimetre_is_heard(self):
+    def test_a_fall_of_half_a_millimetre_is_audible(self):
         scene = self.scene(
             "slight.json",
             bodies=[{"name": "cube", "bank": "cube.h5", "position_m": [0, 0, 0.0505]}],
@@ -876,7 +874,7 @@ class RenderProgram(unittest.TestCase):
         self.assertGreater(json.loads((self.root / "slight-report.json").read_text())["peak_pa"], 100 * 20e-6)  # 40 dB over the threshold
 
     def struck_scene(self, name, duration, **changes):
-        """Two cubes that hang still and ring for seconds, ten strikes a second to within half a second of the end."""
+        """Two fixed cubes that ring for seconds, ten strikes per second until half a second before the end."""
         strikes = [
             {"time_s": 0.1 * i + 0.05, "body": "ab"[i % 2], "triangle": i % 12, "impulse_n_s": [0, 0, -0.01], "duration_s": 1e-4}
             for i in range(int(10 * duration) - 4)
@@ -888,7 +886,7 @@ class RenderProgram(unittest.TestCase):
         peaks = {}
         for seconds in (6, 240):
             scene = self.scene(f"long-{seconds}.json", duration_s=seconds)
-            # Played from a file: a body that swings, hits and slides, with a record a centisecond of each.
+            # From a contacts file: a body that swings, hits and slides, with 100 records of each per second.
             with (self.root / "long.jsonl").open("w") as file:
                 file.write(json.dumps({"carillon_contacts": 1, "bodies": [{"name": "cube", "triangles": 12}]}) + "\n")
                 for i in range(100 * seconds + 1):
@@ -973,10 +971,10 @@ class RenderProgram(unittest.TestCase):
             peaks[seconds] = usage.ru_maxrss / 1024  # MiB
             self.assertEqual((self.root / "long.wav").stat().st_size, 44 + 6 * 48000 * seconds)
             self.assertGreater(sum(1 for _ in (self.root / "long-again.jsonl").open()), 200 * seconds)
-        # The sound alone takes 176 MiB as floats. Each list may keep 4 MiB before it goes to disk, and parts of the heap are lost.
+        # The sound alone takes 176 MiB as floats. Each list may keep 4 MiB in memory; heap fragmentation is lost.
         self.assertLess(peaks[240] - peaks[6], 32.0, peaks)
 
-    def test_a_sound_that_is_cut_off_fades_and_says_so(self):
+    def test_a_sound_that_is_cut_off_fades_with_a_note(self):
         raw = self.struck_scene("raw.json", 1.0, output={"fade_end": False})
         faded = self.struck_scene("faded.json", 1.0)
         silent = self.scene("still.json", bodies=[{"name": "cube", "bank": "cube.h5", "fixed": True, "position_m": [0, 0, 1]}])
@@ -1010,7 +1008,7 @@ class RenderProgram(unittest.TestCase):
             self.assertEqual(run.stdout, (self.root / "out.wav").read_bytes())
             self.assertIn(b"real-time factor", run.stderr)
             self.assertFalse((self.root / "-").exists())
-        # The reader of the output closes it: one error, no signal, and no other file half made.
+        # A closed output pipe gives one error, no signal, and no partial files.
         (self.root / "out.report").unlink()
         child = subprocess.Popen(
             [BIN / "carillon-render", self.struck_scene("gone.json", 10.0), "-o", "-", "--report", self.root / "out.report", "-q"],
@@ -1036,7 +1034,7 @@ class RenderProgram(unittest.TestCase):
             return apply
 
         before = sorted(f.name for f in self.root.iterdir())
-        for size in (5 << 20, 9 << 20):  # 11.5 MB while the sound is made, 8.6 MB for the file
+        for size in (5 << 20, 9 << 20):  # 11.5 MB while rendering, 8.6 MB for the file
             run = subprocess.run(
                 [
                     BIN / "carillon-render",
@@ -1059,7 +1057,7 @@ class RenderProgram(unittest.TestCase):
             self.assertEqual(run.stderr.count("\n"), 1, run.stderr)
             self.assertEqual(sorted(f.name for f in self.root.iterdir()), before)
 
-    def test_whatever_ends_it_no_file_is_half_written(self):
+    def test_no_partial_files_after_any_end(self):
         scene = self.struck_scene("killed.json", 600.0)
         before = sorted(f.name for f in self.root.iterdir())
         for how in (signal.SIGKILL, signal.SIGTERM):
@@ -1077,7 +1075,7 @@ class RenderProgram(unittest.TestCase):
             self.assertEqual(child.wait(timeout=60), -how)
             self.assertEqual(sorted(f.name for f in self.root.iterdir()), before)
 
-    def test_bad_outputs_are_found_before_the_simulation(self):
+    def test_invalid_outputs_are_found_before_the_simulation(self):
         scene = self.scene("outputs.json", duration_s=500)  # would take minutes
         self.assert_refused(render(scene, "-o", self.root), 2, "folder")
         self.assert_refused(render(scene, "-o", scene), 2, "overwrite the scene")

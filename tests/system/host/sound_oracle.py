@@ -16,7 +16,7 @@ BIN = pathlib.Path(os.environ["CARILLON_BIN_DIR"])
 RESTITUTION = 0.6
 GAIN = 1e-4  # full scale per Pa
 LISTENER = np.array([0.4, -2.0, 0.3])
-TURN_DEG = (46.0, 34.0)  # about x, then y: nearly on the space diagonal, so that it bounces off and does not tip over at once
+TURN_DEG = (46.0, 34.0)  # about x, then y: nearly along the space diagonal, so it bounces without tipping over at once
 FALL_FROM = np.array([0.013, -0.007, 0.4])
 SOUND_SPEED = 343.0
 
@@ -130,7 +130,7 @@ class OneHit(unittest.TestCase):
         np.testing.assert_allclose(self.hit["world_m"], [*(FALL_FROM + lowest)[:2], 0.05], atol=1e-5)
 
     def calc_expected(self, rate, ear, times):
-        """Pressure after the pulse has ended, at an ear (-1 left, +1 right)."""
+        """Pressure after the pulse, at an ear (-1 left, +1 right)."""
         bank, hit = self.bank, self.hit
         sounding = np.sqrt(bank.eigenvalue) < np.pi * rate
         distance = np.linalg.norm(LISTENER + [0.1 * ear, 0, 0])
@@ -148,7 +148,7 @@ class OneHit(unittest.TestCase):
             total += bank.gain[m] * force[m] / distance * np.real((1 + 1j * d / root.imag) * spectrum * np.exp(root * np.maximum(local, 0)))
         return total, begin + distance / SOUND_SPEED
 
-    def test_every_sample_is_that_of_the_equations_at_every_rate(self):
+    def test_every_sample_matches_the_equations_at_every_rate(self):
         for rate, sound in self.sounds.items():
             for column, ear in ((0, -1), (1, 1)):
                 times = np.arange(len(sound)) / rate
@@ -176,7 +176,7 @@ class OneHit(unittest.TestCase):
             self.assertLess((start + step + length) / rate, self.next_s)
             ratio = component(sound, start + step) / component(sound, start)
             self.assertAlmostEqual(-np.log(abs(ratio)) * rate / step, self.bank.decay[m], delta=0.05)
-            self.assertAlmostEqual(np.angle(ratio) * rate / step / (2 * np.pi), 0.0, delta=0.02)  # Hz off
+            self.assertAlmostEqual(np.angle(ratio) * rate / step / (2 * np.pi), 0.0, delta=0.02)  # difference in Hz
             level = 20 * np.log10(abs(component(sound, start) / component(expected, start)))
             self.assertLess(abs(level), 0.05, f"mode {m}: {level} dB off")
 

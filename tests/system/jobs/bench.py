@@ -1,4 +1,4 @@
-"""A folder with a store, and the program carillon in it."""
+"""Base class: a temporary folder with a store, and calls of carillon."""
 import json
 import os
 import pathlib
@@ -31,7 +31,7 @@ def make_job(**changes):
 
 
 def make_simulation(duration_s=0.002, **changes):
-    """A short bar that is clamped at one end and struck at the other."""
+    """A short bar, clamped at one end and struck at the other."""
     job = {
         "simulate": {
             "duration_s": duration_s,
@@ -52,8 +52,8 @@ def make_simulation(duration_s=0.002, **changes):
 
 
 class Bench(unittest.TestCase):
-    wrapper = []  # words before carillon
-    parent = None  # of the folder; none: where temporary files go
+    wrapper = []  # command prefix
+    parent = None  # parent of the folder; None: default
 
     def setUp(self):
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="carillon-jobs-", dir=self.parent))
@@ -108,7 +108,7 @@ class Bench(unittest.TestCase):
         return json.loads(self.run_it(*words, "--json", code=code).stdout)
 
     def refuse(self, *words, says, code=2):
-        """One clear error: the words, one line, no control characters."""
+        """Expects an error with these words and without control characters."""
         done = self.run_it(*words, code=code, timeout=120)
         for word in says if isinstance(says, (list, tuple)) else [says]:
             self.assertIn(word, done.stderr)

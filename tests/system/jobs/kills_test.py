@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""carillon submit is killed at each of its calls that change a disk, one after the other; each time the next one finds a whole store.
+"""carillon submit is killed at each of its disk-changing system calls in turn; the next submit must find a consistent store.
 
 usage: kills_test.py BIN_DIR
 """
@@ -20,7 +20,7 @@ CALLS = "write,pwrite64,fsync,fdatasync,rename,renameat,renameat2,mkdir,linkat,u
 
 
 class Kills(Bench):
-    parent = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None  # a kill loses nothing that was written: the disk need not be slow
+    parent = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None  # SIGKILL loses no written data, so a RAM disk is sufficient
 
     def trace(self, kill, *words):
         inject = ["-e", f"inject={kill[0]}:signal=KILL:when={kill[1]}"] if kill else []

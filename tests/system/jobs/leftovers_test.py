@@ -37,7 +37,7 @@ class Leftovers(Bench):
         return sorted(path for folder in (self.temporary, self.out) for path in folder.iterdir())
 
     def find_processes(self):
-        """Processes of this test, marked in their environment."""
+        """Processes of this test, by their environment."""
         found = []
         for process in pathlib.Path("/proc").glob("[0-9]*"):
             try:
@@ -65,7 +65,7 @@ class Leftovers(Bench):
         if program.returncode == 0:
             return False  # done before the signal
         self.assertIn(program.returncode, (-number, 128 + number), said)
-        for _ in range(2000):  # its children end at once; wait for them
+        for _ in range(2000):  # wait for its children
             if not self.find_processes():
                 break
             time.sleep(0.01)

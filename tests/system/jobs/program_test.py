@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""carillon from submit to gc, and what strangers do to it.
+"""carillon from submit to gc, and hostile input.
 
 usage: program_test.py BIN_DIR
 """
@@ -25,7 +25,7 @@ class Path(Bench):
         said = self.ask("submit", job)
         self.assertEqual([(entry["state"], entry["new"]) for entry in said["jobs"]], [("queued", True)])
         id_ = said["jobs"][0]["id"]
-        # The same from another folder, in other words, with resources: the same job.
+        # An equivalent job from another folder, with resources: the same id.
         other = {**make_job(), "resources": {"ranks": 1}, "bank": "elsewhere.hdf", "element": "T10"}
         again = self.ask("submit", self.write("b/c/other.json", "// the same\n" + json.dumps(dict(reversed(other.items())), indent=3)))
         self.assertEqual([(entry["id"], entry["new"]) for entry in again["jobs"]], [(id_, False)])
@@ -45,7 +45,7 @@ class Path(Bench):
         self.assertIn("6 modes", self.run_it("log", id_).stdout)
         self.assertEqual(self.run_it("report", job, "--no-pictures").stdout.strip(), str(bank.parent / "report.html"))
         self.assertEqual(self.ask("gc")["items"], [])
-        # Both job files go: nothing refers to the bank any more.
+        # Without both job files the bank is unreferenced.
         job.unlink()
         self.assertEqual(self.ask("gc")["items"], [])
         (self.folder / "b/c/other.json").unlink()
@@ -62,7 +62,7 @@ class Path(Bench):
         job.unlink()
         self.assertEqual(self.ask("gc", "--delete")["items"], [])
         self.assertEqual(self.ask("status")["counts"]["queued"], 1)
-        # Only names that Carillon gives are taken away.
+        # Other names are kept.
         (self.store / "tmp" / "rubbish").mkdir()
         (self.store / "tmp" / f"{os.uname().nodename},0-1:2,999999999,1,0123456789ab").mkdir()
         (self.store / "inputs" / "thesis.tex").write_text("important")
@@ -126,7 +126,7 @@ class Path(Bench):
                 os.chmod(os.path.join(path, name), 0o444)
             os.chmod(path, 0o555)
         before = self.picture()
-        # Without these capabilities file permissions apply to root, too.
+        # Without these capabilities file permissions apply to root.
         self.wrapper = (
             ["setpriv", "--bounding-set=-dac_override,-dac_read_search,-fowner", "--inh-caps=-dac_override,-dac_read_search,-fowner"]
             if os.geteuid() == 0
@@ -140,7 +140,7 @@ class Path(Bench):
         said = self.ask("status")
         self.assertTrue(said["read_only"])
         self.assertEqual({job["name"]: (job["id"], job["state"], job["reason"], job["bank"]) for job in said["jobs"]}, wanted)
-        self.assertIn("may only be read", self.run_it("status").stderr)
+        self.assertIn("read-only store", self.run_it("status").stderr)
         self.run_it("status", "--watch", done)
         self.assertFalse(self.ask("explain", failed)["would_run"])
         self.assertTrue(self.run_it("report", done, "--no-pictures").stdout.strip().endswith("report.html"))
@@ -151,7 +151,7 @@ class Path(Bench):
         self.assertEqual(self.picture(), before)
 
     def picture(self):
-        """Every file of the store with its moment, but that of the last look."""
+        """Every file of the store with its time."""
         return sorted(
             (os.path.join(path, name), os.lstat(os.path.join(path, name)).st_mtime_ns)
             for path, folders, names in os.walk(self.store)
@@ -202,7 +202,7 @@ class Path(Bench):
         self.run_it("retry", "sweep.txt", code=1)
         self.refuse("get", "sweep.txt#9", says="line 9")
         self.refuse("get", "sweep.txt#1", says="line 1")
-        # A line never submitted does not hide the others.
+        # A line that was never submitted does not hide the others.
         self.write("sweep.txt", (self.folder / "sweep.txt").read_text() + json.dumps(make_job(max_modes=2)) + "\n")
         got = self.run_it("get", "sweep.txt", code=1)
         self.assertEqual(len(got.stdout.split()), 4)
@@ -233,7 +233,7 @@ class Path(Bench):
         self.assertIn('"memory_gb" of the job is 0.2, and it needs at least', job["reason"])
         self.run_it("retry", "large.json", "--memory-gb", "3")
         self.run_it("run", "--quiet")
-        # A simulation does not check its memory itself: the queue ends it above the limit.
+        # The queue ends a simulation above the memory limit.
         simulation = make_simulation(duration_s=1000.0, resources={"ranks": 1, "memory_gb": 0.01})
         self.ask("submit", self.write("long.json", simulation))
         self.run_it("run", "--quiet", code=3)
@@ -353,7 +353,7 @@ class Strangers(Bench):
         self.assertFalse((self.folder / "pwned").exists())
         self.assertEqual(self.ask("status", files[1])["jobs"][0]["state"], "queued")
         self.refuse("submit", self.folder / ("y" * 4096 + ".json"), says="too long")
-        self.refuse("status", "../../x", says="no job of this store")
+        self.refuse("status", "../../x", says="not a job of this store")
         self.refuse("log", "../" * 20 + "etc/passwd", says="passwd:1: ")
         self.refuse("get", "%", says="neither")
 
@@ -383,7 +383,7 @@ class Strangers(Bench):
 
     def test_folders_and_manifests(self):
         (self.folder / "empty").mkdir()
-        self.refuse("submit", "empty", says="no job in this folder")
+        self.refuse("submit", "empty", says="no jobs in this folder")
         self.write("jobs/a.json", make_job(max_modes=1))
         self.write("jobs/b.json", make_job(max_modes=2))
         self.write("jobs/b.hdf.resolved.json", "{}")
@@ -416,7 +416,7 @@ class Strangers(Bench):
         (self.folder / "letters").mkdir()
         (self.folder / "letters/dear.txt").write_text("dear")
         self.store = self.folder / "letters"
-        self.refuse("status", says="no store of Carillon")
+        self.refuse("status", says="not a Carillon store")
 
     @unittest.skipUnless(os.geteuid() == 0, "mounting needs root")
     def test_a_full_disk_is_a_clear_error_and_nothing_is_half_written(self):

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Simulations through carillon: into the store, by mpirun, killed and resumed, damaged, and out again.
+"""Simulations in the store: submitted, run by mpirun, killed and resumed, damaged, copied.
 
 usage: simulate_test.py BIN_DIR
 """
@@ -19,7 +19,7 @@ from bench import BIN, Bench, make_simulation
 
 
 def run_alone(folder, job):
-    """The sound of carillon-simulate without a store, as it is in the file."""
+    """The sound of carillon-simulate without a store."""
     (folder / "alone.json").write_text(json.dumps({**job, "sound": "alone.wav"}))
     subprocess.run([BIN / "carillon-simulate", "--quiet", "alone.json"], cwd=folder, check=True)
     return (folder / "alone.wav").read_bytes()
@@ -35,7 +35,7 @@ class Simulations(Bench):
         said = self.ask("submit", file)
         self.assertEqual([(entry["state"], entry["new"]) for entry in said["jobs"]], [("queued", True)])
         id_ = said["jobs"][0]["id"]
-        # The same in other words, from another folder, with other names of files, with resources: the same job.
+        # An equivalent job with other file names and resources: the same id.
         other = {**job, "motion": "x.vtkhdf", "record": "x.json", "resources": {"ranks": 1}}
         other["simulate"] = {**job["simulate"], "duration_s": 2.0e-3}
         text = "// the same\n" + json.dumps(dict(reversed(other.items())), indent=3)
@@ -62,7 +62,7 @@ class Simulations(Bench):
         self.assertEqual(folder.stat().st_mode & 0o222, 0)
         self.assertFalse((folder / "report.html").exists())
         self.assertIn("steps of", self.run_it("log", id_).stdout)
-        # Once more: answered from the store at once, and nothing is started.
+        # Again: served from the store.
         done = self.ask("submit", "b/other.json", "--run")["jobs"][0]
         self.assertEqual((done["state"], done["new"], done["attempts"]), ("done", False, state["attempts"]))
         self.assertFalse(self.ask("explain", file)["would_run"])
@@ -72,7 +72,7 @@ class Simulations(Bench):
         self.assertEqual({path.name for path in (self.folder / "out").iterdir()}, {path.name for path in files.values()})
         self.assertEqual((self.folder / "out/motion.vtkhdf").read_bytes(), files["motion"].read_bytes())
         self.refuse("get", file, "--to", "one.wav", says=["one.wav", "folder"])
-        # Damage is found, and another run replaces it.
+        # Damage is found and repaired by another run.
         self.assertEqual(self.ask("verify")["damaged"], [])
         sound, picture = files["sound"].read_bytes(), files["spectrogram"].read_bytes()
         folder.chmod(0o755)
@@ -88,7 +88,7 @@ class Simulations(Bench):
         self.run_it("verify", "--repair")
         self.run_it("run", "--quiet")
         self.assertEqual(self.results(file)["sound"].read_bytes(), sound)
-        # Nothing of it is garbage until both job files are gone.
+        # Garbage only without both job files.
         self.assertEqual([item["kind"] for item in self.ask("gc")["items"]], ["damaged"])
         file.unlink()
         (self.folder / "b/other.json").unlink()
@@ -109,7 +109,7 @@ class Simulations(Bench):
         queue.wait(120)
         self.assertTrue((work / "checkpoint").exists())
         self.assertEqual(self.ask("status", id_)["jobs"][0]["state"], "queued")
-        # Then every process of it at once.
+        # Then all of its processes at once.
         queue = subprocess.Popen(self.command("run", "--quiet"), cwd=self.folder, env=self.environment, stderr=subprocess.DEVNULL)
         self.addCleanup(queue.kill)
         self.wait(lambda: "resumed at" in (work / "log").read_text())
@@ -121,7 +121,7 @@ class Simulations(Bench):
         log = self.run_it("log", id_).stdout
         self.assertGreaterEqual(log.count("resumed at"), 2)
         self.assertIn("2 ranks", log)
-        # To the bytes of a run of one rank, without a stop and without a store.
+        # Bitwise equal to an uninterrupted run on one rank without a store.
         self.assertEqual(self.results(file)["sound"].read_bytes(), run_alone(self.folder, job))
 
     def percent(self, work):
@@ -153,7 +153,7 @@ class Simulations(Bench):
         file = self.write("bar.json", job)
         id_ = self.ask("submit", file)["jobs"][0]["id"]
         self.assertEqual(len(list((self.store / "inputs").rglob("*.msh"))), 1)
-        # One mesh is another: another job, and carillon says why.
+        # A changed mesh gives another id; carillon explain shows the mesh.
         (self.folder / "copy.msh").write_bytes(mesh.read_bytes() + b"\n")
         said = self.ask("explain", file)
         self.assertNotEqual(said["id"], id_)
@@ -173,7 +173,7 @@ class Simulations(Bench):
         silent = dict(job)
         del silent["sound"]
         self.refuse("submit", self.write("silent.json", silent), says=["silent.json", "sound"])
-        # What only the mesh shows is an error of the job, once.
+        # An error that only the mesh shows fails the job without retries.
         job["simulate"]["bodies"][0]["fixed"] = "x-mni"
         file = self.write("set.json", job)
         self.run_it("submit", file, "--run", code=3)

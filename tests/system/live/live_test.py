@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""carillon-live on a real sound server: jackd with its dummy driver, which keeps time and has no card. The count of underflows is printed;
-on a busy machine a few are the machine's, so what is asked for is that most blocks come in time, and that none is lost."""
+"""carillon-live on a sound server: jackd with its dummy driver, which has a clock and no card. The number of underflows is printed;
+a busy machine causes a few, so most blocks must be in time and none lost."""
 import json
 import os
 import pathlib
@@ -60,7 +60,7 @@ class Live(unittest.TestCase):
         cls.jack.wait()
         cls.folder.cleanup()
 
-    def test_a_scene_is_played_to_its_end_while_it_happens(self):
+    def test_a_scene_is_played_to_its_end(self):
         started = time.monotonic()
         run = live(self.scene, "--device", "system", "--look-ahead", "0.3")
         seconds = time.monotonic() - started
@@ -71,18 +71,18 @@ class Live(unittest.TestCase):
         blocks, underflows = int(played[2]), int(played[3])
         self.assertGreaterEqual(float(played[1]), 2.0)
         self.assertLess(float(played[1]), 2.5)
-        self.assertAlmostEqual(float(played[1]) * 48000 / 256, blocks, delta=1)  # to the hundredth of a second that is printed
-        self.assertGreater(seconds, 1.9)  # at the pace of the card, not as fast as it can
-        self.assertLessEqual(underflows, blocks)  # How many there are is the machine's affair.
+        self.assertAlmostEqual(float(played[1]) * 48000 / 256, blocks, delta=1)  # printed to 0.01 s
+        self.assertGreater(seconds, 1.9)  # in real time
+        self.assertLessEqual(underflows, blocks)  # Their number depends on the machine.
         strikes = re.search(r"strikes +(\d+), (\d+) late, (\d+) refused", run.stdout)
-        self.assertGreater(int(strikes[1]), 10)  # nine on the gong, and the cube's
+        self.assertGreater(int(strikes[1]), 10)  # nine on the gong, and those of the cube
         self.assertEqual(int(strikes[3]), 0)
         self.assertRegex(run.stdout, r"physics +\d+ times behind the sound")
         work = re.search(r"work +(\S+) % of a core, (\S+) mode-samples/s, (\d+) groups of modes faded", run.stdout)
         self.assertGreater(float(work[2]), 0)
         self.assertEqual(int(work[3]), 0)
 
-    def test_bad_input_is_one_clear_line_and_no_sound(self):
+    def test_invalid_input_is_one_line_and_no_sound(self):
         for arguments, code, words in [
             ((self.scene, "--device", "no such card"), 2, ["no such card", "system"]),
             ((self.root / "none.json",), 2, ["none.json"]),
@@ -94,21 +94,21 @@ class Live(unittest.TestCase):
             for word in words:
                 self.assertIn(word, run.stderr)
 
-    def test_without_a_sound_server_it_says_so(self):
+    def test_a_missing_sound_server_is_reported(self):
         run = live(self.scene, "--device", "system", environment={**ENVIRONMENT, "JACK_DEFAULT_SERVER": "carillon-nowhere"})
         self.assertNotEqual(run.returncode, 0)
         self.assertRegex(run.stderr, r"^carillon-live: .*(no sound card|no output is called)")
         if "no sound card" in run.stderr:
             self.assertRegex(run.stderr, "--null.*carillon-render")
 
-    def test_a_list_without_a_card_says_so(self):
+    def test_a_missing_card_is_listed_as_such(self):
         run = live("--list", environment={**ENVIRONMENT, "JACK_DEFAULT_SERVER": "carillon-nowhere"})
         self.assertEqual(run.returncode, 0, run.stderr)
         self.assertTrue(run.stdout.strip())
         if not any(pathlib.Path("/proc/asound").glob("card*")):
             self.assertIn("there is no sound card", run.stdout)
 
-    def test_nothing_is_played_to_the_end_of_the_scene_without_a_card(self):
+    def test_the_null_device_plays_to_the_end_of_the_scene(self):
         def get_cpu_s():
             used = resource.getrusage(resource.RUSAGE_CHILDREN)
             return used.ru_utime + used.ru_stime
@@ -121,15 +121,13 @@ class Live(unittest.TestCase):
         self.assertGreaterEqual(float(played[1]), 2.0)
         self.assertLess(float(played[1]), 2.5)
         self.assertAlmostEqual(float(played[1]) * 48000 / 256, int(played[2]), delta=1)
-        self.assertGreater(seconds, 1.9)  # by the clock, not as fast as it can
-        self.assertLess(
-            cpu_s, 1.0
-        )  # the physics thread sleeps while it waits for the sound: it takes a twentieth of this, and 2 s if it does not
+        self.assertGreater(seconds, 1.9)  # by the clock
+        self.assertLess(cpu_s, 1.0)  # the physics thread sleeps while waiting for the sound: a twentieth of this, and 2 s if it does not
         strikes = re.search(r"strikes +(\d+), (\d+) late, (\d+) refused", run.stdout)
         self.assertGreater(int(strikes[1]), 10)
         self.assertEqual(int(strikes[3]), 0)
 
-    def test_all_strikes_are_played_however_far_physics_is_in_front(self):
+    def test_all_strikes_are_played_with_any_look_ahead(self):
         scene = {
             "duration_s": 1.5,
             "bodies": [{"name": "gong", "bank": "cube.h5", "position_m": [0, 0, 0.5], "fixed": True}],
@@ -146,9 +144,9 @@ class Live(unittest.TestCase):
         strikes = re.search(r"strikes +(\d+), (\d+) late, (\d+) refused", run.stdout)
         self.assertEqual((int(strikes[1]), int(strikes[3])), (2000, 0))
 
-    def test_what_is_rendered_is_played_however_long_the_look_ahead(self):
-        # Effects are planned long before they change: what rests at the end of the look-ahead is still falling now. On a busy machine some
-        # changes come late.
+    def test_live_matches_rendering_with_any_look_ahead(self):
+        # Effects are planned long before they change: a body at rest at the end of the look-ahead is still falling now.
+        # On a busy machine some changes are late.
         subprocess.run(
             [BIN / "carillon-render", self.scene, "-o", self.root / "scene.wav", "--report", self.root / "report.json", "-q"], check=True
         )
@@ -159,7 +157,7 @@ class Live(unittest.TestCase):
             self.assertEqual(refused, "0")
             self.assertGreater(int(strikes), rendered / 2)
 
-    def test_null_takes_no_device_and_says_nothing_when_quiet(self):
+    def test_null_needs_no_device_and_quiet_is_quiet(self):
         run = live(self.scene, "--null", "--device", "system")
         self.assertEqual(run.returncode, 2)
         self.assertIn("--null", run.stderr)

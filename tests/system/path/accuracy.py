@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Accuracy as an input: the bank that the program chooses is as right as was asked, on bodies whose frequencies are known.
+"""Accuracy as an input: the chosen bank meets the target on bodies with known frequencies.
 
 Truth: Lamb modes of a solid ceramic sphere (radius 50 mm: 6937.16 and 7349.28 Hz, five of each: roots of the exact equations, Lamb 1882);
 torsion of a circular tube (c_T / 2 L, exact for any wall) and its bending in two directions (aluminium tube of OSG02 Table 2, 505 mm:
@@ -45,7 +45,7 @@ def info(folder, name):
 
 
 def check(folder, name, job, truth):
-    """truth: frequencies in ascending order from the first, or one to be found anywhere."""
+    """truth: the first frequencies, ascending, or a single one at any position."""
     text = run(folder, name, job)
     bank = info(folder, name)
     found = sorted(mode["corrected_frequency_hz"] for mode in bank["modes"])
@@ -62,7 +62,7 @@ def check(folder, name, job, truth):
     assert max(map(abs, errors)) <= asked, (name, errors)
     bars = [mode["corrected_error_cents"] for mode in bank["modes"]]
     assert max(bars) <= asked and math.isclose(max(bars), chosen["worst_cents"], rel_tol=1e-9), (name, max(bars), chosen)
-    assert all(trial["worst_cents"] > asked for trial in record["trials"][:-1]), record  # no cheaper trial would have done
+    assert all(trial["worst_cents"] > asked for trial in record["trials"][:-1]), record  # no cheaper trial met the target
     assert (
         record["asked_cents"] == asked
         and record["next_stricter"]["worst_cents"] < chosen["worst_cents"]
@@ -73,7 +73,7 @@ def check(folder, name, job, truth):
 
 
 def fold(source, target):
-    """Pulls every fifth mid-side node of the sphere's surface (radius 50 mm) far inwards, so that its elements fold over. Gmsh 4.1,
+    """Moves every fifth mid-side node of the sphere's surface (radius 50 mm) far inwards, so that its elements fold. Gmsh 4.1,
     binary."""
     data = bytearray(source.read_bytes())
     elements = data.index(b"$Elements\n") + 10 + 4 * 8  # after the counts: one block (3 int32, a count), then tag and ten nodes each
@@ -128,7 +128,7 @@ with tempfile.TemporaryDirectory(prefix="carillon-accuracy-") as scratch:
         [587.88302, 587.88302],
     )
 
-    # A mesh file: a box is exact, so refinement gets there; a coarse ball of flat facets does not, and the run says why.
+    # A mesh file: a box is exact, so refinement converges; a coarse ball of flat facets does not, with a message that says why.
     mesh = lambda *words: subprocess.run([bin_dir / "carillon-mesh", *words, "--quiet"], cwd=folder, check=True, stdout=subprocess.DEVNULL)
     mesh("--shape", "bar", "--length", "0.3", "--width", "0.02", "--thickness", "0.01", "--edge", "0.02", "-o", "coarse.msh")
     chosen = check(folder, "file", {"mesh": "coarse.msh", "material": STEEL, "band_hz": [20, 3000], "accuracy_cents": 3}, [574.44, 1135.46])
@@ -143,16 +143,16 @@ with tempfile.TemporaryDirectory(prefix="carillon-accuracy-") as scratch:
     ), text
     assert not (folder / "facets.hdf").exists()
 
-    # The same ball of second order is not advised to be of second order: its parabolas miss the sphere, or its folded elements are flat.
+    # The same ball with ten-node elements is not advised to use T10: its parabolas miss the sphere, or its folded elements are flat.
     mesh("--shape", "sphere", "--radius", "0.05", "--nodes", "300", "--order", "2", "-o", "curved.msh")
     text = run(folder, "curved", {"mesh": "curved.msh", "material": CERAMIC, "band_hz": [20, 8000], "accuracy_cents": 0.05}, code=3)
-    assert "although it is of second order" in text and "straight-sided" not in text and "next stricter: T10, refined 1 time" in text, text
+    assert "despite its ten-node elements" in text and "straightened" not in text and "next stricter: T10, refined 1 time" in text, text
     fold(folder / "curved.msh", folder / "folded.msh")
     text = run(folder, "folded", {"mesh": "folded.msh", "material": CERAMIC, "band_hz": [20, 8000], "accuracy_cents": 0.5}, code=3)
-    assert re.search(r"it is of second order, but \d+ of its \d+ elements folded over and were made straight-sided", text), text
+    assert re.search(r"it has ten-node elements, but \d+ of its \d+ elements folded over and were straightened", text), text
     assert "on the true surface" not in text and "next stricter: T10, refined 1 time" in text, text
 
-    # Where no mode is, none is said to be right to 0 cents.
+    # No accuracy is stated for an empty band.
     text = run(folder, "silent", {**bar, "band_hz": [20, 300], "accuracy_cents": 10})
     assert "no mode in the band" in text.split("chosen:")[1] and "error bars up to" not in text, text
     text = run(folder, "silent-file", {"mesh": "coarse.msh", "material": STEEL, "band_hz": [20, 300], "accuracy_cents": 10})

@@ -1,4 +1,4 @@
-// Jobs and meshes that cannot be used: exit code, one message that says where and how to correct it, and nothing left behind.
+// Invalid jobs and meshes: exit code, one message with place and remedy, no files left behind.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -16,8 +16,8 @@ using testing::HasSubstr;
 struct BadCase {
   std::string name;
   int ranks = 1;
-  std::function<void(const Folder&)> spoil;  // job.json and mesh.msh are good before
-  std::vector<std::string> words;            // each in the message
+  std::function<void(const Folder&)> spoil;  // modifies the valid job.json and mesh.msh
+  std::vector<std::string> words;            // expected in the message
 };
 
 void write_good(const Folder& folder) {
@@ -135,7 +135,7 @@ TEST(Band, without_a_mode_gives_a_silent_bank_and_a_warning) {
   folder.write_job({}, R"("element": "T4", "band_hz": [20, 30],)");
   const Outcome outcome = folder.run();
   EXPECT_EQ(outcome.code, 0) << outcome.output;
-  EXPECT_THAT(outcome.output, HasSubstr("no mode lies in the band"));
+  EXPECT_THAT(outcome.output, HasSubstr("no mode in the band"));
   EXPECT_EQ(bank::read_bank(folder / "out.bank").mode_count(), 0u);
 }
 

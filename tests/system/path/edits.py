@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""A bank that was edited is the bank of a fresh solve of the edited body: density, stiffness, size and damping of a steel bar, T10, alone
+"""An edited bank equals a fresh solve of the edited body: density, stiffness, size and damping of a steel bar, T10, alone
 and together.
 
 usage: edits.py BIN_DIR
@@ -77,7 +77,7 @@ def compare(folder, what, edited, fresh):
     np.testing.assert_allclose(a["mesh/vertices"], b["mesh/vertices"], atol=1e-12 * size)
     np.testing.assert_allclose(a["rigid/centre_m"], b["rigid/centre_m"], atol=1e-9 * size)
     np.testing.assert_allclose(a["rigid/inertia_kg_m2"], b["rigid/inertia_kg_m2"], atol=1e-9 * np.abs(b["rigid/inertia_kg_m2"]).max())
-    # The shapes themselves are held to 16 bits: within a step and a half.
+    # Shapes are stored in 16 bits: tolerance of one and a half steps.
     for name in ("modes/shape_scale", "modes/radiation_gain"):
         np.testing.assert_allclose(a[name], b[name], rtol=1e-9, err_msg=f"{what}: {name}")
     for m in range(a["phi"].shape[1]):

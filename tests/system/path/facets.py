@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""A faceted cylinder is solved as the cylinder, for any triangulation. With facets in doubt the error bars hold for the meshed body, and
-with the doubt for both. Bells from a lathe: facets are in doubt with few rings, not with many.
+"""A faceted cylinder is solved as the smooth one, for any triangulation. With ambiguous facets the error bars hold for the meshed body and,
+with the doubt, for both. Turned bells: facets are ambiguous with few rings, not with many.
 
 Truth: the free steel cylinder of radius 20 mm and length 200 mm, "cylinder-10" of
 tests/unit/precompute/fem/error_bars/data/known_frequencies.csv (Fourier-Ritz, 7 digits). The prisms, and the bell of planes, are meshed
@@ -23,7 +23,7 @@ RADIUS, LENGTH = 0.02, 0.2
 
 
 def write_cylinder(path, sides, rings, quads):
-    """An OBJ file of rings of quads or triangles, ends of one polygon each."""
+    """An OBJ file of rings of quads or triangles, with polygonal ends."""
     points = [
         (RADIUS * math.cos(2 * math.pi * j / sides), RADIUS * math.sin(2 * math.pi * j / sides), LENGTH * i / rings)
         for i in range(rings + 1)
@@ -105,7 +105,7 @@ with tempfile.TemporaryDirectory(prefix="carillon-facets-") as scratch:
     found, bars, facets = run(folder, "lathe", {"body": {"surface": "lathe.obj"}, "accuracy_cents": 5})
     expect_inside("24 sides, 5 cents asked", found, bars, TRUTH, 5)
     assert not any(facets), facets
-    # Other cuts of the same body, on meshes of one size: the same frequencies.
+    # Other triangulations of the same body, on meshes of one size: the same frequencies.
     all_found = []
     for sides, rings, quads in ((16, 1, True), (16, 32, False), (64, 4, True)):
         name = f"cut-{sides}-{rings}"
@@ -114,7 +114,7 @@ with tempfile.TemporaryDirectory(prefix="carillon-facets-") as scratch:
         expect_inside(f"{sides} sides, {rings} rings", found, bars, TRUTH, 2)
         all_found.append(found)
     assert all(abs(c) < 1 for found in all_found for c in cents(found, all_found[0])), all_found
-    # Facets in doubt: the bars hold for the meshed body, and with the doubt for the other too.
+    # Ambiguous facets: the bars hold for the meshed body and, with the doubt, for the other one.
     for sides, is_round in ((8, False), (12, True)):
         name = f"either-{sides}"
         write_cylinder(folder / f"{name}.obj", sides, 4, True)
@@ -125,7 +125,7 @@ with tempfile.TemporaryDirectory(prefix="carillon-facets-") as scratch:
         expect_inside(f"{sides} sides against what was meshed", found, add(bars, own_bars if not is_round else [0] * 99), meshed)
         expect_inside(f"{sides} sides against the other", found, add(bars, facets), other)
         assert max(map(abs, cents(found, other))) > max(bars), "no bar contains the other body"
-        # The same on more ranks and from a mesh file, which carries the doubt.
+        # The same on more ranks and from a mesh file, which stores the doubt.
         subprocess.run(
             [bin_dir / "carillon-mesh", f"{name}.obj", "--order", "2", "--nodes", "5000", "-o", f"{name}-file.msh"],
             cwd=folder,
@@ -134,13 +134,13 @@ with tempfile.TemporaryDirectory(prefix="carillon-facets-") as scratch:
         )
         _, two, facets_two = run(folder, f"{name}-two", {"mesh": f"{name}-file.msh"}, ranks=2)
         assert all(abs(b / a - 1) < 1e-3 for a, b in zip(bars + facets, two + facets_two)), (bars, two, facets, facets_two)
-    # The accuracy applies to the bars; the doubt is one warning.
+    # The accuracy target applies to the bars; the doubt gives one warning.
     _, bars, facets = run(folder, "asked", {"body": {"surface": "either-12.obj"}, "accuracy_cents": 5})
     record = json.loads((folder / "asked.hdf.resolved.json").read_text())["run"]
     assert record["accuracy"]["chosen"]["worst_cents"] <= 5 < max(facets) and record["accuracy"]["chosen"]["facet_cents"] > 5, record
     assert sum("facets in doubt" in text for text in record["warnings"]) == 1, record["warnings"]
 
-    # A bell from a profile of few points, and from many.
+    # A bell from a profile with few points, and with many.
     for points, sides in ((6, 64), (40, 256)):
         write_bell(folder / f"bell-{sides}.obj", sides, points)
     job = {"nodes": 9000, "scale": 0.001}

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""Corrected frequencies from the job to the sound: a scene plays them, or the mesh's, as it asks; a list that is too short for error bars
-says so in the log, in the bank and in its report, and nowhere as a number.
+"""Corrected frequencies from the job to the sound: a scene plays them or the mesh's, as selected; lists too short for error
+bars are marked in the log, the bank and its report, without numbers.
 
 usage: frequencies.py BIN_DIR
 """
@@ -36,7 +36,7 @@ def solve(folder, name, **more):
 
 
 def measure(folder, name, freq_hz):
-    """How strong each frequency is in the WAV, by a Hann window over its last second."""
+    """Amplitude of each frequency in the last second of the WAV, with a Hann window."""
     with wave.open(str(folder / f"{name}.wav")) as file:
         rate, channels = file.getframerate(), file.getnchannels()
         sound = numpy.frombuffer(file.readframes(file.getnframes()), "<i2").reshape(-1, channels).sum(axis=1)[-rate:]
@@ -45,7 +45,7 @@ def measure(folder, name, freq_hz):
 
 
 def check_sound(folder):
-    _, modes = solve(folder, "bar", band_hz=[20, 1000])  # one mode: no other one is where it is not
+    _, modes = solve(folder, "bar", band_hz=[20, 1000])  # a single mode, so others cannot be shifted
     mesh, corrected = modes["frequency_hz"][0], modes["corrected_frequency_hz"][0]
     assert mesh - corrected > 10, f"{mesh} and {corrected} Hz cannot be separated here"
     scene = {
@@ -90,7 +90,7 @@ def check_short_list(folder):
         page = (folder / f"{name}-report" / "report.html").read_text()
         assert "unknown" in page and "not known of all modes" in page
         assert not re.search(r"\binf\b", page), page[page.index("inf") - 200 :][:400]
-    # The lowest modes of a longer list are not so: they are computed with more, and cut.
+    # The lowest modes of a longer list are unaffected: more modes are computed, then cut.
     _, modes = solve(folder, "cut", mass="lumped", band_hz=[20, 9000], max_modes=2)
     assert len(modes["frequency_hz"]) == 2 and numpy.all(numpy.isfinite(modes["corrected_error_cents"])), modes
     print(f"short lists: {len(mesh)} modes have bars, 3 and 1 have none, 2 of more have some")

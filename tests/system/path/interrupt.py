@@ -1,7 +1,7 @@
 #!/usr/bin/python3
-"""A run that is stopped from outside leaves no half bank, no temporary file and no process, whatever it was doing.
+"""A run stopped by a signal leaves no partial bank, temporary file or process, in any phase.
 
-Starts a run on several ranks, waits for the line of a phase, and sends a signal to mpirun or to a single rank.
+Starts a run on several ranks, waits for the log line of a phase, and sends a signal to mpirun or to one rank.
 
 usage: interrupt.py BIN_DIR
 """
@@ -22,7 +22,7 @@ bin_dir = pathlib.Path(sys.argv[1]).resolve()
 
 
 def find_mentions(folder):
-    """Processes that have the folder on their command line."""
+    """Processes with the folder in their command line."""
     found = []
     for entry in pathlib.Path("/proc").glob("[0-9]*"):
         try:
@@ -73,7 +73,7 @@ def interrupt(folder, temporary, job, ranks, phase, delay_s, number, at_rank):
     assert after == before, f"{name}: files before {before}, after {after}"
     left = list(temporary.glob("carillon-mesh-*"))
     assert not left, f"{name}: {left} stays"
-    for _ in range(50):  # nor does a program that a rank started
+    for _ in range(50):  # neither is a program started by a rank
         if not (others := find_mentions(folder)):
             break
         time.sleep(0.1)
@@ -82,7 +82,7 @@ def interrupt(folder, temporary, job, ranks, phase, delay_s, number, at_rank):
     print(f"{name}: ended after {took_s:.1f} s with code {run.returncode}")
 
 
-# Temporary files go to a folder of this test: other tests mesh at the same time.
+# Temporary files go to a folder of this test, since other tests mesh concurrently.
 with tempfile.TemporaryDirectory(prefix="carillon-interrupt-") as scratch, tempfile.TemporaryDirectory() as own:
     folder, temporary = pathlib.Path(scratch), pathlib.Path(own)
     subprocess.run(
@@ -109,7 +109,7 @@ with tempfile.TemporaryDirectory(prefix="carillon-interrupt-") as scratch, tempf
     ):
         interrupt(folder, temporary, "bar.json", 2, phase, delay_s, number, at_rank)
     assert (folder / "bar.hdf").read_text() == "an older bank"
-    # While another program meshes: it ends too, and its folder goes.
+    # While the mesher runs: it is ended too, and its folder removed.
     rings = 40
     points = (
         [(0, 0, 0.05)]

@@ -1,8 +1,8 @@
 #!/usr/bin/python3
-"""The kinds of modes of carillon-bank against those of closed forms at the same frequencies.
+"""Kinds of modes by carillon-bank against closed forms at the same frequencies.
 
 A free steel bar: Timoshenko's bending in both planes (Huang 1961), torsion (St Venant) and longitudinal motion (Rayleigh). A ball: Lamb's
-breathing mode. A ring: its nodal diameters in and out of the plane (Love 1927). A plate: Leissa 1973, table C20. A lumpy body: none.
+breathing mode. A ring: its nodal diameters in and out of the plane (Love 1927). A plate: Leissa 1973, table C20. An irregular body: none.
 
 usage: kinds.py BIN_DIR
 """
@@ -56,7 +56,7 @@ def bending(length, width, height, high_hz):
 
 
 def solve(folder, name, job):
-    """[(heard frequency [Hz], kind)]"""
+    """[(playback frequency [Hz], kind)]"""
     (folder / f"{name}.json").write_text(json.dumps({"bank": f"{name}.hdf", "material": STEEL, **job}))
     for words in (["carillon-precompute", f"{name}.json", "-q"], ["carillon-bank", "info", f"{name}.hdf", "--csv"]):
         done = subprocess.run([bin_dir / words[0], *words[1:]], cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True)
@@ -116,7 +116,7 @@ with tempfile.TemporaryDirectory(prefix="carillon-kinds-") as scratch:
     assert sum(kind == "-" for _, kind in found) <= 0.1 * len(found), found
 
     radius = 0.2
-    ratio2 = 2 * (1 - NU) / (1 - 2 * NU)  # of the squared speeds
+    ratio2 = 2 * (1 - NU) / (1 - 2 * NU)  # squared ratio of wave speeds
     fast = math.sqrt(E * (1 - NU) / ((1 + NU) * (1 - 2 * NU)) / RHO)
     root = find_roots(lambda x: x * math.cos(x) - (1 - x * x * ratio2 / 4) * math.sin(x), 0.5, 3.1)[0]
     breathing = root * fast / (2 * math.pi * radius)
@@ -130,7 +130,7 @@ with tempfile.TemporaryDirectory(prefix="carillon-kinds-") as scratch:
     found = solve(
         folder, "ring", {"body": {"shape": "ring", "radius_m": radius, "thickness_m": thick, "nodes": 4000}, "band_hz": [20, 3000]}
     )
-    inertia = (thick / 4) ** 2  # of a round section, over its area
+    inertia = (thick / 4) ** 2  # of a round section, per area
     unit = math.sqrt(E * inertia / (RHO * radius**4)) / (2 * math.pi)
     wanted = {}
     for n in range(2, 5):
@@ -147,6 +147,6 @@ with tempfile.TemporaryDirectory(prefix="carillon-kinds-") as scratch:
     )
     unit = thick * math.sqrt(E / (12 * (1 - NU**2) * RHO)) / (2 * math.pi * sides[0] ** 2)
     lines = ("1 x 1", "2 x 0", "2 x 1", "0 x 2")
-    factors = (20.128, 21.603, 46.654, 50.293, 58.201, 67.494)  # the last two are sums of 1 x 2 and 3 x 0: neither has such lines
+    factors = (20.128, 21.603, 46.654, 50.293, 58.201, 67.494)  # the last two are sums of 1 x 2 and 3 x 0, both without such lines
     expect(found, {f"plate bending, {one} lines": [f * unit] for one, f in zip(lines, factors)}, 0.02)
     expect(found, {"plate bending": [f * unit for f in factors[4:]]}, 0.02)

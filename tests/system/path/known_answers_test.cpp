@@ -1,4 +1,4 @@
-// Frequencies and shapes of bodies whose modes are known from elsewhere: closed forms, Fourier-Ritz and Legendre-Ritz values.
+// Frequencies and shapes against independent references: closed forms, Fourier-Ritz and Legendre-Ritz values.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -24,7 +24,7 @@ std::vector<double> frequencies(const bank::Bank& bank) {
   return result;
 }
 
-/// The largest relative distance of the first frequencies from the expected ones.
+/// Largest relative error of the first frequencies.
 void expect_first(const bank::Bank& bank, const std::vector<double>& expected, double tolerance) {
   ASSERT_GE(bank.mode_count(), expected.size());
   for (std::size_t m = 0; m < expected.size(); ++m) EXPECT_NEAR(bank.freq_hz(m) / expected[m], 1, tolerance) << "mode " << m;

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""Bodies whose modes are known, through the programs: figure 2 of van den Doel and Pai 1996 from the job to the rendered sound; banks of
-every kind pass the check and are played, struck and dropped; the queue computes them; input with mistakes gets one error.
+"""Bodies with known modes, through the programs: figure 2 of van den Doel and Pai 1996 from the job to the rendered sound; banks of
+every kind pass the check and are played, struck and dropped; the queue computes them; invalid input gets one error.
 
 usage: known_bodies.py BIN_DIR SOURCE_DIR
 """
@@ -96,7 +96,7 @@ def render(folder, point, name):
 
 
 def list_lines(point, modes=400):
-    """{half-waves squared: sum of the modes' amplitudes}: what modes of one frequency add up to. Closed form."""
+    """{half-waves squared: sum of the amplitudes of degenerate modes}, in closed form."""
     pairs = sorted(((m * m + n * n, m, n) for m in range(1, 60) for n in range(1, 60)))[:modes]
     lines = {}
     for square, m, n in pairs:
@@ -121,7 +121,7 @@ def check_figure_2(folder):
     assert len(found) == len(table) == 400
     scale = math.sqrt(0.25)  # phi is mass-normalised: Psi over the root of the mass
     by_name = {row["name"]: row for row in found}
-    for row in table:  # its nine digits, and all digits of the half-waves that it names
+    for row in table:  # nine digits, and full precision of the half-waves that it lists
         m, n = int(row["m"]), int(row["n"])
         one = by_name[f"({m}, {n})"]
         hz = 500 * math.sqrt((m * m + n * n) / 2)
@@ -146,8 +146,8 @@ def check_rendered_lines(folder):
 
 
 def check_brightness(folder):
-    """The known centroids of the modes' energies, rising towards the edge; and the centroid of the rendered sound against that of its
-    lines, in which modes of one frequency add up with their signs."""
+    """Centroids of the modes' energies against known ones, rising towards the edge; centroid of the rendered sound against that of its
+    lines, in which degenerate modes add with their signs."""
     before = 0.0
     for row in list(csv.reader((DATA / "square_membrane_brightness.csv").open()))[1:]:
         point = float(row[0]), float(row[1])
@@ -157,7 +157,7 @@ def check_brightness(folder):
         assert abs(known - float(row[2])) < 6e-5 and known > before, (known, row[2], before)
         before = known
         if any(abs(80 * x - round(80 * x)) > 1e-9 for x in point):
-            continue  # between the points of the bank's surface
+            continue  # between surface points of the bank
         lines = list_lines(point)
         wanted = sum(a * a * 500 * math.sqrt(s / 2) for s, a in lines.items()) / sum(a * a for a in lines.values())
         rate, samples = render(folder, point, "bright")
@@ -194,7 +194,7 @@ def check_kinds(folder):
     assert report["resets"] == 0 and report["impulses_refused"] == 0
     for one in report["per_body"]:
         assert one["peak_pa_at_1m"] > 0, one
-    # A free bar falls on the ground as any other body.
+    # A free bar falls on the ground like any other body.
     drop = {
         "duration_s": 1,
         "ground": {},
@@ -262,7 +262,7 @@ def check_refusals(folder):
         errors = [line for line in done.stderr.splitlines() if line.strip()]
         assert len(errors) == 1 and words in errors[0] and ("bad.json" in errors[0] or "bad.csv" in errors[0]), (body, errors)
         assert not (folder / "bad.hdf").exists() and not (folder / "bad.hdf.resolved.json").exists()
-    # Clockwise corners, and lines of a table in any order, are no mistake.
+    # Clockwise corners and tables in any order are valid.
     write(
         folder, "bad.json", {"body": polygon([[0, 0], [0, 0.1], [0.1, 0]]), "material": "polyester film", "max_modes": 3, "bank": "bad.hdf"}
     )

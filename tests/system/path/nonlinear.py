@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""`"nonlinear": "stretch"` of held bodies of elements, from the job to the rendered sound: the glide of a clamped bar after a hard blow
-against Duffing's equation of the thin beam, that of a sheet against all of its condensed energy, and soft blows against linear banks.
+"""`"nonlinear": "stretch"` of held meshed bodies, from the job to the rendered sound: the glide of a clamped bar after a hard strike
+against Duffing's equation of the thin beam, that of a sheet against its full condensed energy, and soft strikes against linear banks.
 
 usage: nonlinear.py BIN_DIR
 """
@@ -25,8 +25,8 @@ MATERIAL = {
     "density_kg_m3": DENSITY_KG_M3,
     "damping": {"rayleigh": {"alpha1_s": 0, "alpha2_per_s": ALPHA2_PER_S}},
 }
-# Of the first mode of a clamped beam: its number k L, the share of the mass that moves with the middle, and q'' + omega^2 (q + gamma q^3 /
-# h^2) = 0 for the deflection q of the middle.
+# First mode of a clamped beam: k L, modal mass of the mid-point deflection over the total mass, and gamma of q'' + omega^2 (q + gamma q^3 /
+# h^2) = 0 for the deflection q of the mid-point.
 WAVE_NUMBER, MASS_SHARE, GAMMA = 4.730040744862704, 0.396478, 0.719293030305
 BEGIN_S, AWAY_M = 0.01, 1.0
 WINDOWS_S = ((0.02, 0.12), (0.2, 0.4), (0.7, 0.95))  # of the motion
@@ -39,7 +39,7 @@ def run(folder, *words):
 
 
 def solve(folder, name, body, nonlinear=None, max_modes=10, material="steel"):
-    """Frequencies of the bank as they are played, and how many rows its nonlinear part has."""
+    """Playback frequencies of the bank, and the number of its nonlinear rows."""
     job = {"body": body, "material": material, "fixed": ["x-min", "x-max"], "band_hz": [20, 3000], "max_modes": max_modes}
     job |= {"bank": f"{name}.hdf"} | ({"nonlinear": nonlinear} if nonlinear else {})
     (folder / f"{name}.json").write_text(json.dumps(job))
@@ -51,7 +51,7 @@ def solve(folder, name, body, nonlinear=None, max_modes=10, material="steel"):
 
 
 def strike(folder, bank, impulse_n_s, nonlinear=None, blow_s=1e-4):
-    """The sound at 1 m above the middle, and what the report says of the effect."""
+    """The sound at 1 m above the middle, and the effect's part of the report."""
     with h5py.File(folder / f"{bank}.hdf") as file:
         top = float(file["mesh/vertices"][:, 2].max())
     scene = {
@@ -72,7 +72,7 @@ def strike(folder, bank, impulse_n_s, nonlinear=None, blow_s=1e-4):
 
 
 def find_pitch(sound, window_s, near_hz, late_s=0.0):
-    """The strongest line from three quarters of near_hz to nine fifths, placed by a parabola [Hz]."""
+    """The strongest line between 0.75 and 1.8 near_hz, by parabolic interpolation [Hz]."""
     part = sound[int((window_s[0] + late_s) * RATE_HZ) : int((window_s[1] + late_s) * RATE_HZ)]
     level = numpy.log(abs(numpy.fft.rfft(part * numpy.hanning(len(part)), 1 << 19)) + 1e-300)
     step = RATE_HZ / (1 << 19)
@@ -83,7 +83,7 @@ def find_pitch(sound, window_s, near_hz, late_s=0.0):
 
 
 def list_cents(sound, soft, near_hz):
-    """How sharp each window is, to the pitch of a soft blow."""
+    """Pitch of each window relative to a soft strike [cents]."""
     late = AWAY_M / 343
     soft_hz = find_pitch(soft, (0.1, 0.9), near_hz, late)
     return [1200 * math.log2(find_pitch(sound, window, near_hz, late) / soft_hz) for window in WINDOWS_S]
@@ -110,7 +110,7 @@ def integrate(omega, impulse_n_s):
 
 
 def check_soft(folder, bank, linear, impulse_n_s, blow_s):
-    """Forced on it is the linear sound to -100 dB; left alone it is off, to the byte."""
+    """When forced on, the effect gives the linear sound to -100 dB; by default it is off, with identical bytes."""
     wanted, _ = strike(folder, linear, impulse_n_s, None, blow_s)
     found, effect = strike(folder, bank, impulse_n_s, True, blow_s)
     off = 20 * math.log10(abs(found - wanted).max() / abs(wanted).max())
@@ -122,7 +122,7 @@ def check_soft(folder, bank, linear, impulse_n_s, blow_s):
 
 
 def check_bar(folder):
-    """One mode alone: nothing but its own hardening is heard."""
+    """A single mode with its own hardening."""
     (near_hz,), rows = solve(folder, "bar", BAR, "stretch", 1, MATERIAL)
     assert rows == 1, rows
     solve(folder, "linear-bar", BAR, None, 1, MATERIAL)
@@ -132,7 +132,7 @@ def check_bar(folder):
     for impulse in (0.005, 0.014):
         path = integrate(omega, impulse)
         sound, effect = strike(folder, "bar", impulse)
-        assert effect["on"], effect  # chosen by itself
+        assert effect["on"], effect  # chosen by default
         found = list_cents(sound, soft, near_hz)
         wanted = [1200 * math.log2(find_pitch(path, window, near_hz) / (omega / (2 * math.pi))) for window in WINDOWS_S]
         furthest = abs(path).max() / BAR["thickness_m"]
@@ -143,7 +143,7 @@ def check_bar(folder):
 
 
 def check_sheet(folder):
-    """Modes that bend and twist, together: the rows that stretch against all rows."""
+    """Bending and twisting modes together: stretch rows against all rows."""
     _, rows = solve(folder, "stretch", SHEET, "stretch")
     _, full = solve(folder, "full", SHEET, {"modes": 10})
     frequencies, _ = solve(folder, "linear", SHEET)

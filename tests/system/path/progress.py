@@ -1,7 +1,7 @@
 #!/usr/bin/python3
-"""--progress and the work counted in the record, from outside.
+"""--progress, and the operation counts of the record.
 
-The messages are counted a second time by the preloaded library of tests/bench/scaling, which has its own wrappers.
+Messages are counted independently by the preloaded library of tests/bench/scaling.
 
 usage: progress.py BIN_DIR
 """
@@ -42,12 +42,12 @@ def read_lines(file):
 
 def check_lines(lines, modes, name):
     percents = [line["percent"] for line in lines]
-    assert percents == sorted(percents), f"{name}: progress falls: {percents}"
+    assert percents == sorted(percents), f"{name}: progress decreases: {percents}"
     assert all(0 <= percent < 100 for percent in percents[:-1]), f"{name}: {percents}"
     seconds = [line["seconds"] for line in lines]
     assert seconds == sorted(seconds), f"{name}: {seconds}"
     last = lines[-1]
-    assert (last["phase"], last["percent"], last["seconds_left"]) == ("done", 100, 0), f"{name}: {last}"
+    assert (last["phase"], last["percent"]) == ("done", 100), f"{name}: {last}"
     assert last["modes_done"] == last["modes_wanted"] == modes, f"{name}: {last}, and the bank has {modes} modes"
     assert all(line["modes_done"] <= line.get("modes_wanted", 0) for line in lines), f"{name}: {lines}"
 
@@ -112,8 +112,7 @@ def sum_messages(folder, ranks):
 
 
 def try_work(folder):
-    """Of the same job: the same to the last message, the factor's operations as they were planned, and the messages as others count
-    them."""
+    """Two runs of a job have equal counts; the factor's operations are as planned, and messages as counted independently."""
     write_job(folder, band_hz=[20, 60000])
     records = []
     preload = {"LD_PRELOAD": str(bin_dir / "libcount_messages.so"), "CARILLON_MESSAGES": str(folder / "messages")}

@@ -1,11 +1,11 @@
 #!/usr/bin/python3
-"""Solves cylinder, disc, ring and cone as bodies of a job, and compares frequencies, volume and inertia with what is known.
+"""Solves cylinder, disc, ring and cone as bodies of a job, and compares frequencies, volume and inertia with known values.
 
 Truth: a free solid cylinder of L = 2 R with nu = 0.3 (Fourier-Ritz, nine digits, omega R / c_T); a free thin disc (Kirchhoff's plate, nu =
 0.3: roots of the frequency equation of the free edge, Leissa, NASA SP-160, 1969, chapter 2); a thin ring of round wire, in its plane (Hoppe
 1871) and out of it (Michell 1889), in Love's Treatise, sections 293 and 294; a slender cone clamped at its base (Kirchhoff 1879: 8.7192 of
-c r / 2 L^2) and a free one along its axis (tan kL = kL). Thin-body theories leave shear and rotary inertia out, a part of (h / R)^2 or so
-of the frequency; that is what their tolerances allow.
+c r / 2 L^2) and a free one along its axis (tan kL = kL). Thin-body theories neglect shear and rotary inertia, a relative error of
+about (h / R)^2, which sets the tolerances.
 
 usage: round_shapes.py BIN_DIR
 """
@@ -89,7 +89,7 @@ with tempfile.TemporaryDirectory(prefix="carillon-round-") as scratch:
     bank = solve(folder, {"shape": "cone", "radius_m": r, "height_m": l, "nodes": 5000}, [0.98 * hz, 1.02 * hz])
     compare("cone along its axis", [min(bank["frequencies_hz"], key=lambda f: abs(f - hz))], [hz], 5e-3)
 
-    # A cone that is cut off, of a closed form: volume and centre; with equal radii it is the cylinder.
+    # A truncated cone in closed form: volume and centre; with equal radii it is the cylinder.
     a, b, l = 0.03, 0.01, 0.08
     bank = solve(folder, {"shape": "cone", "radius_m": a, "top_radius_m": b, "height_m": l, "nodes": 3000}, [20, 40000], {"max_modes": 1})
     volume, centre = math.pi * l / 3 * (a * a + a * b + b * b), l / 4 * (a * a + 2 * a * b + 3 * b * b) / (a * a + a * b + b * b) - l / 2

@@ -1,4 +1,4 @@
-// Runs carillon-precompute under mpirun in a folder of its own.
+// Runs carillon-precompute under mpirun in its own folder.
 #pragma once
 
 #include <fmt/core.h>
@@ -66,7 +66,7 @@ class Folder {
     return names;
   }
 
-  /// A job on mesh.msh with bank out.bank; `more` is further keys, each followed by a comma.
+  /// A job on mesh.msh with bank out.bank; `more`: additional keys, each followed by a comma.
   void write_job(const MaterialText& m, const std::string& more = "", const std::string& name = "job.json") const {
     write(name, fmt::format(R"({{ {}
   "mesh": "mesh.msh", "bank": "out.bank",
@@ -93,7 +93,7 @@ class Folder {
     return outcome;
   }
 
-  /// Runs job.json, expects success, and reads the bank, which has to be whole and sane.
+  /// Runs job.json, expects success, and reads and validates the bank.
   bank::Bank solve(int ranks = 1, const std::string& arguments = "job.json", const std::string& bank_name = "out.bank") const {
     const Outcome outcome = run(ranks, arguments);
     EXPECT_EQ(outcome.code, 0) << outcome.output;

@@ -1,4 +1,4 @@
-// One answer whatever the ranks, the pieces and the way back from a resolved job.
+// Results do not depend on ranks, partition, or the round trip through a resolved job.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -16,7 +16,7 @@ namespace {
 using testing::HasSubstr;
 
 TEST(Ranks, give_one_answer_on_1_2_and_3) {
-  // A brick without symmetry between its axes: no two frequencies are equal, so shapes compare one by one.
+  // A brick without symmetry between its axes: distinct frequencies, so shapes compare one by one.
   Folder folder;
   mesh::write_gmsh(shapes::make_box({0.05, 0.065, 0.085}, {3, 4, 5}, 2), folder / "mesh.msh");
   folder.write_job({}, R"("band_hz": [20, 50000], "max_modes": 12,)");
@@ -40,7 +40,7 @@ TEST(Ranks, give_one_answer_on_1_2_and_3) {
   }
 }
 
-/// The job of a resolved JSON, without what its run took.
+/// The job of a resolved JSON, without the record of its run.
 std::string find_job(const std::string& text) {
   base::Json root = base::Json::parse(text).value();
   EXPECT_TRUE(root.has("run"));
@@ -54,7 +54,7 @@ TEST(ResolvedJob, next_to_the_bank_runs_again_and_gives_the_same_bank) {
   folder.write_job({}, R"("element": "T4", "mass": "lumped",)");
   const bank::Bank first = folder.solve();
   const std::string resolved = folder.read("out.bank.resolved.json");
-  EXPECT_EQ(find_job(first.provenance), find_job(resolved));  // the record next to the bank has the writing of the bank, too
+  EXPECT_EQ(find_job(first.provenance), find_job(resolved));  // the record next to the bank includes the writing of the bank
   for (const char* word : {"\"petsc\"", "\"slepc\"", "\"metis\"", "\"hdf5\"", "\"mpi\"", "\"blas\"", "\"git\"", "\"ranks\"", "\"seconds\"",
                            "\"peak_bytes_largest_rank\"", "\"edge_cut\"", "\"halo_nodes\"", "\"tolerance\"", "\"band_hz\""})
     EXPECT_THAT(resolved, HasSubstr(word));
@@ -95,7 +95,7 @@ TEST(MaxModes, gives_the_lowest_of_the_band_and_says_that_there_are_more) {
   const bank::Bank three = folder.solve();
   EXPECT_FALSE(three.complete);
   ASSERT_EQ(three.mode_count(), 3u);
-  // Those of the lowest corrected frequencies; on this mesh bending is too high, so that the lowest of the mesh are others.
+  // Modes of the lowest corrected frequencies; on this mesh bending is too high, so the lowest uncorrected ones differ.
   std::vector<double> wanted = all.corrected.freq_hz, found = three.corrected.freq_hz;
   std::sort(wanted.begin(), wanted.end());
   std::sort(found.begin(), found.end());
@@ -123,7 +123,7 @@ TEST(Progress, names_every_phase_begins_with_wide_bars_and_quiet_shows_them_alon
                            "write ", " MB peak", "modes in 20 .. 20000 Hz", "by inertia, 6 rigid", "of the body to about"})
     EXPECT_THAT(loud.output, HasSubstr(word));
   EXPECT_EQ(loud.output.find("BLAS"), std::string::npos) << loud.output;
-  // A first-order bar of four elements is off by hundreds of cents; that comes before the bank and its figures.
+  // A first-order bar of four elements is off by hundreds of cents; the warning precedes the bank and its figures.
   const std::size_t warning = loud.output.find("warning: frequencies can be wrong by ");
   ASSERT_NE(warning, std::string::npos) << loud.output;
   EXPECT_LT(warning, loud.output.find("modes in 20 .. 20000 Hz"));

@@ -1,8 +1,8 @@
 #!/usr/bin/python3
-"""Starts of solvers: one by one by ranks of an MPI run, together for different work, and on a machine without a network.
+"""Starts of solvers: individually by ranks of an MPI run, together with different jobs, and without a network.
 
-A program of one rank started by a rank (hear, submit, bank-for, validate, the Python module) is no rank of that run. Solvers started in it
-by the user are one run and must have the same job. The oracle is a frequency: a free bar's is proportional to 1 / length^2.
+A program of one rank started by a rank (hear, submit, bank-for, validate, the Python module) is not a rank of that run. Solvers started in
+it by the user form one run and must have the same job. Reference: a free bar's is proportional to 1 / length^2.
 
 usage: starts.py BIN_DIR
 """

@@ -1,4 +1,4 @@
-// Fixed bodies from a job to their losses: a cantilever against beam theory, and what the bank keeps of the job's words.
+// Supports from the job to the losses: a cantilever against beam theory, and the job's entries in the bank.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -14,7 +14,7 @@ namespace {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
-const MaterialText kSteel{200e9, 0.0, 7850};  // without Poisson's ratio: a beam's fixed end is free to be plane
+const MaterialText kSteel{200e9, 0.0, 7850};  // Poisson's ratio 0, so that the fixed end of a beam stays plane
 constexpr double kLength = 0.3, kWidth = 0.012, kHeight = 0.01;
 
 void write_bar(const Folder& folder) { mesh::write_gmsh(shapes::make_box({kLength, kWidth, kHeight}, {30, 1, 1}, 2), folder / "mesh.msh"); }
@@ -26,7 +26,7 @@ double dot(const double* r, int count) {
 }
 
 TEST(Cantilever, pulls_at_its_fixed_end_as_beam_theory_says) {
-  // Clamped-free beam: the mode's force is lambda sqrt(0.6131 M), its couple lambda 0.5688 L sqrt(M) (the integrals of phi and x phi).
+  // Clamped-free beam: modal force lambda sqrt(0.6131 M), couple lambda 0.5688 L sqrt(M) (integrals of phi and x phi).
   Folder folder;
   write_bar(folder);
   folder.write_job(kSteel, R"("fixed": {"node_set": "x-min", "on": "brick wall", "joint": "screwed"}, "band_hz": [20, 3000],)");
@@ -40,7 +40,7 @@ TEST(Cantilever, pulls_at_its_fixed_end_as_beam_theory_says) {
     EXPECT_NEAR(dot(r, 3) / (lambda * std::sqrt(0.6131 * mass)), 1, 0.005);
     EXPECT_NEAR(dot(r + 3, 3) / (lambda * 0.5688 * kLength * std::sqrt(mass)), 1, 0.005);
     EXPECT_NEAR(std::abs(r[0]) / dot(r, 3), 0, 1e-3) << "bending does not pull along the bar";
-    // The strain energy falls with the square of the moment from the fixed end: within h of L, 1 - (1 - h / L)^k at first.
+    // The strain energy density decreases from the fixed end with the square of the moment: within h of L, 1 - (1 - h / L)^k at first.
     EXPECT_NEAR(bank.supports.energy[m], 4.6 * kHeight / kLength, 0.25 * 4.6 * kHeight / kLength);
   }
   EXPECT_NEAR(bank.supports.area_m2[0], kWidth * kHeight, 1e-12);
@@ -68,7 +68,7 @@ TEST(Cantilever, has_the_same_supports_on_two_ranks_and_by_its_own_record) {
     }
   }
   EXPECT_EQ(bank::read_version(folder / "out.bank"), (std::array<int, 2>{1, 4}));
-  // The record runs again and says the same.
+  // The provenance is a job that reproduces the result.
   EXPECT_THAT(folder.read("out.bank.resolved.json"), HasSubstr("\"left\""));
   const bank::Bank again = folder.solve(1, "out.bank.resolved.json");
   EXPECT_EQ(again.supports.text, one.supports.text);

@@ -1,10 +1,10 @@
 #!/usr/bin/python3
-"""Meshes surfaces in both ways, solves them, and holds the frequencies against exact ones.
+"""Meshes surfaces with both methods, solves them, and compares with exact frequencies.
 
 Truth: Lamb modes of a solid ceramic sphere, R = 50 mm (torsional and spheroidal, l = 2: 6937.16 and 7349.28 Hz, five of each), and of a
 steel shell, radii 50 and 45 mm (S2, five at 12550.313 Hz; 200 GPa, 0.3, 7850 kg/m^3), and of NAFEMS FV42's thick sphere at 1:100, radii 60
-and 18 mm (S2, five at 19666.18 Hz; 200 GPa, 0.3, 8000 kg/m^3): roots of the exact frequency equations. What remains of the error is mostly
-the polygon's: elements have straight sides here, so a ball is a little small and its modes a little high.
+and 18 mm (S2, five at 19666.18 Hz; 200 GPa, 0.3, 8000 kg/m^3): roots of the exact frequency equations. The remaining error is mostly
+geometric: elements have straight sides here, so a ball is slightly small and its modes slightly high.
 
 usage: surface_frequencies.py BIN_DIR RANKS
 """
@@ -63,7 +63,7 @@ with tempfile.TemporaryDirectory(prefix="carillon-surface-") as scratch:
     folder = pathlib.Path(scratch)
     write_sphere(folder / "sphere.off", 0.05)
     write_sphere(folder / "nafems.off", 0.06)
-    # Stuffing needs edges shorter than a wall, so the thin shell is left to Delaunay refinement.
+    # Stuffing needs edges shorter than the wall, so the thin shell uses Delaunay refinement only.
     both = ("delaunay", "stuffing")
     cases = [
         ("sphere", both, [], CERAMIC, [20, 8000], [6937.16] * 5 + [7349.28] * 5, 0.01),
@@ -77,7 +77,7 @@ with tempfile.TemporaryDirectory(prefix="carillon-surface-") as scratch:
                 folder, f"{body}-{method}", [f"{surface}.off", *wall, "--nodes", 9000, "--order", 2, "--method", method], material, band
             )
             found = bank["frequencies_hz"]
-            assert len(found) == len(truth), (body, method, found, truth)  # the multiplets are whole, and nothing is between them
+            assert len(found) == len(truth), (body, method, found, truth)  # multiplets are complete, without extra modes
             errors = [f / t - 1 for f, t in zip(found, truth)]
             largest = max(errors, key=abs)
             print(

@@ -1,6 +1,5 @@
 #!/usr/bin/python3
-"""What strangers write does not reach the terminal as control characters: errors of every program, from file names, keys, texts and words
-of the command line.
+"""Untrusted text reaches the terminal without control characters: errors of every program, from file names, keys, texts and arguments.
 
 usage: terminal.py BIN_DIR
 """
@@ -20,7 +19,7 @@ MATERIAL = {"young_modulus_pa": 2e11, "poisson_ratio": 0.3, "density_kg_m3": 785
 def expect_clean(done, what):
     assert done.returncode in (2, 4), f"{what}: exit code {done.returncode}: {done.stderr!r}"
     for name, data in (("standard error", done.stderr), ("standard output", done.stdout)):
-        text = data.decode("utf-8")  # what is no UTF-8 fails here
+        text = data.decode("utf-8")  # invalid UTF-8 fails here
         found = sorted({hex(ord(letter)) for letter in text if ord(letter) in HIDDEN})
         assert not found, f"{what}: {name} holds {found}: {text!r}"
     assert done.stderr.strip(), f"{what}: there is no message"
@@ -44,7 +43,7 @@ def write(folder, name, text):
 
 def check_texts(folder):
     """Texts, keys and node sets inside files."""
-    for raw in (False, True):  # as escapes of JSON, and as the very characters
+    for raw in (False, True):  # as JSON escapes and as raw characters
         dump = lambda value: json.dumps(value, ensure_ascii=not raw).replace("\\u001b", "\x1b" if raw else "\\u001b")
         scene = write(folder, "scene.json", dump({"duration_s": NASTY, "bodies": []}))
         body = write(folder, "body.json", dump({"duration_s": 1, "bodies": [{"name": "a", "bank": NASTY}]}))
@@ -84,7 +83,7 @@ def check_texts(folder):
 
 
 def check_names(folder):
-    """Names of files and words of the command line, which may be no UTF-8 at all."""
+    """File names and arguments, which may be invalid UTF-8."""
     for name in (NASTY.encode().replace(b"/", b""), b"latin \xe9 \x9b \xff"):
         for program, words in (
             ("carillon-render", [name, b"-o", b"x.wav"]),

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""Units: a mesh in millimetres with "mesh_scale" is the body in metres, on one rank and in the parallel format, free and fixed; what is
-likely given in another unit is asked about.
+"""Units: a mesh in millimetres with "mesh_scale" equals the body in metres, on one rank and in the parallel format, free and fixed;
+values that are probably in another unit give warnings.
 
 usage: units.py BIN_DIR
 """
@@ -46,7 +46,7 @@ def expect_close(found, wanted, what):
 
 def check_scale(folder):
     nodes, tets = make_box((8, 3, 2), (0.1, 0.033, 0.021))
-    turned = numpy.linalg.det(nodes[tets[:, 1:4]] - nodes[tets[:, :1]]) < 0  # none is to be inside out, which would be said
+    turned = numpy.linalg.det(nodes[tets[:, 1:4]] - nodes[tets[:, :1]]) < 0  # none may be inside out, which would be reported
     tets[turned, :2] = tets[turned, 1::-1]
     side = (nodes[:, 0] == 0).astype("i4")
     meshio.Mesh(nodes, [("tetra", tets)], point_data={"side": side}).write(folder / "metres.vtu")
@@ -60,18 +60,18 @@ def check_scale(folder):
             found, record, said = solve(folder, ranks, mesh=mesh, mesh_scale=0.001, **hold)
             expect_close(found, wanted, f"{mesh}, {hold}, {ranks} ranks")
             assert record["mesh_scale"] == 0.001 and "millimetres" not in said, said
-        # The record is a job that gives the same again.
+        # The provenance is a job that reproduces the result.
         (folder / "again.json").write_text(json.dumps({key: value for key, value in record.items() if key != "run"}))
         assert run(folder, "-q", "again.json").returncode == 0
     accurate, record, _ = solve(folder, mesh="millimetres.vtu", mesh_scale=0.001, accuracy_cents=300, max_modes=8)
     coarse, _, _ = solve(folder, mesh="metres.vtu", accuracy_cents=300, max_modes=8)
     expect_close(accurate, coarse, "accuracy_cents")
-    # Without the key the warning names it; with a wrong value it gives the right one.
+    # Without the key the warning names it; with a wrong value it states the right one.
     (folder / "job.json").write_text(json.dumps({"mesh": "metres.vtu", "mesh_scale": 1000, "material": GLASS, "bank": "bank.hdf"}))
     warnings = json.loads(run(folder, "--validate", "--json", "job.json").stdout)["warnings"]
     assert any("millimetres" in text and "is 1000: 1 for that" in text for text in warnings), warnings
     (folder / "job.json").write_text(json.dumps({"mesh": "millimetres.vtu", "material": GLASS, "bank": "bank.hdf"}))
-    looked = run(folder, "--validate", "--json", "--patience", "1000000", "job.json")
+    looked = run(folder, "--validate", "--json", "job.json")
     warnings = json.loads(looked.stdout)["warnings"]
     assert any("millimetres" in text and '"mesh_scale": 0.001' in text for text in warnings), warnings
     assert '"mesh_scale": 0.001' in looked.stderr
@@ -92,15 +92,15 @@ def check_questions(folder):
         (folder / "job.json").write_text(
             json.dumps({"body": body, "material": GLASS | change, "bank": "bank.hdf", "band_hz": [20, 5000], "max_modes": 3})
         )
-        looked = run(folder, "--validate", "--json", "--patience", "1000000", "job.json")
+        looked = run(folder, "--validate", "--json", "job.json")
         assert looked.returncode == 0, looked.stderr
         warnings = json.loads(looked.stdout)["warnings"]
         for word in words:
             assert sum(word in text for text in warnings) == 1, f"{change}: {warnings}"
             assert sum(word in line for line in looked.stderr.splitlines()) == 1, looked.stderr
-        people = run(folder, "--validate", "--patience", "1000000", "job.json")
+        people = run(folder, "--validate", "job.json")
         assert all(word in people.stderr for word in words), people.stderr
-    solved = run(folder, "-q", "job.json")  # no damping: solved, with the warning in the record
+    solved = run(folder, "-q", "job.json")  # no damping: solved, with the warning in the provenance
     assert solved.returncode == 0 and "rings for ever" in solved.stderr, solved.stderr
     assert any("rings for ever" in text for text in json.loads((folder / "bank.hdf.resolved.json").read_text())["run"]["warnings"])
 

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""--validate against runs: the modes it counts are those a run finds, the memory it predicts is enough and not twice too much, and a job
-that a run refuses before it solves is refused with the same words.
+"""--validate against runs: equal mode counts, predicted memory between one and two times the peak, and the same errors for jobs that a run
+rejects before solving.
 
 usage: validate.py BIN_DIR
 """
@@ -54,7 +54,7 @@ def write_job(folder, job):
 
 def check_predictions(folder, name, job):
     write_job(folder, job)
-    result = run(folder, "--validate", "--json", "--patience", "1000000", "job.json")
+    result = run(folder, "--validate", "--json", "job.json")
     assert result.returncode == 0, f"{name}: {result.stderr}"
     assert not (folder / "bank.hdf").exists(), f"{name}: a validation wrote a bank"
     predicted = json.loads(result.stdout)
@@ -106,7 +106,7 @@ def check_refusals(folder):
             text = json.loads((folder / "job.json").read_text())
             text.pop("material", None)
             (folder / "job.json").write_text(json.dumps(text))
-        solved, looked = run(folder, "-q", "job.json"), run(folder, "--validate", "--json", "--patience", "1000000", "job.json")
+        solved, looked = run(folder, "-q", "job.json"), run(folder, "--validate", "--json", "job.json")
         assert (
             solved.returncode == looked.returncode == 2
         ), f"{name}: {solved.returncode} of a run, {looked.returncode} of --validate: {looked.stderr}"
@@ -124,10 +124,10 @@ def check_words(folder):
     assert several.returncode == 2 and "without mpirun" in several.stderr, several.stderr
     alone = run(folder, "--json", "job.json")
     assert alone.returncode == 2 and "--validate" in alone.stderr, alone.stderr
-    people = run(folder, "--validate", "--patience", "1000000", "job.json")
+    people = run(folder, "--validate", "job.json")
     assert people.returncode == 0 and "counted by inertia" in people.stdout and "ranks" in people.stdout, people.stdout
     write_job(folder, {"body": {key: value for key, value in BAR.items() if key != "nodes"}, "accuracy_cents": 5})
-    trial = run(folder, "--validate", "--json", "--patience", "1000000", "job.json")
+    trial = run(folder, "--validate", "--json", "job.json")
     assert trial.returncode == 0 and "trial" in " ".join(json.loads(trial.stdout)["notes"]), trial.stdout + trial.stderr
 
 

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The Python module from outside: banks against h5py, jobs against the program that solves them, scenes against carillon-render's file,
+"""The Python module: banks against h5py, jobs against carillon-precompute, scenes against carillon-render's file,
 strikes against the sum of modes by its formula, what is hostile, and what must not be held or left behind.
 
 Finds the programs in $CARILLON_BIN_DIR and the module along PYTHONPATH.
@@ -77,7 +77,7 @@ class Banks(Case):
                 ):
                     numpy.testing.assert_array_equal(getattr(bank, name), stored[where][:], f"{file} {name}")
                 decay, gain = stored["modes/decay"][:], stored["modes/radiation_gain"][:]
-                in_air = "radiation/decay" in stored  # then it is played with what the air takes, and as loud as it makes it
+                in_air = "radiation/decay" in stored  # played with radiation damping and gain
                 if in_air:
                     air = stored["radiation/decay"][:]
                     decay, gain = decay + air, numpy.sqrt(air * 1.21 * 343.0 / (2 * numpy.pi))
@@ -103,7 +103,7 @@ class Banks(Case):
             numpy.testing.assert_allclose(carillon.Bank(file).t60_s, [mode["t60_s"] for mode in heard], rtol=1e-12)
             self.assertIn(f"{len(bank)} modes", repr(bank))
 
-    def test_arrays_are_views_that_outlive_the_bank_and_cannot_be_written(self):
+    def test_arrays_are_read_only_views_that_keep_the_bank_alive(self):
         bank = carillon.Bank(self.bank_file)
         shapes, points = bank.shape_steps, bank.vertices_m
         self.assertTrue(numpy.shares_memory(shapes, bank.shape_steps))
@@ -138,7 +138,7 @@ class Banks(Case):
         self.refuse(carillon.InputError, lambda: bank.edited(size=0), "size")
         self.refuse(carillon.InputError, lambda: bank.write("none/x.hdf"), "there is no folder none")
 
-    def test_hostile_files_are_one_message_and_leave_no_file_open(self):
+    def test_hostile_files_are_one_message_and_are_closed(self):
         whole = self.bank_file.read_bytes()
         _ = carillon.Bank.parse(whole)
         before = count_files()
@@ -178,7 +178,7 @@ class Jobs(Case):
             cwd=self.folder,
         )
 
-    def test_a_job_is_solved_as_by_the_program(self):
+    def test_a_job_matches_the_program(self):
         self.assertEqual(self.solve_outside(BAR).returncode, 0)
         outside = carillon.Bank("outside.hdf")
         before, files = count_files(), set(os.listdir("."))
@@ -186,11 +186,11 @@ class Jobs(Case):
         numpy.testing.assert_array_equal(inside.frequency_hz, outside.frequency_hz)
         numpy.testing.assert_array_equal(inside.vertices_m, outside.vertices_m)
         self.assertEqual(set(os.listdir(".")), files)
-        # The lowest bending of a free bar, 4.73004^2 / (2 pi L^2) sqrt(E I / (rho A)), less some percent for shear and inertia.
+        # Lowest bending mode of a free bar, 4.73004^2 / (2 pi L^2) sqrt(E I / (rho A)), minus some percent for shear and inertia.
         beam = 4.73004**2 / (2 * numpy.pi * 0.3**2) * (200e9 * 0.012**2 / 12 / 7850) ** 0.5
         self.assertTrue(0.96 * beam < inside.frequency_hz[0] < beam, (inside.frequency_hz[0], beam))
         kept = carillon.solve({**BAR, "bank": "kept.hdf"}, ranks=2)
-        # Two ranks add in another order; the tolerance of the modes is 1e-8, and corrections are differences of them.
+        # Two ranks sum in another order; modes have a tolerance of 1e-8, and corrections are their differences.
         numpy.testing.assert_allclose(kept.frequency_hz, outside.frequency_hz, rtol=1e-7)
         numpy.testing.assert_array_equal(carillon.Bank("kept.hdf").frequency_hz, kept.frequency_hz)
         numpy.testing.assert_array_equal(carillon.solve("outside.json", bank="other.hdf").frequency_hz, outside.frequency_hz)
@@ -198,14 +198,14 @@ class Jobs(Case):
         self.assertEqual(count_files(), before)
         self.assertEqual(inside.provenance["material"]["name"], "steel")
 
-    def test_files_of_a_job_start_where_python_is(self):
+    def test_paths_of_a_job_are_relative_to_the_working_directory(self):
         fixtures.copy("bar.msh", ".")
         self.assertGreater(len(carillon.solve({"mesh": pathlib.Path("bar.msh"), "material": "cork"})), 0)
         tetrahedron = "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
         pathlib.Path("t.obj").write_text(tetrahedron)
         self.assertGreater(len(carillon.solve({"body": {"surface": "t.obj", "nodes": 500}, "material": {"from": "cork"}})), 0)
 
-    def test_errors_are_those_of_the_program(self):
+    def test_errors_match_the_program(self):
         wrong = {**BAR, "material": "steele"}
         self.assertEqual(self.solve_outside(wrong, "wrong").returncode, 2)
         message = self.refuse(carillon.InputError, lambda: carillon.solve("wrong.json"), "wrong.json:1", 'did you mean "steel"?')
@@ -272,7 +272,7 @@ class Sounds(Case):
             "strikes": [{"time_s": 0.2, "body": "fixed", "point_m": bank.vertices_m[3], "mallet": "hard-wood"}],
         }
 
-    def test_a_scene_sounds_as_the_file_of_carillon_render(self):
+    def test_a_scene_matches_carillon_render(self):
         scene = self.make_scene()
         scene["bodies"][0].pop("rotation_axis_angle")
         plain = json.loads(carillon.documents.write_json(scene, "scene"))
@@ -298,7 +298,7 @@ class Sounds(Case):
         self.assertGreater(abs(by_head - samples).max(), 0.02 * abs(samples).max())
         self.assertEqual(count_files(), before)
 
-    def test_scenes_that_are_wrong_are_one_message(self):
+    def test_invalid_scenes_are_one_message(self):
         scene = self.make_scene()
         self.refuse(carillon.InputError, lambda: carillon.render(scene), f"{os.getcwd()}/scene:", "rotation_axis_angle")
         scene["bodies"][0].pop("rotation_axis_angle")
@@ -335,7 +335,7 @@ class Sounds(Case):
         worst = min(abs(expect(delay) - pressure)[first + 40 :].max() for delay in delays)
         self.assertLess(worst, 1e-4 * abs(pressure).max())
 
-    def test_a_head_hears_what_is_on_its_left_louder_there(self):
+    def test_a_head_has_a_louder_near_ear(self):
         bank = carillon.Bank(self.bank_file)
         synthesiser = carillon.Synthesiser(head_radius_m=0.0875)
         synthesiser.strike(synthesiser.add_body(bank, [-2, 0, 0]), [0, 0, 0.01], triangle=0, time_s=0.005)
@@ -345,7 +345,7 @@ class Sounds(Case):
         self.refuse(carillon.InputError, lambda: carillon.Synthesiser(microphones_m=[[0, 0, 0]], head_radius_m=0.09), "two microphones")
         self.refuse(carillon.InputError, lambda: carillon.Synthesiser().add_body(bank, effects=["modal", "two_ears", "head"]), "head")
 
-    def test_a_floor_doubles_the_pressure_that_is_heard_on_it(self):
+    def test_a_floor_doubles_the_pressure_on_it(self):
         bank = carillon.Bank(self.bank_file)
         squares = []
         for floor in ({}, {"floor_reflection": 1.0, "floor_height_m": -0.5}):
@@ -358,7 +358,7 @@ class Sounds(Case):
         effects = ["modal", "ground_reflection"]
         self.refuse(carillon.InputError, lambda: carillon.Synthesiser().add_body(bank, effects=effects), "floor")
 
-    def test_the_synthesiser_plays_blocks_edits_and_bodies(self):
+    def test_the_synthesiser_renders_blocks_edits_and_bodies(self):
         bank = carillon.Bank(self.bank_file)
         whole, pieces = carillon.Synthesiser(), carillon.Synthesiser()
         for synthesiser in (whole, pieces):
@@ -392,7 +392,7 @@ class Sounds(Case):
         else:
             self.fail("the ring has no end")
 
-    def test_other_threads_run_while_it_sounds(self):
+    def test_other_threads_run_during_playback(self):
         synthesiser = carillon.Synthesiser()
         body = synthesiser.add_body(carillon.Bank(self.bank_file).edited(density=1e-3))
         for k in range(60):
@@ -410,7 +410,7 @@ class Sounds(Case):
 
 
 class Module(unittest.TestCase):
-    def test_the_stub_has_what_the_module_has(self):
+    def test_the_stub_matches_the_module(self):
         declared = ast.parse((pathlib.Path(carillon.__file__).parent / "_carillon.pyi").read_text())
         compiled = carillon._carillon
         stated = {node.name: node for node in declared.body if isinstance(node, (ast.ClassDef, ast.FunctionDef))}
@@ -439,7 +439,7 @@ class Module(unittest.TestCase):
                 else:
                     self.assertEqual(list_words(members[key]), find_words(getattr(found, key).__doc__), f"{name}.{key}")
 
-    def test_it_is_of_the_programs_version(self):
+    def test_it_has_the_version_of_the_programs(self):
         said = subprocess.run([BIN / "carillon-render", "--version"], capture_output=True, text=True, check=True).stdout
         self.assertIn(carillon.__version__, said)
 

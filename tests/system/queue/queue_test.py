@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""What the queue does when things go wrong, with real processes and real mpirun.
+"""Failures in the queue, with real processes and mpirun.
 
 usage: queue_test.py BIN_DIR CASE
 """
@@ -13,17 +13,17 @@ import time
 
 from service import Service, check, is_alive
 
-LONG_NODES = 2500  # some seconds of solving on one rank
+LONG_NODES = 2500  # a solve of some seconds on one rank
 
 
 def kills(service):
-    """kill -9 of each kind of process while a job of two ranks runs: nothing is lost, nothing is left, nothing is solved twice."""
+    """SIGKILL of each kind of process of a job on two ranks: no loss, no leftovers, no second solve."""
     service.mesh("bar.msh", LONG_NODES)
     (identity,) = service.submit(service.write_job("job.json", "bar.msh", 30000, resources={"ranks": 2}))
     run = service.run(has_pictures=True)
     for kind in ("rank", "mpirun", "attempt", "run"):
         service.wait_for(
-            f"a {kind} to kill",  # on a busy machine the job may be done before it is seen
+            f"a {kind} to kill",  # on a busy machine the job may already be done
             lambda: (found := service.processes()) and len(found["rank"]) == 2 and found[kind] or service.job(identity)["state"] == "done",
         )
         time.sleep(0.3)
@@ -50,13 +50,13 @@ def kills(service):
     check(service.job(identity)["state"] == "done", f"{service.job(identity)}")
     service.check_bank(identity)
     service.check_nothing_left()
-    # A second run finds nothing to do.
+    # A second run has nothing to do.
     before = os.stat(service.bank(identity)).st_ino
     check(service.wait_end(service.run(), 20) == 0 and os.stat(service.bank(identity)).st_ino == before, "it was solved again")
 
 
 def hopeless(service):
-    """What cannot pass fails at once with its reason, and the others run."""
+    """Permanent failures fail at once with a reason; other jobs run."""
     service.mesh("bar.msh", 300)
     (service.path / "bad.msh").write_bytes((service.path / "bar.msh").read_bytes()[:3000])
     good, bad, huge = service.submit(
@@ -69,7 +69,7 @@ def hopeless(service):
     check(jobs[good]["state"] == "done", f"{jobs[good]}")
     check(jobs[bad]["state"] == "failed" and jobs[bad]["attempts"] == 1 and "cut short" in jobs[bad]["reason"], f"{jobs[bad]}")
     check(jobs[huge]["state"] == "failed" and jobs[huge]["attempts"] == 0 and "1000000.00 GB" in jobs[huge]["reason"], f"{jobs[huge]}")
-    # retry of what failed tries once more, and fails once more.
+    # A retry fails again.
     service.call("retry", bad)
     service.wait_end(service.run())
     check(service.job(bad)["attempts"] == 2 and service.job(bad)["state"] == "failed", f"{service.job(bad)}")
@@ -77,7 +77,7 @@ def hopeless(service):
 
 
 def cancel(service):
-    """Cancelled while queued and while running; a retry brings it to its end."""
+    """Cancelled while queued and while running; completed by a retry."""
     service.mesh("bar.msh", LONG_NODES)
     first, second = service.submit(
         service.write_job("first.json", "bar.msh", 30000, resources={"ranks": 2}), service.write_job("second.json", "bar.msh", 1000)
@@ -100,7 +100,7 @@ def cancel(service):
 
 
 def stop(service):
-    """Ctrl-C of the run: jobs go back into the queue, uncounted, and the next run ends them. A second one ends them at once."""
+    """Ctrl-C: jobs are requeued without counting a failure and completed by the next run. A second Ctrl-C ends them at once."""
     service.mesh("bar.msh", LONG_NODES)
     (identity,) = service.submit(service.write_job("job.json", "bar.msh", 30000))
     for rounds in (1, 2):
@@ -111,7 +111,7 @@ def stop(service):
             run.send_signal(signal.SIGINT)
             time.sleep(0.2)
         check(service.wait_end(run, 60) in (130, 0), f"exit code {run.returncode}")
-        if run.returncode == 0:  # it was done before it could be stopped
+        if run.returncode == 0:  # done before the signal
             break
         job = service.job(identity)
         check(job["state"] == "queued" and job["failures"] == 0, f"{job}")
@@ -122,7 +122,7 @@ def stop(service):
 
 
 def time_limit(service):
-    """A job whose time is over is saved and says so; with more time it continues to its end."""
+    """A job at its time limit is saved with a reason; with more time it resumes and completes."""
     service.mesh("bar.msh", LONG_NODES)
     (identity,) = service.submit(service.write_job("job.json", "bar.msh", 30000, resources={"time_limit_s": 1}))
     run = service.run()
@@ -141,7 +141,7 @@ def time_limit(service):
 
 
 def two_runs(service):
-    """Two runs on one store: every job once, and never more ranks than cores."""
+    """Two runs on one store: every job runs once, never more ranks than cores."""
     service.mesh("bar.msh", 500)
     cores = len(os.sched_getaffinity(0))
     names = [service.write_job(f"{i}.json", "bar.msh", 20000 + i, **({"resources": {"ranks": 2}} if i % 3 == 0 else {})) for i in range(4)]
@@ -166,7 +166,7 @@ def two_runs(service):
 
 
 def disk_full(service):
-    """A disk that fills while jobs run: nothing half, a clear reason, and it continues when there is room."""
+    """A disk that fills during jobs: no partial results, a clear reason, continuation with free space."""
     service.store.mkdir()
     if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=8m", "tmpfs", service.store], stderr=subprocess.DEVNULL).returncode != 0:
         print("no small disk can be mounted here: not tried")
@@ -200,7 +200,7 @@ def disk_full(service):
 
 
 def clock(service):
-    """Runs whose clocks since boot differ by a day take over from one another: nothing is lost, and none waits for ever."""
+    """Runs with boot clocks that differ by a day: no loss, no endless wait."""
     other = ("unshare", "-T", "--boottime", "86400", "--monotonic", "86400")
     if subprocess.run([*other, "true"], stderr=subprocess.DEVNULL).returncode != 0:
         print("no time namespace here: not tried")
@@ -214,7 +214,7 @@ def clock(service):
         service.wait_for("a back-off", lambda: service.job(identity)["state"] == "waiting")
         service.kill(run.pid)
         run.wait()
-    # The clock of the last one stands a day before that of the first.
+    # The clock of the last run is a day behind the first.
     service.run(prefix=other)
     service.wait_for("the job to run", lambda: service.job(identity)["state"] == "done", 100)
     service.wait_end(service.runs[-1])
@@ -223,7 +223,7 @@ def clock(service):
 
 
 def hang(service):
-    """A rank that stops for ever while the other waits for it: seen, ended, and tried again from what was saved."""
+    """A stopped rank is detected as hung, killed, and the job resumed from its checkpoint."""
     service.mesh("bar.msh", LONG_NODES)
     (identity,) = service.submit(service.write_job("job.json", "bar.msh", 30000))
     work = service.store / "work" / identity[:2] / identity
@@ -243,7 +243,7 @@ def hang(service):
 
 
 def lost_claims(service):
-    """Rows that were claimed by a process that died before it started anything, and folders whose lock went with their process."""
+    """Rows claimed by a process that died before the start, and stale lock files."""
     service.mesh("bar.msh", 300)
     identities = service.submit(*(service.write_job(f"{i}.json", "bar.msh", 20000 + i) for i in range(2)))
     for _ in range(12):
@@ -259,7 +259,7 @@ def lost_claims(service):
 
 
 def killed_before_publication(service):
-    """An attempt that was killed between the solve and the publication: the next one publishes its bank, and the job has a log."""
+    """An attempt killed between solve and publication: the next attempt publishes its bank; the job has a log."""
     service.mesh("bar.msh", 300)
     (identity,) = service.submit(service.write_job("job.json", "bar.msh"))
     check(service.wait_end(service.run()) == 0, "carillon run ends badly")
@@ -270,7 +270,7 @@ def killed_before_publication(service):
     shutil.copy(solved, service.store / "work" / identity[:2] / identity / "bank.hdf")
     check(service.wait_end(service.run()) == 0, "carillon run ends badly")
     check(service.job(identity)["state"] == "done", f"{service.job(identity)}")
-    check("solved by an attempt that ended before it was published" in service.call("log", identity), "no log")
+    check("computed by an attempt that ended before publication" in service.call("log", identity), "no log")
     check(service.bank(identity).read_bytes() == solved.read_bytes(), "it was solved again")
     service.check_nothing_left()
 

@@ -1,4 +1,4 @@
-"""A store with the real programs: jobs, `carillon run`, and the processes behind them."""
+"""A store with real programs: jobs, `carillon run` and its processes."""
 import json
 import os
 import pathlib
@@ -114,7 +114,7 @@ class Service:
         found = []
         for run in self.runs:
             for line in run.log.read_text().splitlines(keepends=True):
-                if not line.endswith("\n"):  # being written, or its writer was killed
+                if not line.endswith("\n"):  # incomplete
                     continue
                 try:
                     found.append(json.loads(line))
@@ -140,7 +140,7 @@ class Service:
             fail(f"carillon run does not end\n{json.dumps(self.jobs(), indent=1)}\n{run.log.read_text()}")
 
     def processes(self):
-        """kind -> pids: of this store only."""
+        """{kind: pids} of this store."""
         found = {"run": [], "attempt": [], "mpirun": [], "rank": []}
         folder = str(self.store).encode()
         for entry in os.listdir("/proc"):
@@ -163,7 +163,7 @@ class Service:
         return found
 
     def hurry(self):
-        """No back-off is waited out here."""
+        """Skips the back-off."""
         waiting = [identity for identity, job in self.jobs().items() if job["state"] == "waiting"]
         if waiting:
             self.call("retry", *waiting, codes=(0, 1))

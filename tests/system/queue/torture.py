@@ -12,11 +12,11 @@ import time
 from service import OPEN, Service, check, choose_seed
 
 KINDS = ("run", "attempt", "mpirun", "rank")
-PICTURED = 0.25  # of the runs: a process that draws can be killed too, and takes longer
+PICTURED = 0.25  # fraction of runs with pictures
 
 
 def fill(service, count):
-    """Good small jobs, jobs of two ranks, a bad mesh, a need that no machine has."""
+    """Small jobs, jobs on two ranks, a bad mesh, an impossible memory request."""
     service.mesh("small.msh", 400)
     service.mesh("large.msh", 2500)
     (service.path / "bad.msh").write_bytes((service.path / "small.msh").read_bytes()[:3000])
@@ -34,7 +34,7 @@ def main():
     service = Service(sys.argv[1])
     try:
         bad, huge, *good = fill(service, 4)
-        finished = {}  # id -> the bank's inode when it was first seen
+        finished = {}  # id -> inode of the bank
         done_kills = {kind: 0 for kind in KINDS}
         batches = 1
         run = service.run(has_pictures=random.random() < PICTURED)
@@ -54,7 +54,7 @@ def main():
                     service.kill(random.choice(processes[kind]))
                     done_kills[kind] += 1
                 if len(finished) == len(good):
-                    # All is done, and kills are left: more work.
+                    # More work for the remaining kills.
                     more = [
                         service.write_job(
                             f"more-{batches}-{i}.json",

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Jobs of `carillon submit --on slurm` on a real Slurm of one node, which deploy/slurm/cluster starts.
+"""Jobs of `carillon submit --on slurm` in a real Slurm of one node, started by deploy/slurm/cluster.
 
 usage: jobs_in_slurm.py BIN_DIR CLUSTER_DIR CASE        exits 77 (skipped) when there is no cluster in CLUSTER_DIR
 """
@@ -19,11 +19,11 @@ BIN, CLUSTER, CASE = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[
 SCRIPT = pathlib.Path(__file__).resolve().parents[3] / "deploy/slurm/cluster"
 os.environ["SLURM_CONF"] = str(CLUSTER / "slurm.conf")
 QUICK = 300  # nodes: a second of work
-SLOW = {"nodes": 20000, "band_hz": [20, 400000]}  # ten seconds on two idle cores, found in several parts that are saved one by one
+SLOW = {"nodes": 20000, "band_hz": [20, 400000]}  # ten seconds on two idle cores, with several checkpoints
 
 
 def check(holds, text):
-    """`text`: what to say when it does not hold, or what makes that."""
+    """`text`: the failure message, or a function for it."""
     if not holds:
         print(f"{CASE}: {text() if callable(text) else text}")
         print(subprocess.run(["squeue", "--states=all"], capture_output=True, text=True).stdout)
@@ -59,7 +59,7 @@ class Store:
         return json.loads(done.stdout)
 
     def run_lines(self, *words):
-        """As run(), of a command that prints an object per line."""
+        """run() for a command that prints one object per line."""
         words = [BIN / "carillon", "--profile", self.folder / "profile.json", "--json", *words]
         done = subprocess.run(words, capture_output=True, text=True, timeout=120, cwd=self.folder)
         check(done.returncode == 0, f"carillon {words}: exit code {done.returncode}\n{done.stdout}\n{done.stderr}")
@@ -105,7 +105,7 @@ class Store:
         return self.folder / "store/work" / job["id"][:2] / job["id"]
 
     def wait_for_solver(self, job, count):
-        """The ranks of a job that runs, once there is something saved."""
+        """Ranks of a running job after its first checkpoint."""
         deadline = time.monotonic() + 100
         while True:
             ranks = [
@@ -124,7 +124,7 @@ class Store:
 
 @contextlib.contextmanager
 def paused(pids):
-    """Stops processes meanwhile, so that what follows comes while they run, however fast they are."""
+    """SIGSTOPs processes, so that the following actions happen during their run."""
     for pid in pids:
         os.kill(pid, signal.SIGSTOP)
     try:
@@ -147,7 +147,7 @@ def cluster(verb, daemon):
 
 
 def submit(store):
-    """One job on two ranks, under a hostile name; its bank is in the store, and asking again asks nothing of Slurm."""
+    """One job on two ranks with a hostile name; a second submission does not use Slurm."""
     job = store.submit(store.write("a;b'$(touch harmed).json", QUICK), "--ranks", "2")[0]
     check(job["slurm_job"], f"not with Slurm: {job}")
     name = subprocess.run(
@@ -163,7 +163,7 @@ def submit(store):
 
 
 def simulate(store):
-    """A simulation on two ranks: `carillon get` has the files of a run of one rank without a store and without Slurm."""
+    """A simulation on two ranks gives the files of a run on one rank without Slurm."""
     bar = {
         "name": "bar",
         "shape": {"bar": {"length_m": 0.1, "width_m": 0.02, "thickness_m": 0.01, "nodes": 150}},
@@ -193,7 +193,7 @@ def simulate(store):
 
 
 def array(store):
-    """Ten jobs are one array; each has its bank. One of them cannot be solved, says why, and is not tried again."""
+    """Ten jobs in one array; an unsolvable one fails with its reason, without retries."""
     for number in range(9):
         store.write(f"jobs{number}.json", QUICK, number)
     bad = store.write("jobs9.json", QUICK, 9, fixed="no such set")
@@ -214,7 +214,7 @@ def array(store):
 
 
 def read_modes(bank):
-    """Frequencies, decay and shapes as bytes."""
+    """Bytes of frequencies, decays and shapes."""
     found = {}
     with h5py.File(bank) as file:
         file.visititems(
@@ -288,7 +288,7 @@ def killed_task(store):
 
 
 def cancel(store):
-    """A job that runs and one that waits are cancelled; Slurm has neither any more. scancel is noticed too. retry asks again."""
+    """A running and a pending job are cancelled in Slurm; scancel is detected; retry submits again."""
     one, two = (
         store.submit(store.write("one.json", **SLOW), "--ranks", "2")[0],
         store.submit(store.write("two.json", number=1, **SLOW), "--ranks", "2")[0],
@@ -333,7 +333,7 @@ def time_limit(store):
 
 
 def killed_rank(store):
-    """kill -9 of one rank: Slurm queues the job again, with a back-off, and it is done in the end."""
+    """SIGKILL of one rank: the job is requeued with a back-off and completes."""
     job = store.submit(store.write("slow.json", **SLOW), "--ranks", "2")[0]
     os.kill(store.wait_for_solver(job, 2)[0], signal.SIGKILL)
     store.wait(job, "done", 150)
@@ -345,7 +345,7 @@ def killed_rank(store):
 
 
 def wait_until_saved(number):
-    """slurmctld writes its jobs some seconds after a change; killed before that it forgets them, and gives their numbers away again."""
+    """Waits until slurmctld has saved its jobs; killed earlier it forgets them and reuses their numbers."""
     saved = pathlib.Path(os.environ["SLURM_CONF"]).parent / "state/job_state"
     since = time.time()
     subprocess.run(["scontrol", "update", f"JobId={number}", "TimeLimit=300"], check=True)
@@ -395,7 +395,7 @@ def lost_registry(store):
 
 
 def memory_limit(store):
-    """More memory than asked for: failed, the reason says so and what to do, and it is not tried again and again."""
+    """More memory than requested: failed with a reason and a remedy, without retries."""
     job = store.submit(store.write("big.json", 80000), "--ranks", "1", "--memory-gb", "0.06")[0]
     row = store.wait(job, "failed", 100)
     check("memory" in row["reason"] and "memory_gb" in row["reason"], f"not the true reason: {row['reason']}")

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Starts the cluster of the other tests. Exits 77 (skipped) where Slurm is not installed.
+"""Starts the cluster of the other tests. Exit code 77 (skipped) without Slurm.
 
 usage: start.py DIR
 """

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""carillon-study accuracy from outside: rates, error bars and signs against theory, what stops it, and what it says to bad input.
+"""tests/bench/study/run from outside: rates, error bars and signs against theory, interruption, and bad input.
 
 usage: accuracy_test.py BIN_DIR
 """
@@ -18,13 +18,19 @@ import xml.dom.minidom
 
 BIN = pathlib.Path(sys.argv.pop(1)).resolve()
 ROOT = pathlib.Path(__file__).resolve().parents[3]
-sys.path.insert(0, str(ROOT / "jobs/study"))
-from accuracy import bodies, cents, gmsh, known, papers, plots
+STUDY = ROOT / "tests/bench/study"
+sys.path[:0] = [str(STUDY), str(ROOT / "jobs/study")]
+import bodies
+import cents
+import gmsh
+import known
+import papers
+import plots
 
 
 def call(folder, *words, seconds=200):
     return subprocess.run(
-        [str(BIN / "carillon-study"), "accuracy", *map(str, words)],
+        [str(STUDY / "run"), "--bin", str(BIN), *map(str, words)],
         cwd=folder,
         capture_output=True,
         text=True,
@@ -63,12 +69,12 @@ class Study(unittest.TestCase):
 
     def test_report_is_whole(self):
         text = (self.out / "report.md").read_text()
-        commands = [line.strip() for line in text.splitlines() if line.startswith("    carillon study accuracy")]
+        commands = [line.strip() for line in text.splitlines() if line.startswith("    tests/bench/study/run")]
         self.assertEqual(
             commands,
             [
-                "carillon study accuracy --quick --on cube ring --only elements -o REPORT",
-                *(f"carillon study accuracy --only elements --on {bodies} --quick -o REPORT" for bodies in ("cube", "ring", "cube ring")),
+                "tests/bench/study/run --quick --on cube ring --only elements -o REPORT",
+                *(f"tests/bench/study/run --only elements --on {bodies} --quick -o REPORT" for bodies in ("cube", "ring", "cube ring")),
             ],
         )
         self.assertIn("## In words", text)
@@ -81,7 +87,7 @@ class Study(unittest.TestCase):
         self.assertNotIn('src="', page)
 
     def test_errors_in_the_csv_are_those_of_the_banks(self):
-        """The truth is written here once more, from the paper: the cube's lowest pair is 2.85604469 c_T / a (Demarest 1971)."""
+        """Independent reference from the paper: the cube's lowest pair is 2.85604469 c_T / a (Demarest 1971)."""
         shear = math.sqrt(200e9 / 2.6 / 7850)
         true_hz = 2.85604469 * shear / 0.05 / (2 * math.pi)
         points = {
@@ -108,7 +114,7 @@ class Study(unittest.TestCase):
         self.assertLess(rates["ring", "T10 straight"], rates["ring", "T10 curved"])
 
     def test_consistent_mass_is_sharp_and_lumping_flattens(self):
-        """Ritz: on a flat body consistent elements are never below the truth. Lumping T4 lowers every frequency of the same mesh."""
+        """Ritz: consistent elements on a flat body are never too low. Lumping T4 lowers every frequency."""
         consistent, lumped = self.find_modes("cube", "T4 consistent"), self.find_modes("cube", "T4 lumped")
         self.assertEqual(set(consistent), set(lumped))
         for nodes, errors in consistent.items():
@@ -154,7 +160,7 @@ class Study(unittest.TestCase):
         self.assertEqual(first.returncode, 0, first.stderr)
         text = page.read_text()
         self.assertIn("| cube | T10 straight |", text)
-        # A part of the study renews its own findings, and leaves those of the others.
+        # A partial study updates only its own findings.
         summary = lambda page: re.search(r"<!-- accuracy:summary -->(.*?)<!-- /accuracy:summary -->", page, re.S)[1].splitlines()
         old, new = summary((ROOT / "docs/reports/accuracy.md").read_text()), summary(text)
         self.assertTrue(set(old) - set(new), "nothing was renewed")
@@ -201,7 +207,7 @@ class Study(unittest.TestCase):
             ("--only", "element"): "elements",
             ("--on", "bunny", "--surface", "none.obj"): "none.obj",
             ("--bin", empty): "--bin",
-            ("-o", "file"): "cannot be made",
+            ("-o", "file"): "cannot create folder",
             ("--repeats", "0"): "repeats",
             ("--fast",): "--fast",
             ("--timeout", "-1"): "above 0",
@@ -251,14 +257,12 @@ class Study(unittest.TestCase):
         self.assertEqual([row["coupled modes"] for row in read(out / "motion-modes.csv")], ["1", "4", "12"])
         xml.dom.minidom.parse(str(out / "motion-price.svg"))
 
-    def test_without_numpy_only_the_sections_that_need_it_are_missing(self):
-        for words, code, expected in ((("advise", "--help"), 0, "--cents"), (("accuracy", "--only", "playing"), 2, "python3-numpy")):
-            result = subprocess.run(
-                ["/usr/bin/python3", "-S", str(BIN / "carillon-study"), *words], cwd=self.folder, capture_output=True, text=True
-            )  # -S: nothing but the standard library
-            self.assertEqual(result.returncode, code, result.stderr)
-            self.assertIn(expected, result.stdout + result.stderr)
-            self.assertNotIn("Traceback", result.stderr)
+    def test_carillon_study_needs_only_the_standard_library(self):
+        result = subprocess.run(
+            ["/usr/bin/python3", "-S", str(BIN / "carillon-study"), "advise", "--help"], cwd=self.folder, capture_output=True, text=True
+        )  # -S: only the standard library
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("--cents", result.stdout)
 
     def test_error_of_a_program_is_passed_on_with_its_code(self):
         fakes = self.folder / "fakes"

@@ -16,7 +16,8 @@ import unittest
 BIN = pathlib.Path(sys.argv.pop(1)).resolve()
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT / "jobs/study"))
-from accuracy import bodies, forecast
+import bodies
+import forecast
 
 CUBE = {
     "body": {"shape": "box", "length_m": 0.05, "width_m": 0.05, "height_m": 0.05},
@@ -149,7 +150,7 @@ class Program(unittest.TestCase):
 
     def test_study_writes_what_advise_predicts_from(self):
         done = subprocess.run(
-            [str(BIN / "carillon-study"), "accuracy", "--quick", "--on", "cube", "--only", "advice", "-o", "report"],
+            [str(ROOT / "tests/bench/study/run"), "--bin", str(BIN), "--quick", "--on", "cube", "--only", "advice", "-o", "report"],
             cwd=self.folder,
             capture_output=True,
             text=True,

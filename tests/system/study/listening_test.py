@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""carillon-study accuracy --only banks playing contact on a small bar: what it finds must follow from arithmetic that it does not use.
+"""tests/bench/study/run --only banks playing contact on a small bar: what it finds must follow from arithmetic that it does not use.
 
 usage: listening_test.py BIN_DIR"""
 import csv
@@ -11,6 +11,7 @@ import tempfile
 import unittest
 
 BIN = pathlib.Path(sys.argv.pop(1)).resolve()
+STUDY = pathlib.Path(__file__).resolve().parents[3] / "tests/bench/study"
 
 
 def read(folder, name):
@@ -24,20 +25,7 @@ class Listening(unittest.TestCase):
         cls.folder = tempfile.TemporaryDirectory()
         cls.out = pathlib.Path(cls.folder.name) / "report"
         done = subprocess.run(
-            [
-                BIN / "carillon-study",
-                "accuracy",
-                "--quick",
-                "--on",
-                "bar",
-                "--only",
-                "banks",
-                "playing",
-                "contact",
-                "--json",
-                "-o",
-                cls.out,
-            ],
+            [STUDY / "run", "--bin", BIN, "--quick", "--on", "bar", "--only", "banks", "playing", "contact", "--json", "-o", cls.out],
             capture_output=True,
             text=True,
             stdin=subprocess.DEVNULL,

@@ -1,14 +1,14 @@
 #!/usr/bin/python3
-"""How two sounds differ (jobs/study/accuracy/sounds.py) against closed forms: sines, noise, and a body's sound worked out by hand."""
+"""Differences of sounds (tests/bench/study/sounds.py) against closed forms: sines, noise, the sound of a body."""
 import pathlib
 import sys
 import unittest
 
 import numpy as np
 
-STUDY = pathlib.Path(__file__).resolve().parents[3] / "jobs/study"
-sys.path.insert(0, str(STUDY))
-from accuracy import sounds  # noqa: E402
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+sys.path[:0] = [str(ROOT / "tests/bench/study"), str(ROOT / "jobs/study")]
+import sounds  # noqa: E402
 
 RATE = 48000
 TIME = np.arange(2 * RATE) / RATE
@@ -19,7 +19,7 @@ def make(pressure, rate=RATE):
 
 
 def make_sine(freq, peak_pa=1.0, rate=RATE):
-    """With soft ends, so that its spectrum is a line."""
+    """A sine with a soft start and end: a line spectrum."""
     time = np.arange(2 * rate) / rate
     return peak_pa * np.sin(2 * np.pi * freq * time) * np.sin(np.pi * time / 2) ** 2
 

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""carillon-study from outside: what it writes, how it judges work that has grown, and what it says to bad input.
+"""carillon-study scaling: output, comparison of work, bad input.
 
 usage: study_test.py BIN_DIR
 """

@@ -23,7 +23,7 @@ import threading
 import time
 
 CHROMIUM = "/usr/bin/chromium"
-# Nothing that the browser does by itself leaves the machine or waits for a person.
+# The browser makes no requests of its own and never prompts.
 FLAGS = [
     "--headless",
     "--no-sandbox",
@@ -43,13 +43,13 @@ FLAGS = [
 
 
 class BrowserError(Exception):
-    """What the browser refused, or what a script in the page threw."""
+    """A refusal of the browser, or an exception of a script in the page."""
 
 
 class Browser:
-    """One Chromium with a profile of its own, which goes when this is left."""
+    """One Chromium with a temporary profile."""
 
-    # How the names of threads begin that run audio worklets, in real time and offline; the system keeps 15 characters.
+    # Prefixes of the names of audio worklet threads, real-time and offline; the system keeps 15 characters.
     AUDIO_THREADS = ("AudioWorklet", "Realtime Audio", "Offline Audio")
 
     def __init__(self, flags=(), timeout_s=60):
@@ -58,7 +58,7 @@ class Browser:
         to_browser, self._out = os.pipe()
         self._in, from_browser = os.pipe()
         self.log = open(os.path.join(self.profile, "browser.log"), "w+b")
-        # The protocol's pipes are descriptors 3 and 4; a shell puts them there.
+        # The protocol's pipes are descriptors 3 and 4, connected by a shell.
         command = ["/bin/sh", "-c", f'exec "$@" 3<&{to_browser} 4>&{from_browser}', "sh", CHROMIUM, *FLAGS, *flags]
         command += [f"--user-data-dir={self.profile}", "--remote-debugging-pipe", "about:blank"]
         self._process = subprocess.Popen(
@@ -84,7 +84,7 @@ class Browser:
             self._process.wait(10)
         except subprocess.TimeoutExpired:
             pass
-        with contextlib.suppress(ProcessLookupError):  # its renderers, if any are left: the session is ours
+        with contextlib.suppress(ProcessLookupError):  # remaining renderers of this session
             os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait()
         os.close(self._out)
@@ -98,19 +98,19 @@ class Browser:
         return pathlib.Path(self.log.name).read_text(errors="replace")
 
     def list_processes(self):
-        """Numbers of all processes of this browser."""
+        """Process ids of this browser."""
         listing = subprocess.run(["ps", "-o", "pid=", "--sid", str(self._process.pid)], capture_output=True, text=True)
         return [int(word) for word in listing.stdout.split()]
 
     def read_cpu_s(self, names=("",)):
-        """CPU time so far of all its threads that live and whose names begin with one of these."""
+        """CPU time of its live threads with one of these name prefixes."""
         spent_s = 0.0
         for process in self.list_processes():
             for thread in pathlib.Path(f"/proc/{process}/task").glob("*"):
                 try:
                     if not (thread / "comm").read_text().startswith(tuple(names)):
                         continue
-                    if (thread / "schedstat").exists():  # in nanoseconds; stat has steps of 10 ms
+                    if (thread / "schedstat").exists():  # nanoseconds; stat has steps of 10 ms
                         spent_s += int((thread / "schedstat").read_text().split()[0]) * 1e-9
                     else:
                         words = (thread / "stat").read_text().rsplit(")", 1)[1].split()
@@ -120,7 +120,7 @@ class Browser:
         return spent_s
 
     def call(self, method, params=None, session=None, timeout_s=None):
-        """One command of the protocol; its result."""
+        """Runs a command of the protocol; returns its result."""
         waiting = queue.Queue()
         with self._lock:
             self._number += 1
@@ -141,14 +141,14 @@ class Browser:
         return answer["result"]
 
     def open(self, url, wait=True):
-        """A new page. `wait`: until it has loaded."""
+        """Opens a page. `wait`: until it has loaded."""
         target = self.call("Target.createTarget", {"url": "about:blank"})["targetId"]
         session = self.call("Target.attachToTarget", {"targetId": target, "flatten": True})["sessionId"]
         page = Page(self, target, session)
         self._pages[session] = page
         for domain in ("Page", "Runtime", "Network", "Log"):
             page.call(f"{domain}.enable")
-        # Requests of workers and worklets are reported, too.
+        # Reports requests of workers and worklets, too.
         page.call("Target.setAutoAttach", {"autoAttach": True, "waitForDebuggerOnStart": False, "flatten": True})
         page.go(url, wait)
         return page
@@ -180,13 +180,13 @@ class Browser:
 
 
 class Page:
-    """A page: scripts, mouse and keys in; what it asked for, printed and threw out."""
+    """A page: runs scripts, sends mouse and keys; records requests, console and errors."""
 
     def __init__(self, browser, target, session):
         self.browser, self.target, self.session = browser, target, session
         self.requests = []  # URLs, of the page, its workers and its worklets
         self.console = []  # lines
-        self.errors = []  # what was thrown and not caught, and what failed to load
+        self.errors = []  # uncaught exceptions and failed loads
         self._loaded = threading.Event()
 
     def call(self, method, params=None, timeout_s=None):
@@ -213,7 +213,7 @@ class Page:
 
     def _watch(self, session):
         for domain in ("Network", "Runtime", "Log"):
-            with contextlib.suppress(BrowserError):  # worklets have no network of their own
+            with contextlib.suppress(BrowserError):  # worklets have no network domain
                 self.browser.call(f"{domain}.enable", session=session)
 
     def go(self, url, wait=True):
@@ -225,7 +225,7 @@ class Page:
             raise BrowserError(f"{url}: not loaded within {self.browser.timeout_s} s")
 
     def evaluate(self, script, timeout_s=None):
-        """The value of an expression, or of the promise that it gives, as JSON carries it. Throws BrowserError with what it threw."""
+        """The value of an expression or its promise, as JSON. Raises BrowserError for an exception."""
         params = {"expression": script, "awaitPromise": True, "returnByValue": True, "userGesture": True}
         answer = self.call("Runtime.evaluate", params, timeout_s)
         if "exceptionDetails" in answer:
@@ -236,7 +236,7 @@ class Page:
         return answer["result"].get("value")
 
     def wait_for(self, script, timeout_s=30, every_s=0.05):
-        """Until an expression is true; its value."""
+        """Waits until an expression is true; returns its value."""
         end = time.monotonic() + timeout_s
         while True:
             value = self.evaluate(script)
@@ -247,7 +247,7 @@ class Page:
             time.sleep(every_s)
 
     def mouse(self, kind, x, y, button="none", **more):
-        """kind: "mousePressed", "mouseReleased", "mouseMoved" or "mouseWheel"; pixels of the page."""
+        """kind: "mousePressed", "mouseReleased", "mouseMoved" or "mouseWheel"; position in pixels of the page."""
         self.call("Input.dispatchMouseEvent", {"type": kind, "x": x, "y": y, "button": button, **more})
 
     def click(self, x, y, hold_s=0.0, button="left"):
@@ -257,7 +257,7 @@ class Page:
         self.mouse("mouseReleased", x, y, button, clickCount=1)
 
     def press(self, key, code=None, key_code=0, modifiers=0):
-        """A key, by the names of DOM: "Enter", "Tab", "a"."""
+        """Presses a key by its DOM name: "Enter", "Tab", "a"."""
         text = {"Enter": "\r"}.get(key, key if len(key) == 1 else "")
         key_code = key_code or {"Enter": 13, "Tab": 9, "Escape": 27, " ": 32}.get(key, ord(key.upper()) if len(key) == 1 else 0)
         of_key = {"key": key, "code": code or key, "windowsVirtualKeyCode": key_code, "modifiers": modifiers}
@@ -272,7 +272,7 @@ class Page:
         pathlib.Path(file).write_bytes(base64.b64decode(self.call("Page.captureScreenshot", {"format": "png"})["data"]))
 
     def find_strangers(self, origin):
-        """Requests that left an origin ("http://127.0.0.1:8000/")."""
+        """Requests to other origins than ("http://127.0.0.1:8000/")."""
         inside = ("data:", "blob:", "about:")
         return [url for url in self.requests if not url.startswith(origin) and not url.startswith(inside)]
 
@@ -281,7 +281,7 @@ class Page:
 
 
 class Server:
-    """Files of folders under /; `requests` lists the paths that were asked for."""
+    """Serves the files of folders under /; `requests` lists the requested paths."""
 
     def __init__(self, *folders):
         self.requests = requests = []

@@ -28,7 +28,7 @@ SCENE = {
     "strikes": [STRIKE],
     "output": {"gain": 0.01, "format": "float", "fade_end": False},
 }
-# Without addresses of files: the bundler finds them in the engine's module.
+# Without file addresses: the bundler finds them in the engine's module.
 MAIN = """
 import { CarillonAudio } from './engine/carillon-audio.js';
 window.play = async () => {

@@ -25,8 +25,8 @@ HERE = pathlib.Path(__file__).parent
 EFFECTS = ["modal", "hertz_pulse", "air_delay", "doppler", "two_ears"]
 CONTACTS = ["roughness", "rolling", "contact_damping"]
 OTHERS = ["acceleration_noise", "directivity", "ground_reflection", "head", "nonlinear", "cascade"]
-LATENCY = 16  # frames by which the engine is behind a file
-LIMIT_DB = -90.0  # what is asked for is -60
+LATENCY = 16  # frames of the engine's delay relative to a file
+LIMIT_DB = -90.0  # required: -60
 
 
 def run(*command, code=0):
@@ -36,7 +36,7 @@ def run(*command, code=0):
 
 
 def read_wav(file):
-    """(frames, channels), of a WAV file in single precision."""
+    """(frames, channels) of a WAV file in single precision."""
     data, at, channels = pathlib.Path(file).read_bytes(), 12, 0
     while True:
         name, size = data[at : at + 4], struct.unpack("<I", data[at + 4 : at + 8])[0]
@@ -48,7 +48,7 @@ def read_wav(file):
 
 
 class Bench:
-    """A folder with banks, served with the engine, and a page that has loaded it."""
+    """Serves a folder with banks and the engine; a page has loaded it."""
 
     def __init__(self, flags=()):
         self.flags = flags
@@ -76,21 +76,21 @@ class Bench:
         return name
 
     def render_file(self, scene, *options):
-        """What carillon-render makes of a scene, in pascals times 0.01."""
+        """Sound of carillon-render for a scene, in pascals times 0.01."""
         scene = {**scene, "output": {"gain": 0.01, "format": "float", "fade_end": False}}
         (self.folder / "scene.json").write_text(json.dumps(scene))
         run(BIN / "carillon-render", self.folder / "scene.json", "-o", self.folder / "sound.wav", *options)
         return read_wav(self.folder / "sound.wav")
 
     def render_page(self, options, act):
-        """The same by the page: `act` is the body of an async function of audio, load and at."""
+        """The same from the page: `act` is the body of an async function of audio, load and at."""
         options = {"gain_per_pa": 0.01, **options}
         got = self.page.evaluate(f"window.render({json.dumps(options)}, async (audio, {{load, at}}) => {{ {act} }})", timeout_s=120)
         got["sound"] = np.stack([np.frombuffer(base64.b64decode(x), "<f4") for x in got.pop("samples")], 1)[LATENCY:]
         return got
 
     def compare(self, name, scene, options, act, limit_db=LIMIT_DB, file_options=()):
-        """The page's sound must be the file's."""
+        """Asserts that page and file sound the same."""
         expected = self.render_file(scene, *file_options)
         got = self.render_page({"seconds": scene["duration_s"], **options}, act)
         assert got["errors"] == [], got["errors"]
@@ -99,7 +99,7 @@ class Bench:
 
 
 def calc_db(got, expected):
-    """Energy of the difference against the energy of what is expected."""
+    """Energy of the difference relative to the expected energy."""
     assert got.shape == expected.shape, (got.shape, expected.shape)
     power = np.mean(expected.astype(float) ** 2)
     assert power > 0.0
@@ -146,21 +146,21 @@ def test_strikes():
 
 
 def test_ears():
-    """Ears and bodies that move: delay, level and Doppler shift; and ears that turn."""
+    """Moving ears and bodies: delay, level and Doppler shift; rotating ears."""
     with Bench() as bench:
         bench.make_bank("a.hdf")
         path = [[0.0, 0.0, -0.5, 0.5], [0.3, 2.0, -0.5, 0.5], [0.7, 2.0, 3.0, 0.5], [1.2, -1.0, 2.0, 1.0]]
         places = np.array(path)
-        # Speeds as scene files have them: the slopes between the neighbours.
+        # Speeds as in scene files: slopes between neighbours.
         speeds = [(places[min(i + 1, 3)] - places[max(i - 1, 0)]) for i in range(4)]
         rows = [{"time_s": p[0], "position_m": list(p[1:]), "velocity_m_s": list(v[1:] / v[0])} for p, v in zip(places, speeds)]
         act = LOAD + STRIKE_AT % 0.1 + f"for (const row of {json.dumps(rows)}) audio.setListener(row);"
         moving = make_scene(1.2, listener={"path": path})
         bench.compare("a listener that walks", moving, {"listener": {"position_m": path[0][1:]}}, act)
         still = bench.render_file(make_scene(1.2))
-        assert calc_db(bench.render_file(moving), still) > -20.0  # the walk is heard
+        assert calc_db(bench.render_file(moving), still) > -20.0  # the path is audible
 
-        # A listener that has turned a quarter to the left has its right ear in front of where it looked before.
+        # After a quarter turn to the left the right ear points to the former front.
         turned = {"position_m": [0.0, -0.5, 0.5], "facing": [-1, 0, 0]}
         act = LOAD + STRIKE_AT % 0.1
         quarter = {"position_m": [0.0, -0.5, 0.5], "rotation": [np.sqrt(0.5), 0, 0, np.sqrt(0.5)]}
@@ -168,7 +168,7 @@ def test_ears():
 
 
 def test_scenes():
-    """A recorded simulation, with bodies that move, strike and slide, from its contacts file."""
+    """Playback of a contacts file with moving, colliding and sliding bodies."""
     with Bench() as bench:
         bench.make_bank("a.hdf", 4, 40)
         body = {"name": "a", "bank": "a.hdf", "position_m": [-0.2, 0.09, -0.15], "velocity_m_s": [0.8, 0.2, 0]}
@@ -194,7 +194,7 @@ def test_scenes():
         got = bench.compare("a recorded scene", scene, {"listener": LISTENER}, act, file_options=file_options)
         extra = got["extra"]
         assert extra["began_s"] == 0 and 0.9 < extra["duration_s"] < 1.1, extra
-        # The pose on the screen is the one of the recording.
+        # The displayed pose is that of the recording.
         motions = [line["motion"] for line in map(json.loads, contacts.read_text().splitlines()) if "motion" in line]
         mine = [m for m in motions if m["body"] == 0]
         for k in range(3):
@@ -216,7 +216,7 @@ def test_scenes():
 
 
 def test_edits():
-    """Edits without a solve, before a strike and while the engine plays; one mode alone."""
+    """Edits without a solve, before a strike and during playback; solo of a mode."""
     with Bench() as bench:
         bench.make_bank("a.hdf")
         options = {"listener": LISTENER}
@@ -232,7 +232,7 @@ def test_edits():
             run(BIN / "carillon-bank", "edit", bench.folder / "a.hdf", bench.folder / "b.hdf", *given)
             scene = make_scene(bodies=[{**BODY, "bank": "b.hdf"}])
             bench.compare(name, scene, options, LOAD + f"await body.edit({edits});" + STRIKE_AT % 0.1)
-            # While it plays: the last of three wishes is heard.
+            # During playback: the last of three requests applies.
             live = (
                 LOAD
                 + "at(0.25, async () => { body.edit({size_scale: 3}); body.edit({size_scale: 0.5}); "
@@ -241,7 +241,7 @@ def test_edits():
             late = {**scene, "strikes": [{"time_s": 0.4, "body": "a", **STRIKE}]}
             bench.compare(f"{name}, live", late, options, live)
             if name == "of glass":
-                # A body that rings continues without a click: no step of the sound is larger than those of its own strike.
+                # A ringing body continues without a click: no step of the sound is larger than those of its own strike.
                 ringing = bench.render_page({"seconds": 0.6, **options}, LOAD + STRIKE_AT % 0.1 + f"at(0.25, () => body.edit({edits}));")[
                     "sound"
                 ]
@@ -252,7 +252,7 @@ def test_edits():
         run(BIN / "carillon-bank", "edit", bench.folder / "a.hdf", bench.folder / "one.hdf", "--modes", 1, "--keep", "lowest")
         scene = make_scene(bodies=[{**BODY, "bank": "one.hdf"}])
         bench.compare("one mode alone", scene, options, LOAD + "body.solo(0);" + STRIKE_AT % 0.1)
-        # All the others continue: once the solo is over they are heard as if it had not been.
+        # The other modes continue: after the solo they sound as without it.
         back = bench.render_page({"seconds": 1.0, **options}, LOAD + STRIKE_AT % 0.1 + "body.solo(0); at(0.3, () => body.solo(null));")[
             "sound"
         ]
@@ -274,7 +274,7 @@ def test_edits():
 
 
 def test_banks():
-    """Bad banks, plain and packed, give one sentence each, and the engine continues."""
+    """Invalid banks, plain and packed, give one sentence each; the engine continues."""
     with Bench() as bench:
         bench.make_bank("plain.hdf", 2, 8)
         run(BIN / "carillon-bank", "pack", bench.folder / "plain.hdf", bench.folder / "packed.hdf")
@@ -321,7 +321,7 @@ def damage_bank(bench, name, version):
 
 
 def test_packed():
-    """A packed bank sounds in the page as in carillon-render, and about as the bank that it was made of."""
+    """A packed bank sounds the same in the page and carillon-render, and similar to the original bank."""
     with Bench() as bench:
         bench.make_bank("whole.hdf", 20)
         run(BIN / "carillon-bank", "pack", bench.folder / "whole.hdf", bench.folder / "a.hdf", "--error", "-50", "--keep-numbers")
@@ -334,11 +334,11 @@ def test_packed():
 
 
 def test_hard():
-    """Input out of range, storms of strikes, extreme sizes and rates."""
+    """Input out of range, many simultaneous strikes, extreme sizes and rates."""
     with Bench() as bench:
         bench.make_bank("a.hdf", 3, 30)
         options = {"listener": LISTENER}
-        # Numbers that are none, places that are not there: counted and said, and the next strike is heard.
+        # Non-finite numbers and unknown places are counted and reported; the next strike sounds.
         bad = """
             for (const x of [NaN, Infinity, -Infinity]) body.strike({triangle: 7, impulse_n_s: [0, x, 0], duration_s: 1e-3, time_s: 0.05});
             body.strike({triangle: 7, impulse_n_s: [0, 0, 1], duration_s: -1, time_s: 0.05});
@@ -354,7 +354,7 @@ def test_hard():
         assert len(got["errors"]) >= 9 and all("failed" not in text for text in got["errors"]), got["errors"]
         check("a strike after nonsense", got["sound"], bench.render_file(make_scene()))
 
-        # A storm: more strikes at once than a body has room for.
+        # More simultaneous strikes than a body can queue.
         storm = (
             "for (let k = 0; k < 20000; ++k) "
             "body.strike({triangle: k % 100, impulse_n_s: [0, 0, 0.01], duration_s: 1e-3, time_s: 0.1 + 1e-5 * k});"
@@ -374,20 +374,20 @@ def test_hard():
             scene = make_scene(bodies=[{**BODY, "bank": "b.hdf"}], listener=far, duration_s=0.5)
             if np.mean(bench.render_file(scene) ** 2) == 0.0:
                 got = bench.render_page({"seconds": 0.5, "listener": far}, sized + STRIKE_AT % 0.1)
-                assert not got["sound"].any() and got["errors"] == [], size  # all its modes are above what can be heard
+                assert not got["sound"].any() and got["errors"] == [], size  # all modes are above Nyquist
                 continue
             bench.compare(f"{size} times as large", scene, {"listener": far}, sized + STRIKE_AT % 0.1)
         for rate_hz in (8000, 192000):
             bench.compare(f"{rate_hz} Hz", make_scene(0.5, sample_rate_hz=rate_hz), {**options, "rate_hz": rate_hz}, LOAD + STRIKE_AT % 0.1)
 
-        # A thousand modes, in a file of its own: the browser may keep one that it has read for a tenth of its age.
+        # A thousand modes in a separate file: the browser may cache a file for a tenth of its age.
         bank = bench.make_bank("thousand.hdf", 4, 1000)
         scene = make_scene(0.5, bodies=[{**BODY, "bank": bank}])
         bench.compare("1000 modes", scene, options, LOAD.replace("a.hdf", bank) + STRIKE_AT % 0.1)
 
 
 def test_live():
-    """A context in real time: hands that touch, a page that sleeps, a trap in the audio thread."""
+    """Real time: interactive contacts, a suspended page, a trap in the audio thread."""
     with Bench() as bench:
         bench.make_bank("a.hdf", 3, 30)
         page = bench.page
@@ -404,7 +404,7 @@ def test_live():
         amplitudes = page.wait_for("window.state?.bodies[0] && state.peak_pa > 0 && Array.from(state.bodies[0].amplitudes)")
         assert len(amplitudes) == 30 and max(amplitudes) > 0.0, amplitudes
 
-        # A scrape sounds as long as the hand moves, and ends with it.
+        # A scrape sounds while the hand moves and ends with it.
         page.evaluate(
             """(async () => {
           const touch = body.touch({triangle: 3, normal: [0, 0, 1], force_n: 5, slip_m_s: [0.3, 0, 0], mallet: 'steel'});
@@ -420,7 +420,7 @@ def test_live():
         assert effects["modal"]["on"] and effects["roughness"]["on"], effects
         assert all(of["why"] for of in effects.values()), effects
 
-        # Asleep for some seconds: time stands still, nothing is lost, nothing is late.
+        # Suspended for some seconds: time stands still, nothing is lost or late.
         page.evaluate("audio.context.suspend()")
         time.sleep(2.0)
         at = page.evaluate("audio.counters()")
@@ -428,10 +428,10 @@ def test_live():
         page.wait_for(f"audio.counters().then((c) => c.quanta > {at['quanta']} + 50)")
         after = page.evaluate("audio.counters()")
         assert after["strikes"] == before["strikes"] + 2 or after["strikes"] >= 2, (before, after)
-        # A browser may leave the quantum out in which it falls asleep.
+        # A browser may skip the quantum in which it is suspended.
         assert after["gaps"] - at["gaps"] <= 1 and after["late"] == after["faults"] == after["resets"] == 0, (at, after)
 
-        # A trap ends the sound, says so once, and leaves the page alive.
+        # A trap silences the engine with one report; the page continues.
         page.evaluate("audio.engine.ask({type: 'fail'}).catch(() => 0)")
         page.evaluate("body.strike({triangle: 3, impulse_n_s: [0, 0, 0.1], duration_s: 1e-3})")
         said = page.evaluate("audio.settled().then(() => '', (error) => error.message)")
@@ -500,7 +500,7 @@ def test_minute(seconds=60):
         assert after["refused"] == 0 and after["overflows"] == 0, after
         assert after["strikes"] - before["strikes"] > 190 * played_s, after
         assert played_s > 0.98 * seconds, played_s
-        # What the thread itself took must leave room. Whether it got the core in time depends on the machine, and is asked of an idle one.
+        # The thread's own time must leave headroom. Timely scheduling depends on the machine and is required of an idle one only.
         assert 0.0 < cpu_s < 0.5 * played_s, (cpu_s, played_s)
         if busy < 0.7:
             assert over <= 2 and underruns == 0, (over, underruns)

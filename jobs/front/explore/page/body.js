@@ -1,9 +1,9 @@
-// A body as it is drawn: a lit surface that can move in one of its modes.
+// A drawn body: a lit surface that can be animated in one mode.
 import * as THREE from './three/three.module.min.js';
 import { add, findBox, findNormal, findPoint, makeCorners, rotate, rotateBack, scale, subtract } from './geometry.js';
 
-const kBend = 0.045; // of the body's size: how far a mode moves it at most, to be seen
-const kBendHz = 1.1; // so slowly
+const kBend = 0.045; // largest displacement of the animation / size of the body
+const kBendHz = 1.1; // rate of the animation
 
 // How materials look, by group and by name.
 const kGroups = {
@@ -35,7 +35,7 @@ varying float vBend;
 `;
 
 export class ShownBody {
-  /** surface: {vertices_m, triangles}, frame of the mesh. position_m of its origin, rotation, in the world. */
+  /** surface: {vertices_m, triangles}, frame of the mesh. position_m, rotation: of that frame in the world. */
   constructor({ name, surface, position_m, rotation, centre_m, look, fixed }) {
     Object.assign(this, { name, surface, centre_m, fixed });
     this.box = findBox(surface);
@@ -76,10 +76,10 @@ export class ShownBody {
     this.material = this.mesh.material = this.makeMaterial(look);
   }
 
-  /** Of the mesh's origin. */
+  /** Sets the position of the mesh's origin. */
   setPose(position_m, rotation) {
     Object.assign(this, { position_m, rotation });
-    // A body of another size stands where it stood: its lowest place stays.
+    // A scaled body keeps its lowest point.
     const down = rotateBack(rotation, [0, 0, -1]), half = scale(0.5, subtract(this.box.high, this.box.low));
     const reach = Math.abs(down[0]) * half[0] + Math.abs(down[1]) * half[1] + Math.abs(down[2]) * half[2];
     const foot = add(this.box.middle, scale(reach, down));
@@ -89,7 +89,7 @@ export class ShownBody {
     this.mesh.matrix.compose(new THREE.Vector3(...origin), new THREE.Quaternion(x, y, z, w), new THREE.Vector3(s, s, s));
     this.mesh.matrixWorldNeedsUpdate = true;
   }
-  /** Of the centre of mass, as motions have it. */
+  /** Sets the position of the centre of mass, as in recorded motions. */
   setCentrePose(position_m, rotation) {
     this.setPose(subtract(position_m, rotate(rotation, this.centre_m)), rotation);
   }
@@ -111,7 +111,7 @@ export class ShownBody {
     return this.toWorld(findPoint(this.surface, place.triangle, place.barycentric));
   }
 
-  /** Moves in a mode from now on; shape: (V, 3), or null to stop. */
+  /** Starts the animation of a mode; shape: (V, 3), or null to stop. */
   bendIn(shape) {
     this.isBent = shape !== null;
     if (shape === null) {
@@ -128,7 +128,7 @@ export class ShownBody {
     if (isNew) this.material.needsUpdate = true;
     this.uniforms.uTint.value = 1;
   }
-  /** At this moment; whether it moves. */
+  /** Updates the animation; true while it moves. */
   advance(seconds) {
     if (this.isBent) this.uniforms.uBend.value = kBend * this.box.size * Math.sin(2 * Math.PI * kBendHz * seconds);
     return Boolean(this.isBent);

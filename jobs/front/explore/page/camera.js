@@ -1,11 +1,11 @@
-// A camera that turns about a point, z up: drag, pinch, wheel and keys. It keeps turning a little when it is let go.
+// Orbit camera, z up: drag, pinch, wheel and keys, with inertia.
 import * as THREE from './three/three.module.min.js';
 import { add, cross, dot, fromAxes, norm, normalise, scale, subtract } from './geometry.js';
 
 const kNearlyUp = 1.5; // rad
 const kGlideS = 0.12;
-const kNarrowestDeg = 16, kWidestDeg = 50; // angles of view, upright
-const kFilled = 0.88; // of the free part of the picture
+const kNarrowestDeg = 16, kWidestDeg = 50; // vertical angle of view
+const kFilled = 0.88; // fraction of the free part of the picture
 
 export class OrbitCamera {
   constructor() {
@@ -17,10 +17,10 @@ export class OrbitCamera {
     this.elevation = 0.3;
     this.size = 1;
     this.glide = { azimuth: 0, elevation: 0, zoom: 0 };
-    this.covered = { right: 0, below: 0 }; // shares of the picture on which controls lie
+    this.covered = { right: 0, below: 0 }; // fractions of the picture covered by controls
   }
 
-  /** From a listener to what it looks at. size: of all that there is. */
+  /** Places the camera at a listener. size: of the scene. */
   place(position_m, look_at_m, size) {
     const way = subtract(position_m, look_at_m);
     this.target = [...look_at_m];
@@ -43,14 +43,14 @@ export class OrbitCamera {
     this.apply();
   }
 
-  /** By a part of the height of the picture. */
+  /** Moves by a fraction of the height of the picture. */
   pan(dx, dy) {
     const { right, up } = this.findAxes(), reach = 2 * this.distance * Math.tan((this.camera.fov * Math.PI) / 360);
     this.target = add(this.target, add(scale(-dx * reach, right), scale(dy * reach, up)));
     this.apply();
   }
 
-  /** Goes on by itself; whether it still moves. */
+  /** Advances the inertia; true while it moves. */
   advance(seconds) {
     const { glide } = this;
     if (Math.hypot(glide.azimuth, glide.elevation) < 1e-3) return false;
@@ -78,13 +78,13 @@ export class OrbitCamera {
     return { right, forward, up: cross(right, forward) };
   }
 
-  /** Of a listener whose ears stay level: x to its right, y the way that it faces, z up. */
+  /** Axes of a level listener: x right, y forward, z up. */
   findListener() {
     const { right } = this.findAxes();
     return { position_m: this.position_m, rotation: fromAxes(right, cross([0, 0, 1], right), [0, 0, 1]) };
   }
 
-  /** covered: {right, below}, shares of the picture on which controls lie; what is looked at stands in the middle of the rest. */
+  /** covered: {right, below}, fractions covered by controls; the target is centred in the rest. */
   resize(width, height, covered) {
     this.covered = covered;
     this.camera.aspect = width / height;
@@ -94,7 +94,7 @@ export class OrbitCamera {
     this.apply();
   }
 
-  /** Opens the angle until all points are seen, and goes further away where that is not enough. */
+  /** Widens the angle until all points are visible; moves away if that is not enough. */
   fit(points) {
     const { right, forward, up } = this.findAxes(), eye = this.position_m;
     const [wide, high] = [this.camera.aspect * (1 - this.covered.right), 1 - this.covered.below].map((free) => free * kFilled);
@@ -125,7 +125,7 @@ export class OrbitCamera {
     camera.updateMatrixWorld();
   }
 
-  /** The ray through a place of the picture, each from -1 to 1, y up. */
+  /** The ray through a point of the picture, coordinates from -1 to 1, y up. */
   findRay(x, y) {
     const origin = new THREE.Vector3(x, y, -1).unproject(this.camera), far = new THREE.Vector3(x, y, 0.5).unproject(this.camera);
     return { origin: this.position_m, direction: normalise(subtract(far.toArray(), origin.toArray())) };

@@ -1,4 +1,4 @@
-// Plain geometry of surfaces: rays, barycentric coordinates, smooth corners, places with names. No DOM, no three.js.
+// Geometry of surfaces: rays, barycentric coordinates, smooth normals, named points. No DOM, no three.js.
 // A surface is {vertices_m: Float32Array(3 V), triangles: Uint32Array(3 T)}; vectors are [x, y, z]; quaternions [w, x, y, z].
 
 export const subtract = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
@@ -22,7 +22,7 @@ export function multiply(q, p) {
   const [a, b, c, d] = q, [e, f, g, h] = p;
   return [a * e - b * f - c * g - d * h, a * f + b * e + c * h - d * g, a * g - b * h + c * e + d * f, a * h + b * g - c * f + d * e];
 }
-/** Turns about the fixed axes of the world, x first, then y, then z, in degrees: "rotation_deg" of scene files. */
+/** Rotation about the fixed world axes x, y, z in this order, in degrees: "rotation_deg" of scene files. */
 export function fromDegrees(degrees) {
   const about = (axis) => {
     const half = (degrees[axis] * Math.PI) / 360, q = [Math.cos(half), 0, 0, 0];
@@ -31,7 +31,7 @@ export function fromDegrees(degrees) {
   };
   return multiply(about(2), multiply(about(1), about(0)));
 }
-/** The rotation whose columns are three orthonormal axes: where x, y and z of a frame point to. */
+/** Rotation from three orthonormal axes (columns). */
 export function fromAxes(x, y, z) {
   const trace = x[0] + y[1] + z[2];
   let q;
@@ -55,7 +55,7 @@ export function findPoint(surface, triangle, barycentric) {
   return point;
 }
 
-/** Unit normal of a triangle, out of the body. */
+/** Outward unit normal of a triangle. */
 export function findNormal(surface, triangle) {
   const a = corner(surface, triangle, 0);
   return normalise(cross(subtract(corner(surface, triangle, 1), a), subtract(corner(surface, triangle, 2), a)));

@@ -1,19 +1,19 @@
-// Input: pointer and keys over the picture become strikes, scrapes, presses, and turns of the view.
+// Input: pointer and keys to strikes, scrapes, presses and camera motion.
 import { add, normalise, scale, subtract, norm } from './geometry.js';
 
-const kMovedPx = 6; // further: a press has become a scrape
-const kHoldMs = 320; // longer at one place: a press, which damps
-const kSwingPxS = 1400; // a pointer of this speed doubles the speed of the head
+const kScrapePx = 6; // movement that turns a press into a scrape
+const kHoldMs = 320; // a longer press damps
+const kSwingPxS = 1400; // pointer speed that doubles the speed of the mallet
 const kMaxSwing = 3;
 const kSwingMs = 60;
-const kStillMs = 60; // a scrape stops when the pointer has not moved for so long
-const kTurn = 3.2; // rad over the width of the window
-const kKeyStep = 0.035; // of the body's size
+const kScrapeEndMs = 60; // a scrape stops after this time without movement
+const kTurn = 3.2; // rad per window width
+const kKeyStep = 0.035; // / size of the body
 const kKeyTurn = 0.09; // rad
-const kKeyScrape = { radius: 0.05, hz: 1.7 }; // circles of the key S: of the body's size; rounds a second
+const kKeyScrape = { radius: 0.05, hz: 1.7 }; // circle of the key S: radius / size of the body, rate
 
 export class Hands {
-  /** gesture: 'strike', 'scrape' or 'press': what a press on a body begins with. */
+  /** gesture: 'strike', 'scrape' or 'press', the initial action of a press. */
   constructor(view, player) {
     Object.assign(this, { view, player, gesture: 'strike', pointers: new Map(), keys: new Map() });
     const { canvas } = view, on = (name, work) => canvas.addEventListener(name, (event) => work.call(this, event));
@@ -71,13 +71,13 @@ export class Hands {
     if (this.gesture !== 'scrape') pointer.hold = setTimeout(() => this.beginTouch(pointer), kHoldMs);
   }
 
-  /** 0 to 2, 1 for a usual press; undefined where the device does not feel it. */
+  /** Pen pressure, 0 to 2, 1: normal; undefined without a pressure sensor. */
   findPressure(event) {
     if (event.pointerType === 'mouse' || event.pressure === 0 || event.pressure === 0.5 || event.pressure === 1) return undefined;
     return 2 * event.pressure;
   }
 
-  /** How much faster the head is for a pointer that swings into its click: 1 to kMaxSwing. */
+  /** Speed factor of the mallet for a moving pointer: 1 to kMaxSwing. */
   findSwing(trail) {
     const now = performance.now(), recent = trail.filter((point) => now - point.time < kSwingMs);
     if (recent.length < 2) return 1;
@@ -116,7 +116,7 @@ export class Hands {
   }
 
   scrape(event, pointer) {
-    if (!pointer.touch && Math.hypot(event.clientX - pointer.startX, event.clientY - pointer.startY) < kMovedPx) return;
+    if (!pointer.touch && Math.hypot(event.clientX - pointer.startX, event.clientY - pointer.startY) < kScrapePx) return;
     this.beginTouch(pointer);
     const hit = this.view.pick(event.clientX, event.clientY), now = performance.now();
     if (!hit || hit.body !== pointer.body) return;
@@ -131,7 +131,7 @@ export class Hands {
     pointer.still = setTimeout(() => {
       pointer.velocity = [0, 0, 0];
       pointer.touch?.move({ ...pointer.place, velocity_m_s: [0, 0, 0] });
-    }, kStillMs);
+    }, kScrapeEndMs);
   }
 
   release(event) {
@@ -224,7 +224,7 @@ export class Hands {
     event.preventDefault();
   }
 
-  /** Moves the point to strike by a step to the right and up on the screen. */
+  /** Moves the point to strike by a step on the screen. */
   step(dx, dy) {
     if (!this.place) return this.view.dispatchEvent(new Event('first'));
     const { body } = this.place, { right, up } = this.view.orbit.findAxes(), eye = this.view.orbit.position_m;

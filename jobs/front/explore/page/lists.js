@@ -1,4 +1,4 @@
-// Lists and rows of buttons that work with pointer, keys and screen readers (WAI-ARIA: listbox, radiogroup).
+// Lists and button rows for pointer, keys and screen readers (WAI-ARIA: listbox, radiogroup).
 
 let lists = 0;
 
@@ -61,7 +61,7 @@ export function makeList(element, { focused = () => {}, chosen = () => {}, left 
   };
 }
 
-/** A radiogroup in `element`: one of `names`; `chosen` is called with the index. */
+/** A radiogroup in `element` with `names`; calls chosen(index). */
 export function makeChoice(element, names, chosen, start = 0) {
   let current = start;
   const buttons = names.map((name, index) => {
@@ -91,7 +91,7 @@ export function makeChoice(element, names, chosen, start = 0) {
   return { choose: (index) => index < names.length && choose(index, true) };
 }
 
-/** A slider with its value in words. toValue: from its position; changed(value). */
+/** A slider with a text of its value. toValue: from its position; calls changed(value). */
 export function makeSlider(input, toValue, toText, changed) {
   const output = input.parentElement.querySelector('output');
   const show = () => {

@@ -1,4 +1,4 @@
-// The page of a folder made by carillon explore: reads scene and banks, opens the sound engine, and connects view and panel.
+// Main module of the page of carillon explore: loads scene and banks, opens the sound engine, connects view and panel.
 import { View } from './view.js';
 import { ShownBody, makeLook } from './body.js';
 import { Player } from './player.js';
@@ -16,19 +16,19 @@ const find = (id) => document.getElementById(id);
 function refuse(error) {
   find('cover').hidden = false;
   find('cover').classList.add('wrong');
-  find('card-title').textContent = 'This cannot be played';
+  find('card-title').textContent = 'Cannot play this';
   find('card-text').textContent = error.message ?? String(error);
   find('progress').hidden = true;
   document.documentElement.dataset.state = 'failed';
 }
 
-/** The bytes of a file next to the page; progressed(bytes). */
+/** Fetches a file next to the page; calls progressed(bytes). */
 async function fetchBytes(name, progressed = () => {}) {
   let response;
   try {
     response = await fetch(name);
   } catch {
-    throw new Error(`${name} cannot be fetched; serve the whole folder: carillon explore FOLDER --serve`);
+    throw new Error(`${name} cannot be fetched; serve the complete folder: carillon explore FOLDER --serve`);
   }
   if (!response.ok) throw new Error(`${name} is missing (${response.status}); make the folder again with carillon explore`);
   const parts = [];
@@ -44,7 +44,7 @@ async function fetchBytes(name, progressed = () => {}) {
   parts.reduce((at, part) => (bytes.set(part, at), at + part.length), 0);
   return bytes.buffer;
 }
-/** Of a file that may be compressed, and that the server may have unpacked on the way. */
+/** Decompresses a file, unless the server has. */
 async function fetchText(name) {
   const bytes = await fetchBytes(name), [first, second] = new Uint8Array(bytes, 0, Math.min(2, bytes.byteLength));
   if (first !== 0x1f || second !== 0x8b) return new TextDecoder().decode(bytes);
@@ -63,7 +63,7 @@ async function fetchJson(name) {
   }
 }
 
-/** What the folder holds. */
+/** Loads explore.json and the scene. */
 async function readFolder() {
   const about = await fetchJson('explore.json');
   if (about.carillon_explore !== kVersion)
@@ -74,7 +74,7 @@ async function readFolder() {
   return { about, scene };
 }
 
-/** The sound engine that the folder has. */
+/** Loads the sound engine. */
 async function loadEngine() {
   try {
     return (await import('./audio/carillon-audio.js')).CarillonAudio;
@@ -115,7 +115,7 @@ async function addBodies({ about, scene }, audio, view, player) {
   }
 }
 
-/** The view from where the scene's listener is, wide enough to see everything, further away only where that is not enough. */
+/** View from the listener of the scene, with all bodies visible. */
 function placeView(scene, view) {
   const { listener = {} } = scene, position = listener.position_m ?? listener.path?.[0].slice(1) ?? [0, -1.5, 0.5];
   const away = norm(subtract(view.middle, position)), facing = listener.facing;

@@ -6,7 +6,7 @@ import { formatHz, formatSeconds } from './spectrum.js';
 import { makeWav, Recorder } from './recorder.js';
 
 const find = (id) => document.getElementById(id);
-const kEditS = 0.06; // between two edits while a slider moves
+const kEditS = 0.06; // interval of edits while a slider moves
 const kPlanS = 0.5;
 
 /** Two significant digits, without an exponent. */
@@ -54,7 +54,7 @@ export class Panel {
     this.view.addEventListener('edge', () => this.say('visible edge of the body'));
   }
 
-  /** moves: the point to strike moves to this body. */
+  /** moves: also moves the point to strike. */
   select(index, isQuiet = false, moves = true) {
     this.leaveMode();
     this.current = index;
@@ -156,7 +156,7 @@ export class Panel {
     });
   }
 
-  /** Sends the values of the sliders, at most once every kEditS; the last values apply. */
+  /** Applies the values of the sliders, at most once every kEditS. */
   edit() {
     const body = this.body, { material, size, damping, stiffness, density } = body.edit;
     body.shown.setSize(2 ** size);
@@ -212,7 +212,7 @@ export class Panel {
     void this.showLevels();
   }
 
-  /** Heard decay of a mode and its parts. Radiation that the bank does not know is part of the material. */
+  /** Decay of a mode and its parts. Radiation unknown to the bank is included in the material. */
   showDecay(index) {
     const mode = this.body.sound.modes[index];
     if (!mode) return;
@@ -289,7 +289,7 @@ export class Panel {
     this.askPlan();
   }
 
-  /** The plan of the effect selection, at most once every kPlanS. */
+  /** Shows the effect selection, at most once every kPlanS. */
   askPlan() {
     if (this.planning) return;
     this.planning = setTimeout(async () => {
@@ -317,13 +317,13 @@ export class Panel {
     this.load = load;
     this.counters = counters;
   }
-  /** Of amplitudes [m kg^1/2], as velocities, so that high modes count. */
+  /** Velocity amplitudes from amplitudes [m kg^1/2], so that high modes count. */
   showRinging(amplitudes) {
     const { modes } = this.body.sound, speeds = Array.from(amplitudes, (a, i) => a * (modes[i]?.freq_hz ?? 0) * (modes[i]?.gain ?? 1));
     this.loudest = Math.max(0.97 * (this.loudest ?? 0), ...speeds, 1e-30);
     this.spectrum.setRinging(speeds.map((speed) => Math.max(0, 1 + Math.log10(Math.max(1e-9, speed / this.loudest)) / 3)));
   }
-  /** As carillon-render warns; 0: within the range of linear modes. */
+  /** Deflection / thickness as in the warning of carillon-render; 0: linear range. */
   showBending(thicknesses) {
     const text = thicknesses > 0 ? `${this.body.name} has bent by ${short(thicknesses)} times its thickness. Linear modes hold up to 0.5 of it: `
       + 'the sound is approximate. Strike more softly, or compute its bank with "nonlinear".' : '';

@@ -1,9 +1,9 @@
-// Bodies in the sound engine, strikes and contacts on them, and reports of these for the panel and for scripts.
+// Bodies in the sound engine, strikes and contacts, and a log of them for the panel and for scripts.
 import { findNormal, findPoint, rotateBack, scale } from './geometry.js';
 
-const kKneeShare = 0.85; // full scale up to which the output is as it is; louder is bent, not cut
+const kKneeShare = 0.85; // fraction of full scale above which the output is compressed
 
-/** The output: straight up to the knee, then bent towards full scale. */
+/** Soft clipper: linear up to the knee, then towards full scale. */
 function makeLimiter(context) {
   const limiter = new WaveShaperNode(context), points = 4097, curve = new Float32Array(points), reach = 4;
   for (let i = 0; i < points; ++i) {
@@ -17,13 +17,13 @@ function makeLimiter(context) {
 }
 
 export class Player extends EventTarget {
-  /** audio: CarillonAudio, not connected. gain_per_pa: that of the page. */
+  /** audio: CarillonAudio, not connected. gain_per_pa: gain of the page. */
   constructor(audio, gain_per_pa) {
     super();
     this.audio = audio;
     this.gain_per_pa = gain_per_pa;
-    this.bodies = []; // of the engine, in the order of the scene
-    this.log = []; // what was done: {kind, body, triangle, barycentric, ...}, newest last
+    this.bodies = []; // in the order of the scene
+    this.log = []; // actions {kind, body, triangle, barycentric, ...}, newest last
     this.mallet = 'hard-wood';
     this.speed_m_s = 1;
     this.force_n = 1;
@@ -40,7 +40,7 @@ export class Player extends EventTarget {
     this.audio.setGain(this.gain_per_pa * 10 ** (decibels / 20));
   }
 
-  /** Browsers start sound at a gesture only: call it from one. */
+  /** Must be called from a user gesture. */
   async wake() {
     if (this.audio.context.state === 'suspended') await this.audio.context.resume();
   }
@@ -51,7 +51,7 @@ export class Player extends EventTarget {
     this.dispatchEvent(new CustomEvent('done', { detail: entry }));
   }
 
-  /** A blow by the mallet. place: {triangle, barycentric}. -> what came of it. */
+  /** A blow of the mallet. place: {triangle, barycentric}. Returns its contact data. */
   async strike(index, place, speed_m_s = this.speed_m_s) {
     const body = this.bodies[index], { triangle, barycentric } = place;
     const entry = { kind: 'strike', body: index, name: body.name, triangle, barycentric, mallet: this.mallet, speed_m_s };

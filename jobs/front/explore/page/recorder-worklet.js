@@ -1,4 +1,4 @@
-// Passes its input to the page, some blocks at a time.
+// Passes its input to the page in groups of blocks.
 const kFrames = 4096;
 
 class RecorderProcessor extends AudioWorkletProcessor {

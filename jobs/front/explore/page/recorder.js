@@ -1,4 +1,4 @@
-// Records the output, sample by sample, as a WAV file of 32-bit floats.
+// Records the output as a WAV file of 32-bit floats.
 
 export class Recorder {
   /** The output of an AudioNode with two channels. */

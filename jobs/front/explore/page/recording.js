@@ -1,4 +1,4 @@
-// Recorded contacts of a simulation, played by the sound engine; the bodies are drawn at the time that is heard.
+// Playback of recorded contacts by the sound engine, with the bodies drawn in sync.
 
 export class Transport {
   /** recording: of the sound engine. elements: {section, play, position, clock}. */
@@ -48,7 +48,7 @@ export class Transport {
     play.firstElementChild.textContent = isPlaying ? '❚❚' : '▶';
   }
 
-  /** Puts the bodies where they are at that time. */
+  /** Moves the bodies to their positions at that time. */
   show(time_s) {
     this.player.bodies.forEach((body, i) => {
       const pose = this.recording.pose(i, time_s);

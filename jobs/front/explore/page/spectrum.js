@@ -1,4 +1,4 @@
-// Spectrum of the sound over a logarithmic axis, with marks for the modes of a body that light up while they ring.
+// Spectrum on a logarithmic axis, with marks for the modes of a body, bright while they ring.
 const kLowHz = 20, kHighHz = 20000, kFloorDb = -110, kTopDb = -6;
 const kNearPx = 9;
 const kMarkDb = 60; // range of the heights of the marks
@@ -20,12 +20,12 @@ export class Spectrum extends EventTarget {
     this.levels_db = null;
     this.draw();
   }
-  /** Of each mode for a blow at the place that is chosen, below the loudest; null: unknown. */
+  /** Levels of the modes for a blow at the chosen point, relative to the loudest; null: unknown. */
   setLevels(levels_db) {
     this.levels_db = levels_db;
     this.draw();
   }
-  /** How much each mode rings now, 0 to 1. */
+  /** Current amplitude of each mode, 0 to 1. */
   setRinging(parts) {
     this.ringing = parts;
   }
@@ -48,7 +48,7 @@ export class Spectrum extends EventTarget {
     this.show(nearest, true);
   }
 
-  /** Marks a mode; `asks`: also sends an event, as when the pointer chose it. */
+  /** Marks a mode; `asks`: also sends an event. */
   show(mode, asks = false) {
     if (mode === this.shown) return;
     this.shown = mode;
@@ -62,7 +62,7 @@ export class Spectrum extends EventTarget {
     this.draw();
   }
 
-  /** In the next frame. */
+  /** Redraws in the next frame. */
   draw() {
     this.waiting ??= requestAnimationFrame(() => {
       this.waiting = undefined;

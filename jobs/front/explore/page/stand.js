@@ -2,15 +2,15 @@
 import * as THREE from './three/three.module.min.js';
 import { add, dot, norm, rotate, scale, subtract } from './geometry.js';
 
-const kFlat = 0.2; // thinner, against its width: a plate; narrower, against its length: a rod
-const kLevelDeg = 20, kUprightDeg = 70; // tilt of a plate with legs, of one between posts
-const kInset = 0.94; // of the way to its corners
-const kThread = 0.35; // of a rod's length
+const kFlat = 0.2; // thickness / width of a plate; width / length of a rod
+const kLevelDeg = 20, kUprightDeg = 70; // tilt limits: plate with legs, plate between posts
+const kInset = 0.94; // position of supports / distance to the corners
+const kThread = 0.35; // length of a thread / length of the rod
 
 const material = new THREE.MeshStandardMaterial({ color: 0x4a4440, roughness: 0.7, metalness: 0.1 });
 const thread = new THREE.LineBasicMaterial({ color: 0x9aa3ad, transparent: true, opacity: 0.55 });
 
-/** Axes of a body's box in the world, longest first, with the half lengths. */
+/** Axes of a body's bounding box in the world, longest first, with half lengths. */
 function findAxes(body) {
   const half = scale(0.5 * body.size, subtract(body.box.high, body.box.low));
   return [0, 1, 2]
@@ -18,7 +18,7 @@ function findAxes(body) {
     .sort((a, b) => b.half - a.half);
 }
 
-/** The place of the surface that is farthest in a direction of the world. */
+/** Support point of the surface in a world direction. */
 function findFarthest(body, way) {
   const { vertices_m: v } = body.surface;
   let farthest = -Infinity, found = null;
@@ -37,7 +37,7 @@ function makeLeg(from, floor, radius) {
   return leg;
 }
 
-/** The stand of a body over a floor of this height, or null where it needs none. */
+/** The stand of a body above a floor of this height, or null. */
 export function makeStand(body, floor) {
   const [long, middle, short] = findAxes(body), centre = body.toWorld(body.box.middle);
   const stand = new THREE.Group(), lowest = findFarthest(body, [0, 0, -1])[2];

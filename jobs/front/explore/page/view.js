@@ -1,14 +1,14 @@
-// The picture: bodies on a dark stage, the point to strike, and which point of a body lies under a pixel. Draws only after changes.
+// 3D view: bodies on a dark stage, the point to strike, picking. Draws only after changes.
 import * as THREE from './three/three.module.min.js';
 import { castRay, rotate, rotateBack, scale, add, norm, normalise, subtract, cross } from './geometry.js';
 import { makeStand } from './stand.js';
 import { OrbitCamera } from './camera.js';
 
-const kSlowFrameMs = 45; // slower: fewer pixels while something moves
+const kSlowFrameMs = 45; // slower frames reduce the resolution during motion
 const kLeastPixels = 0.5;
 const kRippleS = 0.55;
 
-/** Whether pictures are computed by the processor, which then has little left for the sound. */
+/** True for software rendering, which competes with the sound for the CPU. */
 function isSoftware() {
   const context = document.createElement('canvas').getContext('webgl2');
   if (!context) throw new Error('this browser draws no WebGL 2; allow it, or use another browser');
@@ -18,7 +18,7 @@ function isSoftware() {
   return /swiftshader|llvmpipe|software/i.test(name);
 }
 
-/** Soft boxes around the stage, which metal and glazes mirror. */
+/** Environment map: soft boxes around the stage. */
 function makeSurroundings(renderer, size) {
   const room = new THREE.Scene();
   const add = (color, strength, size, at) => {
@@ -39,7 +39,7 @@ function makeSurroundings(renderer, size) {
   add(0xcfe0ff, 4.5, [0.2, 7, 5], [-9.6, 2, 3]); // left
   add(0xffdfb8, 4, [0.2, 5, 6], [9.6, -3, 2]); // right
   add(0xbfd4ff, 2.5, [10, 0.2, 2.5], [0, 9.6, 4]); // behind
-  add(0xfff4e6, 0.9, [9, 7, 0.2], [2, -7, -7]); // what a floor throws back
+  add(0xfff4e6, 0.9, [9, 7, 0.2], [2, -7, -7]); // reflection of the floor
   const maker = new THREE.PMREMGenerator(renderer), texture = maker.fromScene(room, 0.035, 0.1, 100, { size }).texture;
   maker.dispose();
   return texture;
@@ -89,7 +89,7 @@ export class View extends EventTarget {
     this.scene.add(this.key, this.key.target, rim);
     this.orbit = new OrbitCamera();
     this.bodies = [];
-    this.movers = new Set(); // functions of the time [s] that draw something; they leave when they return false
+    this.movers = new Set(); // animation functions of time [s], removed when they return false
     this.pixels = 1;
     this.makeMarks();
     new ResizeObserver(() => this.resize()).observe(canvas);
@@ -118,13 +118,13 @@ export class View extends EventTarget {
     this.scene.add(body.mesh);
   }
 
-  /** Of the boxes of all bodies, in the world. */
+  /** Bounding box of all bodies in the world. */
   listCorners() {
     const ends = (body, k) => [0, 1, 2].map((c) => (k & (1 << c) ? body.box.high[c] : body.box.low[c]));
     return this.bodies.flatMap((body) => [0, 1, 2, 3, 4, 5, 6, 7].map((k) => body.toWorld(ends(body, k))));
   }
 
-  /** Once all bodies are there: light and floor to their size. ground_m: its height, or null for none. */
+  /** Adapts light and floor to all bodies. ground_m: height of the floor, or null. */
   settle(ground_m) {
     const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
     for (const at of this.listCorners()) at.forEach((x, c) => ([low[c], high[c]] = [Math.min(low[c], x), Math.max(high[c], x)]));
@@ -158,7 +158,7 @@ export class View extends EventTarget {
     if (this.isReady) this.paint();
   }
 
-  /** In the next frame. */
+  /** Redraws in the next frame. */
   draw() {
     if (this.isWaiting || !this.isReady) return;
     this.isWaiting = true;
@@ -190,12 +190,12 @@ export class View extends EventTarget {
   paint() {
     if (this.cursorPlace) this.placeMark(this.cursor, this.cursorPlace, 0.011);
     const pose = this.bodies.map(({ mesh, uniforms }) => `${mesh.matrix.elements} ${uniforms.uBend.value}`).join();
-    this.renderer.shadowMap.needsUpdate = pose !== this.shadowPose; // shadows of what has moved
+    this.renderer.shadowMap.needsUpdate = pose !== this.shadowPose; // only after motion
     this.shadowPose = pose;
     this.renderer.render(this.scene, this.orbit.camera);
   }
 
-  /** Fewer pixels while the machine is slow, all of them for a still picture. */
+  /** Reduced resolution on slow machines during motion. */
   govern(took_ms, moves) {
     this.took_ms = 0.7 * (this.took_ms ?? took_ms) + 0.3 * took_ms;
     let pixels = this.pixels;
@@ -209,7 +209,7 @@ export class View extends EventTarget {
     else this.sharpening = setTimeout(() => this.resize(), 150);
   }
 
-  /** What a place of the window shows: {body, triangle, barycentric, point, normal} with point and normal in the world; or null. */
+  /** Picking: {body, triangle, barycentric, point, normal} with point and normal in the world, or null. */
   pick(clientX, clientY) {
     const box = this.canvas.getBoundingClientRect();
     const x = (2 * (clientX - box.left)) / box.width - 1, y = 1 - (2 * (clientY - box.top)) / box.height;
@@ -229,7 +229,7 @@ export class View extends EventTarget {
     return nearest;
   }
 
-  /** Where a place of the world is in the window. */
+  /** Projects a world point to the window. */
   project(point) {
     const at = new THREE.Vector3(...point).project(this.orbit.camera), box = this.canvas.getBoundingClientRect();
     return { x: box.left + ((at.x + 1) / 2) * box.width, y: box.top + ((1 - at.y) / 2) * box.height };
@@ -251,7 +251,7 @@ export class View extends EventTarget {
     mark.scale.setScalar(size * away);
   }
 
-  /** A ring that runs over the body from a place. strength: 0 to 1. */
+  /** Animates a ring around a struck point. strength: 0 to 1. */
   ripple(place, strength) {
     const mark = this.ripples.shift(), began = performance.now() / 1000;
     this.ripples.push(mark);

@@ -17,7 +17,7 @@ class SolveError(RuntimeError): ...
 class SystemError(OSError): ...
 
 class Bank:
-    """The modes of a body: m modes, V vertices and T triangles of its surface."""
+    """Mode bank of a body: m modes, V vertices and T triangles of its surface."""
 
     def __init__(self, file: File, frequencies: str = "corrected") -> None: ...
     @staticmethod
@@ -75,7 +75,7 @@ class Bank:
     def __len__(self) -> int: ...
 
 class Synthesiser:
-    """A synthesiser: bodies that are struck, and microphones."""
+    """A synthesiser with struck bodies and microphones."""
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""Documents of Python as the JSON that the programs read."""
+"""Python documents as JSON for the programs."""
 import json
 import os
 
@@ -8,7 +8,7 @@ from ._carillon import InputError
 
 
 def write_json(document: dict, what: str) -> str:
-    """A document as text, a line for each value, so that messages name a line. numpy's numbers and arrays are numbers and lists."""
+    """A document as text with one value per line, so messages can name a line. numpy values become numbers and lists."""
 
     def to_plain(value):
         if isinstance(value, (numpy.ndarray, numpy.generic)):

@@ -1,4 +1,4 @@
-"""Jobs, solved by carillon-precompute, which runs as a process of its own (MPI and PETSc are never loaded here)."""
+"""Runs carillon-precompute as a process (MPI and PETSc are never loaded here)."""
 import json
 import os
 import pathlib
@@ -14,17 +14,17 @@ from . import _carillon
 from ._carillon import Bank, InputError, SolveError, SystemError, find_bank
 from .documents import write_json
 
-PATIENCE_S = 5.0  # for a solver that is asked to end
+PATIENCE_S = 5.0  # grace period of an interrupted solver
 SOLVER = "carillon-precompute"
 
 
 def find_program(name: str) -> str:
-    """A program of this installation, else of PATH. Raises SystemError."""
-    prefixes = list(pathlib.Path(__file__).resolve().parents)[:-1]  # without the root: /bin is of the system
+    """Finds a program in this installation, else in PATH. Raises SystemError."""
+    prefixes = list(pathlib.Path(__file__).resolve().parents)[:-1]  # without the root: /bin belongs to the system
     own = next((prefix / "bin" / name for prefix in prefixes if (prefix / "bin" / name).is_file()), None)
     found = str(own) if own else shutil.which(name)
     if found is None:
-        raise SystemError(f"{name} is not installed here (package carillon-precompute), or not along PATH")
+        raise SystemError(f"{name} is not installed here (package carillon-precompute), or not in PATH")
     return found
 
 
@@ -36,7 +36,7 @@ def make_command(ranks: int) -> typing.List[str]:
 
 
 def make_environment(ranks: int) -> typing.Dict[bytes, bytes]:
-    """One thread a rank, outside any MPI run of this process."""
+    """Environment with one thread per rank, independent of an MPI run of this process."""
     entries = (entry.partition(b"=") for entry in _carillon._make_environment(is_alone=ranks == 1))
     environment = {name: value for name, _, value in entries}
     environment.update({b"OMP_NUM_THREADS": b"1", b"OPENBLAS_NUM_THREADS": b"1", b"HWLOC_COMPONENTS": b"-gl"})
@@ -46,10 +46,10 @@ def make_environment(ranks: int) -> typing.Dict[bytes, bytes]:
 
 
 def run(command: typing.List[str], ranks: int) -> typing.Tuple[int, str]:
-    """Exit code and what it prints on standard error. Whatever interrupts this (Ctrl-C) ends it, too."""
+    """Exit code and standard error of a command. An interrupt (Ctrl-C) also ends the command."""
     if shutil.which(command[0]) is None:
-        raise SystemError(f"{command[0]} is not along PATH; install it (package openmpi-bin)")
-    # An interrupt inside Popen() would leave the solver running: it is noted, and raised once the solver can be ended.
+        raise SystemError(f"{command[0]} is not in PATH; install it (package openmpi-bin)")
+    # An interrupt inside Popen() would leave the solver running: it is recorded and raised once the solver can be ended.
     interrupts: typing.List[int] = []
     handler = signal.getsignal(signal.SIGINT) if threading.current_thread() is threading.main_thread() else None
     if handler is not None:
@@ -77,7 +77,7 @@ def run(command: typing.List[str], ranks: int) -> typing.Tuple[int, str]:
 
 
 def raise_error(result: dict, code: int, said: str) -> typing.NoReturn:
-    """The exception that the result file of a program describes (docs/howto/when-jobs-die.md)."""
+    """The exception described by a program's result file (docs/howto/when-jobs-die.md)."""
     kinds = {"bad-input": InputError, "no-solution": SolveError}
     lines = [line for line in said.splitlines() if line.strip(" -")]
     message = result.get("message") or (lines[-1] if lines else f"{SOLVER} ended with exit code {code} and without a message")
@@ -87,11 +87,11 @@ def raise_error(result: dict, code: int, said: str) -> typing.NoReturn:
 def solve(job: typing.Union[dict, str, os.PathLike], *, ranks: int = 1, bank: typing.Union[None, str, os.PathLike] = None) -> Bank:
     """Solves a job and returns its bank.
 
-    job: the file of a job, or the job itself as a dict (docs/howto/make-a-bank.md), whose relative paths start here.
-    ranks: processes that solve together (MPI).
-    bank: the file to write; without it the job's own "bank", and where the job has none the bank is only in memory.
-    What the solver warns of is a warning here. Raises InputError, SolveError or SystemError with the solver's message. Other threads run
-    meanwhile; Ctrl-C ends the solver.
+    job: a job file, or a job as a dict (docs/howto/make-a-bank.md) with paths relative to the current directory.
+    ranks: number of MPI ranks.
+    bank: the file to write; default: the job's "bank", else the bank is kept in memory only.
+    Warnings of the solver become Python warnings. Raises InputError, SolveError or SystemError with the solver's message. Releases the
+    GIL; Ctrl-C ends the solver.
     """
     if isinstance(ranks, bool) or not isinstance(ranks, int) or ranks < 1:
         raise InputError(f"ranks: {ranks!r}; give a whole number, 1 or more")
@@ -118,7 +118,7 @@ def solve(job: typing.Union[dict, str, os.PathLike], *, ranks: int = 1, bank: ty
 
 
 def anchor(job: dict) -> dict:
-    """The job with its files as absolute paths: it is solved from another folder."""
+    """The job with absolute paths, because it is solved from another folder."""
 
     def absolute(value: dict, *keys: str) -> dict:
         return {

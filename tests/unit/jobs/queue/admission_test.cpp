@@ -1,4 +1,4 @@
-// What the queue admits: nothing above the cores, nothing above the memory, and no job starves.
+// Admission: limits of cores and memory, no starvation.
 #include "jobs/queue/admission.hpp"
 
 #include <gtest/gtest.h>
@@ -22,13 +22,13 @@ int count(const std::vector<Admission>& admissions, Admission::Decision decision
 
 const Host kHost{8, 32.0, 32.0};
 
-TEST(Admission, many_small_jobs_run_side_by_side_on_one_rank_each) {
+TEST(Admission, small_jobs_run_concurrently_on_one_rank_each) {
   const std::vector<Admission> admissions = choose(kHost, {}, std::vector<Candidate>(20, small()));
   EXPECT_EQ(count(admissions, Admission::Decision::start), 8);
   for (const Admission& admission : admissions) EXPECT_EQ(admission.ranks, 1);
 }
 
-TEST(Admission, one_large_job_takes_all_cores_and_two_take_half_each) {
+TEST(Admission, large_jobs_divide_the_cores) {
   const std::vector<Admission> alone = choose(kHost, {}, {large(4.0)});
   EXPECT_EQ(alone[0].decision, Admission::Decision::start);
   EXPECT_EQ(alone[0].ranks, 8);
@@ -38,46 +38,46 @@ TEST(Admission, one_large_job_takes_all_cores_and_two_take_half_each) {
   EXPECT_EQ(both[1].ranks, 4);
 }
 
-TEST(Admission, jobs_that_memory_keeps_apart_share_no_cores) {
-  // Two of 20 GB do not fit 32: the first gets every core, as no other job could use them.
+TEST(Admission, jobs_limited_by_memory_get_all_cores) {
+  // Two jobs of 20 GB do not fit into 32 GB: the first gets all cores.
   const std::vector<Admission> admissions = choose(kHost, {}, {large(20.0), large(20.0)});
   EXPECT_EQ(admissions[0].decision, Admission::Decision::start);
   EXPECT_EQ(admissions[0].ranks, 8);
   EXPECT_EQ(admissions[1].decision, Admission::Decision::wait);
 }
 
-TEST(Admission, a_job_that_is_hardly_longer_than_its_start_does_not_spread) {
+TEST(Admission, short_job_gets_one_rank) {
   EXPECT_EQ(choose(kHost, {}, {large(1.0, 40.0)})[0].ranks, 4);
   EXPECT_EQ(choose(kHost, {}, {large(1.0, kSmallSeconds - 1.0)})[0].ranks, 1);
 }
 
-TEST(Admission, ranks_that_are_asked_for_are_given_up_to_the_cores) {
+TEST(Admission, requested_ranks_are_limited_by_cores) {
   EXPECT_EQ(choose(kHost, {}, {asking(3, 1.0)})[0].ranks, 3);
   EXPECT_EQ(choose(kHost, {}, {asking(64, 1.0)})[0].ranks, 8);
 }
 
-TEST(Admission, what_no_moment_of_this_machine_holds_never_runs) {
+TEST(Admission, job_larger_than_the_machine_never_runs) {
   const std::vector<Admission> admissions = choose(kHost, {}, {asking(1, 31.0), asking(1, 30.0)});
   EXPECT_EQ(admissions[0].decision, Admission::Decision::never);
   EXPECT_EQ(admissions[0].memory_gb, 31.0);
   EXPECT_EQ(admissions[1].decision, Admission::Decision::start);
 }
 
-TEST(Admission, memory_that_was_promised_and_is_not_used_yet_is_not_given_twice) {
+TEST(Admission, admitted_memory_is_reserved) {
   const std::vector<Admitted> running{{1, 20.0, 0.5}};
-  // 31.5 GB look free, but 19.5 of them are promised.
+  // 31.5 GB are free, but 19.5 GB are admitted to other jobs.
   const Host host{8, 32.0, 31.5};
   EXPECT_EQ(choose(host, running, {asking(1, 12.0)})[0].decision, Admission::Decision::wait);
   EXPECT_EQ(choose(host, running, {asking(1, 10.0)})[0].decision, Admission::Decision::start);
 }
 
-TEST(Admission, memory_that_others_use_is_not_given) {
+TEST(Admission, memory_of_other_programs_is_not_admitted) {
   const Host host{8, 32.0, 6.0};
   EXPECT_EQ(choose(host, {}, {asking(1, 5.0)})[0].decision, Admission::Decision::wait);
   EXPECT_EQ(choose(host, {}, {asking(1, 4.0)})[0].decision, Admission::Decision::start);
 }
 
-TEST(Admission, a_job_that_waits_for_room_is_passed_at_first_and_kept_room_for_later) {
+TEST(Admission, blocked_job_is_overtaken_until_its_patience_ends) {
   const std::vector<Admitted> running{{1, 1.0, 1.0}};
   const std::vector<Candidate> fresh{asking(8, 1.0, 1.0), small()};
   EXPECT_EQ(choose(kHost, running, fresh)[1].decision, Admission::Decision::start);
@@ -87,15 +87,15 @@ TEST(Admission, a_job_that_waits_for_room_is_passed_at_first_and_kept_room_for_l
   EXPECT_EQ(admissions[1].decision, Admission::Decision::wait);
 }
 
-TEST(Admission, nothing_is_kept_for_a_job_that_others_than_us_keep_out) {
-  // Another user's program holds 26 of 32 GB: waiting for our own jobs would not help.
+TEST(Admission, no_reservation_for_a_job_blocked_by_other_programs) {
+  // Another program holds 26 of 32 GB: waiting for own jobs does not help.
   const Host host{8, 32.0, 6.0};
   const std::vector<Admission> admissions = choose(host, {{1, 1.0, 1.0}}, {asking(1, 20.0, 1e6), small()});
   EXPECT_EQ(admissions[0].decision, Admission::Decision::wait);
   EXPECT_EQ(admissions[1].decision, Admission::Decision::start);
 }
 
-TEST(Admission, no_queue_whatever_oversubscribes_cores_or_memory) {
+TEST(Admission, random_queues_never_oversubscribe) {
   std::mt19937 random(5);
   const auto pick = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
   for (int round = 0; round < 2000; ++round) {
@@ -120,15 +120,15 @@ TEST(Admission, no_queue_whatever_oversubscribes_cores_or_memory) {
       EXPECT_GE(admission.ranks, 1);
     }
     EXPECT_LE(ranks, host.cores) << "round " << round;
-    if (!running.empty() && ranks == static_cast<int>(running.size())) continue;  // nothing was started
+    if (!running.empty() && ranks == static_cast<int>(running.size())) continue;  // none started
     EXPECT_LE(promised, kMemoryShare * host.total_gb + 1e-9) << "round " << round;
   }
 }
 
-TEST(Admission, an_endless_stream_of_small_jobs_does_not_starve_a_large_one) {
-  // Every second a slot of the two frees itself and a new small job comes; the large one needs both.
+TEST(Admission, small_jobs_do_not_starve_a_large_one) {
+  // Small jobs keep arriving; the large job needs both slots.
   const Host host{2, 32.0, 32.0};
-  std::vector<int> left{3, 5};  // seconds of the small ones that run
+  std::vector<int> left{3, 5};  // remaining seconds of running small jobs
   double blocked_s = 0.0;
   for (int second = 0; second < 1000; ++second) {
     std::erase_if(left, [](int& seconds) { return --seconds <= 0; });
@@ -146,7 +146,7 @@ TEST(Admission, an_endless_stream_of_small_jobs_does_not_starve_a_large_one) {
   FAIL() << "the large job never ran";
 }
 
-TEST(Admission, memory_between_two_predictions_is_the_larger_of_both) {
+TEST(Admission, memory_between_two_predictions_is_the_larger) {
   const Need need{0, 0.0, 100.0, {4.0, 5.0, 7.0}};
   EXPECT_EQ(calc_memory(need, 1), 4.0);
   EXPECT_EQ(calc_memory(need, 2), 5.0);
@@ -154,7 +154,7 @@ TEST(Admission, memory_between_two_predictions_is_the_larger_of_both) {
   EXPECT_EQ(calc_memory(need, 16), 7.0);
 }
 
-TEST(Admission, a_guess_grows_with_the_mesh_and_the_ranks) {
+TEST(Admission, estimate_grows_with_mesh_and_ranks) {
   const Need small_mesh = guess_need(carillon::cost::estimate_meshed_size(1000, true)),
              large_mesh = guess_need(carillon::cost::estimate_meshed_size(100000, true));
   EXPECT_LT(calc_memory(small_mesh, 1), 0.3);

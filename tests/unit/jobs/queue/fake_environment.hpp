@@ -1,4 +1,4 @@
-// A store, a machine and a clock in memory, whose attempts do what a test says.
+// Store, machine and clock in memory, with attempts controlled by the test.
 #pragma once
 
 #include <fmt/core.h>
@@ -25,7 +25,7 @@ using registry::JobState;
 
 inline bool is_open(JobState state) { return state == JobState::queued || state == JobState::waiting || state == JobState::running; }
 
-/// Rows in a list. The rule of claims is that of the registry. On a full disk nothing can be changed.
+/// Rows in a list, with the claim rule of the registry. No changes on a full disk.
 class MemoryTable final : public registry::JobTable {
  public:
   MemoryTable(const queue::Clock& clock, std::function<bool(const store::Id&)> has_bank) : clock_(clock), has_bank_(std::move(has_bank)) {}
@@ -64,7 +64,7 @@ class MemoryTable final : public registry::JobTable {
     }
     return false;
   }
-  /// How often the row has ended so far.
+  /// Number of ends of the row.
   int count_ends(const store::Id& id) const { return ends_.count(id) > 0 ? ends_.at(id) : 0; }
 
   bool is_disk_full = false;
@@ -80,23 +80,23 @@ class MemoryTable final : public registry::JobTable {
   std::map<store::Id, int> ends_;
 };
 
-/// kill -9 of a runner in the middle of a round.
+/// SIGKILL of a runner within a round.
 struct RunnerDied {};
 
-/// A process of an attempt. It works from begin() on.
+/// The process of an attempt, running from begin().
 struct Process {
   pid_t pid = 0;
   store::Id job;
   std::string token;
   int ranks = 0;
   double memory_gb = 0.0;
-  bool has_begun = false;  // holds the lock, and attempt.json names it
+  bool has_begun = false;  // holds the lock and has written attempt.json
   bool was_asked = false;  // to save and stop
   bool is_alive = true;
   pid_t parent = 0;  // the runner that started it; 0: an orphan
 };
 
-/// The world of one or more runners, each a Launcher of its own.
+/// The environment of one or more runners, each with its own Launcher.
 class World final : public queue::Disk, public queue::Clock {
  public:
   static constexpr int kCores = 4;
@@ -109,7 +109,7 @@ class World final : public queue::Disk, public queue::Clock {
   }
   std::optional<outcome::Attempt> read_attempt(const store::Id& id) const override { return find(attempts_, id); }
   std::optional<outcome::Outcome> read_outcome(const store::Id& id) const override { return find(outcomes_, id); }
-  /// Every second time the folder cannot be removed.
+  /// Fails every second time.
   void remove_work(const store::Id& id) override {
     if (++removals_ % 2 == 0) throw SystemError("the folder is in use");
     attempts_.erase(id);
@@ -129,8 +129,8 @@ class World final : public queue::Disk, public queue::Clock {
     return processes_.back().pid;
   }
 
-  // What attempts do.
-  /// The attempt takes the lock. An attempt at a job on which another works ends at once, as the program does.
+  // Actions of attempts.
+  /// The attempt takes the lock, or ends if it is held.
   void begin(Process& process) {
     if (has_bank(process.job)) return end(process, kExitInput);  // its folder of work is gone
     if (is_locked(process.job)) return end(process, attempt::kExitBusy);
@@ -140,7 +140,7 @@ class World final : public queue::Disk, public queue::Clock {
     attempt.process = identify(process.pid);
     attempts_.insert_or_assign(process.job, attempt);
   }
-  /// It ends with this cause; done publishes the bank.
+  /// Ends with this cause; done publishes the bank.
   void finish(Process& process, Cause cause) {
     if (cause == Cause::done) {
       ++published_[process.job];
@@ -154,7 +154,7 @@ class World final : public queue::Disk, public queue::Clock {
     }
     end(process, cause == Cause::done ? 0 : 85);
   }
-  /// kill -9
+  /// SIGKILL.
   void kill(Process& process) { end(process, 128 + SIGKILL); }
 
   std::vector<Process*> list_alive() {
@@ -170,7 +170,7 @@ class World final : public queue::Disk, public queue::Clock {
   }
   static process::Identity identify(pid_t pid) { return {"host", "boot", pid, static_cast<std::uint64_t>(pid)}; }
   int count_published(const store::Id& id) const { return published_.count(id) > 0 ? published_.at(id) : 0; }
-  /// The runner is gone: its attempts live on.
+  /// The runner is killed; its attempts continue.
   void orphan_children(pid_t runner) {
     runners_.erase(runner);
     for (Process& process : processes_) {
@@ -182,7 +182,7 @@ class World final : public queue::Disk, public queue::Clock {
   std::set<pid_t> runners_;
   std::map<pid_t, std::deque<queue::EndedChild>> ended_;  // by runner
   bool is_disk_full = false, refuses_to_start = false;
-  std::function<void()> at_next_start;  // happens when a runner has claimed a row and is about to start the attempt
+  std::function<void()> at_next_start;  // called between claim and start
   pid_t next_pid_ = 1000;
 
  private:

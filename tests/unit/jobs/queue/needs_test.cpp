@@ -1,10 +1,10 @@
-// What a job will need, by its request alone.
+// Needs of jobs from their requests.
 #include "jobs/queue/needs.hpp"
 
 #include <gtest/gtest.h>
 
-#include "jobs/store/outcome/outcome.hpp"
 #include "jobs/queue/admission.hpp"
+#include "jobs/store/outcome/outcome.hpp"
 #include "precompute/job/cost/calibration.hpp"
 #include "precompute/job/cost/seconds.hpp"
 #include "tests/unit/jobs/store/registry/jobs.hpp"
@@ -37,7 +37,7 @@ class Needs : public testing::Test {
   const store::Store store_ = store::Store::open(folder_ / "store");
 };
 
-TEST_F(Needs, a_surface_without_a_size_is_meshed_with_the_default_and_needs_no_prediction) {
+TEST_F(Needs, surface_without_mesh_size_needs_no_prediction) {
   const queue::JobNeeds needs = find(R"({"body": {"surface": "a.obj"}})", store::InputKind::surface);
   EXPECT_FALSE(needs.wants_prediction);
   EXPECT_DOUBLE_EQ(needs.need.seconds, predict(cost::kDefaultNodes));
@@ -45,7 +45,7 @@ TEST_F(Needs, a_surface_without_a_size_is_meshed_with_the_default_and_needs_no_p
   EXPECT_DOUBLE_EQ(find(R"({"body": {"surface": "a.obj", "nodes": 700}})", store::InputKind::surface).need.seconds, predict(700));
 }
 
-TEST_F(Needs, grow_where_the_last_attempt_ran_out_of_memory) {
+TEST_F(Needs, memory_is_raised_after_running_out_of_memory) {
   const char* const text = R"({"body": {"shape": "bar", "nodes": 5000}})";
   const double before_gb = queue::calc_memory(find(text, store::InputKind::shape).need, 1);
   const auto find_after = [&](outcome::Cause cause, double asked_gb) {
@@ -62,19 +62,19 @@ TEST_F(Needs, grow_where_the_last_attempt_ran_out_of_memory) {
   EXPECT_DOUBLE_EQ(find_after(outcome::Cause::memory, 2.0), 2.0);  // a requested limit is not raised
 }
 
-TEST_F(Needs, fewer_modes_take_less_time) {
+TEST_F(Needs, fewer_modes_need_less_time) {
   const queue::JobNeeds needs = find(R"({"body": {"shape": "bar", "nodes": 5000}, "max_modes": 10})", store::InputKind::shape);
   EXPECT_DOUBLE_EQ(needs.need.seconds, predict(5000, 10));
   EXPECT_LT(needs.need.seconds, predict(5000));
 }
 
-TEST_F(Needs, what_does_not_fall_with_ranks_is_a_part_of_the_time) {
+TEST_F(Needs, serial_part_is_within_the_total_time) {
   const queue::Need need = find(R"({"body": {"shape": "bar", "nodes": 5000}})", store::InputKind::shape).need;
   EXPECT_GT(need.serial_seconds, cost::kStart);
   EXPECT_LT(need.serial_seconds, 0.5 * need.seconds);
 }
 
-TEST_F(Needs, a_simulation_is_known_as_one) {
+TEST_F(Needs, simulation_is_detected) {
   EXPECT_TRUE(find("{}", store::InputKind::simulation).is_simulation);
   EXPECT_FALSE(find("{}", store::InputKind::shape).is_simulation);
 }

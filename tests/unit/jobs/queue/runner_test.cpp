@@ -1,5 +1,5 @@
-// The decisions of the queue in memory: random and all short orders of what can happen to jobs, attempts and runners.
-// Always true: no more ranks and memory than the machine has; at most one attempt works on a job; a bank is published once; no job is lost.
+// The queue in memory under random and all short sequences of events. Invariants: ranks and memory within the machine; at most one attempt
+// per job; every bank published once; no job lost.
 #include "jobs/queue/runner.hpp"
 
 #include <gtest/gtest.h>
@@ -20,19 +20,19 @@ enum class Event {
   step,         // a runner makes a round
   begin,        // an attempt takes its lock
   done,         // an attempt publishes its bank
-  fail,         // an attempt ends with an error that another attempt may not have
+  fail,         // an attempt ends with a transient error
   refuse,       // an attempt ends with an error of its input
-  save,         // an attempt saves and stops, if it was asked
+  save,         // an attempt saves and stops, if asked
   kill,         // an attempt is killed
-  kill_runner,  // a runner is killed, and another begins
+  kill_runner,  // a runner is killed and replaced
   stop,         // a runner gets SIGTERM
   cancel,       // a user cancels a job
-  retry,        // a user queues a job again
+  retry,        // a user retries a job
   wait,         // time passes
   die,          // a runner will be killed between claim and start
   fill,         // the disk will get full between claim and start
   disk,         // the disk gets full, or free again
-  starts,       // processes cannot be started, or can again
+  starts,       // process starts fail, or work again
 };
 constexpr int kEvents = 16;
 
@@ -48,19 +48,19 @@ class Scene {
     for (int i = 0; i < runners; ++i) add_runner();
   }
 
-  /// `choice` picks the job, attempt or runner. False: nothing of that kind can happen now.
+  /// `choice` selects the job, attempt or runner. False: not possible now.
   bool act(Event event, unsigned choice) {
     bool has_acted = false;
     try {
       has_acted = try_to_act(event, choice);
-    } catch (const DiskFullError&) {  // a command of the user's
+    } catch (const DiskFullError&) {  // in a command of the user
     }
     events_ += fmt::format(" {}/{}", static_cast<int>(event), choice % 12);
     check();
     return has_acted;
   }
 
-  /// From now on all goes well: every job comes to its end.
+  /// Without further failures every job must end.
   void finish() {
     SCOPED_TRACE("events (number/choice):" + events_);
     set_disk_full(false);
@@ -81,7 +81,7 @@ class Scene {
     }
     for (const Job& job : table_.rows()) {
       EXPECT_TRUE(job.state == JobState::done || job.state == JobState::failed || job.state == JobState::cancelled) << to_text(job.state);
-      // The bank of an attempt that no row named is found when the registry is opened next.
+      // The registry finds the bank of an unknown attempt at its next opening.
       const bool has_bank = world_.has_bank(job.id) && (job.state == JobState::done || unnamed_.count(job.id) == 0);
       EXPECT_EQ(job.state == JobState::done, has_bank) << to_text(job.state);
       EXPECT_EQ(table_.count_ends(job.id), 1 + requeued_[job.id]);
@@ -125,7 +125,7 @@ class Scene {
     }
   }
 
-  /// The runner is killed, and another begins.
+  /// The runner is killed and replaced.
   void replace(const OwnRunner& own) {
     world_.orphan_children(own.launcher->self());
     std::erase_if(runners_, [&](const auto& other) { return other.get() == &own; });
@@ -183,7 +183,7 @@ class Scene {
         return world_.at_next_start = [this] { set_disk_full(true); }, true;
       case Event::stop: {
         runners_[runner]->runner->stop(SIGTERM);
-        // It works on until its attempts have ended; a new one continues with the queue.
+        // It continues until its attempts have ended; a new runner continues the queue.
         if (runners_.size() < 3) add_runner();
         return true;
       }
@@ -210,7 +210,7 @@ class Scene {
     double memory_gb = 0.0;
     std::map<store::Id, int> working;
     for (const Process* process : world_.list_alive()) {
-      // A full disk and then the kill of its runner can leave an attempt that no row names before it takes the lock.
+      // A full disk followed by a kill of the runner can leave an attempt without a row.
       const Job row = *table_.find(process->job);
       const bool is_named = row.state == JobState::running && row.token == process->token;
       if (!is_named) unnamed_.insert(process->job);
@@ -233,18 +233,18 @@ class Scene {
   std::string events_;
 };
 
-TEST(Runner, jobs_that_go_well_are_done) {
+TEST(Runner, jobs_without_failures_are_done) {
   for (int jobs = 1; jobs <= 6; ++jobs) Scene(jobs, 1).finish();
 }
 
-TEST(Runner, ends_each_job_once_in_any_random_order_of_events) {
+TEST(Runner, every_job_ends_once_under_random_events) {
   constexpr int kOrders = 3000, kLength = 40;
   for (int seed = 0; seed < kOrders && !testing::Test::HasFailure(); ++seed) {
     SCOPED_TRACE(seed);
     std::mt19937 random(static_cast<unsigned>(seed));
     Scene scene(1 + seed % 6, 1 + seed % 2);
     for (int i = 0; i < kLength; ++i) {
-      // Half of the events are rounds: otherwise nothing would begin.
+      // Half of the events are rounds.
       const Event event = random() % 2 == 0 ? Event::step : static_cast<Event>(random() % kEvents);
       scene.act(event, static_cast<unsigned>(random()));
     }
@@ -252,7 +252,7 @@ TEST(Runner, ends_each_job_once_in_any_random_order_of_events) {
   }
 }
 
-TEST(Runner, ends_each_job_once_in_every_short_order_of_events) {
+TEST(Runner, every_job_ends_once_under_all_short_event_sequences) {
   constexpr int kLength = 4;
   int orders = 1;
   for (int i = 0; i < kLength; ++i) orders *= kEvents - 2;  // without disk and starts

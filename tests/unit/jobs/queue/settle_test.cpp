@@ -1,4 +1,4 @@
-// Cancel and retry of rows without a running attempt; who is asked to stop.
+// Cancel and retry of rows; signals to attempts.
 #include "jobs/queue/settle.hpp"
 
 #include <gtest/gtest.h>
@@ -42,15 +42,15 @@ class Settle : public testing::Test {
   Registry registry_;
 };
 
-TEST_F(Settle, a_cancelled_job_says_what_it_was_and_why) {
+TEST_F(Settle, reason_of_a_cancelled_job) {
   EXPECT_EQ(cancel(JobState::queued, 0, ""), "cancelled before it ran");
   EXPECT_EQ(cancel(JobState::queued, 1, ""), "cancelled before it resumed");
   EXPECT_EQ(cancel(JobState::waiting, 2, "rank 1 was killed"), "cancelled while it waited: rank 1 was killed");
   EXPECT_EQ(cancel(JobState::failed, 4, "the mesh is bad"), "cancelled after it had failed: the mesh is bad");
 }
 
-TEST_F(Settle, a_retry_and_what_is_asked_with_it_are_one_change) {
-  // A job whose id follows from what it asks for: retry looks.
+TEST_F(Settle, retry_with_options_is_one_change) {
+  // A job with a valid id, which retry checks.
   const job::JobSpec job = job::parse_job(
       R"({"body": {"shape": "bar", "length_m": 0.2, "width_m": 0.03, "thickness_m": 0.01, "nodes": 600},
           "material": {"young_modulus_pa": 70e9, "poisson_ratio": 0.33, "density_kg_m3": 2700, "damping": {"internal_friction": {"tan_phi": 1e-3}}}})",
@@ -68,13 +68,13 @@ TEST_F(Settle, a_retry_and_what_is_asked_with_it_are_one_change) {
   EXPECT_EQ(registry_.find(id)->resources.ranks, 7);
 }
 
-TEST_F(Settle, a_job_whose_folder_is_of_another_is_not_retried) {
-  put(JobState::failed, 4, "rank 1 was killed");  // its id is that of no request
+TEST_F(Settle, job_with_the_folder_of_another_is_not_retried) {
+  put(JobState::failed, 4, "rank 1 was killed");  // id without a request
   EXPECT_FALSE(queue::retry(store_, registry_, make_id(1)).is_done);
   EXPECT_EQ(registry_.find(make_id(1))->state, JobState::failed);
 }
 
-TEST_F(Settle, a_process_that_was_not_started_for_the_row_gets_no_signal) {
+TEST_F(Settle, unrelated_process_gets_no_signal) {
   queue::LocalLauncher launcher(store_, {});
   Job job{make_id(1)};
   job.token = store::make_random_name();
@@ -89,12 +89,12 @@ TEST_F(Settle, a_process_that_was_not_started_for_the_row_gets_no_signal) {
     ::_exit(127);
   }
   const process::Identity found = *process::find_process(child);
-  for (int round = 0; round < 10000 && !launcher.is_attempt_of(job, found); ++round) ::usleep(1000);  // until it is another program
+  for (int round = 0; round < 10000 && !launcher.is_attempt_of(job, found); ++round) ::usleep(1000);  // wait for exec
   EXPECT_TRUE(launcher.is_attempt_of(job, found));
   Job other = job;
   other.token = store::make_random_name();
   EXPECT_FALSE(launcher.is_attempt_of(other, found));
-  other.token = "sh";  // a word of its command line, but no token
+  other.token = "sh";  // on its command line, but not a token
   EXPECT_FALSE(launcher.is_attempt_of(other, found));
   ::close(ends[0]);
   ::close(ends[1]);

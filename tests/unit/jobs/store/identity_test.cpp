@@ -1,4 +1,4 @@
-// What is part of an id and what is not. The hashes of files are compared with those of sha256sum.
+// Parts of ids. File hashes are compared with sha256sum.
 #include "jobs/store/identity.hpp"
 
 #include <gtest/gtest.h>
@@ -22,7 +22,7 @@ std::string find_id(const std::filesystem::path& job, const std::string& solver 
 
 std::string job_with(const std::string& mesh, const std::string& rest) { return "{\"mesh\": \"" + mesh + "\", " + kMaterial + rest + "}"; }
 
-TEST(Identity, is_the_same_for_the_same_request_in_other_words) {
+TEST(Identity, equivalent_requests_have_the_same_id) {
   const Folder folder;
   folder.write("m.msh", "$MeshFormat\n");
   folder.write("elsewhere/deep/other name.msh", "$MeshFormat\n");
@@ -46,7 +46,7 @@ TEST(Identity, is_the_same_for_the_same_request_in_other_words) {
       folder, [](const auto& job) { return find_id(job); }, id, same);
 }
 
-TEST(Identity, is_another_for_every_input_that_changes_the_bank) {
+TEST(Identity, changed_inputs_have_other_ids) {
   const Folder folder;
   folder.write("m.msh", "$MeshFormat\n");
   folder.write("n.msh", "$MeshFormat \n");
@@ -81,7 +81,7 @@ TEST(Identity, is_another_for_every_input_that_changes_the_bank) {
   EXPECT_TRUE(ids.emplace(find_id(folder.write("job.json", softer)), "material").second);
 }
 
-TEST(Identity, takes_both_files_of_a_TetGen_mesh_by_either_name) {
+TEST(Identity, TetGen_pairs_by_either_name) {
   const Folder folder;
   folder.write("t.node", "nodes");
   folder.write("t.ele", "elements");
@@ -93,7 +93,7 @@ TEST(Identity, takes_both_files_of_a_TetGen_mesh_by_either_name) {
   EXPECT_THROW(find_id(folder / "a.json"), InputError);
 }
 
-TEST(Identity, a_mesh_that_changes_is_hashed_again) {
+TEST(Identity, changed_mesh_is_hashed_again) {
   const Folder folder;
   const auto job = folder.write("a.json", job_with("m.msh", ""));
   folder.write("m.msh", "first");
@@ -103,7 +103,7 @@ TEST(Identity, a_mesh_that_changes_is_hashed_again) {
   EXPECT_NE(maker.make(job::read_job(job, job::BankKey::optional)).input_sha256, before);
 }
 
-TEST(Identity, hashes_are_those_of_sha256sum) {
+TEST(Identity, hashes_equal_sha256sum) {
   // printf abc | sha256sum, FIPS 180-4 appendix B.1; printf '' | sha256sum.
   EXPECT_EQ(store::hash_text("abc").text(), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
   EXPECT_EQ(store::hash_text("").text(), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
@@ -113,7 +113,7 @@ TEST(Identity, hashes_are_those_of_sha256sum) {
   EXPECT_EQ(store::hash_file(folder.write("large", large), "mesh"), store::hash_text(large));
 }
 
-TEST(Identity, what_is_no_file_is_refused_and_not_waited_for) {
+TEST(Identity, pipes_and_missing_files_are_refused) {
   const Folder folder;
   ASSERT_EQ(::mkfifo((folder / "pipe.msh").c_str(), 0600), 0);
   std::filesystem::create_symlink("loop.msh", folder / "loop.msh");
@@ -134,7 +134,7 @@ TEST(Identity, what_is_no_file_is_refused_and_not_waited_for) {
   }
 }
 
-TEST(Identity, work_is_a_job_that_runs_from_the_copies_in_the_store) {
+TEST(Identity, work_uses_the_inputs_in_the_store) {
   const Folder folder;
   folder.write("m.msh", "$MeshFormat\n");
   const store::Store store = store::Store::open(folder / "store");
@@ -156,7 +156,7 @@ TEST(Identity, work_is_a_job_that_runs_from_the_copies_in_the_store) {
   EXPECT_TRUE(std::filesystem::is_empty(folder / "store/tmp"));
 }
 
-TEST(Identity, an_input_that_is_no_longer_what_was_hashed_is_refused) {
+TEST(Identity, input_changed_after_hashing_is_refused) {
   const Folder folder;
   folder.write("m.msh", "before");
   const store::Store store = store::Store::open(folder / "store");

@@ -1,4 +1,4 @@
-// What tests of the ids of banks and of simulations share.
+// Helpers for tests of ids.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ inline constexpr const char* kMaterial =
     R"("material": {"young_modulus_pa": 7e10, "poisson_ratio": 0.33, "density_kg_m3": 2700, "damping": {"rayleigh": {"alpha1_s": 1e-7, "alpha2_per_s": 0.5}}})";
 
 using FindId = std::function<std::string(const std::filesystem::path&)>;
-using Case = std::pair<const char*, std::string>;  // what it is, and a job; in expect_same() behind the name of its file and "|"
+using Case = std::pair<const char*, std::string>;  // description and job; in expect_same() with "FILE|" before the job
 
 inline void expect_same(const tests::Folder& folder, const FindId& find_id, const std::string& id, std::span<const Case> cases) {
   for (const auto& [what, text] : cases) {
@@ -29,7 +29,7 @@ inline void expect_same(const tests::Folder& folder, const FindId& find_id, cons
   }
 }
 
-/// All of them have ids of their own, which are given back.
+/// Expects distinct ids, and returns them.
 inline std::set<std::string> expect_different(const tests::Folder& folder, const FindId& find_id, std::span<const Case> cases) {
   std::set<std::string> ids;
   for (const auto& [what, text] : cases) EXPECT_TRUE(ids.insert(find_id(folder.write("a.json", text))).second) << what;

@@ -1,4 +1,4 @@
-// What is part of the id of a simulation and what is not, and the job that is carried out in the store.
+// Parts of ids of simulations, and their jobs in the store.
 #include "jobs/store/order.hpp"
 
 #include <gtest/gtest.h>
@@ -29,7 +29,7 @@ std::string find_order_id(const std::filesystem::path& job, const std::string& s
   return store::RequestMaker(kSolver, simulator).make(store::read_order(job)).id;
 }
 
-TEST(Order, is_the_same_simulation_in_other_words) {
+TEST(Order, equivalent_jobs_have_the_same_id) {
   const Folder folder;
   folder.write("m.msh", "$MeshFormat\n");
   folder.write("elsewhere/deep/other name.msh", "$MeshFormat\n");
@@ -45,7 +45,7 @@ TEST(Order, is_the_same_simulation_in_other_words) {
       folder, [](const auto& job) { return find_order_id(job); }, id, same);
 }
 
-TEST(Order, is_another_simulation_for_all_that_changes_its_files) {
+TEST(Order, changed_jobs_have_other_ids) {
   const Folder folder;
   folder.write("m.msh", "$MeshFormat\n");
   folder.write("n.msh", "$MeshFormat \n");
@@ -67,7 +67,7 @@ TEST(Order, is_another_simulation_for_all_that_changes_its_files) {
   EXPECT_TRUE(ids.insert(find_order_id(folder.write("a.json", simulation_of("m.msh")), "carillon-simulate 0.2.0 (abc)")).second);
 }
 
-TEST(Order, work_is_a_simulation_of_the_copies_in_the_store) {
+TEST(Order, work_uses_the_inputs_in_the_store) {
   const Folder folder;
   folder.write("m.msh", "$MeshFormat\n");
   const store::Store store = store::Store::open(folder / "store");
@@ -78,7 +78,7 @@ TEST(Order, work_is_a_simulation_of_the_copies_in_the_store) {
   folder.write("m.msh", "something else by now");
   const store::Id id = store::require_id(request.id, "test");
   const std::filesystem::path work = store.work_folder(id);
-  EXPECT_EQ(store::find_job_fault(store, id, work), std::nullopt);
+  EXPECT_EQ(store::find_job_fault(store, id), std::nullopt);
   const std::string text = tests::read_all(work / store::kJobFile);
   const job::SimulationSpec inner = job::parse_simulation(text, work / store::kJobFile);
   EXPECT_EQ(inner.duration_s, 0.25);
@@ -87,15 +87,15 @@ TEST(Order, work_is_a_simulation_of_the_copies_in_the_store) {
   EXPECT_EQ(inner.sound, work / "sound.wav");
   EXPECT_EQ(inner.record, work / store::kRecordFile);
   EXPECT_TRUE(inner.motion.empty());
-  // Made again from the request alone: to the byte.
+  // Rebuilt from the request: bitwise equal.
   store.remove_work(id);
   EXPECT_TRUE(store::restore_work(store, request));
   EXPECT_EQ(tests::read_all(work / store::kJobFile), text);
-  // One digit of the job in the store is another simulation.
+  // A changed digit is detected.
   std::string changed = text;
   changed.replace(changed.find("0.25"), 4, "0.24");
   folder.write(work.lexically_relative(folder / "").string() + "/" + store::kJobFile, changed);
-  EXPECT_NE(store::find_job_fault(store, id, work), std::nullopt);
+  EXPECT_NE(store::find_job_fault(store, id), std::nullopt);
 }
 
 TEST(Order, a_record_belongs_to_the_bytes_of_a_job) {
@@ -108,7 +108,7 @@ TEST(Order, a_record_belongs_to_the_bytes_of_a_job) {
     EXPECT_NE(store::find_record_fault(broken, "a"), std::nullopt) << broken;
 }
 
-TEST(Order, that_is_no_simulation_to_keep_is_refused_with_its_line) {
+TEST(Order, invalid_jobs_are_refused_with_their_line) {
   const Folder folder;
   folder.write("m.msh", "$MeshFormat\n");
   EXPECT_THROW(store::read_order(folder.write("a.json", simulation_of("m.msh", "", ""))), InputError);

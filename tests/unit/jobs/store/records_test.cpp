@@ -11,7 +11,7 @@ namespace {
 using namespace carillon;
 using carillon::tests::Folder;
 
-TEST(Records, only_64_lower_case_hex_digits_are_an_id) {
+TEST(Records, ids_are_64_lower_case_hex_digits) {
   const std::string good(64, 'a');
   EXPECT_TRUE(store::parse_id(good));
   for (const std::string& bad :
@@ -20,7 +20,7 @@ TEST(Records, only_64_lower_case_hex_digits_are_an_id) {
     EXPECT_FALSE(store::parse_id(bad)) << bad;
 }
 
-TEST(Records, paths_of_any_bytes_come_back_from_text) {
+TEST(Records, round_trip_of_paths_with_any_bytes) {
   for (const std::string& name :
        {std::string("/a/b.json"), std::string("/\xff\xfe/\x80"), std::string("/a\\x41\\y"), std::string("/ä/\xe2\x82\xac"),
         std::string("/\xed\xa0\x80"), std::string("/\xc0\xaf"), std::string("/a\nb\x1b[2J"), std::string("/\xf4\x90\x80\x80")}) {
@@ -30,7 +30,7 @@ TEST(Records, paths_of_any_bytes_come_back_from_text) {
   EXPECT_EQ(store::to_text("/ä"), "/ä");
 }
 
-TEST(Records, a_request_and_a_state_are_read_as_they_were_written) {
+TEST(Records, round_trip_of_request_and_state) {
   const Folder folder;
   store::Request request;
   request.id = std::string(64, 'b');
@@ -58,7 +58,7 @@ TEST(Records, a_request_and_a_state_are_read_as_they_were_written) {
   EXPECT_EQ(store::format_request(request, true).find('\n'), store::format_request(request, true).size() - 1);
 }
 
-TEST(Records, a_record_cut_at_any_byte_is_an_error_and_no_crash) {
+TEST(Records, truncated_record_is_an_error) {
   const Folder folder;
   store::Request request;
   request.id = std::string(64, 'b');
@@ -73,7 +73,7 @@ TEST(Records, a_record_cut_at_any_byte_is_an_error_and_no_crash) {
   EXPECT_FALSE(store::read_state(folder.path()));
 }
 
-TEST(Records, progress_is_the_last_whole_line) {
+TEST(Records, progress_is_the_last_complete_line) {
   const Folder folder;
   EXPECT_FALSE(store::read_progress(folder.path()));
   const std::string first = R"({"phase": "solve", "percent": 40, "modes_done": 3, "modes_wanted": 9, "seconds_left": 2.5, "seconds": 7})";
@@ -95,7 +95,7 @@ TEST(Records, progress_is_the_last_whole_line) {
   ASSERT_TRUE(store::read_progress(folder.path()));
 }
 
-TEST(Warnings, of_many_jobs_are_few_lines) {
+TEST(Warnings, warnings_are_grouped) {
   store::WarningKinds kinds;
   for (int i = 0; i < 200; ++i) {
     const std::string job = "bar-" + std::to_string(i) + ".json";

@@ -9,7 +9,6 @@
 #include <cstring>
 #include <fstream>
 #include <functional>
-#include <iterator>
 
 #include "jobs/store/files.hpp"
 #include "runtime/base/file.hpp"
@@ -30,10 +29,10 @@ unsigned mode_of(const fs::path& path) {
   return ::stat(path.c_str(), &info) == 0 ? info.st_mode & 07777U : 0;
 }
 
-TEST(Store, a_bank_is_published_whole_and_read_only) {
+TEST(Store, published_bank_is_complete_and_read_only) {
   const Folder folder;
   const store::Store store = store::Store::open(folder / "store");
-  const store::Temporary made = store.make_temporary();
+  store::Temporary made = store.make_temporary();
   write_bank(made.path(), "bank");
   fs::create_directory(made / "pictures");
   std::ofstream(made / "pictures/a.png") << "png";
@@ -49,18 +48,18 @@ TEST(Store, a_bank_is_published_whole_and_read_only) {
   EXPECT_TRUE(fs::is_empty(folder / "store/tmp"));
 }
 
-TEST(Store, the_second_of_two_publications_is_no_error_and_changes_nothing) {
+TEST(Store, second_publication_changes_nothing) {
   const Folder folder;
   const store::Store store = store::Store::open(folder / "store");
   for (const char* text : {"first", "second"}) {
-    const store::Temporary made = store.make_temporary();
+    store::Temporary made = store.make_temporary();
     write_bank(made.path(), text);
     EXPECT_EQ(store.publish(kId, made), std::string(text) == "first");
   }
   EXPECT_EQ(tests::read_all(store.bank_folder(kId) / store::kBankFile), "first");
 }
 
-TEST(Store, of_eight_processes_that_publish_at_once_one_wins_and_nothing_is_left) {
+TEST(Store, concurrent_publications_by_eight_processes) {
   const Folder folder;
   const store::Store store = store::Store::open(folder / "store");
   std::vector<pid_t> children;
@@ -69,7 +68,7 @@ TEST(Store, of_eight_processes_that_publish_at_once_one_wins_and_nothing_is_left
     if (child == 0) {
       int won = 0;
       for (int round = 0; round < 20; ++round) {
-        const store::Temporary made = store.make_temporary();
+        store::Temporary made = store.make_temporary();
         write_bank(made.path(), std::string(1000, static_cast<char>('a' + n)));
         won += store.publish(*store::parse_id(std::string(62, 'c') + (round < 10 ? "0" : "1") + std::to_string(round % 10)), made) ? 1 : 0;
       }
@@ -93,19 +92,7 @@ TEST(Store, of_eight_processes_that_publish_at_once_one_wins_and_nothing_is_left
   EXPECT_TRUE(fs::is_empty(folder / "store/tmp"));
 }
 
-TEST(Store, a_file_with_another_name_elsewhere_stays_writable_there) {
-  const Folder folder;
-  const store::Store store = store::Store::open(folder / "store");
-  const store::Temporary made = store.make_temporary();
-  folder.write("log", "text");
-  write_bank(made.path(), "bank");
-  fs::create_hard_link(folder / "log", made / "log");
-  EXPECT_TRUE(store.publish(kId, made));
-  EXPECT_NE(mode_of(folder / "log") & 0200U, 0u);
-  EXPECT_EQ(tests::read_all(store.bank_folder(kId) / "log"), "text");
-}
-
-TEST(Store, another_folder_is_not_taken_for_a_store) {
+TEST(Store, other_folders_are_refused) {
   const Folder folder;
   folder.write("home/letter.txt", "dear");
   EXPECT_THROW(store::Store::open(folder / "home"), InputError);
@@ -123,15 +110,15 @@ TEST(Store, another_folder_is_not_taken_for_a_store) {
   }
 }
 
-TEST(Store, what_is_no_id_in_its_folders_is_passed_over) {
+TEST(Store, other_names_in_its_folders_are_skipped) {
   const Folder folder;
   const store::Store store = store::Store::open(folder / "store");
   fs::create_directories(folder / "store/banks/aa/not-an-id");
-  fs::create_directories(folder / ("store/banks/bb/" + kId.text()));  // in the wrong place
+  fs::create_directories(folder / ("store/banks/bb/" + kId.text()));  // in the wrong shard
   EXPECT_TRUE(store.list_banks().empty());
 }
 
-TEST(Store, a_store_of_a_group_is_writable_by_it_whatever_the_umask) {
+TEST(Store, group_store_is_writable_with_any_umask) {
   const Folder folder;
   fs::create_directory(folder / "store");
   ::chmod((folder / "store").c_str(), 02775);
@@ -147,49 +134,7 @@ TEST(Store, a_store_of_a_group_is_writable_by_it_whatever_the_umask) {
   EXPECT_EQ(status, 0);
 }
 
-TEST(Store, a_link_in_place_of_a_folder_of_its_own_is_refused) {
-  for (const char* name :
-       {"banks", "inputs", "work", "tmp", "damaged", "slurm", "lock", "VERSION", "submissions.jsonl", "registry.sqlite"}) {
-    const Folder folder;
-    fs::create_directory(folder / "victim");
-    store::Store::open(folder / "store");
-    fs::remove_all(folder / "store" / name);
-    fs::create_symlink(folder / "victim", folder / "store" / name);
-    EXPECT_THROW(store::Store::open(folder / "store"), InputError) << name;
-    EXPECT_TRUE(fs::is_empty(folder / "victim")) << name;
-  }
-}
-
-TEST(Store, folders_that_become_links_after_it_was_opened_are_not_followed) {
-  const std::string digits = kId.text().substr(0, 2);
-  for (const std::string& name : {std::string("banks"), std::string("work"), std::string("tmp"), "banks/" + digits, "work/" + digits,
-                                  "work/" + digits + "/" + kId.text(), "banks/" + digits + "/" + kId.text()}) {
-    const Folder folder;
-    const store::Store store = store::Store::open(folder / "store");
-    folder.write("victim/" + digits + "/" + kId.text() + "/thesis.tex", "important");
-    fs::create_directories((folder / ("store/" + name)).parent_path());
-    fs::remove_all(folder / ("store/" + name));
-    fs::create_symlink(folder / "victim", folder / ("store/" + name));
-    EXPECT_FALSE(name.starts_with("work") && store.has_work(kId)) << name;
-    EXPECT_FALSE(name.starts_with("banks") && store.has_bank_folder(kId)) << name;
-    for (const auto& act :
-         std::vector<std::function<void()>>{[&] { store.remove_work(kId); }, [&] { store.remove_bank(kId); }, [&] { store.open_work(kId); },
-                                            [&] {
-                                              const store::Temporary made = store.make_temporary();
-                                              write_bank(made.path(), "bank");
-                                              store.publish(kId, made);
-                                            }}) {
-      try {
-        act();
-      } catch (const SystemError&) {
-      }
-    }
-    EXPECT_EQ(tests::read_all(folder / ("victim/" + digits + "/" + kId.text() + "/thesis.tex")), "important") << name;
-    EXPECT_EQ(std::distance(fs::recursive_directory_iterator(folder / "victim"), fs::recursive_directory_iterator()), 3) << name;
-  }
-}
-
-TEST(Store, what_is_removed_follows_no_link_inside) {
+TEST(Store, removal_does_not_follow_links) {
   const Folder folder;
   const store::Store store = store::Store::open(folder / "store");
   folder.write("victim/thesis.tex", "important");
@@ -203,11 +148,11 @@ TEST(Store, what_is_removed_follows_no_link_inside) {
   EXPECT_EQ(tests::read_all(folder / "victim/thesis.tex"), "important");
 }
 
-TEST(Store, a_bank_that_is_no_longer_what_was_published_is_found) {
+TEST(Store, damaged_bank_is_detected) {
   const auto spoil = [](const std::function<void(const fs::path&)>& act, store::Look look, bool keeps_time) {
     const Folder folder;
     const store::Store store = store::Store::open(folder / "store");
-    const store::Temporary made = store.make_temporary();
+    store::Temporary made = store.make_temporary();
     write_bank(made.path(), std::string(9000, 'x'));
     EXPECT_TRUE(store.publish(kId, made));
     EXPECT_FALSE(store.find_bank_fault(kId, store::Look::full));
@@ -218,7 +163,7 @@ TEST(Store, a_bank_that_is_no_longer_what_was_published_is_found) {
     act(bank);
     if (keeps_time) fs::last_write_time(bank, time);
     const auto fault = store.find_bank_fault(kId, look);
-    // What a full look has found every later one finds.
+    // A fault found once is found by every later quick look.
     return fault && store.find_bank_fault(kId, store::Look::quick);
   };
   const auto flip = [](const fs::path& bank) {
@@ -234,7 +179,7 @@ TEST(Store, a_bank_that_is_no_longer_what_was_published_is_found) {
   EXPECT_TRUE(spoil(flip, store::Look::full, true));
 }
 
-TEST(Store, a_quota_that_is_full_is_a_full_disk) {
+TEST(Store, full_quota_is_a_full_disk) {
   for (const int error : {ENOSPC, EDQUOT}) {
     EXPECT_TRUE(base::is_full_error(error));
     try {
@@ -249,10 +194,10 @@ TEST(Store, a_quota_that_is_full_is_a_full_disk) {
   EXPECT_FALSE(base::is_full_error(EACCES));
   const Folder folder;
   EXPECT_EQ(store::is_disk_full(folder.path(), SystemError(std::strerror(ENOSPC))),
-            store::is_disk_full(folder.path()));  // words decide nothing
+            store::is_disk_full(folder.path()));  // only the type counts
 }
 
-TEST(Store, a_file_system_without_locks_and_a_limit_of_files_are_named) {
+TEST(Store, messages_for_missing_locks_and_file_size_limits) {
   for (const auto& [error, words] : {std::pair{ENOLCK, "this file system keeps no locks"}, {EFBIG, "ulimit -f"}}) {
     try {
       store::throw_errno("/some/file", "lock", error);
@@ -264,17 +209,17 @@ TEST(Store, a_file_system_without_locks_and_a_limit_of_files_are_named) {
   }
 }
 
-TEST(Store, names_of_temporary_folders_are_known_again) {
+TEST(Store, names_of_temporary_folders) {
   const Folder folder;
   const store::Store store = store::Store::open(folder / "store");
-  const store::Temporary made = store.make_temporary();
+  store::Temporary made = store.make_temporary();
   for (const auto& entry : fs::directory_iterator(folder / "store/tmp"))
     EXPECT_TRUE(store::Store::is_temporary_name(entry.path().filename().string())) << entry.path();
   for (const char* name : {"thesis.tex", ".ssh", "a,b,c,d,e", "host,0-1:2,12,34,0123456789ab,", "host,0-1:2,12,34,0123456789aX", ""})
     EXPECT_FALSE(store::Store::is_temporary_name(name)) << name;
 }
 
-TEST(Store, another_user_without_rights_hears_whose_it_is) {
+TEST(Store, user_without_rights_gets_the_owner) {
   if (::geteuid() != 0) GTEST_SKIP() << "only root becomes another user";
   const Folder folder;
   ::chmod(folder.path().c_str(), 0755);

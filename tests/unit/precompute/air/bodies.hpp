@@ -1,4 +1,4 @@
-// Closed surfaces of bodies, as meshes that face outward.
+// Closed surface meshes of bodies, oriented outward.
 #pragma once
 
 #include <algorithm>
@@ -30,14 +30,14 @@ inline double calc_volume(const Skin& skin) {
   return volume;
 }
 
-/// Turns the triangles round if they face inward.
+/// Reverses the triangles if they face inward.
 inline Skin face_outward(Skin skin) {
   if (calc_volume(skin) < 0.0)
     for (Triangle& t : skin.triangles) std::swap(t[1], t[2]);
   return skin;
 }
 
-/// Joins nodes at one place, to 1e-9.
+/// Merges nodes at the same position, to 1e-9.
 class Joiner {
  public:
   std::int32_t add(const Vec3& place) {
@@ -52,7 +52,7 @@ class Joiner {
   std::map<std::array<std::int64_t, 3>, std::int32_t> numbers_;
 };
 
-/// An icosahedron of 10 n^2 + 2 nodes on a sphere; its volume is that of the ball of this radius.
+/// An icosahedron of 10 n^2 + 2 nodes on a sphere, scaled to the volume of the ball of this radius.
 inline Skin make_ball(int n, double radius_m) {
   const double g = std::numbers::phi;
   const std::array<Vec3, 12> corners{Vec3{-1, g, 0},  Vec3{1, g, 0},  Vec3{-1, -g, 0}, Vec3{1, -g, 0}, Vec3{0, -1, g},  Vec3{0, 1, g},
@@ -79,7 +79,7 @@ inline Skin make_ball(int n, double radius_m) {
   return skin;
 }
 
-/// A box around the origin, each side in equal cells of two triangles.
+/// A box around the origin with equal cells of two triangles.
 inline Skin make_box(const Vec3& size_m, const std::array<int, 3>& cells) {
   Joiner joiner;
   Skin skin;
@@ -111,10 +111,10 @@ inline Skin make_box(const Vec3& size_m, const std::array<int, 3>& cells) {
   return skin;
 }
 
-/// A place on a meridian: distance from the axis, height.
+/// A point of a meridian: distance from the axis, height.
 using Place = std::array<double, 2>;
 
-/// Puts places between those of a meridian, about `spacing_m` apart.
+/// Inserts points into a meridian at a spacing of about `spacing_m`.
 inline std::vector<Place> divide(const std::vector<Place>& corners, double spacing_m) {
   std::vector<Place> divided{corners[0]};
   for (std::size_t i = 1; i < corners.size(); ++i) {
@@ -128,7 +128,7 @@ inline std::vector<Place> divide(const std::vector<Place>& corners, double spaci
   return divided;
 }
 
-/// The surface that a meridian sweeps around the z axis, on which it begins and ends; nodes of a ring are about `spacing_m` apart.
+/// Surface of revolution of a meridian around the z axis, where it begins and ends; ring nodes are about `spacing_m` apart.
 inline Skin revolve(const std::vector<Place>& meridian, double spacing_m) {
   Skin skin;
   std::vector<std::vector<std::int32_t>> rings;
@@ -178,7 +178,7 @@ inline Skin make_bowl(double wall_m, double spacing_m) {
   return revolve(meridian, spacing_m);
 }
 
-/// A bell of height 1 and mouth radius 0.55 with a wall that becomes thicker towards the lip.
+/// A bell of height 1 and mouth radius 0.55 whose wall thickens towards the lip.
 inline std::vector<Place> get_bell_outside() {
   return {{0.0, 1.0}, {0.17, 0.99}, {0.27, 0.93}, {0.31, 0.8}, {0.34, 0.6}, {0.38, 0.4}, {0.44, 0.2}, {0.55, 0.0}};
 }
@@ -192,7 +192,7 @@ inline Skin make_bell(double spacing_m) {
   return revolve(divide(meridian, spacing_m), spacing_m);
 }
 
-/// Two skins that do not touch.
+/// Merges two disjoint surfaces.
 inline Skin join(Skin a, const Skin& b, const Vec3& shift_m) {
   const auto offset = static_cast<std::int32_t>(a.nodes_m.size());
   for (const Vec3& node : b.nodes_m) a.nodes_m.push_back(node + shift_m);
@@ -200,7 +200,7 @@ inline Skin join(Skin a, const Skin& b, const Vec3& shift_m) {
   return a;
 }
 
-/// Whether each edge has two triangles that pass it in opposite directions.
+/// True if each edge has two triangles that traverse it in opposite directions.
 inline bool is_closed(const Skin& skin) {
   std::map<std::pair<std::int32_t, std::int32_t>, int> passes;
   for (const Triangle& t : skin.triangles)

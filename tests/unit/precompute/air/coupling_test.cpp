@@ -1,4 +1,4 @@
-// The eigenproblem of modes with the mass of the air between them.
+// Eigenproblem of modes coupled by the mass matrix of the air.
 #include "precompute/air/coupling.hpp"
 
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@
 namespace carillon::air {
 namespace {
 
-/// B B^T / n of random numbers, times a size: symmetric, positive.
+/// Scaled B B^T / n of random numbers: symmetric positive.
 std::vector<double> make_mass(std::size_t n, double size, unsigned seed) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
@@ -42,7 +42,7 @@ double calc_product(const std::vector<double>& a, const std::vector<double>& b, 
 
 std::vector<double> make_wave_numbers(std::size_t n) {
   std::vector<double> waves;
-  for (std::size_t i = 0; i < n; ++i) waves.push_back(1.0 + 0.07 * static_cast<double>((5 * i) % n));  // in no order
+  for (std::size_t i = 0; i < n; ++i) waves.push_back(1.0 + 0.07 * static_cast<double>((5 * i) % n));  // unordered
   return waves;
 }
 
@@ -74,7 +74,7 @@ TEST(couple_modes, leaves_each_mode_its_number_where_the_air_is_light) {
     const std::vector<double> q = spread(mixtures[m], n);
     EXPECT_NEAR(q[m], 1.0, 1e-3);
     EXPECT_NEAR(mixtures[m].wave_number_1_m * std::sqrt(1.0 + mass[m * n + m]) / waves[m], 1.0, 1e-5);
-    // Perturbation: k_m^2 M_im / (k_i^2 - k_m^2), of the second order in M beyond it.
+    // Perturbation: k_m^2 M_im / (k_i^2 - k_m^2), with an error of second order in M.
     for (std::size_t i = 0; i < n; ++i)
       if (i != m && q[i] != 0.0) {
         EXPECT_NEAR(q[i], waves[m] * waves[m] * mass[i * n + m] / (waves[i] * waves[i] - waves[m] * waves[m]), 1e-4);
@@ -116,7 +116,7 @@ TEST(follow_mode, finds_the_mode_that_was_near) {
 }
 
 TEST(follow_mode, keeps_two_modes_of_one_frequency_apart) {
-  // As of a square plate: any turn of the two is as good, and both are to stay a basis whatever rounding does.
+  // Like a square plate: any rotation of the pair is valid, and both must stay a basis despite rounding.
   const std::vector<double> waves{1.0, 1.0, 1.3};
   const std::vector<double> mass{0.3, 0.0, 0.0, 0.0, 0.3, 0.0, 0.0, 0.0, 0.1};
   std::vector<double> noisy = mass;
@@ -133,7 +133,7 @@ TEST(follow_mode, keeps_two_modes_of_one_frequency_apart) {
 }
 
 TEST(follow_mode, lets_a_rigid_motion_yield) {
-  // lambda = 0 of the second: its part is - M_01 / (1 + M_11), and the mass of the first the less.
+  // lambda = 0 of the second: its part is - M_01 / (1 + M_11), which reduces the mass of the first.
   const std::vector<double> waves{2.0, 0.0}, mass{0.5, 0.3, 0.3, 0.6};
   const Mixture found = follow_mode(waves, mass, {.motions = {0, 6}, .parts = {1.0, 0.0}, .wave_number_1_m = 1.6, .added_mass = 0.5});
   EXPECT_NEAR(found.parts[1] / found.parts[0], -0.3 / 1.6, 1e-12);

@@ -1,4 +1,4 @@
-// Fields with known solutions, and the way from a surface to what it sends out.
+// Fields with known solutions, and the path from surface velocity to multipoles.
 #pragma once
 
 #include <algorithm>
@@ -34,7 +34,7 @@ inline double calc_harmonic(int l, int m, const Vec3& u) {
   return m == 0 ? value : std::numbers::sqrt2 * value * (m > 0 ? std::cos(order * around) : std::sin(order * around));
 }
 
-/// Directions spread evenly over a sphere.
+/// Directions distributed evenly over a sphere.
 inline std::vector<Vec3> spread_directions(int count) {
   std::vector<Vec3> directions;
   for (int i = 0; i < count; ++i) {
@@ -58,7 +58,7 @@ inline Complex evaluate(std::span<const Complex> coefficients, int order, double
 
 inline double to_db(double ratio) { return 20.0 * std::log10(std::max(ratio, 1e-30)); }
 
-/// (T, 3, n) from `find`(place, normal of the facet, number).
+/// (T, 3, n) from `find`(position, normal of the facet, number).
 template <typename Find>
 std::vector<float> sample_corners(const RadiatingSurface& surface, std::size_t count, const Find& find) {
   std::vector<float> velocity;
@@ -68,7 +68,7 @@ std::vector<float> sample_corners(const RadiatingSurface& surface, std::size_t c
   return velocity;
 }
 
-/// Pressures (N, n) for n velocities at one wave number, their coefficients (n, (order + 1)^2), and what the iteration took.
+/// Pressures (N, n) for n velocities at one wave number, their coefficients (n, (order + 1)^2), and the iteration counts.
 struct Outcome {
   std::vector<std::complex<float>> pressure;
   std::vector<Complex> expansion;

@@ -1,4 +1,4 @@
-// GMRES for many sides against dense factorisation.
+// GMRES with many right-hand sides against dense factorisation.
 #include "precompute/air/gmres.hpp"
 
 #include <gtest/gtest.h>
@@ -48,12 +48,12 @@ Multiply make_multiply(const Matrix& matrix, int* products = nullptr) {
   };
 }
 
-/// The identity and a part whose spectrum fills a disc of this radius around it.
+/// Identity plus a matrix whose spectrum fills a disc of this radius.
 Matrix make_system(Eigen::Index size, double radius, unsigned seed) {
   return Matrix::Identity(size, size) + radius / std::sqrt(2.0 * static_cast<double>(size)) * make_random(size, size, seed);
 }
 
-/// The largest error of a side relative to its solution.
+/// Largest error of a side relative to its solution.
 double find_worst(const Matrix& found, const Matrix& wanted) {
   double worst = 0.0;
   for (Eigen::Index j = 0; j < wanted.cols(); ++j) worst = std::max(worst, (found.col(j) - wanted.col(j)).norm() / wanted.col(j).norm());
@@ -74,7 +74,7 @@ TEST(gmres, solves_random_systems_as_dense_factors_do) {
       const Matrix found = unpack(solution);
       for (Eigen::Index j = 0; j < sides; ++j) {
         const double residual = (right.col(j) - matrix * found.col(j)).norm() / right.col(j).norm();
-        EXPECT_LE(residual, 1.2e-5);  // of every side, not only of the worst
+        EXPECT_LE(residual, 1.2e-5);  // of every side, not only the largest
       }
       // |x - x'| <= |A^-1| |r|
       const double condition = matrix.jacobiSvd().singularValues()(0) / matrix.jacobiSvd().singularValues()(size - 1);
@@ -83,7 +83,7 @@ TEST(gmres, solves_random_systems_as_dense_factors_do) {
 }
 
 TEST(gmres, solves_sides_of_different_difficulty_each_to_the_tolerance) {
-  // A diagonal matrix: a side that meets few eigenvalues is done after few products, and must stay so.
+  // A diagonal matrix: a right-hand side with few eigenvectors converges after few products and must stay converged.
   const Eigen::Index size = 60;
   Matrix matrix = Matrix::Zero(size, size), right = Matrix::Zero(size, 4);
   for (Eigen::Index i = 0; i < size; ++i) matrix(i, i) = std::complex<double>(1.0 + 0.05 * static_cast<double>(i), 0.3);
@@ -141,7 +141,7 @@ TEST(gmres, begins_with_a_guess) {
 }
 
 TEST(gmres, ends_without_convergence_where_there_is_no_solution) {
-  // Singular, and the right side has a part that no x reaches.
+  // Singular, with a right-hand side outside the range.
   Matrix matrix = make_system(40, 0.5, 8);
   matrix.row(39) = matrix.row(38);
   const Matrix right = make_random(40, 2, 9);
@@ -151,7 +151,7 @@ TEST(gmres, ends_without_convergence_where_there_is_no_solution) {
   EXPECT_FALSE(result.is_converged);
   EXPECT_GT(result.residual, 1e-3);
   EXPECT_LE(result.products, 152);
-  // One that maps all to zero.
+  // The zero matrix.
   const Matrix zero = Matrix::Zero(40, 40);
   Sides other(40, 2);
   EXPECT_FALSE(solve_gmres(make_multiply(zero), pack(right), {.tolerance = 1e-5, .max_products = 20}, other).is_converged);

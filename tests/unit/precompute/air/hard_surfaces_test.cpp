@@ -1,4 +1,4 @@
-// Surfaces and wave numbers that are hard for boundary elements.
+// Difficult surfaces and wave numbers for boundary elements.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -22,7 +22,7 @@ using testing::Outcome;
 using testing::Skin;
 using testing::to_db;
 
-/// Velocity z of the unit normal from the middle of the ball that a place is on.
+/// z component of the unit normal of the ball that contains a point.
 Outcome solve_rigid(const RadiatingSurface& surface, double k) {
   const BoundaryEquations equations(
       surface, find_enclosing_sphere(surface.get_nodes()),
@@ -30,7 +30,7 @@ Outcome solve_rigid(const RadiatingSurface& surface, double k) {
   return testing::solve(equations, k);
 }
 
-/// Error far away of a ball of radius 1 that moves along z, in dB.
+/// Far-field error of a ball of radius 1 that moves along z, in dB.
 double find_error_db(const Outcome& outcome, double k) {
   const Complex wanted = std::sqrt(4.0 * std::numbers::pi / 3.0) / (k * calc_hankel_slope(1, k));
   double error = 0.0;
@@ -38,7 +38,7 @@ double find_error_db(const Outcome& outcome, double k) {
   return to_db(std::sqrt(error) / std::abs(wanted));
 }
 
-/// Puts a node on the edge of corners 0 and 1 of the first triangle, `share` of it from its begin: two triangles become four.
+/// Inserts a node on the edge of corners 0 and 1 of the first triangle at the fraction `share`: two triangles become four.
 Skin split_edge(Skin skin, double share) {
   const auto [a, b, c] = skin.triangles[0];
   const auto node = static_cast<std::int32_t>(skin.nodes_m.size());
@@ -59,7 +59,7 @@ Skin split_edge(Skin skin, double share) {
   return skin;
 }
 
-/// Puts a node into the first triangle at `hat`: one triangle becomes three.
+/// Inserts a node into the first triangle at `hat`: one triangle becomes three.
 Skin split_triangle(Skin skin, const Vec3& hat) {
   const auto [a, b, c] = skin.triangles[0];
   const auto node = static_cast<std::int32_t>(skin.nodes_m.size());
@@ -92,8 +92,8 @@ TEST(hard_surfaces, needles_and_slivers_change_nothing) {
 }
 
 TEST(hard_surfaces, two_balls_radiate_as_their_images_say) {
-  // Two equal balls, each pulsating: at ka -> 0 the flow of both. Each field scatters at the other; the plane between them is rigid, so
-  // that one ball near a rigid plane is the same. The total power at low k is that of both flows at one place: four times that of one.
+  // Two equal pulsating balls: at ka -> 0 the sum of both fluxes. Each field scatters at the other ball; the mid-plane is rigid, which
+  // equals one ball near a rigid plane. The total power at low k is that of both fluxes at one point: four times that of one.
   const double gap = 0.5, k = 0.02;
   const Skin ball = make_ball(5, 1.0), both = testing::join(ball, ball, {2.0 + gap, 0.0, 0.0});
   ASSERT_TRUE(testing::is_closed(both));
@@ -110,9 +110,9 @@ TEST(hard_surfaces, two_balls_radiate_as_their_images_say) {
   std::array<double, 2> power{};
   for (std::size_t side = 0; side < 2; ++side)
     for (const Complex& c : outcome.get_coefficients(side)) power[side] += std::norm(c);
-  // sin(kd) / kd of the distance d and k^2 a^2 change that by less than 1e-3.
+  // sin(kd) / kd at the distance d and k^2 a^2 change that by less than 1e-3.
   EXPECT_NEAR(power[0] / power[1], 4.0, 0.01);
-  // The flow itself: |c_00| = k Q / sqrt(4 pi).
+  // The flux itself: |c_00| = k Q / sqrt(4 pi).
   EXPECT_NEAR(std::abs(outcome.get_coefficients(0)[0]) * std::sqrt(4.0 * std::numbers::pi) / (k * surface.calc_area_m2()), 1.0, 0.01);
 }
 

@@ -1,4 +1,4 @@
-// Monopoles and dipoles inside a body as the data, the air outside against their field: no closed form of the body is needed.
+// Monopoles and dipoles inside a body as exact exterior fields: no closed form of the body is needed.
 #include <gtest/gtest.h>
 
 #include <vector>
@@ -19,7 +19,7 @@ using testing::Skin;
 using testing::Sources;
 using testing::spread_wave_numbers;
 
-/// At twelve wave numbers from low to high.
+/// Twelve wave numbers from low to high.
 void expect_exact(const char* name, const Skin& skin, const Sources& sources, double low, double high, int most_products) {
   ASSERT_TRUE(testing::is_closed(skin));
   ASSERT_GT(testing::calc_volume(skin), 0.0);

@@ -37,10 +37,10 @@ Plate make_plate(const Corners& corners) {
 
 Vec3 find_place(const Corners& corners, const Vec3& hat) { return hat[0] * corners[0] + hat[1] * corners[1] + hat[2] * corners[2]; }
 
-/// The integrals over the part of a plate between three barycentric places, by seven points, halved until halving changes nothing.
+/// Integrals over the part of a triangle between three barycentric points, by seven points, subdivided to convergence.
 class Quadrature {
  public:
-  /// `count`: how many of the integrals, from the first; the others are left 0.
+  /// `count`: number of integrals computed, from the first; the others are 0.
   Quadrature(const Plate& plate, const Vec3& x_m, std::size_t count = 16) : plate_(plate), x_m_(x_m), count_(count) {}
 
   Integrals calc() const {
@@ -88,7 +88,7 @@ class Quadrature {
       found[q] = apply_rule(quarters[q]);
       for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += found[q][i];
     }
-    // The rule is exact to degree five: the error of the quarters is 1/63 of the change.
+    // The rule is exact to degree five: the error after quartering is 1/63 of the change.
     bool is_good = level >= 3;
     for (std::size_t i = 0; i < sum.size(); ++i) {
       const double scale = i < 4 ? plate_.size_m : 1.0;
@@ -120,7 +120,7 @@ Integrals list(const Potentials& found) {
 
 Potentials calc(const Plate& plate, const Vec3& x_m) { return calc_potentials(plate.corners, plate.normal, plate.curl, x_m); }
 
-/// The largest difference of any integral, relative to the largest of its kind.
+/// Largest difference of any integral, relative to the largest of its kind.
 double compare(const Plate& plate, const Vec3& x_m) {
   const Integrals wanted = Quadrature(plate, x_m).calc(), found = list(calc(plate, x_m));
   const auto find_worst = [&](std::size_t first, std::size_t last, double scale) {
@@ -178,7 +178,7 @@ TEST(potentials, are_those_of_quadrature_near_an_edge_and_beyond_its_end) {
 
 TEST(potentials, in_the_plane_are_those_of_quadrature_and_the_normal_parts_vanish) {
   for (const Plate& plate : make_plates()) {
-    for (const Vec3& hat : {Vec3{0.5, 0.3, 0.2}, Vec3{0.1, 0.02, 0.88}}) {  // the gradient has no integral there
+    for (const Vec3& hat : {Vec3{0.5, 0.3, 0.2}, Vec3{0.1, 0.02, 0.88}}) {  // the gradient is not integrable there
       const Vec3 x = find_place(plate.corners, hat);
       const Potentials found = calc(plate, x);
       const Integrals wanted = Quadrature(plate, x, 4).calc();
@@ -191,7 +191,7 @@ TEST(potentials, in_the_plane_are_those_of_quadrature_and_the_normal_parts_vanis
       for (const double part : calc(plate, x).double_layer) EXPECT_NEAR(part, 0.0, 1e-12);
     }
   }
-  // Exactly in the plane, where coordinates allow it.
+  // Exactly in the plane where the coordinates allow it.
   const Plate flat = make_plates()[0];
   const Potentials inside = calc(flat, {0.25, 0.25, 0.0});
   for (std::size_t c = 0; c < 3; ++c) {
@@ -235,7 +235,7 @@ TEST(potentials, of_a_constant_double_layer_are_the_solid_angle) {
 
 TEST(potentials, of_needles_are_those_of_quadrature) {
   for (const double width : {1e-1, 1e-2, 1e-3}) {
-    for (const double lean : {0.0, 0.5}) {  // a needle with one short edge, and a flat one whose edges are all long
+    for (const double lean : {0.0, 0.5}) {  // a needle with one short edge, and a flat triangle with three long edges
       const Plate plate = make_plate({Vec3{0, 0, 0}, Vec3{1, 0, 0}, Vec3{lean, width, 0}});
       for (const Vec3& x : {Vec3{0.5, 0.3 * width, 0.01}, Vec3{0.3, 0.5, 0.2}, Vec3{0.4, 0.4 * width, 1e-3}, Vec3{1.5, 0.01, 0.0},
                             Vec3{-0.01, width, 0.0}, Vec3{0.7, -0.02, -0.005}})

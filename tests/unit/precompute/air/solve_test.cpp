@@ -1,4 +1,4 @@
-// The air of a whole body on any number of ranks: the same bits, resumed runs, the error of interpolation, reactions.
+// Air of a whole body on any number of ranks: bit equality, resumed runs, interpolation error, reactions.
 #include "precompute/air/solve.hpp"
 
 #include <gtest/gtest.h>
@@ -45,7 +45,7 @@ Radiator make_radiator(const Skin& skin, const std::vector<double>& wave_numbers
   return radiator;
 }
 
-/// A ball of radius 1 whose modes are sums of harmonics, no two the same.
+/// A ball of radius 1 with distinct modes that are sums of harmonics.
 Radiator make_ringing_ball(int divisions, std::size_t modes, double low, double high) {
   std::vector<double> wave_numbers;
   for (std::size_t m = 0; m < modes; ++m)
@@ -65,17 +65,17 @@ AirSolveOptions make_options(double step, double error_db = -40.0) {
   return options;
 }
 
-/// Ranks share a wave number where its matrix takes more.
+/// Ranks share a wave number above this matrix size.
 AirSolveOptions limit_memory(double matrix_bytes) {
   AirSolveOptions options;
   options.matrix_bytes = matrix_bytes;
   return options;
 }
 
-/// As of an air that is no small part of the mass.
+/// Air whose mass is comparable to the modal mass.
 double calc_shifted(double k, const Sounding& sounding) { return k / std::sqrt(1.0 - 0.4 * sounding.reaction.real()); }
 
-/// Only rank 0 has it.
+/// Set on rank 0 only.
 Radiator keep_on_root(const Radiator& radiator) { return tests::get_rank() == 0 ? radiator : Radiator{}; }
 
 bool are_same(const Sounding& a, const Sounding& b) {
@@ -95,11 +95,11 @@ void expect_same(const AirSolution& found, const AirSolution& wanted, const std:
   EXPECT_EQ(found.reciprocity, wanted.reciprocity) << what;
 }
 
-/// Keeps what a run saves, in its order, and gives it to the next.
+/// Records answers in order and replays them to the next run.
 struct Notes {
   std::vector<WaveAnswer> saved, given;
   int reports = 0;
-  int most_saved = std::numeric_limits<int>::max();  // then asks to stop
+  int most_saved = std::numeric_limits<int>::max();  // then requests a stop
 
   Keeper make_keeper() {
     return {.read = [this] { return given; },
@@ -110,7 +110,7 @@ struct Notes {
 };
 
 TEST(solve_air, has_the_same_bits_on_any_number_of_ranks) {
-  // Three blocks of rows: of four ranks that share a wave number one has none.
+  // Three blocks of rows: with four ranks per wave number one has none.
   const Radiator radiator = make_ringing_ball(6, 18, 1.0, 7.0);
   const AirSolution alone = solve_air(MPI_COMM_SELF, radiator, {});
   ASSERT_LT(alone.wave_numbers, radiator.count_modes());
@@ -133,13 +133,13 @@ TEST(solve_air, of_one_mode_is_shared_by_all_ranks) {
 TEST(solve_air, resumes_with_the_same_bits_and_solves_nothing_twice) {
   const Radiator radiator = make_ringing_ball(4, 40, 1.0, 9.0);
   AirSolveOptions options = make_options(1.0, -45.0);
-  options.shift = calc_shifted;  // so that a wave number is asked for more modes later
+  options.shift = calc_shifted;  // requests more modes at existing wave numbers later
   Notes first;
   const AirSolution whole = solve_air(MPI_COMM_WORLD, keep_on_root(radiator), options, first.make_keeper());
   if (tests::get_rank() == 0) {
     std::set<double> distinct;
     for (const WaveAnswer& answer : first.saved) distinct.insert(answer.k);
-    EXPECT_LT(distinct.size(), first.saved.size());  // some were asked twice
+    EXPECT_LT(distinct.size(), first.saved.size());  // some were requested twice
     EXPECT_EQ(distinct.size(), whole.wave_numbers);
     EXPECT_GT(first.reports, 0);
   }
@@ -147,12 +147,12 @@ TEST(solve_air, resumes_with_the_same_bits_and_solves_nothing_twice) {
   second.given = first.saved;
   expect_same(solve_air(MPI_COMM_WORLD, keep_on_root(radiator), options, second.make_keeper()), whole, "all was kept");
   EXPECT_TRUE(second.saved.empty());
-  // Stopped early and late.
+  // Early and late stops.
   const int all = static_cast<int>(first.saved.size());
   for (const int part : {1, all / 2, all - 1}) {
     Notes stopped, rest;
     stopped.most_saved = part;
-    if (tests::get_rank() != 0) stopped.most_saved = std::numeric_limits<int>::max();  // rank 0 alone is asked
+    if (tests::get_rank() != 0) stopped.most_saved = std::numeric_limits<int>::max();  // only rank 0 is asked
     EXPECT_THROW(solve_air(MPI_COMM_WORLD, keep_on_root(radiator), options, stopped.make_keeper()), SolveStopped);
     rest.given = stopped.saved;
     expect_same(solve_air(MPI_COMM_WORLD, keep_on_root(radiator), options, rest.make_keeper()), whole, "half was kept");
@@ -173,7 +173,7 @@ TEST(solve_air, refuses_on_all_ranks_what_cannot_be) {
   EXPECT_THROW(solve_air(MPI_COMM_WORLD, keep_on_root(bad), {}), SolveError);
 }
 
-/// The larger of the errors far away and at two radii, in dB of the rms of the field over directions.
+/// The larger of the errors in the far field and at two radii, in dB of the rms of the field over directions.
 double find_error_db(const Sounding& found, const Sounding& wanted, double k_radius) {
   double worst = 0.0;
   for (const bool is_far : {false, true}) {
@@ -193,7 +193,7 @@ double find_error_db(const Sounding& found, const Sounding& wanted, double k_rad
 }
 
 TEST(solve_air, states_an_error_of_interpolation_that_holds) {
-  // What GMRES leaves: both solutions are right to 1e-4 of the right side alone.
+  // GMRES error: both solutions are exact to 1e-4 of the right-hand side only.
   constexpr double kFloorDb = -70.0;
   constexpr std::size_t kModes = 100;
   const Radiator radiator = make_ringing_ball(7, kModes, 1.0, 20.0);
@@ -233,9 +233,9 @@ TEST(solve_air, follows_modes_that_the_air_shifts) {
   EXPECT_GT(shifted, 10);
 }
 
-// ---- modes that the air couples ----
+// ---- coupled modes ----
 
-constexpr double kHeavyAir = 0.35;  // of unit modal mass, in a ball of radius 1
+constexpr double kHeavyAir = 0.35;  // relative to unit modal mass, in a ball of radius 1
 
 AirSolveOptions couple(bool has_rows = true) {
   AirSolveOptions options;
@@ -244,7 +244,7 @@ AirSolveOptions couple(bool has_rows = true) {
   return options;
 }
 
-/// The added mass of Y_lm on a ball of radius 1, by Morse and Ingard.
+/// Added mass of Y_lm on a ball of radius 1, by Morse and Ingard.
 double calc_exact_mass(int l, double k) { return -kHeavyAir * (calc_hankel(l, k) / (k * calc_hankel_slope(l, k))).real(); }
 
 /// Two modes that are both sums of Y_10 and Y_20, turned by an angle.
@@ -256,10 +256,11 @@ double find_turned(const Vec3& place, std::size_t m) {
 
 struct ExactMode {
   double k = 0.0;
-  std::array<double, 2> parts{};  // of the two turned modes
+  std::array<double, 2> parts{};  // in the two rotated modes
 };
 
-/// diag(k_i^2) q = k^2 (1 + M(k)) q of the turned modes, with the masses of the closed form at its own k. The one that is most of `motion`.
+/// diag(k_i^2) q = k^2 (1 + M(k)) q of the rotated modes, with closed-form masses at the mode's own k. Returns the mode dominated by
+/// `motion`.
 ExactMode find_exact_mode(const std::array<double, 2>& alone, std::size_t motion) {
   ExactMode mode{.k = alone[motion], .parts = {}};
   for (int step = 0; step < 200; ++step) {
@@ -288,7 +289,7 @@ std::array<double, 2> list_parts(const Mixture& mixture) {
 }
 
 TEST(coupling, of_mixed_harmonics_is_that_of_the_closed_form) {
-  // Far apart, near, and crossing: 1 % of the frequency is less than what the air adds to either.
+  // Far apart, near, and crossing: a difference of 1 % is less than the shift by the air.
   for (const std::array<double, 2>& alone : {std::array{1.0, 1.4}, {1.0, 1.01}, {1.0, 0.97}, {2.2, 2.25}}) {
     const Radiator radiator = make_radiator(make_ball(9, 1.0), {alone[0], alone[1]},
                                             [](const Vec3& place, const Vec3&, std::size_t m) { return find_turned(place, m); });
@@ -302,7 +303,7 @@ TEST(coupling, of_mixed_harmonics_is_that_of_the_closed_form) {
       const std::array<double, 2> parts = list_parts(mode.mixture);
       for (std::size_t i = 0; i < 2; ++i) EXPECT_NEAR(parts[i], wanted.parts[i], 0.01) << alone[1] << ", mode " << m << ", part " << i;
       EXPECT_GT(std::abs(parts[1 - m]), 0.01);
-      // What the mixture sends: its two harmonics, each by the closed form.
+      // The mixture radiates its two harmonics, each in closed form.
       const double k = found.wave_number_1_m[m], c = std::cos(kTurn), s = std::sin(kTurn);
       const std::array<double, 2> moved{c * wanted.parts[0] - s * wanted.parts[1], s * wanted.parts[0] + c * wanted.parts[1]};
       double error = 0.0, all = 0.0;
@@ -323,7 +324,7 @@ TEST(coupling, turns_modes_of_one_frequency_into_those_that_the_air_separates) {
       make_radiator(make_ball(9, 1.0), {1.2, 1.2}, [](const Vec3& place, const Vec3&, std::size_t m) { return find_turned(place, m); });
   const AirSolution found = solve_air(MPI_COMM_WORLD, keep_on_root(radiator), couple());
   if (tests::get_rank() != 0) return;
-  // Y_10 has more air than Y_20: one mode is the one, the other the other.
+  // Y_10 has more added mass than Y_20, so the modes separate.
   for (std::size_t m = 0; m < 2; ++m) {
     const std::array<double, 2> parts = list_parts(found.modes[m].mixture);
     const double one = std::cos(kTurn) * parts[0] - std::sin(kTurn) * parts[1],
@@ -338,7 +339,7 @@ TEST(coupling, turns_modes_of_one_frequency_into_those_that_the_air_separates) {
 }
 
 TEST(coupling, of_a_free_body_keeps_its_momentum_with_the_airs) {
-  // A mode that moves the skin as a shift of the whole body does: the body yields, and the air's mass counts as m / (1 + m).
+  // A mode with the surface motion of a rigid translation: the body recoils, and the added mass acts as m / (1 + m).
   Radiator radiator = make_radiator(make_ball(8, 1.0), {0.7, 0.7},
                                     [](const Vec3& place, const Vec3&, std::size_t) { return calc_harmonic(1, 0, normalise(place)); });
   radiator.wave_number_1_m.pop_back();
@@ -368,7 +369,7 @@ TEST(coupling, conserves_energy_and_unit_mass) {
     }
     const double k = found.wave_number_1_m[m];
     EXPECT_NEAR(squares * (1.0 + mode.mixture.added_mass), 1.0, 1e-9) << m;
-    EXPECT_NEAR(squares - kHeavyAir * mode.reaction.real(), 1.0, 1e-3) << m;  // the air's mass by p v of what moves
+    EXPECT_NEAR(squares - kHeavyAir * mode.reaction.real(), 1.0, 1e-3) << m;  // added mass from p v of the mixture
     EXPECT_NEAR(stiffness / (k * k), 1.0, 1e-4) << m;
     for (std::size_t i = 0; i < mode.coefficient.size(); ++i)
       power += std::norm(mode.coefficient[i] /
@@ -412,14 +413,14 @@ TEST(coupling, costs_nothing_where_it_is_not_called_for) {
   expect_same(found, solve_air(MPI_COMM_SELF, radiator, {}), "not coupled");
   for (const WaveAnswer& answer : notes.saved)
     for (const auto& [mode, one] : answer.modes) EXPECT_TRUE(one.row.empty());
-  // Called for after all: it says so, and has no more than the modes alone.
+  // Coupling was needed but not prepared: lacks_rows, with uncoupled modes only.
   const AirSolution lacking = solve_air(MPI_COMM_WORLD, keep_on_root(radiator), couple(false));
   if (tests::get_rank() == 0) {
     EXPECT_TRUE(lacking.lacks_rows);
   }
 }
 
-// With dp/dn = v the integral of p v is - m / rho - i / k sum |c_lm|^2: m the added mass of a motion with the velocity v.
+// With dp/dn = v the integral of p v is - m / rho - i / k sum |c_lm|^2, m the added mass of a motion with the velocity v.
 
 TEST(reaction, of_a_ball_is_its_added_mass) {
   const std::vector<int> orders{0, 1, 2};

@@ -1,5 +1,5 @@
-// Sources inside a body: its surface moves as their field does, and the air outside must have that field. Holds for every closed surface,
-// at every wave number.
+// Sources inside a body: its surface moves with their field, so the exterior solution must equal that field. Valid for every closed surface
+// and wave number.
 #pragma once
 
 #include <algorithm>
@@ -18,7 +18,7 @@
 
 namespace carillon::air::testing {
 
-/// A monopole and a dipole at one place.
+/// A monopole and a dipole at one point.
 struct Source {
   Vec3 place_m{};
   double monopole = 0.0;
@@ -60,8 +60,8 @@ inline Complex calc_slope(const Sources& sources, double k, const Vec3& x, const
   return sum;
 }
 
-/// (T, 3, 2 n), real and imaginary parts of n slopes dp/dn, which `find` returns in turn for (place, normal, number): on each facet the
-/// linear function nearest to each in the mean square, by seven points.
+/// (T, 3, 2 n), real and imaginary parts of n slopes dp/dn, which `find` returns for (position, normal, number): least-squares linear
+/// function on each facet, by seven points.
 template <typename Find>
 std::vector<float> project(const RadiatingSurface& surface, std::size_t count, const Find& find) {
   const double root = std::sqrt(15.0);
@@ -101,7 +101,7 @@ std::vector<float> project(const RadiatingSurface& surface, std::size_t count, c
   return velocity;
 }
 
-/// What a surface makes of sources at one wave number.
+/// Errors of the exterior solution at one wave number.
 struct SourceErrors {
   double k = 0.0;
   double near_db = 0.0, far_db = 0.0;  // rms over directions at two radii and at a hundred
@@ -110,7 +110,7 @@ struct SourceErrors {
   double nodes_per_wave = 0.0;
 };
 
-/// Of the field of `sources` outside the surface, at several wave numbers; what does not depend on them is integrated once.
+/// For the field of `sources` outside the surface, at several wave numbers; integrals independent of the wave number are done once.
 inline std::vector<SourceErrors> find_source_errors(const RadiatingSurface& surface, const Sources& sources,
                                                     const std::vector<double>& wave_numbers) {
   std::vector<float> velocity = project(surface, wave_numbers.size(), [&](const Vec3& place, const Vec3& normal, std::size_t i) {
@@ -142,7 +142,7 @@ inline std::vector<SourceErrors> find_source_errors(const RadiatingSurface& surf
   return found;
 }
 
-/// `count` wave numbers from low to high, each by the same factor above the one before.
+/// `count` wave numbers in geometric progression.
 inline std::vector<double> spread_wave_numbers(double low, double high, std::size_t count) {
   std::vector<double> wave_numbers;
   for (std::size_t i = 0; i < count; ++i)
@@ -150,8 +150,8 @@ inline std::vector<double> spread_wave_numbers(double low, double high, std::siz
   return wave_numbers;
 }
 
-/// On the middle plane of a plate, closer to each other than to its faces, fading towards the rim of a patch: dipoles across it, as a
-/// plate that bends, and monopoles of the strength `monopole`.
+/// On the mid-plane of a plate, closer to each other than to its faces, tapered towards the rim of a patch: transverse dipoles as in
+/// bending, and monopoles of the strength `monopole`.
 inline Sources fill_plate(double spacing_m, const std::array<int, 2>& count, double monopole) {
   Sources sources;
   const auto [nx, ny] = count;
@@ -165,7 +165,7 @@ inline Sources fill_plate(double spacing_m, const std::array<int, 2>& count, dou
   return sources;
 }
 
-/// Sources on the meridian of a wall, which fade towards its ends.
+/// Sources on the meridian of a wall, tapered towards its ends.
 inline Sources fill_wall(const std::vector<Place>& middle, double spacing_m) {
   Sources sources;
   for (std::size_t i = 0; i < middle.size(); ++i) {
@@ -184,7 +184,7 @@ inline Sources fill_wall(const std::vector<Place>& middle, double spacing_m) {
   return sources;
 }
 
-/// Of make_bowl(): from the lowest point to near the rim.
+/// For make_bowl(): from the lowest point to near the rim.
 inline Sources fill_bowl(double wall_m, double spacing_m) {
   std::vector<Place> middle;
   const int parts = static_cast<int>(std::lround(1.36 / spacing_m));
@@ -195,7 +195,7 @@ inline Sources fill_bowl(double wall_m, double spacing_m) {
   return fill_wall(middle, spacing_m);
 }
 
-/// Of make_bell(): half way between outside and inside.
+/// For make_bell(): half way between outside and inside.
 inline Sources fill_bell(double spacing_m) {
   std::vector<Place> middle;
   const auto outside = get_bell_outside();

@@ -1,4 +1,4 @@
-// Vibrating spheres against the closed form, and expansions against fields that are known.
+// Vibrating spheres against closed forms, and expansions against known fields.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -26,7 +26,7 @@ using testing::Outcome;
 using testing::sample_corners;
 using testing::Spheres;
 
-/// All orders to 8, each by one harmonic: cosines, sines, and those that no meridian cuts.
+/// All orders to 8, one harmonic each: cosines, sines, and zonal ones.
 const std::vector<Harmonic> kHarmonics{{0, 0}, {1, -1}, {2, 1}, {3, 2}, {4, -3}, {5, 0}, {6, 5}, {7, -4}, {8, 3}};
 
 /// 4,002 nodes: fine enough for patterns of order 8.
@@ -48,11 +48,11 @@ TEST(sphere, sends_out_what_the_closed_form_says) {
     EXPECT_LE(outcome.gmres.products, 30) << k;
     for (std::size_t side = 0; side < kHarmonics.size(); ++side) {
       const int l = kHarmonics[side].first;
-      // The finer the pattern, the more of it the facets turn into low orders, which radiate far better: h^2 of order 8 is 1.7 % of the
-      // pressure on the surface, and -31 to -35 dB of that at two radii.
+      // Facets leak fine patterns into low orders, which radiate far better: h^2 of order 8 is 1.7 % of the surface pressure, and -31 to
+      // -35 dB of that at two radii.
       const double limit_db = l <= 5 ? -55.0 : l <= 7 ? -40.0 : -30.0;
       EXPECT_LE(spheres.find_error_db(side, k, 2.0), limit_db) << "k " << k << ", l " << l;
-      // Far away, what single precision leaves of order 0 is louder than an order that hardly radiates.
+      // In the far field, single-precision rounding of order 0 exceeds orders that hardly radiate.
       if (spheres.find_share(side, k) < 1e-2) continue;
       EXPECT_LE(spheres.find_error_db(side, k, 0.0), std::min(limit_db, -40.0)) << "k " << k << ", l " << l;
     }
@@ -73,7 +73,7 @@ TEST(sphere, radiates_the_power_that_the_closed_form_says) {
 }
 
 TEST(sphere, is_no_worse_at_fictitious_frequencies_than_near_them) {
-  // Zeros of j_0 to j_4: wave numbers at which the air inside a soft sphere resonates, and the plain equation has no unique solution.
+  // Zeros of j_0 to j_4: resonances of the interior Dirichlet problem, where the plain equation is not unique.
   const std::vector<double> zeros{std::numbers::pi,  4.493409457909064, 5.763459196894550, 2.0 * std::numbers::pi, 6.987932000500519,
                                   7.725251836937707, 8.182561452571243, 9.095011330476355, 3.0 * std::numbers::pi};
   for (const double k : zeros) {
@@ -111,7 +111,7 @@ TEST(sphere, has_the_pressure_of_the_closed_form_on_its_surface) {
 }
 
 TEST(expansion, finds_the_coefficients_of_waves_about_its_centre) {
-  // A wave h_l Y_lm on a ball that is not at its centre, pressure and slope given: the integrals must give back 1 for (l, m), else 0.
+  // A wave h_l Y_lm on a ball away from its centre, with exact pressure and slope: the integrals must return 1 for (l, m), else 0.
   const RadiatingSurface surface = make_ball(24, 1.0).make_surface();
   const Sphere sphere{.centre_m = {0.15, -0.1, 0.2}, .radius_m = 1.3};
   const double k = 2.0;

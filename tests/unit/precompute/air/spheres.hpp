@@ -19,14 +19,14 @@ namespace carillon::air::testing {
 
 using Harmonic = std::pair<int, int>;  // l, m
 
-/// Pressure over Y_lm far away: e^{ikr} / (i^{l+1} kr) times this.
+/// Far-field pressure over Y_lm: e^{ikr} / (i^{l+1} kr) times this.
 inline Complex find_exact(int l, double k) { return 1.0 / (k * calc_hankel_slope(l, k)); }
 
 /// Power over rho c / 2 times the integral of the squared velocity, which is 1: Re(i h_l / h_l') = 1 / |k h_l'|^2 by the Wronskian.
 inline double find_exact_efficiency(int l, double k) { return std::norm(find_exact(l, k)); }
 
-/// A sphere of radius 1 that moves in every one of some harmonics, solved once at each wave number. Invariant: all harmonics are
-/// right sides of one solve, and each facet has the linear function nearest to its harmonic.
+/// A sphere of radius 1 that vibrates in several harmonics, solved at each wave number. Invariant: all harmonics are right-hand sides of
+/// one solve, with the least-squares linear function on each facet.
 class Spheres {
  public:
   /// 10 n^2 + 2 nodes.
@@ -43,7 +43,7 @@ class Spheres {
     return found->second;
   }
 
-  /// rms error over directions at distance r, or far away (r = 0), in dB of the field.
+  /// rms error over directions at distance r, or in the far field (r = 0), in dB of the field.
   double find_error_db(std::size_t side, double k, double r) {
     const Outcome& outcome = solve(k);
     const auto [l, m] = harmonics_[side];
@@ -59,14 +59,14 @@ class Spheres {
     return to_db(std::sqrt(error) / (weigh(l) * std::abs(find_exact(l, k))));
   }
 
-  /// What all coefficients send out over what the closed form says: the damping by radiation, relative.
+  /// Radiated power of all coefficients over the closed form.
   double find_power_ratio(std::size_t side, double k) {
     double efficiency = 0.0;
     for (const Complex& c : solve(k).get_coefficients(side)) efficiency += std::norm(c);
     return efficiency / find_exact_efficiency(harmonics_[side].first, k);
   }
 
-  /// The amplitude far away over that of order 0 for the same velocity.
+  /// Far-field amplitude over that of order 0 for the same velocity.
   double find_share(std::size_t side, double k) const {
     return std::abs(find_exact(harmonics_[side].first, k)) / std::abs(find_exact(0, k));
   }

@@ -1,4 +1,4 @@
-// Surfaces and the spheres around them.
+// Surfaces and their bounding spheres.
 #include "precompute/air/surface.hpp"
 
 #include <gtest/gtest.h>
@@ -105,7 +105,7 @@ TEST(enclosing_sphere, of_simple_points_is_known) {
   EXPECT_LT(norm(round.centre_m - Vec3{1, 0.5, 0}), 1e-9);
 }
 
-/// The smallest of all spheres with 2, 3 or 4 of the points on them that have all points inside.
+/// Brute force: the smallest sphere through 2, 3 or 4 of the points that contains all.
 double find_radius_by_trial(const std::vector<Vec3>& points) {
   double best = std::numeric_limits<double>::infinity();
   const auto offer = [&](const Vec3& centre, const Vec3& on) {
@@ -159,7 +159,7 @@ TEST(order_by_place, is_a_permutation_with_compact_runs) {
   for (int i = 0; i < 1000; ++i) places.push_back({value(random), value(random), value(random)});
   const std::vector<std::int32_t> order = order_by_place(places, 16);
   EXPECT_EQ(std::set<std::int32_t>(order.begin(), order.end()).size(), places.size());
-  // Sixteen of a thousand places in a unit cube fill a cube of side 0.25, whose diagonal is 0.43.
+  // Sixteen of a thousand points in a unit cube fill a cube of side 0.25, whose diagonal is 0.43.
   double sum = 0.0;
   for (std::size_t first = 0; first < places.size(); first += 16) {
     double widest = 0.0;

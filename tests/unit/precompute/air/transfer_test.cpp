@@ -1,4 +1,4 @@
-// Velocities that go to a coarser surface.
+// Transfer of velocities to a coarser surface.
 #include "precompute/air/transfer.hpp"
 
 #include <gtest/gtest.h>
@@ -33,7 +33,7 @@ double calc_area(const Radiator& radiator, std::size_t t) {
   return 0.5 * norm(cross(radiator.nodes_m[c[1]] - radiator.nodes_m[c[0]], radiator.nodes_m[c[2]] - radiator.nodes_m[c[0]]));
 }
 
-/// The volume that a mode displaces per second, and the same of the size of its velocity.
+/// Volume velocity of a mode, and the integral of its absolute velocity.
 double calc_flow(const Radiator& radiator, std::size_t mode, bool is_of_size = false) {
   double flow = 0.0;
   const std::size_t modes = radiator.count_modes();
@@ -45,7 +45,7 @@ double calc_flow(const Radiator& radiator, std::size_t mode, bool is_of_size = f
   return flow;
 }
 
-/// The largest difference at any corner from what a place should have.
+/// Largest difference at any corner from the expected value.
 template <typename Find>
 double find_worst(const Radiator& radiator, const Find& find) {
   double worst = 0.0;
@@ -77,14 +77,14 @@ TEST(transfer, keeps_the_flow_of_each_mode) {
 TEST(transfer, keeps_constant_and_linear_velocities_on_flat_faces) {
   const auto find = [](const Vec3& place, std::size_t m) { return m == 0 ? 2.0 : 1.0 + 3.0 * place[0] - 5.0 * place[1] + 20.0 * place[2]; };
   const Radiator fine = make_radiator(make_box({0.3, 0.2, 0.02}, {60, 40, 4}), 2, find);
-  const Skin coarse = make_box({0.3, 0.2, 0.02}, {15, 10, 1});  // four fine cells a coarse one
+  const Skin coarse = make_box({0.3, 0.2, 0.02}, {15, 10, 1});  // four fine cells per coarse one
   EXPECT_LT(find_worst(transfer(fine, coarse.nodes_m, coarse.triangles), find), 2e-5);
-  // To itself nothing changes.
+  // Identity transfer.
   EXPECT_LT(find_worst(transfer(fine, fine.nodes_m, fine.triangles), find), 2e-5);
 }
 
 TEST(transfer, to_facets_of_any_size_radiates_as_the_field_itself) {
-  // Fine facets that lie across edges of coarse ones go to one of them, so that corners scatter; what leaves the body must not.
+  // Fine facets across coarse edges go to one side, so corner values scatter; the total flux must not.
   const std::vector<int> orders{0, 1, 2, 3};
   const auto find = [&](const Vec3& place, std::size_t m) { return calc_harmonic(orders[m], 0, normalise(place)); };
   const Radiator fine = make_radiator(make_ball(17, 1.0), orders.size(), find);
@@ -129,7 +129,7 @@ TEST(transfer, of_a_smooth_field_is_near_the_field) {
 }
 
 TEST(transfer, leaves_facets_at_rest_that_nothing_is_near) {
-  // A coarse body with a part that the fine one lacks.
+  // A coarse body with a part that is missing in the fine one.
   const Radiator fine = make_radiator(make_ball(8, 1.0), 1, [](const Vec3&, std::size_t) { return 1.0; });
   const Skin ball = make_ball(4, 1.0), both = testing::join(ball, make_ball(2, 0.1), {5.0, 0.0, 0.0});
   const Radiator found = transfer(fine, both.nodes_m, both.triangles);

@@ -1,4 +1,4 @@
-// Wave numbers and the polynomials between them.
+// Wave numbers and interpolation between them.
 #include "precompute/air/wave_numbers.hpp"
 
 #include <gtest/gtest.h>
@@ -112,7 +112,7 @@ TEST(wave_numbers, refine_puts_one_at_a_mode_that_fails_in_each_step) {
   EXPECT_EQ(waves.get().size(), before.size() + 2);
   ASSERT_TRUE(std::is_sorted(waves.get().begin(), waves.get().end()));
   for (const std::size_t step : {4U, 5U}) {
-    // The new one is the mode nearest to the middle of the step.
+    // The inserted one is the mode nearest to the middle of the step.
     const double middle = 0.5 * (before[step] + before[step + 1]);
     const double nearest =
         *std::min_element(modes.begin(), modes.end(), [&](double a, double b) { return std::abs(a - middle) < std::abs(b - middle); });

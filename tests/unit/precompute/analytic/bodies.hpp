@@ -15,7 +15,7 @@ inline job::JobSpec parse(const std::string& body, const std::string& material =
   return job::parse_job(R"({"body": )" + body + R"(, "material": )" + material + R"(, "bank": "b.hdf")" + more + "}", "/tmp/job.json");
 }
 
-/// With damping that no test looks at.
+/// With arbitrary damping.
 inline std::string make_material(double young_pa, double poisson_ratio, double density_kg_m3) {
   return R"({"young_modulus_pa": )" + std::to_string(young_pa) + R"(, "poisson_ratio": )" + std::to_string(poisson_ratio) +
          R"(, "density_kg_m3": )" + std::to_string(density_kg_m3) + R"(, "damping": {"internal_friction": {"tan_phi": 0.001}}})";

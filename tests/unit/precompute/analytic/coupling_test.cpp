@@ -1,4 +1,4 @@
-// What large motion couples in bodies with known modes: hardening against closed forms of beams and plates, energies against quadrature.
+// Large-motion coupling of bodies with known modes: hardening against closed forms of beams and plates, energies against quadrature.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -17,7 +17,7 @@ using std::numbers::pi;
 const std::string kSteel = make_material(200e9, 0.3, 7850);
 const std::string kStretch = R"(, "nonlinear": "stretch")";
 
-/// A body with the coupling of its lowest modes.
+/// A body with coupling of its lowest modes.
 struct Coupled {
   std::unique_ptr<KnownBody> body;
   job::JobSpec job;
@@ -117,7 +117,7 @@ TEST(KnownCoupling, of_strings_and_beams_is_the_stretch_by_both_planes) {
 }
 
 TEST(KnownCoupling, of_degenerate_pairs_does_not_see_how_they_are_turned) {
-  // The body turns about its axis: pairs of m nodal diameters by m times the angle.
+  // Rotation of the body about its axis rotates pairs of m nodal diameters by m times the angle.
   const auto check = [](const std::string& text, double high_hz, std::size_t count, bool is_round = false) {
     const Coupled body(text, high_hz, count, true);
     const std::vector<double> q = draw(count, 5, 1e-4);
@@ -147,7 +147,7 @@ std::string make_plate(double a, double b, const std::string& edges = R"("hinged
 }
 
 TEST(KnownCoupling, of_hinged_plates_hardens_as_in_closed_form) {
-  // Chu and Herrmann 1956; by all rows and by the two of the mean stretch.
+  // Chu and Herrmann 1956; by all rows and by the two rows of the mean stretch.
   for (const auto& [ratio, gamma] : {std::pair(1.0, 1.31625), {4.0 / 3.0, 1.384164}, {2.0, 1.6281}})
     for (const bool is_stretch : {false, true}) {
       const Coupled plate(make_plate(0.3 * ratio, 0.3), 2000.0, 6, is_stretch);
@@ -161,7 +161,7 @@ TEST(KnownCoupling, of_hinged_plates_is_von_karmans_energy) {
   constexpr double kA = 0.4, kB = 0.3, kH = 1e-3, kE = 200e9, kNu = 0.3, kArea = kA * kB;
   const Coupled plate(make_plate(kA, kB), 2000.0, 9, false);
   const std::vector<double> q = draw(9, 11, 1e-3);
-  // The right side of Airy's equation on a grid, of second derivatives of sines; its cosine sums; the energy of each.
+  // Right-hand side of Airy's equation on a grid, from second derivatives of sines; its cosine coefficients; the energy of each.
   constexpr int kGrid = 48;
   const double scale = 2.0 / std::sqrt(7850 * kH * kArea);
   std::vector<double> right(kGrid * kGrid);
@@ -190,14 +190,14 @@ TEST(KnownCoupling, of_hinged_plates_is_von_karmans_energy) {
       for (int i = 0; i < kGrid; ++i)
         for (int j = 0; j < kGrid; ++j)
           sum += right[i * kGrid + j] * std::cos(k * pi * (i + 0.5) / kGrid) * std::cos(l * pi * (j + 0.5) / kGrid);
-      sum *= kArea / (kGrid * kGrid);  // integral of the right side times the product
+      sum *= kArea / (kGrid * kGrid);  // integral of the right-hand side times the product
       const double norm = kArea * (k > 0 ? 0.5 : 1.0) * (l > 0 ? 0.5 : 1.0), wave = std::pow(k * pi / kA, 2) + std::pow(l * pi / kB, 2);
       wanted += 0.5 * kE * kH * sum * sum / (norm * wave * wave);
     }
   EXPECT_NEAR(plate.calc(q) / wanted, 1.0, 1e-6);
 }
 
-/// Pitch of mode (1, 1) in windows of 0.1 s [Hz], by its upward crossings of zero: three blows of 0.3 N s, of 1 ms, at 0, 0.4 and 0.8 s.
+/// Pitch of mode (1, 1) in windows of 0.1 s [Hz], from upward zero crossings: three impulses of 0.3 N s, 1 ms long, at 0, 0.4 and 0.8 s.
 std::vector<double> strike_three_times(const Coupled& plate, double rate_hz) {
   const std::size_t count = plate.modes.size();
   std::vector<nonlinear::ModeConstants> constants;
@@ -232,7 +232,7 @@ std::vector<double> strike_three_times(const Coupled& plate, double rate_hz) {
 }
 
 TEST(KnownCoupling, of_hinged_plates_glides_as_a_computation_at_384_kHz) {
-  // Another program's: Verlet's method at 384 kHz, 30 modes. After the second blow strong motion is chaotic.
+  // From an independent program: Verlet's method at 384 kHz, 30 modes. After the second impulse the strong motion is chaotic.
   const std::vector<double> wanted_hz{94.11, 64.93, 50.05, 44.56};
   const Coupled plate(make_plate(0.4, 0.3), 2000.0, 30, false);
   const std::vector<double> found_hz = strike_three_times(plate, 48000.0);

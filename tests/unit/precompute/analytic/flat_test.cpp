@@ -55,14 +55,14 @@ TEST(SquareMembrane, has_the_400_modes_of_figure_2) {
   std::vector<Vec3> phi(list.modes.size());
   body->calc_shapes({0.1, 0.1, 0}, list.modes, phi);
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    // To the digits that the table prints, nine; and to all digits of the numbers of half-waves that it names.
+    // To the nine printed digits; full precision of the listed half-waves.
     const double m = std::stod(rows[i][1]), n = std::stod(rows[i][2]), hz = 500 * std::sqrt((m * m + n * n) / 2);
     const double psi = 2 * std::sin(0.1 * pi * m) * std::sin(0.1 * pi * n), amplitude = psi * 500 / hz;
     EXPECT_NEAR(hz / std::stod(rows[i][3]), 1.0, 5e-9);
     EXPECT_NEAR(amplitude, std::stod(rows[i][5]), 5e-10);
     EXPECT_NEAR(to_hz(list.modes[i]) / hz, 1.0, 1e-12) << i;
   }
-  // Pairs of one frequency stand in either order: compared as they are sorted within it.
+  // Degenerate pairs are in either order: compared after sorting.
   const auto sort_amplitudes = [&](auto get) {
     std::vector<std::pair<double, double>> all;
     for (std::size_t i = 0; i < rows.size(); ++i) all.emplace_back(std::round(to_hz(list.modes[i]) * 1e6), get(i));
@@ -128,10 +128,10 @@ TEST(HingedPlate, has_the_modes_of_the_books) {
 }
 
 struct Root {
-  double lambda, error;  // omega a^2 sqrt(rho h / D); relative, by the body's own bar
+  double lambda, error;  // omega a^2 sqrt(rho h / D); relative, from the body's own bar
 };
 
-/// All modes up to the largest of those given; of a circle only those with so many nodal diameters or fewer.
+/// All modes up to the largest given one; for a circle only up to that many nodal diameters.
 std::vector<Root> list_roots(const std::string& plate, double poisson_ratio, double largest, int most_diameters = 1 << 30) {
   auto body = make(parse(plate, make_material(2e11, poisson_ratio, 7850)));
   const double rate = std::sqrt(2e11 * 1e-6 / (12 * (1 - poisson_ratio * poisson_ratio) * 7850));
@@ -142,8 +142,7 @@ std::vector<Root> list_roots(const std::string& plate, double poisson_ratio, dou
   return found;
 }
 
-/// The plates of plates_kirchhoff.csv, Bessel roots and Ritz's method in other arithmetic: every mode, as often as it is there, and no
-/// other.
+/// The plates of plates_kirchhoff.csv (Bessel roots and Ritz's method in other arithmetic): every mode with its multiplicity, and no other.
 void expect_plates(const std::string& shape, const std::string& size, double least_tolerance, int most_diameters = 1 << 30) {
   struct Plate {
     std::vector<double> lambda;
@@ -199,7 +198,7 @@ TEST(Membranes, have_the_eigenvalues_of_the_table) {
 
 TEST(RitzPlate, has_the_closed_form_where_there_is_one) {
   const std::string square = R"({"plate": {"shape": "rectangle", "length_m": 1, "width_m": 1, "thickness_m": 0.001, "edges": )";
-  // Other edges than all hinged come from Ritz's method: opposite ones hinged, the others sliding, have a closed form, pi^2 (m^2 + n^2).
+  // All edges other than hinged use Ritz's method: two opposite hinged and two sliding edges have the closed form pi^2 (m^2 + n^2).
   std::vector<double> wanted;
   for (int m = 1; m < 9; ++m)
     for (int n = 0; n < 9; ++n) wanted.push_back(pi * pi * (m * m + n * n));
@@ -211,7 +210,7 @@ TEST(RitzPlate, has_the_closed_form_where_there_is_one) {
 }
 
 TEST(RitzPlate, says_how_wrong_it_can_be) {
-  // A corner where a clamped edge meets a free one makes the convergence algebraic: bars must cover it. Truth: twice as many polynomials.
+  // A corner between a clamped and a free edge gives algebraic convergence: bars must cover it. Truth: twice as many polynomials.
   auto body = make(parse(
       R"({"plate": {"shape": "rectangle", "length_m": 1, "width_m": 0.7, "thickness_m": 0.001, "edges": ["clamped", "free", "free", "clamped"]}})"));
   const ModeList coarse = body->list_modes(40.0, kAll);
@@ -225,7 +224,7 @@ TEST(RitzPlate, says_how_wrong_it_can_be) {
 }
 
 TEST(FlatBodies, have_orthonormal_modes) {
-  // What goes in comes out: the modal mass by quadrature over a fine net, for each kind of flat body.
+  // Modal mass by quadrature over a fine mesh, for each kind of flat body.
   const std::vector<std::string> bodies{
       R"({"membrane": {"shape": "rectangle", "length_m": 1, "width_m": 0.6, "tension_n_m": 100, "density_kg_m2": 0.3}})",
       R"({"membrane": {"shape": "circle", "radius_m": 0.5, "tension_n_m": 100, "density_kg_m2": 0.3}})",
@@ -249,9 +248,9 @@ TEST(FlatBodies, have_orthonormal_modes) {
     for (const Triangle& t : surface.triangles) {
       const Vec3 &a = surface.vertices_m[t[0]], &b = surface.vertices_m[t[1]], &c = surface.vertices_m[t[2]];
       const double area = 0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]));
-      if (!(a[2] > 0 && b[2] > 0 && c[2] > 0)) continue;  // the upper side
+      if (!(a[2] > 0 && b[2] > 0 && c[2] > 0)) continue;  // upper face only
       for (const auto& [p, q] :
-           {std::pair(&a, &b), std::pair(&b, &c), std::pair(&c, &a)}) {  // mid-points of edges: exact for squares of lines
+           {std::pair(&a, &b), std::pair(&b, &c), std::pair(&c, &a)}) {  // midpoints of edges: exact for squares of linear functions
         body->calc_shapes(0.5 * (*p + *q), modes, phi);
         for (std::size_t i = 0; i < count; ++i)
           for (std::size_t j = 0; j < count; ++j) sums[i * count + j] += density * thickness * area / 3.0 * phi[i][2] * phi[j][2];

@@ -1,4 +1,4 @@
-// Strings and beams against closed forms that were computed elsewhere with 30 digits, and against quadrature.
+// Strings and beams against closed forms computed independently with 30 digits, and against quadrature.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -15,7 +15,7 @@ namespace {
 using job::Edge;
 using std::numbers::pi;
 
-/// Simpson's rule on [0, 1]: an oracle that knows nothing of the closed forms.
+/// Simpson's rule on [0, 1]: independent of the closed forms.
 template <class F>
 double integrate(F&& f, int pieces = 20000) {
   double sum = f(0.0) + f(1.0);
@@ -83,7 +83,7 @@ TEST(BeamFunctions, meet_their_ends_and_are_orthonormal) {
 }
 
 TEST(BeamFunctions, lose_no_digits_in_high_modes) {
-  // cosh and sinh would: at mode 300 they differ in the 400th digit.
+  // cosh and sinh would lose all digits: at mode 300 they differ in the 400th.
   const std::vector<double> roots = find_beam_roots({Edge::clamped, Edge::free}, 300.5 * pi);
   ASSERT_EQ(roots.size(), 301u);
   for (const double beta : roots) EXPECT_NEAR(std::abs(make_beam_function({Edge::clamped, Edge::free}, beta).calc(1.0)), 2.0, 1e-9) << beta;
@@ -131,7 +131,7 @@ TEST(KnownString, is_stiff_with_a_diameter) {
 
 TEST(KnownString, takes_its_lowest_frequency_in_place_of_the_tension) {
   auto body = make(parse(R"({"string": {"length_m": 0.65, "lowest_hz": 110, "diameter_m": 1e-3}})"));
-  // A little higher, since it is stiff: by B / 2.
+  // Slightly higher by stiffness: by B / 2.
   const double stiffness =
       std::pow(pi, 3) * 2e11 * std::pow(1e-3, 4) / (64 * 4 * 0.65 * 0.65 * 110 * 110 * 7850 * pi / 4 * 1e-6 * 0.65 * 0.65);
   EXPECT_NEAR(to_hz(body->list_modes(150.0, kAll).modes[0]) / 110.0, std::sqrt(1 + stiffness), 1e-12);
@@ -166,7 +166,7 @@ TEST(KnownBeam, torsion_and_axial_waves_have_their_speeds) {
   ASSERT_EQ(list.modes.size(), 2u);
   EXPECT_NEAR(to_hz(list.modes[0]) / torsion, 1.0, 1e-13);
   EXPECT_NEAR(to_hz(list.modes[1]) / axial, 1.0, 1e-13);
-  // Their shapes have unit mass: rho A L <phi^2> along the axis, rho I_p L <phi'^2> of the twist.
+  // Unit modal mass: rho A L <phi^2> along the axis, rho I_p L <phi'^2> in torsion.
   std::vector<Vec3> phi(2);
   body->calc_shapes({0.5, 0.005, 0.0}, list.modes, phi);
   const double area = pi * 25e-6, mass = 2700 * area * 0.5, polar = pi * std::pow(0.005, 4) / 2.0;
@@ -200,7 +200,7 @@ TEST(Timoshenko, hinged_beam_has_the_closed_form) {
       if (hz < 20000.0) wanted.push_back(hz), wanted.push_back(hz);  // a square section: both planes
     }
   }
-  // Shear without deflection, n = 0: the slopes turn all alike.
+  // Pure shear, n = 0: uniform rotation of the sections.
   std::sort(wanted.begin(), wanted.end());
   ASSERT_EQ(list.modes.size(), wanted.size());
   for (std::size_t i = 0; i < wanted.size(); ++i) {

@@ -1,4 +1,4 @@
-// Banks of bodies with known modes: sane, complete, and what the body says.
+// Banks of bodies with known modes: valid, complete, with the body's data.
 #include "precompute/analytic/make_bank.hpp"
 
 #include <gmock/gmock.h>
@@ -42,7 +42,7 @@ TEST(KnownBanks, are_sane_whatever_the_band) {
 }
 
 TEST(KnownBanks, that_meet_at_a_mode_hold_every_mode_once) {
-  // The band is cut at a mode and between two: what is in one part is not in the other, and none is lost.
+  // Bands split at a mode and between two: every mode is in exactly one part.
   for (const std::string& body : {kBodies[0], kBodies[7], kBodies[10]}) {
     const auto count = [&](double low, double high) {
       return make_bank(parse(body, R"("steel")", ", \"band_hz\": [" + std::to_string(low) + ", " + std::to_string(high) + "]"))

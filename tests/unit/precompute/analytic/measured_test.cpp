@@ -1,4 +1,4 @@
-// Tables of measured modes: what is read, and what is refused with its line.
+// Tables of measured modes: accepted input, and errors with line numbers.
 #include "precompute/analytic/measured.hpp"
 
 #include <gmock/gmock.h>
@@ -45,24 +45,23 @@ TEST_F(Table, is_read_in_the_order_of_its_frequencies) {
 
 TEST_F(Table, that_is_wrong_is_refused_with_its_line) {
   const std::string head = "frequency_hz,decay_per_s,gain\n";
-  EXPECT_THAT(find_fault(""), HasSubstr("there is no mode"));
-  EXPECT_THAT(find_fault(head), HasSubstr("there is no mode"));
+  EXPECT_THAT(find_fault(""), HasSubstr("no modes; give"));
+  EXPECT_THAT(find_fault(head), HasSubstr("no modes; give"));
   EXPECT_THAT(find_fault("frequency_hz,gain\n1,2\n"), HasSubstr(":1: give one of the columns decay_per_s and t60_s"));
-  EXPECT_THAT(find_fault("decay_per_s,gain\n1,2\n"), HasSubstr(":1: there is no column frequency_hz"));
+  EXPECT_THAT(find_fault("decay_per_s,gain\n1,2\n"), HasSubstr(":1: column frequency_hz is missing"));
   EXPECT_THAT(find_fault("frequency_hz,decay_per_s\n1,2\n"), HasSubstr(":1: give a column gain"));
   EXPECT_THAT(find_fault("frequency_hz,decay_per_s,gain,0 0 0\n1,2,3,4\n"), HasSubstr("not both"));
   EXPECT_THAT(find_fault("frequency_hz,decay_per_s,gain,gain\n1,2,3,4\n"), HasSubstr("twice"));
-  EXPECT_THAT(find_fault("frequency_hz,decay_per_s,0 0 0,0 1 0,0 0.0 0\n1,2,3,4,5\n"),
-              HasSubstr(":1: the point \"0 0.0 0\" is there twice"));
+  EXPECT_THAT(find_fault("frequency_hz,decay_per_s,0 0 0,0 1 0,0 0.0 0\n1,2,3,4,5\n"), HasSubstr(":1: the point \"0 0.0 0\" occurs twice"));
   EXPECT_THAT(find_fault("frequency_hz,decay_per_s,gian\n1,2,3\n"), HasSubstr("column \"gian\" is not known"));
   EXPECT_THAT(find_fault(head + "440,2\n"), HasSubstr(":2: 2 values, and there are 3 columns"));
   EXPECT_THAT(find_fault("frequency_hz,decay_per_s,0 0 1e300\n1,2,3\n"), HasSubstr("the point \"0 0 1e300\" is too far away"));
   EXPECT_LT(find_fault(head + std::string(100000, 'x') + ",2,1\n").size(), 1000U);
-  EXPECT_THAT(find_fault(head + "440,2,x\n"), HasSubstr(":2: \"x\" is no finite number"));
+  EXPECT_THAT(find_fault(head + "440,2,x\n"), HasSubstr(":2: \"x\" is not a finite number"));
   EXPECT_THAT(find_fault(head + "440,nan,1\n"), HasSubstr("no finite number"));
   EXPECT_THAT(find_fault(head + "\n-3,2,1\n"), HasSubstr(":3: a frequency is -3 Hz"));
   EXPECT_THAT(find_fault(head + "440,-1,1\n"), HasSubstr("the decay is -1"));
-  EXPECT_THAT(find_fault(head + "440,5000,1\n"), HasSubstr("swings from 0 to"));
+  EXPECT_THAT(find_fault(head + "440,5000,1\n"), HasSubstr("is oscillatory from 0 to"));
   EXPECT_THAT(find_fault("frequency_hz,t60_s,gain\n440,0,1\n"), HasSubstr("t60_s is 0"));
   EXPECT_THAT(find_fault(head + "440,1,1e300\n"), HasSubstr("more than any body has"));
 }

@@ -1,4 +1,4 @@
-// Polygons: triangles that fill them, elements of high order, particular solutions.
+// Polygons: triangulation, high-order elements, particular solutions.
 #include "precompute/analytic/polygon.hpp"
 
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ using std::numbers::pi;
 const std::vector<Point2> kSquare{{0, 0}, {1, 0}, {1, 1}, {0, 1}};
 const std::vector<Point2> kL{{0, 0}, {2, 0}, {2, 1}, {1, 1}, {1, 2}, {0, 2}};
 
-/// A comb of so many teeth, each as thin as a hundredth of its length.
+/// A comb whose teeth are a hundred times as long as wide.
 std::vector<Point2> make_comb(int teeth) {
   std::vector<Point2> p{{0, 0}, {static_cast<double>(teeth), 0}};
   for (int i = teeth - 1; i >= 0; --i) {
@@ -48,7 +48,7 @@ void expect_net(const Net& net, double area) {
   }
   EXPECT_NEAR(sum / area, 1.0, 1e-12);
   for (const auto& [edge, count] : edges) EXPECT_EQ(count, 1);
-  // V - E + F = 1 of a disc: no hole, no island.
+  // V - E + F = 1 of a disc: no hole, no second part.
   std::size_t rim = 0;
   for (const auto& [edge, count] : edges) rim += edges.count({edge.second, edge.first}) == 0 ? 1 : 0;
   EXPECT_EQ(net.points_m.size() + net.triangles.size(), (edges.size() + rim) / 2 + 1);
@@ -117,7 +117,7 @@ TEST(TriangleModes, of_a_square_are_those_of_the_closed_form) {
   }
 }
 
-/// Of the L of three unit squares: computed with 70 digits and 48 functions (and with 36: these digits agree).
+/// L of three unit squares: computed with 70 digits and 48 functions (with 36 these digits agree).
 const std::vector<double> kLValues{9.6397238440219410527, 15.19725192645434327, 2 * pi* pi,       29.52148111414488329, 31.9126359571377622,
                                    41.474509890214922,    44.94848778135123,    5 * pi* pi,       5 * pi* pi,           56.7096098873851,
                                    65.376535709845885,    71.05775564851353,    71.57267968033656};
@@ -134,7 +134,7 @@ TEST(ParticularSolutions, give_the_l_shape_to_twelve_digits) {
       EXPECT_LE(std::abs(found->kappa / wanted - 1.0), found->error + 3e-15);
     }
   }
-  EXPECT_FALSE(solutions->refine(12.0, 1e-5, 1));  // nothing there
+  EXPECT_FALSE(solutions->refine(12.0, 1e-5, 1));  // no eigenvalue there
 }
 
 TEST(ParticularSolutions, need_no_more_than_one_corner_with_a_singularity) {
@@ -164,7 +164,7 @@ TEST(PolygonMembrane, that_is_a_rectangle_is_the_rectangle) {
   polygon->calc_shapes({0.11, 0.07, 0}, one.modes, a);
   rectangle->calc_shapes({0.11, 0.07, 0}, other.modes, b);
   for (std::size_t i = 0; i < a.size();) {
-    std::size_t end = i;  // of the modes of one frequency, whose basis is free: (3, 4) and (4, 3) and the like of a rectangle 4 : 3
+    std::size_t end = i;  // end of a degenerate group, whose basis is arbitrary: (3, 4) and (4, 3) and similar of a rectangle 4 : 3
     double found = 0.0, wanted = 0.0;
     for (; end < a.size() && other.modes[end].lambda_rad2_s2 < (1.0 + 1e-9) * other.modes[i].lambda_rad2_s2; ++end) {
       EXPECT_NEAR(one.modes[end].lambda_rad2_s2 / other.modes[end].lambda_rad2_s2, 1.0, 1e-12);
@@ -177,7 +177,7 @@ TEST(PolygonMembrane, that_is_a_rectangle_is_the_rectangle) {
 }
 
 TEST(PolygonMembrane, error_bars_cover_what_singular_corners_cost) {
-  // Two re-entrant corners: no particular solutions. Truth: the same with a band three times as wide, whose elements are a third as large.
+  // Two re-entrant corners: no particular solutions. Truth: the same with three times the band, hence elements a third as large.
   auto body = make(parse(
       R"({"membrane": {"shape": "polygon", "corners_m": [[0,0],[3,0],[3,1],[2,1],[2,2],[1,2],[1,1],[0,1]], "tension_n_m": 1, "density_kg_m2": 1}})"));
   const ModeList coarse = body->list_modes(0.9, kAll), fine = body->list_modes(2.7, kAll);

@@ -1,4 +1,4 @@
-// The tables of known answers in data/.
+// Reference tables in data/.
 #pragma once
 
 #include <fstream>
@@ -9,7 +9,7 @@
 
 namespace carillon::analytic {
 
-/// A table of data/ without its head; cells as text.
+/// A table of data/ without its header line; cells as text.
 inline std::vector<std::vector<std::string>> read_rows(const std::string& name) {
   std::ifstream file(carillon::tests::get_source_dir() + "/tests/unit/precompute/analytic/data/" + name);
   std::vector<std::vector<std::string>> rows;

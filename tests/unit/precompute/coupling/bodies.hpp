@@ -1,4 +1,4 @@
-// Bodies with their modes, for the tests of condense.
+// Bodies with their modes, for the tests of condense_modes().
 #pragma once
 
 #include <gtest/gtest.h>
@@ -7,16 +7,16 @@
 #include <functional>
 #include <vector>
 
-#include "precompute/mesh/distributed/distribute.hpp"
 #include "precompute/coupling/condense.hpp"
 #include "precompute/eigen/solve_modes.hpp"
 #include "precompute/fem/assemble.hpp"
 #include "precompute/la/local_columns.hpp"
+#include "precompute/mesh/distributed/distribute.hpp"
 #include "precompute/petsc/session.hpp"
 
 namespace carillon::tests {
 
-/// A body with everything that condense_modes() borrows.
+/// A body with everything that condense_modes() references.
 struct ModalBody {
   comm::Communicator comm;
   mesh::DistributedMesh pieces;
@@ -28,7 +28,7 @@ struct ModalBody {
     return {pieces.local, materials, system.stiffness, system.mass, modes.lambda, modes.shapes, pieces.components};
   }
   double freq_hz(std::size_t mode) const { return std::sqrt(modes.lambda[mode]) / (2 * M_PI); }
-  /// The largest displacement of a mode.
+  /// Largest displacement of a mode.
   double peak(int mode) const {
     const la::LocalColumns shapes(modes.shapes);
     double peak = 0;
@@ -66,7 +66,7 @@ inline ModalBody solve_body(MPI_Comm comm, const mesh::TetMesh& mesh, const IsFi
   return body;
 }
 
-/// V of the modes that an energy has, on every rank.
+/// V of the modes of an energy, on every rank.
 inline double calc_energy(const comm::Communicator& comm, const bank::QuarticEnergy& energy, const std::vector<double>& q) {
   return comm.broadcast([&] {
     std::vector<double> gradient(q.size());
@@ -74,7 +74,7 @@ inline double calc_energy(const comm::Communicator& comm, const bank::QuarticEne
   });
 }
 
-/// gamma of mode i of the energy, which is mode `mode` of the body, per length s.
+/// gamma of mode i of the energy (mode `mode` of the body) per length s.
 inline double calc_gamma(const ModalBody& body, const bank::QuarticEnergy& energy, int mode, double length_m) {
   const double self = body.comm.broadcast([&] {
     std::size_t i = 0;

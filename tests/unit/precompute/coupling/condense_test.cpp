@@ -1,5 +1,5 @@
-// The condensed energy against the full Saint Venant-Kirchhoff energy of a small mesh, minimised over all other displacements by Newton's
-// method with Eigen; and what must not change it: ranks, rotations of the modes, the way the fields were found, the form that is stored.
+// Condensed energy against the full Saint Venant-Kirchhoff energy of a small mesh, minimised over all other displacements by Newton's
+// method with Eigen; invariance to ranks, rotations of the modes, the construction of the fields and the stored form.
 #include "precompute/coupling/condense.hpp"
 
 #include <gtest/gtest.h>
@@ -29,7 +29,7 @@ using tests::solve_body;
 
 const material::Material kSteel = make_solid(200e9, 0.3, 7800);
 
-/// Saint Venant-Kirchhoff's energy of T10 with four points, forces and stiffness, dense: one rank. Free nodes come first.
+/// Saint Venant-Kirchhoff energy of T10 with four points, forces and stiffness, dense, one rank. Free nodes come first.
 class FullEnergy {
  public:
   FullEnergy(const mesh::LocalMesh& local, const material::Material& material) : free_(3 * local.free_nodes) {
@@ -107,7 +107,7 @@ class FullEnergy {
     return energy;
   }
 
-  /// The least energy of displacements whose modal coordinates of `phi` (free, N) are q; m_phi = M phi.
+  /// Minimum energy over displacements with the modal coordinates q of `phi` (free, N); m_phi = M phi.
   double minimise(const Eigen::MatrixXd& phi, const Eigen::MatrixXd& m_phi, const Eigen::VectorXd& q) const {
     Eigen::VectorXd u = phi * q, force;
     Eigen::MatrixXd stiffness;
@@ -139,7 +139,7 @@ class FullEnergy {
   std::vector<Point> points_;
 };
 
-/// A strip with held ends, thin and flat, or bent to a shallow arch.
+/// A strip with held ends, thin and flat, or a shallow arch.
 mesh::TetMesh make_strip(double rise_m) {
   mesh::TetMesh mesh = make_box({6, 1, 1}, {0.2, 0.02, 0.001}, 1);
   for (Vec3& x : mesh.nodes_m) x[2] += 4 * rise_m * (x[0] / 0.2) * (1 - x[0] / 0.2);
@@ -169,7 +169,7 @@ std::vector<double> negate(std::vector<double> q) {
   return q;
 }
 
-/// V(q) and V(-q) of the full energy, less the linear one.
+/// V(q) and V(-q) of the full energy without the linear one.
 std::array<double, 2> calc_full(const Oracle& oracle, const std::vector<double>& q) {
   const auto modes = static_cast<Eigen::Index>(q.size());
   const Eigen::Map<const Eigen::VectorXd> at(q.data(), modes);
@@ -201,7 +201,7 @@ TEST(CondensedEnergy, is_the_least_energy_of_a_flat_strip) {
   const Oracle oracle = make_oracle(0, 3);
   const Condensed result = condense_modes(PETSC_COMM_SELF, oracle.body.solved(), {.modes = 3, .below_hz = 1e6, .energy_error = 1e-8});
   ASSERT_EQ(result.energy.modes, (std::vector<std::int32_t>{0, 1, 2}));
-  const std::vector<double> q = make_motion(oracle.body, 3, 2e-5);  // a fiftieth of the thickness: beyond the quartic part there is 1e-4
+  const std::vector<double> q = make_motion(oracle.body, 3, 2e-5);  // a fiftieth of the thickness: terms beyond the quartic one are 1e-4
   EXPECT_TRUE(result.energy.linear.empty()) << "the mesh makes a cubic part, which is left out";
   const auto [plus, minus] = calc_full(oracle, q);
   EXPECT_NEAR(0.5 * (plus + minus) / tests::calc_energy(PETSC_COMM_SELF, result.energy, q), 1, 2e-3);
@@ -220,7 +220,7 @@ TEST(CondensedEnergy, has_the_cubic_part_of_an_arch) {
   EXPECT_NEAR((plus + minus) / even, 1, 0.02) << "what a stress of the modes does on condensed rotations is left out";
 }
 
-/// A rectangular plate held at one edge: no two modes of one frequency.
+/// A rectangular plate held at one edge, without degenerate modes.
 ModalBody make_plate(MPI_Comm comm, int modes, const tests::IsFixed& is_fixed) {
   return solve_body(comm, make_box({8, 6, 1}, {0.2, 0.13, 0.001}, 2), is_fixed, kSteel, modes);
 }
@@ -262,7 +262,7 @@ TEST(CondensedEnergy, does_not_change_when_modes_are_turned_among_themselves) {
   EXPECT_NEAR(tests::calc_energy(body.comm, after.energy, turned) / tests::calc_energy(body.comm, before.energy, q), 1, 1e-5);
 }
 
-/// Everything that the two ways to the fields share.
+/// Input of both methods for the fields.
 struct Coupled {
   explicit Coupled(const ModalBody& given, int count)
       : modal(given),

@@ -1,5 +1,5 @@
 // Hardening of single modes against closed forms of thin beams and plates: Woinowsky-Krieger 1950 for beams, von Karman's plate with the
-// membrane part by Ritz's method, which shares nothing with the finite elements.
+// membrane part by an independent Ritz method.
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
@@ -24,7 +24,7 @@ const material::Material kSheet = make_solid(200e9, 0.3, 7800);
 
 Condensed condense(const ModalBody& body, int modes) { return condense_modes(body.comm, body.solved(), {.modes = modes, .below_hz = 1e6}); }
 
-/// Of a beam with both ends clamped; the amplitude counts in thicknesses.
+/// Both ends clamped; amplitude in thicknesses.
 double calc_clamped_beam(std::array<int, 3> cells) {
   const double length = 0.2;
   const auto held = [&](const Vec3& x) { return x[0] < 1e-9 || x[0] > length - 1e-9; };
@@ -40,7 +40,7 @@ TEST(Hardening, of_a_clamped_beam_is_that_of_the_thin_beam) {
 }
 
 TEST(Hardening, without_condensation_would_be_three_times_too_great) {
-  // With all other displacements held, V = 1/2 <E2, C E2>: a prototype has 2.096.
+  // With all other displacements held, V = 1/2 <E2, C E2>: a prototype gives 2.096.
   const double length = 0.2;
   const auto held = [&](const Vec3& x) { return x[0] < 1e-9 || x[0] > length - 1e-9; };
   const ModalBody body = solve_body(PETSC_COMM_WORLD, make_box({12, 1, 1}, {length, 0.008, 0.004}, 2), held, kBar, 2);
@@ -62,7 +62,7 @@ TEST(Hardening, without_condensation_would_be_three_times_too_great) {
 }
 
 TEST(Hardening, of_a_hinged_beam_is_three) {
-  // Held along the middle of its end faces: they turn, and cannot approach each other.
+  // Held along the middle line of the end faces, which rotate but keep their distance.
   const double length = 0.4, thickness = 0.001;
   const auto held = [&](const Vec3& x) { return (x[0] < 1e-9 || x[0] > length - 1e-9) && std::abs(x[2] - thickness / 2) < 1e-9; };
   const ModalBody body = solve_body(PETSC_COMM_WORLD, make_box({40, 1, 1}, {length, 0.004, thickness}, 2), held, kBar, 3);
@@ -77,7 +77,7 @@ TEST(Hardening, of_a_free_beam_is_small) {
   EXPECT_LT(gamma, 0.01) << "its ends approach each other, and nothing is stretched";
 }
 
-/// gamma of the first mode of a plate with hinged edges that cannot move in its plane: w = W sin sin, u and v by 12 x 12 products of sines.
+/// gamma of the first mode of a plate with hinged, in-plane fixed edges: w = W sin sin, u and v by 12 x 12 products of sines.
 double calc_held_plate(double nu) {
   constexpr int kTerms = 12, kPoints = 48;
   const auto unknowns = static_cast<Eigen::Index>(2 * kTerms * kTerms);

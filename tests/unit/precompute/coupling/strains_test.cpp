@@ -1,4 +1,4 @@
-// The scaled strains of elements: their products are the stiffness matrix, whatever the element and the material.
+// Scaled element strains: their products are the stiffness matrix for every element and material.
 #include "precompute/coupling/strains.hpp"
 
 #include <gtest/gtest.h>
@@ -25,7 +25,7 @@ material::Material make_wood() {
   return wood;
 }
 
-/// The largest difference of B^T B from fem's stiffness, over the largest entry.
+/// Largest difference of B^T B from fem's stiffness, relative to the largest entry.
 double compare(const std::string& shape, int order, const material::Material& material) {
   shapes::ShapeOptions options{.shape = shape};
   options.order = order;
@@ -81,7 +81,7 @@ TEST(SolveNonnegative, finds_the_weights_that_made_the_right_side) {
 }
 
 TEST(SolveNonnegative, leaves_at_zero_what_would_be_negative) {
-  // The least squares solution is (2, -1); the best with x >= 0 is (1, 0).
+  // The least-squares solution is (2, -1); the best one with x >= 0 is (1, 0).
   la::Matrix a(2, 2);
   a << 1, 1, 0, 1;
   la::Vector b(2);

@@ -1,4 +1,4 @@
-// The mean stretch of held bodies in few rows: hardening of thin beams in closed form, and what it leaves of all fields.
+// Mean stretch of held bodies in few rows: hardening of thin beams in closed form, and a lower bound of the full fields.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -33,7 +33,7 @@ TEST(Stretch, of_a_clamped_beam_is_one_row_that_hardens_as_the_thin_beam) {
   if (!body.comm.is_root()) return;
   EXPECT_EQ(stretch.energy.row_count(), 1u);
   EXPECT_EQ(stretch.energy.modes, full.energy.modes);
-  // Both planes are in it, and no motion has more of it than it has of all fields.
+  // Both planes are included, and no motion exceeds the energy of all fields.
   const std::size_t n = stretch.energy.mode_count();
   std::vector<double> gradient(n);
   for (std::size_t i = 0; i < n; ++i) {

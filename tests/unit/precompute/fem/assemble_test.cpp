@@ -1,4 +1,4 @@
-// Distribution and assembly on 1, 2 and 3 ranks against values that know nothing of ranks: closed forms of fields on a box.
+// Distribution and assembly on 1, 2 and 3 ranks against closed forms of fields on a box.
 #include "precompute/fem/assemble.hpp"
 
 #include <gmock/gmock.h>
@@ -28,8 +28,7 @@ constexpr std::array<double, 3> kSize{0.3, 0.2, 0.1};
 mesh::TetMesh on_rank_0(const mesh::TetMesh& whole) { return get_rank() == 0 ? whole : mesh::TetMesh{}; }
 
 mesh::DistributedMesh distribute_box(const mesh::TetMesh& whole, const std::vector<std::int32_t>& fixed = {}) {
-  return mesh::distribute(kWorld, on_rank_0(whole), get_rank() == 0 ? fixed : std::vector<std::int32_t>{},
-                               {.elimination_order = true});
+  return mesh::distribute(kWorld, on_rank_0(whole), get_rank() == 0 ? fixed : std::vector<std::int32_t>{}, {.elimination_order = true});
 }
 
 using Field = std::function<Vec3(const Vec3&)>;
@@ -159,7 +158,7 @@ TEST(Elimination, of_fixed_nodes_leaves_the_rows_of_the_others_as_they_were) {
   PetscInt rows = 0;
   petsc::check(MatGetSize(system.stiffness, &rows, nullptr));
   EXPECT_EQ(rows, 3 * static_cast<PetscInt>(box.nodes_m.size() - fixed.size()));
-  // A field that is zero on the fixed face has the energy of the free body: u_x = x, so E_oed V.
+  // A field that is zero on the fixed face has the energy of the free body: u_x = x, hence E_oed V.
   const auto x = sample(system, pieces.local, [](const Vec3& p) { return Vec3{p[0], 0, 0}; });
   const double expected = (kSteel.lame_lambda_pa() + 2 * kSteel.lame_mu_pa()) * kSize[0] * kSize[1] * kSize[2];
   EXPECT_NEAR(product(system.stiffness, x, x), expected, 1e-12 * expected);

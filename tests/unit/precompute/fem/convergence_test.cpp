@@ -1,5 +1,5 @@
-// The tables of docs/elements.md: how T4 and T10 converge on a ball (Lamb) and on a chime (3-D Fourier-Ritz), straight and curved, and near
-// nu = 1/2. Prints one line a mesh, and holds the orders and the chime's errors against what the page says.
+// Tables of docs/elements.md: convergence of T4 and T10 on a ball (Lamb) and on a chime (3-D Fourier-Ritz), straight and curved, and near
+// nu = 1/2. Prints one line per mesh and checks the orders and the chime's errors against the page.
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 
@@ -8,12 +8,12 @@
 #include <numbers>
 #include <utility>
 
-#include "precompute/mesh/distributed/distribute.hpp"
 #include "precompute/eigen/solve_modes.hpp"
 #include "precompute/fem/assemble.hpp"
 #include "precompute/mesh/check.hpp"
-#include "precompute/petsc/session.hpp"
+#include "precompute/mesh/distributed/distribute.hpp"
 #include "precompute/mesh/shapes/shapes.hpp"
+#include "precompute/petsc/session.hpp"
 #include "tests/support/lamb.hpp"
 
 namespace carillon::fem {
@@ -45,7 +45,7 @@ mesh::TetMesh make(const std::string& shape, const std::map<std::string, double>
   return straight ? mesh::to_quadratic(mesh::to_linear(mesh)) : mesh;
 }
 
-/// Prints the errors of the ball on three meshes; returns the order of S2 between the last two, by the cube root of the elements.
+/// Prints the errors of the ball on three meshes; returns the order of S2 between the last two, by the cube root of the number of elements.
 double study_ball(const char* element, double nu, int order, Form form, bool straight) {
   std::vector<double> error, elements;
   for (const double edge : {0.8, 0.45, 0.21}) {
@@ -83,7 +83,7 @@ TEST(Convergence, of_the_ball) {
   for (const double nu : {0.4, 0.45, 0.4999}) study_ball("T4", nu, 1, Form::automatic, false);
 }
 
-/// An orthotropic solid that is incompressible but for `play` of its Poisson's ratios: every row of its compliance adds up to `play` / E.
+/// An orthotropic solid, nearly incompressible: every row of its compliance sums to `play` / E.
 material::Material make_orthotropic_rubber(double play) {
   constexpr double e1 = 3.0, e2 = 2.0, e3 = 1.5;
   material::Material material;
@@ -96,8 +96,8 @@ material::Material make_orthotropic_rubber(double play) {
   return material;
 }
 
-/// Errors of the ball's first ten modes against those of the finest mesh in the form of the elements, which an isotropic solid shows to be
-/// of the fourth order; {160 elements, 540 elements}.
+/// Errors of the ball's first ten modes against the finest mesh of the same formulation, fourth order for an isotropic solid; {160
+/// elements, 540 elements}.
 std::array<double, 2> study_orthotropic(const char* element, const std::vector<double>& exact, double play, Form form) {
   std::array<double, 2> errors{};
   for (int k = 0; k < 2; ++k) {
@@ -135,7 +135,7 @@ TEST(Convergence, of_the_chime) {
       const auto omega = calc_omega(mesh, aluminium, Form::automatic, 20, 800);
       ASSERT_GE(omega.size(), 2u);
       const double error = omega[0] / (2 * std::numbers::pi) / 587.88302 - 1;
-      // A thin ring of n straight sides is flat by sin^2(pi / n) / 3.
+      // A ring of n straight sides is flattened by sin^2(pi / n) / 3.
       const double polygon = straight ? -std::pow(std::sin(std::numbers::pi / sides), 2) / 3 : 0.0;
       EXPECT_NEAR(error, polygon, 5e-4) << edge;
       fmt::print("chime  {:<24}            {:6} nodes {:6} elements  first bending {:8.4f} %\n", straight ? "T10 straight" : "T10 curved",

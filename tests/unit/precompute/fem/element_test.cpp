@@ -1,5 +1,5 @@
-// Element matrices against fields whose energy is known, and against a slow quadrature that shares no code with them: shape functions from
-// a Vandermonde matrix, derivatives by central differences (exact for quadratics), Gauss-Legendre points by Newton's iteration.
+// Element matrices against fields of known energy, and against an independent quadrature: shape functions from a Vandermonde matrix,
+// derivatives by central differences (exact for quadratics), Gauss-Legendre points by Newton's iteration.
 #include "precompute/fem/element.hpp"
 
 #include <gtest/gtest.h>
@@ -89,7 +89,7 @@ double integrate(int n, const std::function<double(const Vector3d&)>& f) {
   return sum;
 }
 
-/// A quadratic interpolant of ten nodal values through the monomials.
+/// Quadratic interpolation of ten nodal values in monomials.
 class Interpolant {
  public:
   explicit Interpolant(const Eigen::MatrixXd& values /* (10, 3) */) {
@@ -214,7 +214,7 @@ TEST(QuadraticElement, agrees_with_a_slow_quadrature_of_another_make) {
       });
       const double kinetic = integrate(
           10, [&](const Vector3d& p) { return place.slope(p).determinant() * kMaterial.density_kg_m3 * field.at(p).squaredNorm(); });
-      // Straight: both rules are exact. Curved: the stiffness integrand is rational, the rule of degree 5 is near.
+      // Straight: both rules are exact. Curved: the stiffness integrand is rational, the degree 5 rule approximate.
       EXPECT_NEAR(0.5 * u.dot(stiffness(element) * u), strain_energy, (bulge == 0 ? 1e-11 : 2e-3) * strain_energy);
       double quadratic_form = 0;
       for (int d = 0; d < 3; ++d) {

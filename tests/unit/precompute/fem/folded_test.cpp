@@ -1,4 +1,4 @@
-// What the mesh check lets pass, assembly takes: curved elements bent at random, many of them folded.
+// Every mesh accepted by the check is accepted by the assembly: randomly bent curved elements, many of them folded.
 #include <gtest/gtest.h>
 
 #include <random>

@@ -8,10 +8,10 @@
 #include <cmath>
 #include <functional>
 
-#include "precompute/mesh/distributed/distribute.hpp"
 #include "precompute/fem/assemble.hpp"
 #include "precompute/fem/element.hpp"
 #include "precompute/fem/energy.hpp"
+#include "precompute/mesh/distributed/distribute.hpp"
 #include "precompute/petsc/session.hpp"
 #include "tests/support/box_mesh.hpp"
 #include "tests/support/ranks.hpp"
@@ -98,7 +98,7 @@ TEST(MaterialsByRegion, that_name_a_region_which_the_mesh_has_not_are_refused_wi
 
 TEST(MaterialsByRegion, that_name_a_region_twice_are_refused) {
   expect_refused("\"material\": " + isotropic(1) + ",\n\"materials\": {\"9\": " + isotropic(1) + ", \"oak\": " + isotropic(2) + "}",
-                 "has a material already");
+                 "already has a material");
 }
 
 TEST(MaterialsByRegion, fail_on_every_rank_with_the_words_of_the_one_that_lacks_tags) {
@@ -135,8 +135,8 @@ petsc::MatHandle sample(const mesh::LocalMesh& local, const std::vector<std::fun
 }
 
 TEST(DecayOfACompositeBar, follows_from_the_shares_of_energy_of_each_half) {
-  // u_x = x: the strain is the same everywhere, so the elastic shares are those of the moduli, 1 : 3; the kinetic ones are
-  // 1000 integral_0^.2 x^2 : 3000 integral_.2^.4 x^2 = 1 : 21. u_x = x^2: elastic 1 : 3 * 7.
+  // u_x = x: uniform strain, so the elastic shares follow the moduli, 1 : 3; the kinetic ones are 1000 integral_0^.2 x^2 : 3000
+  // integral_.2^.4 x^2 = 1 : 21. u_x = x^2: elastic 1 : 3 * 7.
   const std::string soft = R"({"young_modulus_pa": 1e9, "poisson_ratio": 0.25, "density_kg_m3": 1000,
                                "damping": {"rayleigh": {"alpha1_s": 1e-6, "alpha2_per_s": 40}}})";
   const std::string stiff = R"({"young_modulus_pa": 3e9, "poisson_ratio": 0.25, "density_kg_m3": 3000,
@@ -275,7 +275,7 @@ TEST_P(IsotropicConstants, given_as_orthotropic_ones_make_the_same_stiffness) {
     ElementMatrices a, b;
     ASSERT_TRUE(calc_element(x, as_orthotropic, job::Mass::consistent, a));
     ASSERT_TRUE(calc_element(x, as_isotropic, job::Mass::consistent, b));
-    // The inverse of the compliance loses as many digits as the stiffest strain is stiffer than the softest.
+    // The inverse of the compliance loses digits by the ratio of the stiffest to the softest strain.
     for (std::size_t i = 0; i < a.stiffness.size(); ++i)
       EXPECT_NEAR(a.stiffness[i], b.stiffness[i], 1e-14 * stiffest * stiffest / e) << x.size() << " nodes, nu " << nu;
   }
@@ -283,7 +283,7 @@ TEST_P(IsotropicConstants, given_as_orthotropic_ones_make_the_same_stiffness) {
 
 INSTANTIATE_TEST_SUITE_P(PoissonsRatio, IsotropicConstants, testing::Values(0.0, 0.33, 0.45, 0.46, 0.49, 0.4999));
 
-// Mean dilatation leaves uniform strains what they are, in T4 and T10, whatever the anisotropy. The oracle is the elasticity matrix.
+// Mean dilatation leaves uniform strains unchanged, in T4 and T10, for any anisotropy. Reference: the elasticity matrix.
 TEST(OrthotropicRubber, keeps_the_energy_of_every_uniform_strain) {
   const std::string rubber =
       R"("material": {"orthotropic": {"young_modulus_pa": [3e6, 2e6, 1.5e6], "shear_modulus_pa": [0.9e6, 0.5e6, 0.7e6],

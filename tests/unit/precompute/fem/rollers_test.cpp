@@ -1,13 +1,13 @@
-// A box on rollers (normal displacement and tangential traction zero on all six faces) has closed-form modes that are smooth, so it
-// measures the order of convergence: f = c/2 sqrt((i/a)^2 + (j/b)^2 + (k/c)^2), c = c_L with any index, c = c_T with two or three
-// (Demarest 1971; reproduced by direct substitution). The conditions hold single directions, which jobs cannot ask for, so the free K and M
-// are reduced here and solved with Eigen.
+// A box on rollers (normal displacement and tangential traction zero on all six faces) has smooth closed-form modes, suited to measure the
+// order of convergence: f = c/2 sqrt((i/a)^2 + (j/b)^2 + (k/c)^2), c = c_L with any index, c = c_T with two or three (Demarest 1971;
+// verified by substitution). The conditions fix single directions, which jobs do not support, so the free K and M are reduced here and
+// solved with Eigen.
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "precompute/mesh/distributed/distribute.hpp"
 #include "precompute/fem/assemble.hpp"
+#include "precompute/mesh/distributed/distribute.hpp"
 #include "precompute/petsc/session.hpp"
 #include "tests/support/box_mesh.hpp"
 #include "tests/support/subspace.hpp"

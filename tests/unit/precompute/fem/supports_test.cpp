@@ -1,4 +1,4 @@
-// Reactions at patches of fixed nodes on 1, 2 and 3 ranks: fields of constant strain, and the balance of the whole body.
+// Reactions at patches of fixed nodes on 1, 2 and 3 ranks: fields of constant strain, and the global balance.
 #include "precompute/fem/supports.hpp"
 
 #include <gtest/gtest.h>
@@ -6,8 +6,8 @@
 #include <cmath>
 #include <functional>
 
-#include "precompute/mesh/distributed/distribute.hpp"
 #include "precompute/fem/assemble.hpp"
+#include "precompute/mesh/distributed/distribute.hpp"
 #include "precompute/petsc/session.hpp"
 #include "tests/support/box_mesh.hpp"
 #include "tests/support/ranks.hpp"
@@ -23,7 +23,7 @@ constexpr std::array<double, 3> kSize{0.3, 0.04, 0.02};
 constexpr std::array<int, 3> kCells{15, 4, 2};
 
 using Field = std::function<Vec3(const Vec3&)>;
-/// Which entry of the job fixes a point, -1: none.
+/// Entry of the job that fixes a point, -1: none.
 using Fix = std::function<std::int32_t(const Vec3&)>;
 
 struct Body {
@@ -32,8 +32,7 @@ struct Body {
     std::vector<std::int32_t> fixed;
     for (std::size_t i = 0; i < whole.nodes_m.size(); ++i)
       if (fix(whole.nodes_m[i]) >= 0) fixed.push_back(static_cast<std::int32_t>(i));
-    pieces =
-        mesh::distribute(kWorld, get_rank() == 0 ? whole : mesh::TetMesh{}, get_rank() == 0 ? fixed : std::vector<std::int32_t>{});
+    pieces = mesh::distribute(kWorld, get_rank() == 0 ? whole : mesh::TetMesh{}, get_rank() == 0 ? fixed : std::vector<std::int32_t>{});
     for (const Vec3& x : pieces.local.nodes_m) pieces.local.fixed_by.push_back(fix(x));
     system = assemble(kWorld, pieces.local, kSteel, mass);
   }
@@ -93,8 +92,8 @@ TEST_P(Reactions, of_constant_strain_are_stress_times_area) {
 }
 
 TEST_P(Reactions, balance_force_and_couple_of_all_that_moves) {
-  // (K phi - lambda M phi) over all nodes is -lambda times the integrals of rho phi and (x - c) cross rho phi, and on the free nodes the
-  // residual; those are known from K and M of the free nodes alone, and from a polynomial's integral over the box.
+  // Sum of (K phi - lambda M phi) over all nodes: -lambda times the integrals of rho phi and (x - c) cross rho phi; on the free nodes: the
+  // residual, known from K and M of the free nodes and a polynomial's integral over the box.
   const Body body(GetParam(), job::Mass::consistent, at_end);
   const Field field = [](const Vec3& x) { return Vec3{x[0] * x[2], x[0], -2 * x[0]}; };
   const double lambda = 3e7;
@@ -156,7 +155,7 @@ TEST_P(Reactions, come_by_patches_that_no_element_joins) {
     EXPECT_NEAR(end.centre_m[0], s == 0 ? 0 : kSize[0], 1e-15);
     EXPECT_NEAR(end.centre_m[1], kSize[1] / 2, 1e-15);
   }
-  // The field is its own mirror image, the mesh is not: to its error the ends pull alike and turn against each other.
+  // The field is mirror-symmetric, the mesh is not: up to discretisation error, forces at the ends are equal and couples opposite.
   const double* r = supports.reaction.data();
   EXPECT_NEAR(r[2] / r[8], 1, 0.15);
   EXPECT_NEAR(r[4] / r[10], -1, 0.3);
@@ -166,7 +165,7 @@ TEST_P(Reactions, count_the_energy_of_elements_within_one_thickness) {
   const Body body(GetParam(), job::Mass::consistent, at_end);
   const std::vector<Field> fields{[](const Vec3& x) { return Vec3{x[0], 0, 0}; }};
   const double lambda = (kSteel.lame_lambda_pa() + 2 * kSteel.lame_mu_pa()) * kSize[0] * kSize[1] * kSize[2];  // phi^T K phi
-  // Cells of 20 mm, thickness 20 mm: the first of fifteen, whose constant strain has its part of the energy.
+  // Cells of 20 mm, thickness 20 mm: the first of fifteen, with its share of the energy of constant strain.
   EXPECT_NEAR(body.calc(fields, {lambda}).energy[0], 1.0 / 15, 1e-9);
 }
 

@@ -1,4 +1,4 @@
-// A job that must be refused, and what the refusal has to say.
+// An invalid job, and parts of the expected message.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -16,7 +16,7 @@ struct BadJob {
   const char* words;
 };
 
-/// Fails the test unless the text is refused with both the place and the words.
+/// Fails unless the text is refused with both the place and the words.
 inline void expect_refused(const BadJob& job) {
   try {
     job::parse_job(job.text, "/jobs/job.json");

@@ -1,4 +1,4 @@
-// Any bytes as a job: either a job whose resolved form reads back to the same resolved form, or an InputError.
+// Fuzzes jobs: the resolved form reads back to itself, or an InputError.
 #include <cstdint>
 #include <cstdlib>
 #include <string_view>

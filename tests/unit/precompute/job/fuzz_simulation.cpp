@@ -1,4 +1,4 @@
-// Any bytes as a job of carillon-simulate: bodies with outputs that stay within their ranges, or an InputError.
+// Fuzzes jobs of carillon-simulate: bodies within their ranges, or an InputError.
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>

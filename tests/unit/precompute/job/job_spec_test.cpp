@@ -34,7 +34,7 @@ TEST(JobSpec, defaults_are_T10_consistent_20_Hz_to_20_kHz) {
   EXPECT_EQ(job.bank, "/jobs/out/b.bank");
 }
 
-TEST(JobSpec, resources_are_read_and_are_no_part_of_the_resolved_job) {
+TEST(JobSpec, resources_are_read_and_not_in_the_resolved_job) {
   const JobSpec job = parse_job(job_with(R"(, "resources": {"ranks": 3, "memory_gb": 1.5, "time_limit_s": 60})"), "/jobs/job.json");
   EXPECT_EQ(job.resources.ranks, 3);
   EXPECT_EQ(job.resources.memory_gb, 1.5);
@@ -44,7 +44,7 @@ TEST(JobSpec, resources_are_read_and_are_no_part_of_the_resolved_job) {
     EXPECT_THROW(parse_job(job_with(std::string(", \"resources\": ") + bad), "/jobs/job.json"), InputError) << bad;
 }
 
-TEST(JobSpec, nonlinear_is_read_strictly_and_is_part_of_the_resolved_job) {
+TEST(JobSpec, nonlinear_is_read_strictly_and_in_the_resolved_job) {
   EXPECT_FALSE(parse_job(job_with(""), "/jobs/job.json").nonlinear);
   const JobSpec plain = parse_job(job_with(R"(, "nonlinear": {})"), "/jobs/job.json");
   ASSERT_TRUE(plain.nonlinear);
@@ -65,7 +65,7 @@ TEST(JobSpec, nonlinear_is_read_strictly_and_is_part_of_the_resolved_job) {
   const char* known = R"({"body": {"membrane": {"shape": "circle", "radius_m": 0.2, "lowest_hz": 200, "density_kg_m2": 0.3}},
                           "bank": "b", "nonlinear": {}})";
   EXPECT_THROW(parse_job(known, "/jobs/job.json"), InputError);
-  // The short form and the long one; of a body that is held.
+  // Short and long form, for a held body.
   const JobSpec shortly = parse_job(job_with(R"(, "fixed": "rim", "nonlinear": "stretch")"), "/jobs/job.json");
   ASSERT_TRUE(shortly.nonlinear);
   EXPECT_TRUE(shortly.nonlinear->is_stretch);
@@ -77,14 +77,14 @@ TEST(JobSpec, nonlinear_is_read_strictly_and_is_part_of_the_resolved_job) {
                InputError);
 }
 
-TEST(JobSpec, a_bank_may_be_left_out_only_where_a_store_keeps_it) {
+TEST(JobSpec, bank_is_optional_for_a_store_only) {
   const std::string text = "{\"mesh\": \"m.msh\", " + kMaterial + "}";
   EXPECT_TRUE(parse_job(text, "/jobs/job.json", BankKey::optional).bank.empty());
   EXPECT_EQ(resolved_json(parse_job(text, "/jobs/job.json", BankKey::optional), "/jobs", "").find("bank"), std::string::npos);
   EXPECT_THROW(parse_job(text, "/jobs/job.json"), InputError);
 }
 
-TEST(JobSpec, a_shape_may_stand_in_short_form) {
+TEST(JobSpec, a_shape_has_a_short_form) {
   const auto read = [](const std::string& body) {
     return parse_job("{" + body + ", \"material\": \"glass\"}", "/jobs/job.json", BankKey::optional);
   };
@@ -97,7 +97,7 @@ TEST(JobSpec, a_shape_may_stand_in_short_form) {
     EXPECT_THROW(read(bad), InputError) << bad;
 }
 
-TEST(JobSpec, facets_of_a_surface_may_be_planes) {
+TEST(JobSpec, facets_may_be_planes) {
   const auto read = [](const std::string& keys) {
     return parse_job(R"({"body": {)" + keys + R"(}, "material": "glass"})", "/jobs/job.json", BankKey::optional);
   };
@@ -112,7 +112,7 @@ TEST(JobSpec, facets_of_a_surface_may_be_planes) {
   EXPECT_THROW(read(R"("shape": "bowl", "outer_radius_m": 0.06, "facets": true)"), InputError);
 }
 
-TEST(JobSpec, what_says_neither_nodes_nor_accuracy_becomes_a_preview) {
+TEST(JobSpec, a_body_without_nodes_and_accuracy_is_a_preview) {
   const auto make = [](const std::string& body) {
     JobSpec job = parse_job("{" + body + ", \"material\": \"glass\"}", "/jobs/job.json", BankKey::optional);
     const bool is_preview = make_preview(job);
@@ -136,7 +136,7 @@ TEST(JobSpec, what_says_neither_nodes_nor_accuracy_becomes_a_preview) {
                InputError);
 }
 
-TEST(JobSpec, lame_constants_become_the_table_s_engineering_constants) {
+TEST(JobSpec, lame_constants_become_engineering_constants) {
   // references: lambda 3.99e9, mu 2.05e9 is E = 5.454 GPa, nu = 0.3303.
   const JobSpec job = parse_job(job_with(""), "/jobs/job.json");
   EXPECT_NEAR(job.material.young_modulus_pa, 5.454e9, 1e6);
@@ -145,7 +145,7 @@ TEST(JobSpec, lame_constants_become_the_table_s_engineering_constants) {
   EXPECT_NEAR(job.material.lame_mu_pa() / 2.05e9, 1.0, 1e-13);
 }
 
-TEST(JobSpec, the_resolved_job_is_a_job_again_and_resolves_to_itself) {
+TEST(JobSpec, the_resolved_job_resolves_to_itself) {
   const JobSpec job =
       parse_job(job_with(R"(, "element": "T4", "mass": "lumped", "max_modes": 7, "fixed": "x-min", "solver": {"tolerance": 1e-9})"),
                 "/jobs/a/job.json");
@@ -160,7 +160,7 @@ TEST(JobSpec, the_resolved_job_is_a_job_again_and_resolves_to_itself) {
   EXPECT_EQ(resolved_json(again, "/jobs/a/out", R"({"ranks": 2, "git": "abc"})"), text);
 }
 
-TEST(JobSpec, a_bank_that_links_to_the_mesh_is_refused) {
+TEST(JobSpec, a_bank_linked_to_the_mesh_is_refused) {
   namespace fs = std::filesystem;
   const carillon::tests::Folder folder;
   std::ofstream(folder / "m.msh") << "mesh";
@@ -169,7 +169,7 @@ TEST(JobSpec, a_bank_that_links_to_the_mesh_is_refused) {
   EXPECT_THROW(parse_job(job_with(""), folder / "job.json"), InputError);
 }
 
-TEST(JobSpec, a_resolved_job_may_be_the_record_that_it_writes_again) {
+TEST(JobSpec, a_resolved_job_may_overwrite_its_record) {
   EXPECT_NO_THROW(parse_job("{\"mesh\": \"m\", \"bank\": \"b\"," + kMaterial + "}", "/jobs/b.resolved.json"));
 }
 
@@ -179,7 +179,7 @@ TEST(JobSpec, a_resolved_job_moves_with_its_folder) {
   EXPECT_EQ(moved.mesh, "/elsewhere/m.msh");
 }
 
-TEST(JobSpec, the_scale_of_a_mesh_is_part_of_the_resolved_job) {
+TEST(JobSpec, mesh_scale_is_in_the_resolved_job) {
   const JobSpec plain = parse_job(job_with(""), "/jobs/job.json"),
                 scaled = parse_job(job_with(", \"mesh_scale\": 0.001"), "/jobs/job.json");
   EXPECT_EQ(plain.mesh_scale, 1.0);
@@ -195,7 +195,7 @@ std::vector<std::string> warnings_of(const std::string& material) {
   return parse_job("{\"mesh\": \"m\", \"bank\": \"b\",\n\n\"material\": {" + material + "}}", "/jobs/job.json").warnings;
 }
 
-TEST(JobSpec, units_of_another_system_are_asked_about_at_their_line) {
+TEST(JobSpec, values_in_other_units_are_warnings_with_a_line) {
   const std::string damping = R"(, "damping": {"internal_friction": {"tan_phi": 1e-3}})";
   EXPECT_TRUE(warnings_of(R"("young_modulus_pa": 72e9, "poisson_ratio": 0.22, "density_kg_m3": 2500)" + damping).empty());
   EXPECT_TRUE(warnings_of(R"("lame_lambda_pa": 3.99e9, "lame_mu_pa": 2.05e9, "density_kg_m3": 2700)" + damping).empty());
@@ -214,7 +214,7 @@ TEST(JobSpec, units_of_another_system_are_asked_about_at_their_line) {
   }
 }
 
-TEST(JobSpec, damping_that_is_none_or_leaves_nothing_to_swing_is_asked_about) {
+TEST(JobSpec, zero_damping_and_overdamping_are_warnings) {
   const std::string steel = R"("young_modulus_pa": 2e11, "poisson_ratio": 0.3, "density_kg_m3": 7850, "damping": )";
   for (const char* good : {R"({"rayleigh": {"alpha1_s": 1e-7}})", R"({"rayleigh": {"alpha2_per_s": 5}})",
                            R"({"internal_friction": {"tan_phi": 0.5}})", R"({"loss_table": [[100, 0], [1000, 0.1]]})"})
@@ -233,7 +233,7 @@ TEST(JobSpec, damping_that_is_none_or_leaves_nothing_to_swing_is_asked_about) {
 }
 
 class BadJobs : public testing::TestWithParam<BadJob> {};
-TEST_P(BadJobs, is_refused_with_the_line_and_the_correction) { carillon::tests::expect_refused(GetParam()); }
+TEST_P(BadJobs, are_refused_with_line_and_remedy) { carillon::tests::expect_refused(GetParam()); }
 
 std::string material_with(const std::string& inside) { return "{\"mesh\": \"m\", \"bank\": \"b\",\n\n\"material\": {" + inside + "}}"; }
 const std::string kDamping = R"(, "density_kg_m3": 1, "damping": {"rayleigh": {}})";

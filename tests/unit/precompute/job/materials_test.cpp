@@ -1,4 +1,4 @@
-// Materials, damping laws and bodies in jobs: what is read, what is refused, and that a resolved job is the same job again.
+// Materials, damping laws and bodies in jobs: reading, refusals, and round trips.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -31,7 +31,7 @@ const std::string kBody = R"("bank": "b", "material": )" + steel(kRayleigh);
 
 double lambda_at(double freq_hz) { return std::pow(2 * std::numbers::pi * freq_hz, 2); }
 
-TEST(DampingLaws, give_the_decay_that_their_formulas_say) {
+TEST(DampingLaws, give_the_decay_of_their_formulas) {
   const auto decay = [](const std::string& damping, double f) {
     return parse_job(with_damping(damping), "/j.json").material.calc_decay_per_s(lambda_at(f));
   };
@@ -53,16 +53,16 @@ TEST(LossTables, are_linear_in_log_frequency_and_constant_beyond_their_ends) {
   EXPECT_NEAR(eta(19000), 0.02, 1e-12);
 }
 
-TEST(OrthotropicMaterials, stand_for_an_isotropic_one_by_Hills_average) {
+TEST(OrthotropicMaterials, have_an_isotropic_equivalent_by_Hills_average) {
   const auto material = parse_job(wood(kSpruce), "/j.json").material;
-  // By numpy: Hill's mean of the isotropic parts of C and of its inverse as tensors of the fourth order.
+  // By numpy: Hill's mean of the isotropic parts of C and of its inverse, as fourth-order tensors.
   EXPECT_NEAR(material.young_modulus_pa / 1527605905.64, 1, 1e-11);
   EXPECT_NEAR(material.poisson_ratio, 0.264749891816, 1e-11);
 }
 
-TEST(OrthotropicMaterials, have_the_elasticity_whose_inverse_is_their_compliance) {
+TEST(OrthotropicMaterials, have_the_inverse_of_their_compliance) {
   const auto c = parse_job(wood(kSpruce + ", \"axes\": [[0, 1, 0], [0, 0, 1]]"), "/j.json").material.calc_elasticity_pa();
-  // Axis 1 of the material is y of the mesh, 2 is z, 3 is x. A pull along y: strain S e_y gives the stress e_y.
+  // Axis 1 of the material is y of the mesh, 2 is z, 3 is x. A tension along y: strain S e_y gives the stress e_y.
   const double strain[3] = {-0.47 / 11e9, 1 / 11e9, -0.37 / 11e9};
   for (int i = 0; i < 3; ++i) {
     double stress = 0;
@@ -136,7 +136,7 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& info) { return std::string(info.param.first); });
 
 class BadMaterials : public testing::TestWithParam<BadJob> {};
-TEST_P(BadMaterials, are_refused_with_the_line_and_the_correction) { carillon::tests::expect_refused(GetParam()); }
+TEST_P(BadMaterials, are_refused_with_line_and_remedy) { carillon::tests::expect_refused(GetParam()); }
 
 std::string wood_of(const std::string& nu) {
   return wood("\"young_modulus_pa\": [11e9, 0.9e9, 0.5e9], \"shear_modulus_pa\": [0.7e9, 0.04e9, 0.6e9],\n\"poisson_ratio\": " + nu);
@@ -180,12 +180,12 @@ INSTANTIATE_TEST_SUITE_P(
                "job.json:4:", "chooses the tolerance"},
         BadJob{"accuracy_and_nodes", with_body("\"shape\": \"tube\", \"nodes\": 5000", ", \"accuracy_cents\": 5"),
                "job.json:2:", "chooses the mesh"},
-        BadJob{"accuracy_zero", with_material("\"accuracy_cents\": 0"), "job.json:3:", "greater than 0"},
+        BadJob{"accuracy_zero", with_material("\"accuracy_cents\": 0"), "job.json:3:", "from 0.001 to 1200 cents"},
         BadJob{"body_and_mesh", "{\"mesh\": \"m\"," + kBody + ",\n\"body\": {\"shape\": \"tube\"}}", "job.json:2: \"body\"", "give one of"},
         BadJob{"shape_mistyped", with_body("\"shape\": \"tub\""), "job.json:2:", "did you mean \"tube\"?"},
         BadJob{"dimension_of_another", with_body("\"shape\": \"tube\", \"radius_m\": 1"),
                "job.json:2:", "did you mean \"outer_radius_m\"?"},
-        BadJob{"length_in_mm", with_body("\"shape\": \"tube\", \"length_m\": 50500"), "job.json:2:", "lengths are metres"},
+        BadJob{"length_in_mm", with_body("\"shape\": \"tube\", \"length_m\": 50500"), "job.json:2:", "from 1e-06 to 10000 m"},
         BadJob{"shape_and_surface", with_body("\"shape\": \"tube\", \"surface\": \"a.obj\""), "job.json:2:", "one of the two"},
         BadJob{"nodes_and_edge", with_body("\"surface\": \"a.obj\", \"nodes\": 5000, \"edge_m\": 0.1"),
                "job.json:2:", "give one of the two"},

@@ -18,7 +18,7 @@ const std::string kMaterial =
     R"("material": {"young_modulus_pa": 2e11, "poisson_ratio": 0.3, "density_kg_m3": 7850, "damping": {"rayleigh": {"alpha1_s": 1e-8, "alpha2_per_s": 2}}})";
 const std::string kBar = R"({"name": "bar", "mesh": "bar.msh", )" + kMaterial + "}";
 
-/// A job of these bodies, with more keys of "simulate" and of the job.
+/// A job with these bodies and more keys of "simulate" and of the job.
 std::string make_job(const std::string& bodies, const std::string& more = "", const std::string& outer = R"(, "sound": "s.wav")") {
   return R"({"simulate": {"duration_s": 1, "bodies": [)" + bodies + "]" + more + "}" + outer + "}";
 }
@@ -44,7 +44,7 @@ TEST(Simulation, defaults) {
   EXPECT_FALSE(is_simulation("no job"));
 }
 
-TEST(Simulation, all_keys_of_bodies_and_what_meets_them) {
+TEST(Simulation, all_keys_of_bodies_strikers_and_obstacles) {
   const std::string sheet = R"({"name": "sheet", "sheet": {"shape": "rectangle", "length_m": 0.3, "width_m": 0.2, "thickness_m": 1e-3,
       "cells": 12, "bow_m": 0.01}, )" +
                             kMaterial + R"(, "fixed": ["x-min", {"box_m": {"min": [0, 0, 0], "max": [1, 1, 1]}}],
@@ -80,13 +80,13 @@ TEST(Simulation, all_keys_of_bodies_and_what_meets_them) {
   EXPECT_TRUE(spec.visibility) << "the paper's sound has shadows";
 }
 
-TEST(Simulation, a_listener_looks_at_a_place) {
+TEST(Simulation, a_listener_looks_at_a_point) {
   const SimulationSpec spec = parse(make_job(kBar, R"(, "listener": {"position_m": [0, -2, 0], "look_at_m": [0, 5, 0]})"));
   EXPECT_EQ(spec.receivers.facing, (Vec3{0, 1, 0}));
   EXPECT_TRUE(spec.receivers.microphones_m.empty());
 }
 
-TEST(Simulation, other_laws_of_loss_become_rayleighs_with_a_warning) {
+TEST(Simulation, other_damping_laws_become_rayleighs_with_a_warning) {
   const std::string glass = R"({"name": "bar", "mesh": "bar.msh", "material": {"young_modulus_pa": 7e10, "poisson_ratio": 0.2,
       "density_kg_m3": 2500, "damping": {"internal_friction": {"tan_phi": 1e-3}}}})";
   const SimulationSpec spec = parse(make_job(glass));
@@ -100,7 +100,7 @@ TEST(Simulation, other_laws_of_loss_become_rayleighs_with_a_warning) {
   }
 }
 
-TEST(Simulation, bad_jobs_are_refused_with_place_and_words) {
+TEST(Simulation, invalid_jobs_are_refused_with_place_and_cause) {
   const auto body = [](const std::string& more) { return R"({"name": "b", )" + more + kMaterial + "}"; };
   const std::string sheet = R"("sheet": {"shape": "disc", "radius_m": 0.1, "thickness_m": 1e-3}, )", mesh = R"("mesh": "m.msh", )";
   for (const auto& [text, place, words] : std::vector<std::array<std::string, 3>>{

@@ -1,4 +1,4 @@
-// Meshes cut by the separator tree of their nodes against the same meshes cut by METIS or bisection, on any number of ranks.
+// Meshes partitioned by the separator tree of their nodes against METIS or bisection partitions, on any number of ranks.
 #include "precompute/run/cut_mesh.hpp"
 
 #include <gtest/gtest.h>
@@ -25,7 +25,7 @@ using tests::get_rank;
 using tests::get_ranks;
 using Ints = std::vector<std::int32_t>;
 
-/// A plate of T10 with unused nodes, and the nodes of its end, of which many elements have all.
+/// A plate of T10 with unused nodes, and the nodes of its end, including complete elements.
 mesh::TetMesh make_plate() {
   mesh::TetMesh plate = tests::make_box({16, 9, 2}, {0.16, 0.09, 0.02}, 2);
   for (int k = 0; k < 5; ++k) plate.nodes_m.push_back({9, 9, 9});
@@ -47,7 +47,7 @@ fem::System assemble(const comm::Communicator& comm, const mesh::LocalMesh& loca
   return fem::assemble(comm, local, steel, job::Mass::consistent);
 }
 
-/// Eigenvalues below sigma, with the backward error small.
+/// Number of eigenvalues below sigma, with the backward error checked.
 std::int64_t count_below(const fem::System& system, const ldlt::MeshOrder* order, double sigma) {
   ldlt::Factor factor({system.stiffness, system.mass}, order);
   EXPECT_TRUE(factor.factorise(sigma));

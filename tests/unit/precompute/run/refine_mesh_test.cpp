@@ -1,4 +1,4 @@
-// Every tetrahedron into eight: the body, its sets and its curved sides stay.
+// Each tetrahedron is cut into eight: body, sets and curved sides are preserved.
 #include "precompute/run/refine_mesh.hpp"
 
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@ TEST(Refine, makes_eight_of_each_and_keeps_the_volume_for_both_orders) {
     mesh::TetMesh fine = refine_mesh(box);
     EXPECT_EQ(fine.order, order);
     EXPECT_EQ(fine.tet_count(), 8 * old.tet_count());
-    const mesh::CheckReport report = mesh::check_mesh(fine);  // throws for what does not fit together
+    const mesh::CheckReport report = mesh::check_mesh(fine);  // throws for an inconsistent mesh
     EXPECT_EQ(report.reoriented, 0);
     EXPECT_EQ(report.welded, 0);
     EXPECT_EQ(report.unreferenced, 0);
@@ -39,7 +39,7 @@ TEST(Refine, gives_the_nodes_that_a_lattice_twice_as_fine_has) {
       EXPECT_EQ(fine.nodes_m.size(), lattice.nodes_m.size());
     }
     for (const auto& [name, nodes] : fine.node_sets) {
-      // Sets of faces: all nodes on them and no others.
+      // Face sets: exactly the nodes on the faces.
       const std::size_t axis = name[0] - 'x';
       const double side = std::array{0.3, 0.02, 0.01}[axis] / 2 * (name.ends_with("min") ? -1 : 1);
       std::vector<std::int32_t> expected;
@@ -55,10 +55,10 @@ TEST(Refine, keeps_the_curved_body_exactly) {
   const double before = mesh::check_mesh(ball).volume_m3;
   mesh::TetMesh fine = refine_mesh(ball);
   const mesh::CheckReport report = mesh::check_mesh(fine);
-  EXPECT_NEAR(report.volume_m3 / before, 1, 1e-12);  // the same quadratic maps, in parts
+  EXPECT_NEAR(report.volume_m3 / before, 1, 1e-12);  // the same quadratic maps, subdivided
   EXPECT_GT(report.curved, 0);
   EXPECT_EQ(report.straightened, 0);
-  // Old nodes stay where and what they are.
+  // Old nodes keep their numbers and positions.
   for (std::size_t i = 0; i < ball.nodes_m.size(); ++i) EXPECT_EQ(fine.nodes_m[i], ball.nodes_m[i]);
 }
 

@@ -27,7 +27,7 @@ TEST(RunLog, take_the_seconds_of_the_slowest_rank_and_the_memory_of_all) {
   }
   const RunPhase& phase = phases.end();
   EXPECT_GE(phase.seconds, 0.05);
-  EXPECT_GE(phase.cpu_seconds, 0.0199);  // The loop ends by that clock too, whatever share of a core there was.
+  EXPECT_GE(phase.cpu_seconds, 0.0199);  // the loop is timed by the same clock, independent of the load
   EXPECT_GT(phase.peak_bytes, 1 << 20);
   EXPECT_GE(phase.peak_sum_bytes, phase.peak_bytes);
   EXPECT_LE(phase.peak_sum_bytes, ranks * phase.peak_bytes);
@@ -37,7 +37,7 @@ TEST(RunLog, counts_no_waiting_for_other_ranks) {
   const comm::Communicator ranks(MPI_COMM_WORLD);
   RunLog log(ranks, true);
   log.begin("read", "");
-  if (!ranks.is_root()) std::this_thread::sleep_for(std::chrono::milliseconds(600));  // rank 0 is in the reduction meanwhile
+  if (!ranks.is_root()) std::this_thread::sleep_for(std::chrono::milliseconds(600));  // rank 0 waits in the reduction meanwhile
   const RunPhase& phase = log.end();
   EXPECT_LT(phase.cpu_seconds, 0.3);
   EXPECT_GE(phase.seconds, ranks.size() > 1 ? 0.6 : 0.0);

@@ -1,4 +1,4 @@
-// Sounds of scenes with all their samples, for tests.
+// Sounds of scenes with all samples.
 #pragma once
 
 #include <vector>
@@ -7,7 +7,7 @@
 
 namespace carillon::render {
 
-/// A sound with all its samples by channel, for looking at.
+/// A sound with all samples by channel.
 struct Heard : Sound {
   std::vector<std::vector<double>> pressure_pa;
 };

@@ -1,4 +1,4 @@
-// One function from a scene to a sound, each case a short scene; longer than most files.
+// Rendering of short scenes; longer than most files.
 #include "runtime/render/render.hpp"
 
 #include <gtest/gtest.h>
@@ -15,11 +15,11 @@
 #include <numbers>
 #include <string>
 
-#include "runtime/base/error.hpp"
 #include "runtime/acoustics/head/sofa.hpp"
-#include "runtime/scene/microphones.hpp"
+#include "runtime/base/error.hpp"
 #include "runtime/render/report.hpp"
 #include "runtime/render/sound_file.hpp"
+#include "runtime/scene/microphones.hpp"
 #include "tests/support/folder.hpp"
 #include "tests/support/paths.hpp"
 #include "tests/unit/runtime/acoustics/head/oracle.hpp"
@@ -32,7 +32,7 @@ namespace {
 
 using std::numbers::pi;
 
-/// Back into a store, all channels of the same length.
+/// A store with these channels of equal length.
 sound::SoundStore keep(const std::vector<std::vector<double>>& pressure_pa, int rate_hz) {
   sound::SoundStore store(rate_hz, pressure_pa.size());
   for (std::size_t n = 0; n < pressure_pa[0].size(); ++n) {
@@ -50,7 +50,7 @@ std::string make_wav(const sound::SoundStore& store, double gain_per_pa, scene::
   return bytes;
 }
 
-/// One cube at `position`, still, struck once in z with 1 N s at `time_s`; the listener at the origin looks along +y.
+/// One cube at `position`, at rest, struck once in z with 1 N s at `time_s`; the listener at the origin looks along +y.
 struct Case {
   bank::Bank bank;
   scene::Scene scene;
@@ -69,7 +69,7 @@ struct Case {
     simulation.poses[0].push_back(at);
     simulation.impulses.push_back({.time_s = time_s, .body = 0, .triangle = 0, .barycentric = {1, 0, 0}, .impulse_n_s = {0, 0, 1}});
   }
-  /// The path with its velocities and the impulses as events.
+  /// Waypoints and impulses as events.
   std::vector<events::Event> list_events() const {
     std::vector<synth::PathPoint> places;
     for (const physics::Pose& pose : simulation.poses[0]) places.push_back({pose.time_s, pose.position_m});
@@ -94,7 +94,7 @@ TEST(Render, PressureAtTheEarsIsTheClosedForm) {
     const double r = ear == 0 ? 3.1 : 2.9;
     for (int n = 0; n < 24000; ++n) {
       const double t = n / 48000.0 - 0.1 - r / 343.0;
-      if (std::abs(t) < 16.0 / 48000.0) continue;  // the band limit of the delay rings about the jump
+      if (std::abs(t) < 16.0 / 48000.0) continue;  // ringing of the delay's band limit at the jump
       const double expected = t < 0.0 ? 0.0 : 2.0 / r * std::cos(2 * pi * 1000.0 * t);
       ASSERT_NEAR(sound.pressure_pa[ear][n], expected, 2e-4 * 2.0 / r) << "ear " << ear << " sample " << n;
     }
@@ -104,7 +104,7 @@ TEST(Render, PressureAtTheEarsIsTheClosedForm) {
   EXPECT_EQ(sound.strikes, 1);
 }
 
-TEST(Render, AnyListOfMicrophonesIsHeardEachAtItsPlace) {
+TEST(Render, EachMicrophoneHasItsPosition) {
   for (const std::size_t count : {1u, 2u, 5u}) {
     Case c({{1000.0, 0.0, 2.0}}, {0.5, 0.0, 0.2}, 0.1);
     for (std::size_t i = 0; i < count; ++i) c.scene.microphones_m.push_back({0.7 * static_cast<double>(i), 1.0, -0.3});
@@ -124,7 +124,7 @@ TEST(Render, AnyListOfMicrophonesIsHeardEachAtItsPlace) {
   }
 }
 
-TEST(Render, AllInstructionSetsAreTheClosedFormToSinglePrecision) {
+TEST(Render, AllInstructionSetsMatchTheClosedFormToSinglePrecision) {
   for (const synth::Isa isa : {synth::Isa::kPlain, synth::Isa::kSse2, synth::Isa::kAvx2, synth::Isa::kAvx512}) {
     Case c({{1000.0, 0.0, 2.0}}, {3.0, 0.0, 0.0}, 0.1);
     c.scene.quality.instructions = isa;
@@ -134,8 +134,8 @@ TEST(Render, AllInstructionSetsAreTheClosedFormToSinglePrecision) {
   }
 }
 
-TEST(Render, SilenceIsWhereTheSceneSays) {
-  // A mode that falls by e^-100 t from 2 / 3 Pa: asleep at 1 Pa, it is cut off; the time is that at 1 m.
+TEST(Render, BodiesSleepBelowTheSilenceThresholdOfTheScene) {
+  // A mode that decays by e^-100 t from 2 / 3 Pa is cut off at 1 Pa; the time is that at 1 m.
   Case c({{1000.0, 100.0, 2.0}}, {3.0, 0.0, 0.0}, 0.1);
   const auto find_last_sample = [](const Heard& sound) {
     std::size_t last = sound.pressure_pa[0].size();
@@ -144,13 +144,13 @@ TEST(Render, SilenceIsWhereTheSceneSays) {
   };
   const std::size_t usual = find_last_sample(c.render());
   c.scene.quality.silence_pa = 0.2;
-  // Below 0.2 Pa / (1 group + 1) after ln(20) / 100 s, looked at every 1024 samples.
+  // Below 0.2 Pa / (1 group + 1) after ln(20) / 100 s, checked every 1024 samples.
   const double until_s = 0.1 + 3.1 / 343.0 + std::log(20.0) / 100.0;
   EXPECT_NEAR(static_cast<double>(find_last_sample(c.render())) / 48000.0, until_s + 0.5 * 1024 / 48000.0, 0.5 * 1024 / 48000.0 + 2e-3);
   EXPECT_GT(static_cast<double>(usual) / 48000.0, until_s + 0.1);
 }
 
-TEST(Render, AsManyModesRingAtOnceAsTheSceneAllows) {
+TEST(Render, NumberOfRingingModesIsLimited) {
   std::vector<testing::InventedMode> modes;
   for (int i = 0; i < 64; ++i) modes.push_back({400.0 + 150.0 * i, 2.0, 1.0 / (1.0 + i)});
   Case c(modes, {3.0, 0.0, 0.0}, 0.01);
@@ -162,7 +162,7 @@ TEST(Render, AsManyModesRingAtOnceAsTheSceneAllows) {
   EXPECT_NEAR(static_cast<double>(all) / static_cast<double>(few), 4.0, 0.4);
 }
 
-TEST(Render, AListenerThatWalksTakesItsEarsAlong) {
+TEST(Render, EarsMoveWithTheListener) {
   Case c({{1000.0, 0.0, 2.0}}, {0.0, 0.0, 0.0}, 0.01);
   c.scene.listener.path = {{0.0, {1.0, -3.0, 0.0}}, {0.6, {1.0, 3.0, 0.0}}};
   c.scene.listener.position_m = {1.0, -3.0, 0.0};
@@ -176,8 +176,8 @@ TEST(Render, AListenerThatWalksTakesItsEarsAlong) {
   }
 }
 
-// A dipole along z, turned by its pose to x, above a ground that throws half of the pressure back.
-TEST(Render, DirectivityAndTheGroundAreThoseOfTheScene) {
+// A dipole along z, rotated to x, above a ground that reflects half of the pressure.
+TEST(Render, DirectivityAndGroundReflectionMatchTheClosedForm) {
   constexpr double kFreq = 1000.0, kRadius = 0.09, k = 2.0 * pi * kFreq / 343.0;
   Case c({{kFreq, 0.0, 2.0}}, {0.0, 0.0, 0.0}, 0.1);
   testing::give_multipoles(c.bank, {testing::make_dipole(1.0)}, kRadius);
@@ -218,14 +218,14 @@ Case make_case_with_head() {
   return c;
 }
 
-// The sphere has the width of the ears, looks where the listener does, and is heard at the time of the scene: its latency is cut off.
-TEST(Render, AHeadHearsAsTheSceneTurnsIt) {
+// The sphere has the width of the ears and the listener's orientation, without latency.
+TEST(Render, SphericalHeadHasTheOrientationOfTheListener) {
   const Case c = make_case_with_head();
   const Heard sound = c.render();
   ASSERT_EQ(sound.pressure_pa[0].size(), 24000u);
   constexpr double k = 2.0 * pi * 1500.0 / 343.0;
   for (std::size_t ear = 0; ear < 2; ++ear) {
-    const double angle = (ear == 0 ? 10.0 : 170.0) * pi / 180.0;  // ears lie 10 degrees behind the middle
+    const double angle = (ear == 0 ? 10.0 : 170.0) * pi / 180.0;  // ears are 10 degrees behind the middle
     const std::complex<double> at_ear = std::polar(1.0, -2.0 * k) * head::testing::calc_rigid_sphere(k * 0.09, angle);
     for (std::size_t n = 9600; n < 23000; ++n) {
       const double t = static_cast<double>(n) / 48000.0 - 0.1;
@@ -234,8 +234,8 @@ TEST(Render, AHeadHearsAsTheSceneTurnsIt) {
   }
 }
 
-// The head of a file whose law is known: an ear hears a source in the direction d with the level 1 +- 0.5 d_y.
-TEST(Render, AMeasuredHeadIsThatOfItsFile) {
+// A head file with a known law: the level of an ear for the direction d is 1 +- 0.5 d_y.
+TEST(Render, MeasuredHeadIsReadFromItsFile) {
   if (!head::has_sofa()) GTEST_SKIP() << "built without SOFA";
   const tests::Folder folder;
   Case c = make_case_with_head();
@@ -258,7 +258,7 @@ TEST(Render, AMeasuredHeadIsThatOfItsFile) {
   }
 }
 
-TEST(Render, AHeadThatWasMadeBeforeIsNotReadAgain) {
+TEST(Render, GivenHeadIsNotReadAgain) {
   if (!head::has_sofa()) GTEST_SKIP() << "built without SOFA";
   Case c = make_case_with_head();
   const Heard wanted = c.render();
@@ -268,16 +268,16 @@ TEST(Render, AHeadThatWasMadeBeforeIsNotReadAgain) {
   EXPECT_EQ(calc_sound(c.scene, {&c.bank}, c.list_events(), {.rate_hz = 48000, .head = &head}).pressure_pa, wanted.pressure_pa);
 }
 
-TEST(Render, AccelerationNoiseIsADipoleAlongThePush) {
-  // The cube (10 cm, 1 kg) weighs nothing in its modes: what is heard is its click, rho0 c0 a / m times e^{-t/T} (cos t/T - sin t/T) for an
-  // impulse of 1 N s along z, turned to x by the pose; T = a / c0, from the time that sound needs from the nearest point of its sphere.
+TEST(Render, AccelerationNoiseIsADipoleAlongTheImpulse) {
+  // The modes of the cube (10 cm, 1 kg) are silent; its click is rho0 c0 a / m times e^{-t/T} (cos t/T - sin t/T) for an impulse of 1 N s
+  // along z, rotated to x; T = a / c0, from the travel time of the nearest point of its sphere.
   Case c({{1000.0, 5.0, 0.0}}, {0.0, 0.0, 0.0}, 0.1);
   const double half = std::sqrt(0.5);
   for (physics::Pose& pose : c.simulation.poses[0]) pose.rotation = {half, 0.0, half, 0.0};  // a quarter turn about y: z to x
   c.simulation.impulses[0].duration_s = 2e-4;
   c.scene.microphones_m = {{2.0, 0.0, 0.0}, {0.0, 2.0, 0.0}, {-2.0, 0.0, 0.0}, {1.2, 1.6, 0.0}};
-  EXPECT_EQ(c.render().peak_pa, 0.0);  // only where the scene asks for it
-  c.scene.effects = scene::kPlayableEffects;
+  EXPECT_EQ(c.render().peak_pa, 0.0);  // off by default
+  c.scene.effects = synth::EffectSet::all();
   const Heard sound = c.render();
   const double radius = 0.1 * std::cbrt(3.0 / (4.0 * pi)), lag = radius / 343.0;
   double scale = 0.0;
@@ -291,23 +291,23 @@ TEST(Render, AccelerationNoiseIsADipoleAlongThePush) {
     }
     expected *= 1.21 * 343.0 * radius / 1.0 / 2.0 / area;
     scale = std::max(scale, std::abs(expected));
-    ASSERT_NEAR(sound.pressure_pa[0][n], expected, 0.1) << n;  // of a peak of 12: the delay's band limit
+    ASSERT_NEAR(sound.pressure_pa[0][n], expected, 0.1) << n;  // relative to a peak of 12: band limit of the delay
     ASSERT_NEAR(sound.pressure_pa[1][n], 0.0, 1e-5);
     ASSERT_NEAR(sound.pressure_pa[2][n], -sound.pressure_pa[0][n], 1e-5);
     ASSERT_NEAR(sound.pressure_pa[3][n], 0.6 * sound.pressure_pa[0][n], 1e-4);
   }
   EXPECT_GT(scale, 5.0);
-  c.scene.bodies[0].spec.fixed = true;  // nothing moves it
+  c.scene.bodies[0].spec.fixed = true;  // immovable
   EXPECT_EQ(c.render().peak_pa, 0.0);
 }
 
-TEST(Render, EffectsCanBeTakenAway) {
+TEST(Render, EffectsCanBeDisabled) {
   using synth::Effect;
   Case c({{1000.0, 0.0, 2.0}}, {0.0, 3.43, 0.0}, 0.1);
   c.simulation.impulses[0].duration_s = 1e-3;
   c.scene.effects = {Effect::kHertzPulse};
   EXPECT_EQ(c.render().peak_pa, 0.0);
-  // An ideal impulse, at once, in the middle: 2 / 3.43 cos from 0.1 s on in both channels.
+  // An ideal impulse without delay at the centre: 2 / 3.43 cos from 0.1 s on in both channels.
   c.scene.effects = {Effect::kModal};
   c.scene.listener.ear_distance_m = 3.0;
   const Heard sound = c.render();
@@ -315,7 +315,7 @@ TEST(Render, EffectsCanBeTakenAway) {
   for (int n = 4900; n < 24000; ++n) {
     ASSERT_NEAR(sound.pressure_pa[0][n], 2.0 / 3.43 * std::cos(2 * pi * 1000.0 * (n / 48000.0 - 0.1)), 2e-4) << n;
   }
-  // With the pulse it is softer by its spectrum, and with the delay 10 ms later but without Doppler shift when it flies away.
+  // The pulse attenuates by its spectrum; the delay adds 10 ms, without Doppler shift of a receding body.
   c.scene.effects = {Effect::kModal, Effect::kHertzPulse};
   EXPECT_LT(c.render().peak_pa, 0.8 * sound.peak_pa);
   c.scene.effects = {Effect::kModal, Effect::kAirDelay};
@@ -327,7 +327,7 @@ TEST(Render, EffectsCanBeTakenAway) {
   }
 }
 
-TEST(Render, NoSoundComesBeforeTheContactCanBeHeard) {
+TEST(Render, NoSoundArrivesBeforeTheTravelTime) {
   const Case c({{1000.0, 5.0, 2.0}}, {0.0, 3.43, 0.0}, 0.1);
   const Heard sound = c.render();
   const std::size_t arrival = (0.1 + std::hypot(3.43, 0.1) / 343.0) * 48000.0;
@@ -335,7 +335,7 @@ TEST(Render, NoSoundComesBeforeTheContactCanBeHeard) {
   EXPECT_GT(std::abs(sound.pressure_pa[0][arrival + 2]), 0.1);
 }
 
-TEST(Render, ABodyThatFliesAwayIsHeardLowerAndSofter) {
+TEST(Render, RecedingBodyIsLowerAndSofter) {
   Case c({{1000.0, 0.0, 1.0}}, {0.0, 1.0, 0.0}, 0.001);
   c.simulation.poses[0] = {{0.0, {0.0, 1.0, 0.0}}, {0.25, {0.0, 6.0, 0.0}}, {0.5, {0.0, 11.0, 0.0}}};
   const Heard sound = c.render();
@@ -353,7 +353,7 @@ TEST(Render, ABodyThatFliesAwayIsHeardLowerAndSofter) {
   EXPECT_GT(std::abs(component(expected, 4800)), 1.5 * std::abs(component(expected, 19200)));
 }
 
-TEST(Render, ABodyThatFallsOutOfHearingDoesNoHarm) {
+TEST(Render, BodyBeyondTheAudibleDistanceIsHarmless) {
   Case c({{1000.0, 1.0, 1.0}}, {0.0, 1.0, 0.0}, 0.001);
   c.simulation.poses[0] = {{0.0, {0.0, 1.0, 0.0}}, {0.1, {0.0, 1.0, -10.0}}, {0.5, {0.0, 1.0, -1e7}}};
   const Heard sound = c.render();
@@ -361,14 +361,14 @@ TEST(Render, ABodyThatFallsOutOfHearingDoesNoHarm) {
   EXPECT_GT(sound.peak_pa, 0.1);
 }
 
-TEST(Render, TheRateOfTheOutputDecidesWhichModesSound) {
+TEST(Render, ModesAboveNyquistAreSilent) {
   const Case c({{1000.0, 5.0}, {15000.0, 5.0}, {23999.0, 5.0}, {30000.0, 5.0}}, {0.0, 1.0, 0.0}, 0.1);
   EXPECT_EQ(c.render(48000).modes, 3);
   EXPECT_EQ(c.render(22050).modes, 1);
   EXPECT_EQ(c.render(96000).modes, 4);
 }
 
-TEST(Render, ASceneWithoutContactsIsSilentAndStaysFinite) {
+TEST(Render, SceneWithoutContactsIsSilent) {
   Case c({{1000.0, 5.0}}, {0.0, 1.0, 0.0}, 0.1);
   c.simulation.impulses.clear();
   const Heard sound = c.render();
@@ -380,11 +380,12 @@ TEST(Render, ASceneWithoutContactsIsSilentAndStaysFinite) {
   EXPECT_EQ(wav.find_first_not_of('\0', wav.size() - 24000 * 6), std::string::npos);
   Figures figures;
   c.scene.bodies[0].spec.bank = &c.bank;
-  const scene::Plan plan = scene::make_plan(scene::make_facts(c.scene, scene::make_microphones(c.scene), true), scene::make_events(c.list_events()), {});
+  const scene::Plan plan =
+      scene::make_plan(scene::make_facts(c.scene, scene::make_microphones(c.scene), true), scene::make_events(c.list_events()));
   EXPECT_NE(make_report_json(c.scene, sound, plan, figures).find("\"mean_db_spl\": null"), std::string::npos);
 }
 
-TEST(Render, ImpulsesThatAreNoNumbersAreLeftOutAndCounted) {
+TEST(Render, NonFiniteImpulsesAreIgnoredAndCounted) {
   Case c({{1000.0, 5.0}}, {0.0, 1.0, 0.0}, 0.1);
   physics::Impulse bad = c.simulation.impulses[0];
   bad.impulse_n_s[1] = std::numeric_limits<double>::quiet_NaN();
@@ -414,7 +415,7 @@ TEST(SoundFile, LibsndfileReadsEveryFormatAndRateBack) {
     std::vector<std::vector<double>> pressure_pa(2);
     for (int n = 0; n < 5000; ++n) {
       pressure_pa[0].push_back(static_cast<float>(4.0 * std::sin(0.37 * n)));
-      pressure_pa[1].push_back(n == 17 ? 4.0F : n == 18 ? -4.0F : 1e-6F * static_cast<float>(n));  // full scale must not wrap round
+      pressure_pa[1].push_back(n == 17 ? 4.0F : n == 18 ? -4.0F : 1e-6F * static_cast<float>(n));  // full scale must not wrap
     }
     for (const Format& format : formats) {
       std::ofstream(file, std::ios::binary) << make_wav(keep(pressure_pa, rate), 0.25, format.format);
@@ -438,7 +439,7 @@ TEST(SoundFile, LibsndfileReadsEveryFormatAndRateBack) {
   std::remove(file.c_str());
 }
 
-/// What libsndfile sees of a file of which only the beginning is there, and whose other bytes are zero.
+/// libsndfile's view of a truncated file padded with zeros.
 SF_INFO read_info(const std::string& header, std::uint64_t length) {
   struct Source {
     const std::string* header;
@@ -465,7 +466,7 @@ SF_INFO read_info(const std::string& header, std::uint64_t length) {
   return info;
 }
 
-TEST(SoundFile, LongerThanFourGibibytesItIsAnRf64) {
+TEST(SoundFile, AboveFourGibibytesItIsAnRf64) {
   const struct {
     std::size_t channels;
     scene::SampleFormat format;
@@ -486,17 +487,17 @@ TEST(SoundFile, LongerThanFourGibibytesItIsAnRf64) {
   }
 }
 
-TEST(SoundFile, AnOddNumberOfBytesIsPadded) {
+TEST(SoundFile, OddNumberOfBytesIsPadded) {
   const std::string wav = make_wav(keep({{0.5, -0.5, 0.25}}, 8000), 1.0, scene::SampleFormat::kPcm24);
   EXPECT_EQ(wav.size() % 2, 0U);
   EXPECT_EQ(wav.back(), '\0');
 }
 
-TEST(Render, ASoundThatIsCutOffFadesAndOneThatIsOverDoesNot) {
+TEST(Render, OnlyASoundThatIsCutOffFades) {
   const auto render = [](const Case& c, bool fades) {
     return calc_sound(c.scene, {&c.bank}, c.list_events(), {.rate_hz = 48000, .fades_end = fades});
   };
-  // Two channels at equal ways; a mode that rings on, and the same that has died by 140 dB.
+  // Two channels at equal distance; a ringing mode, and one that has decayed by 140 dB.
   const Case rings({{1000.0, 1.0, 2.0}}, {0.0, 3.0, 0.0}, 0.1), over({{1000.0, 40.0, 2.0}}, {0.0, 3.0, 0.0}, 0.1);
   const Heard raw = render(rings, false), faded = render(rings, true);
   EXPECT_EQ(raw.faded_s, 0.0);
@@ -514,14 +515,14 @@ TEST(Render, ASoundThatIsCutOffFadesAndOneThatIsOverDoesNot) {
   EXPECT_EQ(ended.faded_s, 0.0);
   EXPECT_EQ(ended.pressure_pa, render(over, false).pressure_pa);
   EXPECT_NE(ended.pressure_pa[0].back(), 0.0);
-  // A peak within the end itself is that of the file.
+  // A peak within the fade is the peak of the file.
   Case late({{1000.0, 1.0, 2.0}}, {0.0, 1.0, 0.0}, 0.4935);
   const Heard cut = render(late, true);
   double peak = 0.0;
   for (const double p : cut.pressure_pa[0]) peak = std::max(peak, std::abs(p));
   EXPECT_GT(peak, 0.0);
   EXPECT_EQ(cut.peak_pa, peak);
-  // Shorter than the fade itself.
+  // Shorter than the fade.
   late.scene.duration_s = 0.004;
   late.simulation.impulses[0].time_s = 0.0;
   late.scene.bodies[0].spec.initial.position_m = {0.0, 0.1, 0.0};
@@ -556,7 +557,7 @@ TEST(Render, LevelsAreDecibelsRe20MicroPascal) {
   EXPECT_NEAR(levels.mean_db, 93.979 - 3.0103, 0.001);
 }
 
-TEST(Render, ATrajectoryHoldsFewPosesAndThePlacesOfTheImpulses) {
+TEST(Render, TrajectoryHasThinnedPosesAndPositionsOfImpulses) {
   Case c({{1000.0, 5.0}}, {0.0, 1.0, 0.0}, 0.25);
   c.simulation.poses[0].clear();
   for (int i = 0; i <= 5000; ++i)

@@ -1,4 +1,4 @@
-// Recorded surfaces in a scene: small balls in closed form, next to a modal body, at other rates, by a head, and bad files.
+// Recorded surfaces in a scene: small balls in closed form, next to a modal body, resampled, with a head, and invalid files.
 #include "runtime/render/surface_playback.hpp"
 
 #include <gtest/gtest.h>
@@ -14,8 +14,8 @@
 #include "runtime/scene/scene.hpp"
 #include "tests/support/catch_message.hpp"
 #include "tests/support/folder.hpp"
-#include "tests/unit/runtime/render/heard.hpp"
 #include "tests/unit/runtime/acoustics/recording/make_surface.hpp"
+#include "tests/unit/runtime/render/heard.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 
 namespace carillon::render {
@@ -32,17 +32,19 @@ Ball make_tone(double freq_hz) {
 
 class Surfaces : public ::testing::Test {
  protected:
-  /// A scene of 0.1 s at 48 kHz, with these bodies and more root keys.
+  /// A scene of 0.1 s at 48 kHz with these bodies and root keys.
   scene::Scene read(const std::string& bodies, const std::string& root = R"("microphones": [[0.5, 0, 0], [0, 0.7, 0.2]])") {
-    scene::Scene scene =
-        scene::parse_scene(base::parse_document("{\"duration_s\": 0.1, \"bodies\": [" + bodies + "], " + root + "}", folder / "scene.json"));
+    scene::Scene scene = scene::parse_scene(
+        base::parse_document("{\"duration_s\": 0.1, \"bodies\": [" + bodies + "], " + root + "}", folder / "scene.json"));
     read_surfaces(scene);
     return scene;
   }
   void write(const std::string& name, const Ball& ball, const recording::testing::BallOptions& options = {}) {
     folder.write(name, recording::testing::make_ball_surface(ball, options));
   }
-  static std::vector<std::vector<double>> hear(const scene::Scene& scene) { return calc_sound(scene, {}, {}, {.rate_hz = 48000}).pressure_pa; }
+  static std::vector<std::vector<double>> hear(const scene::Scene& scene) {
+    return calc_sound(scene, {}, {}, {.rate_hz = 48000}).pressure_pa;
+  }
 
   tests::Folder folder;
 };
@@ -59,12 +61,12 @@ void expect_close(const std::vector<double>& sound, const std::function<double(d
   EXPECT_LT(10.0 * std::log10(error / power), tolerance_db);
 }
 
-TEST_F(Surfaces, ABallIsHeardWhereTheScenePutsItWhenItBegins) {
+TEST_F(Surfaces, BallHasThePositionAndStartOfTheScene) {
   const Ball ball = make_tone(700.0);
   Ball shifted = ball;
   shifted.centre_m = [](double) { return Vec3{0.2, 0.0, 0.0}; };
   write("ball.surface.hdf", shifted);
-  // Turned a quarter about z, (0.2, 0, 0) lies at (0, 0.2, 0).
+  // Rotated by a quarter about z, (0.2, 0, 0) is at (0, 0.2, 0).
   const scene::Scene scene = read(R"({"name": "b", "recording": "ball.surface.hdf", "start_s": 0.01, "position_m": [0, -0.1, 0.3],
                               "rotation_deg": [0, 0, 90], "gain": 3, "high_pass_hz": 0})");
   const auto sound = hear(scene);
@@ -88,7 +90,7 @@ TEST_F(Surfaces, TwoRecordingsAdd) {
       ASSERT_NEAR(both[m][n], one[m][n] + other[m][n], 2e-7 * (std::abs(one[m][n]) + std::abs(other[m][n]))) << m << " " << n;
 }
 
-TEST_F(Surfaces, AModalBodyNextToItKeepsEveryBit) {
+TEST_F(Surfaces, ModalBodyNextToItIsUnchanged) {
   write("a.surface.hdf", make_tone(700.0));
   const bank::Bank bank = testing::make_cube_bank({{1000.0, 5.0, 2.0}, {2310.0, 8.0, 1.0}});
   const std::string cube = R"({"name": "cube", "bank": "cube.hdf", "fixed": true})";
@@ -117,7 +119,7 @@ TEST_F(Surfaces, AModalBodyNextToItKeepsEveryBit) {
   EXPECT_GT(most, 1e-6);
 }
 
-TEST_F(Surfaces, ALoopBeginsAgainWhereItEnds) {
+TEST_F(Surfaces, LoopRepeats) {
   Ball ball = make_tone(800.0);  // 160 periods in 0.2 s
   write("a.surface.hdf", ball, {.frames = 9600});
   scene::Scene scene = read(R"({"name": "a", "recording": "a.surface.hdf", "loop": true, "high_pass_hz": 0})");
@@ -128,20 +130,20 @@ TEST_F(Surfaces, ALoopBeginsAgainWhereItEnds) {
     ASSERT_NEAR(sound[0][n + 9600], sound[0][n], 1e-6 + 2e-3 * std::abs(sound[0][n]));
 }
 
-TEST_F(Surfaces, AnotherRateIsResampled) {
+TEST_F(Surfaces, OtherRatesAreResampled) {
   const Ball ball = make_tone(3000.0);
   for (const double rate_hz : {44100.0, 96000.0, 16000.0}) {
     write("a.surface.hdf", ball, {.rate_hz = rate_hz, .frames = static_cast<std::uint64_t>(0.1 * rate_hz)});
     const scene::Scene scene = read(R"({"name": "a", "recording": "a.surface.hdf", "high_pass_hz": 0})");
     const auto sound = hear(scene);
-    // ka = 0.06 of a ball of 1 mm.
+    // ka = 0.06 for a ball of 1 mm.
     expect_close(
         sound[0], [&](double t) { return recording::testing::calc_ball_pressure(ball, scene.microphones_m[0], t); }, -40.0, 400);
     EXPECT_NE(describe_surface(scene, scene.surfaces[0]).find("to 48000 Hz, since the scene has that rate"), std::string::npos);
   }
 }
 
-TEST_F(Surfaces, TheGroundReflectsItWhereItReflects) {
+TEST_F(Surfaces, GroundReflectsIt) {
   const Ball ball = make_tone(900.0);
   write("a.surface.hdf", ball);
   const std::string body = R"({"name": "a", "recording": "a.surface.hdf", "position_m": [0, 0, 0.3], "high_pass_hz": 0})";
@@ -163,7 +165,7 @@ TEST_F(Surfaces, TheGroundReflectsItWhereItReflects) {
       -50.0);
 }
 
-/// Amplitude and phase of a tone in the last half of a sound.
+/// Amplitude and phase of a tone in the second half of a sound.
 std::complex<double> find_tone(const std::vector<double>& sound, double freq_hz) {
   std::complex<double> sum;
   for (std::size_t n = sound.size() - 2400; n < sound.size(); ++n)
@@ -171,7 +173,7 @@ std::complex<double> find_tone(const std::vector<double>& sound, double freq_hz)
   return sum;
 }
 
-TEST_F(Surfaces, AHeadHearsItAsItHearsAModalBodyThere) {
+TEST_F(Surfaces, HeadHearsItLikeAModalBody) {
   const double freq_hz = 1000.0;
   write("a.surface.hdf", make_tone(freq_hz));
   const std::string root = R"("listener": {"position_m": [0, 0, 0], "ears": "hrtf"})", at = R"("position_m": [-1.2, 0.8, 0.3])";
@@ -190,14 +192,14 @@ TEST_F(Surfaces, AHeadHearsItAsItHearsAModalBodyThere) {
   EXPECT_GT(std::abs(wanted), 1.2);  // the left ear is nearer
   EXPECT_LT(std::abs(ratio / wanted - 1.0), 5e-3);
   EXPECT_NE(describe_surface(recorded, recorded.surfaces[0]).find("by a head"), std::string::npos);
-  // Its time is that of free ears: from the middle of the head the tone is late by the way alone.
+  // Arrival time as with free ears: the delay is that of the distance to the centre of the head.
   const double late = std::arg(find_tone(one[0], freq_hz) * find_tone(one[1], freq_hz));
   const double distance_m = std::hypot(1.2, 0.8, 0.3);
   const double free = std::arg(std::pow(std::polar(1.0, -kTwoPi * freq_hz * distance_m / 343.0 - 0.5 * std::numbers::pi), 2));
-  EXPECT_LT(std::abs(std::remainder(late - free, kTwoPi)), 1.2);  // the head's own phases; its latency of 0.9 ms would be 11 rad
+  EXPECT_LT(std::abs(std::remainder(late - free, kTwoPi)), 1.2);  // phases of the head alone; its latency of 0.9 ms would be 11 rad
 }
 
-TEST_F(Surfaces, BadInputIsOneClearError) {
+TEST_F(Surfaces, InvalidInputIsOneError) {
   write("a.surface.hdf", make_tone(700.0), {.frames = 480});
   const std::string bytes = tests::read_all(folder / "a.surface.hdf");
   folder.write("cut.surface.hdf", bytes.substr(0, 9000));
@@ -222,7 +224,7 @@ TEST_F(Surfaces, BadInputIsOneClearError) {
   const std::string body = R"({"name": "a", "recording": "a.surface.hdf"})";
   EXPECT_NE(tests::catch_message<InputError>([&] {
               read(body, R"("strikes": [{"time_s": 0.01, "body": "a", "triangle": 0, "impulse_n_s": [0, 0, 1]}])");
-            }).find("\"a\" is a recording, which nothing strikes"),
+            }).find("\"a\" is a recording, which cannot be struck"),
             std::string::npos);
   EXPECT_NE(tests::catch_message<InputError>([&] { read(body + "," + body); }).find("already"), std::string::npos);
   EXPECT_NE(tests::catch_message<InputError>([&] { refuse_surfaces(read(body), "carillon-live"); }).find("carillon-live cannot play"),

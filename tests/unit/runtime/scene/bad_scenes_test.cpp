@@ -1,4 +1,4 @@
-// Scenes with bad values: every one is refused with a message that names its place.
+// Invalid scenes: each is refused with a message that names its place.
 #include <gtest/gtest.h>
 
 #include <string>
@@ -44,7 +44,7 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Values(
         BadScene{"empty", "", {"JSON"}}, BadScene{"cut_short", "{\"duration_s\": 1, \"bodies\": [", {"JSON"}},
         BadScene{"a_list", "[1, 2]", {"object"}}, BadScene{"no_duration", "{" + kBody + "}", {"duration_s", "missing"}},
-        BadScene{"negative_duration", "{\"duration_s\": -1, " + kBody + "}", {":1:", "duration_s", "greater than 0"}},
+        BadScene{"negative_duration", "{\"duration_s\": -1, " + kBody + "}", {":1:", "duration_s", "out of range"}},
         BadScene{"duration_as_text", "{\"duration_s\": \"1\", " + kBody + "}", {"duration_s", "number"}},
         BadScene{"endless", "{\"duration_s\": 1e9, " + kBody + "}", {"duration_s", "out of range", "3600"}},
         BadScene{"an_instant", "{\"duration_s\": 1e-9, " + kBody + "}", {"duration_s", "out of range", "0.001"}},
@@ -67,7 +67,7 @@ INSTANTIATE_TEST_SUITE_P(
                  {":2:", "axis", "no direction"}},
         BadScene{"ball_with_axis",
                  with_joint(R"("kind": "ball", "body": "a", "to": "b", "at_m": [0, 0, 0], "axis": [0, 0, 1])"),
-                 {":2:", "axis", "take it away"}},
+                 {":2:", "axis", "remove it"}},
         BadScene{
             "universal_with_parallel_axes",
             with_joint(R"("kind": "universal", "body": "a", "to": "b", "at_m": [0, 0, 0], "axis": [0, 0, 1], "second_axis": [0, 0.1, 1])"),

@@ -28,7 +28,7 @@ void play(synth::Synthesiser& synthesiser, render::EventPlayback& playback, doub
   }
 }
 
-// Thousands of events at once go through a ring of four; a strike is never late, a body that moves is never refused.
+// Thousands of simultaneous events pass a ring of four; no strike is late, no moving body is refused.
 TEST(EventPlayback, PushesMoreThanTheRingHolds) {
   const auto model = synth::Model::make(testing::make_cube_bank({{500.0, 20.0}}), {.rate_hz = kRate});
   synth::Synthesiser synthesiser({.rate_hz = kRate, .max_strikes = 3000, .ring_events = 4});
@@ -39,7 +39,7 @@ TEST(EventPlayback, PushesMoreThanTheRingHolds) {
     for (int i = 0; i < 700; ++i) events.emplace_back(make_impulse(b, 0.03));
     for (int i = 0; i < 100; ++i) events.emplace_back(make_impulse(b, 0.01 + 5e-4 * i, 0.01));
   }
-  events.emplace_back(make_impulse(3, 0.01));  // of no body
+  events.emplace_back(make_impulse(3, 0.01));  // unknown body
   events.emplace_back(make_impulse(-1, 0.01));
   events.emplace_back(make_impulse(1, std::numeric_limits<double>::quiet_NaN()));
   const Events kept = make_events(events);
@@ -54,8 +54,8 @@ TEST(EventPlayback, PushesMoreThanTheRingHolds) {
   EXPECT_EQ(playback.get_faults(), 2) << "body -1, and a time that is no number";
 }
 
-// A pulse of 13 ms in 82 pieces, and single steps: all of it is played, and none of it late, also by a click that must know it earlier.
-TEST(EventPlayback, PushesForcesBeforeTheyBegin) {
+// A pulse of 13 ms in 82 pieces, and single steps: all is played and none is late, also with the lead of clicks.
+TEST(EventPlayback, PushesForcesInTime) {
   const auto model = synth::Model::make(testing::make_cube_bank({{500.0, 20.0}}), {.rate_hz = kRate});
   synth::Synthesiser synthesiser({.rate_hz = kRate, .ring_events = 16});
   const int body = synthesiser.add_body(
@@ -66,7 +66,8 @@ TEST(EventPlayback, PushesForcesBeforeTheyBegin) {
   for (int i = 0; i < 200; ++i) events.emplace_back(events::Force{.time_s = 0.05 + 5e-4 * i, .step_s = 1e-4, .count = 1});
   events.emplace_back(events::Force{.time_s = 0.2, .step_s = 1e-4, .body = 3, .count = 1});
   const Events kept = make_events(events);
-  render::EventPlayback playback(kept, {{.number = body, .moves = true, .lead_s = model->get_sphere_radius_m() / synth::kSoundSpeedMs}}, {});
+  render::EventPlayback playback(kept, {{.number = body, .moves = true, .lead_s = model->get_sphere_radius_m() / synth::kSoundSpeedMs}},
+                                 {});
   play(synthesiser, playback, 0.2);
   const synth::SynthesiserCounters counters = synthesiser.get_counters();
   EXPECT_EQ(counters.strikes, 1 + 200);
@@ -78,8 +79,8 @@ TEST(EventPlayback, PushesForcesBeforeTheyBegin) {
   EXPECT_EQ(tally.contacts, 201);
 }
 
-// A body whose sound needs a second to arrive, with a waypoint a millisecond: the synthesiser must remember a second of them, and no more.
-TEST(EventPlayback, KnowsHowManyWaypointsAreUnderWay) {
+// A travel time of one second with a waypoint per millisecond: the synthesiser must store one second of them, not more.
+TEST(EventPlayback, CountsTheWaypointsToStore) {
   std::vector<events::Event> events;
   for (int i = 0; i < 5000; ++i) events.emplace_back(events::BodyMotion{1e-3 * i, 0, {0.0, 343.0, 0.0}, {}});
   events.emplace_back(events::BodyMotion{0.5, 1, {}, {}});
@@ -95,8 +96,8 @@ TEST(EventPlayback, KnowsHowManyWaypointsAreUnderWay) {
   EXPECT_LE(far[2], 6);
 }
 
-// With as many waypoints as the playback says, a body that circles far away sounds as with all of them.
-TEST(EventPlayback, SoManyWaypointsAreEnough) {
+// With this number of waypoints a body that circles far away sounds as with all of them.
+TEST(EventPlayback, CountedWaypointsSuffice) {
   const auto model = synth::Model::make(testing::make_cube_bank({{500.0, 0.5}}), {.rate_hz = kRate});
   std::vector<events::Event> events;
   for (int i = 0; i < 1500; ++i) {
@@ -125,11 +126,11 @@ TEST(EventPlayback, SoManyWaypointsAreEnough) {
   EXPECT_NE(render(300), all);
 }
 
-// As live: a ring that refuses every third event and physics that is known to 0.05 s only. Each event comes once and in the order in which
-// it is due, a first waypoint also as a place at rest, a mark says how far physics is.
-TEST(EventScheduler, KeepsWhatIsRefusedAndMarksWhatIsKnown) {
+// Live: a ring that refuses every third event, and physics known to 0.05 s. Each event is pushed once, in order of due times, a first
+// waypoint also at rest; a watermark gives the time of the physics.
+TEST(EventScheduler, RetriesRefusedEventsAndPushesWatermarks) {
   EventScheduler scheduler({{.number = 4, .moves = true, .lead_s = 0.01}, {.number = -1}}, 0.0);
-  scheduler.add(make_impulse(1, 0.01));  // of a body that is not played
+  scheduler.add(make_impulse(1, 0.01));  // unplayed body
   scheduler.add(events::BodyMotion{0.02, 0, {1.0, 0.0, 0.0}, {0.5, 0.0, 0.0}});
   scheduler.add(make_impulse(0, 0.04, 0.0));
   scheduler.add(events::BodyMotion{0.06, 0, {2.0, 0.0, 0.0}, {0.5, 0.0, 0.0}});
@@ -155,9 +156,8 @@ TEST(EventScheduler, KeepsWhatIsRefusedAndMarksWhatIsKnown) {
   EXPECT_EQ(pushed.size(), 5U);
 }
 
-// A ring refuses faulty events for ever: they are counted and do not stand in front of the others. What was added is pushed, dropped or
-// waits.
-TEST(EventScheduler, AFaultyEventDelaysNoOther) {
+// A ring refuses invalid events forever: they are counted and do not block others. Each event is pushed, dropped or queued.
+TEST(EventScheduler, InvalidEventsDoNotBlockOthers) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   EventScheduler scheduler({{.number = 0, .moves = true}}, 0.0);
   events::EventRing ring(4);
@@ -178,10 +178,10 @@ TEST(EventScheduler, AFaultyEventDelaysNoOther) {
   EXPECT_TRUE(scheduler.push_until(1.0, -1.0, push)) << "the two that are due later";
 }
 
-/// What is pushed, by the counters of a synthesiser: all of it must come in time.
-TEST(EventPlayback, WhatIsDueLongBeforeItHappensComesInTime) {
-  // A body with a waypoint every twenty seconds, a contact that pauses as long, a pulse that lasts for six: the body must be on its way at
-  // once, not jump when its next place comes.
+/// All events must be in time by the counters of a synthesiser.
+TEST(EventPlayback, EventsDueLongBeforeTheirTimeAreInTime) {
+  // A body with a waypoint every twenty seconds, a contact with a pause as long, a pulse of six seconds: the body must move at once, not
+  // jump at its next waypoint.
   const auto model = synth::Model::make(testing::make_cube_bank({{500.0, 0.5}}), {.rate_hz = kRate});
   const auto render = [&](const std::vector<double>& at) {
     std::vector<events::Event> events;

@@ -1,4 +1,4 @@
-// Any bytes as a scene: read, or refused with an InputError.
+// Fuzzes scenes: read, or refused with an InputError.
 #include <cstddef>
 #include <cstdint>
 #include <string_view>

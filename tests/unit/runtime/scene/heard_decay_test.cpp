@@ -18,7 +18,7 @@ namespace {
 
 constexpr double kHeardRateHz = 48000.0;
 
-/// The decay of one mode of a body [1/s], from the energy of its sound in two windows.
+/// Decay of one mode of a body [1/s], from its energy in two windows.
 double fit_decay(const bank::Bank& played, int mode, double about_per_s) {
   synth::ResonatorBank voice(synth::Model::make_solo(*synth::Model::make(played, {.rate_hz = kHeardRateHz}), mode));
   voice.strike({.time_s = 0.001, .triangle = 3, .barycentric = {0.3, 0.3, 0.4}, .impulse_n_s = {1.0, 2.0, 3.0}});
@@ -63,12 +63,12 @@ void compare(const char* what, const bank::Bank& bank, double least_share) {
   std::filesystem::remove_all(folder);
 }
 
-TEST(HeardDecay, IsThatOfTheSoundOfEachModeAlone) {
+TEST(HeardDecay, MatchesTheSoundOfEachMode) {
   compare("of the mesh", bank::example::make_bank(), 0.0);
   compare("corrected", bank::example::make_corrected_bank(), 0.0);
   compare("in air", bank::example::make_radiating_bank(2, 9), 0.2);
   bank::Bank held = bank::example::make_supported_bank();
-  const double first_per_s = mounting::calc_heard(held)[0].supports_per_s;  // grows as the square of the reactions
+  const double first_per_s = mounting::calc_heard(held)[0].supports_per_s;  // proportional to the square of the reactions
   ASSERT_GT(first_per_s, 0.0);
   for (double& reaction : held.supports.reaction) reaction *= std::sqrt(20.0 / first_per_s);
   compare("on a wall", held, 0.05);

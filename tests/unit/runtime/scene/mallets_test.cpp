@@ -1,4 +1,4 @@
-// Blows by mallets: their books, the limits that have a closed form, and that what is played is what was solved.
+// Mallet blows: energy balance, limits with a closed form, and agreement of sound and solution.
 #include "runtime/scene/mallets.hpp"
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-/// A cube of 1 kg with modes up to 20 kHz that move its surface along all axes.
+/// A cube of 1 kg with modes up to 20 kHz in all directions.
 bank::Bank make_bank(int modes, double decay_per_s = 0.0) {
   std::vector<testing::InventedMode> invented;
   for (int m = 0; m < modes; ++m) {
@@ -81,7 +81,7 @@ void expect_closed(const std::vector<Blow>& blows, double slack = 1e-9) {
   EXPECT_NEAR(then, before, slack * before);
 }
 
-/// What a voice holds when all has been played, of a bank without damping.
+/// Final energy of a voice, for a bank without damping.
 double play(const bank::Bank& bank, const std::vector<events::Event>& events, double until_s) {
   synth::ResonatorBank voice(synth::Model::make(bank, {.rate_hz = 48000.0}), {.max_forces = 8000, .silence_pa = 1e-30});
   for (const events::Event& event : events) EXPECT_TRUE(voice.push(std::get<events::Force>(event)));
@@ -90,7 +90,7 @@ double play(const bank::Bank& bank, const std::vector<events::Event>& events, do
   return voice.calc_energy_j();
 }
 
-TEST_F(MalletsOnACube, BooksCloseForAllHeadsOnFixedAndFreeBodies) {
+TEST_F(MalletsOnACube, EnergyBalancesForAllHeadsOnFixedAndFreeBodies) {
   for (const bool fixed : {true, false}) {
     for (const double decay : {0.0, 30.0}) {
       begin(make_bank(60, decay), fixed);
@@ -108,7 +108,7 @@ TEST_F(MalletsOnACube, BooksCloseForAllHeadsOnFixedAndFreeBodies) {
             EXPECT_EQ(blow.motion_j > 0.0, !fixed);
             EXPECT_GT(blow.modes_j, 0.0);
             EXPECT_GT(blow.peak_n * blow.contact_s, blow.impulse_n_s);
-            // Momentum of the head, along the normal.
+            // Momentum of the head along the normal.
             double sum = 0.0;
             for (const events::Event& event : made.events) sum -= events::calc_impulse(std::get<events::Force>(event))[2];
             EXPECT_NEAR(sum, blow.impulse_n_s, 1e-6 * sum);
@@ -119,7 +119,7 @@ TEST_F(MalletsOnACube, BooksCloseForAllHeadsOnFixedAndFreeBodies) {
   }
 }
 
-TEST_F(MalletsOnACube, OnARigidFixedBodyItIsHertzsPulse) {
+TEST_F(MalletsOnACube, RigidFixedBodyGivesHertzsPulse) {
   begin(make_bank(0), true);
   const Mallet mallet = make_hard();
   const Strikes made = make(mallet);
@@ -133,7 +133,7 @@ TEST_F(MalletsOnACube, OnARigidFixedBodyItIsHertzsPulse) {
   EXPECT_NEAR(std::get<events::Force>(made.events.at(0)).time_s, 0.01, 1e-12);
 }
 
-TEST_F(MalletsOnACube, AFeltIsItsPowerLaw) {
+TEST_F(MalletsOnACube, FeltFollowsItsPowerLaw) {
   begin(make_bank(0), true);
   Mallet mallet = make_felt();
   mallet.restitution = 1.0;
@@ -146,7 +146,7 @@ TEST_F(MalletsOnACube, AFeltIsItsPowerLaw) {
   }
 }
 
-TEST_F(MalletsOnACube, TheRestitutionGivenIsThatOnSomethingRigid) {
+TEST_F(MalletsOnACube, RestitutionIsThatOnARigidBody) {
   begin(make_bank(0), true);
   for (Mallet mallet : {make_hard(), make_felt()}) {
     for (const double e : {0.2, 0.5, 0.9}) {
@@ -162,12 +162,12 @@ TEST_F(MalletsOnACube, AFreeBodyRecoils) {
   begin(make_bank(0), false);
   const Mallet mallet = make_hard();
   const Blow blow = make(mallet).blows.at(0);
-  // At (0.01, 0.02) from the middle: 1/m = 1/m_head + 1/M + (x^2 + y^2)/I.
+  // At (0.01, 0.02) from the centre: 1/m = 1/m_head + 1/M + (x^2 + y^2)/I.
   const double inverse = 1.0 / 0.03 + 1.0 / 1.0 + (0.01 * 0.01 + 0.02 * 0.02) / (0.01 / 6.0);
   EXPECT_NEAR(blow.impulse_n_s, 2.0 * 1.5 / inverse, 1e-9);
   EXPECT_NEAR(blow.restitution, 1.0, 1e-9);
   EXPECT_GT(blow.motion_j, 0.0);
-  // A head as heavy as it likes is not stopped: it keeps moving with the body before it.
+  // A very heavy head is not stopped: it pushes the body along.
   Mallet heavy = make_hard();
   heavy.mass_kg = 900.0;
   heavy.radius_m = 0.3;
@@ -176,7 +176,7 @@ TEST_F(MalletsOnACube, AFreeBodyRecoils) {
   expect_closed({pushed});
 }
 
-TEST_F(MalletsOnACube, WhatIsPlayedIsWhatWasSolved) {
+TEST_F(MalletsOnACube, SoundMatchesTheSolution) {
   begin(make_bank(80), true);
   for (const Mallet& mallet : {make_hard(), make_felt()}) {
     const Strikes made = make(mallet);
@@ -184,7 +184,7 @@ TEST_F(MalletsOnACube, WhatIsPlayedIsWhatWasSolved) {
   }
 }
 
-TEST_F(MalletsOnACube, ALaterBlowMeetsTheBodyAsItRings) {
+TEST_F(MalletsOnACube, LaterBlowMeetsTheRingingBody) {
   for (const double apart_s : {3e-5, 2e-4, 0.0507}) {
     for (const bool fixed : {true, false}) {
       begin(make_bank(50), fixed);
@@ -202,7 +202,7 @@ TEST_F(MalletsOnACube, ALaterBlowMeetsTheBodyAsItRings) {
   }
 }
 
-TEST_F(MalletsOnACube, AFeltMakesLessOfTheHighModes) {
+TEST_F(MalletsOnACube, FeltExcitesHighModesLess) {
   begin(make_bank(80), true);
   const auto calc_high_share = [&](const Mallet& mallet) {
     const std::vector<events::Event> events = make(mallet).events;
@@ -219,8 +219,8 @@ TEST_F(MalletsOnACube, AFeltMakesLessOfTheHighModes) {
   EXPECT_LT(calc_high_share(soft), 0.01 * hard);
 }
 
-/// From a needle that grazes at a micrometre a second to a ton of diamond at the speed of a shot, as far as a scene may say it.
-TEST_F(MalletsOnACube, OfAnyKindKeepTheBooks) {
+/// Extremes allowed in scenes: from a needle at a micrometre per second to a ton of diamond at the speed of a shot.
+TEST_F(MalletsOnACube, ExtremesBalanceEnergy) {
   std::mt19937_64 random(5);
   const auto draw = [&](double low, double high) { return low * std::pow(high / low, static_cast<double>(random() % 10001) / 1e4); };
   for (int trial = 0; trial < 60; ++trial) {
@@ -241,14 +241,14 @@ TEST_F(MalletsOnACube, OfAnyKindKeepTheBooks) {
     for (const events::Event& event : made.events) ASSERT_EQ(events::find_fault(event), nullptr) << trial;
     const Blow& blow = made.blows[0];
     const bool is_over = made.warnings.empty() || made.warnings[0].find("still presses") == std::string::npos;
-    // What has not parted keeps energy in its spring.
+    // Unfinished contacts keep energy in the spring.
     if (is_over) expect_closed(made.blows, 1e-6);
     EXPECT_TRUE(std::isfinite(blow.impulse_n_s + blow.peak_n + blow.contact_s + blow.restitution)) << trial;
     EXPECT_LE(blow.after_j + blow.motion_j + blow.modes_j + blow.lost_j, blow.before_j * (1.0 + 1e-6)) << trial;
   }
 }
 
-TEST_F(MalletsOnACube, ThatFlyAwayAreRefused) {
+TEST_F(MalletsOnACube, MovingAwayIsRefused) {
   begin(make_bank(3), true);
   for (const Vec3& away : {Vec3{0, 0, 1}, Vec3{1, 0, 0}, Vec3{0.9999, 0, -0.01}}) {
     Mallet mallet = make_hard();
@@ -279,7 +279,7 @@ TEST_F(MalletsOnACube, VaryInSpeedPlaceAndDirection) {
   EXPECT_NEAR(std::sqrt(square - mean * mean), 0.18, 0.04);
 }
 
-TEST_F(MalletsOnACube, AHeadThatIsPressedThroughIsQuestioned) {
+TEST_F(MalletsOnACube, ExcessiveCompressionIsAWarning) {
   begin(make_bank(3), true);
   Mallet mallet = make_felt();
   mallet.felt->stiffness_n_m_p = 1e3;
@@ -288,7 +288,7 @@ TEST_F(MalletsOnACube, AHeadThatIsPressedThroughIsQuestioned) {
   EXPECT_EQ(make(make_hard()).warnings.size(), 0U);
 }
 
-TEST_F(MalletsOnACube, AStrikeWithoutLengthIsQuestionedWhenItIsLarge) {
+TEST_F(MalletsOnACube, LargeIdealImpulseIsAWarning) {
   begin(make_bank(200), true);
   const auto question = [&](double impulse_n_s, double duration_s) {
     SceneStrike strike;

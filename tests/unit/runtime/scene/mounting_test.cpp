@@ -1,4 +1,4 @@
-// Bodies that a scene mounts in one way or another: words, banks, and what is said about them.
+// Supports of bodies in scenes: summaries, banks, and warnings.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A folder with a bank of one support, "end", which the bank itself says is rigid, and a bank of a free body.
+/// A folder with a bank with one support, "end", rigid by default, and a bank of a free body.
 class Mounting : public ::testing::Test {
  protected:
   Mounting() {
@@ -49,7 +49,7 @@ class Mounting : public ::testing::Test {
   fs::path folder_ = fs::temp_directory_path() / ("carillon-mounting-" + std::to_string(getpid()));
 };
 
-TEST_F(Mounting, WithoutAWordIsThatOfTheBankBitByBit) {
+TEST_F(Mounting, DefaultIsTheBankBitByBit) {
   Scene scene = parse(R"({"name": "a", "bank": "fixed.hdf", "fixed": true}, {"name": "b", "bank": "free.hdf"})");
   const Banks banks = read_banks(scene);
   const bank::Bank file = bank::read_bank(folder_ / "fixed.hdf");
@@ -59,7 +59,7 @@ TEST_F(Mounting, WithoutAWordIsThatOfTheBankBitByBit) {
   EXPECT_TRUE(scene.warnings.empty());
 }
 
-TEST_F(Mounting, GivesBodiesOfOneBankTheirOwnDecaysAndSharesThoseThatAreAlike) {
+TEST_F(Mounting, BodiesOfOneBankHaveOwnDecaysAndShareEqualOnes) {
   Scene scene = parse(R"({"name": "a", "bank": "fixed.hdf"}, {"name": "b", "bank": "fixed.hdf", "on": "brick wall"},
     {"name": "c", "bank": "fixed.hdf", "on": "brick wall", "joint": "screwed"}, {"name": "d", "bank": "fixed.hdf", "on": "brick wall"},
     {"name": "e", "bank": "fixed.hdf", "supports": {"end": {"loss": 0.1}}})");
@@ -77,7 +77,7 @@ TEST_F(Mounting, GivesBodiesOfOneBankTheirOwnDecaysAndSharesThoseThatAreAlike) {
   EXPECT_EQ(scene.bodies[3].mounting.decay_before_per_s, get(0).decay_per_s);
 }
 
-TEST_F(Mounting, OfAFreeBodyIsByPoints) {
+TEST_F(Mounting, FreeBodyIsHeldAtPoints) {
   Scene scene = parse(R"({"name": "a", "bank": "free.hdf"},
     {"name": "b", "bank": "free.hdf", "held": [{"by": "cord", "point_m": [0.05, -0.1, 0.2]}, {"by": {"damping_n_s_m": 1}, "point_m": [0.3, -0.1, 0.2]}]})");
   const Banks banks = read_banks(scene);
@@ -86,7 +86,7 @@ TEST_F(Mounting, OfAFreeBodyIsByPoints) {
   EXPECT_NE(scene.bodies[1].mounting.text.find("held by cord"), std::string::npos);
 }
 
-TEST_F(Mounting, BeyondFirstOrderIsOneWarningABank) {
+TEST_F(Mounting, BeyondFirstOrderIsOneWarningPerBank) {
   Scene scene = parse(
       R"({"name": "a", "bank": "fixed.hdf", "on": {"stiffness_n_m": 1}}, {"name": "b", "bank": "fixed.hdf", "on": {"stiffness_n_m": 1}})");
   read_banks(scene);
@@ -94,7 +94,7 @@ TEST_F(Mounting, BeyondFirstOrderIsOneWarningABank) {
   EXPECT_NE(scene.warnings[0].find("first order"), std::string::npos);
 }
 
-TEST_F(Mounting, ThatCannotBeMeantIsRefusedWithItsLine) {
+TEST_F(Mounting, InvalidSupportIsRefusedWithItsLine) {
   const auto expect = [&](const std::string& body, const std::string& words) {
     const std::string said = fail(body);
     EXPECT_NE(said.find(words), std::string::npos) << said;

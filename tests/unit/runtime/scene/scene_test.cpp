@@ -1,4 +1,4 @@
-// The keys of a scene and their values.
+// Keys and values of scenes.
 #include "runtime/scene/scene.hpp"
 
 #include <gtest/gtest.h>
@@ -25,7 +25,7 @@ std::string read_text(const std::string& file) {
   return text.str();
 }
 
-TEST(Scene, AWholeSceneIsRead) {
+TEST(Scene, CompleteSceneIsRead) {
   const Scene scene = parse(read_text(carillon::tests::get_source_dir() + "/tests/unit/runtime/scene/scenes/drop.json"));
   EXPECT_EQ(scene.duration_s, 1.5);
   EXPECT_EQ(scene.sample_rate_hz, 48000);
@@ -39,7 +39,7 @@ TEST(Scene, AWholeSceneIsRead) {
   EXPECT_FALSE(scene.output.gain_per_pa.has_value());
 }
 
-TEST(Scene, BodiesMayBeDescribedInPlaceOfABank) {
+TEST(Scene, BodiesMayBeDescribedInsteadOfABank) {
   const Scene scene = parse(
       "{\"duration_s\": 1, \"bodies\": [\n{\"name\": \"a\", \"shape\": {\"bowl\": {\"any\": 1}},\n\"material\": \"glass\", \"fixed\": "
       "true},\n{\"name\": \"b\", \"bank\": \"b.h5\"}]}");
@@ -103,7 +103,7 @@ TEST(Scene, MalletsAndMaterialsHaveNames) {
   const auto mallet = [&](std::size_t i) { return *scene.strikes[i].mallet; };
   EXPECT_EQ(mallet(0).young_modulus_pa, 200e9);
   EXPECT_EQ(mallet(0).speed_m_s, 1.0);
-  // A ball of steel of its radius weighs what it says.
+  // Mass of a steel ball of its radius.
   EXPECT_NEAR(mallet(0).mass_kg / (7850 * 4.0 / 3.0 * std::numbers::pi * std::pow(mallet(0).radius_m, 3)), 1.0, 0.01);
   EXPECT_EQ(mallet(1).speed_m_s, 3.0);
   EXPECT_EQ(mallet(1).mass_kg, 0.02);
@@ -142,7 +142,7 @@ TEST(Scene, JointsAndCordsAreRead) {
   EXPECT_FALSE(scene.cords[1].length_m.has_value());
 }
 
-TEST(Scene, ManyStrikesAreReadInOnePassOfTheText) {
+TEST(Scene, ManyStrikesAreReadInOnePass) {
   std::string text = "{\"duration_s\": 100,\n" + kBody + ", \"strikes\": [\n";
   constexpr int kStrikes = 20000;
   for (int i = 0; i < kStrikes; ++i) {
@@ -157,7 +157,7 @@ TEST(Scene, ManyStrikesAreReadInOnePassOfTheText) {
   EXPECT_LE(document.count_scanned_bytes(), text.size()) << "the lines of strikes are found by one pass, not by one for each strike";
 }
 
-TEST(Scene, WhatIsLeftOutHasItsDefault) {
+TEST(Scene, MissingKeysHaveDefaults) {
   const Scene scene = parse("{\"duration_s\": 2, " + kBody + "}");
   EXPECT_EQ(scene.sample_rate_hz, 48000);
   EXPECT_EQ(scene.gravity_m_s2[2], -9.81);
@@ -171,7 +171,7 @@ TEST(Scene, WhatIsLeftOutHasItsDefault) {
   EXPECT_EQ(parse("{\"duration_s\": 2, \"output\": {\"gain\": \"auto\"}, " + kBody + "}").output.gain_per_pa, std::nullopt);
 }
 
-TEST(Scene, AListenerMayHaveAHead) {
+TEST(Scene, ListenerMayHaveAHead) {
   const auto parse_listener = [](const std::string& keys, const std::string& more = "") {
     return parse("{\"duration_s\": 2, \"listener\": {" + keys + "}, " + kBody + more + "}");
   };
@@ -195,10 +195,10 @@ TEST(Scene, AListenerMayHaveAHead) {
   EXPECT_TRUE(parse_listener("\"ears\": \"hrtf\"", ", \"effects\": [\"two_ears\", \"head\"]").effects.has(synth::Effect::kHead));
 }
 
-TEST(Scene, AnglesTurnAboutTheFixedAxesXThenYThenZ) {
+TEST(Scene, RotationsAreAboutTheFixedAxesXThenYThenZ) {
   const Scene scene =
       parse(R"({"duration_s": 1, "bodies": [{"name": "a", "bank": "a.h5", "rotation_deg": [90, 0, 90], "position_m": [1, 2, 3]}]})");
-  // y goes to z by the turn about x, and stays there; x goes to y by the turn about z; z goes to -y, then to x.
+  // y goes to z about x and stays there; x goes to y about z; z goes to -y, then to x.
   const auto check = [&](const Vec3& body, const Vec3& world) {
     const Vec3 x = calc_world_point(scene.bodies[0].spec.initial, body);
     for (int k = 0; k < 3; ++k) EXPECT_NEAR(x[k], world[k], 1e-12);
@@ -208,7 +208,7 @@ TEST(Scene, AnglesTurnAboutTheFixedAxesXThenYThenZ) {
   check({0, 0, 1}, {2, 2, 3});
 }
 
-TEST(Scene, AListenerMayMoveAndMicrophonesMayTakeItsPlace) {
+TEST(Scene, ListenerMayMoveOrBeReplacedByMicrophones) {
   const auto parse_root = [](const std::string& keys) { return parse("{\"duration_s\": 2, " + kBody + ", " + keys + "}"); };
   const Scene moving = parse_root(R"("listener": {"path": [[0, 1, 2, 3], [0.5, 2, 2, 3]], "look_at_m": [1, 5, 3]})");
   ASSERT_EQ(moving.listener.path.size(), 2u);
@@ -235,7 +235,7 @@ TEST(Scene, EffectsAreThoseOfTheList) {
       parse_effects(R"(["modal", "hertz_pulse", "acceleration_noise", "air_delay", "doppler", "two_ears", "roughness", "rolling",
     "contact_damping"])");
   EXPECT_FALSE(list.automatic);
-  EXPECT_EQ(list.on, kPlayableEffects.without(
+  EXPECT_EQ(list.on, synth::EffectSet::all().without(
                          {Effect::kDirectivity, Effect::kGroundReflection, Effect::kHead, Effect::kNonlinear, Effect::kCascade}));
   EXPECT_EQ(parse_effects(R"(["doppler"])").on, synth::EffectSet{Effect::kDoppler});
   EXPECT_FALSE(parse_effects("[]").automatic);
@@ -253,7 +253,7 @@ TEST(Scene, EffectsAreThoseOfTheList) {
     EXPECT_THROW(parse_effects(wrong), InputError) << wrong;
 }
 
-TEST(Scene, TheGroundReflectsWhereItSaysSo) {
+TEST(Scene, GroundReflectsByItsKey) {
   const auto parse_ground = [](const std::string& ground, const std::string& more = "") {
     return parse("{\"duration_s\": 2, " + kBody + ", \"ground\": " + ground + more + "}");
   };
@@ -271,7 +271,7 @@ TEST(Scene, TheGroundReflectsWhereItSaysSo) {
   EXPECT_THROW(parse("{\"duration_s\": 2, " + kBody + R"(, "effects": {"ground_reflection": true}})"), InputError);
 }
 
-TEST(Scene, ABodyMayHaveEffectsOfItsOwn) {
+TEST(Scene, BodyMayHaveItsOwnEffects) {
   using synth::Effect;
   const Scene scene = parse(R"({"duration_s": 2, "effects": {"off": ["two_ears"]}, "bodies": [
     {"name": "a", "bank": "a.h5"}, {"name": "b", "bank": "a.h5", "effects": ["modal"]}, {"name": "c", "bank": "a.h5", "effects": "auto"}]})");
@@ -283,9 +283,8 @@ TEST(Scene, ABodyMayHaveEffectsOfItsOwn) {
   EXPECT_TRUE(scene.bodies[2].overrides.automatic);
 }
 
-TEST(Scene, ABodyMayBeNonlinearByItself) {
+TEST(Scene, BodyMayHaveItsOwnNonlinear) {
   using synth::Effect;
-  if (!kPlayableEffects.has(Effect::kNonlinear)) GTEST_SKIP() << "built without it";
   const auto parse_all = [](const std::string& effects) {
     return parse(R"({"duration_s": 2, "effects": )" + effects + R"(, "bodies": [
       {"name": "a", "bank": "a.h5"}, {"name": "b", "bank": "a.h5", "nonlinear": true}, {"name": "c", "bank": "a.h5", "nonlinear": false}]})")
@@ -303,7 +302,7 @@ TEST(Scene, ABodyMayBeNonlinearByItself) {
   EXPECT_EQ(listed[1].overrides.on, listed[0].overrides.on);
   EXPECT_EQ(listed[2].overrides.on, synth::EffectSet{Effect::kModal});
   EXPECT_TRUE(!listed[2].overrides.automatic && listed[2].overrides.off.is_empty());
-  // "auto" takes back what the scene says of this one effect.
+  // "auto" overrides the scene for this effect.
   const Scene chosen = parse(R"({"duration_s": 2, "effects": {"nonlinear": true, "off": ["doppler"]},
     "bodies": [{"name": "a", "bank": "a.h5", "nonlinear": "auto"}]})");
   EXPECT_TRUE(chosen.bodies[0].overrides.automatic);
@@ -319,7 +318,7 @@ TEST(Scene, ABodyMayBeNonlinearByItself) {
   EXPECT_NE(refuse(R"("auto")", R"("nonlinear": true, "effects": {"nonlinear": false})").find("keep one of them"), std::string::npos);
 }
 
-TEST(Scene, SurfacesAreAsRoughAsTheySay) {
+TEST(Scene, RoughnessIsRead) {
   const Scene usual = parse("{\"duration_s\": 2, \"ground\": {}, " + kBody + "}");
   EXPECT_EQ(usual.bodies[0].spec.roughness_m, 2e-6);
   EXPECT_EQ(usual.ground->roughness_m, 20e-6);
@@ -331,7 +330,7 @@ TEST(Scene, SurfacesAreAsRoughAsTheySay) {
   EXPECT_THROW(parse(R"({"duration_s": 2, "ground": {"roughness_m": -1e-6}, "bodies": [{"name": "a", "bank": "a.h5"}]})"), InputError);
 }
 
-TEST(Scene, QualityIsReadAndWithoutItNothingChanges) {
+TEST(Scene, QualityIsReadAndHasDefaults) {
   const Quality usual = parse("{\"duration_s\": 2, " + kBody + "}").quality;
   EXPECT_EQ(usual.thresholds.audible_share, effects::kAudibleShare);
   EXPECT_FALSE(usual.silence_pa.has_value() || usual.modes.has_value());
@@ -348,7 +347,7 @@ TEST(Scene, QualityIsReadAndWithoutItNothingChanges) {
   EXPECT_EQ(quality.instructions, synth::Isa::kAvx2);
 }
 
-TEST(Scene, TheLeftEarIsOnTheLeft) {
+TEST(Scene, LeftEarIsOnTheLeft) {
   SceneListener listener;
   listener.position_m = {1.0, 2.0, 3.0};
   listener.facing = {0.0, 1.0, 0.0};

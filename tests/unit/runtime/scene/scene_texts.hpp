@@ -1,4 +1,4 @@
-// Texts of short scenes, and their parser with a file name.
+// Texts of short scenes, and their parser.
 #pragma once
 
 #include <string>

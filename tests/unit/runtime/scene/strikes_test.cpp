@@ -9,7 +9,7 @@
 namespace carillon::scene {
 namespace {
 
-/// Of strikes without mallets, in order of time.
+/// Impulses of strikes without mallets, in order of time.
 std::vector<physics::Impulse> make_impulses(const Scene& scene, const std::vector<const bank::Bank*>& banks) {
   std::vector<physics::Impulse> impulses;
   for (const events::Event& event : make_strikes(scene, banks).events) impulses.push_back(std::get<events::Impulse>(event));
@@ -46,7 +46,7 @@ class StrikesOfAScene : public ::testing::Test {
   Scene scene_;
 };
 
-TEST_F(StrikesOfAScene, APointOfTheSurfaceIsStruckWhereItIs) {
+TEST_F(StrikesOfAScene, PointOfTheSurfaceIsStruck) {
   for (const Vec3& point : {Vec3{0.05, 0.01, -0.02}, Vec3{-0.03, 0.05, 0.04}, Vec3{0.0, 0.0, -0.05}, Vec3{0.05, 0.05, 0.05}}) {
     const physics::Impulse impulse = strike(point);
     EXPECT_NEAR(impulse.barycentric[0] + impulse.barycentric[1] + impulse.barycentric[2], 1.0, 1e-12);
@@ -59,8 +59,8 @@ TEST_F(StrikesOfAScene, APointOfTheSurfaceIsStruckWhereItIs) {
   }
 }
 
-TEST_F(StrikesOfAScene, APointNextToTheSurfaceStrikesTheNearestPlace) {
-  // Of a cube that is the point with every coordinate cut to its side, for all points outside.
+TEST_F(StrikesOfAScene, PointNextToTheSurfaceStrikesTheNearestPoint) {
+  // For a cube and any point outside: each coordinate clamped to the cube.
   for (int i = 0; i < 1000; ++i) {
     const Vec3 point{0.09 * std::sin(1.0 + 1.7 * i), 0.09 * std::sin(2.0 + 2.9 * i), 0.09 * std::sin(3.0 + 4.3 * i)};
     Vec3 nearest = point;
@@ -76,7 +76,7 @@ TEST_F(StrikesOfAScene, APointNextToTheSurfaceStrikesTheNearestPlace) {
   }
 }
 
-TEST_F(StrikesOfAScene, APointFarAwayIsAMistakeOfUnits) {
+TEST_F(StrikesOfAScene, PointFarAwayIsRefused) {
   try {
     strike({50.0, 0.0, 0.0});
     FAIL() << "it was accepted";
@@ -87,7 +87,7 @@ TEST_F(StrikesOfAScene, APointFarAwayIsAMistakeOfUnits) {
   }
 }
 
-TEST_F(StrikesOfAScene, ATriangleIsStruckInItsMiddleAndHasToExist) {
+TEST_F(StrikesOfAScene, TriangleIsStruckAtItsCentreAndMustExist) {
   scene_.strikes = {{.place = "scene.json:7", .body = 0, .time_s = 0.25, .point_m = {}, .triangle = 11, .impulse_n_s = {0, 0, 1}}};
   const Vec3 place = find_place(make_impulses(scene_, {&bank_}).at(0));  // of the corners 1, 7, 5
   EXPECT_NEAR(place[0], 0.05, 1e-12);
@@ -103,7 +103,7 @@ TEST_F(StrikesOfAScene, ATriangleIsStruckInItsMiddleAndHasToExist) {
   }
 }
 
-TEST_F(StrikesOfAScene, AreEqualUnlessTheyAreToVary) {
+TEST_F(StrikesOfAScene, AreEqualWithoutVariation) {
   scene_.strikes.assign(4000, {.place = "scene.json:7",
                                .body = 0,
                                .time_s = 0.25,
@@ -139,11 +139,11 @@ TEST_F(StrikesOfAScene, AreEqualUnlessTheyAreToVary) {
   EXPECT_LT(farthest, 10e-3);
   EXPECT_LT(max_turned, 0.25);
   EXPECT_NE(varied[0].impulse_n_s, varied[1].impulse_n_s);
-  // The same scene, the same strikes; another name, others.
+  // The same scene gives the same strikes; another name gives others.
   EXPECT_EQ(make_impulses(scene_, {&bank_})[7].impulse_n_s, varied[7].impulse_n_s);
   scene_.bodies[0].name = "box";
   EXPECT_NE(make_impulses(scene_, {&bank_})[7].impulse_n_s, varied[7].impulse_n_s);
-  // A tenth of it is a tenth of the way.
+  // A tenth of the variation is a tenth of the change.
   scene_.bodies[0].name = "cube";
   scene_.bodies[0].variation = 0.1;
   const physics::Impulse small = make_impulses(scene_, {&bank_})[7];

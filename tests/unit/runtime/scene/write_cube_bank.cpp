@@ -1,4 +1,4 @@
-// write_cube_bank OUT.h5 [GAIN [DECAY]]: a bank with modes at 820, 1730, 2950, 4410 and 7020 Hz, for tests of the program.
+// write_cube_bank OUT.h5 [GAIN [DECAY]]: a bank with modes at 820, 1730, 2950, 4410 and 7020 Hz, for tests of programs.
 #include <cstdio>
 #include <cstdlib>
 #include <exception>

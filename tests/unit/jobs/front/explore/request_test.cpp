@@ -1,4 +1,4 @@
-// Requests to the server of pages: parsing, and ranges of bytes.
+// HTTP requests: parsing, byte ranges.
 #include "jobs/front/explore/request.hpp"
 
 #include <gtest/gtest.h>

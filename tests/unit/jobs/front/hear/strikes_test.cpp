@@ -1,4 +1,4 @@
-// Modes of a blow against those of carillon-bank info.
+// Struck modes against carillon-bank info.
 #include "jobs/front/hear/strikes.hpp"
 
 #include <gtest/gtest.h>

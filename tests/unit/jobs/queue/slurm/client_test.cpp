@@ -1,4 +1,4 @@
-// What Slurm's commands print, as recorded from Slurm 22.05, and programs that do not answer.
+// Recorded output of Slurm 22.05, and programs that do not answer.
 #include "jobs/queue/slurm/client.hpp"
 
 #include <gtest/gtest.h>

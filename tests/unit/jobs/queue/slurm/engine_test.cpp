@@ -1,4 +1,4 @@
-// Rows of the engine "slurm" that need no question to Slurm.
+// Rows of the engine "slurm" without a real Slurm.
 #include "jobs/queue/slurm/engine.hpp"
 
 #include <gtest/gtest.h>
@@ -28,7 +28,7 @@ class Engine : public testing::Test {
     registry_.submit({submission});
   }
 
-  /// The row after `worker` claimed it and the engine looked at it.
+  /// The row after a claim by `worker` and follow().
   JobState follow(const process::Identity& worker) {
     const auto all = [](const std::vector<Job>&, const std::vector<Job>& ready) { return ready; };
     EXPECT_EQ(registry_.claim(store::JobEngine::slurm, worker, all).size(), 1u);
@@ -41,24 +41,24 @@ class Engine : public testing::Test {
   Registry registry_;
 };
 
-TEST_F(Engine, a_claim_of_this_process_that_handed_nothing_over_is_queued_again) {
+TEST_F(Engine, own_claim_without_submission_is_requeued) {
   EXPECT_EQ(follow(process::find_self()), JobState::queued);
 }
 
-TEST_F(Engine, a_claim_of_another_machine_is_not_ours_for_having_our_number) {
+TEST_F(Engine, claim_of_another_machine_with_the_same_pid_is_kept) {
   process::Identity other = process::find_self();
   other.host = "another-host";
   other.boot = "another-boot:1";
   EXPECT_EQ(follow(other), JobState::running);
 }
 
-TEST_F(Engine, a_job_that_waits_after_a_failure_keeps_why_when_it_is_cancelled) {
+TEST_F(Engine, cancelled_waiting_job_keeps_its_reason) {
   registry_.update(make_id(1), [](Job& job) { return job.state = JobState::waiting, job.attempts = 2, job.reason = "node n7 died", true; });
   EXPECT_TRUE(slurm::Engine(store_, {}, "carillon", be_silent).cancel(registry_, make_id(1)));
   EXPECT_EQ(registry_.find(make_id(1))->reason, "cancelled while it waited: node n7 died");
 }
 
-/// Packed jobs, with a Slurm of scripts: sbatch gives the number 77, squeue shows what `show` wrote, scancel keeps what it was asked.
+/// Packed jobs with Slurm commands as scripts: sbatch prints 77, squeue prints the text of show(), scancel records its arguments.
 class PackedEngine : public testing::Test {
  protected:
   PackedEngine() : store_(store::Store::open(folder_ / "store")), registry_(Registry::open(store_, be_silent)) {
@@ -98,7 +98,7 @@ class PackedEngine : public testing::Test {
     std::ifstream stream(folder_ / name);
     return {std::istreambuf_iterator<char>(stream), {}};
   }
-  /// As an attempt does; no cause: it is at work.
+  /// Files of an attempt; without cause: running.
   void leave(int number, std::optional<outcome::Cause> cause) const {
     const std::filesystem::path work = store_.work_folder(make_id(number));
     outcome::Attempt attempt;
@@ -126,7 +126,7 @@ class PackedEngine : public testing::Test {
   slurm::Engine engine_{store_, {}, "carillon", [this](const std::string& line) { said_ += line; }};
 };
 
-TEST_F(PackedEngine, short_jobs_are_one_array_of_tasks_and_the_program_says_so) {
+TEST_F(PackedEngine, short_jobs_form_one_array_with_a_message) {
   EXPECT_NE(read("asked").find("--array=0-0"), std::string::npos);
   EXPECT_NE(read("asked").find("--ntasks=2"), std::string::npos);
   EXPECT_NE(said_.find("6 jobs"), std::string::npos) << said_;
@@ -154,13 +154,13 @@ TEST_F(PackedEngine, each_job_has_its_own_state_while_its_task_runs) {
   EXPECT_NE(find(4).reason.find("in a task with other jobs"), std::string::npos) << find(4).reason;
 }
 
-TEST_F(PackedEngine, cancel_takes_one_job_out_of_a_task_that_others_need) {
+TEST_F(PackedEngine, cancel_of_one_job_in_a_shared_task) {
   leave(1, std::nullopt);
   show("RUNNING");
   EXPECT_TRUE(engine_.cancel(registry_, make_id(4)));
   EXPECT_EQ(find(4).state, JobState::cancelled);
   EXPECT_FALSE(slurm::read_submitted_job(store_.work_folder(make_id(4))));
-  // One that runs is asked by its task, and has ended when its attempt says so.
+  // A running job is stopped by its task and ends with its attempt.
   registry_.update(make_id(1), [](Job& job) { return job.cancel_wanted = true; });
   engine_.follow(registry_);
   EXPECT_EQ(find(1).state, JobState::running);
@@ -177,7 +177,7 @@ TEST_F(PackedEngine, cancel_takes_one_job_out_of_a_task_that_others_need) {
   EXPECT_EQ(read("cancelled"), "--quiet\n77_0\n");
 }
 
-TEST_F(PackedEngine, a_task_that_is_killed_leaves_its_jobs_to_be_handed_over_again) {
+TEST_F(PackedEngine, jobs_of_a_killed_task_are_submitted_again) {
   leave(1, std::nullopt);
   leave(2, outcome::Cause::no_solution);
   show_end("NODE_FAIL");
@@ -193,13 +193,13 @@ TEST_F(PackedEngine, a_task_that_is_killed_leaves_its_jobs_to_be_handed_over_aga
   }
 }
 
-TEST_F(PackedEngine, a_task_that_never_began_a_job_counts_against_all_of_them) {
+TEST_F(PackedEngine, task_without_a_started_job_counts_as_failure_of_all) {
   show_end("FAILED");
   engine_.follow(registry_);
   for (int number = 1; number <= kJobs; ++number) EXPECT_EQ(find(number).failures, 1);
 }
 
-TEST_F(PackedEngine, scancel_of_a_task_cancels_what_had_not_ended) {
+TEST_F(PackedEngine, scancel_of_a_task_cancels_its_open_jobs) {
   leave(1, std::nullopt);
   leave(2, outcome::Cause::bad_input);
   show_end("CANCELLED");
@@ -209,13 +209,13 @@ TEST_F(PackedEngine, scancel_of_a_task_cancels_what_had_not_ended) {
   EXPECT_EQ(find(3).state, JobState::cancelled);
 }
 
-TEST_F(PackedEngine, scancel_of_an_array_that_waits_cancels_all) {
+TEST_F(PackedEngine, scancel_of_a_pending_array_cancels_all) {
   std::ofstream(folder_ / "seen") << "77|CANCELLED|None\n";
   engine_.follow(registry_);
   for (int number = 1; number <= kJobs; ++number) EXPECT_EQ(find(number).state, JobState::cancelled);
 }
 
-TEST_F(PackedEngine, a_registry_that_is_made_again_finds_each_job_at_its_place) {
+TEST_F(PackedEngine, rebuilt_registry_finds_the_task_of_each_job) {
   const std::string before = find(5).slurm_job;
   registry_.update(make_id(5), [](Job& job) { return job.slurm_job.clear(), true; });
   show("PENDING");

@@ -1,4 +1,4 @@
-// What became of a job, from what Slurm says and what the attempt left.
+// Outcome of a job from Slurm status and attempt files.
 #include <gtest/gtest.h>
 
 #include <filesystem>

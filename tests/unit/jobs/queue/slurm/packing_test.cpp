@@ -1,4 +1,4 @@
-// Jobs in tasks: each once, evenly, and no core waits for a long one.
+// Packing: every job once, balanced tasks, few idle cores.
 #include "jobs/queue/slurm/packing.hpp"
 
 #include <gtest/gtest.h>
@@ -34,7 +34,7 @@ void expect_each_once(const PackPlan& plan, std::size_t count) {
   EXPECT_EQ(std::set<std::size_t>(seen.begin(), seen.end()).size(), count);
 }
 
-TEST(packing, a_library_is_one_even_array) {
+TEST(packing, many_bodies_form_one_balanced_array) {
   const std::vector<PackJob> jobs = make_library(10000);
   const PackPlan plan = plan_packs(jobs, {16, 64, 256.0}, {1.0, 1800.0, 1000, 16});
   expect_each_once(plan, jobs.size());
@@ -44,7 +44,7 @@ TEST(packing, a_library_is_one_even_array) {
   EXPECT_GT(plan.idle_share, 0.0);
 }
 
-TEST(packing, longer_work_becomes_more_tasks_and_never_more_than_the_site_takes) {
+TEST(packing, long_work_needs_more_tasks_up_to_the_limit_of_the_site) {
   const std::vector<PackJob> jobs = make_library(10000);
   const PackPlan plan = plan_packs(jobs, {1, 2, 0.0}, {1.0, 1800.0, 1000, 16});
   expect_each_once(plan, jobs.size());
@@ -55,7 +55,7 @@ TEST(packing, longer_work_becomes_more_tasks_and_never_more_than_the_site_takes)
   expect_each_once(few, jobs.size());
 }
 
-TEST(packing, little_work_is_one_task) {
+TEST(packing, little_work_forms_one_task) {
   const std::vector<PackJob> jobs(40, PackJob{0.3, 0.0, {}, 0});
   const PackPlan plan = plan_packs(jobs, {16, 64, 0.0}, {1.0, 1800.0, 1000, 16});
   ASSERT_EQ(plan.tasks.size(), 1u);
@@ -63,10 +63,10 @@ TEST(packing, little_work_is_one_task) {
   EXPECT_TRUE(plan_packs({}, {16, 64, 0.0}, {}).tasks.empty());
 }
 
-TEST(packing, a_body_too_large_for_its_share_keeps_several_ranks_and_starts_first) {
+TEST(packing, large_body_gets_several_ranks_and_starts_first) {
   std::vector<PackJob> jobs(400, PackJob{2.0, 0.1, {0.1}, 0});
   jobs.push_back({300.0, 5.0, {1.0, 1.2}, 0});
-  jobs.push_back({2.0, 0.1, {0.1}, 3});  // asked for
+  jobs.push_back({2.0, 0.1, {0.1}, 3});  // requested
   const PackPlan plan = plan_packs(jobs, {1, 16, 0.0}, {1.0, 1800.0, 1000, 16});
   ASSERT_EQ(plan.tasks.size(), 1u);
   const std::vector<Placed>& task = plan.tasks[0];
@@ -79,15 +79,15 @@ TEST(packing, a_body_too_large_for_its_share_keeps_several_ranks_and_starts_firs
   EXPECT_LT(plan.idle_share, 0.15);
 }
 
-TEST(packing, a_task_holds_what_its_jobs_need_at_a_time_and_no_more_than_a_node_has) {
+TEST(packing, memory_of_a_task_is_the_peak_of_its_jobs_within_a_node) {
   std::vector<PackJob> jobs(20, PackJob{10.0, 0.0, {1.0}, 0});
   EXPECT_DOUBLE_EQ(plan_packs(jobs, {1, 4, 64.0}, {}).memory_gb, 5.0);
   const PackPlan tight = plan_packs(jobs, {1, 4, 2.5}, {});
   EXPECT_DOUBLE_EQ(tight.memory_gb, 2.5);
-  EXPECT_NEAR(tight.seconds, 1.0 + 100.0, 1e-9);  // two at a time
+  EXPECT_NEAR(tight.seconds, 1.0 + 100.0, 1e-9);  // two concurrent jobs
 }
 
-TEST(packing, a_job_passes_one_that_waits_for_memory_and_none_that_waits_for_cores) {
+TEST(packing, job_overtakes_for_lack_of_memory_but_not_of_cores) {
   const std::vector<Placed> waiting{{0, 1, 3.0, 1.0}, {1, 1, 1.0, 1.0}, {2, 4, 0.1, 1.0}, {3, 1, 0.1, 1.0}};
   EXPECT_EQ(choose_next(waiting, {2, 4.0}), 0u);
   EXPECT_EQ(choose_next(waiting, {2, 2.0}), 1u);
@@ -96,11 +96,11 @@ TEST(packing, a_job_passes_one_that_waits_for_memory_and_none_that_waits_for_cor
   EXPECT_FALSE(choose_next(waiting, {0, 4.0}));
 }
 
-TEST(packing, a_replay_runs_every_job_once_with_its_own_time_and_within_the_task) {
+TEST(packing, replay_runs_every_job_once_within_the_task) {
   const std::vector<PackJob> jobs = make_library(500);
   const PackPlan plan = plan_packs(jobs, {1, 8, 1.0}, {1.0, 1e9, 1000, 4});
   ASSERT_EQ(plan.tasks.size(), 1u);
-  // Predictions are wrong by up to two either way.
+  // Predictions are wrong by up to a factor of two.
   std::mt19937 random(7);
   std::uniform_real_distribution<double> error(-1.0, 1.0);
   std::vector<double> true_s;

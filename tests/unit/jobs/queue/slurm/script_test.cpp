@@ -1,4 +1,4 @@
-// Scripts and options for sbatch: a shell is the judge of what the script means.
+// Job scripts (run by a shell) and options of sbatch.
 #include "jobs/queue/slurm/script.hpp"
 
 #include <gtest/gtest.h>
@@ -47,7 +47,7 @@ TEST(slurm_script, line_ends_are_refused) {
   EXPECT_THROW(make_script(make_batch("/a\nb", {"ab/abc"}), {}), InputError);
 }
 
-// The script is run as Slurm would run it, with a program that prints its arguments, in a folder with a name that is hard to quote.
+// The script is run with a program that prints its arguments, in a folder with special characters in its name.
 TEST(slurm_script, each_task_takes_its_own_folder) {
   const tests::Folder folder;
   const fs::path root = folder.path() / kNasty;

@@ -31,7 +31,7 @@ FailureCause classify_code(int code, const std::string& dead_rank = "") {
   return classify(ending);
 }
 
-TEST(Endings, the_result_of_the_solver_is_the_cause_and_the_reason) {
+TEST(Endings, result_of_the_solver_takes_precedence) {
   const FailureCause found = classify_result(base::ResultKind::bad_input, "bar.msh:3: no node 7; correct it.");
   EXPECT_EQ(found.cause, Cause::bad_input);
   EXPECT_EQ(found.reason, "bar.msh:3: no node 7; correct it");
@@ -41,7 +41,7 @@ TEST(Endings, the_result_of_the_solver_is_the_cause_and_the_reason) {
   EXPECT_EQ(classify_result(base::ResultKind::done, "").cause, Cause::done);
 }
 
-TEST(Endings, a_reason_is_one_line_whatever_is_in_it) {
+TEST(Endings, reason_is_one_line) {
   const std::string reason = classify_result(base::ResultKind::bad_input, "a\x1b[31m\rb\tc " + std::string(5000, 'x')).reason;
   EXPECT_LE(reason.size(), 1000u);
   for (const char letter : reason) EXPECT_GE(static_cast<unsigned char>(letter), 0x20);
@@ -61,18 +61,18 @@ TEST(Endings, without_a_result_signals_and_exit_codes_are_classified) {
   EXPECT_EQ(classify_code(3).cause, Cause::no_solution);
 }
 
-TEST(Endings, a_kill_while_the_kernel_was_out_of_memory_is_for_memory) {
+TEST(Endings, kill_by_the_kernel_is_for_memory) {
   EXPECT_EQ(classify({.exit_code = 137, .was_kernel_out_of_memory = true}).cause, Cause::memory);
   EXPECT_EQ(classify({.exit_code = 143, .was_kernel_out_of_memory = true}).cause, Cause::killed);
 }
 
-TEST(Endings, a_lack_of_memory_has_the_need_of_the_result) {
+TEST(Endings, memory_need_is_that_of_the_result) {
   const FailureCause found = classify_result(base::ResultKind::memory, "the solve needs about 12.50 GB", 12.5e9);
   EXPECT_EQ(found.cause, Cause::memory);
   EXPECT_DOUBLE_EQ(found.memory_need_gb, 12.5);
 }
 
-TEST(Endings, more_than_memory_gb_is_not_tried_again) {
+TEST(Endings, exceeding_memory_gb_is_permanent) {
   Ending ending{.exit_code = 4, .result = base::Result{.kind = base::ResultKind::memory, .message = "it needs much", .need_bytes = 12.5e9}};
   ending.memory_limit_gb = 16.0;  // the machine has less
   EXPECT_EQ(classify(ending).cause, Cause::memory);
@@ -92,7 +92,7 @@ TEST(Endings, a_full_disk_explains_a_crash) {
   EXPECT_EQ(classify({.exit_code = 3, .is_disk_full = true}).cause, Cause::no_solution);
 }
 
-TEST(Endings, what_we_did_explains_the_code) {
+TEST(Endings, own_actions_explain_the_code) {
   Ending ending;
   ending.exit_code = 137;
   ending.was_hung = true;
@@ -117,7 +117,7 @@ TEST(Endings, what_we_did_explains_the_code) {
   EXPECT_EQ(classify(ending).cause, Cause::done);
 }
 
-TEST(Endings, a_time_limit_says_what_is_saved) {
+TEST(Endings, reason_of_a_time_limit) {
   Ending ending;
   ending.exit_code = 137;
   ending.was_out_of_time = true;
@@ -128,11 +128,11 @@ TEST(Endings, a_time_limit_says_what_is_saved) {
   EXPECT_EQ(classify(ending).reason, "time limit reached; saved, and resumes from there");
 }
 
-TEST(Endings, causes_that_cannot_pass_are_not_tried_again) {
+TEST(Endings, permanent_causes_are_not_retried) {
   for (const Cause cause : {Cause::bad_input, Cause::no_solution, Cause::no_program}) EXPECT_EQ(decide(cause, 0, false).next, Next::failed);
 }
 
-TEST(Endings, causes_that_can_pass_are_tried_again_after_10_40_and_160_seconds) {
+TEST(Endings, transient_causes_are_retried_after_10_40_and_160_seconds) {
   for (const Cause cause :
        {Cause::killed, Cause::crashed, Cause::node_lost, Cause::hung, Cause::system, Cause::bad_bank, Cause::memory, Cause::time_limit}) {
     int failures = 0;
@@ -153,7 +153,7 @@ TEST(Endings, saved_progress_resets_the_count) {
   EXPECT_EQ(decide(Cause::time_limit, kMaxRetries, true).next, Next::queue);
 }
 
-TEST(Endings, stops_do_not_count_and_a_full_disk_is_waited_for) {
+TEST(Endings, stops_and_full_disks_do_not_count) {
   EXPECT_EQ(decide(Cause::stopped, 2, false).next, Next::queue);
   EXPECT_EQ(decide(Cause::stopped, 2, false).failures, 2);
   EXPECT_EQ(decide(Cause::checkpointed, 0, false).next, Next::queue);
@@ -163,7 +163,7 @@ TEST(Endings, stops_do_not_count_and_a_full_disk_is_waited_for) {
   }
 }
 
-TEST(Endings, after_a_lack_of_memory_more_is_asked_for) {
+TEST(Endings, memory_is_raised_after_running_out) {
   EXPECT_GT(calc_next_memory(4.0, 1.0), 4.0);
   EXPECT_GT(calc_next_memory(0.0, 2.0), 2.0);
 }
@@ -174,7 +174,7 @@ class Files : public testing::Test {
   const fs::path& folder_ = scratch_.path();
 };
 
-TEST_F(Files, what_is_written_is_read_back) {
+TEST_F(Files, round_trip) {
   Outcome out;
   out.token = "0123456789abcdef0123456789abcdef";
   out.cause = Cause::node_lost;
@@ -202,7 +202,7 @@ TEST_F(Files, what_is_written_is_read_back) {
   EXPECT_EQ(carillon::process::find_life(read->process), carillon::process::Life::running);
 }
 
-TEST_F(Files, a_file_that_was_cut_anywhere_is_no_file) {
+TEST_F(Files, truncated_file_is_ignored) {
   Outcome out;
   out.reason = "some reason";
   out.host = out.token = out.started = out.ended = "x";
@@ -215,7 +215,7 @@ TEST_F(Files, a_file_that_was_cut_anywhere_is_no_file) {
   }
 }
 
-TEST(Endings, every_cause_has_a_word_of_its_own) {
+TEST(Endings, every_cause_has_its_own_word) {
   for (int i = 0; i <= static_cast<int>(Cause::predicted); ++i) {
     const Cause cause = static_cast<Cause>(i);
     EXPECT_EQ(find_cause(to_text(cause)), cause);

@@ -1,4 +1,4 @@
-// Processes are identified without clocks, and what carries an entry in its environment can be ended, however it hides.
+// Identity and life of processes; termination by an environment entry.
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -33,7 +33,7 @@ void wait_until(const std::function<bool()>& is_true) {
   ASSERT_TRUE(is_true());
 }
 
-TEST(Processes, a_process_is_running_until_it_is_gone_and_a_zombie_is_gone) {
+TEST(Processes, life_of_processes_and_zombies) {
   const pid_t child = start_shell("exec sleep 1000", "X=1");
   const std::optional<process::Identity> identity = process::find_process(child);
   ASSERT_TRUE(identity);
@@ -53,7 +53,7 @@ TEST(Processes, a_process_is_running_until_it_is_gone_and_a_zombie_is_gone) {
   EXPECT_EQ(process::find_life(process::Identity{}), process::Life::gone);
 }
 
-TEST(Processes, what_carries_an_entry_is_ended_with_its_daemons_and_no_other) {
+TEST(Processes, processes_with_an_environment_entry_are_ended) {
   const std::string entry = "CARILLON_TEST_MARK=" + std::to_string(::getpid());
   const pid_t marked = start_shell("trap '' TERM; (setsid sleep 1000 &) ; setsid sleep 1000 & sleep 1000; sleep 1000", entry.c_str());
   const pid_t other = start_shell("exec sleep 1000", (entry + "0").c_str());
@@ -66,7 +66,7 @@ TEST(Processes, what_carries_an_entry_is_ended_with_its_daemons_and_no_other) {
   ::waitpid(other, nullptr, 0);
 }
 
-TEST(Processes, what_ends_by_itself_in_time_is_not_killed) {
+TEST(Processes, processes_that_end_within_the_grace_are_not_killed) {
   const std::string entry = "CARILLON_TEST_MARK=" + std::to_string(::getpid());
   const pid_t quick = start_shell("sleep 0.3; exit 7", entry.c_str());
   const pid_t slow = start_shell("exec sleep 1000", entry.c_str());

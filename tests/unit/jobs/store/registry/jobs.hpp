@@ -28,14 +28,15 @@ inline registry::Submission make_submission(int number) {
 /// A folder in work/, as carillon submit makes it.
 inline void make_work(const store::Store& store, const registry::Submission& submission) {
   const auto temporary = store.make_temporary();
-  const auto folder = temporary.content().make("0");
-  store::write_request(folder.path(), submission.request);
-  store::write_state(folder.path(), {});
+  const auto folder = temporary / "0";
+  std::filesystem::create_directory(folder);
+  store::write_request(folder, submission.request);
+  store::write_state(folder, {});
   store.publish_work(temporary, {{store::require_id(submission.request.id, "test"), "0"}});
 }
 
 inline void make_bank(const store::Store& store, const registry::Submission& submission) {
-  const auto folder = store.make_temporary();
+  auto folder = store.make_temporary();
   store::write_request(folder.path(), submission.request);
   std::ofstream(folder / store::kBankFile) << "bank";
   store.publish(store::require_id(submission.request.id, "test"), folder);

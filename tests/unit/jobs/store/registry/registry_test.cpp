@@ -27,7 +27,7 @@ void submit(const store::Store& store, Registry& registry, int number) {
   registry.submit({make_submission(number)});
 }
 
-TEST(Registry, a_job_that_is_submitted_twice_has_one_row) {
+TEST(Registry, job_submitted_twice_has_one_row) {
   const Folder folder;
   const store::Store store = store::Store::open(folder / "store");
   Registry registry = Registry::open(store, be_silent);
@@ -74,7 +74,7 @@ TEST(Registry, every_job_is_claimed_once_by_eight_processes) {
   for (const Job& job : Registry::open(store, be_silent).list()) EXPECT_EQ(job.attempts, 1);
 }
 
-TEST(Registry, only_what_is_ready_is_handed_out) {
+TEST(Registry, only_ready_jobs_are_claimed) {
   const Folder folder;
   const store::Store store = store::Store::open(folder / "store");
   Registry registry = Registry::open(store, be_silent);
@@ -96,7 +96,7 @@ TEST(Registry, only_what_is_ready_is_handed_out) {
   EXPECT_EQ(names, "1.json 2.json 4.json ");
 }
 
-TEST(Registry, what_is_done_is_never_claimed) {
+TEST(Registry, done_jobs_are_not_claimed) {
   const Folder folder;
   const store::Store store = store::Store::open(folder / "store");
   Registry registry = Registry::open(store, be_silent);
@@ -106,7 +106,7 @@ TEST(Registry, what_is_done_is_never_claimed) {
   EXPECT_EQ(registry.find(make_id(1))->state, JobState::done);
 }
 
-TEST(Registry, prefixes_find_jobs_and_nothing_else_does) {
+TEST(Registry, find_by_prefix) {
   const Folder folder;
   const store::Store store = store::Store::open(folder / "store");
   Registry registry = Registry::open(store, be_silent);
@@ -117,7 +117,7 @@ TEST(Registry, prefixes_find_jobs_and_nothing_else_does) {
   EXPECT_EQ(registry.list().size(), 40u);
 }
 
-TEST(Registry, is_brought_up_to_date_with_the_store) {
+TEST(Registry, opening_reconciles_with_the_store) {
   const Folder folder;
   const store::Store store = store::Store::open(folder / "store");
   {
@@ -135,7 +135,7 @@ TEST(Registry, is_brought_up_to_date_with_the_store) {
   EXPECT_NE(registry.find(make_id(2))->reason.find("submit the job again"), std::string::npos);
 }
 
-TEST(Registry, a_job_that_a_process_works_on_is_running_whatever_was_forgotten) {
+TEST(Registry, job_with_a_live_attempt_is_running) {
   const Folder folder;
   const store::Store store = store::Store::open(folder / "store");
   make_work(store, make_submission(1));
@@ -155,7 +155,7 @@ TEST(Registry, a_job_that_a_process_works_on_is_running_whatever_was_forgotten) 
   EXPECT_EQ(Registry::open(store, be_silent).find(make_id(1))->state, JobState::queued);
 }
 
-TEST(Registry, a_reader_without_write_access_sees_the_states_of_the_folders) {
+TEST(Registry, read_only_registry) {
   const Folder folder;
   std::string wanted;
   {
@@ -190,6 +190,67 @@ TEST(Registry, a_reader_without_write_access_sees_the_states_of_the_folders) {
   EXPECT_FALSE(fs::exists(file));
 }
 
+/// Six jobs in different states, and a copy of their registry file.
+class Rebuild : public testing::Test {
+ protected:
+  Rebuild() : store_(store::Store::open(folder_ / "store")) {
+    Registry registry = Registry::open(store_, be_silent);
+    for (int n = 0; n < 6; ++n) submit(store_, registry, n);
+    make_bank(store_, make_submission(0));
+    store_.remove_work(make_id(0));
+    registry.update(make_id(0), [](Job& job) { return job.state = JobState::done, true; });
+    registry.update(make_id(1), [](Job& job) { return job.state = JobState::failed, job.reason = "bad mesh", job.failures = 1, true; });
+    registry.update(make_id(2), [](Job& job) { return job.state = JobState::cancelled, job.reason = "cancelled", true; });
+    wanted_ = describe(registry);
+  }
+
+  /// Replaces the file, opens the registry, and expects one message and all jobs.
+  void check(const std::string& bytes) const {
+    for (const char* ending : {"-wal", "-shm"}) fs::remove(file_.string() + ending);
+    folder_.write("store/registry.sqlite", bytes);
+    int messages = 0;
+    const Registry registry = Registry::open(store_, [&](const std::string&) { ++messages; });
+    EXPECT_EQ(describe(registry), wanted_) << bytes.size();
+    EXPECT_EQ(registry.list_last_submissions().size(), 6u);
+    EXPECT_LE(messages, 1);
+  }
+
+  const Folder folder_;
+  const store::Store store_;
+  const fs::path file_ = folder_ / "store/registry.sqlite";
+  std::string wanted_;
+};
+
+TEST_F(Rebuild, truncated_file) {
+  const std::string whole = read_all(file_);
+  ASSERT_GT(whole.size(), 8000u);
+  for (std::size_t bytes = 0; bytes < whole.size(); bytes += 509) check(whole.substr(0, bytes));
+}
+
+TEST_F(Rebuild, file_that_is_not_a_database) { check("not a database " + std::string(5000, 'x')); }
+
+TEST_F(Rebuild, file_of_another_version) {
+  std::string bytes = read_all(file_);
+  bytes[63] = 1;  // user_version, sqlite.org, fileformat2.html
+  check(bytes);
+}
+
+TEST_F(Rebuild, file_deleted_while_open) {
+  Registry registry = Registry::open(store_, be_silent);
+  fs::remove(file_);
+  EXPECT_EQ(describe(registry), wanted_);
+  EXPECT_TRUE(registry.update(make_id(3), [](Job& job) { return job.state = JobState::failed, job.reason = "x", true; }));
+  EXPECT_EQ(Registry::open(store_, be_silent).find(make_id(3))->state, JobState::failed);
+}
+
+TEST_F(Rebuild, file_damaged_while_open) {
+  Registry registry = Registry::open(store_, be_silent);
+  std::string bytes = read_all(file_);
+  std::fill(bytes.begin() + 4096, bytes.end(), 'x');
+  std::fstream(file_, std::ios::in | std::ios::out | std::ios::binary) << bytes;
+  EXPECT_EQ(describe(registry), wanted_);
+}
+
 TEST(Registry, hostile_names_stay_text) {
   const Folder folder;
   const store::Store store = store::Store::open(folder / "store");
@@ -210,7 +271,7 @@ TEST(Registry, hostile_names_stay_text) {
   EXPECT_EQ(again.find_last_submission("/a/'; drop table jobs; --")->request.id, make_id(1).text());
 }
 
-TEST(SubmissionLog, cut_at_any_byte_costs_no_more_than_the_line_that_was_cut) {
+TEST(SubmissionLog, truncation_loses_only_the_last_line) {
   const Folder folder;
   const store::Store store = store::Store::open(folder / "store");
   std::vector<registry::Submission> all{make_submission(1), make_submission(2), make_submission(3)};

@@ -13,10 +13,10 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "precompute/mesh/distributed/distribute.hpp"
 #include "precompute/eigen/solve_modes.hpp"
 #include "precompute/fem/assemble.hpp"
 #include "precompute/mesh/check.hpp"
+#include "precompute/mesh/distributed/distribute.hpp"
 #include "precompute/mesh/shapes/shapes.hpp"
 #include "runtime/base/sort_order.hpp"
 #include "tests/support/paths.hpp"
@@ -28,8 +28,7 @@ using mesh::TetMesh;
 
 double find_cpu_s() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
-/// Moves the inner nodes of a lattice about, those of faces within the faces, so that nothing is regular any more. keeps_middle: those of
-/// the plane in the middle of x stay in it.
+/// Perturbs the inner nodes of a lattice, those of faces within the faces. keeps_middle: nodes of the mid-plane in x stay in it.
 void shake(TetMesh& mesh, double spacing_m, bool keeps_middle) {
   Vec3 low = mesh.nodes_m[0], high = mesh.nodes_m[0];
   for (const Vec3& x : mesh.nodes_m)
@@ -46,7 +45,7 @@ void shake(TetMesh& mesh, double spacing_m, bool keeps_middle) {
         x[k] += move(random) * spacing_m;
 }
 
-/// A box [m] cut into cells; shaken unless a dimension has one cell only. in_two: regions 0 and 1, halves along x.
+/// A box [m] cut into cells; perturbed unless a dimension has a single cell. in_two: regions 0 and 1, halves along x.
 TetMesh make_lattice(const std::array<double, 3>& edges_m, const std::array<int, 3>& cells, bool shaken, bool in_two) {
   TetMesh mesh = shapes::make_box(edges_m, cells, 1);
   if (shaken) {
@@ -105,7 +104,7 @@ TetMesh make_cylinder(double radius_m, double length_m, int rings, int layers) {
   return mesh;
 }
 
-/// Mid nodes of edges on a cylinder's lateral surface go onto it.
+/// Moves mid nodes of edges on a cylinder's lateral surface onto it.
 void curve_cylinder(TetMesh& mesh, double radius_m) {
   for (std::size_t e = 0; e < mesh.tets.size(); e += 10)
     for (int m = 0; m < 6; ++m) {
@@ -126,7 +125,7 @@ TetMesh finish(TetMesh mesh, MeshKind kind) {
   return kind == MeshKind::T10Curved && mesh.order == 2 ? mesh : mesh::to_quadratic(mesh::to_linear(mesh));
 }
 
-/// The nodes of the face of lowest x, if the body is fixed there.
+/// Nodes of the face of lowest x if the body is fixed there.
 std::vector<std::int32_t> find_fixed(const Body& body, const TetMesh& mesh) {
   std::vector<std::int32_t> fixed;
   if (!body.fixed) return fixed;
@@ -189,7 +188,7 @@ std::string describe(MeshKind kind) {
 std::string describe(Role role) { return role == Role::training ? "training" : role == Role::test ? "test" : "unseen"; }
 
 const std::vector<Body>& get_bodies() {
-  // Spruce along x; 2, 3 are the radial and the tangential directions.
+  // Spruce along x; 2, 3: radial and tangential directions.
   static const material::Material spruce{.density_kg_m3 = 400,
                                          .orthotropic = material::Orthotropic{.young_modulus_pa = {10.8e9, 0.84e9, 0.46e9},
                                                                               .shear_modulus_pa = {0.69e9, 0.032e9, 0.66e9},
@@ -213,8 +212,8 @@ const std::vector<Body>& get_bodies() {
   const auto pair = [&](double nu_steel, double nu_aluminium) {
     return std::vector<material::Material>{solid(200e9, nu_steel, 7850)[0], solid(70e9, nu_aluminium, 2700)[0]};
   };
-  // A fineness is cells along the shortest edge of a box (negative: not shaken), ten times the cells across a strip and its
-  // layers, rings of a cylinder, or the nodes of a shape.
+  // Fineness: cells along the shortest edge of a box (negative: unperturbed), ten times the cells across a strip plus its layers, rings of
+  // a cylinder, or the nodes of a shape.
   static const std::vector<Body> bodies{
       {"cube", solid(200e9, 0.3, 7850), false, Role::training, {3, 6, 10}},
       {"bar", solid(70e9, 0.33, 2700), false, Role::training, {-1, 2, 4}},
@@ -421,8 +420,8 @@ Outcome solve(MPI_Comm comm, const TetMesh& mesh, const std::vector<std::int32_t
   const bool cut = modes.band_count > static_cast<std::int64_t>(modes.lambda.size());
   const double begin = find_cpu_s();
   outcome.bars = error_bars::calc_error_bars(comm, pieces.local, system.stiffness, system.mass, solids, solid.of_tet, mass,
-                                           {modes.lambda, modes.residual, modes.shapes, low_hz, cut ? outcome.freq_hz.back() : high_hz,
-                                            modes.count_below_low - modes.rigid_count - modes.mechanism_count});
+                                             {modes.lambda, modes.residual, modes.shapes, low_hz, cut ? outcome.freq_hz.back() : high_hz,
+                                              modes.count_below_low - modes.rigid_count - modes.mechanism_count});
   outcome.estimate_cpu_s = find_cpu_s() - begin;
   outcome.by_correction = base::find_sort_order(outcome.bars.corrected.lambda);
   return outcome;

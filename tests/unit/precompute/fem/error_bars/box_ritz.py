@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Frequencies of elastic boxes without any mesh: Rayleigh-Ritz with products of Legendre polynomials.
+"""Frequencies of elastic boxes, meshless: Rayleigh-Ritz with products of Legendre polynomials.
 
 usage: box_ritz.py LX LY LZ MODES DENSITY E NU [--fix-x] [--degrees NX NY NZ]
        box_ritz.py LX LY LZ MODES DENSITY E1 E2 E3 G12 G23 G13 NU12 NU23 NU13 [--fix-x] [--degrees NX NY NZ]
@@ -7,10 +7,9 @@ usage: box_ritz.py LX LY LZ MODES DENSITY E NU [--fix-x] [--degrees NX NY NZ]
 Prints `hertz,relative change when three degrees are taken away from each direction`, all modes from the lowest elastic one on. --fix-x
 fixes the face of the lowest x.
 
-Method: the displacements are sums of P_a(x) P_b(y) P_c(z), a < NX and so on; the box is free, so every polynomial will do. Its three mirror
-planes
-  part the equation into eight (four where a face is fixed). Legendre polynomials crowd their zeros at the ends as 1/n^2, so that a dozen of
-  them across a strip resolve the layer along its edges in which torsion turns round.
+Method: displacements are sums of P_a(x) P_b(y) P_c(z), a < NX and so on; a free box allows all polynomials. Its three mirror planes split
+  the problem into eight (four if a face is fixed). Zeros of Legendre polynomials cluster at the ends as 1/n^2, so a dozen of them across a
+  strip resolve the edge layer of torsion.
 Source: Demarest 1971, J. Acoust. Soc. Am. 49, 768; Visscher, Migliori, Bell, Reinert 1991, J. Acoust. Soc. Am. 90, 2154.
 """
 import itertools

@@ -1,4 +1,4 @@
-// Corrected frequencies: right, with bars that hold; refused where the estimate is not to be trusted.
+// Corrected frequencies: accuracy, coverage of their bars, and rejection of unreliable estimates.
 #include "precompute/fem/error_bars/correct.hpp"
 
 #include <gtest/gtest.h>
@@ -17,7 +17,7 @@ using error_bars::ErrorParts;
 using error_bars::Kind;
 using error_bars::Level;
 
-/// A body, its mesh, and what the median error of its corrected frequencies must be of that of the mesh's.
+/// A body, its mesh, and the maximum ratio of the median errors of corrected and mesh frequencies.
 struct Corrects {
   Case body;
   double ratio;
@@ -48,7 +48,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Corrects{{"rubber-ball", 1200, MeshKind::T10Curved}, 0.2}, Corrects{{"cube", 6, MeshKind::T4}, 0.167},
                     Corrects{{"ball", 1200, MeshKind::T4}, 0.167}, Corrects{{"ring", 6000, MeshKind::T4}, 0.2},
                     Corrects{{"thin-shell", 3000, MeshKind::T4Lumped}, 0.5}, Corrects{{"ring", 6000, MeshKind::T4Lumped}, 0.5},
-                    // Bodies that came when the formulas were fixed.
+                    // Bodies added after the formulas were fixed.
                     Corrects{{"tile", -1, MeshKind::T10}, 0.125}, Corrects{{"maple-plate", -1, MeshKind::T10}, 0.125},
                     Corrects{{"reed", 41, MeshKind::T10}, 0.25}, Corrects{{"stick", 2, MeshKind::T10}, 0.125},
                     Corrects{{"shell-85", 2400, MeshKind::T10Curved}, 0.125}, Corrects{{"brick", 8, MeshKind::T4}, 0.167},
@@ -56,7 +56,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Corrects{{"cone", 2500, MeshKind::T10Curved}, 0.3}, Corrects{{"shell-60", 500, MeshKind::T10Curved}, 0.25},
                     Corrects{{"board", -1, MeshKind::T10}, 0.125}));
 
-/// Curved elements as wide as the wall is far from flat: the recovered strains miss most of their error.
+/// Curved elements as wide as the wall: recovered strains miss most of their error.
 TEST(Corrected, frequencies_of_walls_in_wide_curved_elements_are_within_their_bars) {
   for (const auto& [name, nodes] : {std::pair{"chime", 500}, std::pair{"collar", 300}, std::pair{"shell-95", 700}}) {
     const Outcome outcome = solve(PETSC_COMM_WORLD, get_body(name), nodes, MeshKind::T10Curved);
@@ -82,7 +82,7 @@ TEST(Bars, grow_with_how_far_elements_bend_of_T10_only) {
   EXPECT_NEAR(error_bars::predict_parts(bent, Kind::kT10Curved, 4, 0.5).bent, 0.01 / 64, 1e-15);
 }
 
-/// A level of made-up modes.
+/// A synthetic level of modes.
 Level make_level(const std::vector<double>& hz, const std::vector<double>& interpolation, Kind kind = Kind::kT10) {
   Level level;
   level.kind = kind;
@@ -114,7 +114,7 @@ TEST(Correction, is_refused_to_what_the_elements_cannot_follow) {
 }
 
 TEST(Correction, of_a_mode_that_is_not_corrected_to_half_its_bar_leaves_the_meshs_interval) {
-  // A rough mode: the interval below the mesh's frequency stays, whatever is stated within it.
+  // A rough mode keeps the interval below the mesh's frequency.
   const Level level = make_level({1000}, {0.45});
   const double all = error_bars::calc_cents(level.parts[0], level.kind);
   const error_bars::Corrections rough = error_bars::calc_corrections(level);
@@ -132,7 +132,7 @@ TEST(Facets, in_doubt_are_no_part_of_any_bar_and_are_stated_next_to_it) {
   EXPECT_EQ(both.lambda, alone.lambda);
   EXPECT_TRUE(alone.facet_cents.empty());
   ASSERT_EQ(both.facet_cents.size(), 3U);
-  // Interval of the other body's k-th mode: each mode shifted by its own facets, then sorted.
+  // Interval of the other body's k-th mode: modes shifted by their own facets, then sorted.
   std::vector<double> low, high;
   for (std::size_t m = 0; m < 2; ++m) {
     const double facets = 600 * std::log2(1 + (m == 0 ? 1.5 * 0.02 : 1.5 * 0.1 + 0.15 * 0.2));
@@ -163,7 +163,7 @@ TEST(TwoMeshes, that_agree_shorten_the_bar_to_a_quarter) {
 }
 
 TEST(TwoMeshes, that_contradict_each_other_leave_the_meshs_value_and_a_bar_that_spans_both) {
-  // A wrong estimate: it says that next to nothing is missing, and the finer mesh is 60 cents lower.
+  // A wrong estimate: it predicts almost no error, and the finer mesh is 60 cents lower.
   const Level fine = make_level({1000}, {1e-4}), coarse = make_level({1035}, {4e-4});
   const error_bars::Corrections both = error_bars::calc_corrections(fine, &coarse);
   EXPECT_EQ(both.correction[0], Correction::kDisputed);
@@ -175,7 +175,7 @@ TEST(Degenerate, modes_are_corrected_alike_whatever_basis_their_shapes_are) {
   Level level = make_level({500, 1000, 1000, 1500}, {0.01, 0.08, 0.02, 0.03});
   const error_bars::Corrections first = error_bars::calc_corrections(level);
   std::swap(level.parts[1].interpolation, level.parts[2].interpolation);
-  level.parts[1].interpolation += 0.01;  // another basis of the same space: the sum stays
+  level.parts[1].interpolation += 0.01;  // another basis of the same space: the sum is constant
   level.parts[2].interpolation -= 0.01;
   const error_bars::Corrections other = error_bars::calc_corrections(level);
   EXPECT_EQ(first.lambda[1], first.lambda[2]);
@@ -183,7 +183,7 @@ TEST(Degenerate, modes_are_corrected_alike_whatever_basis_their_shapes_are) {
 }
 
 TEST(Order, of_corrected_frequencies_is_their_own_and_decides_which_are_the_lowest) {
-  // Bending (the third) lies too high on the mesh; it really is the second.
+  // Bending (the third) is too high on the mesh; its true place is second.
   const Level level = make_level({1000, 1500, 1600, 2500}, {0.001, 0.001, 0.3, 0.001});
   const error_bars::Corrections corrections = error_bars::calc_corrections(level);
   EXPECT_LT(corrections.lambda[2], corrections.lambda[1]);
@@ -195,7 +195,7 @@ TEST(Order, of_corrected_frequencies_is_their_own_and_decides_which_are_the_lowe
 }
 
 TEST(ShortLists, of_lumped_T4_hold_the_truth) {
-  // One to three modes of thin bodies: other kinds of modes, which the mesh has far above, come down between them.
+  // One to three modes of thin bodies: unlisted kinds of modes, far above on the mesh, fall between them.
   for (const char* name : {"plate-thin", "strip-thick", "slab", "tile", "stick"}) {
     const Outcome outcome = solve(PETSC_COMM_WORLD, get_body(name), get_body(name).fineness.front(), MeshKind::T4Lumped);
     for (std::size_t m = 0; m < 3; ++m) {

@@ -1,4 +1,4 @@
-// What an error bar promises: it holds, it is no wider than it need be, and it does not depend on how many computed it.
+// Error bars: coverage, sharpness, and independence of the number of ranks.
 #include <gtest/gtest.h>
 #include <petscmat.h>
 
@@ -7,10 +7,10 @@
 #include <numbers>
 #include <random>
 
-#include "precompute/mesh/distributed/distribute.hpp"
 #include "precompute/eigen/solve_modes.hpp"
-#include "precompute/fem/error_bars/algebraic.hpp"
 #include "precompute/fem/assemble.hpp"
+#include "precompute/fem/error_bars/algebraic.hpp"
+#include "precompute/mesh/distributed/distribute.hpp"
 #include "precompute/petsc/session.hpp"
 #include "tests/unit/precompute/fem/error_bars/bodies.hpp"
 
@@ -26,7 +26,7 @@ TEST_P(KnownBody, lies_within_its_bars_which_are_less_than_ten_times_too_wide_at
   EXPECT_GE(outcome.coverage(), 0.95);
   EXPECT_LT(outcome.median_width(), 10.0);
   for (const auto& parts : outcome.bars.level.parts)
-    EXPECT_NEAR(parts.energy, 1.0, 1e-2);  // as K sums it; curved elements by a shorter rule
+    EXPECT_NEAR(parts.energy, 1.0, 1e-2);  // as summed by K; curved elements use a shorter rule
 }
 
 INSTANTIATE_TEST_SUITE_P(ErrorBars, KnownBody,
@@ -58,7 +58,7 @@ INSTANTIATE_TEST_SUITE_P(ErrorBars, Strip,
                                          Case{"strip-fixed", 21, MeshKind::T10}, Case{"plate-thin", 61, MeshKind::T10}));
 
 TEST(ErrorBars, of_the_breathing_triplet_of_a_thick_hollow_sphere_hold_by_themselves) {
-  // Without what neighbours of other kinds add to the bars: the elements at the hole leave tractions on it.
+  // Without the contribution of unlisted kinds of modes; the elements at the hole leave tractions on it.
   for (const auto& [name, hz] : {std::pair{"shell-3", 18303.9301}, std::pair{"shell-5", 19295.2866}}) {
     const Outcome outcome = solve(PETSC_COMM_WORLD, get_body(name), 900, MeshKind::T10Curved);
     int modes = 0;
@@ -75,14 +75,14 @@ TEST(ErrorBars, of_the_breathing_triplet_of_a_thick_hollow_sphere_hold_by_themse
 }
 
 TEST(ErrorBars, of_a_slender_bar_of_T10_are_less_than_four_times_too_wide) {
-  // All its patches are one-sided: a recovery that does not keep linear strains there made them eleven times too wide.
+  // All its patches are one-sided: a recovery that is not exact for linear strains there gave bars eleven times too wide.
   const Outcome outcome = solve(PETSC_COMM_WORLD, get_body("slender-bar"), 1000, MeshKind::T10);
   EXPECT_EQ(outcome.coverage(), 1.0);
   EXPECT_LT(outcome.median_width(), 4.0);
 }
 
 TEST(ErrorBars, of_stretching_a_rod_of_two_materials_hold_the_roots_of_its_equation) {
-  // Z1 tan(w l1 / c1) + Z2 tan(w l2 / c2) = 0, nu = 0: exact for the three-dimensional body, too.
+  // Z1 tan(w l1 / c1) + Z2 tan(w l2 / c2) = 0, nu = 0: exact for the three-dimensional body too.
   const Outcome outcome = solve(PETSC_COMM_WORLD, get_body("rod-two"), 2, MeshKind::T10);
   const double z1 = std::sqrt(200e9 * 7850), z2 = std::sqrt(70e9 * 2700);
   const double t1 = 0.15 * std::sqrt(7850 / 200e9), t2 = 0.15 * std::sqrt(2700 / 70e9);
@@ -115,7 +115,7 @@ TEST(ErrorBars, of_a_bar_of_one_coarse_layer_of_T4_which_is_a_hundred_per_cent_s
   EXPECT_LT(outcome.median_width(), 10.0);
 }
 
-/// A small body with its matrices and, on request, modes.
+/// A small body with its matrices and optionally its modes.
 struct Solved {
   mesh::DistributedMesh pieces;
   fem::System system;
@@ -240,10 +240,10 @@ INSTANTIATE_TEST_SUITE_P(ErrorBars, MassBounds,
                                          Case{"ball", 300, MeshKind::T10Curved}));
 
 TEST(GeometryPart, foretells_what_curving_the_sides_of_T10_changes) {
-  // The oracle: the same lattice with its mid nodes on the true cylinders, solved.
+  // Reference: the same lattice with mid nodes on the true cylinders, solved.
   const Outcome straight = solve(PETSC_COMM_WORLD, get_body("cylinder-2"), 3, MeshKind::T10),
                 curved = solve(PETSC_COMM_WORLD, get_body("cylinder-2"), 3, MeshKind::T10Curved);
-  // Modes change places, so both lists are sorted.
+  // Modes change order, so both lists are sorted.
   double largest = 0;
   std::vector<double> foretold;
   for (std::size_t m = 0; m < straight.freq_hz.size(); ++m) {
@@ -261,7 +261,7 @@ TEST(GeometryPart, is_nothing_where_faces_are_flat) {
 }
 
 TEST(Materials, are_smoothed_each_by_itself) {
-  // A bar of two materials, one ten times as stiff: strains jump at the interface, which T10 follow; the same energy comes out.
+  // A bar of two materials, one ten times as stiff: strains jump at the interface; T10 represent that, with equal energy.
   Solved solved = solve_by_hand("bar", -1, MeshKind::T10, 0);
   const auto& local = solved.pieces.local;
   std::vector<std::int32_t> material_of_tet;
@@ -270,7 +270,7 @@ TEST(Materials, are_smoothed_each_by_itself) {
     for (int i = 0; i < 4; ++i) x += local.nodes_m[local.tets[10 * e + i]][0] / 4;
     material_of_tet.push_back(x < 0 ? 0 : 1);
   }
-  // A stretch that is linear in each half, and exact there: not a mode, but the estimate may not see any error in it.
+  // A stretch that is linear in each half and exact: not a mode, but the estimate must see no error in it.
   const std::vector<error_bars::Solid> solids{error_bars::make_isotropic(1e9, 0.0, 1000), error_bars::make_isotropic(10e9, 0.0, 1000)};
   petsc::MatHandle shapes;
   petsc::check(MatCreateDense(PETSC_COMM_WORLD, 3 * local.free_nodes, PETSC_DECIDE, PETSC_DETERMINE, 1, nullptr, shapes.out()));
@@ -285,15 +285,15 @@ TEST(Materials, are_smoothed_each_by_itself) {
   petsc::check(MatAssemblyBegin(shapes, MAT_FINAL_ASSEMBLY));
   petsc::check(MatAssemblyEnd(shapes, MAT_FINAL_ASSEMBLY));
   const std::vector<double> lambda{1e6}, residual{1e-8};
-  // As with a lumped mass: a consistent one would count the tractions at the ends, too.
-  const auto bars = error_bars::calc_error_bars(PETSC_COMM_WORLD, local, solved.system.stiffness, solved.system.mass, solids, material_of_tet,
-                                              job::Mass::lumped, {lambda, residual, shapes, 20, 1e6});
+  // A lumped mass is used, since a consistent one would add the tractions at the ends.
+  const auto bars = error_bars::calc_error_bars(PETSC_COMM_WORLD, local, solved.system.stiffness, solved.system.mass, solids,
+                                                material_of_tet, job::Mass::lumped, {lambda, residual, shapes, 20, 1e6});
   ASSERT_EQ(bars.level.parts.size(), 1U);
   EXPECT_GT(bars.level.parts[0].energy, 0);
   EXPECT_LT(bars.level.parts[0].interpolation, 1e-6 * bars.level.parts[0].energy);
 }
 
-/// The parts of the estimate for a given displacement of the coarse bar of T10: not a mode, lambda = 1e6.
+/// Parts of the estimate for a given displacement of the coarse T10 bar: not a mode, lambda = 1e6.
 template <typename Field>
 error_bars::ErrorParts estimate_field(const Solved& solved, job::Mass mass_kind, const Field& field) {
   const auto& local = solved.pieces.local;
@@ -310,13 +310,13 @@ error_bars::ErrorParts estimate_field(const Solved& solved, job::Mass mass_kind,
   petsc::check(MatAssemblyEnd(shapes, MAT_FINAL_ASSEMBLY));
   const std::vector<double> lambda{1e6}, residual{1e-8};
   return error_bars::calc_error_bars(PETSC_COMM_WORLD, local, solved.system.stiffness, solved.system.mass, std::span(&solved.solid, 1), {},
-                                   mass_kind, {lambda, residual, shapes, 20, 1e6})
+                                     mass_kind, {lambda, residual, shapes, 20, 1e6})
       .level.parts.at(0);
 }
 
 TEST(Recovery, keeps_linear_strains_exactly_wherever_elements_are_few) {
-  // Pure bending, u quadratic in place, is what T10 follow: no error may be seen, not at the corners of one layer of elements either.
-  // As with a lumped mass: a consistent one would count the tractions at the ends, too.
+  // Pure bending, u quadratic in position, is exact for T10: no error must be seen, not even at the corners of a single layer. A lumped
+  // mass is used, since a consistent one would add the tractions at the ends.
   const Solved solved = solve_by_hand("bar", -1, MeshKind::T10, 0);
   const auto parts = estimate_field(solved, job::Mass::lumped, [](const Vec3& p) {
     const auto& [x, y, z] = p;
@@ -328,8 +328,8 @@ TEST(Recovery, keeps_linear_strains_exactly_wherever_elements_are_few) {
 }
 
 TEST(Tractions, on_the_free_surface_count_as_the_energy_of_a_layer_that_takes_them_away) {
-  // A bar that is stretched evenly and yet free at its ends: sigma^2 / (lambda + 2 mu) on both ends, to a depth of an eighth of the
-  // elements' 10 mm height or of the root of their face's area, 0.5 x 15 x 12 mm^2, whichever is less.
+  // A uniformly stretched bar with free ends: sigma^2 / (lambda + 2 mu) at both ends, to a depth of an eighth of the smaller of the
+  // elements' 10 mm height and the root of their face's area, 0.5 x 15 x 12 mm^2.
   const Solved solved = solve_by_hand("bar", -1, MeshKind::T10, 0);
   const double nu = 0.33, e = 70e9, modulus = e * (1 - nu) / (1 + nu) / (1 - 2 * nu);
   const auto stretch = [&](const Vec3& p) { return Vec3{p[0], -nu * p[1], -nu * p[2]}; };
@@ -339,7 +339,7 @@ TEST(Tractions, on_the_free_surface_count_as_the_energy_of_a_layer_that_takes_th
 }
 
 TEST(Prediction, of_the_bars_on_a_finer_mesh_is_right_to_a_factor_of_two) {
-  // Most of the bars: where modes of two kinds lie together, those on the finer mesh still depend on their neighbours.
+  // Most of the bars: where modes of two kinds are close, those on the finer mesh still depend on their neighbours.
   int good = 0;
   const Outcome coarse = solve(PETSC_COMM_WORLD, get_body("cube"), 6, MeshKind::T4),
                 fine = solve(PETSC_COMM_WORLD, get_body("cube"), 10, MeshKind::T4);
@@ -356,8 +356,8 @@ TEST(Arguments, that_do_not_fit_are_refused_on_every_rank) {
   Solved solved = solve_by_hand("box", -3, MeshKind::T4, 2);
   const std::vector<double> one{solved.modes.lambda[0]}, residual{1e-9};
   EXPECT_THROW((void)error_bars::calc_error_bars(PETSC_COMM_WORLD, solved.pieces.local, solved.system.stiffness, solved.system.mass,
-                                               std::span(&solved.solid, 1), {}, job::Mass::consistent,
-                                               {one, residual, solved.modes.shapes, 20, 1e6}),
+                                                 std::span(&solved.solid, 1), {}, job::Mass::consistent,
+                                                 {one, residual, solved.modes.shapes, 20, 1e6}),
                InputError);
 }
 

@@ -1,4 +1,4 @@
-// The inner loops of the estimate give the same with every instruction set of this processor, and integrate exactly.
+// Kernels of the estimate: equal results for every instruction set, exact integration.
 #include "precompute/fem/error_bars/kernels.hpp"
 
 #include <gtest/gtest.h>
@@ -22,7 +22,7 @@ struct Work {
   std::vector<DoubleLanes> displacement2;
 };
 
-/// Elements of random numbers on 40 nodes; 70 of them, so that the last chunk is not full.
+/// Random elements on 40 nodes; 70 elements, so that the last chunk is partial.
 Work make_work(int nodes) {
   std::mt19937 random(11);
   std::normal_distribution<float> value;
@@ -99,10 +99,10 @@ TEST_P(Loops, give_the_same_with_every_instruction_set) {
   }
 }
 
-/// A polynomial in the four barycentric coordinates: coefficients by exponents.
+/// Polynomial in the four barycentric coordinates: coefficients by exponents.
 using Polynomial = std::map<std::array<int, 4>, double>;
 
-/// The mean of its square over the tetrahedron: of L^a it is 6 a! / (|a| + 3)!.
+/// Mean of its square over the tetrahedron: L^a has the mean 6 a! / (|a| + 3)!.
 double calc_mean_square(const Polynomial& p) {
   double sum = 0;
   for (const auto& [a, x] : p)
@@ -130,7 +130,7 @@ TEST(Energies, of_T10_are_the_exact_integrals_of_the_squared_field) {
   std::vector<Strain> values(10, Strain{}), strains(4, Strain{});
   std::mt19937 random(3);
   std::normal_distribution<float> value;
-  std::array<Polynomial, kLanes> field;  // of the lane's own component of the strain
+  std::array<Polynomial, kLanes> field;  // of the lane's own strain component
   for (int l = 0; l < kLanes; ++l)
     for (int i = 0; i < 10; ++i) {
       const float u = value(random);

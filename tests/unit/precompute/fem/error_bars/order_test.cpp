@@ -1,4 +1,4 @@
-// Bars of the k-th frequency, where modes that are not in the list change places with those that are.
+// Bars of the k-th frequency when unlisted modes change places with listed ones.
 #include "precompute/fem/error_bars/order.hpp"
 
 #include <gtest/gtest.h>
@@ -8,8 +8,8 @@
 #include <numbers>
 #include <random>
 
-#include "precompute/petsc/session.hpp"
 #include "precompute/mesh/shapes/shapes.hpp"
+#include "precompute/petsc/session.hpp"
 #include "tests/unit/precompute/fem/error_bars/bodies.hpp"
 
 namespace carillon::tests {
@@ -17,8 +17,8 @@ namespace {
 
 double to_lambda(double hz) { return std::pow(2 * std::numbers::pi * hz, 2); }
 
-/// A square plate of one layer of 6 x 6 cells: bending is up to 140 cents too sharp, stretching next to nothing. The pair that is really
-/// the 14th and the 15th lies above a mode of stretching, the 16th.
+/// A square plate with one layer of 6 x 6 cells: bending is up to 140 cents sharp, stretching almost exact. The true 14th and 15th modes (a
+/// pair) are above a stretching mode, the 16th.
 Outcome solve_slab(double high_hz, int max_modes) {
   const mesh::TetMesh mesh = shapes::make_box({0.1, 0.1, 0.01}, {6, 6, 1}, 2);
   Outcome outcome = solve(PETSC_COMM_WORLD, mesh, {}, get_body("slab").materials, false, 20, high_hz, max_modes);
@@ -35,20 +35,20 @@ TEST(Order, holds_at_the_end_of_a_list_wherever_it_is_cut) {
     const Outcome outcome = solve_slab(1e6, count);
     ASSERT_EQ(outcome.freq_hz.size(), static_cast<std::size_t>(count));
     EXPECT_EQ(outcome.coverage(), 1.0) << count;
-    // The widest bar is that of the last of 20 (true error 130 cents, own bar 425, with the order 610).
+    // The widest bar is that of the last of 20 (true error 130 cents, own bar 425, after ordering 610).
     for (std::size_t m = 0; m < outcome.freq_hz.size(); ++m) EXPECT_LT(outcome.bar_cents(m), 650) << count << ": mode " << m;
   }
 }
 
 TEST(Order, holds_at_the_upper_end_of_a_band) {
-  const Outcome outcome = solve_slab(23000, 0);  // the pair is computed at 23163 Hz
+  const Outcome outcome = solve_slab(23000, 0);  // the mesh has the pair at 23163 Hz
   ASSERT_EQ(outcome.freq_hz.size(), 14U);
   EXPECT_GT(outcome.error_cents(13), 50);
   EXPECT_EQ(outcome.coverage(), 1.0);
   EXPECT_LT(outcome.bar_cents(9), 300) << "what lies far below the end is as sure as by itself";
   EXPECT_LT(outcome.bar_cents(0), 120);
-  // These bars are wide by the factor of 3.5 of T10 alone, which bodies need whose estimate is a third of the error. Here the estimate is
-  // the error: of the lowest mode, a twist, 30.2 cents are true, 30.7 estimated and 107 the bar; of the first ten all are right to 7 %.
+  // These bars are wide only by the T10 factor of 3.5, needed for bodies whose estimate is a third of the error. Here the estimate equals
+  // the error: for the lowest mode, a twist, 30.2 cents true, 30.7 estimated, bar 107; the first ten agree to 7 %.
   EXPECT_NEAR(outcome.error_cents(0), 30.2, 0.3);
   for (std::size_t m = 0; m < 10; ++m) {
     const double estimated_cents = 600 * std::log2(1 + outcome.bars.level.parts[m].interpolation);
@@ -56,12 +56,12 @@ TEST(Order, holds_at_the_upper_end_of_a_band) {
   }
 }
 
-/// One mode of a made-up body: its true place and where a mesh puts it, cents above 100 Hz.
+/// One mode of a synthetic body: true and meshed positions, cents above 100 Hz.
 struct Mode {
   double truth = 0.0, computed = 0.0, bar = 0.0, above = 0.0;
 };
 
-/// Two kinds of modes on a mesh that sharpens one of them ever more, and that may lower the same a little.
+/// Two kinds of modes on a mesh that sharpens one kind increasingly and may lower it slightly.
 std::vector<Mode> make_modes(std::mt19937& random) {
   std::uniform_real_distribution<double> share(0, 1);
   std::vector<Mode> modes;
@@ -79,7 +79,7 @@ std::vector<Mode> make_modes(std::mt19937& random) {
 
 TEST(Order, of_modes_made_up_holds_for_any_part_of_the_list) {
   std::mt19937 random(11);
-  int changed_above = 0, changed_below = 0;  // where modes that are not listed matter
+  int changed_above = 0, changed_below = 0;  // cases in which unlisted modes matter
   for (int round = 0; round < 400; ++round) {
     const std::vector<Mode> modes = make_modes(random);
     std::vector<double> truth;
@@ -100,8 +100,8 @@ TEST(Order, of_modes_made_up_holds_for_any_part_of_the_list) {
     std::sort(low.begin(), low.end());
     std::sort(high.begin(), high.end());
     const error_bars::Unlisted unlisted{.high_hz = 100 * std::exp2((modes[first + count].computed - 1e-9) / 1200),
-                                      .low_hz = first > 0 ? 100 * std::exp2((modes[first - 1].computed + 1e-9) / 1200) : 20,
-                                      .below = static_cast<std::int64_t>(first)};
+                                        .low_hz = first > 0 ? 100 * std::exp2((modes[first - 1].computed + 1e-9) / 1200) : 20,
+                                        .below = static_cast<std::int64_t>(first)};
     const std::vector<double> wide = error_bars::widen_for_order(lambda, own, unlisted);
     for (std::size_t k = 0; k < count; ++k) {
       const Mode& mode = modes[first + k];

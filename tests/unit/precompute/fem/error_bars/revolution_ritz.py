@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Frequencies of free elastic bodies of revolution without any mesh: Fourier series around, Rayleigh-Ritz across.
+"""Frequencies of free elastic bodies of revolution, meshless: Fourier series around, Rayleigh-Ritz across.
 
 usage: revolution_ritz.py MODES DENSITY E NU R1 Z1 R2 Z2 R3 Z3 R4 Z4 [--degrees N M]
        revolution_ritz.py MODES DENSITY E NU --torus R RADIUS [--degrees N M]
@@ -67,13 +67,13 @@ def make_disc(far, radius, degrees):
 
 
 def solve_waves(n, section, density, e, nu, count):
-    """Eigenvalues of the modes with n waves around, those of the turned functions (sin for cos) the same."""
+    """Eigenvalues of the modes with n waves around, equal for the rotated functions (sin for cos)."""
     value, by_r, by_z, r, weights = section
     lame, shear = e * nu / (1 + nu) / (1 - 2 * nu), e / 2 / (1 + nu)
     f = len(value)
     zero = numpy.zeros_like(value)
     over_r = value / r
-    strains = [  # (of u_r, of u_phi, of u_z): rr, phi phi, zz, phi z, r z, r phi
+    strains = [  # columns (u_r, u_phi, u_z): rr, phi phi, zz, phi z, r z, r phi
         (by_r, zero, zero),
         (over_r, n * over_r, zero),
         (zero, zero, by_z),
@@ -89,7 +89,7 @@ def solve_waves(n, section, density, e, nu, count):
         stiffness += (2 * shear if k < 3 else shear) * (b * weights) @ b.T
     mass = numpy.kron(numpy.eye(3), density * (value * weights) @ value.T)
     parts = [numpy.arange(3 * f)]
-    if n == 0:  # torsion parts from the rest
+    if n == 0:  # torsion decouples
         parts = [numpy.r_[0:f, 2 * f : 3 * f], numpy.arange(f, 2 * f)]
     found = []
     for part in parts:
@@ -107,7 +107,7 @@ def solve(make, degrees, modes, material):
         values = values[values > 1e-9 * largest] if n > 1 else values[2:] if n == 0 else values[2:]
         found += [(v, n) for v in values for _ in range(1 if n == 0 else 2)]
         found.sort()
-        # Beyond some n the lowest rises with n.
+        # Beyond some n the lowest mode rises with n.
         if n > 3 and len(found) >= modes and values[0] > found[modes - 1][0]:
             break
     return [(numpy.sqrt(v) / 2 / numpy.pi, n) for v, n in found[:modes]]

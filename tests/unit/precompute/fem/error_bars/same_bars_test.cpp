@@ -1,4 +1,4 @@
-// The same error bars, whatever the number of ranks.
+// Error bars do not depend on the number of ranks.
 #include <gtest/gtest.h>
 #include <petscsys.h>
 
@@ -10,7 +10,7 @@ namespace {
 class SameBars : public testing::TestWithParam<Case> {};
 
 TEST_P(SameBars, on_one_rank_and_on_all) {
-  // Bodies without repeated modes, whose shapes are unique. The cantilever's fixed nodes lie on the border of the ranks, too.
+  // Bodies without degenerate modes, whose shapes are unique. The cantilever's fixed nodes lie on a rank boundary too.
   const auto& [name, fineness, kind] = GetParam();
   const Outcome one = solve(PETSC_COMM_SELF, get_body(name), fineness, kind), all = solve(PETSC_COMM_WORLD, get_body(name), fineness, kind);
   ASSERT_EQ(one.freq_hz.size(), all.freq_hz.size());

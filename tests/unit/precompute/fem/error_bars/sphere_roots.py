@@ -6,8 +6,7 @@ usage: sphere_roots.py INNER OUTER MODES DENSITY E NU
 Prints `hertz,1e-8 n kind` for every mode from the lowest elastic one on, each as often as it occurs; n: degree, kind: S spheroidal, T
 torsional.
 
-Source: Lamb 1882, Proc. London Math. Soc. 13, 189; Eringen and Suhubi 1975, Elastodynamics vol. 2, section 8.14: without traction at both
-radii,
+Source: Lamb 1882, Proc. London Math. Soc. 13, 189; Eringen and Suhubi 1975, Elastodynamics vol. 2, section 8.14: no traction at both radii,
   displacements from spherical Bessel functions of both kinds.
 """
 import sys

@@ -1,4 +1,4 @@
-// The cost model: how its parts grow, and the estimates of modes against known counts.
+// The cost model: growth of its parts, and estimates of mode counts.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -17,7 +17,7 @@ ProblemSize make_size(std::int64_t nodes) {
   return size;
 }
 
-TEST(ProblemSize, complete_keeps_what_is_known) {
+TEST(ProblemSize, complete_keeps_known_values) {
   ProblemSize size = make_size(5000);
   size.factor_entries = 123;
   size.unknowns = 14000;
@@ -38,7 +38,7 @@ TEST(ProblemSize, refinement_composes_and_keeps_the_modes) {
   EXPECT_EQ(once.unknowns, 4 * 3 * 4000);
   EXPECT_NEAR(static_cast<double>(twice.factor_entries), static_cast<double>(once.factor_entries), 2);
   EXPECT_NEAR(twice.factor_flops / once.factor_flops, 1, 1e-12);
-  // A refined size costs what a body of that size costs, where nothing but the nodes is known.
+  // A refined size costs as much as a body of that size if only the nodes are known.
   EXPECT_NEAR(predict_seconds(once).factor, predict_seconds(make_size(16000)).factor, 1e-3 * predict_seconds(once).factor);
 }
 
@@ -88,7 +88,7 @@ TEST(Seconds, an_empty_band_is_counted_and_not_searched) {
   EXPECT_EQ(seconds.check, 0);
   EXPECT_LT(seconds.solve, full.solve);
   EXPECT_LT(predict_bytes(empty, 1), predict_bytes(make_size(5000), 1));
-  // What is not known is not empty.
+  // Unknown is not empty.
   ProblemSize unknown = make_size(5000);
   unknown.modes.reset();
   EXPECT_GT(predict_seconds(unknown).write, full.write);
@@ -103,7 +103,7 @@ TEST(Seconds, slices_of_the_spectrum) {
   EXPECT_EQ(predict_factorisations(2 * kSliceModes, false), 3);
 }
 
-TEST(Seconds, ranks_divide_all_but_what_one_rank_does) {
+TEST(Seconds, ranks_divide_all_but_serial_work) {
   const PhaseSeconds cpu = predict_seconds(make_size(5000)), wall = calc_wall(cpu, make_size(5000), 4);
   EXPECT_DOUBLE_EQ(wall.solve, cpu.solve / 4);
   EXPECT_DOUBLE_EQ(wall.read, cpu.read);
@@ -125,7 +125,7 @@ TEST(Memory, grows_with_ranks_modes_and_nodes) {
   EXPECT_GT(predict_bytes(more, 1), predict_bytes(make_size(5000), 1));
 }
 
-TEST(Memory, what_was_measured_replaces_what_is_estimated) {
+TEST(Memory, measured_values_replace_estimates) {
   const ProblemSize size = complete(make_size(5000));
   MemoryParts parts = predict_parts(size);
   parts.factor_peak += 1e9;
@@ -136,14 +136,14 @@ TEST(Memory, what_was_measured_replaces_what_is_estimated) {
   dense.is_dense = true;
   constexpr double kMatrix = 8.0 * 15000 * 15000;
   EXPECT_GT(calc_peak_bytes(predict_parts(size), dense, 1), (kDenseCopies + kDenseWork) * kMatrix);
-  // Every rank has copies, and one rank solves.
+  // Every rank has copies, one rank solves.
   const double more_ranks = calc_peak_bytes(predict_parts(size), dense, 4) - calc_peak_bytes(predict_parts(size), dense, 1);
   EXPECT_GT(more_ranks, 3 * kDenseCopies * kMatrix);
   EXPECT_LT(more_ranks, 3.5 * kDenseCopies * kMatrix);
 }
 
-// Bending, torsion and stretching of a slender bar have closed forms: with its section small against the waves, the law for solids
-// undercounts, and the bounds must still contain the true count.
+// Bending, torsion and stretching of a slender bar have closed forms. With a section small against the waves, the law for solids
+// undercounts; the bounds must still contain the true count.
 TEST(Weyl, bounds_hold_the_modes_of_a_slender_bar) {
   material::Material steel;
   steel.density_kg_m3 = 7850;
@@ -170,7 +170,7 @@ TEST(Weyl, bounds_hold_the_modes_of_a_slender_bar) {
   EXPECT_LE(estimate.low, count);
   EXPECT_GE(estimate.high, count);
   EXPECT_FALSE(estimate.is_thin);
-  // Far above the body is a solid: cubes of frequency.
+  // At high frequencies the bar counts as a solid: cubes of frequency.
   const ModeEstimate more = estimate_modes({steel}, {length * width * thickness}, area, 20, 200 * high_hz);
   const ModeEstimate twice = estimate_modes({steel}, {length * width * thickness}, area, 20, 400 * high_hz);
   EXPECT_NEAR(std::log2(twice.count / more.count), 3, 0.05);

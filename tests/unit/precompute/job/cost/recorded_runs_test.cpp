@@ -1,5 +1,5 @@
-// The cost model against runs of carillon-precompute whose records were kept (recorded_runs.csv): CPU seconds by phase, peak of memory, and
-// the sizes that the run found. The runs are of one machine with AVX-512, most while nothing else ran.
+// The cost model against recorded runs of carillon-precompute (recorded_runs.csv): CPU seconds by phase, peak memory and sizes, from one
+// machine with AVX-512, mostly idle.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -54,7 +54,7 @@ ProblemSize make_size(const Record& record) {
   return size;
 }
 
-/// By the nodes alone, as the queue guesses.
+/// From the nodes alone, like the queue.
 ProblemSize make_guess(const Record& record) {
   return estimate_meshed_size(std::llround(get(record, "nodes")), record.at("element") == "T10");
 }
@@ -78,7 +78,7 @@ TEST(RecordedRuns, cover_three_decades_of_size_and_both_elements) {
   EXPECT_GE(elements["T4"], 5);
 }
 
-TEST(RecordedRuns, cpu_seconds_of_a_body_whose_factorisation_is_analysed) {
+TEST(RecordedRuns, cpu_seconds_with_an_analysed_factorisation) {
   double logs = 0;
   int count = 0;
   for (const Record& record : read_records()) {
@@ -110,7 +110,7 @@ TEST(RecordedRuns, right_hand_sides_and_factorisations) {
   }
 }
 
-TEST(RecordedRuns, memory_is_an_upper_bound_but_not_a_wild_one) {
+TEST(RecordedRuns, memory_is_a_tight_upper_bound) {
   for (const Record& record : read_records()) {
     const int ranks = std::stoi(record.at("ranks"));
     const double real = get(record, "peak_bytes"), predicted = predict_bytes(make_size(record), ranks);
@@ -119,7 +119,7 @@ TEST(RecordedRuns, memory_is_an_upper_bound_but_not_a_wild_one) {
   }
 }
 
-TEST(RecordedRuns, a_guess_by_the_nodes_alone_admits_what_fits) {
+TEST(RecordedRuns, an_estimate_from_the_nodes_alone_admits_fitting_jobs) {
   for (const Record& record : read_records()) {
     if (get(record, "modes") > kDefaultModes) continue;
     const double real = get(record, "peak_bytes");

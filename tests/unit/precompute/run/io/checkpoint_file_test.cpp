@@ -1,4 +1,4 @@
-// The checkpoint file as a format: what is saved comes back on any number of ranks, and what is cut, altered or foreign is refused.
+// Checkpoint file format: round trip on any number of ranks; truncated, altered or foreign files are refused.
 #include "precompute/run/io/checkpoint_file.hpp"
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 using tests::get_rank;
 
 constexpr std::int32_t kNodes = 40, kFixed = 5;  // of the mesh, and one of them
-constexpr int kColumns = 19;                     // more than a group of the file
+constexpr int kColumns = 19;                     // more than one group of the file
 
 int count_ranks(MPI_Comm comm) {
   int ranks = 1;
@@ -29,7 +29,7 @@ int count_ranks(MPI_Comm comm) {
   return ranks;
 }
 
-/// Nodes dealt out to the ranks in an order that is not that of the mesh; `shift` moves one node.
+/// Nodes distributed over the ranks in another order than the mesh's; `shift` moves one node.
 mesh::LocalMesh make_mesh(MPI_Comm comm, double shift = 0) {
   int rank = 0;
   MPI_Comm_rank(comm, &rank);
@@ -98,7 +98,7 @@ class CheckpointFileTest : public testing::Test {
     EXPECT_TRUE(file.was_saved());
     bytes_ = base::read_file(file_, "checkpoint", 1 << 20);
   }
-  /// What a file with these bytes is refused for; empty: it is resumed from. On every rank of `comm` the same.
+  /// Reason why a file with these bytes is refused; empty: it is accepted. The same on every rank of `comm`.
   std::string open(const std::string& bytes, MPI_Comm comm = MPI_COMM_WORLD, const Fingerprint& job = kJob,
                    const Fingerprint& system = kSystem) {
     if (get_rank() == 0) base::write_file(file_, bytes);
@@ -165,7 +165,7 @@ TEST_F(CheckpointFileTest, every_truncation_is_refused) {
 
 TEST_F(CheckpointFileTest, every_altered_byte_is_found) {
   save();
-  // Header, settings and numbers; then the columns, a byte here and there. Between them are zeros that nothing reads.
+  // Header, settings and numbers; then some bytes of the columns. Padding between them is not read.
   const std::size_t text_end = bytes_.find("the numbers") + std::string("the numbers").size();
   const auto alter = [&](std::size_t at, MPI_Comm comm) {
     std::string altered = bytes_;

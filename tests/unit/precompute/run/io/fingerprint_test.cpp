@@ -57,7 +57,7 @@ TEST(Setting, is_read_as_it_was_written_and_never_from_less) {
   EXPECT_THROW(read_setting(refused), InputError);
 }
 
-/// A chain of tetrahedra over ten nodes; all on rank 0, or dealt out to the ranks.
+/// A chain of tetrahedra over ten nodes; all on rank 0, or distributed over the ranks.
 mesh::LocalMesh make_chain(bool is_dealt) {
   int ranks = 1;
   MPI_Comm_size(MPI_COMM_WORLD, &ranks);

@@ -41,7 +41,7 @@ TEST_F(ProgressFileTest, appends_and_leaves_out_a_line_that_says_nothing_new) {
   EXPECT_TRUE(file.append(line));
   line.seconds = 1.0;
   line.seconds_left = 7;
-  EXPECT_TRUE(file.append(line));  // its times alone differ
+  EXPECT_TRUE(file.append(line));  // only the times differ
   line.percent = 2.0;
   EXPECT_TRUE(file.append(line));
   ProgressLine first{"read", 1.0, 0, {}, {}, 0.5};
@@ -52,7 +52,7 @@ TEST_F(ProgressFileTest, refuses_what_is_no_file_to_append_to) {
   EXPECT_THROW(ProgressFile{folder_}, InputError);
   EXPECT_THROW(ProgressFile{folder_ / "none" / "p"}, InputError);
   ASSERT_EQ(::mkfifo((folder_ / "fifo").c_str(), 0600), 0);
-  EXPECT_THROW(ProgressFile{folder_ / "fifo"}, InputError);  // and does not wait for a reader
+  EXPECT_THROW(ProgressFile{folder_ / "fifo"}, InputError);  // must not wait for a reader
 }
 
 TEST_F(ProgressFileTest, a_full_disk_is_reported_once) {

@@ -1,4 +1,4 @@
-// Surface modes: gains against closed forms of spheres, steps against the shapes they stand for, on any number of ranks.
+// Surface modes: gains against closed forms of spheres, quantisation steps against the true shapes, on any number of ranks.
 #include "precompute/run/io/surface_modes.hpp"
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@ struct Shell {
   std::vector<Triangle> triangles;
 };
 
-/// An octahedron refined `times` times, on a sphere of the given radius; inward turns the triangles round.
+/// An octahedron refined `times` times, on a sphere of the given radius; inward: reversed triangles.
 Shell make_sphere(double radius, int times, Vec3 centre = {}, bool inward = false) {
   Shell shell{{{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}},
               {{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4}, {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {0, 3, 5}}};
@@ -59,7 +59,7 @@ void append(Shell& shell, const Shell& other) {
   for (const auto& [a, b, c] : other.triangles) shell.triangles.push_back({a + shift, b + shift, c + shift});
 }
 
-/// The vertices' rows: scattered over the ranks, every third row belongs to no vertex; -1 where `is_held`.
+/// Rows of the vertices: scattered over the ranks, every third row belongs to no vertex; -1 where `is_held`.
 std::vector<std::int32_t> make_rows(std::size_t vertices, const std::function<bool(std::size_t)>& is_held = {}) {
   std::vector<std::int32_t> rows(vertices);
   for (std::size_t v = 0; v < vertices; ++v) rows[v] = static_cast<std::int32_t>(v * 3 / 2);
@@ -69,7 +69,7 @@ std::vector<std::int32_t> make_rows(std::size_t vertices, const std::function<bo
   return rows;
 }
 
-/// The shapes as a solver has them: dense, spread over the ranks unevenly, 77 in rows of no vertex.
+/// Shapes in the solver's layout: dense, unevenly distributed over the ranks, 77 in rows of no vertex.
 petsc::MatHandle make_matrix(const std::vector<double>& shapes, const std::vector<std::int32_t>& row) {
   int rank = 0, ranks = 1;
   MPI_Comm_rank(MPI_COMM_WORLD, &rank);
@@ -173,7 +173,7 @@ TEST(RadiationGain, counts_two_separate_bodies_wherever_they_are) {
   EXPECT_EQ(bank::find_outer_triangles(two.vertices_m, two.triangles).size(), two.triangles.size());
 }
 
-/// Twenty modes (more than are worked on at a time), of very different sizes; mode 7 is at rest.
+/// Twenty modes (more than one block), of very different sizes; mode 7 is at rest.
 std::vector<double> make_waves(const Shell& shell) {
   std::vector<double> shapes;
   for (const Vec3& x : shell.vertices_m)

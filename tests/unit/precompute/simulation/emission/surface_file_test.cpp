@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "runtime/base/error.hpp"
-#include "runtime/base/sha256.hpp"
 #include "runtime/acoustics/recording/player.hpp"
 #include "runtime/acoustics/recording/recording.hpp"
+#include "runtime/base/error.hpp"
+#include "runtime/base/sha256.hpp"
 #include "tests/support/catch_message.hpp"
 #include "tests/support/folder.hpp"
 #include "tests/unit/precompute/simulation/emission/motions.hpp"
@@ -186,8 +186,7 @@ TEST_F(SurfaceFiles, TablesThatCannotBeAreRefusedEvenWithTheRightDigest) {
     bad.replace(recording::kTextBytes, recording::kDigestBytes, base::to_hex(sha.finish()));
     return tests::catch_message<InputError>([&] { recording::RecordedSurface(bad, "bad"); });
   };
-  EXPECT_NE(refuse(recording::Array::kTriangle, 12, std::int32_t{1 << 20}).find("triangle[1] names a missing vertex"),
-            std::string::npos);
+  EXPECT_NE(refuse(recording::Array::kTriangle, 12, std::int32_t{1 << 20}).find("triangle[1] names a missing vertex"), std::string::npos);
   EXPECT_NE(refuse(recording::Array::kTriangleBody, 4, std::int32_t{2}).find("triangle_body[1]"), std::string::npos);
   EXPECT_NE(refuse(recording::Array::kVertexBody, 4, std::int32_t{-1}).find("vertex_body[1]"), std::string::npos);
   EXPECT_NE(refuse(recording::Array::kArea, 8, -1.0).find("area[1]"), std::string::npos);

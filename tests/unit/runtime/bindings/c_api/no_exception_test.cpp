@@ -1,4 +1,4 @@
-// No exception leaves a function of carillon.h: when memory fails at any place, and with any options.
+// No exception leaves a function of carillon.h: after any failed allocation, and with any options.
 #include <carillon.h>
 #include <gtest/gtest.h>
 
@@ -21,7 +21,7 @@ constexpr std::uint32_t kEffects = CARILLON_MODAL | CARILLON_HERTZ_PULSE | CARIL
                                    CARILLON_ROUGHNESS | CARILLON_ROLLING | CARILLON_CONTACT_DAMPING | CARILLON_DIRECTIVITY;
 
 void process(carillon_synth* synth, int blocks) {
-  std::array<std::array<float, 512>, 2> sound{};  // not from the heap
+  std::array<std::array<float, 512>, 2> sound{};  // not on the heap
   float* const out[] = {sound[0].data(), sound[1].data()};
   for (int i = 0; i < blocks; ++i) {
     carillon_process(synth, out, 2, 512);
@@ -30,7 +30,7 @@ void process(carillon_synth* synth, int blocks) {
   }
 }
 
-/// One of every function that may take memory. False once one of them failed.
+/// Calls every function that may allocate. False once one has failed.
 class Session {
  public:
   ~Session() {
@@ -92,7 +92,7 @@ class Session {
   int32_t body_ = -1;
 };
 
-TEST(NoException, LeavesWhenMemoryFailsAtAnyPlace) {
+TEST(NoException, LeavesAfterAnyFailedAllocation) {
   int failures = 0;
   for (long place = 0;; ++place) {
     Session session;
@@ -106,7 +106,7 @@ TEST(NoException, LeavesWhenMemoryFailsAtAnyPlace) {
       break;
     }
     ++failures;
-    // CARILLON_BAD_INPUT: HDF5 does not say why it could not read.
+    // CARILLON_BAD_INPUT: HDF5 does not report the reason.
     EXPECT_TRUE(status == CARILLON_SYSTEM || status == CARILLON_OK || (status == CARILLON_BAD_INPUT && session.get_synth() == nullptr))
         << place << ": " << status;
     if (session.get_body() < 0) continue;

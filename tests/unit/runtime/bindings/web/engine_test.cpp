@@ -1,4 +1,4 @@
-// The engine of pages: models that come in pieces, hands that move bodies and touch them, recordings.
+// The engine of pages: models sent in pieces, interactive motion and contacts, recordings.
 #include "runtime/bindings/web/engine.hpp"
 
 #include <gtest/gtest.h>
@@ -25,7 +25,7 @@ synth::SynthesiserOptions make_options() {
       .rate_hz = kRate, .microphones_m = {{-0.1, 0, 0}, {0.1, 0, 0}}, .max_strikes = 256, .max_waypoints = 1024, .ring_events = 1 << 14};
 }
 
-/// Sends a model as a worker does, in pieces of some bytes.
+/// Sends a model in pieces, like a worker.
 void send(Engine& engine, int model, int surface, const synth::Model& from, std::size_t piece) {
   const synth::ModelSurface& s = *from.get_surface();
   engine.begin_surface(surface, {s.triangles.size(), s.columns, s.largest.size(), s.shape.size()});
@@ -62,7 +62,7 @@ events::Impulse make_strike(int body, double time_s) {
       .time_s = time_s, .body = body, .triangle = 4, .barycentric = {0.2, 0.3, 0.5}, .impulse_n_s = {0.01, 0.02, 0.03}, .duration_s = 2e-4};
 }
 
-TEST(Engine, a_model_that_came_in_pieces_sounds_as_the_one_it_was) {
+TEST(Engine, a_model_sent_in_pieces_sounds_the_same) {
   const bank::Bank bank = make_bank();
   const auto model = synth::Model::make(bank, {.rate_hz = kRate});
   synth::Synthesiser direct(make_options());
@@ -84,7 +84,7 @@ TEST(Engine, a_model_that_came_in_pieces_sounds_as_the_one_it_was) {
   }
 }
 
-TEST(Engine, refuses_models_that_are_cut_or_do_not_fit) {
+TEST(Engine, refuses_truncated_or_mismatched_models) {
   const auto model = synth::Model::make(make_bank(), {.rate_hz = kRate});
   const synth::ModelSurface& s = *model->get_surface();
   const std::vector<std::byte> tables = model->write_tables();
@@ -111,7 +111,7 @@ TEST(Engine, refuses_models_that_are_cut_or_do_not_fit) {
   EXPECT_NO_THROW(engine.add_body(2, {}));
 }
 
-TEST(Engine, what_comes_soon_is_never_late) {
+TEST(Engine, events_as_soon_as_possible_are_never_late) {
   Engine engine(make_options());
   send(engine, 1, 1, *synth::Model::make(make_bank(), {.rate_hz = kRate}), 1 << 20);
   const int body = engine.add_body(1, {.position_m = {0, 1, 0}});
@@ -125,7 +125,7 @@ TEST(Engine, what_comes_soon_is_never_late) {
   EXPECT_EQ(counters.underruns, 0);
 }
 
-TEST(Engine, faults_are_counted_and_said) {
+TEST(Engine, faults_are_counted_and_reported) {
   Engine engine(make_options());
   send(engine, 1, 1, *synth::Model::make(make_bank(), {.rate_hz = kRate}), 1 << 20);
   const int body = engine.add_body(1, {.position_m = {0, 1, 0}});
@@ -138,14 +138,14 @@ TEST(Engine, faults_are_counted_and_said) {
   EXPECT_EQ(engine.get_synthesiser().get_counters().faults, 3);
 }
 
-/// The largest step from one sample to the next.
+/// Largest step between samples.
 double find_step(const std::vector<float>& sound) {
   double step = 0.0;
   for (std::size_t n = 1; n < sound.size() / 2; ++n) step = std::max(step, std::abs(static_cast<double>(sound[n]) - sound[n - 1]));
   return step;
 }
 
-TEST(Engine, a_listener_who_jumps_is_heard_without_a_click) {
+TEST(Engine, a_jump_of_the_listener_makes_no_click) {
   const auto model = synth::Model::make(testing::make_cube_bank({{600.0, 0.0}}), {.rate_hz = kRate});
   Engine engine(make_options());
   send(engine, 1, 1, *model, 1 << 20);
@@ -164,7 +164,7 @@ TEST(Engine, a_listener_who_jumps_is_heard_without_a_click) {
   EXPECT_NEAR(after / usual, 3.0 / 12.0, 0.02);  // 1/r
 }
 
-TEST(Engine, a_hand_that_turns_the_listener_turns_the_ears) {
+TEST(Engine, rotating_the_listener_rotates_the_ears) {
   const auto model = synth::Model::make(testing::make_cube_bank({{600.0, 0.0}}), {.rate_hz = kRate});
   Engine engine(make_options());
   send(engine, 1, 1, *model, 1 << 20);
@@ -186,7 +186,7 @@ TEST(Engine, a_hand_that_turns_the_listener_turns_the_ears) {
   EXPECT_NEAR(left_back / right_back, 0.7 / 0.5, 0.01);
 }
 
-TEST(Engine, a_touch_sounds_while_it_slides_and_ends) {
+TEST(Engine, a_contact_sounds_while_it_slides_and_ends) {
   Engine engine(make_options());
   send(engine, 1, 1, *synth::Model::make(make_bank(), {.rate_hz = kRate}), 1 << 20);
   const synth::EffectSet effects = synth::kDefaultEffects.with(synth::kContactEffects);
@@ -207,18 +207,18 @@ TEST(Engine, a_touch_sounds_while_it_slides_and_ends) {
   }
   const double sliding = find_power(play(engine, 12));
   EXPECT_GT(sliding, 0.0);
-  // The hand says nothing more: it rests there, and what rang dies away under it.
+  // Without updates the contact rests, and the ringing decays.
   (void)play(engine, 2000);
   EXPECT_LT(find_power(play(engine, 12)), 1e-4 * sliding);
   touch.state = events::ContactState::kEnd;
   push(engine, touch, Timing::kSoon);
-  push(engine, touch, Timing::kSoon);  // once more does nothing
+  push(engine, touch, Timing::kSoon);  // no effect the second time
   (void)play(engine, 20);
   EXPECT_EQ(engine.get_synthesiser().get_counters().faults, 0);
   EXPECT_EQ(engine.get_synthesiser().get_counters().refused, 0);
 }
 
-TEST(Engine, a_recording_plays_as_its_events_do_and_can_begin_in_the_middle) {
+TEST(Engine, a_recording_plays_like_its_events_and_can_start_in_the_middle) {
   const auto model = synth::Model::make(make_bank(), {.rate_hz = kRate});
   std::vector<events::Event> happened;
   for (int k = 0; k <= 40; ++k) {
@@ -261,7 +261,7 @@ TEST(Engine, a_recording_plays_as_its_events_do_and_can_begin_in_the_middle) {
   EXPECT_EQ(from_middle.get_synthesiser().get_counters().late, 0);
   from_middle.end_playback(3);
   from_middle.end_playback(3);
-  from_middle.add_to_playback(3, words);  // has ended: nothing
+  from_middle.add_to_playback(3, words);  // ended: no effect
   (void)late;
   EXPECT_THROW(from_middle.begin_playback(4, {.bodies = {99}}), InputError);
 }

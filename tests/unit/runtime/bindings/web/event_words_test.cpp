@@ -1,4 +1,4 @@
-// Events as rows of numbers: the same event comes back, and nothing else is taken for one.
+// Events as rows of numbers: round trip, and refusal of malformed rows.
 #include "runtime/bindings/web/event_words.hpp"
 
 #include <gtest/gtest.h>
@@ -38,14 +38,14 @@ std::vector<events::Event> make_all() {
           events::TimeWatermark{.time_s = 4.0}};
 }
 
-/// By the text of a contacts file, which has all digits of all fields.
+/// As text of a contacts file, with all digits of all fields.
 std::string to_text(const events::Event& event) {
   std::string text;
   events::append_line(text, event);
   return text;
 }
 
-TEST(EventWords, come_back_as_they_went) {
+TEST(EventWords, round_trip) {
   std::vector<double> words;
   const std::vector<events::Event> all = make_all();
   for (const events::Event& event : all) append_words(words, event, event.index() % 2 == 0 ? Timing::kExact : Timing::kSoon);
@@ -60,7 +60,7 @@ TEST(EventWords, come_back_as_they_went) {
   EXPECT_EQ(count, all.size());
 }
 
-TEST(EventWords, refuse_what_is_cut_or_changed_into_nonsense) {
+TEST(EventWords, refuse_truncated_or_corrupt_rows) {
   std::vector<double> words;
   for (const events::Event& event : make_all()) append_words(words, event);
   const auto sink = [](const events::Event&, Timing) {};
@@ -78,7 +78,7 @@ TEST(EventWords, refuse_what_is_cut_or_changed_into_nonsense) {
     for (const double bad : {std::nan(""), std::numeric_limits<double>::infinity(), -1e300, 1e300, 0.5, -7.0}) {
       std::vector<double> changed = words;
       changed[at] = bad;
-      // Taken with a fault, or refused: never anything else.
+      // Accepted with a fault, or refused.
       try {
         read_words(changed, [](const events::Event& event, Timing) { (void)events::find_fault(event); });
       } catch (const InputError&) {

@@ -1,4 +1,4 @@
-// Any numbers as rows of events, to an engine that plays.
+// Fuzzes rows of events, sent to a playing engine.
 #include <cstdint>
 #include <cstring>
 #include <vector>

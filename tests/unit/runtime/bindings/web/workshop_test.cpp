@@ -1,4 +1,4 @@
-// What a page asks for, refused in one sentence or made: bodies with edits, blows, plans.
+// Requests of a page: bodies with edits, blows, plans, and refusals.
 #include "runtime/bindings/web/workshop.hpp"
 
 #include <gtest/gtest.h>
@@ -31,7 +31,7 @@ Workshop make_workshop(const std::filesystem::path& folder) {
   return workshop;
 }
 
-TEST(Workshop, edits_give_the_bank_that_the_edit_gives) {
+TEST(Workshop, edits_give_the_edited_bank) {
   const tests::Folder folder;
   Workshop workshop = make_workshop(folder.path());
   workshop.make_body(4, 1, kScene, R"({"size_scale": 2, "density_scale": 1.5, "damping_scale": 3})");
@@ -59,7 +59,7 @@ TEST(Workshop, bodies_of_one_bank_share_their_surface_through_edits) {
   EXPECT_EQ(workshop.get_body(4).model->get_mode_count(), 1);
 }
 
-TEST(Workshop, what_is_wrong_is_said_and_changes_nothing) {
+TEST(Workshop, errors_are_reported_and_change_nothing) {
   const tests::Folder folder;
   Workshop workshop = make_workshop(folder.path());
   workshop.make_body(4, 1, kScene, "{}");
@@ -82,7 +82,7 @@ TEST(Workshop, what_is_wrong_is_said_and_changes_nothing) {
   for (const double rate : {0.0, 7999.0, 192001.0, std::nan("")}) EXPECT_THROW(Workshop{rate}, InputError) << rate;
 }
 
-TEST(Workshop, a_ping_lifts_its_mode_to_the_pressure_asked_for) {
+TEST(Workshop, a_ping_excites_its_mode_to_the_requested_pressure) {
   const tests::Folder folder;
   Workshop workshop = make_workshop(folder.path());
   workshop.make_body(4, 1, kScene, "{}");
@@ -102,7 +102,7 @@ TEST(Workshop, a_ping_lifts_its_mode_to_the_pressure_asked_for) {
   EXPECT_EQ(count, 1);
 }
 
-TEST(Workshop, a_blow_gives_the_impulse_that_momentum_asks_for) {
+TEST(Workshop, a_blow_conserves_momentum) {
   const tests::Folder folder;
   Workshop workshop = make_workshop(folder.path());
   workshop.make_body(4, 1, kScene, "{}");
@@ -112,7 +112,7 @@ TEST(Workshop, a_blow_gives_the_impulse_that_momentum_asks_for) {
   base::Document blow = base::parse_document(workshop.make_blow(4, scene, 3, {0.2, 0.3, 0.5}, std::nullopt, 0, words), "blow");
   base::Object said = blow.root();
   const double impulse = said.number("impulse_n_s"), before = said.number("before_j"), after = said.number("after_j");
-  // The head of 20 g comes with 2 m/s and leaves with what the impulse leaves it.
+  // The head of 20 g arrives at 2 m/s and leaves with the remaining momentum.
   const double leaves = 2.0 - impulse / 0.020;
   EXPECT_NEAR(before, 0.5 * 0.020 * 4.0, 1e-9);
   EXPECT_NEAR(after, 0.5 * 0.020 * leaves * leaves, 1e-6);

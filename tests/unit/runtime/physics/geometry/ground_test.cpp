@@ -222,6 +222,28 @@ TEST(ground, tilted_coin_rolls_on_a_round_rim) {
   EXPECT_NEAR(low, 0.0, 2e-6 * r);
 }
 
+TEST(ground, leaning_bowl_rolls_on_a_round_rim) {
+  // Upside down on its inner rim, between a cone and a hollow part.
+  const double r = 0.07, z = 0.05, tilt = std::numbers::pi - 0.1;
+  const auto bowl =
+      make_lathe({{0, 0}, {0.04, 0.01}, {0.065, 0.03}, {0.074, 0.048}, {r, z}, {0.061, 0.033}, {0.036, 0.014}, {0, 0.004}}, 48, false)
+          .make();
+  double low = 1.0, high = -1.0;
+  for (int i = 0; i < 200; ++i) {
+    Frame frame;
+    frame.rotation = multiply(make_turn({1, 0, 0}, tilt), make_turn({0, 0, 1}, 0.0137 * i));
+    frame.position_m[2] = r * std::sin(tilt) - z * std::cos(tilt);
+    const auto touches = find_touches(*bowl, frame, 2e-5);
+    ASSERT_FALSE(touches.empty());
+    double least = 1.0;
+    for (const Touch& t : touches) least = std::min(least, t.gap_m);
+    low = std::min(low, least);
+    high = std::max(high, least);
+  }
+  EXPECT_LT(high - low, 2e-6 * r);  // the polygon's: 2.1e-3 r sin(tilt)
+  EXPECT_NEAR(low, 0.0, 2e-6 * r);
+}
+
 TEST(ground, feet_between_corners_that_hang_lower_than_the_margin_are_kept) {
   // A plate on a pentagonal foot, its own corners 0.15 mm above the ground: all ten are nearer than the margin.
   const auto plate = make_lathe({{0, 0}, {0.02, 0}, {0.024, 1e-4}, {0.1, 1.5e-4}, {0.1, 0.02}, {0, 0.02}}, 5, false).make();

@@ -1,9 +1,11 @@
 // The mesh of a shape: what is refused, what is recognised, which triangle is touched.
 #include <gtest/gtest.h>
 
+#include <numbers>
 #include <string>
 
 #include "runtime/base/error.hpp"
+#include "runtime/physics/geometry/facing.hpp"
 #include "runtime/physics/geometry/mesh.hpp"
 #include "runtime/physics/geometry/polyhedron.hpp"
 #include "runtime/physics/geometry/skin.hpp"
@@ -64,7 +66,9 @@ TEST(shape, rim_of_a_cylinder_is_a_ridge_and_its_mantle_is_round) {
   const Skin& skin = cylinder->skin();
   for (int v = 0; v < cylinder->mesh().count_vertices(); ++v) {
     const Vec3& x = cylinder->mesh().vertices[v];
-    EXPECT_EQ(skin.kind(v), std::hypot(x[0], x[1]) > 0.5 ? VertexKind::ridge : VertexKind::none);
+    const bool is_on_rim = std::hypot(x[0], x[1]) > 0.5;
+    EXPECT_EQ(skin.kind(v), is_on_rim ? VertexKind::ridge : VertexKind::none);
+    EXPECT_NEAR(skin.calc_rim_radius_m(v), is_on_rim ? 1.0 : 0.0, 2e-3);
   }
   for (int f = 0; f < cylinder->mesh().count_faces(); ++f) {
     const bool cap = std::abs(cylinder->mesh().normals[f][2]) > 0.5;
@@ -74,6 +78,28 @@ TEST(shape, rim_of_a_cylinder_is_a_ridge_and_its_mantle_is_round) {
     EXPECT_NEAR(std::hypot(x[0], x[1]), 1.0, 2e-4);  // facets: 0.0048
     EXPECT_NEAR(skin.calc_mean_curvature(f, {0.2, 0.3, 0.5}), 0.5, 0.02);
   }
+}
+
+TEST(shape, both_sides_of_a_rim_meet_on_its_circle) {
+  const double r = 0.07, half = std::numbers::pi / 48, chord = r * std::cos(half);
+  const auto bowl = make_lathe({{0, 0}, {0.06, 0.01}, {0.075, 0.045}, {r, 0.05}, {0.05, 0.02}, {0, 0.01}}, 48, false).make();
+  const Mesh& mesh = bowl->mesh();
+  int rims = 0;
+  for (int e = 0; e < 3 * mesh.count_faces(); ++e) {
+    const Vec3 middle = 0.5 * (mesh.vertices[mesh.vertex_of(e)] + mesh.vertices[mesh.vertex_of(Mesh::next(e))]);
+    if (!bowl->skin().is_sharp(e) || std::abs(std::hypot(middle[0], middle[1]) - chord) > 1e-9) continue;
+    ++rims;
+    Vec3 weights{};
+    weights[e % 3] = weights[(e + 1) % 3] = 0.5;
+    const Vec3 x = bowl->skin().calc_point(e / 3, weights);
+    EXPECT_NEAR(std::hypot(x[0], x[1]), r, 1e-5 * r);  // the chord: 2.1e-3 r
+    EXPECT_NEAR(x[2], 0.05, 1e-12);
+    const Vec3 within = (1.0 + 5e-5 / chord) * middle - Vec3{0, 0, 1.1e-4};  // inside the mesh, in the opening of the skin
+    const Nearest at = mesh.find_nearest(within, Box::kFar, -1);
+    EXPECT_TRUE(mesh.is_inside(within, at));
+    EXPECT_GT(calc_skin_gap(*bowl, within, at, true), 2e-5);
+  }
+  EXPECT_EQ(rims, 96);
 }
 
 TEST(shape, touched_triangle_is_the_one_that_looks_the_way_asked) {

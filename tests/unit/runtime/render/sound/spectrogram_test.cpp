@@ -23,7 +23,7 @@ SoundStore make_tone(double freq_hz, double amplitude_pa, int rate_hz, double se
   return sound;
 }
 
-/// Brightness of the picture's pixels, as cairo reads the PNG.
+/// Brightness of the pixels of the PNG.
 struct Picture {
   int width = 0, height = 0;
   std::vector<int> brightness;
@@ -52,7 +52,7 @@ struct Picture {
   int at(int x, int y) const { return brightness[static_cast<std::size_t>(y) * width + x]; }
 };
 
-TEST(Spectrogram, AToneHasItsLevelAndItsBin) {
+TEST(Spectrogram, ToneHasItsLevelAndBin) {
   // 1 Pa rms is 93.98 dB; 46 bins of 48000 / 2048 Hz exactly, and 0.4 of a bin next to it.
   const double bin_hz = 48000.0 / 2048.0;
   const auto on = calc_short_time_spectrum(make_tone(46 * bin_hz, std::sqrt(2.0), 48000, 1.0), 50);
@@ -63,8 +63,8 @@ TEST(Spectrogram, AToneHasItsLevelAndItsBin) {
   EXPECT_NEAR(off_centre.level_db[25 * off_centre.bins + 46], 93.979, 1.0);
 }
 
-TEST(Spectrogram, ALongSoundIsAveragedBetweenItsColumns) {
-  // 100 columns over 20 s: a click anywhere must be seen.
+TEST(Spectrogram, LongSoundIsAveragedBetweenColumns) {
+  // 100 columns over 20 s: a click at any time must be visible.
   const SoundStore sound = make_tone(1000.0, 0.0, 48000, 20.0, 48000 * 7 + 3210);
   const auto spectrum = calc_short_time_spectrum(sound, 100);
   double loudest = kFloorDb;
@@ -79,7 +79,7 @@ TEST(Spectrogram, ALongSoundIsAveragedBetweenItsColumns) {
   EXPECT_EQ(where, 35u);
 }
 
-TEST(Spectrogram, AShortSoundShowsItsOnset) {
+TEST(Spectrogram, ShortSoundShowsItsOnset) {
   // A tone of 3 kHz from the middle of short sounds: silence a twentieth before its onset, full level a twentieth after it.
   for (const double seconds : {0.01, 0.03, 0.1, 0.3}) {
     SoundStore sound(48000, 1);
@@ -95,7 +95,7 @@ TEST(Spectrogram, AShortSoundShowsItsOnset) {
   EXPECT_EQ(calc_short_time_spectrum(make_tone(1000.0, 1.0, 48000, 0.43), 10).window, 2048);
 }
 
-TEST(Spectrogram, TheRidgeOfAToneIsAtItsPixelRow) {
+TEST(Spectrogram, RidgeOfAToneIsAtItsPixelRow) {
   const SpectrogramLayout at;
   for (const int rate : {48000, 44100, 8000}) {
     for (const double part : {0.11, 0.5, 0.83}) {
@@ -108,7 +108,7 @@ TEST(Spectrogram, TheRidgeOfAToneIsAtItsPixelRow) {
         for (int y = at.top; y < at.top + at.plot_height; ++y) {
           if (picture.at(x, y) > picture.at(x, best)) best = y;
         }
-        // Rows are equal ratios of frequency; a tone between two bins may peak half a bin off.
+        // Rows have equal frequency ratios; a tone between two bins may peak half a bin off.
         const double rows_per_ratio = at.plot_height / std::log(0.5 * rate / at.lowest_hz);
         const double expected = at.top + rows_per_ratio * std::log(0.5 * rate / freq);
         EXPECT_NEAR(best + 0.5, expected, 1.6 + rows_per_ratio * 12.0 / freq) << freq << " Hz at " << rate;
@@ -118,18 +118,18 @@ TEST(Spectrogram, TheRidgeOfAToneIsAtItsPixelRow) {
   }
 }
 
-TEST(Spectrogram, SilenceIsADarkPicture) {
+TEST(Spectrogram, SilenceIsDark) {
   const SpectrogramLayout at;
   const Picture picture(make_spectrogram_png(make_tone(1000.0, 0.0, 48000, 0.2), "silence"));
   for (int x = at.left; x < at.left + at.plot_width; x += 50) EXPECT_LT(picture.at(x, at.top + at.plot_height / 2), 10);
 }
 
-TEST(Spectrogram, AVeryShortSoundIsDrawn) {
+TEST(Spectrogram, VeryShortSoundIsDrawn) {
   const Picture picture(make_spectrogram_png(make_tone(1000.0, 1.0, 48000, 5e-5), "two samples"));
   EXPECT_GT(picture.width, 0);
 }
 
-TEST(Axis, PressuresAreTwoDigitsWithoutExponentInTheUnitThatSuitsThem) {
+TEST(Axis, PressuresHaveTwoDigitsAndASuitableUnit) {
   const struct {
     double pa;
     const char *text, *unit;
@@ -150,7 +150,7 @@ TEST(Axis, PressuresAreTwoDigitsWithoutExponentInTheUnitThatSuitsThem) {
   }
 }
 
-TEST(Axis, TimesAreRoundAndNeverCrowded) {
+TEST(Axis, TicksOfTimeAreRoundAndFew) {
   for (double duration = 1e-4; duration < 4000.0; duration *= 1.013) {
     const TimeAxis axis = make_time_axis(duration);
     const double unit = axis.unit == "s" ? 1.0 : axis.unit == "ms" ? 1e-3 : 1e-6;

@@ -1,1 +1,0 @@
-"""What accuracy costs in time: the sections of `carillon-study accuracy`."""

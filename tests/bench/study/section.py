@@ -1,0 +1,86 @@
+"""A section of the report: text, tables and charts in order of addition; each table and chart has a CSV."""
+import dataclasses
+
+import measuring
+
+
+@dataclasses.dataclass
+class Item:
+    """kind: "text", "table" or "chart". rows[0]: header on the page; data[0]: header of the CSV."""
+
+    kind: str
+    name: str = ""
+    text: str = ""  # the text, or the caption
+    rows: list = dataclasses.field(default_factory=list)
+    data: list = dataclasses.field(default_factory=list)
+    svg: str = ""
+    command: str = ""
+
+
+class Section:
+    def __init__(self, name, title, command):
+        """name: for file names and --only; command: reproduces this section."""
+        self.name, self.title, self.command = name, title, command
+        self.items, self.findings = [], []
+
+    def say(self, text):
+        """Adds a paragraph, composed from the measured numbers."""
+        self.items.append(Item("text", text=text))
+
+    def conclude(self, text):
+        """Adds a sentence that the summary at the top of the report repeats."""
+        self.findings.append(text)
+        self.say(text)
+
+    def add_table(self, name, rows, caption, data=None, command=None):
+        """rows: as shown, rows[0] is the header; data: for the CSV, all digits (default: rows)."""
+        self.items.append(
+            Item(
+                "table",
+                name,
+                caption,
+                [list(map(str, row)) for row in rows],
+                [list(row) for row in data or rows],
+                command=command or self.command,
+            )
+        )
+
+    def add_chart(self, name, svg, caption, rows, command=None):
+        """rows: plotted data for the CSV, rows[0] is the header."""
+        self.items.append(Item("chart", name, caption, data=[list(row) for row in rows], svg=svg, command=command or self.command))
+
+    def file_name(self, item, ending):
+        return f"{self.name}-{item.name}.{ending}"
+
+    def to_markdown(self, find_picture=lambda name: name):
+        """Markdown lines of the section; find_picture: maps a picture's name to its path on the page."""
+        lines = [f"## {self.title}", ""]
+        shown = None
+        for item in self.items:
+            if item.kind == "chart" or (item.kind == "table" and item.command != shown):
+                lines += [f"    {item.command}", ""]
+                shown = item.command
+            if item.kind == "text":
+                lines += [item.text, ""]
+            elif item.kind == "table":
+                lines += [item.text, "", *measuring.format_table(item.rows, True).splitlines(), ""]
+            else:
+                lines += [f"![{item.text}]({find_picture(self.file_name(item, 'svg'))})", "", item.text, ""]
+        return lines
+
+    def to_json(self):
+        return {
+            "name": self.name,
+            "title": self.title,
+            "command": self.command,
+            "findings": self.findings,
+            "items": [dataclasses.asdict(item) for item in self.items],
+        }
+
+
+def read_section(value):
+    """Inverse of to_json()."""
+    section = Section(value["name"], value["title"], value["command"])
+    section.findings = value["findings"]
+    section.items = [Item(**item) for item in value["items"]]
+    return section
