@@ -27,6 +27,7 @@
 #include "runtime/base/environment.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/file_limit.hpp"
+#include "runtime/base/keys.hpp"
 #include "runtime/base/message.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/base/result.hpp"

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "precompute/job/simulation.hpp"
-#include "precompute/job/simulation.hpp"
 #include "precompute/run/end_in_error.hpp"
 #include "precompute/run/enter_folder.hpp"
 #include "precompute/run/interrupt.hpp"
