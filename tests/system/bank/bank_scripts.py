@@ -213,7 +213,7 @@ BAD = [
     ("unsolved mode", put("modes/residual", at(1, 0.5)), "residual[1] is 0.5"),
     ("NaN gain", put("modes/radiation_gain", at(0, np.nan)), "radiation_gain[0] is nan"),
     ("negative scale", put("modes/shape_scale", at(0, -1.0)), "shape_scale[0] is -1, negative"),
-    ("shape of fewer modes", replace("modes/shape", lambda s: s[:, :-1]), "modes/shape is <i2 (26, 4, 3), and <i2 (26, 5, 3) is wanted"),
+    ("shape of fewer modes", replace("modes/shape", lambda s: s[:, :-1]), "modes/shape is <i2 (26, 4, 3), <i2 (26, 5, 3) is required"),
     ("shape of other type", replace("modes/shape", lambda s: s.astype("<f8")), "modes/shape is <f8 (26, 5, 3), and <i2"),
     ("flat shape", replace("modes/shape", lambda s: s.reshape(-1)), "modes/shape is <i2 (390), and"),
     ("one decay too few", replace("modes/decay", lambda d: d[:-1]), "modes/decay is <f8 (4), and <f8 (5) is wanted"),
