@@ -77,7 +77,7 @@ def print_table(meshes):
     good = sum(mesh["outside"] <= 0.05 * mesh["modes"] and (mesh["width"] or 0) < 10 for mesh in meshes)
     modes, outside = (sum(mesh[key] for mesh in meshes) for key in ("modes", "outside"))
     print(
-        f"<!-- /summary -->\n\n{good} of {len(meshes)} meshes have at least 95 % of the modes within their bars and a median bar less than ten"
+        f"<!-- /summary -->\n\n{good} of {len(meshes)} meshes have at least 95 % of the modes within their bars and a median bar below ten"
         f" times the error; of all {modes} modes {100 * (1 - outside / modes):.2f} % lie within."
     )
 
