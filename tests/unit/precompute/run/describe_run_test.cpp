@@ -41,7 +41,7 @@ TEST(DescribeMaterials, writes_the_axes_of_an_orthotropic_material) {
 }
 
 TEST(DescribeRun, sums_the_phases_of_the_last_setting_and_separates_trials) {
-  Run run(MPI_COMM_WORLD, RunOptions{.quiet = true});
+  run::Run run(MPI_COMM_WORLD, RunOptions{.quiet = true});
   for (const char* phase : {"read", "modes", "errors", "read", "partition", "assemble", "modes", "errors", "collect", "write"})
     run_phase(run, phase);
   run.log.warn_once("a warning");
