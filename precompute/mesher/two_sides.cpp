@@ -48,7 +48,7 @@ std::optional<TwoSides> find_two_sides(const TriangleSurface& closed) {
   if (!(median < kMaxOfDiagonal * calc_box(closed.points).diagonal())) return std::nullopt;
   std::vector<char> thin(count, 0);
   for (std::size_t f = 0; f < count; ++f) thin[f] = way[f] < kMaxOfMedian * median;
-  // Sides: thin triangles connected by edges.
+  // Sides: triangles with a thin wall, connected by edges.
   mesh::Parts parts(count);
   std::unordered_map<Edge, std::int32_t, EdgeHash> first;
   for (std::size_t f = 0; f < count; ++f) {

@@ -60,7 +60,7 @@ class Guard(unittest.TestCase):
             code, said = self.send(number)
             self.assertEqual(code, 2, said)
             last = said.splitlines()[-1]
-            self.assertTrue(last.startswith("carillon-mesh: box.off: the mesher broke down at the step 'refining'"), last)
+            self.assertTrue(last.startswith("carillon-mesh: box.off: the mesher crashed at the step 'refining'"), last)
             self.assertIn("--method stuffing", last)
             self.assertFalse((self.folder / "out.msh").exists())
 

@@ -130,7 +130,7 @@ TEST(coarsen, refuses_open_surfaces_seams_and_too_few_corners) {
   TriangleSurface winged = ball;  // a third triangle on an edge
   winged.points.push_back({3, 0, 0});
   winged.triangles.push_back({ball.triangles[0][0], ball.triangles[0][1], static_cast<std::int32_t>(ball.points.size())});
-  EXPECT_THAT(catch_message<InputError>([&] { coarsen(winged, 100); }), ::testing::HasSubstr("has not two triangles"));
+  EXPECT_THAT(catch_message<InputError>([&] { coarsen(winged, 100); }), ::testing::HasSubstr("does not have two triangles"));
   TriangleSurface turned = ball;  // one that faces the other way
   std::swap(turned.triangles[5][0], turned.triangles[5][1]);
   EXPECT_THROW(coarsen(turned, 100), InputError);

@@ -204,7 +204,7 @@ TEST(Gltf, refuses_what_bends_moves_or_is_compressed_in_a_sentence) {
            {with("", R"(, "extensions": {"KHR_draco_mesh_compression": {"bufferView": 0}})", ""), "without compression"},
            {with(R"([{"children": [1]}, {"children": [0], "mesh": 0}])", "", ""), "inside itself"},
            {with(make_chain(300), "", ""), "200 deep"},
-           {replace(R"("count": 36)", R"("count": 35)"), "35 corners, which are no whole number of triangles"},
+           {replace(R"("count": 36)", R"("count": 35)"), "35 corners, which is not a multiple of three"},
            {replace(R"("byteLength": 96)", R"("byteLength": 96, "byteStride": 0)"), "byteStride"},
            {replace(R"("byteLength": 96)", R"("byteLength": 96, "byteStride": 8)"), "a stride of 8 for 12 bytes"},
            {replace(R"("byteLength": 96)", R"("byteLength": 9223372036854775807)"), "byteLength"},
