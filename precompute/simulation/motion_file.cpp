@@ -23,7 +23,7 @@
 namespace carillon::simulation {
 namespace {
 
-constexpr std::size_t kRow = 4;  // floats of a point in a frame: place and speed
+constexpr std::size_t kRow = 4;  // floats per point and frame: position and speed
 
 void write_attribute(hid_t at, const char* name, hid_t type, std::vector<hsize_t> shape, const void* data) {
   const bank::Hdf5Id space(shape.empty() ? H5Screate(H5S_SCALAR) : H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr),
@@ -38,7 +38,7 @@ void write_text(hid_t at, const char* name, std::string_view text) {
   write_attribute(at, name, type, {}, text.data());
 }
 
-/// A data set without the time of its making, so that equal runs write equal bytes.
+/// Data set without creation time, so that equal runs write equal bytes.
 hid_t create_set(hid_t at, const char* name, hid_t type, hid_t space) {
   const bank::Hdf5Id plain(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
   bank::require(H5Pset_obj_track_times(plain, false), "write the motion");
@@ -86,7 +86,7 @@ MotionFile::MotionFile(const transient::Domain& domain, const job::SimulationSpe
 void MotionFile::add_sample(const transient::Motion& motion) {
   const auto frame = static_cast<std::int64_t>(std::floor(static_cast<double>(motion.get_sample()) / every_samples_ + 1e-9));
   if (frame == frame_) return;
-  // The one that is due, whatever came before: a run that resumes begins in the middle.
+  // The due one: a resumed run starts in the middle.
   frame_ = frame;
   count_ = frame + 1;
   if (motion.get_sample() != static_cast<std::int64_t>(std::ceil(static_cast<double>(frame) * every_samples_ - 1e-9))) return;

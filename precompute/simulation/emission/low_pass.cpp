@@ -1,6 +1,6 @@
-// Method:     a value that lies between two samples is added to the samples before and behind it, with the weights of the kernel at their
-//             distances (polyphase). No step is ever convolved twice, and no history of steps is kept.
-// Source:     OCE01 eq. 6 to 8.
+// Method: a value between two samples is added to the samples around it with the kernel weights at their distances (polyphase): each step
+//   is convolved once, without a step history.
+// Source: OCE01 eq. 6 to 8.
 #include "precompute/simulation/emission/low_pass.hpp"
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 namespace carillon::emission {
 namespace {
 
-/// At x samples from the middle.
+/// At x samples from the centre.
 double calc_kernel(double x, double half) {
   if (std::abs(x) > half) return 0.0;
   const double sinc = x == 0.0 ? 1.0 : std::sin(std::numbers::pi * x) / (std::numbers::pi * x);
@@ -29,7 +29,7 @@ LowPass::LowPass(std::size_t rows, int values, double first)
 }
 
 void LowPass::add(int i, const double* value) {
-  // Slot s of the ring has the weight of place (s - ring_) mod kSlots.
+  // Slot s of the ring has the weight of position (s - ring_) mod kSlots.
   const double* weight = weight_[i].data() + (kSlots - ring_) % kSlots;
   std::copy_n(value, rows_, waiting_.begin() + static_cast<std::ptrdiff_t>(waiting_count_ * rows_));
   waiting_weight_[waiting_count_++] = weight;

@@ -1,7 +1,7 @@
-// Method:     an arrival is spread over 8 half-samples by a spline of degree 7, in whole units of 2^-46 Pa; images of 20 kHz are at -93 dB.
-//             At the end a filter from half-samples to samples makes the response of both that of runtime/base/sinc.hpp.
-// Source:     OCE01 section 3.3 and figure 4; Schoenberg 1946 (spline); docs/equations.md E14.
-// Deviations: OCE01 spreads by a Gaussian of two samples, 2 to 9 dB too soft at 10 kHz.
+// Method: an arrival is spread over 8 half-samples by a spline of degree 7, in integer units of 2^-46 Pa; images of 20 kHz are at -93 dB
+//   (OCE01's Gaussian of two samples loses 2 to 9 dB at 10 kHz). Finally a filter from half-samples to samples gives the combined response
+//   of runtime/base/sinc.hpp.
+// Source: OCE01 section 3.3 and figure 4; Schoenberg 1946 (spline); docs/equations.md E14.
 #include "precompute/simulation/emission/receivers.hpp"
 
 #include <algorithm>
@@ -15,10 +15,10 @@
 namespace carillon::emission {
 namespace {
 
-constexpr int kReach = 40;  // half-samples on either side of a sample that the filter takes
+constexpr int kReach = 40;  // half-samples on either side in the filter
 
 struct alignas(64) Spline {
-  double factor[kSplinePoints][kSplinePoints]{};  // of a power of the place behind a half-sample, at half-sample j - 3
+  double factor[kSplinePoints][kSplinePoints]{};  // coefficient of a power of the offset from a half-sample, at half-sample j - 3
 };
 
 Spline make_spline() {
@@ -43,11 +43,11 @@ Spline make_spline() {
 
 /// Weights of the half-samples 0 to kReach on either side of a sample.
 std::array<double, kReach + 1> make_filter() {
-  constexpr int kPoints = 128, kParts = 4;  // frequencies to the sample rate; values of the sinc a sample
+  constexpr int kPoints = 128, kParts = 4;  // frequencies up to the sample rate; sinc values per sample
   const base::Sinc& sinc = base::Sinc::get();
   std::array<double, kReach + 1> filter{};
   for (int i = 0; i < kPoints; ++i) {
-    const double turn = std::numbers::pi * (i + 0.5) / kPoints;  // of a half-sample
+    const double turn = std::numbers::pi * (i + 0.5) / kPoints;  // per half-sample
     double response = sinc.evaluate(0.0);
     for (int n = 1; n < base::kSincHalf * kParts; ++n)
       response += 2.0 * sinc.evaluate(static_cast<double>(n) / kParts) * std::cos(2.0 / kParts * turn * n);
@@ -56,7 +56,7 @@ std::array<double, kReach + 1> make_filter() {
   }
   double total = filter[0];
   for (std::size_t j = 1; j <= kReach; ++j) total += 2.0 * filter[j];
-  for (double& one : filter) one *= 2.0 / total;  // of two half-samples a sample, one has the pressure
+  for (double& one : filter) one *= 2.0 / total;  // only one of the two half-samples per sample carries the pressure
   return filter;
 }
 
