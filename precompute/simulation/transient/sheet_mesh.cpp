@@ -17,7 +17,7 @@ void check_cells(int cells) {
   if (cells < 2) throw InputError(fmt::format("a sheet has {} cells; give two or more", cells));
 }
 
-/// Ends, middle and radius of an arc of this chord and rise: a point at share s of its length.
+/// Ends, centre and radius of an arc with this chord and rise: a point at share s of its length.
 Vec3 find_on_arc(double chord_m, double bow_m, double s) {
   if (bow_m == 0.0) return {chord_m * (s - 0.5), 0.0, 0.0};
   const double radius = (0.25 * chord_m * chord_m + bow_m * bow_m) / (2.0 * bow_m);
