@@ -57,7 +57,7 @@ void check_law(const SolidBody& body) {
                   body.name, law.lambda_pa, law.mu_pa, law.phi_pa_s, law.psi_pa_s, law.density_kg_m3, body.mass_damping_per_s));
 }
 
-/// Broadcast data of a body, besides its texts.
+/// Broadcast data of a body, except its texts.
 struct Numbers {
   Law law;
   double mass_damping_per_s;

@@ -55,7 +55,7 @@ struct Contacts::Grid {
 
 double calc_hunt_crossley(double restitution) {
   if (restitution >= 1.0) return 0.0;
-  // g(a) = log(1 + a) - log(1 - a e) - a (1 + e) has one root in (0, 1 / e) besides 0.
+  // g(a) = log(1 + a) - log(1 - a e) - a (1 + e) has one root in (0, 1 / e) other than 0.
   const double e = restitution;
   double low = 1e-9, high = (1.0 - 1e-15) / e;
   for (int i = 0; i < 200; ++i) {

@@ -152,7 +152,7 @@ TEST(Domain, refuses_a_sliver_and_names_it) {
 }
 
 TEST(Domain, refuses_bodies_that_are_no_solids) {
-  EXPECT_EQ(tests::catch_message<InputError>([] { World world(std::vector<SolidBody>{}); }), "there is no body to move");
+  EXPECT_EQ(tests::catch_message<InputError>([] { World world(std::vector<SolidBody>{}); }), "the job has no body");
   std::vector<SolidBody> bodies{{"bar", make_box({0.2, 0.02, 0.02}, {4, 1, 1}, 1), make_law(70e9, 0.33, -2700), 0.0}};
   EXPECT_NE(tests::catch_message<InputError>([&] { World world(bodies); }).find("body 'bar': lambda"), std::string::npos);
   bodies[0].law = make_law(70e9, 0.33, 2700);
