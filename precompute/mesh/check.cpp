@@ -19,7 +19,7 @@ namespace carillon::mesh {
 
 namespace {
 
-constexpr double kFlat = 1e-9;  // 6 V / (longest edge)^3; passes coordinates stored as 32-bit floats
+constexpr double kMinVolumeRatio = 1e-9;  // 6 V / (longest edge)^3; passes coordinates stored as 32-bit floats
 
 [[noreturn]] void refuse(const std::string& name, const std::string& message) { throw InputError(name + ": " + message); }
 
@@ -69,7 +69,7 @@ double calc_determinant(const TetMesh& mesh, std::int64_t e, double& longest_squ
 
 /// `determinant` and squared longest edge as from calc_determinant.
 bool is_flat(double determinant, double longest_squared) {
-  return !(std::abs(determinant) > kFlat * longest_squared * std::sqrt(longest_squared));
+  return !(std::abs(determinant) > kMinVolumeRatio * longest_squared * std::sqrt(longest_squared));
 }
 
 void orient(TetMesh& mesh, const std::string& name, CheckReport& report) {
@@ -278,9 +278,9 @@ void warn_of_elements(CheckReport& report) {
                     report.reoriented, report.tets));
   double farthest = 0.0;
   for (std::size_t k = 0; k < 3; ++k) farthest = std::max({farthest, std::abs(report.box_low[k]), std::abs(report.box_high[k])});
-  constexpr double kLost = 1e-6;  // relative to the shortest edge: effect of coordinate rounding on the stiffness
+  constexpr double kMaxRoundingRatio = 1e-6;  // relative to the shortest edge: effect of coordinate rounding on the stiffness
   const double rounding = farthest * std::numeric_limits<double>::epsilon();
-  if (rounding > kLost * report.shortest_edge_m)
+  if (rounding > kMaxRoundingRatio * report.shortest_edge_m)
     add(fmt::format(
         "the body lies {:.3g} m from the origin, where coordinates are rounded to {:.1g} m, {:.1g} of the shortest edge: move it to "
         "the origin where it is made",

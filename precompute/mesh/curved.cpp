@@ -121,12 +121,12 @@ Vec3 calc_middle(const TetMesh& mesh, std::int64_t e, std::size_t edge) {
 }
 
 bool is_curved(const TetMesh& mesh, std::int64_t e) {
-  constexpr double kStraight = 1e-6;  // relative to the edge length
+  constexpr double kMaxMidNodeOffsetRatio = 1e-6;  // relative to the edge length
   for (std::size_t m = 0; m < 6; ++m) {
     const auto tet = mesh.tet(e);
     const Vec3 off = mesh.nodes_m[tet[4 + m]] - calc_middle(mesh, e, m);
     const Vec3 edge = mesh.nodes_m[tet[kEdges[m][1]]] - mesh.nodes_m[tet[kEdges[m][0]]];
-    if (dot(off, off) > kStraight * kStraight * dot(edge, edge)) return true;
+    if (dot(off, off) > kMaxMidNodeOffsetRatio * kMaxMidNodeOffsetRatio * dot(edge, edge)) return true;
   }
   return false;
 }

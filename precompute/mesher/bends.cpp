@@ -16,15 +16,15 @@
 namespace carillon::mesher {
 namespace {
 
-constexpr double kFlatDeg = 0.1;     // coplanar below this turn
-constexpr double kCornerDeg = 10;    // turn at a corner of a pane's outline
-constexpr double kWider = 3;         // largest width ratio of panes in a row
-constexpr double kAlike = 3.3;       // largest ratio of turns in a row
-constexpr double kMaxTurnDeg = 50;   // largest turn of a faceted smooth surface
-constexpr double kSureTurnDeg = 25;  // fifteen or more sides are a circle
-constexpr int kRow = 4;              // panes of an arc
-constexpr int kShortRow = 5;         // bends and panes of a possible arc: two panes between planes, or three without neighbours
-constexpr int kFollowed = 4;         // per side
+constexpr double kMaxCoplanarTurnDeg = 0.1;  // coplanar below this turn
+constexpr double kMinCornerTurnDeg = 10;     // turn at a corner of a pane's outline
+constexpr double kMaxWidthRatio = 3;         // largest width ratio of panes in a row
+constexpr double kMaxTurnRatio = 3.3;        // largest ratio of turns in a row
+constexpr double kMaxTurnDeg = 50;           // largest turn of a faceted smooth surface
+constexpr double kMaxCircleTurnDeg = 25;     // fifteen or more sides are a circle
+constexpr int kMinArcPanes = 4;              // panes of an arc
+constexpr int kMinDoubtfulArcLength = 5;     // bends and panes of a possible arc: two panes between planes, or three without neighbours
+constexpr int kMaxPanesPerSide = 4;          // per side
 
 /// Outline of a pane.
 struct Outline {
@@ -69,8 +69,8 @@ class Judge {
   Vec3 calc_middle(const Bend& edge) const { return 0.5 * (at(edge.ends[0]) + at(edge.ends[1])); }
   std::int32_t pane_of(const Bend& edge, int side) const { return out_.pane[edge.faces[side]]; }
   const Outline& outline_of(std::int32_t pane) const { return outlines_[place_[pane]]; }
-  bool is_plane(const Bend& edge) const { return edge.count == 2 && edge.turn_deg < kFlatDeg; }
-  bool is_bend(const Bend& edge) const { return edge.count == 2 && edge.turn_deg >= kFlatDeg && edge.turn_deg <= kMaxTurnDeg; }
+  bool is_plane(const Bend& edge) const { return edge.count == 2 && edge.turn_deg < kMaxCoplanarTurnDeg; }
+  bool is_bend(const Bend& edge) const { return edge.count == 2 && edge.turn_deg >= kMaxCoplanarTurnDeg && edge.turn_deg <= kMaxTurnDeg; }
 
   void find_edges() {
     std::map<std::array<std::int32_t, 2>, std::int32_t> number;  // ordered: deterministic numbering of new points
@@ -169,7 +169,7 @@ class Judge {
       const auto& [c, d] = out_.edges[outline.edges[around[0] == i ? around[1] : around[0]]].ends;
       const Vec3 in = calc_unit(at(v) - at(c == v ? d : c)), forth = calc_unit(at(next) - at(v));
       order.push_back(i);
-      corner.push_back(dot(in, forth) < std::cos(kCornerDeg * std::numbers::pi / 180));
+      corner.push_back(dot(in, forth) < std::cos(kMinCornerTurnDeg * std::numbers::pi / 180));
       const auto& beyond = at_point.at(next);
       i = beyond[0] == i ? beyond[1] : beyond[0];
       v = next;
@@ -229,16 +229,16 @@ class Judge {
   void follow(std::int32_t start, int side, double width, Row& row) const {
     const Bend& first = out_.edges[start];
     std::int32_t entry = start, pane = pane_of(first, side);
-    for (int n = 0; n < kFollowed; ++n) {
+    for (int n = 0; n < kMaxPanesPerSide; ++n) {
       const std::int32_t exit = find_exit(pane, entry);
       if (exit < 0) return;
       const Bend& edge = out_.edges[exit];
-      if (calc_width(entry, exit) > kWider * width) return;
+      if (calc_width(entry, exit) > kMaxWidthRatio * width) return;
       ++row.panes;
       const double ratio = edge.turn_deg / first.turn_deg;
       const Outline& outline = outline_of(pane);
       if (outline.sides > 4 && outline.neighbours > 4) return;  // a cap
-      if (!is_bend(edge) || edge.sign != first.sign || ratio > kAlike || ratio < 1 / kAlike) return;
+      if (!is_bend(edge) || edge.sign != first.sign || ratio > kMaxTurnRatio || ratio < 1 / kMaxTurnRatio) return;
       ++row.bends;
       pane = pane_of(edge, pane_of(edge, 0) == pane ? 1 : 0);
       entry = exit;
@@ -319,7 +319,7 @@ class Judge {
       const std::array<std::int32_t, 2> panes{pane_of(edge, 0), pane_of(edge, 1)};
       if (is_facet(panes[0]) || is_facet(panes[1])) continue;
       Row& longest = rows_[make_pair(panes[0], panes[1])];
-      if (longest.panes >= kRow) continue;
+      if (longest.panes >= kMinArcPanes) continue;
       const auto place = static_cast<std::int32_t>(e);
       double width = HUGE_VAL;
       for (int side = 0; side < 2; ++side)
@@ -341,20 +341,20 @@ class Judge {
       edge.sharp = true;
       return;
     }
-    if (const auto row = rows_.find(make_pair(panes[0], panes[1])); row != rows_.end() && row->second.panes < kRow) {
+    if (const auto row = rows_.find(make_pair(panes[0], panes[1])); row != rows_.end() && row->second.panes < kMinArcPanes) {
       edge.sharp = true;
-      edge.doubtful = edge.turn_deg <= sharp_angle_deg_ && row->second.bends + row->second.panes >= kShortRow;
+      edge.doubtful = edge.turn_deg <= sharp_angle_deg_ && row->second.bends + row->second.panes >= kMinDoubtfulArcLength;
       return;
     }
     // A shallow pyramid turns less at its edges than its outline.
     const double turn = std::max(edge.turn_deg, std::min(outline_of(panes[0]).rim_turn_deg, outline_of(panes[1]).rim_turn_deg));
     edge.sharp = turn > sharp_angle_deg_;
-    edge.doubtful = turn > kSureTurnDeg && turn <= kMaxTurnDeg;
+    edge.doubtful = turn > kMaxCircleTurnDeg && turn <= kMaxTurnDeg;
     if (edge.sharp) return;
     std::array<double, 2> reach{};
     for (int side = 0; side < 2; ++side) reach[side] = calc_reach(panes[side], edge);
     for (int side = 0; side < 2; ++side)
-      if (reach[side] > kWider * reach[1 - side] || is_polygon(side)) edge.straight = side;
+      if (reach[side] > kMaxWidthRatio * reach[1 - side] || is_polygon(side)) edge.straight = side;
   }
 
   const TriangleSurface& surface_;
@@ -371,8 +371,8 @@ class Judge {
 Bends find_bends(const TriangleSurface& surface, double sharp_angle_deg) { return Judge(surface, sharp_angle_deg).judge(); }
 
 bool is_tip(const TriangleSurface& surface, const Bends& bends, std::int32_t v, const Vec3& normal) {
-  constexpr double kMin = 0.05;     // radians; 3 degrees
-  constexpr double kFurther = 0.4;  // of the slope: on a ball the next edge turns by twice this
+  constexpr double kMinSlopeRad = 0.05;         // radians; 3 degrees
+  constexpr double kMaxFurtherTurnRatio = 0.4;  // of the slope: on a ball the next edge turns by twice this
   const auto at = [&](std::int32_t n) -> const Vec3& { return surface.points[n]; };
   double all = 0;
   std::map<std::int32_t, int> panes;
@@ -381,11 +381,11 @@ bool is_tip(const TriangleSurface& surface, const Bends& bends, std::int32_t v, 
     std::int32_t f = corner / 3, e = bends.edges_of[f][(corner % 3 + 1) % 3];
     const Vec3 away = calc_unit(0.5 * (at(bends.edges[e].ends[0]) + at(bends.edges[e].ends[1])) - at(v));
     const double slope = -dot(away, normal);
-    if (std::abs(slope) < kMin || slope * all < 0) return false;
+    if (std::abs(slope) < kMinSlopeRad || slope * all < 0) return false;
     all += slope;
     ++panes[bends.pane[f]];
     const Vec3 sideways = cross(bends.normals[f], away);
-    for (std::size_t n = 0; n < bends.pane.size() && bends.edges[e].count == 2 && bends.edges[e].turn_deg < kFlatDeg; ++n) {
+    for (std::size_t n = 0; n < bends.pane.size() && bends.edges[e].count == 2 && bends.edges[e].turn_deg < kMaxCoplanarTurnDeg; ++n) {
       f = bends.edges[e].faces[bends.edges[e].faces[0] == f ? 1 : 0];
       std::int32_t next = -1;
       for (const std::int32_t other : bends.edges_of[f]) {
@@ -396,8 +396,8 @@ bool is_tip(const TriangleSurface& surface, const Bends& bends, std::int32_t v, 
       e = next;
     }
     const Bend& edge = bends.edges[e];
-    if (edge.sharp || edge.turn_deg < kFlatDeg) continue;
-    if (edge.sign * slope > 0 && edge.turn_deg * std::numbers::pi / 180 > kFurther * std::asin(std::min(std::abs(slope), 1.0)))
+    if (edge.sharp || edge.turn_deg < kMaxCoplanarTurnDeg) continue;
+    if (edge.sign * slope > 0 && edge.turn_deg * std::numbers::pi / 180 > kMaxFurtherTurnRatio * std::asin(std::min(std::abs(slope), 1.0)))
       return false;
   }
   return panes.size() > 2;

@@ -15,7 +15,7 @@ namespace carillon::mesher {
 namespace {
 
 // Curves closer than this part of an edge (except at common ends) would need hundreds of balls per element between them.
-constexpr double kSameCurve = 0.01;
+constexpr double kMinCurveGapPerEdge = 0.01;
 
 [[noreturn]] void throw_solid(const SurfaceOptions& options, double deepest_m) {
   throw InputError(
@@ -83,7 +83,7 @@ std::unique_ptr<DelaunayBody> make_delaunay(Body& body, const SurfaceOptions& op
       curves.insert(curves.end(), inset.begin(), inset.end());
     }
   }
-  curves = untangle_curves(std::move(curves), kSameCurve * edge_m);
+  curves = untangle_curves(std::move(curves), kMinCurveGapPerEdge * edge_m);
   return body.field ? make_field_body(*body.field, body.wall_m, curves) : make_surface_body(body.repaired.surface, curves);
 }
 

@@ -10,7 +10,7 @@
 namespace carillon::mesher {
 namespace {
 
-constexpr double kVisible = 0.02;  // of a linear element's edge: smaller bulges are below its chord error
+constexpr double kMinBulgePerEdge = 0.02;  // of a linear element's edge: smaller bulges are below its chord error
 // Relative to the diagonal and to the mean thickness: facets that bulge less count as round.
 constexpr double kRoundness = 1e-4, kThinRoundness = 2e-4;
 constexpr std::size_t kMaxRounded = 100'000;  // triangles
@@ -79,7 +79,7 @@ void round(Body& body, const SurfaceOptions& options, SurfaceReport& report) {
   // Fine cuts shorten the offsets to the smooth surface; irrelevant for linear elements.
   const double nodes = static_cast<double>(options.nodes.value_or(10000));
   const double shortest = options.edge_m.value_or(std::sqrt(calc_area(repaired.surface) / nodes));
-  const double tolerance = options.order == 1 ? std::max(kRoundness * diagonal, kVisible * shortest) : kRoundness * diagonal;
+  const double tolerance = options.order == 1 ? std::max(kRoundness * diagonal, kMinBulgePerEdge * shortest) : kRoundness * diagonal;
   int pieces = std::max(1, static_cast<int>(std::ceil(std::sqrt(round.get_usual_bulge() / tolerance))));
   while (pieces > 1 && repaired.surface.triangles.size() * pieces * pieces > kMaxRounded) --pieces;
   TriangleSurface rounded = round.cut(pieces);

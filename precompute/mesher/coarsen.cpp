@@ -41,12 +41,12 @@ class NearPlacement {
     auto placed = placement_(profile);
     if (!placed) return placed;
     const Kernel::Segment_3 edge(profile.p0(), profile.p1());
-    if (CGAL::squared_distance(*placed, edge) > kFarthest * kFarthest * edge.squared_length()) placed.reset();
+    if (CGAL::squared_distance(*placed, edge) > kMaxDistancePerEdge * kMaxDistancePerEdge * edge.squared_length()) placed.reset();
     return placed;
   }
 
  private:
-  static constexpr double kFarthest = 0.1;  // edges
+  static constexpr double kMaxDistancePerEdge = 0.1;  // edges
   SMS::LindstromTurk_placement<Mesh> placement_;
 };
 

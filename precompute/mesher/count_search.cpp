@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kMaxSteps = 10;
 // Below this target a mesh takes a few hundredths of a second, so a series of edges is tried.
-constexpr double kCheapTarget = 3000;
+constexpr double kFastTargetNodes = 3000;
 constexpr int kTrials = 24;
 // Trial fraction of the target; and the ratio of actual to predicted nodes above which the model needs an offset.
 constexpr double kTrialPart = 0.2, kUsual = 1.5;
@@ -26,7 +26,7 @@ struct Trial {
 
 /// True if clearly longer edges gave hardly fewer nodes.
 bool is_level(const std::vector<Trial>& trials, double target) {
-  const double longer = target < kCheapTarget ? 1.6 : 1.25;  // counts of coarse meshes jump
+  const double longer = target < kFastTargetNodes ? 1.6 : 1.25;  // counts of coarse meshes jump
   for (const Trial& a : trials)
     for (const Trial& b : trials)
       if (a.count > target && b.count > target && b.edge_m > longer * a.edge_m && b.count > 0.9 * a.count) return true;
@@ -105,7 +105,7 @@ mesh::TetMesh search_edge(const CountSearch& search, CountModel model, double& e
   };
 
   double edge = std::min(edge_m, search.longest_m), low = 0, high = 1e300;
-  if (search.is_uncertain && target * kTrialPart >= kCheapTarget / 2)
+  if (search.is_uncertain && target * kTrialPart >= kFastTargetNodes / 2)
     edge = std::min(model.find_edge(kTrialPart * target), search.longest_m);
   for (int step = 0; step < kMaxSteps && !is_met(search.contented); ++step) {
     const std::optional<double> count = attempt(edge);
@@ -120,7 +120,7 @@ mesh::TetMesh search_edge(const CountSearch& search, CountModel model, double& e
     edge = count && *count > 0 ? std::min(model.find_edge(target), search.longest_m) : 0.7 * edge;
     if (bracketed && !(edge > low * 1.002 && edge < high / 1.002)) edge = std::sqrt(low * high);
   }
-  if (!is_met(search.tolerance) && target < kCheapTarget && best && failures == 0 && !is_level(trials, target)) {
+  if (!is_met(search.tolerance) && target < kFastTargetNodes && best && failures == 0 && !is_level(trials, target)) {
     const double middle = best->edge_m;
     for (int n = 0; n < kTrials && !is_met(0.8 * search.tolerance); ++n)
       attempt(std::min(middle * (1 + 0.015 * (n / 2 + 1) * (n % 2 == 0 ? 1 : -1)), search.longest_m));

@@ -18,7 +18,7 @@ constexpr double kReach = 0.3;
 // Faces with a larger turn at an edge may lie on two sides of a sharp curve (cosine of 15 degrees).
 constexpr double kTurn = 0.966;
 // An end lies on a curve if nearer than this part of the edge.
-constexpr double kOnCurve = 1e-3;
+constexpr double kMaxCurveDistancePerEdge = 1e-3;
 
 struct BoundaryEdge {
   std::int32_t a = 0, b = 0;  // ends, a < b
@@ -76,8 +76,9 @@ CurvedEdges curve_mesh(mesh::TetMesh& mesh, const std::vector<Polyline>& curves,
     const double length = norm(b - a), reach = kReach * length;
     const Vec3 middle = 0.5 * (a + b), sum = edge.normals[0] + edge.normals[1];
     std::optional<Vec3> place;
-    if (!curves.empty() && dot(edge.normals[0], edge.normals[1]) < kTurn && find_on_curves(curves, a).second < kOnCurve * length &&
-        find_on_curves(curves, b).second < kOnCurve * length) {
+    if (!curves.empty() && dot(edge.normals[0], edge.normals[1]) < kTurn &&
+        find_on_curves(curves, a).second < kMaxCurveDistancePerEdge * length &&
+        find_on_curves(curves, b).second < kMaxCurveDistancePerEdge * length) {
       const auto [on_curve, distance] = find_on_curves(curves, middle);
       if (distance < reach) place = on_curve;
     }

@@ -38,7 +38,7 @@ namespace carillon::mesher {
 namespace {
 
 constexpr std::int64_t kMaxPinches = 10;
-constexpr double kPerturbed = 0.75;  // of the requested angle: smooth.cpp does the rest faster
+constexpr double kPerturbedAngleRatio = 0.75;  // of the requested angle: smooth.cpp does the rest faster
 // Limit on surface queries by refinement: CGAL's can loop without end at touching skins. Sound bodies take at most 12 queries per node,
 // self-touching ones 50.
 constexpr std::int64_t kQueries = 500000;
@@ -200,7 +200,7 @@ class Mesh3Body final : public DelaunayBody {
     if (angle_deg <= 0) return extract();
     // Exudation removes nine of ten slivers in a tenth of the time; the rest is left to perturbation, followed by another exudation.
     CGAL::exude_mesh_3(complex_, p::time_limit = 0, p::sliver_bound = angle_deg);
-    CGAL::perturb_mesh_3(complex_, *domain_, p::time_limit = 0, p::sliver_bound = kPerturbed * angle_deg);
+    CGAL::perturb_mesh_3(complex_, *domain_, p::time_limit = 0, p::sliver_bound = kPerturbedAngleRatio * angle_deg);
     CGAL::exude_mesh_3(complex_, p::time_limit = 0, p::sliver_bound = angle_deg);
     return extract();
   }

@@ -21,16 +21,16 @@
 namespace carillon::mesher {
 namespace {
 
-constexpr double kMaxMitre = 4;         // over the thickness: folds of 29 degrees between the sides
-constexpr double kMinShrink = 0.05;     // least ratio of a triangle's areas on the two sides of the wall
-constexpr double kSameNormal = 0.9998;  // cosine of 1.1 degrees
+constexpr double kMaxMitre = 4;              // over the thickness: folds of 29 degrees between the sides
+constexpr double kMinAreaRatio = 0.05;       // least ratio of a triangle's areas on the two sides of the wall
+constexpr double kMinNormalCosine = 0.9998;  // cosine of 1.1 degrees
 constexpr int kSmoothings = 30;
 
 /// Shortest correction of `way` with the components `wanted` along the unit normals.
 Vec3 correct_way(Vec3 way, const std::vector<Vec3>& normals, double wanted) {
   Mat3 matrix{};
-  constexpr double kLeast = 1e-6;  // regularisation for directions without a normal; the iterations compensate for it
-  for (int i = 0; i < 3; ++i) matrix[i][i] = kLeast;
+  constexpr double kRegularisation = 1e-6;  // regularisation for directions without a normal; the iterations compensate for it
+  for (int i = 0; i < 3; ++i) matrix[i][i] = kRegularisation;
   for (const Vec3& n : normals)
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) matrix[i][j] += n[i] * n[j];
@@ -50,7 +50,8 @@ std::vector<std::vector<Vec3>> find_point_normals(const Skin& skin, const std::v
     for (int c = 0; c < 3; ++c) {
       auto& own = at[skin.surface.triangles[f][c]];
       const Vec3& n = normals[f][c];
-      if (norm(n) > 0 && std::none_of(own.begin(), own.end(), [&](const Vec3& m) { return dot(m, n) > kSameNormal; })) own.push_back(n);
+      if (norm(n) > 0 && std::none_of(own.begin(), own.end(), [&](const Vec3& m) { return dot(m, n) > kMinNormalCosine; }))
+        own.push_back(n);
     }
   return at;
 }
@@ -146,7 +147,7 @@ class Extruder {
     for (int side = 0; side < 2; ++side)
       area[side] = cross(find_at(triangle[1], side) - find_at(triangle[0], side), find_at(triangle[2], side) - find_at(triangle[0], side));
     const double low = norm(area[0]), high = norm(area[1]);
-    if (!(dot(area[0], area[1]) > 0.5 * low * high) || std::min(low, high) < kMinShrink * std::max(low, high)) return false;
+    if (!(dot(area[0], area[1]) > 0.5 * low * high) || std::min(low, high) < kMinAreaRatio * std::max(low, high)) return false;
     bool odd = false;
     const Triangle t = sort(triangle, odd);
     for (int layer = 0; layer < wall_.layers; ++layer)
@@ -320,7 +321,7 @@ class Extruder {
       } else {
         m.at = m.at + bulge;
       }
-      if (across.size() == 2 && dot(across[0], across[1]) > kSameNormal) across.pop_back();
+      if (across.size() == 2 && dot(across[0], across[1]) > kMinNormalCosine) across.pop_back();
       Vec3 way = 0.5 * (ways_[a] + ways_[b]);
       // Rotated by the arc, with the length at the ends.
       way = correct_way(way, across, wanted / sided);

@@ -28,7 +28,7 @@ constexpr double kBendDeg = 30;
 // four or more; except surfaces of few triangles. Generated scans have 10 to 60 % and 35 to 75 %, the Stanford bunny 0.6 % sharp edges;
 // boxes, screws and letters have points of two and three.
 constexpr double kRoughPart = 0.05, kOddPart = 0.25;
-constexpr std::size_t kMinScan = 500;
+constexpr std::size_t kMinScanTriangles = 500;
 // One smoothing sweep: a shrinking and an expanding step; number of sweeps.
 constexpr double kShrink = 0.5, kSwell = -0.53;
 constexpr int kSweeps = 6;
@@ -200,7 +200,7 @@ bool is_crease(const TriangleSurface& surface, Edges& edges, const std::vector<s
 }  // namespace
 
 bool is_scan(const TriangleSurface& surface, double sharp_angle_deg) {
-  if (surface.triangles.size() < kMinScan) return false;
+  if (surface.triangles.size() < kMinScanTriangles) return false;
   const Edges edges(surface);
   const std::vector<Edge> sharp = edges.find_sharp(sharp_angle_deg);
   if (static_cast<double>(sharp.size()) < kRoughPart * static_cast<double>(edges.get_all().size())) return false;

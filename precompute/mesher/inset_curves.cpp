@@ -13,7 +13,7 @@ namespace carillon::mesher {
 namespace {
 
 // Faces with a smaller normal difference are one side of the edge (cosine of 25 degrees).
-constexpr double kSameSide = 0.906;
+constexpr double kMinSideCosine = 0.906;
 // Relative tolerance of the wall distance for points of the inner skin.
 constexpr double kTolerance = 0.02;
 
@@ -28,7 +28,7 @@ Normals group_sides(const Normals& area_normals) {
   Normals sums;
   for (const Vec3& n : area_normals) {
     if (!(norm(n) > 0)) continue;
-    const auto same = std::find_if(sums.begin(), sums.end(), [&](const Vec3& s) { return dot(s, n) > kSameSide * norm(s) * norm(n); });
+    const auto same = std::find_if(sums.begin(), sums.end(), [&](const Vec3& s) { return dot(s, n) > kMinSideCosine * norm(s) * norm(n); });
     if (same == sums.end())
       sums.push_back(n);
     else

@@ -14,7 +14,7 @@ namespace carillon::mesher {
 namespace {
 
 // Least dihedral angle of an added element; smoothing improves it further.
-constexpr double kFlattestDeg = 4;
+constexpr double kMinAddedDihedralDeg = 4;
 constexpr int kMaxPasses = 8;
 
 using Fan = std::vector<std::array<std::int32_t, 2>>;  // other two nodes of each face, counter-clockwise seen from outside
@@ -117,7 +117,7 @@ std::int64_t part_pinched_nodes(mesh::TetMesh& mesh, std::int64_t components, co
       touched[v] = 1;
       for (const Fan& fan : fans)
         for (const auto& face : fan) touched[face[0]] = 1;
-      if (over == nullptr || best.flatness < kFlattestDeg || pass + 2 >= kMaxPasses) {
+      if (over == nullptr || best.flatness < kMinAddedDihedralDeg || pass + 2 >= kMaxPasses) {
         for (const std::int32_t e : around[v]) remove[e] = 1;
         continue;
       }

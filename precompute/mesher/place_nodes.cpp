@@ -17,7 +17,7 @@ namespace carillon::mesher {
 namespace {
 
 // Least remaining part of an element's volume.
-constexpr double kMinVolume = 0.3;
+constexpr double kMinRemainingVolumeRatio = 0.3;
 // Relative to the sample spacing: larger offsets from the skin are not interpolation errors.
 constexpr double kMaxOff = 0.25;
 
@@ -65,7 +65,7 @@ std::int64_t place_on_smooth_surface(mesh::TetMesh& mesh, const Body& body, bool
     again = false;
     for (std::size_t v = 0; v < mesh.nodes_m.size(); ++v) linear.nodes_m[v] = mesh.nodes_m[v] + way[v];
     for (std::int64_t e = 0; e < mesh.tet_count(); ++e) {
-      if (calc_volume(linear, e) > kMinVolume * volumes[e]) continue;
+      if (calc_volume(linear, e) > kMinRemainingVolumeRatio * volumes[e]) continue;
       for (int c = 0; c < 4; ++c) {
         const std::int32_t v = linear.tets[4 * e + c];
         again = again || norm(way[v]) > 0;

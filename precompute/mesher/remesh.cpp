@@ -13,10 +13,10 @@
 namespace carillon::mesher {
 namespace {
 
-constexpr double kLong = 4.0 / 3, kShort = 4.0 / 5;
+constexpr double kSplitLengthRatio = 4.0 / 3, kCollapseLengthRatio = 4.0 / 5;
 constexpr int kSweeps = 8;
-constexpr double kGrowth = 0.4;                      // of the target length, per length
-constexpr double kFlatFold = 0.98, kPerMitre = 1.3;  // cosine of a fold without a mitre; edges over the width of their mitre
+constexpr double kGrowth = 0.4;                            // of the target length, per length
+constexpr double kMinMitreCosine = 0.98, kPerMitre = 1.3;  // cosine of a fold without a mitre; edges over the width of their mitre
 
 /// Lengthens edges at folds to the width of their mitres.
 void widen_folds(const Skin& now, const SkinSizes& sizes, std::vector<double>& size) {
@@ -34,7 +34,7 @@ void widen_folds(const Skin& now, const SkinSizes& sizes, std::vector<double>& s
       if (fresh) continue;
       const double cosine = std::clamp(dot(normal, found->second), -0.99, 1.0);
       const double takes = sizes.reach_m * std::sqrt((1 - cosine) / (1 + cosine)) + sizes.margin_m;
-      if (cosine > kFlatFold) continue;
+      if (cosine > kMinMitreCosine) continue;
       for (const std::int32_t v : {a, b}) least[v] = std::max(least[v], kPerMitre * takes);
     }
   for (int sweep = 0; sweep < 3; ++sweep)
@@ -99,7 +99,7 @@ std::vector<std::pair<double, Edge>> list_outside(const SkinEditor& skin, double
 void split_long(SkinEditor& skin) {
   const auto& x = skin.get_points();
   for (int round = 0; round < 12; ++round) {
-    const auto edges = list_outside(skin, kLong, 1);
+    const auto edges = list_outside(skin, kSplitLengthRatio, 1);
     if (edges.empty()) return;
     // One edge per triangle and round, the longest, keeps the shapes.
     std::vector<char> busy(skin.count_triangles(), 0);
@@ -119,13 +119,14 @@ void split_long(SkinEditor& skin) {
 void collapse_short(SkinEditor& skin) {
   const auto& x = skin.get_points();
   for (int round = 0; round < 6; ++round) {
-    const auto edges = list_outside(skin, kShort, -1);
+    const auto edges = list_outside(skin, kCollapseLengthRatio, -1);
     std::size_t done = 0;
     for (const auto& [order, e] : edges) {
       if (skin.get_star(e[0]).empty() || skin.get_star(e[1]).empty()) continue;
       std::array<std::int32_t, 2> faces{};
       if (skin.find_faces(e[0], e[1], faces) == 0) continue;
-      if (norm(x[e[1]] - x[e[0]]) < kShort * skin.calc_wanted(e[0], e[1])) done += skin.collapse(e[0], e[1], kLong);
+      if (norm(x[e[1]] - x[e[0]]) < kCollapseLengthRatio * skin.calc_wanted(e[0], e[1]))
+        done += skin.collapse(e[0], e[1], kSplitLengthRatio);
     }
     if (done == 0) return;
   }

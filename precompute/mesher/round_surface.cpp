@@ -22,11 +22,11 @@
 namespace carillon::mesher {
 namespace {
 
-constexpr double kMaxBulge = 0.15;     // over the edge length; larger bulges are not a smooth surface
-constexpr double kDefaultPart = 0.95;  // percentile of the bulging edges
-constexpr double kSameNormal = 3e-3;   // radians
-constexpr double kMaxRimTilt = 0.35;   // of the normal at a rim, radians
-constexpr double kOnSide = 1e-8;       // barycentric
+constexpr double kMaxBulge = 0.15;              // over the edge length; larger bulges are not a smooth surface
+constexpr double kDefaultPart = 0.95;           // percentile of the bulging edges
+constexpr double kMaxNormalAngleRad = 3e-3;     // radians
+constexpr double kMaxRimTilt = 0.35;            // of the normal at a rim, radians
+constexpr double kBarycentricTolerance = 1e-8;  // barycentric
 constexpr int kMaxPieces = 16;
 
 using Weights = std::array<double, 3>;  // barycentric
@@ -151,7 +151,7 @@ struct RoundSurface::Patches {
   bool is_straight(const Bend& edge) const {
     for (int side = 0; side < 2; ++side)
       for (const std::int32_t v : edge.ends)
-        if (norm(corner[get_corner(edge.faces[side], v)] - bends.normals[edge.faces[side]]) > kSameNormal) return false;
+        if (norm(corner[get_corner(edge.faces[side], v)] - bends.normals[edge.faces[side]]) > kMaxNormalAngleRad) return false;
     return true;
   }
 
@@ -408,7 +408,7 @@ RoundSurface::Place RoundSurface::find_place(std::int32_t triangle, const Vec3& 
     l[2] = (d00 * d21 - d01 * d20) / det;
     l[0] = 1 - l[1] - l[2];
     double sum = 0;
-    for (double& part : l) sum += part = part < kOnSide ? 0 : part;  // points on a side stay there
+    for (double& part : l) sum += part = part < kBarycentricTolerance ? 0 : part;  // points on a side stay there
     for (double& part : l) part /= sum;
   }
   for (int c = 0; c < 3; ++c)

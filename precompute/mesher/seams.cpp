@@ -17,11 +17,11 @@
 namespace carillon::mesher {
 namespace {
 
-constexpr double kPartOfEdge = 0.25;  // tolerance limit, over a border's length
-constexpr double kLeastOverlap = 20;  // common length of two borders, in seam widths; or half of the shorter border
-constexpr double kFoldedDeg = 2;      // largest angle between the two sides of a wall at its rim
-constexpr double kMaxLooks = 2e8;     // comparisons of borders; above (millions of borders in one place): left unjoined
-constexpr int kMostPasses = 3;        // a split can create new pairs of borders
+constexpr double kPartOfEdge = 0.25;        // tolerance limit, over a border's length
+constexpr double kMinOverlapPerWidth = 20;  // common length of two borders, in seam widths; or half of the shorter border
+constexpr double kMaxRimAngleDeg = 2;       // largest angle between the two sides of a wall at its rim
+constexpr double kMaxComparisons = 2e8;     // comparisons of borders; above (millions of borders in one place): left unjoined
+constexpr int kMaxSeamPasses = 3;           // a split can create new pairs of borders
 
 template <std::size_t N>
 struct CellHash {
@@ -156,7 +156,7 @@ class SeamJoiner {
       for (const std::int32_t b : near) {
         const Border& other = border(b);
         looks += static_cast<double>(own.size());
-        if (looks > kMaxLooks) return contacts_.clear();
+        if (looks > kMaxComparisons) return contacts_.clear();
         const Vec3 way = at(other.to) - at(other.from);
         const double along = std::clamp(dot(at(v) - at(other.from), way) / dot(way, way), 0.0, 1.0);
         const double distance = norm(at(v) - (at(other.from) + along * way));
@@ -180,7 +180,7 @@ class SeamJoiner {
     };
     const Vec3 p = find_inward(a), q = find_inward(b);
     if (norm(p) <= tolerance_ || norm(q) <= tolerance_) return false;  // a degenerate triangle
-    return std::atan2(norm(cross(p, q)), dot(p, q)) < kFoldedDeg * std::numbers::pi / 180.0;
+    return std::atan2(norm(cross(p, q)), dot(p, q)) < kMaxRimAngleDeg * std::numbers::pi / 180.0;
   }
 
   /// Contacts of two borders, from begin to end.
@@ -192,7 +192,7 @@ class SeamJoiner {
       for (std::size_t j = begin; j < i; ++j) overlap = std::max(overlap, norm(at(contacts_[i].point) - at(contacts_[j].point)));
     }
     const double shorter = std::min(a.length, b.length);
-    if (!(overlap >= std::min(0.5 * shorter, kLeastOverlap * tolerance_) && overlap > 2.0 * widest) || is_folded(a, b)) return;
+    if (!(overlap >= std::min(0.5 * shorter, kMinOverlapPerWidth * tolerance_) && overlap > 2.0 * widest) || is_folded(a, b)) return;
     for (std::size_t i = begin; i < end; ++i) {
       const Contact& contact = contacts_[i];
       const Border& on = border(contact.on);
@@ -310,7 +310,7 @@ Seams join_seams(TriangleSurface& surface) {
   std::int64_t left = 0;
   // Narrow seams first: their borders are closed before a wider tolerance could join both sides of a thin wall's rim.
   for (const double tolerance : {1e-3 * kSeam, 1e-2 * kSeam, 0.1 * kSeam, kSeam})
-    for (int pass = 0; pass < kMostPasses; ++pass) {
+    for (int pass = 0; pass < kMaxSeamPasses; ++pass) {
       TriangleSurface candidate = joined;
       SeamJoiner joiner(candidate, tolerance * diagonal);
       left = joiner.count_borders();

@@ -10,8 +10,9 @@ namespace {
 constexpr double kBendDeg = 40;       // a larger bend is a corner of the fold
 constexpr double kMaxTurn = 0.5;      // cosine, largest turn of a triangle in a collapse or move
 constexpr double kMaxFlipTurn = 0.7;  // cosine, between the triangles before and after a flip
-constexpr double kSpeck = 0.02;       // twice the area over the squared target length: smaller triangles have no normal of their own
-constexpr double kMinHeight = 0.02;   // over the longest edge: flatter triangles have no normal
+constexpr double kMinAreaPerSquaredLength =
+    0.02;                                   // twice the area over the squared target length: smaller triangles have no normal of their own
+constexpr double kMinHeightPerEdge = 0.02;  // over the longest edge: flatter triangles have no normal
 
 }  // namespace
 
@@ -159,10 +160,10 @@ bool SkinEditor::keeps_sides(std::int32_t v, std::int32_t other, const Vec3& p) 
     const double longest = calc_longest(q[0], q[1], q[2]), longest_before = calc_longest(x_[t[0]], x_[t[1]], x_[t[2]]);
     const double height = norm(after) / (longest * longest), height_before = norm(before) / (longest_before * longest_before);
     // Flat triangles have no normal: none may become flat.
-    if (!(height > std::min(kMinHeight, 0.5 * height_before))) return false;
-    if (height < kMinHeight) continue;
+    if (!(height > std::min(kMinHeightPerEdge, 0.5 * height_before))) return false;
+    if (height < kMinHeightPerEdge) continue;
     // Normals of triangles far below the target size are noise: use the surrounding mean.
-    const Vec3& side = norm(before) > kSpeck * wanted * wanted ? before : mean;
+    const Vec3& side = norm(before) > kMinAreaPerSquaredLength * wanted * wanted ? before : mean;
     if (dot(side, after) < kMaxTurn * norm(side) * norm(after)) return false;
   }
   return true;
@@ -238,7 +239,7 @@ bool SkinEditor::flip(const Quad& quad) {
     if (!(dot(m, before) > kMaxFlipTurn * norm(m) * norm(before))) return false;
   const double longest =
       std::max({norm(x_[c] - x_[d]), norm(x_[a] - x_[c]), norm(x_[b] - x_[c]), norm(x_[a] - x_[d]), norm(x_[b] - x_[d])});
-  if (std::min(norm(m0), norm(m1)) < kMinHeight * longest * longest) return false;
+  if (std::min(norm(m0), norm(m1)) < kMinHeightPerEdge * longest * longest) return false;
   t_[faces[0]] = one;
   t_[faces[1]] = two;
   std::erase(star_[b], faces[0]);

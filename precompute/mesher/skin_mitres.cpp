@@ -10,7 +10,8 @@ namespace carillon::mesher {
 namespace {
 
 constexpr double kMinRingPart = 0.15, kMaxRingPart = 0.75;  // of edges at rings
-constexpr double kRoom = 0.13, kRoomShape = 0.1;            // least area ratio of a triangle's copies; and over its longest edge squared
+constexpr double kMinCopyAreaRatio = 0.13,
+                 kMinCopyShapeRatio = 0.1;  // least area ratio of a triangle's copies; and over its longest edge squared
 
 }  // namespace
 
@@ -76,7 +77,7 @@ Skin make_room(const Skin& start, const SkinPlaces& places, const std::vector<Ve
       least = std::min(least, area);
       most = std::max(most, std::abs(area));
     }
-    return most > 0 ? least / std::max(most, kRoomShape * longest * longest) : 0.0;
+    return most > 0 ? least / std::max(most, kMinCopyShapeRatio * longest * longest) : 0.0;
   };
   const auto rate_star = [&](std::int32_t v, const Vec3& p) {
     double least = HUGE_VAL;
@@ -92,14 +93,14 @@ Skin make_room(const Skin& start, const SkinPlaces& places, const std::vector<Ve
         return std::min(rate(skin.get_triangle(faces[0]), -1, {}), rate(skin.get_triangle(faces[1]), -1, {}));
       };
       const double before = rate_quad();
-      if (before > kRoom || !skin.flip(*quad) || rate_quad() > before) continue;
+      if (before > kMinCopyAreaRatio || !skin.flip(*quad) || rate_quad() > before) continue;
       if (const auto back = skin.find_quad(quad->c, quad->d)) skin.flip(*back);
     }
     bool again = false;
     for (std::int32_t v = 0; v < static_cast<std::int32_t>(x.size()); ++v) {
       if (skin.get_star(v).empty() || skin.get_kind(v) == SkinEditor::kFixed) continue;
       double best = rate_star(v, x[v]);
-      if (best > kRoom) continue;
+      if (best > kMinCopyAreaRatio) continue;
       double reach = HUGE_VAL;
       Vec3 normal{};
       std::vector<Vec3> ends;  // along the fold

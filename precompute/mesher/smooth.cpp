@@ -15,8 +15,8 @@ namespace carillon::mesher {
 namespace {
 
 constexpr int kMaxPasses = 12;
-constexpr std::size_t kMany = 100;
-constexpr double kHardly = 0.95;  // least progress: remaining part of the missing angles
+constexpr std::size_t kManyFlatElements = 100;
+constexpr double kMaxDeficitRatio = 0.95;  // least progress: remaining part of the missing angles
 
 /// Of element e of a linear mesh.
 double calc_element_flatness(const mesh::TetMesh& mesh, std::int32_t e) {
@@ -60,10 +60,11 @@ class Improver {
         if (const double angle = calc_element_flatness(mesh_, e); angle < angle_deg_) flat.emplace_back(angle, e);
       const double lacking =
           std::accumulate(flat.begin(), flat.end(), 0.0, [&](double sum, const auto& f) { return sum + angle_deg_ - f.first; });
-      if (flat.size() > kMany && lacking > kHardly * last) break;  // many elements with little progress: the body itself is flat there
+      if (flat.size() > kManyFlatElements && lacking > kMaxDeficitRatio * last)
+        break;  // many elements with little progress: the body itself is flat there
       last = lacking;
       std::sort(flat.begin(), flat.end());
-      const std::int64_t moves = move_own(flat) + (flat.size() <= kMany ? move_neighbours(flat) : 0);
+      const std::int64_t moves = move_own(flat) + (flat.size() <= kManyFlatElements ? move_neighbours(flat) : 0);
       moved += moves;
       if (moves == 0) break;
     }

@@ -299,7 +299,7 @@ double calc_flatness(const std::array<Vec3, 4>& corners) {
 }
 
 std::int64_t peel_flat_elements(mesh::TetMesh& mesh) {
-  constexpr double kFlatDeg = 1e-3;
+  constexpr double kMinDihedralDeg = 1e-3;
   std::int64_t peeled = 0;
   while (mesh::count_flat(mesh) > 0) {
     std::set<Triangle> boundary;  // corners ascending
@@ -313,7 +313,7 @@ std::int64_t peel_flat_elements(mesh::TetMesh& mesh) {
       const auto tet = mesh.tet(e);
       std::array<Vec3, 4> corners;
       for (int c = 0; c < 4; ++c) corners[c] = mesh.nodes_m[tet[c]];
-      if (std::abs(calc_flatness(corners)) > kFlatDeg) continue;
+      if (std::abs(calc_flatness(corners)) > kMinDihedralDeg) continue;
       const bool is_outer = std::any_of(std::begin(mesh::kFaces), std::end(mesh::kFaces), [&](const auto& face) {
         Triangle key{tet[face[0]], tet[face[1]], tet[face[2]]};
         std::sort(key.begin(), key.end());

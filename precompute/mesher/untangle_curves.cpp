@@ -10,7 +10,7 @@ namespace carillon::mesher {
 namespace {
 
 // Sine of 1.7 degrees: curves that leave their common end at a smaller angle would need thousands of balls.
-constexpr double kSameDirection = 0.03;
+constexpr double kMinDirectionSine = 0.03;
 
 struct Segment {
   Vec3 a{}, b{};
@@ -44,7 +44,7 @@ bool is_tangled(const Segment& s, const Segment& t, double same_m) {
   if (common > 1) return true;
   if (common == 0) return calc_distance(s, t) <= same_m;
   const Vec3 u = ends[0] || ends[1] ? s.b - s.a : s.a - s.b, v = ends[0] || ends[2] ? t.b - t.a : t.a - t.b;
-  return dot(u, v) > 0 && norm(cross(u, v)) <= kSameDirection * norm(u) * norm(v);
+  return dot(u, v) > 0 && norm(cross(u, v)) <= kMinDirectionSine * norm(u) * norm(v);
 }
 
 /// Points in order, none closer than same_m to its predecessor; ends stay.

@@ -19,12 +19,12 @@ namespace {
 // Parts thinner than the first, or shorter than the second, in edges, may be lost at that element size.
 // Limits for stuffing: cells through the least thickness, and relative length error. Below, tips end short (the ears of the solid bunny by
 // 1.2 mm of 130 with 20,000 nodes).
-constexpr double kCells = 3, kShort = 0.002;
-constexpr double kOpposite = 0.64;  // cosine of half the angle between two directions to the surface
+constexpr double kMinCellsPerThickness = 3, kMaxStuffingLengthError = 0.002;
+constexpr double kMaxHalfAngleCosine = 0.64;  // cosine of half the angle between two directions to the surface
 constexpr double kMinThickness = 1.0, kMinLength = 3;
 // Length deficit allowed for coarse elements: relative to the extent, and in edges.
 constexpr double kMaxLostDistance = 0.1, kMaxLostDistanceEdges = 2;
-constexpr double kHopelessWalls = 3;  // edge length over wall thickness above which shorter edges cannot restore a lost hollow
+constexpr double kMaxRestorableEdgePerWall = 3;  // edge length over wall thickness above which shorter edges cannot restore a lost hollow
 
 /// Region of the field, inside or outside the body.
 struct Region {
@@ -153,20 +153,20 @@ double calc_least_thickness(const DistanceField& field) {
         if (depth < shallow || depth > deep || depth >= least) continue;
         const Vec3 slope{field.sample(i + 1, j, k) - field.sample(i - 1, j, k), field.sample(i, j + 1, k) - field.sample(i, j - 1, k),
                          field.sample(i, j, k + 1) - field.sample(i, j, k - 1)};
-        if (norm(slope) < 2 * field.voxel_m * kOpposite) least = depth;
+        if (norm(slope) < 2 * field.voxel_m * kMaxHalfAngleCosine) least = depth;
       }
   return 2 * least;
 }
 
 std::string find_cut(const mesh::TetMesh& linear, const Body& body, double edge_m) {
   const double thickness = body.wall_m > 0 ? body.wall_m : calc_least_thickness(*body.field);
-  if (thickness < kCells * edge_m)
+  if (thickness < kMinCellsPerThickness * edge_m)
     return fmt::format("has edges of {:.3g} m where the body is {:.3g} m thick at its thinnest, {:.1f} of them", edge_m, thickness,
                        thickness / edge_m);
   const Vec3 made = calc_box(linear.nodes_m).extent(), wanted = calc_used_box(body.repaired.surface).extent();
   for (int c = 0; c < 3; ++c) {
     const double extent = wanted[c] - 2 * body.repaired.offset_m;
-    if (std::abs(made[c] / extent - 1) > kShort)
+    if (std::abs(made[c] / extent - 1) > kMaxStuffingLengthError)
       return fmt::format("is {:.4g} m long along {} where the body is {:.4g} m", made[c], "xyz"[c], extent);
   }
   return "";
@@ -242,7 +242,7 @@ Comparison compare(const mesh::TetMesh& linear, const Body& body, const Expectat
 
   // A hollow was filled where the elements are several times longer than the wall is thick.
   result.is_hopeless = flat > 0 || (!result.fault.empty() && result.shells < expectation.shells.min && body.wall_m > 0 &&
-                                    edge > kHopelessWalls * body.wall_m);
+                                    edge > kMaxRestorableEdgePerWall * body.wall_m);
   if (std::string lost = describe_lost(body, calc_box(linear.nodes_m).extent(), edge, "is"); !lost.empty()) {
     result.is_hopeless = true;
     result.fault = std::move(lost);

@@ -20,14 +20,14 @@
 namespace carillon::mesher {
 namespace {
 
-constexpr double kSearchAim = 0.08;    // count error that ends the search; halved for small, cheap meshes
-constexpr double kSmallTarget = 5000;  // corner nodes
-constexpr int kMaxFinishes = 4;        // finished meshes: finishing changes the count
-constexpr double kFlatDeg = 12;        // flatter elements are improved individually at the end
+constexpr double kSearchAim = 0.08;             // count error that ends the search; halved for small, cheap meshes
+constexpr double kSmallTarget = 5000;           // corner nodes
+constexpr int kMaxFinishes = 4;                 // finished meshes: finishing changes the count
+constexpr double kMaxImprovedDihedralDeg = 12;  // flatter elements are improved individually at the end
 // A target below this part of the count required by the thickness is refused at once.
-constexpr double kHopeless = 0.4;
-constexpr double kOnCurve = 1e-3;            // over the edge: rounding of nodes on sharp curves
-constexpr double kMaxLostByRounding = 0.04;  // relative volume loss by rounded sharp edges
+constexpr double kMinTargetRatio = 0.4;
+constexpr double kMaxCurveDistanceRatio = 1e-3;  // over the edge: rounding of nodes on sharp curves
+constexpr double kMaxLostByRounding = 0.04;      // relative volume loss by rounded sharp edges
 
 /// Repairs a new mesh: pinched edges and nodes, fragments, flat elements.
 void finish_mesh(mesh::TetMesh& mesh, const Body& body, SurfaceReport& report) {
@@ -41,9 +41,9 @@ void finish_mesh(mesh::TetMesh& mesh, const Body& body, SurfaceReport& report) {
     const Vec3 there = project_here(p);
     return is_on_skin(there) ? std::optional(there) : std::nullopt;
   };
-  const auto is_on_curve = [&](const Vec3& p) { return calc_distance(body.curves, p) < kOnCurve * report.mean_edge_m; };
+  const auto is_on_curve = [&](const Vec3& p) { return calc_distance(body.curves, p) < kMaxCurveDistanceRatio * report.mean_edge_m; };
   report.mean_edge_m = measure(mesh).mean_edge_m;
-  better_flat_elements(mesh, kFlatDeg, project_to_skin, is_on_curve);
+  better_flat_elements(mesh, kMaxImprovedDihedralDeg, project_to_skin, is_on_curve);
 }
 
 /// The finished mesh misrepresents the body (verify.hpp); what() completes a sentence.
@@ -62,7 +62,7 @@ mesh::TetMesh meet_count(const Body& body, const SurfaceOptions& options, double
   };
   const double longest = calc_box(body.repaired.surface.points).diagonal();
   // Try slightly shorter edges if the finished mesh misrepresents the body: other elements then lie across its thin walls.
-  constexpr double kShorter = 0.97;
+  constexpr double kEdgeReduction = 0.97;
   Comparison comparison;
   const auto is_the_body = [&](const mesh::TetMesh& mesh) {
     comparison = phases.run("comparing with the body", [&] {
@@ -73,7 +73,7 @@ mesh::TetMesh meet_count(const Body& body, const SurfaceOptions& options, double
     return comparison.fault.empty();
   };
   if (!options.nodes) {
-    for (int n = 0; n < kMaxFinishes; ++n, edge_m *= kShorter) {
+    for (int n = 0; n < kMaxFinishes; ++n, edge_m *= kEdgeReduction) {
       ++report.attempts;
       mesh::TetMesh mesh = phases.run("refining", [&] { return refine(edge_m); });
       refuse_empty(mesh);
@@ -104,7 +104,7 @@ mesh::TetMesh meet_count(const Body& body, const SurfaceOptions& options, double
     if (comparison.is_hopeless) break;
     if (met) {
       target = std::min(1.03 * target, asked * (1 + 0.7 * kCountTolerance));
-      edge_m *= kShorter;
+      edge_m *= kEdgeReduction;
       continue;
     }
     nearest = count;
@@ -255,7 +255,7 @@ void measure_mesh(const mesh::TetMesh& linear, const Body& body, SurfaceReport& 
 
 void check_count(const SurfaceOptions& options, double min_nodes) {
   const bool is_hopeless = options.nodes
-                               ? options.method != Method::kStuffing && static_cast<double>(*options.nodes) < kHopeless * min_nodes
+                               ? options.method != Method::kStuffing && static_cast<double>(*options.nodes) < kMinTargetRatio * min_nodes
                                : min_nodes > 1.5 * kMaxNodes;
   if (is_hopeless) throw_count(options, CountError("", min_nodes, min_nodes));
 }

@@ -15,12 +15,12 @@
 namespace carillon::mesher {
 namespace {
 
-constexpr double kNoiseLength = 2;   // in edges: shorter isolated folds are noise
-constexpr std::size_t kScan = 2000;  // in triangles; sharp edges of larger surfaces may be noise
+constexpr double kMaxNoiseEdges = 2;              // in edges: shorter isolated folds are noise
+constexpr std::size_t kMinNoisyTriangles = 2000;  // in triangles; sharp edges of larger surfaces may be noise
 
 /// Removes isolated folds shorter than elements.
 void drop_noise(const TriangleSurface& facets, std::vector<Edge>& folds, double sharp_angle_deg, double edge_m) {
-  if (facets.triangles.size() > kScan) {
+  if (facets.triangles.size() > kMinNoisyTriangles) {
     // Folds of a scan are also sharp at element size.
     std::map<Vec3, std::int32_t> number;
     for (const Triangle& t : facets.triangles)
@@ -36,7 +36,7 @@ void drop_noise(const TriangleSurface& facets, std::vector<Edge>& folds, double 
   std::map<std::int32_t, double> length;
   const auto& p = facets.points;
   for (const auto& [a, b] : folds) length[parts.find(a)] += norm(p[b] - p[a]);
-  std::erase_if(folds, [&](const Edge& e) { return length[parts.find(e[0])] < kNoiseLength * edge_m; });
+  std::erase_if(folds, [&](const Edge& e) { return length[parts.find(e[0])] < kMaxNoiseEdges * edge_m; });
 }
 
 /// Throws WallError for an edge of three triangles, or a point shared by two parts.
@@ -82,9 +82,9 @@ WallSource::WallSource(const Body& body, const SurfaceOptions& options, double e
   if (round_) {
     folds = round_->list_folds();
   } else {
-    constexpr double kFlatDeg = 1;
+    constexpr double kMaxFlatTurnDeg = 1;
     for (const Bend& bend : find_bends(start_.surface, options.sharp_angle_deg).edges)
-      if (bend.count == 2 && (options.facets ? bend.turn_deg > kFlatDeg : bend.sharp)) folds.push_back(bend.ends);
+      if (bend.count == 2 && (options.facets ? bend.turn_deg > kMaxFlatTurnDeg : bend.sharp)) folds.push_back(bend.ends);
   }
   refuse_shared(start_.surface);
   const std::size_t all = folds.size();

@@ -21,8 +21,8 @@
 namespace carillon::simulation {
 namespace {
 
-constexpr double kMostStrikeDistance = 0.05;  // over the body's extent: largest distance of an impulse's point from the skin
-constexpr double kTableReach = 1e-4;          // over the body's extent: largest distance of a table row from its node
+constexpr double kMaxStrikeDistanceRatio = 0.05;  // over the body's extent: largest distance of an impulse's point from the skin
+constexpr double kMaxTableDistanceRatio = 1e-4;   // over the body's extent: largest distance of a table row from its node
 
 /// Runs `work` for a body; adds the job line to its InputError.
 template <typename Work>
@@ -67,7 +67,7 @@ std::vector<transient::NodeShare> find_struck_nodes(const transient::Assembly& a
   const transient::Assembly::Body& struck = assembly.bodies[body];
   for (std::int32_t n = struck.first_node; n < struck.last_node; ++n) extent = std::max(extent, norm(assembly.nodes_m[n] - centre_m));
   std::vector<transient::NodeShare> shares = find_shares(assembly, skin, point_m, &distance);
-  if (distance > kMostStrikeDistance * extent)
+  if (distance > kMaxStrikeDistanceRatio * extent)
     throw InputError(fmt::format("{}: \"point_m\" is {:.3g} m from the surface of body \"{}\"; give a point on it, in the axes of its mesh",
                                  place, distance, struck.name));
   return shares;
@@ -159,7 +159,7 @@ std::vector<std::int32_t> find_table_nodes(const mesh::TetMesh& mesh, const job:
     }
   }
   std::sort(by_x.begin(), by_x.end());
-  const double reach = kTableReach * norm(high - low);
+  const double reach = kMaxTableDistanceRatio * norm(high - low);
   std::vector<std::int32_t> nodes;
   for (std::size_t row = 0; row < bend.table.size(); ++row) {
     const Vec3 at{bend.table[row][0], bend.table[row][1], bend.table[row][2]};

@@ -21,9 +21,9 @@ namespace {
 namespace fs = std::filesystem;
 using transient::EnergyBook;
 
-constexpr double kFullScalePa = 1.0;  // of a WAV file; louder sounds are normalised to a peak of 1
-constexpr double kBookGoal = 1e-6;    // target energy error over the largest energy
-constexpr double kBookScatter =
+constexpr double kFullScalePa = 1.0;       // of a WAV file; louder sounds are normalised to a peak of 1
+constexpr double kTargetBookError = 1e-6;  // target energy error over the largest energy
+constexpr double kBookErrorFactor =
     3.0;  // largest deviation from the square law: 2.7 in 11 scenes with errors above the target, steps down to a sixth
 
 base::Json describe(const EnergyBook& book) {
@@ -39,10 +39,10 @@ base::Json describe(const EnergyBook& book) {
   return json;
 }
 
-/// Step at which the energy error should reach kBookGoal (error ~ step^2). Empty: already reached.
+/// Step at which the energy error should reach kTargetBookError (error ~ step^2). Empty: already reached.
 std::optional<double> find_closing_step(double step_s, double book_error) {
-  if (!(book_error > kBookGoal) || !std::isfinite(book_error)) return std::nullopt;
-  return step_s * std::sqrt(kBookGoal / (kBookScatter * book_error));
+  if (!(book_error > kTargetBookError) || !std::isfinite(book_error)) return std::nullopt;
+  return step_s * std::sqrt(kTargetBookError / (kBookErrorFactor * book_error));
 }
 
 /// Without file names: the stored picture equals that of a manual run.
@@ -121,7 +121,7 @@ std::string write_outputs(const comm::Communicator& comm, Simulation& simulation
         100.0 * cpu[1] / std::max(1e-9, cpu[0] + cpu[1]), book.kinetic_j, book.elastic_j, book.dissipated_j, book.work_j, worst);
     if (closing_step_s)
       result += fmt::format("\nthe book is expected to close to {:g} with \"step_s\": {:.2e} (its error falls with the square of the step)",
-                            kBookGoal, *closing_step_s);
+                            kTargetBookError, *closing_step_s);
     if (simulation.sound)
       result += fmt::format("\npeak {:.4g} Pa{}", peak, gain < 1.0 ? fmt::format(", the file has it as 1 (gain {:.4g})", gain) : "");
     for (const job::SimulationOutput& output : job::kSimulationOutputs)

@@ -17,17 +17,17 @@ namespace {
 constexpr int kTrialSteps = 200;
 constexpr std::int64_t kTrialSamples = 64, kTimedSamples = 48;  // of the trial's sound
 constexpr int kMaxPredictedRanks = 1024;
-constexpr std::int64_t kPictureBytes = 40 << 20;  // spectrogram, twice the measured memory
-constexpr std::int64_t kLaterBytes = 24 << 20;    // libraries loaded for writing files
-constexpr double kSurfaceBytesPerNode = 8192;     // blocks of the recorded surface: two triangles of 256 samples, of all ranks and of one
-constexpr double kFilmBytesPerNode = 256;         // motion frames
+constexpr std::int64_t kPictureBytes = 40 << 20;        // spectrogram, twice the measured memory
+constexpr std::int64_t kOutputLibraryBytes = 24 << 20;  // libraries loaded for writing files
+constexpr double kSurfaceBytesPerNode = 8192;  // blocks of the recorded surface: two triangles of 256 samples, of all ranks and of one
+constexpr double kFilmBytesPerNode = 256;      // motion frames
 
 /// Bytes of a run on top of those before its first step, maximum over ranks.
 std::int64_t count_later_bytes(const Simulation& simulation, int ranks, bool has_checkpoint, double finer) {
   const job::SimulationSpec& spec = simulation.spec;
   const transient::Assembly& assembly = *simulation.bodies.assembly;
   constexpr std::int64_t kNumber = sizeof(double);
-  std::int64_t arrivals = 0, later = kLaterBytes;  // half-samples of all receivers; at the end of the run
+  std::int64_t arrivals = 0, later = kOutputLibraryBytes;  // half-samples of all receivers; at the end of the run
   if (simulation.makes_sound()) {
     const emission::Options sound = make_emission_options(spec, simulation.motion->get_steps_per_sample(), false);
     const auto frames = static_cast<std::int64_t>(sound.frames);
@@ -39,9 +39,9 @@ std::int64_t count_later_bytes(const Simulation& simulation, int ranks, bool has
   if (!spec.surface.empty()) later += static_cast<std::int64_t>(nodes * kSurfaceBytesPerNode);
   if (!spec.motion.empty()) later += static_cast<std::int64_t>(nodes * kFilmBytesPerNode);
   // State of this rank (a vector grown by doubling); on rank 0 also that of all ranks and the file bytes.
-  const std::int64_t state =
-      has_checkpoint ? kLaterBytes + (3 + 2 * ranks) * arrivals + static_cast<std::int64_t>(3 * kNumber * (30.0 * nodes + 25.0 * elements))
-                     : 0;
+  const std::int64_t state = has_checkpoint ? kOutputLibraryBytes + (3 + 2 * ranks) * arrivals +
+                                                  static_cast<std::int64_t>(3 * kNumber * (30.0 * nodes + 25.0 * elements))
+                                            : 0;
   return arrivals + std::max(later, state);
 }
 

@@ -38,9 +38,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::uint64_t kMaxJobBytes = 16 << 20;
-constexpr double kBookEveryS = 0.01;        // simulated time
-constexpr std::int64_t kLookEvery = 16;     // samples between two polls of signals
-constexpr std::int64_t kMeasureEvery = 17;  // samples between two measurements of the sound's CPU time
+constexpr double kBookIntervalS = 0.01;       // simulated time
+constexpr std::int64_t kPollSamples = 16;     // samples between two polls of signals
+constexpr std::int64_t kMeasureSamples = 17;  // samples between two measurements of the sound's CPU time
 
 /// One line on rank 0.
 struct Log {
@@ -124,7 +124,7 @@ void advance_sample(Simulation& simulation) {
   if (simulation.film) simulation.film->add_sample(motion);
   // Reading the clock costs as much as a step of a small body: measure one sample in 17 (coprime with the sound's periods of 8 and 16
   // samples), less the time of two readings.
-  const bool is_measured = simulation.sound && motion.get_sample() % kMeasureEvery == 0;
+  const bool is_measured = simulation.sound && motion.get_sample() % kMeasureSamples == 0;
   do {
     motion.advance();
     if (!simulation.sound) continue;
@@ -136,7 +136,7 @@ void advance_sample(Simulation& simulation) {
     if (motion.is_at_sample()) set_balls(simulation);
     simulation.sound->add_step(&motion.get_u()[0].x);
     if (is_measured)
-      simulation.sound_cpu_s += static_cast<double>(kMeasureEvery) * (base::get_process_cpu_s() - before - simulation.clock_s);
+      simulation.sound_cpu_s += static_cast<double>(kMeasureSamples) * (base::get_process_cpu_s() - before - simulation.clock_s);
   } while (!motion.is_at_sample());
 }
 
@@ -226,7 +226,7 @@ SimulateSummary simulate(const comm::Communicator& comm, const fs::path& job_fil
 
   Reporter reporter = comm.agree([&] { return Reporter(log, comm.is_root() ? options.progress : fs::path()); });
   const std::int64_t frames = std::llround(spec.duration_s * spec.sample_rate_hz);
-  const std::int64_t book_every = std::max<std::int64_t>(1, std::llround(kBookEveryS * spec.sample_rate_hz));
+  const std::int64_t book_every = std::max<std::int64_t>(1, std::llround(kBookIntervalS * spec.sample_rate_hz));
   const bool is_kept = !options.checkpoint.empty();
   if (is_kept) run::set_news(true);
   double last_save_s = 0.0;
@@ -235,7 +235,7 @@ SimulateSummary simulate(const comm::Communicator& comm, const fs::path& job_fil
   while (motion.get_sample() < frames) {
     advance_sample(simulation);
     if (motion.get_sample() % book_every == 0 || motion.get_sample() == frames) simulation.books.push_back(motion.calc_book());
-    if (motion.get_sample() % kLookEvery != 0 || motion.get_sample() == frames) continue;
+    if (motion.get_sample() % kPollSamples != 0 || motion.get_sample() == frames) continue;
     reporter.report(motion, frames);
     if (!is_kept) continue;
     enum : std::int32_t { kNothing, kSave, kStop };

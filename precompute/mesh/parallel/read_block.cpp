@@ -21,7 +21,7 @@ namespace {
 
 using mesh::MeshBlock;
 
-constexpr double kFlat = 1e-9;                        // as mesh::check_mesh: 6 V / (longest edge)^3
+constexpr double kMinVolumeRatio = 1e-9;              // as mesh::check_mesh: 6 V / (longest edge)^3
 constexpr int kLinearType = 10, kQuadraticType = 24;  // VTK cell types
 
 std::string list_elements(const std::vector<std::int64_t>& elements, std::int64_t total) {
@@ -93,12 +93,12 @@ void check_cells(const Source& source, const std::string& name, const Layout& la
 }
 
 void read_connectivity(const Source& source, const std::string& name, const Layout& layout, MeshBlock& block) {
-  constexpr std::int64_t kAtOnce = 1 << 16;  // elements
+  constexpr std::int64_t kElementsPerRead = 1 << 16;  // elements
   const std::int64_t begin = block.elements.own_begin(), count = block.elements.own_count();
   const std::size_t width = block.width();
   block.tets.resize(static_cast<std::size_t>(count) * width);
-  for (std::int64_t done = 0; done < count; done += kAtOnce) {
-    const std::int64_t now = std::min(kAtOnce, count - done);
+  for (std::int64_t done = 0; done < count; done += kElementsPerRead) {
+    const std::int64_t now = std::min(kElementsPerRead, count - done);
     const auto numbers = source.read<std::int64_t>(layout.connectivity, (begin + done) * static_cast<std::int64_t>(width),
                                                    now * static_cast<std::int64_t>(width));
     for (std::size_t i = 0; i < numbers.size(); ++i) {
@@ -168,7 +168,7 @@ std::vector<std::int64_t> orient(MeshBlock& block, const Touched& touched, const
     const Vec3 &a = edge[0], &b = edge[2], &c = edge[3];
     const double determinant = calc_det(a, b, c);
     for (std::size_t k = 0; k < 3; ++k) block.centres_m[e][k] = (at(0)[k] + at(1)[k] + at(2)[k] + at(3)[k]) / 4;
-    if (!(std::abs(determinant) > kFlat * longest * std::sqrt(longest))) {
+    if (!(std::abs(determinant) > kMinVolumeRatio * longest * std::sqrt(longest))) {
       flat.push_back(block.elements.own_begin() + static_cast<std::int64_t>(e));
     } else if (determinant < 0) {
       std::int32_t* tet = block.tets.data() + e * width;

@@ -6,16 +6,16 @@
 
 namespace carillon::emission {
 
-inline constexpr int kEntry = 4;              // support of a step, in half-samples
-inline constexpr int kMotionHalf = 24;        // half-samples on either side in the filter for position and velocity
-inline constexpr int kDerivativeHalf = 16;    // samples on either side in a derivative
-inline constexpr int kPoleSpan = 32;          // samples in a pole
-inline constexpr int kSplinePoints = 8;       // support of an arrival, in half-samples
-inline constexpr int kSlots = 24;             // samples affected by one value of OCE01's low-pass
-inline constexpr std::size_t kLane = 32;      // row counts are multiples: no remainder loops, which could round differently
-inline constexpr std::size_t kVertices = 10;  // rows of kLane, the last two unused
-inline constexpr std::size_t kTogether = 16;  // values per call of OCE01's low-pass: its open samples exceed the L1 cache
-inline constexpr int kBatch = 8;              // samples per call with common frames, for the same reason
+inline constexpr int kEntry = 4;                   // support of a step, in half-samples
+inline constexpr int kMotionHalf = 24;             // half-samples on either side in the filter for position and velocity
+inline constexpr int kDerivativeHalf = 16;         // samples on either side in a derivative
+inline constexpr int kPoleSpan = 32;               // samples in a pole
+inline constexpr int kSplinePoints = 8;            // support of an arrival, in half-samples
+inline constexpr int kSlots = 24;                  // samples affected by one value of OCE01's low-pass
+inline constexpr std::size_t kLane = 32;           // row counts are multiples: no remainder loops, which could round differently
+inline constexpr std::size_t kVertices = 10;       // rows of kLane, the last two unused
+inline constexpr std::size_t kValuesPerCall = 16;  // values per call of OCE01's low-pass: its open samples exceed the L1 cache
+inline constexpr int kBatch = 8;                   // samples per call with common frames, for the same reason
 
 /// A double in units of 2^-46 Pa, from the bits of its sum with 1.5 * 2^52: range 2^51 units. Integer sums are order-independent.
 inline constexpr double kUnitsPerPa = 70368744177664.0;

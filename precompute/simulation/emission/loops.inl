@@ -192,9 +192,9 @@ void radiate(const Facets* __restrict facets, const Ear* __restrict ear, double 
 }
 
 bool scatter(std::int64_t* units, double now, double end, const double* time, const double* pa, std::size_t n, const double* spline) {
-  constexpr double kMiddle = 6755399441055744.0;  // 1.5 * 2^52
+  constexpr double kBitsOffset = 6755399441055744.0;  // 1.5 * 2^52
   constexpr std::int64_t kMiddleBits = 0x4338000000000000;
-  constexpr double kMostPa = 30.0;  // largest pressure handled by the bit representation
+  constexpr double kMaxBitsPa = 30.0;  // largest pressure handled by the bit representation
   constexpr std::size_t kParts = kSplinePoints / kWidth;
   bool is_fine = true;
   for (std::size_t i = 0; i < n; ++i) {
@@ -213,8 +213,8 @@ bool scatter(std::int64_t* units, double now, double end, const double* time, co
     std::int64_t* to = units + whole;
     for (std::size_t j = 0; j < kParts; ++j) {
       share[j] *= pa[i] * kUnitsPerPa;
-      if (size <= kMostPa) {
-        *reinterpret_cast<Whole*>(to + kWidth * j) += (Whole)(share[j] + kMiddle) - kMiddleBits;
+      if (size <= kMaxBitsPa) {
+        *reinterpret_cast<Whole*>(to + kWidth * j) += (Whole)(share[j] + kBitsOffset) - kMiddleBits;
       } else {
         for (std::size_t k = 0; k < kWidth; ++k) to[kWidth * j + k] += static_cast<std::int64_t>(share[j][k]);
       }
@@ -224,19 +224,19 @@ bool scatter(std::int64_t* units, double now, double end, const double* time, co
 }
 
 void add_rows(double* __restrict open, const double* __restrict value, std::size_t rows, const double* const* weight, std::size_t count) {
-  constexpr std::size_t kOnce = kWidth < 4 ? 1 : 2, kParts = kSlots / kWidth;  // rows and vectors whose sums fit the registers
-  Wide w[kTogether][kParts];
+  constexpr std::size_t kRowsPerPass = kWidth < 4 ? 1 : 2, kParts = kSlots / kWidth;  // rows and vectors whose sums fit the registers
+  Wide w[kValuesPerCall][kParts];
   for (std::size_t i = 0; i < count; ++i)
     for (std::size_t s = 0; s < kParts; ++s) w[i][s] = *reinterpret_cast<const Wide*>(weight[i] + kWidth * s);
-  for (std::size_t row = 0; row < rows; row += kOnce) {
+  for (std::size_t row = 0; row < rows; row += kRowsPerPass) {
     Wide* to = reinterpret_cast<Wide*>(open + row * kSlots);
-    Wide sum[kOnce][kParts];
-    for (std::size_t r = 0; r < kOnce; ++r)
+    Wide sum[kRowsPerPass][kParts];
+    for (std::size_t r = 0; r < kRowsPerPass; ++r)
       for (std::size_t s = 0; s < kParts; ++s) sum[r][s] = to[r * kParts + s];
     for (std::size_t i = 0; i < count; ++i)
-      for (std::size_t r = 0; r < kOnce; ++r)
+      for (std::size_t r = 0; r < kRowsPerPass; ++r)
         for (std::size_t s = 0; s < kParts; ++s) sum[r][s] += value[i * rows + row + r] * w[i][s];
-    for (std::size_t r = 0; r < kOnce; ++r)
+    for (std::size_t r = 0; r < kRowsPerPass; ++r)
       for (std::size_t s = 0; s < kParts; ++s) to[r * kParts + s] = sum[r][s];
   }
 }

@@ -20,7 +20,7 @@ double calc_kernel(double x, double half) {
 }  // namespace
 
 LowPass::LowPass(std::size_t rows, int values, double first)
-    : rows_(rows), weight_(static_cast<std::size_t>(values)), open_(rows * kSlots, 0.0), waiting_(rows * kTogether, 0.0) {
+    : rows_(rows), weight_(static_cast<std::size_t>(values)), open_(rows * kSlots, 0.0), waiting_(rows * kValuesPerCall, 0.0) {
   double total = 0.0;
   for (int i = 0; i < values; ++i)
     for (int s = 0; s < kSlots; ++s) total += weight_[i][s] = calc_kernel((first + i) / values + (kHalf - 1) - s, kHalfWidth);
@@ -33,7 +33,7 @@ void LowPass::add(int i, const double* value) {
   const double* weight = weight_[i].data() + (kSlots - ring_) % kSlots;
   std::copy_n(value, rows_, waiting_.begin() + static_cast<std::ptrdiff_t>(waiting_count_ * rows_));
   waiting_weight_[waiting_count_++] = weight;
-  if (waiting_count_ == kTogether) take_in();
+  if (waiting_count_ == kValuesPerCall) take_in();
   for (std::size_t s = 0; s < kSlots; ++s) weights_[s] += weight[s];
 }
 

@@ -42,8 +42,8 @@ class LowPass {
   std::vector<std::array<double, 2 * kSlots>> weight_;  // (values), twice, for any ring offset
   std::array<double, kSlots> weights_{};                // sum of weights of each open sample
   std::vector<double> open_;                            // (rows, kSlots)
-  std::vector<double> waiting_;                         // (kTogether, rows): values not yet in open_
-  std::array<const double*, kTogether> waiting_weight_{};
+  std::vector<double> waiting_;                         // (kValuesPerCall, rows): values not yet in open_
+  std::array<const double*, kValuesPerCall> waiting_weight_{};
   std::size_t waiting_count_ = 0;
 };
 

@@ -10,13 +10,13 @@
 namespace carillon::emission {
 namespace {
 
-constexpr int kLeastValues = 16;                               // boxes per sample: images at -60 dB
+constexpr int kMinBoxesPerSample = 16;                         // boxes per sample: images at -60 dB
 constexpr int kSpan = 2 * (kBatch - 1) + 2 * kMotionHalf + 1;  // half-samples of a batch
 constexpr std::int64_t kSlot = kEntry - 1;                     // mask for half-sample numbers
 
 /// Steps per box.
 int find_box(int steps) {
-  for (int box = steps / kLeastValues; box > 1; --box)
+  for (int box = steps / kMinBoxesPerSample; box > 1; --box)
     if (steps / 2 % box == 0) return box;
   return 1;
 }

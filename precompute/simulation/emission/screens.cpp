@@ -12,16 +12,16 @@
 namespace carillon::emission {
 namespace {
 
-constexpr std::size_t kLooksPerSecond = 1000;
-constexpr std::size_t kLatest = 64;  // largest lag between the step of a sample and its emission, in samples
+constexpr std::size_t kTestsPerSecond = 1000;
+constexpr std::size_t kMaxLagSamples = 64;  // largest lag between the step of a sample and its emission, in samples
 
 }  // namespace
 
 Screens::Screens(const Surfaces& surfaces, const SurfacePart& part, const Options& options)
     : surfaces_(surfaces),
       options_(options),
-      every_(std::max<std::size_t>(1, static_cast<std::size_t>(options.sample_rate_hz) / kLooksPerSecond)),
-      ring_(kLatest / every_ + 2),
+      every_(std::max<std::size_t>(1, static_cast<std::size_t>(options.sample_rate_hz) / kTestsPerSecond)),
+      ring_(kMaxLagSamples / every_ + 2),
       balls_(options.ball_radius_m.size()),
       before_(surfaces.get_slots() * options.receivers.size(), 1.0F),
       now_(before_) {

@@ -63,11 +63,11 @@ std::array<double, kCount> fit(double top, Find&& find) {
   return b;
 }
 
-constexpr double kNeither = 1e-7;  // weight of frequencies between the bands
+constexpr double kTransitionWeight = 1e-7;  // weight of frequencies between the bands
 
 Wish wish_motion(double f) {
   if (f < 0.42) return {1.0, 1.0};
-  return {0.0, f > 0.58 ? 1.0 : kNeither};
+  return {0.0, f > 0.58 ? 1.0 : kTransitionWeight};
 }
 
 }  // namespace
@@ -98,7 +98,7 @@ std::array<double, kDerivativeHalf + 1> make_derivative() {
   const auto odd = fit<kDerivativeHalf>(0.5, [](double f, auto& row) {
     const double omega = 2.0 * std::numbers::pi * f;
     for (std::size_t n = 0; n < row.size(); ++n) row[n] = 2.0 * std::sin(omega * static_cast<double>(n + 1)) / omega;
-    return Wish{1.0, f < 0.425 ? 1.0 : kNeither};
+    return Wish{1.0, f < 0.425 ? 1.0 : kTransitionWeight};
   });
   double slope = 0.0;
   for (std::size_t n = 0; n < odd.size(); ++n) slope += 2.0 * static_cast<double>(n + 1) * odd[n];

@@ -23,10 +23,10 @@ namespace {
 using Sparse = Eigen::SparseMatrix<double>;
 using Vector = Eigen::VectorXd;
 
-constexpr double kDifference = 1e-3;  // over the shortest edge, or rad
+constexpr double kDifferenceRatio = 1e-3;  // over the shortest edge, or rad
 constexpr int kNewtonSteps = 25;
-constexpr double kCloseEnough = 1e-9, kRounding = 1e-5;  // correction over displacement: convergence, and rounding level
-constexpr double kLeastPart = 1e-3;                      // smallest load step over the load
+constexpr double kConvergedRatio = 1e-9, kRounding = 1e-5;  // correction over displacement: convergence, and rounding level
+constexpr double kMinLoadStep = 1e-3;                       // smallest load step over the load
 // Relative to the highest stiffness over mass: first shift of modes, and rounding error of rigid modes.
 constexpr double kFirstShift = 1e-6, kRigidShare = 1e-12;
 constexpr double kShiftOfMode = 0.3;  // over a mode's eigenvalue: limits the rounding errors of rigid modes
@@ -99,7 +99,7 @@ class Tangent {
     force_.resize(domain_.force_count());
     for (const std::vector<std::int32_t>& together : colours_)
       for (int axis = 0; axis < axes_[together[0]]; ++axis) {
-        const double by = axes_[together[0]] == 3 ? kDifference * edge_m_ : kDifference;
+        const double by = axes_[together[0]] == 3 ? kDifferenceRatio * edge_m_ : kDifferenceRatio;
         std::fill(slope.begin(), slope.end(), Vec3{});
         for (const auto& [places, weight] : {std::pair{1.0, 8.0}, {-1.0, -8.0}, {2.0, -1.0}, {-2.0, 1.0}}) {
           for (const std::int32_t node : together)
@@ -198,7 +198,7 @@ bool find_balance(Domain& domain, Tangent& tangent, const Vector& load, std::vec
     std::fill(moved.begin(), moved.end(), Quad{});
     const double corrected = find_largest(domain, change), all = find_largest(domain, u);
     if (!(corrected < 10.0 * extent)) return false;
-    if (corrected <= kCloseEnough * all || (corrected <= kRounding * all && corrected >= 0.5 * last)) {
+    if (corrected <= kConvergedRatio * all || (corrected <= kRounding * all && corrected >= 0.5 * last)) {
       const Domain::State state = domain.calc_state(u.data());
       return std::all_of(state.least_det.begin(), state.least_det.end(), [](double det) { return det > 0.0; });
     }
@@ -232,7 +232,7 @@ std::vector<Quad> calc_equilibrium(Domain& domain, const std::vector<HeldNode>& 
       continue;
     }
     part *= 0.25;
-    if (part < kLeastPart)
+    if (part < kMinLoadStep)
       throw InputError(
           fmt::format("the body finds no equilibrium beyond {:.3g} of its load: hold it, so that it cannot fly or turn away, or bend it "
                       "less",

@@ -19,15 +19,15 @@
 namespace carillon::transient {
 namespace {
 
-constexpr double kMargin = 0.5;                       // search margin, in mean edges
-constexpr double kStartOverlap = 0.1;                 // in mean edges
-constexpr std::int64_t kMostSteps = 64;               // between two motion checks
-constexpr double kSlowest = 1e-9;                     // closing speed [m/s] of a contact that begins at rest
-constexpr double kStopShare = 0.5;                    // largest share of the tangential momentum removed by friction per step
-constexpr double kStrikerPhase = 0.01;                // [rad] per step of a striker on an obstacle, stopped by its own spring
-constexpr double kBallSlide = 3.5;                    // 1 + m r^2 / I: reduction of a ball's effective mass for tangential forces
-constexpr double kSame = 1e-12;                       // equal distances, in mean edges
-constexpr double kFarthestM = 1e6, kFastestMs = 1e9;  // limits of a stable motion
+constexpr double kMargin = 0.5;                           // search margin, in mean edges
+constexpr double kStartOverlap = 0.1;                     // in mean edges
+constexpr std::int64_t kMaxCheckSteps = 64;               // between two motion checks
+constexpr double kMinClosingMs = 1e-9;                    // closing speed [m/s] of a contact that begins at rest
+constexpr double kStopShare = 0.5;                        // largest share of the tangential momentum removed by friction per step
+constexpr double kStrikerPhase = 0.01;                    // [rad] per step of a striker on an obstacle, stopped by its own spring
+constexpr double kBallSlide = 3.5;                        // 1 + m r^2 / I: reduction of a ball's effective mass for tangential forces
+constexpr double kEqualDistanceRatio = 1e-12;             // equal distances, in mean edges
+constexpr double kMaxPositionM = 1e6, kMaxSpeedMs = 1e9;  // limits of a stable motion
 
 /// NaN counts as larger.
 void take_larger(double value, double& largest) {
@@ -112,7 +112,7 @@ Contacts::Nearest Contacts::find_nearest(const Vec3& p, const std::vector<std::i
     const Vec3 there = p - (w[0] * at[0] + w[1] * at[1] + w[2] * at[2]), twice = cross(at[1] - at[0], at[2] - at[0]);
     const double distance = norm(there), above = dot(there, twice) / norm(twice);
     // Of several triangles that share the nearest point, the one that faces p most decides the side.
-    const double same = kSame * edge_m_;
+    const double same = kEqualDistanceRatio * edge_m_;
     if (!(distance < least - same || (distance < least + same && std::abs(above) > std::abs(height)))) continue;
     least = std::min(least, distance);
     height = above;
@@ -123,7 +123,7 @@ Contacts::Nearest Contacts::find_nearest(const Vec3& p, const std::vector<std::i
   }
   const bool is_sheet = surface_.nodes[surface_.triangles[nearest.triangle][0]].reach_m > 0;
   nearest.distance_m = is_sheet || height >= 0 ? least : -least;
-  nearest.normal = least > kSame * edge_m_ ? (1.0 / nearest.distance_m) * way : face;
+  nearest.normal = least > kEqualDistanceRatio * edge_m_ ? (1.0 / nearest.distance_m) * way : face;
   return nearest;
 }
 
@@ -289,8 +289,9 @@ Vec3 Contacts::calc_force(const StepTime& time, const Key& key, const Pair& pair
   }
   ++touching_;
   const double closing = -dot(pair.relative_m_s, pair.normal);
-  Touch& touch = found != touches_.end() ? found->second
-                                         : touches_.emplace(key, Touch{std::max(closing, kSlowest), pair.stiffness_n_m, {}}).first->second;
+  Touch& touch = found != touches_.end()
+                     ? found->second
+                     : touches_.emplace(key, Touch{std::max(closing, kMinClosingMs), pair.stiffness_n_m, {}}).first->second;
   const double elastic = touch.stiffness_n_m * pair.depth_m;
   // Bodies that separate faster than allowed are released, never pulled.
   const double force = elastic * std::max(0.0, 1.0 + damping_ * closing / touch.closing_m_s);
@@ -412,7 +413,7 @@ void Contacts::look_around(const StepTime& time, const Quad* u, const Quad* v) {
   for (double& value : most)
     if (!std::isfinite(value)) value = std::numeric_limits<double>::infinity();
   comm_.max(std::span<double>(most));
-  if (!(most[0] < kFarthestM && most[1] < kFastestMs))
+  if (!(most[0] < kMaxPositionM && most[1] < kMaxSpeedMs))
     throw SolveError(fmt::format("the bodies move without bounds at {:.6g} s, step {}: use a weaker blow, a shorter step or a finer mesh",
                                  time.time_s, time.step));
   const bool is_first = active_index_.empty();
@@ -421,7 +422,7 @@ void Contacts::look_around(const StepTime& time, const Quad* u, const Quad* v) {
   // Two approaching bodies use up the margin from both sides, and a struck body may double its speed before the next check.
   const double per_step = 4.0 * most[1] * time.step_s;
   steps_to_look_ =
-      per_step > 0 ? std::clamp(static_cast<std::int64_t>(0.25 * margin_m_ / per_step), std::int64_t{1}, kMostSteps) : kMostSteps;
+      per_step > 0 ? std::clamp(static_cast<std::int64_t>(0.25 * margin_m_ / per_step), std::int64_t{1}, kMaxCheckSteps) : kMaxCheckSteps;
 }
 
 void Contacts::add_forces(const StepTime& time, const Quad* u, const Quad* v, Quad* f) {

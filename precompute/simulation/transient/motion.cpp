@@ -20,8 +20,8 @@ namespace carillon::transient {
 namespace {
 
 constexpr int kStartIterations = 50, kCheckIterations = 20;
-constexpr double kStartShare = 0.9, kMostShare = 0.95, kRefinedShare = 0.8;
-constexpr int kMostRefinement = 8;
+constexpr double kStartShare = 0.9, kMaxStableShare = 0.95, kRefinedShare = 0.8;
+constexpr int kMaxRefinement = 8;
 
 /// Smooth ramp from 0 to 1 with two continuous derivatives.
 double calc_ramp(double x) {
@@ -217,13 +217,13 @@ void Motion::find_step(int iterations, bool is_start) {
   const double time_s = get_time_s();
   if (is_start) {
     parts_ = first_parts_ = count_parts(kStartShare * longest_s_);
-  } else if (step_s_ > kMostShare * longest_s_) {
+  } else if (step_s_ > kMaxStableShare * longest_s_) {
     parts_ = count_parts(kRefinedShare * longest_s_);
-    if (parts_ > kMostRefinement * first_parts_)
+    if (parts_ > kMaxRefinement * first_parts_)
       throw SolveError(fmt::format(
           "the bodies are so stiff in their shape at {:.6g} s, step {}, that {} steps a sample are needed, over {} times as many as at the "
           "start ({}): the motion is too violent for St. Venant-Kirchhoff's law; use a weaker blow or a finer mesh",
-          time_s, step_, parts_, kMostRefinement, first_parts_));
+          time_s, step_, parts_, kMaxRefinement, first_parts_));
   }
   step_s_ = 1.0 / (options_.sample_rate_hz * parts_);
 }
@@ -385,7 +385,7 @@ void Motion::check_inversion() {
       fmt::format("{} is turned inside out at {:.6g} s, step {} (det F {:.3g}): ", domain_.get_assembly().describe(first), get_time_s(),
                   step_, least_of_all);
   // Between two step checks a body may stiffen; then the step failed, not the law.
-  if (step_s_ > kMostShare * longest_s_)
+  if (step_s_ > kMaxStableShare * longest_s_)
     throw SolveError(where +
                      fmt::format("the step of {:.3g} s is not below 0.95 of the longest stable one, {:.3g} s: the motion is unstable; "
                                  "give a shorter \"step_s\"",
