@@ -28,7 +28,7 @@ double calc_worst(const TriangleSurface& surface, double voxel_m, const FieldRea
   return worst;
 }
 
-TEST(distances, are_exact_around_a_rough_ball_and_a_torus) {
+TEST(distances, rough_ball_and_torus) {
   const auto check = [](const Polygons& body) { return calc_worst(to_triangles(body), 0.0015, {0.006, 0.018}); };
   // The noise is up to a third of the triangles' edges; the bound is what handing triangles on from sample to sample misses at its spikes.
   EXPECT_LT(check(roughen(make_sphere(0.05, 4), 0.3)), 0.07);

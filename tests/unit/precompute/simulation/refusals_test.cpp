@@ -97,7 +97,7 @@ std::string spoil(const Refusal& refusal) {
   return text.replace(std::min(at, text.size()), refusal.from.size(), refusal.to);
 }
 
-TEST(RefusedJobs, one_error_names_file_and_line_and_nothing_is_written) {
+TEST(RefusedJobs, one_error_without_output) {
   const auto& world = comm::world();
   const tests::Folder own;  // all ranks use that of rank 0
   const std::filesystem::path folder = world.broadcast(own.path().string());
@@ -126,7 +126,7 @@ TEST(RefusedJobs, one_error_names_file_and_line_and_nothing_is_written) {
 }
 
 /// A step longer than stable is only a limit.
-TEST(RefusedJobs, a_long_step_is_none) {
+TEST(RefusedJobs, long_step_accepted) {
   const auto& world = comm::world();
   const tests::Folder own;
   const std::filesystem::path job = std::filesystem::path(world.broadcast(own.path().string())) / "job.json";

@@ -55,7 +55,7 @@ Record play(const std::string& scene) {
 constexpr const char* kBlow =
     R"(, "impulses": [{"time_s": 0.001, "body": "bar", "point_m": [0.05, 0, 0.005], "impulse_n_s": [0, 0, -0.001]}])";
 
-TEST(Walls, ObstaclesStrikersAndSilentBodiesHideWhatLiesBehindThem) {
+TEST(Walls, OccludersOfAllKinds) {
   const auto hear = [](const std::string& scene, const std::string& others = "", const std::string& radiation = "rayleigh") {
     return play(make_scene("", fmt::format(R"({}, "radiation": "{}"{})", kBlow, radiation, scene), others)).peak_pa;
   };
@@ -86,9 +86,9 @@ TEST(Walls, ObstaclesStrikersAndSilentBodiesHideWhatLiesBehindThem) {
   EXPECT_TRUE(!is_root || (deaf.peak_pa == 0.0 && deaf.warnings == 1)) << deaf.warnings;
 }
 
-TEST(Walls, KirchhoffHasNoVisibility) { EXPECT_THROW(play(make_scene("", R"(, "visibility": true)")), InputError); }
+TEST(Walls, KirchhoffWithoutVisibility) { EXPECT_THROW(play(make_scene("", R"(, "visibility": true)")), InputError); }
 
-TEST(Bent, ABodyThatIsLetGoSoundsAndPutsNothingIn) {
+TEST(Bent, ReleasedBody) {
   const bool is_root = comm::world().is_root();
   // Bent by a force, a mode, and a displaced end; no work after the start.
   for (
@@ -116,7 +116,7 @@ TEST(Bent, ABodyThatIsLetGoSoundsAndPutsNothingIn) {
   }
 }
 
-TEST(Bent, DrivenNodesAreReleased) {
+TEST(Bent, ReleaseOfDrivenNodes) {
   const Record record =
       play(make_scene(R"(, "drive": [{"node_set": "x-max", "path": [[0, 0, 0, 0], [0.001, 0, 0, -1e-5]], "release_s": 0.0015}])", ""));
   if (!comm::world().is_root()) return;

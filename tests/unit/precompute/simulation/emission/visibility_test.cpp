@@ -24,7 +24,7 @@ bool is_crossed(const Corners& t, const Vec3& from, const Vec3& to) {
   return (a > 0.0) == (b > 0.0) && (b > 0.0) == (c > 0.0);
 }
 
-TEST(Visibility, TheTreeFindsWhatASearchOfAllTrianglesFinds) {
+TEST(Visibility, TreeAgainstExhaustiveSearch) {
   std::uint64_t state = 7;
   const auto draw = [&] { return base::to_unit(base::draw(state)); };
   const auto place = [&] { return Vec3{draw(), draw(), draw()}; };
@@ -66,7 +66,7 @@ double find_most(const std::vector<double>& sound, std::size_t begin, std::size_
   return most;
 }
 
-TEST(Visibility, ABodyBehindAWallIsSilentWhereTheFormulaHasDelta) {
+TEST(Visibility, BodyBehindAWall) {
   const std::vector<job::RigidObstacle> wall{job::BoxObstacle{{-3, -3, 0.4}, {3, 3, 0.5}}};
   for (const Radiation radiation : {Radiation::kPaper2001, Radiation::kRayleigh}) {
     EXPECT_EQ(find_most(hear_behind(wall, 0.0, radiation), 0, 4000), 0.0);
@@ -76,7 +76,7 @@ TEST(Visibility, ABodyBehindAWallIsSilentWhereTheFormulaHasDelta) {
 }
 
 // A sheet has each triangle from both sides: the side that faces the receiver is heard, and the other one is hidden behind it.
-TEST(Visibility, ASheetIsHeardFromItsNearSideAlone) {
+TEST(Visibility, NearSideOfASheet) {
   const auto listen = [](bool has_both, Radiation radiation) {
     SurfacePart part;
     part.nodes_m = {{-0.01, -0.01, 0}, {0.01, -0.01, 0}, {0.01, 0.01, 0}, {-0.01, 0.01, 0}};
@@ -97,7 +97,7 @@ TEST(Visibility, ASheetIsHeardFromItsNearSideAlone) {
   }
 }
 
-TEST(Visibility, ABodyThatGoesBehindAWallFadesWithoutAClick) {
+TEST(Visibility, FadeWithoutClick) {
   // The edge is at x = 0.2, half way; the body passes it at 10 m/s.
   const std::vector<job::RigidObstacle> wall{job::BoxObstacle{{0.1, -5, 0.49}, {9, 5, 0.5}}};
   const auto sound = hear_behind(wall, 10.0, Radiation::kRayleigh);
@@ -110,7 +110,7 @@ TEST(Visibility, ABodyThatGoesBehindAWallFadesWithoutAClick) {
   EXPECT_LT(most, 2.0 * before * std::pow(kTwoPi / 48.0, 2));
 }
 
-TEST(Visibility, AnObstacleHidesWhatLiesBehindItAndNothingElse) {
+TEST(Visibility, ObstacleShadow) {
   const Vec3 from{0, 0, 0}, to{0, 0, 1};
   const auto hides = [&](const job::RigidObstacle& obstacle) {
     EXPECT_EQ(is_between(obstacle, from, to), is_between(obstacle, to, from));
@@ -150,7 +150,7 @@ std::vector<double> hear_behind_plate(double from_x, double speed, Radiation rad
   });
 }
 
-TEST(Visibility, ASilentSurfaceHidesWhereItIsNow) {
+TEST(Visibility, MovingSilentSurface) {
   for (const Radiation radiation : {Radiation::kPaper2001, Radiation::kRayleigh}) {
     EXPECT_EQ(find_most(hear_behind_plate(0.0, 0.0, radiation), 0, 3000), 0.0);
     const std::vector<double> free = hear_behind_plate(5.0, 0.0, radiation);
@@ -163,7 +163,7 @@ TEST(Visibility, ASilentSurfaceHidesWhereItIsNow) {
   }
 }
 
-TEST(Visibility, ABallThatFliesThroughTheWayHidesForAWhile) {
+TEST(Visibility, PassingBall) {
   const SurfacePart part = make_part(air::testing::make_ball(2, 0.01));
   const auto play = [&](double begin_y, std::size_t stop_at) {
     Options options = make_options(3000, {0.0, 0.0, 1.0}, 4);

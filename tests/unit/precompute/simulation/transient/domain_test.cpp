@@ -28,7 +28,7 @@ std::vector<SolidBody> make_two_bodies() {
           {"block", above, make_law(2e6, 0.4, 1100), 3.0}};
 }
 
-TEST(Assembly, keeps_every_element_of_every_body_in_the_order_of_its_nodes) {
+TEST(Assembly, elements_and_node_order) {
   const World world(make_two_bodies());
   const Assembly& all = *world.assembly;
   ASSERT_EQ(all.bodies.size(), 2U);
@@ -60,7 +60,7 @@ TEST(Assembly, keeps_every_element_of_every_body_in_the_order_of_its_nodes) {
 }
 
 // A closed surface: the area vectors of its facets sum up to nothing, and its volume is that of the box.
-TEST(Assembly, skin_is_closed_and_shares_of_a_point_sum_up_to_one) {
+TEST(Assembly, skin_and_point_shares) {
   const World world(make_two_bodies());
   const auto skin = list_skin(*world.assembly, 0);
   EXPECT_EQ(skin.size(), 2U * 2 * (8 * 2 + 8 * 2 + 2 * 2));
@@ -93,7 +93,7 @@ TEST(Assembly, skin_is_closed_and_shares_of_a_point_sum_up_to_one) {
   }
 }
 
-TEST(Domain, every_node_has_one_owner_and_all_mass_is_there) {
+TEST(Domain, ownership_and_mass) {
   const World world(make_two_bodies());
   std::vector<std::int32_t> owned(world.assembly->node_count(), 0);
   for (std::int32_t i = 0; i < world.domain.own_count(); ++i) ++owned[world.domain.find_number(i)];
@@ -108,7 +108,7 @@ TEST(Domain, every_node_has_one_owner_and_all_mass_is_there) {
             world.assembly->element_count());
 }
 
-TEST(Domain, halo_brings_the_values_of_owners) {
+TEST(Domain, halo_exchange) {
   World world(make_two_bodies());
   std::vector<Quad> values(world.domain.node_count(), Quad{-1, -1, -1, 0});
   for (int round = 1; round < 4; ++round) {
@@ -125,7 +125,7 @@ TEST(Domain, halo_brings_the_values_of_owners) {
   }
 }
 
-TEST(Domain, refuses_a_sliver_and_names_it) {
+TEST(Domain, sliver) {
   std::vector<SolidBody> bodies{{"bar", make_box({0.2, 0.02, 0.02}, {8, 2, 2}, 1), make_law(70e9, 0.33, 2700), 0.0}};
   mesh::TetMesh& mesh = bodies[0].mesh;
   // One inner node almost onto a facet opposite of it.
@@ -151,7 +151,7 @@ TEST(Domain, refuses_a_sliver_and_names_it) {
   }
 }
 
-TEST(Domain, refuses_bodies_that_are_no_solids) {
+TEST(Domain, invalid_solids) {
   EXPECT_EQ(tests::catch_message<InputError>([] { World world(std::vector<SolidBody>{}); }), "the job has no body");
   std::vector<SolidBody> bodies{{"bar", make_box({0.2, 0.02, 0.02}, {4, 1, 1}, 1), make_law(70e9, 0.33, -2700), 0.0}};
   EXPECT_NE(tests::catch_message<InputError>([&] { World world(bodies); }).find("body 'bar': lambda"), std::string::npos);
@@ -161,7 +161,7 @@ TEST(Domain, refuses_bodies_that_are_no_solids) {
 }
 
 // rho t A, of the points alone: angles of edges have an inertia of their own.
-TEST(Domain, a_sheet_has_its_mass_on_any_number_of_ranks) {
+TEST(Domain, sheet_mass) {
   const comm::Communicator comm(MPI_COMM_WORLD);
   SheetBody sheet{"sheet", make_disc(0.1, 12), {}, {8e10, 6e10, 7000.0, 0.002, 0.0}, 0.0};
   sheet.clamped.assign(sheet.mesh.vertices_m.size(), false);
