@@ -1,4 +1,4 @@
-// Files that must be refused, with the words of the message each must give: where, what, and the remedy.
+// Invalid files, with the expected message: position, cause and remedy.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 

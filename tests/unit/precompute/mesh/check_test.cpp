@@ -1,4 +1,4 @@
-// Each defect of a mesh on its own, on bodies small enough to know the answer by hand.
+// Each mesh defect separately, on bodies with answers known by hand.
 #include "precompute/mesh/check.hpp"
 
 #include <gtest/gtest.h>
@@ -379,7 +379,7 @@ TEST(find_fixed_nodes, closed_box) {
 }
 
 TEST(speed, demo_size_mesh) {
-  // The aim is 0.3 s each; the seconds are printed and recorded, not judged: machines are shared.
+  // Target 0.3 s each; times are printed and recorded, not checked: machines are shared.
   const tests::Folder scratch;
   write_gmsh(make_cube(31), scratch / "large.msh");
   const auto begin = std::chrono::steady_clock::now();

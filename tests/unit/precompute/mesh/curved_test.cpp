@@ -1,4 +1,4 @@
-// When a quadratic element counts as folded, and what straightening it does to those around it.
+// Detection of folded quadratic elements, and the effect of straightening on their neighbours.
 #include "precompute/mesh/curved.hpp"
 
 #include <gtest/gtest.h>
@@ -53,7 +53,7 @@ TEST(curved, neighbours_of_straightened_elements) {
 }
 
 TEST(curved, fold_detection) {
-  // The Jacobian by finite differences of the map itself, at the points of every rule in use, on elements from tame to wild.
+  // Jacobian by finite differences of the map, at the points of every quadrature rule, on mild to extreme elements.
   std::mt19937 random(7);
   std::uniform_real_distribution<double> unit(0, 1), shift(-1, 1);
   const auto map = [](const TetMesh& mesh, const std::array<double, 3>& xi) {

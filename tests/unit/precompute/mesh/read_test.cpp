@@ -1,4 +1,4 @@
-// Every format and encoding against what Gmsh says the mesh is; the files were written by Gmsh, VTK, meshio and TetGen.
+// Every format and encoding against Gmsh's data; files written by Gmsh, VTK, meshio and TetGen.
 #include "precompute/mesh/read.hpp"
 
 #include <gtest/gtest.h>
@@ -26,7 +26,7 @@ void expect_truth(TetMesh mesh, int order) {
   EXPECT_NEAR(calc_volume(mesh), 0.3 * 0.2 * 0.1, 1e-12);
 }
 
-/// The node order of the format was understood when every mid node lies in the middle of its own edge.
+/// Correct node order: every mid node lies at the midpoint of its own edge.
 void expect_mid_nodes_in_the_middle(const TetMesh& mesh) {
   ASSERT_EQ(mesh.order, 2);
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
@@ -250,7 +250,7 @@ TEST(read, gmsh_tags_in_binary_values) {
           const TetMesh mesh = parse_mesh(std::as_bytes(std::span(text)), "views.msh", MeshFormat::kGmsh);
           EXPECT_EQ(mesh.tet_count(), plain.tet_count());
         }
-  // A section that is not known, and one that is not as the manual has it, end at the tag that another section or nothing follows.
+  // Unknown or nonstandard sections end at a tag followed by another section or the end of the file.
   const std::string text =
       read_text(fixture("gmsh41_binary_1.msh")) + "$Foreign\n\x01\x02$EndForeign\x03\x04$EndForeign\n$Periodic\nodd$EndPeriodic";
   EXPECT_EQ(parse_mesh(std::as_bytes(std::span(text)), "views.msh", MeshFormat::kGmsh).tet_count(), plain.tet_count());

@@ -1,4 +1,4 @@
-// What we write must come back: through our own reader, through meshio, through Gmsh.
+// Round trip of written files: own reader, meshio, Gmsh.
 #include "precompute/mesh/write.hpp"
 
 #include <gtest/gtest.h>
@@ -65,7 +65,7 @@ TEST_P(Written, gmsh_file_in_gmsh) {
   const auto& [file, encoding] = GetParam();
   const tests::Folder scratch;
   TetMesh mesh = read_mesh(fixture(file));
-  mesh.doubt_m.assign(mesh.nodes_m.size(), Vec3{0, 0, 1e-3});  // data that others may do with what they like
+  mesh.doubt_m.assign(mesh.nodes_m.size(), Vec3{0, 0, 1e-3});  // arbitrary post-processing data
   write_gmsh(mesh, scratch / "out.msh", encoding);
   std::string said;
   if (!read_with("gmsh", scratch / "out.msh", said)) GTEST_SKIP() << "gmsh's Python module is not installed";

@@ -1,4 +1,4 @@
-// Meshes of bodies whose volume, wall and edges are known in closed form.
+// Meshes of bodies with closed-form volume, wall and edges.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -209,9 +209,8 @@ int count_shells_of(const mesh::TetMesh& m) {
 }
 
 TEST(bodies, requested_hollow) {
-  // The hollow is a tenth of the ball, 10 mm wide, and elements of this count are nearly as long: a solid ball would be within a thousandth
-  // of the volume. It is refused in one line that says what to ask for; with what is asked for so, the second time at the latest, there is
-  // a hollow.
+  // The hollow is a tenth of the ball, 10 mm wide, and elements of this count are nearly as long: a solid ball would have the volume within
+  // a thousandth. Refused with a proposed size; the proposal gives a hollow at the second attempt at the latest.
   const auto path = write_text("tiny_hollow.off", to_off(make_sphere(0.05, 4)));
   std::int64_t nodes = 2000;
   int refused = 0;
@@ -236,8 +235,8 @@ TEST(bodies, requested_hollow) {
 }
 
 TEST(bodies, coarse_walls) {
-  // Elements longer than the wall is thick. No node may lie outside or in the hollow, both skins must be there, and what cannot be had is
-  // refused with what to ask for.
+  // Elements longer than the wall. No node may lie outside or in the hollow, both skins must exist, and impossible sizes are refused with a
+  // proposal.
   const double pi = std::numbers::pi;
   int made = 0;
   for (const double wall : {0.003, 0.002})

@@ -1,4 +1,4 @@
-// Surfaces with fewer corners: what must stay, and what is refused.
+// Surface coarsening: preserved properties, and refusals.
 #include "precompute/mesher/coarsen.hpp"
 
 #include <gmock/gmock.h>
@@ -23,7 +23,7 @@ using testing::make_torus;
 using testing::to_triangles;
 using tests::catch_message;
 
-/// Each edge is passed once in each direction: closed, a manifold at its edges, oriented.
+/// Each edge is traversed once per direction: closed, edge-manifold, oriented.
 bool is_closed(const TriangleSurface& surface) {
   std::map<std::pair<std::int32_t, std::int32_t>, int> passes;
   for (const Triangle& t : surface.triangles)

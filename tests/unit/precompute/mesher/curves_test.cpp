@@ -1,4 +1,4 @@
-// Curves as the Delaunay mesher can take them: it shrinks balls without end where two come close or one turns back.
+// Curve preparation for the Delaunay mesher, which shrinks balls without end where two curves come close or one turns back.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Walls made of skins: closed forms for volume, thickness and the place of every node, and what is refused.
+// Walls from skins: closed forms for volume, thickness and node positions, and refusals.
 #include "precompute/mesher/extrude.hpp"
 
 #include <gtest/gtest.h>
@@ -195,7 +195,7 @@ TEST(extrude, openings_and_holes) {
   EXPECT_EQ(capped.shells, 2);
 
   Polygons ball = make_sphere(0.05, 4);
-  std::erase_if(ball.faces, [&](const std::vector<int>& f) {  // what a scanner did not see
+  std::erase_if(ball.faces, [&](const std::vector<int>& f) {  // not seen by a scanner
     return std::all_of(f.begin(), f.end(),
                        [&](int v) { return std::hypot(ball.points[v][0] - 0.05, ball.points[v][1], ball.points[v][2]) < 0.007; });
   });

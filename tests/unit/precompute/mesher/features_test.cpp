@@ -1,4 +1,4 @@
-// Which sharp edges are the body's and which are noise, and what becomes of a scan.
+// Sharp edges of bodies against noise, and meshing of scans.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -142,7 +142,7 @@ TEST(features, touching_boundaries) {
   EXPECT_GE(count_pinches(faces), 4);
 }
 
-/// The solid bunny, by height: how far its mesh's box falls short of it at the ears.
+/// Height deficit of the solid bunny's mesh at the ears.
 TEST(features, bunny_ears) {
   const std::filesystem::path bunny = "/usr/share/glmark2/models/bunny.obj";
   if (!std::filesystem::exists(bunny)) GTEST_SKIP() << "glmark2-data is not installed";
@@ -163,7 +163,7 @@ TEST(features, bunny_ears) {
 }
 
 TEST(features, narrow_rims) {
-  // Steps of 1 to 2 mm on a body of 100 mm: their edges bring most of the nodes, which the model of the count does not know.
+  // Steps of 1 to 2 mm on a body of 100 mm: their edges add most of the nodes, not covered by the count model.
   std::vector<std::array<double, 2>> profile{{0.04, 0},    {0.04, 0.0015}, {0.042, 0.0015}, {0.042, 0.003},  {0.05, 0.003},
                                              {0.05, 0.06}, {0.048, 0.06},  {0.048, 0.0615}, {0.045, 0.0615}, {0.045, 0.063}};
   const auto path = write_text("rims.off", to_off(make_lathe(profile, 48, Cut::kDiagonal)));

@@ -1,4 +1,4 @@
-// glTF and GLB: what programs write is read as the same body as its OFF file, and whatever is wrong in one ends in one error.
+// glTF and GLB: files of common programs give the body of their OFF file; faults give one error.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -79,7 +79,7 @@ std::string find_error(const std::string& bytes, const std::string& format = "gl
   return "";
 }
 
-/// Nodes of which each is the child of the one before; the last has the mesh.
+/// Chain of child nodes; the last has the mesh.
 std::string make_chain(int count) {
   std::string nodes = "[";
   for (int n = 1; n < count; ++n) nodes += "{\"children\": [" + std::to_string(n) + "]}, ";
@@ -111,7 +111,7 @@ TEST(Gltf, node_transforms) {
   model.nodes = R"([{"mesh": 0, "matrix": [0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 1, 0, 4, 0, 0, 1]}])";
   EXPECT_NEAR(calc_box(read(model).points).high[0], 4, 1e-6);
   EXPECT_NEAR(calc_volume(read(model)), 6, 1e-5);
-  // What the scene does not show is left out, and a mesh that two nodes show is there twice.
+  // Meshes outside the scene are ignored; a mesh used by two nodes is duplicated.
   model.nodes = R"([{"mesh": 0}, {"mesh": 0, "translation": [9, 0, 0]}])";
   EXPECT_EQ(read(model).triangles.size(), 12);
   model.scene = R"("scenes": [{"nodes": [0, 1]}])";

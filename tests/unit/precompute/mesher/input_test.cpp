@@ -1,4 +1,4 @@
-// What the mesher reads, repairs and refuses.
+// Reading, repairs and refusals of the mesher.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -205,7 +205,7 @@ TEST(input, not_a_regular_file) {
 }
 
 TEST(input, letter_with_sharp_corners) {
-  // Its corners ask for some 370 nodes. Fewer once made the search continue without end, with ever shorter edges.
+  // Its corners need some 370 nodes. Regression: fewer made the search continue without end, with ever shorter edges.
   const std::filesystem::path file = write_text("letter.obj", to_obj(make_letter_n()));
   for (const long long nodes : {60, 100, 200}) {
     SurfaceReport report;
@@ -223,7 +223,7 @@ TEST(input, letter_with_sharp_corners) {
 }
 
 TEST(input, displaced_corners) {
-  // Each of these once ended in a signal: in the search for a count, where balls were placed on a slit; and in the test of the nesting.
+  // Regression: each caused a signal, in the count search (balls on a slit) and in the nesting test.
   Polygons slit = make_box(0.1, 0.05, 0.03), hair = slit, far = slit;
   slit.points.push_back({0, 0.05, -4.16333625e-19});  // the far corner of a triangle of the lid, on the floor
   slit.faces[3][2] = 8;

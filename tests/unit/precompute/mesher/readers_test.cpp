@@ -1,4 +1,4 @@
-// The readers of surfaces: what legal files may look like, and that no bytes make them do anything but read or refuse.
+// Surface readers: variants of valid files, and safety for arbitrary bytes.
 #include <gtest/gtest.h>
 
 #include <bit>
@@ -160,7 +160,7 @@ TEST(readers, truncated_files) {
 }
 
 TEST(readers, points_equal_to_rounding) {
-  // A corner that is 1.8e-42 off in one triangle once became a slit, a second sharp edge in the same place, and a crash of the mesher.
+  // Regression: a corner 1.8e-42 off in one triangle became a slit, a duplicate sharp edge, and a crash of the mesher.
   Polygons box = make_box(0.1, 0.05, 0.03);
   box.points.push_back({0, 0, 1.793662034335766e-42});
   for (int& v : box.faces[4])

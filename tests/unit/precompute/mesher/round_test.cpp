@@ -1,5 +1,4 @@
-// The smooth surface through the corners of facets, against bodies known in closed form, however they are cut; and bodies of planes, which
-// stay as they are.
+// Smooth surface through facet corners, against closed-form bodies in various triangulations; planar bodies stay unchanged.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -30,7 +29,7 @@ struct Kind {
   const char* name;
   std::function<Profile(int)> make;  // of so many rings
   double volume;
-  double max;  // of what the facets lack of the volume, that the smooth surface may be off
+  double max;  // largest volume error of the smooth surface, over the facets' deficit
   bool is_closed = false;
   int min_rings = 1;
 };
@@ -202,7 +201,7 @@ TEST(Round, planar_bodies) {
 }
 
 TEST(Round, ambiguous_facets) {
-  // Eight sides stay planes, twelve become round; the way to the other reading leads from one to the other.
+  // Eight sides stay planes, twelve become round; the offset leads from one reading to the other.
   for (const int sides : {8, 9, 10, 12, 14}) {
     RoundSurface round(to_triangles(make_prism(make_polygon(sides), 3)), kSharpDeg);
     ASSERT_TRUE(round.is_doubtful()) << sides;

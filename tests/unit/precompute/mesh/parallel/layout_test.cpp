@@ -1,4 +1,4 @@
-// The layout of VTKHDF files that are well, unusual or damaged.
+// Layout of valid, unusual and damaged VTKHDF files.
 #include "precompute/mesh/parallel/layout.hpp"
 
 #include <gmock/gmock.h>
@@ -92,7 +92,7 @@ TEST(Layout, external_links) {
   EXPECT_THAT(find_refusal(file.path()), HasSubstr("Points is a link"));
 }
 
-// HDF5 crashes on some of these; the child does, not the reader. All that is accepted lies inside the file.
+// HDF5 crashes on some of these, in the child only. Accepted arrays lie inside the file.
 TEST(Layout, damaged_files) {
   const File file;
   tests::write_vtkhdf(file.path(), tests::make_box({1, 1, 1}, {1, 1, 1}));

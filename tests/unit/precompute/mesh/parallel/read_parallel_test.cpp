@@ -1,4 +1,4 @@
-// A mesh read by all ranks against the same mesh on the serial path: the same numbers, boundary, fixed nodes and refusals.
+// Parallel reader against the serial path: numbering, boundary, fixed nodes and refusals.
 #include "precompute/mesh/parallel/read_parallel.hpp"
 
 #include <gmock/gmock.h>
@@ -29,7 +29,7 @@ using Box = std::array<Vec3, 2>;
 
 const MPI_Comm kWorld = MPI_COMM_WORLD;
 
-/// A file that rank 0 writes and all read.
+/// File written by rank 0 and read by all.
 class SharedFile {
  public:
   SharedFile(const mesh::TetMesh& mesh, const tests::VtkHdfOptions& options = {}) {
@@ -49,7 +49,7 @@ class SharedFile {
   std::filesystem::path path_;
 };
 
-/// A tube with its elements and nodes in no order at all, some elements inside out, some nodes unused.
+/// A tube with shuffled elements and nodes, some elements inverted, some nodes unused.
 mesh::TetMesh make_shuffled_tube(int order) {
   mesh::TetMesh tube = tests::make_box({9, 5, 4}, {0.9, 0.5, 0.4}, order);
   std::mt19937 random(3);
@@ -80,7 +80,7 @@ mesh::TetMesh make_shuffled_tube(int order) {
   return mixed;
 }
 
-/// What the serial path makes of the mesh.
+/// Mesh of the serial path.
 struct Truth {
   mesh::TetMesh mesh;
   mesh::CheckReport check;
@@ -95,7 +95,7 @@ Truth make_truth(mesh::TetMesh mesh, int order) {
   return truth;
 }
 
-class Orders : public testing::TestWithParam<std::pair<int, int>> {};  // of the file, of the elements
+class Orders : public testing::TestWithParam<std::pair<int, int>> {};  // order in the file, requested order
 
 TEST_P(Orders, same_mesh_as_serial) {
   const auto [file_order, order] = GetParam();
@@ -136,7 +136,7 @@ TEST_P(Orders, row_numbering) {
   const SharedFile file(make_shuffled_tube(file_order));
   const ParallelMesh read = read_parallel(kWorld, file.path(), {.order = order});
   const mesh::LocalMesh& local = read.mesh.local;
-  // Every rank writes the rows it believes in; largest and smallest belief must agree, and owned rows follow each other.
+  // Every rank contributes its rows; largest and smallest values must agree, and owned rows are contiguous.
   std::vector<std::int32_t> low(read.mesh.nodes, INT32_MAX), high(low.size(), -1), owners(low.size(), 0);
   for (std::size_t i = 0; i < local.row.size(); ++i) {
     const std::size_t node = local.node_in_mesh[i];

@@ -1,4 +1,4 @@
-// The parametric bodies against closed forms, and against measures of quality that share no code with them.
+// Parametric bodies against closed forms and independent quality measures.
 #include "precompute/mesh/shapes/shapes.hpp"
 
 #include <fmt/core.h>
@@ -161,7 +161,7 @@ TEST(Shapes, volume_convergence_order) {
   }
 }
 
-// The nodes of all boundary faces, mid-side nodes among them.
+// Nodes of all boundary faces, including mid-side nodes.
 std::set<int> find_boundary_nodes(const mesh::TetMesh& mesh) {
   std::map<std::array<int, 3>, std::array<int, 6>> once;
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e) {

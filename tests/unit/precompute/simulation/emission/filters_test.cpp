@@ -1,4 +1,4 @@
-// The low-pass from steps to samples, the delay and the DC blocker, by single tones.
+// Low-pass from steps to samples, delay and DC blocker, by single tones.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -17,14 +17,14 @@ using namespace testing;
 using recording::calc_alpha;
 using recording::HighPass;
 
-/// What is heard of a tone of a small pulsating sphere, over rho Q' / (4 pi r) of the same velocity at the frequency of `reference_hz`.
+/// Received tone of a small pulsating sphere, over rho Q' / (4 pi r) of the same velocity at the frequency `reference_hz`.
 double find_gain(double freq_hz, double reference_hz, int steps, double r = 0.5) {
   const double radius = 1e-4, omega = kTwoPi * freq_hz, speed = 1e-3;
   const Options options = make_options(1200, {0.0, 0.0, r}, steps);
   const air::testing::Skin skin = air::testing::make_ball(2, radius);
   const auto sound = hear_shape(
       make_part(skin), options, [](const Vec3& x) { return normalise(x); }, [&](double t) { return speed / omega * std::sin(omega * t); });
-  double area = 0.0;  // the derivative of the volume of the polyhedron
+  double area = 0.0;  // derivative of the polyhedron's volume
   for (const Triangle& t : skin.triangles) {
     const Vec3 twice = cross(skin.nodes_m[t[1]] - skin.nodes_m[t[0]], skin.nodes_m[t[2]] - skin.nodes_m[t[0]]);
     for (const std::int32_t node : t) area += dot(normalise(skin.nodes_m[node]), twice) / 6.0;
@@ -54,7 +54,7 @@ TEST(LowPass, DelayFlatness) {
 }
 
 TEST(LowPass, AliasRejection) {
-  // Folded to f - 48 kHz and so on; at 16 * 48 kHz - f and 32 * 48 kHz - f it is the boxes of steps that hold it back.
+  // Aliases at f - 48 kHz and so on; at 16 * 48 kHz - f and 32 * 48 kHz - f the box averages attenuate them.
   for (const int steps : {16, 112})
     for (const double low_hz : {1000.0, 9000.0, 19000.0, 19900.0})
       for (const double image_hz : {48e3, 96e3, 144e3, 192e3, 384e3, 768e3}) {

@@ -1,4 +1,4 @@
-// The same bits on any number of ranks: triangles are dealt out to ranks, and each rank alone does the whole, too.
+// Bit-identical results on any number of ranks: triangles distributed over ranks, and the whole on each rank alone.
 #include "tests/support/ranks.hpp"
 
 #include <gtest/gtest.h>

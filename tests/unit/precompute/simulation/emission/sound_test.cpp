@@ -60,7 +60,7 @@ TEST(Sound, ToneAcrossStepChange) {
 }
 
 TEST(Sound, ImpulsesOfAClosedSurface) {
-  // From rest to rest the integral of the pressure is 0, and the integral of that rho dV / (4 pi r), of one pole as of monopoles.
+  // From rest to rest the integral of the pressure is 0, and its double integral is rho dV / (4 pi r), for one pole as for monopoles.
   air::testing::Skin skin = air::testing::make_ball(2, 0.01);
   const auto part = make_part(skin);
   const auto shape = [](const Vec3& x) { return Vec3{0.01 * x[0], -0.004 * x[1], 0.002 * x[2]}; };
@@ -87,15 +87,15 @@ TEST(Sound, ImpulsesOfAClosedSurface) {
 }
 
 TEST(Sound, RetardedPotentialOfASwingingSource) {
-  // A small pulsating sphere on a pendulum, t = s + r(s) / c, M = -r' / c. A source of one point is heard as rho Q'(s) / (4 pi r (1 - M));
-  // the facets in front and behind are heard at other times, and their areas grow, which adds M 2/3 (1 - M)^-2: the sum over facets of V.S'
-  // (n.x) is 2/3 of V.n Q.
+  // A small pulsating sphere on a pendulum, t = s + r(s) / c, M = -r' / c. A point source gives rho Q'(s) / (4 pi r (1 - M)); front and
+  // rear facets arrive at different times, and their areas grow, which adds M 2/3 (1 - M)^-2: the sum over facets of V.S' (n.x) is 2/3 of
+  // V.n Q.
   const double radius = 1e-3, freq_hz = 2000.0, omega = kTwoPi * freq_hz, swing = kTwoPi * 3.0;
   const Vec3 ear{0.0, 1.5, 0.0};
   const auto centre = [&](double t) { return Vec3{0.0, 0.6 * std::sin(swing * t), 0.0}; };
   const air::testing::Skin skin = air::testing::make_ball(2, radius);
   Options options = make_options(9600, ear, 16);
-  options.radiation = Radiation::kRayleigh;  // the monopoles alone, twice
+  options.radiation = Radiation::kRayleigh;  // monopoles only, twice
   const double amplitude = 1e-6;
   const auto sound =
       hear(make_part(skin), options, [&](const Vec3& x, double t) { return centre(t) + amplitude * std::sin(omega * t) * normalise(x); });
@@ -121,7 +121,7 @@ TEST(Sound, RetardedPotentialOfASwingingSource) {
 }
 
 TEST(Sound, SilentTumblingRigidBody) {
-  // A cube that spins is no pump: its volume does not change, whatever its facets do.
+  // A spinning cube does not change its volume.
   air::testing::Skin skin = air::testing::make_ball(4, 0.05);
   const auto part = make_part(skin);
   const double spin = kTwoPi * 40.0;
@@ -134,7 +134,7 @@ TEST(Sound, SilentTumblingRigidBody) {
   EXPECT_LT(find_most(std::span(sound).subspan(200)), 2e-2 * scale);
 }
 
-// The two sides of a sheet go out as one; with nodes of their own they are two surfaces.
+// The two sides of a sheet act as one; with nodes of their own they are two surfaces.
 TEST(Sound, SheetAsTwoSurfaces) {
   const auto listen = [](std::int32_t apart) {
     SurfacePart part;

@@ -1,5 +1,5 @@
-// Spheres that vibrate as Legendre polynomials: the error of the far pressure of each way from motion to sound, as a quadrature of its
-// formula gives it (docs/equations.md E14), and none at all for a pulsating sphere.
+// Spheres vibrating in Legendre polynomials: far-field error of each radiation formula against a quadrature of the formula
+// (docs/equations.md E14); zero for a pulsating sphere.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -39,7 +39,7 @@ double calc_exact(int l, double ka, double kr) {
   return kRho * kC * std::abs(calc_hankel(l, kr) / slope);
 }
 
-/// The error in dB of the pressure in the direction where the polynomial is 1.
+/// Error [dB] of the pressure in the direction where the polynomial is 1.
 double find_error(Radiation radiation, int l, double ka) {
   const double k = kTwoPi * kFreq / kC, radius = ka / k, kr = std::max(200.0, 3.0 * ka * ka), r = kr / k;
   const bool is_paper = radiation == Radiation::kPaper2001;
@@ -58,7 +58,7 @@ double find_error(Radiation radiation, int l, double ka) {
       },
       [&](double t) { return speed / omega * std::sin(omega * t); });
   double heard = std::abs(find_amplitude(sound, kFreq, rate, delay + 200, delay + 488));
-  if (is_paper) heard *= kFreq / kC;  // the derivative that eq. 10 lacks: (1 / 2 pi c) d/dt
+  if (is_paper) heard *= kFreq / kC;  // the derivative missing in eq. 10: (1 / 2 pi c) d/dt
   return to_db(heard / (speed * calc_exact(l, ka, kr)));
 }
 

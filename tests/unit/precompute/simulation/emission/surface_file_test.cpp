@@ -1,4 +1,4 @@
-// Recorded surfaces: what is played is what was heard, runs that resume, files that are cut or changed.
+// Recorded surfaces: playback, resumed runs, truncated and modified files.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -22,7 +22,7 @@ using namespace testing;
 
 constexpr std::uint64_t kFrames = 1500;
 
-/// Two balls: one flies, turns and rings, the other one rings.
+/// Two balls: one flies, rotates and rings, the other one rings.
 SurfacePart make_pair() {
   SurfacePart part = make_part(air::testing::make_ball(3, 0.03));
   const SurfacePart other = make_part(air::testing::make_ball(2, 0.05));
@@ -126,7 +126,7 @@ TEST_F(SurfaceFiles, ResumedRun) {
     Emission first(MPI_COMM_SELF, part, options);
     for (int n = 0; n < 9000; ++n) first.add_step(calc_displacement(part, move, n / 768e3).data());
     state = first.save();
-    for (int n = 9000; n < 18000; ++n) first.add_step(calc_displacement(part, move, n / 768e3).data());  // lost
+    for (int n = 9000; n < 18000; ++n) first.add_step(calc_displacement(part, move, n / 768e3).data());  // discarded
   }
   EXPECT_FALSE(std::filesystem::exists(options.surface_file));
   options.is_resumed = true;

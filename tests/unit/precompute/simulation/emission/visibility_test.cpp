@@ -1,4 +1,4 @@
-// What stands between a surface and a receiver.
+// Occlusion between surfaces and receivers.
 #include "precompute/simulation/emission/visibility.hpp"
 
 #include <gtest/gtest.h>
@@ -16,7 +16,7 @@ namespace {
 
 using namespace testing;
 
-/// Signed volumes: the way passes through the triangle when the three tetrahedra on it turn the same way.
+/// Signed volumes: the segment crosses the triangle if the three tetrahedra on it have the same sign.
 bool is_crossed(const Corners& t, const Vec3& from, const Vec3& to) {
   const auto volume = [](const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) { return dot(cross(b - a, c - a), d - a); };
   if (volume(t[0], t[1], t[2], from) * volume(t[0], t[1], t[2], to) > 0.0) return false;
@@ -75,7 +75,7 @@ TEST(Visibility, BodyBehindAWall) {
   EXPECT_GT(find_most(hear_behind(wall, 0.0, Radiation::kKirchhoff), 1000, 4000), 1e-9);
 }
 
-// A sheet has each triangle from both sides: the side that faces the receiver is heard, and the other one is hidden behind it.
+// A sheet has each triangle on both sides: the side that faces the receiver is visible and hides the other one.
 TEST(Visibility, NearSideOfASheet) {
   const auto listen = [](bool has_both, Radiation radiation) {
     SurfacePart part;
@@ -98,13 +98,13 @@ TEST(Visibility, NearSideOfASheet) {
 }
 
 TEST(Visibility, FadeWithoutClick) {
-  // The edge is at x = 0.2, half way; the body passes it at 10 m/s.
+  // The edge is at x = 0.2, halfway; the body passes it at 10 m/s.
   const std::vector<job::RigidObstacle> wall{job::BoxObstacle{{0.1, -5, 0.49}, {9, 5, 0.5}}};
   const auto sound = hear_behind(wall, 10.0, Radiation::kRayleigh);
   const double before = find_most(sound, 300, 700);
   EXPECT_EQ(find_most(sound, 2000, 4000), 0.0);
   EXPECT_GT(before, 1e-9);
-  // A tone of 1 kHz at 48 kHz has a second difference of (2 pi / 48)^2; a click has one of its own size.
+  // A 1 kHz tone at 48 kHz has a second difference of (2 pi / 48)^2; a click has one of its own amplitude.
   double most = 0.0;
   for (std::size_t n = 300; n < 2000; ++n) most = std::max(most, std::abs(sound[n + 1] - 2.0 * sound[n] + sound[n - 1]));
   EXPECT_LT(most, 2.0 * before * std::pow(kTwoPi / 48.0, 2));
@@ -155,7 +155,7 @@ TEST(Visibility, MovingSilentSurface) {
     EXPECT_EQ(find_most(hear_behind_plate(0.0, 0.0, radiation), 0, 3000), 0.0);
     const std::vector<double> free = hear_behind_plate(5.0, 0.0, radiation);
     EXPECT_GT(find_most(free, 1000, 3000), 1e-9);
-    // At 20 m/s its edge reaches the way after 20 ms: 960 samples.
+    // At 20 m/s its edge reaches the line of sight after 20 ms: 960 samples.
     const std::vector<double> shut = hear_behind_plate(0.5, -20.0, radiation);
     for (std::size_t n = 0; n < 900; ++n) ASSERT_EQ(shut[n], free[n]) << n;
     EXPECT_EQ(find_most(shut, 1250, 1480), 0.0);

@@ -1,4 +1,4 @@
-// Bent bodies against beams in closed form, and against their own motion.
+// Bent bodies against closed-form beams, and against their own motion.
 #include "precompute/simulation/transient/bend.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// What ranks have of the bodies. Oracles: sums over the whole mesh, and what the test makes by hand.
+// Partition of the bodies over ranks. Oracles: sums over the whole mesh, and hand-made values.
 #include "precompute/simulation/transient/domain.hpp"
 
 #include <gtest/gtest.h>
@@ -59,7 +59,7 @@ TEST(Assembly, elements_and_node_order) {
   }
 }
 
-// A closed surface: the area vectors of its facets sum up to nothing, and its volume is that of the box.
+// Closed surface: the facet area vectors sum to zero, and the volume is the box's.
 TEST(Assembly, skin_and_point_shares) {
   const World world(make_two_bodies());
   const auto skin = list_skin(*world.assembly, 0);
@@ -128,7 +128,7 @@ TEST(Domain, halo_exchange) {
 TEST(Domain, sliver) {
   std::vector<SolidBody> bodies{{"bar", make_box({0.2, 0.02, 0.02}, {8, 2, 2}, 1), make_law(70e9, 0.33, 2700), 0.0}};
   mesh::TetMesh& mesh = bodies[0].mesh;
-  // One inner node almost onto a facet opposite of it.
+  // One inner node almost on its opposite facet.
   std::int32_t inner = -1;
   for (std::size_t n = 0; n < mesh.nodes_m.size(); ++n)
     if (norm(mesh.nodes_m[n] - Vec3{0.05, 0.0, 0.0}) < 1e-9) inner = static_cast<std::int32_t>(n);
@@ -160,7 +160,7 @@ TEST(Domain, invalid_solids) {
   EXPECT_NE(tests::catch_message<InputError>([&] { World world(bodies); }).find("body 'bar': element 1 of its mesh"), std::string::npos);
 }
 
-// rho t A, of the points alone: angles of edges have an inertia of their own.
+// rho t A, of vertices only: edge angles have their own inertia.
 TEST(Domain, sheet_mass) {
   const comm::Communicator comm(MPI_COMM_WORLD);
   SheetBody sheet{"sheet", make_disc(0.1, 12), {}, {8e10, 6e10, 7000.0, 0.002, 0.0}, 0.0};

@@ -70,7 +70,7 @@ TEST(Element, inverted_element) {
   EXPECT_FALSE(make_shape(Kind::kCurvedT10, x, shape));
 }
 
-// Of a T4 alone, from the stiffness V B^T D B by Eigen.
+// Single T4, from the stiffness V B^T D B by Eigen.
 TEST(Element, highest_frequency_of_one_tetrahedron) {
   ElementShape shape;
   ASSERT_TRUE(make_shape(Kind::kT4, kCorners, shape));

@@ -1,4 +1,4 @@
-// Bodies that move: conservation laws, waves in bars, supports, the energy book, and what ends a run. Oracles: closed forms.
+// Moving bodies: conservation laws, waves in bars, supports, energy book, termination. Oracles: closed forms.
 #include "precompute/simulation/transient/motion.hpp"
 
 #include <gtest/gtest.h>
@@ -52,7 +52,7 @@ TEST(Motion, free_fall) {
   EXPECT_NEAR(t, 1e-3, 1e-15);
   for (std::int32_t i = 0; i < world.domain.own_count(); ++i) {
     const Quad& u = motion.get_u()[i];
-    // The first half step is from rest at -h/2 on: h^2 n (n + 1) / 2 in place of t^2 / 2.
+    // The first half step is from rest at -h/2: h^2 n (n + 1) / 2 instead of t^2 / 2.
     const double h = motion.get_step_s(), half_square = 0.5 * (t * t + t * h);
     EXPECT_NEAR(u.z, -9.81 * half_square, 1e-16);
     EXPECT_NEAR(u.x, half_square, 1e-16);
@@ -68,7 +68,7 @@ TEST(Motion, impulse) {
   for (int i = 0; i < 40; ++i) motion.advance_sample();
   const Motion::Momentum momentum = motion.calc_momentum();
   EXPECT_LT(norm(momentum.linear - blow), 1e-9 * norm(blow));
-  // The place is a little displaced while the force acts.
+  // Small displacement during the impulse.
   EXPECT_LT(norm(momentum.angular - cross(place, blow)), 1e-4 * norm(cross(place, blow)));
   const EnergyBook book = motion.calc_book();
   EXPECT_LT(std::abs(book.relative_error), 1e-6);
@@ -102,7 +102,7 @@ struct Wave {
   double seconds = 0.02;
 };
 
-/// The frequency of the standing wave that begins with the velocity shape(x) of a bar that is stretched before.
+/// Frequency of the standing wave with initial velocity shape(x) of a prestretched bar.
 double find_wave(const Wave& wave, double (*shape)(double)) {
   // E / rho = (1,000 m/s)^2, no lateral contraction.
   World world(make_body(wave.order, {0.5, wave.side_m, wave.side_m}, wave.cells, make_law(1e9, 0.0, 1000)));
@@ -161,7 +161,7 @@ TEST(Bar, stretched_bar_frequency) {
 
 // ---- supports ----
 
-/// A bar bent by its end within 1 ms, held there, and released at 1.25 ms.
+/// A bar bent at its end within 1 ms, held, and released at 1.25 ms.
 struct Plucked {
   World world{make_body(1, {0.06, 0.02, 0.02}, {6, 2, 2}, make_law(1e8, 0.3, 1100))};
   Motion motion;
@@ -226,7 +226,7 @@ TEST(Constraint, release_of_a_free_body) {
 TEST(Constraint, driven_and_fixed_nodes) {
   World world(make_body(1, {0.06, 0.02, 0.02}, {6, 2, 2}, make_law(1e8, 0.3, 1100, 1e-6)));
   const Path path({{0.0, {0, 0, 0}}, {5e-4, {2e-3, 1e-3, 0}}, {1e-3, {0, 0, -1e-3}}});
-  // In large motion the book's error is that of the steps: it falls by four with half the step.
+  // In large motion the energy error is that of the steps: a quarter with half the step.
   double error[2] = {};
   for (const int divisor : {1, 2}) {
     MotionOptions options;
@@ -247,7 +247,7 @@ TEST(Constraint, driven_and_fixed_nodes) {
   EXPECT_NEAR(error[0] / error[1], 4.0, 0.5);
 }
 
-// Weight that came on slowly: the support bears it, up to the bar's own swing, which braking has taken away.
+// Slowly applied weight: support reaction, apart from the bar's own oscillation, which is damped out.
 TEST(Constraint, support_reaction) {
   World world(make_body(1, {0.02, 0.02, 0.06}, {2, 2, 6}, make_law(1e6, 0.3, 1100), 300.0));
   MotionOptions options;
@@ -266,7 +266,7 @@ TEST(Constraint, support_reaction) {
   EXPECT_GT(book.dissipated_j, 0.0);
 }
 
-// Mass damping takes vibration, not flight and spin.
+// Mass damping acts on vibration only, not on flight and spin.
 TEST(Motion, mass_damping_of_free_flight) {
   World world(make_body(2, {0.06, 0.02, 0.02}, {3, 1, 1}, make_law(1e8, 0.3, 1100), 2000.0));
   Motion motion(world.domain, {});
@@ -282,13 +282,13 @@ TEST(Motion, mass_damping_of_free_flight) {
   const EnergyBook book = motion.calc_book();
   EXPECT_LT(std::abs(book.relative_error), 1e-6);
   EXPECT_GT(book.dissipated_j, 0.05 * kinetic);
-  // What is left is flight: the rigid part of the motion, and little else.
+  // The remaining motion is nearly rigid.
   const double flight = 0.5 * dot(after.linear, after.linear) / world.calc_mass();
   EXPECT_LT(book.kinetic_j + book.elastic_j, 1.1 * flight);
   EXPECT_GT(book.kinetic_j, flight);
 }
 
-// A rod on a hinge at its end, from the horizontal: at the lowest point the energy of the fall is that of the swing, omega^2 = 3 g / L.
+// A hinged rod falling from the horizontal: at the lowest point omega^2 = 3 g / L.
 TEST(Constraint, hinged_rod_swing) {
   if (tests::get_ranks() > 1) GTEST_SKIP() << "tens of thousands of steps";
   World world(make_body(1, {0.1, 0.01, 0.01}, {8, 2, 2}, make_law(5e7, 0.3, 1000), 5.0));
@@ -312,8 +312,8 @@ TEST(Constraint, hinged_rod_swing) {
   EXPECT_LT(book.dissipated_j, 0.02 * 9.81 * 0.05 * world.calc_mass());
 }
 
-// A rod on a hinge that vibrates and does not swing: without angular momentum about the hinge mass damping takes alpha2 v of all of it, so
-// that the loss is alpha2 times the integral of twice the kinetic energy.
+// A hinged rod vibrating without swing: without angular momentum about the hinge, mass damping acts on the whole velocity, and the loss is
+// alpha2 times the integral of twice the kinetic energy.
 TEST(Constraint, hinged_rod_mass_damping) {
   const double alpha2 = 20.0;
   World world(make_body(1, {0.1, 0.01, 0.01}, {8, 2, 2}, make_law(5e7, 0.3, 1000), alpha2));
@@ -346,9 +346,9 @@ TEST(Constraint, hinged_rod_mass_damping) {
   EXPECT_NEAR(lost / (alpha2 * twice_kinetic / options.sample_rate_hz), 1.0, 0.02);
 }
 
-// ---- forces from outside ----
+// ---- external forces ----
 
-/// A spring to the place at rest of some nodes, and what it knows of itself.
+/// Springs from some nodes to their rest positions, with their energy.
 class Spring : public ExternalForces {
  public:
   Spring(Domain& domain, double stiffness_n_m) : domain_(domain), stiffness_(stiffness_n_m) {}
@@ -412,7 +412,7 @@ TEST(Step, lagged_damping) {
   // omega = 2e6, alpha1 = 1e-6: xi = 1.
   EXPECT_NEAR(calc_longest_step(2e6, 1e-6, 0.0), 1e-6 * (std::sqrt(2.0) - 1.0), 1e-20);
   EXPECT_EQ(calc_longest_step(0.0, 1e-6, 0.0), std::numeric_limits<double>::infinity());
-  // v+ = v - h (omega^2 u + 2 xi omega v), u+ = u + h v+: just below that step it dies away, just above it grows.
+  // v+ = v - h (omega^2 u + 2 xi omega v), u+ = u + h v+: decays just below that step, grows just above.
   for (const double xi : {0.01, 0.5, 3.0}) {
     const double longest = calc_longest_step(1.0, 2.0 * xi, 0.0);
     for (const double factor : {0.99, 1.01}) {
