@@ -74,7 +74,7 @@ TEST(Walls, OccludersOfAllKinds) {
   EXPECT_TRUE(is(hear(R"(, "strikers": [{"sphere_m": 0.2, "mass_kg": 1, "position_m": [0, 0, 0.25]}])"), 0.0));
   EXPECT_TRUE(is(hear("", plate(0, R"("sounds": false,)")), 0.0));
   EXPECT_TRUE(is(hear(R"(, "obstacles": [{"box": {"min": [-1, -1, 0.2], "max": [1, 1, 0.3]}}])", "", "paper2001"), 0.0));
-  // Obstacle beside the line of sight, behind the microphone, and without visibility.
+  // Obstacle off the line of sight, behind the microphone, and without visibility.
   EXPECT_TRUE(is(hear(R"(, "obstacles": [{"box": {"min": [0.2, -1, 0.2], "max": [1, 1, 0.3]}}])"), free));
   EXPECT_TRUE(is(hear(R"(, "obstacles": [{"box": {"min": [-1, -1, 0.6], "max": [1, 1, 0.7]}}])"), free));
   EXPECT_TRUE(is(hear("", plate(0.6, R"("sounds": false,)")), free));
