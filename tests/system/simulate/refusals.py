@@ -1,5 +1,6 @@
 #!/usr/bin/python3
-"""An invalid job on one and two ranks: exit code 2, one error with file and line, no output files. Other refusals: tests/unit/precompute/simulation.
+"""An invalid job on one and two ranks: exit code 2, one error with file and line, no output files.
+Other refusals: tests/unit/precompute/simulation.
 
 usage: refusals.py BIN_DIR
 """
