@@ -1,7 +1,7 @@
 // Method: see impact.hpp. A row is a direction of relative motion at a contact; phi of a row has the sign of the body in it, so that the
-// motion of row r is  free_r + sum_s A_rs f_s,   A = h^2/2 J M^-1 J^T + sum over modes phi_r g phi_s.
+// motion of row r is  free_r + sum_s A_rs f_s,   A = h^2/2 J M^-1 J^T + sum over modes phi_r g phi_s. Frames and mobilities are constant
+// during an impact; gyroscopic couples enter as given constant accelerations.
 // Source: discrete gradients, Gonzalez 1996 (J. Nonlinear Sci. 6, 449); modes inside an impact of a ball and a beam, Timoshenko 1913.
-// Deviations: frames and mobilities are constant in one impact; gyroscopic couples act as the constant accelerations given.
 #include "runtime/physics/impact/impact.hpp"
 
 #include <algorithm>
@@ -14,16 +14,16 @@
 namespace carillon::impact {
 namespace {
 
-constexpr double kSlowest = 1e-6;  // m/s: speed for the choice of the step without an approach
-constexpr double kTaper = 0.05;    // of the time of pressing: time constant of a rebound at its limit
-constexpr double kStill = 1e-3;    // m/s: settled contacts are slower
-constexpr double kSoon = 1e-3;     // s; time to the next touch of bodies still in contact, at most
-constexpr int kLimitings = 8;      // rounds for contacts that share bodies,
-constexpr double kOver = 1e-4;     // to this part of the force of a step
+constexpr double kSlowest = 1e-6;  // m/s; assumed for the step length if nothing approaches
+constexpr double kTaper = 0.05;    // time constant of a limited rebound over the compression time
+constexpr double kStill = 1e-3;    // m/s; maximum speed of settled contacts
+constexpr double kSoon = 1e-3;     // s; maximum time to the next touch of bodies still in contact
+constexpr int kLimitings = 8;      // iterations over contacts that share bodies,
+constexpr double kOver = 1e-4;     // relative to the force of a step
 
 bool is_finite(const Vec3& x) { return std::isfinite(x[0]) && std::isfinite(x[1]) && std::isfinite(x[2]); }
 
-/// Zero unless positive definite, as for a head without spin.
+/// Zero unless positive definite, as for a mallet head without spin.
 Mat3 invert_inertia(const Mat3& m) {
   const Mat3 minors{cross(m[1], m[2]), cross(m[2], m[0]), cross(m[0], m[1])};
   const double determinant = dot(m[0], minors[0]);
@@ -34,7 +34,7 @@ Mat3 invert_inertia(const Mat3& m) {
   return inverse;
 }
 
-/// A unit vector across `n`, along the axis that it is least along.
+/// Unit vector perpendicular to `n`, near the axis with its smallest component.
 Vec3 make_tangent(const Vec3& n) {
   const Vec3 axis = find_least_axis(n);
   const Vec3 t = axis - dot(axis, n) * n;
@@ -55,7 +55,7 @@ double Books::calc_error() const {
 
 Impact::Impact(std::vector<Body> bodies, const std::vector<Contact>& contacts, const Options& options)
     : above_band_(options.above_band), settling_s_(options.settling_s) {
-  check(!contacts.empty(), "there is no contact");
+  check(!contacts.empty(), "no contacts");
   check(options.steps_per_pulse >= 1.0 && options.longest_step_s > 0.0 && options.part_s >= 0.0, "options out of range");
   for (Body& body : bodies) place_body(std::move(body));
   for (const Contact& contact : contacts) add_contact(contact);
@@ -64,13 +64,13 @@ Impact::Impact(std::vector<Body> bodies, const std::vector<Contact>& contacts, c
   books_.start += calc_rigid_energy() + calc_spring_energies();
 }
 
-/// Adds a body, and the energy of its modes to the books.
+/// Adds a body and books the energy of its modes.
 void Impact::place_body(Body body) {
   check_body(body);
   const std::size_t modes = body.modes ? body.modes->size() : 0;
   if (body.q.empty()) body.q.assign(modes, 0.0);
   if (body.q_dot.empty()) body.q_dot.assign(modes, 0.0);
-  check(body.q.size() == modes && body.q_dot.size() == modes, "a modal state has another size than the modes");
+  check(body.q.size() == modes && body.q_dot.size() == modes, "modal state and modes differ in size");
   body.moved_m = body.turned_rad = {};
   body.impulse_n_s = body.couple_n_m_s = body.shift_n_s2 = body.turning_n_m_s2 = {};
   body.work_j = 0.0;
@@ -90,27 +90,29 @@ int Impact::join(const Body& body) {
 void Impact::check_contact(const Contact& contact) const {
   const auto count = static_cast<int>(bodies_.size());
   check(contact.a >= 0 && contact.a < count && contact.b >= -1 && contact.b < count && contact.a != contact.b,
-        "a contact names no two bodies");
-  check(std::abs(dot(contact.normal, contact.normal) - 1.0) < 1e-6, "a normal is not of length 1");
-  check(is_finite(contact.where_m) && std::isfinite(contact.gap_m), "a contact's place is not finite");
-  check(contact.spring.stiffness > 0.0 && std::isfinite(contact.spring.stiffness) && contact.spring.exponent >= 1.0, "a spring is not one");
-  check(contact.restitution >= 0.0 && contact.friction >= 0.0 && contact.tangential_ratio > 0.0, "a contact's law is out of range");
+        "contact does not name two different bodies");
+  check(std::abs(dot(contact.normal, contact.normal) - 1.0) < 1e-6, "normal is not a unit vector");
+  check(is_finite(contact.where_m) && std::isfinite(contact.gap_m), "contact position or gap is not finite");
+  check(contact.spring.stiffness > 0.0 && std::isfinite(contact.spring.stiffness) && contact.spring.exponent >= 1.0,
+        "invalid contact spring");
+  check(contact.restitution >= 0.0 && contact.friction >= 0.0 && contact.tangential_ratio > 0.0,
+        "restitution, friction or tangential ratio out of range");
   for (const bool first : {true, false}) {
     const int body = first ? contact.a : contact.b;
     const std::span<const double> shape = first ? contact.shape_a : contact.shape_b;
     check(shape.empty() || (body >= 0 && shape.size() == 3 * bodies_[body].q.size()),
-          "shape values of another number than the body's modes");
+          "number of shape values differs from the body's modes");
   }
 }
 
 void Impact::check_body(const Body& body) {
-  check(std::isfinite(body.mass_kg) && body.mass_kg >= 0.0, "a mass is negative or not finite");
+  check(std::isfinite(body.mass_kg) && body.mass_kg >= 0.0, "mass is negative or not finite");
   check(is_finite(body.centre_m) && is_finite(body.velocity_m_s) && is_finite(body.spin_rad_s) && is_finite(body.acceleration_m_s2) &&
             is_finite(body.spin_acceleration_rad_s2) && is_finite(body.inertia_kg_m2[0]) && is_finite(body.inertia_kg_m2[1]) &&
             is_finite(body.inertia_kg_m2[2]),
-        "a body's motion is not finite");
+        "motion of a body is not finite");
   for (const auto& row : body.mobility)
-    for (const double w : row) check(std::isfinite(w), "a mobility is not finite");
+    for (const double w : row) check(std::isfinite(w), "mobility is not finite");
 }
 
 void Impact::add_contact(const Contact& contact) {
@@ -127,14 +129,14 @@ void Impact::add_contact(const Contact& contact) {
   laws_.push_back(law);
   History& history = contacts_.emplace_back();
   history.given = contact;
-  history.given.shape_a = history.given.shape_b = {};  // now in modes_
+  history.given.shape_a = history.given.shape_b = {};  // stored in modes_
   history.is_limited = contact.is_limit && !(contact.shape_a.empty() && contact.shape_b.empty());
   history.pulse.contact = index;
   history.is_open = contact.gap_m > 0.0;
   history.yielded_m = contact.yielded_m;
 }
 
-/// Axes, mobilities and shape values of a contact, new or moved; its rows begin with `row`.
+/// Axes, mobilities and shape values of a new or moved contact; its rows begin with `row`.
 void Impact::place_contact(const Contact& contact, int index, int row) {
   const Vec3 n = contact.normal, t = make_tangent(n), axes[3] = {n, t, cross(n, t)};
   const int rows = contact.friction > 0.0 ? 3 : 1;
@@ -191,7 +193,7 @@ double Impact::calc_depth(int contact) const {
   return std::max(laws_[contact].compression_m, 0.0) + contacts_[contact].yielded_m + modes_.calc_displacement(laws_[contact].row);
 }
 
-/// Step length, hysteresis and anchor springs, from the elastic pulses that the rigid bodies would have. With h_ set: only of new contacts.
+/// Step length, hysteresis and anchor springs, from the elastic pulses of the rigid bodies. With h_ set: of new contacts only.
 void Impact::choose_step(const Options& options) {
   const std::size_t first = h_ > 0.0 ? laws_.size() - 1 : 0;
   std::vector<double> speed(laws_.size(), 0.0), inverse_mass(laws_.size(), 0.0);
@@ -210,7 +212,7 @@ void Impact::choose_step(const Options& options) {
   double shortest = options.longest_step_s * options.steps_per_pulse;
   for (std::size_t c = first; c < laws_.size(); ++c) {
     if (!(inverse_mass[c] > 0.0)) continue;
-    // A contact that only its neighbours push is taken at the fastest speed.
+    // A contact pushed only by its neighbours uses the fastest speed.
     const double v = speed[c] > 0.01 * fastest_ ? speed[c] : fastest_;
     const ElasticPulse pulse = set_law(static_cast<int>(c), inverse_mass[c], v);
     shortest = std::min(shortest, pulse.length_s);
@@ -222,7 +224,7 @@ void Impact::choose_step(const Options& options) {
   h_ = get_step(step_index_);
 }
 
-/// Hysteresis and anchor spring of a contact by its striking speed. Returns its elastic pulse.
+/// Hysteresis and anchor spring of a contact for its striking speed. Returns its elastic pulse.
 ElasticPulse Impact::set_law(int contact, double inverse_mass, double speed_m_s) {
   ContactLaw& law = laws_[contact];
   const ElasticPulse pulse = calc_elastic_pulse(law.spring, 1.0 / inverse_mass, speed_m_s);
@@ -236,7 +238,7 @@ ElasticPulse Impact::set_law(int contact, double inverse_mass, double speed_m_s)
   return pulse;
 }
 
-/// The energies of the spring and of its anchor stay. A pressed contact keeps its spring where the other one would be softer.
+/// Keeps the energies of the spring and its anchor. A compressed contact keeps its spring if the new one is softer.
 void Impact::exchange_spring(int contact, const Spring& spring) {
   ContactLaw& law = laws_[contact];
   History& history = contacts_[contact];
@@ -253,14 +255,14 @@ void Impact::exchange_spring(int contact, const Spring& spring) {
   law.tangential_n_m = tangential_n_m;
 }
 
-/// Open contacts are struck at their closing speed.
+/// Open contacts close with their current closing speed as the striking speed.
 void Impact::close_contacts() {
   for (std::size_t c = 0; c < laws_.size(); ++c) {
     const std::size_t row = laws_[c].row;
     if (!contacts_[c].is_open || !(laws_[c].compression_m - free_[row] > 0.0)) continue;
     contacts_[c].is_open = false;
     const double speed = -free_[row] / h_;
-    // The rebound is limited by the approach of the bodies; that of their modes counts for the first blow.
+    // The limit of the rebound is the approach of the bodies; the approach of their modes counts for the first blow only.
     const bool is_first = std::all_of(contacts_.begin(), contacts_.end(), [](const History& h) { return h.impulse_n_s == 0.0; });
     double& closing_m_s = contacts_[c].closing_m_s;
     if (contacts_[c].impulse_n_s == 0.0) closing_m_s = is_first ? speed : 0.0;
@@ -270,7 +272,7 @@ void Impact::close_contacts() {
   }
 }
 
-/// Propagators, A and the free motion of the first step with these contacts.
+/// Propagators, A and the free motion of the first step with the current contacts.
 void Impact::set_up_step() {
   const std::size_t n = rows_.size();
   A_.assign(n * n, 0.0);
@@ -290,15 +292,15 @@ void Impact::set_up_step() {
   modes_.set_up(step_index_, n, A_);
 }
 
-/// The forces of the step, within the restitution of each contact.
+/// Contact forces of the step, within the restitution limit of each contact.
 void Impact::solve_forces() {
   bool found = solver_.solve(laws_, A_, free_, h_, force_);
   for (int round = 0; round < kLimitings && limit_forces(); ++round) found = solver_.solve(laws_, A_, free_, h_, force_) && found;
   if (!found) ++misses_;
 }
 
-/// Bounds the normal forces of modes under which rigid bodies would part too fast at the end of the step; true with any. The distance to
-/// the limit falls as exp(-t / tau), without an audible cut of a force. Forces up to the end of the approach are unbounded.
+/// Bounds the normal forces of modes that would make rigid bodies separate too fast at the end of the step; true if any was bounded. The
+/// distance to the limit decays as exp(-t / tau), without an audible discontinuity of the force. Forces during the approach are unbounded.
 bool Impact::limit_forces() {
   const std::size_t n = rows_.size();
   bool any = false;
@@ -360,7 +362,7 @@ void Impact::step() {
     const auto row = t.row;
     const double before = t.compression_m;
     t.compression_m -= moved_[row];
-    // A contact without a force yields to further pressure: it takes up no energy, and gives back less than it has.
+    // A contact without force yields to further compression: it stores no energy and returns less than it holds.
     double &yielded = contacts_[c].yielded_m, &yielded_j = contacts_[c].yielded_j;
     const bool is_limited = std::isfinite(t.max_n);
     if (is_limited && t.compression_m > before) {
@@ -403,7 +405,7 @@ void Impact::step() {
       ++contacts_[c].silent;
     }
   }
-  // Rigid motion: accelerations of the step are constant.
+  // Rigid motion: constant acceleration during the step.
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
     Body& body = bodies_[b];
     if (!(body.mass_kg > 0.0)) continue;
@@ -439,7 +441,7 @@ void Impact::step() {
   quiet_ = struck ? 0 : quiet_ + 1;
 }
 
-/// True after all have parted, but for settled contacts and those that had their time.
+/// True after all contacts have separated, except settled contacts and those whose time is over.
 bool Impact::is_over() const {
   const double quiet_s = quiet_ * h_;
   if (quiet_s < part_s_) return false;
@@ -472,8 +474,8 @@ void Impact::join(const Contact& contact) {
 }
 
 void Impact::push(int body, const Vec3& velocity_m_s, const Vec3& spin_rad_s) {
-  check(body >= 0 && body < static_cast<int>(bodies_.size()), "there is no such body");
-  check(is_finite(velocity_m_s) && is_finite(spin_rad_s), "a push is not finite");
+  check(body >= 0 && body < static_cast<int>(bodies_.size()), "body index out of range");
+  check(is_finite(velocity_m_s) && is_finite(spin_rad_s), "velocity change is not finite");
   const double before = calc_rigid_energy();
   Body& b = bodies_[body];
   b.velocity_m_s = b.velocity_m_s + velocity_m_s;
@@ -482,17 +484,17 @@ void Impact::push(int body, const Vec3& velocity_m_s, const Vec3& spin_rad_s) {
 }
 
 void Impact::update(std::span<const Body> bodies, std::span<const Contact> contacts) {
-  check(bodies.size() == bodies_.size() && contacts.size() == contacts_.size(), "an update has other bodies or contacts");
+  check(bodies.size() == bodies_.size() && contacts.size() == contacts_.size(), "update has a different number of bodies or contacts");
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     check_body(bodies[b]);
-    check((bodies[b].mass_kg > 0.0) == (bodies_[b].mass_kg > 0.0), "an update frees or fixes a body");
-    check(bodies[b].on_joints == bodies_[b].on_joints, "an update puts a body on joints or takes it off them");
+    check((bodies[b].mass_kg > 0.0) == (bodies_[b].mass_kg > 0.0), "update frees or fixes a body");
+    check(bodies[b].on_joints == bodies_[b].on_joints, "update adds a body to joints or removes it from them");
   }
   for (std::size_t c = 0; c < contacts.size(); ++c) {
     check_contact(contacts[c]);
     check(contacts[c].a == contacts_[c].given.a && contacts[c].b == contacts_[c].given.b &&
               (contacts[c].friction > 0.0) == (contacts_[c].given.friction > 0.0),
-          "an update has other contacts");
+          "update has different contacts");
   }
   const double before = calc_rigid_energy();
   for (std::size_t b = 0; b < bodies.size(); ++b) {
@@ -532,7 +534,7 @@ void Impact::update(std::span<const Body> bodies, std::span<const Contact> conta
       contacts_[c].is_open = t.compression_m < 0.0;
     }
     if (!rubs) continue;
-    // The part of the anchor spring along the new normal is lost.
+    // The component of the anchor spring along the new normal is lost.
     t.stretch = {dot(stretch, rows_[row + 1].axis), dot(stretch, rows_[row + 2].axis)};
     books_.dissipated_friction +=
         0.5 * t.tangential_n_m * (dot(stretch, stretch) - t.stretch[0] * t.stretch[0] - t.stretch[1] * t.stretch[1]);
