@@ -1,5 +1,5 @@
-// Method: the real contact lasts a Hertz time from the touch on, so its pulse is centred half that time later. Where several spots share an
-//   impact, each carries its part of the mass.
+// Method: the real contact lasts one Hertz time from the touch, so its pulse is centred half that time later. If several spots share an
+// impact, each carries its share of the mass.
 // Source: J. O'Brien, C. Shen, C. Gatchalian, "Synthesizing sounds from rigid-body simulations" (2002), section 4.
 #include "runtime/physics/pulses.hpp"
 
@@ -14,11 +14,11 @@ namespace {
 
 using rigid::kSlowest;
 
-constexpr double kMasked = 0.01;    // of the largest impulse of the same instant: 40 dB below it
-constexpr double kHidden = 0.005;   // of an impulse of the same body before: 46 dB below it
-constexpr double kMaskTime = 0.05;  // s; in which the latter fades to 1/e
+constexpr double kMasked = 0.01;    // relative to the largest impulse of the same instant: -40 dB
+constexpr double kHidden = 0.005;   // relative to an earlier impulse of the same body: -46 dB
+constexpr double kMaskTime = 0.05;  // s; decay time (1/e) of the latter threshold
 
-/// 1/m_eff of the contact along the normal [1/kg], of the bodies as they were.
+/// 1/m_eff of the contact along the normal [1/kg], in the state before the impact.
 double calc_inverse_mass(const rigid::Space& space, const rigid::Strike& strike, const rigid::Hit& hit, const Vec3& where,
                          const Vec3& normal) {
   double sum = 0.0;
@@ -51,7 +51,7 @@ void add_spot(const rigid::Space& space, const rigid::Strike& strike, const std:
   normal = (1.0 / norm(normal)) * normal;
   const double inverse_mass =
       first.linked_mass_kg > 0.0 ? 1.0 / first.linked_mass_kg : calc_inverse_mass(space, strike, first, where, normal);
-  // A resting spot that the impact elsewhere hardly moved, or next to nothing of what sounds at the same instant.
+  // A resting spot hardly moved by the impact elsewhere, or negligible next to other pulses of the same instant.
   if (!(inverse_mass > 0.0) || push * inverse_mass < 0.2 * kSlowest || push < kMasked * max_push) return;
   const double speed = approach > kSlowest ? approach : push * inverse_mass;
   const double mass = std::min(push / ((1.0 + first.restitution) * speed), 1.0 / inverse_mass);
@@ -68,7 +68,7 @@ void add_spot(const rigid::Space& space, const rigid::Strike& strike, const std:
     const auto at = std::find(strike.bodies.begin(), strike.bodies.end(), body);
     const rigid::State& state = at == strike.bodies.end() ? space.state(body) : strike.before[at - strike.bodies.begin()];
     const double sign = side == 0 ? 1.0 : -1.0;
-    // Where one hit is alone, the place is known; where there are more, it is on the same face or near.
+    // The position of a single hit is known; several hits are on the same face or near it.
     const std::optional<geometry::Place>& known = first.places[side];
     const std::int32_t near = first.triangles[side];
     const Spotted place = known && hits.size() == 1 ? Spotted{known->triangle, known->barycentric}

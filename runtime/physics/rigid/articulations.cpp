@@ -1,4 +1,4 @@
-// Method: bodies on joints are moved in the coordinates of their mechanism: so joints stay closed to rounding.
+// Method: bodies on joints move in the coordinates of their mechanism, so joints stay closed to rounding.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 
 namespace carillon::rigid {
 
-/// One for each group of bodies that joints hold together. Fixed bodies are the world.
+/// One articulation per group of bodies connected by joints. Fixed bodies count as the world.
 void Bodies::make_articulations(const std::vector<joints::Joint>& joints) {
   if (joints.empty()) return;
   articulation_of_.assign(solids_.size(), -1);

@@ -1,4 +1,4 @@
-// Method: states, and frames that follow from them; mean properties of two bodies that touch.
+// Method: states, and frames derived from them; mean properties of two touching bodies.
 // Source: K. L. Johnson, "Contact mechanics" (1985), eq. 11.24.
 #include "runtime/physics/rigid/bodies.hpp"
 
@@ -39,7 +39,7 @@ void Bodies::place(int body) {
   const State& s = states_[body];
   double sum = 0.0;
   for (int k = 0; k < 3; ++k) sum += s.centre[k] + s.velocity[k] + s.momentum[k] + s.rotation[k];
-  if (!std::isfinite(sum)) throw SolveError(fmt::format("the motion of body {} is not finite after {:.6f} s", body, time_s_));
+  if (!std::isfinite(sum)) throw SolveError(fmt::format("motion of body {} is not finite after {:.6f} s", body, time_s_));
   placed_[body] = rigid::place(solids_[body], s);
 }
 

@@ -1,4 +1,4 @@
-// Method: Runge-Kutta of fourth order on the quaternion, the angular momentum constant.
+// Method: fourth-order Runge-Kutta on the quaternion at constant angular momentum.
 // Source: E. Hairer, G. Wanner, "Solving ordinary differential equations I" (1993), II.1.
 #include "runtime/physics/rigid/body.hpp"
 

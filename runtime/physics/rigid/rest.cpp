@@ -1,6 +1,6 @@
-// Method: a body that has been slow for a while sleeps if contact forces exist that balance it at rest. An island sleeps as a whole. Where
-//   others of the island move, bodies sleep by themselves, with the forces of the others on them as they are. These forces are watched:
-//   where they change by more than a part of its weight a sleeping body wakes, alone, and so may those that lean on it, one after another.
+// Method: a body that has been slow for a while sleeps if contact forces exist that balance it at rest. An island sleeps as a whole. If
+// other bodies of the island move, bodies sleep separately under the current forces of the others. These forces are monitored: if they
+// change by more than a fraction of its weight, the sleeping body wakes, and then possibly the bodies it supports, one after another.
 // Source: J. J. Moreau, "Unilateral contact and dry friction in finite freedom dynamics" (1988), the solution with zero velocities.
 #include "runtime/physics/rigid/rest.hpp"
 
@@ -15,11 +15,11 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr double kPatience = 0.02;  // s; slower than kSlow for so long, a body may be about to rest
-constexpr double kApart = 0.1;      // s; slow for so long, a body may sleep among others that move,
-constexpr double kCalm = 0.05;      // s; if those that it touches have been slow for so long
-constexpr double kStill = 5e-4;     // m/s; and nothing is faster where it touches
-constexpr double kShift = 0.05;     // of its weight: change of the forces on it that wakes it
+constexpr double kPatience = 0.02;  // s; minimum time below kSlowSpeedMS before a test of rest
+constexpr double kApart = 0.1;      // s; minimum slow time of a body that may sleep among moving ones,
+constexpr double kCalm = 0.05;      // s; and of the bodies that it touches,
+constexpr double kStill = 5e-4;     // m/s; with no faster contact
+constexpr double kShift = 0.05;     // fraction of the weight: change of the forces that wakes a body
 
 }  // namespace
 
@@ -46,12 +46,12 @@ bool Rest::try_articulation(Articulation& articulation, double length_s) {
   return true;
 }
 
-/// Puts an island, or a part of one on which others pull, to sleep if it is balanced at rest.
+/// Puts an island, or a part of one under external forces, to sleep if it is balanced at rest.
 Rest::Balance Rest::try_sleep(Island& island, double h, const std::vector<joints::Spatial>& pulls) {
   bool touches = !pulls.empty();
   double slow_s = std::numeric_limits<double>::infinity();
   for (const Pair* pair : island.pairs) {
-    if (pair->sag_m > kDeep) return Balance::none;  // it comes up first
+    if (pair->sag_m > kDeep) return Balance::none;  // must recover first
     touches = touches || pair->has_closed_gap();
   }
   bodies_.for_articulations(island.bodies, [&](const Articulation& articulation) { touches = touches || articulation.is_anchored; });
@@ -139,7 +139,7 @@ void Rest::try_parts() {
     if (is_one(pair->a) && is_one(pair->b) && pair->touches()) groups.join(pair->a, pair->b);
   struct Part {
     Island island;
-    std::vector<Pair*> bounds;  // to bodies that keep moving, with or without forces
+    std::vector<Pair*> bounds;  // pairs with bodies that keep moving, with or without forces
   };
   std::map<int, Part> parts;
   for (Pair* pair : windows_.near()) {
@@ -154,7 +154,7 @@ void Rest::try_parts() {
   for (int i = 0; i < bodies_.count(); ++i)
     if (is_one(i)) parts[groups.find(i)].island.bodies.push_back(i);
   for (auto& [first, part] : parts) {
-    if (part.bounds.empty()) continue;  // an island of its own: try_island() handles it
+    if (part.bounds.empty()) continue;  // a separate island: handled by try_island()
     std::vector<joints::Spatial> pulls(part.island.bodies.size());
     for (const Pair* pair : part.bounds) {
       const bool is_a = is_one(pair->a);
@@ -162,7 +162,7 @@ void Rest::try_parts() {
       for (const Contact& c : pair->contacts) add_pull(bodies_, c, is_a, c.calc_force(), pulls[at - part.island.bodies.begin()]);
     }
     for (Pair* pair : part.island.pairs) touches_.refresh(*pair);
-    // A part that stands without the others bears them as a fixed body does; one that leans on them, or is carried, is their load.
+    // A part that is stable without the others supports them like a fixed body; a part that leans on them, or is carried, is their load.
     const Balance found = try_sleep(part.island, options_.step_s, pulls);
     if (found == Balance::none) continue;
     for (Pair* pair : part.bounds)
@@ -174,7 +174,7 @@ void Rest::try_parts() {
   }
 }
 
-/// Wakes a body and all that touch it, and so on, or it alone.
+/// Wakes a body and all connected sleeping bodies, or it alone.
 std::vector<int> Rest::wake(int body, int by, bool alone) {
   std::vector<int> woken{body}, awake;
   while (!woken.empty()) {
@@ -195,7 +195,7 @@ std::vector<int> Rest::wake(int body, int by, bool alone) {
         if (!sleeps)
           c.rests = c.is_load = false;
         else if (dot((c.a == i ? 1.0 : -1.0) * c.rest_n, bodies_.gravity()) <= 0.0)
-          c.is_load = false;  // the sleeping body below it bears any load
+          c.is_load = false;  // the sleeping body below bears all loads
     }
     for (Pair& pair : touches_.cord_pairs()) {
       if (pair.a != i && pair.b != i) continue;
@@ -227,7 +227,7 @@ void Rest::watch(Pair& pair, double step_s) {
     const double approach = bodies_.calc_approach(c.touch, c.a, c.b);
     const double pull = (a_moves ? -1.0 : 1.0) * dot(bodies_.gravity(), c.touch.normal);
     const double fallen_m = 0.5 * std::max(pull, 0.0) * step_s * step_s;
-    // Where the two rest on each other, slow changes are left to wake_unbalanced().
+    // If the two rest on each other, slow changes are handled by wake_unbalanced().
     return (resting == 0 || approach > kSlowest) && c.touch.gap_m - approach * step_s - fallen_m <= kTouch;
   });
   if (comes) wake(body, by);

@@ -1,7 +1,7 @@
-// Method: the points of an impact and the contacts of their bodies are solved at once, with Newton's restitution and Coulomb's cone.
-// Source: B. Mirtich, "Impulse-based dynamic simulation of rigid body systems" (1996).
-//   V. Smith et al., "Reflections on simultaneous impact", ACM Trans. Graph. 31 (2012), for rows.
-// Deviations: impulses are scaled back where friction and restitution together would gain energy.
+// Method: the points of an impact and the contacts of their bodies are solved simultaneously, with Newton's restitution and Coulomb's cone.
+// Impulses are scaled down if friction and restitution together would gain energy.
+// Source: B. Mirtich, "Impulse-based dynamic simulation of rigid body systems" (1996); V. Smith et al., "Reflections on simultaneous
+// impact", ACM Trans. Graph. 31 (2012), for rows.
 #include "runtime/physics/rigid/rigid_impact.hpp"
 
 #include <algorithm>
@@ -16,12 +16,12 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr int kFewPoints = 8;   // of an impact that is solved to rounding, its load shared evenly
-constexpr double kRow = 0.9;    // least restitution in a row that passes a blow on,
-constexpr int kMaxBlows = 100;  // with so many impacts of each of its contacts at most
-constexpr int kFar = 3;         // bodies from one that strikes to the last one that may be moved
+constexpr int kFewPoints = 8;   // maximum points of an impact solved to rounding, with evenly shared load
+constexpr double kRow = 0.9;    // minimum restitution in a row that transmits a blow,
+constexpr int kMaxBlows = 100;  // maximum impacts per contact
+constexpr int kFar = 3;         // bodies from the striking one to the last one moved
 
-/// With friction Newton's restitution can gain energy (Kane 1984): the part of all impulses with which it does not.
+/// With friction Newton's restitution can gain energy (Kane 1984): the fraction of all impulses that does not.
 double calc_conserving_part(const std::vector<Mover>& before, const std::vector<Mover>& after, const std::vector<Point>& points) {
   double linear = 0.0, square = 0.0;
   for (const Point& p : points) {
@@ -99,16 +99,16 @@ Hit RigidImpact::make_hit(const Collision& collision, const Contact& c, Point& p
   if (hit.is_cord) {
     hit.restitution = c.touching ? 0.0 : touches_.cord(c.cord).restitution;
   } else if (!c.is_closed()) {
-    // A rebound whose flight, 2 e v / g, is shorter than the contact itself is none: weight keeps the surfaces together.
+    // A rebound whose flight time 2 e v / g is shorter than the contact time does not occur: gravity keeps the surfaces together.
     const double e = bodies_.calc_restitution(c.a, c.b), mass = 1.0 / dot(p.normal, calc_mobility(collision.movers, p) * p.normal);
     const double pull = std::abs(dot(bodies_.gravity(), p.normal)), flight = 2.0 * e * hit.approach_m_s;
     hit.restitution = flight > pull * bodies_.calc_contact_time(hit.touch, hit.a, hit.b, mass, hit.approach_m_s) ? e : 0.0;
   }
-  p.wanted = (hit.restitution * hit.approach_m_s) * p.normal;  // across, it may stick where it stops
+  p.wanted = (hit.restitution * hit.approach_m_s) * p.normal;  // tangentially it may stick where it stops
   return hit;
 }
 
-/// Bodies that touch at one point each, two others at most: a blow goes through them as a wave.
+/// Bodies that touch at most two others at one point each: a blow propagates through them as a wave.
 bool RigidImpact::is_row(const Collision& collision) const {
   std::map<int, int> others;
   std::set<std::pair<int, int>> pairs;
@@ -121,7 +121,7 @@ bool RigidImpact::is_row(const Collision& collision) const {
   return pairs.size() > 1;
 }
 
-/// One contact at a time, the one that closes fastest, until none closes.
+/// One contact at a time, the fastest closing one first, until none closes.
 void RigidImpact::solve_row(Collision& collision) const {
   std::vector<Point>& points = collision.points;
   const auto calc_approach = [&](const Point& p) { return -dot(calc_relative_velocity(collision.movers, p), p.normal); };
@@ -179,7 +179,7 @@ Strike RigidImpact::apply(Collision& collision, double& lost_j) {
   };
   for (const int body : moved) strike.before.push_back(bodies_.state(body));
   const double before_j = calc_kinetic();
-  // Calls with the impulses of all hits on moving bodies.
+  // Passes the impulses of all hits on moving bodies.
   const auto for_impulses = [&](const auto& act) {
     for (int n = 0; const Hit& hit : strike.hits) {
       const Point& p = collision.points[n++];

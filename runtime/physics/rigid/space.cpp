@@ -1,4 +1,4 @@
-// Method: the loop over windows, steps, islands and the impacts within a step; the stages do the rest.
+// Method: loop over windows, steps, islands and the impacts within a step; the work is done by the stages.
 #include "runtime/physics/rigid/space.hpp"
 
 #include <algorithm>
@@ -13,14 +13,14 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr double kShortest = 1e-9;  // s; a shorter rest of a step is left out
-constexpr double kStruck = 5e-5;    // s; longest part of a step after the begin of an impact with modes
-constexpr int kMaxMissed = 30;      // in a step: instants at which nothing struck after all
+constexpr double kShortest = 1e-9;  // s; shorter remainders of a step are skipped
+constexpr double kStruck = 5e-5;    // s; longest part of a step after the start of a modal impact
+constexpr int kMaxMissed = 30;      // per step: instants at which no touch struck
 constexpr int kMaxSought = 3;       // of these, with a search for closings on the path
-constexpr int kMaxCompleted = 4;    // solutions of a step that are repeated with touches that were missing
-constexpr int kMaxImpacts = 4;      // of an island in a step, each at its instant; an island with more is crowded
-constexpr int kMinImpacts = 2;      // the same of the largest islands, each of whose impacts costs more
-constexpr int kStruckBodies = 48;   // bodies of an island times its impacts in a step
+constexpr int kMaxCompleted = 4;    // repeated solutions of a step with missing touches added
+constexpr int kMaxImpacts = 4;      // individual impacts of an island per step; an island with more is crowded
+constexpr int kMinImpacts = 2;      // the same for the largest islands, whose impacts cost more
+constexpr int kStruckBodies = 48;   // bodies of an island times its impacts per step
 
 }  // namespace
 
@@ -127,7 +127,7 @@ void Space::step_island(Island& island, double start_s, double length_s) {
       if (!touches_.complete(step_, missed < kMaxSought)) break;
       is_completed = true;
     }
-    // A row stops a touch only at the end of a step, half of its way too deep: missing touches strike at the beginning instead.
+    // A row stops a touch only at the end of a step, half of its movement too deep: missing touches strike at the start instead.
     if (is_completed && impacts >= max_impacts && more++ < kMaxCompleted && strike_at_once(start_s + done, h)) continue;
     double at = h;
     std::vector<ContactRef> first;
@@ -144,7 +144,7 @@ void Space::step_island(Island& island, double start_s, double length_s) {
       if (instants_.confirm(step_, first, length_s - done, kDeep * (1 + missed))) {
         strike(first);
         if (++impacts == max_impacts) instants_.set_crowded(island, start_s + length_s);
-      } else if ((missed += at > kShortest ? 1 : missed + 1) > kMaxMissed) {  // an instant that is now would be missed again
+      } else if ((missed += at > kShortest ? 1 : missed + 1) > kMaxMissed) {  // an immediate instant would be missed again
         impacts = max_impacts;
       }
     }
@@ -154,8 +154,8 @@ void Space::step_island(Island& island, double start_s, double length_s) {
   step_.end();
 }
 
-/// Puts an island to sleep if contact forces balance it: first with its bodies moved apart to kDeep, then as it is. If neither balances, no
-/// body is displaced: bodies that fall back from a lift would never come to rest.
+/// Puts an island to sleep if contact forces balance it: first with its bodies separated to kDeepM, then unchanged. If neither balances, no
+/// body is displaced: bodies falling back from a displacement would never come to rest.
 bool Space::try_rest(Island& island, double length_s) {
   std::vector<State> kept;
   std::vector<std::pair<double, Pair::Errors>> kept_pairs;
@@ -164,7 +164,7 @@ bool Space::try_rest(Island& island, double length_s) {
   Books before, after;
   ledger_.add_to(before);
   const std::int64_t pushes = ledger_.costs.pushes;
-  // A body that has come to lie may have more touches than the one on which it rocked.
+  // A body that has come to rest may have more touches than while rocking.
   for (Pair* pair : island.pairs) {
     if (pair->b >= 0 || pair->contacts.size() != 1 || !pair->touches()) continue;
     pair->memory.known = false;
@@ -187,7 +187,7 @@ bool Space::try_rest(Island& island, double length_s) {
   return rest_.try_island(island, length_s);
 }
 
-/// The impacts of a crowded island: all touches closing within a step strike at its beginning. False: none closes, touches unchanged.
+/// Impacts of a crowded island: all touches that close within a step strike at its start. False: none closes, touches unchanged.
 bool Space::strike_at_once(double start_s, double length_s) {
   bodies_.set_time(start_s);
   step_.together_s = length_s;
@@ -199,19 +199,19 @@ bool Space::strike_at_once(double start_s, double length_s) {
   return true;
 }
 
-/// Takes the bodies of an island through the part of a step that is made.
+/// Advances the bodies of an island through the completed part of a step.
 void Space::move(double to_s, double part_s) {
   const double before_j = bodies_.calc_energy(step_.island().bodies);
   std::vector<State> moved;
-  std::vector<char> in_impact;  // one that ends in this part has been moved by it, too
-  double loads_j = 0.0;         // work of sleeping bodies that lie on them
+  std::vector<char> in_impact;  // includes impacts that end in this part, which have moved their bodies
+  double loads_j = 0.0;         // work of sleeping bodies supported by these
   for (int n = 0; n < step_.count(); ++n) {
     in_impact.push_back(bodies_.is_moved_by_impact(step_.body(n)) ? 1 : 0);
     const bool is_free = step_.free[n].articulation < 0;
     moved.push_back(is_free ? step_.calc_moved(n, part_s) : State{});
     if (is_free && in_impact.back() == 0) loads_j += step_.calc_load_work(n, moved.back(), part_s);
   }
-  ledger_.lose(-loads_j);  // a load does not fall with its support until it wakes, within kDeep: this energy comes from nowhere
+  ledger_.lose(-loads_j);  // a load does not descend with its support until it wakes, within kDeepM: this energy is a gain
   std::vector<const ArticulationStep*> flown;
   for (const ArticulationStep& a : step_.articulations)
     if (a.articulation->struck < 0) flown.push_back(&a);
@@ -229,7 +229,7 @@ void Space::move(double to_s, double part_s) {
   if (!has_impacts) problem_.remove_gain(step_, before_j + loads_j);
 }
 
-/// All that strikes now, as rigid bodies or with modes.
+/// Applies all current strikes, rigid or modal.
 void Space::strike(const std::vector<ContactRef>& first) {
   ++ledger_.costs.impacts;
   std::vector<ContactRef> contacts = rigid_impact_.gather(step_, first);

@@ -1,4 +1,4 @@
-// Method: a search with a margin of several steps' movement; touches are followed until their pair may have moved by it.
+// Method: search with a margin of several steps' movement; touches are followed until their pair may have moved by the margin.
 // Source: runtime/physics/geometry/touch.hpp.
 #include "runtime/physics/rigid/touch_sets.hpp"
 
@@ -15,16 +15,16 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr double kSteps = 4.0;             // of movement in the margin of a search,
-constexpr double kStepsOfRolling = 8.0;    // the same of curved bodies on the ground: few places come near
-constexpr double kAhead = 4e-3;            // s; longest look-ahead of these
-constexpr double kSearchAgain = 2e-3;      // s; between searches for missing touches of a pair
-constexpr double kSame = 0.02;             // of the size: distance of touches counted as one
-constexpr double kOnePlace = 1e-4;         // of the size: touches nearer than this have come to one place
-constexpr double kJump = 0.2;              // rad; turn of the normal in the body by which a touch has jumped
+constexpr double kSteps = 4.0;             // steps of movement in the margin of a search,
+constexpr double kStepsOfRolling = 8.0;    // the same for curved bodies on the ground, where few points come near
+constexpr double kAhead = 4e-3;            // s; maximum look-ahead of these
+constexpr double kSearchAgain = 2e-3;      // s; interval of searches for missing touches of a pair
+constexpr double kSame = 0.02;             // fraction of the size: maximum distance of identical touches
+constexpr double kOnePlace = 1e-4;         // fraction of the size: maximum distance of merged touches
+constexpr double kJump = 0.2;              // rad; rotation of the normal in the body by which a touch has jumped
 constexpr double kSagDecay = 10e-3;        // s
-constexpr int kMaxAdded = 4;               // missing touches at the end of a flight
-constexpr double kDeepForThickness = 0.1;  // of the thickness: bodies deeper than this are searched apart
+constexpr int kMaxAdded = 4;               // missing touches added at the end of a flight
+constexpr double kDeepForThickness = 0.1;  // fraction of the thickness: bodies with deeper penetration are searched apart
 
 /// Lower bound of the gap of any vertex of a body over the ground, from that at an earlier frame.
 double calc_least_gap(const Pair& pair, const geometry::Shape& shape, const geometry::Frame& now) {
@@ -83,7 +83,7 @@ void TouchSets::search(Pair& pair, double step_s) {
   pair.searched = true;
   const std::vector<Contact> old = std::exchange(pair.contacts, {});
   pair.ahead.touches.clear();
-  for (geometry::Touch& last : pair.memory.last) {  // names follow touches on their way
+  for (geometry::Touch& last : pair.memory.last) {  // ids follow touches along their path
     const auto at = std::find_if(old.begin(), old.end(), [&](const Contact& c) { return c.touch.id == last.id; });
     if (at != old.end()) last = move(at->touch, pair.apart_m);
   }
@@ -91,17 +91,18 @@ void TouchSets::search(Pair& pair, double step_s) {
   const geometry::Shape& a = *bodies_.get_shape(pair.a);
   const geometry::Frame frame_a = bodies_.get_frame(pair.a);
   if (pair.b < 0)
-    geometry::find_ground_touches(a, frame_a, bodies_.ground()->height_m, margin_m, pair.memory, found_, bodies_.is_moved_by_impact(pair.a));
+    geometry::find_ground_touches(a, frame_a, bodies_.ground()->height_m, margin_m, pair.memory, found_,
+                                  bodies_.is_moved_by_impact(pair.a));
   else
     geometry::find_touches(a, move(frame_a, pair.apart_m), *bodies_.get_shape(pair.b), bodies_.get_frame(pair.b), margin_m, pair.memory,
-                        found_);
+                           found_);
   for (geometry::Touch& touch : found_) {
     if (pair.apart_m != Vec3{}) touch = move(touch, -1.0 * pair.apart_m);
     const auto same = std::find_if(old.begin(), old.end(), [&](const Contact& c) { return c.touch.id == touch.id; });
     Contact contact;
     if (same != old.end()) {
       contact = *same;
-      if (is_jump(pair, same->touch, touch)) contact.touching = false;  // another place has its name, and may strike
+      if (is_jump(pair, same->touch, touch)) contact.touching = false;  // its id has moved to another point, which may strike
     } else {
       contact.a = pair.a;
       contact.b = pair.b;
@@ -110,19 +111,19 @@ void TouchSets::search(Pair& pair, double step_s) {
     contact.touch = touch;
     pair.contacts.push_back(contact);
   }
-  if (pair.b < 0 || !bodies_.is_flat(pair.a) || !bodies_.is_flat(pair.b)) keep_lost(pair, old);  // those of polyhedra are complete
+  if (pair.b < 0 || !bodies_.is_flat(pair.a) || !bodies_.is_flat(pair.b)) keep_lost(pair, old);  // touch sets of polyhedra are complete
   remove_false(pair);
   complete(pair, frame_a, bodies_.get_frame(pair.b), 0.0);
 }
 
-/// Keeps touches that a search has lost. Between two bodies: those that touched and are within kDeep. With the ground: closed ones that
-/// carry, sharp closed ones, and any deeper than all found.
+/// Keeps touches that a search has lost. Between two bodies: those that touched and are within kDeepM. With the ground: closed load-bearing
+/// ones, closed corners, and any deeper than all found.
 void TouchSets::keep_lost(Pair& pair, const std::vector<Contact>& old) const {
   const geometry::Frame a = bodies_.get_frame(pair.a), b = bodies_.get_frame(pair.b);
   double least_m = pair.margin_m;
   for (const Contact& c : pair.contacts) least_m = std::min(least_m, c.touch.gap_m);
   const double near_m = kSame * bodies_.calc_size(pair.a, pair.b);
-  const auto is_between = [&](const geometry::Touch& touch) {  // two closed ones, which carry without it
+  const auto is_between = [&](const geometry::Touch& touch) {  // between two closed ones, which bear the load without it
     for (const geometry::Touch& f : found_)
       for (const geometry::Touch& g : found_)
         if (std::max(f.gap_m, g.gap_m) <= kTouch && dot(f.where_m - touch.where_m, g.where_m - touch.where_m) < 0.0) return true;
@@ -141,7 +142,7 @@ void TouchSets::keep_lost(Pair& pair, const std::vector<Contact>& old) const {
   }
 }
 
-/// Touches of curved surfaces that have come to one place become one.
+/// Merges touches of curved surfaces that have reached the same point.
 void TouchSets::merge(Pair& pair) const {
   const double near_m = kOnePlace * bodies_.calc_size(pair.a, pair.b);
   for (auto c = pair.contacts.begin(); c != pair.contacts.end();) {
@@ -161,7 +162,7 @@ void TouchSets::merge(Pair& pair) const {
   }
 }
 
-/// Has a touch gone to another part of its surface?
+/// True if a touch has moved to another part of its surface.
 bool TouchSets::is_jump(const Pair& pair, const geometry::Touch& from, const geometry::Touch& to) const {
   const double way_m = geometry::calc_travel(from, to);
   return way_m > kSame * bodies_.calc_size(pair.a, pair.b) && way_m * from.steepest_per_m > kJump;
@@ -192,8 +193,9 @@ void TouchSets::remove_false(Pair& pair) const {
   const auto erased = std::erase_if(pair.contacts, [&](const Contact& c) {
     if (!c.touch.smooth || !(c.touch.gap_m < -kTooDeep)) return false;
     const geometry::Touch touch = move(c.touch, pair.apart_m);
-    return touch.gap_m < -kTooDeep && !geometry::is_overlap(touch, *bodies_.get_shape(pair.a), move(bodies_.get_frame(pair.a), pair.apart_m),
-                                                         *bodies_.get_shape(pair.b), bodies_.get_frame(pair.b));
+    return touch.gap_m < -kTooDeep &&
+           !geometry::is_overlap(touch, *bodies_.get_shape(pair.a), move(bodies_.get_frame(pair.a), pair.apart_m),
+                                 *bodies_.get_shape(pair.b), bodies_.get_frame(pair.b));
   });
   if (erased == 0) return;
   pair.ahead.touches.clear();
@@ -219,7 +221,7 @@ void TouchSets::update(Pair& pair, double step_s) {
   limit_apart(pair);
 }
 
-/// The touch with the least gap at the frames `a` and `b`, with the bodies apart, and that gap; none: infinite.
+/// Touch with the least gap at the frames `a` and `b`, with the bodies apart, and that gap; none: infinite.
 std::pair<Contact*, double> TouchSets::find_least(Pair& pair, const geometry::Frame& a, const geometry::Frame& b) const {
   std::pair<Contact*, double> least{nullptr, std::numeric_limits<double>::infinity()};
   pair.ahead.a = a;
@@ -237,7 +239,7 @@ std::pair<Contact*, double> TouchSets::find_least(Pair& pair, const geometry::Fr
   return least;
 }
 
-/// Adds the deepest place of a pair at the frames `a` and `b`, `closing_s` later (0: unused), if it is deeper than all touches. True for an
+/// Adds the deepest point of a pair at the frames `a` and `b`, `closing_s` later (0: unused), if it is deeper than all touches. True for an
 /// addition, and for a closing deepest touch.
 bool TouchSets::complete(Pair& pair, const geometry::Frame& a, const geometry::Frame& b, double closing_s) {
   const geometry::Shape& mine = *bodies_.get_shape(pair.a);
@@ -248,7 +250,7 @@ bool TouchSets::complete(Pair& pair, const geometry::Frame& a, const geometry::F
     deepest = geometry::find_lowest(mine, a, bodies_.ground()->height_m);
     pair.measured = a;
     pair.lowest_m = deepest.gap_m;
-    if (deepest.gap_m - mine.get_sag_m() >= -kMissing) return false;  // nor is any touch deeper
+    if (deepest.gap_m - mine.get_sag_m() >= -kMissing) return false;  // no touch is deeper either
   } else {
     deepest = geometry::find_deepest(mine, move(a, pair.apart_m), *theirs, b, -kMissing, pair.memory);
     if (deepest.gap_m >= -kMissing) return false;
@@ -260,7 +262,7 @@ bool TouchSets::complete(Pair& pair, const geometry::Frame& a, const geometry::F
   return std::exchange(lowest->closes_s, closing_s * lowest->touch.gap_m / (lowest->touch.gap_m - least_m)) < 0.0;
 }
 
-/// The touch of a place, as the bodies are now.
+/// Adds the touch of a point at the current poses.
 void TouchSets::add(Pair& pair, const geometry::Deepest& deepest) {
   const geometry::Shape& mine = *bodies_.get_shape(pair.a);
   const geometry::Frame a = bodies_.get_frame(pair.a), b = bodies_.get_frame(pair.b);
@@ -273,7 +275,7 @@ void TouchSets::add(Pair& pair, const geometry::Deepest& deepest) {
                     : move(geometry::make_touch(mine, move(a, pair.apart_m), *bodies_.get_shape(pair.b), b, deepest), -1.0 * pair.apart_m);
   const auto same =
       std::find_if(pair.contacts.begin(), pair.contacts.end(), [&](const Contact& c) { return c.touch.id == added.touch.id; });
-  if (same != pair.contacts.end()) {  // it has travelled away from its place
+  if (same != pair.contacts.end()) {  // it has moved away from its point
     same->touch = added.touch;
     return;
   }
@@ -334,7 +336,7 @@ geometry::Touch TouchSets::find_closing(Pair& pair, const Contact& contact, doub
   return touch;
 }
 
-/// Upper bound of the approach of any two points in `time_s` of a step; over the ground vertical motion alone counts.
+/// Upper bound of the approach of any two points in `time_s` of a step; over the ground only vertical motion counts.
 double TouchSets::calc_way(const Pair& pair, double time_s, double step_s) const {
   const bool is_over_ground = pair.b < 0 && bodies_.moves(pair.a);
   const double speed = is_over_ground ? bodies_.calc_sinking_speed(pair.a) : bodies_.calc_closing_speed(pair.a, pair.b);
@@ -352,7 +354,7 @@ void TouchSets::part(Pair& pair, double depth_m, const Vec3& normal) const {
   pair.apart_m = pair.b >= 0 && depth_m > kDeepForThickness * bodies_.calc_thickness(pair.a, pair.b) ? depth_m * normal : Vec3{};
 }
 
-/// The bodies of a pair are as far apart as is explained now.
+/// Limits the separation of a pair in searches to the currently explained depth.
 void TouchSets::limit_apart(Pair& pair) const {
   if (pair.apart_m != Vec3{}) part(pair, std::max(pair.sag_m, impacts_.calc_depth(pair)), carillon::normalise(pair.apart_m));
 }

@@ -1,7 +1,6 @@
-// Method: windows, in which bodies that can meet nothing fly; boxes that hold all that a body may reach in one give the pairs that are
-//   near.
+// Method: windows in which bodies that can meet nothing fly; boxes of the space that each body may reach in a window give the near pairs. A
+// body accelerated by an impact beyond its planned speed is checked again.
 // Source: B. Mirtich, "Impulse-based dynamic simulation of rigid body systems" (1996): bounds of reach, flight in closed form.
-// Deviations: windows have a length; a body that an impact makes faster than planned is checked again.
 #include "runtime/physics/rigid/windows.hpp"
 
 #include <algorithm>
@@ -16,21 +15,21 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr double kMaxSteps = 1024;        // of a window
-constexpr double kThin = 0.15;            // of the thickness of the thinner body: a pair that moves as far in a long step takes short ones
-constexpr double kSag = 5e-6;             // m; a point on an arc may leave its chord by this in a step,
-constexpr double kSagOfThickness = 5e-4;  // or by so much of the thickness of its body
-constexpr double kRolls = 4.0;            // times the arc bounded by the box of a body: keeps long rolling bodies within 50 um
-constexpr double kFlatSteps = 2.0;        // times the step of others: that of groups in which flat bodies alone touch
-constexpr double kRoom = 1e-4;            // m; excess of boxes
-// A body that rolls by itself on smooth touches takes longer steps:
+constexpr double kMaxSteps = 1024;  // per window
+constexpr double kThin = 0.15;      // fraction of the thinner body's thickness: a pair that moves this far in a long step takes short ones
+constexpr double kSag = 5e-6;       // m; permitted deviation of a point on an arc from its chord in a step,
+constexpr double kSagOfThickness = 5e-4;  // the same relative to the thickness of its body
+constexpr double kRolls = 4.0;            // times the arc bounded by a body's box: keeps long rolling bodies within 50 um
+constexpr double kFlatSteps = 2.0;        // times the step of others: for groups with flat contacts only
+constexpr double kRoom = 1e-4;            // m; enlargement of boxes
+// A body that rolls alone on smooth touches takes longer steps:
 constexpr double kRollingSteps = 4.0;  // longest step, times options.step_s
-constexpr double kCalm = 10e-3;        // s; time without an impact before it does
-constexpr double kNear = 0.02;         // of its size,
-constexpr double kAlong = 3.0;         // or travels of its touches in a window: no vertex farther from them may come down
-constexpr double kDrift = 5e-7;        // m; largest change of a gap in a step
-constexpr double kTurn = 0.05;         // rad; largest turn of a normal in the body in a step
-constexpr double kSpan = 0.25;         // of its size: touches farther apart keep it from hopping
+constexpr double kCalm = 10e-3;        // s; required time without an impact
+constexpr double kNear = 0.02;         // fraction of its size,
+constexpr double kAlong = 3.0;         // or touch travel per window: no vertex farther from the touches may come down
+constexpr double kDrift = 5e-7;        // m; maximum change of a gap per step
+constexpr double kTurn = 0.05;         // rad; maximum rotation of a normal in the body per step
+constexpr double kSpan = 0.25;         // fraction of its size: touches farther apart prevent hopping
 
 bool overlap(const geometry::Box& x, const geometry::Box& y) {
   for (int k = 0; k < 3; ++k)
@@ -105,7 +104,7 @@ void Windows::open(double end_s, const std::list<ModalImpact>& impacts) {
   open_cords();
   for (const ModalImpact& impact : impacts)
     for (const int body : impact.bodies) active_[body] = 1;
-  // One that may meet something keeps all of its articulation from flying.
+  // A member that may meet something prevents the flight of the whole articulation.
   for (const Articulation& articulation : bodies_.articulations())
     if (std::any_of(articulation.bodies.begin(), articulation.bodies.end(), [&](int body) { return active_[body] != 0; }))
       for (const int body : articulation.bodies) active_[body] = 1;
@@ -113,7 +112,7 @@ void Windows::open(double end_s, const std::list<ModalImpact>& impacts) {
   touches_.forget_far(number_);
 }
 
-/// Cords that may be taut within the window; their bodies do not fly.
+/// Cords that may become taut within the window; their bodies do not fly.
 void Windows::open_cords() {
   for (Pair& pair : touches_.cord_pairs()) {
     if (!bodies_.moves(pair.a) && !bodies_.moves(pair.b)) continue;
@@ -169,7 +168,7 @@ void Windows::fly(Articulation& articulation) {
   ledger_.costs.body_steps += static_cast<std::int64_t>(articulation.bodies.size());
 }
 
-/// Joins groups with sleeping bodies between them: an impact that wakes these makes one group of them within the window.
+/// Joins groups connected by sleeping bodies: an impact that wakes these merges the groups within the window.
 void Windows::join_sleeping(Groups& groups) const {
   const auto join = [&](const Pair& pair) {
     if (!bodies_.is_fixed(pair.a) && !bodies_.is_fixed(pair.b)) groups.join(pair.a, pair.b);
@@ -183,12 +182,12 @@ void Windows::join_sleeping(Groups& groups) const {
     for (const int body : articulation.bodies) groups.join(articulation.bodies.front(), body);
 }
 
-/// Finds bodies that roll by themselves and their number of steps from the errors of the last window. The change of a gap grows with the
+/// Finds bodies that roll alone and their number of steps from the errors of the last window. The change of a gap is proportional to the
 /// cube of the step.
 void Windows::find_rolling(Groups& groups) {
   const int count = bodies_.count();
   const double most = get_length() / options_.step_s;
-  const auto find_steps = [&](int body) { return rolling_[body].steps > 0 ? rolling_[body].steps : most; };  // of the last window
+  const auto find_steps = [&](int body) { return rolling_[body].steps > 0 ? rolling_[body].steps : most; };  // in the last window
   std::vector<int> sizes(count, 0);
   for (int i = 0; i < count; ++i) ++sizes[groups.find(i)];
   std::vector<char> rolls(count, 0), touches(count, 0);
@@ -197,7 +196,7 @@ void Windows::find_rolling(Groups& groups) {
     rolls[i] = bodies_.moves(i) && sizes[groups.find(i)] == 1 && !bodies_.is_flat(i) && bodies_.find_articulation(i) == nullptr &&
                start_s_ - bodies_.get_struck_s(i) > kCalm;
   }
-  std::vector<double> errors(count, 0.0);  // over those allowed
+  std::vector<double> errors(count, 0.0);  // relative to the permitted ones
   std::vector<Vec3> stations;
   for (Pair* pair : near_) {
     const int body = bodies_.moves(pair->a) ? pair->a : pair->b;
@@ -254,7 +253,7 @@ void Windows::choose_steps() {
   for (const Pair* pair : near_) {
     const int body = bodies_.moves(pair->a) ? pair->a : pair->b;
     if (!bodies_.moves(body)) continue;
-    // Bodies that are fast for their size must not pass through each other between two searches, and thin ones must not sink in.
+    // Bodies that are fast for their size must not pass through each other between searches, and thin ones must not sink in.
     const double speed = bodies_.calc_closing_speed(pair->a, pair->b) + g * length_s;
     ask(body, 2.0 * length_s * speed / (kReach * bodies_.calc_size(pair->a, pair->b)));
     if (rolling_[body].asked > 0.0) continue;
@@ -264,14 +263,14 @@ void Windows::choose_steps() {
   for (int i = 0; i < count; ++i) {
     if (!bodies_.moves(i)) continue;
     if (bodies_.find_articulation(i) != nullptr || bodies_.is_moved_by_impact(i)) ask(i, length_s / options_.step_s);
-    // The arc of a point leaves its chord by w v h^2 / 2 within a step, v its speed by the spin w, at most w times the radius.
+    // A point on an arc leaves its chord by w v h^2 / 2 within a step, with v its speed due to the spin w, at most w times the radius.
     const Solid& solid = bodies_.solid(i);
     const double sag = std::max(kSag, kSagOfThickness * solid.shape->get_thickness_m());
     const double spin = norm(bodies_.placed(i).spin);
     const double rolls = rolling_[i].asked > 0.0 && rolling_[i].spans ? 1.0 : kRolls;
     ask(i, length_s * std::sqrt(spin * std::min(rolls * bodies_.calc_turning_speed(i), spin * solid.radius_m) / (2.0 * sag)));
   }
-  // Powers of two: then the steps of a group are the same whatever others ask for.
+  // Powers of two: the steps of a group do not depend on other groups.
   const auto round = [](double n) {
     return static_cast<int>(std::bit_ceil(static_cast<unsigned>(std::ceil(std::min(n, kMaxSteps) - 1e-6))));
   };
@@ -347,7 +346,8 @@ void Windows::wake(int body, int by) {
   reach_m_s_[body] = norm(bodies_.gravity()) * kLength;
 }
 
-/// Moves a body that flew to the end of the window back to the end of the present step of the body that may meet it, whose steps it takes.
+/// Moves a body that flew to the end of the window back to the end of the current step of the body that may meet it, and gives it the same
+/// steps.
 void Windows::undo_flight(int body, int by) {
   if (body < 0 || !flying_[body]) return;
   const double flown_s = find_time(step_ + strides_[by]) - start_s_;
@@ -366,7 +366,7 @@ void Windows::undo_flight(int body, int by) {
 void Windows::extend(int body) {
   bodies_.note_struck(body);
   const double left = end_s_ - bodies_.get_time();
-  const double others_left = end_s_ - get_time();  // of islands whose step is still to be made
+  const double others_left = end_s_ - get_time();  // remaining time of islands that have not been stepped
   const double speed = bodies_.calc_speed(body) + norm(bodies_.gravity()) * left;
   if (speed <= reach_m_s_[body]) return;
   reach_m_s_[body] = speed;
