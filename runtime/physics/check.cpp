@@ -13,7 +13,7 @@
 namespace carillon::physics {
 namespace {
 
-constexpr double kWidest = kWidestHingeDeg * std::numbers::pi / 180.0 * (1.0 + 1e-12);  // rad; tolerance for rounding of degrees
+constexpr double kMaxHingeRad = kWidestHingeDeg * std::numbers::pi / 180.0 * (1.0 + 1e-12);  // rad; tolerance for rounding of degrees
 
 bool is_finite(const Vec3& x) { return std::isfinite(x[0]) && std::isfinite(x[1]) && std::isfinite(x[2]); }
 
@@ -100,9 +100,9 @@ void check_joints(const WorldSpec& spec) {
       if (!turns && joint.kind != joints::Kind::kSlider) throw InputError(who + ": only hinges and sliders have limits");
       if (!(low <= 0.0 && high >= 0.0 && high - low > 1e-6 && std::isfinite(high - low)))
         throw InputError(fmt::format("{}: its limits {:g} and {:g} must enclose the start, which is 0", who, low, high));
-      if (turns && !(low >= -kWidest && high <= kWidest))
+      if (turns && !(low >= -kMaxHingeRad && high <= kMaxHingeRad))
         throw InputError(
-            fmt::format("{}: its limits must be within {:g} rad of the start; omit limits beyond the range of motion", who, kWidest));
+            fmt::format("{}: its limits must be within {:g} rad of the start; omit limits beyond the range of motion", who, kMaxHingeRad));
       if (!(joint.stop_restitution >= 0.0 && joint.stop_restitution <= 1.0))
         throw InputError(fmt::format("{}: the restitution {} of its stops is not within 0..1", who, joint.stop_restitution));
     }

@@ -16,16 +16,16 @@
 namespace carillon::physics {
 namespace {
 
-constexpr double kInstant = 1e-8;     // s; shorter than any step, longer than the permitted remainder of a step
-constexpr double kPatience = 5e-3;    // s
-constexpr double kRise = 5e-3;        // s; fade-in of the force of a new contact, whose impact has already been rendered
-constexpr double kInterval = 1e-3;    // s
-constexpr double kGone = 5e-3;        // s; a spot unloaded for this time has ended
-constexpr double kSmooth = 20e-3;     // s
-constexpr double kSmallest = 1e-6;    // m; minimum patch radius
-constexpr double kRollingSpin = 1.0;  // rad/s; below, the position of a swaying contact is fixed
-constexpr double kSharpest = 5e-4;    // m; assumed radius of sharp mesh edges
-constexpr double kSticks = 1e-6;      // m/s; below, the contact does not slip
+constexpr double kTimeToleranceS = 1e-8;     // s; shorter than any step, longer than the permitted remainder of a step
+constexpr double kMinQuietS = 5e-3;          // s
+constexpr double kFadeInS = 5e-3;            // s; fade-in of the force of a new contact, whose impact has already been rendered
+constexpr double kIntervalS = 1e-3;          // s
+constexpr double kUnloadedEndS = 5e-3;       // s; a spot unloaded for this time has ended
+constexpr double kSmoothingS = 20e-3;        // s
+constexpr double kMinPatchM = 1e-6;          // m; minimum patch radius
+constexpr double kMinRollingSpinRadS = 1.0;  // rad/s; below, the position of a swaying contact is fixed
+constexpr double kMinEdgeRadiusM = 5e-4;     // m; assumed radius of sharp mesh edges
+constexpr double kMinSlipSpeedMS = 1e-6;     // m/s; below, the contact does not slip
 
 std::uint64_t scramble(std::uint64_t state) { return base::draw(state); }
 
@@ -49,7 +49,7 @@ void LastingContacts::make_groups(const rigid::Space& space) {
   space.list_contacts(contacts_);
   for (const rigid::Contact* c : contacts_) {
     // Groups have steps of different lengths: each counts when its step ends.
-    if (!(c->step_s > 0.0) || !c->touching || std::abs(c->until_s - space.get_time()) > kInstant) continue;
+    if (!(c->step_s > 0.0) || !c->touching || std::abs(c->until_s - space.get_time()) > kTimeToleranceS) continue;
     const double push = dot(c->impulse, c->touch.normal) / c->step_s;
     if (push > 0.0) carriers_.push_back({c, push, false});
   }
@@ -96,7 +96,7 @@ LastingContacts::Group LastingContacts::make_group(const rigid::Space& space, st
 double LastingContacts::calc_patch(const Group& g, double radius_m) const {
   const Matter &a = get_matter(g.a), &b = get_matter(g.b);
   const double compliance = impact::calc_contact_compliance(a.young_modulus_pa, a.poisson_ratio, b.young_modulus_pa, b.poisson_ratio);
-  return std::max(kSmallest, impact::calc_patch_radius(g.push_n, radius_m, compliance));
+  return std::max(kMinPatchM, impact::calc_patch_radius(g.push_n, radius_m, compliance));
 }
 
 /// Impedance of a plane wave into the body over the patch.
@@ -126,12 +126,12 @@ void LastingContacts::record(const rigid::Space& space, const Group& g, Spot& sp
   stir(space, spot, events);
   if (is_new) {
     spot.begun_s = spot.rises_s = time_s;
-    spot.radius_m = 1.0 / std::clamp(g.curvature_per_m, 1.0 / (5.0 * calc_spot_radius(space, g.a, g.b)), 1.0 / kSharpest);
+    spot.radius_m = 1.0 / std::clamp(g.curvature_per_m, 1.0 / (5.0 * calc_spot_radius(space, g.a, g.b)), 1.0 / kMinEdgeRadiusM);
   }
   spot.recorded_s = time_s;
   const Vec3 va = space.calc_velocity(g.a, g.where), vb = space.calc_velocity(g.b, g.where), u = va - vb;
   Vec3 slip = u - dot(u, g.normal) * g.normal;
-  if (norm(slip) < kSticks) slip = {};
+  if (norm(slip) < kMinSlipSpeedMS) slip = {};
   const auto calc_sweep = [&](const Vec3& surface) {
     const Vec3 w = g.carried + spot.drift - surface;
     return norm(w - dot(w, g.normal) * g.normal);
@@ -154,7 +154,7 @@ void LastingContacts::record(const rigid::Space& space, const Group& g, Spot& sp
     c.barycentric = place.barycentric;
     c.normal = back * (sign * g.normal);
     c.slip_m_s = back * (sign * slip);
-    c.force_n = spot.from_n + (spot.load_n - spot.from_n) * std::min(1.0, (time_s - spot.rises_s) / kRise);
+    c.force_n = spot.from_n + (spot.load_n - spot.from_n) * std::min(1.0, (time_s - spot.rises_s) / kFadeInS);
     c.sweep_m_s = side == 0 ? sweep_a : sweep_b;
     c.other_sweep_m_s = side == 0 ? sweep_b : sweep_a;
     c.spin_rad_s = norm(g.turn);
@@ -212,14 +212,14 @@ void LastingContacts::update(const rigid::Space& space, std::vector<events::Even
     Spot& spot = *nearest;
     const double dt = time_s - spot.seen_s;
     // While a body rolls the load shifts from point to point, before points appear or disappear.
-    const bool stays = !g.smooth && spot.features == g.features && norm(g.turn) < kRollingSpin;
+    const bool stays = !g.smooth && spot.features == g.features && norm(g.turn) < kMinRollingSpinRadS;
     const Vec3 velocity = stays ? g.carried : (1.0 / dt) * (g.where - spot.where);
-    spot.drift = spot.drift + (dt / (dt + kSmooth)) * (velocity - g.carried - spot.drift);
-    spot.load_n += dt / (dt + kRise) * (g.push_n - spot.load_n);
+    spot.drift = spot.drift + (dt / (dt + kSmoothingS)) * (velocity - g.carried - spot.drift);
+    spot.load_n += dt / (dt + kFadeInS) * (g.push_n - spot.load_n);
     spot.where = g.where;
     spot.features = g.features;
     spot.seen_s = time_s;
-    const bool is_due = spot.begun_s < 0.0 ? time_s - spot.quiet_s > kPatience : time_s - spot.recorded_s >= kInterval - 1e-9;
+    const bool is_due = spot.begun_s < 0.0 ? time_s - spot.quiet_s > kMinQuietS : time_s - spot.recorded_s >= kIntervalS - 1e-9;
     if (!is_due) continue;
     if (spot.begun_s < 0.0) spot.id = make_id(spot);
     record(space, g, spot, events);
@@ -254,7 +254,7 @@ void LastingContacts::end_or_keep(const rigid::Space& space, std::vector<Spot>& 
     if (!lies) stir(space, spot, events);
     spot.lies = lies;
     if (lies) continue;
-    if (time_s - spot.seen_s <= kGone || spot.begun_s < 0.0) continue;
+    if (time_s - spot.seen_s <= kUnloadedEndS || spot.begun_s < 0.0) continue;
     for (const int side : {0, 1}) {
       events::LastingContact c = spot.last[side];
       if (c.body < 0) continue;
@@ -264,7 +264,7 @@ void LastingContacts::end_or_keep(const rigid::Space& space, std::vector<Spot>& 
       events.push_back(c);
     }
   }
-  std::erase_if(spots, [&](const Spot& s) { return time_s - s.seen_s > kGone; });
+  std::erase_if(spots, [&](const Spot& s) { return time_s - s.seen_s > kUnloadedEndS; });
 }
 
 void LastingContacts::note_impact(const rigid::Space& space, int a, int b, const Vec3& where, double time_s) {

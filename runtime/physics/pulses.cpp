@@ -12,11 +12,11 @@
 namespace carillon::physics {
 namespace {
 
-using rigid::kSlowest;
+using rigid::kMinImpactSpeedMS;
 
-constexpr double kMasked = 0.01;    // relative to the largest impulse of the same instant: -40 dB
-constexpr double kHidden = 0.005;   // relative to an earlier impulse of the same body: -46 dB
-constexpr double kMaskTime = 0.05;  // s; decay time (1/e) of the latter threshold
+constexpr double kMaskedRatio = 0.01;        // relative to the largest impulse of the same instant: -40 dB
+constexpr double kForwardMaskRatio = 0.005;  // relative to an earlier impulse of the same body: -46 dB
+constexpr double kMaskDecayS = 0.05;         // s; decay time (1/e) of the latter threshold
 
 /// 1/m_eff of the contact along the normal [1/kg], in the state before the impact.
 double calc_inverse_mass(const rigid::Space& space, const rigid::Strike& strike, const rigid::Hit& hit, const Vec3& where,
@@ -52,8 +52,8 @@ void add_spot(const rigid::Space& space, const rigid::Strike& strike, const std:
   const double inverse_mass =
       first.linked_mass_kg > 0.0 ? 1.0 / first.linked_mass_kg : calc_inverse_mass(space, strike, first, where, normal);
   // A resting spot hardly moved by the impact elsewhere, or negligible next to other pulses of the same instant.
-  if (!(inverse_mass > 0.0) || push * inverse_mass < 0.2 * kSlowest || push < kMasked * max_push) return;
-  const double speed = approach > kSlowest ? approach : push * inverse_mass;
+  if (!(inverse_mass > 0.0) || push * inverse_mass < 0.2 * kMinImpactSpeedMS || push < kMaskedRatio * max_push) return;
+  const double speed = approach > kMinImpactSpeedMS ? approach : push * inverse_mass;
   const double mass = std::min(push / ((1.0 + first.restitution) * speed), 1.0 / inverse_mass);
   lasting.note_impact(space, first.a, first.b, where, strike.time_s);
   rigid::Hit mean = first;
@@ -86,9 +86,9 @@ void add_spot(const rigid::Space& space, const rigid::Strike& strike, const std:
 
 bool Masks::take(int body, double time_s, double impulse_n_s, double duration_s) {
   Mask& mask = masks_[body];
-  mask.impulse_n_s *= std::exp(-std::max(time_s - mask.time_s, 0.0) / kMaskTime);
+  mask.impulse_n_s *= std::exp(-std::max(time_s - mask.time_s, 0.0) / kMaskDecayS);
   mask.time_s = std::max(time_s, mask.time_s);
-  if (impulse_n_s < kHidden * mask.impulse_n_s && duration_s >= mask.duration_s) return true;
+  if (impulse_n_s < kForwardMaskRatio * mask.impulse_n_s && duration_s >= mask.duration_s) return true;
   if (impulse_n_s >= mask.impulse_n_s) mask = {impulse_n_s, mask.time_s, duration_s};
   return false;
 }
@@ -112,9 +112,9 @@ void add_pulses(const rigid::Space& space, const rigid::Strike& strike, LastingC
       if (norm(hit.touch.where_m - order[seed]->touch.where_m) > calc_spot_radius(space, hit.a, hit.b)) continue;
       taken[i] = 1;
       spot.push_back(&hit);
-      wait_s = std::min(wait_s, hit.approach_m_s > kSlowest ? hit.touch.gap_m / hit.approach_m_s : 0.0);
+      wait_s = std::min(wait_s, hit.approach_m_s > kMinImpactSpeedMS ? hit.touch.gap_m / hit.approach_m_s : 0.0);
     }
-    add_spot(space, strike, spot, strike.time_s + std::clamp(wait_s, -rigid::kTogether, strike.together_s), max_push, lasting, masks,
+    add_spot(space, strike, spot, strike.time_s + std::clamp(wait_s, -rigid::kSimultaneousS, strike.together_s), max_push, lasting, masks,
              events);
   }
 }

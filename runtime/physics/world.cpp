@@ -191,7 +191,7 @@ class World::Course {
     // The processor clock needs a system call, a tenth of a step; the steady clock does not, and never runs behind it.
     const bool is_limited = std::isfinite(cpu_s);
     const double began_s = is_limited ? base::get_steady_s() : 0.0, started_s = is_limited ? base::get_thread_cpu_s() : 0.0;
-    while (!begun_ || (until_s - reached_s_ > kShortest && !is_over())) {
+    while (!begun_ || (until_s - reached_s_ > kTimeToleranceS && !is_over())) {
       step(sink);
       if (is_limited && base::get_steady_s() - began_s >= cpu_s && base::get_thread_cpu_s() - started_s >= cpu_s) break;
     }
@@ -215,11 +215,12 @@ class World::Course {
   }
 
  private:
-  static constexpr double kShortest = 2e-7;              // s; times nearer than this to the end of a window count as its end
-  static constexpr double kEarliest = rigid::kTogether;  // a pulse found in a window may have begun this much earlier (pulses.cpp)
+  static constexpr double kTimeToleranceS = 2e-7;  // s; times nearer than this to the end of a window count as its end
+  static constexpr double kMaxPulseLeadS =
+      rigid::kSimultaneousS;  // a pulse found in a window may have begun this much earlier (pulses.cpp)
 
   int count() const { return static_cast<int>(space_.states().size()); }
-  bool is_over() const { return options_.end_s - reached_s_ <= kShortest; }
+  bool is_over() const { return options_.end_s - reached_s_ <= kTimeToleranceS; }
 
   events::BodyMotion make_motion(int body, const rigid::State& state, double time_s) const {
     return {time_s, body, state.centre, state.velocity, state.rotation};
@@ -346,7 +347,7 @@ class World::Course {
 
   /// Emits events earlier than any that may still come, in time order; then a Mark.
   void emit(const Sink& sink) {
-    const double mark_s = is_over() ? options_.end_s : std::max(0.0, reached_s_ - kEarliest);
+    const double mark_s = is_over() ? options_.end_s : std::max(0.0, reached_s_ - kMaxPulseLeadS);
     // Events are large: sorted by times and indices only.
     order_.clear();
     for (std::size_t n = 0; n < events_.size(); ++n) order_.emplace_back(events::get_time_s(events_[n]), n);
@@ -457,7 +458,7 @@ double World::advance(double until_s, double cpu_s, const Sink& sink) { return c
 Statistics World::get_statistics() const { return course_->get_statistics(); }
 
 std::vector<std::string> ask_about_links(const WorldSpec& spec) {
-  constexpr double kFar = 30.0;  // radii of a body
+  constexpr double kFarRadii = 30.0;  // radii of a body
   std::vector<std::string> questions;
   const auto calc_distance = [&](int body, const Vec3& where, double& radius) {
     const BodySpec& b = spec.bodies[body];
@@ -475,7 +476,7 @@ std::vector<std::string> ask_about_links(const WorldSpec& spec) {
       if (one < 0) continue;
       double radius = 0.0;
       const double distance = calc_distance(one, joint.at_m, radius);
-      far = far && distance > kFar * radius;
+      far = far && distance > kFarRadii * radius;
       if (distance < nearest) nearest = distance, of = radius, body = one;
     }
     if (far)

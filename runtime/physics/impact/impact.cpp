@@ -14,12 +14,12 @@
 namespace carillon::impact {
 namespace {
 
-constexpr double kSlowest = 1e-6;  // m/s; assumed for the step length if nothing approaches
-constexpr double kTaper = 0.05;    // time constant of a limited rebound over the compression time
-constexpr double kStill = 1e-3;    // m/s; maximum speed of settled contacts
-constexpr double kSoon = 1e-3;     // s; maximum time to the next touch of bodies still in contact
-constexpr int kLimitings = 8;      // iterations over contacts that share bodies,
-constexpr double kOver = 1e-4;     // relative to the force of a step
+constexpr double kMinSpeedMS = 1e-6;         // m/s; assumed for the step length if nothing approaches
+constexpr double kReboundDecayRatio = 0.05;  // time constant of a limited rebound over the compression time
+constexpr double kSettledSpeedMS = 1e-3;     // m/s; maximum speed of settled contacts
+constexpr double kMaxTouchDelayS = 1e-3;     // s; maximum time to the next touch of bodies still in contact
+constexpr int kLimitIterations = 8;          // iterations over contacts that share bodies,
+constexpr double kForceTolerance = 1e-4;     // relative to the force of a step
 
 bool is_finite(const Vec3& x) { return std::isfinite(x[0]) && std::isfinite(x[1]) && std::isfinite(x[2]); }
 
@@ -208,7 +208,7 @@ void Impact::choose_step(const Options& options) {
     if (inverse_mass[c] == 0.0) inverse_mass[c] = modal;
     fastest_ = std::max(fastest_, speed[c]);
   }
-  fastest_ = std::max(fastest_, kSlowest);
+  fastest_ = std::max(fastest_, kMinSpeedMS);
   double shortest = options.longest_step_s * options.steps_per_pulse;
   for (std::size_t c = first; c < laws_.size(); ++c) {
     if (!(inverse_mass[c] > 0.0)) continue;
@@ -295,7 +295,7 @@ void Impact::set_up_step() {
 /// Contact forces of the step, within the restitution limit of each contact.
 void Impact::solve_forces() {
   bool found = solver_.solve(laws_, A_, free_, h_, force_);
-  for (int round = 0; round < kLimitings && limit_forces(); ++round) found = solver_.solve(laws_, A_, free_, h_, force_) && found;
+  for (int round = 0; round < kLimitIterations && limit_forces(); ++round) found = solver_.solve(laws_, A_, free_, h_, force_) && found;
   if (!found) ++misses_;
 }
 
@@ -318,19 +318,21 @@ bool Impact::limit_forces() {
     }
     for (std::size_t r = 0; r < n; ++r) parting += h_ * mobility_[row * n + r] * force_[r];
     const double left = limit - before,
-                 allowed = left > 0.0 ? std::max(0.0, before - left * std::expm1(-h_ / (kTaper * (contacts_[c].pressed_s + h_)))) : limit;
+                 allowed = left > 0.0
+                               ? std::max(0.0, before - left * std::expm1(-h_ / (kReboundDecayRatio * (contacts_[c].pressed_s + h_))))
+                               : limit;
     const double over = (parting - allowed) / gain;
-    if (over <= kOver * force_[row]) continue;
+    if (over <= kForceTolerance * force_[row]) continue;
     t.max_n = std::max(0.0, force_[row] - over);
     any = true;
   }
   return any;
 }
 
-void Impact::step() {
-  const std::size_t n = rows_.size();
+/// Motion of the rows in this step without contact forces.
+void Impact::calc_free_motion() {
   const double half = 0.5 * h_ * h_;
-  for (std::size_t r = 0; r < n; ++r) {
+  for (std::size_t r = 0; r < rows_.size(); ++r) {
     free_[r] = h_ * calc_row_speed(rows_[r]);
     for (std::size_t side = 0; side < 2; ++side) {
       if (rows_[r].body[side] < 0) continue;
@@ -339,6 +341,107 @@ void Impact::step() {
     }
   }
   modes_.add_free_motion(free_);
+}
+
+/// Motion of the rows with the contact forces.
+void Impact::calc_motion() {
+  const std::size_t n = rows_.size();
+  for (std::size_t i = 0; i < n; ++i) {
+    moved_[i] = free_[i];
+    for (std::size_t j = 0; j < n; ++j) moved_[i] += A_[i * n + j] * force_[j];
+  }
+}
+
+/// Updates the compression of a contact, and books the loss of its spring.
+void Impact::compress(std::size_t contact) {
+  History& c = contacts_[contact];
+  ContactLaw& t = laws_[contact];
+  const double before = t.compression_m;
+  t.compression_m -= moved_[t.row];
+  // A contact without force yields to further compression: it stores no energy and returns less than it holds.
+  const bool is_limited = std::isfinite(t.max_n);
+  if (is_limited && t.compression_m > before) {
+    c.yielded_m += t.compression_m - before;
+    t.compression_m = before;
+  }
+  // Yielded compression recovers before the surfaces part.
+  if (t.compression_m < 0.0 && c.yielded_m > 0.0) {
+    const double recovered = std::min(c.yielded_m, -t.compression_m), recovered_j = c.yielded_j * recovered / c.yielded_m;
+    c.yielded_j -= recovered_j;
+    books_.dissipated_contact += recovered_j;
+    c.yielded_m -= recovered;
+    t.compression_m += recovered;
+  }
+  t.max_n = std::numeric_limits<double>::infinity();
+  c.pressed_s = t.compression_m > 0.0 ? c.pressed_s + h_ : 0.0;
+  const double taken_j =
+      -(force_[t.row] * moved_[t.row] + (calc_spring_energy(t.spring, t.compression_m) - calc_spring_energy(t.spring, before)));
+  (is_limited ? c.yielded_j : books_.dissipated_contact) += taken_j;
+  if (!(t.compression_m > 0.0) && c.yielded_m == 0.0) books_.dissipated_contact += std::exchange(c.yielded_j, 0.0);
+}
+
+/// Stretches the anchor spring of a contact with friction, and books the loss. Adds the tangential impulse.
+void Impact::slide(ContactLaw& t, Vec3& impulse) {
+  const auto row = t.row;
+  const std::array<double, 2> u0 = t.stretch;
+  t.stretch = calc_shortened({u0[0] + moved_[row + 1], u0[1] + moved_[row + 2]}, t.friction * force_[row] / t.tangential_n_m);
+  for (std::size_t k = 0; k < 2; ++k) {
+    books_.dissipated_friction -=
+        force_[row + 1 + k] * moved_[row + 1 + k] + 0.5 * t.tangential_n_m * (t.stretch[k] * t.stretch[k] - u0[k] * u0[k]);
+    impulse = impulse + h_ * force_[row + 1 + k] * rows_[row + 1 + k].axis;
+  }
+}
+
+/// Appends the impulse of the step to the pulse of a contact.
+void Impact::record(History& contact, const Vec3& impulse) {
+  Pulse& pulse = contact.pulse;
+  if (dot(impulse, impulse) > 0.0) {
+    if (pulse.impulse_n_s.empty()) pulse.start_s = get_time();
+    pulse.step_s = h_;
+    pulse.impulse_n_s.resize(pulse.impulse_n_s.size() + contact.silent);
+    pulse.impulse_n_s.push_back(impulse);
+    contact.silent = 0;
+  } else if (!pulse.impulse_n_s.empty()) {
+    ++contact.silent;
+  }
+}
+
+/// Rigid motion: constant acceleration during the step.
+void Impact::move_body(std::size_t b) {
+  Body& body = bodies_[b];
+  if (!(body.mass_kg > 0.0)) return;
+  const double half = 0.5 * h_ * h_;
+  Vec3 linear = body.acceleration_m_s2, angular = body.spin_acceleration_rad_s2, force{}, couple{};
+  const bool is_pushed = std::any_of(force_.begin(), force_.end(), [](double f) { return f != 0.0; });
+  for (std::size_t r = 0; r < rows_.size() && is_pushed; ++r)
+    for (std::size_t side = 0; side < 2; ++side)
+      if (rows_[r].body[side] == static_cast<int>(b)) {
+        linear = linear + force_[r] * rows_[r].to_velocity[side];
+        angular = angular + force_[r] * rows_[r].to_spin[side];
+        if (!body.on_joints) continue;
+        force = force + force_[r] * rows_[r].linear[side];
+        couple = couple + force_[r] * rows_[r].angular[side];
+      }
+  const Vec3 moved = h_ * body.velocity_m_s + half * linear, turned = h_ * body.spin_rad_s + half * angular;
+  body.velocity_m_s = body.velocity_m_s + h_ * linear;
+  body.spin_rad_s = body.spin_rad_s + h_ * angular;
+  body.moved_m = body.moved_m + moved;
+  body.turned_rad = body.turned_rad + turned;
+  if (body.on_joints) {
+    const double work = dot(force, moved) + dot(couple, turned);
+    on_joints_j_ += work;
+    body.work_j += work;
+    body.shift_n_s2 = body.shift_n_s2 + h_ * body.impulse_n_s + half * force;
+    body.turning_n_m_s2 = body.turning_n_m_s2 + h_ * body.couple_n_m_s + half * couple;
+    body.impulse_n_s = body.impulse_n_s + h_ * force;
+    body.couple_n_m_s = body.couple_n_m_s + h_ * couple;
+    return;
+  }
+  books_.given += body.mass_kg * dot(body.acceleration_m_s2, moved) + dot(body.inertia_kg_m2 * body.spin_acceleration_rad_s2, turned);
+}
+
+void Impact::step() {
+  calc_free_motion();
   for (std::size_t c = 0; c < laws_.size(); ++c)
     contacts_[c].closing_m_s = std::max(contacts_[c].closing_m_s, -calc_row_speed(rows_[laws_[c].row]));
   close_contacts();
@@ -350,92 +453,18 @@ void Impact::step() {
   else
     std::fill(force_.begin(), force_.end(), 0.0);
 
-  bool pushed = false, struck = false;
-  for (std::size_t i = 0; i < n; ++i) {
-    moved_[i] = free_[i];
-    for (std::size_t j = 0; j < n; ++j) moved_[i] += A_[i * n + j] * force_[j];
-    pushed = pushed || force_[i] != 0.0;
-    struck = struck || (force_[i] != 0.0 && !contacts_[rows_[i].contact].given.rests);
-  }
+  calc_motion();
+  bool struck = false;
+  for (std::size_t r = 0; r < rows_.size(); ++r) struck = struck || (force_[r] != 0.0 && !contacts_[rows_[r].contact].given.rests);
   for (std::size_t c = 0; c < laws_.size(); ++c) {
+    compress(c);
     ContactLaw& t = laws_[c];
-    const auto row = t.row;
-    const double before = t.compression_m;
-    t.compression_m -= moved_[row];
-    // A contact without force yields to further compression: it stores no energy and returns less than it holds.
-    double &yielded = contacts_[c].yielded_m, &yielded_j = contacts_[c].yielded_j;
-    const bool is_limited = std::isfinite(t.max_n);
-    if (is_limited && t.compression_m > before) {
-      yielded += t.compression_m - before;
-      t.compression_m = before;
-    }
-    // Yielded compression recovers before the surfaces part.
-    if (t.compression_m < 0.0 && yielded > 0.0) {
-      const double recovered = std::min(yielded, -t.compression_m), recovered_j = yielded_j * recovered / yielded;
-      yielded_j -= recovered_j;
-      books_.dissipated_contact += recovered_j;
-      yielded -= recovered;
-      t.compression_m += recovered;
-    }
-    t.max_n = std::numeric_limits<double>::infinity();
-    contacts_[c].pressed_s = t.compression_m > 0.0 ? contacts_[c].pressed_s + h_ : 0.0;
-    const double taken_j =
-        -(force_[row] * moved_[row] + (calc_spring_energy(t.spring, t.compression_m) - calc_spring_energy(t.spring, before)));
-    (is_limited ? yielded_j : books_.dissipated_contact) += taken_j;
-    if (!(t.compression_m > 0.0) && yielded == 0.0) books_.dissipated_contact += std::exchange(yielded_j, 0.0);
-    Vec3 impulse = h_ * force_[row] * rows_[row].axis;
-    contacts_[c].impulse_n_s += h_ * force_[row];
-    if (t.friction > 0.0) {
-      const std::array<double, 2> u0 = t.stretch;
-      t.stretch = calc_shortened({u0[0] + moved_[row + 1], u0[1] + moved_[row + 2]}, t.friction * force_[row] / t.tangential_n_m);
-      for (std::size_t k = 0; k < 2; ++k) {
-        books_.dissipated_friction -=
-            force_[row + 1 + k] * moved_[row + 1 + k] + 0.5 * t.tangential_n_m * (t.stretch[k] * t.stretch[k] - u0[k] * u0[k]);
-        impulse = impulse + h_ * force_[row + 1 + k] * rows_[row + 1 + k].axis;
-      }
-    }
-    Pulse& pulse = contacts_[c].pulse;
-    if (dot(impulse, impulse) > 0.0) {
-      if (pulse.impulse_n_s.empty()) pulse.start_s = get_time();
-      pulse.step_s = h_;
-      pulse.impulse_n_s.resize(pulse.impulse_n_s.size() + contacts_[c].silent);
-      pulse.impulse_n_s.push_back(impulse);
-      contacts_[c].silent = 0;
-    } else if (!pulse.impulse_n_s.empty()) {
-      ++contacts_[c].silent;
-    }
+    Vec3 impulse = h_ * force_[t.row] * rows_[t.row].axis;
+    contacts_[c].impulse_n_s += h_ * force_[t.row];
+    if (t.friction > 0.0) slide(t, impulse);
+    record(contacts_[c], impulse);
   }
-  // Rigid motion: constant acceleration during the step.
-  for (std::size_t b = 0; b < bodies_.size(); ++b) {
-    Body& body = bodies_[b];
-    if (!(body.mass_kg > 0.0)) continue;
-    Vec3 linear = body.acceleration_m_s2, angular = body.spin_acceleration_rad_s2, force{}, couple{};
-    for (std::size_t r = 0; r < n && pushed; ++r)
-      for (std::size_t side = 0; side < 2; ++side)
-        if (rows_[r].body[side] == static_cast<int>(b)) {
-          linear = linear + force_[r] * rows_[r].to_velocity[side];
-          angular = angular + force_[r] * rows_[r].to_spin[side];
-          if (!body.on_joints) continue;
-          force = force + force_[r] * rows_[r].linear[side];
-          couple = couple + force_[r] * rows_[r].angular[side];
-        }
-    const Vec3 moved = h_ * body.velocity_m_s + half * linear, turned = h_ * body.spin_rad_s + half * angular;
-    body.velocity_m_s = body.velocity_m_s + h_ * linear;
-    body.spin_rad_s = body.spin_rad_s + h_ * angular;
-    body.moved_m = body.moved_m + moved;
-    body.turned_rad = body.turned_rad + turned;
-    if (body.on_joints) {
-      const double work = dot(force, moved) + dot(couple, turned);
-      on_joints_j_ += work;
-      body.work_j += work;
-      body.shift_n_s2 = body.shift_n_s2 + h_ * body.impulse_n_s + half * force;
-      body.turning_n_m_s2 = body.turning_n_m_s2 + h_ * body.couple_n_m_s + half * couple;
-      body.impulse_n_s = body.impulse_n_s + h_ * force;
-      body.couple_n_m_s = body.couple_n_m_s + h_ * couple;
-      continue;
-    }
-    books_.given += body.mass_kg * dot(body.acceleration_m_s2, moved) + dot(body.inertia_kg_m2 * body.spin_acceleration_rad_s2, turned);
-  }
+  for (std::size_t b = 0; b < bodies_.size(); ++b) move_body(b);
   modes_.move(force_);
   ++steps_;
   quiet_ = struck ? 0 : quiet_ + 1;
@@ -447,12 +476,12 @@ bool Impact::is_over() const {
   if (quiet_s < part_s_) return false;
   for (std::size_t c = 0; c < laws_.size(); ++c) {
     if (laws_[c].compression_m <= 0.0) {
-      if (-laws_[c].compression_m < kSoon * calc_approach(static_cast<int>(c))) return false;
+      if (-laws_[c].compression_m < kMaxTouchDelayS * calc_approach(static_cast<int>(c))) return false;
       continue;
     }
     if (!contacts_[c].given.rests) return false;
     const double moved = moved_[laws_[c].row];
-    if (std::abs(moved) > kStill * h_ && quiet_s < settling_s_) return false;
+    if (std::abs(moved) > kSettledSpeedMS * h_ && quiet_s < settling_s_) return false;
   }
   return true;
 }

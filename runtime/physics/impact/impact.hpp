@@ -174,6 +174,12 @@ class Impact {
   void exchange_spring(int contact, const Spring& spring);
   void set_up_step();
   void step();
+  void calc_free_motion();
+  void calc_motion();
+  void compress(std::size_t contact);
+  void slide(ContactLaw& law, Vec3& impulse);
+  void record(History& contact, const Vec3& impulse);
+  void move_body(std::size_t body);
   double calc_row_speed(const Row& row) const;
   void solve_forces();
   bool limit_forces();

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kTailRatio = 1.12;
 constexpr double kTailDecay = 0.15;
-constexpr std::size_t kKept = 24;
+constexpr std::size_t kMaxPropagators = 24;
 
 struct Answer {
   double g, b;  // displacement after a unit force over h [s^2], after a unit impulse [s]
@@ -57,7 +57,7 @@ std::shared_ptr<const Propagator> find_or_make(std::map<int, std::shared_ptr<con
                                                std::span<const double> decay, int k) {
   const auto found = kept.find(k);
   if (found != kept.end()) return found->second;
-  if (kept.size() >= kKept) kept.erase(kept.begin()->first < k ? kept.begin() : std::prev(kept.end()));
+  if (kept.size() >= kMaxPropagators) kept.erase(kept.begin()->first < k ? kept.begin() : std::prev(kept.end()));
   return kept[k] = std::make_shared<const Propagator>(make_propagator(omega, decay, get_step(k)));
 }
 

@@ -19,7 +19,7 @@ namespace carillon::impact {
 namespace {
 
 constexpr int kSweeps = 200;
-constexpr double kFast = 1e-3;  // error reduction of a step below which the next one reuses the factorisation
+constexpr double kReuseErrorRatio = 1e-3;  // error reduction of a step below which the next one reuses the factorisation
 
 /// Normal force of a step that ends with the compression y1.
 StepForce calc_normal_force(const ContactLaw& law, double y1, double h_s) {
@@ -251,7 +251,7 @@ bool StepSolver::solve(const std::vector<ContactLaw>& laws, const std::vector<do
       next = calc_residual(laws, A, free, trial_, h_s, true);
       if (next < error || !is_new) break;
     }
-    is_fast = next < kFast * error;
+    is_fast = next < kReuseErrorRatio * error;
     is_current = next < error;
     if (is_current) {
       moved_.swap(trial_);

@@ -113,7 +113,7 @@ bool Bodies::is_balanced(const Articulation& articulation) const {
   articulation.mechanism->find_accelerations(still, rates);
   const double g = std::max(norm(gravity_), 1e-9);
   for (int k = 0; const int body : articulation.bodies) {
-    if (norm(rates[k].linear) + norm(rates[k].angular) * solids_[body].radius_m >= kBalanced * g) return false;
+    if (norm(rates[k].linear) + norm(rates[k].angular) * solids_[body].radius_m >= kRestResidualRatio * g) return false;
     ++k;
   }
   return true;

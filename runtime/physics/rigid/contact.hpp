@@ -39,8 +39,8 @@ struct Contact {
     impulse = couple = {};
   }
   /// Closed, not in a modal impact, not a cord.
-  bool carries() const { return !presses && cord < 0 && touch.gap_m <= kTouch; }
-  bool is_closed() const { return touching && touch.gap_m <= kTouch; }
+  bool carries() const { return !presses && cord < 0 && touch.gap_m <= kTouchGapM; }
+  bool is_closed() const { return touching && touch.gap_m <= kTouchGapM; }
 };
 
 /// Contacts of two bodies, of a body and the ground, or of a cord.
@@ -78,7 +78,7 @@ struct Pair {
   }
   /// Gap within kDeepM, with or without a force.
   bool has_closed_gap() const {
-    return std::any_of(contacts.begin(), contacts.end(), [](const Contact& c) { return c.touch.gap_m <= kDeep; });
+    return std::any_of(contacts.begin(), contacts.end(), [](const Contact& c) { return c.touch.gap_m <= kDeepM; });
   }
 };
 

@@ -13,7 +13,7 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr double kFarTooDeep = 5e-5;  // m; a cord stretched further is shortened even if that gains energy
+constexpr double kMaxStretchM = 5e-5;  // m; a cord stretched further is shortened even if that gains energy
 
 struct StopTouch {
   double gap_m = 0.0;
@@ -61,8 +61,8 @@ Point make_stop_point(const Bodies& bodies, const Step& step, const Stop& stop, 
   if (p.a >= 0) p.arm_a = end.where_m - step.free[p.a].state.centre;
   if (p.b >= 0) p.arm_b = end.where_m - step.free[p.b].state.centre;
   const double approach = bodies.calc_approach(c.touch, c.a, c.b), gap = c.touch.gap_m;
-  double speed = c.touching && gap <= kTouch ? 0.0 : approach - 2.0 * std::max(gap, 0.0) / h;
-  if (gap < -kDeep) speed += std::min(kPushOut * (-kDeep - gap), 5e-3);
+  double speed = c.touching && gap <= kTouchGapM ? 0.0 : approach - 2.0 * std::max(gap, 0.0) / h;
+  if (gap < -kDeepM) speed += std::min(kPushOutRatePerS * (-kDeepM - gap), 5e-3);
   p.wanted = speed * p.normal;
   p.impulse = (c.step_s > 0.0 ? h / c.step_s : 0.0) * c.impulse;
   return p;
@@ -96,7 +96,7 @@ void update_cord(const Bodies& bodies, const Cord& cord, Pair& pair) {
     contact.a = cord.a;
     contact.b = cord.b;
     contact.cord = pair.cord;
-    contact.touching = now.gap_m <= kTouch;
+    contact.touching = now.gap_m <= kTouchGapM;
     pair.contacts.push_back(contact);
   }
   geometry::Touch& touch = pair.contacts.front().touch;
@@ -143,11 +143,11 @@ Point make_cord_point(const Bodies& bodies, const Step& step, const Cord& cord, 
   const Vec3 u = a.velocity - b.velocity;
   const double along = dot(u, p.normal), error = dot(u, c.touch.normal), gap = c.touch.gap_m;
   // Taut: equal and opposite speeds along the mid-step direction at both ends of the step keep the length; present stretch remains.
-  double speed = c.touching && gap <= kTouch ? error - along : -along - 2.0 * std::max(gap, 0.0) / h;
+  double speed = c.touching && gap <= kTouchGapM ? error - along : -along - 2.0 * std::max(gap, 0.0) / h;
   // Excess length is removed like penetration, at half the power that the cord loses (step_points.cpp).
-  if (gap < -kDeep) {
+  if (gap < -kDeepM) {
     const double pull = dot(c.impulse, c.touch.normal), paid = pull > 0.0 ? std::max(0.5 * c.lost_j / pull, 0.0) : 0.0;
-    speed += std::min(kPushOut * (-kDeep - gap), gap < -kFarTooDeep ? 5e-3 : paid);
+    speed += std::min(kPushOutRatePerS * (-kDeepM - gap), gap < -kMaxStretchM ? 5e-3 : paid);
   }
   p.wanted = speed * p.normal - (a.beyond - b.beyond);
   p.impulse = (c.step_s > 0.0 ? h / c.step_s : 0.0) * c.impulse;

@@ -18,15 +18,15 @@ namespace {
 using Block = Eigen::Matrix<double, 6, 6>;
 using Row6 = Eigen::Matrix<double, 6, 1>;
 
-constexpr double kCompliance = 1e-3;  // relative to the mobility of a row: of one body,
-constexpr double kLeast = 1e-5;       // lower bound,
-constexpr double kOnePoint = 1e-6;    // of a single point, whose rows cannot conflict
-constexpr double kAtCone = 0.9999;    // fraction of the friction bound: slides
-constexpr int kIterations = 12;       // iterations per guess,
-constexpr double kExact = 1e-10;      // final residual relative to the wanted velocities,
-constexpr double kStagnates = 0.9;    // or ratio of consecutive residuals, if held points conflict
-constexpr double kNearBound = 0.5;    // fraction of its bound: larger couples of the previous step are first guessed at the bound
-constexpr int kDense = 12;            // bodies; larger systems are factorised as sparse matrices
+constexpr double kComplianceRatio = 1e-3;       // relative to the mobility of a row: of one body,
+constexpr double kMinComplianceRatio = 1e-5;    // lower bound,
+constexpr double kPointComplianceRatio = 1e-6;  // of a single point, whose rows cannot conflict
+constexpr double kSlidingRatio = 0.9999;        // fraction of the friction bound: slides
+constexpr int kMaxCorrections = 12;             // iterations per guess,
+constexpr double kResidualRatio = 1e-10;        // final residual relative to the wanted velocities,
+constexpr double kStagnationRatio = 0.9;        // or ratio of consecutive residuals, if held points conflict
+constexpr double kCoupleBoundRatio = 0.5;       // fraction of its bound: larger couples of the previous step are first guessed at the bound
+constexpr int kMaxDenseBodies = 12;             // bodies; larger systems are factorised as sparse matrices
 
 enum class Hold : char { kOpen, kSticks, kSlides };
 
@@ -39,11 +39,11 @@ Row6 make_row(const Vec3& linear, const Vec3& angular) {
 /// Compliance of a row over its mobility. Soft enough for conflicts of 1e-9 m/s between rows (two touches of a rolling body), whose
 /// impulses must stay in the cone; stiff enough for convergence of chains and unequal masses.
 double choose_compliance(const std::vector<Mover>& movers, std::size_t points) {
-  if (points == 1) return kOnePoint;
+  if (points == 1) return kPointComplianceRatio;
   const auto [least, most] =
       std::minmax_element(movers.begin(), movers.end(), [](const Mover& x, const Mover& y) { return x.inverse_mass < y.inverse_mass; });
   const auto count = static_cast<double>(movers.size());
-  return std::max(kLeast, kCompliance * least->inverse_mass / (most->inverse_mass * count * count));
+  return std::max(kMinComplianceRatio, kComplianceRatio * least->inverse_mass / (most->inverse_mass * count * count));
 }
 
 /// Matrix of a guess: 6 x 6 blocks for touching bodies, lower triangle. Its pattern is the same for all guesses.
@@ -112,7 +112,7 @@ class System {
  private:
   using Place = Eigen::Map<Block, Eigen::Unaligned, Eigen::OuterStride<>>;
 
-  bool is_dense() const { return bodies_ <= kDense; }
+  bool is_dense() const { return bodies_ <= kMaxDenseBodies; }
   /// The block (row, column), row >= column.
   Place at(int row, int column) {
     const int size = 6 * bodies_;
@@ -233,7 +233,7 @@ void Guess::add(double normal_mass, double turning_mass, bool is_swept) {
   held.axes = {p.normal, tangent, cross(p.normal, tangent)};
   const double push = dot(p.impulse, p.normal);
   const Vec3 across = p.impulse - push * p.normal;
-  const bool slides = is_swept && push > 0.0 && norm(across) >= kAtCone * p.friction * push;
+  const bool slides = is_swept && push > 0.0 && norm(across) >= kSlidingRatio * p.friction * push;
   if (slides) held.sliding = across;
   // A new open touch stays open unless it would close without impulses.
   const double wanted = dot(p.wanted, p.normal);
@@ -243,8 +243,8 @@ void Guess::add(double normal_mass, double turning_mass, bool is_swept) {
     const double twist = dot(p.couple, p.normal), most = p.twisting_m * push;
     const Vec3 roll = p.couple - twist * p.normal;
     const double size = norm(roll), limit = p.rolling_m * push;
-    held.twists = std::abs(twist) >= kNearBound * most;
-    held.rolls = size >= kNearBound * limit;
+    held.twists = std::abs(twist) >= kCoupleBoundRatio * most;
+    held.rolls = size >= kCoupleBoundRatio * limit;
     if (held.twists) held.couple = std::copysign(most, twist) * p.normal;
     if (held.rolls && size > 0.0) held.couple = held.couple + (limit / size) * roll;
   }
@@ -287,9 +287,9 @@ bool Guess::solve(std::vector<Mover>& movers) {
   if (!factorise()) return false;
   move(movers);
   double before = 0.0;
-  for (int again = 0; again < kIterations; ++again) {
+  for (int again = 0; again < kMaxCorrections; ++again) {
     const double left = iterate(movers), rate = before > 0.0 ? left / before : 0.0;
-    if (left <= kExact * scale_ || (rate > 0.0 && rate * left <= kExact * scale_) || rate > kStagnates) break;
+    if (left <= kResidualRatio * scale_ || (rate > 0.0 && rate * left <= kResidualRatio * scale_) || rate > kStagnationRatio) break;
     before = left;
   }
   return true;
@@ -328,7 +328,7 @@ double Guess::iterate(std::vector<Mover>& movers) {
     add(p.a, make_row({}, couple));
     add(p.b, -make_row({}, couple));
   }
-  if (largest <= kExact * scale_) return largest;
+  if (largest <= kResidualRatio * scale_) return largest;
   system_.solve(right_);
   const auto get = [&](int body, int from) {
     const double* x = right_.data() + 6 * body + from;

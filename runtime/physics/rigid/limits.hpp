@@ -3,19 +3,20 @@
 
 namespace carillon::rigid {
 
-inline constexpr double kSlowest = 1e-3;   // m/s; slower touches are no impacts (a fall from 0.05 um)
-inline constexpr double kRattling = 5e-2;  // m/s; slower touches of a rattling pair are no impacts
-inline constexpr double kTogether = 1e-4;  // s; touches nearer in time are one impact
-inline constexpr double kTouch = 1e-7;     // m; smaller gaps count as contact
-inline constexpr double kDeep = 2e-6;      // m; deeper contacts are pushed out
-inline constexpr double kTooDeep = 2e-5;   // m; deeper bodies are moved apart
-inline constexpr double kMissing = 5e-6;   // m; excess of a missing touch over all touches of a pair
-inline constexpr double kPushOut = 80.0;   // 1/s; removal rate of penetration or of the stretch of a cord
-inline constexpr double kBalanced = 1e-4;  // relative to gravity: permitted residual of a solution with zero velocity
-inline constexpr int kMaxGuesses = 12;     // of a factorised problem, for small ones and proofs of rest
-inline constexpr double kSharpest = 5e-4;  // m; minimum contact radius
-inline constexpr double kSlow = 5e-3;      // m/s; slower bodies may be coming to rest
-inline constexpr double kLong = 0.3;   // s; after this time at low speed the mean acceleration is small, and a larger residual is permitted
-inline constexpr double kReach = 0.3;  // relative to the size of the smaller body: search distance of touches
+inline constexpr double kMinImpactSpeedMS = 1e-3;   // m/s; slower touches are no impacts (a fall from 0.05 um)
+inline constexpr double kRattleSpeedMS = 5e-2;      // m/s; slower touches of a rattling pair are no impacts
+inline constexpr double kSimultaneousS = 1e-4;      // s; touches nearer in time are one impact
+inline constexpr double kTouchGapM = 1e-7;          // m; smaller gaps count as contact
+inline constexpr double kDeepM = 2e-6;              // m; deeper contacts are pushed out
+inline constexpr double kMaxDepthM = 2e-5;          // m; deeper bodies are moved apart
+inline constexpr double kMissingDepthM = 5e-6;      // m; excess of a missing touch over all touches of a pair
+inline constexpr double kPushOutRatePerS = 80.0;    // 1/s; removal rate of penetration or of the stretch of a cord
+inline constexpr double kRestResidualRatio = 1e-4;  // relative to gravity: permitted residual of a solution with zero velocity
+inline constexpr int kMaxGuesses = 12;              // of a factorised problem, for small ones and proofs of rest
+inline constexpr double kMinContactRadiusM = 5e-4;  // m; minimum contact radius
+inline constexpr double kSlowSpeedMS = 5e-3;        // m/s; slower bodies may be coming to rest
+inline constexpr double kLongSlowS =
+    0.3;  // s; after this time at low speed the mean acceleration is small, and a larger residual is permitted
+inline constexpr double kSearchRangeRatio = 0.3;  // relative to the size of the smaller body: search distance of touches
 
 }  // namespace carillon::rigid

@@ -14,9 +14,9 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr int kMaxHits = 8;       // per impact
-constexpr double kEarly = 1e-2;   // m/s; minimum approach for an impact before contact of the rigid surfaces
-constexpr int kMaxTogether = 12;  // including resting contacts
+constexpr int kMaxHits = 8;                // per impact
+constexpr double kMinEarlySpeedMS = 1e-2;  // m/s; minimum approach for an impact before contact of the rigid surfaces
+constexpr int kMaxContacts = 12;           // including resting contacts
 
 /// (n) shape values along a direction.
 std::vector<double> project(std::span<const double> shape, const Vec3& along) {
@@ -52,7 +52,7 @@ bool ModalImpacts::predict(const Step& step, Collision& collision) {
   for (int n = 0; Hit & hit : collision.hits) {
     const Contact& c = collision.contacts[n].get();
     Point& point = collision.points[n++];
-    if (!(hit.approach_m_s > kSlowest) || c.is_closed()) continue;
+    if (!(hit.approach_m_s > kMinImpactSpeedMS) || c.is_closed()) continue;
     if (!hit.is_cord && find_own(step, hit) != nullptr) {
       integrate = true;
       continue;
@@ -117,7 +117,7 @@ bool ModalImpacts::add_resting(const Collision& collision, const Instants& insta
       grows = true;
     }
   std::sort(order.begin(), order.end());
-  return order.size() == hit_count || order.size() <= kMaxTogether;
+  return order.size() == hit_count || order.size() <= kMaxContacts;
 }
 
 /// True if two members of one articulation are struck.
@@ -140,7 +140,7 @@ std::optional<ModalImpacts::Selection> ModalImpacts::select(const Step& step, co
   std::vector<char>& rests = selection.rests;
   rests.assign(hits.size(), 1);
   for (int n = 0; n < static_cast<int>(hits.size()); ++n) {
-    if (!(hits[n].approach_m_s > kSlowest) || hits[n].is_cord) continue;
+    if (!(hits[n].approach_m_s > kMinImpactSpeedMS) || hits[n].is_cord) continue;
     order.push_back(n);
     rests[n] = 0;
   }
@@ -167,7 +167,7 @@ bool ModalImpacts::join(const std::vector<Hit>& hits, Selection& selection, Touc
     }
   const bool leans = std::any_of(order.begin(), order.end(), [&](int n) { return selection.rests[n] != 0; });
   const auto together = order.size() + (joined != nullptr ? joined->contacts.size() : 0);
-  if (leans) return together <= kMaxTogether;
+  if (leans) return together <= kMaxContacts;
   if (together <= kMaxHits) return true;
   if (joined != nullptr) end(*std::exchange(joined, nullptr), touches);
   if (order.size() > kMaxHits) {
@@ -305,7 +305,7 @@ double ModalImpacts::calc_swing(const Contact& touch) {
 
 /// True if the swing of the pair's surfaces is relevant and its bodies are in no impact.
 bool ModalImpacts::may_begin_early(const Step& step, const Pair& pair, const Instants& instants) const {
-  if (pair.cord >= 0 || !step.has(pair) || bodies_.get_swing(pair.a) + bodies_.get_swing(pair.b) <= kTooDeep) return false;
+  if (pair.cord >= 0 || !step.has(pair) || bodies_.get_swing(pair.a) + bodies_.get_swing(pair.b) <= kMaxDepthM) return false;
   const auto is_free = [&](int body) {
     return body < 0 ||
            (!bodies_.is_in_impact(body) && bodies_.find_articulation(body) == nullptr && !instants.is_crowded(body, bodies_.get_time()));
@@ -321,10 +321,10 @@ void ModalImpacts::begin_early(const Step& step, double length_s, const Instants
     std::vector<int> order;
     for (Contact& c : pair->contacts) {
       const double approach = bodies_.calc_approach(c.touch, c.a, c.b);
-      if (c.presses || c.is_closed() || approach < kEarly) continue;
+      if (c.presses || c.is_closed() || approach < kMinEarlySpeedMS) continue;
       const double open_m = c.touch.gap_m - (approach + norm(bodies_.gravity()) * length_s) * length_s;
       if (open_m > bodies_.get_swing(c.a) + bodies_.get_swing(c.b)) continue;
-      if (const double swing_m = calc_swing(c); swing_m <= kTooDeep || open_m >= swing_m) continue;
+      if (const double swing_m = calc_swing(c); swing_m <= kMaxDepthM || open_m >= swing_m) continue;
       early.push_back(&c);
       order.push_back(static_cast<int>(hits.size()));
       hits.push_back({.a = c.a, .b = c.b, .touch = c.touch, .triangles = c.triangles});

@@ -10,16 +10,16 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr double kLongest = 50e-3;     // s; end of slow impacts, which become resting contacts,
-constexpr double kLongestOfAll = 0.5;  // s; and of all others
-constexpr double kRight = 0.01;        // fraction of the kinetic energy: maximum correction per step of an impact on joints
-constexpr double kSamePlace = 0.05;    // of the size
-constexpr double kMoved = 0.02;        // fraction of the size: minimum distance of a contact from its touch for an update
-constexpr int kMaxFollowed = 8;        // contacts per impact, including open ones
-constexpr double kExplained = 1.3;     // permitted ratio of the depth to that of spring and modes
-constexpr double kOneFace = 0.99;      // minimum cosine between normals of one face,
-constexpr double kOnePlane = 0.02;     // fraction of the size: maximum distance of corners from its plane
-constexpr double kCalmTime = 5e-3;     // s; after the end of an impact, without slow impacts of the pair
+constexpr double kMaxSlowImpactS = 50e-3;     // s; end of slow impacts, which become resting contacts,
+constexpr double kMaxImpactS = 0.5;           // s; and of all others
+constexpr double kMaxCorrectionRatio = 0.01;  // fraction of the kinetic energy: maximum correction per step of an impact on joints
+constexpr double kSamePlaceRatio = 0.05;      // of the size
+constexpr double kMinMoveRatio = 0.02;        // fraction of the size: minimum distance of a contact from its touch for an update
+constexpr int kMaxFollowed = 8;               // contacts per impact, including open ones
+constexpr double kExplainedRatio = 1.3;       // permitted ratio of the depth to that of spring and modes
+constexpr double kFaceCosine = 0.99;          // minimum cosine between normals of one face,
+constexpr double kFlatnessRatio = 0.02;       // fraction of the size: maximum distance of corners from its plane
+constexpr double kQuietAfterImpactS = 5e-3;              // s; after the end of an impact, without slow impacts of the pair
 
 /// Area of the convex polygon of given points [m^2].
 double calc_area(std::vector<Vec3> corners, const Vec3& normal) {
@@ -67,7 +67,7 @@ void ModalImpacts::for_contacts(const Pair& pair, Do&& act) const {
 }
 
 bool ModalImpacts::is_pressed(const Pair& pair, const Vec3& where) const {
-  const double near = kSamePlace * bodies_.calc_size(pair.a, pair.b);
+  const double near = kSamePlaceRatio * bodies_.calc_size(pair.a, pair.b);
   bool any = false;
   for_contacts(pair, [&](const ModalImpact& modal, int k) { any = any || norm(find_station(modal.contacts[k]) - where) < near; });
   return any;
@@ -81,7 +81,7 @@ double ModalImpacts::calc_depth(const Pair& pair) const {
 
 /// Depth explained by springs and modes at a point.
 double ModalImpacts::calc_depth(const Pair& pair, const Vec3& where) const {
-  const double near = kSamePlace * bodies_.calc_size(pair.a, pair.b);
+  const double near = kSamePlaceRatio * bodies_.calc_size(pair.a, pair.b);
   double depth = 0.0;
   for_contacts(pair, [&](const ModalImpact& modal, int k) {
     if (norm(find_station(modal.contacts[k]) - where) < near) depth = std::max(depth, modal.impact->calc_depth(k));
@@ -138,11 +138,11 @@ void ModalImpacts::end_where_touching(const Step& step, TouchSets& touches) {
       if (modal == nullptr || pair->cord >= 0) continue;
       bool is_deep = false, is_resting = false;
       for (const Contact& c : pair->contacts) {
-        const double depth = -c.touch.gap_m - pair->sag_m - kTooDeep;
-        is_deep = is_deep || (depth > 0.0 && depth > kExplained * calc_depth(*pair, c.touch.where_m));
-        is_resting = is_resting || (c.carries() && std::abs(bodies_.calc_approach(c.touch, c.a, c.b)) <= kSlowest);
+        const double depth = -c.touch.gap_m - pair->sag_m - kMaxDepthM;
+        is_deep = is_deep || (depth > 0.0 && depth > kExplainedRatio * calc_depth(*pair, c.touch.where_m));
+        is_resting = is_resting || (c.carries() && std::abs(bodies_.calc_approach(c.touch, c.a, c.b)) <= kMinImpactSpeedMS);
       }
-      if (is_deep) pair->rattles_until_s = std::max(pair->rattles_until_s, bodies_.get_time() + kCalmTime);
+      if (is_deep) pair->rattles_until_s = std::max(pair->rattles_until_s, bodies_.get_time() + kQuietAfterImpactS);
       if (is_deep || is_resting) end(*modal, touches);
     }
 }
@@ -158,7 +158,7 @@ void ModalImpacts::place(ModalContact& contact, Contact& touch, const geometry::
   contact.gap_m = at.gap_m;
   touch.press();
   const Vec3 station = find_station(touch.a, touch.b, at);
-  if (norm(contact.station - station) < kMoved * bodies_.calc_size(touch.a, touch.b)) return;
+  if (norm(contact.station - station) < kMinMoveRatio * bodies_.calc_size(touch.a, touch.b)) return;
   report(contact);
   forces.continues = false;
   Hit hit{.a = touch.a, .b = touch.b, .touch = at, .triangles = touch.triangles};
@@ -174,7 +174,7 @@ void ModalImpacts::place(ModalContact& contact, Contact& touch, const geometry::
 /// Contact for a touch with a new id: the nearest at its position, or an open one for a touch that may close.
 ModalContact* ModalImpacts::find_nearest(ModalImpact& modal, const Contact& touch, bool is_near) const {
   ModalContact* nearest = nullptr;
-  double least_m = kSamePlace * bodies_.calc_size(touch.a, touch.b);
+  double least_m = kSamePlaceRatio * bodies_.calc_size(touch.a, touch.b);
   for (int n = 0; ModalContact & contact : modal.contacts) {
     const bool is_open = !(modal.impact->get_compression(n++) > 0.0);
     if (contact.is_followed || !contact.is_between(touch.a, touch.b)) continue;
@@ -203,11 +203,12 @@ std::vector<impact::Spring> ModalImpacts::find_springs(const ModalImpact& modal,
     std::vector<Vec3> corners;
     for (int k = first; k < count; ++k) {
       const ModalContact& contact = modal.contacts[k];
-      const double flat_m = springs[k].exponent == 1.0 ? 0.0 : kTooDeep,
+      const double flat_m = springs[k].exponent == 1.0 ? 0.0 : kMaxDepthM,
                    pressed_m = modal.impact->get_compression(k) + std::max(modal.impact->calc_approach(k), 0.0) * part_s;
       if (is_taken[k] != 0 || !contact.is_sharp || !contact.is_followed || !contact.is_between(one.forces.a, one.forces.b) ||
-          dot(contact.normal, one.normal) < kOneFace || !(pressed_m > flat_m) ||
-          std::abs(dot(one.normal, find_station(contact) - find_station(one))) > kOnePlane * bodies_.calc_size(one.forces.a, one.forces.b))
+          dot(contact.normal, one.normal) < kFaceCosine || !(pressed_m > flat_m) ||
+          std::abs(dot(one.normal, find_station(contact) - find_station(one))) >
+              kFlatnessRatio * bodies_.calc_size(one.forces.a, one.forces.b))
         continue;
       face.push_back(k);
       corners.push_back(find_station(contact));
@@ -225,7 +226,7 @@ std::vector<impact::Spring> ModalImpacts::find_springs(const ModalImpact& modal,
 
 void ModalImpacts::follow(ModalImpact& modal, Pair& pair, double length_s, TouchSets& touches) {
   const double reach_m =
-      2.0 * bodies_.calc_closing_speed(pair.a, pair.b) * length_s + bodies_.get_swing(pair.a) + bodies_.get_swing(pair.b) + kTooDeep;
+      2.0 * bodies_.calc_closing_speed(pair.a, pair.b) * length_s + bodies_.get_swing(pair.a) + bodies_.get_swing(pair.b) + kMaxDepthM;
   std::vector<Contact*> others;
   for (Contact& c : pair.contacts) {
     const auto same = std::find_if(modal.contacts.begin(), modal.contacts.end(), [&](const ModalContact& contact) {
@@ -345,8 +346,8 @@ void ModalImpacts::advance(const Step& step, double to_s, double part_s, double 
     if (to_s >= window_end_s - 1e-9)
       for (ModalContact& contact : modal.contacts) report(contact);
     const bool is_slow = std::all_of(modal.bodies.begin(), modal.bodies.end(),
-                                     [&](int body) { return !bodies_.moves(body) || bodies_.calc_speed(body) < kRattling; });
-    if (!ended && to_s - modal.start_s <= (is_slow ? kLongest : kLongestOfAll)) continue;
+                                     [&](int body) { return !bodies_.moves(body) || bodies_.calc_speed(body) < kRattleSpeedMS; });
+    if (!ended && to_s - modal.start_s <= (is_slow ? kMaxSlowImpactS : kMaxImpactS)) continue;
     // The impact, and the other forces with it, extend beyond the end of the part.
     const double beyond_s = modal.start_s + modal.impact->get_time() - to_s;
     const std::vector<int> moved = modal.bodies;
@@ -385,7 +386,7 @@ void ModalImpacts::move_articulation(const ArticulationStep& step, const impact:
   // change of all velocities.
   const auto [kinetic, after] = calc();
   const double gained = after - before - struck.work_j;
-  if (!(std::abs(gained) < kRight * kinetic)) return;
+  if (!(std::abs(gained) < kMaxCorrectionRatio * kinetic)) return;
   const double part = std::sqrt(1.0 - gained / kinetic);
   for (double& u : articulation.now.u) u *= part;
   bodies_.place(articulation);

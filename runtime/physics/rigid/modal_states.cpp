@@ -13,7 +13,7 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr double kLargestShape = 4.0;  // largest mode shape value times sqrt(mass): at the corners of a plate
+constexpr double kMaxShapeValue = 4.0;  // largest mode shape value times sqrt(mass): at the corners of a plate
 
 }  // namespace
 
@@ -60,7 +60,7 @@ std::vector<double> calc_amplitudes(const impact::Modes& modes, const std::vecto
 void note_swing(Bodies& bodies, int body, const std::vector<double>& q, const std::vector<double>& q_dot) {
   double sum = 0.0;
   for (const double amplitude : calc_amplitudes(*bodies.solid(body).modes, q, q_dot)) sum += amplitude;
-  bodies.set_swing(body, kLargestShape / std::sqrt(bodies.solid(body).mass_kg) * sum);
+  bodies.set_swing(body, kMaxShapeValue / std::sqrt(bodies.solid(body).mass_kg) * sum);
 }
 
 void ModalStates::excite(Strike& strike, double available_j) {
@@ -68,7 +68,7 @@ void ModalStates::excite(Strike& strike, double available_j) {
   const Ledger ledger_before = ledger_;
   double given = 0.0;
   for (Hit& hit : strike.hits) {
-    if (hit.impulse == Vec3{} || hit.is_cord || !(hit.approach_m_s > kSlowest)) continue;
+    if (hit.impulse == Vec3{} || hit.is_cord || !(hit.approach_m_s > kMinImpactSpeedMS)) continue;
     for (const bool is_a : {true, false}) {
       const int body = is_a ? hit.a : hit.b;
       if (!bodies_.has_modes(body) || bodies_.is_in_impact(body)) continue;

@@ -13,13 +13,13 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr int kRounds = 3;           // iterations, each with the remaining gaps
-constexpr int kMaxFactorised = 60;   // touches of an island
-constexpr double kTolerance = 1e-7;  // m; tolerance of sweeps,
-constexpr int kSweeps = 200;         // maximum number of sweeps
-constexpr double kMaxRatio = 10.0;   // displacement of any point relative to the excess of the deepest touch
-constexpr double kMaxPaid = 0.5;     // fraction of the kinetic energy
-constexpr double kDisplaced = 0.1;   // relative to the largest displacement: bodies that pay
+constexpr int kIterations = 3;           // iterations, each with the remaining gaps
+constexpr int kMaxFactorised = 60;       // touches of an island
+constexpr double kToleranceM = 1e-7;     // m; tolerance of sweeps,
+constexpr int kMaxSweeps = 200;          // maximum number of sweeps
+constexpr double kMaxRatio = 10.0;       // displacement of any point relative to the excess of the deepest touch
+constexpr double kMaxPaidRatio = 0.5;    // fraction of the kinetic energy
+constexpr double kDisplacedRatio = 0.1;  // relative to the largest displacement: bodies that pay
 
 }  // namespace
 
@@ -58,7 +58,7 @@ std::vector<Point> Projection::make_points(const Step& step, bool& is_held) cons
 }
 
 void Projection::run(const Step& step, double allowed_m) {
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < kIterations; ++round) {
     const double excess = find_excess(step);
     if (excess <= allowed_m) return;
     std::vector<Mover> resting(step.count());
@@ -71,7 +71,7 @@ void Projection::run(const Step& step, double allowed_m) {
     std::vector<Mover> displacements = resting;
     if (static_cast<int>(points.size()) > kMaxFactorised || !solver_.solve_directly(displacements, points, kMaxGuesses)) {
       displacements = resting;
-      solver_.solve(displacements, points, kTolerance, kSweeps);
+      solver_.solve(displacements, points, kToleranceM, kMaxSweeps);
     }
     limit(step, kMaxRatio * excess, displacements);
     move(step, displacements, is_held);
@@ -133,7 +133,7 @@ void Projection::pay(const Step& step, const std::vector<Mover>& displacements, 
   for (const Mover& d : displacements) farthest = std::max(farthest, norm(d.velocity));
   const auto for_displaced = [&](auto&& act) {
     for (int n = 0; n < step.count(); ++n)
-      if (is_movable(step.body(n)) && norm(displacements[n].velocity) >= kDisplaced * farthest) act(step.body(n), displacements[n]);
+      if (is_movable(step.body(n)) && norm(displacements[n].velocity) >= kDisplacedRatio * farthest) act(step.body(n), displacements[n]);
   };
   double momentum = 0.0,
          mass = 0.0;  // along the displacement: reducing the speed by s reduces the kinetic energy by momentum s - mass s^2 / 2
@@ -151,7 +151,7 @@ void Projection::pay(const Step& step, const std::vector<Mover>& displacements, 
     bodies_.place(i);
     kinetic_j += calc_kinetic(bodies_.solid(i), s, bodies_.placed(i));
   });
-  const double rest_j = std::min(owed_j - most_j, kMaxPaid * kinetic_j);
+  const double rest_j = std::min(owed_j - most_j, kMaxPaidRatio * kinetic_j);
   if (!(rest_j > 0.0)) return;
   const double part = std::sqrt(1.0 - rest_j / kinetic_j);
   for_displaced([&](int i, const Mover&) {

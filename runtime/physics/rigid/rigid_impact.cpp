@@ -16,10 +16,10 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr int kFewPoints = 8;   // maximum points of an impact solved to rounding, with evenly shared load
-constexpr double kRow = 0.9;    // minimum restitution in a row that transmits a blow,
-constexpr int kMaxBlows = 100;  // maximum impacts per contact
-constexpr int kFar = 3;         // bodies from the striking one to the last one moved
+constexpr int kMaxExactPoints = 8;          // maximum points of an impact solved to rounding, with evenly shared load
+constexpr double kMinRowRestitution = 0.9;  // minimum restitution in a row that transmits a blow,
+constexpr int kMaxBlows = 100;              // maximum impacts per contact
+constexpr int kMaxReachBodies = 3;          // bodies from the striking one to the last one moved
 
 /// With friction Newton's restitution can gain energy (Kane 1984): the fraction of all impulses that does not.
 double calc_conserving_part(const std::vector<Mover>& before, const std::vector<Mover>& after, const std::vector<Point>& points) {
@@ -38,7 +38,7 @@ std::vector<ContactRef> RigidImpact::gather(const Step& step, const std::vector<
   std::vector<ContactRef> taken = first;
   std::set<int> bodies;
   for (const ContactRef& ref : first) bodies.insert(ref.pair->a), bodies.insert(ref.pair->b);
-  for (int far = 0; far < kFar; ++far) {
+  for (int far = 0; far < kMaxReachBodies; ++far) {
     std::set<int> next = bodies;
     for (Pair* pair : step.island().pairs) {
       if (!step.has(*pair)) continue;
@@ -47,8 +47,8 @@ std::vector<ContactRef> RigidImpact::gather(const Step& step, const std::vector<
       for (int k = 0; const Contact& c : pair->contacts) {
         const ContactRef ref{pair, k++};
         if (c.presses) continue;
-        const bool soon = c.touch.gap_m - bodies_.calc_approach(c.touch, c.a, c.b) * step.together_s <= kTouch;
-        if (!soon && !(c.touching && c.touch.gap_m <= kDeep)) continue;
+        const bool soon = c.touch.gap_m - bodies_.calc_approach(c.touch, c.a, c.b) * step.together_s <= kTouchGapM;
+        if (!soon && !(c.touching && c.touch.gap_m <= kDeepM)) continue;
         if (std::find(taken.begin(), taken.end(), ref) == taken.end()) taken.push_back(ref);
         next.insert(pair->a);
         next.insert(pair->b);
@@ -95,7 +95,7 @@ Hit RigidImpact::make_hit(const Collision& collision, const Contact& c, Point& p
     const double mobility = dot(p.normal, calc_mobility(collision.movers, p) * p.normal);
     hit.linked_mass_kg = mobility > 0.0 ? 1.0 / mobility : 0.0;
   }
-  if (hit.approach_m_s <= kSlowest) return hit;
+  if (hit.approach_m_s <= kMinImpactSpeedMS) return hit;
   if (hit.is_cord) {
     hit.restitution = c.touching ? 0.0 : touches_.cord(c.cord).restitution;
   } else if (!c.is_closed()) {
@@ -115,7 +115,7 @@ bool RigidImpact::is_row(const Collision& collision) const {
   for (const Hit& hit : collision.hits) {
     if (hit.linked_mass_kg > 0.0) return false;
     if (hit.is_cord || !bodies_.moves(hit.a) || !bodies_.moves(hit.b)) continue;
-    if (bodies_.calc_restitution(hit.a, hit.b) < kRow || !pairs.insert({hit.a, hit.b}).second) return false;
+    if (bodies_.calc_restitution(hit.a, hit.b) < kMinRowRestitution || !pairs.insert({hit.a, hit.b}).second) return false;
     if (++others[hit.a] > 2 || ++others[hit.b] > 2) return false;
   }
   return pairs.size() > 1;
@@ -131,12 +131,13 @@ void RigidImpact::solve_row(Collision& collision) const {
     const double approach = calc_approach(*fastest);
     if (approach <= 1e-9) break;
     Hit& hit = collision.hits[fastest - points.begin()];
-    if (!hit.is_cord && bodies_.moves(hit.a) && bodies_.moves(hit.b) && approach > kSlowest)
+    if (!hit.is_cord && bodies_.moves(hit.a) && bodies_.moves(hit.b) && approach > kMinImpactSpeedMS)
       hit.restitution = bodies_.calc_restitution(hit.a, hit.b);
     hit.approach_m_s = std::max(hit.approach_m_s, approach);
     const Vec3& n = fastest->normal;
-    const Vec3 push =
-        ((1.0 + (approach > kSlowest ? hit.restitution : 0.0)) * approach / dot(n, calc_mobility(collision.movers, *fastest) * n)) * n;
+    const Vec3 push = ((1.0 + (approach > kMinImpactSpeedMS ? hit.restitution : 0.0)) * approach /
+                       dot(n, calc_mobility(collision.movers, *fastest) * n)) *
+                      n;
     rigid::apply(collision.movers, *fastest, push);
     hit.impulse = hit.impulse + push;
   }
@@ -145,11 +146,11 @@ void RigidImpact::solve_row(Collision& collision) const {
 void RigidImpact::solve(Collision& collision) {
   if (is_row(collision)) return solve_row(collision);
   std::vector<Point>& points = collision.points;
-  double scale = kSlowest;
+  double scale = kMinImpactSpeedMS;
   for (const Hit& hit : collision.hits) scale = std::max(scale, std::abs(hit.approach_m_s));
   const std::vector<Mover> before = collision.movers;
   const int count = static_cast<int>(points.size());
-  const bool is_few = count <= kFewPoints;
+  const bool is_few = count <= kMaxExactPoints;
   solver_.solve_evenly(collision.movers, points, is_few ? 20 * count : 0, (is_few ? 1e-9 : 1e-4) * scale, is_few ? 1000 : 60);
   const double part = calc_conserving_part(before, collision.movers, points);
   for (int n = 0; n < count; ++n) collision.hits[n].impulse = part * points[n].impulse;
@@ -211,7 +212,7 @@ Strike RigidImpact::apply(Collision& collision, double& lost_j) {
   for (int n = 0; const Hit& hit : strike.hits) {
     Contact& c = collision.contacts[n++].get();
     const bool rebounds = hit.restitution > 0.0;
-    c.touching = !rebounds && c.touch.gap_m <= kDeep;
+    c.touching = !rebounds && c.touch.gap_m <= kDeepM;
     if (rebounds) c.impulse = c.couple = {};
   }
   return strike;

@@ -25,7 +25,7 @@ using sweeps::Response;
 using sweeps::Row;
 using sweeps::Turning;
 
-constexpr double kLocked = 1e-9;  // relative to the largest mobility at a point: smaller ones are directions blocked by joints
+constexpr double kLockedMobilityRatio = 1e-9;  // relative to the largest mobility at a point: smaller ones are directions blocked by joints
 
 void add_mobility(Mat3& k, const Mover& m, const Vec3& arm) {
   // 1/m I - [r] I^-1 [r]
@@ -234,16 +234,16 @@ void Solver::lock(const std::vector<Mover>& movers, const Point& p, const Mat3& 
   const Mat3 k = axes * (calc_mobility(movers, p) * transpose(axes));
   const double kn = k[0][0], trace = k[0][0] + k[1][1] + k[2][2];
   Mat3 range{}, unused{};
-  set_columns(row.inverse, calc_pseudo_inverse(k, range, kLocked * trace));
+  set_columns(row.inverse, calc_pseudo_inverse(k, range, kLockedMobilityRatio * trace));
   set_columns(locked.allowed, range);
-  row.normal_mass = kn > kLocked * trace ? 1.0 / kn : 0.0;
+  row.normal_mass = kn > kLockedMobilityRatio * trace ? 1.0 / kn : 0.0;
   row.mobility = row.normal_mass > 0.0 ? kn : 0.0;
   // Tangential directions left free by joints for given normal motion.
   locked.by_push = Four{0.0, k[1][0], k[2][0], 0.0};
   Mat3 left{};
   for (std::size_t r = 1; r < 3; ++r)
     for (std::size_t c = 1; c < 3; ++c) left[r][c] = k[r][c] - row.normal_mass * k[r][0] * k[c][0];
-  set_columns(locked.across, calc_pseudo_inverse(left, unused, kLocked * trace));
+  set_columns(locked.across, calc_pseudo_inverse(left, unused, kLockedMobilityRatio * trace));
   locked.pushed.begin = static_cast<int>(problem_.responses.size());
   for (const bool is_a : {true, false}) add_responses(movers, is_a ? p.a : p.b, is_a ? p.arm_a : p.arm_b, is_a ? 1.0 : -1.0, true, axes);
   locked.pushed.end = static_cast<int>(problem_.responses.size());

@@ -13,14 +13,14 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr double kShortest = 1e-9;  // s; shorter remainders of a step are skipped
-constexpr double kStruck = 5e-5;    // s; longest part of a step after the start of a modal impact
-constexpr int kMaxMissed = 30;      // per step: instants at which no touch struck
-constexpr int kMaxSought = 3;       // of these, with a search for closings on the path
-constexpr int kMaxCompleted = 4;    // repeated solutions of a step with missing touches added
-constexpr int kMaxImpacts = 4;      // individual impacts of an island per step; an island with more is crowded
-constexpr int kMinImpacts = 2;      // the same for the largest islands, whose impacts cost more
-constexpr int kStruckBodies = 48;   // bodies of an island times its impacts per step
+constexpr double kMinStepS = 1e-9;        // s; shorter remainders of a step are skipped
+constexpr double kMaxStruckStepS = 5e-5;  // s; longest part of a step after the start of a modal impact
+constexpr int kMaxMissed = 30;            // per step: instants at which no touch struck
+constexpr int kMaxSought = 3;             // of these, with a search for closings on the path
+constexpr int kMaxCompleted = 4;          // repeated solutions of a step with missing touches added
+constexpr int kMaxImpacts = 4;            // individual impacts of an island per step; an island with more is crowded
+constexpr int kMinImpacts = 2;            // the same for the largest islands, whose impacts cost more
+constexpr int kMaxStruckBodies = 48;      // bodies of an island times its impacts per step
 
 }  // namespace
 
@@ -100,17 +100,17 @@ void Space::step_island(Island& island, double start_s, double length_s) {
   int impacts = 0, missed = 0, more = 0;
   bool begun = false;
   const bool wobbles = std::any_of(island.bodies.begin(), island.bodies.end(),
-                                   [&](int body) { return !bodies_.is_flat(body) && bodies_.calc_speed(body) > kSlow; });
+                                   [&](int body) { return !bodies_.is_flat(body) && bodies_.calc_speed(body) > kSlowSpeedMS; });
   const bool is_on_ground =
       step_.count() == 1 && std::all_of(island.pairs.begin(), island.pairs.end(), [](const Pair* pair) { return pair->b < 0; });
-  const double open_m = is_on_ground ? kDeep : wobbles ? kTooDeep - kMissing : kTooDeep;
-  const int max_impacts = std::clamp(kStruckBodies / step_.count(), kMinImpacts, kMaxImpacts);
+  const double open_m = is_on_ground ? kDeepM : wobbles ? kMaxDepthM - kMissingDepthM : kMaxDepthM;
+  const int max_impacts = std::clamp(kMaxStruckBodies / step_.count(), kMinImpacts, kMaxImpacts);
   if (instants_.is_crowded(island, start_s)) {
     strike_at_once(start_s, length_s);
     impacts = max_impacts;
   }
-  while (length_s - done > kShortest) {
-    const double h = impacts > 0 && !modal_impacts_.list().empty() ? std::min(length_s - done, kStruck) : length_s - done;
+  while (length_s - done > kMinStepS) {
+    const double h = impacts > 0 && !modal_impacts_.list().empty() ? std::min(length_s - done, kMaxStruckStepS) : length_s - done;
     bodies_.set_time(start_s + done);
     modal_impacts_.begin_early(step_, h, instants_);
     modal_impacts_.follow(step_, h, touches_);
@@ -131,7 +131,7 @@ void Space::step_island(Island& island, double start_s, double length_s) {
     if (is_completed && impacts >= max_impacts && more++ < kMaxCompleted && strike_at_once(start_s + done, h)) continue;
     double at = h;
     std::vector<ContactRef> first;
-    step_.together_s = kTogether;
+    step_.together_s = kSimultaneousS;
     const bool struck = impacts < max_impacts && instants_.find(step_, at, first);
     problem_.keep_impulses(step_, at);
     for (Pair* pair : island.pairs) touches_.travel(*pair, at, h);
@@ -141,14 +141,14 @@ void Space::step_island(Island& island, double start_s, double length_s) {
       bodies_.set_time(start_s + done);
       for (Pair* pair : island.pairs)
         if (!pair->contacts.empty()) touches_.refresh(*pair);
-      if (instants_.confirm(step_, first, length_s - done, kDeep * (1 + missed))) {
+      if (instants_.confirm(step_, first, length_s - done, kDeepM * (1 + missed))) {
         strike(first);
         if (++impacts == max_impacts) instants_.set_crowded(island, start_s + length_s);
-      } else if ((missed += at > kShortest ? 1 : missed + 1) > kMaxMissed) {  // an immediate instant would be missed again
+      } else if ((missed += at > kMinStepS ? 1 : missed + 1) > kMaxMissed) {  // an immediate instant would be missed again
         impacts = max_impacts;
       }
     }
-    if (length_s - done > kShortest)
+    if (length_s - done > kMinStepS)
       for (Pair* pair : island.pairs) touches_.update(*pair, length_s - done);
   }
   step_.end();
@@ -170,7 +170,7 @@ bool Space::try_rest(Island& island, double length_s) {
     pair->memory.known = false;
     touches_.search(*pair, length_s);
   }
-  projection_.run(step_, kDeep);
+  projection_.run(step_, kDeepM);
   if (rest_.try_island(island, length_s)) return true;
   if (ledger_.costs.pushes == pushes) return false;
   ledger_.add_to(after);

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "tests/unit/runtime/physics/checks.hpp"
-#include "tests/unit/runtime/physics/plate_bank.hpp"
-#include "tests/unit/runtime/physics/impact/zener.hpp"
 #include "tests/unit/runtime/physics/geometry/solids.hpp"
+#include "tests/unit/runtime/physics/impact/zener.hpp"
+#include "tests/unit/runtime/physics/plate_bank.hpp"
 
 namespace carillon::physics::tests {
 namespace {

@@ -8,8 +8,8 @@
 #include <numbers>
 #include <vector>
 
-#include "tests/unit/runtime/physics/rigid/momenta.hpp"
 #include "tests/unit/runtime/physics/geometry/solids.hpp"
+#include "tests/unit/runtime/physics/rigid/momenta.hpp"
 
 namespace carillon::rigid {
 namespace {

@@ -164,11 +164,11 @@ TEST(Jointed, WhatCannotBeIsRefusedByName) {
                        "the joint between 'plate' and 'ball' closes a loop"));
   EXPECT_TRUE(contains(find_refusal([](WorldSpec& w) { w.joints[1].kind = Kind::kWeld; }), "set \"fixed\""));
   EXPECT_TRUE(contains(find_refusal([](WorldSpec& w) { w.joints[1].body = 0, w.joints[1].to = 0; }), "to itself"));
-  EXPECT_TRUE(contains(find_refusal([](WorldSpec& w) { w.bodies[1].fixed = true; }), "neither of them moves"));
-  EXPECT_TRUE(contains(find_refusal([](WorldSpec& w) { w.bodies[0].velocity_m_s = {0, 1, 0}; }), "what its joints allow"));
+  EXPECT_TRUE(contains(find_refusal([](WorldSpec& w) { w.bodies[1].fixed = true; }), "two bodies that do not move"));
+  EXPECT_TRUE(contains(find_refusal([](WorldSpec& w) { w.bodies[0].velocity_m_s = {0, 1, 0}; }), "those that its joints allow"));
   EXPECT_TRUE(contains(find_refusal([](WorldSpec& w) { w.joints[1].damping = -1.0; }), "damping"));
   EXPECT_TRUE(contains(find_refusal([](WorldSpec& w) { w.joints[1].axis = {}; }), "axis"));
-  EXPECT_TRUE(contains(find_refusal([](WorldSpec& w) { w.joints[1].limits = {0.1, 0.2}; }), "on both sides of the start"));
+  EXPECT_TRUE(contains(find_refusal([](WorldSpec& w) { w.joints[1].limits = {0.1, 0.2}; }), "must enclose the start"));
   EXPECT_TRUE(contains(find_refusal([](WorldSpec& w) { w.joints[1].limits = {-4.0, 0.2}; }), "within 3.05433 rad"));
   EXPECT_TRUE(contains(find_refusal([](WorldSpec& w) { w.joints[1].limits = {-1, 1}, w.joints[1].stop_restitution = 2; }), "of its stops"));
   EXPECT_TRUE(contains(find_refusal([](WorldSpec& w) { w.joints[1].kind = Kind::kBall, w.joints[1].limits = {-1, 1}; }), "only hinges"));
@@ -177,7 +177,7 @@ TEST(Jointed, WhatCannotBeIsRefusedByName) {
                        }),
                        "it is 0.2 m long"));
   EXPECT_TRUE(
-      contains(find_refusal([](WorldSpec& w) { w.cords.push_back({.body = 0, .to = -1, .from_m = {}, .to_m = {}}); }), "at one place"));
+      contains(find_refusal([](WorldSpec& w) { w.cords.push_back({.body = 0, .to = -1, .from_m = {}, .to_m = {}}); }), "its ends coincide"));
 }
 
 TEST(Jointed, StopsHoldInWhateverOrderTheBodiesAreNamed) {

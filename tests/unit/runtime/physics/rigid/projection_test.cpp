@@ -46,11 +46,11 @@ TEST(projection, a_corner_in_the_ground_goes_the_least_way) {
     // min 1/2 dx^T M dx with n.(moved + turned x arm) = depth: moved = lambda n / m, turned = lambda I^-1 (arm x n).
     const Vec3 turn = stages.bodies.placed(0).inverse_inertia * turning;
     const double lambda = depth / (1.0 / stages.bodies.solid(0).mass_kg + dot(turning, turn));
-    stages.projection.run(stages.step, kTooDeep);
+    stages.projection.run(stages.step, kMaxDepthM);
     const Vec3 moved = stages.bodies.state(0).centre - before.centre;
     EXPECT_NEAR(moved[2], lambda / stages.bodies.solid(0).mass_kg, 1e-3 * depth);
     EXPECT_LT(std::hypot(moved[0], moved[1]), 1e-9);
-    EXPECT_GT(find_least_gap(stages), -kDeep);
+    EXPECT_GT(find_least_gap(stages), -kDeepM);
     // Nothing moves that could pay for the work.
     EXPECT_NEAR(stages.calc_books().lifted_j, 0.1 * kGravity * moved[2], 1e-12);
   }
@@ -63,8 +63,8 @@ TEST(projection, motion_pays_for_the_work) {
     stages.begin({{0, -1}});
     const Books before = stages.calc_books();
     const double kinetic = add_up(stages.bodies).kinetic_j;
-    stages.projection.run(stages.step, kTooDeep);
-    EXPECT_GT(find_least_gap(stages), -kTooDeep);
+    stages.projection.run(stages.step, kMaxDepthM);
+    EXPECT_GT(find_least_gap(stages), -kMaxDepthM);
     const Books after = stages.calc_books();
     EXPECT_NEAR(after.calc_total(), before.calc_total(), 1e-12 * kinetic + 1e-15);
     EXPECT_GE(after.lifted_j, 0.0);
@@ -85,8 +85,8 @@ TEST(projection, free_bodies_part_as_their_masses_and_keep_both_momenta) {
     stages.begin({{0, 1}});
     const Momenta before = add_up(stages.bodies);
     const double total = stages.calc_books().calc_total();
-    stages.projection.run(stages.step, kTooDeep);
-    EXPECT_GT(find_least_gap(stages), -kDeep);
+    stages.projection.run(stages.step, kMaxDepthM);
+    EXPECT_GT(find_least_gap(stages), -kDeepM);
     EXPECT_NEAR(stages.bodies.state(0).centre[0], -0.75 * overlap, 1e-3 * overlap);
     EXPECT_NEAR(stages.bodies.state(1).centre[0] - states[1].centre[0], 0.25 * overlap, 1e-3 * overlap);
     const Momenta after = add_up(stages.bodies);
@@ -103,7 +103,7 @@ TEST(projection, allowed_depth_stays) {
     stages.begin({{0, -1}});
     stages.island.pairs[0]->sag_m = allowed;
     const Vec3 before = stages.bodies.state(0).centre;
-    stages.projection.run(stages.step, kTooDeep);
+    stages.projection.run(stages.step, kMaxDepthM);
     EXPECT_EQ(stages.bodies.state(0).centre == before, allowed > 0.0);
     EXPECT_EQ(stages.ledger.costs.pushes > 0, allowed == 0.0);
   }
@@ -115,9 +115,9 @@ TEST(projection, springs_of_an_impact_lift_the_bodies_out_of_the_depth_that_it_l
   stages.begin({{0, -1}});
   stages.touches.release(0, -1, 0.0, 1.0);
   const double total = stages.calc_books().calc_total();
-  stages.projection.run(stages.step, kTooDeep);
+  stages.projection.run(stages.step, kMaxDepthM);
   const Books books = stages.calc_books();
-  EXPECT_GT(find_least_gap(stages), -kTooDeep);
+  EXPECT_GT(find_least_gap(stages), -kMaxDepthM);
   EXPECT_EQ(books.lifted_j, 0.0);
   EXPECT_LT(books.springs_j, 1.0);
   EXPECT_EQ(books.lost_j, 0.0);

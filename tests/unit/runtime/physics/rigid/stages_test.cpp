@@ -443,9 +443,9 @@ TEST(rest, body_that_has_yielded_comes_up_before_it_sleeps) {
   EXPECT_TRUE(stages.rest.may_sleep(stages.island.bodies, 0.015));
   EXPECT_FALSE(stages.rest.try_island(stages.island, 5e-4));
   sag_m = 0.0;
-  stages.projection.run(stages.step, kDeep);
+  stages.projection.run(stages.step, kDeepM);
   EXPECT_TRUE(stages.rest.try_island(stages.island, 5e-4));
-  EXPECT_NEAR(stages.bodies.state(0).centre[2], 0.02, kDeep);
+  EXPECT_NEAR(stages.bodies.state(0).centre[2], 0.02, kDeepM);
 }
 
 }  // namespace
