@@ -91,7 +91,7 @@ TEST(space, what_parts_from_the_ground_while_it_turns_is_no_impact) {
 
 TEST(space, disc_on_its_rim_without_resistance_precesses_at_the_steady_rate) {
   // A disc of thickness 2 e that leans by a about a fixed centre: W^2 sin a (A cos a - C e/r sin a) = m g (r cos a - e sin a), derived in
-  // Rolling.ACoinOnItsRimPrecessesAtTheSteadyRate; for e = 0 that of H. K. Moffatt, Nature 404 (2000), eq. 2. It comes no lower.
+  // Rolling.SteadyPrecessionOfCoin; for e = 0 that of H. K. Moffatt, Nature 404 (2000), eq. 2. It comes no lower.
   struct Case {
     double radius, e, degrees, end_s;
   };
