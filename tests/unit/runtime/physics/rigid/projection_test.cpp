@@ -33,7 +33,7 @@ Stages make_box_in_ground(std::mt19937& random, double depth_m, double speed_m_s
   return {{make_solid(box, 0.1, kBoxSides)}, {s}, kWood, {0, 0, -kGravity}};
 }
 
-TEST(projection, a_corner_in_the_ground_goes_the_least_way) {
+TEST(projection, least_displacement_of_corner) {
   std::mt19937 random(3);
   for (int n = 0; n < 100; ++n) {
     const double depth = 1e-4;
@@ -56,7 +56,7 @@ TEST(projection, a_corner_in_the_ground_goes_the_least_way) {
   }
 }
 
-TEST(projection, motion_pays_for_the_work) {
+TEST(projection, work_paid_by_motion) {
   std::mt19937 random(4);
   for (int n = 0; n < 200; ++n) {
     Stages stages = make_box_in_ground(random, 1e-4, n % 2 == 0 ? 1.0 : 1e-3);
@@ -73,7 +73,7 @@ TEST(projection, motion_pays_for_the_work) {
   }
 }
 
-TEST(projection, free_bodies_part_as_their_masses_and_keep_both_momenta) {
+TEST(projection, momenta_of_separated_free_bodies) {
   std::mt19937 random(5);
   std::normal_distribution<double> normal;
   for (int n = 0; n < 50; ++n) {
@@ -96,7 +96,7 @@ TEST(projection, free_bodies_part_as_their_masses_and_keep_both_momenta) {
   }
 }
 
-TEST(projection, allowed_depth_stays) {
+TEST(projection, permitted_depth_unchanged) {
   std::mt19937 random(6);
   for (const double allowed : {0.0, 1e-4}) {
     Stages stages = make_box_in_ground(random, 1e-4, 1.0);
@@ -109,7 +109,7 @@ TEST(projection, allowed_depth_stays) {
   }
 }
 
-TEST(projection, springs_of_an_impact_lift_the_bodies_out_of_the_depth_that_it_left) {
+TEST(projection, lift_by_impact_springs) {
   std::mt19937 random(7);
   Stages stages = make_box_in_ground(random, 1e-4, 0.0);
   stages.begin({{0, -1}});
