@@ -35,7 +35,7 @@ namespace {
 
 using namespace carillon;
 
-/// What is wrong with a mesh that passed, or nothing.
+/// The fault of a mesh that passed, or an empty string.
 const char* find_insanity(const char* file) {
   mesh::TetMesh mesh = mesh::read_mesh(file);
   const mesh::CheckReport report = mesh::check_mesh(mesh, file);

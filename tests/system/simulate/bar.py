@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Frequencies of what carillon-simulate writes against closed forms, its energy book, and the same bytes on any number of ranks.
+"""Frequencies of carillon-simulate's output against closed forms, its energy book, and the same bytes on any number of ranks.
 
 usage: bar.py BIN_DIR
 """
