@@ -335,9 +335,9 @@ struct Problem {
 struct State {
   std::vector<double> modes;  // (n) wave numbers at which they are solved
   WaveNumbers waves;
-  std::vector<Stencil> stencils;         // (n) of `modes` in `waves`
-  std::vector<Mixture> mixtures;         // (n); empty: uncoupled modes. On ranks other than 0 the motions only
-  std::map<double, WaveAnswer> answers;  // by wave number, on rank 0
+  std::vector<Stencil> stencils{};         // (n) of `modes` in `waves`
+  std::vector<Mixture> mixtures{};         // (n); empty: uncoupled modes. On ranks other than 0 the motions only
+  std::map<double, WaveAnswer> answers{};  // by wave number, on rank 0
 
   const WaveAnswer& get_answer(std::size_t mode, std::size_t n) const { return answers.at(waves.get()[stencils[mode].nodes[n]]); }
   std::vector<const WaveAnswer*> list_answers(std::size_t mode) const {

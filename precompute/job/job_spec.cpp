@@ -55,7 +55,7 @@ void read_materials(base::Object& job, JobSpec& spec) {
   if (auto materials = job.object_if("materials")) {
     if (materials->keys().empty() || materials->keys().size() > kMaxRegions)
       job.fail("materials",
-               fmt::format("must have 1 to {} materials, one for each region of the mesh by its tag or name: {{\"1\": {{...}}, \"2\": "
+               fmt::format("must have one material for each region of the mesh, 1 to {}, by tag or name: {{\"1\": {{...}}, \"2\": "
                            "{{...}}}}",
                            kMaxRegions));
     for (const std::string& region : materials->keys()) {

@@ -12,6 +12,7 @@
 #include <string>
 #include <string_view>
 
+#include "precompute/job/job_spec.hpp"
 #include "precompute/petsc/session.hpp"
 #include "precompute/run/air.hpp"
 #include "precompute/run/end_in_error.hpp"
@@ -26,6 +27,7 @@
 #include "runtime/base/environment.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/file_limit.hpp"
+#include "runtime/base/keys.hpp"
 #include "runtime/base/message.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/base/result.hpp"
@@ -100,7 +102,7 @@ struct CommandLine {
         ->check(named)
         ->excludes("JOB", "--matrices", "--progress", "--validate", "--at", "--estimate");
     app.add_flag_callback(
-        "--keys", [] { throw CLI::CallForVersion(base::write_key_tables(job::describe_job_keys()), 0); },
+        "--keys", [] { throw CLI::CallForVersion(base::write_key_tables(carillon::job::describe_job_keys()), 0); },
         "print the keys of jobs with defaults, ranges and meaning");
     app.set_version_flag("--version", base::describe("carillon-precompute"));
     // Words after "--" are for PETSc and SLEPc.

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "precompute/job/simulation.hpp"
 #include "precompute/run/end_in_error.hpp"
 #include "precompute/run/enter_folder.hpp"
 #include "precompute/run/interrupt.hpp"
@@ -16,6 +17,7 @@
 #include "runtime/base/environment.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/file_limit.hpp"
+#include "runtime/base/keys.hpp"
 #include "runtime/base/message.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/base/result.hpp"
@@ -74,7 +76,7 @@ struct CommandLine {
         ->needs(validate);
     app.add_flag("--json", options.json, "with --validate: print one JSON object")->needs(validate);
     app.add_flag_callback(
-        "--keys", [] { throw CLI::CallForVersion(base::write_key_tables(job::describe_simulation_keys()), 0); },
+        "--keys", [] { throw CLI::CallForVersion(carillon::base::write_key_tables(carillon::job::describe_simulation_keys()), 0); },
         "print the keys of jobs with defaults, ranges and meaning");
     app.set_version_flag("--version", base::describe("carillon-simulate"));
   }

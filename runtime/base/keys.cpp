@@ -11,11 +11,11 @@
 namespace carillon::base {
 namespace {
 
-std::string describe_limits(const Limits& limits) {
+std::string describe_limits(const Limits& limits, const std::string& unit) {
   const bool is_below = std::isfinite(limits.low), is_above = std::isfinite(limits.high);
-  if (is_below && is_above) return fmt::format("; {} to {}{}", limits.low, limits.high, limits.is_open ? ", both excluded" : "");
-  if (is_below) return fmt::format("; {} {}", limits.is_open ? "above" : "at least", limits.low);
-  return is_above ? fmt::format("; at most {}", limits.high) : "";
+  if (is_below && is_above) return fmt::format("; {} to {}{}{}", limits.low, limits.high, unit, limits.is_open ? ", both excluded" : "");
+  if (is_below) return fmt::format("; {} {}{}", limits.is_open ? "above" : "at least", limits.low, unit);
+  return is_above ? fmt::format("; at most {}{}", limits.high, unit) : unit.empty() ? "" : ";" + unit;
 }
 
 }  // namespace
@@ -36,7 +36,7 @@ Vec3 read_value(Object& object, const char* key, const Limits& limits, const Vec
   const Vec3 vector = object.numbers<3>(key);
   for (const double x : vector)
     if (!(x >= limits.low && x <= limits.high))
-      object.fail(key, fmt::format("{} is out of range; give numbers between {} and {}", x, limits.low, limits.high));
+      object.fail(key, fmt::format("{} is out of range; give numbers between {} and {}{}", x, limits.low, limits.high, find_unit(key)));
   return vector;
 }
 
@@ -66,7 +66,7 @@ KeyText describe_key(const char* name, const KeyValue& fallback, Need need, cons
   const bool is_set = fallback.index() != 0 && value >= limits.low && value <= limits.high;  // members of required keys begin as 0
   const std::string shown = is_set ? fmt::format("`{}`", to_json(fallback).line()) : "none";
   const std::string choices = words.empty() ? "" : fmt::format(": `\"{}\"`", fmt::join(words, "\"`, `\""));
-  return {name, need == Need::required ? "required" : shown, meaning + choices + describe_limits(limits)};
+  return {name, need == Need::required ? "required" : shown, meaning + choices + describe_limits(limits, find_unit(name))};
 }
 
 std::string write_key_tables(const std::vector<KeyTable>& tables) {

@@ -9,6 +9,7 @@
 //   kFloor.read(object, floor);
 #pragma once
 
+#include <concepts>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -59,11 +60,9 @@ bool read_value(Object& object, const char* key, const Limits& limits, const boo
 std::string read_value(Object& object, const char* key, const Limits& limits, const std::string*);
 std::filesystem::path read_value(Object& object, const char* key, const Limits& limits, const std::filesystem::path*);
 Vec3 read_value(Object& object, const char* key, const Limits& limits, const Vec3*);
-inline int read_value(Object& object, const char* key, const Limits& limits, const int*) {
-  return static_cast<int>(read_value(object, key, limits, static_cast<const long long*>(nullptr)));
-}
-inline std::int64_t read_value(Object& object, const char* key, const Limits& limits, const std::int64_t*) {
-  return read_value(object, key, limits, static_cast<const long long*>(nullptr));
+template <std::signed_integral Integer>
+Integer read_value(Object& object, const char* key, const Limits& limits, const Integer*) {
+  return static_cast<Integer>(read_value(object, key, limits, static_cast<const long long*>(nullptr)));
 }
 template <class V>
 std::optional<V> read_value(Object& object, const char* key, const Limits& limits, const std::optional<V>*) {

@@ -3,12 +3,25 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <utility>
 
 namespace carillon::base {
 
+std::string find_unit(std::string_view name) {
+  static constexpr std::pair<std::string_view, const char*> kUnits[]{
+      {"_per_s", " 1/s"},   {"_kg_m3", " kg/m³"}, {"_kg_m2", " kg/m²"}, {"_kg_m", " kg/m"}, {"_m_s2", " m/s²"},
+      {"_m_s", " m/s"},     {"_rad_s", " rad/s"}, {"_n_s_m", " N s/m"}, {"_n_m", " N/m"},   {"_n_s", " N s"},
+      {"_deg", " degrees"}, {"_hz", " Hz"},       {"_kg", " kg"},       {"_pa", " Pa"},     {"_db", " dB"},
+      {"_gb", " GB"},       {"_cents", " cents"}, {"_m", " m"},         {"_s", " s"},       {"_n", " N"}};
+  for (const auto& [suffix, unit] : kUnits)
+    if (name.ends_with(suffix)) return unit;
+  return "";
+}
+
 double read_within(Object& object, std::string_view key, double low, double high) {
   const double value = object.number(key);
-  if (!(value >= low && value <= high)) object.fail(key, fmt::format("{} is out of range; give a number from {} to {}", value, low, high));
+  if (!(value >= low && value <= high))
+    object.fail(key, fmt::format("{} is out of range; give a number from {} to {}{}", value, low, high, find_unit(key)));
   return value;
 }
 
@@ -19,7 +32,8 @@ double read_within(Object& object, std::string_view key, double fallback, double
 Vec3 read_vector(Object& object, std::string_view key, const Vec3& fallback, double limit) {
   const Vec3 v = object.numbers_or<3>(key, fallback);
   for (const double x : v)
-    if (!(std::abs(x) <= limit)) object.fail(key, fmt::format("{} is out of range; give numbers between {} and {}", x, -limit, limit));
+    if (!(std::abs(x) <= limit))
+      object.fail(key, fmt::format("{} is out of range; give numbers between {} and {}{}", x, -limit, limit, find_unit(key)));
   return v;
 }
 

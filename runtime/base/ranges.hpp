@@ -1,12 +1,16 @@
 // Document values with inclusive bounds; violations are InputError "file:line: ...".
 #pragma once
 
+#include <string>
 #include <string_view>
 
 #include "runtime/base/document.hpp"
 #include "runtime/base/vector.hpp"
 
 namespace carillon::base {
+
+/// Unit of a key by its suffix, after a space: " m" of "length_m"; empty if there is none.
+std::string find_unit(std::string_view key);
 
 /// Required number.
 double read_within(Object& object, std::string_view key, double low, double high);

@@ -1,11 +1,11 @@
 #!/usr/bin/python3
-"""Scenes, contacts, jobs and banks with small mistakes: seeded, and made so that most of them still read.
+"""Seeded mutants of scenes, contacts, jobs and banks, most of which remain readable.
 
 usage: mutants.py BIN_DIR KIND COUNT [--seed N] [--keep FOLDER]
 
-BIN_DIR holds the libFuzzer targets (preset fuzz). Every mutant goes through the target of its kind (fuzz_play_scene, fuzz_play_contacts,
-fuzz_job, fuzz_play_bank), which reads and plays it; under the sanitizers a fault ends the target, and so do 20 s on one input or 3 GB. Exit
-code 1 and the mutant's name when one does; it is kept in --keep.
+BIN_DIR holds the libFuzzer targets (preset fuzz). Each mutant is read and played by the target of its kind (fuzz_play_scene,
+fuzz_play_contacts, fuzz_job, fuzz_play_bank) under the sanitizers, limited to 20 s and 3 GB. Exit code 1 and the mutant's name on a fault;
+the mutant is kept in --keep.
 """
 import argparse
 import collections
@@ -125,7 +125,7 @@ RAW = [
 
 
 def list_places(value, path=()):
-    """Every place inside a JSON value, itself among them."""
+    """All paths inside a JSON value, its own included."""
     places = [path]
     items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
     for key, inner in items:
@@ -155,7 +155,7 @@ def change_number(draw, number):
 
 
 def change_value(draw, value):
-    """One value in place of another, mostly of its own kind."""
+    """Replaces a value by another, mostly of the same kind."""
     if draw.random() < 0.08:
         return draw.choice([None, True, False, 0, "", [], {}, [0], {"x": 1}, draw.choice(NUMBERS), draw.choice(WORDS)])
     if isinstance(value, bool):
@@ -203,7 +203,7 @@ def mutate_json(draw, value):
 
 
 def mutate_bytes(draw, data):
-    """Now and then the text itself."""
+    """Occasionally mutates the text itself."""
     data = bytearray(data)
     for _ in range(draw.choice([1, 1, 2, 4])):
         at = draw.randrange(len(data) + 1)
@@ -238,7 +238,7 @@ def make_text(draw, seeds):
 
 
 def tune_event(draw, line):
-    """An amount, a time, an id or a state of an event, within what is played."""
+    """Changes an amount, a time, an id or a state of an event within the playable range."""
     event = next(iter(line.values())) if isinstance(line, dict) and len(line) == 1 else None
     if not isinstance(event, dict) or not event:
         return
@@ -267,7 +267,7 @@ def tune_event(draw, line):
 
 
 def make_lines(draw, seeds):
-    """A contacts file: lines changed, dropped, doubled, exchanged."""
+    """Changes, drops, duplicates or swaps lines of a contacts file."""
     lines = copy.deepcopy(draw.choice(seeds))
     for _ in range(draw.choice([1, 1, 2, 3, 6])):
         at = draw.randrange(len(lines))
@@ -290,7 +290,7 @@ def make_lines(draw, seeds):
 
 
 def make_bank(draw, seeds):
-    """A bank of which numbers or, now and then, bytes changed; the target seals it again."""
+    """Changes numbers or, occasionally, bytes of a bank; the target seals it again."""
     data = bytearray(draw.choice(seeds))
     if draw.random() < 0.2:
         for _ in range(draw.choice([1, 1, 2, 4])):

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Every header of ours compiles by itself, without the precompiled one. Through ccache, where it is installed.
+"""All headers compile by themselves, without the precompiled one; through ccache if installed.
 
 usage: headers_stand_alone.py [-j N] SOURCE_DIR BUILD_DIR     BUILD_DIR: cmake --preset tidy, whose commands are those of single sources
 """
@@ -20,7 +20,7 @@ parser.add_argument("build", type=pathlib.Path)
 parser.add_argument("-j", dest="jobs", type=int, default=2)
 options = parser.parse_args()
 
-# The ways in which the files of each folder of ours are compiled. There may be several.
+# Compile options of the files of each folder; there may be several sets.
 ways = {}
 for command in json.loads((options.build / "compile_commands.json").read_text()):
     words = shlex.split(command["command"])
@@ -41,7 +41,7 @@ objects = tempfile.TemporaryDirectory()
 
 
 def check(header):
-    errors = "no source of its folder is compiled"
+    errors = "its folder has no compiled source"
     for way in ways.get(header.parent, []):
         out = pathlib.Path(objects.name) / f"{abs(hash(header))}.o"
         command = [*launcher, "clang++", "-c", "-o", out, "-Wno-pragma-once-outside-header", "-x", "c++", *way, header]

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Makes the Debian packages of what has been built, unpacks them into an empty root, and builds docs/examples/embed against that root
+"""Makes the Debian packages of a build, unpacks them into an empty root, and builds docs/examples/embed against that root
 alone: by find_package(Carillon), and the C examples by pkg-config. All programs play the same pinned bank.
 
 usage: installed_package.py SOURCE_DIR BUILD_DIR WORK_DIR
@@ -11,7 +11,7 @@ import shutil
 import subprocess
 import sys
 
-# Of each package: what it contains, and whom it may and may not need.
+# Contents of each package, required and forbidden dependencies.
 RUNTIME = {
     "files": [
         "bin/carillon-render",
@@ -54,7 +54,7 @@ def read(*command, **options):
 
 
 def make_packages():
-    """{name of a package: its file}; one package a component of the build."""
+    """{package: file}, one package per component of the build."""
     run("cpack", "--config", build / "CPackConfig.cmake", "-G", "DEB", "-B", work / "packages", cwd=work, **quiet)
     files = {read("dpkg-deb", "-f", file, "Package").strip(): file for file in (work / "packages").glob("*.deb")}
     wanted = set(PACKAGES)
@@ -67,7 +67,7 @@ def make_packages():
 
 
 def check_package(name, file):
-    """Its files, and that its dependencies are right: packages of this machine, which has what the build linked, or of ours."""
+    """Checks files and dependencies, which are installed packages or our own."""
     fields = PACKAGES[name]
     paths = [line.split()[5] for line in read("dpkg-deb", "-c", file).splitlines()]
     missing = [path for path in fields["files"] if f"./usr/{path}" not in paths]
@@ -84,14 +84,14 @@ def check_package(name, file):
 
 
 def check_symbols(library):
-    """Nothing but the C interface is visible."""
+    """Only the C interface is visible."""
     symbols = re.findall(r" T (\w+)$", read("nm", "-D", "--defined-only", library), re.M)
     wrong = [name for name in symbols if not name.startswith("carillon_")]
     assert not wrong and "carillon_process" in symbols, f"{library}: visible in addition to the interface, or missing from it: {wrong[:5]}"
 
 
 def check_module(folder, bank):
-    """The Python module reads a bank, by Debian's Python, from where it was unpacked."""
+    """The unpacked Python module reads a bank with Debian's Python."""
     if not folder.exists():
         return
     script = f"import carillon; print(len(carillon.Bank({str(bank)!r})), carillon.__file__)"
@@ -118,7 +118,7 @@ def build_by_pkg_config(example, usr):
 
 
 def play(programs, pattern, bank):
-    """The groups of what each program prints."""
+    """Output of each program, grouped."""
     found = []
     for program in programs:
         line = read(program, bank)
@@ -144,7 +144,7 @@ def main():
         if (build / "bin" / name).exists():
             assert read(usr / "bin" / name, "--version") == read(build / "bin" / name, "--version"), name
 
-    example = shutil.copytree(source / "docs/examples/embed", work / "example")  # where no header of the sources can be found by chance
+    example = shutil.copytree(source / "docs/examples/embed", work / "example")  # out of reach of the source headers
     by_cmake, by_pkg_config = build_by_cmake(example, usr), build_by_pkg_config(example, usr)
     bank = source / "tests/unit/runtime/bank/pinned/version_1_0.hdf"
     strikes = [by_cmake / "strike_c", by_cmake / "strike_cpp", by_pkg_config / "strike_c"]

@@ -56,7 +56,7 @@ def list_rows(text):
 
 
 def find_stem(name):
-    """The name of a library without its version: libdb-5.3.so, libfmt.so.9, libHYPRE-2.26.0.so."""
+    """Library name without version: libdb-5.3.so, libfmt.so.9, libHYPRE-2.26.0.so."""
     return re.sub(r"(-\d+(\.\d+)+)?\.so.*$", "", name)
 
 

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""What all programs have in common: --version before anything else is asked for, and outputs that go to standard output.
+"""Common to all programs: --version takes precedence, and outputs may go to standard output.
 
 usage: programs.py SOURCE_DIR BIN_DIR"""
 import os

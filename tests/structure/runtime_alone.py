@@ -1,13 +1,12 @@
 #!/usr/bin/env python3
 """Builds and tests the runtime in a mount namespace in which MPI, PETSc, SLEPc, METIS, MUMPS, CGAL and OpenVDB do not exist.
 
-The runtime is configured there again, at the path of the whole build, and takes over what the whole build has made: ninja makes again
-whatever would be made by another command or of other files. What is taken over may have read, and its programs may load, no file of those
-packages. Every program is then tried by some of its tests; all of them run on the same bytes elsewhere.
+The runtime is configured there again, at the path of the full build, whose outputs it reuses: ninja rebuilds those with another command or
+other inputs. Reused outputs must not have read, and programs must not load, files of those packages. Each program then runs some of its
+tests; all tests run on the same bytes in the full build.
 
-With --from-nothing, or where the whole build is none of ninja's, everything is compiled there, and all tests of the runtime run there. So
-it is too where the machine allows no mount namespace (an ordinary container), with everything in sight and the same look at what was read
-and what is loaded.
+With --from-nothing, or if the full build does not use ninja, everything is compiled and all tests of the runtime run there; likewise
+without permission for mount namespaces (an ordinary container), with the packages visible and the same checks of read and loaded files.
 
 usage: runtime_alone.py SOURCE_DIR BUILD_DIR WORK_DIR [--from-nothing]        WORK_DIR is removed at the end
 """
@@ -26,7 +25,7 @@ HIDDEN = re.compile(
     r"^(libopenmpi|openmpi|mpi-default|libpetsc|petsc|libslepc|slepc|libmetis|libmumps|libptscotch|libscotch|libscalapack|libhypre|"
     r"libhdf5-openmpi|libhdf5-mpi|libcgal|libopenvdb|libsuitesparse)"
 )
-# An ordinary machine has these of some of the packages above as dependencies of light libraries; hiding them would not be fair.
+# Also dependencies of light libraries: stay visible.
 SHARED = re.compile(r"/lib(blas|lapack|openblas|hwloc|event|gomp)")
 LEFT_OUT = "structure|docs|bench"
 
@@ -37,12 +36,12 @@ def installed():
 
 
 def hide(packages):
-    """Empties, inside this namespace only, every header, library, program and pkg-config file of the packages."""
+    """Empties, in this namespace, all headers, libraries, programs and pkg-config files of the packages."""
     files = subprocess.run(["dpkg", "-L", *packages], capture_output=True, text=True, check=True).stdout.splitlines()
     roots = set()
     for name in files:
         path = pathlib.Path(name)
-        # Folders that belong to a hidden package as a whole are covered by an empty file system: three levels below /usr are enough.
+        # Folders owned by a hidden package are covered by an empty file system.
         if (
             path.is_dir()
             and re.search(r"/(petscdir|slepcdir|CGAL|openvdb|openmpi|mumps_seq|petsc|slepc|hdf5/openmpi)$", name)
@@ -69,7 +68,7 @@ def hide(packages):
 
 
 def read_settings(build):
-    """What the whole build was configured with, as far as it reaches the compiler."""
+    """Settings of the full build that affect compilation."""
     kept = r"CMAKE_(BUILD_TYPE|COMPILE_WARNING_AS_ERROR|(C|CXX)_(COMPILER|FLAGS|COMPILER_LAUNCHER)):[A-Z]+=.*"
     return [f"-D{line}" for line in (build / "CMakeCache.txt").read_text().splitlines() if re.fullmatch(kept, line)]
 
@@ -83,9 +82,9 @@ def configure(source, build, settings):
 
 
 def take_over(whole, build):
-    """Copies what ninja would make here and finds there, with its moments and the log of how it was made. Returns the copies.
+    """Copies outputs present in the full build, with time stamps and ninja's log. Returns the copies.
 
-    Files that CMake has written, such as sources that include others, get the moment of their equals there.
+    Identical files written by CMake, such as unity sources, get the same time stamp.
     """
     for path in build.rglob("*"):
         equal = whole / path.relative_to(build)
@@ -97,15 +96,14 @@ def take_over(whole, build):
     for name in [*taken, ".ninja_log", ".ninja_deps"]:
         (build / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy2(whole / name, build / name, follow_symlinks=False)
-    # What commands of our own have read, such as those of WebAssembly, is in files of CMake that are no outputs.
+    # Dependency files of custom commands, such as WebAssembly, are not listed as outputs.
     if (whole / "CMakeFiles/d").is_dir():
         shutil.copytree(whole / "CMakeFiles/d", build / "CMakeFiles/d", dirs_exist_ok=True)
     return taken
 
 
 def find_sample(build):
-    """A regular expression of some tests of every program: one of each suite where each case is a test, and every script but those of
-    pages, which run in a browser."""
+    """A regular expression of sample tests: one of each suite if each case is a test, and all scripts but those that need a browser."""
     sample = {}
     for test in ctest.list_tests(build, "-LE", LEFT_OUT + "|web"):
         program = test["command"][0]
@@ -115,7 +113,7 @@ def find_sample(build):
 
 
 def run_tests(build, *choice, every=1):
-    """every: of the cases of a GoogleTest program that runs whole, one in so many."""
+    """every: runs one in so many cases of GoogleTest programs that are a single test."""
     return subprocess.run(
         ["ctest", "--test-dir", build, "-j2", "--output-on-failure", "--no-tests=error", "-LE", LEFT_OUT, *choice],
         env={**os.environ, "GTEST_TOTAL_SHARDS": str(every), "GTEST_SHARD_INDEX": "0"},
@@ -123,7 +121,7 @@ def run_tests(build, *choice, every=1):
 
 
 def find_traces(build):
-    """Files of hidden packages that a compile read or a program loads."""
+    """Files of hidden packages read by the compiler or loaded by a program."""
     forbidden = re.compile(
         r"/(openmpi|petscdir|slepcdir|CGAL|openvdb|mumps_seq)/|/(mpi|metis|dmumps_c)\.h$|"
         r"lib(mpi|petsc|slepc|metis|dmumps|openvdb|CGAL)[_.-]"
@@ -137,7 +135,7 @@ def find_traces(build):
 
 
 def build_and_test(source, build, whole=None):
-    """In `build`; `whole` is the whole build to take over from."""
+    """In `build`; `whole`: full build to reuse."""
     configure(source, build, read_settings(whole) if whole else ["-DCMAKE_BUILD_TYPE=Release"])
     taken = take_over(whole, build) if whole else []
     subprocess.run(["cmake", "--build", build, "--", "--quiet"], check=True)
@@ -161,9 +159,9 @@ def build_and_test(source, build, whole=None):
 
 
 def test_hidden(source, build, work, whole):
-    """Inside the namespace. `whole`: where the whole build is to be seen, while the runtime's own is at its path; None: from nothing."""
+    """Inside the namespace. `whole`: mount point of the full build, while the runtime's own is at its path; None: from nothing."""
     hide(installed())
-    # The tree is hidden for real: the compiler can use no type of these headers.
+    # The headers must be unusable.
     for header, name in (("mpi.h", "MPI_Comm"), ("petsc.h", "PetscInt"), ("metis.h", "idx_t")):
         probe = subprocess.run(
             ["g++", "-x", "c++", "-", "-fsyntax-only", "-I/usr/lib/x86_64-linux-gnu/openmpi/include"],

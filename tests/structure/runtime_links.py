@@ -18,7 +18,7 @@ FORBIDDEN = re.compile(
 
 
 def list_libraries(file):
-    """{name: path} of all that the dynamic linker would load."""
+    """{name: path} of all loaded libraries."""
     lines = subprocess.run(["ldd", file], capture_output=True, text=True, check=True).stdout.splitlines()
     return {words[0]: words[2] if len(words) > 2 else words[0] for words in map(str.split, lines)}
 

@@ -22,7 +22,7 @@ PLACE = re.compile(r"(.+?:\d+:\d+): (?:warning|error): (.+)")
 
 
 def read_commands(source, build, folders):
-    """The compile commands of the sources below the folders, as clang reads them: no launcher, no precompiled header, no -Werror."""
+    """Compile commands of the sources below the folders for clang: no launcher, no precompiled header, no -Werror."""
     chosen = {}
     for entry in json.loads((build / "compile_commands.json").read_text()):
         path = pathlib.Path(entry["file"])

@@ -1,10 +1,10 @@
-"""The tests of a build, as CTest lists them."""
+"""Tests of a build, listed by CTest."""
 import json
 import subprocess
 
 
 def list_tests(build, *choice):
-    """[{"name", "command": words, "labels", "is_fixture"}] of the tests that CTest would run with these further arguments."""
+    """[{"name", "command": words, "labels", "is_fixture"}] of the tests selected by these CTest arguments."""
     listed = subprocess.run(["ctest", "--test-dir", build, *choice, "--show-only=json-v1"], capture_output=True, text=True, check=True)
     tests = []
     for test in json.loads(listed.stdout)["tests"]:

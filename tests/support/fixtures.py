@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Meshes and banks that many tests need: made once a build, by the CTest fixtures of tests/support/CMakeLists.txt.
+"""Meshes and banks shared by tests: made once per build by the CTest fixtures of tests/support/CMakeLists.txt.
 
 usage: fixtures.py NAME     makes the fixture, unless it is there and made by the programs that are there now
        fixtures.py --list   names all, one a line
@@ -71,20 +71,20 @@ def get_bin_dir():
 
 
 def copy(name, folder, as_name=None):
-    """A copy in `folder`, that may be changed."""
+    """A modifiable copy in `folder`."""
     target = pathlib.Path(folder) / (as_name or name)
     shutil.copyfile(get(name), target)
     return target
 
 
 def describe_programs(bin_dir):
-    """Size and date of the programs that make fixtures."""
+    """Size and date of the programs that make the fixtures."""
     programs = (bin_dir / "carillon-mesh", bin_dir.parent / "libexec/carillon/carillon-precompute")
     return [[program.stat().st_size, program.stat().st_mtime_ns] for program in programs]
 
 
 def get(name):
-    """The path of a fixture; made where no CTest fixture has done so, as for a script that runs by hand."""
+    """Path of a fixture, made if no CTest fixture has, as for scripts run by hand."""
     recipe = RECIPES[name]
     bin_dir = get_bin_dir()
     folder = bin_dir.parent / "fixtures"

@@ -1,4 +1,4 @@
-"""Surfaces of bodies, as points and triangles, and as files."""
+"""Surfaces of bodies as points and triangles, and as files."""
 
 
 def make_box(length_m, width_m, height_m):

@@ -150,7 +150,7 @@ class Maker {
     const store::Id id = store::require_id(request.id, "the job");
     const auto start = std::chrono::steady_clock::now();
     say(fmt::format("computing the modes of {}, once", describe(job_)));
-    const store::Temporary temporary = cache_.make_temporary();
+    store::Temporary temporary = cache_.make_temporary();
     const fs::path folder = temporary.path(), file = folder / store::kJobFile;
     job_.bank = folder / store::kBankFile;
     base::write_file(file, job::resolved_json(job_, folder, ""));

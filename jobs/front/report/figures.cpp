@@ -122,7 +122,9 @@ base::Json make_surface(const bank::Bank& bank) {
   std::int64_t count = 0;
   for (const auto& triangle : bank.triangles) {
     std::array<double, 3> edge{};
-    if (std::any_of(triangle.begin(), triangle.end(), [&](const auto corner) { return corner >= bank.vertices_m.size(); })) continue;
+    if (std::any_of(triangle.begin(), triangle.end(),
+                    [&](const auto corner) { return static_cast<std::size_t>(corner) >= bank.vertices_m.size(); }))
+      continue;
     for (std::size_t i = 0; i < 3; ++i) {
       const Vec3 &x = bank.vertices_m[triangle[i]], &y = bank.vertices_m[triangle[(i + 1) % 3]];
       edge[i] = std::hypot(y[0] - x[0], y[1] - x[1], y[2] - x[2]);

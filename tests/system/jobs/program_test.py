@@ -145,7 +145,7 @@ class Path(Bench):
         self.assertFalse(self.ask("explain", failed)["would_run"])
         self.assertTrue(self.run_it("report", done, "--no-pictures").stdout.strip().endswith("report.html"))
         self.assertIn("modes", self.run_it("log", done).stdout)
-        self.refuse("log", queued, says="nothing yet", code=1)
+        self.refuse("log", queued, says="no output yet", code=1)
         for words in (("submit", done), ("cancel", queued), ("retry", failed), ("run", "--quiet"), ("gc",)):
             self.refuse(*words, says="may not write to this store")
         self.assertEqual(self.picture(), before)
@@ -355,7 +355,7 @@ class Strangers(Bench):
         self.refuse("submit", self.folder / ("y" * 4096 + ".json"), says="too long")
         self.refuse("status", "../../x", says="not a job of this store")
         self.refuse("log", "../" * 20 + "etc/passwd", says="passwd:1: ")
-        self.refuse("get", "%", says="neither")
+        self.refuse("get", "%", says="not an id")
 
     def test_what_is_no_file_is_one_clear_error_at_once(self):
         os.mkfifo(self.folder / "pipe.json")
@@ -408,7 +408,7 @@ class Strangers(Bench):
             (["submit", file, "--ranks", "0"], "ranks"),
             (["fly"], "--help"),
             (["retry"], "--failed"),
-            (["status", "abcd"], "neither"),
+            (["status", "abcd"], "not an id"),
         ):
             self.refuse(*words, says=says)
         self.assertEqual(self.ask("submit", "none.json", code=2)["errors"][0]["job_file"], str(self.folder / "none.json"))

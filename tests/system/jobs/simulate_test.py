@@ -66,7 +66,7 @@ class Simulations(Bench):
         done = self.ask("submit", "b/other.json", "--run")["jobs"][0]
         self.assertEqual((done["state"], done["new"], done["attempts"]), ("done", False, state["attempts"]))
         self.assertFalse(self.ask("explain", file)["would_run"])
-        self.refuse("report", file, says="reports are of banks")
+        self.refuse("report", file, says="a simulation has no report")
         (self.folder / "out").mkdir()
         self.run_it("get", file, "--to", "out")
         self.assertEqual({path.name for path in (self.folder / "out").iterdir()}, {path.name for path in files.values()})

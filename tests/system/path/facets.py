@@ -3,8 +3,8 @@
 with the doubt, for both. Turned bells: facets are ambiguous with few rings, not with many.
 
 Truth: the free steel cylinder of radius 20 mm and length 200 mm, "cylinder-10" of
-tests/unit/precompute/fem/error_bars/data/known_frequencies.csv
-(Fourier-Ritz, 7 digits). The prisms, and the bell of planes, are meshed with "facets": true and solved on their own.
+tests/unit/precompute/fem/error_bars/data/known_frequencies.csv (Fourier-Ritz, 7 digits). The prisms, and the bell of planes, are meshed
+with "facets": true and solved on their own.
 
 usage: facets.py BIN_DIR
 """

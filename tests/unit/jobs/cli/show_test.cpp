@@ -20,7 +20,7 @@ TEST(Show, numbers) {
   EXPECT_EQ(format_seconds(-1), "?");
   EXPECT_EQ(format_bytes(999), "999 B");
   EXPECT_EQ(format_bytes(1.25e9), "1.2 GB");
-  EXPECT_EQ(to_json_time(0).isNull(), true);
+  EXPECT_EQ(to_json_time(0).is_null(), true);
   EXPECT_EQ(to_json_time(1e9).as_string(), "2001-09-09T01:46:40Z");
 }
 

@@ -78,7 +78,7 @@ TEST(Order, work_uses_the_inputs_in_the_store) {
   folder.write("m.msh", "something else by now");
   const store::Id id = store::require_id(request.id, "test");
   const std::filesystem::path work = store.work_folder(id);
-  EXPECT_EQ(store::find_job_fault(store, id, work), std::nullopt);
+  EXPECT_EQ(store::find_job_fault(store, id), std::nullopt);
   const std::string text = tests::read_all(work / store::kJobFile);
   const job::SimulationSpec inner = job::parse_simulation(text, work / store::kJobFile);
   EXPECT_EQ(inner.duration_s, 0.25);
@@ -95,7 +95,7 @@ TEST(Order, work_uses_the_inputs_in_the_store) {
   std::string changed = text;
   changed.replace(changed.find("0.25"), 4, "0.24");
   folder.write(work.lexically_relative(folder / "").string() + "/" + store::kJobFile, changed);
-  EXPECT_NE(store::find_job_fault(store, id, work), std::nullopt);
+  EXPECT_NE(store::find_job_fault(store, id), std::nullopt);
 }
 
 TEST(Order, a_record_belongs_to_the_bytes_of_a_job) {

@@ -67,7 +67,7 @@ TEST(Keys, ReadMembersOfAllTypes) {
 
 TEST(Keys, ErrorsNamePlaceAndRange) {
   for (const auto& [keys, words] : std::vector<std::pair<std::string, std::string>>{
-           {R"("mass_kg": 10)", "/thing.json:1: \"mass_kg\": 10 is out of range; give a number from 1 to 9"},
+           {R"("mass_kg": 10)", "/thing.json:1: \"mass_kg\": 10 is out of range; give a number from 1 to 9 kg"},
            {R"("masskg": 2)", "did you mean \"mass_kg\"?"},
            {R"("mass_kg": 1, "ratio": 0.5)", "between -1 and 0.5"},
            {R"("mass_kg": 1, "width_m": 0)", "greater than 0"},
@@ -89,8 +89,8 @@ TEST(Keys, DescribeDefaultsAndRanges) {
   kThing.describe(table, "a.");
   const std::string text = write_key_tables({table});
   for (const char* row :
-       {"# thing\n", "| `a.mass_kg` | required | mass; 1 to 9 |", "| `a.height_m` | `0.5` | height; -2 to 2 |",
-        "| `a.ratio` | `0.2` | Poisson's ratio; -1 to 0.5, both excluded |", "| `a.width_m` | none | width; above 0 |",
+       {"# thing\n", "| `a.mass_kg` | required | mass; 1 to 9 kg |", "| `a.height_m` | `0.5` | height; -2 to 2 m |",
+        "| `a.ratio` | `0.2` | Poisson's ratio; -1 to 0.5, both excluded |", "| `a.width_m` | none | width; above 0 m |",
         "| `a.fixed` | `false` | does not move |", "| `a.colour` | `\"green\"` | colour: `\"red\"`, `\"green\"` |",
         "| `a.side` | none | side: `\"in\"`, `\"out\"` |", "| `a.place_m` | `[0, 0, 1]` |", "| `a.other` | none | read elsewhere |"})
     EXPECT_NE(text.find(row), std::string::npos) << row << "\n" << text;

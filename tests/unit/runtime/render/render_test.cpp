@@ -381,7 +381,7 @@ TEST(Render, SceneWithoutContactsIsSilent) {
   Figures figures;
   c.scene.bodies[0].spec.bank = &c.bank;
   const scene::Plan plan =
-      scene::make_plan(scene::make_facts(c.scene, scene::make_microphones(c.scene), true), scene::make_events(c.list_events()), {});
+      scene::make_plan(scene::make_facts(c.scene, scene::make_microphones(c.scene), true), scene::make_events(c.list_events()));
   EXPECT_NE(make_report_json(c.scene, sound, plan, figures).find("\"mean_db_spl\": null"), std::string::npos);
 }
 
