@@ -19,7 +19,7 @@ constexpr int kMaxFollowed = 8;               // contacts per impact, including 
 constexpr double kExplainedRatio = 1.3;       // permitted ratio of the depth to that of spring and modes
 constexpr double kFaceCosine = 0.99;          // minimum cosine between normals of one face,
 constexpr double kFlatnessRatio = 0.02;       // fraction of the size: maximum distance of corners from its plane
-constexpr double kQuietAfterImpactS = 5e-3;              // s; after the end of an impact, without slow impacts of the pair
+constexpr double kQuietAfterImpactS = 5e-3;   // s; after the end of an impact, without slow impacts of the pair
 
 /// Area of the convex polygon of given points [m^2].
 double calc_area(std::vector<Vec3> corners, const Vec3& normal) {
