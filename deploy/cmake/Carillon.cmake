@@ -18,7 +18,7 @@ if(CARILLON_MOLD AND PROJECT_IS_TOP_LEVEL)
   add_link_options(-fuse-ld=mold)
 endif()
 
-# ---- sources compiled together, and precompiled headers: both save most of what parsing the same headers again costs ----
+# ---- sources compiled together, and precompiled headers: both avoid most repeated parsing of headers ----
 
 option(CARILLON_UNITY "Compile the sources of a target together, about 60 kB at a time" ON)
 # Without optimisation gcc 12 reads intrinsics behind a precompiled header as if it optimised, and refuses Eigen's prefetches.
@@ -89,7 +89,7 @@ function(carillon_unite target)
   set_target_properties(${target} PROPERTIES SOURCES "${units};${alone}")
 endfunction()
 
-# What is compiled with other macros or position independent needs its own precompiled header. KIND: plain, pic, loops (pic, no errno of
+# Other macros or position-independent code need their own precompiled header. KIND: plain, pic, loops (pic, no errno of
 # mathematical functions) or test.
 function(carillon_precompiled kind)
   set(name carillon_precompiled_${kind})
@@ -198,7 +198,7 @@ function(carillon_helper target)
   install(TARGETS ${target} RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/carillon)
 endfunction()
 
-# A TIMEOUT is what a test may take alone on an idle core. Its limit is three times that: deploy/test runs two tests a core, and a machine
+# TIMEOUT: time of the test alone on an idle core. Its limit is three times that: deploy/test runs two tests a core, and a machine
 # may be slower.
 function(carillon_limit_time out seconds)
   math(EXPR limit "3 * ${seconds}")

@@ -1,5 +1,5 @@
-# Debian packages of what has been built: cpack --config build/release/CPackConfig.cmake -G DEB. docs/howto/packages.md
-# One install component is one package: runtime, dev (what other projects build against), python and precompute.
+# Debian packages of the build: cpack --config build/release/CPackConfig.cmake -G DEB. docs/howto/packages.md
+# One install component is one package: runtime, dev (headers and libraries for other projects), python and precompute.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME carillon)
 set(CPACK_PACKAGE_VENDOR "The Carillon maintainers")

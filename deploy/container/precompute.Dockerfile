@@ -1,6 +1,6 @@
 # The precompute side: carillon, carillon-precompute, carillon-mesh, carillon-bank, carillon-draw, with Debian's Open MPI, PETSc and SLEPc.
 #   docker build -t carillon-precompute -f deploy/container/precompute.Dockerfile .
-# What is installed is what deploy/install installs, by the same lists. VTK is not in them: carillon-draw, and pictures
+# Installs by deploy/install and its package lists. VTK is not in them: carillon-draw, and pictures
 # in reports, also need the list demo. docs/howto/containers.md
 FROM debian:bookworm AS build
 COPY deploy/install deploy/install

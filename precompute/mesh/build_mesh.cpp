@@ -9,7 +9,7 @@ namespace carillon::mesh {
 
 namespace {
 
-/// From the file's tags to indices: a table where the tags are dense, a sorted list where they are not.
+/// Maps file tags to indices: a table for dense tags, a sorted list for sparse ones.
 class TagTable {
  public:
   TagTable(const RawMesh& raw, const Cursor& cursor) {
@@ -34,7 +34,7 @@ class TagTable {
       if (sorted_[i].first == sorted_[i - 1].first) refuse_twin(raw, cursor, static_cast<std::size_t>(sorted_[i].second));
   }
 
-  /// The index of the node, -1 when the file has no such tag.
+  /// Index of the node; -1 for an unknown tag.
   std::int32_t find(std::int64_t tag) const {
     if (!dense_.empty()) {
       const std::uint64_t offset = static_cast<std::uint64_t>(tag) - static_cast<std::uint64_t>(low_);
@@ -112,7 +112,7 @@ std::vector<std::int64_t> merge_repeated_tets(RawMesh& raw) {
   std::vector<std::int64_t> position(count);
   std::size_t kept = 0;
   for (std::size_t e = 0; e < count; ++e) {
-    // A copy under the same region is a fault of the mesh: it stays, for check_mesh to name.
+    // A copy within the same region is a mesh error, which check_mesh reports.
     const auto original = first[e] == e ? kept : static_cast<std::size_t>(position[first[e]]);
     if (first[e] != e && raw.regions[e] != raw.regions[original]) {
       position[e] = static_cast<std::int64_t>(original);

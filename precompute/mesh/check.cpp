@@ -1,7 +1,6 @@
-// Method: indices, welding, orientation, volume, twins of elements, then the faces: two elements on a face run through its corners in
-//   opposite senses when they lie on opposite sides of it; faces that stay alone form the boundary, whose edges must pair up.
-// orientation by the sign of det(x1 - x0, x2 - x0, x3 - x0).
-// Deviations: elements that interpenetrate without sharing a face are not found (that would need a search for intersections).
+// Method: indices, welding, orientation (sign of det(x1 - x0, x2 - x0, x3 - x0)), volume, duplicate elements, then faces: two elements on
+//   opposite sides of a face traverse its corners in opposite senses; unmatched faces form the boundary, whose edges must pair up.
+// Limitation: elements that interpenetrate without sharing a face are not detected (needs an intersection search).
 
 #include "precompute/mesh/check.hpp"
 
@@ -20,7 +19,7 @@ namespace carillon::mesh {
 
 namespace {
 
-constexpr double kFlat = 1e-9;  // six volumes over the cube of the longest edge; coordinates stored as 32-bit floats still pass
+constexpr double kMinVolumeRatio = 1e-9;  // 6 V / (longest edge)^3; passes coordinates stored as 32-bit floats
 
 [[noreturn]] void refuse(const std::string& name, const std::string& message) { throw InputError(name + ": " + message); }
 
@@ -68,9 +67,9 @@ double calc_determinant(const TetMesh& mesh, std::int64_t e, double& longest_squ
   return calc_det(a, b, c);
 }
 
-/// `determinant` and the square of the longest edge as calc_determinant gives them.
+/// `determinant` and squared longest edge as from calc_determinant.
 bool is_flat(double determinant, double longest_squared) {
-  return !(std::abs(determinant) > kFlat * longest_squared * std::sqrt(longest_squared));
+  return !(std::abs(determinant) > kMinVolumeRatio * longest_squared * std::sqrt(longest_squared));
 }
 
 void orient(TetMesh& mesh, const std::string& name, CheckReport& report) {
@@ -83,7 +82,7 @@ void orient(TetMesh& mesh, const std::string& name, CheckReport& report) {
     } else if (determinant < 0.0) {
       auto* tet = mesh.tets.data() + e * mesh.nodes_per_tet();
       std::swap(tet[1], tet[2]);
-      if (mesh.order == 2) {  // edges 01 and 02, 13 and 23 change places
+      if (mesh.order == 2) {  // swap edges 01 and 02, 13 and 23
         std::swap(tet[4], tet[6]);
         std::swap(tet[8], tet[9]);
       }
@@ -95,7 +94,7 @@ void orient(TetMesh& mesh, const std::string& name, CheckReport& report) {
                              flat.size() == 1 ? "" : "s", list_elements(flat), flat.size() == 1 ? "it" : "them"));
 }
 
-/// Two elements with the same four corners share each of their faces; the face opposite the greatest corner is enough to find them.
+/// Elements with equal corners share all faces, so comparing the face opposite the greatest corner finds them.
 void refuse_duplicates(const TetMesh& mesh, const std::vector<Face>& faces, const std::string& name) {
   const auto apex = [&](const Face& face) { return mesh.tet(face.tet)[face.local]; };
   std::vector<std::int64_t> copies;
@@ -119,7 +118,7 @@ void refuse_duplicates(const TetMesh& mesh, const std::vector<Face>& faces, cons
                            copies.size() == 1 ? " is" : "s are", list_elements(copies), first + 1, first_original + 1));
 }
 
-/// Checks every face; returns those of one element.
+/// Checks every face; returns the unmatched ones.
 std::vector<Face> check_faces(const TetMesh& mesh, const std::vector<Face>& faces, const std::string& name) {
   std::vector<Face> boundary;
   for (std::size_t i = 0; i < faces.size();) {
@@ -149,10 +148,10 @@ std::vector<Face> check_faces(const TetMesh& mesh, const std::vector<Face>& face
 struct BoundaryEdge {
   std::int32_t low, high;
   std::int32_t face;                // index into the boundary
-  std::array<std::int8_t, 2> slot;  // where low and high stand in the face
+  std::array<std::int8_t, 2> slot;  // corner indices of low and high in the face
 };
 
-/// Every boundary edge joins two boundary faces; counts the nodes at which the fan of faces falls into several.
+/// Checks that every boundary edge joins two boundary faces; counts nodes with more than one fan of faces.
 void check_boundary(const std::vector<Face>& boundary, std::size_t node_count, const std::string& name, CheckReport& report) {
   std::vector<BoundaryEdge> edges;
   edges.reserve(3 * boundary.size());
@@ -206,7 +205,7 @@ void check_boundary(const std::vector<Face>& boundary, std::size_t node_count, c
   report.pinched_nodes = std::count(pinched.begin(), pinched.end(), 1);
 }
 
-/// Drops the nodes of no element (welded ones are among them), renumbers elements and sets.
+/// Drops unreferenced (including welded) nodes; renumbers elements and sets.
 void drop_unused(TetMesh& mesh, const std::vector<std::int32_t>& stand, CheckReport& report) {
   std::vector<std::int32_t> number(mesh.nodes_m.size(), -1);
   for (const auto node : mesh.tets) number[node] = 0;
@@ -247,9 +246,8 @@ void collect_warnings(CheckReport& report) {
   const auto add = [&](const std::string& text) { report.warnings.push_back(text); };
   if (report.welded > 0) add(fmt::format("{} repeated nodes were joined with their twins, closing cracks in the mesh", report.welded));
   if (report.touching_nodes > 0)
-    add(fmt::format(
-        "{} nodes lie in the place of another without a common face and were left apart: bodies that only touch do not hold together",
-        report.touching_nodes));
+    add(fmt::format("{} nodes coincide with another without a common face and were not merged: touching bodies are not connected",
+                    report.touching_nodes));
   if (report.pinched_nodes > 0)
     add(fmt::format("{} nodes join two parts of the body at a point only: the motion there is not determined by elasticity",
                     report.pinched_nodes));
@@ -280,9 +278,9 @@ void warn_of_elements(CheckReport& report) {
                     report.reoriented, report.tets));
   double farthest = 0.0;
   for (std::size_t k = 0; k < 3; ++k) farthest = std::max({farthest, std::abs(report.box_low[k]), std::abs(report.box_high[k])});
-  constexpr double kLost = 1e-6;  // of the shortest edge: what rounding its ends does to an element's stiffness
+  constexpr double kMaxRoundingRatio = 1e-6;  // relative to the shortest edge: effect of coordinate rounding on the stiffness
   const double rounding = farthest * std::numeric_limits<double>::epsilon();
-  if (rounding > kLost * report.shortest_edge_m)
+  if (rounding > kMaxRoundingRatio * report.shortest_edge_m)
     add(fmt::format(
         "the body lies {:.3g} m from the origin, where coordinates are rounded to {:.1g} m, {:.1g} of the shortest edge: move it to "
         "the origin where it is made",

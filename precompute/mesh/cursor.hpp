@@ -1,4 +1,4 @@
-// A bounds-checked place in the bytes of a mesh file: text tokens and binary numbers. Inner header of the readers.
+// Bounds-checked cursor over the bytes of a mesh file: text tokens and binary numbers. Internal header of the readers.
 #pragma once
 
 #include <fmt/format.h>
@@ -14,15 +14,15 @@
 
 namespace carillon::mesh {
 
-/// The first characters of untrusted text, made printable, for messages.
+/// Beginning of untrusted text, made printable, for messages.
 std::string quote_excerpt(std::string_view text);
 
-/// A place in the bytes of a mesh file. No read goes beyond the end: it throws InputError, which names the file and the place.
+/// Cursor over the bytes of a mesh file. Reading past the end throws InputError with file and position.
 class Cursor {
  public:
   Cursor(std::string_view bytes, std::string name) : bytes_(bytes), name_(std::move(name)) {}
 
-  /// From here on numbers are binary and places are named as bytes; `swap_bytes` for a file of the other byte order.
+  /// Switches to binary numbers and byte positions; `swap_bytes` for files of the other byte order.
   void set_binary(bool swap_bytes) {
     binary_ = true;
     swap_ = swap_bytes;
@@ -42,25 +42,25 @@ class Cursor {
   }
   [[noreturn]] void fail_text(std::size_t place, const std::string& message) const;
 
-  /// Skips white space, line ends and comments; false at the end of the bytes.
+  /// Skips white space, line ends and comments; false at the end.
   bool skip_space();
-  /// The rest of the line without its end (LF or CRLF), consumed with it.
+  /// Consumes the rest of the line; returns it without its end (LF or CRLF).
   std::string_view line();
-  /// The next word; InputError at the end of the bytes. `what` names what was expected.
+  /// Next word; InputError at the end. `what` names the expected item.
   std::string_view word(const char* what);
 
-  /// The next number in the file's present mode (text, or binary of exactly this type).
+  /// Next number in the current mode (text, or binary of exactly this type).
   std::int32_t int32(const char* what) {
     return binary_ ? raw<std::int32_t>(what) : static_cast<std::int32_t>(text_int(what, INT32_MIN, INT32_MAX));
   }
   std::int64_t int64(const char* what) { return binary_ ? raw<std::int64_t>(what) : text_int(what, INT64_MIN, INT64_MAX); }
   double real(const char* what) { return binary_ ? raw<double>(what) : text_real(what); }
 
-  /// Text whatever the mode (the counts of binary Gmsh 2.2 are text).
+  /// Text in either mode (counts of binary Gmsh 2.2 are text).
   std::int64_t text_int(const char* what, std::int64_t low, std::int64_t high);
   double text_real(const char* what);
 
-  /// Checks that `count` things of at least `min_bytes` each can still follow; a hostile count never reaches an allocation.
+  /// Checks that `count` items of at least `min_bytes` each fit the remaining bytes, before any allocation.
   std::size_t checked_count(std::int64_t count, std::size_t min_bytes, const char* what, std::size_t place) const;
 
   template <class T>

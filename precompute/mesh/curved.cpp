@@ -1,9 +1,9 @@
-// Method: the Jacobian of the quadratic map is a cubic of the barycentric coordinates. Its Bernstein coefficients come from products of the
-//   slopes, which are linear; if all of them are positive, so is the Jacobian everywhere. Otherwise it is tried at the points that count.
+// Method: the Jacobian of the quadratic map is a cubic in barycentric coordinates. Its Bernstein coefficients follow from products of the
+//   linear slopes; if all are positive, so is the Jacobian. Otherwise it is evaluated at the nodes and quadrature points only (the paper
+//   subdivides until the sign is proven).
 // Source: Johnen, Remacle and Geuzaine 2013, "Geometrical validity of curvilinear finite elements", J. Comput. Phys. 233, 359 (bounds by
 //   Bernstein coefficients); Keast 1986, CMAME 55, 339, the 11-point rule of degree 4; Walkington 2000, the 14-point rule of degree 5;
 //   Stroud's conical product of 125 points; Zienkiewicz and Taylor, the 4-point rule of degree 2.
-// Deviations: they subdivide until the sign is proven; the finite elements only ask it at their points.
 #include "precompute/mesh/curved.hpp"
 
 #include <algorithm>
@@ -17,12 +17,12 @@ namespace {
 
 using Barycentric = std::array<double, 4>;
 
-/// slope[k][j]: along xi_(k+1), dx / dxi_(k+1) = sum over j of L_j slope[k][j]. From N_i = L_i (2 L_i - 1), 4 L_i L_j and sum L = 1.
+/// slope[k][j]: dx / dxi_(k+1) = sum_j L_j slope[k][j]. From N_i = L_i (2 L_i - 1), 4 L_i L_j and sum L = 1.
 using Slopes = std::array<std::array<Vec3, 4>, 3>;
 
 Slopes calc_slopes(const TetMesh& mesh, std::int64_t e) {
   const auto tet = mesh.tet(e);
-  std::array<std::array<Vec3, 4>, 4> g{};  // dx / dL_i = sum over j of L_j g[i][j]
+  std::array<std::array<Vec3, 4>, 4> g{};  // dx / dL_i = sum_j L_j g[i][j]
   for (std::size_t i = 0; i < 4; ++i) {
     const Vec3& x = mesh.nodes_m[tet[i]];
     for (std::size_t j = 0; j < 4; ++j)
@@ -52,7 +52,7 @@ double calc_determinant(const Slopes& slopes, const Barycentric& L) {
 
 /// True if all twenty Bernstein coefficients are positive.
 bool is_positive_throughout(const Slopes& slopes) {
-  std::array<std::array<std::array<double, 4>, 4>, 4> sum{};  // over the orders of (j, k, l), at the ascending one
+  std::array<std::array<std::array<double, 4>, 4>, 4> sum{};  // over permutations of (j, k, l), stored at the ascending one
   for (std::size_t j = 0; j < 4; ++j)
     for (std::size_t k = 0; k < 4; ++k)
       for (std::size_t l = 0; l < 4; ++l) {
@@ -69,7 +69,7 @@ bool is_positive_throughout(const Slopes& slopes) {
 
 struct Point {
   Barycentric at;
-  double weight;  // of the reference volume 1/6; only those of the 11-point rule carry one
+  double weight;  // relative to the reference volume 1/6; set for the 11-point rule only
 };
 
 void add_orbit(std::vector<Point>& points, double other, double weight) {
@@ -121,12 +121,12 @@ Vec3 calc_middle(const TetMesh& mesh, std::int64_t e, std::size_t edge) {
 }
 
 bool is_curved(const TetMesh& mesh, std::int64_t e) {
-  constexpr double kStraight = 1e-6;  // of the edge's length
+  constexpr double kMaxMidNodeOffsetRatio = 1e-6;  // relative to the edge length
   for (std::size_t m = 0; m < 6; ++m) {
     const auto tet = mesh.tet(e);
     const Vec3 off = mesh.nodes_m[tet[4 + m]] - calc_middle(mesh, e, m);
     const Vec3 edge = mesh.nodes_m[tet[kEdges[m][1]]] - mesh.nodes_m[tet[kEdges[m][0]]];
-    if (dot(off, off) > kStraight * kStraight * dot(edge, edge)) return true;
+    if (dot(off, off) > kMaxMidNodeOffsetRatio * kMaxMidNodeOffsetRatio * dot(edge, edge)) return true;
   }
   return false;
 }
@@ -165,8 +165,8 @@ std::int64_t straighten_folded_elements(TetMesh& mesh) {
   std::vector<std::int64_t> curved;
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
     if (is_curved(mesh, e)) curved.push_back(e);
-  // Straightening one element moves mid nodes of its neighbours, so it repeats until none is folded. It ends: each pass straightens at
-  // least one element for good, and straight elements of positive volume are not folded.
+  // Straightening moves mid nodes shared with neighbours, so iterate until no element is folded. Terminates: each pass straightens at least
+  // one element for good, and straight elements of positive volume are not folded.
   std::int64_t straightened = 0;
   for (bool again = true; again;) {
     again = false;

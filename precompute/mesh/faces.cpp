@@ -1,4 +1,4 @@
-// Method: faces are dropped into buckets by their smallest corner and sorted within them; a face that stays alone is on the boundary.
+// Method: faces are bucketed by smallest corner and sorted within a bucket; unmatched faces are on the boundary.
 
 #include "precompute/mesh/faces.hpp"
 
@@ -41,7 +41,7 @@ std::vector<Face> sort_faces(const TetMesh& mesh, const std::vector<std::int32_t
   std::vector<Face> faces(unsorted.size());
   std::vector<std::size_t> next(begin.begin(), begin.end() - 1);
   for (const Face& face : unsorted) faces[next[face.a]++] = face;
-  // Faces come in the order of elements, so a stable sort by the other corners is all; the faces of one lowest corner are some twenty.
+  // Faces come in element order, so a stable sort by the other two corners suffices; about twenty faces share a lowest corner.
   const auto get_key = [](const Face& face) { return std::int64_t{face.b} << 32 | face.c; };
   constexpr std::size_t kFew = 64;
   for (std::size_t n = 0; n + 1 < begin.size(); ++n) {

@@ -1,4 +1,4 @@
-// The faces of all elements, brought together. Inner header of check and boundary extraction.
+// All element faces, sorted. Internal header of check and boundary extraction.
 #pragma once
 
 #include <cstdint>
@@ -12,15 +12,15 @@ struct Face {
   std::int32_t a, b, c;  // corners, ascending
   std::int32_t tet;
   std::int8_t local;  // 0..3, see kFaces
-  bool odd;           // seen from outside the element, a b c run clockwise
+  bool odd;           // a b c run clockwise seen from outside the element
 };
 
 inline bool same_corners(const Face& x, const Face& y) { return x.a == y.a && x.b == y.b && x.c == y.c; }
 
-/// All 4 E faces, equal ones next to each other. `node_of`: what stands for a node (identity when empty).
+/// All 4 E faces, equal ones adjacent. `node_of`: representative of each node (empty: identity).
 std::vector<Face> sort_faces(const TetMesh& mesh, const std::vector<std::int32_t>& node_of = {});
 
-/// The edge between the local corners i and j, as an index into kEdges.
+/// Index into kEdges of the edge between local corners i and j.
 int find_edge(int i, int j);
 
 }  // namespace carillon::mesh

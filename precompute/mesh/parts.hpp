@@ -7,7 +7,7 @@
 
 namespace carillon::mesh {
 
-/// Things joined to parts (nodes, triangles); find() is cheap through path halving.
+/// Disjoint sets of nodes or triangles; find() uses path halving.
 class Parts {
  public:
   explicit Parts(std::size_t count) : parent_(count) {
@@ -21,7 +21,7 @@ class Parts {
     }
     return i;
   }
-  /// The smaller number stands for both.
+  /// The smaller number is the representative.
   void join(std::int32_t i, std::int32_t j) {
     i = find(i);
     j = find(j);

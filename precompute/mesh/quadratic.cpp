@@ -1,5 +1,4 @@
-// Method: edges are dropped into buckets by their smaller corner; each gets one mid node, numbered after the corners in the order of the
-// edges.
+// Method: edges are bucketed by smaller corner; each gets one mid node, numbered after the corners in edge order.
 
 #include <algorithm>
 
@@ -20,7 +19,7 @@ TetMesh to_quadratic(const TetMesh& mesh) {
   fine.tets.resize(10 * count);
   struct Edge {
     std::int32_t high;
-    std::int64_t slot;  // where in fine.tets its mid node belongs
+    std::int64_t slot;  // index of its mid node in fine.tets
   };
   std::vector<std::size_t> begin(mesh.nodes_m.size() + 1, 0);
   const auto corners = [&](std::size_t e, std::size_t k) {

@@ -1,5 +1,5 @@
 // Method: dihedral angles from the outward area vectors of the faces; mean ratio; volume.
-// Source: Liu and Joe 1994, "Relationship between tetrahedron shape measures", BIT 34, eq. (mean ratio eta).
+// Source: Liu and Joe 1994, "Relationship between tetrahedron shape measures", BIT 34 (mean ratio eta).
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -29,8 +29,8 @@ void calc_quality(const TetMesh& mesh, CheckReport& report) {
     }
   const std::int64_t count = mesh.tet_count();
   std::vector<double> ratios(count);
-  double shortest = std::numeric_limits<double>::infinity();  // of the squared edges
-  double max = -1.0, min = 1.0, sum = 0.0;                    // of the cosines of the dihedral angles
+  double shortest = std::numeric_limits<double>::infinity();  // squared edge
+  double max = -1.0, min = 1.0, sum = 0.0;                    // cosines of the dihedral angles
   for (std::int64_t e = 0; e < count; ++e) {
     const auto tet = mesh.tet(e);
     std::array<Vec3, 4> x{};
@@ -44,7 +44,7 @@ void calc_quality(const TetMesh& mesh, CheckReport& report) {
       for (double& value : normal[f]) value /= length;
     }
     double own_max = -1.0, own_min = 1.0;
-    for (const auto& [f, g] : kEdges) {  // every pair of faces, too
+    for (const auto& [f, g] : kEdges) {  // also every pair of faces
       const double cosine = -dot(normal[f], normal[g]);
       own_max = std::max(own_max, cosine);
       own_min = std::min(own_min, cosine);

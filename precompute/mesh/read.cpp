@@ -13,7 +13,7 @@ namespace carillon::mesh {
 
 namespace {
 
-/// No mesh that could be solved here is larger; what is, is no mesh.
+/// Upper limit of the file size; larger files are refused.
 constexpr std::uint64_t kMaxBytes = 32ULL << 30;
 
 std::string read_bytes(const std::filesystem::path& file) {
@@ -22,7 +22,7 @@ std::string read_bytes(const std::filesystem::path& file) {
   return bytes;
 }
 
-/// The format by the first word of the content.
+/// Format by the first word of the file.
 MeshFormat find_format(std::string_view bytes, const std::string& name, const std::string& extension) {
   constexpr const char* kReadable = "carillon reads Gmsh .msh (2.2, 4.1), VTU, Medit .mesh and TetGen .node/.ele";
   base::refuse_utf16(bytes, name);
@@ -58,7 +58,7 @@ TetMesh parse_mesh(std::span<const std::byte> bytes, const std::string& name, Me
     return parse_tetgen(text.substr(0, split), name + ".node",
                         split == std::string_view::npos ? std::string_view{} : text.substr(split + 1), name + ".ele");
   }
-  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);  // a byte-order mark of UTF-8
+  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);  // UTF-8 byte-order mark
   if (format == MeshFormat::kGmsh) return parse_gmsh(text, name);
   if (format == MeshFormat::kVtu) return parse_vtu(text, name);
   return parse_medit(text, name);

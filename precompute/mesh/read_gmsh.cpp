@@ -1,9 +1,9 @@
-// One format, whose sections share one cursor and one set of tags: longer than most files.
-// Method: one pass over the sections of a .msh file, versions 2.0-2.2 and 4.1, text and binary in either byte order; sections that are not
-//   about the mesh are skipped. Tags become indices at the end (build_mesh), so the order of the sections is free.
+// Method: one pass over the sections of a .msh file, versions 2.0-2.2 and 4.1, text and binary in either byte order; other sections are
+//   skipped. Tags become indices at the end (build_mesh), so sections may come in any order. All sections share one cursor and one set of
+//   tags, hence one long file.
 // Source: Gmsh reference manual, "MSH file format" and "MSH file format version 2 (Legacy)". Gmsh's quadratic tetrahedron swaps the last
-//   two mid nodes against VTK's.
-// Deviations: $Periodic, $GhostElements, parametric coordinates and post-processing data but carillon-mesh's own are not used.
+//   two mid nodes relative to VTK.
+// Limitation: $Periodic, $GhostElements, parametric coordinates and foreign post-processing data are ignored.
 
 #include <algorithm>
 #include <array>
@@ -67,7 +67,7 @@ class GmshReader {
 
   Cursor cursor_;
   std::size_t group_budget_;
-  std::size_t start_ = 0;  // of the section that is skipped
+  std::size_t start_ = 0;  // of the skipped section
   bool binary_ = false;
   bool swap_ = false;
   int version_ = 0;  // 2 or 4; 0 before $MeshFormat
@@ -77,7 +77,7 @@ class GmshReader {
   std::map<Group, std::vector<RawMesh::Reference>> node_groups_;
   std::map<Group, std::vector<std::int64_t>> tet_groups_;
   std::unordered_map<std::int64_t, Vec3> doubt_m_;  // by node
-  std::array<std::int64_t, 64> tags_{};             // the nodes of the element being read
+  std::array<std::int64_t, 64> tags_{};             // nodes of the current element
 };
 
 void GmshReader::read_format() {
@@ -222,7 +222,7 @@ const GmshType& GmshReader::find_type(int type, std::size_t place) const {
 
 void GmshReader::add_element(std::int64_t tag, int number, const GmshType& type, const std::vector<std::int32_t>& physicals,
                              std::size_t place) {
-  // An entity may claim thousands of groups; what they take together stays in proportion to the file.
+  // An entity may claim thousands of groups; bound their total by the file size.
   const std::size_t entries = physicals.size() * static_cast<std::size_t>(type.nodes);
   if (entries > group_budget_)
     cursor_.fail(place, "the elements belong to more physical groups than a file of {} bytes explains; use fewer groups",
@@ -319,7 +319,7 @@ void GmshReader::read_elements_4() {
     cursor_.fail(at, "$Elements announces {} elements, but its blocks hold {}; the file was damaged: write the mesh again", count, total);
 }
 
-/// Behind the numbers of a binary section that is known; the cursor stands where its $End should.
+/// Skips the numbers of a known binary section, up to its $End.
 void GmshReader::skip_numbers(std::string_view name) {
   const auto step = [&](std::size_t bytes) {
     if (bytes > cursor_.remaining()) cursor_.fail(cursor_.place(), "${} is longer than the file", name);
@@ -328,7 +328,7 @@ void GmshReader::skip_numbers(std::string_view name) {
   const auto step_many = [&](std::int64_t count, std::size_t bytes) {
     step(cursor_.checked_count(count, bytes, "entries", cursor_.place()) * bytes);
   };
-  // A text number that ends its line: the binary data begin behind that.
+  // The binary data begin after the end of this line.
   const auto read_line_int = [&](const char* what) {
     const auto value = cursor_.text_int(what, INT64_MIN, INT64_MAX);
     cursor_.line();
@@ -361,7 +361,7 @@ void GmshReader::skip_numbers(std::string_view name) {
       step_many(points, 11 * 8);
       step_many(triangles, 3 * 4);
     }
-  } else {  // NodeData, ElementData, ElementNodeData: three lists in text, then the values
+  } else {  // three lists as text, then values
     const auto strings = cursor_.checked_count(read_line_int("the number of string tags"), 1, "string tags", cursor_.place());
     for (std::size_t n = 0; n < strings; ++n) cursor_.line();
     const auto reals = cursor_.checked_count(read_line_int("the number of real tags"), 2, "real tags", cursor_.place());
@@ -387,7 +387,7 @@ void GmshReader::skip_numbers(std::string_view name) {
   }
 }
 
-/// The section $NodeData, if it is the one that carillon-mesh writes; false for others, of which nothing is read.
+/// Reads $NodeData written by carillon-mesh; returns false for other data.
 bool GmshReader::read_doubt() {
   const std::string head = fmt::format("1\n\"{}\"\n1\n0\n3\n0\n3\n", kDoubtName);
   if (cursor_.bytes().substr(cursor_.place(), head.size()) != head) return false;
@@ -403,7 +403,7 @@ bool GmshReader::read_doubt() {
     const Vec3 way = read_point();
     doubt_m_[tag] = way;
     for (const double x : way)
-      if (!std::isfinite(x)) cursor_.fail(place, "a way between two surfaces is not finite; write the mesh again");
+      if (!std::isfinite(x)) cursor_.fail(place, "an offset between two surfaces is not finite; write the mesh again");
   }
   return true;
 }
@@ -412,7 +412,7 @@ void GmshReader::skip_section(std::string_view name, std::size_t place) {
   const std::string end = fmt::format("$End{}", name);
   const std::string_view bytes = cursor_.bytes();
   start_ = cursor_.place();
-  // Whether the end of the section is here: its tag, a line of its own but for what comes before, and then another section or nothing.
+  // True if the section ends here: its $End tag on a line, followed by another section or the end of the file.
   const auto is_end = [&](std::size_t at) {
     if (bytes.substr(at, end.size()) != end) return false;
     const auto line = std::min(bytes.find('\n', at), bytes.size());
@@ -422,16 +422,16 @@ void GmshReader::skip_section(std::string_view name, std::size_t place) {
   };
   static const std::set<std::string_view> kLists{"NodeData", "ElementData", "ElementNodeData"};
   static const std::set<std::string_view> kBinary{"Periodic", "GhostElements", "Parametrizations"};
-  // Binary values may hold anything, the tag itself too, so a section that is known is walked through. Version 2 has the others in text.
+  // Binary values may contain the tag itself, so known sections are parsed. Version 2 stores the others as text.
   if (binary_ && (kLists.contains(name) || (version_ == 4 && kBinary.contains(name)))) {
     try {
       skip_numbers(name);
       cursor_.skip_space();
       if (is_end(cursor_.place())) return;
-    } catch (const InputError&) {  // not as the manual has it: its end is sought
+    } catch (const InputError&) {  // not as in the manual: search for the end
     }
   }
-  // In text the tag begins a line; behind binary values there is no line end before it.
+  // In text the tag begins a line; after binary values there is no line end before it.
   for (std::size_t at = start_ == 0 ? 0 : start_ - 1; (at = bytes.find(end, at)) != std::string_view::npos; ++at) {
     if (!is_end(at) || (!binary_ && at > 0 && bytes[at - 1] != '\n' && bytes[at - 1] != '\r')) continue;
     cursor_.seek(at);
@@ -440,7 +440,7 @@ void GmshReader::skip_section(std::string_view name, std::size_t place) {
   cursor_.fail(place, "section ${} has no ${}; the file was cut short: write or copy it again", name, end.substr(1));
 }
 
-/// Drops the group of region 0, which is neither a region nor a set.
+/// Drops the group of region 0, which is neither region nor set.
 void GmshReader::clear_no_region() {
   const auto found =
       std::find_if(names_.begin(), names_.end(), [](const auto& entry) { return entry.first.first == 3 && entry.second == kNoRegionName; });
@@ -466,7 +466,7 @@ void GmshReader::name_groups() {
   }
 }
 
-/// Version 2.2 writes an element of several physical groups once for each: the copies become one element of the first group.
+/// Version 2.2 repeats an element for each of its physical groups: the copies become one element of the first group.
 void GmshReader::merge_repeated() {
   if (version_ != 2 || tet_groups_.size() < 2) return;
   const std::vector<std::int64_t> position_of = merge_repeated_tets(raw_);
@@ -486,7 +486,7 @@ TetMesh GmshReader::read() {
     const std::string name(head.substr(1));
     if (name == "NOD" || name == "ELM")
       cursor_.fail(place, "Gmsh format 1 is not read, only 2.2 and 4.1; convert it: gmsh FILE -save -format msh41 -o NEW.msh");
-    const bool parametric = name == "ParametricNodes";  // of version 2, in place of $Nodes
+    const bool parametric = name == "ParametricNodes";  // version 2 alternative to $Nodes
     const bool ours =
         name == "Nodes" || parametric || name == "Elements" || name == "Entities" || name == "MeshFormat" || name == "PartitionedEntities";
     if (ours && !seen.insert(parametric ? "Nodes" : name).second)

@@ -1,9 +1,9 @@
-// Method: keywords and numbers of an ASCII .mesh file; what does not bear on the body is skipped.
+// Method: keywords and numbers of an ASCII .mesh file; keywords other than nodes and elements are skipped. TetrahedraP2 without
+//   TetrahedraP2Ordering has no agreed order: VTK order is assumed (as Gmsh reads it) unless Gmsh order brings the mid nodes nearer to the
+//   edge midpoints. Gmsh 4.8 writes second order under first-order keywords with more numbers per line; rows of 11 numbers under Tetrahedra
+//   are read that way (two first-order rows on a line would be 10).
 // Source: INRIA technical report RT-0253 (P. Frey, "MEDIT", 2001), appendix on the .mesh format; TetrahedraP2 and TetrahedraP2Ordering as
-//   libMeshb 7 has them.
-// Deviations: TetrahedraP2 without TetrahedraP2Ordering has no agreed order. VTK's is assumed (Gmsh reads it so) unless Gmsh's own order
-//   brings the mid nodes nearer to the middles of their edges.  Gmsh (4.8) writes second order under the keywords of the first, with more
-//   numbers a line; rows of 11 numbers under Tetrahedra are taken so (two rows of the first order on a line would be 10).
+//   in libMeshb 7.
 
 #include <algorithm>
 #include <array>
@@ -17,11 +17,11 @@ namespace carillon::mesh {
 namespace {
 
 struct Section {
-  int numbers;          // a line's node numbers, the reference not counted
-  const char* prefix;   // of the node sets, nullptr for none
-  const char* plural;   // in messages
-  bool volume = false;  // a solid element that is no tetrahedron
-  int quadratic = 0;    // node numbers of a line where Gmsh writes second order under the first order's keyword
+  int numbers;          // node numbers per row, without the reference
+  const char* prefix;   // of the node sets; nullptr: none
+  const char* plural;   // for messages
+  bool volume = false;  // a solid element other than a tetrahedron
+  int quadratic = 0;    // node numbers per row if Gmsh writes second order under this keyword
 };
 
 const std::map<std::string_view, Section>& sections() {
@@ -67,7 +67,7 @@ class MeditReader {
   Cursor cursor_;
   RawMesh raw_;
   std::vector<std::int64_t> references_;
-  std::optional<std::array<int, 10>> ordering_;  // where the file keeps our node i
+  std::optional<std::array<int, 10>> ordering_;  // file position of our node i
 };
 
 void MeditReader::read_vertices() {
@@ -83,7 +83,7 @@ void MeditReader::read_vertices() {
   }
 }
 
-/// How many words stand on the line of the first row of a list.
+/// Words on the line of the first row of a list.
 int MeditReader::count_line_numbers() {
   if (!cursor_.skip_space()) return 0;
   std::string_view line = cursor_.bytes().substr(cursor_.place());
@@ -129,7 +129,7 @@ void MeditReader::read_surface(const Section& section) {
   }
 }
 
-/// Ten rows of four barycentric numbers in halves: a corner has one 2, the middle of an edge two 1s.
+/// Ten rows of four barycentric coordinates in halves: a corner has one 2, an edge midpoint two 1s.
 void MeditReader::read_ordering() {
   const std::size_t start = cursor_.place();
   if (read_count(2, "rows of the ordering") != 10) cursor_.fail(start, "TetrahedraP2Ordering needs ten rows; write the mesh again");
@@ -170,7 +170,7 @@ void MeditReader::order_mid_nodes() {
     std::array<double, 2> distance{};
     for (std::size_t e = 0; e < raw_.tet_tags.size(); ++e) {
       const std::int64_t* tags = raw_.tets.data() + 10 * e;
-      if (!std::all_of(tags, tags + 10, known)) return;  // build_mesh refuses it by name
+      if (!std::all_of(tags, tags + 10, known)) return;  // build_mesh reports the unknown node
       for (std::size_t edge = 4; edge < 6; ++edge)
         for (std::size_t way = 0; way < 2; ++way) {
           const Vec3 a = at(tags[kEdges[edge][0]]), b = at(tags[kEdges[edge][1]]);

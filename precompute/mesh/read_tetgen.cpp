@@ -1,7 +1,7 @@
-// Method: the two text files of TetGen, numbered from 0 or 1 (or any other way: the numbers are looked up).
-// Source: TetGen 1.5 manual, sections 5.2.1 (.node) and 5.2.4 (.ele). The order of the mid nodes of -o2 was read off the program's own
-//   output (tests/unit/precompute/mesh/data/box2.1.ele): edges 23, 03, 01, 12, 13, 02.
-// Deviations: .face, .edge and .neigh files are not needed; attributes of nodes are skipped.
+// Method: the two text files of TetGen; node numbers are arbitrary and looked up. Node attributes, .face, .edge and .neigh files are
+//   ignored.
+// Source: TetGen 1.5 manual, sections 5.2.1 (.node) and 5.2.4 (.ele). Mid-node order of -o2 as in the program's output
+//   (tests/unit/precompute/mesh/data/box2.1.ele): edges 23, 03, 01, 12, 13, 02.
 
 #include <cmath>
 
@@ -60,7 +60,7 @@ TetMesh parse_tetgen(std::string_view node_bytes, const std::string& node_name, 
     for (std::int64_t k = 0; k < corners; ++k) tags[k] = ele.text_int("a node of a tetrahedron", INT32_MIN, INT32_MAX);
     std::int32_t region = 0;
     for (std::int64_t k = 0; k < region_count; ++k) {
-      // TetGen's region attributes are real numbers; a region is the nearest whole number.
+      // TetGen's region attributes are real numbers; round to the nearest integer.
       const double value = ele.text_real("a region attribute");
       if (k == 0 && std::abs(value) < 2e9) region = static_cast<std::int32_t>(std::lround(value));
     }

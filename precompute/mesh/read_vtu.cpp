@@ -1,7 +1,7 @@
-// Method: the appended data are cut out, the rest is XML for pugixml; the arrays are decoded by vtu_data.cpp. Pieces are laid end to end.
-// Source: VTK file formats, "XML File Formats" (The VTK User's Guide). Cell types 10 and 24, and 71 (Lagrange) of second order, whose
-//   node order is that of 24.
-// Deviations: parallel files (.pvtu) are refused: name one piece, or save as one file.
+// Method: the appended data are cut out, the rest is parsed as XML by pugixml; vtu_data.cpp decodes the arrays. Pieces are concatenated.
+//   Parallel files (.pvtu) are refused.
+// Source: VTK file formats, "XML File Formats" (The VTK User's Guide). Cell types 10 and 24, and second-order 71 (Lagrange), which has the
+//   node order of 24.
 
 #include <algorithm>
 #include <array>
@@ -54,7 +54,7 @@ const char* solid_name(std::int64_t type) {
   }
 }
 
-/// Points, lines and surface cells, which a volume mesh may carry.
+/// Points, lines and surface cells, allowed in a volume mesh.
 bool is_surface_cell(std::int64_t type) {
   return (type >= 0 && type <= 9) || (type >= 21 && type <= 23) || type == 28 || type == 30 || (type >= 34 && type <= 36) ||
          (type >= 68 && type <= 70) || (type >= 75 && type <= 77);
@@ -87,14 +87,14 @@ class VtuReader {
   void read_point_sets(const Piece& piece, std::size_t first_node);
 
   Cursor file_;
-  std::string xml_;         // the file without its appended data
-  std::size_t cut_at_ = 0;  // where they were
+  std::string xml_;         // without appended data
+  std::size_t cut_at_ = 0;  // position of the appended data
   std::size_t cut_size_ = 0;
   std::string_view appended_;
   pugi::xml_document document_;
   std::unique_ptr<VtuData> data_;
   RawMesh raw_;
-  std::map<std::string, std::vector<std::int64_t>> point_values_;  // over all pieces
+  std::map<std::string, std::vector<std::int64_t>> point_values_;  // concatenated over pieces
 };
 
 void VtuReader::cut_appended() {
@@ -195,7 +195,7 @@ void VtuReader::read_point_sets(const Piece& piece, std::size_t first_node) {
   for (const pugi::xml_node& array : piece.node.child("PointData").children("DataArray")) {
     const std::string name = array.attribute("Name").as_string();
     if (name.empty() || !is_integer(array.attribute("type").as_string()) || array.attribute("NumberOfComponents").as_int(1) != 1) continue;
-    // These arrays are a convenience; a file with hundreds of them is not a list of node sets.
+    // These arrays are a convenience; hundreds of them are not node sets.
     if (++arrays > kMaxSetArrays || (point_values_.size() >= kMaxSetArrays && !point_values_.contains(name))) break;
     const auto values = read_array<std::int64_t>(array, piece.points);
     auto& all = point_values_[name];

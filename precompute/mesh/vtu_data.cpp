@@ -1,6 +1,6 @@
-// Method: ascii numbers; base64 read four characters at a time, padding allowed between header and data; blocks of zlib.
+// Method: ascii numbers; base64 in groups of four characters, padding allowed between header and data; zlib blocks. LZ4 and LZMA data and
+//   unsigned 64-bit integers above 2^63 - 1 are refused.
 // Source: VTK file formats, "XML File Formats" (The VTK User's Guide); RFC 4648 section 4; zlib's uncompress().
-// Deviations: LZ4 and LZMA data are refused with the remedy; unsigned 64-bit integers above 2^63 - 1 are refused.
 
 #include "precompute/mesh/vtu_data.hpp"
 
@@ -15,7 +15,7 @@ namespace carillon::mesh {
 
 namespace {
 
-constexpr std::size_t kZlibRatio = 1040;  // deflate's greatest expansion is 1032 (zlib, "Technical Details")
+constexpr std::size_t kZlibRatio = 1040;  // deflate's maximum expansion is 1032 (zlib, "Technical Details")
 
 std::array<signed char, 256> make_base64_values() {
   std::array<signed char, 256> values{};
@@ -25,15 +25,15 @@ std::array<signed char, 256> make_base64_values() {
   return values;
 }
 
-/// Bytes one after another out of raw data or base64 text.
+/// Byte stream over raw data or base64 text.
 class ByteStream {
  public:
   ByteStream(std::string_view source, bool base64) : source_(source), base64_(base64) {}
 
-  /// Upper bound of what is left.
+  /// Upper bound of the remaining bytes.
   std::size_t remaining() const { return base64_ ? ready_.size() - used_ + (source_.size() - at_) / 4 * 3 + 3 : source_.size() - at_; }
 
-  /// The next `count` bytes appended to `out`; false when there are fewer.
+  /// Appends the next `count` bytes to `out`; false if there are fewer.
   bool take(std::size_t count, std::string& out) {
     if (!base64_) {
       if (count > source_.size() - at_) return false;
@@ -166,7 +166,7 @@ std::string VtuData::decode(const std::string& name, const std::string& format, 
   if (block_count > stream.remaining() / static_cast<std::size_t>(encoding_.header_bytes)) cut_short();
   const auto packed = header(static_cast<std::size_t>(block_count));
   const std::uint64_t last = sizes[1] == 0 ? sizes[0] : sizes[1];
-  // block_count - 1 whole blocks and the last one make `expected`, checked without a product that could overflow.
+  // Sum of block_count - 1 full blocks and the last one equals `expected`; written without an overflowing product.
   if (last > expected ||
       (block_count > 1 &&
        (sizes[0] == 0 || (expected - last) / (block_count - 1) != sizes[0] || (expected - last) % (block_count - 1) != 0)) ||
@@ -211,7 +211,7 @@ std::vector<T> VtuData::read(const std::string& name, const std::string& type, c
                  name, count, text.size() / 2 + 1);
     spend(count * sizeof(T), place);
     std::vector<T> values(count);
-    // The text is a part of the parsed XML and not of the file: errors name the array's line.
+    // The text belongs to the parsed XML, not to the file: errors name the array's line.
     Cursor numbers(text, file_.name());
     std::size_t done = 0;
     try {

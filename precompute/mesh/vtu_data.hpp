@@ -1,4 +1,4 @@
-// The numbers of one VTK XML DataArray, however they are stored. Inner header of the VTU reader.
+// Numbers of one VTK XML DataArray in any encoding. Internal header of the VTU reader.
 #pragma once
 
 #include <cstdint>
@@ -10,22 +10,22 @@
 
 namespace carillon::mesh {
 
-/// What the root element of the file says about its binary data.
+/// Binary encoding given by the root element.
 struct VtuEncoding {
-  bool swap_bytes = false;    // the file's byte order is not this machine's
+  bool swap_bytes = false;    // byte order differs from this machine's
   int header_bytes = 4;       // header_type UInt32 or UInt64
   bool zlib = false;          // compressor vtkZLibDataCompressor
   bool appended_raw = false;  // encoding of <AppendedData>
 };
 
-/// Decodes DataArrays of one file. A budget tied to the file's size bounds all that is ever decoded, so that neither many arrays on one
-/// block of data nor a decompression bomb can exhaust the machine.
+/// Decodes DataArrays of one file. The total decoded size is bounded by the file size, against decompression bombs and repeated references
+/// to one block.
 class VtuData {
  public:
-  /// `file`: for messages; its bytes are those of the whole file. `appended`: what follows the underscore of <AppendedData>.
+  /// `file`: whole file, for messages. `appended`: bytes after the underscore of <AppendedData>.
   VtuData(const Cursor& file, VtuEncoding encoding, std::string_view appended);
 
-  /// The `count` numbers of type `type` ("Float32", "Int64", ...) as double or int64. `place`: of the array in the file.
+  /// `count` numbers of type `type` ("Float32", "Int64", ...) as double or int64. `place`: position of the array in the file.
   /// `text`: inline content (format ascii or binary); `offset`: into the appended data when `format` is "appended".
   template <class T>
   std::vector<T> read(const std::string& name, const std::string& type, const std::string& format, std::string_view text,

@@ -1,7 +1,6 @@
-// Method: nodes are sorted into cells of a grid a thousand times coarser than the tolerance; twins are joined transitively. Twins are
-//   welded only where two boundary faces coincide corner by corner, so that bodies touching at a point or along an edge stay apart.
-// Deviations: the tolerance is 1e-6 of the diagonal of the box of the nodes in use, but 0.01 of the shortest edge at most, and
-//   calc_place_tolerance at least.
+// Method: nodes are sorted into grid cells a thousand times coarser than the tolerance; twins are joined transitively. Twins are welded
+//   only where two boundary faces coincide corner by corner, so that bodies touching at a point or along an edge stay apart. Tolerance:
+//   1e-6 of the box diagonal of the used nodes, at most 0.01 of the shortest edge, at least calc_place_tolerance.
 
 #include <fmt/format.h>
 
@@ -17,7 +16,7 @@ namespace carillon::mesh {
 
 namespace {
 
-/// Joins the nodes in use that lie within `tolerance` of each other; true when there are any.
+/// Joins used nodes within `tolerance` of each other; true if there are any.
 bool join_twins(const TetMesh& mesh, const std::vector<char>& used, const Vec3& low, double tolerance, Parts& twins) {
   const double cell = 1000.0 * tolerance;
   struct Entry {
@@ -52,7 +51,7 @@ bool join_twins(const TetMesh& mesh, const std::vector<char>& used, const Vec3& 
       from[k] = cell_of(x[k] - tolerance, low[k]);
       to[k] = cell_of(x[k] + tolerance, low[k]);
     }
-    if (from == to) continue;  // nearly always: the node keeps away from the borders of its cell
+    if (from == to) continue;  // usual case: the node is away from its cell's border
     for (std::int64_t i = from[0]; i <= to[0]; ++i)
       for (std::int64_t j = from[1]; j <= to[1]; ++j)
         for (std::int64_t k = from[2]; k <= to[2]; ++k) {
@@ -64,9 +63,9 @@ bool join_twins(const TetMesh& mesh, const std::vector<char>& used, const Vec3& 
   return any;
 }
 
-/// Marks the corners and mid nodes of the pairs of boundary faces that would be one face if twins were one node.
+/// Marks the corners and mid nodes of boundary faces that coincide after merging twins.
 void mark_cracks(const TetMesh& mesh, const std::vector<std::int32_t>& twin_of, std::vector<char>& marked) {
-  // Faces by the nodes themselves first: what is shared already is no crack.
+  // Exclude faces that are already shared.
   std::vector<char> single(4 * mesh.tet_count(), 0);
   const auto slot = [](const Face& face) { return static_cast<std::size_t>(4 * static_cast<std::int64_t>(face.tet) + face.local); };
   {
@@ -92,12 +91,12 @@ void mark_cracks(const TetMesh& mesh, const std::vector<std::int32_t>& twin_of, 
 }
 
 struct MidNode {
-  std::int32_t high;  // the greater corner of the edge
+  std::int32_t high;  // greater corner of the edge
   std::int32_t mid;
   std::int32_t tet;
 };
 
-/// Every edge of a quadratic mesh has one mid node: twins are marked for welding, different places are refused.
+/// Every edge of a quadratic mesh has one mid node: marks twins for welding; refuses different positions.
 void match_mid_nodes(const TetMesh& mesh, const std::string& name, const std::vector<std::int32_t>& twin_of,
                      const std::vector<std::int32_t>& corner_of, std::vector<char>& marked) {
   std::vector<std::size_t> begin(mesh.nodes_m.size() + 1, 0);
@@ -150,7 +149,7 @@ void match_mid_nodes(const TetMesh& mesh, const std::string& name, const std::ve
   }
 }
 
-/// Between the corners of an element [m].
+/// Shortest distance between corners of an element [m].
 double find_shortest_edge(const TetMesh& mesh) {
   double shortest = HUGE_VAL;
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e) {
@@ -177,7 +176,7 @@ std::vector<std::int32_t> weld_cracks(TetMesh& mesh, const std::string& name, Ch
     }
   if (!std::isfinite(calc_length(high - low)))
     throw InputError(fmt::format("{}: the coordinates are too large to compute with; give them in metres", name));
-  // Coordinates of single precision differ by 1e-7 of the body; nodes that close on the scale of an element are still not twins.
+  // Single-precision coordinates differ by 1e-7 of the body; nodes that close relative to an element are still distinct.
   constexpr double kSingle = 1e-6, kOfEdge = 1e-2;
   const double diagonal = calc_length(high - low);
   const double tolerance = std::max(calc_place_tolerance(low, high), std::min(kSingle * diagonal, kOfEdge * find_shortest_edge(mesh)));
@@ -193,7 +192,7 @@ std::vector<std::int32_t> weld_cracks(TetMesh& mesh, const std::string& name, Ch
     if (mesh.order == 2) match_mid_nodes(mesh, name, twin_of, identity, marked);
     return identity;
   }
-  // Twins within one element are not a crack: that element has no volume and is refused for it.
+  // Twins within one element are no crack: the element has zero volume and is refused later.
   std::vector<char> barred(count, 0);
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e) {
     const auto tet = mesh.tet(e);
@@ -205,7 +204,7 @@ std::vector<std::int32_t> weld_cracks(TetMesh& mesh, const std::string& name, Ch
     if (barred[twins.find(identity[i])] != 0) twin_of[i] = identity[i];
   std::vector<char> marked(count, 0);
   mark_cracks(mesh, twin_of, marked);
-  // The first marked twin stands for the others.
+  // The first marked twin is the representative.
   const auto choose = [&] {
     std::vector<std::int32_t> first(count, -1), stand(identity);
     for (std::size_t i = 0; i < count; ++i) {

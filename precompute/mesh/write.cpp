@@ -1,6 +1,6 @@
-// Method: one point entity for each node set, one volume entity for each region; nodes belong to the first volume.
+// Method: one discrete point entity per node set, one discrete volume entity per region (with the box of the mesh); nodes belong to the
+//   first volume.
 // Source: Gmsh reference manual, "MSH file format", version 4.1.
-// Deviations: entities are discrete (no geometry); the boxes of the volumes are that of the mesh.
 
 #include "precompute/mesh/write.hpp"
 
@@ -17,7 +17,7 @@ namespace carillon::mesh {
 
 namespace {
 
-/// Numbers in the mode of the file; `end_line` is silent in binary.
+/// Number output in the mode of the file; `end_line` does nothing in binary.
 class Output {
  public:
   explicit Output(bool binary) : binary_(binary) {}
@@ -37,21 +37,21 @@ class Output {
       const auto raw = std::bit_cast<std::array<char, sizeof(T)>>(value);
       bytes_.append(raw.data(), raw.size());
     } else {
-      fmt::format_to(std::back_inserter(bytes_), "{} ", value);  // the shortest digits that read back the same
+      fmt::format_to(std::back_inserter(bytes_), "{} ", value);  // shortest round-trip digits
     }
   }
   bool binary_;
   std::string bytes_;
 };
 
-/// Quotes and line ends would break the list of names.
+/// Replaces quotes and line ends, which would break the list of names.
 std::string clean_name(std::string name) {
   for (char& c : name)
     if (c == '"' || c == '\n' || c == '\r') c = '_';
   return name;
 }
 
-/// The nodes of the elements of a region, ascending.
+/// Nodes of a region's elements, ascending.
 std::vector<std::int32_t> find_region_nodes(const TetMesh& mesh, const std::vector<std::int32_t>& region_of, std::int32_t region) {
   std::vector<char> is_in(mesh.nodes_m.size(), 0);
   for (std::size_t e = 0; e < region_of.size(); ++e)
@@ -63,7 +63,7 @@ std::vector<std::int32_t> find_region_nodes(const TetMesh& mesh, const std::vect
   return nodes;
 }
 
-/// The section of post-processing data with TetMesh::doubt_m, of the nodes that have any.
+/// Post-processing section of TetMesh::doubt_m, for nonzero nodes.
 void write_doubt(const TetMesh& mesh, bool binary, Output& out) {
   std::vector<std::size_t> nodes;
   for (std::size_t i = 0; i < mesh.doubt_m.size(); ++i)
@@ -189,7 +189,7 @@ class GmshWriter {
     end("Nodes");
   }
 
-  /// Tetrahedra in blocks, one for each run of a region, which keeps their order; then the points of the sets.
+  /// Tetrahedra in blocks, one per run of a region (order preserved); then the points of the sets.
   void write_elements() {
     std::size_t elements = mesh_.tet_count(), tag = 0;
     for (const std::size_t s : filled_) elements += sets_[s].second->size();
@@ -229,7 +229,7 @@ class GmshWriter {
   bool binary_;
   std::vector<std::int32_t> region_of_;  // (elements)
   std::vector<std::int32_t> regions_;    // ascending
-  std::vector<std::string> names_;       // (regions) of their groups; empty: none
+  std::vector<std::string> names_;       // (regions) group names; empty: none
   std::int32_t no_region_ = 1;           // group of region 0: an unused number
   std::vector<std::pair<std::string, const std::vector<std::int32_t>*>> sets_;
   std::vector<std::size_t> filled_;  // sets that have nodes

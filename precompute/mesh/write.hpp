@@ -11,8 +11,8 @@ namespace carillon::mesh {
 enum class GmshEncoding { kBinary, kText };
 
 /// Writes Gmsh 4.1, first or second order, atomically. Each node set becomes a physical group of dimension 0 (one point element per node),
-/// each region one of dimension 3, with its name (region 0: kNoRegionName), so that read_mesh gives the same mesh back. A set equal to
-/// the nodes of a region is not written as points. Throws SystemError on write errors. Not collective.
+/// each region one of dimension 3 with its name (region 0: kNoRegionName), so that read_mesh restores the same mesh. A set equal to a
+/// region's nodes is not written as points. Throws SystemError on write errors. Not collective.
 void write_gmsh(const TetMesh& mesh, const std::filesystem::path& file, GmshEncoding encoding = GmshEncoding::kBinary);
 
 /// The bytes of that file.

@@ -1,8 +1,7 @@
-// Method: coplanar triangles are joined to panes. From every edge that turns by less than 50 degrees a row of panes is followed to both
-//   sides: through a pane with four corners to the opposite side, through others straight on. The row ends at a sharp edge, at a pane more
-//   than three times wider or a polygon, and where the turn changes its sign or its size by more than a factor. Its length distinguishes an
-//   arc cut into facets from a bevel.
-// Source: our own. The thresholds are measured: docs/decisions/surface-meshing.md.
+// Method: coplanar triangles are merged into panes. From every edge that turns by less than 50 degrees a row of panes is followed to both
+//   sides: through four-cornered panes to the opposite side, straight through others. The row ends at a sharp edge, at a pane more than
+//   three times wider or a polygon, and where the turn changes its sign or its size by more than a factor. The row length distinguishes a
+//   faceted arc from a bevel. Thresholds are measured: docs/decisions/surface-meshing.md.
 #include "precompute/mesher/bends.hpp"
 
 #include <algorithm>
@@ -17,29 +16,29 @@
 namespace carillon::mesher {
 namespace {
 
-constexpr double kFlatDeg = 0.1;     // faces that turn by less are one plane
-constexpr double kCornerDeg = 10;    // the outline of a pane has a corner where it turns by more
-constexpr double kWider = 3;         // a pane this many times wider than its neighbour is not of its row
-constexpr double kAlike = 3.3;       // turns that differ by more than this factor are not of one row
-constexpr double kMaxTurnDeg = 50;   // no smooth surface is cut as coarsely
-constexpr double kSureTurnDeg = 25;  // fifteen sides and more are a circle
-constexpr int kRow = 4;              // panes that make an arc
-constexpr int kShortRow = 5;         // bends and panes that may be an arc: two panes between planes, or three and nothing next to them
-constexpr int kFollowed = 4;         // to each side
+constexpr double kMaxCoplanarTurnDeg = 0.1;  // coplanar below this turn
+constexpr double kMinCornerTurnDeg = 10;     // turn at a corner of a pane's outline
+constexpr double kMaxWidthRatio = 3;         // largest width ratio of panes in a row
+constexpr double kMaxTurnRatio = 3.3;        // largest ratio of turns in a row
+constexpr double kMaxTurnDeg = 50;           // largest turn of a faceted smooth surface
+constexpr double kMaxCircleTurnDeg = 25;     // fifteen or more sides are a circle
+constexpr int kMinArcPanes = 4;              // panes of an arc
+constexpr int kMinDoubtfulArcLength = 5;     // bends and panes of a possible arc: two panes between planes, or three without neighbours
+constexpr int kMaxPanesPerSide = 4;          // per side
 
-/// The outline of a pane.
+/// Outline of a pane.
 struct Outline {
-  std::vector<std::int32_t> edges;  // of Bends
-  std::vector<int> side;            // of each edge, numbered around; empty if the outline is no single loop
+  std::vector<std::int32_t> edges;  // indices into Bends
+  std::vector<int> side;            // side of each edge, numbered around; empty if the outline is not a single loop
   int sides = 0;
   int triangles = 0;
-  int sharp = 0;       // edges across which no smooth surface continues
-  int neighbours = 0;  // panes on which it may
+  int sharp = 0;       // edges that end the smooth surface
+  int neighbours = 0;  // panes across the other edges
   double rim_turn_deg = 0;
 };
 
 struct Row {
-  int bends = 1;  // of one kind
+  int bends = 1;  // of one sign
   int panes = 0;
 };
 
@@ -70,11 +69,11 @@ class Judge {
   Vec3 calc_middle(const Bend& edge) const { return 0.5 * (at(edge.ends[0]) + at(edge.ends[1])); }
   std::int32_t pane_of(const Bend& edge, int side) const { return out_.pane[edge.faces[side]]; }
   const Outline& outline_of(std::int32_t pane) const { return outlines_[place_[pane]]; }
-  bool is_plane(const Bend& edge) const { return edge.count == 2 && edge.turn_deg < kFlatDeg; }
-  bool is_bend(const Bend& edge) const { return edge.count == 2 && edge.turn_deg >= kFlatDeg && edge.turn_deg <= kMaxTurnDeg; }
+  bool is_plane(const Bend& edge) const { return edge.count == 2 && edge.turn_deg < kMaxCoplanarTurnDeg; }
+  bool is_bend(const Bend& edge) const { return edge.count == 2 && edge.turn_deg >= kMaxCoplanarTurnDeg && edge.turn_deg <= kMaxTurnDeg; }
 
   void find_edges() {
-    std::map<std::array<std::int32_t, 2>, std::int32_t> number;  // ordered: the new points come in a fixed order
+    std::map<std::array<std::int32_t, 2>, std::int32_t> number;  // ordered: deterministic numbering of new points
     for (const Triangle& t : surface_.triangles)
       for (int c = 0; c < 3; ++c) number[{std::min(t[c], t[(c + 1) % 3]), std::max(t[c], t[(c + 1) % 3])}];
     for (auto& [ends, place] : number) {
@@ -160,7 +159,7 @@ class Judge {
     for (const auto& [v, around] : at_point)
       if (around.size() != 2) return;
     std::vector<std::size_t> order;
-    std::vector<char> corner;  // at the start of each edge of the order
+    std::vector<char> corner;  // at the start of each edge, in walking order
     std::size_t i = 0;
     std::int32_t v = out_.edges[outline.edges[0]].ends[0];
     do {
@@ -170,7 +169,7 @@ class Judge {
       const auto& [c, d] = out_.edges[outline.edges[around[0] == i ? around[1] : around[0]]].ends;
       const Vec3 in = calc_unit(at(v) - at(c == v ? d : c)), forth = calc_unit(at(next) - at(v));
       order.push_back(i);
-      corner.push_back(dot(in, forth) < std::cos(kCornerDeg * std::numbers::pi / 180));
+      corner.push_back(dot(in, forth) < std::cos(kMinCornerTurnDeg * std::numbers::pi / 180));
       const auto& beyond = at_point.at(next);
       i = beyond[0] == i ? beyond[1] : beyond[0];
       v = next;
@@ -186,7 +185,7 @@ class Judge {
     }
   }
 
-  /// The edge at which a row that enters the pane by `entry` leaves it; -1 if there is none.
+  /// Edge at which a row that enters the pane by `entry` leaves it; -1 if none.
   std::int32_t find_exit(std::int32_t pane, std::int32_t entry) const {
     const Outline& outline = outline_of(pane);
     const Bend& from = out_.edges[entry];
@@ -203,7 +202,7 @@ class Judge {
     };
     const std::size_t own = std::find(outline.edges.begin(), outline.edges.end(), entry) - outline.edges.begin();
     if (outline.sides == 4) return find_nearest((outline.side[own] + 2) % 4);
-    if (outline.sides == 3) {  // one side on the rim: from one of the others to the third
+    if (outline.sides == 3) {  // one side on the rim: connect the other two
       std::array<bool, 3> rim{};
       for (std::size_t i = 0; i < outline.edges.size(); ++i)
         rim[outline.side[i]] = rim[outline.side[i]] || !is_bend(out_.edges[outline.edges[i]]);
@@ -226,20 +225,20 @@ class Judge {
     return best;
   }
 
-  /// Follows the panes from the edge to one side. `width` is that of the narrower of both panes at the edge.
+  /// Follows the panes from the edge to one side. `width`: of the narrower pane at the edge.
   void follow(std::int32_t start, int side, double width, Row& row) const {
     const Bend& first = out_.edges[start];
     std::int32_t entry = start, pane = pane_of(first, side);
-    for (int n = 0; n < kFollowed; ++n) {
+    for (int n = 0; n < kMaxPanesPerSide; ++n) {
       const std::int32_t exit = find_exit(pane, entry);
       if (exit < 0) return;
       const Bend& edge = out_.edges[exit];
-      if (calc_width(entry, exit) > kWider * width) return;
+      if (calc_width(entry, exit) > kMaxWidthRatio * width) return;
       ++row.panes;
       const double ratio = edge.turn_deg / first.turn_deg;
       const Outline& outline = outline_of(pane);
       if (outline.sides > 4 && outline.neighbours > 4) return;  // a cap
-      if (!is_bend(edge) || edge.sign != first.sign || ratio > kAlike || ratio < 1 / kAlike) return;
+      if (!is_bend(edge) || edge.sign != first.sign || ratio > kMaxTurnRatio || ratio < 1 / kMaxTurnRatio) return;
       ++row.bends;
       pane = pane_of(edge, pane_of(edge, 0) == pane ? 1 : 0);
       entry = exit;
@@ -252,7 +251,7 @@ class Judge {
     return norm(cross(along, calc_middle(out_.edges[exit]) - calc_middle(from)));
   }
 
-  /// How far the pane reaches from the line of the edge.
+  /// Extent of the pane from the line of the edge.
   double calc_reach(std::int32_t pane, const Bend& edge) const {
     const Vec3 along = calc_unit(at(edge.ends[1]) - at(edge.ends[0]));
     double reach = 0;
@@ -261,7 +260,7 @@ class Judge {
     return reach;
   }
 
-  /// How sharply the rim of the smooth part bends at each point on a sharp edge: the sides of a pyramid meet in corners.
+  /// Turn of the smooth part's rim at each point on a sharp edge; sides of a pyramid meet in corners.
   void find_rim_turns() {
     std::map<std::int32_t, std::vector<std::int32_t>> along;
     for (const Bend& edge : out_.edges)
@@ -274,7 +273,7 @@ class Judge {
     return std::atan2(norm(cross(in, forth)), dot(in, forth)) * 180 / std::numbers::pi;
   }
 
-  /// The other end of the pane's sharp edge at v; -1 if it has none or two.
+  /// Other end of the pane's sharp edge at v; -1 for none or two.
   std::int32_t find_rim(std::int32_t pane, std::int32_t v) const {
     std::int32_t found = -1;
     for (const std::int32_t e : outline_of(pane).edges) {
@@ -286,7 +285,7 @@ class Judge {
     return found;
   }
 
-  /// The least turn of the rim at the places where a bend of the pane meets it; 0 if none does.
+  /// Least turn of the rim where a bend of the pane meets it; 0 if none does.
   double calc_rim_turn(std::int32_t pane) const {
     double min = HUGE_VAL;
     for (const std::int32_t e : outline_of(pane).edges) {
@@ -296,7 +295,7 @@ class Judge {
         const auto found = rim_turn_deg_.find(v);
         if (found == rim_turn_deg_.end()) continue;
         double turn = found->second;
-        if (turn < 0) {  // several sharp edges: those of both panes
+        if (turn < 0) {  // several sharp edges: use those of both panes
           const std::int32_t before = find_rim(pane_of(edge, 0), v), next = find_rim(pane_of(edge, 1), v);
           if (before < 0 || next < 0) continue;
           turn = calc_turn(before, v, next);
@@ -307,12 +306,12 @@ class Judge {
     return min < HUGE_VAL ? min : 0;
   }
 
-  /// A single triangle without a side on a sharp edge, or with one.
+  /// True for a single triangle without a side on a sharp edge, or with one.
   bool is_facet(std::int32_t pane) const { return outline_of(pane).triangles == 1 && outline_of(pane).sharp <= 1; }
 
   static std::array<std::int32_t, 2> make_pair(std::int32_t a, std::int32_t b) { return {std::min(a, b), std::max(a, b)}; }
 
-  /// The longest row across the line that two panes have in common.
+  /// Longest row across the common line of two panes.
   void find_rows() {
     for (std::size_t e = 0; e < out_.edges.size(); ++e) {
       const Bend& edge = out_.edges[e];
@@ -320,7 +319,7 @@ class Judge {
       const std::array<std::int32_t, 2> panes{pane_of(edge, 0), pane_of(edge, 1)};
       if (is_facet(panes[0]) || is_facet(panes[1])) continue;
       Row& longest = rows_[make_pair(panes[0], panes[1])];
-      if (longest.panes >= kRow) continue;
+      if (longest.panes >= kMinArcPanes) continue;
       const auto place = static_cast<std::int32_t>(e);
       double width = HUGE_VAL;
       for (int side = 0; side < 2; ++side)
@@ -333,7 +332,7 @@ class Judge {
 
   void judge(Bend& edge) const {
     const std::array<std::int32_t, 2> panes{pane_of(edge, 0), pane_of(edge, 1)};
-    // A polygon in the midst of a smooth part: no strip and no net is cut like that.
+    // A polygon inside a smooth part: not produced by strips or nets.
     const auto is_polygon = [&](int side) {
       const Outline& outline = outline_of(panes[side]);
       return outline.sides > 4 && outline.sharp == 0;
@@ -342,29 +341,29 @@ class Judge {
       edge.sharp = true;
       return;
     }
-    if (const auto row = rows_.find(make_pair(panes[0], panes[1])); row != rows_.end() && row->second.panes < kRow) {
+    if (const auto row = rows_.find(make_pair(panes[0], panes[1])); row != rows_.end() && row->second.panes < kMinArcPanes) {
       edge.sharp = true;
-      edge.doubtful = edge.turn_deg <= sharp_angle_deg_ && row->second.bends + row->second.panes >= kShortRow;
+      edge.doubtful = edge.turn_deg <= sharp_angle_deg_ && row->second.bends + row->second.panes >= kMinDoubtfulArcLength;
       return;
     }
-    // A shallow pyramid turns less at its edges than its outline does.
+    // A shallow pyramid turns less at its edges than its outline.
     const double turn = std::max(edge.turn_deg, std::min(outline_of(panes[0]).rim_turn_deg, outline_of(panes[1]).rim_turn_deg));
     edge.sharp = turn > sharp_angle_deg_;
-    edge.doubtful = turn > kSureTurnDeg && turn <= kMaxTurnDeg;
+    edge.doubtful = turn > kMaxCircleTurnDeg && turn <= kMaxTurnDeg;
     if (edge.sharp) return;
     std::array<double, 2> reach{};
     for (int side = 0; side < 2; ++side) reach[side] = calc_reach(panes[side], edge);
     for (int side = 0; side < 2; ++side)
-      if (reach[side] > kWider * reach[1 - side] || is_polygon(side)) edge.straight = side;
+      if (reach[side] > kMaxWidthRatio * reach[1 - side] || is_polygon(side)) edge.straight = side;
   }
 
   const TriangleSurface& surface_;
   double sharp_angle_deg_;
   Bends out_;
-  std::vector<std::int32_t> place_;  // (T) of a pane among the outlines
+  std::vector<std::int32_t> place_;  // (T) index of the pane's outline
   std::vector<Outline> outlines_;
   std::map<std::int32_t, double> rim_turn_deg_;
-  std::map<std::array<std::int32_t, 2>, Row> rows_;  // by the two panes
+  std::map<std::array<std::int32_t, 2>, Row> rows_;  // by pane pair
 };
 
 }  // namespace
@@ -372,8 +371,8 @@ class Judge {
 Bends find_bends(const TriangleSurface& surface, double sharp_angle_deg) { return Judge(surface, sharp_angle_deg).judge(); }
 
 bool is_tip(const TriangleSurface& surface, const Bends& bends, std::int32_t v, const Vec3& normal) {
-  constexpr double kMin = 0.05;     // 3 degrees
-  constexpr double kFurther = 0.4;  // of the slope: on a ball the next edge turns by twice of it
+  constexpr double kMinSlopeRad = 0.05;         // radians; 3 degrees
+  constexpr double kMaxFurtherTurnRatio = 0.4;  // of the slope: on a ball the next edge turns by twice this
   const auto at = [&](std::int32_t n) -> const Vec3& { return surface.points[n]; };
   double all = 0;
   std::map<std::int32_t, int> panes;
@@ -382,11 +381,11 @@ bool is_tip(const TriangleSurface& surface, const Bends& bends, std::int32_t v, 
     std::int32_t f = corner / 3, e = bends.edges_of[f][(corner % 3 + 1) % 3];
     const Vec3 away = calc_unit(0.5 * (at(bends.edges[e].ends[0]) + at(bends.edges[e].ends[1])) - at(v));
     const double slope = -dot(away, normal);
-    if (std::abs(slope) < kMin || slope * all < 0) return false;
+    if (std::abs(slope) < kMinSlopeRad || slope * all < 0) return false;
     all += slope;
     ++panes[bends.pane[f]];
     const Vec3 sideways = cross(bends.normals[f], away);
-    for (std::size_t n = 0; n < bends.pane.size() && bends.edges[e].count == 2 && bends.edges[e].turn_deg < kFlatDeg; ++n) {
+    for (std::size_t n = 0; n < bends.pane.size() && bends.edges[e].count == 2 && bends.edges[e].turn_deg < kMaxCoplanarTurnDeg; ++n) {
       f = bends.edges[e].faces[bends.edges[e].faces[0] == f ? 1 : 0];
       std::int32_t next = -1;
       for (const std::int32_t other : bends.edges_of[f]) {
@@ -397,8 +396,8 @@ bool is_tip(const TriangleSurface& surface, const Bends& bends, std::int32_t v, 
       e = next;
     }
     const Bend& edge = bends.edges[e];
-    if (edge.sharp || edge.turn_deg < kFlatDeg) continue;
-    if (edge.sign * slope > 0 && edge.turn_deg * std::numbers::pi / 180 > kFurther * std::asin(std::min(std::abs(slope), 1.0)))
+    if (edge.sharp || edge.turn_deg < kMaxCoplanarTurnDeg) continue;
+    if (edge.sign * slope > 0 && edge.turn_deg * std::numbers::pi / 180 > kMaxFurtherTurnRatio * std::asin(std::min(std::abs(slope), 1.0)))
       return false;
   }
   return panes.size() > 2;

@@ -1,4 +1,4 @@
-// The body and the steps that read its distance field.
+// The body and the steps that use its distance field.
 #include "precompute/mesher/body.hpp"
 
 #include <fmt/core.h>
@@ -14,8 +14,8 @@
 namespace carillon::mesher {
 namespace {
 
-// Curves closer than this part of an edge, but for their common ends, would take hundreds of balls for every element between them.
-constexpr double kSameCurve = 0.01;
+// Curves closer than this part of an edge (except at common ends) would need hundreds of balls per element between them.
+constexpr double kMinCurveGapPerEdge = 0.01;
 
 [[noreturn]] void throw_solid(const SurfaceOptions& options, double deepest_m) {
   throw InputError(
@@ -38,7 +38,7 @@ void check_edge(const SurfaceOptions& options, double edge_m, double diagonal_m,
 DistanceField make_field(const Body& body, const SurfaceOptions& options, double edge_m) {
   const Vec3 extent = calc_box(body.repaired.surface.points).extent();
   const double diagonal = norm(extent);
-  // Three samples an edge and eight through the wall, as far as sixty million samples reach.
+  // Three samples per edge and eight through the wall, up to sixty million samples.
   constexpr double kPleasantSamples = 6e7;
   double voxel = std::min({edge_m / 3, diagonal / 80, body.wall_m > 0 ? body.wall_m / 8 : diagonal});
   voxel = std::max(voxel, std::cbrt(extent[0] * extent[1] * extent[2] / kPleasantSamples));
@@ -47,7 +47,7 @@ DistanceField make_field(const Body& body, const SurfaceOptions& options, double
   if (body.wall_m >= half) throw_solid(options, half);
   DistanceField field = [&] {
     try {
-      // Outside, stuffing reads one edge away; the wrap's offset widens what is inside.
+      // Outside, stuffing samples one edge away; the wrap's offset extends the inside.
       return calc_distance_field(body.repaired.surface, voxel,
                                  {std::max(4 * voxel, std::min(edge_m, diagonal / 20)),
                                   std::max(body.wall_m + 4 * voxel, options.method == Method::kStuffing ? 2 * edge_m : 0.0)},
@@ -83,14 +83,13 @@ std::unique_ptr<DelaunayBody> make_delaunay(Body& body, const SurfaceOptions& op
       curves.insert(curves.end(), inset.begin(), inset.end());
     }
   }
-  curves = untangle_curves(std::move(curves), kSameCurve * edge_m);
+  curves = untangle_curves(std::move(curves), kMinCurveGapPerEdge * edge_m);
   return body.field ? make_field_body(*body.field, body.wall_m, curves) : make_surface_body(body.repaired.surface, curves);
 }
 
 DelaunaySizes calc_sizes(const Body& body, const SurfaceOptions& options, double edge_m) {
   const double distance = body.wall_m > 0 ? std::min(0.1 * edge_m, 0.15 * body.wall_m) : 0.1 * edge_m;
-  // Far more than any body needs at this edge length, so that only a runaway meets it.
-  // Without a target, a thin body takes what its thickness needs.
+  // Runaway limit, far above any reasonable count for this edge length. Without a target, a thin body takes the count its thickness needs.
   const double effective = options.nodes ? edge_m : std::min(edge_m, kEdgePerThickness * body.thickness_m);
   const double max_nodes = 3000 + 5 * std::max(body.model.calc_nodes(effective), static_cast<double>(options.nodes.value_or(0)));
   return {edge_m, distance, static_cast<std::size_t>(std::min(max_nodes, 3 * kMaxNodes))};
@@ -110,8 +109,8 @@ Vec3 project(const Body& body, Vec3 p) {
       gradient[c] = (field.calc_distance(high) - field.calc_distance(low)) / field.voxel_m;
     }
     const double square = dot(gradient, gradient);
-    if (square < 0.1) break;  // on the skeleton of the body, where no skin is nearest
-    // Near the skeleton the slope is too small and the step too long: it is halved until it leads closer.
+    if (square < 0.1) break;  // medial axis: no nearest skin
+    // Near the medial axis the slope is too small and the step too long: halve until closer.
     Vec3 step = (off / square) * gradient;
     double closer = off;
     for (int half = 0; half < 5; ++half, step = 0.5 * step) {
@@ -127,8 +126,7 @@ Vec3 project(const Body& body, Vec3 p) {
 
 namespace {
 
-/// The distance to the true surface, negative inside it; of a clean solid, the sign by the nearest triangle is not known and it is
-/// positive.
+/// Distance to the true surface, negative inside; positive for a clean solid, where the sign is unknown.
 double calc_signed(const Body& body, const Vec3& p) {
   const double way = norm(body.nearest->find(p) - p);
   const bool inside = body.field && body.field->calc_distance(p) < body.repaired.offset_m;
@@ -154,7 +152,7 @@ std::optional<Vec3> find_skin(const Body& body, const Vec3& middle, const Vec3& 
     const Vec3 p = body.nearest->find(middle);
     return norm(p - middle) < reach_m ? std::optional(p) : std::nullopt;
   }
-  // The body's function is about a distance, so its value is the first guess of the way.
+  // The body function approximates a distance: first guess.
   const auto calc = [&](double t) { return calc_body(*body.field, body.wall_m, middle + t * normal); };
   double low = 0, at_low = calc(0), high = 0, at_high = at_low;
   for (double way = 1.5 * std::abs(at_low) + 0.01 * reach_m; (at_high > 0) == (at_low > 0); way *= 2) {

@@ -1,5 +1,5 @@
-// What CGAL's Mesh_3 asks of a body, as an interface: its templates compile slowly, and so they are compiled for one domain (delaunay.cpp),
-// not for each kind of body. Only the delaunay files include this.
+// Queries of CGAL's Mesh_3 as an interface: its templates compile slowly, so they are instantiated for one domain (delaunay.cpp) only.
+// Included by the delaunay files only.
 #pragma once
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
@@ -17,9 +17,8 @@ namespace carillon::mesher {
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 
-/// The surface of one body, for CGAL's refinement (its concept MeshDomain_3). Keeps true: after restart() the same queries in the same
-/// order have the same answers. restart() comes before any query. A query may throw std::runtime_error when the body is queried far more
-/// often than a sound body is.
+/// Surface of one body, for CGAL's concept MeshDomain_3. Invariant: after restart() the same queries in the same order give the same
+/// answers. restart() comes before any query. A query may throw std::runtime_error beyond its limit on the number of queries.
 class BodyQueries {
  public:
   using Inside = boost::optional<int>;  // 1 inside, none outside
@@ -27,12 +26,12 @@ class BodyQueries {
   using Patch = boost::optional<PatchIndex>;
   using Index = boost::variant<int, PatchIndex>;
   using Crossing = std::tuple<Kernel::Point_3, Index, int>;
-  static constexpr PatchIndex kPatch{0, 1};  // there is one: between outside and inside
+  static constexpr PatchIndex kPatch{0, 1};  // the only patch: between outside and inside
 
   virtual ~BodyQueries() = default;
-  /// Before each refinement; `max_nodes` says how much work to expect.
+  /// Called before each refinement; `max_nodes` scales the query limit.
   virtual void restart(std::size_t max_nodes) = 0;
-  /// Points on the boundary about `spacing_m` apart, on every part of it.
+  /// Points on every part of the boundary, about `spacing_m` apart.
   virtual std::vector<Vec3> find_first_points(double spacing_m) = 0;
 
   virtual CGAL::Bbox_3 calc_box() const = 0;
@@ -40,16 +39,16 @@ class BodyQueries {
   virtual Patch find_patch(const Kernel::Segment_3& query) const = 0;
   virtual Patch find_patch(const Kernel::Ray_3& query) const = 0;
   virtual Patch find_patch(const Kernel::Line_3& query) const = 0;
-  /// A point where the query meets the boundary; only right after find_patch() gave a patch for the same query.
+  /// Intersection of the query with the boundary; valid only directly after find_patch() found a patch for the same query.
   virtual Crossing find_crossing(const Kernel::Segment_3& query) const = 0;
   virtual Crossing find_crossing(const Kernel::Ray_3& query) const = 0;
   virtual Crossing find_crossing(const Kernel::Line_3& query) const = 0;
 
-  /// Whether elements are refined; while sliver elements are removed, a body is queried more often.
+  /// True during refinement; sliver removal has a higher query limit.
   bool is_refining = false;
 };
 
-/// Queries that a domain of CGAL answers, which restart() makes.
+/// Query count of CGAL's domain, reset by restart().
 template <class Domain>
 class DomainQueries : public BodyQueries {
  public:
@@ -66,7 +65,7 @@ class DomainQueries : public BodyQueries {
   std::unique_ptr<Domain> domain_;
 };
 
-/// The mesh of a body by Delaunay refinement. `curves` lie on its boundary and become edges of the mesh.
+/// Mesh of a body by Delaunay refinement. `curves` lie on its boundary and become edges of the mesh.
 std::unique_ptr<DelaunayBody> make_delaunay_body(std::unique_ptr<BodyQueries> queries, const std::vector<Polyline>& curves);
 
 }  // namespace carillon::mesher

@@ -10,20 +10,20 @@
 namespace carillon::mesher {
 namespace {
 
-constexpr double kVisible = 0.02;  // of a linear element's edge: bulges below this are lost in its own chords
-// Of the body's diagonal and of its mean thickness: facets that bulge less are as good as round.
+constexpr double kMinBulgePerEdge = 0.02;  // of a linear element's edge: smaller bulges are below its chord error
+// Relative to the diagonal and to the mean thickness: facets that bulge less count as round.
 constexpr double kRoundness = 1e-4, kThinRoundness = 2e-4;
 constexpr std::size_t kMaxRounded = 100'000;  // triangles
-constexpr double kSmoothedPerEdge = 0.1;      // largest displacement of a smoothed point, of an edge
+constexpr double kSmoothedPerEdge = 0.1;      // largest displacement of a smoothed point, relative to the edge
 
-/// Scales the surface to the height asked for. Returns the factor.
+/// Scales the surface to the requested height. Returns the factor.
 double fit_height(RepairedSurface& repaired, const SurfaceOptions& options, SurfaceReport& report) {
   Vec3 extent = calc_used_box(repaired.surface).extent();
   for (double& e : extent) e -= 2 * repaired.offset_m;
   double factor = 1;
   if (options.height_m) {
     factor = *options.height_m / extent[static_cast<int>(options.up)];
-    // Offset and rounding are small; other factors would make another body.
+    // Offset and rounding are small; other factors would change the body.
     if (!(factor > 0.5 && factor < 2)) factor = 1;
     for (Vec3& p : repaired.surface.points) p = factor * p;
     repaired.offset_m *= factor;
@@ -37,12 +37,12 @@ double fit_height(RepairedSurface& repaired, const SurfaceOptions& options, Surf
 
 void set_model(Body& body, const SurfaceOptions& options, double volume_m3, double area_m2) {
   body.wall_m = options.wall_m.value_or(0);
-  // The wall takes at most the whole volume; area of each skin: about its volume over its thickness.
+  // The wall is at most the whole volume; area of each skin: about volume over thickness.
   const double wall_volume = std::min(body.wall_m * area_m2, volume_m3);
   body.model = body.wall_m > 0 ? CountModel{.volume_m3 = wall_volume, .area_m2 = 2 * wall_volume / body.wall_m, .is_wall = true}
                                : CountModel{.volume_m3 = volume_m3, .area_m2 = area_m2};
   body.thickness_m = body.wall_m > 0 ? body.wall_m : 2 * volume_m3 / area_m2;
-  // A second-order mesh of a solid has about seven and a half times as many nodes as corners, of a thin wall fewer.
+  // A second-order mesh of a solid has about 7.5 times as many nodes as corners, a thin wall fewer.
   if (options.order == 2) body.model.factor = body.wall_m > 0 ? 6.4 : 7.5;
 }
 
@@ -76,10 +76,10 @@ void round(Body& body, const SurfaceOptions& options, SurfaceReport& report) {
   const double diagonal = calc_box(repaired.surface.points).diagonal();
   const double thickness = 2 * std::abs(calc_volume(repaired.surface)) / calc_area(repaired.surface);
   if (!round.is_doubtful() && round.get_largest_bulge() < std::min(kRoundness * diagonal, kThinRoundness * thickness)) return;
-  // Fine cuts spare the nodes long ways to the smooth surface; linear elements show no difference.
+  // Fine cuts shorten the offsets to the smooth surface; irrelevant for linear elements.
   const double nodes = static_cast<double>(options.nodes.value_or(10000));
   const double shortest = options.edge_m.value_or(std::sqrt(calc_area(repaired.surface) / nodes));
-  const double tolerance = options.order == 1 ? std::max(kRoundness * diagonal, kVisible * shortest) : kRoundness * diagonal;
+  const double tolerance = options.order == 1 ? std::max(kRoundness * diagonal, kMinBulgePerEdge * shortest) : kRoundness * diagonal;
   int pieces = std::max(1, static_cast<int>(std::ceil(std::sqrt(round.get_usual_bulge() / tolerance))));
   while (pieces > 1 && repaired.surface.triangles.size() * pieces * pieces > kMaxRounded) --pieces;
   TriangleSurface rounded = round.cut(pieces);
@@ -95,7 +95,7 @@ void round(Body& body, const SurfaceOptions& options, SurfaceReport& report) {
   body.round = std::move(round);
 }
 
-/// The patches keep their facets: those are scaled, and rounded again.
+/// The patches keep their own facets: scale those and round again.
 void round_to_height(Body& body, const SurfaceOptions& options, SurfaceReport& report) {
   const bool is_rounded = !options.facets && !report.wrapped && !body.is_scan;
   RepairedSurface facets;

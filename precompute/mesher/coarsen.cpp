@@ -1,8 +1,6 @@
-// Method:     CGAL's edge collapse: cost is the length of the edge, placement that of Lindstrom and Turk where it stays near the edge;
-// other
-//             edges stay.
-// Source:     P. Lindstrom, G. Turk, Fast and memory efficient polygonal simplification, IEEE Visualization 1998.
-// Deviations: their cost, which leaves few triangles on flat faces, is for pictures; waves need them everywhere.
+// Method: CGAL's edge collapse: cost is the edge length, placement after Lindstrom and Turk where it stays near the edge. Their cost
+//   function leaves few triangles on flat faces, but waves need them everywhere.
+// Source: P. Lindstrom, G. Turk, Fast and memory efficient polygonal simplification, IEEE Visualization 1998.
 #include "precompute/mesher/coarsen.hpp"
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
@@ -22,7 +20,7 @@ namespace SMS = CGAL::Surface_mesh_simplification;
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using Mesh = CGAL::Surface_mesh<Kernel::Point_3>;
 
-/// Stops at a number of edges: three times that of the corners, but for the genus.
+/// Stops at three edges per corner (up to the genus).
 class StopAtEdges {
  public:
   explicit StopAtEdges(std::size_t edges) : edges_(edges) {}
@@ -35,7 +33,7 @@ class StopAtEdges {
   std::size_t edges_;
 };
 
-/// The placement of Lindstrom and Turk, but none far from the edge: at rims of thin bodies it would go outward to make up for their volume.
+/// Placement of Lindstrom and Turk, limited to near the edge: at rims of thin bodies it would move outward to preserve their volume.
 class NearPlacement {
  public:
   template <typename Profile>
@@ -43,12 +41,12 @@ class NearPlacement {
     auto placed = placement_(profile);
     if (!placed) return placed;
     const Kernel::Segment_3 edge(profile.p0(), profile.p1());
-    if (CGAL::squared_distance(*placed, edge) > kFarthest * kFarthest * edge.squared_length()) placed.reset();
+    if (CGAL::squared_distance(*placed, edge) > kMaxDistancePerEdge * kMaxDistancePerEdge * edge.squared_length()) placed.reset();
     return placed;
   }
 
  private:
-  static constexpr double kFarthest = 0.1;  // edges
+  static constexpr double kMaxDistancePerEdge = 0.1;  // edges
   SMS::LindstromTurk_placement<Mesh> placement_;
 };
 
@@ -61,7 +59,7 @@ TriangleSurface coarsen(const TriangleSurface& surface, std::size_t corners) {
   std::vector<std::vector<std::size_t>> polygons;
   for (const Triangle& t : surface.triangles)
     polygons.push_back({static_cast<std::size_t>(t[0]), static_cast<std::size_t>(t[1]), static_cast<std::size_t>(t[2])});
-  if (!PMP::is_polygon_soup_a_polygon_mesh(polygons)) throw InputError("--coarsen: an edge of the surface has not two triangles");
+  if (!PMP::is_polygon_soup_a_polygon_mesh(polygons)) throw InputError("--coarsen: an edge of the surface does not have two triangles");
   Mesh mesh;
   PMP::polygon_soup_to_polygon_mesh(points, polygons, mesh);
   if (!CGAL::is_closed(mesh)) throw InputError("--coarsen: the surface is open");

@@ -1,8 +1,6 @@
-// Method: secant steps on a model of the count, fitted to the last two meshes, inside the bracket known so far. Where sharp edges lie
-//   closer to each other than elements are long, they bring nodes of their own, which a trial on a fifth of the nodes finds out. Where the
-//   count no longer falls as edges grow, the body's own thickness sets it and the search ends. Counts of coarse meshes jump, so a row of
-//   edges is tried there too.
-// Source: our own.
+// Method: secant steps on a count model fitted to the last two meshes, within the current bracket. Sharp edges closer together than the
+//   element size add nodes, detected by a trial at a fifth of the nodes. Where the count no longer falls with longer edges, the thickness
+//   determines it and the search ends. Counts of coarse meshes jump, so a series of edges is tried there.
 #include "precompute/mesher/count_search.hpp"
 
 #include <algorithm>
@@ -16,19 +14,19 @@ namespace carillon::mesher {
 namespace {
 
 constexpr int kMaxSteps = 10;
-// Below this target a mesh costs a few hundredths of a second, and the row of edges is tried.
-constexpr double kCheapTarget = 3000;
+// Below this target a mesh takes a few hundredths of a second, so a series of edges is tried.
+constexpr double kFastTargetNodes = 3000;
 constexpr int kTrials = 24;
-// Of the target, for a trial; and how many times as many nodes as the model has are more than a factor.
+// Trial fraction of the target; and the ratio of actual to predicted nodes above which the model needs an offset.
 constexpr double kTrialPart = 0.2, kUsual = 1.5;
 
 struct Trial {
   double edge_m, count;
 };
 
-/// True if edges a good deal longer gave hardly fewer nodes.
+/// True if clearly longer edges gave hardly fewer nodes.
 bool is_level(const std::vector<Trial>& trials, double target) {
-  const double longer = target < kCheapTarget ? 1.6 : 1.25;  // counts of coarse meshes jump
+  const double longer = target < kFastTargetNodes ? 1.6 : 1.25;  // counts of coarse meshes jump
   for (const Trial& a : trials)
     for (const Trial& b : trials)
       if (a.count > target && b.count > target && b.edge_m > longer * a.edge_m && b.count > 0.9 * a.count) return true;
@@ -44,7 +42,7 @@ double CountModel::calc_nodes(double edge_m) const {
     const double between = 1.4 * std::clamp(layers - 0.97, 0.0, 0.6) + 0.61 * std::max(0.0, layers - 1.57);
     return base + factor * (1.55 + between) * area_m2 / (edge_m * edge_m);
   }
-  // Inside and skin. Of plates with less than two rows of elements the skins alone decide, and each has more nodes.
+  // Interior and skin. For plates with less than two rows of elements only the skins count, with more nodes each.
   const double inside = volume_m3 / std::pow(edge_m, 3), skin = area_m2 / (edge_m * edge_m), rows = 2 * volume_m3 / (area_m2 * edge_m);
   const double thick = std::clamp((rows - 1.5) / 0.4, 0.0, 1.0);
   return base + factor * (thick * (0.94 * inside + 0.61 * skin) + (1 - thick) * (0.61 * inside + 1.15 * skin));
@@ -69,7 +67,7 @@ mesh::TetMesh search_edge(const CountSearch& search, CountModel model, double& e
   double last_edge = 0;
   int failures = 0;
   std::optional<Trial> best;
-  // The count at an edge, or nothing if such a mesh cannot be made though shorter edges could.
+  // Count at an edge; empty if such a mesh cannot be made but shorter edges might work.
   const auto attempt = [&](double edge) -> std::optional<double> {
     ++attempts;
     try {
@@ -89,7 +87,7 @@ mesh::TetMesh search_edge(const CountSearch& search, CountModel model, double& e
   };
   const auto is_met = [&](double tolerance) { return best && std::abs(best->count / target - 1) <= tolerance; };
 
-  // The model that explains the last mesh, or the last two: a factor, or a factor and a count that the edges do not change.
+  // Model fitted to the last mesh, or the last two: a factor, or a factor and an offset independent of the edge.
   const auto learn = [&] {
     const Trial& last = trials.back();
     CountModel plain = model;
@@ -107,7 +105,7 @@ mesh::TetMesh search_edge(const CountSearch& search, CountModel model, double& e
   };
 
   double edge = std::min(edge_m, search.longest_m), low = 0, high = 1e300;
-  if (search.is_uncertain && target * kTrialPart >= kCheapTarget / 2)
+  if (search.is_uncertain && target * kTrialPart >= kFastTargetNodes / 2)
     edge = std::min(model.find_edge(kTrialPart * target), search.longest_m);
   for (int step = 0; step < kMaxSteps && !is_met(search.contented); ++step) {
     const std::optional<double> count = attempt(edge);
@@ -122,7 +120,7 @@ mesh::TetMesh search_edge(const CountSearch& search, CountModel model, double& e
     edge = count && *count > 0 ? std::min(model.find_edge(target), search.longest_m) : 0.7 * edge;
     if (bracketed && !(edge > low * 1.002 && edge < high / 1.002)) edge = std::sqrt(low * high);
   }
-  if (!is_met(search.tolerance) && target < kCheapTarget && best && failures == 0 && !is_level(trials, target)) {
+  if (!is_met(search.tolerance) && target < kFastTargetNodes && best && failures == 0 && !is_level(trials, target)) {
     const double middle = best->edge_m;
     for (int n = 0; n < kTrials && !is_met(0.8 * search.tolerance); ++n)
       attempt(std::min(middle * (1 + 0.015 * (n / 2 + 1) * (n % 2 == 0 ? 1 : -1)), search.longest_m));

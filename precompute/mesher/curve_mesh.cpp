@@ -1,8 +1,6 @@
-// Method: the mid node of a boundary edge goes along the mean normal of the two boundary faces at the edge until it meets the skin; that of
-//   an edge along a sharp curve goes to the nearest point of the curve. Elements that fold go back to straight sides.
-// Source: the usual way to second-order meshes, as in Dey, O'Bara and Shephard 2001, "Towards curvilinear meshing in 3D: the case of
-//   quadratic simplices", CAD 33, 199, section 3; the way back to straight sides is their last resort.
-// Deviations: they reshape and swap before they straighten; so few elements fold here that the last resort does.
+// Method: the mid node of a boundary edge moves along the mean normal of its two boundary faces to the skin; on a sharp curve it moves to
+//   the nearest curve point. Folded elements become straight-sided again: few elements fold, so no reshaping or swapping is needed.
+// Source: Dey, O'Bara and Shephard 2001, "Towards curvilinear meshing in 3D: the case of quadratic simplices", CAD 33, 199, section 3.
 #include "precompute/mesher/curve_mesh.hpp"
 
 #include <algorithm>
@@ -15,22 +13,22 @@
 namespace carillon::mesher {
 namespace {
 
-// A mid node farther off than this part of its edge belongs to another part of the skin, or would fold the element.
+// A mid node displaced by more than this part of its edge belongs to another part of the skin, or would fold the element.
 constexpr double kReach = 0.3;
-// Faces that turn by more than this at an edge may lie on two sides of a sharp curve (cosine of 15 degrees).
+// Faces with a larger turn at an edge may lie on two sides of a sharp curve (cosine of 15 degrees).
 constexpr double kTurn = 0.966;
-// An end lies on a curve if it is nearer to it than this part of the edge.
-constexpr double kOnCurve = 1e-3;
+// An end lies on a curve if nearer than this part of the edge.
+constexpr double kMaxCurveDistancePerEdge = 1e-3;
 
 struct BoundaryEdge {
-  std::int32_t a = 0, b = 0;  // its ends, a < b
+  std::int32_t a = 0, b = 0;  // ends, a < b
   std::int32_t middle = 0;
   std::array<Vec3, 2> normals{};  // unit, of its two faces
 };
 
-/// The boundary edges, in the order of their ends.
+/// Boundary edges, ordered by their ends.
 std::vector<BoundaryEdge> find_boundary_edges(const mesh::TetMesh& mesh) {
-  mesh::TetMesh linear;  // the corners alone, numbered as they are
+  mesh::TetMesh linear;  // corners only, same numbering
   linear.nodes_m = mesh.nodes_m;
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e) linear.tets.insert(linear.tets.end(), mesh.tet(e).begin(), mesh.tet(e).begin() + 4);
   std::map<std::array<std::int32_t, 2>, BoundaryEdge> edges;
@@ -55,7 +53,7 @@ std::vector<BoundaryEdge> find_boundary_edges(const mesh::TetMesh& mesh) {
   return out;
 }
 
-/// The point of the curves nearest to p, and its distance.
+/// Point of the curves nearest to p, and its distance.
 std::pair<Vec3, double> find_on_curves(const std::vector<Polyline>& curves, const Vec3& p) {
   std::pair<Vec3, double> best{{}, HUGE_VAL};
   for (const Polyline& curve : curves)
@@ -78,8 +76,9 @@ CurvedEdges curve_mesh(mesh::TetMesh& mesh, const std::vector<Polyline>& curves,
     const double length = norm(b - a), reach = kReach * length;
     const Vec3 middle = 0.5 * (a + b), sum = edge.normals[0] + edge.normals[1];
     std::optional<Vec3> place;
-    if (!curves.empty() && dot(edge.normals[0], edge.normals[1]) < kTurn && find_on_curves(curves, a).second < kOnCurve * length &&
-        find_on_curves(curves, b).second < kOnCurve * length) {
+    if (!curves.empty() && dot(edge.normals[0], edge.normals[1]) < kTurn &&
+        find_on_curves(curves, a).second < kMaxCurveDistancePerEdge * length &&
+        find_on_curves(curves, b).second < kMaxCurveDistancePerEdge * length) {
       const auto [on_curve, distance] = find_on_curves(curves, middle);
       if (distance < reach) place = on_curve;
     }

@@ -10,18 +10,17 @@
 
 namespace carillon::mesher {
 
-/// Finds the place on the body's skin for the middle of a boundary edge: near `middle`, where the mesh has the outward unit normal
-/// `normal`, not farther than reach_m; nothing if there is none.
+/// Finds the skin position for the midpoint `middle` of a boundary edge with outward unit normal `normal`, within reach_m; empty if none.
 using SkinPlace = std::function<std::optional<Vec3>(const Vec3& middle, const Vec3& normal, double reach_m)>;
 
 struct CurvedEdges {
   std::int64_t curved = 0;        // boundary edges whose mid node left the middle
-  std::int64_t left = 0;          // boundary edges that stayed straight since no skin was found near enough
-  std::int64_t straightened = 0;  // elements that would have folded and went back to straight sides
+  std::int64_t left = 0;          // boundary edges left straight: no skin near enough
+  std::int64_t straightened = 0;  // folded elements made straight-sided again
 };
 
-/// Moves the mid nodes of boundary edges of a quadratic mesh with straight sides onto the skin, those of sharp edges onto `curves`, then
-/// makes the elements straight again that this folds. Mid nodes inside stay in the middle.
+/// Moves the mid nodes of boundary edges of a straight-sided quadratic mesh onto the skin, those of sharp edges onto `curves`; elements
+/// that fold become straight again. Inner mid nodes stay at the midpoints.
 CurvedEdges curve_mesh(mesh::TetMesh& mesh, const std::vector<Polyline>& curves, const SkinPlace& find_place);
 
 }  // namespace carillon::mesher

@@ -1,7 +1,6 @@
-// Method: each curve is sampled; the least distance of a sample to the curves that share no end with its own bounds the edges there.
-//   Balls around edges that are longer than this would reach into each other, and the mesher would shrink them again and again.
-// Source: our own; the condition is the one on protecting balls of Cheng, Dey and Ramos, "Delaunay refinement for piecewise smooth
-//   complexes", SODA 2007.
+// Method: each curve is sampled; the least distance of a sample to curves without a common end bounds the edges there. Longer edges would
+//   make protecting balls overlap, and the mesher would shrink them repeatedly.
+// Source: the condition on protecting balls in Cheng, Dey and Ramos, "Delaunay refinement for piecewise smooth complexes", SODA 2007.
 #include "precompute/mesher/curve_sizes.hpp"
 
 #include <algorithm>
@@ -10,17 +9,17 @@
 namespace carillon::mesher {
 namespace {
 
-// The edge length is the radius of the balls, so two balls face to face need twice of it between their middles.
+// The edge length is the ball radius, so facing balls need twice that between their centres.
 constexpr double kSizePerGap = 0.45;
 constexpr double kGrowth = 0.5;
 constexpr double kMaxSamples = 4000;
-// Two places on one curve hinder each other if the way along it is this many times the straight one.
+// Two points on one curve conflict if their arc length is this many times their distance.
 constexpr double kHairpin = 4;
 
 struct Segment {
   Vec3 a{}, b{};
   std::size_t curve = 0;
-  double start_m = 0;  // along its curve
+  double start_m = 0;  // arc length along its curve
 };
 
 double calc_distance(const Vec3& p, const Segment& s, double& along_m) {

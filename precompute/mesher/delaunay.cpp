@@ -1,10 +1,10 @@
-// Method: restricted Delaunay refinement, then sliver perturbation and exudation, with balls protecting the sharp curves.
-// Source: Boissonnat and Oudot 2005 (refinement); Cheng, Dey, Edelsbrunner, Facello and Teng 2000 (exudation); Tournois,
-//   Srinivasan and Alliez 2009 (perturbation); all as CGAL 5.5 Mesh_3 has them.
-// Deviations: the first points on the surface are ours (CGAL shoots random lines from a centre and can miss a part of the body).
+// Method: restricted Delaunay refinement, then sliver perturbation and exudation, with balls protecting the sharp curves. Initial surface
+//   points are sampled here: CGAL shoots random lines from a centre and can miss a part of the body.
+// Source: Boissonnat and Oudot 2005 (refinement); Cheng, Dey, Edelsbrunner, Facello and Teng 2000 (exudation); Tournois, Srinivasan and
+//   Alliez 2009 (perturbation); all in CGAL 5.5 Mesh_3.
 
-// Where CGAL sees that a point is there already it throws, and before that it writes two files, dump-bug.mesh and dump-bug.binary.cgal,
-// into the folder where the program stands. Its header of that is taken as included, and what it would define does nothing.
+// On a duplicate point CGAL throws, after writing dump-bug.mesh and dump-bug.binary.cgal to the working directory. Marking its header as
+// included and defining empty functions suppresses the files.
 #define CGAL_MESH_3_DUMP_C3T3_H
 #include <string>
 namespace CGAL {
@@ -38,14 +38,14 @@ namespace carillon::mesher {
 namespace {
 
 constexpr std::int64_t kMaxPinches = 10;
-constexpr double kPerturbed = 0.75;  // of the angle asked for: the rest is for smooth.cpp, in less time
-// Limit on queries of the surface by refinement: CGAL's can loop without end at touching skins. Sound bodies take at most 12 queries per
-// node, self-touching ones 50.
+constexpr double kPerturbedAngleRatio = 0.75;  // of the requested angle: smooth.cpp does the rest faster
+// Limit on surface queries by refinement: CGAL's can loop without end at touching skins. Sound bodies take at most 12 queries per node,
+// self-touching ones 50.
 constexpr std::int64_t kQueries = 500000;
 constexpr std::int64_t kQueriesPerNode = 100;
 
-/// BodyQueries as CGAL's concept MeshDomain_3. A body is asked only about what is finite: circumcentres of nearly flat tetrahedra may not
-/// be, and GMP ends the process where it is to compute exactly with what is not a number.
+/// BodyQueries as CGAL's concept MeshDomain_3. Only finite points are passed on: circumcentres of nearly flat tetrahedra may be infinite,
+/// and GMP aborts the process on non-finite numbers.
 class QueriedDomain {
  public:
   using R = Kernel;
@@ -69,7 +69,7 @@ class QueriedDomain {
   /// Decremented by every query; a query at 0 throws.
   mutable std::int64_t queries_left = std::numeric_limits<std::int64_t>::max();
 
-  struct Construct_initial_points {  // the concept has it; the first points are ours
+  struct Construct_initial_points {  // required by the concept; initial points are sampled elsewhere
     template <class Out>
     Out operator()(Out out, int = 0) const {
       return out;
@@ -105,7 +105,7 @@ class QueriedDomain {
   Construct_intersection construct_intersection_object() const { return {*this}; }
 
  private:
-  /// A segment, a ray or a line, by two of its points.
+  /// Segment, ray or line through two of its points.
   template <class Query>
   static bool is_finite(const Query& query) {
     double sum = 0;
@@ -122,8 +122,8 @@ class QueriedDomain {
   const BodyQueries* queries_;
 };
 
-/// The domain with its sharp curves, and a bound on the balls that are placed on them: where curves cannot be parted, CGAL places ever
-/// smaller ones, without a look at its own bound on the vertices.
+/// Domain with sharp curves, and a limit on the protecting balls: for inseparable curves CGAL places ever smaller balls without checking
+/// its own limit on vertices.
 class BoundedCurves : public CGAL::Mesh_domain_with_polyline_features_3<QueriedDomain> {
   using Base = CGAL::Mesh_domain_with_polyline_features_3<QueriedDomain>;
 
@@ -140,7 +140,7 @@ class BoundedCurves : public CGAL::Mesh_domain_with_polyline_features_3<QueriedD
   mutable std::size_t balls_ = 0;
 };
 
-/// DelaunayBody by Mesh_3. Invariant: a mesh depends on its sizes and on whether an earlier one touched itself, because refine() restarts
+/// DelaunayBody by Mesh_3. Invariant: a mesh depends only on its sizes and on whether an earlier one touched itself: refine() restarts
 /// CGAL's random numbers and the queries.
 class Mesh3Body final : public DelaunayBody {
   using Domain = BoundedCurves;
@@ -161,13 +161,13 @@ class Mesh3Body final : public DelaunayBody {
 
   mesh::TetMesh refine(const DelaunaySizes& sizes) override {
     namespace p = CGAL::parameters;
-    // The random numbers restart, so that the same sizes give the same mesh whatever was made before.
+    // Restart the random numbers: equal sizes give equal meshes.
     CGAL::get_default_random() = CGAL::Random(0);
     queries_->is_refining = false;
     queries_->restart(sizes.max_nodes);
     domain_ = std::make_unique<Domain>(queries_.get());
     if (!curves_.empty()) domain_->add_features(curves_.begin(), curves_.end());
-    // The nodes on the sharp edges and twice as many more: they are part of a fifth of max_nodes.
+    // Nodes on the sharp edges and twice as many more: part of a fifth of max_nodes.
     domain_->max_balls = 2000 + sizes.max_nodes / 8;
     complex_ = Complex();
     const double radius = kRadiusPerEdge * sizes.edge_m;
@@ -177,19 +177,19 @@ class Mesh3Body final : public DelaunayBody {
     };
     criteria_.emplace(p::edge_size = calc_edge, p::facet_angle = 25, p::facet_size = radius, p::facet_distance = sizes.distance_m,
                       p::cell_radius_edge_ratio = 2, p::cell_size = radius);
-    // A bound on the nodes ends what would otherwise never end: balls between curves that nearly touch.
+    // The node limit stops endless ball insertion between curves that nearly touch.
     CGAL::Mesh_error_code unused = CGAL::CGAL_MESH_3_NO_ERROR;
     if (!curves_.empty()) CGAL::Mesh_3::internal::init_c3t3_with_features(complex_, *domain_, *criteria_, false, sizes.max_nodes, &unused);
     insert_first_points(sizes.edge_m);
     max_nodes_ = sizes.max_nodes;
-    // CGAL's manifold criterion tests every edge repeatedly, although nearly all of the boundary is a manifold anyway. A few pinches are
-    // cheaper to repair; bodies that touch themselves have many, and at every size.
+    // CGAL's manifold criterion tests every edge repeatedly, although most of the boundary is a manifold. A few pinches are cheaper to
+    // repair; bodies that touch themselves have many, at every size.
     refine_complex(touches_ ? p::manifold() : p::non_manifold());
     if (!touches_ && count_pinches() > kMaxPinches) {
       touches_ = true;
       refine_complex(p::manifold());
     }
-    // Faces are refined before cells: where they alone met the bound there is no cell, and that is no sign of too few nodes.
+    // Faces are refined before cells: if faces alone reached the limit there are no cells, which does not mean too few nodes.
     if (complex_.number_of_cells_in_complex() == 0 && complex_.triangulation().number_of_vertices() >= sizes.max_nodes)
       throw std::runtime_error("its faces meet in angles too sharp for elements of this size");
     return extract();
@@ -198,10 +198,9 @@ class Mesh3Body final : public DelaunayBody {
   mesh::TetMesh optimise(double angle_deg) override {
     namespace p = CGAL::parameters;
     if (angle_deg <= 0) return extract();
-    // Exudation removes nine slivers of ten in a tenth of the time; what is left is for perturbation, and what that makes for exudation
-    // again.
+    // Exudation removes nine of ten slivers in a tenth of the time; the rest is left to perturbation, followed by another exudation.
     CGAL::exude_mesh_3(complex_, p::time_limit = 0, p::sliver_bound = angle_deg);
-    CGAL::perturb_mesh_3(complex_, *domain_, p::time_limit = 0, p::sliver_bound = kPerturbed * angle_deg);
+    CGAL::perturb_mesh_3(complex_, *domain_, p::time_limit = 0, p::sliver_bound = kPerturbedAngleRatio * angle_deg);
     CGAL::exude_mesh_3(complex_, p::time_limit = 0, p::sliver_bound = angle_deg);
     return extract();
   }
@@ -209,10 +208,10 @@ class Mesh3Body final : public DelaunayBody {
  private:
   std::unique_ptr<BodyQueries> queries_;
   std::unique_ptr<Domain> domain_;
-  std::vector<Polyline> polylines_;         // the sharp curves,
-  std::vector<std::vector<Point>> curves_;  // and the same for CGAL
+  std::vector<Polyline> polylines_;         // sharp curves
+  std::vector<std::vector<Point>> curves_;  // the same for CGAL
 
-  // Mesh_3 bounds circumradii; the mean edge of the tetrahedra it makes is about 1.1 times that bound.
+  // Mesh_3 bounds circumradii; the mean tetrahedron edge is about 1.1 times that bound.
   static constexpr double kRadiusPerEdge = 0.9;
 
   void refine_complex(const CGAL::parameters::internal::Manifold_options& topology) {
@@ -226,7 +225,7 @@ class Mesh3Body final : public DelaunayBody {
     queries_->is_refining = false;
   }
 
-  /// At how many edges and nodes the boundary touches itself.
+  /// Number of edges and nodes at which the boundary touches itself.
   std::int64_t count_pinches() const {
     std::unordered_map<const void*, std::int32_t> number;
     std::vector<Triangle> faces;
@@ -242,7 +241,7 @@ class Mesh3Body final : public DelaunayBody {
 
   void insert_first_points(double edge_m) {
     auto& triangulation = complex_.triangulation();
-    // A point inside or close to the ball of a curve would be hidden by it, or would give it a needlessly short neighbour.
+    // A point in or near a curve's ball would be hidden by it, or give it a needlessly short neighbour.
     std::vector<WeightedPoint> balls;
     for (auto v = triangulation.finite_vertices_begin(); v != triangulation.finite_vertices_end(); ++v)
       balls.push_back(triangulation.point(v));
@@ -279,8 +278,8 @@ class Mesh3Body final : public DelaunayBody {
   Complex complex_;
   std::optional<Criteria> criteria_;
   std::size_t max_nodes_ = 0;
-  bool touches_ = false;            // parts of the boundary do, unless they are kept apart
-  std::vector<SizedPoint> narrow_;  // where curves lie closer together than edges are long
+  bool touches_ = false;            // parts of the boundary touch unless kept apart
+  std::vector<SizedPoint> narrow_;  // curves closer together than the edge length
 };
 
 }  // namespace

@@ -1,4 +1,4 @@
-// The Delaunay body of a distance field. Method and source: delaunay.cpp.
+// Delaunay body of a distance field. Method and source: delaunay.cpp.
 #include <CGAL/Labeled_mesh_domain_3.h>
 
 #include <cmath>
@@ -19,7 +19,7 @@ class FieldQueries final : public DomainQueries<Domain> {
   void restart(std::size_t max_nodes) override {
     max_refining_ = kEvaluationsAtLeast + kEvaluationsPerNode * max_nodes;
     max_evaluations_ = max_refining_ + kEvaluationsToOptimise * max_nodes;
-    // Refinement can try without end to separate what touches at a point; no node comes of it, so their bound does not end it.
+    // Refinement can loop at touching points without adding nodes, so the node limit does not end it.
     evaluations_ = 0;
     const auto body = [this](const Kernel::Point_3& p) {
       if (++evaluations_ > (is_refining ? max_refining_ : max_evaluations_))
@@ -30,14 +30,14 @@ class FieldQueries final : public DomainQueries<Domain> {
     Vec3 high = low;
     for (int c = 0; c < 3; ++c) high[c] += field_.voxel_m * (field_.size[c] - 1);
     const CGAL::Bbox_3 box(low[0], low[1], low[2], high[0], high[1], high[2]);
-    // The surface is found by bisection to a hundredth of a voxel; CGAL's bound is relative to the body's radius.
+    // Bisection to a hundredth of a voxel; CGAL's bound is relative to the body's radius.
     const double radius = 0.5 * norm(high - low);
     domain_ = std::make_unique<Domain>(
         Domain::create_implicit_mesh_domain(body, box, CGAL::parameters::relative_error_bound = 0.01 * field_.voxel_m / radius));
   }
 
   std::vector<Vec3> find_first_points(double spacing_m) override {
-    // Where the rows of samples cross the skins, thinned to one in every cube of the spacing.
+    // Crossings of sample rows with the skins, thinned to one per cube of the spacing.
     std::vector<Vec3> points;
     std::set<std::array<std::int32_t, 4>> taken;
     const int skins = wall_m_ > 0 ? 2 : 1;
@@ -62,8 +62,8 @@ class FieldQueries final : public DomainQueries<Domain> {
   }
 
  private:
-  // Sound bodies take 180 (the hollow bunny of 37,000 nodes) to 280 evaluations a node (a box with a wall of one element), to remove
-  // slivers up to 900, and the bound on the nodes is at least four times what they have.
+  // Sound bodies take 180 (hollow bunny of 37,000 nodes) to 280 evaluations per node (box with a wall of one element), up to 900 with
+  // sliver removal; the node limit is at least four times their count.
   static constexpr std::size_t kEvaluationsAtLeast = 1'000'000, kEvaluationsPerNode = 120, kEvaluationsToOptimise = 400;
 
   const DistanceField& field_;

@@ -1,4 +1,4 @@
-// The Delaunay body inside a clean triangle surface. Method and source: delaunay.cpp.
+// Delaunay body inside a clean triangle surface. Method and source: delaunay.cpp.
 #include <CGAL/Polygon_mesh_processing/polygon_soup_to_polygon_mesh.h>
 #include <CGAL/Polyhedral_mesh_domain_3.h>
 #include <CGAL/Surface_mesh.h>
@@ -29,9 +29,9 @@ class SurfaceQueries final : public DomainQueries<Domain> {
   void restart(std::size_t) override { domain_ = std::make_unique<Domain>(mesh_); }
 
   std::vector<Vec3> find_first_points(double spacing_m) override {
-    // Points inside the triangles: never on an edge, where the patch of a Delaunay edge's crossing would be in doubt.
+    // Interior points of the triangles: on an edge the patch of a Delaunay edge's crossing would be ambiguous.
     std::vector<Vec3> points;
-    // One per cube of the spacing and direction of the face, so that both sides of a thin plate get theirs.
+    // One per cube of the spacing and face direction, so that both sides of a thin plate are sampled.
     std::set<std::array<std::int64_t, 4>> taken;
     for (const Triangle& t : surface_.triangles) {
       const Vec3 &a = surface_.points[t[0]], &b = surface_.points[t[1]], &c = surface_.points[t[2]];

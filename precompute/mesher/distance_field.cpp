@@ -1,8 +1,7 @@
-// Method: the distance in a band around the surface by handing the nearest triangle on from sample to sample (nearest_triangle.hpp); the
-//   sign from the winding number, found by crossing the surface with one line along x per row of samples. A flood fill would fill a body's
-//   closed cavities and needs a watertight surface; the winding number needs neither and takes overlapping parts as one body.
-// Source: the tie rule of the crossings is the "simulation of simplicity" of Edelsbrunner and Muecke 1990 (the line is moved by an
-//   infinitesimal).
+// Method: distance in a band around the surface by propagating the nearest triangle between samples (nearest_triangle.hpp); sign from the
+//   winding number, by crossings of the surface with one line along x per sample row. A flood fill would fill closed cavities and needs a
+//   watertight surface; the winding number does not and merges overlapping parts.
+// Source: tie rule of the crossings: "simulation of simplicity" of Edelsbrunner and Muecke 1990 (infinitesimal shift of the line).
 #include "precompute/mesher/distance_field.hpp"
 
 #include <fmt/core.h>
@@ -16,8 +15,8 @@
 namespace carillon::mesher {
 namespace {
 
-/// Twice the signed area of (a, b, p) in the yz plane, with the sign that p has when it is moved by (eps, eps^2): never 0 for
-/// a != b. Computed from the lower index to the higher one, so the two triangles of an edge see exactly opposite signs.
+/// Twice the signed area of (a, b, p) in the yz plane, with the sign for p shifted by (eps, eps^2): never 0 for a != b. Computed from the
+/// lower to the higher index, so both triangles of an edge get exactly opposite signs.
 double calc_side(const Vec3& a, const Vec3& b, double y, double z) {
   const double side = (b[1] - a[1]) * (z - a[2]) - (b[2] - a[2]) * (y - a[1]);
   if (side != 0) return side;
@@ -30,7 +29,7 @@ struct Crossing {
   std::int8_t turn;
 };
 
-/// Every crossing of the surface with the sample rows: x and +1 where the row enters the body.
+/// All crossings of the surface with sample rows: x, and +1 where the row enters the body.
 void collect_crossings(const TriangleSurface& surface, const DistanceField& field, std::vector<std::vector<Crossing>>& rows) {
   for (const Triangle& t : surface.triangles) {
     std::array<const Vec3*, 3> p;
@@ -119,7 +118,7 @@ DistanceField calc_distance_field(const TriangleSurface& surface, double voxel_m
                       "ask for longer edges (--edge), fewer nodes or a thicker wall",
                       voxel_m, box.diagonal(), kMaxSamples / 1e6));
     field.size[c] = static_cast<std::int32_t>(cells) + 1;
-    // The grid is off the box by an odd fraction, so that flat faces do not lie on samples.
+    // Offset by an odd fraction of a voxel, so that flat faces of the box avoid the samples.
     field.origin[c] = 0.5 * (box.low[c] + box.high[c]) - voxel_m * (0.5 * cells + 0.0137 * (c + 1));
   }
   field.samples.assign(static_cast<std::size_t>(field.size[0]) * field.size[1] * field.size[2], kFar);
@@ -136,7 +135,7 @@ DistanceField calc_distance_field(const TriangleSurface& surface, double voxel_m
 }
 
 double calc_volume(const DistanceField& field, double wall_m) {
-  // Each sample stands for its voxel; the fraction inside is that of a plane at the sample's distance.
+  // Each sample represents its voxel; fraction inside for a plane at the sample's distance.
   double voxels = 0;
   for (const float sample : field.samples) {
     const double outer = std::clamp(0.5 - sample / field.voxel_m, 0.0, 1.0);

@@ -1,4 +1,4 @@
-// The signed distance to a closed triangle surface, sampled on a grid.
+// Signed distance to a closed triangle surface, sampled on a grid.
 #pragma once
 
 #include <array>
@@ -9,8 +9,8 @@
 
 namespace carillon::mesher {
 
-/// Samples of the signed distance (positive outside) at origin + voxel * (i, j, k), x fastest. Exact to float precision from
-/// `inside_m` under the surface to `outside_m` above it, -inside_m and outside_m beyond.
+/// Samples of the signed distance (positive outside) at origin + voxel * (i, j, k), x fastest. Exact to float precision from `inside_m`
+/// below to `outside_m` above the surface, clamped beyond.
 struct DistanceField {
   Vec3 origin{};
   double voxel_m = 0;
@@ -22,24 +22,24 @@ struct DistanceField {
     return samples[static_cast<std::size_t>(i) +
                    static_cast<std::size_t>(size[0]) * (static_cast<std::size_t>(j) + static_cast<std::size_t>(size[1]) * k)];
   }
-  /// Trilinear interpolation; a point outside the grid is outside the body.
+  /// Trilinear interpolation; points outside the grid are outside the body.
   double calc_distance(const Vec3& p) const;
 };
 
-/// `surface` is closed and oriented outward (it may intersect itself: inside is where its winding number is positive).
-/// `offset_m` is added to every distance. Throws InputError if the grid would have more than 400 million samples.
+/// `surface` is closed and oriented outward (it may self-intersect: inside is positive winding number). `offset_m` is added to every
+/// distance. Throws InputError for more than 400 million samples.
 struct FieldReach {
   double outside_m = 0, inside_m = 0;
 };
 DistanceField calc_distance_field(const TriangleSurface& surface, double voxel_m, const FieldReach& reach, double offset_m);
 
-/// The body within the field: {d < 0}, or with wall_m > 0 the shell {-wall_m < d < 0}. Negative inside.
+/// Body within the field: {d < 0}, or with wall_m > 0 the shell {-wall_m < d < 0}. Negative inside.
 inline double calc_body(const DistanceField& field, double wall_m, const Vec3& p) {
   const double d = field.calc_distance(p);
   return wall_m > 0 ? (d > -d - wall_m ? d : -d - wall_m) : d;
 }
 
-/// Volume of the body, by the fraction of each voxel that is inside.
+/// Volume of the body, by the inside fraction of each voxel.
 double calc_volume(const DistanceField& field, double wall_m);
 
 }  // namespace carillon::mesher

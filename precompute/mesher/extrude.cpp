@@ -1,9 +1,9 @@
-// Method: prisms between two offset copies of the skin, each cut into three tetrahedra by an order of its points. The copies lie along the
-//   normals, at folds along the mitre. Mid-side nodes of the skin's edges are put on the true surface (or on the arc between the normals)
-//   and moved out along the mean way, corrected so that the wall keeps its thickness there; vertical edges are halved; diagonals get the
-//   mean of the two edges above and below, so that the sides of prisms are ruled.
+// Method: prisms between two offset copies of the skin, each cut into three tetrahedra by a point order. Offsets follow the normals, at
+//   folds the mitre. Mid-side nodes of skin edges lie on the true surface (or on the arc between the normals) and are offset along the mean
+//   direction, corrected to keep the wall thickness; vertical edges are halved; diagonals get the mean of the edges above and below, so
+//   that prism sides are ruled.
 // Source: Dompierre, Labbe, Vallet and Camarero, "How to subdivide pyramids, prisms and hexahedra into tetrahedra", 8th International
-//   Meshing Roundtable, 1999 (the diagonals); Vlachos, Peters, Boyd and Mitchell, "Curved PN triangles", I3D 2001 (the arcs).
+//   Meshing Roundtable, 1999 (diagonals); Vlachos, Peters, Boyd and Mitchell, "Curved PN triangles", I3D 2001 (arcs).
 #include "precompute/mesher/extrude.hpp"
 
 #include <fmt/core.h>
@@ -21,16 +21,16 @@
 namespace carillon::mesher {
 namespace {
 
-constexpr double kMaxMitre = 4;         // of the thickness: folds of 29 degrees between the sides
-constexpr double kMinShrink = 0.05;     // of a triangle's area, from one side of the wall to the other
-constexpr double kSameNormal = 0.9998;  // cosine of 1.1 degrees
+constexpr double kMaxMitre = 4;              // over the thickness: folds of 29 degrees between the sides
+constexpr double kMinAreaRatio = 0.05;       // least ratio of a triangle's areas on the two sides of the wall
+constexpr double kMinNormalCosine = 0.9998;  // cosine of 1.1 degrees
 constexpr int kSmoothings = 30;
 
-/// The shortest correction of `way` whose parts along the unit normals become `wanted`.
+/// Shortest correction of `way` with the components `wanted` along the unit normals.
 Vec3 correct_way(Vec3 way, const std::vector<Vec3>& normals, double wanted) {
   Mat3 matrix{};
-  constexpr double kLeast = 1e-6;  // regularisation for directions without a normal; the iterations compensate for it
-  for (int i = 0; i < 3; ++i) matrix[i][i] = kLeast;
+  constexpr double kRegularisation = 1e-6;  // regularisation for directions without a normal; the iterations compensate for it
+  for (int i = 0; i < 3; ++i) matrix[i][i] = kRegularisation;
   for (const Vec3& n : normals)
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) matrix[i][j] += n[i] * n[j];
@@ -43,14 +43,15 @@ Vec3 correct_way(Vec3 way, const std::vector<Vec3>& normals, double wanted) {
   return way;
 }
 
-/// Different normals at each point.
+/// Distinct normals at each point.
 std::vector<std::vector<Vec3>> find_point_normals(const Skin& skin, const std::vector<std::array<Vec3, 3>>& normals) {
   std::vector<std::vector<Vec3>> at(skin.surface.points.size());
   for (std::size_t f = 0; f < normals.size(); ++f)
     for (int c = 0; c < 3; ++c) {
       auto& own = at[skin.surface.triangles[f][c]];
       const Vec3& n = normals[f][c];
-      if (norm(n) > 0 && std::none_of(own.begin(), own.end(), [&](const Vec3& m) { return dot(m, n) > kSameNormal; })) own.push_back(n);
+      if (norm(n) > 0 && std::none_of(own.begin(), own.end(), [&](const Vec3& m) { return dot(m, n) > kMinNormalCosine; }))
+        own.push_back(n);
     }
   return at;
 }
@@ -71,7 +72,7 @@ std::vector<Vec3> find_ways_out(const Skin& skin, const std::vector<std::array<V
 }
 
 struct Middle {
-  Vec3 at{}, low_at{}, way{};  // on the skin; on the low side, where it is known; offset direction
+  Vec3 at{}, low_at{}, way{};  // on the skin; on the low side, if known; offset direction
 };
 
 class Extruder {
@@ -81,7 +82,7 @@ class Extruder {
     if (!wall_.low_m.empty()) {
       wall_.levels_m.clear();
       for (std::size_t v = 0; v < count(); ++v) {
-        // So long that the part along the normal, or the largest of them at a fold, is one.
+        // Scaled so that the component along the normal, or the largest one at a fold, is one.
         const Vec3 way = skin.surface.points[v] - wall.low_m[v];
         const double part = dot(way, ways_[v]) / dot(ways_[v], ways_[v]);
         const double thickness = part > 0 ? part : norm(way);
@@ -111,7 +112,7 @@ class Extruder {
   Vec3 find_at(std::int32_t v, double part) const { return skin_.surface.points[v] + level(static_cast<std::size_t>(v), part) * ways_[v]; }
   double calc_volume(const std::array<Vec3, 4>& x) const { return dot(cross(x[1] - x[0], x[2] - x[0]), x[3] - x[0]); }
 
-  /// The tetrahedra of the prism over a triangle, as its points in ascending order and whether each corner is high.
+  /// Tetrahedra of the prism over a triangle: points in ascending order, and which corners are high.
   static constexpr std::array<std::array<std::array<int, 2>, 4>, 3> kCut{
       {{{{0, 0}, {1, 0}, {2, 0}, {2, 1}}}, {{{0, 0}, {1, 0}, {2, 1}, {1, 1}}}, {{{0, 0}, {0, 1}, {1, 1}, {2, 1}}}}};
 
@@ -122,8 +123,8 @@ class Extruder {
     return t;
   }
 
-  /// The points in the order that cuts the prisms: first those whose ways lean away from their neighbours (ridges), last those that lean to
-  /// them, so that the diagonals of leaning sides are the short ones.
+  /// Point order that cuts the prisms: first points whose offsets diverge (ridges), last those whose offsets converge, so that diagonals of
+  /// leaning sides are the short ones.
   void rank_points() {
     std::vector<double> lean(count(), 0);
     for (const Triangle& t : skin_.surface.triangles)
@@ -140,13 +141,13 @@ class Extruder {
     for (std::size_t n = 0; n < order.size(); ++n) rank_[order[n]] = static_cast<std::int32_t>(n);
   }
 
-  /// Whether the wall over the triangle has its sides the right way round and no tetrahedron without volume.
+  /// True if the sides of the wall over the triangle are correctly oriented and no tetrahedron is flat.
   bool is_sound(const Triangle& triangle) const {
     std::array<Vec3, 2> area;
     for (int side = 0; side < 2; ++side)
       area[side] = cross(find_at(triangle[1], side) - find_at(triangle[0], side), find_at(triangle[2], side) - find_at(triangle[0], side));
     const double low = norm(area[0]), high = norm(area[1]);
-    if (!(dot(area[0], area[1]) > 0.5 * low * high) || std::min(low, high) < kMinShrink * std::max(low, high)) return false;
+    if (!(dot(area[0], area[1]) > 0.5 * low * high) || std::min(low, high) < kMinAreaRatio * std::max(low, high)) return false;
     bool odd = false;
     const Triangle t = sort(triangle, odd);
     for (int layer = 0; layer < wall_.layers; ++layer)
@@ -161,7 +162,7 @@ class Extruder {
     return true;
   }
 
-  /// Where prisms are folded over, offset directions are smoothed; prisms that stay folded are refused.
+  /// Smooths offset directions at folded prisms; refuses prisms that stay folded.
   void smooth_ways() {
     std::vector<char> fixed(count(), 0);
     for (const auto& [a, b] : skin_.folds) fixed[a] = fixed[b] = 1;
@@ -248,7 +249,7 @@ class Extruder {
       }
   }
 
-  /// Tangents along folds and borders, for their arcs: at each point with two of them that do not bend, by the circle through three points.
+  /// Tangents along folds and borders for their arcs: at points with two of them and no corner, by the circle through three points.
   std::map<std::int32_t, std::vector<std::int32_t>> find_chains() const {
     std::map<std::int32_t, std::vector<std::int32_t>> along;
     for (const std::vector<Edge>* edges : std::array{&skin_.folds, &std::as_const(border_)})
@@ -295,7 +296,7 @@ class Extruder {
       Middle& m = middles[e];
       m.at = 0.5 * (p[a] + p[b]);
       Vec3 bulge{};
-      std::vector<Vec3> across;  // of each side, the normal in the middle
+      std::vector<Vec3> across;  // per side, normal at the middle
       double wanted = 0;
       for (const Side& side : sides[e]) {
         const Vec3 sum = side.low + side.high;
@@ -320,9 +321,9 @@ class Extruder {
       } else {
         m.at = m.at + bulge;
       }
-      if (across.size() == 2 && dot(across[0], across[1]) > kSameNormal) across.pop_back();
+      if (across.size() == 2 && dot(across[0], across[1]) > kMinNormalCosine) across.pop_back();
       Vec3 way = 0.5 * (ways_[a] + ways_[b]);
-      // Turned by the arc, as long as at the ends.
+      // Rotated by the arc, with the length at the ends.
       way = correct_way(way, across, wanted / sided);
       const double longest = 1.1 * std::max(norm(ways_[a]), norm(ways_[b]));
       m.way = norm(way) > longest ? (longest / norm(way)) * way : way;
@@ -386,7 +387,7 @@ class Extruder {
     }
     border_ = find_border(skin_.surface);
     if (!border_.empty()) {
-      std::unordered_map<Edge, char, EdgeHash> columns;  // of border edges, and of their points
+      std::unordered_map<Edge, char, EdgeHash> columns;  // border edges, and points on them
       for (const auto& [a, b] : border_) columns[make_edge(a, b)] = columns[make_edge(a, a)] = columns[make_edge(b, b)] = 1;
       auto& rim = sets["rim"];
       for (std::int32_t node = 0; node < points * (wall_.layers + 1); ++node)
@@ -404,9 +405,9 @@ class Extruder {
   Wall wall_;
   std::vector<std::array<Vec3, 3>> normals_;
   std::vector<Vec3> ways_;
-  std::vector<std::int32_t> rank_;  // of each point in the order that cuts the prisms
+  std::vector<std::int32_t> rank_;  // position of each point in the cutting order
   std::vector<Edge> border_;
-  std::unordered_map<Edge, std::int32_t, EdgeHash> place_of_, made_;  // of the skin's edges; mid nodes by their ends
+  std::unordered_map<Edge, std::int32_t, EdgeHash> place_of_, made_;  // skin edges; mid nodes by their ends
   Extruded result_;
 };
 

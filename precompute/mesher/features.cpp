@@ -1,10 +1,8 @@
 // Method: edges whose faces turn by more than an angle are joined to curves, split where curves meet or bend. Short curves with a loose end
-//   are noise and are removed first, repeatedly, since spurs hide the curve that they branch from. A curve counts as a sharp edge of the
-//   body if its two sides, each averaged over a patch the size of an element, still turn by that much, which on a noisy surface they do
-//   not. Where many edges are sharp and many of them start, end or meet irregularly, the surface is a scan, and none of its edges is kept.
-// Source: our own; the angle threshold is common practice. Smoothing: Taubin, "A signal processing approach to fair surface design",
-//   SIGGRAPH 1995, with equal weights.
-// Deviations: no point is smoothed farther than a bound.
+//   are noise and are removed first, repeatedly, since spurs split the curve they branch from. A curve is a sharp edge of the body if its
+//   two sides, each averaged over an element-sized patch, still turn by that much; on noisy surfaces they do not. If many edges are sharp
+//   and many start, end or meet irregularly, the surface is a scan without sharp edges. Smoothing: bounded displacement, equal weights.
+// Source: Taubin, "A signal processing approach to fair surface design", SIGGRAPH 1995 (smoothing).
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -19,22 +17,22 @@
 namespace carillon::mesher {
 namespace {
 
-// A curve is a crease if over most of its length the mean normals of its two sides turn by most of the sharp angle. Set by trial
-// on the Stanford bunny (no curve but the creases of ears and paws) and on boxes, cylinders and screws (all of theirs).
+// A curve is a crease if over most of its length the mean normals of its sides turn by most of the sharp angle. Tuned on the Stanford bunny
+// (only the creases of ears and paws) and on boxes, cylinders and screws (all edges).
 constexpr double kMeanTurnPart = 0.85;
 constexpr double kCreasePart = 0.8;
-// Curves are split where they bend by more than this, because the mesher rounds all bends but the ends of curves.
+// Curves are split at larger bends, because the mesher rounds all bends except at curve ends.
 constexpr double kBendDeg = 30;
 
-// A surface with more than this part of its edges sharp, and of whose points on them more than this part have one sharp edge or four and
-// more, is a scan, unless it is one of few triangles. Generated scans have 10 to 60 % and 35 to 75 %, the Stanford bunny 0.6 % sharp edges;
+// A surface is a scan if more than this part of its edges is sharp, and if more than this part of the points on them has one sharp edge, or
+// four or more; except surfaces of few triangles. Generated scans have 10 to 60 % and 35 to 75 %, the Stanford bunny 0.6 % sharp edges;
 // boxes, screws and letters have points of two and three.
 constexpr double kRoughPart = 0.05, kOddPart = 0.25;
-constexpr std::size_t kMinScan = 500;
-// One sweep of smoothing: a step that shrinks and one that expands again, and how many sweeps.
+constexpr std::size_t kMinScanTriangles = 500;
+// One smoothing sweep: a shrinking and an expanding step; number of sweeps.
 constexpr double kShrink = 0.5, kSwell = -0.53;
 constexpr int kSweeps = 6;
-// Faces whose normals cancel to less than this part of their area turn all the way around: the wall of a bore.
+// Faces whose normals cancel to less than this part of their area wrap around: the wall of a bore.
 constexpr double kCancelled = 0.3;
 
 struct EdgeData {
@@ -42,10 +40,10 @@ struct EdgeData {
   std::array<std::int32_t, 2> faces{-1, -1};
   int face_count = 0;
   double turn_deg = 0;
-  bool is_wall = false;  // sharp, and no noise: the sides of curves end there
+  bool is_wall = false;  // sharp and no noise: ends the averaging patches of curves
 };
 
-/// The edges of a surface, in a fixed order.
+/// Edges of a surface, in a fixed order.
 class Edges {
  public:
   explicit Edges(const TriangleSurface& surface) : of_face_(surface.triangles.size()) {
@@ -86,7 +84,7 @@ class Edges {
       if (edge.face_count == 2 && edge.turn_deg > sharp_angle_deg) sharp.push_back(edge.ends);
     return sharp;
   }
-  /// The edge from corner c of a face to the next.
+  /// Edge from corner c of a face to the next.
   const EdgeData& at(std::int32_t face, int corner) const { return edges_[of_face_[face][corner]]; }
   EdgeData& at(const Edge& ends) {
     return *std::lower_bound(edges_.begin(), edges_.end(), ends, [](const EdgeData& edge, const Edge& key) { return edge.ends < key; });
@@ -129,7 +127,7 @@ std::vector<std::vector<std::int32_t>> join_curves(const TriangleSurface& surfac
     if (is_end(v))
       for (const std::int32_t w : around)
         if (!used[make_edge(v, w)]) walk(v, w);
-  for (const Edge& e : sharp)  // what is left are closed curves without an end
+  for (const Edge& e : sharp)  // the rest are closed curves
     if (!used[e]) walk(e[0], e[1]);
   return curves;
 }
@@ -140,13 +138,13 @@ double calc_length(const TriangleSurface& surface, const std::vector<std::int32_
   return length;
 }
 
-/// The curves of the sharp edges but those that are shorter than `shortest_m` and have a loose end, and what they leave.
+/// Curves of the sharp edges, without loose-ended ones shorter than `shortest_m`, after splitting.
 std::vector<std::vector<std::int32_t>> find_tied_curves(const TriangleSurface& surface, std::vector<Edge> sharp, double shortest_m) {
   while (true) {
     const auto curves = join_curves(surface, sharp);
     std::map<std::int32_t, int> valence;
     for (const Edge& e : sharp) ++valence[e[0]], ++valence[e[1]];
-    // A bend splits a curve, and both parts end there: neither end is loose.
+    // A bend splits a curve; neither new end is loose.
     const auto is_loose = [&](const std::vector<std::int32_t>& curve) {
       return (valence[curve.front()] == 1 || valence[curve.back()] == 1) && calc_length(surface, curve) < shortest_m;
     };
@@ -160,7 +158,7 @@ std::vector<std::vector<std::int32_t>> find_tied_curves(const TriangleSurface& s
   }
 }
 
-/// The normals, by area, of the faces reached from `seed` within `radius` of p without crossing a wall, summed; and their area.
+/// Sum of area normals of the faces reached from `seed` within `radius` of p without crossing a wall; and their area.
 std::pair<Vec3, double> sum_normals(const TriangleSurface& surface, const Edges& edges, std::int32_t seed, const Vec3& p, double radius) {
   constexpr std::size_t kMaxFaces = 500;
   std::vector<std::int32_t> reached{seed};
@@ -183,7 +181,7 @@ std::pair<Vec3, double> sum_normals(const TriangleSurface& surface, const Edges&
   return {sum, area};
 }
 
-/// True if the two sides of the curve, each averaged over `radius`, still turn by most of the angle along most of its length.
+/// True if the sides of the curve, averaged over `radius`, turn by most of the angle along most of its length.
 bool is_crease(const TriangleSurface& surface, Edges& edges, const std::vector<std::int32_t>& curve, double sharp_angle_deg,
                double radius) {
   double length = 0, crease = 0;
@@ -202,7 +200,7 @@ bool is_crease(const TriangleSurface& surface, Edges& edges, const std::vector<s
 }  // namespace
 
 bool is_scan(const TriangleSurface& surface, double sharp_angle_deg) {
-  if (surface.triangles.size() < kMinScan) return false;
+  if (surface.triangles.size() < kMinScanTriangles) return false;
   const Edges edges(surface);
   const std::vector<Edge> sharp = edges.find_sharp(sharp_angle_deg);
   if (static_cast<double>(sharp.size()) < kRoughPart * static_cast<double>(edges.get_all().size())) return false;
@@ -247,8 +245,7 @@ std::vector<Polyline> find_sharp_curves(const TriangleSurface& surface, double s
     for (std::size_t i = 0; i + 1 < curve.size(); ++i) edges.at(make_edge(curve[i], curve[i + 1])).is_wall = true;
   std::vector<char> kept(all.size(), 0);
   std::set<std::int32_t> ends;
-  // Short curves are noise, but for those between the ends of long ones (the edges of a plate along its thickness) and closed ones (the
-  // rim of a bore).
+  // Short curves are noise, except between ends of long ones (edges of a plate along its thickness) and closed ones (rim of a bore).
   for (const bool is_long : {true, false})
     for (std::size_t n = 0; n < all.size(); ++n) {
       const auto& curve = all[n];

@@ -1,5 +1,5 @@
-// Method: signal handlers on a stack of their own, so that they run after a stack overflow too. They only write a line that was made before
-//   and end the process: nothing else is safe in them. Nothing is lost, for outputs have no name before they are whole.
+// Method: signal handlers on an alternate stack, so that they survive a stack overflow. They only write a prepared line and end the process
+//   (async-signal-safe). No output is lost: files are named only when complete.
 // Source: POSIX.1-2017, signal concepts (async-signal-safe functions), setrlimit (RLIMIT_CPU, SIGXCPU).
 #include "precompute/mesher/guard.hpp"
 
@@ -32,13 +32,13 @@ alignas(16) std::array<char, kStack> alternate_stack;
 
 bool guarded = false;
 const char* program_name = "";
-double limit_s = 0;  // set by us; 0: none, and what ends the process is a limit that it came with
-// What the handlers write, each a whole line.
+double limit_s = 0;  // set by this program; 0: none, an inherited limit applies
+// Output of the handlers, whole lines.
 std::array<char, 1024> crash_line{}, time_line{};
 
 void store(std::array<char, 1024>& line, const std::string& text) {
   const std::size_t length = std::min(text.size(), line.size() - 2);
-  // A handler that comes in between finds an end in any case.
+  // A handler in between still finds a terminated string.
   line[length] = '\n';
   line[length + 1] = '\0';
   std::memcpy(line.data(), text.data(), length);
@@ -69,8 +69,8 @@ void guard_program(const char* program) {
   action.sa_handler = end_by_time;
   ::sigaction(SIGXCPU, &action, nullptr);
   action.sa_handler = end_by_crash;
-  ::sigaction(SIGFPE, &action, nullptr);  // GMP raises it for what is not a number
-  if (kSanitized) return;                 // the other faults are for the sanitizer to report
+  ::sigaction(SIGFPE, &action, nullptr);  // GMP raises it for non-finite numbers
+  if (kSanitized) return;                 // leave other faults to the sanitizer
   for (const int signal : {SIGSEGV, SIGBUS, SIGILL, SIGABRT}) ::sigaction(signal, &action, nullptr);
 }
 
@@ -81,8 +81,7 @@ void set_guarded_step(std::string_view file, std::string_view step) {
       "touch "
       "each other, needles)";
   const std::string place = file.empty() ? std::string(program_name) : fmt::format("{}: {}", program_name, file.substr(0, 300));
-  store(crash_line,
-        fmt::format("{}: the mesher broke down at the step '{}': the surface is one that it cannot take; {}", place, step, kAdvice));
+  store(crash_line, fmt::format("{}: the mesher crashed at the step '{}': it cannot handle this surface; {}", place, step, kAdvice));
   if (limit_s > 0)
     store(time_line,
           fmt::format(
@@ -102,7 +101,7 @@ CpuLimit::CpuLimit(double seconds) {
   const double now = static_cast<double>(used.ru_utime.tv_sec + used.ru_stime.tv_sec) +
                      1e-6 * static_cast<double>(used.ru_utime.tv_usec + used.ru_stime.tv_usec);
   const auto wanted = static_cast<rlim_t>(std::ceil(now + std::min(seconds, 1e8)));
-  if (wanted >= limit.rlim_cur) return;  // the user's own limit is the tighter one
+  if (wanted >= limit.rlim_cur) return;  // the user's limit is tighter
   before_ = limit.rlim_cur;
   limit.rlim_cur = wanted;
   set_ = ::setrlimit(RLIMIT_CPU, &limit) == 0;

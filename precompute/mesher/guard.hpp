@@ -1,14 +1,14 @@
-// The step at which a process is, for what it says when a signal ends it. Inner header; guard_program() is in surface.hpp.
+// Current step of the process, for messages on fatal signals. Internal header; guard_program() is in surface.hpp.
 #pragma once
 
 #include <string_view>
 
 namespace carillon::mesher {
 
-/// What is being done to which file. Nothing unless guard_program() was called, as the others here.
+/// Current step and file. No effect unless guard_program() was called, as for the others here.
 void set_guarded_step(std::string_view file, std::string_view step);
 
-/// During its lifetime, the process ends after this much more processor time.
+/// During its lifetime, limits the further processor time of the process.
 class CpuLimit {
  public:
   explicit CpuLimit(double seconds);

@@ -1,8 +1,7 @@
-// Method: at a point of a sharp edge with the unit normals n_i of the faces that meet there, the offset planes meet at the point
-//   moved by x, the shortest solution of n_i . x = -wall for all i in the least-squares sense; kept if it is `wall` from the surface.
-// Source: the offset of a polyhedron by its planes, as in Pavic and Kobbelt, "High-resolution volumetric computation of offset
-//   surfaces with feature preservation", CGF 27(2), 2008, section 4 (they find the same point as the minimum of a quadric).
-// Deviations: only along edges that are known to be sharp.
+// Method: at a point of a sharp edge with adjacent unit normals n_i, the offset planes meet at the point displaced by x, the minimum-norm
+//   least-squares solution of n_i . x = -wall; kept if it is `wall` from the surface.
+// Source: Pavic and Kobbelt, "High-resolution volumetric computation of offset surfaces with feature preservation", CGF 27(2), 2008,
+//   section 4 (the same point as minimum of a quadric); here only along known sharp edges.
 #include "precompute/mesher/inset_curves.hpp"
 
 #include <Eigen/Eigenvalues>
@@ -13,9 +12,9 @@
 namespace carillon::mesher {
 namespace {
 
-// Faces whose normals differ by less than this at a point are one side of the edge (cosine of 25 degrees).
-constexpr double kSameSide = 0.906;
-// A point belongs to the inner skin if its distance to the surface is the wall within this part.
+// Faces with a smaller normal difference are one side of the edge (cosine of 25 degrees).
+constexpr double kMinSideCosine = 0.906;
+// Relative tolerance of the wall distance for points of the inner skin.
 constexpr double kTolerance = 0.02;
 
 using Normals = std::vector<Vec3>;
@@ -24,12 +23,12 @@ Vec3 calc_area_normal(const TriangleSurface& surface, const Triangle& t) {
   return cross(surface.points[t[1]] - surface.points[t[0]], surface.points[t[2]] - surface.points[t[0]]);
 }
 
-/// One unit normal for every side that the area normals belong to.
+/// One unit normal per side.
 Normals group_sides(const Normals& area_normals) {
   Normals sums;
   for (const Vec3& n : area_normals) {
     if (!(norm(n) > 0)) continue;
-    const auto same = std::find_if(sums.begin(), sums.end(), [&](const Vec3& s) { return dot(s, n) > kSameSide * norm(s) * norm(n); });
+    const auto same = std::find_if(sums.begin(), sums.end(), [&](const Vec3& s) { return dot(s, n) > kMinSideCosine * norm(s) * norm(n); });
     if (same == sums.end())
       sums.push_back(n);
     else
@@ -41,7 +40,7 @@ Normals group_sides(const Normals& area_normals) {
 
 Vec3 calc_inset(const Normals& sides, double wall_m) {
   if (sides.empty()) return {};
-  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();  // of the least squares
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();  // normal equations
   Eigen::Vector3d right = Eigen::Vector3d::Zero(), x = right;
   for (const Vec3& side : sides) {
     const Eigen::Vector3d n(side[0], side[1], side[2]);
@@ -86,7 +85,7 @@ std::vector<Polyline> make_inset_curves(const TriangleSurface& surface, const st
       if (piece.size() > 1) out.push_back(piece);
       piece.clear();
     };
-    // A corner is exactly the same point for all curves that meet in it, so it replaces points that came too close before it.
+    // A corner is the same point in all its curves; it replaces points too close before it.
     const auto add = [&](const Vec3& p, const Normals& normals, bool corner) {
       const Vec3 q = p + calc_inset(group_sides(normals), wall_m);
       if (!is_on_skin(q)) return;
@@ -103,12 +102,12 @@ std::vector<Polyline> make_inset_curves(const TriangleSurface& surface, const st
       for (int k = 1; k < pieces; ++k) add(a + (static_cast<double>(k) / pieces) * (b - a), sides, false);
       add(b, at_point.at(b), i + 2 == curve.size());
     }
-    // A closed curve whose inset is whole closes too.
+    // A closed curve with a complete inset is closed as well.
     if (curve.front() == curve.back() && piece.size() > 2 && norm(piece.front() - piece.back()) < 3 * spacing_m)
       piece.back() = piece.front();
     finish();
   }
-  // Ends that nearly meet are made to meet: the mesher would put ever smaller balls between them.
+  // Merge ends that nearly meet: the mesher would put ever smaller balls between them.
   std::vector<Vec3*> ends;
   for (Polyline& piece : out)
     for (Vec3* end : {&piece.front(), &piece.back()}) {

@@ -41,10 +41,10 @@ namespace {
 using namespace carillon;
 using Clock = std::chrono::steady_clock;
 
-/// The command line as it was given.
+/// Command line.
 struct Order {
   std::string surface, shape, out, json, result;
-  std::map<std::string, double> lengths;  // --wall, --height and the dimensions of shapes, by name without dashes
+  std::map<std::string, double> lengths;  // --wall, --height and shape dimensions, by name without dashes
   std::optional<double> scale, edge, close_holes;
   std::optional<long long> nodes;
   std::string up, method, side;
@@ -56,7 +56,7 @@ struct Order {
   bool quiet = false;
 };
 
-/// What came out, for both ways of making a mesh.
+/// Result of either meshing path.
 struct Meshed {
   mesh::TetMesh mesh;
   std::vector<std::string> notes, remarks;
@@ -102,7 +102,7 @@ std::string describe_shapes() {
          "  carillon-mesh --shape tube --length 0.4 --outer-radius 0.0125 --wall 0.001 --order 2 -o chime.msh\n";
 }
 
-/// A tube and a bowl are described by one radius, the outer one: --radius means that.
+/// Tube and bowl have one radius, the outer one: --radius is an alias.
 void complete_radius(Order& order) {
   if (order.shape != "tube" && order.shape != "bowl") return;
   if (!order.lengths.contains("radius")) return;
@@ -111,7 +111,7 @@ void complete_radius(Order& order) {
   order.lengths.erase("radius");
 }
 
-/// Throws InputError for the first option that does not belong to the way of meshing that was asked for.
+/// Throws InputError for the first option that does not apply to the chosen meshing path.
 void check_options(const Order& order) {
   if (order.surface.empty() && order.shape.empty()) {
     throw InputError("nothing to mesh: give a SURFACE file or --shape S (see --help for the shapes)");
@@ -213,7 +213,7 @@ Meshed make_from_shape(const Order& order, const mesher::Progress& progress) {
   return result;
 }
 
-/// What the count fell short of, or nothing.
+/// Notes on a missed node count.
 void note_count(const Order& order, Meshed& result) {
   if (!order.nodes) return;
   const double ratio = static_cast<double>(result.mesh.nodes_m.size()) / static_cast<double>(*order.nodes);
@@ -318,7 +318,7 @@ void make_mesh(const Order& order) {
   auto phase = Clock::now();
   const mesh::CheckReport check = mesh::check_mesh(result.mesh, is_piped ? "the mesh" : order.out);
   result.remarks.insert(result.remarks.end(), check.warnings.begin(),
-                        check.warnings.end());  // not printed for programs, which check the mesh themselves
+                        check.warnings.end());  // not in machine-readable output: programs check the mesh themselves
   result.seconds.emplace_back("check", calc_seconds(phase));
   progress(fmt::format("writing {}", order.out));
   phase = Clock::now();
@@ -342,7 +342,7 @@ void make_mesh(const Order& order) {
   if (std::fflush(to) != 0) throw SystemError("the report cannot be written");
 }
 
-/// Adds the nearest known option to CLI11's complaint about an unknown one.
+/// Adds the nearest known option to CLI11's unknown-option message.
 [[noreturn]] void throw_unknown(const CLI::App& app, const std::string& complaint) {
   std::vector<std::string> known;
   for (const CLI::Option* option : app.get_options()) {
@@ -359,7 +359,7 @@ void make_mesh(const Order& order) {
   throw InputError(message);
 }
 
-/// True for unsupported mesh formats as well, which the reader refuses.
+/// True for unsupported mesh formats as well; the reader refuses them.
 bool is_mesh_name(const std::filesystem::path& file) {
   constexpr std::array<std::string_view, 17> kEndings{".msh", ".vtu", ".mesh", ".node", ".ele", ".meshb", ".vtk",  ".pvtu", ".vtkhdf",
                                                       ".inp", ".bdf", ".nas",  ".unv",  ".med", ".xdmf",  ".cgns", ".exo"};

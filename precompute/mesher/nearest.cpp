@@ -24,7 +24,7 @@ NearestPoint::NearestPoint(const TriangleSurface& surface) : tree_(std::make_uni
   for (std::size_t f = 0; f < surface.triangles.size(); ++f) {
     const Triangle& t = surface.triangles[f];
     const DoubleKernel::Triangle_3 triangle(point(t[0]), point(t[1]), point(t[2]));
-    if (triangle.is_degenerate()) continue;  // its edges belong to its neighbours too
+    if (triangle.is_degenerate()) continue;  // its edges belong to neighbours
     tree_->triangles.push_back(triangle);
     tree_->number.push_back(static_cast<std::int32_t>(f));
   }

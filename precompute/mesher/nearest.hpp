@@ -1,4 +1,4 @@
-// The exact distance to a triangle surface; std only, CGAL's AABB tree stays in nearest.cpp.
+// Exact distance to a triangle surface; std only, CGAL's AABB tree is confined to nearest.cpp.
 #pragma once
 
 #include <cstdint>
@@ -10,16 +10,16 @@
 
 namespace carillon::mesher {
 
-/// A tree of the triangles of a surface. It holds copies, so that the surface may go; find() is exact up to rounding.
+/// Tree of copied triangles (independent of the surface); find() is exact up to rounding.
 class NearestPoint {
  public:
   explicit NearestPoint(const TriangleSurface& surface);
   ~NearestPoint();
-  /// The point of the surface nearest to p.
+  /// Nearest point of the surface.
   Vec3 find(const Vec3& p) const;
-  /// The same, and its triangle.
+  /// Nearest point and its triangle.
   std::pair<Vec3, std::int32_t> find_on(const Vec3& p) const;
-  /// The nearest triangle that a ray meets, but `own` (-1: none), and how far away along the unit vector `way`.
+  /// First triangle hit by a ray, except `own` (-1: none), and its distance along the unit vector `way`.
   std::optional<std::pair<double, std::int32_t>> find_hit(const Vec3& from, const Vec3& way, std::int32_t own) const;
 
  private:

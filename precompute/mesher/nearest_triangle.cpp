@@ -1,10 +1,9 @@
-// Method: grid points within a voxel of a triangle get their exact distance to it; then every point hands its triangle on to its 26
-//   neighbours, which take it if it is nearer than theirs, first come first served until nothing changes.
-// Source: the closest point on a triangle by its Voronoi regions: Ericson, Real-Time Collision Detection, 2005, section 5.1.5. Handing on
-//   the nearest feature: Danielsson, "Euclidean distance mapping", CGIP 14, 1980, with triangles for his vectors.
-// Deviations: a queue in place of his sweeps, since only a band of the grid is filled. A point whose nearest triangle is none of its
-//   neighbours' gets the distance to another one; on a ball whose noise is a third of
-//   its triangles' edges the largest error is 0.06 voxels, on smooth bodies under a thousandth (distances_test.cpp).
+// Method: grid points within a voxel of a triangle get their exact distance; then every point offers its triangle to its 26 neighbours,
+//   which take it if nearer, from a queue until nothing changes (only a band is filled, so no sweeps). A point whose nearest triangle is
+//   none of its neighbours' gets a larger distance; the largest error is 0.06 voxels on a ball with noise of a third of its edges, below a
+//   thousandth on smooth bodies (distances_test.cpp).
+// Source: closest point on a triangle by Voronoi regions: Ericson, Real-Time Collision Detection, 2005, section 5.1.5. Propagation:
+//   Danielsson, "Euclidean distance mapping", CGIP 14, 1980, with triangles instead of vectors.
 #include "precompute/mesher/nearest_triangle.hpp"
 
 #include <algorithm>
@@ -13,9 +12,9 @@
 namespace carillon::mesher {
 namespace {
 
-// Triangles are taken apart until their boxes are at most this many voxels wide, so that a large one fills no box of its diagonal.
+// Triangles are split until their boxes are at most this many voxels wide, so that a large one does not fill its whole box.
 constexpr double kBox = 4;
-// A nearer triangle is taken if it is nearer by more than this, in squared voxels: rounding must not make neighbours swap without end.
+// Least improvement, in squared voxels: prevents endless swaps by rounding.
 constexpr float kNearer = 1e-6f;
 
 struct Corners {
@@ -29,7 +28,7 @@ float dot3(const std::array<float, 3>& a, const std::array<float, 3>& b) { retur
 float calc_square(const Corners& t, const std::array<float, 3>& p) {
   const std::array<float, 3> ap{p[0] - t.a[0], p[1] - t.a[1], p[2] - t.a[2]};
   const float d1 = dot3(t.ab, ap), d2 = dot3(t.ac, ap);
-  // Along ab and ac, the nearest point is a + v ab + w ac.
+  // Nearest point: a + v ab + w ac.
   float v = 0, w = 0;
   const float d3 = d1 - t.ab_ab, d4 = d2 - t.ab_ac, d5 = d1 - t.ab_ac, d6 = d2 - t.ac_ac;
   const float vc = d1 * d4 - d3 * d2, vb = d5 * d2 - d1 * d6, va = d3 * d6 - d5 * d4;
@@ -83,7 +82,7 @@ class Filler {
     }
   }
 
-  /// Hands the triangles on to the points nearer than reach[inside].
+  /// Propagates triangles to points nearer than reach[inside].
   void spread(const std::vector<char>& inside, const std::array<double, 2>& reach) {
     const std::array<float, 2> max{static_cast<float>(reach[0] * reach[0]), static_cast<float>(reach[1] * reach[1])};
     std::vector<std::array<std::int32_t, 3>> queue, next;
@@ -105,9 +104,9 @@ class Filler {
             for (std::int32_t x = std::max(i - 1, 0); x <= std::min(i + 1, size_[0] - 1); ++x) {
               const std::size_t to = at(x, y, z);
               Sample& other = samples_[to];
-              // A nearer one has been processed before, or will be.
+              // A nearer one was processed before, or will be.
               if (other.nearest == f || other.square < here.square) continue;
-              // By the triangle inequality the triangle is at least this far from there.
+              // Lower bound of the distance by the triangle inequality.
               const int steps = std::abs(x - i) + std::abs(y - j) + std::abs(z - k);
               const float min = own - kStep[steps];
               if (min > 0 && min * min >= other.square) continue;

@@ -1,6 +1,5 @@
-// Method: the boundary faces around a node form one fan on a surface. Where they form several, the cheapest place for a second node is
-//   sought over each of the fans, and the space between fan and node filled with one element per face.
-// Source: our own; the inverse of the edge collapse that would have pinched a sound mesh.
+// Method: on a surface the boundary faces around a node form one fan. At a node with several fans, the best position of a second node is
+//   searched over each fan, and one element per face fills the gap: the inverse of the edge collapse that would create the pinch.
 #include "precompute/mesher/part_nodes.hpp"
 
 #include <algorithm>
@@ -14,13 +13,13 @@
 namespace carillon::mesher {
 namespace {
 
-// The flattest element that may be added; smoothing opens it further.
-constexpr double kFlattestDeg = 4;
+// Least dihedral angle of an added element; smoothing improves it further.
+constexpr double kMinAddedDihedralDeg = 4;
 constexpr int kMaxPasses = 8;
 
-using Fan = std::vector<std::array<std::int32_t, 2>>;  // the other two nodes of each face, counter-clockwise seen from outside
+using Fan = std::vector<std::array<std::int32_t, 2>>;  // other two nodes of each face, counter-clockwise seen from outside
 
-/// The fans of the boundary faces around each node that has more than one.
+/// Fans of boundary faces around each node with more than one.
 std::map<std::int32_t, std::vector<Fan>> find_pinched(const mesh::TetMesh& mesh) {
   std::vector<std::vector<std::array<std::int32_t, 2>>> around(mesh.nodes_m.size());
   for (const Triangle& t : find_boundary(mesh))
@@ -30,7 +29,7 @@ std::map<std::int32_t, std::vector<Fan>> find_pinched(const mesh::TetMesh& mesh)
     auto left = around[v];
     std::vector<Fan> fans;
     while (!left.empty()) {
-      // Each face is followed by the one that begins where it ends.
+      // Each face is followed by the face that begins at its end.
       Fan fan{left.back()};
       left.pop_back();
       for (;;) {
@@ -50,7 +49,7 @@ bool is_inside(const mesh::TetMesh& mesh, std::int32_t e, const Vec3& x) {
   const auto tet = mesh.tet(e);
   for (const auto& face : mesh::kFaces) {
     const Vec3 &a = mesh.nodes_m[tet[face[0]]], &b = mesh.nodes_m[tet[face[1]]], &c = mesh.nodes_m[tet[face[2]]];
-    if (dot(cross(b - a, c - a), x - a) >= 0) return false;  // the faces' normals point outward
+    if (dot(cross(b - a, c - a), x - a) >= 0) return false;  // face normals point outward
   }
   return true;
 }
@@ -60,7 +59,7 @@ struct Place {
   Vec3 at{};
 };
 
-/// The place over the fan that gives the best elements.
+/// Position over the fan with the best elements.
 Place find_place(const mesh::TetMesh& mesh, std::int32_t v, const Fan& fan, const std::function<Vec3(const Vec3&)>& project,
                  const std::function<bool(const Vec3&)>& is_on_skin) {
   const Vec3 middle = mesh.nodes_m[v];
@@ -99,7 +98,7 @@ std::int64_t part_pinched_nodes(mesh::TetMesh& mesh, std::int64_t components, co
     std::vector<char> touched(mesh.nodes_m.size(), 0);
     std::vector<char> remove(mesh.tet_count(), 0);
     for (const auto& [v, fans] : pinched) {
-      // Fans of neighbours change with each other: they wait for the next pass.
+      // Fans of neighbours change too: they wait for the next pass.
       bool wait = touched[v];
       for (const Fan& fan : fans)
         for (const auto& face : fan) wait = wait || touched[face[0]];
@@ -118,7 +117,7 @@ std::int64_t part_pinched_nodes(mesh::TetMesh& mesh, std::int64_t components, co
       touched[v] = 1;
       for (const Fan& fan : fans)
         for (const auto& face : fan) touched[face[0]] = 1;
-      if (over == nullptr || best.flatness < kFlattestDeg || pass + 2 >= kMaxPasses) {
+      if (over == nullptr || best.flatness < kMinAddedDihedralDeg || pass + 2 >= kMaxPasses) {
         for (const std::int32_t e : around[v]) remove[e] = 1;
         continue;
       }

@@ -1,4 +1,4 @@
-// The phases of a mesh: shown, timed, and guarded.
+// Meshing phases: progress, timing and guard.
 #pragma once
 
 #include <chrono>
@@ -9,7 +9,7 @@
 
 namespace carillon::mesher {
 
-/// Phases of one mesh. Seconds of a phase that runs again are summed in the report. Refers to the report and the progress.
+/// Phases of one mesh. Repeated phases are summed in the report. Refers to the report and the progress.
 class Phases {
  public:
   Phases(SurfaceReport& report, const Progress& progress, std::string file)

@@ -1,8 +1,7 @@
-// Method: a node of the skin gets the way from its nearest point on the triangles to the point of the smooth surface that belongs to it.
-//   The inner skin of a shell moves as the outer one does there. The ways are short: of the order of the height of an arc over one of the
-//   triangles. The skins of a shell come from a sampled distance, which is linear between its samples and so lies off a curved skin by up
-//   to an eighth of the square of their spacing over the radius; there the way leads to no distance, or to that of the wall.
-// Source: our own.
+// Method: a skin node is displaced by the vector from its nearest point on the triangles to the corresponding smooth-surface point. The
+//   inner skin of a shell moves with the outer one. Displacements are of the order of a triangle's sagitta. Shell skins come from a sampled
+//   distance, linear between samples and off a curved skin by up to an eighth of the squared spacing over the radius; there the target
+//   distance is zero or the wall.
 #include "precompute/mesher/place_nodes.hpp"
 
 #include <fmt/core.h>
@@ -17,9 +16,9 @@
 namespace carillon::mesher {
 namespace {
 
-// An element keeps at least this part of its volume.
-constexpr double kMinVolume = 0.3;
-// Of the spacing of the samples: farther off a skin a node is not by their interpolation.
+// Least remaining part of an element's volume.
+constexpr double kMinRemainingVolumeRatio = 0.3;
+// Relative to the sample spacing: larger offsets from the skin are not interpolation errors.
 constexpr double kMaxOff = 0.25;
 
 double calc_volume(const mesh::TetMesh& mesh, std::int64_t e) {
@@ -32,7 +31,7 @@ double calc_volume(const mesh::TetMesh& mesh, std::int64_t e) {
 
 std::int64_t place_on_smooth_surface(mesh::TetMesh& mesh, const Body& body, bool straight) {
   if (!body.round) return 0;
-  mesh::TetMesh linear;  // the corners alone, numbered as they are
+  mesh::TetMesh linear;  // corners only, same numbering
   linear.nodes_m = mesh.nodes_m;
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e) linear.tets.insert(linear.tets.end(), mesh.tet(e).begin(), mesh.tet(e).begin() + 4);
   std::vector<char> on_skin(mesh.nodes_m.size(), 0);
@@ -43,7 +42,7 @@ std::int64_t place_on_smooth_surface(mesh::TetMesh& mesh, const Body& body, bool
       edges.insert(make_edge(t[c], t[(c + 1) % 3]));
     }
   std::vector<Vec3> way(mesh.nodes_m.size(), Vec3{});
-  // The part of the way from the surface by which a node lies off the skin that it belongs to.
+  // Part of the displacement from the surface by which a node is off its skin.
   const auto calc_off = [&](const Vec3& inward) {
     const double depth = norm(inward);
     if (!body.field || body.wall_m <= 0 || depth == 0) return 0.0;
@@ -66,7 +65,7 @@ std::int64_t place_on_smooth_surface(mesh::TetMesh& mesh, const Body& body, bool
     again = false;
     for (std::size_t v = 0; v < mesh.nodes_m.size(); ++v) linear.nodes_m[v] = mesh.nodes_m[v] + way[v];
     for (std::int64_t e = 0; e < mesh.tet_count(); ++e) {
-      if (calc_volume(linear, e) > kMinVolume * volumes[e]) continue;
+      if (calc_volume(linear, e) > kMinRemainingVolumeRatio * volumes[e]) continue;
       for (int c = 0; c < 4; ++c) {
         const std::int32_t v = linear.tets[4 * e + c];
         again = again || norm(way[v]) > 0;

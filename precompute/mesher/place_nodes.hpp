@@ -1,4 +1,4 @@
-// The last step to the smooth surface.
+// Final projection onto the smooth surface.
 #pragma once
 
 #include "precompute/mesh/tet_mesh.hpp"
@@ -6,13 +6,12 @@
 
 namespace carillon::mesher {
 
-/// Moves the nodes of both skins from the triangles of body.repaired.surface, where the mesher put them, to the smooth surface body.round;
-/// mid-side nodes inside follow the ends of their edges. With `straight`, all mid-side nodes do. Elements that this would turn inside out
-/// keep their nodes (of ten nodes: their straight sides). Where the facets leave it open what they are, mesh.doubt_m says by how much.
-/// Returns the number of elements made straight. Nothing to do without body.round.
+/// Moves the nodes of both skins from the triangles of body.repaired.surface to the smooth surface body.round; inner mid-side nodes follow
+/// their edge ends (with `straight`, all mid-side nodes do). Elements that would invert keep their nodes (ten nodes: straight sides). Where
+/// the facets are ambiguous, mesh.doubt_m gets the offset. Returns the number of straightened elements. No-op without body.round.
 std::int64_t place_on_smooth_surface(mesh::TetMesh& mesh, const Body& body, bool straight);
 
-/// Largest doubt of the nodes into the report, with a remark on coarse facets.
+/// Reports the largest doubt of the nodes, with a remark on coarse facets.
 void remark_doubt(const mesh::TetMesh& mesh, SurfaceReport& report);
 
 }  // namespace carillon::mesher

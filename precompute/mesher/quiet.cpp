@@ -1,4 +1,4 @@
-// Silence for CGAL: its handlers, and the streams of standard error that it also writes to.
+// Silences CGAL: its handlers, and the standard error streams it writes to.
 #include "precompute/mesher/quiet.hpp"
 
 #include <CGAL/assertions.h>
@@ -11,7 +11,7 @@ namespace {
 
 void say_nothing(const char*, const char*, const char*, int, const char*) {}
 
-/// Takes every character and keeps none.
+/// Discards all characters.
 class Nowhere final : public std::streambuf {
   int overflow(int c) override { return c == traits_type::eof() ? 0 : c; }
 };

@@ -1,11 +1,11 @@
-// Keeps libraries from talking past the program.
+// Suppresses library output.
 #pragma once
 
 #include <memory>
 
 namespace carillon::mesher {
 
-/// While it lives, CGAL's warnings and what is written to std::cerr and std::clog go nowhere; CGAL's errors still throw. One at a time.
+/// During its lifetime, CGAL warnings and output to std::cerr and std::clog are discarded; CGAL errors still throw. One at a time.
 class Quiet {
  public:
   Quiet();

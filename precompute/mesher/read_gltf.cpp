@@ -1,6 +1,6 @@
-// Method:     The triangles of all meshes of the scene, transformed by their nodes; skins, morph targets and animations are refused.
-// Source:     glTF 2.0 specification, Khronos 2021 (ISO/IEC 12113:2022): chapters 3.5 and 3.7 (nodes, meshes).
-// Deviations: materials, textures, lights and cameras are ignored.
+// Method: triangles of all meshes of the scene, transformed by their nodes; skins, morph targets and animations are refused; materials,
+//   textures, lights and cameras ignored.
+// Source: glTF 2.0 specification, Khronos 2021 (ISO/IEC 12113:2022): chapters 3.5 and 3.7 (nodes, meshes).
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -47,13 +47,13 @@ class Gltf {
   }
 
  private:
-  /// The indices of a list that is one of nodes.
+  /// Indices of a list of nodes.
   std::vector<std::size_t> list_nodes(base::Object& object, const char* key) {
     std::vector<std::size_t> list;
     if (!object.has(key)) return list;
     for (const double number : object.number_list(key, 10'000'000)) {
       if (!(number >= 0 && number < static_cast<double>(nodes_.size()) && number == std::floor(number)))
-        object.fail(key, fmt::format("{:g} is no node; there are {}", number, nodes_.size()));
+        object.fail(key, fmt::format("{:g} is not a node; there are {}", number, nodes_.size()));
       list.push_back(static_cast<std::size_t>(number));
     }
     return list;
@@ -108,7 +108,7 @@ class Gltf {
     if (primitive.has("indices")) indices = file_.read(primitive, "indices", "SCALAR", gltf::kIndexTypes);
     const std::size_t corners = indices ? indices->count() : points;
     if (kind == 0 && corners % 3 != 0)
-      primitive.fail("", fmt::format("mesh {} has {} corners, which are no whole number of triangles; export it again", m, corners));
+      primitive.fail("", fmt::format("mesh {} has {} corners, which is not a multiple of three; export it again", m, corners));
     if (corners / (kind == 0 ? 3 : 1) + std::ssize(soup_.counts) > kMaxTriangles) refuse_size();
     const auto get = [&](std::size_t i) {
       const std::size_t index = indices ? indices->get(i, 0) : static_cast<double>(i);

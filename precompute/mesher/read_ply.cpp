@@ -1,8 +1,7 @@
-// Method: the header says which elements follow, in which order, and what each is made of; all of it is walked through, and of it the x, y
-//   and z of the vertices and the corners of the faces are kept. Every count is compared with the bytes that are left before anything is
-//   taken for it.
+// Method: the header defines the elements and their properties; all are parsed, and x, y, z of the vertices and the corners of the faces
+//   are kept. Every count is compared with the remaining bytes before allocation. Triangle strips are refused; other elements and
+//   properties are skipped.
 // Source: G. Turk, "The PLY Polygon File Format", Stanford University, 1994.
-// Deviations: triangle strips are refused; other elements and properties are stepped over.
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -77,7 +76,7 @@ class PlyReader {
   std::vector<Element> elements_;
   Encoding encoding_ = Encoding::kText;
   std::int64_t vertices_ = 0;
-  std::size_t at_ = 0;  // of the binary part
+  std::size_t at_ = 0;  // in the binary part
   PolygonSoup soup_;
 };
 
@@ -91,7 +90,7 @@ const Type& PlyReader::find_type(std::string_view word) const {
 void PlyReader::read_element_line() {
   const auto count = words_.size() == 3 ? read_whole(words_[2]) : std::nullopt;
   if (!count) text_.refuse("an element needs a name and a count; export the surface again");
-  // The least that one of them takes is a byte.
+  // Each takes at least one byte.
   if (*count < 0 || *count > static_cast<std::int64_t>(bytes_.size()))
     text_.refuse("the header promises {} {}, but the file has only {} bytes; it is cut off or damaged, export it again", *count,
                  quote_excerpt(words_[1]), bytes_.size());

@@ -1,7 +1,6 @@
-// Method: a file is binary if its size fits its count, or if it does not begin with "solid", or if its first bytes hold a zero. Triangles
-//   in the order of the file; their points are joined later, where they are equal.
+// Method: a file is binary if its size fits its count, if it does not begin with "solid", or if its first bytes contain a zero. Triangles
+//   in file order; equal points are joined later. Normals and attribute bytes are ignored.
 // Source: 3D Systems, "StereoLithography Interface Specification", 1989.
-// Deviations: the normals and the attribute bytes are not used.
 #include <array>
 #include <bit>
 #include <cmath>

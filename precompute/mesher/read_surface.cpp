@@ -1,5 +1,5 @@
-// Reads a surface: picks the reader by the ending of the name and cuts what it found into triangles. The readers are our own
-// (surface_text.cpp, read_ply.cpp, read_stl.cpp, read_gltf.cpp), since files are untrusted.
+// Reads a surface: chooses the reader by file extension and triangulates polygons. Files are untrusted, hence own readers
+// (surface_text.cpp, read_ply.cpp, read_stl.cpp, read_gltf.cpp).
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -16,7 +16,7 @@
 namespace carillon::mesher {
 namespace {
 
-/// No surface that could be meshed here is larger: kMaxTriangles as text with normals, colours and textures.
+/// Upper limit of the file size: kMaxTriangles as text with normals, colours and textures.
 constexpr std::uint64_t kMaxBytes = 4ULL << 30;
 
 /// "obj", "stl", "ply", "off", "gltf" or "glb".
@@ -31,15 +31,15 @@ std::string find_format(const std::filesystem::path& path) {
 
 using Polygon = std::vector<std::size_t>;
 
-/// Newell's normal of a polygon, not normalised.
+/// Newell normal of a polygon, not normalised.
 Vec3 calc_normal(const std::vector<Vec3>& points, const Polygon& polygon) {
   Vec3 sum{};
   for (std::size_t c = 0; c < polygon.size(); ++c) sum = sum + cross(points[polygon[c]], points[polygon[(c + 1) % polygon.size()]]);
   return sum;
 }
 
-/// Cuts a polygon into triangles, ear by ear: first the corner that is convex, holds no other corner, and is least acute.
-/// `work` counts the looks at corners; past a bound, what is left of polygons becomes fans, so that no file takes minutes.
+/// Triangulates a polygon by ear clipping: first the convex corner that contains no other corner and is least acute. `work` counts corner
+/// visits; beyond a limit polygons become fans, which bounds the time.
 void add_polygon(const std::vector<Vec3>& points, Polygon polygon, std::vector<Triangle>& triangles, double& work) {
   constexpr std::size_t kMaxCornersCutByEars = 1000;
   constexpr double kMaxWork = 3e9;
@@ -65,7 +65,7 @@ void add_polygon(const std::vector<Vec3>& points, Polygon polygon, std::vector<T
       const double quality = ear && ab > 0 && bc > 0 ? dot(points[b] - points[a], points[c] - points[b]) / (ab * bc) : -2;
       if (ear && -std::abs(quality) > best_quality) best = i, best_quality = -std::abs(quality);
     }
-    if (best == n) break;  // degenerate or crossing itself: the rest becomes a fan
+    if (best == n) break;  // degenerate or self-crossing: the rest becomes a fan
     triangles.push_back({static_cast<std::int32_t>(polygon[(best + n - 1) % n]), static_cast<std::int32_t>(polygon[best]),
                          static_cast<std::int32_t>(polygon[(best + 1) % n])});
     polygon.erase(polygon.begin() + static_cast<std::ptrdiff_t>(best));
@@ -79,7 +79,7 @@ void add_polygon(const std::vector<Vec3>& points, Polygon polygon, std::vector<T
 
 TriangleSurface parse_surface(std::string_view bytes, const std::string& name, const std::string& format) {
   if (format != "stl" || bytes.starts_with("\xFF\xFE")) base::refuse_utf16(bytes, name);  // a binary STL file may begin with any bytes
-  if (bytes.starts_with("\xEF\xBB\xBF")) bytes.remove_prefix(3);                          // a byte-order mark of UTF-8
+  if (bytes.starts_with("\xEF\xBB\xBF")) bytes.remove_prefix(3);                          // UTF-8 byte-order mark
   PolygonSoup soup = format == "obj"    ? parse_obj(bytes, name)
                      : format == "off"  ? parse_off(bytes, name)
                      : format == "ply"  ? parse_ply(bytes, name)

@@ -1,9 +1,7 @@
-// Method: edges are split where they are longer than 4/3 of the wanted length and collapsed where shorter than 4/5; edges are flipped
-//   towards six triangles at a point; points are moved within the tangent plane to the middle of their neighbours and put back on the
-//   surface; in the end edges are flipped until every pair of triangles is Delaunay. The wanted length follows the curvature of the
-//   triangles themselves, blind to details smaller than they are, and changes slowly.
-// Source: Botsch and Kobbelt, "A remeshing approach to multiresolution modeling", SGP 2004.
-// Deviations: theirs has one length; points on folds move along them, and a collapse may not turn a triangle.
+// Method: edges longer than 4/3 of the target are split, shorter than 4/5 collapsed (unless a triangle would flip); flips towards valence
+//   six; tangential smoothing with projection onto the surface, along folds for fold points; final Delaunay flips. The target length
+//   follows the curvature at the triangle scale, ignoring finer detail, and is graded.
+// Source: Botsch and Kobbelt, "A remeshing approach to multiresolution modeling", SGP 2004 (uniform length).
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -15,10 +13,10 @@
 namespace carillon::mesher {
 namespace {
 
-constexpr double kLong = 4.0 / 3, kShort = 4.0 / 5;
+constexpr double kSplitLengthRatio = 4.0 / 3, kCollapseLengthRatio = 4.0 / 5;
 constexpr int kSweeps = 8;
-constexpr double kGrowth = 0.4;                      // of the wanted length, per length
-constexpr double kFlatFold = 0.98, kPerMitre = 1.3;  // cosine of a fold without a mitre; edges over the width of their mitre
+constexpr double kGrowth = 0.4;                            // of the target length, per length
+constexpr double kMinMitreCosine = 0.98, kPerMitre = 1.3;  // cosine of a fold without a mitre; edges over the width of their mitre
 
 /// Lengthens edges at folds to the width of their mitres.
 void widen_folds(const Skin& now, const SkinSizes& sizes, std::vector<double>& size) {
@@ -36,7 +34,7 @@ void widen_folds(const Skin& now, const SkinSizes& sizes, std::vector<double>& s
       if (fresh) continue;
       const double cosine = std::clamp(dot(normal, found->second), -0.99, 1.0);
       const double takes = sizes.reach_m * std::sqrt((1 - cosine) / (1 + cosine)) + sizes.margin_m;
-      if (cosine > kFlatFold) continue;
+      if (cosine > kMinMitreCosine) continue;
       for (const std::int32_t v : {a, b}) least[v] = std::max(least[v], kPerMitre * takes);
     }
   for (int sweep = 0; sweep < 3; ++sweep)
@@ -51,7 +49,7 @@ void widen_folds(const Skin& now, const SkinSizes& sizes, std::vector<double>& s
   for (std::size_t v = 0; v < size.size(); ++v) size[v] = std::max(size[v], least[v]);
 }
 
-/// Wanted length of the edges at each point, by the curvature of the triangles.
+/// Target edge length at each point, by the curvature of the triangles.
 std::vector<double> find_sizes(const Skin& now, const SkinSizes& sizes) {
   const auto normals = find_skin_normals(now);
   std::vector<double> bend(now.surface.points.size(), 0), weight(bend.size(), 0);
@@ -65,7 +63,7 @@ std::vector<double> find_sizes(const Skin& now, const SkinSizes& sizes) {
       bend[a] = std::max(bend[a], curvature);
       bend[b] = std::max(bend[b], curvature);
     }
-  // Curvature of a single point is noise.
+  // Curvature at a single point is noise.
   std::vector<double> mean(bend.size(), 0);
   for (const Triangle& t : now.surface.triangles)
     for (int c = 0; c < 3; ++c) {
@@ -89,7 +87,7 @@ std::vector<double> find_sizes(const Skin& now, const SkinSizes& sizes) {
   return size;
 }
 
-/// Edges longer (sign 1) or shorter (sign -1) than `limit` of their wanted length; the longest or shortest first.
+/// Edges longer (sign 1) or shorter (sign -1) than `limit` times their target; longest or shortest first.
 std::vector<std::pair<double, Edge>> list_outside(const SkinEditor& skin, double limit, int sign) {
   std::vector<std::pair<double, Edge>> edges;
   for (const Edge& e : skin.list_edges())
@@ -101,9 +99,9 @@ std::vector<std::pair<double, Edge>> list_outside(const SkinEditor& skin, double
 void split_long(SkinEditor& skin) {
   const auto& x = skin.get_points();
   for (int round = 0; round < 12; ++round) {
-    const auto edges = list_outside(skin, kLong, 1);
+    const auto edges = list_outside(skin, kSplitLengthRatio, 1);
     if (edges.empty()) return;
-    // One edge of a triangle a round, the longest, keeps their shapes.
+    // One edge per triangle and round, the longest, keeps the shapes.
     std::vector<char> busy(skin.count_triangles(), 0);
     for (const auto& [order, e] : edges) {
       std::array<std::int32_t, 2> faces{};
@@ -121,13 +119,14 @@ void split_long(SkinEditor& skin) {
 void collapse_short(SkinEditor& skin) {
   const auto& x = skin.get_points();
   for (int round = 0; round < 6; ++round) {
-    const auto edges = list_outside(skin, kShort, -1);
+    const auto edges = list_outside(skin, kCollapseLengthRatio, -1);
     std::size_t done = 0;
     for (const auto& [order, e] : edges) {
       if (skin.get_star(e[0]).empty() || skin.get_star(e[1]).empty()) continue;
       std::array<std::int32_t, 2> faces{};
       if (skin.find_faces(e[0], e[1], faces) == 0) continue;
-      if (norm(x[e[1]] - x[e[0]]) < kShort * skin.calc_wanted(e[0], e[1])) done += skin.collapse(e[0], e[1], kLong);
+      if (norm(x[e[1]] - x[e[0]]) < kCollapseLengthRatio * skin.calc_wanted(e[0], e[1]))
+        done += skin.collapse(e[0], e[1], kSplitLengthRatio);
     }
     if (done == 0) return;
   }
@@ -189,7 +188,7 @@ void relax(SkinEditor& skin) {
               ends[1] = w;
           }
       if (ends[1] < 0) continue;
-      // Even in parts of the wanted lengths.
+      // Equal parts in target lengths.
       const double wa = 1 / skin.calc_wanted(v, ends[0]), wb = 1 / skin.calc_wanted(v, ends[1]);
       const double la = norm(x[ends[0]] - x[v]), lb = norm(x[ends[1]] - x[v]);
       const double off = 0.5 * (lb * wb - la * wa) / std::max(wa, wb);  // towards ends[1]

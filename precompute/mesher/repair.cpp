@@ -1,6 +1,5 @@
-// Method: least-area hole filling and alpha wrapping.
-// Source: Liepa, "Filling holes in meshes", SGP 2003; Portaneri et al., "Alpha wrapping with an offset", ACM TOG 41(4), 2022;
-//   both as CGAL 5.5 has them.
+// Method: least-area hole filling and alpha wrapping, both from CGAL 5.5.
+// Source: Liepa, "Filling holes in meshes", SGP 2003; Portaneri et al., "Alpha wrapping with an offset", ACM TOG 41(4), 2022.
 #include "precompute/mesher/repair.hpp"
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
@@ -41,7 +40,7 @@ std::vector<std::vector<std::size_t>> make_polygons(const std::vector<Triangle>&
 std::vector<Triangle> fill_polygon(const Polyline& polygon) {
   if (polygon.size() < 3) return {};
   if (polygon.size() == 3) return {{0, 1, 2}};
-  // The time grows with the cube of the corners where the Delaunay triangulation offers no filling.
+  // Cubic time in the corners where the Delaunay triangulation has no filling.
   constexpr std::size_t kMaxCorners = 1500;
   if (polygon.size() > kMaxCorners) return {};
   struct Face {
@@ -52,7 +51,7 @@ std::vector<Triangle> fill_polygon(const Polyline& polygon) {
   try {
     PMP::triangulate_hole_polyline(make_points(polygon), std::back_inserter(faces));
   } catch (const std::exception&) {
-    return {};  // CGAL's preconditions on degenerate polygons; the caller has another way
+    return {};  // CGAL's preconditions on degenerate polygons; the caller has a fallback
   }
   std::vector<Triangle> out;
   for (const Face& f : faces) out.push_back({f.a, f.b, f.c});
@@ -66,7 +65,7 @@ bool is_clean(const TriangleSurface& surface) {
   PMP::polygon_soup_to_polygon_mesh(make_points(surface.points), polygons, mesh);
   for (const auto face : faces(mesh))
     if (PMP::is_degenerate_triangle_face(face, mesh)) return false;
-  // The nesting is looked at by ourselves: CGAL's own test crashes on surfaces of very different lengths.
+  // Own nesting test: CGAL's crashes on surfaces of very different lengths.
   return CGAL::is_closed(mesh) && !PMP::does_self_intersect(mesh) && is_nested(surface);
 }
 

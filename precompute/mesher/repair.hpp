@@ -1,4 +1,4 @@
-// The repairs of a triangle surface that CGAL does for us; std only, CGAL stays in repair.cpp.
+// Repairs of a triangle surface by CGAL; std only, CGAL is confined to repair.cpp.
 #pragma once
 
 #include <array>
@@ -10,17 +10,17 @@
 
 namespace carillon::mesher {
 
-/// Triangles of least area over a closed polygon, as indices into it, in the polygon's own sense of rotation. Empty if there are none
-/// or the polygon has more than 1500 corners.
+/// Least-area triangulation of a closed polygon, as indices into it, in the polygon's orientation. Empty if there is none, or above 1500
+/// corners.
 std::vector<Triangle> fill_polygon(const Polyline& polygon);
 
-/// True if the surface is a 2-manifold, encloses a volume and no two of its triangles intersect.
+/// True for a 2-manifold without intersecting triangles that encloses a volume.
 bool is_clean(const TriangleSurface& surface);
 
-/// Of a surface that is a manifold (else twice the first): the first two triangles that intersect, but in corners they share; or nothing.
+/// First two triangles that intersect other than in common corners; empty if none; twice the first if not a manifold.
 std::optional<std::array<std::int32_t, 2>> find_crossing(const TriangleSurface& surface);
 
-/// A closed manifold at the distance `offset_m` around a heap of triangles, which enters no gap narrower than `alpha_m`.
+/// Closed manifold at distance `offset_m` around a triangle soup that enters no gap narrower than `alpha_m`.
 TriangleSurface wrap(const TriangleSurface& surface, double alpha_m, double offset_m);
 
 }  // namespace carillon::mesher

@@ -1,6 +1,5 @@
-// Method: points at one place are joined; each patch is oriented across its edges; the boundary of the triangles, taken with
-//   their signs, is a set of loops, and each small enough loop is filled. A heap that this does not close is wrapped.
-// Source: the boundary of a chain is a cycle (any text on simplicial homology).
+// Method: coincident points are joined; each patch is oriented across its edges; the signed boundary of the triangles is a set of loops
+//   (the boundary of a chain is a cycle), and each small enough loop is filled. If the surface is still open, it is wrapped.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -21,15 +20,15 @@
 namespace carillon::mesher {
 namespace {
 
-// A hole counts as the diameter of a circle of the area of the triangles over it, in parts of the body's diagonal: cracks of no width are
-// no holes. Raw scans of the kind of the Stanford bunny leave up to 0.11 open where the object stood; the mouth of a cup is 0.3 and more.
+// Hole size: diameter of a circle with the area of the filling triangles, relative to the body diagonal; zero-width cracks are no holes.
+// Raw scans like the Stanford bunny have open bases of up to 0.11; the mouth of a cup is 0.3 and more.
 constexpr double kLargestHole = 0.15;
-constexpr double kSmallestOpening = 0.02;      // of the diagonal, as kLargestHole
-constexpr double kOpeningTurn = 60;            // degrees, between what would fill it and the surface around it
-constexpr double kLargestHolesTogether = 0.3;  // of the closed surface's area
+constexpr double kSmallestOpening = 0.02;      // over the diagonal, as kLargestHole
+constexpr double kOpeningTurn = 60;            // degrees, between the fill and the surrounding surface
+constexpr double kLargestHolesTogether = 0.3;  // over the area of the closed surface
 constexpr std::size_t kMaxComponentsNested = 2000;
 
-/// The faces at each undirected edge; +f+1 where the face runs along it upward (low to high index), -f-1 downward.
+/// Faces at each undirected edge; +f+1 where the face traverses it upward (low to high index), -f-1 downward.
 using EdgeFaces = std::unordered_map<Edge, std::vector<std::int32_t>, EdgeHash>;
 EdgeFaces find_edge_faces(const std::vector<Triangle>& triangles) {
   EdgeFaces faces;
@@ -42,7 +41,7 @@ EdgeFaces find_edge_faces(const std::vector<Triangle>& triangles) {
   return faces;
 }
 
-/// Groups of faces joined by edges that have exactly two faces; with `any_edge` by all edges.
+/// Groups of faces joined by edges with exactly two faces; with `any_edge` by all edges.
 std::vector<std::int32_t> find_patches(const EdgeFaces& edges, std::size_t face_count, bool any_edge, std::int32_t& count) {
   mesh::Parts parts(face_count);
   for (const auto& [edge, faces] : edges) {
@@ -58,11 +57,11 @@ std::vector<std::int32_t> find_patches(const EdgeFaces& edges, std::size_t face_
   return patch;
 }
 
-/// Drops triangles with a repeated corner, and of those with the same three corners all but the first; with `cancel` those that face
-/// opposite ways go in pairs first (two sides of a fold). Returns how many went.
+/// Drops triangles with a repeated corner, and duplicates of the same three corners; with `cancel` pairs of opposite orientation first (two
+/// sides of a fold). Returns the number dropped.
 std::int64_t drop_useless(std::vector<Triangle>& triangles, bool cancel) {
   const auto calc_key = [](Triangle t, int& turn) {
-    turn = 1;  // the parity of the permutation that sorts the corners: which way the triangle faces
+    turn = 1;  // parity of the permutation that sorts the corners: orientation
     for (const auto& [i, j] : {std::pair{0, 1}, std::pair{1, 2}, std::pair{0, 1}})
       if (t[i] > t[j]) std::swap(t[i], t[j]), turn = -turn;
     return t;
@@ -83,7 +82,7 @@ std::int64_t drop_useless(std::vector<Triangle>& triangles, bool cancel) {
   return static_cast<std::int64_t>(std::erase_if(triangles, useless));
 }
 
-/// Makes neighbours agree across every edge with two faces, by the fewest flips per patch. Returns how many were flipped.
+/// Makes neighbours consistent across every edge with two faces, with the fewest flips per patch. Returns the number of flips.
 std::int64_t orient_patches(std::vector<Triangle>& triangles) {
   const EdgeFaces edges = find_edge_faces(triangles);
   std::vector<std::int8_t> flip(triangles.size(), -1);
@@ -107,18 +106,18 @@ std::int64_t orient_patches(std::vector<Triangle>& triangles) {
         patch.push_back(other);
       }
     }
-    const int turn = 2 * turned > patch.size() ? 0 : 1;  // the majority stays as it is
+    const int turn = 2 * turned > patch.size() ? 0 : 1;  // keep the majority
     for (const std::int32_t f : patch)
       if (flip[f] == turn) std::swap(triangles[f][1], triangles[f][2]), ++flipped;
   }
   return flipped;
 }
 
-/// The boundary of the triangles with their signs, as loops that run so that a triangle over one of them closes it.
-/// Empty if the surface is closed. `whole` is false where an edge is left more than once over, which no simple fill repairs.
+/// Signed boundary of the triangles as loops, oriented so that a fill closes them. Empty if closed. `whole` is false if an edge remains
+/// more than once, which simple fills cannot repair.
 std::vector<std::vector<std::int32_t>> find_loops(const std::vector<Triangle>& triangles, bool& whole) {
   whole = true;
-  std::map<std::int32_t, std::vector<std::int32_t>> next;  // ordered, so that the loops come in a fixed order
+  std::map<std::int32_t, std::vector<std::int32_t>> next;  // ordered: deterministic loops
   for (const auto& [edge, faces] : find_edge_faces(triangles)) {
     int net = 0;
     for (const std::int32_t f : faces) net += f > 0 ? 1 : -1;
@@ -134,7 +133,7 @@ std::vector<std::vector<std::int32_t>> find_loops(const std::vector<Triangle>& t
   std::vector<std::vector<std::int32_t>> loops;
   for (auto& [start, ends] : next)
     while (!ends.empty()) {
-      // Walk until a vertex comes back; what lies between is a loop, the walk continues from there.
+      // Walk until a vertex repeats; the part in between is a loop.
       std::vector<std::int32_t> walk{start};
       std::unordered_map<std::int32_t, std::size_t> place{{start, 0}};
       while (!next[walk.back()].empty()) {
@@ -155,14 +154,14 @@ std::vector<std::vector<std::int32_t>> find_loops(const std::vector<Triangle>& t
   return loops;
 }
 
-/// The holes of a surface: how many, the sum of their areas, and the largest of them.
+/// Holes of a surface: number, total area and largest.
 struct Holes {
   std::int64_t count = 0;
-  double area_m2 = 0, surface_m2 = 0;                             // of all of them, and of the surface without them
-  double largest_m2 = 0, largest_across_m = 0, largest_part = 0;  // part: of the diagonal, as kLargestHole
+  double area_m2 = 0, surface_m2 = 0;                             // of all holes, and of the surface without them
+  double largest_m2 = 0, largest_across_m = 0, largest_part = 0;  // part: over the diagonal, as kLargestHole
 };
 
-/// The largest distance of two points; of many points, twice that of the farthest from their middle.
+/// Largest distance of two points; for many points, twice the largest distance from the centroid.
 double calc_across(const Polyline& polygon) {
   constexpr std::size_t kMaxCompared = 1000;
   double farthest = 0;
@@ -177,16 +176,16 @@ double calc_across(const Polyline& polygon) {
   return farthest;
 }
 
-/// The triangles of a polygon's points that fill it.
+/// Triangles that fill a polygon.
 std::vector<Triangle> fill_loop(const Polyline& polygon) {
   std::vector<Triangle> fill = fill_polygon(polygon);
-  if (fill.empty())  // a crack of zero width: any triangles between its sides will do
+  if (fill.empty())  // zero-width crack: any triangulation
     for (std::int32_t c = 1; c + 1 < static_cast<std::int32_t>(polygon.size()); ++c) fill.push_back({0, c, c + 1});
   return fill;
 }
 
-/// Whether one of the loops is an opening of a vessel or a tube rather than a hole: what would fill it is large enough, and turns away from
-/// the surface around it, in the mean along its border.
+/// True if a loop is the opening of a vessel or tube rather than a hole: its fill is large enough, and turns away from the surrounding
+/// surface on average along the border.
 bool has_opening(const TriangleSurface& surface, const std::vector<std::vector<std::int32_t>>& loops) {
   const double diagonal = calc_box(surface.points).diagonal();
   const auto calc_area_vector = [](const std::vector<Vec3>& points, const Triangle& t) {
@@ -217,8 +216,7 @@ bool has_opening(const TriangleSurface& surface, const std::vector<std::vector<s
   });
 }
 
-/// Fills every loop. False, and nothing changed, if one is larger than `close_holes` (in parts of the diagonal; without it as far as
-/// kLargestHole and kLargestHolesTogether go).
+/// Fills every loop. False without change if one exceeds `close_holes` (over the diagonal; default kLargestHole and kLargestHolesTogether).
 bool fill_loops(TriangleSurface& surface, const std::vector<std::vector<std::int32_t>>& loops, const std::optional<double>& close_holes,
                 Holes& holes) {
   const double diagonal = calc_box(surface.points).diagonal();
@@ -227,7 +225,7 @@ bool fill_loops(TriangleSurface& surface, const std::vector<std::vector<std::int
   for (const auto& loop : loops) {
     Polyline polygon;
     for (const std::int32_t v : loop) polygon.push_back(surface.points[v]);
-    if (loop.size() == 2) continue;  // an edge there and back closes itself
+    if (loop.size() == 2) continue;  // an edge and its reverse
     const std::vector<Triangle> fill = fill_loop(polygon);
     const double area = calc_area({polygon, fill});
     ++holes.count;
@@ -245,14 +243,14 @@ bool fill_loops(TriangleSurface& surface, const std::vector<std::vector<std::int
   return true;
 }
 
-/// Turns every outermost component outward, and with it, as the file has them to each other, those inside it.
+/// Orients every outermost component outward, together with its nested components.
 void orient_outward(TriangleSurface& surface, SurfaceReport& report) {
   std::int32_t count = 0;
   const auto patch = find_patches(find_edge_faces(surface.triangles), surface.triangles.size(), true, count);
   std::vector<TriangleSurface> parts(count);
   for (std::size_t f = 0; f < surface.triangles.size(); ++f) parts[patch[f]].triangles.push_back(surface.triangles[f]);
   for (auto& part : parts) {
-    // Keep the parts' own points only, so that a part costs what it has.
+    // Keep only the part's own points to bound the cost.
     std::unordered_map<std::int32_t, std::int32_t> number;
     for (Triangle& t : part.triangles)
       for (std::int32_t& v : t) {
@@ -266,7 +264,7 @@ void orient_outward(TriangleSurface& surface, SurfaceReport& report) {
   for (const auto& part : parts) volume.push_back(calc_volume(part));
   std::vector<bool> flip(parts.size(), false);
   for (std::size_t p = 0; p < parts.size(); ++p) {
-    // The largest part around this one decides; without one it decides for itself.
+    // Orientation follows the largest enclosing part; otherwise its own.
     std::size_t outermost = p;
     if (parts.size() <= kMaxComponentsNested)
       for (std::size_t q = 0; q < parts.size(); ++q)
@@ -278,7 +276,7 @@ void orient_outward(TriangleSurface& surface, SurfaceReport& report) {
     if (flip[patch[f]]) std::swap(surface.triangles[f][1], surface.triangles[f][2]), ++report.flipped_triangles;
 }
 
-/// Closes the surface by joining, orienting and filling. False if that is not enough; `holes` are those it found, if it came so far.
+/// Closes the surface by joining, orienting and filling. False on failure; `holes`: those found.
 bool close_surface(TriangleSurface& surface, double tolerance, bool cancel, const std::optional<double>& close_holes, SurfaceReport& report,
                    Holes& holes) {
   weld(surface, tolerance);
@@ -338,7 +336,7 @@ std::optional<Sheet> find_sheet(const TriangleSurface& surface, const SurfaceOpt
   if (is_closed && (options.close_holes || !has_opening(sheet.surface, loops))) return std::nullopt;
   if (is_closed) closed = sheet.surface;
   sheet.holes = holes.count;
-  // Facing out where it is a vessel; a sheet that is hardly bent stays as it is.
+  // Outward for a vessel; a nearly flat sheet keeps its orientation.
   SurfaceOptions all = options;
   all.close_holes = 1;
   if (fill_loops(closed, loops, all.close_holes, holes)) {
@@ -357,7 +355,7 @@ std::optional<Sheet> find_sheet(const TriangleSurface& surface, const SurfaceOpt
   std::size_t branches = 0;
   for (const auto& [edge, faces] : find_edge_faces(sheet.surface.triangles)) {
     if (faces.size() > 2 && (!branch || edge < *branch)) branch = edge, branches = faces.size();
-    // After all patches were oriented: the last edge of a way around along which the sides change.
+    // After orientation of all patches: an edge of a loop along which the sides swap.
     if (faces.size() == 2 && (faces[0] > 0) == (faces[1] > 0) && (!turn || edge < *turn)) turn = edge;
   }
   if (branch)
@@ -415,7 +413,7 @@ RepairedSurface repair_surface(TriangleSurface surface, const SurfaceOptions& op
                     "a job's body: \"wall_m\")",
                     options.surface.string(), what));
   };
-  // What is missing of a body is at most this part of its skin; a sheet lacks half of it.
+  // Upper limit of a body's missing skin; a sheet lacks half of it.
   constexpr double kSheet = 0.4;
   std::optional<Holes> too_large;
   const double same = kSamePoint * diagonal, near = 1e-6 * diagonal;
@@ -436,28 +434,27 @@ RepairedSurface repair_surface(TriangleSurface surface, const SurfaceOptions& op
                                          describe_hole(report.largest_hole_m, report.largest_hole_part, report.holes_area_part)));
     return {candidate, 0, is_clean(candidate)};
   }
-  // No closed surface in it as it is: wrap it. A wrap that slips inside through an opening is a thin sheet around the
-  // triangles, of hardly any volume within its offset; then only a coarser one can help.
+  // Not closable: wrap it. A wrap that enters an opening is a thin sheet around the triangles with hardly any volume within its offset;
+  // only a coarser one can help.
   weld(surface, same);
   report.removed_triangles = drop_useless(surface.triangles, false);
   report.input_vertices = static_cast<std::int64_t>(surface.points.size());
   if (surface.triangles.empty()) refuse_open("all its triangles are degenerate");
   const double area = calc_area(surface);
   const double offset = diagonal / 1000;
-  // A wrap goes through gaps wider than twice its alpha, and where a coarse one slips inside, finer ones do. It then runs along both sides
-  // of the triangles, which its area shows at a larger offset too, where a wrap takes a third of the time. The finest that does not slip is
-  // made with the small offset.
+  // A wrap enters gaps wider than twice its alpha; where a coarse one enters, finer ones do. It then follows both sides of the triangles,
+  // visible in its area even at a larger offset, which takes a third of the time. The finest closed one is made with the small offset.
   constexpr double kProbeOffset = 0.2;                         // of alpha
-  constexpr double kBothSides = 1.6, kBothSidesOfProbe = 1.7;  // times the area; an offset adds to it around edges
+  constexpr double kBothSides = 1.6, kBothSidesOfProbe = 1.7;  // times the area; an offset adds area around edges
   const auto is_body = [&](const TriangleSurface& wrapped) {
     return calc_volume(wrapped) - offset * calc_area(wrapped) > 3 * offset * area && calc_area(wrapped) <= kBothSides * area;
   };
   constexpr double kCoarsest = 14, kFinest = 50;
   std::vector<double> parts{kCoarsest, 25, kFinest};
   std::erase_if(parts, [&](double part) { return 2 / part > options.close_holes.value_or(kLargestHole); });
-  // What a wrap costs grows with the triangles of its own that cover the surface, and may grow with those of the file: a soup of few
-  // triangles and much area has no detail that is worth a fine wrap. Bodies have an area of one or two squares of their diagonal: above
-  // some 900 triangles they may have the finest wrap, below 200 the coarsest, which bridges gaps of a seventh of the diagonal.
+  // Cost of a wrap grows with its own triangles; the limit grows with those of the file: a soup of few triangles and large area has no
+  // detail that needs a fine wrap. Bodies have an area of one or two squared diagonals: above some 900 triangles they may have the finest
+  // wrap, below 200 the coarsest, which bridges gaps of a seventh of the diagonal.
   const auto count = static_cast<double>(surface.triangles.size());
   const double max_area = std::min(0.2 + 2.5e-3 * count, 1.5 + 1e-3 * count) * diagonal * diagonal;  // for the finest
   std::erase_if(parts, [&](double part) { return part > kCoarsest && part * part * area > kFinest * kFinest * max_area; });

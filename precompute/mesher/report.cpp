@@ -1,4 +1,4 @@
-// The report of the mesher as lines for a person.
+// Report of the mesher as text.
 #include <fmt/core.h>
 
 #include "precompute/mesher/surface.hpp"

@@ -1,13 +1,12 @@
-// Method: a cubic patch over each triangle from its corners and the normals there. Normals are estimated from the facets of one side of the
-//   sharp edges, with weights that are exact on a sphere; at the rim of a smooth part, where half of the facets is missing, the normal is
-//   tilted until the curve to its inner neighbours is an arc. A plane next to a curved part keeps its normal up to the common edge. Edges
-//   get the cubics that are circles where the normals at both ends say so; sharp edges those along the tangent of the circle through their
-//   points. At the tip of a cone the patch is ruled.
-// Source: Vlachos, Peters, Boyd and Mitchell, "Curved PN triangles", I3D 2001, section 3 (the patch); Max, "Weights for computing vertex
-//   normals from facet normals", J. Graphics Tools 4(2), 1999 (the normals); Goldapp, "Approximation of circular arcs by cubic
-//   polynomials", CAGD 8, 1991 (the length of the handles).
-// Deviations: they take normals from the modeller and leave creases open; the creases' own curves close them. Their handles are a third
-//   of the projected chord, which cuts an arc of 22.5 degrees 3 % short of its height.
+// Method: a cubic patch per triangle from its corners and normals. Normals are estimated from the facets on one side of the sharp edges,
+//   with weights that are exact on a sphere; at the rim of a smooth part, where half of the facets is missing, the normal is tilted until
+//   the curves to its inner neighbours are arcs. A plane next to a curved part keeps its normal up to the common edge. Edge cubics
+//   approximate circles if the end normals are consistent with one (handles of a third of the projected chord would lose 3 % of the height
+//   of an arc of 22.5 degrees); sharp edges follow the tangents of circles through their points, which closes creases. At a cone tip the
+//   patch is ruled.
+// Source: Vlachos, Peters, Boyd and Mitchell, "Curved PN triangles", I3D 2001, section 3 (patch); Max, "Weights for computing vertex
+//   normals from facet normals", J. Graphics Tools 4(2), 1999 (normals); Goldapp, "Approximation of circular arcs by cubic polynomials",
+//   CAGD 8, 1991 (length of the handles).
 #include "precompute/mesher/round_surface.hpp"
 
 #include <algorithm>
@@ -23,11 +22,11 @@
 namespace carillon::mesher {
 namespace {
 
-constexpr double kMaxBulge = 0.15;     // of an edge's length; more is no estimate of a smooth surface
-constexpr double kDefaultPart = 0.95;  // of the edges that bulge at all
-constexpr double kSameNormal = 3e-3;   // radians
-constexpr double kMaxRimTilt = 0.35;   // of the normal at a rim, radians
-constexpr double kOnSide = 1e-8;       // barycentric
+constexpr double kMaxBulge = 0.15;              // over the edge length; larger bulges are not a smooth surface
+constexpr double kDefaultPart = 0.95;           // percentile of the bulging edges
+constexpr double kMaxNormalAngleRad = 3e-3;     // radians
+constexpr double kMaxRimTilt = 0.35;            // of the normal at a rim, radians
+constexpr double kBarycentricTolerance = 1e-8;  // barycentric
 constexpr int kMaxPieces = 16;
 
 using Weights = std::array<double, 3>;  // barycentric
@@ -53,10 +52,10 @@ struct RoundSurface::Patches {
     return 3 * f + (t[0] == v ? 0 : t[1] == v ? 1 : 2);
   }
 
-  /// One normal for all corners at a point that hang together by edges which are not sharp.
+  /// One normal for all corners at a point connected by edges that are not sharp.
   void find_corner_normals() {
     mesh::Parts parts(corner.size());
-    std::vector<char> rules(corner.size(), 0), yields(corner.size(), 0);  // its face keeps its normal at this point, or yields
+    std::vector<char> rules(corner.size(), 0), yields(corner.size(), 0);  // face keeps its normal at this point, or yields
     for (const Bend& edge : bends.edges) {
       if (edge.sharp) continue;
       for (const std::int32_t v : edge.ends) {
@@ -88,13 +87,12 @@ struct RoundSurface::Patches {
     tilt_rims(root);
   }
 
-  /// Where a smooth part ends, the facets of one side alone lean to that side: the normal is turned about the rim until it and that of the
-  /// inner neighbours are those of an arc over the edge between them. Where the part is one strip without an inner point, it is taken for
-  /// straight across.
+  /// At the end of a smooth part the facets on one side bias the normal: it is rotated about the rim until it and the inner neighbours'
+  /// normals fit an arc over the common edge. A single strip without inner points is taken as straight across.
   void tilt_rims(const std::vector<std::int32_t>& root) {
     struct Rim {
       std::vector<Vec3> along;                        // from the point, on the sharp edges
-      std::vector<std::pair<Vec3, Vec3>> in, across;  // to points inside, to other rims: way, normal there
+      std::vector<std::pair<Vec3, Vec3>> in, across;  // to inner points, to other rims: direction, normal there
     };
     std::map<std::int32_t, Rim> rims;  // by root
     std::vector<char> on_rim(surface.points.size(), 0);
@@ -125,7 +123,7 @@ struct RoundSurface::Patches {
       for (const auto& [way, other] : rim.in.empty() ? rim.across : rim.in) {
         const Vec3 unit = calc_unit(way);
         const double reach = dot(unit, sideways);
-        // How far the way falls below the tangent plane, against an arc, or a part that bends along the rim alone.
+        // Drop below the tangent plane, relative to an arc, or a part that bends along the rim only.
         const double arc =
             rim.in.empty() ? dot(unit, along) * std::tan(0.5 * std::atan2(dot(other, along), dot(other, normal))) : dot(other, unit);
         gap += (dot(normal, unit) + arc) * reach;
@@ -149,22 +147,21 @@ struct RoundSurface::Patches {
         tip[v] = is_tip(surface, bends, static_cast<std::int32_t>(v), corner[bends.corners_at[v][0]]) ? 1 : 0;
   }
 
-  /// True for the line in which two flat faces meet.
+  /// True for the intersection line of two flat faces.
   bool is_straight(const Bend& edge) const {
     for (int side = 0; side < 2; ++side)
       for (const std::int32_t v : edge.ends)
-        if (norm(corner[get_corner(edge.faces[side], v)] - bends.normals[edge.faces[side]]) > kSameNormal) return false;
+        if (norm(corner[get_corner(edge.faces[side], v)] - bends.normals[edge.faces[side]]) > kMaxNormalAngleRad) return false;
     return true;
   }
 
   void find_edge_curves(double sharp_angle_deg) {
-    std::map<std::int32_t, std::vector<std::int32_t>> along;  // edges: the sharp ones at each point
+    std::map<std::int32_t, std::vector<std::int32_t>> along;  // sharp edges at each point
     for (std::size_t e = 0; e < bends.edges.size(); ++e)
       if (bends.edges[e].sharp)
         for (const std::int32_t v : bends.edges[e].ends) along[v].push_back(static_cast<std::int32_t>(e));
     const auto is_line = [&](const Bend& edge) { return edge.count == 2 && is_straight(edge); };
-    // The tangent at point v of the sharp curve that continues along `edge`: that of the circle through three points. Zero where it ends or
-    // bends.
+    // Tangent at point v of the sharp curve that continues along `edge`: of the circle through three points. Zero at ends and corners.
     const auto calc_tangent = [&](std::int32_t v, std::int32_t e) {
       const auto& others = along.at(v);
       if (others.size() != 2) return Vec3{};
@@ -177,7 +174,7 @@ struct RoundSurface::Patches {
     for (std::size_t e = 0; e < bends.edges.size(); ++e) {
       const Bend& edge = bends.edges[e];
       const Vec3 &a = at(edge.ends[0]), &b = at(edge.ends[1]), chord = b - a;
-      std::array<Vec3, 2> step{chord, chord};  // three times the way to the control points
+      std::array<Vec3, 2> step{chord, chord};  // three times the vector to the control points
       const auto mirror = [&](int side) {      // bends at this end as at the other
         step[side] = (2 * dot(step[1 - side], chord) / dot(chord, chord)) * chord - step[1 - side];
       };
@@ -185,7 +182,7 @@ struct RoundSurface::Patches {
         if (!is_line(edge)) {
           const auto number = static_cast<std::int32_t>(e);
           const std::array<Vec3, 2> tangent{calc_tangent(edge.ends[0], number), -1.0 * calc_tangent(edge.ends[1], number)};
-          for (int side = 0; side < 2; ++side)  // as long as those of a circle
+          for (int side = 0; side < 2; ++side)  // length as for a circle
             if (norm(tangent[side]) > 0)
               step[side] = (2 * dot(chord, chord) / (norm(chord) + std::abs(dot(tangent[side], chord)))) * tangent[side];
           for (int side = 0; side < 2; ++side)
@@ -253,7 +250,7 @@ struct RoundSurface::Patches {
   const TriangleSurface& surface;
   Bends bends;
   std::vector<Vec3> corner;                  // (T, 3) normal of the smooth surface
-  std::vector<std::array<Vec3, 2>> control;  // of the edges' cubics: near the lower and near the higher end
+  std::vector<std::array<Vec3, 2>> control;  // edge cubics: near the lower and the higher end
   std::vector<char> tip;                     // (P) of a cone
 };
 
@@ -283,7 +280,7 @@ double RoundSurface::get_largest_bulge() const {
 
 double RoundSurface::get_usual_bulge() const {
   const double largest = get_largest_bulge();
-  std::vector<double> bulges;  // of the edges that bulge at all: a few bulging ones on a large box count too
+  std::vector<double> bulges;  // bulging edges only: a few on a large box count too
   for (std::size_t e = 0; e < patches_->control.size(); ++e) {
     const Bend& edge = patches_->bends.edges[e];
     const double bulge = norm(patches_->calc_on_edge(e, 0.5) - 0.5 * (patches_->at(edge.ends[0]) + patches_->at(edge.ends[1])));
@@ -302,12 +299,12 @@ void RoundSurface::keep_facets() {
 
 double RoundSurface::calc_volume() const {
   if (keeps_facets_) return mesher::calc_volume(*facets_);
-  // Every patch in 64 and in 16 triangles; what either lacks falls as the square of their size.
+  // Patches in 64 and in 16 triangles; the volume error falls with the squared size.
   constexpr int kPieces = 8;
   std::array<double, 2> sum{};
   std::array<std::array<Vec3, kPieces + 1>, kPieces + 1> x;
   const auto calc_cone = [](const Vec3& a, const Vec3& b, const Vec3& c) { return dot(cross(a, b), c) / 6; };
-  const Vec3 origin = facets_->points.front();  // near the body: far from it the differences would lose their digits
+  const Vec3 origin = facets_->points.front();  // local origin: avoids cancellation far from the origin
   for (std::int32_t f = 0; f < static_cast<std::int32_t>(facets_->triangles.size()); ++f) {
     for (int j = 0; j <= kPieces; ++j)
       for (int i = 0; i + j <= kPieces; ++i)
@@ -327,7 +324,7 @@ TriangleSurface RoundSurface::cut(int pieces) {
   pieces = pieces_;
   TriangleSurface out;
   out.points = facets_->points;
-  std::vector<std::int32_t> first_of;  // the first inner point of each edge, from its lower end on
+  std::vector<std::int32_t> first_of;  // first inner point of each edge, from its lower end
   for (std::size_t e = 0; e < patches_->bends.edges.size(); ++e) {
     first_of.push_back(static_cast<std::int32_t>(out.points.size()));
     for (int n = 1; n < pieces; ++n) out.points.push_back(patches_->calc_on_edge(e, static_cast<double>(n) / pieces));
@@ -335,7 +332,7 @@ TriangleSurface RoundSurface::cut(int pieces) {
   std::vector<std::vector<std::int32_t>> row(pieces + 1);
   for (std::size_t f = 0; f < facets_->triangles.size(); ++f) {
     const Triangle& t = facets_->triangles[f];
-    const auto on_edge = [&](int side, int from, int to, int n) {  // the n-th point from corner `from` to corner `to`
+    const auto on_edge = [&](int side, int from, int to, int n) {  // n-th point from corner `from` to corner `to`
       if (n == 0) return t[from];
       if (n == pieces) return t[to];
       return first_of[patches_->bends.edges_of[f][side]] + (t[from] < t[to] ? n : pieces - n) - 1;
@@ -390,7 +387,7 @@ std::vector<std::array<std::int32_t, 2>> RoundSurface::list_lines() const {
 }
 
 RoundSurface::Place RoundSurface::find_place(std::int32_t triangle, const Vec3& p) const {
-  // The triangles of a facet come in rows, in each row one that points up, then one that points down, and so on.
+  // Triangles of a facet come in rows that alternate between upward and downward ones.
   const int pieces = pieces_;
   Place place{triangle / (pieces * pieces), {}};
   int left = triangle % (pieces * pieces), j = 0;
@@ -411,7 +408,7 @@ RoundSurface::Place RoundSurface::find_place(std::int32_t triangle, const Vec3& 
     l[2] = (d00 * d21 - d01 * d20) / det;
     l[0] = 1 - l[1] - l[2];
     double sum = 0;
-    for (double& part : l) sum += part = part < kOnSide ? 0 : part;  // what lies on a side stays there
+    for (double& part : l) sum += part = part < kBarycentricTolerance ? 0 : part;  // points on a side stay there
     for (double& part : l) part /= sum;
   }
   for (int c = 0; c < 3; ++c)

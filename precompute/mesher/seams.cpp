@@ -1,5 +1,5 @@
-// Method: borders are the edges of one triangle. A grid for each length of border finds near ones. Two borders run along each other if they
-//   share two distant points, within the tolerance. Ends that meet become one point; an end inside the other border cuts its triangle.
+// Method: borders are edges of a single triangle; a grid per border length finds near ones. Two borders match if they share two distant
+//   points within the tolerance. Ends that meet are merged; an end inside the other border splits its triangle.
 #include "precompute/mesher/seams.hpp"
 
 #include <algorithm>
@@ -17,11 +17,11 @@
 namespace carillon::mesher {
 namespace {
 
-constexpr double kPartOfEdge = 0.25;  // of a border's length: limit of the tolerance
-constexpr double kLeastOverlap = 20;  // common length of two borders, in widths of the seam; or half of the shorter border
-constexpr double kFoldedDeg = 2;      // angle between the two sides of a wall at its rim, at most
-constexpr double kMaxLooks = 2e8;     // comparisons of borders; more (millions of borders in one place): left unjoined
-constexpr int kMostPasses = 3;        // a cut can create new pairs of borders
+constexpr double kPartOfEdge = 0.25;        // tolerance limit, over a border's length
+constexpr double kMinOverlapPerWidth = 20;  // common length of two borders, in seam widths; or half of the shorter border
+constexpr double kMaxRimAngleDeg = 2;       // largest angle between the two sides of a wall at its rim
+constexpr double kMaxComparisons = 2e8;     // comparisons of borders; above (millions of borders in one place): left unjoined
+constexpr int kMaxSeamPasses = 3;           // a split can create new pairs of borders
 
 template <std::size_t N>
 struct CellHash {
@@ -32,7 +32,7 @@ struct CellHash {
   }
 };
 
-/// An edge of one triangle.
+/// Edge of a single triangle.
 struct Border {
   std::int32_t triangle = 0;
   int side = 0;  // between this corner and the next
@@ -54,7 +54,7 @@ std::vector<Border> find_borders(const TriangleSurface& surface) {
   return borders;
 }
 
-/// Borders by grid cells, with one grid for each power of two of their lengths.
+/// Borders by grid cell, one grid per power of two of their lengths.
 class BorderGrid {
  public:
   BorderGrid(const std::vector<Border>& borders, const std::vector<Vec3>& points, const Vec3& low, double reach)
@@ -100,14 +100,14 @@ class BorderGrid {
 
 /// An end of one border on another.
 struct Contact {
-  std::int32_t first = 0, second = 0;  // the borders, the lower number first
+  std::int32_t first = 0, second = 0;  // borders, the lower number first
   std::int32_t point = 0;              // the end
   std::int32_t on = 0;                 // the border under it
   double along = 0.0;                  // position on that border, 0 to 1
   double distance = 0.0;
 };
 
-/// Joins the seams of one surface at one tolerance. Keeps true: the surface is unchanged until run() has found seams.
+/// Joins the seams of one surface at one tolerance. Invariant: the surface is unchanged until run() has found seams.
 class SeamJoiner {
  public:
   SeamJoiner(TriangleSurface& surface, double tolerance)
@@ -121,7 +121,7 @@ class SeamJoiner {
   /// Largest displacement of a point.
   double get_widest() const { return widest_; }
 
-  /// False: no seams, and no change.
+  /// False: no seams, no change.
   bool run() {
     find_contacts();
     for (std::size_t i = 0; i < contacts_.size();) {
@@ -156,7 +156,7 @@ class SeamJoiner {
       for (const std::int32_t b : near) {
         const Border& other = border(b);
         looks += static_cast<double>(own.size());
-        if (looks > kMaxLooks) return contacts_.clear();
+        if (looks > kMaxComparisons) return contacts_.clear();
         const Vec3 way = at(other.to) - at(other.from);
         const double along = std::clamp(dot(at(v) - at(other.from), way) / dot(way, way), 0.0, 1.0);
         const double distance = norm(at(v) - (at(other.from) + along * way));
@@ -180,10 +180,10 @@ class SeamJoiner {
     };
     const Vec3 p = find_inward(a), q = find_inward(b);
     if (norm(p) <= tolerance_ || norm(q) <= tolerance_) return false;  // a degenerate triangle
-    return std::atan2(norm(cross(p, q)), dot(p, q)) < kFoldedDeg * std::numbers::pi / 180.0;
+    return std::atan2(norm(cross(p, q)), dot(p, q)) < kMaxRimAngleDeg * std::numbers::pi / 180.0;
   }
 
-  /// The contacts of two borders, from begin to end.
+  /// Contacts of two borders, from begin to end.
   void join_pair(std::size_t begin, std::size_t end) {
     const Border &a = border(contacts_[begin].first), &b = border(contacts_[begin].second);
     double overlap = 0.0, widest = 0.0;
@@ -192,7 +192,7 @@ class SeamJoiner {
       for (std::size_t j = begin; j < i; ++j) overlap = std::max(overlap, norm(at(contacts_[i].point) - at(contacts_[j].point)));
     }
     const double shorter = std::min(a.length, b.length);
-    if (!(overlap >= std::min(0.5 * shorter, kLeastOverlap * tolerance_) && overlap > 2.0 * widest) || is_folded(a, b)) return;
+    if (!(overlap >= std::min(0.5 * shorter, kMinOverlapPerWidth * tolerance_) && overlap > 2.0 * widest) || is_folded(a, b)) return;
     for (std::size_t i = begin; i < end; ++i) {
       const Contact& contact = contacts_[i];
       const Border& on = border(contact.on);
@@ -208,7 +208,7 @@ class SeamJoiner {
     }
   }
 
-  /// Replaces joined points in all triangles, and cuts triangles at ends on their sides.
+  /// Replaces merged points in all triangles, and splits triangles at ends on their sides.
   void cut_triangles() {
     const std::size_t before = surface_.triangles.size();
     for (Triangle& t : surface_.triangles)
@@ -308,9 +308,9 @@ Seams join_seams(TriangleSurface& surface) {
   weld(joined, kSamePoint * diagonal);
   Seams seams;
   std::int64_t left = 0;
-  // Narrow seams first: their borders are gone before a wider tolerance could join both sides of a thin wall's rim.
+  // Narrow seams first: their borders are closed before a wider tolerance could join both sides of a thin wall's rim.
   for (const double tolerance : {1e-3 * kSeam, 1e-2 * kSeam, 0.1 * kSeam, kSeam})
-    for (int pass = 0; pass < kMostPasses; ++pass) {
+    for (int pass = 0; pass < kMaxSeamPasses; ++pass) {
       TriangleSurface candidate = joined;
       SeamJoiner joiner(candidate, tolerance * diagonal);
       left = joiner.count_borders();

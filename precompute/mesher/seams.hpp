@@ -1,4 +1,4 @@
-// Joins equal points and matching borders of a triangle soup.
+// Merges equal points and closes matching borders of a triangle soup.
 #pragma once
 
 #include <cstdint>
@@ -7,17 +7,17 @@
 
 namespace carillon::mesher {
 
-/// Points closer than this part of the diagonal are one: coordinates in single precision differ by more.
+/// Points closer than this part of the diagonal are equal: above single-precision rounding.
 inline constexpr double kSamePoint = 1e-9;
 
-/// Joins points closer than the tolerance (0: equal ones) and drops unused points.
+/// Merges points closer than the tolerance (0: equal ones) and drops unused points.
 void weld(TriangleSurface& surface, double tolerance);
 
 /// Drops unused points. Returns their number.
 std::int64_t drop_unused_points(TriangleSurface& surface);
 
-/// Largest width of a seam over the diagonal. CAD programs tessellate faces one by one; the corners of a common edge then differ by up to
-/// about 1e-5 of the body.
+/// Largest seam width over the diagonal. CAD programs tessellate faces separately; corners of a common edge then differ by up to about 1e-5
+/// of the body.
 inline constexpr double kSeam = 3e-5;
 
 /// Joined seams.
@@ -26,15 +26,14 @@ struct Seams {
   double widest = 0.0;     // largest displacement of a point, in the surface's units
 };
 
-/// Joins borders along each other within kSeam of the diagonal and a quarter of their own length, the nearest first; a corner inside the
-/// other side cuts it in two. Parallel sheets (a thin wall without its rim) stay apart. Changes borders only, and nothing if no border is
-/// closed.
+/// Joins matching borders within kSeam of the diagonal and a quarter of their length, nearest first; a corner inside the other side splits
+/// it. Parallel sheets (a thin wall without rim) stay apart. Changes borders only; no change if none is closed.
 Seams join_seams(TriangleSurface& surface);
 
-/// Number of bodies among the parts of a surface: parts with a common point or an intersection are one body, the wall of a cavity is none.
+/// Number of bodies among the parts of a surface: parts with a common point or an intersection count as one, a cavity wall as none.
 std::int64_t count_bodies(TriangleSurface surface);
 
-/// The surface of a file, without unused points, its seams joined.
+/// Surface of a file, without unused points, seams joined.
 struct SurfaceInput {
   TriangleSurface surface;
   std::int64_t triangles = 0;      // of the file

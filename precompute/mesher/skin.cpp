@@ -35,8 +35,8 @@ std::vector<std::array<Vec3, 3>> find_skin_normals(const Skin& skin) {
   const auto& points = skin.surface.points;
   const auto& triangles = skin.surface.triangles;
   const EdgeSet features = find_features(skin);
-  mesh::Parts parts(3 * triangles.size());                 // corners
-  std::unordered_map<Edge, std::int32_t, EdgeHash> first;  // the corner at the lower end of the edge, of its first triangle
+  mesh::Parts parts(3 * triangles.size());                 // over triangle corners
+  std::unordered_map<Edge, std::int32_t, EdgeHash> first;  // corner at the lower end of the edge, in its first triangle
   const auto corner_of = [&](std::size_t f, std::int32_t v) {
     const Triangle& t = triangles[f];
     return static_cast<std::int32_t>(3 * f) + (t[0] == v ? 0 : t[1] == v ? 1 : 2);
@@ -59,10 +59,10 @@ std::vector<std::array<Vec3, 3>> find_skin_normals(const Skin& skin) {
     if (squares > 0) sum[parts.find(c)] = sum[parts.find(c)] + (1 / squares) * cross(a, b);
   }
   for (Vec3& n : sum) n = calc_unit(n);
-  // At a fold or border: turned about it until the edges inward are arcs, equally inclined to their chord at both ends.
+  // At a fold or border: rotated about it until the inward edges are arcs, equally inclined to their chord at both ends.
   struct Rim {
     std::vector<Vec3> along;
-    std::vector<std::pair<Vec3, Vec3>> in;  // way, normal at its end
+    std::vector<std::pair<Vec3, Vec3>> in;  // direction, normal at its end
   };
   std::vector<char> on_rim(points.size(), 0);
   for (const auto& [a, b] : features) on_rim[a] = on_rim[b] = 1;

@@ -7,11 +7,12 @@
 namespace carillon::mesher {
 namespace {
 
-constexpr double kBendDeg = 40;       // a fold that bends by more has a corner
-constexpr double kMaxTurn = 0.5;      // cosine: least between a triangle before and after a collapse or a move
+constexpr double kBendDeg = 40;       // a larger bend is a corner of the fold
+constexpr double kMaxTurn = 0.5;      // cosine, largest turn of a triangle in a collapse or move
 constexpr double kMaxFlipTurn = 0.7;  // cosine, between the triangles before and after a flip
-constexpr double kSpeck = 0.02;       // of the wanted length's square: twice the area of a triangle that has no normal of its own
-constexpr double kMinHeight = 0.02;   // of a triangle's longest edge: flatter ones have no normal
+constexpr double kMinAreaPerSquaredLength =
+    0.02;                                   // twice the area over the squared target length: smaller triangles have no normal of their own
+constexpr double kMinHeightPerEdge = 0.02;  // over the longest edge: flatter triangles have no normal
 
 }  // namespace
 
@@ -140,7 +141,7 @@ void SkinEditor::split(std::int32_t a, std::int32_t b, const Vec3& at) {
   }
 }
 
-/// True if the triangles at v, but those with `other`, keep their sides when v moves to p.
+/// True if the triangles at v, except those with `other`, keep their orientation when v moves to p.
 bool SkinEditor::keeps_sides(std::int32_t v, std::int32_t other, const Vec3& p) const {
   Vec3 mean{};
   double wanted = HUGE_VAL;
@@ -159,10 +160,10 @@ bool SkinEditor::keeps_sides(std::int32_t v, std::int32_t other, const Vec3& p) 
     const double longest = calc_longest(q[0], q[1], q[2]), longest_before = calc_longest(x_[t[0]], x_[t[1]], x_[t[2]]);
     const double height = norm(after) / (longest * longest), height_before = norm(before) / (longest_before * longest_before);
     // Flat triangles have no normal: none may become flat.
-    if (!(height > std::min(kMinHeight, 0.5 * height_before))) return false;
-    if (height < kMinHeight) continue;
-    // Normals of triangles far smaller than wanted are noise; the mean around them decides.
-    const Vec3& side = norm(before) > kSpeck * wanted * wanted ? before : mean;
+    if (!(height > std::min(kMinHeightPerEdge, 0.5 * height_before))) return false;
+    if (height < kMinHeightPerEdge) continue;
+    // Normals of triangles far below the target size are noise: use the surrounding mean.
+    const Vec3& side = norm(before) > kMinAreaPerSquaredLength * wanted * wanted ? before : mean;
     if (dot(side, after) < kMaxTurn * norm(side) * norm(after)) return false;
   }
   return true;
@@ -186,7 +187,7 @@ bool SkinEditor::collapse(std::int32_t a, std::int32_t b, double longest) {
   std::sort(common.begin(), common.end());
   common.erase(std::unique(common.begin(), common.end()), common.end());
   if (static_cast<int>(common.size()) != count) return false;
-  // A fold may not lose its second side, nor two folds become one.
+  // A fold must keep its two sides, and two folds must not merge.
   for (int n = 0; n < count; ++n) {
     const std::int32_t c = find_third(faces[n], a, b);
     if (star_[c].size() <= 3 && kind_[c] == kInside) return false;
@@ -238,7 +239,7 @@ bool SkinEditor::flip(const Quad& quad) {
     if (!(dot(m, before) > kMaxFlipTurn * norm(m) * norm(before))) return false;
   const double longest =
       std::max({norm(x_[c] - x_[d]), norm(x_[a] - x_[c]), norm(x_[b] - x_[c]), norm(x_[a] - x_[d]), norm(x_[b] - x_[d])});
-  if (std::min(norm(m0), norm(m1)) < kMinHeight * longest * longest) return false;
+  if (std::min(norm(m0), norm(m1)) < kMinHeightPerEdge * longest * longest) return false;
   t_[faces[0]] = one;
   t_[faces[1]] = two;
   std::erase(star_[b], faces[0]);
@@ -251,7 +252,7 @@ bool SkinEditor::flip(const Quad& quad) {
 void SkinEditor::part_chords() {
   for (const auto& [a, b] : list_edges())
     if (kind_[a] != kInside && kind_[b] != kInside && !is_feature(a, b)) split(a, b, places_.on_surface(0.5 * (x_[a] + x_[b])));
-  // Triangles in corners, with two sides on folds.
+  // Corner triangles with two sides on folds.
   for (std::size_t f = 0, n = t_.size(); f < n; ++f) {
     const Triangle t = t_[f];
     if (t[0] < 0 || kind_[t[0]] == kInside || kind_[t[1]] == kInside || kind_[t[2]] == kInside) continue;

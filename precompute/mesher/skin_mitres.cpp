@@ -1,5 +1,4 @@
-// Triangles at the mitres of folds: rings along folds and rims, and room in corners for both sides of a wall.
-// Source: our own.
+// Triangles at the mitres of folds: rings along folds and rims, and space in corners for both sides of a wall.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -11,7 +10,8 @@ namespace carillon::mesher {
 namespace {
 
 constexpr double kMinRingPart = 0.15, kMaxRingPart = 0.75;  // of edges at rings
-constexpr double kRoom = 0.13, kRoomShape = 0.1;            // least ratio of the areas of a triangle's copies; of its longest edge's square
+constexpr double kMinCopyAreaRatio = 0.13,
+                 kMinCopyShapeRatio = 0.1;  // least area ratio of a triangle's copies; and over its longest edge squared
 
 }  // namespace
 
@@ -28,7 +28,7 @@ Skin add_rings(const Skin& start, const SkinPlaces& places, const RingDistance& 
   struct Leaving : LeavingEdge {
     double distance = 0;
   };
-  // Folds at a within a right angle of the edge from a to b, with the distances of their rings.
+  // Folds at a within a right angle of the edge a b, with the distances of their rings.
   const auto list_leaving = [&](std::int32_t a, std::int32_t b) {
     const Vec3 way = calc_unit(x[b] - x[a]);
     std::vector<Leaving> leaving;
@@ -64,7 +64,7 @@ Skin make_room(const Skin& start, const SkinPlaces& places, const std::vector<Ve
   SkinEditor skin(start, places, 0);
   const auto& x = skin.get_points();
   constexpr int kRounds = 12;
-  // Ratio of the areas of a triangle's copies, at most of its shape; negative for a folded one.
+  // Area ratio of a triangle's copies, at most its shape; negative if folded.
   const auto rate = [&](const Triangle& t, std::int32_t v, const Vec3& p) {
     std::array<Vec3, 3> q;
     for (int c = 0; c < 3; ++c) q[c] = t[c] == v ? p : x[t[c]];
@@ -77,14 +77,14 @@ Skin make_room(const Skin& start, const SkinPlaces& places, const std::vector<Ve
       least = std::min(least, area);
       most = std::max(most, std::abs(area));
     }
-    return most > 0 ? least / std::max(most, kRoomShape * longest * longest) : 0.0;
+    return most > 0 ? least / std::max(most, kMinCopyShapeRatio * longest * longest) : 0.0;
   };
   const auto rate_star = [&](std::int32_t v, const Vec3& p) {
     double least = HUGE_VAL;
     for (const std::int32_t f : skin.get_star(v)) least = std::min(least, rate(skin.get_triangle(f), v, p));
     return least;
   };
-  // In turn: other diagonals for narrow triangles, then places of their points that widen the narrowest around them.
+  // Alternately: flips for narrow triangles, then point moves that widen the narrowest around them.
   for (int round = 0; round < kRounds; ++round) {
     for (const auto& [a, b] : skin.list_edges()) {
       const std::optional<Quad> quad = skin.find_quad(a, b);
@@ -93,14 +93,14 @@ Skin make_room(const Skin& start, const SkinPlaces& places, const std::vector<Ve
         return std::min(rate(skin.get_triangle(faces[0]), -1, {}), rate(skin.get_triangle(faces[1]), -1, {}));
       };
       const double before = rate_quad();
-      if (before > kRoom || !skin.flip(*quad) || rate_quad() > before) continue;
+      if (before > kMinCopyAreaRatio || !skin.flip(*quad) || rate_quad() > before) continue;
       if (const auto back = skin.find_quad(quad->c, quad->d)) skin.flip(*back);
     }
     bool again = false;
     for (std::int32_t v = 0; v < static_cast<std::int32_t>(x.size()); ++v) {
       if (skin.get_star(v).empty() || skin.get_kind(v) == SkinEditor::kFixed) continue;
       double best = rate_star(v, x[v]);
-      if (best > kRoom) continue;
+      if (best > kMinCopyAreaRatio) continue;
       double reach = HUGE_VAL;
       Vec3 normal{};
       std::vector<Vec3> ends;  // along the fold

@@ -1,8 +1,6 @@
-// Method: hill climbing. A node of a flat element tries steps in 26 directions and keeps the one after which the worst dihedral angle
-//   of the elements around it is best.
-// Source: optimisation-based smoothing after Freitag and Ollivier-Gooch, "Tetrahedral mesh improvement using swapping and
-//   smoothing", IJNME 40, 1997, section 3.
-// Deviations: steps of fixed directions instead of their active-set ascent: only a handful of elements need it after exudation.
+// Method: hill climbing: a node of a flat element tries steps in 26 directions (instead of the paper's active-set ascent: only a handful of
+//   elements need it after exudation) and keeps the best for the worst surrounding dihedral angle.
+// Source: Freitag and Ollivier-Gooch, "Tetrahedral mesh improvement using swapping and smoothing", IJNME 40, 1997, section 3.
 #include "precompute/mesher/smooth.hpp"
 
 #include <algorithm>
@@ -17,8 +15,8 @@ namespace carillon::mesher {
 namespace {
 
 constexpr int kMaxPasses = 12;
-constexpr std::size_t kMany = 100;
-constexpr double kHardly = 0.95;  // of what they lacked before the pass
+constexpr std::size_t kManyFlatElements = 100;
+constexpr double kMaxDeficitRatio = 0.95;  // least progress: remaining part of the missing angles
 
 /// Of element e of a linear mesh.
 double calc_element_flatness(const mesh::TetMesh& mesh, std::int32_t e) {
@@ -37,7 +35,7 @@ std::vector<Place> find_places(const mesh::TetMesh& mesh, const std::function<bo
   return places;
 }
 
-/// Moves nodes so that the flattest elements around them become less flat.
+/// Moves nodes to raise the worst dihedral angles around them.
 class Improver {
  public:
   Improver(mesh::TetMesh& mesh, double angle_deg, const std::function<std::optional<Vec3>(const Vec3&)>& project,
@@ -52,20 +50,21 @@ class Improver {
       for (const std::int32_t v : mesh.tet(e)) around_[v].push_back(e);
   }
 
-  /// The number of moves.
+  /// Returns the number of moves.
   std::int64_t run() {
     std::int64_t moved = 0;
-    double last = std::numeric_limits<double>::infinity();  // sum of the degrees missing in flat elements
+    double last = std::numeric_limits<double>::infinity();  // total missing angle of flat elements [degrees]
     for (int pass = 0; pass < kMaxPasses; ++pass) {
       std::vector<std::pair<double, std::int32_t>> flat;
       for (std::int32_t e = 0; e < mesh_.tet_count(); ++e)
         if (const double angle = calc_element_flatness(mesh_, e); angle < angle_deg_) flat.emplace_back(angle, e);
       const double lacking =
           std::accumulate(flat.begin(), flat.end(), 0.0, [&](double sum, const auto& f) { return sum + angle_deg_ - f.first; });
-      if (flat.size() > kMany && lacking > kHardly * last) break;  // many elements with little gain: the body itself is flat there
+      if (flat.size() > kManyFlatElements && lacking > kMaxDeficitRatio * last)
+        break;  // many elements with little progress: the body itself is flat there
       last = lacking;
       std::sort(flat.begin(), flat.end());
-      const std::int64_t moves = move_own(flat) + (flat.size() <= kMany ? move_neighbours(flat) : 0);
+      const std::int64_t moves = move_own(flat) + (flat.size() <= kManyFlatElements ? move_neighbours(flat) : 0);
       moved += moves;
       if (moves == 0) break;
     }
@@ -77,7 +76,7 @@ class Improver {
 
   bool is_flat(std::int32_t e) const { return calc_element_flatness(mesh_, e) < angle_deg_; }
 
-  /// Flatness of the worst element around a node; stops at the first that is not above `min`.
+  /// Smallest angle around a node; stops at the first not above `min`.
   double calc_worst(std::int32_t v, double min) const {
     double worst = 180;
     for (const std::int32_t e : around_[v]) {
@@ -87,7 +86,7 @@ class Improver {
     return worst;
   }
 
-  /// Pattern search around the best position so far, in decreasing steps.
+  /// Pattern search around the best position, with decreasing steps.
   bool climb(std::int32_t v) {
     const Vec3 start = mesh_.nodes_m[v];
     double length = 1e300;
@@ -116,7 +115,7 @@ class Improver {
     return best_place != start;
   }
 
-  /// A node without a better position has none until a neighbour has moved.
+  /// Skips a node without a better position until a neighbour has moved.
   bool move(std::int32_t v) {
     if (places_[v] == Place::kFixed || is_stuck_[v]) return false;
     if (!climb(v)) {
@@ -136,7 +135,7 @@ class Improver {
     return moves;
   }
 
-  /// For elements that none of their own nodes improves.
+  /// For elements that no single node move improves.
   std::int64_t move_neighbours(const Flat& flat) {
     std::int64_t moves = 0;
     for (const auto& [angle, e] : flat) {

@@ -1,4 +1,4 @@
-// Betters the flattest elements of a mesh by moving their nodes.
+// Improves the flattest elements by moving their nodes.
 #pragma once
 
 #include <functional>
@@ -9,9 +9,9 @@
 
 namespace carillon::mesher {
 
-/// Moves nodes of elements that have a dihedral angle under `angle_deg` or over 180 - `angle_deg`, where that raises the worst angle
-/// around the node. Inner nodes move freely; those of the boundary are brought back to it by `project`, which gives nothing where it finds
-/// no way; those for which `is_fixed` is true stay. Linear meshes, positively oriented before and after. Returns how many nodes were moved.
+/// Moves nodes of elements with a dihedral angle under `angle_deg` or over 180 - `angle_deg` to raise the worst surrounding angle. Inner
+/// nodes move freely; boundary nodes are projected by `project` (empty: no move); nodes with `is_fixed` stay. Linear meshes, positively
+/// oriented before and after. Returns the number of moved nodes.
 std::int64_t better_flat_elements(mesh::TetMesh& mesh, double angle_deg, const std::function<std::optional<Vec3>(const Vec3&)>& project,
                                   const std::function<bool(const Vec3&)>& is_fixed);
 

@@ -1,10 +1,9 @@
-// Method: isosurface stuffing. A body-centred cubic lattice is laid over the body; lattice points close to the surface are moved
-//   onto it; the tetrahedra that it still crosses are cut off by stencils.
-// Source: Labelle and Shewchuk, "Isosurface stuffing: fast tetrahedral meshes with good dihedral angles", ACM TOG 26(3), 2007,
-//   sections 3 and 4; the distances at which a point is moved (alpha_long, alpha_short) from their table 1, "safe" row.
-// Deviations: a quadrilateral face is cut from the corner of the first cubic grid (of two corners of one grid: from the one with
-//   the smaller number), the free one by its shorter diagonal; the paper's parity rule is another. Its bound on the angles
-//   (10.7 degrees) is therefore not proven for us; the report measures them.
+// Method: isosurface stuffing: a body-centred cubic lattice over the body; lattice points close to the surface are snapped onto it;
+//   stencils cut the crossing tetrahedra. A quadrilateral face is cut from the corner of the first cubic grid (in one grid, the smaller
+//   number), the free one by its shorter diagonal, not by the paper's parity rule; its angle bound (10.7 degrees) is therefore not proven
+//   here, and the report measures the angles.
+// Source: Labelle and Shewchuk, "Isosurface stuffing: fast tetrahedral meshes with good dihedral angles", ACM TOG 26(3), 2007, sections 3
+//   and 4; snapping distances (alpha_long, alpha_short) from table 1, "safe" row.
 #include "precompute/mesher/stuffing.hpp"
 
 #include <fmt/core.h>
@@ -19,12 +18,12 @@ namespace carillon::mesher {
 namespace {
 
 constexpr double kAlphaLong = 0.24999, kAlphaShort = 0.41189;
-// Long edges (three in seven) are the spacing, short ones 0.866 of it: 0.92 in the mean.
+// Long edges (three in seven) equal the spacing, short ones 0.866 of it: 0.92 on average.
 constexpr double kSpacingPerEdge = 1.08;
 
 using Cell = std::array<std::int32_t, 3>;
 
-/// The lattice: points of the first grid have even, those of the second odd coordinates, in halves of the spacing.
+/// Lattice: points of the first grid have even, of the second odd coordinates, in half spacings.
 class Lattice {
  public:
   Lattice(const DistanceField& field, double wall_m, double spacing_m) : field_(field), wall_m_(wall_m), half_(0.5 * spacing_m) {
@@ -60,7 +59,7 @@ class Lattice {
         for (std::int32_t i = k & 1; i < size_[0]; i += 2) visit(Cell{i, j, k});
   }
 
-  /// The root of the body's function between two places, by bisection.
+  /// Root of the body function between two points, by bisection.
   Vec3 find_root(Vec3 inside, Vec3 outside) const {
     for (int n = 0; n < 30; ++n) {
       const Vec3 middle = 0.5 * (inside + outside);
@@ -79,7 +78,7 @@ class Lattice {
 
 Cell add(const Cell& a, const Cell& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
 
-/// The fourteen lattice neighbours: six along the axes (long edges), eight along the diagonals (short ones).
+/// Fourteen lattice neighbours: six along the axes (long edges), eight along the diagonals (short).
 std::vector<Cell> list_neighbours() {
   std::vector<Cell> out;
   for (int axis = 0; axis < 3; ++axis)
@@ -104,7 +103,7 @@ class Stuffer {
   }
 
  private:
-  /// Moves each lattice point that has a crossing too close to it onto the nearest one.
+  /// Snaps each lattice point to its nearest crossing if that is too close.
   void warp() {
     const auto neighbours = list_neighbours();
     std::vector<std::pair<std::size_t, Vec3>> moves;
@@ -150,7 +149,7 @@ class Stuffer {
     out_.tets.insert(out_.tets.end(), {a, b, c, d});
   }
 
-  /// The tetrahedra around the three long edges that start at p: each has such an edge and one of the four across it.
+  /// Tetrahedra around the three long edges that start at p: each has such an edge and one of the four across it.
   void add_tets_at(const Cell& p) {
     for (int axis = 0; axis < 3; ++axis) {
       Cell along{};
@@ -164,7 +163,7 @@ class Stuffer {
         r[axis] += 1, s[axis] += 1;
         r[u] += kAround[n][0], r[v] += kAround[n][1];
         s[u] += kAround[(n + 1) % 4][0], s[v] += kAround[(n + 1) % 4][1];
-        // Each tetrahedron has a long edge of either grid; it is made from that of the first.
+        // Each tetrahedron has a long edge of either grid; it is created from the first grid's.
         if ((p[0] & 1) == 0 && lattice_.holds(r) && lattice_.holds(s)) add_cut({p, q, r, s});
       }
     }
@@ -190,11 +189,11 @@ class Stuffer {
     } else if (plus.size() == 1) {
       for (std::size_t m = 0; m < minus.size(); ++m) z.push_back(cut(0, m));
       add_tet(p[0], z[0], z[1], z[2]);
-    } else if (plus.size() == 2 && minus.size() == 1) {  // a pyramid with its tip at the zero corner
+    } else if (plus.size() == 2 && minus.size() == 1) {  // pyramid with its tip at the zero corner
       const std::int32_t a = cut(0, 0), b = cut(1, 0);
       add_tet(z[0], p[0], p[1], b);
       add_tet(z[0], p[0], b, a);
-    } else if (plus.size() == 2) {  // a wedge
+    } else if (plus.size() == 2) {  // wedge
       const std::int32_t a0 = cut(0, 0), a1 = cut(0, 1), b0 = cut(1, 0), b1 = cut(1, 1);
       add_tet(p[0], p[1], b0, b1);
       const auto& x = out_.nodes_m;
@@ -205,7 +204,7 @@ class Stuffer {
         add_tet(p[0], a1, b0, a0);
         add_tet(p[0], a1, b0, b1);
       }
-    } else {  // three inside: a prism
+    } else {  // three inside: prism
       const std::int32_t c0 = cut(0, 0), c1 = cut(1, 0), c2 = cut(2, 0);
       add_tet(p[0], p[1], p[2], c2);
       add_tet(p[0], p[1], c1, c2);

@@ -6,7 +6,7 @@
 
 namespace carillon::mesher {
 
-/// Fills the body of calc_body(field, wall_m, .) with tetrahedra of about the given edge length. Sharp edges are rounded.
+/// Fills the body of calc_body(field, wall_m, .) with tetrahedra of about the given edge length. Rounds sharp edges.
 mesh::TetMesh stuff(const DistanceField& field, double wall_m, double edge_m);
 
 }  // namespace carillon::mesher

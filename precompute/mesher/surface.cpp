@@ -1,4 +1,4 @@
-// The path from a surface file to tetrahedra; the steps are in the other files of this folder.
+// From surface file to tetrahedra; the steps are in the other files of this folder.
 #include "precompute/mesher/surface.hpp"
 
 #include <fmt/core.h>
@@ -28,9 +28,8 @@
 namespace carillon::mesher {
 namespace {
 
-constexpr double kSmallest = 1e-10, kLargest = 1e9;  // bodies, in metres
-// Limits of processor seconds (guard_program), of the repair and of the rest. The hollow bunny of 37,000 nodes takes 7 s, its limit is 670
-// s.
+constexpr double kSmallest = 1e-10, kLargest = 1e9;  // body size, in metres
+// Processor time limits [s] (guard_program), of the repair and of the rest. The hollow bunny of 37,000 nodes takes 7 s, its limit is 670 s.
 constexpr double kMinCpuOfRepair = 10, kMinCpu = 12, kCpuPerTriangle = 2e-3, kCpuPerNode = 5e-3;
 
 void check_options(const SurfaceOptions& o) {
@@ -56,7 +55,7 @@ void check_options(const SurfaceOptions& o) {
     throw InputError(fmt::format("the angle of slivers is {} degrees; it must be in [0, 30]", o.sliver_deg));
 }
 
-/// Scales the surface to metres. A sheet may be flat, but not across the axis of its height.
+/// Scales the surface to metres. A sheet may be flat, but not along the height axis.
 void scale_surface(TriangleSurface& surface, const SurfaceOptions& options, SurfaceReport& report, bool is_sheet) {
   const Box box = calc_used_box(surface);
   const Vec3 extent = box.extent();
@@ -87,7 +86,7 @@ void scale_surface(TriangleSurface& surface, const SurfaceOptions& options, Surf
         "The body is {:.3g} m long. If the file is not in metres, give its height or a scale (0.001 for millimetres).", largest));
 }
 
-/// Notes on the joins and drops of reading.
+/// Notes on seams and dropped points.
 void note_input(SurfaceReport& report) {
   if (report.seam_edges > 0)
     report.notes.push_back(fmt::format(
@@ -100,7 +99,7 @@ void note_input(SurfaceReport& report) {
                                        report.unused_points == 1 ? "was" : "were"));
 }
 
-/// Puts the mid nodes of the boundary on the skins.
+/// Moves the mid nodes of the boundary onto the skins.
 void curve(mesh::TetMesh& mesh, const Body& body, SurfaceReport& report) {
   const CurvedEdges edges = curve_mesh(
       mesh, body.curves, [&](const Vec3& middle, const Vec3& normal, double reach_m) { return find_skin(body, middle, normal, reach_m); });
@@ -109,7 +108,7 @@ void curve(mesh::TetMesh& mesh, const Body& body, SurfaceReport& report) {
   report.straightened_tets = edges.straightened;
 }
 
-/// Puts the nodes of the skins on the smooth surface and sums the volume again.
+/// Moves skin nodes to the smooth surface and recomputes the volume.
 void place_nodes(mesh::TetMesh& mesh, const Body& body, const SurfaceOptions& options, SurfaceReport& report) {
   report.straightened_tets += place_on_smooth_surface(mesh, body, options.straight);
   remark_doubt(mesh, report);
@@ -144,7 +143,7 @@ std::string format_estimate(const char* word, const Body& body, double edge_m) {
   return fmt::format("{} {}", word, estimate.line());
 }
 
-/// An estimate from the unrepaired surface: its repair may take long.
+/// Estimate from the unrepaired surface: the repair may take long.
 void show_rough_estimate(const TriangleSurface& raw, const SurfaceOptions& options, bool is_sheet, Phases& phases) {
   const double volume = std::abs(calc_volume(raw)), area = calc_area(raw);
   if (is_sheet) {

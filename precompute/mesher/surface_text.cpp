@@ -1,7 +1,6 @@
-// Words and numbers of text, and the two formats that are nothing but text: OBJ and OFF.
-// Source: Wavefront, "Object Files (.obj)", Advanced Visualizer manual, appendix B1 (v, f, negative references, continued lines);
-//   Geomview manual, "OFF Files".
-// Deviations: of OBJ only v and f are used; of OFF the kinds with 4 or n coordinates and the binary one are refused.
+// Tokens of text formats, and the text-only formats OBJ (only v and f) and OFF (3 coordinates, text).
+// Source: Wavefront, "Object Files (.obj)", Advanced Visualizer manual, appendix B1 (v, f, negative references, continued lines); Geomview
+//   manual, "OFF Files".
 #include "precompute/mesher/surface_text.hpp"
 
 #include <algorithm>
@@ -19,7 +18,7 @@ namespace {
 
 bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\v' || c == '\f'; }
 
-/// The corner of a face in OBJ: the number before the first slash, counted from 1, or back from the last vertex if negative.
+/// Corner of an OBJ face: the number before the first slash, from 1; negative: back from the last vertex.
 std::optional<std::int64_t> read_reference(std::string_view word, std::int64_t vertices) {
   const auto index = read_whole(word.substr(0, word.find('/')));
   if (!index || *index == 0 || *index < -vertices) return std::nullopt;
@@ -90,7 +89,7 @@ PolygonSoup parse_obj(std::string_view bytes, const std::string& name) {
   std::vector<std::string_view> words, more;
   std::int64_t largest = -1, line_of_largest = 0;
   while (text.next(words)) {
-    // A backslash at its end continues a line.
+    // A backslash at the end continues a line.
     while (!words.empty() && words.back() == "\\") {
       words.pop_back();
       if (!text.next(more)) break;
@@ -125,7 +124,7 @@ PolygonSoup parse_off(std::string_view bytes, const std::string& name) {
   PolygonSoup soup;
   std::vector<std::string_view> words;
   if (!text.next_filled(words)) text.refuse("the file holds only blanks and comments; export it again");
-  // The word may be left out, and the counts may stand next to it.
+  // The word is optional, and the counts may follow on the same line.
   std::string_view kind = "OFF";
   if (!read_whole(words[0])) {
     kind = words[0];
@@ -145,7 +144,8 @@ PolygonSoup parse_off(std::string_view bytes, const std::string& name) {
     const char* what = n == 0 ? "vertices" : "faces";
     const auto count = read_whole(words[n]);
     if (!count) text.refuse("found {} where the number of {} should be; export the surface again", quote_excerpt(words[n]), what);
-    // A vertex takes six bytes at least ("0 0 0\n"), a face two.
+    // A vertex takes at least six bytes ("0 0 0
+    // "), a face two.
     const std::int64_t max = std::min(static_cast<std::int64_t>(bytes.size()) / (n == 0 ? 5 : 2) + 1, kMaxPoints);
     if (*count < 0 || *count > max)
       text.refuse("the header promises {} {}, but the file has only {} bytes; it is cut off or damaged, export it again", *count, what,

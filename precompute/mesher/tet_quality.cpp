@@ -1,6 +1,5 @@
-// Method: an edge or a node at which the boundary is no surface is the meeting of several groups of elements that share no face
-//   there; all but the largest group are removed, and again, until there is none.
-// Source: our own.
+// Method: an edge or node where the boundary is not a surface joins several groups of elements without common faces there; all but the
+//   largest group are removed, iterated until none is left.
 #include "precompute/mesher/tet_quality.hpp"
 
 #include <algorithm>
@@ -39,10 +38,10 @@ Triangle get_face(const mesh::TetMesh& mesh, std::int64_t e, int face) {
   return {tet[mesh::kFaces[face][0]], tet[mesh::kFaces[face][1]], tet[mesh::kFaces[face][2]]};
 }
 
-/// The element at the other side of each face of each element; -1 at the boundary.
+/// Neighbour across each face of each element; -1 at the boundary.
 std::vector<std::array<std::int32_t, 4>> find_neighbours(const mesh::TetMesh& mesh) {
   std::vector<std::array<std::int32_t, 4>> neighbours(mesh.tet_count(), {-1, -1, -1, -1});
-  // Faces in buckets by their lowest node; few share one, so twins are found by looking through the bucket.
+  // Faces bucketed by lowest node; few share one, so twins are found by linear search.
   struct Entry {
     std::int32_t middle, high, element;
     int face;
@@ -71,7 +70,7 @@ std::vector<std::array<std::int32_t, 4>> find_neighbours(const mesh::TetMesh& me
   return neighbours;
 }
 
-/// Groups of `around` (elements that share a node or an edge) that hang together by faces which hold all of `shared`.
+/// Groups of `around` (elements that share a node or edge) connected by faces that contain all of `shared`.
 template <std::size_t N>
 std::vector<std::vector<std::int32_t>> find_groups(const mesh::TetMesh& mesh, const std::vector<std::array<std::int32_t, 4>>& neighbours,
                                                    const std::vector<std::int32_t>& around, const std::array<std::int32_t, N>& shared) {
@@ -97,11 +96,11 @@ std::vector<std::vector<std::int32_t>> find_groups(const mesh::TetMesh& mesh, co
   return groups;
 }
 
-/// Elements to remove so that the boundary around edges and nodes becomes a surface; empty if it is one.
+/// Elements to remove to make the boundary a surface around edges and nodes; empty if it is one.
 std::vector<char> find_pinching(const mesh::TetMesh& mesh, const std::vector<std::array<std::int32_t, 4>>& neighbours, bool& any) {
   std::vector<char> remove(neighbours.size(), 0);
   any = false;
-  // Only nodes and edges on the boundary can pinch.
+  // Only boundary nodes and edges can be pinched.
   std::unordered_map<Edge, int, KeyHash> boundary_edges;
   std::vector<char> on_boundary(mesh.nodes_m.size(), 0);
   for (std::int32_t e = 0; e < mesh.tet_count(); ++e)
@@ -139,7 +138,7 @@ std::vector<char> find_pinching(const mesh::TetMesh& mesh, const std::vector<std
 /// Marks the elements of all but the `components` largest pieces.
 std::vector<char> find_crumbs(const std::vector<std::array<std::int32_t, 4>>& neighbours, std::int64_t components, bool& any) {
   std::vector<std::int32_t> piece(neighbours.size(), -1);
-  std::vector<std::pair<std::int64_t, std::int32_t>> sizes;  // minus the size, so that sorting puts the largest first
+  std::vector<std::pair<std::int64_t, std::int32_t>> sizes;  // negative size: sorts the largest first
   for (std::size_t seed = 0; seed < neighbours.size(); ++seed) {
     if (piece[seed] >= 0) continue;
     const auto number = static_cast<std::int32_t>(sizes.size());
@@ -216,7 +215,7 @@ std::int64_t count_pinches(const std::vector<Triangle>& faces) {
       top = std::max(top, faces[f][c] + 1);
     }
   std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) { return a.ends < b.ends; });
-  // The corners of faces that meet at a node, joined across common edges: one group a node.
+  // Corners of faces at a node, joined across common edges: one group per node.
   std::vector<std::int32_t> leader(3 * faces.size());
   std::iota(leader.begin(), leader.end(), 0);
   const auto find_leader = [&](std::int32_t n) {
@@ -231,7 +230,7 @@ std::int64_t count_pinches(const std::vector<Triangle>& faces) {
   for (std::size_t n = 0, end = 0; n < sides.size(); n = end) {
     for (end = n; end < sides.size() && sides[end].ends == sides[n].ends;) ++end;
     pinches += end - n != 2;
-    // At an edge of several sheets any pairing will do, since it is a pinch already.
+    // At an edge of several sheets any pairing works: it is a pinch already.
     for (std::size_t k = n + 1; k < end; ++k)
       for (const std::int32_t v : sides[n].ends) {
         const std::int32_t a = find_leader(find_corner(sides[n].face, v)), b = find_leader(find_corner(sides[k].face, v));
@@ -290,7 +289,7 @@ double calc_flatness(const std::array<Vec3, 4>& corners) {
     normal[f] = cross(p[mesh::kFaces[f][1]] - p[mesh::kFaces[f][0]], p[mesh::kFaces[f][2]] - p[mesh::kFaces[f][0]]);
   std::array<double, 4> square;
   for (int f = 0; f < 4; ++f) square[f] = dot(normal[f], normal[f]);
-  double max = 0;  // the square of the cosine of the flattest angle
+  double max = 0;  // squared cosine of the flattest angle
   for (int i = 0; i < 4; ++i)
     for (int j = i + 1; j < 4; ++j) {
       const double product = dot(normal[i], normal[j]);
@@ -300,7 +299,7 @@ double calc_flatness(const std::array<Vec3, 4>& corners) {
 }
 
 std::int64_t peel_flat_elements(mesh::TetMesh& mesh) {
-  constexpr double kFlatDeg = 1e-3;
+  constexpr double kMinDihedralDeg = 1e-3;
   std::int64_t peeled = 0;
   while (mesh::count_flat(mesh) > 0) {
     std::set<Triangle> boundary;  // corners ascending
@@ -314,7 +313,7 @@ std::int64_t peel_flat_elements(mesh::TetMesh& mesh) {
       const auto tet = mesh.tet(e);
       std::array<Vec3, 4> corners;
       for (int c = 0; c < 4; ++c) corners[c] = mesh.nodes_m[tet[c]];
-      if (std::abs(calc_flatness(corners)) > kFlatDeg) continue;
+      if (std::abs(calc_flatness(corners)) > kMinDihedralDeg) continue;
       const bool is_outer = std::any_of(std::begin(mesh::kFaces), std::end(mesh::kFaces), [&](const auto& face) {
         Triangle key{tet[face[0]], tet[face[1]], tet[face[2]]};
         std::sort(key.begin(), key.end());

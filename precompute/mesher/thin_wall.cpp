@@ -1,10 +1,8 @@
-// Method: the skin is remeshed to edges by rule, its folds and rims get a ring of narrow triangles, and it is extruded. The number of nodes
-//   is met by changing the edges. The mesh is compared with the volume of the parallel body, and tested for crossings of its skin and for
-//   tips cut off by the triangles.
-// Source: the volume between parallel surfaces: Steiner's formula (Gray, "Tubes", 2nd ed., Birkhaeuser 2004); the length of bending waves:
-//   Cremer, Heckl and Petersson, "Structure-borne sound", 3rd ed., Springer 2005. How long edges may be: measured,
-//   docs/howto/thin-walls.md.
-// Deviations: at folds the formula has the mitre's area in place of the arc's.
+// Method: the skin is remeshed to a ruled edge length, folds and rims get a ring of narrow triangles, and it is extruded. The node count is
+//   met by varying the edge length. The mesh is compared with the volume of the parallel body (at folds with the mitre's area), and tested
+//   for self-intersection and cut tips. Edge limits are measured: docs/howto/thin-walls.md.
+// Source: volume between parallel surfaces: Steiner's formula (Gray, "Tubes", 2nd ed., Birkhaeuser 2004); bending wave length: Cremer,
+//   Heckl and Petersson, "Structure-borne sound", 3rd ed., Springer 2005.
 #include "precompute/mesher/thin_wall.hpp"
 
 #include <fmt/core.h>
@@ -26,34 +24,34 @@
 namespace carillon::mesher {
 namespace {
 
-// Longest edge over the thickness of the wall: beyond, unstructured triangles of second order lock.
+// Largest ratio of edge length to thickness: longer second-order triangles lock.
 constexpr double kMaxEdgePerWall = 8;
 constexpr double kWavesPerEdge = 12;
-constexpr double kRuleHz = 10000, kPlateSpeed = 5400;  // [m/s] of longitudinal waves in plates of steel, glass or aluminium
+constexpr double kRuleHz = 10000, kPlateSpeed = 5400;  // [m/s] longitudinal waves in plates of steel, glass or aluminium
 constexpr double kPerRadius = 0.35, kMaxPerRadius = 0.7;
-constexpr double kMinPerWall = 0.8;        // shortest edges of curved places, in walls
-constexpr double kPointsPerArea = 1.1547;  // of a triangulation, times its edges' square
+constexpr double kMinPerWall = 0.8;        // shortest edges of curved places, in wall thicknesses
+constexpr double kPointsPerArea = 1.1547;  // triangulation points, times squared edge over area
 constexpr double kCountAim = 0.07;
 constexpr int kMaxAttempts = 8;
 constexpr double kRimRing = 0.7, kFoldRing = 0.2,
-                 kFoldRingOfEdge = 0.5;  // walls from a rim to its ring, and from the inner corner of a fold
-constexpr double kRingFrom = 1.05;       // the mitre of a fold with a ring: it turns by 36 degrees
-constexpr double kMaxHalfTurn = 1.32;    // of a fold that is mitred [radians]
+                 kFoldRingOfEdge = 0.5;  // over the wall: distance from a rim, and from a fold's inner corner, to the ring
+constexpr double kRingFrom = 1.05;       // mitre of a fold with a ring (36 degrees turn)
+constexpr double kMaxHalfTurn = 1.32;    // of a mitred fold [radians]
 constexpr double kMaxVolumeError = 0.05, kMaxLost = 0.35;
 constexpr double kDefaultMaxNodes = 200'000;
 
-/// Nodes of the mesh per point of the skin, about.
+/// Approximate mesh nodes per skin point.
 double calc_nodes_per_point(int order, int layers) { return order == 1 ? layers + 1 : 4 * (2 * layers + 1); }
 
 struct ThinSizes {
   double edge_m = 0;
   int layers = 1;
-  double nodes = 0;  // about
+  double nodes = 0;  // approximate
 };
 
-/// Edges shorter than the wall is thick get several layers: elements of one size in all directions.
+/// Edges shorter than the wall thickness get several layers, for isotropic elements.
 ThinSizes choose_sizes(double area_m2, double wall_m, const SurfaceOptions& options) {
-  constexpr double kPerLayer = 0.65;  // shortest edge over the thickness of a layer
+  constexpr double kPerLayer = 0.65;  // shortest edge over layer thickness
   constexpr int kMaxLayers = 6;
   ThinSizes sizes;
   for (;; ++sizes.layers) {
@@ -65,7 +63,7 @@ ThinSizes choose_sizes(double area_m2, double wall_m, const SurfaceOptions& opti
   }
 }
 
-/// The volume between the levels low and high [m] of the surface, along its normals, by Steiner's formula.
+/// Volume between the levels low and high [m] along the surface normals, by Steiner's formula.
 double calc_parallel_volume(const TriangleSurface& surface, double low, double high) {
   std::map<Edge, std::vector<std::int32_t>> faces;
   for (std::size_t f = 0; f < surface.triangles.size(); ++f)
@@ -93,7 +91,7 @@ double calc_parallel_volume(const TriangleSurface& surface, double low, double h
       if (v != edge[0] && v != edge[1] && dot(a, p[v] - p[edge[0]]) > 0) sign = -1;
     bend += 2 * sign * norm(p[edge[1]] - p[edge[0]]) * std::tan(std::min(0.5 * turn, kMaxHalfTurn));
   }
-  // The total curvature of a closed surface is that of its holes alone.
+  // The total curvature of a closed surface depends on its genus only.
   double total = 0;
   if (is_closed) {
     std::vector<char> used(p.size(), 0);
@@ -158,10 +156,10 @@ class ThinMesher {
   }
 
  private:
-  /// From the inner corner of a fold to its ring.
+  /// Distance from the inner corner of a fold to its ring.
   double calc_margin(double edge_m) const { return std::min(kFoldRing * body_.wall_m, kFoldRingOfEdge * edge_m); }
 
-  /// The skin with edges of about that length, and rings along its folds and rims.
+  /// Skin with edges of about that length, and rings along its folds and rims.
   Attempt make_skin(double edge_m, double per_radius) {
     ++report_.attempts;
     const double wall = body_.wall_m;
@@ -178,8 +176,7 @@ class ThinMesher {
       const Vec3 &out = ways[v], &across = leaving.across;
       double distance = on_border[v] != 0 ? kRimRing * wall : 0;
       if (norm(out) > kRingFrom) {
-        // Width of the mitre at the wall's inner corner. The measured corner of a round wall lies off the plane of edge and fold, and
-        // counts along the edge.
+        // Width of the mitre at the wall's inner corner, which for a round wall is off the plane of edge and fold; measured along the edge.
         const std::size_t point = v;
         const double shift = low_source_ ? dot(low[point] - plain.surface.points[point], leaving.way) / leaving.sine
                                          : std::max(levels_[0] * dot(out, across), levels_[1] * dot(out, across));
@@ -199,7 +196,7 @@ class ThinMesher {
     const double first = edge_;
     double nearest = 0;
     Attempt best;
-    // Curved places: coarser than the rule as far as their arcs allow, and finer with the rest.
+    // Curved places: longer than the rule if their arcs permit, shorter otherwise.
     const double rule = options_.edge_m ? edge_ : find_edge_rule(body_.wall_m);
     double low = 0, high = HUGE_VAL;  // edges with too many and too few nodes
     for (int n = 0; n < kMaxAttempts; ++n) {
@@ -221,7 +218,7 @@ class ThinMesher {
     return best;
   }
 
-  /// Triangles in corners, between the mitres of folds, need room for both sides of the wall; other edges may give it.
+  /// Corner triangles between fold mitres need space for both sides of the wall; other edge lengths may provide it.
   Extruded extrude_or_retry(Attempt& attempt) {
     constexpr std::array<double, 7> kFactors{1, 1.06, 0.94, 1.12, 0.88, 1.2, 0.8};
     const bool may_retry = !low_source_ && !attempt.skin.folds.empty();
@@ -256,7 +253,7 @@ class ThinMesher {
     return extrude(skin, wall);
   }
 
-  /// The point of the other side for each point of the skin.
+  /// Point of the other side for each skin point.
   std::vector<Vec3> find_low(const Skin& skin, const std::vector<Vec3>& ways) const {
     std::vector<Vec3> low;
     const std::vector<char> on_border = mark_border(skin.surface);
@@ -272,7 +269,7 @@ class ThinMesher {
     return low;
   }
 
-  /// Throws WallError for a mesh that is not the body.
+  /// Throws WallError for a mesh that misrepresents the body.
   void compare(const Skin& skin, const mesh::TetMesh& mesh) {
     const TriangleSurface hull{mesh.nodes_m, find_boundary(mesh)};
     if (const auto crossing = find_crossing(hull)) {
@@ -355,7 +352,7 @@ class ThinMesher {
       note(fmt::format("The elements cut off up to {:.3g} mm of the surface's details; more nodes keep them.", 1000 * lost_));
   }
 
-  /// Doubt of the surface at every node of the mesh; none for a surface without doubt.
+  /// Surface ambiguity at every mesh node; empty if unambiguous.
   void spread_doubt(const TriangleSurface& skin, Extruded& extruded) {
     if (!source_.is_doubtful()) return;
     mesh::TetMesh& mesh = extruded.mesh;
@@ -367,7 +364,7 @@ class ThinMesher {
       way[v] = source_.find_doubt(p[v]);
       for (int l = 0; l <= layers_; ++l) mesh.doubt_m[l * points + v] = way[v];
     }
-    // Mid nodes of the skin's edges have their own, the others the mean of their ends'.
+    // Mid nodes of skin edges have their own value, others the mean of their ends.
     if (order_ == 2)
       for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
         for (std::size_t m = 0; m < 6; ++m)

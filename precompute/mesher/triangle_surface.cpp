@@ -40,7 +40,7 @@ Box calc_used_box(const TriangleSurface& surface) {
 }
 
 double calc_volume(const TriangleSurface& surface) {
-  // Relative to a point of the surface, so that a body far from the origin loses no digits.
+  // Relative to a surface point: avoids cancellation far from the origin.
   const Vec3 origin = surface.points.empty() ? Vec3{} : surface.points.front();
   double sum = 0;
   for (const Triangle& t : surface.triangles)

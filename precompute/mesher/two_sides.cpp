@@ -13,9 +13,9 @@
 namespace carillon::mesher {
 
 std::optional<TwoSides> find_two_sides(const TriangleSurface& closed) {
-  constexpr double kFacing = 0.9;  // cosine
+  constexpr double kMinOppositeCosine = 0.9;  // cosine
   constexpr double kMaxOfDiagonal = 0.2, kMaxOfMedian = 3;
-  constexpr double kMinSide = 0.3, kMaxRim = 0.25;  // of the area
+  constexpr double kMinSideAreaRatio = 0.3, kMaxRimAreaRatio = 0.25;  // of the area
   constexpr std::size_t kMaxTriangles = 200'000;
   const std::size_t count = closed.triangles.size();
   if (count > kMaxTriangles) return std::nullopt;
@@ -34,7 +34,7 @@ std::optional<TwoSides> find_two_sides(const TriangleSurface& closed) {
     const Triangle& t = closed.triangles[f];
     const Vec3 middle = (1.0 / 3) * (closed.points[t[0]] + closed.points[t[1]] + closed.points[t[2]]);
     const auto hit = tree.find_hit(middle, -1.0 * normal[f], static_cast<std::int32_t>(f));
-    if (!hit || -dot(normal[f], normal[hit->second]) < kFacing) continue;
+    if (!hit || -dot(normal[f], normal[hit->second]) < kMinOppositeCosine) continue;
     way[f] = hit->first;
     other[f] = hit->second;
   }
@@ -48,7 +48,7 @@ std::optional<TwoSides> find_two_sides(const TriangleSurface& closed) {
   if (!(median < kMaxOfDiagonal * calc_box(closed.points).diagonal())) return std::nullopt;
   std::vector<char> thin(count, 0);
   for (std::size_t f = 0; f < count; ++f) thin[f] = way[f] < kMaxOfMedian * median;
-  // Sides: thin triangles connected by edges.
+  // Sides: triangles with a thin wall, connected by edges.
   mesh::Parts parts(count);
   std::unordered_map<Edge, std::int32_t, EdgeHash> first;
   for (std::size_t f = 0; f < count; ++f) {
@@ -65,8 +65,8 @@ std::optional<TwoSides> find_two_sides(const TriangleSurface& closed) {
   std::vector<std::pair<double, std::int32_t>> largest;
   for (const auto& [side, a] : sides) largest.emplace_back(-a, side);
   std::sort(largest.begin(), largest.end());
-  if (largest.size() < 2 || -largest[1].first < kMinSide * all) return std::nullopt;
-  if (all + largest[0].first + largest[1].first > kMaxRim * all) return std::nullopt;
+  if (largest.size() < 2 || -largest[1].first < kMinSideAreaRatio * all) return std::nullopt;
+  if (all + largest[0].first + largest[1].first > kMaxRimAreaRatio * all) return std::nullopt;
   double facing = 0;
   TwoSides result;
   result.thickness_m = median;

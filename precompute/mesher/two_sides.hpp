@@ -1,4 +1,4 @@
-// Walls that are given as closed surfaces.
+// Walls given as closed surfaces.
 #pragma once
 
 #include <optional>
@@ -7,14 +7,14 @@
 
 namespace carillon::mesher {
 
-/// The two sides of a wall, without the rim between them.
+/// Two sides of a wall, without the rim between them.
 struct TwoSides {
   TriangleSurface outer, inner;  // facing away from each other
   double thickness_m = 0;        // median
 };
 
-/// The sides of a closed surface that is the skin of a thin wall. Empty if more than a small part of the surface has no opposite side
-/// within a fifth of the diagonal, or for sides that do not face each other.
+/// Sides of a closed surface that is the skin of a thin wall. Empty if more than a small part of the surface has no opposite side within a
+/// fifth of the diagonal, or if the sides do not face each other.
 std::optional<TwoSides> find_two_sides(const TriangleSurface& closed);
 
 }  // namespace carillon::mesher

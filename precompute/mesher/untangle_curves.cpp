@@ -1,5 +1,5 @@
-// Method: curves end where they turn back; segments sorted along an axis; each is compared with those whose boxes it meets.
-// Source: distance of two segments: Ericson, Real-Time Collision Detection, 2005, section 5.1.9.
+// Method: curves end where they turn back; segments are sorted along an axis and compared where their boxes overlap.
+// Source: segment distance: Ericson, Real-Time Collision Detection, 2005, section 5.1.9.
 #include "precompute/mesher/untangle_curves.hpp"
 
 #include <algorithm>
@@ -9,8 +9,8 @@
 namespace carillon::mesher {
 namespace {
 
-// The sine of 1.7 degrees: to part curves that leave their common end in a smaller angle takes thousands of balls.
-constexpr double kSameDirection = 0.03;
+// Sine of 1.7 degrees: curves that leave their common end at a smaller angle would need thousands of balls.
+constexpr double kMinDirectionSine = 0.03;
 
 struct Segment {
   Vec3 a{}, b{};
@@ -23,7 +23,7 @@ double calc_length(const Polyline& curve) {
   return length;
 }
 
-/// The least distance of two segments.
+/// Distance of two segments.
 double calc_distance(const Segment& s, const Segment& t) {
   const Vec3 u = s.b - s.a, v = t.b - t.a, w = s.a - t.a;
   const double uu = dot(u, u), vv = dot(v, v), uv = dot(u, v), uw = dot(u, w), vw = dot(v, w);
@@ -37,17 +37,17 @@ double calc_distance(const Segment& s, const Segment& t) {
   return norm(w + x * u - y * v);
 }
 
-/// Whether the two segments touch but for a common end, or run along each other from one.
+/// True if the segments touch other than at a common end, or overlap from it.
 bool is_tangled(const Segment& s, const Segment& t, double same_m) {
   const bool ends[4] = {s.a == t.a, s.a == t.b, s.b == t.a, s.b == t.b};
   const int common = ends[0] + ends[1] + ends[2] + ends[3];
   if (common > 1) return true;
   if (common == 0) return calc_distance(s, t) <= same_m;
   const Vec3 u = ends[0] || ends[1] ? s.b - s.a : s.a - s.b, v = ends[0] || ends[2] ? t.b - t.a : t.a - t.b;
-  return dot(u, v) > 0 && norm(cross(u, v)) <= kSameDirection * norm(u) * norm(v);
+  return dot(u, v) > 0 && norm(cross(u, v)) <= kMinDirectionSine * norm(u) * norm(v);
 }
 
-/// Points in order, none closer than same_m to the one before; ends stay.
+/// Points in order, none closer than same_m to its predecessor; ends stay.
 Polyline thin_out(const Polyline& curve, double same_m) {
   Polyline out{curve.front()};
   for (std::size_t i = 1; i < curve.size(); ++i) {
@@ -60,10 +60,10 @@ Polyline thin_out(const Polyline& curve, double same_m) {
   return out;
 }
 
-/// Whether the curve turns back at b: the mesher's balls on the two sides of such a bend shrink without end, unless one stands on it.
+/// True if the curve turns back at b: protecting balls on both sides of such a bend shrink without end, unless one is centred on it.
 bool turns_back(const Vec3& a, const Vec3& b, const Vec3& c) { return dot(b - a, c - b) < 0; }
 
-/// The curve in pieces that end where it turns back; a closed one begins at such a bend and has two pieces at least.
+/// Pieces of the curve between turn-back points; a closed one begins at such a bend and has at least two pieces.
 std::vector<Polyline> split_at_bends(Polyline curve) {
   if (curve.size() > 3 && curve.front() == curve.back() && !turns_back(curve[curve.size() - 2], curve[0], curve[1]))
     for (std::size_t i = 1; i + 1 < curve.size(); ++i)
@@ -108,7 +108,7 @@ std::vector<Polyline> untangle_curves(std::vector<Polyline> curves, double same_
   }
   const auto low = [](const Segment& s, int c) { return std::min(s.a[c], s.b[c]); };
   const auto high = [](const Segment& s, int c) { return std::max(s.a[c], s.b[c]); };
-  // Sorted along the longest side of their box: curves in a plane across it would all meet.
+  // Sorted along the longest side of their box: all curves in a plane normal to it would overlap.
   Vec3 lowest{1e300, 1e300, 1e300}, highest{-1e300, -1e300, -1e300};
   for (const Segment& s : segments)
     for (int c = 0; c < 3; ++c) lowest[c] = std::min(lowest[c], low(s, c)), highest[c] = std::max(highest[c], high(s, c));

@@ -1,4 +1,4 @@
-// Sharp curves as the Delaunay mesher can take them.
+// Prepares sharp curves for the Delaunay mesher.
 #pragma once
 
 #include <vector>
@@ -7,9 +7,9 @@
 
 namespace carillon::mesher {
 
-/// The curves without repeated points, with ends closer than `same_m` made one, and without those that touch, cross or run along another
-/// (or themselves) anywhere but at a common end: of two the shorter goes. A curve ends where it turns by more than a right angle. CGAL's
-/// protecting balls shrink to nothing, or crash, on what is left out.
+/// Removes repeated points, merges ends closer than `same_m`, and drops curves that touch, cross or overlap another (or themselves) other
+/// than at a common end: the shorter of two. Splits curves where they turn by more than a right angle. On the dropped curves CGAL's
+/// protecting balls shrink to nothing, or CGAL crashes.
 std::vector<Polyline> untangle_curves(std::vector<Polyline> curves, double same_m);
 
 }  // namespace carillon::mesher

@@ -1,8 +1,7 @@
-// Method: the volume by tetrahedra against the one by the divergence theorem or the distance field; distances of the boundary's nodes by
-//   exact nearest points; the mesh's shells by walking its boundary. The body's shells: of a clean solid the parts of its surface; else
-//   the parts of the body and of the space around it, found in the distance field by rows of samples, are one more than the surfaces
-//   between them (in space, each closed surface parts one region in two).
-// Source: our own; the last is the tree of regions that nested surfaces make (Alexander duality).
+// Method: volume by tetrahedra against the divergence theorem or the distance field; boundary node distances by exact nearest points;
+//   shells of the mesh by walking its boundary. Shells of a clean solid: parts of its surface; otherwise regions of the body and of the
+//   surrounding space in the distance field, found by sample rows, minus one (in space, each closed surface separates one region into two:
+//   Alexander duality).
 #include "precompute/mesher/verify.hpp"
 
 #include <fmt/core.h>
@@ -17,29 +16,29 @@
 namespace carillon::mesher {
 namespace {
 
-// Parts thinner than this many edges, or shorter than the second, may be lost in elements of that size.
-// Cells through the least thickness, and how much longer or shorter the mesh may be, where stuffing is to show the body: with less
-// tips end short (the ears of the solid bunny by 1.2 mm of 130 with 20,000 nodes).
-constexpr double kCells = 3, kShort = 0.002;
-constexpr double kOpposite = 0.64;  // cosine of half the angle between two directions to the surface
+// Parts thinner than the first, or shorter than the second, in edges, may be lost at that element size.
+// Limits for stuffing: cells through the least thickness, and relative length error. Below, tips end short (the ears of the solid bunny by
+// 1.2 mm of 130 with 20,000 nodes).
+constexpr double kMinCellsPerThickness = 3, kMaxStuffingLengthError = 0.002;
+constexpr double kMaxHalfAngleCosine = 0.64;  // cosine of half the angle between two directions to the surface
 constexpr double kMinThickness = 1.0, kMinLength = 3;
-// Of an extent of the body, and in edges: what coarse elements may lack of its tips.
+// Length deficit allowed for coarse elements: relative to the extent, and in edges.
 constexpr double kMaxLostDistance = 0.1, kMaxLostDistanceEdges = 2;
-constexpr double kHopelessWalls = 3;  // edges this many times as long as the wall is thick do not bring a lost hollow back
+constexpr double kMaxRestorableEdgePerWall = 3;  // edge length over wall thickness above which shorter edges cannot restore a lost hollow
 
-/// A region of the field: where the body is, or where it is not.
+/// Region of the field, inside or outside the body.
 struct Region {
   double samples = 0, faces = 0;  // faces: of samples against the other kind
   std::array<std::int32_t, 3> low{INT32_MAX, INT32_MAX, INT32_MAX}, high{INT32_MIN, INT32_MIN, INT32_MIN};
 };
 
-/// A run of samples of one kind along x.
+/// Run of samples of one kind along x.
 struct Run {
   std::int32_t first = 0, last = 0;
   bool inside = false;
 };
 
-/// The regions of the field that hang together by faces of samples; with `by_corners` by their edges and corners too.
+/// Regions of the field connected by sample faces; with `by_corners` also by edges and corners.
 std::vector<Region> find_regions(const DistanceField& field, double wall_m, bool by_corners) {
   const auto rows = static_cast<std::size_t>(field.size[1]) * static_cast<std::size_t>(field.size[2]);
   std::vector<std::size_t> start(rows + 1, 0);
@@ -58,7 +57,7 @@ std::vector<Region> find_regions(const DistanceField& field, double wall_m, bool
   std::vector<double> faces(runs.size(), 0);
   const std::int32_t reach = by_corners ? 1 : 0;
   const auto join = [&](std::size_t a, std::size_t b) { parts.join(static_cast<std::int32_t>(a), static_cast<std::int32_t>(b)); };
-  // Runs of two rows side by side (or, if `across`, only diagonally).
+  // Runs of two adjacent rows (or, if `across`, diagonally adjacent).
   const auto join_rows = [&](std::size_t one, std::size_t other, bool across) {
     std::size_t a = start[one], b = start[other];
     while (a < start[one + 1] && b < start[other + 1]) {
@@ -69,7 +68,7 @@ std::vector<Region> find_regions(const DistanceField& field, double wall_m, bool
       } else if (first <= last && runs[a].inside == runs[b].inside) {
         join(a, b);
       }
-      // The next run of either row may touch this one of the other by a corner.
+      // The next run of either row may touch this one of the other at a corner.
       if (reach > 0 && b + 1 < start[other + 1] && runs[b].last == last && runs[b + 1].inside == runs[a].inside) join(a, b + 1);
       if (reach > 0 && a + 1 < start[one + 1] && runs[a].last == last && runs[a + 1].inside == runs[b].inside) join(a + 1, b);
       runs[a].last < runs[b].last ? ++a : ++b;
@@ -105,7 +104,7 @@ std::vector<Region> find_regions(const DistanceField& field, double wall_m, bool
   return regions;
 }
 
-/// Of boundary faces, the sets that hang together by edges.
+/// Boundary faces grouped by common edges.
 std::int64_t count_parts(const std::vector<Triangle>& boundary, std::size_t nodes) {
   TriangleSurface skin;
   skin.points.resize(nodes);
@@ -113,7 +112,7 @@ std::int64_t count_parts(const std::vector<Triangle>& boundary, std::size_t node
   return static_cast<std::int64_t>(split_parts(skin).size());
 }
 
-/// Where a mesh of this extent falls short of the body by more than coarse elements explain; empty if nowhere. `is` begins the sentence.
+/// Extent deficit of the mesh beyond that of coarse elements; empty if none. `is` begins the sentence.
 std::string describe_lost(const Body& body, const Vec3& made, double edge_m, const char* is) {
   const Vec3 wanted = calc_used_box(body.repaired.surface).extent();
   std::string text;
@@ -134,11 +133,11 @@ std::string find_lost(const Body& body, double edge_m) {
   Vec3 made{};
   for (int c = 0; c < 3; ++c) {
     std::int32_t low = INT32_MAX, high = INT32_MIN;
-    for (std::size_t r = 1; r < regions.size(); ++r) {  // the first is the space around the body
+    for (std::size_t r = 1; r < regions.size(); ++r) {  // the first is the surrounding space
       low = std::min(low, regions[r].low[c]);
       high = std::max(high, regions[r].high[c]);
     }
-    // The skin is less than a sample beyond the last one inside.
+    // The skin is less than a sample beyond the last inner one.
     if (regions.size() > 1) made[c] = body.field->voxel_m * (high - low + 2);
   }
   return describe_lost(body, made, edge_m, "would be at most");
@@ -154,20 +153,20 @@ double calc_least_thickness(const DistanceField& field) {
         if (depth < shallow || depth > deep || depth >= least) continue;
         const Vec3 slope{field.sample(i + 1, j, k) - field.sample(i - 1, j, k), field.sample(i, j + 1, k) - field.sample(i, j - 1, k),
                          field.sample(i, j, k + 1) - field.sample(i, j, k - 1)};
-        if (norm(slope) < 2 * field.voxel_m * kOpposite) least = depth;
+        if (norm(slope) < 2 * field.voxel_m * kMaxHalfAngleCosine) least = depth;
       }
   return 2 * least;
 }
 
 std::string find_cut(const mesh::TetMesh& linear, const Body& body, double edge_m) {
   const double thickness = body.wall_m > 0 ? body.wall_m : calc_least_thickness(*body.field);
-  if (thickness < kCells * edge_m)
+  if (thickness < kMinCellsPerThickness * edge_m)
     return fmt::format("has edges of {:.3g} m where the body is {:.3g} m thick at its thinnest, {:.1f} of them", edge_m, thickness,
                        thickness / edge_m);
   const Vec3 made = calc_box(linear.nodes_m).extent(), wanted = calc_used_box(body.repaired.surface).extent();
   for (int c = 0; c < 3; ++c) {
     const double extent = wanted[c] - 2 * body.repaired.offset_m;
-    if (std::abs(made[c] / extent - 1) > kShort)
+    if (std::abs(made[c] / extent - 1) > kMaxStuffingLengthError)
       return fmt::format("is {:.4g} m long along {} where the body is {:.4g} m", made[c], "xyz"[c], extent);
   }
   return "";
@@ -183,11 +182,11 @@ Shells count_shells(const Body& body, double edge_m) {
     }
   } else {
     const double voxel = body.field->voxel_m;
-    // Parts that touch may come out joined or apart.
+    // Touching parts may be meshed joined or apart.
     shells.max = static_cast<std::int64_t>(find_regions(*body.field, body.wall_m, false).size());
     const auto regions = find_regions(*body.field, body.wall_m, true);
     for (const Region& region : regions) {
-      // A surface of samples' faces has about one and a half times the area of the smooth one.
+      // A surface of sample faces has about 1.5 times the area of the smooth one.
       const double thickness = 2 * region.samples * voxel / std::max(region.faces / 1.5, 1.0);
       double diagonal = 0;
       for (int c = 0; c < 3; ++c) diagonal = std::hypot(diagonal, voxel * (region.high[c] - region.low[c] + 1));
@@ -197,7 +196,7 @@ Shells count_shells(const Body& body, double edge_m) {
     }
     --shells.max;
     --shells.min;
-    // Who asks for a wall has a hollow, however small.
+    // A requested wall implies a hollow, however small.
     if (body.wall_m > 0 && shells.max >= 2) shells.min = std::max<std::int64_t>(shells.min, 2);
   }
   shells.min = std::max<std::int64_t>(shells.min, 1);
@@ -241,9 +240,9 @@ Comparison compare(const mesh::TetMesh& linear, const Body& body, const Expectat
                                    ? fmt::format("{}", expectation.shells.max)
                                    : fmt::format("{} to {}", expectation.shells.min, expectation.shells.max));
 
-  // Of a hollow that was filled where elements are as long as the wall is thick several times over.
+  // A hollow was filled where the elements are several times longer than the wall is thick.
   result.is_hopeless = flat > 0 || (!result.fault.empty() && result.shells < expectation.shells.min && body.wall_m > 0 &&
-                                    edge > kHopelessWalls * body.wall_m);
+                                    edge > kMaxRestorableEdgePerWall * body.wall_m);
   if (std::string lost = describe_lost(body, calc_box(linear.nodes_m).extent(), edge, "is"); !lost.empty()) {
     result.is_hopeless = true;
     result.fault = std::move(lost);

@@ -20,16 +20,16 @@
 namespace carillon::mesher {
 namespace {
 
-constexpr double kSearchAim = 0.08;    // error of the count that ends the search; half of it for small, cheap meshes
-constexpr double kSmallTarget = 5000;  // corner nodes
-constexpr int kMaxFinishes = 4;        // finished meshes: finishing changes the count
-constexpr double kFlatDeg = 12;        // elements flatter than this are improved one by one at the end
-// A target under this part of the count that the body's thickness needs is refused at once.
-constexpr double kHopeless = 0.4;
-constexpr double kOnCurve = 1e-3;            // of an edge: rounding of nodes on sharp curves
-constexpr double kMaxLostByRounding = 0.04;  // of the volume, by rounded sharp edges
+constexpr double kSearchAim = 0.08;             // count error that ends the search; halved for small, cheap meshes
+constexpr double kSmallTarget = 5000;           // corner nodes
+constexpr int kMaxFinishes = 4;                 // finished meshes: finishing changes the count
+constexpr double kMaxImprovedDihedralDeg = 12;  // flatter elements are improved individually at the end
+// A target below this part of the count required by the thickness is refused at once.
+constexpr double kMinTargetRatio = 0.4;
+constexpr double kMaxCurveDistanceRatio = 1e-3;  // over the edge: rounding of nodes on sharp curves
+constexpr double kMaxLostByRounding = 0.04;      // relative volume loss by rounded sharp edges
 
-/// Makes the body of a fresh mesh sound: no pinched edges or nodes, no crumbs, no element flatter than need be.
+/// Repairs a new mesh: pinched edges and nodes, fragments, flat elements.
 void finish_mesh(mesh::TetMesh& mesh, const Body& body, SurfaceReport& report) {
   const auto project_here = [&](const Vec3& p) { return project(body, p); };
   peel_flat_elements(mesh);
@@ -41,18 +41,18 @@ void finish_mesh(mesh::TetMesh& mesh, const Body& body, SurfaceReport& report) {
     const Vec3 there = project_here(p);
     return is_on_skin(there) ? std::optional(there) : std::nullopt;
   };
-  const auto is_on_curve = [&](const Vec3& p) { return calc_distance(body.curves, p) < kOnCurve * report.mean_edge_m; };
+  const auto is_on_curve = [&](const Vec3& p) { return calc_distance(body.curves, p) < kMaxCurveDistanceRatio * report.mean_edge_m; };
   report.mean_edge_m = measure(mesh).mean_edge_m;
-  better_flat_elements(mesh, kFlatDeg, project_to_skin, is_on_curve);
+  better_flat_elements(mesh, kMaxImprovedDihedralDeg, project_to_skin, is_on_curve);
 }
 
-/// The finished mesh is not the body (verify.hpp); what() is the end of a sentence.
+/// The finished mesh misrepresents the body (verify.hpp); what() completes a sentence.
 struct WrongMesh : std::runtime_error {
   WrongMesh(const std::string& what, double edge) : std::runtime_error(what), edge_m(edge) {}
   double edge_m;
 };
 
-/// Refines until the count is met, and finishes the mesh; with a corrected target if finishing changes the count too much.
+/// Refines until the count is met and finishes the mesh; repeats with a corrected target if finishing changes the count too much.
 mesh::TetMesh meet_count(const Body& body, const SurfaceOptions& options, double& edge_m, SurfaceReport& report, Phases& phases,
                          const std::function<mesh::TetMesh(double)>& refine, const std::function<void(mesh::TetMesh&)>& finish) {
   const auto refuse_empty = [&](const mesh::TetMesh& mesh) {
@@ -61,8 +61,8 @@ mesh::TetMesh meet_count(const Body& body, const SurfaceOptions& options, double
                                    options.surface.string(), edge_m));
   };
   const double longest = calc_box(body.repaired.surface.points).diagonal();
-  // Slightly shorter edges for a finished mesh that is not the body: other elements lie across its thin walls then.
-  constexpr double kShorter = 0.97;
+  // Try slightly shorter edges if the finished mesh misrepresents the body: other elements then lie across its thin walls.
+  constexpr double kEdgeReduction = 0.97;
   Comparison comparison;
   const auto is_the_body = [&](const mesh::TetMesh& mesh) {
     comparison = phases.run("comparing with the body", [&] {
@@ -73,7 +73,7 @@ mesh::TetMesh meet_count(const Body& body, const SurfaceOptions& options, double
     return comparison.fault.empty();
   };
   if (!options.nodes) {
-    for (int n = 0; n < kMaxFinishes; ++n, edge_m *= kShorter) {
+    for (int n = 0; n < kMaxFinishes; ++n, edge_m *= kEdgeReduction) {
       ++report.attempts;
       mesh::TetMesh mesh = phases.run("refining", [&] { return refine(edge_m); });
       refuse_empty(mesh);
@@ -104,7 +104,7 @@ mesh::TetMesh meet_count(const Body& body, const SurfaceOptions& options, double
     if (comparison.is_hopeless) break;
     if (met) {
       target = std::min(1.03 * target, asked * (1 + 0.7 * kCountTolerance));
-      edge_m *= kShorter;
+      edge_m *= kEdgeReduction;
       continue;
     }
     nearest = count;
@@ -114,7 +114,7 @@ mesh::TetMesh meet_count(const Body& body, const SurfaceOptions& options, double
   throw CountError("the count cannot be met", nearest, nearest);
 }
 
-/// Proposes a size where a mesh with edges of that length does not represent the body.
+/// Proposes an edge length if a mesh with this one misrepresents the body.
 [[noreturn]] void throw_wrong(const SurfaceOptions& options, const Body& body, const WrongMesh& failure) {
   const double shorter = failure.edge_m / 1.4;
   const double nodes = std::max(body.model.calc_nodes(shorter), 1.5 * static_cast<double>(options.nodes.value_or(0)));
@@ -139,12 +139,12 @@ mesh::TetMesh meet_count(const Body& body, const SurfaceOptions& options, double
                      std::llround(failure.nearest));
 }
 
-/// The surface defeats Delaunay refinement, but perhaps not stuffing.
+/// Delaunay refinement fails on this surface; stuffing may work.
 struct DelaunayError : InputError {
   using InputError::InputError;
 };
 
-/// The linear mesh by Delaunay refinement.
+/// Linear mesh by Delaunay refinement.
 mesh::TetMesh make_delaunay_mesh(Body& body, const SurfaceOptions& options, double& edge_m, SurfaceReport& report, Phases& phases) {
   const double first_edge = edge_m;
   std::optional<CountError> with_sharp;
@@ -178,7 +178,7 @@ mesh::TetMesh make_delaunay_mesh(Body& body, const SurfaceOptions& options, doub
       refuse(failure);
     }
   }
-  // Sharp edges that lie closer together than the elements are long defeat the mesher; rounded, the body can still be meshed.
+  // Sharp edges closer together than the element length defeat the mesher; with rounded edges the body can still be meshed.
   report.notes.push_back(
       "The sharp edges lie too close to each other for this element size and were rounded; ask for more nodes to keep them.");
   try {
@@ -201,7 +201,7 @@ mesh::TetMesh make_delaunay_mesh(Body& body, const SurfaceOptions& options, doub
   return {};
 }
 
-/// The linear mesh by isosurface stuffing.
+/// Linear mesh by isosurface stuffing.
 mesh::TetMesh make_stuffed_mesh(const Body& body, const SurfaceOptions& options, double& edge_m, SurfaceReport& report, Phases& phases) {
   const auto refine = [&](double e) { return stuff(*body.field, body.wall_m, e); };
   try {
@@ -229,7 +229,7 @@ void measure_mesh(const mesh::TetMesh& linear, const Body& body, SurfaceReport& 
   report.mean_edge_m = measures.mean_edge_m;
   report.layers_mean = measures.mean_edge_m > 0 ? body.thickness_m / measures.mean_edge_m : 0;
   if (body.wall_m <= 0) return;
-  // The inner skin: boundary nodes deeper than half the wall.
+  // Inner skin: boundary nodes deeper than half the wall.
   std::vector<std::int32_t> skin;
   for (const Triangle& t : find_boundary(linear)) skin.insert(skin.end(), t.begin(), t.end());
   std::sort(skin.begin(), skin.end());
@@ -255,7 +255,7 @@ void measure_mesh(const mesh::TetMesh& linear, const Body& body, SurfaceReport& 
 
 void check_count(const SurfaceOptions& options, double min_nodes) {
   const bool is_hopeless = options.nodes
-                               ? options.method != Method::kStuffing && static_cast<double>(*options.nodes) < kHopeless * min_nodes
+                               ? options.method != Method::kStuffing && static_cast<double>(*options.nodes) < kMinTargetRatio * min_nodes
                                : min_nodes > 1.5 * kMaxNodes;
   if (is_hopeless) throw_count(options, CountError("", min_nodes, min_nodes));
 }
@@ -267,7 +267,7 @@ mesh::TetMesh make_volume_mesh(Body& body, const SurfaceOptions& options, double
   body.nearest.emplace(body.repaired.surface);
   if (body.wall_m > 0 || !body.repaired.clean || report.method == Method::kStuffing)
     body.field = phases.run("computing distances", [&] { return make_field(body, options, edge_m); });
-  // Refinement of parts thinner than the elements takes long and loses them in the end. A count may need longer edges than these.
+  // Refinement of parts thinner than the elements takes long and finally loses them. A count may need longer edges than these.
   constexpr double kLonger = 1.5;
   if (const std::string lost = find_lost(body, options.nodes ? kLonger * edge_m : edge_m); !lost.empty())
     throw_wrong(options, body, WrongMesh(lost, edge_m));

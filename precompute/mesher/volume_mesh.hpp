@@ -7,12 +7,12 @@
 
 namespace carillon::mesher {
 
-/// Refuses a node count far below `min_nodes`, and bodies so thin that without a count they need too many (InputError, CountRefusal).
+/// Refuses a node count far below `min_nodes`, and bodies too thin to mesh without a count (InputError, CountRefusal).
 void check_count(const SurfaceOptions& options, double min_nodes);
 
-/// The mesh of the body, with its method and measures in the report; body: repaired, rounded, with its model. edge_m: first edge of the
-/// search. Stuffs automatic bodies on which refinement does not end. Throws InputError if the mesh is not the body, CountRefusal if the
-/// count cannot be met.
+/// Mesh of the body (repaired, rounded, with its model); method and measures go to the report. edge_m: first edge of the search. Automatic
+/// bodies fall back to stuffing if refinement does not end. Throws InputError if the mesh misrepresents the body, CountRefusal if the count
+/// cannot be met.
 mesh::TetMesh make_volume_mesh(Body& body, const SurfaceOptions& options, double edge_m, SurfaceReport& report, Phases& phases);
 
 }  // namespace carillon::mesher

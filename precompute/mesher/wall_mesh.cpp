@@ -10,7 +10,7 @@
 namespace carillon::mesher {
 namespace {
 
-/// Meshes a wall by extrusion. False for an impossible wall; fault: the reason, the end of a sentence.
+/// Meshes a wall by extrusion. False for an impossible wall; fault: the reason, completing a sentence.
 bool extrude_wall(const ThinBody& body, const SurfaceOptions& options, SurfaceReport& report, Phases& phases, mesh::TetMesh& out,
                   std::string& fault) {
   const SurfaceReport before = report;

@@ -1,4 +1,4 @@
-// Bodies that are meshed as walls, by extrusion of their skins.
+// Bodies meshed as walls, by extrusion of their skins.
 #pragma once
 
 #include <optional>
@@ -9,11 +9,11 @@
 
 namespace carillon::mesher {
 
-/// An open sheet with a wall. Throws InputError if it cannot be extruded.
+/// Open sheet with a wall. Throws InputError if it cannot be extruded.
 mesh::TetMesh make_sheet(Sheet sheet, const SurfaceOptions& options, SurfaceReport& report, Phases& phases);
 
-/// The wall of a closed body by extrusion: as asked for, or thinner than its elements are long. Empty for a body left to the volume
-/// meshers, with the reason in the report. Throws InputError if extrusion was asked for and is impossible.
+/// Extruded wall of a closed body, if requested or thinner than the element length. Empty for bodies left to the volume meshers, with the
+/// reason in the report. Throws InputError if extrusion was requested and is impossible.
 std::optional<mesh::TetMesh> make_thin(const Body& body, const SurfaceOptions& options, SurfaceReport& report, Phases& phases);
 
 }  // namespace carillon::mesher

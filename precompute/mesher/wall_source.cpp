@@ -15,13 +15,13 @@
 namespace carillon::mesher {
 namespace {
 
-constexpr double kNoiseLength = 2;   // edges: shorter isolated folds are noise
-constexpr std::size_t kScan = 2000;  // triangles; sharp edges of larger surfaces may be noise
+constexpr double kMaxNoiseEdges = 2;              // in edges: shorter isolated folds are noise
+constexpr std::size_t kMinNoisyTriangles = 2000;  // in triangles; sharp edges of larger surfaces may be noise
 
 /// Removes isolated folds shorter than elements.
 void drop_noise(const TriangleSurface& facets, std::vector<Edge>& folds, double sharp_angle_deg, double edge_m) {
-  if (facets.triangles.size() > kScan) {
-    // Folds of a scan are sharp at the size of elements, too.
+  if (facets.triangles.size() > kMinNoisyTriangles) {
+    // Folds of a scan are also sharp at element size.
     std::map<Vec3, std::int32_t> number;
     for (const Triangle& t : facets.triangles)
       for (const std::int32_t v : t) number[facets.points[v]] = v;
@@ -36,10 +36,10 @@ void drop_noise(const TriangleSurface& facets, std::vector<Edge>& folds, double 
   std::map<std::int32_t, double> length;
   const auto& p = facets.points;
   for (const auto& [a, b] : folds) length[parts.find(a)] += norm(p[b] - p[a]);
-  std::erase_if(folds, [&](const Edge& e) { return length[parts.find(e[0])] < kNoiseLength * edge_m; });
+  std::erase_if(folds, [&](const Edge& e) { return length[parts.find(e[0])] < kMaxNoiseEdges * edge_m; });
 }
 
-/// Throws WallError for an edge of three triangles, or a point shared by two parts of the surface.
+/// Throws WallError for an edge of three triangles, or a point shared by two parts.
 void refuse_shared(const TriangleSurface& facets) {
   const FaceCounts count = count_faces(facets);
   for (const Triangle& t : facets.triangles)
@@ -52,7 +52,7 @@ void refuse_shared(const TriangleSurface& facets) {
   // Unconnected corners at one point: shared by two parts.
   const std::size_t count_of_corners = 3 * facets.triangles.size();
   mesh::Parts parts(count_of_corners);
-  std::unordered_map<Edge, std::array<std::int32_t, 2>, EdgeHash> first;  // by edge: the corners at its lower and its higher point
+  std::unordered_map<Edge, std::array<std::int32_t, 2>, EdgeHash> first;  // by edge: corners at its lower and higher point
   for (std::size_t f = 0; f < facets.triangles.size(); ++f)
     for (int c = 0; c < 3; ++c) {
       const Triangle& t = facets.triangles[f];
@@ -82,9 +82,9 @@ WallSource::WallSource(const Body& body, const SurfaceOptions& options, double e
   if (round_) {
     folds = round_->list_folds();
   } else {
-    constexpr double kFlatDeg = 1;
+    constexpr double kMaxFlatTurnDeg = 1;
     for (const Bend& bend : find_bends(start_.surface, options.sharp_angle_deg).edges)
-      if (bend.count == 2 && (options.facets ? bend.turn_deg > kFlatDeg : bend.sharp)) folds.push_back(bend.ends);
+      if (bend.count == 2 && (options.facets ? bend.turn_deg > kMaxFlatTurnDeg : bend.sharp)) folds.push_back(bend.ends);
   }
   refuse_shared(start_.surface);
   const std::size_t all = folds.size();

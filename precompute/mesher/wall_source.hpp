@@ -1,4 +1,4 @@
-// The surface from which the skin of a thin wall is made.
+// Source surface of a thin wall's skin.
 #pragma once
 
 #include <vector>
@@ -8,11 +8,11 @@
 
 namespace carillon::mesher {
 
-/// The triangles, folds and borders of a body's surface, and projections onto them. Invariant: no edge of three triangles, no
-/// point shared by two parts. Refers to the body.
+/// Triangles, folds and borders of a body's surface, and projections onto them. Invariant: no edge of three triangles, no point shared by
+/// two parts. Refers to the body.
 class WallSource {
  public:
-  /// edge_m: of the skin; shorter isolated folds are noise. Throws WallError for a surface that branches or touches itself in a point.
+  /// edge_m: of the skin; shorter isolated folds are noise. Throws WallError for a surface that branches or touches itself at a point.
   WallSource(const Body& body, const SurfaceOptions& options, double edge_m);
 
   const Skin& get_start() const { return start_; }
@@ -25,7 +25,7 @@ class WallSource {
   Vec3 find_on_lines(const Vec3& p) const;
   double calc_distance(const Vec3& p) const { return norm(nearest_.find(p) - p); }
 
-  /// As of RoundSurface; zero without one.
+  /// As RoundSurface; zero without one.
   bool is_doubtful() const { return round_ && round_->is_doubtful(); }
   Vec3 find_doubt(const Vec3& p) const;
 

@@ -21,10 +21,10 @@
 namespace carillon::simulation {
 namespace {
 
-constexpr double kMostStrikeDistance = 0.05;  // of a body's extent, between a blow's point and the skin
-constexpr double kTableReach = 1e-4;          // of a body's extent, between the position of a row and a node
+constexpr double kMaxStrikeDistanceRatio = 0.05;  // over the body's extent: largest distance of an impulse's point from the skin
+constexpr double kMaxTableDistanceRatio = 1e-4;   // over the body's extent: largest distance of a table row from its node
 
-/// Runs `work` for a body; its InputError gets the line of the job.
+/// Runs `work` for a body; adds the job line to its InputError.
 template <typename Work>
 auto name_place(const std::string& place, Work&& work) {
   try {
@@ -40,7 +40,7 @@ transient::Law make_law(const job::Material& material) {
   return {lambda, mu, material.alpha1_s * lambda, material.alpha1_s * mu, material.density_kg_m3};
 }
 
-/// In the axes of the body's mesh. Rank 0.
+/// In mesh coordinates. Rank 0.
 mesh::TetMesh make_mesh(const job::SimulatedBody& body, std::vector<std::string>& warnings) {
   const int order = body.element == job::Element::T10 ? 2 : 1;
   mesh::TetMesh mesh;
@@ -59,7 +59,7 @@ mesh::TetMesh make_mesh(const job::SimulatedBody& body, std::vector<std::string>
   return mesh;
 }
 
-/// Nodes and shares of the nearest point of the skin. Refuses points too far from it for the body's extent about its centre of mass.
+/// Nodes and shares of the nearest skin point. Refuses points too far from it relative to the body's extent about its centre of mass.
 std::vector<transient::NodeShare> find_struck_nodes(const transient::Assembly& assembly, std::size_t body,
                                                     const std::vector<std::array<std::int32_t, 6>>& skin, const Vec3& centre_m,
                                                     const Vec3& point_m, const std::string& place) {
@@ -67,7 +67,7 @@ std::vector<transient::NodeShare> find_struck_nodes(const transient::Assembly& a
   const transient::Assembly::Body& struck = assembly.bodies[body];
   for (std::int32_t n = struck.first_node; n < struck.last_node; ++n) extent = std::max(extent, norm(assembly.nodes_m[n] - centre_m));
   std::vector<transient::NodeShare> shares = find_shares(assembly, skin, point_m, &distance);
-  if (distance > kMostStrikeDistance * extent)
+  if (distance > kMaxStrikeDistanceRatio * extent)
     throw InputError(fmt::format("{}: \"point_m\" is {:.3g} m from the surface of body \"{}\"; give a point on it, in the axes of its mesh",
                                  place, distance, struck.name));
   return shares;
@@ -81,7 +81,7 @@ std::vector<std::int32_t> find_group(const mesh::TetMesh& mesh, const job::NodeG
   });
 }
 
-/// A list of nodes on a line?
+/// True if the nodes are collinear.
 bool is_line(const std::vector<Vec3>& nodes_m, const std::vector<std::int32_t>& nodes) {
   const auto at = [&](std::size_t i) { return nodes_m[nodes[i]]; };
   std::size_t far = 0;
@@ -96,23 +96,23 @@ bool is_line(const std::vector<Vec3>& nodes_m, const std::vector<std::int32_t>& 
   });
 }
 
-/// What rank 0 knows of a body. Nodes of `constrained` are those of the mesh; of a sheet its vertices, then its edges and ghosts.
+/// A body as known to rank 0. Nodes of `constrained` are mesh nodes; of a sheet vertices, then edges and ghosts.
 struct Made {
   transient::AnyBody body;
   struct Group {
     std::vector<std::int32_t> nodes;
-    std::vector<std::array<double, 4>> rows;  // of the path
+    std::vector<std::array<double, 4>> rows;  // path rows
     bool is_hinge = false;
     double release_s = std::numeric_limits<double>::infinity();
   };
   std::vector<Group> constrained;
   Vec3 centre_m{};
-  std::vector<std::string> warnings = {};  // of its mesh
-  std::map<std::int32_t, Vec3> moved;      // displaced nodes of a bent body; displacements in the axes of the mesh
+  std::vector<std::string> warnings = {};  // from its mesh
+  std::map<std::int32_t, Vec3> moved;      // displaced nodes of a bent body; mesh coordinates
   std::vector<transient::Quad> start;      // (nodes) initial displacements of a bent body
 };
 
-/// The constrained groups of a body, each node once: those that follow paths, one by one, then those that are fixed, then the hinged.
+/// Constrained groups of a body, each node once: driven groups one by one, then fixed, then hinged nodes.
 struct ConstrainedGroups {
   std::vector<Made::Group> driven;
   std::vector<std::int32_t> fixed, hinged;
@@ -147,7 +147,7 @@ ConstrainedGroups find_constrained(const job::SimulatedBody& body, const mesh::T
   return constrained;
 }
 
-/// The node at the position of each row of a table.
+/// Node at the position of each row of a table.
 std::vector<std::int32_t> find_table_nodes(const mesh::TetMesh& mesh, const job::Bend& bend) {
   std::vector<std::pair<double, std::int32_t>> by_x;
   Vec3 low = mesh.nodes_m[0], high = low;
@@ -159,7 +159,7 @@ std::vector<std::int32_t> find_table_nodes(const mesh::TetMesh& mesh, const job:
     }
   }
   std::sort(by_x.begin(), by_x.end());
-  const double reach = kTableReach * norm(high - low);
+  const double reach = kMaxTableDistanceRatio * norm(high - low);
   std::vector<std::int32_t> nodes;
   for (std::size_t row = 0; row < bend.table.size(); ++row) {
     const Vec3 at{bend.table[row][0], bend.table[row][1], bend.table[row][2]};
@@ -179,7 +179,7 @@ std::vector<std::int32_t> find_table_nodes(const mesh::TetMesh& mesh, const job:
   return nodes;
 }
 
-/// Displaced nodes of a bent body, in the axes of its mesh.
+/// Displaced nodes of a bent body, in mesh coordinates.
 std::map<std::int32_t, Vec3> find_moved(const job::SimulatedBody& body, const mesh::TetMesh& mesh, const ConstrainedGroups& constrained) {
   std::map<std::int32_t, Vec3> moved;
   for (const job::Bend& bend : body.bends) {
@@ -230,8 +230,7 @@ Made make_solid(const job::SimulatedBody& body) {
   return made;
 }
 
-/// Fixes what a clamp fixes in addition to vertices: the angles of all edges between clamped vertices, and the ghosts behind those of the
-/// rim, which go where both ends of their edge go.
+/// Constrains the angles of all edges between clamped vertices, and the ghosts behind rim edges, which follow both ends of their edge.
 void clamp_directions(const std::string& place, const transient::SheetElements& elements, const std::vector<std::int32_t>& group_of,
                       Made& made, std::vector<std::int32_t>& fixed_nodes) {
   const auto find_group_of = [&](std::int32_t vertex) { return group_of[vertex]; };
@@ -265,13 +264,13 @@ Made make_sheet(const job::SimulatedBody& body) {
   sheet.law = {body.material.lame_lambda_pa(), body.material.lame_mu_pa(), body.material.density_kg_m3, described.thickness_m,
                body.material.alpha1_s};
   sheet.mass_damping_per_s = body.material.alpha2_per_s;
-  // Groups are found as those of solids are.
+  // Same grouping as for solids.
   mesh::TetMesh vertices;
   vertices.nodes_m = sheet.mesh.vertices_m;
   vertices.node_sets = sheet.mesh.node_sets;
   ConstrainedGroups constrained = find_constrained(body, vertices);
   made.moved = find_moved(body, vertices, constrained);
-  std::vector<std::int32_t> group_of(vertices.nodes_m.size(), -1);  // clamped: the group
+  std::vector<std::int32_t> group_of(vertices.nodes_m.size(), -1);  // clamped: group index
   sheet.clamped.resize(vertices.nodes_m.size());
   const auto clamp = [&](const std::vector<std::int32_t>& nodes, std::size_t group) {
     for (const std::int32_t node : nodes) {
@@ -279,13 +278,13 @@ Made make_sheet(const job::SimulatedBody& body) {
       sheet.clamped[node] = true;
     }
   };
-  // A released edge turns freely: elements include the direction of clamps that stay.
+  // A released edge rotates freely: elements include the direction of permanent clamps only.
   for (std::size_t g = 0; g < constrained.driven.size(); ++g)
     if (std::isinf(constrained.driven[g].release_s)) clamp(constrained.driven[g].nodes, g);
   clamp(constrained.fixed, constrained.driven.size());
   const bool is_hinge = constrained.driven.empty() && constrained.fixed.empty() && is_line(vertices.nodes_m, constrained.hinged);
   made.constrained = std::move(constrained.driven);
-  // Angles are no places: they stay as they are where vertices follow a path.
+  // Angles are no positions: fixed even where vertices follow a path.
   clamp_directions(body.place, transient::make_elements(sheet.mesh, sheet.clamped), group_of, made, constrained.fixed);
   if (!constrained.fixed.empty()) made.constrained.push_back({std::move(constrained.fixed), {}, false});
   if (!constrained.hinged.empty()) made.constrained.push_back({std::move(constrained.hinged), {}, is_hinge});
@@ -372,7 +371,7 @@ std::string describe(const transient::AnyBody& body) {
                      sheet.mesh.triangles.size());
 }
 
-/// Displacements of bent bodies in the numbering of the assembly, on every rank.
+/// Displacements of bent bodies in assembly numbering, on every rank.
 void share_start(const comm::Communicator& comm, const std::vector<Made>& made, Bodies& bodies) {
   bodies.start = comm.broadcast([&] {
     std::vector<transient::Quad> start;
@@ -387,7 +386,7 @@ void share_start(const comm::Communicator& comm, const std::vector<Made>& made, 
   });
 }
 
-/// Rank 0's lists on every rank.
+/// Broadcasts lists of rank 0.
 void share(const comm::Communicator& comm, const std::vector<Made>& made, const transient::Assembly& assembly, Bodies& bodies) {
   struct Entry {
     std::int32_t constraint, node;

@@ -37,10 +37,10 @@ Hash calc_seal(std::span<const std::byte> bytes) {
   return sum.finish();
 }
 
-/// What rank 0 has of a file.
+/// File contents on rank 0.
 struct Content {
   SimulationState state;
-  std::vector<std::int64_t> sizes;  // (ranks) bytes of their sounds
+  std::vector<std::int64_t> sizes;  // (ranks) bytes of their sound state
   std::vector<std::byte> sounds;    // of all ranks
 };
 
@@ -55,7 +55,7 @@ Content read(const std::filesystem::path& file, const Hash& identity, int ranks)
   std::span<const std::byte> end = from.subspan(content.size());
   from = content;
   const auto head = base::take<Head>(from);
-  if (std::memcmp(head.magic, kMagic, sizeof kMagic) != 0) refuse("is none of a simulation");
+  if (std::memcmp(head.magic, kMagic, sizeof kMagic) != 0) refuse("is not a simulation checkpoint");
   if (base::take<Hash>(end) != calc_seal(content)) refuse("is cut off or changed");
   if (head.identity != identity) refuse("is of another job, of other meshes or of another version of the program");
   if (head.ranks != ranks) refuse(fmt::format("is of {} ranks, and there are {}", head.ranks, ranks));
@@ -111,7 +111,7 @@ std::optional<SimulationState> load_checkpoint(const comm::Communicator& comm, c
   }) != 0;
   if (!is_there) return std::nullopt;
   content.state.books = comm.broadcast(std::move(content.state.books));
-  // Each rank gets its part of rank 0.
+  // Rank 0 sends each rank its part.
   comm::ByRank<std::byte> parts;
   parts.items = std::move(content.sounds);
   parts.begin.assign(1, 0);

@@ -12,12 +12,12 @@
 namespace carillon::simulation {
 namespace {
 
-constexpr double kNodesPerSecond = 20000.0;  // for meshing, partition and some hundred steps
+constexpr double kNodesPerSecond = 20000.0;  // meshing, partition and some hundred steps
 constexpr double kBytesPerNode = 100.0;      // of mesh files, lower bound
-constexpr long long kCoarseNodes = 1000;     // of a trial mesh that relates edge length to nodes
-constexpr double kSurfaceShare = 5.0;        // time to mesh a surface over that of a shape
+constexpr long long kCoarseNodes = 1000;     // trial mesh that relates edge length to nodes
+constexpr double kSurfaceShare = 5.0;        // meshing time of a surface over that of a shape
 
-/// Nodes asked for; 0: the mesher's choice.
+/// Requested nodes; 0: the mesher's default.
 double estimate_nodes(const job::Body& body, int order) {
   if (body.nodes) return static_cast<double>(*body.nodes);
   if (!body.edge_m || body.shape.empty()) return 0.0;

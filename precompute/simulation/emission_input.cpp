@@ -61,7 +61,7 @@ emission::SurfacePart make_surface_part(const transient::Domain& domain, const j
   std::int64_t number = 0;
   for (std::size_t b = 0; b < assembly.bodies.size(); ++b) {
     if (!spec.bodies[b].sounds && !spec.visibility) continue;
-    // Corners alone, of quadratic elements too: their waves are longer than a facet, and four triangles each cost four times as much.
+    // Corners only, also for quadratic elements: wavelengths exceed a facet, and four triangles each cost four times as much.
     for (const auto& facet : transient::list_skin(assembly, static_cast<std::int32_t>(b))) {
       const std::array<std::int32_t, 3> triangle{facet[0], facet[1], facet[2]};
       const std::int32_t owner = domain.find_place(*std::min_element(triangle.begin(), triangle.end()));

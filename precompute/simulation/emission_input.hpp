@@ -1,18 +1,18 @@
-// Receivers, options and surfaces of a job's sound, for emission.
+// Receivers, options and surfaces of a job's sound, as emission input.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "precompute/simulation/emission/emission.hpp"
 #include "precompute/job/simulation.hpp"
+#include "precompute/simulation/emission/emission.hpp"
 #include "precompute/simulation/transient/domain.hpp"
 
 namespace carillon::simulation {
 
 emission::Options make_emission_options(const job::SimulationSpec& spec, int steps_per_sample, bool is_resumed);
 
-/// Warnings of receivers inside an obstacle, which receive no sound.
+/// Warnings for receivers inside an obstacle, which receive no sound.
 std::vector<std::string> find_deaf_receivers(const job::SimulationSpec& spec);
 
 /// Each triangle on the rank that owns its lowest node.

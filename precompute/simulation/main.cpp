@@ -1,4 +1,4 @@
-// carillon-simulate: bodies that deform and move, on as many ranks as mpirun starts, to sound.
+// carillon-simulate: deforming and moving bodies to sound, on MPI ranks.
 #include <fmt/core.h>
 #include <mpi.h>
 
@@ -27,7 +27,7 @@ namespace {
 
 using namespace carillon;
 
-/// MPI from its beginning to its end.
+/// Lifetime of MPI.
 class Session {
  public:
   Session(int argc, char** argv) { MPI_Init(&argc, &argv); }
@@ -56,7 +56,7 @@ struct CommandLine {
     app.add_option("--surface", options.surface, "record the surface to this file, for carillon-render")->check(named);
     app.add_option("--motion", options.motion, "write the motion to this VTKHDF file")->check(named);
     app.add_option("--record", options.record, "write figures and energies of the run to this file, JSON")->check(named);
-    app.add_option("--progress", options.progress, "append how far the run is to this file, a JSON object a line")->check(named);
+    app.add_option("--progress", options.progress, "append progress to this file, one JSON object per line")->check(named);
     app.add_option("--checkpoint", options.checkpoint,
                    "resume from this file if it exists, and save to it; SIGUSR1 and SIGTERM then save and end with 85")
         ->check(named);
@@ -70,7 +70,7 @@ struct CommandLine {
     CLI::Option* validate =
         app.add_flag("--validate", options.validate, "check the job and its meshes, predict step, time and memory, and simulate nothing");
     app.add_option("--patience", options.patience_s,
-                   "with --validate: seconds for the answer; of meshes that would take longer coarser ones are made, and that is said")
+                   "with --validate: time limit in seconds; larger meshes are replaced by coarser ones, with a note")
         ->check(CLI::Range(0.0, 1e6))
         ->capture_default_str()
         ->needs(validate);

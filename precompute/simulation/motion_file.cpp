@@ -23,7 +23,7 @@
 namespace carillon::simulation {
 namespace {
 
-constexpr std::size_t kRow = 4;  // floats of a point in a frame: place and speed
+constexpr std::size_t kFloatsPerPoint = 4;  // floats per point and frame: position and speed
 
 void write_attribute(hid_t at, const char* name, hid_t type, std::vector<hsize_t> shape, const void* data) {
   const bank::Hdf5Id space(shape.empty() ? H5Screate(H5S_SCALAR) : H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr),
@@ -38,7 +38,7 @@ void write_text(hid_t at, const char* name, std::string_view text) {
   write_attribute(at, name, type, {}, text.data());
 }
 
-/// A data set without the time of its making, so that equal runs write equal bytes.
+/// Data set without creation time, so that equal runs write equal bytes.
 hid_t create_set(hid_t at, const char* name, hid_t type, hid_t space) {
   const bank::Hdf5Id plain(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
   bank::require(H5Pset_obj_track_times(plain, false), "write the motion");
@@ -86,7 +86,7 @@ MotionFile::MotionFile(const transient::Domain& domain, const job::SimulationSpe
 void MotionFile::add_sample(const transient::Motion& motion) {
   const auto frame = static_cast<std::int64_t>(std::floor(static_cast<double>(motion.get_sample()) / every_samples_ + 1e-9));
   if (frame == frame_) return;
-  // The one that is due, whatever came before: a run that resumes begins in the middle.
+  // The due one: a resumed run starts in the middle.
   frame_ = frame;
   count_ = frame + 1;
   if (motion.get_sample() != static_cast<std::int64_t>(std::ceil(static_cast<double>(frame) * every_samples_ - 1e-9))) return;
@@ -100,9 +100,9 @@ void MotionFile::add_sample(const transient::Motion& motion) {
   const std::vector<Point> all = comm::gather(domain_.get_comm(), own);
   domain_.get_comm().agree([&] {
     if (!domain_.get_comm().is_root()) return;
-    std::vector<float> row(static_cast<std::size_t>(points_) * kRow);
+    std::vector<float> row(static_cast<std::size_t>(points_) * kFloatsPerPoint);
     for (const Point& point : all) {
-      float* at = &row[static_cast<std::size_t>(point.index) * kRow];
+      float* at = &row[static_cast<std::size_t>(point.index) * kFloatsPerPoint];
       at[0] = point.x;
       at[1] = point.y;
       at[2] = point.z;
@@ -182,7 +182,7 @@ void MotionFile::write_frames(std::int64_t root) const {
       speed_space(H5Screate_simple(1, all_points, nullptr), H5Sclose);
   const bank::Hdf5Id points(create_set(root, "Points", H5T_IEEE_F32LE, points_space), H5Dclose);
   const bank::Hdf5Id speed(create_set(point_data, "speed", H5T_IEEE_F32LE, speed_space), H5Dclose);
-  const std::size_t row = static_cast<std::size_t>(points_) * kRow;
+  const std::size_t row = static_cast<std::size_t>(points_) * kFloatsPerPoint;
   std::int64_t frame = 0;
   std::string kept;
   base::read_pieces(frames_, "frames of the motion", row * sizeof(float), [&](std::string_view piece) {
@@ -192,8 +192,8 @@ void MotionFile::write_frames(std::int64_t root) const {
       std::memcpy(values.data(), kept.data(), row * sizeof(float));
       kept.erase(0, row * sizeof(float));
       for (std::size_t p = 0; p < static_cast<std::size_t>(points_); ++p) {
-        for (std::size_t k = 0; k < 3; ++k) place[3 * p + k] = values[kRow * p + k];
-        size[p] = values[kRow * p + 3];
+        for (std::size_t k = 0; k < 3; ++k) place[3 * p + k] = values[kFloatsPerPoint * p + k];
+        size[p] = values[kFloatsPerPoint * p + 3];
       }
       const hsize_t begin[2] = {static_cast<hsize_t>(frame) * static_cast<hsize_t>(points_), 0},
                     count[2] = {static_cast<hsize_t>(points_), 3};

@@ -1,4 +1,4 @@
-// The motion of the skins as VTKHDF, for ParaView and carillon-draw.
+// Motion of the skins as VTKHDF, for ParaView and carillon-draw.
 #pragma once
 
 #include <array>
@@ -11,17 +11,17 @@
 
 namespace carillon::simulation {
 
-/// An UnstructuredGrid of moving triangles (VTKHDF 2.0, "Steps") with the point data "speed" [m/s] and the cell data "body", without
-/// strikers. Frames are appended to FILE.frames; the end writes FILE from them by way of FILE.part. The caller removes both
-/// (run::TemporaryFile). A resumed run continues at its checkpoint. Collective, but for the constructor's checks.
+/// UnstructuredGrid of moving triangles (VTKHDF 2.0, "Steps") with point data "speed" [m/s] and cell data "body", without strikers. Frames
+/// are appended to FILE.frames; finally converted to FILE by way of FILE.part. The caller removes both (run::TemporaryFile). A resumed run
+/// continues at its checkpoint. Collective, except for the constructor's checks.
 class MotionFile {
  public:
-  /// Throws InputError on every rank when is_resumed and there are no frames. Collective.
+  /// Throws InputError on every rank if is_resumed and there are no frames. Collective.
   MotionFile(const transient::Domain& domain, const job::SimulationSpec& spec, bool is_resumed);
 
-  /// A frame, if one is due at the present sample. Throws SystemError when the disk refuses. Collective.
+  /// Writes a frame if one is due at the current sample. Throws SystemError for write errors. Collective.
   void add_sample(const transient::Motion& motion);
-  /// Makes the file. Collective.
+  /// Writes the file. Collective.
   void finish();
 
  private:
@@ -40,7 +40,7 @@ class MotionFile {
   std::int64_t frame_ = -1;  // the last one
   std::int64_t count_ = 0;   // frames in the file
   double rate_hz_ = 0;
-  std::vector<std::array<std::int32_t, 2>> own_;        // index among the points, place on this rank
+  std::vector<std::array<std::int32_t, 2>> own_;        // index among the points, index on this rank
   std::vector<std::array<std::int32_t, 3>> triangles_;  // into the points
   std::vector<std::int32_t> body_;                      // of each
   std::int32_t points_ = 0;

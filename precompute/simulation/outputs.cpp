@@ -21,9 +21,10 @@ namespace {
 namespace fs = std::filesystem;
 using transient::EnergyBook;
 
-constexpr double kFullScalePa = 1.0;  // of a WAV file; louder sounds are scaled to a peak of 1
-constexpr double kBookGoal = 1e-6;    // error of an energy book over the largest energy
-constexpr double kBookScatter = 3.0;  // off the square law by 2.7 at most: 11 scenes with errors above the goal, steps down to a sixth
+constexpr double kFullScalePa = 1.0;       // of a WAV file; louder sounds are normalised to a peak of 1
+constexpr double kTargetBookError = 1e-6;  // target energy error over the largest energy
+constexpr double kBookErrorFactor =
+    3.0;  // largest deviation from the square law: 2.7 in 11 scenes with errors above the target, steps down to a sixth
 
 base::Json describe(const EnergyBook& book) {
   base::Json json = base::Json::object();
@@ -38,13 +39,13 @@ base::Json describe(const EnergyBook& book) {
   return json;
 }
 
-/// Step at which the energy book should close to kBookGoal: its error falls with the square of the step. None: it closes.
+/// Step at which the energy error should reach kTargetBookError (error ~ step^2). Empty: already reached.
 std::optional<double> find_closing_step(double step_s, double book_error) {
-  if (!(book_error > kBookGoal) || !std::isfinite(book_error)) return std::nullopt;
-  return step_s * std::sqrt(kBookGoal / (kBookScatter * book_error));
+  if (!(book_error > kTargetBookError) || !std::isfinite(book_error)) return std::nullopt;
+  return step_s * std::sqrt(kTargetBookError / (kBookErrorFactor * book_error));
 }
 
-/// Without names of files: the picture from the store is that of a run by hand.
+/// Without file names: the stored picture equals that of a manual run.
 std::string make_title(const Simulation& simulation) {
   std::vector<std::string> names;
   for (const job::SimulatedBody& body : simulation.spec.bodies) names.push_back(base::printable(body.name));
@@ -72,14 +73,14 @@ std::string write_outputs(const comm::Communicator& comm, Simulation& simulation
     if (!comm.is_root()) return;
     const EnergyBook& book = simulation.books.back();
     const double gain = peak > kFullScalePa ? kFullScalePa / peak : 1.0;
-    std::string picture;  // before anything is written
+    std::string picture;  // before any output
     if (!spec.spectrogram.empty())
       picture = draw_spectrogram(channels, spec.sample_rate_hz, make_title(simulation), base::find_folder(spec.spectrogram));
     if (!spec.sound.empty()) write_sound(spec.sound, channels, spec.sample_rate_hz, gain);
     if (!spec.spectrogram.empty()) base::write_file(spec.spectrogram, picture);
     double worst = 0;
     for (const EnergyBook& one : simulation.books) worst = std::max(worst, std::abs(one.relative_error));
-    // By CPU time, independent of other load on the machine.
+    // CPU time, independent of other load.
     const double rate = static_cast<double>(simulation.bodies.assembly->element_count()) *
                         static_cast<double>(simulation.motion->get_step_count() - simulation.first_step) / std::max(1e-9, cpu[0]);
     base::Json record = base::Json::object();
@@ -120,7 +121,7 @@ std::string write_outputs(const comm::Communicator& comm, Simulation& simulation
         100.0 * cpu[1] / std::max(1e-9, cpu[0] + cpu[1]), book.kinetic_j, book.elastic_j, book.dissipated_j, book.work_j, worst);
     if (closing_step_s)
       result += fmt::format("\nthe book is expected to close to {:g} with \"step_s\": {:.2e} (its error falls with the square of the step)",
-                            kBookGoal, *closing_step_s);
+                            kTargetBookError, *closing_step_s);
     if (simulation.sound)
       result += fmt::format("\npeak {:.4g} Pa{}", peak, gain < 1.0 ? fmt::format(", the file has it as 1 (gain {:.4g})", gain) : "");
     for (const job::SimulationOutput& output : job::kSimulationOutputs)

@@ -1,4 +1,4 @@
-// The files of a simulation: sound, spectrogram, motion and record.
+// Output files of a simulation: sound, spectrogram, motion and record.
 #pragma once
 
 #include <string>
@@ -8,8 +8,8 @@
 
 namespace carillon::simulation {
 
-/// After the last step; `seconds` of wall time for the record. The summary for the terminal, on rank 0. Collective. Throws SystemError on
-/// every rank when the disk refuses.
+/// Call after the last step; `seconds` of wall time for the record. Returns the terminal summary, on rank 0. Collective. Throws SystemError
+/// on every rank for write errors.
 std::string write_outputs(const comm::Communicator& comm, Simulation& simulation, double seconds);
 
 }  // namespace carillon::simulation

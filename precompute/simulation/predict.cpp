@@ -17,17 +17,17 @@ namespace {
 constexpr int kTrialSteps = 200;
 constexpr std::int64_t kTrialSamples = 64, kTimedSamples = 48;  // of the trial's sound
 constexpr int kMaxPredictedRanks = 1024;
-constexpr std::int64_t kPictureBytes = 40 << 20;  // for drawing the spectrogram, twice the measured memory
-constexpr std::int64_t kLaterBytes = 24 << 20;    // libraries loaded for writing files
-constexpr double kSurfaceBytesPerNode = 8192;     // blocks of the recorded surface: two triangles of 256 samples, of all ranks and of one
-constexpr double kFilmBytesPerNode = 256;         // frames of the motion
+constexpr std::int64_t kPictureBytes = 40 << 20;        // spectrogram, twice the measured memory
+constexpr std::int64_t kOutputLibraryBytes = 24 << 20;  // libraries loaded for writing files
+constexpr double kSurfaceBytesPerNode = 8192;  // blocks of the recorded surface: two triangles of 256 samples, of all ranks and of one
+constexpr double kFilmBytesPerNode = 256;      // motion frames
 
-/// Bytes of a run beyond those before its first step, largest over ranks.
+/// Bytes of a run on top of those before its first step, maximum over ranks.
 std::int64_t count_later_bytes(const Simulation& simulation, int ranks, bool has_checkpoint, double finer) {
   const job::SimulationSpec& spec = simulation.spec;
   const transient::Assembly& assembly = *simulation.bodies.assembly;
   constexpr std::int64_t kNumber = sizeof(double);
-  std::int64_t arrivals = 0, later = kLaterBytes;  // half-samples of all receivers; at the end of the run
+  std::int64_t arrivals = 0, later = kOutputLibraryBytes;  // half-samples of all receivers; at the end of the run
   if (simulation.makes_sound()) {
     const emission::Options sound = make_emission_options(spec, simulation.motion->get_steps_per_sample(), false);
     const auto frames = static_cast<std::int64_t>(sound.frames);
@@ -38,14 +38,14 @@ std::int64_t count_later_bytes(const Simulation& simulation, int ranks, bool has
   const double nodes = finer * assembly.node_count(), elements = finer * assembly.element_count();
   if (!spec.surface.empty()) later += static_cast<std::int64_t>(nodes * kSurfaceBytesPerNode);
   if (!spec.motion.empty()) later += static_cast<std::int64_t>(nodes * kFilmBytesPerNode);
-  // State of this rank (a vector grown by doubling); on rank 0 also that of all ranks and the bytes of the file.
-  const std::int64_t state =
-      has_checkpoint ? kLaterBytes + (3 + 2 * ranks) * arrivals + static_cast<std::int64_t>(3 * kNumber * (30.0 * nodes + 25.0 * elements))
-                     : 0;
+  // State of this rank (a vector grown by doubling); on rank 0 also that of all ranks and the file bytes.
+  const std::int64_t state = has_checkpoint ? kOutputLibraryBytes + (3 + 2 * ranks) * arrivals +
+                                                  static_cast<std::int64_t>(3 * kNumber * (30.0 * nodes + 25.0 * elements))
+                                            : 0;
   return arrivals + std::max(later, state);
 }
 
-/// CPU seconds of the sound of one sample, from surfaces at rest, after warm-up of all stages.
+/// CPU seconds of one sound sample, from surfaces at rest, after warm-up of all stages.
 double measure_sound(const comm::Communicator& comm, const Simulation& simulation) {
   if (!simulation.makes_sound()) return 0.0;
   const int steps = simulation.motion->get_steps_per_sample();
@@ -89,7 +89,7 @@ std::string predict(const comm::Communicator& comm, Simulation& simulation, cons
   record.set("seconds", base::significant(most_cpu_s, 3)).set("memory_bytes_a_rank", count_bytes(comm.size()));
   record.set("cpu_seconds", base::significant(cpu_s, 3));
   record.set("sound_cpu_seconds", base::significant(simulation.spec.duration_s * simulation.spec.sample_rate_hz * sound_s, 3));
-  // As carillon-precompute --validate says it, for the queue: ranks share the bodies, and are counted as if they did not.
+  // Same format as carillon-precompute --validate, for the queue: ranks are counted as if not sharing the bodies.
   base::Json memory = base::Json::object();
   for (int ranks = 1; ranks <= kMaxPredictedRanks; ranks *= 2) memory.set(std::to_string(ranks), ranks * count_bytes(ranks));
   record.set("memory_bytes", std::move(memory)).set("warnings", base::Json::array(simulation.spec.warnings));

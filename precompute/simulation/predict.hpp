@@ -1,4 +1,4 @@
-// Predicted cost of a simulation.
+// Cost prediction of a simulation.
 #pragma once
 
 #include <cstdint>
@@ -10,8 +10,8 @@
 
 namespace carillon::simulation {
 
-/// From a few steps and the sound of some samples. finer: nodes of the job over nodes of these meshes; program_bytes: memory before the
-/// bodies were made. Collective.
+/// From a few steps and sound samples. finer: nodes of the job over nodes of these meshes; program_bytes: memory before the bodies were
+/// made. Collective.
 std::string predict(const comm::Communicator& comm, Simulation& simulation, const SimulateOptions& options, double finer,
                     std::int64_t program_bytes);
 

@@ -1,7 +1,5 @@
-// Method:     the steps of transient::Motion, whose displacements go to emission::Emission; books of the energy every hundredth of a
-//             second.
-// Source:     docs/equations.md E11 and E14; O'Brien, Cook and Essl 2001.
-// Deviations: none beyond those of both.
+// Method: steps of transient::Motion feed emission::Emission; energy books every 0.01 s.
+// Source: docs/equations.md E11 and E14; O'Brien, Cook and Essl 2001.
 #include "precompute/simulation/simulate.hpp"
 
 #include <fmt/core.h>
@@ -40,9 +38,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::uint64_t kMaxJobBytes = 16 << 20;
-constexpr double kBookEveryS = 0.01;        // of simulated time
-constexpr std::int64_t kLookEvery = 16;     // samples between two polls of signals
-constexpr std::int64_t kMeasureEvery = 17;  // samples between two measurements of the sound's CPU time
+constexpr double kBookIntervalS = 0.01;       // simulated time
+constexpr std::int64_t kPollSamples = 16;     // samples between two polls of signals
+constexpr std::int64_t kMeasureSamples = 17;  // samples between two measurements of the sound's CPU time
 
 /// One line on rank 0.
 struct Log {
@@ -92,7 +90,7 @@ job::SimulationSpec read_spec(const comm::Communicator& comm, const fs::path& fi
 
 /// Files removed at the end of the run, on rank 0.
 struct TemporaryFiles {
-  std::vector<std::unique_ptr<run::TemporaryFile>> resumable;  // kept for a checkpoint
+  std::vector<std::unique_ptr<run::TemporaryFile>> resumable;  // kept with a checkpoint
   std::vector<std::unique_ptr<run::TemporaryFile>> others;
 };
 
@@ -110,7 +108,7 @@ TemporaryFiles make_temporary_files(const comm::Communicator& comm, const job::S
   return files;
 }
 
-/// Least CPU time between two readings of the clock.
+/// Least CPU time between two clock readings.
 double measure_clock() {
   double least = std::numeric_limits<double>::infinity();
   for (int look = 0; look < 100; ++look) {
@@ -120,13 +118,13 @@ double measure_clock() {
   return least;
 }
 
-/// The steps of one sample, and what they make the surfaces sound.
+/// Steps and sound of one sample.
 void advance_sample(Simulation& simulation) {
   transient::Motion& motion = *simulation.motion;
   if (simulation.film) simulation.film->add_sample(motion);
-  // Reading the clock costs as much as a step of a small body: one sample in 17 is measured, coprime with the sound's periods of 8
-  // and 16 samples, less the time of two readings.
-  const bool is_measured = simulation.sound && motion.get_sample() % kMeasureEvery == 0;
+  // Reading the clock costs as much as a step of a small body: measure one sample in 17 (coprime with the sound's periods of 8 and 16
+  // samples), less the time of two readings.
+  const bool is_measured = simulation.sound && motion.get_sample() % kMeasureSamples == 0;
   do {
     motion.advance();
     if (!simulation.sound) continue;
@@ -138,11 +136,11 @@ void advance_sample(Simulation& simulation) {
     if (motion.is_at_sample()) set_balls(simulation);
     simulation.sound->add_step(&motion.get_u()[0].x);
     if (is_measured)
-      simulation.sound_cpu_s += static_cast<double>(kMeasureEvery) * (base::get_process_cpu_s() - before - simulation.clock_s);
+      simulation.sound_cpu_s += static_cast<double>(kMeasureSamples) * (base::get_process_cpu_s() - before - simulation.clock_s);
   } while (!motion.is_at_sample());
 }
 
-/// Lines of progress, on rank 0.
+/// Progress lines, on rank 0.
 class Reporter {
  public:
   Reporter(const Log& log, const fs::path& file) : log_(log) {
@@ -171,7 +169,7 @@ class Reporter {
   double last_ = 0.0, last_printed_ = 0.0;
 };
 
-/// Makes sound and film, and resumes from a checkpoint. Collective.
+/// Creates sound and film, and resumes from a checkpoint. Collective.
 void start(const comm::Communicator& comm, Simulation& simulation, const std::optional<SimulationState>& saved, const Log& log) {
   transient::Motion& motion = *simulation.motion;
   const job::SimulationSpec& spec = simulation.spec;
@@ -228,7 +226,7 @@ SimulateSummary simulate(const comm::Communicator& comm, const fs::path& job_fil
 
   Reporter reporter = comm.agree([&] { return Reporter(log, comm.is_root() ? options.progress : fs::path()); });
   const std::int64_t frames = std::llround(spec.duration_s * spec.sample_rate_hz);
-  const std::int64_t book_every = std::max<std::int64_t>(1, std::llround(kBookEveryS * spec.sample_rate_hz));
+  const std::int64_t book_every = std::max<std::int64_t>(1, std::llround(kBookIntervalS * spec.sample_rate_hz));
   const bool is_kept = !options.checkpoint.empty();
   if (is_kept) run::set_news(true);
   double last_save_s = 0.0;
@@ -237,7 +235,7 @@ SimulateSummary simulate(const comm::Communicator& comm, const fs::path& job_fil
   while (motion.get_sample() < frames) {
     advance_sample(simulation);
     if (motion.get_sample() % book_every == 0 || motion.get_sample() == frames) simulation.books.push_back(motion.calc_book());
-    if (motion.get_sample() % kLookEvery != 0 || motion.get_sample() == frames) continue;
+    if (motion.get_sample() % kPollSamples != 0 || motion.get_sample() == frames) continue;
     reporter.report(motion, frames);
     if (!is_kept) continue;
     enum : std::int32_t { kNothing, kSave, kStop };

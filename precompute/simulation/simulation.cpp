@@ -21,7 +21,7 @@ transient::MotionOptions make_motion_options(const job::SimulationSpec& spec) {
   return options;
 }
 
-/// The job's line of the body or striker at the beginning of a message of Contacts.
+/// Job line of the body or striker at the beginning of a message of Contacts.
 std::string find_overlap_place(const job::SimulationSpec& spec, std::string_view message) {
   for (std::size_t i = 0; i < spec.strikers.size(); ++i)
     if (message.starts_with(fmt::format("striker {} ", i + 1))) return spec.strikers[i].place;
@@ -57,7 +57,7 @@ void make_motion(const comm::Communicator& comm, Simulation& simulation) {
     }
     return start;
   });
-  // The first forces, with the search for contacts: finds overlaps.
+  // The first forces include the contact search, which finds overlaps.
   try {
     simulation.motion->prepare();
   } catch (const InputError& error) {

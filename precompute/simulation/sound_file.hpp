@@ -1,4 +1,4 @@
-// WAV of the receivers, and its picture.
+// WAV of the receivers, and its spectrogram.
 #pragma once
 
 #include <filesystem>
@@ -7,10 +7,10 @@
 
 namespace carillon::simulation {
 
-/// channels: (receivers)(frames) [Pa]. 32-bit floats in pascals times `gain_per_pa`. Throws SystemError when the disk refuses.
+/// channels: (receivers)(frames) [Pa]. 32-bit floats in pascals times `gain_per_pa`. Throws SystemError for write errors.
 void write_sound(const std::filesystem::path& file, const std::vector<std::vector<double>>& channels, int rate_hz, double gain_per_pa);
 
-/// The bytes of a PNG: sound::make_spectrogram_png() of the same channels. A long sound waits in `folder` meanwhile. Throws SystemError.
+/// PNG bytes of sound::make_spectrogram_png() of the same channels. Long sounds are buffered in `folder`. Throws SystemError.
 std::string draw_spectrogram(const std::vector<std::vector<double>>& channels, int rate_hz, const std::string& title,
                              const std::filesystem::path& folder);
 

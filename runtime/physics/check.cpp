@@ -1,4 +1,4 @@
-// What a world must be to be simulated, before anything of it is made. Each fault is one InputError that names the body, joint or cord.
+// Checks of a world's description before simulation. Each fault is one InputError that names the body, joint or cord.
 #include "runtime/physics/check.hpp"
 
 #include <fmt/format.h>
@@ -13,7 +13,7 @@
 namespace carillon::physics {
 namespace {
 
-constexpr double kWidest = kWidestHingeDeg * std::numbers::pi / 180.0 * (1.0 + 1e-12);  // rad; what was given in degrees is rounded
+constexpr double kMaxHingeRad = kWidestHingeDeg * std::numbers::pi / 180.0 * (1.0 + 1e-12);  // rad; tolerance for rounding of degrees
 
 bool is_finite(const Vec3& x) { return std::isfinite(x[0]) && std::isfinite(x[1]) && std::isfinite(x[2]); }
 
@@ -28,7 +28,7 @@ void check_contact_numbers(const std::string& who, double restitution, double fr
   if (!(poisson > -1.0 && poisson <= 0.5)) throw InputError(fmt::format("{}: poisson_ratio {} is not within -1..0.5", who, poisson));
 }
 
-/// Sylvester's criterion, with a tolerance relative to the trace. A NaN fails as well.
+/// Sylvester's criterion, with a tolerance relative to the trace. False for NaN.
 bool is_positive_definite(const std::array<double, 9>& m, double tolerance) {
   const double trace = m[0] + m[4] + m[8];
   const double minor2 = m[0] * m[4] - m[1] * m[3];
@@ -39,16 +39,15 @@ bool is_positive_definite(const std::array<double, 9>& m, double tolerance) {
 
 void check_rigid(const std::string& who, const bank::RigidBody& r) {
   if (!(r.mass_kg > 0.0 && std::isfinite(r.mass_kg)) || !is_finite(r.centre_m)) {
-    throw InputError(fmt::format("{}: mass {} kg or centre in its bank is unusable; make the bank again", who, r.mass_kg));
+    throw InputError(fmt::format("{}: invalid mass {} kg or centre of mass in its bank; make the bank again", who, r.mass_kg));
   }
   const auto& i = r.inertia_kg_m2;
   if (!is_positive_definite(i, 0.0)) throw InputError(who + ": the inertia in its bank is not positive definite; make the bank again");
-  // tr(I)/2 - I is the integral of x x^T over the mass, which no mass distribution makes negative.
+  // tr(I)/2 - I is the integral of x x^T over the mass, which is positive semidefinite for any mass distribution.
   const double half_trace = 0.5 * (i[0] + i[4] + i[8]);
   const std::array<double, 9> second{half_trace - i[0], -i[1], -i[2], -i[3], half_trace - i[4], -i[5], -i[6], -i[7], half_trace - i[8]};
   if (!is_positive_definite(second, -1e-9)) {
-    throw InputError(
-        who + ": no body can have the inertia in its bank (one principal moment exceeds the sum of the others); make the bank again");
+    throw InputError(who + ": impossible inertia in its bank (one principal moment exceeds the sum of the others); make the bank again");
   }
 }
 
@@ -62,12 +61,12 @@ void check_body(const BodySpec& b) {
   const auto& q = b.initial.rotation;
   const double norm = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
   if (!(norm > 1e-12 && std::isfinite(norm))) {
-    throw InputError(who + ": the rotation (quaternion w x y z) is zero or not finite; use 1 0 0 0 for none");
+    throw InputError(who + ": the rotation (quaternion w x y z) is zero or not finite; use 1 0 0 0 for no rotation");
   }
   if (!b.fixed) {
     check_rigid(who, b.bank->rigid);
   } else if (!is_zero(b.velocity_m_s) || !is_zero(b.angular_velocity_rad_s)) {
-    throw InputError(who + ": is fixed but has a velocity; take one of the two away");
+    throw InputError(who + ": is fixed but has a velocity; remove one of the two");
   }
 }
 
@@ -77,22 +76,22 @@ void check_joints(const WorldSpec& spec) {
   const auto check_ends = [&](const std::string& place, const char* what, int body, int to) {
     if (body < 0 || body >= count || to < -1 || to >= count) throw InputError(fmt::format("{}: a {} names no body", place, what));
     std::string who = describe(spec, place, what, body, to);
-    if (body == to) throw InputError(who + " ties a body to itself; name another one, or \"world\"");
-    if (is_fixed(body) && is_fixed(to)) throw InputError(who + " has nothing to hold: neither of them moves");
+    if (body == to) throw InputError(who + " connects a body to itself; name another body, or \"world\"");
+    if (is_fixed(body) && is_fixed(to)) throw InputError(who + " connects two bodies that do not move");
     return who;
   };
-  rigid::Groups groups(count + 1);  // the last: all that does not move
+  rigid::Groups groups(count + 1);  // the last: static bodies and the world
   const auto find = [&](int body) { return is_fixed(body) ? count : body; };
   for (const JointSpec& joint : spec.joints) {
     const std::string who = check_ends(joint.place, "joint", joint.body, joint.to);
-    if (!is_finite(joint.at_m)) throw InputError(who + ": its place must be three finite numbers");
+    if (!is_finite(joint.at_m)) throw InputError(who + ": its position must be three finite numbers");
     const auto length = [](const Vec3& v) { return std::hypot(v[0], v[1], v[2]); };
     const bool has_axis =
         joint.kind == joints::Kind::kHinge || joint.kind == joints::Kind::kSlider || joint.kind == joints::Kind::kUniversal;
-    if (has_axis && !(std::abs(length(joint.axis) - 1.0) < 1e-6)) throw InputError(who + ": its axis is not of length 1");
+    if (has_axis && !(std::abs(length(joint.axis) - 1.0) < 1e-6)) throw InputError(who + ": its axis is not a unit vector");
     if (joint.kind == joints::Kind::kUniversal &&
         !(std::abs(length(joint.second_axis) - 1.0) < 1e-6 && std::abs(dot(joint.axis, joint.second_axis)) < 1e-6))
-      throw InputError(who + ": its second axis is not of length 1 and at right angles to the first");
+      throw InputError(who + ": its second axis is not a unit vector perpendicular to the first");
     if (!(joint.damping >= 0.0 && std::isfinite(joint.damping)))
       throw InputError(fmt::format("{}: damping {} must be a finite number, 0 or more", who, joint.damping));
     if (joint.limits) {
@@ -100,17 +99,17 @@ void check_joints(const WorldSpec& spec) {
       const bool turns = joint.kind == joints::Kind::kHinge;
       if (!turns && joint.kind != joints::Kind::kSlider) throw InputError(who + ": only hinges and sliders have limits");
       if (!(low <= 0.0 && high >= 0.0 && high - low > 1e-6 && std::isfinite(high - low)))
-        throw InputError(fmt::format("{}: its limits {:g} and {:g} must be on both sides of the start, which is 0", who, low, high));
-      if (turns && !(low >= -kWidest && high <= kWidest))
+        throw InputError(fmt::format("{}: its limits {:g} and {:g} must enclose the start, which is 0", who, low, high));
+      if (turns && !(low >= -kMaxHingeRad && high <= kMaxHingeRad))
         throw InputError(
-            fmt::format("{}: its limits must be within {:g} rad of the start; leave out what never comes so far", who, kWidest));
+            fmt::format("{}: its limits must be within {:g} rad of the start; omit limits beyond the range of motion", who, kMaxHingeRad));
       if (!(joint.stop_restitution >= 0.0 && joint.stop_restitution <= 1.0))
         throw InputError(fmt::format("{}: the restitution {} of its stops is not within 0..1", who, joint.stop_restitution));
     }
     if (joint.kind == joints::Kind::kWeld && (is_fixed(joint.body) || is_fixed(joint.to)))
-      throw InputError(who + " welds a body to what does not move; set \"fixed\" of that body to true instead");
+      throw InputError(who + " welds a body to one that does not move; set \"fixed\" of that body to true instead");
     if (groups.find(find(joint.body)) == groups.find(find(joint.to)))
-      throw InputError(who + " closes a loop of joints, which is not supported; replace one joint of the loop by a cord, or leave one out");
+      throw InputError(who + " closes a loop of joints, which is not supported; replace one joint of the loop by a cord, or remove one");
     groups.join(find(joint.body), find(joint.to));
   }
   for (const CordSpec& cord : spec.cords) {
@@ -119,11 +118,10 @@ void check_joints(const WorldSpec& spec) {
     const double distance = std::hypot(cord.from_m[0] - cord.to_m[0], cord.from_m[1] - cord.to_m[1], cord.from_m[2] - cord.to_m[2]);
     if (!(cord.restitution >= 0.0 && cord.restitution <= 1.0))
       throw InputError(fmt::format("{}: restitution {} is not within 0..1", who, cord.restitution));
-    if (!(distance > 1e-4)) throw InputError(who + ": its ends are at one place; give a ball joint instead, or ends that are apart");
+    if (!(distance > 1e-4)) throw InputError(who + ": its ends coincide; use a ball joint, or ends that differ");
     if (cord.length_m && !(*cord.length_m >= distance - 1e-9 && std::isfinite(*cord.length_m)))
-      throw InputError(
-          fmt::format("{}: it is {:.6g} m long, and its ends are {:.6g} m apart at the start; give at least that, or leave its length out",
-                      who, *cord.length_m, distance));
+      throw InputError(fmt::format("{}: it is {:.6g} m long, and its ends are {:.6g} m apart at the start; increase its length, or omit it",
+                                   who, *cord.length_m, distance));
   }
 }
 
@@ -135,7 +133,7 @@ std::string describe(const WorldSpec& spec, const std::string& place, const char
 }
 
 void check(const WorldSpec& spec, const WorldOptions& options) {
-  if (!(options.end_s >= 0.0)) throw InputError(fmt::format("the end of the world, {} s, must be a number, 0 or more", options.end_s));
+  if (!(options.end_s >= 0.0)) throw InputError(fmt::format("the end time {} s must be a number, 0 or more", options.end_s));
   if (!(options.contact_step_s >= 2e-6 && options.contact_step_s <= 2e-3))
     throw InputError(fmt::format("the step of contacts, {} s, must lie within 2e-6 and 0.002 s", options.contact_step_s));
   if (!is_finite(spec.gravity_m_s2)) throw InputError("gravity must be three finite numbers");

@@ -7,7 +7,7 @@
 
 namespace carillon::physics {
 
-/// Throws InputError for the first fault: numbers, masses and inertias, joints (loops, axes) and cords (lengths).
+/// Throws InputError for the first fault in numbers, masses and inertias, joints (loops, axes) or cords (lengths).
 void check(const WorldSpec& spec, const WorldOptions& options);
 
 /// "scene.json:12: the joint between 'a' and 'b'". `what`: "joint" or "cord"; `body` and `to`: -1 is the world.

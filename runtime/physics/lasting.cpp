@@ -1,9 +1,8 @@
-// Method: the points that carry are gathered into spots, as the impacts are; a spot that has carried for kPatience with no impact is a
-//   lasting contact, of which a record is made every kInterval. The place of a spot moves with the body whose point carries it, and jumps
-//   when another point takes over; smoothed, that is the speed of the contact over the world, and what of it is not the speed of a surface
-//   is its sweep over that surface.
-// Source: K. Johnson, "Contact Mechanics" (1985), 4.2, for the radius of the touch; the impedance of a plane wave, rho c_L, over its area.
-// Deviations: a flat contact has no Hertz radius; half the size of the smaller body takes its place, as for the length of impacts.
+// Method: load-bearing points are grouped into spots, as in impacts; a spot loaded for kMinQuietS without an impact is a lasting contact,
+// with one record every kIntervalS. The position of a spot moves with the body that owns the loaded point, and jumps when another point
+// takes over; smoothed, this is the velocity of the contact in the world, and its difference from the velocity of a surface is its sweep
+// over that surface. A flat contact has no Hertz radius; half the size of the smaller body is used, as for the duration of impacts.
+// Source: K. Johnson, "Contact Mechanics" (1985), 4.2, for the contact radius; the impedance of a plane wave, rho c_L, over its area.
 #include "runtime/physics/lasting.hpp"
 
 #include <algorithm>
@@ -17,16 +16,16 @@
 namespace carillon::physics {
 namespace {
 
-constexpr double kInstant = 1e-8;     // s; shorter than any step, longer than what a step may leave out at its end
-constexpr double kPatience = 5e-3;    // s
-constexpr double kRise = 5e-3;        // s; the force of a new contact comes within it: the impact before has been heard already
-constexpr double kInterval = 1e-3;    // s
-constexpr double kGone = 5e-3;        // s; a spot that has not carried for so long has ended
-constexpr double kSmooth = 20e-3;     // s
-constexpr double kSmallest = 1e-6;    // m; of a patch
-constexpr double kRollingSpin = 1.0;  // rad/s; slower, what sways stays where it is
-constexpr double kSharpest = 5e-4;    // m; radius of an edge that the mesh has sharp
-constexpr double kSticks = 1e-6;      // m/s; what is slower than this does not slip
+constexpr double kTimeToleranceS = 1e-8;     // s; shorter than any step, longer than the permitted remainder of a step
+constexpr double kMinQuietS = 5e-3;          // s
+constexpr double kFadeInS = 5e-3;            // s; fade-in of the force of a new contact, whose impact has already been rendered
+constexpr double kIntervalS = 1e-3;          // s
+constexpr double kUnloadedEndS = 5e-3;       // s; a spot unloaded for this time has ended
+constexpr double kSmoothingS = 20e-3;        // s
+constexpr double kMinPatchM = 1e-6;          // m; minimum patch radius
+constexpr double kMinRollingSpinRadS = 1.0;  // rad/s; below, the position of a swaying contact is fixed
+constexpr double kMinEdgeRadiusM = 5e-4;     // m; assumed radius of sharp mesh edges
+constexpr double kMinSlipSpeedMS = 1e-6;     // m/s; below, the contact does not slip
 
 std::uint64_t scramble(std::uint64_t state) { return base::draw(state); }
 
@@ -43,14 +42,14 @@ Spotted find_place(const rigid::Solid& solid, const rigid::State& state, const V
   return {place.triangle, place.barycentric};
 }
 
-/// Fills groups_ with what carries now, pair after pair.
+/// Fills groups_ with the currently loaded points, pair by pair.
 void LastingContacts::make_groups(const rigid::Space& space) {
   groups_.clear();
   carriers_.clear();
   space.list_contacts(contacts_);
   for (const rigid::Contact* c : contacts_) {
     // Groups have steps of different lengths: each counts when its step ends.
-    if (!(c->step_s > 0.0) || !c->touching || std::abs(c->until_s - space.get_time()) > kInstant) continue;
+    if (!(c->step_s > 0.0) || !c->touching || std::abs(c->until_s - space.get_time()) > kTimeToleranceS) continue;
     const double push = dot(c->impulse, c->touch.normal) / c->step_s;
     if (push > 0.0) carriers_.push_back({c, push, false});
   }
@@ -66,7 +65,7 @@ void LastingContacts::make_groups(const rigid::Space& space) {
   }
 }
 
-/// The first of these and those near it that no group has yet.
+/// Group of the first carrier and those near it that belong to no group yet.
 LastingContacts::Group LastingContacts::make_group(const rigid::Space& space, std::span<Carrier> carriers) {
   const rigid::Contact& first = *carriers.front().contact;
   Group g;
@@ -83,7 +82,7 @@ LastingContacts::Group LastingContacts::make_group(const rigid::Space& space, st
     g.carried = g.carried + carrier.push_n * space.calc_velocity(c.touch.side_a == geometry::Side::plane ? g.b : g.a, c.touch.where_m);
     g.curvature_per_m += carrier.push_n * (c.touch.curvature_a_per_m + c.touch.curvature_b_per_m);
     g.smooth = g.smooth || c.touch.smooth;
-    g.features += scramble(c.touch.id);  // in any order
+    g.features += scramble(c.touch.id);  // independent of the order
   }
   g.where = (1.0 / g.push_n) * g.where;
   g.carried = (1.0 / g.push_n) * g.carried;
@@ -97,17 +96,17 @@ LastingContacts::Group LastingContacts::make_group(const rigid::Space& space, st
 double LastingContacts::calc_patch(const Group& g, double radius_m) const {
   const Matter &a = get_matter(g.a), &b = get_matter(g.b);
   const double compliance = impact::calc_contact_compliance(a.young_modulus_pa, a.poisson_ratio, b.young_modulus_pa, b.poisson_ratio);
-  return std::max(kSmallest, impact::calc_patch_radius(g.push_n, radius_m, compliance));
+  return std::max(kMinPatchM, impact::calc_patch_radius(g.push_n, radius_m, compliance));
 }
 
-/// Of a plane wave into the body over the patch.
+/// Impedance of a plane wave into the body over the patch.
 double LastingContacts::calc_impedance(int body, double patch_m) const {
   const Matter& m = get_matter(body);
   const bank::Material material{.young_modulus_pa = m.young_modulus_pa, .poisson_ratio = m.poisson_ratio, .density_kg_m3 = m.density_kg_m3};
   return bank::calc_wave_impedance(material) * std::numbers::pi * patch_m * patch_m;
 }
 
-/// A contact at rest has no records. Its last values once more, so that nothing is interpolated over the time before it is struck.
+/// A contact at rest has no records. Repeats its last values, so that nothing is interpolated over the time at rest.
 void LastingContacts::stir(const rigid::Space& space, Spot& spot, std::vector<events::Event>& events) {
   if (!spot.lies) return;
   spot.lies = false;
@@ -127,12 +126,12 @@ void LastingContacts::record(const rigid::Space& space, const Group& g, Spot& sp
   stir(space, spot, events);
   if (is_new) {
     spot.begun_s = spot.rises_s = time_s;
-    spot.radius_m = 1.0 / std::clamp(g.curvature_per_m, 1.0 / (5.0 * calc_spot_radius(space, g.a, g.b)), 1.0 / kSharpest);
+    spot.radius_m = 1.0 / std::clamp(g.curvature_per_m, 1.0 / (5.0 * calc_spot_radius(space, g.a, g.b)), 1.0 / kMinEdgeRadiusM);
   }
   spot.recorded_s = time_s;
   const Vec3 va = space.calc_velocity(g.a, g.where), vb = space.calc_velocity(g.b, g.where), u = va - vb;
   Vec3 slip = u - dot(u, g.normal) * g.normal;
-  if (norm(slip) < kSticks) slip = {};
+  if (norm(slip) < kMinSlipSpeedMS) slip = {};
   const auto calc_sweep = [&](const Vec3& surface) {
     const Vec3 w = g.carried + spot.drift - surface;
     return norm(w - dot(w, g.normal) * g.normal);
@@ -155,7 +154,7 @@ void LastingContacts::record(const rigid::Space& space, const Group& g, Spot& sp
     c.barycentric = place.barycentric;
     c.normal = back * (sign * g.normal);
     c.slip_m_s = back * (sign * slip);
-    c.force_n = spot.from_n + (spot.load_n - spot.from_n) * std::min(1.0, (time_s - spot.rises_s) / kRise);
+    c.force_n = spot.from_n + (spot.load_n - spot.from_n) * std::min(1.0, (time_s - spot.rises_s) / kFadeInS);
     c.sweep_m_s = side == 0 ? sweep_a : sweep_b;
     c.other_sweep_m_s = side == 0 ? sweep_b : sweep_a;
     c.spin_rad_s = norm(g.turn);
@@ -169,12 +168,12 @@ void LastingContacts::record(const rigid::Space& space, const Group& g, Spot& sp
 /// 0 for the ground.
 std::uint64_t LastingContacts::hash_name(int body) const { return body < 0 ? 0 : base::hash_name(get_matter(body).name); }
 
-/// Of the names of the pair and the number of the touch among theirs: other bodies of the scene change nothing of it, nor does their order.
+/// From the names of the pair and the number of the touch within it: independent of other bodies of the scene and of their order.
 std::uint64_t LastingContacts::make_id(const Spot& spot) {
   std::uint64_t& touch = touches_[{spot.a, spot.b}];
   std::uint64_t id = scramble(scramble(hash_name(spot.a)) + scramble(hash_name(spot.b)) + touch) >> 1;  // files hold signed numbers
   ++touch;
-  // Bodies may have one name.
+  // Bodies may share a name.
   const auto is_taken = [&](const auto& of_pair) {
     return std::any_of(of_pair.second.begin(), of_pair.second.end(),
                        [&](const Spot& other) { return other.begun_s >= 0.0 && other.id == id; });
@@ -212,20 +211,20 @@ void LastingContacts::update(const rigid::Space& space, std::vector<events::Even
     }
     Spot& spot = *nearest;
     const double dt = time_s - spot.seen_s;
-    // The load goes over from point to point while a body rolls, before one of them comes or goes.
-    const bool stays = !g.smooth && spot.features == g.features && norm(g.turn) < kRollingSpin;
+    // While a body rolls the load shifts from point to point, before points appear or disappear.
+    const bool stays = !g.smooth && spot.features == g.features && norm(g.turn) < kMinRollingSpinRadS;
     const Vec3 velocity = stays ? g.carried : (1.0 / dt) * (g.where - spot.where);
-    spot.drift = spot.drift + (dt / (dt + kSmooth)) * (velocity - g.carried - spot.drift);
-    spot.load_n += dt / (dt + kRise) * (g.push_n - spot.load_n);
+    spot.drift = spot.drift + (dt / (dt + kSmoothingS)) * (velocity - g.carried - spot.drift);
+    spot.load_n += dt / (dt + kFadeInS) * (g.push_n - spot.load_n);
     spot.where = g.where;
     spot.features = g.features;
     spot.seen_s = time_s;
-    const bool is_due = spot.begun_s < 0.0 ? time_s - spot.quiet_s > kPatience : time_s - spot.recorded_s >= kInterval - 1e-9;
+    const bool is_due = spot.begun_s < 0.0 ? time_s - spot.quiet_s > kMinQuietS : time_s - spot.recorded_s >= kIntervalS - 1e-9;
     if (!is_due) continue;
     if (spot.begun_s < 0.0) spot.id = make_id(spot);
     record(space, g, spot, events);
   }
-  // At times that do not depend on the steps of other groups.
+  // At times independent of the steps of other groups.
   if (!space.is_at_window()) return;
   for (auto pair = spots_.begin(); pair != spots_.end();) {
     end_or_keep(space, pair->second, events);
@@ -233,11 +232,11 @@ void LastingContacts::update(const rigid::Space& space, std::vector<events::Even
   }
 }
 
-/// The spots of a pair that were not seen, or lie still.
+/// Ends or keeps the spots of a pair that were not seen, or are at rest.
 void LastingContacts::end_or_keep(const rigid::Space& space, std::vector<Spot>& spots, std::vector<events::Event>& events) {
   const double time_s = space.get_time();
   for (Spot& spot : spots) {
-    // Where both lie still the contact lasts, and after one record of that nothing changes.
+    // If both bodies are at rest the contact lasts; one record is written, after which nothing changes.
     const bool lies = space.is_still(spot.a) && (spot.b < 0 || space.is_still(spot.b));
     if (lies) {
       spot.seen_s = time_s;
@@ -255,7 +254,7 @@ void LastingContacts::end_or_keep(const rigid::Space& space, std::vector<Spot>& 
     if (!lies) stir(space, spot, events);
     spot.lies = lies;
     if (lies) continue;
-    if (time_s - spot.seen_s <= kGone || spot.begun_s < 0.0) continue;
+    if (time_s - spot.seen_s <= kUnloadedEndS || spot.begun_s < 0.0) continue;
     for (const int side : {0, 1}) {
       events::LastingContact c = spot.last[side];
       if (c.body < 0) continue;
@@ -265,7 +264,7 @@ void LastingContacts::end_or_keep(const rigid::Space& space, std::vector<Spot>& 
       events.push_back(c);
     }
   }
-  std::erase_if(spots, [&](const Spot& s) { return time_s - s.seen_s > kGone; });
+  std::erase_if(spots, [&](const Spot& s) { return time_s - s.seen_s > kUnloadedEndS; });
 }
 
 void LastingContacts::note_impact(const rigid::Space& space, int a, int b, const Vec3& where, double time_s) {

@@ -1,4 +1,4 @@
-// The modes of banks as impacts take them.
+// Modes of banks in the form used by impacts.
 #pragma once
 
 #include <map>
@@ -9,10 +9,10 @@
 
 namespace carillon::physics {
 
-/// Bodies of one bank share their modes. Banks must not move.
+/// Bodies of one bank share their modes. Banks must not move in memory.
 class ModeSets {
  public:
-  /// Null for a bank without modes.
+  /// nullptr for a bank without modes.
   std::shared_ptr<const impact::Modes> find(const bank::Bank& bank);
 
  private:

@@ -1,5 +1,5 @@
-// Method: the real contact lasts a Hertz time from the touch on, so its pulse is centred half that time later. Where several spots share an
-//   impact, each carries its part of the mass.
+// Method: the real contact lasts one Hertz time from the touch, so its pulse is centred half that time later. If several spots share an
+// impact, each carries its share of the mass.
 // Source: J. O'Brien, C. Shen, C. Gatchalian, "Synthesizing sounds from rigid-body simulations" (2002), section 4.
 #include "runtime/physics/pulses.hpp"
 
@@ -12,13 +12,13 @@
 namespace carillon::physics {
 namespace {
 
-using rigid::kSlowest;
+using rigid::kMinImpactSpeedMS;
 
-constexpr double kMasked = 0.01;    // of the largest impulse of the same instant: 40 dB below it
-constexpr double kHidden = 0.005;   // of an impulse of the same body before: 46 dB below it
-constexpr double kMaskTime = 0.05;  // s; in which the latter fades to 1/e
+constexpr double kMaskedRatio = 0.01;        // relative to the largest impulse of the same instant: -40 dB
+constexpr double kForwardMaskRatio = 0.005;  // relative to an earlier impulse of the same body: -46 dB
+constexpr double kMaskDecayS = 0.05;         // s; decay time (1/e) of the latter threshold
 
-/// 1/m_eff of the contact along the normal [1/kg], of the bodies as they were.
+/// 1/m_eff of the contact along the normal [1/kg], in the state before the impact.
 double calc_inverse_mass(const rigid::Space& space, const rigid::Strike& strike, const rigid::Hit& hit, const Vec3& where,
                          const Vec3& normal) {
   double sum = 0.0;
@@ -51,9 +51,9 @@ void add_spot(const rigid::Space& space, const rigid::Strike& strike, const std:
   normal = (1.0 / norm(normal)) * normal;
   const double inverse_mass =
       first.linked_mass_kg > 0.0 ? 1.0 / first.linked_mass_kg : calc_inverse_mass(space, strike, first, where, normal);
-  // A resting spot that the impact elsewhere hardly moved, or next to nothing of what sounds at the same instant.
-  if (!(inverse_mass > 0.0) || push * inverse_mass < 0.2 * kSlowest || push < kMasked * max_push) return;
-  const double speed = approach > kSlowest ? approach : push * inverse_mass;
+  // A resting spot hardly moved by the impact elsewhere, or negligible next to other pulses of the same instant.
+  if (!(inverse_mass > 0.0) || push * inverse_mass < 0.2 * kMinImpactSpeedMS || push < kMaskedRatio * max_push) return;
+  const double speed = approach > kMinImpactSpeedMS ? approach : push * inverse_mass;
   const double mass = std::min(push / ((1.0 + first.restitution) * speed), 1.0 / inverse_mass);
   lasting.note_impact(space, first.a, first.b, where, strike.time_s);
   rigid::Hit mean = first;
@@ -68,7 +68,7 @@ void add_spot(const rigid::Space& space, const rigid::Strike& strike, const std:
     const auto at = std::find(strike.bodies.begin(), strike.bodies.end(), body);
     const rigid::State& state = at == strike.bodies.end() ? space.state(body) : strike.before[at - strike.bodies.begin()];
     const double sign = side == 0 ? 1.0 : -1.0;
-    // Where one hit is alone, the place is known; where there are more, it is on the same face or near.
+    // The position of a single hit is known; several hits are on the same face or near it.
     const std::optional<geometry::Place>& known = first.places[side];
     const std::int32_t near = first.triangles[side];
     const Spotted place = known && hits.size() == 1 ? Spotted{known->triangle, known->barycentric}
@@ -86,9 +86,9 @@ void add_spot(const rigid::Space& space, const rigid::Strike& strike, const std:
 
 bool Masks::take(int body, double time_s, double impulse_n_s, double duration_s) {
   Mask& mask = masks_[body];
-  mask.impulse_n_s *= std::exp(-std::max(time_s - mask.time_s, 0.0) / kMaskTime);
+  mask.impulse_n_s *= std::exp(-std::max(time_s - mask.time_s, 0.0) / kMaskDecayS);
   mask.time_s = std::max(time_s, mask.time_s);
-  if (impulse_n_s < kHidden * mask.impulse_n_s && duration_s >= mask.duration_s) return true;
+  if (impulse_n_s < kForwardMaskRatio * mask.impulse_n_s && duration_s >= mask.duration_s) return true;
   if (impulse_n_s >= mask.impulse_n_s) mask = {impulse_n_s, mask.time_s, duration_s};
   return false;
 }
@@ -112,9 +112,9 @@ void add_pulses(const rigid::Space& space, const rigid::Strike& strike, LastingC
       if (norm(hit.touch.where_m - order[seed]->touch.where_m) > calc_spot_radius(space, hit.a, hit.b)) continue;
       taken[i] = 1;
       spot.push_back(&hit);
-      wait_s = std::min(wait_s, hit.approach_m_s > kSlowest ? hit.touch.gap_m / hit.approach_m_s : 0.0);
+      wait_s = std::min(wait_s, hit.approach_m_s > kMinImpactSpeedMS ? hit.touch.gap_m / hit.approach_m_s : 0.0);
     }
-    add_spot(space, strike, spot, strike.time_s + std::clamp(wait_s, -rigid::kTogether, strike.together_s), max_push, lasting, masks,
+    add_spot(space, strike, spot, strike.time_s + std::clamp(wait_s, -rigid::kSimultaneousS, strike.together_s), max_push, lasting, masks,
              events);
   }
 }

@@ -1,21 +1,21 @@
-// What an impact gives to the sound: one pulse for every spot and body.
+// Sound excitation by impacts: one pulse per spot and body.
 #pragma once
 
 #include <vector>
 
-#include "runtime/physics/lasting.hpp"
 #include "runtime/events/events.hpp"
+#include "runtime/physics/lasting.hpp"
 #include "runtime/physics/rigid/space.hpp"
 
 namespace carillon::physics {
 
-/// What each body was struck with lately, as it fades from hearing: a heap that settles taps its bodies thousands of times a second, most
-/// of them far below what rings there already.
+/// Audibility of pulses per body, given its recent pulses: a settling heap hits its bodies thousands of times a second, mostly far below
+/// their current sound.
 class Masks {
  public:
   explicit Masks(int bodies) : masks_(static_cast<std::size_t>(bodies)) {}
-  /// Takes note of a pulse on a body [N s, s]. True if one before it hides it: that one was no longer, so that its spectrum reaches as
-  /// high, and is 46 dB above it, 1 dB more for every 6 ms since. In order of time, but for the length of a window.
+  /// Records a pulse on a body [N s, s]. True if an earlier one masks it: one that was not longer, so that its spectrum reaches as high,
+  /// and is 46 dB above it, plus 1 dB per 6 ms since. Call in time order, up to the length of a window.
   bool take(int body, double time_s, double impulse_n_s, double duration_s);
 
  private:
@@ -25,8 +25,8 @@ class Masks {
   std::vector<Mask> masks_;
 };
 
-/// Gathers the points of an impact into spots, strongest first, and appends one pulse a spot and body; with masks only
-/// where it is heard. `lasting` is notified of it.
+/// Groups the points of an impact into spots, strongest first, and appends one pulse per spot and body; with masks only audible ones.
+/// Notifies `lasting`.
 void add_pulses(const rigid::Space& space, const rigid::Strike& strike, LastingContacts& lasting, Masks* masks,
                 std::vector<events::Event>& events);
 

@@ -5,7 +5,7 @@
 namespace carillon::physics {
 namespace {
 
-/// The bodies as they are now; b: -1 for the ground.
+/// Current penetration of the bodies; b: -1 for the ground.
 Depth measure(const rigid::Space& space, int a, int b) {
   const rigid::Solid& solid = space.solid(a);
   const geometry::Frame frame = space.get_frame(a);

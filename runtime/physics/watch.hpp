@@ -1,4 +1,4 @@
-// Depths of bodies in each other and in the ground, and counts of their hits, for an audit.
+// Audit of penetrations between bodies and into the ground, and of hit counts.
 #pragma once
 
 #include <array>
@@ -12,18 +12,18 @@
 
 namespace carillon::physics {
 
-/// Depths are those of the bodies' places, not of the touches that a simulation has found, which may be incomplete. Invariant: hits are
-/// added in order of time.
+/// Depths are computed from the poses of the bodies, not from the touches of the simulation, which may be incomplete. Invariant: hits are
+/// added in time order.
 class ContactWatch {
  public:
   using Bodies = std::pair<int, int>;  // other: -1, or greater
 
-  /// After a step: bodies that move, in the ground.
+  /// After a step: moving bodies in the ground.
   void look_at_ground(const rigid::Space& space);
-  /// At the end of a window: those of `pairs` of which one moves, in each other. They are looked at all where `is_start`.
+  /// At the end of a window: those of `pairs` with a moving body. All of them if `is_start`.
   void look_at_pairs(const rigid::Space& space, const std::vector<Bodies>& pairs, bool is_start);
   void add_hit(double time_s, int a, int b);
-  /// At the present time.
+  /// Audit at the current time.
   ContactAudit find(const rigid::Space& space) const;
 
  private:

@@ -1,5 +1,5 @@
-// Checks a world, lets its bodies move and strike (runtime/physics/rigid), and writes down what the sound needs of it.
-// One world, whose bodies, shapes and records every step changes together; longer than most files.
+// Checks a world, runs its rigid bodies (runtime/physics/rigid), and writes the events needed for its sound. One class, whose bodies,
+// shapes and records change together in every step; longer than most files.
 #include "runtime/physics/world.hpp"
 
 #include <fmt/format.h>
@@ -17,9 +17,9 @@
 #include "runtime/physics/lasting.hpp"
 #include "runtime/physics/mode_sets.hpp"
 #include "runtime/physics/pulses.hpp"
-#include "runtime/physics/watch.hpp"
 #include "runtime/physics/rigid/limits.hpp"
 #include "runtime/physics/rigid/space.hpp"
+#include "runtime/physics/watch.hpp"
 
 namespace carillon::physics {
 namespace {
@@ -81,9 +81,9 @@ std::vector<Matter> list_matter(const WorldSpec& spec) {
   return matter;
 }
 
-/// The stops of a joint: one at each end of its way.
+/// Stops of a joint: one at each end of its travel.
 void add_stops(const JointSpec& j, const std::vector<rigid::Solid>& solids, const std::vector<rigid::State>& states, rigid::Links& links) {
-  const bool turned = solids[j.body].fixed;  // what moves comes first
+  const bool turned = solids[j.body].fixed;  // the moving body comes first
   const int a = turned ? j.to : j.body, b = turned ? j.body : j.to;
   const auto get_turn = [&](int body) {
     return body < 0 ? Mat3{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}} : transpose(rigid::make_rotation(states[body].rotation));
@@ -116,7 +116,7 @@ rigid::Links make_links(const WorldSpec& spec, const std::vector<rigid::Solid>& 
       return transpose(rigid::make_rotation(state.rotation)) * (where - state.centre);
     };
     rigid::Cord cord;
-    // What moves comes first.
+    // The moving body comes first.
     const bool turned = solids[c.body].fixed;
     cord.a = turned ? c.to : c.body;
     cord.b = turned ? c.body : c.to;
@@ -130,7 +130,7 @@ rigid::Links make_links(const WorldSpec& spec, const std::vector<rigid::Solid>& 
   return links;
 }
 
-/// A body must begin to move as its joints allow.
+/// Checks that the start velocities are compatible with the joints.
 void check_start(const WorldSpec& spec, const rigid::Space& space) {
   for (std::size_t i = 0; i < spec.bodies.size() && !spec.joints.empty(); ++i) {
     const BodySpec& body = spec.bodies[i];
@@ -141,8 +141,8 @@ void check_start(const WorldSpec& spec, const rigid::Space& space) {
       fastest = std::max(fastest, std::hypot(other.velocity_m_s[0], other.velocity_m_s[1], other.velocity_m_s[2]));
     if (error > 1e-3 + 0.01 * fastest)
       throw InputError(fmt::format(
-          "body '{}': its velocities at the start differ by {:.3g} m/s from what its joints allow; a body that turns about a joint has "
-          "\"velocity_m_s\" = \"angular_velocity_rad_s\" x (its centre of mass - the joint), and what hangs on it moves along",
+          "body '{}': its start velocities differ by {:.3g} m/s from those that its joints allow; a body that rotates about a joint has "
+          "\"velocity_m_s\" = \"angular_velocity_rad_s\" x (its centre of mass - the joint), and bodies attached to it move along",
           body.name, error));
   }
 }
@@ -166,14 +166,14 @@ rigid::Space make_space(const WorldSpec& spec, const WorldOptions& options) {
   try {
     return rigid::Space(std::move(solids), std::move(states), ground, spec.gravity_m_s2,
                         {.step_s = options.contact_step_s, .islands = options.islands, .joint_tolerance = options.joint_tolerance}, links);
-  } catch (const std::invalid_argument& error) {  // joints that make no tree
+  } catch (const std::invalid_argument& error) {  // joints that do not form trees
     throw InputError(error.what());
   }
 }
 
 }  // namespace
 
-/// The bodies on their way, and the window that is being made.
+/// State of the simulation, and the current window.
 class World::Course {
  public:
   Course(const WorldSpec& spec, const WorldOptions& options)
@@ -188,10 +188,10 @@ class World::Course {
   }
 
   double advance(double until_s, double cpu_s, const Sink& sink) {
-    // The clock of the processor is a call of the system, as long as a tenth of a step; the steady one is none, and never behind it.
+    // The processor clock needs a system call, a tenth of a step; the steady clock does not, and never runs behind it.
     const bool is_limited = std::isfinite(cpu_s);
     const double began_s = is_limited ? base::get_steady_s() : 0.0, started_s = is_limited ? base::get_thread_cpu_s() : 0.0;
-    while (!begun_ || (until_s - reached_s_ > kShortest && !is_over())) {
+    while (!begun_ || (until_s - reached_s_ > kTimeToleranceS && !is_over())) {
       step(sink);
       if (is_limited && base::get_steady_s() - began_s >= cpu_s && base::get_thread_cpu_s() - started_s >= cpu_s) break;
     }
@@ -215,11 +215,12 @@ class World::Course {
   }
 
  private:
-  static constexpr double kShortest = 2e-7;              // s; what is nearer than this to the end of a window has reached it
-  static constexpr double kEarliest = rigid::kTogether;  // a pulse found in a window may have begun so much before it (pulses.cpp)
+  static constexpr double kTimeToleranceS = 2e-7;  // s; times nearer than this to the end of a window count as its end
+  static constexpr double kMaxPulseLeadS =
+      rigid::kSimultaneousS;  // a pulse found in a window may have begun this much earlier (pulses.cpp)
 
   int count() const { return static_cast<int>(space_.states().size()); }
-  bool is_over() const { return options_.end_s - reached_s_ <= kShortest; }
+  bool is_over() const { return options_.end_s - reached_s_ <= kTimeToleranceS; }
 
   events::BodyMotion make_motion(int body, const rigid::State& state, double time_s) const {
     return {time_s, body, state.centre, state.velocity, state.rotation};
@@ -233,7 +234,7 @@ class World::Course {
       watch_start();
       return;
     }
-    const bool slept = space_.is_at_window() && space_.is_all_asleep();  // and nothing presses
+    const bool slept = space_.is_at_window() && space_.is_all_asleep();  // and no impact is in progress
     if (slept) {
       space_.skip_window(options_.end_s);
     } else {
@@ -255,7 +256,7 @@ class World::Course {
     emit(sink);
   }
 
-  /// The window in which a body is put to sleep ends with its last motion.
+  /// A body's motion ends with the window in which it falls asleep.
   bool just_slept(int body) {
     still_.resize(count(), 1);
     const char now = space_.is_still(body) ? 1 : 0, before = std::exchange(still_[body], now);
@@ -276,7 +277,7 @@ class World::Course {
     energy_.hit_rise_j = std::max(energy_.hit_rise_j, strike.modes_j - taken);
   }
 
-  /// One event a body that rings or moves, in pieces as long as events take.
+  /// One event per ringing or moving body, split at the maximum length of events.
   void take(const rigid::Forces& forces) {
     for (const int side : {0, 1}) {
       const int body = side == 0 ? forces.a : forces.b;
@@ -344,10 +345,10 @@ class World::Course {
     watch_.look_at_pairs(space_, pairs, false);
   }
 
-  /// What is earlier than any that may still come, in order of time; a Mark at the end.
+  /// Emits events earlier than any that may still come, in time order; then a Mark.
   void emit(const Sink& sink) {
-    const double mark_s = is_over() ? options_.end_s : std::max(0.0, reached_s_ - kEarliest);
-    // Events are large: their order is found by times and places alone.
+    const double mark_s = is_over() ? options_.end_s : std::max(0.0, reached_s_ - kMaxPulseLeadS);
+    // Events are large: sorted by times and indices only.
     order_.clear();
     for (std::size_t n = 0; n < events_.size(); ++n) order_.emplace_back(events::get_time_s(events_[n]), n);
     std::sort(order_.begin(), order_.end());
@@ -370,7 +371,7 @@ class World::Course {
   rigid::Space space_;
   LastingContacts lasting_;
   std::optional<Masks> masks_;
-  std::vector<events::Event> events_, later_;  // of this window; of those, what is not reported yet
+  std::vector<events::Event> events_, later_;  // of this window; those not reported yet
   std::vector<std::pair<double, std::size_t>> order_;
   std::vector<char> still_;
   bool begun_ = false;
@@ -379,10 +380,10 @@ class World::Course {
   ContactWatch watch_;
   bool has_books_ = false;
   double taken_j_ = 0.0;                                    // by hits
-  double min_j_ = std::numeric_limits<double>::infinity();  // energy there has been, with what hits took
+  double min_j_ = std::numeric_limits<double>::infinity();  // minimum energy so far, with losses by hits added back
 };
 
-/// Which bodies each body shares some of its box with; of a pair, only the later one, and none of two that are fixed. In order.
+/// For each body those with overlapping boxes; each pair is listed once, at the later body, and not if both are fixed. Sorted.
 std::vector<std::vector<int>> World::Course::find_near() const {
   std::vector<geometry::Box> boxes;
   std::vector<int> order;
@@ -404,8 +405,8 @@ std::vector<std::vector<int>> World::Course::find_near() const {
   return near;
 }
 
-/// What searches will need of the shapes is made now: a scene that is heard as it runs must not wait for it. Polyhedra need it against
-/// other bodies alone, and not against each other.
+/// Creates the search data of the shapes now, so that real-time scenes do not wait for it. Polyhedra need it only against other kinds of
+/// bodies.
 void World::Course::prepare_shapes(bool has_ground) const {
   for (int a = 0; a < count(); ++a) {
     const rigid::Solid& solid = space_.solid(a);
@@ -438,7 +439,7 @@ void World::Course::check_overlaps(const WorldSpec& spec) const {
       if (space_.is_joined(a, b)) continue;
       Vec3 where{};
       const double depth = geometry::calc_overlap(*space_.solid(a).shape, at_a.frame, *space_.solid(b).shape,
-                                               rigid::place(space_.solid(b), space_.state(b)).frame, where);
+                                                  rigid::place(space_.solid(b), space_.state(b)).frame, where);
       if (depth > std::min(allowed_m(a), allowed_m(b)))
         throw InputError(
             fmt::format("bodies '{}' and '{}' start inside each other, {:.2f} mm deep near ({:.4f}, {:.4f}, {:.4f}) m; move one of them",
@@ -457,7 +458,7 @@ double World::advance(double until_s, double cpu_s, const Sink& sink) { return c
 Statistics World::get_statistics() const { return course_->get_statistics(); }
 
 std::vector<std::string> ask_about_links(const WorldSpec& spec) {
-  constexpr double kFar = 30.0;  // radii of a body
+  constexpr double kFarRadii = 30.0;  // radii of a body
   std::vector<std::string> questions;
   const auto calc_distance = [&](int body, const Vec3& where, double& radius) {
     const BodySpec& b = spec.bodies[body];
@@ -475,7 +476,7 @@ std::vector<std::string> ask_about_links(const WorldSpec& spec) {
       if (one < 0) continue;
       double radius = 0.0;
       const double distance = calc_distance(one, joint.at_m, radius);
-      far = far && distance > kFar * radius;
+      far = far && distance > kFarRadii * radius;
       if (distance < nearest) nearest = distance, of = radius, body = one;
     }
     if (far)
@@ -514,7 +515,7 @@ Simulation collect(const std::vector<events::Event>& events, const std::vector<V
     } else if (const auto* motion = std::get_if<events::BodyMotion>(&event); motion != nullptr && is_known(motion->body)) {
       const std::size_t body = motion->body;
       auto& path = all.poses[body];
-      if (!path.empty() && path.back().time_s >= motion->time_s) continue;  // after an impact it is where it was before
+      if (!path.empty() && path.back().time_s >= motion->time_s) continue;  // after an impact the pose is unchanged
       path.push_back(calc_pose(*motion, centres_m[body]));
     }
   }

@@ -1,4 +1,4 @@
-// Worlds of the hard cases of contact: their bodies, how they go, and what is asked of them in the end.
+// Worlds of the hard cases of contact: bodies, motion, and final checks.
 #pragma once
 
 #include <algorithm>
@@ -49,7 +49,7 @@ inline BodySpec make_body(const bank::Bank& bank, Vec3 position, double restitut
   return physics::tests::make_body("body", bank, position, restitution);
 }
 
-/// What a world did until its end.
+/// Results of a world at its end.
 struct Course {
   std::vector<events::BodyMotion> middle, end;
   physics::EnergyAudit energy;

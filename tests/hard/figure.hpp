@@ -32,7 +32,7 @@ inline void record(const std::string& id, const std::string& part, const std::st
   std::ofstream(std::filesystem::path(folder) / (id + ".jsonl"), std::ios::app) << line.str() << std::flush;
 }
 
-/// `value` as JSON, to 9 digits; what is not finite becomes null.
+/// `value` as JSON, to 9 digits; non-finite values become null.
 inline std::string to_json(double value) {
   if (!std::isfinite(value)) return "null";
   std::ostringstream text;
@@ -48,7 +48,7 @@ inline void hold(const std::string& id, double value, double bound, const std::s
   EXPECT_LE(value, bound) << id << " " << part;
 }
 
-/// For what is refused or warned of: `message` must contain all of `words` (file, place, remedy). Counts as the figure "refused".
+/// For refusals and warnings: `message` must contain all of `words` (file, place, remedy). Counts as the figure "refused".
 inline void hold_refusal(const std::string& id, const std::string& message, std::initializer_list<std::string> words,
                          const std::string& part = "") {
   record(id, part, "\"refused\"", "\"refused\"");

@@ -28,7 +28,7 @@ def hold(case, value, bound, part="", ranks=1):
 
 
 def hold_refusal(case, message, words, part="", ranks=1):
-    """For what is refused or warned of: `message` must contain all of `words` (file, place, remedy). Counts as the figure "refused"."""
+    """For refusals and warnings: `message` must contain all of `words` (file, place, remedy). Counts as the figure "refused"."""
     record(case, part, "refused", "refused", ranks)
     for word in words:
         if word not in message:

@@ -44,7 +44,7 @@ def pack(folder, bank, error_db):
 
 
 def hold_error(case, folder, bank, errors_db=(-30, -60)):
-    """The error on 95 % of the surface is no greater than what was asked for."""
+    """The error on 95 % of the surface is at most the requested one."""
     bench = load_bench()
     whole = bench.Shapes(bank)
     for error_db in errors_db:

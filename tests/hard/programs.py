@@ -12,7 +12,7 @@ import numpy as np
 
 BIN = pathlib.Path(os.environ.get("CARILLON_BIN_DIR", "build/release/bin")).resolve()
 STEEL = {"young_modulus_pa": 200e9, "poisson_ratio": 0.3, "density_kg_m3": 7850}
-TIMEOUT_S = 330 * int(os.environ.get("CARILLON_PATIENCE", "1"))  # of one run: what takes longer hangs
+TIMEOUT_S = 330 * int(os.environ.get("CARILLON_PATIENCE", "1"))  # of one run: a longer run counts as hung
 
 
 class Outcome:

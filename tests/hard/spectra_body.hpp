@@ -1,4 +1,4 @@
-// Small bodies whose spectra are hard, solved in every way there is, and what must hold whatever the way.
+// Small bodies with difficult spectra, solved in all ways, and the invariants of the solutions.
 #pragma once
 
 #include <mpi.h>
@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "precompute/eigen/solve_modes.hpp"
-#include "precompute/fem/error_bars/error_bars.hpp"
 #include "precompute/fem/assemble.hpp"
+#include "precompute/fem/error_bars/error_bars.hpp"
 #include "precompute/mesh/tet_mesh.hpp"
 
 namespace carillon::hard {

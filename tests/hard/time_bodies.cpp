@@ -24,7 +24,7 @@ using physics::tests::make_body;
 using physics::tests::make_box;
 constexpr double kGravity = 9.81;
 
-/// What a world did until its end.
+/// Results of a world at its end.
 struct Course {
   std::vector<events::Event> events;
   physics::Statistics at_half, at_end;

@@ -18,10 +18,6 @@ MAX_FILE_LINES = 600
 ALLOWED = (
     "precompute/ldlt/kernels_body.inl",
     "precompute/simulation/transient/sheets.inl:add_block",
-    "runtime/physics/geometry/refresh.cpp:step",
-    "runtime/physics/geometry/samples.cpp:Samples",
-    "runtime/physics/impact/impact.cpp:step",
-    "runtime/physics/rigid/step_points.cpp:make_lasting_point",
     "runtime/synth/kernels_body.inl:drive_modes",
 )
 COMMENT = {True: re.compile(r"(?:^|\s)//+[<!]?\s*(.*)"), False: re.compile(r"(?:^|\s)#(?!!)\s*(.*)")}

@@ -106,7 +106,11 @@ std::vector<Submission> read_submissions(Database& database, const std::string& 
       database,
       fmt::format("select job_file, request from submissions {} order by seq", job_file.empty() ? "" : "where job_file = ?").c_str());
   if (!job_file.empty()) row.bind(job_file);
-  while (row.step()) submissions.push_back({row.text(0), store::parse_request(row.text(1), "registry")});
+  try {
+    while (row.step()) submissions.push_back({row.text(0), store::parse_request(row.text(1), "registry")});
+  } catch (const InputError& error) {
+    throw Damaged(error.what());
+  }
   return submissions;
 }
 

@@ -1,5 +1,5 @@
-// Method: faces are first brought together within a rank; those left alone, and those whose corners all lie on a seam, go to the owner of
-//   their lowest corner, which sees all elements of a face. What is alone there too is boundary; its rank sends it to rank 0.
+// Method: faces are matched within a rank; unmatched faces, and faces with all corners on a seam, go to the owner of their lowest corner,
+//   which sees all elements of the face. Faces unmatched there are boundary and go to rank 0.
 #include "precompute/mesh/parallel/boundary.hpp"
 
 #include <fmt/format.h>
@@ -18,15 +18,15 @@ namespace {
 
 using mesh::LocalMesh;
 
-/// A face of this rank's elements as the owner of its lowest corner sees it.
+/// A face of this rank's elements as sent to the owner of its lowest corner.
 struct FaceRecord {
-  std::int32_t a, b, c;   // numbers of the corners, ascending
-  std::int32_t apex;      // the element's fourth corner
-  std::int32_t tet;       // number of the element
-  std::int32_t in_local;  // the element's place in LocalMesh
+  std::int32_t a, b, c;   // corner numbers, ascending
+  std::int32_t apex;      // fourth corner of the element
+  std::int32_t tet;       // element number
+  std::int32_t in_local;  // index of the element in LocalMesh
   std::int8_t local;      // 0..3, see mesh::kFaces
-  bool is_odd;            // seen from outside the element, a b c run clockwise
-  bool is_matched;        // its twin is on the same rank
+  bool is_odd;            // a b c run clockwise seen from outside the element
+  bool is_matched;        // twin is on the same rank
 };
 
 bool have_same_corners(const FaceRecord& x, const FaceRecord& y) { return x.a == y.a && x.b == y.b && x.c == y.c; }
@@ -113,12 +113,12 @@ bool match_at_rank(const std::string& name, const LocalMesh& local, const std::v
   return joined == local.tet_count() - 1;
 }
 
-/// A boundary triangle and a vertex on their way to rank 0.
+/// A boundary triangle and a vertex as sent to rank 0.
 struct TriangleRecord {
   std::int32_t tet;
-  std::int32_t side;  // 4 local face + part of a quadratic face
+  std::int32_t side;  // 4 * local face + part of a quadratic face
   std::array<std::int32_t, 3> nodes;
-  std::array<std::int32_t, 3> corners;  // of the face, for linear ones the same
+  std::array<std::int32_t, 3> corners;  // of the face; those of the triangle for linear elements
 };
 
 struct VertexRecord {
@@ -143,7 +143,7 @@ void add_triangles(const LocalMesh& local, const FaceRecord& face, std::vector<T
   add(3, ij, jk, ki);
 }
 
-/// Every edge of a closed surface joins two triangles.
+/// Checks that every edge of the surface joins two triangles.
 void check_closed(const std::string& name, const std::vector<TriangleRecord>& triangles) {
   struct Edge {
     std::int32_t low, high, tet;
@@ -200,10 +200,10 @@ Boundary make_boundary(std::vector<TriangleRecord>& triangles, std::vector<Verte
   return boundary;
 }
 
-/// For each face, in the order of arrival, whether no other rank has it; adds to `cut` the pairs of faces on two ranks.
+/// True for each face (in order of arrival) without a twin on another rank; adds the pairs of faces across ranks to `cut`.
 std::vector<char> match_faces(const std::string& name, std::vector<FaceRecord> faces, std::int64_t& cut) {
   std::vector<char> is_alone(faces.size(), 0);
-  for (std::size_t i = 0; i < faces.size(); ++i) faces[i].in_local = static_cast<std::int32_t>(i);  // sorting loses the order of arrival
+  for (std::size_t i = 0; i < faces.size(); ++i) faces[i].in_local = static_cast<std::int32_t>(i);  // remember the order of arrival
   for_each_face(faces, [&](std::size_t first, std::size_t end) {
     check_face(name, faces, first, end);
     if (end - first == 1) is_alone[faces[first].in_local] = 1;
@@ -212,7 +212,7 @@ std::vector<char> match_faces(const std::string& name, std::vector<FaceRecord> f
   return is_alone;
 }
 
-/// The triangles of the faces that are alone, with the numbers of their nodes.
+/// Triangles of the unmatched faces, with their node numbers.
 std::vector<TriangleRecord> list_triangles(const LocalMesh& local, const std::vector<FaceRecord>& faces, const std::vector<char>& is_alone,
                                            std::vector<VertexRecord>& vertices) {
   std::vector<TriangleRecord> triangles;

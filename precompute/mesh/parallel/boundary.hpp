@@ -1,4 +1,4 @@
-// The boundary of a distributed mesh, and how its elements meet. Inner header of the parallel reader.
+// Boundary of a distributed mesh and checks of its faces. Internal header of the parallel reader.
 #pragma once
 
 #include <string>
@@ -10,9 +10,9 @@
 
 namespace carillon::parallel_mesh {
 
-/// Brings the faces of all elements together: refuses elements given twice, faces of more than two elements and elements on one side of
-/// their common face; counts the cut; returns the boundary on rank 0. corners: who brings together the faces whose lowest corner is which
-/// node; on_seam (n): which local nodes other ranks touch too. Collective. Throws InputError on every rank.
+/// Matches the faces of all elements: refuses duplicate elements, faces of more than two elements and elements on one side of a common
+/// face; counts the cut; returns the boundary on rank 0. corners: rank that matches the faces of each lowest corner; on_seam (n): local
+/// nodes shared with other ranks. Collective. Throws InputError on every rank.
 Boundary find_boundary(const comm::Communicator& comm, const std::string& name, const comm::IndexPartition& corners,
                        const std::vector<char>& on_seam, mesh::DistributedMesh& mesh, mesh::CheckReport& report);
 

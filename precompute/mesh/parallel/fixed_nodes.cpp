@@ -12,7 +12,7 @@
 namespace carillon::parallel_mesh {
 namespace {
 
-/// A node that several entries name belongs to the first of them.
+/// A node named by several entries belongs to the first.
 void fix_by(std::int32_t& fixed, std::size_t entry) {
   const auto by = static_cast<std::int32_t>(entry) + 1;
   fixed = fixed == 0 ? by : std::min(fixed, by);
@@ -22,8 +22,8 @@ std::string begin_message(const std::string& name, const FixedNodes& entry) {
   return entry.place.empty() ? name : fmt::format("{}: {}", entry.place, name);
 }
 
-/// The array and the value of a node set: `NAME` is every node whose value in point data NAME is not 0 (then no value), `NAME:N` those
-/// whose value is N. Null if there is none.
+/// Array and value of a node set: `NAME` is every node with a nonzero value in point data NAME (no value), `NAME:N` those with value N.
+/// Null if there is none.
 const Array* find_set(const Layout& layout, const std::string& set, std::optional<std::int64_t>& value) {
   for (const Array& array : layout.point_data) {
     if (set == array.name) return &array;
@@ -53,7 +53,7 @@ const Array* find_set(const Layout& layout, const std::string& set, std::optiona
                                nearest.empty() ? "" : fmt::format(" (did you mean '{}'?)", nearest), list, names.front()));
 }
 
-/// Marks the nodes of an entry's set; returns how many are on this rank.
+/// Marks the nodes of an entry's set; returns their number on this rank.
 std::int64_t read_fixed_set(const Source& source, const std::string& name, const Layout& layout, const FixedNodes& entry,
                             std::size_t number, mesh::MeshBlock& block) {
   std::optional<std::int64_t> value;

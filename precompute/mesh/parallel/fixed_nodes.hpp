@@ -1,21 +1,20 @@
-// Which of a rank's nodes are fixed: by sets of the file, and by boxes.
+// Fixed nodes of a rank's block, from sets of the file and from boxes.
 #pragma once
 
 #include <string>
 
-#include "precompute/mesh/distributed/mesh_block.hpp"
 #include "precompute/mesh/check.hpp"
+#include "precompute/mesh/distributed/mesh_block.hpp"
 #include "precompute/mesh/parallel/read_parallel.hpp"
 #include "precompute/mesh/parallel/source.hpp"
 
 namespace carillon::parallel_mesh {
 
-/// Marks the nodes of all named sets in block.fixed. Collective. Throws InputError on every rank for a set that is not there or has no
-/// node.
+/// Marks the nodes of all named sets in block.fixed. Collective. Throws InputError on every rank for an unknown or empty set.
 void read_fixed_sets(const comm::Communicator& comm, const Source& source, const std::string& name, const Layout& layout,
                      const ReadOptions& options, mesh::MeshBlock& block);
 
-/// Puts the box of the mesh into the report and marks the nodes of the given boxes. Collective. Throws InputError on every rank for a box
+/// Computes the mesh box for the report and marks the nodes of the given boxes. Collective. Throws InputError on every rank for a box
 /// without a node.
 void find_fixed_boxes(const comm::Communicator& comm, const std::string& name, const ReadOptions& options, mesh::MeshBlock& block,
                       mesh::CheckReport& report);

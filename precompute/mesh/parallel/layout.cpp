@@ -1,5 +1,5 @@
-// Method: carillon-vtkhdf, a process of its own, opens the file by HDF5 and says where each array lies. The arrays are read by their
-//   places, without HDF5, and every place is checked against the length of the file here.
+// Method: carillon-vtkhdf opens the file with HDF5 in a process of its own and prints the location of each array. The arrays are read by
+//   offset, without HDF5; every offset is checked here against the file length.
 // Source: VTK file formats, "VTKHDF", version 1.0.
 #include "precompute/mesh/parallel/layout.hpp"
 
@@ -22,7 +22,7 @@ constexpr double kPatienceS = 30;
   throw InputError(fmt::format("{}: {}", file.string(), what));
 }
 
-/// What carillon-vtkhdf says of the file.
+/// Output of carillon-vtkhdf.
 std::string describe_file(const std::filesystem::path& file) {
   const base::Finished finished = base::run(
       {.words = {base::find_helper("carillon-vtkhdf").string(), std::filesystem::absolute(file).string()}, .output = base::kCapture},

@@ -1,4 +1,4 @@
-// Where the arrays of a VTKHDF file lie. HDF5 is only asked for that, and in a process of its own.
+// Locations of the arrays of a VTKHDF file. HDF5 runs in a process of its own.
 #pragma once
 
 #include <cstdint>
@@ -8,12 +8,12 @@
 
 namespace carillon::parallel_mesh {
 
-/// Where a contiguous array of numbers lies in the file, row-major.
+/// Location of a contiguous numeric array in the file, row-major.
 struct ArrayPlace {
-  std::int64_t offset = 0;  // [byte] from the beginning of the file
+  std::int64_t offset = 0;  // [byte] from the start of the file
   std::int64_t rows = 0;
   std::int64_t columns = 1;
-  int bytes = 0;  // of one number: 4 or 8 (floating point), 1, 2, 4 or 8 (integers)
+  int bytes = 0;  // per number: 4 or 8 (floating point), 1, 2, 4 or 8 (integers)
   bool is_floating = false;
   bool is_signed = true;
   bool is_big_endian = false;
@@ -32,9 +32,9 @@ struct Layout {
   std::vector<Array> cell_data;   // integer arrays (E) of CellData
 };
 
-/// Reads the layout of a VTKHDF file in a child process, which may crash or spin on a damaged file without harm to this one.
-/// Not collective. Throws InputError for what is no VTKHDF 1.0 UnstructuredGrid in one piece with contiguous arrays, all inside the file;
-/// SystemError when no child can be started.
+/// Reads the layout of a VTKHDF file in a child process, so that a damaged file cannot crash or block this one. Not collective. Throws
+/// InputError unless the file is a VTKHDF 1.0 UnstructuredGrid in one piece with contiguous arrays inside the file; SystemError if no child
+/// can be started.
 Layout find_layout(const std::filesystem::path& file);
 
 }  // namespace carillon::parallel_mesh

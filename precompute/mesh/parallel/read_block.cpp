@@ -1,6 +1,5 @@
-// Method: every rank reads an even run of nodes and of elements by their places in the file, and asks the owners of its elements' nodes for
-//   what it needs of them. Mid nodes are numbered by the order of their edges (low corner, then high corner), which the owners of the low
-//   corners sort among themselves.
+// Method: every rank reads an equal range of nodes and elements and requests node data from the owners. Mid nodes are numbered in the order
+//   of their edges (low corner, then high corner), which the owners of the low corners sort.
 #include "precompute/mesh/parallel/read_block.hpp"
 
 #include <fmt/format.h>
@@ -22,8 +21,8 @@ namespace {
 
 using mesh::MeshBlock;
 
-constexpr double kFlat = 1e-9;                        // as mesh::check_mesh: six volumes over the cube of the longest edge
-constexpr int kLinearType = 10, kQuadraticType = 24;  // VTK's cell types
+constexpr double kMinVolumeRatio = 1e-9;              // as mesh::check_mesh: 6 V / (longest edge)^3
+constexpr int kLinearType = 10, kQuadraticType = 24;  // VTK cell types
 
 std::string list_elements(const std::vector<std::int64_t>& elements, std::int64_t total) {
   std::string text;
@@ -33,7 +32,7 @@ std::string list_elements(const std::vector<std::int64_t>& elements, std::int64_
   return text + " (tetrahedra counted from 1 in the order of the file)";
 }
 
-/// Throws on every rank if any rank found bad elements. `what` completes "3 elements ...", `remedy` follows the list. Collective.
+/// Throws on every rank if any rank found bad elements. `what` completes "3 elements ..."; `remedy` follows the list. Collective.
 void refuse_elements(const comm::Communicator& comm, const std::string& name, const std::vector<std::int64_t>& bad, const char* what,
                      const char* remedy) {
   const auto total = comm.sum(static_cast<std::int64_t>(bad.size()));
@@ -44,7 +43,7 @@ void refuse_elements(const comm::Communicator& comm, const std::string& name, co
       fmt::format("{}: {} element{} {}: {}; {}", name, total, total == 1 ? "" : "s", what, list_elements(listed, total), remedy));
 }
 
-/// The nodes of this rank's elements, each once and ascending, and where each node of each element is among them.
+/// Distinct nodes of this rank's elements, ascending, and the index of each element node among them.
 struct Touched {
   std::vector<std::int32_t> nodes;
   std::vector<std::int32_t> place;  // (e, width)
@@ -69,7 +68,7 @@ std::string describe_cell(std::int64_t type, std::int64_t cell) {
       cell + 1, type);
 }
 
-/// The order of the elements from the first one's type, if the arrays fit it.
+/// Element order by the type of the first cell, if the arrays match it.
 int find_order(const Source& source, const std::string& name, const Layout& layout, std::int64_t& type) {
   type = source.read<std::int64_t>(layout.types, 0, 1).front();
   if (type != kLinearType && type != kQuadraticType) throw InputError(fmt::format("{}: {}", name, describe_cell(type, 0)));
@@ -94,12 +93,12 @@ void check_cells(const Source& source, const std::string& name, const Layout& la
 }
 
 void read_connectivity(const Source& source, const std::string& name, const Layout& layout, MeshBlock& block) {
-  constexpr std::int64_t kAtOnce = 1 << 16;  // elements
+  constexpr std::int64_t kElementsPerRead = 1 << 16;  // elements
   const std::int64_t begin = block.elements.own_begin(), count = block.elements.own_count();
   const std::size_t width = block.width();
   block.tets.resize(static_cast<std::size_t>(count) * width);
-  for (std::int64_t done = 0; done < count; done += kAtOnce) {
-    const std::int64_t now = std::min(kAtOnce, count - done);
+  for (std::int64_t done = 0; done < count; done += kElementsPerRead) {
+    const std::int64_t now = std::min(kElementsPerRead, count - done);
     const auto numbers = source.read<std::int64_t>(layout.connectivity, (begin + done) * static_cast<std::int64_t>(width),
                                                    now * static_cast<std::int64_t>(width));
     for (std::size_t i = 0; i < numbers.size(); ++i) {
@@ -111,7 +110,7 @@ void read_connectivity(const Source& source, const std::string& name, const Layo
   }
 }
 
-/// The numbers of the elements that name a node twice.
+/// Numbers of elements with a repeated node.
 std::vector<std::int64_t> find_repeated(const MeshBlock& block) {
   std::vector<std::int64_t> repeated;
   const std::size_t width = block.width();
@@ -153,7 +152,7 @@ void read_nodes(const Source& source, const std::string& name, const Layout& lay
   }
 }
 
-/// Turns elements that are inside out, finds the flat ones, and keeps every element's centre.
+/// Reorients inverted elements, finds flat ones and stores every element's centre.
 std::vector<std::int64_t> orient(MeshBlock& block, const Touched& touched, const std::vector<Vec3>& nodes_m, mesh::CheckReport& report) {
   const std::size_t width = block.width(), count = block.tets.size() / width;
   std::vector<std::int64_t> flat;
@@ -169,12 +168,12 @@ std::vector<std::int64_t> orient(MeshBlock& block, const Touched& touched, const
     const Vec3 &a = edge[0], &b = edge[2], &c = edge[3];
     const double determinant = calc_det(a, b, c);
     for (std::size_t k = 0; k < 3; ++k) block.centres_m[e][k] = (at(0)[k] + at(1)[k] + at(2)[k] + at(3)[k]) / 4;
-    if (!(std::abs(determinant) > kFlat * longest * std::sqrt(longest))) {
+    if (!(std::abs(determinant) > kMinVolumeRatio * longest * std::sqrt(longest))) {
       flat.push_back(block.elements.own_begin() + static_cast<std::int64_t>(e));
     } else if (determinant < 0) {
       std::int32_t* tet = block.tets.data() + e * width;
       std::swap(tet[1], tet[2]);
-      if (block.order == 2) {  // edges 01 and 02, 13 and 23 change places
+      if (block.order == 2) {  // swap edges 01 and 02, 13 and 23
         std::swap(tet[4], tet[6]);
         std::swap(tet[8], tet[9]);
       }
@@ -193,17 +192,17 @@ void drop_mid_nodes(MeshBlock& block) {
   block.order = 1;
 }
 
-/// The places of nodes of other blocks. Collective.
+/// Positions of nodes of other blocks. Collective.
 std::vector<Vec3> query_nodes(const comm::Communicator& comm, const MeshBlock& block, const std::vector<std::int32_t>& nodes) {
   return comm::query_owners<Vec3>(
       comm, nodes, [&](std::int32_t node) { return block.find_owner(node); },
       [&](std::int32_t node) { return block.nodes_m[block.to_local(node)]; });
 }
 
-/// Renumbers the nodes in use by their old order and drops the others. Collective.
+/// Renumbers used nodes in their old order and drops the others. Collective.
 void drop_unused(const comm::Communicator& comm, MeshBlock& block, mesh::CheckReport& report) {
   const Touched touched = comm.agree([&] { return find_touched(block.tets); });
-  std::vector<std::int32_t> number;  // of the nodes of this block that are in use: place among these; -1: unused
+  std::vector<std::int32_t> number;  // new index of each node of this block; -1: unused
   std::int32_t kept = 0;
   const auto find_numbers = [&](const comm::ByRank<std::int32_t>& nodes) {
     number.assign(block.nodes_m.size(), -1);
@@ -233,7 +232,7 @@ void drop_unused(const comm::Communicator& comm, MeshBlock& block, mesh::CheckRe
   block.corners = used;
 }
 
-/// An edge, and what the rank that gets its mid node has to know.
+/// An edge as sent to the rank that numbers its mid node.
 struct Edge {
   std::int32_t low, high;
   Vec3 middle_m;
@@ -256,13 +255,13 @@ struct Corner {
 /// Edge m of element e of linear elements.
 Edge make_edge(const Touched& touched, const std::vector<Corner>& corners, std::size_t e, std::size_t m) {
   const auto [a, b] = std::minmax(touched.place[4 * e + static_cast<std::size_t>(mesh::kEdges[m][0])],
-                                  touched.place[4 * e + static_cast<std::size_t>(mesh::kEdges[m][1])]);  // places ascend as the nodes do
+                                  touched.place[4 * e + static_cast<std::size_t>(mesh::kEdges[m][1])]);  // indices ascend with node numbers
   const Corner &low = corners[a], &high = corners[b];
   return {touched.nodes[a], touched.nodes[b], 0.5 * (low.x_m + high.x_m),
           low.fixed != 0 && high.fixed != 0 ? std::min(low.fixed, high.fixed) : 0};
 }
 
-/// Gives every edge a mid node, which the owner of its low corner gets. Collective.
+/// Gives every edge a mid node, owned by the owner of its low corner. Collective.
 void add_mid_nodes(const comm::Communicator& comm, MeshBlock& block, const std::string& name) {
   const auto find_owner = [&](std::int32_t node) { return block.find_owner(node); };
   const Touched touched = comm.agree([&] { return find_touched(block.tets); });
@@ -312,7 +311,7 @@ void add_mid_nodes(const comm::Communicator& comm, MeshBlock& block, const std::
   });
 }
 
-/// What the file has of this rank's block. Collective.
+/// Reads this rank's block of the file. Collective.
 MeshBlock read_arrays(const comm::Communicator& comm, const std::filesystem::path& file, const std::string& name, const Layout& layout,
                       const ReadOptions& options) {
   MeshBlock block;
@@ -353,7 +352,7 @@ MeshBlock read_block(const comm::Communicator& comm, const std::filesystem::path
   }
   report.reoriented = comm.sum(report.reoriented);
   drop_unused(comm, block, report);
-  // As mesh::check_mesh, before the order changes.
+  // As mesh::check_mesh; must precede the change of order.
   report.nodes = block.corners.total();
   report.tets = layout.types.rows;
   if (options.order == 1 && block.order == 2) {

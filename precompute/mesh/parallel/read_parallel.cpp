@@ -1,6 +1,5 @@
-// Method: find the arrays (layout), read blocks (read_block), cut (mesh::bisect), move elements and number nodes
-//   (mesh::redistribute), once more if the caller has a better cut, bring faces together (boundary).
-// Source: the steps name theirs.
+// Method: locate arrays (layout), read blocks (read_block), partition (mesh::bisect), move elements and number nodes (mesh::redistribute),
+//   again if the caller has a better partition, match faces (boundary).
 #include "precompute/mesh/parallel/read_parallel.hpp"
 
 #include <fmt/format.h>
@@ -11,10 +10,10 @@
 #include <system_error>
 #include <utility>
 
-#include "precompute/mesh/distributed/bisect.hpp"
-#include "precompute/mesh/distributed/redistribute.hpp"
 #include "precompute/comm/exchange.hpp"
 #include "precompute/mesh/check_parts.hpp"
+#include "precompute/mesh/distributed/bisect.hpp"
+#include "precompute/mesh/distributed/redistribute.hpp"
 #include "precompute/mesh/parallel/boundary.hpp"
 #include "precompute/mesh/parallel/layout.hpp"
 #include "precompute/mesh/parallel/read_block.hpp"
@@ -30,7 +29,7 @@ void for_each_array(Layout& layout, const Visit& visit) {
     for (auto& array : *list) visit(array);
 }
 
-/// Rank 0 finds the layout, all get it. Collective.
+/// Rank 0 reads the layout and broadcasts it. Collective.
 Layout broadcast_layout(const comm::Communicator& comm, const std::filesystem::path& file) {
   Layout layout;
   const auto names = comm.broadcast([&] {
@@ -57,7 +56,7 @@ Layout broadcast_layout(const comm::Communicator& comm, const std::filesystem::p
   return layout;
 }
 
-/// The quality of all elements from that of each rank's. Collective.
+/// Global quality from the quality on each rank. Collective.
 void calc_quality(const comm::Communicator& comm, const mesh::LocalMesh& local, mesh::CheckReport& report) {
   const auto own = comm.agree([&] {
     mesh::CheckReport quality;
@@ -82,7 +81,7 @@ void calc_quality(const comm::Communicator& comm, const mesh::LocalMesh& local, 
   report.slivers = static_cast<std::int64_t>(sum[2]);
 }
 
-/// The rank of each element of the block, where each rank knows those of its elements. Collective.
+/// Target rank of each element of the block, from those known to the current owners. Collective.
 std::vector<std::int32_t> send_back(const comm::Communicator& comm, const comm::IndexPartition& elements, const mesh::LocalMesh& local,
                                     const std::vector<std::int32_t>& rank) {
   return comm::report_to_owners<std::int32_t>(
@@ -95,9 +94,9 @@ std::vector<std::int32_t> send_back(const comm::Communicator& comm, const comm::
       elements);
 }
 
-/// The rows of free nodes in the mesh as it is cut now. Collective.
-std::vector<std::int32_t> find_rows(const comm::Communicator& comm, const mesh::MeshBlock& block,
-                                    const std::vector<std::int32_t>& nodes, const mesh::LocalMesh& now) {
+/// Rows of free nodes in the current partition. Collective.
+std::vector<std::int32_t> find_rows(const comm::Communicator& comm, const mesh::MeshBlock& block, const std::vector<std::int32_t>& nodes,
+                                    const mesh::LocalMesh& now) {
   const auto find_owner = [&](std::int32_t node) { return block.find_owner(node); };
   const auto row_at = comm::report_to_owners<std::int32_t>(
       comm,
@@ -110,9 +109,9 @@ std::vector<std::int32_t> find_rows(const comm::Communicator& comm, const mesh::
   return comm::query_owners<std::int32_t>(comm, nodes, find_owner, [&](std::int32_t node) { return row_at[block.to_local(node)]; });
 }
 
-/// Cuts the mesh by `part`, and once more where the options say so. Collective.
+/// Partitions the mesh by `part`, and again if the options request it. Collective.
 mesh::DistributedMesh cut(const comm::Communicator& comm, const std::string& name, mesh::MeshBlock& block,
-                               const std::vector<std::int32_t>& part, const ReadOptions& options, std::vector<char>& on_seam) {
+                          const std::vector<std::int32_t>& part, const ReadOptions& options, std::vector<char>& on_seam) {
   const bool has_fixed = !options.fixed.empty();
   if (!options.recut || !options.recut->is_wanted(block.node_count()))
     return mesh::redistribute(comm, name, block, part, has_fixed, on_seam);
@@ -132,7 +131,7 @@ void collect_warnings(mesh::CheckReport& report) {
   mesh::warn_of_elements(report);
   if (report.touching_nodes > 0)
     report.warnings.push_back(
-        fmt::format("{} nodes of the boundary lie in the place of another: cracks are not closed in meshes that are read in parallel, so "
+        fmt::format("{} nodes of the boundary coincide with another: the parallel reader does not close cracks, so "
                     "the body may be in more parts than it seems ({} here)",
                     report.touching_nodes, report.components));
 }
@@ -142,7 +141,7 @@ void collect_warnings(mesh::CheckReport& report) {
 bool is_parallel_format(const std::filesystem::path& file) {
   constexpr char kSignature[] = "\x89HDF\r\n\x1a\n";
   std::array<char, 8> begin{};
-  std::error_code error;  // A pipe without a writer would keep us waiting.
+  std::error_code error;  // A pipe without a writer would block.
   if (!std::filesystem::is_regular_file(file, error)) return false;
   std::ifstream(file, std::ios::binary).read(begin.data(), begin.size());
   return std::equal(begin.begin(), begin.end(), kSignature);

@@ -1,4 +1,4 @@
-// The arrays of a mesh file, read by places on any rank.
+// Arrays of a mesh file, read by offset on any rank.
 #pragma once
 
 #include <fcntl.h>
@@ -20,7 +20,7 @@
 
 namespace carillon::parallel_mesh {
 
-/// A file that is read by places.
+/// A file read by offset.
 class Source {
  public:
   Source(const std::filesystem::path& file, std::string name)
@@ -33,7 +33,7 @@ class Source {
   Source(const Source&) = delete;
   Source& operator=(const Source&) = delete;
 
-  /// The rows first ... first + rows - 1 as T (double or std::int64_t).
+  /// Rows first ... first + rows - 1 as T (double or std::int64_t).
   template <typename T>
   std::vector<T> read(const Array& array, std::int64_t first, std::int64_t rows) const {
     std::vector<T> values(rows * array.columns);

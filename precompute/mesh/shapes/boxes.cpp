@@ -1,8 +1,8 @@
-// The bodies on Cartesian lattices: bar, plate and box, the hollow box, and the tube (a lattice in x, radius and angle).
+// Bodies on Cartesian lattices: bar, plate, box, hollow box, and tube (lattice in x, radius and angle).
 //
-// Method: Whole numbers of cells; the hollow box leaves the cells of its cavity out. The radii of the tube grow geometrically, so that the
-//   cells of a thick wall stay as long as wide. Mid-side nodes of the tube lie at the mean radius and mean angle of their corners: exactly
-//   on the cylinders where both corners do, and blended across the wall, so that no element folds.
+// Method: integer numbers of cells; the hollow box omits the cells of its cavity. Tube radii grow geometrically, so that cells of a thick
+//   wall keep their aspect ratio. Mid-side nodes of the tube lie at the mean radius and angle of their corners: exact on the cylinders,
+//   blended across the wall, so that no element folds.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -19,7 +19,7 @@ namespace {
 
 using Cells = std::array<int, 3>;
 
-// Names the nodes on both ends of a lattice axis.
+// Names the nodes at both ends of a lattice axis.
 void add_end_sets(mesh::TetMesh& mesh, const std::vector<Cells>& indices, int axis, int cells, const std::string& low_name,
                   const std::string& high_name) {
   auto& low = mesh.node_sets[low_name];
@@ -43,7 +43,7 @@ void raise_straight(mesh::TetMesh& mesh) {
 long long multiply(const Cells& n) { return static_cast<long long>(n[0]) * n[1] * n[2]; }
 long long calc_face_cells(const Cells& n) { return 1LL * n[0] * n[1] + 1LL * n[1] * n[2] + 1LL * n[2] * n[0]; }
 
-// The box with a cavity of `cavity` cells behind walls of `layers` cells.
+// Box with a cavity of `cavity` cells behind walls of `layers` cells.
 mesh::TetMesh make_hollow_box(const std::array<double, 3>& edges, double wall, const Cells& cavity, int layers, int order) {
   Lattice lattice;
   for (int axis = 0; axis < 3; ++axis) lattice.cells[axis] = cavity[axis] + 2 * layers;
@@ -159,7 +159,7 @@ Body plan_tube(double length_m, double outer_radius_m, double wall_m, int order)
   const double inner_radius = outer_radius_m - wall_m;
   const double mean_radius = outer_radius_m - 0.5 * wall_m;
   Body body;
-  // Cells around come in pairs, so that the mirrored lattice closes on itself.
+  // An even number of cells around, so that the mirrored lattice closes.
   body.lengths = {length_m, mean_radius * std::log(outer_radius_m / inner_radius), std::numbers::pi * mean_radius, 0.0};
   body.coarsest = {1, 1, 4, 1};
   body.wanted = {2, order == 1 ? 2 : 1, 6, 1};

@@ -1,9 +1,9 @@
-// Method: A cell of a lattice is cut into the six tetrahedra of Kuhn, the monotone paths from one corner to the opposite one, and the cut
-//   is mirrored from cell to cell by the parity of its index (the J1 triangulation). Neighbours then share the diagonals of their faces,
-//   and an evenly divided box keeps its three mirror planes, so bending modes of a square bar stay degenerate. A prism is cut along the
-//   diagonals that start at the smallest index, which conforms by construction.
-// Source: Kuhn 1960, IBM J. Res. Dev. 4; Todd 1976, "The Computation of Fixed Points and Applications" (J1); Dompierre et al. 1999,
-//   "How to subdivide pyramids, prisms and hexahedra into tetrahedra".
+// Method: each cell is cut into Kuhn's six tetrahedra (monotone paths from one corner to the opposite one), mirrored from cell to cell by
+//   index parity (J1 triangulation). Neighbours then share face diagonals, and an evenly divided box keeps its three mirror planes, so
+//   bending modes of a square bar stay degenerate. A prism is cut along the diagonals from the smallest index, which conforms by
+//   construction.
+// Source: Kuhn 1960, IBM J. Res. Dev. 4; Todd 1976, "The Computation of Fixed Points and Applications" (J1); Dompierre et al. 1999, "How to
+//   subdivide pyramids, prisms and hexahedra into tetrahedra".
 #include "precompute/mesh/shapes/lattice.hpp"
 
 #include <algorithm>
@@ -16,7 +16,7 @@
 namespace carillon::shapes {
 namespace {
 
-// The six orders in which a monotone path takes the three axes, and whether the order is an odd permutation.
+// The six axis orders of a monotone path, and their parity.
 constexpr std::array<std::array<int, 4>, 6> kPaths{{{0, 1, 2, 0}, {1, 2, 0, 0}, {2, 0, 1, 0}, {0, 2, 1, 1}, {2, 1, 0, 1}, {1, 0, 2, 1}}};
 
 void append_tet(mesh::TetMesh& mesh, std::int32_t a, std::int32_t b, std::int32_t c, std::int32_t d) {
@@ -28,7 +28,7 @@ void append_tet(mesh::TetMesh& mesh, std::int32_t a, std::int32_t b, std::int32_
   mesh.regions.push_back(0);
 }
 
-// Four tetrahedra around the shortest diagonal of the octahedron whose opposite corners are o[i] and o[i + 3].
+// Four tetrahedra around the shortest diagonal of an octahedron with opposite corners o[i] and o[i + 3].
 void append_octahedron(mesh::TetMesh& mesh, const std::array<std::int32_t, 6>& o) {
   int best = 0;
   double best_length = HUGE_VAL;
@@ -58,13 +58,13 @@ mesh::TetMesh make_lattice(const Lattice& lattice, const std::function<Vec3(int,
   };
 
   mesh::TetMesh mesh;
-  std::vector<std::size_t> corners;  // slots, four a tetrahedron
+  std::vector<std::size_t> corners;  // slots, four per tetrahedron
   for (int k = 0; k < lattice.cells[2]; ++k) {
     for (int j = 0; j < lattice.cells[1]; ++j) {
       for (int i = 0; i < lattice.cells[0]; ++i) {
         if (lattice.keep && !lattice.keep(i, j, k)) continue;
         const std::array<int, 3> cell{i, j, k};
-        const bool mirrored = ((i + j + k) & 1) != 0;  // an odd number of mirrored axes turns the orientation
+        const bool mirrored = ((i + j + k) & 1) != 0;  // an odd number of mirrored axes reverses the orientation
         for (const auto& path : kPaths) {
           std::array<int, 3> at{};
           for (int axis = 0; axis < 3; ++axis) at[axis] = cell[axis] + (cell[axis] & 1);
@@ -99,7 +99,7 @@ mesh::TetMesh make_lattice(const Lattice& lattice, const std::function<Vec3(int,
 }
 
 void append_prism(mesh::TetMesh& mesh, std::array<std::int32_t, 3> bottom, std::array<std::int32_t, 3> top) {
-  // Sort the three columns; an odd permutation turns the orientation of the triangle.
+  // Sort the three columns; an odd permutation reverses the triangle.
   bool odd = false;
   const auto order = [&](int a, int b) {
     if (bottom[a] < bottom[b]) return;

@@ -13,27 +13,27 @@ namespace carillon::shapes {
 /// A Cartesian lattice of cells, cut into tetrahedra.
 struct Lattice {
   std::array<int, 3> cells{1, 1, 1};
-  int periodic_axis = -1;                             // the last point of this axis is the first one again; needs an even number of cells
-  std::function<bool(int, int, int)> keep = nullptr;  // which cells exist; null keeps all
+  int periodic_axis = -1;                             // the last point of this axis equals the first; needs an even number of cells
+  std::function<bool(int, int, int)> keep = nullptr;  // selects cells; null keeps all
 };
 
-/// The lattice as a linear mesh: `place` maps a lattice point (i, j, k) to a position and has to keep the orientation of space.
-/// Points that no kept cell uses get no node. `indices`, if given, receives (i, j, k) of every node.
+/// Lattice as a linear mesh: `place` maps a lattice point (i, j, k) to a position and must preserve orientation. Points of no kept cell get
+/// no node. `indices`, if given, receives (i, j, k) of every node.
 mesh::TetMesh make_lattice(const Lattice& lattice, const std::function<Vec3(int, int, int)>& place,
                            std::vector<std::array<int, 3>>* indices = nullptr);
 
-/// Appends to `mesh` the three tetrahedra of the prism between the triangle `bottom` and the triangle `top`, where `top` lies outward of
-/// `bottom`. The quadrilaterals are cut by the order of bottom's indices, so neighbouring prisms agree.
+/// Appends to `mesh` the three tetrahedra of the prism between the triangles `bottom` and `top` (outward of `bottom`). Quadrilaterals are
+/// cut by the order of bottom's indices, so neighbouring prisms conform.
 void append_prism(mesh::TetMesh& mesh, std::array<std::int32_t, 3> bottom, std::array<std::int32_t, 3> top);
 
-/// Appends the refinement of a tetrahedron into frequency^3 ones, octahedra cut along their shortest diagonal; the mesh has its nodes
-/// already. `node` gives the node of the weights (a, b, c) of the corners of its base, the apex having what is left of the frequency.
-/// `skin`, if given, receives the triangles of the base, in the base's orientation.
+/// Appends the refinement of a tetrahedron into frequency^3 ones; octahedra are cut along their shortest diagonal; the mesh already has the
+/// nodes. `node` gives the node for the weights (a, b, c) of the base corners; the apex has the remaining weight. `skin`, if given,
+/// receives the triangles of the base in its orientation.
 void append_refined(mesh::TetMesh& mesh, int frequency, const std::function<std::int32_t(int, int, int)>& node,
                     std::vector<std::array<std::int32_t, 3>>* skin = nullptr);
 
-/// Turns a linear mesh into a quadratic one. `place(a, b)` gives the mid-side node of the edge between the corners a < b. A mid-side node
-/// joins every named set that holds both ends of its edge.
+/// Converts a linear mesh to a quadratic one. `place(a, b)` gives the mid-side node of the edge between corners a < b. A mid-side node
+/// joins every named set that holds both edge ends.
 void raise_order(mesh::TetMesh& mesh, const std::function<Vec3(std::int32_t, std::int32_t)>& place);
 
 Vec3 calc_middle(const Vec3& a, const Vec3& b);

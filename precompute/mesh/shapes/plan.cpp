@@ -1,6 +1,5 @@
-// Method: Cells as near to the wanted edge as whole numbers allow. For a node count the edge is found by bisection, then all divisions near
-//   it are compared: what misses the count by more than 3 % pays ten times its miss, what is longer than wide pays the square of the
-//   logarithm of its aspect.
+// Method: integer cell counts nearest to the requested edge. For a node count, bisection finds the edge, then divisions near it are
+//   compared: a count error above 3 % costs ten times the error, anisotropy the squared logarithm of the aspect ratio.
 #include "precompute/mesh/shapes/plan.hpp"
 
 #include <fmt/core.h>
@@ -15,7 +14,7 @@ namespace carillon::shapes {
 namespace {
 
 constexpr long long kMaxNodes = 20'000'000;
-constexpr double kMaxCells = 1e5;  // along one direction; keeps products inside 64 bits
+constexpr double kMaxCells = 1e5;  // per direction; products stay within 64 bits
 
 Divisions divide(const Body& body, const Divisions& fewest, double edge_m) {
   Divisions divisions = fewest;
@@ -26,7 +25,7 @@ Divisions divide(const Body& body, const Divisions& fewest, double edge_m) {
   return divisions;
 }
 
-// The edge at which the node count passes the target.
+// Edge length at which the node count exceeds the target.
 double find_edge(const Body& body, const Divisions& fewest, int order, long long target) {
   const double longest = *std::max_element(body.lengths.begin(), body.lengths.end());
   double small = std::log(longest / kMaxCells);
@@ -39,7 +38,7 @@ double find_edge(const Body& body, const Divisions& fewest, int order, long long
   return std::exp(large);
 }
 
-// What a division costs at an edge length: deviation from the target and from equal edges.
+// Cost of a division at an edge length: count error and anisotropy.
 double calc_cost(const Body& body, const Divisions& fewest, const Divisions& divisions, double edge_m, double miss) {
   double cost = 10.0 * std::max(0.0, miss - 0.03) + 0.5 * miss;
   for (int axis = 0; axis < 4; ++axis) {

@@ -1,4 +1,4 @@
-// How many cells a body's lattice gets (private to carillon::shapes).
+// Number of cells of a body's lattice (private to carillon::shapes).
 #pragma once
 
 #include <array>
@@ -10,7 +10,7 @@
 
 namespace carillon::shapes {
 
-/// The simplices of a linear tetrahedral mesh.
+/// Simplex counts of a linear tetrahedral mesh.
 struct Counts {
   long long vertices = 0;
   long long tets = 0;
@@ -18,33 +18,33 @@ struct Counts {
   long long euler = 1;  // Euler characteristic of the body: ball 1, ring 0, closed shell 2
 };
 
-/// Nodes of the mesh at an order: vertices, and for order 2 the edges, by Euler's formula E = V + T + F_boundary / 2 - euler.
+/// Nodes of a mesh: vertices, and for order 2 the edges, by Euler's formula E = V + T + F_boundary / 2 - euler.
 long long calc_node_count(const Counts& counts, int order);
 
-/// Cells along up to four independent directions of a body; unused directions stay at 1.
+/// Cells along up to four independent directions; 1 in unused directions.
 using Divisions = std::array<int, 4>;
 
-/// A body before its lattice is chosen.
+/// A body before its divisions are chosen.
 struct Body {
   std::array<double, 4> lengths{};  // [m] along each direction; 0 for an unused direction
-  Divisions coarsest{1, 1, 1, 1};   // the fewest cells that make a valid mesh
-  Divisions wanted{1, 1, 1, 1};     // the fewest cells that make a good one, where the count permits
+  Divisions coarsest{1, 1, 1, 1};   // minimum cells of a valid mesh
+  Divisions wanted{1, 1, 1, 1};     // minimum cells of a good mesh, if the count permits
   std::function<Counts(const Divisions&)> calc_counts;
-  std::function<mesh::TetMesh(const Divisions&)> make;  // the mesh, of the wanted order
-  double reluctance = 0.0;  // what this construction costs relative to others of the same body; 0.1 weighs as a node count 1 % further off
+  std::function<mesh::TetMesh(const Divisions&)> make;  // builds the mesh of the requested order
+  double reluctance = 0.0;  // penalty relative to other constructions of the body; 0.1 equals a count error of 1 %
 };
 
-/// Chooses among constructions of one body and their divisions for a wanted edge length (the first construction) or node count (one of
-/// the two is given) and makes the mesh. Throws InputError when they are out of reach.
+/// Chooses a construction and its divisions for an edge length (first construction only) or a node count (exactly one is given) and makes
+/// the mesh. Throws InputError when out of range.
 mesh::TetMesh make_best(const std::vector<Body>& bodies, int order, std::optional<long long> target_nodes, std::optional<double> edge_m);
 
-// The bodies. Dimensions are valid already; order 1 or 2.
+// Bodies. Dimensions are validated; order is 1 or 2.
 Body plan_box(const std::array<double, 3>& edges_m, int order);
 Body plan_hollow_box(const std::array<double, 3>& edges_m, double wall_m, int order);
 Body plan_tube(double length_m, double outer_radius_m, double wall_m, int order);
-/// Constructions on several polyhedra, the icosahedron first: its symmetry keeps the five-fold modes of a ball together.
+/// Constructions on several polyhedra, icosahedron first: its symmetry keeps the five-fold modes of a ball degenerate.
 std::vector<Body> plan_ball(double radius_m, int order);
-/// Along x; a disc in the x-y plane; a cone along z whose top has the radius top_radius_m, 0 for a point; a ring of round section about z.
+/// Cylinder along x; disc in the x-y plane; cone along z with top radius top_radius_m (0: pointed); ring of round section about z.
 std::vector<Body> plan_cylinder(double length_m, double radius_m, int order);
 std::vector<Body> plan_disc(double radius_m, double thickness_m, int order);
 std::vector<Body> plan_cone(double radius_m, double top_radius_m, double height_m, int order);

@@ -1,11 +1,10 @@
-// The bodies with a round section: cylinder, disc, cone and ring.
+// Bodies with a round section: cylinder, disc, cone and ring.
 //
-// Method: The disc is a lattice of six sectors (of five, seven or eight where another count is asked for) whose ring i, of 6 i points,
-//   goes to a circle; its triangles are nearly regular. It is swept along the axis (round the circle for the ring) in layers of prisms. The
-//   layers of a cone that is cut off grow with its radius, so that they stay as long as wide. A pointed cone is six tetrahedra round its
-//   axis, each refined, so that the section at level i has i rings; layers of prisms may follow, so that levels and rings are chosen apart.
-//   Mid-side nodes lie at the mean radius of their corners about the axis of the section: exactly on the surface where both corners do, the
-//   bulge fading with the square of the radius towards the axis.
+// Method: the disc is a lattice of six sectors (five, seven or eight for other counts) whose ring i of 6 i points maps to a circle; its
+//   triangles are nearly regular. It is swept along the axis (around the circle for the ring) in layers of prisms. Layers of a truncated
+//   cone grow with its radius to keep their aspect ratio. A pointed cone is six refined tetrahedra around its axis, so that level i has i
+//   rings; layers of prisms may follow, so that levels and rings are independent. Mid-side nodes lie at the mean radius of their corners
+//   about the section axis: exact on the surface, and the bulge fades with the square of the radius.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -18,12 +17,12 @@ namespace carillon::shapes {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-/// A node before it is put in its place: on the section (x along a, y along b, from its centre) [m], and how far along the sweep.
+/// A node in sweep coordinates: section (x along a, y along b, from its centre) [m], and position along the sweep.
 struct Local {
   double a = 0.0, b = 0.0, along = 0.0;
 };
 
-/// What is swept: the radius of the section and where its points go. `place` keeps the orientation of (a, b, along).
+/// Sweep: section radius and mapping. `place` preserves the orientation of (a, b, along).
 struct Sweep {
   std::function<double(double)> radius;
   std::function<Vec3(const Local&)> place;
@@ -33,13 +32,13 @@ struct Sweep {
 
 int count_points(int sectors, int rings) { return 1 + sectors * rings * (rings + 1) / 2; }
 
-/// Number of the point `at` of a sector of ring `ring`.
+/// Index of point `at` of a sector of ring `ring`.
 std::int32_t find_point(int sectors, int ring, int sector, int at) {
   if (ring == 0) return 0;
   return static_cast<std::int32_t>(count_points(sectors, ring - 1) + (sector * ring + at) % (sectors * ring));
 }
 
-/// The points of the section of `rings` rings at a place of the sweep.
+/// Points of a section of `rings` rings at a sweep position.
 void append_section(std::vector<Local>& nodes, int sectors, int rings, double radius, double along) {
   nodes.push_back({0.0, 0.0, along});
   for (int ring = 1; ring <= rings; ++ring) {
@@ -51,7 +50,7 @@ void append_section(std::vector<Local>& nodes, int sectors, int rings, double ra
   }
 }
 
-/// The triangles of the section, counter-clockwise in (a, b).
+/// Triangles of the section, counter-clockwise in (a, b).
 std::vector<std::array<std::int32_t, 3>> make_triangles(int sectors, int rings) {
   std::vector<std::array<std::int32_t, 3>> triangles;
   for (int sector = 0; sector < sectors; ++sector) {
@@ -68,18 +67,18 @@ std::vector<std::array<std::int32_t, 3>> make_triangles(int sectors, int rings) 
   return triangles;
 }
 
-/// A mesh under construction.
+/// Mesh under construction.
 struct Built {
   mesh::TetMesh mesh;
   std::vector<Local> nodes;
-  std::vector<std::int32_t> first, last, round;  // nodes of the first and the last section, and of the rim of all sections
+  std::vector<std::int32_t> first, last, round;  // nodes of the first and last section, and the rim of all sections
 };
 
 void append_layer(Built& built, const std::vector<std::array<std::int32_t, 3>>& triangles, std::int32_t low, std::int32_t high) {
   for (const auto& t : triangles) append_prism(built.mesh, {low + t[0], low + t[1], low + t[2]}, {high + t[0], high + t[1], high + t[2]});
 }
 
-/// Sections at the given places, joined by prisms; the last to the first again for a ring.
+/// Sections at the given positions, joined by prisms; for a ring the last joins the first.
 Built sweep_sections(const Sweep& sweep, int rings, const std::vector<double>& along) {
   Built built;
   const std::vector<std::array<std::int32_t, 3>> triangles = make_triangles(sweep.sectors, rings);
@@ -96,7 +95,7 @@ Built sweep_sections(const Sweep& sweep, int rings, const std::vector<double>& a
   return built;
 }
 
-/// A cone whose point is at 0: `rings` levels of the refined point, then layers of prisms up to `levels`.
+/// Cone with its tip at 0: `rings` refined levels, then layers of prisms up to `levels`.
 Built make_point(const Sweep& sweep, double height, int rings, int levels) {
   Built built;
   std::vector<std::int32_t> first_of_level;
@@ -108,7 +107,7 @@ Built make_point(const Sweep& sweep, double height, int rings, int levels) {
     for (int p = level == 0 ? 0 : count_points(sweep.sectors, outer - 1); p < count_points(sweep.sectors, outer); ++p)
       built.round.push_back(first_of_level.back() + p);
   }
-  for (const Local& node : built.nodes) built.mesh.nodes_m.push_back(sweep.place(node));  // the refinement looks at lengths
+  for (const Local& node : built.nodes) built.mesh.nodes_m.push_back(sweep.place(node));  // the refinement compares lengths
   for (int sector = 0; sector < sweep.sectors; ++sector) {
     append_refined(built.mesh, rings,
                    [&](int centre, int a, int b) { return first_of_level[centre + a + b] + find_point(sweep.sectors, a + b, sector, b); });
@@ -150,7 +149,7 @@ std::vector<double> divide_evenly(double length, int layers) {
   return along;
 }
 
-/// A body for each number of sectors, six first: others are for counts that six do not give. `make_body` takes the sweep with its sectors.
+/// One body per number of sectors, six first; others serve counts that six cannot give. `make_body` takes the sweep.
 template <typename MakeBody>
 std::vector<Body> plan_sectors(Sweep sweep, const MakeBody& make_body) {
   std::vector<Body> bodies;
@@ -163,7 +162,7 @@ std::vector<Body> plan_sectors(Sweep sweep, const MakeBody& make_body) {
   return bodies;
 }
 
-/// What cylinder, disc and cut-off cone have in common: rings, layers. `divide` gives the places of the sections for a number of layers.
+/// Common part of cylinder, disc and truncated cone: rings, layers. `divide` gives the section positions for a number of layers.
 std::vector<Body> plan_swept(const Sweep& swept, double radius, double length, int order, const std::array<std::string, 3>& names,
                              const std::function<std::vector<double>(int)>& divide) {
   return plan_sectors(swept, [&](const Sweep& sweep) {
@@ -204,7 +203,7 @@ std::vector<Body> plan_cone(double radius_m, double top_radius_m, double height_
       body.lengths = {radius_m, height_m, 0.0, 0.0};
       body.wanted = {2, 2, 1, 1};
       body.calc_counts = [sectors = sweep.sectors](const Divisions& d) {
-        const long long f = d[0], more = std::max(0, d[1] - d[0]);  // never fewer levels than rings
+        const long long f = d[0], more = std::max(0, d[1] - d[0]);  // at least as many levels as rings
         const long long triangles = sectors * f * f;
         return Counts{f + 1 + sectors * f * (f + 1) * (f + 2) / 6 + more * (1 + sectors * f * (f + 1) / 2), triangles * (f + 3 * more),
                       2 * triangles + 2 * sectors * f * more, 1};

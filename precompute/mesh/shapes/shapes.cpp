@@ -1,4 +1,4 @@
-// The table of shapes and its checks.
+// Table of shapes, and its checks.
 #include "precompute/mesh/shapes/shapes.hpp"
 
 #include <fmt/core.h>
@@ -17,8 +17,8 @@ namespace {
 
 constexpr double kMinLength = 1e-6;                        // [m]
 constexpr double kMaxLength = 1e4;                         // [m]
-constexpr double kMinConeRatio = 1e-3;                     // of the radii of a cone that is cut off
-constexpr double kMaxRingThickness = 0.9;                  // of a ring, over the diameter of its centre line
+constexpr double kMinConeRatio = 1e-3;                     // of the radii of a truncated cone
+constexpr double kMaxRingThickness = 0.9;                  // over the diameter of the centre line
 constexpr double kMinOpening = 20.0, kMaxOpening = 340.0;  // [degrees]
 
 std::vector<std::string> list_names(const Shape& shape) {
@@ -27,14 +27,14 @@ std::vector<std::string> list_names(const Shape& shape) {
   return names;
 }
 
-// "; did you mean 'x'?" or the list of what there is.
+// "; did you mean 'x'?" or the list of known names.
 std::string suggest(std::string_view word, const std::vector<std::string>& known) {
   const std::string nearest = base::find_nearest(word, known);
   if (!nearest.empty()) return fmt::format("did you mean '{}'? (known: {})", nearest, fmt::join(known, ", "));
   return fmt::format("known: {}", fmt::join(known, ", "));
 }
 
-// The dimensions of an order, checked and completed.
+// Dimensions of an order, checked and completed with defaults.
 class Dimensions {
  public:
   Dimensions(const Shape& shape, const std::map<std::string, double>& given) : shape_(shape) {

@@ -1,13 +1,12 @@
-// The round bodies: the solid ball, the bowl and the closed spherical shell.
+// Round bodies: solid ball, bowl and closed spherical shell.
 //
-// Method: Ball: the icosahedron's 20 tetrahedra (centre and a face) are nearly regular; each is refined into frequency^3 parts, the nodes
-//   of equal weight of the centre go to a sphere, and layers of prisms may follow outside, so that the radial and tangential divisions are
-//   chosen apart. No edge of a cube is folded flat, hence no slivers. Octahedra of the refinement are cut along their shortest diagonal.
-//   Shell: rings of points round a pole, six sectors; a ring takes as many points as its circumference asks for, neighbouring rings are
-//   joined by the shorter diagonal, the triangles are extruded through the wall into prisms. Radii grow geometrically.
-//   Mid-side nodes: on the mean radius of their corners, exactly on the spheres where both corners are; in the ball the bulge fades with
-//   the square of the radius towards the straight-sided centre.
-// Source: refinement: Bey 1995, Computing 55, 355. The rest is own.
+// Method: Ball: the icosahedron's 20 tetrahedra (centre and a face) are nearly regular; each is refined into frequency^3 parts, nodes of
+//   equal centre weight map to a sphere, and layers of prisms may follow outside, so that radial and tangential divisions are independent.
+//   No flat-folded cube edges, hence no slivers. Octahedra of the refinement are cut along their shortest diagonal. Shell: rings of points
+//   around a pole, six sectors; the points of a ring follow its circumference, neighbouring rings are joined by the shorter diagonal, the
+//   triangles are extruded through the wall into prisms. Radii grow geometrically. Mid-side nodes: mean radius of their corners, exact on
+//   the spheres; in the ball the bulge fades with the square of the radius.
+// Source: Bey 1995, Computing 55, 355 (refinement).
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -20,15 +19,15 @@
 namespace carillon::shapes {
 namespace {
 
-// ---------------------------------------------------------------- the ball
+// ---------------------------------------------------------------- ball
 
-// A triangulated polyhedron with its vertices on the unit sphere.
+// Triangulated polyhedron with vertices on the unit sphere.
 struct Polyhedron {
   std::vector<Vec3> vertices;
   std::vector<std::array<int, 3>> faces;  // counter-clockwise from outside
 };
 
-// Two poles and two rings of `sides` points each, the rings turned by half a step: sides 5 is the icosahedron. sides 0: the octahedron.
+// Two poles and two rings of `sides` points each, staggered by half a step: sides 5 is the icosahedron, 0 the octahedron.
 Polyhedron make_polyhedron(int sides) {
   Polyhedron body;
   if (sides == 0) {
@@ -36,7 +35,7 @@ Polyhedron make_polyhedron(int sides) {
     body.faces = {{0, 1, 2}, {1, 3, 2}, {3, 4, 2}, {4, 0, 2}, {1, 0, 5}, {3, 1, 5}, {4, 3, 5}, {0, 4, 5}};
     return body;
   }
-  // Polar angle of the upper ring: of the icosahedron, and of the points of least Coulomb energy for the others.
+  // Polar angle of the upper ring: icosahedron, and least Coulomb energy for the others.
   const double polar = sides == 5 ? std::acos(1.0 / std::sqrt(5.0)) : (sides == 4 ? 65.1 : 58.7) * std::numbers::pi / 180.0;
   body.vertices = {{0, 0, 1}, {0, 0, -1}};
   for (int ring = 0; ring < 2; ++ring) {
@@ -57,7 +56,7 @@ Polyhedron make_polyhedron(int sides) {
   return body;
 }
 
-// The solid core of the ball: frequency levels up to `radius`, and the triangles of its surface.
+// Solid core of the ball: frequency levels up to `radius`, and the triangles of its surface.
 class Core {
  public:
   Core(const Polyhedron& solid, int frequency, double radius) : frequency_(frequency), radius_(radius), solid_(solid) {
@@ -67,7 +66,7 @@ class Core {
   std::vector<std::array<std::int32_t, 3>> skin;
 
  private:
-  // The node of face weights (a, b, c); the centre has the weight frequency - a - b - c.
+  // Node of face weights (a, b, c); the centre has the weight frequency - a - b - c.
   std::int32_t find_node(const std::array<int, 3>& face, const std::array<int, 3>& weights) {
     std::array<std::uint64_t, 3> parts{};
     for (int i = 0; i < 3; ++i) {
@@ -144,7 +143,7 @@ mesh::TetMesh make_ball(double radius, int sides, int frequency, int levels, int
   return mesh;
 }
 
-// ---------------------------------------------------------------- the shell
+// ---------------------------------------------------------------- shell
 
 constexpr int kSectors = 6;
 
@@ -164,10 +163,10 @@ std::vector<int> calc_rings(double half_angle, int rings, int widest) {
 struct Cap {
   std::vector<Vec3> directions;
   std::vector<std::array<std::int32_t, 3>> triangles;
-  std::int32_t first_of_rim = -1;  // from here on the directions lie on the rim; -1 when closed
+  std::int32_t first_of_rim = -1;  // first direction on the rim; -1 when closed
 };
 
-// Joins two rings within every sector: of the two possible next diagonals the shorter one.
+// Joins two rings within every sector by the shorter diagonal.
 void join_rings(Cap& cap, std::int32_t inner_first, int inner, std::int32_t outer_first, int outer) {
   const auto on = [](std::int32_t first, int count, int sector, int at) {
     return count == 0 ? first : first + static_cast<std::int32_t>((sector * count + at) % (kSectors * count));
@@ -243,7 +242,7 @@ mesh::TetMesh make_shell(double outer_radius, double wall, double half_angle, in
   raise_order(mesh, [&](std::int32_t a, std::int32_t b) {
     const double mean = 0.5 * (radius(a / per_layer) + radius(b / per_layer));
     Vec3 middle = calc_middle(cap.directions[a % per_layer], cap.directions[b % per_layer]);
-    if (on_rim(a) && on_rim(b)) {  // on the cone of the rim: only the angle about the axis is halved
+    if (on_rim(a) && on_rim(b)) {  // on the rim cone: halve only the angle about the axis
       const double across = std::sin(half_angle) / std::hypot(middle[0], middle[1]);
       middle = {middle[0] * across, middle[1] * across, -std::cos(half_angle)};
     }
@@ -259,10 +258,10 @@ std::vector<Body> plan_ball(double radius_m, int order) {
   for (int sides : {5, 4, 6, 0}) {
     const int faces = sides == 0 ? 8 : 4 * sides;
     Body body;
-    // A regular triangle of the mean face's area has this edge.
+    // Edge of a regular triangle with the mean face area.
     body.lengths = {radius_m * std::sqrt(16.0 * std::numbers::pi / (std::sqrt(3.0) * faces)), radius_m, 0.0, 0.0};
     body.calc_counts = [faces](const Divisions& d) {
-      const long long f = d[0], more = std::max(0, d[1] - d[0]);  // never fewer levels than the frequency
+      const long long f = d[0], more = std::max(0, d[1] - d[0]);  // at least as many levels as the frequency
       const long long half = faces / 2;                           // the sphere of frequency i has half i^2 + 2 vertices
       const long long core = 1 + half * (f * (f + 1) * (2 * f + 1) / 6) + 2 * f;
       return Counts{core + more * (half * f * f + 2), faces * f * f * (f + 3 * more), faces * f * f, 1};

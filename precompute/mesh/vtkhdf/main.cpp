@@ -1,9 +1,9 @@
-// carillon-vtkhdf FILE: writes down the place, shape and type of each array of a VTKHDF file, in lines of text.
+// carillon-vtkhdf FILE: prints the offset, shape and type of each array of a VTKHDF file, one line each.
 //
-// Method: HDF5 1.10 was not written for untrusted files: fuzzed ones crash it. So this program opens the file in a process of its own, with
-//   limits of time and memory, and the reader (precompute/mesh/parallel/layout.cpp) takes a crash for a damaged file.
+// Method: HDF5 1.10 is not robust against untrusted files: fuzzed ones crash it. Hence a process of its own with time and memory limits;
+//   the reader (precompute/mesh/parallel/layout.cpp) treats a crash as a damaged file. Chunked, compressed and external arrays are refused:
+//   they have no file offset.
 // Source: VTK file formats, "VTKHDF", version 1.0; HDF5 1.10 reference manual (H5Dget_offset).
-// Deviations: chunked, compressed and external arrays are refused, for they have no place to be read from.
 #include <fmt/format.h>
 #include <hdf5.h>
 #include <signal.h>
@@ -23,7 +23,7 @@
 namespace {
 
 constexpr rlim_t kMaxCpuS = 15;
-constexpr rlim_t kMaxBytes = rlim_t{1} << 29;  // beyond what the process has at its start
+constexpr rlim_t kMaxBytes = rlim_t{1} << 29;  // on top of the process's initial size
 constexpr std::size_t kMaxArrays = 1000;       // of PointData or CellData
 
 struct Refusal : std::runtime_error {
@@ -35,7 +35,7 @@ hid_t require(hid_t id, const std::string& what) {
   return id;
 }
 
-/// Opens only what lies in this very file: no soft and no external links.
+/// Opens only objects inside this file: no soft or external links.
 hid_t open_object(hid_t folder, const std::string& name) {
   H5L_info_t info;
   if (H5Lexists(folder, name.c_str(), H5P_DEFAULT) <= 0 || H5Lget_info(folder, name.c_str(), &info, H5P_DEFAULT) < 0)
@@ -46,11 +46,11 @@ hid_t open_object(hid_t folder, const std::string& name) {
 
 hid_t open_dataset(hid_t folder, const std::string& name) {
   const hid_t object = open_object(folder, name);
-  if (H5Iget_type(object) != H5I_DATASET) throw Refusal(name + " is no array");
+  if (H5Iget_type(object) != H5I_DATASET) throw Refusal(name + " is not an array");
   return object;
 }
 
-/// "bytes floating signed big-endian" of the plain types; empty for all others.
+/// "bytes floating signed big-endian" of the plain types; empty for others.
 std::string describe_type(hid_t type) {
   const std::array<std::pair<hid_t, const char*>, 20> known{{
       {H5T_IEEE_F32LE, "4 1 1 0"}, {H5T_IEEE_F64LE, "8 1 1 0"}, {H5T_IEEE_F32BE, "4 1 1 1"}, {H5T_IEEE_F64BE, "8 1 1 1"},
@@ -64,7 +64,7 @@ std::string describe_type(hid_t type) {
   return {};
 }
 
-/// A line "list name offset rows columns bytes floating signed big-endian", the name in hexadecimal; false if it is of no use here.
+/// Line "list name offset rows columns bytes floating signed big-endian", name in hexadecimal; false if the array is not usable.
 bool describe_array(hid_t folder, const std::string& name, bool is_required, const char* list, std::string& text) {
   const hid_t data = open_dataset(folder, name);
   const hid_t space = require(H5Dget_space(data), "the shape of " + name);
@@ -74,7 +74,7 @@ bool describe_array(hid_t folder, const std::string& name, bool is_required, con
   std::array<hsize_t, 2> extent{0, 1};
   if (rank < 1 || rank > 2 || H5Sget_simple_extent_dims(space, extent.data(), nullptr) < 0) {
     if (!is_required) return false;
-    throw Refusal(name + " has not one or two dimensions");
+    throw Refusal(name + " does not have one or two dimensions");
   }
   const std::string words = describe_type(type);
   if (words.empty()) {
@@ -111,7 +111,7 @@ std::int64_t read_count(hid_t folder, const char* name) {
 void check_type(hid_t root) {
   const hid_t attribute = require(H5Aopen(root, "Type", H5P_DEFAULT), "attribute Type of /VTKHDF");
   const hid_t type = require(H5Aget_type(attribute), "attribute Type of /VTKHDF");
-  if (H5Tget_class(type) != H5T_STRING) throw Refusal("attribute Type of /VTKHDF is no text");
+  if (H5Tget_class(type) != H5T_STRING) throw Refusal("attribute Type of /VTKHDF is not text");
   std::string text;
   if (H5Tis_variable_str(type) > 0) {
     char* read = nullptr;
@@ -151,7 +151,7 @@ std::string describe_file(const std::string& path) {
   return text;
 }
 
-/// A damaged file can neither run for long nor take much memory nor leave a core file.
+/// Limits time and memory and disables core files.
 void limit_process() {
   for (const int number : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGXCPU}) ::signal(number, SIG_DFL);
   const rlimit none{0, 0}, seconds{kMaxCpuS, kMaxCpuS};
@@ -177,5 +177,5 @@ int main(int argc, char** argv) {
     return 1;
   }
   std::fflush(stdout);
-  ::_Exit(0);  // HDF5 has nothing to tidy that a damaged file could not break
+  ::_Exit(0);  // skip HDF5 cleanup, which a damaged file could break
 }

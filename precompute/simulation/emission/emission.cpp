@@ -1,8 +1,8 @@
-// Method:     from steps to places and velocities at the audio rate, to volume accelerations of triangles, to arrivals at the receivers.
-//             Triangles are evaluated once a sample.
-// Source:     OCE01 eq. 2 to 10; docs/equations.md E14.
-// Deviations: but for kPaper2001 the nodes are filtered instead of eq. 5: a normal turns by far less within a step than its node moves
-//             within a sample. a_n is d(v.S)/dt over the area at rest, so that a closed surface radiates its change of volume exactly.
+// Method: steps to positions and velocities at the audio rate, to volume accelerations of triangles, to arrivals at the receivers.
+//   Triangles are evaluated once per sample. Except for kPaper2001 the nodes are filtered instead of eq. 5: a normal rotates far less per
+//   step than its node moves per sample. a_n is d(v.S)/dt over the rest area, so that a closed surface radiates exactly its change of
+//   volume.
+// Source: OCE01 eq. 2 to 10; docs/equations.md E14.
 #include "precompute/simulation/emission/emission.hpp"
 
 #include <fmt/format.h>
@@ -20,8 +20,8 @@
 #include "precompute/simulation/emission/screens.hpp"
 #include "precompute/simulation/emission/sources.hpp"
 #include "precompute/simulation/emission/surfaces.hpp"
-#include "runtime/base/error.hpp"
 #include "runtime/acoustics/recording/high_pass.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::emission {
 namespace {
@@ -66,19 +66,19 @@ struct Emission::State {
   const RowLoops* loops = &find_loops();
   double alpha = 0.0;
   Surfaces surfaces;
-  std::vector<std::int64_t> counts;  // (blocks): triangles, in front of the padding
+  std::vector<std::int64_t> counts;  // (blocks): triangles, without padding
   std::vector<Ear> ears;
 
-  // The chain of filters: the first two, or the third.
+  // Filter chain: the first two, or the third.
   std::optional<MotionFilter> motion;
   std::optional<Sources> sources;
   std::optional<PaperFilter> paper;
-  std::optional<Screens> screens;    // of formulas with delta, if it is not switched off
-  std::optional<Recorder> recorder;  // of runs with a file
-  std::vector<HighPass> blockers;    // (slots); none with kKirchhoff
+  std::optional<Screens> screens;    // for formulas with delta, unless disabled
+  std::optional<Recorder> recorder;  // only with a surface file
+  std::vector<HighPass> blockers;    // (slots); empty with kKirchhoff
   std::vector<Arrivals> arrivals;    // (receivers)
 
-  int steps = 0;              // a sample
+  int steps = 0;              // per sample
   std::int64_t step = 0;      // of this sample, so far
   std::int64_t samples = 0;   // before this one
   std::uint64_t emitted = 0;  // samples
@@ -105,7 +105,7 @@ Emission::State::State(const comm::Communicator& communicator, const SurfacePart
     }
     set_rate(options.steps_per_sample);
   });
-  if (options.has_visibility && !is_kirchhoff) screens.emplace(surfaces, part, options);  // on ranks without triangles, too
+  if (options.has_visibility && !is_kirchhoff) screens.emplace(surfaces, part, options);  // also on ranks without triangles
   if (!options.surface_file.empty()) recorder.emplace(surfaces, options);
 }
 
@@ -138,7 +138,7 @@ void Emission::State::add_step(const double* u) {
   }
 }
 
-/// Places and velocities from sample `first` on.
+/// Positions and velocities from sample `first` on.
 void Emission::State::take_batch(std::int64_t first) {
   const std::optional<std::int64_t> now = sources->calc(*motion, first);
   if (!now) return;
@@ -148,15 +148,15 @@ void Emission::State::take_batch(std::int64_t first) {
   }
 }
 
-/// Sample k leaves for the receivers. source: slots; poles: (slots), of kKirchhoff.
+/// Sends sample k to the receivers. source: slots; poles: (slots), with kKirchhoff.
 void Emission::State::emit(std::int64_t k, const double* x, Frames source, const double* poles) {
   if (static_cast<std::uint64_t>(k) >= options.frames) return;
   emitted = static_cast<std::uint64_t>(k) + 1;
   if (screens) screens->look(k, x);
-  const double per_speed = 2.0 * options.sample_rate_hz / options.sound_speed_m_s;  // half-samples
+  const double per_speed = 2.0 * options.sample_rate_hz / options.sound_speed_m_s;  // half-samples per metre
   const double share = options.air_density_kg_m3 / (4.0 * std::numbers::pi);
   Facets facets;
-  alignas(64) double plain[kLane], turned[kLane], time[kLane], pa[kLane];  // alike to all sides; times the cosine
+  alignas(64) double plain[kLane], turned[kLane], time[kLane], pa[kLane];  // omnidirectional part; part times the cosine
   for (std::size_t r = 0; r < surfaces.runs.size(); ++r) {
     const Surfaces::Run& run = surfaces.runs[r];
     for (std::size_t begin = run.begin; begin < (poles ? run.middle : run.end); begin += kLane) {
@@ -167,7 +167,7 @@ void Emission::State::emit(std::int64_t k, const double* x, Frames source, const
       std::fill(std::begin(plain), std::end(plain), 0.0);
       std::fill(std::begin(turned), std::end(turned), 0.0);
       if (options.radiation == Radiation::kKirchhoff) {
-        // Of the two sides of a sheet the monopoles cancel, and the dipoles are equal.
+        // For the two sides of a sheet the monopoles cancel, and the dipoles are equal.
         for (std::size_t i = 0; i < count; ++i) {
           const bool is_pair = surfaces.has_twin[begin + i];
           plain[i] = is_pair ? 0.0 : share * from[i];
@@ -204,14 +204,14 @@ void Emission::State::finish() {
   }
   comm.agree([&] {
     if (has_fault)
-      throw SolveError("a surface makes more than 1e4 Pa, or moves by what is no number: the motion is not stable; take a shorter step");
+      throw SolveError("a surface makes more than 1e4 Pa, or moves by a non-finite value: the motion is not stable; take a shorter step");
     if (recorder) recorder->commit();
   });
 }
 
 template <typename Visit>
 void Emission::State::visit_state(Visit&& visit) {
-  visit(steps, step, samples, has_fault, emitted, blockers);  // load() reads the first one before
+  visit(steps, step, samples, has_fault, emitted, blockers);  // load() reads the first one separately
   if (motion) motion->visit_state(visit);
   if (sources) sources->visit_state(visit);
   if (paper) paper->visit_state(visit);

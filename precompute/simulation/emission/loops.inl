@@ -1,10 +1,9 @@
-// Method:     elementwise; see loops.hpp.
-// Source:     docs/equations.md E14.
+// Method: elementwise; see loops.hpp. docs/equations.md E14.
 //
-// Included by loops_*.cpp inside an unnamed namespace; nothing of std is used, so that no function compiled for one processor can be linked
-// in place of another's.
+// Included by loops_*.cpp inside an unnamed namespace; no std functions, so that code compiled for one instruction set cannot be linked
+// into another.
 
-// Vectors of the width of the registers: wider ones go through memory.
+// Vectors of register width: wider ones spill to memory.
 #if defined(__AVX512F__)
 constexpr std::size_t kWidth = 8;
 #elif defined(__AVX2__)
@@ -64,7 +63,7 @@ void add_value(double* open, const double* sum, const double* u, const std::int3
 void close_value(double* __restrict open, std::size_t n, int slot, double scale, Frames to) {
   double* from = open + 4 * slot;
   for (std::size_t begin = 0; begin < n; begin += kVertices, to.data += to.stride)
-    // The fourth number of a vertex is overwritten by the next one, or lies behind the rows in use.
+    // The fourth component of a vertex is overwritten by the next one, or lies after the rows in use.
     for (std::size_t i = 0; i < kVertices && begin + i < n; ++i, from += 4 * kEntry)
       for (std::size_t part = 0; part < 4; part += kQuad) {
         *reinterpret_cast<Quad*>(to.data + 3 * i + part) = scale * *reinterpret_cast<const Quad*>(from + part);
@@ -72,8 +71,8 @@ void close_value(double* __restrict open, std::size_t n, int slot, double scale,
       }
 }
 
-constexpr std::size_t kVectors = 4;               // of rows at once: sums that fit the registers
-constexpr std::size_t kRows = kVectors * kWidth;  // at once
+constexpr std::size_t kVectors = 4;               // vectors per pass: sums fit the registers
+constexpr std::size_t kRows = kVectors * kWidth;  // per pass
 static_assert(kLane % kRows == 0);
 
 void calc_motion(Frames from, const std::size_t* offset, std::size_t rows, const double* even, const double* odd, const double* rest,
@@ -193,9 +192,9 @@ void radiate(const Facets* __restrict facets, const Ear* __restrict ear, double 
 }
 
 bool scatter(std::int64_t* units, double now, double end, const double* time, const double* pa, std::size_t n, const double* spline) {
-  constexpr double kMiddle = 6755399441055744.0;  // 1.5 * 2^52
+  constexpr double kBitsOffset = 6755399441055744.0;  // 1.5 * 2^52
   constexpr std::int64_t kMiddleBits = 0x4338000000000000;
-  constexpr double kMostPa = 30.0;  // whose units are read off the bits
+  constexpr double kMaxBitsPa = 30.0;  // largest pressure handled by the bit representation
   constexpr std::size_t kParts = kSplinePoints / kWidth;
   bool is_fine = true;
   for (std::size_t i = 0; i < n; ++i) {
@@ -214,8 +213,8 @@ bool scatter(std::int64_t* units, double now, double end, const double* time, co
     std::int64_t* to = units + whole;
     for (std::size_t j = 0; j < kParts; ++j) {
       share[j] *= pa[i] * kUnitsPerPa;
-      if (size <= kMostPa) {
-        *reinterpret_cast<Whole*>(to + kWidth * j) += (Whole)(share[j] + kMiddle) - kMiddleBits;
+      if (size <= kMaxBitsPa) {
+        *reinterpret_cast<Whole*>(to + kWidth * j) += (Whole)(share[j] + kBitsOffset) - kMiddleBits;
       } else {
         for (std::size_t k = 0; k < kWidth; ++k) to[kWidth * j + k] += static_cast<std::int64_t>(share[j][k]);
       }
@@ -225,19 +224,19 @@ bool scatter(std::int64_t* units, double now, double end, const double* time, co
 }
 
 void add_rows(double* __restrict open, const double* __restrict value, std::size_t rows, const double* const* weight, std::size_t count) {
-  constexpr std::size_t kOnce = kWidth < 4 ? 1 : 2, kParts = kSlots / kWidth;  // rows and vectors whose sums fit the registers
-  Wide w[kTogether][kParts];
+  constexpr std::size_t kRowsPerPass = kWidth < 4 ? 1 : 2, kParts = kSlots / kWidth;  // rows and vectors whose sums fit the registers
+  Wide w[kValuesPerCall][kParts];
   for (std::size_t i = 0; i < count; ++i)
     for (std::size_t s = 0; s < kParts; ++s) w[i][s] = *reinterpret_cast<const Wide*>(weight[i] + kWidth * s);
-  for (std::size_t row = 0; row < rows; row += kOnce) {
+  for (std::size_t row = 0; row < rows; row += kRowsPerPass) {
     Wide* to = reinterpret_cast<Wide*>(open + row * kSlots);
-    Wide sum[kOnce][kParts];
-    for (std::size_t r = 0; r < kOnce; ++r)
+    Wide sum[kRowsPerPass][kParts];
+    for (std::size_t r = 0; r < kRowsPerPass; ++r)
       for (std::size_t s = 0; s < kParts; ++s) sum[r][s] = to[r * kParts + s];
     for (std::size_t i = 0; i < count; ++i)
-      for (std::size_t r = 0; r < kOnce; ++r)
+      for (std::size_t r = 0; r < kRowsPerPass; ++r)
         for (std::size_t s = 0; s < kParts; ++s) sum[r][s] += value[i * rows + row + r] * w[i][s];
-    for (std::size_t r = 0; r < kOnce; ++r)
+    for (std::size_t r = 0; r < kRowsPerPass; ++r)
       for (std::size_t s = 0; s < kParts; ++s) to[r * kParts + s] = sum[r][s];
   }
 }

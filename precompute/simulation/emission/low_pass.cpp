@@ -1,6 +1,6 @@
-// Method:     a value that lies between two samples is added to the samples before and behind it, with the weights of the kernel at their
-//             distances (polyphase). No step is ever convolved twice, and no history of steps is kept.
-// Source:     OCE01 eq. 6 to 8.
+// Method: a value between two samples is added to the samples around it with the kernel weights at their distances (polyphase): each step
+//   is convolved once, without a step history.
+// Source: OCE01 eq. 6 to 8.
 #include "precompute/simulation/emission/low_pass.hpp"
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 namespace carillon::emission {
 namespace {
 
-/// At x samples from the middle.
+/// At x samples from the centre.
 double calc_kernel(double x, double half) {
   if (std::abs(x) > half) return 0.0;
   const double sinc = x == 0.0 ? 1.0 : std::sin(std::numbers::pi * x) / (std::numbers::pi * x);
@@ -20,7 +20,7 @@ double calc_kernel(double x, double half) {
 }  // namespace
 
 LowPass::LowPass(std::size_t rows, int values, double first)
-    : rows_(rows), weight_(static_cast<std::size_t>(values)), open_(rows * kSlots, 0.0), waiting_(rows * kTogether, 0.0) {
+    : rows_(rows), weight_(static_cast<std::size_t>(values)), open_(rows * kSlots, 0.0), waiting_(rows * kValuesPerCall, 0.0) {
   double total = 0.0;
   for (int i = 0; i < values; ++i)
     for (int s = 0; s < kSlots; ++s) total += weight_[i][s] = calc_kernel((first + i) / values + (kHalf - 1) - s, kHalfWidth);
@@ -29,11 +29,11 @@ LowPass::LowPass(std::size_t rows, int values, double first)
 }
 
 void LowPass::add(int i, const double* value) {
-  // Slot s of the ring has the weight of place (s - ring_) mod kSlots.
+  // Slot s of the ring has the weight of position (s - ring_) mod kSlots.
   const double* weight = weight_[i].data() + (kSlots - ring_) % kSlots;
   std::copy_n(value, rows_, waiting_.begin() + static_cast<std::ptrdiff_t>(waiting_count_ * rows_));
   waiting_weight_[waiting_count_++] = weight;
-  if (waiting_count_ == kTogether) take_in();
+  if (waiting_count_ == kValuesPerCall) take_in();
   for (std::size_t s = 0; s < kSlots; ++s) weights_[s] += weight[s];
 }
 

@@ -1,7 +1,6 @@
-// Method:     a step is added to the four half-samples around it (polyphase, no history of steps); places and velocities are sums over
-//             half-samples with weights that also take out the droop of the first stage. Many steps a sample are first summed in boxes. A
-//             velocity is the difference of two steps, whose images at multiples of the rate of boxes are thus down by two factors.
-// Source:     docs/equations.md E14.
+// Method: a step is added to the four half-samples around it (polyphase, no step history); positions and velocities are weighted sums of
+//   half-samples, which also compensate the droop of the first stage. Many steps per sample are first averaged in boxes. A velocity is the
+//   difference of two steps, so its images at multiples of the box rate are attenuated twice. docs/equations.md E14.
 #include "precompute/simulation/emission/motion_filter.hpp"
 
 #include <algorithm>
@@ -11,26 +10,27 @@
 namespace carillon::emission {
 namespace {
 
-constexpr int kLeastValues = 16;                               // boxes in a sample: images at -60 dB
+constexpr int kMinBoxesPerSample = 16;                         // boxes per sample: images at -60 dB
 constexpr int kSpan = 2 * (kBatch - 1) + 2 * kMotionHalf + 1;  // half-samples of a batch
-constexpr std::int64_t kSlot = kEntry - 1;                     // mask of half-sample numbers
+constexpr std::int64_t kSlot = kEntry - 1;                     // mask for half-sample numbers
 
-/// Steps in a box.
+/// Steps per box.
 int find_box(int steps) {
-  for (int box = steps / kLeastValues; box > 1; --box)
+  for (int box = steps / kMinBoxesPerSample; box > 1; --box)
     if (steps / 2 % box == 0) return box;
   return 1;
 }
 
-/// Factors of the weights of the first three values at another rate, so that the sum is that of an integral to the third order (Euler and
-/// Maclaurin). ratio: old distance between values over the new one; end, begin: distances of the last and the first value from the change.
+/// Weight factors of the first three values after a rate change, for a third-order (Euler-Maclaurin) integral. ratio: old spacing over the
+/// new one; end, begin: distances of the last and first value from the change.
 std::array<double, 3> join(double ratio, double end, double begin) {
   const auto b1 = [](double x) { return x - 0.5; };
   const auto b2 = [](double x) { return x * x - x + 1.0 / 6.0; };
   const auto b3 = [](double x) { return x * (x - 0.5) * (x - 1.0); };
   const double value = b1(begin) + ratio * b1(end), slope = 0.5 * (b2(begin) - ratio * ratio * b2(end)),
                bend = (b3(begin) + ratio * ratio * ratio * b3(end)) / 6.0;
-  const double x = begin, y = begin + 1.0, z = begin + 2.0;  // the value, slope and bend at the change by the parabola through three values
+  const double x = begin, y = begin + 1.0,
+               z = begin + 2.0;  // value, slope and curvature at the change of the parabola through three values
   return {1.0 + 0.5 * y * z * value - 0.5 * (y + z) * slope + bend, 1.0 - x * z * value + (x + z) * slope - 2.0 * bend,
           1.0 + 0.5 * x * y * value - 0.5 * (x + y) * slope + bend};
 }
@@ -51,12 +51,12 @@ MotionFilter::MotionFilter(const Surfaces& surfaces, std::uint64_t frames, std::
 }
 
 void MotionFilter::set_rate(int steps_per_sample) {
-  const double before = values_ > 0 ? 1.0 / values_ : 0.0, end = 1.0 - shift_;  // half-samples between values; of them, behind the last
+  const double before = values_ > 0 ? 1.0 / values_ : 0.0, end = 1.0 - shift_;  // half-samples between values; remainder after the last
   box_ = find_box(steps_per_sample);
   values_ = steps_per_sample / 2 / box_;
   shift_ = 0.5 * (box_ - 1) / box_;
   if (has_speed()) change_ = join(before * values_, end, shift_);
-  // Of all values around one half-sample: the moment that a shift leaves is taken out, since all have the same one.
+  // Common to all values of a half-sample: removes the first moment left by the shift.
   weight_.assign(values_, {});
   distance_ = weight_;
   double sum = 0.0, moment = 0.0, square = 0.0;
@@ -78,7 +78,7 @@ void MotionFilter::add_step(const double* u) {
   const bool is_first = in_box_ == 0;
   if (++in_box_ < box_) return loops_->add_places(sum_.data(), u, surfaces_.node.data(), surfaces_.node.size(), is_first);
   in_box_ = 0;
-  // The first two values define the motion before them, the last two the motion behind them.
+  // The first two values define the motion before them, the last two the motion after them.
   if (values_seen_ < 2 || half_ + 4 >= 2 * static_cast<std::int64_t>(frames_)) keep(u);
   if (values_seen_ == 2) {
     feed(u);
@@ -89,7 +89,7 @@ void MotionFilter::add_step(const double* u) {
   }
 }
 
-/// Of a box whose last step u is.
+/// Processes a box whose last step is u.
 void MotionFilter::keep(const double* u) {
   const double now = find_time(), per_time = values_seen_ > 0 ? 1.0 / (now - last_at_) : 0.0;
   for (std::size_t v = 0; v < surfaces_.node.size(); ++v)
@@ -102,7 +102,7 @@ void MotionFilter::keep(const double* u) {
   last_at_ = now;
 }
 
-/// The next values, of uniform motion.
+/// Next value of uniform motion.
 void MotionFilter::feed_uniform(std::int64_t count) {
   for (std::int64_t n = 0; n < count; ++n) {
     const double time = find_time() - last_at_;
@@ -131,7 +131,7 @@ void MotionFilter::begin() {
   feed_uniform(count);
 }
 
-/// Of a box: sum_, and its last step u.
+/// Processes a box: sum_, and its last step u.
 void MotionFilter::feed(const double* u) {
   const auto& weight = weight_[value_];
   const auto& distance = distance_[value_];
@@ -154,7 +154,7 @@ void MotionFilter::close_half() {
   const double scale = 1.0 / open_sum_[slot], shift = open_moment_[slot] * scale;  // in half-samples
   loops_->close_value(open_.data(), surfaces_.node.size(), static_cast<int>(slot), scale, ring_.get(0, j));
   if (std::abs(shift) > 1e-9) {
-    // A value at time t of a uniform motion is x + (t - now) speed, and the speed is (x - last) / (1 + shift).
+    // A value at time t of uniform motion is x + (t - now) speed, and the speed is (x - last) / (1 + shift).
     for (std::size_t begin = 0; begin < surfaces_.get_rows(); begin += kLane) {
       double* now = ring_.get(begin, j).data;
       const double* last = ring_.get(begin, j - 1).data;
@@ -167,7 +167,7 @@ void MotionFilter::close_half() {
   push(j);
 }
 
-/// Half-sample j is there.
+/// Handles the completed half-sample j.
 void MotionFilter::push(std::int64_t j) {
   if (j != 2 * (next_ + kBatch - 1 + kAhead)) return;
   std::array<std::size_t, kSpan> offset;

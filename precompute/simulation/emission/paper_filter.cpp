@@ -1,5 +1,4 @@
-// Method:     see paper_filter.hpp.
-// Source:     OCE01 eq. 5 to 8.
+// Method: see paper_filter.hpp. OCE01 eq. 5 to 8.
 #include "precompute/simulation/emission/paper_filter.hpp"
 
 #include <algorithm>
@@ -7,7 +6,7 @@
 
 namespace carillon::emission {
 
-// w = ceil(3 / (fmax h)) = ceil(6 m); a trace of rounding is no step more.
+// w = ceil(3 / (fmax h)) = ceil(6 m), tolerant to rounding.
 PaperFilter::PaperFilter(const Surfaces& surfaces, double sample_rate_hz, int steps_per_sample, double rho_c,
                          std::function<void(std::int64_t)> take)
     : surfaces_(surfaces),

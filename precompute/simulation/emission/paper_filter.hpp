@@ -1,4 +1,4 @@
-// Pressures of triangles as OCE01 prints them. Internal to carillon::emission.
+// Pressures of triangles as printed in OCE01. Internal to carillon::emission.
 #pragma once
 
 #include <cstdint>
@@ -11,15 +11,15 @@
 
 namespace carillon::emission {
 
-/// Eq. 5 at every step, between two steps, where the velocity is; pressures and places are filtered alike.
+/// Eq. 5 at every step, between two steps, where the velocity is defined; pressures and positions are filtered alike.
 class PaperFilter {
  public:
-  /// take(k): sample k is there, from 1 - LowPass::kHalf on. rho_c: impedance of the air [Pa s/m].
+  /// take(k): receives sample k, from 1 - LowPass::kHalf on. rho_c: impedance of the air [Pa s/m].
   PaperFilter(const Surfaces& surfaces, double sample_rate_hz, int steps_per_sample, double rho_c, std::function<void(std::int64_t)> take);
 
-  /// u: (N, 4) displacements of the nodes of the caller [m].
+  /// u: (N, 4) displacements of the caller's nodes [m].
   void add_step(const double* u);
-  /// All vertices at rest until is_done().
+  /// Holds all vertices at rest until is_done().
   void finish(const std::function<bool()>& is_done);
 
   const double* get_places() const { return places_.get(); }  // (rows) m
@@ -40,9 +40,9 @@ class PaperFilter {
   double scale_;
   std::function<void(std::int64_t)> take_;
   LowPass places_filter_, pressure_filter_;
-  std::int64_t step_ = 0, interval_ = 0;  // of the interval; between which samples
+  std::int64_t step_ = 0, interval_ = 0;  // of the interval; samples around it
   bool has_last_ = false;
-  Rows now_, last_;  // (rows) displacements of this step and of the one before [m]
+  Rows now_, last_;  // (rows) displacements of this and the previous step [m]
   Rows pressure_;    // (slots) of this step
   Rows places_, sources_;
 };

@@ -1,4 +1,4 @@
-// Microphones, and the sound that has arrived at them.
+// Microphones and their arriving sound.
 #pragma once
 
 #include <cstddef>
@@ -8,25 +8,25 @@
 
 #include "precompute/comm/communicator.hpp"
 #include "precompute/simulation/emission/loops.hpp"
-#include "runtime/base/vector.hpp"
 #include "runtime/acoustics/recording/player.hpp"
+#include "runtime/base/vector.hpp"
 
 namespace carillon::emission {
 
 using recording::Microphone;
 
-/// The left and the right one of two omnidirectional ears, distance_m apart on a horizontal line (z is up) at right angles to the view
-/// (OCE01 section 4). Throws InputError when the view has no direction or goes straight up or down.
+/// Left and right omnidirectional ears, distance_m apart on a horizontal line (z is up) normal to the view (OCE01 section 4). Throws
+/// InputError for a view without direction or straight up or down.
 std::vector<Microphone> make_ears(const Vec3& position_m, const Vec3& look_at_m, double distance_m = 0.2);
 
-/// Pressure over time at one place. Invariant: half-samples are whole numbers of 2^-46 Pa, so that their sums have the same bits
-/// in any order and on any number of ranks.
+/// Pressure over time at one point. Invariant: half-samples are integers in units of 2^-46 Pa, so that sums are bit-identical in any order
+/// and on any number of ranks.
 class Arrivals {
  public:
   explicit Arrivals(std::size_t frames);
 
-  /// Pressures of a source sample [Pa], heard `time` half-samples after it: flat to 0.4 of the sample rate. Samples after the end are
-  /// left out. False: one is not finite or over 1e4 Pa; it is left out.
+  /// Pressures of a source sample [Pa], arriving `time` half-samples later: flat to 0.4 of the sample rate. Drops samples after the end.
+  /// False: dropped one that is not finite or over 1e4 Pa.
   bool add(std::int64_t sample, std::span<const double> time, const double* pressure_pa);
 
   /// (frames) Pa, of all ranks. Collective.

@@ -1,5 +1,4 @@
-// Method:     whole blocks of samples, and keys, are gathered from all ranks and written by rank 0.
-// Source:     docs/surface-format.md.
+// Method: whole blocks of samples, and keys, are gathered from all ranks and written by rank 0. docs/surface-format.md.
 #include "precompute/simulation/emission/recorder.hpp"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// The recorded surface of a run (docs/surface-format.md). Internal to carillon::emission.
+// Recorded surface of a run (docs/surface-format.md). Internal to carillon::emission.
 #pragma once
 
 #include <cstddef>
@@ -13,14 +13,14 @@
 
 namespace carillon::emission {
 
-/// Accelerations of triangles in blocks of samples and places of vertices at keys, of all ranks, to the file of rank 0. All calls are
-/// collective, and throw SystemError on all ranks when the file cannot be written.
+/// Writes triangle accelerations in blocks of samples and vertex positions at keys, of all ranks, to the file of rank 0. All calls are
+/// collective and throw SystemError on all ranks for write errors.
 class Recorder {
  public:
-  /// options: as of Emission, with a file. Throws InputError as SurfaceFile does.
+  /// options: as for Emission, with a file. Throws InputError as SurfaceFile does.
   Recorder(const Surfaces& surfaces, const Options& options);
 
-  /// Sample k; x: rows. False when a number is not finite or too large; it is recorded as 0.
+  /// Sample k; x: rows. False for a number that is not finite or too large, recorded as 0.
   bool record(std::int64_t k, const double* x, Sources& sources);
   bool is_whole() const { return keys_written_ >= static_cast<std::int64_t>(header_.count_keys()); }
   /// On rank 0.
@@ -41,7 +41,7 @@ class Recorder {
   recording::Header header_;
   std::unique_ptr<SurfaceFile> file_;  // rank 0
   std::int64_t keys_written_ = 0;
-  std::vector<float> block_;  // (own triangles, kBlockFrames): accelerations of the block that is open
+  std::vector<float> block_;  // (own triangles, kBlockFrames): accelerations of the open block
 };
 
 }  // namespace carillon::emission

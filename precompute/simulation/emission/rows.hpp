@@ -1,4 +1,4 @@
-// Memory of the filters: rows in blocks of lanes, and their last frames. Internal to carillon::emission.
+// Storage of the filters: rows in blocks of lanes, and their last frames. Internal to carillon::emission.
 #pragma once
 
 #include <array>
@@ -16,7 +16,7 @@ struct alignas(64) Block {
   std::array<double, kLane> value{};
 };
 
-/// Rows at one time, or one after another. Invariant: its memory begins at a multiple of 64 bytes.
+/// Rows at one time, or successive ones. Invariant: aligned to 64 bytes.
 class Rows {
  public:
   Rows() = default;
@@ -30,17 +30,17 @@ class Rows {
   std::vector<Block> blocks_;
 };
 
-/// The last frames of rows. Invariant: the frames of a block lie behind one another, where a filter reads them at once.
+/// Last frames of rows. Invariant: the frames of a block are contiguous, for filters that read them together.
 class Ring {
  public:
   Ring(std::size_t rows, std::size_t frames)
-      : frames_(frames), memory_(rows * (frames + 1)) {}  // one more: strides that share no cache set
+      : frames_(frames), memory_(rows * (frames + 1)) {}  // one more: avoids strides that alias in the cache
   std::size_t get_stride() const { return (frames_ + 1) * kLane; }
   std::size_t find_offset(std::int64_t frame) const {
     const auto count = static_cast<std::int64_t>(frames_);
     return static_cast<std::size_t>((frame % count + count) % count) * kLane;
   }
-  /// From a row on, which begins a block.
+  /// From a row on that begins a block.
   Frames get(std::size_t row = 0) { return {memory_.get() + row / kLane * get_stride(), get_stride()}; }
   Frames get(std::size_t row, std::int64_t frame) { return {get(row).data + find_offset(frame), get_stride()}; }
   std::vector<Block>& get_blocks() { return memory_.get_blocks(); }
@@ -69,7 +69,7 @@ struct Saver {
   }
 };
 
-/// Takes it off their front, in the same order.
+/// Extracts it from their front, in the same order.
 struct Loader {
   std::span<const std::byte>& from;
   template <typename... Values>

@@ -1,6 +1,6 @@
-// Method:     rays from every triangle to every receiver, 1000 times a second, past the places at the beginning of a sample; delta is faded
-//             from one look to the next.
-// Source:     OCE01 eq. 10; docs/equations.md E14.
+// Method: rays from every triangle to every receiver, 1000 times a second, at the positions of the beginning of a sample; delta is
+//   interpolated in between.
+// Source: OCE01 eq. 10; docs/equations.md E14.
 #include "precompute/simulation/emission/screens.hpp"
 
 #include <algorithm>
@@ -12,16 +12,16 @@
 namespace carillon::emission {
 namespace {
 
-constexpr std::size_t kLooksPerSecond = 1000;
-constexpr std::size_t kLatest = 64;  // samples between the step of a sample and its emission, at most
+constexpr std::size_t kTestsPerSecond = 1000;
+constexpr std::size_t kMaxLagSamples = 64;  // largest lag between the step of a sample and its emission, in samples
 
 }  // namespace
 
 Screens::Screens(const Surfaces& surfaces, const SurfacePart& part, const Options& options)
     : surfaces_(surfaces),
       options_(options),
-      every_(std::max<std::size_t>(1, static_cast<std::size_t>(options.sample_rate_hz) / kLooksPerSecond)),
-      ring_(kLatest / every_ + 2),
+      every_(std::max<std::size_t>(1, static_cast<std::size_t>(options.sample_rate_hz) / kTestsPerSecond)),
+      ring_(kMaxLagSamples / every_ + 2),
       balls_(options.ball_radius_m.size()),
       before_(surfaces.get_slots() * options.receivers.size(), 1.0F),
       now_(before_) {
@@ -83,7 +83,7 @@ void Screens::look(std::int64_t k, const double* x) {
     const Vec3 centre = (1.0 / 3.0) * (corner[0] + corner[1] + corner[2]);
     const Vec3 out = cross(corner[1] - corner[0], corner[2] - corner[0]);
     for (std::size_t i = 0; i < options_.receivers.size(); ++i) {
-      // A side that faces away is hidden by its own body; of a sheet, by its other side, which lies in the same plane.
+      // A side that faces away is hidden by its own body; for a sheet, by its other side in the same plane.
       const Vec3& ear = options_.receivers[i].place_m;
       const bool is_seen = dot(out, ear - centre) > 0.0 &&
                            std::none_of(walls.begin(), walls.end(), [&](const auto& wall) { return is_between(wall, centre, ear); }) &&

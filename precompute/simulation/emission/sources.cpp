@@ -1,5 +1,4 @@
-// Method:     fluxes of triangles once a sample; their derivative over 33 samples; one pole a body over 32.
-// Source:     docs/equations.md E14.
+// Method: triangle fluxes once per sample; their derivative over 33 samples; one pole per body over 32. docs/equations.md E14.
 #include "precompute/simulation/emission/sources.hpp"
 
 #include <algorithm>
@@ -20,7 +19,7 @@ Sources::Sources(const Surfaces& surfaces, double sample_rate_hz, double sound_s
 }
 
 std::optional<std::int64_t> Sources::calc(const MotionFilter& motion, std::int64_t k) {
-  // The mean of three, half of the cross product, and two derivatives by samples.
+  // Mean of three, half of the cross product, and two derivatives by samples.
   const double scale = sample_rate_hz_ * sample_rate_hz_ / 6.0;
   for (std::int64_t b = k; b < k + kBatch; ++b)
     for (const Surfaces::Run& run : surfaces_.runs)
@@ -48,7 +47,7 @@ std::optional<std::int64_t> Sources::calc(const MotionFilter& motion, std::int64
   return first;
 }
 
-/// Of the kBatch samples behind `first`, for which there is one.
+/// For the kBatch samples after `first`, for which there is one.
 void Sources::calc_poles(std::int64_t first) {
   std::array<std::size_t, kPoleSpan + kBatch - 1> from;
   for (std::size_t j = 0; j < from.size(); ++j) from[j] = rates_.find_offset(first - kPoleSpan / 2 + 1 + static_cast<std::int64_t>(j));

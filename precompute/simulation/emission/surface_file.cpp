@@ -1,6 +1,6 @@
-// Method:     HDF5 lays the arrays out once, each in one piece and at its final length; from then on rows are written to where they belong
-//             without HDF5, so that a process that ends in the middle leaves a file that can be continued.
-// Source:     HDF5 1.10 reference manual; docs/surface-format.md.
+// Method: HDF5 allocates the arrays once, contiguous and at final length; rows are then written by offset without HDF5, so that an
+//   interrupted process leaves a file that can be continued.
+// Source: HDF5 1.10 reference manual; docs/surface-format.md.
 #include "precompute/simulation/emission/surface_file.hpp"
 
 #include <fcntl.h>
@@ -49,7 +49,7 @@ SurfaceFile::SurfaceFile(std::filesystem::path file, recording::Header header, c
     throw SystemError(fmt::format("{}: cannot be opened: {}", part_.string(), std::strerror(error)));
   }
   if (!is_resumed) {
-    // The text is there from now on, the digest is not: the file reads as damaged, and a run that resumes knows its own.
+    // The text is present from now on, the digest is not: the file reads as damaged until sealed.
     const std::string text = recording::format_header(header_);
     write(0, std::as_bytes(std::span(text)));
     return;
@@ -102,7 +102,7 @@ void SurfaceFile::make(const SurfaceTables& tables) {
       if (static_cast<Array>(i) == Array::kRadius) write_table(tables.radius_m.data(), H5T_NATIVE_DOUBLE);
     }
   }
-  // HDF5 ends the file behind what was written; the arrays end behind it.
+  // HDF5 truncates the file after its own writes; the arrays extend beyond.
   struct stat status {};
   if (::stat(part_.c_str(), &status) != 0) throw SystemError(fmt::format("{}: {}", part_.string(), std::strerror(errno)));
   header_.length = static_cast<std::uint64_t>(status.st_size);

@@ -7,33 +7,33 @@
 #include <string>
 #include <vector>
 
+#include "runtime/acoustics/recording/header.hpp"
 #include "runtime/base/descriptor.hpp"
 #include "runtime/base/triangle.hpp"
 #include "runtime/base/vector.hpp"
-#include "runtime/acoustics/recording/header.hpp"
 
 namespace carillon::emission {
 
-/// What does not change while it is written.
+/// Constant data.
 struct SurfaceTables {
   std::vector<Triangle> triangles;                       // into vertices
   std::vector<std::int32_t> triangle_body, vertex_body;  // (T), (V)
   std::vector<double> area_m2, radius_m;                 // (T), (B)
 };
 
-/// A file that grows under another name, FILE.part, and gets its own when it is whole. Keys and blocks may be written in any order and
-/// again: a run that resumes continues where its checkpoint was. One process has it open. All throw SystemError when the disk refuses.
+/// A file written as FILE.part and renamed when complete. Keys and blocks may be written repeatedly and in any order: a resumed run
+/// continues at its checkpoint. For one process. All methods throw SystemError for write errors.
 class SurfaceFile {
  public:
-  /// header: counts and constants. Makes FILE.part of its final length (holes take no room); is_resumed: takes the one that is there, and
-  /// throws InputError when it is of another run.
+  /// header: counts and constants. Creates FILE.part at final length (sparse); is_resumed: opens the existing one, throws InputError if it
+  /// is of another run.
   SurfaceFile(std::filesystem::path file, recording::Header header, const SurfaceTables& tables, bool is_resumed);
 
   /// places (V) [m] at sample key * key_frames.
   void write_key(std::uint64_t key, std::span<const Vec3> places_m);
   /// scale (T) [m/s2] and values (T, kBlockFrames).
   void write_block(std::uint64_t block, std::span<const float> scale, std::span<const std::int16_t> values);
-  /// Seals and renames it. Nothing may be written afterwards.
+  /// Seals and renames the file. No writes afterwards.
   void commit();
 
  private:

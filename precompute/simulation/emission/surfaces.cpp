@@ -1,4 +1,4 @@
-// Method: vertices and triangles of a rank in the order of their numbers; global places by binary search. docs/equations.md E14.
+// Method: vertices and triangles of a rank in the order of their numbers; global indices by binary search. docs/equations.md E14.
 #include "precompute/simulation/emission/surfaces.hpp"
 
 #include <fmt/format.h>
@@ -16,7 +16,7 @@
 namespace carillon::emission {
 namespace {
 
-/// A triangle as all ranks know it.
+/// A triangle in global terms.
 struct Gathered {
   std::int64_t number;
   std::int32_t body;
@@ -33,13 +33,13 @@ void check(const SurfacePart& part) {
   const auto check_corners = [&](const std::vector<Triangle>& triangles, const char* name) {
     for (const Triangle& corner : triangles)
       for (const std::int32_t one : corner)
-        if (one < 0 || static_cast<std::size_t>(one) >= nodes) throw InputError(fmt::format("a {} names a node that is not there", name));
+        if (one < 0 || static_cast<std::size_t>(one) >= nodes) throw InputError(fmt::format("a {} names a node that does not exist", name));
   };
   check_corners(part.triangles, "triangle of a surface");
   check_corners(part.silent, "silent triangle");
 }
 
-/// The triangles of all ranks, by their numbers. Collective.
+/// Triangles of all ranks, by number. Collective.
 std::vector<Gathered> gather_triangles(const comm::Communicator& comm, const SurfacePart& part) {
   auto all = comm.all_gather([&] {
     std::vector<Gathered> own;
@@ -151,7 +151,7 @@ std::size_t Surfaces::pad() {
 }
 
 void Surfaces::fill_slots(const SurfacePart& part, const std::vector<std::int32_t>& vertex_of, const std::vector<std::int64_t>& numbers) {
-  std::vector<std::size_t> order(part.triangles.size());  // body after body
+  std::vector<std::size_t> order(part.triangles.size());  // by body
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
     return std::pair(part.body[a], part.triangle_number[a]) < std::pair(part.body[b], part.triangle_number[b]);
@@ -164,8 +164,8 @@ void Surfaces::fill_slots(const SurfacePart& part, const std::vector<std::int32_
   for (std::size_t i = 0; i < order.size();) {
     const std::int32_t body = part.body[order[i]];
     Run run{corners.size(), 0, 0, body};
-    // The second side of a thin sheet comes behind all other triangles.
-    std::map<Triangle, std::size_t> sides;  // corners, the lowest first -> slot
+    // Second sides of thin sheets follow all other triangles.
+    std::map<Triangle, std::size_t> sides;  // corners, lowest first -> slot
     std::vector<std::pair<std::size_t, std::int32_t>> second;
     for (; i < order.size() && part.body[order[i]] == body; ++i) {
       Triangle turned = part.triangles[order[i]];

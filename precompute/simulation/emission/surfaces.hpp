@@ -1,4 +1,4 @@
-// The triangles of the surfaces that sound: those of this rank, and their places among those of all ranks. Internal to carillon::emission.
+// Sounding triangles of this rank, and their global indices. Internal to carillon::emission.
 #pragma once
 
 #include <array>
@@ -13,11 +13,11 @@
 
 namespace carillon::emission {
 
-/// Vertices are the nodes of the triangles. A place or velocity of a vertex is three rows; a triangle has a slot.
+/// Vertices are the triangles' nodes. A vertex position or velocity is three rows; a triangle is a slot.
 struct Surfaces {
-  /// Slots of one body, from a multiple of kLane to a multiple of kLane.
+  /// Slots of one body, aligned to kLane.
   struct Run {
-    std::size_t begin, middle, end;  // from the middle on twins
+    std::size_t begin, middle, end;  // twins from the middle on
     std::int32_t body;
   };
 
@@ -26,29 +26,29 @@ struct Surfaces {
 
   std::size_t get_rows() const { return (node.size() + kVertices - 1) / kVertices * kLane; }
   std::size_t get_slots() const { return place.size(); }
-  /// Places of the vertices of all ranks [m], from rows. Collective.
+  /// Positions of the vertices of all ranks [m], from rows. Collective.
   std::vector<Vec3> gather_vertices(const double* x) const;
 
   comm::Communicator comm;
-  std::vector<std::int32_t> node;   // (V) of the caller
+  std::vector<std::int32_t> node;   // (V) caller's nodes
   std::vector<std::int32_t> row;    // (V)
   Rows rest;                        // m
-  std::vector<Triangle> corners;    // (slots): rows of the vertices; 0 in padding
-  std::vector<std::int64_t> place;  // (slots) among the triangles of all ranks by their numbers; -1: padding
+  std::vector<Triangle> corners;    // (slots): vertex rows; 0 in padding
+  std::vector<std::int64_t> place;  // (slots) index among the triangles of all ranks by number; -1: padding
   std::vector<double> area;         // (slots) at rest, m2
-  std::vector<std::int32_t> twin;   // (slots) the same triangle from its other side, which is no twin; -1: none
+  std::vector<std::int32_t> twin;   // (slots) the first side of the same triangle; -1: none
   std::vector<bool> has_twin;       // (slots)
   std::vector<Run> runs;
-  std::vector<std::int64_t> gathered_places;    // of the triangles that ranks send, in the order of the ranks
+  std::vector<std::int64_t> gathered_places;    // of the sent triangles, concatenated by rank
   std::vector<std::int64_t> gathered_vertices;  // of the vertices
   std::size_t vertex_total = 0, triangle_total = 0;
   SurfaceTables tables;  // of all ranks
 
  private:
-  /// Slots of this rank's triangles, body after body. vertex_of: (nodes) index into `node`. numbers: of all triangles, ascending.
+  /// Slots of this rank's triangles, by body. vertex_of: (nodes) index into `node`. numbers: of all triangles, ascending.
   void fill_slots(const SurfacePart& part, const std::vector<std::int32_t>& vertex_of, const std::vector<std::int64_t>& numbers);
   void add_slot(const Triangle& corner, std::int64_t at, std::int32_t of_twin);
-  /// Fills up to a multiple of kLane; the new number of slots.
+  /// Pads to a multiple of kLane; returns the new number of slots.
   std::size_t pad();
 };
 

@@ -1,6 +1,5 @@
-// Method:     boxes are cut at the median of the centres along their longest side; the way is cut with boxes by slabs and with triangles by
-//             Moeller and Trumbore.
-// Source:     OCE01 eq. 10 (delta); Moeller and Trumbore 1997; Kay and Kajiya 1986.
+// Method: boxes are split at the median of the centres along their longest side; slab test for boxes, Moeller-Trumbore for triangles.
+// Source: OCE01 eq. 10 (delta); Moeller and Trumbore 1997; Kay and Kajiya 1986.
 #include "precompute/simulation/emission/visibility.hpp"
 
 #include <algorithm>
@@ -13,14 +12,14 @@ namespace {
 constexpr std::size_t kLeaf = 4;
 
 struct Cut {
-  double enter = 0.0, leave = 1.0;  // shares of the way
+  double enter = 0.0, leave = 1.0;  // ray parameters
 };
 Cut cut_box(const Vec3& low, const Vec3& high, const Vec3& from, const Vec3& inverse) {
   auto [enter, leave] = Cut{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     double a = (low[axis] - from[axis]) * inverse[axis], b = (high[axis] - from[axis]) * inverse[axis];
     if (a > b) std::swap(a, b);
-    if (a > enter) enter = a;  // false for NaN: a way in the plane of a side counts as inside
+    if (a > enter) enter = a;  // false for NaN: a ray in a side's plane counts as inside
     if (b < leave) leave = b;
   }
   return {enter, leave};
@@ -57,7 +56,7 @@ bool is_between(const job::RigidObstacle& obstacle, const Vec3& from, const Vec3
     return norm(reach - nearest * way) < ball->radius_m;
   }
   const auto& box = std::get<job::BoxObstacle>(obstacle);
-  for (std::size_t axis = 0; axis < 3; ++axis)  // a way along a side is free; its quotient is NaN
+  for (std::size_t axis = 0; axis < 3; ++axis)  // a ray parallel to a side does not cross it; its quotient is NaN
     if (way[axis] == 0.0 && !(box.min_m[axis] < from[axis] && from[axis] < box.max_m[axis])) return false;
   const auto [enter, leave] = cut_box(box.min_m, box.max_m, from, {1.0 / way[0], 1.0 / way[1], 1.0 / way[2]});
   return enter < leave;
@@ -103,7 +102,7 @@ void Visibility::split(std::size_t begin, std::size_t end) {
 bool Visibility::is_free(const Vec3& from, const Vec3& to, std::int64_t own) const {
   if (boxes_.empty()) return true;
   const Vec3 way = to - from, inverse{1.0 / way[0], 1.0 / way[1], 1.0 / way[2]};
-  std::array<std::int32_t, 64> waiting;  // halves: never deeper than the bits of a number
+  std::array<std::int32_t, 64> waiting;  // nodes: depth is at most the bits of a number
   std::size_t count = 1;
   waiting[0] = 0;
   while (count > 0) {

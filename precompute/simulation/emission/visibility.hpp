@@ -13,22 +13,22 @@ namespace carillon::emission {
 
 using Corners = std::array<Vec3, 3>;  // of a triangle, m
 
-/// True if a part of the straight way, or one of its ends, lies inside the obstacle.
+/// True if any part of the segment, including its ends, lies inside the obstacle.
 bool is_between(const job::RigidObstacle& obstacle, const Vec3& from, const Vec3& to);
 
-/// Triangles under a tree of boxes. Invariant: an answer depends on the list of triangles alone, not on who asks.
+/// Bounding volume hierarchy of triangles. Invariant: results depend on the list of triangles only.
 class Visibility {
  public:
   Visibility() = default;
   explicit Visibility(std::span<const Corners> triangles);
 
-  /// True when no triangle but `own` (a number in the list, or -1) is met by the straight way between the two.
+  /// True if the segment meets no triangle except `own` (an index, or -1).
   bool is_free(const Vec3& from, const Vec3& to, std::int64_t own) const;
 
  private:
   struct Box {
     Vec3 low, high;
-    std::int32_t first = 0, count = 0;  // of order_, when it is a leaf
+    std::int32_t first = 0, count = 0;  // of order_, for a leaf
     std::int32_t second = 0;            // the other child; the first follows
   };
   void split(std::size_t begin, std::size_t end);

@@ -1,7 +1,6 @@
-// Method:     calc_entry(): a Kaiser window. The others: least squares of the error of the response over pass band and stop band, of both
-//             stages together for the motion, relative for derivatives, with a weight of 1e-7 on other frequencies, which keeps the weights
-//             small; normal equations, L D L^T.
-// Source:     Kaiser 1974; docs/equations.md E14.
+// Method: calc_entry(): Kaiser window. Others: least squares of the response error over pass band and stop band, of both stages together
+//   for the motion, relative for derivatives, with weight 1e-7 at other frequencies to keep the weights small; normal equations, L D L^T.
+// Source: Kaiser 1974; docs/equations.md E14.
 #include "precompute/simulation/emission/weights.hpp"
 
 #include <algorithm>
@@ -14,7 +13,7 @@ namespace {
 
 constexpr double kEntryBeta = 9.5;
 
-/// The Kaiser window, |x| <= 1.
+/// Kaiser window, |x| <= 1.
 double calc_window(double beta, double x) {
   const auto calc_bessel_i0 = [](double y) {
     double term = 1.0, sum = 1.0;
@@ -27,19 +26,18 @@ double calc_window(double beta, double x) {
   return calc_bessel_i0(beta * std::sqrt(std::max(0.0, 1.0 - x * x))) / calc_bessel_i0(beta);
 }
 
-/// The response of calc_entry() at f of the sample rate, f <= 1, 1 at 0.
+/// Response of calc_entry() at f times the sample rate, f <= 1; 1 at 0.
 double calc_entry_response(double f) {
   const double at = std::numbers::pi * kEntry * 0.5 * f, root = std::sqrt(kEntryBeta * kEntryBeta - at * at);
   return std::sinh(root) / root * kEntryBeta / std::sinh(kEntryBeta);
 }
 
-/// The desired response at a frequency, and the share of its error.
+/// Desired response at a frequency, and the weight of its error.
 struct Wish {
   double response, share;
 };
 
-/// The weights for which the response, the sum of weight[n] row[n] of find(f, row), is nearest to its wish at all f to `top` of the sample
-/// rate.
+/// Weights that minimise the error of sum weight[n] row[n] of find(f, row) for all f up to `top` times the sample rate.
 template <std::size_t kCount, typename Find>
 std::array<double, kCount> fit(double top, Find&& find) {
   constexpr int kPoints = 250;
@@ -65,11 +63,11 @@ std::array<double, kCount> fit(double top, Find&& find) {
   return b;
 }
 
-constexpr double kNeither = 1e-7;  // share of frequencies between the bands
+constexpr double kTransitionWeight = 1e-7;  // weight of frequencies between the bands
 
 Wish wish_motion(double f) {
   if (f < 0.42) return {1.0, 1.0};
-  return {0.0, f > 0.58 ? 1.0 : kNeither};
+  return {0.0, f > 0.58 ? 1.0 : kTransitionWeight};
 }
 
 }  // namespace
@@ -100,7 +98,7 @@ std::array<double, kDerivativeHalf + 1> make_derivative() {
   const auto odd = fit<kDerivativeHalf>(0.5, [](double f, auto& row) {
     const double omega = 2.0 * std::numbers::pi * f;
     for (std::size_t n = 0; n < row.size(); ++n) row[n] = 2.0 * std::sin(omega * static_cast<double>(n + 1)) / omega;
-    return Wish{1.0, f < 0.425 ? 1.0 : kNeither};
+    return Wish{1.0, f < 0.425 ? 1.0 : kTransitionWeight};
   });
   double slope = 0.0;
   for (std::size_t n = 0; n < odd.size(); ++n) slope += 2.0 * static_cast<double>(n + 1) * odd[n];

@@ -1,5 +1,5 @@
-// Method: rank 0 sorts nodes along a Morton curve and elements by kind and lowest nodes, and broadcasts the result. Nodes that follow each
-//   other are near each other, so that the values of an element's nodes are in few lines of the cache.
+// Method: rank 0 sorts nodes along a Morton curve and elements by kind and lowest node, and broadcasts the result. Consecutive nodes are
+//   close in space, so an element's node values share few cache lines.
 // Source: Morton 1966.
 #include "precompute/simulation/transient/assembly.hpp"
 
@@ -25,7 +25,7 @@ std::uint64_t spread_bits(std::uint64_t v) {
   return (v | v << 2) & 0x1249249249249249;
 }
 
-/// The nodes along a Morton curve: result[i] is the old number of new node i.
+/// Nodes along a Morton curve: result[i] is the old number of new node i.
 std::vector<std::int32_t> sort_nodes(const std::vector<Vec3>& nodes_m) {
   Vec3 low{1e300, 1e300, 1e300}, high{-1e300, -1e300, -1e300};
   for (const Vec3& x : nodes_m)
@@ -57,14 +57,14 @@ void check_law(const SolidBody& body) {
                   body.name, law.lambda_pa, law.mu_pa, law.phi_pa_s, law.psi_pa_s, law.density_kg_m3, body.mass_damping_per_s));
 }
 
-/// What is broadcast of a body in addition to its texts.
+/// Broadcast data of a body, except its texts.
 struct Numbers {
   Law law;
   double mass_damping_per_s;
   std::int32_t nodes, elements, straight, width, mesh_nodes;
 };
 
-/// A sheet as it is broadcast, with its numbers.
+/// Broadcast data of a sheet.
 struct SheetNumbers {
   SheetLaw law;
   std::int32_t body, vertices, triangles;
@@ -135,7 +135,7 @@ void append_body(const SolidBody& solid, Assembly& assembly, std::vector<Numbers
                      straight, static_cast<std::int32_t>(width), static_cast<std::int32_t>(number.size())});
 }
 
-/// An assembly as rank 0 knows it, in arrays that can be broadcast.
+/// Assembly on rank 0, in arrays for the broadcast.
 struct Draft {
   Assembly assembly;
   std::vector<Numbers> numbers;  // (bodies)
@@ -176,7 +176,7 @@ void append_sheet(const SheetBody& sheet, Draft& draft) {
   draft.names.push_back(sheet.name);
 }
 
-/// From rank 0 to all. Collective.
+/// Broadcast from rank 0. Collective.
 void broadcast(const comm::Communicator& comm, Draft& draft) {
   const auto share = [&](auto& values) { values = comm.broadcast(std::move(values)); };
   share(draft.names);
@@ -284,7 +284,7 @@ Assembly make_assembly(const comm::Communicator& comm, const std::vector<AnyBody
   Draft draft;
   comm.agree([&] {
     if (!comm.is_root()) return;
-    if (bodies.empty()) throw InputError("there is no body to move");
+    if (bodies.empty()) throw InputError("the job has no body");
     for (const AnyBody& body : bodies) {
       if (const auto* solid = std::get_if<SolidBody>(&body)) {
         append_body(*solid, draft.assembly, draft.numbers, draft.node_of_mesh);

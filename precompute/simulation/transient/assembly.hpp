@@ -1,4 +1,4 @@
-// All bodies of a run in one numbering, which does not depend on the number of ranks.
+// All bodies of a run in one numbering, independent of the number of ranks.
 #pragma once
 
 #include <array>
@@ -17,7 +17,7 @@
 
 namespace carillon::transient {
 
-/// A solid body as a job has it, at rest where the run begins.
+/// Solid body of a job, in its initial position.
 struct SolidBody {
   std::string name;    // in messages
   mesh::TetMesh mesh;  // of order 1 or 2, checked (mesh::check_mesh)
@@ -25,7 +25,7 @@ struct SolidBody {
   double mass_damping_per_s = 0.0;  // alpha2
 };
 
-/// A thin sheet, likewise. Its nodes are its vertices, the angles of its edges, and ghosts (SheetElements).
+/// Thin sheet, likewise. Nodes: vertices, edge angles, and ghosts (SheetElements).
 struct SheetBody {
   std::string name;
   SheetMesh mesh;
@@ -35,61 +35,61 @@ struct SheetBody {
 };
 using AnyBody = std::variant<SolidBody, SheetBody>;
 
-/// Bodies one behind the other. Within a body nodes follow a Morton curve through their rest positions; elements with straight edges come
-/// first, then those with curved ones, each by their lowest node. These numbers give the order of every sum, and are what "node" and
-/// "element" mean in this folder. The same on every rank.
+/// Concatenated bodies. Within a body nodes follow a Morton curve through their rest positions; straight elements precede curved ones, each
+/// sorted by lowest node. These numbers define the order of every sum, and the meaning of "node" and "element" in this folder. The same on
+/// every rank.
 struct Assembly {
   struct Body {
     std::string name;
     Law law;
     double mass_damping_per_s = 0.0;
-    std::int32_t first_node = 0, last_node = 0;  // last: one behind
+    std::int32_t first_node = 0, last_node = 0;  // last: one past the end
     std::int32_t first_element = 0, last_element = 0;
-    std::int32_t first_curved = 0;           // element; last_element where none is
+    std::int32_t first_curved = 0;           // first curved element; last_element if none
     std::size_t nodes_at = 0;                // in `tets`: of the first element
-    int width = 4;                           // nodes of an element
-    std::vector<std::int32_t> node_of_mesh;  // (nodes of the mesh) their numbers here
+    int width = 4;                           // nodes per element
+    std::vector<std::int32_t> node_of_mesh;  // (nodes of the mesh) assembly numbers
     bool is_sheet = false;
-    SheetElements sheet;  // its numbers plus first_node are those here
+    SheetElements sheet;  // plus first_node: assembly numbers
     SheetLaw sheet_law;
   };
   std::vector<Body> bodies;
   std::vector<Vec3> nodes_m;                  // (N) at rest
-  std::vector<std::int32_t> tets;             // nodes of all elements, body by body; of a sheet 9, -1 where there is none
-  std::vector<std::int32_t> element_of_mesh;  // (E) number of the element in its body's mesh, from 0
+  std::vector<std::int32_t> tets;             // nodes of all elements, by body; of a sheet 9, -1 for none
+  std::vector<std::int32_t> element_of_mesh;  // (E) element number in its body's mesh, from 0
 
   std::int32_t node_count() const { return static_cast<std::int32_t>(nodes_m.size()); }
   std::int32_t element_count() const { return static_cast<std::int32_t>(element_of_mesh.size()); }
   std::int32_t find_body_of_node(std::int32_t node) const;
   std::int32_t find_body(std::int32_t element) const;
   Kind find_kind(std::int32_t element) const;
-  /// A node with a place in space, that gravity and rigid motion move: no angle of an edge, no ghost of a sheet.
+  /// True for nodes with a position, subject to gravity and rigid motion; false for edge angles and ghosts of sheets.
   bool is_point(std::int32_t node) const;
   std::span<const std::int32_t> find_nodes(std::int32_t element) const;
   /// "body 'bar', element 12 of its mesh, whose centre is at rest at (0.1, 0.02, 0) m": for messages.
   std::string describe(std::int32_t element) const;
 };
 
-/// Bodies are read on rank 0 only. Collective. Throws on every rank: InputError for no body, a law that is no solid's (mu and density
-/// positive, 3 lambda + 2 mu positive, phi and psi not negative), and an element whose Jacobian is not positive.
+/// Bodies are read on rank 0 only. Collective. Throws on every rank: InputError for no body, an invalid law (mu, density and 3 lambda + 2
+/// mu must be positive, phi and psi not negative), or an element with a nonpositive Jacobian.
 Assembly make_assembly(const comm::Communicator& comm, const std::vector<AnyBody>& bodies);
 Assembly make_assembly(const comm::Communicator& comm, const std::vector<SolidBody>& bodies);
 
-/// The facets of a body's skin in the numbers of the assembly: three corners, counter-clockwise seen from outside, then the mid nodes of
-/// the edges 01, 12, 20 (-1 in linear meshes). Of a sheet its triangles. Ordered by element. Local.
+/// Skin facets of a body in assembly numbers: three corners, counter-clockwise seen from outside, then the mid nodes of edges 01, 12, 20
+/// (-1 in linear meshes). For a sheet its triangles. Ordered by element. Local.
 std::vector<std::array<std::int32_t, 6>> list_skin(const Assembly& assembly, std::int32_t body);
 
-/// A node that takes a share of a force.
+/// A node and its share of a force.
 struct NodeShare {
   std::int32_t node;
   double share;
 };
 
-/// Shares of a force at `point_m` (rest position) among the nodes of the nearest facet of the body's skin: the values of the facet's shape
-/// functions at the nearest place on it, which sum up to 1. `distance_m`, if given: how far that is. Local.
+/// Shares of a force at `point_m` (rest position) among the nodes of the nearest skin facet: its shape functions at the nearest point,
+/// which sum to 1. `distance_m`, if given: distance to that point. Local.
 std::vector<NodeShare> find_shares(const Assembly& assembly, std::span<const std::array<std::int32_t, 6>> skin, const Vec3& point_m,
                                    double* distance_m = nullptr);
-/// The same with the skin listed for it.
+/// The same for a given list of skin facets.
 std::vector<NodeShare> find_shares(const Assembly& assembly, std::int32_t body, const Vec3& point_m, double* distance_m = nullptr);
 
 }  // namespace carillon::transient

@@ -1,7 +1,7 @@
-// Method:     tangent stiffness by five-point differences of the forces (exact for solids), many nodes without common neighbours at a time
-//             (Curtis, Powell and Reid); Newton's method for an equilibrium, with load steps if it does not converge; subspace iteration
-//             with a negative shift for modes; sparse L D L^T.
-// Source:     Curtis, Powell and Reid 1974; Bathe 1996, 8.4 and 11.6; docs/equations.md E11.
+// Method: tangent stiffness by five-point force differences (exact for solids), perturbing many nodes without common neighbours at once
+//   (Curtis, Powell and Reid); Newton's method for equilibrium, with load steps if it does not converge; subspace iteration with a negative
+//   shift for modes; sparse L D L^T.
+// Source: Curtis, Powell and Reid 1974; Bathe 1996, 8.4 and 11.6; docs/equations.md E11.
 #include "precompute/simulation/transient/bend.hpp"
 
 #include <fmt/format.h>
@@ -23,13 +23,13 @@ namespace {
 using Sparse = Eigen::SparseMatrix<double>;
 using Vector = Eigen::VectorXd;
 
-constexpr double kDifference = 1e-3;  // of the shortest edge, or rad
+constexpr double kDifferenceRatio = 1e-3;  // over the shortest edge, or rad
 constexpr int kNewtonSteps = 25;
-constexpr double kCloseEnough = 1e-9, kRounding = 1e-5;  // corrections over the displacement: convergence, and rounding level
-constexpr double kLeastPart = 1e-3;                      // smallest load step over the load
-// Over the highest stiffness over mass: the first shift of modes, and the rounding error of rigid modes.
+constexpr double kConvergedRatio = 1e-9, kRounding = 1e-5;  // correction over displacement: convergence, and rounding level
+constexpr double kMinLoadStep = 1e-3;                       // smallest load step over the load
+// Relative to the highest stiffness over mass: first shift of modes, and rounding error of rigid modes.
 constexpr double kFirstShift = 1e-6, kRigidShare = 1e-12;
-constexpr double kShiftOfMode = 0.3;  // over a mode's eigenvalue: keeps the rounding errors of rigid modes small
+constexpr double kShiftOfMode = 0.3;  // over a mode's eigenvalue: limits the rounding errors of rigid modes
 
 double& get_component(Quad& q, int axis) { return axis == 0 ? q.x : axis == 1 ? q.y : q.z; }
 
@@ -75,7 +75,7 @@ class Tangent {
   double get_edge_m() const { return edge_m_; }
   bool is_held(std::size_t node) const { return held_[node] != 0; }
 
-  /// (free) Elastic forces at u.
+  /// (free) elastic forces at u.
   Vector calc_forces(const std::vector<Quad>& u) {
     force_.resize(domain_.force_count());
     domain_.set_elastic_forces(u.data(), force_.data());
@@ -99,7 +99,7 @@ class Tangent {
     force_.resize(domain_.force_count());
     for (const std::vector<std::int32_t>& together : colours_)
       for (int axis = 0; axis < axes_[together[0]]; ++axis) {
-        const double by = axes_[together[0]] == 3 ? kDifference * edge_m_ : kDifference;
+        const double by = axes_[together[0]] == 3 ? kDifferenceRatio * edge_m_ : kDifferenceRatio;
         std::fill(slope.begin(), slope.end(), Vec3{});
         for (const auto& [places, weight] : {std::pair{1.0, 8.0}, {-1.0, -8.0}, {2.0, -1.0}, {-2.0, 1.0}}) {
           for (const std::int32_t node : together)
@@ -135,7 +135,7 @@ class Tangent {
   }
 
  private:
-  /// Nodes of one colour have no common neighbours, and equal numbers of axes.
+  /// Colours: nodes of one colour have no common neighbours, and equal numbers of axes.
   void colour() {
     std::vector<std::int32_t> of(near_.size(), -1), used;
     std::vector<int> axes_of;
@@ -198,7 +198,7 @@ bool find_balance(Domain& domain, Tangent& tangent, const Vector& load, std::vec
     std::fill(moved.begin(), moved.end(), Quad{});
     const double corrected = find_largest(domain, change), all = find_largest(domain, u);
     if (!(corrected < 10.0 * extent)) return false;
-    if (corrected <= kCloseEnough * all || (corrected <= kRounding * all && corrected >= 0.5 * last)) {
+    if (corrected <= kConvergedRatio * all || (corrected <= kRounding * all && corrected >= 0.5 * last)) {
       const Domain::State state = domain.calc_state(u.data());
       return std::all_of(state.least_det.begin(), state.least_det.end(), [](double det) { return det > 0.0; });
     }
@@ -232,11 +232,11 @@ std::vector<Quad> calc_equilibrium(Domain& domain, const std::vector<HeldNode>& 
       continue;
     }
     part *= 0.25;
-    if (part < kLeastPart)
-      throw InputError(fmt::format(
-          "the body finds no equilibrium beyond {:.3g} of what bends it: hold it, so that it cannot fly or turn away, or bend it "
-          "less",
-          done));
+    if (part < kMinLoadStep)
+      throw InputError(
+          fmt::format("the body finds no equilibrium beyond {:.3g} of its load: hold it, so that it cannot fly or turn away, or bend it "
+                      "less",
+                      done));
   }
   return u;
 }
@@ -274,9 +274,9 @@ ElasticMode calc_mode(Domain& domain, const std::vector<HeldNode>& held, int num
   constexpr int kRounds = 200;
   constexpr double kConverged = 1e-10, kRounded = 1e-14;
   for (int round = 0; round < kRounds; ++round) {
-    const Eigen::MatrixXd force = mass.asDiagonal() * x;  // a copy: solve() writes to x before it has read all of it
+    const Eigen::MatrixXd force = mass.asDiagonal() * x;  // copied: solve() writes to x before reading all of it
     x = factor.solve(force);
-    // Orthonormalise the columns (in the mass norm) against rounding errors in their products.
+    // Mass-orthonormalise the columns against rounding errors in their products.
     const Eigen::MatrixXd weighted = mass.cwiseSqrt().asDiagonal() * x;
     const Eigen::MatrixXd q = Eigen::HouseholderQR<Eigen::MatrixXd>(weighted).householderQ() * Eigen::MatrixXd::Identity(freedoms, width);
     x = mass.cwiseSqrt().cwiseInverse().asDiagonal() * q;

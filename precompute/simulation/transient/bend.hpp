@@ -8,7 +8,7 @@
 
 namespace carillon::transient {
 
-/// A node with a prescribed displacement, by its number in the assembly.
+/// A node (assembly number) with a prescribed displacement.
 struct HeldNode {
   std::int32_t node = 0;
   Vec3 displacement_m{};
@@ -19,9 +19,9 @@ struct PulledNode {
   Vec3 force_n{};
 };
 
-/// (nodes) Displacements from rest in equilibrium under `pulled`, with `held` prescribed; for an edge of a sheet the angle, in x. Nodes
-/// clamped in direction must be in `held`. Large displacements, all bodies of `domain`, which has one rank. Throws InputError without an
-/// equilibrium: a body free to fly away, or a force too strong for the mesh. Not collective.
+/// (nodes) Displacements from rest in equilibrium under `pulled`, with `held` prescribed; for a sheet edge the angle, in x. `held` must
+/// include nodes with clamped direction. Large displacements, all bodies of `domain` (one rank). Throws InputError without an equilibrium:
+/// an unconstrained body, or a force too strong for the mesh. Not collective.
 std::vector<Quad> calc_equilibrium(Domain& domain, const std::vector<HeldNode>& held, const std::vector<PulledNode>& pulled);
 
 struct ElasticMode {
@@ -30,8 +30,8 @@ struct ElasticMode {
 };
 inline constexpr int kMostModes = 20;
 
-/// The elastic mode of this number, 1 to kMostModes, from the lowest, about rest. held: fixed nodes; their displacements are ignored.
-/// Domain of one rank. Throws InputError for a body with fewer modes. Not collective.
+/// Elastic mode of this number, 1 (lowest) to kMostModes, about rest. held: fixed nodes; their displacements are ignored. One rank. Throws
+/// InputError for a body with fewer modes. Not collective.
 ElasticMode calc_mode(Domain& domain, const std::vector<HeldNode>& held, int number);
 
 }  // namespace carillon::transient

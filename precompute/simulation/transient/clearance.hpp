@@ -8,7 +8,7 @@ namespace carillon::transient {
 
 using job::RigidObstacle;
 
-/// Of a point: signed distance [m], positive outside, and the unit normal to the free side.
+/// Of a point: signed distance [m], positive outside, and unit normal towards the free side.
 struct Clearance {
   double distance_m = 0;
   Vec3 normal{};

@@ -1,7 +1,7 @@
-// Method:     a point of one surface against the nearest point of another: penalty k d (1 + a d' / v), never pulling, with the closing
-//             speed v at which the contact began; Coulomb friction that stops a node within one step at most.
-// Source:     docs/equations.md E11; Hunt and Crossley 1975; Gonthier, McPhee, Lange and Piedboeuf 2004 (restitution).
-// Deviations: O'Brien and Hodgins 1999 have a force in proportion to the volume of the overlap; here it is the depth of nodes, times area.
+// Method: a point of one surface against the nearest point of another: penalty k d (1 + a d' / v), never adhesive, with the closing speed v
+//   at the beginning of contact; d is node depth times area (O'Brien and Hodgins 1999: overlap volume). Coulomb friction stops a node
+//   within one step at most.
+// Source: docs/equations.md E11; Hunt and Crossley 1975; Gonthier, McPhee, Lange and Piedboeuf 2004 (restitution).
 #include "precompute/simulation/transient/contact.hpp"
 
 #include <fmt/core.h>
@@ -19,15 +19,15 @@
 namespace carillon::transient {
 namespace {
 
-constexpr double kMargin = 0.5;                       // of the search, in mean edges
-constexpr double kStartOverlap = 0.1;                 // in mean edges
-constexpr std::int64_t kMostSteps = 64;               // between two looks at how far things have moved
-constexpr double kSlowest = 1e-9;                     // closing speed [m/s] of a contact that begins at rest
-constexpr double kStopShare = 0.5;                    // of the tangential momentum that friction takes in a step at most
-constexpr double kStrikerPhase = 0.01;                // [rad] a step of a striker on an obstacle, which is stopped by a spring of its own
-constexpr double kBallSlide = 3.5;                    // 1 + m r^2 / I: how much lighter a ball is to a force along its surface
-constexpr double kSame = 1e-12;                       // distances that are the same, in mean edges
-constexpr double kFarthestM = 1e6, kFastestMs = 1e9;  // beyond which a motion is not stable
+constexpr double kMargin = 0.5;                           // search margin, in mean edges
+constexpr double kStartOverlap = 0.1;                     // in mean edges
+constexpr std::int64_t kMaxCheckSteps = 64;               // between two motion checks
+constexpr double kMinClosingMs = 1e-9;                    // closing speed [m/s] of a contact that begins at rest
+constexpr double kStopShare = 0.5;                        // largest share of the tangential momentum removed by friction per step
+constexpr double kStrikerPhase = 0.01;                    // [rad] per step of a striker on an obstacle, stopped by its own spring
+constexpr double kBallSlide = 3.5;                        // 1 + m r^2 / I: reduction of a ball's effective mass for tangential forces
+constexpr double kEqualDistanceRatio = 1e-12;             // equal distances, in mean edges
+constexpr double kMaxPositionM = 1e6, kMaxSpeedMs = 1e9;  // limits of a stable motion
 
 /// NaN counts as larger.
 void take_larger(double value, double& largest) {
@@ -42,7 +42,7 @@ void add(Quad& f, const Vec3& force) {
 
 }  // namespace
 
-/// Cells of a grid as keys.
+/// Hash of grid cells.
 struct Contacts::Grid {
   double cell_m;
   std::unordered_map<std::int64_t, std::vector<std::int32_t>> at;
@@ -55,7 +55,7 @@ struct Contacts::Grid {
 
 double calc_hunt_crossley(double restitution) {
   if (restitution >= 1.0) return 0.0;
-  // g(a) = log(1 + a) - log(1 - a e) - a (1 + e) has one root in (0, 1 / e) in addition to 0.
+  // g(a) = log(1 + a) - log(1 - a e) - a (1 + e) has one root in (0, 1 / e) other than 0.
   const double e = restitution;
   double low = 1e-9, high = (1.0 - 1e-15) / e;
   for (int i = 0; i < 200; ++i) {
@@ -111,8 +111,8 @@ Contacts::Nearest Contacts::find_nearest(const Vec3& p, const std::vector<std::i
     const Vec3 w = weigh_corners(p, at[0], at[1], at[2]);
     const Vec3 there = p - (w[0] * at[0] + w[1] * at[1] + w[2] * at[2]), twice = cross(at[1] - at[0], at[2] - at[0]);
     const double distance = norm(there), above = dot(there, twice) / norm(twice);
-    // Of several that share the nearest point, the one that sees p most from the front says on which side p is.
-    const double same = kSame * edge_m_;
+    // Of several triangles that share the nearest point, the one that faces p most decides the side.
+    const double same = kEqualDistanceRatio * edge_m_;
     if (!(distance < least - same || (distance < least + same && std::abs(above) > std::abs(height)))) continue;
     least = std::min(least, distance);
     height = above;
@@ -123,7 +123,7 @@ Contacts::Nearest Contacts::find_nearest(const Vec3& p, const std::vector<std::i
   }
   const bool is_sheet = surface_.nodes[surface_.triangles[nearest.triangle][0]].reach_m > 0;
   nearest.distance_m = is_sheet || height >= 0 ? least : -least;
-  nearest.normal = least > kSame * edge_m_ ? (1.0 / nearest.distance_m) * way : face;
+  nearest.normal = least > kEqualDistanceRatio * edge_m_ ? (1.0 / nearest.distance_m) * way : face;
   return nearest;
 }
 
@@ -281,7 +281,7 @@ void Contacts::gather_active(const Quad* u, const Quad* v) {
 
 Vec3 Contacts::calc_force(const StepTime& time, const Key& key, const Pair& pair, Account& account) {
   const auto found = touches_.find(key);
-  // The second half of the work of the step before: with the velocity that it led to.
+  // Second half of the previous step's work: with the resulting velocity.
   if (found != touches_.end()) account.lost_j -= 0.5 * time.act_before_s * dot(found->second.loss_n, pair.relative_m_s);
   if (!(pair.depth_m > 0)) {
     if (found != touches_.end()) touches_.erase(found);
@@ -289,10 +289,11 @@ Vec3 Contacts::calc_force(const StepTime& time, const Key& key, const Pair& pair
   }
   ++touching_;
   const double closing = -dot(pair.relative_m_s, pair.normal);
-  Touch& touch = found != touches_.end() ? found->second
-                                         : touches_.emplace(key, Touch{std::max(closing, kSlowest), pair.stiffness_n_m, {}}).first->second;
+  Touch& touch = found != touches_.end()
+                     ? found->second
+                     : touches_.emplace(key, Touch{std::max(closing, kMinClosingMs), pair.stiffness_n_m, {}}).first->second;
   const double elastic = touch.stiffness_n_m * pair.depth_m;
-  // What parts faster than it may is let go, and never pulled.
+  // Bodies that separate faster than allowed are released, never pulled.
   const double force = elastic * std::max(0.0, 1.0 + damping_ * closing / touch.closing_m_s);
   touch.loss_n = (force - elastic) * pair.normal;
   const Vec3 slide = pair.relative_m_s + closing * pair.normal;
@@ -408,20 +409,20 @@ void Contacts::look_around(const StepTime& time, const Quad* u, const Quad* v) {
     take_larger(norm(strikers_[s].velocity_m_s), fastest);
   }
   std::array<double, 2> most{moved, fastest};
-  // Forces grow with the cube of the displacement: what is lost is found here before its places are no numbers.
+  // Forces grow with the cube of the displacement: detect divergence before positions become non-finite.
   for (double& value : most)
     if (!std::isfinite(value)) value = std::numeric_limits<double>::infinity();
   comm_.max(std::span<double>(most));
-  if (!(most[0] < kFarthestM && most[1] < kFastestMs))
+  if (!(most[0] < kMaxPositionM && most[1] < kMaxSpeedMs))
     throw SolveError(fmt::format("the bodies move without bounds at {:.6g} s, step {}: use a weaker blow, a shorter step or a finer mesh",
                                  time.time_s, time.step));
   const bool is_first = active_index_.empty();
   if (is_first || most[0] > 0.25 * margin_m_) search(u);
   if (is_first && time.step == 0) comm_.agree([&] { check_start(); });
-  // Two that approach each other use up the margin from both sides, and what is struck may become twice as fast until the next look.
+  // Two approaching bodies use up the margin from both sides, and a struck body may double its speed before the next check.
   const double per_step = 4.0 * most[1] * time.step_s;
   steps_to_look_ =
-      per_step > 0 ? std::clamp(static_cast<std::int64_t>(0.25 * margin_m_ / per_step), std::int64_t{1}, kMostSteps) : kMostSteps;
+      per_step > 0 ? std::clamp(static_cast<std::int64_t>(0.25 * margin_m_ / per_step), std::int64_t{1}, kMaxCheckSteps) : kMaxCheckSteps;
 }
 
 void Contacts::add_forces(const StepTime& time, const Quad* u, const Quad* v, Quad* f) {
@@ -453,7 +454,7 @@ ExternalForces::Energy Contacts::calc_energy() {
   std::array<OrderFreeSum, 2> sums{stored_own_, lost_own_};
   const std::vector<double> own = calc_sums(comm_, sums);
   Energy energy{own[0] + stored_shared_, own[1] + lost_shared_, gravity_work_};
-  // As the book has it: in the middle of the step, kinetic energy by the velocities of both halves.
+  // As in the energy book: mid-step, kinetic energy from the velocities of both halves.
   for (std::size_t s = 0; s < strikers_.size(); ++s) {
     const BallStriker& striker = strikers_[s];
     const Vec3& v = striker.velocity_m_s;
@@ -467,7 +468,7 @@ ExternalForces::Energy Contacts::calc_energy() {
 
 namespace {
 
-/// A contact as it is kept.
+/// Checkpointed contact.
 struct KeptTouch {
   std::int32_t first, second;
   double closing_m_s, stiffness_n_m;
@@ -482,7 +483,7 @@ struct KeptHead {
 }  // namespace
 
 std::vector<std::byte> Contacts::save() {
-  // Nodes that touch obstacles are known to their owner alone.
+  // Contacts of nodes with obstacles are known to their owner only.
   std::vector<KeptTouch> own;
   for (const auto& [key, touch] : touches_) {
     const bool is_local = key[0] >= 0 && key[1] < 0;

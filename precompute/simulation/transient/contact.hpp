@@ -1,4 +1,4 @@
-// Contact by penalty: between deformable bodies, with rigid balls that fly freely, and with rigid obstacles; Coulomb friction.
+// Penalty contact of deformable bodies with each other, with free rigid balls and with rigid obstacles; Coulomb friction.
 #pragma once
 
 #include <array>
@@ -23,48 +23,48 @@ namespace carillon::transient {
 using job::BallStriker;
 
 struct TouchRules {
-  double restitution = 1.0;  // of a contact alone: the part of the closing speed with which rigid bodies would part
+  double restitution = 1.0;  // of contact alone: separation over closing speed of rigid bodies
   double friction = 0.0;     // Coulomb
   Vec3 gravity_m_s2{};       // of strikers
 };
 
-/// Finds contacts and adds their forces. Every rank knows which pairs may touch and computes all of those, with the same bits; nodes that
-/// touch obstacles alone stay with their owner. The search is repeated when something may have moved by a part of its margin.
+/// Finds contacts and adds their forces. Pairs that may touch are known to all ranks and computed redundantly, bit-identical; contacts with
+/// obstacles only stay with the node's owner. The search repeats when something may have moved by part of its margin.
 class Contacts : public ExternalForces {
  public:
   /// Collective.
   Contacts(const Domain& domain, TouchSurface surface, std::vector<BallStriker> strikers, std::vector<RigidObstacle> obstacles,
            const TouchRules& rules);
 
-  /// The first call throws InputError on every rank when bodies, strikers or obstacles overlap by more than a tenth of an edge.
+  /// The first call throws InputError on every rank if bodies, strikers or obstacles overlap by more than a tenth of an edge.
   void add_forces(const StepTime& time, const Quad* u, const Quad* v, Quad* f) override;
   double calc_longest_step_s(const std::vector<double>& omega_rad_s) const override;
   Energy calc_energy() override;
 
   const std::vector<BallStriker>& get_strikers() const { return strikers_; }
-  /// Whether anything may touch at all.
+  /// True if any contact is possible.
   bool is_needed() const { return !obstacles_.empty() || !strikers_.empty() || bodies_ > 1; }
-  /// Touches in the last step, on this rank.
+  /// Contacts in the last step, on this rank.
   std::size_t count_touching() const { return touching_; }
 
-  /// The state as bytes on rank 0, empty elsewhere, whatever the number of ranks. Collective.
+  /// State as bytes on rank 0, empty elsewhere, independent of the number of ranks. Collective.
   std::vector<std::byte> save();
-  /// Resumes from there. Throws InputError on every rank when they are of other bodies or cut off. Collective.
+  /// Resumes from such bytes. Throws InputError on every rank for truncated data or other bodies. Collective.
   void load(std::span<const std::byte> bytes);
 
  private:
   struct Touch {
-    double closing_m_s = 0;    // speed at which the contact began
-    double stiffness_n_m = 0;  // as it began: a spring that does not change keeps what is put into it
-    Vec3 loss_n{};             // friction and damping of the step before
+    double closing_m_s = 0;    // speed at the beginning of the contact
+    double stiffness_n_m = 0;  // constant during the contact: conserves the stored energy
+    Vec3 loss_n{};             // friction and damping of the previous step
   };
-  using Key = std::array<std::int32_t, 2>;  // who touches whom: a surface node or -1 - striker; a body or -1 - obstacle
-  /// Two that may touch.
+  using Key = std::array<std::int32_t, 2>;  // contact pair: a surface node or -1 - striker; a body or -1 - obstacle
+  /// Candidate pair.
   struct Pair {
     double stiffness_n_m = 0, depth_m = 0;
-    double mass_kg = 0;   // that both have together where they touch, along the surface
+    double mass_kg = 0;   // combined effective mass at the contact, tangential
     Vec3 normal{};        // from the second to the first
-    Vec3 relative_m_s{};  // of the first against the second
+    Vec3 relative_m_s{};  // of the first relative to the second
   };
 
   struct Nearest {
@@ -72,7 +72,7 @@ class Contacts : public ExternalForces {
     Vec3 weights{}, normal{};
     std::int32_t triangle = -1;
   };
-  /// Of at least one triangle.
+  /// At least one triangle.
   template <typename FindPosition>
   Nearest find_nearest(const Vec3& p, const std::vector<std::int32_t>& triangles, FindPosition&& find_position) const;
 
@@ -92,10 +92,10 @@ class Contacts : public ExternalForces {
     double stored_j = 0, lost_j = 0;
   };
   Vec3 calc_force(const StepTime& time, const Key& key, const Pair& pair, Account& account);
-  /// The velocity of the point of a ball that touches a surface with this normal.
+  /// Velocity of a ball's contact point on a surface with this normal.
   static Vec3 calc_touching_velocity(const BallStriker& striker, const Vec3& normal);
   void push_striker(std::size_t striker, const Vec3& normal, const Vec3& force);
-  /// By the forces of the step before.
+  /// By the forces of the previous step.
   void move_strikers(const StepTime& time);
   void add_striker_obstacles(const StepTime& time, Account& account);
 
@@ -104,16 +104,16 @@ class Contacts : public ExternalForces {
   std::vector<BallStriker> strikers_;
   std::vector<RigidObstacle> obstacles_;
   TouchRules rules_;
-  double damping_ = 0;  // of Hunt and Crossley's law, over the closing speed
+  double damping_ = 0;  // Hunt-Crossley damping, over the closing speed
   std::int32_t bodies_ = 0;
-  std::vector<std::int32_t> place_;  // (surface nodes) on this rank, -1
+  std::vector<std::int32_t> place_;  // (surface nodes) index on this rank, -1
   std::vector<std::int32_t> own_;    // surface nodes of this rank
   std::vector<std::int32_t> owner_;  // (surface nodes) rank
   std::vector<double> mass_kg_;      // (surface nodes)
   std::vector<std::string> names_;   // of bodies
   double margin_m_ = 0, edge_m_ = 0;
-  // Of the last search:
-  std::vector<Vec3> found_at_m_;  // (surface nodes) positions then
+  // Last search:
+  std::vector<Vec3> found_at_m_;  // (surface nodes) positions at the search
   std::vector<Vec3> strikers_at_m_;
   std::vector<std::array<std::int32_t, 2>> near_obstacles_;  // own surface node, obstacle
   std::vector<std::int32_t> active_;                         // surface nodes whose state every rank gets, ascending
@@ -128,8 +128,8 @@ class Contacts : public ExternalForces {
   std::vector<double> sent_, received_;
   std::vector<std::int32_t> active_order_;  // (received) surface node
   std::vector<Vec3> on_striker_n_;          // forces of this step
-  std::vector<Vec3> on_striker_n_m_;        // their moments about the centre
-  double act_s_ = 0;                        // for how long they act
+  std::vector<Vec3> on_striker_n_m_;        // moments about the centre
+  double act_s_ = 0;                        // duration of their action
   std::vector<Vec3> x_, v_;                 // (active)
   std::int64_t steps_to_look_ = 0;
   std::map<Key, Touch> touches_;
@@ -138,8 +138,8 @@ class Contacts : public ExternalForces {
   std::size_t touching_ = 0;
 };
 
-/// The damping of Hunt and Crossley's contact f = k d (1 + a d' / v) that parts with `restitution` times the closing speed v:
-/// (1 + a) / (1 - a e) = exp(a (1 + e)) (Gonthier et al. 2004), whatever the mass. 0 for e = 1.
+/// Damping a of Hunt and Crossley's contact f = k d (1 + a d' / v) with separation speed `restitution` times v: (1 + a) / (1 - a e) = exp(a
+/// (1 + e)) (Gonthier et al. 2004), independent of the mass. 0 for e = 1.
 double calc_hunt_crossley(double restitution);
 
 }  // namespace carillon::transient

@@ -1,5 +1,4 @@
-// Method: every rank has the assembly, keeps its part of the nodes, and lists the elements that touch one of them.
-// Source: docs/equations.md E11.
+// Method: every rank has the assembly, keeps its nodes, and lists the elements that touch one of them. docs/equations.md E11.
 #include "precompute/simulation/transient/domain.hpp"
 
 #include <fmt/format.h>
@@ -11,8 +10,8 @@
 #include <tuple>
 #include <utility>
 
-#include "precompute/mesh/distributed/bisect.hpp"
 #include "partition/partition.hpp"
+#include "precompute/mesh/distributed/bisect.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::transient {
@@ -51,7 +50,7 @@ std::vector<std::int32_t> cut(const comm::Communicator& comm, const Assembly& as
   return comm.all_gather(mesh::bisect(comm, centres, static_cast<std::int64_t>(first)));
 }
 
-/// The step [s] that a triangle of a sheet allows by itself: its least height over the speed of a plane wave.
+/// Step limit [s] of a sheet triangle alone: least height over the speed of a plane wave.
 double calc_triangle_step(const Assembly& assembly, std::int32_t element) {
   const Assembly::Body& body = assembly.bodies[assembly.find_body(element)];
   const auto nodes = assembly.find_nodes(element);
@@ -64,8 +63,8 @@ double calc_triangle_step(const Assembly& assembly, std::int32_t element) {
   return norm(cross(at[1] - at[0], at[2] - at[0])) / longest / std::sqrt(plane / law.density_kg_m3);
 }
 
-/// The rank of each node. Nodes on the seam between two parts go half to the one and half to the other, by number, that is by place: so
-/// both compute half of the elements along the seam twice, and not one of them all.
+/// Rank of each node. Seam nodes between two parts are split in half by number (hence by position): both ranks compute half of the seam
+/// elements redundantly, rather than one rank all.
 std::vector<std::int32_t> find_owners(const Assembly& all, const std::vector<std::int32_t>& part) {
   const std::size_t nodes = all.node_count();
   std::vector<std::int32_t> lowest(nodes, std::numeric_limits<std::int32_t>::max()), highest(nodes, 0);
@@ -76,7 +75,7 @@ std::vector<std::int32_t> find_owners(const Assembly& all, const std::vector<std
       lowest[n] = std::min(lowest[n], part[e]);
       highest[n] = std::max(highest[n], part[e]);
     }
-  std::map<std::pair<std::int32_t, std::int32_t>, std::pair<std::int64_t, std::int64_t>> seams;  // how many nodes, how many seen
+  std::map<std::pair<std::int32_t, std::int32_t>, std::pair<std::int64_t, std::int64_t>> seams;  // number of nodes, number seen
   for (std::size_t n = 0; n < nodes; ++n) ++seams[{lowest[n], highest[n]}].first;
   for (std::size_t n = 0; n < nodes; ++n) {
     auto& [count, seen] = seams[{lowest[n], highest[n]}];
@@ -105,14 +104,14 @@ Domain::Domain(const comm::Communicator& comm, std::shared_ptr<const Assembly> a
     const Assembly& all = *assembly_;
     const std::int32_t rank = comm_.rank();
     const std::vector<std::int32_t> owner = find_owners(all, part);
-    std::vector<std::tuple<std::int32_t, std::int32_t>> others;  // owner, number: each neighbour's follow each other
+    std::vector<std::tuple<std::int32_t, std::int32_t>> others;  // owner, number: sorted by neighbour
     std::vector<char> is_wanted(owner.size(), 0);
     for (std::int32_t e = 0; e < all.element_count(); ++e) {
       const auto nodes = all.find_nodes(e);
       const auto is_own = [&](std::int32_t node) { return node >= 0 && owner[node] == rank; };
       if (std::none_of(nodes.begin(), nodes.end(), is_own)) continue;
       element_.push_back(e);
-      // Reported by the owner of its first node, who has it surely.
+      // Reported by the owner of its first node.
       is_reported_.push_back(is_own(nodes[0]) ? 1 : 0);
       for (const std::int32_t node : nodes)
         if (node >= 0 && !is_own(node) && !std::exchange(is_wanted[node], 1)) others.emplace_back(owner[node], node);
@@ -147,7 +146,7 @@ Domain::Domain(const comm::Communicator& comm, std::shared_ptr<const Assembly> a
 
 void Domain::make_elements() {
   const Assembly& all = *assembly_;
-  ElementNodes elements;  // without the places that a sheet's triangle at the rim does not have
+  ElementNodes elements;  // without the missing neighbours of a sheet's rim triangles
   std::vector<Law> laws;
   for (const Assembly::Body& body : all.bodies) laws.push_back(body.law);
   mass_kg_.assign(own_, 0.0);
@@ -303,7 +302,7 @@ Domain::State Domain::calc_state(const Quad* u) const {
     for (std::size_t i = 0; i < part->list.size(); ++i) report(part->list[i], energy[i], least[i]);
     for (const SheetRun& run : part->sheets)
       for (std::size_t i = 0; i < run.list.size(); ++i) {
-        // A sheet has no inside out; what is no number is found by its energy.
+        // Sheets have no inversion; their energy detects non-finite values.
         const double of_triangle = run.sheets.calc_energy(i, x_.data());
         report(run.list[i], of_triangle, std::isfinite(of_triangle) ? 1.0 : std::numeric_limits<double>::quiet_NaN());
       }

@@ -1,6 +1,5 @@
-// Method: gradients from the Jacobian of the map, at the points of the kernel; the diagonal of the consistent mass of curved T10 by a
-// conical
-//   product of Gauss's rule of five points, which is exact for it, scaled to the volume.
+// Method: gradients from the Jacobian of the map at the kernel's points; diagonal of the consistent mass of curved T10 by a conical product
+//   of the five-point Gauss rule (exact), scaled to the volume.
 // Source: docs/equations.md E11; Hinton, Rock and Zienkiewicz 1976, Earthquake Eng. Struct. Dyn. 4, 245; Stroud 1971 (conical product).
 #include "precompute/simulation/transient/element.hpp"
 
@@ -15,7 +14,7 @@ namespace {
 
 using Barycentric = std::array<double, 4>;
 
-/// dN_a / dL_k of T10, taking the four coordinates as independent.
+/// dN_a / dL_k of T10, with the four coordinates as independent variables.
 std::array<Barycentric, 10> calc_derivatives(const Barycentric& L) {
   std::array<Barycentric, 10> d{};
   for (std::size_t k = 0; k < 4; ++k) d[k][k] = 4.0 * L[k] - 1.0;
@@ -56,7 +55,7 @@ constexpr Barycentric make_point(std::size_t q) {
   return L;
 }
 
-/// Each node's integral of N_a^2, scaled so that they sum up to the volume.
+/// Integral of N_a^2 of each node, scaled so that the sum is the volume.
 bool lump_curved(std::span<const Vec3> x, std::array<double, 10>& lumped) {
   constexpr std::array<double, 5> kPlace{0.04691007703066800, 0.23076534494715845, 0.5, 0.76923465505284155, 0.95308992296933200};
   constexpr std::array<double, 5> kWeight{0.11846344252809454, 0.23931433524968324, 0.28444444444444444, 0.23931433524968324,

@@ -1,17 +1,17 @@
-// Method:     total Lagrangian, one element a lane. H = grad u, Green's strain as 2 E = H + H^T + H^T H, which has no cancellation, and its
-//             rate as 2 E' = G + G^T + H^T G + G^T H with G = grad v. T10 at point q: with s_k = (4b - 1) u_k + 4b sum of the three u_kj,
-//             and w_k = u_q where k = q and u_kq elsewhere, the derivative with respect to L_k is s_k + 4 (a - b) w_k. The part of s is the
-//             same at all points, and w are the nodes of the small tetrahedron at corner q. Forces by the transpose of the same.
-// Source:     docs/equations.md E11. O'Brien, Cook and Essl 2001; Miller, Joldes, Lance and Wittek 2007 (total Lagrangian, explicit).
+// Method: total Lagrangian, one element per lane. H = grad u; Green strain as 2 E = H + H^T + H^T H (no cancellation), rate 2 E' = G + G^T
+//   + H^T G + G^T H with G = grad v. T10 at point q: with s_k = (4b - 1) u_k + 4b sum of the three u_kj, and w_k = u_q for k = q and u_kq
+//   otherwise, the derivative with respect to L_k is s_k + 4 (a - b) w_k. The s part is the same at all points; w are the nodes of the
+//   small tetrahedron at corner q. Forces by the transpose.
+// Source: docs/equations.md E11. O'Brien, Cook and Essl 2001; Miller, Joldes, Lance and Wittek 2007 (total Lagrangian, explicit).
 //
-// Included by solids_*.cpp inside an unnamed namespace behind kLanes; nothing of std is used, so that no function compiled for one
-// processor can be linked in place of another's. What a lane computes does not depend on the other lanes.
+// Included by solids_*.cpp inside an unnamed namespace after kLanes; no std functions, so that code compiled for one instruction set cannot
+// be linked into another. Lanes are independent of each other.
 
 typedef double V __attribute__((vector_size(8 * kLanes)));
 typedef double Pair __attribute__((vector_size(16)));
 typedef double Four __attribute__((vector_size(32)));
 
-// The address sanitizer of clang takes minutes to check one body that has everything inlined.
+// clang's address sanitizer takes minutes to check one fully inlined function.
 #if defined(__has_feature)
 #if __has_feature(address_sanitizer)
 #define CARILLON_INLINE inline
@@ -32,7 +32,7 @@ CARILLON_INLINE Three operator-(const Three& a, const Three& b) { return {a.x - 
 CARILLON_INLINE Three operator+(const Three& a, const Three& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 CARILLON_INLINE Three operator*(double s, const Three& a) { return {s * a.x, s * a.y, s * a.z}; }
 
-/// Pairs of every second lane, one behind the other. T is V: a template, since shuffles of other widths do not compile.
+/// Interleaved pairs of lanes. T is V: a template, since shuffles of other widths do not compile.
 template <int kWidth, typename T>
 CARILLON_INLINE T load_pairs(const double* values, const std::int32_t* at) {
   if constexpr (kWidth == 2) {
@@ -49,7 +49,7 @@ CARILLON_INLINE T load_pairs(const double* values, const std::int32_t* at) {
 }
 CARILLON_INLINE V load_pairs(const double* values, const std::int32_t* at) { return load_pairs<kLanes, V>(values, at); }
 
-/// The first of each pair of a and of b, in turn, or (kSecond) the second.
+/// Interleaves the first, or (kSecond) the second, of each pair of a and b.
 template <int kWidth, int kSecond, typename T>
 CARILLON_INLINE T take(T a, T b) {
   constexpr int s = kSecond, w = kSecond + kWidth;
@@ -71,7 +71,7 @@ CARILLON_INLINE Three load_node(const Quad* values, const std::int32_t* at) {
   return {take_first(even, odd), take_second(even, odd), take_first(load_pairs(first + 2, at), load_pairs(first + 2, at + 1))};
 }
 
-/// The forces of every lane on one node, to be added later: lane by lane, so that a sum does not depend on who shares a block.
+/// Forces of all lanes on one node, added later lane by lane, so that sums do not depend on block composition.
 CARILLON_INLINE void keep_force(const Three& force, Four* kept, int stride) {
   const V even = take_first(force.x, force.y), odd = take_second(force.x, force.y), none{};
   const V even_z = take_first(force.z, none), odd_z = take_second(force.z, none);
@@ -94,7 +94,7 @@ CARILLON_INLINE void add_kept(const Four* kept, const std::int32_t* write, Quad*
     }
 }
 
-/// m += sum over k = 0..2 of d_k (x) gradient_k, row by row.
+/// m += sum over k = 0..2 of d_k (x) gradient_k, by rows.
 CARILLON_INLINE void add_gradient(const Three* d, const V* gradient, V* m) {
 #pragma GCC unroll 3
   for (int k = 0; k < 3; ++k)
@@ -128,7 +128,7 @@ CARILLON_INLINE void calc_strain(const V* h, V* twice) {
   twice[5] = (h[1] + h[3]) + multiply_columns(h, 0, h, 1);
 }
 
-/// bulk / 2 tr(C) I + shear C, of C = 2 E or 2 E'.
+/// bulk / 2 tr(C) I + shear C, for C = 2 E or 2 E'.
 CARILLON_INLINE void calc_law(double bulk, double shear, const V* twice, V* s) {
   const V pressure = (0.5 * bulk) * (twice[0] + twice[1] + twice[2]);
 #pragma GCC unroll 3
@@ -137,12 +137,12 @@ CARILLON_INLINE void calc_law(double bulk, double shear, const V* twice, V* s) {
   for (int i = 3; i < 6; ++i) s[i] = shear * twice[i];
 }
 
-/// S : E of C = 2 E.
+/// S : E for C = 2 E.
 CARILLON_INLINE V contract(const V* s, const V* twice) {
   return 0.5 * (s[0] * twice[0] + s[1] * twice[1] + s[2] * twice[2]) + (s[3] * twice[3] + s[4] * twice[4] + s[5] * twice[5]);
 }
 
-/// One point: q = -weight (I + h) S, and what damping takes.
+/// One point: q = -weight (I + h) S, and the damping work.
 template <bool kDamped>
 CARILLON_INLINE void calc_point(const Law& law, const StepWeights& weights, V weight, const V* h, const V* g, double* lag, V& spent, V* q) {
   V twice[6], s[6];
@@ -170,7 +170,7 @@ CARILLON_INLINE void calc_point(const Law& law, const StepWeights& weights, V we
       s[i] += viscous[i];
     }
     V loss = weights.now_s * contract(viscous, rate);
-    // The force of the step before acts on this velocity too: through F of that step, which is this F less step G.
+    // The previous step's force also acts on this velocity: through its F, which is this F less step G.
     const double twice_step = 2.0 * weights.step_s;
 #pragma GCC unroll 6
     for (int i = 0; i < 6; ++i) rate[i] -= twice_step * square[i];
@@ -227,10 +227,10 @@ void add_t4(const BlockRun& run, const StepWeights& weights, const Quad* u, cons
   }
 }
 
-/// The node between corners i and j; the corner itself where they are the same.
+/// Node between corners i and j; the corner itself if equal.
 constexpr int kNode[4][4] = {{0, 4, 6, 7}, {4, 1, 5, 8}, {6, 5, 2, 9}, {7, 8, 9, 3}};
 
-/// The part of s_k - s_0, k = 1..3, over kPointScale.
+/// s_k - s_0 term, k = 1..3, over kPointScale.
 CARILLON_INLINE void calc_common(const Three* node, Three* d) {
   Three s[4];
 #pragma GCC unroll 4
@@ -246,7 +246,8 @@ CARILLON_INLINE void calc_own(const Three* node, Three* d) {
   for (int k = 0; k < 3; ++k) d[k] = node[kNode[k + 1][kPoint]] - node[kNode[0][kPoint]];
 }
 
-/// The nodes of an element, and what of grad u or grad v is the same at all points: d of curved ones, the gradient itself of straight ones.
+/// Nodes of an element, and the part of grad u or grad v common to all points: d for curved elements, the gradient itself for straight
+/// ones.
 struct Field {
   Three node[10], d[3];
   V m[9];
@@ -280,7 +281,7 @@ CARILLON_INLINE void load_gradient(const double* shape, V* gradient) {
   for (int i = 0; i < 9; ++i) gradient[i] = load(shape + i * kLanes);
 }
 
-/// Adds point kPoint to the sum over the points and to the nodes of its small tetrahedron.
+/// Adds point kPoint to the sum over points and to the nodes of its small tetrahedron.
 template <bool kDamped, bool kCurved, int kPoint>
 CARILLON_INLINE void add_point(const BlockRun& run, const StepWeights& weights, const double* shape, const Field& u, const Field& v,
                                const V* common, double* lag, V& spent, V* sum, Three* total, Three* force) {
@@ -356,7 +357,7 @@ CARILLON_INLINE void add_state(const Law& law, V weight, const V* h, V& energy, 
   const V a = 1.0 + h[0], e = 1.0 + h[4], i = 1.0 + h[8];
   const V det = a * (e * i - h[5] * h[7]) - h[1] * (h[3] * i - h[5] * h[6]) + h[2] * (h[3] * h[7] - e * h[6]);
   for (int lane = 0; lane < kLanes; ++lane)
-    if (!(det[lane] >= least[lane])) least[lane] = det[lane];  // what is no number stays one
+    if (!(det[lane] >= least[lane])) least[lane] = det[lane];  // propagates NaN
 }
 
 inline void calc_t4_state(const BlockRun& run, const Quad* u, double* energy_j, double* least_out) {

@@ -1,8 +1,7 @@
-// Method:     central differences as leapfrog; the work of every force is h f_n (v_{n-1/2} + v_{n+1/2}) / 2, which is exact, and the
-//             kinetic energy m v_{n-1/2} v_{n+1/2} / 2, which with the elastic one is constant for a linear body at any stable step.
-// Source:     docs/equations.md E11; O'Brien, Cook and Essl 2001; Belytschko, Liu and Moran 2000, 6.2 (stable step with lagged damping).
-// Deviations: mass damping is of the velocity less that of the rigid body, for bodies that are free or hinged; the rigid velocity is
-//             renewed at every output sample.
+// Method: central differences as leapfrog; work of every force h f_n (v_{n-1/2} + v_{n+1/2}) / 2 (exact) and kinetic energy m v_{n-1/2}
+//   v_{n+1/2} / 2, which with the elastic energy is constant for a linear body at any stable step. Mass damping acts on the velocity
+//   relative to the rigid motion of free or hinged bodies, updated at every output sample.
+// Source: docs/equations.md E11; O'Brien, Cook and Essl 2001; Belytschko, Liu and Moran 2000, 6.2 (stable step with lagged damping).
 #include "precompute/simulation/transient/motion.hpp"
 
 #include <fmt/format.h>
@@ -21,10 +20,10 @@ namespace carillon::transient {
 namespace {
 
 constexpr int kStartIterations = 50, kCheckIterations = 20;
-constexpr double kStartShare = 0.9, kMostShare = 0.95, kRefinedShare = 0.8;
-constexpr int kMostRefinement = 8;
+constexpr double kStartShare = 0.9, kMaxStableShare = 0.95, kRefinedShare = 0.8;
+constexpr int kMaxRefinement = 8;
 
-/// From 0 to 1 with two continuous derivatives.
+/// Smooth ramp from 0 to 1 with two continuous derivatives.
 double calc_ramp(double x) {
   if (x <= 0.0) return 0.0;
   if (x >= 1.0) return 1.0;
@@ -33,7 +32,7 @@ double calc_ramp(double x) {
 
 double multiply(const Quad& a, const Quad& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 
-/// What is saved once; checked when it is loaded.
+/// Saved constants, checked on loading.
 struct SavedHead {
   char magic[16];
   std::int64_t nodes, elements, sample, step;
@@ -100,7 +99,7 @@ void Motion::find_carried() {
 }
 
 void Motion::release() {
-  const double now_s = get_time_s() * (1.0 + 1e-12);  // against rounding of a release at a step
+  const double now_s = get_time_s() * (1.0 + 1e-12);  // tolerance for a release at a step
   if (now_s < next_release_s_) return;
   const auto is_released = [&](const Constraint& constraint) { return now_s >= constraint.release_s; };
   std::erase_if(constrained_nodes_, [&](const ConstrainedNode& node) {
@@ -181,7 +180,7 @@ void Motion::find_hinges(const std::function<Vec3(std::int32_t)>& find_place) {
 void Motion::begin() {
   begun_ = true;
   find_step(kStartIterations, true);
-  // From v_0 to v_{-1/2}, so that the steps are symmetric in time from the start on.
+  // From v_0 to v_{-1/2}: steps symmetric in time from the start.
   domain_.set_elastic_forces(u_.data(), f_.data());
   for (std::size_t i = 0; i < is_constrained_.size(); ++i) {
     if (is_constrained_[i] != 0) continue;
@@ -218,13 +217,13 @@ void Motion::find_step(int iterations, bool is_start) {
   const double time_s = get_time_s();
   if (is_start) {
     parts_ = first_parts_ = count_parts(kStartShare * longest_s_);
-  } else if (step_s_ > kMostShare * longest_s_) {
+  } else if (step_s_ > kMaxStableShare * longest_s_) {
     parts_ = count_parts(kRefinedShare * longest_s_);
-    if (parts_ > kMostRefinement * first_parts_)
+    if (parts_ > kMaxRefinement * first_parts_)
       throw SolveError(fmt::format(
           "the bodies are so stiff in their shape at {:.6g} s, step {}, that {} steps a sample are needed, over {} times as many as at the "
           "start ({}): the motion is too violent for St. Venant-Kirchhoff's law; use a weaker blow or a finer mesh",
-          time_s, step_, parts_, kMostRefinement, first_parts_));
+          time_s, step_, parts_, kMaxRefinement, first_parts_));
   }
   step_s_ = 1.0 / (options_.sample_rate_hz * parts_);
 }
@@ -327,7 +326,7 @@ void Motion::set_external_forces() {
   const StepTime time{step_, time_s, act_s_, act_before_s_, step_s_, step_before_s_};
   for (ExternalForces* forces : outside_) forces->add_forces(time, u_.data(), v_.data(), external_.data());
   release();
-  // The force of a support is what brings a node where it has to be.
+  // The support force moves a node to its prescribed position.
   std::vector<Vec3> next;
   for (const Constraint& constraint : constraints_) next.push_back(constraint.path.calc(find_next_time_s()));
   for (const ConstrainedNode& constrained : constrained_nodes_) {
@@ -371,7 +370,7 @@ void Motion::check_inversion() {
   double least = std::numeric_limits<double>::infinity();
   std::int32_t element = std::numeric_limits<std::int32_t>::max();
   for (std::size_t i = 0; i < state.element.size(); ++i) {
-    // What is no number comes first of all.
+    // Non-finite values take precedence.
     const double det = std::isfinite(state.least_det[i]) ? state.least_det[i] : -std::numeric_limits<double>::infinity();
     if (det < least || (det == least && state.element[i] < element)) {
       least = det;
@@ -385,8 +384,8 @@ void Motion::check_inversion() {
   const std::string where =
       fmt::format("{} is turned inside out at {:.6g} s, step {} (det F {:.3g}): ", domain_.get_assembly().describe(first), get_time_s(),
                   step_, least_of_all);
-  // Between two checks of the step a body may stiffen; then it is the step that failed and not the law.
-  if (step_s_ > kMostShare * longest_s_)
+  // Between two step checks a body may stiffen; then the step failed, not the law.
+  if (step_s_ > kMaxStableShare * longest_s_)
     throw SolveError(where +
                      fmt::format("the step of {:.3g} s is not below 0.95 of the longest stable one, {:.3g} s: the motion is unstable; "
                                  "give a shorter \"step_s\"",
@@ -424,7 +423,7 @@ EnergyBook Motion::calc_book() {
   for (const double value : domain_.list_spent()) sums[5].add(value);
   domain_.forget_spent();
   const std::vector<double> sum = calc_sums(domain_.get_comm(), sums);
-  // The second half of the last step's work against damping is not known yet, and the first half is among those in sum[5].
+  // The second half of the last step's damping work is not known yet, and the first half is among those in sum[5].
   dissipated_j_ += sum[5];
   braked_j_ += sum[3];
   work_j_ += sum[2] + sum[3];
@@ -447,7 +446,7 @@ Motion::Momentum Motion::calc_momentum() {
   std::vector<OrderFreeSum> sums(6);
   for (std::size_t i = 0; i < inverse_kg_.size(); ++i) {
     if (!domain_.is_point(static_cast<std::int32_t>(i))) continue;
-    // Where the node was half a step ago: the angular momentum of both half steps is the same there.
+    // Position half a step ago: the angular momentum of both half steps is equal there.
     const double half = 0.5 * step_before_s_;
     const Vec3 v = to_vector(v_[i]), x = domain_.get_rest_m()[i] + to_vector(u_[i]) - half * v, turn = cross(x, v);
     for (std::size_t k = 0; k < 3; ++k) {

@@ -1,4 +1,4 @@
-// Bodies that move: explicit steps of a Domain's nodes under elastic forces, damping, gravity, impulses, supports and what others add.
+// Motion of bodies: explicit steps of a Domain's nodes under elastic forces, damping, gravity, impulses, supports and external forces.
 //
 //   Motion motion(domain, options, constraints, impulses);
 //   motion.set_start([](std::int32_t node, const Vec3& rest_m) { return Motion::Start{}; });
@@ -24,20 +24,20 @@
 namespace carillon::transient {
 
 struct MotionOptions {
-  double sample_rate_hz = 48000.0;  // a whole number of steps makes a sample
+  double sample_rate_hz = 48000.0;  // an integer number of steps per sample
   double longest_step_s = std::numeric_limits<double>::infinity();
   Vec3 gravity_m_s2{};
-  double settle_s = 0.0;       // gravity grows from 0 in this time, with continuous second derivative
-  double step_check_s = 1e-3;  // of simulated time: how often the stable step is found again
+  double settle_s = 0.0;       // duration of gravity's ramp from 0, with continuous second derivative
+  double step_check_s = 1e-3;  // of simulated time: interval between stable-step computations
   int inversion_check_steps = 100;
-  std::function<int(int)> round_steps;  // the number of steps in a sample that is taken for at least so many; none: the same
+  std::function<int(int)> round_steps;  // steps per sample, at least the given number; empty: identity
 };
 
-/// Nodes whose displacement is prescribed: fixed (Dirichlet) where they are at the start (set_start()), or driven along a path from there.
+/// Nodes with prescribed displacement: fixed (Dirichlet) at their initial position (set_start()), or driven along a path from there.
 struct Constraint {
-  std::vector<std::int32_t> nodes;  // numbers of the assembly
-  Path path;                        // none: fixed
-  bool is_hinge = false;            // nodes of a line: the body swings about it, and mass damping does not brake the swing
+  std::vector<std::int32_t> nodes;                             // assembly numbers
+  Path path;                                                   // empty: fixed
+  bool is_hinge = false;                                       // collinear nodes: the body swings about them, exempt from mass damping
   double release_s = std::numeric_limits<double>::infinity();  // time of release
 };
 
@@ -48,88 +48,86 @@ struct Impulse {
   std::vector<NodeShare> shares;
 };
 
-/// When forces are asked for, and how they act.
+/// Time of a force evaluation, and duration of its effect.
 struct StepTime {
   std::int64_t step = 0;
   double time_s = 0.0;
-  double act_s = 0.0;         // the forces change m v by this times themselves
-  double act_before_s = 0.0;  // the same of the step before, 0 at the first
-  double step_s = 0.0;        // of the displacements that follow
+  double act_s = 0.0;         // duration by which the forces change m v
+  double act_before_s = 0.0;  // the same for the previous step, 0 at the first
+  double step_s = 0.0;        // of the subsequent displacements
   double step_before_s = 0.0;
 };
 
-/// What acts on nodes from outside: contact, strikers, friction. Their nodal work is in the energy book without their doing (EnergyBook::
-/// work_j); what they say of themselves is the other side of it: stored + dissipated - put in = - work on the nodes.
+/// External forces on nodes: contact, strikers, friction. The energy book includes their nodal work automatically (EnergyBook::work_j);
+/// their own energies are the counterpart: stored + dissipated - put in = - work on the nodes.
 class ExternalForces {
  public:
   virtual ~ExternalForces() = default;
-  /// f += forces [N] on own nodes at time_s. u [m] is of time_s, v [m/s] of half a step before; both have Domain::node_count() entries, the
-  /// halo with its values. Called once a step, in order, on all ranks, so it may be collective. Work of the forces of the step before
-  /// can be added up here: act_before_s f (v before + v) / 2.
-  /// The forces on a node must not depend on the number of ranks. Throws on all ranks alike or not at all.
+  /// f += forces [N] on own nodes at time_s. u [m] is at time_s, v [m/s] half a step earlier; both have Domain::node_count() entries with a
+  /// valid halo. Called once per step, in order, on all ranks, so it may be collective. The previous step's work can be accumulated here:
+  /// act_before_s f (v before + v) / 2. Nodal forces must not depend on the number of ranks. Throws on all ranks alike or not at all.
   virtual void add_forces(const StepTime& time, const Quad* u, const Quad* v, Quad* f) = 0;
-  /// The longest step [s] that its stiffness allows in addition to that of a body, whose highest frequency is given (bodies) [rad/s].
-  /// Collective.
+  /// Longest step [s] allowed by its stiffness in addition to that of a body with the given highest frequency (bodies) [rad/s]. Collective.
   virtual double calc_longest_step_s(const std::vector<double>& omega_rad_s) const {
     static_cast<void>(omega_rad_s);
     return std::numeric_limits<double>::infinity();
   }
   struct Energy {
-    double stored_j = 0.0;      // springs of contact, motion of strikers
+    double stored_j = 0.0;      // contact springs, striker motion
     double dissipated_j = 0.0;  // friction, contact damping
-    double put_in_j = 0.0;      // by what moves it from outside
+    double put_in_j = 0.0;      // by moving it from outside
   };
-  /// Of all ranks, the same on each. Collective.
+  /// Over all ranks, the same on each. Collective.
   virtual Energy calc_energy() = 0;
 };
 
-/// kinetic + elastic + dissipated - work = const. All at time_s, over all ranks, the same bits on any number of them.
+/// kinetic + elastic + dissipated - work = const. At time_s, over all ranks, bit-identical on any number of ranks.
 struct EnergyBook {
   double time_s = 0.0;
   std::int64_t step = 0;
-  double kinetic_j = 0.0;  // sum of m v_{n-1/2} v_{n+1/2} / 2: what the steps conserve
+  double kinetic_j = 0.0;  // sum of m v_{n-1/2} v_{n+1/2} / 2, conserved by the steps
   double elastic_j = 0.0;
   double dissipated_j = 0.0;    // by strain rate and mass damping
-  double work_j = 0.0;          // of supports that move, impulses, gravity, external forces
-  double error_j = 0.0;         // kinetic + elastic + dissipated - work, less the same at the start
-  double relative_error = 0.0;  // of the most that kinetic + elastic + dissipated has been at any book so far
+  double work_j = 0.0;          // of moving supports, impulses, gravity, external forces
+  double error_j = 0.0;         // kinetic + elastic + dissipated - work, minus the initial value
+  double relative_error = 0.0;  // over the largest kinetic + elastic + dissipated of all books so far
 };
 
-/// Leapfrog: v_{n+1/2} = v_{n-1/2} + h f_n / m, u_{n+1} = u_n + h v_{n+1/2}. Between calls u and f are those of the time get_time_s(), v of
-/// half a step before, and halo values are those of their owners. The step is a whole part of a sample. Everything has the same bits on any
-/// number of ranks. All methods are collective but those called get_ and is_.
+/// Leapfrog: v_{n+1/2} = v_{n-1/2} + h f_n / m, u_{n+1} = u_n + h v_{n+1/2}. Between calls u and f are at get_time_s(), v half a step
+/// earlier, and halo values are current. The step divides a sample. Bit-identical on any number of ranks. All methods are collective except
+/// get_ and is_.
 ///
-/// Step: at the start 0.9 of the longest stable one, from 50 power iterations at the shape there. Every step_check_s the longest one is
-/// found again (20 more iterations); when the step is over 0.95 of it, it becomes at most 0.8 of it, from that output sample on. More than
-/// 8 times as many steps a sample as at the start: SolveError that names the time and the step. Elements turned inside out (det F <= 0), or
-/// values that are no numbers, end the run with SolveError that names element, time and step.
+/// Step: initially 0.9 of the longest stable one, from 50 power iterations at the initial shape. Every step_check_s the stable step is
+/// recomputed (20 more iterations); if the step exceeds 0.95 of it, it is reduced to at most 0.8 of it from that output sample on. More
+/// than 8 times the initial steps per sample: SolveError with time and step. Inverted elements (det F <= 0) or non-finite values end the
+/// run with SolveError naming element, time and step.
 class Motion {
  public:
   struct Start {
     Vec3 displacement_m{}, velocity_m_s{};
-    double angle_rad = 0.0;  // for an edge of a sheet, instead of both
+    double angle_rad = 0.0;  // for a sheet edge, instead of both
   };
 
-  /// Bodies are at rest in their rest shape. Domain lives as long as this; one Motion for a Domain. Throws on every rank: InputError for a
-  /// node that is constrained twice or does not exist, and for an impulse or option that makes no sense.
+  /// Bodies are at rest in their rest shape. Domain must outlive this; one Motion per Domain. Throws on every rank: InputError for a node
+  /// that is constrained twice or does not exist, and for invalid impulses or options.
   Motion(Domain& domain, const MotionOptions& options, std::vector<Constraint> constraints = {}, std::vector<Impulse> impulses = {});
   Motion(const Motion&) = delete;
   Motion& operator=(const Motion&) = delete;
 
-  /// Adds forces from outside, before the first step. They live as long as this.
+  /// Adds external forces, before the first step. They must outlive this.
   void add(ExternalForces& forces);
-  /// Displacement and velocity at time 0 of a node of the assembly with its rest position, the same on every rank; constrained nodes do
-  /// not move. Before the first step.
+  /// Initial displacement and velocity of an assembly node by its rest position, the same on every rank; constrained nodes do not move.
+  /// Before the first step.
   void set_start(const std::function<Start(std::int32_t node, const Vec3& rest_m)>& find_start);
 
-  /// Finds the step, if that was not done yet, and returns get_steps_per_sample(). Throws on every rank alike.
+  /// Computes the step if necessary, and returns get_steps_per_sample(). Throws on every rank alike.
   int prepare() {
     begin_if_new();
     return parts_;
   }
   /// One step. Throws on every rank alike.
   void advance();
-  /// Until the next output sample.
+  /// Advances to the next output sample.
   void advance_sample();
 
   double get_time_s() const { return (static_cast<double>(sample_) + static_cast<double>(part_) / parts_) / options_.sample_rate_hz; }
@@ -138,27 +136,27 @@ class Motion {
   std::int64_t get_step_count() const { return step_; }
   double get_step_s() const { return step_s_; }
   int get_steps_per_sample() const { return parts_; }
-  /// Of each body at the last check [rad/s], and the longest stable step of all [s].
+  /// Per body at the last check [rad/s], and the longest stable step of all [s].
   const std::vector<double>& get_omega_rad_s() const { return omega_; }
   double get_longest_step_s() const { return longest_s_; }
 
   const std::vector<Quad>& get_u() const { return u_; }  // (Domain::node_count) [m] at get_time_s()
-  const std::vector<Quad>& get_v() const { return v_; }  // (Domain::node_count) [m/s] half a step before
+  const std::vector<Quad>& get_v() const { return v_; }  // (Domain::node_count) [m/s] half a step earlier
   const std::vector<Quad>& get_f() const { return f_; }  // (at least own_count) [N] elastic and viscous, at get_time_s()
-  /// Reaction [N] of the nodes of a constraint, on the body, summed over them. Collective.
+  /// Total reaction [N] of a constraint's nodes on the body. Collective.
   Vec3 calc_reaction(std::size_t constraint);
 
   EnergyBook calc_book();
-  /// Momentum [kg m/s] and angular momentum about the origin [kg m^2/s] at half a step before get_time_s(), over all ranks.
+  /// Momentum [kg m/s] and angular momentum about the origin [kg m^2/s] half a step before get_time_s(), over all ranks.
   struct Momentum {
     Vec3 linear{}, angular{};
   };
   Momentum calc_momentum();
 
-  /// The whole state as bytes on rank 0, empty elsewhere: it does not depend on the number of ranks. Not what external forces keep.
+  /// Complete state as bytes on rank 0, empty elsewhere, independent of the number of ranks. Without state of external forces.
   std::vector<std::byte> save();
-  /// Continues from there: the same bits as without a stop. `bytes` of rank 0 count. Throws InputError on every rank when they are of other
-  /// bodies or cut off.
+  /// Continues from there, bit-identical to an uninterrupted run. Uses `bytes` of rank 0. Throws InputError on every rank for truncated
+  /// data or other bodies.
   void load(std::span<const std::byte> bytes);
 
  private:
@@ -168,7 +166,7 @@ class Motion {
   void calc_forces(bool halo_is_there);
   void move_halo();
   void set_external_forces();
-  /// Of all hinged bodies, whose nodes are at `find_place(number)`.
+  /// All hinges, with node positions `find_place(number)`.
   void find_hinges(const std::function<Vec3(std::int32_t)>& find_place);
   void update_carried();
   /// Releases constraints at their release_s.
@@ -201,11 +199,11 @@ class Motion {
   std::vector<char> is_constrained_for_ever_;  // (own)
   double next_release_s_ = std::numeric_limits<double>::infinity();
   std::vector<double> inverse_kg_, braked_kg_s_;  // (own)
-  std::vector<char> is_carried_;                  // (bodies) with mass damping that leaves rigid motion alone
+  std::vector<char> is_carried_;                  // (bodies) mass damping exempts rigid motion
   std::vector<Hinge> hinges_;                     // (bodies)
   bool is_braked_ = false, has_carried_ = false, has_external_ = false, begun_ = false;
   std::vector<Quad> u_, v_, f_, external_, work_, brake_loss_, carried_;
-  std::vector<Quad> home_, reaction_;  // (own) of constrained nodes: displacement at the start, reaction force
+  std::vector<Quad> home_, reaction_;  // (own) constrained nodes: initial displacement, reaction force
   HighestFrequency highest_;
   std::vector<double> omega_;
   double longest_s_ = 0.0;

@@ -1,5 +1,6 @@
-// Method: every double is a whole number of 2^-1074; its bits are added to digits of 32 bits in words of 64, and carries are taken at the
-// end. Source: Kulisch 1971 (exact accumulator).
+// Method: every double is an integer multiple of 2^-1074; its bits are added to 32-bit digits in 64-bit words, and carries are propagated
+//   at the end.
+// Source: Kulisch 1971 (exact accumulator).
 #include "precompute/simulation/transient/order_free_sum.hpp"
 
 #include <bit>

@@ -38,7 +38,7 @@ Vec3 Path::calc(double time_s) const {
   const auto next = std::upper_bound(rows_.begin(), rows_.end(), time_s, [](double t, const PathRow& row) { return t < row.time_s; });
   const auto j = static_cast<std::size_t>(next - rows_.begin()), i = j - 1;
   const double span = rows_[j].time_s - rows_[i].time_s, x = (time_s - rows_[i].time_s) / span, y = 1.0 - x;
-  // Each polynomial is 1 in one of value, slope and bend at x = 0; mirrored for x = 1.
+  // Each polynomial is 1 in one of value, slope and curvature at x = 0; mirrored for x = 1.
   const auto value = [](double a, double b) { return b * b * b * (1.0 + a * (3.0 + 6.0 * a)); };
   const auto slope = [](double a, double b) { return a * b * b * b * (1.0 + 3.0 * a); };
   const auto bend = [](double a, double b) { return 0.5 * a * a * b * b * b; };

@@ -1,4 +1,4 @@
-// Where driven nodes are: rows of time and place, joined smoothly. Std only.
+// Paths of driven nodes: rows of time and position, smoothly interpolated. Std only.
 #pragma once
 
 #include <vector>
@@ -13,13 +13,13 @@ struct PathRow {
   Vec3 displacement_m{};
 };
 
-/// A displacement that passes through the rows, with continuous velocity and acceleration everywhere: it rests before the first row and
-/// behind the last one. Between rows a quintic (Hermite); at rows inside velocity and acceleration are those of the parabola through the
-/// row and its neighbours. Two rows give the movement of least jerk (Flash and Hogan 1985).
+/// Displacement through the rows, with continuous velocity and acceleration: at rest before the first and after the last row. Quintic
+/// Hermite pieces; at inner rows velocity and acceleration are those of the parabola through the row and its neighbours. Two rows give the
+/// minimum-jerk movement (Flash and Hogan 1985).
 class Path {
  public:
   Path() = default;  // no displacement at any time
-  /// Throws InputError: times that do not ascend, a first displacement other than 0, values that are not finite.
+  /// Throws InputError: times not ascending, first displacement other than 0, non-finite values.
   explicit Path(std::vector<PathRow> rows);
 
   Vec3 calc(double time_s) const;

@@ -1,17 +1,17 @@
-// What every part of the full-order motion shares: the value of a node, the law of a material. Std only.
+// Common types of the full-order motion: nodal value, material law. Std only.
 #pragma once
 
 #include <cstdint>
 
 namespace carillon::transient {
 
-/// Displacement [m], velocity [m/s] or force [N] of one node, in one load of a processor. w is 0 and stays 0.
+/// Displacement [m], velocity [m/s] or force [N] of one node, as one vector load. w is always 0.
 struct alignas(32) Quad {
   double x = 0.0, y = 0.0, z = 0.0, w = 0.0;
 };
 
-/// St. Venant-Kirchhoff with strain-rate damping (O'Brien, Cook and Essl 2001; O'Brien, Shen and Gatchalian 2002):
-/// S = lambda tr(E) I + 2 mu E + phi tr(E') I + 2 psi E'. phi = alpha1 lambda, psi = alpha1 mu is Rayleigh's damping at small amplitude.
+/// St. Venant-Kirchhoff with strain-rate damping (O'Brien, Cook and Essl 2001; O'Brien, Shen and Gatchalian 2002): S = lambda tr(E) I + 2
+/// mu E + phi tr(E') I + 2 psi E'. phi = alpha1 lambda, psi = alpha1 mu is Rayleigh damping at small amplitude.
 struct Law {
   double lambda_pa = 0.0;
   double mu_pa = 0.0;

@@ -9,9 +9,9 @@
 namespace carillon::transient {
 namespace {
 
-constexpr std::size_t kSums = 16;  // m, m x, m v, m x (x) v as a vector, the six of m x x^T
+constexpr std::size_t kSums = 16;  // m, m x, m v, m x (x) v as a vector, the six components of m x x^T
 
-/// Of a body, by its sums. A hinged body only rotates about its hinge.
+/// Rigid motion of a body from its sums. A hinged body only rotates about its hinge.
 RigidMotion calc_rigid_motion(const double* s, const Hinge& hinge) {
   const Vec3 middle{s[1] / s[0], s[2] / s[0], s[3] / s[0]}, v{s[4] / s[0], s[5] / s[0], s[6] / s[0]};
   const Vec3 c = hinge.is_there ? hinge.point_m : middle;

@@ -1,4 +1,4 @@
-// Rigid motion of bodies: that with their momentum and angular momentum.
+// Rigid motion of bodies, from their momentum and angular momentum.
 #pragma once
 
 #include <span>
@@ -10,13 +10,13 @@
 
 namespace carillon::transient {
 
-/// The line about which a body swings.
+/// Swing axis of a body.
 struct Hinge {
   bool is_there = false;
-  Vec3 point_m{}, axis{};  // unit; 0 where all nodes are one point
+  Vec3 point_m{}, axis{};  // unit; 0 if all nodes coincide
 };
 
-/// Through the first place and the one farthest from it; of at least one place.
+/// Through the first position and the one farthest from it; at least one position.
 Hinge make_hinge(std::span<const Vec3> places_m);
 
 struct RigidMotion {
@@ -24,8 +24,8 @@ struct RigidMotion {
   Vec3 calc_velocity(const Vec3& place_m) const { return velocity_m_s + cross(spin_rad_s, place_m - centre_m); }
 };
 
-/// Of the bodies in is_wanted, at rest for the others; about its hinge where a body has one. Over all ranks, the same bits on any number
-/// of them. Collective.
+/// For the bodies in is_wanted, zero for the others; about its hinge for a hinged body. Over all ranks, bit-identical on any number of
+/// them. Collective.
 std::vector<RigidMotion> calc_rigid_motions(const Domain& domain, const std::vector<Quad>& u, const std::vector<Quad>& v,
                                             const std::vector<char>& is_wanted, std::span<const Hinge> hinges);
 

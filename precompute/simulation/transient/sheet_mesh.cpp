@@ -11,13 +11,13 @@
 namespace carillon::transient {
 namespace {
 
-constexpr double kMostBow = 0.4;
+constexpr double kMaxBowRatio = 0.4;
 
 void check_cells(int cells) {
   if (cells < 2) throw InputError(fmt::format("a sheet has {} cells; give two or more", cells));
 }
 
-/// Ends, middle and radius of an arc of this chord and rise: a point at share s of its length.
+/// Ends, centre and radius of an arc with this chord and rise: a point at share s of its length.
 Vec3 find_on_arc(double chord_m, double bow_m, double s) {
   if (bow_m == 0.0) return {chord_m * (s - 0.5), 0.0, 0.0};
   const double radius = (0.25 * chord_m * chord_m + bow_m * bow_m) / (2.0 * bow_m);
@@ -30,8 +30,8 @@ Vec3 find_on_arc(double chord_m, double bow_m, double s) {
 SheetMesh make_rectangle(double length_m, double width_m, int cells, double bow_m) {
   check_cells(cells);
   if (!(length_m > 0.0 && width_m > 0.0)) throw InputError("the sides of a sheet must be positive");
-  if (!(bow_m >= 0.0 && bow_m <= kMostBow * length_m))
-    throw InputError(fmt::format("the bow of a sheet must be from 0 to {:g} of its length", kMostBow));
+  if (!(bow_m >= 0.0 && bow_m <= kMaxBowRatio * length_m))
+    throw InputError(fmt::format("the bow of a sheet must be from 0 to {:g} of its length", kMaxBowRatio));
   const double cell = std::max(length_m, width_m) / cells;
   const int nx = std::max(1, static_cast<int>(std::lround(length_m / cell))),
             ny = std::max(1, static_cast<int>(std::lround(width_m / cell)));

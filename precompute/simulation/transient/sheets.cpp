@@ -1,5 +1,4 @@
-// Method:     constants of a triangle in its own frame; energies in plain arithmetic, for the energy book.
-// Source:     docs/equations.md E11.
+// Method: constants of a triangle in its own frame; energies in scalar code, for the energy book. docs/equations.md E11.
 #include "precompute/simulation/transient/sheets.hpp"
 
 #include <algorithm>

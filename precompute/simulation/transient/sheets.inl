@@ -1,9 +1,8 @@
-// Method:     four triangles in the lanes. Membrane: constant Green's strain in plane stress. Bending: s = turn * 2 tan(theta / 2) +- psi
-//             of each edge, M = B (s - s0 + alpha1 s'); each triangle takes its own side of a hinge, so that an edge needs no pass of
-//             its own.
-// Source:     docs/equations.md E11; Grinspun, Gingold, Reisman and Zorin 2006 (mid-edge normals), with 2 tan(theta / 2) for theta.
+// Method: four triangles in the lanes. Membrane: constant Green strain in plane stress. Bending: s = turn * 2 tan(theta / 2) +- psi of each
+//   edge, M = B (s - s0 + alpha1 s'); each triangle handles its own side of a hinge, so no separate edge pass is needed.
+// Source: docs/equations.md E11; Grinspun, Gingold, Reisman and Zorin 2006 (mid-edge normals), with 2 tan(theta / 2) for theta.
 //
-// Included by sheets_*.cpp inside an unnamed namespace; nothing of std is used.
+// Included by sheets_*.cpp inside an unnamed namespace; no std functions.
 
 typedef double Lanes __attribute__((vector_size(32)));
 
@@ -18,7 +17,7 @@ inline Lanes dot(const Lanes3& a, const Lanes3& b) { return a.x * b.x + a.y * b.
 inline Lanes3 cross(const Lanes3& a, const Lanes3& b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
 
 inline Lanes load(const double* at) { return *reinterpret_cast<const Lanes*>(at); }
-/// At any address.
+/// Unaligned.
 inline Lanes load_loose(const double* at) {
   Lanes value;
   __builtin_memcpy(&value, at, sizeof value);
@@ -31,7 +30,7 @@ inline Lanes calc_root(Lanes x) {
   return root;
 }
 
-/// Four rows to four columns.
+/// Transposes 4 x 4.
 inline void transpose(Lanes& a, Lanes& b, Lanes& c, Lanes& d) {
   const Lanes ab0 = __builtin_shufflevector(a, b, 0, 4, 2, 6), ab1 = __builtin_shufflevector(a, b, 1, 5, 3, 7);
   const Lanes cd0 = __builtin_shufflevector(c, d, 0, 4, 2, 6), cd1 = __builtin_shufflevector(c, d, 1, 5, 3, 7);
@@ -49,14 +48,14 @@ inline Lanes3 gather(const Quad* q, const std::int32_t* at) {
 
 inline Lanes gather_angle(const Quad* q, const std::int32_t* at) { return Lanes{q[at[0]].x, q[at[1]].x, q[at[2]].x, q[at[3]].x}; }
 
-/// The work of a viscous stress in this step, and of that of the step before, which `lag` keeps: StepWeights.
+/// Work of the viscous stresses of this and (from `lag`) the previous step: StepWeights.
 inline Lanes spend(const StepWeights& weights, double* lag, Lanes stress, Lanes rate) {
   const Lanes work = (weights.now_s * stress + weights.before_s * load_loose(lag)) * rate;
   store_loose(lag, stress);
   return work;
 }
 
-/// What a triangle and its three neighbours do.
+/// Forces of a triangle and its three neighbours.
 template <bool kIsDamped>
 inline void add_block(const Sheets::Block& block, const StepWeights& weights, const Quad* x, const Quad* v, Quad* f, double* lag,
                       double* spent) {
@@ -104,7 +103,7 @@ inline void add_block(const Sheets::Block& block, const StepWeights& weights, co
     const Lanes length2 = dot(along, along), length = calc_root(length2), per_length = 1.0 / length;
     const Lanes other2 = dot(other, other), other_size = calc_root(other2);
     const Lanes turn = constant(11 + i);
-    // Without a neighbour d is c, which is folded back on itself: any finite angle, of which there is no share.
+    // Without a neighbour d is c (folded back): any finite angle, with share 0.
     const Lanes alone = turn == 0.0 ? own2 : Lanes{};
     const Lanes tangent = -length * dot(c - a, other) / (own_size * other_size + dot(own, other) + alone);
     slope[i] = turn * (1.0 + tangent * tangent);
@@ -142,7 +141,7 @@ inline void add_block(const Sheets::Block& block, const StepWeights& weights, co
     on_edge[i] = -moment[i] * constant(14 + i);
   }
   if constexpr (kIsDamped) store_loose(spent, load_loose(spent) + lost);
-  // Lane by lane: the sum over the triangles of a node is in ascending order.
+  // Lane by lane: a node's sum over triangles is in ascending order.
   Lanes rows[6][4];
   for (int k = 0; k < 6; ++k) {
     rows[k][0] = force[k].x;

@@ -1,6 +1,5 @@
-// Method: elements that follow each other with the same kind and law are a run; a run is cut into blocks of as many elements as the
-//   processor has lanes, and the last block is filled up with its own last element at weight 0.
-// Source: docs/equations.md E11; the loops are in kernel.inl.
+// Method: consecutive elements of equal kind and law form a run; a run is split into blocks of the processor's lane count, and the last
+//   block is padded with its last element at weight 0. Loops: kernel.inl. docs/equations.md E11.
 #include "precompute/simulation/transient/solids.hpp"
 
 #include <algorithm>

@@ -14,10 +14,10 @@
 
 namespace carillon::transient {
 
-/// Memory of doubles that begins at a multiple of 64 bytes.
+/// 64-byte aligned memory of doubles.
 class AlignedDoubles {
  public:
-  void resize(std::size_t count);  // all 0
+  void resize(std::size_t count);  // zero-initialised
   double* data() { return reinterpret_cast<double*>(lines_.data()); }
   const double* data() const { return reinterpret_cast<const double*>(lines_.data()); }
   std::size_t size() const { return count_; }
@@ -30,38 +30,38 @@ class AlignedDoubles {
   std::size_t count_ = 0;
 };
 
-/// An element as Solids takes it: places of its nodes in u and v, and in f, which may be others (Domain, "slots").
+/// An element: indices of its nodes in u and v, and in f, which may differ (Domain, "slots").
 struct SolidElement {
   Kind kind = Kind::kT4;
-  std::int32_t law = 0;                  // which of the laws
+  std::int32_t law = 0;                  // index of the law
   std::array<std::int32_t, 10> read{};   // (4 or 10)
   std::array<std::int32_t, 10> write{};  // (4 or 10)
 };
 
-/// The elements of one rank in blocks of lanes, in the order given, which is the order in which forces are added to a node. Forces of an
-/// element do not depend on its neighbours in a block, so that equal elements give equal bits wherever they are.
+/// Elements of one rank in blocks of lanes, in the given order, which is the order of force summation. Forces of an element do not depend
+/// on its block: equal elements give equal bits.
 class Solids {
  public:
   Solids() = default;
-  /// places_m: rest positions by entry of `read`; no_entry: an entry of f that is not read. Pre: make_shape() succeeds for every element.
+  /// places_m: rest positions by entry of `read`; no_entry: an unread entry of f. Pre: make_shape() succeeds for every element.
   Solids(const std::vector<SolidElement>& elements, const std::vector<Law>& laws, const std::vector<Vec3>& places_m, std::int32_t no_entry,
          const Loops& loops = find_loops());
 
   std::int64_t element_count() const { return static_cast<std::int64_t>(block_lane_.size()); }
 
-  /// f += elastic and viscous forces [N] of all elements, in their order. u [m], v [m/s]: by entries. Keeps the viscous stress for the next
-  /// call, and adds up the work against damping: calls follow the steps of the motion. Not collective; allocates nothing.
+  /// f += elastic and viscous forces [N] of all elements, in order. u [m], v [m/s]: by entries. Keeps the viscous stress for the next call
+  /// and accumulates damping work: one call per step. Not collective; does not allocate.
   void add_forces(const StepWeights& weights, const Quad* u, const Quad* v, Quad* f);
-  /// Only the elastic ones; changes nothing else.
+  /// Elastic forces only; no other change.
   void add_elastic_forces(const Quad* u, Quad* f) const;
 
-  /// Of every element [J], and its smallest det F; (element_count).
+  /// Energy of every element [J], and smallest det F; (element_count).
   void calc_state(const Quad* u, std::vector<double>& energy_j, std::vector<double>& least_det) const;
-  /// Work against damping since the last forget_spent(), by element [J].
+  /// Damping work per element since the last forget_spent() [J].
   std::vector<double> list_spent() const;
   void forget_spent();
 
-  /// What must be kept to continue later: (element_count, 1 + 24), the work against damping and the viscous stress of the step before.
+  /// Resumption state: (element_count, 1 + 24), damping work and viscous stress of the previous step.
   static constexpr std::size_t kStateWidth = 1 + 4 * kStresses;
   void save_state(std::vector<double>& state) const;
   void load_state(std::span<const double> state);
@@ -83,7 +83,7 @@ class Solids {
   std::vector<Run> runs_;
   struct Place {
     std::int32_t run;
-    std::int32_t place;  // in the run
+    std::int32_t place;  // index in the run
   };
   std::vector<Place> block_lane_;  // (elements)
 };

@@ -1,6 +1,5 @@
-// Method: p <- M^-1 (f(u - e p) - f(u + e p)) / 2 e for all bodies at once, each scaled by itself, with e p at most 1e-6 of the body's
-//   shortest edge; omega^2 is Rayleigh's quotient.
-// Source: docs/equations.md E11.
+// Method: p <- M^-1 (f(u - e p) - f(u + e p)) / 2 e for all bodies at once, each scaled separately, with e p at most 1e-6 of the body's
+//   shortest edge; omega^2 is the Rayleigh quotient. docs/equations.md E11.
 #include "precompute/simulation/transient/stable_step.hpp"
 
 #include <algorithm>
@@ -82,7 +81,7 @@ std::vector<double> HighestFrequency::calc(Domain& domain, const Quad* u, const 
     }
     const std::vector<double> sum = calc_sums(comm, sums);
     for (std::size_t b = 0; b < bodies; ++b) square[b] = sum[2 * b + 1] > 0.0 ? sum[2 * b] / sum[2 * b + 1] : 0.0;
-    // Numbers stay of the order of 1.
+    // Normalise.
     for (std::size_t i = 0; i < own; ++i) {
       const double factor = square[body_of(i)] > 0.0 ? 1.0 / square[body_of(i)] : 1.0;
       p_[i] = {factor * p_[i].x, factor * p_[i].y, factor * p_[i].z, 0.0};

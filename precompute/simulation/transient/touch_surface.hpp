@@ -1,4 +1,4 @@
-// The surfaces of bodies that may touch, with the stiffness of their penalty.
+// Contact surfaces of bodies, with their penalty stiffness.
 #pragma once
 
 #include <array>
@@ -10,23 +10,23 @@
 
 namespace carillon::transient {
 
-/// A node of a surface that may touch.
+/// A node of a contact surface.
 struct TouchNode {
   std::int32_t node = 0;  // of the assembly
   std::int32_t body = 0;
-  double stiffness_n_m = 0;  // of the penalty on this node: kappa E* A / l
-  double reach_m = 0;        // a sheet: half of its thickness, on both sides; a solid: 0
+  double stiffness_n_m = 0;  // penalty on this node: kappa E* A / l
+  double reach_m = 0;        // a sheet: half its thickness, on both sides; a solid: 0
   Vec3 rest_m{};
 };
 
-/// The surfaces of all bodies, the same on every rank.
+/// Surfaces of all bodies, the same on every rank.
 struct TouchSurface {
   std::vector<TouchNode> nodes;                        // ascending by node
   std::vector<std::array<std::int32_t, 3>> triangles;  // into nodes; of a solid counter-clockwise seen from outside
 };
 
-/// The stiffness of the penalty of each node and the rest of a surface, by its triangles (assembly numbers) and the modulus of each body's
-/// material. kappa: docs/equations.md E11.
+/// Penalty stiffness and other data of a surface's nodes, from its triangles (assembly numbers) and the modulus of each body's material.
+/// kappa: docs/equations.md E11.
 TouchSurface make_touch_surface(std::span<const Vec3> rest_m, std::span<const std::array<std::int32_t, 3>> triangles,
                                 std::span<const std::int32_t> body_of_triangle, std::span<const double> modulus_pa,
                                 std::span<const double> reach_m, double kappa);

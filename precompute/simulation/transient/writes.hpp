@@ -1,4 +1,4 @@
-// Where elements add their forces, so that each node's sum has one order on any number of ranks. Inner header of carillon::transient.
+// Write positions of element forces, so that each node's sum has one order on any number of ranks. Internal header of carillon::transient.
 #pragma once
 
 #include <cstdint>
@@ -8,11 +8,11 @@
 
 namespace carillon::transient {
 
-/// Elements of one rank: all that touch a node of its own, in ascending order. Own nodes have the places 0 .. own_nodes - 1, halo nodes
-/// those behind. Any kind of element: solids, triangles of sheets, stencils of edges.
+/// Elements of one rank: all that touch an own node, in ascending order. Own nodes have indices 0 .. own_nodes - 1, halo nodes follow. Any
+/// kind of element: solids, sheet triangles, edge stencils.
 struct ElementNodes {
   std::vector<std::int64_t> begin{0};  // (e + 1) into nodes
-  std::vector<std::int32_t> nodes;     // places
+  std::vector<std::int32_t> nodes;     // indices
 
   void add(const std::int32_t* places, std::size_t count) {
     nodes.insert(nodes.end(), places, places + count);
@@ -21,18 +21,17 @@ struct ElementNodes {
   std::size_t count() const { return begin.size() - 1; }
 };
 
-/// The plan: elements with halo nodes ("outer") are computed last, when the halo has come. Own nodes that share an element with a halo node
-/// get every contribution in a slot of its own, and the sum over the slots in ascending order of the elements at the end. Other own nodes
-/// are touched by elements without halo nodes only, which add to them in ascending order as they are computed. Halo nodes' forces go to an
-/// entry that is not read. One rank: no outer elements, no slots.
+/// Elements with halo nodes ("outer") are computed last, after communication. Own nodes that share an element with a halo node get a slot
+/// per contribution, summed at the end in ascending element order. Other own nodes are touched by inner elements only, which add to them in
+/// ascending order directly. Forces on halo nodes go to an unread entry. One rank: no outer elements, no slots.
 struct WritePlan {
-  std::vector<std::int32_t> writes;        // as ElementNodes::nodes: entries of the array of forces
+  std::vector<std::int32_t> writes;        // as ElementNodes::nodes: force entries
   std::vector<std::int32_t> inner, outer;  // elements, ascending
   std::vector<std::int32_t> summed;        // own nodes with slots
-  std::vector<std::int32_t> slot_begin;    // (summed + 1): slots, which follow each other from first_slot
-  std::int32_t last_slot = 0;              // one behind
+  std::vector<std::int32_t> slot_begin;    // (summed + 1): slots, contiguous from first_slot
+  std::int32_t last_slot = 0;              // one past the end
 
-  /// f[node] += its slots, in their order.
+  /// f[node] += its slots, in order.
   void gather(Quad* f) const;
 };
 

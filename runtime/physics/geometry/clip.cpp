@@ -1,9 +1,9 @@
-// Method: separating axes: the facets of both, and the pairs of edges whose arcs cross on the Gauss map. Where a facet separates best, the
-//   facet opposite is clipped against its sides; where a pair of edges does, it is the touch. Bodies whose nearest features do not face
-//   each other (corner next to corner) are at the closest points of their edges and corners.
+// Method: separating axis test over the facets of both bodies and the edge pairs whose arcs cross on the Gauss map. If a facet separates
+// best, the opposite facet is clipped against its side planes; if an edge pair does, its closest points are the contact. If the nearest
+// features do not face each other (corner next to corner), the closest points of edges and corners are used. Facets are preferred to edges
+// within one degree of them.
 // Source: D. Gregorius, "The separating axis test between convex polyhedra" (GDC 2013); I. Sutherland, G. Hodgman (1974); C. Ericson,
-//   "Real-Time Collision Detection" (2005), 5.1.9.
-// Deviations: facets are preferred to edges that are within a degree of them.
+// "Real-Time Collision Detection" (2005), 5.1.9.
 #include <algorithm>
 #include <cmath>
 
@@ -14,12 +14,12 @@
 namespace carillon::geometry {
 namespace {
 
-constexpr double kPrefer = 1e-5;         // of the size: how much better another axis must be
-constexpr double kFlushCosine = 0.9998;  // cosine of a degree
-constexpr double kSeam = 3e-6;           // m; facets that are so flush have no step between them
-constexpr double kFacetBrim = 1e-5;      // of the size: a corner may stand out so far beyond a facet
+constexpr double kAxisPreferenceRatio = 1e-5;  // fraction of the size: required advantage of another axis
+constexpr double kCoplanarCosine = 0.9998;     // cos(1 degree)
+constexpr double kCoplanarStepM = 3e-6;        // m; facets this flush count as coplanar
+constexpr double kFacetOverhangRatio = 1e-5;   // fraction of the size: permitted overhang of a corner beyond a facet
 
-/// Polyhedron b in the frame of a; a stays as it is.
+/// Polyhedron b in the frame of a.
 struct Turned {
   std::vector<Vec3> corners, normals, arcs;
   std::vector<double> offsets;
@@ -40,10 +40,10 @@ double find_min(const std::vector<Vec3>& points, const Vec3& n) {
 
 struct Vertex {
   Vec3 x{};
-  int corner = -1;           // of the facet that is clipped,
-  int edge = -1, side = -1;  // or its edge, and a side of the other facet,
+  int corner = -1;           // corner of the clipped facet,
+  int edge = -1, side = -1;  // or its edge and a side plane of the other facet,
   int other_corner = -1;     // or a corner of the other facet
-  int along = 0;             // the segment to the next: edge e of its body, or -1 - side
+  int along = 0;             // segment to the next point: edge e of its body, or -1 - side
 };
 
 class Pair {
@@ -64,7 +64,7 @@ class Pair {
     }
   }
 
-  /// The gap along one axis; a quick look at the one of last time.
+  /// Gap along one axis; used to retest the axis of the previous search.
   double calc_gap(int kind, int i) const {
     return kind == 0 ? find_min(t_.corners, a_.normals[i]) - a_.offsets_m[i] : find_min(a_.corners, t_.normals[i]) - t_.offsets[i];
   }
@@ -81,18 +81,19 @@ class Pair {
     return best;
   }
 
-  /// Facets in whose plane a facet of the other body lies, back to front. Along them the bodies pass each other, or one lies on the other:
-  /// they do not meet across, however near they come.
+  /// Facets coplanar with a back-to-back facet of the other body. Such bodies slide along these planes or rest on them; they have no
+  /// contact across them.
   std::vector<Axis> find_seams() const {
     std::vector<Axis> seams;
     for (const int kind : {0, 1}) {
       const std::vector<Vec3>&mine = kind == 0 ? a_.normals : t_.normals, &theirs = kind == 0 ? t_.normals : a_.normals;
       for (std::size_t i = 0; i < mine.size(); ++i) {
         const double gap = calc_gap(kind, static_cast<int>(i));
-        if (std::abs(gap) > kSeam) continue;
+        if (std::abs(gap) > kCoplanarStepM) continue;
         const Vec3 normal = kind == 0 ? -1.0 * mine[i] : mine[i];
-        if (std::any_of(seams.begin(), seams.end(), [&](const Axis& other) { return dot(other.normal, normal) > kFlushCosine; })) continue;
-        if (std::any_of(theirs.begin(), theirs.end(), [&](const Vec3& n) { return dot(n, mine[i]) < -kFlushCosine; }))
+        if (std::any_of(seams.begin(), seams.end(), [&](const Axis& other) { return dot(other.normal, normal) > kCoplanarCosine; }))
+          continue;
+        if (std::any_of(theirs.begin(), theirs.end(), [&](const Vec3& n) { return dot(n, mine[i]) < -kCoplanarCosine; }))
           seams.push_back({gap, kind, static_cast<int>(i), -1, normal});
       }
     }
@@ -107,7 +108,7 @@ class Pair {
       const Vec3 &na0 = a_.normals[ea.facets[0]], &na1 = a_.normals[ea.facets[1]];
       for (std::size_t j = 0; j < b_.edges.size(); ++j) {
         const Polyhedron::Edge& eb = b_.edges[j];
-        // The arc from na0 to na1 and that from -nb0 to -nb1 cross.
+        // Arcs (na0, na1) and (-nb0, -nb1) intersect.
         const Vec3 &nb0 = t_.normals[eb.facets[0]], &nb1 = t_.normals[eb.facets[1]];
         const double c = dot(nb0, ea.arc), d = dot(nb1, ea.arc);
         if (c * d >= 0.0) continue;
@@ -117,7 +118,7 @@ class Pair {
         const double length2 = norm2(n);
         if (length2 < 1e-6 * norm2(ea.arc) * norm2(t_.arcs[j])) continue;
         n = (1.0 / std::sqrt(length2)) * n;
-        if (dot(n, na0 + na1) > 0.0) n = -1.0 * n;  // from b to a: against the outside of a
+        if (dot(n, na0 + na1) > 0.0) n = -1.0 * n;  // from b to a
         const double gap = dot(n, a_.corners[ea.corners[0]] - t_.corners[eb.corners[0]]);
         if (gap > best.gap) best = {gap, 2, static_cast<int>(i), static_cast<int>(j), n};
       }
@@ -126,7 +127,7 @@ class Pair {
   }
 
   void clip(const Axis& axis, double margin, std::vector<Touch>& out) const {
-    const bool on_a = axis.kind == 0;  // the facet that stays
+    const bool on_a = axis.kind == 0;  // reference facet
     const Polyhedron &mine = on_a ? a_ : b_, &theirs = on_a ? b_ : a_;
     const std::vector<Vec3>&my_corners = on_a ? a_.corners : t_.corners, &their_corners = on_a ? t_.corners : a_.corners;
     const std::vector<Vec3>& their_normals = on_a ? t_.normals : a_.normals;
@@ -152,7 +153,7 @@ class Pair {
       next.clear();
       for (std::size_t i = 0; i < polygon.size(); ++i) {
         const Vertex &here = polygon[i], &there = polygon[(i + 1) % polygon.size()];
-        const double s = dot(out_of, here.x - p), t = dot(out_of, there.x - p), brim = kFacetBrim * size_;
+        const double s = dot(out_of, here.x - p), t = dot(out_of, there.x - p), brim = kFacetOverhangRatio * size_;
         if (s <= brim) next.push_back(here);
         if ((s <= brim) == (t <= brim)) continue;
         Vertex v;
@@ -221,7 +222,7 @@ class Pair {
     out.push_back(t);
   }
 
-  /// The closest points of two bodies whose nearest features are edges or corners that do not face each other.
+  /// Closest points of bodies whose nearest features are edges or corners that do not face each other.
   void find_closest(double margin, std::vector<Touch>& out) const {
     double min = margin * margin;
     Vec3 at_a{}, at_b{};
@@ -290,14 +291,14 @@ void find_polyhedra_touches(const Shape& a, const Frame& fa, const Shape& b, con
     memory.axis = {1, on_b.i};
     return;
   }
-  const double prefer = kPrefer * pair.size();
+  const double prefer = kAxisPreferenceRatio * pair.size();
   const bool was_b = memory.axis[0] == 1;
   Axis facet = on_b.gap > on_a.gap + (was_b ? -prefer : prefer) ? on_b : on_a;
   memory.axis = {facet.kind, facet.i};
   if (facet.gap > 0.0) {
     const std::vector<Axis> seams = pair.find_seams();
-    if (seams.size() > 1) return;  // edge to edge, they pass
-    if (seams.size() == 1 && dot(seams.front().normal, facet.normal) < kFlushCosine) {
+    if (seams.size() > 1) return;  // edge to edge: sliding past
+    if (seams.size() == 1 && dot(seams.front().normal, facet.normal) < kCoplanarCosine) {
       pair.clip(seams.front(), margin, out);
       reduce(out, Box::kFar);
       return;
@@ -305,12 +306,12 @@ void find_polyhedra_touches(const Shape& a, const Frame& fa, const Shape& b, con
   }
   const Axis edges = pair.find_edge_axis();
   if (edges.gap > margin) return;
-  const bool crossed = edges.i >= 0 && edges.gap > facet.gap + prefer && dot(edges.normal, facet.normal) < kFlushCosine;
+  const bool crossed = edges.i >= 0 && edges.gap > facet.gap + prefer && dot(edges.normal, facet.normal) < kCoplanarCosine;
   if (!crossed) pair.clip(facet, margin, out);
   if (out.empty() && edges.i >= 0 && (crossed || edges.gap > facet.gap - prefer)) pair.cross_edges(edges, out);
   double min = margin;
   for (const Touch& t : out) min = std::min(min, t.gap_m);
-  // Apart, and the facets do not face each other where they are nearest.
+  // Separated, and the nearest facets do not face each other.
   if (out.empty() || (facet.gap > 0.0 && !crossed && min > facet.gap + prefer)) pair.find_closest(out.empty() ? margin : min - prefer, out);
   reduce(out, Box::kFar);
 }

@@ -1,4 +1,5 @@
-// Method: pairs of ridges by two trees; two cross where their lines are nearest within both and their arcs on the Gauss map meet.
+// Method: ridge pairs by two trees; a pair crosses if the closest points of its lines lie within both and its arcs on the Gauss map
+// intersect.
 // Source: D. Gregorius, "The separating axis test between convex polyhedra" (GDC 2013).
 #include <array>
 #include <cmath>
@@ -9,8 +10,8 @@
 namespace carillon::geometry {
 namespace {
 
-constexpr double kEnd = 1e-6;   // of an edge: overlap of consecutive edges
-constexpr double kEdge = 1e-3;  // rad; the edges of two faces that lie on each other cross as well
+constexpr double kEdgeOverlapRatio = 1e-6;  // fraction of an edge: overlap of consecutive edges
+constexpr double kArcToleranceRad = 1e-3;   // rad; includes edges of faces that lie on each other
 
 }  // namespace
 
@@ -25,12 +26,12 @@ void cross_ridges(const Shape& a, const Frame& fa, const Shape& b, const Frame& 
     const double dd = norm2(d), ee = norm2(e), de = dot(d, e), det = dd * ee - de * de;
     if (det < 1e-6 * dd * ee) return;
     const double s = (de * dot(e, r) - ee * dot(d, r)) / det, t = (dd * dot(e, r) - de * dot(d, r)) / det;
-    if (s < -kEnd || s > 1.0 + kEnd || t < -kEnd || t > 1.0 + kEnd) return;
+    if (s < -kEdgeOverlapRatio || s > 1.0 + kEdgeOverlapRatio || t < -kEdgeOverlapRatio || t > 1.0 + kEdgeOverlapRatio) return;
     Vec3 n = normalise(cross(d, e));
     if (dot(n, rb.into[0] + rb.into[1]) > 0.0) n = -1.0 * n;  // outward of b
     const Vec3 on_a = ra.begin + s * (ra.end - ra.begin), on_b = q + t * e, m = turn_back(fa.rotation, fb.rotation * n);
     for (const int k : {0, 1})
-      if (dot(n, find_into(b, rb, k, on_b)) > kEdge || dot(m, find_into(a, ra, k, on_a)) < -kEdge) return;
+      if (dot(n, find_into(b, rb, k, on_b)) > kArcToleranceRad || dot(m, find_into(a, ra, k, on_a)) < -kArcToleranceRad) return;
     const double gap = dot(n, r + s * d - t * e);
     if (gap > reach || -gap > std::min(deepest, 0.5 * std::sqrt(std::min(dd, ee)))) return;
     Touch touch;

@@ -9,7 +9,7 @@ double calc_skin_gap(const Shape& shape, const Vec3& x, const Nearest& at, bool 
   const Mesh& mesh = shape.mesh();
   const auto calc_height = [&](int face, const Vec3& w) { return dot(skin.calc_normal(face, w), x - skin.calc_point(face, w)); };
   double gap = skin.is_flat(at.face) ? (is_inside ? -1.0 : 1.0) * std::sqrt(at.distance2) : calc_height(at.face, at.weights);
-  // Next to a round hole the mesh stands out of the skin: inside is what is under both sides of its edge.
+  // At round holes the mesh protrudes from the skin: inside means below both sides of the edge.
   for (int e = 3 * at.face; e < 3 * at.face + 3 && gap < 0.0; ++e) {
     const int other = mesh.opposite[e] / 3;
     if (skin.is_sharp(e) && !skin.is_flat(other) && mesh.is_convex(e))
@@ -31,7 +31,7 @@ Facing describe(const Mesh& mesh, const Skin& skin, const Nearest& at) {
   if (zeros == 2) {
     const int v = mesh.vertex_of(3 * at.face + whole);
     if (skin.kind(v) == VertexKind::corner) return {Side::point, {}, v};
-    // Amid an edge: along the sharp edge that leaves it.
+    // Point within an edge: follow the sharp edge.
     for (int e = 3 * at.face + whole;;) {
       if (skin.is_sharp(e)) return {Side::line, normalise(mesh.vertices[mesh.vertex_of(Mesh::next(e))] - mesh.vertices[v]), v};
       e = Mesh::next(mesh.opposite[e]);

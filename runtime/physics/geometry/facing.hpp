@@ -1,4 +1,4 @@
-// Distances of places to the surface of a body, and its features at the nearest place.
+// Distance from a point to the surface of a body, and the surface feature at the nearest point.
 #pragma once
 
 #include <algorithm>
@@ -13,10 +13,10 @@
 
 namespace carillon::geometry {
 
-/// Gap of x over the skin [m], from the nearest place of the mesh; negative: inside.
+/// Gap of x over the skin [m], from the nearest point of the mesh; negative inside.
 double calc_skin_gap(const Shape& shape, const Vec3& x, const Nearest& at, bool is_inside);
 
-/// Distances of places to the surface of a body, in its own frame.
+/// Distances from points to the surface of a body, in the body frame.
 class SurfaceProbe {
  public:
   explicit SurfaceProbe(const Shape& shape) : shape_(shape), body_(shape.polyhedron()) {
@@ -27,12 +27,12 @@ class SurfaceProbe {
     thin_ = wall_m_ < kThinCells * grid_->get_cell_m();
   }
 
-  /// No face is nearer than this.
+  /// Lower bound of the distance to the surface.
   double find_bound(const Vec3& x) const { return body_ != nullptr ? find_outside(x) : grid_->find_near(x).min_m; }
-  /// Signed, good enough to compare neighbours; beyond `limit_m` a bound.
+  /// Approximate signed distance, accurate enough to compare neighbours; a bound beyond `limit_m`.
   double estimate(const Vec3& x, double limit_m) const {
     if (body_ != nullptr) {
-      int outside = 0;  // facets with x outside: with two of them x is next to an edge or a corner
+      int outside = 0;  // facets with x outside; two or more: x is next to an edge or a corner
       for (std::size_t i = 0; i < body_->normals.size() && outside < 2; ++i)
         outside += dot(body_->normals[i], x) > body_->offsets_m[i] ? 1 : 0;
       return outside < 2 ? find_outside(x) : std::sqrt(shape_.mesh().find_nearest(x, Box::kFar, -1).distance2);
@@ -42,10 +42,10 @@ class SurfaceProbe {
     const auto [on, is_inside] = find_side(x, near.face);
     return (is_inside ? -1.0 : 1.0) * std::sqrt(on.distance2);
   }
-  /// The same, but behind a thin wall a bound.
+  /// estimate(), but only a bound behind a thin wall.
   double find_distance(const Vec3& x, double limit_m) const { return thin_ ? find_bound(x) : estimate(x, limit_m); }
   bool is_thin() const { return thin_; }
-  /// Gap over the skin; beyond `limit_m` a bound of it, also after movements shorter than the excess.
+  /// Gap over the skin; beyond `limit_m` a bound that also holds after movements shorter than the excess.
   double calc_gap(const Vec3& x, double limit_m) const {
     if (body_ != nullptr) return find_outside(x);
     const double sag = shape_.get_sag_m(), far = std::max(limit_m, 0.0) + sag;
@@ -60,7 +60,7 @@ class SurfaceProbe {
   }
 
  private:
-  /// The nearest place, by way of a near face, and true for x inside.
+  /// Nearest point, searched from a nearby face, and true for x inside.
   std::pair<Nearest, bool> find_side(const Vec3& x, int face) const {
     const Mesh& mesh = shape_.mesh();
     const Nearest on = mesh.walk_nearest(x, face);
@@ -74,7 +74,7 @@ class SurfaceProbe {
     for (std::size_t i = 0; i < body_->normals.size(); ++i) max = std::max(max, dot(body_->normals[i], x) - body_->offsets_m[i]);
     return max;
   }
-  static constexpr double kThinCells = 4;  // cells of a thin wall: a node of the grid may look to its far side
+  static constexpr double kThinCells = 4;  // cells; in thinner walls a grid node may refer to the far side
 
   const Shape& shape_;
   const Polyhedron* body_ = nullptr;
@@ -83,16 +83,16 @@ class SurfaceProbe {
   double wall_m_ = 0.0;
 };
 
-/// Feature of a skin at a place: a plane or curved part, an edge, a corner.
+/// Feature of a skin at a point: plane or curved part, edge or corner.
 struct Facing {
   Side side = Side::plane;
   Vec3 axis{};  // normal of a plane, direction of a line
   int vertex = -1;
 };
 Facing describe(const Mesh& mesh, const Skin& skin, const Nearest& at);
-/// Outward normal of a face at its place nearest to x, on a curved face that of the skin.
+/// Outward normal of a face at its point nearest to x; on a curved face the normal of the skin.
 Vec3 find_normal(const Shape& shape, int face, const Vec3& x);
-/// Ridge::into at a place of the ridge, in the tangent plane of a curved side.
+/// Ridge::into at a point of the ridge, in the tangent plane of a curved side.
 Vec3 find_into(const Shape& shape, const Ridge& ridge, int side, const Vec3& x);
 
 }  // namespace carillon::geometry

@@ -1,14 +1,14 @@
-// Method: convex polyhedra by clipping. Of any other pair a pass in each direction (pass.hpp), then ridges against ridges. Candidates and
-//   near samples are kept with a slack: a distance changes by no more than the movement of the pair.
+// Method: convex polyhedra by clipping; other pairs by one pass in each direction (pass.hpp), then ridges against ridges. Candidates and
+// near samples are cached with a slack: a distance changes by at most the relative movement of the pair.
 #include "runtime/physics/geometry/pass.hpp"
 #include "runtime/physics/geometry/reduce.hpp"
 
 namespace carillon::geometry {
 namespace {
 
-constexpr double kNear = 0.01;  // of the size of the smaller body: movement for which the near samples are kept
+constexpr double kNearMovementRatio = 0.01;  // fraction of the smaller body's size: movement for which near samples stay valid
 
-/// The same touch seen from the other body.
+/// Swaps the sides of a touch.
 void turn_round(Touch& t) {
   t.normal = -1.0 * t.normal;
   std::swap(t.station_a, t.station_b);
@@ -19,7 +19,7 @@ void turn_round(Touch& t) {
   t.id ^= static_cast<std::uint64_t>(Feature::corner_a) << 56 ^ static_cast<std::uint64_t>(Feature::corner_b) << 56;
 }
 
-/// Renews the near samples if `wanted` and the movement since then exceed their reach. Returns that movement.
+/// Updates the near samples if `wanted` and the movement since the last update exceed their reach. Returns that movement.
 double update_near(const Shape& a, const Frame& fa, const Shape& b, const Frame& fb, double wanted, NearSamples& near) {
   const Frame relative = calc_relative(fa, fb);
   if (near.known) {
@@ -28,7 +28,7 @@ double update_near(const Shape& a, const Frame& fa, const Shape& b, const Frame&
   }
   near.known = true;
   near.pose = relative;
-  near.reach_m = std::max(wanted, near.wanted_m) + kNear * std::min(a.get_size_m(), b.get_size_m());
+  near.reach_m = std::max(wanted, near.wanted_m) + kNearMovementRatio * std::min(a.get_size_m(), b.get_size_m());
   std::vector<Touch> none;
   Pass(a, fa, b, fb, 0.0, none).list(near.reach_m, near.samples[0]);
   Pass(b, fb, a, fa, 0.0, none).list(near.reach_m, near.samples[1]);
@@ -44,7 +44,7 @@ double update_near(const Shape& a, const Frame& fa, const Shape& b, const Frame&
 void find_candidates(const Shape& a, const Frame& fa, const Shape& b, const Frame& fb, double reach, NearSamples& near,
                      std::vector<Touch>& out) {
   static thread_local Distances distances_a, distances_b;
-  // A body that is curved all over and not much larger than the other finds everything itself: its samples are dense enough.
+  // An entirely curved body that is not much larger than the other has dense enough samples for a one-sided search.
   const bool a_alone = a.skin().is_all_curved() && a.get_size_m() < 2.0 * b.get_size_m();
   const bool b_alone = b.skin().is_all_curved() && b.get_size_m() < 2.0 * a.get_size_m();
   const bool a_first = a.samples().samples.size() <= b.samples().samples.size();
@@ -106,7 +106,7 @@ void find_touches(const Shape& a, const Frame& fa, const Shape& b, const Frame& 
   const double size = std::min(a.get_size_m(), b.get_size_m());
   begin_search(memory, pose, fa, fb, margin, size);
   find_candidates(a, fa, b, fb, memory.reach_m, memory.near, memory.candidates);
-  thin(memory.candidates, 0.02 * size, kPatch * size);
+  thin(memory.candidates, 0.02 * size, kPatchDistanceRatio * size);
   answer(a, fa, &b, fb, margin, memory, out);
 }
 

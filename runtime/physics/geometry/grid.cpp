@@ -1,22 +1,21 @@
-// Method: nodes in bricks of 4^3 near the surface keep a distance and a near face, other bricks the distance of their middle. A distance
-//   changes by no more than the way, so both give a bound that holds everywhere. The search at a node begins with the face of the node
-//   before.
-// Deviations: the grid only finds; distances and signs come from the mesh, so that walls thinner than a cell are safe.
+// Method: bricks of 4^3 nodes near the surface store a distance and a nearby face per node, other bricks the distance of their centre. A
+// distance changes by at most the distance moved, so both give bounds that hold everywhere. The search at a node starts from the face of
+// the previous node. The grid is only used for searches; distances and signs come from the mesh, so walls thinner than a cell are handled.
 #include "runtime/physics/geometry/grid.hpp"
 
 namespace carillon::geometry {
 namespace {
 
-constexpr double kCells = 48.0;  // along the longest side
-constexpr double kBand = 1.5;    // cells about the surface with nodes
-constexpr double kSlack = 0.25;  // cells: how exact the distances are
+constexpr double kGridCells = 48.0;           // along the longest side
+constexpr double kBandCells = 1.5;            // cells; width of the band of nodes about the surface
+constexpr double kDistanceErrorCells = 0.25;  // cells; accuracy of the distances
 constexpr double kRoundDown = 1.0 - 1e-6;
 
 }  // namespace
 
 Grid::Grid(const Mesh& mesh) : box_(mesh.box) {
   const Vec3 side = box_.high - box_.low;
-  cell_m_ = std::max({side[0], side[1], side[2]}) / kCells;
+  cell_m_ = std::max({side[0], side[1], side[2]}) / kGridCells;
   const double brick = kBrick * cell_m_, half = 0.5 * std::sqrt(3.0) * brick;
   for (int k = 0; k < 3; ++k) {
     bricks_along_[k] = static_cast<int>(std::ceil((side[k] + 2.0 * cell_m_) / brick));
@@ -24,9 +23,9 @@ Grid::Grid(const Mesh& mesh) : box_(mesh.box) {
   }
   int face = 0;
   const auto measure = [&](const Vec3& x) {
-    const Nearest nearest = mesh.find_nearest(x, Box::kFar, face, kSlack * cell_m_);
+    const Nearest nearest = mesh.find_nearest(x, Box::kFar, face, kDistanceErrorCells * cell_m_);
     face = nearest.face;
-    return kRoundDown * (std::sqrt(nearest.distance2) - kSlack * cell_m_);
+    return kRoundDown * (std::sqrt(nearest.distance2) - kDistanceErrorCells * cell_m_);
   };
   for (int i = 0; i < bricks_along_[0]; ++i) {
     for (int j = 0; j < bricks_along_[1]; ++j) {
@@ -34,12 +33,12 @@ Grid::Grid(const Mesh& mesh) : box_(mesh.box) {
         const Vec3 corner = low_ + Vec3{i * brick, j * brick, k * brick};
         Brick b;
         b.distance_m = static_cast<float>(measure(corner + Vec3{0.5 * brick, 0.5 * brick, 0.5 * brick}));
-        if (b.distance_m < half + kBand * cell_m_) {
+        if (b.distance_m < half + kBandCells * cell_m_) {
           b.first = static_cast<std::int32_t>(nodes_.size());
           for (int l = 0; l < kBrick; ++l) {
             for (int m = 0; m < kBrick; ++m) {
               for (int o = 0; o < kBrick; ++o) {
-                const int n = m % 2 == 0 ? o : kBrick - 1 - o;  // there and back, so that each node is next to the one before
+                const int n = m % 2 == 0 ? o : kBrick - 1 - o;  // serpentine order: consecutive nodes are neighbours
                 const Vec3 x = corner + cell_m_ * Vec3{l + 0.5, m + 0.5, n + 0.5};
                 const double distance = measure(x);
                 const std::size_t at = b.first + (l * kBrick + m) * kBrick + n;

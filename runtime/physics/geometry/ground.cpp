@@ -1,5 +1,5 @@
-// Method: corners of a polyhedron by their height; of any other body the samples nearer than the margin, those of them that no neighbour is
-//   lower than, each moved to the lowest place of the skin about it.
+// Method: corners of a polyhedron by height; for other bodies the samples within the margin that are local minima, each moved to the lowest
+// point of the skin around it.
 #include "runtime/physics/geometry/mesh.hpp"
 #include "runtime/physics/geometry/polyhedron.hpp"
 #include "runtime/physics/geometry/reduce.hpp"
@@ -9,7 +9,7 @@
 namespace carillon::geometry {
 namespace {
 
-constexpr double kFacesDown = -0.7;  // vertical part of the normal of a facet whose corners may all touch the ground
+constexpr double kMaxDownNormal = -0.7;  // vertical component of the normal of a facet whose corners may all touch the ground
 
 Touch make_ground_touch(const Shape& a, const Frame& fa, const Vec3& x, double height) {
   Touch t;
@@ -24,19 +24,19 @@ Touch make_ground_touch(const Shape& a, const Frame& fa, const Vec3& x, double h
   return t;
 }
 
-/// No neighbour of the sample is lower.
+/// True if no neighbour of the sample is lower.
 bool is_lowest(const Shape& a, const Sample& sample, const Vec3& up) {
   if (sample.kind != VertexKind::smooth) return carries(a.mesh(), sample.vertex, up);
   const Samples& s = a.samples();
   const double h = dot(up, sample.point);
   for (int k = 0; k < sample.neighbours; ++k) {
     const Vec3& x = s.samples[s.neighbours[sample.first_neighbour + k]].point;
-    if (dot(up, x) - h < -kFlat * norm(x - sample.point)) return false;
+    if (dot(up, x) - h < -kFlatPatchSlope * norm(x - sample.point)) return false;
   }
   return true;
 }
 
-/// The touches of a sample: at it, or where the skin about it is lowest.
+/// Touches of a sample: at the sample, or at the lowest point of the skin around it.
 void add_candidates(const Shape& a, const Frame& fa, double height, double margin, const Sample& sample, std::vector<Touch>& out) {
   Touch t = make_ground_touch(a, fa, sample.point, height);
   t.id = make_id(Feature::corner_a, sample.vertex, 0);
@@ -56,13 +56,13 @@ void add_candidates(const Shape& a, const Frame& fa, double height, double margi
       out.push_back(before);
     }
     if (settled) {
-      settle(t, a, fa, nullptr, fa, reach);  // the spring's centre is now there
+      settle(t, a, fa, nullptr, fa, reach);  // centres the spring at the current point
     } else {
-      // Falling on beyond its reach: of another sample, unless the skin about it is nearly parallel to the ground.
+      // Still descending at the end of the reach: belongs to another sample, unless the skin is nearly parallel to the ground.
       t = before;
       settle(t, a, fa, nullptr, fa, reach);
       const Spot spot = a.skin().locate(t.station_a, t.face_a);
-      if (norm(a.skin().calc_normal(spot.face, spot.weights) + fa.rotation[2]) > kFlush) return;
+      if (norm(a.skin().calc_normal(spot.face, spot.weights) + fa.rotation[2]) > kParallelSlope) return;
     }
   }
   if (t.gap_m <= margin) out.push_back(t);
@@ -70,7 +70,7 @@ void add_candidates(const Shape& a, const Frame& fa, double height, double margi
 
 void find_candidates(const Shape& a, const Frame& fa, double height, double margin, std::vector<Touch>& out) {
   const Samples& s = a.samples();
-  const Vec3& up = fa.rotation[2];  // of the world, in the frame of a
+  const Vec3& up = fa.rotation[2];  // world axis in the frame of a
   const double below = height + margin - fa.position_m[2];
   for_near(
       s.sample_tree, [&](const Ball& ball) { return dot(up, ball.middle) - ball.radius_m > below; },
@@ -84,7 +84,7 @@ void find_candidates(const Shape& a, const Frame& fa, double height, double marg
 
 Touch make_ground_touch(const Shape& a, const Frame& fa, double height, int vertex) {
   Touch t = make_ground_touch(a, fa, a.mesh().vertices[vertex], height);
-  t.id = make_id(Feature::corner_a, vertex, a.is_polyhedron() ? 0 : kDeepest);
+  t.id = make_id(Feature::corner_a, vertex, a.is_polyhedron() ? 0 : kMissedTouchId);
   t.curvature_a_per_m = calc_vertex_curvature(a, vertex);
   return t;
 }
@@ -95,7 +95,7 @@ bool carries(const Mesh& mesh, int vertex, const Vec3& normal) {
   do {
     const Vec3 d = mesh.vertices[mesh.vertex_of(Mesh::next(e))] - mesh.vertices[vertex];
     const double h = dot(d, normal);
-    if (h < 0.0 && h * h > kFlat * kFlat * norm2(d)) return false;
+    if (h < 0.0 && h * h > kFlatPatchSlope * kFlatPatchSlope * norm2(d)) return false;
     e = Mesh::next(mesh.opposite[e]);
   } while (e != start);
   return true;
@@ -111,7 +111,7 @@ Frame calc_relative(const Frame& a, const Frame& b) {
 
 double calc_way(const Frame& from, const Frame& to, const Shape& a) {
   double turned = 0.0;
-  Vec3 moved = to.position_m - from.position_m, swept{};  // of the middle; of a corner of the box about it, at most
+  Vec3 moved = to.position_m - from.position_m, swept{};  // of the centre; upper bound for the corners of the bounding box
   const Vec3 half = 0.5 * (a.mesh().box.high - a.mesh().box.low);
   for (int i = 0; i < 3; ++i) {
     const Vec3 row = to.rotation[i] - from.rotation[i];
@@ -165,7 +165,7 @@ bool answer(const Shape& a, const Frame& fa, const Shape* b, const Frame& fb, do
     out.push_back(candidate);
     if (out.back().gap_m > margin) out.pop_back();
   }
-  if (moved) thin(out, 0.02 * size, kPatch * size);
+  if (moved) thin(out, 0.02 * size, kPatchDistanceRatio * size);
   name(out, 0.1 * size, memory);
   return true;
 }
@@ -178,7 +178,7 @@ void find_ground_touches(const Shape& a, const Frame& fa, double height, double 
     std::vector<char> faces_down;
     if (with_all) faces_down.assign(body->corners.size(), 0);
     for (std::size_t f = 0; f < body->loops.size() && with_all; ++f)
-      if (dot(fa.rotation[2], body->normals[f]) < kFacesDown)
+      if (dot(fa.rotation[2], body->normals[f]) < kMaxDownNormal)
         for (const int c : body->loops[f]) faces_down[c] = 1;
     for (std::size_t c = 0; c < body->corners.size(); ++c) {
       const double h = dot(fa.rotation[2], body->corners[c]) + fa.position_m[2] - height;
@@ -189,12 +189,12 @@ void find_ground_touches(const Shape& a, const Frame& fa, double height, double 
     reduce(out, Box::kFar);
     return;
   }
-  // Sideways and about the vertical nothing changes, but stations do.
+  // Horizontal translation and yaw change stations only.
   const Frame pose{{Vec3{}, Vec3{}, fa.rotation[2]}, {0.0, 0.0, fa.position_m[2] - height}};
   if (recall(memory, pose, a, margin) && answer(a, fa, nullptr, fa, margin, memory, out)) return;
   begin_search(memory, pose, fa, fa, margin, a.get_size_m());
   find_candidates(a, fa, height, memory.reach_m, memory.candidates);
-  thin(memory.candidates, a.samples().spacing_m, kPatch * a.get_size_m());
+  thin(memory.candidates, a.samples().spacing_m, kPatchDistanceRatio * a.get_size_m());
   answer(a, fa, nullptr, fa, margin, memory, out);
 }
 

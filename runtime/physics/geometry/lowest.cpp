@@ -1,5 +1,6 @@
-// Method: the tree of vertices, the lower of two balls first; of a polyhedron all corners. For the directions of a cell few vertices can be
-//   lowest: those no higher than the lowest vertex and than their neighbours along its middle by the angle of the cell times the distance.
+// Method: tree of vertices, the lower ball first; all corners of a polyhedron. Candidates of a direction cell are the vertices that are,
+// along the central direction of the cell, higher than the lowest vertex and than their neighbours by at most the cell's angle times the
+// distance.
 #include "runtime/physics/geometry/lowest.hpp"
 
 #include <limits>
@@ -14,9 +15,9 @@
 namespace carillon::geometry {
 namespace {
 
-constexpr double kRounding = 1e-9;  // of the distance: rounding
+constexpr double kRounding = 1e-9;  // relative to the distance
 
-/// The vertex that is lowest along `up` (mesh frame), and its height.
+/// Lowest vertex along `up` (mesh frame), and its height.
 std::pair<int, double> find_lowest_vertex(const Mesh& mesh, const Samples& s, const Vec3& up) {
   std::pair<int, double> lowest{-1, std::numeric_limits<double>::infinity()};
   std::vector<int> open{0};
@@ -48,7 +49,7 @@ LowVertices::Cell LowVertices::find_cell(const Vec3& up) {
   return cell;
 }
 
-/// A unit direction of a cell, from (0, 0) at one corner to (1, 1) at the opposite one.
+/// Unit direction within a cell, from (0, 0) at one corner to (1, 1) at the opposite one.
 Vec3 LowVertices::make_way(const Cell& cell, double x, double y) {
   Vec3 way{};
   way[cell.axis] = cell.sign > 0 ? 1.0 : -1.0;
@@ -61,7 +62,7 @@ void LowVertices::fill(const Shape& shape, const Cell& cell, std::vector<int>& l
   const Mesh& mesh = shape.mesh();
   const Samples& s = shape.samples();
   const Vec3 middle = make_way(cell, 0.5, 0.5);
-  double lean = 0.0;  // largest distance of a unit direction of the cell from the middle
+  double lean = 0.0;  // largest distance between a unit direction of the cell and its central one
   for (const double x : {0.0, 1.0})
     for (const double y : {0.0, 1.0}) lean = std::max(lean, norm(make_way(cell, x, y) - middle) + kRounding);
   const auto [lowest, height] = find_lowest_vertex(mesh, s, middle);

@@ -1,4 +1,4 @@
-// The lowest vertex of a body that turns: candidates by direction.
+// Lowest vertex of a rotating body: candidates by direction.
 #pragma once
 
 #include <array>
@@ -11,19 +11,19 @@ namespace carillon::geometry {
 
 class Shape;
 
-/// For each cell of directions (a square on a face of a cube) the vertices of a mesh that may be lowest along one of them, found when a
-/// direction of the cell is first asked for. The answer is that of a search of all vertices.
+/// For each cell of directions (a square on a face of a cube) the vertices of a mesh that may be lowest along one of them, computed on
+/// first use. The result equals that of a search of all vertices.
 class LowVertices {
  public:
-  /// The vertex that is lowest along `up` (mesh frame), and its height. Always of the same shape.
+  /// Lowest vertex along `up` (mesh frame), and its height. All calls must pass the same shape.
   std::pair<int, double> find(const Shape& shape, const Vec3& up);
   /// All vertices that may be lowest along a direction in the cell of `up`.
   const std::vector<int>& list(const Shape& shape, const Vec3& up);
 
  private:
-  static constexpr int kSide = 16;  // cells along an edge of the cube
+  static constexpr int kSide = 16;  // cells along a cube edge
   struct Cell {
-    int axis = 0, sign = 0;  // of the face of the cube: sign 1 on the positive side
+    int axis = 0, sign = 0;  // cube face: axis, and 1 on its positive side
     std::array<int, 2> rows{};
   };
 

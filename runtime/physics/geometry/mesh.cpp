@@ -1,5 +1,5 @@
-// Method: half-edges are paired and checked; vertices with several fans are split; the tree halves the faces at the median of their
-//   middles along the longest side of their box, down to four. Nearest places by branch and bound from a hint.
+// Method: half-edges are paired and checked; vertices with several fans are split; the tree splits faces at the median centroid along the
+// longest side of their box, down to four per leaf. Nearest points by branch and bound from a hint.
 // Source: C. Ericson, "Real-Time Collision Detection" (2005), 5.1.5, 6.1; sign by angle-weighted pseudo-normals: J. A. Baerentzen,
 //   H. Aanaes, "Signed distance computation using the angle weighted pseudonormal" (2005).
 #include "runtime/physics/geometry/mesh.hpp"
@@ -16,7 +16,7 @@ namespace carillon::geometry {
 namespace {
 
 constexpr int kLeaf = 4;
-constexpr double kSame = 1e-13;  // relative: distances that are equal
+constexpr double kSame = 1e-13;  // relative: distances counted as equal
 
 void check_input(std::span<const Vec3> vertices, std::span<const Triangle> triangles) {
   if (triangles.empty()) throw InputError("its bank has no surface triangles; make the bank again");
@@ -67,7 +67,7 @@ Mesh::Mesh(std::span<const Vec3> given_vertices, std::span<const Triangle> trian
   check_input(given_vertices, triangles);
   faces.assign(triangles.begin(), triangles.end());
   opposite = find_opposites(faces, given_vertices.size());
-  // A vertex for each fan of faces about a given one.
+  // One vertex per fan of faces.
   std::vector<std::int32_t> fan(3 * faces.size(), -1);
   std::vector<std::array<std::int32_t, 3>> renumbered(faces.size());
   for (std::size_t start = 0; start < fan.size(); ++start) {
@@ -78,7 +78,7 @@ Mesh::Mesh(std::span<const Vec3> given_vertices, std::span<const Triangle> trian
     for (std::size_t e = start; fan[e] < 0;) {
       fan[e] = v;
       renumbered[e / 3][e % 3] = v;
-      e = next(opposite[e]);  // the next about the vertex, clockwise
+      e = next(opposite[e]);  // next half-edge about the vertex, clockwise
     }
   }
   faces = std::move(renumbered);
@@ -212,14 +212,14 @@ Nearest Mesh::walk_nearest(const Vec3& x, int face) const {
       const Nearest beyond = find_nearest_on_face(x, f);
       if (beyond.distance2 < better.distance2) better = beyond;
     };
-    // A face beyond has a nearer place only where its corner is less than a right angle from the way to x.
+    // A neighbouring face can only be nearer if the angle at its corner to the direction of x is below a right angle.
     const auto leads = [&](int half_edge) { return dot(out, vertices[vertex_of(half_edge)] - best.place) > 0.0; };
     if (zeros == 1) {
       const int e = opposite[3 * best.face + (zero + 1) % 3];
       if (leads(next(next(e)))) try_face(e / 3);
     } else {
       const int start = 3 * best.face + whole;
-      bool before = leads(next(start));  // the end of the last edge
+      bool before = leads(next(start));  // at the end of the last edge
       for (int e = next(opposite[start]); e != start; e = next(opposite[e])) {
         const bool now = leads(next(e));
         if (before || now) try_face(e / 3);
@@ -245,7 +245,7 @@ bool Mesh::is_inside(const Vec3& x, const Nearest& nearest) const {
   }
   const Vec3& own = normals[nearest.face];
   if (zeros == 0) return dot(d, own) < 0.0;
-  if (zeros == 1) {  // the edge that faces corner `zero`
+  if (zeros == 1) {  // edge opposite to corner `zero`
     const int back = opposite[3 * nearest.face + (zero + 1) % 3];
     return dot(d, own + normals[back / 3]) < 0.0;
   }

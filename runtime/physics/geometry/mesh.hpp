@@ -1,4 +1,4 @@
-// A closed fine mesh with its neighbourhoods and a tree of boxes.
+// Closed triangle mesh with neighbourhoods and a tree of boxes.
 #pragma once
 
 #include <array>
@@ -10,7 +10,7 @@
 
 namespace carillon::geometry {
 
-/// The place of a mesh nearest to a point.
+/// Point of a mesh nearest to a given point.
 struct Nearest {
   double distance2 = Box::kFar;
   int face = -1;   // -1: none within reach
@@ -18,12 +18,12 @@ struct Nearest {
   Vec3 place{};
 };
 
-/// A closed, oriented triangle mesh: every half-edge has exactly one opposite, every vertex one fan of triangles, and normals point
-/// outwards. Never changes once it is made.
+/// Closed, oriented triangle mesh: every half-edge has exactly one opposite, every vertex one fan of triangles, normals point outwards.
+/// Immutable.
 class Mesh {
  public:
-  /// Throws InputError when the surface is empty, open, has more than two triangles at an edge, is degenerate or inside out. Vertices in
-  /// which several fans of triangles meet are split.
+  /// Throws InputError if the surface is empty, open, non-manifold, degenerate or inside out. Vertices with several fans of triangles are
+  /// split.
   Mesh(std::span<const Vec3> vertices_m, std::span<const std::array<std::int32_t, 3>> triangles);
 
   int count_faces() const { return static_cast<int>(faces.size()); }
@@ -39,12 +39,12 @@ class Mesh {
   }
 
   Nearest find_nearest_on_face(const Vec3& x, int face) const;
-  /// The nearest place within a squared distance; `hint`: a face that may be near, or -1.
-  /// With a `slack` the one found may be further than the nearest by that much, sooner.
+  /// Nearest point within a squared distance; `hint`: a face that may be near, or -1. With a `slack` the result may be further than the
+  /// nearest point by up to `slack`, and is found sooner.
   Nearest find_nearest(const Vec3& x, double within2, int hint, double slack = 0.0) const;
-  /// The nearest place by way of neighbours from a face on: near enough to begin with, it is the nearest of all.
+  /// Nearest point by walking over neighbouring faces; if the start is near enough, it is the global nearest.
   Nearest walk_nearest(const Vec3& x, int face) const;
-  /// Is x inside, seen from its nearest place? Exact at edges and corners as well (pseudo-normals).
+  /// True if x is inside, given its nearest point. Exact at edges and corners (pseudo-normals).
   bool is_inside(const Vec3& x, const Nearest& nearest) const;
   /// Calls take(face) for the faces whose box is within `reach` of x.
   template <class Take>
@@ -63,7 +63,7 @@ class Mesh {
       }
     }
   }
-  /// Calls take(face) for the faces whose box the ray from x along d (both ways with t >= 0) may cross.
+  /// Calls take(face) for the faces whose box the line from x along d may cross.
   template <class Take>
   void for_ray(const Vec3& x, const Vec3& d, double length, Take&& take) const {
     std::array<int, 64> open{};
@@ -81,12 +81,12 @@ class Mesh {
     }
   }
 
-  // Read only after the making.
+  // Constant after construction.
   std::vector<Vec3> vertices, normals;  // normals: unit, of faces
   std::vector<std::array<std::int32_t, 3>> faces;
-  std::vector<std::int32_t> opposite;       // half-edge 3 f + k runs from corner k to the next; the one that runs back
-  std::vector<Vec3> vertex_normals;         // weighted by angle; not unit
-  std::vector<std::int32_t> any_half_edge;  // that begins at a vertex
+  std::vector<std::int32_t> opposite;       // half-edge 3 f + k runs from corner k to the next; its reverse half-edge
+  std::vector<Vec3> vertex_normals;         // angle-weighted; not unit
+  std::vector<std::int32_t> any_half_edge;  // that begins at the vertex
   Box box;
   double volume_m3 = 0.0, area_m2 = 0.0;
 

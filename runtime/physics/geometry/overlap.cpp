@@ -1,24 +1,24 @@
-// Method: vertices of each in the other; middles of the pieces of edges of each that are inside the other (two plates that cross); places
-//   halfway from a face to the wall opposite (two bodies whose faces coincide). Only faces near the other body are looked at.
+// Method: vertices of each body in the other; midpoints of edge pieces inside the other body (two crossing plates); points halfway from a
+// face to the opposite wall (two bodies with coinciding faces). Only faces near the other body are tested.
 // Source: T. Moeller, B. Trumbore, "Fast, minimum storage ray-triangle intersection" (1997).
 #include "runtime/physics/geometry/facing.hpp"
 
 namespace carillon::geometry {
 namespace {
 
-constexpr double kOff = 1e-3;       // of the size: distance of a touch from its edge or facet, at most
-constexpr double kDoubtful = 2e-4;  // m; of deeper touches the depth is confirmed
-constexpr double kDepth = 0.25;     // of the depth of a touch: least depth of its deeper place in the other body
-constexpr int kProbes = 200;        // faces of each body with a look behind them
+constexpr double kFeatureToleranceRatio = 1e-3;  // fraction of the size: maximum distance of a touch from its edge or facet
+constexpr double kVerifiedDepthM = 2e-4;         // m; the depth of deeper touches is verified
+constexpr double kMinDepthRatio = 0.25;          // fraction of a touch's depth: minimum depth of its deeper point in the other body
+constexpr int kMaxProbes = 200;                  // faces per body with an inward probe
 
-/// How deep x is inside; 0 outside.
+/// Depth of x inside the mesh; 0 outside.
 double calc_depth(const Mesh& mesh, const Vec3& x) {
   if (mesh.box.calc_distance2(x) > 0.0) return 0.0;
   const Nearest at = mesh.find_nearest(x, Box::kFar, -1);
   return mesh.is_inside(x, at) ? std::sqrt(at.distance2) : 0.0;
 }
 
-/// The same under the curved skin.
+/// Depth of x below the curved skin.
 double calc_skin_depth(const Shape& shape, const Vec3& x) {
   const Mesh& mesh = shape.mesh();
   const double sag = shape.get_sag_m();
@@ -28,9 +28,9 @@ double calc_skin_depth(const Shape& shape, const Vec3& x) {
   return !is_inside && at.distance2 > sag * sag ? 0.0 : -calc_skin_gap(shape, x, at, is_inside);
 }
 
-/// The first crossing of a ray with the surface; false where there is none within `length`.
+/// First intersection of a ray with the surface; false if none within `length`.
 bool find_crossing(const Mesh& mesh, const Vec3& origin, const Vec3& way, double length, double& distance, bool& leaves) {
-  constexpr double kBeyond = 1e-12;  // of a triangle: a ray through an edge must not slip between two
+  constexpr double kBarycentricTolerance = 1e-12;  // fraction of a triangle: tolerance, so that a ray through an edge hits a face
   double min = length;
   bool found = false;
   mesh.for_ray(origin, way, length, [&](int f) {
@@ -40,10 +40,10 @@ bool find_crossing(const Mesh& mesh, const Vec3& origin, const Vec3& way, double
     if (std::abs(det) <= 1e-15 * norm(ab) * norm(ac)) return;
     const Vec3 s = origin - a;
     const double u = dot(s, h) / det;
-    if (u < -kBeyond || u > 1.0 + kBeyond) return;
+    if (u < -kBarycentricTolerance || u > 1.0 + kBarycentricTolerance) return;
     const Vec3 q = cross(s, ab);
     const double v = dot(way, q) / det, t = dot(ac, q) / det;
-    if (v < -kBeyond || u + v > 1.0 + kBeyond || t < 0.0 || t > min) return;
+    if (v < -kBarycentricTolerance || u + v > 1.0 + kBarycentricTolerance || t < 0.0 || t > min) return;
     min = t;
     leaves = dot(mesh.normals[f], way) > 0.0;
     found = true;
@@ -56,14 +56,14 @@ bool find_crossing(const Mesh& mesh, const Vec3& origin, const Vec3& way, double
 
 bool is_overlap(const Touch& touch, const Shape& a, const Frame& fa, const Shape& b, const Frame& fb) {
   const auto is_off = [](Side side, const Shape& shape, const Vec3& station) {
-    const double brim = kOff * shape.get_size_m();
+    const double brim = kFeatureToleranceRatio * shape.get_size_m();
     return (side == Side::line || side == Side::plane) && shape.mesh().find_nearest(station, Box::kFar, -1).distance2 > brim * brim;
   };
   if (is_off(touch.side_a, a, touch.station_a) || is_off(touch.side_b, b, touch.station_b)) return false;
-  if (touch.gap_m > -kDoubtful) return true;
+  if (touch.gap_m > -kVerifiedDepthM) return true;
   const double depth = std::max(calc_skin_depth(b, to_body(fb, to_world(fa, touch.station_a))),
                                 calc_skin_depth(a, to_body(fa, to_world(fb, touch.station_b))));
-  return depth > -kDepth * touch.gap_m;
+  return depth > -kMinDepthRatio * touch.gap_m;
 }
 
 double calc_overlap(const Shape& a, const Frame& fa, const Shape& b, const Frame& fb, Vec3& where) {
@@ -98,7 +98,7 @@ double calc_overlap(const Shape& a, const Frame& fa, const Shape& b, const Frame
         double enter = 0.0, leave = 0.0;
         bool leaves = false;
         if (!find_crossing(t, p, way, length, enter, leaves)) continue;
-        if (leaves) {  // it began inside
+        if (leaves) {  // the ray starts inside
           leave = enter;
           enter = 0.0;
         } else {
@@ -109,7 +109,7 @@ double calc_overlap(const Shape& a, const Frame& fa, const Shape& b, const Frame
         take(x, calc_depth(t, x));
       }
     }
-    const std::size_t stride = 1 + near.size() / kProbes;
+    const std::size_t stride = 1 + near.size() / kMaxProbes;
     for (std::size_t i = 0; i < near.size(); i += stride) {
       const Vec3 inwards = -1.0 * m.normals[near[i]];
       const Vec3 start = m.place(near[i], {1.0 / 3, 1.0 / 3, 1.0 / 3}) + (1e-6 * mine.get_size_m()) * inwards;

@@ -1,15 +1,15 @@
-// Method: of the samples near the other body, corners and ridge points that no neighbour is lower than, and samples of curved parts that
-//   are the nearest among their neighbours; each against the nearest place of the other's fine mesh, and settled there. Ridges against
-//   curved parts: the lowest place of each straight piece, and ends that both pieces rise from.
+// Method: samples near the other body: corners and ridge points that are local minima, and samples of curved parts that are nearest among
+// their neighbours; each is paired with the nearest point of the other body's mesh and settled there. Ridges against curved parts: the
+// lowest point of each straight piece, and ends from which both pieces rise. The nearest point is found by walking from the grid's face,
+// except for bodies with walls thinner than four cells.
 // Source: C. Ericson, "Real-Time Collision Detection" (2005), 5.1.9.
-// Deviations: the nearest place is found from the grid's face by way of neighbours, but for bodies with walls thinner than four cells.
 #include "runtime/physics/geometry/pass.hpp"
 
 namespace carillon::geometry {
 namespace {
 
-constexpr double kBrim = 1e-4;  // of the size: overhang of a corner that still stands on a face
-constexpr double kBend = 4.0;   // over the thickness: the curvature, halved, that is allowed for between samples
+constexpr double kCornerOverhangRatio = 1e-4;  // fraction of the size: overhang of a corner that still rests on a face
+constexpr double kHalfCurvatureBound = 4.0;    // relative to 1 / thickness: bound of half the curvature between samples
 
 }  // namespace
 
@@ -18,7 +18,7 @@ Pass::Pass(const Shape& mine, const Frame& fm, const Shape& theirs, const Frame&
   const Frame relative = calc_relative(fm, ft);
   rotation_ = relative.rotation;
   offset_ = relative.position_m;
-  bend_ = kBend * (1.0 / mine.get_thickness_m() + 1.0 / theirs.get_thickness_m());
+  bend_ = kHalfCurvatureBound * (1.0 / mine.get_thickness_m() + 1.0 / theirs.get_thickness_m());
 }
 
 void Pass::list(double reach_m, std::vector<std::pair<int, double>>& near) const {
@@ -48,7 +48,7 @@ void Pass::run(Distances& distances, const std::vector<std::pair<int, double>>& 
     const Sample& sample = s.samples[i];
     const double within = reach_ + sag_ + (sample.kind == VertexKind::smooth ? calc_room(sample.reach_m) : 0.0);
     if (before - way_m > within) continue;
-    if (way_m == 0.0 && !surface_.is_thin()) {  // as it was just estimated
+    if (way_m == 0.0 && !surface_.is_thin()) {  // just estimated
       distances.stamps[i] = distances.stamp;
       distances.values[i] = before;
     }
@@ -62,11 +62,11 @@ void Pass::run(Distances& distances, const std::vector<std::pair<int, double>>& 
     for (int k = 0; k < sample.neighbours && nearest; ++k) {
       const int other = s.neighbours[sample.first_neighbour + k];
       const double step2 = norm2(s.samples[other].point - sample.point), fall = measure(other) - d;
-      nearest = fall >= 0.0 || fall * fall <= kFlat * kFlat * step2;
+      nearest = fall >= 0.0 || fall * fall <= kFlatPatchSlope * kFlatPatchSlope * step2;
     }
     if (nearest) pits.emplace_back(d, i);
   }
-  // Those next to one that has been settled lower would come to the same place.
+  // Neighbours of a sample that settled lower would converge to the same point.
   std::sort(pits.begin(), pits.end());
   std::vector<std::pair<Vec3, double>> found;
   for (const auto& [d, i] : pits) {
@@ -120,8 +120,8 @@ Touch Pass::make_touch(int place) const {
     const Spot spot = mine_.skin().locate(sample.point, sample.face);
     t.curvature_a_per_m = mine_.skin().calc_mean_curvature(spot.face, spot.weights);
   }
-  settle(t, mine_, fm_, &theirs_, ft_, mine_.samples().spacing_m, kFirst);
-  t.id = make_id(Feature::corner_a, place, kDeepest);
+  settle(t, mine_, fm_, &theirs_, ft_, mine_.samples().spacing_m, kSearchIterations);
+  t.id = make_id(Feature::corner_a, place, kMissedTouchId);
   return t;
 }
 
@@ -149,7 +149,7 @@ void Pass::add_point(const Sample& sample) {
       t.side_b = Side::skin;
       t.face_b = at.face;
       t.smooth = true;
-      found = settle(t, mine_, fm_, &theirs_, ft_, 0.05 * mine_.get_size_m(), kFirst);
+      found = settle(t, mine_, fm_, &theirs_, ft_, 0.05 * mine_.get_size_m(), kSearchIterations);
       found = found && may_carry(sample, turn_back(ft_.rotation, t.normal));
     }
   } else if (facing.side == Side::plane) {
@@ -205,13 +205,13 @@ int Pass::add_ridge(int ridge) {
   if (!t) return -1;
   t->side_a = Side::line;
   t->axis_a = r.along;
-  const bool settled = settle(*t, mine_, fm_, &theirs_, ft_, length, kFirst);
+  const bool settled = settle(*t, mine_, fm_, &theirs_, ft_, length, kSearchIterations);
   const double at = dot(t->station_a - r.begin, r.along);
   if (at < 0.0) return r.vertices[0];
   if (at > length) return r.vertices[1];
   const Vec3 n = turn_back(fm_.rotation, t->normal);
   for (const int k : {0, 1})
-    if (dot(n, find_into(mine_, r, k, t->station_a)) < -kFlush) return -1;
+    if (dot(n, find_into(mine_, r, k, t->station_a)) < -kParallelSlope) return -1;
   t->id = make_id(Feature::corner_a, ridge, 3);
   if (settled && t->gap_m <= reach_) out_.push_back(*t);
   return -1;
@@ -219,7 +219,7 @@ int Pass::add_ridge(int ridge) {
 
 void Pass::add_end(int vertex) {
   std::optional<Touch> t = begin_ridge(mine_.mesh().vertices[vertex]);
-  if (!t || !settle(*t, mine_, fm_, &theirs_, ft_, 0.05 * mine_.get_size_m(), kFirst) || t->gap_m > reach_) return;
+  if (!t || !settle(*t, mine_, fm_, &theirs_, ft_, 0.05 * mine_.get_size_m(), kSearchIterations) || t->gap_m > reach_) return;
   t->id = make_id(Feature::corner_a, vertex, 0);
   t->rim_m = mine_.skin().calc_rim_radius_m(vertex);
   out_.push_back(*t);
@@ -227,7 +227,7 @@ void Pass::add_end(int vertex) {
 
 bool Pass::find_brim(const Sample& sample, const Vec3& x, double d, Touch& t) const {
   const Mesh& mesh = theirs_.mesh();
-  const double brim = kBrim * std::min(mine_.get_size_m(), theirs_.get_size_m());
+  const double brim = kCornerOverhangRatio * std::min(mine_.get_size_m(), theirs_.get_size_m());
   double best = -Box::kFar;
   mesh.for_ball(x, d + brim, [&](int f) {
     const Vec3& n = mesh.normals[f];
@@ -244,7 +244,7 @@ bool Pass::find_brim(const Sample& sample, const Vec3& x, double d, Touch& t) co
 
 bool Pass::add_rim(const Sample& sample, Touch t) {
   const double reach = kWalk * std::max(1.5 * sample.reach_m, 2.0 * mine_.samples().spacing_m);
-  const double brim = kBrim * std::min(mine_.get_size_m(), theirs_.get_size_m());
+  const double brim = kCornerOverhangRatio * std::min(mine_.get_size_m(), theirs_.get_size_m());
   t.side_a = Side::skin;
   t.face_a = sample.face;
   t.smooth = true;
@@ -259,14 +259,14 @@ bool Pass::add_rim(const Sample& sample, Touch t) {
   const bool remains = settle(stays, mine_, fm_, &theirs_, ft_, reach);
   if (!settle(t, mine_, fm_, &theirs_, ft_, reach) || is_level(t, mine_, fm_, &theirs_, ft_)) return remains && add(stays);
   if (remains && norm(t.station_a - sample.point) > kGuard * mine_.get_size_m()) add(stays);
-  settle(t, mine_, fm_, &theirs_, ft_, reach);  // the spring's centre is now there
+  settle(t, mine_, fm_, &theirs_, ft_, reach);  // centres the spring at the current point
   return add(t);
 }
 
 void Pass::add_smooth(const Sample& sample) {
   constexpr int kMax = 4;  // facets tried
   const Mesh& mesh = theirs_.mesh();
-  const double reach = std::max(1.5 * sample.reach_m, 2.0 * mine_.samples().spacing_m), brim = kBrim * mine_.get_size_m();
+  const double reach = std::max(1.5 * sample.reach_m, 2.0 * mine_.samples().spacing_m), brim = kCornerOverhangRatio * mine_.get_size_m();
   Spot spot = mine_.skin().locate(sample.point, sample.face);
   const Vec3 x = to_theirs(spot.point);
   Nearest at = surface_.find_nearest(x);
@@ -293,7 +293,7 @@ void Pass::add_smooth(const Sample& sample) {
     if (facing.side == Side::line) t.curvature_b_per_m = get_sharp_curvature(theirs_, VertexKind::ridge);
     if (facing.side == Side::point) t.curvature_b_per_m = get_sharp_curvature(theirs_, VertexKind::corner);
     const Touch before = t;
-    bool settled = settle(t, mine_, fm_, &theirs_, ft_, facing.side == Side::plane ? kWalk * reach : reach, kFirst);
+    bool settled = settle(t, mine_, fm_, &theirs_, ft_, facing.side == Side::plane ? kWalk * reach : reach, kSearchIterations);
     if (settled && facing.side == Side::plane && is_level(t, mine_, fm_, &theirs_, ft_)) {
       t = before;
       t.stays = true;
@@ -303,7 +303,7 @@ void Pass::add_smooth(const Sample& sample) {
     if (facing.side == Side::plane || facing.side == Side::line) {
       const Nearest foot = mesh.find_nearest(t.station_b, Box::kFar, at.face);
       if (foot.distance2 > brim * brim || (facing.side == Side::line && !is_between(t, foot))) {
-        // Past the facet or the edge: its neighbour.
+        // Past the facet or the edge: continue on its neighbour.
         at = foot;
         if (facing.side == Side::line && foot.distance2 <= brim * brim) {
           at = surface_.find_nearest(to_theirs(t.station_a));
@@ -326,9 +326,9 @@ void Pass::add_smooth(const Sample& sample) {
       }
     }
     if (settled) break;
-    // Falling on beyond its reach: of another sample, unless it is nearly parallel.
+    // Still descending at the end of the reach: belongs to another sample, unless nearly parallel.
     const Vec3 outward = rotation_ * mine_.skin().calc_normal(spot.face, spot.weights);
-    if (facing.side != Side::plane || norm(outward + n) > kFlush) return;
+    if (facing.side != Side::plane || norm(outward + n) > kParallelSlope) return;
     t.stays = true;
     t.station_a = spot.point;
     t.face_a = spot.face;
@@ -351,7 +351,7 @@ bool Pass::is_between(const Touch& t, const Nearest& foot) const {
     if (std::abs(dot(along, t.axis_b)) < 0.99) return false;
     const Vec3 in = cross(find_normal(theirs_, e / 3, foot.place), along);
     const Vec3 out = cross(along, find_normal(theirs_, mesh.opposite[e] / 3, foot.place));
-    return dot(n, in) <= kFlush && dot(n, out) <= kFlush;
+    return dot(n, in) <= kParallelSlope && dot(n, out) <= kParallelSlope;
   };
   for (int k = 0; k < 3; ++k) {
     if (foot.weights[(k + 2) % 3] > 1e-9) continue;

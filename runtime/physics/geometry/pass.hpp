@@ -1,4 +1,4 @@
-// One direction of a search between two bodies: places of one before the surface of the other.
+// One direction of a pair search: points of one body against the surface of the other.
 #pragma once
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 
 namespace carillon::geometry {
 
-/// Distances of samples of one body to another, found once in a search.
+/// Distances from samples of one body to the other, computed once per search.
 struct Distances {
   std::vector<double> values;
   std::vector<std::uint32_t> stamps;
@@ -30,23 +30,22 @@ struct Distances {
   }
 };
 
-/// Samples and ridges of `mine` before the surface of `theirs`. Touches are made with mine as a.
+/// Samples and ridges of `mine` against the surface of `theirs`. Touches have `mine` as a.
 class Pass {
  public:
   Pass(const Shape& mine, const Frame& fm, const Shape& theirs, const Frame& ft, double reach, std::vector<Touch>& out);
-  /// The samples within `reach_m`.
+  /// Lists the samples within `reach_m`.
   void list(double reach_m, std::vector<std::pair<int, double>>& near) const;
-  /// Largest distance of a sample that covers a place within the reach.
+  /// Largest distance of a sample that covers a point within the reach.
   double find_room() const { return calc_room(mine_.samples().reach_m) + reach_ + sag_; }
   /// `near`: samples listed before a movement of the bodies by at most `way_m`.
   void run(Distances& distances, const std::vector<std::pair<int, double>>& near, double way_m);
-  /// The deepest sample in theirs below `gap_m`, which becomes its gap; -1: none. `least_m`: for each near sample a bound of its gap
-  /// plus `gone_m` when it was found; renewed where a sample is measured.
+  /// Index of the deepest sample in theirs below `gap_m`, which becomes its gap; -1: none. `least_m`: per near sample a lower bound of its
+  /// gap plus the value of `gone_m` at that time; updated where a sample is measured.
   int find_deepest(double& gap_m, const std::vector<std::pair<int, double>>& near, double gone_m, std::vector<double>& least_m) const;
-  /// Ridges of mine before curved parts of theirs: the lowest places of their straight pieces, and corners between two pieces that both
-  /// rise.
+  /// Ridges of mine against curved parts of theirs: lowest points of straight pieces, and corners from which both pieces rise.
   void run_ridges();
-  /// A touch of a sample with the nearest place of theirs.
+  /// Touch of a sample with the nearest point of theirs.
   Touch make_touch(int place) const;
 
  private:
@@ -57,21 +56,21 @@ class Pass {
   }
 
   Touch begin(const Vec3& station, const Vec3& theirs, const Vec3& normal) const;
-  /// A corner or a point of a ridge.
+  /// Adds a corner or a point of a ridge.
   void add_point(const Sample& sample);
-  /// A touch of a place of a ridge of mine with a curved part of theirs; none over a flat one.
+  /// Touch of a ridge point of mine with a curved part of theirs; none over a flat part.
   std::optional<Touch> begin_ridge(const Vec3& point) const;
-  /// The lowest place of a straight piece of a ridge. Returns the end vertex of a piece with its lowest place beyond; otherwise -1.
+  /// Adds the lowest point of a straight ridge piece. Returns the end vertex if the lowest point is beyond it; otherwise -1.
   int add_ridge(int ridge);
-  /// A corner of a ridge below both pieces next to it.
+  /// Adds a corner of a ridge that is below both adjacent pieces.
   void add_end(int vertex);
-  /// A flat face about x under the sample other than the nearest one: a corner in the plane of a side.
+  /// Finds a flat face near x under the sample other than the nearest one: a corner in the plane of a side.
   bool find_brim(const Sample& sample, const Vec3& x, double d, Touch& t) const;
-  /// A rim over a facet is round: the lowest place of the skin about the sample. False where that is not over the facet.
+  /// Rounded rim over a facet: adds the lowest point of the skin around the sample. False if that point is not over the facet.
   bool add_rim(const Sample& sample, Touch t);
-  /// A place of a curved part.
+  /// Adds a point of a curved part.
   void add_smooth(const Sample& sample);
-  /// True for a normal of a touch on an edge of theirs between the normals of its two faces.
+  /// True if the normal of a touch on an edge of theirs lies between the normals of the two faces.
   bool is_between(const Touch& t, const Nearest& foot) const;
 
   const Shape &mine_, &theirs_;

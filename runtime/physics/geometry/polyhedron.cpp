@@ -1,5 +1,4 @@
-// Method: regions of coplanar faces are the facets, corners of the skin their corners, in order about the facet's normal.
-// Source: textbook.
+// Method: regions of coplanar faces become facets, corners of the skin become corners, ordered about the facet normal.
 #include "runtime/physics/geometry/polyhedron.hpp"
 
 #include <map>
@@ -8,10 +7,10 @@
 namespace carillon::geometry {
 
 std::optional<Polyhedron> make_polyhedron(const Mesh& mesh, const Skin& skin, int max) {
-  constexpr double kConvex = 1e-6;  // of the size
+  constexpr double kConvexityRatio = 1e-6;  // fraction of the size
   if (skin.count_regions() > max || skin.count_smooth_edges() > 0) return std::nullopt;
   Polyhedron body;
-  const double slack = kConvex * norm(mesh.box.high - mesh.box.low);
+  const double slack = kConvexityRatio * norm(mesh.box.high - mesh.box.low);
   std::vector<int> corner_of(mesh.vertices.size(), -1);
   for (int v = 0; v < mesh.count_vertices(); ++v) {
     if (skin.kind(v) == VertexKind::none) continue;
@@ -35,7 +34,7 @@ std::optional<Polyhedron> make_polyhedron(const Mesh& mesh, const Skin& skin, in
       if (c >= 0 && std::find(loop.begin(), loop.end(), c) == loop.end()) loop.push_back(c);
     }
   }
-  std::map<std::pair<int, int>, int> found;  // half-edges of loops: their facet
+  std::map<std::pair<int, int>, int> found;  // half-edges of loops and their facet
   for (int r = 0; r < facets; ++r) {
     Vec3& n = body.normals[r];
     auto& loop = body.loops[r];
@@ -58,7 +57,7 @@ std::optional<Polyhedron> make_polyhedron(const Mesh& mesh, const Skin& skin, in
   }
   for (const auto& [pair, facet] : found) {
     const auto back = found.find({pair.second, pair.first});
-    if (back == found.end()) return std::nullopt;  // not what a convex polyhedron looks like
+    if (back == found.end()) return std::nullopt;  // not a convex polyhedron
     if (pair.first > pair.second) continue;
     Polyhedron::Edge edge;
     edge.corners = {pair.first, pair.second};
@@ -78,7 +77,7 @@ std::optional<Polyhedron> make_polyhedron(const Mesh& mesh, const Skin& skin, in
           body.loop_edges[r].push_back(static_cast<int>(e));
     }
   }
-  if (body.corners.size() + body.normals.size() != body.edges.size() + 2) return std::nullopt;  // Euler
+  if (body.corners.size() + body.normals.size() != body.edges.size() + 2) return std::nullopt;  // Euler's formula
   return body;
 }
 

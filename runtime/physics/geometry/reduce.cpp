@@ -1,6 +1,5 @@
-// Method: patches by single linkage; of each patch the deepest point, the one furthest from it, the one furthest from their line, and the
-//   one that adds most area on the other side; then those below the planes of these. Names by nearness of the stations.
-// Source: textbook.
+// Method: patches by single linkage; per patch the deepest point, the point furthest from it, the point furthest from their line, and the
+// point on the other side that adds most area; then points below the planes through these. Identities by nearness of the stations.
 #include "runtime/physics/geometry/reduce.hpp"
 
 #include <numeric>
@@ -8,15 +7,15 @@
 namespace carillon::geometry {
 namespace {
 
-constexpr double kNormal = 0.966;        // cosine of 15 degrees
-constexpr double kLevel = 1e-5;          // slope
-constexpr double kLower = 1e-6;          // m; a touch this far below the plane of three kept ones is kept, too
-constexpr double kOutside = 0.05;        // barycentric: how far outside their triangle it may lie
-constexpr std::size_t kMostInPatch = 8;  // touches kept of a patch
-constexpr double kFlatTriangle = 1e-6;   // area over the square of a side: no plane
-constexpr std::uint64_t kTravels = 1ULL << 63;
+constexpr double kPatchCosine = 0.966;       // cosine of 15 degrees
+constexpr double kLevelSlope = 1e-5;         // slope
+constexpr double kKeepDepthM = 1e-6;         // m; a touch this far below the plane of three kept ones is kept too
+constexpr double kBarycentricMargin = 0.05;  // barycentric: permitted distance outside their triangle
+constexpr std::size_t kMostInPatch = 8;      // touches kept per patch
+constexpr double kFlatTriangle = 1e-6;       // area relative to a squared side: too flat to define a plane
+constexpr std::uint64_t kMovingIdBit = 1ULL << 63;
 
-/// Of the touches [first, last) of one patch those to keep, as indices.
+/// Selects the touches of one patch to keep, as indices.
 void keep_four(const std::vector<Touch>& t, const std::vector<int>& patch, std::vector<int>& kept) {
   if (patch.size() <= 4) {
     kept.insert(kept.end(), patch.begin(), patch.end());
@@ -37,15 +36,15 @@ void keep_four(const std::vector<Touch>& t, const std::vector<int>& patch, std::
   int first = best([&](int i) { return -t[i].gap_m; });
   const auto find_furthest = [&](int from) { return best([&](int i) { return norm2(t[i].where_m - t[from].where_m); }); };
   const int second = find_furthest(first), end = find_furthest(second);
-  // Where the deepest is no deeper than rounding makes it, the end counts.
-  if (t[end].gap_m - t[first].gap_m < kLevel * norm(t[end].where_m - t[first].where_m)) first = end;
+  // If the deepest touch is deeper by rounding only, take the end of the patch instead.
+  if (t[end].gap_m - t[first].gap_m < kLevelSlope * norm(t[end].where_m - t[first].where_m)) first = end;
   const Vec3 n = t[first].normal, o = t[first].where_m;
   const Vec3 along = t[second].where_m - o;
   const auto area = [&](int i) { return dot(n, cross(along, t[i].where_m - o)); };
   const int third = best([&](int i) { return std::abs(area(i)); });
   const double side = area(third) < 0.0 ? -1.0 : 1.0;
   const Vec3 p = t[second].where_m, q = t[third].where_m;
-  const auto gain = [&](int i) {  // area outside of the triangle
+  const auto gain = [&](int i) {  // added area outside the triangle
     const Vec3& x = t[i].where_m;
     return std::max({-side * dot(n, cross(p - o, x - o)), -side * dot(n, cross(q - p, x - p)), -side * dot(n, cross(o - q, x - q))});
   };
@@ -55,13 +54,13 @@ void keep_four(const std::vector<Touch>& t, const std::vector<int>& patch, std::
   if (scale > 0.0) kept.push_back(second);
   if (std::abs(area(third)) > 1e-6 * scale) {
     kept.push_back(third);
-  } else if (end != first && end != second) {  // a line
+  } else if (end != first && end != second) {  // collinear patch
     kept.push_back(end);
   }
   if (gain(fourth) > 1e-6 * scale && fourth != first && fourth != second && fourth != third) kept.push_back(fourth);
 }
 
-/// How much lower a touch is than the kept ones about it, in whatever way the patch tilts [m]; negative: higher, or none is about it.
+/// Maximum depth of a touch below the planes of the surrounding kept ones [m]; negative: above, or not surrounded.
 double find_excess(const std::vector<Touch>& t, int i, const std::vector<int>& kept) {
   const Vec3 &x = t[i].where_m, &n = t[kept[0]].normal;
   double lowest = -Box::kFar;
@@ -74,18 +73,18 @@ double find_excess(const std::vector<Touch>& t, int i, const std::vector<int>& k
         const double area = parts[0] + parts[1] + parts[2];
         if (std::abs(area) < kFlatTriangle * norm2(q.where_m - p.where_m)) continue;
         const double u = parts[0] / area, v = parts[1] / area, w = parts[2] / area;
-        if (std::min({u, v, w}) < -kOutside) continue;
+        if (std::min({u, v, w}) < -kBarycentricMargin) continue;
         const double gap = u * p.gap_m + v * q.gap_m + w * r.gap_m;
         lowest = lowest == -Box::kFar ? gap : std::min(lowest, gap);
       }
   return lowest - t[i].gap_m;
 }
 
-/// Adds the touches of a patch that may carry before those kept: one below the plane of three others about it stays below however the
-/// bodies tilt.
+/// Adds the touches of a patch that may become load-bearing before the kept ones: a touch below the plane of three surrounding ones stays
+/// below it for any tilt.
 void keep_low(const std::vector<Touch>& t, const std::vector<int>& patch, std::vector<int>& kept) {
   while (kept.size() < kMostInPatch) {
-    double most = kLower;
+    double most = kKeepDepthM;
     int lowest = -1;
     for (const int i : patch)
       if (std::find(kept.begin(), kept.end(), i) == kept.end())
@@ -108,7 +107,7 @@ void reduce(std::vector<Touch>& touches, double patch_m) {
   };
   for (int i = 0; i < count; ++i) {
     for (int j = 0; j < i; ++j) {
-      if (dot(touches[i].normal, touches[j].normal) < kNormal || norm2(touches[i].where_m - touches[j].where_m) > patch_m * patch_m)
+      if (dot(touches[i].normal, touches[j].normal) < kPatchCosine || norm2(touches[i].where_m - touches[j].where_m) > patch_m * patch_m)
         continue;
       const int p = root(i), q = root(j);
       group[std::max(p, q)] = std::min(p, q);
@@ -152,7 +151,7 @@ void name(std::vector<Touch>& touches, double reach_m, PairMemory& memory) {
       taken[which] = 1;
       t.id = memory.last[which].id;
     } else {
-      t.id = kTravels | ++memory.serial;
+      t.id = kMovingIdBit | ++memory.serial;
     }
   }
   memory.last = touches;

@@ -1,4 +1,4 @@
-// The parts of a search for touches.
+// Building blocks of the touch search.
 #pragma once
 
 #include "runtime/physics/geometry/samples.hpp"
@@ -12,63 +12,62 @@ inline std::uint64_t make_id(Feature feature, int i, int j) {
          (static_cast<std::uint32_t>(j) & 0xfffffffU);
 }
 
-/// Two convex polyhedra: separating axes and clipping. Fills `out`.
+/// Touches of two convex polyhedra: separating axes and clipping. Fills `out`.
 void find_polyhedra_touches(const Shape& a, const Frame& frame_a, const Shape& b, const Frame& frame_b, double margin_m, PairMemory& memory,
                             std::vector<Touch>& out);
 
-/// Adds touches of ridges of a with ridges of b.
+/// Adds touches between ridges of a and ridges of b.
 void cross_ridges(const Shape& a, const Frame& frame_a, const Shape& b, const Frame& frame_b, double reach_m, std::vector<Touch>& out);
 
-/// May a corner or ridge vertex of the skin be the first to touch what has this outward normal (mesh frame)? No neighbour is lower.
+/// True if a corner or ridge vertex of the skin may touch a surface with this outward normal (mesh frame) first: no neighbour is lower.
 bool carries(const Mesh& mesh, int vertex, const Vec3& normal);
 
-inline constexpr int kDeepest = 2;  // second number of the name of a touch that a search lacked
+inline constexpr int kMissedTouchId = 2;  // second number of the id of a touch that a search missed
 
 /// Mean curvature of a corner or an edge.
 inline double get_sharp_curvature(const Shape& shape, VertexKind kind) {
   return (kind == VertexKind::corner ? 1.0 : 0.5) * shape.get_corner_curvature_per_m();
 }
-/// The same of any vertex, on a curved part that of the skin.
+/// Mean curvature of any vertex; on a curved part that of the skin.
 double calc_vertex_curvature(const Shape& shape, int vertex);
 
-inline constexpr double kFlat = 0.02;   // slope: tolerance of a flat contact patch
-inline constexpr double kFlush = 0.01;  // slope: tolerance of parallel surfaces
+inline constexpr double kFlatPatchSlope = 0.02;  // slope: tolerance of a flat contact patch
+inline constexpr double kParallelSlope = 0.01;   // slope: tolerance of parallel surfaces
 
-inline constexpr int kFirst = 12, kAgain = 2;  // iterations between two curved sides, in a search and near a place known
+inline constexpr int kSearchIterations = 12, kFollowIterations = 2;  // iterations between two curved sides: in a search; from a known point
 
-/// Moves the touch to where its two sides face each other, from where they are now, and fills gap, where, normal and stations. False where
-/// the touch left its features (the end of a line, a skin that continues to fall beyond `reach_m`).
+/// Moves the touch from its current points to where its sides face each other, and sets gap, where, normal and stations. False if the touch
+/// left its features (end of a line, or a skin that still descends at `reach_m`).
 bool settle(Touch& touch, const Shape& a, const Frame& frame_a, const Shape* b, const Frame& frame_b, double reach_m,
-            int iterations = kAgain);
+            int iterations = kFollowIterations);
 
-/// The same from a known place. False for a touch off its features, which stays at its places.
+/// Like settle(), from a known point. False for a touch off its features, which keeps its points.
 bool follow(Touch& touch, const Shape& a, const Frame& frame_a, const Shape* b, const Frame& frame_b, double reach_m);
 
-/// Of a touch at the lowest place of a skin over a plane: would that place move by more than a twentieth of the body's size if the body
-/// tilted by 2e-3 rad? It would under a rod or a coin that lies, which stand on several places, and not under a coin that leans by more
-/// than a degree.
+/// For a touch at the lowest point of a skin over a plane: true if a tilt of the body by 2e-3 rad would move that point by more than a
+/// twentieth of the body's size. True for a lying rod or coin, which stand on several points; false for a coin that leans by more than a
+/// degree.
 bool is_level(const Touch& touch, const Shape& a, const Frame& frame_a, const Shape* b, const Frame& frame_b);
 
 /// Pose of a in b.
 Frame calc_relative(const Frame& a, const Frame& b);
-/// Upper bound of the movement of any point of a between two poses [m].
+/// Upper bound of the displacement of any point of a between two poses [m].
 double calc_way(const Frame& from, const Frame& to, const Shape& a);
-/// Notes a new search.
+/// Records a new search.
 void begin_search(PairMemory& memory, const Frame& pose, const Frame& frame_a, const Frame& frame_b, double margin_m, double size_m);
-/// Is all that is nearer than margin_m now among the candidates of the last search? `pose`: of a in b.
+/// True if the candidates of the last search include everything nearer than margin_m now. `pose`: of a in b.
 bool recall(const PairMemory& memory, const Frame& pose, const Shape& a, double margin_m);
-/// Keeps of touches that travel and have met one, the deepest; then few of a patch.
+/// Keeps the deepest of moving touches that have merged; then reduces each patch.
 void thin(std::vector<Touch>& touches, double spacing_m, double patch_m);
-/// Candidates of the memory within the margin, with names, settled where the bodies have moved since the search. False, without touches: a
-/// lost candidate.
+/// Returns the candidates of the memory within the margin, with ids, settled if the bodies have moved since the search. False, without
+/// touches: a candidate was lost.
 bool answer(const Shape& a, const Frame& frame_a, const Shape* b, const Frame& frame_b, double margin_m, PairMemory& memory,
             std::vector<Touch>& out);
 
-/// Of two bodies at a distance of 0 to `size`: how far a search looks beyond the margin, so that the next ones can be spared.
+/// Distance that a search covers beyond the margin, to spare later searches; bodies at a distance of 0 to `size`.
 inline double choose_slack(double margin_m, double size_m) { return std::max(margin_m, 1e-3 * size_m); }
-inline constexpr double kGuard =
-    0.25;  // of the size: a place near the plane that is further than this from the lowest one is a touch of its own
-inline constexpr double kWalk = 4.0;    // reaches of a sample: how far the lowest place may be, at a tip that no sample is near
-inline constexpr double kPatch = 0.25;  // of the smaller body: what is further apart are different patches
+inline constexpr double kGuard = 0.25;               // of the size: distance of a separate touch near the plane from the lowest point
+inline constexpr double kWalk = 4.0;                 // sample reaches: maximum distance of the lowest point from its sample
+inline constexpr double kPatchDistanceRatio = 0.25;  // fraction of the smaller body: minimum distance of separate patches
 
 }  // namespace carillon::geometry

@@ -1,4 +1,4 @@
-// Method: the kind of body follows from the mesh; see the parts.
+// Method: the kind of body is determined from the mesh.
 #include "runtime/physics/geometry/shape.hpp"
 
 #include <optional>
@@ -13,8 +13,8 @@ namespace carillon::geometry {
 
 namespace {
 
-constexpr double kOnFace = 1e-3;  // of the size of the body: what is as near to a face is on it,
-constexpr double kFaces = -0.2;   // unless it looks away from the way asked: cosine
+constexpr double kOnFaceRatio = 1e-3;   // fraction of the size: points this near to a face are on it,
+constexpr double kFacingCosine = -0.2;  // unless its normal deviates from the given one: cosine
 
 }  // namespace
 
@@ -72,13 +72,13 @@ Box Shape::calc_box(const Frame& frame) const {
 Place Shape::find_place(const Vec3& point, const Vec3& outward, std::int32_t hint) const {
   if (hint >= 0) {
     const Nearest on = mesh_->walk_nearest(point, hint);
-    if (on.distance2 < kOnFace * kOnFace * size_m_ * size_m_) {
+    if (on.distance2 < kOnFaceRatio * kOnFaceRatio * size_m_ * size_m_) {
       const Place place = choose_face(on, point, outward);
-      if (dot(mesh_->normals[place.triangle], outward) > kFaces) return place;
+      if (dot(mesh_->normals[place.triangle], outward) > kFacingCosine) return place;
     }
   }
   const Nearest nearest = mesh_->find_nearest(point, Box::kFar, -1);
-  // At an edge or a corner, and under a curved skin, several faces are near: the one that looks the way asked.
+  // At edges, corners and under a curved skin several faces are near: choose the one aligned with the given normal.
   const double reach = std::sqrt(nearest.distance2) + 1e-6 * size_m_;
   Nearest best = nearest;
   double max = dot(mesh_->normals[nearest.face], outward);
@@ -93,9 +93,9 @@ Place Shape::find_place(const Vec3& point, const Vec3& outward, std::int32_t hin
   return {best.face, best.weights, skin_->calc_mean_curvature(best.face, best.weights)};
 }
 
-/// Of the faces that meet where a point of the surface was found, the one that looks the way asked.
+/// Of the faces that meet at a surface point, the one aligned with the given normal.
 Place Shape::choose_face(const Nearest& on, const Vec3& point, const Vec3& outward) const {
-  constexpr double kEdge = 1e-3;  // of a triangle's height
+  constexpr double kEdge = 1e-3;  // fraction of a triangle's height
   int face = on.face, zeros = 0, whole = 0;
   double max = dot(mesh_->normals[face], outward);
   const auto look = [&](int f) {

@@ -1,7 +1,7 @@
-// The collision geometry of a body, made once for all bodies of a bank.
+// Collision geometry of a body, shared by all bodies of a bank.
 //
-// Three kinds of body, chosen by the mesh: convex polyhedra of few facets (exact, whatever the fineness), smooth bodies and all others.
-// What only the last two need (samples, distance grid) is made when it is first asked for.
+// Three kinds of body, determined from the mesh: convex polyhedra of few facets (exact, independent of the fineness), smooth bodies and all
+// others. Data of the last two kinds (samples, distance grid) is created on first use.
 // [main-thread]
 #pragma once
 
@@ -22,47 +22,46 @@ class Samples;
 class Grid;
 class LowVertices;
 
-/// A place of the mesh that was given: its triangle, where in it, and the mean curvature of the smooth body there (convex positive).
+/// A point of the input mesh: triangle, position in it, and mean curvature of the smooth body there (convex positive).
 struct Place {
   std::int32_t triangle = 0;
   Vec3 barycentric{};
   double curvature_per_m = 0.0;
 };
 
-/// The collision geometry of one surface, shared by all bodies that have it. Its answers never change; samples and grid are made when they
-/// are first asked for, which only takes time.
+/// Collision geometry of one surface, shared by all bodies that use it. Logically constant; samples and grid are created on first use,
+/// which only takes time.
 class Shape {
  public:
-  /// Throws InputError for what is empty, open, not a manifold, without area or inside out; the message names the place.
+  /// Throws InputError for a surface that is empty, open, non-manifold, degenerate or inside out; the message names the place.
   Shape(std::span<const Vec3> vertices_m, std::span<const std::array<std::int32_t, 3>> triangles);
   ~Shape();
   Shape(const Shape&) = delete;
   Shape& operator=(const Shape&) = delete;
 
   double get_size_m() const { return size_m_; }            // diagonal of the bounding box
-  double get_thickness_m() const { return thickness_m_; }  // its shortest side
+  double get_thickness_m() const { return thickness_m_; }  // shortest side of the bounding box
   const Vec3& get_middle_m() const { return middle_m_; }   // of the bounding box
-  double get_radius_m() const { return radius_m_; }        // of a ball about the middle that holds all
-  /// Largest distance of the curved surface from the mesh.
+  double get_radius_m() const { return radius_m_; }        // of a ball about the middle that encloses the body
+  /// Maximum distance between the curved surface and the mesh.
   double get_sag_m() const;
-  /// Of a ball about `centre` (mesh frame) that holds all.
+  /// Radius of the ball about `centre` (mesh frame) that encloses the body.
   double calc_radius_m(const Vec3& centre) const;
-  /// Upper bound of the speed of any point by a spin about `centre` (mesh frame).
+  /// Upper bound of the speed of any point due to a spin about `centre` (mesh frame).
   double calc_turning_speed(const Vec3& centre, const Vec3& spin) const;
   /// Upper bound of |way . (x - centre)| of any point x; mesh frame.
   double calc_reach_m(const Vec3& centre, const Vec3& way) const;
-  /// Along the world's axes.
+  /// Axis-aligned bounding box in the world frame.
   Box calc_box(const Frame& frame) const;
-  /// The triangle of the fine mesh at a point of the surface whose normal is `outward`; mesh frame. `hint`: a triangle that may be it; -1:
-  /// none.
+  /// Triangle of the input mesh at a surface point with normal `outward`; mesh frame. `hint`: a likely triangle, or -1.
   Place find_place(const Vec3& point_m, const Vec3& outward, std::int32_t hint = -1) const;
-  /// Makes now what a search against the ground will need, or against other bodies as well, so that the first one is as quick as the next.
+  /// Creates the data of ground searches, and of body searches if `meets_bodies`, so that the first search takes no longer than later ones.
   void prepare(bool meets_bodies = true) const;
   bool is_polyhedron() const { return polyhedron_ != nullptr; }
-  /// Curvature that stands for a sharp corner; a ridge has half of it.
+  /// Curvature assumed for a sharp corner; a ridge has half of it.
   double get_corner_curvature_per_m() const { return 200.0 / size_m_; }
 
-  // Of use to this folder.
+  // Internal to this folder.
   const Mesh& mesh() const { return *mesh_; }
   const Skin& skin() const { return *skin_; }
   const Polyhedron* polyhedron() const { return polyhedron_.get(); }

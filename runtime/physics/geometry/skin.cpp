@@ -1,11 +1,11 @@
-// Method: coplanar faces are joined to regions by a flood from a seed. An edge between regions is sharp above 40 degrees, or above 20 and
-//   three times the mean of the other edges about its two regions. Corners of faces joined over edges that are not sharp share a normal
-//   (weighted by angle) and a curvature tensor (least squares over the edges); a plane facet much larger than its curved neighbours keeps
-//   its own normal. At a tip (a vertex whose faces lean from their mean by as much as a sharp edge's, where no edge is sharp: the point of
-//   a cone) each face keeps its own; the edges there lie in both their faces, so that patches still meet. The lowest place of a quadratic
-//   patch has a closed form; the search walks over edges as long as it gets lower.
-// Source: T. Boubekeur, M. Alexa, "Phong tessellation" (2008); G. Thuermer, C. Wuethrich (1998) for the angle weights.
-// Deviations: alpha 1/2 in place of 3/4, which is exact for circles to second order.
+// Method: coplanar faces are joined into regions by flood fill. An edge between regions is sharp above 40 degrees, or above 20 degrees and
+// three times the mean of the other edges about its two regions. Corners of faces joined over non-sharp edges share an angle-weighted
+// normal and a curvature tensor (least squares over the edges); a plane facet much larger than its curved neighbours keeps its own normal.
+// At a tip (a vertex without sharp edges whose faces deviate from their mean by a sharp angle, like the apex of a cone) each face keeps its
+// normal; edges there lie in both faces, so that patches still meet. The lowest point of a quadratic patch has a closed form; the search
+// walks over edges while the height decreases.
+// Source: T. Boubekeur, M. Alexa, "Phong tessellation" (2008), with alpha 1/2 in place of 3/4, which is exact for circles to second order;
+// G. Thuermer, C. Wuethrich (1998) for the angle weights.
 #include "runtime/physics/geometry/skin.hpp"
 
 #include <map>
@@ -15,14 +15,14 @@
 namespace carillon::geometry {
 namespace {
 
-constexpr double kCoplanar = 2e-4;   // rad
-constexpr double kSharp = 0.698;     // rad, 40 degrees
-constexpr double kBlunt = 0.35;      // rad, 20 degrees: below, an edge among others is never sharp
-constexpr double kSharper = 3.0;     // than the mean about it
-constexpr double kLargePlane = 6.0;  // times the area of its curved neighbours
+constexpr double kCoplanarRad = 2e-4;     // rad
+constexpr double kSharpRad = 0.698;       // rad, 40 degrees
+constexpr double kBluntRad = 0.35;        // rad, 20 degrees; below, an edge between other edges is never sharp
+constexpr double kSharpRatio = 3.0;       // relative to the mean about it
+constexpr double kLargePlaneRatio = 6.0;  // times the area of its curved neighbours
 constexpr double kLargePlaneOfAll = 0.01;
 constexpr double kAlpha = 0.5;
-constexpr double kSpring = 1e-3, kStays = 0.2;  // curvatures over the size
+constexpr double kSpring = 1e-3, kStays = 0.2;  // spring curvature times the size
 
 double calc_angle(const Vec3& a, const Vec3& b) { return std::atan2(norm(cross(a, b)), dot(a, b)); }
 
@@ -55,7 +55,7 @@ void Skin::find_regions() {
       region_area_[r] += 0.5 * norm(cross(mesh_.corner(f, 1) - mesh_.corner(f, 0), mesh_.corner(f, 2) - mesh_.corner(f, 0)));
       for (int k = 0; k < 3; ++k) {
         const int g = mesh_.opposite[3 * f + k] / 3;
-        if (region_[g] < 0 && norm2(mesh_.normals[g] - mesh_.normals[seed]) < kCoplanar * kCoplanar) {
+        if (region_[g] < 0 && norm2(mesh_.normals[g] - mesh_.normals[seed]) < kCoplanarRad * kCoplanarRad) {
           region_[g] = r;
           open.push_back(g);
         }
@@ -67,7 +67,7 @@ void Skin::find_regions() {
 void Skin::find_sharp_edges() {
   const int edges = 3 * mesh_.count_faces();
   sharp_.assign(edges, 0);
-  std::map<std::pair<int, int>, double> angles;  // of region pairs, the largest
+  std::map<std::pair<int, int>, double> angles;  // maximum angle of each region pair
   for (int e = 0; e < edges; ++e) {
     const int f = e / 3, g = mesh_.opposite[e] / 3;
     if (region_[f] >= region_[g]) continue;
@@ -77,7 +77,7 @@ void Skin::find_sharp_edges() {
   std::vector<double> sum(regions_, 0.0), area(regions_, 0.0);
   std::vector<int> count(regions_, 0);
   for (const auto& [pair, angle] : angles) {
-    if (angle > kSharp) continue;
+    if (angle > kSharpRad) continue;
     for (const auto& [r, other] : {pair, std::pair(pair.second, pair.first)}) {
       sum[r] += angle;
       ++count[r];
@@ -86,17 +86,18 @@ void Skin::find_sharp_edges() {
   }
   plane_.assign(regions_, 0);
   for (int r = 0; r < regions_; ++r)
-    plane_[r] = count[r] > 0 && region_area_[r] > kLargePlane * area[r] / count[r] && region_area_[r] > kLargePlaneOfAll * mesh_.area_m2;
+    plane_[r] =
+        count[r] > 0 && region_area_[r] > kLargePlaneRatio * area[r] / count[r] && region_area_[r] > kLargePlaneOfAll * mesh_.area_m2;
   for (int e = 0; e < edges; ++e) {
     int r = region_[e / 3], s = region_[mesh_.opposite[e] / 3];
     if (r == s) continue;
     if (r > s) std::swap(r, s);
     const double angle = angles[{r, s}];
     const int others = count[r] + count[s] - 2;
-    const bool lonely = others <= 0 || (angle > kBlunt && angle > kSharper * (sum[r] + sum[s] - 2.0 * angle) / others);
-    sharp_[e] = angle > kSharp || lonely || (plane_[r] != 0 && plane_[s] != 0);
+    const bool lonely = others <= 0 || (angle > kBluntRad && angle > kSharpRatio * (sum[r] + sum[s] - 2.0 * angle) / others);
+    sharp_[e] = angle > kSharpRad || lonely || (plane_[r] != 0 && plane_[s] != 0);
   }
-  // What ends amid a curved part is a dent of the mesh, not a ridge: ridges are closed or end at corners.
+  // A sharp chain that ends within a curved part is a dent of the mesh, not a ridge: ridges are closed or end at corners.
   std::vector<int> meeting(mesh_.vertices.size(), 0), open;
   for (int e = 0; e < edges; ++e)
     if (sharp_[e] != 0) ++meeting[mesh_.vertex_of(e)];
@@ -125,7 +126,7 @@ void Skin::make_fans() {
   for (int v = 0; v < mesh_.count_vertices(); ++v) {
     around.clear();
     int e = mesh_.any_half_edge[v];
-    int first = 0;  // of the first fan: behind a sharp edge
+    int first = 0;  // start of the first fan: behind a sharp edge
     int sharp = 0;
     bool curved = false, tip = false;
     std::array<Vec3, 2> ways{};
@@ -186,7 +187,7 @@ void Skin::make_fans() {
       kinds_[v] = curved ? VertexKind::smooth : VertexKind::none;
     } else if (sharp == 2) {
       const double bend = calc_angle(ways[0], -1.0 * ways[1]);
-      kinds_[v] = bend > kSharp ? VertexKind::corner : curved || bend > kCoplanar ? VertexKind::ridge : VertexKind::none;
+      kinds_[v] = bend > kSharpRad ? VertexKind::corner : curved || bend > kCoplanarRad ? VertexKind::ridge : VertexKind::none;
     } else {
       kinds_[v] = VertexKind::corner;
     }
@@ -199,7 +200,7 @@ bool Skin::is_tip(const std::vector<int>& corners, const Vec3& mean) const {
     max = std::max(max, calc_angle(mesh_.normals[c / 3], mean));
     edges += calc_angle(mesh_.normals[c / 3], mesh_.normals[mesh_.opposite[c] / 3]);
   }
-  return max > kSharp || (max > kBlunt && max > kSharper * edges / static_cast<double>(corners.size()));
+  return max > kSharpRad || (max > kBluntRad && max > kSharpRatio * edges / static_cast<double>(corners.size()));
 }
 
 void Skin::fit_tensor(int v, const std::vector<int>& corners, int fan) {
@@ -269,7 +270,7 @@ double Skin::calc_rim_radius_m(int vertex) const {
     e = Mesh::next(mesh_.opposite[e]);
   } while (e != mesh_.any_half_edge[vertex]);
   const double bend = calc_angle(ways[0], -1.0 * ways[1]);
-  return bend > kCoplanar ? std::min(0.5 * (norm(ways[0]) + norm(ways[1])) / bend, 0.5 * size_m_) : 0.0;
+  return bend > kCoplanarRad ? std::min(0.5 * (norm(ways[0]) + norm(ways[1])) / bend, 0.5 * size_m_) : 0.0;
 }
 
 int Skin::find_face(int vertex) const {
@@ -282,7 +283,8 @@ int Skin::find_face(int vertex) const {
   return start / 3;
 }
 
-/// Control points of curved edges. A sharp edge bends in the plane of its tangents, given by the normals of both sides, so both sides meet.
+/// Control points of curved edges. A sharp edge bends in the plane of its tangents, given by the normals of both sides, so that both sides
+/// meet.
 void Skin::make_bends() {
   bends_.resize(mesh_.faces.size());
   for (int e = 0; e < 3 * mesh_.count_faces(); ++e) {
@@ -290,11 +292,11 @@ void Skin::make_bends() {
     const Vec3 &p = mesh_.vertices[mesh_.vertex_of(e)], &q = mesh_.vertices[mesh_.vertex_of(next)], d = q - p;
     Vec3& control = bends_[e / 3][e % 3];
     control = 0.5 * (p + q);
-    const auto lift = [&](int corner, int across) {  // from the tangent plane or line at a corner to the other end
+    const auto lift = [&](int corner, int across) {  // height of the other end over the tangent plane or line at a corner
       const Vec3& n = fan_normals_[fan_[corner]];
       const Vec3 t = cross(n, fan_normals_[fan_[across]]);
       if (sharp_[e] == 0) return dot(d, n) * n;
-      return norm2(t) > kCoplanar ? d - (dot(d, t) / norm2(t)) * t : Vec3{};
+      return norm2(t) > kCoplanarRad ? d - (dot(d, t) / norm2(t)) * t : Vec3{};
     };
     if (flat_[e / 3] == 0) control = control - (0.5 * kAlpha) * lift(e, Mesh::next(other)) + (0.5 * kAlpha) * lift(next, other);
     sag_m_ = std::max(sag_m_, 2.0 / 3.0 * norm(control - 0.5 * (p + q)));
@@ -312,7 +314,7 @@ Vec3 Skin::calc_point(int face, const Vec3& w) const {
 Vec3 Skin::calc_normal(int face, const Vec3& w) const {
   if (flat_[face] != 0) return mesh_.normals[face];
   const Patch q = get_patch(face);
-  std::array<Vec3, 3> d;  // by each weight
+  std::array<Vec3, 3> d;  // derivatives by the weights
   for (int k = 0; k < 3; ++k) d[k] = w[k] * q.p[k] + w[(k + 1) % 3] * q.c[k] + w[(k + 2) % 3] * q.c[(k + 2) % 3];
   return normalise(cross(d[1] - d[0], d[2] - d[0]));
 }
@@ -327,7 +329,7 @@ Tensor Skin::calc_tensor(int face, const Vec3& w) const {
 
 double Skin::calc_mean_curvature(int face, const Vec3& w) const { return calc_mean(calc_tensor(face, w)); }
 
-/// Replaces a place by the lowest one of another face, if that is lower and below `below`; place() follows.
+/// Replaces a point by the lowest point of another face, if that is lower and below `below`; place() follows.
 void Skin::lower(const Vec3& up, int face, const Vec3& centre, double spring, double below, Spot& spot) const {
   const Patch q = get_patch(face);
   const Vec3 d0 = q.p[0] - centre, d1 = q.p[1] - centre, d2 = q.p[2] - centre;
@@ -335,7 +337,7 @@ void Skin::lower(const Vec3& up, int face, const Vec3& centre, double spring, do
                a2 = dot(up, q.p[2]) + spring * norm2(d2);
   const double c01 = dot(up, q.c[0]) + spring * dot(d0, d1), c12 = dot(up, q.c[1]) + spring * dot(d1, d2),
                c20 = dot(up, q.c[2]) + spring * dot(d2, d0);
-  // No place is lower than all coefficients, rounding apart.
+  // The coefficients bound the height from below, up to rounding.
   if (std::min({a0, a1, a2, c01, c12, c20}) >= below + tiny_) return;
   double lowest = Box::kFar;
   Vec3 weights{};
@@ -375,7 +377,7 @@ void Skin::lower(const Vec3& up, int face, const Vec3& centre, double spring, do
   spot.weights = weights;
 }
 
-/// The point of a spot on the patch, of a flat face as well.
+/// Point of a spot on the patch; also for a flat face.
 void Skin::place(Spot& spot) const {
   const Patch q = get_patch(spot.face);
   const Vec3& w = spot.weights;

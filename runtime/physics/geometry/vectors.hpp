@@ -12,7 +12,7 @@ namespace carillon::geometry {
 
 inline double norm2(const Vec3& a) { return dot(a, a); }
 
-/// Where a body is: x_world = R x + p, x in the frame of its mesh.
+/// Pose of a body: x_world = R x + p, x in the mesh frame.
 struct Frame {
   Mat3 rotation{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
   Vec3 position_m{};
@@ -21,7 +21,7 @@ struct Frame {
 inline Vec3 to_world(const Frame& f, const Vec3& x) { return f.rotation * x + f.position_m; }
 inline Vec3 to_body(const Frame& f, const Vec3& x) { return turn_back(f.rotation, x - f.position_m); }
 
-/// A box along axes.
+/// Axis-aligned box.
 struct Box {
   Vec3 low{kFar, kFar, kFar}, high{-kFar, -kFar, -kFar};
   void add(const Vec3& x) {

@@ -1,7 +1,7 @@
 // Method: see impact.hpp. A row is a direction of relative motion at a contact; phi of a row has the sign of the body in it, so that the
-// motion of row r is  free_r + sum_s A_rs f_s,   A = h^2/2 J M^-1 J^T + sum over modes phi_r g phi_s.
+// motion of row r is  free_r + sum_s A_rs f_s,   A = h^2/2 J M^-1 J^T + sum over modes phi_r g phi_s. Frames and mobilities are constant
+// during an impact; gyroscopic couples enter as given constant accelerations.
 // Source: discrete gradients, Gonzalez 1996 (J. Nonlinear Sci. 6, 449); modes inside an impact of a ball and a beam, Timoshenko 1913.
-// Deviations: frames and mobilities are constant in one impact; gyroscopic couples act as the constant accelerations given.
 #include "runtime/physics/impact/impact.hpp"
 
 #include <algorithm>
@@ -14,16 +14,13 @@
 namespace carillon::impact {
 namespace {
 
-constexpr double kSlowest = 1e-6;  // m/s: speed for the choice of the step without an approach
-constexpr double kTaper = 0.05;    // of the time of pressing: time constant of a rebound at its limit
-constexpr double kStill = 1e-3;    // m/s: settled contacts are slower
-constexpr double kSoon = 1e-3;     // s; time to the next touch of bodies still in contact, at most
-constexpr int kLimitings = 8;      // rounds for contacts that share bodies,
-constexpr double kOver = 1e-4;     // to this part of the force of a step
+constexpr double kMinSpeedMS = 1e-6;      // m/s; assumed for the step length if nothing approaches
+constexpr double kSettledSpeedMS = 1e-3;  // m/s; maximum speed of settled contacts
+constexpr double kMaxTouchDelayS = 1e-3;  // s; maximum time to the next touch of bodies still in contact
 
 bool is_finite(const Vec3& x) { return std::isfinite(x[0]) && std::isfinite(x[1]) && std::isfinite(x[2]); }
 
-/// Zero unless positive definite, as for a head without spin.
+/// Zero unless positive definite, as for a mallet head without spin.
 Mat3 invert_inertia(const Mat3& m) {
   const Mat3 minors{cross(m[1], m[2]), cross(m[2], m[0]), cross(m[0], m[1])};
   const double determinant = dot(m[0], minors[0]);
@@ -34,7 +31,7 @@ Mat3 invert_inertia(const Mat3& m) {
   return inverse;
 }
 
-/// A unit vector across `n`, along the axis that it is least along.
+/// Unit vector perpendicular to `n`, near the axis with its smallest component.
 Vec3 make_tangent(const Vec3& n) {
   const Vec3 axis = find_least_axis(n);
   const Vec3 t = axis - dot(axis, n) * n;
@@ -55,7 +52,7 @@ double Books::calc_error() const {
 
 Impact::Impact(std::vector<Body> bodies, const std::vector<Contact>& contacts, const Options& options)
     : above_band_(options.above_band), settling_s_(options.settling_s) {
-  check(!contacts.empty(), "there is no contact");
+  check(!contacts.empty(), "no contacts");
   check(options.steps_per_pulse >= 1.0 && options.longest_step_s > 0.0 && options.part_s >= 0.0, "options out of range");
   for (Body& body : bodies) place_body(std::move(body));
   for (const Contact& contact : contacts) add_contact(contact);
@@ -64,13 +61,13 @@ Impact::Impact(std::vector<Body> bodies, const std::vector<Contact>& contacts, c
   books_.start += calc_rigid_energy() + calc_spring_energies();
 }
 
-/// Adds a body, and the energy of its modes to the books.
+/// Adds a body and books the energy of its modes.
 void Impact::place_body(Body body) {
   check_body(body);
   const std::size_t modes = body.modes ? body.modes->size() : 0;
   if (body.q.empty()) body.q.assign(modes, 0.0);
   if (body.q_dot.empty()) body.q_dot.assign(modes, 0.0);
-  check(body.q.size() == modes && body.q_dot.size() == modes, "a modal state has another size than the modes");
+  check(body.q.size() == modes && body.q_dot.size() == modes, "modal state and modes differ in size");
   body.moved_m = body.turned_rad = {};
   body.impulse_n_s = body.couple_n_m_s = body.shift_n_s2 = body.turning_n_m_s2 = {};
   body.work_j = 0.0;
@@ -90,27 +87,29 @@ int Impact::join(const Body& body) {
 void Impact::check_contact(const Contact& contact) const {
   const auto count = static_cast<int>(bodies_.size());
   check(contact.a >= 0 && contact.a < count && contact.b >= -1 && contact.b < count && contact.a != contact.b,
-        "a contact names no two bodies");
-  check(std::abs(dot(contact.normal, contact.normal) - 1.0) < 1e-6, "a normal is not of length 1");
-  check(is_finite(contact.where_m) && std::isfinite(contact.gap_m), "a contact's place is not finite");
-  check(contact.spring.stiffness > 0.0 && std::isfinite(contact.spring.stiffness) && contact.spring.exponent >= 1.0, "a spring is not one");
-  check(contact.restitution >= 0.0 && contact.friction >= 0.0 && contact.tangential_ratio > 0.0, "a contact's law is out of range");
+        "contact does not name two different bodies");
+  check(std::abs(dot(contact.normal, contact.normal) - 1.0) < 1e-6, "normal is not a unit vector");
+  check(is_finite(contact.where_m) && std::isfinite(contact.gap_m), "contact position or gap is not finite");
+  check(contact.spring.stiffness > 0.0 && std::isfinite(contact.spring.stiffness) && contact.spring.exponent >= 1.0,
+        "invalid contact spring");
+  check(contact.restitution >= 0.0 && contact.friction >= 0.0 && contact.tangential_ratio > 0.0,
+        "restitution, friction or tangential ratio out of range");
   for (const bool first : {true, false}) {
     const int body = first ? contact.a : contact.b;
     const std::span<const double> shape = first ? contact.shape_a : contact.shape_b;
     check(shape.empty() || (body >= 0 && shape.size() == 3 * bodies_[body].q.size()),
-          "shape values of another number than the body's modes");
+          "number of shape values differs from the body's modes");
   }
 }
 
 void Impact::check_body(const Body& body) {
-  check(std::isfinite(body.mass_kg) && body.mass_kg >= 0.0, "a mass is negative or not finite");
+  check(std::isfinite(body.mass_kg) && body.mass_kg >= 0.0, "mass is negative or not finite");
   check(is_finite(body.centre_m) && is_finite(body.velocity_m_s) && is_finite(body.spin_rad_s) && is_finite(body.acceleration_m_s2) &&
             is_finite(body.spin_acceleration_rad_s2) && is_finite(body.inertia_kg_m2[0]) && is_finite(body.inertia_kg_m2[1]) &&
             is_finite(body.inertia_kg_m2[2]),
-        "a body's motion is not finite");
+        "motion of a body is not finite");
   for (const auto& row : body.mobility)
-    for (const double w : row) check(std::isfinite(w), "a mobility is not finite");
+    for (const double w : row) check(std::isfinite(w), "mobility is not finite");
 }
 
 void Impact::add_contact(const Contact& contact) {
@@ -127,14 +126,14 @@ void Impact::add_contact(const Contact& contact) {
   laws_.push_back(law);
   History& history = contacts_.emplace_back();
   history.given = contact;
-  history.given.shape_a = history.given.shape_b = {};  // now in modes_
+  history.given.shape_a = history.given.shape_b = {};  // stored in modes_
   history.is_limited = contact.is_limit && !(contact.shape_a.empty() && contact.shape_b.empty());
   history.pulse.contact = index;
   history.is_open = contact.gap_m > 0.0;
   history.yielded_m = contact.yielded_m;
 }
 
-/// Axes, mobilities and shape values of a contact, new or moved; its rows begin with `row`.
+/// Axes, mobilities and shape values of a new or moved contact; its rows begin with `row`.
 void Impact::place_contact(const Contact& contact, int index, int row) {
   const Vec3 n = contact.normal, t = make_tangent(n), axes[3] = {n, t, cross(n, t)};
   const int rows = contact.friction > 0.0 ? 3 : 1;
@@ -191,7 +190,7 @@ double Impact::calc_depth(int contact) const {
   return std::max(laws_[contact].compression_m, 0.0) + contacts_[contact].yielded_m + modes_.calc_displacement(laws_[contact].row);
 }
 
-/// Step length, hysteresis and anchor springs, from the elastic pulses that the rigid bodies would have. With h_ set: only of new contacts.
+/// Step length, hysteresis and anchor springs, from the elastic pulses of the rigid bodies. With h_ set: of new contacts only.
 void Impact::choose_step(const Options& options) {
   const std::size_t first = h_ > 0.0 ? laws_.size() - 1 : 0;
   std::vector<double> speed(laws_.size(), 0.0), inverse_mass(laws_.size(), 0.0);
@@ -206,11 +205,11 @@ void Impact::choose_step(const Options& options) {
     if (inverse_mass[c] == 0.0) inverse_mass[c] = modal;
     fastest_ = std::max(fastest_, speed[c]);
   }
-  fastest_ = std::max(fastest_, kSlowest);
+  fastest_ = std::max(fastest_, kMinSpeedMS);
   double shortest = options.longest_step_s * options.steps_per_pulse;
   for (std::size_t c = first; c < laws_.size(); ++c) {
     if (!(inverse_mass[c] > 0.0)) continue;
-    // A contact that only its neighbours push is taken at the fastest speed.
+    // A contact pushed only by its neighbours uses the fastest speed.
     const double v = speed[c] > 0.01 * fastest_ ? speed[c] : fastest_;
     const ElasticPulse pulse = set_law(static_cast<int>(c), inverse_mass[c], v);
     shortest = std::min(shortest, pulse.length_s);
@@ -222,7 +221,7 @@ void Impact::choose_step(const Options& options) {
   h_ = get_step(step_index_);
 }
 
-/// Hysteresis and anchor spring of a contact by its striking speed. Returns its elastic pulse.
+/// Hysteresis and anchor spring of a contact for its striking speed. Returns its elastic pulse.
 ElasticPulse Impact::set_law(int contact, double inverse_mass, double speed_m_s) {
   ContactLaw& law = laws_[contact];
   const ElasticPulse pulse = calc_elastic_pulse(law.spring, 1.0 / inverse_mass, speed_m_s);
@@ -236,7 +235,7 @@ ElasticPulse Impact::set_law(int contact, double inverse_mass, double speed_m_s)
   return pulse;
 }
 
-/// The energies of the spring and of its anchor stay. A pressed contact keeps its spring where the other one would be softer.
+/// Keeps the energies of the spring and its anchor. A compressed contact keeps its spring if the new one is softer.
 void Impact::exchange_spring(int contact, const Spring& spring) {
   ContactLaw& law = laws_[contact];
   History& history = contacts_[contact];
@@ -253,14 +252,14 @@ void Impact::exchange_spring(int contact, const Spring& spring) {
   law.tangential_n_m = tangential_n_m;
 }
 
-/// Open contacts are struck at their closing speed.
+/// Open contacts close with their current closing speed as the striking speed.
 void Impact::close_contacts() {
   for (std::size_t c = 0; c < laws_.size(); ++c) {
     const std::size_t row = laws_[c].row;
     if (!contacts_[c].is_open || !(laws_[c].compression_m - free_[row] > 0.0)) continue;
     contacts_[c].is_open = false;
     const double speed = -free_[row] / h_;
-    // The rebound is limited by the approach of the bodies; that of their modes counts for the first blow.
+    // The limit of the rebound is the approach of the bodies; the approach of their modes counts for the first blow only.
     const bool is_first = std::all_of(contacts_.begin(), contacts_.end(), [](const History& h) { return h.impulse_n_s == 0.0; });
     double& closing_m_s = contacts_[c].closing_m_s;
     if (contacts_[c].impulse_n_s == 0.0) closing_m_s = is_first ? speed : 0.0;
@@ -270,187 +269,18 @@ void Impact::close_contacts() {
   }
 }
 
-/// Propagators, A and the free motion of the first step with these contacts.
-void Impact::set_up_step() {
-  const std::size_t n = rows_.size();
-  A_.assign(n * n, 0.0);
-  mobility_.assign(n * n, 0.0);
-  free_.assign(n, 0.0);
-  moved_.assign(n, 0.0);
-  for (std::size_t i = 0; i < n; ++i)
-    for (std::size_t j = 0; j <= i; ++j) {
-      double gain = 0.0;
-      for (std::size_t s = 0; s < 2; ++s)
-        for (std::size_t t = 0; t < 2; ++t)
-          if (rows_[i].body[s] >= 0 && rows_[i].body[s] == rows_[j].body[t])
-            gain += dot(rows_[i].linear[s], rows_[j].to_velocity[t]) + dot(rows_[i].angular[s], rows_[j].to_spin[t]);
-      mobility_[i * n + j] = mobility_[j * n + i] = gain;
-      A_[i * n + j] = A_[j * n + i] = 0.5 * h_ * h_ * gain;
-    }
-  modes_.set_up(step_index_, n, A_);
-}
-
-/// The forces of the step, within the restitution of each contact.
-void Impact::solve_forces() {
-  bool found = solver_.solve(laws_, A_, free_, h_, force_);
-  for (int round = 0; round < kLimitings && limit_forces(); ++round) found = solver_.solve(laws_, A_, free_, h_, force_) && found;
-  if (!found) ++misses_;
-}
-
-/// Bounds the normal forces of modes under which rigid bodies would part too fast at the end of the step; true with any. The distance to
-/// the limit falls as exp(-t / tau), without an audible cut of a force. Forces up to the end of the approach are unbounded.
-bool Impact::limit_forces() {
-  const std::size_t n = rows_.size();
-  bool any = false;
-  for (std::size_t c = 0; c < laws_.size(); ++c) {
-    ContactLaw& t = laws_[c];
-    const auto row = t.row;
-    const double gain = h_ * mobility_[row * n + row];
-    if (!contacts_[c].is_limited || contacts_[c].given.restitution >= 1.0 || !(force_[row] > 0.0) || !(gain > 0.0)) continue;
-    const double before = calc_row_speed(rows_[row]), limit = contacts_[c].given.restitution * contacts_[c].closing_m_s;
-    double parting = before;
-    for (std::size_t side = 0; side < 2; ++side) {
-      if (rows_[row].body[side] < 0) continue;
-      const Body& body = bodies_[rows_[row].body[side]];
-      parting += h_ * (dot(rows_[row].linear[side], body.acceleration_m_s2) + dot(rows_[row].angular[side], body.spin_acceleration_rad_s2));
-    }
-    for (std::size_t r = 0; r < n; ++r) parting += h_ * mobility_[row * n + r] * force_[r];
-    const double left = limit - before,
-                 allowed = left > 0.0 ? std::max(0.0, before - left * std::expm1(-h_ / (kTaper * (contacts_[c].pressed_s + h_)))) : limit;
-    const double over = (parting - allowed) / gain;
-    if (over <= kOver * force_[row]) continue;
-    t.max_n = std::max(0.0, force_[row] - over);
-    any = true;
-  }
-  return any;
-}
-
-void Impact::step() {
-  const std::size_t n = rows_.size();
-  const double half = 0.5 * h_ * h_;
-  for (std::size_t r = 0; r < n; ++r) {
-    free_[r] = h_ * calc_row_speed(rows_[r]);
-    for (std::size_t side = 0; side < 2; ++side) {
-      if (rows_[r].body[side] < 0) continue;
-      const Body& body = bodies_[rows_[r].body[side]];
-      free_[r] += half * (dot(rows_[r].linear[side], body.acceleration_m_s2) + dot(rows_[r].angular[side], body.spin_acceleration_rad_s2));
-    }
-  }
-  modes_.add_free_motion(free_);
-  for (std::size_t c = 0; c < laws_.size(); ++c)
-    contacts_[c].closing_m_s = std::max(contacts_[c].closing_m_s, -calc_row_speed(rows_[laws_[c].row]));
-  close_contacts();
-
-  const bool reached = std::any_of(laws_.begin(), laws_.end(),
-                                   [&](const ContactLaw& t) { return t.compression_m > 0.0 || t.compression_m - free_[t.row] > 0.0; });
-  if (reached)
-    solve_forces();
-  else
-    std::fill(force_.begin(), force_.end(), 0.0);
-
-  bool pushed = false, struck = false;
-  for (std::size_t i = 0; i < n; ++i) {
-    moved_[i] = free_[i];
-    for (std::size_t j = 0; j < n; ++j) moved_[i] += A_[i * n + j] * force_[j];
-    pushed = pushed || force_[i] != 0.0;
-    struck = struck || (force_[i] != 0.0 && !contacts_[rows_[i].contact].given.rests);
-  }
-  for (std::size_t c = 0; c < laws_.size(); ++c) {
-    ContactLaw& t = laws_[c];
-    const auto row = t.row;
-    const double before = t.compression_m;
-    t.compression_m -= moved_[row];
-    // A contact without a force yields to further pressure: it takes up no energy, and gives back less than it has.
-    double &yielded = contacts_[c].yielded_m, &yielded_j = contacts_[c].yielded_j;
-    const bool is_limited = std::isfinite(t.max_n);
-    if (is_limited && t.compression_m > before) {
-      yielded += t.compression_m - before;
-      t.compression_m = before;
-    }
-    // Yielded compression recovers before the surfaces part.
-    if (t.compression_m < 0.0 && yielded > 0.0) {
-      const double recovered = std::min(yielded, -t.compression_m), recovered_j = yielded_j * recovered / yielded;
-      yielded_j -= recovered_j;
-      books_.dissipated_contact += recovered_j;
-      yielded -= recovered;
-      t.compression_m += recovered;
-    }
-    t.max_n = std::numeric_limits<double>::infinity();
-    contacts_[c].pressed_s = t.compression_m > 0.0 ? contacts_[c].pressed_s + h_ : 0.0;
-    const double taken_j =
-        -(force_[row] * moved_[row] + (calc_spring_energy(t.spring, t.compression_m) - calc_spring_energy(t.spring, before)));
-    (is_limited ? yielded_j : books_.dissipated_contact) += taken_j;
-    if (!(t.compression_m > 0.0) && yielded == 0.0) books_.dissipated_contact += std::exchange(yielded_j, 0.0);
-    Vec3 impulse = h_ * force_[row] * rows_[row].axis;
-    contacts_[c].impulse_n_s += h_ * force_[row];
-    if (t.friction > 0.0) {
-      const std::array<double, 2> u0 = t.stretch;
-      t.stretch = calc_shortened({u0[0] + moved_[row + 1], u0[1] + moved_[row + 2]}, t.friction * force_[row] / t.tangential_n_m);
-      for (std::size_t k = 0; k < 2; ++k) {
-        books_.dissipated_friction -=
-            force_[row + 1 + k] * moved_[row + 1 + k] + 0.5 * t.tangential_n_m * (t.stretch[k] * t.stretch[k] - u0[k] * u0[k]);
-        impulse = impulse + h_ * force_[row + 1 + k] * rows_[row + 1 + k].axis;
-      }
-    }
-    Pulse& pulse = contacts_[c].pulse;
-    if (dot(impulse, impulse) > 0.0) {
-      if (pulse.impulse_n_s.empty()) pulse.start_s = get_time();
-      pulse.step_s = h_;
-      pulse.impulse_n_s.resize(pulse.impulse_n_s.size() + contacts_[c].silent);
-      pulse.impulse_n_s.push_back(impulse);
-      contacts_[c].silent = 0;
-    } else if (!pulse.impulse_n_s.empty()) {
-      ++contacts_[c].silent;
-    }
-  }
-  // Rigid motion: accelerations of the step are constant.
-  for (std::size_t b = 0; b < bodies_.size(); ++b) {
-    Body& body = bodies_[b];
-    if (!(body.mass_kg > 0.0)) continue;
-    Vec3 linear = body.acceleration_m_s2, angular = body.spin_acceleration_rad_s2, force{}, couple{};
-    for (std::size_t r = 0; r < n && pushed; ++r)
-      for (std::size_t side = 0; side < 2; ++side)
-        if (rows_[r].body[side] == static_cast<int>(b)) {
-          linear = linear + force_[r] * rows_[r].to_velocity[side];
-          angular = angular + force_[r] * rows_[r].to_spin[side];
-          if (!body.on_joints) continue;
-          force = force + force_[r] * rows_[r].linear[side];
-          couple = couple + force_[r] * rows_[r].angular[side];
-        }
-    const Vec3 moved = h_ * body.velocity_m_s + half * linear, turned = h_ * body.spin_rad_s + half * angular;
-    body.velocity_m_s = body.velocity_m_s + h_ * linear;
-    body.spin_rad_s = body.spin_rad_s + h_ * angular;
-    body.moved_m = body.moved_m + moved;
-    body.turned_rad = body.turned_rad + turned;
-    if (body.on_joints) {
-      const double work = dot(force, moved) + dot(couple, turned);
-      on_joints_j_ += work;
-      body.work_j += work;
-      body.shift_n_s2 = body.shift_n_s2 + h_ * body.impulse_n_s + half * force;
-      body.turning_n_m_s2 = body.turning_n_m_s2 + h_ * body.couple_n_m_s + half * couple;
-      body.impulse_n_s = body.impulse_n_s + h_ * force;
-      body.couple_n_m_s = body.couple_n_m_s + h_ * couple;
-      continue;
-    }
-    books_.given += body.mass_kg * dot(body.acceleration_m_s2, moved) + dot(body.inertia_kg_m2 * body.spin_acceleration_rad_s2, turned);
-  }
-  modes_.move(force_);
-  ++steps_;
-  quiet_ = struck ? 0 : quiet_ + 1;
-}
-
-/// True after all have parted, but for settled contacts and those that had their time.
+/// True after all contacts have separated, except settled contacts and those whose time is over.
 bool Impact::is_over() const {
   const double quiet_s = quiet_ * h_;
   if (quiet_s < part_s_) return false;
   for (std::size_t c = 0; c < laws_.size(); ++c) {
     if (laws_[c].compression_m <= 0.0) {
-      if (-laws_[c].compression_m < kSoon * calc_approach(static_cast<int>(c))) return false;
+      if (-laws_[c].compression_m < kMaxTouchDelayS * calc_approach(static_cast<int>(c))) return false;
       continue;
     }
     if (!contacts_[c].given.rests) return false;
     const double moved = moved_[laws_[c].row];
-    if (std::abs(moved) > kStill * h_ && quiet_s < settling_s_) return false;
+    if (std::abs(moved) > kSettledSpeedMS * h_ && quiet_s < settling_s_) return false;
   }
   return true;
 }
@@ -472,8 +302,8 @@ void Impact::join(const Contact& contact) {
 }
 
 void Impact::push(int body, const Vec3& velocity_m_s, const Vec3& spin_rad_s) {
-  check(body >= 0 && body < static_cast<int>(bodies_.size()), "there is no such body");
-  check(is_finite(velocity_m_s) && is_finite(spin_rad_s), "a push is not finite");
+  check(body >= 0 && body < static_cast<int>(bodies_.size()), "body index out of range");
+  check(is_finite(velocity_m_s) && is_finite(spin_rad_s), "velocity change is not finite");
   const double before = calc_rigid_energy();
   Body& b = bodies_[body];
   b.velocity_m_s = b.velocity_m_s + velocity_m_s;
@@ -482,17 +312,17 @@ void Impact::push(int body, const Vec3& velocity_m_s, const Vec3& spin_rad_s) {
 }
 
 void Impact::update(std::span<const Body> bodies, std::span<const Contact> contacts) {
-  check(bodies.size() == bodies_.size() && contacts.size() == contacts_.size(), "an update has other bodies or contacts");
+  check(bodies.size() == bodies_.size() && contacts.size() == contacts_.size(), "update has a different number of bodies or contacts");
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     check_body(bodies[b]);
-    check((bodies[b].mass_kg > 0.0) == (bodies_[b].mass_kg > 0.0), "an update frees or fixes a body");
-    check(bodies[b].on_joints == bodies_[b].on_joints, "an update puts a body on joints or takes it off them");
+    check((bodies[b].mass_kg > 0.0) == (bodies_[b].mass_kg > 0.0), "update frees or fixes a body");
+    check(bodies[b].on_joints == bodies_[b].on_joints, "update adds a body to joints or removes it from them");
   }
   for (std::size_t c = 0; c < contacts.size(); ++c) {
     check_contact(contacts[c]);
     check(contacts[c].a == contacts_[c].given.a && contacts[c].b == contacts_[c].given.b &&
               (contacts[c].friction > 0.0) == (contacts_[c].given.friction > 0.0),
-          "an update has other contacts");
+          "update has different contacts");
   }
   const double before = calc_rigid_energy();
   for (std::size_t b = 0; b < bodies.size(); ++b) {
@@ -532,7 +362,7 @@ void Impact::update(std::span<const Body> bodies, std::span<const Contact> conta
       contacts_[c].is_open = t.compression_m < 0.0;
     }
     if (!rubs) continue;
-    // The part of the anchor spring along the new normal is lost.
+    // The component of the anchor spring along the new normal is lost.
     t.stretch = {dot(stretch, rows_[row + 1].axis), dot(stretch, rows_[row + 2].axis)};
     books_.dissipated_friction +=
         0.5 * t.tangential_n_m * (dot(stretch, stretch) - t.stretch[0] * t.stretch[0] - t.stretch[1] * t.stretch[1]);

@@ -1,4 +1,4 @@
-// Method: sums go in eight lanes, so that their bits do not depend on the width of vectors.
+// Method: sums use eight lanes, so that results do not depend on the vector width.
 #include "runtime/physics/impact/modal_groups.hpp"
 
 #include <algorithm>
@@ -18,7 +18,7 @@ struct State {
   std::size_t padded;
 };
 
-/// q, v over one step under the forces f of the rows; x: free motion of q in the next; w_free = phi x. kRows = 0: `rows` of them.
+/// Advances q, v by one step under the forces f of the rows; x: free motion of q in the next step; w_free = phi x. kRows = 0: `rows` rows.
 template <int kRows>
 void move_modes(const State& s, int rows, const double* __restrict f, double* __restrict w_free, double* __restrict lanes) {
   const int n = kRows ? kRows : rows;

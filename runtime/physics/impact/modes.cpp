@@ -1,8 +1,8 @@
-// Method: the answers g (to a unit force) and b = g' (to a unit impulse) of one oscillator in closed form; a = 1 - w^2 g, c = -w^2 b,
-// e = 1 - 2 d b - w^2 g follow from the equation of motion. Small w h and d h by the power series of g, which has no cancellation.
-// Source: the equation of the damped oscillator; the tail after the residual flexibility of component mode synthesis (MacNeal 1971),
-// with the constant modal density of plates (Cremer, Heckl, Structure-Borne Sound, on point mobilities).
-// Deviations: residual flexibility is a spring; ours also takes the energy that a short pulse sends above the band.
+// Method: responses g (to a unit force) and b = g' (to a unit impulse) of one oscillator in closed form; a = 1 - w^2 g, c = -w^2 b, e = 1 -
+// 2 d b - w^2 g follow from the equation of motion. Small w h and d h use the power series of g, which has no cancellation.
+// Source: the equation of the damped oscillator; the tail follows the residual flexibility of component mode synthesis (MacNeal 1971), with
+// the constant modal density of plates (Cremer, Heckl, Structure-Borne Sound, on point mobilities). Residual flexibility is a spring; this
+// tail also absorbs the energy of a short pulse above the band.
 #include "runtime/physics/impact/modes.hpp"
 
 #include <algorithm>
@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kTailRatio = 1.12;
 constexpr double kTailDecay = 0.15;
-constexpr std::size_t kKept = 24;
+constexpr std::size_t kMaxPropagators = 24;
 
 struct Answer {
   double g, b;  // displacement after a unit force over h [s^2], after a unit impulse [s]
@@ -46,7 +46,7 @@ Answer calc_answer(double w, double d, double h) {
   // Two real decays, slow * fast = w^2.
   const double k = std::sqrt(-discriminant), fast = d + k, slow = w * w / fast;
   const double to_slow = slow * h > 1e-300 ? -std::expm1(-slow * h) / slow : h, to_fast = -std::expm1(-fast * h) / fast;
-  if (2.0 * k * h < 1e-3) {  // next to critical damping: b from its sinh, g from the equation of motion
+  if (2.0 * k * h < 1e-3) {  // near critical damping: b from its sinh, g from the equation of motion
     const double fall = std::exp(-d * h), s = h * (1.0 + k * k * h * h / 6.0), c = 1.0 + 0.5 * k * k * h * h;
     return {(1.0 - fall * (c + d * s)) / (w * w), fall * s};
   }
@@ -57,7 +57,7 @@ std::shared_ptr<const Propagator> find_or_make(std::map<int, std::shared_ptr<con
                                                std::span<const double> decay, int k) {
   const auto found = kept.find(k);
   if (found != kept.end()) return found->second;
-  if (kept.size() >= kKept) kept.erase(kept.begin()->first < k ? kept.begin() : std::prev(kept.end()));
+  if (kept.size() >= kMaxPropagators) kept.erase(kept.begin()->first < k ? kept.begin() : std::prev(kept.end()));
   return kept[k] = std::make_shared<const Propagator>(make_propagator(omega, decay, get_step(k)));
 }
 
@@ -87,10 +87,10 @@ int find_step(double h_s) {
 
 Modes::Modes(std::span<const double> omega, std::span<const double> decay, double band_rad_s)
     : omega_(omega.begin(), omega.end()), decay_(decay.begin(), decay.end()), band_(band_rad_s) {
-  if (omega.size() != decay.size()) throw std::invalid_argument("impact: as many decays as frequencies are needed");
+  if (omega.size() != decay.size()) throw std::invalid_argument("impact: numbers of frequencies and decays differ");
   for (const auto& values : {omega_, decay_})
     if (!std::all_of(values.begin(), values.end(), [](double x) { return std::isfinite(x) && x >= 0.0; }))
-      throw std::invalid_argument("impact: frequencies and decays must be finite and not negative");
+      throw std::invalid_argument("impact: frequencies and decays must be finite and non-negative");
   if (!(band_ > 0.0)) band_ = omega_.empty() ? 0.0 : *std::max_element(omega_.begin(), omega_.end());
   const auto count = [&](double low, double high) {
     return std::count_if(omega_.begin(), omega_.end(), [&](double w) { return w > low && w <= high; });
@@ -120,7 +120,7 @@ std::vector<double> Modes::calc_tail_shapes(double compliance) const {
   std::vector<double> phi;
   for (int j = 0; j < kTailModes && has_tail_; ++j) {
     const double low = band_ * std::pow(kTailRatio, j), w = tail_omega_[j];
-    // The last one also has all that lies above it.
+    // The last mode also represents everything above it.
     const double share = band_ / low * (j + 1 < kTailModes ? 1.0 - 1.0 / kTailRatio : 1.0);
     phi.push_back(w * std::sqrt(compliance * share));
   }

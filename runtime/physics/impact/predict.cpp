@@ -1,4 +1,4 @@
-// Method: the spectrum of sin^1.5 in a table, energy of the modes as if the pulse were that of rigid bodies.
+// Method: tabulated spectrum of sin^1.5; modal energy as if the pulse were that of rigid bodies.
 // Source: Hertz 1882; sin^1.5 after Hunt and Crossley 1975; lambda of Zener 1941 (Phys. Rev. 59, 669): loss 1 - e^2 = 3.4 lambda.
 #include "runtime/physics/impact/predict.hpp"
 
@@ -29,7 +29,7 @@ std::array<double, kCells + 1> make_table() {
   for (int c = 0; c <= kCells; ++c) {
     const double x = kEnd * c / kCells;
     double sum = 0.0;
-    for (std::size_t i = 0; i < kPoints; ++i) sum += weight[i] * std::cos(x * (time[i] - 0.5));  // even about its middle
+    for (std::size_t i = 0; i < kPoints; ++i) sum += weight[i] * std::cos(x * (time[i] - 0.5));  // even about its centre
     table[c] = sum * sum / (area * area);
   }
   return table;

@@ -1,11 +1,11 @@
 // Method: Newton on  r(m) = m - free - A law(m)  in the motions m of the step; law() is monotone and piecewise smooth. One contact without
-// friction: Newton kept inside a bracket, which cannot fail.
-// Source: the mean-value discrete gradient, Gonzalez 1996; the friction rule (solve.hpp) is a return mapping (Simo, Hughes 1998, ch. 1)
-// at the middle of the step for the force and at its end for the state; own derivation of its passivity.
+// friction: bracketed Newton, which always converges.
+// Source: the mean-value discrete gradient, Gonzalez 1996; the friction rule (solve.hpp) is a return mapping (Simo, Hughes 1998, ch. 1) at
+// mid-step for the force and at the end of the step for the state.
 // Passivity of the friction rule: with R = mu F_n/k_t, U = |u0|, T = |u0 + s| and m = |u0 + s/2| <= (T + U)/2 the loss over k_t/2 is
 // min(1, R/m) (T^2 - U^2) - (min(T, R)^2 - U^2). m <= R: T <= R gives 0, T > R gives T^2 - R^2. m > R, T <= R: then U > R >= T, and it is
 // (1 - R/m) (U^2 - T^2). m > R, T > R: for T < U it is at least (U^2 - R^2) - (U^2 - T^2); for T >= U >= R at least U^2 - R^2; for U < R
-// at least 2 R (T - U) - (R - U)(R + U). None is negative.
+// at least 2 R (T - U) - (R - U)(R + U). All are non-negative.
 #include "runtime/physics/impact/solve.hpp"
 
 #include <algorithm>
@@ -19,9 +19,9 @@ namespace carillon::impact {
 namespace {
 
 constexpr int kSweeps = 200;
-constexpr double kFast = 1e-3;  // where a step leaves so little of the error, the next one takes the same factorisation
+constexpr double kReuseErrorRatio = 1e-3;  // error reduction of a step below which the next one reuses the factorisation
 
-/// The normal force of a step at whose end the compression is y1.
+/// Normal force of a step that ends with the compression y1.
 StepForce calc_normal_force(const ContactLaw& law, double y1, double h_s) {
   const StepForce one = calc_step_force(law.spring, law.compression_m, y1, h_s);
   return one.force > law.max_n ? StepForce{law.max_n, 0.0} : one;
@@ -36,7 +36,7 @@ std::array<double, 2> calc_shortened(const std::array<double, 2>& x, double long
 }
 
 void StepSolver::solve_one(const ContactLaw& law, double compliance, double free, double h_s, double& f) const {
-  // In the compression m: r(m) = m - m_free + A F(y0 + m) grows with slope >= 1; r <= 0 at m_free - A F(m_free), r >= 0 at m_free.
+  // In terms of the compression m: r(m) = m - m_free + A F(y0 + m) grows with slope >= 1; r <= 0 at m_free - A F(m_free), r >= 0 at m_free.
   const double m_free = -free, y0 = law.compression_m;
   double high = m_free, low = m_free - compliance * calc_normal_force(law, y0 + m_free, h_s).force;
   double m = std::clamp(m_free - compliance * f, low, high);
@@ -54,8 +54,8 @@ void StepSolver::solve_one(const ContactLaw& law, double compliance, double free
   f = calc_normal_force(law, y0 + m, h_s).force;
 }
 
-/// Fills law_ with the forces at `moved` (and slopes_), and pressing_ and pressed_ with the contacts that have any and their rows; returns
-/// the largest.
+/// Fills law_ and slopes_ with the forces at `moved`, and pressing_ and pressed_ with the loaded contacts and their rows; returns the
+/// largest force.
 double StepSolver::calc_law(const std::vector<ContactLaw>& laws, const std::vector<double>& moved, double h_s, bool with_slopes) {
   double largest = 0.0;
   pressing_.clear();
@@ -90,7 +90,7 @@ double StepSolver::calc_law(const std::vector<ContactLaw>& laws, const std::vect
   return largest;
 }
 
-/// Fills residual_ with m - free - A law(m); returns its largest entry, as a share of the motion along normals or tangents.
+/// Fills residual_ with m - free - A law(m); returns its largest entry, relative to the motion along normals or tangents.
 double StepSolver::calc_residual(const std::vector<ContactLaw>& laws, const std::vector<double>& A, const std::vector<double>& free,
                                  const std::vector<double>& moved, double h_s, bool with_slopes) {
   calc_law(laws, moved, h_s, with_slopes);
@@ -102,13 +102,13 @@ double StepSolver::calc_residual(const std::vector<ContactLaw>& laws, const std:
   double largest = 0.0;
   for (std::size_t i = 0; i < n; ++i) {
     const double r = std::abs(residual_[i]) / size_[i];
-    if (!std::isfinite(r)) return std::numeric_limits<double>::infinity();  // of a step that was not finite
+    if (!std::isfinite(r)) return std::numeric_limits<double>::infinity();  // from a non-finite step
     largest = std::max(largest, r);
   }
   return largest;
 }
 
-/// Factorises 1 - A law' of the rows that press; columns of what does not are those of 1. False where it is singular.
+/// Factorises 1 - A law' for the loaded rows; the other columns are those of the identity. False if singular.
 bool StepSolver::factorise(const std::vector<ContactLaw>& laws, const std::vector<double>& A) {
   const std::size_t rows = residual_.size(), n = pressed_.size();
   if (compliance_of_ != pressed_) {
@@ -138,15 +138,14 @@ bool StepSolver::factorise(const std::vector<ContactLaw>& laws, const std::vecto
   return functions.factorise(jacobian_.data(), n, n, pivots_.data());
 }
 
-/// The step of Newton, (1 - A law') step_ = residual_, with the law' that was factorised: the rows that press follow from that, the others
-/// from theirs.
+/// Newton step (1 - A law') step_ = residual_ with the factorised law': solved for the loaded rows; the others follow from them.
 void StepSolver::find_step(const std::vector<ContactLaw>& laws, const std::vector<double>& A) {
   const std::size_t rows = residual_.size(), n = pressed_then_.size();
   const dense::Functions& functions = dense::get_functions();
   solved_.resize(n);
   for (std::size_t j = 0; j < n; ++j) solved_[j] = residual_[pressed_then_[j]];
   functions.substitute(jacobian_.data(), n, n, pivots_.data(), solved_.data());
-  // By what the forces change with that, the motions of all rows.
+  // Motion of all rows due to the change of the forces.
   change_.assign(n, 0.0);
   std::size_t at = 0;
   for (const std::size_t c : pressing_then_) {
@@ -160,10 +159,10 @@ void StepSolver::find_step(const std::vector<ContactLaw>& laws, const std::vecto
   for (std::size_t j = 0; j < n; ++j) step_[pressed_then_[j]] = solved_[j];
 }
 
-/// Friction of one contact with its other forces given: u = c + A F/2, F = -k P(u) with P to at most limit/k. Where it slips, u and F are
-/// along each other, F = -2 b u with (1 + b A) u = c and 2 b |u| = limit; b |u(b)| grows with b, so b is bracketed. A: (2, 2).
+/// Friction of one contact for given other forces: u = c + A F/2, F = -k P(u) with P limited to limit/k. When slipping, u and F are
+/// parallel, F = -2 b u with (1 + b A) u = c and 2 b |u| = limit; b |u(b)| grows with b, so b is bracketed. A: (2, 2).
 std::array<double, 2> StepSolver::solve_friction(const std::array<double, 3>& A, const std::array<double, 2>& c, double k, double limit) {
-  // In the axes of A = (A00, A01, A11).
+  // In the principal axes of A = (A00, A01, A11).
   const double angle = 0.5 * std::atan2(2.0 * A[1], A[0] - A[2]), cosine = std::cos(angle), sine = std::sin(angle);
   const double mean = 0.5 * (A[0] + A[2]), off = std::hypot(0.5 * (A[0] - A[2]), A[1]);
   const std::array<double, 2> a{mean + off, std::max(mean - off, 0.0)}, along{cosine * c[0] + sine * c[1], cosine * c[1] - sine * c[0]};
@@ -180,7 +179,7 @@ std::array<double, 2> StepSolver::solve_friction(const std::array<double, 3>& A,
   return calc_shortened({cosine * f[0] - sine * f[1], sine * f[0] + cosine * f[1]}, limit);
 }
 
-/// Contact after contact, each with the others' forces given; true where the forces settle. Without friction: a descent on a convex energy.
+/// Contact by contact, each with the others' forces given; true if the forces converge. Without friction: descent on a convex energy.
 bool StepSolver::sweep(const std::vector<ContactLaw>& laws, const std::vector<double>& A, const std::vector<double>& free, double h_s,
                        bool rubs, std::vector<double>& f) const {
   const std::size_t n = free.size();
@@ -188,7 +187,7 @@ bool StepSolver::sweep(const std::vector<ContactLaw>& laws, const std::vector<do
     double change = 0.0, largest = 0.0;
     for (const ContactLaw& t : laws) {
       const auto row = t.row;
-      const auto calc_motion = [&](std::size_t i, std::size_t first, std::size_t last) {  // by all forces but first .. last
+      const auto calc_motion = [&](std::size_t i, std::size_t first, std::size_t last) {  // by all forces except first .. last
         double m = free[i];
         for (std::size_t j = 0; j < n; ++j)
           if (j < first || j > last) m += A[i * n + j] * f[j];
@@ -238,9 +237,9 @@ bool StepSolver::solve(const std::vector<ContactLaw>& laws, const std::vector<do
   }
   size_.assign(n, size_tangential);
   for (const ContactLaw& t : laws) size_[t.row] = size_normal;
-  compliance_of_.clear();  // A may be another one
+  compliance_of_.clear();  // A may have changed
   double error = calc_residual(laws, A, free, moved_, h_s, true);
-  bool is_fast = false, is_current = true;  // are forces and residual those of moved_?
+  bool is_fast = false, is_current = true;  // is_current: forces and residual belong to moved_
   for (int iteration = 0; iteration < 40 && error > 1e-13; ++iteration) {
     const bool is_new = !is_fast || pressed_ != pressed_then_;
     if (is_new && !factorise(laws, A)) break;
@@ -252,15 +251,15 @@ bool StepSolver::solve(const std::vector<ContactLaw>& laws, const std::vector<do
       next = calc_residual(laws, A, free, trial_, h_s, true);
       if (next < error || !is_new) break;
     }
-    is_fast = next < kFast * error;
+    is_fast = next < kReuseErrorRatio * error;
     is_current = next < error;
     if (is_current) {
       moved_.swap(trial_);
       error = next;
     } else if (is_new) {
-      break;  // as near as rounding or a kink lets it
+      break;  // limit of rounding, or a kink
     } else {
-      error = calc_residual(laws, A, free, moved_, h_s, true);  // once more with a factorisation of its own
+      error = calc_residual(laws, A, free, moved_, h_s, true);  // once more with a new factorisation
       is_current = true;
     }
   }
@@ -268,7 +267,7 @@ bool StepSolver::solve(const std::vector<ContactLaw>& laws, const std::vector<do
   f = law_;
   if (error <= 1e-11) return true;
   if (sweep(laws, A, free, h_s, true, f)) return true;
-  // Without friction nothing can be won: what the anchor springs held is lost.
+  // Without friction no energy can be gained: the energy of the anchor springs is lost.
   for (const ContactLaw& t : laws)
     if (t.friction > 0.0) f[t.row + 1] = f[t.row + 2] = 0.0;
   sweep(laws, A, free, h_s, false, f);

@@ -1,5 +1,5 @@
-// Method: discrete gradient of the spring's potential (Gonzalez 1996), so that a step's work is a difference of potentials. For p = 1.5
-// with a = sqrt(y0), b = sqrt(y1) it is 2/5 K (b^5 - a^5)/(b^2 - a^2) = 2/5 K (a^4 + a^3 b + a^2 b^2 + a b^3 + b^4)/(a + b).
+// Method: discrete gradient of the spring's potential (Gonzalez 1996), so that the work of a step is a difference of potentials. For p =
+// 1.5 with a = sqrt(y0), b = sqrt(y1) it is 2/5 K (b^5 - a^5)/(b^2 - a^2) = 2/5 K (a^4 + a^3 b + a^2 b^2 + a b^3 + b^4)/(a + b).
 // Source: Hertz 1882; Hunt and Crossley 1975 (J. Appl. Mech. 42, 440).
 #include "runtime/physics/impact/spring.hpp"
 
@@ -12,7 +12,7 @@ namespace {
 
 double calc_power(double y, double p) { return p == 1.5 ? y * std::sqrt(y) : std::pow(y, p); }
 
-/// Mean of y^p over y0 .. y1, none for y < 0.
+/// Mean of y^p over y0 .. y1; 0 for y < 0.
 double calc_mean_power(double y0, double y1, double p) {
   const double low = std::min(y0, y1), high = std::max(y0, y1);
   if (!(high > 0.0)) return 0.0;
@@ -22,7 +22,7 @@ double calc_mean_power(double y0, double y1, double p) {
     return 0.4 * (low * low + high * high + ab * (low + high + ab)) / (a + b);
   }
   if (high - low > 0.02 * high) return (high * std::pow(high, p) - low * std::pow(low, p)) / ((p + 1.0) * (high - low));
-  const double middle = 0.5 * (low + high), off = 0.5 * (high - low) * std::sqrt(0.6);  // Gauss, 3 points
+  const double middle = 0.5 * (low + high), off = 0.5 * (high - low) * std::sqrt(0.6);  // 3-point Gauss quadrature
   return (5.0 * std::pow(middle - off, p) + 8.0 * std::pow(middle, p) + 5.0 * std::pow(middle + off, p)) / 18.0;
 }
 

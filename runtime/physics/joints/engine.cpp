@@ -1,9 +1,8 @@
-// Method: bodies in the coordinates of their joints; mass matrix, Jacobians and accelerations by Simbody's recursive operators, none of
-//   which forms a matrix: accelerations cost O(n). Free motion by Merson's Runge-Kutta method of fourth order with its error estimate; the
-//   damping's work is one more component. What an impulse on a member does to all is J M^-1 J^T, a column of six for those that are
-//   touched.
+// Method: bodies in joint coordinates; mass matrix, Jacobians and accelerations by Simbody's recursive operators without forming matrices:
+// accelerations cost O(n). Free motion by Merson's Runge-Kutta method of fourth order with its error estimate; the work of the damping is
+// an additional component. The response of all members to an impulse on one is J M^-1 J^T, six columns per impacted member.
 // Source: A. Jain, "Robot and multibody dynamics" (2011), spatial operators; M. Sherman, A. Seth, S. Delp, "Simbody: multibody dynamics for
-//   biomedical research" (2011); E. Hairer, G. Wanner, "Solving ordinary differential equations I" (1993), II.4, Merson.
+// biomedical research" (2011); E. Hairer, G. Wanner, "Solving ordinary differential equations I" (1993), II.4, Merson.
 #include "runtime/physics/joints/engine.hpp"
 
 #include <SimTKsimbody.h>
@@ -23,7 +22,7 @@ SimTK::Vec3 to_simtk(const Vec3& v) { return SimTK::Vec3(v[0], v[1], v[2]); }
 Vec3 from_simtk(const SimTK::Vec3& v) { return Vec3{{v[0], v[1], v[2]}}; }
 SimTK::Rotation to_rotation(const Quaternion& q) { return SimTK::Rotation(SimTK::Quaternion(q[0], q[1], q[2], q[3])); }
 
-/// The frame of a joint in the world: its axis where Simbody's joint of that kind has it.
+/// Frame of a joint in the world: its axis as in Simbody's joint of that kind.
 SimTK::Rotation find_axes(const Joint& joint) {
   switch (joint.kind) {
     case Kind::kHinge:
@@ -37,7 +36,7 @@ SimTK::Rotation find_axes(const Joint& joint) {
   }
 }
 
-constexpr double kShortest = 1e-9;  // s; an integration that needs shorter steps than this has broken down
+constexpr double kShortest = 1e-9;  // s; with shorter steps the integration has failed
 
 class Tree final : public Mechanism {
  public:
@@ -87,11 +86,11 @@ class Tree final : public Mechanism {
         const double e = length / 30.0 * std::abs(2.0 * k1_[i] - 9.0 * k3_[i] + 8.0 * k4_[i] - k5_[i]);
         error = std::max(error, i < nq ? e : length * e);
       }
-      if (!std::isfinite(error)) throw std::runtime_error("the motion of a mechanism is not finite");
+      if (!std::isfinite(error)) throw std::runtime_error("motion of the mechanism is not finite");
       const double change = std::clamp(0.9 * std::pow(tolerance / std::max(error, 1e-30), 0.2), 0.2, 4.0);
       if (error > tolerance) {
         wished = length * std::min(change, 0.9);
-        if (wished < kShortest) throw std::runtime_error("the motion of a mechanism cannot be integrated any more");
+        if (wished < kShortest) throw std::runtime_error("motion of the mechanism cannot be integrated: step length too small");
         continue;
       }
       for (std::size_t i = 0; i < n; ++i) x_[i] += h / 6.0 * (k1_[i] + 4.0 * k4_[i] + k5_[i]);
@@ -184,7 +183,7 @@ class Tree final : public Mechanism {
     double damping;
   };
 
-  /// From the world outwards.
+  /// Builds the tree from the world outwards.
   void build(const std::vector<Member>& members, const std::vector<Joint>& joints) {
     std::vector<char> placed(members.size(), 0), used(joints.size(), 0);
     const auto get_pose = [&](int member) {
@@ -214,11 +213,11 @@ class Tree final : public Mechanism {
         const Joint& joint = joints[j];
         const auto is_placed = [&](int member) { return member < 0 || placed[member]; };
         const bool has_body = is_placed(joint.body), has_to = is_placed(joint.to);
-        if (has_body && has_to) throw std::invalid_argument("the joints close a loop");
+        if (has_body && has_to) throw std::invalid_argument("joints close a loop");
         if (!has_body && !has_to) continue;
         used[j] = 1;
         --left;
-        // A joint that is met from the other end is turned round: its axes are those of the start, and Simbody has it in reverse.
+        // A joint reached from its other end is reversed: its axes are those of the start, and Simbody reverses it.
         const int outer = has_to ? joint.body : joint.to, inner = has_to ? joint.to : joint.body;
         const SimTK::Transform frame(find_axes(joint), to_simtk(joint.at));
         const SimTK::Transform in = ~get_pose(inner) * frame, out = ~get_pose(outer) * frame;
@@ -246,12 +245,12 @@ class Tree final : public Mechanism {
         add(outer, index);
         if (joint.damping > 0.0) damped_.push_back({index, joint.damping});
       }
-      if (left == before) throw std::invalid_argument("the joints leave members apart");
+      if (left == before) throw std::invalid_argument("members are not connected by joints");
     }
-    if (std::find(placed.begin(), placed.end(), 0) != placed.end()) throw std::invalid_argument("the joints leave members apart");
+    if (std::find(placed.begin(), placed.end(), 0) != placed.end()) throw std::invalid_argument("members are not connected by joints");
   }
 
-  /// Velocities that the joints allow, nearest to those asked for by the kinetic energy of the difference.
+  /// Velocities permitted by the joints, nearest to the given ones by the kinetic energy of the difference.
   void start(const std::vector<Member>& members) {
     start_.q = to_list(state_.getQ());
     start_.u.assign(state_.getNU(), 0.0);
@@ -282,7 +281,7 @@ class Tree final : public Mechanism {
     system_.realize(state_, stage);
   }
 
-  /// q', u' and the damping's power.
+  /// Derivatives q', u' and the power of the damping.
   void calc_rates(const std::vector<double>& x, std::vector<double>& k) {
     SimTK::Vector &q = state_.updQ(), &u = state_.updU();
     const std::size_t nq = static_cast<std::size_t>(q.size()), nu = u.size();
@@ -297,7 +296,7 @@ class Tree final : public Mechanism {
     k[nq + nu] = power;
   }
 
-  /// By gravity and damping; the power of the damping.
+  /// Accelerations by gravity and damping. Returns the power of the damping.
   double calc_accelerations() {
     const SimTK::Vector& u = state_.getU();
     mobility_forces_.resize(u.size());
@@ -307,7 +306,7 @@ class Tree final : public Mechanism {
       mobility_forces_[i] = -damping * u[i];
       power += damping * u[i] * u[i];
     }
-    // M u' = forces - bias, the bias by Newton and Euler's recursion.
+    // M u' = forces - bias; bias by recursive Newton-Euler.
     matter_.calcResidualForceIgnoringConstraints(state_, mobility_forces_, weights_, SimTK::Vector(), residual_);
     matter_.multiplyByMInv(state_, -residual_, rates_);
     return power;

@@ -1,4 +1,4 @@
-// What the module with Simbody offers: one function, found by its name.
+// Interface of the module with Simbody: one function, found by its name.
 #pragma once
 
 #include <vector>

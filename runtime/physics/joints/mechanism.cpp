@@ -1,4 +1,4 @@
-// Loads the module with Simbody and makes mechanisms with it.
+// Loads the module with Simbody and creates mechanisms.
 #include "runtime/physics/joints/mechanism.hpp"
 
 #include <dlfcn.h>
@@ -16,12 +16,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The folder of the program or library that this code is in.
+/// Folder of the program or library that contains this code.
 fs::path find_own_folder() {
   Dl_info info{};
   if (dladdr(reinterpret_cast<const void*>(&find_own_folder), &info) == 0 || info.dli_fname == nullptr) return ".";
   std::error_code error;
-  // Of a program that was found along PATH the name has no folder.
+  // The name of a program found along PATH has no folder.
   const bool has_folder = std::string_view(info.dli_fname).find('/') != std::string_view::npos;
   const fs::path file = has_folder ? fs::canonical(info.dli_fname, error) : fs::read_symlink("/proc/self/exe", error);
   return error ? fs::path(".") : file.parent_path();
@@ -44,7 +44,7 @@ MakeMechanism load_engine() {
     if (void* found = dlsym(module, kEngineName); found != nullptr) return reinterpret_cast<MakeMechanism>(found);
     throw SystemError(fmt::format("{} belongs to another version of Carillon; install both from one build", file.string()));
   }
-  throw SystemError(fmt::format("joints need the module {}, which is at none of {}; install it with the programs", kEngineFile, tried));
+  throw SystemError(fmt::format("joints need the module {}, not found at {}; install it with the programs", kEngineFile, tried));
 }
 
 }  // namespace

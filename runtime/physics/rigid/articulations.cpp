@@ -1,4 +1,4 @@
-// Method: bodies on joints are moved in the coordinates of their mechanism: so joints stay closed to rounding.
+// Method: bodies on joints move in the coordinates of their mechanism, so joints stay closed to rounding.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 
 namespace carillon::rigid {
 
-/// One for each group of bodies that joints hold together. Fixed bodies are the world.
+/// One articulation per group of bodies connected by joints. Fixed bodies count as the world.
 void Bodies::make_articulations(const std::vector<joints::Joint>& joints) {
   if (joints.empty()) return;
   articulation_of_.assign(solids_.size(), -1);
@@ -113,7 +113,7 @@ bool Bodies::is_balanced(const Articulation& articulation) const {
   articulation.mechanism->find_accelerations(still, rates);
   const double g = std::max(norm(gravity_), 1e-9);
   for (int k = 0; const int body : articulation.bodies) {
-    if (norm(rates[k].linear) + norm(rates[k].angular) * solids_[body].radius_m >= kBalanced * g) return false;
+    if (norm(rates[k].linear) + norm(rates[k].angular) * solids_[body].radius_m >= kRestResidualRatio * g) return false;
     ++k;
   }
   return true;

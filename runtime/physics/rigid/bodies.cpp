@@ -1,4 +1,4 @@
-// Method: states, and frames that follow from them; mean properties of two bodies that touch.
+// Method: states, and frames derived from them; mean properties of two touching bodies.
 // Source: K. L. Johnson, "Contact mechanics" (1985), eq. 11.24.
 #include "runtime/physics/rigid/bodies.hpp"
 
@@ -14,13 +14,13 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr double kLongestHertz = 20e-3;  // s
+constexpr double kMaxHertzS = 20e-3;  // s
 
 }  // namespace
 
 double calc_hertz_duration(double compliance, double radius, double mass, double speed) {
   const double duration = 2.87 * std::pow(mass * mass * compliance * compliance / (radius * std::max(speed, 1e-3)), 0.2);
-  return std::clamp(duration, 5e-6, kLongestHertz);
+  return std::clamp(duration, 5e-6, kMaxHertzS);
 }
 
 Bodies::Bodies(std::vector<Solid> solids, std::vector<State> states, std::optional<Ground> ground, const Vec3& gravity,
@@ -39,7 +39,7 @@ void Bodies::place(int body) {
   const State& s = states_[body];
   double sum = 0.0;
   for (int k = 0; k < 3; ++k) sum += s.centre[k] + s.velocity[k] + s.momentum[k] + s.rotation[k];
-  if (!std::isfinite(sum)) throw SolveError(fmt::format("the motion of body {} is not finite after {:.6f} s", body, time_s_));
+  if (!std::isfinite(sum)) throw SolveError(fmt::format("motion of body {} is not finite after {:.6f} s", body, time_s_));
   placed_[body] = rigid::place(solids_[body], s);
 }
 
@@ -133,7 +133,7 @@ double Bodies::calc_compliance(int a, int b) const {
 
 double Bodies::calc_contact_radius(const geometry::Touch& touch, int a, int b) const {
   const double curvature = std::max(touch.curvature_a_per_m + touch.curvature_b_per_m, 0.0);
-  return 1.0 / std::clamp(curvature, 1.0 / std::max(0.5 * calc_size(a, b), kSharpest), 1.0 / kSharpest);
+  return 1.0 / std::clamp(curvature, 1.0 / std::max(0.5 * calc_size(a, b), kMinContactRadiusM), 1.0 / kMinContactRadiusM);
 }
 
 }  // namespace carillon::rigid

@@ -1,4 +1,4 @@
-// The bodies of a simulation: properties, states and frames; bodies on joints in joint coordinates.
+// Bodies of a simulation: properties, states and frames; bodies on joints in joint coordinates.
 #pragma once
 
 #include <memory>
@@ -14,7 +14,7 @@
 
 namespace carillon::rigid {
 
-/// Hertz contact time [s]: 2.87 (m^2 / (R E*^2 v))^(1/5) (K. L. Johnson, "Contact mechanics" (1985), eq. 11.24), kept within 5 us .. 20 ms.
+/// Hertz contact time [s]: 2.87 (m^2 / (R E*^2 v))^(1/5) (K. L. Johnson, "Contact mechanics" (1985), eq. 11.24), clamped to 5 us .. 20 ms.
 double calc_hertz_duration(double compliance_per_pa, double radius_m, double mass_kg, double speed_m_s);
 
 /// The half space z <= height_m.
@@ -24,38 +24,38 @@ struct Ground {
   double young_modulus_pa = 0.0, poisson_ratio = 0.0;
 };
 
-/// Bodies on joints, which move in the coordinates that their joints leave (runtime/physics/joints).
+/// Bodies on joints, moved in joint coordinates (runtime/physics/joints).
 struct Articulation {
   std::unique_ptr<joints::Mechanism> mechanism;
   std::vector<int> bodies;   // its members
-  bool is_anchored = false;  // by a joint to something that does not move
+  bool is_anchored = false;  // by a joint to a static body or the world
   joints::Coordinates now;
   int struck = -1;  // member that an impact with modes moves; -1: none
 };
 
-/// All bodies and the ground, body -1. Invariants: fixed and sleeping bodies do not move; frames and spins are those of the states, except
-/// between a change of state() and the place() that follows it; bodies on joints are where the coordinates of their articulation have them.
+/// All bodies and the ground, body -1. Invariants: fixed and sleeping bodies do not move; frames and spins match the states, except between
+/// a change of state() and the following place(); bodies on joints match the coordinates of their articulation.
 class Bodies {
  public:
-  /// Bodies on joints must make trees (joints::make_mechanism), and their velocities are projected onto the motions that the joints allow.
+  /// Bodies on joints must form trees (joints::make_mechanism); their velocities are projected onto the motions permitted by the joints.
   Bodies(std::vector<Solid> solids, std::vector<State> states, std::optional<Ground> ground, const Vec3& gravity,
          const std::vector<joints::Joint>& joints = {}, double joint_tolerance = joints::kTolerance);
 
   int count() const { return static_cast<int>(solids_.size()); }
   const Solid& solid(int body) const { return solids_[body]; }
   const State& state(int body) const { return states_[body]; }
-  /// place() follows a change.
+  /// Call place() after a change.
   State& state(int body) { return states_[body]; }
   const std::vector<State>& states() const { return states_; }
   const Placed& placed(int body) const { return placed_[body]; }
   const std::optional<Ground>& ground() const { return ground_; }
   const Vec3& gravity() const { return gravity_; }
-  /// Null: the ground.
+  /// nullptr: the ground.
   const geometry::Shape* get_shape(int body) const { return body >= 0 ? solids_[body].shape.get() : nullptr; }
   geometry::Frame get_frame(int body) const { return body >= 0 ? placed_[body].frame : geometry::Frame{}; }
-  /// Frame and spin follow from the state. Throws SolveError where it is not finite.
+  /// Updates frame and spin from the state. Throws SolveError if the state is not finite.
   void place(int body);
-  /// The time of the states.
+  /// Time of the states.
   void set_time(double time_s) { time_s_ = time_s; }
   double get_time() const { return time_s_; }
 
@@ -65,28 +65,28 @@ class Bodies {
   void set_asleep(int body, bool sleeps) { asleep_[body] = sleeps ? 1 : 0; }
   bool are_all_asleep() const;
   bool has_modes(int body) const { return body >= 0 && solids_[body].modes != nullptr; }
-  /// Is its surface without curved parts?
+  /// True if the surface has no curved parts.
   bool is_flat(int body) const { return body < 0 || solids_[body].shape->is_polyhedron(); }
-  /// Is it, or are its modes, in an impact with modes?
+  /// True if the body or its modes take part in a modal impact.
   bool is_in_impact(int body) const { return body >= 0 && in_impact_[body] != 0; }
-  /// Begin and end of an impact with modes count as blows.
+  /// Start and end of a modal impact count as blows.
   void set_in_impact(int body, bool is_in) {
     in_impact_[body] = is_in ? 1 : 0;
     note_struck(body);
   }
   void note_struck(int body) { struck_s_[body] = get_time(); }
-  double get_struck_s(int body) const { return struck_s_[body]; }  // of the last impact
-  /// Bound of the displacement of its surface by its modes between impacts [m].
+  double get_struck_s(int body) const { return struck_s_[body]; }  // time of the last impact
+  /// Bound of the displacement of the surface by modes between impacts [m].
   double get_swing(int body) const { return body >= 0 ? swings_m_[body] : 0.0; }
   void set_swing(int body, double swing_m) { swings_m_[body] = swing_m; }
-  /// Does an impact with modes move it, or the articulation that it belongs to?
+  /// True if a modal impact moves the body or its articulation.
   bool is_moved_by_impact(int body) const {
     if (!moves(body)) return false;
     const Articulation* articulation = find_articulation(body);
     return articulation != nullptr ? articulation->struck >= 0 : is_in_impact(body);
   }
 
-  /// Velocity of the point of a body at that place [m/s]; zero for the ground and fixed bodies.
+  /// Velocity of a body at a point [m/s]; zero for the ground and fixed bodies.
   Vec3 calc_velocity(int body, const Vec3& where) const;
   /// Closing speed of the surfaces of a and b at a touch [m/s].
   double calc_approach(const geometry::Touch& touch, int a, int b) const;
@@ -99,23 +99,23 @@ class Bodies {
   /// Upper bound of the speed of any point of a body [m/s].
   double calc_speed(int body) const { return norm(states_[body].velocity) + norm(placed_[body].spin) * solids_[body].radius_m; }
   geometry::Box calc_box(int body, double grown_m) const;
-  /// About its centre, world axes [kg m^2].
+  /// About the centre, world axes [kg m^2].
   Mat3 calc_inertia(int body) const { return placed_[body].rotation * (solids_[body].inertia_kg_m2 * transpose(placed_[body].rotation)); }
-  /// Kinetic and of gravity [J].
+  /// Kinetic and gravitational energy [J].
   double calc_energy(const std::vector<int>& bodies) const;
   double calc_kinetic(const std::vector<int>& bodies) const;
-  /// Energy of motion, and losses in joints.
+  /// Adds the energy of motion and the losses in joints.
   void add_to(Books& books) const;
 
-  // Of two bodies that touch, or of one and the ground:
+  // Of two touching bodies, or of one and the ground:
   double calc_friction(int a, int b) const;
   double calc_restitution(int a, int b) const;
   double calc_size(int a, int b) const;        // of the smaller one [m]
   double calc_thickness(int a, int b) const;   // of the thinner one [m]
   double calc_compliance(int a, int b) const;  // 1/E* [1/Pa]
-  /// 1/R is the summed curvature, kept within 1/(0.5 mm) and one over half the size of the smaller body.
+  /// 1/R is the summed curvature, clamped between the curvature for half the size of the smaller body and 1/(0.5 mm).
   double calc_contact_radius(const geometry::Touch& touch, int a, int b) const;
-  /// Duration of an impact there (calc_hertz_duration) of that effective mass and speed [s].
+  /// Duration of an impact at the touch (calc_hertz_duration) for an effective mass and speed [s].
   double calc_contact_time(const geometry::Touch& touch, int a, int b, double mass_kg, double speed_m_s) const {
     return calc_hertz_duration(calc_compliance(a, b), calc_contact_radius(touch, a, b), mass_kg, speed_m_s);
   }
@@ -126,30 +126,30 @@ class Bodies {
     return body >= 0 && !articulations_.empty() && articulation_of_[body] >= 0 ? &articulations_[articulation_of_[body]] : nullptr;
   }
   const Articulation* find_articulation(int body) const { return const_cast<Bodies*>(this)->find_articulation(body); }
-  /// Its number in its articulation.
+  /// Index of the body in its articulation.
   int get_member(int body) const { return member_[body]; }
-  /// Are they one body, or members of one articulation?
+  /// True for the same body or members of one articulation.
   bool share_motion(int a, int b) const {
     return a == b || (find_articulation(a) != nullptr && find_articulation(a) == find_articulation(b));
   }
-  /// Does a joint hold the two together, so that they do not collide?
+  /// True if a joint connects the two bodies; they do not collide.
   bool is_joined(int a, int b) const { return !joined_.empty() && joined_.contains(std::minmax(a, b)); }
-  /// Difference between the velocity given at the start and the motions that the joints of a body allow [m/s]; 0 without joints.
+  /// Difference between the given start velocity and the motions permitted by the joints of a body [m/s]; 0 without joints.
   double get_start_error(int body) const;
-  /// `time_s` later without contacts. Throws SolveError where the integration fails.
+  /// Motion by `time_s` without contacts. Throws SolveError if the integration fails.
   joints::Coordinates fly(const Articulation& articulation, const joints::Coordinates& from, double time_s) const;
-  /// The states of its members follow from its coordinates.
+  /// Updates the states of the members from the coordinates.
   void place(const Articulation& articulation);
   State make_member_state(int body, const joints::Motion& motion) const;
-  /// Impulses at once, one a member.
+  /// Applies simultaneous impulses, one per member.
   void apply_impulses(Articulation& articulation, const std::vector<joints::Spatial>& impulses);
-  /// Bound of the acceleration of any of its points by joints: twice the present one [m/s^2].
+  /// Bound of the acceleration of any point due to joints: twice the present one [m/s^2].
   double calc_joint_acceleration(const Articulation& articulation) const;
-  /// Is it in equilibrium without velocity and contacts?
+  /// True if the articulation is in equilibrium without velocity and contacts.
   bool is_balanced(const Articulation& articulation) const;
-  /// Velocity and spin that a member gains per impulse and couple on itself.
+  /// Velocity and spin of a member per linear and angular impulse on itself.
   impact::Mobility calc_own_mobility(const Articulation& articulation, int member) const;
-  /// Calls for every articulation among `bodies`, of which either all members are there or none.
+  /// Calls act for every articulation among `bodies`; either all or no members of an articulation are included.
   template <typename Do>
   void for_articulations(const std::vector<int>& bodies, Do&& act) {
     if (articulations_.empty()) return;

@@ -1,4 +1,4 @@
-// Method: Runge-Kutta of fourth order on the quaternion, the angular momentum constant.
+// Method: fourth-order Runge-Kutta on the quaternion at constant angular momentum.
 // Source: E. Hairer, G. Wanner, "Solving ordinary differential equations I" (1993), II.1.
 #include "runtime/physics/rigid/body.hpp"
 
@@ -53,8 +53,8 @@ State fly(const Solid& solid, const State& from, const Vec3& gravity, double tim
   const auto add = [](const Quaternion& q, double s, const Quaternion& k) {
     return Quaternion{q[0] + s * k[0], q[1] + s * k[1], q[2] + s * k[2], q[3] + s * k[3]};
   };
-  constexpr double kTurn = 0.05;  // rad
-  const int parts = std::max(1, static_cast<int>(std::ceil(std::min(norm(calc_spin(from.rotation)) * time_s / kTurn, 1e6))));
+  constexpr double kSubstepTurnRad = 0.05;  // rad
+  const int parts = std::max(1, static_cast<int>(std::ceil(std::min(norm(calc_spin(from.rotation)) * time_s / kSubstepTurnRad, 1e6))));
   const double h = time_s / parts;
   Quaternion q = from.rotation;
   for (int part = 0; part < parts; ++part) {

@@ -1,4 +1,4 @@
-// A rigid body: its state, and how it flies.
+// A rigid body: state and free flight.
 #pragma once
 
 #include <array>
@@ -9,8 +9,8 @@
 
 #include "runtime/base/quaternion.hpp"
 #include "runtime/base/vector.hpp"
-#include "runtime/physics/impact/modes.hpp"
 #include "runtime/physics/geometry/touch.hpp"
+#include "runtime/physics/impact/modes.hpp"
 
 namespace carillon::rigid {
 
@@ -18,11 +18,11 @@ using carillon::multiply;
 using carillon::Quaternion;
 
 Mat3 make_rotation(const Quaternion& q);
-/// Of a rotation vector [rad], in full.
+/// From a rotation vector [rad], exact.
 Quaternion make_turn(const Vec3& turn);
 Quaternion normalise(const Quaternion& q);
 
-/// What does not change.
+/// Constant properties of a body.
 struct Solid {
   std::shared_ptr<const geometry::Shape> shape;
   bool fixed = false;
@@ -30,22 +30,22 @@ struct Solid {
   Vec3 centre_m{};       // of mass, frame of the mesh
   Mat3 inertia_kg_m2{};  // about the centre, axes of the mesh
   Mat3 inverse_inertia{};
-  double radius_m = 0.0;  // of a ball about the centre that holds the body
+  double radius_m = 0.0;  // of a ball about the centre that encloses the body
   double restitution = 0.5, friction = 0.4;
   double young_modulus_pa = 0.0, poisson_ratio = 0.0;
-  std::shared_ptr<const impact::Modes> modes;  // null: does not ring
-  /// (n, 3) mode shapes at a place of the surface, axes of the mesh [1/sqrt(kg)]. Set where there are modes.
+  std::shared_ptr<const impact::Modes> modes;  // null: no modes
+  /// (n, 3) mode shapes at a point of the surface, mesh axes [1/sqrt(kg)]. Set if there are modes.
   std::function<std::vector<double>(const geometry::Place&)> find_shape;
 };
 
-/// Where a body is and how it moves. The angular momentum is kept, not the spin: in flight it is constant to the last bit.
+/// Pose and motion of a body. Stores the angular momentum instead of the spin: constant in flight, bit for bit.
 struct State {
   Vec3 centre{}, velocity{};
   Quaternion rotation{1, 0, 0, 0};
   Vec3 momentum{};  // angular, about the centre, world axes [kg m^2/s]
 };
 
-/// The same with what follows from it.
+/// A state with derived quantities.
 struct Placed {
   Mat3 rotation{}, inverse_inertia{};  // world axes
   Vec3 spin{};
@@ -54,11 +54,11 @@ struct Placed {
 
 Placed place(const Solid& solid, const State& state);
 
-/// `time_s` later without contacts: a parabola, and a rotation of constant angular momentum, q' = 1/2 (I(q)^-1 L) q, by the classical
-/// Runge-Kutta method in pieces that turn by at most 0.05 rad.
+/// Motion by `time_s` without contacts: a parabola, and a rotation at constant angular momentum, q' = 1/2 (I(q)^-1 L) q, by the classical
+/// Runge-Kutta method in substeps of at most 0.05 rad.
 State fly(const Solid& solid, const State& state, const Vec3& gravity, double time_s);
 
-/// Kinetic and in the field of gravity, which counts from the origin [J].
+/// Kinetic and gravitational energy, relative to the origin [J].
 double calc_energy(const Solid& solid, const State& state, const Vec3& gravity);
 double calc_kinetic(const Solid& solid, const State& state);
 double calc_kinetic(const Solid& solid, const State& state, const Placed& placed);

@@ -1,9 +1,8 @@
-// Method: a cord is a contact between the two places it is tied to: the gap is the length until it is taut, the normal lies along it, it
-//   pulls and never pushes. In a step the normal is that of the middle of the step: with it a taut cord keeps its length and does no work
-//   while its body swings.
+// Method: a cord is a contact between its two anchors: the gap is the length until taut, the normal lies along the cord, and the cord only
+// pulls. The normal of a step is that at mid-step: a taut cord then keeps its length and does no work while its body swings. A cord has no
+// mass, and its tug on the surface of a body is inaudible. A stop of a joint is a contact of the same kind with a normal along the motion
+// of the joint, also inaudible.
 // Source: J. J. Moreau, "Unilateral contact and dry friction in finite freedom dynamics" (1988).
-// Deviations: a cord has no mass, and its jerk on the surface of a body is not heard. A stop of a joint is such a
-//   contact, too, with a normal along the way of its joint, and is not heard either.
 #include "runtime/physics/rigid/cords.hpp"
 
 #include <algorithm>
@@ -14,11 +13,11 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr double kFarTooDeep = 5e-5;  // m; from here on a cord shortens even if that gains energy
+constexpr double kMaxStretchM = 5e-5;  // m; a cord stretched further is shortened even if that gains energy
 
 struct StopTouch {
   double gap_m = 0.0;
-  Vec3 where_m{}, normal{};  // from b to a: a is pushed along it
+  Vec3 where_m{}, normal{};  // from b to a: direction of the push on a
 };
 
 struct Pose {
@@ -27,7 +26,7 @@ struct Pose {
 };
 Pose get_pose(const State& state) { return {state.centre, make_rotation(state.rotation)}; }
 
-/// Place of a stop and the way that is left to it, the bodies being there.
+/// Position of a stop and its remaining travel for the given poses.
 StopTouch calc_stop_touch(const Stop& stop, const Pose& a, const Pose& b) {
   const Vec3 axis = b.rotation * stop.axis, at_a = a.centre + a.rotation * stop.at_a;
   const double sign = stop.is_lower ? 1.0 : -1.0;
@@ -40,19 +39,19 @@ StopTouch calc_stop_touch(const Stop& stop, const Pose& a, const Pose& b) {
   return {-sign * stop.arm_m * (stop.max - angle), at_a + stop.arm_m * lever_a, sign * cross(axis, lever_a)};
 }
 
-/// The place in the world of an end of a cord, its body being there.
+/// World position of a cord end for a state of its body.
 Vec3 calc_anchor(const Cord& cord, bool is_a, const State& state) {
   if (!is_a && cord.b < 0) return cord.at_b;
   return state.centre + make_rotation(state.rotation) * (is_a ? cord.at_a : cord.at_b);
 }
 
-/// The row of a stop in a step. Equal and opposite impulses at one place on two bodies that a joint connects move that joint alone.
+/// Row of a stop in a step. Equal and opposite impulses at one point of two bodies connected by a joint move that joint alone.
 Point make_stop_point(const Bodies& bodies, const Step& step, const Stop& stop, const Contact& c) {
   const double h = step.length_s;
   Point p;
   p.a = step.find(c.a);
   p.b = step.find(c.b);
-  // Impulses act where the mechanism is at the end of the step without them (step.cpp).
+  // Impulses act at the configuration of the mechanism at the end of the step without them (step.cpp).
   const auto get_end = [&](int body, int n) {
     if (n < 0) return body >= 0 ? get_pose(bodies.state(body)) : Pose{};
     return Pose{step.free[n].state.centre, step.free[n].placed.rotation};
@@ -62,8 +61,8 @@ Point make_stop_point(const Bodies& bodies, const Step& step, const Stop& stop, 
   if (p.a >= 0) p.arm_a = end.where_m - step.free[p.a].state.centre;
   if (p.b >= 0) p.arm_b = end.where_m - step.free[p.b].state.centre;
   const double approach = bodies.calc_approach(c.touch, c.a, c.b), gap = c.touch.gap_m;
-  double speed = c.touching && gap <= kTouch ? 0.0 : approach - 2.0 * std::max(gap, 0.0) / h;
-  if (gap < -kDeep) speed += std::min(kPushOut * (-kDeep - gap), 5e-3);
+  double speed = c.touching && gap <= kTouchGapM ? 0.0 : approach - 2.0 * std::max(gap, 0.0) / h;
+  if (gap < -kDeepM) speed += std::min(kPushOutRatePerS * (-kDeepM - gap), 5e-3);
   p.wanted = speed * p.normal;
   p.impulse = (c.step_s > 0.0 ? h / c.step_s : 0.0) * c.impulse;
   return p;
@@ -97,7 +96,7 @@ void update_cord(const Bodies& bodies, const Cord& cord, Pair& pair) {
     contact.a = cord.a;
     contact.b = cord.b;
     contact.cord = pair.cord;
-    contact.touching = now.gap_m <= kTouch;
+    contact.touching = now.gap_m <= kTouchGapM;
     pair.contacts.push_back(contact);
   }
   geometry::Touch& touch = pair.contacts.front().touch;
@@ -106,7 +105,7 @@ void update_cord(const Bodies& bodies, const Cord& cord, Pair& pair) {
   touch.normal = now.normal;
 }
 
-/// Along the cord half a step later.
+/// Row of a cord in a step, along the cord at mid-step.
 Point make_cord_point(const Bodies& bodies, const Step& step, const Cord& cord, const Contact& c) {
   if (cord.stop) return make_stop_point(bodies, step, *cord.stop, c);
   const double h = step.length_s;
@@ -115,7 +114,7 @@ Point make_cord_point(const Bodies& bodies, const Step& step, const Cord& cord, 
   p.b = step.find(c.b);
   struct End {
     Vec3 middle{}, velocity{}, arm{},
-        beyond{};  // in the world half a step later; now; from the centre that the impulse has; of the arm after
+        beyond{};  // world: at mid-step; now; from the centre to the impulse; rotation of the arm after mid-step
   };
   const auto make_end = [&](int body, int n, bool is_a) {
     End end;
@@ -143,12 +142,12 @@ Point make_cord_point(const Bodies& bodies, const Step& step, const Cord& cord, 
   p.normal = distance > 0.0 ? (1.0 / distance) * way : c.touch.normal;
   const Vec3 u = a.velocity - b.velocity;
   const double along = dot(u, p.normal), error = dot(u, c.touch.normal), gap = c.touch.gap_m;
-  // Taut: as fast along the middle at the end as against it now, which keeps the length; the present stretch is not kept.
-  double speed = c.touching && gap <= kTouch ? error - along : -along - 2.0 * std::max(gap, 0.0) / h;
-  // Excess length is taken in as depth is pushed out, at half the power that the cord loses (step_points.cpp).
-  if (gap < -kDeep) {
+  // Taut: equal and opposite speeds along the mid-step direction at both ends of the step keep the length; present stretch remains.
+  double speed = c.touching && gap <= kTouchGapM ? error - along : -along - 2.0 * std::max(gap, 0.0) / h;
+  // Excess length is removed like penetration, at half the power that the cord loses (step_points.cpp).
+  if (gap < -kDeepM) {
     const double pull = dot(c.impulse, c.touch.normal), paid = pull > 0.0 ? std::max(0.5 * c.lost_j / pull, 0.0) : 0.0;
-    speed += std::min(kPushOut * (-kDeep - gap), gap < -kFarTooDeep ? 5e-3 : paid);
+    speed += std::min(kPushOutRatePerS * (-kDeepM - gap), gap < -kMaxStretchM ? 5e-3 : paid);
   }
   p.wanted = speed * p.normal - (a.beyond - b.beyond);
   p.impulse = (c.step_s > 0.0 ? h / c.step_s : 0.0) * c.impulse;

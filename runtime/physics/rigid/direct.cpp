@@ -1,10 +1,9 @@
-// Method: augmented Lagrangian. With the residual r = w - J v of the rows that hold and a compliance eps,
+// Method: augmented Lagrangian. With the residual r = w - J v of the active rows and a compliance eps,
 //     (M + sum J^T J / eps) d = J^T r / eps,   lambda += (r - J d) / eps,   v = v_free + M^-1 J^T lambda,
-//   symmetric, positive and as sparse as the touches between bodies; iterated until r vanishes (3 to 5 times) with one factorisation. Rows
-//   are released and added by the signs of the answer.
+// symmetric, positive definite and as sparse as the contact graph; iterated until r vanishes (3 to 5 times) with one factorisation. Rows
+// are released and added by the signs of the solution. The cone is round; the impulse of a sliding point lags by one guess.
 // Source: A. Enzenhoefer, N. Lefebvre, S. Andrews, "Efficient block pivoting for multibody simulations with contact" (2019): pivoting of
-//   blocks with a compliant system; factorisation by Eigen.
-// Deviations: the cone is round; the impulse of a sliding point lags by one guess.
+// blocks with a compliant system; factorisation by Eigen.
 #include <Eigen/LU>
 #include <Eigen/SparseCholesky>
 #include <algorithm>
@@ -19,15 +18,15 @@ namespace {
 using Block = Eigen::Matrix<double, 6, 6>;
 using Row6 = Eigen::Matrix<double, 6, 1>;
 
-constexpr double kCompliance = 1e-3;  // of the mobility of a row: of one body,
-constexpr double kLeast = 1e-5;       // and at least;
-constexpr double kOnePoint = 1e-6;    // of one point, whose rows cannot contradict each other
-constexpr double kAtCone = 0.9999;    // of the bound on friction: slides
-constexpr int kIterations = 12;       // of one guess,
-constexpr double kExact = 1e-10;      // of the wanted velocities: final residual,
-constexpr double kStagnates = 0.9;    // or ratio of consecutive residuals, of held points that contradict each other
-constexpr double kNearBound = 0.5;    // of its bound: larger couples of the step before are first guessed at it
-constexpr int kDense = 12;            // bodies; more are factorised as a sparse matrix
+constexpr double kComplianceRatio = 1e-3;       // relative to the mobility of a row: of one body,
+constexpr double kMinComplianceRatio = 1e-5;    // lower bound,
+constexpr double kPointComplianceRatio = 1e-6;  // of a single point, whose rows cannot conflict
+constexpr double kSlidingRatio = 0.9999;        // fraction of the friction bound: slides
+constexpr int kMaxCorrections = 12;             // iterations per guess,
+constexpr double kResidualRatio = 1e-10;        // final residual relative to the wanted velocities,
+constexpr double kStagnationRatio = 0.9;        // or ratio of consecutive residuals, if held points conflict
+constexpr double kCoupleBoundRatio = 0.5;       // fraction of its bound: larger couples of the previous step are first guessed at the bound
+constexpr int kMaxDenseBodies = 12;             // bodies; larger systems are factorised as sparse matrices
 
 enum class Hold : char { kOpen, kSticks, kSlides };
 
@@ -37,17 +36,17 @@ Row6 make_row(const Vec3& linear, const Vec3& angular) {
   return r;
 }
 
-/// Compliance of a row over its mobility. Soft enough for rows in contradiction by 1e-9 m/s (two touches of a rolling body), whose impulses
-/// must stay in the cone; stiff enough for convergence of chains and of unequal masses.
+/// Compliance of a row over its mobility. Soft enough for conflicts of 1e-9 m/s between rows (two touches of a rolling body), whose
+/// impulses must stay in the cone; stiff enough for convergence of chains and unequal masses.
 double choose_compliance(const std::vector<Mover>& movers, std::size_t points) {
-  if (points == 1) return kOnePoint;
+  if (points == 1) return kPointComplianceRatio;
   const auto [least, most] =
       std::minmax_element(movers.begin(), movers.end(), [](const Mover& x, const Mover& y) { return x.inverse_mass < y.inverse_mass; });
   const auto count = static_cast<double>(movers.size());
-  return std::max(kLeast, kCompliance * least->inverse_mass / (most->inverse_mass * count * count));
+  return std::max(kMinComplianceRatio, kComplianceRatio * least->inverse_mass / (most->inverse_mass * count * count));
 }
 
-/// The matrix of a guess: blocks of 6 x 6 for pairs of bodies that touch, lower triangle. Its pattern is the same for all guesses.
+/// Matrix of a guess: 6 x 6 blocks for touching bodies, lower triangle. Its pattern is the same for all guesses.
 class System {
  public:
   System(int bodies, const std::vector<Point>& points) : bodies_(bodies) {
@@ -86,7 +85,7 @@ class System {
     block.bottomRightCorner<3, 3>() = inertia;
     at(body, body) += block;
   }
-  /// A row with that stiffness.
+  /// Adds a row with the given stiffness.
   void add(int a, const Row6& ra, int b, const Row6& rb, double stiffness) {
     if (a >= 0) at(a, a).noalias() += stiffness * ra * ra.transpose();
     if (b >= 0) at(b, b).noalias() += stiffness * rb * rb.transpose();
@@ -113,7 +112,7 @@ class System {
  private:
   using Place = Eigen::Map<Block, Eigen::Unaligned, Eigen::OuterStride<>>;
 
-  bool is_dense() const { return bodies_ <= kDense; }
+  bool is_dense() const { return bodies_ <= kMaxDenseBodies; }
   /// The block (row, column), row >= column.
   Place at(int row, int column) {
     const int size = 6 * bodies_;
@@ -124,7 +123,7 @@ class System {
                  Eigen::OuterStride<>(6 * static_cast<Eigen::Index>(rows.size())));
   }
 
-  /// Calls with the size of the matrix, a constant where bodies are few: several times as fast as a general library.
+  /// Passes the matrix size, as a compile-time constant for few bodies: several times as fast as a general library.
   template <typename Do>
   decltype(auto) with_size(Do&& act) const {
     if (bodies_ == 1) return act(std::integral_constant<int, 6>{});
@@ -161,13 +160,13 @@ class System {
   }
 
   int bodies_;
-  std::vector<std::vector<int>> below_;  // rows of the blocks of each column
+  std::vector<std::vector<int>> below_;  // row indices of the blocks of each column
   std::vector<double> full_;
   Eigen::SparseMatrix<double> sparse_;
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> sparse_solver_;
 };
 
-/// Which points carry, stick and roll, and the impulses that follow from it.
+/// Guess of the load-bearing, sticking and rolling points, and the resulting impulses.
 class Guess {
  public:
   Guess(const std::vector<Mover>& free, const std::vector<Point>& points)
@@ -180,19 +179,19 @@ class Guess {
         left_spin_(points.size()) {
     for (const Point& p : points) scale_ = std::max(scale_, norm(p.wanted - calc_relative_velocity(free, p)));
   }
-  /// The next point. Masses: impulse per velocity along the normal, couple per spin (0: none). `is_swept`: its impulse is an answer.
+  /// Adds the next point. Masses: impulse per velocity along the normal, couple per spin (0: none). `is_swept`: its impulse is a solution.
   void add(double normal_mass, double turning_mass, bool is_swept);
-  /// Impulses under which all points move as guessed, and the velocities that they give. False where the system is singular.
+  /// Impulses under which all points move as guessed, and the resulting velocities. False if the system is singular.
   bool solve(std::vector<Mover>& movers);
-  /// Changes the guess by its answer; true where the answer confirms it. `may_stick`: points that slide or roll may stick again.
+  /// Corrects the guess from its solution; true if the solution confirms it. `may_stick`: sliding or rolling points may stick again.
   bool correct(const std::vector<Mover>& movers, bool may_stick);
-  /// Impulses into the points, and the velocities that these give, and no others.
+  /// Writes the impulses to the points, and the velocities due to them alone.
   void read(std::vector<Mover>& movers, std::vector<Point>& points) const;
 
  private:
   struct Held {
     Hold hold = Hold::kOpen;
-    bool rolls = false, twists = false;  // couple at its bound, across the normal and about it
+    bool rolls = false, twists = false;  // couple at its bound, perpendicular to the normal and about it
     double stiffness = 0.0, turning_mass = 0.0;
     std::array<Vec3, 3> axes{};
     Vec3 sliding{}, impulse{}, couple{};
@@ -218,10 +217,10 @@ class Guess {
   const std::vector<Point>& points_;
   double compliance_;
   std::vector<Held> held_;      // of the points
-  bool is_factorised_ = false;  // for the present holds
+  bool is_factorised_ = false;  // for the current holds
   System system_;
   Eigen::VectorXd right_;               // work memory
-  std::vector<Vec3> left_, left_spin_;  // the same
+  std::vector<Vec3> left_, left_spin_;  // work memory
   double scale_ = 0.0;                  // m/s
 };
 
@@ -234,24 +233,24 @@ void Guess::add(double normal_mass, double turning_mass, bool is_swept) {
   held.axes = {p.normal, tangent, cross(p.normal, tangent)};
   const double push = dot(p.impulse, p.normal);
   const Vec3 across = p.impulse - push * p.normal;
-  const bool slides = is_swept && push > 0.0 && norm(across) >= kAtCone * p.friction * push;
+  const bool slides = is_swept && push > 0.0 && norm(across) >= kSlidingRatio * p.friction * push;
   if (slides) held.sliding = across;
-  // A new touch that is open stays open, unless it would close without impulses.
+  // A new open touch stays open unless it would close without impulses.
   const double wanted = dot(p.wanted, p.normal);
   const bool is_open = wanted < 0.0 && wanted <= dot(calc_relative_velocity(free_, p), p.normal);
   held.hold = slides ? Hold::kSlides : push > 0.0 || (p.impulse == Vec3{} && !is_open) ? Hold::kSticks : Hold::kOpen;
-  if (turning_mass > 0.0 && push > 0.0) {  // as in the step before, by the present bounds
+  if (turning_mass > 0.0 && push > 0.0) {  // as in the previous step, with the current bounds
     const double twist = dot(p.couple, p.normal), most = p.twisting_m * push;
     const Vec3 roll = p.couple - twist * p.normal;
     const double size = norm(roll), limit = p.rolling_m * push;
-    held.twists = std::abs(twist) >= kNearBound * most;
-    held.rolls = size >= kNearBound * limit;
+    held.twists = std::abs(twist) >= kCoupleBoundRatio * most;
+    held.rolls = size >= kCoupleBoundRatio * limit;
     if (held.twists) held.couple = std::copysign(most, twist) * p.normal;
     if (held.rolls && size > 0.0) held.couple = held.couple + (limit / size) * roll;
   }
 }
 
-/// The matrix of the points that hold.
+/// Assembles the matrix of the held points.
 void Guess::assemble() {
   system_.clear();
   for (int i = 0; const Mover& m : free_) {
@@ -272,7 +271,7 @@ void Guess::assemble() {
   }
 }
 
-/// A new system for the present holds, from zero impulses.
+/// New system for the current holds, from zero impulses.
 bool Guess::factorise() {
   if (is_factorised_) return true;
   assemble();
@@ -288,15 +287,15 @@ bool Guess::solve(std::vector<Mover>& movers) {
   if (!factorise()) return false;
   move(movers);
   double before = 0.0;
-  for (int again = 0; again < kIterations; ++again) {
+  for (int again = 0; again < kMaxCorrections; ++again) {
     const double left = iterate(movers), rate = before > 0.0 ? left / before : 0.0;
-    if (left <= kExact * scale_ || (rate > 0.0 && rate * left <= kExact * scale_) || rate > kStagnates) break;
+    if (left <= kResidualRatio * scale_ || (rate > 0.0 && rate * left <= kResidualRatio * scale_) || rate > kStagnationRatio) break;
     before = left;
   }
   return true;
 }
 
-/// The velocities that all impulses give.
+/// Velocities due to all impulses.
 void Guess::move(std::vector<Mover>& movers) const {
   movers = free_;
   for (int i = 0; const Held& held : held_) {
@@ -306,7 +305,7 @@ void Guess::move(std::vector<Mover>& movers) const {
   }
 }
 
-/// One correction of the impulses; returns the residual before it [m/s].
+/// One correction of the impulses; returns the preceding residual [m/s].
 double Guess::iterate(std::vector<Mover>& movers) {
   right_.setZero();
   const auto add = [&](int body, const Row6& row) {
@@ -329,7 +328,7 @@ double Guess::iterate(std::vector<Mover>& movers) {
     add(p.a, make_row({}, couple));
     add(p.b, -make_row({}, couple));
   }
-  if (largest <= kExact * scale_) return largest;
+  if (largest <= kResidualRatio * scale_) return largest;
   system_.solve(right_);
   const auto get = [&](int body, int from) {
     const double* x = right_.data() + 6 * body + from;
@@ -369,7 +368,7 @@ bool Guess::correct(const std::vector<Mover>& movers, bool may_stick) {
   return confirmed;
 }
 
-/// The hold that the answer asks for; impulses are brought back to the cone.
+/// Hold state required by the solution; impulses are projected onto the cone.
 Hold Guess::correct_hold(const std::vector<Mover>& movers, const Point& p, Held& held, bool may_stick, bool& confirmed) {
   const double push = dot(held.impulse, p.normal), limit = p.friction * push;
   if (held.hold == Hold::kOpen)
@@ -386,7 +385,7 @@ Hold Guess::correct_hold(const std::vector<Mover>& movers, const Point& p, Held&
     held.impulse = push * p.normal + held.sliding;
     return Hold::kSlides;
   }
-  // Slides on against its velocity; where that would not brake any more, it sticks.
+  // Continues to slide against its velocity; sticks if that would no longer brake.
   const Vec3 short_of = p.wanted - calc_relative_velocity(movers, p);
   const Vec3 across = short_of - dot(short_of, p.normal) * p.normal;
   const double size = norm(across);
@@ -401,7 +400,7 @@ Hold Guess::correct_hold(const std::vector<Mover>& movers, const Point& p, Held&
   return Hold::kSlides;
 }
 
-/// Missing part of a couple at its bounds, for the present push and direction of rolling.
+/// Remaining part of a couple at its bounds, for the current normal impulse and rolling direction.
 Vec3 Guess::calc_rest_of_bound(const std::vector<Mover>& movers, const Point& p, const Held& held) {
   if (!held.rolls && !held.twists) return {};
   const double push = std::max(dot(held.impulse, p.normal), 0.0);
@@ -413,8 +412,8 @@ Vec3 Guess::calc_rest_of_bound(const std::vector<Mover>& movers, const Point& p,
   return held.free_turning(bound - held.couple);
 }
 
-/// Releases a couple above its bounds, about the normal and across it, and sets it to its bound against the present spin; holds it again
-/// where a smaller one stops the spin. True without a change.
+/// Releases a couple above its bounds, about the normal and perpendicular to it, and sets it to its bound against the current spin; holds
+/// it again if a smaller couple stops the spin. True if nothing changed.
 bool Guess::correct_couple(const std::vector<Mover>& movers, const Point& p, Held& held, double push, bool may_stick) {
   const Vec3 free_couple = held.couple - held.turning_mass * held.free_turning(calc_relative_spin(movers, p));
   double twist = dot(free_couple, p.normal);

@@ -1,4 +1,4 @@
-// Which bodies belong together: a union-find.
+// Connected groups of bodies: union-find.
 #pragma once
 
 #include <algorithm>

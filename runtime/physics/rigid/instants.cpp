@@ -1,5 +1,5 @@
-// Method: candidates from constant relative accelerations; instants by bracketing on the paths, as long as a candidate is earlier than the
-//   first instant found.
+// Method: candidates from constant relative accelerations; instants by bracketing on the paths, while a candidate is earlier than the first
+// instant found.
 // Source: B. Mirtich, "Impulse-based dynamic simulation of rigid body systems" (1996).
 #include "runtime/physics/rigid/instants.hpp"
 
@@ -15,13 +15,13 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr double kInstant = 1e-9;  // m; tolerance of an instant of impact,
-constexpr int kLooks = 20;         // and evaluations at most
-constexpr double kNear = 1e-6;     // m; a touch that is nearer at the end of a step strikes there
-constexpr double kCrowded = 2e-3;  // s; for so long an island is crowded
-constexpr double kRattle = 10e-3;  // s; within it a pair has more slow impacts than Pair::slow_hits holds, and then none for so long
+constexpr double kGapToleranceM = 1e-9;  // m; gap tolerance of an instant of impact,
+constexpr int kMaxEvaluations = 20;      // maximum number of evaluations
+constexpr double kStrikeGapM = 1e-6;     // m; a touch nearer than this at the end of a step strikes there
+constexpr double kCrowdedS = 2e-3;       // s; duration of the crowded state of an island
+constexpr double kRattleS = 10e-3;  // s; a pair with more slow impacts than Pair::slow_hits within this time has none for the same time
 
-/// Will this touch close within the step, faster than `slowest`?
+/// True if this touch closes within the step, faster than `slowest`.
 bool is_faster(const Bodies& bodies, const Contact& c, double h, double slowest) {
   if (c.presses || c.is_closed()) return false;
   const double approach = bodies.calc_approach(c.touch, c.a, c.b), gap = std::max(c.touch.gap_m, 0.0);
@@ -30,7 +30,7 @@ bool is_faster(const Bodies& bodies, const Contact& c, double h, double slowest)
   if (bodies.moves(c.b)) pull += dot(bodies.gravity(), c.touch.normal);
   const double square = approach * approach + 2.0 * std::max(pull, 0.0) * gap;
   if (square <= slowest * slowest) return false;
-  // A touch that has just rebounded comes back within the step only if it is slow.
+  // A touch that has just rebounded returns within the step only if it is slow.
   if (approach < 0.0) return pull > 0.0 && -approach + std::sqrt(square) <= pull * h;
   return gap <= approach * h + 0.5 * norm(bodies.gravity()) * h * h + 1e-6;
 }
@@ -40,14 +40,14 @@ bool rattles(const Bodies& bodies, const Pair& pair) { return bodies.get_time() 
 }  // namespace
 
 bool is_fast(const Bodies& bodies, const Pair& pair, const Contact& c, double h) {
-  return is_faster(bodies, c, h, rattles(bodies, pair) ? kRattling : kSlowest);
+  return is_faster(bodies, c, h, rattles(bodies, pair) ? kRattleSpeedMS : kMinImpactSpeedMS);
 }
 
 bool Instants::find(const Step& step, double& at_s, std::vector<ContactRef>& first) const {
   struct Candidate {
     ContactRef ref;
     double at;
-    double apex;  // until when it parts
+    double apex;  // end of the separation
   };
   const double h = step.length_s;
   std::vector<Candidate> candidates;
@@ -56,7 +56,8 @@ bool Instants::find(const Step& step, double& at_s, std::vector<ContactRef>& fir
     for (int k = 0; const Contact& c : pair->contacts) {
       const ContactRef ref{pair, k++};
       if (!is_fast(bodies_, *pair, c, h)) {
-        if (rattles(bodies_, *pair) && is_faster(bodies_, c, h, kSlowest)) pair->rattles_until_s = bodies_.get_time() + h + kRattle;
+        if (rattles(bodies_, *pair) && is_faster(bodies_, c, h, kMinImpactSpeedMS))
+          pair->rattles_until_s = bodies_.get_time() + h + kRattleS;
         if (c.closes_s >= 0.0 && !c.presses) candidates.push_back({ref, c.closes_s, 0.0});
         continue;
       }
@@ -65,7 +66,7 @@ bool Instants::find(const Step& step, double& at_s, std::vector<ContactRef>& fir
       const double rate = (later - approach) / h;
       // gap = approach s + rate s^2 / 2
       const double gap = std::max(c.touch.gap_m, 0.0), root = approach * approach + 2.0 * rate * gap;
-      if (root < 0.0) {  // an impulse in the middle of the step turns it back, maybe after it has closed
+      if (root < 0.0) {  // a mid-step impulse reverses it, maybe after it has closed
         if (approach * 0.5 * h >= gap) candidates.push_back({ref, gap / approach, 0.0});
         continue;
       }
@@ -75,7 +76,7 @@ bool Instants::find(const Step& step, double& at_s, std::vector<ContactRef>& fir
     }
   }
   std::stable_sort(candidates.begin(), candidates.end(), [](const auto& x, const auto& y) { return x.at < y.at; });
-  // Paths are not quite straight: instants are looked for on them, as long as a guess is earlier than the first of those found.
+  // Paths are slightly curved: instants are searched on them while a guess is earlier than the first one found.
   double earliest = std::numeric_limits<double>::infinity();
   for (Candidate& c : candidates) {
     if (c.at >= earliest) break;
@@ -89,7 +90,7 @@ bool Instants::find(const Step& step, double& at_s, std::vector<ContactRef>& fir
   return true;
 }
 
-/// When a touch that closes at about `guess_s`, and not before `apex_s`, does so on the path of the step; none if it does not.
+/// Closing time on the path of the step of a touch that closes at about `guess_s`, not before `apex_s`; none if it does not close.
 std::optional<double> Instants::find_instant(const Step& step, const ContactRef& ref, double apex_s, double guess_s) const {
   Pair& pair = *ref.pair;
   const geometry::Touch now = ref.get().touch;
@@ -107,17 +108,17 @@ std::optional<double> Instants::find_instant(const Step& step, const ContactRef&
   };
   if (!(guess_s > 0.0)) return guess_s;
   double open = apex_s, open_m = apex_s > 0.0 ? look(apex_s) : now.gap_m;
-  if (!(open_m > 0.0)) return guess_s;  // it parts by less than it is deep
+  if (!(open_m > 0.0)) return guess_s;  // separates by less than its depth
   double shut = guess_s, shut_m = look(guess_s);
-  if (shut_m > kInstant) {
+  if (shut_m > kGapToleranceM) {
     open = shut;
     open_m = shut_m;
     shut = step.length_s;
     shut_m = look(shut);
-    if (shut_m > kNear) return std::nullopt;
+    if (shut_m > kStrikeGapM) return std::nullopt;
   }
-  if (shut_m >= -kInstant) return shut;
-  return base::find_crossing(look, open, open_m, shut, shut_m, kInstant, 0.0, kLooks);
+  if (shut_m >= -kGapToleranceM) return shut;
+  return base::find_crossing(look, open, open_m, shut, shut_m, kGapToleranceM, 0.0, kMaxEvaluations);
 }
 
 std::vector<ContactRef> Instants::list_closing(const Step& step, double step_s) const {
@@ -144,8 +145,8 @@ bool Instants::confirm(const Step& step, std::vector<ContactRef>& first, double 
     for (int k = 0; const Contact& c : pair->contacts) {
       const ContactRef ref{pair, k++};
       const double approach = bodies_.calc_approach(c.touch, c.a, c.b);
-      if (c.presses || approach <= 0.5 * kSlowest || c.is_closed() ||
-          c.touch.gap_m > std::max(approach * step.together_s + kTouch, std::isfinite(near_m) ? near_m : 0.0))
+      if (c.presses || approach <= 0.5 * kMinImpactSpeedMS || c.is_closed() ||
+          c.touch.gap_m > std::max(approach * step.together_s + kTouchGapM, std::isfinite(near_m) ? near_m : 0.0))
         continue;
       first.push_back(ref);
       any = any || c.touch.gap_m <= near_m;
@@ -161,22 +162,22 @@ void Instants::note(const std::vector<ContactRef>& contacts, const std::vector<H
     if (!hit.is_cord) fastest[ref.pair] = std::max(fastest[ref.pair], hit.approach_m_s);
   }
   for (const auto& [pair, speed] : fastest) {
-    if (speed <= kSlowest) continue;
-    if (speed >= kRattling) {
+    if (speed <= kMinImpactSpeedMS) continue;
+    if (speed >= kRattleSpeedMS) {
       pair->slow_hits.fill({});
       continue;
     }
-    // A ball that bounces to rest strikes as often, but each time slower by its restitution e: by e^4 over these.
+    // A ball bouncing to rest also strikes often, but each time slower by its restitution e: by e^4 over these.
     const Pair::SlowHit& first = pair->slow_hits.front();
     const bool decays = speed < std::pow(bodies_.calc_restitution(pair->a, pair->b), 2.0) * first.speed_m_s;
-    if (first.time_s >= 0.0 && time_s - first.time_s < kRattle && !decays) pair->rattles_until_s = time_s + kRattle;
+    if (first.time_s >= 0.0 && time_s - first.time_s < kRattleS && !decays) pair->rattles_until_s = time_s + kRattleS;
     std::shift_left(pair->slow_hits.begin(), pair->slow_hits.end(), 1);
     pair->slow_hits.back() = {time_s, speed};
   }
 }
 
 void Instants::set_crowded(const Island& island, double time_s) {
-  for (const int body : island.bodies) crowded_until_s_[body] = time_s + kCrowded;
+  for (const int body : island.bodies) crowded_until_s_[body] = time_s + kCrowdedS;
 }
 
 bool Instants::is_crowded(const Island& island, double time_s) const {

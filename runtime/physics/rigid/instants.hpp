@@ -1,4 +1,4 @@
-// When the first impact of a step is.
+// Time of the first impact of a step.
 #pragma once
 
 #include <optional>
@@ -9,24 +9,24 @@
 
 namespace carillon::rigid {
 
-/// Will this touch close within the step, and fast enough for an impact of its pair?
+/// True if this touch closes within the step, fast enough for an impact of its pair.
 bool is_fast(const Bodies& bodies, const Pair& pair, const Contact& contact, double step_s);
 
-/// Finds the instants of impacts on the predicted paths of a step, and knows which islands have so many that they are crowded: those strike
-/// once a step.
+/// Finds the instants of impacts on the predicted paths of a step, and tracks crowded islands, whose many impacts are all applied once per
+/// step.
 class Instants {
  public:
   Instants(const Bodies& bodies, TouchSets& touches) : bodies_(bodies), touches_(touches), crowded_until_s_(bodies.count(), 0.0) {}
 
-  /// The first instant, from now, at which a fast touch closes on the paths of the step; sets `at_s` and the touches that close with it.
+  /// First instant from now at which a fast touch closes on the paths of the step; sets `at_s` and the touches that close with it.
   bool find(const Step& step, double& at_s, std::vector<ContactRef>& first) const;
-  /// The touches that close within the step.
+  /// Touches that close within the step.
   std::vector<ContactRef> list_closing(const Step& step, double step_s) const;
-  /// Searches the pairs of an impact again, as they are at its instant: an edge that passes another one closely was taken for a plane until
-  /// now. Keeps the touches that close within step.together_s of the first one, whose gap is at most `near_m` (infinite: of now).
+  /// Searches the pairs of an impact again at its instant: closely passing edges were treated as planes until now. Keeps the touches that
+  /// close within step.together_s of the first one, with gaps up to `near_m` (infinite: current gap).
   bool confirm(const Step& step, std::vector<ContactRef>& first, double step_s, double near_m) const;
 
-  /// An impact of these hits: a pair that has many slow ones rattles.
+  /// Records an impact of these hits: a pair with many slow ones rattles.
   void note(const std::vector<ContactRef>& contacts, const std::vector<Hit>& hits, double time_s) const;
 
   void set_crowded(const Island& island, double time_s);
@@ -38,7 +38,7 @@ class Instants {
 
   const Bodies& bodies_;
   TouchSets& touches_;
-  std::vector<double> crowded_until_s_;  // of each body: its impacts come all at once until then
+  std::vector<double> crowded_until_s_;  // per body: until then its impacts are simultaneous
 };
 
 }  // namespace carillon::rigid

@@ -1,5 +1,5 @@
-// Method: where modes would get less than 2 % of the energy, the rigid impact and the Hertz pulse stand; otherwise an impact begins, or one
-//   that is not over gets more contacts.
+// Method: if modes would receive less than 2 % of the energy, the rigid impact and the Hertz pulse are used; otherwise a modal impact
+// begins, or a current one gets additional contacts.
 // Source: runtime/physics/impact/predict.hpp; docs/decisions/impact.md.
 #include <algorithm>
 #include <cmath>
@@ -14,11 +14,11 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr int kMaxHits = 8;       // of one impact
-constexpr double kEarly = 1e-2;   // m/s; least approach for an impact before contact of the rigid surfaces
-constexpr int kMaxTogether = 12;  // with those that rest
+constexpr int kMaxHits = 8;                // per impact
+constexpr double kMinEarlySpeedMS = 1e-2;  // m/s; minimum approach for an impact before contact of the rigid surfaces
+constexpr int kMaxContacts = 12;           // including resting contacts
 
-/// (n) along a direction.
+/// (n) shape values along a direction.
 std::vector<double> project(std::span<const double> shape, const Vec3& along) {
   std::vector<double> phi(shape.size() / 3);
   for (int m = 0; double& value : phi) {
@@ -35,7 +35,7 @@ impact::Spring make_spring(const Bodies& bodies, const Hit& hit) {
 
 }  // namespace
 
-/// An impact that a hit belongs to: one of its bodies is in it. None where either body is in one that moves bodies outside of the island.
+/// The current impact of one of the hit's bodies. None if a body is in an impact that moves bodies outside the island.
 ModalImpact* ModalImpacts::find_own(const Step& step, const Hit& hit) {
   ModalImpact* own = nullptr;
   for (const int body : {hit.a, hit.b}) {
@@ -52,17 +52,17 @@ bool ModalImpacts::predict(const Step& step, Collision& collision) {
   for (int n = 0; Hit & hit : collision.hits) {
     const Contact& c = collision.contacts[n].get();
     Point& point = collision.points[n++];
-    if (!(hit.approach_m_s > kSlowest) || c.is_closed()) continue;
+    if (!(hit.approach_m_s > kMinImpactSpeedMS) || c.is_closed()) continue;
     if (!hit.is_cord && find_own(step, hit) != nullptr) {
       integrate = true;
       continue;
     }
     if (hit.is_cord || (!bodies_.has_modes(hit.a) && !bodies_.has_modes(hit.b))) continue;
-    if (!(hit.restitution > 0.0)) continue;  // weight keeps the surfaces together (rigid_impact.cpp)
+    if (!(hit.restitution > 0.0)) continue;  // gravity keeps the surfaces together (rigid_impact.cpp)
     const double inverse_mass = dot(hit.touch.normal, calc_mobility(collision.movers, point) * hit.touch.normal);
     std::vector<double> phi[2];
     impact::Side sides[2];
-    // A shelf has one modal state: while an impact of another island has it, those that strike it meanwhile do so as rigid bodies.
+    // A body such as a shelf has one modal state: while an impact of another island owns it, further strikes on it are rigid.
     bool is_free = true;
     for (const int side : {0, 1}) {
       const int body = side == 0 ? hit.a : hit.b;
@@ -86,8 +86,8 @@ bool ModalImpacts::predict(const Step& step, Collision& collision) {
   return integrate;
 }
 
-/// A body that leans on another one is struck with it: adds the contacts that rest on the bodies of `order`, and on the bodies that these
-/// lean on. False where they are too many, or bodies on joints or another impact are among them: the rigid impact stands.
+/// A supported body is struck together with its supports: adds the resting contacts of the bodies of `order`, and of the bodies that
+/// support these. False (rigid impact) if there are too many, or if bodies on joints or another impact are among them.
 bool ModalImpacts::add_resting(const Collision& collision, const Instants& instants, std::vector<int>& order) const {
   const std::vector<Hit>& hits = collision.hits;
   const int count = static_cast<int>(hits.size());
@@ -117,10 +117,10 @@ bool ModalImpacts::add_resting(const Collision& collision, const Instants& insta
       grows = true;
     }
   std::sort(order.begin(), order.end());
-  return order.size() == hit_count || order.size() <= kMaxTogether;
+  return order.size() == hit_count || order.size() <= kMaxContacts;
 }
 
-/// Are two members of one articulation struck?
+/// True if two members of one articulation are struck.
 bool ModalImpacts::shares_articulations(const std::vector<Hit>& hits, const std::vector<int>& order) const {
   std::map<const Articulation*, int> struck;
   for (const int n : order)
@@ -140,20 +140,20 @@ std::optional<ModalImpacts::Selection> ModalImpacts::select(const Step& step, co
   std::vector<char>& rests = selection.rests;
   rests.assign(hits.size(), 1);
   for (int n = 0; n < static_cast<int>(hits.size()); ++n) {
-    if (!(hits[n].approach_m_s > kSlowest) || hits[n].is_cord) continue;
+    if (!(hits[n].approach_m_s > kMinImpactSpeedMS) || hits[n].is_cord) continue;
     order.push_back(n);
     rests[n] = 0;
   }
   if (order.empty() || !add_resting(collision, instants, order) || shares_articulations(hits, order)) return std::nullopt;
-  // A hit on a body (such as a shelf) that is in an impact of another island stays out of this one.
+  // A hit on a body (such as a shelf) that is in an impact of another island is left out.
   std::erase_if(order,
                 [&](int n) { return find_own(step, hits[n]) == nullptr && (find(hits[n].a) != nullptr || find(hits[n].b) != nullptr); });
-  if (std::all_of(order.begin(), order.end(), [&](int n) { return rests[n] != 0; })) return std::nullopt;  // all hits stay out
+  if (std::all_of(order.begin(), order.end(), [&](int n) { return rests[n] != 0; })) return std::nullopt;  // all hits are left out
   return selection;
 }
 
-/// The impact that the selected contacts join: those of all bodies that meet become one. None: they begin one; where they are too many
-/// together the old ones end, and the fastest begin it. False: none of that, as too many rest.
+/// The impact that the selected contacts join; the impacts of all bodies involved are merged. None: they begin a new one; if there are too
+/// many contacts, the current impacts end and the fastest hits begin it. False: too many resting contacts.
 bool ModalImpacts::join(const std::vector<Hit>& hits, Selection& selection, TouchSets& touches, ModalImpact*& joined) {
   std::vector<int>& order = selection.order;
   for (const int n : order)
@@ -167,7 +167,7 @@ bool ModalImpacts::join(const std::vector<Hit>& hits, Selection& selection, Touc
     }
   const bool leans = std::any_of(order.begin(), order.end(), [&](int n) { return selection.rests[n] != 0; });
   const auto together = order.size() + (joined != nullptr ? joined->contacts.size() : 0);
-  if (leans) return together <= kMaxTogether;
+  if (leans) return together <= kMaxContacts;
   if (together <= kMaxHits) return true;
   if (joined != nullptr) end(*std::exchange(joined, nullptr), touches);
   if (order.size() > kMaxHits) {
@@ -196,7 +196,7 @@ impact::Body ModalImpacts::make_body(int body) {
   return b;
 }
 
-/// The number of a body in an impact, which it joins where it was not in it; -1: static. An impact that has not begun gets it by `made`.
+/// Index of a body in an impact; adds it if necessary; -1: static. For an impact that has not begun the body is added to `made`.
 int ModalImpacts::add_body(ModalImpact& modal, int body, std::vector<impact::Body>& made) {
   if (body < 0 || (!bodies_.moves(body) && !bodies_.has_modes(body))) return -1;
   const auto at = std::find(modal.bodies.begin(), modal.bodies.end(), body);
@@ -210,7 +210,7 @@ int ModalImpacts::add_body(ModalImpact& modal, int body, std::vector<impact::Bod
   return static_cast<int>(made.size()) - 1;
 }
 
-/// Displacement of the surfaces at a contact away from each other, by the modes of both bodies [m].
+/// Separation of the surfaces at a contact by the modes of both bodies [m].
 double ModalImpacts::calc_yield(const impact::Contact& contact, const std::vector<impact::Body>& bodies) {
   double yield = 0.0;
   for (const bool is_a : {true, false}) {
@@ -223,8 +223,8 @@ double ModalImpacts::calc_yield(const impact::Contact& contact, const std::vecto
   return yield;
 }
 
-/// A touch becomes a contact of an impact, open where the deformed surfaces are apart. Their overlap, left by an earlier impact (`sag_m`)
-/// or missed, presses no spring.
+/// Converts a touch to a contact of an impact, open if the deformed surfaces are separated. Overlap left by an earlier impact (`sag_m`) or
+/// a missed touch does not load the spring.
 void ModalImpacts::add_contact(ModalImpact& modal, Contact& touch, double sag_m, Hit& hit, bool rests, Made& made) {
   impact::Contact spring;
   spring.a = add_body(modal, hit.a, made.bodies);
@@ -269,8 +269,8 @@ void ModalImpacts::add_contact(ModalImpact& modal, Contact& touch, double sag_m,
     made.springs.push_back(spring);
 }
 
-/// An impact that was ended has been computed by a part of its step beyond now, and so have the modes of its bodies: the next one begins
-/// then. Takes the bodies there; returns the time.
+/// An ended impact, and the modes of its bodies, may be ahead by a part of its step: the next impact begins at that time. Moves the bodies
+/// there; returns the time.
 double ModalImpacts::fly_to_modes(const std::vector<Hit>& hits, const std::vector<int>& order) {
   const double now_s = bodies_.get_time();
   double start_s = now_s;
@@ -288,7 +288,7 @@ double ModalImpacts::fly_to_modes(const std::vector<Hit>& hits, const std::vecto
   return start_s;
 }
 
-/// Bound of the displacement of both surfaces at a touch by their modes.
+/// Bound of the displacement of both surfaces at a touch by modes.
 double ModalImpacts::calc_swing(const Contact& touch) {
   Hit hit{.a = touch.a, .b = touch.b, .touch = touch.touch, .triangles = touch.triangles};
   double swing = 0.0;
@@ -303,9 +303,9 @@ double ModalImpacts::calc_swing(const Contact& touch) {
   return swing;
 }
 
-/// True for a pair with a relevant swing of its surfaces and bodies in no impact.
+/// True if the swing of the pair's surfaces is relevant and its bodies are in no impact.
 bool ModalImpacts::may_begin_early(const Step& step, const Pair& pair, const Instants& instants) const {
-  if (pair.cord >= 0 || !step.has(pair) || bodies_.get_swing(pair.a) + bodies_.get_swing(pair.b) <= kTooDeep) return false;
+  if (pair.cord >= 0 || !step.has(pair) || bodies_.get_swing(pair.a) + bodies_.get_swing(pair.b) <= kMaxDepthM) return false;
   const auto is_free = [&](int body) {
     return body < 0 ||
            (!bodies_.is_in_impact(body) && bodies_.find_articulation(body) == nullptr && !instants.is_crowded(body, bodies_.get_time()));
@@ -321,10 +321,10 @@ void ModalImpacts::begin_early(const Step& step, double length_s, const Instants
     std::vector<int> order;
     for (Contact& c : pair->contacts) {
       const double approach = bodies_.calc_approach(c.touch, c.a, c.b);
-      if (c.presses || c.is_closed() || approach < kEarly) continue;
+      if (c.presses || c.is_closed() || approach < kMinEarlySpeedMS) continue;
       const double open_m = c.touch.gap_m - (approach + norm(bodies_.gravity()) * length_s) * length_s;
       if (open_m > bodies_.get_swing(c.a) + bodies_.get_swing(c.b)) continue;
-      if (const double swing_m = calc_swing(c); swing_m <= kTooDeep || open_m >= swing_m) continue;
+      if (const double swing_m = calc_swing(c); swing_m <= kMaxDepthM || open_m >= swing_m) continue;
       early.push_back(&c);
       order.push_back(static_cast<int>(hits.size()));
       hits.push_back({.a = c.a, .b = c.b, .touch = c.touch, .triangles = c.triangles});

@@ -1,4 +1,4 @@
-// Method: an impact whose bodies ring is integrated with their modes, a small step at a time, until its contacts have parted.
+// Method: an impact with ringing bodies is integrated with their modes, one small step at a time, until its contacts have separated.
 // Source: runtime/physics/impact/impact.hpp; docs/decisions/impact.md.
 #include "runtime/physics/rigid/modal_impact.hpp"
 
@@ -10,18 +10,18 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr double kLongest = 50e-3;     // s; end of slow impacts, which become contacts at rest,
-constexpr double kLongestOfAll = 0.5;  // s; and of all others
-constexpr double kRight = 0.01;        // of the kinetic energy: largest correction of a step of an impact on joints
-constexpr double kSamePlace = 0.05;    // of the size
-constexpr double kMoved = 0.02;        // of the size: least way of a contact to its touch for a move
-constexpr int kMaxFollowed = 8;        // contacts of an impact, open ones included
-constexpr double kExplained = 1.3;     // times the depth of spring and modes is explained
-constexpr double kOneFace = 0.99;      // cosine between the normals of one face,
-constexpr double kOnePlane = 0.02;     // of the size: and distance of its corners from its plane
-constexpr double kCalmTime = 5e-3;     // s; after the end of an impact, without slow impacts of the pair
+constexpr double kMaxSlowImpactS = 50e-3;     // s; end of slow impacts, which become resting contacts,
+constexpr double kMaxImpactS = 0.5;           // s; and of all others
+constexpr double kMaxCorrectionRatio = 0.01;  // fraction of the kinetic energy: maximum correction per step of an impact on joints
+constexpr double kSamePlaceRatio = 0.05;      // of the size
+constexpr double kMinMoveRatio = 0.02;        // fraction of the size: minimum distance of a contact from its touch for an update
+constexpr int kMaxFollowed = 8;               // contacts per impact, including open ones
+constexpr double kExplainedRatio = 1.3;       // permitted ratio of the depth to that of spring and modes
+constexpr double kFaceCosine = 0.99;          // minimum cosine between normals of one face,
+constexpr double kFlatnessRatio = 0.02;       // fraction of the size: maximum distance of corners from its plane
+constexpr double kQuietAfterImpactS = 5e-3;   // s; after the end of an impact, without slow impacts of the pair
 
-/// Area of the convex polygon of some points [m^2].
+/// Area of the convex polygon of given points [m^2].
 double calc_area(std::vector<Vec3> corners, const Vec3& normal) {
   Vec3 middle{};
   for (const Vec3& x : corners) middle = middle + (1.0 / static_cast<double>(corners.size())) * x;
@@ -45,18 +45,18 @@ ModalImpact* ModalImpacts::find(int body) {
   return nullptr;
 }
 
-/// The place of a touch on the body that moves, from its centre, axes of its mesh.
+/// Position of a touch on the moving body, from its centre, mesh axes.
 Vec3 ModalImpacts::find_station(int a, int b, const geometry::Touch& touch) const {
   return bodies_.moves(a) ? touch.station_a - bodies_.solid(a).centre_m : touch.station_b - bodies_.solid(b).centre_m;
 }
 
-/// Where the point of a contact is now, by the body that moves.
+/// Current position of a contact, by the moving body.
 Vec3 ModalImpacts::find_station(const ModalContact& contact) const {
   const int body = bodies_.moves(contact.forces.a) ? contact.forces.a : contact.forces.b;
   return bodies_.state(body).centre + bodies_.placed(body).rotation * contact.station;
 }
 
-/// Calls act(impact, number) for all contacts between the bodies of a pair.
+/// Calls act(impact, index) for all contacts between the bodies of a pair.
 template <typename Do>
 void ModalImpacts::for_contacts(const Pair& pair, Do&& act) const {
   for (const ModalImpact& modal : impacts_)
@@ -67,7 +67,7 @@ void ModalImpacts::for_contacts(const Pair& pair, Do&& act) const {
 }
 
 bool ModalImpacts::is_pressed(const Pair& pair, const Vec3& where) const {
-  const double near = kSamePlace * bodies_.calc_size(pair.a, pair.b);
+  const double near = kSamePlaceRatio * bodies_.calc_size(pair.a, pair.b);
   bool any = false;
   for_contacts(pair, [&](const ModalImpact& modal, int k) { any = any || norm(find_station(modal.contacts[k]) - where) < near; });
   return any;
@@ -79,9 +79,9 @@ double ModalImpacts::calc_depth(const Pair& pair) const {
   return depth;
 }
 
-/// The same at a place.
+/// Depth explained by springs and modes at a point.
 double ModalImpacts::calc_depth(const Pair& pair, const Vec3& where) const {
-  const double near = kSamePlace * bodies_.calc_size(pair.a, pair.b);
+  const double near = kSamePlaceRatio * bodies_.calc_size(pair.a, pair.b);
   double depth = 0.0;
   for_contacts(pair, [&](const ModalImpact& modal, int k) {
     if (norm(find_station(modal.contacts[k]) - where) < near) depth = std::max(depth, modal.impact->calc_depth(k));
@@ -89,7 +89,7 @@ double ModalImpacts::calc_depth(const Pair& pair, const Vec3& where) const {
   return depth;
 }
 
-/// The motion of a body as an impact begins or continues with it.
+/// Copies the motion of a body into an impact.
 void ModalImpacts::set_motion(int body, impact::Body& b) const {
   const State& state = bodies_.state(body);
   const Placed& placed = bodies_.placed(body);
@@ -110,7 +110,7 @@ void ModalImpacts::set_motion(int body, impact::Body& b) const {
   b.spin_acceleration_rad_s2 = rates[member].angular;
 }
 
-/// Shapes of a body in world axes.
+/// Mode shapes of a body, rotated to world axes.
 std::vector<double> ModalImpacts::turn_to_world(int body, const std::vector<double>& shape) const {
   const int size = static_cast<int>(shape.size());
   std::vector<double> world(size);
@@ -138,11 +138,11 @@ void ModalImpacts::end_where_touching(const Step& step, TouchSets& touches) {
       if (modal == nullptr || pair->cord >= 0) continue;
       bool is_deep = false, is_resting = false;
       for (const Contact& c : pair->contacts) {
-        const double depth = -c.touch.gap_m - pair->sag_m - kTooDeep;
-        is_deep = is_deep || (depth > 0.0 && depth > kExplained * calc_depth(*pair, c.touch.where_m));
-        is_resting = is_resting || (c.carries() && std::abs(bodies_.calc_approach(c.touch, c.a, c.b)) <= kSlowest);
+        const double depth = -c.touch.gap_m - pair->sag_m - kMaxDepthM;
+        is_deep = is_deep || (depth > 0.0 && depth > kExplainedRatio * calc_depth(*pair, c.touch.where_m));
+        is_resting = is_resting || (c.carries() && std::abs(bodies_.calc_approach(c.touch, c.a, c.b)) <= kMinImpactSpeedMS);
       }
-      if (is_deep) pair->rattles_until_s = std::max(pair->rattles_until_s, bodies_.get_time() + kCalmTime);
+      if (is_deep) pair->rattles_until_s = std::max(pair->rattles_until_s, bodies_.get_time() + kQuietAfterImpactS);
       if (is_deep || is_resting) end(*modal, touches);
     }
 }
@@ -158,7 +158,7 @@ void ModalImpacts::place(ModalContact& contact, Contact& touch, const geometry::
   contact.gap_m = at.gap_m;
   touch.press();
   const Vec3 station = find_station(touch.a, touch.b, at);
-  if (norm(contact.station - station) < kMoved * bodies_.calc_size(touch.a, touch.b)) return;
+  if (norm(contact.station - station) < kMinMoveRatio * bodies_.calc_size(touch.a, touch.b)) return;
   report(contact);
   forces.continues = false;
   Hit hit{.a = touch.a, .b = touch.b, .touch = at, .triangles = touch.triangles};
@@ -171,10 +171,10 @@ void ModalImpacts::place(ModalContact& contact, Contact& touch, const geometry::
   }
 }
 
-/// The contact for a touch under a new name: the nearest one at its place, or an open one for a touch that may close.
+/// Contact for a touch with a new id: the nearest at its position, or an open one for a touch that may close.
 ModalContact* ModalImpacts::find_nearest(ModalImpact& modal, const Contact& touch, bool is_near) const {
   ModalContact* nearest = nullptr;
-  double least_m = kSamePlace * bodies_.calc_size(touch.a, touch.b);
+  double least_m = kSamePlaceRatio * bodies_.calc_size(touch.a, touch.b);
   for (int n = 0; ModalContact & contact : modal.contacts) {
     const bool is_open = !(modal.impact->get_compression(n++) > 0.0);
     if (contact.is_followed || !contact.is_between(touch.a, touch.b)) continue;
@@ -186,7 +186,8 @@ ModalContact* ModalImpacts::find_nearest(ModalImpact& modal, const Contact& touc
   return nearest;
 }
 
-/// The springs of an impact: three corners of a face that are pressed within `part_s` by more than it is flat share the spring of the face.
+/// Springs of an impact: three corners of a face that are compressed within `part_s` by more than its flatness share the spring of the
+/// face.
 std::vector<impact::Spring> ModalImpacts::find_springs(const ModalImpact& modal, double part_s) const {
   const int count = static_cast<int>(modal.contacts.size());
   std::vector<impact::Spring> springs;
@@ -202,11 +203,12 @@ std::vector<impact::Spring> ModalImpacts::find_springs(const ModalImpact& modal,
     std::vector<Vec3> corners;
     for (int k = first; k < count; ++k) {
       const ModalContact& contact = modal.contacts[k];
-      const double flat_m = springs[k].exponent == 1.0 ? 0.0 : kTooDeep,
+      const double flat_m = springs[k].exponent == 1.0 ? 0.0 : kMaxDepthM,
                    pressed_m = modal.impact->get_compression(k) + std::max(modal.impact->calc_approach(k), 0.0) * part_s;
       if (is_taken[k] != 0 || !contact.is_sharp || !contact.is_followed || !contact.is_between(one.forces.a, one.forces.b) ||
-          dot(contact.normal, one.normal) < kOneFace || !(pressed_m > flat_m) ||
-          std::abs(dot(one.normal, find_station(contact) - find_station(one))) > kOnePlane * bodies_.calc_size(one.forces.a, one.forces.b))
+          dot(contact.normal, one.normal) < kFaceCosine || !(pressed_m > flat_m) ||
+          std::abs(dot(one.normal, find_station(contact) - find_station(one))) >
+              kFlatnessRatio * bodies_.calc_size(one.forces.a, one.forces.b))
         continue;
       face.push_back(k);
       corners.push_back(find_station(contact));
@@ -224,7 +226,7 @@ std::vector<impact::Spring> ModalImpacts::find_springs(const ModalImpact& modal,
 
 void ModalImpacts::follow(ModalImpact& modal, Pair& pair, double length_s, TouchSets& touches) {
   const double reach_m =
-      2.0 * bodies_.calc_closing_speed(pair.a, pair.b) * length_s + bodies_.get_swing(pair.a) + bodies_.get_swing(pair.b) + kTooDeep;
+      2.0 * bodies_.calc_closing_speed(pair.a, pair.b) * length_s + bodies_.get_swing(pair.a) + bodies_.get_swing(pair.b) + kMaxDepthM;
   std::vector<Contact*> others;
   for (Contact& c : pair.contacts) {
     const auto same = std::find_if(modal.contacts.begin(), modal.contacts.end(), [&](const ModalContact& contact) {
@@ -286,12 +288,12 @@ void ModalImpacts::advance(const Step& step, double to_s, double part_s, double 
     if (!is_here || !(part_s > 0.0)) continue;
     std::vector<impact::Body> bodies = modal.impact->get_bodies();
     const int count = static_cast<int>(bodies.size());
-    // A body that slept when it was struck has come to move, or belongs to another island: the impact cannot continue as it was.
+    // A struck sleeping body now moves or belongs to another island: the impact cannot continue unchanged.
     bool is_whole = true;
     for (int k = 0; k < count; ++k)
       is_whole = is_whole && bodies_.moves(modal.bodies[k]) == (bodies[k].mass_kg > 0.0) && step.has(modal.bodies[k]);
     if (!is_whole) {
-      release(modal, to_s, touches);  // its bodies stay where they are for this part
+      release(modal, to_s, touches);  // its bodies do not move in this part
       continue;
     }
     std::vector<joints::Spatial> pulls(count);
@@ -301,7 +303,7 @@ void ModalImpacts::advance(const Step& step, double to_s, double part_s, double 
       impact::Body& b = bodies[k];
       set_motion(body, b);
       if (!b.on_joints) b.spin_acceleration_rad_s2 = (1.0 / step.length_s) * (step.free[n].placed.spin - bodies_.placed(body).spin);
-      // Cords and other contacts act as long as the impact continues in this part, whose own steps may be longer.
+      // Cords and other contacts act as long as the impact lasts in this part; its own steps may be longer.
       const Vec3 free = b.on_joints ? step.free[n].state.velocity : bodies_.state(body).velocity + step.length_s * bodies_.gravity();
       pulls[k] = {(1.0 / step.length_s) * (step.movers[n].velocity - free),
                   (1.0 / step.length_s) * (step.movers[n].spin - step.free[n].placed.spin)};
@@ -340,13 +342,13 @@ void ModalImpacts::advance(const Step& step, double to_s, double part_s, double 
       s.momentum = rotation * (bodies_.solid(body).inertia_kg_m2 * (transpose(rotation) * bodies[k].spin_rad_s));
     }
     keep_pulses(modal);
-    // Once a window: pieces of a small step each would be many.
+    // Once per window, to avoid many short pieces
     if (to_s >= window_end_s - 1e-9)
       for (ModalContact& contact : modal.contacts) report(contact);
     const bool is_slow = std::all_of(modal.bodies.begin(), modal.bodies.end(),
-                                     [&](int body) { return !bodies_.moves(body) || bodies_.calc_speed(body) < kRattling; });
-    if (!ended && to_s - modal.start_s <= (is_slow ? kLongest : kLongestOfAll)) continue;
-    // It has gone beyond the end of the part, and so did the pulls.
+                                     [&](int body) { return !bodies_.moves(body) || bodies_.calc_speed(body) < kRattleSpeedMS; });
+    if (!ended && to_s - modal.start_s <= (is_slow ? kMaxSlowImpactS : kMaxImpactS)) continue;
+    // The impact, and the other forces with it, extend beyond the end of the part.
     const double beyond_s = modal.start_s + modal.impact->get_time() - to_s;
     const std::vector<int> moved = modal.bodies;
     release(modal, to_s, touches);
@@ -356,7 +358,7 @@ void ModalImpacts::advance(const Step& step, double to_s, double part_s, double 
   impacts_.remove_if([](const ModalImpact& modal) { return modal.impact == nullptr; });
 }
 
-/// The articulation of a body that an impact has moved by `time_s`, of which the contacts of the step have their part.
+/// Moves the articulation of a body moved by an impact by `time_s`, including the effect of the step's contacts.
 void ModalImpacts::move_articulation(const ArticulationStep& step, const impact::Body& struck, double time_s, double step_s) {
   Articulation& articulation = *step.articulation;
   joints::Mechanism& mechanism = *articulation.mechanism;
@@ -380,17 +382,17 @@ void ModalImpacts::move_articulation(const ArticulationStep& step, const impact:
   articulation.now = std::move(moved);
   bodies_.place(articulation);
   if (!step.push.empty() || !articulation.is_anchored) return;
-  // The impact has taken its mobility for constant: the difference of the motion's energy from the contacts' work is corrected, as a change
-  // of all its velocities by the same part.
+  // The impact used a constant mobility: the deviation of the kinetic energy from the work of the contacts is corrected by scaling the
+  // change of all velocities.
   const auto [kinetic, after] = calc();
   const double gained = after - before - struck.work_j;
-  if (!(std::abs(gained) < kRight * kinetic)) return;
+  if (!(std::abs(gained) < kMaxCorrectionRatio * kinetic)) return;
   const double part = std::sqrt(1.0 - gained / kinetic);
   for (double& u : articulation.now.u) u *= part;
   bodies_.place(articulation);
 }
 
-/// Takes the effect of cords and other contacts on a body in the last `time_s` back.
+/// Reverts the effect of cords and other contacts on a body in the last `time_s`.
 void ModalImpacts::undo_pull(const Step& step, int body, const joints::Spatial& pull, double time_s) {
   if (pull.linear == Vec3{} && pull.angular == Vec3{}) return;
   if (const int number = step.free[step.find(body)].articulation; number >= 0) {
@@ -407,13 +409,13 @@ void ModalImpacts::undo_pull(const Step& step, int body, const joints::Spatial& 
   bodies_.place(body);
 }
 
-/// Takes the forces of an impact since the last time into the frames of its bodies, as they are now.
+/// Converts the forces of an impact since the last call to the current frames of its bodies.
 void ModalImpacts::keep_pulses(ModalImpact& modal) {
   for (const impact::Pulse& pulse : modal.impact->take_pulses()) {
     ModalContact& contact = modal.contacts[pulse.contact];
     Forces& forces = contact.forces;
     const double start_s = modal.start_s + pulse.start_s;
-    // A contact that was open for a while begins again.
+    // A contact that was open for a while starts a new pulse.
     if (!forces.on_a.empty() &&
         std::abs(start_s - forces.time_s - forces.step_s * static_cast<double>(forces.on_a.size())) > 0.5 * forces.step_s)
       report(contact);
@@ -437,7 +439,7 @@ void ModalImpacts::report(ModalContact& contact) {
   forces.continues = true;
 }
 
-/// Returns the modal states of an impact's bodies. It may be ahead of `time_s` by a part of its step.
+/// Returns the modal states of an impact's bodies, which may be ahead of `time_s` by part of its step.
 void ModalImpacts::release(ModalImpact& modal, double time_s, TouchSets& touches) {
   keep_pulses(modal);
   for (ModalContact& contact : modal.contacts) report(contact);
@@ -446,7 +448,7 @@ void ModalImpacts::release(ModalImpact& modal, double time_s, TouchSets& touches
   if (!modal.impact->has_ended()) ++ledger_.costs.ended_impacts;
   ledger_.costs.longest_impact_s = std::max(ledger_.costs.longest_impact_s, modal.impact->get_time());
   const impact::Books books = modal.impact->get_books();
-  // Yielded compression keeps the work of its recovery against the weight.
+  // Yielded compression retains the work of its recovery against gravity.
   double deepest_m = 0.0, weight_n = 0.0;
   for (int k = 0; k < static_cast<int>(modal.contacts.size()); ++k) deepest_m = std::max(deepest_m, modal.impact->calc_depth(k));
   for (const impact::Body& b : bodies) weight_n += b.mass_kg * norm(bodies_.gravity());

@@ -1,4 +1,4 @@
-// Impacts in which modes take part.
+// Impacts that involve modes.
 #pragma once
 
 #include <list>
@@ -15,67 +15,67 @@
 
 namespace carillon::rigid {
 
-/// A contact of an impact with modes.
+/// A contact of a modal impact.
 struct ModalContact {
-  Forces forces;                         // bodies, places, and impulses that are not reported yet
-  impact::Spring spring;                 // of this place alone
-  std::vector<double> shape_a, shape_b;  // axes of the meshes; empty: does not ring
-  Vec3 station{};                        // of the point, from the centre of the one that moves, axes of its mesh
-  std::uint64_t touch = 0;               // name of its touch
-  bool is_sharp = false;                 // a corner: where it bears with others, of a face
-  bool is_followed = false;              // in the present touch set,
+  Forces forces;                         // bodies, positions, and unreported impulses
+  impact::Spring spring;                 // of this point alone
+  std::vector<double> shape_a, shape_b;  // mesh axes; empty: no modes
+  Vec3 station{};                        // of the point, from the centre of the moving body, mesh axes
+  std::uint64_t touch = 0;               // id of its touch
+  bool is_sharp = false;                 // a corner: shares the face's spring with others
+  bool is_followed = false;              // in the current touch set,
   Vec3 normal{};                         // with this normal to side a
   double gap_m = 0.0;                    // and this gap of the rigid surfaces
 
   bool is_between(int a, int b) const { return (forces.a == a && forces.b == b) || (forces.a == b && forces.b == a); }
 };
 
-/// An impact with modes that is not over.
+/// A modal impact in progress.
 struct ModalImpact {
   std::unique_ptr<impact::Impact> impact;
   double start_s = 0.0;
-  std::vector<int> bodies;  // in the order of the impact's
+  std::vector<int> bodies;  // in the order of `impact`
   std::vector<ModalContact> contacts;
 };
 
-/// Impacts that are integrated with the modes of their bodies inside (runtime/physics/impact), over as many small steps as they take. Their bodies
-/// take their motion from them; gravity and other contacts enter as accelerations, a small step at a time. Invariant: a
-/// body, and so its modal state, is in one impact at a time.
+/// Impacts integrated with the modes of their bodies (runtime/physics/impact) over as many small steps as needed. They determine the motion
+/// of their bodies; gravity and other contacts enter as accelerations, constant per small step. Invariant: a body, and its modal state,
+/// belongs to at most one impact.
 class ModalImpacts {
  public:
   ModalImpacts(Bodies& bodies, ModalStates& states, Ledger& ledger) : bodies_(bodies), states_(states), ledger_(ledger) {}
 
   const std::list<ModalImpact>& list() const { return impacts_; }
-  /// Is there an impact between the two bodies of a pair, at that place? Points get other names while bodies roll.
+  /// True if the two bodies of a pair are in an impact at that point. Touch ids change while bodies roll.
   bool is_pressed(const Pair& pair, const Vec3& where) const;
 
-  /// Limits the restitution of every hit by the energy that its modes take; true where an impact has to be integrated.
+  /// Limits the restitution of every hit by the energy transferred to modes; true if the impact must be integrated.
   bool predict(const Step& step, Collision& collision);
-  /// Begins an impact, or lets the hits join one that is not over. False where there are too many points: the rigid impact stands.
+  /// Begins an impact, or adds the hits to a current one. False if there are too many points: use the rigid impact.
   bool begin(const Step& step, Collision& collision, const Instants& instants, TouchSets& touches);
-  /// A rigid impact ends the impacts with modes that its bodies were moved by.
+  /// A rigid impact ends the modal impacts of its bodies.
   void end(const std::vector<Hit>& hits, TouchSets& touches);
-  /// Ends impacts with slow touches elsewhere, or touches deeper than by their springs and modes, at the time of the touches.
+  /// Ends impacts with slow touches elsewhere, or touches deeper than their springs and modes explain, at the time of the touches.
   void end_where_touching(const Step& step, TouchSets& touches);
-  /// Moves contacts of impacts to their touches; touches that may close in a step become open contacts.
+  /// Moves contacts of impacts to their touches; touches that may close within a step become open contacts.
   void follow(const Step& step, double length_s, TouchSets& touches);
   /// Begins impacts of ringing bodies before contact of their deformed surfaces in a step.
   void begin_early(const Step& step, double length_s, const Instants& instants);
-  /// Depth of a pair by springs and modes of its impact [m].
+  /// Depth of a pair explained by springs and modes of its impact [m].
   double calc_depth(const Pair& pair) const;
-  /// Moves the impacts of an island to the time `to_s`, `part_s` later. The step has the effect of gravity and of other contacts on
-  /// their bodies. Forces are reported where the window ends.
+  /// Advances the impacts of an island to the time `to_s`, `part_s` later, with the effect of gravity and other contacts from the step.
+  /// Forces are reported at the end of the window.
   void advance(const Step& step, double to_s, double part_s, double window_end_s, TouchSets& touches);
-  /// Forces since the last call.
+  /// Returns the forces since the last call.
   std::vector<Forces> take_forces() { return std::exchange(forces_, {}); }
-  /// Energies in modes and springs of impacts, and losses there.
+  /// Adds the energies and losses of modes and springs in impacts.
   void add_to(Books& books) const;
 
  private:
-  /// Which hits and resting contacts of a collision become contacts of an impact.
+  /// Hits and resting contacts of a collision that become contacts of an impact.
   struct Selection {
     std::vector<int> order;
-    std::vector<char> rests;  // of all contacts of the collision
+    std::vector<char> rests;  // per contact of the collision
   };
 
   /// Bodies and contacts of a new impact.

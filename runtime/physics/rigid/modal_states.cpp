@@ -1,4 +1,4 @@
-// Method: free motion in closed form (runtime/physics/impact/modes.hpp); pulses of rigid impacts by their spectrum.
+// Method: free motion in closed form (runtime/physics/impact/modes.hpp); excitation by rigid impacts from the pulse spectrum.
 // Source: docs/decisions/impact.md.
 #include "runtime/physics/rigid/modal_states.hpp"
 
@@ -13,7 +13,7 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr double kLargestShape = 4.0;  // of a mode, over 1/sqrt(mass): at the corners of a plate
+constexpr double kMaxShapeValue = 4.0;  // largest mode shape value times sqrt(mass): at the corners of a plate
 
 }  // namespace
 
@@ -60,15 +60,15 @@ std::vector<double> calc_amplitudes(const impact::Modes& modes, const std::vecto
 void note_swing(Bodies& bodies, int body, const std::vector<double>& q, const std::vector<double>& q_dot) {
   double sum = 0.0;
   for (const double amplitude : calc_amplitudes(*bodies.solid(body).modes, q, q_dot)) sum += amplitude;
-  bodies.set_swing(body, kLargestShape / std::sqrt(bodies.solid(body).mass_kg) * sum);
+  bodies.set_swing(body, kMaxShapeValue / std::sqrt(bodies.solid(body).mass_kg) * sum);
 }
 
 void ModalStates::excite(Strike& strike, double available_j) {
-  std::map<int, ModalState> before;  // of the bodies whose modes are struck
+  std::map<int, ModalState> before;  // bodies whose modes are struck
   const Ledger ledger_before = ledger_;
   double given = 0.0;
   for (Hit& hit : strike.hits) {
-    if (hit.impulse == Vec3{} || hit.is_cord || !(hit.approach_m_s > kSlowest)) continue;
+    if (hit.impulse == Vec3{} || hit.is_cord || !(hit.approach_m_s > kMinImpactSpeedMS)) continue;
     for (const bool is_a : {true, false}) {
       const int body = is_a ? hit.a : hit.b;
       if (!bodies_.has_modes(body) || bodies_.is_in_impact(body)) continue;
@@ -90,7 +90,7 @@ void ModalStates::excite(Strike& strike, double available_j) {
     }
   }
   if (given > std::max(available_j, 0.0)) {
-    // More than there was: they get none of it. A rigid impact is only taken where modes get next to nothing.
+    // More than available: discarded. Rigid impacts are only used if modes receive almost no energy.
     for (auto& [body, state] : before) states_[body] = std::move(state);
     ledger_ = ledger_before;
     given = 0.0;

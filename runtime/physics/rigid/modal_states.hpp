@@ -1,4 +1,4 @@
-// The modes of bodies between impacts.
+// Modes of bodies between impacts.
 #pragma once
 
 #include <vector>
@@ -8,36 +8,36 @@
 
 namespace carillon::rigid {
 
-/// The modal state of a body at a time; empty: at rest since the beginning.
+/// Modal state of a body at a time; empty: at rest since the start.
 struct ModalState {
   std::vector<double> q, q_dot;
   double time_s = 0.0;
 };
 
-/// The place of a hit on a body's surface; looked for once.
+/// Position of a hit on a body's surface; searched once.
 const geometry::Place& find_place(const Bodies& bodies, Hit& hit, bool is_a);
-/// (n, 3) mode shapes there, axes of the mesh. Of a body with modes.
+/// (n, 3) mode shapes at a hit, mesh axes. The body must have modes.
 std::vector<double> find_shape(const Bodies& bodies, Hit& hit, bool is_a);
 
-/// (n) amplitudes of free modes in a state.
+/// (n) amplitudes of freely vibrating modes.
 std::vector<double> calc_amplitudes(const impact::Modes& modes, const std::vector<double>& q, const std::vector<double>& q_dot);
-/// Notes the bound of the displacement of a body's surface by modes in a state (Bodies::get_swing()).
+/// Stores the bound of a body's surface displacement by modes (Bodies::get_swing()).
 void note_swing(Bodies& bodies, int body, const std::vector<double>& q, const std::vector<double>& q_dot);
 
-/// Modal states of all bodies with modes. An impact with modes has those of its bodies until it returns them (set()).
+/// Modal states of all bodies with modes. A modal impact owns those of its bodies until it returns them (set()).
 class ModalStates {
  public:
   ModalStates(Bodies& bodies, Ledger& ledger) : bodies_(bodies), ledger_(ledger), states_(bodies.count()) {}
 
-  /// Moved freely to a time, unless it is later already; losses by damping are booked.
+  /// Advances freely to a time, unless it is later already; books damping losses.
   ModalState& advance(int body, double time_s);
   void set(int body, ModalState state) {
     states_[body] = std::move(state);
     note_swing(bodies_, body, states_[body].q, states_[body].q_dot);
   }
-  /// Excites modes by the pulses of a rigid impact, with at most `available_j`, which the motion lost; the rest of it is booked as lost.
+  /// Excites modes by the pulses of a rigid impact, with at most `available_j`, the loss of the motion; the remainder is booked as lost.
   void excite(Strike& strike, double available_j);
-  /// Energies at a time, and losses until then.
+  /// Adds energies at a time, and losses until then.
   void add_to(Books& books, double time_s) const;
 
  private:

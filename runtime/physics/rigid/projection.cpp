@@ -1,6 +1,6 @@
-// Method: min 1/2 dx^T M dx with n.(da - db) >= -gap - allowance for all touches of an island: the velocity problem without friction, its
-//   velocities read as displacements. Open touches may close, but not overlap. The work is paid by the motion along the displacement, then
-//   by all motion of the displaced bodies.
+// Method: min 1/2 dx^T M dx with n.(da - db) >= -gap - allowance for all touches of an island: the velocity problem without friction, with
+// velocities read as displacements. Open touches may close, but not overlap. The work is paid by the motion along the displacement, then by
+// all motion of the displaced bodies.
 // Source: V. Acary, "Projected event-capturing time-stepping schemes for nonsmooth mechanical systems with unilateral contact and Coulomb's
 //   friction", Comput. Methods Appl. Mech. Eng. 256 (2013) 224.
 #include "runtime/physics/rigid/projection.hpp"
@@ -13,13 +13,13 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr int kRounds = 3;           // each with the gaps that the last one left
-constexpr int kMaxFactorised = 60;   // touches of an island
-constexpr double kTolerance = 1e-7;  // m; of sweeps,
-constexpr int kSweeps = 200;         // and their number
-constexpr double kMaxRatio = 10.0;   // of the excess of the deepest touch: displacement of any point
-constexpr double kMaxPaid = 0.5;     // of the kinetic energy
-constexpr double kDisplaced = 0.1;   // of the farthest displacement: bodies that pay
+constexpr int kIterations = 3;           // iterations, each with the remaining gaps
+constexpr int kMaxFactorised = 60;       // touches of an island
+constexpr double kToleranceM = 1e-7;     // m; tolerance of sweeps,
+constexpr int kMaxSweeps = 200;          // maximum number of sweeps
+constexpr double kMaxRatio = 10.0;       // displacement of any point relative to the excess of the deepest touch
+constexpr double kMaxPaidRatio = 0.5;    // fraction of the kinetic energy
+constexpr double kDisplacedRatio = 0.1;  // relative to the largest displacement: bodies that pay
 
 }  // namespace
 
@@ -29,7 +29,7 @@ bool Projection::can_part(const Step& step, const Pair& pair) const {
   return is_movable(pair.a) || is_movable(pair.b);
 }
 
-/// Depth of the deepest touch beyond its allowance [m].
+/// Excess of the deepest touch over its allowance [m].
 double Projection::find_excess(const Step& step) const {
   double excess = 0.0;
   for (const Pair* pair : step.island().pairs) {
@@ -39,7 +39,7 @@ double Projection::find_excess(const Step& step) const {
   return excess;
 }
 
-/// `is_held`: a body or the ground that does not move is among them.
+/// `is_held`: a static body or the ground is among them.
 std::vector<Point> Projection::make_points(const Step& step, bool& is_held) const {
   std::vector<Point> points;
   for (const Pair* pair : step.island().pairs) {
@@ -58,7 +58,7 @@ std::vector<Point> Projection::make_points(const Step& step, bool& is_held) cons
 }
 
 void Projection::run(const Step& step, double allowed_m) {
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < kIterations; ++round) {
     const double excess = find_excess(step);
     if (excess <= allowed_m) return;
     std::vector<Mover> resting(step.count());
@@ -71,7 +71,7 @@ void Projection::run(const Step& step, double allowed_m) {
     std::vector<Mover> displacements = resting;
     if (static_cast<int>(points.size()) > kMaxFactorised || !solver_.solve_directly(displacements, points, kMaxGuesses)) {
       displacements = resting;
-      solver_.solve(displacements, points, kTolerance, kSweeps);
+      solver_.solve(displacements, points, kToleranceM, kMaxSweeps);
     }
     limit(step, kMaxRatio * excess, displacements);
     move(step, displacements, is_held);
@@ -79,8 +79,7 @@ void Projection::run(const Step& step, double allowed_m) {
   }
 }
 
-/// Touches that contradict each other, as in a jam, have no solution: shortens all displacements so that no point of a body moves farther
-/// than `most_m`.
+/// Conflicting touches, as in a jam, have no solution: scales all displacements so that no point of a body moves farther than `most_m`.
 void Projection::limit(const Step& step, double most_m, std::vector<Mover>& displacements) const {
   double farthest = 0.0;
   for (int n = 0; n < step.count(); ++n)
@@ -92,8 +91,8 @@ void Projection::limit(const Step& step, double most_m, std::vector<Mover>& disp
   }
 }
 
-/// Moves every body by the velocity and spin of its mover, read as displacements. In an island that is held the spin about the axes of the
-/// body is kept, otherwise the angular momentum of all.
+/// Displaces every body by the velocity and spin of its mover. In an island held by static bodies the spin in body axes is kept, otherwise
+/// the total angular momentum.
 void Projection::move(const Step& step, const std::vector<Mover>& displacements, bool is_held) {
   const double before_j = bodies_.calc_energy(step.island().bodies);
   const Vec3 turning = is_held ? Vec3{} : calc_angular_momentum(step);
@@ -134,9 +133,10 @@ void Projection::pay(const Step& step, const std::vector<Mover>& displacements, 
   for (const Mover& d : displacements) farthest = std::max(farthest, norm(d.velocity));
   const auto for_displaced = [&](auto&& act) {
     for (int n = 0; n < step.count(); ++n)
-      if (is_movable(step.body(n)) && norm(displacements[n].velocity) >= kDisplaced * farthest) act(step.body(n), displacements[n]);
+      if (is_movable(step.body(n)) && norm(displacements[n].velocity) >= kDisplacedRatio * farthest) act(step.body(n), displacements[n]);
   };
-  double momentum = 0.0, mass = 0.0;  // along the displacement: kinetic energy is momentum s + mass s^2 / 2 less at speed s less
+  double momentum = 0.0,
+         mass = 0.0;  // along the displacement: reducing the speed by s reduces the kinetic energy by momentum s - mass s^2 / 2
   for_displaced([&](int i, const Mover& d) {
     momentum += bodies_.solid(i).mass_kg * dot(d.velocity, bodies_.state(i).velocity) + dot(d.spin, bodies_.state(i).momentum);
     mass += bodies_.solid(i).mass_kg * dot(d.velocity, d.velocity) + dot(d.spin, bodies_.calc_inertia(i) * d.spin);
@@ -151,7 +151,7 @@ void Projection::pay(const Step& step, const std::vector<Mover>& displacements, 
     bodies_.place(i);
     kinetic_j += calc_kinetic(bodies_.solid(i), s, bodies_.placed(i));
   });
-  const double rest_j = std::min(owed_j - most_j, kMaxPaid * kinetic_j);
+  const double rest_j = std::min(owed_j - most_j, kMaxPaidRatio * kinetic_j);
   if (!(rest_j > 0.0)) return;
   const double part = std::sqrt(1.0 - rest_j / kinetic_j);
   for_displaced([&](int i, const Mover&) {
@@ -170,7 +170,7 @@ Vec3 Projection::calc_angular_momentum(const Step& step) const {
   return sum;
 }
 
-/// Gives an island an angular momentum by a spin of the whole.
+/// Adds angular momentum to an island by a rigid spin of the whole.
 void Projection::turn(const Step& step, const Vec3& gained) {
   double mass = 0.0;
   Vec3 centre{};

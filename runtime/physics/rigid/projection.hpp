@@ -1,4 +1,4 @@
-// Bodies that are too deep in each other are moved apart.
+// Separation of bodies with deep penetrations.
 #pragma once
 
 #include <vector>
@@ -10,14 +10,14 @@
 
 namespace carillon::rigid {
 
-/// Displaces the bodies of an island so that no touch is deeper than allowed, by the least displacement in the norm of their masses.
-/// Invariants: a free island keeps its momentum and angular momentum; energy is only gained where motion cannot pay for it, and is booked
-/// as lifted then. Bodies on joints and in impacts with modes stay where they are.
+/// Displaces the bodies of an island so that no touch is deeper than allowed, by the least displacement in the mass norm. Invariants: a
+/// free island keeps its momentum and angular momentum; energy is gained only where motion cannot pay for it, and is then booked as lifted.
+/// Bodies on joints and in modal impacts are not moved.
 class Projection {
  public:
   Projection(Bodies& bodies, TouchSets& touches, Ledger& ledger) : bodies_(bodies), touches_(touches), ledger_(ledger) {}
 
-  /// At the beginning of a step. Touches deeper than `allowed_m` and their allowance (Pair::sag_m) are opened.
+  /// Call at the start of a step. Separates touches deeper than `allowed_m` plus their allowance (Pair::sag_m).
   void run(const Step& step, double allowed_m);
 
  private:

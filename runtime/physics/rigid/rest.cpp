@@ -1,6 +1,6 @@
-// Method: a body that has been slow for a while sleeps if contact forces exist that balance it at rest. An island sleeps as a whole. Where
-//   others of the island move, bodies sleep by themselves, with the forces of the others on them as they are. These forces are watched:
-//   where they change by more than a part of its weight a sleeping body wakes, alone, and so may those that lean on it, one after another.
+// Method: a body that has been slow for a while sleeps if contact forces exist that balance it at rest. An island sleeps as a whole. If
+// other bodies of the island move, bodies sleep separately under the current forces of the others. These forces are monitored: if they
+// change by more than a fraction of its weight, the sleeping body wakes, and then possibly the bodies it supports, one after another.
 // Source: J. J. Moreau, "Unilateral contact and dry friction in finite freedom dynamics" (1988), the solution with zero velocities.
 #include "runtime/physics/rigid/rest.hpp"
 
@@ -15,11 +15,11 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr double kPatience = 0.02;  // s; slower than kSlow for so long, a body may be about to rest
-constexpr double kApart = 0.1;      // s; slow for so long, a body may sleep among others that move,
-constexpr double kCalm = 0.05;      // s; if those that it touches have been slow for so long
-constexpr double kStill = 5e-4;     // m/s; and nothing is faster where it touches
-constexpr double kShift = 0.05;     // of its weight: change of the forces on it that wakes it
+constexpr double kSlowDelayS = 0.02;       // s; minimum time below kSlowSpeedMS before a test of rest
+constexpr double kSleepDelayS = 0.1;       // s; minimum slow time of a body that may sleep among moving ones,
+constexpr double kNeighbourSlowS = 0.05;   // s; and of the bodies that it touches,
+constexpr double kMaxTouchSpeedMS = 5e-4;  // m/s; with no faster contact
+constexpr double kWakeForceRatio = 0.05;   // fraction of the weight: change of the forces that wakes a body
 
 }  // namespace
 
@@ -31,8 +31,8 @@ bool Rest::may_sleep(const std::vector<int>& bodies, double time_s) {
   bool all = true;
   for (const int body : bodies) {
     Pace& pace = paces_[body];
-    pace.slow_s = bodies_.calc_speed(body) < kSlow && !bodies_.is_moved_by_impact(body) ? pace.slow_s + time_s : 0.0;
-    all = all && pace.slow_s > kPatience && bodies_.get_time() >= pace.next_proof_s;
+    pace.slow_s = bodies_.calc_speed(body) < kSlowSpeedMS && !bodies_.is_moved_by_impact(body) ? pace.slow_s + time_s : 0.0;
+    all = all && pace.slow_s > kSlowDelayS && bodies_.get_time() >= pace.next_proof_s;
   }
   return all;
 }
@@ -46,12 +46,12 @@ bool Rest::try_articulation(Articulation& articulation, double length_s) {
   return true;
 }
 
-/// Puts an island, or a part of one on which others pull, to sleep if it is balanced at rest.
+/// Puts an island, or a part of one under external forces, to sleep if it is balanced at rest.
 Rest::Balance Rest::try_sleep(Island& island, double h, const std::vector<joints::Spatial>& pulls) {
   bool touches = !pulls.empty();
   double slow_s = std::numeric_limits<double>::infinity();
   for (const Pair* pair : island.pairs) {
-    if (pair->sag_m > kDeep) return Balance::none;  // it comes up first
+    if (pair->sag_m > kDeepM) return Balance::none;  // must recover first
     touches = touches || pair->has_closed_gap();
   }
   bodies_.for_articulations(island.bodies, [&](const Articulation& articulation) { touches = touches || articulation.is_anchored; });
@@ -82,7 +82,7 @@ Rest::Balance Rest::try_sleep(Island& island, double h, const std::vector<joints
       ledger_.lose(calc_kinetic(bodies_.solid(body), before));
     } else {
       bodies_.state(body) = before;
-      (pulls.empty() ? paces_[body].next_proof_s : paces_[body].next_part_s) = bodies_.get_time() + std::min(0.5 * slow_s, kLong);
+      (pulls.empty() ? paces_[body].next_proof_s : paces_[body].next_part_s) = bodies_.get_time() + std::min(0.5 * slow_s, kLongSlowS);
       bodies_.place(body);
     }
   }
@@ -100,7 +100,7 @@ Rest::Balance Rest::try_sleep(Island& island, double h, const std::vector<joints
     c.couple = p.couple;
     c.step_s = h;
     c.touching = dot(c.impulse, c.touch.normal) > 0.0;
-    c.rests = c.is_load = c.touch.gap_m <= kDeep;
+    c.rests = c.is_load = c.touch.gap_m <= kDeepM;
     c.rest_n = (1.0 / h) * c.impulse;
   }
   return stands ? Balance::stands : Balance::leans;
@@ -110,21 +110,22 @@ Rest::Balance Rest::try_sleep(Island& island, double h, const std::vector<joints
 std::vector<char> Rest::find_slow() const {
   std::vector<char> is_slow(bodies_.count(), 0);
   for (int i = 0; i < bodies_.count(); ++i)
-    is_slow[i] = bodies_.moves(i) && paces_[i].slow_s > kApart && bodies_.get_time() >= paces_[i].next_part_s &&
+    is_slow[i] = bodies_.moves(i) && paces_[i].slow_s > kSleepDelayS && bodies_.get_time() >= paces_[i].next_part_s &&
                  !bodies_.is_moved_by_impact(i) && bodies_.find_articulation(i) == nullptr;
   if (std::none_of(is_slow.begin(), is_slow.end(), [](char slow) { return slow != 0; })) return {};
   const auto is_one = [&](int body) { return body >= 0 && is_slow[body] != 0; };
   for (const Pair* pair : windows_.near()) {
-    if ((!is_one(pair->a) && !is_one(pair->b)) || !(pair->touches() || pair->sag_m > kDeep)) continue;
+    if ((!is_one(pair->a) && !is_one(pair->b)) || !(pair->touches() || pair->sag_m > kDeepM)) continue;
     const bool moves_there = std::any_of(pair->contacts.begin(), pair->contacts.end(), [&](const Contact& c) {
-      return c.touching && norm(bodies_.calc_velocity(c.a, c.touch.where_m) - bodies_.calc_velocity(c.b, c.touch.where_m)) > kStill;
+      return c.touching &&
+             norm(bodies_.calc_velocity(c.a, c.touch.where_m) - bodies_.calc_velocity(c.b, c.touch.where_m)) > kMaxTouchSpeedMS;
     });
     for (const bool is_a : {true, false}) {
       const int body = is_a ? pair->a : pair->b, other = is_a ? pair->b : pair->a;
       // Forces on articulated bodies belong to the joints.
-      const bool is_calm = !bodies_.moves(other) || (paces_[other].slow_s > kCalm && !bodies_.is_moved_by_impact(other) &&
+      const bool is_calm = !bodies_.moves(other) || (paces_[other].slow_s > kNeighbourSlowS && !bodies_.is_moved_by_impact(other) &&
                                                      bodies_.find_articulation(other) == nullptr);
-      if (is_one(body) && (pair->cord >= 0 || moves_there || !is_calm || pair->sag_m > kDeep)) is_slow[body] = 0;
+      if (is_one(body) && (pair->cord >= 0 || moves_there || !is_calm || pair->sag_m > kDeepM)) is_slow[body] = 0;
     }
   }
   return is_slow;
@@ -139,7 +140,7 @@ void Rest::try_parts() {
     if (is_one(pair->a) && is_one(pair->b) && pair->touches()) groups.join(pair->a, pair->b);
   struct Part {
     Island island;
-    std::vector<Pair*> bounds;  // to bodies that keep moving, with or without forces
+    std::vector<Pair*> bounds;  // pairs with bodies that keep moving, with or without forces
   };
   std::map<int, Part> parts;
   for (Pair* pair : windows_.near()) {
@@ -154,7 +155,7 @@ void Rest::try_parts() {
   for (int i = 0; i < bodies_.count(); ++i)
     if (is_one(i)) parts[groups.find(i)].island.bodies.push_back(i);
   for (auto& [first, part] : parts) {
-    if (part.bounds.empty()) continue;  // an island of its own: try_island() handles it
+    if (part.bounds.empty()) continue;  // a separate island: handled by try_island()
     std::vector<joints::Spatial> pulls(part.island.bodies.size());
     for (const Pair* pair : part.bounds) {
       const bool is_a = is_one(pair->a);
@@ -162,19 +163,19 @@ void Rest::try_parts() {
       for (const Contact& c : pair->contacts) add_pull(bodies_, c, is_a, c.calc_force(), pulls[at - part.island.bodies.begin()]);
     }
     for (Pair* pair : part.island.pairs) touches_.refresh(*pair);
-    // A part that stands without the others bears them as a fixed body does; one that leans on them, or is carried, is their load.
+    // A part that is stable without the others supports them like a fixed body; a part that leans on them, or is carried, is their load.
     const Balance found = try_sleep(part.island, options_.step_s, pulls);
     if (found == Balance::none) continue;
     for (Pair* pair : part.bounds)
       for (Contact& c : pair->contacts) {
-        c.rests = c.touch.gap_m <= kDeep;
+        c.rests = c.touch.gap_m <= kDeepM;
         c.is_load = found == Balance::leans && c.rests;
         c.rest_n = c.calc_force();
       }
   }
 }
 
-/// Wakes a body and all that touch it, and so on, or it alone.
+/// Wakes a body and all connected sleeping bodies, or it alone.
 std::vector<int> Rest::wake(int body, int by, bool alone) {
   std::vector<int> woken{body}, awake;
   while (!woken.empty()) {
@@ -195,7 +196,7 @@ std::vector<int> Rest::wake(int body, int by, bool alone) {
         if (!sleeps)
           c.rests = c.is_load = false;
         else if (dot((c.a == i ? 1.0 : -1.0) * c.rest_n, bodies_.gravity()) <= 0.0)
-          c.is_load = false;  // the sleeping body below it bears any load
+          c.is_load = false;  // the sleeping body below bears all loads
     }
     for (Pair& pair : touches_.cord_pairs()) {
       if (pair.a != i && pair.b != i) continue;
@@ -218,7 +219,7 @@ void Rest::watch(Pair& pair, double step_s) {
   const int body = a_moves ? pair.b : pair.a, by = a_moves ? pair.a : pair.b;
   if (!bodies_.is_asleep(body)) return;
   const auto left =
-      std::count_if(pair.contacts.begin(), pair.contacts.end(), [](const Contact& c) { return c.rests && c.touch.gap_m <= kDeep; });
+      std::count_if(pair.contacts.begin(), pair.contacts.end(), [](const Contact& c) { return c.rests && c.touch.gap_m <= kDeepM; });
   if (left < resting) {
     wake(body, by, bodies_.find_articulation(body) == nullptr);
     return;
@@ -227,8 +228,8 @@ void Rest::watch(Pair& pair, double step_s) {
     const double approach = bodies_.calc_approach(c.touch, c.a, c.b);
     const double pull = (a_moves ? -1.0 : 1.0) * dot(bodies_.gravity(), c.touch.normal);
     const double fallen_m = 0.5 * std::max(pull, 0.0) * step_s * step_s;
-    // Where the two rest on each other, slow changes are left to wake_unbalanced().
-    return (resting == 0 || approach > kSlowest) && c.touch.gap_m - approach * step_s - fallen_m <= kTouch;
+    // If the two rest on each other, slow changes are handled by wake_unbalanced().
+    return (resting == 0 || approach > kMinImpactSpeedMS) && c.touch.gap_m - approach * step_s - fallen_m <= kTouchGapM;
   });
   if (comes) wake(body, by);
 }
@@ -256,7 +257,7 @@ void Rest::wake_unbalanced() {
   for (const auto& [body, change] : changes) {
     const Solid& solid = bodies_.solid(body);
     const double size = norm(change.pull.linear) + norm(change.pull.angular) / solid.radius_m;
-    if (change.is_struck || size > kShift * solid.mass_kg * norm(bodies_.gravity()))
+    if (change.is_struck || size > kWakeForceRatio * solid.mass_kg * norm(bodies_.gravity()))
       wake(body, change.by, bodies_.find_articulation(body) == nullptr);
   }
 }

@@ -1,4 +1,4 @@
-// Which bodies sleep, and until when.
+// Sleeping bodies.
 #pragma once
 
 #include <vector>
@@ -11,7 +11,7 @@
 
 namespace carillon::rigid {
 
-/// Puts bodies to sleep that contact forces balance, and wakes them where these forces change. Invariant: a sleeping body has no velocity,
+/// Puts bodies to sleep that contact forces balance, and wakes them when these forces change. Invariant: a sleeping body has no velocity,
 /// and its contacts keep the forces under which it fell asleep.
 class Rest {
  public:
@@ -25,31 +25,31 @@ class Rest {
         trial_(bodies),
         paces_(bodies.count()) {}
 
-  /// These bodies are not about to rest.
+  /// Restarts the slow time of these bodies.
   void reset(const std::vector<int>& bodies);
-  /// Adds up the time for which bodies have been slow; true where a proof of rest may be tried.
+  /// Accumulates the slow time of bodies; true if a test of rest is due.
   bool may_sleep(const std::vector<int>& bodies, double time_s);
-  /// Puts an island to sleep where it is balanced at rest. True: it sleeps.
+  /// Puts an island to sleep if it is balanced at rest; true if so.
   bool try_island(Island& island, double step_s) { return try_sleep(island, step_s, {}) != Balance::none; }
-  /// The same of bodies whose island keeps moving elsewhere. At the beginning of a window, on the contacts of the last step.
+  /// Puts bodies to sleep whose island keeps moving elsewhere. Call at the start of a window; uses the contacts of the last step.
   void try_parts();
-  /// The same of an articulation that touches nothing for the length of a window.
+  /// Puts an articulation to sleep that touches nothing during a window.
   bool try_articulation(Articulation& articulation, double length_s);
 
-  /// Updates the touches of a pair for a step. A sleeping body of it wakes where a contact that it rested on has opened, or where another
-  /// body is about to touch it.
+  /// Updates the touches of a pair for a step. Wakes a sleeping body of the pair if a supporting contact has opened, or if another body is
+  /// about to touch it.
   void watch(Pair& pair, double step_s);
-  /// Wakes the bodies that sleep among others whose forces on them are no longer those under which they rest.
+  /// Wakes sleeping bodies whose contact forces from moving bodies have changed.
   void wake_unbalanced();
-  /// Bodies of an impact that slept until now move from here on, in this island. True if there were any. If another island touches them,
-  /// too, that touch waits for the next step, in which the islands are one (they take the same steps: Windows::choose_steps()).
+  /// Adds sleeping bodies of an impact to this island; true if there were any. If another island touches them too, that touch waits for the
+  /// next step, in which the islands are merged (both use the same steps: Windows::choose_steps()).
   bool wake_struck(Step& step, const std::vector<ContactRef>& contacts);
 
  private:
-  /// The recent speed of a body, and when to look again.
+  /// Slow time of a body, and time of the next test.
   struct Pace {
-    double slow_s = 0.0;        // it has been slow for so long
-    double next_proof_s = 0.0;  // when rest may be looked for again,
+    double slow_s = 0.0;        // duration of slow motion
+    double next_proof_s = 0.0;  // next test of rest,
     double next_part_s = 0.0;   // that of a part of its island
   };
   enum class Balance { none, stands, leans };  // leans: only with the forces of others

@@ -1,7 +1,7 @@
-// Method: the points of an impact and the contacts of their bodies are solved at once, with Newton's restitution and Coulomb's cone.
-// Source: B. Mirtich, "Impulse-based dynamic simulation of rigid body systems" (1996).
-//   V. Smith et al., "Reflections on simultaneous impact", ACM Trans. Graph. 31 (2012), for rows.
-// Deviations: impulses are scaled back where friction and restitution together would gain energy.
+// Method: the points of an impact and the contacts of their bodies are solved simultaneously, with Newton's restitution and Coulomb's cone.
+// Impulses are scaled down if friction and restitution together would gain energy.
+// Source: B. Mirtich, "Impulse-based dynamic simulation of rigid body systems" (1996); V. Smith et al., "Reflections on simultaneous
+// impact", ACM Trans. Graph. 31 (2012), for rows.
 #include "runtime/physics/rigid/rigid_impact.hpp"
 
 #include <algorithm>
@@ -16,12 +16,12 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr int kFewPoints = 8;   // of an impact that is solved to rounding, its load shared evenly
-constexpr double kRow = 0.9;    // least restitution in a row that passes a blow on,
-constexpr int kMaxBlows = 100;  // with so many impacts of each of its contacts at most
-constexpr int kFar = 3;         // bodies from one that strikes to the last one that may be moved
+constexpr int kMaxExactPoints = 8;          // maximum points of an impact solved to rounding, with evenly shared load
+constexpr double kMinRowRestitution = 0.9;  // minimum restitution in a row that transmits a blow,
+constexpr int kMaxBlows = 100;              // maximum impacts per contact
+constexpr int kMaxReachBodies = 3;          // bodies from the striking one to the last one moved
 
-/// With friction Newton's restitution can gain energy (Kane 1984): the part of all impulses with which it does not.
+/// With friction Newton's restitution can gain energy (Kane 1984): the fraction of all impulses that does not.
 double calc_conserving_part(const std::vector<Mover>& before, const std::vector<Mover>& after, const std::vector<Point>& points) {
   double linear = 0.0, square = 0.0;
   for (const Point& p : points) {
@@ -38,7 +38,7 @@ std::vector<ContactRef> RigidImpact::gather(const Step& step, const std::vector<
   std::vector<ContactRef> taken = first;
   std::set<int> bodies;
   for (const ContactRef& ref : first) bodies.insert(ref.pair->a), bodies.insert(ref.pair->b);
-  for (int far = 0; far < kFar; ++far) {
+  for (int far = 0; far < kMaxReachBodies; ++far) {
     std::set<int> next = bodies;
     for (Pair* pair : step.island().pairs) {
       if (!step.has(*pair)) continue;
@@ -47,8 +47,8 @@ std::vector<ContactRef> RigidImpact::gather(const Step& step, const std::vector<
       for (int k = 0; const Contact& c : pair->contacts) {
         const ContactRef ref{pair, k++};
         if (c.presses) continue;
-        const bool soon = c.touch.gap_m - bodies_.calc_approach(c.touch, c.a, c.b) * step.together_s <= kTouch;
-        if (!soon && !(c.touching && c.touch.gap_m <= kDeep)) continue;
+        const bool soon = c.touch.gap_m - bodies_.calc_approach(c.touch, c.a, c.b) * step.together_s <= kTouchGapM;
+        if (!soon && !(c.touching && c.touch.gap_m <= kDeepM)) continue;
         if (std::find(taken.begin(), taken.end(), ref) == taken.end()) taken.push_back(ref);
         next.insert(pair->a);
         next.insert(pair->b);
@@ -95,33 +95,33 @@ Hit RigidImpact::make_hit(const Collision& collision, const Contact& c, Point& p
     const double mobility = dot(p.normal, calc_mobility(collision.movers, p) * p.normal);
     hit.linked_mass_kg = mobility > 0.0 ? 1.0 / mobility : 0.0;
   }
-  if (hit.approach_m_s <= kSlowest) return hit;
+  if (hit.approach_m_s <= kMinImpactSpeedMS) return hit;
   if (hit.is_cord) {
     hit.restitution = c.touching ? 0.0 : touches_.cord(c.cord).restitution;
   } else if (!c.is_closed()) {
-    // A rebound whose flight, 2 e v / g, is shorter than the contact itself is none: weight keeps the surfaces together.
+    // A rebound whose flight time 2 e v / g is shorter than the contact time does not occur: gravity keeps the surfaces together.
     const double e = bodies_.calc_restitution(c.a, c.b), mass = 1.0 / dot(p.normal, calc_mobility(collision.movers, p) * p.normal);
     const double pull = std::abs(dot(bodies_.gravity(), p.normal)), flight = 2.0 * e * hit.approach_m_s;
     hit.restitution = flight > pull * bodies_.calc_contact_time(hit.touch, hit.a, hit.b, mass, hit.approach_m_s) ? e : 0.0;
   }
-  p.wanted = (hit.restitution * hit.approach_m_s) * p.normal;  // across, it may stick where it stops
+  p.wanted = (hit.restitution * hit.approach_m_s) * p.normal;  // tangentially it may stick where it stops
   return hit;
 }
 
-/// Bodies that touch at one point each, two others at most: a blow goes through them as a wave.
+/// Bodies that touch at most two others at one point each: a blow propagates through them as a wave.
 bool RigidImpact::is_row(const Collision& collision) const {
   std::map<int, int> others;
   std::set<std::pair<int, int>> pairs;
   for (const Hit& hit : collision.hits) {
     if (hit.linked_mass_kg > 0.0) return false;
     if (hit.is_cord || !bodies_.moves(hit.a) || !bodies_.moves(hit.b)) continue;
-    if (bodies_.calc_restitution(hit.a, hit.b) < kRow || !pairs.insert({hit.a, hit.b}).second) return false;
+    if (bodies_.calc_restitution(hit.a, hit.b) < kMinRowRestitution || !pairs.insert({hit.a, hit.b}).second) return false;
     if (++others[hit.a] > 2 || ++others[hit.b] > 2) return false;
   }
   return pairs.size() > 1;
 }
 
-/// One contact at a time, the one that closes fastest, until none closes.
+/// One contact at a time, the fastest closing one first, until none closes.
 void RigidImpact::solve_row(Collision& collision) const {
   std::vector<Point>& points = collision.points;
   const auto calc_approach = [&](const Point& p) { return -dot(calc_relative_velocity(collision.movers, p), p.normal); };
@@ -131,12 +131,13 @@ void RigidImpact::solve_row(Collision& collision) const {
     const double approach = calc_approach(*fastest);
     if (approach <= 1e-9) break;
     Hit& hit = collision.hits[fastest - points.begin()];
-    if (!hit.is_cord && bodies_.moves(hit.a) && bodies_.moves(hit.b) && approach > kSlowest)
+    if (!hit.is_cord && bodies_.moves(hit.a) && bodies_.moves(hit.b) && approach > kMinImpactSpeedMS)
       hit.restitution = bodies_.calc_restitution(hit.a, hit.b);
     hit.approach_m_s = std::max(hit.approach_m_s, approach);
     const Vec3& n = fastest->normal;
-    const Vec3 push =
-        ((1.0 + (approach > kSlowest ? hit.restitution : 0.0)) * approach / dot(n, calc_mobility(collision.movers, *fastest) * n)) * n;
+    const Vec3 push = ((1.0 + (approach > kMinImpactSpeedMS ? hit.restitution : 0.0)) * approach /
+                       dot(n, calc_mobility(collision.movers, *fastest) * n)) *
+                      n;
     rigid::apply(collision.movers, *fastest, push);
     hit.impulse = hit.impulse + push;
   }
@@ -145,11 +146,11 @@ void RigidImpact::solve_row(Collision& collision) const {
 void RigidImpact::solve(Collision& collision) {
   if (is_row(collision)) return solve_row(collision);
   std::vector<Point>& points = collision.points;
-  double scale = kSlowest;
+  double scale = kMinImpactSpeedMS;
   for (const Hit& hit : collision.hits) scale = std::max(scale, std::abs(hit.approach_m_s));
   const std::vector<Mover> before = collision.movers;
   const int count = static_cast<int>(points.size());
-  const bool is_few = count <= kFewPoints;
+  const bool is_few = count <= kMaxExactPoints;
   solver_.solve_evenly(collision.movers, points, is_few ? 20 * count : 0, (is_few ? 1e-9 : 1e-4) * scale, is_few ? 1000 : 60);
   const double part = calc_conserving_part(before, collision.movers, points);
   for (int n = 0; n < count; ++n) collision.hits[n].impulse = part * points[n].impulse;
@@ -179,7 +180,7 @@ Strike RigidImpact::apply(Collision& collision, double& lost_j) {
   };
   for (const int body : moved) strike.before.push_back(bodies_.state(body));
   const double before_j = calc_kinetic();
-  // Calls with the impulses of all hits on moving bodies.
+  // Passes the impulses of all hits on moving bodies.
   const auto for_impulses = [&](const auto& act) {
     for (int n = 0; const Hit& hit : strike.hits) {
       const Point& p = collision.points[n++];
@@ -211,7 +212,7 @@ Strike RigidImpact::apply(Collision& collision, double& lost_j) {
   for (int n = 0; const Hit& hit : strike.hits) {
     Contact& c = collision.contacts[n++].get();
     const bool rebounds = hit.restitution > 0.0;
-    c.touching = !rebounds && c.touch.gap_m <= kDeep;
+    c.touching = !rebounds && c.touch.gap_m <= kDeepM;
     if (rebounds) c.impulse = c.couple = {};
   }
   return strike;

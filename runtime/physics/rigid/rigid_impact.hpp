@@ -1,4 +1,4 @@
-// Impacts of rigid bodies: all points of one instant at once.
+// Impacts of rigid bodies: all points of one instant simultaneously.
 #pragma once
 
 #include <vector>
@@ -9,32 +9,32 @@
 
 namespace carillon::rigid {
 
-/// An impact of bodies of a step: contacts, hits and points, one for one, and the bodies as they are before or, solved, after it.
+/// Impact of bodies of a step: contacts, hits and points (same indices), and the bodies before or, once solved, after it.
 struct Collision {
   std::vector<ContactRef> contacts;
   std::vector<Hit> hits;
   std::vector<Point> points;
-  std::vector<Mover> movers;      // the bodies of the step
-  std::vector<Linkage> linkages;  // of its articulations, as they are now
+  std::vector<Mover> movers;      // bodies of the step
+  std::vector<Linkage> linkages;  // of its articulations, current configuration
 
   Collision() = default;
   Collision(Collision&&) = default;  // movers refer to linkages
   Collision& operator=(Collision&&) = default;
 };
 
-/// Newton's restitution and Coulomb's cone for all points of an impact. Invariant: an impact takes energy from the motion, or none, and
-/// changes no momentum of a free island. It keeps nothing between calls.
+/// Newton's restitution and Coulomb's cone for all points of an impact. Invariant: an impact never adds energy to the motion, and conserves
+/// the momentum of a free island. Stateless between calls.
 class RigidImpact {
  public:
   RigidImpact(Bodies& bodies, const TouchSets& touches) : bodies_(bodies), touches_(touches) {}
 
-  /// The points that strike now, and those in touch with the bodies that they move, three bodies far; in order.
+  /// Striking points, and contacts of the bodies that they move, up to three bodies away; sorted.
   std::vector<ContactRef> gather(const Step& step, const std::vector<ContactRef>& first) const;
-  /// Hits with the restitution of rigid bodies, and points with the velocities that they are to have.
+  /// Hits with the restitution of rigid bodies, and points with their wanted velocities.
   Collision make(const Step& step, std::vector<ContactRef> contacts) const;
-  /// The impulses of all hits.
+  /// Computes the impulses of all hits.
   void solve(Collision& collision);
-  /// Gives the bodies these impulses; the contacts touch or rebound after that. Returns the record of it, and the loss of the motion [J].
+  /// Applies the impulses to the bodies; the contacts then touch or rebound. Returns the record, and the energy lost by the motion [J].
   Strike apply(Collision& collision, double& lost_j);
 
  private:

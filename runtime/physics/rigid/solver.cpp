@@ -1,13 +1,11 @@
-// Method: projected Gauss-Seidel over points, each a block of three: the impulse that stops the point if it lies in the cone, otherwise
-//   the normal one and a tangential one brought back to the cone. Sweeps go to and fro and begin at the impulses of the step before, so
-//   that what rests is found in a sweep or two. Between pairs of sweeps the impulses continue along the conjugate direction of the last
-//   pairs: towers and unequal masses take tens of sweeps, not thousands. The last thing done is a sweep, which leaves all inside their
-//   cones.
-// Source: J. J. Moreau, "Some numerical methods in multibody dynamics" (1999); M. Jean, "The non-smooth contact dynamics method" (1999);
-//   M. Silcowitz-Hansen, S. Niebe, K. Erleben, "A nonsmooth nonlinear conjugate gradient method for interactive contact force problems"
-//   (2010).
-// Deviations: couples against rolling and twisting, bounded by the normal impulse, in the same sweeps. An impulse on a body on joints moves
-//   all that hangs together; ways that joints do not allow are left out of a block.
+// Method: projected Gauss-Seidel over points, each a block of three: the impulse that stops the point if it lies in the cone, otherwise the
+// normal impulse and a tangential one projected onto the cone. Sweeps alternate in direction and start from the impulses of the previous
+// step, so resting contacts converge in one or two sweeps. Between pairs of sweeps the impulses are extrapolated along the conjugate
+// direction of the last pairs: towers and unequal masses take tens of sweeps instead of thousands. A final sweep leaves all impulses inside
+// their cones. Rolling and twisting couples, bounded by the normal impulse, are part of the same sweeps. An impulse on a body on joints
+// moves its whole articulation; directions blocked by joints are excluded from the block.
+// Source: J. J. Moreau, "Some numerical methods in multibody dynamics" (1999); M. Jean, "The non-smooth contact dynamics method" (1999); M.
+// Silcowitz-Hansen, S. Niebe, K. Erleben, "A nonsmooth nonlinear conjugate gradient method for interactive contact force problems" (2010).
 #include "runtime/physics/rigid/solver.hpp"
 
 #include <Eigen/Eigenvalues>
@@ -27,7 +25,7 @@ using sweeps::Response;
 using sweeps::Row;
 using sweeps::Turning;
 
-constexpr double kLocked = 1e-9;  // of the largest mobility at a point: what is less is a way that joints do not allow
+constexpr double kLockedMobilityRatio = 1e-9;  // relative to the largest mobility at a point: smaller ones are directions blocked by joints
 
 void add_mobility(Mat3& k, const Mover& m, const Vec3& arm) {
   // 1/m I - [r] I^-1 [r]
@@ -43,7 +41,7 @@ void add_mobility(Mat3& k, const Mover& m, const Vec3& arm) {
   }
 }
 
-/// An impulse and a couple at the centre of a body on joints move all that hangs together.
+/// Applies an impulse and a couple at the centre of a body on joints to its whole articulation.
 void give(std::vector<Mover>& movers, const Mover& on, const Vec3& impulse, const Vec3& couple) {
   const double by[6] = {impulse[0], impulse[1], impulse[2], couple[0], couple[1], couple[2]};
   const Linkage& linkage = *on.linkage;
@@ -73,7 +71,7 @@ void add_linked_mobility(Mat3& k, const Mover& of, const Vec3& arm_of, const Mov
   }
 }
 
-/// The inverse of a symmetric matrix where it is more than `min`, and the projector on where that is.
+/// Inverse of a symmetric matrix on the range of eigenvalues above `min`, and the projector onto that range.
 Mat3 calc_pseudo_inverse(const Mat3& m, Mat3& range, double min) {
   Eigen::Matrix3d k;
   for (std::size_t i = 0; i < 3; ++i)
@@ -230,28 +228,28 @@ void Solver::prepare(const std::vector<Mover>& movers, const std::vector<Point>&
   }
 }
 
-/// A point on bodies on joints: an impulse moves all that hangs together, and not every way is free.
+/// A point on bodies on joints: an impulse moves the articulation, and not every direction is free.
 void Solver::lock(const std::vector<Mover>& movers, const Point& p, const Mat3& axes, Row& row) {
   Locked& locked = problem_.locked[row.locked];
   const Mat3 k = axes * (calc_mobility(movers, p) * transpose(axes));
   const double kn = k[0][0], trace = k[0][0] + k[1][1] + k[2][2];
   Mat3 range{}, unused{};
-  set_columns(row.inverse, calc_pseudo_inverse(k, range, kLocked * trace));
+  set_columns(row.inverse, calc_pseudo_inverse(k, range, kLockedMobilityRatio * trace));
   set_columns(locked.allowed, range);
-  row.normal_mass = kn > kLocked * trace ? 1.0 / kn : 0.0;
+  row.normal_mass = kn > kLockedMobilityRatio * trace ? 1.0 / kn : 0.0;
   row.mobility = row.normal_mass > 0.0 ? kn : 0.0;
-  // Across, as far as joints leave it free once the motion along the normal is given.
+  // Tangential directions left free by joints for given normal motion.
   locked.by_push = Four{0.0, k[1][0], k[2][0], 0.0};
   Mat3 left{};
   for (std::size_t r = 1; r < 3; ++r)
     for (std::size_t c = 1; c < 3; ++c) left[r][c] = k[r][c] - row.normal_mass * k[r][0] * k[c][0];
-  set_columns(locked.across, calc_pseudo_inverse(left, unused, kLocked * trace));
+  set_columns(locked.across, calc_pseudo_inverse(left, unused, kLockedMobilityRatio * trace));
   locked.pushed.begin = static_cast<int>(problem_.responses.size());
   for (const bool is_a : {true, false}) add_responses(movers, is_a ? p.a : p.b, is_a ? p.arm_a : p.arm_b, is_a ? 1.0 : -1.0, true, axes);
   locked.pushed.end = static_cast<int>(problem_.responses.size());
 }
 
-/// What the bodies on the joints of one gain by impulses along the axes of a point, or by couples about them.
+/// Response of the bodies on the same joints to impulses along the axes of a point, or to couples about them.
 void Solver::add_responses(const std::vector<Mover>& movers, int body, const Vec3& arm, double sign, bool are_impulses, const Mat3& axes) {
   if (body < 0 || movers[body].linkage == nullptr) return;
   const Mover& on = movers[body];
@@ -292,7 +290,7 @@ void Solver::add_turning(const std::vector<Mover>& movers, const Point& p, const
   turning.mass = calc_turning_mass(movers, p);
 }
 
-/// Writes the answer.
+/// Writes the solution.
 void Solver::take(std::vector<Mover>& movers, std::vector<Point>& points) const {
   for (std::size_t n = 0; n < movers.size(); ++n) {
     movers[n].velocity = to_vec(problem_.bodies[n].velocity);
@@ -316,7 +314,7 @@ double calc_turning_mass(const std::vector<Mover>& movers, const Point& p) {
 double Solver::solve(std::vector<Mover>& movers, std::vector<Point>& points, double tolerance_m_s, int max_sweeps) {
   prepare(movers, points);
   for (Row& row : problem_.rows) {
-    // The part of the old impulse along the normal of now stays normal.
+    // The component of the old impulse along the current normal stays normal.
     Four& impulse = row.impulse;
     impulse[0] = std::max(0.0, impulse[0]);
     const double size = std::hypot(impulse[1], impulse[2]), limit = row.friction * impulse[0];
@@ -354,7 +352,7 @@ double Solver::run(double tolerance_m_s, int max_sweeps) {
     if (largest <= tolerance_m_s) break;
     largest = sweep(false);
     if (largest <= tolerance_m_s || sweeps_ >= max_sweeps) break;
-    // What both sweeps changed is minus a gradient, conjugate to the one before.
+    // The change by both sweeps is a negative gradient, conjugate to the previous one.
     double now = 0.0;
     for (std::size_t i = 0; i < rows.size(); ++i) {
       before_[i].by = rows[i].impulse - before_[i].by;

@@ -1,4 +1,4 @@
-// Contacts that last, in one step: the impulses of all points that touch, found together.
+// Persistent contacts in one step: simultaneous impulses of all touching points.
 #pragma once
 
 #include <vector>
@@ -9,45 +9,44 @@
 
 namespace carillon::rigid {
 
-/// A body in a step, world axes: what impulses do to it. Fixed ones and the ground have none of their own; their index is -1.
+/// Response of a body to impulses in a step, world axes. Fixed bodies and the ground have no mover; their index is -1.
 struct Mover {
   double inverse_mass = 0.0;         // 1/kg
   Mat3 inverse_inertia{};            // 1/(kg m^2)
-  Vec3 velocity{}, spin{};           // m/s of the centre, rad/s; in: at the end of the step without contacts; out: with them
-  const Linkage* linkage = nullptr;  // on joints: what impulses do is in there
-  int member = 0;                    // of it
+  Vec3 velocity{}, spin{};           // m/s of the centre, rad/s; in: at the end of the step without contacts; out: with contacts
+  const Linkage* linkage = nullptr;  // on joints: holds the response to impulses
+  int member = 0;                    // index in the linkage
 };
 
-/// One point in touch. u is the velocity of a less that of b there.
+/// One touching point. u is the velocity of a minus that of b there.
 struct Point {
   int a = -1, b = -1;
   Vec3 arm_a{}, arm_b{};     // from the centres [m]
   Vec3 normal{};             // unit, from b to a
-  Vec3 wanted{};             // u at the end: along the normal at least this much, across it exactly while it sticks [m/s]
-  double friction = 0.0;     // Coulomb's
-  double rolling_m = 0.0;    // arm of the couple that resists rolling: bound over the normal impulse
-  double twisting_m = 0.0;   // the same about the normal
-  Vec3 impulse{}, couple{};  // on a [N s, N m s]; in: where the iteration begins
+  Vec3 wanted{};             // u at the end: minimum along the normal, exact tangentially while sticking [m/s]
+  double friction = 0.0;     // Coulomb coefficient
+  double rolling_m = 0.0;    // rolling resistance arm: couple bound over the normal impulse
+  double twisting_m = 0.0;   // twisting resistance arm, about the normal
+  Vec3 impulse{}, couple{};  // on a [N s, N m s]; in: initial values
 };
 
 /// Solves the complementarity problem of all points of a step. Invariant: after every call the normal impulses push, the tangential ones
-/// lie inside the cone, and the couples inside their bounds, converged or not. Members are work memory: no call changes the result of the
+/// lie inside the cone, and the couples inside their bounds, converged or not. Members are work memory: no call affects the result of the
 /// next.
 class Solver {
  public:
   explicit Solver(const sweeps::Functions& functions = sweeps::get_functions()) : functions_(&functions) {}
-  /// Changes the points' impulses and couples, and velocities and spins with them, until the largest change of a velocity by a sweep is
-  /// below `tolerance_m_s`, in at most `max_sweeps` sweeps to and fro over the points as they are ordered. Returns the change of the last
-  /// sweep [m/s].
+  /// Updates the points' impulses and couples, and the velocities and spins, until the largest velocity change of a sweep is below
+  /// `tolerance_m_s`, in at most `max_sweeps` alternating sweeps in the given order. Returns the change of the last sweep [m/s].
   double solve(std::vector<Mover>& movers, std::vector<Point>& points, double tolerance_m_s, int max_sweeps);
-  /// The same from zero impulses, and the load shared evenly first between points that are redundant: `shares` times all points change at
-  /// once, damped by their number. A box that lands flat keeps its symmetry.
+  /// solve() from zero impulses, with the load first shared evenly between redundant points: `shares` simultaneous updates of all points,
+  /// damped by their number. A box that lands flat keeps its symmetry.
   double solve_evenly(std::vector<Mover>& movers, std::vector<Point>& points, int shares, double tolerance_m_s, int max_sweeps);
-  /// The same problem by factorisation, for what sweeps take too long for (towers, unequal masses): guesses which points carry and stick,
-  /// solves, corrects the guess from the answer, in at most `max_guesses`. Redundant points share their load evenly. True where the guess
-  /// was confirmed; the impulses obey all bounds in any case. False where bodies are on joints.
-  /// `are_swept`: the impulses given are an answer of sweeps or of the step before, and points at their bound slide in the first guess;
-  /// otherwise all that carry stick in it.
+  /// The same problem by factorisation, for slowly converging cases (towers, unequal masses): guesses the load-bearing and sticking points,
+  /// solves, and corrects the guess from the solution, at most `max_guesses` times. Redundant points share their load evenly. True if the
+  /// guess was confirmed; the impulses obey all bounds in any case. False if bodies are on joints. `are_swept`: the given impulses are a
+  /// solution of sweeps or of the previous step, and points at their bound slide in the first guess; otherwise all load-bearing points
+  /// stick in it.
   bool solve_directly(std::vector<Mover>& movers, std::vector<Point>& points, int max_guesses, bool are_swept = false);
   int get_sweeps() const { return sweeps_; }
 
@@ -65,18 +64,18 @@ class Solver {
   int sweeps_ = 0;
 };
 
-/// Velocity of the point of a less that of b.
+/// Velocity of a minus that of b at the point.
 Vec3 calc_relative_velocity(const std::vector<Mover>& movers, const Point& point);
 
 Vec3 calc_relative_spin(const std::vector<Mover>& movers, const Point& point);
-/// Gives both bodies of a point an impulse, or a couple.
+/// Applies an impulse, or a couple, to both bodies of a point.
 void apply(std::vector<Mover>& movers, const Point& point, const Vec3& impulse);
 void turn(std::vector<Mover>& movers, const Point& point, const Vec3& couple);
 
-/// Scale of the couples at a point: couple per spin [kg m^2], as without joints. 0: the point has no couple.
+/// Scale of the couples at a point: couple per spin [kg m^2], as without joints. 0: no couple.
 double calc_turning_mass(const std::vector<Mover>& movers, const Point& point);
 
-/// The mobility at a point [1/kg]: u gained per impulse.
+/// Mobility at a point [1/kg]: change of u per impulse.
 Mat3 calc_mobility(const std::vector<Mover>& movers, const Point& point);
 
 }  // namespace carillon::rigid

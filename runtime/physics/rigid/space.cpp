@@ -1,4 +1,4 @@
-// Method: the loop over windows, steps, islands and the impacts within a step; the stages do the rest.
+// Method: loop over windows, steps, islands and the impacts within a step; the work is done by the stages.
 #include "runtime/physics/rigid/space.hpp"
 
 #include <algorithm>
@@ -13,14 +13,14 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr double kShortest = 1e-9;  // s; a shorter rest of a step is left out
-constexpr double kStruck = 5e-5;    // s; longest part of a step after the begin of an impact with modes
-constexpr int kMaxMissed = 30;      // in a step: instants at which nothing struck after all
-constexpr int kMaxSought = 3;       // of these, with a search for closings on the path
-constexpr int kMaxCompleted = 4;    // solutions of a step that are repeated with touches that were missing
-constexpr int kMaxImpacts = 4;      // of an island in a step, each at its instant; an island with more is crowded
-constexpr int kMinImpacts = 2;      // the same of the largest islands, each of whose impacts costs more
-constexpr int kStruckBodies = 48;   // bodies of an island times its impacts in a step
+constexpr double kMinStepS = 1e-9;        // s; shorter remainders of a step are skipped
+constexpr double kMaxStruckStepS = 5e-5;  // s; longest part of a step after the start of a modal impact
+constexpr int kMaxMissed = 30;            // per step: instants at which no touch struck
+constexpr int kMaxSought = 3;             // of these, with a search for closings on the path
+constexpr int kMaxCompleted = 4;          // repeated solutions of a step with missing touches added
+constexpr int kMaxImpacts = 4;            // individual impacts of an island per step; an island with more is crowded
+constexpr int kMinImpacts = 2;            // the same for the largest islands, whose impacts cost more
+constexpr int kMaxStruckBodies = 48;      // bodies of an island times its impacts per step
 
 }  // namespace
 
@@ -100,17 +100,17 @@ void Space::step_island(Island& island, double start_s, double length_s) {
   int impacts = 0, missed = 0, more = 0;
   bool begun = false;
   const bool wobbles = std::any_of(island.bodies.begin(), island.bodies.end(),
-                                   [&](int body) { return !bodies_.is_flat(body) && bodies_.calc_speed(body) > kSlow; });
+                                   [&](int body) { return !bodies_.is_flat(body) && bodies_.calc_speed(body) > kSlowSpeedMS; });
   const bool is_on_ground =
       step_.count() == 1 && std::all_of(island.pairs.begin(), island.pairs.end(), [](const Pair* pair) { return pair->b < 0; });
-  const double open_m = is_on_ground ? kDeep : wobbles ? kTooDeep - kMissing : kTooDeep;
-  const int max_impacts = std::clamp(kStruckBodies / step_.count(), kMinImpacts, kMaxImpacts);
+  const double open_m = is_on_ground ? kDeepM : wobbles ? kMaxDepthM - kMissingDepthM : kMaxDepthM;
+  const int max_impacts = std::clamp(kMaxStruckBodies / step_.count(), kMinImpacts, kMaxImpacts);
   if (instants_.is_crowded(island, start_s)) {
     strike_at_once(start_s, length_s);
     impacts = max_impacts;
   }
-  while (length_s - done > kShortest) {
-    const double h = impacts > 0 && !modal_impacts_.list().empty() ? std::min(length_s - done, kStruck) : length_s - done;
+  while (length_s - done > kMinStepS) {
+    const double h = impacts > 0 && !modal_impacts_.list().empty() ? std::min(length_s - done, kMaxStruckStepS) : length_s - done;
     bodies_.set_time(start_s + done);
     modal_impacts_.begin_early(step_, h, instants_);
     modal_impacts_.follow(step_, h, touches_);
@@ -127,11 +127,11 @@ void Space::step_island(Island& island, double start_s, double length_s) {
       if (!touches_.complete(step_, missed < kMaxSought)) break;
       is_completed = true;
     }
-    // A row stops a touch only at the end of a step, half of its way too deep: missing touches strike at the beginning instead.
+    // A row stops a touch only at the end of a step, half of its movement too deep: missing touches strike at the start instead.
     if (is_completed && impacts >= max_impacts && more++ < kMaxCompleted && strike_at_once(start_s + done, h)) continue;
     double at = h;
     std::vector<ContactRef> first;
-    step_.together_s = kTogether;
+    step_.together_s = kSimultaneousS;
     const bool struck = impacts < max_impacts && instants_.find(step_, at, first);
     problem_.keep_impulses(step_, at);
     for (Pair* pair : island.pairs) touches_.travel(*pair, at, h);
@@ -141,21 +141,21 @@ void Space::step_island(Island& island, double start_s, double length_s) {
       bodies_.set_time(start_s + done);
       for (Pair* pair : island.pairs)
         if (!pair->contacts.empty()) touches_.refresh(*pair);
-      if (instants_.confirm(step_, first, length_s - done, kDeep * (1 + missed))) {
+      if (instants_.confirm(step_, first, length_s - done, kDeepM * (1 + missed))) {
         strike(first);
         if (++impacts == max_impacts) instants_.set_crowded(island, start_s + length_s);
-      } else if ((missed += at > kShortest ? 1 : missed + 1) > kMaxMissed) {  // an instant that is now would be missed again
+      } else if ((missed += at > kMinStepS ? 1 : missed + 1) > kMaxMissed) {  // an immediate instant would be missed again
         impacts = max_impacts;
       }
     }
-    if (length_s - done > kShortest)
+    if (length_s - done > kMinStepS)
       for (Pair* pair : island.pairs) touches_.update(*pair, length_s - done);
   }
   step_.end();
 }
 
-/// Puts an island to sleep if contact forces balance it: first with its bodies moved apart to kDeep, then as it is. If neither balances, no
-/// body is displaced: bodies that fall back from a lift would never come to rest.
+/// Puts an island to sleep if contact forces balance it: first with its bodies separated to kDeepM, then unchanged. If neither balances, no
+/// body is displaced: bodies falling back from a displacement would never come to rest.
 bool Space::try_rest(Island& island, double length_s) {
   std::vector<State> kept;
   std::vector<std::pair<double, Pair::Errors>> kept_pairs;
@@ -164,13 +164,13 @@ bool Space::try_rest(Island& island, double length_s) {
   Books before, after;
   ledger_.add_to(before);
   const std::int64_t pushes = ledger_.costs.pushes;
-  // A body that has come to lie may have more touches than the one on which it rocked.
+  // A body that has come to rest may have more touches than while rocking.
   for (Pair* pair : island.pairs) {
     if (pair->b >= 0 || pair->contacts.size() != 1 || !pair->touches()) continue;
     pair->memory.known = false;
     touches_.search(*pair, length_s);
   }
-  projection_.run(step_, kDeep);
+  projection_.run(step_, kDeepM);
   if (rest_.try_island(island, length_s)) return true;
   if (ledger_.costs.pushes == pushes) return false;
   ledger_.add_to(after);
@@ -187,7 +187,7 @@ bool Space::try_rest(Island& island, double length_s) {
   return rest_.try_island(island, length_s);
 }
 
-/// The impacts of a crowded island: all touches closing within a step strike at its beginning. False: none closes, touches unchanged.
+/// Impacts of a crowded island: all touches that close within a step strike at its start. False: none closes, touches unchanged.
 bool Space::strike_at_once(double start_s, double length_s) {
   bodies_.set_time(start_s);
   step_.together_s = length_s;
@@ -199,19 +199,19 @@ bool Space::strike_at_once(double start_s, double length_s) {
   return true;
 }
 
-/// Takes the bodies of an island through the part of a step that is made.
+/// Advances the bodies of an island through the completed part of a step.
 void Space::move(double to_s, double part_s) {
   const double before_j = bodies_.calc_energy(step_.island().bodies);
   std::vector<State> moved;
-  std::vector<char> in_impact;  // one that ends in this part has been moved by it, too
-  double loads_j = 0.0;         // work of sleeping bodies that lie on them
+  std::vector<char> in_impact;  // includes impacts that end in this part, which have moved their bodies
+  double loads_j = 0.0;         // work of sleeping bodies supported by these
   for (int n = 0; n < step_.count(); ++n) {
     in_impact.push_back(bodies_.is_moved_by_impact(step_.body(n)) ? 1 : 0);
     const bool is_free = step_.free[n].articulation < 0;
     moved.push_back(is_free ? step_.calc_moved(n, part_s) : State{});
     if (is_free && in_impact.back() == 0) loads_j += step_.calc_load_work(n, moved.back(), part_s);
   }
-  ledger_.lose(-loads_j);  // a load does not fall with its support until it wakes, within kDeep: this energy comes from nowhere
+  ledger_.lose(-loads_j);  // a load does not descend with its support until it wakes, within kDeepM: this energy is a gain
   std::vector<const ArticulationStep*> flown;
   for (const ArticulationStep& a : step_.articulations)
     if (a.articulation->struck < 0) flown.push_back(&a);
@@ -229,7 +229,7 @@ void Space::move(double to_s, double part_s) {
   if (!has_impacts) problem_.remove_gain(step_, before_j + loads_j);
 }
 
-/// All that strikes now, as rigid bodies or with modes.
+/// Applies all current strikes, rigid or modal.
 void Space::strike(const std::vector<ContactRef>& first) {
   ++ledger_.costs.impacts;
   std::vector<ContactRef> contacts = rigid_impact_.gather(step_, first);

@@ -1,13 +1,13 @@
-// Bodies that fall, strike, slide, roll and rest: their motion in small steps, on contacts that have an identity.
+// Bodies that fall, strike, slide, roll and rest: their motion in small steps on persistent contacts.
 //
-// Time goes in windows of 2 ms. Bodies that can meet nothing within one fly through it in closed form. The others go through it in small
-// steps. In each of them the velocities at its end follow from one complementarity problem over all points that touch (solver.hpp), begun
-// at the impulses of the step before; places follow from the mean of both velocities, so that contacts without slip and impacts keep the
-// energy. A touch that comes fast is no part of that: its instant is found, the step ends there, and the impact is solved by itself.
-// An island that a solution with zero velocity balances is put to sleep.
+// Time is divided into windows of 2 ms. Bodies that can meet nothing within a window fly through it in closed form. The others take small
+// steps. The velocities at the end of each step follow from one complementarity problem over all touching points (solver.hpp), started from
+// the impulses of the previous step; positions follow from the mean of both velocities, so that non-slipping contacts and impacts conserve
+// energy. Fast touches are excluded: the step ends at their instant, and the impact is solved separately. An island that is balanced with
+// zero velocity is put to sleep.
 //
 // The stages of a step: Windows, TouchSets, Projection, Rest, StepProblem, Instants, RigidImpact, ModalImpacts, on the Bodies and their
-// ModalStates; each keeps its own state, and gets that of a step as a Step. All book their losses in the Ledger.
+// ModalStates; each keeps its own state, and receives that of a step as a Step. All book their losses in the Ledger.
 #pragma once
 
 #include <algorithm>
@@ -34,23 +34,23 @@
 namespace carillon::rigid {
 
 /// All bodies of a simulation and their contacts. At the start of a window all bodies are at its time. Fixed and sleeping bodies do not
-/// move, bodies on joints never leave them, and the energies of calc_books() have a constant sum. Islands are stepped apart.
+/// move, joints stay closed, and the energies of calc_books() have a constant sum. Islands are stepped independently.
 class Space {
  public:
   static constexpr double kWindow = Windows::kLength;  // s
 
-  /// Bodies on joints must make trees (joints::make_mechanism), and their velocities are projected onto the motions that the joints allow.
+  /// Bodies on joints must form trees (joints::make_mechanism); their velocities are projected onto the motions permitted by the joints.
   Space(std::vector<Solid> solids, std::vector<State> states, std::optional<Ground> ground, const Vec3& gravity, const Options& options,
         const Links& links = {});
   Space(const Space&) = delete;  // stages refer to each other
   Space& operator=(const Space&) = delete;
 
-  /// One small step of all that is not asleep, to at most `until_s`. At the start of a window all bodies are at its time; within it those
-  /// that fly are at its end. Throws SolveError where a state is not finite.
+  /// One small step of all awake bodies, to at most `until_s`. At the start of a window all bodies are at its time; within it flying bodies
+  /// are at its end. Throws SolveError if a state is not finite.
   void step(double until_s);
   double get_time() const { return bodies_.get_time(); }
   bool is_at_window() const { return at_window_; }
-  /// Of the window of the last step.
+  /// Start of the window of the last step.
   double get_window_start() const { return windows_.get_start(); }
 
   const Solid& solid(int body) const { return bodies_.solid(body); }
@@ -59,36 +59,36 @@ class Space {
   /// Fixed or asleep.
   bool is_still(int body) const { return !bodies_.moves(body); }
   bool is_all_asleep() const { return bodies_.are_all_asleep(); }
-  /// Where all is asleep: to the end of the next window, without a step.
+  /// If all bodies sleep: advances to the end of the next window without a step.
   void skip_window(double end_s);
-  /// Velocity of the point of a body at that place [m/s]; zero for the ground and fixed bodies.
+  /// Velocity of a body at a point [m/s]; zero for the ground and fixed bodies.
   Vec3 calc_velocity(int body, const Vec3& where) const { return bodies_.calc_velocity(body, where); }
   geometry::Frame get_frame(int body) const { return bodies_.get_frame(body); }
   const Vec3& get_spin(int body) const { return bodies_.placed(body).spin; }
   /// Contacts of bodies that are awake.
   void list_contacts(std::vector<const Contact*>& out) const;
-  /// Of bodies that are near in this window, and of still ones that touch. b: -1 for the ground, or greater than a.
+  /// Pairs of bodies near in this window, and of static or sleeping ones that touch. b: -1 for the ground, or greater than a.
   const std::map<std::pair<int, int>, Pair>& pairs() const { return touches_.pairs(); }
-  /// Depth of a pair explained or left by an impact with modes [m].
+  /// Depth of a pair explained or left by a modal impact [m].
   double calc_explained_depth(int a, int b) const {
     const auto at = pairs().find({a, b});
     return at == pairs().end() ? 0.0 : std::max(at->second.sag_m, modal_impacts_.calc_depth(at->second));
   }
-  /// Impacts since the last call.
+  /// Returns the impacts since the last call.
   std::vector<Strike> take_strikes() { return std::exchange(strikes_, {}); }
-  /// Forces of impacts with modes since the last call.
+  /// Returns the forces of modal impacts since the last call.
   std::vector<Forces> take_forces() { return modal_impacts_.take_forces(); }
   Books calc_books() const;
-  /// Duration of an impact (calc_hertz_duration) of that effective mass and speed [s].
+  /// Duration of an impact (calc_hertz_duration) for an effective mass and speed [s].
   double calc_contact_time(const Hit& hit, double mass_kg, double speed_m_s) const {
     return bodies_.calc_contact_time(hit.touch, hit.a, hit.b, mass_kg, speed_m_s);
   }
   int count_mechanisms() const { return static_cast<int>(bodies_.articulations().size()); }
-  /// Difference between the velocity given at the start and the motions that the joints of a body allow [m/s]; 0 without joints.
+  /// Difference between the given start velocity and the motions permitted by the joints of a body [m/s]; 0 without joints.
   double get_start_error(int body) const { return bodies_.get_start_error(body); }
-  /// Does a joint hold the two together, so that they do not collide?
+  /// True if a joint connects the two bodies; they do not collide.
   bool is_joined(int a, int b) const { return bodies_.is_joined(a, b); }
-  /// Groups of moving bodies that may touch each other in the present window.
+  /// Groups of moving bodies that may touch each other in the current window.
   int count_islands() const { return windows_.count_islands(); }
   const Costs& get_costs() const { return ledger_.costs; }
   const std::optional<Ground>& ground() const { return bodies_.ground(); }
@@ -114,7 +114,7 @@ class Space {
   Instants instants_;
   RigidImpact rigid_impact_;
   Rest rest_;
-  Step step_;  // that is being made
+  Step step_;  // current step
   std::vector<Strike> strikes_;
   bool at_window_ = true;
 };

@@ -1,5 +1,5 @@
-// Method: impulses act at the middle of a step, and places follow from the mean of the velocities at its two ends. On articulations they
-//   act where the mechanism is at the end of the step without contacts, at the place where they press half a step later.
+// Method: impulses act at mid-step, and positions follow from the mean of the velocities at both ends. For articulations they act in the
+// configuration at the end of the step without contacts, at the contact position at mid-step.
 // Source: J. J. Moreau, "Unilateral contact and dry friction in finite freedom dynamics" (1988); in generalised coordinates for joints.
 #include "runtime/physics/rigid/step.hpp"
 
@@ -40,7 +40,7 @@ State Step::calc_moved(int n, double part_s) const {
   to.centre = to.centre + (0.5 * part_s * part_s) * gained;
   const Vec3 spun = movers[n].spin - free[n].placed.spin;
   to.rotation = normalise(multiply(make_turn((0.5 * part_s * part_s / length_s) * spun), to.rotation));
-  // The impulses act at the middle of the part: there the centre is less far than where their arms begin.
+  // The impulses act at the middle of the part: the centre is then behind the origin of their arms.
   const Vec3 late = cross((0.5 * (length_s - part_s)) * from.velocity, (bodies_.solid(i).mass_kg * length_s) * gained);
   to.momentum = to.momentum + (part_s / length_s) * (turned[n] + late);
   return to;
@@ -53,7 +53,7 @@ double Step::calc_loss(const Point& p, double part) const {
     const State& state = bodies_.state(body(n));
     const Vec3& spin = bodies_.placed(body(n)).spin;
     if (movers[n].linkage != nullptr) {
-      // The arm is from where the centre is at the end.
+      // The arm starts at the centre at the end of the step.
       const Vec3 moved = 0.5 * (free[n].state.centre - state.centre);
       u = u + ((2.0 - part) * sign) * cross(spin, moved);
     }

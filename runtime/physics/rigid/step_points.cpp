@@ -1,6 +1,6 @@
-// Method: predicted motion of a step without contacts, and the touches that last as points of its velocity problem; impulses act at the
-//   middle of the step. With the arm from x0 + h v0 / 2 momentum and angular momentum of a free island are conserved to rounding, and a
-//   contact that neither slides nor strikes does no work.
+// Method: predicted motion of a step without contacts, and persistent touches as points of its velocity problem; impulses act at mid-step.
+// With arms from x0 + h v0 / 2 the momentum and angular momentum of a free island are conserved to rounding, and a contact that neither
+// slides nor strikes does no work.
 // Source: J. J. Moreau, "Unilateral contact and dry friction in finite freedom dynamics" (1988), the step with the impulse at its middle.
 #include <algorithm>
 #include <array>
@@ -16,14 +16,14 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr double kDrilling = 3.0 * std::numbers::pi / 16.0;  // of friction times patch radius: arm of the couple against drilling
-constexpr double kAtRest = 1e-6;                             // m/s
-constexpr double kAtRestTurned = 1e-7;                       // rad in a step
-constexpr double kMaxRolling = 20.0;                         // of the size: way of a touch for an angle of rolling
-constexpr int kTurns = 16;                                   // points that take turns by their pairs
+constexpr double kTwistArmRatio = 3.0 * std::numbers::pi / 16.0;  // twisting arm over friction times patch radius
+constexpr double kRestSpeedMS = 1e-6;                             // m/s
+constexpr double kRestTurnRad = 1e-7;                             // rad in a step
+constexpr double kMaxRollingRatio = 20.0;                         // relative to the size: maximum travel of a touch per rolling angle
+constexpr int kPairBlock = 16;                                    // block length for interleaving points by pair
 
-/// From below to above, so that a sweep carries the weight down a pile. Of each kTurns points in that order those that are the first of
-/// their pairs come first, then the second ones, and so on: sweeps over such an order need a tenth fewer.
+/// Sorts points by height, so that one sweep propagates the weight down a pile. Within each block of kPairBlock points the first points of
+/// all pairs come first, then the second ones, and so on: this order needs 10 % fewer sweeps.
 void sort_points(Step& step, const Vec3& gravity) {
   const int count = static_cast<int>(step.points.size());
   if (count < 2) return;
@@ -33,10 +33,10 @@ void sort_points(Step& step, const Vec3& gravity) {
   std::vector<int> order(count);
   std::iota(order.begin(), order.end(), 0);
   std::stable_sort(order.begin(), order.end(), [&](int x, int y) { return heights[x] < heights[y]; });
-  std::array<const Pair*, kTurns> pairs;
-  std::array<int, kTurns> sorted, turns;  // turns: of each point among those of its pair
-  for (int begin = 0; begin < count; begin += kTurns) {
-    const int size = std::min(kTurns, count - begin);
+  std::array<const Pair*, kPairBlock> pairs;
+  std::array<int, kPairBlock> sorted, turns;  // turns: index of each point within its pair
+  for (int begin = 0; begin < count; begin += kPairBlock) {
+    const int size = std::min(kPairBlock, count - begin);
     int last = 0;
     for (int n = 0; n < size; ++n) {
       sorted[n] = order[begin + n];
@@ -56,6 +56,30 @@ void sort_points(Step& step, const Vec3& gravity) {
   for (const int n : order) points.push_back(step.points[n]), rows.push_back(step.rows[n]);
   step.points.swap(points);
   step.rows.swap(rows);
+}
+
+/// Path of a touch relative to one of its bodies during a step.
+struct ArmPath {
+  Vec3 middle{}, first{}, last{};  // centre at mid-step; arms at both ends
+  Vec3 centre{};                   // origin of the arm of the impulse
+  bool has_joints = false;
+};
+
+/// `later`: the touch at the end of the step; n: index of the body in the step.
+ArmPath make_arm_path(const Bodies& bodies, const Step& step, const geometry::Touch& t, const Vec3& later, int body, int n) {
+  const State& state = bodies.state(body);
+  const FreeMotion& free = step.free[n];
+  ArmPath path;
+  path.middle = state.centre + (0.5 * step.length_s) * state.velocity;
+  path.centre = path.middle;
+  path.has_joints = free.articulation >= 0;
+  if (path.has_joints) {
+    path.middle = 0.5 * (state.centre + free.state.centre);
+    path.centre = free.state.centre;
+  }
+  path.first = t.where_m - state.centre;
+  path.last = t.smooth ? later - free.state.centre : free.placed.rotation * (transpose(bodies.placed(body).rotation) * path.first);
+  return path;
 }
 
 }  // namespace
@@ -103,7 +127,7 @@ void StepProblem::predict_articulation(Step& step, int number, bool at_rest) {
   }
 }
 
-/// Bodies that sleep on those of an island keep the forces on them that they had when they fell asleep.
+/// Sleeping bodies keep acting on an island with the forces that they had when they fell asleep.
 void StepProblem::add_loads(Step& step) const {
   step.loads.assign(step.count(), {});
   for (const Pair* pair : step.island().pairs) {
@@ -120,66 +144,46 @@ void StepProblem::add_loads(Step& step) const {
   }
 }
 
-/// Of the Hertz contact under the load of the last step [m]; 0 without.
+/// Radius of the Hertz contact under the load of the last step [m]; 0 without load.
 double StepProblem::calc_patch_radius(const Contact& c) const {
   const double push = c.step_s > 0.0 ? dot(c.impulse, c.touch.normal) / c.step_s : 0.0;
   if (!(push > 0.0)) return 0.0;
   return impact::calc_patch_radius(push, bodies_.calc_contact_radius(c.touch, c.a, c.b), bodies_.calc_compliance(c.a, c.b));
 }
 
-/// Way of a touch over the more curved surface for an angle of rolling [m]; at rest the radius of the largest curvature. A polygonal rim
-/// goes from corner to corner, as far as a round one.
+/// Travel of a touch over the more curved surface per rolling angle [m]; at rest the radius of the largest curvature. A polygonal rim moves
+/// from corner to corner, as far as a round one.
 double StepProblem::calc_rolling_radius(const Step& step, const Point& p, const Contact& c, const geometry::Touch& moved) const {
   const geometry::Touch& t = c.touch;
   const double at_rest = std::max(t.rim_m, 1.0 / std::max(t.curvature_a_per_m + t.curvature_b_per_m, t.steepest_per_m));
   const Vec3 spin = (p.a >= 0 ? step.free[p.a].placed.spin : Vec3{}) - (p.b >= 0 ? step.free[p.b].placed.spin : Vec3{});
   const double turned = step.length_s * norm(spin - dot(spin, t.normal) * t.normal);
-  if (turned < kAtRestTurned) return at_rest;
-  return std::clamp(geometry::calc_travel(t, moved) / turned, at_rest, std::max(at_rest, kMaxRolling * bodies_.calc_size(c.a, c.b)));
+  if (turned < kRestTurnRad) return at_rest;
+  return std::clamp(geometry::calc_travel(t, moved) / turned, at_rest, std::max(at_rest, kMaxRollingRatio * bodies_.calc_size(c.a, c.b)));
 }
 
-/// A touch that lasts, as a row of the step.
+/// Row of a persistent touch in the step.
 Point StepProblem::make_lasting_point(const Step& step, Pair& pair, const Contact& c) const {
   const geometry::Touch& t = c.touch;
   const double h = step.length_s, approach = bodies_.calc_approach(t, c.a, c.b);
   Point p = make_point(bodies_, step, c);
-  // The touch of a curved surface travels over it: where it will be at the end of the step, contacts apart.
+  // The touch of a curved surface moves over it: its position at the end of the step without contacts.
   const auto get_frame = [&](int body) {
     const int n = step.find(body);
     return n >= 0 ? step.free[n].placed.frame : bodies_.get_frame(body);
   };
   const geometry::Touch moved = t.smooth ? touches_.find_moved(pair, t, get_frame(pair.a), get_frame(pair.b)) : t;
   const Vec3& later = moved.where_m;
-  // Where the impulse acts: half a step later, the same point for both bodies.
-  struct Side {
-    Vec3 middle{}, first{}, last{};  // centre half a step later; arms at both ends
-    Vec3 centre{};                   // from which the impulse has its arm
-    bool has_joints = false;
-  };
-  const auto make_side = [&](int body, int n) {
-    const State& state = bodies_.state(body);
-    const FreeMotion& free = step.free[n];
-    Side side;
-    side.middle = state.centre + (0.5 * h) * state.velocity;
-    side.centre = side.middle;
-    side.has_joints = free.articulation >= 0;
-    if (side.has_joints) {
-      side.middle = 0.5 * (state.centre + free.state.centre);
-      side.centre = free.state.centre;
-    }
-    side.first = t.where_m - state.centre;
-    side.last = t.smooth ? later - free.state.centre : free.placed.rotation * (transpose(bodies_.placed(body).rotation) * side.first);
-    return side;
-  };
+  // The impulse acts at mid-step, at the same point for both bodies.
   Vec3 where{};
-  Side sa, sb;
-  if (p.a >= 0) sa = make_side(c.a, p.a), where = sa.middle + 0.5 * (sa.first + sa.last);
+  ArmPath sa, sb;
+  if (p.a >= 0) sa = make_arm_path(bodies_, step, t, later, c.a, p.a), where = sa.middle + 0.5 * (sa.first + sa.last);
   if (p.b >= 0) {
-    sb = make_side(c.b, p.b);
+    sb = make_arm_path(bodies_, step, t, later, c.b, p.b);
     const Vec3 other = sb.middle + 0.5 * (sb.first + sb.last);
     where = p.a >= 0 ? 0.5 * (where + other) : other;
   }
-  // The turn of the arms from that point until the end of the step belongs to the velocity there.
+  // The rotation of the arms after mid-step contributes to the velocity at the point.
   Vec3 beyond{};
   if (p.a >= 0) {
     p.arm_a = where - sa.centre;
@@ -189,8 +193,8 @@ Point StepProblem::make_lasting_point(const Step& step, Pair& pair, const Contac
     p.arm_b = where - sb.centre;
     beyond = beyond - cross(step.free[p.b].placed.spin, sb.has_joints ? sb.last - p.arm_b : 0.5 * (sb.last - sb.first));
   }
-  // The normal half a step later: that of a plane turns with its body, and a touch that slides would leave the plane or sink in.
-  double turning = 0.0;  // closing speed by that
+  // The normal at mid-step: that of a plane rotates with its body; otherwise a sliding touch would leave the plane or sink in.
+  double turning = 0.0;  // resulting closing speed
   if (!t.smooth && c.touching) {
     const int owner = t.side_b == geometry::Side::plane ? c.b : t.side_a == geometry::Side::plane ? c.a : -1;
     if (bodies_.moves(owner)) {
@@ -198,22 +202,22 @@ Point StepProblem::make_lasting_point(const Step& step, Pair& pair, const Contac
       turning = -dot(bodies_.calc_velocity(c.a, t.where_m) - bodies_.calc_velocity(c.b, t.where_m), p.normal) - approach;
     }
   }
-  // A touch at rest stays so exactly: a picometre is no gap, and would be a force.
-  const bool rests = t.gap_m <= kTouch && c.touching && std::abs(approach) < kAtRest;
-  // A deep touch that parts may come back to its present depth: a push that ends its parting would do work.
-  const double free_way = t.gap_m < -kDeep ? 0.0 : t.gap_m;
+  // A resting touch keeps its gap exactly: a gap of a picometre would cause a force.
+  const bool rests = t.gap_m <= kTouchGapM && c.touching && std::abs(approach) < kRestSpeedMS;
+  // A deep touch that separates may return to its present depth: stopping its separation by a push would do work.
+  const double free_way = t.gap_m < -kDeepM ? 0.0 : t.gap_m;
   double speed = rests ? 0.0 : std::min(0.0, approach - 2.0 * free_way / h);
-  // A deep touch is pushed out, at half the power that the contact loses, so that no energy is gained.
-  if (t.gap_m < -kDeep) {
+  // Penetration is removed at half the power that the contact loses, so that no energy is gained.
+  if (t.gap_m < -kDeepM) {
     const double push = dot(c.impulse, t.normal), paid = push > 0.0 ? 0.5 * c.lost_j / push : 0.0;
-    const double up = std::min(kPushOut * (-kDeep - t.gap_m), paid);
+    const double up = std::min(kPushOutRatePerS * (-kDeepM - t.gap_m), paid);
     if (approach > -up) speed = up;
   }
   p.wanted = (speed + turning) * p.normal - beyond;
   const double curvature = t.curvature_a_per_m + t.curvature_b_per_m;
   if (t.smooth && curvature > 0.0) {
     p.rolling_m = options_.rolling_resistance * calc_rolling_radius(step, p, c, moved);
-    p.twisting_m = kDrilling * p.friction * calc_patch_radius(c);
+    p.twisting_m = kTwistArmRatio * p.friction * calc_patch_radius(c);
   }
   p.impulse = (c.step_s > 0.0 ? h / c.step_s : 0.0) * c.impulse;
   if (c.is_load) p.impulse = p.impulse - h * c.rest_n;
@@ -231,9 +235,9 @@ void StepProblem::make_points(Step& step, bool leaves_impacts) const {
       const ContactRef row{pair, k++};
       const double approach = bodies_.calc_approach(c.touch, c.a, c.b);
       if (c.presses || (leaves_impacts && (is_fast(bodies_, *pair, c, h) || c.closes_s >= 0.0))) continue;
-      // The impact moves these bodies; static ones that ring continue to carry others.
+      // The impact moves these bodies; ringing static ones still support others.
       if (c.cord < 0 && (bodies_.is_moved_by_impact(pair->a) || bodies_.is_moved_by_impact(pair->b))) continue;
-      if (c.touch.gap_m > kTouch + 2.0 * h * std::max(approach, 0.0) + 4.0 * norm(bodies_.gravity()) * h * h && !c.touching) continue;
+      if (c.touch.gap_m > kTouchGapM + 2.0 * h * std::max(approach, 0.0) + 4.0 * norm(bodies_.gravity()) * h * h && !c.touching) continue;
       step.points.push_back(c.cord >= 0 ? make_cord_point(bodies_, step, touches_.cord(c.cord), c) : make_lasting_point(step, *pair, c));
       step.rows.push_back(row);
     }

@@ -1,6 +1,6 @@
-// Method: one complementarity problem, by factorisation or by sweeps. Rest is proven by a solution with zero velocities.
+// Method: one complementarity problem, by factorisation or by sweeps. Rest is proven by a solution with zero velocities. Fast touches end
+// the step at their instant (instants.cpp).
 // Source: J. J. Moreau, "Unilateral contact and dry friction in finite freedom dynamics" (1988).
-// Deviations: fast touches end the step at their instant (instants.cpp).
 #include "runtime/physics/rigid/step_problem.hpp"
 
 #include <algorithm>
@@ -12,22 +12,22 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr double kComes = 20e-3;             // m/s; a gap that closes so fast at the end of a step strikes in the next one
-constexpr double kSettling = 0.02;           // m/s; an island that is slower is about to rest
-constexpr int kMaxDirect = 24;               // points of a small island
-constexpr int kMaxAtOnce = 12;               // bodies that are about to rest and are factorised without sweeps before
-constexpr double kLoose = 1000.0;            // times the tolerance
-constexpr double kLooseOfSpeed = 1e-3;       // of the fastest of its bodies, where that is more,
-constexpr double kLoosest = 0.3 * kSlowest;  // and no more than this: standing bodies must not strike
-constexpr int kGuesses = 6;                  // of a factorised problem in a step
-constexpr double kRetry = 4e-3;              // s; an island whose guesses failed goes by sweeps for so long,
-constexpr double kRetrySmall = 1e-3;         // s; a small one for so long
-constexpr int kProofSweeps = 600;            // that look for rest,
-constexpr int kMaxProofSweeps = 1200;        // of bodies that were slow for kLong
+constexpr double kStrikeSpeedMS = 20e-3;                 // m/s; a gap that closes this fast at the end of a step strikes in the next one
+constexpr double kSettlingSpeedMS = 0.02;                // m/s; a slower island is coming to rest
+constexpr int kMaxDirectPoints = 24;                     // points of a small island
+constexpr int kMaxDirectBodies = 12;                     // bodies coming to rest that are factorised without preceding sweeps
+constexpr double kLooseRatio = 1000.0;                   // relative to the tolerance
+constexpr double kLooseSpeedRatio = 1e-3;                // relative to the fastest of its bodies, if larger,
+constexpr double kMaxLooseMS = 0.3 * kMinImpactSpeedMS;  // upper bound: standing bodies must not strike
+constexpr int kMaxStepGuesses = 6;                       // of a factorised problem per step
+constexpr double kRetryS = 4e-3;                         // s; time by sweeps after failed guesses,
+constexpr double kSmallRetryS = 1e-3;                    // s; for a small island
+constexpr int kProofSweeps = 600;                        // sweeps of a test of rest,
+constexpr int kMaxProofSweeps = 1200;                    // for bodies slow for kLongSlowS
 
 }  // namespace
 
-/// More than rounding, from the motion without contacts.
+/// True if the gain over the motion without contacts exceeds rounding.
 bool StepProblem::gains_energy(const std::vector<Mover>& free, const Step& step) {
   double gained = 0.0, size = 0.0;
   for (const Point& p : step.points) {
@@ -55,25 +55,27 @@ void StepProblem::find_impulses(Step& step) {
   double fastest = 0.0;
   for (const int body : bodies) fastest = std::max(fastest, bodies_.calc_speed(body));
   const int count = step.count();
-  const bool settles = fastest < kSettling;
-  const bool is_small = count <= options_.max_direct && static_cast<int>(points.size()) <= kMaxDirect;
+  const bool settles = fastest < kSettlingSpeedMS;
+  const bool is_small = count <= options_.max_direct && static_cast<int>(points.size()) <= kMaxDirectPoints;
   const bool rolls = std::any_of(points.begin(), points.end(), [](const Point& p) { return p.rolling_m > 0.0; });
   const auto factorise = [&](bool are_swept) {
-    if (solver_.solve_directly(movers, points, is_small ? kMaxGuesses : kGuesses, are_swept) && !gains_energy(free, step)) return true;
-    // Rolling bodies keep their energy better that way, even where a guess fails now and then.
-    const double pause_s = !is_small ? kRetry : rolls ? 0.0 : kRetrySmall;
+    if (solver_.solve_directly(movers, points, is_small ? kMaxGuesses : kMaxStepGuesses, are_swept) && !gains_energy(free, step))
+      return true;
+    // Rolling bodies conserve energy better this way, even if a guess fails occasionally.
+    const double pause_s = !is_small ? kRetryS : rolls ? 0.0 : kSmallRetryS;
     for (const int body : bodies) next_guess_s_[body] = bodies_.get_time() + pause_s;
     return false;
   };
   const auto sweep = [&](int max) {
-    const bool is_loose = !settles && !is_small;  // fast motion needs less accuracy than bodies that are about to stand still
-    const double tolerance = is_loose ? std::max(kLoose * tolerance_m_s, std::min(kLooseOfSpeed * fastest, kLoosest)) : tolerance_m_s,
+    const bool is_loose = !settles && !is_small;  // fast motion needs less accuracy than bodies coming to rest
+    const double tolerance =
+                     is_loose ? std::max(kLooseRatio * tolerance_m_s, std::min(kLooseSpeedRatio * fastest, kMaxLooseMS)) : tolerance_m_s,
                  left = solver_.solve(movers, points, tolerance, max);
     ledger_.costs.sweeps += solver_.get_sweeps();
     return left <= tolerance && !gains_energy(free, step);
   };
   const bool may_guess = std::all_of(bodies.begin(), bodies.end(), [&](int body) { return bodies_.get_time() >= next_guess_s_[body]; });
-  const bool at_once = is_small || (settles && count <= kMaxAtOnce);
+  const bool at_once = is_small || (settles && count <= kMaxDirectBodies);
   if (at_once && may_guess) {
     // First guess: the sliding points of the last step.
     if (factorise(is_small)) return;
@@ -82,7 +84,7 @@ void StepProblem::find_impulses(Step& step) {
   }
   if (sweep(options_.max_sweeps)) return;
   if (!at_once && may_guess && settles && count <= options_.max_settling) {
-    // From the guess that the sweeps have made; they would let a pile tremble for long.
+    // Starts from the sweeps, which alone would let a pile tremble for long.
     const std::vector<Point> swept = points;
     movers = free;
     if (factorise(true)) return;
@@ -91,14 +93,14 @@ void StepProblem::find_impulses(Step& step) {
     sweep(2);
   }
   if (!gains_energy(free, step)) return;
-  // Sweeps that begin at zero impulses never add any.
+  // Sweeps from zero impulses never add energy.
   movers = free;
   points = begun;
   for (Point& p : points) p.impulse = p.couple = {};
   sweep(options_.max_sweeps);
 }
 
-/// The angular impulses of all points on each body, and the velocities that they give the articulations.
+/// Angular impulses of all points on each body, and the resulting velocities of the articulations.
 void StepProblem::sum_impulses(Step& step) const {
   step.turned.assign(step.count(), Vec3{});
   for (int n = 0; n < step.count(); ++n) step.turned[n] = step.loads[n].angular;
@@ -134,17 +136,17 @@ bool StepProblem::solve_rest(Step& step, double h, const std::vector<joints::Spa
     movers[n].spin = movers[n].spin + h * (movers[n].inverse_inertia * pulls[n].angular);
   }
   make_points(step, false);
-  // A gap that roughness bridges is none: here all that is near is in touch.
+  // Gaps within the surface roughness count as contact.
   for (int n = 0; Point & p : points)
-    if (step.rows[n++].get().touch.gap_m <= kDeep) p.wanted = {};
+    if (step.rows[n++].get().touch.gap_m <= kDeepM) p.wanted = {};
   const std::vector<Point> moving = points;
   for (Point& p : points) p.impulse = p.couple = {};
   const std::vector<Point> unloaded = points;
   const double g = std::max(norm(bodies_.gravity()), 1e-9);
-  const double bound = slow_s > kLong ? kSlow / (g * kLong) : kBalanced;
+  const double bound = slow_s > kLongSlowS ? kSlowSpeedMS / (g * kLongSlowS) : kRestResidualRatio;
   const std::vector<Mover> free = movers;
   const auto holds = [&] {
-    std::vector<char> carried(step.count(), 0);  // a body that nothing carries is not at rest, even without gravity
+    std::vector<char> carried(step.count(), 0);  // an unsupported body is not at rest, even without gravity
     for (int n = 0; n < static_cast<int>(pulls.size()); ++n) carried[n] = dot(pulls[n].linear, bodies_.gravity()) < 0.0 ? 1 : 0;
     for (const Point& p : points)
       for (const int n : {p.a, p.b})
@@ -162,7 +164,7 @@ bool StepProblem::solve_rest(Step& step, double h, const std::vector<joints::Spa
   };
   ++ledger_.costs.solves;
   const bool balanced = solver_.solve_directly(movers, points, kMaxGuesses) && holds();
-  // By sweeps from the impulses of the motion, and from none.
+  // Sweeps from the impulses of the motion, and from zero.
   const auto sweep_from = [&](const std::vector<Point>& from, int max_sweeps) {
     movers = free;
     points = from;
@@ -170,7 +172,7 @@ bool StepProblem::solve_rest(Step& step, double h, const std::vector<joints::Spa
     ledger_.costs.sweeps += solver_.get_sweeps();
     return holds();
   };
-  return balanced || sweep_from(moving, kProofSweeps) || sweep_from(unloaded, slow_s > kLong ? kMaxProofSweeps : kProofSweeps);
+  return balanced || sweep_from(moving, kProofSweeps) || sweep_from(unloaded, slow_s > kLongSlowS ? kMaxProofSweeps : kProofSweeps);
 }
 
 void StepProblem::keep_impulses(const Step& step, double at_s) const {
@@ -184,7 +186,7 @@ void StepProblem::keep_impulses(const Step& step, double at_s) const {
     c.until_s = bodies_.get_time() + at_s;
     c.lost_j = step.calc_loss(p, 1.0);
     ledger_.lose(at_s < h ? step.calc_loss(p, at_s / h) : c.lost_j);
-    const bool comes = c.touch.gap_m > kTouch && dot(calc_relative_velocity(step.movers, p), p.normal) < -kComes;
+    const bool comes = c.touch.gap_m > kTouchGapM && dot(calc_relative_velocity(step.movers, p), p.normal) < -kStrikeSpeedMS;
     c.touching = (dot(c.impulse, c.touch.normal) > 0.0 && !comes) || c.is_closed();
   }
 }

@@ -1,4 +1,4 @@
-// The velocity problem of a step: made, solved, and written back into its contacts.
+// Velocity problem of a step: setup, solution and write-back to its contacts.
 #pragma once
 
 #include <vector>
@@ -9,26 +9,26 @@
 
 namespace carillon::rigid {
 
-/// Makes and solves the complementarity problem over all touches of a step that last. Invariant: whatever the solution, contacts take
-/// energy from the motion without them, or none.
+/// Builds and solves the complementarity problem over all persistent touches of a step. Invariant: contacts never add energy to the motion
+/// without them, for any solution.
 class StepProblem {
  public:
   StepProblem(Bodies& bodies, const TouchSets& touches, const Options& options, Ledger& ledger)
       : bodies_(bodies), touches_(touches), options_(options), ledger_(ledger), next_guess_s_(bodies.count(), 0.0) {}
 
-  /// The motion of every body without contacts in a step of that length; `at_rest`: as if it had no velocity.
+  /// Motion of every body without contacts in a step of that length; `at_rest`: from zero velocity.
   void predict(Step& step, double length_s, bool at_rest);
-  /// The touches that are in the problem. `leaves_impacts`: without those that will strike.
+  /// Points of the touches in the problem. `leaves_impacts`: without those that will strike.
   void make_points(Step& step, bool leaves_impacts) const;
-  /// Small islands by factorisation; large ones in sweeps, which begin at the impulses of the step before.
+  /// Small islands by factorisation; large ones by sweeps, started from the impulses of the previous step.
   void solve(Step& step);
-  /// Are there contact forces that balance the bodies of an island, which have no velocity? They are in the step then. `pulls`: forces and
-  /// couples of others on each body, or empty. The longer a body has been slow, the less balance is enough.
+  /// True if contact forces balance the motionless bodies of an island; they are in the step then. `pulls`: external forces and couples on
+  /// each body, or empty. The tolerance grows with the slow time of the bodies.
   bool solve_rest(Step& step, double length_s, const std::vector<joints::Spatial>& pulls, double slow_s);
-  /// Writes impulses and losses into the contacts; the first `at_s` of the step is made.
+  /// Writes impulses and losses to the contacts, for the first `at_s` of the step.
   void keep_impulses(const Step& step, double at_s) const;
-  /// Contacts do no work on an island, except for rounding, for contacts that are pushed out and for surfaces whose curvature changes
-  /// within a step. Such a gain is taken from the motion, where the island touches a static body (a free one would lose momentum).
+  /// Contacts do no work on an island, except for rounding, removal of penetration, and surfaces whose curvature changes within a step.
+  /// Such a gain is taken from the motion if the island touches a static body (a free island would lose momentum).
   void remove_gain(const Step& step, double before_j);
 
  private:
@@ -46,7 +46,7 @@ class StepProblem {
   const Options& options_;
   Ledger& ledger_;
   Solver solver_;
-  std::vector<double> next_guess_s_;  // of each body: when factorisation may be tried again
+  std::vector<double> next_guess_s_;  // per body: time of the next factorisation
 };
 
 }  // namespace carillon::rigid

@@ -6,7 +6,7 @@
 
 #include "runtime/physics/rigid/sweeps.hpp"
 
-#pragma GCC diagnostic ignored "-Wpsabi"  // no vector crosses from one set of instructions to another
+#pragma GCC diagnostic ignored "-Wpsabi"  // no vector is passed between instruction sets
 
 namespace carillon::rigid::sweeps {
 namespace {

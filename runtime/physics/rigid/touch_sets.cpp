@@ -1,4 +1,4 @@
-// Method: a search with a margin of several steps' movement; touches are followed until their pair may have moved by it.
+// Method: search with a margin of several steps' movement; touches are followed until their pair may have moved by the margin.
 // Source: runtime/physics/geometry/touch.hpp.
 #include "runtime/physics/rigid/touch_sets.hpp"
 
@@ -15,16 +15,16 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr double kSteps = 4.0;             // of movement in the margin of a search,
-constexpr double kStepsOfRolling = 8.0;    // the same of curved bodies on the ground: few places come near
-constexpr double kAhead = 4e-3;            // s; longest look-ahead of these
-constexpr double kSearchAgain = 2e-3;      // s; between searches for missing touches of a pair
-constexpr double kSame = 0.02;             // of the size: distance of touches counted as one
-constexpr double kOnePlace = 1e-4;         // of the size: touches nearer than this have come to one place
-constexpr double kJump = 0.2;              // rad; turn of the normal in the body by which a touch has jumped
-constexpr double kSagDecay = 10e-3;        // s
-constexpr int kMaxAdded = 4;               // missing touches at the end of a flight
-constexpr double kDeepForThickness = 0.1;  // of the thickness: bodies deeper than this are searched apart
+constexpr double kMarginSteps = 4.0;         // steps of movement in the margin of a search,
+constexpr double kRollingMarginSteps = 8.0;  // the same for curved bodies on the ground, where few points come near
+constexpr double kMaxLookAheadS = 4e-3;      // s; maximum look-ahead of these
+constexpr double kSearchIntervalS = 2e-3;    // s; interval of searches for missing touches of a pair
+constexpr double kSameTouchRatio = 0.02;     // fraction of the size: maximum distance of identical touches
+constexpr double kMergeRatio = 1e-4;         // fraction of the size: maximum distance of merged touches
+constexpr double kJumpRad = 0.2;             // rad; rotation of the normal in the body by which a touch has jumped
+constexpr double kSagDecayS = 10e-3;         // s
+constexpr int kMaxAdded = 4;                 // missing touches added at the end of a flight
+constexpr double kDeepRatio = 0.1;           // fraction of the thickness: bodies with deeper penetration are searched apart
 
 /// Lower bound of the gap of any vertex of a body over the ground, from that at an earlier frame.
 double calc_least_gap(const Pair& pair, const geometry::Shape& shape, const geometry::Frame& now) {
@@ -76,14 +76,15 @@ void TouchSets::search(Pair& pair, double step_s) {
   if (pair.cord >= 0) return refresh(pair);
   ++ledger_.costs.searches;
   const double speed = bodies_.calc_closing_speed(pair.a, pair.b) + norm(bodies_.gravity()) * step_s;
-  const double ahead_s = pair.b < 0 && !bodies_.is_flat(pair.a) ? std::min(kStepsOfRolling * step_s, kAhead) : kSteps * step_s;
-  pair.margin_m = std::min(std::max(2e-4, ahead_s * speed), kReach * bodies_.calc_size(pair.a, pair.b));
+  const double ahead_s =
+      pair.b < 0 && !bodies_.is_flat(pair.a) ? std::min(kRollingMarginSteps * step_s, kMaxLookAheadS) : kMarginSteps * step_s;
+  pair.margin_m = std::min(std::max(2e-4, ahead_s * speed), kSearchRangeRatio * bodies_.calc_size(pair.a, pair.b));
   const double margin_m = pair.margin_m + bodies_.get_swing(pair.a) + bodies_.get_swing(pair.b);
   pair.travelled_m = 0.0;
   pair.searched = true;
   const std::vector<Contact> old = std::exchange(pair.contacts, {});
   pair.ahead.touches.clear();
-  for (geometry::Touch& last : pair.memory.last) {  // names follow touches on their way
+  for (geometry::Touch& last : pair.memory.last) {  // ids follow touches along their path
     const auto at = std::find_if(old.begin(), old.end(), [&](const Contact& c) { return c.touch.id == last.id; });
     if (at != old.end()) last = move(at->touch, pair.apart_m);
   }
@@ -91,17 +92,18 @@ void TouchSets::search(Pair& pair, double step_s) {
   const geometry::Shape& a = *bodies_.get_shape(pair.a);
   const geometry::Frame frame_a = bodies_.get_frame(pair.a);
   if (pair.b < 0)
-    geometry::find_ground_touches(a, frame_a, bodies_.ground()->height_m, margin_m, pair.memory, found_, bodies_.is_moved_by_impact(pair.a));
+    geometry::find_ground_touches(a, frame_a, bodies_.ground()->height_m, margin_m, pair.memory, found_,
+                                  bodies_.is_moved_by_impact(pair.a));
   else
     geometry::find_touches(a, move(frame_a, pair.apart_m), *bodies_.get_shape(pair.b), bodies_.get_frame(pair.b), margin_m, pair.memory,
-                        found_);
+                           found_);
   for (geometry::Touch& touch : found_) {
     if (pair.apart_m != Vec3{}) touch = move(touch, -1.0 * pair.apart_m);
     const auto same = std::find_if(old.begin(), old.end(), [&](const Contact& c) { return c.touch.id == touch.id; });
     Contact contact;
     if (same != old.end()) {
       contact = *same;
-      if (is_jump(pair, same->touch, touch)) contact.touching = false;  // another place has its name, and may strike
+      if (is_jump(pair, same->touch, touch)) contact.touching = false;  // its id has moved to another point, which may strike
     } else {
       contact.a = pair.a;
       contact.b = pair.b;
@@ -110,22 +112,22 @@ void TouchSets::search(Pair& pair, double step_s) {
     contact.touch = touch;
     pair.contacts.push_back(contact);
   }
-  if (pair.b < 0 || !bodies_.is_flat(pair.a) || !bodies_.is_flat(pair.b)) keep_lost(pair, old);  // those of polyhedra are complete
+  if (pair.b < 0 || !bodies_.is_flat(pair.a) || !bodies_.is_flat(pair.b)) keep_lost(pair, old);  // touch sets of polyhedra are complete
   remove_false(pair);
   complete(pair, frame_a, bodies_.get_frame(pair.b), 0.0);
 }
 
-/// Keeps touches that a search has lost. Between two bodies: those that touched and are within kDeep. With the ground: closed ones that
-/// carry, sharp closed ones, and any deeper than all found.
+/// Keeps touches that a search has lost. Between two bodies: those that touched and are within kDeepM. With the ground: closed load-bearing
+/// ones, closed corners, and any deeper than all found.
 void TouchSets::keep_lost(Pair& pair, const std::vector<Contact>& old) const {
   const geometry::Frame a = bodies_.get_frame(pair.a), b = bodies_.get_frame(pair.b);
   double least_m = pair.margin_m;
   for (const Contact& c : pair.contacts) least_m = std::min(least_m, c.touch.gap_m);
-  const double near_m = kSame * bodies_.calc_size(pair.a, pair.b);
-  const auto is_between = [&](const geometry::Touch& touch) {  // two closed ones, which carry without it
+  const double near_m = kSameTouchRatio * bodies_.calc_size(pair.a, pair.b);
+  const auto is_between = [&](const geometry::Touch& touch) {  // between two closed ones, which bear the load without it
     for (const geometry::Touch& f : found_)
       for (const geometry::Touch& g : found_)
-        if (std::max(f.gap_m, g.gap_m) <= kTouch && dot(f.where_m - touch.where_m, g.where_m - touch.where_m) < 0.0) return true;
+        if (std::max(f.gap_m, g.gap_m) <= kTouchGapM && dot(f.where_m - touch.where_m, g.where_m - touch.where_m) < 0.0) return true;
     return false;
   };
   for (const Contact& c : old) {
@@ -136,14 +138,16 @@ void TouchSets::keep_lost(Pair& pair, const std::vector<Contact>& old) const {
       return found.touch.id == touch.id || norm(found.touch.where_m - touch.where_m) < near_m;
     });
     const bool carries = pair.b < 0 && c.touching && dot(c.impulse, c.touch.normal) > 0.0 && !is_between(touch);
-    const double most_m = pair.b >= 0 ? kDeep : touch.smooth && !carries ? least_m - kMissing : std::max(least_m - kMissing, kTouch);
+    const double most_m = pair.b >= 0                ? kDeepM
+                          : touch.smooth && !carries ? least_m - kMissingDepthM
+                                                     : std::max(least_m - kMissingDepthM, kTouchGapM);
     if (touch.gap_m <= most_m && !is_found) pair.contacts.emplace_back(c).touch = touch;
   }
 }
 
-/// Touches of curved surfaces that have come to one place become one.
+/// Merges touches of curved surfaces that have reached the same point.
 void TouchSets::merge(Pair& pair) const {
-  const double near_m = kOnePlace * bodies_.calc_size(pair.a, pair.b);
+  const double near_m = kMergeRatio * bodies_.calc_size(pair.a, pair.b);
   for (auto c = pair.contacts.begin(); c != pair.contacts.end();) {
     const auto same = std::find_if(pair.contacts.begin(), c, [&](const Contact& other) {
       return c->touch.smooth && other.touch.smooth && !c->presses && !other.presses &&
@@ -161,10 +165,10 @@ void TouchSets::merge(Pair& pair) const {
   }
 }
 
-/// Has a touch gone to another part of its surface?
+/// True if a touch has moved to another part of its surface.
 bool TouchSets::is_jump(const Pair& pair, const geometry::Touch& from, const geometry::Touch& to) const {
   const double way_m = geometry::calc_travel(from, to);
-  return way_m > kSame * bodies_.calc_size(pair.a, pair.b) && way_m * from.steepest_per_m > kJump;
+  return way_m > kSameTouchRatio * bodies_.calc_size(pair.a, pair.b) && way_m * from.steepest_per_m > kJumpRad;
 }
 
 void TouchSets::refresh(Pair& pair) const {
@@ -190,10 +194,11 @@ void TouchSets::refresh(Pair& pair) const {
 void TouchSets::remove_false(Pair& pair) const {
   if (pair.b < 0) return;
   const auto erased = std::erase_if(pair.contacts, [&](const Contact& c) {
-    if (!c.touch.smooth || !(c.touch.gap_m < -kTooDeep)) return false;
+    if (!c.touch.smooth || !(c.touch.gap_m < -kMaxDepthM)) return false;
     const geometry::Touch touch = move(c.touch, pair.apart_m);
-    return touch.gap_m < -kTooDeep && !geometry::is_overlap(touch, *bodies_.get_shape(pair.a), move(bodies_.get_frame(pair.a), pair.apart_m),
-                                                         *bodies_.get_shape(pair.b), bodies_.get_frame(pair.b));
+    return touch.gap_m < -kMaxDepthM &&
+           !geometry::is_overlap(touch, *bodies_.get_shape(pair.a), move(bodies_.get_frame(pair.a), pair.apart_m),
+                                 *bodies_.get_shape(pair.b), bodies_.get_frame(pair.b));
   });
   if (erased == 0) return;
   pair.ahead.touches.clear();
@@ -219,7 +224,7 @@ void TouchSets::update(Pair& pair, double step_s) {
   limit_apart(pair);
 }
 
-/// The touch with the least gap at the frames `a` and `b`, with the bodies apart, and that gap; none: infinite.
+/// Touch with the least gap at the frames `a` and `b`, with the bodies apart, and that gap; none: infinite.
 std::pair<Contact*, double> TouchSets::find_least(Pair& pair, const geometry::Frame& a, const geometry::Frame& b) const {
   std::pair<Contact*, double> least{nullptr, std::numeric_limits<double>::infinity()};
   pair.ahead.a = a;
@@ -237,30 +242,31 @@ std::pair<Contact*, double> TouchSets::find_least(Pair& pair, const geometry::Fr
   return least;
 }
 
-/// Adds the deepest place of a pair at the frames `a` and `b`, `closing_s` later (0: unused), if it is deeper than all touches. True for an
+/// Adds the deepest point of a pair at the frames `a` and `b`, `closing_s` later (0: unused), if it is deeper than all touches. True for an
 /// addition, and for a closing deepest touch.
 bool TouchSets::complete(Pair& pair, const geometry::Frame& a, const geometry::Frame& b, double closing_s) {
   const geometry::Shape& mine = *bodies_.get_shape(pair.a);
   const geometry::Shape* theirs = bodies_.get_shape(pair.b);
   geometry::Deepest deepest;
   if (theirs == nullptr) {
-    if (calc_least_gap(pair, mine, a) >= -kMissing) return false;
+    if (calc_least_gap(pair, mine, a) >= -kMissingDepthM) return false;
     deepest = geometry::find_lowest(mine, a, bodies_.ground()->height_m);
     pair.measured = a;
     pair.lowest_m = deepest.gap_m;
-    if (deepest.gap_m - mine.get_sag_m() >= -kMissing) return false;  // nor is any touch deeper
+    if (deepest.gap_m - mine.get_sag_m() >= -kMissingDepthM) return false;  // no touch is deeper either
   } else {
-    deepest = geometry::find_deepest(mine, move(a, pair.apart_m), *theirs, b, -kMissing, pair.memory);
-    if (deepest.gap_m >= -kMissing) return false;
+    deepest = geometry::find_deepest(mine, move(a, pair.apart_m), *theirs, b, -kMissingDepthM, pair.memory);
+    if (deepest.gap_m >= -kMissingDepthM) return false;
   }
   const auto [lowest, least_m] = find_least(pair, a, b);
-  if (deepest.gap_m < std::min(least_m, 0.0) - kMissing) return add(pair, deepest), true;
-  if (lowest == nullptr || lowest->touch.gap_m <= kTouch || least_m > -kMissing || lowest->rests || !(closing_s > 0.0)) return false;
+  if (deepest.gap_m < std::min(least_m, 0.0) - kMissingDepthM) return add(pair, deepest), true;
+  if (lowest == nullptr || lowest->touch.gap_m <= kTouchGapM || least_m > -kMissingDepthM || lowest->rests || !(closing_s > 0.0))
+    return false;
   lowest->touching = false;
   return std::exchange(lowest->closes_s, closing_s * lowest->touch.gap_m / (lowest->touch.gap_m - least_m)) < 0.0;
 }
 
-/// The touch of a place, as the bodies are now.
+/// Adds the touch of a point at the current poses.
 void TouchSets::add(Pair& pair, const geometry::Deepest& deepest) {
   const geometry::Shape& mine = *bodies_.get_shape(pair.a);
   const geometry::Frame a = bodies_.get_frame(pair.a), b = bodies_.get_frame(pair.b);
@@ -273,7 +279,7 @@ void TouchSets::add(Pair& pair, const geometry::Deepest& deepest) {
                     : move(geometry::make_touch(mine, move(a, pair.apart_m), *bodies_.get_shape(pair.b), b, deepest), -1.0 * pair.apart_m);
   const auto same =
       std::find_if(pair.contacts.begin(), pair.contacts.end(), [&](const Contact& c) { return c.touch.id == added.touch.id; });
-  if (same != pair.contacts.end()) {  // it has travelled away from its place
+  if (same != pair.contacts.end()) {  // it has moved away from its point
     same->touch = added.touch;
     return;
   }
@@ -303,7 +309,7 @@ bool TouchSets::complete(const Step& step, bool finds_closing) {
     if (complete(*pair, get_then(pair->a), get_then(pair->b), finds_closing ? step.length_s : 0.0)) any = true;
     if (pair->contacts.size() == found || bodies_.get_time() < pair->next_search_s) continue;
     pair->searched = pair->memory.known = false;  // a lying body has more touches
-    pair->next_search_s = bodies_.get_time() + kSearchAgain;
+    pair->next_search_s = bodies_.get_time() + kSearchIntervalS;
   }
   return any;
 }
@@ -321,7 +327,7 @@ void TouchSets::complete_in_flight(Pair& pair, double time_s) {
 
 geometry::Touch TouchSets::find_closing(Pair& pair, const Contact& contact, double time_s) const {
   const double approach = bodies_.calc_approach(contact.touch, contact.a, contact.b);
-  if (!contact.touch.smooth || !(contact.touch.gap_m > kTouch) || !(approach > 0.0)) return contact.touch;
+  if (!contact.touch.smooth || !(contact.touch.gap_m > kTouchGapM) || !(approach > 0.0)) return contact.touch;
   const double closes_s = std::min(time_s, contact.touch.gap_m / approach);
   geometry::Touch touch = find_moved(pair, contact.touch, find_flown(pair.a, closes_s), find_flown(pair.b, closes_s));
   const auto find_now = [&](int body, const Vec3& station) {
@@ -334,7 +340,7 @@ geometry::Touch TouchSets::find_closing(Pair& pair, const Contact& contact, doub
   return touch;
 }
 
-/// Upper bound of the approach of any two points in `time_s` of a step; over the ground vertical motion alone counts.
+/// Upper bound of the approach of any two points in `time_s` of a step; over the ground only vertical motion counts.
 double TouchSets::calc_way(const Pair& pair, double time_s, double step_s) const {
   const bool is_over_ground = pair.b < 0 && bodies_.moves(pair.a);
   const double speed = is_over_ground ? bodies_.calc_sinking_speed(pair.a) : bodies_.calc_closing_speed(pair.a, pair.b);
@@ -343,16 +349,16 @@ double TouchSets::calc_way(const Pair& pair, double time_s, double step_s) const
 
 void TouchSets::travel(Pair& pair, double time_s, double step_s) const {
   pair.travelled_m += calc_way(pair, time_s, step_s) + 1e-12;
-  if (pair.sag_m > 0.0) pair.sag_m *= std::exp(-time_s / kSagDecay);
+  if (pair.sag_m > 0.0) pair.sag_m *= std::exp(-time_s / kSagDecayS);
   limit_apart(pair);
-  if (pair.sag_m < kDeep) lose_stored(pair);
+  if (pair.sag_m < kDeepM) lose_stored(pair);
 }
 
 void TouchSets::part(Pair& pair, double depth_m, const Vec3& normal) const {
-  pair.apart_m = pair.b >= 0 && depth_m > kDeepForThickness * bodies_.calc_thickness(pair.a, pair.b) ? depth_m * normal : Vec3{};
+  pair.apart_m = pair.b >= 0 && depth_m > kDeepRatio * bodies_.calc_thickness(pair.a, pair.b) ? depth_m * normal : Vec3{};
 }
 
-/// The bodies of a pair are as far apart as is explained now.
+/// Limits the separation of a pair in searches to the currently explained depth.
 void TouchSets::limit_apart(Pair& pair) const {
   if (pair.apart_m != Vec3{}) part(pair, std::max(pair.sag_m, impacts_.calc_depth(pair)), carillon::normalise(pair.apart_m));
 }

@@ -1,4 +1,4 @@
-// Which touches the bodies have: found with a margin, followed from step to step, named.
+// Touches of bodies: found with a margin, followed from step to step, identified.
 #pragma once
 
 #include <cstdint>
@@ -15,52 +15,52 @@ namespace carillon::rigid {
 
 class ModalImpacts;
 
-/// The contacts of all pairs of bodies that are near, and of all cords. Invariant: after search() or update() a pair has every touch that
-/// can close within the step, as the speeds are then, and after complete() none
-/// is missing where its bodies would be deepest at the end of the step; a touch that stays keeps its name, and so its contact its impulses.
+/// Contacts of all pairs of near bodies, and of all cords. Invariant: after search() or update() a pair has every touch that can close
+/// within the step at the current speeds; after complete() none is missing where its bodies would be deepest at the end of the step; a
+/// persistent touch keeps its id, and its contact its impulses.
 class TouchSets {
  public:
   TouchSets(const Bodies& bodies, std::vector<Cord> cords, const ModalImpacts& impacts, Ledger& ledger);
 
-  /// Made where it is asked for first. b: -1, or greater than a.
+  /// Created on first request. b: -1, or greater than a.
   Pair& get(int a, int b);
   std::map<std::pair<int, int>, Pair>& pairs() { return pairs_; }
   const std::map<std::pair<int, int>, Pair>& pairs() const { return pairs_; }
-  /// One a cord.
+  /// One per cord.
   std::vector<Pair>& cord_pairs() { return cord_pairs_; }
   const std::vector<Pair>& cord_pairs() const { return cord_pairs_; }
   const Cord& cord(int number) const { return cords_[number]; }
-  /// Removes pairs that are not near in this window, unless both bodies are still.
+  /// Removes pairs that are not near in this window, unless both bodies are static or asleep.
   void forget_far(std::int64_t window);
 
-  /// The touches as the bodies are now, found again.
+  /// Searches the touches at the current poses.
   void search(Pair& pair, double step_s);
-  /// Moves the touches with the bodies. Touches off their surfaces are dropped, and the pair is searched at its next update. The pair notes
-  /// the largest changes of curved touches that last: of the gap, of the place on body a, and of the normal in it.
+  /// Moves the touches with the bodies. Touches off their surfaces are dropped, and the pair is searched at its next update. Records the
+  /// largest changes of persistent curved touches: of the gap, of the position on body a, and of the normal in it.
   void refresh(Pair& pair) const;
   /// Removes deep touches of curved surfaces on far sides or past the ends of edges and facets.
   void remove_false(Pair& pair) const;
-  /// Touches that are good for a step: searched again where the pair may have moved by its margin.
+  /// Updates touches for a step: searched again if the pair may have moved by its margin.
   void update(Pair& pair, double step_s);
-  /// Contacts of a step are not known to close in it.
+  /// Resets the closing times of the contacts of a step.
   void forget_closing(const Step& step) const;
-  /// Adds touches that are missing at the end of a step, by its predicted motion, and with `finds_closing` finds those that close. True if
+  /// Adds touches that are missing at the end of a step by its predicted motion, and with `finds_closing` finds those that close. True if
   /// there were any.
   bool complete(const Step& step, bool finds_closing);
-  /// The same for a pair in an impact with modes, by free flight.
+  /// Like complete(), for a pair in a modal impact, by free flight.
   void complete_in_flight(Pair& pair, double time_s);
-  /// The closing place of a touch of a curved surface within a time of free flight, moved back with the bodies.
+  /// Closing point of a touch of a curved surface within a time of free flight, moved back with the bodies.
   geometry::Touch find_closing(Pair& pair, const Contact& contact, double time_s) const;
-  /// Counts a movement of `time_s` in a step.
+  /// Accumulates a movement of `time_s` in a step.
   void travel(Pair& pair, double time_s, double step_s) const;
-  /// Touches are found with bodies as far apart as springs and modes explain, along `normal` (to a). Past the middle of a thin body the
-  /// nearest surface would be that of its other side.
+  /// Searches the touches with the bodies separated by the depth explained by springs and modes, along `normal` (to a). Past the middle of
+  /// a thin body the nearest surface would be its other side.
   void part(Pair& pair, double depth_m, const Vec3& normal) const;
-  /// Frees the contacts of two bodies after an impact with modes. depth_m: explained by it; stored_j: energy of its springs, for lifting.
+  /// Frees the contacts of two bodies after a modal impact. depth_m: explained by it; stored_j: energy of its springs, for lifting.
   void release(int a, int b, double depth_m, double stored_j);
   /// Adds the energy left in springs of ended impacts to the books.
   void add_to(Books& books) const;
-  /// A touch of a pair whose bodies are at these frames.
+  /// A touch of a pair with its bodies at these frames.
   geometry::Touch find_moved(const Pair& pair, geometry::Touch touch, const geometry::Frame& a, const geometry::Frame& b) const;
 
  private:

@@ -1,7 +1,6 @@
-// Method: windows, in which bodies that can meet nothing fly; boxes that hold all that a body may reach in one give the pairs that are
-//   near.
+// Method: windows in which bodies that can meet nothing fly; boxes of the space that each body may reach in a window give the near pairs. A
+// body accelerated by an impact beyond its planned speed is checked again.
 // Source: B. Mirtich, "Impulse-based dynamic simulation of rigid body systems" (1996): bounds of reach, flight in closed form.
-// Deviations: windows have a length; a body that an impact makes faster than planned is checked again.
 #include "runtime/physics/rigid/windows.hpp"
 
 #include <algorithm>
@@ -16,21 +15,22 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr double kMaxSteps = 1024;        // of a window
-constexpr double kThin = 0.15;            // of the thickness of the thinner body: a pair that moves as far in a long step takes short ones
-constexpr double kSag = 5e-6;             // m; a point on an arc may leave its chord by this in a step,
-constexpr double kSagOfThickness = 5e-4;  // or by so much of the thickness of its body
-constexpr double kRolls = 4.0;            // times the arc bounded by the box of a body: keeps long rolling bodies within 50 um
-constexpr double kFlatSteps = 2.0;        // times the step of others: that of groups in which flat bodies alone touch
-constexpr double kRoom = 1e-4;            // m; excess of boxes
-// A body that rolls by itself on smooth touches takes longer steps:
-constexpr double kRollingSteps = 4.0;  // longest step, times options.step_s
-constexpr double kCalm = 10e-3;        // s; time without an impact before it does
-constexpr double kNear = 0.02;         // of its size,
-constexpr double kAlong = 3.0;         // or travels of its touches in a window: no vertex farther from them may come down
-constexpr double kDrift = 5e-7;        // m; largest change of a gap in a step
-constexpr double kTurn = 0.05;         // rad; largest turn of a normal in the body in a step
-constexpr double kSpan = 0.25;         // of its size: touches farther apart keep it from hopping
+constexpr double kMaxSteps = 1024;  // per window
+constexpr double kLongStepRatio =
+    0.15;                          // fraction of the thinner body's thickness: a pair that moves this far in a long step takes short ones
+constexpr double kArcSagM = 5e-6;  // m; permitted deviation of a point on an arc from its chord in a step,
+constexpr double kArcSagRatio = 5e-4;     // the same relative to the thickness of its body
+constexpr double kRollingArcRatio = 4.0;  // times the arc bounded by a body's box: keeps long rolling bodies within 50 um
+constexpr double kFlatStepRatio = 2.0;    // times the step of others: for groups with flat contacts only
+constexpr double kBoxMarginM = 1e-4;      // m; enlargement of boxes
+// A body that rolls alone on smooth touches takes longer steps:
+constexpr double kRollingStepRatio = 4.0;  // longest step, times options.step_s
+constexpr double kQuietS = 10e-3;          // s; required time without an impact
+constexpr double kNearRatio = 0.02;        // fraction of its size,
+constexpr double kTravelRatio = 3.0;       // or touch travel per window: no vertex farther from the touches may come down
+constexpr double kGapDriftM = 5e-7;        // m; maximum change of a gap per step
+constexpr double kMaxTurnRad = 0.05;       // rad; maximum rotation of a normal in the body per step
+constexpr double kMaxSpanRatio = 0.25;     // fraction of its size: touches farther apart prevent hopping
 
 bool overlap(const geometry::Box& x, const geometry::Box& y) {
   for (int k = 0; k < 3; ++k)
@@ -87,7 +87,7 @@ void Windows::open(double end_s, const std::list<ModalImpact>& impacts) {
     reach_m_s_[i] = bodies_.moves(i) ? bodies_.calc_speed(i) + g * length : 0.0;
     if (const Articulation* articulation = bodies_.find_articulation(i); articulation != nullptr && bodies_.moves(i))
       reach_m_s_[i] += bodies_.calc_joint_acceleration(*articulation) * length;
-    boxes[i] = bodies_.calc_box(i, bodies_.moves(i) ? reach_m_s_[i] * length + bodies_.get_swing(i) + kRoom : 0.0);
+    boxes[i] = bodies_.calc_box(i, bodies_.moves(i) ? reach_m_s_[i] * length + bodies_.get_swing(i) + kBoxMarginM : 0.0);
   }
   std::vector<int> order(count);
   std::iota(order.begin(), order.end(), 0);
@@ -105,7 +105,7 @@ void Windows::open(double end_s, const std::list<ModalImpact>& impacts) {
   open_cords();
   for (const ModalImpact& impact : impacts)
     for (const int body : impact.bodies) active_[body] = 1;
-  // One that may meet something keeps all of its articulation from flying.
+  // A member that may meet something prevents the flight of the whole articulation.
   for (const Articulation& articulation : bodies_.articulations())
     if (std::any_of(articulation.bodies.begin(), articulation.bodies.end(), [&](int body) { return active_[body] != 0; }))
       for (const int body : articulation.bodies) active_[body] = 1;
@@ -113,7 +113,7 @@ void Windows::open(double end_s, const std::list<ModalImpact>& impacts) {
   touches_.forget_far(number_);
 }
 
-/// Cords that may be taut within the window; their bodies do not fly.
+/// Cords that may become taut within the window; their bodies do not fly.
 void Windows::open_cords() {
   for (Pair& pair : touches_.cord_pairs()) {
     if (!bodies_.moves(pair.a) && !bodies_.moves(pair.b)) continue;
@@ -121,7 +121,7 @@ void Windows::open_cords() {
     double speed = 0.0;
     for (const int body : {pair.a, pair.b})
       if (body >= 0) speed += reach_m_s_[body];
-    if (pair.contacts.front().touch.gap_m > speed * get_length() + kRoom) {
+    if (pair.contacts.front().touch.gap_m > speed * get_length() + kBoxMarginM) {
       pair.contacts.front().touching = false;
       continue;
     }
@@ -169,7 +169,7 @@ void Windows::fly(Articulation& articulation) {
   ledger_.costs.body_steps += static_cast<std::int64_t>(articulation.bodies.size());
 }
 
-/// Joins groups with sleeping bodies between them: an impact that wakes these makes one group of them within the window.
+/// Joins groups connected by sleeping bodies: an impact that wakes these merges the groups within the window.
 void Windows::join_sleeping(Groups& groups) const {
   const auto join = [&](const Pair& pair) {
     if (!bodies_.is_fixed(pair.a) && !bodies_.is_fixed(pair.b)) groups.join(pair.a, pair.b);
@@ -183,27 +183,27 @@ void Windows::join_sleeping(Groups& groups) const {
     for (const int body : articulation.bodies) groups.join(articulation.bodies.front(), body);
 }
 
-/// Finds bodies that roll by themselves and their number of steps from the errors of the last window. The change of a gap grows with the
+/// Finds bodies that roll alone and their number of steps from the errors of the last window. The change of a gap is proportional to the
 /// cube of the step.
 void Windows::find_rolling(Groups& groups) {
   const int count = bodies_.count();
   const double most = get_length() / options_.step_s;
-  const auto find_steps = [&](int body) { return rolling_[body].steps > 0 ? rolling_[body].steps : most; };  // of the last window
+  const auto find_steps = [&](int body) { return rolling_[body].steps > 0 ? rolling_[body].steps : most; };  // in the last window
   std::vector<int> sizes(count, 0);
   for (int i = 0; i < count; ++i) ++sizes[groups.find(i)];
   std::vector<char> rolls(count, 0), touches(count, 0);
   for (int i = 0; i < count; ++i) {
     if (bodies_.is_moved_by_impact(i)) bodies_.note_struck(i);
     rolls[i] = bodies_.moves(i) && sizes[groups.find(i)] == 1 && !bodies_.is_flat(i) && bodies_.find_articulation(i) == nullptr &&
-               start_s_ - bodies_.get_struck_s(i) > kCalm;
+               start_s_ - bodies_.get_struck_s(i) > kQuietS;
   }
-  std::vector<double> errors(count, 0.0);  // over those allowed
+  std::vector<double> errors(count, 0.0);  // relative to the permitted ones
   std::vector<Vec3> stations;
   for (Pair* pair : near_) {
     const int body = bodies_.moves(pair->a) ? pair->a : pair->b;
     if (!bodies_.moves(body)) continue;
     const Pair::Errors last = std::exchange(pair->errors, {});
-    errors[body] = std::max({errors[body], std::cbrt(last.drift_m / kDrift), last.turn / kTurn});
+    errors[body] = std::max({errors[body], std::cbrt(last.drift_m / kGapDriftM), last.turn / kMaxTurnRad});
     if (pair->cord >= 0 || start_s_ < pair->rattles_until_s || pair->sag_m > 0.0) rolls[body] = 0;
     if (rolls[body] == 0) continue;
     stations.clear();
@@ -217,15 +217,16 @@ void Windows::find_rolling(Groups& groups) {
     if (stations.empty()) continue;
     touches[body] = 1;
     const geometry::Shape& shape = *bodies_.get_shape(body);
-    rolling_[body].spans = norm(stations.front() - stations.back()) > kSpan * shape.get_size_m();
-    const double far_m = std::max(kNear * shape.get_size_m(), kAlong * last.way_m * find_steps(body));
+    rolling_[body].spans = norm(stations.front() - stations.back()) > kMaxSpanRatio * shape.get_size_m();
+    const double far_m = std::max(kNearRatio * shape.get_size_m(), kTravelRatio * last.way_m * find_steps(body));
     if (geometry::may_tip(shape, bodies_.get_frame(body), up, bodies_.placed(body).spin, stations, far_m, get_length())) rolls[body] = 0;
   }
   for (int i = 0; i < count; ++i) {
     Rolling& r = rolling_[i];
     const double before = find_steps(i);
-    r.asked =
-        rolls[i] == 0 || touches[i] == 0 ? 0.0 : std::clamp(std::max(errors[i], 0.5) * before, std::max(most / kRollingSteps, 1.0), most);
+    r.asked = rolls[i] == 0 || touches[i] == 0
+                  ? 0.0
+                  : std::clamp(std::max(errors[i], 0.5) * before, std::max(most / kRollingStepRatio, 1.0), most);
   }
 }
 
@@ -244,7 +245,7 @@ void Windows::choose_steps() {
   if (any_asleep) join_sleeping(groups);
   const double g = norm(bodies_.gravity());
   find_rolling(groups);
-  std::vector<double> steps(count, std::max(1.0, length_s / (kFlatSteps * options_.step_s)));
+  std::vector<double> steps(count, std::max(1.0, length_s / (kFlatStepRatio * options_.step_s)));
   for (int i = 0; i < count; ++i)
     if (rolling_[i].asked > 0.0) steps[groups.find(i)] = rolling_[i].asked;
   const auto ask = [&](int body, double asked) {
@@ -254,24 +255,24 @@ void Windows::choose_steps() {
   for (const Pair* pair : near_) {
     const int body = bodies_.moves(pair->a) ? pair->a : pair->b;
     if (!bodies_.moves(body)) continue;
-    // Bodies that are fast for their size must not pass through each other between two searches, and thin ones must not sink in.
+    // Bodies that are fast for their size must not pass through each other between searches, and thin ones must not sink in.
     const double speed = bodies_.calc_closing_speed(pair->a, pair->b) + g * length_s;
-    ask(body, 2.0 * length_s * speed / (kReach * bodies_.calc_size(pair->a, pair->b)));
+    ask(body, 2.0 * length_s * speed / (kSearchRangeRatio * bodies_.calc_size(pair->a, pair->b)));
     if (rolling_[body].asked > 0.0) continue;
-    const bool is_thin = kFlatSteps * options_.step_s * speed > kThin * bodies_.calc_thickness(pair->a, pair->b);
+    const bool is_thin = kFlatStepRatio * options_.step_s * speed > kLongStepRatio * bodies_.calc_thickness(pair->a, pair->b);
     if (is_thin || pair->cord >= 0 || !bodies_.is_flat(pair->a) || !bodies_.is_flat(pair->b)) ask(body, length_s / options_.step_s);
   }
   for (int i = 0; i < count; ++i) {
     if (!bodies_.moves(i)) continue;
     if (bodies_.find_articulation(i) != nullptr || bodies_.is_moved_by_impact(i)) ask(i, length_s / options_.step_s);
-    // The arc of a point leaves its chord by w v h^2 / 2 within a step, v its speed by the spin w, at most w times the radius.
+    // A point on an arc leaves its chord by w v h^2 / 2 within a step, with v its speed due to the spin w, at most w times the radius.
     const Solid& solid = bodies_.solid(i);
-    const double sag = std::max(kSag, kSagOfThickness * solid.shape->get_thickness_m());
+    const double sag = std::max(kArcSagM, kArcSagRatio * solid.shape->get_thickness_m());
     const double spin = norm(bodies_.placed(i).spin);
-    const double rolls = rolling_[i].asked > 0.0 && rolling_[i].spans ? 1.0 : kRolls;
+    const double rolls = rolling_[i].asked > 0.0 && rolling_[i].spans ? 1.0 : kRollingArcRatio;
     ask(i, length_s * std::sqrt(spin * std::min(rolls * bodies_.calc_turning_speed(i), spin * solid.radius_m) / (2.0 * sag)));
   }
-  // Powers of two: then the steps of a group are the same whatever others ask for.
+  // Powers of two: the steps of a group do not depend on other groups.
   const auto round = [](double n) {
     return static_cast<int>(std::bit_ceil(static_cast<unsigned>(std::ceil(std::min(n, kMaxSteps) - 1e-6))));
   };
@@ -347,7 +348,8 @@ void Windows::wake(int body, int by) {
   reach_m_s_[body] = norm(bodies_.gravity()) * kLength;
 }
 
-/// Moves a body that flew to the end of the window back to the end of the present step of the body that may meet it, whose steps it takes.
+/// Moves a body that flew to the end of the window back to the end of the current step of the body that may meet it, and gives it the same
+/// steps.
 void Windows::undo_flight(int body, int by) {
   if (body < 0 || !flying_[body]) return;
   const double flown_s = find_time(step_ + strides_[by]) - start_s_;
@@ -366,15 +368,15 @@ void Windows::undo_flight(int body, int by) {
 void Windows::extend(int body) {
   bodies_.note_struck(body);
   const double left = end_s_ - bodies_.get_time();
-  const double others_left = end_s_ - get_time();  // of islands whose step is still to be made
+  const double others_left = end_s_ - get_time();  // remaining time of islands that have not been stepped
   const double speed = bodies_.calc_speed(body) + norm(bodies_.gravity()) * left;
   if (speed <= reach_m_s_[body]) return;
   reach_m_s_[body] = speed;
-  const geometry::Box box = bodies_.calc_box(body, speed * left + kRoom);
+  const geometry::Box box = bodies_.calc_box(body, speed * left + kBoxMarginM);
   if (bodies_.ground() && box.low[2] < bodies_.ground()->height_m) add(body, -1);
   for (int j = 0; j < bodies_.count(); ++j) {
     if (j == body) continue;
-    const double reach_m = bodies_.moves(j) ? reach_m_s_[j] * (flying_[j] ? kLength : others_left) + kRoom : 0.0;
+    const double reach_m = bodies_.moves(j) ? reach_m_s_[j] * (flying_[j] ? kLength : others_left) + kBoxMarginM : 0.0;
     if (!overlap(box, bodies_.calc_box(j, reach_m)) || bodies_.is_joined(body, j)) continue;
     undo_flight(j, body);
     add(body, j);

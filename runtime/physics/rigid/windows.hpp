@@ -1,4 +1,4 @@
-// Windows of 2 ms: which bodies may meet in one, which fly through it, and the small steps of the others.
+// Windows of 2 ms: near pairs, free flights, and the small steps of the other bodies.
 #pragma once
 
 #include <cstdint>
@@ -13,23 +13,23 @@
 
 namespace carillon::rigid {
 
-/// The present window. Invariants: pairs that are not near cannot touch before its end; a body that flies is where it is at the end of the
-/// window and meets nothing on its way there; the steps of an island do not depend on other islands.
+/// The current window. Invariants: pairs that are not near cannot touch before its end; a flying body is at its end-of-window state and
+/// meets nothing on its way; the steps of an island do not depend on other islands.
 class Windows {
  public:
   static constexpr double kLength = 2e-3;  // s
 
   Windows(Bodies& bodies, TouchSets& touches, const Options& options, Ledger& ledger);
 
-  // In this order: a new window, its flights, its small steps.
-  /// Which pairs are near until the end of the window, `end_s` at the latest. All bodies are at its start.
+  // Call in this order: new window, flights, small steps.
+  /// Determines the pairs that are near until the end of the window, `end_s` at the latest. All bodies are at its start.
   void open(double end_s, const std::list<ModalImpact>& impacts);
-  /// Bodies that can meet nothing, to the end of the window; they are listed then.
+  /// Moves bodies that can meet nothing to the end of the window; returns them.
   const std::vector<int>& fly_bodies();
-  /// The same of an articulation. False: it may meet something.
+  /// True if an articulation can meet nothing.
   bool may_fly(const Articulation& articulation) const;
   void fly(Articulation& articulation);
-  /// The step length of each group of bodies that may meet in this window: some take several of the small steps at once.
+  /// Step length of each group of bodies that may meet in this window: some take several small steps at once.
   void choose_steps();
   /// A window in which all bodies sleep.
   void skip(double end_s);
@@ -37,41 +37,41 @@ class Windows {
   double get_start() const { return start_s_; }
   double get_end() const { return end_s_; }
   double get_length() const { return end_s_ - start_s_; }
-  /// The time at which a small step begins.
+  /// Start time of a small step.
   double find_time(int step) const { return step >= steps_ ? end_s_ : start_s_ + (end_s_ - start_s_) * step / steps_; }
   double get_time() const { return find_time(step_); }
-  /// Length of so many small steps from now.
+  /// Length of the next `steps` small steps.
   double calc_length(int steps) const { return find_time(step_ + steps) - get_time(); }
   void next_step() { ++step_; }
   bool is_over() const { return step_ == steps_; }
-  /// Is there a body that does not fly?
+  /// True if any body does not fly.
   bool has_steps() const { return any_active_; }
-  /// Does a step of it begin now?
+  /// True if a step of the body starts now.
   bool is_due(int body) const { return step_ % strides_[body] == 0; }
-  /// Small steps until both bodies of a pair are due again; 0: now they are not, or nothing moves.
+  /// Small steps until both bodies of a pair are due again; 0: not due now, or both static.
   int find_stride(const Pair& pair) const;
 
-  /// Pairs that may touch, in order after sort_near().
+  /// Pairs that may touch; sorted after sort_near().
   const std::vector<Pair*>& near() const { return near_; }
   void sort_near();
   void add(Pair& pair);
   void add(int a, int b);
-  /// The islands whose steps begin now.
+  /// Islands whose steps start now.
   std::vector<Island> make_islands(const std::list<ModalImpact>& impacts);
   /// Groups of moving bodies that may touch each other in the window.
   int count_islands() const { return islands_; }
 
-  /// A body that wakes takes the steps of the one that wakes it, which is due: so they do not depend on other islands.
+  /// A woken body takes the steps of the one that wakes it, which is due: so they do not depend on other islands.
   void wake(int body, int by);
-  /// Adds the pairs that a body may reach after an impact made it faster than the window was planned for.
+  /// Adds the pairs that a body may reach after an impact beyond its planned speed.
   void extend(int body);
 
  private:
-  /// Of a body that may roll by itself, on smooth touches that last.
+  /// A body that may roll alone, on smooth persistent touches.
   struct Rolling {
-    bool spans = false;  // its touches lie far apart
-    int steps = 0;       // of the last window; 0: it did not roll
-    double asked = 0.0;  // of this window; 0: it does not roll
+    bool spans = false;  // its touches are far apart
+    int steps = 0;       // in the last window; 0: did not roll
+    double asked = 0.0;  // in this window; 0: does not roll
   };
 
   void open_cords();
@@ -92,8 +92,8 @@ class Windows {
   std::vector<int> flown_;
   std::vector<int> strides_;       // small steps that a body takes at once
   std::vector<Rolling> rolling_;   // of the bodies
-  std::vector<double> reach_m_s_;  // the speed that the window was planned for
-  std::vector<State> flew_from_;   // of bodies that fly; and of the articulations:
+  std::vector<double> reach_m_s_;  // planned speed
+  std::vector<State> flew_from_;   // of flying bodies; and of the articulations:
   std::vector<joints::Coordinates> articulation_flew_from_;
 };
 

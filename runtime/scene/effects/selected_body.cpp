@@ -54,7 +54,10 @@ void SelectedBody::call_directivity(double spread_db) {
 void SelectedBody::call_propagation(Hearing& hearing, double time_s) {
   const double nearest = hearing.find_ways(position_m, time_s);
   nearest_m = std::min(nearest_m, nearest);
-  if (time_s > sounds_until_s) return;
+  if (time_s > sounds_until_s) {
+    anchor_m = hearing.way_m;
+    return;
+  }
   const double wave = 2.0 * std::numbers::pi * std::max(mean_hz, kLowestHz) / bank::kSoundSpeedMs;  // rad/m
   const double limit_m = std::sqrt(audible_share) / wave;
   const std::vector<double>& way_m = hearing.way_m;

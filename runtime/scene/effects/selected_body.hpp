@@ -41,7 +41,7 @@ struct SelectedBody {
   std::vector<double> swing;              // per coupled mode: amplitude of q [m kg^1/2] by strikes, at swing_s
   double swing_s = 0.0;
   bool has_cascade = false;          // modes above the coupled ones, a mass and a thickness
-  std::vector<double> anchor_m;      // distances to the microphones at the last Doppler call
+  std::vector<double> anchor_m;      // distances to the microphones at the last Doppler call, or while silent
   synth::PerEffect<double> share{};  // of the loudest call so far
   synth::PerEffect<SelectionReason> reason;
   struct Lasting {

@@ -1,11 +1,11 @@
-"""What a bank says of its air, worked out from its arrays alone: gains, patterns, roundness. numpy, scipy and h5py; no code of Carillon."""
+"""Radiation data of a bank, computed from its arrays alone: gains, patterns, roundness. numpy, scipy and h5py; no code of Carillon."""
 import numpy as np
 import scipy.special
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 AIR_DENSITY_KG_M3, SOUND_SPEED_MS = 1.21, 343.0
-LOBES = 8  # harmonics of the equivalent sphere; what is finer counts as one order above (docs/decisions/radiation-gain.md)
+LOBES = 8  # harmonics of the equivalent sphere; finer patterns count as one order above (docs/decisions/radiation-gain.md)
 ALONG = 5e-3  # modes that move along the surface: less than this share of the square of their motion is normal to it
 POLAR, AROUND = 48, 96  # directions: Gauss-Legendre by equal steps, exact for products of harmonics to order 47
 
@@ -46,7 +46,7 @@ def make_directions():
 
 
 class Air:
-    """A bank: its outer surface, and what its modes send out."""
+    """A bank: outer surface and radiation of its modes."""
 
     def __init__(self, file):
         import h5py
@@ -72,7 +72,7 @@ class Air:
         self.make_skin()
 
     def make_skin(self):
-        """Triangles of the shells that enclose a positive volume, and what they enclose."""
+        """Triangles of the shells that enclose a positive volume, and the enclosed volume."""
         corners = self.triangles
         edges = np.sort(np.concatenate([corners[:, [i, (i + 1) % 3]] for i in range(3)]), axis=1)
         _, edge = np.unique(edges, axis=0, return_inverse=True)

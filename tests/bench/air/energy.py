@@ -1,4 +1,4 @@
-"""What arrives at a closed sphere of microphones around a body that is struck, against what radiation damping took from its modes."""
+"""Energy received by a closed sphere of microphones around a struck body, against the energy lost by radiation damping."""
 import json
 import math
 import subprocess

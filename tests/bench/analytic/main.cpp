@@ -1,4 +1,4 @@
-// What accuracy of polygonal membranes costs: order and size of the elements, their grading to corners, particular solutions. Prints CSV.
+// Cost of accuracy of polygonal membranes: order and size of the elements, their grading to corners, particular solutions. Prints CSV.
 //
 //   bench_analytic [--quick]
 //

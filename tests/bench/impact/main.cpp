@@ -1,4 +1,4 @@
-// What an impact costs, and what accuracy of it costs: CPU time, restitution against steps per pulse, against Zener, and falling plates.
+// Cost of an impact, and of its accuracy: CPU time, restitution against steps per pulse, against Zener, and falling plates.
 //
 // usage: bench_impact [--quick]
 #include <algorithm>

@@ -1,4 +1,4 @@
-// What coupled modes cost a sample, by their number and form: energies of made-up numbers, motion of about a thickness without loss.
+// Cost of coupled modes per sample, by number and form: energies of made-up numbers, motion of about a thickness without loss.
 //
 // usage: bench_nonlinear SAMPLES     one line a case: form, modes, points, rows, microseconds a sample, bytes of the matrices
 #include <fmt/format.h>

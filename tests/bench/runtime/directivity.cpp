@@ -1,4 +1,4 @@
-// What directivity and ground reflection cost: a body of 228 modes that rings, heard by two ears.
+// Cost of directivity and ground reflection: a body of 228 modes that rings, heard by two ears.
 //
 // usage: bench_directivity [--quick]       prints the figures of docs/reports/performance-runtime.md
 //

@@ -1,4 +1,4 @@
-// What one microphone costs for one source: Receiver::process in blocks of 128 samples.
+// Cost of one microphone for one source: Receiver::process in blocks of 128 samples.
 //
 // usage: bench_ears [--quick]       prints the table of docs/reports/performance-runtime.md
 //
@@ -62,7 +62,7 @@ int main(int argc, char** argv) {
   std::uniform_real_distribution<float> number(-1.0F, 1.0F);
   std::vector<float> noise(1000 + kBlock);
   for (float& x : noise) x = number(random);
-  // What asking for the time takes.
+  // Cost of reading the clock.
   double empty = 1.0;
   for (int i = 0; i < 1000; ++i) {
     const double started = base::get_thread_cpu_s();

@@ -1,4 +1,4 @@
-// What this processor can do: multiply-adds of floats per second of CPU time, measured.
+// Peak rate of this processor: multiply-adds of floats per second of CPU time, measured.
 #pragma once
 
 #include "runtime/synth/kernels.hpp"

@@ -1,4 +1,4 @@
-// What a pulse costs the synthesiser that is known step by step, by its number of steps, compared with the Hertz pulse of the same length.
+// Cost of a pulse given step by step in the synthesiser, by its number of steps, compared with the Hertz pulse of the same length.
 //
 // usage: bench_forces [--quick]       prints the table of docs/decisions/contact-pulses.md
 //

@@ -1,4 +1,4 @@
-// What bodies that do not touch each other cost: a group each against one problem for all, in one run.
+// Cost of bodies without contact: one group each against one problem for all, in one run.
 //
 // usage: bench_islands [BOXES [SECONDS]]     prints CPU seconds a simulated second and their ratio, which no exit code judges. Exit 1 when
 //                                            the bodies moved, summed over all steps, are not 2.5 times fewer with islands

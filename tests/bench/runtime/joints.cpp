@@ -1,4 +1,4 @@
-// What the free motion of mechanisms costs, and what the tolerance of its integration gives; the table of docs/decisions/joints.md.
+// Cost of the free motion of mechanisms, and effect of the integration tolerance; the table of docs/decisions/joints.md.
 //
 // usage: bench_joints [--quick]     chains of links let go out of the horizontal, in windows of 2 ms; the error is that of the last link
 //                                   against a tolerance of 1e-13. Exit 1 when a tolerance of 1e-10 is off by more than 1 um after 0.5 s

@@ -1,4 +1,4 @@
-// How fast modes ring: voices in blocks of 128 frames against what the processor's multiply-adds allow, measured in the same run.
+// Throughput of modes: voices in blocks of 128 frames against the processor's multiply-add limit, measured in the same run.
 //
 // usage: bench_runtime [--quick]       prints the tables of docs/reports/performance-runtime.md
 //

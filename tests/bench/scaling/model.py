@@ -34,7 +34,7 @@ CLUSTER = Machine(
 
 @dataclasses.dataclass(frozen=True)
 class Body:
-    """What is solved, and how. Measured at one size; grow() makes a finer mesh of the same body."""
+    """Problem and solver options. Measured at one size; grow() makes a finer mesh of the same body."""
 
     unknowns: float
     modes: float
@@ -70,7 +70,7 @@ class Body:
 
 @dataclasses.dataclass(frozen=True)
 class Rates:
-    """What the code reaches on the measuring machine, one rank. Seconds per unit of work, from the run on one rank."""
+    """Rates of the code on the measuring machine, one rank. Seconds per unit of work, from the run on one rank."""
 
     dense_gflops: float  # of that machine, to carry the others over
     memory_gb_s: float
@@ -99,7 +99,7 @@ LARGEST_GATHERED = 1e6  # nodes of a part that one rank cuts: partition/dissect.
 CLUSTERS = 64  # of a rank, at least 1,024 in all: the vertices of the quotient graph
 CLUSTER_TRIES = 2  # of the quotient graph the best of eight bisections is taken, of a part the best of four separators
 MAPPING_S_PER_RANK = 4.5e-4  # every rank maps all shared fronts: count_mapping, 0.45 s at 1,024 ranks of 5.7 million unknowns
-PROGRAM_BYTES = 9e7  # what a rank holds before it has a matrix
+PROGRAM_BYTES = 9e7  # memory of a rank without a matrix
 FACTOR_CALLS = 14  # collective calls of a factorisation, before and after its fronts
 PLAN_CALLS = 100  # of an order and its plan, once
 PROJECTED_SHARE = 0.4  # of DGEMM's rate: what a dense symmetric eigensolver reaches

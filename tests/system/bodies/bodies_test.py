@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Bodies that scenes describe: carillon-render and carillon-live have their banks computed once, by `carillon bank-for`, and kept.
+"""Bodies described in scenes: carillon-render and carillon-live obtain cached banks from `carillon bank-for`.
 
 Finds the programs in $CARILLON_BIN_DIR.
 """
@@ -42,7 +42,7 @@ class BodiesTest(unittest.TestCase):
     def list_banks(self):
         return sorted((self.folder / "cache").glob("carillon/banks/*/*/bank.hdf"))
 
-    def test_a_bank_is_computed_once_and_sounds_as_the_job_of_the_same_words(self):
+    def test_cached_bank_equals_job(self):
         scene = self.write_scene(BOX, {**BOX})
         first = self.run_program(BIN / "carillon-render", scene, "-o", "first.wav")
         self.assertIn("computing the modes of box of aluminium, once", first.stderr)
@@ -57,14 +57,14 @@ class BodiesTest(unittest.TestCase):
         self.write_scene({"bank": "own.hdf"}, {"bank": "own.hdf"}, name="named.json")
         self.run_program(BIN / "carillon-render", "named.json", "-o", "named.wav", "-q")
         self.assertEqual((self.folder / "first.wav").read_bytes(), (self.folder / "named.wav").read_bytes())
-        # In other words it is the same body, and what the store of jobs has is not computed again.
+        # An equivalent description is the same body: banks in the job store are reused.
         self.write_scene({"body": {"shape": "box", **box}, "material": "aluminium"}, name="words.json")
         self.assertNotIn("computing", self.run_program(BIN / "carillon-render", "words.json", "-o", "words.wav").stderr)
         self.assertEqual(len(self.list_banks()), 1)
         live = self.run_program(BIN / "carillon-live", scene, "--null")
         self.assertNotIn("computing", live.stderr)
 
-    def test_known_bodies_surfaces_and_meshes_go_too(self):
+    def test_known_bodies_surfaces_and_meshes(self):
         (self.folder / "part").mkdir()
         cube = "\n".join(f"v {x} {y} {z}" for x in (0, 50) for y in (0, 50) for z in (0, 50))
         faces = ((1, 2, 4, 3), (5, 7, 8, 6), (1, 5, 6, 2), (3, 4, 8, 7), (1, 3, 7, 5), (2, 6, 8, 4))
@@ -92,7 +92,7 @@ class BodiesTest(unittest.TestCase):
         )
         self.assertIn("computing the modes of cube.obj", self.run_program(BIN / "carillon-render", scene, "-o", "out.wav").stderr)
 
-    def test_two_at_once_make_one_bank(self):
+    def test_concurrent_requests(self):
         scene = self.write_scene(BOX)
         both = [
             subprocess.Popen([BIN / "carillon-render", scene, "-q", "-o", f"{i}.wav"], cwd=self.folder, env=self.environment)
@@ -102,7 +102,7 @@ class BodiesTest(unittest.TestCase):
         self.assertEqual(len(self.list_banks()), 1)
         self.assertEqual((self.folder / "0.wav").read_bytes(), (self.folder / "1.wav").read_bytes())
 
-    def test_a_bank_that_was_cut_is_computed_again(self):
+    def test_truncated_bank(self):
         scene = self.write_scene(BOX)
         self.run_program(BIN / "carillon-render", scene, "-o", "first.wav", "-q")
         (bank,) = self.list_banks()
@@ -113,7 +113,7 @@ class BodiesTest(unittest.TestCase):
         self.assertIn("computing", self.run_program(BIN / "carillon-render", scene, "-o", "again.wav").stderr)
         self.assertEqual((self.folder / "first.wav").read_bytes(), (self.folder / "again.wav").read_bytes())
 
-    def test_mistakes_end_in_one_sentence_with_the_place_in_the_scene(self):
+    def test_error_messages(self):
         for body, said in (
             ({**BOX, "bank": "own.hdf"}, 'scene.json:7: "bodies[0].shape": describes the body'),
             ({"shape": {"bol": {}}, "material": "glass"}, 'scene.json:8: "shape.bol": is no shape, did you mean "bowl"?'),
@@ -137,7 +137,7 @@ class BodiesTest(unittest.TestCase):
         self.assertEqual(self.list_banks(), [])
         self.assertEqual(list((self.folder / "cache").glob("carillon/tmp/*")), [])
 
-    def test_without_the_precompute_side_the_sentence_says_so(self):
+    def test_without_precompute(self):
         alone = self.folder / "alone"
         alone.mkdir()
         shutil.copy(BIN / "carillon-render", alone)
@@ -150,14 +150,14 @@ class BodiesTest(unittest.TestCase):
         )
         self.assertEqual(done.stderr.count("\n"), 1)
 
-    def test_bank_for_is_a_command_of_its_own(self):
+    def test_bank_for_command(self):
         (self.folder / "body.json").write_text(json.dumps(BOX))
         answer = json.loads(self.run_program(BIN / "carillon", "--json", "bank-for", "body.json").stdout)
         self.assertTrue(answer["is_new"])
         again = self.run_program(BIN / "carillon", "bank-for", "body.json")
         self.assertEqual((again.stdout, again.stderr), (answer["bank"] + "\n", ""))
         self.run_program(BIN / "carillon-bank", "check", answer["bank"])
-        # The cache is a store: gc finds nothing that it needs, and removes it when asked to.
+        # The cache is a store: gc finds nothing in use, and removes it on request.
         self.run_program(BIN / "carillon", "--store", self.folder / "cache" / "carillon", "gc", "--delete")
 
 

@@ -59,7 +59,7 @@ def check(side, wanted):
 
 
 def check_environment():
-    """What deploy/environment sets for everybody is set in the image."""
+    """The variables of deploy/environment are set in the image."""
     text = (SOURCE / "deploy/environment").read_text()
     wanted = {
         name: value
@@ -76,7 +76,7 @@ def check_environment():
 
 
 def check_root_script():
-    """deploy/container/root reads the same instructions, and refuses what it does not know."""
+    """deploy/container/root reads the same instructions, and rejects unknown ones."""
     for side in SIDES:
         done = subprocess.run([SOURCE / "deploy/container/root", side, "--check"], capture_output=True, text=True, check=True)
         printed = [line.split(": ", 1)[1] for line in done.stdout.splitlines() if "debootstrap" not in line]

@@ -1,4 +1,4 @@
-"""Banks for these tests, and what a scene of one blow sounds like."""
+"""Banks for these tests, and the sound of a scene with one blow."""
 import json
 import os
 import pathlib

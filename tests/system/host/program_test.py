@@ -224,12 +224,7 @@ class RenderProgram(unittest.TestCase):
         with h5py.File(self.root / "cube.h5") as bank:
             osg02 = bank["modes/radiation_gain"][()]
         # Cube of side s, phi = a (1 + 0.07 corner): it translates and slightly breathes. At its first mode, ka = 1, it is louder than the
-<<<<<<< HEAD
-        # flow of its volume alone, s^2 0.07 a . (1, 2, 4), and softer than if the flow through both sides added up (both as rho0 omega
-        # flow / 4 pi).
-=======
         # flow of its volume alone, s^2 0.07 a . (1, 2, 4), softer than the sum of the flows through both sides (rho0 omega flow / 4 pi).
->>>>>>> a_bankbase
         a, hz = np.array([0.4, 0.7, 1.1]), MODES_HZ[0]
         per_flow = 1.21 * hz / 2 / np.hypot(1, 2 * np.pi * hz / 343 * np.sqrt(6 * 0.01 / (4 * np.pi)))
         ratio = levels["sphere"][0] / levels["osg02"][0] * osg02[0] / per_flow

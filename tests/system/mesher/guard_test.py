@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""A signal in the mesher is an input error with a reason: of carillon-mesh itself, and of carillon-precompute, which starts it.
+"""Fatal signals in the mesher are input errors with a reason, in carillon-mesh and in carillon-precompute, which starts it.
 
 usage: guard_test.py BIN_DIR
 """
@@ -41,7 +41,7 @@ class Guard(unittest.TestCase):
         self.temporary.cleanup()
 
     def send(self, number):
-        """Starts a mesh that takes a while and sends the signal when the first step was announced."""
+        """Starts a long mesh and sends the signal at the first progress message."""
         with subprocess.Popen(
             [BIN / "carillon-mesh", "box.off", "-o", "out.msh", "--nodes", "2000000"],
             cwd=self.folder,
@@ -55,21 +55,21 @@ class Guard(unittest.TestCase):
             said = child.stderr.read()
             return child.wait(), said
 
-    def test_a_crash_names_the_file_and_the_step(self):
+    def test_crash_message(self):
         for number in (signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGABRT):
             code, said = self.send(number)
             self.assertEqual(code, 2, said)
             last = said.splitlines()[-1]
-            self.assertTrue(last.startswith("carillon-mesh: box.off: the mesher broke down at the step 'refining'"), last)
+            self.assertTrue(last.startswith("carillon-mesh: box.off: the mesher crashed at the step 'refining'"), last)
             self.assertIn("--method stuffing", last)
             self.assertFalse((self.folder / "out.msh").exists())
 
-    def test_so_does_a_run_that_has_used_its_time(self):
+    def test_time_limit_message(self):
         code, said = self.send(signal.SIGXCPU)
         self.assertEqual(code, 2)
         self.assertIn("box.off: the mesher was ended at the step 'refining' after 10012 s of processor time", said)
 
-    def test_a_limit_of_the_users_own_is_called_one(self):
+    def test_inherited_time_limit(self):
         limit = lambda: resource.setrlimit(resource.RLIMIT_CPU, (1, 100))
         done = subprocess.run(
             [BIN / "carillon-mesh", "box.off", "-o", "out.msh", "--nodes", "2000000", "-q"],
@@ -87,8 +87,8 @@ class Guard(unittest.TestCase):
             ),
         )
 
-    def test_nothing_but_the_mesh_is_written_and_nothing_but_the_reason_said(self):
-        # A box with a corner moved through its faces: CGAL gives up on it, and would leave files of its own where the program stands.
+    def test_no_other_files_or_output(self):
+        # A box with a corner moved through its faces: CGAL fails and would write files to the working directory.
         points = [
             (0, 0, 0),
             (0.151621431, -0.0424084216, 0.0735708103),
@@ -112,7 +112,7 @@ class Guard(unittest.TestCase):
         self.assertEqual(sorted(self.folder.iterdir()), before)
 
     def solve(self, script):
-        """carillon-precompute next to a mesher of ours."""
+        """carillon-precompute next to a fake mesher."""
         bin_dir = self.folder / "bin"
         program = bin_dir / "carillon-precompute"
         for name in ("bin/carillon-precompute", "libexec/carillon/carillon-precompute"):  # the launcher and the solver
@@ -126,7 +126,7 @@ class Guard(unittest.TestCase):
         return done.returncode, done.stderr
 
     @unittest.skipUnless((BIN / "carillon-precompute").exists(), "carillon-precompute is not built")
-    def test_a_job_whose_mesher_dies_has_a_wrong_input_and_a_reason(self):
+    def test_job_with_dying_mesher(self):
         for number, name in ((11, "Segmentation fault"), (7, "Bus error"), (6, "Aborted")):
             code, said = self.solve(f"kill -{number} $$\n")
             self.assertEqual(code, 2, said)
@@ -135,11 +135,11 @@ class Guard(unittest.TestCase):
             self.assertIn("stuffing", said)
         code, said = self.solve("echo 'out of luck' >&2; kill -11 $$\n")
         self.assertIn("out of luck", said)
-        # Another process ended it: another attempt may succeed.
+        # Killed by another process: another attempt may succeed.
         code, said = self.solve("kill -9 $$\n")
         self.assertEqual(code, 4, said)
         self.assertIn("ended from outside", said)
-        # It says what is wrong, or nothing at all.
+        # With and without an error message.
         code, said = self.solve(
             'while [ "$1" != --result ]; do shift; done\n'
             'echo \'{"kind": "bad-input", "message": "no good", "resumable": false}\' > "$2"; exit 2\n'

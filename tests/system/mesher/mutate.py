@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Damages surfaces and meshes and gives them to the programs: none may crash, hang or write what is not a mesh.
+"""Damages surfaces and meshes and runs the programs on them: none may crash, hang or write an invalid mesh.
 
 usage: mutate.py --bin BIN_DIR [--surfaces N] [--first N] [--defer SECONDS...] [--meshes N] [--seed S] [--seconds LIMIT] [--keep FOLDER]
 
@@ -125,7 +125,7 @@ def two_boxes():
     return points + [(x + 0.05, y + 0.02, z + 0.01) for x, y, z in points], faces + [tuple(v + 8 for v in f) for f in faces]
 
 
-# Each with edges, in metres, that give it a hundred nodes or a few.
+# Each with edge lengths [m] that give a hundred nodes or fewer.
 BODIES = {box: 0.014, sphere: 0.02, cylinder: 0.016, torus: 0.014, two_boxes: 0.016}
 
 
@@ -179,7 +179,7 @@ KINDS = ["obj", "off", "stl", "binary stl", "ply", "little ply", "big ply"]
 
 
 def damage_shape(points, faces, random):
-    """Damage that leaves a whole file of a wrong body: what repair and mesher see."""
+    """Damage that keeps the file valid but not the body, for repair and mesher."""
     points, faces = [list(p) for p in points], [list(f) for f in faces]
     for _ in range(random.choice([1, 1, 1, 2, 3, 6])):
         what = random.randrange(9)
@@ -203,7 +203,7 @@ def damage_shape(points, faces, random):
         elif what == 7:
             faces.append(list(faces[f]))
         else:
-            # A corner of one triangle only: a slit.
+            # One corner of one triangle: a slit.
             points.append([x + random.choice([0, 1e-42, 1e-10, 1e-5]) for x in points[faces[f][0]]])
             faces[f][0] = len(points) - 1
     return points, faces
@@ -237,7 +237,7 @@ def damage_bytes(data, random):
             put = struct.pack(random.choice("<>") + random.choice("fd"), random.choice([x for x in ODD if not abs(x) > 3e30]))
             data[at : at + len(put)] = put
         else:
-            # A word of text.
+            # A token.
             end = at
             while at > 0 and data[at - 1] > 32:
                 at -= 1
@@ -248,8 +248,8 @@ def damage_bytes(data, random):
 
 
 class Campaign:
-    # Leaks are not looked for, where memory was taken is kept for few calls, and little of what was freed: that halves the time, and shows
-    # the same faults.
+    # No leak detection, short allocation stacks and a small quarantine: half the time, and the same faults
+    # are found.
     ASAN = "detect_leaks=0:allocator_may_return_null=1:malloc_context_size=3:quarantine_size_mb=32"
 
     def __init__(self, options):
@@ -266,7 +266,7 @@ class Campaign:
             sys.exit("mutate.py: test_meshes is not built")
 
     def run(self, words):
-        """Its exit code (None: too long), what it said and its CPU seconds: those count, so that a busy machine makes no hang."""
+        """Exit code (None: time limit), output and CPU seconds, which the limit counts, so that machine load causes no false hangs."""
         begin = os.times()
         limit = math.ceil(self.options.seconds)
         try:
@@ -291,7 +291,7 @@ class Campaign:
         self.cpu += seconds
 
     def ask(self, words, patience):
-        """As run(), of what carillon-mesh does, by a process that stays; with patience the signal SIGPROF after so many seconds."""
+        """As run(), for carillon-mesh in a persistent process; with patience, SIGPROF after so many seconds."""
         if patience not in self.servers:
             self.servers[patience] = subprocess.Popen(
                 [self.reader, "--surfaces", str(patience or self.options.seconds)],
@@ -324,7 +324,7 @@ class Campaign:
         return code is not None and (code not in (0, 2, 3, 4) or "Sanitizer" in said or "runtime error:" in said or "broke down" in said)
 
     def surfaces(self, folder):
-        """Those that take little time first, so that a campaign that is ended early has seen most of the files."""
+        """Fast ones first, so that an interrupted campaign covers most of the files."""
         all_of_them = range(self.options.first, self.options.first + self.options.surfaces)
         numbers, late = all_of_them, []
         for patience in self.options.defer + [None]:
@@ -340,7 +340,7 @@ class Campaign:
             numbers, late = late, []
 
     def surface(self, folder, n, patience):
-        """Makes and meshes surface n. False if it takes more than `patience` seconds, where there is one."""
+        """Makes and meshes surface n. False if it exceeds `patience` seconds, if given."""
         number = random.Random(f"surface {self.options.seed} {n}")
         kind = number.choice(KINDS)
         body = number.choice(list(BODIES))

@@ -1,7 +1,7 @@
 // usage: test_meshes FILE...
 //        test_meshes --surfaces SECONDS
-// Reads each mesh as the solver does and checks it. One line to standard error for each that is refused; exit code 2 if any was, 1 if a
-// mesh that passed is none: a volume, a node or a reference that cannot be.
+// Reads and checks each mesh as the solver does. One line on standard error per refused mesh; exit code 2 if any was refused, 1 if an
+// accepted mesh is invalid (volume, node or reference).
 //
 // --surfaces: for each line of standard input, SURFACE, MESH and options of carillon-mesh with tabs between them, does in a process of its
 // own what carillon-mesh --quiet does (--slivers DEG is SurfaceOptions::sliver_deg), ends that after SECONDS of processor time, and reads
@@ -35,7 +35,7 @@ namespace {
 
 using namespace carillon;
 
-/// What is wrong with a mesh that passed, or nothing.
+/// Fault of an accepted mesh; empty if none.
 const char* find_insanity(const char* file) {
   mesh::TetMesh mesh = mesh::read_mesh(file);
   const mesh::CheckReport report = mesh::check_mesh(mesh, file);
@@ -65,11 +65,11 @@ int check_meshes(int count, char** files) {
   return code;
 }
 
-// Bodies of more nodes take longer than a damaged surface is worth: a corner that was moved kilometres away makes millions.
+// Limit of nodes: a corner moved kilometres away would make millions.
 constexpr long long kMaxNodes = 50'000;
 constexpr int kExitLarge = 5;
 
-/// Ends the process where the body, read and repaired by now, will have too many nodes.
+/// Ends the process if the repaired body will have too many nodes.
 void leave_if_large(std::string_view phase) {
   const std::size_t at = phase.find("\"nodes\": ");
   if (!phase.starts_with("estimate {") || at == std::string_view::npos) return;
@@ -77,7 +77,7 @@ void leave_if_large(std::string_view phase) {
   if (nodes > kMaxNodes) ::_exit(kExitLarge);
 }
 
-/// As carillon-mesh SURFACE -o MESH OPTIONS... --quiet; its exit code, 1 where the mesh that it wrote is none.
+/// As carillon-mesh SURFACE -o MESH OPTIONS... --quiet; returns its exit code, 1 for an invalid mesh.
 int mesh_one(const std::vector<std::string>& words) {
   try {
     mesher::SurfaceOptions options;
@@ -137,7 +137,7 @@ std::string quote(std::FILE* said) {
   std::rewind(said);
   for (int c = std::fgetc(said); c != EOF; c = std::fgetc(said)) {
     char code[16];
-    // Each byte by its number: what it says may quote the file, which may be of any bytes.
+    // Bytes as numbers: messages may quote arbitrary bytes of the file.
     std::snprintf(code, sizeof code, "\\u%04x", static_cast<unsigned>(c));
     text += c >= 0x20 && c < 0x7f && c != '"' && c != '\\' ? std::string(1, static_cast<char>(c)) : std::string(code);
   }
@@ -158,7 +158,7 @@ int serve(double limit_s) {
     if (child == 0) {
       const auto limit = static_cast<rlim_t>(std::ceil(limit_s));
       const rlimit cpu{limit + 1, limit + 5};
-      // Seconds are all that a limit counts in; this signal ends the process after fractions of one.
+      // rlimits count whole seconds; this signal resolves fractions.
       const auto whole_s = static_cast<time_t>(limit_s);
       const itimerval timer{{0, 0}, {whole_s, static_cast<suseconds_t>(1e6 * (limit_s - static_cast<double>(whole_s)))}};
       if (limit_s < 1) ::setitimer(ITIMER_PROF, &timer, nullptr);

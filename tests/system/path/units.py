@@ -69,7 +69,7 @@ def check_scale(folder):
     # Without the key the warning names it; with a wrong value it states the right one.
     (folder / "job.json").write_text(json.dumps({"mesh": "metres.vtu", "mesh_scale": 1000, "material": GLASS, "bank": "bank.hdf"}))
     warnings = json.loads(run(folder, "--validate", "--json", "job.json").stdout)["warnings"]
-    assert any("millimetres" in text and "is 1000: 1 for that" in text for text in warnings), warnings
+    assert any("millimetres" in text and "is 1000: for millimetres give 1" in text for text in warnings), warnings
     (folder / "job.json").write_text(json.dumps({"mesh": "millimetres.vtu", "material": GLASS, "bank": "bank.hdf"}))
     looked = run(folder, "--validate", "--json", "job.json")
     warnings = json.loads(looked.stdout)["warnings"]

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Runs carillon-mesh as a user does: every shape by name alone, the options that do not belong together, and what it says then."""
+"""Command line of carillon-mesh: every shape by name alone, conflicting options and their messages."""
 import json
 import os
 import pathlib
@@ -22,7 +22,7 @@ def expect(true, what):
 
 
 def count_by_hand(path):
-    """Node and tetrahedron counts out of a binary Gmsh 4.1 file, without any reader of ours: block headers of $Nodes, $Entities skipped."""
+    """Node and tetrahedron counts of a binary Gmsh 4.1 file, by an independent reader: block headers of $Nodes, $Entities skipped."""
     import struct
 
     data = path.read_bytes()

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Frequencies of what carillon-simulate writes against closed forms, its energy book, and the same bytes on any number of ranks.
+"""carillon-simulate: frequencies against closed forms, energy book, bit-identical output on any number of ranks.
 
 usage: bar.py BIN_DIR
 """
@@ -35,7 +35,7 @@ def check_run(folder, name, job, ranks=1):
 
 with tempfile.TemporaryDirectory(prefix="carillon-simulate-") as scratch:
     folder = pathlib.Path(scratch)
-    # Slender, so that a beam is near; and the modes of the same mesh, which another program finds, to less than a cent.
+    # Slender, hence beam-like; and the modes of the same mesh by carillon-precompute, to less than a cent.
     job = make_bar()
     shape = {"length_m": 0.2, "width_m": 0.02, "thickness_m": 0.01, "nodes": 300}
     job["simulate"]["bodies"][0]["shape"] = {"bar": shape}
@@ -50,7 +50,7 @@ with tempfile.TemporaryDirectory(prefix="carillon-simulate-") as scratch:
         mode = min(bank["modes/frequency_hz"][:], key=lambda hz: abs(hz - found))
     print(f"cantilever: {found:.3f} Hz; {mode:.3f} Hz by its modes, {wanted:.3f} Hz as a beam")
     assert abs(found / mode - 1) < 5e-4, (found, mode)
-    # The clamp keeps the width as it is, which beams do not know, and the mesh is coarse.
+    # The clamp prevents lateral contraction, unlike beam theory, and the mesh is coarse.
     assert abs(found / wanted - 1) < 0.02, (found, wanted)
     # Square plates of side a: omega a^2 sqrt(rho h / D) = 2 pi^2 hinged, 35.985 clamped (Leissa 1969), from below as cells get smaller.
     unit = math.sqrt(200e9 * 0.001**2 / (12 * (1 - 0.3**2) * 7850)) / (2 * math.pi * 0.3**2)
@@ -60,7 +60,7 @@ with tempfile.TemporaryDirectory(prefix="carillon-simulate-") as scratch:
         print(f"{held} plate: {found:.2f} Hz, {factor * unit:.2f} Hz wanted")
         assert -most < found / (factor * unit) - 1 < 0.003, (held, found, factor * unit)
 
-    # A bar falls on a sheet that is driven: contact, supports and damping have the same bits on any number of ranks.
+    # A bar falls on a driven sheet: contact, supports and damping are bit-identical on any number of ranks.
     job = make_bar(0.008)
     job["simulate"]["bodies"][0] |= {"position_m": [0, 0, 0.006]}
     del job["simulate"]["bodies"][0]["fixed"]

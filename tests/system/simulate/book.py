@@ -1,6 +1,5 @@
 #!/usr/bin/python3
-"""Energy books that do not close to 1e-6: the program says with which step they are expected to, and then they do. The error falls with the
-square of the step, in two scenes.
+"""Energy errors above 1e-6: the step that the program recommends reaches 1e-6. Quadratic convergence, in two scenes.
 
 usage: book.py BIN_DIR
 """
@@ -28,7 +27,7 @@ def make_ball_on_sheet():
 
 
 def make_bar_on_floor():
-    """A bar that is thrown flat on a floor."""
+    """A bar thrown flat on a floor."""
     job = make_bar(0.003, "T4")
     del job["simulate"]["impulses"], job["simulate"]["bodies"][0]["fixed"], job["sound"]
     job["simulate"]["bodies"][0] |= {"position_m": [0, 0, 0.0052], "velocity_m_s": [0, 0, -20]}
@@ -37,7 +36,7 @@ def make_bar_on_floor():
 
 
 def simulate(folder, job, step_s=None):
-    """The record, and the lines about a step that would close the book."""
+    """The record, and the output lines that recommend a step."""
     job = json.loads(json.dumps(job))
     if step_s:
         job["simulate"]["step_s"] = step_s

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""carillon-simulate ended by a signal or an error: a message that names it, and no files left but those of a checkpoint.
+"""carillon-simulate ended by a signal or an error: message with the reason, no remaining files except those of a checkpoint.
 
 usage: ends.py BIN_DIR
 """

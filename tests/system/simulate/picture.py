@@ -1,6 +1,5 @@
 #!/usr/bin/python3
-"""The spectrogram that carillon-simulate draws: the line that it shows, the same bytes whatever else is written and on any number of ranks,
-and names that are refused before anything is computed.
+"""Spectrogram of carillon-simulate: visible line, identical bytes with any other outputs and number of ranks, refused file names.
 
 usage: picture.py BIN_DIR
 """
@@ -68,7 +67,7 @@ with tempfile.TemporaryDirectory(prefix="carillon-simulate-") as scratch:
     (folder / "file").write_text("no folder")
     check_refused(folder, job | {"spectrogram": "file/bar.png"}, says=["file", "spectrogram", "folder"])
 
-    # What is predicted has the memory that drawing takes.
+    # The prediction includes the memory for drawing.
     need = []
     for one in (job, {key: value for key, value in job.items() if key != "spectrogram"}):
         write_job(folder / "job.json", one)

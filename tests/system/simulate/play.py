@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""carillon-render plays what carillon-simulate recorded: at the simulation's listener it is the simulation's sound, wherever both are put.
+"""carillon-render plays recorded surfaces of carillon-simulate: the same sound at the simulation's listener, for any common placement.
 
 usage: play.py BIN_DIR
 """
@@ -76,7 +76,7 @@ with tempfile.TemporaryDirectory(prefix="carillon-simulate-") as scratch:
     (folder / "bar.surface").unlink()
     done = render(folder, scene, "-o", "bad.wav")
     assert done.returncode == 2 and 'scene.json:1: the recording of body "bar"' in done.stderr and not (folder / "bad.wav").exists(), done
-    # What is played is not overwritten.
+    # The played file is not overwritten.
     (folder / "bar.surface").write_bytes(whole)
     done = render(folder, scene, "-o", "out.wav", "--report", "bar.surface")
     assert done.returncode == 2 and 'recording of "bar"' in done.stderr and (folder / "bar.surface").read_bytes() == whole, done

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""A job that cannot be simulated, on one rank and on two: exit code 2, one error that names file and line, and no file more than before.
-Every other refusal: tests/unit/precompute/simulation.
+"""An invalid job on one and two ranks: exit code 2, one error with file and line, no output files.
+Other refusals: tests/unit/precompute/simulation.
 
 usage: refusals.py BIN_DIR
 """

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""A run that SIGUSR1 or SIGTERM stops ends with 85, and the same command continues to the bytes of a run without a stop.
+"""Runs stopped by SIGUSR1 or SIGTERM exit with 85; the same command resumes, with output identical to an uninterrupted run.
 
 usage: resume.py BIN_DIR
 """
@@ -28,7 +28,7 @@ def find_ranks(folder):
 
 
 def stop(folder, number, ranks):
-    """Starts a run and sends it a signal as soon as its second save is there."""
+    """Starts a run and sends a signal after its second save."""
     words = list_words(ranks, "job.json", "--checkpoint", "state", "--checkpoint-every", "0.2")
     process = subprocess.Popen(words, cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     for _ in range(3000):
@@ -67,7 +67,7 @@ with tempfile.TemporaryDirectory(prefix="carillon-simulate-") as scratch:
         left = sorted(path.name for path in folder.iterdir())
         assert left == sorted([*FILES, "job.json", "bar.record.json"]), left
 
-    # A checkpoint of another job, and one that is damaged.
+    # A checkpoint of another job, and a damaged one.
     for file in FILES:
         (folder / file).unlink()
     stop(folder, signal.SIGUSR1, 1)

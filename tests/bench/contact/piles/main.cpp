@@ -1,10 +1,10 @@
-// What bodies that touch cost: a scene, in physics::World or in Bullet from the same start.
+// Cost of bodies in contact: a scene in physics::World or in Bullet from the same start.
 //
 // usage: bench_piles SCENE carillon|bullet SECONDS [TRIANGLES]
 //          prints one line of JSON: CPU seconds (clock of the thread) for a second of the scene, the worst 100 ms and the worst 2 ms of it,
 //          when all slept [s]
 //        bench_piles steps
-//          prints what the longest step costs, and how far two motions are from their solutions
+//          prints the cost of the longest step, and the errors of two motions
 //   SCENE: pile10 pile20 pile50 heap bars stack dominoes ball coin bottle pen cards bunnies2 bunnies3
 //   TRIANGLES: of a box of a pile; 12, 512 or 8384
 #include <BulletCollision/Gimpact/btGImpactCollisionAlgorithm.h>
@@ -28,10 +28,10 @@
 
 #include "runtime/base/clock.hpp"
 #include "runtime/physics/world.hpp"
-#include "tests/unit/runtime/physics/leaning_train.hpp"
-#include "tests/unit/runtime/physics/solids.hpp"
-#include "tests/unit/runtime/physics/rigid/drops.hpp"
 #include "tests/unit/runtime/physics/geometry/solids.hpp"
+#include "tests/unit/runtime/physics/leaning_train.hpp"
+#include "tests/unit/runtime/physics/rigid/drops.hpp"
+#include "tests/unit/runtime/physics/solids.hpp"
 
 namespace {
 

@@ -1,4 +1,4 @@
-// What a search for touches costs [us].
+// Cost of a touch search [us].
 //
 // usage: bench_shape [--quick]
 #include <cstdio>
@@ -65,7 +65,7 @@ void report_ground(const char* name, const Shape& a, const Frame& fa, double mar
               touches.size());
 }
 
-/// What making a shape and its search structures costs [ms].
+/// Cost of creating a shape and its search structures [ms].
 void report_making(const char* name, const Solid& solid) {
   const double begin = 1e6 * base::get_thread_cpu_s();
   const auto shape = solid.make();

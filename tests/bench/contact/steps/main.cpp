@@ -1,4 +1,4 @@
-// What a small step of a body costs in the physics, by what the body does.
+// Cost of a small physics step of a body, by kind of motion.
 //
 // usage: bench_body_steps [SECONDS]     prints a table of docs/reports/effects.md: CPU time of the thread per second of the scene, steps of
 //                                       bodies, microseconds per step

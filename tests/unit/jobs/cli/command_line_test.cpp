@@ -70,12 +70,12 @@ TEST(Options, rows_keep_values_without_an_option) {
   registry::Job job{store::hash_text("a")};
   job.resources = {2, 1.5, 60};
   EXPECT_FALSE(ResourceOptions().apply(job));
-  EXPECT_TRUE((ResourceOptions{.ranks = 4, .time_limit = "2m"}.apply(job)));
+  EXPECT_TRUE((ResourceOptions{.ranks = 4, .time_limit = "2m", .engine = ""}.apply(job)));
   EXPECT_EQ(job.resources.ranks, 4);
   EXPECT_EQ(job.resources.memory_gb, 1.5);
   EXPECT_EQ(job.resources.time_limit_s, 120);
   job.slurm_job = "12";  // stays in Slurm
-  EXPECT_TRUE((ResourceOptions{.engine = "slurm"}.apply(job)));
+  EXPECT_TRUE((ResourceOptions{.time_limit = "", .engine = "slurm"}.apply(job)));
   EXPECT_EQ(job.engine, store::JobEngine::local);
 }
 

@@ -340,7 +340,7 @@ TEST(SolveModes, refuses_bad_options_and_names_them) {
        [](Problem& p, Options&) {
          p.nodes.elimination_position = {0, 1};
        },
-       "order names 2 nodes"},
+       "order has 2 of"},
   };
   for (const BadOptions& bad : cases) {
     test::System system = test::make_system(make_block(3, 3, 3));

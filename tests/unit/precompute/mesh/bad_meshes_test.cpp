@@ -1,4 +1,4 @@
-// Files that must be refused, with the words of the message each must give: where, what, and the remedy.
+// Invalid files, with the expected message: position, cause and remedy.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
@@ -112,7 +112,7 @@ std::vector<BadFile> bad_files() {
 
 class BadMesh : public testing::TestWithParam<BadFile> {};
 
-TEST_P(BadMesh, is_refused_in_words_that_help) {
+TEST_P(BadMesh, refusal_message) {
   const tests::Folder scratch;
   write_text(scratch / GetParam().name, GetParam().content);
   try {
@@ -135,7 +135,7 @@ std::string refusal(const std::filesystem::path& file) {
   return "accepted";
 }
 
-TEST(bad_files, a_folder_a_pipe_a_device_and_a_missing_file_are_refused_without_waiting) {
+TEST(bad_files, not_a_regular_file) {
   const tests::Folder scratch;
   ASSERT_EQ(::mkfifo((scratch / "pipe.msh").c_str(), 0600), 0);
   std::filesystem::create_directory(scratch / "folder.msh");
@@ -144,7 +144,7 @@ TEST(bad_files, a_folder_a_pipe_a_device_and_a_missing_file_are_refused_without_
     EXPECT_NE(refusal(file).find(file.string()), std::string::npos) << refusal(file);
 }
 
-TEST(bad_files, tetgen_pairs_are_refused_with_the_file_that_is_at_fault) {
+TEST(bad_files, tetgen_pairs) {
   const tests::Folder scratch;
   const std::string nodes = "4 3 0 0\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n";
   const auto attempt = [&](const std::string& node, const std::string& ele) {
@@ -166,11 +166,9 @@ TEST(bad_files, tetgen_pairs_are_refused_with_the_file_that_is_at_fault) {
   EXPECT_NE(refusal(scratch / "t.ele").find("t.node"), std::string::npos);
 }
 
-TEST(bad_files, a_vtu_compressed_with_lz4_by_vtk_says_how_to_save_it) {
-  EXPECT_NE(refusal(fixture("lz4.vtu")).find("save with zlib or no compression"), std::string::npos);
-}
+TEST(bad_files, lz4_vtu) { EXPECT_NE(refusal(fixture("lz4.vtu")).find("save with zlib or no compression"), std::string::npos); }
 
-TEST(bad_files, damaged_binary_data_name_the_byte) {
+TEST(bad_files, damaged_binary_data) {
   std::string text = read_text(fixture("gmsh41_binary_1.msh"));
   const auto elements = text.find("$Elements\n") + 10;
   text[elements + 7] = '\x7f';  // the count of blocks becomes enormous
@@ -182,7 +180,7 @@ TEST(bad_files, damaged_binary_data_name_the_byte) {
   }
 }
 
-TEST(bad_files, a_compressed_block_that_was_damaged_is_named) {
+TEST(bad_files, damaged_zlib_block) {
   std::string text = read_text(fixture("vtk_raw_zlib_1.vtu"));
   const auto data = text.find('_', text.find("<AppendedData"));
   for (std::size_t i = data + 60; i < data + 80; ++i) text[i] = static_cast<char>(~text[i]);

@@ -1,4 +1,4 @@
-// Each defect of a mesh on its own, on bodies small enough to know the answer by hand.
+// Each mesh defect separately, on bodies with answers known by hand.
 #include "precompute/mesh/check.hpp"
 
 #include <gtest/gtest.h>
@@ -67,7 +67,7 @@ void expect_refusal(const TetMesh& mesh, std::initializer_list<const char*> word
   for (const char* word : words) EXPECT_NE(message.find(word), std::string::npos) << word << " is not in: " << message;
 }
 
-TEST(check, a_whole_mesh_is_left_as_it_is) {
+TEST(check, sound_mesh_unchanged) {
   TetMesh mesh = make_cube(3);
   const TetMesh before = mesh;
   const CheckReport report = check_mesh(mesh);
@@ -85,7 +85,7 @@ TEST(check, a_whole_mesh_is_left_as_it_is) {
   EXPECT_NEAR(report.mean_ratio_mean, report.mean_ratio_1_percent, 1e-12);
 }
 
-TEST(check, a_regular_tetrahedron_has_mean_ratio_one_and_dihedral_angles_of_arccos_one_third) {
+TEST(check, regular_tetrahedron_quality) {
   TetMesh mesh{1, {{1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}}, {0, 1, 2, 3}, {}, {}, {}, {}};
   const CheckReport report = check_mesh(mesh);
   EXPECT_NEAR(report.mean_ratio_min, 1.0, 1e-12);
@@ -94,7 +94,7 @@ TEST(check, a_regular_tetrahedron_has_mean_ratio_one_and_dihedral_angles_of_arcc
   EXPECT_NEAR(report.volume_m3, 8.0 / 3.0, 1e-12);
 }
 
-TEST(check, elements_inside_out_are_turned_and_counted) {
+TEST(check, inverted_elements) {
   for (const int order : {1, 2}) {
     TetMesh mesh = make_cube(2);
     if (order == 2) mesh = to_quadratic(mesh);
@@ -115,7 +115,7 @@ TEST(check, elements_inside_out_are_turned_and_counted) {
   }
 }
 
-TEST(check, unreferenced_nodes_are_dropped_counted_and_leave_the_sets) {
+TEST(check, unreferenced_nodes) {
   TetMesh mesh = make_two();
   mesh.nodes_m.insert(mesh.nodes_m.begin(), {9, 9, 9});
   for (auto& node : mesh.tets) ++node;
@@ -127,7 +127,7 @@ TEST(check, unreferenced_nodes_are_dropped_counted_and_leave_the_sets) {
   EXPECT_NEAR(calc_volume(mesh), 1.0 / 6.0 + 1.0 / 3.0, 1e-14);
 }
 
-TEST(check, a_crack_is_welded_and_counted_and_node_sets_follow) {
+TEST(check, crack_welding) {
   for (const int order : {1, 2}) {
     TetMesh mesh = make_cube(2);
     if (order == 2) mesh = to_quadratic(mesh);
@@ -163,7 +163,7 @@ TEST(check, a_crack_is_welded_and_counted_and_node_sets_follow) {
   }
 }
 
-TEST(check, a_mesh_whose_elements_each_have_nodes_of_their_own_is_joined_into_one_body) {
+TEST(check, unshared_nodes_welding) {
   for (const int order : {1, 2}) {
     const TetMesh whole = order == 1 ? make_cube(3) : to_quadratic(make_cube(3));
     TetMesh mesh = whole;
@@ -181,7 +181,7 @@ TEST(check, a_mesh_whose_elements_each_have_nodes_of_their_own_is_joined_into_on
   }
 }
 
-TEST(check, bodies_that_touch_at_one_place_are_left_apart_and_reported) {
+TEST(check, touching_bodies) {
   TetMesh mesh = make_one();
   for (const Vec3& x : {Vec3{1, 0, 0}, Vec3{2, 0, 0}, Vec3{1, 1, 0}, Vec3{1, 0, 1}}) mesh.nodes_m.push_back(x);
   mesh.tets.insert(mesh.tets.end(), {4, 5, 6, 7});
@@ -193,7 +193,7 @@ TEST(check, bodies_that_touch_at_one_place_are_left_apart_and_reported) {
   EXPECT_NE(report.warnings.at(0).find("left apart"), std::string::npos);
 }
 
-TEST(check, a_node_that_joins_two_parts_at_a_point_is_a_warning) {
+TEST(check, pinched_node_warning) {
   TetMesh mesh = make_one();
   for (const Vec3& x : {Vec3{2, 0, 0}, Vec3{1, 1, 0}, Vec3{1, 0, 1}}) mesh.nodes_m.push_back(x);
   mesh.tets.insert(mesh.tets.end(), {1, 4, 5, 6});
@@ -203,7 +203,7 @@ TEST(check, a_node_that_joins_two_parts_at_a_point_is_a_warning) {
   EXPECT_NE(report.warnings.at(0).find("at a point only"), std::string::npos);
 }
 
-TEST(check, elements_without_volume_are_counted_and_refused_by_number_and_remedy) {
+TEST(check, flat_elements) {
   TetMesh mesh = make_two();
   mesh.nodes_m[4] = {1.0 / 3, 1.0 / 3, 1.0 / 3};
   EXPECT_EQ(count_flat(mesh), 1);
@@ -213,44 +213,44 @@ TEST(check, elements_without_volume_are_counted_and_refused_by_number_and_remedy
   expect_refusal(mesh, {"162 elements without volume: 1, 2, 3, 4, 5, 6, 7, 8, 9, 10 and 152 more"});
 }
 
-TEST(check, two_nodes_of_one_element_in_one_place_are_refused_not_welded) {
+TEST(check, coincident_nodes_in_element) {
   TetMesh mesh = make_two();
   mesh.nodes_m[4] = mesh.nodes_m[3];
   expect_refusal(mesh, {"without volume: 2"});
 }
 
-TEST(check, elements_on_one_side_of_their_common_face_are_refused_by_name) {
+TEST(check, overlapping_elements) {
   TetMesh mesh = make_two();
   mesh.nodes_m[4] = {0.1, 0.1, 0.1};
   expect_refusal(mesh, {"elements 1 and 2", "same side", "nodes 2, 3, 4", "apexes 1 and 5", "inverted"});
 }
 
-TEST(check, a_node_dragged_through_the_opposite_face_is_found) {
+TEST(check, node_beyond_opposite_face) {
   TetMesh mesh = make_cube(3);
   mesh.nodes_m[1 + 4 * 1 + 16 * 1] = {0.75, 0.75, 0.75};  // an inner node beyond its neighbours
   expect_refusal(mesh, {"same side", "inverted"});
 }
 
-TEST(check, a_face_of_three_elements_is_refused) {
+TEST(check, face_of_three_elements) {
   TetMesh mesh = make_two();
   mesh.nodes_m.push_back({2, 2, 2.5});
   mesh.tets.insert(mesh.tets.end(), {1, 2, 3, 5});
   expect_refusal(mesh, {"the face of nodes 2, 3 and 4 belongs to 3 elements: 1, 2, 3"});
 }
 
-TEST(check, an_element_given_twice_is_refused) {
+TEST(check, duplicate_element) {
   TetMesh mesh = make_two();
   mesh.tets.insert(mesh.tets.end(), {4, 3, 1, 2});
   expect_refusal(mesh, {"1 element is given twice: 3", "has the corners of 2"});
 }
 
-TEST(check, an_element_with_a_repeated_node_is_refused) {
+TEST(check, repeated_node) {
   TetMesh mesh = make_two();
   mesh.tets[7] = 2;
   expect_refusal(mesh, {"1 element with a repeated node: 2"});
 }
 
-TEST(check, an_index_out_of_range_is_refused) {
+TEST(check, index_out_of_range) {
   TetMesh mesh = make_two();
   mesh.tets[7] = 5;
   expect_refusal(mesh, {"element 2 refers to node 6", "from 1 to 5"});
@@ -261,13 +261,13 @@ TEST(check, an_index_out_of_range_is_refused) {
   expect_refusal(mesh, {"'far'", "node 78"});
 }
 
-TEST(check, a_coordinate_that_is_not_finite_is_refused) {
+TEST(check, nonfinite_coordinate) {
   TetMesh mesh = make_two();
   mesh.nodes_m[2][1] = NAN;
   expect_refusal(mesh, {"node 3", "not finite"});
 }
 
-TEST(check, bodies_that_share_only_an_edge_are_refused_with_its_nodes_and_elements) {
+TEST(check, bodies_sharing_an_edge) {
   TetMesh mesh = make_one();
   mesh.nodes_m.push_back({0, -1, 0});
   mesh.nodes_m.push_back({0, 0, -1});
@@ -275,7 +275,7 @@ TEST(check, bodies_that_share_only_an_edge_are_refused_with_its_nodes_and_elemen
   expect_refusal(mesh, {"not a closed surface", "between nodes 1 and 2", "4 boundary faces instead of 2", "elements 1, 1, 2, 2"});
 }
 
-TEST(check, quadratic_elements_that_disagree_about_a_mid_node_are_refused) {
+TEST(check, contradictory_mid_nodes) {
   TetMesh mesh = to_quadratic(make_two());
   Vec3 x = mesh.nodes_m[mesh.tets[10 + 4]];
   x[0] += 0.1;
@@ -284,7 +284,7 @@ TEST(check, quadratic_elements_that_disagree_about_a_mid_node_are_refused) {
   expect_refusal(mesh, {"elements 1 and 2 share the edge of nodes 2 and 3", "different mid nodes"});
 }
 
-TEST(check, curved_elements_are_counted_and_folded_ones_straightened) {
+TEST(check, curved_and_folded_elements) {
   TetMesh mesh = to_quadratic(make_one());
   mesh.nodes_m[mesh.tets[4]][1] -= 0.05;  // the middle of edge 01 bulges outwards
   CheckReport report = check_mesh(mesh);
@@ -300,7 +300,7 @@ TEST(check, curved_elements_are_counted_and_folded_ones_straightened) {
   EXPECT_NEAR(report.volume_m3, 1.0 / 6.0, 1e-14);
 }
 
-TEST(check, the_volume_of_a_curved_element_is_that_of_its_curved_boundary) {
+TEST(check, curved_element_volume) {
   // Mapping of a simplex by a known smooth quadratic map: x -> x + a y^2 has Jacobian 1, so the volume stays; the mid nodes move exactly.
   TetMesh mesh = to_quadratic(make_cube(2));
   for (auto& x : mesh.nodes_m) x[0] += 0.3 * x[1] * x[1];
@@ -309,7 +309,7 @@ TEST(check, the_volume_of_a_curved_element_is_that_of_its_curved_boundary) {
   EXPECT_NEAR(report.volume_m3, 1.0, 1e-12);
 }
 
-TEST(check, slivers_and_strange_sizes_are_warned_of) {
+TEST(check, sliver_and_size_warnings) {
   TetMesh mesh{1, {{0, 0, 0}, {1, 0, 0}, {0.5, 1, 0}, {0.5, 0.4, 0.01}}, {0, 1, 2, 3}, {}, {}, {}, {}};
   EXPECT_EQ(check_mesh(mesh).slivers, 1);
   TetMesh large = make_cube(2);
@@ -317,7 +317,7 @@ TEST(check, slivers_and_strange_sizes_are_warned_of) {
   EXPECT_NE(check_mesh(large).warnings.at(0).find("millimetres given as metres"), std::string::npos);
 }
 
-TEST(boundary, triangles_point_outwards_and_enclose_the_volume) {
+TEST(boundary, orientation_and_volume) {
   for (const int order : {1, 2}) {
     TetMesh mesh = make_cube(3);
     if (order == 2) mesh = to_quadratic(mesh);
@@ -341,7 +341,7 @@ TEST(boundary, triangles_point_outwards_and_enclose_the_volume) {
   }
 }
 
-TEST(quadratic, mid_nodes_are_shared_and_dropped_again_without_loss) {
+TEST(quadratic, round_trip_to_linear) {
   TetMesh mesh = make_cube(3);
   mesh.node_sets = {{"floor", {}}};
   for (std::int32_t i = 0; i < 16; ++i) mesh.node_sets["floor"].push_back(i);
@@ -357,7 +357,7 @@ TEST(quadratic, mid_nodes_are_shared_and_dropped_again_without_loss) {
   EXPECT_EQ(back.node_sets, mesh.node_sets);
 }
 
-TEST(find_fixed_nodes, knows_sets_by_name_and_helps_with_a_wrong_one) {
+TEST(find_fixed_nodes, named_sets) {
   const TetMesh mesh = read_mesh(fixture("gmsh41_text_1.msh"));
   EXPECT_LT(find_distance(place_nodes(mesh, find_fixed_nodes(mesh, "clamp")), read_truth(1).groups.at("clamp")), 1e-11);
   try {
@@ -370,7 +370,7 @@ TEST(find_fixed_nodes, knows_sets_by_name_and_helps_with_a_wrong_one) {
   }
 }
 
-TEST(find_fixed_nodes, finds_the_nodes_on_the_faces_of_a_closed_box) {
+TEST(find_fixed_nodes, closed_box) {
   const TetMesh mesh = make_cube(10);
   EXPECT_EQ(find_fixed_nodes(mesh, {0, 0, 0}, {0.3, 1, 1}).size(), 4U * 11 * 11);  // 3 / 10 is not 0.3 to the last bit
   EXPECT_EQ(find_fixed_nodes(mesh, {0.5, 0.5, 0.5}, {0.5, 0.5, 0.5}).size(), 1U);
@@ -378,8 +378,8 @@ TEST(find_fixed_nodes, finds_the_nodes_on_the_faces_of_a_closed_box) {
   EXPECT_THROW(find_fixed_nodes(mesh, {1, 0, 0}, {0, 1, 1}), InputError);
 }
 
-TEST(speed, a_mesh_of_the_demos_size_is_read_and_checked_whole) {
-  // The aim is 0.3 s each; the seconds are printed and recorded, not judged: machines are shared.
+TEST(speed, demo_size_mesh) {
+  // Target 0.3 s each; times are printed and recorded, not checked: machines are shared.
   const tests::Folder scratch;
   write_gmsh(make_cube(31), scratch / "large.msh");
   const auto begin = std::chrono::steady_clock::now();

@@ -1,4 +1,4 @@
-// When a quadratic element counts as folded, and what straightening it does to those around it.
+// Detection of folded quadratic elements, and the effect of straightening on their neighbours.
 #include "precompute/mesh/curved.hpp"
 
 #include <gtest/gtest.h>
@@ -26,7 +26,7 @@ TetMesh make_tets(bool two) {
 
 Vec3& get_middle_01(TetMesh& mesh) { return mesh.nodes_m[mesh.tets[4]]; }
 
-TEST(curved, a_mid_node_nearer_than_a_quarter_to_a_corner_folds_the_element_there) {
+TEST(curved, quarter_point_fold) {
   // Along the edge x(s) = s (1 - s) 4 m + s (2 s - 1): dx/ds at s = 0 is 4 m - 1, negative for m < 1/4, though positive at all Gauss
   // points.
   for (const auto& [m, folded] : {std::pair{0.27, false}, std::pair{0.245, true}, std::pair{0.73, false}, std::pair{0.755, true}}) {
@@ -40,7 +40,7 @@ TEST(curved, a_mid_node_nearer_than_a_quarter_to_a_corner_folds_the_element_ther
   }
 }
 
-TEST(curved, elements_that_share_a_straightened_edge_follow) {
+TEST(curved, neighbours_of_straightened_elements) {
   TetMesh mesh = make_tets(true);
   get_middle_01(mesh) = {0.5, 0, 0.6};  // far up into the first element, out of the second
   EXPECT_TRUE(is_folded(mesh, 0));
@@ -52,8 +52,8 @@ TEST(curved, elements_that_share_a_straightened_edge_follow) {
   EXPECT_EQ(straighten_folded_elements(mesh), 0);
 }
 
-TEST(curved, no_element_that_passes_has_a_point_where_it_is_folded_over) {
-  // The Jacobian by finite differences of the map itself, at the points of every rule in use, on elements from tame to wild.
+TEST(curved, fold_detection) {
+  // Jacobian by finite differences of the map, at the points of every quadrature rule, on mild to extreme elements.
   std::mt19937 random(7);
   std::uniform_real_distribution<double> unit(0, 1), shift(-1, 1);
   const auto map = [](const TetMesh& mesh, const std::array<double, 3>& xi) {
@@ -99,7 +99,7 @@ TEST(curved, no_element_that_passes_has_a_point_where_it_is_folded_over) {
   EXPECT_GT(refused, 50);
 }
 
-TEST(curved, straighten_puts_every_mid_node_in_the_middle) {
+TEST(curved, straighten) {
   TetMesh mesh = make_tets(true);
   for (std::size_t n = 5; n < mesh.nodes_m.size(); ++n) mesh.nodes_m[n][1] += 0.1;
   straighten(mesh);

@@ -49,7 +49,7 @@ def make_model():
 
 
 def write_truth(order):
-    """Corner coordinates of each tetrahedron sorted, then the lines sorted; then the nodes of each group."""
+    """Corner coordinates of each tetrahedron sorted, sorted by line, and the nodes of each group."""
     tags, coords, _ = gmsh.model.mesh.getNodes()
     where = dict(zip(tags, coords.reshape(-1, 3)))
     kind = 4 if order == 1 else 11

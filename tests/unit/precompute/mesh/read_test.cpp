@@ -1,4 +1,4 @@
-// Every format and encoding against what Gmsh says the mesh is; the files were written by Gmsh, VTK, meshio and TetGen.
+// Every format and encoding against Gmsh's data; files written by Gmsh, VTK, meshio and TetGen.
 #include "precompute/mesh/read.hpp"
 
 #include <gtest/gtest.h>
@@ -26,7 +26,7 @@ void expect_truth(TetMesh mesh, int order) {
   EXPECT_NEAR(calc_volume(mesh), 0.3 * 0.2 * 0.1, 1e-12);
 }
 
-/// The node order of the format was understood when every mid node lies in the middle of its own edge.
+/// Correct node order: every mid node lies at the midpoint of its own edge.
 void expect_mid_nodes_in_the_middle(const TetMesh& mesh) {
   ASSERT_EQ(mesh.order, 2);
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
@@ -39,7 +39,7 @@ void expect_mid_nodes_in_the_middle(const TetMesh& mesh) {
 
 class EveryFile : public testing::TestWithParam<std::string> {};
 
-TEST_P(EveryFile, holds_the_mesh_that_gmsh_says) {
+TEST_P(EveryFile, same_mesh_as_gmsh) {
   const int order = GetParam().find("2.") != std::string::npos ? 2 : 1;
   const TetMesh mesh = read_mesh(fixture(GetParam()));
   expect_truth(mesh, order);
@@ -69,7 +69,7 @@ INSTANTIATE_TEST_SUITE_P(fixtures, EveryFile,
 
 class GmshFile : public testing::TestWithParam<std::string> {};
 
-TEST_P(GmshFile, gives_its_physical_groups_as_node_sets_and_its_volume_tag_as_region) {
+TEST_P(GmshFile, physical_groups_and_regions) {
   const Truth truth = read_truth(GetParam().find("2.") != std::string::npos ? 2 : 1);
   const TetMesh mesh = read_mesh(fixture(GetParam()));
   ASSERT_EQ(mesh.node_sets.size(), truth.groups.size());
@@ -90,7 +90,7 @@ INSTANTIATE_TEST_SUITE_P(fixtures, GmshFile,
                                          "gmsh22_parted_binary_2.msh", "gmsh41_parted_text_2.msh", "gmsh41_parted_binary_2.msh"),
                          [](const auto& info) { return info.param.substr(0, info.param.size() - 4); });
 
-TEST(read, node_sets_and_regions_come_out_of_the_other_formats_too) {
+TEST(read, node_sets_and_regions) {
   for (const auto& [file, set, order] : {std::tuple{"vtk_ascii_1.vtu", "clamp", 1},
                                          {"vtk_raw_zlib_2.vtu", "clamp:3", 2},
                                          {"meshio_zlib_2.vtu", "clamp", 2},
@@ -104,7 +104,7 @@ TEST(read, node_sets_and_regions_come_out_of_the_other_formats_too) {
   }
 }
 
-TEST(read, tetgens_own_files_have_mid_nodes_in_the_middle_and_the_box_volume) {
+TEST(read, tetgen_mid_nodes) {
   for (const char* file : {"tetgen1.1.node", "tetgen1.1.ele", "tetgen2.1.node", "tetgen2.1.ele"}) {
     TetMesh mesh = read_mesh(fixture(file));
     if (mesh.order == 2) expect_mid_nodes_in_the_middle(mesh);
@@ -118,7 +118,7 @@ TEST(read, tetgens_own_files_have_mid_nodes_in_the_middle_and_the_box_volume) {
 }
 
 // Gmsh (4.8) saves second order as rows of 11 and 7 numbers under the keywords of the first.
-TEST(read, medit_of_second_order_under_the_keywords_of_the_first_is_the_same_mesh) {
+TEST(read, medit_second_order_by_gmsh) {
   std::string text = read_text(fixture("medit_2.mesh"));
   for (const std::string word : {"TetrahedraP2", "TrianglesP2"}) {
     const auto at = text.find(word + "\n");
@@ -135,7 +135,7 @@ TEST(read, medit_of_second_order_under_the_keywords_of_the_first_is_the_same_mes
   EXPECT_EQ(mesh.node_sets, truth.node_sets);
 }
 
-TEST(read, medit_triangles_make_sets_of_their_references) {
+TEST(read, medit_triangle_references) {
   // In a file of Gmsh's the reference of a triangle is the number of its surface: six of them cover the box.
   const TetMesh mesh = read_mesh(fixture("gmsh_1.mesh"));
   int faces = 0;
@@ -156,7 +156,7 @@ TEST(read, medit_triangles_make_sets_of_their_references) {
   EXPECT_EQ(faces, 6);
 }
 
-TEST(read, windows_line_ends_comments_and_a_missing_last_line_end_change_nothing) {
+TEST(read, line_ends_and_comments) {
   const tests::Folder scratch;
   for (const char* file : {"gmsh22_text_1.msh", "gmsh41_text_2.msh", "medit_1.mesh", "vtk_ascii_1.vtu"}) {
     std::string text;
@@ -171,7 +171,7 @@ TEST(read, windows_line_ends_comments_and_a_missing_last_line_end_change_nothing
   }
 }
 
-TEST(read, a_gmsh_2_element_of_two_physical_groups_is_one_element) {
+TEST(read, gmsh_2_element_in_two_groups) {
   const std::string text =
       "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n2\n3 1 \"body\"\n3 2 \"half\"\n$EndPhysicalNames\n"
       "$Nodes\n5\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n5 1 1 1\n$EndNodes\n"
@@ -182,7 +182,7 @@ TEST(read, a_gmsh_2_element_of_two_physical_groups_is_one_element) {
   EXPECT_EQ(mesh.node_sets.at("half"), (std::vector<std::int32_t>{1, 2, 3, 4}));
 }
 
-TEST(read, parametric_nodes_partitioned_entities_and_foreign_sections_of_gmsh_4_are_understood) {
+TEST(read, gmsh_4_optional_sections) {
   const std::string text =
       "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Comments\nanything $Nodes\n$EndComments\n"
       "$PhysicalNames\n1\n2 5 \"grip\"\n$EndPhysicalNames\n"
@@ -197,7 +197,7 @@ TEST(read, parametric_nodes_partitioned_entities_and_foreign_sections_of_gmsh_4_
   EXPECT_EQ(mesh.node_sets.at("grip"), (std::vector<std::int32_t>{0, 1, 2}));
 }
 
-TEST(read, a_gmsh_file_of_the_other_byte_order_gives_the_same_mesh) {
+TEST(read, gmsh_byte_order) {
   // Version 2.2 binary, written big-endian by hand.
   std::string text = "$MeshFormat\n2.2 1 8\n";
   const auto put = [&](auto value) {
@@ -219,7 +219,7 @@ TEST(read, a_gmsh_file_of_the_other_byte_order_gives_the_same_mesh) {
   EXPECT_EQ(mesh.regions.at(0), 5);
 }
 
-TEST(read, a_periodic_mesh_of_gmsh_is_the_same_in_every_encoding) {
+TEST(read, gmsh_periodic_mesh) {
   const TetMesh first = read_mesh(fixture("gmsh41_periodic_text_1.msh"));
   EXPECT_NEAR(calc_volume(first), 0.3 * 0.2 * 0.1, 1e-12);
   for (const char* name : {"gmsh41_periodic_binary_1.msh", "gmsh22_periodic_text_1.msh", "gmsh22_periodic_binary_1.msh"}) {
@@ -238,7 +238,7 @@ std::string make_data(const std::string& name, std::string bytes, bool tag_on_a_
          "$End" + name + "\n";
 }
 
-TEST(read, values_of_binary_sections_may_hold_anything) {
+TEST(read, gmsh_tags_in_binary_values) {
   const TetMesh plain = read_mesh(fixture("gmsh41_binary_1.msh"));
   const std::string hostile[] = {"\n$EndElementData\n$Nodes\n", "$EndElementData", "\n$EndNodeData\n", std::string(24, '\0'), ""};
   for (const char* version : {"gmsh41_binary_1.msh", "gmsh22_binary_1.msh"})
@@ -250,7 +250,7 @@ TEST(read, values_of_binary_sections_may_hold_anything) {
           const TetMesh mesh = parse_mesh(std::as_bytes(std::span(text)), "views.msh", MeshFormat::kGmsh);
           EXPECT_EQ(mesh.tet_count(), plain.tet_count());
         }
-  // A section that is not known, and one that is not as the manual has it, end at the tag that another section or nothing follows.
+  // Unknown or nonstandard sections end at a tag followed by another section or the end of the file.
   const std::string text =
       read_text(fixture("gmsh41_binary_1.msh")) + "$Foreign\n\x01\x02$EndForeign\x03\x04$EndForeign\n$Periodic\nodd$EndPeriodic";
   EXPECT_EQ(parse_mesh(std::as_bytes(std::span(text)), "views.msh", MeshFormat::kGmsh).tet_count(), plain.tet_count());
@@ -258,7 +258,7 @@ TEST(read, values_of_binary_sections_may_hold_anything) {
   EXPECT_THROW(parse_mesh(std::as_bytes(std::span(cut)), "views.msh", MeshFormat::kGmsh), InputError);
 }
 
-TEST(read, every_truncation_of_every_format_is_an_error_or_the_whole_mesh_and_never_a_crash) {
+TEST(read, truncated_files) {
   for (const auto& [file, format] : {std::pair{"gmsh22_text_1.msh", MeshFormat::kGmsh},
                                      {"gmsh22_binary_1.msh", MeshFormat::kGmsh},
                                      {"gmsh41_text_1.msh", MeshFormat::kGmsh},

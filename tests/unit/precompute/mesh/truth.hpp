@@ -1,4 +1,4 @@
-// What Gmsh's own interface says the fixtures are (tests/unit/precompute/mesh/make_fixtures.py), and our meshes in the same words.
+// Reference data of the fixtures from Gmsh's API (tests/unit/precompute/mesh/make_fixtures.py), and this reader's meshes in the same form.
 #pragma once
 
 #include <filesystem>
@@ -24,7 +24,7 @@ Truth read_truth(int order);
 std::vector<std::vector<Vec3>> place_tets(const TetMesh& mesh);
 std::vector<Vec3> place_nodes(const TetMesh& mesh, const std::vector<std::int32_t>& nodes);
 
-/// The greatest distance between points of two lists of one length.
+/// Largest distance between corresponding points of two lists.
 double find_distance(const std::vector<Vec3>& a, const std::vector<Vec3>& b);
 
 double calc_volume(const TetMesh& mesh);  // signed, by the divergence theorem over each element's faces

@@ -1,4 +1,4 @@
-// What we write must come back: through our own reader, through meshio, through Gmsh.
+// Round trip of written files: own reader, meshio, Gmsh.
 #include "precompute/mesh/write.hpp"
 
 #include <gtest/gtest.h>
@@ -16,7 +16,7 @@ namespace {
 
 class Written : public testing::TestWithParam<std::tuple<const char*, GmshEncoding>> {};
 
-TEST_P(Written, gmsh_file_is_read_back_bit_for_bit) {
+TEST_P(Written, gmsh_round_trip) {
   const auto& [file, encoding] = GetParam();
   const tests::Folder scratch;
   TetMesh mesh = read_mesh(fixture(file));
@@ -52,7 +52,7 @@ void expect_same_again(const TetMesh& mesh, const std::filesystem::path& file) {
   EXPECT_EQ(back.node_sets, mesh.node_sets);
 }
 
-TEST_P(Written, gmsh_file_is_read_by_meshio_with_volume_and_sets) {
+TEST_P(Written, gmsh_file_in_meshio) {
   const auto& [file, encoding] = GetParam();
   const tests::Folder scratch;
   write_gmsh(read_mesh(fixture(file)), scratch / "out.msh", encoding);
@@ -61,11 +61,11 @@ TEST_P(Written, gmsh_file_is_read_by_meshio_with_volume_and_sets) {
   EXPECT_NE(said.find("volume 0.006000 tets 89 mid-off 0"), std::string::npos) << said;
 }
 
-TEST_P(Written, gmsh_file_is_read_by_gmsh_with_volume_and_sets) {
+TEST_P(Written, gmsh_file_in_gmsh) {
   const auto& [file, encoding] = GetParam();
   const tests::Folder scratch;
   TetMesh mesh = read_mesh(fixture(file));
-  mesh.doubt_m.assign(mesh.nodes_m.size(), Vec3{0, 0, 1e-3});  // data that others may do with what they like
+  mesh.doubt_m.assign(mesh.nodes_m.size(), Vec3{0, 0, 1e-3});  // arbitrary post-processing data
   write_gmsh(mesh, scratch / "out.msh", encoding);
   std::string said;
   if (!read_with("gmsh", scratch / "out.msh", said)) GTEST_SKIP() << "gmsh's Python module is not installed";
@@ -81,7 +81,7 @@ INSTANTIATE_TEST_SUITE_P(fixtures, Written,
                          testing::Combine(testing::Values("gmsh41_text_1.msh", "gmsh41_binary_2.msh", "vtk_raw_1.vtu"),
                                           testing::Values(GmshEncoding::kBinary, GmshEncoding::kText)));
 
-TEST(write, a_mesh_without_regions_is_read_and_exported_by_others) {
+TEST(write, mesh_without_regions) {
   for (const char* file : {"vtk_raw_1.vtu", "gmsh41_binary_2.msh"}) {
     const tests::Folder scratch;
     TetMesh mesh = read_mesh(fixture(file));
@@ -96,7 +96,7 @@ TEST(write, a_mesh_without_regions_is_read_and_exported_by_others) {
   }
 }
 
-TEST(write, named_regions_and_elements_without_one_come_back) {
+TEST(write, named_regions) {
   TetMesh mesh = read_mesh(fixture("vtk_ascii_1.vtu"));
   for (std::size_t e = 0; e < mesh.regions.size(); ++e) mesh.regions[e] = static_cast<std::int32_t>(e % 3);  // 0, 1, 2
   mesh.region_names = {{1, "steel"}};
@@ -114,7 +114,7 @@ TEST(write, named_regions_and_elements_without_one_come_back) {
   EXPECT_NE(said.find("group 3 30"), std::string::npos) << said;  // region 0, under an unused number
 }
 
-TEST(write, regions_and_names_survive_in_the_order_of_the_elements) {
+TEST(write, region_order) {
   TetMesh mesh = read_mesh(fixture("vtk_ascii_1.vtu"));
   for (std::size_t e = 0; e < mesh.regions.size(); ++e) mesh.regions[e] = static_cast<std::int32_t>(e % 3);
   mesh.node_sets = {{"two words", {3, 5}}, {"empty", {}}, {"overlap", {5, 6, 7}}};

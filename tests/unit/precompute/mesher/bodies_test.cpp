@@ -1,4 +1,4 @@
-// Meshes of bodies whose volume, wall and edges are known in closed form.
+// Meshes of bodies with closed-form volume, wall and edges.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -83,7 +83,7 @@ void expect_count(const mesh::TetMesh& m, std::int64_t target) {
   EXPECT_NEAR(static_cast<double>(m.nodes_m.size()), static_cast<double>(target), 0.1 * static_cast<double>(target));
 }
 
-TEST(bodies, sphere_of_an_off_file_converges_to_its_volume) {
+TEST(bodies, off_sphere_volume_convergence) {
   const auto path = write_text("sphere.off", to_off(make_sphere(0.05, 5)));
   const double exact = 4 * std::numbers::pi / 3 * std::pow(0.05, 3);
   double last = 1;
@@ -101,7 +101,7 @@ TEST(bodies, sphere_of_an_off_file_converges_to_its_volume) {
   EXPECT_LT(last, 0.02);
 }
 
-TEST(bodies, cube_keeps_its_twelve_edges_and_eight_corners) {
+TEST(bodies, cube_edges_and_corners) {
   SurfaceReport report;
   const auto m = mesh_surface({.surface = write_text("cube.obj", to_obj(make_box(1, 1, 1))), .nodes = 3000}, report);
   expect_sound(m);
@@ -120,7 +120,7 @@ TEST(bodies, cube_keeps_its_twelve_edges_and_eight_corners) {
   EXPECT_NEAR(report.sharp_edges_m, 12, 1e-9);
 }
 
-TEST(bodies, hollow_cube_keeps_the_edges_of_both_skins) {
+TEST(bodies, hollow_cube_edges) {
   SurfaceReport report;
   const auto m = mesh_surface({.surface = write_text("cube2.obj", to_obj(make_box(1, 1, 1))), .wall_m = 0.1, .nodes = 2500}, report);
   expect_sound(m);
@@ -136,7 +136,7 @@ TEST(bodies, hollow_cube_keeps_the_edges_of_both_skins) {
   EXPECT_NEAR(report.wall_mean_m, 0.1, 1e-3);
 }
 
-TEST(bodies, hollow_sphere_has_the_wall_and_the_volume_of_two_spheres) {
+TEST(bodies, hollow_sphere_wall_and_volume) {
   const auto path = write_text("hollow.off", to_off(make_sphere(0.05, 5)));
   SurfaceReport report;
   const auto m = mesh_surface({.surface = path, .wall_m = 0.008, .nodes = 3000}, report);
@@ -153,7 +153,7 @@ TEST(bodies, hollow_sphere_has_the_wall_and_the_volume_of_two_spheres) {
   EXPECT_NEAR(report.wall_min_m, 0.008, 2e-4);
 }
 
-TEST(bodies, stuffing_fills_a_hollow_sphere_within_the_count) {
+TEST(bodies, stuffed_hollow_sphere) {
   const auto path = write_text("stuffed.off", to_off(make_sphere(0.05, 4)));
   SurfaceReport report;
   const auto m = mesh_surface({.surface = path, .wall_m = 0.01, .nodes = 3000, .method = Method::kStuffing}, report);
@@ -164,7 +164,7 @@ TEST(bodies, stuffing_fills_a_hollow_sphere_within_the_count) {
   EXPECT_GT(report.min_dihedral_deg, 5);
 }
 
-TEST(bodies, thin_plate_keeps_its_edges_where_elements_are_as_long_as_it_is_thick) {
+TEST(bodies, thin_plate_edges) {
   SurfaceReport report;
   const auto m = mesh_surface({.surface = write_text("plate.obj", to_obj(make_box(0.3, 0.2, 0.01))), .nodes = 5000}, report);
   expect_sound(m);
@@ -174,7 +174,7 @@ TEST(bodies, thin_plate_keeps_its_edges_where_elements_are_as_long_as_it_is_thic
   EXPECT_GT(report.min_dihedral_deg, 8);
 }
 
-TEST(bodies, coarse_hollow_sphere_is_repaired_where_its_skins_meet) {
+TEST(bodies, coarse_hollow_sphere_repair) {
   SurfaceReport report;
   const auto m = mesh_surface({.surface = write_text("coarse.off", to_off(make_sphere(0.05, 4))), .wall_m = 0.004, .nodes = 2000}, report);
   expect_sound(m);
@@ -208,10 +208,9 @@ int count_shells_of(const mesh::TetMesh& m) {
   return shells;
 }
 
-TEST(bodies, who_asks_for_a_wall_has_a_hollow) {
-  // The hollow is a tenth of the ball, 10 mm wide, and elements of this count are nearly as long: a solid ball would be within a thousandth
-  // of the volume. It is refused in one line that says what to ask for; with what is asked for so, the second time at the latest, there is
-  // a hollow.
+TEST(bodies, requested_hollow) {
+  // The hollow is a tenth of the ball, 10 mm wide, and elements of this count are nearly as long: a solid ball would have the volume within
+  // a thousandth. Refused with a proposed size; the proposal gives a hollow at the second attempt at the latest.
   const auto path = write_text("tiny_hollow.off", to_off(make_sphere(0.05, 4)));
   std::int64_t nodes = 2000;
   int refused = 0;
@@ -235,9 +234,9 @@ TEST(bodies, who_asks_for_a_wall_has_a_hollow) {
   EXPECT_EQ(count_shells_of(m), 2);
 }
 
-TEST(bodies, coarse_walls_are_the_body_or_are_refused) {
-  // Elements longer than the wall is thick. No node may lie outside or in the hollow, both skins must be there, and what cannot be had is
-  // refused with what to ask for.
+TEST(bodies, coarse_walls) {
+  // Elements longer than the wall. No node may lie outside or in the hollow, both skins must exist, and impossible sizes are refused with a
+  // proposal.
   const double pi = std::numbers::pi;
   int made = 0;
   for (const double wall : {0.003, 0.002})
@@ -267,7 +266,7 @@ TEST(bodies, coarse_walls_are_the_body_or_are_refused) {
   EXPECT_GE(made, 4);
 }
 
-TEST(bodies, coarse_round_solids_pass_the_comparison_with_the_body) {
+TEST(bodies, coarse_round_solids) {
   for (const auto& [name, surface] :
        {std::pair{"coarse_ball.off", make_sphere(0.05, 4)}, std::pair{"coarse_ring.off", make_torus(0.05, 0.02, 24, 12)}})
     for (const std::int64_t nodes : {200, 500})
@@ -280,7 +279,7 @@ TEST(bodies, coarse_round_solids_pass_the_comparison_with_the_body) {
       }
 }
 
-TEST(bodies, a_part_that_elements_are_too_coarse_for_is_not_left_out_in_silence) {
+TEST(bodies, unresolved_fin) {
   // A block with a fin. A fin of 0.2 mm is a hundredth of the block's volume at most and falls between the samples of the distance field.
   for (const double thickness : {0.0002, 0.008}) {
     const double low = 0.015 - thickness / 2, high = 0.015 + thickness / 2;
@@ -329,7 +328,7 @@ TEST(bodies, a_part_that_elements_are_too_coarse_for_is_not_left_out_in_silence)
   }
 }
 
-TEST(bodies, elements_of_what_is_flat_itself_are_not_improved_for_long) {
+TEST(bodies, smoothing_time_of_flat_bodies) {
   // A sheet of one layer, a hundred times as wide as it is thick in each element: no place of its nodes makes an element less flat by much.
   mesh::TetMesh sheet = tests::make_box({20, 20, 1}, {2.0, 2.0, 0.001});
   for (Vec3& p : sheet.nodes_m) p = {p[0] + 0.02 * std::sin(70.0 * p[1]), p[1] + 0.02 * std::sin(50.0 * p[0]), p[2]};
@@ -340,7 +339,7 @@ TEST(bodies, elements_of_what_is_flat_itself_are_not_improved_for_long) {
   EXPECT_LT(moved, static_cast<std::int64_t>(sheet.nodes_m.size()));
 }
 
-TEST(bodies, small_and_slender_targets_are_met) {
+TEST(bodies, small_and_slender_targets) {
   const struct {
     const char* name;
     Polygons surface;
@@ -357,7 +356,7 @@ TEST(bodies, small_and_slender_targets_are_met) {
   }
 }
 
-TEST(bodies, second_order_counts_the_mid_side_nodes_and_puts_them_in_the_middle) {
+TEST(bodies, second_order_mid_nodes) {
   SurfaceReport report;
   const auto m = mesh_surface({.surface = write_text("cube3.off", to_off(make_box(0.3, 0.1, 0.2))), .nodes = 4000, .order = 2}, report);
   EXPECT_EQ(m.order, 2);
@@ -371,7 +370,7 @@ TEST(bodies, second_order_counts_the_mid_side_nodes_and_puts_them_in_the_middle)
                     1e-15);
 }
 
-TEST(bodies, the_same_input_gives_the_same_mesh) {
+TEST(bodies, determinism) {
   const SurfaceOptions options{.surface = write_text("twice.off", to_off(make_sphere(0.05, 3))), .wall_m = 0.01, .nodes = 1200};
   SurfaceReport first, second;
   const auto a = mesh_surface(options, first), b = mesh_surface(options, second);
@@ -379,7 +378,7 @@ TEST(bodies, the_same_input_gives_the_same_mesh) {
   EXPECT_EQ(a.tets, b.tets);
 }
 
-TEST(bodies, hollow_bunny_is_one_piece_with_a_closed_boundary) {
+TEST(bodies, hollow_bunny_topology) {
   const std::filesystem::path bunny = "/usr/share/glmark2/models/bunny.obj";
   if (!std::filesystem::exists(bunny)) GTEST_SKIP() << "glmark2-data is not installed";
   SurfaceReport report;

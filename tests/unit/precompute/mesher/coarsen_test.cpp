@@ -1,4 +1,4 @@
-// Surfaces with fewer corners: what must stay, and what is refused.
+// Surface coarsening: preserved properties, and refusals.
 #include "precompute/mesher/coarsen.hpp"
 
 #include <gmock/gmock.h>
@@ -23,7 +23,7 @@ using testing::make_torus;
 using testing::to_triangles;
 using tests::catch_message;
 
-/// Each edge is passed once in each direction: closed, a manifold at its edges, oriented.
+/// Each edge is traversed once per direction: closed, edge-manifold, oriented.
 bool is_closed(const TriangleSurface& surface) {
   std::map<std::pair<std::int32_t, std::int32_t>, int> passes;
   for (const Triangle& t : surface.triangles)
@@ -80,7 +80,7 @@ void expect_coarse(const TriangleSurface& fine, std::size_t corners, const std::
   EXPECT_EQ(genus(coarse), genus(fine)) << what;
 }
 
-TEST(coarsen, keeps_volume_orientation_and_topology) {
+TEST(coarsen, volume_orientation_and_topology) {
   const TriangleSurface ball = to_triangles(make_sphere(0.1, 5));  // 4,098 corners
   for (const std::size_t corners : {2000U, 600U, 150U}) expect_coarse(ball, corners, "ball");
   const TriangleSurface torus = to_triangles(make_torus(1.0, 0.3, 80, 30));
@@ -89,7 +89,7 @@ TEST(coarsen, keeps_volume_orientation_and_topology) {
   for (const std::size_t corners : {2000U, 600U}) expect_coarse(box, corners, "plate");
 }
 
-TEST(coarsen, keeps_the_faces_of_a_plate_flat_and_apart) {
+TEST(coarsen, plate_faces) {
   const TriangleSurface coarse = coarsen(make_fine_box({0.3, 0.2, 0.01}, {60, 40, 2}), 800);
   const Box box = calc_used_box(coarse);
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -100,7 +100,7 @@ TEST(coarsen, keeps_the_faces_of_a_plate_flat_and_apart) {
   EXPECT_NEAR(calc_winding(coarse, {0.15, 0.1, 0.0105}), 0.0, 1e-9);
 }
 
-TEST(coarsen, leaves_triangles_even) {
+TEST(coarsen, triangle_quality) {
   const TriangleSurface coarse = coarsen(to_triangles(make_sphere(1.0, 5)), 700);
   double longest = 0.0, sum = 0.0;
   for (const Triangle& t : coarse.triangles)
@@ -113,7 +113,7 @@ TEST(coarsen, leaves_triangles_even) {
   EXPECT_LT(longest, 2.0 * mean);
 }
 
-TEST(coarsen, leaves_surfaces_that_have_no_more_corners) {
+TEST(coarsen, no_excess_corners) {
   const TriangleSurface ball = to_triangles(make_sphere(1.0, 2));
   const TriangleSurface same = coarsen(ball, 1000);
   EXPECT_EQ(same.points, ball.points);
@@ -121,7 +121,7 @@ TEST(coarsen, leaves_surfaces_that_have_no_more_corners) {
   EXPECT_TRUE(is_closed(same));
 }
 
-TEST(coarsen, refuses_open_surfaces_seams_and_too_few_corners) {
+TEST(coarsen, refusals) {
   const TriangleSurface ball = to_triangles(make_sphere(1.0, 3));
   EXPECT_THAT(catch_message<InputError>([&] { coarsen(ball, 11); }), ::testing::HasSubstr("12 corners"));
   TriangleSurface open = ball;
@@ -130,7 +130,7 @@ TEST(coarsen, refuses_open_surfaces_seams_and_too_few_corners) {
   TriangleSurface winged = ball;  // a third triangle on an edge
   winged.points.push_back({3, 0, 0});
   winged.triangles.push_back({ball.triangles[0][0], ball.triangles[0][1], static_cast<std::int32_t>(ball.points.size())});
-  EXPECT_THAT(catch_message<InputError>([&] { coarsen(winged, 100); }), ::testing::HasSubstr("has not two triangles"));
+  EXPECT_THAT(catch_message<InputError>([&] { coarsen(winged, 100); }), ::testing::HasSubstr("does not have two triangles"));
   TriangleSurface turned = ball;  // one that faces the other way
   std::swap(turned.triangles[5][0], turned.triangles[5][1]);
   EXPECT_THROW(coarsen(turned, 100), InputError);

@@ -53,7 +53,7 @@ double calc_volume(const mesh::TetMesh& m) {
   return mesh::check_mesh(copy).volume_m3;
 }
 
-TEST(curved, mid_nodes_of_a_coarsely_faceted_ball_lie_on_the_sphere) {
+TEST(curved, faceted_ball) {
   const double radius = 0.05;
   const auto calc_worst = [&](bool facets, bool straight) {
     SurfaceReport report;
@@ -67,7 +67,7 @@ TEST(curved, mid_nodes_of_a_coarsely_faceted_ball_lie_on_the_sphere) {
   EXPECT_GT(calc_worst(false, true), 0.015);  // the chords of the mesh
 }
 
-TEST(curved, volume_of_a_ball_is_fifteen_times_nearer_with_curved_sides_than_with_straight_ones) {
+TEST(curved, curved_ball_volume) {
   const double exact = 4 * std::numbers::pi / 3;
   for (const std::int64_t nodes : {2000, 9000}) {
     const auto calc_error = [&](bool straight) {
@@ -83,7 +83,7 @@ TEST(curved, volume_of_a_ball_is_fifteen_times_nearer_with_curved_sides_than_wit
   }
 }
 
-TEST(curved, both_skins_of_a_hollow_ball_are_spheres) {
+TEST(curved, hollow_ball_skins) {
   const double radius = 0.05, wall = 0.006;
   SurfaceReport report;
   const auto m = make("shell.off", make_sphere(radius, 4), {.wall_m = wall, .nodes = 9000}, report);
@@ -101,7 +101,7 @@ TEST(curved, both_skins_of_a_hollow_ball_are_spheres) {
   EXPECT_NEAR(calc_volume(m) / exact, 1, 2e-3);
 }
 
-TEST(curved, mid_nodes_of_a_faceted_torus_lie_on_the_torus) {
+TEST(curved, faceted_torus) {
   const double large = 0.05, small = 0.015;
   SurfaceReport report;
   const auto m = make("torus.off", make_torus(large, small, 48, 24), {.nodes = 6000}, report);
@@ -114,7 +114,7 @@ TEST(curved, mid_nodes_of_a_faceted_torus_lie_on_the_torus) {
   EXPECT_NEAR(calc_volume(m) / (2 * std::numbers::pi * std::numbers::pi * large * small * small), 1, 4e-3);
 }
 
-TEST(curved, rims_of_a_cylinder_are_circles_and_its_ends_stay_flat) {
+TEST(curved, cylinder_rims_and_ends) {
   const double radius = 0.01, length = 0.05;
   SurfaceReport report;
   const auto m = make("cylinder.off", make_cylinder(radius, length, 24), {.nodes = 5000}, report);
@@ -139,7 +139,7 @@ TEST(curved, rims_of_a_cylinder_are_circles_and_its_ends_stay_flat) {
   EXPECT_NEAR(calc_volume(m) / (std::numbers::pi * radius * radius * length), 1, 5e-3);
 }
 
-TEST(curved, a_box_stays_straight) {
+TEST(curved, straight_box) {
   SurfaceReport report;
   const auto m = make("box.off", make_box(3, 2, 1), {.nodes = 4000}, report);
   EXPECT_EQ(report.curved_edges, 0);
@@ -147,7 +147,7 @@ TEST(curved, a_box_stays_straight) {
   EXPECT_NEAR(calc_volume(m), 6, 1e-9);
 }
 
-TEST(curved, planes_next_to_fillets_stay_flat_and_the_fillets_become_round) {
+TEST(curved, fillets) {
   const double a = 0.03, b = 0.02, fillet = 0.006, length = 0.05;
   SurfaceReport report;
   const auto m = make("fillet.off", make_filleted_bar(a, b, fillet, length, 4), {.nodes = 12000}, report);
@@ -160,7 +160,7 @@ TEST(curved, planes_next_to_fillets_stay_flat_and_the_fillets_become_round) {
   EXPECT_NEAR(calc_volume(m) / exact, 1, 1e-3);
 }
 
-TEST(curved, facets_are_kept_when_asked_for) {
+TEST(curved, facets_option) {
   const double radius = 0.01, length = 0.05, exact = 6 * std::sin(std::numbers::pi / 6) * radius * radius * length;  // twelve sides
   SurfaceReport report;
   const auto m = make("prism.off", make_cylinder(radius, length, 12), {.nodes = 3000, .facets = true, .sharp_angle_deg = 20}, report);
@@ -168,7 +168,7 @@ TEST(curved, facets_are_kept_when_asked_for) {
   EXPECT_EQ(report.facet_pieces, 1);
 }
 
-TEST(curved, the_same_input_gives_the_same_curved_mesh) {
+TEST(curved, determinism) {
   SurfaceReport first, second;
   const auto a = make("same.off", make_sphere(0.05, 3), {.wall_m = 0.01, .nodes = 3000}, first);
   const auto b = make("same.off", make_sphere(0.05, 3), {.wall_m = 0.01, .nodes = 3000}, second);

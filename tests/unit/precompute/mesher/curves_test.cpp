@@ -1,4 +1,4 @@
-// Curves as the Delaunay mesher can take them: it shrinks balls without end where two come close or one turns back.
+// Curve preparation for the Delaunay mesher, which shrinks balls without end where two curves come close or one turns back.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -19,7 +19,7 @@ bool is_end(const std::vector<Polyline>& curves, const Vec3& p) {
   return std::any_of(curves.begin(), curves.end(), [&](const Polyline& c) { return c.front() == p || c.back() == p; });
 }
 
-TEST(curves, end_where_they_turn_back_and_lose_no_length) {
+TEST(curves, split_at_reversals) {
   // At (2, 0, 0) the interior angle is 45 degrees, at (1, 1, 0) 135.
   const std::vector<Polyline> curves{{{0, 0, 0}, {2, 0, 0}, {1, 1, 0}, {1, 3, 0}}};
   const auto out = untangle_curves(curves, 1e-6);
@@ -29,7 +29,7 @@ TEST(curves, end_where_they_turn_back_and_lose_no_length) {
   EXPECT_DOUBLE_EQ(calc_length(out), calc_length(curves));
 }
 
-TEST(curves, closed_ones_end_at_every_bend_wherever_they_begin) {
+TEST(curves, closed_curves) {
   Polyline drop{{0, 0, 0}, {2, 1, 0}, {3, 1, 0}, {3.5, 0, 0}, {3, -1, 0}, {2, -1, 0}, {0, 0, 0}};
   for (std::size_t start = 0; start + 1 < drop.size(); ++start) {
     Polyline curve(drop.begin(), drop.end() - 1);
@@ -43,19 +43,19 @@ TEST(curves, closed_ones_end_at_every_bend_wherever_they_begin) {
   }
 }
 
-TEST(curves, sound_ones_stay_as_they_are) {
+TEST(curves, sound_curves_unchanged) {
   const std::vector<Polyline> curves{
       {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}}, {{1, 1, 0}, {0, 1, 0}, {0, 0, 0}}, {{5, 0, 0}, {6, 0, 0}, {6, 1, 0}, {5, 1, 0}, {5, 0, 0}}};
   EXPECT_EQ(untangle_curves(curves, 1e-6), curves);
 }
 
-TEST(curves, of_two_that_cross_the_shorter_goes) {
+TEST(curves, crossing_curves) {
   const auto out = untangle_curves({{{-1, 0, 0}, {1, 0, 0}}, {{0, -2, 0}, {0, 2, 0}}}, 1e-6);
   ASSERT_EQ(out.size(), 1u);
   EXPECT_EQ(out[0].front()[1], -2);
 }
 
-TEST(curves, a_way_forth_and_back_is_one_way) {
+TEST(curves, retraced_curve) {
   const auto out = untangle_curves({{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {1, 1e-9, 0}, {0.5, 1e-9, 0}}}, 1e-6);
   EXPECT_EQ(out, (std::vector<Polyline>{{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}}));
 }

@@ -1,4 +1,4 @@
-// The distance field against distances computed one by one.
+// Distance field against brute-force distances.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -12,7 +12,7 @@ namespace {
 
 using namespace testing;
 
-/// The farthest that a sample within both reaches is off the exact distance, in voxels.
+/// Largest error of samples within both reaches, in voxels.
 double calc_worst(const TriangleSurface& surface, double voxel_m, const FieldReach& reach) {
   const DistanceField field = calc_distance_field(surface, voxel_m, reach, 0);
   const NearestPoint nearest(surface);
@@ -28,9 +28,9 @@ double calc_worst(const TriangleSurface& surface, double voxel_m, const FieldRea
   return worst;
 }
 
-TEST(distances, are_exact_around_a_rough_ball_and_a_torus) {
+TEST(distances, rough_ball_and_torus) {
   const auto check = [](const Polygons& body) { return calc_worst(to_triangles(body), 0.0015, {0.006, 0.018}); };
-  // The noise is up to a third of the triangles' edges; the bound is what handing triangles on from sample to sample misses at its spikes.
+  // The noise is up to a third of the triangles' edges; the bound covers propagation errors at its spikes.
   EXPECT_LT(check(roughen(make_sphere(0.05, 4), 0.3)), 0.07);
   EXPECT_LT(check(make_sphere(0.05, 2)), 0.001);
   EXPECT_LT(check(roughen(make_torus(0.05, 0.02, 60, 24), 0.2)), 0.07);

@@ -1,4 +1,4 @@
-// Walls made of skins: closed forms for volume, thickness and the place of every node, and what is refused.
+// Walls from skins: closed forms for volume, thickness and node positions, and refusals.
 #include "precompute/mesher/extrude.hpp"
 
 #include <gtest/gtest.h>
@@ -104,7 +104,7 @@ std::string find_refusal(const Polygons& s, const SurfaceOptions& options) {
   return "";
 }
 
-TEST(extrude, prisms_of_any_numbering_and_layers_agree_about_their_sides) {
+TEST(extrude, prism_conformity) {
   std::mt19937 random(7);
   for (const int layers : {1, 2, 3}) {
     const Polygons grid = make_grid(7, 5, [](double u, double v) { return std::array{u, v, 0.1 * std::sin(3 * u + v)}; });
@@ -129,7 +129,7 @@ TEST(extrude, prisms_of_any_numbering_and_layers_agree_about_their_sides) {
   }
 }
 
-TEST(extrude, a_plate_is_exact_on_whatever_side_its_surface_lies) {
+TEST(extrude, plate_sides) {
   const Polygons plate = make_grid(2, 2, [](double u, double v) { return std::array{0.1 * u, 0.09 * v, 0.0}; });
   for (const auto& [side, low] : {std::pair{Side::kMiddle, -0.0015}, std::pair{Side::kOutside, -0.003}, std::pair{Side::kInside, 0.0}}) {
     SurfaceReport report;
@@ -154,7 +154,7 @@ TEST(extrude, a_plate_is_exact_on_whatever_side_its_surface_lies) {
   }
 }
 
-TEST(extrude, both_sides_of_a_hollow_ball_are_spheres) {
+TEST(extrude, hollow_ball) {
   const double radius = 0.05, wall = 0.002;
   SurfaceReport report;
   const auto m = make(make_sphere(radius, 4), {.wall_m = wall, .edge_m = 0.008}, report);
@@ -168,7 +168,7 @@ TEST(extrude, both_sides_of_a_hollow_ball_are_spheres) {
   for (const std::int32_t v : m.node_sets.at("inner")) EXPECT_NEAR(norm(m.nodes_m[v]), radius - wall, 2e-4 * radius);
 }
 
-TEST(extrude, an_open_tube_of_facets_is_a_tube) {
+TEST(extrude, faceted_open_tube) {
   const double radius = 0.03, length = 0.1, wall = 0.002;
   for (const auto& [side, middle] :
        {std::pair{Side::kAutomatic, radius}, std::pair{Side::kOutside, radius - wall / 2}, std::pair{Side::kInside, radius + wall / 2}}) {
@@ -181,7 +181,7 @@ TEST(extrude, an_open_tube_of_facets_is_a_tube) {
   }
 }
 
-TEST(extrude, narrow_ends_of_a_long_tube_are_openings_and_holes_of_a_scan_are_not) {
+TEST(extrude, openings_and_holes) {
   // Both take less than a twentieth of the diagonal.
   const Polygons tube = make_open_tube(0.0115, 0.505, 48);
   SurfaceReport report;
@@ -195,7 +195,7 @@ TEST(extrude, narrow_ends_of_a_long_tube_are_openings_and_holes_of_a_scan_are_no
   EXPECT_EQ(capped.shells, 2);
 
   Polygons ball = make_sphere(0.05, 4);
-  std::erase_if(ball.faces, [&](const std::vector<int>& f) {  // what a scanner did not see
+  std::erase_if(ball.faces, [&](const std::vector<int>& f) {  // not seen by a scanner
     return std::all_of(f.begin(), f.end(),
                        [&](int v) { return std::hypot(ball.points[v][0] - 0.05, ball.points[v][1], ball.points[v][2]) < 0.007; });
   });
@@ -205,7 +205,7 @@ TEST(extrude, narrow_ends_of_a_long_tube_are_openings_and_holes_of_a_scan_are_no
   EXPECT_EQ(scanned.shells, 2);
 }
 
-TEST(extrude, folds_are_mitred) {
+TEST(extrude, mitred_folds) {
   const double wall = 0.004;
   for (const double angle : {175.0, 120.0, 90.0, 60.0, 40.0})
     for (const auto& [side, sign] : {std::pair{Side::kMiddle, 0}, std::pair{Side::kOutside, -1}, std::pair{Side::kInside, 1}}) {
@@ -225,7 +225,7 @@ TEST(extrude, folds_are_mitred) {
     }
 }
 
-TEST(extrude, counts_are_met_and_repeat) {
+TEST(extrude, node_counts_and_determinism) {
   for (const std::int64_t nodes : {800, 3000, 12000}) {
     SurfaceReport report;
     const auto m = make(make_open_tube(0.03, 0.1, 32), {.wall_m = 0.001, .nodes = nodes}, report);
@@ -237,7 +237,7 @@ TEST(extrude, counts_are_met_and_repeat) {
   }
 }
 
-TEST(extrude, a_surface_of_two_sides_keeps_both) {
+TEST(extrude, two_sided_surface) {
   // A cup, turned: sides of 2 mm, a bottom of 3 mm.
   const std::vector<std::array<double, 2>> profile{{0, 0},        {0.03, 0},      {0.03, 0.025},  {0.03, 0.05},
                                                    {0.028, 0.05}, {0.028, 0.026}, {0.028, 0.003}, {0, 0.003}};
@@ -252,7 +252,7 @@ TEST(extrude, a_surface_of_two_sides_keeps_both) {
   for (const std::int32_t v : m.node_sets.at("rim")) EXPECT_NEAR(m.nodes_m[v][2], 0.05, 1e-6);
 }
 
-TEST(extrude, the_choice_follows_wall_and_elements_and_says_why) {
+TEST(extrude, automatic_method) {
   const Polygons ball = make_sphere(0.05, 4);
   SurfaceReport report;
   make(ball, {.wall_m = 0.004, .nodes = 9000}, report);  // edges of 7 mm
@@ -269,7 +269,7 @@ TEST(extrude, the_choice_follows_wall_and_elements_and_says_why) {
   EXPECT_EQ(linear.method, Method::kDelaunay);
 }
 
-TEST(extrude, holes_at_a_rim_stay_open) {
+TEST(extrude, holes_at_a_rim) {
   const auto tube = [](double u, double v) { return std::array{0.03 * std::cos(2 * kPi * u), 0.03 * std::sin(2 * kPi * u), 0.1 * v}; };
   const Polygons holed = make_grid(48, 24, tube, [](int i, int j) { return (j == 1 || j == 2) && i % 8 < 2; });
   SurfaceReport report;
@@ -282,7 +282,7 @@ TEST(extrude, holes_at_a_rim_stay_open) {
   EXPECT_NEAR(calc_volume_of(m) / (0.002 * (2 * kPi * 0.03 * 0.1 - 6 * hole)), 1, 2e-3);
 }
 
-TEST(extrude, what_is_no_wall_is_refused_with_place_and_reason) {
+TEST(extrude, refusals) {
   const auto plate = [](double u, double v) { return std::array{0.1 * u, 0.1 * v, 0.0}; };
   Polygons tee = make_grid(4, 4, plate), crossed = make_grid(5, 5, plate);
   const Polygons post = make_grid(4, 2, [](double u, double v) { return std::array{0.1 * u, 0.05, 0.05 * v}; });

@@ -1,4 +1,4 @@
-// Which sharp edges are the body's and which are noise, and what becomes of a scan.
+// Sharp edges of bodies against noise, and meshing of scans.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -54,7 +54,7 @@ Polygons make_fine_box(int n) {
   return s;
 }
 
-TEST(features, bodies_keep_their_edges_and_are_no_scans) {
+TEST(features, sharp_edges) {
   // Lengths in closed form. The cylinder's two rims are polygons of 48 sides, the letter's outline has 10 corners on either side.
   const double rims = 2 * 48 * 2 * 0.02 * std::sin(std::numbers::pi / 48);
   double outline = 0.2;
@@ -70,7 +70,7 @@ TEST(features, bodies_keep_their_edges_and_are_no_scans) {
   }
 }
 
-TEST(features, noise_of_a_scan_has_none) {
+TEST(features, noisy_scan) {
   for (const double roughness : {0.15, 0.2, 0.3, 0.45}) {
     const Polygons scan = roughen(make_sphere(0.05, 5), roughness);
     EXPECT_TRUE(is_scan(to_triangles(scan), kSharpDeg)) << roughness;
@@ -80,14 +80,14 @@ TEST(features, noise_of_a_scan_has_none) {
   EXPECT_FALSE(is_scan(to_triangles(make_sphere(0.05, 5)), kSharpDeg));
 }
 
-TEST(features, real_edges_come_out_of_light_noise) {
+TEST(features, edges_in_light_noise) {
   // Noise of 4 % of the squares: spurs grow on the edges, whose turn stays.
   const Polygons box = roughen(make_fine_box(16), 0.04);
   EXPECT_FALSE(is_scan(to_triangles(box), kSharpDeg));
   EXPECT_NEAR(calc_length(find_curves(box, 0.1)), 12, 0.6);
 }
 
-TEST(features, smoothing_takes_the_noise_and_leaves_the_body) {
+TEST(features, smoothing) {
   const double radius = 0.05;
   const Polygons ball = make_sphere(radius, 5);
   const auto calc_roughness = [&](const TriangleSurface& s) {  // root mean square of the distance from the ball
@@ -108,7 +108,7 @@ TEST(features, smoothing_takes_the_noise_and_leaves_the_body) {
   for (std::size_t v = 0; v < start.size(); ++v) EXPECT_LE(norm(bound.points[v] - start[v]), 1e-4 * (1 + 1e-9));
 }
 
-TEST(features, a_rough_scan_is_meshed_at_the_first_attempt_or_the_second) {
+TEST(features, rough_scan_attempts) {
   const double radius = 0.05, exact = 4 * std::numbers::pi / 3 * std::pow(radius, 3);
   const auto path = write_text("scan.off", to_off(roughen(make_sphere(radius, 5), 0.2)));
   for (const bool is_hollow : {false, true}) {
@@ -124,7 +124,7 @@ TEST(features, a_rough_scan_is_meshed_at_the_first_attempt_or_the_second) {
   }
 }
 
-TEST(features, closed_boundaries_that_touch_are_counted) {
+TEST(features, touching_boundaries) {
   const Polygons box = make_box(1, 1, 1);
   std::vector<Triangle> faces = to_triangles(box).triangles;
   EXPECT_EQ(count_pinches(faces), 0);
@@ -142,8 +142,8 @@ TEST(features, closed_boundaries_that_touch_are_counted) {
   EXPECT_GE(count_pinches(faces), 4);
 }
 
-/// The solid bunny, by height: how far its mesh's box falls short of it at the ears.
-TEST(features, ears_of_the_bunny_are_kept_and_stuffing_says_that_it_cuts_them) {
+/// Height deficit of the solid bunny's mesh at the ears.
+TEST(features, bunny_ears) {
   const std::filesystem::path bunny = "/usr/share/glmark2/models/bunny.obj";
   if (!std::filesystem::exists(bunny)) GTEST_SKIP() << "glmark2-data is not installed";
   const auto is_warned = [](const SurfaceReport& r) {
@@ -162,8 +162,8 @@ TEST(features, ears_of_the_bunny_are_kept_and_stuffing_says_that_it_cuts_them) {
   EXPECT_FALSE(is_warned(ball));
 }
 
-TEST(features, narrow_rims_need_no_search) {
-  // Steps of 1 to 2 mm on a body of 100 mm: their edges bring most of the nodes, which the model of the count does not know.
+TEST(features, narrow_rims) {
+  // Steps of 1 to 2 mm on a body of 100 mm: their edges add most of the nodes, not covered by the count model.
   std::vector<std::array<double, 2>> profile{{0.04, 0},    {0.04, 0.0015}, {0.042, 0.0015}, {0.042, 0.003},  {0.05, 0.003},
                                              {0.05, 0.06}, {0.048, 0.06},  {0.048, 0.0615}, {0.045, 0.0615}, {0.045, 0.063}};
   const auto path = write_text("rims.off", to_off(make_lathe(profile, 48, Cut::kDiagonal)));

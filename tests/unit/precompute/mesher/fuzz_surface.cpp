@@ -15,7 +15,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const mesher::Quiet quiet;
   try {
     auto surface = mesher::parse_surface({reinterpret_cast<const char*>(data) + 1, size - 1}, "fuzz", kFormats[data[0] % 6]);
-    // What repair costs grows with the triangles; the readers have been through by now.
+    // The cost of repair grows with the triangles; the readers are done by now.
     if (surface.triangles.size() > 300) return 0;
     mesher::SurfaceReport report;
     mesher::repair_surface(std::move(surface), {.surface = "fuzz"}, report);

@@ -1,4 +1,4 @@
-// glTF and GLB: what programs write is read as the same body as its OFF file, and whatever is wrong in one ends in one error.
+// glTF and GLB: files of common programs give the body of their OFF file; faults give one error.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -79,21 +79,21 @@ std::string find_error(const std::string& bytes, const std::string& format = "gl
   return "";
 }
 
-/// Nodes of which each is the child of the one before; the last has the mesh.
+/// Chain of child nodes; the last has the mesh.
 std::string make_chain(int count) {
   std::string nodes = "[";
   for (int n = 1; n < count; ++n) nodes += "{\"children\": [" + std::to_string(n) + "]}, ";
   return nodes + "{\"mesh\": 0}]";
 }
 
-TEST(Gltf, is_the_body_of_its_points_and_indices) {
+TEST(Gltf, points_and_indices) {
   const Polygons ball = make_sphere(0.5, 3);
   const TriangleSurface read_back = read(make_model(ball)), plain = to_triangles(ball);
   EXPECT_EQ(read_back.triangles, plain.triangles);
   for (std::size_t v = 0; v < plain.points.size(); ++v) EXPECT_LT(norm(read_back.points[v] - plain.points[v]), 1e-7);
 }
 
-TEST(Gltf, moves_meshes_with_their_nodes) {
+TEST(Gltf, node_transforms) {
   Model model = make_model(make_box(1, 2, 3));
   // Turned by 90 degrees about z, stretched by 2 along its own x, moved; inside a node that is moved too.
   model.nodes = R"([{"children": [1], "translation": [10, 0, 0]},
@@ -111,7 +111,7 @@ TEST(Gltf, moves_meshes_with_their_nodes) {
   model.nodes = R"([{"mesh": 0, "matrix": [0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 1, 0, 4, 0, 0, 1]}])";
   EXPECT_NEAR(calc_box(read(model).points).high[0], 4, 1e-6);
   EXPECT_NEAR(calc_volume(read(model)), 6, 1e-5);
-  // What the scene does not show is left out, and a mesh that two nodes show is there twice.
+  // Meshes outside the scene are ignored; a mesh used by two nodes is duplicated.
   model.nodes = R"([{"mesh": 0}, {"mesh": 0, "translation": [9, 0, 0]}])";
   EXPECT_EQ(read(model).triangles.size(), 12);
   model.scene = R"("scenes": [{"nodes": [0, 1]}])";
@@ -120,7 +120,7 @@ TEST(Gltf, moves_meshes_with_their_nodes) {
   EXPECT_EQ(read(model).triangles.size(), 12);
 }
 
-TEST(Gltf, reads_strips_fans_and_whole_numbers) {
+TEST(Gltf, strips_fans_and_integers) {
   Model strip;
   for (const auto& p : {Vec3{0, 0, 0}, Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{1, 1, 0}, Vec3{0, 2, 0}})
     for (const double x : p) put(strip.binary, static_cast<float>(x));
@@ -150,7 +150,7 @@ TEST(Gltf, reads_strips_fans_and_whole_numbers) {
   EXPECT_EQ(bytes.triangles.size(), 1);
 }
 
-TEST(Gltf, reads_text_with_its_buffer_inside_or_next_to_it) {
+TEST(Gltf, embedded_and_external_buffers) {
   const Model model = make_model(make_box(1, 1, 1));
   constexpr const char* kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   std::string base64;
@@ -177,7 +177,7 @@ TEST(Gltf, reads_text_with_its_buffer_inside_or_next_to_it) {
   EXPECT_THAT(find_error(model.json(), "gltf"), ::testing::HasSubstr("has no bytes"));
 }
 
-TEST(Gltf, refuses_what_bends_moves_or_is_compressed_in_a_sentence) {
+TEST(Gltf, refusals) {
   const Model box = make_model(make_box(1, 1, 1));
   const auto with = [&](const std::string& nodes, const std::string& primitive, const std::string& more) {
     Model model = box;
@@ -204,7 +204,7 @@ TEST(Gltf, refuses_what_bends_moves_or_is_compressed_in_a_sentence) {
            {with("", R"(, "extensions": {"KHR_draco_mesh_compression": {"bufferView": 0}})", ""), "without compression"},
            {with(R"([{"children": [1]}, {"children": [0], "mesh": 0}])", "", ""), "inside itself"},
            {with(make_chain(300), "", ""), "200 deep"},
-           {replace(R"("count": 36)", R"("count": 35)"), "35 corners, which are no whole number of triangles"},
+           {replace(R"("count": 36)", R"("count": 35)"), "35 corners, which is not a multiple of three"},
            {replace(R"("byteLength": 96)", R"("byteLength": 96, "byteStride": 0)"), "byteStride"},
            {replace(R"("byteLength": 96)", R"("byteLength": 96, "byteStride": 8)"), "a stride of 8 for 12 bytes"},
            {replace(R"("byteLength": 96)", R"("byteLength": 9223372036854775807)"), "byteLength"},
@@ -237,7 +237,7 @@ TEST(Gltf, refuses_what_bends_moves_or_is_compressed_in_a_sentence) {
               ::testing::HasSubstr("no triangles"));
 }
 
-TEST(Gltf, of_ten_million_triangles_is_refused_before_it_takes_memory) {
+TEST(Gltf, triangle_limit) {
   Model many;
   for (int i = 0; i < 9; ++i) put(many.binary, static_cast<float>(i % 4));
   many.points = 3;
@@ -246,7 +246,7 @@ TEST(Gltf, of_ten_million_triangles_is_refused_before_it_takes_memory) {
   EXPECT_THAT(find_error(to_glb(many.json(), many.binary)), ::testing::HasSubstr("more than 5,000,000 triangles; reduce it"));
 }
 
-TEST(Gltf, of_very_many_values_or_buffers_is_refused_before_it_takes_memory) {
+TEST(Gltf, value_and_buffer_limits) {
   Model box = make_model(make_box(1, 1, 1));
   box.nodes = R"([{"mesh": 0})";
   for (int n = 0; n < 3'000'000; ++n) box.nodes += ",{}";
@@ -257,7 +257,7 @@ TEST(Gltf, of_very_many_values_or_buffers_is_refused_before_it_takes_memory) {
               ::testing::AllOf(::testing::HasSubstr("buffers[1].byteLength"), ::testing::HasSubstr("more than 4 GiB")));
 }
 
-TEST(Gltf, cut_or_changed_at_any_byte_ends_in_a_surface_or_an_error) {
+TEST(Gltf, damaged_files) {
   const Model box = make_model(make_box(1, 1, 1));
   const std::string whole = to_glb(box.json(), box.binary);
   for (std::size_t n = 0; n < whole.size(); ++n) {

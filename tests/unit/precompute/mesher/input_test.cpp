@@ -1,4 +1,4 @@
-// What the mesher reads, repairs and refuses.
+// Reading, repairs and refusals of the mesher.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -15,7 +15,7 @@ namespace {
 
 using namespace testing;
 
-TEST(input, five_formats_give_the_same_body) {
+TEST(input, same_body_in_five_formats) {
   const Polygons box = make_box(0.5, 0.25, 0.125);  // exact in single precision
   const std::pair<const char*, std::string> files[] = {{"box.off", to_off(box)},
                                                        {"box.obj", to_obj(box)},
@@ -35,7 +35,7 @@ TEST(input, five_formats_give_the_same_body) {
   }
 }
 
-TEST(input, height_is_measured_along_the_chosen_axis_and_scale_multiplies) {
+TEST(input, height_and_scale) {
   const auto path = write_text("tall.obj", to_obj(make_box(1, 2, 4)));
   SurfaceReport report;
   mesh_surface({.surface = path, .height_m = 0.2, .nodes = 400}, report);
@@ -57,7 +57,7 @@ Polygons cut_sphere(double radius, int levels, double z) {
   return sphere;
 }
 
-TEST(input, a_small_hole_is_closed_and_said_with_its_size) {
+TEST(input, small_hole) {
   // A cap whose rim has a radius of about 12 mm, in a ball of 100 mm.
   SurfaceReport report;
   mesh_surface({.surface = write_text("hole.off", to_off(cut_sphere(0.05, 5, 0.0485))), .nodes = 1000}, report);
@@ -69,7 +69,7 @@ TEST(input, a_small_hole_is_closed_and_said_with_its_size) {
   EXPECT_NE(report.notes[0].find("1 hole was closed, 2"), std::string::npos) << report.notes[0];
 }
 
-TEST(input, a_large_hole_is_refused_unless_it_is_to_be_closed) {
+TEST(input, large_hole) {
   // A rim of 60 mm in a ball of 100 mm.
   const auto path = write_text("large_hole.off", to_off(cut_sphere(0.05, 5, 0.04)));
   SurfaceReport report;
@@ -97,7 +97,7 @@ TEST(input, a_large_hole_is_refused_unless_it_is_to_be_closed) {
   EXPECT_NEAR(report.volume_m3, 1, 1e-3);
 }
 
-TEST(input, the_body_as_meshed_has_the_height_asked_for) {
+TEST(input, meshed_height) {
   // A coarse torus: the smooth surface through its corners bulges beyond them. On its side its height is that of the outer circle.
   const auto torus = write_text("tall_torus.off", to_off(make_torus(0.05, 0.015, 12, 8)));
   for (const auto& [axis, wall] : {std::pair{Axis::kX, 0.0}, std::pair{Axis::kZ, 0.0}, std::pair{Axis::kY, 0.006}}) {
@@ -112,7 +112,7 @@ TEST(input, the_body_as_meshed_has_the_height_asked_for) {
   }
 }
 
-TEST(input, mixed_orientation_duplicate_and_degenerate_triangles_are_repaired) {
+TEST(input, triangle_repair) {
   Polygons box = make_box(1, 1, 1);
   for (const int f : {1, 4, 9}) std::swap(box.faces[f][0], box.faces[f][1]);
   box.faces.push_back(box.faces[0]);
@@ -124,7 +124,7 @@ TEST(input, mixed_orientation_duplicate_and_degenerate_triangles_are_repaired) {
   EXPECT_NEAR(report.volume_m3, 1, 1e-3);
 }
 
-TEST(input, an_inside_out_surface_is_turned) {
+TEST(input, inverted_surface) {
   Polygons box = make_box(1, 1, 1);
   for (auto& f : box.faces) std::swap(f[0], f[1]);
   SurfaceReport report;
@@ -133,7 +133,7 @@ TEST(input, an_inside_out_surface_is_turned) {
   EXPECT_NEAR(report.volume_m3, 1, 1e-3);
 }
 
-TEST(input, two_boxes_that_pass_through_each_other_are_one_body) {
+TEST(input, intersecting_boxes) {
   Polygons both = make_box(1, 1, 1);
   for (auto p : make_box(1, 1, 1).points) both.points.push_back({p[0] + 0.5, p[1] + 0.25, p[2] + 0.25});
   for (auto f : make_box(1, 1, 1).faces) {
@@ -145,7 +145,7 @@ TEST(input, two_boxes_that_pass_through_each_other_are_one_body) {
   EXPECT_NEAR(report.volume_m3, 2 - 0.5 * 0.75 * 0.75, 0.04);
 }
 
-TEST(input, a_closed_cavity_stays_hollow) {
+TEST(input, closed_cavity) {
   Polygons both = make_box(1, 1, 1);
   for (auto p : make_box(0.5, 0.5, 0.5).points) both.points.push_back({p[0] + 0.25, p[1] + 0.25, p[2] + 0.25});
   for (auto f : make_box(1, 1, 1).faces) {
@@ -169,7 +169,7 @@ Polygons join_boxes(const Polygons& a, Polygons b, double x, double y, double z)
   return both;
 }
 
-TEST(input, bodies_that_lie_apart_or_touch_along_an_edge_are_meshed) {
+TEST(input, separate_and_touching_bodies) {
   const Polygons cube = make_box(1, 1, 1);
   SurfaceReport report;
   mesh_surface({.surface = write_text("apart.off", to_off(join_boxes(cube, cube, 3, 0, 0))), .nodes = 500}, report);
@@ -179,7 +179,7 @@ TEST(input, bodies_that_lie_apart_or_touch_along_an_edge_are_meshed) {
   EXPECT_NEAR(report.volume_m3, 2, 0.02);
 }
 
-TEST(input, sizes_from_nanometres_to_megametres_are_meshed_alike) {
+TEST(input, size_independence) {
   for (const double size : {1e-9, 1e6}) {
     SurfaceReport report;
     mesh_surface({.surface = write_text("size.off", to_off(make_box(size, size, size))), .nodes = 300}, report);
@@ -187,7 +187,7 @@ TEST(input, sizes_from_nanometres_to_megametres_are_meshed_alike) {
   }
 }
 
-TEST(input, nothing_but_files_is_read) {
+TEST(input, not_a_regular_file) {
   const auto folder = get_path("folder.off");
   std::filesystem::create_directories(folder);
   const auto device = get_path("device.off");
@@ -204,8 +204,8 @@ TEST(input, nothing_but_files_is_read) {
   }
 }
 
-TEST(input, a_letter_with_sharp_corners_is_meshed_or_refused_with_the_count_it_needs) {
-  // Its corners ask for some 370 nodes. Fewer once made the search continue without end, with ever shorter edges.
+TEST(input, letter_with_sharp_corners) {
+  // Its corners need some 370 nodes. Regression: fewer made the search continue without end, with ever shorter edges.
   const std::filesystem::path file = write_text("letter.obj", to_obj(make_letter_n()));
   for (const long long nodes : {60, 100, 200}) {
     SurfaceReport report;
@@ -222,8 +222,8 @@ TEST(input, a_letter_with_sharp_corners_is_meshed_or_refused_with_the_count_it_n
   EXPECT_NEAR(report.volume_m3, 0.2 * (2 * 0.2 * 1.0 + 0.3 * 0.45), 1e-6);
 }
 
-TEST(input, boxes_with_one_corner_moved_hardly_or_kilometres_away_are_meshed_or_refused) {
-  // Each of these once ended in a signal: in the search for a count, where balls were placed on a slit; and in the test of the nesting.
+TEST(input, displaced_corners) {
+  // Regression: each caused a signal, in the count search (balls on a slit) and in the nesting test.
   Polygons slit = make_box(0.1, 0.05, 0.03), hair = slit, far = slit;
   slit.points.push_back({0, 0.05, -4.16333625e-19});  // the far corner of a triangle of the lid, on the floor
   slit.faces[3][2] = 8;
@@ -259,7 +259,7 @@ TEST(input, boxes_with_one_corner_moved_hardly_or_kilometres_away_are_meshed_or_
   }
 }
 
-TEST(input, a_soup_of_few_triangles_is_wrapped_by_few) {
+TEST(input, small_soup_wrap) {
   // A box whose faces name the wrong corners. Finer wraps of it have 25,000 triangles and take seconds.
   const std::string soup =
       "v 0.1 0 0\nv 0 0.05 0\nv 0.1 0.05 0\nv 0 0 0.03\nv 0.1 0 0.03\nv 0 0 0.03\nv 0 0.05 0.03\nv 0.1 0.05 0.03\n"
@@ -271,7 +271,7 @@ TEST(input, a_soup_of_few_triangles_is_wrapped_by_few) {
   EXPECT_GT(calc_volume(repaired.surface), 0.0);
 }
 
-TEST(input, what_cannot_be_meshed_is_refused_with_the_reason) {
+TEST(input, refusals) {
   const std::string box = to_off(make_box(1, 1, 1));
   Polygons open = make_box(1, 1, 1);
   open.faces.resize(10);

@@ -1,4 +1,4 @@
-// The readers of surfaces: what legal files may look like, and that no bytes make them do anything but read or refuse.
+// Surface readers: variants of valid files, and safety for arbitrary bytes.
 #include <gtest/gtest.h>
 
 #include <bit>
@@ -41,7 +41,7 @@ std::string with_ends(const std::string& text, const std::string& end) {
 const Polygons kBox = make_box(0.5, 0.25, 0.125);
 const double kVolume = 0.5 * 0.25 * 0.125;
 
-TEST(readers, line_ends_blanks_and_comments_change_nothing) {
+TEST(readers, line_ends_blanks_and_comments) {
   const std::pair<const char*, std::string> files[] = {
       {"obj", to_obj(kBox)}, {"off", to_off(kBox)}, {"ply", to_ply(kBox)}, {"stl", to_stl(kBox)}};
   for (const auto& [format, text] : files)
@@ -58,7 +58,7 @@ TEST(readers, line_ends_blanks_and_comments_change_nothing) {
   EXPECT_NEAR(volume_of(replaced(to_off(kBox), "OFF", "COFF"), "off"), kVolume, 1e-12);
 }
 
-TEST(readers, obj_counts_backwards_continues_lines_and_has_slashes) {
+TEST(readers, obj_syntax) {
   const std::string text =
       "mtllib a.mtl\nv 0 0 0 1.0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvn 0 0 1\nf 1/2/3 3//1 2\nf 1 2 4 # a side\nf -3 \\\n -2 -1\nf 1 4 3\nl 1 "
       "2\ns off\n";
@@ -95,12 +95,12 @@ std::string to_rich_ply(const Polygons& s, bool big, const char* index_type) {
   return out;
 }
 
-TEST(readers, ply_of_either_byte_order_with_other_properties_gives_the_box) {
+TEST(readers, binary_ply) {
   for (const bool big : {false, true})
     for (const char* type : {"ushort", "uint"}) EXPECT_NEAR(volume_of(to_rich_ply(kBox, big, type), "ply"), kVolume, 1e-12);
 }
 
-TEST(readers, ply_refuses_with_the_line_or_byte) {
+TEST(readers, ply_refusals) {
   const std::pair<std::string, const char*> cases[] = {
       {"ply\nformat ascii 1.0\nproperty float x\nend_header\n", "body.ply:3: a property before the first element"},
       {"ply\nelement vertex 0\nend_header\n", "has no format"},
@@ -122,7 +122,7 @@ TEST(readers, ply_refuses_with_the_line_or_byte) {
     EXPECT_NE(refusal(text, "ply").find(words), std::string::npos) << words << ": " << refusal(text, "ply");
 }
 
-TEST(readers, stl_is_text_or_binary_by_its_content) {
+TEST(readers, stl_detection) {
   std::string named = to_binary_stl(kBox);
   named.replace(0, 5, "solid");
   EXPECT_NEAR(volume_of(named, "stl"), kVolume, 1e-9);  // a header that begins as text does
@@ -141,7 +141,7 @@ TEST(readers, stl_is_text_or_binary_by_its_content) {
   EXPECT_NE(refusal(infinite, "stl").find("byte 104: the coordinate inf of triangle 1"), std::string::npos) << refusal(infinite, "stl");
 }
 
-TEST(readers, every_beginning_of_every_file_is_read_or_refused) {
+TEST(readers, truncated_files) {
   const std::pair<const char*, std::string> files[] = {{"obj", to_obj(kBox)},
                                                        {"off", to_off(kBox)},
                                                        {"ply", to_ply(kBox)},
@@ -159,8 +159,8 @@ TEST(readers, every_beginning_of_every_file_is_read_or_refused) {
     }
 }
 
-TEST(readers, points_that_differ_by_rounding_alone_are_one) {
-  // A corner that is 1.8e-42 off in one triangle once became a slit, a second sharp edge in the same place, and a crash of the mesher.
+TEST(readers, points_equal_to_rounding) {
+  // Regression: a corner 1.8e-42 off in one triangle became a slit, a duplicate sharp edge, and a crash of the mesher.
   Polygons box = make_box(0.1, 0.05, 0.03);
   box.points.push_back({0, 0, 1.793662034335766e-42});
   for (int& v : box.faces[4])
@@ -173,7 +173,7 @@ TEST(readers, points_that_differ_by_rounding_alone_are_one) {
   EXPECT_NEAR(report.volume_m3, 0.1 * 0.05 * 0.03, 1e-9);
 }
 
-TEST(readers, parts_that_lie_in_each_other_in_any_order_are_distinguished_from_bodies) {
+TEST(readers, nested_parts) {
   const auto make = [](const Polygons& s, double shift) {
     TriangleSurface out;
     for (const auto& p : s.points) out.points.push_back({p[0] + shift, p[1] + shift, p[2] + shift});

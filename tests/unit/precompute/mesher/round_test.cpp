@@ -1,5 +1,4 @@
-// The smooth surface through the corners of facets, against bodies known in closed form, however they are cut; and bodies of planes, which
-// stay as they are.
+// Smooth surface through facet corners, against closed-form bodies in various triangulations; planar bodies stay unchanged.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -30,7 +29,7 @@ struct Kind {
   const char* name;
   std::function<Profile(int)> make;  // of so many rings
   double volume;
-  double max;  // of what the facets lack of the volume, that the smooth surface may be off
+  double max;  // largest volume error of the smooth surface, over the facets' deficit
   bool is_closed = false;
   int min_rings = 1;
 };
@@ -73,7 +72,7 @@ const std::vector<Kind>& list_kinds() {
   return kinds;
 }
 
-TEST(Round, the_volume_is_that_of_the_smooth_body_however_it_is_cut) {
+TEST(Round, smooth_volume) {
   for (const Kind& kind : list_kinds())
     for (const int sides : {16, 24, 32, 64, 128})
       for (const int rings : {1, 4, 8, 16, 32})
@@ -91,7 +90,7 @@ TEST(Round, the_volume_is_that_of_the_smooth_body_however_it_is_cut) {
         }
 }
 
-TEST(Round, the_cut_surface_encloses_the_same_volume_and_its_points_lie_on_the_body) {
+TEST(Round, cut_surface) {
   RoundSurface round(to_triangles(make_lathe(list_kinds()[0].make(3), 24, Cut::kQuads)), kSharpDeg);
   EXPECT_NEAR(calc_cut_volume(round) / round.calc_volume(), 1, 1e-6);
   const TriangleSurface cut = round.cut(3);
@@ -122,7 +121,7 @@ double calc_turned_volume(const Profile& p) {
   return sum;
 }
 
-TEST(Round, long_panels_next_to_the_short_ones_of_an_arc_stay_straight_along_and_are_round_across) {
+TEST(Round, long_panels_at_an_arc) {
   const double exact = calc_turned_volume(make_bottle(4000, 1));
   for (const int rings : {1, 5})
     for (const int sides : {16, 24, 64}) {
@@ -131,7 +130,7 @@ TEST(Round, long_panels_next_to_the_short_ones_of_an_arc_stay_straight_along_and
     }
 }
 
-TEST(Round, the_last_ring_before_a_rim_is_as_round_as_the_others) {
+TEST(Round, ring_at_a_rim) {
   for (const int rings : {4, 8}) {
     const Profile p = make_profile(rings, [](double t) { return std::array{t == 0 ? 0.0 : std::sin(pi / 2 * t), -std::cos(pi / 2 * t)}; });
     const RoundSurface round(to_triangles(make_lathe(p, 32, Cut::kDiagonal)), kSharpDeg);
@@ -185,7 +184,7 @@ void expect_flat(const Polygons& body, const std::string& name, bool may_be_doub
   }
 }
 
-TEST(Round, bodies_of_planes_keep_them) {
+TEST(Round, planar_bodies) {
   expect_flat(make_box(3, 2, 1), "box");
   expect_flat(make_letter_n(), "letter");
   for (const int n : {3, 4, 5, 6, 7}) expect_flat(make_prism(make_polygon(n), 3), "prism of " + std::to_string(n));
@@ -201,8 +200,8 @@ TEST(Round, bodies_of_planes_keep_them) {
     expect_flat(make_prism({{-1, -1}, {1, -1}, {1, 0}, {0, height}, {-1, 0}}, 3), "roof " + std::to_string(height));
 }
 
-TEST(Round, facets_that_may_be_either_are_named_and_both_readings_are_known) {
-  // Eight sides stay planes, twelve become round; the way to the other reading leads from one to the other.
+TEST(Round, ambiguous_facets) {
+  // Eight sides stay planes, twelve become round; the offset leads from one reading to the other.
   for (const int sides : {8, 9, 10, 12, 14}) {
     RoundSurface round(to_triangles(make_prism(make_polygon(sides), 3)), kSharpDeg);
     ASSERT_TRUE(round.is_doubtful()) << sides;
@@ -226,7 +225,7 @@ TEST(Round, facets_that_may_be_either_are_named_and_both_readings_are_known) {
   EXPECT_NEAR(fillet.calc_volume() / (10 * (24 - (4 - pi) * 0.16)), 1, 1e-5);
 }
 
-TEST(Round, facets_whose_smooth_surface_would_run_through_itself_stay_and_leave_a_doubt) {
+TEST(Round, self_intersecting_smooth_surface) {
   // A rod of 16 sides whose facet looks at a block, nearer than the arc over the facet is high: the round rod would be inside the block.
   const int sides = 16;
   const double radius = 0.02, length = 0.06, low = radius * std::cos(pi / sides), gap = 0.4 * (radius - low);
@@ -266,7 +265,7 @@ TEST(Round, facets_whose_smooth_surface_would_run_through_itself_stay_and_leave_
   EXPECT_GT(on_side, 50);
 }
 
-TEST(Round, nodes_of_meshes_lie_on_the_smooth_skins) {
+TEST(Round, nodes_on_smooth_skins) {
   const double radius = 0.01, length = 0.03, wall = 0.003;
   const auto file = write_text("lathe.obj", to_obj(make_lathe({{radius, 0}, {radius, 0.01}, {radius, length}}, 24, Cut::kQuads)));
   for (const SurfaceOptions& options :

@@ -62,7 +62,7 @@ Polygons make_sheet(double x, double y, double z, double low_x = 0, bool faces_d
   return sheet;
 }
 
-TEST(seams, a_box_whose_faces_were_cut_one_by_one_is_the_box) {
+TEST(seams, box_of_separate_faces) {
   for (const Counts& counts : {kMatching, kDiffering})
     for (const double jitter : {0.0, 1e-9, 5e-8, 1e-6}) {
       const Polygons box = make_box_of_faces({0, 0, 0}, {0.1, 0.06, 0.02}, counts, jitter);
@@ -82,7 +82,7 @@ TEST(seams, a_box_whose_faces_were_cut_one_by_one_is_the_box) {
     }
 }
 
-TEST(seams, what_was_joined_is_said) {
+TEST(seams, report_of_joined_borders) {
   SurfaceReport report;
   mesh_surface(
       {.surface = write_text("s.obj", to_obj(make_box_of_faces({0, 0, 0}, {100, 60, 20}, kMatching, 1e-4))), .scale = 1e-3, .nodes = 500},
@@ -94,7 +94,7 @@ TEST(seams, what_was_joined_is_said) {
   EXPECT_NE(report.notes.back().find("72 borders"), std::string::npos) << report.notes.back();
 }
 
-TEST(seams, a_closed_plate_as_thin_as_a_seam_keeps_its_thickness) {
+TEST(seams, thin_closed_plate) {
   for (const double thickness : {1e-5, 2e-6, 5e-7}) {  // of 0.1 m; seams are joined up to 3.5e-6
     TriangleSurface surface =
         read_surface(write_text("foil.obj", to_obj(make_box_of_faces({0, 0, 0}, {0.1, 0.06, thickness}, kMatching, 1e-10))));
@@ -104,7 +104,7 @@ TEST(seams, a_closed_plate_as_thin_as_a_seam_keeps_its_thickness) {
   }
 }
 
-TEST(seams, sheets_near_each_other_stay_apart) {
+TEST(seams, nearby_sheets) {
   const double gap = 2e-6;  // below the tolerance
   const SurfaceLook facing =
       look_at_surface(write_text("facing.obj", to_obj(join(make_sheet(0.1, 0.06, 0), make_sheet(0.1, 0.06, gap, 0, true)))));
@@ -116,14 +116,14 @@ TEST(seams, sheets_near_each_other_stay_apart) {
   EXPECT_EQ(neighbours.seam_edges, 0);
 }
 
-TEST(seams, patches_of_a_sheet_become_one) {
+TEST(seams, sheet_patches) {
   const SurfaceLook look =
       look_at_surface(write_text("two.obj", to_obj(join(make_sheet(0.05, 0.06, 0), make_sheet(0.05, 0.06, 2e-7, 0.05)))));
   EXPECT_EQ(look.parts, 1);
   EXPECT_EQ(look.openings, 1);
 }
 
-TEST(seams, bodies_are_counted_by_what_hangs_together) {
+TEST(seams, body_count) {
   const auto count = [](const Polygons& polygons) { return look_at_surface(write_text("bodies.stl", to_binary_stl(polygons))).parts; };
   const auto make = [](double x, double size) { return make_box_of_faces({x, x, x}, {size, size, size}, kMatching, 0); };
   EXPECT_EQ(count(make(0, 1)), 1);
@@ -133,7 +133,7 @@ TEST(seams, bodies_are_counted_by_what_hangs_together) {
   EXPECT_EQ(count(join(join(make(0, 4), make(1, 2)), make(1.5, 0.5))), 2) << "a body in a cavity";
 }
 
-TEST(seams, points_without_a_triangle_are_no_part_of_the_body) {
+TEST(seams, unused_points) {
   Polygons box = make_box(0.1, 0.06, 0.02);
   box.points.insert(box.points.begin(), {5e5, 0, 0});
   for (auto& face : box.faces)

@@ -1,4 +1,4 @@
-// Surfaces whose volumes are known, and files of them.
+// Surfaces of known volume, and files of them.
 #pragma once
 
 #include <unistd.h>
@@ -64,7 +64,7 @@ inline Polygons make_sphere(double radius, int levels) {
   return s;
 }
 
-/// As a scanner leaves it: every point off its place by `roughness` times the mean edge, in the mean square along each axis.
+/// Scan noise: displaces every point by `roughness` times the mean edge (RMS per axis).
 inline Polygons roughen(Polygons s, double roughness, unsigned seed = 1) {
   double length = 0;
   std::size_t edges = 0;
@@ -151,7 +151,7 @@ inline Polygons make_filleted_bar(double a, double b, double fillet, double leng
   return make_prism(outline, length);
 }
 
-/// How the panels of a body of revolution are cut.
+/// Triangulation of the panels of a body of revolution.
 enum class Cut { kQuads, kDiagonal, kOtherDiagonal, kAlternating, kTurned };  // kTurned: every second ring by half a panel, triangles
 
 /// The body of revolution around z of a profile (r, z) that runs upwards, in n panels; r = 0 is a pole. `is_closed`: the profile is a loop

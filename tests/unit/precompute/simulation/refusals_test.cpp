@@ -1,4 +1,4 @@
-// Jobs that cannot be simulated: one error that names file and line, the same with --validate, and no file more than before.
+// Invalid jobs: one error with file and line, the same with --validate, and no output files.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -21,7 +21,7 @@ constexpr std::string_view kMaterial =
     R"("material": {"young_modulus_pa": 70e9, "poisson_ratio": 0.33, "density_kg_m3": 2700,
                  "damping": {"rayleigh": {"alpha1_s": 1e-8, "alpha2_per_s": 2}}})";
 constexpr std::string_view kOutputs = R"(, "sound": "bar.wav", "record": "bar.json")";
-/// A cantilever, struck at its free end; and a square sheet that is held along its rim.
+/// A cantilever struck at its free end, and a square sheet clamped along its rim.
 const std::string kBar = fmt::format(R"({{
   "simulate": {{
     "duration_s": 0.002,
@@ -49,12 +49,12 @@ const std::string kPlate = fmt::format(R"({{
 
 struct Refusal {
   std::string name;
-  std::string_view job, from, to;  // the first `from` of a good job becomes `to`
-  std::string_view words;          // in the message
+  std::string_view job, from, to;  // replaces the first `from` of a valid job by `to`
+  std::string_view words;          // part of the message
   bool names_line = true;
 };
 
-/// The name of the bar, and its drive.
+/// Name of the bar, and its drive.
 std::string add_drive(std::string_view path, std::string_view node_set) {
   return fmt::format(R"("name": "bar", "drive": [{{"node_set": "{}", "path": [{}]}}])", node_set, path);
 }
@@ -97,9 +97,9 @@ std::string spoil(const Refusal& refusal) {
   return text.replace(std::min(at, text.size()), refusal.from.size(), refusal.to);
 }
 
-TEST(RefusedJobs, one_error_names_file_and_line_and_nothing_is_written) {
+TEST(RefusedJobs, one_error_without_output) {
   const auto& world = comm::world();
-  const tests::Folder own;  // all ranks use that of rank 0
+  const tests::Folder own;  // all ranks use rank 0's
   const std::filesystem::path folder = world.broadcast(own.path().string());
   for (const Refusal& refusal : list_refusals()) {
     const std::filesystem::path job = folder / "job.json";
@@ -125,8 +125,8 @@ TEST(RefusedJobs, one_error_names_file_and_line_and_nothing_is_written) {
   }
 }
 
-/// A step longer than stable is only a limit.
-TEST(RefusedJobs, a_long_step_is_none) {
+/// A step longer than the stable one is only an upper limit.
+TEST(RefusedJobs, long_step_accepted) {
   const auto& world = comm::world();
   const tests::Folder own;
   const std::filesystem::path job = std::filesystem::path(world.broadcast(own.path().string())) / "job.json";

@@ -14,7 +14,7 @@
 namespace carillon::simulation {
 namespace {
 
-/// A cantilever along x, heard 0.5 m above it; `body` and `scene` are further keys, `others` further bodies.
+/// A cantilever along x with a receiver 0.5 m above; `body` and `scene` are further keys, `others` further bodies.
 std::string make_scene(const std::string& body, const std::string& scene, const std::string& others = "", double duration_s = 0.004) {
   return fmt::format(R"({{"simulate": {{
     "duration_s": {}, "bodies": [
@@ -55,7 +55,7 @@ Record play(const std::string& scene) {
 constexpr const char* kBlow =
     R"(, "impulses": [{"time_s": 0.001, "body": "bar", "point_m": [0.05, 0, 0.005], "impulse_n_s": [0, 0, -0.001]}])";
 
-TEST(Walls, ObstaclesStrikersAndSilentBodiesHideWhatLiesBehindThem) {
+TEST(Walls, OccludersOfAllKinds) {
   const auto hear = [](const std::string& scene, const std::string& others = "", const std::string& radiation = "rayleigh") {
     return play(make_scene("", fmt::format(R"({}, "radiation": "{}"{})", kBlow, radiation, scene), others)).peak_pa;
   };
@@ -74,21 +74,21 @@ TEST(Walls, ObstaclesStrikersAndSilentBodiesHideWhatLiesBehindThem) {
   EXPECT_TRUE(is(hear(R"(, "strikers": [{"sphere_m": 0.2, "mass_kg": 1, "position_m": [0, 0, 0.25]}])"), 0.0));
   EXPECT_TRUE(is(hear("", plate(0, R"("sounds": false,)")), 0.0));
   EXPECT_TRUE(is(hear(R"(, "obstacles": [{"box": {"min": [-1, -1, 0.2], "max": [1, 1, 0.3]}}])", "", "paper2001"), 0.0));
-  // An obstacle next to the way, behind the microphone, and without visibility.
+  // Obstacle off the line of sight, behind the microphone, and without visibility.
   EXPECT_TRUE(is(hear(R"(, "obstacles": [{"box": {"min": [0.2, -1, 0.2], "max": [1, 1, 0.3]}}])"), free));
   EXPECT_TRUE(is(hear(R"(, "obstacles": [{"box": {"min": [-1, -1, 0.6], "max": [1, 1, 0.7]}}])"), free));
   EXPECT_TRUE(is(hear("", plate(0.6, R"("sounds": false,)")), free));
   EXPECT_GT(hear(R"(, "visibility": false, "obstacles": [{"box": {"min": [-1, -1, 0.2], "max": [1, 1, 0.3]}}])") + (is_root ? 0.0 : 1.0),
             0.5 * free);
-  // A microphone inside the obstacle.
+  // Microphone inside the obstacle.
   const Record deaf = play(make_scene(
       "", fmt::format(R"({}, "radiation": "rayleigh", "obstacles": [{{"sphere": {{"centre_m": [0, 0, 0.5], "radius_m": 0.1}}}}])", kBlow)));
   EXPECT_TRUE(!is_root || (deaf.peak_pa == 0.0 && deaf.warnings == 1)) << deaf.warnings;
 }
 
-TEST(Walls, KirchhoffHasNoVisibility) { EXPECT_THROW(play(make_scene("", R"(, "visibility": true)")), InputError); }
+TEST(Walls, KirchhoffWithoutVisibility) { EXPECT_THROW(play(make_scene("", R"(, "visibility": true)")), InputError); }
 
-TEST(Bent, ABodyThatIsLetGoSoundsAndPutsNothingIn) {
+TEST(Bent, ReleasedBody) {
   const bool is_root = comm::world().is_root();
   // Bent by a force, a mode, and a displaced end; no work after the start.
   for (
@@ -116,7 +116,7 @@ TEST(Bent, ABodyThatIsLetGoSoundsAndPutsNothingIn) {
   }
 }
 
-TEST(Bent, DrivenNodesAreReleased) {
+TEST(Bent, ReleaseOfDrivenNodes) {
   const Record record =
       play(make_scene(R"(, "drive": [{"node_set": "x-max", "path": [[0, 0, 0, 0], [0.001, 0, 0, -1e-5]], "release_s": 0.0015}])", ""));
   if (!comm::world().is_root()) return;

@@ -12,8 +12,8 @@
 
 #include "runtime/physics/world.hpp"
 #include "tests/unit/runtime/physics/checks.hpp"
-#include "tests/unit/runtime/physics/solids.hpp"
 #include "tests/unit/runtime/physics/geometry/solids.hpp"
+#include "tests/unit/runtime/physics/solids.hpp"
 
 namespace carillon::physics::tests {
 

@@ -38,7 +38,7 @@ INSTANTIATE_TEST_SUITE_P(Sizes, DroppedBall,
                                          std::tuple{0.25, 1.0, 0.6}, std::tuple{0.03, 0.01, 0.5}, std::tuple{0.03, 0.3, 0.0},
                                          std::tuple{0.03, 5.0, 0.95}));
 
-TEST_P(DroppedBall, TouchesAndBouncesAtTheTimesOfTheClosedForm) {
+TEST_P(DroppedBall, ContactAndBounceTimesOfClosedForm) {
   const auto [radius, height, e] = GetParam();
   const bank::Bank ball = make_ball(radius);
   const double first = std::sqrt(2 * height / kGravity), v = kGravity * first;
@@ -67,7 +67,7 @@ TEST_P(DroppedBall, TouchesAndBouncesAtTheTimesOfTheClosedForm) {
   }
 }
 
-TEST(Ball, BouncesToTheHeightThatItsRestitutionGives) {
+TEST(Ball, BounceHeightByRestitution) {
   const bank::Bank ball = make_ball(0.03);
   const Simulation s = simulate(make_ground_world(make_body("ball", ball, {0, 0, 0.53}, 0.7)), 0.75);
   double highest = 0.0;
@@ -77,7 +77,7 @@ TEST(Ball, BouncesToTheHeightThatItsRestitutionGives) {
   EXPECT_NEAR(highest, 0.49 * 0.5, 1e-3);
 }
 
-TEST(Ball, LastsAsLongAsHertzSaysForBothMaterials) {
+TEST(Ball, HertzDurationForTwoMaterials) {
   // Johnson (1985) 11.24: 2.87 (m^2 / (R E*^2 v))^(1/5), ball on a flat.
   const double radius = 0.03;
   const bank::Bank ball = make_ball(radius, 5);
@@ -92,7 +92,7 @@ TEST(Ball, LastsAsLongAsHertzSaysForBothMaterials) {
   EXPECT_NEAR(s.impulses[0].duration_s, expected, 0.03 * expected);
 }
 
-TEST(Ball, IsSilentInFreeFlight) {
+TEST(Ball, SilenceInFreeFlight) {
   const bank::Bank ball = make_ball(0.03);
   WorldSpec w;
   w.bodies = {make_body("ball", ball, {0, 0, 1})};
@@ -106,7 +106,7 @@ TEST(Ball, IsSilentInFreeFlight) {
   EXPECT_NEAR(end.position_m[2], 1 + 2 - 0.5 * kGravity, 1e-6);
 }
 
-TEST(Ball, ThrownAslantIsBrakedAgainstItsSlidingWithinTheFrictionCone) {
+TEST(Ball, ObliqueImpactWithinFrictionCone) {
   const bank::Bank ball = make_ball(0.03);
   WorldSpec w = make_ground_world(make_body("ball", ball, {0, 0, 0.33}), 0.2);
   w.bodies[0].velocity_m_s = {3, 1, 0};
@@ -119,7 +119,7 @@ TEST(Ball, ThrownAslantIsBrakedAgainstItsSlidingWithinTheFrictionCone) {
   EXPECT_LT(j[0], 0.0);
 }
 
-TEST(Ball, ThatGripsRollsOnWithFiveSeventhsOfItsSpeed) {
+TEST(Ball, RollingAtFiveSeventhsAfterGrip) {
   // A ball that lands sliding and sticks: angular momentum about the contact gives v = 5/7 v0.
   const bank::Bank ball = make_ball(0.03);
   WorldSpec w = make_ground_world(make_body("ball", ball, {0, 0, 0.33}), 2.0);
@@ -129,7 +129,7 @@ TEST(Ball, ThatGripsRollsOnWithFiveSeventhsOfItsSpeed) {
   EXPECT_NEAR(impulse_in_world(s, s.impulses[0])[0], -2.0 / 7.0 * 0.7 * ball.rigid.mass_kg, 1e-3 * ball.rigid.mass_kg);
 }
 
-TEST(Ball, RollsInSilence) {
+TEST(Ball, SilentRolling) {
   const bank::Bank ball = make_ball(0.03);
   WorldSpec w = make_ground_world(make_body("ball", ball, {0, 0, 0.03}));
   w.bodies[0].velocity_m_s = {0.5, 0, 0};
@@ -142,7 +142,7 @@ TEST(Ball, RollsInSilence) {
 class Resting : public testing::TestWithParam<double> {};
 INSTANTIATE_TEST_SUITE_P(Sizes, Resting, testing::Values(0.02, 0.1, 0.5));
 
-TEST_P(Resting, BoxIsSilentFromTheStart) {
+TEST_P(Resting, SilentBoxAtRest) {
   const double size = GetParam();
   const bank::Bank box = make_box({size, 0.8 * size, 0.5 * size}, {4, 4, 2});
   const Simulation s = simulate(make_ground_world(make_body("box", box, {0, 0, 0.25 * size})), 2.0);
@@ -151,7 +151,7 @@ TEST_P(Resting, BoxIsSilentFromTheStart) {
   EXPECT_NEAR(s.poses[0].back().position_m[0], 0.0, 1e-4);
 }
 
-TEST_P(Resting, BoxComesToRestAndThenIsSilentForGood) {
+TEST_P(Resting, SilenceAfterComingToRest) {
   const double size = GetParam();
   const bank::Bank box = make_box({size, 0.8 * size, 0.5 * size});
   WorldSpec w = make_ground_world(make_body("box", box, {0, 0, 1.5 * size}));
@@ -163,7 +163,7 @@ TEST_P(Resting, BoxComesToRestAndThenIsSilentForGood) {
   EXPECT_LT(s.impulses.size(), 150U) << "a machine-gun";
 }
 
-TEST_P(Resting, NoEnergyIsGainedOnTheWayThere) {
+TEST_P(Resting, NoEnergyGain) {
   const double size = GetParam();
   const bank::Bank box = make_box({size, 0.8 * size, 0.5 * size});
   WorldSpec w = make_ground_world(make_body("box", box, {0, 0, 2 * size}, 0.8));
@@ -183,7 +183,7 @@ TEST_P(Resting, NoEnergyIsGainedOnTheWayThere) {
   EXPECT_LT(energies.back().energy_j, 0.9 * energies.front().energy_j);
 }
 
-TEST(Simulate, GivesTheSameBitsTwice) {
+TEST(Simulate, Determinism) {
   const bank::Bank box = make_box({0.1, 0.06, 0.04});
   WorldSpec w = make_ground_world(make_body("box", box, {0, 0, 0.3}));
   w.bodies[0].initial.rotation = {0.9, 0.3, 0.2, 0.1};
@@ -198,7 +198,7 @@ TEST(Simulate, GivesTheSameBitsTwice) {
   EXPECT_EQ(a.poses[0].back().position_m, b.poses[0].back().position_m);
 }
 
-TEST(Simulate, RecordsPosesFromStartToEndAndReportsProgress) {
+TEST(Simulate, PosesAndProgress) {
   const bank::Bank ball = make_ball(0.03);
   const bank::Bank plate = make_box({0.3, 0.2, 0.01});
   WorldSpec w = make_ground_world(make_body("ball", ball, {0, 0, 0.2}));

@@ -29,7 +29,7 @@ Vec3 calc_momentum(const bank::Bank& bank, const std::vector<Pose>& path, double
   return (bank.rigid.mass_kg / (to_s - from_s)) * (centre(to_s) - centre(from_s));
 }
 
-TEST(TwoBodies, InFlightGetEqualAndOppositePulsesAndKeepTheirMomentum) {
+TEST(TwoBodies, MomentumOfImpactInFlight) {
   const bank::Bank ball = make_ball(0.03), box = make_box({0.1, 0.06, 0.04});
   WorldSpec w;
   w.gravity_m_s2 = {0, 0, 0};
@@ -47,7 +47,7 @@ TEST(TwoBodies, InFlightGetEqualAndOppositePulsesAndKeepTheirMomentum) {
   EXPECT_LT(norm(calc_momentum(ball, s.poses[0], 0.2, 0.4) - j0), 2e-3 * norm(j0));
 }
 
-TEST(TwoBodies, HeadOnTakeTheSpeedsOfNewtonsRestitution) {
+TEST(TwoBodies, HeadOnNewtonRestitution) {
   const bank::Bank ball = make_ball(0.03), big = make_ball(0.05);
   WorldSpec w;
   w.gravity_m_s2 = {0, 0, 0};
@@ -61,7 +61,7 @@ TEST(TwoBodies, HeadOnTakeTheSpeedsOfNewtonsRestitution) {
   EXPECT_NEAR(s.impulses[0].time_s - 0.5 * s.impulses[0].duration_s, (0.2 - 0.08) / 2, 1e-5);
 }
 
-TEST(Shelf, GetsTheOppositePulseAtTheSamePlace) {
+TEST(Shelf, OppositePulseAtSamePlace) {
   const bank::Bank ball = make_ball(0.03), plate = make_box({0.3, 0.2, 0.01}, {12, 8, 1});
   for (const bool fine : {true, false}) {
     const bank::Bank coarse = make_box({0.3, 0.2, 0.01});
@@ -86,7 +86,7 @@ TEST(Shelf, GetsTheOppositePulseAtTheSamePlace) {
   }
 }
 
-TEST(Shelf, IsHitByEdgeOnEdge) {
+TEST(Shelf, EdgeOnEdgeHit) {
   // Two long boxes crosswise, ridge on ridge: no corner is inside the other when they meet.
   const bank::Bank bar = make_box({0.3, 0.02, 0.02});
   WorldSpec w;
@@ -103,7 +103,7 @@ TEST(Shelf, IsHitByEdgeOnEdge) {
   EXPECT_NEAR(impulse_in_world(s, p)[2], 1.5 * bar.rigid.mass_kg * std::sqrt(2 * 9.81 * fall), 1e-3);
 }
 
-TEST(Box, LandsFlatOnSeveralSpotsThatShareTheImpulse) {
+TEST(Box, FlatLandingWithSharedImpulse) {
   const bank::Bank box = make_box({0.1, 0.06, 0.04});
   WorldSpec w;
   w.ground = GroundSpec{};
@@ -122,7 +122,7 @@ TEST(Box, LandsFlatOnSeveralSpotsThatShareTheImpulse) {
   EXPECT_NEAR(sum[2], 1.5 * box.rigid.mass_kg * std::sqrt(2 * 9.81 * 0.2), 1e-3);
 }
 
-TEST(Box, ThatTipsOverMakesAPulseWhereTheSecondEdgeLandsWhileTheFirstRests) {
+TEST(Box, PulseAtSecondEdgeOfTippingBox) {
   for (const int cells : {1, 6}) {
     const bank::Bank box = make_box({0.1, 0.06, 0.04}, {cells, cells, cells});
     WorldSpec w;
@@ -165,7 +165,7 @@ TEST(Box, ThatTipsOverMakesAPulseWhereTheSecondEdgeLandsWhileTheFirstRests) {
   }
 }
 
-TEST(Box, TumblingGetsExactlyTheMomentumThatWasEmitted) {
+TEST(Box, MomentumOfTumblingBox) {
   const bank::Bank box = make_box({0.1, 0.06, 0.04}, {3, 3, 3}), plate = make_box({0.4, 0.4, 0.02});
   WorldSpec w;
   w.ground = GroundSpec{};
@@ -189,7 +189,7 @@ TEST(Box, TumblingGetsExactlyTheMomentumThatWasEmitted) {
   EXPECT_LT(norm(emitted + from_shelf), 0.02 * norm(emitted)) << "only the shelf was hit so far";
 }
 
-TEST(Stack, FallsTogetherAndComesToRest) {
+TEST(Stack, RestAfterCommonFall) {
   const bank::Bank box = make_box({0.06, 0.06, 0.04}, {2, 2, 2});
   WorldSpec w;
   w.ground = GroundSpec{};
@@ -204,7 +204,7 @@ TEST(Stack, FallsTogetherAndComesToRest) {
   for (int i = 0; i < 3; ++i) EXPECT_NEAR(s.poses[i].back().position_m[2], 0.02 + 0.04 * i, 2e-4);
 }
 
-TEST(HollowBody, TouchesWithItsOuterWallOnly) {
+TEST(HollowBody, ContactOfOuterWallOnly) {
   bank::Bank shell = make_ball(0.05, 3);
   const bank::Bank inner = make_ball(0.045, 3);
   const auto count = static_cast<std::int32_t>(shell.vertices_m.size());
@@ -219,7 +219,7 @@ TEST(HollowBody, TouchesWithItsOuterWallOnly) {
   EXPECT_NEAR(norm(point_on_body(shell, s.impulses[0])), 0.05, 1e-6);
 }
 
-TEST(Masks, HideWhatIsFarWeakerThanWhatTheBodyWasStruckWithJustBefore) {
+TEST(Masks, MaskingOfMuchWeakerHits) {
   constexpr double kLength = 5e-4;
   Masks masks(2);
   EXPECT_FALSE(masks.take(0, 1.0, 1.0, kLength));

@@ -80,7 +80,7 @@ void expect_same_bits(const std::vector<events::Event>& a, const std::vector<eve
   }
 }
 
-TEST(Islands, GiveTheFirstImpactsOfOneSystem) {
+TEST(Islands, FirstImpactsOfOneSystem) {
   // Every box lands on an edge: up to its second impact nothing is chaotic.
   const bank::Bank box = make_box({0.06, 0.05, 0.04});
   const WorldSpec spec = make_rain(box, 6);
@@ -97,7 +97,7 @@ TEST(Islands, GiveTheFirstImpactsOfOneSystem) {
   }
 }
 
-TEST(Islands, GoTheirWaysToTheBitWhateverElseThereIs) {
+TEST(Islands, BitwiseIndependence) {
   // A ball that rolls takes shorter steps than boxes do, and a ball that is fast still shorter ones.
   const bank::Bank box = make_box({0.06, 0.05, 0.04}), ball = make_ball(0.03, 3), shot = make_ball(0.004, 3);
   WorldSpec boxes = make_rain(box, 4);
@@ -127,7 +127,7 @@ TEST(Islands, GoTheirWaysToTheBitWhateverElseThereIs) {
   expect_same_bits(among, alone);
 }
 
-TEST(Islands, ThatMeetAreJoinedAndPart) {
+TEST(Islands, JoiningAndSeparation) {
   const bank::Bank ball = make_ball(0.03, 3), shelf = make_box({1.5, 0.5, 0.02});
   const WorldSpec spec = make_meeting(ball, shelf);
   World world(spec, {.end_s = 0.6});
@@ -153,7 +153,7 @@ TEST(Islands, ThatMeetAreJoinedAndPart) {
   EXPECT_TRUE(find_impulses(events, 1).empty());
 }
 
-TEST(Islands, ThatMeetAgainstTheGuessGoThroughTheWindowAgain) {
+TEST(Islands, RepeatedWindowAfterUnplannedMeeting) {
   // A heavy fast ball hits a light one that stands; the light one leaves at nearly twice the speed and meets a third within the same 2 ms.
   const bank::Bank heavy = make_ball(0.2, 3), light = make_ball(0.005, 3);
   WorldSpec w;
@@ -168,7 +168,7 @@ TEST(Islands, ThatMeetAgainstTheGuessGoThroughTheWindowAgain) {
   EXPECT_NEAR(on_third[0].time_s - 0.5 * on_third[0].duration_s, 1.1e-3 / 10 + 16.1e-3 / 20, 2e-5);
 }
 
-TEST(Flight, TurnsASymmetricTopAboutItsAngularMomentum) {
+TEST(Flight, PrecessionOfSymmetricTop) {
   // Euler's top: the axis goes round L at |L| / I_1 (Landau and Lifshitz, Mechanics, section 33).
   const bank::Bank box = make_box({0.04, 0.04, 0.1});
   WorldSpec w;
@@ -189,7 +189,7 @@ TEST(Flight, TurnsASymmetricTopAboutItsAngularMomentum) {
   }
 }
 
-TEST(Sleepers, CostNothingAndWakeWhenTheyAreHit) {
+TEST(Sleepers, NoCostUntilHit) {
   const bank::Bank box = make_box({0.1, 0.1, 0.1}), ball = make_ball(0.03, 3);
   WorldSpec w;
   w.ground = GroundSpec{};
@@ -210,7 +210,7 @@ TEST(Sleepers, CostNothingAndWakeWhenTheyAreHit) {
   EXPECT_TRUE(std::any_of(hits.begin(), hits.end(), is_passed_on)) << "the floor feels what the box feels";
 }
 
-TEST(Slices, OfTimeDoNotChangeABit) {
+TEST(Slices, SameBitsInTimeSlices) {
   const bank::Bank ball = make_ball(0.03, 3), shelf = make_box({1.5, 0.5, 0.02});
   const WorldSpec spec = make_meeting(ball, shelf);
   const auto whole = run(spec, 0.6, true, 0.6);
@@ -218,7 +218,7 @@ TEST(Slices, OfTimeDoNotChangeABit) {
   expect_same_bits(run(spec, 0.6, true, 0.05, 0.0), whole);  // one step a call
 }
 
-TEST(Slices, EndWithAMarkThatNothingIsBefore) {
+TEST(Slices, FinalMark) {
   const bank::Bank box = make_box({0.06, 0.05, 0.04});
   const auto events = run(make_rain(box, 3), 0.5, true, 0.01);
   double mark = 0.0;
@@ -231,7 +231,7 @@ TEST(Slices, EndWithAMarkThatNothingIsBefore) {
   EXPECT_EQ(mark, 0.5);
 }
 
-TEST(Slices, OfACrowdEndWithMarksThatNothingIsBefore) {
+TEST(Slices, FinalMarkOfCrowd) {
   // A pile, whose groups strike once a step: pulses still have their own instants.
   const bank::Bank box = make_box({0.06, 0.05, 0.04});
   WorldSpec w;
@@ -255,7 +255,7 @@ TEST(Slices, OfACrowdEndWithMarksThatNothingIsBefore) {
   }
 }
 
-TEST(Slices, OfCpuEndAfterOneStep) {
+TEST(Slices, CpuLimitAfterOneStep) {
   const bank::Bank box = make_box({0.06, 0.05, 0.04});
   World world(make_rain(box, 20), {.end_s = 1.0});
   const auto ignore = [](const events::Event&) {};
@@ -267,7 +267,7 @@ TEST(Slices, OfCpuEndAfterOneStep) {
   }
 }
 
-TEST(Worlds, WhoseEndIsNoTimeAreRefused) {
+TEST(Worlds, RefusalOfInvalidEnd) {
   const bank::Bank ball = make_ball(0.03, 2);
   WorldSpec spec;
   spec.bodies = {make_body("ball", ball, {0, 0, 1})};

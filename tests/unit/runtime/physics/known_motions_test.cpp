@@ -52,7 +52,7 @@ INSTANTIATE_TEST_SUITE_P(Planes, RollingDown,
                          testing::Combine(testing::Values(1.0, 3.0, 10.0, 20.0),
                                           testing::Values(6, 16)));  // degrees; 720 and 5,120 triangles
 
-TEST_P(RollingDown, AcceleratesByFiveSeventhsLessTheResistance) {
+TEST_P(RollingDown, AccelerationOfFiveSeventhsLessResistance) {
   const auto [degrees, n] = GetParam();
   const double a = degrees * M_PI / 180, radius = 0.03;
   const bank::Bank ball = make_round(radius, n), plane = make_box({4.0, 0.4, 0.04});
@@ -72,7 +72,7 @@ TEST_P(RollingDown, AcceleratesByFiveSeventhsLessTheResistance) {
   EXPECT_NEAR(motions.back().velocity_m_s[1], 0.0, 0.01 * speed(1.2)) << "to the side";
 }
 
-TEST(Rolling, OnTheFlatLosesWhatTheResistanceTakes) {
+TEST(Rolling, LossByRollingResistance) {
   for (const int n : {6, 16}) {
     const bank::Bank ball = make_round(0.03, n);
     WorldSpec w;
@@ -90,7 +90,7 @@ TEST(Rolling, OnTheFlatLosesWhatTheResistanceTakes) {
 class SlidingToRolling : public testing::TestWithParam<std::tuple<double, double>> {};
 INSTANTIATE_TEST_SUITE_P(Speeds, SlidingToRolling, testing::Combine(testing::Values(0.5, 1.0, 2.0), testing::Values(0.1, 0.3)));
 
-TEST_P(SlidingToRolling, EndsWithFiveSeventhsAfterTwoSeventhsOfTheSpeedOverFrictionAndGravity) {
+TEST_P(SlidingToRolling, FinalSpeedAndTime) {
   const auto [speed, friction] = GetParam();
   const bank::Bank ball = make_round(0.03, 8);
   WorldSpec w;
@@ -104,7 +104,7 @@ TEST_P(SlidingToRolling, EndsWithFiveSeventhsAfterTwoSeventhsOfTheSpeedOverFrict
   EXPECT_NEAR(get_at(motions, 1.1 * rolls_s).velocity_m_s[0], 5.0 / 7.0 * speed, 0.01 * speed);
 }
 
-TEST(Bowl, HoldsABallThatSwingsWithItsPeriod) {
+TEST(Bowl, PeriodOfBallInBowl) {
   // A ball that rolls in a sphere is a pendulum of length (R - r) 7/5: period by the complete elliptic integral.
   const double bowl = 0.15, radius = 0.015;
   std::vector<std::array<double, 2>> outline;
@@ -138,7 +138,7 @@ TEST(Bowl, HoldsABallThatSwingsWithItsPeriod) {
 class Dominoes : public testing::TestWithParam<double> {};
 INSTANTIATE_TEST_SUITE_P(FrictionBetweenThem, Dominoes, testing::Values(0.0, 0.1, 0.2, 0.3));
 
-TEST_P(Dominoes, FallAsFastAsTheTrainThatLeans) {
+TEST_P(Dominoes, SpeedOfLeaningTrain) {
   struct Row {
     double height_m, thickness_m, gap_m, speed_m_s;  // in the long run, without friction
   };
@@ -239,7 +239,7 @@ struct RollingDisc {
   }
 };
 
-TEST(Rolling, AThinDiscOnItsRimPrecessesAtTheSteadyRate) {
+TEST(Rolling, SteadyPrecessionOfThinDisc) {
   // A disc without thickness that leans by a and rolls about a fixed centre turns about the vertical at sqrt(4 g/(r sin a)): H. K. Moffatt,
   // "Euler's disk and its finite-time singularity", Nature 404 (2000), eq. 2. The resistance lowers it by 1 to 3 mm in this time.
   for (const double degrees : {14.0, 30.0}) {
@@ -254,7 +254,7 @@ TEST(Rolling, AThinDiscOnItsRimPrecessesAtTheSteadyRate) {
   }
 }
 
-TEST(Rolling, ACoinOnItsRimPrecessesAtTheSteadyRate) {
+TEST(Rolling, SteadyPrecessionOfCoin) {
   // The same with a thickness of 2 e. The centre rests, so that the spin is along the way p = r d - e k from it to the rim (k the axis, d
   // down the slope): w = -W sin a (d - e/r k). Its momentum A (w - (w k) k) + C (w k) k turns with W about the vertical, which p x m g
   // does:
@@ -273,7 +273,7 @@ TEST(Rolling, ACoinOnItsRimPrecessesAtTheSteadyRate) {
   }
 }
 
-TEST(Rolling, EulersDiscLiesDownAtTheTimeThatItsResistanceGives) {
+TEST(Rolling, DurationOfEulersDisc) {
   // At small angles E = 3/2 m g r a and W = 2 sqrt(g/(r a)); the resistance takes c m g r W a second, so that the disc lies after
   // a^(3/2) / (2 c sqrt(g/r)).
   const double radius = 0.0375, a = 0.2, ends = 0.02, s = std::sin(a), c = std::cos(a), rate = std::sqrt(4.0 * kGravity / (radius * s));
@@ -308,7 +308,7 @@ geometry::tests::Solid make_bottle(double radius, int around) {
 class RollingBottle : public testing::TestWithParam<std::tuple<double, int>> {};
 INSTANTIATE_TEST_SUITE_P(Planes, RollingBottle, testing::Combine(testing::Values(3.0, 10.0), testing::Values(24, 48)));  // degrees; facets
 
-TEST_P(RollingBottle, AcceleratesAsARoundOne) {
+TEST_P(RollingBottle, AccelerationOfRoundBottle) {
   // g (sin a - c cos a)/(1 + I/(m r^2)). A full one is a cylinder, an empty one has a bottom, a wall and a neck.
   const auto [degrees, facets] = GetParam();
   const double a = degrees * M_PI / 180, radius = 0.035;

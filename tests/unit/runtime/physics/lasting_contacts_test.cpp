@@ -65,7 +65,7 @@ double calc_mean(const Outcome& run, double from_s, double to_s, Get get) {
   return sum / std::max(count, 1);
 }
 
-TEST(LastingContacts, CarryTheWeightOfABoxAtRestAndAreNoStrikes) {
+TEST(LastingContacts, WeightOfBoxAtRest) {
   const bank::Bank box = make_box({0.06, 0.05, 0.04});
   const Outcome r = run(make_world(box, {0, 0, 0.05}, 0.5), 4.0);
   for (const Impulse& p : r.impulses) EXPECT_LT(p.time_s, 0.6) << "it lies by then";
@@ -92,7 +92,7 @@ TEST(LastingContacts, CarryTheWeightOfABoxAtRestAndAreNoStrikes) {
   EXPECT_NEAR(force, box.rigid.mass_kg * kGravity, 1e-3 * box.rigid.mass_kg * kGravity);
 }
 
-TEST(LastingContacts, AreNotMadeForThoseWhoDoNotAskAndChangeNothing) {
+TEST(LastingContacts, NoEffectWhenDisabled) {
   const bank::Bank box = make_box({0.06, 0.05, 0.04});
   const WorldSpec spec = make_world(box, {0.0, 0.0, 0.05}, 0.5);
   std::vector<events::Event> with, without;
@@ -113,7 +113,7 @@ TEST(LastingContacts, AreNotMadeForThoseWhoDoNotAskAndChangeNothing) {
   }
 }
 
-TEST(LastingContacts, OfABoxThatSlidesFlatSweepOnlyTheFloor) {
+TEST(LastingContacts, SweepOfSlidingBox) {
   // v = v0 - mu g t; it starts on the floor.
   const bank::Bank box = make_box({0.1, 0.1, 0.02});
   const double mu = 0.1, v0 = 1.0;
@@ -135,7 +135,7 @@ TEST(LastingContacts, OfABoxThatSlidesFlatSweepOnlyTheFloor) {
   EXPECT_NEAR(force, box.rigid.mass_kg * kGravity, 0.02 * box.rigid.mass_kg * kGravity);
 }
 
-TEST(LastingContacts, OfABoxThatFrictionHoldsOnASlopeDoNotSlip) {
+TEST(LastingContacts, NoSlipOfBoxHeldOnSlope) {
   // Ten degrees, friction 0.5: it slides from 0.3 m/s to rest, by mu g cos - g sin, and stays.
   const bank::Bank box = make_box({0.1, 0.1, 0.02});
   const double slope = 10.0 * 3.14159265358979 / 180.0;
@@ -160,7 +160,7 @@ TEST(LastingContacts, OfABoxThatFrictionHoldsOnASlopeDoNotSlip) {
   EXPECT_GT(resting, 4);
 }
 
-TEST(LastingContacts, OfABallThatRollsSweepBothSurfacesAndDoNotSlip) {
+TEST(LastingContacts, SweepOfRollingBall) {
   const double radius = 0.03, v = 0.4;
   const bank::Bank ball = make_ball(radius, 5);
   WorldSpec w = make_world(ball, {0, 0, radius}, 0.5);
@@ -216,7 +216,7 @@ void expect_nothing_before_hit(const WorldSpec& spec, double end_s) {
   EXPECT_GT(seen, 0);
 }
 
-TEST(LastingContacts, ThatLayChangeNothingBeforeTheHit) {
+TEST(LastingContacts, NoChangeBeforeHitAfterRest) {
   const bank::Bank box = make_box({0.06, 0.05, 0.04}), ball = make_ball(0.03, 3);
   WorldSpec stack = make_world(box, {0, 0, 0.02}, 0.4);
   for (int i = 1; i < 8; ++i) {
@@ -243,7 +243,7 @@ TEST(LastingContacts, ThatLayChangeNothingBeforeTheHit) {
   expect_nothing_before_hit(block, 0.7);
 }
 
-TEST(LastingContacts, OfTwoBodiesComeInPairsOfOneId) {
+TEST(LastingContacts, PairedRecordsWithOneId) {
   const bank::Bank box = make_box({0.06, 0.05, 0.04}), shelf = make_box({0.3, 0.3, 0.02});
   WorldSpec w = make_world(box, {0, 0, 0.03}, 0.5);
   w.ground.reset();
@@ -267,7 +267,7 @@ TEST(LastingContacts, OfTwoBodiesComeInPairsOfOneId) {
   }
 }
 
-TEST(LastingContacts, AreNamedByTheirPairAndTouchAlone) {
+TEST(LastingContacts, IdsByPairAndTouch) {
   const bank::Bank box = make_box({0.1, 0.08, 0.04});
   WorldSpec alone = make_world(box, {0, 0, 0.0205}, 0.4);
   alone.bodies[0].velocity_m_s = {0.5, 0, 0};

@@ -80,7 +80,7 @@ Found look(const std::vector<events::Event>& events, std::int32_t body, double m
   return found;
 }
 
-TEST(RandomDrops, MissNoHit) {
+TEST(RandomDrops, NoMissedHit) {
   // 200 boxes and lumpy balls, each dropped by itself, turned and spinning anyhow, with any restitution and friction.
   const bank::Bank box = make_box({0.06, 0.05, 0.04}), plate = make_box({0.1, 0.08, 0.01}), lump = make_eared_ball(0.03, 3);
   std::mt19937_64 random(11);

@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "tests/unit/runtime/physics/solids.hpp"
 #include "tests/unit/runtime/physics/impact/free_plate.hpp"
+#include "tests/unit/runtime/physics/solids.hpp"
 
 namespace carillon::physics::tests {
 

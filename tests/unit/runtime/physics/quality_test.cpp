@@ -69,7 +69,7 @@ INSTANTIATE_TEST_SUITE_P(Balls, Bouncing,
                                          std::tuple{0.05, 0.02, 0.9}, std::tuple{0.03, 5e-4, 0.5}, std::tuple{0.01, 1e-5, 0.5},
                                          std::tuple{0.003, 5e-4, 0.6}));
 
-TEST_P(Bouncing, HitsAsOftenAndWhenTheClosedFormSaysUntilItStaysDown) {
+TEST_P(Bouncing, HitTimesOfClosedForm) {
   const auto [radius, height, e] = GetParam();
   bank::Bank ball = make_ball(radius, 5);
   if (radius < 0.02)
@@ -94,7 +94,7 @@ TEST_P(Bouncing, HitsAsOftenAndWhenTheClosedFormSaysUntilItStaysDown) {
   EXPECT_NEAR(given, kGravity * get_touch_s(last), 0.01 * given + 1.1 * expected.back().speed_m_s * e) << "down to the speed that is left";
 }
 
-TEST(Bouncing, AsOftenWhenItDriftsSideways) {
+TEST(Bouncing, SameHitsWithSidewaysDrift) {
   // Without friction the way along the ground changes nothing: no hit is taken for the hop of a mesh that rolls.
   const bank::Bank ball = make_ball(0.03, 4);
   for (const double height : {5e-4, 5e-3}) {
@@ -113,7 +113,7 @@ TEST(Bouncing, AsOftenWhenItDriftsSideways) {
   }
 }
 
-TEST(SlowHit, OfABodyThatDriftsIsHeard) {
+TEST(SlowHit, AudibleHitOfDriftingBody) {
   // Without gravity nothing but the hit can come of it: 2 mm/s, a snail's pace.
   const bank::Bank ball = make_ball(0.03, 3), plate = make_box({0.2, 0.2, 0.02});
   WorldSpec w;
@@ -130,7 +130,7 @@ TEST(SlowHit, OfABodyThatDriftsIsHeard) {
 class ComingToRest : public testing::TestWithParam<double> {};
 INSTANTIATE_TEST_SUITE_P(Restitutions, ComingToRest, testing::Values(0.0, 0.3, 0.6));
 
-TEST_P(ComingToRest, IsNoMachineGun) {
+TEST_P(ComingToRest, NoRapidRepeatedHits) {
   // A box that falls on a corner rattles to rest, faster and softer, over ever shorter flights. No corner is heard again before its contact
   // is over, but for what another corner that lands pushes through it, a tenth of a hit; and gravity alone pays for all of them together.
   const double e = GetParam();
@@ -174,7 +174,7 @@ std::pair<double, std::int64_t> slide(double contact_step_s) {
   return {x, world.get_statistics().steps};
 }
 
-TEST(ContactStep, IsWhatTheOptionsSayAndCostsAsMuch) {
+TEST(ContactStep, StepOfOptionsAndItsCost) {
   const auto [coarse_m, coarse_steps] = slide(1e-3);
   const auto [fine_m, fine_steps] = slide(1e-4);
   const double stops_m = 1.0 / (2 * 0.4 * kGravity);

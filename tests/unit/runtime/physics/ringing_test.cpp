@@ -39,7 +39,7 @@ events::BodyMotion find_last(const Outcome& outcome, int body) {
   return last;
 }
 
-TEST(Ringing, GivesBodiesEqualAndOppositeForcesAndTheirMomentum) {
+TEST(Ringing, EqualAndOppositeForces) {
   // Two that ring meet in flight without spin about the line between them.
   const bank::Bank ball = add_modes(make_ball(0.03, 3), 20), box = add_modes(make_box({0.1, 0.08, 0.05}), 20);
   WorldSpec w;
@@ -70,7 +70,7 @@ TEST(Ringing, GivesBodiesEqualAndOppositeForcesAndTheirMomentum) {
 class Books : public testing::TestWithParam<int> {};
 INSTANTIATE_TEST_SUITE_P(Scenes, Books, testing::Range(0, 10));
 
-TEST_P(Books, OfMotionModesAndLossesStayWithinAHundredth) {
+TEST_P(Books, EnergyBalanceWithinOnePercent) {
   const bank::Bank ball = add_modes(make_ball(0.03, 3), 20), box = add_modes(make_box({0.1, 0.08, 0.05}), 20),
                    plate = add_modes(make_box({0.4, 0.3, 0.01}), 20), lump = add_modes(make_eared_ball(0.05, 3), 20);
   WorldSpec w;
@@ -142,7 +142,7 @@ TEST(Ringing, BoxesThatStrikeTheGroundAndEachOtherAtOnceKeepTheBooks) {
   }
 }
 
-TEST(Ringing, HeapsOfAllKindsOfBodiesKeepTheBooks) {
+TEST(Ringing, EnergyBalanceOfRandomHeaps) {
   // Random heaps: boxes, plates and balls that ring, on the ground or on a shelf that rings, of all restitutions.
   const bank::Bank banks[] = {add_modes(make_ball(0.03, 3), 20), add_modes(make_box({0.1, 0.08, 0.05}), 20),
                               add_modes(make_box({0.2, 0.15, 0.01}), 20), add_modes(make_eared_ball(0.05, 3), 20),
@@ -186,7 +186,7 @@ TEST(Ringing, HeapsOfAllKindsOfBodiesKeepTheBooks) {
   }
 }
 
-TEST(Ringing, WhatLiesOnTheGroundIsPushedByItWhenItIsStruck) {
+TEST(Ringing, GroundReactionOfStruckPlate) {
   // A ball falls on a plate that lies on the ground, and the plate sounds by the blow and by the ground. Of all that acts on it gravity is
   // the one that is not sounded.
   const bank::Bank ball = add_modes(make_ball(0.03, 3), 20), plate = add_modes(make_box({0.4, 0.3, 0.01}), 20);
@@ -210,7 +210,7 @@ TEST(Ringing, WhatLiesOnTheGroundIsPushedByItWhenItIsStruck) {
   EXPECT_LT(r.energy.error_j, 0.01 * ball.rigid.mass_kg * 9.81 * 0.06);
 }
 
-TEST(Ringing, ShelfContinuesToCarryWhatLiesOnIt) {
+TEST(Ringing, SupportByStruckShelf) {
   // Balls strike a shelf that rings while a box lies at its other end.
   const bank::Bank ball = add_modes(make_ball(0.03, 3), 20), box = add_modes(make_box({0.1, 0.08, 0.05}), 20),
                    plate = add_modes(make_box({0.6, 0.3, 0.01}), 20);

@@ -28,7 +28,7 @@ INSTANTIATE_TEST_SUITE_P(Bodies, Pinched,
                                          std::vector<std::array<int, 3>>{
                                              {0, 0, 0}, {-1, 0, 0}, {-1, 1, 0}, {-1, 1, 1}, {-1, 2, 1}, {0, 2, 1}, {1, 2, 1}, {1, 1, 1}}));
 
-TEST_P(Pinched, BodyFallsAndIsHeardAsAnyOther) {
+TEST_P(Pinched, SoundOfPinchedBody) {
   const bank::Bank bank = make_cells(GetParam(), 0.02);
   const double height = 0.2;
   const Simulation s = simulate(make_fall(bank, height), 0.22);
@@ -44,7 +44,7 @@ TEST_P(Pinched, BodyFallsAndIsHeardAsAnyOther) {
   EXPECT_GT(push, 0.3 * bank.rigid.mass_kg * std::sqrt(2 * 9.81 * height));
 }
 
-TEST(FlatBody, IsStruckAtItsCornersHoweverFineItsMesh) {
+TEST(FlatBody, CornerHitsForAnyMesh) {
   std::vector<Simulation> runs;
   for (const int cells : {1, 7}) {
     const bank::Bank box = make_box({0.1, 0.06, 0.04}, {cells, cells, cells});
@@ -59,7 +59,7 @@ TEST(FlatBody, IsStruckAtItsCornersHoweverFineItsMesh) {
   for (std::size_t i = 0; i < runs[0].impulses.size(); ++i) EXPECT_NEAR(runs[0].impulses[i].time_s, runs[1].impulses[i].time_s, 2e-4);
 }
 
-TEST(FlatBody, FallsFlushAcrossANarrowShelfAndStaysThere) {
+TEST(FlatBody, RestAcrossNarrowShelf) {
   // A cross: no corner of one is over the other; only their edges cross. With six cells they cross exactly where the next edge begins.
   for (const int cells : {1, 5, 6}) {
     const bank::Bank across = make_box({0.3, 0.06, 0.02}, {cells, cells, 1}), along = make_box({0.06, 0.3, 0.02}, {cells, cells, 1});
@@ -105,7 +105,7 @@ INSTANTIATE_TEST_SUITE_P(Falls, EaredBall,
                          testing::Values(Fall{0.3, 0.3, {1, 0, 0, 0}, {0, 0, 0}}, Fall{0.0, 1.0, {0.1, 0.9, 0.3, 0.1}, {5, -3, 2}},
                                          Fall{0.8, 0.1, {0.4, -0.2, 0.9, 0.3}, {-8, 4, 9}}, Fall{0.3, 0.0, {0, 0, 1, 0}, {0, 20, 0}}));
 
-TEST_P(EaredBall, TumblesDownAShelfWithoutSinkingInOrGainingEnergy) {
+TEST_P(EaredBall, TumblingWithoutPenetrationOrEnergyGain) {
   const Fall& fall = GetParam();
   const bank::Bank bank = make_eared_ball(0.04, 5);
   const Vec3 plate{0.3, 0.2, 0.008};

@@ -13,7 +13,7 @@
 namespace carillon::physics::tests {
 namespace {
 
-TEST(Standing, AStackOfTenStandsForAnHourInSilence) {
+TEST(Standing, SilentStackOfTen) {
   const bank::Bank block = make_box({0.05, 0.05, 0.05});
   WorldSpec w;
   w.ground = GroundSpec{};
@@ -25,7 +25,7 @@ TEST(Standing, AStackOfTenStandsForAnHourInSilence) {
   for (int i = 0; i < 10; ++i) EXPECT_NEAR(course.at_end[i].position_m[2], 0.025 + 0.05 * i, 1e-6) << i;
 }
 
-TEST(Standing, ABoxOnOthersDoesNotCreep) {
+TEST(Standing, NoCreepOfStackedBoxes) {
   // A bridge: two below, one across, turned, and one leaning on nothing on top; dropped by half a millimetre.
   const bank::Bank box = make_box({0.06, 0.05, 0.04});
   WorldSpec w;
@@ -39,7 +39,7 @@ TEST(Standing, ABoxOnOthersDoesNotCreep) {
   EXPECT_LT(course.last_hit_s, 1.0);
 }
 
-TEST(Standing, NothingMovesOrStrikesInTheGroupOfSomethingFast) {
+TEST(Standing, RestNextToFastBody) {
   // Boxes stand on a plank, each in touch with it alone, while another one slides along the plank without friction.
   const bank::Bank box = make_box({0.06, 0.05, 0.04}), plank = make_box({2.0, 0.4, 0.02});
   WorldSpec w;
@@ -63,7 +63,7 @@ TEST(Standing, NothingMovesOrStrikesInTheGroupOfSomethingFast) {
   for (std::size_t i = 2; i < w.bodies.size(); ++i) EXPECT_LT(norm(last[i].position_m - begun[i].position_m), 1e-6) << i;
 }
 
-TEST(Standing, WhatFallsAsleepSaysSoByALastMotionAtRest) {
+TEST(Standing, FinalMotionRecordOfSleepingBody) {
   const bank::Bank box = make_box({0.06, 0.05, 0.04});
   WorldSpec w;
   w.ground = GroundSpec{};
@@ -78,7 +78,7 @@ TEST(Standing, WhatFallsAsleepSaysSoByALastMotionAtRest) {
   EXPECT_EQ(norm(last.velocity_m_s), 0.0);
 }
 
-TEST(Standing, OnASlopeThatFrictionHoldsNothingCreeps) {
+TEST(Standing, NoCreepOnSlope) {
   const bank::Bank box = make_box({0.06, 0.05, 0.04}), plane = make_box({1.0, 0.4, 0.04});
   for (const double part : {0.5, 0.9, 0.98}) {
     const double a = std::atan(0.4 * part);  // of the angle at which it slides
@@ -113,7 +113,7 @@ WorldSpec build_card_house(const bank::Bank& card, double friction) {
   return w;
 }
 
-TEST(Standing, ACardHouseStandsByItsFriction) {
+TEST(Standing, CardHouse) {
   bank::Bank card = make_box({0.0003, 0.063, 0.088});
   card.material = {3e9, 0.3, 900.0, 1e-6, 50.0};
   set_rigid_of_solid(card);

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "tests/unit/runtime/physics/checks.hpp"
-#include "tests/unit/runtime/physics/plate_bank.hpp"
-#include "tests/unit/runtime/physics/impact/zener.hpp"
 #include "tests/unit/runtime/physics/geometry/solids.hpp"
+#include "tests/unit/runtime/physics/impact/zener.hpp"
+#include "tests/unit/runtime/physics/plate_bank.hpp"
 
 namespace carillon::physics::tests {
 namespace {
@@ -112,7 +112,7 @@ INSTANTIATE_TEST_SUITE_P(Zener, LargePlate,
                                          Case{.003, .010, 1}, Case{.006, .020, 1}, Case{.003, .0075, 5}, Case{.006, .010, 5},
                                          Case{.003, .0075, 1}, Case{.006, .005, .1}, Case{.003, .010, .1}, Case{.006, .015, 5}));
 
-TEST_P(LargePlate, GivesABallZenersRestitution) {
+TEST_P(LargePlate, ZenersRestitution) {
   // A simply supported steel plate of 1 x 0.93 m, its modes to 20 kHz. The shortest pulses have 0.6 cycles of the highest mode.
   const Case c = GetParam();
   const impact::tests::Plate plate = impact::tests::make_plate(1.0, 0.93, c.thickness_m, 20e3, 0.47, 0.4929);
@@ -132,7 +132,7 @@ TEST_P(LargePlate, GivesABallZenersRestitution) {
   EXPECT_LT(blow.energy.error_j, 1e-6 * blow.energy.start_j);
 }
 
-TEST(Rebound, OfABallOnWhatBendsIsNeverFasterThanTheRestitutionGiven) {
+TEST(Rebound, RestitutionLimitOnBendingBodies) {
   // Small supported plates, which swing back while a heavy ball still presses: with a restitution of 1 it comes off faster than with any
   // given below.
   int thrown = 0;
@@ -155,7 +155,7 @@ TEST(Rebound, OfABallOnWhatBendsIsNeverFasterThanTheRestitutionGiven) {
   EXPECT_GT(thrown, 5);
 }
 
-TEST(ThickBlock, GivesABallHertzsPulse) {
+TEST(ThickBlock, HertzPulse) {
   // A block of 0.4 x 0.35 x 0.3 m with standing waves of its three directions to 20 kHz; a ball of 2 cm is over it before they answer.
   const Vec3 size{0.4, 0.35, 0.3};
   bank::Bank block = make_struck_box(size, 0.03, -0.02);
@@ -193,7 +193,7 @@ class Falling : public testing::TestWithParam<std::array<double, 2>> {};
 INSTANTIATE_TEST_SUITE_P(Plates, Falling,
                          testing::Values(std::array{0.3, 0.002}, std::array{0.2, 0.0005}, std::array{0.024, 0.002}));  // plate, sheet, coin
 
-TEST_P(Falling, GivesItsModesLessThanTheMotionLost) {
+TEST_P(Falling, ModalEnergyBelowLossOfMotion) {
   const auto [side, thickness] = GetParam();
   const bank::Bank plate = make_plate_bank(side, thickness, side > 0.1 ? 6e3 : 60e3, 16, 3.0);
   const std::size_t modes = plate.mode_count();

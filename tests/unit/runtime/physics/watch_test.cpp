@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kForever = std::numeric_limits<double>::infinity();
 
-TEST(ContactAudit, HasTheDepthInWhichBodiesStart) {
+TEST(ContactAudit, DepthAtStart) {
   const bank::Bank box = make_box({0.06, 0.05, 0.04}), ball = make_ball(0.03, 3);
   constexpr double kDepth = 1.5e-4;
   for (const bool is_ball : {false, true}) {
@@ -41,7 +41,7 @@ TEST(ContactAudit, HasTheDepthInWhichBodiesStart) {
   }
 }
 
-TEST(ContactAudit, HasTheDepthInTheGround) {
+TEST(ContactAudit, DepthInGround) {
   const bank::Bank box = make_box({0.06, 0.05, 0.04});
   WorldSpec spec;
   spec.ground = GroundSpec{};
@@ -57,7 +57,7 @@ TEST(ContactAudit, HasTheDepthInTheGround) {
   }
 }
 
-TEST(ContactAudit, CountsTheHitsThatEventsHave) {
+TEST(ContactAudit, HitCountOfEvents) {
   const bank::Bank ball = make_ball(0.02, 3);
   WorldSpec spec;
   spec.ground = GroundSpec{};
@@ -82,7 +82,7 @@ TEST(ContactAudit, CountsTheHitsThatEventsHave) {
   EXPECT_EQ(audit.longest_impact_s, 0.0);
 }
 
-TEST(ContactAudit, IsEmptyUnlessAskedFor) {
+TEST(ContactAudit, EmptyUnlessRequested) {
   const bank::Bank ball = make_ball(0.02, 3);
   WorldSpec spec;
   spec.ground = GroundSpec{};

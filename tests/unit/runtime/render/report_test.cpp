@@ -68,7 +68,9 @@ TEST_F(Report, JsonHasAuditAndMalletsOnRequestAndNullForSilence) {
   scene_.warnings.push_back("a warning");
   Sound sound;
   sound.levels.mean_db = sound.levels.loudest_db = -std::numeric_limits<double>::infinity();
-  const scene::Plan plan{{}, effects::EffectSelector({})};
+  effects::SceneFacts facts;
+  facts.microphones_m = {{0.0, 0.0, 0.0}};
+  const scene::Plan plan{facts, effects::EffectSelector(facts)};
   Figures figures;
   const auto read = [&] { return make_report_json(scene_, sound, plan, figures); };
   const std::string plain = read();

@@ -40,7 +40,7 @@ TEST(Report, page_holds_the_data_without_markup) {
   EXPECT_EQ(figures["modes"]["freq_hz"].size(), bank.mode_count());
   EXPECT_EQ(figures["checks"].empty(), false);
   const std::string job = R"({"mesh": "</script><script>alert(1)</script>\u202e", "run": {}})";
-  write_report(folder / "b.hdf", folder.write("j.json", job), folder / "out", {.drawn_modes = 0});
+  write_report(folder / "b.hdf", folder.write("j.json", job), folder / "out", {.title = "", .drawn_modes = 0});
   const std::string page = tests::read_all(folder / "out/report.html");
   EXPECT_EQ(page.find("alert(1)</script>"), std::string::npos);
   EXPECT_NE(page.find("\\u003cscript>alert(1)"), std::string::npos);

@@ -1,4 +1,4 @@
-// The layout of VTKHDF files that are well, unusual or damaged.
+// Layout of valid, unusual and damaged VTKHDF files.
 #include "precompute/mesh/parallel/layout.hpp"
 
 #include <gmock/gmock.h>
@@ -43,7 +43,7 @@ std::string find_refusal(const std::filesystem::path& file) {
   return "";
 }
 
-TEST(Layout, gives_places_where_the_bytes_of_the_arrays_stand) {
+TEST(Layout, array_offsets) {
   const File file;
   const auto box = tests::make_box({3, 2, 1}, {1, 2, 3});
   tests::write_vtkhdf(file.path(), box, {.point_data = {{"clamp", std::vector<std::int32_t>(box.nodes_m.size(), 7)}}});
@@ -66,7 +66,7 @@ TEST(Layout, gives_places_where_the_bytes_of_the_arrays_stand) {
   EXPECT_EQ(node, box.tets[5]);
 }
 
-TEST(Layout, refuses_what_cannot_be_read_in_blocks_and_names_the_correction) {
+TEST(Layout, unsupported_layouts) {
   const File file;
   const auto box = tests::make_box({1, 1, 1}, {1, 1, 1});
   const auto refusal = [&](const tests::VtkHdfOptions& options) {
@@ -81,7 +81,7 @@ TEST(Layout, refuses_what_cannot_be_read_in_blocks_and_names_the_correction) {
   EXPECT_THAT(find_refusal(file.path()), HasSubstr("VTKHDF is missing"));
 }
 
-TEST(Layout, does_not_follow_links_out_of_the_file) {
+TEST(Layout, external_links) {
   const File file, other;
   const auto box = tests::make_box({1, 1, 1}, {1, 1, 1});
   tests::write_vtkhdf(file.path(), box);
@@ -92,8 +92,8 @@ TEST(Layout, does_not_follow_links_out_of_the_file) {
   EXPECT_THAT(find_refusal(file.path()), HasSubstr("Points is a link"));
 }
 
-// HDF5 crashes on some of these; the child does, not the reader. All that is accepted lies inside the file.
-TEST(Layout, of_damaged_files_is_an_error_or_lies_inside_the_file) {
+// HDF5 crashes on some of these, in the child only. Accepted arrays lie inside the file.
+TEST(Layout, damaged_files) {
   const File file;
   tests::write_vtkhdf(file.path(), tests::make_box({1, 1, 1}, {1, 1, 1}));
   const std::string good = file.read();

@@ -1,4 +1,4 @@
-// A mesh read by all ranks against the same mesh on the serial path: the same numbers, boundary, fixed nodes and refusals.
+// Parallel reader against the serial path: numbering, boundary, fixed nodes and refusals.
 #include "precompute/mesh/parallel/read_parallel.hpp"
 
 #include <gmock/gmock.h>
@@ -12,8 +12,8 @@
 #include <random>
 #include <set>
 
-#include "precompute/petsc/session.hpp"
 #include "precompute/mesh/shapes/shapes.hpp"
+#include "precompute/petsc/session.hpp"
 #include "runtime/base/error.hpp"
 #include "tests/support/box_mesh.hpp"
 #include "tests/support/ranks.hpp"
@@ -29,7 +29,7 @@ using Box = std::array<Vec3, 2>;
 
 const MPI_Comm kWorld = MPI_COMM_WORLD;
 
-/// A file that rank 0 writes and all read.
+/// File written by rank 0 and read by all.
 class SharedFile {
  public:
   SharedFile(const mesh::TetMesh& mesh, const tests::VtkHdfOptions& options = {}) {
@@ -49,7 +49,7 @@ class SharedFile {
   std::filesystem::path path_;
 };
 
-/// A tube with its elements and nodes in no order at all, some elements inside out, some nodes unused.
+/// A tube with shuffled elements and nodes, some elements inverted, some nodes unused.
 mesh::TetMesh make_shuffled_tube(int order) {
   mesh::TetMesh tube = tests::make_box({9, 5, 4}, {0.9, 0.5, 0.4}, order);
   std::mt19937 random(3);
@@ -80,7 +80,7 @@ mesh::TetMesh make_shuffled_tube(int order) {
   return mixed;
 }
 
-/// What the serial path makes of the mesh.
+/// Mesh of the serial path.
 struct Truth {
   mesh::TetMesh mesh;
   mesh::CheckReport check;
@@ -95,9 +95,9 @@ Truth make_truth(mesh::TetMesh mesh, int order) {
   return truth;
 }
 
-class Orders : public testing::TestWithParam<std::pair<int, int>> {};  // of the file, of the elements
+class Orders : public testing::TestWithParam<std::pair<int, int>> {};  // order in the file, requested order
 
-TEST_P(Orders, give_every_rank_a_piece_of_the_very_mesh_that_the_serial_path_makes) {
+TEST_P(Orders, same_mesh_as_serial) {
   const auto [file_order, order] = GetParam();
   const mesh::TetMesh mesh = make_shuffled_tube(file_order);
   const SharedFile file(mesh);
@@ -131,12 +131,12 @@ TEST_P(Orders, give_every_rank_a_piece_of_the_very_mesh_that_the_serial_path_mak
   EXPECT_LT(read.mesh.report.node_balance, 1.5);  // the highest rank owns its seams, which are much of so small a mesh
 }
 
-TEST_P(Orders, number_each_free_node_once_and_alike_on_all_ranks) {
+TEST_P(Orders, row_numbering) {
   const auto [file_order, order] = GetParam();
   const SharedFile file(make_shuffled_tube(file_order));
   const ParallelMesh read = read_parallel(kWorld, file.path(), {.order = order});
   const mesh::LocalMesh& local = read.mesh.local;
-  // Every rank writes the rows it believes in; largest and smallest belief must agree, and owned rows follow each other.
+  // Every rank contributes its rows; largest and smallest values must agree, and owned rows are contiguous.
   std::vector<std::int32_t> low(read.mesh.nodes, INT32_MAX), high(low.size(), -1), owners(low.size(), 0);
   for (std::size_t i = 0; i < local.row.size(); ++i) {
     const std::size_t node = local.node_in_mesh[i];
@@ -153,7 +153,7 @@ TEST_P(Orders, number_each_free_node_once_and_alike_on_all_ranks) {
   EXPECT_EQ(std::set<std::int32_t>(high.begin(), high.end()).size(), high.size());
 }
 
-TEST_P(Orders, bring_the_boundary_of_the_serial_path_to_rank_0_vertex_by_vertex) {
+TEST_P(Orders, same_boundary_as_serial) {
   const auto [file_order, order] = GetParam();
   const mesh::TetMesh mesh = make_shuffled_tube(file_order);
   const SharedFile file(mesh);
@@ -174,7 +174,7 @@ INSTANTIATE_TEST_SUITE_P(All, Orders, testing::Values(std::pair(1, 1), std::pair
                            return "from_" + std::to_string(info.param.first) + "_to_" + std::to_string(info.param.second);
                          });
 
-TEST(FixedNodes, by_box_and_by_value_of_point_data_are_those_of_the_plane) {
+TEST(FixedNodes, box_and_point_data) {
   const auto box = tests::make_box({4, 3, 2}, {4, 3, 2});
   std::vector<std::int32_t> side(box.nodes_m.size(), 0);
   for (std::size_t i = 0; i < side.size(); ++i) side[i] = box.nodes_m[i][0] == 0 ? 1 : box.nodes_m[i][0] == 4 ? -2 : 0;
@@ -196,7 +196,7 @@ TEST(FixedNodes, by_box_and_by_value_of_point_data_are_those_of_the_plane) {
   EXPECT_EQ(count({.order = 2, .fixed = {{.box_m = Box{{{0, 0, 0}, {0, 3, 2}}}}}}), 7 * 5);
 }
 
-TEST(FixedNodes, know_the_first_entry_that_names_them) {
+TEST(FixedNodes, first_entry_wins) {
   // x = 0 by a set, y = 0 by a box; the edge of both belongs to the set, which comes first, and so do mid nodes between the two.
   const auto box = tests::make_box({4, 3, 2}, {4, 3, 2});
   std::vector<std::int32_t> side(box.nodes_m.size(), 0);
@@ -213,7 +213,7 @@ TEST(FixedNodes, know_the_first_entry_that_names_them) {
   }
 }
 
-TEST(Components, are_numbered_by_their_first_nodes_whatever_the_cut) {
+TEST(Components, numbering_by_first_node) {
   mesh::TetMesh three;
   for (int k : {2, 0, 1}) {  // in space in another order than in the file
     const auto one = tests::make_box({2, 2, 2}, {1, 1, 1}, 1, {5.0 * k, 0, 0});
@@ -230,7 +230,7 @@ TEST(Components, are_numbered_by_their_first_nodes_whatever_the_cut) {
   }
 }
 
-TEST(Cut, of_a_bar_is_a_plane_and_its_parts_are_connected) {
+TEST(Cut, planar_cut_of_a_bar) {
   const auto bar = tests::make_box({60, 2, 2}, {60, 2, 2});
   const SharedFile file(bar);
   const ParallelMesh read = read_parallel(kWorld, file.path(), {.order = 1});
@@ -240,7 +240,7 @@ TEST(Cut, of_a_bar_is_a_plane_and_its_parts_are_connected) {
   EXPECT_GE(read.mesh.report.edge_cut, 8 * (get_ranks() - 1));
 }
 
-TEST(SinglePrecision, and_the_other_byte_order_are_read) {
+TEST(SinglePrecision, and_big_endian) {
   const auto box = tests::make_box({2, 2, 2}, {0.5, 0.25, 2});
   const SharedFile file(box, {.single_precision = true});
   const ParallelMesh read = read_parallel(kWorld, file.path(), {.order = 1});
@@ -259,7 +259,7 @@ void PrintTo(const BadCase& bad, std::ostream* out) { *out << bad.name; }
 
 class BadMeshes : public testing::TestWithParam<BadCase> {};
 
-TEST_P(BadMeshes, are_refused_on_every_rank_with_the_element_named) {
+TEST_P(BadMeshes, collective_refusal) {
   mesh::TetMesh box = tests::make_box({4, 3, 2}, {4, 3, 2});
   GetParam().spoil(box);
   const SharedFile file(box);
@@ -326,14 +326,14 @@ INSTANTIATE_TEST_SUITE_P(
             "all_fixed", [](mesh::TetMesh&) {}, "names every node", {.order = 1, .fixed = {{.box_m = Box{{{-1, -1, -1}, {8, 8, 8}}}}}}}),
     [](const auto& info) { return info.param.name; });
 
-TEST(Format, is_known_by_its_first_bytes) {
+TEST(Format, detection_by_signature) {
   const SharedFile file(tests::make_box({1, 1, 1}, {1, 1, 1}));
   EXPECT_TRUE(is_parallel_format(file.path()));
   EXPECT_FALSE(is_parallel_format("/proc/self/status"));
   EXPECT_FALSE(is_parallel_format("/no/such/file"));
 }
 
-TEST(FewElements, for_many_ranks_are_refused_and_one_each_is_enough) {
+TEST(FewElements, one_per_rank) {
   mesh::TetMesh one;
   one.nodes_m = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   one.tets = {0, 1, 2, 3};

@@ -1,4 +1,4 @@
-// Writes meshes as VTKHDF files, with HDF5's own functions and in the words of VTK's description of the format.
+// Writes meshes as VTKHDF files with HDF5, after VTK's format description.
 #pragma once
 
 #include <hdf5.h>

@@ -1,4 +1,4 @@
-// Measures of a mesh that share no code with the mesher: volume by the divergence theorem, conformity, dihedral angles, Jacobians.
+// Mesh measures independent of the mesher's code: volume by the divergence theorem, conformity, dihedral angles, Jacobians.
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// The parametric bodies against closed forms, and against measures of quality that share no code with them.
+// Parametric bodies against closed forms and independent quality measures.
 #include "precompute/mesh/shapes/shapes.hpp"
 
 #include <fmt/core.h>
@@ -74,7 +74,7 @@ std::string describe(const Case& body, int order) {
   return text;
 }
 
-TEST(Shapes, every_body_is_a_conforming_mesh_of_upright_elements_without_slivers) {
+TEST(Shapes, conformity_and_quality) {
   for (const Case& body : get_cases()) {
     for (int order : {1, 2}) {
       SCOPED_TRACE(describe(body, order));
@@ -93,7 +93,7 @@ TEST(Shapes, every_body_is_a_conforming_mesh_of_upright_elements_without_slivers
   }
 }
 
-TEST(Shapes, the_boundary_has_the_topology_of_the_body) {
+TEST(Shapes, boundary_topology) {
   for (const Case& body : get_cases()) {
     SCOPED_TRACE(describe(body, 1));
     const mesh::TetMesh mesh = make(body.shape, body.dimensions, 1, 3000);
@@ -116,7 +116,7 @@ TEST(Shapes, the_boundary_has_the_topology_of_the_body) {
   }
 }
 
-TEST(Shapes, the_node_count_is_within_ten_percent) {
+TEST(Shapes, node_count) {
   for (const Case& body : get_cases()) {
     for (int order : {1, 2}) {
       SCOPED_TRACE(describe(body, order));
@@ -128,7 +128,7 @@ TEST(Shapes, the_node_count_is_within_ten_percent) {
   }
 }
 
-TEST(Shapes, quadratic_bodies_have_the_closed_form_volume) {
+TEST(Shapes, quadratic_volumes) {
   for (const Case& body : get_cases()) {
     SCOPED_TRACE(describe(body, 2));
     const bool flat = body.shape == "bar" || body.shape == "plate" || body.shape == "box" || body.shape == "hollow-box";
@@ -137,7 +137,7 @@ TEST(Shapes, quadratic_bodies_have_the_closed_form_volume) {
   }
 }
 
-TEST(Shapes, the_volume_converges_with_the_square_of_the_edge_for_linear_and_the_fourth_power_for_quadratic_elements) {
+TEST(Shapes, volume_convergence_order) {
   const double bowl = 0.5 * calc_shell_volume(0.08, 0.06);
   const double tube = kPi * 0.03 * (0.02 * 0.02 - 0.01 * 0.01);
   const double ball = calc_shell_volume(0.05, 0.0);
@@ -161,7 +161,7 @@ TEST(Shapes, the_volume_converges_with_the_square_of_the_edge_for_linear_and_the
   }
 }
 
-// The nodes of all boundary faces, mid-side nodes among them.
+// Nodes of all boundary faces, including mid-side nodes.
 std::set<int> find_boundary_nodes(const mesh::TetMesh& mesh) {
   std::map<std::array<int, 3>, std::array<int, 6>> once;
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e) {
@@ -185,7 +185,7 @@ std::set<int> find_boundary_nodes(const mesh::TetMesh& mesh) {
   return result;
 }
 
-TEST(Shapes, boundary_nodes_of_quadratic_spheres_lie_on_the_sphere) {
+TEST(Shapes, sphere_boundary_nodes) {
   for (long long nodes : {700, 3000, 11000}) {
     const mesh::TetMesh mesh = make("sphere", {}, 2, nodes);
     const std::set<int> boundary = find_boundary_nodes(mesh);
@@ -195,7 +195,7 @@ TEST(Shapes, boundary_nodes_of_quadratic_spheres_lie_on_the_sphere) {
   }
 }
 
-TEST(Shapes, boundary_nodes_of_quadratic_tubes_lie_on_the_cylinders_or_the_ends) {
+TEST(Shapes, tube_boundary_nodes) {
   const mesh::TetMesh mesh = make("tube", {}, 2, 8000);
   int inner = 0, outer = 0;
   for (int node : find_boundary_nodes(mesh)) {
@@ -212,7 +212,7 @@ TEST(Shapes, boundary_nodes_of_quadratic_tubes_lie_on_the_cylinders_or_the_ends)
   EXPECT_EQ(static_cast<int>(mesh.node_sets.at("outer").size()), outer);
 }
 
-TEST(Shapes, boundary_nodes_of_quadratic_bowls_lie_on_the_spheres_or_the_cone_of_the_rim) {
+TEST(Shapes, bowl_boundary_nodes) {
   for (double opening : {100.0, 180.0, 250.0}) {
     const mesh::TetMesh mesh = make("bowl", {{"opening-angle", opening}}, 2, 8000);
     const double cosine = -std::cos(opening * kPi / 360.0);
@@ -228,7 +228,7 @@ TEST(Shapes, boundary_nodes_of_quadratic_bowls_lie_on_the_spheres_or_the_cone_of
   }
 }
 
-TEST(Shapes, boundary_nodes_of_quadratic_round_sections_lie_on_their_surfaces_and_the_sets_name_them) {
+TEST(Shapes, round_section_boundary_nodes) {
   struct Round {
     std::string shape;
     Values dimensions;
@@ -283,7 +283,7 @@ TEST(Shapes, boundary_nodes_of_quadratic_round_sections_lie_on_their_surfaces_an
   }
 }
 
-TEST(Shapes, node_sets_hold_exactly_the_nodes_of_their_face) {
+TEST(Shapes, node_set_contents) {
   const std::array<double, 3> edges{0.2, 0.15, 0.1};
   for (int order : {1, 2}) {
     for (const char* shape : {"box", "hollow-box"}) {
@@ -312,7 +312,7 @@ TEST(Shapes, node_sets_hold_exactly_the_nodes_of_their_face) {
   for (auto node : tube.node_sets.at("end-max")) EXPECT_EQ(tube.nodes_m[node][0], 0.15);
 }
 
-TEST(Shapes, every_declared_node_set_is_in_the_mesh) {
+TEST(Shapes, declared_node_sets) {
   for (const Shape& shape : get_shapes()) {
     if (shape.name == "sphere") continue;  // its sets depend on the wall
     const mesh::TetMesh mesh = make(shape.name, {}, 1, 2000);
@@ -321,7 +321,7 @@ TEST(Shapes, every_declared_node_set_is_in_the_mesh) {
   }
 }
 
-TEST(Shapes, an_evenly_divided_square_bar_keeps_its_mirror_planes) {
+TEST(Shapes, square_bar_symmetry) {
   const mesh::TetMesh mesh = make_box({0.4, 0.1, 0.1}, {8, 2, 2});
   std::set<std::set<std::array<long, 3>>> tets, mirrored, turned;
   const auto key = [](double v) { return std::lround(v * 1e6); };
@@ -341,7 +341,7 @@ TEST(Shapes, an_evenly_divided_square_bar_keeps_its_mirror_planes) {
   EXPECT_EQ(tets, turned);
 }
 
-TEST(Shapes, the_edge_length_asked_for_is_about_the_edge_length_made) {
+TEST(Shapes, edge_length) {
   for (const char* shape : {"box", "sphere", "bowl"}) {
     ShapeOptions options{.shape = shape};
     options.edge_m = 0.008;
@@ -358,13 +358,13 @@ TEST(Shapes, the_edge_length_asked_for_is_about_the_edge_length_made) {
   }
 }
 
-TEST(Shapes, the_same_options_give_the_same_mesh) {
+TEST(Shapes, determinism) {
   const mesh::TetMesh a = make("bowl", {}, 2, 3000), b = make("bowl", {}, 2, 3000);
   EXPECT_EQ(a.nodes_m, b.nodes_m);
   EXPECT_EQ(a.tets, b.tets);
 }
 
-TEST(Shapes, extreme_but_valid_bodies_still_have_upright_unfolded_elements) {
+TEST(Shapes, extreme_bodies) {
   struct Extreme {
     std::string shape;
     Values dimensions;
@@ -393,7 +393,7 @@ TEST(Shapes, extreme_but_valid_bodies_still_have_upright_unfolded_elements) {
   }
 }
 
-TEST(Shapes, bad_orders_name_what_is_wrong_and_what_would_correct_it) {
+TEST(Shapes, refusals) {
   const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
   struct Bad {
     ShapeOptions options;

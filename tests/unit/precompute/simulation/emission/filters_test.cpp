@@ -1,4 +1,4 @@
-// The low-pass from steps to samples, the delay and the DC blocker, by single tones.
+// Low-pass from steps to samples, delay and DC blocker, by single tones.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "precompute/simulation/emission/weights.hpp"
-#include "runtime/base/error.hpp"
 #include "runtime/acoustics/recording/high_pass.hpp"
+#include "runtime/base/error.hpp"
 #include "tests/unit/precompute/simulation/emission/motions.hpp"
 
 namespace carillon::emission {
@@ -17,14 +17,14 @@ using namespace testing;
 using recording::calc_alpha;
 using recording::HighPass;
 
-/// What is heard of a tone of a small pulsating sphere, over rho Q' / (4 pi r) of the same velocity at the frequency of `reference_hz`.
+/// Received tone of a small pulsating sphere, over rho Q' / (4 pi r) of the same velocity at the frequency `reference_hz`.
 double find_gain(double freq_hz, double reference_hz, int steps, double r = 0.5) {
   const double radius = 1e-4, omega = kTwoPi * freq_hz, speed = 1e-3;
   const Options options = make_options(1200, {0.0, 0.0, r}, steps);
   const air::testing::Skin skin = air::testing::make_ball(2, radius);
   const auto sound = hear_shape(
       make_part(skin), options, [](const Vec3& x) { return normalise(x); }, [&](double t) { return speed / omega * std::sin(omega * t); });
-  double area = 0.0;  // the derivative of the volume of the polyhedron
+  double area = 0.0;  // derivative of the polyhedron's volume
   for (const Triangle& t : skin.triangles) {
     const Vec3 twice = cross(skin.nodes_m[t[1]] - skin.nodes_m[t[0]], skin.nodes_m[t[2]] - skin.nodes_m[t[0]]);
     for (const std::int32_t node : t) area += dot(normalise(skin.nodes_m[node]), twice) / 6.0;
@@ -33,19 +33,19 @@ double find_gain(double freq_hz, double reference_hz, int steps, double r = 0.5)
   return heard / (kRho * kTwoPi * reference_hz * speed * area / (kTwoPi * 2.0 * r));
 }
 
-TEST(LowPass, ASmallPulsatingSphereRadiatesItsVolume) {
+TEST(LowPass, PulsatingSphere) {
   for (const double freq_hz : {100.0, 1000.0, 5000.0, 10000.0, 15000.0})
     EXPECT_NEAR(find_gain(freq_hz, freq_hz, 16), 1.0, 1.2e-3) << freq_hz << " Hz";  // ka = 0.03 at 15 kHz
   for (const double freq_hz : {1000.0, 5000.0}) EXPECT_NEAR(find_gain(freq_hz, freq_hz, 64), 1.0, 1e-3) << freq_hz << " Hz, 64 steps";
 }
 
-TEST(LowPass, PassesTheBandToTwentyKilohertzThroughAllStages) {
+TEST(LowPass, PassBandTo20kHz) {
   for (const int steps : {4, 16, 20, 68, 112})
     for (const double freq_hz : {50.0, 8000.0, 16000.0, 19200.0, 20000.0})
       EXPECT_NEAR(to_db(find_gain(freq_hz, freq_hz, steps)), 0.0, 0.1) << freq_hz << " Hz, " << steps << " steps";
 }
 
-TEST(LowPass, TheDelayIsFlatToFourTenthsOfTheRate) {
+TEST(LowPass, DelayFlatness) {
   for (const double part : {0.0, 0.25, 0.5, 0.77}) {
     const double r = (100.0 + part) * kC / 48000.0;
     for (const double freq_hz : {1000.0, 10000.0, 19200.0})
@@ -53,8 +53,8 @@ TEST(LowPass, TheDelayIsFlatToFourTenthsOfTheRate) {
   }
 }
 
-TEST(LowPass, WhatIsFoldedIntoTheBandIsSixtyDecibelsDown) {
-  // Folded to f - 48 kHz and so on; at 16 * 48 kHz - f and 32 * 48 kHz - f it is the boxes of steps that hold it back.
+TEST(LowPass, AliasRejection) {
+  // Aliases at f - 48 kHz and so on; at 16 * 48 kHz - f and 32 * 48 kHz - f the box averages attenuate them.
   for (const int steps : {16, 112})
     for (const double low_hz : {1000.0, 9000.0, 19000.0, 19900.0})
       for (const double image_hz : {48e3, 96e3, 144e3, 192e3, 384e3, 768e3}) {
@@ -65,7 +65,7 @@ TEST(LowPass, WhatIsFoldedIntoTheBandIsSixtyDecibelsDown) {
       }
 }
 
-TEST(LowPass, StepsAreRoundedUpToWhatCanBeFiltered) {
+TEST(LowPass, StepRounding) {
   EXPECT_EQ(find_steps(1), 4);
   EXPECT_EQ(find_steps(64), 64);
   EXPECT_EQ(find_steps(101), 104);
@@ -85,7 +85,7 @@ double find_blocker_gain(double freq_hz, double alpha, double rate_hz) {
   return std::abs(find_amplitude(out, freq_hz, rate_hz, 20000, 60000));
 }
 
-TEST(HighPass, ItsCornerIsWhereItWasAsked) {
+TEST(HighPass, CornerFrequency) {
   const double half_power_db = to_db(std::sqrt(0.5));
   for (const double corner_hz : {20.0, 100.0, 400.0}) {
     const double alpha = calc_alpha(corner_hz, 48000.0), top = 2.0 / (2.0 - alpha);
@@ -96,7 +96,7 @@ TEST(HighPass, ItsCornerIsWhereItWasAsked) {
   EXPECT_LT(find_blocker_gain(1.0, calc_alpha(20.0, 48000.0), 48000.0), 0.051);
 }
 
-TEST(LowPass, BothStagesHaveOneFlatResponse) {
+TEST(LowPass, CombinedResponse) {
   const MotionWeights weights = make_motion_weights();
   constexpr int kSteps = 64;  // a half-sample
   const auto find_response = [&](double rate, bool is_velocity) {
@@ -124,7 +124,7 @@ TEST(LowPass, BothStagesHaveOneFlatResponse) {
   }
 }
 
-TEST(Derivative, IsThatOfATone) {
+TEST(Derivative, OfATone) {
   const auto weights = make_derivative();
   for (int i = 1; i <= 420; ++i) {
     const double omega = kTwoPi * 1e-3 * i;
@@ -134,7 +134,7 @@ TEST(Derivative, IsThatOfATone) {
   }
 }
 
-TEST(HighPass, WhatIsConstantFromTheBeginningIsNeverHeard) {
+TEST(HighPass, ConstantInput) {
   HighPass blocker;
   for (int n = 0; n < 10; ++n) EXPECT_EQ(blocker.next(7.0, 0.1), 0.0);
 }

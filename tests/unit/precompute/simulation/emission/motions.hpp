@@ -1,4 +1,4 @@
-// Bodies that move as a formula says, and what is heard of them.
+// Bodies with analytic motion, and their received sound.
 #pragma once
 
 #include <mpi.h>
@@ -32,7 +32,7 @@ inline SurfacePart make_part(const air::testing::Skin& skin) {
   return part;
 }
 
-/// The displacement of a node at rest in x at time t.
+/// Displacement at time t of a node at rest position x.
 using Motion = std::function<Vec3(const Vec3& x, double t)>;
 
 inline std::vector<double> calc_displacement(const SurfacePart& part, const Motion& motion, double t) {

@@ -1,4 +1,4 @@
-// The same bits on any number of ranks: triangles are dealt out to ranks, and each rank alone does the whole, too.
+// Bit-identical results on any number of ranks: triangles distributed over ranks, and the whole on each rank alone.
 #include "tests/support/ranks.hpp"
 
 #include <gtest/gtest.h>
@@ -60,7 +60,7 @@ std::vector<double> play(const comm::Communicator& comm, const SurfacePart& part
   return sound.calc_sound(0);
 }
 
-TEST(Ranks, SoundHasTheSameBits) {
+TEST(Ranks, BitIdenticalSound) {
   const SurfacePart whole = make_part(air::testing::make_ball(4, 0.04)), part = deal(whole);
   for (const Radiation radiation : {Radiation::kKirchhoff, Radiation::kRayleigh, Radiation::kPaper2001}) {
     Options options = make_options(260, {0.3, 0.1, 0.2}, 16);
@@ -71,7 +71,7 @@ TEST(Ranks, SoundHasTheSameBits) {
   }
 }
 
-TEST(Ranks, RecordedSurfacesHaveTheSameBits) {
+TEST(Ranks, BitIdenticalRecordedSurfaces) {
   const SurfacePart whole = make_part(air::testing::make_ball(3, 0.04)), part = deal(whole);
   const tests::Folder own;
   const comm::Communicator comm(MPI_COMM_WORLD);
@@ -87,7 +87,7 @@ TEST(Ranks, RecordedSurfacesHaveTheSameBits) {
   comm.agree([] {});
 }
 
-TEST(Ranks, AllRanksThrowWhatOneFinds) {
+TEST(Ranks, CollectiveErrors) {
   SurfacePart part = deal(make_part(air::testing::make_ball(2, 0.04)));
   Options options = make_options(60, {0.3, 0.1, 0.2}, 16);
   if (tests::get_rank() == 0) part.triangles[0][0] = 100000;

@@ -21,7 +21,7 @@ double find_most(std::span<const double> sound) {
   return most;
 }
 
-TEST(Sound, UniformMotionIsSilentThroughAChangeOfTheStep) {
+TEST(Sound, UniformMotionAcrossStepChange) {
   const auto part = make_part(air::testing::make_ball(3, 0.05));
   Options options = make_options(300, {1.0, 2.0, 0.5}, 16);
   const auto motion = [](const Vec3&, double t) { return t * Vec3{20.0, -7.0, 3.0}; };
@@ -39,7 +39,7 @@ TEST(Sound, UniformMotionIsSilentThroughAChangeOfTheStep) {
   EXPECT_LT(find_most(sound.calc_sound(0)), 1e-7);  // -46 dB of the threshold of hearing, of a body at 21 m/s
 }
 
-TEST(Sound, AToneIsTheSameThroughAChangeOfTheStep) {
+TEST(Sound, ToneAcrossStepChange) {
   const auto part = make_part(air::testing::make_ball(2, 0.01));
   const Options options = make_options(600, {0.0, 0.0, 0.3}, 16);
   const auto motion = [](const Vec3& x, double t) { return 1e-6 * std::sin(kTwoPi * 3000.0 * t) * normalise(x); };
@@ -59,8 +59,8 @@ TEST(Sound, AToneIsTheSameThroughAChangeOfTheStep) {
   for (std::size_t n = 0; n < whole.size(); ++n) EXPECT_NEAR(changed[n], whole[n], 2e-3 * find_most(whole)) << n;
 }
 
-TEST(Sound, TheImpulsesOfAClosedSurfaceAreThoseOfItsVolume) {
-  // From rest to rest the integral of the pressure is 0, and the integral of that rho dV / (4 pi r), of one pole as of monopoles.
+TEST(Sound, ImpulsesOfAClosedSurface) {
+  // From rest to rest the integral of the pressure is 0, and its double integral is rho dV / (4 pi r), for one pole as for monopoles.
   air::testing::Skin skin = air::testing::make_ball(2, 0.01);
   const auto part = make_part(skin);
   const auto shape = [](const Vec3& x) { return Vec3{0.01 * x[0], -0.004 * x[1], 0.002 * x[2]}; };
@@ -86,16 +86,16 @@ TEST(Sound, TheImpulsesOfAClosedSurfaceAreThoseOfItsVolume) {
   }
 }
 
-TEST(Sound, ASwingingSourceIsHeardAsItsRetardedPotential) {
-  // A small pulsating sphere on a pendulum, t = s + r(s) / c, M = -r' / c. A source of one point is heard as rho Q'(s) / (4 pi r (1 - M));
-  // the facets in front and behind are heard at other times, and their areas grow, which adds M 2/3 (1 - M)^-2: the sum over facets of V.S'
-  // (n.x) is 2/3 of V.n Q.
+TEST(Sound, RetardedPotentialOfASwingingSource) {
+  // A small pulsating sphere on a pendulum, t = s + r(s) / c, M = -r' / c. A point source gives rho Q'(s) / (4 pi r (1 - M)); front and
+  // rear facets arrive at different times, and their areas grow, which adds M 2/3 (1 - M)^-2: the sum over facets of V.S' (n.x) is 2/3 of
+  // V.n Q.
   const double radius = 1e-3, freq_hz = 2000.0, omega = kTwoPi * freq_hz, swing = kTwoPi * 3.0;
   const Vec3 ear{0.0, 1.5, 0.0};
   const auto centre = [&](double t) { return Vec3{0.0, 0.6 * std::sin(swing * t), 0.0}; };
   const air::testing::Skin skin = air::testing::make_ball(2, radius);
   Options options = make_options(9600, ear, 16);
-  options.radiation = Radiation::kRayleigh;  // the monopoles alone, twice
+  options.radiation = Radiation::kRayleigh;  // monopoles only, twice
   const double amplitude = 1e-6;
   const auto sound =
       hear(make_part(skin), options, [&](const Vec3& x, double t) { return centre(t) + amplitude * std::sin(omega * t) * normalise(x); });
@@ -120,8 +120,8 @@ TEST(Sound, ASwingingSourceIsHeardAsItsRetardedPotential) {
   EXPECT_LT(std::sqrt(error / power), 3e-3);
 }
 
-TEST(Sound, ATumblingRigidBodyMakesNoTone) {
-  // A cube that spins is no pump: its volume does not change, whatever its facets do.
+TEST(Sound, SilentTumblingRigidBody) {
+  // A spinning cube does not change its volume.
   air::testing::Skin skin = air::testing::make_ball(4, 0.05);
   const auto part = make_part(skin);
   const double spin = kTwoPi * 40.0;
@@ -134,8 +134,8 @@ TEST(Sound, ATumblingRigidBodyMakesNoTone) {
   EXPECT_LT(find_most(std::span(sound).subspan(200)), 2e-2 * scale);
 }
 
-// The two sides of a sheet go out as one; with nodes of their own they are two surfaces.
-TEST(Sound, TheSidesOfASheetAreHeardAsTheTwoSurfacesThatTheyAre) {
+// The two sides of a sheet act as one; with nodes of their own they are two surfaces.
+TEST(Sound, SheetAsTwoSurfaces) {
   const auto listen = [](std::int32_t apart) {
     SurfacePart part;
     const std::vector<Vec3> corners{{-0.1, -0.1, 0}, {0.1, -0.1, 0}, {0.1, 0.1, 0}, {-0.1, 0.1, 0}};
@@ -159,7 +159,7 @@ TEST(Sound, TheSidesOfASheetAreHeardAsTheTwoSurfacesThatTheyAre) {
   EXPECT_LT(difference, 1e-9 * most);
 }
 
-TEST(Sound, ReceiversHaveDirections) {
+TEST(Sound, ReceiverDirectivity) {
   const auto part = make_part(air::testing::make_ball(2, 1e-3));
   Options options = make_options(800, {0.0, 0.0, 1.0}, 16);
   Microphone eight;
@@ -185,7 +185,7 @@ TEST(Sound, ReceiversHaveDirections) {
   EXPECT_LT(find_most(sound.calc_sound(3)), 2e-3 * whole);
 }
 
-TEST(Sound, EarsAreTwentyCentimetresApartAtRightAnglesToTheView) {
+TEST(Sound, EarPositions) {
   const auto ears = make_ears({1.0, -2.0, 0.5}, {1.0, 5.0, 3.0});
   ASSERT_EQ(ears.size(), 2U);
   EXPECT_NEAR(ears[0].place_m[0], 0.9, 1e-12);
@@ -194,7 +194,7 @@ TEST(Sound, EarsAreTwentyCentimetresApartAtRightAnglesToTheView) {
   EXPECT_THROW(make_ears({0, 0, 1}, {0, 0, 0}), InputError);
 }
 
-TEST(Sound, ACheckpointContinuesWithTheSameBits) {
+TEST(Sound, BitIdenticalResumption) {
   const auto part = make_part(air::testing::make_ball(3, 0.03));
   for (const Radiation radiation : {Radiation::kKirchhoff, Radiation::kRayleigh, Radiation::kPaper2001}) {
     Options options = make_options(220, {0.2, 0.1, 0.4}, 16);
@@ -222,7 +222,7 @@ TEST(Sound, ACheckpointContinuesWithTheSameBits) {
   }
 }
 
-TEST(Sound, AMotionThatBlowsUpEndsInOneError) {
+TEST(Sound, UnstableMotion) {
   const auto part = make_part(air::testing::make_ball(1, 0.03));
   Emission sound(MPI_COMM_SELF, part, make_options(80, {0.0, 0.0, 0.3}, 16));
   for (int n = 0; n <= 80 * 16; ++n)
@@ -233,7 +233,7 @@ TEST(Sound, AMotionThatBlowsUpEndsInOneError) {
   EXPECT_NE(tests::catch_message<SolveError>([&] { sound.finish(); }).find("not stable"), std::string::npos);
 }
 
-TEST(Sound, ARunThatStopsEarlyIsNotFinished) {
+TEST(Sound, MissingSteps) {
   const auto part = make_part(air::testing::make_ball(1, 0.03));
   Emission sound(MPI_COMM_SELF, part, make_options(50, {0.0, 0.0, 0.3}, 16));
   for (int n = 0; n < 20 * 16; ++n)
@@ -243,7 +243,7 @@ TEST(Sound, ARunThatStopsEarlyIsNotFinished) {
   EXPECT_NE(tests::catch_message<SolveError>([&] { sound.finish(); }).find("20 samples of 50"), std::string::npos);
 }
 
-TEST(Sound, InputThatCannotBeUsedIsRefused) {
+TEST(Sound, InvalidInput) {
   auto part = make_part(air::testing::make_ball(1, 0.03));
   Options options = make_options(50, {0.0, 0.0, 0.3}, 17);
   EXPECT_NE(tests::catch_message<InputError>([&] {

@@ -1,5 +1,5 @@
-// Spheres that vibrate as Legendre polynomials: the error of the far pressure of each way from motion to sound, as a quadrature of its
-// formula gives it (docs/equations.md E14), and none at all for a pulsating sphere.
+// Spheres vibrating in Legendre polynomials: far-field error of each radiation formula against a quadrature of the formula
+// (docs/equations.md E14); zero for a pulsating sphere.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -39,7 +39,7 @@ double calc_exact(int l, double ka, double kr) {
   return kRho * kC * std::abs(calc_hankel(l, kr) / slope);
 }
 
-/// The error in dB of the pressure in the direction where the polynomial is 1.
+/// Error [dB] of the pressure in the direction where the polynomial is 1.
 double find_error(Radiation radiation, int l, double ka) {
   const double k = kTwoPi * kFreq / kC, radius = ka / k, kr = std::max(200.0, 3.0 * ka * ka), r = kr / k;
   const bool is_paper = radiation == Radiation::kPaper2001;
@@ -58,13 +58,13 @@ double find_error(Radiation radiation, int l, double ka) {
       },
       [&](double t) { return speed / omega * std::sin(omega * t); });
   double heard = std::abs(find_amplitude(sound, kFreq, rate, delay + 200, delay + 488));
-  if (is_paper) heard *= kFreq / kC;  // the derivative that eq. 10 lacks: (1 / 2 pi c) d/dt
+  if (is_paper) heard *= kFreq / kC;  // the derivative missing in eq. 10: (1 / 2 pi c) d/dt
   return to_db(heard / (speed * calc_exact(l, ka, kr)));
 }
 
 constexpr std::array<double, 4> kKa{0.1, 1.0, 5.0, 20.0};
 
-TEST(Sphere, KirchhoffWithOnePoleIsAsFarOffAsItsFormula) {
+TEST(Sphere, KirchhoffError) {
   const double wanted[4][4] = {{0.0, 2.4, 5.1, 7.1}, {0.0, -0.2, 2.0, 4.1}, {0.0, -0.3, -0.4, 0.3}, {0.0, 0.0, 0.0, -0.1}};
   for (std::size_t i = 0; i < 4; ++i)
     for (int l = 0; l < 4; ++l) {
@@ -74,14 +74,14 @@ TEST(Sphere, KirchhoffWithOnePoleIsAsFarOffAsItsFormula) {
     }
 }
 
-TEST(Sphere, RayleighIsAsFarOffAsItsFormula) {
+TEST(Sphere, RayleighError) {
   const double wanted[3][4] = {{6.0, 2.5, 1.6, 1.2}, {7.5, 2.6, 1.4, 1.1}, {5.8, -0.4, 2.3, 6.5}};
   for (std::size_t i = 0; i < 3; ++i)
     for (int l = 0; l < 4; ++l)
       EXPECT_NEAR(find_error(Radiation::kRayleigh, l, kKa[i]), wanted[i][l], 0.3) << "ka " << kKa[i] << ", l " << l;
 }
 
-TEST(Sphere, Paper2001IsAsFarOffAsItsFormulaWithTheMissingDerivative) {
+TEST(Sphere, Paper2001Error) {
   const double wanted[3][4] = {{-23.5, 22.5, 27.6, 30.7}, {-1.4, 0.6, 6.7, 10.3}, {-0.3, 3.8, 4.6, -6.9}};
   for (std::size_t i = 0; i < 3; ++i)
     for (int l = 0; l < 4; ++l)

@@ -1,4 +1,4 @@
-// Recorded surfaces: what is played is what was heard, runs that resume, files that are cut or changed.
+// Recorded surfaces: playback, resumed runs, truncated and modified files.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -22,7 +22,7 @@ using namespace testing;
 
 constexpr std::uint64_t kFrames = 1500;
 
-/// Two balls: one flies, turns and rings, the other one rings.
+/// Two balls: one flies, rotates and rings, the other one rings.
 SurfacePart make_pair() {
   SurfacePart part = make_part(air::testing::make_ball(3, 0.03));
   const SurfacePart other = make_part(air::testing::make_ball(2, 0.05));
@@ -77,7 +77,7 @@ class SurfaceFiles : public ::testing::Test {
   static inline std::vector<std::vector<double>> heard;
 };
 
-TEST_F(SurfaceFiles, WhatIsPlayedIsWhatWasHeard) {
+TEST_F(SurfaceFiles, PlaybackMatchesSound) {
   const recording::RecordedSurface recording(file);
   EXPECT_EQ(recording.get_header().frames, kFrames);
   EXPECT_EQ(recording.get_header().bodies, 2U);
@@ -106,7 +106,7 @@ TEST_F(SurfaceFiles, WhatIsPlayedIsWhatWasHeard) {
   EXPECT_EQ(silence[3999], 0.0);  // all has arrived
 }
 
-TEST_F(SurfaceFiles, PlacesAreThoseOfTheMotionToAStep) {
+TEST_F(SurfaceFiles, RecordedPositions) {
   const recording::RecordedSurface recording(file);
   const SurfacePart part = make_pair();
   std::vector<Vec3> places(part.nodes_m.size());
@@ -118,7 +118,7 @@ TEST_F(SurfaceFiles, PlacesAreThoseOfTheMotionToAStep) {
   }
 }
 
-TEST_F(SurfaceFiles, ARunThatResumesMakesTheSameFile) {
+TEST_F(SurfaceFiles, ResumedRun) {
   const SurfacePart part = make_pair();
   Options options = make_file_options(*folder / "again.surface.hdf");
   std::vector<std::byte> state;
@@ -126,7 +126,7 @@ TEST_F(SurfaceFiles, ARunThatResumesMakesTheSameFile) {
     Emission first(MPI_COMM_SELF, part, options);
     for (int n = 0; n < 9000; ++n) first.add_step(calc_displacement(part, move, n / 768e3).data());
     state = first.save();
-    for (int n = 9000; n < 18000; ++n) first.add_step(calc_displacement(part, move, n / 768e3).data());  // lost
+    for (int n = 9000; n < 18000; ++n) first.add_step(calc_displacement(part, move, n / 768e3).data());  // discarded
   }
   EXPECT_FALSE(std::filesystem::exists(options.surface_file));
   options.is_resumed = true;
@@ -139,7 +139,7 @@ TEST_F(SurfaceFiles, ARunThatResumesMakesTheSameFile) {
             std::string::npos);
 }
 
-TEST_F(SurfaceFiles, AFileOfAnotherRunIsNotContinued) {
+TEST_F(SurfaceFiles, FileOfAnotherRun) {
   const SurfacePart part = make_pair();
   Options options = make_file_options(*folder / "other.surface.hdf");
   { Emission first(MPI_COMM_SELF, part, options); }
@@ -148,7 +148,7 @@ TEST_F(SurfaceFiles, AFileOfAnotherRunIsNotContinued) {
   EXPECT_NE(tests::catch_message<InputError>([&] { Emission(MPI_COMM_SELF, part, options); }).find("is of another run"), std::string::npos);
 }
 
-TEST_F(SurfaceFiles, EveryCutIsOneClearError) {
+TEST_F(SurfaceFiles, TruncatedFiles) {
   const std::string bytes = tests::read_all(file);
   std::vector<std::size_t> cuts;
   for (std::size_t n = 0; n < 4300; ++n) cuts.push_back(n);
@@ -163,7 +163,7 @@ TEST_F(SurfaceFiles, EveryCutIsOneClearError) {
   EXPECT_NE(tests::catch_message<InputError>([&] { recording::RecordedSurface{path}; }).find("truncated: 100000 bytes"), std::string::npos);
 }
 
-TEST_F(SurfaceFiles, EveryChangedByteIsFound) {
+TEST_F(SurfaceFiles, ChangedBytes) {
   std::string bytes = tests::read_all(file);
   for (std::size_t at = 0; at < bytes.size(); at += 97777) {
     bytes[at] = static_cast<char>(bytes[at] ^ 0x40);
@@ -173,7 +173,7 @@ TEST_F(SurfaceFiles, EveryChangedByteIsFound) {
   EXPECT_NO_THROW(recording::RecordedSurface(bytes, "whole"));
 }
 
-TEST_F(SurfaceFiles, TablesThatCannotBeAreRefusedEvenWithTheRightDigest) {
+TEST_F(SurfaceFiles, InvalidTablesWithValidDigest) {
   const std::string bytes = tests::read_all(file);
   const recording::RecordedSurface recording(bytes, "whole");
   const auto refuse = [&](recording::Array array, std::size_t at, auto value) {

@@ -1,4 +1,4 @@
-// What stands between a surface and a receiver.
+// Occlusion between surfaces and receivers.
 #include "precompute/simulation/emission/visibility.hpp"
 
 #include <gtest/gtest.h>
@@ -16,7 +16,7 @@ namespace {
 
 using namespace testing;
 
-/// Signed volumes: the way passes through the triangle when the three tetrahedra on it turn the same way.
+/// Signed volumes: the segment crosses the triangle if the three tetrahedra on it have the same sign.
 bool is_crossed(const Corners& t, const Vec3& from, const Vec3& to) {
   const auto volume = [](const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) { return dot(cross(b - a, c - a), d - a); };
   if (volume(t[0], t[1], t[2], from) * volume(t[0], t[1], t[2], to) > 0.0) return false;
@@ -24,7 +24,7 @@ bool is_crossed(const Corners& t, const Vec3& from, const Vec3& to) {
   return (a > 0.0) == (b > 0.0) && (b > 0.0) == (c > 0.0);
 }
 
-TEST(Visibility, TheTreeFindsWhatASearchOfAllTrianglesFinds) {
+TEST(Visibility, TreeAgainstExhaustiveSearch) {
   std::uint64_t state = 7;
   const auto draw = [&] { return base::to_unit(base::draw(state)); };
   const auto place = [&] { return Vec3{draw(), draw(), draw()}; };
@@ -66,7 +66,7 @@ double find_most(const std::vector<double>& sound, std::size_t begin, std::size_
   return most;
 }
 
-TEST(Visibility, ABodyBehindAWallIsSilentWhereTheFormulaHasDelta) {
+TEST(Visibility, BodyBehindAWall) {
   const std::vector<job::RigidObstacle> wall{job::BoxObstacle{{-3, -3, 0.4}, {3, 3, 0.5}}};
   for (const Radiation radiation : {Radiation::kPaper2001, Radiation::kRayleigh}) {
     EXPECT_EQ(find_most(hear_behind(wall, 0.0, radiation), 0, 4000), 0.0);
@@ -75,8 +75,8 @@ TEST(Visibility, ABodyBehindAWallIsSilentWhereTheFormulaHasDelta) {
   EXPECT_GT(find_most(hear_behind(wall, 0.0, Radiation::kKirchhoff), 1000, 4000), 1e-9);
 }
 
-// A sheet has each triangle from both sides: the side that faces the receiver is heard, and the other one is hidden behind it.
-TEST(Visibility, ASheetIsHeardFromItsNearSideAlone) {
+// A sheet has each triangle on both sides: the side that faces the receiver is visible and hides the other one.
+TEST(Visibility, NearSideOfASheet) {
   const auto listen = [](bool has_both, Radiation radiation) {
     SurfacePart part;
     part.nodes_m = {{-0.01, -0.01, 0}, {0.01, -0.01, 0}, {0.01, 0.01, 0}, {-0.01, 0.01, 0}};
@@ -97,20 +97,20 @@ TEST(Visibility, ASheetIsHeardFromItsNearSideAlone) {
   }
 }
 
-TEST(Visibility, ABodyThatGoesBehindAWallFadesWithoutAClick) {
-  // The edge is at x = 0.2, half way; the body passes it at 10 m/s.
+TEST(Visibility, FadeWithoutClick) {
+  // The edge is at x = 0.2, halfway; the body passes it at 10 m/s.
   const std::vector<job::RigidObstacle> wall{job::BoxObstacle{{0.1, -5, 0.49}, {9, 5, 0.5}}};
   const auto sound = hear_behind(wall, 10.0, Radiation::kRayleigh);
   const double before = find_most(sound, 300, 700);
   EXPECT_EQ(find_most(sound, 2000, 4000), 0.0);
   EXPECT_GT(before, 1e-9);
-  // A tone of 1 kHz at 48 kHz has a second difference of (2 pi / 48)^2; a click has one of its own size.
+  // A 1 kHz tone at 48 kHz has a second difference of (2 pi / 48)^2; a click has one of its own amplitude.
   double most = 0.0;
   for (std::size_t n = 300; n < 2000; ++n) most = std::max(most, std::abs(sound[n + 1] - 2.0 * sound[n] + sound[n - 1]));
   EXPECT_LT(most, 2.0 * before * std::pow(kTwoPi / 48.0, 2));
 }
 
-TEST(Visibility, AnObstacleHidesWhatLiesBehindItAndNothingElse) {
+TEST(Visibility, ObstacleShadow) {
   const Vec3 from{0, 0, 0}, to{0, 0, 1};
   const auto hides = [&](const job::RigidObstacle& obstacle) {
     EXPECT_EQ(is_between(obstacle, from, to), is_between(obstacle, to, from));
@@ -150,12 +150,12 @@ std::vector<double> hear_behind_plate(double from_x, double speed, Radiation rad
   });
 }
 
-TEST(Visibility, ASilentSurfaceHidesWhereItIsNow) {
+TEST(Visibility, MovingSilentSurface) {
   for (const Radiation radiation : {Radiation::kPaper2001, Radiation::kRayleigh}) {
     EXPECT_EQ(find_most(hear_behind_plate(0.0, 0.0, radiation), 0, 3000), 0.0);
     const std::vector<double> free = hear_behind_plate(5.0, 0.0, radiation);
     EXPECT_GT(find_most(free, 1000, 3000), 1e-9);
-    // At 20 m/s its edge reaches the way after 20 ms: 960 samples.
+    // At 20 m/s its edge reaches the line of sight after 20 ms: 960 samples.
     const std::vector<double> shut = hear_behind_plate(0.5, -20.0, radiation);
     for (std::size_t n = 0; n < 900; ++n) ASSERT_EQ(shut[n], free[n]) << n;
     EXPECT_EQ(find_most(shut, 1250, 1480), 0.0);
@@ -163,7 +163,7 @@ TEST(Visibility, ASilentSurfaceHidesWhereItIsNow) {
   }
 }
 
-TEST(Visibility, ABallThatFliesThroughTheWayHidesForAWhile) {
+TEST(Visibility, PassingBall) {
   const SurfacePart part = make_part(air::testing::make_ball(2, 0.01));
   const auto play = [&](double begin_y, std::size_t stop_at) {
     Options options = make_options(3000, {0.0, 0.0, 1.0}, 4);

@@ -1,4 +1,4 @@
-// Bent bodies against beams in closed form, and against their own motion.
+// Bent bodies against closed-form beams, and against their own motion.
 #include "precompute/simulation/transient/bend.hpp"
 
 #include <gtest/gtest.h>
@@ -45,7 +45,7 @@ struct Clamped {
   }
 };
 
-TEST(Bend, ABarUnderAForceAtItsEndYieldsAsABeam) {
+TEST(Bend, BarUnderEndForce) {
   Clamped bar;
   const auto pull = [&](double force_n) {
     std::vector<PulledNode> pulled;
@@ -67,7 +67,7 @@ TEST(Bend, ABarUnderAForceAtItsEndYieldsAsABeam) {
   EXPECT_NEAR(back / kLength, 0.0564, 0.002);
 }
 
-TEST(Bend, WhatIsHeldIsWhereItIsHeldAndTheRestIsInBalance) {
+TEST(Bend, HeldNodesAndEquilibrium) {
   Clamped bar;
   for (const std::int32_t node : bar.end) bar.held.push_back({node, {0.0, 0.0, -0.02}});
   const std::vector<Quad> u = calc_equilibrium(bar.world.domain, bar.held, {});
@@ -84,7 +84,7 @@ TEST(Bend, WhatIsHeldIsWhereItIsHeldAndTheRestIsInBalance) {
   EXPECT_LT(free, 1e-6 * held);
 }
 
-TEST(Bend, AModeIsABeamsAndLetGoItSwingsAtItsFrequency) {
+TEST(Bend, FirstModeOfABeam) {
   Clamped bar;
   const ElasticMode first = calc_mode(bar.world.domain, bar.held, 1);
   const double beam = kFirst * kFirst * kThickness / (kLength * kLength) * std::sqrt(kYoung / (12.0 * kDensity));
@@ -114,7 +114,7 @@ TEST(Bend, AModeIsABeamsAndLetGoItSwingsAtItsFrequency) {
   EXPECT_LT(std::abs(motion.calc_book().relative_error), 1e-9);
 }
 
-TEST(Bend, HigherModesAndThoseOfAFreeBarAreBeams) {
+TEST(Bend, HigherAndFreeModes) {
   Clamped bar;
   const double unit = kThickness / (kLength * kLength) * std::sqrt(kYoung / (12.0 * kDensity));
   // In order: flat 1, upright 1 (twice as wide, so twice as high), flat 2.
@@ -123,7 +123,7 @@ TEST(Bend, HigherModesAndThoseOfAFreeBarAreBeams) {
   EXPECT_NEAR(calc_mode(bar.world.domain, {}, 1).omega_rad_s / (unit * 22.3733), 1.0, 0.02);
 }
 
-TEST(Bend, WhatCannotBeInBalanceIsRefused) {
+TEST(Bend, Refusals) {
   Clamped bar;
   std::vector<PulledNode> pulled{{bar.end[0], {0, 0, 1.0}}};
   EXPECT_THROW(calc_equilibrium(bar.world.domain, {}, pulled), InputError);
@@ -134,7 +134,7 @@ TEST(Bend, WhatCannotBeInBalanceIsRefused) {
 }
 
 // A strip as a sheet, with angles of edges.
-TEST(Bend, ASheetYieldsAsABeam) {
+TEST(Bend, SheetStrip) {
   constexpr double kThin = 5e-4;
   SheetBody sheet;
   sheet.mesh = make_rectangle(kLength, kWidth, 40);

@@ -1,4 +1,4 @@
-// Bodies that several tests move.
+// Common bodies of the tests.
 #pragma once
 
 #include <array>
@@ -25,7 +25,7 @@ inline Law make_law(double young_pa, double poisson, double density, double alph
   return law;
 }
 
-/// A box from -edges / 2 to edges / 2. bend_m: inner and outer mid nodes are moved by up to so much, alike in all elements that share them.
+/// Box from -edges / 2 to edges / 2. bend_m: largest displacement of mid nodes, consistent in all elements that share them.
 inline mesh::TetMesh make_box(const std::array<double, 3>& edges_m, const std::array<int, 3>& cells, int order, double bend_m = 0.0) {
   mesh::TetMesh mesh = shapes::make_box(edges_m, cells, order);
   if (bend_m == 0.0) return mesh;
@@ -41,7 +41,7 @@ inline mesh::TetMesh make_box(const std::array<double, 3>& edges_m, const std::a
   return mesh;
 }
 
-/// Bodies on all ranks of a communicator, and what moves them.
+/// Bodies on all ranks of a communicator, and their motion.
 struct World {
   explicit World(std::vector<SolidBody> all_bodies, MPI_Comm communicator = MPI_COMM_WORLD)
       : comm(communicator),
@@ -68,7 +68,7 @@ struct World {
   Domain domain;
 };
 
-/// The number of the node next to a place.
+/// Number of the node nearest to a position.
 inline std::int32_t find_node(const Assembly& assembly, const Vec3& place_m) {
   std::int32_t nearest = 0;
   for (std::int32_t n = 0; n < assembly.node_count(); ++n)
@@ -76,7 +76,7 @@ inline std::int32_t find_node(const Assembly& assembly, const Vec3& place_m) {
   return nearest;
 }
 
-/// A value of a node, on all ranks.
+/// Nodal value, on all ranks.
 inline Vec3 find_value(const Domain& domain, const std::vector<Quad>& values, std::int32_t node) {
   const std::int32_t place = domain.find_place(node);
   std::array<double, 3> value{};

@@ -1,4 +1,4 @@
-// Contact: what is put in comes out. Oracles: restitution and friction of rigid bodies, conservation of momentum and energy, equal bits.
+// Contact. Oracles: restitution and friction of rigid bodies, conservation of momentum and energy, bit-identity.
 #include "precompute/simulation/transient/contact.hpp"
 
 #include <gtest/gtest.h>
@@ -46,10 +46,10 @@ mesh::TetMesh make_block(const Vec3& edges_m, const std::array<int, 3>& cells, c
   return mesh;
 }
 
-TEST(HuntCrossley, factor_gives_the_restitution_that_was_asked_for) {
+TEST(HuntCrossley, restitution) {
   EXPECT_EQ(calc_hunt_crossley(1.0), 0.0);
   for (const double e : {0.2, 0.5, 0.9}) {
-    // One mass on the spring, in small steps.
+    // A single mass on the spring, in small steps.
     const double a = calc_hunt_crossley(e), k = 1e4, m = 0.1, v0 = 2.0, h = 1e-8;
     double d = 0, v = v0;
     do {
@@ -60,8 +60,8 @@ TEST(HuntCrossley, factor_gives_the_restitution_that_was_asked_for) {
   }
 }
 
-// A block falls flat on a hard floor: it leaves with e times its speed, less what it keeps as vibration, and the books close.
-TEST(Contact, a_block_bounces_off_a_plane) {
+// A block falls flat on a hard floor: separation speed e times the impact speed, less vibration; the energy book closes.
+TEST(Contact, bouncing_block) {
   const double speed = 0.5;
   for (const double restitution : {1.0, 0.6}) {
     World world({{"block", make_block({0.02, 0.02, 0.01}, {2, 2, 1}, {0, 0, 0.0052}), make_law(kYoung, 0.3, 1000, 1e-7), 0.0}});
@@ -88,7 +88,7 @@ TEST(Contact, a_block_bounces_off_a_plane) {
 }
 
 // v - mu g t until it stops: a block slides on the floor.
-TEST(Contact, friction_slows_a_sliding_block_by_coulombs_law) {
+TEST(Contact, coulomb_friction_of_a_block) {
   const double g = 9.81, mu = 0.3, speed = 0.2;
   World world({{"block", make_block({0.02, 0.02, 0.01}, {2, 2, 1}, {0, 0, 0.005}), make_law(1e7, 0.3, 1000, 1e-5), 0.0}});
   MotionOptions options;
@@ -106,10 +106,10 @@ TEST(Contact, friction_slows_a_sliding_block_by_coulombs_law) {
   EXPECT_LT(std::abs(motion.calc_book().relative_error), 1e-6);
 }
 
-// A ball on a slope of 20 degrees rolls with 5/7 of g sin a; where the friction is below 2/7 tan a it slips, with g (sin a - mu cos a), and
-// spins up by 5/2 mu g cos a / r. On the level, what slides without spin rolls with 5/7 of its speed, and the books have what friction
-// took.
-TEST(Contact, a_ball_rolls_and_slips) {
+// A ball on a slope of 20 degrees rolls with 5/7 of g sin a; with friction below 2/7 tan a it slips, with g (sin a - mu cos a), and spins
+// up by 5/2 mu g cos a / r. On the level a sliding ball without spin finally rolls with 5/7 of its speed, and the book contains the
+// friction loss.
+TEST(Contact, rolling_and_slipping_ball) {
   const double g = 9.81, radius = 0.01, mass = 0.03, slope = 20.0 * std::numbers::pi / 180.0, along = g * std::sin(slope),
                across = g * std::cos(slope);
   struct Case {
@@ -141,8 +141,8 @@ TEST(Contact, a_ball_rolls_and_slips) {
   }
 }
 
-// Two blocks and a ball meet in the air: momentum is kept, and what is lost is booked.
-TEST(Contact, bodies_and_a_ball_keep_momentum_and_energy) {
+// Two blocks and a ball collide: momentum is conserved, and losses are booked.
+TEST(Contact, momentum_and_energy) {
   World world({{"left", make_block({0.02, 0.02, 0.02}, {2, 2, 2}, {-0.0105, 0, 0}), make_law(kYoung, 0.3, 1000, 1e-7), 0.0},
                {"right", make_block({0.02, 0.01, 0.01}, {2, 1, 1}, {0.0105, 0.001, 0.0015}), make_law(kYoung, 0.3, 1200, 1e-7), 0.0}});
   MotionOptions options;
@@ -170,15 +170,15 @@ TEST(Contact, bodies_and_a_ball_keep_momentum_and_energy) {
     for (int i = 0; i < 40; ++i) motion.advance_sample();
     has_touched = has_touched || contacts.count_touching() > 0;
     EXPECT_LT(norm(find_momentum() - before), 1e-9 * norm(before) + 1e-12);
-    // A contact begins somewhere within a step, which is worth up to half of (omega h)^2 of what the node's spring takes.
+    // Contact begins within a step: error up to half of (omega h)^2 of the spring energy.
     EXPECT_NEAR(find_energy(), energy, 1e-2 * energy);
   }
   EXPECT_TRUE(has_touched);
   EXPECT_LT(contacts.get_strikers()[0].velocity_m_s[0], 1.5);
 }
 
-// Without friction forces lie on the line between the two points: what hits off its centre turns, and the angular momentum of both is kept.
-TEST(Contact, keeps_angular_momentum_where_nothing_rubs) {
+// Without friction forces are central: off-centre impacts cause rotation, and total angular momentum is conserved.
+TEST(Contact, angular_momentum_without_friction) {
   World world({{"left", make_block({0.02, 0.02, 0.02}, {2, 2, 2}, {-0.0105, 0, 0}), make_law(kYoung, 0.3, 1000, 1e-7), 0.0},
                {"right", make_block({0.02, 0.01, 0.01}, {2, 1, 1}, {0.0105, 0.006, 0.004}), make_law(kYoung, 0.3, 1200, 1e-7), 0.0}});
   MotionOptions options;
@@ -200,7 +200,7 @@ TEST(Contact, keeps_angular_momentum_where_nothing_rubs) {
   EXPECT_TRUE(has_touched);
 }
 
-TEST(Contact, a_resumed_run_has_the_same_bits) {
+TEST(Contact, bit_identical_resumption) {
   const auto make = [] {
     return std::vector<SolidBody>{
         {"block", make_block({0.02, 0.02, 0.01}, {2, 2, 1}, {0, 0, 0.0051}), make_law(kYoung, 0.3, 1000, 1e-7), 0.0}};
@@ -234,8 +234,8 @@ TEST(Contact, a_resumed_run_has_the_same_bits) {
   EXPECT_EQ(run(false), run(true));
 }
 
-// The same sum of the whole state's bits as on one rank: written there, compared on more.
-TEST(Contact, has_the_same_bits_on_any_number_of_ranks) {
+// Checksum of the complete state, written on one rank, compared on more.
+TEST(Contact, bit_identical_on_ranks) {
   const auto run = [](MPI_Comm comm) {
     World world({{"left", make_block({0.02, 0.02, 0.02}, {2, 2, 2}, {-0.0102, 0, 0.0105}), make_law(kYoung, 0.3, 1000, 1e-7), 0.0},
                  {"right", make_block({0.02, 0.01, 0.01}, {2, 1, 1}, {0.0102, 0.001, 0.012}), make_law(kYoung, 0.3, 1200, 1e-7), 0.0}},
@@ -262,7 +262,7 @@ TEST(Contact, has_the_same_bits_on_any_number_of_ranks) {
   EXPECT_EQ(ball, ball_alone);
 }
 
-TEST(Contact, refuses_bodies_that_overlap_at_the_start) {
+TEST(Contact, initial_overlap) {
   World world({{"block", make_block({0.02, 0.02, 0.01}, {2, 2, 1}, {0, 0, 0.003}), make_law(kYoung, 0.3, 1000), 0.0}});
   MotionOptions options;
   Motion motion(world.domain, options);

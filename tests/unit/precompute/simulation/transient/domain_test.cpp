@@ -1,4 +1,4 @@
-// What ranks have of the bodies. Oracles: sums over the whole mesh, and what the test makes by hand.
+// Partition of the bodies over ranks. Oracles: sums over the whole mesh, and hand-made values.
 #include "precompute/simulation/transient/domain.hpp"
 
 #include <gtest/gtest.h>
@@ -28,7 +28,7 @@ std::vector<SolidBody> make_two_bodies() {
           {"block", above, make_law(2e6, 0.4, 1100), 3.0}};
 }
 
-TEST(Assembly, keeps_every_element_of_every_body_in_the_order_of_its_nodes) {
+TEST(Assembly, elements_and_node_order) {
   const World world(make_two_bodies());
   const Assembly& all = *world.assembly;
   ASSERT_EQ(all.bodies.size(), 2U);
@@ -59,8 +59,8 @@ TEST(Assembly, keeps_every_element_of_every_body_in_the_order_of_its_nodes) {
   }
 }
 
-// A closed surface: the area vectors of its facets sum up to nothing, and its volume is that of the box.
-TEST(Assembly, skin_is_closed_and_shares_of_a_point_sum_up_to_one) {
+// Closed surface: the facet area vectors sum to zero, and the volume is the box's.
+TEST(Assembly, skin_and_point_shares) {
   const World world(make_two_bodies());
   const auto skin = list_skin(*world.assembly, 0);
   EXPECT_EQ(skin.size(), 2U * 2 * (8 * 2 + 8 * 2 + 2 * 2));
@@ -93,7 +93,7 @@ TEST(Assembly, skin_is_closed_and_shares_of_a_point_sum_up_to_one) {
   }
 }
 
-TEST(Domain, every_node_has_one_owner_and_all_mass_is_there) {
+TEST(Domain, ownership_and_mass) {
   const World world(make_two_bodies());
   std::vector<std::int32_t> owned(world.assembly->node_count(), 0);
   for (std::int32_t i = 0; i < world.domain.own_count(); ++i) ++owned[world.domain.find_number(i)];
@@ -108,7 +108,7 @@ TEST(Domain, every_node_has_one_owner_and_all_mass_is_there) {
             world.assembly->element_count());
 }
 
-TEST(Domain, halo_brings_the_values_of_owners) {
+TEST(Domain, halo_exchange) {
   World world(make_two_bodies());
   std::vector<Quad> values(world.domain.node_count(), Quad{-1, -1, -1, 0});
   for (int round = 1; round < 4; ++round) {
@@ -125,10 +125,10 @@ TEST(Domain, halo_brings_the_values_of_owners) {
   }
 }
 
-TEST(Domain, refuses_a_sliver_and_names_it) {
+TEST(Domain, sliver) {
   std::vector<SolidBody> bodies{{"bar", make_box({0.2, 0.02, 0.02}, {8, 2, 2}, 1), make_law(70e9, 0.33, 2700), 0.0}};
   mesh::TetMesh& mesh = bodies[0].mesh;
-  // One inner node almost onto a facet opposite of it.
+  // One inner node almost on its opposite facet.
   std::int32_t inner = -1;
   for (std::size_t n = 0; n < mesh.nodes_m.size(); ++n)
     if (norm(mesh.nodes_m[n] - Vec3{0.05, 0.0, 0.0}) < 1e-9) inner = static_cast<std::int32_t>(n);
@@ -151,8 +151,8 @@ TEST(Domain, refuses_a_sliver_and_names_it) {
   }
 }
 
-TEST(Domain, refuses_bodies_that_are_no_solids) {
-  EXPECT_EQ(tests::catch_message<InputError>([] { World world(std::vector<SolidBody>{}); }), "there is no body to move");
+TEST(Domain, invalid_solids) {
+  EXPECT_EQ(tests::catch_message<InputError>([] { World world(std::vector<SolidBody>{}); }), "the job has no body");
   std::vector<SolidBody> bodies{{"bar", make_box({0.2, 0.02, 0.02}, {4, 1, 1}, 1), make_law(70e9, 0.33, -2700), 0.0}};
   EXPECT_NE(tests::catch_message<InputError>([&] { World world(bodies); }).find("body 'bar': lambda"), std::string::npos);
   bodies[0].law = make_law(70e9, 0.33, 2700);
@@ -160,8 +160,8 @@ TEST(Domain, refuses_bodies_that_are_no_solids) {
   EXPECT_NE(tests::catch_message<InputError>([&] { World world(bodies); }).find("body 'bar': element 1 of its mesh"), std::string::npos);
 }
 
-// rho t A, of the points alone: angles of edges have an inertia of their own.
-TEST(Domain, a_sheet_has_its_mass_on_any_number_of_ranks) {
+// rho t A, of vertices only: edge angles have their own inertia.
+TEST(Domain, sheet_mass) {
   const comm::Communicator comm(MPI_COMM_WORLD);
   SheetBody sheet{"sheet", make_disc(0.1, 12), {}, {8e10, 6e10, 7000.0, 0.002, 0.0}, 0.0};
   sheet.clamped.assign(sheet.mesh.vertices_m.size(), false);

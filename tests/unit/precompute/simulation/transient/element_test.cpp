@@ -18,7 +18,7 @@ std::vector<Vec3> make_t10(const std::array<Vec3, 4>& corners) {
 }
 const std::array<Vec3, 4> kCorners{Vec3{0.1, 0.0, 0.2}, Vec3{1.3, 0.2, 0.1}, Vec3{0.2, 1.1, 0.0}, Vec3{0.3, 0.2, 0.9}};
 
-TEST(Element, gradients_of_a_tetrahedron_are_those_of_its_barycentric_coordinates) {
+TEST(Element, barycentric_gradients) {
   ElementShape shape;
   ASSERT_TRUE(make_shape(Kind::kT4, kCorners, shape));
   Eigen::Matrix3d edges;
@@ -30,7 +30,7 @@ TEST(Element, gradients_of_a_tetrahedron_are_those_of_its_barycentric_coordinate
   EXPECT_NEAR(shape.weight_m3[0], edges.determinant() / 6.0, 1e-15);
 }
 
-TEST(Element, straight_and_curved_rules_agree_where_edges_are_straight) {
+TEST(Element, straight_and_curved_rules) {
   const std::vector<Vec3> x = make_t10(kCorners);
   EXPECT_FALSE(is_curved(x));
   ElementShape straight, curved;
@@ -45,7 +45,7 @@ TEST(Element, straight_and_curved_rules_agree_where_edges_are_straight) {
 
 // The map of a corner tetrahedron x -> x + c x y stretches volumes
 // by det = 1 + c y, whose integral over the unit tetrahedron is 1/6 + c/24.
-TEST(Element, mass_of_a_curved_element_is_its_volume) {
+TEST(Element, curved_mass) {
   const double c = 0.3;
   std::vector<Vec3> x = make_t10({Vec3{0, 0, 0}, Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}});
   for (Vec3& p : x) p[0] += c * p[0] * p[1];
@@ -60,7 +60,7 @@ TEST(Element, mass_of_a_curved_element_is_its_volume) {
   EXPECT_NEAR(sum, 1.0 / 6.0 + c / 24.0, 1e-15);
 }
 
-TEST(Element, turned_inside_out_is_refused) {
+TEST(Element, inverted_element) {
   ElementShape shape;
   EXPECT_FALSE(make_shape(Kind::kT4, std::vector<Vec3>{kCorners[1], kCorners[0], kCorners[2], kCorners[3]}, shape));
   std::vector<Vec3> x = make_t10({Vec3{0, 0, 0}, Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}});
@@ -70,7 +70,7 @@ TEST(Element, turned_inside_out_is_refused) {
   EXPECT_FALSE(make_shape(Kind::kCurvedT10, x, shape));
 }
 
-// Of a T4 alone, from the stiffness V B^T D B by Eigen.
+// Single T4, from the stiffness V B^T D B by Eigen.
 TEST(Element, highest_frequency_of_one_tetrahedron) {
   ElementShape shape;
   ASSERT_TRUE(make_shape(Kind::kT4, kCorners, shape));

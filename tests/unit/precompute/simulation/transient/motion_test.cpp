@@ -1,4 +1,4 @@
-// Bodies that move: conservation laws, waves in bars, supports, the energy book, and what ends a run. Oracles: closed forms.
+// Moving bodies: conservation laws, waves in bars, supports, energy book, termination. Oracles: closed forms.
 #include "precompute/simulation/transient/motion.hpp"
 
 #include <gtest/gtest.h>
@@ -32,7 +32,7 @@ std::vector<SolidBody> make_body(int order, const std::array<double, 3>& edges, 
 class Spin : public ::testing::TestWithParam<int> {};
 INSTANTIATE_TEST_SUITE_P(Orders, Spin, ::testing::Values(1, 2));
 
-TEST_P(Spin, keeps_momentum_angular_momentum_and_energy) {
+TEST_P(Spin, momentum_and_energy) {
   if (tests::get_ranks() > 1) GTEST_SKIP() << "tens of thousands of steps";
   const testing::Turned turned = testing::turn_fifteen_times(GetParam());
   EXPECT_LE(turned.step_s, 5e-7);
@@ -42,7 +42,7 @@ TEST_P(Spin, keeps_momentum_angular_momentum_and_energy) {
   EXPECT_LT(turned.linear_error, 1e-13);
 }
 
-TEST(Motion, falls_freely) {
+TEST(Motion, free_fall) {
   World world(make_body(1, {0.06, 0.02, 0.02}, {3, 1, 1}, make_law(1e9, 0.3, 1100)));
   MotionOptions options;
   options.gravity_m_s2 = {1.0, 0.0, -9.81};
@@ -52,7 +52,7 @@ TEST(Motion, falls_freely) {
   EXPECT_NEAR(t, 1e-3, 1e-15);
   for (std::int32_t i = 0; i < world.domain.own_count(); ++i) {
     const Quad& u = motion.get_u()[i];
-    // The first half step is from rest at -h/2 on: h^2 n (n + 1) / 2 in place of t^2 / 2.
+    // The first half step is from rest at -h/2: h^2 n (n + 1) / 2 instead of t^2 / 2.
     const double h = motion.get_step_s(), half_square = 0.5 * (t * t + t * h);
     EXPECT_NEAR(u.z, -9.81 * half_square, 1e-16);
     EXPECT_NEAR(u.x, half_square, 1e-16);
@@ -61,14 +61,14 @@ TEST(Motion, falls_freely) {
   EXPECT_LT(std::abs(motion.calc_book().relative_error), 1e-12);
 }
 
-TEST(Motion, impulse_becomes_momentum_and_spin) {
+TEST(Motion, impulse) {
   World world(make_body(2, {0.06, 0.02, 0.02}, {3, 1, 1}, make_law(70e9, 0.3, 2700, 1e-8)));
   const Vec3 place{0.02, 0.004, 0.01}, blow{1e-4, 2e-5, -3e-4};
   Motion motion(world.domain, {}, {}, {{1e-4, 5e-4, blow, find_shares(*world.assembly, 0, place)}});
   for (int i = 0; i < 40; ++i) motion.advance_sample();
   const Motion::Momentum momentum = motion.calc_momentum();
   EXPECT_LT(norm(momentum.linear - blow), 1e-9 * norm(blow));
-  // The place is a little displaced while the force acts.
+  // Small displacement during the impulse.
   EXPECT_LT(norm(momentum.angular - cross(place, blow)), 1e-4 * norm(cross(place, blow)));
   const EnergyBook book = motion.calc_book();
   EXPECT_LT(std::abs(book.relative_error), 1e-6);
@@ -102,7 +102,7 @@ struct Wave {
   double seconds = 0.02;
 };
 
-/// The frequency of the standing wave that begins with the velocity shape(x) of a bar that is stretched before.
+/// Frequency of the standing wave with initial velocity shape(x) of a prestretched bar.
 double find_wave(const Wave& wave, double (*shape)(double)) {
   // E / rho = (1,000 m/s)^2, no lateral contraction.
   World world(make_body(wave.order, {0.5, wave.side_m, wave.side_m}, wave.cells, make_law(1e9, 0.0, 1000)));
@@ -132,7 +132,7 @@ double find_wave(const Wave& wave, double (*shape)(double)) {
   return find_frequency(q, 1e-5);
 }
 
-TEST(Bar, that_is_free_sounds_at_half_the_speed_over_its_length) {
+TEST(Bar, free_bar_frequency) {
   if (tests::get_ranks() > 1) GTEST_SKIP() << "tens of thousands of steps";
   const auto shape = [](double x) { return std::cos(pi * x); };
   EXPECT_NEAR(to_cents(find_wave({1, {50, 1, 1}, 0.01}, shape), 1000.0), 0.0, 1.0);
@@ -142,7 +142,7 @@ TEST(Bar, that_is_free_sounds_at_half_the_speed_over_its_length) {
 // In coordinates of the rest shape a stretched bar has the speed c sqrt((3 l^2 - 1) / 2) along it, and as a string c sqrt((l^2 - 1) / 2)
 // across it. A string with stiff, clamped ends is higher by 1 + 2 e + (4 + pi^2 / 2) e^2, e^2 = bending stiffness / (tension length^2)
 // (Morse 1948); the bending stiffness is that of the stretched bar.
-TEST(Bar, that_is_stretched_is_faster) {
+TEST(Bar, stretched_bar_frequency) {
   if (tests::get_ranks() > 1) GTEST_SKIP() << "tens of thousands of steps";
   const auto shape = [](double x) { return std::sin(pi * x); };
   for (const double stretch : {1.01, 1.1, 1.5}) {
@@ -161,7 +161,7 @@ TEST(Bar, that_is_stretched_is_faster) {
 
 // ---- supports ----
 
-/// A bar bent by its end within 1 ms, held there, and released at 1.25 ms.
+/// A bar bent at its end within 1 ms, held, and released at 1.25 ms.
 struct Plucked {
   World world{make_body(1, {0.06, 0.02, 0.02}, {6, 2, 2}, make_law(1e8, 0.3, 1100))};
   Motion motion;
@@ -184,7 +184,7 @@ struct Plucked {
   }
 };
 
-TEST(Constraint, nodes_are_let_go_and_no_energy_comes_with_it) {
+TEST(Constraint, release_conserves_energy) {
   Plucked bar(1.25e-3);
   while (bar.motion.get_time_s() < 1.25e-3 - 1e-9) bar.motion.advance_sample();
   EXPECT_LT(bar.find_end(), 1e-17);
@@ -202,7 +202,7 @@ TEST(Constraint, nodes_are_let_go_and_no_energy_comes_with_it) {
   EXPECT_EQ(norm(bar.motion.calc_reaction(1)), 0.0);
 }
 
-TEST(Constraint, a_run_that_resumes_behind_or_before_the_release_has_the_same_bits) {
+TEST(Constraint, resumption_around_release) {
   for (const double stop_s : {1e-3, 2e-3}) {
     Plucked whole(1.25e-3), first(1.25e-3), second(1.25e-3);
     while (first.motion.get_time_s() < stop_s) first.motion.advance_sample();
@@ -213,7 +213,7 @@ TEST(Constraint, a_run_that_resumes_behind_or_before_the_release_has_the_same_bi
   }
 }
 
-TEST(Constraint, a_body_that_nothing_else_holds_flies_on) {
+TEST(Constraint, release_of_a_free_body) {
   // Released in the middle of its path, it keeps its momentum.
   Plucked bar(5e-4, false);
   while (bar.motion.get_time_s() < 6e-4) bar.motion.advance_sample();
@@ -223,10 +223,10 @@ TEST(Constraint, a_body_that_nothing_else_holds_flies_on) {
   EXPECT_LT(norm(bar.motion.calc_momentum().linear - thrown), 1e-9 * norm(thrown));
 }
 
-TEST(Constraint, driven_nodes_are_on_their_path_and_fixed_ones_stay) {
+TEST(Constraint, driven_and_fixed_nodes) {
   World world(make_body(1, {0.06, 0.02, 0.02}, {6, 2, 2}, make_law(1e8, 0.3, 1100, 1e-6)));
   const Path path({{0.0, {0, 0, 0}}, {5e-4, {2e-3, 1e-3, 0}}, {1e-3, {0, 0, -1e-3}}});
-  // In large motion the book's error is that of the steps: it falls by four with half the step.
+  // In large motion the energy error is that of the steps: a quarter with half the step.
   double error[2] = {};
   for (const int divisor : {1, 2}) {
     MotionOptions options;
@@ -247,8 +247,8 @@ TEST(Constraint, driven_nodes_are_on_their_path_and_fixed_ones_stay) {
   EXPECT_NEAR(error[0] / error[1], 4.0, 0.5);
 }
 
-// Weight that came on slowly: the support bears it, up to the bar's own swing, which braking has taken away.
-TEST(Constraint, a_support_bears_the_weight) {
+// Slowly applied weight: support reaction, apart from the bar's own oscillation, which is damped out.
+TEST(Constraint, support_reaction) {
   World world(make_body(1, {0.02, 0.02, 0.06}, {2, 2, 6}, make_law(1e6, 0.3, 1100), 300.0));
   MotionOptions options;
   options.gravity_m_s2 = {0, 0, -9.81};
@@ -266,8 +266,8 @@ TEST(Constraint, a_support_bears_the_weight) {
   EXPECT_GT(book.dissipated_j, 0.0);
 }
 
-// Mass damping takes vibration, not flight and spin.
-TEST(Motion, mass_damping_leaves_flight_alone) {
+// Mass damping acts on vibration only, not on flight and spin.
+TEST(Motion, mass_damping_of_free_flight) {
   World world(make_body(2, {0.06, 0.02, 0.02}, {3, 1, 1}, make_law(1e8, 0.3, 1100), 2000.0));
   Motion motion(world.domain, {});
   motion.set_start([&](std::int32_t, const Vec3& x) {
@@ -282,14 +282,14 @@ TEST(Motion, mass_damping_leaves_flight_alone) {
   const EnergyBook book = motion.calc_book();
   EXPECT_LT(std::abs(book.relative_error), 1e-6);
   EXPECT_GT(book.dissipated_j, 0.05 * kinetic);
-  // What is left is flight: the rigid part of the motion, and little else.
+  // The remaining motion is nearly rigid.
   const double flight = 0.5 * dot(after.linear, after.linear) / world.calc_mass();
   EXPECT_LT(book.kinetic_j + book.elastic_j, 1.1 * flight);
   EXPECT_GT(book.kinetic_j, flight);
 }
 
-// A rod on a hinge at its end, from the horizontal: at the lowest point the energy of the fall is that of the swing, omega^2 = 3 g / L.
-TEST(Constraint, a_hinged_rod_swings_and_mass_damping_does_not_brake_it) {
+// A hinged rod falling from the horizontal: at the lowest point omega^2 = 3 g / L.
+TEST(Constraint, hinged_rod_swing) {
   if (tests::get_ranks() > 1) GTEST_SKIP() << "tens of thousands of steps";
   World world(make_body(1, {0.1, 0.01, 0.01}, {8, 2, 2}, make_law(5e7, 0.3, 1000), 5.0));
   Constraint hinge;
@@ -312,9 +312,9 @@ TEST(Constraint, a_hinged_rod_swings_and_mass_damping_does_not_brake_it) {
   EXPECT_LT(book.dissipated_j, 0.02 * 9.81 * 0.05 * world.calc_mass());
 }
 
-// A rod on a hinge that vibrates and does not swing: without angular momentum about the hinge mass damping takes alpha2 v of all of it, so
-// that the loss is alpha2 times the integral of twice the kinetic energy.
-TEST(Constraint, mass_damping_takes_from_a_hinged_rod_what_is_not_swing) {
+// A hinged rod vibrating without swing: without angular momentum about the hinge, mass damping acts on the whole velocity, and the loss is
+// alpha2 times the integral of twice the kinetic energy.
+TEST(Constraint, hinged_rod_mass_damping) {
   const double alpha2 = 20.0;
   World world(make_body(1, {0.1, 0.01, 0.01}, {8, 2, 2}, make_law(5e7, 0.3, 1000), alpha2));
   Constraint hinge;
@@ -346,9 +346,9 @@ TEST(Constraint, mass_damping_takes_from_a_hinged_rod_what_is_not_swing) {
   EXPECT_NEAR(lost / (alpha2 * twice_kinetic / options.sample_rate_hz), 1.0, 0.02);
 }
 
-// ---- forces from outside ----
+// ---- external forces ----
 
-/// A spring to the place at rest of some nodes, and what it knows of itself.
+/// Springs from some nodes to their rest positions, with their energy.
 class Spring : public ExternalForces {
  public:
   Spring(Domain& domain, double stiffness_n_m) : domain_(domain), stiffness_(stiffness_n_m) {}
@@ -376,7 +376,7 @@ class Spring : public ExternalForces {
   std::vector<Quad> u_;
 };
 
-TEST(ExternalForces, their_work_is_in_the_book_and_is_what_they_store) {
+TEST(ExternalForces, work_in_energy_book) {
   World world(make_body(1, {0.06, 0.02, 0.02}, {3, 1, 1}, make_law(1e9, 0.3, 1100)));
   Motion motion(world.domain, {});
   Spring spring(world.domain, 200.0);
@@ -397,7 +397,7 @@ TEST(ExternalForces, their_work_is_in_the_book_and_is_what_they_store) {
 
 // ---- steps ----
 
-TEST(Step, is_below_the_stable_one_and_a_whole_part_of_a_sample) {
+TEST(Step, stability_and_sample_division) {
   World world(make_body(1, {0.2, 0.02, 0.01}, {20, 2, 1}, make_law(70e9, 0.33, 2700)));
   Motion motion(world.domain, {});
   motion.advance();
@@ -408,11 +408,11 @@ TEST(Step, is_below_the_stable_one_and_a_whole_part_of_a_sample) {
   EXPECT_GT(1.0 / (48000.0 * (motion.get_steps_per_sample() - 1)), 0.9 * motion.get_longest_step_s());
 }
 
-TEST(Step, allows_for_damping_that_lags) {
+TEST(Step, lagged_damping) {
   // omega = 2e6, alpha1 = 1e-6: xi = 1.
   EXPECT_NEAR(calc_longest_step(2e6, 1e-6, 0.0), 1e-6 * (std::sqrt(2.0) - 1.0), 1e-20);
   EXPECT_EQ(calc_longest_step(0.0, 1e-6, 0.0), std::numeric_limits<double>::infinity());
-  // v+ = v - h (omega^2 u + 2 xi omega v), u+ = u + h v+: just below that step it dies away, just above it grows.
+  // v+ = v - h (omega^2 u + 2 xi omega v), u+ = u + h v+: decays just below that step, grows just above.
   for (const double xi : {0.01, 0.5, 3.0}) {
     const double longest = calc_longest_step(1.0, 2.0 * xi, 0.0);
     for (const double factor : {0.99, 1.01}) {
@@ -429,7 +429,7 @@ TEST(Step, allows_for_damping_that_lags) {
   EXPECT_NEAR(calc_alpha1(law), 3e-8, 1e-20);
 }
 
-TEST(Step, is_refined_when_the_body_stiffens_and_the_book_still_closes) {
+TEST(Step, refinement_of_stiffening_body) {
   World world(make_body(1, {0.06, 0.02, 0.02}, {6, 2, 2}, make_law(1e8, 0.3, 1100, 2e-7), 1.0));
   const Path pull({{0.0, {0, 0, 0}}, {5e-3, {0.05, 0, 0}}});
   Motion motion(world.domain, {}, {{world.list_set("x-min"), {}, false}, {world.list_set("x-max"), pull, false}});
@@ -442,7 +442,7 @@ TEST(Step, is_refined_when_the_body_stiffens_and_the_book_still_closes) {
   EXPECT_LT(std::abs(motion.calc_book().relative_error), 1e-6);
 }
 
-TEST(Step, of_a_body_that_stiffens_without_end_stops_the_run) {
+TEST(Step, refinement_limit) {
   World world(make_body(1, {0.06, 0.02, 0.02}, {3, 1, 1}, make_law(1e8, 0.3, 1100)));
   MotionOptions options;
   options.step_check_s = 2e-5;
@@ -454,7 +454,7 @@ TEST(Step, of_a_body_that_stiffens_without_end_stops_the_run) {
   EXPECT_NE(message.find("steps a sample are needed, over 8 times as many as at the start"), std::string::npos) << message;
 }
 
-TEST(Motion, ends_when_an_element_is_turned_inside_out) {
+TEST(Motion, inverted_element) {
   World world(make_body(1, {0.06, 0.02, 0.02}, {3, 1, 1}, make_law(1e8, 0.3, 1100)));
   const Path push({{0.0, {0, 0, 0}}, {2e-3, {-0.07, 0, 0}}});
   Motion motion(world.domain, {}, {{world.list_set("x-min"), {}, false}, {world.list_set("x-max"), push, false}});
@@ -466,7 +466,7 @@ TEST(Motion, ends_when_an_element_is_turned_inside_out) {
   EXPECT_NE(message.find(", step "), std::string::npos) << message;
 }
 
-TEST(Motion, refuses_input_that_makes_no_sense) {
+TEST(Motion, invalid_input) {
   World world(make_body(1, {0.06, 0.02, 0.02}, {3, 1, 1}, make_law(1e8, 0.3, 1100)));
   const auto nodes = world.list_set("x-min");
   EXPECT_EQ(tests::catch_message<InputError>([&] {

@@ -9,7 +9,7 @@
 namespace carillon::transient {
 namespace {
 
-TEST(Path, passes_through_its_rows_and_rests_outside) {
+TEST(Path, interpolation_and_rest) {
   const Path path({{0.1, {0, 0, 0}}, {0.2, {1, 0, 2}}, {0.5, {-1, 3, 2}}, {0.6, {0, 1, 0}}});
   EXPECT_EQ(norm(path.calc(0.0)), 0.0);
   EXPECT_LT(norm(path.calc(0.2) - Vec3{1, 0, 2}), 1e-14);
@@ -18,7 +18,7 @@ TEST(Path, passes_through_its_rows_and_rests_outside) {
   EXPECT_EQ(norm(Path().calc(0.3)), 0.0);
 }
 
-TEST(Path, velocity_and_acceleration_are_continuous_at_every_row) {
+TEST(Path, continuity) {
   const Path path({{0.1, {0, 0, 0}}, {0.2, {1, 0, 2}}, {0.5, {-1, 3, 2}}, {0.6, {0, 1, 0}}});
   const double h = 1e-5;
   const auto slope = [&](double a, double b) { return (1.0 / (b - a)) * (path.calc(b) - path.calc(a)); };
@@ -31,13 +31,13 @@ TEST(Path, velocity_and_acceleration_are_continuous_at_every_row) {
   }
 }
 
-TEST(Path, of_two_rows_has_least_jerk) {
+TEST(Path, minimum_jerk) {
   const Path path({{0.0, {0, 0, 0}}, {0.5, {0, 0, -0.03}}});
   const double x = 0.3;
   EXPECT_NEAR(path.calc(0.15)[2], -0.03 * (10 * x * x * x - 15 * x * x * x * x + 6 * x * x * x * x * x), 1e-16);
 }
 
-TEST(Path, refuses_rows_that_are_no_path) {
+TEST(Path, invalid_rows) {
   EXPECT_EQ(tests::catch_message<InputError>([] {
               Path({{0.0, {0, 0, 0}}, {0.0, {1, 0, 0}}});
             }),

@@ -70,7 +70,7 @@ void expect_same(const EnergyBook& a, const EnergyBook& b) {
   EXPECT_EQ(a.error_j, b.error_j);
 }
 
-TEST(Ranks, give_the_same_bits_as_one) {
+TEST(Ranks, bit_identical_motion) {
   Scene here(MPI_COMM_WORLD), alone(MPI_COMM_SELF);
   EXPECT_EQ(here.world.domain.own_count() == here.world.assembly->node_count(), tests::get_ranks() == 1);
   double dissipated = 0.0;
@@ -89,7 +89,7 @@ TEST(Ranks, give_the_same_bits_as_one) {
   EXPECT_GT(here.motion->get_step_count(), 2000);
 }
 
-TEST(Ranks, continue_from_what_any_number_of_them_saved) {
+TEST(Ranks, resumption_on_other_ranks) {
   Scene here(MPI_COMM_WORLD), alone(MPI_COMM_SELF), later(MPI_COMM_WORLD);
   for (int i = 0; i < 7; ++i) here.motion->advance_sample();
   for (int i = 0; i < 5; ++i) here.motion->advance();
@@ -110,7 +110,7 @@ TEST(Ranks, continue_from_what_any_number_of_them_saved) {
   EXPECT_EQ(again, other);
 }
 
-TEST(Ranks, refuse_bytes_that_are_not_theirs) {
+TEST(Ranks, invalid_state) {
   Scene here(MPI_COMM_WORLD);
   std::vector<std::byte> bytes = here.world.comm.broadcast(here.motion->save());
   for (const std::size_t length : {std::size_t{0}, std::size_t{10}, sizeof(double), bytes.size() / 2, bytes.size() - 1})
@@ -122,7 +122,7 @@ TEST(Ranks, refuse_bytes_that_are_not_theirs) {
   EXPECT_THROW(here.motion->load(bytes), InputError);
 }
 
-TEST(Ranks, more_than_elements_are_refused) {
+TEST(Ranks, too_many_ranks) {
   if (tests::get_ranks() == 1) return;
   std::vector<SolidBody> bodies{{"one", make_box({0.2, 0.2, 0.2}, {1, 1, 1}, 1), make_law(1e9, 0.3, 1000), 0.0}};
   bodies[0].mesh.tets.resize(4);

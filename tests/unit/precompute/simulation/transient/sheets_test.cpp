@@ -73,7 +73,7 @@ std::vector<bool> mark(const SheetMesh& mesh, const std::string& set) {
   return marked;
 }
 
-TEST(Sheets, forces_are_the_gradient_of_the_energy) {
+TEST(Sheets, forces_against_energy_gradient) {
   const SheetMesh mesh = make_rectangle(0.3, 0.2, 6, 0.02);
   Sheet sheet(mesh, mark(mesh, "x-min"), make_law(0.01));
   std::mt19937 random(7);
@@ -101,7 +101,7 @@ TEST(Sheets, forces_are_the_gradient_of_the_energy) {
   EXPECT_LT(worst, 1e-8 * largest);
 }
 
-TEST(Sheets, rigid_motion_costs_nothing) {
+TEST(Sheets, rigid_motion) {
   const SheetMesh mesh = make_rectangle(0.3, 0.2, 8, 0.03);
   Sheet sheet(mesh, mark(mesh, ""), make_law(0.001));
   for (std::int32_t n = 0; n < sheet.nodes; ++n) {
@@ -113,7 +113,7 @@ TEST(Sheets, rigid_motion_costs_nothing) {
   EXPECT_LT(sheet.find_largest_force(), 1e-11 * kYoung * 0.001 * 0.3);
 }
 
-TEST(Sheets, forces_and_moments_are_in_balance) {
+TEST(Sheets, force_and_moment_balance) {
   const SheetMesh mesh = make_disc(0.1, 10);
   Sheet sheet(mesh, mark(mesh, ""), make_law(0.001));
   std::mt19937 random(3);
@@ -170,7 +170,7 @@ double find_lowest_hz(const SheetMesh& mesh, const std::string& clamped, const s
 }
 
 // Square plates of side a: omega a^2 sqrt(rho h / D) = 2 pi^2 hinged, 35.985 clamped (Leissa 1969); second order in the cell.
-TEST(Sheets, plates_have_the_frequencies_of_kirchhoff) {
+TEST(Sheets, kirchhoff_plate_frequencies) {
   const double side = 0.3, thickness = 0.001;
   const double rigidity = kYoung * std::pow(thickness, 3) / (12 * (1 - kPoisson * kPoisson));
   const double unit = std::sqrt(rigidity / (kDensity * thickness)) / (2 * pi * side * side);
@@ -184,7 +184,7 @@ TEST(Sheets, plates_have_the_frequencies_of_kirchhoff) {
 }
 
 // Stretched by e in one direction and free to contract in the other two: E of a plane strip, and the same force from a rate by alpha1.
-TEST(Sheets, membrane_has_plane_stress_and_its_damping) {
+TEST(Sheets, membrane_stress_and_damping) {
   const SheetMesh mesh = make_rectangle(0.2, 0.1, 4);
   const double alpha1 = 1e-5, strain = 1e-7, rate = 1e-2;
   Sheet sheet(mesh, mark(mesh, ""), make_law(0.002, alpha1));
@@ -205,7 +205,7 @@ TEST(Sheets, membrane_has_plane_stress_and_its_damping) {
   EXPECT_NEAR(spent, 1.5e-6 * kYoung * alpha1 * rate * rate * section * 0.2, 1e-5 * spent);
 }
 
-TEST(SheetMesh, refuses_what_is_no_sheet) {
+TEST(SheetMesh, refusals) {
   EXPECT_THROW(make_rectangle(0.1, 0, 4), InputError);
   EXPECT_THROW(make_rectangle(0.1, 0.1, 1), InputError);
   EXPECT_THROW(make_rectangle(0.1, 0.1, 4, 0.05), InputError);
@@ -220,7 +220,7 @@ TEST(SheetMesh, refuses_what_is_no_sheet) {
   EXPECT_THROW(make_elements(fan, std::vector<bool>(5)), InputError);
 }
 
-TEST(SheetMesh, bow_is_an_arc_and_a_disc_is_round) {
+TEST(SheetMesh, bow_and_disc) {
   const SheetMesh bowed = make_rectangle(0.3, 0.1, 10, 0.02);
   double top = 0;
   for (const Vec3& x : bowed.vertices_m) top = std::max(top, x[2]);

@@ -118,7 +118,7 @@ INSTANTIATE_TEST_SUITE_P(Solids, OfKind, ::testing::Values(Choice{"T4", 1, 0.0},
 
 // u = (F - I) x in every node. In the interior forces cancel; the sum of f (x) X is - P times the volume. Of a curved mesh the volume is
 // that of the rule of four points, and forces in the interior do not cancel to rounding but to the error of that rule.
-TEST_P(OfKind, a_homogeneous_deformation_gives_the_known_stress_and_energy) {
+TEST_P(OfKind, homogeneous_deformation) {
   Law law;
   law.lambda_pa = 2.0;
   law.mu_pa = 1.0;
@@ -163,14 +163,14 @@ TEST_P(OfKind, a_homogeneous_deformation_gives_the_known_stress_and_energy) {
   }
 }
 
-TEST_P(OfKind, a_rotation_makes_no_force) {
+TEST_P(OfKind, rotation) {
   const Body body = make_body(GetParam().order, GetParam().bend_m, testing::make_law(200e9, 0.3, 7850), find_loops());
   Mat3 gradient = kPatches[0].f;
   for (std::size_t i = 0; i < 3; ++i) gradient[i][i] -= 1.0;
   for (const Quad& f : calc_forces(body, make_values(body, gradient))) EXPECT_LT(norm(Vec3{f.x, f.y, f.z}), 1e-12 * 200e9 * 0.05);
 }
 
-TEST_P(OfKind, elastic_forces_are_the_slope_of_the_energy) {
+TEST_P(OfKind, forces_against_energy_gradient) {
   const Body body = make_body(GetParam().order, GetParam().bend_m, testing::make_law(3.0, 0.3, 1.0), find_loops());
   const std::vector<Quad> u = make_random(body.nodes(), 0.01, 1), p = make_random(body.nodes(), 1.0, 2), f = calc_forces(body, u);
   double power = 0.0;
@@ -184,7 +184,7 @@ TEST_P(OfKind, elastic_forces_are_the_slope_of_the_energy) {
   EXPECT_NEAR(-(8 * (at(h) - at(-h)) - (at(2 * h) - at(-2 * h))) / (12 * h) / power, 1.0, 1e-10);
 }
 
-TEST_P(OfKind, damping_forces_take_the_work_that_is_added_up) {
+TEST_P(OfKind, damping_work) {
   const Law law = testing::make_law(3.0, 0.3, 1.0, 0.02);
   Body body = make_body(GetParam().order, GetParam().bend_m, law, find_loops());
   Body elastic = make_body(GetParam().order, GetParam().bend_m, testing::make_law(3.0, 0.3, 1.0), find_loops());
@@ -216,7 +216,7 @@ TEST_P(OfKind, damping_forces_take_the_work_that_is_added_up) {
 }
 
 // Every instruction set sums in the order of the elements, and a block's size does not show: the elements one by one give the same bits.
-TEST_P(OfKind, bits_do_not_depend_on_blocks) {
+TEST_P(OfKind, independence_of_blocks) {
   for (const Loops* loops : list_loops()) {
     Body body = make_body(GetParam().order, GetParam().bend_m, testing::make_law(3.0, 0.3, 1.0, 0.02), *loops, {3, 1, 1});
     const std::vector<Quad> u = make_random(body.nodes(), 0.01, 4), v = make_random(body.nodes(), 1.0, 5);
@@ -239,7 +239,7 @@ TEST_P(OfKind, bits_do_not_depend_on_blocks) {
   }
 }
 
-TEST_P(OfKind, smallest_determinant_names_the_element_that_is_inside_out) {
+TEST_P(OfKind, smallest_determinant) {
   const Body body = make_body(GetParam().order, GetParam().bend_m, testing::make_law(3.0, 0.3, 1.0), find_loops());
   std::vector<Quad> u(body.nodes());
   std::vector<double> energy, least;

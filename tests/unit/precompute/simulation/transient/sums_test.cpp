@@ -17,7 +17,7 @@ double sum_of(const std::vector<double>& values) {
   return sum.calc();
 }
 
-TEST(OrderFreeSum, is_exact_where_doubles_cancel) {
+TEST(OrderFreeSum, cancellation) {
   EXPECT_EQ(sum_of({1e300, 1.0, -1e300}), 1.0);
   EXPECT_EQ(sum_of({1e16, 1.0, 1.0, -1e16}), 2.0);
   EXPECT_EQ(sum_of({-3.5, 1.25}), -2.25);
@@ -26,7 +26,7 @@ TEST(OrderFreeSum, is_exact_where_doubles_cancel) {
   EXPECT_EQ(sum_of({std::numeric_limits<double>::max(), -1.0}), std::numeric_limits<double>::max());
 }
 
-TEST(OrderFreeSum, does_not_depend_on_the_order) {
+TEST(OrderFreeSum, order_independence) {
   std::mt19937_64 random(7);
   std::uniform_real_distribution<double> mantissa(-1.0, 1.0);
   std::uniform_int_distribution<int> exponent(-80, 80);
@@ -42,7 +42,7 @@ TEST(OrderFreeSum, does_not_depend_on_the_order) {
   }
 }
 
-TEST(OrderFreeSum, is_no_number_with_one_that_is_none) {
+TEST(OrderFreeSum, nonfinite_values) {
   EXPECT_TRUE(std::isnan(sum_of({1.0, std::numeric_limits<double>::infinity()})));
   EXPECT_TRUE(std::isnan(sum_of({std::nan(""), 2.0})));
 }

@@ -24,7 +24,7 @@ std::vector<Touch> find_touches(const Shape& a, const Frame& frame, double margi
   return find_touches(a, frame, margin, memory);
 }
 
-TEST(ground, box_stands_on_four_corners_whatever_its_mesh) {
+TEST(ground, box_on_four_corners_for_any_mesh) {
   for (const int n : {1, 7}) {
     const auto box = make_box({0.06, 0.05, 0.04}, n).make();
     Frame frame;
@@ -41,7 +41,7 @@ TEST(ground, box_stands_on_four_corners_whatever_its_mesh) {
   }
 }
 
-TEST(ground, corner_keeps_its_name_while_a_box_turns) {
+TEST(ground, constant_corner_id_of_rotating_box) {
   const auto box = make_box({0.06, 0.05, 0.04}, 3).make();
   PairMemory memory;
   std::uint64_t id = 0;
@@ -62,7 +62,7 @@ TEST(ground, corner_keeps_its_name_while_a_box_turns) {
   }
 }
 
-TEST(ground, all_corners_of_a_side_that_faces_it_are_found_where_they_are_asked_for) {
+TEST(ground, all_corners_of_facing_side_on_request) {
   const auto box = make_box({0.06, 0.05, 0.004}, 2).make();
   Frame frame;
   frame.rotation = multiply(make_turn({1, 0, 0}, 0.02), make_turn({0, 1, 0}, 0.05));
@@ -75,7 +75,7 @@ TEST(ground, all_corners_of_a_side_that_faces_it_are_found_where_they_are_asked_
   }
 }
 
-TEST(ground, lowest_vertex_is_that_of_all) {
+TEST(ground, lowest_vertex_of_all) {
   const std::shared_ptr<const Shape> shapes[] = {make_lumpy(0.05, 4, 0.2).make(), make_cylinder(0.012, 0.002, 48).make(),
                                                  make_ring(0.02, 0.003, 48, 16).make(), make_cylinder(0.005, 0.2, 24).make()};
   Dice dice(3);
@@ -119,7 +119,7 @@ TEST(ground, ball_of_facets_rolls_as_a_ball) {
   EXPECT_LE(fine, 2e-5);
 }
 
-TEST(ground, rolling_ball_has_one_touch_with_one_name_and_refresh_agrees_with_search) {
+TEST(ground, single_touch_of_rolling_ball) {
   const double r = 0.03;
   const auto ball = make_ball(r, 16).make();
   PairMemory memory;
@@ -148,7 +148,7 @@ TEST(ground, rolling_ball_has_one_touch_with_one_name_and_refresh_agrees_with_se
   }
 }
 
-TEST(ground, cylinder_lies_on_a_line_and_stands_on_a_ring) {
+TEST(ground, cylinder_on_line_and_ring) {
   const auto cylinder = make_cylinder(0.02, 0.1, 48).make();
   Frame frame;
   frame.rotation = make_turn({1, 0, 0}, std::numbers::pi / 2);
@@ -182,7 +182,7 @@ TEST(ground, cylinder_lies_on_a_line_and_stands_on_a_ring) {
   }
 }
 
-TEST(ground, nearly_level_tube_touches_at_both_ends) {
+TEST(ground, both_ends_of_nearly_level_tube) {
   // It lies on the middle of facets, so no vertex is near the ground. An end that is missing sinks unseen while the tube rocks.
   std::vector<std::array<double, 2>> outline;
   for (int n = 0; n <= 20; ++n) outline.push_back({0.04, -0.05 + 0.005 * n});
@@ -205,7 +205,7 @@ TEST(ground, nearly_level_tube_touches_at_both_ends) {
   }
 }
 
-TEST(ground, tilted_coin_rolls_on_a_round_rim) {
+TEST(ground, round_rim_of_tilted_coin) {
   const double r = 0.012, tilt = 0.3;
   const auto coin = make_cylinder(r, 0.002, 64).make();
   double low = 1.0, high = -1.0;
@@ -222,7 +222,7 @@ TEST(ground, tilted_coin_rolls_on_a_round_rim) {
   EXPECT_NEAR(low, 0.0, 2e-6 * r);
 }
 
-TEST(ground, leaning_bowl_rolls_on_a_round_rim) {
+TEST(ground, round_rim_of_leaning_bowl) {
   // Upside down on its inner rim, between a cone and a hollow part.
   const double r = 0.07, z = 0.05, tilt = std::numbers::pi - 0.1;
   const auto bowl =
@@ -244,7 +244,7 @@ TEST(ground, leaning_bowl_rolls_on_a_round_rim) {
   EXPECT_NEAR(low, 0.0, 2e-6 * r);
 }
 
-TEST(ground, feet_between_corners_that_hang_lower_than_the_margin_are_kept) {
+TEST(ground, feet_between_corners_within_margin) {
   // A plate on a pentagonal foot, its own corners 0.15 mm above the ground: all ten are nearer than the margin.
   const auto plate = make_lathe({{0, 0}, {0.02, 0}, {0.024, 1e-4}, {0.1, 1.5e-4}, {0.1, 0.02}, {0, 0.02}}, 5, false).make();
   for (const double tilt : {0.0, 1e-4, 5e-4}) {
@@ -256,7 +256,7 @@ TEST(ground, feet_between_corners_that_hang_lower_than_the_margin_are_kept) {
   }
 }
 
-TEST(ground, leaning_cone_stands_on_its_tip) {
+TEST(ground, tip_of_leaning_cone) {
   // However round its mantle is; further than its own angle, 16.7 degrees from the ground, its rim is lower.
   for (const int around : {12, 64}) {
     const auto cone = make_lathe({{0, 0}, {0.03, 0.1}, {0, 0.1}}, around, false).make();

@@ -125,7 +125,7 @@ TEST(pairs, ball_in_a_bowl) {
   }
 }
 
-TEST(pairs, rings_that_interlock) {
+TEST(pairs, interlocked_rings) {
   const double R = 0.03, w = 0.004;
   const auto ring = make_ring(R, w, 96, 24).make();
   for (const double gap : {1e-4, 1e-5, -1e-5}) {
@@ -158,7 +158,7 @@ TEST(pairs, ball_inside_a_hollow_ball) {
   EXPECT_GT(dot(touches[0].normal, -1.0 * normalise({1, 2, -3})), 0.999);
 }
 
-TEST(pairs, hollow_boxes_stand_flush_on_each_other) {
+TEST(pairs, flush_hollow_boxes) {
   Solid hollow = make_box({0.06, 0.06, 0.04}, 3), inner = make_box({0.056, 0.056, 0.036}, 3);
   inner.turn_inside_out();
   hollow.add(inner, {});
@@ -348,7 +348,7 @@ std::unique_ptr<Shape> make_cup() {
       .make();
 }
 
-TEST(pairs, rims_find_their_touches_with_curved_parts) {
+TEST(pairs, rims_on_curved_parts) {
   const auto coin = make_cylinder(0.012, 0.002, 48).make(), ring = make_ring(0.02, 0.003, 48, 16).make();
   const auto cup = make_cup();
   Dice dice(7);
@@ -371,7 +371,7 @@ TEST(pairs, rims_find_their_touches_with_curved_parts) {
   EXPECT_LE(missed, 4);  // where curved parts meet with a kink
 }
 
-TEST(pairs, a_gap_shrinks_no_faster_than_its_places_approach) {
+TEST(pairs, bound_of_gap_change) {
   const auto cup = make_cup();
   const auto bowl = [] {
     std::vector<std::array<double, 2>> outline;
@@ -404,7 +404,7 @@ TEST(pairs, a_gap_shrinks_no_faster_than_its_places_approach) {
   EXPECT_GE(followed, 300);
 }
 
-TEST(pairs, memory_gives_what_a_new_search_gives) {
+TEST(pairs, memory_equals_new_search) {
   const double R = 0.05;
   const auto a = make_lumpy(R, 16).make(), b = make_lumpy(R, 16, 0.1).make();
   Frame fa, fb;
@@ -428,7 +428,7 @@ TEST(pairs, memory_gives_what_a_new_search_gives) {
   }
 }
 
-TEST(pairs, deepest_sample_from_memory_is_that_of_a_whole_search) {
+TEST(pairs, deepest_sample_from_memory) {
   const auto lumpy = make_lumpy(0.05, 12, 0.1).make(), ring = make_ring(0.05, 0.008, 48, 16).make(),
              box = make_box({0.1, 0.1, 0.03}, 6).make();
   const auto cup = make_lathe({{0, 0}, {0.03, 0}, {0.035, 0.08}, {0.033, 0.08}, {0.028, 0.002}, {0, 0.002}}, 40, false).make();
@@ -454,7 +454,7 @@ TEST(pairs, deepest_sample_from_memory_is_that_of_a_whole_search) {
   EXPECT_GT(deep, 300);
 }
 
-TEST(pairs, fine_and_coarse_meshes_of_a_body_touch_alike) {
+TEST(pairs, independence_of_mesh_fineness) {
   const auto ball = make_ball(0.02, 8).make();
   const auto l_block = [](int n) {
     Solid s = make_lathe({{0, -0.02}, {0.05, -0.02}, {0.05, 0.02}, {0, 0.02}}, n, false);
@@ -474,7 +474,7 @@ TEST(pairs, fine_and_coarse_meshes_of_a_body_touch_alike) {
   EXPECT_NEAR(u[0].gap_m, v[0].gap_m, 3e-6);
 }
 
-TEST(overlap, is_how_deep_two_bodies_are_in_each_other) {
+TEST(overlap, penetration_depth) {
   const auto box = make_box({0.06, 0.05, 0.04}, 4).make(), plate = make_box({0.2, 0.2, 0.002}).make(), ball = make_ball(0.03, 10).make();
   Frame fa, fb;
   Vec3 where{};

@@ -8,7 +8,7 @@
 namespace carillon::geometry::tests {
 namespace {
 
-TEST(polyhedra, flush_boxes_touch_at_the_corners_of_their_overlap) {
+TEST(polyhedra, corners_of_flush_overlap) {
   const auto small = make_box({0.06, 0.05, 0.04}, 4).make(), large = make_box({0.1, 0.03, 0.04}, 1).make();
   Frame top, bottom;
   top.position_m = {0.03, 0, 0.04 + 1e-6};
@@ -29,7 +29,7 @@ TEST(polyhedra, flush_boxes_touch_at_the_corners_of_their_overlap) {
   EXPECT_EQ(find(*small, top, *small, bottom, 1e-4).size(), 4U);
 }
 
-TEST(polyhedra, pass_each_other_at_a_flush_seam) {
+TEST(polyhedra, sliding_over_flush_seam) {
   // A tile comes over the edge of a board whose face it slides in, from 1 um too high to 1 um too deep: no touch is across its way.
   const auto tile = make_box({0.08, 0.06, 0.02}, 2).make(), board = make_box({0.4, 0.3, 0.04}, 1).make();
   for (const double x : {-0.241, -0.2401, -0.240002, -0.24 - 1e-9}) {
@@ -50,7 +50,7 @@ TEST(polyhedra, pass_each_other_at_a_flush_seam) {
   }
 }
 
-TEST(polyhedra, crossed_edges_touch_in_one_point) {
+TEST(polyhedra, single_point_of_crossed_edges) {
   const auto bar = make_box({0.2, 0.02, 0.02}, 2).make();
   Frame below, above;
   below.rotation = make_turn({1, 0, 0}, std::numbers::pi / 4);
@@ -99,7 +99,7 @@ double calc_gap(const Solid& a, const Frame& fa, const Solid& b, const Frame& fb
   return best;
 }
 
-TEST(polyhedra, deepest_touch_is_the_separation_of_the_bodies) {
+TEST(polyhedra, deepest_touch_equals_separation) {
   const Solid sa = make_box({0.06, 0.05, 0.04}), sb = make_box({0.04, 0.09, 0.03});
   const auto a = sa.make(), b = sb.make();
   Dice dice(11);
@@ -133,7 +133,7 @@ TEST(polyhedra, deepest_touch_is_the_separation_of_the_bodies) {
   EXPECT_GE(compared, 250);
 }
 
-TEST(polyhedra, same_answer_swapped_and_carried_elsewhere) {
+TEST(polyhedra, invariance_to_swap_and_pose) {
   const auto a = make_box({0.06, 0.05, 0.04}, 2).make(), b = make_box({0.1, 0.1, 0.02}, 3).make();
   Frame fa, fb, move;
   fa.rotation = make_turn({0.2, 0.1, 1}, 0.4);

@@ -23,7 +23,7 @@ std::string refuse(const Solid& solid) {
   return "";
 }
 
-TEST(shape, refuses_what_is_no_closed_surface) {
+TEST(shape, refusal_of_invalid_surfaces) {
   Solid open = make_box({1, 1, 1});
   open.triangles.pop_back();
   EXPECT_NE(refuse(open).find("the surface is open at edge"), std::string::npos);
@@ -42,7 +42,7 @@ TEST(shape, refuses_what_is_no_closed_surface) {
   EXPECT_NE(refuse({}).find("no surface triangles"), std::string::npos);
 }
 
-TEST(shape, box_of_any_fineness_is_a_polyhedron_of_six_facets) {
+TEST(shape, six_facets_of_box_for_any_mesh) {
   for (const int n : {1, 3, 20}) {
     const auto box = make_box({0.06, 0.05, 0.04}, n).make();
     ASSERT_TRUE(box->is_polyhedron()) << n;
@@ -52,7 +52,7 @@ TEST(shape, box_of_any_fineness_is_a_polyhedron_of_six_facets) {
   }
 }
 
-TEST(shape, round_and_hollow_bodies_are_no_polyhedra) {
+TEST(shape, round_and_hollow_bodies_not_polyhedra) {
   EXPECT_FALSE(make_ball(1, 2).make()->is_polyhedron());
   EXPECT_FALSE(make_cylinder(1, 2, 24).make()->is_polyhedron());
   Solid hollow = make_box({1, 1, 1}, 2), inner = make_box({0.9, 0.9, 0.9}, 2);
@@ -61,7 +61,7 @@ TEST(shape, round_and_hollow_bodies_are_no_polyhedra) {
   EXPECT_FALSE(hollow.make()->is_polyhedron());
 }
 
-TEST(shape, rim_of_a_cylinder_is_a_ridge_and_its_mantle_is_round) {
+TEST(shape, cylinder_rim_and_mantle) {
   const auto cylinder = make_cylinder(1.0, 2.0, 32).make();
   const Skin& skin = cylinder->skin();
   for (int v = 0; v < cylinder->mesh().count_vertices(); ++v) {
@@ -80,7 +80,7 @@ TEST(shape, rim_of_a_cylinder_is_a_ridge_and_its_mantle_is_round) {
   }
 }
 
-TEST(shape, both_sides_of_a_rim_meet_on_its_circle) {
+TEST(shape, common_circle_of_rim_sides) {
   const double r = 0.07, half = std::numbers::pi / 48, chord = r * std::cos(half);
   const auto bowl = make_lathe({{0, 0}, {0.06, 0.01}, {0.075, 0.045}, {r, 0.05}, {0.05, 0.02}, {0, 0.01}}, 48, false).make();
   const Mesh& mesh = bowl->mesh();
@@ -102,7 +102,7 @@ TEST(shape, both_sides_of_a_rim_meet_on_its_circle) {
   EXPECT_EQ(rims, 96);
 }
 
-TEST(shape, touched_triangle_is_the_one_that_looks_the_way_asked) {
+TEST(shape, triangle_by_normal) {
   const Solid solid = make_box({2, 2, 2}, 4);
   const auto box = solid.make();
   for (int k = 0; k < 3; ++k) {

@@ -6,7 +6,7 @@
 namespace carillon::impact::tests {
 namespace {
 
-TEST(Balls, OfHertzReboundWithAllTheirSpeedAtAnyStep) {
+TEST(Balls, ElasticHertzReboundAtAnyStep) {
   for (const double v : {1e-5, 0.01, 1.0, 100.0})
     for (const double steps : {1.0, 3.0, 5.0, 8.0, 20.0, 64.0, 500.0}) {
       const std::vector<Contact> contacts{make_contact(0.01)};
@@ -16,7 +16,7 @@ TEST(Balls, OfHertzReboundWithAllTheirSpeedAtAnyStep) {
     }
 }
 
-TEST(Balls, TouchForHertzsTime) {
+TEST(Balls, HertzContactTime) {
   const double v = 1.0, radius = 0.01;
   const Body ball = make_ball(radius, {0, 0, -v});
   const std::vector<Contact> contacts{make_contact(radius)};
@@ -34,7 +34,7 @@ TEST(Balls, TouchForHertzsTime) {
               1e-3 * largest);  // peak of Zener's lambda = 0
 }
 
-TEST(Balls, LoseWhatHuntAndCrossleysLawSays) {
+TEST(Balls, HuntCrossleyLoss) {
   for (const double e : {0.95, 0.7, 0.5, 0.2}) {
     std::vector<Contact> contacts{make_contact(0.01)};
     contacts[0].restitution = e;
@@ -46,7 +46,7 @@ TEST(Balls, LoseWhatHuntAndCrossleysLawSays) {
   }
 }
 
-TEST(Balls, InACradleMoveAsTheWaveThroughThemSays) {
+TEST(Balls, NewtonsCradle) {
   // Touching Hertz balls, velocities after over that before: own integration (Verlet, 30,000 steps).
   const std::vector<std::vector<double>> wanted{
       {-.0710, .0764, .9945}, {-.0711, -.0303, -.0145, .1270, .9888}, {-.0711, -.0303, -.0158, -.0089, -.0024, .1418, .9867}};
@@ -71,7 +71,7 @@ TEST(Balls, InACradleMoveAsTheWaveThroughThemSays) {
   }
 }
 
-TEST(Balls, UnderGravityGiveItsWorkToTheBooks) {
+TEST(Balls, WorkOfGravityInEnergyBalance) {
   // A soft long contact in which gravity does as much as the impact.
   Body ball = make_ball(0.02, {0, 0, -0.05});
   ball.acceleration_m_s2 = {0, 0, -9.81};
@@ -85,7 +85,7 @@ TEST(Balls, UnderGravityGiveItsWorkToTheBooks) {
   EXPECT_GT(after.velocity_m_s[2], 0.03);
 }
 
-TEST(Balls, FallFlushAsBoxesWithoutATurn) {
+TEST(Balls, FlushBoxesWithoutSpin) {
   for (const double mu : {0.0, 0.4})
     for (const double e : {1.0, 0.5}) {
       Body box;
@@ -112,7 +112,7 @@ TEST(Balls, FallFlushAsBoxesWithoutATurn) {
     }
 }
 
-TEST(Balls, ThatAreMalletsOfFeltPushLongerAndSofter) {
+TEST(Balls, FeltMalletPulse) {
   // A felt hammer of 9 g on a heavy block: F = K y^2.5, length and peak of its pulse against quadrature of the energy integral.
   const double m = 0.009, v = 3.0, p = 2.5, K = 4e9;
   Body mallet;
@@ -133,7 +133,7 @@ TEST(Balls, ThatAreMalletsOfFeltPushLongerAndSofter) {
   EXPECT_NEAR(static_cast<double>(pulses[0].impulse_n_s.size()) * pulses[0].step_s, time, 3e-3 * time);
 }
 
-TEST(Balls, WithWrongInputAreRefused) {
+TEST(Balls, RefusalOfInvalidInput) {
   const Body ball = make_ball(0.01, {0, 0, -1});
   const Contact good = make_contact(0.01);
   const auto refuse = [&](auto change) {

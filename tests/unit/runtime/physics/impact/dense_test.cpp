@@ -36,7 +36,7 @@ Solved solve(const Functions& functions, const Eigen::MatrixXd& A, const Eigen::
   return solved;
 }
 
-TEST(Dense, SolvesAsEigenDoes) {
+TEST(Dense, SolutionOfEigen) {
   std::mt19937_64 random(5);
   for (int n = 1; n <= 40; ++n) {
     const Eigen::MatrixXd A = make_matrix(n, random);
@@ -49,7 +49,7 @@ TEST(Dense, SolvesAsEigenDoes) {
   }
 }
 
-TEST(Dense, AllSetsOfInstructionsGiveTheSameBits) {
+TEST(Dense, SameBitsForAllInstructionSets) {
 #if defined(__x86_64__)
   if (!__builtin_cpu_supports("avx2")) GTEST_SKIP() << "this processor has one set";
   std::mt19937_64 random(6);
@@ -61,14 +61,14 @@ TEST(Dense, AllSetsOfInstructionsGiveTheSameBits) {
 #endif
 }
 
-TEST(Dense, SaysWhereThereIsNoSolution) {
+TEST(Dense, SingularMatrix) {
   Eigen::MatrixXd A = Eigen::MatrixXd::Random(7, 7);
   EXPECT_TRUE(solve(get_functions(), Eigen::MatrixXd::Identity(7, 7), Eigen::VectorXd::Ones(7)).is_regular);
   A.row(3).setZero();
   EXPECT_FALSE(solve(get_functions(), A, Eigen::VectorXd::Ones(7)).is_regular);
 }
 
-TEST(Dense, AddsTheColumnsThatAreNamed) {
+TEST(Dense, SumOfSelectedColumns) {
   const int rows = 11;
   const Eigen::MatrixXd A = Eigen::MatrixXd::Random(rows, 9);
   const std::vector<std::size_t> which{7, 0, 3};

@@ -11,7 +11,7 @@ constexpr double kRadius = 0.015;
 /// Speed of the ball's lowest point along x.
 double calc_slip(const Body& ball) { return ball.velocity_m_s[0] - kRadius * ball.spin_rad_s[1]; }
 
-TEST(Friction, OfAGrosslySlidingBallIsMuTimesTheImpulse) {
+TEST(Friction, GrossSlidingImpulse) {
   // Slip never ends: dv = mu J/m, and the contact point slows by 7/2 of it. J = 2 m v.
   const double mu = 0.1, v = 1.0, along = 3.0;
   std::vector<Contact> contacts{make_contact(kRadius)};
@@ -27,7 +27,7 @@ TEST(Friction, OfAGrosslySlidingBallIsMuTimesTheImpulse) {
               5e-3 * impact.get_books().dissipated_friction);
 }
 
-TEST(Friction, KeepsTheAngularMomentumAboutTheContact) {
+TEST(Friction, AngularMomentumAboutContact) {
   for (const double mu : {0.05, 0.3, 1.0})
     for (const double along : {0.2, 1.0, 4.0}) {
       std::vector<Contact> contacts{make_contact(kRadius)};
@@ -41,7 +41,7 @@ TEST(Friction, KeepsTheAngularMomentumAboutTheContact) {
     }
 }
 
-TEST(Friction, TurnsSlidingIntoRollingAtFiveSeventhsOfTheSpeed) {
+TEST(Friction, SlidingToRollingAtFiveSevenths) {
   // A ball pressed by gravity alone: v = 5/7 v0 after 2 v0/(7 mu g) and 12 v0^2/(49 mu g).
   const double mu = 0.3, v0 = 0.5, g = 9.81;
   std::vector<Contact> contacts{make_contact(kRadius)};
@@ -65,7 +65,7 @@ TEST(Friction, TurnsSlidingIntoRollingAtFiveSeventhsOfTheSpeed) {
   EXPECT_NEAR(impact.get_books().dissipated_friction, 2.0 / 7.0 * 0.5 * ball.mass_kg * v0 * v0, 0.02 * 0.5 * ball.mass_kg * v0 * v0);
 }
 
-TEST(Friction, SticksWithoutLossAndSwingsOnTheAnchor) {
+TEST(Friction, LosslessStickingOscillation) {
   // A ball pressed hard and pushed softly: the anchor spring and 2/7 of the mass (7/2 of the mobility) swing, and nothing is lost.
   const double press = 1e4, v0 = 1e-4;
   std::vector<Contact> contacts{make_contact(kRadius)};
@@ -87,7 +87,7 @@ TEST(Friction, SticksWithoutLossAndSwingsOnTheAnchor) {
   expect_sound(impact, contacts);
 }
 
-TEST(Friction, ThrowsTangentialMotionBackAsElasticSpheresDo) {
+TEST(Friction, TangentialReboundOfElasticSpheres) {
   // Maw, Barber and Fawcett 1976: with psi = 2 (1 - nu)/(2 - nu) v_t/(mu v_n), a solid sphere slides all the way for
   // psi_1 > 4 chi - 1 = 4.76 (chi = 7/2 (1 - nu)/(2 - nu)), and comes back reversed from small angles. psi_2 = psi_1 - 7 kappa there.
   const double mu = 0.2, kappa = 2.0 * (1.0 - kPoisson) / (2.0 - kPoisson);
@@ -111,7 +111,7 @@ TEST(Friction, ThrowsTangentialMotionBackAsElasticSpheresDo) {
   EXPECT_GT(min, -1.8);
 }
 
-TEST(Friction, HoldsSeveralPointsOnTheirCones) {
+TEST(Friction, SeveralPointsWithinCones) {
   // A box that lands on four corners while it slides and spins; the forces of every step are looked at by run().
   for (const double mu : {0.05, 0.3, 1.2}) {
     Body box;
@@ -133,7 +133,7 @@ TEST(Friction, HoldsSeveralPointsOnTheirCones) {
   }
 }
 
-TEST(Friction, BringsTangentialModesToRing) {
+TEST(Friction, ExcitationOfTangentialModes) {
   // A mode along x that only friction can reach.
   const Modes modes(std::array{2.0 * kPi * 900.0}, std::array{2.0});
   const std::vector<double> shape{0.8, 0.0, 0.0};

@@ -64,7 +64,7 @@ void expect_limited(const Rebound& rebound, double restitution, int& limited) {
   if (rebound.elastic > 1.02 * restitution) ++limited;
 }
 
-TEST(Limit, OfABallOnASupportedPlateIsTheRestitutionGiven) {
+TEST(Limit, BallOnSupportedPlate) {
   int limited = 0;
   for (const double thickness : {0.002, 0.004, 0.01})
     for (const double radius : {0.005, 0.01, 0.02, 0.04}) {
@@ -77,7 +77,7 @@ TEST(Limit, OfABallOnASupportedPlateIsTheRestitutionGiven) {
   EXPECT_GT(limited, 8);
 }
 
-TEST(Limit, BooksTheEnergyThatItTakesAsYieldedThenAsDissipated) {
+TEST(Limit, YieldedThenDissipatedEnergy) {
   int limited = 0;
   for (const double thickness : {0.002, 0.004, 0.01})
     for (const double radius : {0.01, 0.02, 0.04}) {
@@ -115,7 +115,7 @@ Body make_free(const Bar& bar, const Modes& modes) {
   return body;
 }
 
-TEST(Limit, OfABallOnAFreeBarIsTheRestitutionGiven) {
+TEST(Limit, BallOnFreeBar) {
   int limited = 0;
   for (const double x : {0.0, 0.03, 0.07, 0.1})
     for (const double radius : {0.005, 0.012, 0.03})
@@ -128,7 +128,7 @@ TEST(Limit, OfABallOnAFreeBarIsTheRestitutionGiven) {
   EXPECT_GT(limited, 8);
 }
 
-TEST(Limit, OfABallOnABlockIsReachedSinceTheBlockKeepsNothing) {
+TEST(Limit, BallOnBlock) {
   // Modes far above the pulse: what the contact loses is all that is lost.
   const Modes modes(std::vector<double>{2.0 * kPi * 60e3, 2.0 * kPi * 90e3}, std::vector<double>{5.0, 5.0});
   Body below;
@@ -143,7 +143,7 @@ TEST(Limit, OfABallOnABlockIsReachedSinceTheBlockKeepsNothing) {
   }
 }
 
-TEST(Limit, OfTwoContactsThatShareABarHoldsForBoth) {
+TEST(Limit, TwoContactsOnOneBar) {
   for (const double e : {0.2, 0.6}) {
     const Bar left = make_bar(0.2, 0.03, 0.006, -0.05, 20e3), right = make_bar(0.2, 0.03, 0.006, 0.08, 20e3);
     const Modes modes(left.omega, std::vector<double>(left.omega.size(), 2.0), 2.0 * kPi * 20e3);
@@ -164,7 +164,7 @@ TEST(Limit, OfTwoContactsThatShareABarHoldsForBoth) {
   }
 }
 
-TEST(Limit, DoesNotLetThroughWhatIsPressedForLong) {
+TEST(Limit, NoPenetrationUnderLongPressure) {
   // A ball lies on a plate for 0.3 s; then something presses it down. Springs and modes yield by some 20 um.
   const Plate plate = make_plate(0.2, 0.18, 0.004, 15e3, 0.094, 0.0954, 50.0);
   const Modes modes(plate.omega, plate.decay, 2.0 * kPi * 15e3);

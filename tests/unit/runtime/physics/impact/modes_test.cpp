@@ -23,7 +23,7 @@ std::array<Real, 2> integrate(Real w, Real d, Real q, Real v, Real f, Real h) {
   return {q, v};
 }
 
-TEST(Modes, OneStepIsTheSolutionInAllRegimes) {
+TEST(Modes, ExactStepInAllRegimes) {
   const double h = 1e-5;
   for (const double wh : {0.0, 1e-8, 1e-3, 0.3, 0.49, 0.51, 2.0, 3.1415926, 20.0})
     for (const double ratio : {0.0, 1e-4, 0.5, 0.999999, 1.0, 1.000001, 1.3, 4.0}) {
@@ -38,7 +38,7 @@ TEST(Modes, OneStepIsTheSolutionInAllRegimes) {
     }
 }
 
-TEST(Modes, StepsLieOnTheirGrid) {
+TEST(Modes, GridOfStepLengths) {
   for (const double h : {1e-9, 3.3e-6, 1.0 / 4096, 0.7}) {
     const int k = find_step(h);
     EXPECT_LE(get_step(k), h);
@@ -47,7 +47,7 @@ TEST(Modes, StepsLieOnTheirGrid) {
   EXPECT_EQ(find_step(get_step(-61)), -61);
 }
 
-TEST(Modes, MovedFreelyInOneGoOrManyIsTheSame) {
+TEST(Modes, FreeMotionInOneOrManySteps) {
   const Modes modes(std::array{300.0, 4e4, 1e5}, std::array{1.0, 50.0, 2e5});
   std::vector<double> q{1e-3, 2e-5, 1e-6}, v{0.1, 0.2, 0.3}, one = q, one_v = v;
   const double before = modes.calc_energy(q, v);
@@ -60,7 +60,7 @@ TEST(Modes, MovedFreelyInOneGoOrManyIsTheSame) {
   EXPECT_LT(modes.calc_energy(q, v), before);
 }
 
-TEST(Modes, AboveTheBandIsPlateLikeOrNothing) {
+TEST(Modes, TailOfPlateLikeBodies) {
   std::vector<double> omega, decay, solid, phi;
   for (int i = 1; i <= 100; ++i) {
     omega.push_back(1000.0 * i);

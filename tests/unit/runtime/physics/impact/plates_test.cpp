@@ -8,7 +8,7 @@
 namespace carillon::impact::tests {
 namespace {
 
-TEST(Plates, ZenersTheoryIsTheOneOfTheTables) {
+TEST(Plates, ZenersTables) {
   for (const auto& [lambda, e] :
        std::to_array<std::array<double, 2>>({{0.1, .843339}, {0.3, .605947}, {0.5, .436895}, {1.0, .184123}, {2.0, .020683}}))
     EXPECT_NEAR(calc_zener(lambda), e, 2e-6);
@@ -18,7 +18,7 @@ struct Case {
   double thickness, radius, speed, highest_hz;
 };
 
-TEST(Plates, GiveABallZenersRestitutionAlsoForPulsesBeyondTheBand) {
+TEST(Plates, ZenersRestitutionBeyondTheBand) {
   double nearest = 1e9, furthest = 0.0;
   for (const Case& c : std::to_array<Case>({{.006, .005, 1, 20e3},
                                             {.003, .005, 1, 20e3},
@@ -53,7 +53,7 @@ TEST(Plates, GiveABallZenersRestitutionAlsoForPulsesBeyondTheBand) {
   EXPECT_GT(furthest, 17.0);
 }
 
-TEST(Plates, ThatFallNeverRingWithMoreThanTheMotionLost) {
+TEST(Plates, ModalEnergyOfFallingPlate) {
   // 300 x 300 x 2 mm of steel from 0.6 m on concrete, on its corner, its edge and its face. A rigid impact of e = 0.5 gives some 100 J.
   const double side = 0.3, thickness = 0.002, v = 3.43;
   const FreePlate plate = make_free_plate(side, thickness, 20e3);

@@ -7,7 +7,7 @@
 namespace carillon::impact::tests {
 namespace {
 
-TEST(Prediction, SpectrumIsThatOfThePulse) {
+TEST(Prediction, PulseSpectrum) {
   EXPECT_NEAR(calc_pulse_spectrum(0.0), 1.0, 1e-12);
   for (const double x : {0.5, 2.0, 5.0, 9.3, 15.0, 40.0}) {
     long double real = 0, imaginary = 0, area = 0;
@@ -23,7 +23,7 @@ TEST(Prediction, SpectrumIsThatOfThePulse) {
   EXPECT_EQ(calc_pulse_spectrum(1e9), 0.0);
 }
 
-TEST(Prediction, WhereItIsEnoughAgreesWithTheImpact) {
+TEST(Prediction, AgreementWithIntegratedImpact) {
   int enough = 0, not_enough = 0;
   for (const double thickness : {0.003, 0.01, 0.03})
     for (const double radius : {0.002, 0.005, 0.01, 0.02})
@@ -55,7 +55,7 @@ TEST(Prediction, WhereItIsEnoughAgreesWithTheImpact) {
   EXPECT_GE(not_enough, 4);
 }
 
-TEST(Prediction, NeverGivesTheModesMoreThanTheMotionLoses) {
+TEST(Prediction, ModalEnergyBelowLossOfMotion) {
   const Plate plate = make_plate(0.3, 0.3, 0.0005, 20e3, 0.01, 0.01);
   const Modes modes(plate.omega, plate.decay);
   std::vector<double> phi;
@@ -73,7 +73,7 @@ TEST(Prediction, NeverGivesTheModesMoreThanTheMotionLoses) {
     }
 }
 
-TEST(Prediction, IsNotEnoughForBodiesThatRing) {
+TEST(Prediction, InsufficientForRingingBodies) {
   const Modes modes(std::array{6000.0}, std::array{1.0});
   const std::vector<double> phi{0.01}, rest{0.0}, ringing{3.0};
   const Spring spring{1e10, 1.5, 0.0};

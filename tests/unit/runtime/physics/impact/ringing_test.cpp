@@ -90,7 +90,7 @@ Vector integrate(const Pair& p, long double time, int steps) {
   return s;
 }
 
-TEST(Ringing, BodiesMeetAsRungeKuttaSays) {
+TEST(Ringing, AgreementWithRungeKutta) {
   const Pair pair;
   Impact impact = run(pair.make_bodies(), pair.make_contacts(), {.steps_per_pulse = 400.0});
   const auto after = impact.get_bodies();
@@ -106,7 +106,7 @@ TEST(Ringing, BodiesMeetAsRungeKuttaSays) {
   EXPECT_NEAR(pair.mass_a * after[0].velocity_m_s[2] + pair.mass_b * after[1].velocity_m_s[2], -pair.mass_a * pair.speed, 1e-15);
 }
 
-TEST(Ringing, TheForceSamplesGiveTheModesTheSameStates) {
+TEST(Ringing, ModalStatesFromForceSamples) {
   // What a synthesiser does with the samples: each is a constant force for one step.
   const Pair pair;
   Impact impact = run(pair.make_bodies(), pair.make_contacts());
@@ -130,7 +130,7 @@ TEST(Ringing, TheForceSamplesGiveTheModesTheSameStates) {
   }
 }
 
-TEST(Ringing, LeftAndTakenUpAgainGivesTheSameBits) {
+TEST(Ringing, SameBitsAfterInterruption) {
   const Pair pair;
   std::vector<Contact> contacts = pair.make_contacts();
   contacts[0].friction = 0.3;
@@ -170,7 +170,7 @@ TEST(Ringing, LeftAndTakenUpAgainGivesTheSameBits) {
   ASSERT_EQ(whole.take_pulses()[0].impulse_n_s, samples);
 }
 
-TEST(Ringing, AContactThatJoinsClosesTheBooksToo) {
+TEST(Ringing, EnergyBalanceWithJoiningContact) {
   for (const double gap : {1e-7, -1e-7}) {
     const Pair pair;
     std::vector<Contact> contacts = pair.make_contacts();
@@ -190,7 +190,7 @@ TEST(Ringing, AContactThatJoinsClosesTheBooksToo) {
   }
 }
 
-TEST(Ringing, ABodyThatJoinsIsPushedAsOneThatWasThere) {
+TEST(Ringing, JoiningBody) {
   const Pair pair;
   const Body ball = make_ball(0.01, {0, 0, 0.4});
   Contact touch = make_contact(0.005, 1, 2);
@@ -207,7 +207,7 @@ TEST(Ringing, ABodyThatJoinsIsPushedAsOneThatWasThere) {
   expect_sound(joined, both);
 }
 
-TEST(Ringing, AnUpdateWithTheSamePlacesChangesNothing) {
+TEST(Ringing, UpdateWithoutChange) {
   const Pair pair;
   std::vector<Contact> contacts = pair.make_contacts();
   contacts[0].friction = 0.3;
@@ -225,7 +225,7 @@ TEST(Ringing, AnUpdateWithTheSamePlacesChangesNothing) {
     }
 }
 
-TEST(Ringing, BodiesThatTurnInALongContactKeepTheirBooks) {
+TEST(Ringing, EnergyBalanceOfRotatingBodies) {
   // A plate pressed on one corner for 4 ms while it spins, with its frame updated every 0.2 ms.
   const Plate plate = make_plate(0.3, 0.2, 0.002, 20e3, 0.29, 0.19);
   const Modes modes(plate.omega, plate.decay, 2.0 * kPi * 20e3);
@@ -265,7 +265,7 @@ TEST(Ringing, BodiesThatTurnInALongContactKeepTheirBooks) {
   EXPECT_THROW(impact.update(impact.get_bodies(), two), std::invalid_argument);
 }
 
-TEST(Ringing, SecondHitTakesEnergyAsWellAsItGives) {
+TEST(Ringing, SecondHitInBothPhases) {
   // The same hit on a body that rings in one phase and in the other: books close, and the modes end with more or with less.
   const Modes modes(std::array{2.0 * kPi * 500.0}, std::array{0.0});
   const std::vector<double> shape{0, 0, 2.0};
@@ -285,7 +285,7 @@ TEST(Ringing, SecondHitTakesEnergyAsWellAsItGives) {
   EXPECT_LT(modal[1], 0.02);
 }
 
-TEST(Ringing, AnOpenContactIsStruckAtTheSpeedWithWhichItCloses) {
+TEST(Ringing, ClosingSpeedOfOpenContact) {
   // From 0.05 m/s to 0.29 m/s on the way of 40 um; the same from there on.
   const double pull = 1e3, way = 4e-5, speed = std::sqrt(0.05 * 0.05 + 2.0 * pull * way);
   double rebound[2] = {};
@@ -308,7 +308,7 @@ TEST(Ringing, AnOpenContactIsStruckAtTheSpeedWithWhichItCloses) {
   EXPECT_NEAR(rebound[1], rebound[0], 0.02);
 }
 
-TEST(Ringing, AnOpenContactGoesWithItsTouchAndAPressedOneKeepsItsCompression) {
+TEST(Ringing, UpdateOfOpenAndPressedContacts) {
   Body ball = make_ball(0.01, {0, 0, -1.0});
   std::vector<Contact> contacts(2, make_contact(0.01));
   contacts[1].gap_m = 1e-3;
@@ -323,7 +323,7 @@ TEST(Ringing, AnOpenContactGoesWithItsTouchAndAPressedOneKeepsItsCompression) {
   EXPECT_EQ(impact.get_compression(1), -2e-4);
 }
 
-TEST(Ringing, AStifferSpringTakesTheEnergyAndTheDepthOfTheOldOne) {
+TEST(Ringing, ExchangeByStifferSpring) {
   for (const double factor : {1.0, 30.0}) {
     std::vector<Contact> contacts{make_contact(0.01)};
     contacts[0].restitution = 1.0;
@@ -345,7 +345,7 @@ TEST(Ringing, AStifferSpringTakesTheEnergyAndTheDepthOfTheOldOne) {
   }
 }
 
-TEST(Ringing, WhatHasYieldedRecoversAsTheSurfacesPart) {
+TEST(Ringing, RecoveryOfYieldedCompression) {
   for (const double speed : {-1.0, 1.0}) {
     std::vector<Contact> contacts{make_contact(0.01)};
     contacts[0].yielded_m = 1e-4;

@@ -9,7 +9,7 @@
 namespace carillon::impact {
 namespace {
 
-TEST(Spring, ForceOfAStepIsTheMeanOverItAndItsSlopeTheDerivative) {
+TEST(Spring, MeanForceAndSlopeOfStep) {
   for (const double p : {1.0, 1.5, 2.3, 3.5}) {
     const Spring spring{2e7, p, 0.0};
     for (const auto& [y0, y1] : std::to_array<std::array<double, 2>>({{0, 1e-5},
@@ -41,7 +41,7 @@ TEST(Spring, ForceOfAStepIsTheMeanOverItAndItsSlopeTheDerivative) {
   EXPECT_EQ(calc_step_force({2e7, 1.5, 0.0}, -1e-5, -1e-6, 1e-6).force, 0.0);
 }
 
-TEST(Spring, HysteresisGivesTheRestitutionOfHuntAndCrossleysLaw) {
+TEST(Spring, HysteresisOfHuntAndCrossley) {
   // chi v and e from the equation of motion by Runge-Kutta, step 2e-5.
   for (const auto& [x, e] : std::to_array<std::array<double, 2>>({{0.02, .986842},
                                                                   {0.05, .967739},
@@ -66,7 +66,7 @@ TEST(Spring, HysteresisGivesTheRestitutionOfHuntAndCrossleysLaw) {
   }
 }
 
-TEST(Spring, PulsesLastAsHertzSaysAndLinearSpringsHalfAPeriod) {
+TEST(Spring, PulseDuration) {
   const Spring hertz{1e10, 1.5, 0.0};
   EXPECT_NEAR(calc_elastic_pulse(hertz, 0.1, 2.0).length_s, 3.21807 * std::pow(0.1 / (1e10 * std::sqrt(2.0)), 0.4), 1e-9);
   const Spring linear{1e6, 1.0, 0.0};

@@ -58,7 +58,7 @@ double calc_period(double w0, double a) {
   return 2.0 * std::numbers::pi / (w0 * x);
 }
 
-TEST(mechanism, pendulum_has_the_period_of_the_elliptic_integral) {
+TEST(mechanism, pendulum_period) {
   for (const double a : {0.01, 0.5, 1.5, 3.0}) {
     const double l = 0.6;
     const std::vector<Member> members{make_bar(0.4, l, {}, a)};
@@ -80,7 +80,7 @@ TEST(mechanism, pendulum_has_the_period_of_the_elliptic_integral) {
   }
 }
 
-TEST(mechanism, pendulum_keeps_its_energy_for_a_minute) {
+TEST(mechanism, pendulum_energy_over_a_minute) {
   const std::vector<Member> members{make_bar(0.4, 0.6, {}, 2.5)};
   const auto m = make_mechanism(members, {make_hinge(0, -1, {})}, kGravity);
   Coordinates now = m->get_start();
@@ -97,7 +97,7 @@ TEST(mechanism, pendulum_keeps_its_energy_for_a_minute) {
   EXPECT_EQ(now.lost_j, 0.0);
 }
 
-TEST(mechanism, double_pendulum_moves_by_its_lagrangian) {
+TEST(mechanism, double_pendulum) {
   // Two thin bars; equations of motion from the Lagrangian in the two angles, integrated here by the classical method with 10 us.
   const double m1 = 0.3, m2 = 0.2, l1 = 0.4, l2 = 0.3, a1 = 1.2, a2 = -0.4;
   const Vec3 middle{l1 * std::sin(a1), 0, -l1 * std::cos(a1)};
@@ -136,7 +136,7 @@ TEST(mechanism, double_pendulum_moves_by_its_lagrangian) {
   EXPECT_NEAR(motions[1].spin[1], -x[3], 1e-5);
 }
 
-TEST(mechanism, ball_joint_keeps_the_angular_momentum_about_the_vertical) {
+TEST(mechanism, angular_momentum_of_ball_joint) {
   // A heavy top: a symmetrical body that spins and swings about a ball joint. Energy and both angular momenta stay.
   Member top;
   top.mass_kg = 0.3;
@@ -169,7 +169,7 @@ TEST(mechanism, ball_joint_keeps_the_angular_momentum_about_the_vertical) {
   EXPECT_NEAR(after[3], 0.13, 1e-12);  // the joint does not open
 }
 
-TEST(mechanism, impulse_beyond_the_centre_of_percussion_pushes_the_hinge_the_other_way) {
+TEST(mechanism, centre_of_percussion) {
   // A bar hinged at its end: W = r r' / I; the reaction vanishes for a blow at 2/3 of its length.
   const double mass = 0.4, l = 0.6, inertia = mass * l * l / 3.0;
   const auto m = make_mechanism({make_bar(mass, l, {}, 0.0)}, {make_hinge(0, -1, {})}, kGravity);
@@ -192,7 +192,7 @@ TEST(mechanism, impulse_beyond_the_centre_of_percussion_pushes_the_hinge_the_oth
   EXPECT_NEAR(at(2, 2), 0.0, 1e-15);
 }
 
-TEST(mechanism, mobility_of_a_free_pair_keeps_momentum) {
+TEST(mechanism, momentum_by_mobility_of_free_pair) {
   // Two bars on a ball joint that nothing holds: an impulse on one gives both together just that momentum.
   std::vector<Member> members{make_bar(0.3, 0.4, {}, 0.3), make_bar(0.7, 0.5, {}, -1.0)};
   const auto m = make_mechanism(members, {{.kind = Kind::kBall, .body = 1, .to = 0, .at = {}}}, {});
@@ -206,7 +206,7 @@ TEST(mechanism, mobility_of_a_free_pair_keeps_momentum) {
   }
 }
 
-TEST(mechanism, hanging_chain_does_not_drift) {
+TEST(mechanism, no_drift_of_hanging_chain) {
   std::vector<Member> members;
   std::vector<Joint> joints;
   for (int i = 0; i < 20; ++i) {
@@ -222,7 +222,7 @@ TEST(mechanism, hanging_chain_does_not_drift) {
   for (std::size_t i = 0; i < motions.size(); ++i) EXPECT_LT(norm(motions[i].centre - members[i].start.centre), 1e-12);
 }
 
-TEST(mechanism, damped_hinge_loses_what_its_books_say) {
+TEST(mechanism, energy_loss_of_damped_hinge) {
   // Small swings: a exp(-d t) with d = c / 2 I.
   const double mass = 0.4, l = 0.6, c = 0.02, inertia = mass * l * l / 3.0, a = 1e-3;
   const std::vector<Member> members{make_bar(mass, l, {}, a)};
@@ -242,7 +242,7 @@ TEST(mechanism, damped_hinge_loses_what_its_books_say) {
   EXPECT_GT(now.lost_j, 0.0);
 }
 
-TEST(mechanism, slider_falls_along_its_axis) {
+TEST(mechanism, fall_along_slider) {
   Member m = make_bar(0.4, 0.6, {}, 0.0);
   const Vec3 axis{0.6, 0.0, -0.8};
   const auto s = make_mechanism({m}, {{.kind = Kind::kSlider, .body = 0, .to = -1, .at = {1, 2, 3}, .axis = axis}}, kGravity);
@@ -252,7 +252,7 @@ TEST(mechanism, slider_falls_along_its_axis) {
   EXPECT_LT(norm(motions[0].centre - m.start.centre - (0.5 * 0.8 * kG * 0.49) * axis), 1e-9);
 }
 
-TEST(mechanism, universal_joint_does_not_twist) {
+TEST(mechanism, no_twist_of_universal_joint) {
   // Hung by its end: it may swing both ways, and the middle of its length stays across the axis that is fixed in it.
   Member bar = make_bar(0.4, 0.6, {}, 0.0);
   bar.start.spin = {2.0, 1.0, 0.0};
@@ -273,7 +273,7 @@ TEST(mechanism, universal_joint_does_not_twist) {
   EXPECT_NEAR(second[0], 0.0, 1e-12);  // the second axis stays across the first
 }
 
-TEST(mechanism, weld_moves_two_as_one) {
+TEST(mechanism, welded_bodies) {
   std::vector<Member> members{make_bar(0.3, 0.4, {}, 0.0), make_bar(0.3, 0.4, {0, 0, -0.4}, 0.0)};
   const auto welded =
       make_mechanism(members, {make_hinge(0, -1, {}), {.kind = Kind::kWeld, .body = 1, .to = 0, .at = {0, 0, -0.4}}}, kGravity);
@@ -285,13 +285,13 @@ TEST(mechanism, weld_moves_two_as_one) {
   EXPECT_NEAR(du[0], one[0], 1e-12);
 }
 
-TEST(mechanism, velocities_that_a_joint_does_not_allow_are_reported) {
+TEST(mechanism, report_of_incompatible_velocities) {
   Member bar = make_bar(0.4, 0.6, {}, 0.0);
   bar.start.velocity = {0, 0.5, 0};  // along the axis
   EXPECT_NEAR(make_mechanism({bar}, {make_hinge(0, -1, {})}, kGravity)->get_start_error(), 0.5, 1e-12);
 }
 
-TEST(mechanism, loops_and_loose_members_are_refused) {
+TEST(mechanism, refusal_of_loops_and_loose_members) {
   const std::vector<Member> members{make_bar(0.3, 0.4, {}, 0.0), make_bar(0.3, 0.4, {0, 0, -0.4}, 0.0)};
   EXPECT_THROW(make_mechanism(members, {make_hinge(0, -1, {}), make_hinge(1, 0, {0, 0, -0.4}), make_hinge(1, -1, {0, 0, -0.8})}, kGravity),
                std::invalid_argument);

@@ -8,8 +8,8 @@
 #include <numbers>
 #include <vector>
 
-#include "tests/unit/runtime/physics/rigid/momenta.hpp"
 #include "tests/unit/runtime/physics/geometry/solids.hpp"
+#include "tests/unit/runtime/physics/rigid/momenta.hpp"
 
 namespace carillon::rigid {
 namespace {
@@ -82,7 +82,7 @@ std::vector<Strike> step_to_first_strikes(Space& space, double end_s) {
   return strikes;
 }
 
-TEST(joints, bob_strikes_a_wall) {
+TEST(joints, pendulum_against_wall) {
   // A ball of 3 cm that hangs 0.4 m below a hinge is let go at 0.6 rad and meets a wall at the bottom.
   const double r = 0.03, arm = 0.4, mass = 0.5, a = 0.6, e = 0.7;
   std::vector<Solid> solids{make_ball_solid(mass, r, e), make_wall({0.1, 0.2, 0.2}, e)};
@@ -110,7 +110,7 @@ TEST(joints, bob_strikes_a_wall) {
   EXPECT_NEAR(norm(space.state(0).centre), arm, 1e-12);
 }
 
-TEST(joints, ball_strikes_a_hinged_bar) {
+TEST(joints, ball_against_hinged_bar) {
   // Without gravity: a bar hinged at its end, struck across at a distance d; elastic. The bar is there an effective mass I / d^2.
   for (const double d : {0.1, 0.2, 0.27}) {
     const double l = 0.3, bar = 0.4, ball = 0.1, r = 0.01, v = 2.0;
@@ -128,7 +128,7 @@ TEST(joints, ball_strikes_a_hinged_bar) {
   }
 }
 
-TEST(joints, impulse_goes_through_a_chain) {
+TEST(joints, impulse_through_chain) {
   // Two bars on a hinge, free; a ball strikes one across at its outer end. Momentum and angular momentum of all are kept.
   const Vec3 sides{0.02, 0.02, 0.2};
   std::vector<Solid> solids{make_box_solid(0.2, sides, 0.6, 0.3), make_box_solid(0.3, sides, 0.6, 0.3),
@@ -147,7 +147,7 @@ TEST(joints, impulse_goes_through_a_chain) {
   EXPECT_LT(norm(space.state(0).centre + r0 * Vec3{0, 0, 0.1} - space.state(1).centre - r1 * Vec3{0, 0, -0.1}), 1e-12);
 }
 
-TEST(joints, hanging_pendulum_sleeps_and_wakes) {
+TEST(joints, sleep_and_wake_of_pendulum) {
   std::vector<Solid> solids{make_box_solid(0.3, {0.02, 0.02, 0.3}), make_ball_solid(0.1, 0.01)};
   std::vector<State> states{at({0, 0, -0.15}), at({0.5, 0, -0.25})};
   states[1].velocity = {-1, 0, 2.5};
@@ -159,7 +159,7 @@ TEST(joints, hanging_pendulum_sleeps_and_wakes) {
   EXPECT_GT(norm(space.get_spin(0)), 0.5);
 }
 
-TEST(joints, hanging_chain_of_twenty_sleeps_where_it_is) {
+TEST(joints, sleep_of_hanging_chain) {
   std::vector<Solid> solids;
   std::vector<State> states;
   Links links;
@@ -175,7 +175,7 @@ TEST(joints, hanging_chain_of_twenty_sleeps_where_it_is) {
   for (int i = 0; i < 20; ++i) EXPECT_LT(norm(space.state(i).centre - start[i].centre), 1e-12);
 }
 
-TEST(joints, sleeping_pendulum_takes_part_in_the_impact_on_a_box_that_touches_it) {
+TEST(joints, sleeping_pendulum_in_impact) {
   // A box slides into a second one, which sleeps in touch with a pendulum that hangs asleep. Oracle: all of them in one problem; and
   // the momentum of the boxes and of the pendulum about its hinge, over its arm.
   const double mass = 0.1, arm = 0.5;
@@ -205,7 +205,7 @@ TEST(joints, sleeping_pendulum_takes_part_in_the_impact_on_a_box_that_touches_it
   EXPECT_NEAR(space.calc_books().calc_total(), before_j, 1e-6 * mass * 0.5 * 0.5);
 }
 
-TEST(joints, leaning_pendulum_comes_to_rest_at_its_wall) {
+TEST(joints, rest_of_leaning_pendulum) {
   // A bar on a hinge that leans against a wall 10 degrees off the vertical: moments about the hinge balance.
   const double l = 0.3, mass = 0.4, a = 10.0 * std::numbers::pi / 180.0;
   const Vec3 sides{0.02, 0.02, l};
@@ -225,7 +225,7 @@ TEST(joints, leaning_pendulum_comes_to_rest_at_its_wall) {
   EXPECT_NEAR((transpose(make_rotation(space.state(0).rotation)) * edge)[0], -0.01, 3e-6);  // on the bar's left face
 }
 
-TEST(joints, slider_falls_on_a_plate_and_stays) {
+TEST(joints, slider_on_plate) {
   std::vector<Solid> solids{make_box_solid(0.4, {0.05, 0.05, 0.05}, 0.4, 0.4), make_wall({0.2, 0.2, 0.05}, 0.4, 0.4)};
   std::vector<State> states{at({0, 0, 0.1}), at({})};
   Space space(std::move(solids), std::move(states), std::nullopt, kGravity, {},
@@ -238,7 +238,7 @@ TEST(joints, slider_falls_on_a_plate_and_stays) {
   EXPECT_NEAR(space.calc_books().lost_j, 0.4 * kG * 0.05, 1e-3 * 0.4 * kG * 0.05);
 }
 
-TEST(joints, sliding_along_a_floor_loses_what_friction_takes) {
+TEST(joints, friction_loss_on_floor) {
   // A bar on a universal support turns about the vertical with its end on a plate: the moment of friction stops it as it would a mass.
   const double mass = 0.5, arm = 0.3, mu = 0.3, w = 4.0;
   std::vector<Solid> solids{make_ball_solid(mass, 0.02, 0.0, mu), make_wall({1.0, 1.0, 0.1}, 0.0, mu)};
@@ -274,7 +274,7 @@ TEST(joints, same_bits_in_any_slices) {
   EXPECT_EQ(one.state(0).momentum, two.state(0).momentum);
 }
 
-TEST(cords, ball_swings_as_a_pendulum) {
+TEST(cords, pendulum_on_cord) {
   // Frictionless sphere that does not turn about its cord's end: it is tied at its centre, a point mass.
   const double l = 0.5, a = 0.5, mass = 0.2;
   std::vector<Solid> solids{make_ball_solid(mass, 0.02)};
@@ -297,7 +297,7 @@ TEST(cords, ball_swings_as_a_pendulum) {
   EXPECT_NEAR(space.calc_books().calc_total(), before, 1e-3 * swing);
 }
 
-TEST(cords, slack_cord_lets_fall_and_takes_up) {
+TEST(cords, slack_cord) {
   const double l = 0.3, mass = 0.2;
   std::vector<Solid> solids{make_ball_solid(mass, 0.02)};
   std::vector<State> states{at({0, 0, -0.1})};
@@ -319,7 +319,7 @@ TEST(cords, slack_cord_lets_fall_and_takes_up) {
   EXPECT_NEAR(space.state(0).centre[2], -l - 0.02, 1e-7);
 }
 
-TEST(cords, springy_cord_throws_back) {
+TEST(cords, rebound_of_elastic_cord) {
   const double l = 0.3, mass = 0.2, e = 0.5;
   std::vector<Solid> solids{make_ball_solid(mass, 0.02)};
   std::vector<State> states{at({0, 0, -0.1})};
@@ -330,7 +330,7 @@ TEST(cords, springy_cord_throws_back) {
   EXPECT_NEAR(space.state(0).velocity[2], e * v - kG * 0.1, 1e-5);
 }
 
-TEST(cords, bar_hangs_still_on_two) {
+TEST(cords, bar_at_rest_on_two_cords) {
   // And turns about neither end: asleep, and each cord bears half.
   std::vector<Solid> solids{make_box_solid(0.3, {0.3, 0.03, 0.01}, 0.5, 0.4)};
   std::vector<State> states{at({0, 0, 0})};
@@ -343,7 +343,7 @@ TEST(cords, bar_hangs_still_on_two) {
   EXPECT_LT(norm(space.state(0).centre), 1e-7);
 }
 
-TEST(cords, two_balls_on_a_cord_keep_momentum) {
+TEST(cords, momentum_of_two_balls_on_cord) {
   // A dumb-bell of a slack cord in flight: taut later, they turn about each other.
   std::vector<Solid> solids{make_ball_solid(0.1, 0.01), make_ball_solid(0.3, 0.01)};
   std::vector<State> states{at({0, 0, 0}), at({0.1, 0, 0})};
@@ -366,7 +366,7 @@ Cord make_stop(bool turns, const Vec3& centre, const Vec3& axis, double max, boo
   return {.a = 0, .b = -1, .restitution = restitution, .stop = stop};
 }
 
-TEST(stops, pendulum_is_thrown_back_by_a_stop) {
+TEST(stops, rebound_of_pendulum_at_stop) {
   // Let go at 0.6 rad; the stop is before the lowest place, at it, or past it.
   const double r = 0.03, arm = 0.4, mass = 0.5, a = 0.6, e = 0.6;
   for (const double past : {-0.3, 0.0, 0.2}) {  // of the vertical
@@ -398,7 +398,7 @@ TEST(stops, pendulum_is_thrown_back_by_a_stop) {
   }
 }
 
-TEST(stops, leaning_on_a_stop_is_rest) {
+TEST(stops, rest_on_stop) {
   // A bar on a hinge at its end falls from upright and comes to lie on a stop 1 rad from there, after bounces of restitution 0.3.
   const double l = 0.3;
   const Vec3 centre{1e-3, 0, 0.5 * l};
@@ -412,7 +412,7 @@ TEST(stops, leaning_on_a_stop_is_rest) {
   EXPECT_NEAR(space.calc_books().calc_total(), before, 1e-3 * std::abs(before));
 }
 
-TEST(stops, slider_bounces_between_its_ends) {
+TEST(stops, slider_between_stops) {
   // Without gravity, to and fro between two stops: the speed is e^n times the first, the times follow.
   const double e = 0.8, v = 0.5, low = -0.1, high = 0.2;
   joints::Joint slider{.kind = joints::Kind::kSlider, .body = 0, .to = -1, .at = {}, .axis = {0.6, 0, 0.8}};
@@ -436,7 +436,7 @@ TEST(stops, slider_bounces_between_its_ends) {
   }
 }
 
-TEST(stops, of_two_free_bars_keep_momentum_and_angular_momentum) {
+TEST(stops, momentum_of_two_free_bars) {
   // Two bars with a hinge between them float; one turns until it strikes the stop. Restitution 1: the energy stays.
   const double l = 0.2, mass = 0.3;
   for (const double e : {1.0, 0.4}) {

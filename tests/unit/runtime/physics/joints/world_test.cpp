@@ -96,7 +96,7 @@ WorldSpec make_scene(const Things& t, int which) {
 class JointedBooks : public testing::TestWithParam<int> {};
 INSTANTIATE_TEST_SUITE_P(Scenes, JointedBooks, testing::Range(0, 5));
 
-TEST_P(JointedBooks, OfMotionModesAndLossesStayWithinAHundredth) {
+TEST_P(JointedBooks, EnergyBalanceWithinOnePercent) {
   const Things things;
   const Outcome r = run(make_scene(things, GetParam()), 1.0);
   RecordProperty("error_j", std::to_string(r.energy.error_j));
@@ -124,7 +124,7 @@ TEST(Jointed, SameBitsInAnySlices) {
   EXPECT_EQ(n, one.events.size());
 }
 
-TEST(Jointed, AnImpactWithModesKeepsTheAngularMomentumAboutTheHinge) {
+TEST(Jointed, AngularMomentumAboutHinge) {
   // Without gravity: a ball flies into a plate on a hinge; both ring. About the hinge nothing is lost.
   const Things things;
   WorldSpec w = make_scene(things, 2);
@@ -157,18 +157,18 @@ std::string find_refusal(Change&& change) {
   return "";
 }
 
-TEST(Jointed, WhatCannotBeIsRefusedByName) {
+TEST(Jointed, RefusalByName) {
   const auto contains = [](const std::string& text, const char* part) { return text.find(part) != std::string::npos; };
   EXPECT_EQ(find_refusal([](WorldSpec&) {}), "");
   EXPECT_TRUE(contains(find_refusal([](WorldSpec& w) { w.joints.push_back({.kind = Kind::kBall, .body = 1, .to = 0, .at_m = {}}); }),
                        "the joint between 'plate' and 'ball' closes a loop"));
   EXPECT_TRUE(contains(find_refusal([](WorldSpec& w) { w.joints[1].kind = Kind::kWeld; }), "set \"fixed\""));
   EXPECT_TRUE(contains(find_refusal([](WorldSpec& w) { w.joints[1].body = 0, w.joints[1].to = 0; }), "to itself"));
-  EXPECT_TRUE(contains(find_refusal([](WorldSpec& w) { w.bodies[1].fixed = true; }), "neither of them moves"));
-  EXPECT_TRUE(contains(find_refusal([](WorldSpec& w) { w.bodies[0].velocity_m_s = {0, 1, 0}; }), "what its joints allow"));
+  EXPECT_TRUE(contains(find_refusal([](WorldSpec& w) { w.bodies[1].fixed = true; }), "two bodies that do not move"));
+  EXPECT_TRUE(contains(find_refusal([](WorldSpec& w) { w.bodies[0].velocity_m_s = {0, 1, 0}; }), "those that its joints allow"));
   EXPECT_TRUE(contains(find_refusal([](WorldSpec& w) { w.joints[1].damping = -1.0; }), "damping"));
   EXPECT_TRUE(contains(find_refusal([](WorldSpec& w) { w.joints[1].axis = {}; }), "axis"));
-  EXPECT_TRUE(contains(find_refusal([](WorldSpec& w) { w.joints[1].limits = {0.1, 0.2}; }), "on both sides of the start"));
+  EXPECT_TRUE(contains(find_refusal([](WorldSpec& w) { w.joints[1].limits = {0.1, 0.2}; }), "must enclose the start"));
   EXPECT_TRUE(contains(find_refusal([](WorldSpec& w) { w.joints[1].limits = {-4.0, 0.2}; }), "within 3.05433 rad"));
   EXPECT_TRUE(contains(find_refusal([](WorldSpec& w) { w.joints[1].limits = {-1, 1}, w.joints[1].stop_restitution = 2; }), "of its stops"));
   EXPECT_TRUE(contains(find_refusal([](WorldSpec& w) { w.joints[1].kind = Kind::kBall, w.joints[1].limits = {-1, 1}; }), "only hinges"));
@@ -176,11 +176,11 @@ TEST(Jointed, WhatCannotBeIsRefusedByName) {
                          w.cords.push_back({.body = 0, .to = 1, .from_m = {0, 0.3, 0}, .to_m = {0, 0, -0.3}, .length_m = 0.2});
                        }),
                        "it is 0.2 m long"));
-  EXPECT_TRUE(
-      contains(find_refusal([](WorldSpec& w) { w.cords.push_back({.body = 0, .to = -1, .from_m = {}, .to_m = {}}); }), "at one place"));
+  EXPECT_TRUE(contains(find_refusal([](WorldSpec& w) { w.cords.push_back({.body = 0, .to = -1, .from_m = {}, .to_m = {}}); }),
+                       "its ends coincide"));
 }
 
-TEST(Jointed, StopsHoldInWhateverOrderTheBodiesAreNamed) {
+TEST(Jointed, StopsInAnyBodyOrder) {
   // A ball that hangs 0.3 m to the side of a hinge may fall by 0.5 rad; then it is thrown back, and comes to rest there.
   const bank::Bank ball = make_ball(0.03, 3), post = make_box({0.05, 0.05, 0.05});
   for (const bool turned : {false, true}) {
@@ -206,7 +206,7 @@ TEST(Jointed, StopsHoldInWhateverOrderTheBodiesAreNamed) {
   }
 }
 
-TEST(Jointed, WhatIsFarFromItsBodiesIsQuestioned) {
+TEST(Jointed, QuestionsAboutDistantLinks) {
   const Things things;
   WorldSpec w = make_scene(things, 1);
   EXPECT_TRUE(ask_about_links(w).empty());

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "runtime/physics/rigid/space.hpp"
-#include "tests/unit/runtime/physics/solids.hpp"
 #include "tests/unit/runtime/physics/geometry/solids.hpp"
+#include "tests/unit/runtime/physics/solids.hpp"
 
 namespace carillon::rigid::tests {
 

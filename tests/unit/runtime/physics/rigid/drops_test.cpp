@@ -9,7 +9,7 @@
 namespace carillon::rigid::tests {
 namespace {
 
-TEST(drops, touches_with_the_floor_are_complete_at_the_end_of_every_step) {
+TEST(drops, complete_floor_touches_at_end_of_steps) {
   std::mt19937 random(3);
   for (int n = 0; n < 24; ++n) {
     std::array<std::uint8_t, 16> bytes{};
@@ -23,7 +23,7 @@ TEST(drops, touches_with_the_floor_are_complete_at_the_end_of_every_step) {
 
 // One side lands and throws the other down within a step: its touch is missing at the beginning of the step. Before added touches were
 // kept these drops were 70 to 170 um deep.
-TEST(drops, the_other_side_of_a_body_that_lands_is_not_too_deep) {
+TEST(drops, depth_of_far_side_at_landing) {
   const std::array<std::uint8_t, 16> drops[] = {{0, 222, 225, 252, 142, 195, 61, 83, 236, 253, 11, 205, 5, 84, 11, 2},
                                                 {1, 61, 195, 86, 73, 51, 37, 146, 193, 47, 128, 220, 44, 240, 173, 107},
                                                 {5, 41, 161, 54, 81, 152, 214, 13, 233, 208, 243, 235, 209, 15, 206, 188},
@@ -38,7 +38,7 @@ TEST(drops, the_other_side_of_a_body_that_lands_is_not_too_deep) {
 
 // A cup and a bowl in a bowl that is fixed. Oracle: they fall no higher than they were, so that nothing lifts them. With touches that a
 // search had lost, and with displacements before each proof of rest, they were lifted by 0.4 % of their energy and rattled on.
-TEST(drops, cup_or_bowl_in_a_bowl_is_not_lifted) {
+TEST(drops, no_lift_of_cup_or_bowl_in_bowl) {
   const std::pair<int, int> falls[] = {{5, 4}, {6, 0}};
   for (const auto& [kind, turn] : falls) {
     const double half = 0.5 * (0.3 + 0.7 * turn);
@@ -60,7 +60,7 @@ TEST(drops, cup_or_bowl_in_a_bowl_is_not_lifted) {
 }
 
 // A coin that rocks on its rim, 2 mm wide: its one touch goes from edge to edge. At rest it has touches on both edges.
-TEST(drops, coin_that_stands_on_its_rim_sleeps) {
+TEST(drops, sleep_of_coin_on_rim) {
   const Solid coin = make_drop_body(1, 0).solid;
   const double tilt = 4e-3, half = 0.5 * (0.5 * std::numbers::pi + tilt);
   State at;

@@ -33,7 +33,7 @@ Stages make_box_in_ground(std::mt19937& random, double depth_m, double speed_m_s
   return {{make_solid(box, 0.1, kBoxSides)}, {s}, kWood, {0, 0, -kGravity}};
 }
 
-TEST(projection, a_corner_in_the_ground_goes_the_least_way) {
+TEST(projection, least_displacement_of_corner) {
   std::mt19937 random(3);
   for (int n = 0; n < 100; ++n) {
     const double depth = 1e-4;
@@ -46,25 +46,25 @@ TEST(projection, a_corner_in_the_ground_goes_the_least_way) {
     // min 1/2 dx^T M dx with n.(moved + turned x arm) = depth: moved = lambda n / m, turned = lambda I^-1 (arm x n).
     const Vec3 turn = stages.bodies.placed(0).inverse_inertia * turning;
     const double lambda = depth / (1.0 / stages.bodies.solid(0).mass_kg + dot(turning, turn));
-    stages.projection.run(stages.step, kTooDeep);
+    stages.projection.run(stages.step, kMaxDepthM);
     const Vec3 moved = stages.bodies.state(0).centre - before.centre;
     EXPECT_NEAR(moved[2], lambda / stages.bodies.solid(0).mass_kg, 1e-3 * depth);
     EXPECT_LT(std::hypot(moved[0], moved[1]), 1e-9);
-    EXPECT_GT(find_least_gap(stages), -kDeep);
+    EXPECT_GT(find_least_gap(stages), -kDeepM);
     // Nothing moves that could pay for the work.
     EXPECT_NEAR(stages.calc_books().lifted_j, 0.1 * kGravity * moved[2], 1e-12);
   }
 }
 
-TEST(projection, motion_pays_for_the_work) {
+TEST(projection, work_paid_by_motion) {
   std::mt19937 random(4);
   for (int n = 0; n < 200; ++n) {
     Stages stages = make_box_in_ground(random, 1e-4, n % 2 == 0 ? 1.0 : 1e-3);
     stages.begin({{0, -1}});
     const Books before = stages.calc_books();
     const double kinetic = add_up(stages.bodies).kinetic_j;
-    stages.projection.run(stages.step, kTooDeep);
-    EXPECT_GT(find_least_gap(stages), -kTooDeep);
+    stages.projection.run(stages.step, kMaxDepthM);
+    EXPECT_GT(find_least_gap(stages), -kMaxDepthM);
     const Books after = stages.calc_books();
     EXPECT_NEAR(after.calc_total(), before.calc_total(), 1e-12 * kinetic + 1e-15);
     EXPECT_GE(after.lifted_j, 0.0);
@@ -73,7 +73,7 @@ TEST(projection, motion_pays_for_the_work) {
   }
 }
 
-TEST(projection, free_bodies_part_as_their_masses_and_keep_both_momenta) {
+TEST(projection, momenta_of_separated_free_bodies) {
   std::mt19937 random(5);
   std::normal_distribution<double> normal;
   for (int n = 0; n < 50; ++n) {
@@ -85,8 +85,8 @@ TEST(projection, free_bodies_part_as_their_masses_and_keep_both_momenta) {
     stages.begin({{0, 1}});
     const Momenta before = add_up(stages.bodies);
     const double total = stages.calc_books().calc_total();
-    stages.projection.run(stages.step, kTooDeep);
-    EXPECT_GT(find_least_gap(stages), -kDeep);
+    stages.projection.run(stages.step, kMaxDepthM);
+    EXPECT_GT(find_least_gap(stages), -kDeepM);
     EXPECT_NEAR(stages.bodies.state(0).centre[0], -0.75 * overlap, 1e-3 * overlap);
     EXPECT_NEAR(stages.bodies.state(1).centre[0] - states[1].centre[0], 0.25 * overlap, 1e-3 * overlap);
     const Momenta after = add_up(stages.bodies);
@@ -96,28 +96,28 @@ TEST(projection, free_bodies_part_as_their_masses_and_keep_both_momenta) {
   }
 }
 
-TEST(projection, allowed_depth_stays) {
+TEST(projection, permitted_depth_unchanged) {
   std::mt19937 random(6);
   for (const double allowed : {0.0, 1e-4}) {
     Stages stages = make_box_in_ground(random, 1e-4, 1.0);
     stages.begin({{0, -1}});
     stages.island.pairs[0]->sag_m = allowed;
     const Vec3 before = stages.bodies.state(0).centre;
-    stages.projection.run(stages.step, kTooDeep);
+    stages.projection.run(stages.step, kMaxDepthM);
     EXPECT_EQ(stages.bodies.state(0).centre == before, allowed > 0.0);
     EXPECT_EQ(stages.ledger.costs.pushes > 0, allowed == 0.0);
   }
 }
 
-TEST(projection, springs_of_an_impact_lift_the_bodies_out_of_the_depth_that_it_left) {
+TEST(projection, lift_by_impact_springs) {
   std::mt19937 random(7);
   Stages stages = make_box_in_ground(random, 1e-4, 0.0);
   stages.begin({{0, -1}});
   stages.touches.release(0, -1, 0.0, 1.0);
   const double total = stages.calc_books().calc_total();
-  stages.projection.run(stages.step, kTooDeep);
+  stages.projection.run(stages.step, kMaxDepthM);
   const Books books = stages.calc_books();
-  EXPECT_GT(find_least_gap(stages), -kTooDeep);
+  EXPECT_GT(find_least_gap(stages), -kMaxDepthM);
   EXPECT_EQ(books.lifted_j, 0.0);
   EXPECT_LT(books.springs_j, 1.0);
   EXPECT_EQ(books.lost_j, 0.0);

@@ -54,7 +54,7 @@ Solid make_smooth_box(double mass_kg) {
   return box;
 }
 
-TEST(sleep, bodies_of_a_group_sleep_while_others_of_it_move) {
+TEST(sleep, sleep_among_moving_bodies) {
   // A board with twelve boxes, along which another one slides.
   Table table;
   const int board = table.add(make_box(5.0, {2.0, 0.6, 0.02}), {0, 0, 0.01});
@@ -80,7 +80,7 @@ TEST(sleep, bodies_of_a_group_sleep_while_others_of_it_move) {
   EXPECT_NEAR(after.calc_total(), before_j, 1e-8 * before_j);
 }
 
-TEST(sleep, what_it_stands_on_tips_and_it_wakes) {
+TEST(sleep, wake_on_tipping_support) {
   // A board on two supports; what slides along it beyond the second one tips it, and the box that slept on its other end.
   Table table;
   table.add_supports(0.05);
@@ -102,7 +102,7 @@ TEST(sleep, what_it_stands_on_tips_and_it_wakes) {
     EXPECT_LT(norm(space.state(static_cast<int>(i)).centre - whole.state(static_cast<int>(i)).centre), 5e-4) << i;
 }
 
-TEST(sleep, what_it_lies_on_goes_down_and_it_falls) {
+TEST(sleep, wake_on_sinking_support) {
   // The same board; the box sleeps on the end that goes down.
   Table table;
   table.add_supports(0.35);
@@ -121,7 +121,7 @@ TEST(sleep, what_it_lies_on_goes_down_and_it_falls) {
   EXPECT_NEAR(after.calc_total(), before_j, 1e-8 * before_j);
 }
 
-TEST(sleep, columns_that_are_relieved_are_not_pushed_up) {
+TEST(sleep, no_lift_of_relieved_columns) {
   // A board on two columns of two blocks; what slides off one of them and to the other.
   Table table;
   std::vector<int> blocks;
@@ -144,7 +144,7 @@ TEST(sleep, columns_that_are_relieved_are_not_pushed_up) {
   EXPECT_NEAR(after.calc_total(), before_j, 1e-8 * before_j);
 }
 
-TEST(sleep, a_row_that_is_struck_takes_part_in_the_impact) {
+TEST(sleep, sleeping_row_in_impact) {
   // Three boxes in touch sleep on a board; a fourth one slides into them.
   Table table;
   table.add(make_box(5.0, {2.0, 0.6, 0.02}), {0, 0, 0.01});
@@ -189,7 +189,7 @@ struct StruckBlock {
   }
 };
 
-TEST(sleep, what_another_group_touches_takes_part_in_the_impact) {
+TEST(sleep, impact_through_body_of_other_group) {
   const StruckBlock scene(0.28, 0.5);
   Space space = scene.table.begin(), whole = scene.table.begin(false);
   const double before_j = space.calc_books().motion_j;
@@ -205,7 +205,7 @@ TEST(sleep, what_another_group_touches_takes_part_in_the_impact) {
   EXPECT_NEAR(after.calc_total(), before_j, 1e-8 * before_j);
 }
 
-TEST(sleep, a_group_of_short_steps_strikes_through_what_sleeps_on_one_of_long_steps) {
+TEST(sleep, impact_between_groups_of_different_steps) {
   // What is fast takes shorter steps than what slides slowly; the impact comes at any moment of the longer ones.
   const double speed = 40.0;
   for (int k = 0; k < 9; ++k) {
@@ -221,7 +221,7 @@ TEST(sleep, a_group_of_short_steps_strikes_through_what_sleeps_on_one_of_long_st
   }
 }
 
-TEST(sleep, load_that_comes_slowly_wakes_and_what_carries_it_sleeps_again) {
+TEST(sleep, wake_by_slow_load_and_sleep_again) {
   // A board on two blocks; the weight of what slides along it goes from one block to the other.
   Table table;
   std::vector<int> blocks;

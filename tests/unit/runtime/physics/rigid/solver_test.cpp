@@ -35,7 +35,7 @@ std::vector<Point> make_feet(int a, int b, Vec3 size_m, double friction, double 
   return feet;
 }
 
-TEST(solver, block_at_rest_stays_and_its_weight_is_carried) {
+TEST(solver, block_at_rest) {
   const double h = 1e-3, g = 9.81;
   std::vector<Mover> movers{make_block(2.0, {0.1, 0.2, 0.05}, {0, 0, -g * h})};
   auto feet = make_feet(0, -1, {0.1, 0.2, 0.05}, 0.5);
@@ -53,7 +53,7 @@ TEST(solver, block_at_rest_stays_and_its_weight_is_carried) {
   EXPECT_EQ(solver.get_sweeps(), 1);
 }
 
-TEST(solver, sliding_follows_coulomb_and_the_cone_is_never_left) {
+TEST(solver, coulomb_sliding_within_cone) {
   const double h = 1e-3, g = 9.81, mu = 0.3;
   std::vector<Mover> movers{make_block(1.0, {0.1, 0.1, 0.01}, {1.0, 0.5, -g * h})};
   auto feet = make_feet(0, -1, {0.1, 0.1, 0.01}, mu);
@@ -69,7 +69,7 @@ TEST(solver, sliding_follows_coulomb_and_the_cone_is_never_left) {
   }
 }
 
-TEST(solver, couple_against_rolling_is_at_its_bound_while_a_ball_rolls) {
+TEST(solver, rolling_couple_at_bound) {
   // The touch is a little before or behind the lowest place, so that friction that would stop the ball would lift it or press it down.
   const double h = 1e-3, g = 9.81, radius = 0.03, inertia = 0.4 * radius * radius;
   for (const double ahead : {-1e-3, 0.0, 1e-3}) {
@@ -95,7 +95,7 @@ TEST(solver, couple_against_rolling_is_at_its_bound_while_a_ball_rolls) {
 class Towers : public testing::TestWithParam<double> {};
 INSTANTIATE_TEST_SUITE_P(MassOfTheUppermost, Towers, testing::Values(1.0, 1000.0, 1e-3));
 
-TEST_P(Towers, of_ten_carry_their_weight) {
+TEST_P(Towers, weight_of_towers_of_ten) {
   const double h = 1e-3, g = 9.81;
   const Vec3 size{0.05, 0.05, 0.05};
   std::vector<Mover> movers;
@@ -117,7 +117,7 @@ TEST_P(Towers, of_ten_carry_their_weight) {
   EXPECT_NEAR(carried, total * g * h, 1e-5 * total * g * h);
 }
 
-TEST(solver, free_pairs_keep_momentum_and_angular_momentum_and_gain_no_energy) {
+TEST(solver, momenta_and_energy_of_free_pairs) {
   std::mt19937_64 random(5);
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
   for (int trial = 0; trial < 300; ++trial) {
@@ -165,7 +165,7 @@ TEST(solver, free_pairs_keep_momentum_and_angular_momentum_and_gain_no_energy) {
   }
 }
 
-TEST(solver, all_sets_of_instructions_give_the_same_numbers) {
+TEST(solver, same_results_for_all_instruction_sets) {
 #if defined(__x86_64__)
   if (!__builtin_cpu_supports("avx2")) GTEST_SKIP() << "this processor has no AVX2";
   const double h = 1e-3, g = 9.81;

@@ -14,7 +14,7 @@
 namespace carillon::rigid {
 namespace {
 
-TEST(space, free_crowd_keeps_momentum_and_angular_momentum_and_gains_no_energy) {
+TEST(space, momenta_and_energy_of_free_crowd) {
   // 27 boxes fly to one place and strike each other many times within a step.
   std::vector<Solid> solids;
   std::vector<State> states;
@@ -41,7 +41,7 @@ TEST(space, free_crowd_keeps_momentum_and_angular_momentum_and_gains_no_energy) 
   EXPECT_NEAR(books.calc_total(), before.kinetic_j, 1e-2 * before.kinetic_j);
 }
 
-TEST(space, free_group_keeps_momentum_and_angular_momentum) {
+TEST(space, momenta_of_free_group) {
   // Boxes and balls that fly into each other: they strike, slide along and roll off each other.
   std::vector<Solid> solids;
   std::vector<State> states;
@@ -69,7 +69,7 @@ TEST(space, free_group_keeps_momentum_and_angular_momentum) {
   EXPECT_LT(norm(after.angular - before.angular), 1e-10 * size * 0.12);
 }
 
-TEST(space, what_parts_from_the_ground_while_it_turns_is_no_impact) {
+TEST(space, no_impact_of_rotating_body_leaving_ground) {
   // The lowest edge parts from its last touch by less than an impact is looked for from, and its body turns so fast that it does not come
   // back: a parabola through its velocities would.
   const Vec3 sides{0.06, 0.05, 0.04};
@@ -89,9 +89,9 @@ TEST(space, what_parts_from_the_ground_while_it_turns_is_no_impact) {
   EXPECT_LE(space.get_costs().solves, 2) << "after " << space.get_time() << " s";
 }
 
-TEST(space, disc_on_its_rim_without_resistance_precesses_at_the_steady_rate) {
+TEST(space, steady_precession_of_disc) {
   // A disc of thickness 2 e that leans by a about a fixed centre: W^2 sin a (A cos a - C e/r sin a) = m g (r cos a - e sin a), derived in
-  // Rolling.ACoinOnItsRimPrecessesAtTheSteadyRate; for e = 0 that of H. K. Moffatt, Nature 404 (2000), eq. 2. It comes no lower.
+  // Rolling.SteadyPrecessionOfCoin; for e = 0 that of H. K. Moffatt, Nature 404 (2000), eq. 2. It comes no lower.
   struct Case {
     double radius, e, degrees, end_s;
   };

@@ -31,7 +31,7 @@ struct Stages {
       touches.search(*island.pairs.back(), 1e-3);
     }
     step.begin(island);
-    step.together_s = kTogether;
+    step.together_s = kSimultaneousS;
   }
   /// The impulses of a step.
   void solve(double length_s, bool leaves_impacts = false) {

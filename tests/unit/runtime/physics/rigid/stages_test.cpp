@@ -21,7 +21,7 @@ State make_turned(std::mt19937& random, double height_m) {
   return s;
 }
 
-TEST(touch_sets, lowest_gap_over_the_ground_is_that_of_all_vertices) {
+TEST(touch_sets, lowest_gap_of_all_vertices) {
   std::mt19937 random(5);
   const geometry::tests::Solid box = geometry::tests::make_box(kBoxSides, 1);
   for (int n = 0; n < 50; ++n) {
@@ -51,7 +51,7 @@ TEST(touch_sets, lowest_gap_over_the_ground_is_that_of_all_vertices) {
   }
 }
 
-TEST(touch_sets, touch_that_stays_keeps_its_contact) {
+TEST(touch_sets, persistent_contact) {
   Stages stages({make_box(0.1, kBoxSides)}, {make_state({0, 0, 0.02})}, kWood, {0, 0, -kGravity});
   stages.begin({{0, -1}});
   Pair& pair = *stages.island.pairs[0];
@@ -64,7 +64,7 @@ TEST(touch_sets, touch_that_stays_keeps_its_contact) {
   for (const Contact& c : pair.contacts) EXPECT_LT(norm(c.impulse - c.touch.where_m), 1.01e-5);
 }
 
-TEST(touch_sets, body_deep_in_what_bends_touches_the_side_that_it_came_from) {
+TEST(touch_sets, contact_side_of_deep_body) {
   // Past the middle plane of a shelf of 4 mm, which springs and modes explain. Depth: that of the lowest vertex below the upper side.
   const Vec3 sides{0.3, 0.3, 0.004};
   const geometry::tests::Solid lumpy = geometry::tests::make_lumpy(0.025, 16);
@@ -100,7 +100,7 @@ TEST(touch_sets, body_deep_in_what_bends_touches_the_side_that_it_came_from) {
   }
 }
 
-TEST(touch_sets, energy_of_springs_that_lifts_nothing_is_lost_and_never_forgotten) {
+TEST(touch_sets, loss_of_unused_spring_energy) {
   Stages stages({make_box(0.1, kBoxSides), make_box(0.1, kBoxSides)}, {make_state({0, 0, 0.02}), make_state({1, 0, 0.02})}, kWood,
                 {0, 0, -kGravity});
   stages.begin({{0, -1}, {1, -1}});
@@ -124,7 +124,7 @@ TEST(touch_sets, energy_of_springs_that_lifts_nothing_is_lost_and_never_forgotte
   EXPECT_EQ(stages.calc_books().calc_total(), total_j + 7.0);
 }
 
-TEST(step_problem, block_on_a_slope_balances_gravity_or_slides) {
+TEST(step_problem, block_on_slope) {
   const double h = 5e-4, mass = 0.1;
   for (const double slope : {0.0, 0.2, 0.35, 0.5}) {  // friction 0.4 holds up to 0.3805 rad
     Stages stages({make_box(mass, kBoxSides)}, {make_state({0, 0, 0.02})}, kWood,
@@ -142,7 +142,7 @@ TEST(step_problem, block_on_a_slope_balances_gravity_or_slides) {
   }
 }
 
-TEST(instants, slow_touches_of_a_pair_that_rattles_last) {
+TEST(instants, slow_touches_of_rattling_pair) {
   for (const bool decays : {false, true}) {
     Stages stages({make_box(0.1, kBoxSides)}, {make_state({0, 0, 0.02 + 1e-6}, {0, 0, -0.02})}, kWood, {0, 0, -kGravity});
     stages.begin({{0, -1}});
@@ -165,7 +165,7 @@ TEST(instants, slow_touches_of_a_pair_that_rattles_last) {
   }
 }
 
-TEST(instants, fall_onto_the_ground_is_found_by_its_closed_form) {
+TEST(instants, instant_of_fall) {
   const double gap = 2e-5, speed = 0.1, h = 5e-4;
   Stages stages({make_box(0.1, kBoxSides)}, {make_state({0, 0, 0.02 + gap}, {0, 0, -speed})}, kWood, {0, 0, -kGravity});
   stages.begin({{0, -1}});
@@ -211,7 +211,7 @@ struct Boxes {
   }
 };
 
-TEST(rigid_impact, a_row_of_equal_balls_passes_a_blow_on) {
+TEST(rigid_impact, blow_through_row_of_balls) {
   const double radius = 0.02;
   const geometry::tests::Solid surface = geometry::tests::make_ball(radius, 3);
   const double pitch = 2 * radius - 7.46e-5;  // faces touch there
@@ -242,7 +242,7 @@ TEST(rigid_impact, a_row_of_equal_balls_passes_a_blow_on) {
     }
 }
 
-TEST(rigid_impact, impulse_and_loss_of_an_oblique_hit_are_those_of_newton) {
+TEST(rigid_impact, oblique_hit) {
   const Boxes boxes;
   Stages stages = boxes.make();
   Pair pair;
@@ -279,7 +279,7 @@ Solid make_ringing(Solid solid, double freq_hz, double decay_per_s) {
   return solid;
 }
 
-TEST(modal_impact, impact_keeps_momentum_and_the_books) {
+TEST(modal_impact, momentum_and_energy_balance) {
   Boxes boxes;
   boxes.b = make_ringing(boxes.b, 2e3, 10.0);
   boxes.a.restitution = boxes.b.restitution = 1.0;
@@ -320,7 +320,7 @@ TEST(modal_impact, impact_keeps_momentum_and_the_books) {
   EXPECT_NEAR(pushed[0], 0.1 * (stages.bodies.state(0).velocity[0] - boxes.speed), 1e-6);
 }
 
-TEST(modal_impact, soft_face_that_lands_flat_is_as_stiff_as_a_punch) {
+TEST(modal_impact, punch_stiffness_of_soft_face) {
   // Half a period of a mass on k = 2 E* sqrt(A / pi), the stiffness of a flat punch: depth v sqrt(m / k). On Hertz springs at its corners
   // it is six times as deep.
   const Vec3 sides{0.1, 0.08, 0.04};
@@ -346,7 +346,7 @@ TEST(modal_impact, soft_face_that_lands_flat_is_as_stiff_as_a_punch) {
   EXPECT_LT(space.get_costs().impacts, 3);
 }
 
-TEST(ledger, damping_of_modes_is_booked_when_they_are_moved_or_asked_for) {
+TEST(ledger, booked_modal_damping) {
   const double decay = 50.0;
   Stages stages({make_ringing(make_box(0.1, kBoxSides), 1e3, decay)}, {make_state({0, 0, 1}, {0, 0, 2})}, std::nullopt, {0, 0, -kGravity});
   stages.modal_states.set(0, {{0.0}, {0.3}, 0.0});
@@ -362,7 +362,7 @@ TEST(ledger, damping_of_modes_is_booked_when_they_are_moved_or_asked_for) {
   EXPECT_NEAR(books.modes_j / (0.5 * 0.09), std::exp(-2.0 * decay * 0.02), 0.02);
 }
 
-TEST(ledger, pulses_give_modes_at_most_what_the_motion_lost) {
+TEST(ledger, bound_of_modal_energy) {
   Boxes boxes;
   boxes.a = make_ringing(boxes.a, 1e3, 0.0);
   Stages stages = boxes.make();
@@ -383,7 +383,7 @@ TEST(ledger, pulses_give_modes_at_most_what_the_motion_lost) {
   EXPECT_NEAR(stages.calc_books().lost_j, books.lost_j + 1e-3 * all_j, 1e-15);
 }
 
-TEST(windows, what_can_meet_nothing_flies_and_steps_of_one_group_are_not_those_of_another) {
+TEST(windows, flights_and_independent_steps) {
   std::vector<Solid> solids{make_box(0.1, kBoxSides), make_box(0.1, kBoxSides), make_box(0.1, kBoxSides), make_box(0.1, kBoxSides)};
   std::vector<State> states{make_state({0, 0, 1}, {1, 0, 0}), make_state({1, 0, 0.0201}), make_state({2, 0, 0.021}, {0, 0, -30}),
                             make_state({3, 0, 1})};
@@ -411,7 +411,7 @@ TEST(windows, what_can_meet_nothing_flies_and_steps_of_one_group_are_not_those_o
   EXPECT_EQ(near.size(), 4u);
 }
 
-TEST(rest, island_that_is_slow_and_balanced_sleeps_and_wakes_where_it_is_struck) {
+TEST(rest, sleep_and_wake_of_balanced_island) {
   for (const double slope : {0.2, 0.5}) {
     Stages stages({make_box(0.1, kBoxSides), make_box(0.1, kBoxSides), make_box(0.1, kBoxSides)},
                   {make_state({0, 0, 0.02}), make_state({0, 0, 0.06}), make_state({0, 0, 0.1}, {0, 0, -1})}, kWood,
@@ -435,7 +435,7 @@ TEST(rest, island_that_is_slow_and_balanced_sleeps_and_wakes_where_it_is_struck)
   }
 }
 
-TEST(rest, body_that_has_yielded_comes_up_before_it_sleeps) {
+TEST(rest, recovery_before_sleep) {
   Stages stages({make_box(0.1, kBoxSides)}, {make_state({0, 0, 0.02 - 1e-4})}, kWood, {0, 0, -kGravity});
   stages.begin({{0, -1}});
   double& sag_m = stages.island.pairs[0]->sag_m = 1e-4;
@@ -443,9 +443,9 @@ TEST(rest, body_that_has_yielded_comes_up_before_it_sleeps) {
   EXPECT_TRUE(stages.rest.may_sleep(stages.island.bodies, 0.015));
   EXPECT_FALSE(stages.rest.try_island(stages.island, 5e-4));
   sag_m = 0.0;
-  stages.projection.run(stages.step, kDeep);
+  stages.projection.run(stages.step, kDeepM);
   EXPECT_TRUE(stages.rest.try_island(stages.island, 5e-4));
-  EXPECT_NEAR(stages.bodies.state(0).centre[2], 0.02, kDeep);
+  EXPECT_NEAR(stages.bodies.state(0).centre[2], 0.02, kDeepM);
 }
 
 }  // namespace
