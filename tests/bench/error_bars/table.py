@@ -27,24 +27,58 @@ def error(row):
     return abs(float(row["error_cents"]))
 
 
-def print_table(groups):
-    print("| body | element | unknowns | modes | error, cents: median | largest | bars hold | bar / error, median |")
-    print("|---|---|---|---|---|---|---|---|")
-    good = total = modes = held = 0
-    for (body, kind, element, unknowns), rows in groups.items():
-        inside = [error(r) <= bar(r) + float(r["truth_cents"]) for r in rows]
+def summarise(groups):
+    """One record per mesh: largest error, median of bar over error (None if no error exceeds the reference's), modes outside their bars."""
+    meshes = []
+    for (body, kind, element, _), rows in groups.items():
         wide = [bar(r) / error(r) for r in rows if error(r) > 3 * float(r["truth_cents"])]
-        median = statistics.median(wide) if wide else float("nan")
-        total, good = total + 1, good + (sum(inside) >= 0.95 * len(inside) and not median >= 10)
-        modes, held = modes + len(inside), held + sum(inside)
-        name = body + (" (training)" if kind == "training" else "")
-        print(
-            f"| {name} | {element} | {unknowns} | {len(rows)} | {statistics.median(map(error, rows)):.3g} | {max(map(error, rows)):.3g} "
-            f"| {100 * sum(inside) / len(inside):.0f} % | {median:.2g} |"
+        meshes.append(
+            {
+                "body": body + (" (training)" if kind == "training" else ""),
+                "element": element,
+                "modes": len(rows),
+                "largest": max(map(error, rows)),
+                "width": statistics.median(wide) if wide else None,
+                "outside": sum(error(r) > bar(r) + float(r["truth_cents"]) for r in rows),
+            }
         )
+    return meshes
+
+
+def print_table(meshes):
+    """A row per body, a cell per element, the meshes of a cell from coarse to fine; then all bodies together."""
+    bodies = collections.OrderedDict()
+    for mesh in meshes:
+        bodies.setdefault(mesh["body"], []).append(mesh)
+    print("| body | modes | " + " | ".join(COLOURS) + " |\n" + "|---" * (len(COLOURS) + 2) + "|")
+    for body, own in bodies.items():
+        modes = sorted({mesh["modes"] for mesh in own})
+        cells = [body, " to ".join(map(str, [modes[0], modes[-1]] if len(modes) > 1 else modes))]
+        for element in COLOURS:
+            of_element = [mesh for mesh in own if mesh["element"] == element]
+            widths = ", ".join("-" if mesh["width"] is None else f"{mesh['width']:.2g}" for mesh in of_element)
+            outside = sum(mesh["outside"] for mesh in of_element)
+            text = (
+                ", ".join(f"{float(format(mesh['largest'], '.3g')):g}" for mesh in of_element)
+                + f" ({widths})"
+                + (f"; {outside} outside" if outside else "")
+            )
+            cells.append(text if of_element else "")
+        print("| " + " | ".join(cells) + " |")
     print(
-        f"\n{good} of {total} meshes have at least 95 % of the modes within their bars and a median bar less than ten times the error; "
-        f"of all {modes} modes {100 * held / modes:.2f} % lie within."
+        "\n<!-- summary -->\n| element | meshes | modes | modes outside their bars | bar / error: median of a mesh |\n|---|--:|--:|--:|--:|"
+    )
+    for element in ("T10", "T10 curved", "T10 lumped", "T4", "T4 lumped"):
+        own = [mesh for mesh in meshes if mesh["element"] == element]
+        widths = [mesh["width"] for mesh in own if mesh["width"] is not None]
+        modes, outside = (sum(mesh[key] for mesh in own) for key in ("modes", "outside"))
+        spread = f"{statistics.median(widths):.2g} ({min(widths):.2g} to {max(widths):.2g})"
+        print(f"| {element} | {len(own)} | {modes} | {outside} | {spread} |")
+    good = sum(mesh["outside"] <= 0.05 * mesh["modes"] and (mesh["width"] or 0) < 10 for mesh in meshes)
+    modes, outside = (sum(mesh[key] for mesh in meshes) for key in ("modes", "outside"))
+    print(
+        f"<!-- /summary -->\n\n{good} of {len(meshes)} meshes have at least 95 % of the modes within their bars and a median bar below ten"
+        f" times the error; of all {modes} modes {100 * (1 - outside / modes):.2f} % lie within."
     )
 
 
@@ -122,7 +156,7 @@ if __name__ == "__main__":
     if len(sys.argv) < 2:
         sys.exit(__doc__)
     found = read(sys.argv[1])
-    print_table(found)
+    print_table(summarise(found))
     print_corrected(found)
     if len(sys.argv) > 2:
         draw(found, sys.argv[2])

@@ -3,6 +3,8 @@ import dataclasses
 
 import measuring
 
+MAX_ROWS = 12  # of a table in the docs
+
 
 @dataclasses.dataclass
 class Item:
@@ -66,6 +68,18 @@ class Section:
                 lines += [item.text, "", *measuring.format_table(item.rows, True).splitlines(), ""]
             else:
                 lines += [f"![{item.text}]({find_picture(self.file_name(item, 'svg'))})", "", item.text, ""]
+        return lines
+
+    def to_short_markdown(self, find_picture):
+        """The pictures, and of the tables of at most MAX_ROWS rows the one with most rows."""
+        lines = [f"`--only {self.name}`", ""]
+        for item in self.items:
+            if item.kind == "chart":
+                lines += [f"![{item.text}]({find_picture(self.file_name(item, 'svg'))})", ""]
+        tables = [item for item in self.items if item.kind == "table" and len(item.rows) <= MAX_ROWS + 1]
+        if tables:
+            item = max(tables, key=lambda table: len(table.rows))
+            lines += [item.text, "", *measuring.format_table(item.rows, True).splitlines(), ""]
         return lines
 
     def to_json(self):

@@ -159,7 +159,7 @@ class Study(unittest.TestCase):
         first = subprocess.run(update, capture_output=True, text=True)
         self.assertEqual(first.returncode, 0, first.stderr)
         text = page.read_text()
-        self.assertIn("| cube | T10 straight |", text)
+        self.assertIn("(../images/accuracy-elements-cube.svg)", text)
         # A partial study updates only its own findings.
         summary = lambda page: re.search(r"<!-- accuracy:summary -->(.*?)<!-- /accuracy:summary -->", page, re.S)[1].splitlines()
         old, new = summary((ROOT / "docs/reports/accuracy.md").read_text()), summary(text)
