@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "jobs/cli/follow.hpp"
-#include "jobs/store/process/process.hpp"
 #include "jobs/queue/display.hpp"
 #include "jobs/queue/slurm/engine.hpp"
 #include "jobs/queue/slurm/needs.hpp"
+#include "jobs/store/process/process.hpp"
 #include "runtime/base/clock.hpp"
 #include "runtime/base/command.hpp"
 

@@ -9,8 +9,8 @@
 #include "jobs/queue/local.hpp"
 #include "jobs/queue/repair.hpp"
 #include "jobs/queue/runner.hpp"
-#include "jobs/store/registry/registry.hpp"
 #include "jobs/store/identity.hpp"
+#include "jobs/store/registry/registry.hpp"
 
 namespace carillon::queue {
 namespace {

@@ -88,8 +88,8 @@ void Runner::stop(int signal) {
   ++stops_;
   exit_code_ = 128 + signal;
   if (stops_ == 1)
-    display_.print_note(fmt::format("stopping: {} running job{} save{} and return to the queue; again to end them now",
-                                    children_.size(), children_.size() == 1 ? "" : "s", children_.size() == 1 ? "s" : ""));
+    display_.print_note(fmt::format("stopping: {} running job{} save{} and return to the queue; again to end them now", children_.size(),
+                                    children_.size() == 1 ? "" : "s", children_.size() == 1 ? "s" : ""));
   for (const pid_t pid : list_attempts()) {
     // SIGTERM after SIGUSR1 ends an attempt at once.
     at_.launcher.send_signal(pid, SIGUSR1);
@@ -232,8 +232,8 @@ std::vector<Job> Runner::pick_jobs(const Host& host, double now_s, const std::ve
 
 void Runner::refuse(const Job& job, double memory_gb, const Host& host) {
   const std::string reason =
-      fmt::format("needs {:.2f} GB of memory, and this machine has {:.2f} GB for jobs; use a coarser mesh or a larger machine",
-                  memory_gb, kMemoryShare * host.total_gb);
+      fmt::format("needs {:.2f} GB of memory, and this machine has {:.2f} GB for jobs; use a coarser mesh or a larger machine", memory_gb,
+                  kMemoryShare * host.total_gb);
   const bool is_changed = table_.update(job.id, [&](Job& row) {
     if (row.state != JobState::queued && row.state != JobState::waiting) return false;
     row.state = JobState::failed;

@@ -54,9 +54,9 @@ fs::path make_local_folder(const fs::path& folder, const fs::path& root) {
   if (::lstat(folder.c_str(), &info) != 0) throw_errno(folder, "read", errno);
   const bool is_ours = info.st_uid == ::geteuid() || (is_group && info.st_gid == store.st_gid && info.st_uid != 0);
   if (!S_ISDIR(info.st_mode) || !is_ours || (info.st_mode & S_IWOTH) != 0)
-    throw SystemError(fmt::format(
-        "{}: the folder for the registry of {} belongs to another user; set XDG_STATE_HOME to a folder on a local disk",
-        folder.string(), root.string()));
+    throw SystemError(
+        fmt::format("{}: the folder for the registry of {} belongs to another user; set XDG_STATE_HOME to a folder on a local disk",
+                    folder.string(), root.string()));
   return folder;
 }
 

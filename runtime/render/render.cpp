@@ -288,9 +288,9 @@ class Rendering {
   const scene::Scene* scene_;
   const RenderOptions* options_;
   scene::Session session_;
-  std::vector<events::Listener> path_;  // path of the listener
-  Vec3 base_;                           // initial position of the listener
-  std::vector<BodySummary> summaries_;  // per body
+  std::vector<events::Listener> path_;     // path of the listener
+  Vec3 base_;                              // initial position of the listener
+  std::vector<BodySummary> summaries_;     // per body
   std::vector<synth::EffectSet> effects_;  // per body
   EventPlayback playback_;
   synth::Synthesiser* synthesiser_;

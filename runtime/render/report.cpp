@@ -209,8 +209,7 @@ base::Json make_body_json(const scene::Scene& scene, const Sound& sound, const s
       .set("peak_pa_at_1m", make_figure(sound.body_peak_pa[i]));
   if (sound.body_deflection[i] > 0.0) json.set("deflection_thicknesses", make_figure(sound.body_deflection[i], 4));
   if (!body.mounting.text.empty()) json.set("supports", make_mounting_json(body.mounting));
-  if (body.limited.modes != 0)
-    json["limited_gains"].set("modes", body.limited.modes).set("max_db", make_figure(body.limited.max_db, 4));
+  if (body.limited.modes != 0) json["limited_gains"].set("modes", body.limited.modes).set("max_db", make_figure(body.limited.max_db, 4));
   json.set("effects", make_effects_json(plan, sound, i));
   return json;
 }

@@ -1,7 +1,6 @@
 // Plan of a scene: the effects that its bodies need.
 #pragma once
 
-#include "runtime/scene/effects/effect_selector.hpp"
 #include "runtime/events/events.hpp"
 #include "runtime/scene/effects/effect_selector.hpp"
 #include "runtime/scene/events.hpp"

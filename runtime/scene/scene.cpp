@@ -71,8 +71,7 @@ const base::Keys<Output> kOutput{
     {"format", &Output::format, kSampleFormatNames, "`--format` overrides it; above 4 GiB an RF64"},
     {"fade_end", &Output::fade_end, "fade-out within the last 10 ms if not silent; false for renderings that are added or analysed"}};
 const base::Keys<Quality> kQuality{
-    {"planner_db", "-50",
-     "an effect is omitted if it changes a body's A-weighted sound by less; -150 to -10. Lower: more effects"},
+    {"planner_db", "-50", "an effect is omitted if it changes a body's A-weighted sound by less; -150 to -10. Lower: more effects"},
     {"silence_pa", &Quality::silence_pa, Limits{1e-15, 1},
      "below this pressure at 1 m bodies sleep and modes are dropped, by default as planned, or 1e-10. Lower: modes ring for longer"},
     {"modes", &Quality::modes, Limits{synth::kGroup, std::numeric_limits<std::int32_t>::max()},

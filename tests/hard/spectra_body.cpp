@@ -7,8 +7,8 @@
 #include <limits>
 #include <numbers>
 
-#include "precompute/mesh/distributed/distribute.hpp"
 #include "precompute/la/local_columns.hpp"
+#include "precompute/mesh/distributed/distribute.hpp"
 #include "precompute/petsc/session.hpp"
 #include "tests/hard/figure.hpp"
 #include "tests/support/ranks.hpp"

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "precompute/petsc/session.hpp"
 #include "precompute/mesh/shapes/shapes.hpp"
+#include "precompute/petsc/session.hpp"
 #include "runtime/base/sort_order.hpp"
 #include "tests/hard/figure.hpp"
 #include "tests/hard/spectra_body.hpp"

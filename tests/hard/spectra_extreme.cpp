@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "precompute/mesh/check.hpp"
-#include "precompute/petsc/session.hpp"
 #include "precompute/mesh/shapes/shapes.hpp"
+#include "precompute/petsc/session.hpp"
 #include "tests/hard/figure.hpp"
 #include "tests/hard/spectra_body.hpp"
 #include "tests/support/ranks.hpp"

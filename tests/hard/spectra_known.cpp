@@ -7,8 +7,8 @@
 #include <numbers>
 
 #include "precompute/mesh/check.hpp"
-#include "precompute/petsc/session.hpp"
 #include "precompute/mesh/shapes/shapes.hpp"
+#include "precompute/petsc/session.hpp"
 #include "tests/hard/figure.hpp"
 #include "tests/hard/spectra_body.hpp"
 #include "tests/unit/precompute/fem/error_bars/bodies.hpp"

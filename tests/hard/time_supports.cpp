@@ -3,8 +3,8 @@
 
 #include <cmath>
 
-#include "runtime/base/printable.hpp"
 #include "runtime/bank/mounting/losses.hpp"
+#include "runtime/base/printable.hpp"
 #include "tests/hard/figure.hpp"
 #include "tests/unit/runtime/bank/example_bank.hpp"
 

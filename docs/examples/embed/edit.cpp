@@ -5,9 +5,9 @@
 #include <cstdio>
 #include <exception>
 
+#include "runtime/acoustics/radiation/gains.hpp"
 #include "runtime/bank/bank.hpp"
 #include "runtime/bank/edits.hpp"
-#include "runtime/acoustics/radiation/gains.hpp"
 #include "runtime/synth/load_keeper.hpp"
 #include "runtime/synth/synthesiser.hpp"
 

@@ -4,8 +4,8 @@
 #include <cstdio>
 #include <exception>
 
-#include "runtime/bank/bank.hpp"
 #include "runtime/acoustics/radiation/gains.hpp"
+#include "runtime/bank/bank.hpp"
 #include "runtime/synth/synthesiser.hpp"
 
 using namespace carillon;

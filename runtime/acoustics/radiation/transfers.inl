@@ -1,7 +1,7 @@
 // The multipoles of a group of modes at a place, kLanes modes at once; the file that includes this says how many. Nothing from the standard
 // library: an inline function of it could end up in code for other processors.
-#include "runtime/bank/multipoles.hpp"
 #include "runtime/acoustics/radiation/transfer_loops.hpp"
+#include "runtime/bank/multipoles.hpp"
 
 namespace carillon::radiation {
 namespace {

@@ -1,7 +1,7 @@
 #include "runtime/bank/packed/stencil.hpp"
 
-#include "runtime/base/instructions.hpp"
 #include "runtime/bank/packed/loops.hpp"
+#include "runtime/base/instructions.hpp"
 
 namespace carillon::packed {
 

@@ -397,11 +397,11 @@ CARILLON_API carillon_status carillon_get_counters(const carillon_synth* synth, 
 typedef struct carillon_effect_counters {
   uint32_t size;
   uint32_t reserved;
-  int64_t units[CARILLON_EFFECT_COUNT]; /* modal: mode-samples; hertz_pulse: pulses; the others: samples */
+  int64_t units[CARILLON_EFFECT_COUNT];             /* modal: mode-samples; hertz_pulse: pulses; the others: samples */
   int64_t later_units[CARILLON_LATER_EFFECT_COUNT]; /* directivity: transfers looked up; ground_reflection: samples */
-  int64_t head_units; /* samples */
-  int64_t nonlinear_units; /* coupled modes times samples */
-  int64_t cascade_units; /* modes above the coupled ones times samples */
+  int64_t head_units;                               /* samples */
+  int64_t nonlinear_units;                          /* coupled modes times samples */
+  int64_t cascade_units;                            /* modes above the coupled ones times samples */
 } carillon_effect_counters;
 
 #define carillon_effect_counters_init(counters) carillon_effect_counters_init_sized((counters), sizeof(carillon_effect_counters))

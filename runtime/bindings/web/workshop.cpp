@@ -441,9 +441,8 @@ std::string Workshop::make_plan(std::string_view scene, std::span<const int> bod
   const scene::Plan plan = scene::make_plan(std::move(facts), happened);
   Json json = Json::object();
   for (std::size_t i = 0; i < bodies.size(); ++i)
-    json["bodies"].add(Json::object()
-                                  .set("name", described.bodies[i].name)
-                                  .set("effects", effects::make_plan_json(plan.selector, static_cast<int>(i))));
+    json["bodies"].add(
+        Json::object().set("name", described.bodies[i].name).set("effects", effects::make_plan_json(plan.selector, static_cast<int>(i))));
   return json.line();
 }
 

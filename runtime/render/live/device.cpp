@@ -100,7 +100,8 @@ struct Device::State {
     state.frames.fetch_add(static_cast<std::int64_t>(frames), std::memory_order_relaxed);
     const std::uint64_t started_ns = base::read_clock_ns(CLOCK_THREAD_CPUTIME_ID);
     state.synthesiser->process(static_cast<float* const*>(out), state.synthesiser->get_microphone_count(), static_cast<int>(frames));
-    state.busy_ns.fetch_add(static_cast<std::int64_t>(base::read_clock_ns(CLOCK_THREAD_CPUTIME_ID) - started_ns), std::memory_order_relaxed);
+    state.busy_ns.fetch_add(static_cast<std::int64_t>(base::read_clock_ns(CLOCK_THREAD_CPUTIME_ID) - started_ns),
+                            std::memory_order_relaxed);
     return paContinue;
   }
 };

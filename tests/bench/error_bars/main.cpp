@@ -87,7 +87,7 @@ void compare_meshes(const std::string& finest, const std::vector<std::string>& c
     for (std::size_t m = 0; m < both; ++m) outcome.truth_cents.push_back(truth.bar_cents(m) / 2);
     const MeshKind kind = outcome.bars.level.kind == error_bars::Kind::kT4    ? MeshKind::T4
                           : outcome.bars.level.kind == error_bars::Kind::kT10 ? MeshKind::T10
-                                                                            : MeshKind::T10Curved;
+                                                                              : MeshKind::T10Curved;
     if (rank == 0) print_row(file, "test", describe(kind), outcome);
     if (modes != nullptr)
       write_modes(modes, {.name = "bunny", .materials = {}, .fineness = {}}, static_cast<int>(outcome.unknowns), kind, outcome);

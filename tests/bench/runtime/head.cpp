@@ -12,10 +12,10 @@
 #include <span>
 #include <vector>
 
-#include "runtime/base/clock.hpp"
 #include "runtime/acoustics/head/ear_filter.hpp"
 #include "runtime/acoustics/head/sofa.hpp"
 #include "runtime/acoustics/head/sphere.hpp"
+#include "runtime/base/clock.hpp"
 #include "runtime/synth/synthesiser.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 

@@ -23,12 +23,12 @@
 #include <string>
 #include <vector>
 
+#include "runtime/acoustics/radiation/transfers.hpp"
 #include "runtime/bank/bank.hpp"
 #include "runtime/base/clock.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/instructions.hpp"
 #include "runtime/base/vector.hpp"
-#include "runtime/acoustics/radiation/transfers.hpp"
 #include "runtime/synth/synthesiser.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 #include "tests/unit/runtime/synth/multipole_cube.hpp"

@@ -187,7 +187,7 @@ class SamplesTest(unittest.TestCase):
         self.assertEqual(files, ["bar-hard-wood-1-v64.wav", "bar.sfz"])
         (self.folder / "again" / "notes.txt").write_text("mine")
         done = run(BIN / "carillon-samples", self.bank, "-o", "again", "-q", cwd=self.folder, code=2)
-        self.assertIn("other files are there", done.stderr)
+        self.assertIn("contains other files", done.stderr)
         self.assertEqual(sorted(path.name for path in (self.folder / "again").rglob("*") if path.is_file()), [*files, "notes.txt"])
         self.assertEqual([path.name for path in self.folder.glob(".*")], [])
 

@@ -221,7 +221,7 @@ class Jobs(Case):
         path = os.environ["PATH"]
         os.environ["PATH"] = str(self.folder)
         try:
-            self.refuse(carillon.SystemError, lambda: carillon.solve(BAR, ranks=2), "mpirun is not along PATH")
+            self.refuse(carillon.SystemError, lambda: carillon.solve(BAR, ranks=2), "mpirun is not in PATH")
         finally:
             os.environ["PATH"] = path
         self.assertFalse([name for name in os.listdir(tempfile.gettempdir()) if name.startswith("carillon-solve-")])

@@ -4,11 +4,11 @@
 
 #include <cmath>
 
-#include "precompute/mesh/distributed/distribute.hpp"
 #include "precompute/fem/assemble.hpp"
 #include "precompute/mesh/check.hpp"
-#include "precompute/petsc/session.hpp"
+#include "precompute/mesh/distributed/distribute.hpp"
 #include "precompute/mesh/shapes/shapes.hpp"
+#include "precompute/petsc/session.hpp"
 #include "tests/support/lamb.hpp"
 #include "tests/support/subspace.hpp"
 

@@ -133,7 +133,8 @@ TEST_P(MultipoleFaults, AreReported) {
 
 const Spoiled kSpoiled[] = {
     {"wrong_decay", [](Bank& b) { b.multipoles.decay_per_s[3] *= 1.001; }, "radiation/decay[3] is"},
-    {"decay_of_another_mode", [](Bank& b) { std::swap(b.multipoles.decay_per_s[1], b.multipoles.decay_per_s[2]); }, "the coefficients give"},
+    {"decay_of_another_mode", [](Bank& b) { std::swap(b.multipoles.decay_per_s[1], b.multipoles.decay_per_s[2]); },
+     "the coefficients give"},
     {"other_coefficient", [](Bank& b) { b.multipoles.coefficient[1] = static_cast<std::int16_t>(b.multipoles.coefficient[1] + 40); },
      "radiation/decay[0] is"},
     {"other_air", [](Bank& b) { b.multipoles.air_density_kg_m3 = 1.2; }, "the coefficients give"},

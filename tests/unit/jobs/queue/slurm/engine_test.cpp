@@ -41,9 +41,7 @@ class Engine : public testing::Test {
   Registry registry_;
 };
 
-TEST_F(Engine, own_claim_without_submission_is_requeued) {
-  EXPECT_EQ(follow(process::find_self()), JobState::queued);
-}
+TEST_F(Engine, own_claim_without_submission_is_requeued) { EXPECT_EQ(follow(process::find_self()), JobState::queued); }
 
 TEST_F(Engine, claim_of_another_machine_with_the_same_pid_is_kept) {
   process::Identity other = process::find_self();

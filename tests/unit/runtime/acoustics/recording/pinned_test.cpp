@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "runtime/base/error.hpp"
 #include "runtime/acoustics/recording/player.hpp"
 #include "runtime/acoustics/recording/recording.hpp"
+#include "runtime/base/error.hpp"
 #include "tests/support/folder.hpp"
 #include "tests/support/paths.hpp"
 #include "tests/unit/runtime/acoustics/recording/seal_again.hpp"
