@@ -134,7 +134,7 @@ class Program(unittest.TestCase):
         os.mkfifo(self.folder / "pipe_record.json")
         (self.folder / "deep.json").write_text("[" * 100000)
         (self.folder / "digits.json").write_text('{"format": ' + "1" * 5000 + "}")
-        for record, expected in (("pipe_record.json", "regular file"), ("deep.json", "not valid JSON"), ("digits.json", "no JSON")):
+        for record, expected in (("pipe_record.json", "regular file"), ("deep.json", "not valid JSON"), ("digits.json", "not valid JSON")):
             result = call(self.folder, "scaling", JOB, "-o", "bad", "--check", record)
             self.assertEqual((result.returncode, len(result.stderr.strip().splitlines())), (2, 1), result.stderr)
             self.assertIn(expected, result.stderr)
@@ -157,7 +157,7 @@ class Program(unittest.TestCase):
             "not a record": lambda record: drop(record, "job"),
             '"nodes"': lambda record: drop(record, "cases", 1, "nodes"),
             '"ranks"': lambda record: put(record, "2", "cases", 1, "ranks"),
-            "no object": lambda record: put(record, 7, "cases", 1),
+            "not an object": lambda record: put(record, 7, "cases", 1),
             '"work"': lambda record: drop(record, "cases", 1, "work"),
             '"solve"': lambda record: put(record, None, "cases", 1, "work", "solve"),
             '"flops"': lambda record: drop(record, "cases", 1, "work", "factor", "flops"),

@@ -124,7 +124,7 @@ TEST(KnownJobs, that_are_wrong_are_refused_in_words) {
   };
   EXPECT_THAT(fault(R"({"string": {"length_m": 1, "mass_kg_m": 1e-3}})"), HasSubstr(R"(give one of "tension_n" and "lowest_hz")"));
   EXPECT_THAT(fault(R"({"string": {"length_m": 1, "tension_n": 5}})"), HasSubstr("mass_kg_m"));
-  EXPECT_THAT(fault(R"({"string": {"length_m": 1, "tension_n": 5, "diameter_m": 0.9}})"), HasSubstr("no string"));
+  EXPECT_THAT(fault(R"({"string": {"length_m": 1, "tension_n": 5, "diameter_m": 0.9}})"), HasSubstr("too thick for a string"));
   EXPECT_THAT(fault(R"({"beam": {"length_m": 1, "width_m": 0.1}})"), HasSubstr("section"));
   EXPECT_THAT(fault(R"({"beam": {"length_m": 1, "width_m": 0.1, "thickness_m": 0.9}})"), HasSubstr("beam theory"));
   EXPECT_THAT(fault(R"({"beam": {"length_m": 1, "diameter_m": 0.1, "ends": ["free"]}})"), HasSubstr("one word for all, or 2"));
@@ -141,7 +141,7 @@ TEST(KnownJobs, that_are_wrong_are_refused_in_words) {
   EXPECT_THAT(fault(R"({"modes_csv": {"file": "x.csv", "mass_kg": 1, "size_m": [1, 1, 1]}})"), HasSubstr(R"({"modes_csv": "modes.csv", )"));
   EXPECT_THAT(fault(R"({"string": {"length_m": 1}, "shape": "bar"})"), HasSubstr("already"));
   EXPECT_THAT(fault(R"({"string": {"length_m": 1, "tension_n": 5, "mass_kg_m": 1}})", R"(, "element": "T4")"),
-              HasSubstr("bodies of elements"));
+              HasSubstr("for finite elements"));
   EXPECT_THAT(fault(R"({"string": {"length_m": 1, "tension_n": 5, "mass_kg_m": 1, "mass_kg": 3}})"), HasSubstr("mass_kg"));
 }
 

@@ -58,7 +58,7 @@ TEST_F(Table, that_is_wrong_is_refused_with_its_line) {
   EXPECT_THAT(find_fault("frequency_hz,decay_per_s,0 0 1e300\n1,2,3\n"), HasSubstr("the point \"0 0 1e300\" is too far away"));
   EXPECT_LT(find_fault(head + std::string(100000, 'x') + ",2,1\n").size(), 1000U);
   EXPECT_THAT(find_fault(head + "440,2,x\n"), HasSubstr(":2: \"x\" is not a finite number"));
-  EXPECT_THAT(find_fault(head + "440,nan,1\n"), HasSubstr("no finite number"));
+  EXPECT_THAT(find_fault(head + "440,nan,1\n"), HasSubstr("not a finite number"));
   EXPECT_THAT(find_fault(head + "\n-3,2,1\n"), HasSubstr(":3: a frequency is -3 Hz"));
   EXPECT_THAT(find_fault(head + "440,-1,1\n"), HasSubstr("the decay is -1"));
   EXPECT_THAT(find_fault(head + "440,5000,1\n"), HasSubstr("is oscillatory from 0 to"));

@@ -190,7 +190,7 @@ TEST(check, touching_bodies) {
   EXPECT_EQ(report.touching_nodes, 1);
   EXPECT_EQ(report.components, 2);
   EXPECT_EQ(report.component_of_node, (std::vector<std::int32_t>{0, 0, 0, 0, 1, 1, 1, 1}));
-  EXPECT_NE(report.warnings.at(0).find("left apart"), std::string::npos);
+  EXPECT_NE(report.warnings.at(0).find("not merged"), std::string::npos);
 }
 
 TEST(check, pinched_node_warning) {
