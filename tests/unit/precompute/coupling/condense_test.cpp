@@ -343,7 +343,7 @@ TEST(CondenseModes, says_in_words_what_it_cannot_do) {
             std::string::npos);
   SolvedModes two = body.solved();
   two.components = 2;
-  EXPECT_NE(tests::catch_message<InputError>([&] { condense_modes(body.comm, two, {.modes = 2}); }).find("the body has 2"),
+  EXPECT_NE(tests::catch_message<InputError>([&] { condense_modes(body.comm, two, {.modes = 2}); }).find("this one has 2 parts"),
             std::string::npos);
 }
 

@@ -139,21 +139,24 @@ TEST(InnerProduct, multiplies_by_the_mass_at_every_place_of_its_block) {
   }
 }
 
-// With a general and a diagonal mass matrix, against products of Eigen.
+// With a full and a diagonal mass matrix, against products of Eigen. The mass of the rig is diagonal, so its stiffness serves as the full
+// one.
 TEST(InnerProduct, subtracts_multiplies_and_combines_in_one_pass) {
   Rig rig(2 * Rig::kBlock);
   for (const bool is_diagonal : {false, true}) {
     rig.fill_at_random(rig.view());
     petsc::MatHandle mass;
-    check(MatDuplicate(rig.system.mass, MAT_COPY_VALUES, mass.out()));
-    Matrix m = rig.m;
+    check(MatDuplicate(is_diagonal ? rig.system.mass : rig.system.stiffness, MAT_COPY_VALUES, mass.out()));
+    const double scale = 1.0 / find_largest(is_diagonal ? rig.m : rig.k);
+    check(MatScale(mass, scale));
+    Matrix m = scale * (is_diagonal ? rig.m : rig.k);
     if (is_diagonal) {
       petsc::VecHandle diagonal;
       check(MatCreateVecs(mass, nullptr, diagonal.out()));
       check(MatGetDiagonal(mass, diagonal));
       check(MatZeroEntries(mass));
       check(MatDiagonalSet(mass, diagonal, INSERT_VALUES));
-      m = Matrix(rig.m.diagonal().asDiagonal());
+      m = Matrix(m.diagonal().asDiagonal());
     }
     const la::NodeMatrix blocks(mass);
     ASSERT_EQ(blocks.is_diagonal(), is_diagonal);

@@ -93,7 +93,7 @@ TEST(MaterialsByRegion, that_miss_a_region_are_refused_and_the_region_is_named) 
 
 TEST(MaterialsByRegion, that_name_a_region_which_the_mesh_has_not_are_refused_with_the_line_and_the_regions_there_are) {
   expect_refused("\"material\": " + isotropic(1) + ",\n\n\"materials\": {\"8\": " + isotropic(1) + "}", "job.json:4: \"materials.8\"");
-  expect_refused("\"material\": " + isotropic(1) + ",\n\n\"materials\": {\"8\": " + isotropic(1) + "}", "there is 7, 9 \"oak\"");
+  expect_refused("\"material\": " + isotropic(1) + ",\n\n\"materials\": {\"8\": " + isotropic(1) + "}", "which has 7, 9 \"oak\"");
 }
 
 TEST(MaterialsByRegion, that_name_a_region_twice_are_refused) {

@@ -155,7 +155,7 @@ TEST(MeshOrder, of_another_mesh_is_refused) {
   };
   Pencil larger = test::make_lattice(4, 4, 4, 1, test::MassKind::kDiagonal, 5);
   test::distribute(larger);
-  EXPECT_NE(refuse(larger).find("another number of nodes"), std::string::npos);
+  EXPECT_NE(refuse(larger).find("different numbers of nodes"), std::string::npos);
   Pencil other = test::make_random(48, 20, 3);
   test::distribute(other);
   EXPECT_NE(refuse(other).find("lacks links"), std::string::npos);
