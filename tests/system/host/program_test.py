@@ -779,7 +779,7 @@ class RenderProgram(unittest.TestCase):
         for count, words in (
             (1001, ["1001 bodies", "at most 1000"]),
             (100000, ["100000 bodies", "at most 1000"]),
-            (1000000, ["too many for a JSON file", "a scene at most 1000 bodies"]),
+            (1000000, ["too many for a JSON file", "a scene may hold 1000 bodies"]),
         ):
             bodies = ", ".join('{"name": "b%d", "bank": "cube.h5"}' % i for i in range(count))
             (self.root / "crowd.json").write_text('{"duration_s": 1, "bodies": [%s]}' % bodies)
