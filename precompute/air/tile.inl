@@ -2,7 +2,6 @@
 //             g = (1/r - ik) G / r, combined to the kernels of - K - alpha W and - V - alpha K'; then sums over the midpoints next to a
 //             node, and over its facets for the curls. Points that are near each other take part without the static kernels, by series.
 // Source:     docs/equations.md E10. Sine and cosine: reduction by pi / 2 in three parts, polynomials of degree 7 and 8 (least squares).
-// Deviations: none.
 //
 // Included by tile_*.cpp inside an unnamed namespace; nothing of std is used, so that no function compiled for one processor can be linked
 // in place of another's.

@@ -1,6 +1,5 @@
 // Method:     kernels_body.inl and kernels_receiver.inl on AVX2 and FMA: 8 lanes, 16 registers.
 // Source:     Intel's intrinsics guide.
-// Deviations: none.
 #include <immintrin.h>
 
 #include "runtime/synth/kernels.hpp"

@@ -1,6 +1,5 @@
 // Method:     kernels_body.inl and kernels_receiver.inl on AVX-512 (F, DQ, VL): 16 lanes, 32 registers.
 // Source:     Intel's intrinsics guide.
-// Deviations: none.
 #include <immintrin.h>
 
 #include "runtime/synth/kernels.hpp"

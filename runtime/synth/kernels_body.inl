@@ -7,7 +7,6 @@
 //             damps, it steps what rings through the sub-block too, for its sound only: the state in double precision is multiplied by
 //             the product of the factors.
 // Source:     docs/decisions/resonator-kernel.md.
-// Deviations: none.
 //
 // Included by kernels_*.cpp, which give the types F (lanes of float), D (as many lanes of double), P (lanes of float in pairs) and
 // kVectors, kHeldColumns: how many vectors of samples of how many columns emit holds in registers at once. Everything is in an unnamed

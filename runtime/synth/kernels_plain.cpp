@@ -1,5 +1,4 @@
 // Method:     one mode or sample at a time, for any processor; the compiler may take what it has.
-// Source:     none.
 // Deviations: no fused multiply-add, so that no library function is called for it.
 #include "runtime/synth/kernels.hpp"
 

@@ -2,7 +2,6 @@
 //             lanes and a sub-block is one convolution; where it moves, taps are in the lanes and the sources of one place, which all are
 //             read with the same taps, are summed before.
 // Source:     docs/equations.md.
-// Deviations: none.
 //
 // Included by kernels_*.cpp after kernels_body.inl.
 

@@ -1,6 +1,5 @@
 // Method:     kernels_body.inl and kernels_receiver.inl on SSE2, which every x86-64 processor has: 4 lanes, no fused multiply-add.
 // Source:     Intel's intrinsics guide.
-// Deviations: none.
 #include <immintrin.h>
 
 #include "runtime/synth/kernels.hpp"

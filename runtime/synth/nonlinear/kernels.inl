@@ -3,7 +3,6 @@
 //             A turn by three shears (Strachan's lifting): each has the determinant 1 to the last bit, so that its rounding turns an
 //             ellipse a little and does not change its size.
 // Source:     docs/equations.md E12.
-// Deviations: none.
 //
 // Included by kernels_*.cpp. Nothing of the standard library's templates is called here: the linker would take one copy of them for all
 // files, maybe one with instructions that the processor has not.
