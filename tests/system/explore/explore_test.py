@@ -228,7 +228,7 @@ class Explore(unittest.TestCase):
             timeout=20,
         )
         self.assertEqual((taken.returncode, len(taken.stderr.splitlines())), (4, 1), taken.stderr)
-        self.assertIn("taken", taken.stderr)
+        self.assertIn("in use", taken.stderr)
         self.assertEqual(server.stop(), 0)
         again = Server(str(self.root / "served"))
         self.assertEqual(again.get("/index.html")[0].status, 200)
