@@ -84,7 +84,7 @@ class Browser:
             self._process.wait(10)
         except subprocess.TimeoutExpired:
             pass
-        with contextlib.suppress(ProcessLookupError):  # remaining renderers of this session
+        with contextlib.suppress(ProcessLookupError):  # remaining processes of its group
             os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait()
         os.close(self._out)
