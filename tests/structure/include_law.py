@@ -34,36 +34,45 @@ LIBRARIES = {
     "sqlite": ["sqlite3.h"],
     "pybind11": ["pybind11/"],
 }
-# folder: (folders of ours that it may include, libraries that it may include). std and POSIX are free everywhere. A folder includes its
-# private parts (PARTS) and they include each other from left to right only.
-LAW = {
+# Folder or part of a folder: (folders of ours that it may include, libraries that it may include). std and POSIX are free everywhere.
+# Parts of a folder stand in the order in which they may include each other: downwards is forbidden.
+RULES = {
     "partition": (["runtime/base"], ["fmt", "metis"]),
-    "runtime/base": ([], ["rapidjson", "fmt", "openssl"]),
+    "runtime/base": ([], ["fmt", "openssl", "rapidjson"]),
     "runtime/material": (["runtime/base"], ["fmt"]),
-    "runtime/bank": (["runtime/base", "runtime/material"], ["fmt", "hdf5", "eigen", "deflate", "stb"]),
+    "runtime/bank/packed": (["runtime/base"], ["deflate", "eigen", "fmt", "stb"]),
+    "runtime/bank": (["runtime/base", "runtime/material"], ["fmt", "hdf5"]),
+    "runtime/bank/mounting": (["runtime/base", "runtime/material"], ["fmt"]),
     "runtime/events": (["runtime/base"], ["fmt"]),
-    "runtime/acoustics": (["runtime/base", "runtime/bank"], ["fmt", "mysofa"]),
-    "runtime/exchange": (["runtime/base", "runtime/material", "runtime/bank", "runtime/acoustics"], ["fmt", "cli", "eigen"]),
-    "runtime/synth": (["runtime/base", "runtime/bank", "runtime/events", "runtime/acoustics"], ["fmt"]),
-    "runtime/physics": (["runtime/base", "runtime/bank", "runtime/events"], ["eigen", "fmt", "simbody"]),
+    "runtime/acoustics/radiation": (["runtime/base", "runtime/bank"], []),
+    "runtime/acoustics/head": (["runtime/base"], ["fmt", "mysofa"]),
+    "runtime/acoustics/recording": (["runtime/base"], ["fmt"]),
+    "runtime/exchange/gltf": (["runtime/base"], ["fmt"]),
+    "runtime/exchange": (["runtime/base", "runtime/material", "runtime/bank", "runtime/acoustics"], ["cli", "eigen", "fmt"]),
+    "runtime/synth/nonlinear": (["runtime/base", "runtime/bank"], ["fmt"]),
+    "runtime/synth": (["runtime/base", "runtime/bank", "runtime/events", "runtime/acoustics"], []),
+    "runtime/physics/geometry": (["runtime/base", "runtime/bank"], []),
+    "runtime/physics/impact": (["runtime/base"], []),
+    "runtime/physics/joints": (["runtime/base"], ["fmt", "simbody"]),
+    "runtime/physics/rigid": (["runtime/base"], ["eigen", "fmt"]),
+    "runtime/physics": (["runtime/base", "runtime/bank", "runtime/events"], ["fmt"]),
+    "runtime/scene/effects": (["runtime/base", "runtime/bank", "runtime/events", "runtime/acoustics", "runtime/synth"], ["fmt"]),
     "runtime/scene": (
         ["runtime/base", "runtime/material", "runtime/bank", "runtime/events", "runtime/acoustics", "runtime/synth", "runtime/physics"],
         ["fmt"],
     ),
+    "runtime/render/sound": (["runtime/base"], ["cairo", "eigen", "fmt"]),
     "runtime/render": (
-        [
-            "runtime/base",
-            "runtime/material",
-            "runtime/bank",
-            "runtime/events",
-            "runtime/acoustics",
-            "runtime/synth",
-            "runtime/physics",
-            "runtime/scene",
-        ],
-        ["fmt", "cli", "sndfile", "eigen", "cairo", "portaudio"],
+        ["runtime/base", "runtime/bank", "runtime/events", "runtime/acoustics", "runtime/synth", "runtime/scene"],
+        ["cli", "fmt", "sndfile"],
     ),
-    "runtime/bindings": (
+    "runtime/render/live": (
+        ["runtime/base", "runtime/events", "runtime/synth", "runtime/physics", "runtime/scene"],
+        ["cli", "fmt", "portaudio"],
+    ),
+    "runtime/render/samples": (["runtime/base", "runtime/material", "runtime/bank", "runtime/scene"], ["cli", "fmt"]),
+    "runtime/bindings/c_api": (["runtime/base", "runtime/bank", "runtime/events", "runtime/acoustics", "runtime/synth"], []),
+    "runtime/bindings/python": (
         [
             "runtime/base",
             "runtime/material",
@@ -76,20 +85,35 @@ LAW = {
         ],
         ["fmt", "pybind11"],
     ),
+    "runtime/bindings/web": (
+        ["runtime/base", "runtime/material", "runtime/bank", "runtime/events", "runtime/acoustics", "runtime/synth", "runtime/scene"],
+        ["fmt"],
+    ),
     "precompute/job": (["runtime/base", "runtime/material"], ["fmt"]),
+    "precompute/job/cost": (["runtime/material"], []),
     "precompute/comm": (["runtime/base"], ["fmt", "mpi"]),
-    "precompute/mesh": (["runtime/base", "partition", "precompute/comm"], ["fmt", "xml", "zlib", "mpi", "eigen", "hdf5"]),
-    "precompute/mesher": (["runtime/base", "runtime/exchange", "precompute/mesh"], ["fmt", "cli", "eigen", "cgal"]),
+    "precompute/mesh": (["runtime/base"], ["fmt", "xml", "zlib"]),
+    "precompute/mesh/shapes": (["runtime/base"], ["fmt"]),
+    "precompute/mesh/distributed": (["partition", "runtime/base", "precompute/comm"], ["eigen", "fmt"]),
+    "precompute/mesh/parallel": (["runtime/base", "precompute/comm"], ["fmt"]),
+    "precompute/mesh/vtkhdf": (["runtime/base"], ["fmt", "hdf5"]),
+    "precompute/mesher": (["runtime/base", "runtime/exchange", "precompute/mesh"], ["cgal", "cli", "eigen", "fmt"]),
+    "precompute/petsc/launch": (["runtime/base"], ["fmt"]),
     "precompute/petsc": (["runtime/base", "precompute/comm"], ["fmt", "mpi", "petsc"]),
-    "precompute/la": (["runtime/base", "precompute/comm", "precompute/petsc"], ["mpi", "petsc", "eigen"]),
+    "precompute/petsc/profile": (["runtime/base"], ["mpi"]),
+    "precompute/la": (["runtime/base", "precompute/comm", "precompute/petsc"], ["eigen", "mpi", "petsc"]),
     "precompute/fem": (
+        ["runtime/base", "precompute/job", "precompute/comm", "precompute/mesh", "precompute/petsc"],
+        ["fmt", "mpi", "petsc"],
+    ),
+    "precompute/fem/error_bars": (
         ["runtime/base", "runtime/bank", "precompute/job", "precompute/comm", "precompute/mesh", "precompute/petsc", "precompute/la"],
-        ["fmt", "mpi", "petsc", "eigen"],
+        ["eigen", "fmt", "mpi", "petsc"],
     ),
     "precompute/ldlt": (["runtime/base", "partition", "precompute/comm", "precompute/petsc", "precompute/la"], ["fmt", "mpi", "petsc"]),
     "precompute/eigen": (
         ["runtime/base", "precompute/job", "precompute/comm", "precompute/petsc", "precompute/la", "precompute/ldlt"],
-        ["fmt", "mpi", "petsc", "mumps", "eigen"],
+        ["eigen", "fmt", "mpi", "mumps", "petsc"],
     ),
     "precompute/coupling": (
         [
@@ -103,24 +127,37 @@ LAW = {
             "precompute/fem",
             "precompute/eigen",
         ],
-        ["fmt", "petsc", "eigen"],
+        ["eigen", "fmt", "petsc"],
     ),
     "precompute/analytic": (
         ["runtime/base", "runtime/bank", "runtime/material", "precompute/job", "precompute/petsc", "precompute/la", "precompute/eigen"],
-        ["fmt", "petsc", "eigen"],
+        ["eigen", "fmt", "petsc"],
     ),
-    "precompute/air": (["runtime/base", "runtime/bank", "precompute/comm", "precompute/la"], ["fmt", "eigen"]),
-    "precompute/run": (
+    "precompute/air": (["runtime/base", "runtime/bank", "precompute/comm", "precompute/la"], ["eigen", "fmt"]),
+    "precompute/run/io": (
         [
             "runtime/base",
             "runtime/bank",
-            "runtime/acoustics",
-            "partition",
             "precompute/job",
             "precompute/comm",
             "precompute/mesh",
             "precompute/petsc",
             "precompute/la",
+            "precompute/fem",
+            "precompute/eigen",
+        ],
+        ["fmt", "mpi", "petsc"],
+    ),
+    "precompute/run": (
+        [
+            "partition",
+            "runtime/base",
+            "runtime/bank",
+            "runtime/acoustics",
+            "precompute/job",
+            "precompute/comm",
+            "precompute/mesh",
+            "precompute/petsc",
             "precompute/fem",
             "precompute/ldlt",
             "precompute/eigen",
@@ -128,50 +165,58 @@ LAW = {
             "precompute/analytic",
             "precompute/air",
         ],
-        ["fmt", "mpi", "petsc", "hdf5", "cli"],
+        ["cli", "fmt", "hdf5", "mpi"],
+    ),
+    "precompute/simulation/transient": (
+        ["partition", "runtime/base", "precompute/job", "precompute/comm", "precompute/mesh"],
+        ["eigen", "fmt"],
+    ),
+    "precompute/simulation/emission": (
+        ["runtime/base", "runtime/bank", "runtime/acoustics", "precompute/job", "precompute/comm"],
+        ["fmt", "hdf5"],
     ),
     "precompute/simulation": (
-        [
-            "runtime/base",
-            "runtime/bank",
-            "runtime/acoustics",
-            "runtime/render",
-            "partition",
-            "precompute/job",
-            "precompute/comm",
-            "precompute/mesh",
-            "precompute/run",
-        ],
-        ["fmt", "cli", "mpi", "hdf5", "eigen"],
+        ["runtime/base", "runtime/bank", "runtime/render", "precompute/job", "precompute/comm", "precompute/mesh", "precompute/run"],
+        ["cli", "fmt", "hdf5", "mpi"],
     ),
-    "jobs/store": (["runtime/base", "runtime/material", "runtime/bank", "precompute/job"], ["fmt", "sqlite"]),
-    "jobs/front": (["runtime/base", "runtime/material", "runtime/bank", "runtime/scene", "precompute/job", "jobs/store"], ["fmt", "zlib"]),
-    "jobs/queue": (["runtime/base", "runtime/bank", "precompute/job", "jobs/store", "jobs/front"], ["fmt"]),
+    "jobs/store/process": (["runtime/base"], ["fmt"]),
+    "jobs/store": (["runtime/base", "runtime/material", "runtime/bank", "precompute/job"], ["fmt"]),
+    "jobs/store/outcome": (["runtime/base"], ["fmt"]),
+    "jobs/store/registry": (["runtime/base"], ["fmt", "sqlite"]),
+    "jobs/front/report": (["runtime/base", "runtime/bank"], ["fmt"]),
+    "jobs/front/explore": (["runtime/base", "runtime/material", "runtime/bank", "runtime/scene", "jobs/store"], ["fmt", "zlib"]),
+    "jobs/front/hear": (["runtime/base", "runtime/material", "runtime/bank", "precompute/job", "jobs/store"], ["fmt"]),
+    "jobs/front/cache": (["runtime/base", "precompute/job", "jobs/store"], ["fmt"]),
+    "jobs/queue/attempt": (["runtime/base", "runtime/bank", "jobs/store", "jobs/front"], ["fmt"]),
+    "jobs/queue": (["runtime/base", "precompute/job", "jobs/store"], ["fmt"]),
+    "jobs/queue/slurm": (["runtime/base", "precompute/job", "jobs/store"], ["fmt"]),
     "jobs/cli": (
         ["runtime/base", "runtime/material", "runtime/bank", "precompute/job", "jobs/store", "jobs/front", "jobs/queue"],
-        ["fmt", "cli"],
+        ["cli", "fmt"],
     ),
 }
-# Private parts of folders, in the order in which they may be included; "." is the folder itself.
-PARTS = {
-    "runtime/bank": ["packed", ".", "mounting"],
-    "runtime/acoustics": ["radiation", "head", "recording"],
-    "runtime/exchange": ["gltf", "."],
-    "runtime/synth": ["nonlinear", "."],
-    "runtime/physics": ["geometry", "impact", "joints", "rigid", "."],
-    "runtime/scene": ["effects", "."],
-    "runtime/render": ["sound", ".", "live", "samples"],
-    "runtime/bindings": ["c_api", "python", "web"],
-    "precompute/job": [".", "cost"],
-    "precompute/mesh": [".", "shapes", "distributed", "parallel", "vtkhdf"],
-    "precompute/petsc": ["launch", ".", "profile"],
-    "precompute/fem": [".", "error_bars"],
-    "precompute/run": ["io", "."],
-    "precompute/simulation": ["transient", "emission", "."],
-    "jobs/store": ["process", ".", "outcome", "registry"],
-    "jobs/front": ["report", "explore", "hear", "cache"],
-    "jobs/queue": ["attempt", ".", "slurm"],
-}
+
+
+def find_folder(path):
+    """The folder of a part: runtime/physics of runtime/physics/rigid."""
+    return "/".join(path.split("/")[:2])
+
+
+def merge_parts():
+    """LAW: {folder: (folders, libraries)} of all its parts together; PARTS: {folder: names of its parts in order, "." for itself}."""
+    law, parts = {}, {}
+    for path, (ours, libraries) in RULES.items():
+        folder = find_folder(path)
+        known = law.setdefault(folder, ([], []))
+        known[0].extend(name for name in ours if name not in known[0])
+        known[1].extend(name for name in libraries if name not in known[1])
+        parts.setdefault(folder, []).append(path.removeprefix(folder).strip("/") or ".")
+    for ours, _ in law.values():
+        ours.sort(key=list(law).index)
+    return law, parts
+
+
+LAW, PARTS = merge_parts()
 # Headers of parts that other folders may include, too: the part's whole content or named headers.
 PUBLIC = {
     "runtime/bank": ["mounting/"],
@@ -203,12 +248,7 @@ ONLY_IN = {
         r"precompute/mesh/vtkhdf/main)\.cpp|runtime/bank/hdf5_id\.hpp)$"
     ),
     "cgal": re.compile(r"^precompute/mesher/[a-z0-9_]+\.(cpp|hpp)$"),
-    "simbody": re.compile(r"^runtime/physics/joints/"),
-    "portaudio": re.compile(r"^runtime/render/live/"),
-    "sqlite": re.compile(r"^jobs/store/registry/"),
 }
-# Parts whose readers and meshers run without MPI.
-WITHOUT_MPI = re.compile(r"^precompute/mesh/(shapes/)?[a-z0-9_]+\.[ch]pp$")
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 
 
@@ -229,29 +269,25 @@ def library_of(path):
 def split(path):
     """(folder of LAW, part) of a file or header."""
     parent = str(pathlib.PurePosixPath(path).parent)
-    folder = max((name for name in LAW if parent == name or parent.startswith(name + "/")), key=len, default=None)
-    if folder is None:
-        return None, None
-    part = parent.removeprefix(folder).strip("/") or "."
-    return (folder, part) if part in PARTS.get(folder, ["."]) else (None, None)
+    folder = find_folder(parent)
+    return (folder, parent.removeprefix(folder).strip("/") or ".") if parent in RULES else (None, None)
 
 
-def find_breach(path, folder, part, target):
-    """What forbids an include of one of our headers, or None."""
+def find_breach(folder, part, target):
+    """The rule that forbids an include of one of our headers, or None."""
     other, other_part = split(target)
     if other is None:
         return f"{target} is in no folder of the include law"
     if other == folder:
-        order = PARTS.get(folder, ["."])
+        order = PARTS[folder]
         if order.index(other_part) > order.index(part):
             return f"{folder}/{part} may not include {other}/{other_part} ({target})"
         return None
-    if other not in LAW[folder][0]:
-        return f"{folder} may not include {other} ({target})"
+    path = folder if part == "." else f"{folder}/{part}"
+    if other not in RULES[path][0]:
+        return f"{path} may not include {other} ({target})"
     if other_part != "." and not target.removeprefix(other + "/").startswith(tuple(PUBLIC.get(other, []))):
         return f"{target} is private to {other}"
-    if other in ("partition", "precompute/comm") and WITHOUT_MPI.match(path):
-        return f"{target} needs MPI or METIS, {path} must not"
     return None
 
 
@@ -263,14 +299,14 @@ def find_breaches(files):
         if folder is None:
             breaches.append(f"{path}: its folder is not in the include law; add it to tests/structure/include_law.py")
             continue
-        libraries = LAW[folder][1]
+        libraries = RULES[str(pathlib.PurePosixPath(path).parent)][1]
         for number, line in enumerate(text.splitlines(), 1):
             match = INCLUDE.match(line)
             if not match:
                 continue
             bracket, target = match.groups()
             if bracket == '"':
-                if breach := find_breach(path, folder, part, target):
+                if breach := find_breach(folder, part, target):
                     breaches.append(f"{path}:{number}: {breach}")
                 continue
             library = library_of(target)
@@ -279,7 +315,7 @@ def find_breaches(files):
                     f"{path}:{number}: <{target}> belongs to no library of the include law; name ours in quotes, add a new one to LIBRARIES"
                 )
             elif library and library not in libraries:
-                breaches.append(f"{path}:{number}: {folder} may not include {library} ({target})")
+                breaches.append(f"{path}:{number}: {pathlib.PurePosixPath(path).parent} may not include {library} ({target})")
             elif library in ONLY_IN and not ONLY_IN[library].match(path):
                 breaches.append(f"{path}:{number}: {library} is kept to {ONLY_IN[library].pattern}")
     return breaches
@@ -306,6 +342,8 @@ def self_test():
         ("runtime/physics/geometry/x.cpp", '#include "runtime/physics/rigid/space.hpp"\n'),
         ("runtime/physics/geometry/x.cpp", '#include "runtime/physics/world.hpp"\n'),
         ("precompute/mesh/x.cpp", '#include "partition/partition.hpp"\n'),
+        ("runtime/physics/impact/x.cpp", '#include "runtime/bank/bank.hpp"\n'),
+        ("runtime/physics/rigid/x.cpp", "#include <SimTKsimbody.h>\n"),
     ]
     for one in bad:
         assert len(find_breaches([one])) == 1, one
