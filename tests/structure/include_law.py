@@ -24,7 +24,6 @@ LIBRARIES = {
     "mpi": ["mpi.h"],
     "petsc": ["petsc", "slepc"],
     "mumps": ["dmumps_c.h"],
-    "cholmod": ["cholmod.h", "suitesparse/"],
     "cgal": ["CGAL/", "boost/"],
     "xml": ["pugixml.hpp"],
     "zlib": ["zlib.h"],
