@@ -1,6 +1,5 @@
 // Method:     The id is the SHA-256 of the resolved job as one canonical line, the kind, format and SHA-256 of the input, and the version
-// of
-//             the solver. Equivalent jobs resolve to the same line.
+//             of the solver. Equivalent jobs resolve to the same line.
 // Source:     FIPS 180-4 (hash).
 #include "jobs/store/identity.hpp"
 

@@ -2,8 +2,7 @@
 //
 //   VERSION                    "carillon store 1"
 //   banks/ab/<id>/             read-only: bank.hdf, job.json, request.json, outcome.json, log, report.html ...; of a simulation
-//   record.json,
-//                              sound.wav, motion.vtkhdf ... (order.hpp) instead of bank and report
+//                              record.json, sound.wav, motion.vtkhdf ... (order.hpp) instead of bank and report
 //   inputs/ab/<sha256>.<end>   read-only snapshots of meshes and surfaces
 //   work/ab/<id>/              job.json (for the solver: mesh in inputs/, bank "bank.hdf"), request.json, attempt.json, outcome.json,
 //                              result.json, log, progress.jsonl, checkpoint, bank.hdf

@@ -1,6 +1,5 @@
 // Method: HDF5's "core" driver builds the file in memory, so that disk errors do not reach HDF5 and the checksum is computed from memory.
-// The
-//   driver allocates through callbacks, and the memory is kept when the file is closed. All arrays of the seal are contiguous.
+//   The driver allocates through callbacks, and the memory is kept when the file is closed. All arrays of the seal are contiguous.
 // Deviations: not H5Fget_file_image, which copies all bytes and in 1.10.8 leaves an image that cannot be opened (it clears a flag in the
 //   superblock but keeps the old checksum).
 // Source: HDF5 1.10 reference manual; VTK file formats, "VTKHDF", version 1.0 (UnstructuredGrid).

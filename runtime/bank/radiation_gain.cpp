@@ -1,6 +1,5 @@
 // Method: one omnidirectional gain per mode from the unsigned volume velocity of the surface triangles, as for a pulsating sphere of the
-// same
-//   area.
+//   same area.
 // Source: OSG02 section 3.4 (one gain per mode); Pierce 1981, Acoustics, section 4.1 (pulsating sphere).
 // Deviations: OSG02 sums the signed normal displacement, which vanishes for bending modes of symmetric bodies; here absolute values per
 //   triangle are summed. The sign is dropped after the integral over a triangle: tangential motion of a curved surface contributes with

@@ -1,7 +1,6 @@
 // Reader of banks from untrusted bytes.
 // Method: the seal locates the arrays; the file is read once, front to back, arrays directly to their destination, and hashed on the way.
-// The
-//   content is checked after the digest.
+//   The content is checked after the digest.
 // Deviations: HDF5 is not used: libhdf5 1.10.8 crashed and hung on files with one changed byte. The HDF5 structure serves other programs.
 #include <fcntl.h>
 #include <fmt/format.h>

@@ -1,7 +1,6 @@
 // Lock-free queue of events from any thread to the audio thread.
 // Method: bounded queue with a turn number per cell: a producer claims a place by advancing the tail, writes the cell and publishes it by
-// its
-//   turn number; neither producers nor reader wait.
+//   its turn number; neither producers nor reader wait.
 // Source: Vyukov, "Bounded MPMC queue", 1024cores.net, 2010 (here with one reader).
 #pragma once
 

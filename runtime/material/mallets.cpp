@@ -1,6 +1,5 @@
 // Source: felts and yarn: power laws of piano hammers (Chaigne and Askenfelt 1994, J. Acoust. Soc. Am. 95, 1112: K 4e8 to 1e12, p 2.3 to
-// 3),
-//   the softer ones estimates; masses, radii and restitutions are estimates.
+//   3), the softer ones estimates; masses, radii and restitutions are estimates.
 #include "runtime/material/mallets.hpp"
 
 #include <fmt/core.h>

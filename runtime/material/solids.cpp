@@ -1,9 +1,8 @@
 // Method: plausible ranges of stiffness, density and speed of sound sqrt(E / rho). Outside them the common units are tried: the first unit,
 //   or pair, that gives an ordinary solid is suggested.
 // Source: Ashby, Materials Selection in Mechanical Design (2011), chapter 4, modulus-density charts: E from 1e5 Pa (soft foams) to 1.2e12
-// Pa
-//   (diamond), density from 10 (foams) to 22 600 kg/m^3 (osmium), sqrt(E / rho) from 30 m/s to 20 km/s. Gels and soft rubbers (1e3 to 1e6
-//   Pa) lie below, where a unit error is as likely: they cause a warning only.
+//   Pa (diamond), density from 10 (foams) to 22 600 kg/m^3 (osmium), sqrt(E / rho) from 30 m/s to 20 km/s. Gels and soft rubbers (1e3 to
+//   1e6 Pa) lie below, where a unit error is as likely: they cause a warning only.
 #include "runtime/material/solids.hpp"
 
 #include <fmt/format.h>

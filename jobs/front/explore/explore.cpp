@@ -1,7 +1,6 @@
 // Method:     Banks become a scene; carillon-render checks and simulates it and records its contacts; the folder gets scene, contacts,
-// banks,
-//             page and sound engine, and explore.json, which connects them. For a silent scene a probe with a blow on each body determines
-//             the gain.
+//             banks, page and sound engine, and explore.json, which connects them. For a silent scene a probe with a blow on each body
+//             determines the gain.
 // Source:     van den Doel and Pai 1996 (Sonic Explorer).
 #include "jobs/front/explore/explore.hpp"
 

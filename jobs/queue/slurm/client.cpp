@@ -1,6 +1,5 @@
 // Method:     Slurm's commands are run without a shell, with output formats that are stable since Slurm 20. Their JSON is not used:
-// scontrol
-//             of 22.05 has none, and squeue --json prints all fields of all jobs.
+//             scontrol of 22.05 has none, and squeue --json prints all fields of all jobs.
 // Source:     squeue(1), scontrol(1), sacct(1), sbatch(1) of Slurm 22.05.
 #include "jobs/queue/slurm/client.hpp"
 

@@ -1,6 +1,5 @@
 // Method: under a mode's reaction r q a support moves with velocity Y r q; the absorbed power over twice the mode's energy is the decay,
-// the
-//   imaginary part shifts the frequency. Y is diagonal in the frame of the patch normal: force and couple along it and across it. Time
+//   the imaginary part shifts the frequency. Y is diagonal in the frame of the patch normal: force and couple along it and across it. Time
 //   factor exp(i omega t).
 // Source: thin plate: Cremer, Heckl and Petersson, Structure-Borne Sound (2005), chapter 5, for the force; couples and in-plane forces are
 //   derived in docs/equations.md. Half space under a disc: Lysmer's analogue as in Richart, Hall and Woods, Vibrations of Soils and

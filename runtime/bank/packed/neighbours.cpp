@@ -1,6 +1,5 @@
 // Method: lattice cells in hash buckets. 2x2x2 cells contain all vertices within half a cell width and most within one: prediction needs
-// good
-//   neighbours on which reader and writer agree, not the exact nearest ones.
+//   good neighbours on which reader and writer agree, not the exact nearest ones.
 #include "runtime/bank/packed/neighbours.hpp"
 
 #include <algorithm>
