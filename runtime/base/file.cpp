@@ -19,6 +19,7 @@
 #include "runtime/base/failure.hpp"
 #include "runtime/base/foreign.hpp"
 #include "runtime/base/message.hpp"
+#include "runtime/base/signal_pause.hpp"
 #include "runtime/base/temporary.hpp"
 
 namespace carillon::base {
@@ -105,22 +106,6 @@ void read_pieces(const fs::path& file, std::string_view what, std::size_t piece_
 }
 
 namespace {
-
-/// Blocks all signals during its lifetime.
-class SignalPause {
- public:
-  SignalPause() {
-    sigset_t all;
-    sigfillset(&all);
-    pthread_sigmask(SIG_SETMASK, &all, &before_);
-  }
-  ~SignalPause() { pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
-  SignalPause(const SignalPause&) = delete;
-  SignalPause& operator=(const SignalPause&) = delete;
-
- private:
-  sigset_t before_{};
-};
 
 /// Nameless file in `folder`, gone with its last descriptor; -1 if unsupported (NFS, FAT).
 int open_nameless(const fs::path& folder) {

@@ -20,6 +20,7 @@
 #include "runtime/base/descriptor.hpp"
 #include "runtime/base/failure.hpp"
 #include "runtime/base/message.hpp"
+#include "runtime/base/signal_pause.hpp"
 
 namespace carillon::base {
 namespace {
@@ -117,6 +118,7 @@ void release(Slot& slot) {
 
 fs::path make_temporary_folder(const fs::path& parent, const std::string& begin) {
   sweep(parent, begin);
+  const SignalPause pause;  // until the folder is in the table of the handler
   std::string path = (parent / (begin + kLetters)).string();
   if (path.size() >= kMaxPath || ::mkdtemp(path.data()) == nullptr)
     throw_system_error(errno, fmt::format("{}: no temporary folder can be made here: {}; make room there, or name another place (temporary "
