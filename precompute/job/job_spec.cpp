@@ -3,7 +3,6 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "precompute/job/keys.hpp"
 #include "precompute/job/read_body.hpp"
@@ -86,8 +85,7 @@ void read_air(base::Object& job, JobSpec& spec) {
   kAirKeys.read(air, spec.air);
   if (auto half = air.object_if("half_space")) {
     spec.air.half_space = HalfSpace{half->numbers<3>("point_m"), half->numbers<3>("normal")};
-    const auto& n = spec.air.half_space->normal;
-    const double length = std::hypot(n[0], n[1], n[2]);
+    const double length = calc_length(spec.air.half_space->normal);
     if (!(length > kMinNormal && length < kMaxNormal))
       half->fail("normal", "must be a direction, [0, 0, 1] for a floor below the body, and is 0");
     half->finish();

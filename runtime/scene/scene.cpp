@@ -129,7 +129,7 @@ std::vector<synth::PathPoint> read_path(base::Object& object, std::string_view k
         object.fail(key, fmt::format("time {} follows {}; give rows [t, x, y, z] in order of time", place.time_s, last.time_s));
       }
       const Vec3 &a = last.position_m, &b = place.position_m;
-      const double speed = std::hypot(b[0] - a[0], b[1] - a[1], b[2] - a[2]) / (place.time_s - last.time_s);
+      const double speed = calc_length(b - a) / (place.time_s - last.time_s);
       if (speed > kMaxSpeedMs) {
         object.fail(key, fmt::format("moves at {:.4g} m/s after {} s; give {} m/s at most", speed, last.time_s, kMaxSpeedMs));
       }
