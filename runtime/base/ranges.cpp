@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 namespace carillon::base {
@@ -15,6 +16,14 @@ std::string find_unit(std::string_view name) {
   for (const auto& [suffix, unit] : kUnits)
     if (name.ends_with(suffix)) return unit;
   return "";
+}
+
+std::string read_name(Object& object, std::string_view key) {
+  constexpr std::size_t kMaxBytes = 200;
+  std::string name = object.string(key);
+  if (name.size() > kMaxBytes || std::any_of(name.begin(), name.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }))
+    object.fail(key, fmt::format("is not a valid name: at most {} bytes, no control characters", kMaxBytes));
+  return name;
 }
 
 double read_within(Object& object, std::string_view key, double low, double high) {

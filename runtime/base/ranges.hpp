@@ -12,6 +12,9 @@ namespace carillon::base {
 /// Unit of a key by its suffix, after a space: " m" of "length_m"; empty if there is none.
 std::string find_unit(std::string_view key);
 
+/// Name of at most 200 bytes without control characters.
+std::string read_name(Object& object, std::string_view key);
+
 /// Required number.
 double read_within(Object& object, std::string_view key, double low, double high);
 /// Optional number; the fallback is not checked.

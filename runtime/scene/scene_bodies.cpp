@@ -19,7 +19,6 @@ namespace {
 using base::Limits;
 using base::within;
 
-constexpr std::size_t kLongestName = 200;  // bytes
 constexpr std::size_t kMaxHolders = 1000;
 
 const base::Keys<SceneBody> kBody{
@@ -196,17 +195,9 @@ void read_bank_or_job(base::Object& object, SceneBody& body) {
   body.job = object.make_excerpt(kKeys);
 }
 
-std::string read_body_name(base::Object& object) {
-  std::string name = object.string("name");
-  if (name.size() > kLongestName || std::any_of(name.begin(), name.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; })) {
-    object.fail("name", fmt::format("is not a valid name: at most {} bytes, no control characters", kLongestName));
-  }
-  return name;
-}
-
 SceneBody parse_body(base::Object& object, const Scene& scene) {
   SceneBody body;
-  body.name = read_body_name(object);
+  body.name = base::read_name(object, "name");
   body.place = object.find_place("");
   read_bank_or_job(object, body);
   body.variation = read_within(object, "variation", scene.variation, 0.0, 1.0);
@@ -232,7 +223,7 @@ SceneBody parse_body(base::Object& object, const Scene& scene) {
 
 SceneSurface parse_surface(base::Object& object) {
   SceneSurface surface;
-  surface.name = read_body_name(object);
+  surface.name = base::read_name(object, "name");
   surface.place = object.find_place("recording");
   surface.file = object.path("recording");
   for (const char* key : {"bank", "shape", "body", "mesh"})
