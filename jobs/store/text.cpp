@@ -2,44 +2,19 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cstdint>
+#include <string_view>
 
 #include "jobs/store/records.hpp"
+#include "runtime/base/printable.hpp"
 
 namespace carillon::store {
 namespace {
 
-/// Length of the UTF-8 character at `at`; 0 if invalid.
-std::size_t find_character(std::string_view text, std::size_t at) {
-  const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0U; };
-  const unsigned first = byte(at);
-  const std::size_t length = first < 0x80                    ? 1
-                             : first >= 0xC2 && first < 0xE0 ? 2
-                             : first >= 0xE0 && first < 0xF0 ? 3
-                             : first >= 0xF0 && first < 0xF5 ? 4
-                                                             : 0;
-  if (length == 0) return 0;
-  for (std::size_t i = 1; i < length; ++i) {
-    if ((byte(at + i) & 0xC0U) != 0x80U) return 0;
-  }
-  const unsigned second = byte(at + 1);
-  // Overlong forms, surrogates, above U+10FFFF (RFC 3629, section 4).
-  if ((first == 0xE0 && second < 0xA0) || (first == 0xED && second > 0x9F) || (first == 0xF0 && second < 0x90) ||
-      (first == 0xF4 && second > 0x8F))
-    return 0;
-  return length;
-}
-
-/// Length in bytes of a control or bidirectional character at `at`, else 0: C0, DEL, C1 (U+0080 - U+009F), U+061C, U+200E, U+200F,
-/// U+2028 - U+202E, U+2066 - U+2069.
-std::size_t find_control(std::string_view text, std::size_t at) {
-  const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0U; };
-  const unsigned a = byte(at), b = byte(at + 1), c = byte(at + 2);
-  if (a < 0x20 || a == 0x7F) return 1;
-  if (a == 0xC2 && b < 0xA0) return 2;
-  if (a == 0xD8 && b == 0x9C) return 2;
-  if (a == 0xE2 && b == 0x80 && (c == 0x8E || c == 0x8F || (c >= 0xA8 && c <= 0xAE))) return 3;
-  if (a == 0xE2 && b == 0x81 && c >= 0xA6 && c <= 0xA9) return 3;
-  return 0;
+/// Control and bidirectional characters beyond C0.
+bool is_control(std::uint32_t code) {
+  return (code >= 0x7F && code < 0xA0) || code == 0x61C || code == 0x200E || code == 0x200F || (code >= 0x2028 && code <= 0x202E) ||
+         (code >= 0x2066 && code <= 0x2069);
 }
 
 int find_digit(char c) {
@@ -53,7 +28,7 @@ std::string to_text(const std::filesystem::path& path) {
   const std::string& bytes = path.native();
   std::string text;
   for (std::size_t at = 0; at < bytes.size();) {
-    const std::size_t length = find_character(bytes, at);
+    const std::size_t length = base::decode_utf8(std::string_view(bytes).substr(at)).bytes;
     const bool is_escape = bytes[at] == '\\' && at + 1 < bytes.size() && bytes[at + 1] == 'x';
     if (length == 0 || is_escape)
       text += fmt::format("\\x{:02x}", static_cast<unsigned char>(bytes[at]));
@@ -81,18 +56,14 @@ std::filesystem::path from_text(const std::string& text) {
 
 std::string to_plain_json(const std::string& json) {
   std::string result;
-  for (std::size_t at = 0; at < json.size();) {
-    const std::size_t control = find_control(json, at);
-    const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(json[at + i]); };
-    if (control < 2 && byte(0) != 0x7F) {
-      result += json[at++];
-      continue;
-    }
-    const unsigned code = control == 1   ? 0x7FU
-                          : control == 2 ? (byte(0) & 0x1FU) << 6U | (byte(1) & 0x3FU)
-                                         : (byte(0) & 0xFU) << 12U | (byte(1) & 0x3FU) << 6U | (byte(2) & 0x3FU);
-    result += fmt::format("\\u{:04x}", code);
-    at += control;
+  for (std::string_view rest = json; !rest.empty();) {
+    const base::Character character = base::decode_utf8(rest);
+    const std::size_t bytes = std::max<std::size_t>(character.bytes, 1);
+    if (is_control(character.code))
+      base::append_unicode_escape(result, character.code);
+    else
+      result += rest.substr(0, bytes);
+    rest.remove_prefix(bytes);
   }
   return result;
 }

@@ -294,8 +294,7 @@ base::Json write_analytic(const AnalyticBody& body, const fs::path& folder) {
         },
         body.kind);
   }
-  if (body.grid) json.set("grid", *body.grid);
-  return json;
+  return kAnyBody.write(body, std::move(json));
 }
 
 std::vector<base::KeyTable> describe_analytic_keys() {

@@ -3,10 +3,10 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "precompute/job/keys.hpp"
 #include "precompute/job/read_body.hpp"
+#include "runtime/base/ranges.hpp"
 #include "runtime/material/read_material.hpp"
 
 namespace carillon::job {
@@ -15,7 +15,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxFixed = 1000, kMaxRegions = 10000;
-constexpr std::size_t kLongestName = 200;  // bytes
 constexpr double kMinScale = 1e-9, kMaxScale = 1e6;
 constexpr double kMinNormal = 1e-100, kMaxNormal = 1e100;
 
@@ -23,12 +22,7 @@ Fixed read_fixed(base::Object fixed) {
   Fixed result;
   kFixedKeys.read(fixed, result);
   if (auto box = fixed.object_if("box_m")) result.box_m = read_box(*box);
-  if (fixed.has("name")) {
-    result.name = fixed.string("name");
-    if (result.name.size() > kLongestName ||
-        std::any_of(result.name.begin(), result.name.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }))
-      fixed.fail("name", fmt::format("is not a valid name: at most {} bytes, no control characters", kLongestName));
-  }
+  if (fixed.has("name")) result.name = base::read_name(fixed, "name");
   if (auto fixing = material::read_fixing(fixed)) result.fixing = *fixing;
   fixed.finish();
   if (result.node_set.has_value() == result.box_m.has_value()) {
@@ -86,8 +80,7 @@ void read_air(base::Object& job, JobSpec& spec) {
   kAirKeys.read(air, spec.air);
   if (auto half = air.object_if("half_space")) {
     spec.air.half_space = HalfSpace{half->numbers<3>("point_m"), half->numbers<3>("normal")};
-    const auto& n = spec.air.half_space->normal;
-    const double length = std::hypot(n[0], n[1], n[2]);
+    const double length = calc_length(spec.air.half_space->normal);
     if (!(length > kMinNormal && length < kMaxNormal))
       half->fail("normal", "must be a direction, [0, 0, 1] for a floor below the body, and is 0");
     half->finish();

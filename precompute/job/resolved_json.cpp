@@ -13,12 +13,6 @@ using material::CaugheyTerm, material::DampingLaw, material::LossRow, material::
 
 namespace fs = std::filesystem;
 
-base::Json to_json(const std::array<double, 3>& v) {
-  base::Json list = base::Json::array();
-  for (const double x : v) list.append(x);
-  return list;
-}
-
 /// `path` relative to `folder` if both share a root below "/", else absolute.
 std::string relative_to(const fs::path& path, const fs::path& folder) {
   const fs::path relative = path.lexically_relative(folder);
@@ -43,9 +37,7 @@ base::Json write_damping(const Material& material) {
       break;
     case DampingLaw::loss_table:
       for (const LossRow& row : material.loss_table) {
-        base::Json& pair = damping["loss_table"].append(base::Json::array());
-        pair.append(row.freq_hz);
-        pair.append(row.loss_factor);
+        damping["loss_table"].add(base::Json::array(std::array{row.freq_hz, row.loss_factor}));
       }
       break;
   }
@@ -57,11 +49,11 @@ base::Json write_material(const Material& material) {
   if (!material.name.empty()) root["name"] = material.name;
   if (material.orthotropic) {
     const Orthotropic& o = *material.orthotropic;
-    root["orthotropic"]["young_modulus_pa"] = to_json(o.young_modulus_pa);
-    root["orthotropic"]["shear_modulus_pa"] = to_json(o.shear_modulus_pa);
-    root["orthotropic"]["poisson_ratio"] = to_json(o.poisson_ratio);
-    root["orthotropic"]["axes"].append(to_json(o.axes[0]));
-    root["orthotropic"]["axes"].append(to_json(o.axes[1]));
+    root["orthotropic"]["young_modulus_pa"] = base::Json::array(o.young_modulus_pa);
+    root["orthotropic"]["shear_modulus_pa"] = base::Json::array(o.shear_modulus_pa);
+    root["orthotropic"]["poisson_ratio"] = base::Json::array(o.poisson_ratio);
+    root["orthotropic"]["axes"].append(base::Json::array(o.axes[0]));
+    root["orthotropic"]["axes"].append(base::Json::array(o.axes[1]));
   } else {
     root["young_modulus_pa"] = material.young_modulus_pa;
     root["poisson_ratio"] = material.poisson_ratio;
@@ -96,8 +88,8 @@ base::Json write_fixed(const std::vector<Fixed>& list) {
   for (const Fixed& fixed : list) {
     base::Json& entry = root.append(kFixedKeys.write(fixed));
     if (fixed.box_m) {
-      entry["box_m"]["min"] = to_json((*fixed.box_m)[0]);
-      entry["box_m"]["max"] = to_json((*fixed.box_m)[1]);
+      entry["box_m"]["min"] = base::Json::array((*fixed.box_m)[0]);
+      entry["box_m"]["max"] = base::Json::array((*fixed.box_m)[1]);
     }
     if (!fixed.name.empty()) entry["name"] = fixed.name;
     add_members(material::write_fixing(fixed.fixing), entry);
@@ -108,8 +100,8 @@ base::Json write_fixed(const std::vector<Fixed>& list) {
 base::Json write_air(const Air& air) {
   base::Json root = kAirKeys.write(air);
   if (air.half_space) {
-    root["half_space"]["point_m"] = to_json(air.half_space->point_m);
-    root["half_space"]["normal"] = to_json(air.half_space->normal);
+    root["half_space"]["point_m"] = base::Json::array(air.half_space->point_m);
+    root["half_space"]["normal"] = base::Json::array(air.half_space->normal);
   }
   return root;
 }
@@ -150,8 +142,7 @@ std::string resolved_json(const JobSpec& job, const fs::path& folder, const std:
   if (!job.bank.empty()) root["bank"] = relative_to(job.bank, base);
   if (job.has_material) root["material"] = write_material(job.material);
   for (const auto& [region, material] : job.materials) root["materials"][region] = write_material(material);
-  root["band_hz"].append(job.band_hz[0]);
-  root["band_hz"].append(job.band_hz[1]);
+  root["band_hz"] = base::Json::array(job.band_hz);
   if (job.max_modes) root["max_modes"] = *job.max_modes;
   if (!job.analytic) write_solve(job, root);
   if (job.nonlinear) root["nonlinear"] = write_nonlinear(*job.nonlinear, !job.analytic && !job.nonlinear->is_stretch);

@@ -185,7 +185,7 @@ Bend read_bend(base::Object& object) {
     bend.force_n = object.numbers<3>("force_n");
     bend.point_m = base::read_vector(object, "point_m", {}, kFarthestM);
   } else if (is_group) {
-    bend.displacement_m = base::read_vector(object, "displacement_m", object.numbers<3>("displacement_m"), kFarthestM);
+    bend.displacement_m = base::read_vector_within(object, "displacement_m", -kFarthestM, kFarthestM);
     bend.nodes = read_group(object);
   } else {
     for (const std::vector<double>& row : object.number_rows("table_m", 6, kMaxRows)) {

@@ -6,13 +6,6 @@
 namespace carillon::run {
 namespace {
 
-template <class Values>
-base::Json make_list(const Values& values) {
-  base::Json list = base::Json::array();
-  for (const auto& value : values) list.append(base::Json(value));
-  return list;
-}
-
 base::Json describe_mesh(const Body& body, const Setting& setting) {
   const mesh::DistributedMesh& pieces = body.pieces;
   const mesh::CheckReport& check = body.check;
@@ -33,7 +26,7 @@ base::Json describe_mesh(const Body& body, const Setting& setting) {
   mesh["straightened"] = check.straightened;
   mesh["min_dihedral_deg"] = check.min_dihedral_deg;
   mesh["mean_ratio_min"] = check.mean_ratio_min;
-  mesh["warnings"] = make_list(check.warnings);
+  mesh["warnings"] = base::Json::array(check.warnings);
   for (const std::string& warning : body.mesher_warnings) mesh["warnings"].append(warning);
   return mesh;
 }
@@ -158,7 +151,7 @@ base::Json describe_damping(const material::Material& material) {
   return damping;
 }
 
-base::Json describe_warnings(const Run& run) { return make_list(run.log.get_warnings()); }
+base::Json describe_warnings(const Run& run) { return base::Json::array(run.log.get_warnings()); }
 
 }  // namespace
 
@@ -176,10 +169,10 @@ base::Json describe_materials(const fem::Materials& materials, const std::vector
     if (material.orthotropic) {
       const material::Orthotropic& own = *material.orthotropic;
       base::Json& orthotropic = entry["orthotropic"];
-      orthotropic["young_modulus_pa"] = make_list(own.young_modulus_pa);
-      orthotropic["shear_modulus_pa"] = make_list(own.shear_modulus_pa);
-      orthotropic["poisson_ratio"] = make_list(own.poisson_ratio);
-      for (const auto& axis : own.axes) orthotropic["axes"].append(make_list(axis));
+      orthotropic["young_modulus_pa"] = base::Json::array(own.young_modulus_pa);
+      orthotropic["shear_modulus_pa"] = base::Json::array(own.shear_modulus_pa);
+      orthotropic["poisson_ratio"] = base::Json::array(own.poisson_ratio);
+      for (const auto& axis : own.axes) orthotropic["axes"].append(base::Json::array(axis));
     }
     entry["damping"] = describe_damping(material);
   }
@@ -211,7 +204,7 @@ base::Json describe_run(const Run& run, const Solution& found, const Measured& m
   root["work"] = describe_work(measured.work);
   root["effort"] = describe_effort(measured.work);
   for (const std::int64_t bytes : measured.peak_bytes) root["peak_bytes_by_rank"].append(bytes);
-  root["solver_options"] = make_list(run.options.solver_options);
+  root["solver_options"] = base::Json::array(run.options.solver_options);
   root["chosen"]["element"] = job::to_text(found.setting.element);
   root["chosen"]["tolerance"] = found.setting.tolerance;
   root["mesh"] = describe_mesh(found.body, found.setting);

@@ -4,7 +4,6 @@
 #include <rapidjson/reader.h>
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <cmath>
 #include <numeric>
@@ -21,40 +20,23 @@ double require_finite(double value) {
   return value;
 }
 
-/// Decodes a character of UTF-8 and advances `at`; U+FFFD for an invalid byte.
-std::uint32_t take_character(std::string_view text, std::size_t& at) {
-  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
-  const unsigned first = byte(at);
-  const std::size_t count = first < 0x80 ? 1 : first < 0xE0 ? 2 : first < 0xF0 ? 3 : 4;
-  std::uint32_t character = count == 1 ? first : first & (0x7FU >> count);
-  bool is_valid = first < 0x80 || (first >= 0xC2 && first < 0xF5 && at + count <= text.size());
-  for (std::size_t i = 1; is_valid && i < count; ++i) {
-    is_valid = (byte(at + i) & 0xC0U) == 0x80U;
-    character = character << 6 | (byte(at + i) & 0x3FU);
-  }
-  constexpr std::array<std::uint32_t, 5> kLeast{0, 0, 0x80, 0x800, 0x10000};
-  is_valid = is_valid && character >= kLeast[count] && (character < 0xD800 || character > 0xDFFF) && character <= 0x10FFFF;
-  at += is_valid ? count : 1;
-  return is_valid ? character : 0xFFFD;
-}
-
+/// Bytes that are not UTF-8 become U+FFFD if escaped.
 std::string quote_sorted(std::string_view text, bool is_ascii) {
   std::string out = "\"";
-  for (std::size_t at = 0; at < text.size();) {
+  while (!text.empty()) {
     constexpr std::string_view kSpecial = "\"\\\b\f\n\r\t", kLetters = "\"\\bfnrt";
-    const auto c = static_cast<unsigned char>(text[at]);
-    if (const std::size_t i = kSpecial.find(text[at]); i != std::string_view::npos) {
+    const auto c = static_cast<unsigned char>(text[0]);
+    std::size_t bytes = 1;
+    if (const std::size_t i = kSpecial.find(text[0]); i != std::string_view::npos) {
       out.append("\\") += kLetters[i];
-      ++at;
     } else if (c >= 0x20 && (c < 0x80 || !is_ascii)) {
-      out += text[at++];
+      out += text[0];
     } else {
-      const std::uint32_t x = take_character(text, at);
-      if (x < 0x10000)
-        fmt::format_to(std::back_inserter(out), "\\u{:04x}", x);
-      else
-        fmt::format_to(std::back_inserter(out), "\\u{:04x}\\u{:04x}", 0xD7C0 + (x >> 10), 0xDC00 + (x & 0x3FFU));
+      const Character character = decode_utf8(text);
+      append_unicode_escape(out, character.bytes > 0 ? character.code : 0xFFFD);
+      bytes = std::max<std::size_t>(character.bytes, 1);
     }
+    text.remove_prefix(bytes);
   }
   return out + '"';
 }
@@ -68,8 +50,8 @@ std::string format_real(double value) {
 
 }  // namespace
 
-/// Makes a Json of the events of a rapidjson::Reader.
-class JsonBuilder {
+/// Makes a Json of the events of a rapidjson::Reader, with numbers as text.
+class JsonBuilder : public rapidjson::BaseReaderHandler<rapidjson::UTF8<>, JsonBuilder> {
  public:
   explicit JsonBuilder(Json& root) : root_(&root) {}
   bool Null() { return put({}); }
@@ -83,12 +65,6 @@ class JsonBuilder {
     const std::optional<double> real = to_double({text, size});
     return real && put(*real);
   }
-  // Unused: numbers are read as text.
-  bool Int(int) { return false; }
-  bool Uint(unsigned) { return false; }
-  bool Int64(std::int64_t) { return false; }
-  bool Uint64(std::uint64_t) { return false; }
-  bool Double(double) { return false; }
   bool String(const char* text, rapidjson::SizeType size, bool) { return put(std::string_view(text, size)); }
   bool Key(const char* text, rapidjson::SizeType size, bool) {
     open_.back()->keys_.emplace_back(text, size);

@@ -33,11 +33,7 @@ std::string read_value(Object& object, const char* key, const Limits&, const std
 std::filesystem::path read_value(Object& object, const char* key, const Limits&, const std::filesystem::path*) { return object.path(key); }
 
 Vec3 read_value(Object& object, const char* key, const Limits& limits, const Vec3*) {
-  const Vec3 vector = object.numbers<3>(key);
-  for (const double x : vector)
-    if (!(x >= limits.low && x <= limits.high))
-      object.fail(key, fmt::format("{} is out of range; give numbers between {} and {}{}", x, limits.low, limits.high, find_unit(key)));
-  return vector;
+  return read_vector_within(object, key, limits.low, limits.high);
 }
 
 std::size_t read_word(Object& object, const char* key, const std::vector<std::string>& words) {

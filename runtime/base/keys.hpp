@@ -85,6 +85,12 @@ KeyValue to_value(const std::optional<V>& value) {
 }
 
 Json to_json(const KeyValue& value);
+/// A T with the initialisers of its members.
+template <class T>
+const T& get_defaults() {
+  static const T defaults{};
+  return defaults;
+}
 KeyText describe_key(const char* name, const KeyValue& fallback, Need need, const char* meaning, const Limits& limits,
                      const std::vector<std::string>& words);
 
@@ -99,7 +105,7 @@ struct Key {
 
   template <class V>
   Key(const char* name, V T::*member, const Limits& limits, const char* meaning, Need need = Need::optional)
-      : text(describe_key(name, to_value(T{}.*member), need, meaning, limits, {})),
+      : text(describe_key(name, to_value(get_defaults<T>().*member), need, meaning, limits, {})),
         read([=](Object& object, T& target) {
           if (need == Need::required || object.has(name)) target.*member = read_value(object, name, limits, static_cast<const V*>(nullptr));
         }),
@@ -124,7 +130,7 @@ struct Key {
           else
             return KeyValue(words[static_cast<std::size_t>(source.*member)]);
         }) {
-    text = describe_key(name, get(T{}), need, meaning, {}, words);
+    text = describe_key(name, get(get_defaults<T>()), need, meaning, {}, words);
   }
 };
 

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
+#include <algorithm>
 #include <utility>
 
 namespace carillon::base {
@@ -18,6 +18,14 @@ std::string find_unit(std::string_view name) {
   return "";
 }
 
+std::string read_name(Object& object, std::string_view key) {
+  constexpr std::size_t kMaxBytes = 200;
+  std::string name = object.string(key);
+  if (name.size() > kMaxBytes || std::any_of(name.begin(), name.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }))
+    object.fail(key, fmt::format("is not a valid name: at most {} bytes, no control characters", kMaxBytes));
+  return name;
+}
+
 double read_within(Object& object, std::string_view key, double low, double high) {
   const double value = object.number(key);
   if (!(value >= low && value <= high))
@@ -29,12 +37,16 @@ double read_within(Object& object, std::string_view key, double fallback, double
   return object.has(key) ? read_within(object, key, low, high) : fallback;
 }
 
-Vec3 read_vector(Object& object, std::string_view key, const Vec3& fallback, double limit) {
-  const Vec3 v = object.numbers_or<3>(key, fallback);
+Vec3 read_vector_within(Object& object, std::string_view key, double low, double high) {
+  const Vec3 v = object.numbers<3>(key);
   for (const double x : v)
-    if (!(std::abs(x) <= limit))
-      object.fail(key, fmt::format("{} is out of range; give numbers between {} and {}{}", x, -limit, limit, find_unit(key)));
+    if (!(x >= low && x <= high))
+      object.fail(key, fmt::format("{} is out of range; give numbers between {} and {}{}", x, low, high, find_unit(key)));
   return v;
+}
+
+Vec3 read_vector(Object& object, std::string_view key, const Vec3& fallback, double limit) {
+  return object.has(key) ? read_vector_within(object, key, -limit, limit) : fallback;
 }
 
 Vec3 read_facing(Object& listener, const Vec3& position_m, const Vec3& fallback, double limit) {

@@ -231,7 +231,7 @@ base::Json describe_impulse(const events::Impulse& impulse, const Vec3& world_m)
       .set("body", impulse.body)
       .set("other", impulse.other)
       .set("world_m", place)
-      .set("impulse_n_s", base::significant(std::hypot(impulse.impulse_n_s[0], impulse.impulse_n_s[1], impulse.impulse_n_s[2]), 6))
+      .set("impulse_n_s", base::significant(calc_length(impulse.impulse_n_s), 6))
       .set("duration_s", base::significant(impulse.duration_s, 6));
 }
 

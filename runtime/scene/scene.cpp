@@ -35,7 +35,7 @@ const base::Keys<Scene> kScene{
     {"gravity_m_s2", &Scene::gravity_m_s2, within(1e4), "acceleration of gravity"},
     {"ground", "none", "hard floor with the keys below"},
     {"bodies", "required", "1 to 1000 bodies"},
-    {"variation", "0", "variation of equal strikes ([Strikes](#strikes)); 0 to 1"},
+    {"variation", &Scene::variation, Limits{0, 1}, "variation of equal strikes ([Strikes](#strikes))"},
     {"joints", "none", "hinges, ball joints, sliders ([joints](joints.md))"},
     {"cords", "none", "strings ([joints](joints.md))"},
     {"strikes", "none", "blows in addition to those of the physics"},
@@ -55,8 +55,8 @@ const base::Keys<physics::GroundSpec> kGround{
     {"density_kg_m3", &physics::GroundSpec::density_kg_m3, Limits{1, 3e4}, "density"},
     {"restitution", &physics::GroundSpec::restitution, Limits{0, 1}, "as of a body"},
     {"friction", &physics::GroundSpec::friction, Limits{0, 10}, "as of a body"},
-    {"roughness_m", &physics::GroundSpec::roughness_m, Limits{0, kRoughestM}, "as of a body"},
-    {"reflection", "none", "reflected share of the pressure; 0 to 1"}};
+    {"roughness_m", &physics::GroundSpec::roughness_m, Limits{0, kRoughestM}, "as of a body"}};
+const base::Keys<Scene> kReflection{{"reflection", &Scene::reflection, Limits{0, 1}, "reflected share of the pressure"}};
 const base::Keys<SceneListener> kListener{
     {"position_m", &SceneListener::position_m, within(kFarthestM), "between the ears"},
     {"path", "none", "replaces `position_m`: rows `[t, x, y, z]` in order of time; smooth between, at rest before and after"},
@@ -91,8 +91,8 @@ const base::Keys<effects::SelectionThresholds> kThresholds{
     {"quiet_db", &effects::SelectionThresholds::below_loudest_db, Limits{20, 250},
      "sound this far below the loudest strike so far is inaudible and needs no effects. More: bodies ring for longer"}};
 
-physics::GroundSpec parse_ground(base::Object& object, std::optional<double>& reflection, std::vector<std::string>& warnings) {
-  physics::GroundSpec ground;
+void parse_ground(base::Object& object, Scene& scene) {
+  physics::GroundSpec& ground = scene.ground.emplace();
   if (const material::Material* material = read_material(object, ground.young_modulus_pa, ground.poisson_ratio))
     ground.density_kg_m3 = material->density_kg_m3;
   kGround.read(object, ground);
@@ -101,10 +101,9 @@ physics::GroundSpec parse_ground(base::Object& object, std::optional<double>& re
     object.fail("young_modulus_pa", fmt::format("{:g} Pa is not a plausible ground stiffness; give {:g} to {:g}{}", ground.young_modulus_pa,
                                                 kSoftestPa, kStiffestPa, question ? ": " + *question : ""));
   }
-  if (question) warnings.push_back(fmt::format("{}: \"ground\": {}", object.find_place("young_modulus_pa"), *question));
-  if (object.has("reflection")) reflection = read_within(object, "reflection", 0.0, 1.0);
+  if (question) scene.warnings.push_back(fmt::format("{}: \"ground\": {}", object.find_place("young_modulus_pa"), *question));
+  kReflection.read(object, scene);
   object.finish();
-  return ground;
 }
 
 /// A checked position.
@@ -130,7 +129,7 @@ std::vector<synth::PathPoint> read_path(base::Object& object, std::string_view k
         object.fail(key, fmt::format("time {} follows {}; give rows [t, x, y, z] in order of time", place.time_s, last.time_s));
       }
       const Vec3 &a = last.position_m, &b = place.position_m;
-      const double speed = std::hypot(b[0] - a[0], b[1] - a[1], b[2] - a[2]) / (place.time_s - last.time_s);
+      const double speed = calc_length(b - a) / (place.time_s - last.time_s);
       if (speed > kMaxSpeedMs) {
         object.fail(key, fmt::format("moves at {:.4g} m/s after {} s; give {} m/s at most", speed, last.time_s, kMaxSpeedMs));
       }
@@ -242,7 +241,7 @@ Scene parse_scene(const base::Document& document) {
   scene.file = document.file();
   base::Object root = document.root();
   kScene.read(root, scene);
-  if (auto ground = root.object_if("ground")) scene.ground = parse_ground(*ground, scene.reflection, scene.warnings);
+  if (auto ground = root.object_if("ground")) parse_ground(*ground, scene);
 
   if (root.objects("bodies").empty()) {
     kScene.expect(root);
@@ -275,6 +274,7 @@ std::vector<base::KeyTable> describe_scene_keys() {
   std::vector<base::KeyTable> tables{{"scene", {}}, {"quality", {}}};
   kScene.describe(tables[0]);
   kGround.describe(tables[0], "ground.");
+  kReflection.describe(tables[0], "ground.");
   kListener.describe(tables[0], "listener.");
   kOutput.describe(tables[0], "output.");
   kQuality.describe(tables[1]);

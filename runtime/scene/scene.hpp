@@ -164,6 +164,7 @@ struct Scene {
   std::vector<Vec3> microphones_m;  // replace the listener's ears, one per channel
   radiation::GainKind radiation = radiation::GainKind::kAuto;
   bank::Frequencies frequencies = bank::Frequencies::kCorrected;  // played frequencies of the banks
+  double variation = 0.0;                                         // of bodies without their own
   effects::EffectOverrides overrides;                             // the key "effects"
   synth::EffectSet effects = kDefaultEffects;                     // without planning
   Output output;

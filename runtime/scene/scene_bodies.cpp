@@ -19,7 +19,6 @@ namespace {
 using base::Limits;
 using base::within;
 
-constexpr std::size_t kLongestName = 200;  // bytes
 constexpr std::size_t kMaxHolders = 1000;
 
 const base::Keys<SceneBody> kBody{
@@ -196,20 +195,12 @@ void read_bank_or_job(base::Object& object, SceneBody& body) {
   body.job = object.make_excerpt(kKeys);
 }
 
-std::string read_body_name(base::Object& object) {
-  std::string name = object.string("name");
-  if (name.size() > kLongestName || std::any_of(name.begin(), name.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; })) {
-    object.fail("name", fmt::format("is not a valid name: at most {} bytes, no control characters", kLongestName));
-  }
-  return name;
-}
-
-SceneBody parse_body(base::Object& object, const effects::EffectOverrides& overrides, double variation) {
+SceneBody parse_body(base::Object& object, const Scene& scene) {
   SceneBody body;
-  body.name = read_body_name(object);
+  body.name = base::read_name(object, "name");
   body.place = object.find_place("");
   read_bank_or_job(object, body);
-  body.variation = read_within(object, "variation", variation, 0.0, 1.0);
+  body.variation = read_within(object, "variation", scene.variation, 0.0, 1.0);
   physics::BodySpec& spec = body.spec;
   spec.name = body.name;
   kMotion.read(object, spec);
@@ -224,7 +215,7 @@ SceneBody parse_body(base::Object& object, const effects::EffectOverrides& overr
   for (const char* key : {"on", "joint", "loss", "supports", "held"}) {
     if (body.support_place.empty() && object.has(key)) body.support_place = object.find_place(key);
   }
-  body.overrides = object.has("effects") ? read_effects(object) : overrides;
+  body.overrides = object.has("effects") ? read_effects(object) : scene.overrides;
   read_nonlinear(object, body.overrides);
   object.finish();
   return body;
@@ -232,7 +223,7 @@ SceneBody parse_body(base::Object& object, const effects::EffectOverrides& overr
 
 SceneSurface parse_surface(base::Object& object) {
   SceneSurface surface;
-  surface.name = read_body_name(object);
+  surface.name = base::read_name(object, "name");
   surface.place = object.find_place("recording");
   surface.file = object.path("recording");
   for (const char* key : {"bank", "shape", "body", "mesh"})
@@ -252,14 +243,13 @@ Names parse_bodies(base::Object& root, Scene& scene) {
     root.fail("bodies", fmt::format("has {} bodies, at most {} are allowed: split the scene", bodies.size(), kMaxBodies));
   if (root.has("effects")) scene.overrides = read_effects(root);
   scene.effects = find_usual(scene.overrides);
-  const double variation = read_within(root, "variation", 0.0, 0.0, 1.0);
   Names names;
   for (base::Object& object : bodies) {
     const bool is_recorded = object.has("recording");
     if (is_recorded)
       scene.surfaces.push_back(parse_surface(object));
     else
-      scene.bodies.push_back(parse_body(object, scene.overrides, variation));
+      scene.bodies.push_back(parse_body(object, scene));
     const std::string& name = is_recorded ? scene.surfaces.back().name : scene.bodies.back().name;
     if (!names.emplace(name, is_recorded ? kNotModal : scene.bodies.size() - 1).second)
       object.fail("name", fmt::format("there is a body called \"{}\" already; give this one another name", name));

@@ -52,14 +52,15 @@ const base::Keys<Mallet> kMallet{
     {"mass_kg", &Mallet::mass_kg, Limits{1e-6, 1e3}, "required without `from`: of the head; a loosely held stick adds little"},
     {"speed_m_s", &Mallet::speed_m_s, Limits{1e-6, kMaxSpeedMs}, "required without `from`: relative to the body"},
     {"felt", "none", "soft head: `{\"stiffness_n_m_p\": K, \"exponent\": p}` of F = K y^p, p 2.5 by default, of felts 2.2 to 3.5"},
-    {"material", "none", "hard head: [material](materials.md) of its elasticity"},
-    {"young_modulus_pa", "none", "or Young's modulus"},
-    {"poisson_ratio", "0.3", "of a hard head"},
-    {"radius_m", "required for hard heads", "of the sphere at the contact (Hertz's law)"},
     {"restitution", &Mallet::restitution, Limits{0, 1},
      "on a rigid surface: loss in the head (Hunt and Crossley); 0.7 with `felt`, own estimate"},
     {"friction", &Mallet::friction, Limits{0, 10}, "Coulomb; matters for oblique blows"},
     {"direction", "into the surface", "of the head's motion, in the axes of the mesh"}};
+const base::Keys<Mallet> kHardHead{
+    {"material", "none", "hard head: [material](materials.md) of its elasticity"},
+    {"young_modulus_pa", &Mallet::young_modulus_pa, Limits{kSoftestPa, kStiffestPa}, "hard head: or Young's modulus"},
+    {"radius_m", &Mallet::radius_m, Limits{1e-4, 10}, "hard head: of the sphere at the contact (Hertz's law)", required},
+    {"poisson_ratio", &Mallet::poisson_ratio, Limits{-1, 0.5, true}, "hard head: Poisson's ratio"}};
 const base::Keys<Felt> kFelt{{"stiffness_n_m_p", &Felt::stiffness_n_m_p, Limits{1e-3, 1e30}, "K", required},
                              {"exponent", &Felt::exponent, Limits{1, 6}, "p"}};
 
@@ -83,9 +84,7 @@ void read_head(base::Object& object, Mallet& mallet) {
   if (read_material(object, mallet.young_modulus_pa, mallet.poisson_ratio) == nullptr && !object.has("young_modulus_pa"))
     object.fail("young_modulus_pa",
                 "is missing; give the hardness of the head: \"material\" or \"young_modulus_pa\", and \"radius_m\", or \"felt\"");
-  if (object.has("young_modulus_pa")) mallet.young_modulus_pa = read_within(object, "young_modulus_pa", kSoftestPa, kStiffestPa);
-  mallet.radius_m = read_within(object, "radius_m", 1e-4, 10.0);
-  mallet.poisson_ratio = object.number_or("poisson_ratio", mallet.poisson_ratio, {-1.0, 0.5});
+  kHardHead.read(object, mallet);
 }
 
 Mallet read_mallet(base::Object& object, std::vector<std::string>& warnings) {
@@ -149,7 +148,9 @@ void parse_strikes(base::Object& root, const Names& names, Scene& scene) {
 
 void describe_strike_keys(std::vector<base::KeyTable>& tables) {
   kStrike.describe(tables.emplace_back(base::KeyTable{"strike", {}}));
-  kMallet.describe(tables.emplace_back(base::KeyTable{"mallet", {}}));
+  base::KeyTable& mallet = tables.emplace_back(base::KeyTable{"mallet", {}});
+  kMallet.describe(mallet);
+  kHardHead.describe(mallet);
 }
 
 }  // namespace carillon::scene

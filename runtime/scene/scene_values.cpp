@@ -5,8 +5,7 @@
 namespace carillon::scene {
 
 Vec3 read_required_vector(base::Object& object, std::string_view key, double limit) {
-  if (!object.has(key)) object.numbers<3>(key);  // its message
-  return read_vector(object, key, {}, limit);
+  return base::read_vector_within(object, key, -limit, limit);
 }
 
 Vec3 read_direction(base::Object& object, std::string_view key) {

@@ -20,7 +20,7 @@ inline constexpr double kStiffestPa = 1e13;   // ten times diamond
 using base::read_vector;
 using base::read_within;
 
-/// read_vector() of a required key.
+/// Three required numbers of magnitude at most `limit`.
 Vec3 read_required_vector(base::Object& object, std::string_view key, double limit = kFarthestM);
 /// A direction, of length 1.
 Vec3 read_direction(base::Object& object, std::string_view key);

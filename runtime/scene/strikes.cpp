@@ -34,7 +34,7 @@ class Finder {
     }
   }
   bank::NearestPlace find(const Vec3& point_m) const { return tree_ ? tree_->find(point_m) : bank::find_nearest(*bank_, point_m); }
-  double get_extent_m() const { return std::hypot(high_[0] - low_[0], high_[1] - low_[1], high_[2] - low_[2]); }
+  double get_extent_m() const { return calc_length(high_ - low_); }
 
  private:
   static constexpr std::size_t kStrikesForTree = 30;
@@ -65,7 +65,7 @@ Vec3 find_velocity(const Mallet& mallet, const bank::Bank& bank, std::int32_t tr
     const auto& corners = bank.triangles[triangle];
     const Vec3 &p = bank.vertices_m[corners[0]], &q = bank.vertices_m[corners[1]], &r = bank.vertices_m[corners[2]];
     const Vec3 u = q - p, v = r - p, normal = cross(v, u);  // inwards
-    way = (1.0 / std::max(std::hypot(normal[0], normal[1], normal[2]), 1e-300)) * normal;
+    way = (1.0 / std::max(calc_length(normal), 1e-300)) * normal;
   }
   return mallet.speed_m_s * way;
 }
@@ -74,7 +74,7 @@ Vec3 find_velocity(const Mallet& mallet, const bank::Bank& bank, std::int32_t tr
 std::optional<std::string> question_strike(const SceneStrike& strike, const std::string& name, const bank::Bank& bank,
                                            const events::Impulse& impulse) {
   if (strike.duration_s > 0.0) return std::nullopt;
-  const double size = std::hypot(impulse.impulse_n_s[0], impulse.impulse_n_s[1], impulse.impulse_n_s[2]);
+  const double size = calc_length(impulse.impulse_n_s);
   const auto& corners = bank.triangles[impulse.triangle];
   const std::size_t modes = bank.mode_count();
   double energy_j = 0.0;

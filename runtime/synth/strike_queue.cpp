@@ -93,7 +93,7 @@ bool StrikeQueue::push(const events::Impulse& impulse, std::int64_t horizon) noe
   pulse.length = calc_pulse_length(impulse.shape, impulse.duration_s * model_->get_rate_hz());
   pulse.begin = impulse.time_s * model_->get_rate_hz() - 0.5 * pulse.length;
   begin_in_time(pulse.begin, horizon);
-  pulse.strength_n_s = static_cast<float>(std::hypot(impulse.impulse_n_s[0], impulse.impulse_n_s[1], impulse.impulse_n_s[2]));
+  pulse.strength_n_s = static_cast<float>(calc_length(impulse.impulse_n_s));
   pulse.triangle = impulse.triangle;
   for (int corner = 0; corner < 3; ++corner) {
     for (int axis = 0; axis < 3; ++axis) {

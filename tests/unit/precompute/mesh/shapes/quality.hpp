@@ -12,13 +12,6 @@
 
 namespace carillon::shapes::tests {
 
-inline Vec3 subtract(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-inline double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-inline Vec3 cross(const Vec3& a, const Vec3& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-inline double norm(const Vec3& a) { return std::sqrt(dot(a, a)); }
-
 struct Quality {
   double volume_m3 = 0.0;            // of the mapped elements (quadratic: by quadrature)
   double min_corner_volume = 1e300;  // of the straight tetrahedra of the corners [m3]
@@ -60,7 +53,7 @@ inline Quality measure(const mesh::TetMesh& mesh) {
     for (auto node : tet) used[node] = true;
     std::array<Vec3, 4> x;
     for (int i = 0; i < 4; ++i) x[i] = mesh.nodes_m[tet[i]];
-    const double volume = dot(subtract(x[1], x[0]), cross(subtract(x[2], x[0]), subtract(x[3], x[0]))) / 6.0;
+    const double volume = calc_det(x[1] - x[0], x[2] - x[0], x[3] - x[0]) / 6.0;
     quality.min_corner_volume = std::min(quality.min_corner_volume, volume);
     std::array<Vec3, 4> normals;
     for (int f = 0; f < 4; ++f) {
@@ -68,7 +61,7 @@ inline Quality measure(const mesh::TetMesh& mesh) {
       std::array<int, 3> key{tet[face[0]], tet[face[1]], tet[face[2]]};
       std::sort(key.begin(), key.end());
       ++faces[key];
-      normals[f] = cross(subtract(x[face[1]], x[face[0]]), subtract(x[face[2]], x[face[0]]));
+      normals[f] = cross(x[face[1]] - x[face[0]], x[face[2]] - x[face[0]]);
     }
     for (int f = 0; f < 4; ++f) {
       for (int g = f + 1; g < 4; ++g) {

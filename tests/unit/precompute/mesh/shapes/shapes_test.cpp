@@ -252,7 +252,7 @@ TEST(Shapes, round_section_boundary_nodes) {
        {{"base", [&](const Vec3& x) { return off(x[2], -0.04); }},
         {"top",
          [&](const Vec3& x) {
-           return norm(subtract(x, Vec3{0, 0, 0.04}));
+           return norm(x - Vec3{0, 0, 0.04});
          }},
         {"side", [&](const Vec3& x) { return off(std::hypot(x[0], x[1]), 0.03 * (0.04 - x[2]) / 0.08); }}}},
       {"cone",
@@ -350,7 +350,7 @@ TEST(Shapes, edge_length) {
     long long count = 0;
     for (std::int64_t e = 0; e < mesh.tet_count(); ++e) {
       for (const auto& [a, b] : mesh::kEdges) {
-        sum += norm(subtract(mesh.nodes_m[mesh.tet(e)[a]], mesh.nodes_m[mesh.tet(e)[b]]));
+        sum += norm(mesh.nodes_m[mesh.tet(e)[a]] - mesh.nodes_m[mesh.tet(e)[b]]);
         ++count;
       }
     }

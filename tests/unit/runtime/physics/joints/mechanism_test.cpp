@@ -16,8 +16,6 @@ constexpr double kG = 9.81;
 constexpr double kFine = 1e-10;  // a tolerance for comparisons to many digits
 constexpr Vec3 kGravity{0, 0, -kG};
 
-double norm(const Vec3& a) { return std::sqrt(dot(a, a)); }
-
 /// A thin bar of length `l` whose centre hangs at the angle `a` from the vertical, in the plane y = 0, `below` its upper end.
 Member make_bar(double mass, double l, const Vec3& top, double a, double spin = 0.0) {
   Member m;
