@@ -70,6 +70,23 @@ void set_handlers(bool is_first) {
   }
 }
 
+/// Signals wait until a new folder is in the table of the handler.
+class SignalsBlocked {
+ public:
+  SignalsBlocked() {
+    sigset_t blocked;
+    sigemptyset(&blocked);
+    for (const int signal : kSignals) sigaddset(&blocked, signal);
+    ::pthread_sigmask(SIG_BLOCK, &blocked, &before_);
+  }
+  ~SignalsBlocked() { ::pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
+  SignalsBlocked(const SignalsBlocked&) = delete;
+  SignalsBlocked& operator=(const SignalsBlocked&) = delete;
+
+ private:
+  sigset_t before_;
+};
+
 /// Removes folders of dead processes.
 void sweep(const fs::path& parent, const std::string& begin) {
   std::error_code error;
@@ -117,6 +134,7 @@ void release(Slot& slot) {
 
 fs::path make_temporary_folder(const fs::path& parent, const std::string& begin) {
   sweep(parent, begin);
+  const SignalsBlocked blocked;
   std::string path = (parent / (begin + kLetters)).string();
   if (path.size() >= kMaxPath || ::mkdtemp(path.data()) == nullptr)
     throw_system_error(errno, fmt::format("{}: no temporary folder can be made here: {}; make room there, or name another place (temporary "
