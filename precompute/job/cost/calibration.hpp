@@ -29,8 +29,8 @@ inline constexpr std::int64_t kDenseRows = 300;    // dense LAPACK up to this si
 inline constexpr std::int64_t kSliceModes = 420;   // per slice of the spectrum
 inline constexpr std::int64_t kSliceSolves = 110;  // right-hand sides per slice, plus two per mode
 
-// CPU seconds with AVX-512 on a Sapphire Rapids Xeon with two busy ranks of other programs; an AMD EPYC with kUpdateRate agrees within a
-// third. Factorisations are fitted to both.
+// CPU seconds with AVX-512 on a Sapphire Rapids Xeon with two busy ranks of other programs; an AMD EPYC, scaled by its speed in
+// factorisations, agrees within a third. Factorisations are fitted to both.
 inline constexpr double kStart = 0.08;
 inline constexpr double kReadTet = 1.5e-6, kReadQuadraticTet = 2e-6;
 inline constexpr double kPartitionTet = 1e-6;
@@ -52,7 +52,6 @@ inline constexpr int kModesOfAllPairs = 40;
 inline constexpr double kFieldsPerMode = 8;
 inline constexpr double kCouplingSolveEntry = 1.5e-10, kCouplingPoint = 5e-8, kCouplingProduct = 2e-10, kCouplingSearch = 1e-3;
 inline constexpr double kCollectNumber = 1e-8, kWriteNumber = 5e-9;
-inline constexpr double kUpdateRate = 5.3e10;  // of ldlt::measure_update_rate() on that machine
 
 // Bytes.
 inline constexpr double kProgramBytes = 57e6;                                     // rank without a mesh
