@@ -15,8 +15,6 @@ inline constexpr double kRefinementGrowth = 4;        // growth of the node coun
 inline constexpr std::int64_t kDefaultModes = 200;    // band without a count
 inline constexpr double kQuadraticNodesPerTet = 1.5;  // solids without thin walls
 inline constexpr double kLinearNodesPerTet = 0.25;
-inline constexpr double kSurfaceMeshSeconds = 5;  // carillon-mesh with an unknown surface
-inline constexpr double kSurfaceMeshSecondsPerNode = 1e-4;
 
 // Fill of the factor at 100,000 unknowns, and exponents: 4/3 and 2 for infinite solids (George 1973). Fitted to the hollow bunny of 38,000
 // to 1,470,000 unknowns (docs/reports/scaling.md), whose walls gain elements across with refinement.
