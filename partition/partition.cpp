@@ -147,7 +147,7 @@ Graph make_dual_graph(std::span<const std::int32_t> corners) {
   for (std::int32_t e = 0; e < elements; ++e)
     for (const auto& local : kFaceCorners) ++begin[make_face(e, local)[0] + 1];
   std::partial_sum(begin.begin(), begin.end(), begin.begin());
-  std::vector<Face> faces(4 * elements);
+  std::vector<Face> faces(std::size_t{4} * elements);
   {
     std::vector<std::int64_t> next(begin.begin(), begin.end() - 1);
     for (std::int32_t e = 0; e < elements; ++e)
@@ -176,7 +176,7 @@ Graph make_dual_graph(std::span<const std::int32_t> corners) {
   Graph graph;
   graph.offsets.reserve(elements + 1);
   graph.offsets.push_back(0);
-  graph.neighbours.reserve(4 * elements);
+  graph.neighbours.reserve(faces.size());
   for (std::int32_t e = 0; e < elements; ++e) {
     const auto first = neighbours[e].begin();
     std::sort(first, first + degree[e]);

@@ -15,7 +15,6 @@
 #include "precompute/eigen/proof.hpp"
 #include "precompute/eigen/timer.hpp"
 #include "precompute/petsc/session.hpp"
-#include "runtime/base/error.hpp"
 
 namespace carillon::eigen {
 namespace {

@@ -72,7 +72,7 @@ void sort_by_transposing(BlockRows& rows) {
 void find_own_pattern(const LocalMesh& local, Neighbours& neighbours, LocalRows& rows) {
   rows.own.begin.reserve(local.free_nodes + 1);
   rows.off.begin.reserve(local.free_nodes + 1);
-  rows.own.column.reserve(16 * local.free_nodes);
+  rows.own.column.reserve(std::size_t{16} * local.free_nodes);
   for (std::int32_t i = 0; i < local.free_nodes; ++i) {
     neighbours.visit(i, [&](std::int32_t other) {
       if (other < local.free_nodes) {

@@ -337,7 +337,7 @@ class Fetch {
     const double* columns = nullptr;
     petsc::check(MatDenseGetArrayRead(shapes_, &columns));
     for (PetscInt j = 0; j < count; ++j) {
-      petsc::check(VecPlaceArray(whole_, columns + (first + j) * stride_));
+      petsc::check(VecPlaceArray(whole_, columns + std::ptrdiff_t{first + j} * stride_));
       petsc::check(VecScatterBegin(scatter_, whole_, part_, INSERT_VALUES, SCATTER_FORWARD));
       petsc::check(VecScatterEnd(scatter_, whole_, part_, INSERT_VALUES, SCATTER_FORWARD));
       petsc::check(VecResetArray(whole_));

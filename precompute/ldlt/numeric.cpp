@@ -176,7 +176,7 @@ class Factoriser {
       const auto collect = [&](const NodeRows& rows, const Ints& ghosts, double factor) {
         const auto add = [&](std::int32_t link, PetscInt column, double value) {
           const std::int32_t at = slot_[link];
-          if (at >= 0) blocks[9 * at + static_cast<std::size_t>(3 * d + column % 3)] += factor * value;
+          if (at >= 0) blocks[std::ptrdiff_t{9} * at + 3 * d + column % 3] += factor * value;
         };
         rows.visit(
             3 * own + d, [&](PetscInt column, double value) { add(column / 3, column, value); },

@@ -1,7 +1,6 @@
 // The record of a run as JSON: choices, results and resources.
 #pragma once
 
-#include <string>
 #include <vector>
 
 #include "precompute/run/run.hpp"

@@ -1,8 +1,7 @@
 // Clocks in seconds.
-// Source: POSIX.1-2008, clock_gettime, getrusage; Linux clock_gettime(2), CLOCK_BOOTTIME.
+// Source: POSIX.1-2008, clock_gettime; Linux clock_gettime(2), CLOCK_BOOTTIME.
 #pragma once
 
-#include <sys/resource.h>
 #include <time.h>
 
 #include <cstdint>
@@ -20,13 +19,6 @@ inline double read_clock(clockid_t clock) noexcept { return 1e-9 * static_cast<d
 inline double get_thread_cpu_s() noexcept { return read_clock(CLOCK_THREAD_CPUTIME_ID); }
 /// Processor time of all threads of this process.
 inline double get_process_cpu_s() noexcept { return read_clock(CLOCK_PROCESS_CPUTIME_ID); }
-/// Processor time of the terminated children of this process.
-inline double get_children_cpu_s() noexcept {
-  rusage used{};
-  ::getrusage(RUSAGE_CHILDREN, &used);
-  return static_cast<double>(used.ru_utime.tv_sec + used.ru_stime.tv_sec) +
-         1e-6 * static_cast<double>(used.ru_utime.tv_usec + used.ru_stime.tv_usec);
-}
 
 /// Monotonic clock, arbitrary origin; excludes suspended time.
 inline double get_steady_s() noexcept { return read_clock(CLOCK_MONOTONIC); }

@@ -15,8 +15,6 @@ inline constexpr double kRefinementGrowth = 4;        // growth of the node coun
 inline constexpr std::int64_t kDefaultModes = 200;    // band without a count
 inline constexpr double kQuadraticNodesPerTet = 1.5;  // solids without thin walls
 inline constexpr double kLinearNodesPerTet = 0.25;
-inline constexpr double kSurfaceMeshSeconds = 5;  // carillon-mesh with an unknown surface
-inline constexpr double kSurfaceMeshSecondsPerNode = 1e-4;
 
 // Fill of the factor at 100,000 unknowns, and exponents: 4/3 and 2 for infinite solids (George 1973). Fitted to the hollow bunny of 38,000
 // to 1,470,000 unknowns (docs/reports/scaling.md), whose walls gain elements across with refinement.
@@ -29,8 +27,8 @@ inline constexpr std::int64_t kDenseRows = 300;    // dense LAPACK up to this si
 inline constexpr std::int64_t kSliceModes = 420;   // per slice of the spectrum
 inline constexpr std::int64_t kSliceSolves = 110;  // right-hand sides per slice, plus two per mode
 
-// CPU seconds with AVX-512 on a Sapphire Rapids Xeon with two busy ranks of other programs; an AMD EPYC with kUpdateRate agrees within a
-// third. Factorisations are fitted to both.
+// CPU seconds with AVX-512 on a Sapphire Rapids Xeon with two busy ranks of other programs; an AMD EPYC, scaled by its speed in
+// factorisations, agrees within a third. Factorisations are fitted to both.
 inline constexpr double kStart = 0.08;
 inline constexpr double kReadTet = 1.5e-6, kReadQuadraticTet = 2e-6;
 inline constexpr double kPartitionTet = 1e-6;
@@ -52,7 +50,6 @@ inline constexpr int kModesOfAllPairs = 40;
 inline constexpr double kFieldsPerMode = 8;
 inline constexpr double kCouplingSolveEntry = 1.5e-10, kCouplingPoint = 5e-8, kCouplingProduct = 2e-10, kCouplingSearch = 1e-3;
 inline constexpr double kCollectNumber = 1e-8, kWriteNumber = 5e-9;
-inline constexpr double kUpdateRate = 5.3e10;  // of ldlt::measure_update_rate() on that machine
 
 // Bytes.
 inline constexpr double kProgramBytes = 57e6;                                     // rank without a mesh

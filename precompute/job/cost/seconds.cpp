@@ -1,5 +1,5 @@
 // Method: counts (elements, entries and operations of the factor, columns of the basis) times calibrated rates, fitted by least squares to
-// the runs of tests/bench/predict; other machines are scaled by their update rate.
+// the runs of tests/bench/predict.
 #include "precompute/job/cost/seconds.hpp"
 
 #include <algorithm>

@@ -25,8 +25,7 @@ struct PhaseSeconds {
   double sum() const { return read + partition + assemble + sum_modes() + errors + coupling + collect + air + write; }
 };
 
-/// CPU seconds on the calibration machine; another takes kUpdateRate / ldlt::measure_update_rate() times as long. Unknown sizes are
-/// estimated.
+/// CPU seconds on the calibration machine. Unknown sizes are estimated.
 PhaseSeconds predict_seconds(const ProblemSize& size);
 
 /// Right-hand sides for the quartic energy of this many coupled modes.

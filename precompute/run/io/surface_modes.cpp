@@ -165,7 +165,7 @@ void SurfaceWork::add_flow(std::size_t mode, std::size_t count) {
     std::array<double, kBlock> through{};  // 3 phi . n of the middle, times twice the area
     for (const std::int32_t row : panel.row) {
       if (row < 0) continue;
-      const double* phi = &values_[row * 3 * kBlock];
+      const double* phi = &values_[3 * kBlock * row];
       for (int d = 0; d < 3; ++d)
         for (std::size_t k = 0; k < kBlock; ++k) through[k] += panel.normal[d] * phi[d * kBlock + k];
     }

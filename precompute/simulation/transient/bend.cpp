@@ -72,7 +72,6 @@ class Tangent {
   }
 
   int count_freedoms() const { return freedoms_; }
-  double get_edge_m() const { return edge_m_; }
   bool is_held(std::size_t node) const { return held_[node] != 0; }
 
   /// (free) elastic forces at u.

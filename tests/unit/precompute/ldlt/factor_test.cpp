@@ -16,7 +16,6 @@
 #include <utility>
 
 #include "precompute/ldlt/kernels.hpp"
-#include "precompute/ldlt/update_rate.hpp"
 #include "precompute/petsc/session.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/host.hpp"
@@ -389,16 +388,6 @@ std::vector<double> make_tiles(const Eigen::MatrixXd& a, bool is_triangle) {
   }
   tiles.resize(tiles.size() + 2048);  // prefetched beyond the end
   return tiles;
-}
-
-TEST(kernels, have_a_rate_that_a_processor_can_have) {
-  for (const Kernels* kernels : list_kernels()) {
-    set_kernels(kernels);
-    const double rate = measure_update_rate();
-    EXPECT_GT(rate, 1e7) << kernels->name;
-    EXPECT_LT(rate, 1e12) << kernels->name;
-  }
-  set_kernels(nullptr);
 }
 
 TEST(kernels, of_every_instruction_set_multiply_tiles_as_the_definition_says) {
