@@ -40,12 +40,6 @@ std::string make_name(const SubmittedJob& submitted, const std::string& number) 
   return submitted.place < 0 ? name : fmt::format("{}.{}", name, submitted.place);
 }
 
-void make_queued(Job& row, const std::string& reason) {
-  row.state = JobState::queued;
-  row.slurm_job.clear();
-  row.reason = reason;
-}
-
 /// Appends Slurm's output to the log of the job.
 void append_output(const fs::path& root, const fs::path& work, const SubmittedJob& submitted) {
   const std::string output = read_output(root, submitted);
@@ -338,7 +332,7 @@ void Engine::adopt(registry::Registry& registry, Rows& jobs) {
     if (submitted && number == "none") remove_submitted_job(store_, job.id);
     registry.update(job.id, [&](Job& row) {
       if (!row.slurm_job.empty() || row.state != job.state || row.token != job.token) return false;
-      make_queued(row, "");
+      queue::wait(row, 0.0, "", queue::LocalClock());
       if (submitted && number != "none") row.slurm_job = make_name(*submitted, number);
       job = row;
       return true;
@@ -420,13 +414,12 @@ void Engine::settle_ended(registry::Registry& registry, const Job& job, const Su
       queue::end(row, JobState::cancelled, row.cancel_wanted ? "cancelled" : "cancelled in Slurm (scancel)");
     } else if (state == PackedState::waits && has_begun(store_.root(), submitted)) {
       // The end of the task is not a failure of a job that had not begun.
-      make_queued(row, "its Slurm task ended before it began: " + judgement.outcome.reason);
+      queue::wait(row, 0.0, "its Slurm task ended before it began: " + judgement.outcome.reason, queue::LocalClock());
       row.attempts -= 1;
     } else {
       row.failures = failures;
       apply(row, judgement.outcome, has_asked_memory);
     }
-    row.cancel_wanted = false;
     changed.push_back(row);
     return true;
   });
