@@ -35,11 +35,7 @@ TRIAL_TOLERANCE = 1e-6
 START_S = 0.15  # CPU seconds of the start, in no phase of the record
 BUDGET_MARGIN = 0.85  # fraction of --seconds that is used
 CHECK_GROWTH = 2.5  # factor of the nodes for --check
-PATIENCE_S = 20.0  # limit of --validate
-LONG_S, MANY_NODES = (
-    10.0,
-    45000,
-)  # of a mesh file's solve, of a surface's coarsest mesh: from here on the first look is an answer of its own
+LONG_S, MANY_NODES = 10.0, 45000  # solve of a mesh file, coarsest mesh of a surface: above these an estimate is printed first
 MAX_CENTS, MAX_SECONDS = 2400.0, 1e6
 PROGRAMS = ("carillon-precompute", "carillon-mesh", "carillon-bank")
 
@@ -179,11 +175,11 @@ class Adviser:
             thread.join()
 
     def estimate(self):
-        """What carillon-precompute --validate says of a surface or mesh file whose trials will take long; None of any other body."""
+        """The prediction of carillon-precompute --validate for a surface or mesh file whose trials take long; None for other bodies."""
         if self.target.kind not in ("surface", "mesh"):
             return None
-        with self.doing(f"looking at {self.target.name}"):
-            found = self.look()
+        with self.doing(f"predicting the cost of {self.target.name}"):
+            found = self.validate()
         if found is None:
             return None
         # A surface that is not thin has a few thousand nodes in its first trial, whatever its usual mesh takes.
@@ -191,7 +187,8 @@ class Adviser:
         is_long = self.target.kind == "mesh" and found["cpu_seconds"] > LONG_S
         return found if is_thin or is_long else None
 
-    def look(self):
+    def validate(self):
+        """The document of carillon-precompute --validate, whose work is bounded by the size of the body; None for an error."""
         setting = forecast.Setting("T10", PROBE_NODES["surface"], TRIAL_TOLERANCE)
         job = self.target.target.make_job(setting) | {"bank": "bank.hdf"}
         job.get("body", {}).pop("nodes", None)  # what its thickness needs
@@ -199,14 +196,9 @@ class Adviser:
             file = pathlib.Path(folder) / "job.json"
             file.write_text(json.dumps(job))
             command = [self.lab.find_program("carillon-precompute"), "--validate", "--json", "--quiet", file]
-            try:
-                done = subprocess.run(
-                    command, capture_output=True, text=True, errors="surrogateescape", stdin=subprocess.DEVNULL, timeout=PATIENCE_S
-                )
-            except subprocess.TimeoutExpired:
-                return None
+            done = subprocess.run(command, capture_output=True, text=True, errors="surrogateescape", stdin=subprocess.DEVNULL)
         if done.returncode != 0:
-            return None  # the first trial says why, in the words of a run
+            return None  # the first trial reports it
         return json.loads(done.stdout)
 
     def calibrate(self):
