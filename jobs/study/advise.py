@@ -28,6 +28,7 @@ import scaling
 import targets
 from lab import Case, Lab
 from errors import InputError, RunError, printable
+from measuring import to_cents
 
 RANKS_FROM_S = 4.0  # CPU seconds above which a second rank reduces the wall time
 PROBE_NODES, PROBE_GROWTH, MAX_PROBE_NODES = {"shape": 1000, "surface": 2500}, {"shape": 3, "surface": 2}, 60000
@@ -63,7 +64,7 @@ class KnownTarget:
         truth = {} if body.truth else advice.content.get("truths", {}).get(body.name, {})
         self.truth_hz = list(body.truth.freq_hz) if body.truth else truth.get("freq_hz", [])
         self.how = "known" if body.truth else "extrapolated"
-        self.doubt_cents = max((1200 * math.log2(1 + doubt) for doubt in truth.get("uncertainty", [])), default=0.0)
+        self.doubt_cents = max((to_cents(1 + doubt, 1) for doubt in truth.get("uncertainty", [])), default=0.0)
         if self.doubt_cents > 1:
             self.notes.append(
                 "its frequencies are not known: errors are relative to the study's finest curved T10, extrapolated, which may be"
@@ -227,7 +228,7 @@ class Adviser:
             solve = self.solve(setting, f"{element} on the mesh file")
             self.probe_cpu_s += solve.cpu
             if solve.freq_hz:
-                tried.append((setting, solve, max(find_bars(solve)) / self.advice.find_usual_ratio(element)))
+                tried.append((setting, solve, max(solve.bar_cents) / self.advice.find_usual_ratio(element)))
         if not tried:
             raise InputError(
                 f'{self.target.name}: no mode was found in the band; give another band (--band LOW,HIGH, or "band_hz" of the job)'
@@ -321,7 +322,7 @@ class Adviser:
     def make_trial(self, solve, nodes):
         phases_s = sum(phase.get("cpu_seconds", phase["seconds"]) for phase in solve.record["stations"])
         mesh_s = max(solve.cpu - phases_s - START_S, 0.0) if self.target.kind == "surface" else 0.0
-        return forecast.Trial(nodes, solve.unknowns, solve.freq_hz, find_bars(solve), solve.cpu, mesh_s)
+        return forecast.Trial(nodes, solve.unknowns, solve.freq_hz, solve.bar_cents, solve.cpu, mesh_s)
 
     def solve(self, setting, name):
         case = self.target.make_case(self.lab, setting, name)
@@ -380,16 +381,16 @@ class Adviser:
     # --- after
 
     def judge(self, setting, solve):
-        bars = find_bars(solve)
+        bars = solve.bar_cents
         bar = max(bars)
         if self.target.truth_hz:
-            errors = [abs(1200 * math.log2(f / true)) for f, true in zip(solve.freq_hz, self.target.truth_hz)]
+            errors = [abs(to_cents(f, true)) for f, true in zip(solve.freq_hz, self.target.truth_hz)]
             how = self.target.how
         elif self.options.check:
             finer = self.solve(dataclasses.replace(setting, nodes=round(CHECK_GROWTH * setting.nodes)), "finer mesh, to check")
             slope = self.probe.find_slope(*self.probe.trials[-2:]) if self.probe else 4 / 3
             # Correct for the error of the finer mesh by the rate.
-            errors = [abs(1200 * math.log2(f / fine)) / (1 - CHECK_GROWTH**-slope) for f, fine in zip(solve.freq_hz, finer.freq_hz)]
+            errors = [abs(to_cents(f, fine)) / (1 - CHECK_GROWTH**-slope) for f, fine in zip(solve.freq_hz, finer.freq_hz)]
             how = "finer"
         else:
             worst = self.probe.judge(self.make_trial(solve, setting.nodes)) if self.probe else bar / self.advice.find_usual_ratio()
@@ -405,10 +406,6 @@ class Adviser:
         shutil.copyfile(solve.bank, bank)
         file.write_text(json.dumps(content, indent=1) + "\n")
         return file, bank
-
-
-def find_bars(solve):
-    return [a + b for a, b in zip(solve.algebraic_cents, solve.discretisation_cents)]
 
 
 def read_packed_advice(path=None):

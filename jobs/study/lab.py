@@ -64,6 +64,11 @@ class Solve:
     def spread(self):
         return measuring.find_spread(self.cpu_s)
 
+    @property
+    def bar_cents(self):
+        """Error bars of the frequencies, algebraic and discretisation error together."""
+        return [a + b for a, b in zip(self.algebraic_cents, self.discretisation_cents)]
+
 
 @functools.cache
 def calc_digest(path):
