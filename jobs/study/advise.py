@@ -12,7 +12,6 @@ import math
 import os
 import pathlib
 import pkgutil
-import re
 import shutil
 import subprocess
 import sys
@@ -277,10 +276,9 @@ class Adviser:
             try:
                 trial = self.try_one(nodes)
             except RunError as error:
-                least = re.search(r"at least about (\d+)", str(error))  # nodes that the mesher needs for a thin wall
-                if not least or error.code != 2 or int(least.group(1)) <= nodes:
+                if not error.possible_nodes or error.possible_nodes <= nodes:
                     raise
-                nodes = math.ceil(1.05 * int(least.group(1)))
+                nodes = math.ceil(1.05 * error.possible_nodes)  # thin walls need more nodes
                 continue
             self.probe_cpu_s += trial.cpu_s
             self.probe.trials.append(trial)

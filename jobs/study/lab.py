@@ -100,6 +100,11 @@ def read_kept(path):
     return value if isinstance(value, dict) else None
 
 
+def add_possible_nodes(error, result):
+    """The RunError with the node count of the file that the program wrote to --result."""
+    return RunError(error.code, str(error), (read_kept(result) or {}).get("possible_nodes"))
+
+
 class Lab:
     def __init__(self, out, programs, quick=False, repeats=None, surface=None, timeout_s=3600, on=None):
         """out: the report's folder. programs: {name: path}, see programs.find_all(). repeats: of every case; default 1 when quick, else 2.
@@ -159,8 +164,7 @@ class Lab:
                     kept = {"nodes": made["nodes"], "elements": made["tets"], "cpu_s": cost.cpu_s}
                 os.replace(part, mesh)
             except RunError as error:
-                result = read_kept(part.with_suffix(".result")) or {}
-                raise RunError(error.code, str(error), result.get("possible_nodes")) from None
+                raise add_possible_nodes(error, part.with_suffix(".result")) from None
             finally:
                 for path in (part, part.with_suffix(".json"), part.with_suffix(".result")):
                     path.unlink(missing_ok=True)
@@ -222,16 +226,24 @@ class Lab:
     def run_case(self, case, key, kept, may_fail):
         folder = self.runs / key
         folder.mkdir(exist_ok=True)
-        bank = folder / "bank.hdf"
+        bank, result = folder / "bank.hdf", folder / "result.json"
+        result.unlink(missing_ok=True)
         write_whole(folder / "job.json", json.dumps(case.job | {"bank": "bank.hdf"}, indent=1) + "\n")
-        program = [self.find_program("carillon-precompute"), "-q", "job.json", *(["--", *case.options] if case.options else [])]
+        program = [
+            self.find_program("carillon-precompute"),
+            "-q",
+            "--result",
+            result.name,
+            "job.json",
+            *(["--", *case.options] if case.options else []),
+        ]
         try:
             cost = self.call(
                 ["mpirun", "-np", case.ranks, *program] if case.ranks > 1 else program, case.name, dict(case.environment), folder
             )
         except RunError as error:
             if not may_fail or error.code not in (2, 3):
-                raise
+                raise add_possible_nodes(error, result) from None
             kept["error"] = str(error)
         else:
             if "modes" not in kept:
