@@ -236,9 +236,7 @@ void Runner::refuse(const Job& job, double memory_gb, const Host& host) {
                   kMemoryShare * host.total_gb);
   const bool is_changed = table_.update(job.id, [&](Job& row) {
     if (row.state != JobState::queued && row.state != JobState::waiting) return false;
-    row.state = JobState::failed;
-    row.reason = reason;
-    row.ended_unix_s = registry::find_unix_seconds();
+    end(row, JobState::failed, reason);
     return true;
   });
   const std::optional<Job> now = table_.find(job.id);
@@ -284,11 +282,7 @@ void Runner::name_worker(const Job& job, pid_t pid) {
 }
 
 void Runner::give_back(const Job& job) {
-  table_.update(job.id, [&](Job& row) {
-    if (row.state != JobState::running || row.token != job.token) return false;
-    row.state = JobState::queued;
-    return true;
-  });
+  change_running(table_, job, [](Job& row) { row.state = JobState::queued; });
 }
 
 /// A row claimed by this process that is in neither list: its end could not be written (full disk).
