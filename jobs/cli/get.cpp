@@ -1,5 +1,4 @@
 // carillon get: paths or copies of banks and of files of simulations.
-#include <fcntl.h>
 #include <fmt/core.h>
 #include <unistd.h>
 

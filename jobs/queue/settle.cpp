@@ -6,7 +6,6 @@
 #include <fmt/core.h>
 #include <signal.h>
 
-#include <algorithm>
 #include <optional>
 
 #include "jobs/queue/repair.hpp"

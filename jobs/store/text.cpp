@@ -1,8 +1,6 @@
 // Paths as text.
 #include <fmt/core.h>
 
-#include <algorithm>
-
 #include "jobs/store/records.hpp"
 
 namespace carillon::store {
