@@ -68,13 +68,13 @@ bool Runner::step() {
   const bool is_first = std::exchange(is_first_step_, false);
   reap_children();
   for (const Job& job : settle(at_, table_)) show_end(job);
-  std::vector<Job> jobs = list_open();
+  std::vector<Job> jobs = table_.list_open(store::JobEngine::local);
   for (const Job& job : jobs) worked_.insert(job.id);
   release_lost(jobs);
   const bool has_ready = std::any_of(jobs.begin(), jobs.end(), [](const Job& job) { return job.state != JobState::running; });
   if (stops_ == 0 && has_ready) start_what_fits();
   start_claimed();
-  if (has_ready) jobs = list_open();
+  if (has_ready) jobs = table_.list_open(store::JobEngine::local);
   for (const Job& job : jobs) worked_.insert(job.id);
   if (is_first) show_adopted(jobs);
   ask_cancelled(jobs);
@@ -95,12 +95,6 @@ void Runner::stop(int signal) {
     at_.launcher.send_signal(pid, SIGUSR1);
     if (stops_ > 1) at_.launcher.send_signal(pid, SIGTERM);
   }
-}
-
-std::vector<Job> Runner::list_open() const {
-  std::vector<Job> jobs = table_.list({JobState::queued, JobState::running, JobState::waiting});
-  std::erase_if(jobs, [](const Job& job) { return job.engine != store::JobEngine::local; });
-  return jobs;
 }
 
 void Runner::reap_children() {

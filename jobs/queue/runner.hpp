@@ -38,7 +38,6 @@ class Runner {
   void stop(int signal);
 
  private:
-  std::vector<registry::Job> list_open() const;
   int find_exit_code() const;
   void reap_children();
   void show_end(const registry::Job& job);
