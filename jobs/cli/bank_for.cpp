@@ -2,7 +2,6 @@
 #include <fmt/core.h>
 
 #include <iostream>
-#include <iterator>
 
 #include "jobs/cli/commands.hpp"
 #include "jobs/front/cache/cache.hpp"

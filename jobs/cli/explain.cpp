@@ -94,9 +94,7 @@ std::string describe_results(const store::Store& store, const store::Id& id) {
 
 Explanation explain(Shared& shared, const store::Id& id, const std::optional<registry::Job>& job) {
   if (shared.store().has_bank(id)) return {"done", fmt::format("nothing would run: {}", describe_results(shared.store(), id)), false};
-  const bool is_open = job && (job->state == registry::JobState::queued || job->state == registry::JobState::running ||
-                               job->state == registry::JobState::waiting);
-  if (shared.store().has_bank_folder(id) && !is_open)
+  if (shared.store().has_bank_folder(id) && !(job && is_open(job->state)))
     return {"failed",
             fmt::format("it would run: {}; carillon submit, or retry, computes it again",
                         show_message(shared.store().find_bank_fault(id, store::Look::quick).value_or("its bank is damaged"))),

@@ -29,9 +29,7 @@ std::vector<registry::Job> read_jobs(Shared& shared, const std::vector<store::Id
   return jobs;
 }
 
-bool has_ended(const registry::Job& job) {
-  return job.state == registry::JobState::done || job.state == registry::JobState::failed || job.state == registry::JobState::cancelled;
-}
+bool has_ended(const registry::Job& job) { return !is_open(job.state); }
 
 /// Redraws the jobs in place, limited to the rows of the terminal.
 class Screen {

@@ -1,5 +1,4 @@
 // carillon get: paths or copies of banks and of files of simulations.
-#include <fcntl.h>
 #include <fmt/core.h>
 #include <unistd.h>
 
@@ -69,8 +68,7 @@ Got look_at(Shared& shared, Named named) {
     got.results = list_results(shared.store(), id);
     return got;
   }
-  const bool is_again = job && (job->state == registry::JobState::queued || job->state == registry::JobState::running ||
-                                job->state == registry::JobState::waiting);
+  const bool is_again = job && is_open(job->state);
   const bool is_damaged = shared.store().has_bank_folder(id) && !is_again;
   got.state = is_damaged ? "failed" : job ? to_text(job->state) : "new";
   got.why = is_damaged ? fmt::format("{}; carillon retry {} computes it again", *fault, id.short_text())

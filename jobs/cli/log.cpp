@@ -40,10 +40,6 @@ std::string read_from(const fs::path& file, off_t& from, off_t max) {
   return bytes;
 }
 
-bool has_ended(const registry::Job& job) {
-  return job.state == registry::JobState::done || job.state == registry::JobState::failed || job.state == registry::JobState::cancelled;
-}
-
 int print_log(Shared& shared, registry::Job job, bool follows) {
   off_t at = 0;
   if (shared.json) {
@@ -59,7 +55,7 @@ int print_log(Shared& shared, registry::Job job, bool follows) {
     return 0;
   }
   for (;;) {
-    const bool is_last = !follows || has_ended(job);  // checked before reading: the log is complete after the end
+    const bool is_last = !follows || !is_open(job.state);  // checked before reading: the log is complete after the end
     for (std::string bytes; !(bytes = read_from(shared.store().find_folder(job.id) / store::kLogFile, at, 1 << 20)).empty();) {
       // Keep an incomplete UTF-8 character for the next piece.
       std::size_t whole = bytes.size();

@@ -1,8 +1,6 @@
 // carillon materials: the table of materials.
 #include <fmt/core.h>
 
-#include <algorithm>
-#include <cmath>
 #include <numbers>
 #include <utility>
 

@@ -1,8 +1,6 @@
 // carillon run and carillon attempt.
 #include "jobs/queue/run.hpp"
 
-#include <fmt/core.h>
-
 #include "jobs/cli/commands.hpp"
 #include "jobs/cli/follow.hpp"
 #include "jobs/cli/slurm.hpp"

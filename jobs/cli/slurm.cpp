@@ -39,14 +39,6 @@ slurm::Engine& find_engine(Shared& shared) {
   return *shared.slurm_engine;
 }
 
-bool is_of_slurm(const Job& job) { return job.engine == store::JobEngine::slurm; }
-
-std::vector<Job> list_open(Shared& shared) {
-  std::vector<Job> jobs = shared.registry().list({JobState::queued, JobState::running, JobState::waiting});
-  std::erase_if(jobs, [](const Job& job) { return !is_of_slurm(job); });
-  return jobs;
-}
-
 std::vector<Job> hand_over(Shared& shared) {
   return find_engine(shared).hand_over(
       shared.registry(), [&](const Job& job) { return slurm::find_needs(shared.store(), job, find_settings(shared), base::find_self()); });
@@ -59,7 +51,7 @@ void follow_slurm(Shared& shared) {
   if (shared.slurm_asked_s > 0.0 && now_s - shared.slurm_asked_s < shared.profile().slurm.poll_s) return;
   const std::vector<Job> cancelled = shared.registry().list({JobState::cancelled});
   const bool is_left = std::any_of(cancelled.begin(), cancelled.end(), [](const Job& job) { return !job.slurm_job.empty(); });
-  if (!is_left && list_open(shared).empty()) return;
+  if (!is_left && shared.registry().list_open(store::JobEngine::slurm).empty()) return;
   find_engine(shared).follow(shared.registry());
   shared.slurm_asked_s = base::get_boot_s();
 }
@@ -71,10 +63,7 @@ std::size_t hand_over_to_slurm(Shared& shared) {
 
 queue::CommandResult cancel_in_slurm(Shared& shared, const store::Id& id) {
   const auto row = shared.registry().find(id);
-  if (!row) return {false, "there is no such job"};
-  if (row->state == JobState::done) return {false, "it is done already; its bank stays"};
-  if (row->state == JobState::cancelled) return {true, "it is cancelled already"};
-  if (row->state == JobState::failed) return queue::request_cancel(shared.registry(), id);
+  if (!row || !is_open(row->state)) return queue::request_cancel(shared.registry(), id);
   if (!find_engine(shared).cancel(shared.registry(), id))
     return {true, "Slurm is asked to end it; carillon status shows when it has ended"};
   const auto now = shared.registry().find(id);
@@ -90,7 +79,7 @@ int run_with_slurm(Shared& shared, const queue::RunOptions& options) {
   for (;;) {
     for (const Job& job : find_engine(shared).follow(shared.registry())) display.print_event(to_text(job.state), job);
     for (const Job& job : hand_over(shared)) display.print_event(job.state == JobState::failed ? "failed" : "queued", job);
-    const std::vector<Job> open = list_open(shared);
+    const std::vector<Job> open = shared.registry().list_open(store::JobEngine::slurm);
     for (const Job& job : open) worked.insert(job.id);
     display.show(open);
     if (open.empty() && !options.runner.keep) {

@@ -88,9 +88,7 @@ int run_status(Shared& shared, const StatusOptions& options) {
   if (options.watch) {
     std::vector<store::Id> ids;
     for (const registry::Job& job : jobs) {
-      const bool is_open =
-          job.state == registry::JobState::queued || job.state == registry::JobState::running || job.state == registry::JobState::waiting;
-      if (is_open || !options.words.empty()) ids.push_back(job.id);
+      if (is_open(job.state) || !options.words.empty()) ids.push_back(job.id);
     }
     const int code = ids.empty() ? 0 : follow(shared, ids, true);
     if (!options.words.empty()) return code;
@@ -134,8 +132,8 @@ std::vector<std::string> format_bars(Shared& shared, const std::vector<registry:
     const std::string reason = format_reason(shared, job);
     if (lines.size() + (reason.empty() ? 1 : 2) + 2 > job_rows && jobs.size() > 1 && shown + 1 < jobs.size()) break;
     ++shown;
-    const bool is_open = job.state == registry::JobState::running || job.state == registry::JobState::waiting;
-    const std::string progress = is_open ? format_progress(shared, job) : "";
+    const bool has_progress = job.state == registry::JobState::running || job.state == registry::JobState::waiting;
+    const std::string progress = has_progress ? format_progress(shared, job) : "";
     lines.push_back(cut(fmt::format("{}  {:<9}  {}{}{}", job.id.short_text(), to_text(job.state), show(job.name, 40),
                                     progress.empty() ? "" : "  ", progress),
                         columns));

@@ -2,7 +2,6 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <map>
 
@@ -155,10 +154,6 @@ void print_lines(Shared& shared, const std::vector<SubmitResult>& results) {
   }
 }
 
-bool is_open(const registry::Job& job) {
-  return job.state == registry::JobState::queued || job.state == registry::JobState::waiting || job.state == registry::JobState::running;
-}
-
 /// Submits to Slurm and updates the results.
 void hand_over(Shared& shared, std::vector<SubmitResult>& results) {
   follow_slurm(shared);
@@ -219,7 +214,7 @@ int run_submit(Shared& shared, const SubmitOptions& options) {
   } else {
     if (!shared.json) print_warnings(shared, results);
     for (const SubmitResult& result : results) {
-      if (code == 0 && result.job && !is_open(*result.job) && result.job->state != registry::JobState::done) code = kExitSolve;
+      if (code == 0 && result.job && !is_open(result.job->state) && result.job->state != registry::JobState::done) code = kExitSolve;
     }
   }
   return code;

@@ -6,8 +6,6 @@
 // cores and memory are reserved for it.
 #pragma once
 
-#include <functional>
-#include <string>
 #include <vector>
 
 #include "runtime/base/host.hpp"

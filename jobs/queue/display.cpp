@@ -5,12 +5,10 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cstdio>
 #include <optional>
 #include <string>
 
-#include "jobs/store/process/process.hpp"
 #include "jobs/store/records.hpp"
 #include "runtime/base/clock.hpp"
 #include "runtime/base/json.hpp"

@@ -2,8 +2,6 @@
 
 #include <fmt/core.h>
 
-#include <algorithm>
-
 #include "jobs/store/identity.hpp"
 
 namespace carillon::queue {

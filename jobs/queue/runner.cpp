@@ -68,13 +68,13 @@ bool Runner::step() {
   const bool is_first = std::exchange(is_first_step_, false);
   reap_children();
   for (const Job& job : settle(at_, table_)) show_end(job);
-  std::vector<Job> jobs = list_open();
+  std::vector<Job> jobs = table_.list_open(store::JobEngine::local);
   for (const Job& job : jobs) worked_.insert(job.id);
   release_lost(jobs);
   const bool has_ready = std::any_of(jobs.begin(), jobs.end(), [](const Job& job) { return job.state != JobState::running; });
   if (stops_ == 0 && has_ready) start_what_fits();
   start_claimed();
-  if (has_ready) jobs = list_open();
+  if (has_ready) jobs = table_.list_open(store::JobEngine::local);
   for (const Job& job : jobs) worked_.insert(job.id);
   if (is_first) show_adopted(jobs);
   ask_cancelled(jobs);
@@ -95,12 +95,6 @@ void Runner::stop(int signal) {
     at_.launcher.send_signal(pid, SIGUSR1);
     if (stops_ > 1) at_.launcher.send_signal(pid, SIGTERM);
   }
-}
-
-std::vector<Job> Runner::list_open() const {
-  std::vector<Job> jobs = table_.list({JobState::queued, JobState::running, JobState::waiting});
-  std::erase_if(jobs, [](const Job& job) { return job.engine != store::JobEngine::local; });
-  return jobs;
 }
 
 void Runner::reap_children() {
@@ -236,9 +230,7 @@ void Runner::refuse(const Job& job, double memory_gb, const Host& host) {
                   kMemoryShare * host.total_gb);
   const bool is_changed = table_.update(job.id, [&](Job& row) {
     if (row.state != JobState::queued && row.state != JobState::waiting) return false;
-    row.state = JobState::failed;
-    row.reason = reason;
-    row.ended_unix_s = registry::find_unix_seconds();
+    end(row, JobState::failed, reason);
     return true;
   });
   const std::optional<Job> now = table_.find(job.id);
@@ -284,11 +276,7 @@ void Runner::name_worker(const Job& job, pid_t pid) {
 }
 
 void Runner::give_back(const Job& job) {
-  table_.update(job.id, [&](Job& row) {
-    if (row.state != JobState::running || row.token != job.token) return false;
-    row.state = JobState::queued;
-    return true;
-  });
+  change_running(table_, job, [](Job& row) { row.state = JobState::queued; });
 }
 
 /// A row claimed by this process that is in neither list: its end could not be written (full disk).

@@ -3,7 +3,6 @@
 
 #include <functional>
 #include <map>
-#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -39,7 +38,6 @@ class Runner {
   void stop(int signal);
 
  private:
-  std::vector<registry::Job> list_open() const;
   int find_exit_code() const;
   void reap_children();
   void show_end(const registry::Job& job);

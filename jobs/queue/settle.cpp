@@ -6,7 +6,6 @@
 #include <fmt/core.h>
 #include <signal.h>
 
-#include <algorithm>
 #include <optional>
 
 #include "jobs/queue/repair.hpp"
@@ -117,16 +116,14 @@ void settle_not_begun(const Environment& at, registry::JobTable& table, const Jo
   outcome::Outcome outcome = find_outcome(at.disk, job);
   if (outcome.cause == outcome::Cause::killed && exit_code < 128)
     outcome.reason = fmt::format("the attempt could not begin (exit code {}); see its log", exit_code);
-  change_running(
-      table, job, [&](Job& row) { apply(row, outcome, at.clock); }, nullptr);
+  change_running(table, job, [&](Job& row) { apply(row, outcome, at.clock); });
 }
 
 void settle_not_started(const Environment& at, registry::JobTable& table, const Job& job, const SystemError& refusal) {
   outcome::Outcome outcome = outcome::make_killed(job.token);
   outcome.cause = at.disk.is_full(&refusal) ? outcome::Cause::disk_full : outcome::Cause::system;
   outcome.reason = refusal.what();
-  change_running(
-      table, job, [&](Job& row) { apply(row, outcome, at.clock); }, nullptr);
+  change_running(table, job, [&](Job& row) { apply(row, outcome, at.clock); });
 }
 
 void cancel_not_started(Job& job) {

@@ -26,9 +26,9 @@ AttemptState find_attempt_state(const Environment& at, const registry::Job& job)
 /// Asks the attempt of a running row to save and stop. False: not reachable.
 bool ask_to_stop(const Environment& at, const registry::Job& job);
 
-/// Changes the row of a running job unless its attempt is another one by now, and appends it to `changed` (may be null). True if changed.
+/// Changes the row of a running job unless its attempt is another one by now, and appends it to `changed`. True if changed.
 bool change_running(registry::JobTable& table, const registry::Job& job, const std::function<void(registry::Job&)>& change,
-                    std::vector<registry::Job>* changed);
+                    std::vector<registry::Job>* changed = nullptr);
 
 /// Ends a row in this state.
 void end(registry::Job& job, registry::JobState state, const std::string& reason);

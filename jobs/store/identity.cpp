@@ -16,7 +16,6 @@
 #include <fstream>
 #include <map>
 #include <set>
-#include <sstream>
 
 #include "jobs/store/files.hpp"
 #include "jobs/store/process/process.hpp"

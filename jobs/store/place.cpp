@@ -1,5 +1,4 @@
 // Location of the registry: SQLite's WAL needs shared memory, so it is never on a network file system.
-#include <fcntl.h>
 #include <fmt/core.h>
 #include <sys/stat.h>
 #include <sys/vfs.h>

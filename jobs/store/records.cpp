@@ -1,13 +1,11 @@
 #include "jobs/store/records.hpp"
 
 #include <fcntl.h>
-#include <fmt/core.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
-#include <sstream>
 
 #include "jobs/store/store.hpp"
 #include "runtime/base/document.hpp"

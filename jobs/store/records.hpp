@@ -16,6 +16,8 @@ using job::Resources;
 
 /// queued: may be claimed. running: claimed. waiting: queued, but not before a given time. done, failed, cancelled: ended.
 enum class JobState { queued, running, waiting, done, failed, cancelled };
+/// Queued, running or waiting.
+constexpr bool is_open(JobState state) { return state == JobState::queued || state == JobState::running || state == JobState::waiting; }
 /// Where a job runs: on this machine or in Slurm.
 enum class JobEngine { local, slurm };
 /// Input of a job in addition to its description; a simulation has any number of meshes and surfaces.

@@ -13,11 +13,9 @@
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
-#include <map>
 #include <set>
 #include <sstream>
 #include <string_view>
-#include <utility>
 
 #include "jobs/store/bank_sum.hpp"
 #include "jobs/store/files.hpp"

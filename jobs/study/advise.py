@@ -12,7 +12,6 @@ import math
 import os
 import pathlib
 import pkgutil
-import re
 import shutil
 import subprocess
 import sys
@@ -28,6 +27,7 @@ import scaling
 import targets
 from lab import Case, Lab
 from errors import InputError, RunError, printable
+from measuring import to_cents
 
 RANKS_FROM_S = 4.0  # CPU seconds above which a second rank reduces the wall time
 PROBE_NODES, PROBE_GROWTH, MAX_PROBE_NODES = {"shape": 1000, "surface": 2500}, {"shape": 3, "surface": 2}, 60000
@@ -35,11 +35,7 @@ TRIAL_TOLERANCE = 1e-6
 START_S = 0.15  # CPU seconds of the start, in no phase of the record
 BUDGET_MARGIN = 0.85  # fraction of --seconds that is used
 CHECK_GROWTH = 2.5  # factor of the nodes for --check
-PATIENCE_S = 20.0  # limit of --validate
-LONG_S, MANY_NODES = (
-    10.0,
-    45000,
-)  # of a mesh file's solve, of a surface's coarsest mesh: from here on the first look is an answer of its own
+LONG_S, MANY_NODES = 10.0, 45000  # solve of a mesh file, coarsest mesh of a surface: above these an estimate is printed first
 MAX_CENTS, MAX_SECONDS = 2400.0, 1e6
 PROGRAMS = ("carillon-precompute", "carillon-mesh", "carillon-bank")
 
@@ -67,7 +63,7 @@ class KnownTarget:
         truth = {} if body.truth else advice.content.get("truths", {}).get(body.name, {})
         self.truth_hz = list(body.truth.freq_hz) if body.truth else truth.get("freq_hz", [])
         self.how = "known" if body.truth else "extrapolated"
-        self.doubt_cents = max((1200 * math.log2(1 + doubt) for doubt in truth.get("uncertainty", [])), default=0.0)
+        self.doubt_cents = max((to_cents(1 + doubt, 1) for doubt in truth.get("uncertainty", [])), default=0.0)
         if self.doubt_cents > 1:
             self.notes.append(
                 "its frequencies are not known: errors are relative to the study's finest curved T10, extrapolated, which may be"
@@ -179,11 +175,11 @@ class Adviser:
             thread.join()
 
     def estimate(self):
-        """What carillon-precompute --validate says of a surface or mesh file whose trials will take long; None of any other body."""
+        """The prediction of carillon-precompute --validate for a surface or mesh file whose trials take long; None for other bodies."""
         if self.target.kind not in ("surface", "mesh"):
             return None
-        with self.doing(f"looking at {self.target.name}"):
-            found = self.look()
+        with self.doing(f"predicting the cost of {self.target.name}"):
+            found = self.validate()
         if found is None:
             return None
         # A surface that is not thin has a few thousand nodes in its first trial, whatever its usual mesh takes.
@@ -191,7 +187,8 @@ class Adviser:
         is_long = self.target.kind == "mesh" and found["cpu_seconds"] > LONG_S
         return found if is_thin or is_long else None
 
-    def look(self):
+    def validate(self):
+        """The document of carillon-precompute --validate, whose work is bounded by the size of the body; None for an error."""
         setting = forecast.Setting("T10", PROBE_NODES["surface"], TRIAL_TOLERANCE)
         job = self.target.target.make_job(setting) | {"bank": "bank.hdf"}
         job.get("body", {}).pop("nodes", None)  # what its thickness needs
@@ -199,14 +196,9 @@ class Adviser:
             file = pathlib.Path(folder) / "job.json"
             file.write_text(json.dumps(job))
             command = [self.lab.find_program("carillon-precompute"), "--validate", "--json", "--quiet", file]
-            try:
-                done = subprocess.run(
-                    command, capture_output=True, text=True, errors="surrogateescape", stdin=subprocess.DEVNULL, timeout=PATIENCE_S
-                )
-            except subprocess.TimeoutExpired:
-                return None
+            done = subprocess.run(command, capture_output=True, text=True, errors="surrogateescape", stdin=subprocess.DEVNULL)
         if done.returncode != 0:
-            return None  # the first trial says why, in the words of a run
+            return None  # the first trial reports it
         return json.loads(done.stdout)
 
     def calibrate(self):
@@ -235,7 +227,7 @@ class Adviser:
             solve = self.solve(setting, f"{element} on the mesh file")
             self.probe_cpu_s += solve.cpu
             if solve.freq_hz:
-                tried.append((setting, solve, max(find_bars(solve)) / self.advice.find_usual_ratio(element)))
+                tried.append((setting, solve, max(solve.bar_cents) / self.advice.find_usual_ratio(element)))
         if not tried:
             raise InputError(
                 f'{self.target.name}: no mode was found in the band; give another band (--band LOW,HIGH, or "band_hz" of the job)'
@@ -284,10 +276,9 @@ class Adviser:
             try:
                 trial = self.try_one(nodes)
             except RunError as error:
-                least = re.search(r"at least about (\d+)", str(error))  # nodes that the mesher needs for a thin wall
-                if not least or error.code != 2 or int(least.group(1)) <= nodes:
+                if not error.possible_nodes or error.possible_nodes <= nodes:
                     raise
-                nodes = math.ceil(1.05 * int(least.group(1)))
+                nodes = math.ceil(1.05 * error.possible_nodes)  # thin walls need more nodes
                 continue
             self.probe_cpu_s += trial.cpu_s
             self.probe.trials.append(trial)
@@ -329,7 +320,7 @@ class Adviser:
     def make_trial(self, solve, nodes):
         phases_s = sum(phase.get("cpu_seconds", phase["seconds"]) for phase in solve.record["stations"])
         mesh_s = max(solve.cpu - phases_s - START_S, 0.0) if self.target.kind == "surface" else 0.0
-        return forecast.Trial(nodes, solve.unknowns, solve.freq_hz, find_bars(solve), solve.cpu, mesh_s)
+        return forecast.Trial(nodes, solve.unknowns, solve.freq_hz, solve.bar_cents, solve.cpu, mesh_s)
 
     def solve(self, setting, name):
         case = self.target.make_case(self.lab, setting, name)
@@ -388,16 +379,16 @@ class Adviser:
     # --- after
 
     def judge(self, setting, solve):
-        bars = find_bars(solve)
+        bars = solve.bar_cents
         bar = max(bars)
         if self.target.truth_hz:
-            errors = [abs(1200 * math.log2(f / true)) for f, true in zip(solve.freq_hz, self.target.truth_hz)]
+            errors = [abs(to_cents(f, true)) for f, true in zip(solve.freq_hz, self.target.truth_hz)]
             how = self.target.how
         elif self.options.check:
             finer = self.solve(dataclasses.replace(setting, nodes=round(CHECK_GROWTH * setting.nodes)), "finer mesh, to check")
             slope = self.probe.find_slope(*self.probe.trials[-2:]) if self.probe else 4 / 3
             # Correct for the error of the finer mesh by the rate.
-            errors = [abs(1200 * math.log2(f / fine)) / (1 - CHECK_GROWTH**-slope) for f, fine in zip(solve.freq_hz, finer.freq_hz)]
+            errors = [abs(to_cents(f, fine)) / (1 - CHECK_GROWTH**-slope) for f, fine in zip(solve.freq_hz, finer.freq_hz)]
             how = "finer"
         else:
             worst = self.probe.judge(self.make_trial(solve, setting.nodes)) if self.probe else bar / self.advice.find_usual_ratio()
@@ -413,10 +404,6 @@ class Adviser:
         shutil.copyfile(solve.bank, bank)
         file.write_text(json.dumps(content, indent=1) + "\n")
         return file, bank
-
-
-def find_bars(solve):
-    return [a + b for a, b in zip(solve.algebraic_cents, solve.discretisation_cents)]
 
 
 def read_packed_advice(path=None):

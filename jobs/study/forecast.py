@@ -8,6 +8,8 @@ import dataclasses
 import json
 import math
 
+from measuring import to_cents
+
 FORMAT = 1
 GOAL = 0.75  # fraction of the requested error that is aimed at
 MAX_FINER = 10.0  # limit of extrapolation: nodes / nodes of the finest measured mesh
@@ -222,7 +224,7 @@ class Trial:
 
 def find_fall(coarse_hz, fine_hz):
     """Largest distance in cents between modes of equal index."""
-    return max((abs(1200 * math.log2(a / b)) for a, b in zip(coarse_hz, fine_hz)), default=0.0)
+    return max((abs(to_cents(a, b)) for a, b in zip(coarse_hz, fine_hz)), default=0.0)
 
 
 class Probe:

@@ -64,6 +64,11 @@ class Solve:
     def spread(self):
         return measuring.find_spread(self.cpu_s)
 
+    @property
+    def bar_cents(self):
+        """Error bars of the frequencies, algebraic and discretisation error together."""
+        return [a + b for a, b in zip(self.algebraic_cents, self.discretisation_cents)]
+
 
 @functools.cache
 def calc_digest(path):
@@ -93,6 +98,11 @@ def read_kept(path):
     except (OSError, ValueError):
         return None
     return value if isinstance(value, dict) else None
+
+
+def add_possible_nodes(error, result):
+    """The RunError with the node count of the file that the program wrote to --result."""
+    return RunError(error.code, str(error), (read_kept(result) or {}).get("possible_nodes"))
 
 
 class Lab:
@@ -154,8 +164,7 @@ class Lab:
                     kept = {"nodes": made["nodes"], "elements": made["tets"], "cpu_s": cost.cpu_s}
                 os.replace(part, mesh)
             except RunError as error:
-                result = read_kept(part.with_suffix(".result")) or {}
-                raise RunError(error.code, str(error), result.get("possible_nodes")) from None
+                raise add_possible_nodes(error, part.with_suffix(".result")) from None
             finally:
                 for path in (part, part.with_suffix(".json"), part.with_suffix(".result")):
                     path.unlink(missing_ok=True)
@@ -217,16 +226,24 @@ class Lab:
     def run_case(self, case, key, kept, may_fail):
         folder = self.runs / key
         folder.mkdir(exist_ok=True)
-        bank = folder / "bank.hdf"
+        bank, result = folder / "bank.hdf", folder / "result.json"
+        result.unlink(missing_ok=True)
         write_whole(folder / "job.json", json.dumps(case.job | {"bank": "bank.hdf"}, indent=1) + "\n")
-        program = [self.find_program("carillon-precompute"), "-q", "job.json", *(["--", *case.options] if case.options else [])]
+        program = [
+            self.find_program("carillon-precompute"),
+            "-q",
+            "--result",
+            result.name,
+            "job.json",
+            *(["--", *case.options] if case.options else []),
+        ]
         try:
             cost = self.call(
                 ["mpirun", "-np", case.ranks, *program] if case.ranks > 1 else program, case.name, dict(case.environment), folder
             )
         except RunError as error:
             if not may_fail or error.code not in (2, 3):
-                raise
+                raise add_possible_nodes(error, result) from None
             kept["error"] = str(error)
         else:
             if "modes" not in kept:

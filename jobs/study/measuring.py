@@ -2,6 +2,7 @@
 import dataclasses
 import functools
 import json
+import math
 import os
 import pathlib
 import signal
@@ -218,6 +219,10 @@ def find_extras(record, total_s):
     add("residuals, orthonormality, canonical basis", share * solver["check"])
     add("error bars", to_phases(record, total_s)["error bars"])
     return rows
+
+
+def to_cents(freq_hz, true_hz):
+    return 1200 * math.log2(freq_hz / true_hz)
 
 
 def compare_frequencies(reference_hz, other_hz):

@@ -16,7 +16,6 @@
 #include "precompute/petsc/session.hpp"
 #include "precompute/run/air.hpp"
 #include "precompute/run/end_in_error.hpp"
-#include "precompute/run/enter_folder.hpp"
 #include "precompute/run/interrupt.hpp"
 #include "precompute/run/known_body.hpp"
 #include "precompute/run/predict_cost.hpp"
@@ -78,9 +77,6 @@ struct CommandLine {
     app.add_option("--bank", options.bank, "write the bank to this file instead of the job's \"bank\"")->check(named);
     app.add_option("--result", result, "write the outcome of the run to this file, a JSON object (docs/howto/when-jobs-die.md)")
         ->check(named);
-    app.add_option("--folder", options.folder, "working directory NAME below ROOT; links below ROOT are refused")
-        ->expected(2)
-        ->type_name("ROOT NAME");
     CLI::Option* matrices =
         app.add_option("--matrices", options.matrices, "also write K and M to this folder, as Matrix Market files")->check(named);
     CLI::Option* validate =
@@ -216,7 +212,6 @@ int main(int argc, char** argv) {
     const CommandLine words(argc, argv);
     if (words.only_asks()) return base::is_first_of_all() ? words.app.exit(*words.error) : 0;
     if (!words.error && !words.estimate.empty()) return print_estimate(words);
-    if (!words.error && !words.options.folder.empty()) run::enter_folder(words.options.folder[0], words.options.folder[1]);
     if (base::is_first_of_all()) result = words.result;
     run::end_on_signals("carillon-precompute", "the bank is unchanged or complete");
     if (!words.options.checkpoint.empty()) run::save_on_signals();

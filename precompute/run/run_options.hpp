@@ -16,7 +16,6 @@ struct RunOptions {
   std::filesystem::path checkpoint;           // resumed from if it fits, and saved to; empty: none
   double checkpoint_every_s = 300;            // interval of saves
   std::filesystem::path progress;             // JSON lines are appended; empty: none
-  std::vector<std::string> folder;            // working directory [1] below [0]; links below [0] are not followed; empty: current
   bool profile = false;                       // count messages; read by the launcher
   std::filesystem::path bank;                 // overrides the job's "bank"; empty: no
   std::filesystem::path matrices;             // folder for K and M; empty: none

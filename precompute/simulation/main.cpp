@@ -7,18 +7,15 @@
 #include <exception>
 #include <filesystem>
 #include <string>
-#include <vector>
 
 #include "precompute/job/simulation.hpp"
 #include "precompute/run/end_in_error.hpp"
-#include "precompute/run/enter_folder.hpp"
 #include "precompute/run/interrupt.hpp"
 #include "precompute/simulation/simulate.hpp"
 #include "runtime/base/environment.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/file_limit.hpp"
 #include "runtime/base/keys.hpp"
-#include "runtime/base/message.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/base/result.hpp"
 #include "runtime/base/version.hpp"
@@ -42,7 +39,6 @@ struct CommandLine {
       "Start it on several ranks with: mpirun -np N carillon-simulate JOB.json",
       "carillon-simulate"};
   std::string job, result;
-  std::vector<std::string> folder;
   simulation::SimulateOptions options;
 
   CommandLine() {
@@ -64,9 +60,6 @@ struct CommandLine {
         ->check(CLI::Range(0.0, 1e9))
         ->capture_default_str();
     app.add_option("--result", result, "write how the run ended to this file, a JSON object (docs/howto/when-jobs-die.md)")->check(named);
-    app.add_option("--folder", folder, "work in folder NAME below ROOT, to which no link below ROOT leads")
-        ->expected(2)
-        ->type_name("ROOT NAME");
     CLI::Option* validate =
         app.add_flag("--validate", options.validate, "check the job and its meshes, predict step, time and memory, and simulate nothing");
     app.add_option("--patience", options.patience_s,
@@ -118,12 +111,6 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     if (!base::is_first_of_all()) return error.get_exit_code() == 0 ? 0 : kExitInput;
     return words.app.exit(error) == 0 ? 0 : kExitInput;
-  }
-  try {
-    if (!words.folder.empty()) run::enter_folder(words.folder[0], words.folder[1]);
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "carillon-simulate: error: {}\n", base::show_message(error.what()));
-    return base::get_exit_code(base::describe_error(std::current_exception(), "").kind);
   }
   if (!words.options.checkpoint.empty()) run::save_on_signals();
   base::isolate_lone_process();

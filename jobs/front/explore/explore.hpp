@@ -1,7 +1,6 @@
 // carillon explore: a folder with a web page on which bodies are struck and heard.
 #pragma once
 
-#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>

@@ -6,7 +6,6 @@
 #include <array>
 #include <fstream>
 #include <optional>
-#include <vector>
 
 #include "runtime/base/command.hpp"
 #include "runtime/base/result.hpp"

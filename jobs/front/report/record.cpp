@@ -1,7 +1,5 @@
 #include "jobs/front/report/record.hpp"
 
-#include <fmt/format.h>
-
 #include "runtime/base/file.hpp"
 
 namespace carillon::report {

@@ -2,7 +2,6 @@
 //             watch it, classify its end, verify and publish; write outcome.json last. docs/howto/when-jobs-die.md
 #include <fmt/core.h>
 #include <sys/stat.h>
-#include <time.h>
 #include <unistd.h>
 
 #include <algorithm>

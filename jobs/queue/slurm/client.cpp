@@ -4,7 +4,6 @@
 #include "jobs/queue/slurm/client.hpp"
 
 #include <fmt/core.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>

@@ -33,17 +33,9 @@ constexpr std::size_t kMinPacked = 4;  // minimum number of jobs for packing
 constexpr double kRunnerGb = 0.1;      // memory of the task runner
 constexpr double kTimeMargin = 2.0;    // factor for a predicted time
 
-bool is_open(const Job& job) { return job.state == JobState::queued || job.state == JobState::running || job.state == JobState::waiting; }
-
 std::string make_name(const SubmittedJob& submitted, const std::string& number) {
   const std::string name = submitted.task < 0 ? number : fmt::format("{}_{}", number, submitted.task);
   return submitted.place < 0 ? name : fmt::format("{}.{}", name, submitted.place);
-}
-
-void make_queued(Job& row, const std::string& reason) {
-  row.state = JobState::queued;
-  row.slurm_job.clear();
-  row.reason = reason;
 }
 
 /// Appends Slurm's output to the log of the job.
@@ -263,8 +255,7 @@ void Engine::submit(registry::Registry& registry, const Batch& batch, const Rows
 }
 
 std::vector<Job> Engine::follow(registry::Registry& registry) {
-  Rows changed, jobs = registry.list({JobState::queued, JobState::running, JobState::waiting});
-  std::erase_if(jobs, [](const Job& job) { return job.engine != store::JobEngine::slurm; });
+  Rows changed, jobs = registry.list_open(store::JobEngine::slurm);
   try {
     adopt(registry, jobs);
     std::vector<std::string> names;
@@ -338,7 +329,7 @@ void Engine::adopt(registry::Registry& registry, Rows& jobs) {
     if (submitted && number == "none") remove_submitted_job(store_, job.id);
     registry.update(job.id, [&](Job& row) {
       if (!row.slurm_job.empty() || row.state != job.state || row.token != job.token) return false;
-      make_queued(row, "");
+      queue::wait(row, 0.0, "", queue::LocalClock());
       if (submitted && number != "none") row.slurm_job = make_name(*submitted, number);
       job = row;
       return true;
@@ -371,7 +362,7 @@ void Engine::show_phase(registry::Registry& registry, const Job& job, const Slur
   const std::string reason = is_running ? "" : fmt::format("pending in Slurm{}", has_reason ? " (" + seen.reason + ")" : "");
   if (job.state == state && job.reason == reason) return;
   registry.update(job.id, [&](Job& row) {
-    if (row.slurm_job != job.slurm_job || !is_open(row)) return false;
+    if (row.slurm_job != job.slurm_job || !is_open(row.state)) return false;
     if (row.state != state) {
       if (is_running) row.started_unix_s = registry::find_unix_seconds();
       row.state = state;
@@ -392,7 +383,7 @@ void Engine::settle_ended(registry::Registry& registry, const Job& job, const Su
                           const std::optional<SlurmStatus>& seen, Rows& changed) {
   // Another command may have settled and resubmitted it meanwhile.
   const std::optional<Job> now = registry.find(job.id);
-  if (!now || now->slurm_job != job.slurm_job || !is_open(*now)) return;
+  if (!now || now->slurm_job != job.slurm_job || !is_open(now->state)) return;
   const fs::path work = store_.work_folder(job.id);
   const bool is_shared = is_packed(job.slurm_job);
   const bool is_done = store_.has_bank(job.id);
@@ -410,7 +401,7 @@ void Engine::settle_ended(registry::Registry& registry, const Job& job, const Su
     if (is_shared && state == PackedState::ended) judgement.is_cancelled = false;
   }
   registry.update(job.id, [&](Job& row) {
-    if (row.slurm_job != job.slurm_job || !is_open(row)) return false;
+    if (row.slurm_job != job.slurm_job || !is_open(row.state)) return false;
     remove_submitted_job(store_, job.id);
     row.slurm_job.clear();
     row.attempts += seen && !is_shared ? seen->restarts : 0;
@@ -420,13 +411,12 @@ void Engine::settle_ended(registry::Registry& registry, const Job& job, const Su
       queue::end(row, JobState::cancelled, row.cancel_wanted ? "cancelled" : "cancelled in Slurm (scancel)");
     } else if (state == PackedState::waits && has_begun(store_.root(), submitted)) {
       // The end of the task is not a failure of a job that had not begun.
-      make_queued(row, "its Slurm task ended before it began: " + judgement.outcome.reason);
+      queue::wait(row, 0.0, "its Slurm task ended before it began: " + judgement.outcome.reason, queue::LocalClock());
       row.attempts -= 1;
     } else {
       row.failures = failures;
       apply(row, judgement.outcome, has_asked_memory);
     }
-    row.cancel_wanted = false;
     changed.push_back(row);
     return true;
   });
@@ -449,7 +439,7 @@ void Engine::clean() {
 bool Engine::cancel(registry::Registry& registry, const store::Id& id) {
   bool has_slurm = false;
   registry.update(id, [&](Job& row) {
-    if (!is_open(row)) return false;
+    if (!is_open(row.state)) return false;
     const bool is_with_slurm = !row.slurm_job.empty() || row.state == JobState::running || read_submitted_job(store_.work_folder(id));
     if (!is_with_slurm) {
       queue::cancel_not_started(row);
@@ -462,7 +452,7 @@ bool Engine::cancel(registry::Registry& registry, const store::Id& id) {
   for (const double start_s = base::get_boot_s();;) {
     follow(registry);
     const std::optional<Job> row = registry.find(id);
-    if (!row || !is_open(*row)) return true;
+    if (!row || !is_open(row->state)) return true;
     if (is_unreachable_shown_ || base::get_boot_s() - start_s > kCancelPatienceS) return false;
     const timespec time{0, 300000000};
     ::nanosleep(&time, nullptr);

@@ -6,9 +6,7 @@
 
 #include <cstdlib>
 #include <optional>
-#include <string>
 
-#include "jobs/queue/attempt/attempt.hpp"
 #include "jobs/queue/slurm/client.hpp"
 #include "jobs/queue/slurm/records.hpp"
 #include "jobs/store/files.hpp"

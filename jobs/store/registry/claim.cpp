@@ -15,6 +15,12 @@ bool is_ready(const Job& job, const std::string& boot, double now_s) {
 
 }  // namespace
 
+std::vector<Job> JobTable::list_open(store::JobEngine engine) const {
+  std::vector<Job> jobs = list({JobState::queued, JobState::running, JobState::waiting});
+  std::erase_if(jobs, [&](const Job& job) { return job.engine != engine; });
+  return jobs;
+}
+
 std::vector<Job> calc_claims(const std::vector<Job>& open, const ClaimTerms& terms, const JobTable::Choose& choose) {
   std::vector<Job> running, ready, changed;
   for (const Job& job : open) {

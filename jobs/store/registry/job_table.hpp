@@ -48,6 +48,8 @@ class JobTable {
   virtual std::optional<Job> find(const store::Id& id) const = 0;
   /// In the order of submission; empty `states`: all.
   virtual std::vector<Job> list(const std::vector<JobState>& states) const = 0;
+  /// Open rows of an engine.
+  std::vector<Job> list_open(store::JobEngine engine) const;
   /// Calls `choose` with the running jobs (all engines) and at most `max` jobs that are ready for `engine`, in the order of submission. The
   /// jobs it returns (with `given` and `reason` set) become running: attempts + 1, new token, claimed by `worker`. Returns them. `choose`
   /// must not use the table.

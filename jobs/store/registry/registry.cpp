@@ -174,10 +174,8 @@ std::vector<Job> Registry::list(const std::vector<JobState>& states) const {
     if (states.empty()) return read_jobs(database);
     std::string condition = "where state in (";
     for (const JobState state : states) condition += fmt::format("{}'{}'", condition.ends_with('(') ? "" : ", ", to_text(state));
-    const bool is_open = std::none_of(states.begin(), states.end(), [](JobState state) {
-      return state == JobState::done || state == JobState::failed || state == JobState::cancelled;
-    });
-    if (is_open) condition += ") and state in ('queued', 'waiting', 'running'";  // uses the index
+    if (std::all_of(states.begin(), states.end(), store::is_open))
+      condition += ") and state in ('queued', 'waiting', 'running'";  // uses the index
     return read_jobs(database, condition + ")");
   });
 }

@@ -59,7 +59,6 @@ def list_samples(body, solves):
     rows = []
     for kind, solve in solves:
         errors = [abs(cents.to_cents(f, true)) for f, true in zip(solve.freq_hz, truth.freq_hz)]
-        bars = [a + b for a, b in zip(solve.algebraic_cents, solve.discretisation_cents)]
         if len(errors) == len(truth.freq_hz):
             rows.append(
                 {
@@ -70,7 +69,7 @@ def list_samples(body, solves):
                     "cpu_s": round(solve.cpu, 4),
                     "worst_cents": max(errors),
                     "median_cents": statistics.median(errors),
-                    "bar_cents": max(bars),
+                    "bar_cents": max(solve.bar_cents),
                     "truth_cents": doubt,
                 }
             )

@@ -5,10 +5,7 @@ import statistics
 
 import scaling
 from known import Truth
-
-
-def to_cents(freq_hz, true_hz):
-    return 1200 * math.log2(freq_hz / true_hz)
+from measuring import to_cents
 
 
 @dataclasses.dataclass

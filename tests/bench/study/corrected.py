@@ -49,14 +49,13 @@ def compare(kind, solve, truth, mesh_cpu_s):
     if len(solve.freq_hz) < count:
         return None
     believed = sorted(zip(solve.corrected_hz, solve.corrected_cents))[:count]
-    bars = [a + d for a, d in zip(solve.algebraic_cents, solve.discretisation_cents)][:count]
     return Compared(
         kind.name,
         solve.nodes,
         solve.cpu + mesh_cpu_s,
         [cents.to_cents(f, true) for f, true in zip(solve.freq_hz, truth.freq_hz)],
         [cents.to_cents(f, true) for (f, _), true in zip(believed, truth.freq_hz)],
-        bars,
+        solve.bar_cents[:count],
         [bar for _, bar in believed],
         [cents.to_cents(1 + doubt, 1) for doubt in truth.uncertainty],
     )

@@ -5,6 +5,8 @@ import os
 
 import plots
 from bodies import find_kind, make_bodies
+from forecast import find_fall
+from measuring import to_cents
 from section import Section
 
 PROGRAMS = ("carillon-mesh", "carillon-precompute", "carillon-bank")
@@ -27,14 +29,12 @@ HIGHEST_HZ = 1e6  # above the 800th mode of all bodies
 
 def find_errors(body, freq_hz):
     """Cents above the truth by mode; empty without a truth."""
-    return [1200 * math.log2(f / true) for f, true in zip(freq_hz, body.truth.freq_hz)] if body.truth else []
+    return [to_cents(f, true) for f, true in zip(freq_hz, body.truth.freq_hz)] if body.truth else []
 
 
 def find_distance(one_hz, other_hz):
     """Largest distance in cents of modes of equal index; infinite if the counts differ."""
-    if len(one_hz) != len(other_hz):
-        return math.inf
-    return max((abs(1200 * math.log2(a / b)) for a, b in zip(one_hz, other_hz)), default=0.0)
+    return find_fall(one_hz, other_hz) if len(one_hz) == len(other_hz) else math.inf
 
 
 def show(value, digits=3):
@@ -193,7 +193,7 @@ class Solver:
         data = [("body", "modes", "highest_hz", "cpu_s", "spread", "solves", "factorisations", "worst_residual", "worst_bar_cents")]
         for solve in solves:
             found, record = len(solve.freq_hz), solve.record["solver"]
-            bar = max(a + b for a, b in zip(solve.algebraic_cents, solve.discretisation_cents))
+            bar = max(solve.bar_cents)
             data.append(
                 (
                     body.name,

@@ -23,8 +23,6 @@ using outcome::Cause;
 using registry::Job;
 using registry::JobState;
 
-inline bool is_open(JobState state) { return state == JobState::queued || state == JobState::waiting || state == JobState::running; }
-
 /// Rows in a list, with the claim rule of the registry. No changes on a full disk.
 class MemoryTable final : public registry::JobTable {
  public:
