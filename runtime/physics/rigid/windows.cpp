@@ -193,9 +193,8 @@ void Windows::find_rolling(Groups& groups) {
   for (int i = 0; i < count; ++i) ++sizes[groups.find(i)];
   std::vector<char> rolls(count, 0), touches(count, 0);
   for (int i = 0; i < count; ++i) {
-    if (bodies_.is_moved_by_impact(i)) bodies_.note_struck(i);
     rolls[i] = bodies_.moves(i) && sizes[groups.find(i)] == 1 && !bodies_.is_flat(i) && bodies_.find_articulation(i) == nullptr &&
-               start_s_ - bodies_.get_struck_s(i) > kQuietS;
+               !bodies_.is_in_impact(i) && start_s_ - bodies_.get_struck_s(i) > kQuietS;
   }
   std::vector<double> errors(count, 0.0);  // relative to the permitted ones
   std::vector<Vec3> stations;
