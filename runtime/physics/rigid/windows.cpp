@@ -6,10 +6,10 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <numeric>
 #include <tuple>
 #include <utility>
 
+#include "runtime/physics/geometry/boxes.hpp"
 #include "runtime/physics/rigid/limits.hpp"
 
 namespace carillon::rigid {
@@ -31,12 +31,6 @@ constexpr double kTravelRatio = 3.0;       // or touch travel per window: no ver
 constexpr double kGapDriftM = 5e-7;        // m; maximum change of a gap per step
 constexpr double kMaxTurnRad = 0.05;       // rad; maximum rotation of a normal in the body per step
 constexpr double kMaxSpanRatio = 0.25;     // fraction of its size: touches farther apart prevent hopping
-
-bool overlap(const geometry::Box& x, const geometry::Box& y) {
-  for (int k = 0; k < 3; ++k)
-    if (y.low[k] > x.high[k] || x.low[k] > y.high[k]) return false;
-  return true;
-}
 
 }  // namespace
 
@@ -89,19 +83,13 @@ void Windows::open(double end_s, const std::list<ModalImpact>& impacts) {
       reach_m_s_[i] += bodies_.calc_joint_acceleration(*articulation) * length;
     boxes[i] = bodies_.calc_box(i, bodies_.moves(i) ? reach_m_s_[i] * length + bodies_.get_swing(i) + kBoxMarginM : 0.0);
   }
-  std::vector<int> order(count);
-  std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(), [&](int x, int y) { return boxes[x].low[0] < boxes[y].low[0]; });
-  for (int p = 0; p < count; ++p) {
-    const int i = order[p];
+  for (int i = 0; i < count; ++i)
     if (bodies_.moves(i) && bodies_.ground() && boxes[i].low[2] < bodies_.ground()->height_m) add(i, -1), active_[i] = 1;
-    for (int q = p + 1; q < count && boxes[order[q]].low[0] <= boxes[i].high[0]; ++q) {
-      const int j = order[q];
-      if (!overlap(boxes[i], boxes[j]) || (!bodies_.moves(i) && !bodies_.moves(j)) || bodies_.is_joined(i, j)) continue;
-      add(i, j);
-      active_[i] = active_[j] = 1;
-    }
-  }
+  geometry::for_overlaps(boxes, [&](int i, int j) {
+    if ((!bodies_.moves(i) && !bodies_.moves(j)) || bodies_.is_joined(i, j)) return;
+    add(i, j);
+    active_[i] = active_[j] = 1;
+  });
   open_cords();
   for (const ModalImpact& impact : impacts)
     for (const int body : impact.bodies) active_[body] = 1;
@@ -376,7 +364,7 @@ void Windows::extend(int body) {
   for (int j = 0; j < bodies_.count(); ++j) {
     if (j == body) continue;
     const double reach_m = bodies_.moves(j) ? reach_m_s_[j] * (flying_[j] ? kLength : others_left) + kBoxMarginM : 0.0;
-    if (!overlap(box, bodies_.calc_box(j, reach_m)) || bodies_.is_joined(body, j)) continue;
+    if (!box.overlaps(bodies_.calc_box(j, reach_m)) || bodies_.is_joined(body, j)) continue;
     undo_flight(j, body);
     add(body, j);
   }
