@@ -85,12 +85,11 @@ void check_joints(const WorldSpec& spec) {
   for (const JointSpec& joint : spec.joints) {
     const std::string who = check_ends(joint.place, "joint", joint.body, joint.to);
     if (!is_finite(joint.at_m)) throw InputError(who + ": its position must be three finite numbers");
-    const auto length = [](const Vec3& v) { return std::hypot(v[0], v[1], v[2]); };
     const bool has_axis =
         joint.kind == joints::Kind::kHinge || joint.kind == joints::Kind::kSlider || joint.kind == joints::Kind::kUniversal;
-    if (has_axis && !(std::abs(length(joint.axis) - 1.0) < 1e-6)) throw InputError(who + ": its axis is not a unit vector");
+    if (has_axis && !(std::abs(calc_length(joint.axis) - 1.0) < 1e-6)) throw InputError(who + ": its axis is not a unit vector");
     if (joint.kind == joints::Kind::kUniversal &&
-        !(std::abs(length(joint.second_axis) - 1.0) < 1e-6 && std::abs(dot(joint.axis, joint.second_axis)) < 1e-6))
+        !(std::abs(calc_length(joint.second_axis) - 1.0) < 1e-6 && std::abs(dot(joint.axis, joint.second_axis)) < 1e-6))
       throw InputError(who + ": its second axis is not a unit vector perpendicular to the first");
     if (!(joint.damping >= 0.0 && std::isfinite(joint.damping)))
       throw InputError(fmt::format("{}: damping {} must be a finite number, 0 or more", who, joint.damping));
@@ -115,7 +114,7 @@ void check_joints(const WorldSpec& spec) {
   for (const CordSpec& cord : spec.cords) {
     const std::string who = check_ends(cord.place, "cord", cord.body, cord.to);
     if (!is_finite(cord.from_m) || !is_finite(cord.to_m)) throw InputError(who + ": its ends must be finite numbers");
-    const double distance = std::hypot(cord.from_m[0] - cord.to_m[0], cord.from_m[1] - cord.to_m[1], cord.from_m[2] - cord.to_m[2]);
+    const double distance = calc_length(cord.from_m - cord.to_m);
     if (!(cord.restitution >= 0.0 && cord.restitution <= 1.0))
       throw InputError(fmt::format("{}: restitution {} is not within 0..1", who, cord.restitution));
     if (!(distance > 1e-4)) throw InputError(who + ": its ends coincide; use a ball joint, or ends that differ");

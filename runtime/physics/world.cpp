@@ -48,8 +48,7 @@ rigid::Solid make_solid(const BodySpec& b, Shapes& shapes) {
     solid.inertia_kg_m2 = to_matrix(b.bank->rigid.inertia_kg_m2);
     solid.inverse_inertia = calc_inverse(solid.inertia_kg_m2);
   }
-  for (const Vec3& v : b.bank->vertices_m)
-    solid.radius_m = std::max(solid.radius_m, std::hypot(v[0] - solid.centre_m[0], v[1] - solid.centre_m[1], v[2] - solid.centre_m[2]));
+  for (const Vec3& v : b.bank->vertices_m) solid.radius_m = std::max(solid.radius_m, calc_length(v - solid.centre_m));
   solid.restitution = b.restitution;
   solid.friction = b.friction;
   solid.young_modulus_pa = b.bank->material.young_modulus_pa;
@@ -124,7 +123,7 @@ rigid::Links make_links(const WorldSpec& spec, const std::vector<rigid::Solid>& 
     cord.at_a = tie(cord.a, turned ? c.to_m : c.from_m);
     cord.at_b = tie(cord.b, turned ? c.from_m : c.to_m);
     const Vec3 apart = c.from_m - c.to_m;
-    cord.length_m = std::max(c.length_m.value_or(0.0), std::hypot(apart[0], apart[1], apart[2]));
+    cord.length_m = std::max(c.length_m.value_or(0.0), calc_length(apart));
     cord.restitution = c.restitution;
     links.cords.push_back(cord);
   }
@@ -138,8 +137,7 @@ void check_start(const WorldSpec& spec, const rigid::Space& space) {
     const double error = space.get_start_error(static_cast<int>(i));
     if (body.fixed || (body.velocity_m_s == Vec3{} && body.angular_velocity_rad_s == Vec3{})) continue;
     double fastest = 0.0;
-    for (const BodySpec& other : spec.bodies)
-      fastest = std::max(fastest, std::hypot(other.velocity_m_s[0], other.velocity_m_s[1], other.velocity_m_s[2]));
+    for (const BodySpec& other : spec.bodies) fastest = std::max(fastest, calc_length(other.velocity_m_s));
     if (error > 1e-3 + 0.01 * fastest)
       throw InputError(fmt::format(
           "body '{}': its start velocities differ by {:.3g} m/s from those that its joints allow; a body that rotates about a joint has "
