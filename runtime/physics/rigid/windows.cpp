@@ -158,7 +158,7 @@ void Windows::fly(Articulation& articulation) {
 }
 
 /// Joins groups connected by sleeping bodies: an impact that wakes these merges the groups within the window.
-void Windows::join_sleeping(Groups& groups) const {
+void Windows::join_sleeping(base::Groups& groups) const {
   const auto join = [&](const Pair& pair) {
     if (!bodies_.is_fixed(pair.a) && !bodies_.is_fixed(pair.b)) groups.join(pair.a, pair.b);
   };
@@ -173,7 +173,7 @@ void Windows::join_sleeping(Groups& groups) const {
 
 /// Finds bodies that roll alone and their number of steps from the errors of the last window. The change of a gap is proportional to the
 /// cube of the step.
-void Windows::find_rolling(Groups& groups) {
+void Windows::find_rolling(base::Groups& groups) {
   const int count = bodies_.count();
   const double most = get_length() / options_.step_s;
   const auto find_steps = [&](int body) { return rolling_[body].steps > 0 ? rolling_[body].steps : most; };  // in the last window
@@ -220,7 +220,7 @@ void Windows::find_rolling(Groups& groups) {
 void Windows::choose_steps() {
   const double length_s = get_length();
   const int count = bodies_.count();
-  Groups groups(count);
+  base::Groups groups(count);
   for (const Pair* pair : near_)
     if (bodies_.moves(pair->a) && bodies_.moves(pair->b)) groups.join(pair->a, pair->b);
   islands_ = 0;
@@ -287,7 +287,7 @@ int Windows::find_stride(const Pair& pair) const {
 
 std::vector<Island> Windows::make_islands(const std::list<ModalImpact>& impacts) {
   const int count = bodies_.count();
-  Groups groups(count);
+  base::Groups groups(count);
   for (const Pair* pair : near_)
     if (!pair->contacts.empty() && bodies_.moves(pair->a) && bodies_.moves(pair->b) && is_due(pair->a) && is_due(pair->b))
       groups.join(pair->a, pair->b);
