@@ -4,28 +4,22 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <numeric>
 
 #include "runtime/bank/edges.hpp"
+#include "runtime/base/groups.hpp"
 
 namespace carillon::bank {
 namespace {
 
 /// Per triangle: the smallest triangle connected through edges.
 std::vector<std::int32_t> find_shells(const std::vector<Triangle>& triangles, std::size_t vertices) {
-  std::vector<std::int32_t> shell(triangles.size());
-  std::iota(shell.begin(), shell.end(), 0);
-  const auto find = [&](std::int32_t t) {
-    while (shell[t] != t) t = shell[t] = shell[shell[t]];
-    return t;
-  };
+  const auto count = static_cast<int>(triangles.size());
+  base::Groups shells(count);
   for_each_edge(triangles, vertices, [&](std::int32_t, const HalfEdge* first, const HalfEdge* last) {
-    for (const HalfEdge* edge = first + 1; edge < last; ++edge) {
-      const std::int32_t a = find(edge->number / 3), b = find(edge[-1].number / 3);
-      shell[std::max(a, b)] = std::min(a, b);
-    }
+    for (const HalfEdge* edge = first + 1; edge < last; ++edge) shells.join(edge->number / 3, edge[-1].number / 3);
   });
-  for (std::size_t t = 0; t < triangles.size(); ++t) shell[t] = find(static_cast<std::int32_t>(t));
+  std::vector<std::int32_t> shell(triangles.size());
+  for (int t = 0; t < count; ++t) shell[t] = shells.find(t);
   return shell;
 }
 

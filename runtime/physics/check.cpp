@@ -8,7 +8,7 @@
 #include <numbers>
 
 #include "runtime/base/error.hpp"
-#include "runtime/physics/rigid/groups.hpp"
+#include "runtime/base/groups.hpp"
 
 namespace carillon::physics {
 namespace {
@@ -80,7 +80,7 @@ void check_joints(const WorldSpec& spec) {
     if (is_fixed(body) && is_fixed(to)) throw InputError(who + " connects two bodies that do not move");
     return who;
   };
-  rigid::Groups groups(count + 1);  // the last: static bodies and the world
+  base::Groups groups(count + 1);  // the last: static bodies and the world
   const auto find = [&](int body) { return is_fixed(body) ? count : body; };
   for (const JointSpec& joint : spec.joints) {
     const std::string who = check_ends(joint.place, "joint", joint.body, joint.to);

@@ -12,6 +12,7 @@
 #include "runtime/bank/bank.hpp"
 #include "runtime/base/chance.hpp"
 #include "runtime/physics/impact/spring.hpp"
+#include "runtime/physics/rigid/limits.hpp"
 
 namespace carillon::physics {
 namespace {
@@ -24,7 +25,6 @@ constexpr double kUnloadedEndS = 5e-3;       // s; a spot unloaded for this time
 constexpr double kSmoothingS = 20e-3;        // s
 constexpr double kMinPatchM = 1e-6;          // m; minimum patch radius
 constexpr double kMinRollingSpinRadS = 1.0;  // rad/s; below, the position of a swaying contact is fixed
-constexpr double kMinEdgeRadiusM = 5e-4;     // m; assumed radius of sharp mesh edges
 constexpr double kMinSlipSpeedMS = 1e-6;     // m/s; below, the contact does not slip
 
 std::uint64_t scramble(std::uint64_t state) { return base::draw(state); }
@@ -126,7 +126,8 @@ void LastingContacts::record(const rigid::Space& space, const Group& g, Spot& sp
   stir(space, spot, events);
   if (is_new) {
     spot.begun_s = spot.rises_s = time_s;
-    spot.radius_m = 1.0 / std::clamp(g.curvature_per_m, 1.0 / (5.0 * calc_spot_radius(space, g.a, g.b)), 1.0 / kMinEdgeRadiusM);
+    const double max_m = std::max(5.0 * calc_spot_radius(space, g.a, g.b), rigid::kMinContactRadiusM);
+    spot.radius_m = 1.0 / std::clamp(g.curvature_per_m, 1.0 / max_m, 1.0 / rigid::kMinContactRadiusM);
   }
   spot.recorded_s = time_s;
   const Vec3 va = space.calc_velocity(g.a, g.where), vb = space.calc_velocity(g.b, g.where), u = va - vb;

@@ -18,14 +18,19 @@ constexpr double kMaskedRatio = 0.01;        // relative to the largest impulse 
 constexpr double kForwardMaskRatio = 0.005;  // relative to an earlier impulse of the same body: -46 dB
 constexpr double kMaskDecayS = 0.05;         // s; decay time (1/e) of the latter threshold
 
+/// State of a body before an impact, which may not have moved it.
+const rigid::State& get_state_before(const rigid::Space& space, const rigid::Strike& strike, int body) {
+  const auto at = std::find(strike.bodies.begin(), strike.bodies.end(), body);
+  return at == strike.bodies.end() ? space.state(body) : strike.before[at - strike.bodies.begin()];
+}
+
 /// 1/m_eff of the contact along the normal [1/kg], in the state before the impact.
 double calc_inverse_mass(const rigid::Space& space, const rigid::Strike& strike, const rigid::Hit& hit, const Vec3& where,
                          const Vec3& normal) {
   double sum = 0.0;
   for (const int body : {hit.a, hit.b}) {
     if (body < 0 || space.solid(body).fixed) continue;
-    const auto at = std::find(strike.bodies.begin(), strike.bodies.end(), body);
-    const rigid::State& state = at == strike.bodies.end() ? space.state(body) : strike.before[at - strike.bodies.begin()];
+    const rigid::State& state = get_state_before(space, strike, body);
     const rigid::Solid& solid = space.solid(body);
     const Vec3 arm = cross(where - state.centre, normal);
     sum += 1.0 / solid.mass_kg + dot(arm, rigid::place(solid, state).inverse_inertia * arm);
@@ -65,8 +70,7 @@ void add_spot(const rigid::Space& space, const rigid::Strike& strike, const std:
   for (const int side : {0, 1}) {
     const int body = side == 0 ? first.a : first.b;
     if (body < 0 || (masks != nullptr && masks->take(body, strike.time_s, norm(impulse), pulse.duration_s))) continue;
-    const auto at = std::find(strike.bodies.begin(), strike.bodies.end(), body);
-    const rigid::State& state = at == strike.bodies.end() ? space.state(body) : strike.before[at - strike.bodies.begin()];
+    const rigid::State& state = get_state_before(space, strike, body);
     const double sign = side == 0 ? 1.0 : -1.0;
     // The position of a single hit is known; several hits are on the same face or near it.
     const std::optional<geometry::Place>& known = first.places[side];

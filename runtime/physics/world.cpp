@@ -14,6 +14,7 @@
 #include "runtime/base/clock.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/physics/check.hpp"
+#include "runtime/physics/geometry/boxes.hpp"
 #include "runtime/physics/lasting.hpp"
 #include "runtime/physics/mode_sets.hpp"
 #include "runtime/physics/pulses.hpp"
@@ -380,24 +381,15 @@ class World::Course {
   double min_j_ = std::numeric_limits<double>::infinity();  // minimum energy so far, with losses by hits added back
 };
 
-/// For each body those with overlapping boxes; each pair is listed once, at the later body, and not if both are fixed. Sorted.
+/// For each body those with overlapping boxes; each pair is listed once, at the body with the lower index, and not if both are fixed.
+/// Sorted.
 std::vector<std::vector<int>> World::Course::find_near() const {
   std::vector<geometry::Box> boxes;
-  std::vector<int> order;
-  for (int i = 0; i < count(); ++i) {
-    boxes.push_back(space_.solid(i).shape->calc_box(rigid::place(space_.solid(i), space_.state(i)).frame));
-    order.push_back(i);
-  }
-  const auto box = [&](int body) -> const geometry::Box& { return boxes[body]; };
-  std::sort(order.begin(), order.end(), [&](int a, int b) { return box(a).low[0] < box(b).low[0]; });
+  for (int i = 0; i < count(); ++i) boxes.push_back(space_.solid(i).shape->calc_box(rigid::place(space_.solid(i), space_.state(i)).frame));
   std::vector<std::vector<int>> near(boxes.size());
-  for (auto a = order.begin(); a != order.end(); ++a) {
-    for (auto b = a + 1; b != order.end() && box(*b).low[0] <= box(*a).high[0]; ++b) {
-      if (space_.solid(*a).fixed && space_.solid(*b).fixed) continue;
-      const auto is_apart = [&](std::size_t k) { return box(*a).low[k] > box(*b).high[k] || box(*b).low[k] > box(*a).high[k]; };
-      if (!is_apart(1) && !is_apart(2)) near[std::min(*a, *b)].push_back(std::max(*a, *b));
-    }
-  }
+  geometry::for_overlaps(boxes, [&](int a, int b) {
+    if (!space_.solid(a).fixed || !space_.solid(b).fixed) near[std::min(a, b)].push_back(std::max(a, b));
+  });
   for (std::vector<int>& bodies : near) std::sort(bodies.begin(), bodies.end());
   return near;
 }

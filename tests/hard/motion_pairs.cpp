@@ -1,4 +1,4 @@
-// Hard case of coupled modes of one frequency: any two that span the same motions have to make the same energy and the same sound.
+// Hard case of coupled modes of one frequency: any two with the same span must give the same energy and the same sound.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -73,7 +73,7 @@ void check(const std::string& name, const tests::ModalBody& body, double thickne
     apart = std::max(apart, std::abs(tests::calc_energy(body.comm, second.energy, turn(q, pairs)) / v - 1.0));
   }
   hold("degenerate_pairs", apart, 1e-5, name + ", energy, relative");
-  // Both play the same blow for a fifth of a second; what is heard is the velocity of all modes against one direction.
+  // Both play the same blow for a fifth of a second; the output is the velocity of all modes along one direction.
   std::vector<nonlinear::ModeConstants> constants;
   for (std::size_t i = 0; i < kModes; ++i) constants.push_back({body.modes.lambda[i], 3.0});
   for (const std::size_t i : pairs) constants[i + 1] = constants[i];

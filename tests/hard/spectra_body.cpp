@@ -34,7 +34,7 @@ Eigen::MatrixXd gather(const Answer& answer, std::size_t nodes) {
   return all;
 }
 
-/// The largest sine of an angle between what degenerate modes of both span; groups by the frequencies of `alone`.
+/// Largest sine of an angle between the spaces of degenerate modes of both; groups by the frequencies of `alone`.
 double find_largest_angle(const Answer& alone, const Answer& together, std::size_t nodes) {
   Eigen::MatrixXd a = gather(alone, nodes), b = gather(together, nodes);
   MPI_Allreduce(MPI_IN_PLACE, b.data(), static_cast<int>(b.size()), MPI_DOUBLE, MPI_SUM, PETSC_COMM_WORLD);

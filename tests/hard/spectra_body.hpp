@@ -61,7 +61,7 @@ Answer hold_every_way(const std::string& id, const std::string& part, const Body
 void hold_bars(const std::string& id, const std::string& part, const Body& body, const Answer& answer, const eigen::Options& options,
                const std::vector<double>& true_hz);
 
-/// Holds what modes of one group differ by, relative, at most `bound`. sizes: how many are degenerate, from mode `first` on.
+/// Holds the relative difference of modes of one group to `bound`. sizes: numbers of degenerate modes, from mode `first` on.
 void hold_groups(const std::string& id, const std::string& part, const std::vector<double>& freq_hz, std::size_t first,
                  const std::vector<int>& sizes, double bound);
 

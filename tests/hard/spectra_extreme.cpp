@@ -26,7 +26,7 @@ Body make_brick(int order, const material::Material& material = make_solid(kE, k
   return {move_nodes(box, [&](const Vec3& x) { return Vec3{x[0] + origin[0], x[1] + origin[1], x[2] + origin[2]}; }), {material}};
 }
 
-/// What of a mode's kinetic energy is where x < 0; on every rank.
+/// Share of a mode's kinetic energy at x < 0; on every rank.
 std::vector<double> find_shares(const Answer& answer) {
   petsc::VecHandle phi, m_phi;
   petsc::check(MatCreateVecs(answer.system.mass, phi.out(), m_phi.out()));
@@ -155,7 +155,7 @@ TEST(spectra, tenth_hz) {
       hold(id, std::abs(static_cast<double>(answer.modes.count_below_low) - 6), 0, part + " zeros");
     }
   }
-  // Stiff blocks on a soft layer: six modes near 0.1 Hz in addition to the six zeros, and what rings at some kHz, in one band.
+  // Stiff blocks on a soft layer: six modes near 0.1 Hz, the six zeros, and modes of some kHz, in one band.
   for (const int order : {1, 2})
     for (const double high_hz : {20.0, 20e3})
       for (const double low_hz : {0.05, 1e-4}) hold_dumbbell(id, order, make_band(low_hz, high_hz));

@@ -71,7 +71,7 @@ TEST(time, twenty_at_rest) {
   hold("twenty_at_rest", course.impulses, 0.0, "hits");
   hold("twenty_at_rest", calc_drift(course), 0.0, "drift in ten minutes [m]");
   hold("twenty_at_rest", static_cast<double>(course.at_end.steps - course.at_half.steps), 0.0, "steps of physics in ten minutes");
-  // What is heard of it, with every effect, after the sound of being set down.
+  // Its sound with every effect, after that of being set down.
   const Course heard = run(spec, 20.0, 2.0, true);
   synth::Synthesiser synthesiser({.rate_hz = 48000.0, .max_waypoints = 256, .ring_events = 1 << 18});
   const auto model = synth::Model::make(box);

@@ -1,5 +1,5 @@
-// Hard cases of contact: what spins, rolls, slides, bounces and balances, thin and tiny bodies, bodies inside others. Against closed forms,
-// and the books of energy.
+// Hard cases of contact: spinning, rolling, sliding, bouncing and balancing bodies, thin and tiny ones, bodies inside others. Against
+// closed forms and the energy balance.
 #include <gtest/gtest.h>
 
 #include <array>

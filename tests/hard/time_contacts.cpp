@@ -1,4 +1,4 @@
-// Hard cases of contact: thin, fast, unequal, many, wedged, and chained bodies. Whether they end where they must.
+// Hard cases of contact: thin, fast, unequal, many, wedged, and chained bodies, by their final positions.
 #include <gtest/gtest.h>
 
 #include <string>

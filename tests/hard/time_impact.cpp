@@ -22,8 +22,7 @@ using impact::tests::make_contact;
 using impact::tests::make_plate;
 constexpr double kBooks = 1e-10;
 
-/// The largest of what must not be: books that are open, energy that a loss gave, forces that pull or leave the cone, numbers that ran
-/// away.
+/// Largest fault: an open energy balance, energy gained by a loss, forces that pull or leave the cone, diverging numbers.
 double calc_fault(Impact& impact, const std::vector<Contact>& contacts) {
   const Books books = impact.get_books();
   const double scale = std::max({books.start, std::abs(books.given), books.rigid, 1e-300});
@@ -47,7 +46,7 @@ double calc_fault(Impact& impact, const std::vector<Contact>& contacts) {
   return fault;
 }
 
-/// Runs it to its end, or for `longest_s`, and holds what is wrong to the bound.
+/// Runs it to its end, or for `longest_s`, and holds its fault to the bound.
 Impact hold_impact(const std::string& id, const std::vector<Body>& bodies, const std::vector<Contact>& contacts, const std::string& part,
                    const Options& options = {}, double longest_s = 0.2) {
   Impact impact(bodies, contacts, options);

@@ -65,7 +65,7 @@ double calc_drift(const Course& course) {
   return max;
 }
 
-/// Links on ball joints from the origin along x, and what hangs at their end.
+/// Links on ball joints from the origin along x, and a body at their end.
 WorldSpec make_chain(const bank::Bank& link, double length_m, int count, const bank::Bank* weight, double radius_m) {
   WorldSpec spec;
   for (int i = 0; i < count; ++i) {

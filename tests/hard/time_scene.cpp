@@ -27,7 +27,7 @@ constexpr int kMillion = 1000000;
 
 /// With the room that a scene has.
 void play_million_hits_with_little_room() {
-  // What is not played is counted, work in a period stays below what that room can ask for, nothing else suffers.
+  // Omitted hits are counted, work in a period stays within the limit of that room, nothing else changes.
   std::vector<std::pair<double, double>> modes;
   for (int m = 0; m < 64; ++m) modes.emplace_back(to_lambda(150.0 * (m + 1)), 5.0 + m);
   const auto model = Model::make(make_bank(modes), {.rate_hz = kSceneRate});

@@ -1,4 +1,4 @@
-// GROUP time: supports that no wall is.
+// GROUP time: extreme supports.
 #include <gtest/gtest.h>
 
 #include <cmath>

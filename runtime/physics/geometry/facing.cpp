@@ -19,30 +19,19 @@ double calc_skin_gap(const Shape& shape, const Vec3& x, const Nearest& at, bool 
 }
 
 Facing describe(const Mesh& mesh, const Skin& skin, const Nearest& at) {
-  int zeros = 0, zero = 0, whole = 0;
-  for (int k = 0; k < 3; ++k) {
-    if (at.weights[k] <= 0.0) {
-      ++zeros;
-      zero = k;
-    } else {
-      whole = k;
-    }
-  }
+  const auto [zeros, start] = find_feature(at.face, at.weights);
   if (zeros == 2) {
-    const int v = mesh.vertex_of(3 * at.face + whole);
+    const int v = mesh.vertex_of(start);
     if (skin.kind(v) == VertexKind::corner) return {Side::point, {}, v};
     // Point within an edge: follow the sharp edge.
-    for (int e = 3 * at.face + whole;;) {
+    for (int e = start;;) {
       if (skin.is_sharp(e)) return {Side::line, normalise(mesh.vertices[mesh.vertex_of(Mesh::next(e))] - mesh.vertices[v]), v};
       e = Mesh::next(mesh.opposite[e]);
-      if (e == 3 * at.face + whole) break;
+      if (e == start) break;
     }
   }
-  if (zeros == 1) {
-    const int e = 3 * at.face + (zero + 1) % 3;
-    if (skin.is_sharp(e))
-      return {Side::line, normalise(mesh.vertices[mesh.vertex_of(Mesh::next(e))] - mesh.vertices[mesh.vertex_of(e)]), -1};
-  }
+  if (zeros == 1 && skin.is_sharp(start))
+    return {Side::line, normalise(mesh.vertices[mesh.vertex_of(Mesh::next(start))] - mesh.vertices[mesh.vertex_of(start)]), -1};
   if (skin.is_flat(at.face)) return {Side::plane, mesh.normals[at.face], -1};
   return {Side::skin, {}, -1};
 }

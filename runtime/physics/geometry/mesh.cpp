@@ -198,13 +198,7 @@ Nearest Mesh::walk_nearest(const Vec3& x, int face) const {
   constexpr int kMax = 100;
   Nearest best = find_nearest_on_face(x, face);
   for (int step = 0; step < kMax; ++step) {
-    int whole = 0, zero = 0, zeros = 0;
-    for (int k = 0; k < 3; ++k) {
-      if (best.weights[k] > 0.0)
-        whole = k;
-      else
-        zero = k, ++zeros;
-    }
+    const auto [zeros, start] = find_feature(best.face, best.weights);
     if (zeros == 0) break;
     Nearest better = best;
     const Vec3 out = x - best.place;
@@ -215,10 +209,9 @@ Nearest Mesh::walk_nearest(const Vec3& x, int face) const {
     // A neighbouring face can only be nearer if the angle at its corner to the direction of x is below a right angle.
     const auto leads = [&](int half_edge) { return dot(out, vertices[vertex_of(half_edge)] - best.place) > 0.0; };
     if (zeros == 1) {
-      const int e = opposite[3 * best.face + (zero + 1) % 3];
+      const int e = opposite[start];
       if (leads(next(next(e)))) try_face(e / 3);
     } else {
-      const int start = 3 * best.face + whole;
       bool before = leads(next(start));  // at the end of the last edge
       for (int e = next(opposite[start]); e != start; e = next(opposite[e])) {
         const bool now = leads(next(e));
@@ -234,22 +227,11 @@ Nearest Mesh::walk_nearest(const Vec3& x, int face) const {
 
 bool Mesh::is_inside(const Vec3& x, const Nearest& nearest) const {
   const Vec3 d = x - nearest.place;
-  int zeros = 0, zero = 0, whole = 0;
-  for (int k = 0; k < 3; ++k) {
-    if (nearest.weights[k] <= 0.0) {
-      ++zeros;
-      zero = k;
-    } else {
-      whole = k;
-    }
-  }
+  const auto [zeros, half_edge] = find_feature(nearest.face, nearest.weights);
   const Vec3& own = normals[nearest.face];
   if (zeros == 0) return dot(d, own) < 0.0;
-  if (zeros == 1) {  // edge opposite to corner `zero`
-    const int back = opposite[3 * nearest.face + (zero + 1) % 3];
-    return dot(d, own + normals[back / 3]) < 0.0;
-  }
-  return dot(d, vertex_normals[vertex_of(3 * nearest.face + whole)]) < 0.0;
+  if (zeros == 1) return dot(d, own + normals[opposite[half_edge] / 3]) < 0.0;
+  return dot(d, vertex_normals[vertex_of(half_edge)]) < 0.0;
 }
 
 bool Mesh::crosses(const Box& box, const Vec3& x, const Vec3& d, double length) {

@@ -18,6 +18,22 @@ struct Nearest {
   Vec3 place{};
 };
 
+/// Feature of a face at barycentric weights: its interior, one of its edges or one of its corners.
+struct FaceFeature {
+  int zeros = 0;       // number of zero weights; 1: on an edge, 2: at a corner
+  int half_edge = -1;  // that edge, or the edge that leaves the corner
+};
+inline FaceFeature find_feature(int face, const Vec3& weights) {
+  int zeros = 0, zero = 0, whole = 0;
+  for (int k = 0; k < 3; ++k) {
+    if (weights[k] <= 0.0)
+      zero = k, ++zeros;
+    else
+      whole = k;
+  }
+  return {zeros, 3 * face + (zeros == 1 ? (zero + 1) % 3 : whole)};
+}
+
 /// Closed, oriented triangle mesh: every half-edge has exactly one opposite, every vertex one fan of triangles, normals point outwards.
 /// Immutable.
 class Mesh {

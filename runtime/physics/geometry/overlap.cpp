@@ -85,9 +85,7 @@ double calc_overlap(const Shape& a, const Frame& fa, const Shape& b, const Frame
     for (int f = 0; f < m.count_faces(); ++f) {
       Box box;
       for (int k = 0; k < 3; ++k) box.add(places[m.vertex_of(3 * f + k)]);
-      bool apart = false;
-      for (int k = 0; k < 3; ++k) apart = apart || box.low[k] > t.box.high[k] || box.high[k] < t.box.low[k];
-      if (!apart) near.push_back(f);
+      if (box.overlaps(t.box)) near.push_back(f);
     }
     for (const int f : near) {
       for (int e = 3 * f; e < 3 * f + 3; ++e) {

@@ -2,7 +2,9 @@
 // point on the other side that adds most area; then points below the planes through these. Identities by nearness of the stations.
 #include "runtime/physics/geometry/reduce.hpp"
 
-#include <numeric>
+#include <algorithm>
+
+#include "runtime/base/groups.hpp"
 
 namespace carillon::geometry {
 namespace {
@@ -99,26 +101,20 @@ void keep_low(const std::vector<Touch>& t, const std::vector<int>& patch, std::v
 void reduce(std::vector<Touch>& touches, double patch_m) {
   const int count = static_cast<int>(touches.size());
   if (count <= 4) return;
-  std::vector<int> group(count);
-  std::iota(group.begin(), group.end(), 0);
-  const auto root = [&](int i) {
-    while (group[i] != i) i = group[i] = group[group[i]];
-    return i;
-  };
+  base::Groups groups(count);
   for (int i = 0; i < count; ++i) {
     for (int j = 0; j < i; ++j) {
       if (dot(touches[i].normal, touches[j].normal) < kPatchCosine || norm2(touches[i].where_m - touches[j].where_m) > patch_m * patch_m)
         continue;
-      const int p = root(i), q = root(j);
-      group[std::max(p, q)] = std::min(p, q);
+      groups.join(i, j);
     }
   }
   std::vector<int> patch, kept, of_patch;
   for (int r = 0; r < count; ++r) {
-    if (root(r) != r) continue;
+    if (groups.find(r) != r) continue;
     patch.clear();
     for (int i = r; i < count; ++i)
-      if (root(i) == r) patch.push_back(i);
+      if (groups.find(i) == r) patch.push_back(i);
     of_patch.clear();
     keep_four(touches, patch, of_patch);
     keep_low(touches, patch, of_patch);

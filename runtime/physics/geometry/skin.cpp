@@ -398,22 +398,13 @@ Spot Skin::walk_lowest(const Vec3& up, int face, const Vec3& centre, double reac
       best.settled = false;
       return best;
     }
-    int zeros = 0, zero = 0, whole = 0;
-    for (int k = 0; k < 3; ++k) {
-      if (best.weights[k] == 0.0) {
-        ++zeros;
-        zero = k;
-      } else {
-        whole = k;
-      }
-    }
+    const auto [zeros, start] = find_feature(best.face, best.weights);
     if (zeros == 0) return best;
     const double below = best.height - tiny_;
     Spot better = best;
     if (zeros == 1) {
-      lower(up, mesh_.opposite[3 * best.face + (zero + 1) % 3] / 3, centre, spring, below, better);
+      lower(up, mesh_.opposite[start] / 3, centre, spring, below, better);
     } else {
-      const int start = 3 * best.face + whole;
       for (int e = Mesh::next(mesh_.opposite[start]); e != start; e = Mesh::next(mesh_.opposite[e]))
         lower(up, e / 3, centre, spring, below, better);
     }

@@ -34,6 +34,11 @@ struct Box {
     add(other.low);
     add(other.high);
   }
+  bool overlaps(const Box& other) const {
+    for (std::size_t k = 0; k < 3; ++k)
+      if (other.low[k] > high[k] || low[k] > other.high[k]) return false;
+    return true;
+  }
   double calc_distance2(const Vec3& x) const {
     double sum = 0.0;
     for (std::size_t k = 0; k < 3; ++k) {

@@ -1,6 +1,6 @@
-// Compiled once for every set of instructions, without contraction. All loops go along columns, element by element: so all sets give the
-// same numbers. Nothing of the standard library's templates is called here: the linker would take one copy of them for all files, maybe
-// one with instructions that the processor has not.
+// Compiled once per instruction set, without contraction. All loops run along columns, element by element, so results do not depend on the
+// instruction set. No templates of the standard library: the linker keeps one copy of them for all files, possibly one with unsupported
+// instructions.
 // Source: G. H. Golub, C. F. Van Loan, "Matrix Computations" (2013), algorithm 3.4.1.
 #include "runtime/physics/impact/dense.hpp"
 

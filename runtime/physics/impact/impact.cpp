@@ -370,13 +370,6 @@ void Impact::update(std::span<const Body> bodies, std::span<const Contact> conta
   set_up_step();
 }
 
-Vec3 Impact::get_force(int contact) const {
-  Vec3 force{};
-  for (std::size_t r = 0; r < rows_.size(); ++r)
-    if (rows_[r].contact == contact) force = force + force_[r] * rows_[r].axis;
-  return force;
-}
-
 double Impact::calc_rigid_energy() const {
   double sum = on_joints_j_;
   for (const Body& body : bodies_)

@@ -123,9 +123,7 @@ class Impact {
   int get_steps() const { return steps_; }
   /// Steps solved without friction because no frictional solution was found (solve.hpp). 0 in all tests.
   int get_misses() const { return misses_; }
-  /// Force on a in the last step [N], world axes; compression [m].
-  Vec3 get_force(int contact) const;
-  double get_compression(int contact) const { return laws_[contact].compression_m; }
+  double get_compression(int contact) const { return laws_[contact].compression_m; }  // [m]
   const Contact& get_contact(int contact) const { return contacts_[contact].given; }  // without its shapes
   /// Rigid penetration explained by the compression of the spring and the displacement of the modes of both bodies [m].
   double calc_depth(int contact) const;

@@ -43,7 +43,6 @@ class Modes {
 
   int size() const { return static_cast<int>(omega_.size()); }
   const std::vector<double>& get_omega() const { return omega_; }
-  const std::vector<double>& get_decay() const { return decay_; }
   double get_band() const { return band_; }
   const std::vector<double>& get_tail_omega() const { return tail_omega_; }  // empty if has_tail() is false
 

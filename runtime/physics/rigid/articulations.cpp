@@ -6,8 +6,8 @@
 #include <stdexcept>
 
 #include "runtime/base/error.hpp"
+#include "runtime/base/groups.hpp"
 #include "runtime/physics/rigid/bodies.hpp"
-#include "runtime/physics/rigid/groups.hpp"
 #include "runtime/physics/rigid/limits.hpp"
 
 namespace carillon::rigid {
@@ -17,7 +17,7 @@ void Bodies::make_articulations(const std::vector<joints::Joint>& joints) {
   if (joints.empty()) return;
   articulation_of_.assign(solids_.size(), -1);
   member_.assign(solids_.size(), -1);
-  Groups groups(count());
+  base::Groups groups(count());
   std::vector<char> has_joint(solids_.size(), 0);
   for (const joints::Joint& joint : joints) {
     if (joint.body >= 0 && joint.to >= 0) joined_.insert(std::minmax(joint.body, joint.to));

@@ -19,7 +19,7 @@ constexpr double kMaxHertzS = 20e-3;  // s
 }  // namespace
 
 double calc_hertz_duration(double compliance, double radius, double mass, double speed) {
-  const double duration = 2.87 * std::pow(mass * mass * compliance * compliance / (radius * std::max(speed, 1e-3)), 0.2);
+  const double duration = 2.87 * std::pow(mass * mass * compliance * compliance / (radius * std::max(speed, kMinImpactSpeedMS)), 0.2);
   return std::clamp(duration, 5e-6, kMaxHertzS);
 }
 

@@ -13,7 +13,8 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr double kMaxStretchM = 5e-5;  // m; a cord stretched further is shortened even if that gains energy
+constexpr double kMaxStretchM = 5e-5;   // m; a cord stretched further is shortened even if that gains energy
+constexpr double kMaxPushOutMS = 5e-3;  // m/s; maximum speed of that, and of a body pushed back to its stop
 
 struct StopTouch {
   double gap_m = 0.0;
@@ -62,7 +63,7 @@ Point make_stop_point(const Bodies& bodies, const Step& step, const Stop& stop, 
   if (p.b >= 0) p.arm_b = end.where_m - step.free[p.b].state.centre;
   const double approach = bodies.calc_approach(c.touch, c.a, c.b), gap = c.touch.gap_m;
   double speed = c.touching && gap <= kTouchGapM ? 0.0 : approach - 2.0 * std::max(gap, 0.0) / h;
-  if (gap < -kDeepM) speed += std::min(kPushOutRatePerS * (-kDeepM - gap), 5e-3);
+  if (gap < -kDeepM) speed += std::min(kPushOutRatePerS * (-kDeepM - gap), kMaxPushOutMS);
   p.wanted = speed * p.normal;
   p.impulse = (c.step_s > 0.0 ? h / c.step_s : 0.0) * c.impulse;
   return p;
@@ -147,7 +148,7 @@ Point make_cord_point(const Bodies& bodies, const Step& step, const Cord& cord, 
   // Excess length is removed like penetration, at half the power that the cord loses (step_points.cpp).
   if (gap < -kDeepM) {
     const double pull = dot(c.impulse, c.touch.normal), paid = pull > 0.0 ? std::max(0.5 * c.lost_j / pull, 0.0) : 0.0;
-    speed += std::min(kPushOutRatePerS * (-kDeepM - gap), gap < -kMaxStretchM ? 5e-3 : paid);
+    speed += std::min(kPushOutRatePerS * (-kDeepM - gap), gap < -kMaxStretchM ? kMaxPushOutMS : paid);
   }
   p.wanted = speed * p.normal - (a.beyond - b.beyond);
   p.impulse = (c.step_s > 0.0 ? h / c.step_s : 0.0) * c.impulse;

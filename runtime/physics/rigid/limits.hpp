@@ -13,10 +13,9 @@ inline constexpr double kMissingDepthM = 5e-6;      // m; excess of a missing to
 inline constexpr double kPushOutRatePerS = 80.0;    // 1/s; removal rate of penetration or of the stretch of a cord
 inline constexpr double kRestResidualRatio = 1e-4;  // relative to gravity: permitted residual of a solution with zero velocity
 inline constexpr int kMaxGuesses = 12;              // of a factorised problem, for small ones and proofs of rest
-inline constexpr double kMinContactRadiusM = 5e-4;  // m; minimum contact radius
+inline constexpr double kMinContactRadiusM = 5e-4;  // m; minimum contact radius: that of sharp mesh edges
 inline constexpr double kSlowSpeedMS = 5e-3;        // m/s; slower bodies may be coming to rest
-inline constexpr double kLongSlowS =
-    0.3;  // s; after this time at low speed the mean acceleration is small, and a larger residual is permitted
+inline constexpr double kLongSlowS = 0.3;  // s; after this time at low speed the mean acceleration is small: a larger residual is permitted
 inline constexpr double kSearchRangeRatio = 0.3;  // relative to the size of the smaller body: search distance of touches
 
 }  // namespace carillon::rigid

@@ -9,7 +9,7 @@
 #include <limits>
 #include <map>
 
-#include "runtime/physics/rigid/groups.hpp"
+#include "runtime/base/groups.hpp"
 #include "runtime/physics/rigid/limits.hpp"
 
 namespace carillon::rigid {
@@ -135,7 +135,7 @@ void Rest::try_parts() {
   const std::vector<char> is_slow = find_slow();
   if (is_slow.empty()) return;
   const auto is_one = [&](int body) { return body >= 0 && is_slow[body] != 0; };
-  Groups groups(bodies_.count());
+  base::Groups groups(bodies_.count());
   for (const Pair* pair : windows_.near())
     if (is_one(pair->a) && is_one(pair->b) && pair->touches()) groups.join(pair->a, pair->b);
   struct Part {

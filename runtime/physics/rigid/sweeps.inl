@@ -1,6 +1,6 @@
-// The loops over the points. Compiled once for every set of instructions, without contraction, so that all give the same numbers. Nothing
-// here makes or grows a vector: such a function may be kept outside of the loops, and the linker would take one of them for all files,
-// maybe that with instructions that the processor has not.
+// Loops over the points. Compiled once per instruction set, without contraction, so results do not depend on the instruction set. No vector
+// is created or grown here: such a function may be emitted separately, and the linker keeps one copy of it for all files, possibly one with
+// unsupported instructions.
 #include <algorithm>
 #include <cmath>
 
@@ -11,14 +11,14 @@
 namespace carillon::rigid::sweeps {
 namespace {
 
-/// The part across the normal.
+/// Tangential part.
 inline Four drop_normal(const Four& from) {
   Four a = from;
   a[0] = 0.0;
   return a;
 }
 
-/// Velocity of the point of a less that of b, axes of the point.
+/// Velocity of a minus that of b at the point; axes of the point.
 inline Four calc_velocity(const Problem& problem, const Row& row) {
   const Body &a = problem.bodies[row.a], &b = problem.bodies[row.b];
   return combine(row.along, a.velocity - b.velocity) + (combine(row.turning_a, a.spin) + combine(row.turning_b, b.spin));
@@ -62,7 +62,7 @@ void prepare(Problem& problem) {
     for (Four& column : row.inverse) column *= part;
     row.mobility = k[0][0];
     row.normal_mass = 1.0 / k[0][0];
-    row.tangent_mass = 1.0 / (k[1][1] + k[2][2]);  // the sum of both eigenvalues across the normal
+    row.tangent_mass = 1.0 / (k[1][1] + k[2][2]);  // sum of both tangential eigenvalues
   }
 }
 
@@ -85,11 +85,11 @@ inline void push(Problem& problem, const Row& row, const Four& impulse) {
   if (row.locked >= 0) respond(problem, problem.locked[row.locked].pushed, impulse);
 }
 
-/// The impulse that the point ought to have, seeing the velocities as they are, a part of the way to it.
+/// Impulse of a point required by the current velocities; `part` < 1: only this part of its change.
 inline Four calc_impulse(const Problem& problem, const Row& row, double part) {
   const Four missing = row.wanted - calc_velocity(problem, row);
   const Locked* locked = row.locked >= 0 ? &problem.locked[row.locked] : nullptr;
-  // What joints do not allow no impulse brings about.
+  // No impulse along directions that joints block.
   bool may_stick = part == 1.0;
   if (locked != nullptr && may_stick) {
     const Four beyond = missing - combine(locked->allowed, missing);
@@ -118,7 +118,7 @@ inline void give_couple(Problem& problem, const Row& row, const Turning& turning
   respond(problem, turning.turned, couple);
 }
 
-/// Brings the couple against rolling and drilling up to date. Returns the change of it as a velocity, squared.
+/// Updates the couple that resists rolling and twisting. Returns its squared change, as a velocity.
 inline double turn(Problem& problem, const Row& row, Turning& turning) {
   const Body &a = problem.bodies[row.a], &b = problem.bodies[row.b];
   Four next = turning.couple - turning.mass * combine(row.along, a.spin - b.spin);
@@ -167,7 +167,7 @@ void begin(Problem& problem) {
 }
 
 void share(Problem& problem, double part) {
-  // A point's share is of the velocities before any point has changed.
+  // All points use the velocities before any of them has changed.
   for (std::size_t n = 0; n < problem.rows.size(); ++n)
     problem.changes[n].by = calc_impulse(problem, problem.rows[n], part) - problem.rows[n].impulse;
   add(problem, problem.changes);

@@ -330,11 +330,7 @@ geometry::Touch TouchSets::find_closing(Pair& pair, const Contact& contact, doub
   if (!contact.touch.smooth || !(contact.touch.gap_m > kTouchGapM) || !(approach > 0.0)) return contact.touch;
   const double closes_s = std::min(time_s, contact.touch.gap_m / approach);
   geometry::Touch touch = find_moved(pair, contact.touch, find_flown(pair.a, closes_s), find_flown(pair.b, closes_s));
-  const auto find_now = [&](int body, const Vec3& station) {
-    const geometry::Frame frame = bodies_.get_frame(body);
-    return body < 0 ? station : frame.position_m + frame.rotation * station;
-  };
-  const Vec3 at_a = find_now(pair.a, touch.station_a), at_b = find_now(pair.b, touch.station_b);
+  const Vec3 at_a = to_world(bodies_.get_frame(pair.a), touch.station_a), at_b = to_world(bodies_.get_frame(pair.b), touch.station_b);
   touch.gap_m = dot(at_a - at_b, touch.normal);
   touch.where_m = at_a;
   return touch;

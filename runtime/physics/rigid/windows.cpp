@@ -6,10 +6,10 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <numeric>
 #include <tuple>
 #include <utility>
 
+#include "runtime/physics/geometry/boxes.hpp"
 #include "runtime/physics/rigid/limits.hpp"
 
 namespace carillon::rigid {
@@ -31,12 +31,6 @@ constexpr double kTravelRatio = 3.0;       // or touch travel per window: no ver
 constexpr double kGapDriftM = 5e-7;        // m; maximum change of a gap per step
 constexpr double kMaxTurnRad = 0.05;       // rad; maximum rotation of a normal in the body per step
 constexpr double kMaxSpanRatio = 0.25;     // fraction of its size: touches farther apart prevent hopping
-
-bool overlap(const geometry::Box& x, const geometry::Box& y) {
-  for (int k = 0; k < 3; ++k)
-    if (y.low[k] > x.high[k] || x.low[k] > y.high[k]) return false;
-  return true;
-}
 
 }  // namespace
 
@@ -89,19 +83,13 @@ void Windows::open(double end_s, const std::list<ModalImpact>& impacts) {
       reach_m_s_[i] += bodies_.calc_joint_acceleration(*articulation) * length;
     boxes[i] = bodies_.calc_box(i, bodies_.moves(i) ? reach_m_s_[i] * length + bodies_.get_swing(i) + kBoxMarginM : 0.0);
   }
-  std::vector<int> order(count);
-  std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(), [&](int x, int y) { return boxes[x].low[0] < boxes[y].low[0]; });
-  for (int p = 0; p < count; ++p) {
-    const int i = order[p];
+  for (int i = 0; i < count; ++i)
     if (bodies_.moves(i) && bodies_.ground() && boxes[i].low[2] < bodies_.ground()->height_m) add(i, -1), active_[i] = 1;
-    for (int q = p + 1; q < count && boxes[order[q]].low[0] <= boxes[i].high[0]; ++q) {
-      const int j = order[q];
-      if (!overlap(boxes[i], boxes[j]) || (!bodies_.moves(i) && !bodies_.moves(j)) || bodies_.is_joined(i, j)) continue;
-      add(i, j);
-      active_[i] = active_[j] = 1;
-    }
-  }
+  geometry::for_overlaps(boxes, [&](int i, int j) {
+    if ((!bodies_.moves(i) && !bodies_.moves(j)) || bodies_.is_joined(i, j)) return;
+    add(i, j);
+    active_[i] = active_[j] = 1;
+  });
   open_cords();
   for (const ModalImpact& impact : impacts)
     for (const int body : impact.bodies) active_[body] = 1;
@@ -170,7 +158,7 @@ void Windows::fly(Articulation& articulation) {
 }
 
 /// Joins groups connected by sleeping bodies: an impact that wakes these merges the groups within the window.
-void Windows::join_sleeping(Groups& groups) const {
+void Windows::join_sleeping(base::Groups& groups) const {
   const auto join = [&](const Pair& pair) {
     if (!bodies_.is_fixed(pair.a) && !bodies_.is_fixed(pair.b)) groups.join(pair.a, pair.b);
   };
@@ -185,7 +173,7 @@ void Windows::join_sleeping(Groups& groups) const {
 
 /// Finds bodies that roll alone and their number of steps from the errors of the last window. The change of a gap is proportional to the
 /// cube of the step.
-void Windows::find_rolling(Groups& groups) {
+void Windows::find_rolling(base::Groups& groups) {
   const int count = bodies_.count();
   const double most = get_length() / options_.step_s;
   const auto find_steps = [&](int body) { return rolling_[body].steps > 0 ? rolling_[body].steps : most; };  // in the last window
@@ -193,9 +181,8 @@ void Windows::find_rolling(Groups& groups) {
   for (int i = 0; i < count; ++i) ++sizes[groups.find(i)];
   std::vector<char> rolls(count, 0), touches(count, 0);
   for (int i = 0; i < count; ++i) {
-    if (bodies_.is_moved_by_impact(i)) bodies_.note_struck(i);
     rolls[i] = bodies_.moves(i) && sizes[groups.find(i)] == 1 && !bodies_.is_flat(i) && bodies_.find_articulation(i) == nullptr &&
-               start_s_ - bodies_.get_struck_s(i) > kQuietS;
+               !bodies_.is_in_impact(i) && start_s_ - bodies_.get_struck_s(i) > kQuietS;
   }
   std::vector<double> errors(count, 0.0);  // relative to the permitted ones
   std::vector<Vec3> stations;
@@ -233,7 +220,7 @@ void Windows::find_rolling(Groups& groups) {
 void Windows::choose_steps() {
   const double length_s = get_length();
   const int count = bodies_.count();
-  Groups groups(count);
+  base::Groups groups(count);
   for (const Pair* pair : near_)
     if (bodies_.moves(pair->a) && bodies_.moves(pair->b)) groups.join(pair->a, pair->b);
   islands_ = 0;
@@ -300,7 +287,7 @@ int Windows::find_stride(const Pair& pair) const {
 
 std::vector<Island> Windows::make_islands(const std::list<ModalImpact>& impacts) {
   const int count = bodies_.count();
-  Groups groups(count);
+  base::Groups groups(count);
   for (const Pair* pair : near_)
     if (!pair->contacts.empty() && bodies_.moves(pair->a) && bodies_.moves(pair->b) && is_due(pair->a) && is_due(pair->b))
       groups.join(pair->a, pair->b);
@@ -377,7 +364,7 @@ void Windows::extend(int body) {
   for (int j = 0; j < bodies_.count(); ++j) {
     if (j == body) continue;
     const double reach_m = bodies_.moves(j) ? reach_m_s_[j] * (flying_[j] ? kLength : others_left) + kBoxMarginM : 0.0;
-    if (!overlap(box, bodies_.calc_box(j, reach_m)) || bodies_.is_joined(body, j)) continue;
+    if (!box.overlaps(bodies_.calc_box(j, reach_m)) || bodies_.is_joined(body, j)) continue;
     undo_flight(j, body);
     add(body, j);
   }

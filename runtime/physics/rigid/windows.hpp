@@ -5,7 +5,7 @@
 #include <list>
 #include <vector>
 
-#include "runtime/physics/rigid/groups.hpp"
+#include "runtime/base/groups.hpp"
 #include "runtime/physics/rigid/modal_impact.hpp"
 #include "runtime/physics/rigid/options.hpp"
 #include "runtime/physics/rigid/step.hpp"
@@ -75,8 +75,8 @@ class Windows {
   };
 
   void open_cords();
-  void find_rolling(Groups& groups);
-  void join_sleeping(Groups& groups) const;
+  void find_rolling(base::Groups& groups);
+  void join_sleeping(base::Groups& groups) const;
   void undo_flight(int body, int by);
 
   Bodies& bodies_;

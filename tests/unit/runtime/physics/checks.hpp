@@ -1,4 +1,4 @@
-// What the tests ask of a finished simulation, by means of their own.
+// Quantities of a finished simulation, computed independently.
 #pragma once
 
 #include <algorithm>

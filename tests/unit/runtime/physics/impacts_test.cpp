@@ -43,7 +43,7 @@ TEST(TwoBodies, MomentumOfImpactInFlight) {
   EXPECT_EQ(s.impulses[0].other, s.impulses[1].body);
   const Vec3 total = calc_momentum(ball, s.poses[0], 0.2, 0.4) + calc_momentum(box, s.poses[1], 0.2, 0.4);
   EXPECT_LT(norm(total - Vec3{-box.rigid.mass_kg, 0, 0}), 2e-3 * box.rigid.mass_kg);
-  // What was emitted is what each body gained.
+  // The emitted impulses are the momentum gained by each body.
   EXPECT_LT(norm(calc_momentum(ball, s.poses[0], 0.2, 0.4) - j0), 2e-3 * norm(j0));
 }
 
@@ -229,9 +229,9 @@ TEST(Masks, MaskingOfMuchWeakerHits) {
   EXPECT_TRUE(masks.take(0, 1.001, 0.001, 2.0 * kLength));
   // A hard tap is heard above a soft blow, whose spectrum ends below it.
   EXPECT_FALSE(masks.take(0, 1.001, 0.001, 0.1 * kLength));
-  // They fade by 60 dB in a third of a second, and what is hidden hides nothing else.
+  // Masks decay by 60 dB in a third of a second, and masked hits mask no others.
   EXPECT_FALSE(masks.take(0, 1.35, 0.001, kLength));
-  // Of an impact that is given late by the length of a step, nothing grows.
+  // An impact reported late by a step does not increase the mask.
   EXPECT_TRUE(masks.take(0, 1.3495, 4e-6, kLength));
 }
 

@@ -1,4 +1,4 @@
-// Bodies that do not touch go their ways apart; in slices of any size; to the same bits.
+// Bodies without contact move independently; results do not depend on the slices, bit for bit.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// Motions that have a closed form, or a solution that others published: what rolls, swings in a bowl, falls in a row.
+// Motions with a closed form or a published solution: rolling bodies, a ball in a bowl, dominoes.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Contacts that last: their force against weight, their speeds against Coulomb's and rolling's closed forms, and that nothing chatters.
+// Lasting contacts: force against the weight, speeds against closed forms of sliding and rolling, no chatter.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -170,7 +170,7 @@ TEST(LastingContacts, SweepOfRollingBall) {
   int late = 0;
   for (const Impulse& p : r.impulses) late += p.time_s > 0.1 ? 1 : 0;
   EXPECT_EQ(late, 0) << "its facets are no strikes";
-  // Rolling resistance and facets brake it: what it sweeps is compared with how fast it is by then.
+  // Rolling resistance and facets slow it down: the sweep is compared with its speed at that time.
   double now = 0.0;
   int count = 0;
   for (const events::BodyMotion& m : r.motions) {
@@ -187,7 +187,7 @@ TEST(LastingContacts, SweepOfRollingBall) {
   EXPECT_NEAR(calc_mean(r, 0.1, 0.4, [](const LastingContact& c) { return c.spin_rad_s; }), now / radius, 0.1 * now / radius);
 }
 
-/// Nothing between two records may lead to what only the first hit on bodies at rest does.
+/// The records before the first hit on bodies at rest must not show its effect.
 void expect_nothing_before_hit(const WorldSpec& spec, double end_s) {
   const Outcome r = run(spec, end_s);
   const double rested = 0.3;

@@ -1,4 +1,4 @@
-// Nothing is struck without a pulse: what a body's velocity does, against the pulses it was given.
+// Every change of a body's velocity has its pulse.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -27,8 +27,8 @@ std::vector<events::Event> run(const WorldSpec& spec, double end_s) {
 
 struct Found {
   int jumps = 0;            // instants at which the velocity jumps by more than 1 cm/s
-  double worst_jump = 0.0;  // m/s; of a jump what no pulse explains, beyond what may be left unheard
-  double worst_rest = 0.0;  // m/s; what the velocity changes from motion to motion between impacts, without gravity
+  double worst_jump = 0.0;  // m/s; largest part of a jump without a pulse, beyond the inaudible part
+  double worst_rest = 0.0;  // m/s; largest change of velocity between impacts, without gravity
 };
 
 /// Goes through the motions of one body. At an impact there are two with one time, before and after.

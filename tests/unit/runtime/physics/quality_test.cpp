@@ -1,4 +1,4 @@
-// What is heard of contacts: every hit that is there and none that is not, down to inaudible speeds.
+// Hits of contacts: complete and without false ones, down to inaudible speeds.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -87,7 +87,7 @@ TEST_P(Bouncing, HitTimesOfClosedForm) {
     if (n + 1 >= fewest) continue;
     EXPECT_NEAR(s.impulses[n].impulse_n_s[2] / ball.rigid.mass_kg, (1 + e) * hit.speed_m_s, 0.01 * hit.speed_m_s + 2e-4) << "hit " << n;
   }
-  // What gravity did to it in all the time, and nothing else, was given back in hits, but for the last moment.
+  // The hits return the momentum of gravity over the whole time, except for the last moment.
   double given = 0.0;
   for (const Impulse& p : s.impulses) given += p.impulse_n_s[2] / ball.rigid.mass_kg;
   const Impulse& last = s.impulses.back();
@@ -131,8 +131,8 @@ class ComingToRest : public testing::TestWithParam<double> {};
 INSTANTIATE_TEST_SUITE_P(Restitutions, ComingToRest, testing::Values(0.0, 0.3, 0.6));
 
 TEST_P(ComingToRest, NoRapidRepeatedHits) {
-  // A box that falls on a corner rattles to rest, faster and softer, over ever shorter flights. No corner is heard again before its contact
-  // is over, but for what another corner that lands pushes through it, a tenth of a hit; and gravity alone pays for all of them together.
+  // A box that falls on a corner rattles to rest with ever shorter flights. No corner hits again before the end of its contact, except for
+  // a tenth of a hit caused by the landing of another corner, and the sum of all hits is the momentum of gravity.
   const double e = GetParam();
   const bank::Bank box = make_box({0.06, 0.05, 0.04});
   for (int turn = 0; turn < 12; ++turn) {

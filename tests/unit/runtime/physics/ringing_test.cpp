@@ -1,4 +1,4 @@
-// Impacts with modes inside: what goes in comes out, of energy and of momentum, and what rings still carries.
+// Impacts with modes: balance of energy and momentum; ringing bodies still support others.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -105,7 +105,7 @@ TEST_P(Books, EnergyBalanceWithinOnePercent) {
       w.bodies = {make_body("box", box, {0, 0, 0.025}, 0.6), make_body("plate", plate, {0, 0, 0.055}, 0.6),
                   make_body("ball", ball, {0.01, 0.01, 0.4}, 0.6)};
       break;
-    case 8:  // what is struck lies on a shelf that rings
+    case 8:  // the struck body lies on a ringing shelf
       w.bodies = {make_body("shelf", plate, {0, 0, 0.3}, 0.6), make_body("box", box, {0.05, 0.02, 0.33}, 0.6),
                   make_body("ball", ball, {0.06, 0.03, 0.6}, 0.6)};
       w.bodies[0].fixed = true;
@@ -204,7 +204,7 @@ TEST(Ringing, GroundReactionOfStruckPlate) {
   const double fall = std::sqrt(2.0 * 9.81 * 0.06);
   EXPECT_GT(on_ball, 0.5 * ball.rigid.mass_kg * fall);
   EXPECT_NEAR(by_ball, -on_ball, 0.01 * on_ball);
-  // The ground has taken what the ball gave.
+  // The ground took the momentum of the ball.
   EXPECT_GT(on_plate, 0.3 * on_ball);
   EXPECT_GT(r.energy.max_modes_j, 0.02 * ball.rigid.mass_kg * 9.81 * 0.06);
   EXPECT_LT(r.energy.error_j, 0.01 * ball.rigid.mass_kg * 9.81 * 0.06);

@@ -1,4 +1,4 @@
-// What stands remains standing.
+// Standing bodies remain standing.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Thin plates that are struck and that fall, through the whole world: restitution against Zener's theory, and what their modes get.
+// Struck and falling thin plates in a whole world: restitution against Zener's theory, energy of their modes.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -28,7 +28,7 @@ bank::Bank make_steel_ball(double radius_m) {
   return ball;
 }
 
-/// A box whose upper face has one more vertex, the last, at (x, y): what strikes there finds the shapes that are given for it.
+/// A box with one more vertex, the last, at (x, y) of its upper face: hits there find the mode shapes of that vertex.
 bank::Bank make_struck_box(const Vec3& size, double x, double y) {
   bank::Bank box = make_box(size);
   box.material = {kSteel, kSteelPoisson, kSteelDensity, 1e-7, 1.0};

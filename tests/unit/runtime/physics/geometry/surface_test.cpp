@@ -1,4 +1,4 @@
-// The mesh of a shape: what is refused, what is recognised, which triangle is touched.
+// Mesh of a shape: refusals, recognised features, touched triangles.
 #include <gtest/gtest.h>
 
 #include <numbers>

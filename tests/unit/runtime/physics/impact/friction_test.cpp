@@ -19,7 +19,7 @@ TEST(Friction, GrossSlidingImpulse) {
   Impact impact = run({make_ball(kRadius, {along, 0, -v})}, contacts, {.steps_per_pulse = 40.0});
   const Body after = impact.get_bodies()[0];
   EXPECT_NEAR(after.velocity_m_s[2], v, 1e-11);
-  // At the very end the anchor spring lets go of what it holds: mu F k^-1 F'.
+  // At the very end the anchor spring releases its energy: mu F k^-1 F'.
   EXPECT_NEAR(after.velocity_m_s[0], along - 2.0 * mu * v, 2e-3 * 2.0 * mu * v);
   EXPECT_NEAR(calc_slip(after), along - 7.0 * mu * v, 2e-3 * 7.0 * mu * v);
   // Work of friction: mean slip times impulse.
@@ -145,7 +145,7 @@ TEST(Friction, ExcitationOfTangentialModes) {
   Impact impact = run({make_ball(kRadius, {1.0, 0, -1.0}), table}, contacts);
   const Body ball = impact.get_bodies()[0];
   EXPECT_GT(impact.get_books().modal, 0.0);
-  // About 0.8 J: the pulse is short against the period, and what it does later in it counts a little less.
+  // About 0.8 J: the pulse is short relative to the period, and its later part counts a little less.
   const double impulse = -ball.mass_kg * (ball.velocity_m_s[0] - 1.0);
   EXPECT_NEAR(std::sqrt(2.0 * impact.get_books().modal), 0.8 * impulse, 0.2 * 0.8 * impulse);
 }

@@ -1,4 +1,4 @@
-// A given restitution is an upper limit of the whole one: of what the contact, and what bodies that bend, throw back.
+// A given restitution is an upper limit of the total one, of the contact and of bending bodies.
 #include <array>
 
 #include "tests/unit/runtime/physics/impact/scenes.hpp"
@@ -37,7 +37,7 @@ struct Rebound {
   double elastic = 0.0, given = 0.0;  // with a restitution of 1, and with the one given; of the bodies as rigid ones, at the contact
 };
 
-/// Of a ball that strikes a body with modes at rest, `x` from its centre. Checks what every impact has to keep.
+/// Rebound of a ball from a body at rest with modes, `x` from its centre. Checks the invariants of impacts.
 Rebound calc_rebound(const Body& below, const std::vector<double>& shape, double radius, double speed, double x, double restitution,
                      double friction = 0.0) {
   Rebound rebound;
@@ -129,7 +129,7 @@ TEST(Limit, BallOnFreeBar) {
 }
 
 TEST(Limit, BallOnBlock) {
-  // Modes far above the pulse: what the contact loses is all that is lost.
+  // Modes far above the pulse: the contact is the only loss.
   const Modes modes(std::vector<double>{2.0 * kPi * 60e3, 2.0 * kPi * 90e3}, std::vector<double>{5.0, 5.0});
   Body below;
   below.modes = &modes;
@@ -158,7 +158,7 @@ TEST(Limit, TwoContactsOnOneBar) {
     contacts[1].shape_b = right.shape;
     for (Contact& contact : contacts) contact.restitution = e, contact.friction = 0.2, contact.is_limit = true;
     Impact impact = run(bodies, contacts);
-    // A blow on one side may lift the other; what a contact itself pushes apart is limited, and so is the sum here.
+    // A blow on one side may lift the other; the rebound of each contact is limited, and so is their sum here.
     EXPECT_LE(-impact.calc_approach(0), 1.3 * e);
     EXPECT_LE(-impact.calc_approach(1), 1.3 * e);
   }

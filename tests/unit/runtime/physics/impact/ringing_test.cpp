@@ -107,7 +107,7 @@ TEST(Ringing, AgreementWithRungeKutta) {
 }
 
 TEST(Ringing, ModalStatesFromForceSamples) {
-  // What a synthesiser does with the samples: each is a constant force for one step.
+  // As a synthesiser uses the samples: each is a constant force for one step.
   const Pair pair;
   Impact impact = run(pair.make_bodies(), pair.make_contacts());
   const auto after = impact.get_bodies();

@@ -1,4 +1,4 @@
-// Balls and plates for the tests of impacts, and what all of them have to keep.
+// Balls and plates for the tests of impacts, and the invariants of all impacts.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -25,7 +25,7 @@ inline Body make_ball(double radius_m, const Vec3& velocity_m_s, double density 
   return ball;
 }
 
-/// Ball (body `a`) on what lies under it at z = 0.
+/// Ball (body `a`) on a body under it at z = 0.
 inline Contact make_contact(double radius_m, int a = 0, int b = -1) {
   Contact contact;
   contact.a = a;

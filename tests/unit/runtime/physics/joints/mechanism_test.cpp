@@ -1,4 +1,4 @@
-// Mechanisms by themselves: free motion and what impulses do, against closed forms and equations written down here.
+// Mechanisms alone: free motion and response to impulses, against closed forms and independent equations.
 #include "runtime/physics/joints/mechanism.hpp"
 
 #include <gtest/gtest.h>

@@ -386,7 +386,7 @@ TEST(stops, rebound_of_pendulum_at_stop) {
     EXPECT_NEAR(norm(hit.after[0].velocity), e * speed, 1e-4 * speed) << past;
     EXPECT_NEAR(hit.before[0].centre[0], -arm * std::sin(past), 1e-6) << past;
     EXPECT_NEAR(space.calc_books().calc_total(), before, 1e-6 * gained);
-    // Back as far as what is left goes; never beyond the stop.
+    // Back to the height of the remaining energy; never beyond the stop.
     double highest = -1.0, min = 1.0;
     while (space.get_time() < hit.time_s + 0.6) {
       space.step(3.0);

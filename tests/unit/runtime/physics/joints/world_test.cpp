@@ -1,4 +1,4 @@
-// Worlds with joints and cords in which things ring: books of energy, momentum, and what is refused.
+// Worlds with joints, cords and ringing bodies: energy balance, momentum, refusals.
 #include <gtest/gtest.h>
 
 #include <cmath>

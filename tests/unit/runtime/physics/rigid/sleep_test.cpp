@@ -1,4 +1,4 @@
-// What sleeps in a group that moves elsewhere, and what wakes it. Oracle: the same bodies in one problem, in which none sleeps by itself.
+// Sleeping parts of moving groups, and their wake-up. Oracle: the same bodies in one problem, in which none sleeps alone.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -81,7 +81,7 @@ TEST(sleep, sleep_among_moving_bodies) {
 }
 
 TEST(sleep, wake_on_tipping_support) {
-  // A board on two supports; what slides along it beyond the second one tips it, and the box that slept on its other end.
+  // A board on two supports; a block that slides beyond the second one tips it, and wakes the box on its other end.
   Table table;
   table.add_supports(0.05);
   table.add(make_box(1.0, {1.0, 0.2, 0.02}), {0, 0, 0.11});
@@ -122,7 +122,7 @@ TEST(sleep, wake_on_sinking_support) {
 }
 
 TEST(sleep, no_lift_of_relieved_columns) {
-  // A board on two columns of two blocks; what slides off one of them and to the other.
+  // A board on two columns of two blocks; a block slides along it from one column to the other.
   Table table;
   std::vector<int> blocks;
   for (const double x : {-0.3, 0.3})
@@ -206,7 +206,7 @@ TEST(sleep, impact_through_body_of_other_group) {
 }
 
 TEST(sleep, impact_between_groups_of_different_steps) {
-  // What is fast takes shorter steps than what slides slowly; the impact comes at any moment of the longer ones.
+  // Fast bodies take shorter steps than slowly sliding ones; the impact comes at any moment of the longer steps.
   const double speed = 40.0;
   for (int k = 0; k < 9; ++k) {
     const StruckBlock scene(speed * (0.552 + 0.00025 * k), speed);
@@ -222,7 +222,7 @@ TEST(sleep, impact_between_groups_of_different_steps) {
 }
 
 TEST(sleep, wake_by_slow_load_and_sleep_again) {
-  // A board on two blocks; the weight of what slides along it goes from one block to the other.
+  // A board on two blocks; the weight of a sliding block moves from one to the other.
   Table table;
   std::vector<int> blocks;
   for (const double x : {-0.3, 0.3}) blocks.push_back(table.add(make_box(0.2, {0.06, 0.1, 0.05}), {x, 0, 0.025}));

@@ -18,7 +18,7 @@ Mover make_block(double mass_kg, Vec3 size_m, Vec3 velocity) {
   return m;
 }
 
-/// The four lower corners of a block against what is below it.
+/// The four lower corners of a block on the body below it.
 std::vector<Point> make_feet(int a, int b, Vec3 size_m, double friction, double below_m = 0.0) {
   std::vector<Point> feet;
   for (const double x : {-0.5, 0.5})

@@ -1,4 +1,4 @@
-// Connected groups of bodies: union-find.
+// Connected groups: union-find.
 #pragma once
 
 #include <algorithm>
@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-namespace carillon::rigid {
+namespace carillon::base {
 
 /// Disjoint groups of the numbers 0 ... count - 1 (union-find). A group is represented by its smallest number.
 class Groups {
@@ -28,4 +28,4 @@ class Groups {
   std::vector<int> parent_;
 };
 
-}  // namespace carillon::rigid
+}  // namespace carillon::base
