@@ -68,7 +68,6 @@ class NonlinearModes {
   void drop_below(double pressure_pa) noexcept;
   void reset() noexcept;
   double calc_energy_j() const noexcept { return modes_.get_energy_j() + (cascade_ ? cascade_->calc_energy_j() : 0.0); }
-  const nonlinear::CoupledCounters& get_counters() const noexcept { return modes_.get_counters(); }
 
  private:
   double get_re(int i) const noexcept { return i < get_coupled_count() ? modes_.get_re(i) : cascade_->get_re(i - get_coupled_count()); }

@@ -77,7 +77,6 @@ struct BodyScratch {
   std::array<float, kBlock> mono{};
   std::array<std::array<float, kBlock>, 3> dipole{};
   std::array<double, kBlock> heard{};
-  std::array<std::array<double, kBlock>, 2> by_head{};
 };
 
 using Mix = std::vector<std::array<double, kBlock>>;  // per microphone
