@@ -4,6 +4,7 @@
 #include <cmath>
 #include <span>
 
+#include "runtime/synth/smooth_step.hpp"
 #include "runtime/synth/sounding_body.hpp"
 
 namespace carillon::synth {
@@ -11,7 +12,7 @@ namespace {
 
 /// Smooth step from 0 to 1 over a block, or back.
 double calc_fade(Fade fade, std::int64_t sample) noexcept {
-  const double u = static_cast<double>(sample % kBlock) / kBlock, in = u * u * (3.0 - 2.0 * u);
+  const double in = calc_smooth_step(static_cast<double>(sample % kBlock) / kBlock);
   return fade == Fade::kIn ? in : 1.0 - in;
 }
 
