@@ -92,7 +92,7 @@ std::unique_ptr<ModelSwap> SoundingBody::make_swap(std::shared_ptr<const Model> 
   if (swap->modes) swap->handover = std::make_unique<ModeHandover>(*model_, *model);
   swap->acceleration_noise = make_noise(*model);
   swap->contacts = make_contacts(model, swap->surface);
-  if (is_directed()) swap->directed = make_directed_sound(effects_, make_propagation_options(), model);
+  if (is_directed()) swap->directed = std::make_unique<DirectedSound>(effects_, make_propagation_options(), model);
   model_ = std::move(model);
   return swap;
 }
