@@ -23,7 +23,7 @@ SoundingBody::SoundingBody(std::shared_ptr<const Model> model, BodyFrame frame, 
       effects_(effects),
       track_(static_cast<std::size_t>(frame_.max_waypoints)),
       rotation_(rotation) {
-  check(effects, *model_);
+  check(*model_);
   track_.push({.position_m = position_m});
   surface_ = make_surface(*model_);
   modes_ = make_modes(model_);
@@ -36,12 +36,12 @@ SoundingBody::SoundingBody(std::shared_ptr<const Model> model, BodyFrame frame, 
   if (is_directed()) modes_->direct(propagation_->directed->weights.get());
 }
 
-void SoundingBody::check(EffectSet effects, const Model& model) {
-  if (effects.has(Effect::kDirectivity) && model.get_directivity() == nullptr)
+void SoundingBody::check(const Model& model) const {
+  if (effects_.has(Effect::kDirectivity) && model.get_directivity() == nullptr)
     throw InputError("directivity: this bank has no multipoles; make the bank with them, or leave the effect out");
-  if (effects.has(Effect::kNonlinear) && model.get_nonlinear() == nullptr)
+  if (effects_.has(Effect::kNonlinear) && model.get_nonlinear() == nullptr)
     throw InputError("nonlinear: this bank has no nonlinear energy; make the bank with it, or leave the effect out");
-  if (effects.has(Effect::kAccelerationNoise) && !(model.get_sphere_radius_m() > 0.0 && model.get_mass_kg() > 0.0))
+  if (effects_.has(Effect::kAccelerationNoise) && !(model.get_sphere_radius_m() > 0.0 && model.get_mass_kg() > 0.0))
     throw InputError("acceleration_noise: this bank has no mass or no volume; leave the effect out");
 }
 
@@ -85,7 +85,6 @@ ContactSurface SoundingBody::make_surface(const Model& model) const {
 }
 
 std::unique_ptr<ModelSwap> SoundingBody::make_swap(std::shared_ptr<const Model> model) {
-  check(effects_, *model);
   auto swap = std::make_unique<ModelSwap>();
   swap->surface = make_surface(*model);
   swap->modes = make_modes(model);

@@ -92,10 +92,11 @@ class SoundingBody {
   SoundingBody(std::shared_ptr<const Model> model, BodyFrame frame, EffectSet effects, const Vec3& position_m,
                const events::Quaternion& rotation);
 
-  /// Modules of a new model, which the body has from then on. Throws as check() does. [main-thread]
+  EffectSet get_effects() const noexcept { return effects_; }
+  /// Throws InputError for a model without the data for the effects. [main-thread]
+  void check(const Model& model) const;
+  /// Modules of a checked model, which the body has from then on. [main-thread]
   std::unique_ptr<ModelSwap> make_swap(std::shared_ptr<const Model> model);
-  /// Throws InputError for effects that a body of this model cannot have. [main-thread]
-  static void check(EffectSet effects, const Model& model);
 
   /// All that follows: [audio-thread], no heap, no lock, no throw.
 

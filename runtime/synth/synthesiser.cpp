@@ -160,7 +160,7 @@ int Synthesiser::add_body(std::shared_ptr<const Model> model, const BodySettings
   for (auto* energy : {&published.given_j, &published.lost_j, &published.held_j, &published.radiated_j})
     energy->store(0.0, std::memory_order_relaxed);
   Owned& owned = owned_[free];
-  owned = Owned{.body = std::move(body), .swap = nullptr, .wanted_model = nullptr, .effects = settings.effects, .is_leaving = false};
+  owned.body = std::move(body);
   commands_->push({.body = owned.body.get(), .number = number, .kind = Command::Kind::kAdd});
   return number;
 }
@@ -183,7 +183,7 @@ void Synthesiser::swap_model(int body, std::shared_ptr<const Model> model) {
   check_model(model.get());
   collect();
   Owned& owned = owned_[check_owned(body)];
-  SoundingBody::check(owned.effects, *model);
+  owned.body->check(*model);
   std::shared_ptr<const Model> before = std::exchange(owned.wanted_model, std::move(model));
   try {
     send_swap(body);
@@ -193,7 +193,7 @@ void Synthesiser::swap_model(int body, std::shared_ptr<const Model> model) {
   }
 }
 
-EffectSet Synthesiser::get_effects(int body) const { return owned_[check_owned(body)].effects; }
+EffectSet Synthesiser::get_effects(int body) const { return owned_[check_owned(body)].body->get_effects(); }
 
 /// Sends the pending swap unless an earlier one is in progress.
 void Synthesiser::send_swap(int number) {
