@@ -139,8 +139,7 @@ void Model::add_ringing_mode(const Mode& mode) {
   modes_.push_back(mode);
   const double h = 1.0 / rate_hz_;
   const double d = mode.decay;
-  const double omega = std::sqrt(mode.lambda);
-  const double omega_d = std::sqrt((omega - d) * (omega + d));
+  const double omega = std::sqrt(mode.lambda), omega_d = calc_damped_omega(mode.lambda, d);
   const auto answer = [&](double samples) { return std::exp(-d * samples * h) * std::polar(1.0, omega_d * samples * h); };
   const std::complex<double> out(mode.gain, mode.gain * d / omega_d);
   for (int k = 0; k < kColumn; ++k) {
