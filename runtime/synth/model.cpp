@@ -202,9 +202,7 @@ void Model::add_nonlinear(const bank::QuarticEnergy& energy) {
     made->constants.push_back({mode.lambda, mode.decay});
     made->groups = std::max(made->groups, m / kGroup + 1);
     made->strike[m / kGroup].scale[m % kGroup] = 0.0F;
-    const ForceAnswer answer = calc_force_answer({mode.lambda, mode.decay}, rate_hz_);
-    made->force_re.push_back(answer.re);
-    made->force_im.push_back(answer.im);
+    made->answer.push_back(calc_force_answer({mode.lambda, mode.decay}, rate_hz_));
   }
   double highest = 0.0;
   for (const nonlinear::ModeConstants& mode : made->constants) highest = std::max(highest, mode.eigenvalue_rad2_s2);

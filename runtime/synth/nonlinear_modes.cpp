@@ -76,8 +76,7 @@ NonlinearModes::NonlinearModes(const Model& model, bool has_cascade)
     place_[mode_[i]] = static_cast<int>(i);
     groups_ = std::max(groups_, mode_[i] / kGroup + 1);
     gain_.push_back(model.get_gain(mode_[i]));
-    answer_.push_back(i < nonlinear_->mode.size() ? ForceAnswer{nonlinear_->force_re[i], nonlinear_->force_im[i]}
-                                                  : calc_force_answer(constants_[i], model.get_rate_hz()));
+    answer_.push_back(i < nonlinear_->mode.size() ? nonlinear_->answer[i] : calc_force_answer(constants_[i], model.get_rate_hz()));
   }
   for (auto* values : {&push_re_, &push_im_, &keep_}) values->assign(kIntervals * mode_.size(), 0.0);
 }
