@@ -127,7 +127,8 @@ void SoundingBody::hear_by_head(std::int64_t sample, std::size_t count, const Li
       const std::size_t size = std::min<std::size_t>(kSubBlock, count - n);
       Vec3 from = -1.0 * direction[n / kSubBlock];
       if (is_mirrored) from = listener.get_floor()->mirror_direction(from);
-      const double end_s = static_cast<double>(sample + static_cast<std::int64_t>(n + size) - Receiver::kLatency) / frame_.rate_hz;
+      const double end_s =
+          static_cast<double>(sample + static_cast<std::int64_t>(n + size) - Receiver::kLatency) / frame_.propagation.rate_hz;
       propagation.head[way].process(listener.find_in_head(from, end_s), arrived.subspan(n, size), ears[0].subspan(n, size),
                                     ears[1].subspan(n, size));
     }

@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -27,18 +26,12 @@ namespace carillon::synth {
 
 /// The surroundings and limits of a body, in addition to its model.
 struct BodyFrame {
-  double rate_hz = 0.0;
-  std::vector<Vec3> microphones_m;  // from the listener
+  PropagationOptions propagation;
   int max_strikes = 0, max_forces = 0;
-  int max_waypoints = 0;
-  double longest_m = 0.0;
   double silence_pa = 1e-10;
   Isa isa = Isa::kBest;
   ContactSurface surface{};
   bool audits_energy = false;
-  std::optional<Floor> floor = std::nullopt;
-  std::optional<ListeningHead> head = std::nullopt;
-  int phase = 0;  // of Directivity
 };
 
 /// The acceleration noise of a body with its attitude.
@@ -138,7 +131,7 @@ class SoundingBody {
   template <class Strike>
   bool play(const Strike& strike, bool has_length, bool is_new, std::int64_t sample) noexcept;
   void wake(std::int64_t sample) noexcept;
-  PropagationOptions make_propagation_options() const;
+  double calc_own_s(double time_s) const noexcept;
   std::unique_ptr<ResonatorBank> make_modes(const std::shared_ptr<const Model>& model) const;
   std::unique_ptr<BodyAccelerationNoise> make_noise(const Model& model) const;
   std::unique_ptr<ContactForces> make_contacts(const std::shared_ptr<const Model>& model, const ContactSurface& surface) const;

@@ -138,19 +138,19 @@ int Synthesiser::add_body(std::shared_ptr<const Model> model, const BodySettings
   const auto number = static_cast<int>(free);
   auto body = std::make_unique<SoundingBody>(
       std::move(model),
-      BodyFrame{.rate_hz = options_.rate_hz,
-                .microphones_m = options_.microphones_m,
+      BodyFrame{.propagation = {.rate_hz = options_.rate_hz,
+                                .microphones_m = options_.microphones_m,
+                                .longest_m = settings.longest_m > 0.0 ? settings.longest_m : options_.longest_m,
+                                .max_waypoints = settings.max_waypoints > 0 ? settings.max_waypoints : options_.max_waypoints,
+                                .floor = options_.floor,
+                                .head = options_.head,
+                                .phase = number},
                 .max_strikes = options_.max_strikes,
                 .max_forces = settings.max_forces >= 0 ? settings.max_forces : options_.max_forces,
-                .max_waypoints = settings.max_waypoints > 0 ? settings.max_waypoints : options_.max_waypoints,
-                .longest_m = settings.longest_m > 0.0 ? settings.longest_m : options_.longest_m,
                 .silence_pa = settings.silence_pa,
                 .isa = settings.isa,
                 .surface = settings.surface,
-                .audits_energy = settings.audits_energy,
-                .floor = options_.floor,
-                .head = options_.head,
-                .phase = number},
+                .audits_energy = settings.audits_energy},
       settings.effects, settings.position_m, settings.rotation);
   Published& published = published_bodies_[free];
   for (const Effect effect : EffectSet::all()) published.units[effect].store(0, std::memory_order_relaxed);
