@@ -29,9 +29,6 @@ class AccelerationNoise {
   /// Force known step by step.
   bool push(const events::Force& force, const events::Quaternion& to_world) noexcept;
 
-  /// Time before its beginning by which a strike must be known.
-  double get_lead_s() const { return radius_s_; }
-
   /// Writes the next samples of the dipole along x, y and z of the world [Pa at 1 m], three spans of one size. The bits do not depend on
   /// the block sizes. At rest it only writes zeros. [audio-thread]: no heap, no lock, no throw.
   void process(const std::array<std::span<float>, 3>& dipole_pa) noexcept;

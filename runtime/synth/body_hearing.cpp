@@ -4,6 +4,7 @@
 #include <cmath>
 #include <span>
 
+#include "runtime/synth/smooth_step.hpp"
 #include "runtime/synth/sounding_body.hpp"
 
 namespace carillon::synth {
@@ -11,7 +12,7 @@ namespace {
 
 /// Smooth step from 0 to 1 over a block, or back.
 double calc_fade(Fade fade, std::int64_t sample) noexcept {
-  const double u = static_cast<double>(sample % kBlock) / kBlock, in = u * u * (3.0 - 2.0 * u);
+  const double in = calc_smooth_step(static_cast<double>(sample % kBlock) / kBlock);
   return fade == Fade::kIn ? in : 1.0 - in;
 }
 
@@ -126,7 +127,8 @@ void SoundingBody::hear_by_head(std::int64_t sample, std::size_t count, const Li
       const std::size_t size = std::min<std::size_t>(kSubBlock, count - n);
       Vec3 from = -1.0 * direction[n / kSubBlock];
       if (is_mirrored) from = listener.get_floor()->mirror_direction(from);
-      const double end_s = static_cast<double>(sample + static_cast<std::int64_t>(n + size) - Receiver::kLatency) / frame_.rate_hz;
+      const double end_s =
+          static_cast<double>(sample + static_cast<std::int64_t>(n + size) - Receiver::kLatency) / frame_.propagation.rate_hz;
       propagation.head[way].process(listener.find_in_head(from, end_s), arrived.subspan(n, size), ears[0].subspan(n, size),
                                     ears[1].subspan(n, size));
     }

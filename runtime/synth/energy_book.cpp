@@ -24,8 +24,7 @@ EnergyBook::EnergyBook(const Model& model) {
     mode.alone = calc_oscillator_map(mode.lambda, mode.decay, kSubBlock * h);
     if (m >= model.get_ringing_mode_count()) continue;  // radiation of damped modes is left out
     mode.share = calc_radiated_share(model.get_gain(m), mode.decay);
-    const double omega = std::sqrt(mode.lambda);
-    mode.omega_d = std::sqrt((omega - mode.decay) * (omega + mode.decay));
+    mode.omega_d = calc_damped_omega(mode.lambda, mode.decay);
     mode.turn_re = std::exp(-mode.decay * h) * std::cos(mode.omega_d * h);
     mode.turn_im = std::exp(-mode.decay * h) * std::sin(mode.omega_d * h);
   }

@@ -139,8 +139,7 @@ void Model::add_ringing_mode(const Mode& mode) {
   modes_.push_back(mode);
   const double h = 1.0 / rate_hz_;
   const double d = mode.decay;
-  const double omega = std::sqrt(mode.lambda);
-  const double omega_d = std::sqrt((omega - d) * (omega + d));
+  const double omega = std::sqrt(mode.lambda), omega_d = calc_damped_omega(mode.lambda, d);
   const auto answer = [&](double samples) { return std::exp(-d * samples * h) * std::polar(1.0, omega_d * samples * h); };
   const std::complex<double> out(mode.gain, mode.gain * d / omega_d);
   for (int k = 0; k < kColumn; ++k) {
@@ -203,9 +202,7 @@ void Model::add_nonlinear(const bank::QuarticEnergy& energy) {
     made->constants.push_back({mode.lambda, mode.decay});
     made->groups = std::max(made->groups, m / kGroup + 1);
     made->strike[m / kGroup].scale[m % kGroup] = 0.0F;
-    const ForceAnswer answer = calc_force_answer({mode.lambda, mode.decay}, rate_hz_);
-    made->force_re.push_back(answer.re);
-    made->force_im.push_back(answer.im);
+    made->answer.push_back(calc_force_answer({mode.lambda, mode.decay}, rate_hz_));
   }
   double highest = 0.0;
   for (const nonlinear::ModeConstants& mode : made->constants) highest = std::max(highest, mode.eigenvalue_rad2_s2);
@@ -551,30 +548,6 @@ double Model::calc_projection(int mode, std::int32_t triangle, const Vec3& baryc
     }
   }
   return sum * modes_[mode].scale;
-}
-
-namespace {
-
-std::size_t calc_nonlinear_bytes(const ModelNonlinear& nonlinear) {
-  const bank::QuarticEnergy& energy = nonlinear.energy;
-  const auto count = [](const auto& list) { return list.size() * sizeof(list[0]); };
-  return count(energy.modes) + count(energy.rows) + count(energy.gradient) + count(energy.stress) + count(energy.weight) +
-         count(energy.linear) + count(nonlinear.mode) + count(nonlinear.constants) + count(nonlinear.force_re) + count(nonlinear.force_im) +
-         count(nonlinear.strike) + count(nonlinear.above);
-}
-
-}  // namespace
-
-std::size_t Model::calc_bytes() const {
-  return sound_.size() * (sizeof(SoundTable) + sizeof(RotationTable) + sizeof(StrikeTable) + sizeof(weight_[0]) + sizeof(reach_[0])) +
-         damped_.size() * sizeof(DampedMode) + modes_.size() * sizeof(Mode) + surface_->triangles.size() * sizeof(surface_->triangles[0]) +
-         surface_->shape.size() * sizeof(surface_->shape[0]) + surface_->largest.size() * sizeof(surface_->largest[0]) +
-         (bending_.step_m.size() + bending_.largest.size() + 2 * bending_.back_re.size()) * sizeof(float) +
-         bending_.vertex.size() * sizeof(std::int32_t) + (nonlinear_ ? calc_nonlinear_bytes(*nonlinear_) : 0) +
-         (directivity_
-              ? directivity_->sound.size() * (sizeof(SoundTable) + sizeof(weight_[0]) + sizeof(reach_[0])) +
-                    (directivity_->tilt.size() + directivity_->level.size()) * sizeof(float) + directivity_->transfers->calc_bytes()
-              : 0);
 }
 
 }  // namespace carillon::synth

@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "runtime/synth/oscillator.hpp"
+
 namespace carillon::synth {
 namespace {
 
@@ -36,7 +38,7 @@ double calc_damping(const ContactBlock& drive, std::size_t end, int mode, double
 }  // namespace
 
 ForceAnswer calc_force_answer(const nonlinear::ModeConstants& mode, double rate_hz) {
-  const double omega = std::sqrt(mode.eigenvalue_rad2_s2), d = mode.decay_per_s, omega_d = std::sqrt((omega - d) * (omega + d));
+  const double d = mode.decay_per_s, omega_d = calc_damped_omega(mode.eigenvalue_rad2_s2, d);
   const auto points = get_chebyshev_points();
   Moments re{}, im{};
   for (int k = 0; k < kMoments; ++k) {
@@ -74,8 +76,7 @@ NonlinearModes::NonlinearModes(const Model& model, bool has_cascade)
     place_[mode_[i]] = static_cast<int>(i);
     groups_ = std::max(groups_, mode_[i] / kGroup + 1);
     gain_.push_back(model.get_gain(mode_[i]));
-    answer_.push_back(i < nonlinear_->mode.size() ? ForceAnswer{nonlinear_->force_re[i], nonlinear_->force_im[i]}
-                                                  : calc_force_answer(constants_[i], model.get_rate_hz()));
+    answer_.push_back(i < nonlinear_->mode.size() ? nonlinear_->answer[i] : calc_force_answer(constants_[i], model.get_rate_hz()));
   }
   for (auto* values : {&push_re_, &push_im_, &keep_}) values->assign(kIntervals * mode_.size(), 0.0);
 }
@@ -214,16 +215,16 @@ void NonlinearModes::add(std::int64_t sample, const StrikeQueue& strikes, bool s
 /// Advanced by one sample, as the lanes of the groups are.
 DampedState NonlinearModes::get_state(int i) const noexcept {
   const nonlinear::ModeConstants& mode = constants_[i];
-  const double omega = std::sqrt(mode.eigenvalue_rad2_s2), d = mode.decay_per_s, k = 1.0 / model_->get_rate_hz();
-  const double damped = std::sqrt((omega - d) * (omega + d)), size = std::exp(-d * k), c = std::cos(damped * k), s = std::sin(damped * k);
+  const double d = mode.decay_per_s, damped = calc_damped_omega(mode.eigenvalue_rad2_s2, d), k = 1.0 / model_->get_rate_hz();
+  const double size = std::exp(-d * k), c = std::cos(damped * k), s = std::sin(damped * k);
   const double re = get_re(i), im = get_im(i), q = size * (im * c + re * s) / damped;
   return {q, size * (re * c - im * s) - d * q};
 }
 
 void NonlinearModes::set_state(int i, const DampedState& state) noexcept {
   const nonlinear::ModeConstants& mode = constants_[i];
-  const double omega = std::sqrt(mode.eigenvalue_rad2_s2), d = mode.decay_per_s, k = 1.0 / model_->get_rate_hz();
-  const double damped = std::sqrt((omega - d) * (omega + d)), size = std::exp(d * k), c = std::cos(damped * k), s = std::sin(damped * k);
+  const double d = mode.decay_per_s, damped = calc_damped_omega(mode.eigenvalue_rad2_s2, d), k = 1.0 / model_->get_rate_hz();
+  const double size = std::exp(d * k), c = std::cos(damped * k), s = std::sin(damped * k);
   const double re = state.v + d * state.q, im = damped * state.q, q = size * (im * c - re * s) / damped;
   const double velocity = size * (re * c + im * s) - d * q;
   if (i < get_coupled_count())

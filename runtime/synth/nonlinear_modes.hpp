@@ -16,23 +16,23 @@
 
 namespace carillon::synth {
 
+/// Response of a mode's state to the Chebyshev moments of a force over a sample.
+struct ForceAnswer {
+  Moments re{}, im{};
+};
+ForceAnswer calc_force_answer(const nonlinear::ModeConstants& mode, double rate_hz);
+
 /// Tables for Effect::kNonlinear, for banks with a nonlinear energy. N coupled modes, in the order of the energy: those that ring below the
 /// Nyquist frequency.
 struct ModelNonlinear {
   bank::QuarticEnergy energy;
   std::vector<int> mode;  // (N) of the model
   std::vector<nonlinear::ModeConstants> constants;
-  std::vector<Moments> force_re, force_im;  // (N) response of the state to the Chebyshev moments of a force over a sample
-  std::vector<StrikeTable> strike;          // strike tables of the model without these modes
-  int groups = 0;                           // groups up to the last one with such a mode
-  std::vector<int> above;                   // modes of the model that ring at higher frequencies, ascending
+  std::vector<ForceAnswer> answer;  // (N)
+  std::vector<StrikeTable> strike;  // strike tables of the model without these modes
+  int groups = 0;                   // groups up to the last one with such a mode
+  std::vector<int> above;           // modes of the model that ring at higher frequencies, ascending
 };
-
-/// Response of a mode's state to the Chebyshev moments of a force over a sample.
-struct ForceAnswer {
-  Moments re{}, im{};
-};
-ForceAnswer calc_force_answer(const nonlinear::ModeConstants& mode, double rate_hz);
 
 /// States are those at the last rendered sample; at rest while is_live() is false. Allocates in the constructor only.
 class NonlinearModes {
@@ -68,7 +68,6 @@ class NonlinearModes {
   void drop_below(double pressure_pa) noexcept;
   void reset() noexcept;
   double calc_energy_j() const noexcept { return modes_.get_energy_j() + (cascade_ ? cascade_->calc_energy_j() : 0.0); }
-  const nonlinear::CoupledCounters& get_counters() const noexcept { return modes_.get_counters(); }
 
  private:
   double get_re(int i) const noexcept { return i < get_coupled_count() ? modes_.get_re(i) : cascade_->get_re(i - get_coupled_count()); }

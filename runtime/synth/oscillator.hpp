@@ -1,7 +1,15 @@
 // Exact map of (q, q') of one mode over a time, in all three damping regimes.
 #pragma once
 
+#include <cmath>
+
 namespace carillon::synth {
+
+/// Damped angular frequency [rad/s] of an under-damped mode.
+inline double calc_damped_omega(double lambda, double decay_per_s) noexcept {
+  const double omega = std::sqrt(lambda);
+  return std::sqrt((omega - decay_per_s) * (omega + decay_per_s));
+}
 
 /// Map of a damped oscillator over a time t: q(t) = qq q(0) + qv q'(0), q'(t) = vq q(0) + vv q'(0). (qv, vv) is the response to a unit
 /// impulse: q(0) = 0, q'(0) = 1.

@@ -22,6 +22,11 @@ const Trajectory& find_ear_track(const ListenerTracks& listener, bool apart, std
 /// True with one ear per microphone.
 bool are_apart(EffectSet effects) noexcept { return effects.has(Effect::kTwoEars) && !has_head(effects); }
 
+/// Number of ears without the mirrored ones.
+std::size_t count_straight(EffectSet effects, const PropagationOptions& options) {
+  return are_apart(effects) ? options.microphones_m.size() : 1;
+}
+
 /// Additional latency [samples] of receivers without a head, equal to that of the head.
 int calc_more_latency(EffectSet effects, const PropagationOptions& options) {
   return options.head && !has_head(effects) ? options.head->head->get_latency() : 0;
@@ -43,19 +48,18 @@ std::vector<Vec3> list_offsets(EffectSet effects, const PropagationOptions& opti
 
 }  // namespace
 
-DirectedSound::DirectedSound(const std::shared_ptr<const Model>& model, const std::vector<Vec3>& offsets_m, std::size_t straight,
-                             const PropagationOptions& options, EffectSet effects)
-    : weights(std::make_unique<Directivity>(model, offsets_m.size(), options.phase)),
-      straight_(straight),
+DirectedSound::DirectedSound(EffectSet effects, const PropagationOptions& options, const std::shared_ptr<const Model>& model)
+    : weights(std::make_unique<Directivity>(model, list_offsets(effects, options).size(), options.phase)),
+      straight_(count_straight(effects, options)),
       apart_(are_apart(effects)),
       rate_hz_(options.rate_hz),
       offset_m_(model->get_directivity()->offset_m),
-      offsets_m_(offsets_m),
+      offsets_m_(list_offsets(effects, options)),
       attitude_(static_cast<std::size_t>(options.max_waypoints)),
       centre_(static_cast<std::size_t>(options.max_waypoints)) {
   const double sphere_m = model->get_directivity()->transfers->get_radius_m();
-  receivers_.reserve(offsets_m.size());
-  for (const Vec3& offset : offsets_m)
+  receivers_.reserve(offsets_m_.size());
+  for (const Vec3& offset : offsets_m_)
     receivers_.emplace_back(offset, options.rate_hz, effects, Isa::kBest, sphere_m, calc_more_latency(effects, options));
 }
 
@@ -120,12 +124,6 @@ const Trajectory& Propagation::find_track(const ListenerTracks& listener, std::s
 
 bool has_head(EffectSet effects) noexcept { return effects.has(Effect::kHead) && effects.has(Effect::kTwoEars); }
 
-std::unique_ptr<DirectedSound> make_directed_sound(EffectSet effects, const PropagationOptions& options,
-                                                   const std::shared_ptr<const Model>& model) {
-  const std::size_t straight = are_apart(effects) ? options.microphones_m.size() : 1;
-  return std::make_unique<DirectedSound>(model, list_offsets(effects, options), straight, options, effects);
-}
-
 std::unique_ptr<Propagation> make_propagation(EffectSet effects, const PropagationOptions& options,
                                               const std::shared_ptr<const Model>& model) {
   auto propagation = std::make_unique<Propagation>();
@@ -134,7 +132,7 @@ std::unique_ptr<Propagation> make_propagation(EffectSet effects, const Propagati
   const auto make_line = [&] { return std::make_unique<DelayLine>(longest_m, options.rate_hz, kBlock); };
   const std::vector<Vec3> offsets = list_offsets(effects, options);
   if (effects.has(Effect::kModal) && effects.has(Effect::kDirectivity)) {
-    propagation->directed = make_directed_sound(effects, options, model);
+    propagation->directed = std::make_unique<DirectedSound>(effects, options, model);
     for (std::size_t e = 0; e < offsets.size(); ++e) propagation->directed_lines.emplace_back(longest_m, options.rate_hz, kBlock);
   } else if (effects.has(Effect::kModal)) {
     propagation->monopole = make_line();
@@ -144,7 +142,7 @@ std::unique_ptr<Propagation> make_propagation(EffectSet effects, const Propagati
     propagation->dipole[k] = make_line();
     propagation->source.dipole[k] = propagation->dipole[k].get();
   }
-  const std::size_t straight = are_apart(effects) ? options.microphones_m.size() : 1;
+  const std::size_t straight = count_straight(effects, options);
   for (std::size_t e = 0; e < offsets.size(); ++e)
     (e < straight ? propagation->ears : propagation->mirrored)
         .emplace_back(offsets[e], options.rate_hz, effects, Isa::kBest, 0.0, calc_more_latency(effects, options));

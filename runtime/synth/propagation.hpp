@@ -35,10 +35,8 @@ struct PropagationOptions {
 /// multipoles follows from the position and attitude of the body.
 class DirectedSound {
  public:
-  /// `offsets_m`: of the ears, the mirrored ones last; `straight`: number of the others. Throws InputError for a model without transfers.
-  /// [main-thread]
-  DirectedSound(const std::shared_ptr<const Model>& model, const std::vector<Vec3>& offsets_m, std::size_t straight,
-                const PropagationOptions& options, EffectSet effects);
+  /// For a body of these effects. Throws InputError for a model without transfers. [main-thread]
+  DirectedSound(EffectSet effects, const PropagationOptions& options, const std::shared_ptr<const Model>& model);
 
   /// begin(): trajectory of the body so far and its last attitude; push(): one waypoint. [audio-thread]
   void begin(const Trajectory& body, double turned_s, const events::Quaternion& rotation) noexcept;
@@ -100,9 +98,5 @@ bool has_head(EffectSet effects) noexcept;
 /// Throws InputError for directivity of a model without transfers. [main-thread]
 std::unique_ptr<Propagation> make_propagation(EffectSet effects, const PropagationOptions& options,
                                               const std::shared_ptr<const Model>& model);
-
-/// DirectedSound for a body of these effects. Throws InputError for a model without transfers. [main-thread]
-std::unique_ptr<DirectedSound> make_directed_sound(EffectSet effects, const PropagationOptions& options,
-                                                   const std::shared_ptr<const Model>& model);
 
 }  // namespace carillon::synth

@@ -4,11 +4,12 @@
 #include <array>
 #include <cmath>
 
+#include "runtime/synth/oscillator.hpp"
+
 namespace carillon::synth {
 
 double calc_damped_omega(const Model& model, int mode) noexcept {
-  const double omega = std::sqrt(model.get_eigenvalue_rad2_s2(mode)), decay = model.get_decay_per_s(mode);
-  return std::sqrt((omega - decay) * (omega + decay));
+  return calc_damped_omega(model.get_eigenvalue_rad2_s2(mode), model.get_decay_per_s(mode));
 }
 
 RingingModes::RingingModes(const Model& model, Isa isa) : model_(&model), kernels_(&synth::get_kernels(isa)) {

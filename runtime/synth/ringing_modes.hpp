@@ -68,7 +68,7 @@ class RingingModes {
   std::vector<float> bounds_;  // of measure()
 };
 
-/// Damped angular frequency [rad/s] of an under-damped mode.
+/// Of a mode of a model.
 double calc_damped_omega(const Model& model, int mode) noexcept;
 
 }  // namespace carillon::synth

@@ -21,9 +21,9 @@ SoundingBody::SoundingBody(std::shared_ptr<const Model> model, BodyFrame frame, 
     : model_(std::move(model)),
       frame_(std::move(frame)),
       effects_(effects),
-      track_(static_cast<std::size_t>(frame_.max_waypoints)),
+      track_(static_cast<std::size_t>(frame_.propagation.max_waypoints)),
       rotation_(rotation) {
-  check(effects, *model_);
+  check(*model_);
   track_.push({.position_m = position_m});
   surface_ = make_surface(*model_);
   modes_ = make_modes(model_);
@@ -31,29 +31,22 @@ SoundingBody::SoundingBody(std::shared_ptr<const Model> model, BodyFrame frame, 
   contacts_ = make_contacts(model_, surface_);
   if (modes_) modes_->attach(contacts_.get());
   if (!modes_ && !acceleration_noise_) return;
-  propagation_ = make_propagation(effects, make_propagation_options(), model_);
+  propagation_ = make_propagation(effects, frame_.propagation, model_);
   propagation_->source.track = &track_;
   if (is_directed()) modes_->direct(propagation_->directed->weights.get());
 }
 
-void SoundingBody::check(EffectSet effects, const Model& model) {
-  if (effects.has(Effect::kDirectivity) && model.get_directivity() == nullptr)
+void SoundingBody::check(const Model& model) const {
+  if (effects_.has(Effect::kDirectivity) && model.get_directivity() == nullptr)
     throw InputError("directivity: this bank has no multipoles; make the bank with them, or leave the effect out");
-  if (effects.has(Effect::kNonlinear) && model.get_nonlinear() == nullptr)
+  if (effects_.has(Effect::kNonlinear) && model.get_nonlinear() == nullptr)
     throw InputError("nonlinear: this bank has no nonlinear energy; make the bank with it, or leave the effect out");
-  if (effects.has(Effect::kAccelerationNoise) && !(model.get_sphere_radius_m() > 0.0 && model.get_mass_kg() > 0.0))
+  if (effects_.has(Effect::kAccelerationNoise) && !(model.get_sphere_radius_m() > 0.0 && model.get_mass_kg() > 0.0))
     throw InputError("acceleration_noise: this bank has no mass or no volume; leave the effect out");
 }
 
-PropagationOptions SoundingBody::make_propagation_options() const {
-  return {.rate_hz = frame_.rate_hz,
-          .microphones_m = frame_.microphones_m,
-          .longest_m = frame_.longest_m,
-          .max_waypoints = frame_.max_waypoints,
-          .floor = frame_.floor,
-          .head = frame_.head,
-          .phase = frame_.phase};
-}
+/// Time since the first sample of the modules.
+double SoundingBody::calc_own_s(double time_s) const noexcept { return time_s - static_cast<double>(first_) / frame_.propagation.rate_hz; }
 
 std::unique_ptr<ResonatorBank> SoundingBody::make_modes(const std::shared_ptr<const Model>& model) const {
   if (!effects_.has(Effect::kModal)) return nullptr;
@@ -70,9 +63,10 @@ std::unique_ptr<ResonatorBank> SoundingBody::make_modes(const std::shared_ptr<co
 
 std::unique_ptr<BodyAccelerationNoise> SoundingBody::make_noise(const Model& model) const {
   if (!effects_.has(Effect::kAccelerationNoise)) return nullptr;
-  return std::make_unique<BodyAccelerationNoise>(BodyAccelerationNoise{
-      AccelerationNoise(model.get_sphere_radius_m(), model.get_mass_kg(), frame_.rate_hz, frame_.max_strikes, frame_.max_forces),
-      Attitude(static_cast<std::size_t>(frame_.max_waypoints))});
+  return std::make_unique<BodyAccelerationNoise>(
+      BodyAccelerationNoise{AccelerationNoise(model.get_sphere_radius_m(), model.get_mass_kg(), frame_.propagation.rate_hz,
+                                              frame_.max_strikes, frame_.max_forces),
+                            Attitude(static_cast<std::size_t>(frame_.propagation.max_waypoints))});
 }
 
 std::unique_ptr<ContactForces> SoundingBody::make_contacts(const std::shared_ptr<const Model>& model, const ContactSurface& surface) const {
@@ -85,14 +79,13 @@ ContactSurface SoundingBody::make_surface(const Model& model) const {
 }
 
 std::unique_ptr<ModelSwap> SoundingBody::make_swap(std::shared_ptr<const Model> model) {
-  check(effects_, *model);
   auto swap = std::make_unique<ModelSwap>();
   swap->surface = make_surface(*model);
   swap->modes = make_modes(model);
   if (swap->modes) swap->handover = std::make_unique<ModeHandover>(*model_, *model);
   swap->acceleration_noise = make_noise(*model);
   swap->contacts = make_contacts(model, swap->surface);
-  if (is_directed()) swap->directed = make_directed_sound(effects_, make_propagation_options(), model);
+  if (is_directed()) swap->directed = std::make_unique<DirectedSound>(effects_, frame_.propagation, model);
   model_ = std::move(model);
   return swap;
 }
@@ -148,11 +141,11 @@ ModelSwap* SoundingBody::finish_swap(std::int64_t sample) noexcept {
 }
 
 float SoundingBody::calc_nearness(const ListenerTracks& listener, std::int64_t sample) const noexcept {
-  const double time_s = static_cast<double>(sample) / frame_.rate_hz;
+  const double time_s = static_cast<double>(sample) / frame_.propagation.rate_hz;
   const Vec3 here = track_.find(time_s).position_m;
   double nearest = std::numeric_limits<double>::infinity();  // squared
-  for (std::size_t m = 0; m < frame_.microphones_m.size(); ++m) {
-    const Vec3 there = listener.get_track(m).find(time_s).position_m, place = frame_.microphones_m[m];
+  for (std::size_t m = 0; m < frame_.propagation.microphones_m.size(); ++m) {
+    const Vec3 there = listener.get_track(m).find(time_s).position_m, place = frame_.propagation.microphones_m[m];
     double square = 0.0;
     for (std::size_t k = 0; k < 3; ++k) square += (there[k] + place[k] - here[k]) * (there[k] + place[k] - here[k]);
     nearest = std::min(nearest, square);
@@ -200,7 +193,7 @@ template <class Strike>
 bool SoundingBody::play(const Strike& strike, bool has_length, bool is_new, std::int64_t sample) noexcept {
   wake(sample);
   Strike own = strike;
-  own.time_s = strike.time_s - static_cast<double>(first_) / frame_.rate_hz;
+  own.time_s = calc_own_s(strike.time_s);
   bool is_taken = false, is_refused = false;
   if (modes_) {
     const std::int64_t late = modes_->get_counters().late;
@@ -225,7 +218,7 @@ bool SoundingBody::take(const events::LastingContact& contact, const ContactSurf
   }
   wake(sample);
   events::LastingContact own = contact;
-  own.time_s -= static_cast<double>(first_) / frame_.rate_hz;
+  own.time_s = calc_own_s(contact.time_s);
   const ContactCounters before = contacts_->get_counters();
   const bool is_taken = contacts_->take(own, other);
   const ContactCounters& now = contacts_->get_counters();
@@ -238,7 +231,7 @@ bool SoundingBody::take(const events::LastingContact& contact, const ContactSurf
 }
 
 void SoundingBody::reach(double time_s) noexcept {
-  if (contacts_) contacts_->reach(time_s - static_cast<double>(first_) / frame_.rate_hz);
+  if (contacts_) contacts_->reach(calc_own_s(time_s));
 }
 
 bool SoundingBody::take(const events::BodyMotion& motion) noexcept {

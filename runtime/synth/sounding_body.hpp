@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -27,18 +26,12 @@ namespace carillon::synth {
 
 /// The surroundings and limits of a body, in addition to its model.
 struct BodyFrame {
-  double rate_hz = 0.0;
-  std::vector<Vec3> microphones_m;  // from the listener
+  PropagationOptions propagation;
   int max_strikes = 0, max_forces = 0;
-  int max_waypoints = 0;
-  double longest_m = 0.0;
   double silence_pa = 1e-10;
   Isa isa = Isa::kBest;
   ContactSurface surface{};
   bool audits_energy = false;
-  std::optional<Floor> floor = std::nullopt;
-  std::optional<ListeningHead> head = std::nullopt;
-  int phase = 0;  // of Directivity
 };
 
 /// The acceleration noise of a body with its attitude.
@@ -77,7 +70,6 @@ struct BodyScratch {
   std::array<float, kBlock> mono{};
   std::array<std::array<float, kBlock>, 3> dipole{};
   std::array<double, kBlock> heard{};
-  std::array<std::array<double, kBlock>, 2> by_head{};
 };
 
 using Mix = std::vector<std::array<double, kBlock>>;  // per microphone
@@ -93,10 +85,11 @@ class SoundingBody {
   SoundingBody(std::shared_ptr<const Model> model, BodyFrame frame, EffectSet effects, const Vec3& position_m,
                const events::Quaternion& rotation);
 
-  /// Modules of a new model, which the body has from then on. Throws as check() does. [main-thread]
+  EffectSet get_effects() const noexcept { return effects_; }
+  /// Throws InputError for a model without the data for the effects. [main-thread]
+  void check(const Model& model) const;
+  /// Modules of a checked model, which the body has from then on. [main-thread]
   std::unique_ptr<ModelSwap> make_swap(std::shared_ptr<const Model> model);
-  /// Throws InputError for effects that a body of this model cannot have. [main-thread]
-  static void check(EffectSet effects, const Model& model);
 
   /// All that follows: [audio-thread], no heap, no lock, no throw.
 
@@ -138,7 +131,7 @@ class SoundingBody {
   template <class Strike>
   bool play(const Strike& strike, bool has_length, bool is_new, std::int64_t sample) noexcept;
   void wake(std::int64_t sample) noexcept;
-  PropagationOptions make_propagation_options() const;
+  double calc_own_s(double time_s) const noexcept;
   std::unique_ptr<ResonatorBank> make_modes(const std::shared_ptr<const Model>& model) const;
   std::unique_ptr<BodyAccelerationNoise> make_noise(const Model& model) const;
   std::unique_ptr<ContactForces> make_contacts(const std::shared_ptr<const Model>& model, const ContactSurface& surface) const;

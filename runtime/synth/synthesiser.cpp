@@ -138,19 +138,19 @@ int Synthesiser::add_body(std::shared_ptr<const Model> model, const BodySettings
   const auto number = static_cast<int>(free);
   auto body = std::make_unique<SoundingBody>(
       std::move(model),
-      BodyFrame{.rate_hz = options_.rate_hz,
-                .microphones_m = options_.microphones_m,
+      BodyFrame{.propagation = {.rate_hz = options_.rate_hz,
+                                .microphones_m = options_.microphones_m,
+                                .longest_m = settings.longest_m > 0.0 ? settings.longest_m : options_.longest_m,
+                                .max_waypoints = settings.max_waypoints > 0 ? settings.max_waypoints : options_.max_waypoints,
+                                .floor = options_.floor,
+                                .head = options_.head,
+                                .phase = number},
                 .max_strikes = options_.max_strikes,
                 .max_forces = settings.max_forces >= 0 ? settings.max_forces : options_.max_forces,
-                .max_waypoints = settings.max_waypoints > 0 ? settings.max_waypoints : options_.max_waypoints,
-                .longest_m = settings.longest_m > 0.0 ? settings.longest_m : options_.longest_m,
                 .silence_pa = settings.silence_pa,
                 .isa = settings.isa,
                 .surface = settings.surface,
-                .audits_energy = settings.audits_energy,
-                .floor = options_.floor,
-                .head = options_.head,
-                .phase = number},
+                .audits_energy = settings.audits_energy},
       settings.effects, settings.position_m, settings.rotation);
   Published& published = published_bodies_[free];
   for (const Effect effect : EffectSet::all()) published.units[effect].store(0, std::memory_order_relaxed);
@@ -160,7 +160,7 @@ int Synthesiser::add_body(std::shared_ptr<const Model> model, const BodySettings
   for (auto* energy : {&published.given_j, &published.lost_j, &published.held_j, &published.radiated_j})
     energy->store(0.0, std::memory_order_relaxed);
   Owned& owned = owned_[free];
-  owned = Owned{.body = std::move(body), .swap = nullptr, .wanted_model = nullptr, .effects = settings.effects, .is_leaving = false};
+  owned.body = std::move(body);
   commands_->push({.body = owned.body.get(), .number = number, .kind = Command::Kind::kAdd});
   return number;
 }
@@ -183,7 +183,7 @@ void Synthesiser::swap_model(int body, std::shared_ptr<const Model> model) {
   check_model(model.get());
   collect();
   Owned& owned = owned_[check_owned(body)];
-  SoundingBody::check(owned.effects, *model);
+  owned.body->check(*model);
   std::shared_ptr<const Model> before = std::exchange(owned.wanted_model, std::move(model));
   try {
     send_swap(body);
@@ -193,7 +193,7 @@ void Synthesiser::swap_model(int body, std::shared_ptr<const Model> model) {
   }
 }
 
-EffectSet Synthesiser::get_effects(int body) const { return owned_[check_owned(body)].effects; }
+EffectSet Synthesiser::get_effects(int body) const { return owned_[check_owned(body)].body->get_effects(); }
 
 /// Sends the pending swap unless an earlier one is in progress.
 void Synthesiser::send_swap(int number) {

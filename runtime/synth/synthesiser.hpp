@@ -187,7 +187,6 @@ class Synthesiser {
     std::unique_ptr<SoundingBody> body;
     std::unique_ptr<ModelSwap> swap;            // in progress
     std::shared_ptr<const Model> wanted_model;  // pending; nullptr: none
-    EffectSet effects;
     bool is_leaving = false;
   };
   /// Figures of a body for all threads.

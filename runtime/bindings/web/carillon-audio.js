@@ -149,7 +149,6 @@ export class Body {
     for (const name of ['modes', 'mass_kg', 'centre_m', 'sounding_modes', 'limited_modes']) this[name] = facts[name];
     this.patches = facts.patch_m;
     this.model = facts.model;
-    this.possible = facts.effects;
   }
 
   /** A contact pulse, sin^1.5 of this duration; impulse in the frame of the mesh. Default time_s: as soon as possible. */

@@ -196,7 +196,6 @@ std::string Workshop::list_choices() const {
                                  .set("damping", row.material.describe_damping()));
   }
   for (const synth::Effect effect : synth::EffectSet::all()) choices["effects"].add(synth::get_name(effect));
-  choices.set("default_effects", to_mask(synth::kDefaultEffects));
   return choices.line();
 }
 

@@ -40,8 +40,7 @@ class Workshop {
  public:
   explicit Workshop(double rate_hz);
 
-  /// Available choices: {"mallets": [{"name", "mass_kg", ...}], "materials": [{"name", "group", ...}], "effects": [...],
-  /// "default_effects": N}.
+  /// Available choices: {"mallets": [{"name", "mass_kg", ...}], "materials": [{"name", "group", ...}], "effects": [...]}.
   std::string list_choices() const;
 
   /// Reads a bank; `name` is used in messages. Returns its properties without surface and shapes.

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "runtime/base/error.hpp"
+#include "runtime/synth/listener.hpp"
 #include "runtime/synth/receiver.hpp"
 
 namespace carillon::effects {
@@ -13,8 +14,7 @@ Hearing::Hearing(SceneFacts scene) : facts(std::move(scene)) {
   if (facts.listener.empty()) facts.listener.push_back({});
   listener = synth::make_trajectory(facts.listener);
   if (facts.microphones_m.empty()) throw InputError("a choice of effects needs at least one microphone");
-  for (const Vec3& place : facts.microphones_m)
-    for (std::size_t k = 0; k < 3; ++k) middle[k] += place[k] / static_cast<double>(facts.microphones_m.size());
+  middle = synth::calc_middle(facts.microphones_m);
 }
 
 double Hearing::calc_inaudible_db() const {
@@ -28,14 +28,9 @@ double Hearing::calc_quiet_pa(double inaudible_db, double distance_m, std::size_
 double Hearing::find_ways(const Vec3& place_m, double time_s) {
   const Vec3 ear = listener.find(time_s).position_m;
   way_m.clear();
-  for (const Vec3& offset : facts.microphones_m) {
-    Vec3 way{};
-    for (std::size_t k = 0; k < 3; ++k) way[k] = ear[k] + offset[k] - place_m[k];
-    way_m.push_back(std::max(norm(way), synth::kNearestM));
-  }
-  middle_m = 0.0;
-  for (std::size_t k = 0; k < 3; ++k) middle_m += std::pow(ear[k] + middle[k] - place_m[k], 2.0);
-  middle_m = std::max(std::sqrt(middle_m), synth::kNearestM);
+  const auto calc_way_m = [&](const Vec3& offset) { return std::max(norm(ear + offset - place_m), synth::kNearestM); };
+  for (const Vec3& offset : facts.microphones_m) way_m.push_back(calc_way_m(offset));
+  middle_m = calc_way_m(middle);
   return *std::min_element(way_m.begin(), way_m.end());
 }
 

@@ -205,7 +205,6 @@ StrikeLevels calc_strike_levels(const BankLevels& bank, std::span<const double> 
     levels.pulse_loss_pa2_s += flat * (1.0 - pulse) * (1.0 - pulse);
     square_hz += flat * pulse * pulse * mode.freq_hz * mode.freq_hz;
   }
-  if (!modes.empty()) levels.lowest_hz = modes.front().freq_hz;
   if (levels.modal_pa2_s > 0.0) levels.mean_hz = std::sqrt(square_hz / levels.modal_pa2_s);
   return levels;
 }

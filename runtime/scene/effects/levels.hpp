@@ -94,7 +94,6 @@ struct StrikeLevels {
   double modal_pa2_s = 0.0;       // exposure
   double pulse_loss_pa2_s = 0.0;  // exposure of the difference to an ideal impulse
   double mean_hz = 0.0;           // root mean square of the frequency, weighted with the exposure
-  double lowest_hz = 0.0;         // lowest mode
 };
 
 /// `amplitude_pa` (modes): output, initial pressure amplitude of every mode at 1 m, not A-weighted.
