@@ -417,9 +417,9 @@ class Reports(unittest.TestCase):
             self.assertIn("of an older version, or damaged", page.text[section])
 
     def test_damaged_records_are_left_out_and_nothing_breaks(self):
-        spoilt = [None, 1e308, "x", [], {}, [None, {}, 5, "x"], True, -1, [[]], {"a": {"b": []}}, 2**63, -1e-300, {"seconds": []}]
+        spoilt = [None, True, -1, 1e308, "x", [], {}, [[]], {"a": {"b": []}}, [None, {}, 5, "x"], 2**63, -1e-300, {"seconds": []}]
         for number, value in enumerate(spoilt):
-            for key in self.record["run"] if number < 6 else []:
+            for key in self.record["run"]:
                 record = json.loads(self.resolved.read_text())
                 record["run"][key] = value
                 self.assert_whole(self.report("spoilt", record))
