@@ -93,7 +93,10 @@ def draw_panels(panels, title, subtitle, columns=2):
         if any(panel.front for panel in panels):
             handles.append(pyplot.Line2D([], [], color="#cfcfcf", linewidth=8))
             names.append("Pareto front")
-        figure.legend(handles, names, loc="outside lower center", ncols=min(len(names), 3 * columns))
+        per_row = min(len(names), 3 * columns)
+        legend_height = 0.3 * -(-len(names) // per_row) / figure.get_figheight()
+        figure.get_layout_engine().set(rect=(0, legend_height, 1, 1 - legend_height))  # loc="outside ..." needs matplotlib 3.7
+        figure.legend(handles, names, loc="lower center", ncols=per_row)
         stream = io.StringIO()
         figure.savefig(stream, format="svg", metadata={"Date": None})
         pyplot.close(figure)

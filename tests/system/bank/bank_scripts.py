@@ -496,7 +496,7 @@ def check_program(folder):
         "closed, outward",
         "ascending from 574.44",
         "20 to 20000 Hz",
-        ": valid",
+        f"{path}: valid",
     ):
         assert words in check.stdout, words
 

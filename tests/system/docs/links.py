@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Links of the pages at the root and in docs: relative links lead to files, anchors to headings; every page of docs is at most two links
 from docs/README.md; paths named by pages exist; names in the symbol table of the equations and in the glossary occur in the code, and
-names after a file (`folder/file.cpp`: `name()`, `Class::name()`) in that file.
+names after a file (`folder/file.cpp`: `name()`, `Class::name()`) in that file; every equation names a function.
 
 usage: links.py SOURCE_DIR
 """
@@ -82,6 +82,16 @@ def find_missing_functions(source, pages):
     return bad
 
 
+def find_homeless_equations(source):
+    """Sections of the equations that name no function of a file."""
+    sections = re.split(r"^## ", (source / "docs/equations.md").read_text(), flags=re.M)
+    return [
+        f"docs/equations.md: no function computes {section.splitlines()[0]}"
+        for section in sections
+        if re.match(r"E\d", section) and not any(name.endswith("()") for _, name in read_file_names(section))
+    ]
+
+
 def find_unknown_terms(source):
     """Symbols of the glossary that are not in the file, or in a header of the folder, of their row."""
     bad, rows = [], 0
@@ -121,7 +131,7 @@ def main():
     pages = [*(source / name for name in ROOT_PAGES), *docs]
     bad = find_broken(source, pages) + find_far(source, docs)
     current = [page for page in pages if page.name != "CHANGELOG.md"]
-    bad += find_missing_paths(source, current) + find_missing_functions(source, current)
+    bad += find_missing_paths(source, current) + find_missing_functions(source, current) + find_homeless_equations(source)
     bad += find_unknown_names(source) + find_unknown_terms(source)
     print("\n".join(bad) if bad else f"{len(pages)} pages: all links, anchors, paths and names exist")
     return 1 if bad else 0

@@ -177,7 +177,7 @@ def check_kinds(folder):
         write(folder, f"{name}.json", job)
         run(folder, BIN / "carillon-precompute", "-q", f"{name}.json")
         text = run(folder, BIN / "carillon-bank", "check", f"{name}.hdf").stdout
-        assert ": valid" in text, text
+        assert f"{name}.hdf: valid" in text, text
         assert ("by enumeration" in text) == (name != "table"), text
         assert "1 tets" not in text
         again = json.loads((folder / f"{name}.hdf.resolved.json").read_text())
@@ -212,7 +212,7 @@ def check_queue(folder):
     run(folder, *carillon, "submit", "bar.json", "table.json", "--run")
     for name in ("bar", "table"):
         run(folder, *carillon, "get", f"{name}.json", "--to", f"{name}-got.hdf")
-        assert ": valid" in run(folder, BIN / "carillon-bank", "check", f"{name}-got.hdf").stdout
+        assert f"{name}-got.hdf: valid" in run(folder, BIN / "carillon-bank", "check", f"{name}-got.hdf").stdout
     assert "done" in run(folder, *carillon, "status").stdout
     write(folder, "table.csv", TABLE + "1320,1,1,1\n")
     assert "table" in run(folder, *carillon, "explain", "table.json").stdout

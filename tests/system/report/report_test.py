@@ -48,15 +48,14 @@ NOTHING = "/nowhere/carillon-draw"
 class Page(html.parser.HTMLParser):
     """The rendered page: texts, tables and charts by section, and everything that could load or run something."""
 
-    browser = None
+    tab = None  # one for all pages: opening a tab takes longer than a page
 
     def __init__(self, file):
         super().__init__(convert_charrefs=True)
         self.source = pathlib.Path(file).read_bytes()
         assert self.source.count(b"<script") == 2, "text of the bank became a script"
-        page = self.browser.open(pathlib.Path(file).as_uri())
-        text = page.evaluate("[...document.scripts].forEach((it) => it.remove()), document.documentElement.outerHTML")
-        page.close()
+        self.tab.go(pathlib.Path(file).as_uri())
+        text = self.tab.evaluate("[...document.scripts].forEach((it) => it.remove()), document.documentElement.outerHTML")
         self.stack, self.tags, self.attributes, self.links = [], set(), set(), []
         self.sections, self.text, self.charts, self.tables, self.missing = {}, {}, {}, {}, {}
         self.section, self.title = "head", ""
@@ -147,8 +146,9 @@ def read_seconds(text):
 class Reports(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.browser = Page.browser = Browser()
+        cls.browser = Browser()
         cls.addClassCleanup(cls.browser.close)
+        Page.tab = cls.browser.open("about:blank")
         cls.temporary = tempfile.TemporaryDirectory()
         cls.root = pathlib.Path(cls.temporary.name)
         fixtures.copy("bar.msh", cls.root, "chime.msh")
@@ -417,9 +417,9 @@ class Reports(unittest.TestCase):
             self.assertIn("of an older version, or damaged", page.text[section])
 
     def test_damaged_records_are_left_out_and_nothing_breaks(self):
-        spoilt = [None, 1e308, "x", [], {}, [None, {}, 5, "x"], True, -1, [[]], {"a": {"b": []}}, 2**63, -1e-300, {"seconds": []}]
+        spoilt = [None, True, -1, 1e308, "x", [], {}, [[]], {"a": {"b": []}}, [None, {}, 5, "x"], 2**63, -1e-300, {"seconds": []}]
         for number, value in enumerate(spoilt):
-            for key in self.record["run"] if number < 6 else []:
+            for key in self.record["run"]:
                 record = json.loads(self.resolved.read_text())
                 record["run"][key] = value
                 self.assert_whole(self.report("spoilt", record))

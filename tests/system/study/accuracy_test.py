@@ -159,7 +159,24 @@ class Study(unittest.TestCase):
         first = subprocess.run(update, capture_output=True, text=True)
         self.assertEqual(first.returncode, 0, first.stderr)
         text = page.read_text()
-        self.assertIn("(../images/accuracy-elements-cube.svg)", text)
+        # The section shows the pictures and the table of this report, instead of those of all bodies.
+        section = re.search(r"<!-- accuracy:elements -->\n(.*?)<!-- /accuracy:elements -->", text, re.S)[1]
+        self.assertEqual(re.findall(r"\(\.\./images/accuracy-([\w-]+)\.svg\)", section), ["elements-cube", "elements-ring"])
+        table = [[cell.strip() for cell in line.split("|")[1:-1]] for line in section.splitlines() if line.startswith("| T")]
+        measured = read(self.out / "elements-ring.csv")
+        self.assertEqual(len(measured), 12)
+        self.assertEqual(
+            [(row[0], row[1], row[-2], row[-1]) for row in table],
+            [
+                (
+                    row["element"],
+                    f"{int(row['nodes']):,}",
+                    f"{float(row['error_median_cents']):.3g}",
+                    f"{float(row['error_worst_cents']):.3g}",
+                )
+                for row in measured
+            ],
+        )
         # A partial study updates only its own findings.
         summary = lambda page: re.search(r"<!-- accuracy:summary -->(.*?)<!-- /accuracy:summary -->", page, re.S)[1].splitlines()
         old, new = summary((ROOT / "docs/reports/accuracy.md").read_text()), summary(text)
@@ -170,7 +187,8 @@ class Study(unittest.TestCase):
         )
         for picture in re.findall(r"\(\.\./(images/accuracy-elements[^)]*)\)", text):
             self.assertTrue((docs / picture).is_file() or (ROOT / "docs" / picture).is_file(), picture)
-        self.assertTrue((docs / "images/accuracy-elements-cube.svg").is_file())
+        for picture in ("elements-cube.svg", "elements-ring.svg"):
+            self.assertEqual((docs / "images" / f"accuracy-{picture}").read_bytes(), (self.out / picture).read_bytes())
         subprocess.run(update, check=True, capture_output=True)
         self.assertEqual(page.read_text(), text)
         page.write_text("no place\n")

@@ -85,7 +85,9 @@ TEST_P(Sparse, agrees_with_dense_lapack) {
 
 INSTANTIATE_TEST_SUITE_P(Table, Sparse,
                          testing::Values(Case{"T4_lumped_mumps", 1, job::Mass::lumped, Factorisation::kMumps},
-                                         Case{"T10_consistent_mumps", 2, job::Mass::consistent, Factorisation::kMumps}),
+                                         Case{"T4_consistent_ldlt", 1, job::Mass::consistent, Factorisation::kLdlt},
+                                         Case{"T10_consistent_mumps", 2, job::Mass::consistent, Factorisation::kMumps},
+                                         Case{"T10_consistent_ldlt", 2, job::Mass::consistent, Factorisation::kLdlt}),
                          [](const auto& info) { return info.param.name; });
 
 }  // namespace

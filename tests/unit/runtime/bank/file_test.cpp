@@ -190,7 +190,7 @@ TEST_F(BankFile, EveryReleasedVersionIsStillRead) {
   expect_equal(radiating, example::make_radiating_bank(1, 4));
   expect_near(radiating.multipoles, example::make_radiating_bank(1, 4).multipoles);
   // carillon-bank pack version_1_5.hdf box_radiation.hdf --error -40
-  expect_near(read_bank(carillon::tests::get_source_dir() + "/tests/unit/runtime/bank/packed/box_radiation.hdf").multipoles,
+  expect_near(read_bank(carillon::tests::get_source_dir() + "/tests/unit/runtime/bank/packed/banks/box_radiation.hdf").multipoles,
               radiating.multipoles);
 }
 

@@ -184,9 +184,9 @@ TEST(Recording, ReadsAForceAndRejectsInvalidOnes) {
     expect_error(kHeader + replace(kForce, from, to), says);
   };
   refuse("1e-5", "0", "run.jsonl:2: the length of a step is not above 0");
-  refuse("1e-5", "1", "exceeds the limit");
+  refuse("1e-5", "1", "step_s\": 1 exceeds the limit; give");
   refuse("[[0, 0, 1e-3], [0, 0, 2e-3]]", "[]", "impulse_n_s");
-  refuse("2e-3]", "2e10]", "exceeds the limit");
+  refuse("2e-3]", "2e10]", "2e+10 exceeds the limit; give");
   refuse("2e-3]", "2e-3, 1]", "impulse_n_s");
   std::string many = "[[0, 0, 1e-3]";
   for (int k = 0; k < kMaxForceSteps; ++k) many += ", [0, 0, 1e-3]";

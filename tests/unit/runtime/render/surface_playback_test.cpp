@@ -232,7 +232,8 @@ TEST_F(Surfaces, InvalidInputIsOneError) {
   Ball loud = make_tone(700.0);
   loud.acceleration_m_s2 = [](double) { return 1e15; };
   write("a.surface.hdf", loud);
-  EXPECT_NE(tests::catch_message<InputError>([&] { hear(read(body)); }).find("which is implausible"), std::string::npos);
+  EXPECT_NE(tests::catch_message<InputError>([&] { hear(read(body)); }).find("which is implausible; give it another place"),
+            std::string::npos);
 }
 
 }  // namespace

@@ -44,7 +44,7 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Values(
         BadScene{"empty", "", {"JSON"}}, BadScene{"cut_short", "{\"duration_s\": 1, \"bodies\": [", {"JSON"}},
         BadScene{"a_list", "[1, 2]", {"object"}}, BadScene{"no_duration", "{" + kBody + "}", {"duration_s", "missing"}},
-        BadScene{"negative_duration", "{\"duration_s\": -1, " + kBody + "}", {":1:", "duration_s", "out of range"}},
+        BadScene{"negative_duration", "{\"duration_s\": -1, " + kBody + "}", {":1:", "duration_s", "out of range", "0.001"}},
         BadScene{"duration_as_text", "{\"duration_s\": \"1\", " + kBody + "}", {"duration_s", "number"}},
         BadScene{"endless", "{\"duration_s\": 1e9, " + kBody + "}", {"duration_s", "out of range", "3600"}},
         BadScene{"an_instant", "{\"duration_s\": 1e-9, " + kBody + "}", {"duration_s", "out of range", "0.001"}},

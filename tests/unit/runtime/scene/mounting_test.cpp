@@ -103,7 +103,7 @@ TEST_F(Mounting, InvalidSupportIsRefusedWithItsLine) {
   };
   expect(R"({"name": "a", "bank": "free.hdf", "on": "brick wall"})", "no supports");
   expect(R"({"name": "a", "bank": "fixed.hdf", "supports": {"ent": {"loss": 0.1}}})", "did you mean \"end\"?");
-  expect(R"({"name": "a", "bank": "fixed.hdf", "supports": {"end": {}}})", "is empty");
+  expect(R"({"name": "a", "bank": "fixed.hdf", "supports": {"end": {}}})", R"(is empty; give "on", "joint" or "loss")");
   expect(R"({"name": "a", "bank": "free.hdf", "held": "cord"})", "\"point_m\": [x, y, z]");
   expect(R"({"name": "a", "bank": "free.hdf", "held": {"by": "rope", "point_m": [0, 0, 0]}})", "cord");
   expect(R"({"name": "a", "bank": "free.hdf", "held": {"by": "cord"}})", "point_m");
