@@ -550,4 +550,28 @@ double Model::calc_projection(int mode, std::int32_t triangle, const Vec3& baryc
   return sum * modes_[mode].scale;
 }
 
+namespace {
+
+std::size_t calc_nonlinear_bytes(const ModelNonlinear& nonlinear) {
+  const bank::QuarticEnergy& energy = nonlinear.energy;
+  const auto count = [](const auto& list) { return list.size() * sizeof(list[0]); };
+  return count(energy.modes) + count(energy.rows) + count(energy.gradient) + count(energy.stress) + count(energy.weight) +
+         count(energy.linear) + count(nonlinear.mode) + count(nonlinear.constants) + count(nonlinear.force_re) + count(nonlinear.force_im) +
+         count(nonlinear.strike) + count(nonlinear.above);
+}
+
+}  // namespace
+
+std::size_t Model::calc_bytes() const {
+  return sound_.size() * (sizeof(SoundTable) + sizeof(RotationTable) + sizeof(StrikeTable) + sizeof(weight_[0]) + sizeof(reach_[0])) +
+         damped_.size() * sizeof(DampedMode) + modes_.size() * sizeof(Mode) + surface_->triangles.size() * sizeof(surface_->triangles[0]) +
+         surface_->shape.size() * sizeof(surface_->shape[0]) + surface_->largest.size() * sizeof(surface_->largest[0]) +
+         (bending_.step_m.size() + bending_.largest.size() + 2 * bending_.back_re.size()) * sizeof(float) +
+         bending_.vertex.size() * sizeof(std::int32_t) + (nonlinear_ ? calc_nonlinear_bytes(*nonlinear_) : 0) +
+         (directivity_
+              ? directivity_->sound.size() * (sizeof(SoundTable) + sizeof(weight_[0]) + sizeof(reach_[0])) +
+                    (directivity_->tilt.size() + directivity_->level.size()) * sizeof(float) + directivity_->transfers->calc_bytes()
+              : 0);
+}
+
 }  // namespace carillon::synth

@@ -110,6 +110,8 @@ class Model {
   const ModelBending& get_bending() const { return bending_; }
   /// Centre of mass in the frame of the mesh.
   const Vec3& get_centre_m() const { return centre_m_; }
+  /// Memory of the shared tables [bytes], with the transfers, which models of one bank may share.
+  std::size_t calc_bytes() const;
 
   /// A mode at, near or above critical damping, as (q, q'). Stiff ones take several substeps per sample during pulses; those whose fast
   /// root decays within a thousandth of a sample take none (0): that root follows the force, and force_q is the response of the slow one.

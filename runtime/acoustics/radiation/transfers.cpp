@@ -137,6 +137,12 @@ void Transfers::set_recurrences(int highest) {
   behind_.resize(behind_.size() + kHarmonicsPadding);
 }
 
+std::size_t Transfers::calc_bytes() const noexcept {
+  return sizeof(Transfers) + orders_.capacity() * sizeof(int) + (rms_.capacity() + turn_orders_.capacity()) * sizeof(double) +
+         slots_.capacity() * sizeof(std::int32_t) + groups_.capacity() * sizeof(TransferGroup) + lines_.capacity() * sizeof(MultipoleLine) +
+         radial_.capacity() * sizeof(RadialLine) + (ahead_.capacity() + behind_.capacity() + diagonal_.capacity()) * sizeof(double);
+}
+
 std::shared_ptr<const Transfers> make_transfers(const bank::Bank& bank) {
   return bank.multipoles.is_empty() ? nullptr : std::make_shared<const Transfers>(bank);
 }

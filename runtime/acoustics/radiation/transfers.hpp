@@ -50,6 +50,9 @@ class Transfers {
   /// here from the multipoles instead of the decay.
   double get_rms(int mode) const noexcept { return rms_[mode]; }
 
+  /// Memory [bytes].
+  std::size_t calc_bytes() const noexcept;
+
   /// T of the given modes, 0 <= number < get_mode_count(), in any order (ascending costs least; 16 modes of similar order are evaluated
   /// together), into `transfer` of the same size. For audio threads: no heap, 170 kB of stack.
   void evaluate(const Vec3& place_m, std::span<const std::int32_t> modes, std::span<std::complex<float>> transfer) const noexcept {

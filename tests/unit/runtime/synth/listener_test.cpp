@@ -140,5 +140,16 @@ TEST(Model, a_model_like_another_shares_its_surface_and_sounds_as_one_of_its_own
   EXPECT_NE(Model::make(smaller, {.rate_hz = kRate, .like = first.get()})->get_surface(), first->get_surface());
 }
 
+TEST(Model, all_that_a_nonlinear_energy_holds_counts_as_memory) {
+  bank::Bank bank = testing::make_cube_bank({{300.0, 5.0}, {700.0, 5.0}, {1100.0, 5.0}});
+  const std::size_t linear = Model::make(bank, {.rate_hz = kRate})->calc_bytes();
+  bank.quartic.modes = {0, 1, 2};
+  bank.quartic.rows.assign(1000 * bank::count_pairs(3), 1.0F);
+  const std::size_t flat = Model::make(bank, {.rate_hz = kRate})->calc_bytes();
+  EXPECT_GE(flat - linear, 1000 * 6 * sizeof(float) + 3 * (sizeof(std::int32_t) + 2 * sizeof(double)));
+  bank.quartic.linear.assign(1000 * 3, 1e-9);
+  EXPECT_EQ(Model::make(bank, {.rate_hz = kRate})->calc_bytes() - flat, 1000 * 3 * sizeof(double));
+}
+
 }  // namespace
 }  // namespace carillon::synth

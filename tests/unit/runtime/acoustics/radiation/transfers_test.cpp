@@ -317,12 +317,13 @@ TEST(Transfers, TheGainIsTheMeanOfAHalfSpaceAndInTheAirOfTheBank) {
   }
 }
 
-TEST(Transfers, HaveTheCentreRadiusAndOrdersOfTheBank) {
+TEST(Transfers, ReportsItsMemory) {
   const bank::Bank bank = make_random_bank(20, 9);
   const Transfers transfers(bank);
   EXPECT_EQ(transfers.get_mode_count(), 20);
   EXPECT_EQ(transfers.get_centre_m(), kSphereCentre);
   EXPECT_EQ(transfers.get_radius_m(), kSphereRadius);
+  EXPECT_GT(transfers.calc_bytes(), 2 * bank.multipoles.coefficient.size());
   EXPECT_EQ(make_transfers(bank::Bank{}), nullptr);
   EXPECT_EQ(make_transfers(bank)->get_mode_count(), 20);
   for (int m = 0; m < 20; ++m) EXPECT_EQ(transfers.get_order(m), bank.multipoles.order[m]);
