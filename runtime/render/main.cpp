@@ -50,7 +50,8 @@ int main(int argc, char** argv) {
       ->option_text("FORMAT");
   app.add_flag("--audit", options.audit,
                "Audit energy (motion, modes, losses, radiation, balance error) and contacts (penetration depth, hit rate)");
-  app.add_flag("--plan", options.plan, "Print the effects of each body with reasons, and the estimated cost of recordings; no sound is made");
+  app.add_flag("--plan", options.plan,
+               "Print the effects of each body with reasons, and the estimated cost of recordings; no sound is made");
   app.add_flag("-q,--quiet", options.quiet, "Print warnings and errors only");
   app.add_flag_callback(
       "--keys", [] { throw CLI::CallForVersion(carillon::base::write_key_tables(carillon::scene::describe_scene_keys()), 0); },

@@ -1,7 +1,8 @@
 #!/usr/bin/python3
 """Links of the pages at the root and in docs: relative links lead to files, anchors to headings; every page of docs is at most two links
 from docs/README.md; paths named by pages exist; names in the symbol table of the equations and in the glossary occur in the code, and
-names after a file (`folder/file.cpp`: `name()`, `Class::name()`) in that file; every equation names a function.
+names after a file (`folder/file.cpp`: `name()`, `Class::name()`) in that file; every equation names a function;
+every picture of docs is shown; decisions have the dates of their index.
 
 usage: links.py SOURCE_DIR
 """
@@ -125,14 +126,32 @@ def find_unknown_names(source):
     return bad
 
 
+def find_unused_pictures(source, pages):
+    shown = {path for page in pages for path, _ in read_links(page)}
+    pictures = [path for path in sorted((source / "docs").rglob("*")) if path.suffix in {".png", ".svg"}]
+    return [f"{path.relative_to(source)}: no page shows it" for path in pictures if path not in shown]
+
+
+def find_undated(source):
+    """Decisions without status and date below their title, or with another date in the index."""
+    index = (source / "docs/decisions/README.md").read_text()
+    dates = dict(re.findall(r"^\| \[([\w-]+)\][^|]*\| (\d{4}-\d\d-\d\d) \|", index, re.M))
+    bad = []
+    for page in sorted((source / "docs/decisions").glob("*.md")):
+        found = re.match(r"# [^\n]+\n\n(?:Accepted|Proposed), (\d{4}-\d\d-\d\d)", page.read_text())
+        if page.name != "README.md" and (not found or dates.get(page.stem) != found[1]):
+            bad.append(f"docs/decisions/{page.name}: begins with status and date (Accepted, YYYY-MM-DD), as in README.md")
+    return bad
+
+
 def main():
     source = pathlib.Path(sys.argv[1]).resolve()
     docs = sorted((source / "docs").rglob("*.md"))
     pages = [*(source / name for name in ROOT_PAGES), *docs]
-    bad = find_broken(source, pages) + find_far(source, docs)
+    bad = find_broken(source, pages) + find_far(source, docs) + find_unused_pictures(source, pages)
     current = [page for page in pages if page.name != "CHANGELOG.md"]
     bad += find_missing_paths(source, current) + find_missing_functions(source, current) + find_homeless_equations(source)
-    bad += find_unknown_names(source) + find_unknown_terms(source)
+    bad += find_undated(source) + find_unknown_names(source) + find_unknown_terms(source)
     print("\n".join(bad) if bad else f"{len(pages)} pages: all links, anchors, paths and names exist")
     return 1 if bad else 0
 
