@@ -556,8 +556,8 @@ std::size_t calc_nonlinear_bytes(const ModelNonlinear& nonlinear) {
   const bank::QuarticEnergy& energy = nonlinear.energy;
   const auto count = [](const auto& list) { return list.size() * sizeof(list[0]); };
   return count(energy.modes) + count(energy.rows) + count(energy.gradient) + count(energy.stress) + count(energy.weight) +
-         count(energy.linear) + count(nonlinear.mode) + count(nonlinear.constants) + count(nonlinear.force_re) + count(nonlinear.force_im) +
-         count(nonlinear.strike) + count(nonlinear.above);
+         count(energy.linear) + count(nonlinear.mode) + count(nonlinear.constants) + count(nonlinear.answer) + count(nonlinear.strike) +
+         count(nonlinear.above);
 }
 
 }  // namespace
