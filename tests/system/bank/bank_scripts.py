@@ -252,7 +252,7 @@ BAD_PACKED = [
     ("shapes cut", replace("modes/packed_shape", lambda b: b[:-5]), "packed shapes"),
     ("shapes of nothing", replace("modes/packed_shape", lambda b: b[:0]), "packed shapes: ends too early"),
     ("a surface of another form", put("mesh/packed", at(0, 9)), "packed surface: its form is 9, and this reader knows 1"),
-    ("2^32 - 1 vertices", put("mesh/packed", at(slice(2, 6), 255)), "packed surface: it would become larger than any bank of its length"),
+    ("2^32 - 1 vertices", put("mesh/packed", at(slice(2, 6), 255)), "packed surface: it would expand beyond the limit for its length"),
     ("2^32 - 1 modes", put("modes/packed_shape", at(slice(1, 5), 255)), "packed shapes: they are of 4294967295 modes, and the bank has"),
     ("shapes damaged", put("modes/packed_shape", at(-40, 170)), "packed shapes"),
     ("a surface as numbers", replace("mesh/packed", lambda b: b.astype("<i4")), "mesh/packed is <i4"),

@@ -283,7 +283,7 @@ class Hear(unittest.TestCase):
     def test_it_says_what_it_takes_for_granted(self):
         (self.folder / "ball.off").write_text(make_ball(0.3, 3))
         said = self.call("hear", "-q", "ball.off")
-        for words in ("taken for metres", "material: steel, since none is given", "body: solid", "a preview", "T60 [s]", "ball-steel.wav"):
+        for words in ("taken for metres", "material: steel (none given)", "body: solid", "a preview", "T60 [s]", "ball-steel.wav"):
             self.assertIn(words, said)
         (self.folder / "unit.off").write_text(make_ball(1, 3))
         self.assertIn("a normalised size", self.call("hear", "-q", "unit.off"))

@@ -206,7 +206,7 @@ class Program(unittest.TestCase):
             ("bar", "--cents", "5", "--check"): "--check",
             ("lost.json", "--cents", "5"): "gone.msh",
             ("bar", "--cents", "5", "--advice", "none.advice"): "calibration",
-            ("bar", "--cents", "5", "--advice", "zero.advice"): "above 0",
+            ("bar", "--cents", "5", "--advice", "zero.advice"): "not a positive number",
             ("box", "--cents", "5", "--advice", "few.advice"): "too few",
             ("wrong.json", "--cents", "50", "-o", "."): "-o",
         }
