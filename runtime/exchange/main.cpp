@@ -290,9 +290,9 @@ struct Options {
   bool json = false, csv = false, all = false, keep_numbers = false;
   std::size_t modes = 20;
   double error_db = -60.0;
-  Wishes wishes{};
-  exchange::ExportWishes exported{};
-  exchange::ImportWishes imported{};
+  Wishes wishes;
+  exchange::ExportWishes exported;
+  exchange::ImportWishes imported;
 };
 
 void add_commands(CLI::App& app, Options& options) {
@@ -344,7 +344,7 @@ int run(int argc, char** argv) {
       [](const CLI::App* asked, const CLI::Error& error) { return base::printable_lines(CLI::FailureMessage::simple(asked, error)); });
   app.require_subcommand(1);
   app.set_version_flag("--version", base::describe("carillon-bank"));
-  Options options{};
+  Options options;
   add_commands(app, options);
   try {
     app.parse(argc, argv);

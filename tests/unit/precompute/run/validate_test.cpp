@@ -1,6 +1,7 @@
 // --validate and --estimate: branches of the prediction.
 #include "precompute/run/validate.hpp"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -53,7 +54,7 @@ TEST_F(Validate, lists_no_more_modes_than_requested) {
   const base::Json found = validate_as_json(kBar, R"(, "band_hz": [20, 60000], "max_modes": 3)");
   EXPECT_EQ(found["modes"]["count"].as_double(), 3);
   const std::string text =
-      validate(std::string(R"({"body": )") + kBar + R"(, "material": "steel", "max_modes": 3, "band_hz": [20, 60000]})", false);
+      validate(fmt::format(R"({{"body": {}, "material": "steel", "max_modes": 3, "band_hz": [20, 60000]}})", kBar), false);
   EXPECT_THAT(text, HasSubstr("3 modes in 20 .. 60000 Hz, counted by inertia"));
   EXPECT_THAT(text, HasSubstr("lowest 3 corrected ones"));
 }
@@ -77,7 +78,7 @@ TEST_F(Validate, known_bodies_are_made) {
 
 TEST_F(Validate, refuses_an_invalid_job_like_a_run) {
   EXPECT_THROW(validate(R"({"body": {"shape": "bar"}})", true), InputError);
-  EXPECT_THROW(validate(std::string(R"({"body": )") + kBar + R"(, "material": "steel", "fixed": [{"node_set": "nowhere"}]})", true),
+  EXPECT_THROW(validate(fmt::format(R"({{"body": {}, "material": "steel", "fixed": [{{"node_set": "nowhere"}}]}})", kBar), true),
                InputError);
 }
 

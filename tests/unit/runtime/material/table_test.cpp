@@ -242,8 +242,11 @@ TEST(MaterialTable, has_the_elastic_ratios_of_the_wood_handbook) {
                                                       {r.lr, nu[0]},
                                                       {r.lt, nu[2]},
                                                       {r.rt, nu[1]}}};
-    for (const auto& [table, ours] : pairs)
-      if (table > 0) EXPECT_NEAR(ours, table, 1e-3) << r.name;
+    for (const auto& [table, ours] : pairs) {
+      if (table > 0) {
+        EXPECT_NEAR(ours, table, 1e-3) << r.name;
+      }
+    }
   }
 }
 
