@@ -24,6 +24,7 @@
 #include "runtime/base/clock.hpp"
 #include "runtime/base/descriptor.hpp"
 #include "runtime/base/environment.hpp"
+#include "runtime/base/signal_pause.hpp"
 #include "runtime/base/temporary.hpp"
 
 namespace carillon::base {
@@ -178,10 +179,14 @@ std::optional<int> await(pid_t child, double deadline_s, const std::function<boo
   }
 }
 
-/// Kills and reaps the child when run() exits by an exception.
+/// Starts a child, and kills and reaps it when run() exits by an exception.
 class Reaper {
  public:
-  explicit Reaper(pid_t child) : child_(child) { note_child(child); }
+  explicit Reaper(const Command& command) {
+    const SignalPause pause;  // until the handler of signals knows the child
+    child_ = start(command);
+    note_child(child_);
+  }
   ~Reaper() {
     if (child_ <= 0) return;
     forget_child(child_);
@@ -190,13 +195,14 @@ class Reaper {
   }
   Reaper(const Reaper&) = delete;
   Reaper& operator=(const Reaper&) = delete;
+  pid_t get() const noexcept { return child_; }
   void release() {
     forget_child(child_);
     child_ = -1;
   }
 
  private:
-  pid_t child_;
+  pid_t child_ = -1;
 };
 
 /// First executable of that name along PATH.
@@ -314,12 +320,10 @@ pid_t start(const Command& command) {
     if (streams[k].get() < 0) refuse(errno);
     plan.streams[k] = streams[k].get();
   }
-  sigset_t all, before;
-  ::sigfillset(&all);
-  ::pthread_sigmask(SIG_SETMASK, &all, &before);
+  std::optional<SignalPause> pause(std::in_place);
   const pid_t child = fork_and_execute(plan);
   const int error = child < 0 ? errno : plan.error;
-  ::pthread_sigmask(SIG_SETMASK, &before, nullptr);
+  pause.reset();
   if (error == 0) return child;
   while (child > 0 && ::waitpid(child, nullptr, 0) < 0 && errno == EINTR) {
   }
@@ -335,8 +339,8 @@ Finished run(Command command, const RunOptions& options) {
   if (command.errors == kCapture) command.errors = errors.emplace().write.get();
   if (command.signal_at_end == 0) command.signal_at_end = SIGKILL;
   const double deadline_s = get_boot_s() + options.patience_s;
-  const pid_t child = start(command);
-  Reaper reaper(child);
+  Reaper reaper(command);
+  const pid_t child = reaper.get();
   if (options.started) options.started(child);
   Descriptor give_to, take_from, errors_from;
   if (in) give_to = std::move(in->write), in->read.close();
