@@ -116,7 +116,7 @@ class BodiesTest(unittest.TestCase):
     def test_error_messages(self):
         for body, said in (
             ({**BOX, "bank": "own.hdf"}, 'scene.json:7: "bodies[0].shape": describes a body'),
-            ({"shape": {"bol": {}}, "material": "glass"}, 'scene.json:8: "shape.bol": is no shape, did you mean "bowl"?'),
+            ({"shape": {"bol": {}}, "material": "glass"}, 'scene.json:8: "shape.bol": is not a shape, did you mean "bowl"?'),
             ({"shape": {"bowl": {"outer_radius": 0.06}}, "material": "glass"}, "outer_radius"),
             ({"shape": {"bowl": {"outer_radius_m": 0.06, "wall_m": 0.004}}, "material": "unobtainium"}, "unobtainium"),
             ({"shape": {"bowl": {"outer_radius_m": 0.06, "wall_m": 0.004}}}, '"material" is missing'),
