@@ -139,7 +139,7 @@ with tempfile.TemporaryDirectory(prefix="carillon-accuracy-") as scratch:
     assert (
         "next stricter: T10, refined 1 time" in text
         and "CPU s" in text.split("next stricter")[1]
-        and "second order on the true surface" in text
+        and "ten-node elements on the true surface" in text
     ), text
     assert not (folder / "facets.hdf").exists()
 

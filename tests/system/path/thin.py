@@ -136,5 +136,5 @@ with tempfile.TemporaryDirectory() as top:
     assert advice.returncode == 0, advice.stderr
     document = json.loads(advice.stdout)
     assert document["setting"]["nodes"] > 5000 and 0 < document["predicted"]["cents"] <= 20, document
-    assert "looking at" in advice.stderr, advice.stderr
+    assert "predicting the cost of glass.obj" in advice.stderr, advice.stderr
 print("thin: well")
