@@ -157,4 +157,4 @@ with tempfile.TemporaryDirectory(prefix="carillon-accuracy-") as scratch:
     assert "no mode in the band" in text.split("chosen:")[1] and "error bars up to" not in text, text
     text = run(folder, "silent-file", {"mesh": "coarse.msh", "material": STEEL, "band_hz": [20, 300], "accuracy_cents": 10})
     assert "no mode in the band" in text.split("chosen: T10, refined 1 time,")[1], text
-    print("as right as was asked, each time")
+    print("accuracy: as requested")

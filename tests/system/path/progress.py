@@ -139,4 +139,4 @@ def try_work(folder):
 with tempfile.TemporaryDirectory() as name:
     for test in (try_runs, try_trials, try_bad_files, try_work):
         test(pathlib.Path(name))
-print("progress and work: well")
+print("progress and work: ok")

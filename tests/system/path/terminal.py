@@ -105,4 +105,4 @@ def check_names(folder):
 with tempfile.TemporaryDirectory() as top:
     check_texts(pathlib.Path(top))
     check_names(pathlib.Path(top))
-print("terminal: well")
+print("terminal: ok")

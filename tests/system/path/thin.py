@@ -137,4 +137,4 @@ with tempfile.TemporaryDirectory() as top:
     document = json.loads(advice.stdout)
     assert document["setting"]["nodes"] > 5000 and 0 < document["predicted"]["cents"] <= 20, document
     assert "predicting the cost of glass.obj" in advice.stderr, advice.stderr
-print("thin: well")
+print("thin: ok")

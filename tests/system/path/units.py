@@ -108,4 +108,4 @@ def check_questions(folder):
 with tempfile.TemporaryDirectory() as top:
     check_scale(pathlib.Path(top))
     check_questions(pathlib.Path(top))
-print("units: well")
+print("units: ok")
