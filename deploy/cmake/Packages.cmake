@@ -1,4 +1,4 @@
-# Debian packages of the build: cpack --config build/release/CPackConfig.cmake -G DEB. docs/howto/packages.md
+# Debian packages of the build: cpack --config build/release/CPackConfig.cmake -G DEB. docs/howto/install.md
 # One install component is one package: runtime, dev (headers and libraries for other projects), python and precompute.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME carillon)

@@ -1,7 +1,7 @@
 # The precompute side: carillon, carillon-precompute, carillon-mesh, carillon-bank, carillon-draw, with Debian's Open MPI, PETSc and SLEPc.
 #   docker build -t carillon-precompute -f deploy/container/precompute.Dockerfile .
 # Installs by deploy/install and its package lists. VTK is not in them: carillon-draw, and pictures
-# in reports, also need the list demo. docs/howto/containers.md
+# in reports, also need the list demo. docs/howto/install.md
 FROM debian:bookworm AS build
 COPY deploy/install deploy/install
 COPY deploy/packages deploy/packages

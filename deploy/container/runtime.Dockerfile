@@ -1,6 +1,6 @@
 # The runtime side: carillon-render, carillon-live, carillon-bank and the library to build against. No MPI, no PETSc.
 #   docker build -t carillon-runtime -f deploy/container/runtime.Dockerfile .
-# Installs by deploy/install and its package lists. docs/howto/containers.md
+# Installs by deploy/install and its package lists. docs/howto/install.md
 FROM debian:bookworm AS build
 COPY deploy/install deploy/install
 COPY deploy/packages deploy/packages

@@ -1,6 +1,6 @@
 // Method:     Free memory: the smaller of (a) memory not admitted to running jobs, and (b) available memory minus memory that running jobs
 //             were admitted but do not hold yet. Backfilling with a reservation for the first job (EASY), with a fixed patience instead of
-//             run time estimates. docs/howto/when-jobs-die.md
+//             run time estimates. docs/howto/jobs.md
 // Source:     Lifka 1995 (EASY).
 #include "jobs/queue/admission.hpp"
 

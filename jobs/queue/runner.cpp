@@ -1,5 +1,5 @@
 // Method:     One thread: reap children, settle rows, claim and start jobs, update the display, wait for a signal or one second. Attempts
-//             run in sessions of their own and outlive this process; rows and locks hold the complete state. docs/howto/when-jobs-die.md
+//             run in sessions of their own and outlive this process; rows and locks hold the complete state. docs/howto/jobs.md
 #include "jobs/queue/runner.hpp"
 
 #include <fmt/core.h>

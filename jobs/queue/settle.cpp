@@ -1,6 +1,6 @@
 // Method:     A running attempt holds the lock of its folder, which the kernel releases at its end; attempt.json shows whether the claimed
 //             attempt began. Wall clocks are not used. Every change is a transaction that checks the row again.
-//             docs/howto/when-jobs-die.md
+//             docs/howto/jobs.md
 #include "jobs/queue/settle.hpp"
 
 #include <fmt/core.h>

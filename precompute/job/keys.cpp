@@ -21,7 +21,7 @@ const base::Keys<JobSpec> kJobKeys{
     {"band_hz", "`[20, 20000]`", "undamped frequencies to find; every mode of the band is found, or the program fails"},
     {"max_modes", &JobSpec::max_modes, Limits{1, 40000}, "maximum number of modes, the lowest of the band"},
     {"element", &JobSpec::element, kElementNames,
-     "linear or quadratic tetrahedra, for any mesh file ([choose-a-mesh](choose-a-mesh.md), [elements](../elements.md))"},
+     "linear or quadratic tetrahedra, for any mesh file ([which](choose-accuracy.md#element-and-mesh), [elements](../elements.md))"},
     {"mass", &JobSpec::mass, kMassNames, "mass matrix"},
     {"fixed", "none", "fixed nodes: name of a node set, object with the keys below, or a list of both"},
     {"solver", "none", "eigensolver"},
@@ -44,7 +44,7 @@ const base::Keys<Body> kMeshSizeKeys{{"nodes", "10,000", "number of nodes of a s
 const base::Keys<Fixed> kFixedKeys{{"node_set", &Fixed::node_set, "name of a node set of the mesh"},
                                    {"box_m", "none", "or all nodes in a box: `{\"min\": [x, y, z], \"max\": [x, y, z]}`"},
                                    {"name", "the node set's", "name of the support in scenes"},
-                                   {"on", "rigid", "what is behind the nodes: [supports](supports.md)"},
+                                   {"on", "rigid", "what is behind the nodes: [supports](materials.md#supports)"},
                                    {"joint", "none", "type of the joint, or its loss factor as `loss`"}};
 const base::Keys<JobSpec> kSolverKeys{
     {"tolerance", &JobSpec::tolerance, Limits{1e-14, 1e-4, true}, "relative residual of every mode"},
@@ -70,7 +70,8 @@ const base::Keys<Nonlinear> kNonlinearKeys{
      "full coupling of elements only: relative error of the stored energy; 0.01 is one cent in a glide of a semitone"}};
 const base::Keys<Resources> kResourceKeys{
     {"ranks", &Resources::ranks, Limits{1, 1'000'000}, "MPI ranks; predicted by default"},
-    {"memory_gb", &Resources::memory_gb, Limits{0, 1e9, true}, "[limit](when-jobs-die.md) of all ranks together; predicted by default"},
+    {"memory_gb", &Resources::memory_gb, Limits{0, 1e9, true},
+     "[limit](jobs.md#who-runs-when) of all ranks together; predicted by default"},
     {"time_limit_s", &Resources::time_limit_s, Limits{0, 1e9, true}, "limit of one attempt; predicted by default"}};
 
 namespace {

@@ -57,7 +57,7 @@ const base::Keys<SimulatedBody> kBody{
     {"shape", "one form", "a parametric shape, as in [a job of modes](make-a-bank.md)"},
     {"body", "one form", "a meshed body, as in [a job of modes](make-a-bank.md)"},
     {"sheet", "one form", "a thin sheet"},
-    {"element", "`\"T10\"`", "of solids, or `\"T4\"`, which is far too stiff in bending ([choose-a-mesh](choose-a-mesh.md))"},
+    {"element", "`\"T10\"`", "of solids, or `\"T4\"`, which is far too stiff in bending ([which](choose-accuracy.md#element-and-mesh))"},
     {"model", "`\"stvk\"`", "Saint Venant and Kirchhoff: large rotation, moderate strain"},
     {"material", "required", "isotropic; losses other than Rayleigh's are fitted by Rayleigh damping at 200 and 5000 Hz"},
     {"fixed", "none", "node groups without displacement; of a sheet: clamped"},

@@ -433,7 +433,7 @@ void make(int argc, char** argv, Order& order) {
          "Surface: closes holes up to this part of the body's diagonal (a hole counts as the diameter of a circle of its area) [0.15]")
       ->check(CLI::Range(0.0, 1.0));
   app.add_option("--json", order.json, "Writes the report as JSON to this file too");
-  app.add_option("--result", order.result, "Write how the program ended to this file, a JSON object (docs/howto/when-jobs-die.md)");
+  app.add_option("--result", order.result, "Write how the program ended to this file, a JSON object (docs/howto/jobs.md)");
   app.add_flag(
       "--estimate", order.estimate,
       "Surface: says on standard error volume, area, thickness and about how many nodes there will be, in JSON, of the surface as it "

@@ -1,6 +1,6 @@
 // Method: the skin is remeshed to a ruled edge length, folds and rims get a ring of narrow triangles, and it is extruded. The node count is
 //   met by varying the edge length. The mesh is compared with the volume of the parallel body (at folds with the mitre's area), and tested
-//   for self-intersection and cut tips. Edge limits are measured: docs/howto/thin-walls.md.
+//   for self-intersection and cut tips. Edge limits are measured: docs/howto/choose-accuracy.md.
 // Source: volume between parallel surfaces: Steiner's formula (Gray, "Tubes", 2nd ed., Birkhaeuser 2004); bending wave length: Cremer,
 //   Heckl and Petersson, "Structure-borne sound", 3rd ed., Springer 2005.
 #include "precompute/mesher/thin_wall.hpp"

@@ -75,8 +75,7 @@ struct CommandLine {
         ->check(CLI::Range(0.0, 1e9))
         ->capture_default_str();
     app.add_option("--bank", options.bank, "write the bank to this file instead of the job's \"bank\"")->check(named);
-    app.add_option("--result", result, "write the outcome of the run to this file, a JSON object (docs/howto/when-jobs-die.md)")
-        ->check(named);
+    app.add_option("--result", result, "write the outcome of the run to this file, a JSON object (docs/howto/jobs.md)")->check(named);
     CLI::Option* matrices =
         app.add_option("--matrices", options.matrices, "also write K and M to this folder, as Matrix Market files")->check(named);
     CLI::Option* validate =

@@ -59,7 +59,7 @@ struct CommandLine {
     app.add_option("--checkpoint-every", options.checkpoint_every_s, "seconds between two saves")
         ->check(CLI::Range(0.0, 1e9))
         ->capture_default_str();
-    app.add_option("--result", result, "write how the run ended to this file, a JSON object (docs/howto/when-jobs-die.md)")->check(named);
+    app.add_option("--result", result, "write how the run ended to this file, a JSON object (docs/howto/jobs.md)")->check(named);
     CLI::Option* validate =
         app.add_flag("--validate", options.validate, "check the job and its meshes, predict step, time and memory, and simulate nothing");
     app.add_option("--patience", options.patience_s,

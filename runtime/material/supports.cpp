@@ -1,6 +1,6 @@
 // Source: walls: infinite thin plates (Cremer, Heckl and Petersson, Structure-Borne Sound, 3rd ed., chapter 5) of common building
 // materials.
-//   Joints, cord, felt and hand are estimates; sources of all numbers: docs/howto/supports.md.
+//   Joints, cord, felt and hand are estimates; sources of all numbers: docs/howto/materials.md.
 #include "runtime/material/supports.hpp"
 
 #include <fmt/format.h>

@@ -1,5 +1,5 @@
 // Supports of bodies and the vibration energy they absorb: names in jobs and scenes, and their values.
-// Table with sources: docs/howto/supports.md.
+// Table with sources: docs/howto/materials.md.
 #pragma once
 
 #include <optional>

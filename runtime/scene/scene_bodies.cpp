@@ -29,7 +29,7 @@ const base::Keys<SceneBody> kBody{
     {"position_m", "`[0, 0, 0]`", "of the mesh's origin"},
     {"rotation_deg", "`[0, 0, 0]`", "about the fixed axes x, then y, then z"},
     {"quaternion", "none", "replaces `rotation_deg`: unit `[w, x, y, z]`"},
-    {"on", "the bank's", "with `joint`, `loss`: what is behind its fixed nodes, such as `\"brick wall\"` ([supports](supports.md))"},
+    {"on", "the bank's", "with `joint`, `loss`: what is behind its fixed nodes, like `\"brick wall\"` ([supports](materials.md#supports))"},
     {"supports", "none", "the same per support by name: `{\"left\": {\"on\": \"concrete wall\"}}`"},
     {"held", "none", "contact with a holder, or a list: `{\"by\": \"cord\", \"point_m\": [x, y, z]}` in the axes of the mesh"},
     {"variation", "the scene's", "variation of equal strikes; 0 to 1"},

@@ -1,5 +1,5 @@
 // Method:     Lock the folder; end processes of the previous attempt; write attempt.json; publish an existing bank, else start the solver,
-//             watch it, classify its end, verify and publish; write outcome.json last. docs/howto/when-jobs-die.md
+//             watch it, classify its end, verify and publish; write outcome.json last. docs/howto/jobs.md
 #include <fmt/core.h>
 #include <sys/stat.h>
 #include <unistd.h>

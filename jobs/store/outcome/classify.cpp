@@ -1,6 +1,6 @@
 // Method:     The result file of the solver takes precedence; without one (ended by a signal) the exit code and the actions of the attempt
 //             give the cause.
-// Source:     exit codes: docs/howto/when-jobs-die.md; of mpirun: measured with Open MPI 4.1.
+// Source:     exit codes: docs/howto/jobs.md; of mpirun: measured with Open MPI 4.1.
 #include <fmt/core.h>
 
 #include <csignal>

@@ -1,5 +1,5 @@
 // Method:     Permanent causes fail the job at once. Transient causes are retried after 10, 40 and 160 s; an attempt with progress resets
-//             the count. A full disk is waited for without limit. Table: docs/howto/when-jobs-die.md.
+//             the count. A full disk is waited for without limit. Table: docs/howto/jobs.md.
 #include "jobs/store/outcome/policy.hpp"
 
 #include <algorithm>

@@ -42,7 +42,7 @@ struct RetryDecision {
 };
 
 /// `failures`: consecutive failed attempts before this one. `is_further`: this attempt made progress, which resets the count. Table:
-/// docs/howto/when-jobs-die.md.
+/// docs/howto/jobs.md.
 RetryDecision decide(Cause cause, int failures, bool is_further);
 
 /// Memory to request after an attempt that ran out of memory [GB]: 1.1 times the reported need, at least 1.5 times the observed peak.

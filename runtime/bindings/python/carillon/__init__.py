@@ -5,7 +5,7 @@
     print(bank.frequency_hz[:5], bank.t60_s[:5])
 
 Units are SI and part of the names. Errors are InputError (a ValueError), SolveError (a RuntimeError) and SystemError (an OSError), with
-the same messages as the programs. docs/howto/python.md
+the same messages as the programs. docs/howto/embed-the-runtime.md
 """
 import os as _os
 import typing as _typing

@@ -77,7 +77,7 @@ def run(command: typing.List[str], ranks: int) -> typing.Tuple[int, str]:
 
 
 def raise_error(result: dict, code: int, said: str) -> typing.NoReturn:
-    """The exception described by a program's result file (docs/howto/when-jobs-die.md)."""
+    """The exception described by a program's result file (docs/howto/jobs.md)."""
     kinds = {"bad-input": InputError, "no-solution": SolveError}
     lines = [line for line in said.splitlines() if line.strip(" -")]
     message = result.get("message") or (lines[-1] if lines else f"{SOLVER} ended with exit code {code} and without a message")
