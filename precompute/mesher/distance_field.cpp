@@ -1,4 +1,4 @@
-// Method: distance in a band around the surface by propagating the nearest triangle between samples (nearest_triangle.hpp); sign from the
+// Method: distance in a band around the surface by propagating the nearest triangle between samples; sign from the
 //   winding number, by crossings of the surface with one line along x per sample row. A flood fill would fill closed cavities and needs a
 //   watertight surface; the winding number does not and merges overlapping parts.
 // Source: tie rule of the crossings: "simulation of simplicity" of Edelsbrunner and Muecke 1990 (infinitesimal shift of the line).

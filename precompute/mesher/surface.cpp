@@ -28,7 +28,6 @@
 #include "precompute/mesher/two_sides.hpp"
 #include "precompute/mesher/volume_mesh.hpp"
 #include "runtime/base/error.hpp"
-#include "runtime/base/json.hpp"
 
 namespace carillon::mesher {
 namespace {
@@ -331,33 +330,6 @@ void add_notes(const SurfaceOptions& options, const Body& body, SurfaceReport& r
                     report.layers_mean));
 }
 
-std::string format_estimate(const char* word, const Body& body, double edge_m) {
-  const double nodes = std::min(std::max(body.model.calc_nodes(edge_m), calc_min_nodes(body)), 1e15);
-  base::Json estimate = base::Json::object();
-  estimate.set("volume_m3", base::significant(body.model.volume_m3, 12)).set("area_m2", base::significant(body.model.area_m2, 12));
-  estimate.set("thickness_m", base::significant(body.thickness_m, 12)).set("nodes", std::llround(nodes));
-  return fmt::format("{} {}", word, estimate.line());
-}
-
-/// Estimate from the unrepaired surface: the repair may take long.
-void show_rough_estimate(const TriangleSurface& raw, const SurfaceOptions& options, bool is_sheet, Phases& phases) {
-  const double volume = std::abs(calc_volume(raw)), area = calc_area(raw);
-  if (is_sheet) {
-    phases.show(fmt::format("rough {}", format_thin_estimate(area, *options.wall_m, options)));
-    return;
-  }
-  if (!(volume > 0 && area > 0)) return;
-  Body body;
-  set_model(body, options, volume, area);
-  // Thickness over diagonal below which a wall is probably extruded.
-  constexpr double kThin = 0.03;
-  if (options.method == Method::kAutomatic && options.order != 1 && body.thickness_m < kThin * calc_box(raw.points).diagonal()) {
-    phases.show(fmt::format("rough {}", format_thin_estimate(options.wall_m ? area : area / 2, body.thickness_m, options)));
-    return;
-  }
-  phases.show(format_estimate("rough", body, find_first_edge(body, options)));
-}
-
 [[noreturn]] void refuse_open(const SurfaceOptions& options, const Sheet& sheet) {
   throw InputError(fmt::format(
       "{}: it is an open surface ({} border{}), which has no thickness: give one with --wall (of a job's body: \"wall_m\"), or, "
@@ -383,7 +355,6 @@ mesh::TetMesh make_mesh(const SurfaceOptions& given, SurfaceReport& report, Phas
   report.unused_points = input.unused_points;
   report.seam_edges = input.seams.edges;
   report.seam_m = report.scale * input.seams.widest;
-  show_rough_estimate(raw, options, sheet.has_value(), phases);
   if (sheet) {
     for (Vec3& p : sheet->surface.points) p = report.scale * p;
     const auto take = [&] {
@@ -417,10 +388,7 @@ mesh::TetMesh make_mesh(const SurfaceOptions& given, SurfaceReport& report, Phas
   check_count(options, min_nodes);
   if (!options.edge_m && !options.nodes)
     report.remarks.push_back("Neither nodes nor edge was given: about 10,000 corner nodes (order 2: 30,000 nodes in all) were aimed at.");
-
-  for (const std::string& note : report.notes) phases.show("note " + note);  // estimates often end here
-  phases.show(format_estimate("estimate", body, edge));
-
+  phases.show(fmt::format("about {:.0f} nodes", std::max(body.model.calc_nodes(edge), min_nodes)));
   mesh::TetMesh linear = make_volume_mesh(body, options, edge, report, phases);
   mesh::TetMesh out = options.order == 2 ? mesh::to_quadratic(linear) : std::move(linear);
   if (options.order == 2 && !options.straight) phases.run("curving", [&] { curve(out, body, report); });

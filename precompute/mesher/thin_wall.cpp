@@ -19,7 +19,6 @@
 #include "precompute/mesher/tet_quality.hpp"
 #include "precompute/mesher/wall_source.hpp"
 #include "runtime/base/failure.hpp"
-#include "runtime/base/json.hpp"
 
 namespace carillon::mesher {
 namespace {
@@ -401,19 +400,11 @@ double find_thin_edge(const ThinBody& body, const SurfaceOptions& options) {
   return choose_sizes(calc_area(body.skin.repaired.surface), body.wall_m, options).edge_m;
 }
 
-std::string format_thin_estimate(double area_m2, double wall_m, const SurfaceOptions& options) {
-  const double nodes = std::clamp(choose_sizes(area_m2, wall_m, options).nodes, 1.0, 1e15);
-  base::Json estimate = base::Json::object();
-  estimate.set("volume_m3", base::significant(area_m2 * wall_m, 12)).set("area_m2", base::significant(2 * area_m2, 12));
-  estimate.set("thickness_m", base::significant(wall_m, 12)).set("nodes", std::llround(nodes));
-  return estimate.line();
-}
-
 mesh::TetMesh mesh_thin_wall(const ThinBody& body, const SurfaceOptions& options, SurfaceReport& report, Phases& phases) {
   const double area = calc_area(body.skin.repaired.surface);
   const ThinSizes sizes = choose_sizes(area, body.wall_m, options);
   check_edge(options, sizes.edge_m, calc_box(body.skin.repaired.surface.points).diagonal(), sizes.nodes, kMaxNodes);
-  phases.show(fmt::format("estimate {}", format_thin_estimate(area, body.wall_m, options)));
+  phases.show(fmt::format("about {:.0f} nodes", sizes.nodes));
   return ThinMesher(body, options, sizes, report, phases).make();
 }
 
