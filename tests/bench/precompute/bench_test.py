@@ -66,7 +66,7 @@ class Measuring(unittest.TestCase):
             measuring.run_measured(["sh", "-c", "echo no such mesh >&2; exit 3"], ".")
         for command, code, text in (
             ("echo error: no such key; exit 2", 2, "^bar: error: no such key$"),
-            ("echo error: no such key; exit 7", 4, "^bar: sh ended with exit code 7 and said: error: no such key$"),
+            ("echo error: no such key; exit 7", 4, "^bar: sh ended with exit code 7: error: no such key$"),
             ("kill -9 $$", 4, "^bar: sh ended with exit code -9$"),
         ):
             with self.assertRaisesRegex(RunError, text) as caught:

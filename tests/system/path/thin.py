@@ -91,20 +91,7 @@ with tempfile.TemporaryDirectory() as top:
     assert 0.85 < made["mesh"]["nodes"] / 9000 < 1.15, made["mesh"]
     assert made["factor"]["how"] == "analysed" and made["modes"]["how"] == "counted" and "notes" not in made, made
     # The mesher reports the node count that it can meet.
-    ended = run(
-        folder,
-        "carillon-mesh",
-        "glass.obj",
-        "--order",
-        2,
-        "--nodes",
-        400,
-        "--quiet",
-        "--result",
-        "mesh.result",
-        "-o",
-        "glass.msh",
-    )
+    ended = run(folder, "carillon-mesh", "glass.obj", "--order", 2, "--nodes", 400, "--quiet", "--result", "mesh.result", "-o", "glass.msh")
     possible = json.loads((folder / "mesh.result").read_text())["possible_nodes"]
     assert ended.returncode == 2 and possible > 400, ended.stderr
     # A coarse trial below the minimum of the thickness uses the node count that the mesher suggests.
