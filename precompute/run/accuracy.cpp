@@ -19,9 +19,8 @@
 #include "precompute/job/cost/seconds.hpp"
 #include "precompute/mesh/parallel/read_parallel.hpp"
 #include "precompute/petsc/session.hpp"
-#include "precompute/run/body.hpp"
 #include "precompute/run/io/checkpoint_file.hpp"
-#include "precompute/run/solve_body.hpp"
+#include "precompute/run/stages.hpp"
 #include "runtime/base/failure.hpp"
 
 namespace carillon::run {

@@ -1,4 +1,4 @@
-#include "precompute/run/air.hpp"
+#include "runtime/bank/air.hpp"
 
 #include <fmt/core.h>
 
@@ -13,8 +13,8 @@
 #include "precompute/eigen/checkpoint.hpp"
 #include "precompute/run/interrupt.hpp"
 #include "precompute/run/meshing.hpp"
+#include "precompute/run/stages.hpp"
 #include "runtime/acoustics/radiation/gains.hpp"
-#include "runtime/bank/air.hpp"
 #include "runtime/base/file.hpp"
 
 namespace carillon::run {

@@ -7,7 +7,7 @@
 
 #include "precompute/analytic/make_bank.hpp"
 #include "precompute/run/describe_run.hpp"
-#include "precompute/run/open_job.hpp"
+#include "precompute/run/run.hpp"
 #include "runtime/base/clock.hpp"
 #include "runtime/base/file.hpp"
 #include "runtime/base/host.hpp"

@@ -1,5 +1,3 @@
-#include "precompute/run/run_job.hpp"
-
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -14,9 +12,6 @@
 #include "precompute/job/job_spec.hpp"
 #include "precompute/petsc/session.hpp"
 #include "precompute/run/accuracy.hpp"
-#include "precompute/run/air.hpp"
-#include "precompute/run/body.hpp"
-#include "precompute/run/coupling.hpp"
 #include "precompute/run/describe_run.hpp"
 #include "precompute/run/interrupt.hpp"
 #include "precompute/run/io/checkpoint_file.hpp"
@@ -24,10 +19,6 @@
 #include "precompute/run/io/matrices.hpp"
 #include "precompute/run/io/surface_modes.hpp"
 #include "precompute/run/known_body.hpp"
-#include "precompute/run/modes.hpp"
-#include "precompute/run/open_job.hpp"
-#include "precompute/run/run.hpp"
-#include "precompute/run/solve_body.hpp"
 #include "precompute/run/stages.hpp"
 #include "runtime/bank/bank.hpp"
 #include "runtime/bank/corrected.hpp"

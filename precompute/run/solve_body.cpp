@@ -1,5 +1,3 @@
-#include "precompute/run/solve_body.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -10,10 +8,7 @@
 #include "precompute/run/io/checkpoint_file.hpp"
 #include "precompute/run/io/fingerprint.hpp"
 #include "precompute/run/io/matrices.hpp"
-#include "precompute/run/modes.hpp"
-#include "precompute/run/run.hpp"
 #include "precompute/run/stages.hpp"
-#include "precompute/run/system.hpp"
 
 namespace carillon::run {
 namespace {

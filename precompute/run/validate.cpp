@@ -16,12 +16,9 @@
 #include "precompute/job/cost/modes.hpp"
 #include "precompute/job/cost/seconds.hpp"
 #include "precompute/run/accuracy.hpp"
-#include "precompute/run/body.hpp"
 #include "precompute/run/describe_run.hpp"
 #include "precompute/run/known_body.hpp"
-#include "precompute/run/modes.hpp"
-#include "precompute/run/open_job.hpp"
-#include "precompute/run/system.hpp"
+#include "precompute/run/stages.hpp"
 #include "runtime/base/host.hpp"
 #include "runtime/base/json.hpp"
 
