@@ -4,13 +4,11 @@
 //             set aside. Never removed: open jobs, and names that the store does not generate.
 #include <fmt/core.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <map>
 #include <set>
 #include <sstream>
-#include <string_view>
 
 #include "jobs/cli/commands.hpp"
 #include "jobs/store/files.hpp"

@@ -9,8 +9,6 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <cmath>
-#include <numbers>
 #include <numeric>
 
 #include "precompute/comm/exchange.hpp"

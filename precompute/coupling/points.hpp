@@ -1,8 +1,6 @@
 // Cubature points for the coupling of modes.
 #pragma once
 
-#include <vector>
-
 #include "precompute/coupling/stresses.hpp"
 
 namespace carillon::coupling {

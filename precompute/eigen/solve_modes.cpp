@@ -10,7 +10,6 @@
 #include <petscmat.h>
 
 #include <algorithm>
-#include <limits>
 #include <numeric>
 #include <optional>
 #include <utility>

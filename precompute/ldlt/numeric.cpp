@@ -8,8 +8,6 @@
 #include "precompute/ldlt/numeric.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 #include <numeric>
 
 #include "precompute/la/node_rows.hpp"

@@ -4,7 +4,6 @@
 #include "precompute/ldlt/plan.hpp"
 
 #include <algorithm>
-#include <numeric>
 #include <optional>
 #include <unordered_map>
 

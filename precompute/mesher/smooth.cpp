@@ -4,7 +4,6 @@
 #include "precompute/mesher/smooth.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <numeric>
 #include <vector>

@@ -7,7 +7,6 @@
 #include <functional>
 #include <map>
 #include <new>
-#include <utility>
 #include <vector>
 
 #include "precompute/mesh/check.hpp"

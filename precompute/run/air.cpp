@@ -6,7 +6,6 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
-#include <optional>
 #include <utility>
 
 #include "precompute/air/radiate.hpp"

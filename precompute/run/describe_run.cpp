@@ -1,7 +1,6 @@
 #include "precompute/run/describe_run.hpp"
 
 #include <algorithm>
-#include <numeric>
 
 namespace carillon::run {
 namespace {

@@ -1,7 +1,6 @@
 // Values of a scene's keys and their ranges. Invalid values are an InputError "file:line: ...".
 #pragma once
 
-#include <cstddef>
 #include <string_view>
 
 #include "runtime/base/ranges.hpp"

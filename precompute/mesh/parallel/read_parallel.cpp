@@ -8,7 +8,6 @@
 #include <array>
 #include <fstream>
 #include <system_error>
-#include <utility>
 
 #include "precompute/comm/exchange.hpp"
 #include "precompute/mesh/check_parts.hpp"

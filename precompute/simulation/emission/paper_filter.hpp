@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <functional>
-#include <vector>
 
 #include "precompute/simulation/emission/low_pass.hpp"
 #include "precompute/simulation/emission/rows.hpp"

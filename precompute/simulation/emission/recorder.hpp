@@ -1,7 +1,6 @@
 // Recorded surface of a run (docs/surface-format.md). Internal to carillon::emission.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <vector>
