@@ -15,8 +15,6 @@
 #include "runtime/base/vector.hpp"
 #include "runtime/material/solids.hpp"
 #include "runtime/scene/scene_bodies.hpp"
-#include "runtime/scene/scene_strikes.hpp"
-#include "runtime/scene/scene_values.hpp"
 
 namespace carillon::scene {
 namespace {
