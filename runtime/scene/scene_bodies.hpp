@@ -15,14 +15,6 @@
 
 namespace carillon::scene {
 
-inline constexpr std::size_t kMaxStrikes = 100000;
-
-/// Reads the key "strikes" of a scene whose duration is known. Throws InputError "file:line: ...".
-void parse_strikes(base::Object& root, const Names& names, Scene& scene);
-
-/// Appends the tables "strike" and "mallet" of the reference.
-void describe_strike_keys(std::vector<base::KeyTable>& tables);
-
 inline constexpr double kLongestS = 3600.0;
 inline constexpr double kFarthestM = 1e4;     // of positions; half a minute at the speed of sound
 inline constexpr double kMaxSpeedMs = 300.0;  // below the speed of sound in air
@@ -52,5 +44,13 @@ void describe_body_keys(std::vector<base::KeyTable>& tables);
 
 /// Index of the modal body named by a key.
 std::size_t find_body(base::Object& object, const Names& bodies, std::string_view key = "body");
+
+inline constexpr std::size_t kMaxStrikes = 100000;
+
+/// Reads the key "strikes" of a scene whose duration is known. Throws InputError "file:line: ...".
+void parse_strikes(base::Object& root, const Names& names, Scene& scene);
+
+/// Appends the tables "strike" and "mallet" of the reference.
+void describe_strike_keys(std::vector<base::KeyTable>& tables);
 
 }  // namespace carillon::scene
