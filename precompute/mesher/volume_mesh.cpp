@@ -12,8 +12,6 @@
 #include "precompute/mesh/check.hpp"
 #include "precompute/mesh/tet_mesh.hpp"
 #include "precompute/mesher/curve_sizes.hpp"
-#include "precompute/mesher/smooth.hpp"
-#include "precompute/mesher/stuffing.hpp"
 #include "precompute/mesher/tet_quality.hpp"
 #include "precompute/mesher/triangle_surface.hpp"
 #include "precompute/mesher/verify.hpp"
