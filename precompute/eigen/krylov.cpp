@@ -3,11 +3,14 @@
 // Source: Ericsson, Ruhe, Math. Comp. 35, 1980 (shift and invert). Block Lanczos: block_lanczos.cpp.
 #include "precompute/eigen/krylov.hpp"
 
+#include <petscmat.h>
 #include <slepcbv.h>
 #include <slepceps.h>
 
 #include <algorithm>
 #include <bit>
+#include <exception>
+#include <new>
 #include <numeric>
 #include <vector>
 
@@ -15,9 +18,8 @@
 #include "precompute/eigen/found_modes.hpp"
 #include "precompute/eigen/locked_modes.hpp"
 #include "precompute/eigen/ritz.hpp"
-#include "precompute/eigen/scaled_matrix.hpp"
 #include "precompute/eigen/shift_invert.hpp"
-#include "precompute/petsc/guard.hpp"
+#include "precompute/petsc/handle.hpp"
 #include "precompute/petsc/noise.hpp"
 #include "precompute/petsc/session.hpp"
 
@@ -25,7 +27,41 @@ namespace carillon::eigen {
 namespace {
 
 using petsc::check;
-using petsc::guard;
+
+/// factor * matrix for products with vectors, without a copy of the matrix, which must outlive this object.
+class ScaledMatrix {
+ public:
+  /// Collective.
+  ScaledMatrix(Mat matrix, double factor);
+  ScaledMatrix(const ScaledMatrix&) = delete;
+  ScaledMatrix& operator=(const ScaledMatrix&) = delete;
+
+  operator Mat() const { return shell_; }
+
+ private:
+  static PetscErrorCode multiply(Mat shell, Vec x, Vec y);
+
+  Mat matrix_;
+  double factor_;
+  petsc::MatHandle shell_;
+};
+
+ScaledMatrix::ScaledMatrix(Mat matrix, double factor) : matrix_(matrix), factor_(factor) {
+  PetscInt rows = 0;
+  PetscInt n = 0;
+  check(MatGetLocalSize(matrix, &rows, nullptr));
+  check(MatGetSize(matrix, &n, nullptr));
+  check(MatCreateShell(petsc::get_communicator(matrix), rows, rows, n, n, this, shell_.out()));
+  check(MatShellSetOperation(shell_, MATOP_MULT, reinterpret_cast<void (*)()>(multiply)));
+  check(MatShellSetOperation(shell_, MATOP_MULT_TRANSPOSE, reinterpret_cast<void (*)()>(multiply)));  // symmetric
+}
+
+PetscErrorCode ScaledMatrix::multiply(Mat shell, Vec x, Vec y) {
+  const ScaledMatrix* scaled = nullptr;
+  PetscCall(MatShellGetContext(shell, &scaled));
+  PetscCall(MatMult(scaled->matrix_, x, y));
+  return VecScale(y, scaled->factor_);
+}
 
 // Method: SLEPc's Krylov-Schur seeks the eigenvalues nearest to the shift, with the available factor as operator. Its Gram-Schmidt repeats
 // as SLEPc decides: skipping the second pass occasionally lost orthogonality.
@@ -51,6 +87,19 @@ class LocalVector {
   Vec vector_;
   PetscScalar* values_ = nullptr;
 };
+
+/// Runs the work of a callback; converts an exception to a PETSc error with the same text, which check() converts back.
+template <typename Work>
+PetscErrorCode guard(Work&& work) {
+  try {
+    work();
+  } catch (const std::bad_alloc&) {
+    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_MEM, "out of memory");
+  } catch (const std::exception& error) {
+    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_LIB, "%s", error.what());
+  }
+  return 0;
+}
 
 PetscErrorCode apply_inverse(PC pc, Vec b, Vec x) {
   return guard([&] {
