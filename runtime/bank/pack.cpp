@@ -106,42 +106,6 @@ Blows::Blows(const Bank& bank) : skin(find_skin(bank)), weight(calc_weights(bank
   for (double& heard : exposure) heard = std::max(heard, quietest);
 }
 
-std::string describe(const Packing& packing) {
-  if (packing.worst_db <= kExactDb) return "no error";
-  return fmt::format("error at most {:.1f} dB(A) on 95 % of the surface, {:.1f} at the worst place", packing.error_db, packing.worst_db);
-}
-
-Check check_packing(const Bank& bank) {
-  const Packing& packing = *bank.packing;
-  Check check{"packing", describe(packing), {}};
-  const auto is_vertex = [&](std::int32_t v) { return v >= 0 && static_cast<std::size_t>(v) < bank.vertex_count(); };
-  if (!std::all_of(packing.witness.begin(), packing.witness.end(), is_vertex) ||
-      packing.witness_shape.size() != packing.witness.size() * bank.mode_count() * 3) {
-    check.faults.push_back("the witnesses are not vertices with the shapes of all modes");
-    return check;
-  }
-  const Blows blows(bank);
-  std::size_t above = 0;
-  double worst_db = kExactDb;
-  for (std::size_t i = 0; i < packing.witness.size(); ++i) {
-    const std::size_t v = packing.witness[i];
-    const std::int16_t* own = packing.witness_shape.data() + i * bank.mode_count() * 3;
-    const Vec3& normal = blows.skin.normal[v];
-    const double missed = calc_heard(blows.weight, normal, own, bank.shape.data() + v * bank.mode_count() * 3);
-    const double here_db = calc_db(missed, std::max(calc_heard(blows.weight, normal, own), blows.quietest));
-    worst_db = std::max(worst_db, here_db);
-    if (here_db > packing.error_db + kRoundingDb) ++above;
-    if (here_db > packing.worst_db + kRoundingDb)
-      check.faults.push_back(
-          fmt::format("the error is {:.1f} dB(A) at vertex {}, the recorded maximum is {:.1f}", here_db, v, packing.worst_db));
-  }
-  check.figure += fmt::format("; {:.1f} at the worst of {} witnesses", worst_db, packing.witness.size());
-  if (static_cast<double>(above) > kWitnessShare * static_cast<double>(packing.witness.size()))
-    check.faults.push_back(
-        fmt::format("the error is greater than {:.1f} dB(A) at {} of {} witnesses", packing.error_db, above, packing.witness.size()));
-  return check;
-}
-
 constexpr double kLatticePerSize = 32768.0, kLatticePerEdge = 8.0;  // lattice steps per body size, per shortest edge
 constexpr double kMostLattice = 1 << 22;
 constexpr double kMaxRelativeStep = 1.0;  // maximum step of a mode over its mean motion, so that none vanishes
@@ -428,6 +392,42 @@ class Packer {
 };
 
 }  // namespace
+
+std::string describe(const Packing& packing) {
+  if (packing.worst_db <= kExactDb) return "no error";
+  return fmt::format("error at most {:.1f} dB(A) on 95 % of the surface, {:.1f} at the worst place", packing.error_db, packing.worst_db);
+}
+
+Check check_packing(const Bank& bank) {
+  const Packing& packing = *bank.packing;
+  Check check{"packing", describe(packing), {}};
+  const auto is_vertex = [&](std::int32_t v) { return v >= 0 && static_cast<std::size_t>(v) < bank.vertex_count(); };
+  if (!std::all_of(packing.witness.begin(), packing.witness.end(), is_vertex) ||
+      packing.witness_shape.size() != packing.witness.size() * bank.mode_count() * 3) {
+    check.faults.push_back("the witnesses are not vertices with the shapes of all modes");
+    return check;
+  }
+  const Blows blows(bank);
+  std::size_t above = 0;
+  double worst_db = kExactDb;
+  for (std::size_t i = 0; i < packing.witness.size(); ++i) {
+    const std::size_t v = packing.witness[i];
+    const std::int16_t* own = packing.witness_shape.data() + i * bank.mode_count() * 3;
+    const Vec3& normal = blows.skin.normal[v];
+    const double missed = calc_heard(blows.weight, normal, own, bank.shape.data() + v * bank.mode_count() * 3);
+    const double here_db = calc_db(missed, std::max(calc_heard(blows.weight, normal, own), blows.quietest));
+    worst_db = std::max(worst_db, here_db);
+    if (here_db > packing.error_db + kRoundingDb) ++above;
+    if (here_db > packing.worst_db + kRoundingDb)
+      check.faults.push_back(
+          fmt::format("the error is {:.1f} dB(A) at vertex {}, the recorded maximum is {:.1f}", here_db, v, packing.worst_db));
+  }
+  check.figure += fmt::format("; {:.1f} at the worst of {} witnesses", worst_db, packing.witness.size());
+  if (static_cast<double>(above) > kWitnessShare * static_cast<double>(packing.witness.size()))
+    check.faults.push_back(
+        fmt::format("the error is greater than {:.1f} dB(A) at {} of {} witnesses", packing.error_db, above, packing.witness.size()));
+  return check;
+}
 
 PackedBank calc_packed(const Bank& bank, double error_db, bool keep_numbers) {
   if (!(error_db >= kMinPackError && error_db <= kMaxPackError))
