@@ -263,13 +263,8 @@ class Lab:
         content = json.loads(child.stdout)
         record = json.loads(pathlib.Path(f"{bank}.resolved.json").read_text())["run"]
         columns = (
-            "frequency_hz",
-            "algebraic_error_cents",
-            "discretisation_error_cents",
-            "residual",
-            "corrected_frequency_hz",
-            "corrected_error_cents",
-        )
+            "frequency_hz algebraic_error_cents discretisation_error_cents residual corrected_frequency_hz corrected_error_cents"
+        ).split()
         return {
             "modes": [[mode[column] for column in columns] for mode in content["modes"]],
             "record": record,

@@ -42,31 +42,12 @@ library = ctypes.CDLL("libopenblas.so.0")
 library.openblas_get_corename.restype = ctypes.c_char_p
 print(library.openblas_get_corename().decode())"""
 # Rank by vector instructions: 2 is AVX2 with FMA; unlisted names are newer.
-KERNEL_RANKS = dict.fromkeys(
-    (
-        "generic",
-        "katmai",
-        "coppermine",
-        "northwood",
-        "prescott",
-        "banias",
-        "atom",
-        "core2",
-        "penryn",
-        "dunnington",
-        "nehalem",
-        "athlon",
-        "opteron",
-        "opteron_sse3",
-        "barcelona",
-        "bobcat",
-        "nano",
-    ),
-    0,
+KERNELS_BY_RANK = (
+    "generic katmai coppermine northwood prescott banias atom core2 penryn dunnington nehalem athlon opteron opteron_sse3 barcelona bobcat nano",
+    "sandybridge bulldozer piledriver steamroller",
+    "haswell zen excavator",
 )
-KERNEL_RANKS |= dict.fromkeys(("sandybridge", "bulldozer", "piledriver", "steamroller"), 1) | dict.fromkeys(
-    ("haswell", "zen", "excavator"), 2
-)
+KERNEL_RANKS = {name: rank for rank, names in enumerate(KERNELS_BY_RANK) for name in names.split()}
 
 
 def find_fitting_kernels(cpuinfo):
