@@ -5,6 +5,12 @@ import time
 
 from lab import Lab
 
+# Nodes asked for, coarse to fine: all, and with --quick. Thin walls need more, those of T10 again more.
+SIZES, QUICK_SIZES = (400, 1000, 2500, 6000, 15000), (300, 900, 2700)
+THIN = ((800, 2000, 5000, 12000, 30000), (500, 1300, 3200))
+SIZES_OF = {"tube": THIN, "bowl": THIN, "bunny": ((6000, 10500, 18000, 32000, 60000), (3000, 5000, 9000))}
+QUADRATIC_SIZES_OF = {"bunny": ((18500, 27000, 40000, 64000, 105000), (18500, 21000, 24000))}
+
 
 class StudyLab(Lab):
     def __init__(self, options, programs):
@@ -13,6 +19,10 @@ class StudyLab(Lab):
         self.on, self.asked_repeats = options.on, options.repeats
         self.start, self.load_start = time.monotonic(), os.getloadavg()[0]
         self.found = {}  # results by section, for later sections
+
+    def get_sizes(self, body, kind):
+        sizes = SIZES_OF.get(body.name, (SIZES, QUICK_SIZES))
+        return (QUADRATIC_SIZES_OF.get(body.name, sizes) if kind.element == "T10" else sizes)[self.quick]
 
     def make_command(self, section, *words):
         """The command that repeats a section or a part of it."""
