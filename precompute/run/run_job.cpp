@@ -248,8 +248,7 @@ RunSummary write_outputs(Run& run, const Solution& found, const AccuracyReport& 
     base::Json record = describe_run(run, found, measured);
     if (run.job.accuracy_cents) record["accuracy"] = describe_accuracy(accuracy);
     if (!air.why.empty()) {
-      record["air"]["solved"] = air.is_solved;
-      record["air"]["why"] = air.why;
+      record["air"].set("solved", air.is_solved).set("why", air.why);
       if (!air.result.empty()) record["air"]["result"] = air.result;
     }
     if (!coupling.result.empty()) record["coupling"] = coupling.result;

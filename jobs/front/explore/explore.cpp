@@ -66,10 +66,8 @@ base::Json make_row(const std::vector<std::filesystem::path>& files, const std::
     const std::string stem = cut_name(files[i].stem().string());
     std::string name = stem;
     for (int k = 2; !taken.insert(name).second; ++k) name = fmt::format("{} {}", stem, k);
-    body["name"] = name;
-    body["bank"] = files[i].string();
-    body["fixed"] = true;
-    body["position_m"] = to_json({x - box.low[0], -0.5 * (box.low[1] + box.high[1]), -box.low[2]});
+    body.set("name", name).set("bank", files[i].string()).set("fixed", true);
+    body.set("position_m", to_json({x - box.low[0], -0.5 * (box.low[1] + box.high[1]), -box.low[2]}));
     if (up == Up::kY) body["rotation_deg"] = to_json({90.0, 0.0, 0.0});
     scene["bodies"].append(body);
     x += width;
@@ -89,14 +87,10 @@ base::Json make_probe(base::Json scene, const std::vector<std::filesystem::path>
   double time_s = 0.05;
   for (std::size_t i = 0; i < scene["bodies"].size(); ++i) {
     base::Json& body = scene["bodies"][i];
-    body["fixed"] = true;
-    body["bank"] = files[i].string();
+    body.set("fixed", true).set("bank", files[i].string());
     for (const char* motion : {"velocity_m_s", "angular_velocity_rad_s"}) body.erase(motion);
     base::Json strike = base::Json::object();
-    strike["time_s"] = time_s;
-    strike["body"] = body["name"];
-    strike["point_m"] = to_json(facts[i]->loudest_m);
-    strike["mallet"] = kMallet;
+    strike.set("time_s", time_s).set("body", body["name"]).set("point_m", to_json(facts[i]->loudest_m)).set("mallet", kMallet);
     scene["strikes"].append(strike);
     time_s += kStrikeS;
   }
@@ -305,24 +299,17 @@ class Work {
 
   void write(double gain) {
     base::Json about = base::Json::object();
-    about["carillon_explore"] = kVersion;
-    about["made_by"] = base::describe("carillon");
-    about["title"] = find_title(order_);
-    about["scene"] = kSceneFile;
-    about["contacts"] = done_.has_recording ? base::Json(kPackedContactsFile) : base::Json();
-    about["duration_s"] = done_.duration_s;
-    about["gain_per_pa"] = gain;
+    about.set("carillon_explore", kVersion).set("made_by", base::describe("carillon")).set("title", find_title(order_));
+    about.set("scene", kSceneFile).set("contacts", done_.has_recording ? base::Json(kPackedContactsFile) : base::Json());
+    about.set("duration_s", done_.duration_s).set("gain_per_pa", gain);
     for (std::size_t i = 0; i < scene_["bodies"].size(); ++i) {
       const BankFacts& facts = *facts_[i];
       scene_["bodies"][i]["bank"] = fmt::format("{}/{}", kBankFolder, facts.kept.name);
       base::Json body = base::Json::object();
-      body["bank_bytes"] = facts.kept.bytes;
-      body["full_bytes"] = facts.kept.full_bytes;
-      body["change"] = facts.kept.change.empty() ? base::Json() : base::Json(facts.kept.change);
-      body["material"] = facts.material;
-      body["group"] = facts.group;
-      body["loudest"]["triangle"] = facts.loudest[0];
-      body["loudest"]["corner"] = facts.loudest[1];
+      body.set("bank_bytes", facts.kept.bytes).set("full_bytes", facts.kept.full_bytes);
+      body.set("change", facts.kept.change.empty() ? base::Json() : base::Json(facts.kept.change)).set("material", facts.material);
+      body.set("group", facts.group);
+      body["loudest"].set("triangle", facts.loudest[0]).set("corner", facts.loudest[1]);
       if (done_.has_recording) body["effects"] = report_["per_body"][i]["effects"];
       about["bodies"].append(body);
     }

@@ -114,8 +114,7 @@ base::Json draw(const base::Json& figures, const fs::path& bank, const fs::path&
   if (!drawing.fault.empty()) {
     json["reason"] = drawing.fault + ".";
   } else {
-    json["file"] = kPictureFile;
-    json["modes"] = modes;
+    json.set("file", kPictureFile).set("modes", modes);
   }
   return json;
 }
@@ -160,10 +159,7 @@ void write_report(const fs::path& bank, const fs::path& resolved_job, const fs::
   Record record = read_record(resolved_job, provenance);
   data["title"] = options.title.empty() ? find_title(record.job, bank) : options.title;
   if (record.job.is_object()) record.job.erase("run");
-  data["job"] = record.job;
-  data["run"] = record.run;
-  data["remarks"] = base::Json::array(record.remarks);
-  data["explorer"] = options.explorer;
+  data.set("job", record.job).set("run", record.run).set("remarks", base::Json::array(record.remarks)).set("explorer", options.explorer);
   std::error_code error;
   fs::create_directories(folder, error);
   if (error || !fs::is_directory(folder))
