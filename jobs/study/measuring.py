@@ -43,7 +43,8 @@ library.openblas_get_corename.restype = ctypes.c_char_p
 print(library.openblas_get_corename().decode())"""
 # Rank by vector instructions: 2 is AVX2 with FMA; unlisted names are newer.
 KERNELS_BY_RANK = (
-    "generic katmai coppermine northwood prescott banias atom core2 penryn dunnington nehalem athlon opteron opteron_sse3 barcelona bobcat nano",
+    "generic katmai coppermine northwood prescott banias atom core2 penryn dunnington nehalem athlon opteron opteron_sse3 barcelona"
+    " bobcat nano",
     "sandybridge bulldozer piledriver steamroller",
     "haswell zen excavator",
 )
