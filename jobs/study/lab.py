@@ -106,7 +106,7 @@ def add_possible_nodes(error, result):
 
 class Lab:
     def __init__(self, out, programs, quick=False, repeats=None, surface=None, timeout_s=3600):
-        """out: folder of the report. programs: {name: path}, see programs.find_all(). repeats: of every case; default 1 if quick, else 2."""
+        """out: the report. programs: {name: path}, see programs.find_all(). repeats: of every case; default 1 if quick, else 2."""
         self.out, self.programs, self.quick = pathlib.Path(out).resolve(), programs, quick
         self.repeats = repeats or (1 if quick else 2)
         self.surface, self.timeout_s = surface, timeout_s
