@@ -12,7 +12,6 @@
 #include "precompute/petsc/session.hpp"
 #include "precompute/run/cut_mesh.hpp"
 #include "precompute/run/meshing.hpp"
-#include "precompute/run/refine_mesh.hpp"
 #include "precompute/run/stages.hpp"
 
 namespace carillon::run {

@@ -1,6 +1,6 @@
-#include "precompute/run/describe_run.hpp"
-
 #include <algorithm>
+
+#include "precompute/run/stages.hpp"
 
 namespace carillon::run {
 namespace {

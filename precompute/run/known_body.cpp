@@ -6,8 +6,8 @@
 #include <numbers>
 
 #include "precompute/analytic/make_bank.hpp"
-#include "precompute/run/describe_run.hpp"
 #include "precompute/run/run.hpp"
+#include "precompute/run/stages.hpp"
 #include "runtime/base/clock.hpp"
 #include "runtime/base/file.hpp"
 #include "runtime/base/host.hpp"

@@ -17,7 +17,6 @@
 #include "precompute/run/end_in_error.hpp"
 #include "precompute/run/interrupt.hpp"
 #include "precompute/run/known_body.hpp"
-#include "precompute/run/predict_cost.hpp"
 #include "precompute/run/run_log.hpp"
 #include "precompute/run/same_start.hpp"
 #include "precompute/run/stages.hpp"

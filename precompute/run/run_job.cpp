@@ -12,7 +12,6 @@
 #include "precompute/job/job_spec.hpp"
 #include "precompute/petsc/session.hpp"
 #include "precompute/run/accuracy.hpp"
-#include "precompute/run/describe_run.hpp"
 #include "precompute/run/interrupt.hpp"
 #include "precompute/run/io/checkpoint_file.hpp"
 #include "precompute/run/io/fingerprint.hpp"

@@ -1,4 +1,4 @@
-// Stages of a run and their results, in the order of a run.
+// Stages of a run and their results, in the order of a run, and its record.
 #pragma once
 
 #include <cstdint>
@@ -19,10 +19,12 @@
 #include "precompute/job/setting.hpp"
 #include "precompute/mesh/check.hpp"
 #include "precompute/mesh/distributed/distributed_mesh.hpp"
+#include "precompute/mesh/tet_mesh.hpp"
 #include "precompute/run/io/surface_modes.hpp"
 #include "precompute/run/run.hpp"
 #include "runtime/bank/bank.hpp"
 #include "runtime/bank/quartic_energy.hpp"
+#include "runtime/base/json.hpp"
 
 namespace carillon::ldlt {
 class MeshOrder;
@@ -105,6 +107,11 @@ std::optional<std::int64_t> find_computed_count(const job::JobSpec& job);
 /// Rank 0.
 cost::ProblemSize find_problem_size(const Run& run, const Setting& setting, const Body& body);
 
+/// Cuts every tetrahedron into eight: four corner tetrahedra and four from the inner octahedron, cut along its shortest diagonal. Ten-node
+/// elements keep their curved sides: new nodes are on the quadratic map of the old element. Node sets gain the nodes whose old edge or face
+/// is entirely in the set. Pre: a mesh accepted by check_mesh. Not collective.
+mesh::TetMesh refine_mesh(const mesh::TetMesh& mesh);
+
 /// Reads or makes the mesh, checks it, and distributes it; rank 0 frees the whole mesh. Collective. Throws on every rank: InputError naming
 /// the file or the job's line, SystemError.
 Body make_body(Run& run, const Setting& setting);
@@ -154,5 +161,14 @@ RunSummary radiate_bank(const comm::Communicator& comm, const RunOptions& option
 /// error, before anything is written. Progress goes to standard output (unless quiet) and warnings to standard error, on rank 0.
 /// Collective. Throws the same on every rank: InputError, SolveError, SystemError.
 RunSummary run_job(const comm::Communicator& comm, const std::filesystem::path& job_file, const RunOptions& options);
+
+/// "run" of the resolved job and of the bank's provenance. Rank 0 only.
+base::Json describe_run(const Run& run, const Solution& found, const Measured& measured);
+
+/// Its part about the program: name, version, ranks, phases.
+base::Json describe_program(const Run& run);
+
+/// Materials by region: constants, damping, volume.
+base::Json describe_materials(const fem::Materials& materials, const std::vector<double>& volume_m3);
 
 }  // namespace carillon::run

@@ -16,7 +16,6 @@
 #include "precompute/job/cost/modes.hpp"
 #include "precompute/job/cost/seconds.hpp"
 #include "precompute/run/accuracy.hpp"
-#include "precompute/run/describe_run.hpp"
 #include "precompute/run/known_body.hpp"
 #include "precompute/run/stages.hpp"
 #include "runtime/base/host.hpp"
