@@ -47,8 +47,7 @@ class ScaledMatrix {
 };
 
 ScaledMatrix::ScaledMatrix(Mat matrix, double factor) : matrix_(matrix), factor_(factor) {
-  PetscInt rows = 0;
-  PetscInt n = 0;
+  PetscInt rows = 0, n = 0;
   check(MatGetLocalSize(matrix, &rows, nullptr));
   check(MatGetSize(matrix, &n, nullptr));
   check(MatCreateShell(petsc::get_communicator(matrix), rows, rows, n, n, this, shell_.out()));
@@ -228,11 +227,8 @@ struct Sizes {
     max_steps = request.max_steps > 0 ? request.max_steps : std::max(200, static_cast<int>(20 * columns / kBlock));
   }
 
-  PetscInt wanted = 0;
-  PetscInt columns = 0;
-  int room = 0;
-  int block = 0;
-  int max_steps = 0;
+  PetscInt wanted = 0, columns = 0;
+  int room = 0, block = 0, max_steps = 0;
 };
 
 // Pseudo-random number in (-1/2, 1/2) from a position and two more numbers.

@@ -53,8 +53,7 @@ constexpr double kEigenFlops =
 la::Matrix gather_dense(Mat matrix, double factor, PetscInt n) {
   const comm::Communicator comm = petsc::get_communicator(matrix);
   la::Matrix dense = comm.agree([&] { return la::Matrix(la::Matrix::Zero(n, n)); });
-  PetscInt first = 0;
-  PetscInt last = 0;
+  PetscInt first = 0, last = 0;
   check(MatGetOwnershipRange(matrix, &first, &last));
   for (PetscInt row = first; row < last; ++row) {
     PetscInt count = 0;
@@ -90,8 +89,7 @@ DensePairs solve_dense(const la::Pencil& pencil) {
   m.resize(0, 0);
   comm.broadcast_into(la::entries(k));
   comm.broadcast_into(la::entries(lambda));
-  PetscInt first = 0;
-  PetscInt last = 0;
+  PetscInt first = 0, last = 0;
   check(MatGetOwnershipRange(stiffness, &first, &last));
   DensePairs pairs;
   pairs.lambda.assign(lambda.begin(), lambda.end());
@@ -135,8 +133,7 @@ petsc::MatHandle copy_columns(const BandProblem& body, Mat vectors, const std::v
 // Counts slightly outside the band, but not beyond the next mode: all eigenvalues are known.
 void prove_dense(const BandProblem& body, const BandLimits& limits, const std::vector<double>& lambda, Modes& modes) {
   const auto count_under = [&](double x) -> std::int64_t { return std::lower_bound(lambda.begin(), lambda.end(), x) - lambda.begin(); };
-  double low = limits.low * (1 - kEdgeNudge);
-  double high = limits.high * (1 + kEdgeNudge);
+  double low = limits.low * (1 - kEdgeNudge), high = limits.high * (1 + kEdgeNudge);
   for (const double x : lambda) {
     if (limits.is_below(x)) low = std::max(low, std::midpoint(x, limits.low));
     if (limits.is_above(x)) high = std::min(high, std::midpoint(x, limits.high));

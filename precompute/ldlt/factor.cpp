@@ -128,8 +128,7 @@ struct Factor::State {
   double mass_norm = 0;
   Numbers numbers;
   Workspace workspace;
-  double sigma = 0;
-  double norm = 0;
+  double sigma = 0, norm = 0;
   bool needs_refinement = false;
   double backward_error = 0;  // of solves as performed, with refinement if any
   bool is_allocated = false;
@@ -201,8 +200,7 @@ double Factor::State::measure_backward_error(bool is_refined) {
   petsc::VecHandle scratch;
   check(MatCreateVecs(given.stiffness, x.out(), b.out()));
   check(VecDuplicate(x, scratch.out()));
-  PetscInt first = 0;
-  PetscInt last = 0;
+  PetscInt first = 0, last = 0;
   check(VecGetOwnershipRange(x, &first, &last));
   PetscScalar* values = nullptr;
   check(VecGetArray(x, &values));
@@ -217,9 +215,7 @@ double Factor::State::measure_backward_error(bool is_refined) {
   else
     solve(values, values, stride, 1);
   check(VecRestoreArray(x, &values));
-  double b_norm = 0;
-  double x_norm = 0;
-  double residual = 0;
+  double b_norm = 0, x_norm = 0, residual = 0;
   check(VecNorm(b, NORM_INFINITY, &b_norm));
   check(VecNorm(x, NORM_INFINITY, &x_norm));
   petsc::VecHandle image;

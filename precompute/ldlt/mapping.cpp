@@ -53,8 +53,7 @@ std::vector<FrontParts> list_parts(const std::vector<FrontCost>& fronts, const M
 void level(std::vector<FrontShare>& shares, const std::vector<double>& times, double operations, double least) {
   std::vector<double> sorted = times;
   std::sort(sorted.begin(), sorted.end());
-  double end = 0;
-  double sum = 0;
+  double end = 0, sum = 0;
   for (std::size_t k = 0; k < sorted.size(); ++k) {
     sum += sorted[k];
     end = (sum + operations) / static_cast<double>(k + 1);
@@ -198,8 +197,7 @@ Mapping::Mapping(const std::vector<FrontCost>& fronts, int ranks, double operati
       end_(fronts.size(), 0.0),
       owner_(fronts.size(), -1) {
   const std::size_t count = fronts.size();
-  double operations = 0;
-  double entries = 0;
+  double operations = 0, entries = 0;
   for (const FrontCost& front : fronts) {
     operations += front.operations;
     entries += front.entries;
