@@ -24,9 +24,7 @@ int make(const Shared& shared, const BankForOptions& options) {
   for (const std::string& warning : made.warnings) fmt::print(stderr, "carillon: warning: {}\n", show_message(warning));
   if (shared.json) {
     base::Json root;
-    root["bank"] = to_json(made.bank.string());
-    root["is_new"] = made.is_new;
-    root["warnings"] = to_json(made.warnings);
+    root.set("bank", to_json(made.bank.string())).set("is_new", made.is_new).set("warnings", to_json(made.warnings));
     print_json(root);
   } else {
     fmt::print("{}\n", made.bank.string());

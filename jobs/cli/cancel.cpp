@@ -25,8 +25,7 @@ int do_to_all(Shared& shared, const std::vector<registry::Job>& jobs, const Act&
     is_done = is_done && result.is_done;
     if (shared.json) {
       base::Json entry = describe(shared, shared.registry().find(job.id).value_or(job));
-      entry["did"] = result.is_done;
-      entry["said"] = to_json(result.text);
+      entry.set("did", result.is_done).set("said", to_json(result.text));
       root["jobs"].append(entry);
     } else {
       fmt::print("{}  {}: {}\n", job.id.short_text(), show(job.name), show_message(result.text));

@@ -119,19 +119,14 @@ base::Json explain_one(Shared& shared, const Source& source) {
   const std::vector<Change> changes = last ? find_changes(last->request, source.request) : std::vector<Change>();
   if (shared.json) {
     base::Json root;
-    root["id"] = id.text();
-    root["job_file"] = to_json(source.job_file);
-    root["state"] = explanation.word;
-    root["would_run"] = explanation.would_run;
-    root["why"] = to_json(explanation.line);
-    root["last_id"] = last ? base::Json(last->request.id) : base::Json();
-    root["changes"] = base::Json::array();
+    root.set("id", id.text()).set("job_file", to_json(source.job_file)).set("state", explanation.word);
+    root.set("would_run", explanation.would_run).set("why", to_json(explanation.line));
+    root.set("last_id", last ? base::Json(last->request.id) : base::Json()).set("changes", base::Json::array());
     for (const Change& change : changes) {
       base::Json entry;
-      entry["part"] = change.part;
-      entry["key"] = change.key.empty() ? base::Json() : to_json(change.key);
-      entry["before"] = change.before.empty() ? base::Json() : to_json(change.before);
-      entry["after"] = change.after.empty() ? base::Json() : to_json(change.after);
+      entry.set("part", change.part).set("key", change.key.empty() ? base::Json() : to_json(change.key));
+      entry.set("before", change.before.empty() ? base::Json() : to_json(change.before));
+      entry.set("after", change.after.empty() ? base::Json() : to_json(change.after));
       root["changes"].append(entry);
     }
     root["bank"] = base::Json();

@@ -29,18 +29,13 @@ void print(const explore::Explored& made) {
 
 base::Json describe(const explore::Explored& made) {
   base::Json root;
-  root["folder"] = to_json(made.folder.string());
-  root["page"] = to_json((made.folder / "index.html").string());
-  root["bytes"] = made.bytes;
-  root["recording_s"] = made.has_recording ? base::Json(made.duration_s) : base::Json();
-  root["warnings"] = to_json(made.warnings);
-  root["banks"] = base::Json::array();
+  root.set("folder", to_json(made.folder.string())).set("page", to_json((made.folder / "index.html").string())).set("bytes", made.bytes);
+  root.set("recording_s", made.has_recording ? base::Json(made.duration_s) : base::Json()).set("warnings", to_json(made.warnings));
+  root.set("banks", base::Json::array());
   for (const explore::PageBank& bank : made.banks) {
     base::Json& one = root["banks"].append(base::Json::object());
-    one["file"] = to_json(bank.name);
-    one["bytes"] = bank.bytes;
-    one["full_bytes"] = bank.full_bytes;
-    one["change"] = bank.change.empty() ? base::Json() : to_json(bank.change);
+    one.set("file", to_json(bank.name)).set("bytes", bank.bytes).set("full_bytes", bank.full_bytes);
+    one.set("change", bank.change.empty() ? base::Json() : to_json(bank.change));
   }
   return root;
 }

@@ -4,13 +4,11 @@
 //             set aside. Never removed: open jobs, and names that the store does not generate.
 #include <fmt/core.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <map>
 #include <set>
 #include <sstream>
-#include <string_view>
 
 #include "jobs/cli/commands.hpp"
 #include "jobs/store/files.hpp"
@@ -221,18 +219,13 @@ int run_gc(Shared& shared, const GcOptions& options) {
   double bytes = 0.0;
   bool has_failed = false;
   base::Json root;
-  root["deleted"] = options.is_deleting;
-  root["items"] = base::Json::array();
+  root.set("deleted", options.is_deleting).set("items", base::Json::array());
   for (const Item& item : items) {
     has_failed = has_failed || !item.error.empty();
     if (item.error.empty()) bytes += item.bytes;
     base::Json entry;
-    entry["kind"] = item.kind;
-    entry["path"] = to_json(item.path.string());
-    entry["id"] = item.id ? base::Json(item.id->text()) : base::Json();
-    entry["why"] = to_json(item.why);
-    entry["bytes"] = item.bytes;
-    entry["error"] = item.error.empty() ? base::Json() : to_json(item.error);
+    entry.set("kind", item.kind).set("path", to_json(item.path.string())).set("id", item.id ? base::Json(item.id->text()) : base::Json());
+    entry.set("why", to_json(item.why)).set("bytes", item.bytes).set("error", item.error.empty() ? base::Json() : to_json(item.error));
     root["items"].append(entry);
     if (shared.json) continue;
     fmt::print("{:<9}  {:>9}  {}: {}\n", item.kind, format_bytes(item.bytes),

@@ -105,13 +105,9 @@ void choose_places(std::vector<Got>& all, const fs::path& to) {
 
 base::Json describe(const Got& got, const fs::path& to, bool is_one) {
   base::Json root;
-  root["id"] = got.named.id.text();
-  root["name"] = to_json(got.named.name);
-  root["state"] = got.state;
-  root["reason"] = to_json(got.state == "new" ? "" : got.why);
-  root["warnings"] = to_json(got.warnings);
-  root["bank"] = got.is_bank() ? to_json(got.results.at("bank").string()) : base::Json();
-  root["results"] = base::Json::object();
+  root.set("id", got.named.id.text()).set("name", to_json(got.named.name)).set("state", got.state);
+  root.set("reason", to_json(got.state == "new" ? "" : got.why)).set("warnings", to_json(got.warnings));
+  root.set("bank", got.is_bank() ? to_json(got.results.at("bank").string()) : base::Json()).set("results", base::Json::object());
   for (const auto& [key, file] : got.results) root["results"][key] = to_json(file.string());
   root["copy"] = base::Json();
   if (!got.copies.empty())

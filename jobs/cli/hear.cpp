@@ -12,19 +12,16 @@ namespace {
 
 base::Json describe(const hear::Sound& sound) {
   base::Json entry;
-  entry["name"] = to_json(sound.name);
-  entry["material"] = to_json(sound.material);
-  entry["height_m"] = sound.height_m > 0.0 ? base::Json(sound.height_m) : base::Json();
+  entry.set("name", to_json(sound.name)).set("material", to_json(sound.material));
+  entry.set("height_m", sound.height_m > 0.0 ? base::Json(sound.height_m) : base::Json());
   for (const auto& [key, file] :
        {std::pair{"bank", &sound.bank}, {"scene", &sound.scene}, {"wav", &sound.wav}, {"spectrogram", &sound.spectrogram}})
     entry[key] = to_json(file->string());
-  entry["is_scaled"] = sound.is_edited;
-  entry["mode_count"] = sound.mode_count;
-  entry["highest_hz"] = sound.highest_hz;
-  entry["is_complete"] = sound.is_complete;
-  entry["worst_cents"] = std::isfinite(sound.worst_cents) ? base::Json(sound.worst_cents) : base::Json();
-  entry["facet_cents"] = std::isfinite(sound.facet_cents) ? base::Json(sound.facet_cents) : base::Json();
-  entry["modes"] = base::Json::array();
+  entry.set("is_scaled", sound.is_edited).set("mode_count", sound.mode_count).set("highest_hz", sound.highest_hz);
+  entry.set("is_complete", sound.is_complete);
+  entry.set("worst_cents", std::isfinite(sound.worst_cents) ? base::Json(sound.worst_cents) : base::Json());
+  entry.set("facet_cents", std::isfinite(sound.facet_cents) ? base::Json(sound.facet_cents) : base::Json());
+  entry.set("modes", base::Json::array());
   for (const hear::StruckMode& mode : sound.modes) {
     base::Json& one = entry["modes"].append(base::Json::object());
     one["freq_hz"] = mode.heard.freq_hz;
@@ -82,11 +79,9 @@ int run_hear(Shared& shared, const HearOptions& options) {
   const hear::Heard heard = hear::hear(wanted);
   if (shared.json) {
     base::Json root;
-    root["folder"] = to_json(heard.folder.string());
-    root["page"] = to_json(heard.page.string());
-    root["explorer"] = heard.explorer.empty() ? base::Json() : to_json(heard.explorer.string());
-    root["assumed"] = to_json(heard.assumed);
-    root["warnings"] = to_json(heard.warnings);
+    root.set("folder", to_json(heard.folder.string())).set("page", to_json(heard.page.string()));
+    root.set("explorer", heard.explorer.empty() ? base::Json() : to_json(heard.explorer.string())).set("assumed", to_json(heard.assumed));
+    root.set("warnings", to_json(heard.warnings));
     for (const double x : heard.extent_m) root["extent_m"].append(x);
     root["sounds"] = base::Json::array();
     for (const hear::Sound& sound : heard.sounds) root["sounds"].append(describe(sound));

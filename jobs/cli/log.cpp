@@ -45,9 +45,7 @@ int print_log(Shared& shared, registry::Job job, bool follows) {
   if (shared.json) {
     const fs::path file = shared.store().find_folder(job.id) / store::kLogFile;
     base::Json root;
-    root["id"] = job.id.text();
-    root["state"] = to_text(job.state);
-    root["file"] = to_json(file.string());
+    root.set("id", job.id.text()).set("state", to_text(job.state)).set("file", to_json(file.string()));
     struct stat info {};
     if (::stat(file.c_str(), &info) == 0) at = std::max<off_t>(0, info.st_size - kMaxJsonBytes);
     root["text"] = to_json(read_from(file, at, kMaxJsonBytes));

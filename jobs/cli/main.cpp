@@ -22,8 +22,7 @@ int fail(bool json, const std::string& what, int code) {
   std::fflush(stdout);
   if (json) {
     base::Json root;
-    root["error"] = to_json(base::shorten(what));
-    root["exit_code"] = code;
+    root.set("error", to_json(base::shorten(what))).set("exit_code", code);
     print_json(root);
   }
   fmt::print(stderr, "carillon: {}\n", show_message(what));

@@ -21,23 +21,17 @@ double calc_loss_factor(const material::Material& material) {
 base::Json describe(const material::Row& row) {
   const material::Material& m = row.material;
   base::Json entry;
-  entry["name"] = to_json(m.name);
-  entry["group"] = to_json(row.group);
-  entry["also"] = to_json(row.also);
-  entry["young_modulus_pa"] = m.young_modulus_pa;
-  entry["poisson_ratio"] = m.poisson_ratio;
-  entry["density_kg_m3"] = m.density_kg_m3;
-  entry["is_orthotropic"] = m.orthotropic.has_value();
+  entry.set("name", to_json(m.name)).set("group", to_json(row.group)).set("also", to_json(row.also));
+  entry.set("young_modulus_pa", m.young_modulus_pa).set("poisson_ratio", m.poisson_ratio).set("density_kg_m3", m.density_kg_m3);
+  entry.set("is_orthotropic", m.orthotropic.has_value());
   if (m.orthotropic) {
     const auto& [e, g, nu, axes] = *m.orthotropic;
     for (const auto& [key, values] : {std::pair{"young_modulus_pa", &e}, {"shear_modulus_pa", &g}, {"poisson_ratio", &nu}})
       for (const double value : *values) entry["orthotropic"][key].append(value);
   }
-  entry["loss_factor_at_1_khz"] = calc_loss_factor(m);
-  entry["damping"] = to_json(m.describe_damping());
-  entry["elasticity_source"] = to_json(row.elasticity_source);
-  entry["loss_source"] = to_json(row.loss_source);
-  entry["place"] = row.place.empty() ? base::Json() : to_json(row.place);
+  entry.set("loss_factor_at_1_khz", calc_loss_factor(m)).set("damping", to_json(m.describe_damping()));
+  entry.set("elasticity_source", to_json(row.elasticity_source)).set("loss_source", to_json(row.loss_source));
+  entry.set("place", row.place.empty() ? base::Json() : to_json(row.place));
   return entry;
 }
 

@@ -89,8 +89,7 @@ int report_job(Shared& shared, const ReportOptions& options) {
   const fs::path folder = shared.store().bank_folder(id);
   const bool is_done = shared.store().has_bank(id);
   base::Json root;
-  root["id"] = id.text();
-  root["state"] = is_done ? "done" : job ? to_text(job->state) : "new";
+  root.set("id", id.text()).set("state", is_done ? "done" : job ? to_text(job->state) : "new");
   fs::path page;
   std::error_code error;
   if (is_done && list_results(shared.store(), id).count("bank") == 0)

@@ -220,32 +220,24 @@ std::map<std::string, fs::path> list_results(const store::Store& store, const st
 
 base::Json describe(Shared& shared, const registry::Job& job) {
   base::Json root;
-  root["id"] = job.id.text();
-  root["state"] = to_text(job.state);
-  root["name"] = to_json(job.name);
-  root["engine"] = to_text(job.engine);
-  root["reason"] = to_json(find_reason(shared, job));
-  root["attempts"] = job.attempts;
-  root["failures"] = job.failures;
+  root.set("id", job.id.text()).set("state", to_text(job.state)).set("name", to_json(job.name)).set("engine", to_text(job.engine));
+  root.set("reason", to_json(find_reason(shared, job))).set("attempts", job.attempts).set("failures", job.failures);
   root["ranks"] = job.given.ranks > 0 ? job.given.ranks : job.resources.ranks;  // as chosen by the queue
-  root["memory_gb"] = job.given.ranks > 0 ? job.given.memory_gb : job.resources.memory_gb;
-  root["time_limit_s"] = job.resources.time_limit_s;
-  root["slurm_job"] = job.slurm_job.empty() ? base::Json() : to_json(job.slurm_job);
-  root["submitted"] = to_json_time(job.submitted_unix_s);
-  root["started"] = to_json_time(job.started_unix_s);
-  root["ended"] = to_json_time(job.ended_unix_s);
+  root.set("memory_gb", job.given.ranks > 0 ? job.given.memory_gb : job.resources.memory_gb);
+  root.set("time_limit_s", job.resources.time_limit_s).set("slurm_job", job.slurm_job.empty() ? base::Json() : to_json(job.slurm_job));
+  root.set("submitted", to_json_time(job.submitted_unix_s)).set("started", to_json_time(job.started_unix_s));
+  root.set("ended", to_json_time(job.ended_unix_s));
   const bool is_done = job.state == registry::JobState::done;
   const auto progress = is_done ? std::nullopt : store::read_progress(shared.store().work_folder(job.id));
-  root["phase"] = is_done ? base::Json("done") : progress ? to_json(progress->phase) : base::Json();
-  root["percent"] = is_done ? 100.0 : progress ? progress->percent : 0.0;
-  root["modes_done"] = progress && progress->modes_done >= 0 ? base::Json(progress->modes_done) : base::Json();
-  root["modes_wanted"] = progress && progress->modes_wanted >= 0 ? base::Json(progress->modes_wanted) : base::Json();
-  root["seconds_left"] = progress && progress->seconds_left >= 0 && job.state == registry::JobState::running
-                             ? base::Json(progress->seconds_left)
-                             : base::Json();
+  root.set("phase", is_done ? base::Json("done") : progress ? to_json(progress->phase) : base::Json());
+  root.set("percent", is_done ? 100.0 : progress ? progress->percent : 0.0);
+  root.set("modes_done", progress && progress->modes_done >= 0 ? base::Json(progress->modes_done) : base::Json());
+  root.set("modes_wanted", progress && progress->modes_wanted >= 0 ? base::Json(progress->modes_wanted) : base::Json());
+  root.set("seconds_left", progress && progress->seconds_left >= 0 && job.state == registry::JobState::running
+                               ? base::Json(progress->seconds_left)
+                               : base::Json());
   const auto results = is_done ? list_results(shared.store(), job.id) : std::map<std::string, fs::path>();
-  root["bank"] = results.count("bank") > 0 ? to_json(results.at("bank").string()) : base::Json();
-  root["results"] = base::Json::object();
+  root.set("bank", results.count("bank") > 0 ? to_json(results.at("bank").string()) : base::Json()).set("results", base::Json::object());
   for (const auto& [key, file] : results) root["results"][key] = to_json(file.string());
   root["warnings"] = to_json(find_warnings(shared, job));
   return root;

@@ -1,8 +1,6 @@
 // Commands for jobs in Slurm.
 #pragma once
 
-#include <filesystem>
-
 #include "jobs/cli/shared.hpp"
 #include "jobs/queue/run.hpp"
 #include "jobs/queue/settle.hpp"

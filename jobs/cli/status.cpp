@@ -97,9 +97,8 @@ int run_status(Shared& shared, const StatusOptions& options) {
   }
   if (shared.json) {
     base::Json root;
-    root["store"] = to_json(shared.store().root().string());
-    root["read_only"] = !shared.store().may_write();
-    root["jobs"] = base::Json::array();
+    root.set("store", to_json(shared.store().root().string())).set("read_only", !shared.store().may_write());
+    root.set("jobs", base::Json::array());
     for (const char* state : {"queued", "running", "waiting", "done", "failed", "cancelled"}) root["counts"][state] = 0;
     for (const registry::Job& job : jobs) {
       root["jobs"].append(describe(shared, job));

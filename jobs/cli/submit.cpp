@@ -93,9 +93,7 @@ std::vector<std::string> find_own_warnings(Shared& shared, const SubmitResult& r
 
 base::Json describe_results(Shared& shared, const std::vector<SubmitResult>& results) {
   base::Json root;
-  root["store"] = to_json(shared.store().root().string());
-  root["jobs"] = base::Json::array();
-  root["errors"] = base::Json::array();
+  root.set("store", to_json(shared.store().root().string())).set("jobs", base::Json::array()).set("errors", base::Json::array());
   for (const SubmitResult& result : results) {
     base::Json entry;
     if (result.job) {

@@ -124,9 +124,7 @@ int run_verify(Shared& shared, const VerifyOptions& options) {
   }
   bool is_whole = true;
   base::Json root;
-  root["store"] = to_json(store.root().string());
-  root["checked"] = ids.size();
-  root["damaged"] = base::Json::array();
+  root.set("store", to_json(store.root().string())).set("checked", ids.size()).set("damaged", base::Json::array());
   for (Finding& finding : findings) {
     if (options.repairs) {
       finding.kind == "input"    ? repair_input(shared, finding)
@@ -135,11 +133,8 @@ int run_verify(Shared& shared, const VerifyOptions& options) {
     }
     is_whole = is_whole && finding.is_repaired;
     base::Json entry;
-    entry["kind"] = finding.kind;
-    entry["id"] = finding.id.text();
-    entry["fault"] = to_json(finding.fault);
-    entry["repaired"] = finding.is_repaired;
-    entry["repair"] = finding.repair.empty() ? base::Json() : to_json(finding.repair);
+    entry.set("kind", finding.kind).set("id", finding.id.text()).set("fault", to_json(finding.fault)).set("repaired", finding.is_repaired);
+    entry.set("repair", finding.repair.empty() ? base::Json() : to_json(finding.repair));
     root["damaged"].append(entry);
     if (shared.json) continue;
     fmt::print("{}  {:<6}  {}\n", finding.id.short_text(), finding.kind, show_message(finding.fault));

@@ -1,7 +1,6 @@
 #include "jobs/store/id.hpp"
 
 #include <fmt/core.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>

@@ -22,12 +22,16 @@ def describe_setting(setting, target):
     )
 
 
+def describe_request(adviser, options):
+    """Lines: the body, and the error and time that are asked for."""
+    limits = ((options.cents, "cents"), (options.seconds, "CPU s"))
+    notes = adviser.target.notes or [f"a {adviser.target.kind}, as the job has it"]
+    asked = " and ".join(f"{value:g} {unit}" for value, unit in limits if value is not None)
+    return [*(f"{adviser.target.name}: {note}" for note in notes), f"asked:     {asked}"]
+
+
 def describe_prediction(adviser, found, remark):
-    options = adviser.options
-    asked = " and ".join(f"{value:g} {unit}" for value, unit in ((options.cents, "cents"), (options.seconds, "CPU s")) if value is not None)
-    lines = [f"{adviser.target.name}: {note}" for note in adviser.target.notes or [f"a {adviser.target.kind}, as the job has it"]] + [
-        f"asked:     {asked}"
-    ]
+    lines = describe_request(adviser, adviser.options)
     if remark:
         lines.append(f"           {remark}")
     if adviser.probe_cpu_s:
@@ -47,22 +51,18 @@ def describe_prediction(adviser, found, remark):
 
 
 def describe_estimate(adviser, found, options):
-    asked = " and ".join(f"{value:g} {unit}" for value, unit in ((options.cents, "cents"), (options.seconds, "CPU s")) if value is not None)
     memory = found["memory_bytes"]["1"] * 1e-9
-    lines = [f"{adviser.target.name}: {note}" for note in adviser.target.notes or [f"a {adviser.target.kind}, as the job has it"]]
+    lines = describe_request(adviser, options)
     modes = f"{'' if found['modes']['how'] == 'counted' else 'about '}{found['modes']['count']} modes in the band"
     what = (
         "so many nodes take long to solve. The mesh has"
         if adviser.target.kind == "mesh"
         else "so thin a body takes long to mesh and to solve. Its coarsest mesh has"
     )
-    lines += [
-        f"asked:     {asked}",
-        (
-            f"estimate:  {what} about {found['mesh']['nodes']:,} nodes (T10), {modes}, {found['cpu_seconds']:.0f} CPU s and"
-            f" {memory:.1f} GB, without a solve"
-        ),
-    ]
+    lines.append(
+        f"estimate:  {what} about {found['mesh']['nodes']:,} nodes (T10), {modes}, {found['cpu_seconds']:.0f} CPU s and"
+        f" {memory:.1f} GB, without a solve"
+    )
     if options.dry_run:
         lines.append("           cents are not predicted without a trial: leave --dry-run away for the trials")
     return lines

@@ -20,11 +20,6 @@ class Kind:
     mass: str
     curved: bool = False
 
-    @property
-    def order(self):
-        """Order of the frequency error in the edge length, without singular edges (straight T10: 4 on flat bodies)."""
-        return 4 if self.element == "T10" and self.curved else 2
-
 
 KINDS = (
     Kind("T4 consistent", "T4", "consistent"),
@@ -59,8 +54,7 @@ CERAMIC = {
 
 @dataclasses.dataclass(frozen=True)
 class Body:
-    """words: for carillon-mesh; change: (name, function of a MeshFile that moves its nodes) or None. sizes, quick_sizes: nodes asked for,
-    coarse to fine; quadratic_sizes: those of T10 (all, quick) where a thin wall asks for more."""
+    """words: for carillon-mesh; change: (name, function of a MeshFile that moves its nodes) or None."""
 
     name: str
     summary: str
@@ -68,9 +62,6 @@ class Body:
     words: tuple
     modes: int
     round: bool  # has curved faces, which a straight T10 does not represent
-    sizes: tuple = (400, 1000, 2500, 6000, 15000)
-    quick_sizes: tuple = (300, 900, 2700)
-    quadratic_sizes: tuple = ()
     change: tuple | None = None
     truth: known.Truth | None = None  # None: the finest curved T10 is the reference
     surface: bool = False
@@ -78,11 +69,6 @@ class Body:
     def get_kinds(self):
         """Straight and curved T10 are equal on flat bodies."""
         return [kind for kind in KINDS if self.round or kind.name != "T10 curved"]
-
-    def get_sizes(self, lab, kind):
-        if self.quadratic_sizes and kind.element == "T10":
-            return self.quadratic_sizes[lab.quick]
-        return self.quick_sizes if lab.quick else self.sizes
 
     def make_mesh(self, lab, kind, nodes):
         """A Mesh of this kind with about `nodes` nodes."""
@@ -166,7 +152,6 @@ def shape(name, **lengths):
 def make_bodies():
     """{name: Body}, in the order of the report."""
     truths = known.read_known()
-    thin = {"sizes": (800, 2000, 5000, 12000, 30000), "quick_sizes": (500, 1300, 3200)}
     bodies = [
         Body("bar", "aluminium bar, 300 x 30 x 12 mm", ALUMINIUM, shape("bar", length=0.3, width=0.03, thickness=0.012), 16, False),
         Body(
@@ -176,7 +161,6 @@ def make_bodies():
             shape("tube", length=0.505, outer_radius=0.0125, wall=0.001),
             7,
             True,
-            **thin,
         ),
         Body("sphere", "solid steel ball, radius 50 mm", STEEL, shape("sphere", radius=0.05), 27, True),
         Body("plate", "thick steel plate, 100 x 100 x 10 mm", STEEL, shape("plate", length=0.1, width=0.1, thickness=0.01), 15, False),
@@ -197,7 +181,6 @@ def make_bodies():
             10,
             True,
             change=("bowl", bend_to_bowl),
-            **thin,
         ),
         Body(
             "vibraphone",
@@ -215,9 +198,6 @@ def make_bodies():
             ("--height", "0.13", "--wall", "0.005"),
             15,
             True,
-            sizes=(6000, 10500, 18000, 32000, 60000),
-            quick_sizes=(3000, 5000, 9000),
-            quadratic_sizes=((18500, 27000, 40000, 64000, 105000), (18500, 21000, 24000)),
             surface=True,
         ),
     ]

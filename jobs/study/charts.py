@@ -16,7 +16,6 @@ PALETTE = {
     "other": "#bdbdbd",
     "in all": "#1a1a1a",
 }
-HATCH = "#f4f4f4"
 
 
 def start(width, height, title, subtitle=""):

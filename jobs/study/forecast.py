@@ -15,10 +15,8 @@ GOAL = 0.75  # fraction of the requested error that is aimed at
 MAX_FINER = 10.0  # limit of extrapolation: nodes / nodes of the finest measured mesh
 MAX_FINER_TRIAL = 4.0  # the same for trials
 START_S, STEEPEST_CPU = 0.1, 1.8  # CPU seconds of the start; largest power of the nodes of the rest
-TRUST, STEEPEST_BEYOND = (
-    0.85,
-    4 / 3,
-)  # of the power at the end of a curve, beyond it: meshes that are coarse for their walls gain faster than those that follow
+# Of the power at the end of a curve, beyond it: meshes that are coarse for their walls gain faster than those that follow.
+TRUST, STEEPEST_BEYOND = 0.85, 4 / 3
 DISTRUST = 0.9  # factor for a power measured on coarse meshes
 # Limits of the power of the nodes for errors: order four, and bodies refined in two directions.
 MIN_STEEPNESS, MAX_STEEPNESS = 0.3, 4 / 2

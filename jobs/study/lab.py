@@ -7,7 +7,6 @@ import hashlib
 import json
 import os
 import pathlib
-import shlex
 import shutil
 import subprocess
 import sys
@@ -106,33 +105,21 @@ def add_possible_nodes(error, result):
 
 
 class Lab:
-    def __init__(self, out, programs, quick=False, repeats=None, surface=None, timeout_s=3600, on=None):
-        """out: the report's folder. programs: {name: path}, see programs.find_all(). repeats: of every case; default 1 when quick, else 2.
-        on: names of --on, where it was given."""
+    def __init__(self, out, programs, quick=False, repeats=None, surface=None, timeout_s=3600):
+        """out: the report. programs: {name: path}, see programs.find_all(). repeats: of every case; default 1 if quick, else 2."""
         self.out, self.programs, self.quick = pathlib.Path(out).resolve(), programs, quick
         self.repeats = repeats or (1 if quick else 2)
         self.surface, self.timeout_s = surface, timeout_s
-        self.on, self.asked_repeats = on, repeats  # for the commands in the report
         self.meshes, self.runs = self.out / "work/meshes", self.out / "work/runs"
         try:
             for folder in (self.meshes, self.runs):
                 folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise InputError(f"{out}: cannot create folder: {error.strerror}; give another one with -o") from None
-        self.start, self.load_start = time.monotonic(), os.getloadavg()[0]
         self.measured_s = 0.0  # CPU seconds of this run
-        self.found = {}  # results by section, for later sections
 
     def say(self, text):
         print(text, file=sys.stderr, flush=True)
-
-    def make_command(self, section, *words):
-        """The command that repeats a section or a part of it."""
-        on = ["--on", *self.on] if self.on and "--on" not in words else []
-        repeats = ["--repeats", str(self.asked_repeats)] if self.asked_repeats else []
-        return shlex.join(
-            ["tests/bench/study/run", "--only", section, *words, *on, *repeats, *(["--quick"] if self.quick else []), "-o", "REPORT"]
-        )
 
     def find_program(self, name):
         if name not in self.programs:
@@ -263,13 +250,8 @@ class Lab:
         content = json.loads(child.stdout)
         record = json.loads(pathlib.Path(f"{bank}.resolved.json").read_text())["run"]
         columns = (
-            "frequency_hz",
-            "algebraic_error_cents",
-            "discretisation_error_cents",
-            "residual",
-            "corrected_frequency_hz",
-            "corrected_error_cents",
-        )
+            "frequency_hz algebraic_error_cents discretisation_error_cents residual corrected_frequency_hz corrected_error_cents"
+        ).split()
         return {
             "modes": [[mode[column] for column in columns] for mode in content["modes"]],
             "record": record,
@@ -290,15 +272,4 @@ class Lab:
             kept["elements"],
             self.runs / key / "bank.hdf",
             kept["record"],
-        )
-
-    def describe_machine(self):
-        processors = [line.split(":", 1)[1].strip() for line in open("/proc/cpuinfo") if line.startswith("model name")][:1]
-        cores = len(os.sched_getaffinity(0))
-        others = max(self.load_start, 0.0)
-        return (
-            f"{processors[0] if processors else 'A processor without a name'}, {cores} core{'s' if cores > 1 else ''}; load of the machine"
-            f" when the study began {others:.1f}, at its end {os.getloadavg()[0]:.1f}. This call ran solves of {self.measured_s:.0f} CPU s"
-            f" in {(time.monotonic() - self.start) / 60:.1f} minutes; {self.repeats} repeat{'s' if self.repeats > 1 else ''} of every case,"
-            " all cases in turn, medians of CPU seconds (user and system, all processes)."
         )

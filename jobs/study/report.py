@@ -282,46 +282,16 @@ def write_cases(study):
     with open(study.out / "cases.csv", "w", newline="") as stream:
         table = csv.writer(stream)
         table.writerow(
-            [
-                "nodes_asked",
-                "ranks",
-                "more_ranks_than_cores",
-                "unknowns",
-                "modes",
-                "repeat",
-                "phase",
-                "wall_s",
-                "mpi_s",
-                "cpu_s",
-                "flops",
-                "messages",
-                "bytes",
-                "collectives",
-                "collective_bytes",
-                "peak_bytes_fullest_rank",
-            ]
+            "nodes_asked ranks more_ranks_than_cores unknowns modes repeat phase wall_s mpi_s cpu_s flops messages bytes collectives"
+            " collective_bytes peak_bytes_fullest_rank".split()
         )
         for case in study.cases:
             for repeat, record in enumerate(study.runs[case]):
                 for phase in scaling.PHASES:
                     effort, work = record["effort"][phase], record["work"][phase]
-                    table.writerow(
-                        [
-                            case.nodes or "",
-                            case.ranks,
-                            int(study.is_crowded(case.ranks)),
-                            study.get_unknowns(case),
-                            record["solver"]["modes"],
-                            repeat,
-                            phase,
-                            f"{effort['wall_seconds'] / case.ranks:.6f}",
-                            f"{effort['mpi_seconds'] / case.ranks:.6f}",
-                            f"{effort['cpu_seconds']:.6f}",
-                            f"{work['flops']:.0f}",
-                            f"{work['messages']:.0f}",
-                            f"{work['bytes']:.0f}",
-                            f"{work['collectives']:.0f}",
-                            f"{work['collective_bytes']:.0f}",
-                            max(record["peak_bytes_by_rank"]),
-                        ]
-                    )
+                    seconds = (effort["wall_seconds"] / case.ranks, effort["mpi_seconds"] / case.ranks, effort["cpu_seconds"])
+                    counts = (work[key] for key in ("flops", "messages", "bytes", "collectives", "collective_bytes"))
+                    names = [case.nodes or "", case.ranks, int(study.is_crowded(case.ranks)), study.get_unknowns(case)]
+                    names += [record["solver"]["modes"], repeat, phase]
+                    figures = [*(f"{value:.6f}" for value in seconds), *(f"{value:.0f}" for value in counts)]
+                    table.writerow([*names, *figures, max(record["peak_bytes_by_rank"])])

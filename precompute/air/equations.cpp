@@ -13,7 +13,6 @@
 #include <limits>
 #include <memory>
 #include <numbers>
-#include <numeric>
 #include <utility>
 
 #include "runtime/base/instructions.hpp"

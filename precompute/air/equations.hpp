@@ -1,7 +1,6 @@
 // Boundary element equations of the air outside a surface.
 #pragma once
 
-#include <array>
 #include <complex>
 #include <cstddef>
 #include <cstdint>

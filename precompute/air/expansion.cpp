@@ -5,7 +5,6 @@
 #include "precompute/air/expansion.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 

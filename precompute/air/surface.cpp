@@ -123,7 +123,6 @@ RadiatingSurface::RadiatingSurface(std::span<const Vec3> nodes_m, std::span<cons
       if (number[node] < 0) {
         number[node] = static_cast<std::int32_t>(nodes_m_.size());
         nodes_m_.push_back(nodes_m[node]);
-        node_source_.push_back(node);
       }
       facet.corners[c] = number[node];
     }
@@ -158,12 +157,6 @@ double RadiatingSurface::calc_volume_m3() const {
   const Vec3 base = nodes_m_[0];
   for (const Facet& facet : facets_) volume += dot(nodes_m_[facet.corners[0]] - base, facet.normal) * facet.area_m2 / 3.0;
   return volume;
-}
-
-double RadiatingSurface::calc_longest_edge_m() const {
-  double longest = 0.0;
-  for (const Facet& facet : facets_) longest = std::max(longest, facet.size_m);
-  return longest;
 }
 
 }  // namespace carillon::air

@@ -38,21 +38,19 @@ class RadiatingSurface {
   const std::vector<Vec3>& get_nodes() const { return nodes_m_; }
   const std::vector<Facet>& get_facets() const { return facets_; }
   const std::vector<EdgePoint>& get_points() const { return points_; }
-  /// (N), (T) numbers in the constructor's input.
-  const std::vector<std::int32_t>& get_node_sources() const { return node_source_; }
+  /// (T) numbers in the constructor's input.
   const std::vector<std::int32_t>& get_facet_sources() const { return facet_source_; }
   std::size_t count_nodes() const { return nodes_m_.size(); }
   std::size_t count_facets() const { return facets_.size(); }
   std::size_t count_points() const { return points_.size(); }
   double calc_area_m2() const;
   double calc_volume_m3() const;
-  double calc_longest_edge_m() const;
 
  private:
   std::vector<Vec3> nodes_m_;
   std::vector<Facet> facets_;
   std::vector<EdgePoint> points_;
-  std::vector<std::int32_t> node_source_, facet_source_;
+  std::vector<std::int32_t> facet_source_;
 };
 
 /// Sphere around points.

@@ -1,10 +1,8 @@
 // Wave numbers of the solves, and interpolation weights of the modes between them.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <vector>
 

@@ -1,6 +1,5 @@
 #include "precompute/analytic/beam_functions.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <numbers>
 

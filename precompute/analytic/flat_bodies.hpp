@@ -1,8 +1,6 @@
 // Membranes and plates on rectangles and circles.
 #pragma once
 
-#include <functional>
-
 #include "precompute/analytic/known_body.hpp"
 #include "precompute/analytic/slabs.hpp"
 #include "precompute/la/lapack.hpp"

@@ -1,11 +1,16 @@
-// Cubature points for the coupling of modes.
+// Cubature points for the coupling of modes, and the nonnegative least squares that weigh them.
 #pragma once
 
-#include <vector>
+#include <cstddef>
 
 #include "precompute/coupling/stresses.hpp"
+#include "precompute/la/lapack.hpp"
 
 namespace carillon::coupling {
+
+/// Sparse x >= 0 with small |A x - b|: Lawson and Hanson's method, stopped at |A x - b| <= tolerance |b|, at `most` nonzero entries, or
+/// without further improvement. Not collective.
+la::Vector solve_nonnegative(const la::Matrix& a, const la::Vector& b, double tolerance, std::ptrdiff_t most);
 
 /// P points: eta_r = sum over p of weight_p stress_rp . strain_p, as bank::QuarticEnergy has it for solids. Rank 0.
 struct CouplingPoints {

@@ -3,10 +3,7 @@
 
 #include <petscmat.h>
 
-#include <cstdint>
-#include <functional>
 #include <memory>
-#include <span>
 #include <vector>
 
 #include "precompute/comm/halo_exchange.hpp"

@@ -3,16 +3,28 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
 
-#include "precompute/coupling/pairs.hpp"
 #include "precompute/fem/materials.hpp"
 #include "precompute/la/lapack.hpp"
 #include "precompute/mesh/distributed/distributed_mesh.hpp"
+#include "runtime/bank/quartic_energy.hpp"
 
 namespace carillon::coupling {
+
+/// N (N + 1) / 2 pairs, in the order of bank::QuarticEnergy: columns of the upper triangle.
+struct Pairs {
+  std::ptrdiff_t modes = 0;
+
+  std::ptrdiff_t count() const { return static_cast<std::ptrdiff_t>(bank::count_pairs(static_cast<std::size_t>(modes))); }
+  /// Pre: 0 <= i <= j < modes.
+  std::ptrdiff_t find(std::ptrdiff_t i, std::ptrdiff_t j) const {
+    return static_cast<std::ptrdiff_t>(bank::find_pair(static_cast<std::size_t>(i), static_cast<std::size_t>(j)));
+  }
+};
 
 using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;

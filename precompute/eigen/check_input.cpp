@@ -24,8 +24,7 @@ void check_input(const Problem& problem, const Options& options) {
   }
   const comm::Communicator comm = petsc::get_communicator(problem.stiffness);
   comm.agree([&] {
-    PetscInt rows = 0;
-    PetscInt n = 0;
+    PetscInt rows = 0, n = 0;
     check(MatGetLocalSize(problem.stiffness, &rows, nullptr));
     check(MatGetSize(problem.stiffness, &n, nullptr));
     if (options.method == Method::kDense && n > kMaxDenseUnknowns)

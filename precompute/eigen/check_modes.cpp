@@ -9,7 +9,6 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <numeric>
 #include <tuple>
 
 #include "precompute/la/lapack.hpp"

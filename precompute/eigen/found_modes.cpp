@@ -12,8 +12,7 @@ using la::LocalColumns;
 using petsc::check;
 
 petsc::MatHandle FoundModes::make_columns(PetscInt count) const {
-  PetscInt rows = 0;
-  PetscInt n = 0;
+  PetscInt rows = 0, n = 0;
   const comm::Communicator comm = petsc::get_communicator(stiffness_);
   check(MatGetLocalSize(stiffness_, &rows, nullptr));
   check(MatGetSize(stiffness_, &n, nullptr));

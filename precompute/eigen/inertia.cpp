@@ -41,8 +41,7 @@ InertiaCounter::InertiaCounter(const la::Pencil& pencil, const Problem& problem,
       statistics_(statistics),
       to_hz_(std::move(to_hz)),
       comm_(petsc::get_communicator(problem.stiffness)) {
-  PetscScalar k = 0;
-  PetscScalar m = 0;
+  PetscScalar k = 0, m = 0;
   check(MatGetTrace(problem.stiffness, &k));
   check(MatGetTrace(problem.mass, &m));
   rounding_ = PETSC_MACHINE_EPSILON * (pencil.stiffness_factor * k) / (pencil.mass_factor * m);

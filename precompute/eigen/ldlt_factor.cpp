@@ -1,4 +1,3 @@
-#include <limits>
 
 #include "precompute/eigen/shifted_factor.hpp"
 #include "precompute/ldlt/factor.hpp"

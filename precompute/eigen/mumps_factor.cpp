@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <array>
-#include <exception>
 #include <string_view>
 #include <utility>
 
@@ -35,20 +34,17 @@ using petsc::check;
 template <typename Visit>
 void visit_lower_entries(const la::Pencil& pencil, Visit&& visit) {
   const auto [stiffness, mass, stiffness_factor, mass_factor] = pencil;
-  PetscInt first = 0;
-  PetscInt last = 0;
+  PetscInt first = 0, last = 0;
   check(MatGetOwnershipRange(stiffness, &first, &last));
   for (PetscInt row = first; row < last; ++row) {
-    PetscInt k_count = 0;
-    PetscInt m_count = 0;
+    PetscInt k_count = 0, m_count = 0;
     const PetscInt* k_columns = nullptr;
     const PetscInt* m_columns = nullptr;
     const PetscScalar* k_values = nullptr;
     const PetscScalar* m_values = nullptr;
     check(MatGetRow(stiffness, row, &k_count, &k_columns, &k_values));
     check(MatGetRow(mass, row, &m_count, &m_columns, &m_values));
-    PetscInt k = 0;
-    PetscInt m = 0;
+    PetscInt k = 0, m = 0;
     while (true) {
       const PetscInt k_column = k < k_count ? k_columns[k] : PETSC_MAX_INT;
       const PetscInt m_column = m < m_count ? m_columns[m] : PETSC_MAX_INT;
@@ -208,8 +204,7 @@ MumpsFactor::MumpsFactor(const la::Pencil& pencil, const std::vector<std::int32_
   if (code < 0) throw SolveError(fmt::format("MUMPS cannot analyse K - sigma M: code {}, {}.", code, s.infog(2)));
   s.analysis_megabytes = s.mumps.info[14];  // INFO(15): predicted memory of the factorisation on this rank.
 
-  PetscInt first = 0;
-  PetscInt last = 0;
+  PetscInt first = 0, last = 0;
   check(MatGetOwnershipRange(pencil.stiffness, &first, &last));
   for (PetscInt row = first; row < last; ++row) s.own_rows.push_back(row + 1);
 }

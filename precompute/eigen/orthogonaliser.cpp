@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 
 #include "precompute/comm/communicator.hpp"
 #include "precompute/petsc/noise.hpp"

@@ -8,7 +8,6 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "precompute/comm/communicator.hpp"

@@ -13,7 +13,6 @@
 #include "precompute/fem/element.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 namespace carillon::fem {
 namespace {

@@ -3,7 +3,6 @@
 #include "precompute/fem/energy.hpp"
 
 #include <algorithm>
-#include <array>
 
 #include "precompute/petsc/session.hpp"
 

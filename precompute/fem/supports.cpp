@@ -8,8 +8,6 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <numeric>
-#include <tuple>
 #include <unordered_map>
 
 #include "precompute/comm/exchange.hpp"

@@ -23,8 +23,7 @@ base::Json write_damping(const Material& material) {
   base::Json damping;
   switch (material.law) {
     case DampingLaw::rayleigh:
-      damping["rayleigh"]["alpha1_s"] = material.alpha1_s;
-      damping["rayleigh"]["alpha2_per_s"] = material.alpha2_per_s;
+      damping["rayleigh"].set("alpha1_s", material.alpha1_s).set("alpha2_per_s", material.alpha2_per_s);
       break;
     case DampingLaw::internal_friction:
       damping["internal_friction"]["tan_phi"] = material.tan_phi;
@@ -55,11 +54,9 @@ base::Json write_material(const Material& material) {
     root["orthotropic"]["axes"].append(base::Json::array(o.axes[0]));
     root["orthotropic"]["axes"].append(base::Json::array(o.axes[1]));
   } else {
-    root["young_modulus_pa"] = material.young_modulus_pa;
-    root["poisson_ratio"] = material.poisson_ratio;
+    root.set("young_modulus_pa", material.young_modulus_pa).set("poisson_ratio", material.poisson_ratio);
   }
-  root["density_kg_m3"] = material.density_kg_m3;
-  root["damping"] = write_damping(material);
+  root.set("density_kg_m3", material.density_kg_m3).set("damping", write_damping(material));
   return root;
 }
 
@@ -88,8 +85,7 @@ base::Json write_fixed(const std::vector<Fixed>& list) {
   for (const Fixed& fixed : list) {
     base::Json& entry = root.append(kFixedKeys.write(fixed));
     if (fixed.box_m) {
-      entry["box_m"]["min"] = base::Json::array((*fixed.box_m)[0]);
-      entry["box_m"]["max"] = base::Json::array((*fixed.box_m)[1]);
+      entry["box_m"].set("min", base::Json::array((*fixed.box_m)[0])).set("max", base::Json::array((*fixed.box_m)[1]));
     }
     if (!fixed.name.empty()) entry["name"] = fixed.name;
     add_members(material::write_fixing(fixed.fixing), entry);
@@ -100,8 +96,7 @@ base::Json write_fixed(const std::vector<Fixed>& list) {
 base::Json write_air(const Air& air) {
   base::Json root = kAirKeys.write(air);
   if (air.half_space) {
-    root["half_space"]["point_m"] = base::Json::array(air.half_space->point_m);
-    root["half_space"]["normal"] = base::Json::array(air.half_space->normal);
+    root["half_space"].set("point_m", base::Json::array(air.half_space->point_m)).set("normal", base::Json::array(air.half_space->normal));
   }
   return root;
 }

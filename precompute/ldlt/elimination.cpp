@@ -27,8 +27,7 @@ constexpr std::int32_t kAnyNumber = std::numeric_limits<std::int32_t>::max();  /
 
 /// Remainder of an eliminated subtree: the rows of one of its roots, and that front.
 struct Element {
-  std::int32_t part = 0;
-  std::int32_t supernode = 0;
+  std::int32_t part = 0, supernode = 0;
   Ints rows;  // positions, ascending
 };
 

@@ -1,12 +1,13 @@
 // Method: Plan, values and workspace behind one interface; a factorisation is accepted by the backward error of a solve with known
 // solution. If element growth is large, because pivots are sought within blocks only, solves get one step of iterative refinement. The
-// matrix is equilibrated first (equilibrated.cpp). The infinity norm of K - sigma M is bounded by ||K|| + |sigma| ||M||.
+// matrix is equilibrated first. The infinity norm of K - sigma M is bounded by ||K|| + |sigma| ||M||.
 // Source: Rigal and Gaches 1967 (normwise backward error); Higham 2002, sections 7.1, 12.1 (fixed precision refinement).
 #include "precompute/ldlt/factor.hpp"
 
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -14,8 +15,9 @@
 #include <vector>
 
 #include "precompute/la/node_rows.hpp"
-#include "precompute/ldlt/equilibrated.hpp"
+#include "precompute/la/pencil.hpp"
 #include "precompute/ldlt/numeric.hpp"
+#include "precompute/petsc/diagonal.hpp"
 #include "precompute/petsc/handle.hpp"
 #include "precompute/petsc/noise.hpp"
 #include "precompute/petsc/session.hpp"
@@ -26,6 +28,84 @@ namespace carillon::ldlt {
 namespace {
 
 using petsc::check;
+
+// Method: Symmetric scaling to a unit diagonal by powers of two, which change no digit; one factor per node, so that pivoting sees rigid
+// motions of a node unchanged; none if the diagonal spans less than six decades.
+// Source: van der Sluis, Condition numbers and equilibration of matrices, Numer. Math. 14, 1969; Higham 2002, section 7.3.
+
+/// S K S and S M S, S a power of two per node that scales the diagonal of K to about one: a soft part next to a stiff one, or an element a
+/// thousand times thinner than its neighbours, then has pivots of its own magnitude instead of the rounding of others. Bodies of uniform
+/// stiffness are not copied. Refers to K and M, which must not change: their values are read once, at construction.
+class EquilibratedPencil {
+ public:
+  /// K, M: (3n, 3n) AIJ, whole nodes per rank. Collective. Throws SystemError on every rank if memory runs out.
+  explicit EquilibratedPencil(const la::Pencil& given);
+
+  const la::Pencil& get() const { return pencil_; }
+  bool is_scaled() const { return static_cast<bool>(scaled_stiffness_); }
+  /// X <- S X on this rank's rows, column-major.
+  void scale(double* x, int stride, int columns) const;
+
+ private:
+  la::Pencil pencil_;
+  petsc::MatHandle scaled_stiffness_;  // null if S is the identity
+  petsc::MatHandle scaled_mass_;
+  std::vector<double> factor_;  // (own rows), empty if S is the identity
+};
+
+constexpr double kWide = 1e6;  // Stiffest over softest node; well-shaped meshes of one material span three decades.
+
+/// Largest diagonal entry of each own node. Collective.
+std::vector<double> find_stiffness(const la::Pencil& pencil) {
+  std::vector<double> largest = petsc::read_diagonal(pencil.stiffness);
+  const std::size_t nodes = largest.size() / 3;
+  for (std::size_t node = 0; node < nodes; ++node)
+    largest[node] = pencil.stiffness_factor * std::max({largest[3 * node], largest[3 * node + 1], largest[3 * node + 2]});
+  largest.resize(nodes);
+  return largest;
+}
+
+/// Ratio of the stiffest to the softest node, of all nodes with stiffness; 0 if there is none. Collective.
+double find_width(const comm::Communicator& comm, const std::vector<double>& stiffness) {
+  std::array<double, 2> ends{0, 0};  // largest value, largest inverse
+  for (const double k : stiffness)
+    if (k > 0) ends = {std::max(ends[0], k), std::max(ends[1], 1 / k)};
+  comm.max(ends);
+  return ends[0] * ends[1];
+}
+
+EquilibratedPencil::EquilibratedPencil(const la::Pencil& given) : pencil_(given) {
+  const Mat stiffness = given.stiffness, mass = given.mass;
+  const comm::Communicator comm = petsc::get_communicator(stiffness);
+  const std::vector<double> node_stiffness = find_stiffness(given);
+  const double width = find_width(comm, node_stiffness);
+  if (!(width > kWide) || !std::isfinite(width)) return;
+  petsc::VecHandle factor;
+  check(MatCreateVecs(stiffness, nullptr, factor.out()));
+  comm.agree([&] {  // Copies of this rank's rows: allocation may fail on one rank alone.
+    factor_.resize(3 * node_stiffness.size());
+    check(MatDuplicate(stiffness, MAT_COPY_VALUES, scaled_stiffness_.out()));
+    check(MatDuplicate(mass, MAT_COPY_VALUES, scaled_mass_.out()));
+  });
+  for (std::size_t i = 0; i < factor_.size(); ++i) {
+    const double k = node_stiffness[i / 3];
+    factor_[i] = std::ldexp(1.0, k > 0 ? -static_cast<int>(std::lround(0.5 * std::log2(k))) : 0);
+  }
+  PetscScalar* values = nullptr;
+  check(VecGetArray(factor, &values));
+  std::copy(factor_.begin(), factor_.end(), values);
+  check(VecRestoreArray(factor, &values));
+  check(MatDiagonalScale(scaled_stiffness_, factor, factor));
+  check(MatDiagonalScale(scaled_mass_, factor, factor));
+  pencil_.stiffness = scaled_stiffness_;
+  pencil_.mass = scaled_mass_;
+}
+
+void EquilibratedPencil::scale(double* x, int stride, int columns) const {
+  if (factor_.empty()) return;
+  for (int j = 0; j < columns; ++j)
+    for (std::size_t i = 0; i < factor_.size(); ++i) x[std::ptrdiff_t{j} * stride + static_cast<std::ptrdiff_t>(i)] *= factor_[i];
+}
 
 constexpr double kWorstBackwardError = 1e-10;
 constexpr double kRefinedBackwardError = 3e-13;  // Above this, solves are refined; typical bodies have 1e-15 to 1e-13.
@@ -48,8 +128,7 @@ struct Factor::State {
   double mass_norm = 0;
   Numbers numbers;
   Workspace workspace;
-  double sigma = 0;
-  double norm = 0;
+  double sigma = 0, norm = 0;
   bool needs_refinement = false;
   double backward_error = 0;  // of solves as performed, with refinement if any
   bool is_allocated = false;
@@ -121,8 +200,7 @@ double Factor::State::measure_backward_error(bool is_refined) {
   petsc::VecHandle scratch;
   check(MatCreateVecs(given.stiffness, x.out(), b.out()));
   check(VecDuplicate(x, scratch.out()));
-  PetscInt first = 0;
-  PetscInt last = 0;
+  PetscInt first = 0, last = 0;
   check(VecGetOwnershipRange(x, &first, &last));
   PetscScalar* values = nullptr;
   check(VecGetArray(x, &values));
@@ -137,9 +215,7 @@ double Factor::State::measure_backward_error(bool is_refined) {
   else
     solve(values, values, stride, 1);
   check(VecRestoreArray(x, &values));
-  double b_norm = 0;
-  double x_norm = 0;
-  double residual = 0;
+  double b_norm = 0, x_norm = 0, residual = 0;
   check(VecNorm(b, NORM_INFINITY, &b_norm));
   check(VecNorm(x, NORM_INFINITY, &x_norm));
   petsc::VecHandle image;

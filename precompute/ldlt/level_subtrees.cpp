@@ -31,8 +31,7 @@ class Levelling {
   bool exchange() {
     const int most = find_most();
     double best = kUneven * load(most);
-    std::int32_t given = -1;
-    std::int32_t taken = -1;
+    std::int32_t given = -1, taken = -1;
     int to = -1;
     const auto consider = [&](std::int32_t subtree, std::int32_t back, int rank) {
       const double moved = work(subtree) - (back < 0 ? 0 : work(back));

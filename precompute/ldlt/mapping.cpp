@@ -23,16 +23,12 @@ namespace {
 
 constexpr double kSnap = 0.08;   // in ranks
 constexpr double kSmall = 0.06;  // in ranks: a shorter subtree that straddles two ranks goes to one of them
-constexpr double kColumns = 16;  // columns of a solve
 constexpr double kEntriesBound = 1.25;
 constexpr double kLeastShare = 0.2;   // relative to an even share
 constexpr double kSharedFront = 5e6;  // operations equivalent to the messages of a shared front, factorisation and solves: 0.1 ms
 // Rank counts up to which subtrees are levelled, and several grains are tried; beyond, the mapping takes longer than it saves.
 constexpr int kMostLevelled = 64;
 constexpr int kMostGrains = 16;
-
-/// Entries of the lower triangle of the trailing rows of a front.
-double count_triangle_of(double rows) { return rows * (rows + 1) / 2; }
 
 /// Share of each rank in a shared front by the tiles assigned; empty if the front has one rank.
 struct FrontParts {
@@ -57,8 +53,7 @@ std::vector<FrontParts> list_parts(const std::vector<FrontCost>& fronts, const M
 void level(std::vector<FrontShare>& shares, const std::vector<double>& times, double operations, double least) {
   std::vector<double> sorted = times;
   std::sort(sorted.begin(), sorted.end());
-  double end = 0;
-  double sum = 0;
+  double end = 0, sum = 0;
   for (std::size_t k = 0; k < sorted.size(); ++k) {
     sum += sorted[k];
     end = (sum + operations) / static_cast<double>(k + 1);
@@ -202,8 +197,7 @@ Mapping::Mapping(const std::vector<FrontCost>& fronts, int ranks, double operati
       end_(fronts.size(), 0.0),
       owner_(fronts.size(), -1) {
   const std::size_t count = fronts.size();
-  double operations = 0;
-  double entries = 0;
+  double operations = 0, entries = 0;
   for (const FrontCost& front : fronts) {
     operations += front.operations;
     entries += front.entries;
@@ -287,57 +281,7 @@ double MappingCounts::fullest_ratio() const {
   return *std::max_element(entries.begin(), entries.end()) * static_cast<double>(entries.size()) / total_entries;
 }
 
-namespace {
-
-/// Counts the messages between the ranks of a shared front.
-class FrontMessages {
- public:
-  FrontMessages(const TileMap& map, MappingCounts& counts) : map_(map), counts_(counts) {}
-
-  void count() {
-    for (int k = 0; k < map_.pivot_tiles(); ++k) {
-      const double n = 3.0 * map_.nodes(k);
-      const int home = map_.owner(k, k);
-      for (const int place : map_.list_column(k)) {
-        receive(place, 3 * n + static_cast<double>(count_triangle(static_cast<std::int64_t>(n))));
-        solve(place, n);  // forward: solution at the panel
-        solve(home, n);   // backward: a sum
-        send_rows(k, place);
-      }
-      send_rows(k, home);
-      for (const int place : map_.list_row(k)) {
-        solve(home, n);
-        solve(place, n);
-      }
-    }
-  }
-
- private:
-  /// Sends each place with tiles behind the panel the rows that it needs for its rows or columns.
-  void send_rows(int k, int from) {
-    const double n = 3.0 * map_.nodes(k);
-    for (int to = 0; to < map_.places(); ++to) {
-      if (to == from || map_.find_last_column(to) <= k) continue;
-      double rows = 0;
-      map_.for_needed(k, from, to, [&](int i) { rows += 3.0 * map_.nodes(i); });
-      if (rows > 0) receive(to, n * (rows + 2));
-    }
-  }
-  void receive(int place, double numbers) {
-    counts_.messages[map_.rank(place)] += 1;
-    counts_.bytes[map_.rank(place)] += 8 * numbers;
-  }
-  void solve(int place, double rows) {
-    counts_.solve_messages[map_.rank(place)] += 1;
-    counts_.solve_bytes[map_.rank(place)] += 8 * kColumns * rows;
-  }
-
-  const TileMap& map_;
-  MappingCounts& counts_;
-};
-
-/// Sums up operations, entries and path length, the criteria of the mapping.
-MappingCounts count_work(const std::vector<FrontCost>& fronts, const Mapping& mapping) {
+MappingCounts count_mapping(const std::vector<FrontCost>& fronts, const Mapping& mapping) {
   const std::size_t ranks = mapping.ranks();
   MappingCounts counts;
   counts.operations.assign(ranks, 0.0);
@@ -369,48 +313,8 @@ MappingCounts count_work(const std::vector<FrontCost>& fronts, const Mapping& ma
   return counts;
 }
 
-}  // namespace
-
-MappingCounts count_mapping(const std::vector<FrontCost>& fronts, const Mapping& mapping) {
-  MappingCounts counts = count_work(fronts, mapping);
-  counts.gang_operations = Replay(fronts, mapping, list_parts(fronts, mapping), true).run();
-  const std::size_t ranks = mapping.ranks();
-  for (std::vector<double>* list : {&counts.messages, &counts.bytes, &counts.solve_messages, &counts.solve_bytes}) list->assign(ranks, 0.0);
-  std::vector<std::int32_t> planned(ranks, 0);
-  std::vector<double> path(fronts.size(), 0.0);  // messages of a solve between the leaves and this front, both ways
-  std::vector<std::int32_t> roots;
-  const std::vector<std::vector<std::int32_t>> children = list_children(fronts, roots);
-  for (std::size_t s = 0; s < fronts.size(); ++s) {
-    const auto front = static_cast<std::int32_t>(s);
-    if (mapping.owner(front) >= 0) continue;
-    const std::vector<FrontShare> shares = mapping.list_shares(front);
-    const TileMap map(fronts[s].width, fronts[s].rows, shares);
-    FrontMessages(map, counts).count();
-    for (const FrontShare& share : shares) planned[share.rank] += 1 + static_cast<std::int32_t>(children[s].size());
-    for (const std::int32_t child : children[s]) {
-      const auto rows = 3.0 * static_cast<double>(fronts[child].rows);
-      const std::vector<FrontShare> from = mapping.list_shares(child);
-      const double copies = std::ceil(std::sqrt(static_cast<double>(from.size())));  // ranks that hold a partial sum of a row
-      path[s] = std::max(path[s], path[child]);
-      for (const FrontShare& share : shares) {
-        const std::size_t rank = share.rank;
-        for (const FrontShare& sender : from) {
-          if (sender.rank == share.rank) continue;
-          const double part = share.fraction * sender.fraction;
-          counts.messages[rank] += 1;
-          counts.bytes[rank] += 8 * count_triangle_of(rows) * part;
-          counts.solve_messages[rank] += 1;
-          counts.solve_bytes[rank] += 8 * kColumns * rows * copies * part;
-          counts.solve_messages[sender.rank] += 1;
-          counts.solve_bytes[sender.rank] += 8 * kColumns * rows * copies * part;
-        }
-      }
-    }
-    path[s] += 2 + 4.0 * map.pivot_tiles();  // from and to the children, and at each panel along its row and its column
-    counts.solve_path_messages = std::max(counts.solve_path_messages, path[s]);
-  }
-  for (const std::int32_t known : planned) counts.most_planned_fronts = std::max(counts.most_planned_fronts, known);
-  return counts;
+double calc_gang_operations(const std::vector<FrontCost>& fronts, const Mapping& mapping) {
+  return Replay(fronts, mapping, list_parts(fronts, mapping), true).run();
 }
 
 Mapping choose_mapping(const std::vector<FrontCost>& fronts, int ranks) {
@@ -418,7 +322,7 @@ Mapping choose_mapping(const std::vector<FrontCost>& fronts, int ranks) {
   double best_cost = std::numeric_limits<double>::infinity();
   double best_entries = std::numeric_limits<double>::infinity();
   const auto consider = [&](const Mapping& candidate) {
-    const MappingCounts counts = count_work(fronts, candidate);
+    const MappingCounts counts = count_mapping(fronts, candidate);
     const double entries = std::max(counts.fullest_ratio(), kEntriesBound);
     const double cost = counts.path_operations + kSharedFront * counts.most_shared_fronts;
     if (entries > best_entries || (entries == best_entries && cost >= best_cost)) return;

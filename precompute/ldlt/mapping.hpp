@@ -60,29 +60,19 @@ class Mapping {
   std::vector<std::vector<FrontShare>> given_shares_;  // (fronts) set by set_shares(), or empty
 };
 
-/// Cost of a mapping, counted by tiles as the factorisation assigns them (tile_map.hpp). For contribution blocks and sums sent from a child
-/// to its parent, message counts are upper bounds, one per pair of ranks, and bytes assume even shares.
+/// Cost of a mapping, counted by tiles as the factorisation assigns them (tile_map.hpp).
 struct MappingCounts {
-  std::vector<double> operations;      // (ranks) of a factorisation
-  std::vector<double> entries;         // (ranks) of L and D
-  std::vector<double> messages;        // (ranks) received in a factorisation
-  std::vector<double> bytes;           // (ranks) received in a factorisation
-  std::vector<double> solve_messages;  // (ranks) received in a solve of up to 32 columns, forward and backward
-  std::vector<double> solve_bytes;     // (ranks) the same for 16 columns
-  double solve_path_messages = 0;      // sequential messages on the longest path from a leaf to the root and back
+  std::vector<double> operations;  // (ranks) of a factorisation
+  std::vector<double> entries;     // (ranks) of L and D
   double total_operations = 0;
   double total_entries = 0;
   /// Operations on the critical path over fronts and ranks, if a rank starts its share of a front as soon as it is free and the children
-  /// are complete ...
+  /// are complete.
   double path_operations = 0;
-  /// ... and if all ranks of a front start together and wait for the slowest.
-  double gang_operations = 0;
   double shared_operations = 0;  // in fronts of more than one rank
   double shared_entries = 0;
   std::int32_t shared_fronts = 0;
   std::int32_t most_shared_fronts = 0;  // largest number of shared fronts of one rank
-  std::int32_t most_planned_fronts =
-      0;  // largest number of shared fronts in the plan of one rank: those between its subtrees and the root, and their children
 
   /// path_operations over total_operations / ranks; 1 is ideal.
   double path_ratio() const { return path_operations * static_cast<double>(operations.size()) / total_operations; }
@@ -91,6 +81,9 @@ struct MappingCounts {
 };
 
 MappingCounts count_mapping(const std::vector<FrontCost>& fronts, const Mapping& mapping);
+
+/// path_operations if all ranks of a front started together and waited for the slowest.
+double calc_gang_operations(const std::vector<FrontCost>& fronts, const Mapping& mapping);
 
 /// The mapping with the shortest path, with a penalty per shared front, among several weights and grains whose fullest rank has at most
 /// 1.25 times the mean entries; if none has, the mapping with the fewest entries on the fullest rank.

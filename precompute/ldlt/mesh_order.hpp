@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <span>
-#include <vector>
 
 #include "precompute/comm/communicator.hpp"
 #include "precompute/comm/index_partition.hpp"

@@ -8,8 +8,6 @@
 #include "precompute/ldlt/numeric.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 #include <numeric>
 
 #include "precompute/la/node_rows.hpp"
@@ -286,9 +284,7 @@ class Factoriser {
   const Kernels& kernels_;
 
   // Current front: w pivot columns of f rows, and the contribution block of the r other rows.
-  int w_ = 0;
-  int r_ = 0;
-  int f_ = 0;
+  int w_ = 0, r_ = 0, f_ = 0;
   double* columns_ = nullptr;
   Buffer wide_;
   Buffer block_;

@@ -30,8 +30,7 @@ constexpr int kTries = 4;                     // ranks that compute a separator 
 
 /// Part that contains a node, in its interior or its separator.
 struct Label {
-  std::int32_t part = 0;
-  std::int32_t is_separator = 0;
+  std::int32_t part = 0, is_separator = 0;
   friend bool operator==(const Label&, const Label&) = default;
 };
 
@@ -47,8 +46,7 @@ Graph make_own_graph(const NodeLinks& nodes) {
 }
 
 struct Link {
-  std::int32_t from = 0;
-  std::int32_t to = 0;
+  std::int32_t from = 0, to = 0;
   auto operator<=>(const Link&) const = default;
 };
 

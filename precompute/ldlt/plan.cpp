@@ -4,7 +4,6 @@
 #include "precompute/ldlt/plan.hpp"
 
 #include <algorithm>
-#include <numeric>
 #include <optional>
 #include <unordered_map>
 
@@ -359,8 +358,7 @@ Analysis::Rank measure(Plan& plan) {
     if (front.shared_parent >= 0) leaving += count_update_of(front.rows);
   }
   std::int64_t kept = leaving;  // including letters of this rank to itself
-  std::int64_t shared_columns = 0;
-  std::int64_t shared_peak = 0;
+  std::int64_t shared_columns = 0, shared_peak = 0;
   for (const SharedFront& front : plan.shared) {
     own.entries += front.map.count_entries()[front.place];
     own.flops += front.map.count_operations()[front.place];

@@ -87,8 +87,7 @@ Ints find_postorder(const Ints& parent) {
 /// A supernode during amalgamation.
 struct Group {
   std::int32_t parent = -1;
-  std::int64_t width = 0;
-  std::int64_t size = 0;
+  std::int64_t width = 0, size = 0;
   Ints vertices;  // in elimination order
   Ints children;
   bool is_merged = false;

@@ -3,7 +3,6 @@
 #include "precompute/mesh/faces.hpp"
 
 #include <algorithm>
-#include <tuple>
 
 #include "precompute/mesh/check.hpp"
 

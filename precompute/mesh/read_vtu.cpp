@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <limits>
 #include <memory>
 #include <pugixml.hpp>
 

@@ -72,7 +72,7 @@ std::vector<Vec3> find_ways_out(const Skin& skin, const std::vector<std::array<V
 }
 
 struct Middle {
-  Vec3 at{}, low_at{}, way{};  // on the skin; on the low side, if known; offset direction
+  Vec3 at{}, way{};  // on the skin; offset direction
 };
 
 class Extruder {

@@ -50,7 +50,6 @@ struct Order {
   std::string up, method, side;
   std::optional<int> order;
   bool straight = false, facets = false, refuses_open = false;
-  bool estimate = false;
   bool look = false;
   std::optional<std::int64_t> coarsen;
   bool quiet = false;
@@ -146,7 +145,6 @@ void check_options(const Order& order) {
                           : order.close_holes     ? "--close-holes"
                           : order.facets          ? "--facets"
                           : order.refuses_open    ? "--refuse-open"
-                          : order.estimate        ? "--estimate"
                                                   : nullptr;
     if (foreign) {
       throw InputError(fmt::format("{} is for surfaces; --shape {} takes its dimensions in metres: {}", foreign, shape.name, takes));
@@ -288,13 +286,6 @@ std::string format_report(const Order& order, const Meshed& result, const mesh::
 void make_mesh(const Order& order) {
   const auto start = Clock::now();
   const mesher::Progress progress = [&](std::string_view phase) {
-    if (phase.starts_with("rough {") || phase.starts_with("estimate {") || phase.starts_with("note ")) {  // for programs
-      if (order.estimate)
-        fmt::print(stderr, "{}{}\n", phase.starts_with("note ") ? "carillon-mesh: note: " : "",
-                   base::printable(phase.starts_with("note ") ? phase.substr(5) : phase));
-      std::fflush(stderr);
-      return;
-    }
     if (order.quiet) return;
     fmt::print(stderr, "[{:6.1f} s] {}\n", calc_seconds(start), base::printable(phase));
     std::fflush(stderr);
@@ -434,10 +425,6 @@ void make(int argc, char** argv, Order& order) {
       ->check(CLI::Range(0.0, 1.0));
   app.add_option("--json", order.json, "Writes the report as JSON to this file too");
   app.add_option("--result", order.result, "Write how the program ended to this file, a JSON object (docs/howto/jobs.md)");
-  app.add_flag(
-      "--estimate", order.estimate,
-      "Surface: says on standard error volume, area, thickness and about how many nodes there will be, in JSON, of the surface as it "
-      "was read (rough) and repaired (estimate)");
   app.add_flag("-q,--quiet", order.quiet, "Print nothing but notes on the mesh and errors, on standard error");
   app.set_version_flag("--version", base::describe("carillon-mesh"));
   std::map<std::string, std::string> help{

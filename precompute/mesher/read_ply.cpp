@@ -6,7 +6,6 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <cstring>
 
 #include "precompute/mesh/cursor.hpp"
 #include "precompute/mesher/surface_text.hpp"

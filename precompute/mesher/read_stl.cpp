@@ -1,10 +1,8 @@
 // Method: a file is binary if its size fits its count, if it does not begin with "solid", or if its first bytes contain a zero. Triangles
 //   in file order; equal points are joined later. Normals and attribute bytes are ignored.
 // Source: 3D Systems, "StereoLithography Interface Specification", 1989.
-#include <array>
 #include <bit>
 #include <cmath>
-#include <cstring>
 
 #include "precompute/mesh/cursor.hpp"
 #include "precompute/mesher/surface_text.hpp"

@@ -1,15 +1,13 @@
 // Method: hill climbing: a node of a flat element tries steps in 26 directions (instead of the paper's active-set ascent: only a handful of
 //   elements need it after exudation) and keeps the best for the worst surrounding dihedral angle.
 // Source: Freitag and Ollivier-Gooch, "Tetrahedral mesh improvement using swapping and smoothing", IJNME 40, 1997, section 3.
-#include "precompute/mesher/smooth.hpp"
-
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <numeric>
 #include <vector>
 
 #include "precompute/mesher/tet_quality.hpp"
+#include "precompute/mesher/volume_mesh.hpp"
 
 namespace carillon::mesher {
 namespace {

@@ -4,14 +4,13 @@
 //   here, and the report measures the angles.
 // Source: Labelle and Shewchuk, "Isosurface stuffing: fast tetrahedral meshes with good dihedral angles", ACM TOG 26(3), 2007, sections 3
 //   and 4; snapping distances (alpha_long, alpha_short) from table 1, "safe" row.
-#include "precompute/mesher/stuffing.hpp"
-
 #include <fmt/core.h>
 
 #include <algorithm>
 #include <cmath>
 #include <unordered_map>
 
+#include "precompute/mesher/volume_mesh.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::mesher {

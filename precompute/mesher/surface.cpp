@@ -5,12 +5,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <functional>
+#include <map>
 #include <new>
+#include <optional>
+#include <vector>
 
 #include "precompute/mesh/check.hpp"
 #include "precompute/mesh/curved.hpp"
+#include "precompute/mesh/tet_mesh.hpp"
 #include "precompute/mesher/body_surface.hpp"
-#include "precompute/mesher/curve_mesh.hpp"
+#include "precompute/mesher/extrude.hpp"
 #include "precompute/mesher/guard.hpp"
 #include "precompute/mesher/phases.hpp"
 #include "precompute/mesher/place_nodes.hpp"
@@ -21,12 +27,201 @@
 #include "precompute/mesher/triangle_surface.hpp"
 #include "precompute/mesher/two_sides.hpp"
 #include "precompute/mesher/volume_mesh.hpp"
-#include "precompute/mesher/wall_mesh.hpp"
 #include "runtime/base/error.hpp"
-#include "runtime/base/json.hpp"
 
 namespace carillon::mesher {
 namespace {
+
+// Method: the mid node of a boundary edge moves along the mean normal of its two boundary faces to the skin; on a sharp curve it moves to
+//   the nearest curve point. Folded elements become straight-sided again: few elements fold, so no reshaping or swapping is needed.
+// Source: Dey, O'Bara and Shephard 2001, "Towards curvilinear meshing in 3D: the case of quadratic simplices", CAD 33, 199, section 3.
+
+/// Finds the skin position for the midpoint `middle` of a boundary edge with outward unit normal `normal`, within reach_m; empty if none.
+using SkinPlace = std::function<std::optional<Vec3>(const Vec3& middle, const Vec3& normal, double reach_m)>;
+
+struct CurvedEdges {
+  std::int64_t curved = 0;        // boundary edges whose mid node left the middle
+  std::int64_t left = 0;          // boundary edges left straight: no skin near enough
+  std::int64_t straightened = 0;  // folded elements made straight-sided again
+};
+
+// A mid node displaced by more than this part of its edge belongs to another part of the skin, or would fold the element.
+constexpr double kReach = 0.3;
+// Faces with a larger turn at an edge may lie on two sides of a sharp curve (cosine of 15 degrees).
+constexpr double kTurn = 0.966;
+// An end lies on a curve if nearer than this part of the edge.
+constexpr double kMaxCurveDistancePerEdge = 1e-3;
+
+struct BoundaryEdge {
+  std::int32_t a = 0, b = 0;  // ends, a < b
+  std::int32_t middle = 0;
+  std::array<Vec3, 2> normals{};  // unit, of its two faces
+};
+
+/// Boundary edges, ordered by their ends.
+std::vector<BoundaryEdge> find_boundary_edges(const mesh::TetMesh& mesh) {
+  mesh::TetMesh linear;  // corners only, same numbering
+  linear.nodes_m = mesh.nodes_m;
+  for (std::int64_t e = 0; e < mesh.tet_count(); ++e) linear.tets.insert(linear.tets.end(), mesh.tet(e).begin(), mesh.tet(e).begin() + 4);
+  std::map<std::array<std::int32_t, 2>, BoundaryEdge> edges;
+  for (const Triangle& t : find_boundary(linear)) {
+    const Vec3 area = cross(mesh.nodes_m[t[1]] - mesh.nodes_m[t[0]], mesh.nodes_m[t[2]] - mesh.nodes_m[t[0]]);
+    const Vec3 normal = (1 / norm(area)) * area;
+    for (int c = 0; c < 3; ++c) {
+      const auto [a, b] = std::minmax(t[c], t[(c + 1) % 3]);
+      BoundaryEdge& edge = edges[{a, b}];
+      edge.normals[norm(edge.normals[0]) > 0 ? 1 : 0] = normal;
+    }
+  }
+  for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
+    for (std::size_t m = 0; m < 6; ++m) {
+      const auto tet = mesh.tet(e);
+      const auto [a, b] = std::minmax(tet[mesh::kEdges[m][0]], tet[mesh::kEdges[m][1]]);
+      const auto found = edges.find({a, b});
+      if (found != edges.end()) found->second.a = a, found->second.b = b, found->second.middle = tet[4 + m];
+    }
+  std::vector<BoundaryEdge> out;
+  for (const auto& [ends, edge] : edges) out.push_back(edge);
+  return out;
+}
+
+/// Point of the curves nearest to p, and its distance.
+std::pair<Vec3, double> find_on_curves(const std::vector<Polyline>& curves, const Vec3& p) {
+  std::pair<Vec3, double> best{{}, HUGE_VAL};
+  for (const Polyline& curve : curves)
+    for (std::size_t i = 1; i < curve.size(); ++i) {
+      const Vec3 &a = curve[i - 1], along = curve[i] - a;
+      const double square = dot(along, along);
+      const double t = square > 0 ? std::clamp(dot(p - a, along) / square, 0.0, 1.0) : 0;
+      const Vec3 q = a + t * along;
+      if (const double distance = norm(p - q); distance < best.second) best = {q, distance};
+    }
+  return best;
+}
+
+/// Moves the mid nodes of boundary edges of a straight-sided quadratic mesh onto the skin, those of sharp edges onto `curves`; elements
+/// that fold become straight again. Inner mid nodes stay at the midpoints.
+CurvedEdges curve_mesh(mesh::TetMesh& mesh, const std::vector<Polyline>& curves, const SkinPlace& find_place) {
+  CurvedEdges out;
+  for (const BoundaryEdge& edge : find_boundary_edges(mesh)) {
+    const Vec3 &a = mesh.nodes_m[edge.a], &b = mesh.nodes_m[edge.b];
+    const double length = norm(b - a), reach = kReach * length;
+    const Vec3 middle = 0.5 * (a + b), sum = edge.normals[0] + edge.normals[1];
+    std::optional<Vec3> place;
+    if (!curves.empty() && dot(edge.normals[0], edge.normals[1]) < kTurn &&
+        find_on_curves(curves, a).second < kMaxCurveDistancePerEdge * length &&
+        find_on_curves(curves, b).second < kMaxCurveDistancePerEdge * length) {
+      const auto [on_curve, distance] = find_on_curves(curves, middle);
+      if (distance < reach) place = on_curve;
+    }
+    if (!place && norm(sum) > 0.2) place = find_place(middle, (1 / norm(sum)) * sum, reach);
+    if (!place) {
+      ++out.left;
+    } else if (norm(*place - middle) > 1e-6 * length) {
+      mesh.nodes_m[edge.middle] = *place;
+      ++out.curved;
+    }
+  }
+  out.straightened = mesh::straighten_folded_elements(mesh);
+  return out;
+}
+
+/// Meshes a wall by extrusion. False for an impossible wall; fault: the reason, completing a sentence.
+bool extrude_wall(const ThinBody& body, const SurfaceOptions& options, SurfaceReport& report, Phases& phases, mesh::TetMesh& out,
+                  std::string& fault) {
+  const SurfaceReport before = report;
+  try {
+    out = mesh_thin_wall(body, options, report, phases);
+    return true;
+  } catch (const WallError& failure) {
+    fault = failure.what();
+    auto seconds = std::move(report.seconds);
+    report = before;
+    report.seconds = std::move(seconds);
+    return false;
+  }
+}
+
+/// Open sheet with a wall. Throws InputError if it cannot be extruded.
+mesh::TetMesh make_sheet(Sheet sheet, const SurfaceOptions& options, SurfaceReport& report, Phases& phases) {
+  const auto refuse = [&](const std::string& fault) {
+    throw InputError(fmt::format("{}: it is an open sheet, and its wall {}; correct it in a modeller, or give a thinner wall",
+                                 options.surface.string(), fault));
+  };
+  if (!sheet.fault.empty()) refuse(sheet.fault);
+  if (options.method == Method::kDelaunay || options.method == Method::kStuffing)
+    throw InputError(fmt::format("{}: it is an open sheet, which needs --method extrude or auto", options.surface.string()));
+  Body body;
+  body.repaired = {std::move(sheet.surface), 0, false};
+  phases.run("rounding", [&] { round_to_height(body, options, report); });
+  report.input_area_m2 = calc_area(body.repaired.surface);
+  report.input_volume_m3 = *options.wall_m * report.input_area_m2;
+  const Side side = options.side == Side::kAutomatic ? Side::kMiddle : options.side;
+  report.reason =
+      fmt::format("the surface is open ({} border{}): it is the {} of a wall of {:.3g} mm", sheet.holes, sheet.holes == 1 ? "" : "s",
+                  side == Side::kMiddle    ? "middle"
+                  : side == Side::kOutside ? "outside"
+                                           : "inside",
+                  1000 * *options.wall_m);
+  mesh::TetMesh out;
+  std::string fault;
+  if (!extrude_wall({.skin = body, .wall_m = *options.wall_m, .side = side}, options, report, phases, out, fault)) refuse(fault);
+  return out;
+}
+
+/// Extruded wall of a closed body, if requested or thinner than the element length. Empty for bodies left to the volume meshers, with the
+/// reason in the report. Throws InputError if extrusion was requested and is impossible.
+std::optional<mesh::TetMesh> make_thin(const Body& body, const SurfaceOptions& options, SurfaceReport& report, Phases& phases) {
+  const bool must = options.method == Method::kExtrusion || (options.side != Side::kAutomatic && options.side != Side::kOutside);
+  if (!must && (options.method != Method::kAutomatic || options.order == 1)) return std::nullopt;
+  const auto give_up = [&](const std::string& fault) {
+    if (must) throw InputError(fmt::format("{}: the wall cannot be extruded from this surface: it {}", options.surface.string(), fault));
+    report.reason.clear();
+    report.remarks.push_back(
+        fmt::format("The wall is thin, but it {}: the volume was meshed instead of the skin, which takes more nodes.", fault));
+    return std::nullopt;
+  };
+  mesh::TetMesh out;
+  std::string fault;
+  if (options.wall_m) {
+    ThinBody thin{.skin = body, .wall_m = *options.wall_m, .side = options.side == Side::kAutomatic ? Side::kOutside : options.side};
+    const double edge = find_thin_edge(thin, options);
+    if (!must && edge <= *options.wall_m) {
+      report.reason =
+          fmt::format("elements of {:.3g} mm are not longer than the wall is thick ({:.3g} mm)", 1000 * edge, 1000 * *options.wall_m);
+      return std::nullopt;
+    }
+    if (report.wrapped) return give_up("has a surface that could not be closed and was wrapped");
+    report.reason =
+        must ? "it was asked for"
+             : fmt::format("the wall ({:.3g} mm) is thinner than the elements are long ({:.3g} mm)", 1000 * *options.wall_m, 1000 * edge);
+    if (extrude_wall(thin, options, report, phases, out, fault)) return out;
+    return give_up(fault);
+  }
+  std::optional<TwoSides> sides;
+  if (!report.wrapped && report.components <= 2)
+    phases.run("looking for a wall", [&] { sides = find_two_sides(body.round ? body.round->get_facets() : body.repaired.surface); });
+  if (!sides) {
+    if (must)
+      throw InputError(
+          fmt::format("{}: it is a closed surface and not a thin wall; give --wall for the thickness of a wall", options.surface.string()));
+    return std::nullopt;
+  }
+  Body outer, inner;
+  outer.repaired = {std::move(sides->outer), 0, false};
+  inner.repaired = {std::move(sides->inner), 0, false};
+  if (!options.facets) {
+    round(outer, options, report);
+    round(inner, options, report);
+  }
+  ThinBody thin{.skin = outer, .low = &inner, .wall_m = sides->thickness_m, .expected_volume_m3 = report.input_volume_m3};
+  const double edge = find_thin_edge(thin, options);
+  if (!must && edge <= thin.wall_m) return std::nullopt;
+  report.reason = fmt::format("the body is itself a wall, of {:.3g} mm, and thinner than the elements are long ({:.3g} mm)",
+                              1000 * thin.wall_m, 1000 * edge);
+  if (extrude_wall(thin, options, report, phases, out, fault)) return out;
+  return give_up(fault);
+}
 
 constexpr double kSmallest = 1e-10, kLargest = 1e9;  // body size, in metres
 // Processor time limits [s] (guard_program), of the repair and of the rest. The hollow bunny of 37,000 nodes takes 7 s, its limit is 670 s.
@@ -135,33 +330,6 @@ void add_notes(const SurfaceOptions& options, const Body& body, SurfaceReport& r
                     report.layers_mean));
 }
 
-std::string format_estimate(const char* word, const Body& body, double edge_m) {
-  const double nodes = std::min(std::max(body.model.calc_nodes(edge_m), calc_min_nodes(body)), 1e15);
-  base::Json estimate = base::Json::object();
-  estimate.set("volume_m3", base::significant(body.model.volume_m3, 12)).set("area_m2", base::significant(body.model.area_m2, 12));
-  estimate.set("thickness_m", base::significant(body.thickness_m, 12)).set("nodes", std::llround(nodes));
-  return fmt::format("{} {}", word, estimate.line());
-}
-
-/// Estimate from the unrepaired surface: the repair may take long.
-void show_rough_estimate(const TriangleSurface& raw, const SurfaceOptions& options, bool is_sheet, Phases& phases) {
-  const double volume = std::abs(calc_volume(raw)), area = calc_area(raw);
-  if (is_sheet) {
-    phases.show(fmt::format("rough {}", format_thin_estimate(area, *options.wall_m, options)));
-    return;
-  }
-  if (!(volume > 0 && area > 0)) return;
-  Body body;
-  set_model(body, options, volume, area);
-  // Thickness over diagonal below which a wall is probably extruded.
-  constexpr double kThin = 0.03;
-  if (options.method == Method::kAutomatic && options.order != 1 && body.thickness_m < kThin * calc_box(raw.points).diagonal()) {
-    phases.show(fmt::format("rough {}", format_thin_estimate(options.wall_m ? area : area / 2, body.thickness_m, options)));
-    return;
-  }
-  phases.show(format_estimate("rough", body, find_first_edge(body, options)));
-}
-
 [[noreturn]] void refuse_open(const SurfaceOptions& options, const Sheet& sheet) {
   throw InputError(fmt::format(
       "{}: it is an open surface ({} border{}), which has no thickness: give one with --wall (of a job's body: \"wall_m\"), or, "
@@ -187,7 +355,6 @@ mesh::TetMesh make_mesh(const SurfaceOptions& given, SurfaceReport& report, Phas
   report.unused_points = input.unused_points;
   report.seam_edges = input.seams.edges;
   report.seam_m = report.scale * input.seams.widest;
-  show_rough_estimate(raw, options, sheet.has_value(), phases);
   if (sheet) {
     for (Vec3& p : sheet->surface.points) p = report.scale * p;
     const auto take = [&] {
@@ -221,10 +388,7 @@ mesh::TetMesh make_mesh(const SurfaceOptions& given, SurfaceReport& report, Phas
   check_count(options, min_nodes);
   if (!options.edge_m && !options.nodes)
     report.remarks.push_back("Neither nodes nor edge was given: about 10,000 corner nodes (order 2: 30,000 nodes in all) were aimed at.");
-
-  for (const std::string& note : report.notes) phases.show("note " + note);  // estimates often end here
-  phases.show(format_estimate("estimate", body, edge));
-
+  phases.show(fmt::format("about {:.0f} nodes", std::max(body.model.calc_nodes(edge), min_nodes)));
   mesh::TetMesh linear = make_volume_mesh(body, options, edge, report, phases);
   mesh::TetMesh out = options.order == 2 ? mesh::to_quadratic(linear) : std::move(linear);
   if (options.order == 2 && !options.straight) phases.run("curving", [&] { curve(out, body, report); });

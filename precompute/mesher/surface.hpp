@@ -111,8 +111,7 @@ struct SurfaceReport {
   std::vector<std::string> remarks;                     // other facts about a mesh that matches the file
 };
 
-/// Called with a short sentence at the start of each phase. Two sentences are machine-readable, a word and a JSON object: "rough {...}" for
-/// the surface as read and "estimate {...}" for the repaired one, each with volume_m3, area_m2, thickness_m and nodes.
+/// Called with a short sentence at the start of each phase, and with "about N nodes" before the volume is meshed.
 using Progress = std::function<void(std::string_view)>;
 
 /// Meshes a surface. Tetrahedra are positively oriented, every node is used, the boundary is a closed 2-manifold (two boundary faces per

@@ -11,18 +11,171 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <set>
+#include <unordered_map>
+#include <vector>
 
+#include "precompute/mesh/parts.hpp"
+#include "precompute/mesher/bends.hpp"
+#include "precompute/mesher/body.hpp"
 #include "precompute/mesher/extrude.hpp"
 #include "precompute/mesher/place_nodes.hpp"
 #include "precompute/mesher/repair.hpp"
 #include "precompute/mesher/skin.hpp"
 #include "precompute/mesher/tet_quality.hpp"
-#include "precompute/mesher/wall_source.hpp"
 #include "runtime/base/failure.hpp"
-#include "runtime/base/json.hpp"
 
 namespace carillon::mesher {
 namespace {
+
+/// Triangles, folds and borders of a body's surface, and projections onto them. Invariant: no edge of three triangles, no point shared by
+/// two parts. Refers to the body.
+class WallSource {
+ public:
+  /// edge_m: of the skin; shorter isolated folds are noise. Throws WallError for a surface that branches or touches itself at a point.
+  WallSource(const Body& body, const SurfaceOptions& options, double edge_m);
+
+  const Skin& get_start() const { return start_; }
+  const TriangleSurface& get_facets() const { return start_.surface; }
+  std::size_t count_dropped_folds() const { return dropped_; }
+
+  /// Nearest point of the smooth surface, or of the facets.
+  Vec3 find(const Vec3& p) const;
+  /// Nearest point of the folds and borders.
+  Vec3 find_on_lines(const Vec3& p) const;
+  double calc_distance(const Vec3& p) const { return norm(nearest_.find(p) - p); }
+
+  /// As RoundSurface; zero without one.
+  bool is_doubtful() const { return round_ && round_->is_doubtful(); }
+  Vec3 find_doubt(const Vec3& p) const;
+
+ private:
+  struct Line {
+    Vec3 a, way, middle;
+    double square, half;
+  };
+  void find_lines(const TriangleSurface& surface, const std::vector<Edge>& folds);
+
+  const RoundSurface* round_;
+  NearestPoint nearest_;  // of the cut of round_, or of the facets
+  Skin start_;
+  std::vector<Line> lines_;
+  std::size_t dropped_ = 0;
+};
+
+constexpr double kMaxNoiseEdges = 2;              // in edges: shorter isolated folds are noise
+constexpr std::size_t kMinNoisyTriangles = 2000;  // in triangles; sharp edges of larger surfaces may be noise
+
+/// Removes isolated folds shorter than elements.
+void drop_noise(const TriangleSurface& facets, std::vector<Edge>& folds, double sharp_angle_deg, double edge_m) {
+  if (facets.triangles.size() > kMinNoisyTriangles) {
+    // Folds of a scan are also sharp at element size.
+    std::map<Vec3, std::int32_t> number;
+    for (const Triangle& t : facets.triangles)
+      for (const std::int32_t v : t) number[facets.points[v]] = v;
+    std::set<Edge> kept;
+    const double diagonal = calc_box(facets.points).diagonal();
+    for (const Polyline& curve : find_sharp_curves(facets, sharp_angle_deg, std::min(2 * edge_m, 0.1 * diagonal), 2 * edge_m))
+      for (std::size_t i = 1; i < curve.size(); ++i) kept.insert(make_edge(number.at(curve[i - 1]), number.at(curve[i])));
+    std::erase_if(folds, [&](const Edge& e) { return !kept.contains(e); });
+  }
+  mesh::Parts parts(facets.points.size());
+  for (const auto& [a, b] : folds) parts.join(a, b);
+  std::map<std::int32_t, double> length;
+  const auto& p = facets.points;
+  for (const auto& [a, b] : folds) length[parts.find(a)] += norm(p[b] - p[a]);
+  std::erase_if(folds, [&](const Edge& e) { return length[parts.find(e[0])] < kMaxNoiseEdges * edge_m; });
+}
+
+/// Throws WallError for an edge of three triangles, or a point shared by two parts.
+void refuse_shared(const TriangleSurface& facets) {
+  const FaceCounts count = count_faces(facets);
+  for (const Triangle& t : facets.triangles)
+    for (int c = 0; c < 3; ++c) {
+      const int faces = count.at(make_edge(t[c], t[(c + 1) % 3]));
+      if (faces > 2)
+        throw WallError(fmt::format("cannot branch: {} triangles meet in one edge at {} (a T-junction)", faces,
+                                    format_place(0.5 * (facets.points[t[c]] + facets.points[t[(c + 1) % 3]]))));
+    }
+  // Unconnected corners at one point: shared by two parts.
+  const std::size_t count_of_corners = 3 * facets.triangles.size();
+  mesh::Parts parts(count_of_corners);
+  std::unordered_map<Edge, std::array<std::int32_t, 2>, EdgeHash> first;  // by edge: corners at its lower and higher point
+  for (std::size_t f = 0; f < facets.triangles.size(); ++f)
+    for (int c = 0; c < 3; ++c) {
+      const Triangle& t = facets.triangles[f];
+      std::array<std::int32_t, 2> corners{static_cast<std::int32_t>(3 * f) + c, static_cast<std::int32_t>(3 * f) + (c + 1) % 3};
+      if (t[c] > t[(c + 1) % 3]) std::swap(corners[0], corners[1]);
+      const auto [found, fresh] = first.try_emplace(make_edge(t[c], t[(c + 1) % 3]), corners);
+      if (fresh) continue;
+      for (int end = 0; end < 2; ++end) parts.join(corners[end], found->second[end]);
+    }
+  std::vector<std::int32_t> part(facets.points.size(), -1);
+  for (std::int32_t c = 0; c < static_cast<std::int32_t>(count_of_corners); ++c) {
+    const std::int32_t v = facets.triangles[c / 3][c % 3];
+    if (part[v] >= 0 && part[v] != parts.find(c))
+      throw WallError(
+          fmt::format("cannot be connected at one point only: two parts of the surface touch at {}", format_place(facets.points[v])));
+    part[v] = parts.find(c);
+  }
+}
+
+WallSource::WallSource(const Body& body, const SurfaceOptions& options, double edge_m)
+    : round_(body.round ? &*body.round : nullptr),
+      nearest_(body.repaired.surface),
+      start_{round_ ? round_->get_facets() : body.repaired.surface, {}} {
+  std::vector<Edge>& folds = start_.folds;
+  if (round_) {
+    folds = round_->list_folds();
+  } else {
+    constexpr double kMaxFlatTurnDeg = 1;
+    for (const Bend& bend : find_bends(start_.surface, options.sharp_angle_deg).edges)
+      if (bend.count == 2 && (options.facets ? bend.turn_deg > kMaxFlatTurnDeg : bend.sharp)) folds.push_back(bend.ends);
+  }
+  refuse_shared(start_.surface);
+  const std::size_t all = folds.size();
+  if (!options.facets) drop_noise(start_.surface, folds, options.sharp_angle_deg, edge_m);
+  dropped_ = all - folds.size();
+  find_lines(body.repaired.surface, folds);
+}
+
+void WallSource::find_lines(const TriangleSurface& surface, const std::vector<Edge>& folds) {
+  std::vector<Edge> edges = round_ ? round_->list_lines() : folds;
+  if (!round_) {
+    const auto border = find_border(surface);
+    edges.insert(edges.end(), border.begin(), border.end());
+  }
+  const auto& points = surface.points;
+  for (const auto& [a, b] : edges) {
+    const Vec3 way = points[b] - points[a];
+    if (dot(way, way) > 0) lines_.push_back({points[a], way, points[a] + 0.5 * way, dot(way, way), 0.5 * norm(way)});
+  }
+}
+
+Vec3 WallSource::find(const Vec3& p) const {
+  const auto [at, triangle] = nearest_.find_on(p);
+  return round_ ? round_->find(triangle, at) : at;
+}
+
+Vec3 WallSource::find_on_lines(const Vec3& p) const {
+  double best = HUGE_VAL;
+  Vec3 found = p;
+  for (const Line& line : lines_) {
+    const double off = norm(p - line.middle) - line.half;
+    if (off > 0 && off * off >= best) continue;
+    const double t = std::clamp(dot(p - line.a, line.way) / line.square, 0.0, 1.0);
+    const Vec3 q = line.a + t * line.way;
+    const double square = dot(p - q, p - q);
+    if (square < best) best = square, found = q;
+  }
+  return round_ ? find(found) : found;  // from the chord of the cut to the curve
+}
+
+Vec3 WallSource::find_doubt(const Vec3& p) const {
+  if (!round_) return {};
+  const auto [at, triangle] = nearest_.find_on(p);
+  return round_->find_doubt(triangle, at);
+}
 
 // Largest ratio of edge length to thickness: longer second-order triangles lock.
 constexpr double kMaxEdgePerWall = 8;
@@ -401,19 +554,11 @@ double find_thin_edge(const ThinBody& body, const SurfaceOptions& options) {
   return choose_sizes(calc_area(body.skin.repaired.surface), body.wall_m, options).edge_m;
 }
 
-std::string format_thin_estimate(double area_m2, double wall_m, const SurfaceOptions& options) {
-  const double nodes = std::clamp(choose_sizes(area_m2, wall_m, options).nodes, 1.0, 1e15);
-  base::Json estimate = base::Json::object();
-  estimate.set("volume_m3", base::significant(area_m2 * wall_m, 12)).set("area_m2", base::significant(2 * area_m2, 12));
-  estimate.set("thickness_m", base::significant(wall_m, 12)).set("nodes", std::llround(nodes));
-  return estimate.line();
-}
-
 mesh::TetMesh mesh_thin_wall(const ThinBody& body, const SurfaceOptions& options, SurfaceReport& report, Phases& phases) {
   const double area = calc_area(body.skin.repaired.surface);
   const ThinSizes sizes = choose_sizes(area, body.wall_m, options);
   check_edge(options, sizes.edge_m, calc_box(body.skin.repaired.surface.points).diagonal(), sizes.nodes, kMaxNodes);
-  phases.show(fmt::format("estimate {}", format_thin_estimate(area, body.wall_m, options)));
+  phases.show(fmt::format("about {:.0f} nodes", sizes.nodes));
   return ThinMesher(body, options, sizes, report, phases).make();
 }
 

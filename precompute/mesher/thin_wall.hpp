@@ -33,9 +33,6 @@ struct ThinBody {
 /// Default edge length on a wall: a twelfth of the bending wave at 10 kHz in steel, glass or aluminium, at most eight times the thickness.
 double find_edge_rule(double wall_m);
 
-/// Expected mesh of a wall on a skin of this area, as an estimate's JSON object (surface.hpp, Progress).
-std::string format_thin_estimate(double area_m2, double wall_m, const SurfaceOptions& options);
-
 /// Skin edge length [m]: as requested, from the count, or by the rule. Curvature shortens it further.
 double find_thin_edge(const ThinBody& body, const SurfaceOptions& options);
 

@@ -13,7 +13,6 @@
 #include <cstdint>
 #include <cstdlib>
 #include <limits>
-#include <string_view>
 #include <vector>
 
 #include "runtime/base/failure.hpp"

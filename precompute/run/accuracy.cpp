@@ -19,9 +19,8 @@
 #include "precompute/job/cost/seconds.hpp"
 #include "precompute/mesh/parallel/read_parallel.hpp"
 #include "precompute/petsc/session.hpp"
-#include "precompute/run/body.hpp"
 #include "precompute/run/io/checkpoint_file.hpp"
-#include "precompute/run/solve_body.hpp"
+#include "precompute/run/stages.hpp"
 #include "runtime/base/failure.hpp"
 
 namespace carillon::run {
@@ -406,8 +405,7 @@ Solution Search::solve(AccuracyReport& report) {
 
 base::Json describe_setting(const Setting& setting) {
   base::Json value;
-  value["element"] = job::to_text(setting.element);
-  value["tolerance"] = setting.tolerance;
+  value.set("element", job::to_text(setting.element)).set("tolerance", setting.tolerance);
   if (setting.nodes) value["body_nodes"] = *setting.nodes;
   if (setting.edge_m) value["body_edge_m"] = *setting.edge_m;
   if (setting.refinements > 0) value["refinements"] = setting.refinements;
@@ -466,26 +464,18 @@ base::Json describe_accuracy(const AccuracyReport& report) {
   root["asked_cents"] = report.asked_cents;
   for (const Trial& trial : report.trials) {
     base::Json entry = describe_setting(trial.setting);
-    entry["nodes"] = trial.nodes;
-    entry["tets"] = trial.tets;
-    entry["mean_edge_m"] = trial.edge_m;
-    entry["modes"] = trial.modes;
-    entry["worst_cents"] = trial.worst_cents;
-    entry["worst_hz"] = trial.worst_hz;
-    entry["algebraic_cents"] = trial.algebraic_cents;
-    entry["facet_cents"] = trial.facet_cents;
-    entry["cpu_seconds"] = trial.cpu_seconds;
-    entry["peak_bytes_all_ranks"] = trial.peak_bytes;
+    entry.set("nodes", trial.nodes).set("tets", trial.tets).set("mean_edge_m", trial.edge_m).set("modes", trial.modes);
+    entry.set("worst_cents", trial.worst_cents).set("worst_hz", trial.worst_hz).set("algebraic_cents", trial.algebraic_cents);
+    entry.set("facet_cents", trial.facet_cents).set("cpu_seconds", trial.cpu_seconds).set("peak_bytes_all_ranks", trial.peak_bytes);
     root["trials"].append(entry);
   }
   if (!report.trials.empty()) root["chosen"] = root["trials"][report.trials.size() - 1];
   if (report.next.nodes > 0) {
     base::Json& next = root["next_stricter"] = describe_setting(report.next.setting);
     if (report.next.needs_new_mesh) next["needs_new_mesh"] = true;
-    next["nodes"] = std::round(report.next.nodes);
-    next["worst_cents"] = report.next.worst_cents > 0 ? base::Json(report.next.worst_cents) : base::Json();
-    next["cpu_seconds"] = report.next.cpu_seconds;
-    next["peak_bytes_all_ranks"] = std::round(report.next.bytes);
+    next.set("nodes", std::round(report.next.nodes));
+    next.set("worst_cents", report.next.worst_cents > 0 ? base::Json(report.next.worst_cents) : base::Json());
+    next.set("cpu_seconds", report.next.cpu_seconds).set("peak_bytes_all_ranks", std::round(report.next.bytes));
   }
   return root;
 }

@@ -1,4 +1,4 @@
-#include "precompute/run/air.hpp"
+#include "runtime/bank/air.hpp"
 
 #include <fmt/core.h>
 
@@ -6,15 +6,14 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
-#include <optional>
 #include <utility>
 
 #include "precompute/air/radiate.hpp"
 #include "precompute/eigen/checkpoint.hpp"
 #include "precompute/run/interrupt.hpp"
 #include "precompute/run/meshing.hpp"
+#include "precompute/run/stages.hpp"
 #include "runtime/acoustics/radiation/gains.hpp"
-#include "runtime/bank/air.hpp"
 #include "runtime/base/file.hpp"
 
 namespace carillon::run {

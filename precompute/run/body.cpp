@@ -1,5 +1,3 @@
-#include "precompute/run/body.hpp"
-
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -14,8 +12,7 @@
 #include "precompute/petsc/session.hpp"
 #include "precompute/run/cut_mesh.hpp"
 #include "precompute/run/meshing.hpp"
-#include "precompute/run/modes.hpp"
-#include "precompute/run/refine_mesh.hpp"
+#include "precompute/run/stages.hpp"
 
 namespace carillon::run {
 namespace {

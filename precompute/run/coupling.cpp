@@ -1,5 +1,3 @@
-#include "precompute/run/coupling.hpp"
-
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -10,6 +8,7 @@
 
 #include "precompute/coupling/condense.hpp"
 #include "precompute/fem/assemble.hpp"
+#include "precompute/run/stages.hpp"
 #include "runtime/bank/surface.hpp"
 #include "runtime/base/sort_order.hpp"
 #include "runtime/base/vector.hpp"

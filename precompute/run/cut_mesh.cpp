@@ -1,8 +1,6 @@
 #include "precompute/run/cut_mesh.hpp"
 
 #include <algorithm>
-#include <numeric>
-#include <span>
 #include <utility>
 
 #include "precompute/comm/exchange.hpp"

@@ -1,7 +1,6 @@
-#include "precompute/run/describe_run.hpp"
-
 #include <algorithm>
-#include <numeric>
+
+#include "precompute/run/stages.hpp"
 
 namespace carillon::run {
 namespace {
@@ -10,63 +9,37 @@ base::Json describe_mesh(const Body& body, const Setting& setting) {
   const mesh::DistributedMesh& pieces = body.pieces;
   const mesh::CheckReport& check = body.check;
   base::Json mesh;
-  mesh["source"] = body.source;
-  mesh["nodes"] = pieces.nodes;
-  mesh["tets"] = pieces.tets;
-  mesh["components"] = pieces.components;
-  mesh["fixed_nodes"] = body.fixed_nodes;
-  mesh["free_nodes"] = pieces.free_nodes;
-  mesh["file_nodes"] = check.nodes;
-  mesh["file_order"] = check.order;
-  mesh["refinements"] = setting.refinements;
-  mesh["reoriented"] = check.reoriented;
-  mesh["unreferenced"] = check.unreferenced;
-  mesh["welded"] = check.welded;
-  mesh["curved"] = check.curved;
-  mesh["straightened"] = check.straightened;
-  mesh["min_dihedral_deg"] = check.min_dihedral_deg;
-  mesh["mean_ratio_min"] = check.mean_ratio_min;
-  mesh["warnings"] = base::Json::array(check.warnings);
+  mesh.set("source", body.source).set("nodes", pieces.nodes).set("tets", pieces.tets).set("components", pieces.components);
+  mesh.set("fixed_nodes", body.fixed_nodes).set("free_nodes", pieces.free_nodes).set("file_nodes", check.nodes);
+  mesh.set("file_order", check.order).set("refinements", setting.refinements).set("reoriented", check.reoriented);
+  mesh.set("unreferenced", check.unreferenced).set("welded", check.welded).set("curved", check.curved);
+  mesh.set("straightened", check.straightened).set("min_dihedral_deg", check.min_dihedral_deg).set("mean_ratio_min", check.mean_ratio_min);
+  mesh.set("warnings", base::Json::array(check.warnings));
   for (const std::string& warning : body.mesher_warnings) mesh["warnings"].append(warning);
   return mesh;
 }
 
 base::Json describe_partition(const mesh::PartitionReport& report) {
   base::Json partition;
-  partition["edge_cut"] = report.edge_cut;
-  partition["element_balance"] = report.element_balance;
-  partition["node_balance"] = report.node_balance;
-  partition["contiguous"] = report.contiguous;
+  partition.set("edge_cut", report.edge_cut).set("element_balance", report.element_balance).set("node_balance", report.node_balance);
+  partition.set("contiguous", report.contiguous);
   for (const auto& rank : report.ranks) {
     base::Json& entry = partition["ranks"].append();
-    entry["elements"] = rank.elements;
-    entry["owned_nodes"] = rank.owned_nodes;
-    entry["halo_nodes"] = rank.halo_nodes;
+    entry.set("elements", rank.elements).set("owned_nodes", rank.owned_nodes).set("halo_nodes", rank.halo_nodes);
   }
   return partition;
 }
 
 base::Json describe_solver(const eigen::Modes& modes) {
   base::Json solver;
-  solver["factorisation"] = modes.factor.solver;
-  solver["ordering"] = modes.factor.ordering;
-  solver["factor_entries"] = modes.factor.entries;
-  solver["factor_flops"] = modes.factor.flops;
-  solver["factorisations"] = modes.factor.factorisations;
-  solver["solves"] = modes.factor.solves;
-  solver["modes"] = modes.lambda.size();
-  solver["modes_in_band"] = modes.band_count;
-  solver["rigid_modes"] = modes.rigid_count;
-  solver["mechanisms"] = modes.mechanism_count;
-  solver["orthonormality_error"] = modes.orthonormality_error;
+  solver.set("factorisation", modes.factor.solver).set("ordering", modes.factor.ordering).set("factor_entries", modes.factor.entries);
+  solver.set("factor_flops", modes.factor.flops).set("factorisations", modes.factor.factorisations).set("solves", modes.factor.solves);
+  solver.set("modes", modes.lambda.size()).set("modes_in_band", modes.band_count).set("rigid_modes", modes.rigid_count);
+  solver.set("mechanisms", modes.mechanism_count).set("orthonormality_error", modes.orthonormality_error);
   solver["above_tolerance"] = modes.above_tolerance_count;  // limited by rounding, see eigen::Modes::residual
   solver["proof"] = modes.proof.method;
-  solver["seconds"]["rigid"] = modes.seconds.rigid;
-  solver["seconds"]["analyse"] = modes.seconds.analyse;
-  solver["seconds"]["factor"] = modes.seconds.factor;
-  solver["seconds"]["iterate"] = modes.seconds.iterate;
-  solver["seconds"]["solve"] = modes.seconds.solve;
-  solver["seconds"]["check"] = modes.seconds.check;
+  solver["seconds"].set("rigid", modes.seconds.rigid).set("analyse", modes.seconds.analyse).set("factor", modes.seconds.factor);
+  solver["seconds"].set("iterate", modes.seconds.iterate).set("solve", modes.seconds.solve).set("check", modes.seconds.check);
   return solver;
 }
 
@@ -102,10 +75,8 @@ base::Json describe_work(const petsc::WorkTable& table) {
     base::Json& entry = phases[petsc::kWorkPhaseNames[i]];
     entry["flops"] = work.flops;
     if (!petsc::is_profiled()) continue;
-    entry["messages"] = work.messages;
-    entry["bytes"] = work.bytes;
-    entry["collectives"] = work.collectives;
-    entry["collective_bytes"] = work.collective_bytes;
+    entry.set("messages", work.messages).set("bytes", work.bytes).set("collectives", work.collectives);
+    entry.set("collective_bytes", work.collective_bytes);
   }
   return phases;
 }
@@ -116,8 +87,7 @@ base::Json describe_effort(const petsc::WorkTable& table) {
   for (std::size_t i = 0; i < table.size(); ++i) {
     const petsc::Effort& effort = table[i].effort;
     base::Json& entry = phases[petsc::kWorkPhaseNames[i]];
-    entry["cpu_seconds"] = effort.cpu_seconds;
-    entry["wall_seconds"] = effort.wall_seconds;
+    entry.set("cpu_seconds", effort.cpu_seconds).set("wall_seconds", effort.wall_seconds);
     if (petsc::is_profiled()) entry["mpi_seconds"] = effort.mpi_seconds;
   }
   return phases;
@@ -127,8 +97,7 @@ base::Json describe_damping(const material::Material& material) {
   base::Json damping;
   switch (material.law) {
     case material::DampingLaw::rayleigh:
-      damping["rayleigh"]["alpha1_s"] = material.alpha1_s;
-      damping["rayleigh"]["alpha2_per_s"] = material.alpha2_per_s;
+      damping["rayleigh"].set("alpha1_s", material.alpha1_s).set("alpha2_per_s", material.alpha2_per_s);
       break;
     case material::DampingLaw::internal_friction:
       damping["internal_friction"]["tan_phi"] = material.tan_phi;
@@ -136,15 +105,13 @@ base::Json describe_damping(const material::Material& material) {
     case material::DampingLaw::caughey:
       for (const material::CaugheyTerm& term : material.caughey) {
         base::Json& entry = damping["caughey"].append();
-        entry["power"] = term.power;
-        entry["coefficient"] = term.coefficient;
+        entry.set("power", term.power).set("coefficient", term.coefficient);
       }
       break;
     case material::DampingLaw::loss_table:
       for (const material::LossRow& row : material.loss_table) {
         base::Json& entry = damping["loss_table"].append();
-        entry["freq_hz"] = row.freq_hz;
-        entry["loss_factor"] = row.loss_factor;
+        entry.set("freq_hz", row.freq_hz).set("loss_factor", row.loss_factor);
       }
       break;
   }
@@ -162,10 +129,8 @@ base::Json describe_materials(const fem::Materials& materials, const std::vector
     base::Json& entry = list.append();
     entry["region"] = i < materials.region.size() ? materials.region[i] : "";
     if (!material.name.empty()) entry["name"] = material.name;
-    entry["volume_m3"] = volume_m3[i];
-    entry["density_kg_m3"] = material.density_kg_m3;
-    entry["young_modulus_pa"] = material.young_modulus_pa;
-    entry["poisson_ratio"] = material.poisson_ratio;
+    entry.set("volume_m3", volume_m3[i]).set("density_kg_m3", material.density_kg_m3).set("young_modulus_pa", material.young_modulus_pa);
+    entry.set("poisson_ratio", material.poisson_ratio);
     if (material.orthotropic) {
       const material::Orthotropic& own = *material.orthotropic;
       base::Json& orthotropic = entry["orthotropic"];
@@ -181,18 +146,12 @@ base::Json describe_materials(const fem::Materials& materials, const std::vector
 
 base::Json describe_program(const Run& run) {
   base::Json root;
-  root["program"] = "carillon-precompute";
-  root["git"] = git_id();
-  root["finished_utc"] = find_time_utc();
-  root["ranks"] = run.comm.size();
+  root.set("program", "carillon-precompute").set("git", git_id()).set("finished_utc", find_time_utc()).set("ranks", run.comm.size());
   for (const auto& [name, version] : find_versions()) root["versions"][name] = version;
   for (const RunPhase& phase : run.log.get_phases()) {
     base::Json& entry = root["stations"].append();
-    entry["name"] = phase.name;
-    entry["seconds"] = phase.seconds;
-    entry["cpu_seconds"] = phase.cpu_seconds;
-    entry["peak_bytes_largest_rank"] = phase.peak_bytes;
-    entry["peak_bytes_all_ranks"] = phase.peak_sum_bytes;
+    entry.set("name", phase.name).set("seconds", phase.seconds).set("cpu_seconds", phase.cpu_seconds);
+    entry.set("peak_bytes_largest_rank", phase.peak_bytes).set("peak_bytes_all_ranks", phase.peak_sum_bytes);
   }
   return root;
 }
@@ -200,18 +159,15 @@ base::Json describe_program(const Run& run) {
 base::Json describe_run(const Run& run, const Solution& found, const Measured& measured) {
   const SolvedBody& solved = found.solved;
   base::Json root = describe_program(run);
-  root["phase_seconds"] = describe_phases(run, solved.modes);
-  root["work"] = describe_work(measured.work);
-  root["effort"] = describe_effort(measured.work);
+  root.set("phase_seconds", describe_phases(run, solved.modes)).set("work", describe_work(measured.work));
+  root.set("effort", describe_effort(measured.work));
   for (const std::int64_t bytes : measured.peak_bytes) root["peak_bytes_by_rank"].append(bytes);
   root["solver_options"] = base::Json::array(run.options.solver_options);
-  root["chosen"]["element"] = job::to_text(found.setting.element);
-  root["chosen"]["tolerance"] = found.setting.tolerance;
-  root["mesh"] = describe_mesh(found.body, found.setting);
-  root["materials"] = describe_materials(solved.properties.materials, solved.properties.volume_m3);
-  root["partition"] = describe_partition(found.body.pieces.report);
-  root["solver"] = describe_solver(solved.modes);
-  root["warnings"] = describe_warnings(run);
+  root["chosen"].set("element", job::to_text(found.setting.element)).set("tolerance", found.setting.tolerance);
+  root.set("mesh", describe_mesh(found.body, found.setting));
+  root.set("materials", describe_materials(solved.properties.materials, solved.properties.volume_m3));
+  root.set("partition", describe_partition(found.body.pieces.report)).set("solver", describe_solver(solved.modes));
+  root.set("warnings", describe_warnings(run));
   return root;
 }
 

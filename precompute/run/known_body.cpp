@@ -6,8 +6,8 @@
 #include <numbers>
 
 #include "precompute/analytic/make_bank.hpp"
-#include "precompute/run/describe_run.hpp"
-#include "precompute/run/open_job.hpp"
+#include "precompute/run/run.hpp"
+#include "precompute/run/stages.hpp"
 #include "runtime/base/clock.hpp"
 #include "runtime/base/file.hpp"
 #include "runtime/base/host.hpp"
@@ -29,8 +29,7 @@ void check_options(const Run& run) {
 
 base::Json describe_known_body(const Run& run, const analytic::Made& made) {
   base::Json record = describe_program(run);
-  record["theory"] = made.theory;
-  record["method"] = made.method;
+  record.set("theory", made.theory).set("method", made.method);
   if (!made.coupling.empty()) record["coupling"] = made.coupling;
   for (const std::string& name : made.names) record["mode_names"].append(name);
   for (const std::string& warning : run.log.get_warnings()) record["warnings"].append(warning);
@@ -83,16 +82,14 @@ std::string validate_known_body(const Run& run) {
   }
   base::Json root;
   root["ok"] = true;
-  root["mesh"]["source"] = made.theory;
-  root["mesh"]["nodes"] = made.bank.vertex_count();
+  root["mesh"].set("source", made.theory).set("nodes", made.bank.vertex_count());
   for (const char* key : {"count", "estimate", "low", "high"}) root["modes"][key] = modes;
   root["modes"]["how"] = "counted";
   for (const char* ranks : {"1", "2", "4"}) {
     root["memory_bytes"][ranks] = bytes;
     root["wall_seconds"][ranks] = seconds;
   }
-  root["cpu_seconds"] = seconds;
-  root["fits_here"] = true;
+  root.set("cpu_seconds", seconds).set("fits_here", true);
   for (const std::string& warning : run.log.get_warnings()) root["warnings"].append(warning);
   for (const std::string& warning : made.warnings) root["warnings"].append(warning);
   return root.sorted_text();

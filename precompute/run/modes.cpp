@@ -1,5 +1,3 @@
-#include "precompute/run/modes.hpp"
-
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -9,8 +7,8 @@
 #include <utility>
 
 #include "precompute/eigen/solve_modes.hpp"
-#include "precompute/run/body.hpp"
 #include "precompute/run/io/checkpoint_file.hpp"
+#include "precompute/run/stages.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::run {

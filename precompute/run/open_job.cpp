@@ -1,11 +1,10 @@
-#include "precompute/run/open_job.hpp"
-
 #include <fmt/core.h>
 
 #include <cstdint>
 #include <string>
 
 #include "precompute/petsc/session.hpp"
+#include "precompute/run/run.hpp"
 #include "precompute/run/same_start.hpp"
 #include "runtime/base/file.hpp"
 

@@ -1,11 +1,10 @@
-#include "precompute/run/predict_cost.hpp"
-
 #include <array>
 #include <cmath>
 #include <utility>
 
 #include "precompute/job/cost/memory.hpp"
 #include "precompute/job/cost/seconds.hpp"
+#include "precompute/run/validate.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/base/json.hpp"
 

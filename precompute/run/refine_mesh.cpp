@@ -1,8 +1,6 @@
 // Method: regular refinement: every edge is halved; the inner octahedron is cut along its shortest diagonal.
 // Source: Bey, Tetrahedral grid refinement, Computing 55, 1995, section 2.
 // Deviations: the shortest diagonal instead of a fixed one preserves element quality and does not affect neighbours.
-#include "precompute/run/refine_mesh.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -10,6 +8,7 @@
 #include <utility>
 
 #include "precompute/mesh/check.hpp"
+#include "precompute/run/stages.hpp"
 
 namespace carillon::run {
 namespace {

@@ -1,10 +1,11 @@
-// Results of the stages of a run.
+// Stages of a run and their results, in the order of a run, and its record.
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,11 +15,16 @@
 #include "precompute/fem/error_bars/error_bars.hpp"
 #include "precompute/fem/materials.hpp"
 #include "precompute/fem/supports.hpp"
+#include "precompute/job/cost/problem_size.hpp"
 #include "precompute/job/setting.hpp"
 #include "precompute/mesh/check.hpp"
 #include "precompute/mesh/distributed/distributed_mesh.hpp"
+#include "precompute/mesh/tet_mesh.hpp"
 #include "precompute/run/io/surface_modes.hpp"
+#include "precompute/run/run.hpp"
+#include "runtime/bank/bank.hpp"
 #include "runtime/bank/quartic_energy.hpp"
+#include "runtime/base/json.hpp"
 
 namespace carillon::ldlt {
 class MeshOrder;
@@ -91,5 +97,78 @@ struct RunSummary {
   std::string warning;      // audible error bars, and the remedy; empty: none
   bool is_stopped = false;  // by a signal, with a checkpoint; described in `result`
 };
+
+/// The job's key for the unit of its mesh, with a suggested value, for messages about the size of the body.
+std::string describe_scale_key(const job::JobSpec& job);
+
+/// Number of modes to compute: more than `max_modes`, so that the lowest corrected ones are reliable; nullopt: all of the band.
+std::optional<std::int64_t> find_computed_count(const job::JobSpec& job);
+
+/// Rank 0.
+cost::ProblemSize find_problem_size(const Run& run, const Setting& setting, const Body& body);
+
+/// Cuts every tetrahedron into eight: four corner tetrahedra and four from the inner octahedron, cut along its shortest diagonal. Ten-node
+/// elements keep their curved sides: new nodes are on the quadratic map of the old element. Node sets gain the nodes whose old edge or face
+/// is entirely in the set. Pre: a mesh accepted by check_mesh. Not collective.
+mesh::TetMesh refine_mesh(const mesh::TetMesh& mesh);
+
+/// Reads or makes the mesh, checks it, and distributes it; rank 0 frees the whole mesh. Collective. Throws on every rank: InputError naming
+/// the file or the job's line, SystemError.
+Body make_body(Run& run, const Setting& setting);
+
+/// Finds the materials, assembles K and M, and integrates volumes and inertia. Warns of locking. Phase "assemble". Collective. Throws on
+/// every rank: InputError, SolveError, SystemError, naming the body or the job's line.
+AssembledSystem assemble_system(Run& run, const Setting& setting, const Body& body);
+
+/// Options of the eigensolver.
+eigen::Options make_options(const job::JobSpec& job, const Setting& setting);
+
+/// Lower end of the bank's band [Hz]: from the job, or higher if rounding hides lower modes.
+double find_low_hz(const job::JobSpec& job, const eigen::Modes& modes);
+
+/// Positions and components of the free nodes; moves the elimination order out of the body.
+eigen::NodeLayout make_layout(Body& body);
+
+/// All modes of the job's band, with the proof of completeness. Warns of modes outside the band and of mechanisms. Moves the elimination
+/// order out of the body. Phase "modes". Collective. Throws on every rank: InputError, SolveError, SystemError, naming the body and the
+/// job; eigen::Stopped when a signal requested a checkpoint.
+eigen::Modes find_modes(Run& run, const Setting& setting, Body& body, const AssembledSystem& system);
+
+/// Assembles K and M, finds the modes of the job's band, and estimates their errors. Frees K, M and the elimination order of the body.
+/// Collective. Throws on every rank: InputError, SolveError, SystemError, naming the body and the job; eigen::Stopped when a signal
+/// requested a checkpoint.
+SolvedBody solve_body(Run& run, const Setting& setting, Body& body);
+
+/// True if air or coupled modes follow the modes and their errors.
+bool has_later_stages(const job::JobSpec& job);
+
+/// Condenses the quartic energy of the modes requested by "nonlinear", from the unrounded shapes. Assembles K and M again. Warns if
+/// condensed motions are not much faster than the coupled modes. A run stopped here resumes from its modes. Phase "coupling". Collective.
+/// Throws on every rank: InputError, SolveError, SystemError, naming the body and the job.
+CouplingReport couple_modes(Run& run, const Solution& found);
+
+/// Adds the multipoles of all modes to the bank (rank 0 only), as the job's "radiation" says. With a checkpoint, solved wave numbers are
+/// kept in a file next to it. Phase "air". Collective. Throws on every rank: InputError, SolveError, SystemError; eigen::Stopped when a
+/// signal requested a checkpoint.
+AirReport add_air(Run& run, bank::Bank& bank);
+
+/// Reads the bank options.radiate, adds the multipoles of all modes by boundary elements, and writes it to options.bank, which may be the
+/// same file. The same bytes on any number of ranks. Resumes from options.checkpoint. Collective. Throws as run_job().
+RunSummary radiate_bank(const comm::Communicator& comm, const RunOptions& options);
+
+/// Reads the job on rank 0 and runs it on all ranks: mesh, partition, assembly, modes, error bars, bank. Writes the bank and
+/// <bank>.resolved.json, each atomically; checks before the solve that they can be written. Unused words of options.solver_options are an
+/// error, before anything is written. Progress goes to standard output (unless quiet) and warnings to standard error, on rank 0.
+/// Collective. Throws the same on every rank: InputError, SolveError, SystemError.
+RunSummary run_job(const comm::Communicator& comm, const std::filesystem::path& job_file, const RunOptions& options);
+
+/// "run" of the resolved job and of the bank's provenance. Rank 0 only.
+base::Json describe_run(const Run& run, const Solution& found, const Measured& measured);
+
+/// Its part about the program: name, version, ranks, phases.
+base::Json describe_program(const Run& run);
+
+/// Materials by region: constants, damping, volume.
+base::Json describe_materials(const fem::Materials& materials, const std::vector<double>& volume_m3);
 
 }  // namespace carillon::run

@@ -1,9 +1,8 @@
-#include "precompute/run/system.hpp"
-
 #include <fmt/core.h>
 
 #include "precompute/eigen/types.hpp"
 #include "precompute/fem/element.hpp"
+#include "precompute/run/stages.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::run {

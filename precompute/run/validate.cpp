@@ -16,12 +16,8 @@
 #include "precompute/job/cost/modes.hpp"
 #include "precompute/job/cost/seconds.hpp"
 #include "precompute/run/accuracy.hpp"
-#include "precompute/run/body.hpp"
-#include "precompute/run/describe_run.hpp"
 #include "precompute/run/known_body.hpp"
-#include "precompute/run/modes.hpp"
-#include "precompute/run/open_job.hpp"
-#include "precompute/run/system.hpp"
+#include "precompute/run/stages.hpp"
 #include "runtime/base/host.hpp"
 #include "runtime/base/json.hpp"
 
@@ -155,29 +151,22 @@ base::Json describe(const Run& run, const Prediction& found) {
   base::Json root;
   root["ok"] = true;
   base::Json& mesh = root["mesh"];
-  mesh["source"] = found.body.source;
-  mesh["nodes"] = found.size.nodes;
-  mesh["tets"] = found.size.tets;
-  mesh["components"] = found.body.pieces.components;
-  mesh["fixed_nodes"] = found.body.fixed_nodes;
-  mesh["min_dihedral_deg"] = found.body.check.min_dihedral_deg;
-  mesh["mean_ratio_min"] = found.body.check.mean_ratio_min;
+  mesh.set("source", found.body.source).set("nodes", found.size.nodes).set("tets", found.size.tets);
+  mesh.set("components", found.body.pieces.components).set("fixed_nodes", found.body.fixed_nodes);
+  mesh.set("min_dihedral_deg", found.body.check.min_dihedral_deg).set("mean_ratio_min", found.body.check.mean_ratio_min);
   root["unknowns"] = found.size.unknowns;
   base::Json& modes = root["modes"];
-  modes["count"] = get_listed(run, *found.size.modes);
-  modes["how"] = found.solve.modes ? "counted" : "estimated";
-  modes["estimate"] = get_listed(run, std::llround(found.weyl.count));
-  modes["low"] = get_listed(run, found.solve.modes ? *found.size.modes : std::llround(std::floor(found.weyl.low)));
-  modes["high"] = get_listed(run, found.get_max_modes());
-  root["factor"]["entries"] = found.solve.entries;
-  root["factor"]["flops"] = found.solve.flops;
-  root["factor"]["how"] = found.is_analysed ? "analysed" : "extrapolated";
+  modes.set("count", get_listed(run, *found.size.modes)).set("how", found.solve.modes ? "counted" : "estimated");
+  modes.set("estimate", get_listed(run, std::llround(found.weyl.count)));
+  modes.set("low", get_listed(run, found.solve.modes ? *found.size.modes : std::llround(std::floor(found.weyl.low))));
+  modes.set("high", get_listed(run, found.get_max_modes()));
+  root["factor"].set("entries", found.solve.entries).set("flops", found.solve.flops);
+  root["factor"].set("how", found.is_analysed ? "analysed" : "extrapolated");
   for (std::size_t i = 0; i < kRanks.size(); ++i) {
     root["memory_bytes"][std::to_string(kRanks[i])] = found.bytes[i];
     root["wall_seconds"][std::to_string(kRanks[i])] = cost::calc_wall(found.cpu_s, found.size, kRanks[i]).sum();
   }
-  root["cpu_seconds"] = found.cpu_s.sum();
-  root["fits_here"] = fits_here(found);
+  root.set("cpu_seconds", found.cpu_s.sum()).set("fits_here", fits_here(found));
   for (const std::string& note : found.notes) root["notes"].add(note);
   for (const std::string& warning : run.log.get_warnings()) root["warnings"].add(warning);
   return root;
@@ -214,9 +203,7 @@ std::string validate_job(const comm::Communicator& comm, const std::filesystem::
 
 std::string describe_failure(const std::string& message, int code) {
   base::Json root;
-  root["ok"] = false;
-  root["error"] = message;
-  root["code"] = code;
+  root.set("ok", false).set("error", message).set("code", code);
   return root.sorted_text();
 }
 

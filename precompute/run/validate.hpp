@@ -1,4 +1,4 @@
-// Checks a job and predicts its modes and memory without solving it.
+// Checks a job and predicts its modes and memory without solving it; cost of a problem of a given size.
 #pragma once
 
 #include <filesystem>
@@ -8,6 +8,11 @@
 #include "precompute/run/run_options.hpp"
 
 namespace carillon::run {
+
+/// size: {"element": "T10" (or "T4"), "nodes": N, "modes": M (of the band; default 200)}. Returns one JSON object on one line:
+/// cpu_seconds and phase_seconds of one rank on the reference machine of the cost model, memory_bytes by ranks, factor (entries, flops),
+/// factorisations, right_sides. Throws InputError for invalid text. No MPI, no files.
+std::string predict_cost(const std::string& size);
 
 /// Runs the stages before the eigensolver (job, mesh, materials, assembly, analysis of the factorisation), with the errors of a run, and
 /// predicts the number of modes and the memory of 1, 2 and 4 ranks. Returns text, or one JSON object (options.json). One rank only:

@@ -11,7 +11,6 @@
 #include <map>
 #include <string>
 #include <string_view>
-#include <utility>
 
 #include "precompute/comm/exchange.hpp"
 #include "precompute/simulation/bodies.hpp"

@@ -239,10 +239,6 @@ Bank read_bank_unchecked(const std::filesystem::path& file);
 /// Layout version (major, minor) of a bank file; reads its seal only. InputError as read_bank.
 std::array<int, 2> read_version(const std::filesystem::path& file);
 
-/// Shapes of all modes at one vertex, (m) [kg^-1/2], without reading the rest of the file: version and length are checked, the checksum is
-/// not. Throws InputError as read_bank does, and for an unknown vertex.
-std::vector<Vec3> read_shape_row(const std::filesystem::path& file, std::size_t vertex);
-
 /// Writes a bank atomically (temporary file in the same folder, fsync, rename). Throws InputError if find_faults() is not empty or `file`
 /// cannot name a bank (nothing is written), SystemError on I/O errors (nothing is left behind). Follows symbolic links.
 void write_bank(const Bank& bank, const std::filesystem::path& file);

@@ -8,8 +8,6 @@
 //   an unpacked bank does not record that it was packed.
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numbers>
 
 #include "runtime/bank/faults.hpp"
 #include "runtime/bank/mixing.hpp"

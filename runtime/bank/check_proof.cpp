@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <numeric>
 
 #include "runtime/bank/bank.hpp"
 #include "runtime/bank/faults.hpp"

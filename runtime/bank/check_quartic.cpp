@@ -4,7 +4,6 @@
 //   compared with finite differences of V along a random direction at a random point: polynomials that agree there are identical (Schwartz
 //   and Zippel). All coupled modes move with equal energy, scaled so that V is about 1 J; V is evaluated six times for any number of modes.
 // Source: docs/equations.md E12.
-#include <algorithm>
 #include <cmath>
 #include <random>
 #include <vector>

@@ -12,7 +12,6 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <numeric>
 
 #include "runtime/bank/bank.hpp"
 #include "runtime/bank/edges.hpp"

@@ -16,7 +16,6 @@
 #include <iterator>
 #include <numbers>
 #include <string_view>
-#include <system_error>
 
 #include "runtime/bank/air.hpp"
 #include "runtime/bank/radiation_gain.hpp"

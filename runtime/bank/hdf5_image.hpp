@@ -6,7 +6,6 @@
 #include <memory>
 #include <span>
 #include <string>
-#include <vector>
 
 #include "runtime/bank/bank.hpp"
 #include "runtime/bank/layout.hpp"

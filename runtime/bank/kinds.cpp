@@ -12,7 +12,6 @@
 #include <array>
 #include <cmath>
 #include <complex>
-#include <numbers>
 
 #include "runtime/bank/surface.hpp"
 

@@ -1,7 +1,6 @@
 // Closest point on a body's surface: clicks, collisions, strikes.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <vector>
 

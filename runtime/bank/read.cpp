@@ -462,39 +462,4 @@ std::array<int, 2> read_version(const std::filesystem::path& path) {
   return {seal.major, seal.minor};
 }
 
-std::vector<Vec3> read_shape_row(const std::filesystem::path& path, std::size_t vertex) {
-  const File file(path);
-  const Seal seal = file.read_seal();
-  if (seal.extents.contains("mesh/packed")) {  // rows cannot be decoded separately
-    const Bank bank = read_bank(path);
-    if (vertex >= bank.vertex_count())
-      throw InputError(fmt::format("{}: no vertex {}; the bank has {}, numbered from 0", file.name(), vertex, bank.vertex_count()));
-    std::vector<Vec3> row;
-    for (std::size_t i = 0; i < bank.mode_count(); ++i) row.push_back(bank.shape_at(vertex, i));
-    return row;
-  }
-  const std::uint64_t vertices = get_rows(seal, "mesh/vertices", file.name());
-  const std::uint64_t modes = get_rows(seal, "modes/eigenvalue", file.name());
-  const Extent& shape = get_extent(seal, "modes/shape", file.name());
-  const Extent& scale = get_extent(seal, "modes/shape_scale", file.name());
-  const bool is_narrow = shape.dtype == "|i1";
-  check_extent({"modes/shape", is_narrow ? "|i1" : "<i2", {vertices, modes, 3}, "", "", nullptr}, shape, file.name());
-  check_extent({"modes/shape_scale", "<f8", {modes}, "", "", nullptr}, scale, file.name());
-  if (vertex >= vertices)
-    throw InputError(fmt::format("{}: no vertex {}; the bank has {}, numbered from 0", file.name(), vertex, vertices));
-  std::vector<std::int16_t> steps(3 * modes);
-  std::vector<double> scales(modes);
-  if (is_narrow) {
-    std::vector<std::int8_t> narrow(3 * modes);
-    file.read(shape.offset + vertex * narrow.size(), std::as_writable_bytes(std::span(narrow)));
-    steps.assign(narrow.begin(), narrow.end());
-  } else {
-    file.read(shape.offset + vertex * 3 * modes * sizeof(std::int16_t), std::as_writable_bytes(std::span(steps)));
-  }
-  file.read(scale.offset, std::as_writable_bytes(std::span(scales)));
-  std::vector<Vec3> row(modes);
-  for (std::size_t i = 0; i < modes; ++i) row[i] = {steps[3 * i] * scales[i], steps[3 * i + 1] * scales[i], steps[3 * i + 2] * scales[i]};
-  return row;
-}
-
 }  // namespace carillon::bank

@@ -199,20 +199,13 @@ base::Json make_list(const Range& values) {
 base::Json make_mode(const Bank& bank, const HeardMode& heard, std::size_t i, const ModeKind& kind) {
   const double omega = 2.0 * std::numbers::pi * heard.freq_hz, decay = heard.calc_decay_per_s();
   base::Json mode;
-  mode["frequency_hz"] = bank.freq_hz(i);
-  mode["eigenvalue_rad2_s2"] = bank.eigenvalue_rad2_s2[i];
-  mode["decay_per_s"] = bank.decay_per_s[i];
+  mode.set("frequency_hz", bank.freq_hz(i)).set("eigenvalue_rad2_s2", bank.eigenvalue_rad2_s2[i]).set("decay_per_s", bank.decay_per_s[i]);
   // JSON has no infinity: an undamped mode has no T60.
   mode["t60_s"] = std::isfinite(calc_t60_s(decay)) ? base::Json(calc_t60_s(decay)) : base::Json();
   base::Json& parts = mode["heard"];
-  parts["frequency_hz"] = heard.freq_hz;
-  parts["decay_per_s"] = decay;
-  parts["material_per_s"] = heard.material_per_s;
-  parts["radiation_per_s"] = heard.radiation_per_s;
-  parts["supports_per_s"] = heard.supports_per_s;
-  mode["damping_ratio"] = decay / omega;
-  mode["regime"] = find_regime(decay, omega);
-  mode["residual"] = bank.residual[i];
+  parts.set("frequency_hz", heard.freq_hz).set("decay_per_s", decay).set("material_per_s", heard.material_per_s);
+  parts.set("radiation_per_s", heard.radiation_per_s).set("supports_per_s", heard.supports_per_s);
+  mode.set("damping_ratio", decay / omega).set("regime", find_regime(decay, omega)).set("residual", bank.residual[i]);
   const auto get_cents = [&](const std::vector<double>& cents) {
     return i < cents.size() && std::isfinite(cents[i]) ? base::Json(cents[i]) : base::Json();
   };
@@ -220,23 +213,17 @@ base::Json make_mode(const Bank& bank, const HeardMode& heard, std::size_t i, co
   mode["discretisation_error_cents"] = get_cents(bank.discretisation_error_cents);
   mode["facet_error_cents"] = bank.facet_error_cents.empty() ? base::Json(0.0) : get_cents(bank.facet_error_cents);
   if (const Corrected& corrected = bank.corrected; !corrected.is_empty()) {
-    mode["corrected_frequency_hz"] = corrected.freq_hz[i];
-    mode["corrected_decay_per_s"] = corrected.decay_per_s[i];
-    mode["corrected_error_cents"] = get_cents(corrected.error_cents);
-    mode["correction"] = describe(corrected.correction[i]);
+    mode.set("corrected_frequency_hz", corrected.freq_hz[i]).set("corrected_decay_per_s", corrected.decay_per_s[i]);
+    mode.set("corrected_error_cents", get_cents(corrected.error_cents)).set("correction", describe(corrected.correction[i]));
   }
   mode["radiation_gain"] = bank.radiation_gain[i];
   if (const Multipoles& air = bank.multipoles; !air.is_empty()) {
     base::Json& radiation = mode["radiation"];
-    radiation["frequency_hz"] = air.freq_hz[i];
-    radiation["order"] = air.order[i];
-    radiation["decay_per_s"] = air.decay_per_s[i];
-    radiation["added_mass"] = air.added_mass[i];
-    radiation["error_db"] = air.error_db[i];
+    radiation.set("frequency_hz", air.freq_hz[i]).set("order", air.order[i]).set("decay_per_s", air.decay_per_s[i]);
+    radiation.set("added_mass", air.added_mass[i]).set("error_db", air.error_db[i]);
     if (!air.mixing.is_empty()) radiation["coupled_modes"] = air.mixing.count[i];
   }
-  mode["shape_scale"] = bank.shape_scale[i];
-  mode["kind"] = describe(kind);
+  mode.set("shape_scale", bank.shape_scale[i]).set("kind", describe(kind));
   return mode;
 }
 
@@ -245,14 +232,12 @@ base::Json make_damping(const Bank& bank) {
   base::Json damping;
   damping["law"] = law.law;
   if (law.law == "rayleigh") {
-    damping["rayleigh"]["alpha1_s"] = bank.material.alpha1_s;
-    damping["rayleigh"]["alpha2_per_s"] = bank.material.alpha2_per_s;
+    damping["rayleigh"].set("alpha1_s", bank.material.alpha1_s).set("alpha2_per_s", bank.material.alpha2_per_s);
   }
   if (!law.coefficient.empty()) damping["coefficient"] = make_list(law.coefficient);
   if (!law.power.empty()) damping["power"] = make_list(law.power);
   if (!law.freq_hz.empty()) {
-    damping["freq_hz"] = make_list(law.freq_hz);
-    damping["loss_factor"] = make_list(law.loss_factor);
+    damping.set("freq_hz", make_list(law.freq_hz)).set("loss_factor", make_list(law.loss_factor));
   }
   return damping;
 }
@@ -265,16 +250,11 @@ base::Json make_counts(const std::vector<std::int64_t>& counts) {
 
 base::Json make_proof(const Proof& proof) {
   base::Json value;
-  value["cut_hz"] = make_list(proof.cut_hz);
-  value["below"] = make_counts(proof.below);
-  value["margin"] = make_list(proof.margin);
-  value["rigid_per_component"] = make_counts(proof.rigid_per_component);
-  value["found"] = proof.found;
-  value["orthonormality"] = proof.orthonormality;
-  value["backward_error"] = proof.backward_error;
-  value["cluster_first"] = make_counts(proof.cluster_first);
-  value["cluster_count"] = make_counts(proof.cluster_count);
-  value["method"] = proof.method;
+  value.set("cut_hz", make_list(proof.cut_hz)).set("below", make_counts(proof.below)).set("margin", make_list(proof.margin));
+  value.set("rigid_per_component", make_counts(proof.rigid_per_component)).set("found", proof.found);
+  value.set("orthonormality", proof.orthonormality).set("backward_error", proof.backward_error);
+  value.set("cluster_first", make_counts(proof.cluster_first)).set("cluster_count", make_counts(proof.cluster_count));
+  value.set("method", proof.method);
   return value;
 }
 
@@ -282,31 +262,18 @@ base::Json make_radiation(const Bank& bank) {
   const Multipoles& air = bank.multipoles;
   const RadiationFacts facts = find_radiation_facts(bank);
   base::Json radiation;
-  radiation["method"] = air.method;
-  radiation["centre_m"] = make_list(air.centre_m);
-  radiation["radius_m"] = air.radius_m;
-  radiation["nearest_m"] = air.nearest_m;
-  radiation["air_density_kg_m3"] = air.air_density_kg_m3;
-  radiation["sound_speed_ms"] = air.sound_speed_ms;
-  radiation["bytes"] = facts.bytes;
-  radiation["worst_error_db"] = facts.worst_db;
-  radiation["modes_mostly_damped_by_it"] = facts.strong;
-  radiation["largest_added_mass_cents"] = facts.cents;
-  radiation["most_coupled_modes"] = facts.parts;
+  radiation.set("method", air.method).set("centre_m", make_list(air.centre_m)).set("radius_m", air.radius_m);
+  radiation.set("nearest_m", air.nearest_m).set("air_density_kg_m3", air.air_density_kg_m3).set("sound_speed_ms", air.sound_speed_ms);
+  radiation.set("bytes", facts.bytes).set("worst_error_db", facts.worst_db).set("modes_mostly_damped_by_it", facts.strong);
+  radiation.set("largest_added_mass_cents", facts.cents).set("most_coupled_modes", facts.parts);
   return radiation;
 }
 
 base::Json make_nonlinear(const QuarticEnergy& energy) {
   base::Json nonlinear;
-  nonlinear["form"] = get_form(energy);
-  nonlinear["coupled_modes"] = energy.mode_count();
-  nonlinear["rows"] = energy.row_count();
-  nonlinear["points"] = energy.point_count();
-  nonlinear["is_curved"] = !energy.linear.empty();
-  nonlinear["bytes"] = count_bytes(energy);
-  nonlinear["energy_error"] = energy.error;
-  nonlinear["membrane_ratio"] = energy.membrane_ratio;
-  nonlinear["thickness_m"] = energy.thickness_m;
+  nonlinear.set("form", get_form(energy)).set("coupled_modes", energy.mode_count()).set("rows", energy.row_count());
+  nonlinear.set("points", energy.point_count()).set("is_curved", !energy.linear.empty()).set("bytes", count_bytes(energy));
+  nonlinear.set("energy_error", energy.error).set("membrane_ratio", energy.membrane_ratio).set("thickness_m", energy.thickness_m);
   return nonlinear;
 }
 
@@ -360,43 +327,28 @@ std::string format_info(const Bank& bank, std::span<const HeardMode> heard, cons
 std::string format_info_json(const Bank& bank, std::span<const HeardMode> heard, const std::filesystem::path& file) {
   const auto [major, minor] = read_version(file);
   base::Json root;
-  root["file"] = file.string();
-  root["format_version"] = fmt::format("{}.{}", major, minor);
-  root["bytes"] = std::filesystem::file_size(file);
-  root["mode_count"] = bank.mode_count();
-  root["vertex_count"] = bank.vertex_count();
-  root["triangle_count"] = bank.triangles.size();
-  root["band_hz"] = make_list(bank.band_hz);
-  root["complete"] = bank.complete;
-  root["shape_bytes"] = bank.shape_bytes;
+  root.set("file", file.string()).set("format_version", fmt::format("{}.{}", major, minor)).set("bytes", std::filesystem::file_size(file));
+  root.set("mode_count", bank.mode_count()).set("vertex_count", bank.vertex_count()).set("triangle_count", bank.triangles.size());
+  root.set("band_hz", make_list(bank.band_hz)).set("complete", bank.complete).set("shape_bytes", bank.shape_bytes);
   if (bank.packing) {
-    root["packing"]["error_db"] = bank.packing->error_db;
-    root["packing"]["worst_db"] = bank.packing->worst_db;
+    root["packing"].set("error_db", bank.packing->error_db).set("worst_db", bank.packing->worst_db);
   }
-  root["element"] = bank.element;
-  root["mass"] = bank.mass;
+  root.set("element", bank.element).set("mass", bank.mass);
   base::Json& counts = root["counts"];
-  counts["nodes"] = bank.counts.nodes;
-  counts["tets"] = bank.counts.tets;
-  counts["components"] = bank.counts.components;
-  counts["rigid_modes"] = bank.counts.rigid_modes;
+  counts.set("nodes", bank.counts.nodes).set("tets", bank.counts.tets).set("components", bank.counts.components);
+  counts.set("rigid_modes", bank.counts.rigid_modes);
   base::Json& rigid = root["rigid"];
-  rigid["mass_kg"] = bank.rigid.mass_kg;
-  rigid["volume_m3"] = bank.rigid.volume_m3;
-  rigid["centre_m"] = make_list(bank.rigid.centre_m);
+  rigid.set("mass_kg", bank.rigid.mass_kg).set("volume_m3", bank.rigid.volume_m3).set("centre_m", make_list(bank.rigid.centre_m));
   for (std::size_t i = 0; i < 3; ++i) rigid["inertia_kg_m2"].append(make_list(std::span(bank.rigid.inertia_kg_m2).subspan(3 * i, 3)));
   base::Json& material = root["material"];
-  material["young_modulus_pa"] = bank.material.young_modulus_pa;
-  material["poisson_ratio"] = bank.material.poisson_ratio;
-  material["density_kg_m3"] = bank.material.density_kg_m3;
-  material["damping"] = make_damping(bank);
+  material.set("young_modulus_pa", bank.material.young_modulus_pa).set("poisson_ratio", bank.material.poisson_ratio);
+  material.set("density_kg_m3", bank.material.density_kg_m3).set("damping", make_damping(bank));
   if (const auto regions = base::Json::parse(bank.regions); !bank.regions.empty())
     material["regions"] = regions ? *regions : base::Json(bank.regions);
   if (!bank.multipoles.is_empty()) root["radiation"] = make_radiation(bank);
   if (!bank.quartic.is_empty()) root["nonlinear"] = make_nonlinear(bank.quartic);
-  root["proof"] = bank.proof ? make_proof(*bank.proof) : base::Json();
-  root["frequencies_hz"] = base::Json::array();
-  root["corrected_frequencies_hz"] = base::Json::array();
+  root.set("proof", bank.proof ? make_proof(*bank.proof) : base::Json()).set("frequencies_hz", base::Json::array());
+  root.set("corrected_frequencies_hz", base::Json::array());
   for (const std::size_t mode : sort_modes(bank))
     if (!bank.corrected.is_empty()) root["corrected_frequencies_hz"].append(bank.corrected.freq_hz[mode]);
   root["modes"] = base::Json::array();

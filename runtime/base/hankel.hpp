@@ -2,7 +2,6 @@
 #pragma once
 
 #include <complex>
-#include <cstddef>
 #include <vector>
 
 namespace carillon::base {

@@ -5,7 +5,6 @@
 #include <cerrno>
 #include <iterator>
 #include <new>
-#include <string_view>
 
 #include "runtime/base/document.hpp"
 #include "runtime/base/failure.hpp"

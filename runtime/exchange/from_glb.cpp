@@ -14,7 +14,6 @@
 #include <limits>
 #include <map>
 #include <numbers>
-#include <numeric>
 #include <vector>
 
 #include "runtime/bank/corrected.hpp"

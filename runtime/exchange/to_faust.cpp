@@ -10,7 +10,6 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <numeric>
 
 #include "runtime/bank/blows.hpp"
 #include "runtime/bank/corrected.hpp"

@@ -1,7 +1,6 @@
 // Named materials: the built-in table (materials.json), extended by a user file.
 #pragma once
 
-#include <filesystem>
 #include <string>
 #include <string_view>
 #include <vector>

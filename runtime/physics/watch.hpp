@@ -1,7 +1,6 @@
 // Audit of penetrations between bodies and into the ground, and of hit counts.
 #pragma once
 
-#include <array>
 #include <deque>
 #include <map>
 #include <utility>

@@ -124,13 +124,11 @@ base::Json make_effects_json(const scene::Plan& plan, const Sound& sound, std::s
 
 /// Effect of supports on the modes of a body.
 base::Json make_mounting_json(const scene::Mounting& mounting) {
-  return base::Json::object()
-      .set("text", base::printable(mounting.text))
-      .set("beyond_first_order", mounting.beyond)
-      .set("shared", mounting.mixed)
-      .set("frequencies_hz", make_list_json(mounting.freq_hz))
-      .set("decay_before_per_s", make_list_json(mounting.decay_before_per_s))
-      .set("decay_per_s", make_list_json(mounting.decay_per_s));
+  base::Json json = base::Json::object();
+  json.set("text", base::printable(mounting.text)).set("beyond_first_order", mounting.beyond).set("shared", mounting.mixed);
+  json.set("frequencies_hz", make_list_json(mounting.freq_hz)).set("decay_before_per_s", make_list_json(mounting.decay_before_per_s));
+  json.set("decay_per_s", make_list_json(mounting.decay_per_s));
+  return json;
 }
 
 base::Json make_pair_json(const scene::Scene& scene, int body, int other) {
@@ -150,63 +148,46 @@ base::Json make_rate_json(const scene::Scene& scene, const physics::HitRate& rat
 }
 
 base::Json make_contacts_json(const scene::Scene& scene, const physics::ContactAudit& contacts) {
-  return base::Json::object()
-      .set("deepest_now", make_depth_json(scene, contacts.now))
-      .set("deepest", make_depth_json(scene, contacts.deepest))
-      .set("deepest_unexplained", make_depth_json(scene, contacts.unexplained))
-      .set("pushes", contacts.pushes)
-      .set("hits_per_s", make_figure(contacts.hits_per_s))
-      .set("worst_pair", make_rate_json(scene, contacts.worst_pair))
-      .set("busiest_half_second", make_rate_json(scene, contacts.busiest))
-      .set("ended_impacts", contacts.ended_impacts)
-      .set("longest_impact_s", make_figure(contacts.longest_impact_s));
+  base::Json json = base::Json::object();
+  json.set("deepest_now", make_depth_json(scene, contacts.now)).set("deepest", make_depth_json(scene, contacts.deepest));
+  json.set("deepest_unexplained", make_depth_json(scene, contacts.unexplained)).set("pushes", contacts.pushes);
+  json.set("hits_per_s", make_figure(contacts.hits_per_s)).set("worst_pair", make_rate_json(scene, contacts.worst_pair));
+  json.set("busiest_half_second", make_rate_json(scene, contacts.busiest)).set("ended_impacts", contacts.ended_impacts);
+  json.set("longest_impact_s", make_figure(contacts.longest_impact_s));
+  return json;
 }
 
 base::Json make_audit_json(const EnergyBooks& books) {
   const physics::EnergyAudit& bodies = books.bodies;
-  return base::Json::object()
-      .set("rise_j", make_figure(bodies.rise_j))
-      .set("hit_rise_j", make_figure(bodies.hit_rise_j))
-      .set("largest_kinetic_j", make_figure(bodies.kinetic_j))
-      .set("weight_n", make_figure(bodies.weight_n))
-      .set("modes_rise", make_figure(books.modes_rise))
-      .set("start_j", make_figure(bodies.start_j, 9))
-      .set("motion_j", make_figure(bodies.motion_j, 9))
-      .set("modes_j", make_figure(bodies.modes_j))
-      .set("max_modes_j", make_figure(bodies.max_modes_j))
-      .set("modes_share", make_figure(bodies.modes_share))
-      .set("lost_j", make_figure(bodies.lost_j, 9))
-      .set("lifted_j", make_figure(bodies.lifted_j))
-      .set("difference_j", make_figure(bodies.error_j))
-      .set("modes_given_j", make_figure(books.modes.given_j, 9))
-      .set("modes_held_j", make_figure(books.modes.held_j, 9))
-      .set("modes_lost_j", make_figure(books.modes.lost_j, 9))
-      .set("radiated_j", make_figure(books.modes.radiated_j));
+  base::Json json = base::Json::object();
+  json.set("rise_j", make_figure(bodies.rise_j)).set("hit_rise_j", make_figure(bodies.hit_rise_j));
+  json.set("largest_kinetic_j", make_figure(bodies.kinetic_j)).set("weight_n", make_figure(bodies.weight_n));
+  json.set("modes_rise", make_figure(books.modes_rise)).set("start_j", make_figure(bodies.start_j, 9));
+  json.set("motion_j", make_figure(bodies.motion_j, 9)).set("modes_j", make_figure(bodies.modes_j));
+  json.set("max_modes_j", make_figure(bodies.max_modes_j)).set("modes_share", make_figure(bodies.modes_share));
+  json.set("lost_j", make_figure(bodies.lost_j, 9)).set("lifted_j", make_figure(bodies.lifted_j));
+  json.set("difference_j", make_figure(bodies.error_j)).set("modes_given_j", make_figure(books.modes.given_j, 9));
+  json.set("modes_held_j", make_figure(books.modes.held_j, 9)).set("modes_lost_j", make_figure(books.modes.lost_j, 9));
+  json.set("radiated_j", make_figure(books.modes.radiated_j));
+  return json;
 }
 
 base::Json make_blow_json(const scene::Blow& blow) {
-  return base::Json::object()
-      .set("body", blow.body)
-      .set("time_s", make_figure(blow.time_s, 9))
-      .set("contact_s", make_figure(blow.contact_s))
-      .set("impulse_n_s", make_figure(blow.impulse_n_s))
-      .set("peak_n", make_figure(blow.peak_n))
-      .set("restitution", make_figure(blow.restitution))
-      .set("before_j", make_figure(blow.before_j))
-      .set("after_j", make_figure(blow.after_j))
-      .set("together", blow.together)
-      .set("motion_j", make_figure(blow.motion_j))
-      .set("modes_j", make_figure(blow.modes_j))
-      .set("lost_j", make_figure(blow.lost_j));
+  base::Json json = base::Json::object();
+  json.set("body", blow.body).set("time_s", make_figure(blow.time_s, 9)).set("contact_s", make_figure(blow.contact_s));
+  json.set("impulse_n_s", make_figure(blow.impulse_n_s)).set("peak_n", make_figure(blow.peak_n));
+  json.set("restitution", make_figure(blow.restitution)).set("before_j", make_figure(blow.before_j));
+  json.set("after_j", make_figure(blow.after_j)).set("together", blow.together).set("motion_j", make_figure(blow.motion_j));
+  json.set("modes_j", make_figure(blow.modes_j)).set("lost_j", make_figure(blow.lost_j));
+  return json;
 }
 
 base::Json make_body_json(const scene::Scene& scene, const Sound& sound, const scene::Plan& plan, const Figures& figures, std::size_t i) {
   const scene::SceneBody& body = scene.bodies[i];
   base::Json json = base::Json::object();
-  json.set("name", body.name)
-      .set("modes", sound.body_modes[i])
-      .set("impulses", i < figures.tally.body_impulses.size() ? figures.tally.body_impulses[i] : std::int64_t{0})
-      .set("peak_pa_at_1m", make_figure(sound.body_peak_pa[i]));
+  json.set("name", body.name).set("modes", sound.body_modes[i]);
+  json.set("impulses", i < figures.tally.body_impulses.size() ? figures.tally.body_impulses[i] : std::int64_t{0});
+  json.set("peak_pa_at_1m", make_figure(sound.body_peak_pa[i]));
   if (sound.body_deflection[i] > 0.0) json.set("deflection_thicknesses", make_figure(sound.body_deflection[i], 4));
   if (!body.mounting.text.empty()) json.set("supports", make_mounting_json(body.mounting));
   if (body.limited.modes != 0) json["limited_gains"].set("modes", body.limited.modes).set("max_db", make_figure(body.limited.max_db, 4));
@@ -226,13 +207,11 @@ base::Json describe_pose(const physics::Pose& pose) {
 base::Json describe_impulse(const events::Impulse& impulse, const Vec3& world_m) {
   base::Json place = base::Json::array();
   for (const double x : world_m) place.add(base::significant(x, 6));
-  return base::Json::object()
-      .set("time_s", base::decimals(impulse.time_s, 9))
-      .set("body", impulse.body)
-      .set("other", impulse.other)
-      .set("world_m", place)
-      .set("impulse_n_s", base::significant(calc_length(impulse.impulse_n_s), 6))
-      .set("duration_s", base::significant(impulse.duration_s, 6));
+  base::Json json = base::Json::object();
+  json.set("time_s", base::decimals(impulse.time_s, 9)).set("body", impulse.body).set("other", impulse.other).set("world_m", place);
+  json.set("impulse_n_s", base::significant(calc_length(impulse.impulse_n_s), 6));
+  json.set("duration_s", base::significant(impulse.duration_s, 6));
+  return json;
 }
 
 /// Streams a JSON object with long lists to a sink in pieces; memory does not grow with their lengths. Tracks the open objects and lists;
@@ -376,32 +355,17 @@ void write_trajectory(const scene::Scene& scene, const std::vector<const bank::B
 
 std::string make_report_json(const scene::Scene& scene, const Sound& sound, const scene::Plan& plan, const Figures& f) {
   base::Json json = base::Json::object();
-  json.set("scene", scene.file.string())
-      .set("duration_s", scene.duration_s)
-      .set("sample_rate_hz", sound.rate_hz)
-      .set("samples", sound.frames)
-      .set("channels", sound.channels)
-      .set("instructions", synth::get_name(synth::get_kernels(scene.quality.instructions).isa))
-      .set("bodies", f.bodies)
-      .set("modes", f.modes)
-      .set("contacts", f.tally.contacts)
-      .set("impulses", f.tally.impulses)
-      .set("impulses_played", sound.strikes)
-      .set("impulses_refused", sound.refused + sound.faults)
-      .set("resets", sound.resets)
-      .set("physics_steps", f.physics_steps)
-      .set("physics_s", base::decimals(f.physics_s, 4))
-      .set("physics_cpu_s", base::decimals(f.physics_cpu_s, 5))
-      .set("sound_s", base::decimals(f.sound_s, 4))
-      .set("sound_cpu_s", base::decimals(sound.seconds_cpu, 5))
-      .set("playing_cpu_s", base::decimals(sound.seconds_playing_cpu, 6))
-      .set("real_time_factor", base::decimals(f.real_time_factor, 4))
-      .set("peak_pa", make_figure(sound.peak_pa))
-      .set("mean_db_spl", make_level_json(sound.levels.mean_db))
-      .set("loudest_db_spl", make_level_json(sound.levels.loudest_db))
-      .set("gain_per_pa", make_figure(f.gain.per_pa))
-      .set("gain_reduced", f.gain.reduced)
-      .set("faded_end_s", make_figure(sound.faded_s));
+  json.set("scene", scene.file.string()).set("duration_s", scene.duration_s).set("sample_rate_hz", sound.rate_hz);
+  json.set("samples", sound.frames).set("channels", sound.channels);
+  json.set("instructions", synth::get_name(synth::get_kernels(scene.quality.instructions).isa)).set("bodies", f.bodies);
+  json.set("modes", f.modes).set("contacts", f.tally.contacts).set("impulses", f.tally.impulses).set("impulses_played", sound.strikes);
+  json.set("impulses_refused", sound.refused + sound.faults).set("resets", sound.resets).set("physics_steps", f.physics_steps);
+  json.set("physics_s", base::decimals(f.physics_s, 4)).set("physics_cpu_s", base::decimals(f.physics_cpu_s, 5));
+  json.set("sound_s", base::decimals(f.sound_s, 4)).set("sound_cpu_s", base::decimals(sound.seconds_cpu, 5));
+  json.set("playing_cpu_s", base::decimals(sound.seconds_playing_cpu, 6)).set("real_time_factor", base::decimals(f.real_time_factor, 4));
+  json.set("peak_pa", make_figure(sound.peak_pa)).set("mean_db_spl", make_level_json(sound.levels.mean_db));
+  json.set("loudest_db_spl", make_level_json(sound.levels.loudest_db)).set("gain_per_pa", make_figure(f.gain.per_pa));
+  json.set("gain_reduced", f.gain.reduced).set("faded_end_s", make_figure(sound.faded_s));
   if (f.audit) json.set("energy", make_audit_json(*f.audit));
   if (f.audit) json.set("depth_and_hits", make_contacts_json(scene, f.contacts));
   for (const scene::Blow& blow : f.blows) json["mallets"].add(make_blow_json(blow));

@@ -7,7 +7,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <list>
 #include <map>
@@ -108,23 +107,15 @@ std::string describe_surface(const scene::Scene& scene, const scene::SceneSurfac
 base::Json make_surface_json(const scene::Scene& scene, const scene::SceneSurface& surface, const SurfaceFigures& figures) {
   const SurfacePlan plan = make_surface_plan(scene, surface);
   const recording::Header& header = surface.recording->get_header();
-  return base::Json::object()
-      .set("name", surface.name)
-      .set("recording", surface.file.string())
-      .set("triangles", static_cast<std::int64_t>(header.triangles))
-      .set("bodies", static_cast<std::int64_t>(header.bodies))
-      .set("recorded_s", base::significant(surface.recording->get_duration_s(), 9))
-      .set("recorded_hz", header.sample_rate_hz)
-      .set("start_s", base::significant(calc_start_s(surface, scene.sample_rate_hz), 9))
-      .set("sounding_s", base::significant(plan.sounding_s, 9))
-      .set("receivers", plan.receivers)
-      .set("head", plan.has_head)
-      .set("ground_reflection", plan.is_reflected)
-      .set("resampled", plan.is_resampled)
-      .set("why", describe_surface(scene, surface))
-      .set("planned_cpu_s", base::significant(plan.cost_s, 4))
-      .set("cpu_s", base::significant(figures.seconds_cpu, 4))
-      .set("peak_pa", base::finite_or_null(figures.peak_pa, base::significant, 6));
+  base::Json json = base::Json::object();
+  json.set("name", surface.name).set("recording", surface.file.string()).set("triangles", static_cast<std::int64_t>(header.triangles));
+  json.set("bodies", static_cast<std::int64_t>(header.bodies)).set("recorded_s", base::significant(surface.recording->get_duration_s(), 9));
+  json.set("recorded_hz", header.sample_rate_hz).set("start_s", base::significant(calc_start_s(surface, scene.sample_rate_hz), 9));
+  json.set("sounding_s", base::significant(plan.sounding_s, 9)).set("receivers", plan.receivers).set("head", plan.has_head);
+  json.set("ground_reflection", plan.is_reflected).set("resampled", plan.is_resampled).set("why", describe_surface(scene, surface));
+  json.set("planned_cpu_s", base::significant(plan.cost_s, 4)).set("cpu_s", base::significant(figures.seconds_cpu, 4));
+  json.set("peak_pa", base::finite_or_null(figures.peak_pa, base::significant, 6));
+  return json;
 }
 
 /// Playback of one recorded surface at all receivers. Invariant: pieces come in order; finished passes free their memory.

@@ -1,7 +1,6 @@
 // Playback of the recorded surfaces of a scene.
 #pragma once
 
-#include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>

@@ -1,7 +1,6 @@
 #include "runtime/scene/event_scheduler.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include "runtime/synth/pulse.hpp"

@@ -1,7 +1,6 @@
 // Due times of events, and the queue of events not yet pushed to a synthesiser. Used offline and live.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <map>

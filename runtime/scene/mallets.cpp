@@ -8,9 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <span>
-#include <stdexcept>
 #include <utility>
 
 #include "runtime/base/error.hpp"

@@ -1,9 +1,7 @@
 // Interpolation of poses.
 #pragma once
 
-#include <cstddef>
 #include <span>
-#include <vector>
 
 #include "runtime/physics/events.hpp"
 

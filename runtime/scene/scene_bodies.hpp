@@ -1,4 +1,4 @@
-// Bodies of a scene file, modal and recorded, with their effects and supports.
+// Parts of a scene file: bodies, modal and recorded, with their effects and supports; strikes; values of keys and their ranges.
 #pragma once
 
 #include <cstddef>
@@ -8,9 +8,29 @@
 #include <string_view>
 
 #include "runtime/base/document.hpp"
+#include "runtime/base/ranges.hpp"
+#include "runtime/base/vector.hpp"
+#include "runtime/material/material.hpp"
 #include "runtime/scene/scene.hpp"
 
 namespace carillon::scene {
+
+inline constexpr double kLongestS = 3600.0;
+inline constexpr double kFarthestM = 1e4;     // of positions; half a minute at the speed of sound
+inline constexpr double kMaxSpeedMs = 300.0;  // below the speed of sound in air
+inline constexpr double kRoughestM = 1e-3;    // larger heights belong to the shape
+inline constexpr double kSoftestPa = 100.0;   // a jelly
+inline constexpr double kStiffestPa = 1e13;   // ten times diamond
+
+using base::read_vector;
+using base::read_within;
+
+/// Three required numbers of magnitude at most `limit`.
+Vec3 read_required_vector(base::Object& object, std::string_view key, double limit = kFarthestM);
+/// A direction, of length 1.
+Vec3 read_direction(base::Object& object, std::string_view key);
+/// Reads elastic constants from the key "material"; nullptr without the key.
+const material::Material* read_material(base::Object& object, double& young_modulus_pa, double& poisson_ratio);
 
 inline constexpr std::size_t kMaxBodies = 1000;
 inline constexpr std::size_t kNotModal = std::numeric_limits<std::size_t>::max();
@@ -24,5 +44,13 @@ void describe_body_keys(std::vector<base::KeyTable>& tables);
 
 /// Index of the modal body named by a key.
 std::size_t find_body(base::Object& object, const Names& bodies, std::string_view key = "body");
+
+inline constexpr std::size_t kMaxStrikes = 100000;
+
+/// Reads the key "strikes" of a scene whose duration is known. Throws InputError "file:line: ...".
+void parse_strikes(base::Object& root, const Names& names, Scene& scene);
+
+/// Appends the tables "strike" and "mallet" of the reference.
+void describe_strike_keys(std::vector<base::KeyTable>& tables);
 
 }  // namespace carillon::scene

@@ -1,5 +1,3 @@
-#include "runtime/scene/scene_strikes.hpp"
-
 #include <fmt/format.h>
 
 #include <cmath>
@@ -11,7 +9,7 @@
 
 #include "runtime/material/mallets.hpp"
 #include "runtime/material/table.hpp"
-#include "runtime/scene/scene_values.hpp"
+#include "runtime/scene/scene_bodies.hpp"
 
 namespace carillon::scene {
 

@@ -10,7 +10,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include "runtime/bank/bank.hpp"
 #include "runtime/base/error.hpp"

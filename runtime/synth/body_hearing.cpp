@@ -1,7 +1,6 @@
 // Sound of one body at the ears: microphones, mirrored ears and heads.
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <span>
 
 #include "runtime/synth/smooth_step.hpp"

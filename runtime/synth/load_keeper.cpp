@@ -4,7 +4,6 @@
 #include "runtime/synth/load_keeper.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 namespace carillon::synth {

@@ -4,8 +4,6 @@
 //   keeper.keep(synthesiser, 0.3, busy_s);  // ten times a second, outside the audio thread; the host measures busy_s around process()
 #pragma once
 
-#include <cstdint>
-
 #include "runtime/synth/synthesiser.hpp"
 
 namespace carillon::synth {

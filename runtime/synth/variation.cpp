@@ -5,7 +5,6 @@
 #include "runtime/synth/variation.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "runtime/base/chance.hpp"

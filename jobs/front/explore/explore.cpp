@@ -8,21 +8,218 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
 
-#include "jobs/front/explore/banks.hpp"
 #include "jobs/front/explore/files.hpp"
-#include "jobs/front/explore/scenes.hpp"
+#include "jobs/front/explore/names.hpp"
 #include "jobs/front/report/record.hpp"
 #include "jobs/store/process/programs.hpp"
+#include "runtime/bank/bank.hpp"
+#include "runtime/bank/blows.hpp"
+#include "runtime/bank/pack.hpp"
+#include "runtime/bank/surface.hpp"
+#include "runtime/bank/write.hpp"
 #include "runtime/base/command.hpp"
 #include "runtime/base/file.hpp"
+#include "runtime/base/json.hpp"
+#include "runtime/base/vector.hpp"
 #include "runtime/base/version.hpp"
+#include "runtime/material/table.hpp"
 #include "runtime/scene/job_keys.hpp"
 
 namespace carillon::explore {
 namespace {
 
 namespace fs = std::filesystem;
+
+struct BankFacts {
+  PageBank kept;
+  Vec3 low_m{}, high_m{};        // bounding box of the surface, in the frame of the mesh
+  std::string material, group;   // nearest row of the material table, and its group
+  Vec3 loudest_m{};              // vertex with the loudest response
+  std::array<int, 2> loudest{};  // the same vertex as triangle and corner
+};
+
+/// Puts banks into a folder, each once. Large ones are packed without renumbering triangles, which recorded contacts refer to.
+class PageBanks {
+ public:
+  /// `keeps_all`: copies all banks unchanged.
+  PageBanks(std::filesystem::path folder, bool keeps_all) : folder_(std::move(folder)), keeps_all_(keeps_all) {}
+
+  /// InputError for invalid banks and banks without modes.
+  const BankFacts& add(const std::filesystem::path& file);
+  /// In the order of add().
+  std::vector<PageBank> list() const;
+
+ private:
+  std::filesystem::path folder_;
+  bool keeps_all_;
+  std::map<std::filesystem::path, BankFacts> facts_;
+  std::vector<const BankFacts*> order_;
+};
+
+constexpr std::uintmax_t kSmallBytes = 4'000'000;  // not packed below
+constexpr double kPackErrorDb = -60.0;             // for larger ones
+
+const material::Row* find_nearest(const material::MaterialTable& table, const bank::Material& material) {
+  const material::Row* nearest = nullptr;
+  double least = std::numeric_limits<double>::infinity();
+  for (const material::Row& row : table.rows()) {
+    const double off = std::abs(std::log(row.material.young_modulus_pa / material.young_modulus_pa)) +
+                       2.0 * std::abs(std::log(row.material.density_kg_m3 / material.density_kg_m3));
+    if (off < least) least = off, nearest = &row;
+  }
+  return nearest;
+}
+
+/// The material for the look of the body: that of the job, else one in the file name ("shelf_wood"), else the table row with the nearest
+/// stiffness and density.
+void find_material(const bank::Bank& bank, const fs::path& file, BankFacts& facts) {
+  const material::MaterialTable& table = material::MaterialTable::get();
+  const base::Json job = report::parse_json(bank.provenance);
+  const base::Json& given = job["material"];
+  const material::Row* row = nullptr;
+  if (given.is_string()) row = table.find(given.as_string());
+  if (given.is_object() && given["name"].is_string()) row = table.find(given["name"].as_string());
+  std::string word;
+  for (const char c : file.stem().string() + " ") {
+    if (std::isalpha(static_cast<unsigned char>(c)) != 0) {
+      word += c;
+      continue;
+    }
+    if (row == nullptr && !word.empty()) row = table.find(word);
+    for (const material::Row& one : table.rows())
+      if (row == nullptr && one.group == word) facts.group = word;
+    word.clear();
+  }
+  if (row == nullptr && facts.group.empty()) row = find_nearest(table, bank.material);
+  if (row == nullptr) return;
+  facts.material = row->material.name;
+  facts.group = row->group;
+}
+
+void find_place(const bank::Bank& bank, BankFacts& facts) {
+  const auto [low, high] = bank::find_extent(bank.vertices_m);
+  facts.low_m = low;
+  facts.high_m = high;
+  const std::size_t vertex = bank::find_strikes(bank, 1).front();
+  facts.loudest_m = bank.vertices_m[vertex];
+  for (std::size_t t = 0; t < bank.triangles.size(); ++t)
+    for (int corner = 0; corner < 3; ++corner)
+      if (static_cast<std::size_t>(bank.triangles[t][corner]) == vertex) {
+        facts.loudest = {static_cast<int>(t), corner};
+        return;
+      }
+}
+
+const BankFacts& PageBanks::add(const fs::path& file) {
+  const fs::path whole = fs::weakly_canonical(file);
+  if (const auto found = facts_.find(whole); found != facts_.end()) return found->second;
+  const bank::Bank bank = bank::read_bank(file);
+  if (bank.mode_count() == 0) throw InputError(fmt::format("{}: the bank has no modes, so it has no sound", file.string()));
+  BankFacts facts;
+  find_material(bank, file, facts);
+  find_place(bank, facts);
+  facts.kept.full_bytes = fs::file_size(file);
+  std::set<std::string> taken;
+  for (const BankFacts* other : order_) taken.insert(other->kept.name);
+  const std::string stem = make_name(file.stem().string());
+  facts.kept.name = stem + ".hdf";
+  for (int k = 2; taken.contains(facts.kept.name); ++k) facts.kept.name = fmt::format("{}-{}.hdf", stem, k);
+  const fs::path target = folder_ / facts.kept.name;
+  if (keeps_all_ || bank.packing || facts.kept.full_bytes <= kSmallBytes) {
+    put_file(file, target);
+  } else {
+    const bank::PackedBank packed = bank::calc_packed(bank, kPackErrorDb, true);
+    bank::write_packed_bank(packed, target);
+    facts.kept.change = "packed, " + bank::describe(*packed.bank.packing);
+  }
+  facts.kept.bytes = fs::file_size(target);
+  const BankFacts& kept = facts_.emplace(whole, std::move(facts)).first->second;
+  order_.push_back(&kept);
+  return kept;
+}
+
+std::vector<PageBank> PageBanks::list() const {
+  std::vector<PageBank> banks;
+  for (const BankFacts* facts : order_) banks.push_back(facts->kept);
+  return banks;
+}
+
+constexpr double kGap = 0.25;      // gap between neighbours / mean width
+constexpr double kView = 1.6;      // distance of the listener / diagonal of the row
+constexpr double kNearestM = 0.3;  // minimum distance of the listener
+constexpr double kStrikeS = 0.15;  // interval between blows of the probe
+constexpr const char* kMallet = "hard-wood";
+
+base::Json to_json(const Vec3& v) {
+  base::Json list = base::Json::array();
+  for (const double x : v) list.append(x);
+  return list;
+}
+
+/// Bounding box of the surface in world axes, relative to the origin of the mesh.
+struct Box {
+  Vec3 low, high;
+};
+Box find_box(const BankFacts& facts, Up up) {
+  const Vec3 &low = facts.low_m, &high = facts.high_m;
+  if (up == Up::kZ) return {low, high};
+  return {{low[0], -high[2], low[1]}, {high[0], -low[2], high[1]}};  // rotation by 90 degrees about x
+}
+
+/// Bodies in a row along x on the ground, and a listener in front of them. `names` and `facts`: one entry per body.
+base::Json make_row(const std::vector<std::filesystem::path>& files, const std::vector<const BankFacts*>& facts, Up up) {
+  base::Json scene = base::Json::object();
+  scene["duration_s"] = 1.0;
+  std::set<std::string> taken;
+  double x = 0.0, height = 0.0, depth = 0.0, last = 0.0;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    const Box box = find_box(*facts[i], up);
+    const double width = box.high[0] - box.low[0];
+    if (i > 0) x += kGap * 0.5 * (width + last);
+    base::Json body = base::Json::object();
+    const std::string stem = cut_name(files[i].stem().string());
+    std::string name = stem;
+    for (int k = 2; !taken.insert(name).second; ++k) name = fmt::format("{} {}", stem, k);
+    body.set("name", name).set("bank", files[i].string()).set("fixed", true);
+    body.set("position_m", to_json({x - box.low[0], -0.5 * (box.low[1] + box.high[1]), -box.low[2]}));
+    if (up == Up::kY) body["rotation_deg"] = to_json({90.0, 0.0, 0.0});
+    scene["bodies"].append(body);
+    x += width;
+    last = width;
+    height = std::max(height, box.high[2] - box.low[2]);
+    depth = std::max(depth, box.high[1] - box.low[1]);
+  }
+  const double away = std::max(kNearestM, kView * std::hypot(x, height, depth));
+  scene["listener"]["position_m"] = to_json({0.5 * x, -0.94 * away, 0.5 * height + 0.34 * away});
+  scene["listener"]["look_at_m"] = to_json({0.5 * x, 0.0, 0.5 * height});
+  return scene;
+}
+
+/// The scene with all bodies fixed and, instead of its events, one blow on each at its loudest point. `files`: banks of its bodies.
+base::Json make_probe(base::Json scene, const std::vector<std::filesystem::path>& files, const std::vector<const BankFacts*>& facts) {
+  for (const char* happening : {"strikes", "joints", "cords", "gravity_m_s2", "variation"}) scene.erase(happening);
+  double time_s = 0.05;
+  for (std::size_t i = 0; i < scene["bodies"].size(); ++i) {
+    base::Json& body = scene["bodies"][i];
+    body.set("fixed", true).set("bank", files[i].string());
+    for (const char* motion : {"velocity_m_s", "angular_velocity_rad_s"}) body.erase(motion);
+    base::Json strike = base::Json::object();
+    strike.set("time_s", time_s).set("body", body["name"]).set("point_m", to_json(facts[i]->loudest_m)).set("mallet", kMallet);
+    scene["strikes"].append(strike);
+    time_s += kStrikeS;
+  }
+  scene["duration_s"] = time_s;
+  return scene;
+}
 
 constexpr int kVersion = 1;  // of explore.json
 constexpr std::uint64_t kMaxSceneBytes = 16 << 20, kMaxTrajectoryBytes = std::uint64_t{1} << 30;
@@ -225,24 +422,17 @@ class Work {
 
   void write(double gain) {
     base::Json about = base::Json::object();
-    about["carillon_explore"] = kVersion;
-    about["made_by"] = base::describe("carillon");
-    about["title"] = find_title(order_);
-    about["scene"] = kSceneFile;
-    about["contacts"] = done_.has_recording ? base::Json(kPackedContactsFile) : base::Json();
-    about["duration_s"] = done_.duration_s;
-    about["gain_per_pa"] = gain;
+    about.set("carillon_explore", kVersion).set("made_by", base::describe("carillon")).set("title", find_title(order_));
+    about.set("scene", kSceneFile).set("contacts", done_.has_recording ? base::Json(kPackedContactsFile) : base::Json());
+    about.set("duration_s", done_.duration_s).set("gain_per_pa", gain);
     for (std::size_t i = 0; i < scene_["bodies"].size(); ++i) {
       const BankFacts& facts = *facts_[i];
       scene_["bodies"][i]["bank"] = fmt::format("{}/{}", kBankFolder, facts.kept.name);
       base::Json body = base::Json::object();
-      body["bank_bytes"] = facts.kept.bytes;
-      body["full_bytes"] = facts.kept.full_bytes;
-      body["change"] = facts.kept.change.empty() ? base::Json() : base::Json(facts.kept.change);
-      body["material"] = facts.material;
-      body["group"] = facts.group;
-      body["loudest"]["triangle"] = facts.loudest[0];
-      body["loudest"]["corner"] = facts.loudest[1];
+      body.set("bank_bytes", facts.kept.bytes).set("full_bytes", facts.kept.full_bytes);
+      body.set("change", facts.kept.change.empty() ? base::Json() : base::Json(facts.kept.change)).set("material", facts.material);
+      body.set("group", facts.group);
+      body["loudest"].set("triangle", facts.loudest[0]).set("corner", facts.loudest[1]);
       if (done_.has_recording) body["effects"] = report_["per_body"][i]["effects"];
       about["bodies"].append(body);
     }

@@ -5,7 +5,6 @@
 
 #include <cctype>
 #include <cerrno>
-#include <cstring>
 #include <system_error>
 
 #include "jobs/front/explore/names.hpp"

@@ -89,12 +89,9 @@ base::Json make_modes(const bank::Bank& bank, const std::vector<bank::HeardMode>
   }
   for (const bank::ModeKind& kind : bank::find_kinds(bank, std::min(kMaxNamedModes, bank.mode_count())))
     modes["kind"].add(bank::describe(kind));
-  modes["bound_cents"] = make_list(bank.algebraic_error_cents);
-  modes["body_cents"] = make_list(bank.discretisation_error_cents);
-  modes["corrected_cents"] = make_list(bank.corrected.error_cents);
-  modes["facet_cents"] = make_list(bank.facet_error_cents);
-  modes["residual"] = make_list(bank.residual);
-  modes["gain"] = make_list(bank.radiation_gain);
+  modes.set("bound_cents", make_list(bank.algebraic_error_cents)).set("body_cents", make_list(bank.discretisation_error_cents));
+  modes.set("corrected_cents", make_list(bank.corrected.error_cents)).set("facet_cents", make_list(bank.facet_error_cents));
+  modes.set("residual", make_list(bank.residual)).set("gain", make_list(bank.radiation_gain));
   return modes;
 }
 
@@ -107,11 +104,8 @@ base::Json make_proof(const bank::Proof& proof) {
     json["below"].add(proof.below[i]);
     json["margin"].add(to_json(proof.margin[i]));
   }
-  json["orthonormality"] = to_json(proof.orthonormality);
-  json["backward_error"] = to_json(proof.backward_error);
-  json["rigid"] = make_list(proof.rigid_per_component);
-  json["clusters"] = proof.cluster_first.size();
-  json["method"] = proof.method;
+  json.set("orthonormality", to_json(proof.orthonormality)).set("backward_error", to_json(proof.backward_error));
+  json.set("rigid", make_list(proof.rigid_per_component)).set("clusters", proof.cluster_first.size()).set("method", proof.method);
   return json;
 }
 
@@ -144,11 +138,8 @@ base::Json make_surface(const bank::Bank& bank) {
   }
   base::Json json;
   if (count == 0) return json;
-  json["shortest_m"] = shortest_m;
-  json["longest_m"] = longest_m;
-  json["mean_m"] = sum_m / static_cast<double>(count);
-  json["smallest_deg"] = smallest_deg;
-  json["triangles"] = make_list(triangles);
+  json.set("shortest_m", shortest_m).set("longest_m", longest_m).set("mean_m", sum_m / static_cast<double>(count));
+  json.set("smallest_deg", smallest_deg).set("triangles", make_list(triangles));
   return json;
 }
 
@@ -177,9 +168,7 @@ base::Json make_checks(const std::vector<bank::Check>& checks) {
   base::Json list = base::Json::array();
   for (const bank::Check& check : checks) {
     base::Json& json = list.append();
-    json["property"] = check.property;
-    json["figure"] = check.figure;
-    json["faults"] = base::Json::array();
+    json.set("property", check.property).set("figure", check.figure).set("faults", base::Json::array());
     for (std::size_t i = 0; i < std::min(check.faults.size(), kMaxFaults); ++i) json["faults"].add(check.faults[i]);
   }
   return list;
@@ -195,28 +184,15 @@ base::Json make_figures(const fs::path& file, std::string& provenance) {
   const std::uintmax_t bytes = fs::file_size(file, error);
   provenance = bank.provenance;
   base::Json json;
-  json["file"] = file.filename().string();
-  json["bytes"] = error ? 0.0 : static_cast<double>(bytes);
-  json["version"] = make_list(bank::read_version(file));
-  json["element"] = bank.element;
-  json["mass"] = bank.mass;
-  json["origin"] = bank::name_origin(bank);
-  json["band_hz"] = make_list(bank.band_hz);
-  json["complete"] = bank.complete;
-  json["completeness"] = is_sound && bank.proof ? base::Json(bank::describe_completeness(bank)) : base::Json();
-  json["accuracy"] = is_sound ? describe_bars(bank) : std::string();
-  json["nodes"] = bank.counts.nodes;
-  json["tets"] = bank.counts.tets;
-  json["components"] = bank.counts.components;
-  json["triangles"] = bank.triangles.size();
-  json["vertices"] = bank.vertex_count();
-  json["mass_kg"] = to_json(bank.rigid.mass_kg);
-  json["volume_m3"] = to_json(bank.rigid.volume_m3);
-  json["modes"] = make_modes(bank, find_heard(bank, is_sound));
-  json["proof"] = bank.proof ? make_proof(*bank.proof) : base::Json();
-  json["surface"] = make_surface(bank);
-  json["parts"] = make_parts(bank, json["bytes"].as_double());
-  json["checks"] = make_checks(checks);
+  json.set("file", file.filename().string()).set("bytes", error ? 0.0 : static_cast<double>(bytes));
+  json.set("version", make_list(bank::read_version(file))).set("element", bank.element).set("mass", bank.mass);
+  json.set("origin", bank::name_origin(bank)).set("band_hz", make_list(bank.band_hz)).set("complete", bank.complete);
+  json.set("completeness", is_sound && bank.proof ? base::Json(bank::describe_completeness(bank)) : base::Json());
+  json.set("accuracy", is_sound ? describe_bars(bank) : std::string()).set("nodes", bank.counts.nodes).set("tets", bank.counts.tets);
+  json.set("components", bank.counts.components).set("triangles", bank.triangles.size()).set("vertices", bank.vertex_count());
+  json.set("mass_kg", to_json(bank.rigid.mass_kg)).set("volume_m3", to_json(bank.rigid.volume_m3));
+  json.set("modes", make_modes(bank, find_heard(bank, is_sound))).set("proof", bank.proof ? make_proof(*bank.proof) : base::Json());
+  json.set("surface", make_surface(bank)).set("parts", make_parts(bank, json["bytes"].as_double())).set("checks", make_checks(checks));
   return json;
 }
 

@@ -4,7 +4,6 @@
 #include <fmt/core.h>
 
 #include <csignal>
-#include <cstring>
 
 #include "jobs/store/outcome/policy.hpp"
 #include "runtime/base/error.hpp"

@@ -1,7 +1,6 @@
 // Runs programs of this installation; their errors become exceptions.
 #pragma once
 
-#include <filesystem>
 #include <string>
 #include <vector>
 

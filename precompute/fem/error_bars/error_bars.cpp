@@ -160,18 +160,6 @@ bool is_curved(const comm::Communicator& comm, const mesh::LocalMesh& local) {
 
 }  // namespace
 
-Solid make_isotropic(double young_modulus_pa, double poisson_ratio, double density_kg_m3) {
-  const double lambda = young_modulus_pa * poisson_ratio / ((1 + poisson_ratio) * (1 - 2 * poisson_ratio));
-  const double mu = young_modulus_pa / (2 * (1 + poisson_ratio));
-  Solid solid;
-  solid.density_kg_m3 = density_kg_m3;
-  for (int r = 0; r < 3; ++r) {
-    for (int c = 0; c < 3; ++c) solid.elasticity_pa[6 * r + c] = lambda + (r == c ? 2 * mu : 0.0);
-    solid.elasticity_pa[7 * (3 + r)] = mu;
-  }
-  return solid;
-}
-
 ErrorBars calc_error_bars(const comm::Communicator& comm, const mesh::LocalMesh& local, Mat stiffness, Mat mass,
                           std::span<const Solid> solids, std::span<const std::int32_t> material_of_tet, job::Mass mass_kind,
                           const Solution& solution) {

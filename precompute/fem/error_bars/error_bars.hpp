@@ -58,7 +58,4 @@ ErrorBars calc_error_bars(const comm::Communicator& comm, const mesh::LocalMesh&
                           std::span<const Solid> solids, std::span<const std::int32_t> material_of_tet, job::Mass mass_kind,
                           const Solution& solution);
 
-/// The elasticity of an isotropic solid.
-Solid make_isotropic(double young_modulus_pa, double poisson_ratio, double density_kg_m3);
-
 }  // namespace carillon::error_bars

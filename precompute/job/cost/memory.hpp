@@ -1,8 +1,6 @@
 // Predicted memory of a run.
 #pragma once
 
-#include <cstdint>
-
 #include "precompute/job/cost/problem_size.hpp"
 
 namespace carillon::cost {

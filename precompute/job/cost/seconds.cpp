@@ -41,8 +41,6 @@ double predict_coupling_solves(int modes) {
   return modes <= kModesOfAllPairs ? n * (n + 1) / 2 : kFieldsPerMode * n;
 }
 
-double predict_factorisation_seconds(const ProblemSize& known) { return calc_factorisation(complete(known)); }
-
 PhaseSeconds predict_seconds(const ProblemSize& known) {
   const ProblemSize size = complete(known);
   const bool is_quadratic = size.is_quadratic;

@@ -31,9 +31,6 @@ PhaseSeconds predict_seconds(const ProblemSize& size);
 /// Right-hand sides for the quartic energy of this many coupled modes.
 double predict_coupling_solves(int modes);
 
-/// One factorisation for it.
-double predict_factorisation_seconds(const ProblemSize& size);
-
 /// Wall clock of CPU seconds on `ranks` ranks with a core each: single-rank work stays, the rest is divided.
 PhaseSeconds calc_wall(const PhaseSeconds& cpu, const ProblemSize& size, int ranks);
 

@@ -9,7 +9,6 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <bit>
-#include <cmath>
 
 #include "precompute/comm/places.hpp"
 

@@ -1,11 +1,10 @@
-#include "precompute/mesh/parallel/fixed_nodes.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <limits>
 #include <optional>
 
+#include "precompute/mesh/parallel/read_block.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/base/error.hpp"
 

@@ -11,7 +11,6 @@
 #include <utility>
 
 #include "precompute/comm/exchange.hpp"
-#include "precompute/mesh/parallel/fixed_nodes.hpp"
 #include "precompute/mesh/parallel/source.hpp"
 #include "precompute/mesh/read.hpp"
 #include "runtime/base/error.hpp"

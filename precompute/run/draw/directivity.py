@@ -4,24 +4,8 @@ import math
 import numpy
 
 from far_field import calc_levels, make_equal_areas
-from picture import (
-    LEGEND,
-    VIRIDIS,
-    View,
-    choose_panels,
-    draw,
-    draw_legend,
-    drop_cavities,
-    make_actor,
-    make_colours,
-    make_flat,
-    make_line,
-    make_renderer,
-    make_surface,
-    make_text,
-    to_numpy,
-    to_vtk,
-)
+import picture
+from picture import to_numpy, to_vtk
 
 RANGE_DB = 30.0  # from the centre of a balloon to its largest radius
 BODY_RADIUS = 0.24  # of the sphere around the body, relative to the largest radius of the balloon
@@ -57,8 +41,8 @@ def make_ring(view, radius):
 
 
 def make_polyline(points, colour, width):
-    line = make_line(points, 0.5 * width, colour)
-    return make_flat(line)
+    line = picture.make_line(points, 0.5 * width, colour)
+    return picture.make_flat(line)
 
 
 def make_glass(surface, toward):
@@ -68,10 +52,10 @@ def make_glass(surface, toward):
     facing = numpy.abs(normals @ toward)
     rgba = numpy.empty((len(level), 4))
     for channel in range(3):
-        rgba[:, channel] = numpy.interp(level, numpy.linspace(0, 1, len(VIRIDIS)), VIRIDIS[:, channel])
+        rgba[:, channel] = numpy.interp(level, numpy.linspace(0, 1, len(picture.VIRIDIS)), picture.VIRIDIS[:, channel])
     rgba[:, 3] = 0.46 + 0.50 * (1 - facing) ** 1.5
     surface.GetPointData().SetScalars(to_vtk((255 * rgba).astype(numpy.uint8), deep=True))
-    actor = make_actor(surface)
+    actor = picture.make_actor(surface)
     actor.GetMapper().ScalarVisibilityOn()
     actor.GetMapper().SetColorModeToDirectScalars()
     actor.ForceTranslucentOn()
@@ -79,18 +63,18 @@ def make_glass(surface, toward):
 
 
 def draw_directivity(bank, air, numbers, up):
-    triangles = drop_cavities(bank.vertices, bank.triangles)
+    triangles = picture.drop_cavities(bank.vertices, bank.triangles)
     body = (bank.vertices - air.centre_m) * BODY_RADIUS / air.radius_m
-    view = View(up, body[numpy.unique(triangles)], 28, 20)
-    colours = make_colours()
-    columns, width, height = choose_panels(len(numbers), 1.0)
+    view = picture.View(up, body[numpy.unique(triangles)], 28, 20)
+    colours = picture.make_colours()
+    columns, width, height = picture.choose_panels(len(numbers), 1.0)
     rows = math.ceil(len(numbers) / columns)
-    canvas = numpy.full((rows * height + LEGEND, columns * width, 3), 255.0)
+    canvas = numpy.full((rows * height + picture.LEGEND, columns * width, 3), 255.0)
     for index, number in enumerate(numbers):
         order = int(air.order[number - 1])
         polar, azimuth = make_directions(order)
         levels = calc_levels(air.calc_far(number, polar, azimuth))
-        renderer, above = make_renderer(), make_renderer()
+        renderer, above = picture.make_renderer(), picture.make_renderer()
         renderer.GradientBackgroundOff()
         renderer.SetBackground(1.0, 1.0, 1.0)
         reach = numpy.full(3, 1.06)
@@ -100,18 +84,20 @@ def draw_directivity(bank, air, numbers, up):
         for step in range(3):
             radius = 1 - 10 * step / RANGE_DB
             renderer.AddActor(make_polyline(make_ring(view, radius), (0.72, 0.75, 0.80), 1.6 * pixel))
-        above.AddActor(make_actor(make_surface(body, triangles), (0.96, 0.42, 0.26)))
+        above.AddActor(picture.make_actor(picture.make_surface(body, triangles), (0.96, 0.42, 0.26)))
         spread = "silent"
         if levels is not None:
             spread = f"spread {calc_levels(air.calc_far(number, *make_equal_areas(order))).std():.1f} dB"
             vertices, faces, level = make_balloon(levels, polar, azimuth)
-            above.AddActor(make_glass(make_surface(vertices, faces, level, crease_deg=180.0), view.axes[2]))
+            above.AddActor(make_glass(picture.make_surface(vertices, faces, level, crease_deg=180.0), view.axes[2]))
         above.ResetCameraClippingRange(-2, 2, -2, 2, -2, 2)
-        renderer.AddActor2D(make_text(f"Mode {number}", 0.5, 80 / height, 30, bold=True))
+        renderer.AddActor2D(picture.make_text(f"Mode {number}", 0.5, 80 / height, 30, bold=True))
         label = f"{air.freq_hz[number - 1]:,.1f} Hz, order {order}, {spread}"
-        renderer.AddActor2D(make_text(label, 0.5, 42 / height, min(24, 1.75 * width / len(label))))
+        renderer.AddActor2D(picture.make_text(label, 0.5, 42 / height, min(24, 1.75 * width / len(label))))
         row, column = divmod(index, columns)
-        canvas[row * height : (row + 1) * height, column * width : (column + 1) * width] = draw([renderer, above], width, height)
+        canvas[row * height : (row + 1) * height, column * width : (column + 1) * width] = picture.draw([renderer, above], width, height)
     note = f"{bank.path.name}   ·   far away, about the body in the middle   ·   rings: 0, -10 and -20 dB"
-    canvas[rows * height :] = draw_legend(canvas.shape[1], LEGEND, colours, (f"-{RANGE_DB:.0f} dB", "0 dB, the loudest direction"), note)
+    canvas[rows * height :] = picture.draw_legend(
+        canvas.shape[1], picture.LEGEND, colours, (f"-{RANGE_DB:.0f} dB", "0 dB, the loudest direction"), note
+    )
     return canvas

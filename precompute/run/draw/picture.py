@@ -18,20 +18,7 @@ TEXT = (0.16, 0.17, 0.20)
 BACKGROUND = ((1.0, 1.0, 1.0), (0.90, 0.92, 0.95))  # top, bottom
 # viridis (van der Walt and Smith 2015), nine colours.
 VIRIDIS = (
-    numpy.array(
-        [
-            (68, 1, 84),
-            (71, 44, 122),
-            (59, 82, 139),
-            (44, 113, 142),
-            (33, 145, 140),
-            (39, 173, 129),
-            (92, 200, 99),
-            (170, 220, 50),
-            (253, 231, 37),
-        ]
-    )
-    / 255.0
+    numpy.frombuffer(bytes.fromhex("440154 472c7a 3b528b 2c718e 21918c 27ad81 5cc863 aadc32 fde725"), numpy.uint8).reshape(9, 3) / 255.0
 )
 
 

@@ -3,23 +3,8 @@ import math
 
 import numpy
 
-from picture import (
-    SUPERSAMPLING,
-    View,
-    draw,
-    drop_cavities,
-    make_actor,
-    make_flat,
-    make_lights,
-    make_line,
-    make_renderer,
-    make_surface,
-    make_text,
-    rotate,
-    to_numpy,
-    to_vtk,
-    vtk,
-)
+import picture
+from picture import to_numpy, to_vtk, vtk
 
 MOVING = [(0.85, 0.42, 0.20), (0.20, 0.45, 0.78), (0.55, 0.30, 0.62), (0.25, 0.60, 0.35)]
 FIXED = [(0.55, 0.66, 0.80), (0.72, 0.74, 0.78), (0.80, 0.66, 0.46), (0.62, 0.74, 0.62), (0.76, 0.62, 0.70)]
@@ -30,7 +15,7 @@ def decimate(vertices, triangles, max_triangles):
     if len(triangles) <= max_triangles:
         return vertices, triangles
     clean = vtk.vtkCleanPolyData()  # also removes unused points
-    clean.SetInputData(make_surface(vertices, triangles, crease_deg=180.0))
+    clean.SetInputData(picture.make_surface(vertices, triangles, crease_deg=180.0))
     clean.SetTolerance(0.0)
     thin = vtk.vtkQuadricDecimation()
     thin.SetInputConnection(clean.GetOutputPort())
@@ -70,7 +55,7 @@ def make_ground(centre, radius, up):
     rgba = numpy.column_stack([numpy.tile((202, 207, 214), (len(flat), 1)), 255 * numpy.minimum(fade, 1)]).astype(numpy.uint8)
     rgba[numpy.hypot(flat[:, 0], flat[:, 1]) > 0.999 * radius, 3] = 0
     data.GetPointData().SetScalars(to_vtk(rgba, deep=True))
-    return make_flat(make_actor(data, colours=vtk.vtkLookupTable()))
+    return picture.make_flat(picture.make_actor(data, colours=vtk.vtkLookupTable()))
 
 
 def blend(colour, other, weight):
@@ -95,8 +80,8 @@ def add_legend(renderer, entries, width, height):
             if colour:
                 dot = vtk.vtkRegularPolygonSource()
                 dot.SetNumberOfSides(32)
-                dot.SetRadius(9 * SUPERSAMPLING)
-                dot.SetCenter((x + 12) * SUPERSAMPLING, y * SUPERSAMPLING, 0)
+                dot.SetRadius(9 * picture.SUPERSAMPLING)
+                dot.SetCenter((x + 12) * picture.SUPERSAMPLING, y * picture.SUPERSAMPLING, 0)
                 mapper = vtk.vtkPolyDataMapper2D()
                 mapper.SetInputConnection(dot.GetOutputPort())
                 actor = vtk.vtkActor2D()
@@ -105,7 +90,7 @@ def add_legend(renderer, entries, width, height):
                 renderer.AddActor2D(actor)
                 x += 34
                 need -= 34
-            renderer.AddActor2D(make_text(text, x / width, y / height, size, centred=False))
+            renderer.AddActor2D(picture.make_text(text, x / width, y / height, size, centred=False))
             x += need
     return len(rows)
 
@@ -157,7 +142,7 @@ def add_impulses(overlay, impulses, size, legend):
         dot.Update()
         dots.AddInputData(dot.GetOutput())
     dots.Update()
-    overlay.AddActor(make_actor(dots.GetOutput(), (0.80, 0.10, 0.16), opacity=0.85))
+    overlay.AddActor(picture.make_actor(dots.GetOutput(), (0.80, 0.10, 0.16), opacity=0.85))
     legend.append((f"contacts, largest {largest:.2g} N s", (0.80, 0.10, 0.16), True))
 
 
@@ -169,31 +154,31 @@ def add_moving_body(renderer, overlay, body, colour, size):
     for order, index in enumerate(chosen):
         last = order == len(chosen) - 1
         pale = 0.55 * (1 - order / max(1, len(chosen) - 1))
-        surface = make_surface(rotate(poses[index][4:], vertices) + poses[index][1:4], thin)
-        renderer.AddActor(make_actor(surface, blend(colour, (1, 1, 1), pale), opacity=1.0 if last else 0.42))
+        surface = picture.make_surface(picture.rotate(poses[index][4:], vertices) + poses[index][1:4], thin)
+        renderer.AddActor(picture.make_actor(surface, blend(colour, (1, 1, 1), pale), opacity=1.0 if last else 0.42))
     if len(centres) > 1 and numpy.ptp(centres, axis=0).max() > 0.02 * size:
         step = max(1, len(centres) // 2000)
-        overlay.AddActor(make_line(centres[::step], 0.0018 * size, (0.95, 0.75, 0.10), 0.9))
+        overlay.AddActor(picture.make_line(centres[::step], 0.0018 * size, (0.95, 0.75, 0.10), 0.9))
 
 
 def draw_scene(scene):
     bodies, moving_points, fixed_points = [], [], []
     for name, bank, fixed, poses in scene.bodies:
-        triangles = drop_cavities(bank.vertices, bank.triangles)
+        triangles = picture.drop_cavities(bank.vertices, bank.triangles)
         used = bank.vertices[numpy.unique(triangles)]
         radius = numpy.linalg.norm(used - bank.centre, axis=1).max()
-        centres = numpy.array([rotate(p[4:], bank.centre[None])[0] + p[1:4] for p in poses])
+        centres = numpy.array([picture.rotate(p[4:], bank.centre[None])[0] + p[1:4] for p in poses])
         bodies.append((name, bank, fixed, poses, triangles, radius, centres))
         if fixed:
-            fixed_points.append(rotate(poses[0][4:], used) + poses[0][1:4])
+            fixed_points.append(picture.rotate(poses[0][4:], used) + poses[0][1:4])
         else:
             moving_points += [centres - radius, centres + radius]
     points = find_frame(scene, moving_points, fixed_points)
     size = numpy.linalg.norm(points.max(axis=0) - points.min(axis=0))
-    renderer, overlay = make_renderer(), vtk.vtkRenderer()
-    make_lights(overlay)
+    renderer, overlay = picture.make_renderer(), vtk.vtkRenderer()
+    picture.make_lights(overlay)
     camera = renderer.GetActiveCamera()
-    width, height, slope = aim_camera(camera, View(scene.up, points, 24, 13), points)
+    width, height, slope = aim_camera(camera, picture.View(scene.up, points, 24, 13), points)
     overlay.SetActiveCamera(camera)
     if scene.ground is not None:
         centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
@@ -205,7 +190,9 @@ def draw_scene(scene):
         if fixed:
             colour = FIXED[len([entry for entry in legend if entry[2]]) % len(FIXED)]
             legend.append((name, colour, True))
-            renderer.AddActor(make_actor(make_surface(rotate(poses[0][4:], bank.vertices) + poses[0][1:4], triangles), colour))
+            renderer.AddActor(
+                picture.make_actor(picture.make_surface(picture.rotate(poses[0][4:], bank.vertices) + poses[0][1:4], triangles), colour)
+            )
             continue
         colour = MOVING[moving % len(MOVING)]
         moving += 1
@@ -223,4 +210,4 @@ def draw_scene(scene):
     camera.SetViewAngle(2 * math.degrees(math.atan(slope / (1 - band))))
     camera.SetWindowCenter(0.0, -band)
     renderer.ResetCameraClippingRange()
-    return draw([renderer, overlay], width, height)
+    return picture.draw([renderer, overlay], width, height)

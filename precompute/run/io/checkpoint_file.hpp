@@ -1,7 +1,6 @@
 // Checkpoint file of a solve.
 #pragma once
 
-#include <array>
 #include <chrono>
 #include <cstdint>
 #include <filesystem>

@@ -3,10 +3,8 @@
 
 #include <mpi.h>
 
-#include <array>
 #include <cstdint>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "precompute/comm/communicator.hpp"

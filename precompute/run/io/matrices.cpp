@@ -99,8 +99,7 @@ void visit_row(Mat matrix, PetscInt row, const std::vector<std::int32_t>& places
 
 void write_matrix(const comm::Communicator& comm, const fs::path& file, const std::string& what, Mat matrix,
                   const std::vector<std::int32_t>& places) {
-  PetscInt first = 0;
-  PetscInt last = 0;
+  PetscInt first = 0, last = 0;
   check(MatGetOwnershipRange(matrix, &first, &last));
   std::int64_t entries = 0;
   for (PetscInt row = first; row < last; ++row) visit_row(matrix, row, places, [&](std::int64_t, std::int64_t, double) { ++entries; });

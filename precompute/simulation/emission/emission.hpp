@@ -6,14 +6,12 @@
 //   const std::vector<double> pressure_pa = sound.calc_sound(receiver);
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "precompute/comm/communicator.hpp"

@@ -1,7 +1,6 @@
 // Sounding triangles of this rank, and their global indices. Internal to carillon::emission.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>

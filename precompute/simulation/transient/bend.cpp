@@ -11,7 +11,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <optional>
 
 #include "precompute/simulation/transient/vectors.hpp"
 #include "runtime/base/chance.hpp"

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "precompute/comm/communicator.hpp"
-#include "precompute/simulation/transient/clearance.hpp"
 #include "precompute/simulation/transient/domain.hpp"
 #include "precompute/simulation/transient/motion.hpp"
 #include "precompute/simulation/transient/order_free_sum.hpp"

@@ -2,7 +2,6 @@
 #include "precompute/simulation/transient/sheets.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "precompute/simulation/transient/vectors.hpp"
 #include "runtime/base/instructions.hpp"

@@ -3,7 +3,6 @@
 #include "precompute/simulation/transient/solids.hpp"
 
 #include <algorithm>
-#include <cstring>
 
 #include "runtime/base/instructions.hpp"
 

@@ -1,4 +1,4 @@
-// Contact surfaces of bodies, with their penalty stiffness.
+// Contact surfaces of bodies, with their penalty stiffness; clearance of points from rigid obstacles.
 #pragma once
 
 #include <array>
@@ -6,9 +6,20 @@
 #include <span>
 #include <vector>
 
+#include "precompute/job/obstacles.hpp"
 #include "runtime/base/vector.hpp"
 
 namespace carillon::transient {
+
+using job::RigidObstacle;
+
+/// Of a point: signed distance [m], positive outside, and unit normal towards the free side.
+struct Clearance {
+  double distance_m = 0;
+  Vec3 normal{};
+};
+
+Clearance find_clearance(const RigidObstacle& obstacle, const Vec3& p);
 
 /// A node of a contact surface.
 struct TouchNode {

@@ -4,7 +4,6 @@
 #include "runtime/acoustics/head/ear_filter.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
 #include <utility>
 

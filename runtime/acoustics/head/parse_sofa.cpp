@@ -19,7 +19,6 @@
 #include <cstdio>
 #include <exception>
 #include <initializer_list>
-#include <memory>
 #include <span>
 #include <string_view>
 

@@ -4,10 +4,8 @@
 #include <fmt/format.h>
 
 #include <charconv>
-#include <cmath>
 #include <map>
 #include <optional>
-#include <vector>
 
 #include "runtime/base/error.hpp"
 

@@ -1,7 +1,5 @@
 #include "runtime/bank/mounting/heard.hpp"
 
-#include <utility>
-
 #include "runtime/bank/corrected.hpp"
 
 namespace carillon::mounting {

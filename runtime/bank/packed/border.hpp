@@ -1,7 +1,6 @@
 // Border of a surface that grows by one triangle at a time.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>

@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <cstdlib>
-#include <limits>
 #include <numeric>
 
 #include "runtime/bank/packed/loops.hpp"

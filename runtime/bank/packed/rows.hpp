@@ -1,7 +1,6 @@
 // Predicted shapes of all modes at the vertices: in steps of each mode, single precision.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>

@@ -1,4 +1,3 @@
-#include <algorithm>
 
 #include "runtime/bank/packed/reader.hpp"
 #include "runtime/bank/packed/shapes.hpp"

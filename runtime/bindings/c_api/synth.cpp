@@ -1,6 +1,5 @@
 // The synthesiser of the C interface: its bodies, its sound and its counters.
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <string>

@@ -2,7 +2,6 @@
 #include "runtime/bindings/python/module.hpp"
 
 #include <exception>
-#include <new>
 #include <utility>
 
 #include "runtime/base/environment.hpp"

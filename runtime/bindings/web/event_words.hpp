@@ -1,7 +1,6 @@
 // Events as rows of numbers: their form between JavaScript and WebAssembly memories.
 #pragma once
 
-#include <cstddef>
 #include <functional>
 #include <span>
 #include <vector>

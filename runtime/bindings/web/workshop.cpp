@@ -49,14 +49,12 @@ Json list_modes(const bank::Bank& bank, const std::vector<bank::HeardMode>& hear
     const bank::HeardMode& mode = heard[m];
     const double cents = m < bank.discretisation_error_cents.size() ? bank.discretisation_error_cents[m] : NAN;
     Json json = Json::object();
-    json.set("freq_hz", base::significant(mode.freq_hz, 9))
-        .set("decay_per_s", base::significant(bank.decay_per_s[m], 9))
-        .set("t60_s", base::finite_or_null(mode.calc_t60_s(), base::significant, 6))
-        .set("material_per_s", base::significant(mode.material_per_s, 6))
-        .set("radiation_per_s", base::finite_or_null(bank.multipoles.is_empty() ? NAN : mode.radiation_per_s, base::significant, 6))
-        .set("supports_per_s", base::significant(mode.supports_per_s, 6))
-        .set("gain", base::significant(bank.radiation_gain[m], 9))
-        .set("error_cents", base::finite_or_null(cents, base::significant, 4));
+    json.set("freq_hz", base::significant(mode.freq_hz, 9)).set("decay_per_s", base::significant(bank.decay_per_s[m], 9));
+    json.set("t60_s", base::finite_or_null(mode.calc_t60_s(), base::significant, 6));
+    json.set("material_per_s", base::significant(mode.material_per_s, 6));
+    json.set("radiation_per_s", base::finite_or_null(bank.multipoles.is_empty() ? NAN : mode.radiation_per_s, base::significant, 6));
+    json.set("supports_per_s", base::significant(mode.supports_per_s, 6)).set("gain", base::significant(bank.radiation_gain[m], 9));
+    json.set("error_cents", base::finite_or_null(cents, base::significant, 4));
     if (m < bank.facet_error_cents.size()) json.set("facet_cents", base::finite_or_null(bank.facet_error_cents[m], base::significant, 4));
     modes.add(json);
   }
@@ -215,24 +213,14 @@ std::string Workshop::add_bank(int bank, std::span<const std::byte> bytes, const
   auto read = std::make_shared<bank::Bank>(bank::parse_bank(bytes, name));
   const bank::Bank& b = *read;
   Json facts = Json::object();
-  facts.set("name", name)
-      .set("mode_count", static_cast<std::int64_t>(b.mode_count()))
-      .set("vertex_count", static_cast<std::int64_t>(b.vertex_count()))
-      .set("triangle_count", static_cast<std::int64_t>(b.triangles.size()))
-      .set("bytes", static_cast<std::int64_t>(bytes.size()))
-      .set("mass_kg", b.rigid.mass_kg)
-      .set("volume_m3", b.rigid.volume_m3)
-      .set("centre_m", to_json(b.rigid.centre_m))
-      .set("band_hz", Json::array(b.band_hz))
-      .set("element", b.element)
-      .set("complete", b.complete)
-      .set("completeness", bank::describe_completeness(b))
-      .set("accuracy", bank::describe_accuracy(b));
-  facts["material"]
-      .set("young_modulus_pa", b.material.young_modulus_pa)
-      .set("poisson_ratio", b.material.poisson_ratio)
-      .set("density_kg_m3", b.material.density_kg_m3)
-      .set("damping_law", b.damping.law);
+  facts.set("name", name).set("mode_count", static_cast<std::int64_t>(b.mode_count()));
+  facts.set("vertex_count", static_cast<std::int64_t>(b.vertex_count()));
+  facts.set("triangle_count", static_cast<std::int64_t>(b.triangles.size())).set("bytes", static_cast<std::int64_t>(bytes.size()));
+  facts.set("mass_kg", b.rigid.mass_kg).set("volume_m3", b.rigid.volume_m3).set("centre_m", to_json(b.rigid.centre_m));
+  facts.set("band_hz", Json::array(b.band_hz)).set("element", b.element).set("complete", b.complete);
+  facts.set("completeness", bank::describe_completeness(b)).set("accuracy", bank::describe_accuracy(b));
+  facts["material"].set("young_modulus_pa", b.material.young_modulus_pa).set("poisson_ratio", b.material.poisson_ratio);
+  facts["material"].set("density_kg_m3", b.material.density_kg_m3).set("damping_law", b.damping.law);
   bank::Bank played = bank::choose_frequencies(b, bank::Frequencies::kCorrected);
   const std::vector<bank::HeardMode> heard = mounting::mount(played);
   facts.set("modes", list_modes(played, heard));
@@ -283,21 +271,14 @@ std::string Workshop::make_body(int body, int bank, std::string_view scene, std:
   const bank::Bank& b = *made.played;
   const synth::ContactSurface surface = scene::make_surface(described);
   Json facts = Json::object();
-  facts.set("name", described.name)
-      .set("fixed", described.spec.fixed)
-      .set("position_m", to_json(scene::calc_world_point(described.spec.initial, b.rigid.centre_m)))
-      .set("rotation", Json::array(described.spec.initial.rotation))
-      .set("centre_m", to_json(b.rigid.centre_m))
-      .set("mass_kg", b.rigid.mass_kg)
-      .set("modes", std::move(modes))
-      .set("sounding_modes", made.model->get_mode_count())
-      .set("limited_modes", static_cast<std::int64_t>(described.limited.modes))
-      .set("silence_pa", made.scene.quality.silence_pa.value_or(synth::BodySettings{}.silence_pa))
-      .set("roughness_m", surface.roughness_m)
-      .set("friction", surface.friction)
-      .set("seed_high", static_cast<std::int64_t>(surface.seed >> 32))
-      .set("seed_low", static_cast<std::int64_t>(surface.seed & 0xffffffffU))
-      .set("patch_m", list_patches(b));
+  facts.set("name", described.name).set("fixed", described.spec.fixed);
+  facts.set("position_m", to_json(scene::calc_world_point(described.spec.initial, b.rigid.centre_m)));
+  facts.set("rotation", Json::array(described.spec.initial.rotation)).set("centre_m", to_json(b.rigid.centre_m));
+  facts.set("mass_kg", b.rigid.mass_kg).set("modes", std::move(modes)).set("sounding_modes", made.model->get_mode_count());
+  facts.set("limited_modes", static_cast<std::int64_t>(described.limited.modes));
+  facts.set("silence_pa", made.scene.quality.silence_pa.value_or(synth::BodySettings{}.silence_pa)).set("roughness_m", surface.roughness_m);
+  facts.set("friction", surface.friction).set("seed_high", static_cast<std::int64_t>(surface.seed >> 32));
+  facts.set("seed_low", static_cast<std::int64_t>(surface.seed & 0xffffffffU)).set("patch_m", list_patches(b));
   std::swap(bodies_[body], made);
   try {
     facts.set("effects", to_mask(find_possible(body)));
@@ -363,15 +344,9 @@ std::string Workshop::make_blow(int body, std::string_view scene, std::int32_t t
   Json result = Json::object();
   if (!strikes.blows.empty()) {
     const scene::Blow& blow = strikes.blows.front();
-    result.set("contact_s", blow.contact_s)
-        .set("impulse_n_s", blow.impulse_n_s)
-        .set("peak_n", blow.peak_n)
-        .set("restitution", base::finite_or_null(blow.restitution, base::significant, 6))
-        .set("before_j", blow.before_j)
-        .set("after_j", blow.after_j)
-        .set("motion_j", blow.motion_j)
-        .set("modes_j", blow.modes_j)
-        .set("lost_j", blow.lost_j);
+    result.set("contact_s", blow.contact_s).set("impulse_n_s", blow.impulse_n_s).set("peak_n", blow.peak_n);
+    result.set("restitution", base::finite_or_null(blow.restitution, base::significant, 6)).set("before_j", blow.before_j);
+    result.set("after_j", blow.after_j).set("motion_j", blow.motion_j).set("modes_j", blow.modes_j).set("lost_j", blow.lost_j);
   }
   result.set("warnings", Json::array(strikes.warnings));
   return result.line();
@@ -460,10 +435,8 @@ std::string Workshop::add_recording(int recording, std::string_view text, const 
     duration_s = std::max(duration_s, events::get_time_s(event));
   }
   Json facts = Json::object();
-  facts.set("duration_s", duration_s)
-      .set("events", static_cast<std::int64_t>(made.events.events.size()))
-      .set("words", static_cast<std::int64_t>(made.words.size()))
-      .set("warnings", Json::array(warnings));
+  facts.set("duration_s", duration_s).set("events", static_cast<std::int64_t>(made.events.events.size()));
+  facts.set("words", static_cast<std::int64_t>(made.words.size())).set("warnings", Json::array(warnings));
   for (const events::RecordedBody& body : made.events.bodies) facts["bodies"].add(body.name);
   recordings_[recording] = std::move(made);
   return facts.line();

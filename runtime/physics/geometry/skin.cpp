@@ -9,7 +9,6 @@
 #include "runtime/physics/geometry/skin.hpp"
 
 #include <map>
-#include <numeric>
 #include <utility>
 
 namespace carillon::geometry {

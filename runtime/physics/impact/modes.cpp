@@ -6,7 +6,6 @@
 #include "runtime/physics/impact/modes.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <stdexcept>
 

@@ -5,7 +5,6 @@
 #include "runtime/physics/rigid/rest.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <map>
 

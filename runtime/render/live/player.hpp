@@ -1,7 +1,6 @@
 // Live playback of a scene: physics runs slightly ahead of the sound card.
 #pragma once
 
-#include <cstdint>
 #include <filesystem>
 #include <string>
 

@@ -1,7 +1,6 @@
 // Spectrogram of a sound as a picture.
 #pragma once
 
-#include <cstdint>
 #include <string>
 #include <vector>
 

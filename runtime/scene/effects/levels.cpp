@@ -6,7 +6,6 @@
 #include "runtime/scene/effects/levels.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <complex>
 #include <numbers>

@@ -11,6 +11,7 @@ import numpy
 
 sys.path[:0] = [str(pathlib.Path(__file__).resolve().parent), str(pathlib.Path(__file__).resolve().parents[3] / "jobs/study")]
 import charts
+import comparing
 import measuring
 import system
 from errors import RunError
@@ -65,7 +66,7 @@ class Measuring(unittest.TestCase):
             measuring.run_measured(["sh", "-c", "echo no such mesh >&2; exit 3"], ".")
         for command, code, text in (
             ("echo error: no such key; exit 2", 2, "^bar: error: no such key$"),
-            ("echo error: no such key; exit 7", 4, "^bar: sh ended with exit code 7 and said: error: no such key$"),
+            ("echo error: no such key; exit 7", 4, "^bar: sh ended with exit code 7: error: no such key$"),
             ("kill -9 $$", 4, "^bar: sh ended with exit code -9$"),
         ):
             with self.assertRaisesRegex(RunError, text) as caught:
@@ -84,22 +85,22 @@ class Measuring(unittest.TestCase):
             {"name": "modes", "seconds": 10.0, "cpu_seconds": 5.0},
             {"name": "prayer", "seconds": 9.0, "cpu_seconds": 0.25},
         ]
-        phases = measuring.to_phases({"stations": recorded, "solver": solver}, 8.0)
+        phases = comparing.to_phases({"stations": recorded, "solver": solver}, 8.0)
         self.assertEqual(
             {name: value for name, value in phases.items() if value},
             {"read": 0.5, "factor": 1.0, "solve": 2.0, "orthogonalise": 2.0, "other": 2.5},
         )
-        extras = measuring.find_extras({"stations": recorded, "solver": solver}, 8.0)
+        extras = comparing.find_extras({"stations": recorded, "solver": solver}, 8.0)
         self.assertEqual([row[1] for row in extras[1:]], ["0.50", "0.50", "0.00"])
 
     def test_different_numbers_of_frequencies_never_agree(self):
-        self.assertEqual(measuring.compare_frequencies([100.0], [100.0, 200.0]), float("inf"))
-        self.assertAlmostEqual(measuring.compare_frequencies([100.0, 200.2], [100.0, 200.0]), 0.001, 6)
+        self.assertEqual(comparing.compare_frequencies([100.0], [100.0, 200.0]), float("inf"))
+        self.assertAlmostEqual(comparing.compare_frequencies([100.0, 200.2], [100.0, 200.0]), 0.001, 6)
 
     def test_the_table_gives_ratios_to_ours(self):
         entry = {"wall_s": [1.0], "peak_bytes": 10**9, "modes": 7, "residual": 1e-9, "frequency_error": 0.0}
         results = {"carillon1": entry | {"label": "ours", "cpu_s": [2.0, 2.0, 3.0]}, "slow": entry | {"label": "theirs", "cpu_s": [13.0]}}
-        rows = measuring.make_rows(results, "carillon1")
+        rows = comparing.make_rows(results, "carillon1")
         self.assertEqual([row[0] for row in rows[1:]], ["ours", "theirs"])
         self.assertEqual(rows[2][3], "6.50")
         self.assertEqual([row[2] for row in rows[1:]], ["25 %", "-"])  # one run has no spread
@@ -112,14 +113,14 @@ class Measuring(unittest.TestCase):
         self.assertEqual([round(length / lengths[0], 3) for length in lengths], [1.0, 2.0, 1.0, 2.0])
 
     def test_a_page_without_markers_is_rejected(self):
-        self.assertEqual(measuring.replace_between("x\n<!-- t -->\nold\n<!-- /t -->\n", "t", "new"), "x\n<!-- t -->\nnew\n<!-- /t -->\n")
+        self.assertEqual(comparing.replace_between("x\n<!-- t -->\nold\n<!-- /t -->\n", "t", "new"), "x\n<!-- t -->\nnew\n<!-- /t -->\n")
         with self.assertRaises(ValueError):
-            measuring.replace_between("x", "t", "new")
+            comparing.replace_between("x", "t", "new")
 
     def test_the_page_has_markers_for_all_generated_parts(self):
         page = (pathlib.Path(__file__).resolve().parents[3] / "docs/reports/performance.md").read_text()
         for name in ("table", "goals", "phases", "proof", "table-800", "goals-800"):
-            self.assertIn("x", measuring.replace_between(page, name, "x"))
+            self.assertIn("x", comparing.replace_between(page, name, "x"))
 
 
 class System(unittest.TestCase):

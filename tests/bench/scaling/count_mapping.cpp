@@ -18,6 +18,7 @@
 #include "precompute/ldlt/mapping.hpp"
 #include "precompute/ldlt/tile_map.hpp"
 #include "precompute/mesh/read.hpp"
+#include "tests/support/mapping_messages.hpp"
 
 namespace {
 
@@ -139,6 +140,7 @@ void run(const std::string& file, int refinements, const std::vector<int>& rank_
     const ldlt::Mapping mapping = ldlt::choose_mapping(forest, ranks);
     const double map_s = find_seconds() - before;
     const ldlt::MappingCounts counts = ldlt::count_mapping(forest, mapping);
+    const tests::MappingMessages sent = tests::count_messages(forest, mapping);
     std::int32_t root = 0;  // unknowns of the largest front
     for (const ldlt::FrontCost& front : forest) root = std::max(root, 3 * (front.width + front.rows));
     fmt::print(
@@ -146,10 +148,10 @@ void run(const std::string& file, int refinements, const std::vector<int>& rank_
         ","
         "{:.3f}\n",
         ranks, counts.total_operations, counts.total_entries, counts.total_operations / alone.total_operations, counts.path_ratio(),
-        counts.path_operations * ranks / alone.total_operations, counts.gang_operations * ranks / counts.total_operations,
+        counts.path_operations * ranks / alone.total_operations, ldlt::calc_gang_operations(forest, mapping) * ranks / counts.total_operations,
         counts.fullest_ratio(), mapping.operations_weight(), counts.shared_operations / counts.total_operations,
-        counts.shared_entries / counts.total_entries, counts.shared_fronts, counts.most_planned_fronts, largest(counts.messages),
-        1e-6 * largest(counts.bytes), largest(counts.solve_messages), 1e-3 * largest(counts.solve_bytes), counts.solve_path_messages,
+        counts.shared_entries / counts.total_entries, counts.shared_fronts, sent.most_planned_fronts, largest(sent.messages),
+        1e-6 * largest(sent.bytes), largest(sent.solve_messages), 1e-3 * largest(sent.solve_bytes), sent.solve_path_messages,
         1e-6 * largest(count_peaks(forest, mapping, counts)), root, dissect_s, map_s);
     std::fflush(stdout);
   }

@@ -210,7 +210,7 @@ def recommend_mass(lab, bodies, results, today):
     quadratic = []
     for body in solver.choose_bodies(bodies)[: 1 if lab.quick else 2]:
         kind = find_kind(find_best_t10(body))
-        sizes = body.get_sizes(lab, kind)[-3:-1]
+        sizes = lab.get_sizes(body, kind)[-3:-1]
         full = [body.make_case(lab, kind, nodes) for nodes in sizes]
         lumped = [body.make_case(lab, Kind("T10 lumped", "T10", "lumped", kind.curved), nodes) for nodes in sizes]
         solves = lab.measure(full + lumped)

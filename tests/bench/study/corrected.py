@@ -65,7 +65,7 @@ def compare_all(lab, body, solves):
     truth, _ = elements.find_truth(body, solves)
     seconds = {}
     for kind in dict.fromkeys(kind for kind, _ in solves):
-        for size in body.get_sizes(lab, kind):
+        for size in lab.get_sizes(body, kind):
             mesh = body.make_mesh(lab, kind, size)
             seconds[kind.name, mesh.nodes] = mesh.cpu_s
     found = [compare(kind, solve, truth, seconds[kind.name, solve.nodes]) for kind, solve in solves]

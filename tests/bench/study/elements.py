@@ -18,7 +18,7 @@ def measure(lab, bodies, kinds=None):
         lab.say(f"meshing: {body.name}")
         for kind in [kind for kind in body.get_kinds() if not kinds or kind.name in kinds]:
             seen = set()
-            for nodes in body.get_sizes(lab, kind):
+            for nodes in lab.get_sizes(body, kind):
                 case = body.make_case(lab, kind, nodes)
                 if case.job["mesh"] not in seen:
                     seen.add(case.job["mesh"])

@@ -8,6 +8,7 @@ from bodies import find_kind, make_bodies
 from forecast import find_fall
 from measuring import to_cents
 from section import Section
+from study_lab import QUADRATIC_SIZES_OF
 
 PROGRAMS = ("carillon-mesh", "carillon-precompute", "carillon-bank")
 TOLERANCES = (5e-5, 1e-5, 1e-6, 1e-8, 1e-10, 1e-12)  # banks reject residuals of 1e-4 or above
@@ -48,7 +49,7 @@ def draw_curves(curves, title, subtitle, x_label, y_label):
 def choose_bodies(bodies):
     """Preferred bodies, else the first that can be meshed coarsely (thin walls cannot)."""
     chosen = [body for name in PREFERRED for body in bodies if body.name == name]
-    return chosen or [body for body in bodies if not body.quadratic_sizes][:1] or [make_bodies()[PREFERRED[0]]]
+    return chosen or [body for body in bodies if body.name not in QUADRATIC_SIZES_OF][:1] or [make_bodies()[PREFERRED[0]]]
 
 
 class Solver:

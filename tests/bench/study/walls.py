@@ -102,7 +102,7 @@ def make_meshes(lab, body):
                 made.append((way, mesh))
             else:
                 lab.say(f"{body.name}, {way}, {nodes} nodes: left out, since its elements cannot be so few")
-    for nodes in body.get_sizes(lab, T10):
+    for nodes in lab.get_sizes(body, T10):
         made.append((REGULAR, body.make_mesh(lab, T10 if body.round else bodies.find_kind("T10 straight"), nodes)))
     return made
 

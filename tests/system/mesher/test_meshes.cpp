@@ -71,10 +71,8 @@ constexpr int kExitLarge = 5;
 
 /// Ends the process if the repaired body will have too many nodes.
 void leave_if_large(std::string_view phase) {
-  const std::size_t at = phase.find("\"nodes\": ");
-  if (!phase.starts_with("estimate {") || at == std::string_view::npos) return;
-  const long long nodes = std::stoll(std::string(phase.substr(at + 9)));
-  if (nodes > kMaxNodes) ::_exit(kExitLarge);
+  if (!phase.starts_with("about ")) return;
+  if (std::stod(std::string(phase.substr(6))) > kMaxNodes) ::_exit(kExitLarge);
 }
 
 /// As carillon-mesh SURFACE -o MESH OPTIONS... --quiet; returns its exit code, 1 for an invalid mesh.

@@ -90,25 +90,10 @@ with tempfile.TemporaryDirectory() as top:
     made = json.loads(done.stdout)
     assert 0.85 < made["mesh"]["nodes"] / 9000 < 1.15, made["mesh"]
     assert made["factor"]["how"] == "analysed" and made["modes"]["how"] == "counted" and "notes" not in made, made
-    # The mesher reports an estimate of the surface and the node count that it can meet.
-    ended = run(
-        folder,
-        "carillon-mesh",
-        "glass.obj",
-        "--order",
-        2,
-        "--nodes",
-        400,
-        "--estimate",
-        "--quiet",
-        "--result",
-        "mesh.result",
-        "-o",
-        "glass.msh",
-    )
-    rough = json.loads(dict(line.split(" ", 1) for line in ended.stderr.splitlines())["rough"])
+    # The mesher reports the node count that it can meet.
+    ended = run(folder, "carillon-mesh", "glass.obj", "--order", 2, "--nodes", 400, "--quiet", "--result", "mesh.result", "-o", "glass.msh")
     possible = json.loads((folder / "mesh.result").read_text())["possible_nodes"]
-    assert ended.returncode == 2 and possible > 400 and 0.5 < rough["nodes"] / possible < 2, ended.stderr
+    assert ended.returncode == 2 and possible > 400, ended.stderr
     # A coarse trial below the minimum of the thickness uses the node count that the mesher suggests.
     write_job(folder, {"surface": "cup.obj", "method": "delaunay"}, {"band_hz": [20, 12000], "accuracy_cents": 150})
     done = run(folder, "carillon-precompute", "job.json")

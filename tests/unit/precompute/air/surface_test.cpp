@@ -32,7 +32,6 @@ TEST(surface, has_the_volume_and_the_area_of_a_ball_and_of_a_box) {
   const RadiatingSurface box = make_box({0.3, 0.2, 0.01}, {30, 20, 1}).make_surface();
   EXPECT_NEAR(box.calc_volume_m3(), 6e-4, 1e-15);
   EXPECT_NEAR(box.calc_area_m2(), 0.13, 1e-12);
-  EXPECT_NEAR(box.calc_longest_edge_m(), 0.01 * std::numbers::sqrt2, 1e-12);
 }
 
 TEST(surface, keeps_facets_and_says_where_they_were) {
@@ -45,7 +44,6 @@ TEST(surface, keeps_facets_and_says_where_they_were) {
     const Triangle& given = skin.triangles[surface.get_facet_sources()[t]];
     Vec3 sum{};
     for (std::size_t c = 0; c < 3; ++c) {
-      EXPECT_EQ(surface.get_node_sources()[facet.corners[c]], given[c]);
       EXPECT_EQ(surface.get_nodes()[facet.corners[c]], skin.nodes_m[given[c]]);
       const EdgePoint& point = surface.get_points()[facet.points[c]];
       const Vec3 middle = 0.5 * (surface.get_nodes()[facet.corners[(c + 1) % 3]] + surface.get_nodes()[facet.corners[(c + 2) % 3]]);

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "precompute/coupling/choose.hpp"
-#include "precompute/coupling/nonnegative.hpp"
+#include "precompute/coupling/points.hpp"
 #include "precompute/fem/element.hpp"
 #include "precompute/mesh/shapes/shapes.hpp"
 #include "tests/unit/precompute/coupling/bodies.hpp"

@@ -8,9 +8,9 @@
 #include <set>
 
 #include "precompute/mesh/check.hpp"
-#include "precompute/mesher/smooth.hpp"
 #include "precompute/mesher/surface.hpp"
 #include "precompute/mesher/tet_quality.hpp"
+#include "precompute/mesher/volume_mesh.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/failure.hpp"
 #include "tests/support/box_mesh.hpp"

@@ -1,9 +1,9 @@
 // The record of a run: phases of the last setting, damping laws, materials.
-#include "precompute/run/describe_run.hpp"
-
 #include <gtest/gtest.h>
 
 #include <string>
+
+#include "precompute/run/stages.hpp"
 
 namespace carillon::run {
 namespace {

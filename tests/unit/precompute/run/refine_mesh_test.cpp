@@ -1,6 +1,4 @@
 // Each tetrahedron is cut into eight: body, sets and curved sides are preserved.
-#include "precompute/run/refine_mesh.hpp"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,6 +6,7 @@
 
 #include "precompute/mesh/check.hpp"
 #include "precompute/mesh/shapes/shapes.hpp"
+#include "precompute/run/stages.hpp"
 
 namespace carillon::run {
 namespace {

@@ -7,7 +7,6 @@
 
 #include <string>
 
-#include "precompute/run/predict_cost.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/file.hpp"
 #include "runtime/base/json.hpp"

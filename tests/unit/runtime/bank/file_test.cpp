@@ -211,7 +211,6 @@ TEST_F(BankFile, MayHoldNoModes) {
   const Bank bank = example::make_bank(2, 0);
   write_bank(bank, file_);
   expect_equal(read_bank(file_), bank);
-  EXPECT_TRUE(read_shape_row(file_, 0).empty());
 }
 
 TEST_F(BankFile, TheSameBankGivesTheSameBytes) {
@@ -232,7 +231,6 @@ TEST_F(BankFile, AnyTruncationIsRejected) {
     put(whole.substr(0, length));
     const std::string message = message_of(file_);
     EXPECT_NE(message.find(length == 0 ? "empty" : "truncated"), std::string::npos) << message;
-    EXPECT_THROW(read_shape_row(file_, 0), InputError);
   }
   put(whole + "x");
   EXPECT_NE(message_of(file_).find("bytes were added"), std::string::npos);
@@ -299,21 +297,6 @@ TEST_F(BankFile, OverlappingArraysAreRejected) {
   bytes.replace(place, offset.size(), other);
   put(seal_again(bytes));
   EXPECT_NE(message_of(file_).find("damaged seal: two arrays overlap"), std::string::npos) << message_of(file_);
-}
-
-TEST_F(BankFile, ARowIsReadWithoutTheRest) {
-  const Bank bank = example::make_bank(12, 100);
-  write_bank(bank, file_);
-  const std::uint64_t before = read_so_far();
-  const std::vector<Vec3> row = read_shape_row(file_, 123);
-  const std::uint64_t taken = read_so_far() - before;
-  ASSERT_GT(before, 0u) << "/proc/self/io cannot be read";
-  EXPECT_LT(taken, 4096u + 100u * (6 + 8) + 1024u) << "of " << fs::file_size(file_);
-  EXPECT_GT(fs::file_size(file_), 500'000u);
-  ASSERT_EQ(row.size(), 100u);
-  for (std::size_t mode = 0; mode < row.size(); ++mode) EXPECT_EQ(row[mode], bank.shape_at(123, mode));
-  EXPECT_EQ(read_shape_row(file_, bank.vertex_count() - 1).back(), bank.shape_at(bank.vertex_count() - 1, 99));
-  EXPECT_THROW(read_shape_row(file_, bank.vertex_count()), InputError);
 }
 
 TEST_F(BankFile, OtherFilesAreReported) {
