@@ -7,22 +7,12 @@
 #include <variant>
 #include <vector>
 
-#include "runtime/physics/world.hpp"
+#include "tests/hard/contact_course.hpp"
 #include "tests/hard/figure.hpp"
-#include "tests/unit/runtime/physics/checks.hpp"
-#include "tests/unit/runtime/physics/solids.hpp"
 
 namespace carillon::hard {
 namespace {
 
-using carillon::norm;
-using physics::BodySpec;
-using physics::GroundSpec;
-using physics::World;
-using physics::WorldSpec;
-using physics::tests::make_ball;
-using physics::tests::make_box;
-using carillon::operator-;
 using joints::Kind;
 
 bank::Bank weigh(bank::Bank bank, double mass_kg) {
@@ -32,48 +22,15 @@ bank::Bank weigh(bank::Bank bank, double mass_kg) {
   return bank;
 }
 
-BodySpec make_body(const bank::Bank& bank, const Vec3& position) {
-  BodySpec body;
-  body.name = "body";
-  body.bank = &bank;
-  body.initial.position_m = position;
-  return body;
-}
-
-struct Course {
-  std::vector<events::BodyMotion> middle, end;  // of each body
-  physics::Statistics statistics;
-};
-
-Course run(const WorldSpec& spec, double middle_s, double end_s) {
-  World world(spec, {.end_s = end_s, .audits_energy = true});
-  Course course;
-  course.end.resize(spec.bodies.size());
-  const auto keep = [&](const events::Event& event) {
-    if (const auto* motion = std::get_if<events::BodyMotion>(&event)) course.end[motion->body] = *motion;
-  };
-  world.advance(middle_s, std::numeric_limits<double>::infinity(), keep);
-  course.middle = course.end;
-  world.advance(end_s, std::numeric_limits<double>::infinity(), keep);
-  course.statistics = world.get_statistics();
-  return course;
-}
-
-double calc_drift(const Course& course) {
-  double max = 0.0;
-  for (std::size_t i = 0; i < course.end.size(); ++i) max = std::max(max, norm(course.end[i].position_m - course.middle[i].position_m));
-  return max;
-}
-
 /// Links on ball joints from the origin along x, and a body at their end.
 WorldSpec make_chain(const bank::Bank& link, double length_m, int count, const bank::Bank* weight, double radius_m) {
   WorldSpec spec;
   for (int i = 0; i < count; ++i) {
-    spec.bodies.push_back(make_body(link, {length_m * (i + 0.5), 0, 0}));
+    spec.bodies.push_back(make_body(link, {length_m * (i + 0.5), 0, 0}, 0.5));
     spec.joints.push_back({.kind = Kind::kBall, .body = i, .to = i - 1, .at_m = {length_m * i, 0, 0}});
   }
   if (weight != nullptr) {
-    spec.bodies.push_back(make_body(*weight, {length_m * count + radius_m, 0, 0}));
+    spec.bodies.push_back(make_body(*weight, {length_m * count + radius_m, 0, 0}, 0.5));
     spec.joints.push_back({.kind = Kind::kBall, .body = count, .to = count - 1, .at_m = {length_m * count, 0, 0}});
   }
   return spec;
@@ -86,7 +43,7 @@ TEST(time, joints_unequal_masses) {
     // Taut it hangs and swings; let go out of the horizontal it folds, and links strike each other and the ball.
     if (is_taut) spec.gravity_m_s2 = {9.81 * std::cos(0.8), 0, -9.81 * std::sin(0.8)};
     const Course course = run(spec, 1.0, 2.0);
-    const auto& energy = course.statistics.energy;
+    const auto& energy = course.energy;
     const std::string part = is_taut ? "taut" : "folding";
     hold("joints_unequal_masses", energy.error_j / energy.kinetic_j, is_taut ? 1e-8 : 2e-3, part + ", energy unbooked, as a share");
     hold("joints_unequal_masses", std::max(0.0, norm(course.end.back().position_m) - 0.26), 1e-9, part + ", beyond its chain [m]");
@@ -98,7 +55,7 @@ TEST(time, joints_whip) {
   const bank::Bank link = make_box({0.01, 0.003, 0.003});
   const WorldSpec spec = make_chain(link, 0.01, 100, nullptr, 0.0);
   const Course course = run(spec, 0.2, 0.5);
-  const auto& energy = course.statistics.energy;
+  const auto& energy = course.energy;
   hold("joints_whip", energy.error_j / energy.kinetic_j, 1e-4, "energy unbooked, as a share");
   hold("joints_whip", std::max(0.0, norm(course.end.back().position_m) - 0.995), 1e-9, "last link beyond its chain [m]");
 }
@@ -108,7 +65,7 @@ TEST(time, joints_both_rest) {
   const bank::Bank box = make_box({0.1, 0.06, 0.03});
   WorldSpec spec;
   spec.ground = GroundSpec{};
-  spec.bodies = {make_body(box, {-0.051, 0, 0.016}), make_body(box, {0.051, 0, 0.016})};
+  spec.bodies = {make_body(box, {-0.051, 0, 0.016}, 0.5), make_body(box, {0.051, 0, 0.016}, 0.5)};
   spec.joints = {{.kind = Kind::kHinge, .body = 1, .to = 0, .at_m = {0, 0, 0.016}, .axis = {0, 1, 0}}};
   const Course course = run(spec, 1.0, 600.0);
   hold("joints_both_rest", calc_drift(course), 1e-9, "way from 1 s to ten minutes [m]");
@@ -119,11 +76,11 @@ TEST(time, joints_both_rest) {
 TEST(time, cords_swing) {
   const bank::Bank ball = make_ball(0.02, 3);
   WorldSpec spec;
-  spec.bodies = {make_body(ball, {0.3, 0, -0.4})};
+  spec.bodies = {make_body(ball, {0.3, 0, -0.4}, 0.5)};
   spec.bodies[0].velocity_m_s = {0, 0.8, 0};  // round about, not in a plane
   spec.cords = {{.body = 0, .to = -1, .from_m = {0.3, 0, -0.4}, .to_m = {0, 0, 0}}};
   const Course course = run(spec, 1.0, 120.0);
-  const auto& energy = course.statistics.energy;
+  const auto& energy = course.energy;
   hold("cords_swing", energy.error_j / energy.kinetic_j, 1e-5, "energy unbooked in two minutes, as a share");
   hold("cords_swing", std::abs(energy.lost_j) / energy.kinetic_j, 1e-3, "energy lost, as a share");
   hold("cords_swing", std::abs(norm(course.end[0].position_m) - 0.5), 5e-6, "off its length [m]");
@@ -133,7 +90,7 @@ TEST(time, cords_share_a_load) {
   // Eight cords where three would do, of a plate that is dropped into them.
   const bank::Bank plate = make_box({0.3, 0.3, 0.02});
   WorldSpec spec;
-  spec.bodies = {make_body(plate, {0, 0, 0.004})};
+  spec.bodies = {make_body(plate, {0, 0, 0.004}, 0.5)};
   for (int i = 0; i < 8; ++i) {
     const double a = i * M_PI / 4, x = 0.14 * std::cos(a), y = 0.14 * std::sin(a);
     spec.cords.push_back({.body = 0, .to = -1, .from_m = {x, y, 0.004}, .to_m = {x, y, 0.2}, .length_m = 0.2});

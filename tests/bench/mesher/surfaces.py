@@ -117,16 +117,3 @@ def make_pot(around=32):
         [0, 0.109],
     ]
     return make_lathe(profile, around)
-
-
-def find_turns(points, triangles):
-    """The angles in degrees by which the two triangles of each inner edge turn."""
-    normals = np.cross(points[triangles[:, 1]] - points[triangles[:, 0]], points[triangles[:, 2]] - points[triangles[:, 0]])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]
-    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    faces = np.repeat(np.arange(len(triangles)), 3)
-    order = np.lexsort(edges.T)
-    edges, faces = edges[order], faces[order]
-    pair = np.flatnonzero((edges[1:] == edges[:-1]).all(axis=1))
-    cosine = (normals[faces[pair]] * normals[faces[pair + 1]]).sum(axis=1)
-    return np.degrees(np.arccos(np.clip(cosine, -1, 1)))

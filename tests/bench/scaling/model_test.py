@@ -1,16 +1,14 @@
 #!/usr/bin/python3
-"""The scaling model's sanity: what it must reproduce, how its parts grow, and how messages are assigned to phases."""
+"""The scaling model: what it must reproduce, how its parts grow, and its counts."""
 import dataclasses
 import json
 import pathlib
 import sys
-import tempfile
 import unittest
 
 sys.path[:0] = [str(pathlib.Path(__file__).resolve().parent)]
 import counting
 import fronts
-import messages
 import model
 
 BODY = model.Body(
@@ -59,38 +57,6 @@ class Model(unittest.TestCase):
             self.assertLess(many[phase][0], few[phase][0], phase)
             self.assertGreater(many[phase][2], 0)
         self.assertAlmostEqual(few["assemble"][0] / many["assemble"][0], 8)
-
-    def test_good_is_faster_than_expected_and_poor_slower(self):
-        for ranks in (2, 64, 1024):
-            for phase in ("factor", "solve"):
-                good, expected, poor = (self.here.calc_seconds(ranks, case=case)[phase] for case in model.CASES)
-                self.assertLess(good, expected)
-                self.assertLessEqual(expected, poor)
-
-    def test_the_poor_case_runs_shared_fronts_at_half_the_rate(self):
-        body = dataclasses.replace(BODY, factor_flops=2 * fronts.count_shared(BODY.tree, 64)[0])
-        here = model.Model(body, RATES, HERE)
-        computing = [sum(here.calc(64, case=case)["factor"][:2]) - here.calc_ordering_s(64) for case in ("expected", "poor")]
-        self.assertAlmostEqual(computing[1] / computing[0], 1.5)
-
-    def test_ordering_does_not_grow_with_the_square_of_the_ranks(self):
-        big = model.Model(dataclasses.replace(BODY, unknowns=1e7), RATES, HERE)
-        self.assertLess(big.calc_ordering_s(4096), 8 * big.calc_ordering_s(512))
-        self.assertGreater(big.calc_ordering_s(1), 4 * big.calc_ordering_s(64))
-
-    def test_a_slower_memory_slows_the_solves(self):
-        starved = model.Machine("starved", dense_gflops=50, memory_gb_s=1, latency_s=5e-7, transfer_gb_s=6, disk_gb_s=1)
-        ratio = model.Model(BODY, RATES, starved).calc(1)["solve"][0] / (480 / 16 * 16 * 3e7 / 1e9)
-        self.assertAlmostEqual(ratio, 1.0)
-
-    def test_growth_keeps_modes_and_scales_areas(self):
-        big = BODY.grow(8e5, 16 * BODY.entries, 64 * BODY.factor_flops, BODY.tree.grow(8))
-        self.assertEqual((big.modes, big.basis), (BODY.modes, BODY.basis))
-        self.assertAlmostEqual(big.tree.root / BODY.tree.root, 4)
-        self.assertAlmostEqual(big.surface_nodes / BODY.surface_nodes, 4)
-
-    def test_a_power_law_is_found_again(self):
-        self.assertAlmostEqual(model.fit_power([1e3, 1e4, 3e5], [7 * x**1.38 for x in (1e3, 1e4, 3e5)]), 1.38)
 
     def test_memory_of_a_rank_falls_with_the_ranks(self):
         sizes = [self.here.calc_memory_bytes(p) - model.PROGRAM_BYTES for p in (1, 4, 64, 1024)]
@@ -164,36 +130,6 @@ class Counts(unittest.TestCase):
             for row in self.counted[name]["rows"]:
                 self.assertLessEqual(row["path_over_one"], 1.5 if row["ranks"] <= 16 else 2.5)
                 self.assertLessEqual(row["fullest"], 1.3)
-
-
-class Messages(unittest.TestCase):
-    def test_the_innermost_known_function_says_the_phase(self):
-        self.assertEqual(
-            messages.find_phase(["PetscSFBcastBegin", "carillon::eigen::NodeMatrix::multiply", "carillon::run::run_job"]), "orthogonalise"
-        )
-        self.assertEqual(
-            messages.find_phase(["carillon::ldlt::Factor::solve(double*, int, int)", "carillon::eigen::run_krylov_schur"]), "solve"
-        )
-        self.assertEqual(
-            messages.find_phase(["carillon::ldlt::(anonymous namespace)::Solver::send", "carillon::ldlt::Factor::factorise(double)"]),
-            "factor",
-        )
-        self.assertEqual(messages.find_phase(["main"]), "other")
-
-    def test_a_rank_s_file_is_summed_by_phase_and_kind(self):
-        symbols = ([0x1000, 0x2000], ["carillon::ldlt::Factor::solve(double*, int, int)", "carillon::fem::assemble"])
-        with tempfile.TemporaryDirectory() as folder:
-            path = pathlib.Path(folder) / "messages.0"
-            path.write_text(
-                "send 3 2400 0.5 1.0 1010 2020\nsend 1 100 0.25 0.0 1040\nallreduce 2 16 0.125 2.0 2010\nwait 9 0 1.0 0.0 1010\n"
-            )
-            phases = messages.read_rank(path, symbols)
-        self.assertEqual(phases["solve"], {"compute_s": 1.0, "mpi_s": 1.75, "send": [4, 2500.0]})
-        self.assertEqual(phases["assemble"], {"compute_s": 2.0, "mpi_s": 0.125, "allreduce": [2, 16.0]})
-
-    def test_an_address_belongs_to_the_function_that_begins_before_it(self):
-        symbols = ([0x1000, 0x2000], ["a", "b"])
-        self.assertEqual([messages.find_function(symbols, at) for at in (0x500, 0x1000, 0x1FFF, 0x2000)], ["?", "a", "a", "b"])
 
 
 if __name__ == "__main__":

@@ -7,47 +7,22 @@ torsion of a circular tube (c_T / 2 L, exact for any wall) and its bending in tw
 
 usage: accuracy.py BIN_DIR
 """
-import json
 import math
 import pathlib
 import re
 import struct
-import subprocess
-import sys
 import tempfile
 
-bin_dir = pathlib.Path(sys.argv[1]).resolve()
-RAYLEIGH = {"damping": {"rayleigh": {}}}
-STEEL = {"young_modulus_pa": 200e9, "poisson_ratio": 0.3, "density_kg_m3": 7850, **RAYLEIGH}
-CERAMIC = {"lame_lambda_pa": 3.99e9, "lame_mu_pa": 2.05e9, "density_kg_m3": 2700, **RAYLEIGH}
-ALUMINIUM = {"young_modulus_pa": 68.352e9, "poisson_ratio": 0.3298, "density_kg_m3": 2700, **RAYLEIGH}
+from solver import CERAMIC, STEEL, read_info, run, solve
+
+ALUMINIUM = {"young_modulus_pa": 68.352e9, "poisson_ratio": 0.3298, "density_kg_m3": 2700, "damping": {"rayleigh": {}}}
 TORSION = math.sqrt(200e9 / 2.6 / 7850) / (2 * 0.12)
-
-
-def run(folder, name, job, code=0):
-    (folder / f"{name}.json").write_text(json.dumps({"bank": f"{name}.hdf", **job}))
-    done = subprocess.run(
-        ["mpirun", "-np", "2", "--oversubscribe", "--bind-to", "none", bin_dir / "carillon-precompute", f"{name}.json"],
-        cwd=folder,
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == code, f"{name}: exit code {done.returncode}\n{done.stdout[-3000:]}{done.stderr[-3000:]}"
-    return done.stdout + done.stderr
-
-
-def info(folder, name):
-    done = subprocess.run(
-        [bin_dir / "carillon-bank", "info", "--json", f"{name}.hdf"], cwd=folder, capture_output=True, text=True, check=True
-    )
-    return json.loads(done.stdout)
 
 
 def check(folder, name, job, truth):
     """truth: the first frequencies, ascending, or a single one at any position."""
-    text = run(folder, name, job)
-    bank = info(folder, name)
+    text = solve(folder, name, 2, **job)
+    bank = read_info(folder, name)
     found = sorted(mode["corrected_frequency_hz"] for mode in bank["modes"])
     nearest = found[: len(truth)] if len(truth) > 1 else [min(found, key=lambda f: abs(f - truth[0]))]
     errors = [1200 * math.log2(f / t) for f, t in zip(nearest, truth)]
@@ -129,12 +104,12 @@ with tempfile.TemporaryDirectory(prefix="carillon-accuracy-") as scratch:
     )
 
     # A mesh file: a box is exact, so refinement converges; a coarse ball of flat facets does not, with a message that says why.
-    mesh = lambda *words: subprocess.run([bin_dir / "carillon-mesh", *words, "--quiet"], cwd=folder, check=True, stdout=subprocess.DEVNULL)
+    mesh = lambda *words: run(folder, "carillon-mesh", *words, "--quiet")
     mesh("--shape", "bar", "--length", "0.3", "--width", "0.02", "--thickness", "0.01", "--edge", "0.02", "-o", "coarse.msh")
     chosen = check(folder, "file", {"mesh": "coarse.msh", "material": STEEL, "band_hz": [20, 3000], "accuracy_cents": 3}, [574.44, 1135.46])
     assert chosen["element"] == "T10", chosen
     mesh("--shape", "sphere", "--radius", "0.05", "--nodes", "300", "-o", "facets.msh")
-    text = run(folder, "facets", {"mesh": "facets.msh", "material": CERAMIC, "band_hz": [20, 8000], "accuracy_cents": 0.5}, code=3)
+    text = solve(folder, "facets", 2, 3, **{"mesh": "facets.msh", "material": CERAMIC, "band_hz": [20, 8000], "accuracy_cents": 0.5})
     assert "accuracy_cents" in text and "reached" in text and "surface" in text, text
     assert (
         "next stricter: T10, refined 1 time" in text
@@ -145,16 +120,16 @@ with tempfile.TemporaryDirectory(prefix="carillon-accuracy-") as scratch:
 
     # The same ball with ten-node elements is not advised to use T10: its parabolas miss the sphere, or its folded elements are flat.
     mesh("--shape", "sphere", "--radius", "0.05", "--nodes", "300", "--order", "2", "-o", "curved.msh")
-    text = run(folder, "curved", {"mesh": "curved.msh", "material": CERAMIC, "band_hz": [20, 8000], "accuracy_cents": 0.05}, code=3)
+    text = solve(folder, "curved", 2, 3, **{"mesh": "curved.msh", "material": CERAMIC, "band_hz": [20, 8000], "accuracy_cents": 0.05})
     assert "despite its ten-node elements" in text and "straightened" not in text and "next stricter: T10, refined 1 time" in text, text
     fold(folder / "curved.msh", folder / "folded.msh")
-    text = run(folder, "folded", {"mesh": "folded.msh", "material": CERAMIC, "band_hz": [20, 8000], "accuracy_cents": 0.5}, code=3)
+    text = solve(folder, "folded", 2, 3, **{"mesh": "folded.msh", "material": CERAMIC, "band_hz": [20, 8000], "accuracy_cents": 0.5})
     assert re.search(r"it has ten-node elements, but \d+ of its \d+ elements folded over and were straightened", text), text
     assert "on the true surface" not in text and "next stricter: T10, refined 1 time" in text, text
 
     # No accuracy is stated for an empty band.
-    text = run(folder, "silent", {**bar, "band_hz": [20, 300], "accuracy_cents": 10})
+    text = solve(folder, "silent", 2, **{**bar, "band_hz": [20, 300], "accuracy_cents": 10})
     assert "no mode in the band" in text.split("chosen:")[1] and "error bars up to" not in text, text
-    text = run(folder, "silent-file", {"mesh": "coarse.msh", "material": STEEL, "band_hz": [20, 300], "accuracy_cents": 10})
+    text = solve(folder, "silent-file", 2, **{"mesh": "coarse.msh", "material": STEEL, "band_hz": [20, 300], "accuracy_cents": 10})
     assert "no mode in the band" in text.split("chosen: T10, refined 1 time,")[1], text
     print("accuracy: as requested")

@@ -4,16 +4,13 @@ the material damping; the log states the decision, the reason and the figures.
 
 usage: auto_air.py BIN_DIR
 """
-import json
 import pathlib
 import re
-import subprocess
-import sys
 import tempfile
 
 import h5py
+from solver import solve
 
-BIN = pathlib.Path(sys.argv[1]).resolve()
 CUBE = {"length_m": 0.15, "width_m": 0.15, "height_m": 0.15, "nodes": 800}
 HOLLOW = {"shape": "hollow-box", **CUBE, "wall_m": 0.006}
 LOSSY = {
@@ -41,12 +38,9 @@ def main():
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         for case, (body, material, is_solved, words) in CASES.items():
-            job = {"body": body, "material": material, "band_hz": [20, 12000], "max_modes": 6, "bank": f"{case}.hdf"}
-            job["radiation"] = {"method": "auto", "skin_nodes": 400}
-            (folder / f"{case}.json").write_text(json.dumps(job))
-            done = subprocess.run([BIN / "carillon-precompute", f"{case}.json"], cwd=folder, capture_output=True, text=True, timeout=120)
-            assert done.returncode == 0, f"{case}: {done.stderr}"
-            line = next(line for line in done.stdout.splitlines() if "boundary elements: " in line)
+            radiation = {"method": "auto", "skin_nodes": 400}
+            text = solve(folder, case, body=body, material=material, band_hz=[20, 12000], max_modes=6, radiation=radiation)
+            line = next(line for line in text.splitlines() if "boundary elements: " in line)
             assert f"boundary elements: {'yes' if is_solved else 'no'}; " in line and words in line, f"{case}: {line}"
             with h5py.File(folder / f"{case}.hdf") as bank:
                 assert ("radiation" in bank) == is_solved, case

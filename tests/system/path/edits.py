@@ -4,36 +4,22 @@ and together.
 
 usage: edits.py BIN_DIR
 """
-import json
 import pathlib
-import subprocess
-import sys
 import tempfile
 
 import h5py
 import numpy as np
+from solver import run, write_job
 
-bin_dir = pathlib.Path(sys.argv[1]).resolve()
 BAND = [20.0, 19000.0]
 
 
-def run(folder, *command):
-    done = subprocess.run([str(part) for part in command], cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True)
-    assert done.returncode == 0, f"{command}: exit code {done.returncode}\n{done.stdout[-2000:]}{done.stderr[-2000:]}"
-
-
 def solve(folder, name, density=1.0, stiffness=1.0, size=1.0, damping=None):
-    run(
-        folder,
-        bin_dir / "carillon-mesh",
-        *f"--shape bar --length {0.3 * size} --width {0.02 * size} --thickness {0.013 * size} --nodes 700 --order 2".split(),
-        "-o",
-        f"{name}.msh",
-    )
+    size_words = f"--length {0.3 * size} --width {0.02 * size} --thickness {0.013 * size}".split()
+    run(folder, "carillon-mesh", "--shape", "bar", *size_words, "--nodes", 700, "--order", 2, "-o", f"{name}.msh")
     times = (stiffness / density) ** 0.5 / size
     job = {
         "mesh": f"{name}.msh",
-        "bank": f"{name}.hdf",
         "band_hz": [f * times for f in BAND],
         "solver": {"tolerance": 1e-11},
         "material": {
@@ -43,8 +29,8 @@ def solve(folder, name, density=1.0, stiffness=1.0, size=1.0, damping=None):
             "damping": damping or {"rayleigh": {"alpha1_s": 1e-7, "alpha2_per_s": 2.5}},
         },
     }
-    (folder / f"{name}.json").write_text(json.dumps(job))
-    run(folder, bin_dir / "carillon-precompute", f"{name}.json")
+    write_job(folder, name, **job)
+    run(folder, "carillon-precompute", f"{name}.json")
 
 
 def read(file):
@@ -109,7 +95,7 @@ with tempfile.TemporaryDirectory() as name:
         if base == "friction" and "rayleigh" in damping:
             options += ["--alphas", "3e-8", "11"]
         (folder / "edited.hdf").unlink(missing_ok=True)
-        run(folder, bin_dir / "carillon-bank", "edit", f"{base}.hdf", "edited.hdf", *options)
-        run(folder, bin_dir / "carillon-bank", "check", "edited.hdf")
+        run(folder, "carillon-bank", "edit", f"{base}.hdf", "edited.hdf", *options)
+        run(folder, "carillon-bank", "check", "edited.hdf")
         solve(folder, "fresh", damping=damping, **change)
         compare(folder, what, "edited.hdf", "fresh.hdf")

@@ -8,17 +8,15 @@ with "facets": true and solved on their own.
 
 usage: facets.py BIN_DIR
 """
-import json
 import math
 import pathlib
-import subprocess
-import sys
 import tempfile
 
-bin_dir = pathlib.Path(sys.argv[1]).resolve()
+from solver import STEEL, read_info, read_record, solve
+from solver import run as run_program
+
 data = pathlib.Path(__file__).resolve().parents[2] / "unit/precompute/fem/error_bars/data/known_frequencies.csv"
 TRUTH = [float(line.split(",")[1]) for line in data.read_text().splitlines() if line.startswith("cylinder-10,")][:9]
-STEEL = {"young_modulus_pa": 200e9, "poisson_ratio": 0.3, "density_kg_m3": 7850, "damping": {"rayleigh": {}}}
 RADIUS, LENGTH = 0.02, 0.2
 
 
@@ -60,23 +58,9 @@ def write_bell(path, sides, points):
     path.write_text("\n".join(lines) + "\n")
 
 
-def run(folder, name, job, ranks=1, code=0):
-    (folder / f"{name}.json").write_text(json.dumps({"bank": f"{name}.hdf", "material": STEEL, "band_hz": [20, 17800], **job}))
-    done = subprocess.run(
-        ["mpirun", "-np", str(ranks), "--oversubscribe", "--bind-to", "none", bin_dir / "carillon-precompute", f"{name}.json"],
-        cwd=folder,
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == code, f"{name}: exit code {done.returncode}\n{done.stdout[-3000:]}{done.stderr[-3000:]}"
-    if code:
-        return done.stdout + done.stderr
-    bank = json.loads(
-        subprocess.run(
-            [bin_dir / "carillon-bank", "info", "--json", f"{name}.hdf"], cwd=folder, capture_output=True, text=True, check=True
-        ).stdout
-    )
+def run(folder, name, job, ranks=1):
+    solve(folder, name, ranks, **{"material": STEEL, "band_hz": [20, 17800], **job})
+    bank = read_info(folder, name)
     modes = bank["modes"]
     bars = [m["algebraic_error_cents"] + m["discretisation_error_cents"] for m in modes]
     return bank["frequencies_hz"], bars, [m["facet_error_cents"] for m in modes]
@@ -126,17 +110,12 @@ with tempfile.TemporaryDirectory(prefix="carillon-facets-") as scratch:
         expect_inside(f"{sides} sides against the other", found, add(bars, facets), other)
         assert max(map(abs, cents(found, other))) > max(bars), "no bar contains the other body"
         # The same on more ranks and from a mesh file, which stores the doubt.
-        subprocess.run(
-            [bin_dir / "carillon-mesh", f"{name}.obj", "--order", "2", "--nodes", "5000", "-o", f"{name}-file.msh"],
-            cwd=folder,
-            check=True,
-            capture_output=True,
-        )
+        run_program(folder, "carillon-mesh", f"{name}.obj", "--order", 2, "--nodes", 5000, "-o", f"{name}-file.msh")
         _, two, facets_two = run(folder, f"{name}-two", {"mesh": f"{name}-file.msh"}, ranks=2)
         assert all(abs(b / a - 1) < 1e-3 for a, b in zip(bars + facets, two + facets_two)), (bars, two, facets, facets_two)
     # The accuracy target applies to the bars; the doubt gives one warning.
     _, bars, facets = run(folder, "asked", {"body": {"surface": "either-12.obj"}, "accuracy_cents": 5})
-    record = json.loads((folder / "asked.hdf.resolved.json").read_text())["run"]
+    record = read_record(folder, "asked")["run"]
     assert record["accuracy"]["chosen"]["worst_cents"] <= 5 < max(facets) and record["accuracy"]["chosen"]["facet_cents"] > 5, record
     assert sum("facets in doubt" in text for text in record["warnings"]) == 1, record["warnings"]
 

@@ -8,17 +8,14 @@ usage: kinds.py BIN_DIR
 """
 import csv
 import io
-import json
 import math
 import pathlib
 import re
-import subprocess
-import sys
 import tempfile
 
-bin_dir = pathlib.Path(sys.argv[1]).resolve()
+import solver
+
 E, NU, RHO = 200e9, 0.3, 7850
-STEEL = {"young_modulus_pa": E, "poisson_ratio": NU, "density_kg_m3": RHO, "damping": {"rayleigh": {}}}
 
 
 def find_roots(f, low, high, steps=20000):
@@ -57,17 +54,13 @@ def bending(length, width, height, high_hz):
 
 def solve(folder, name, job):
     """[(playback frequency [Hz], kind)]"""
-    (folder / f"{name}.json").write_text(json.dumps({"bank": f"{name}.hdf", "material": STEEL, **job}))
-    for words in (["carillon-precompute", f"{name}.json", "-q"], ["carillon-bank", "info", f"{name}.hdf", "--csv"]):
-        done = subprocess.run([bin_dir / words[0], *words[1:]], cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True)
-        assert done.returncode == 0, f"{words}: {done.stdout[-2000:]}{done.stderr[-2000:]}"
-    rows = list(csv.DictReader(io.StringIO(done.stdout)))
-    info = json.loads(subprocess.run([bin_dir / "carillon-bank", "info", f"{name}.hdf", "--json"], cwd=folder, capture_output=True).stdout)
+    solver.solve(folder, name, material=solver.STEEL, **job)
+    list_modes = lambda *words: solver.run(folder, "carillon-bank", "info", f"{name}.hdf", *words).stdout
+    rows = list(csv.DictReader(io.StringIO(list_modes("--csv"))))
+    info = solver.read_info(folder, name)
     assert [row["kind"] for row in rows] == [mode["kind"] for mode in info["modes"]]
     assert [float(row["frequency_hz"]) for row in rows] == info["frequencies_hz"]
-    table = subprocess.run(
-        [bin_dir / "carillon-bank", "info", f"{name}.hdf", "--modes", "3"], cwd=folder, capture_output=True, text=True
-    ).stdout
+    table = list_modes("--modes", 3)
     for row in rows[:3]:
         assert re.search(rf"  {re.escape(row['kind'])}$", table, re.M), table
     found = [(float(row["heard_frequency_hz"]), row["kind"]) for row in rows]

@@ -37,7 +37,7 @@ int count_near(const bank::Bank& bank, double freq_hz, double tolerance) {
 
 TEST(SteelBar, of_10_x_20_x_300_mm_rings_at_574_and_1135_Hz_with_T10) {
   // Converged 3-D values; Timoshenko's theory gives 574.36 and 1135.30 Hz.
-  Folder folder;
+  JobFolder folder;
   mesh::write_gmsh(shapes::make_box({0.3, 0.02, 0.01}, {30, 2, 1}, 2), folder / "mesh.msh");
   folder.write_job(kSteel, R"("element": "T10", "max_modes": 2,)");
   const bank::Bank bank = folder.solve();
@@ -55,7 +55,7 @@ TEST(SteelBar, of_10_x_20_x_300_mm_rings_at_574_and_1135_Hz_with_T10) {
 
 TEST(SteelBar, with_the_same_cells_of_T4_is_far_too_sharp) {
   // T4 locks in bending: +110.7 % on this mesh, measured with an independent prototype.
-  Folder folder;
+  JobFolder folder;
   mesh::write_gmsh(shapes::make_box({0.3, 0.02, 0.01}, {30, 2, 1}), folder / "mesh.msh");
   folder.write_job(kSteel, R"("element": "T4", "max_modes": 1,)");
   const double ratio = folder.solve().freq_hz(0) / 574.44;
@@ -69,7 +69,7 @@ TEST_P(Chimes, of_OSG02_table_2_ring_as_the_exact_tube_does) {
   // Outer radius 12.5 mm, wall 1 mm, aluminium of OSG02 Table 1 (E 68.352 GPa, nu 0.3298). Exact: 3-D Fourier-Ritz, 8 digits; the paper
   // prints 589.17 to 1186.88 Hz for the six.
   const auto [length, exact_hz] = GetParam();
-  Folder folder;
+  JobFolder folder;
   mesh::write_gmsh(shapes::make_shape({.shape = "tube",
                                        .dimensions = {{"length", length}, {"outer-radius", 0.0125}, {"wall", 0.001}},
                                        .order = 2,
@@ -87,7 +87,7 @@ INSTANTIATE_TEST_SUITE_P(Table2, Chimes,
 
 TEST(Tube, turns_at_the_exact_frequency_of_torsion) {
   // f = c_T / 2 L for any circular tube, no approximation; here with a thick wall.
-  Folder folder;
+  JobFolder folder;
   mesh::write_gmsh(
       shapes::make_shape(
           {.shape = "tube", .dimensions = {{"length", 0.12}, {"outer-radius", 0.02}, {"wall", 0.008}}, .order = 2, .target_nodes = 3500}),
@@ -101,7 +101,7 @@ TEST(Tube, turns_at_the_exact_frequency_of_torsion) {
 TEST(SteelCube, has_the_three_Lame_modes_whatever_the_Poisson_ratio) {
   // f = c_T / (sqrt 2 a), independent of nu: 44269.895 Hz for a = 50 mm, mu of steel with nu = 0.3.
   for (const double nu : {0.0, 0.3, 0.45}) {
-    Folder folder;
+    JobFolder folder;
     const double mu = 200e9 / 2.6;
     mesh::write_gmsh(shapes::make_box({0.05, 0.05, 0.05}, {6, 6, 6}, 2), folder / "mesh.msh");
     folder.write_job({2 * mu * (1 + nu), nu, 7850}, R"("band_hz": [20, 45000],)");
@@ -111,7 +111,7 @@ TEST(SteelCube, has_the_three_Lame_modes_whatever_the_Poisson_ratio) {
 
 TEST(Prism, with_zero_Poisson_ratio_stretches_at_the_exact_bar_frequency_free_and_held) {
   // n sqrt(E / rho) / 2 L free, (2 n - 1) sqrt(E / rho) / 4 L with one end fixed: exact in 3-D when nu = 0.
-  Folder folder;
+  JobFolder folder;
   mesh::write_gmsh(shapes::make_box({0.25, 0.06, 0.05}, {6, 2, 2}, 2), folder / "mesh.msh");
   folder.write_job({10e9, 0, 1000}, R"("band_hz": [20, 7000],)");
   EXPECT_EQ(count_near(folder.solve(), 6324.555320337, 5e-4), 1);
@@ -122,7 +122,7 @@ TEST(Prism, with_zero_Poisson_ratio_stretches_at_the_exact_bar_frequency_free_an
 }
 
 TEST(CeramicSphere, of_50_mm_has_the_five_fold_modes_of_Lamb_at_6937_and_7349_Hz) {
-  Folder folder;
+  JobFolder folder;
   mesh::write_gmsh(shapes::make_shape({.shape = "sphere", .dimensions = {{"radius", 0.05}}, .order = 2, .target_nodes = 2500}),
                    folder / "mesh.msh");
   folder.write_job(from_lame(3.99e9, 2.05e9, 2700), R"("band_hz": [20, 8000],)");
@@ -134,7 +134,7 @@ TEST(CeramicSphere, of_50_mm_has_the_five_fold_modes_of_Lamb_at_6937_and_7349_Hz
 
 TEST(Sphere, has_the_exact_amplitudes_of_its_lowest_spheroidal_modes_all_over_its_surface) {
   // nu = 0.3: the sum of M (phi . r)^2 over the five S2 modes is 1.8382637^2 = 3.37921 at every point of the surface (Lamb; closed form).
-  Folder folder;
+  JobFolder folder;
   mesh::write_gmsh(shapes::make_shape({.shape = "sphere", .dimensions = {{"radius", 0.05}}, .order = 2, .target_nodes = 2500}),
                    folder / "mesh.msh");
   folder.write_job(kSteel, R"("band_hz": [20, 30000], "max_modes": 10,)");
@@ -161,7 +161,7 @@ TEST(Sphere, has_the_exact_amplitudes_of_its_lowest_spheroidal_modes_all_over_it
 
 TEST(Brick, of_1_to_1_3_to_1_7_has_the_modes_of_resonant_ultrasound_theory) {
   // Legendre-Ritz (Demarest 1971, Visscher 1991), nu = 0.3: omega a / c_T, 1e-7.
-  Folder folder;
+  JobFolder folder;
   mesh::write_gmsh(shapes::make_box({0.05, 0.065, 0.085}, {5, 7, 8}, 2), folder / "mesh.msh");
   folder.write_job(kSteel, R"("band_hz": [20, 40000], "max_modes": 8,)");
   std::vector<double> expected{1.60445570, 2.05720583, 2.27116546, 2.65591529, 2.83035882, 2.86874453, 2.99862339, 3.02018400};
@@ -173,7 +173,7 @@ TEST(Brick, of_1_to_1_3_to_1_7_has_the_modes_of_resonant_ultrasound_theory) {
 
 TEST(Cantilever, of_aluminium_rings_as_the_clamped_bar_of_3_D_theory) {
   // 300 x 30 x 12 mm, x- face fixed. hp-Ritz: 110.1245, 272.828, 684.937 Hz; the clamped edges are singular, so convergence is slow.
-  Folder folder;
+  JobFolder folder;
   mesh::write_gmsh(shapes::make_box({0.3, 0.03, 0.012}, {30, 3, 2}, 2), folder / "mesh.msh");
   folder.write_job(kAluminium, R"("max_modes": 3, "fixed": {"box_m": {"min": [-0.15, -1, -1], "max": [-0.15, 1, 1]}},)");
   const bank::Bank bank = folder.solve();
@@ -187,7 +187,7 @@ TEST(Cantilever, of_aluminium_rings_as_the_clamped_bar_of_3_D_theory) {
 }
 
 TEST(Lumped, mass_of_T4_lowers_and_of_T10_keeps_the_frequencies_of_a_bar_within_a_few_per_cent) {
-  Folder folder;
+  JobFolder folder;
   mesh::write_gmsh(shapes::make_box({0.3, 0.02, 0.01}, {30, 2, 1}, 2), folder / "mesh.msh");
   folder.write_job(kSteel, R"("mass": "lumped", "max_modes": 2,)");
   const bank::Bank bank = folder.solve();
@@ -198,7 +198,7 @@ TEST(Lumped, mass_of_T4_lowers_and_of_T10_keeps_the_frequencies_of_a_bar_within_
 
 TEST(Fibres, that_make_coarse_meshes_lock_are_warned_of_and_wood_is_not) {
   for (const auto& [young, is_warned] : {std::pair("[2e11, 1e8, 1e8]", true), std::pair("[11e9, 0.9e9, 0.5e9]", false)}) {
-    Folder folder;
+    JobFolder folder;
     folder.write("job.json",
                  fmt::format(R"({{"body": {{"shape": "bar", "length_m": 0.3, "width_m": 0.03, "thickness_m": 0.02, "nodes": 300}},
       "band_hz": [20, 2000], "bank": "out.bank",

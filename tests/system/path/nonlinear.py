@@ -7,14 +7,13 @@ usage: nonlinear.py BIN_DIR
 import json
 import math
 import pathlib
-import subprocess
-import sys
 import tempfile
 
 import h5py
 import numpy
+import solver
+from solver import run
 
-BIN = pathlib.Path(sys.argv[1]).resolve()
 RATE_HZ = 48000
 YOUNG_PA, DENSITY_KG_M3, ALPHA2_PER_S = 70e9, 2700.0, 8.0
 BAR = {"shape": "bar", "length_m": 0.3, "width_m": 0.01, "thickness_m": 0.002, "nodes": 350}
@@ -32,19 +31,11 @@ BEGIN_S, AWAY_M = 0.01, 1.0
 WINDOWS_S = ((0.02, 0.12), (0.2, 0.4), (0.7, 0.95))  # of the motion
 
 
-def run(folder, *words):
-    done = subprocess.run(list(map(str, words)), cwd=folder, capture_output=True, text=True, stdin=subprocess.DEVNULL)
-    assert done.returncode == 0, f"{words}: {done}"
-    return done.stdout
-
-
 def solve(folder, name, body, nonlinear=None, max_modes=10, material="steel"):
     """Playback frequencies of the bank, and the number of its nonlinear rows."""
     job = {"body": body, "material": material, "fixed": ["x-min", "x-max"], "band_hz": [20, 3000], "max_modes": max_modes}
-    job |= {"bank": f"{name}.hdf"} | ({"nonlinear": nonlinear} if nonlinear else {})
-    (folder / f"{name}.json").write_text(json.dumps(job))
-    run(folder, BIN / "carillon-precompute", "-q", f"{name}.json")
-    run(folder, BIN / "carillon-bank", "check", f"{name}.hdf")
+    solver.solve(folder, name, **job | ({"nonlinear": nonlinear} if nonlinear else {}))
+    run(folder, "carillon-bank", "check", f"{name}.hdf")
     with h5py.File(folder / f"{name}.hdf") as bank:
         assert ("nonlinear" in bank) == (nonlinear is not None), name
         return bank["modes/corrected_frequency_hz"][:], len(bank["nonlinear/A"]) if nonlinear else 0
@@ -63,7 +54,7 @@ def strike(folder, bank, impulse_n_s, nonlinear=None, blow_s=1e-4):
         "output": {"format": "float", "fade_end": False},
     }
     (folder / "scene.json").write_text(json.dumps(scene))
-    run(folder, BIN / "carillon-render", "scene.json", "-o", "scene.wav", "--quiet", "--report", "report.json")
+    run(folder, "carillon-render", "scene.json", "-o", "scene.wav", "--quiet", "--report", "report.json")
     report = json.loads((folder / "report.json").read_text())
     data = (folder / "scene.wav").read_bytes()
     sound = numpy.frombuffer(data[data.index(b"data") + 8 :], "<f4").astype(float)

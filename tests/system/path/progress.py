@@ -8,32 +8,23 @@ usage: progress.py BIN_DIR
 import json
 import os
 import pathlib
-import subprocess
-import sys
 import tempfile
 
-bin_dir = pathlib.Path(sys.argv[1]).resolve()
-STEEL = {
-    "density_kg_m3": 7850,
-    "young_modulus_pa": 2e11,
-    "poisson_ratio": 0.3,
-    "damping": {"rayleigh": {"alpha1_s": 1e-7, "alpha2_per_s": 0.5}},
-}
+import solver
+from solver import BIN
+
+STEEL = solver.STEEL | {"damping": {"rayleigh": {"alpha1_s": 1e-7, "alpha2_per_s": 0.5}}}
 BAR = {"shape": "bar", "length_m": 0.2, "width_m": 0.03, "thickness_m": 0.02}
 PHASES = ["read", "partition", "assemble", "rigid", "analyse", "count", "factor", "iterate", "check", "errors", "collect", "write", "done"]
 
 
-def run(folder, ranks, *words, **variables):
-    command = ["mpirun", "-np", str(ranks), "--oversubscribe", "--bind-to", "none", str(bin_dir / "carillon-precompute"), *words]
-    return subprocess.run(
-        command, cwd=folder, capture_output=True, text=True, stdin=subprocess.DEVNULL, timeout=120, env=os.environ | variables
-    )
+def run(folder, ranks, *words, code=0, **variables):
+    return solver.run(folder, "carillon-precompute", *words, ranks=ranks, code=code, env=os.environ | variables)
 
 
 def write_job(folder, **keys):
     body = BAR if "accuracy_cents" in keys else BAR | {"nodes": 3000}
-    job = {"body": body, "material": STEEL, "bank": "bar.hdf"} | keys
-    (folder / "job.json").write_text(json.dumps(job))
+    solver.write_job(folder, **{"body": body, "material": STEEL, "bank": "bar.hdf"} | keys)
 
 
 def read_lines(file):
@@ -60,8 +51,7 @@ def try_runs(folder):
     write_job(folder, band_hz=[20, 60000])
     file = folder / "progress.jsonl"
     for ranks in (1, 2):
-        result = run(folder, ranks, "job.json", "--progress", "progress.jsonl")
-        assert result.returncode == 0, result.stderr
+        run(folder, ranks, "job.json", "--progress", "progress.jsonl")
     lines = read_lines(file)
     ends = [i for i, line in enumerate(lines) if line["phase"] == "done"]
     assert len(ends) == 2 and ends[1] == len(lines) - 1, f"the second run does not append to the first: {ends} of {len(lines)}"
@@ -78,8 +68,7 @@ def try_runs(folder):
 
 def try_trials(folder):
     write_job(folder, accuracy_cents=60)
-    result = run(folder, 1, "job.json", "--progress", "trials.jsonl")
-    assert result.returncode == 0, result.stderr
+    run(folder, 1, "job.json", "--progress", "trials.jsonl")
     lines = read_lines(folder / "trials.jsonl")
     check_lines(lines, read_record(folder)["solver"]["modes"], "accuracy_cents")
 
@@ -92,8 +81,7 @@ def try_bad_files(folder):
     job = (folder / "job.json").read_bytes()
     for name in ("none/progress.jsonl", "folder", "pipe", "job.json", "bar.hdf", "./bar.hdf.resolved.json", ""):
         for ranks in (1, 2):
-            result = run(folder, ranks, "job.json", "--progress", name)
-            assert result.returncode == 2, f"--progress '{name}': exit code {result.returncode}: {result.stderr}"
+            result = run(folder, ranks, "job.json", "--progress", name, code=2)
             if name != "":
                 errors = [line for line in result.stderr.splitlines() if "carillon-precompute: error" in line]
                 assert len(errors) == 1 and name.removeprefix("./") in errors[0] and "--progress" in errors[0], result.stderr
@@ -115,10 +103,9 @@ def try_work(folder):
     """Two runs of a job have equal counts; the factor's operations are as planned, and messages as counted independently."""
     write_job(folder, band_hz=[20, 60000])
     records = []
-    preload = {"LD_PRELOAD": str(bin_dir / "libcount_messages.so"), "CARILLON_MESSAGES": str(folder / "messages")}
+    preload = {"LD_PRELOAD": str(BIN / "libcount_messages.so"), "CARILLON_MESSAGES": str(folder / "messages")}
     for variables in ({}, preload):
-        result = run(folder, 3, "job.json", "--profile", **variables)
-        assert result.returncode == 0, result.stderr
+        run(folder, 3, "job.json", "--profile", **variables)
         records.append(read_record(folder))
     assert records[0]["work"] == records[1]["work"], "two runs of a job did different work"
     work, solver = records[0]["work"], records[0]["solver"]
@@ -130,7 +117,7 @@ def try_work(folder):
     assert 0.9 * columns <= work["solve"]["flops"] <= 1.1 * columns, f"{work['solve']['flops']} operations in solves, and {columns} planned"
     assert work["orthogonalise"]["flops"] > 0 and work["partition"]["messages"] > 0
     ours = sum(phase["messages"] for phase in work.values()), sum(phase["bytes"] for phase in work.values())
-    assert run(folder, 3, "job.json").returncode == 0
+    run(folder, 3, "job.json")
     unprofiled = read_record(folder)["work"]
     assert all(phase == {"flops": work[name]["flops"]} for name, phase in unprofiled.items()), "messages are counted without --profile"
     assert ours == sum_messages(folder, 3), f"messages and bytes: {ours} in the record, {sum_messages(folder, 3)} counted"

@@ -9,34 +9,22 @@ about (h / R)^2, which sets the tolerances.
 
 usage: round_shapes.py BIN_DIR
 """
-import json
 import math
 import pathlib
-import subprocess
-import sys
 import tempfile
 
-bin_dir = pathlib.Path(sys.argv[1]).resolve()
+import solver
+
 E, NU, RHO = 200e9, 0.3, 7850.0
 C_T, C_BAR = math.sqrt(E / (2 * (1 + NU)) / RHO), math.sqrt(E / RHO)
 
 
 def solve(folder, body, band, more=None):
-    job = {
-        "body": body,
-        "bank": "bank.hdf",
-        "band_hz": band,
-        **(more or {}),
-        "material": {"young_modulus_pa": E, "poisson_ratio": NU, "density_kg_m3": RHO, "damping": {"internal_friction": {"tan_phi": 1e-3}}},
-    }
-    (folder / "job.json").write_text(json.dumps(job))
-    done = subprocess.run([bin_dir / "carillon-precompute", "-q", "job.json"], cwd=folder, capture_output=True, text=True)
-    assert done.returncode == 0 and done.stdout == "", done
-    return json.loads(
-        subprocess.run(
-            [bin_dir / "carillon-bank", "info", "--json", "bank.hdf"], cwd=folder, capture_output=True, text=True, check=True
-        ).stdout
-    )
+    damping = {"internal_friction": {"tan_phi": 1e-3}}
+    material = {"young_modulus_pa": E, "poisson_ratio": NU, "density_kg_m3": RHO, "damping": damping}
+    solver.write_job(folder, body=body, band_hz=band, material=material, **(more or {}))
+    assert solver.run(folder, "carillon-precompute", "-q", "job.json").stdout == ""
+    return solver.read_info(folder)
 
 
 def compare(name, found, truth, tolerance):

@@ -4,20 +4,18 @@
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
-#include <sstream>
 #include <string>
 #include <vector>
 
 #include "precompute/mesh/write.hpp"
 #include "runtime/bank/bank.hpp"
+#include "tests/support/folder.hpp"
 #include "tests/support/paths.hpp"
 
 namespace carillon::tests {
@@ -33,35 +31,12 @@ struct MaterialText {
   double density_kg_m3 = 7850;
 };
 
-/// A folder that is removed with the test.
-class Folder {
+class JobFolder : public Folder {
  public:
-  Folder() {
-    static int count = 0;
-    path_ = std::filesystem::temp_directory_path() / fmt::format("carillon-path-{}-{}", getpid(), count++);
-    std::filesystem::create_directories(path_);
-  }
-  ~Folder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-
-  std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
-
-  void write(const std::string& name, const std::string& text) const { std::ofstream(path_ / name) << text; }
-
-  std::string read(const std::string& name) const {
-    std::ostringstream text;
-    text << std::ifstream(path_ / name).rdbuf();
-    return text.str();
-  }
-
   std::vector<std::string> list() const {
     std::vector<std::string> names;
-    for (const auto& entry : std::filesystem::recursive_directory_iterator(path_))
-      names.push_back(std::filesystem::relative(entry.path(), path_).string());
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(path()))
+      names.push_back(std::filesystem::relative(entry.path(), path()).string());
     std::sort(names.begin(), names.end());
     return names;
   }
@@ -83,7 +58,7 @@ class Folder {
                                                                              {"OPENBLAS_NUM_THREADS", "1"}})
       setenv(name, value, 1);
     const std::string command = fmt::format("cd '{}' && mpirun -np {} --oversubscribe --bind-to none '{}/carillon-precompute' {} 2>&1",
-                                            path_.string(), ranks, carillon::tests::get_bin_dir(), arguments);
+                                            path().string(), ranks, carillon::tests::get_bin_dir(), arguments);
     Outcome outcome;
     FILE* pipe = popen(command.c_str(), "r");
     std::array<char, 4096> buffer;
@@ -98,14 +73,11 @@ class Folder {
     const Outcome outcome = run(ranks, arguments);
     EXPECT_EQ(outcome.code, 0) << outcome.output;
     if (outcome.code != 0) return {};
-    bank::Bank result = bank::read_bank(path_ / bank_name);
+    bank::Bank result = bank::read_bank(path() / bank_name);
     const auto faults = bank::find_faults(result);
     EXPECT_TRUE(faults.empty()) << faults.front();
     return result;
   }
-
- private:
-  std::filesystem::path path_;
 };
 
 }  // namespace carillon::tests

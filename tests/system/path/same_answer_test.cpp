@@ -17,7 +17,7 @@ using testing::HasSubstr;
 
 TEST(Ranks, give_one_answer_on_1_2_and_3) {
   // A brick without symmetry between its axes: distinct frequencies, so shapes compare one by one.
-  Folder folder;
+  JobFolder folder;
   mesh::write_gmsh(shapes::make_box({0.05, 0.065, 0.085}, {3, 4, 5}, 2), folder / "mesh.msh");
   folder.write_job({}, R"("band_hz": [20, 50000], "max_modes": 12,)");
   const bank::Bank one = folder.solve(1);
@@ -49,11 +49,11 @@ std::string find_job(const std::string& text) {
 }
 
 TEST(ResolvedJob, next_to_the_bank_runs_again_and_gives_the_same_bank) {
-  Folder folder;
+  JobFolder folder;
   mesh::write_gmsh(shapes::make_box({0.1, 0.02, 0.01}, {8, 2, 1}), folder / "mesh.msh");
   folder.write_job({}, R"("element": "T4", "mass": "lumped",)");
   const bank::Bank first = folder.solve();
-  const std::string resolved = folder.read("out.bank.resolved.json");
+  const std::string resolved = read_all(folder / "out.bank.resolved.json");
   EXPECT_EQ(find_job(first.provenance), find_job(resolved));  // the record next to the bank includes the writing of the bank
   for (const char* word : {"\"petsc\"", "\"slepc\"", "\"metis\"", "\"hdf5\"", "\"mpi\"", "\"blas\"", "\"git\"", "\"ranks\"", "\"seconds\"",
                            "\"peak_bytes_largest_rank\"", "\"edge_cut\"", "\"halo_nodes\"", "\"tolerance\"", "\"band_hz\""})
@@ -73,7 +73,7 @@ TEST(TwoBodies, in_one_mesh_have_twelve_rigid_modes_and_every_frequency_twice) {
   for (const auto node : one.tets) both.tets.push_back(node + shift);
   both.regions.insert(both.regions.end(), one.regions.begin(), one.regions.end());
   both.node_sets.clear();
-  Folder folder;
+  JobFolder folder;
   mesh::write_gmsh(both, folder / "mesh.msh");
   folder.write_job({}, R"("max_modes": 6,)");
   const bank::Bank bank = folder.solve(2);
@@ -85,7 +85,7 @@ TEST(TwoBodies, in_one_mesh_have_twelve_rigid_modes_and_every_frequency_twice) {
 }
 
 TEST(MaxModes, gives_the_lowest_of_the_band_and_says_that_there_are_more) {
-  Folder folder;
+  JobFolder folder;
   mesh::write_gmsh(shapes::make_box({0.1, 0.02, 0.01}, {8, 2, 1}), folder / "mesh.msh");
   folder.write_job({}, R"("element": "T4", "band_hz": [20, 40000],)");
   const bank::Bank all = folder.solve();
@@ -103,7 +103,7 @@ TEST(MaxModes, gives_the_lowest_of_the_band_and_says_that_there_are_more) {
 }
 
 TEST(HeldNodes, by_name_and_by_box_give_the_same_modes) {
-  Folder folder;
+  JobFolder folder;
   mesh::write_gmsh(shapes::make_box({0.1, 0.02, 0.01}, {8, 2, 1}), folder / "mesh.msh");
   folder.write_job({}, R"("element": "T10", "max_modes": 3, "fixed": {"node_set": "x-max"},)");
   const bank::Bank named = folder.solve();
@@ -114,7 +114,7 @@ TEST(HeldNodes, by_name_and_by_box_give_the_same_modes) {
 }
 
 TEST(Progress, names_every_phase_begins_with_wide_bars_and_quiet_shows_them_alone) {
-  Folder folder;
+  JobFolder folder;
   mesh::write_gmsh(shapes::make_box({0.1, 0.02, 0.01}, {4, 2, 1}), folder / "mesh.msh");
   folder.write_job({}, R"("element": "T4", "max_modes": 1,)");
   const Outcome loud = folder.run(2);

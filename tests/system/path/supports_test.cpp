@@ -17,7 +17,9 @@ using testing::HasSubstr;
 const MaterialText kSteel{200e9, 0.0, 7850};  // Poisson's ratio 0, so that the fixed end of a beam stays plane
 constexpr double kLength = 0.3, kWidth = 0.012, kHeight = 0.01;
 
-void write_bar(const Folder& folder) { mesh::write_gmsh(shapes::make_box({kLength, kWidth, kHeight}, {30, 1, 1}, 2), folder / "mesh.msh"); }
+void write_bar(const JobFolder& folder) {
+  mesh::write_gmsh(shapes::make_box({kLength, kWidth, kHeight}, {30, 1, 1}, 2), folder / "mesh.msh");
+}
 
 double dot(const double* r, int count) {
   double sum = 0.0;
@@ -27,7 +29,7 @@ double dot(const double* r, int count) {
 
 TEST(Cantilever, pulls_at_its_fixed_end_as_beam_theory_says) {
   // Clamped-free beam: modal force lambda sqrt(0.6131 M), couple lambda 0.5688 L sqrt(M) (integrals of phi and x phi).
-  Folder folder;
+  JobFolder folder;
   write_bar(folder);
   folder.write_job(kSteel, R"("fixed": {"node_set": "x-min", "on": "brick wall", "joint": "screwed"}, "band_hz": [20, 3000],)");
   const bank::Bank bank = folder.solve();
@@ -53,7 +55,7 @@ TEST(Cantilever, pulls_at_its_fixed_end_as_beam_theory_says) {
 }
 
 TEST(Cantilever, has_the_same_supports_on_two_ranks_and_by_its_own_record) {
-  Folder folder;
+  JobFolder folder;
   write_bar(folder);
   folder.write_job(kSteel, R"("fixed": [{"node_set": "x-min", "name": "left", "loss": 0.03}, "x-max"], "band_hz": [20, 3000],)");
   const bank::Bank one = folder.solve(1), two = folder.solve(2);
@@ -69,20 +71,20 @@ TEST(Cantilever, has_the_same_supports_on_two_ranks_and_by_its_own_record) {
   }
   EXPECT_EQ(bank::read_version(folder / "out.bank"), (std::array<int, 2>{1, 4}));
   // The provenance is a job that reproduces the result.
-  EXPECT_THAT(folder.read("out.bank.resolved.json"), HasSubstr("\"left\""));
+  EXPECT_THAT(read_all(folder / "out.bank.resolved.json"), HasSubstr("\"left\""));
   const bank::Bank again = folder.solve(1, "out.bank.resolved.json");
   EXPECT_EQ(again.supports.text, one.supports.text);
 }
 
 TEST(Cantilever, fixed_by_a_box_has_a_support_of_that_name) {
-  Folder folder;
+  JobFolder folder;
   write_bar(folder);
   folder.write_job(kSteel, R"("fixed": {"box_m": {"min": [0, 0, 0], "max": [0, 1, 1]}}, "band_hz": [20, 1000],)");
   EXPECT_THAT(mounting::list_names(folder.solve()), ElementsAre("box 1"));
 }
 
 TEST(FreeBody, has_a_bank_without_supports) {
-  Folder folder;
+  JobFolder folder;
   write_bar(folder);
   folder.write_job(kSteel, R"("band_hz": [20, 3000],)");
   const bank::Bank bank = folder.solve();
@@ -91,7 +93,7 @@ TEST(FreeBody, has_a_bank_without_supports) {
 }
 
 TEST(BadSupport, is_refused_with_its_line_and_a_correction) {
-  Folder folder;
+  JobFolder folder;
   write_bar(folder);
   folder.write_job(kSteel, "\n\"fixed\": {\"node_set\": \"x-min\", \"on\": \"brck wall\"},");
   const Outcome outcome = folder.run();

@@ -8,61 +8,28 @@ geometric: elements have straight sides here, so a ball is slightly small and it
 
 usage: surface_frequencies.py BIN_DIR RANKS
 """
-import json
-import math
 import pathlib
-import subprocess
 import sys
 import tempfile
 
-bin_dir, ranks = pathlib.Path(sys.argv[1]).resolve(), sys.argv[2]
-CERAMIC = {"lame_lambda_pa": 3.99e9, "lame_mu_pa": 2.05e9, "density_kg_m3": 2700}
-STEEL = {"young_modulus_pa": 200e9, "poisson_ratio": 0.3, "density_kg_m3": 7850}
+import solver
+from solver import CERAMIC, STEEL
+
+ranks = int(sys.argv[2])
 NAFEMS = {**STEEL, "density_kg_m3": 8000}
 
 
-def write_sphere(path, radius, rings=48):
-    """A fine latitude-longitude sphere as an OFF file."""
-    points, faces, around = [(0, 0, radius)], [], 2 * rings
-    for i in range(1, rings):
-        for j in range(around):
-            polar, azimuth = math.pi * i / rings, 2 * math.pi * j / around
-            points.append(
-                (radius * math.sin(polar) * math.cos(azimuth), radius * math.sin(polar) * math.sin(azimuth), radius * math.cos(polar))
-            )
-    points.append((0, 0, -radius))
-    at = lambda i, j: 1 + (i - 1) * around + j % around
-    for j in range(around):
-        faces += [(0, at(1, j), at(1, j + 1)), (len(points) - 1, at(rings - 1, j + 1), at(rings - 1, j))]
-        for i in range(1, rings - 1):
-            faces += [(at(i, j), at(i + 1, j), at(i + 1, j + 1)), (at(i, j), at(i + 1, j + 1), at(i, j + 1))]
-    path.write_text(
-        f"OFF\n{len(points)} {len(faces)} 0\n"
-        + "".join("%.9g %.9g %.9g\n" % p for p in points)
-        + "".join("3 %d %d %d\n" % f for f in faces)
-    )
-
-
 def solve(folder, name, mesh_options, material, band):
-    def run(*command):
-        result = subprocess.run([str(word) for word in command], cwd=folder, capture_output=True, text=True, stdin=subprocess.DEVNULL)
-        if result.returncode != 0:
-            sys.exit(f"{command[0]} failed ({result.returncode}):\n{result.stdout[-1500:]}{result.stderr[-1500:]}")
-        return result.stdout
-
-    run(bin_dir / "carillon-mesh", *mesh_options, "-o", f"{name}.msh")
-    (folder / f"{name}.json").write_text(
-        json.dumps({"mesh": f"{name}.msh", "bank": f"{name}.hdf", "band_hz": band, "material": {**material, "damping": {"rayleigh": {}}}})
-    )
-    run("mpirun", "-np", ranks, "--oversubscribe", bin_dir / "carillon-precompute", "-q", f"{name}.json")
-    return json.loads(run(bin_dir / "carillon-bank", "info", "--json", f"{name}.hdf"))
+    solver.run(folder, "carillon-mesh", *mesh_options, "-o", f"{name}.msh")
+    solver.solve(folder, name, ranks, mesh=f"{name}.msh", band_hz=band, material=material)
+    return solver.read_info(folder, name)
 
 
 worst = 0.0
 with tempfile.TemporaryDirectory(prefix="carillon-surface-") as scratch:
     folder = pathlib.Path(scratch)
-    write_sphere(folder / "sphere.off", 0.05)
-    write_sphere(folder / "nafems.off", 0.06)
+    solver.write_sphere(folder / "sphere.off", 0.05)
+    solver.write_sphere(folder / "nafems.off", 0.06)
     # Stuffing needs edges shorter than the wall, so the thin shell uses Delaunay refinement only.
     both = ("delaunay", "stuffing")
     cases = [

@@ -6,7 +6,6 @@ usage: units.py BIN_DIR
 """
 import json
 import pathlib
-import subprocess
 import sys
 import tempfile
 
@@ -14,30 +13,23 @@ import meshio
 import numpy
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "failures"))
+import solver
 from runs import make_box, write_vtkhdf
-
-BIN = pathlib.Path(sys.argv[1]).resolve()
-GLASS = {"young_modulus_pa": 72e9, "poisson_ratio": 0.22, "density_kg_m3": 2500, "damping": {"internal_friction": {"tan_phi": 1e-3}}}
+from solver import GLASS, read_record
 
 
 def run(folder, *words, ranks=1):
-    launcher = ["mpirun", "-np", str(ranks), "--oversubscribe", "--bind-to", "none"] if ranks > 1 else []
-    return subprocess.run(
-        [*launcher, str(BIN / "carillon-precompute"), *map(str, words)],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        stdin=subprocess.DEVNULL,
-        timeout=100,
-    )
+    return solver.run(folder, "carillon-precompute", *words, ranks=ranks)
+
+
+def write_job(folder, **job):
+    solver.write_job(folder, **{"material": GLASS} | job)
 
 
 def solve(folder, ranks=1, **job):
-    (folder / "job.json").write_text(json.dumps({"material": GLASS, "bank": "bank.hdf", "band_hz": [20, 60000], "max_modes": 8} | job))
+    write_job(folder, **{"band_hz": [20, 60000], "max_modes": 8} | job)
     done = run(folder, "-q", "job.json", ranks=ranks)
-    assert done.returncode == 0, done.stderr
-    info = subprocess.run([BIN / "carillon-bank", "info", "--json", "bank.hdf"], cwd=folder, capture_output=True, text=True, check=True)
-    return numpy.array(json.loads(info.stdout)["frequencies_hz"]), json.loads((folder / "bank.hdf.resolved.json").read_text()), done.stderr
+    return numpy.array(solver.read_info(folder)["frequencies_hz"]), read_record(folder), done.stderr
 
 
 def expect_close(found, wanted, what):
@@ -62,15 +54,15 @@ def check_scale(folder):
             assert record["mesh_scale"] == 0.001 and "millimetres" not in said, said
         # The provenance is a job that reproduces the result.
         (folder / "again.json").write_text(json.dumps({key: value for key, value in record.items() if key != "run"}))
-        assert run(folder, "-q", "again.json").returncode == 0
+        run(folder, "-q", "again.json")
     accurate, record, _ = solve(folder, mesh="millimetres.vtu", mesh_scale=0.001, accuracy_cents=300, max_modes=8)
     coarse, _, _ = solve(folder, mesh="metres.vtu", accuracy_cents=300, max_modes=8)
     expect_close(accurate, coarse, "accuracy_cents")
     # Without the key the warning names it; with a wrong value it states the right one.
-    (folder / "job.json").write_text(json.dumps({"mesh": "metres.vtu", "mesh_scale": 1000, "material": GLASS, "bank": "bank.hdf"}))
+    write_job(folder, mesh="metres.vtu", mesh_scale=1000)
     warnings = json.loads(run(folder, "--validate", "--json", "job.json").stdout)["warnings"]
     assert any("millimetres" in text and "is 1000: for millimetres give 1" in text for text in warnings), warnings
-    (folder / "job.json").write_text(json.dumps({"mesh": "millimetres.vtu", "material": GLASS, "bank": "bank.hdf"}))
+    write_job(folder, mesh="millimetres.vtu")
     looked = run(folder, "--validate", "--json", "job.json")
     warnings = json.loads(looked.stdout)["warnings"]
     assert any("millimetres" in text and '"mesh_scale": 0.001' in text for text in warnings), warnings
@@ -89,11 +81,8 @@ def check_questions(folder):
         ({"density_kg_m3": 2.5}, ["2.5: was it given in g/cm^3?"]),
         ({"damping": {"rayleigh": {}}}, ["rings for ever"]),
     ):
-        (folder / "job.json").write_text(
-            json.dumps({"body": body, "material": GLASS | change, "bank": "bank.hdf", "band_hz": [20, 5000], "max_modes": 3})
-        )
+        write_job(folder, body=body, material=GLASS | change, band_hz=[20, 5000], max_modes=3)
         looked = run(folder, "--validate", "--json", "job.json")
-        assert looked.returncode == 0, looked.stderr
         warnings = json.loads(looked.stdout)["warnings"]
         for word in words:
             assert sum(word in text for text in warnings) == 1, f"{change}: {warnings}"
@@ -101,8 +90,8 @@ def check_questions(folder):
         people = run(folder, "--validate", "job.json")
         assert all(word in people.stderr for word in words), people.stderr
     solved = run(folder, "-q", "job.json")  # no damping: solved, with the warning in the provenance
-    assert solved.returncode == 0 and "rings for ever" in solved.stderr, solved.stderr
-    assert any("rings for ever" in text for text in json.loads((folder / "bank.hdf.resolved.json").read_text())["run"]["warnings"])
+    assert "rings for ever" in solved.stderr, solved.stderr
+    assert any("rings for ever" in text for text in read_record(folder)["run"]["warnings"])
 
 
 with tempfile.TemporaryDirectory() as top:

@@ -7,7 +7,6 @@
         assert page.find_strangers(server.url) == []
 """
 
-import base64
 import contextlib
 import functools
 import http.server
@@ -267,9 +266,6 @@ class Page:
     def resize(self, width, height):
         """Sets the size of the screen in CSS pixels."""
         self.call("Emulation.setDeviceMetricsOverride", {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False})
-
-    def screenshot(self, file):
-        pathlib.Path(file).write_bytes(base64.b64decode(self.call("Page.captureScreenshot", {"format": "png"})["data"]))
 
     def find_strangers(self, origin):
         """Requests to other origins than ("http://127.0.0.1:8000/")."""

@@ -17,6 +17,7 @@
 #include "partition/metis.hpp"
 #include "runtime/base/error.hpp"
 #include "tests/support/box_mesh.hpp"
+#include "tests/support/catch_message.hpp"
 #include "tests/unit/partition/fill.hpp"
 
 namespace carillon::partition {
@@ -49,12 +50,7 @@ TEST(DualGraph, joins_exactly_the_tetrahedra_that_share_three_corners) {
 
 TEST(DualGraph, refuses_three_tetrahedra_on_one_face_and_names_them) {
   const std::vector<std::int32_t> corners{0, 1, 2, 3, 0, 1, 2, 4, 0, 1, 2, 5};
-  try {
-    make_dual_graph(corners);
-    FAIL() << "accepted";
-  } catch (const InputError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("tetrahedra 0, 1 and 2 share one face (nodes 0, 1, 2)"));
-  }
+  tests::expect_error<InputError>({"tetrahedra 0, 1 and 2 share one face (nodes 0, 1, 2)"}, [&] { make_dual_graph(corners); });
 }
 
 TEST(NodeGraph, joins_nodes_of_one_element_and_skips_negative_ones) {
@@ -110,12 +106,7 @@ TEST(Partition, leaves_no_part_empty_down_to_one_element_each) {
 
 TEST(Partition, refuses_more_parts_than_elements_and_says_how_many_ranks_to_start) {
   const auto cube = tests::make_box({1, 1, 1}, {1, 1, 1});
-  try {
-    partition_elements(cube.tets, 7);
-    FAIL() << "accepted";
-  } catch (const InputError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("6 tetrahedra, fewer than the 7 ranks; start at most 6"));
-  }
+  tests::expect_error<InputError>({"6 tetrahedra, fewer than the 7 ranks; start at most 6"}, [&] { partition_elements(cube.tets, 7); });
   EXPECT_THROW(partition_elements(cube.tets, 0), InputError);
 }
 

@@ -7,6 +7,7 @@
 
 #include "jobs/cli/options.hpp"
 #include "runtime/base/error.hpp"
+#include "tests/support/catch_message.hpp"
 
 namespace carillon::cli {
 namespace {
@@ -16,12 +17,7 @@ std::string find_refusal(std::vector<std::string> words, Shared& shared) {
   words.insert(words.begin(), "carillon");
   std::vector<char*> argv;
   for (std::string& word : words) argv.push_back(word.data());
-  try {
-    (void)parse_command_line(static_cast<int>(argv.size()), argv.data(), shared);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
+  return tests::catch_message<InputError>([&] { (void)parse_command_line(static_cast<int>(argv.size()), argv.data(), shared); });
 }
 
 TEST(CommandLine, global_options_before_and_after_the_command) {

@@ -8,6 +8,7 @@
 #include "jobs/store/identity.hpp"
 #include "precompute/job/simulation.hpp"
 #include "runtime/base/error.hpp"
+#include "tests/support/catch_message.hpp"
 #include "tests/support/folder.hpp"
 #include "tests/unit/jobs/store/ids.hpp"
 
@@ -112,12 +113,8 @@ TEST(Order, invalid_jobs_are_refused_with_their_line) {
   const Folder folder;
   folder.write("m.msh", "$MeshFormat\n");
   EXPECT_THROW(store::read_order(folder.write("a.json", simulation_of("m.msh", "", ""))), InputError);
-  try {
-    (void)store::parse_order(simulation_of("m.msh", ", \"gravty_m_s2\": [0, 0, 1]"), folder / "list.txt", 7);
-    FAIL();
-  } catch (const InputError& error) {
-    EXPECT_NE(std::string(error.what()).find("list.txt:7"), std::string::npos) << error.what();
-  }
+  tests::expect_error<InputError>(
+      {"list.txt:7"}, [&] { (void)store::parse_order(simulation_of("m.msh", ", \"gravty_m_s2\": [0, 0, 1]"), folder / "list.txt", 7); });
 }
 
 }  // namespace

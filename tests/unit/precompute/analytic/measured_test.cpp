@@ -9,6 +9,7 @@
 
 #include "precompute/analytic/make_bank.hpp"
 #include "runtime/base/error.hpp"
+#include "tests/support/catch_message.hpp"
 #include "tests/unit/precompute/analytic/bodies.hpp"
 
 namespace carillon::analytic {
@@ -24,12 +25,7 @@ class Table : public testing::Test {
   void write(const std::string& text) const { std::ofstream(file_, std::ios::binary) << text; }
   std::string find_fault(const std::string& text) const {
     write(text);
-    try {
-      (void)read_modes_table(file_);
-    } catch (const InputError& error) {
-      return error.what();
-    }
-    return "";
+    return tests::catch_message<InputError>([&] { (void)read_modes_table(file_); });
   }
   const fs::path file_;
 };

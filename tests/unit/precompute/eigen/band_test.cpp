@@ -10,6 +10,7 @@
 #include "precompute/eigen/solve_modes.hpp"
 #include "precompute/petsc/session.hpp"
 #include "runtime/base/error.hpp"
+#include "tests/support/catch_message.hpp"
 #include "tests/unit/precompute/eigen/spring_network.hpp"
 
 namespace carillon::eigen {
@@ -346,12 +347,7 @@ TEST(SolveModes, refuses_bad_options_and_names_them) {
     test::System system = test::make_system(make_block(3, 3, 3));
     Options options = make_options();
     bad.spoil(system.problem, options);
-    try {
-      solve_modes(system.problem, options);
-      ADD_FAILURE() << bad.name;
-    } catch (const InputError& error) {
-      EXPECT_NE(std::string(error.what()).find(bad.words), std::string::npos) << bad.name << ": " << error.what();
-    }
+    tests::expect_error<InputError>({bad.words}, [&] { solve_modes(system.problem, options); });
   }
 }
 

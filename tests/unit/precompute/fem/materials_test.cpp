@@ -14,6 +14,7 @@
 #include "precompute/mesh/distributed/distribute.hpp"
 #include "precompute/petsc/session.hpp"
 #include "tests/support/box_mesh.hpp"
+#include "tests/support/catch_message.hpp"
 #include "tests/support/ranks.hpp"
 
 namespace carillon::fem {
@@ -77,14 +78,9 @@ TEST(MaterialsByRegion, are_found_among_names_of_any_bytes) {
 
 void expect_refused(const std::string& materials, const std::string& words) {
   const mesh::DistributedMesh pieces = distribute_halves(1);
-  try {
+  tests::expect_error<InputError>({words, "job.json", "9 \"oak\""}, [&] {
     find_materials(kWorld, pieces.local, parse(materials), {{9, "oak"}});
-    FAIL() << "accepted";
-  } catch (const InputError& error) {
-    EXPECT_THAT(error.what(), HasSubstr(words));
-    EXPECT_THAT(error.what(), HasSubstr("job.json"));
-    EXPECT_THAT(error.what(), HasSubstr("9 \"oak\""));
-  }
+  });
 }
 
 TEST(MaterialsByRegion, that_miss_a_region_are_refused_and_the_region_is_named) {
@@ -105,12 +101,7 @@ TEST(MaterialsByRegion, fail_on_every_rank_with_the_words_of_the_one_that_lacks_
   mesh::DistributedMesh pieces = distribute_halves(1);
   const auto job = parse("\"materials\": {\"7\": " + isotropic(1) + ", \"9\": " + isotropic(1) + "}");
   if (get_rank() == get_ranks() - 1) pieces.local.region.resize(1);
-  try {
-    find_materials(kWorld, pieces.local, job);
-    FAIL() << "accepted";
-  } catch (const SystemError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("with 1 region tags"));
-  }
+  tests::expect_error<SystemError>({"with 1 region tags"}, [&] { find_materials(kWorld, pieces.local, job); });
   MPI_Barrier(kWorld);  // no rank is left waiting in another collective
 }
 

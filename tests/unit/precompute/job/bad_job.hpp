@@ -6,6 +6,7 @@
 #include <string>
 
 #include "precompute/job/job_spec.hpp"
+#include "tests/support/catch_message.hpp"
 
 namespace carillon::tests {
 
@@ -18,14 +19,7 @@ struct BadJob {
 
 /// Fails unless the text is refused with both the place and the words.
 inline void expect_refused(const BadJob& job) {
-  try {
-    job::parse_job(job.text, "/jobs/job.json");
-    FAIL() << "accepted";
-  } catch (const InputError& error) {
-    const std::string message = error.what();
-    EXPECT_NE(message.find(job.place), std::string::npos) << message;
-    EXPECT_NE(message.find(job.words), std::string::npos) << message;
-  }
+  tests::expect_error<InputError>({job.place, job.words}, [&] { job::parse_job(job.text, "/jobs/job.json"); });
 }
 
 }  // namespace carillon::tests

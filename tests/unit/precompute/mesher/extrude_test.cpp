@@ -14,6 +14,7 @@
 #include "precompute/mesher/skin.hpp"
 #include "precompute/mesher/surface.hpp"
 #include "runtime/base/error.hpp"
+#include "tests/support/catch_message.hpp"
 #include "tests/unit/precompute/mesher/surfaces.hpp"
 
 namespace carillon::mesher {
@@ -96,12 +97,7 @@ mesh::TetMesh make(const Polygons& s, SurfaceOptions options, SurfaceReport& rep
 
 std::string find_refusal(const Polygons& s, const SurfaceOptions& options) {
   SurfaceReport report;
-  try {
-    make(s, options, report);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
+  return tests::catch_message<InputError>([&] { make(s, options, report); });
 }
 
 TEST(extrude, prism_conformity) {

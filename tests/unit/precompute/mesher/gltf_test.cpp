@@ -9,6 +9,7 @@
 
 #include "precompute/mesher/triangle_surface.hpp"
 #include "runtime/base/error.hpp"
+#include "tests/support/catch_message.hpp"
 #include "tests/unit/precompute/mesher/surfaces.hpp"
 
 namespace carillon::mesher {
@@ -71,12 +72,7 @@ Model make_model(const Polygons& body) {
 TriangleSurface read(const Model& model) { return parse_surface(to_glb(model.json(), model.binary), "body.glb", "glb"); }
 
 std::string find_error(const std::string& bytes, const std::string& format = "glb") {
-  try {
-    parse_surface(bytes, "body." + format, format);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
+  return tests::catch_message<InputError>([&] { parse_surface(bytes, "body." + format, format); });
 }
 
 /// Chain of child nodes; the last has the mesh.

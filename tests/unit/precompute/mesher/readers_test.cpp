@@ -8,6 +8,7 @@
 #include "precompute/mesher/surface.hpp"
 #include "precompute/mesher/triangle_surface.hpp"
 #include "runtime/base/error.hpp"
+#include "tests/support/catch_message.hpp"
 #include "tests/unit/precompute/mesher/surfaces.hpp"
 
 namespace carillon::mesher {
@@ -16,12 +17,7 @@ namespace {
 using namespace testing;
 
 std::string refusal(const std::string& text, const std::string& format) {
-  try {
-    parse_surface(text, "body." + format, format);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
+  return tests::catch_message<InputError>([&] { parse_surface(text, "body." + format, format); });
 }
 
 double volume_of(const std::string& text, const std::string& format) { return calc_volume(parse_surface(text, "body." + format, format)); }

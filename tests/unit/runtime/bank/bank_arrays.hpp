@@ -11,6 +11,7 @@
 
 #include "runtime/bank/layout.hpp"
 #include "runtime/base/error.hpp"
+#include "tests/support/catch_message.hpp"
 
 namespace carillon::bank {
 
@@ -32,12 +33,7 @@ struct Arrays {
   }
   /// Error message, or "".
   std::string find_error() const {
-    try {
-      (void)assemble_bank(list, "arrays");
-    } catch (const InputError& error) {
-      return error.what();
-    }
-    return "";
+    return tests::catch_message<InputError>([&] { (void)assemble_bank(list, "arrays"); });
   }
 };
 

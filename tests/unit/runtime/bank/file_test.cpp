@@ -12,6 +12,7 @@
 #include <random>
 
 #include "runtime/bank/reduce.hpp"
+#include "tests/support/catch_message.hpp"
 #include "tests/support/folder.hpp"
 #include "tests/support/paths.hpp"
 #include "tests/unit/runtime/bank/bank_arrays.hpp"
@@ -26,12 +27,7 @@ namespace fs = std::filesystem;
 class BankFile : public testing::Test {
  protected:
   std::string message_of(const fs::path& file) const {
-    try {
-      read_bank(file);
-    } catch (const InputError& error) {
-      return error.what();
-    }
-    return "(was read)";
+    return tests::catch_message<InputError>([&] { read_bank(file); });
   }
   void put(const std::string& bytes) const { std::ofstream(file_, std::ios::binary) << bytes; }
   std::string get() const {

@@ -13,6 +13,7 @@
 #include <fstream>
 
 #include "runtime/base/environment.hpp"
+#include "tests/support/catch_message.hpp"
 
 namespace carillon::base {
 namespace {
@@ -78,12 +79,7 @@ TEST(Command, start_errors_state_the_reason) {
   const std::ptrdiff_t before = count_descriptors();
   for (const std::string& program :
        {std::string("/no/such/program"), std::string("no-such-program-anywhere"), std::string("/etc/passwd")}) {
-    try {
-      run({.words = {program}});
-      FAIL() << program;
-    } catch (const StartError& error) {
-      EXPECT_NE(std::string(error.what()).find(program + ": cannot be started: "), std::string::npos);
-    }
+    tests::expect_error<StartError>({program + ": cannot be started: "}, [&] { run({.words = {program}}); });
   }
   EXPECT_THROW(run({.words = {"true"}, .folder = "/no/such/folder"}), StartError);
   EXPECT_EQ(count_descriptors(), before);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "runtime/base/error.hpp"
+#include "tests/support/catch_message.hpp"
 
 namespace carillon::base {
 namespace {
@@ -40,12 +41,7 @@ Thing read(const std::string& text) {
 }
 
 std::string refuse(const std::string& text) {
-  try {
-    read(text);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "accepted";
+  return tests::catch_message<InputError>([&] { read(text); });
 }
 
 TEST(Keys, ReadMembersOfAllTypes) {

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "runtime/base/error.hpp"
+#include "tests/support/catch_message.hpp"
 
 namespace carillon::events::tests {
 namespace {
@@ -153,12 +154,7 @@ void expect_same(const BodyMotion& a, const BodyMotion& b) {
 void expect_same(const Listener& a, const Listener& b) { expect_same_moving(a, b); }
 
 std::string find_error(const std::string& text) {
-  try {
-    parse_recording(text, "run.jsonl");
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
+  return carillon::tests::catch_message<InputError>([&] { parse_recording(text, "run.jsonl"); });
 }
 
 void expect_error(const std::string& text, const std::string& part) {
@@ -197,13 +193,7 @@ TEST(Recording, ReadsAForceAndRejectsInvalidOnes) {
 TEST(Recording, RejectsAbsurdAmounts) {
   const auto refuse = [](const std::string& from, const std::string& to, const std::string& key) {
     const std::string text = replace(kHeader + kImpulse, from, to);
-    try {
-      parse_recording(text, "run.jsonl");
-      ADD_FAILURE() << to << " was read";
-    } catch (const InputError& error) {
-      EXPECT_NE(std::string(error.what()).find("run.jsonl:2: \"impulse." + key), std::string::npos) << error.what();
-      EXPECT_NE(std::string(error.what()).find("at most"), std::string::npos) << error.what();
-    }
+    carillon::tests::expect_error<InputError>({"run.jsonl:2: \"impulse." + key, "at most"}, [&] { parse_recording(text, "run.jsonl"); });
   };
   refuse("1e-3]", "1.1e9]", "impulse_n_s");
   refuse("1e-3]", "-1e39]", "impulse_n_s");

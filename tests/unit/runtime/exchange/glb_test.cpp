@@ -21,6 +21,7 @@
 #include "runtime/bank/write.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/material/table.hpp"
+#include "tests/support/catch_message.hpp"
 #include "tests/support/folder.hpp"
 #include "tests/support/paths.hpp"
 #include "tests/unit/runtime/bank/example_bank.hpp"
@@ -36,12 +37,7 @@ std::string to_glb(const bank::Bank& bank, const GlbOptions& options = {}) {
 }
 
 std::string find_error(const std::string& bytes, const GlbReading& reading = {}) {
-  try {
-    (void)parse_glb(bytes, "body.glb", reading);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
+  return tests::catch_message<InputError>([&] { (void)parse_glb(bytes, "body.glb", reading); });
 }
 
 /// Replaces a text in the JSON chunk and corrects the lengths.

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "runtime/base/printable.hpp"
+#include "tests/support/catch_message.hpp"
 
 namespace carillon::material {
 namespace {
@@ -19,12 +20,7 @@ std::optional<Fixing> read_supports(const std::string& members) {
 }
 
 std::string fail(const std::string& members) {
-  try {
-    read_supports(members);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "no error";
+  return tests::catch_message<InputError>([&] { read_supports(members); });
 }
 
 /// Input of read_supports().

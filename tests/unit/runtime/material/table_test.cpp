@@ -14,6 +14,7 @@
 
 #include "runtime/material/read_material.hpp"
 #include "runtime/material/solids.hpp"
+#include "tests/support/catch_message.hpp"
 
 namespace carillon::material {
 namespace {
@@ -28,12 +29,7 @@ Material read(const std::string& text) {
 }
 
 std::string find_error(const std::string& text) {
-  try {
-    read(text);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
+  return tests::catch_message<InputError>([&] { read(text); });
 }
 
 TEST(MaterialTable, has_solids_of_every_kind_with_sources) {

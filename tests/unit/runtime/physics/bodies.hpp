@@ -1,6 +1,8 @@
 // Bodies of tests, and worlds that run past the time at which all should rest.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -12,20 +14,9 @@
 
 #include "runtime/physics/world.hpp"
 #include "tests/unit/runtime/physics/checks.hpp"
-#include "tests/unit/runtime/physics/geometry/solids.hpp"
 #include "tests/unit/runtime/physics/solids.hpp"
 
 namespace carillon::physics::tests {
-
-/// A body of uniform density with the surface of a solid.
-inline bank::Bank make_bank(const geometry::tests::Solid& solid, const bank::Material& material = ceramic()) {
-  bank::Bank bank;
-  bank.material = material;
-  bank.vertices_m.assign(solid.vertices.begin(), solid.vertices.end());
-  bank.triangles.assign(solid.triangles.begin(), solid.triangles.end());
-  set_rigid_of_solid(bank);
-  return bank;
-}
 
 /// Invented modes on the surface of a bank: every vertex moves in a direction of its own.
 inline bank::Bank add_modes(bank::Bank bank, int modes) {
@@ -79,6 +70,34 @@ inline double calc_drift(const Course& course) {
   for (std::size_t i = 0; i < course.at_end.size(); ++i)
     drift = std::max(drift, norm(course.at_end[i].position_m - course.at_begin[i].position_m));
   return drift;
+}
+
+/// Events of a world with an audit of its energy.
+struct Outcome {
+  std::vector<events::Event> events;
+  std::vector<events::Force> forces;
+  int impulses = 0;
+  EnergyAudit energy;
+};
+
+inline Outcome run_audited(const WorldSpec& spec, double end_s) {
+  World world(spec, {.end_s = end_s, .audits_energy = true});
+  Outcome outcome;
+  world.advance(end_s, std::numeric_limits<double>::infinity(), [&](const events::Event& event) {
+    EXPECT_EQ(events::find_fault(event), nullptr);
+    outcome.events.push_back(event);
+    if (const auto* force = std::get_if<events::Force>(&event)) outcome.forces.push_back(*force);
+    if (std::holds_alternative<events::Impulse>(event)) ++outcome.impulses;
+  });
+  outcome.energy = world.get_statistics().energy;
+  return outcome;
+}
+
+inline events::BodyMotion find_last(const Outcome& outcome, int body, double before_s = 1e9) {
+  events::BodyMotion last;
+  for (const events::Event& event : outcome.events)
+    if (const auto* m = std::get_if<events::BodyMotion>(&event); m != nullptr && m->body == body && m->time_s <= before_s) last = *m;
+  return last;
 }
 
 }  // namespace carillon::physics::tests

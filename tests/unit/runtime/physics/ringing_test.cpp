@@ -12,33 +12,6 @@
 namespace carillon::physics::tests {
 namespace {
 
-struct Outcome {
-  std::vector<events::Force> forces;
-  std::vector<events::BodyMotion> motions;
-  int impulses = 0;
-  EnergyAudit energy;
-};
-
-Outcome run(const WorldSpec& spec, double end_s) {
-  World world(spec, {.end_s = end_s, .audits_energy = true});
-  Outcome outcome;
-  world.advance(end_s, std::numeric_limits<double>::infinity(), [&](const events::Event& event) {
-    EXPECT_EQ(events::find_fault(event), nullptr);
-    if (const auto* force = std::get_if<events::Force>(&event)) outcome.forces.push_back(*force);
-    if (const auto* motion = std::get_if<events::BodyMotion>(&event)) outcome.motions.push_back(*motion);
-    if (std::holds_alternative<events::Impulse>(event)) ++outcome.impulses;
-  });
-  outcome.energy = world.get_statistics().energy;
-  return outcome;
-}
-
-events::BodyMotion find_last(const Outcome& outcome, int body) {
-  events::BodyMotion last;
-  for (const events::BodyMotion& m : outcome.motions)
-    if (m.body == body) last = m;
-  return last;
-}
-
 TEST(Ringing, EqualAndOppositeForces) {
   // Two that ring meet in flight without spin about the line between them.
   const bank::Bank ball = add_modes(make_ball(0.03, 3), 20), box = add_modes(make_box({0.1, 0.08, 0.05}), 20);
@@ -46,10 +19,10 @@ TEST(Ringing, EqualAndOppositeForces) {
   w.gravity_m_s2 = {0, 0, 0};
   w.bodies = {make_body("ball", ball, {0, 0, 0}, 0.6), make_body("box", box, {0.2, 0.01, 0.005}, 0.6)};
   w.bodies[1].velocity_m_s = {-2, 0, 0};
-  const Outcome r = run(w, 0.2);
+  const Outcome r = run_audited(w, 0.2);
   ASSERT_FALSE(r.forces.empty());
   EXPECT_EQ(r.impulses, 0);
-  const Simulation paths = collect({r.motions.begin(), r.motions.end()}, {ball.rigid.centre_m, box.rigid.centre_m});
+  const Simulation paths = collect(r.events, {ball.rigid.centre_m, box.rigid.centre_m});
   Vec3 on[2] = {};
   for (const events::Force& f : r.forces) {
     for (int k = 0; k < f.count; ++k) {
@@ -116,7 +89,7 @@ TEST_P(Books, EnergyBalanceWithinOnePercent) {
       w.bodies[0].fixed = true;
       w.bodies[0].initial.rotation = {std::cos(0.15), 0, std::sin(0.15), 0};
   }
-  const EnergyAudit e = run(w, 1.0).energy;
+  const EnergyAudit e = run_audited(w, 1.0).energy;
   EXPECT_GT(e.max_modes_j, 0.0);
   EXPECT_GT(e.lost_j, 0.0);
   EXPECT_LT(e.error_j, 0.01 * e.start_j) << "start " << e.start_j << ", motion " << e.motion_j << ", modes " << e.modes_j << ", lost "
@@ -136,7 +109,7 @@ TEST(Ringing, BoxesThatStrikeTheGroundAndEachOtherAtOnceKeepTheBooks) {
                 make_body("third", box, {-0.02, 2e-4 * n, 0.3}, 0.6)};
     w.bodies[1].initial.rotation = {0.98, 0.1, 0.15, 0.0};
     w.bodies[2].initial.rotation = {0.9, -0.3, 0.1, 0.2};
-    const EnergyAudit e = run(w, 0.7).energy;
+    const EnergyAudit e = run_audited(w, 0.7).energy;
     EXPECT_LT(e.error_j, 0.01 * e.start_j);
     EXPECT_LT(e.max_modes_j, e.start_j);
   }
@@ -179,7 +152,7 @@ TEST(Ringing, EnergyBalanceOfRandomHeaps) {
       body.velocity_m_s = {0.3 * numbers[6], 0.3 * numbers[7], numbers[8] - 1.0};
       body.angular_velocity_rad_s = {5.0 * numbers[9], 5.0 * numbers[10], 5.0 * numbers[11]};
     }
-    const EnergyAudit e = run(w, 1.0).energy;
+    const EnergyAudit e = run_audited(w, 1.0).energy;
     EXPECT_LT(e.error_j, 0.01 * e.start_j);
     EXPECT_LT(e.max_modes_j, e.start_j);
     EXPECT_LE(e.modes_share, 1.0);
@@ -193,7 +166,7 @@ TEST(Ringing, GroundReactionOfStruckPlate) {
   WorldSpec w;
   w.ground = GroundSpec{};
   w.bodies = {make_body("plate", plate, {0, 0, 0.005}, 0.6), make_body("ball", ball, {0.03, 0.04, 0.1}, 0.6)};
-  const Outcome r = run(w, 0.13);
+  const Outcome r = run_audited(w, 0.13);
   double on_ball = 0.0, on_plate = 0.0, by_ball = 0.0;
   for (const events::Force& f : r.forces)
     for (int k = 0; k < f.count; ++k) {
@@ -218,7 +191,7 @@ TEST(Ringing, SupportByStruckShelf) {
   w.bodies = {make_body("shelf", plate, {0, 0, 0}, 0.6), make_body("box", box, {-0.2, 0, 0.03}, 0.6),
               make_body("ball", ball, {0.2, 0, 0.3}, 0.6), make_body("other", ball, {0.2, 0.1, 0.3003}, 0.6)};
   w.bodies[0].fixed = true;
-  const Outcome r = run(w, 0.6);
+  const Outcome r = run_audited(w, 0.6);
   int on_shelf = 0;
   for (const events::Force& f : r.forces) on_shelf += f.body == 0 ? 1 : 0;
   EXPECT_GT(on_shelf, 0);

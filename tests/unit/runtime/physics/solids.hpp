@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "runtime/bank/bank.hpp"
+#include "tests/unit/runtime/physics/geometry/solids.hpp"
 
 namespace carillon::physics::tests {
 
@@ -84,46 +85,19 @@ inline bank::Bank make_ball(double radius_m, int levels = 4) {
   return bank;
 }
 
-/// A box about the origin, each face divided into n[k] cells along axis k.
-inline bank::Bank make_box(std::array<double, 3> size_m, std::array<int, 3> n = {1, 1, 1}) {
+/// A body of uniform density with the surface of a solid.
+inline bank::Bank make_bank(const geometry::tests::Solid& solid, const bank::Material& material = ceramic()) {
   bank::Bank bank;
-  bank.material = ceramic();
-  std::map<std::array<int, 3>, std::int32_t> index;
-  const auto vertex = [&](std::array<int, 3> i) {
-    const auto [it, fresh] = index.emplace(i, static_cast<std::int32_t>(bank.vertices_m.size()));
-    if (fresh) {
-      Vec3 x{};
-      for (int k = 0; k < 3; ++k) x[k] = size_m[k] * (static_cast<double>(i[k]) / n[k] - 0.5);
-      bank.vertices_m.push_back(x);
-    }
-    return it->second;
-  };
-  for (int axis = 0; axis < 3; ++axis) {
-    const int u = (axis + 1) % 3, v = (axis + 2) % 3;
-    for (int side = 0; side < 2; ++side) {
-      for (int i = 0; i < n[u]; ++i) {
-        for (int j = 0; j < n[v]; ++j) {
-          const auto at = [&](int di, int dj) {
-            std::array<int, 3> p{};
-            p[axis] = side * n[axis];
-            p[u] = i + di;
-            p[v] = j + dj;
-            return vertex(p);
-          };
-          const auto a = at(0, 0), b = at(1, 0), c = at(1, 1), d = at(0, 1);
-          if (side == 1) {
-            bank.triangles.push_back({a, b, c});
-            bank.triangles.push_back({a, c, d});
-          } else {
-            bank.triangles.push_back({a, c, b});
-            bank.triangles.push_back({a, d, c});
-          }
-        }
-      }
-    }
-  }
+  bank.material = material;
+  bank.vertices_m.assign(solid.vertices.begin(), solid.vertices.end());
+  bank.triangles.assign(solid.triangles.begin(), solid.triangles.end());
   set_rigid_of_solid(bank);
   return bank;
+}
+
+/// A box about the origin, each face divided into n[k] cells along axis k.
+inline bank::Bank make_box(const Vec3& size_m, const std::array<int, 3>& n = {1, 1, 1}) {
+  return make_bank(geometry::tests::make_box(size_m, n));
 }
 
 /// Cubes of side `side_m` at whole-numbered places, glued at their faces; cubes that meet in a corner only share that vertex.

@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "runtime/scene/banks.hpp"
+#include "tests/support/catch_message.hpp"
 #include "tests/unit/runtime/bank/example_bank.hpp"
 
 namespace carillon::scene {
@@ -37,13 +38,10 @@ class Mounting : public ::testing::Test {
     return parse_scene(base::parse_document("{\"duration_s\": 1,\n\"bodies\": [" + bodies + "]}", folder_ / "scene.json"));
   }
   std::string fail(const std::string& bodies) const {
-    try {
+    return tests::catch_message<InputError>([&] {
       Scene scene = parse(bodies);
       read_banks(scene);
-    } catch (const InputError& error) {
-      return error.what();
-    }
-    return "no error";
+    });
   }
 
   fs::path folder_ = fs::temp_directory_path() / ("carillon-mounting-" + std::to_string(getpid()));

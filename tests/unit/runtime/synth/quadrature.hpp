@@ -28,9 +28,4 @@ inline double calc_reference_pulse(double x) {
   return x <= 0.0 || x >= 1.0 ? 0.0 : std::pow(std::sin(std::numbers::pi * x), 1.5) / area;
 }
 
-/// Fourier transform of the centred pulse of duration 1 at omega tau.
-inline double calc_reference_spectrum(double omega_tau) {
-  return integrate([=](double x) { return calc_reference_pulse(x) * std::cos(omega_tau * (x - 0.5)); }, 0.0, 1.0);
-}
-
 }  // namespace carillon::testing

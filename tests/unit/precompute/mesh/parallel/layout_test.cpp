@@ -12,6 +12,7 @@
 
 #include "runtime/base/error.hpp"
 #include "tests/support/box_mesh.hpp"
+#include "tests/support/catch_message.hpp"
 #include "tests/unit/precompute/mesh/parallel/write_vtkhdf.hpp"
 
 namespace carillon::parallel_mesh {
@@ -35,12 +36,7 @@ class File {
 };
 
 std::string find_refusal(const std::filesystem::path& file) {
-  try {
-    find_layout(file);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
+  return tests::catch_message<InputError>([&] { find_layout(file); });
 }
 
 TEST(Layout, array_offsets) {

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "runtime/base/printable.hpp"
+#include "tests/support/catch_message.hpp"
 #include "tests/unit/runtime/bank/example_bank.hpp"
 
 namespace carillon::mounting {
@@ -288,12 +289,7 @@ TEST(Names, select_supports_and_unknown_ones_are_rejected) {
   EXPECT_GT(calc_losses(bank, wanted).decay_per_s[0], 0.0);
   MountingRequest wrong;
   wrong.by_name["ent"] = on(R"("loss": 0.02)");
-  try {
-    calc_losses(bank, wrong);
-    FAIL();
-  } catch (const InputError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("did you mean \"end\"?"));
-  }
+  tests::expect_error<InputError>({"did you mean \"end\"?"}, [&] { calc_losses(bank, wrong); });
   const bank::Bank free = bank::example::make_bank();
   EXPECT_THROW(calc_losses(free, wish(R"("on": "brick wall")")), InputError);
   EXPECT_TRUE(calc_losses(free, {}).is_empty());

@@ -28,44 +28,42 @@ struct Solid {
   }
 };
 
-/// A box about the origin, each side cut into n x n squares of two triangles.
-inline Solid make_box(const Vec3& sides, int n = 1) {
+/// A box about the origin, cut into n[k] cells along axis k, two triangles a square.
+inline Solid make_box(const Vec3& sides, const std::array<int, 3>& n) {
   Solid s;
   std::map<std::array<int, 3>, std::int32_t> made;
   const auto vertex = [&](const std::array<int, 3>& at) {
     const auto [found, fresh] = made.try_emplace(at, static_cast<std::int32_t>(s.vertices.size()));
     if (fresh) {
       Vec3 x{};
-      for (int k = 0; k < 3; ++k) x[k] = sides[k] * (static_cast<double>(at[k]) / n - 0.5);
+      for (int k = 0; k < 3; ++k) x[k] = sides[k] * (static_cast<double>(at[k]) / n[k] - 0.5);
       s.vertices.push_back(x);
     }
     return found->second;
   };
   for (int k = 0; k < 3; ++k) {
-    for (const int end : {0, n}) {
-      for (int i = 0; i < n; ++i) {
-        for (int j = 0; j < n; ++j) {
+    const int u = (k + 1) % 3, v = (k + 2) % 3;
+    for (const int end : {0, n[k]}) {
+      for (int i = 0; i < n[u]; ++i) {
+        for (int j = 0; j < n[v]; ++j) {
           const auto at = [&](int p, int q) {
             std::array<int, 3> c{};
-            c[k] = end;
-            c[(k + 1) % 3] = p;
-            c[(k + 2) % 3] = q;
+            c[k] = end, c[u] = p, c[v] = q;
             return vertex(c);
           };
           const auto a = at(i, j), b = at(i + 1, j), c = at(i + 1, j + 1), d = at(i, j + 1);
-          if (end == n) {
-            s.triangles.push_back({a, b, c});
-            s.triangles.push_back({a, c, d});
-          } else {
-            s.triangles.push_back({a, c, b});
-            s.triangles.push_back({a, d, c});
-          }
+          if (end > 0)
+            s.triangles.insert(s.triangles.end(), {{a, b, c}, {a, c, d}});
+          else
+            s.triangles.insert(s.triangles.end(), {{a, c, b}, {a, d, c}});
         }
       }
     }
   }
   return s;
 }
+
+inline Solid make_box(const Vec3& sides, int n = 1) { return make_box(sides, std::array{n, n, n}); }
 
 /// A ball from an icosahedron with n parts an edge: 20 n^2 triangles.
 inline Solid make_ball(double radius, int n) {

@@ -9,18 +9,14 @@
 #include "runtime/physics/geometry/mesh.hpp"
 #include "runtime/physics/geometry/polyhedron.hpp"
 #include "runtime/physics/geometry/skin.hpp"
+#include "tests/support/catch_message.hpp"
 #include "tests/unit/runtime/physics/geometry/solids.hpp"
 
 namespace carillon::geometry::tests {
 namespace {
 
 std::string refuse(const Solid& solid) {
-  try {
-    solid.make();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
+  return carillon::tests::catch_message<InputError>([&] { solid.make(); });
 }
 
 TEST(shape, refusal_of_invalid_surfaces) {

@@ -8,7 +8,7 @@
 #include <numbers>
 #include <vector>
 
-#include "tests/unit/runtime/physics/geometry/solids.hpp"
+#include "tests/unit/runtime/physics/rigid/bodies.hpp"
 #include "tests/unit/runtime/physics/rigid/momenta.hpp"
 
 namespace carillon::rigid {
@@ -20,36 +20,17 @@ constexpr Vec3 kGravity{0, 0, -kG};
 Solid finish(Solid s, double restitution, double friction) {
   s.restitution = restitution;
   s.friction = friction;
-  s.young_modulus_pa = 10e9;
-  s.poisson_ratio = 0.3;
   return s;
 }
 
 Solid make_box_solid(double mass_kg, const Vec3& sides, double restitution = 1.0, double friction = 0.0) {
-  const geometry::tests::Solid box = geometry::tests::make_box(sides, 1);
-  Solid s;
-  s.shape = box.make();
-  s.mass_kg = mass_kg;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const double u = sides[(k + 1) % 3], v = sides[(k + 2) % 3], inertia = mass_kg * (u * u + v * v) / 12.0;
-    s.inertia_kg_m2[k][k] = inertia;
-    s.inverse_inertia[k][k] = 1.0 / inertia;
-  }
-  for (const Vec3& x : box.vertices) s.radius_m = std::max(s.radius_m, norm(x));
-  return finish(s, restitution, friction);
+  return finish(make_box(mass_kg, sides), restitution, friction);
 }
 
+/// With the inertia of a box of this side.
 Solid make_ball_solid(double mass_kg, double radius, double restitution = 1.0, double friction = 0.0) {
-  const geometry::tests::Solid ball = geometry::tests::make_ball(radius, 16);
-  Solid s;
-  s.shape = ball.make();
-  s.mass_kg = mass_kg;
-  for (std::size_t k = 0; k < 3; ++k) {
-    s.inertia_kg_m2[k][k] = 0.4 * mass_kg * radius * radius;
-    s.inverse_inertia[k][k] = 1.0 / s.inertia_kg_m2[k][k];
-  }
-  for (const Vec3& x : ball.vertices) s.radius_m = std::max(s.radius_m, norm(x));
-  return finish(s, restitution, friction);
+  const double side = std::sqrt(2.4) * radius;
+  return finish(make_solid(geometry::tests::make_ball(radius, 16), mass_kg, {side, side, side}), restitution, friction);
 }
 
 Solid make_wall(const Vec3& sides, double restitution = 1.0, double friction = 0.0) {

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "runtime/base/error.hpp"
+#include "tests/support/catch_message.hpp"
 #include "tests/unit/runtime/physics/bodies.hpp"
 
 namespace carillon::physics::tests {
@@ -15,32 +16,6 @@ using joints::Kind;
 
 BodySpec make_springy(const std::string& name, const bank::Bank& bank, const Vec3& position) {
   return make_body(name, bank, position, 0.6);
-}
-
-struct Outcome {
-  std::vector<events::Event> events;
-  int forces = 0, impulses = 0;
-  EnergyAudit energy;
-};
-
-Outcome run(const WorldSpec& spec, double end_s) {
-  World world(spec, {.end_s = end_s, .audits_energy = true});
-  Outcome outcome;
-  world.advance(end_s, std::numeric_limits<double>::infinity(), [&](const events::Event& event) {
-    EXPECT_EQ(events::find_fault(event), nullptr);
-    outcome.events.push_back(event);
-    if (std::holds_alternative<events::Force>(event)) ++outcome.forces;
-    if (std::holds_alternative<events::Impulse>(event)) ++outcome.impulses;
-  });
-  outcome.energy = world.get_statistics().energy;
-  return outcome;
-}
-
-events::BodyMotion find_last(const Outcome& outcome, int body, double before_s = 1e9) {
-  events::BodyMotion last;
-  for (const events::Event& event : outcome.events)
-    if (const auto* m = std::get_if<events::BodyMotion>(&event); m != nullptr && m->body == body && m->time_s <= before_s) last = *m;
-  return last;
 }
 
 /// Banks of the scenes below.
@@ -98,9 +73,9 @@ INSTANTIATE_TEST_SUITE_P(Scenes, JointedBooks, testing::Range(0, 5));
 
 TEST_P(JointedBooks, EnergyBalanceWithinOnePercent) {
   const Things things;
-  const Outcome r = run(make_scene(things, GetParam()), 1.0);
+  const Outcome r = run_audited(make_scene(things, GetParam()), 1.0);
   RecordProperty("error_j", std::to_string(r.energy.error_j));
-  EXPECT_GT(r.forces, 0) << "no impact with modes";
+  EXPECT_FALSE(r.forces.empty()) << "no impact with modes";
   EXPECT_GT(r.energy.max_modes_j, 1e-4 * r.energy.kinetic_j);
   EXPECT_LT(r.energy.error_j, 0.01 * r.energy.kinetic_j);
   EXPECT_LT(r.energy.max_modes_j, r.energy.kinetic_j);
@@ -108,7 +83,7 @@ TEST_P(JointedBooks, EnergyBalanceWithinOnePercent) {
 
 TEST(Jointed, SameBitsInAnySlices) {
   const Things things;
-  const Outcome one = run(make_scene(things, 1), 0.5);
+  const Outcome one = run_audited(make_scene(things, 1), 0.5);
   World world(make_scene(things, 1), {.end_s = 0.5, .audits_energy = true});
   std::size_t n = 0;
   double reached = 0.0;
@@ -133,8 +108,8 @@ TEST(Jointed, AngularMomentumAboutHinge) {
   w.bodies[0].velocity_m_s = {0, -3, 0};
   w.bodies[0].friction = w.bodies[1].friction = 0.0;
   const double m = things.ball.rigid.mass_kg, arm = 0.1;
-  const Outcome r = run(w, 0.3);
-  ASSERT_GT(r.forces, 0);
+  const Outcome r = run_audited(w, 0.3);
+  ASSERT_FALSE(r.forces.empty());
   const events::BodyMotion ball = find_last(r, 0), plate = find_last(r, 1), before = find_last(r, 1, 0.29);
   const auto& bank = things.plate.rigid;
   const double inertia = bank.inertia_kg_m2[0] + bank.mass_kg * 0.01;
@@ -149,12 +124,7 @@ std::string find_refusal(Change&& change) {
   const Things things;
   WorldSpec w = make_scene(things, 1);
   change(w);
-  try {
-    World world(w, {});
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
+  return carillon::tests::catch_message<InputError>([&] { World world(w, {}); });
 }
 
 TEST(Jointed, RefusalByName) {
@@ -191,7 +161,7 @@ TEST(Jointed, StopsInAnyBodyOrder) {
     hinge.limits = turned ? std::array<double, 2>{-0.5, 0.1} : std::array<double, 2>{-0.1, 0.5};
     hinge.stop_restitution = 0.5;
     w.joints = {hinge};
-    const Outcome r = run(w, 3.0);
+    const Outcome r = run_audited(w, 3.0);
     double lowest = 0.0, after = -1.0;
     for (const events::Event& event : r.events)
       if (const auto* m = std::get_if<events::BodyMotion>(&event); m != nullptr && m->body == 0) {
