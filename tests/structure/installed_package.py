@@ -18,7 +18,7 @@ RUNTIME = {
         "bin/carillon-live",
         "bin/carillon-bank",
         "bin/carillon-samples",
-        "lib/libcarillon.so.2",
+        "lib/libcarillon.so.3",
         "lib/carillon/carillon-joints.so",
     ],
     "needs": "libhdf5-",
