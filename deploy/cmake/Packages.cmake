@@ -37,12 +37,13 @@ set(CPACK_DEBIAN_PRECOMPUTE_PACKAGE_RECOMMENDS python3-vtk9)
 
 if(TARGET carillon_python)
   list(APPEND CPACK_COMPONENTS_ALL python)
-  math(EXPR next_minor "${Python3_VERSION_MINOR} + 1")
+  get_target_property(minor carillon_python PYTHON_MINOR)
+  math(EXPR next_minor "${minor} + 1")
   set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-carillon)
   set(CPACK_COMPONENT_PYTHON_DESCRIPTION "Python module: mode banks as numpy arrays, jobs solved, scenes rendered, bodies struck by hand")
   set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
   set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS
-    "carillon-runtime (= ${PROJECT_VERSION}), python3 (>= 3.${Python3_VERSION_MINOR}), python3 (<< 3.${next_minor}), python3-numpy")
+    "carillon-runtime (= ${PROJECT_VERSION}), python3 (>= 3.${minor}), python3 (<< 3.${next_minor}), python3-numpy")
   set(CPACK_DEBIAN_PYTHON_PACKAGE_SUGGESTS "carillon-precompute, python3-matplotlib")
 endif()
 

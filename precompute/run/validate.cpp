@@ -24,8 +24,6 @@
 namespace carillon::run {
 namespace {
 
-static_assert(cost::kSliceModes == eigen::kSliceModes && cost::kDenseRows == eigen::kDenseRows, "The model must match the solver.");
-
 constexpr double kRoomUsed = 0.8;        // maximum part of the available memory
 constexpr double kMaxCountFlops = 5e11;  // of one factorisation of the count: about 10 s
 constexpr std::array<int, 3> kRanks{1, 2, 4};

@@ -1,6 +1,10 @@
-# Writes OUTPUT, a C++ file that defines kGitId: the commit of SOURCE, "-dirty" when tracked files differ from it, "unknown" outside git;
-# and TEXT, "VERSION (commit)" on one line. Run at every build; a file is touched only when the answer changes.
-set(id "unknown")
+# Writes OUTPUT, a C++ file that defines kGitId: the commit of SOURCE, "-dirty" when tracked files differ from it; in an archive of git the
+# commit that it was made from, elsewhere "unknown". And TEXT, "VERSION (commit)" on one line. Run at every build; a file is touched only
+# when the answer changes.
+set(id "$Format:%H$")  # filled in by git archive (.gitattributes)
+if(NOT id MATCHES "^[0-9a-f]+$")
+  set(id "unknown")
+endif()
 find_program(git git)
 if(git)
   execute_process(COMMAND ${git} -C ${SOURCE} rev-parse HEAD OUTPUT_VARIABLE commit RESULT_VARIABLE status

@@ -18,7 +18,7 @@ RUNTIME = {
         "bin/carillon-live",
         "bin/carillon-bank",
         "bin/carillon-samples",
-        "lib/libcarillon.so.2",
+        "lib/libcarillon.so.3",
         "lib/carillon/carillon-joints.so",
     ],
     "needs": "libhdf5-",
@@ -41,7 +41,6 @@ PYTHON = {
 }
 PACKAGES = {"python3-carillon": PYTHON, "carillon-runtime": RUNTIME, "carillon-runtime-dev": DEV, "carillon-precompute": PRECOMPUTE}
 
-source, build, work = (pathlib.Path(word).resolve() for word in sys.argv[1:4])
 quiet = {"stdout": subprocess.DEVNULL}
 
 
@@ -53,10 +52,14 @@ def read(*command, **options):
     return run(*command, capture_output=True, **options).stdout
 
 
-def make_packages():
+def find_packages(folder):
+    return {read("dpkg-deb", "-f", file, "Package").strip(): file for file in folder.glob("*.deb")}
+
+
+def make_packages(build, work):
     """{package: file}, one package per component of the build."""
     run("cpack", "--config", build / "CPackConfig.cmake", "-G", "DEB", "-B", work / "packages", cwd=work, **quiet)
-    files = {read("dpkg-deb", "-f", file, "Package").strip(): file for file in (work / "packages").glob("*.deb")}
+    files = find_packages(work / "packages")
     wanted = set(PACKAGES)
     if not (build / "bin/carillon-precompute").exists():
         wanted.discard("carillon-precompute")
@@ -90,7 +93,7 @@ def check_symbols(library):
     assert not wrong and "carillon_process" in symbols, f"{library}: visible in addition to the interface, or missing from it: {wrong[:5]}"
 
 
-def check_module(folder, bank):
+def check_module(folder, bank, work):
     """The unpacked Python module reads a bank with Debian's Python."""
     if not folder.exists():
         return
@@ -99,7 +102,7 @@ def check_module(folder, bank):
     assert int(words[0]) > 0 and words[1].startswith(str(folder)), words
 
 
-def build_by_cmake(example, usr):
+def build_by_cmake(example, usr, work):
     warnings = "-Wall -Wextra -Werror"
     flags = [f"-DCMAKE_PREFIX_PATH={usr}", f"-DCMAKE_C_FLAGS=-std=c99 -pedantic {warnings}", f"-DCMAKE_CXX_FLAGS={warnings}"]
     run("cmake", "-S", example, "-B", work / "by-cmake", "-G", "Ninja", *flags, **quiet)
@@ -107,7 +110,7 @@ def build_by_cmake(example, usr):
     return work / "by-cmake"
 
 
-def build_by_pkg_config(example, usr):
+def build_by_pkg_config(example, usr, work):
     folder = work / "by-pkg-config"
     folder.mkdir()
     paths = {**os.environ, "PKG_CONFIG_PATH": str(usr / "lib/pkgconfig")}
@@ -130,10 +133,11 @@ def play(programs, pattern, bank):
 
 
 def main():
+    source, build, work = (pathlib.Path(word).resolve() for word in sys.argv[1:4])
     shutil.rmtree(work, ignore_errors=True)
     work.mkdir(parents=True)
     root = work / "root"
-    packages = make_packages()
+    packages = make_packages(build, work)
     listed = [path for name, file in packages.items() for path in check_package(name, file)]
     assert len(listed) == len(set(listed)), "two packages have one file"
     for file in packages.values():
@@ -145,7 +149,7 @@ def main():
             assert read(usr / "bin" / name, "--version") == read(build / "bin" / name, "--version"), name
 
     example = shutil.copytree(source / "docs/examples/embed", work / "example")  # out of reach of the source headers
-    by_cmake, by_pkg_config = build_by_cmake(example, usr), build_by_pkg_config(example, usr)
+    by_cmake, by_pkg_config = build_by_cmake(example, usr, work), build_by_pkg_config(example, usr, work)
     bank = source / "tests/unit/runtime/bank/pinned/version_1_0.hdf"
     strikes = [by_cmake / "strike_c", by_cmake / "strike_cpp", by_pkg_config / "strike_c"]
     heard = play(strikes, r"(\d+) modes, peak (\S+) Pa at the left ear\n", bank)
@@ -155,7 +159,7 @@ def main():
     edited = play(edits, r"peak (\S+) Pa, (\S+) Pa after the edit; (\d+) -> (\d+) Hz(?:; 0 underruns)?\n", bank)
     assert len({groups[2:] for groups in edited}) == 1, "they do not edit the same bank"
     play([by_cmake / "click_c", by_pkg_config / "click_c"], r"triangle \d+ of \d+, peak \S+ Pa at the left ear\n", bank)
-    check_module(usr / "lib/python3/dist-packages", bank)
+    check_module(usr / "lib/python3/dist-packages", bank, work)
     bad = subprocess.run([by_cmake / "strike_c", __file__], capture_output=True, text=True)
     assert bad.returncode == 1 and "installed_package.py" in bad.stderr, f"no clear error for a file that is no bank: {bad.stderr}"
 

@@ -24,7 +24,7 @@
 extern "C" {
 #endif
 
-/* Incremented with every added function or field. The number in the name of libcarillon.so.2 differs: it changes only when
+/* Incremented with every added function or field. The number in the name of libcarillon.so.3 differs: it changes only when
  * programs must be recompiled. */
 #define CARILLON_ABI_VERSION 10
 
