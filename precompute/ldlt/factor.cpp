@@ -25,7 +25,6 @@
 #include "runtime/base/failure.hpp"
 
 namespace carillon::ldlt {
-namespace {
 
 using petsc::check;
 
@@ -53,6 +52,8 @@ class EquilibratedPencil {
   std::vector<double> factor_;  // (own rows), empty if S is the identity
 };
 
+namespace {
+
 constexpr double kWide = 1e6;  // Stiffest over softest node; well-shaped meshes of one material span three decades.
 
 /// Largest diagonal entry of each own node. Collective.
@@ -73,6 +74,8 @@ double find_width(const comm::Communicator& comm, const std::vector<double>& sti
   comm.max(ends);
   return ends[0] * ends[1];
 }
+
+}  // namespace
 
 EquilibratedPencil::EquilibratedPencil(const la::Pencil& given) : pencil_(given) {
   const Mat stiffness = given.stiffness, mass = given.mass;
@@ -106,6 +109,8 @@ void EquilibratedPencil::scale(double* x, int stride, int columns) const {
   for (int j = 0; j < columns; ++j)
     for (std::size_t i = 0; i < factor_.size(); ++i) x[std::ptrdiff_t{j} * stride + static_cast<std::ptrdiff_t>(i)] *= factor_[i];
 }
+
+namespace {
 
 constexpr double kWorstBackwardError = 1e-10;
 constexpr double kRefinedBackwardError = 3e-13;  // Above this, solves are refined; typical bodies have 1e-15 to 1e-13.
