@@ -410,6 +410,7 @@ def add_defaults(page, name, caption, rows):
         name,
         [HEAD] + [(*row[:5], "yes" if row[5] else "no" + (f": {REASONS[row[0]]}" if row[0] in REASONS else "")) for row in rows],
         caption,
+        in_docs=name == "solver",  # those of bank and runtime are in the findings of banks and playing
     )
     against = [f"{row[0]} ({row[1]}{', kept: ' + REASONS[row[0]] if row[0] in REASONS else ''})" for row in rows if not row[5]]
     page.conclude(

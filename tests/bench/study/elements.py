@@ -209,9 +209,9 @@ def add_rates(section, lab, results):
         data,
         lab.make_command("elements"),
     )
-    for name, values in gaps.items():
-        low, high, middle = min(values), max(values), statistics.median(values)
-        section.say(f"{name}: rates {low:+.1f} to {high:+.1f} compared with theory, median {middle:+.1f}.")
+    if gaps:
+        parts = (f"{name} {statistics.median(own):+.1f} ({min(own):+.1f} to {max(own):+.1f})" for name, own in gaps.items())
+        section.conclude(f"**Rates of convergence** less those of theory, median of the bodies and extremes: {', '.join(parts)}.")
 
 
 def add_costs(section, lab, results):

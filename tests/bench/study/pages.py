@@ -4,6 +4,7 @@ import html
 import json
 import re
 
+import provenance
 from lab import write_whole
 
 STYLE = """body { font: 15px/1.5 sans-serif; max-width: 980px; margin: 2em auto; padding: 0 1em; color: #222; }
@@ -31,7 +32,15 @@ def write(lab, sections, setting):
     files["report.md"] = "\n".join([*head, *summary, *(line for section in sections for line in section.to_markdown())]).rstrip() + "\n"
     files["report.html"] = format_html(sections, setting, machine, findings)
     files["report.json"] = (
-        json.dumps({"format": 1, "setting": setting, "machine": machine, "sections": [section.to_json() for section in sections]}, indent=1)
+        json.dumps(
+            {
+                "format": 2,
+                "measured": provenance.describe(setting),
+                "machine": machine,
+                "sections": [section.to_json() for section in sections],
+            },
+            indent=1,
+        )
         + "\n"
     )
     for name, text in files.items():

@@ -369,6 +369,7 @@ def add_effects(section, effects):
         "Everything on against each effect left out by itself and against the choice of effect selection; the same contacts in all."
         " Scene: chute.",
         [("effects", *DATA), *((what, *to_data(one)) for what, one in effects.items())],
+        in_docs=True,
     )
     audible = [what.removeprefix("without ") for what, one in effects.items() if what.startswith("without") and one.difference.is_audible]
     inaudible = [

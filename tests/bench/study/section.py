@@ -3,7 +3,7 @@ import dataclasses
 
 import measuring
 
-MAX_ROWS = 12  # of a table in the docs
+PICTURES_A_LINE = 3  # in the docs
 
 
 @dataclasses.dataclass
@@ -17,6 +17,7 @@ class Item:
     data: list = dataclasses.field(default_factory=list)
     svg: str = ""
     command: str = ""
+    in_docs: bool = False
 
 
 class Section:
@@ -34,8 +35,8 @@ class Section:
         self.findings.append(text)
         self.say(text)
 
-    def add_table(self, name, rows, caption, data=None, command=None):
-        """rows: as shown, rows[0] is the header; data: for the CSV, all digits (default: rows)."""
+    def add_table(self, name, rows, caption, data=None, command=None, in_docs=False):
+        """rows: as shown, rows[0] is the header; data: for the CSV, all digits (default: rows); in_docs: also on the page in the docs."""
         self.items.append(
             Item(
                 "table",
@@ -44,6 +45,7 @@ class Section:
                 [list(map(str, row)) for row in rows],
                 [list(row) for row in data or rows],
                 command=command or self.command,
+                in_docs=in_docs,
             )
         )
 
@@ -71,15 +73,14 @@ class Section:
         return lines
 
     def to_short_markdown(self, find_picture):
-        """The pictures, and of the tables of at most MAX_ROWS rows the one with most rows."""
-        lines = [f"`--only {self.name}`", ""]
+        """The page in the docs: findings, pictures, and the tables that it has, too."""
+        lines = [*(f"- {finding}" for finding in self.findings), ""]
+        pictures = [f"![{item.text}]({find_picture(self.file_name(item, 'svg'))})" for item in self.items if item.kind == "chart"]
+        for first in range(0, len(pictures), PICTURES_A_LINE):
+            lines.append(" ".join(pictures[first : first + PICTURES_A_LINE]))
         for item in self.items:
-            if item.kind == "chart":
-                lines += [f"![{item.text}]({find_picture(self.file_name(item, 'svg'))})", ""]
-        tables = [item for item in self.items if item.kind == "table" and len(item.rows) <= MAX_ROWS + 1]
-        if tables:
-            item = max(tables, key=lambda table: len(table.rows))
-            lines += [item.text, "", *measuring.format_table(item.rows, True).splitlines(), ""]
+            if item.in_docs:
+                lines += ["", item.text, "", *measuring.format_table(item.rows, True).splitlines()]
         return lines
 
     def to_json(self):

@@ -154,37 +154,26 @@ class Study(unittest.TestCase):
         page = docs / "reports/accuracy.md"
         for folder in (docs / "images", page.parent):
             folder.mkdir(parents=True, exist_ok=True)
-        shutil.copy(ROOT / "docs/reports/accuracy.md", page)
+        whole = (ROOT / "docs/reports/accuracy.md").read_text()
+        page.write_text(whole)
         update = [ROOT / "tests/bench/accuracy/update", self.out, docs]
+        partial = subprocess.run(update, capture_output=True, text=True)
+        self.assertEqual((partial.returncode, len(partial.stderr.splitlines())), (2, 1), partial.stderr)
+        self.assertIn("lacks advice, air", partial.stderr)
+        self.assertEqual(page.read_text(), whole)
+        # The page of a study of one section.
+        page.write_text(re.sub(r"<!-- accuracy:(?!elements)(\w+) -->.*?<!-- /accuracy:\1 -->\n", "", whole, flags=re.S))
         first = subprocess.run(update, capture_output=True, text=True)
         self.assertEqual(first.returncode, 0, first.stderr)
         text = page.read_text()
-        # The section shows the pictures and the table of this report, instead of those of all bodies.
+        # The section shows the findings and the pictures of this report, instead of those of all bodies.
+        made = json.loads((self.out / "report.json").read_text())
         section = re.search(r"<!-- accuracy:elements -->\n(.*?)<!-- /accuracy:elements -->", text, re.S)[1]
         self.assertEqual(re.findall(r"\(\.\./images/accuracy-([\w-]+)\.svg\)", section), ["elements-cube", "elements-ring"])
-        table = [[cell.strip() for cell in line.split("|")[1:-1]] for line in section.splitlines() if line.startswith("| T")]
-        measured = read(self.out / "elements-ring.csv")
-        self.assertEqual(len(measured), 12)
-        self.assertEqual(
-            [(row[0], row[1], row[-2], row[-1]) for row in table],
-            [
-                (
-                    row["element"],
-                    f"{int(row['nodes']):,}",
-                    f"{float(row['error_median_cents']):.3g}",
-                    f"{float(row['error_worst_cents']):.3g}",
-                )
-                for row in measured
-            ],
-        )
-        # A partial study updates only its own findings.
-        summary = lambda page: re.search(r"<!-- accuracy:summary -->(.*?)<!-- /accuracy:summary -->", page, re.S)[1].splitlines()
-        old, new = summary((ROOT / "docs/reports/accuracy.md").read_text()), summary(text)
-        self.assertTrue(set(old) - set(new), "nothing was renewed")
-        self.assertEqual(
-            [line for line in old if re.match(r"- (\*\*Defaults|Step of contacts|Culling)", line)],
-            [line for line in new if re.match(r"- (\*\*Defaults|Step of contacts|Culling)", line)],
-        )
+        self.assertEqual([line[2:] for line in section.splitlines() if line.startswith("- ")], made["sections"][0]["findings"])
+        self.assertTrue(any("semitone" in finding for finding in made["sections"][0]["findings"]))
+        self.assertIn(f"\n{made['measured']}\n", text)
+        self.assertIn(f"<!-- machine -->\n{made['machine']}\n", text)
         for picture in re.findall(r"\(\.\./(images/accuracy-elements[^)]*)\)", text):
             self.assertTrue((docs / picture).is_file() or (ROOT / "docs" / picture).is_file(), picture)
         for picture in ("elements-cube.svg", "elements-ring.svg"):
