@@ -13,6 +13,9 @@ import time
 import measure
 
 HERE = pathlib.Path(__file__).resolve().parent
+sys.path.append(str(HERE.parent.parent / "tests/support"))
+import provenance
+
 ENVIRONMENT = HERE.parent.parent / "deploy/environment"  # how mpirun starts as any user on a machine of any size
 RANKS = 2
 
@@ -223,7 +226,7 @@ class Stage:
         for name in page.list_names():
             if name in self.tables:
                 page.set(name, format_table(self.tables[name][0]))
-        page.file.write_text(page.text)
+        page.file.write_text(provenance.put(page.text, provenance.describe(f"docs/examples/run {self.folder.name} --update --pictures")))
 
     def expect(self, what, met):
         self.checks.append((what, bool(met)))
