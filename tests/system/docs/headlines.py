@@ -1,7 +1,8 @@
 #!/usr/bin/python3
-"""The headline figures of the one-screen pages of docs/, taken from the generated reports in docs/reports/.
+"""The headline figures of the one-screen pages of docs/, taken from the generated reports in docs/reports/. A report is short. It
+says when, at which commit, on which machine and by which command it was measured, as the pages of the examples do.
 
-usage: headlines.py SOURCE_DIR            exit 1 and one line per page whose figures are not those of its report
+usage: headlines.py SOURCE_DIR            exit 1 and one line per fault
        headlines.py SOURCE_DIR --update   writes them
 """
 import json
@@ -10,6 +11,11 @@ import re
 import statistics
 import sys
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "support"))
+import provenance
+
+MAX_LINES = 200  # of a report
+HEAD_LINES = 20
 GOALS = ((100, "a semitone (100 cents)"), (10, "10 cents"), (1, "1 cent"))
 GROUPS = {
     "meshes": "bad, extreme and odd meshes",
@@ -77,9 +83,8 @@ def make_cases(source):
     page = (source / "docs/reports/stability.md").read_text()
     table = []
     for group, text in GROUPS.items():
-        rows = read_rows(read_between(page, group), 5)
-        refused = sum(row[3] == "refused" for row in rows)
-        table.append([text, f"`ctest --preset release -R hard.{group}`", str(len(rows) - refused), str(refused)])
+        held, refused = re.match(r"\d+ cases: (\d+) held to a bound, (\d+) refused", read_between(page, group)).groups()
+        table.append([text, f"`ctest --preset release -R hard.{group}`", held, refused])
     return write_table(["group", "command", "cases held to a bound", "cases refused with one error"], table)
 
 
@@ -161,9 +166,19 @@ PAGES = {
 }
 
 
+def find_report_faults(source):
+    for page in sorted([*source.glob("docs/reports/*.md"), *source.glob("docs/examples/*/README.md")]):
+        name, lines = page.relative_to(source), page.read_text().splitlines()
+        measured = provenance.LINE.search("\n".join(lines[:HEAD_LINES]))
+        if page.name != "README.md" and len(lines) > MAX_LINES:
+            yield f"{name}: {len(lines)} lines; a report has at most {MAX_LINES}"
+        if (page.parent.name != "reports" or page.name != "README.md") and (not measured or measured[1]):
+            yield f"{name}: no line `Measured DATE, commit COMMIT, MACHINE, by COMMAND.` of a commit at its top"
+
+
 def main():
     source = pathlib.Path(sys.argv[1])
-    faults = []
+    faults = list(find_report_faults(source))
     for name, make in PAGES.items():
         page = source / f"docs/{name}.md"
         text, table = page.read_text(), make(source)
