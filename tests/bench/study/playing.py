@@ -407,6 +407,8 @@ def add_chart(section, measured):
     for knob, turns in measured:
         points = [(one.cpu_ms, one.difference.error_db) for one in turns[1:] if one.difference.error_db > sounds.NONE_DB]
         rows += [(knob.key, format_setting(one.setting), *to_data(one)) for one in turns]
+        if not points:
+            continue  # no setting differs
         panels.append(
             plots.Panel(
                 knob.key,

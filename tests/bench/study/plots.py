@@ -82,7 +82,8 @@ def draw_panels(panels, title, subtitle, columns=2):
     colours = find_colours(names)
     columns = min(columns, len(panels))
     lines = -(-len(panels) // columns)
-    with pyplot.rc_context({"svg.hashsalt": title, "font.size": 9, "axes.titlesize": 10}):  # ids differ between charts of one page
+    # Text stays text; ids differ between charts of one page.
+    with pyplot.rc_context({"svg.fonttype": "none", "svg.hashsalt": title, "font.size": 9, "axes.titlesize": 10}):
         figure, axes = pyplot.subplots(lines, columns, figsize=(4.8 * columns, 4.0 * lines + 0.9), squeeze=False, layout="constrained")
         for place in axes.flat[len(panels) :]:
             place.set_axis_off()
