@@ -148,11 +148,12 @@ void run(const std::string& file, int refinements, const std::vector<int>& rank_
         ","
         "{:.3f}\n",
         ranks, counts.total_operations, counts.total_entries, counts.total_operations / alone.total_operations, counts.path_ratio(),
-        counts.path_operations * ranks / alone.total_operations, ldlt::calc_gang_operations(forest, mapping) * ranks / counts.total_operations,
-        counts.fullest_ratio(), mapping.operations_weight(), counts.shared_operations / counts.total_operations,
-        counts.shared_entries / counts.total_entries, counts.shared_fronts, sent.most_planned_fronts, largest(sent.messages),
-        1e-6 * largest(sent.bytes), largest(sent.solve_messages), 1e-3 * largest(sent.solve_bytes), sent.solve_path_messages,
-        1e-6 * largest(count_peaks(forest, mapping, counts)), root, dissect_s, map_s);
+        counts.path_operations * ranks / alone.total_operations,
+        ldlt::calc_gang_operations(forest, mapping) * ranks / counts.total_operations, counts.fullest_ratio(), mapping.operations_weight(),
+        counts.shared_operations / counts.total_operations, counts.shared_entries / counts.total_entries, counts.shared_fronts,
+        sent.most_planned_fronts, largest(sent.messages), 1e-6 * largest(sent.bytes), largest(sent.solve_messages),
+        1e-3 * largest(sent.solve_bytes), sent.solve_path_messages, 1e-6 * largest(count_peaks(forest, mapping, counts)), root, dissect_s,
+        map_s);
     std::fflush(stdout);
   }
 }
