@@ -6,12 +6,10 @@ namespace carillon::mesher {
 namespace {
 
 [[noreturn]] void refuse(const SurfaceOptions& options) {
-  base::refuse_missing(options.surface.string() + ": to extrude a thin wall (other methods: delaunay, stuffing)", "THIN_WALLS");
+  base::refuse_missing(options.surface.string() + ": an extruded wall", "THIN_WALLS");
 }
 
 }  // namespace
-
-std::string format_thin_estimate(double, double, const SurfaceOptions& options) { refuse(options); }
 
 mesh::TetMesh make_sheet(Sheet, const SurfaceOptions& options, SurfaceReport&, Phases&) { refuse(options); }
 

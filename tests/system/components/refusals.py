@@ -27,7 +27,7 @@ JOBS = {
 SIMULATION = {"simulate": {"duration_s": 0.01, "bodies": [{**BAR["body"], "material": "steel"}]}}
 SCENE = {
     "duration_s": 0.1,
-    "bodies": [{"bank": str(BANK), "position_m": [0, 0, 0], "fixed": True}],
+    "bodies": [{"name": "body", "bank": str(BANK), "position_m": [0, 0, 0], "fixed": True}],
     "listener": {"position_m": [0, -1, 0], "ears": "hrtf"},
 }
 faults = []
