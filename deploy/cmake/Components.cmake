@@ -20,10 +20,9 @@ carillon_component(SIMULATION "full-order motion of bodies and its sound, carill
 carillon_component(AIR "boundary elements of the air outside a body" precompute/air precompute/run/air.cpp)
 carillon_component(NONLINEAR "modes that large motion couples" precompute/coupling precompute/run/coupling.cpp runtime/synth/nonlinear
   runtime/synth/nonlinear_modes.cpp)
-carillon_component(THIN_WALLS "extruded meshes of thin walls" precompute/mesher/thin_wall.cpp precompute/mesher/wall_mesh.cpp
-  precompute/mesher/wall_source.cpp precompute/mesher/wall_source.hpp precompute/mesher/extrude.cpp precompute/mesher/extrude.hpp
-  precompute/mesher/remesh.cpp precompute/mesher/skin.cpp precompute/mesher/skin.hpp precompute/mesher/skin_editor.cpp
-  precompute/mesher/skin_editor.hpp precompute/mesher/skin_mitres.cpp)
+carillon_component(THIN_WALLS "extruded meshes of thin walls" precompute/mesher/thin_wall.cpp precompute/mesher/extrude.cpp
+  precompute/mesher/extrude.hpp precompute/mesher/remesh.cpp precompute/mesher/skin.cpp precompute/mesher/skin.hpp
+  precompute/mesher/skin_editor.cpp precompute/mesher/skin_editor.hpp precompute/mesher/skin_mitres.cpp)
 carillon_component(ANALYTIC "bodies with known modes" precompute/analytic precompute/run/known_body.cpp)
 carillon_component(PAGE "the web page of carillon explore and its sound engine" jobs/front/explore runtime/bindings/web)
 carillon_component(EXCHANGE "banks as GLB, Faust and samples" runtime/exchange/commands.cpp runtime/exchange/from_glb.cpp
