@@ -20,7 +20,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests/support"))
 import ctest
 
-GROUPS = (("ranks", "slow"), ("programs", "bench"), ("docs", "integration"), ("sanitizers", "tidy", "threads"))
+GROUPS = (("ranks", "slow", "core"), ("programs", "bench"), ("docs", "integration"), ("sanitizers", "tidy", "threads"))
 
 
 def choose(record, commit_count):

@@ -47,6 +47,7 @@ int run_cancel(Shared& shared, const CancelOptions& options) {
 }
 
 int run_retry(Shared& shared, const RetryOptions& options) {
+  if (options.resources.engine == "slurm") check_slurm();
   shared.settle();
   if (options.words.empty() && !options.all_failed)
     throw InputError("no job given; give an id or a job file, or --failed for all failed jobs");

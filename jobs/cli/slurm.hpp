@@ -7,6 +7,9 @@
 
 namespace carillon::cli {
 
+/// Refuses jobs on Slurm in a build without the component SLURM. Throws InputError.
+void check_slurm();
+
 /// Updates the rows of jobs in Slurm, at most once per poll interval of the profile.
 void follow_slurm(Shared& shared);
 

@@ -165,6 +165,7 @@ void hand_over(Shared& shared, std::vector<SubmitResult>& results) {
 
 int run_submit(Shared& shared, const SubmitOptions& options) {
   const store::JobEngine engine = store::find_engine(options.resources.engine).value_or(shared.profile().engine);
+  if (engine == store::JobEngine::slurm) check_slurm();
   std::vector<Source> sources = gather(options.words, read_solver_version());
   bool is_bad = false, is_good = false;
   for (Source& source : sources) {

@@ -4,18 +4,13 @@
 #include <array>
 #include <cstdint>
 #include <functional>
-#include <stdexcept>
 #include <vector>
 
 #include "precompute/mesh/tet_mesh.hpp"
 #include "precompute/mesher/skin.hpp"
+#include "precompute/mesher/wall_error.hpp"
 
 namespace carillon::mesher {
-
-/// The skin cannot be extruded to this wall; what() is a predicate about the wall, with the position.
-struct WallError : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
 
 struct Wall {
   std::vector<std::array<double, 2>> levels_m;  // (P) both sides along the offset direction: {-t, 0} if the skin is the outside

@@ -16,7 +16,6 @@
 #include "precompute/mesh/curved.hpp"
 #include "precompute/mesh/tet_mesh.hpp"
 #include "precompute/mesher/body_surface.hpp"
-#include "precompute/mesher/extrude.hpp"
 #include "precompute/mesher/guard.hpp"
 #include "precompute/mesher/phases.hpp"
 #include "precompute/mesher/place_nodes.hpp"
@@ -27,6 +26,7 @@
 #include "precompute/mesher/triangle_surface.hpp"
 #include "precompute/mesher/two_sides.hpp"
 #include "precompute/mesher/volume_mesh.hpp"
+#include "precompute/mesher/wall_error.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::mesher {

@@ -36,7 +36,7 @@ double find_edge_rule(double wall_m);
 /// Skin edge length [m]: as requested, from the count, or by the rule. Curvature shortens it further.
 double find_thin_edge(const ThinBody& body, const SurfaceOptions& options);
 
-/// Makes the mesh. Throws WallError (extrude.hpp) with the position of an impossible wall; CountRefusal if the count cannot be met.
+/// Makes the mesh. Throws WallError (wall_error.hpp) with the position of an impossible wall; CountRefusal if the count cannot be met.
 mesh::TetMesh mesh_thin_wall(const ThinBody& body, const SurfaceOptions& options, SurfaceReport& report, Phases& phases);
 
 }  // namespace carillon::mesher

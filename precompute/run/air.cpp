@@ -72,6 +72,8 @@ std::string describe_multipoles(const bank::Multipoles& multipoles) {
 
 }  // namespace
 
+void check_air(const job::JobSpec&) {}
+
 RunSummary radiate_bank(const comm::Communicator& comm, const RunOptions& options) {
   Run run(comm, options);
   run.job.air.method = job::AirMethod::bem;

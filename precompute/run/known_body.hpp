@@ -8,6 +8,9 @@
 
 namespace carillon::run {
 
+/// Refuses such a job in a build without the component ANALYTIC. Throws InputError.
+void check_known_body(const job::JobSpec& job);
+
 /// Writes the bank and its record on rank 0; the other ranks are idle. Collective. Throws as run_job().
 RunSummary write_known_body(Run& run);
 

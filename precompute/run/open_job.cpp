@@ -4,8 +4,10 @@
 #include <string>
 
 #include "precompute/petsc/session.hpp"
+#include "precompute/run/known_body.hpp"
 #include "precompute/run/run.hpp"
 #include "precompute/run/same_start.hpp"
+#include "precompute/run/stages.hpp"
 #include "runtime/base/file.hpp"
 
 namespace carillon::run {
@@ -30,6 +32,9 @@ void check_job(const Run& run) {
             fmt::format("\"{}\": the eigensolver takes no options; choose \"solver.method\" of the job: \"block-lanczos\" or "
                         "\"krylov-schur\"",
                         word));
+    check_known_body(run.job);
+    check_air(run.job);
+    check_coupling(run.job);
     if (!run.comm.is_root() || run.bank.empty()) return;
     base::check_writable(run.bank, "bank");
     base::check_writable(job::find_resolved_path(run.bank), "resolved job");

@@ -142,10 +142,16 @@ SolvedBody solve_body(Run& run, const Setting& setting, Body& body);
 /// True if air or coupled modes follow the modes and their errors.
 bool has_later_stages(const job::JobSpec& job);
 
+/// Refuses "nonlinear" in a build without the component NONLINEAR. Throws InputError.
+void check_coupling(const job::JobSpec& job);
+
 /// Condenses the quartic energy of the modes requested by "nonlinear", from the unrounded shapes. Assembles K and M again. Warns if
 /// condensed motions are not much faster than the coupled modes. A run stopped here resumes from its modes. Phase "coupling". Collective.
 /// Throws on every rank: InputError, SolveError, SystemError, naming the body and the job.
 CouplingReport couple_modes(Run& run, const Solution& found);
+
+/// Refuses "radiation" in a build without the component AIR. Throws InputError.
+void check_air(const job::JobSpec& job);
 
 /// Adds the multipoles of all modes to the bank (rank 0 only), as the job's "radiation" says. With a checkpoint, solved wave numbers are
 /// kept in a file next to it. Phase "air". Collective. Throws on every rank: InputError, SolveError, SystemError; eigen::Stopped when a

@@ -19,6 +19,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <string_view>
 #include <utility>
 
 #include "runtime/base/clock.hpp"
@@ -38,6 +39,9 @@ constexpr double kOutputGraceS = 1.0;    // grace for reading the output of a la
 constexpr double kKillPatienceS = 5.0;   // wait after SIGKILL
 constexpr const char* kHelperFolder = "libexec/carillon";
 constexpr const char* kDataFolder = "share/carillon";
+/// Programs of components, which a build may leave out (docs/components.md).
+constexpr std::array<std::array<std::string_view, 2>, 2> kComponentPrograms{
+    {{"carillon-simulate", "SIMULATION"}, {"carillon-study", "STUDIES"}}};
 constexpr const char* kOomScore = "500";  // out of 1,000
 
 struct Pipe {
@@ -271,7 +275,10 @@ fs::path find_data_folder(const std::string& name, std::string_view remedy) {
 
 fs::path require_program(const std::string& name) {
   if (const auto program = find_program(name)) return *program;
-  throw SystemError(fmt::format("{} is neither next to this program nor in PATH; install it, or put its folder in PATH", name));
+  std::string remedy = "install it, or put its folder in PATH";
+  for (const auto& [program, component] : kComponentPrograms)
+    if (name == program) remedy += fmt::format("; it is the component {0}, of a build with -DCARILLON_{0}=ON", component);
+  throw SystemError(fmt::format("{} is neither next to this program nor in PATH; {}", name, remedy));
 }
 
 void become(const std::vector<std::string>& words, const std::optional<std::vector<std::string>>& environment) {

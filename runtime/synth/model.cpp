@@ -179,6 +179,18 @@ void Model::add_ringing_mode(const Mode& mode) {
   }
 }
 
+ForceAnswer calc_force_answer(const nonlinear::ModeConstants& mode, double rate_hz) {
+  const double d = mode.decay_per_s, omega_d = calc_damped_omega(mode.eigenvalue_rad2_s2, d);
+  const auto points = get_chebyshev_points();
+  Moments re{}, im{};
+  for (int k = 0; k < kMoments; ++k) {
+    const double age = (1.0 - points[k]) / rate_hz;
+    re[k] = std::exp(-d * age) * std::cos(omega_d * age);
+    im[k] = std::exp(-d * age) * std::sin(omega_d * age);
+  }
+  return {calc_chebyshev_coefficients(re), calc_chebyshev_coefficients(im)};
+}
+
 bool Model::has_cascade() const {
   return nonlinear_ != nullptr && nonlinear_->energy.thickness_m > 0.0 && mass_kg_ > 0.0 && !nonlinear_->above.empty();
 }

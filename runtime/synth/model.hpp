@@ -13,7 +13,7 @@
 
 #include "runtime/bank/bank.hpp"
 #include "runtime/synth/kernels.hpp"
-#include "runtime/synth/nonlinear/coupled_modes.hpp"
+#include "runtime/synth/nonlinear/mode_constants.hpp"
 #include "runtime/synth/pulse.hpp"
 
 namespace carillon::radiation {

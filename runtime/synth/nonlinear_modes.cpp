@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "runtime/synth/nonlinear/cascade.hpp"
+#include "runtime/synth/nonlinear/coupled_modes.hpp"
 #include "runtime/synth/oscillator.hpp"
 
 namespace carillon::synth {
@@ -35,21 +37,54 @@ double calc_damping(const ContactBlock& drive, std::size_t end, int mode, double
   return p / (1.0 + p);
 }
 
-}  // namespace
+/// States of the modes in a row: the coupled ones, then those of the cascade.
+class CoupledResonators final : public NonlinearModes {
+ public:
+  CoupledResonators(const Model& model, bool has_cascade);
 
-ForceAnswer calc_force_answer(const nonlinear::ModeConstants& mode, double rate_hz) {
-  const double d = mode.decay_per_s, omega_d = calc_damped_omega(mode.eigenvalue_rad2_s2, d);
-  const auto points = get_chebyshev_points();
-  Moments re{}, im{};
-  for (int k = 0; k < kMoments; ++k) {
-    const double age = (1.0 - points[k]) / rate_hz;
-    re[k] = std::exp(-d * age) * std::cos(omega_d * age);
-    im[k] = std::exp(-d * age) * std::sin(omega_d * age);
-  }
-  return {calc_chebyshev_coefficients(re), calc_chebyshev_coefficients(im)};
-}
+  bool is_live() const noexcept override { return modes_.is_moving() || has_carry_ || (cascade_ && cascade_->is_moving()); }
+  int get_coupled_count() const noexcept override { return modes_.get_count(); }
+  int get_cascade_count() const noexcept override { return cascade_ ? cascade_->get_count() : 0; }
+  std::span<const int> get_modes() const noexcept override { return mode_; }
+  const StrikeTable* get_strike_tables() const noexcept override { return cascade_ ? strike_.data() : nonlinear_->strike.data(); }
+  int get_group_count() const noexcept override { return groups_; }
+  int find_place(int mode) const noexcept override { return place_[mode]; }
+  void add(std::int64_t sample, const StrikeQueue& strikes, bool struck, const ContactBlock* drive, float* out, SampleStates* kept,
+           int groups) noexcept override;
+  DampedState get_state(int i) const noexcept override;
+  void set_state(int i, const DampedState& state) noexcept override;
+  void set_limit(int modes) noexcept override { modes_.set_limit(modes); }
+  int get_limit() const noexcept override { return modes_.get_limit(); }
+  void drop_below(double pressure_pa) noexcept override;
+  void reset() noexcept override;
+  double calc_energy_j() const noexcept override { return modes_.get_energy_j() + (cascade_ ? cascade_->calc_energy_j() : 0.0); }
 
-NonlinearModes::NonlinearModes(const Model& model, bool has_cascade)
+ private:
+  double get_re(int i) const noexcept { return i < get_coupled_count() ? modes_.get_re(i) : cascade_->get_re(i - get_coupled_count()); }
+  double get_im(int i) const noexcept { return i < get_coupled_count() ? modes_.get_im(i) : cascade_->get_im(i - get_coupled_count()); }
+  double calc_pressure() const noexcept;
+  void add_pulses(std::int64_t sample, std::span<const QueuedPulse> pulses) noexcept;
+  void add_forces(std::int64_t sample, std::span<const QueuedForce> forces) noexcept;
+  void add_contacts(const ContactBlock& drive) noexcept;
+  void add_push(int interval, std::size_t i, double amplitude, const Moments& moments) noexcept;
+
+  const Model* model_;
+  const ModelNonlinear* nonlinear_;  // of the model
+  nonlinear::CoupledModes modes_;
+  std::vector<int> mode_;  // modes of the model: coupled ones, then those above
+  std::vector<nonlinear::ModeConstants> constants_;
+  std::vector<ForceAnswer> answer_;
+  std::vector<double> gain_;  // [Pa at 1 m] per velocity
+  std::unique_ptr<nonlinear::Cascade> cascade_;
+  std::vector<StrikeTable> strike_;  // with a cascade
+  std::vector<int> place_;
+  int groups_ = 0;
+  std::vector<double> push_re_, push_im_, keep_;  // (kSubBlock + 1, N): at the samples of this sub-block and the next one
+  bool pushes_ = false;                           // any push in this sub-block
+  bool has_carry_ = false, carry_damps_ = false;  // the last row applies to the next sub-block
+};
+
+CoupledResonators::CoupledResonators(const Model& model, bool has_cascade)
     : model_(&model),
       nonlinear_(model.get_nonlinear()),
       modes_(nonlinear_->energy, nonlinear_->constants, model.get_rate_hz()),
@@ -81,9 +116,7 @@ NonlinearModes::NonlinearModes(const Model& model, bool has_cascade)
   for (auto* values : {&push_re_, &push_im_, &keep_}) values->assign(kIntervals * mode_.size(), 0.0);
 }
 
-int NonlinearModes::get_group_count() const noexcept { return groups_; }
-
-void NonlinearModes::add_push(int interval, std::size_t i, double amplitude, const Moments& moments) noexcept {
+void CoupledResonators::add_push(int interval, std::size_t i, double amplitude, const Moments& moments) noexcept {
   const std::size_t at = static_cast<std::size_t>(interval) * mode_.size() + i;
   for (int j = 0; j < kMoments; ++j) {
     push_re_[at] += amplitude * moments[j] * answer_[i].re[j];
@@ -91,7 +124,7 @@ void NonlinearModes::add_push(int interval, std::size_t i, double amplitude, con
   }
 }
 
-void NonlinearModes::add_pulses(std::int64_t sample, std::span<const QueuedPulse> pulses) noexcept {
+void CoupledResonators::add_pulses(std::int64_t sample, std::span<const QueuedPulse> pulses) noexcept {
   for (const QueuedPulse& pulse : pulses) {
     const double begin = pulse.begin - static_cast<double>(sample - 1);
     for (int n = 0; n < kSubBlock; ++n) {
@@ -106,7 +139,7 @@ void NonlinearModes::add_pulses(std::int64_t sample, std::span<const QueuedPulse
   }
 }
 
-void NonlinearModes::add_forces(std::int64_t sample, std::span<const QueuedForce> forces) noexcept {
+void CoupledResonators::add_forces(std::int64_t sample, std::span<const QueuedForce> forces) noexcept {
   for (const QueuedForce& force : forces) {
     const double begin = force.begin - static_cast<double>(sample - 1), end = force.calc_end() - static_cast<double>(sample - 1);
     const std::int16_t* row[kStrikeRows];
@@ -126,7 +159,7 @@ void NonlinearModes::add_forces(std::int64_t sample, std::span<const QueuedForce
   }
 }
 
-void NonlinearModes::add_contacts(const ContactBlock& drive) noexcept {
+void CoupledResonators::add_contacts(const ContactBlock& drive) noexcept {
   const std::size_t count = mode_.size();
   for (std::size_t i = 0; i < count; ++i) {
     const int mode = mode_[i];
@@ -161,8 +194,8 @@ void NonlinearModes::add_contacts(const ContactBlock& drive) noexcept {
   }
 }
 
-void NonlinearModes::add(std::int64_t sample, const StrikeQueue& strikes, bool struck, const ContactBlock* drive, float* out,
-                         SampleStates* kept, int groups) noexcept {
+void CoupledResonators::add(std::int64_t sample, const StrikeQueue& strikes, bool struck, const ContactBlock* drive, float* out,
+                            SampleStates* kept, int groups) noexcept {
   const std::size_t count = mode_.size(), coupled = nonlinear_->mode.size();
   const auto row = [count](std::vector<double>& values, int n) {
     return std::span(values).subspan(static_cast<std::size_t>(n) * count, count);
@@ -213,7 +246,7 @@ void NonlinearModes::add(std::int64_t sample, const StrikeQueue& strikes, bool s
 }
 
 /// Advanced by one sample, as the lanes of the groups are.
-DampedState NonlinearModes::get_state(int i) const noexcept {
+DampedState CoupledResonators::get_state(int i) const noexcept {
   const nonlinear::ModeConstants& mode = constants_[i];
   const double d = mode.decay_per_s, damped = calc_damped_omega(mode.eigenvalue_rad2_s2, d), k = 1.0 / model_->get_rate_hz();
   const double size = std::exp(-d * k), c = std::cos(damped * k), s = std::sin(damped * k);
@@ -221,7 +254,7 @@ DampedState NonlinearModes::get_state(int i) const noexcept {
   return {q, size * (re * c - im * s) - d * q};
 }
 
-void NonlinearModes::set_state(int i, const DampedState& state) noexcept {
+void CoupledResonators::set_state(int i, const DampedState& state) noexcept {
   const nonlinear::ModeConstants& mode = constants_[i];
   const double d = mode.decay_per_s, damped = calc_damped_omega(mode.eigenvalue_rad2_s2, d), k = 1.0 / model_->get_rate_hz();
   const double size = std::exp(d * k), c = std::cos(damped * k), s = std::sin(damped * k);
@@ -233,13 +266,13 @@ void NonlinearModes::set_state(int i, const DampedState& state) noexcept {
     cascade_->set_state(i - get_coupled_count(), q, velocity);
 }
 
-void NonlinearModes::drop_below(double pressure_pa) noexcept {
+void CoupledResonators::drop_below(double pressure_pa) noexcept {
   double bound = 0.0;
   for (int i = 0; i < get_count(); ++i) bound += std::abs(gain_[i]) * std::hypot(get_re(i), get_im(i));
   if (bound < pressure_pa && !has_carry_) reset();
 }
 
-void NonlinearModes::reset() noexcept {
+void CoupledResonators::reset() noexcept {
   modes_.reset();
   if (cascade_) cascade_->reset();
   has_carry_ = carry_damps_ = false;
@@ -248,7 +281,7 @@ void NonlinearModes::reset() noexcept {
 }
 
 /// Pressure at the sample.
-double NonlinearModes::calc_pressure() const noexcept {
+double CoupledResonators::calc_pressure() const noexcept {
   double pressure = 0.0;
   for (int i = 0; i < get_coupled_count(); ++i) pressure += gain_[i] * modes_.get_velocity(i);
   if (!cascade_) return pressure;
@@ -256,6 +289,12 @@ double NonlinearModes::calc_pressure() const noexcept {
   const double* gain = gain_.data() + get_coupled_count();
   for (std::size_t m = 0; m < velocity.size(); ++m) pressure += gain[m] * velocity[m];
   return pressure;
+}
+
+}  // namespace
+
+std::unique_ptr<NonlinearModes> make_nonlinear_modes(const Model& model, bool has_cascade) {
+  return std::make_unique<CoupledResonators>(model, has_cascade);
 }
 
 }  // namespace carillon::synth

@@ -10,8 +10,7 @@
 #include "runtime/synth/damped_modes.hpp"
 #include "runtime/synth/kernels.hpp"
 #include "runtime/synth/model.hpp"
-#include "runtime/synth/nonlinear/cascade.hpp"
-#include "runtime/synth/nonlinear/coupled_modes.hpp"
+#include "runtime/synth/nonlinear/mode_constants.hpp"
 #include "runtime/synth/strike_queue.hpp"
 
 namespace carillon::synth {
@@ -34,64 +33,42 @@ struct ModelNonlinear {
   std::vector<int> above;           // modes of the model that ring at higher frequencies, ascending
 };
 
-/// States are those at the last rendered sample; at rest while is_live() is false. Allocates in the constructor only.
+/// States are those at the last rendered sample; at rest while is_live() is false. Allocates in make_nonlinear_modes() only.
 class NonlinearModes {
  public:
-  /// The model must outlive the result and have a nonlinear energy, and Model::has_cascade() with a cascade, whose modes follow the coupled
-  /// ones.
-  explicit NonlinearModes(const Model& model, bool has_cascade = false);
+  virtual ~NonlinearModes() = default;
 
-  bool is_live() const noexcept { return modes_.is_moving() || has_carry_ || (cascade_ && cascade_->is_moving()); }
-  int get_count() const noexcept { return static_cast<int>(mode_.size()); }
-  int get_coupled_count() const noexcept { return modes_.get_count(); }
-  int get_cascade_count() const noexcept { return cascade_ ? cascade_->get_count() : 0; }
+  virtual bool is_live() const noexcept = 0;
+  int get_count() const noexcept { return static_cast<int>(get_modes().size()); }
+  virtual int get_coupled_count() const noexcept = 0;
+  virtual int get_cascade_count() const noexcept = 0;
   /// Numbers in the model.
-  std::span<const int> get_modes() const noexcept { return mode_; }
+  virtual std::span<const int> get_modes() const noexcept = 0;
   /// Strike tables of the model without these modes.
-  const StrikeTable* get_strike_tables() const noexcept { return cascade_ ? strike_.data() : nonlinear_->strike.data(); }
-  int get_group_count() const noexcept;
+  virtual const StrikeTable* get_strike_tables() const noexcept = 0;
+  virtual int get_group_count() const noexcept = 0;
   /// Index of a mode of the model; -1: none.
-  int find_place(int mode) const noexcept { return place_[mode]; }
+  virtual int find_place(int mode) const noexcept = 0;
 
   /// Adds the pressure [Pa at 1 m] of the kSubBlock samples from `sample` on. `struck`: some of `strikes` act; `drive`: lasting contacts,
   /// or nullptr. `kept`: receives the states of groups below `groups`, or nullptr.
-  void add(std::int64_t sample, const StrikeQueue& strikes, bool struck, const ContactBlock* drive, float* out, SampleStates* kept,
-           int groups) noexcept;
+  virtual void add(std::int64_t sample, const StrikeQueue& strikes, bool struck, const ContactBlock* drive, float* out, SampleStates* kept,
+                   int groups) noexcept = 0;
 
   /// State of mode i at the next sample, without coupling on the way.
-  DampedState get_state(int i) const noexcept;
-  void set_state(int i, const DampedState& state) noexcept;
+  virtual DampedState get_state(int i) const noexcept = 0;
+  virtual void set_state(int i, const DampedState& state) noexcept = 0;
   /// Limits the number of coupled modes.
-  void set_limit(int modes) noexcept { modes_.set_limit(modes); }
-  int get_limit() const noexcept { return modes_.get_limit(); }  // coupled modes now
+  virtual void set_limit(int modes) noexcept = 0;
+  virtual int get_limit() const noexcept = 0;  // coupled modes now
   /// Silences all modes if their total pressure stays below this.
-  void drop_below(double pressure_pa) noexcept;
-  void reset() noexcept;
-  double calc_energy_j() const noexcept { return modes_.get_energy_j() + (cascade_ ? cascade_->calc_energy_j() : 0.0); }
-
- private:
-  double get_re(int i) const noexcept { return i < get_coupled_count() ? modes_.get_re(i) : cascade_->get_re(i - get_coupled_count()); }
-  double get_im(int i) const noexcept { return i < get_coupled_count() ? modes_.get_im(i) : cascade_->get_im(i - get_coupled_count()); }
-  double calc_pressure() const noexcept;
-  void add_pulses(std::int64_t sample, std::span<const QueuedPulse> pulses) noexcept;
-  void add_forces(std::int64_t sample, std::span<const QueuedForce> forces) noexcept;
-  void add_contacts(const ContactBlock& drive) noexcept;
-  void add_push(int interval, std::size_t i, double amplitude, const Moments& moments) noexcept;
-
-  const Model* model_;
-  const ModelNonlinear* nonlinear_;  // of the model
-  nonlinear::CoupledModes modes_;
-  std::vector<int> mode_;  // modes of the model: coupled ones, then those above
-  std::vector<nonlinear::ModeConstants> constants_;
-  std::vector<ForceAnswer> answer_;
-  std::vector<double> gain_;  // [Pa at 1 m] per velocity
-  std::unique_ptr<nonlinear::Cascade> cascade_;
-  std::vector<StrikeTable> strike_;  // with a cascade
-  std::vector<int> place_;
-  int groups_ = 0;
-  std::vector<double> push_re_, push_im_, keep_;  // (kSubBlock + 1, N): at the samples of this sub-block and the next one
-  bool pushes_ = false;                           // any push in this sub-block
-  bool has_carry_ = false, carry_damps_ = false;  // the last row applies to the next sub-block
+  virtual void drop_below(double pressure_pa) noexcept = 0;
+  virtual void reset() noexcept = 0;
+  virtual double calc_energy_j() const noexcept = 0;
 };
+
+/// The model must outlive the result and have a nonlinear energy, and Model::has_cascade() with a cascade, whose modes follow the coupled
+/// ones. Throws InputError in a build without the component NONLINEAR.
+std::unique_ptr<NonlinearModes> make_nonlinear_modes(const Model& model, bool has_cascade);
 
 }  // namespace carillon::synth

@@ -39,7 +39,7 @@ ResonatorBank::ResonatorBank(std::shared_ptr<const Model> model, ResonatorOption
     if (model_->get_nonlinear() == nullptr) throw InputError("nonlinear: this bank has no nonlinear energy");
     if (options.has_cascade && !model_->has_cascade())
       throw InputError("a cascade needs a bank with a nonlinear energy, a mass, a thickness, and modes above the coupled ones");
-    nonlinear_ = std::make_unique<NonlinearModes>(*model_, options.has_cascade);
+    nonlinear_ = make_nonlinear_modes(*model_, options.has_cascade);
   }
   if (options.audits_energy) book_ = std::make_unique<EnergyBook>(*model_);
 }

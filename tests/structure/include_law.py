@@ -248,6 +248,19 @@ ONLY_IN = {
     ),
     "cgal": re.compile(r"^precompute/mesher/[a-z0-9_]+\.(cpp|hpp)$"),
 }
+# Headers of components (docs/components.md) that others may include, too: the core is built without the rest of the component.
+FACES = {
+    "runtime/synth/nonlinear/mode_constants.hpp",
+    "runtime/acoustics/head/head.hpp",
+    "runtime/acoustics/head/sofa.hpp",
+    "runtime/acoustics/head/sphere.hpp",
+    "jobs/front/explore/explore.hpp",
+    "jobs/front/explore/names.hpp",
+    "jobs/front/explore/serve.hpp",
+    "jobs/queue/slurm/inside.hpp",
+    "jobs/queue/slurm/settings.hpp",
+    "jobs/queue/slurm/task.hpp",
+}
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 
 
@@ -256,6 +269,20 @@ SYSTEM = re.compile(
     r"^(sys/[a-z]+|unistd|fcntl|dirent|dlfcn|signal|pthread|poll|netinet/in|termios|errno|limits|"
     r"stddef|stdint|stdlib|stdio|string|math|time|sched|spawn|immintrin|xmmintrin|wasm_simd128|pwd|malloc)\.h$"
 )
+
+
+def read_components(table):
+    """{NAME: paths of folders and files} of deploy/cmake/Components.cmake."""
+    return {name: paths.split() for name, paths in re.findall(r'^carillon_component\((\w+) "[^"]*"([^)]*)\)', table, re.M)}
+
+
+COMPONENTS = read_components((pathlib.Path(__file__).resolve().parents[2] / "deploy/cmake/Components.cmake").read_text())
+
+
+def find_component(path):
+    """Name of the component of a file, None for the core. x_absent.cpp stands in for x.cpp."""
+    path = path.replace("_absent.cpp", ".cpp")
+    return next((name for name, own in COMPONENTS.items() if any(path == one or path.startswith(one + "/") for one in own)), None)
 
 
 def library_of(path):
@@ -307,6 +334,9 @@ def find_breaches(files):
             if bracket == '"':
                 if breach := find_breach(folder, part, target):
                     breaches.append(f"{path}:{number}: {breach}")
+                owner = find_component(target)
+                if owner not in (None, find_component(path)) and target not in FACES:
+                    breaches.append(f"{path}:{number}: {target} belongs to the component {owner}, and is not among its FACES")
                 continue
             library = library_of(target)
             if library is None and ("/" in target or "." in target) and not SYSTEM.match(target):
@@ -343,9 +373,12 @@ def self_test():
         ("precompute/mesh/x.cpp", '#include "partition/partition.hpp"\n'),
         ("runtime/physics/impact/x.cpp", '#include "runtime/bank/bank.hpp"\n'),
         ("runtime/physics/rigid/x.cpp", "#include <SimTKsimbody.h>\n"),
+        ("precompute/run/run_job.cpp", '#include "precompute/air/radiate.hpp"\n'),
+        ("runtime/synth/model.cpp", '#include "runtime/acoustics/head/ear_filter.hpp"\n'),
     ]
     for one in bad:
         assert len(find_breaches([one])) == 1, one
+    assert not find_breaches([("precompute/run/air.cpp", '#include "precompute/air/radiate.hpp"\n')])
     good = [("runtime/bank/x.cpp", '#include <hdf5.h>\n#include <vector>\n#include "runtime/base/error.hpp"\n// #include <mpi.h>\n')]
     assert not find_breaches(good)
 

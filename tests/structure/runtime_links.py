@@ -25,8 +25,8 @@ def list_libraries(file):
 
 bad = []
 folder = pathlib.Path(sys.argv[1])
-module = folder.parent.glob("python/carillon/_carillon*.so")  # the Python module, where it is built
-for name in ("carillon-bank", "carillon-render", "carillon-live", "carillon-samples", *module):
+optional = [*folder.glob("carillon-samples"), *folder.parent.glob("python/carillon/_carillon*.so")]  # where they are built
+for name in ("carillon-bank", "carillon-render", "carillon-live", *optional):
     program = folder / name
     loaded = list_libraries(program)
     found = {library for library in loaded if FORBIDDEN.search(library)}

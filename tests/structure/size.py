@@ -10,6 +10,9 @@ import subprocess
 import sys
 import tempfile
 
+sys.dont_write_bytecode = True
+from include_law import COMPONENTS, find_component
+
 PRODUCT = ("runtime", "precompute", "partition", "jobs")
 C_ENDINGS = {".cpp", ".hpp", ".inl", ".c", ".h"}
 MAX_FUNCTION_LINES = 80
@@ -76,6 +79,14 @@ def measure(root):
     return counts, functions + files
 
 
+def count_components(root):
+    """{NAME: lines} of the components (docs/components.md); None: the core."""
+    counts = dict.fromkeys([*COMPONENTS, None], 0)
+    for path, lines in read_sources(root, PRODUCT).items():
+        counts[find_component(path)] += len(lines)
+    return counts
+
+
 def main():
     root = pathlib.Path(__file__).resolve().parents[2]
     arguments = sys.argv[1:]
@@ -88,6 +99,8 @@ def main():
             archive = subprocess.run(["git", "archive", arguments[0]], cwd=root, capture_output=True, check=True).stdout
             subprocess.run(["tar", "-x", "-C", folder], input=archive, check=True)
         counts, long = measure(pathlib.Path(folder) if arguments else root)
+        components = count_components(pathlib.Path(folder) if arguments else root)
+    counts |= {f"  of the component {name}" if name else "  of the core": count for name, count in components.items()}
     print("\n".join([f"{count:>8}  {name}" for name, count in counts.items()] + [f"{count:>8}  {place}" for count, place in long]))
     return 0
 

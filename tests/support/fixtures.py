@@ -2,7 +2,7 @@
 """Meshes and banks shared by tests: made once per build by the CTest fixtures of tests/support/CMakeLists.txt.
 
 usage: fixtures.py NAME     makes the fixture, unless it is there and made by the programs that are there now
-       fixtures.py --list   names all, one a line
+       fixtures.py --list   names all, one a line, with the component that it needs
 
 A test asks for its path:
 
@@ -66,6 +66,11 @@ RECIPES = {
 }
 
 
+def find_component(recipe):
+    """The component that a recipe needs (docs/components.md), or ""."""
+    return "analytic" if isinstance(recipe, dict) and "shape" not in recipe["body"] else ""
+
+
 def get_bin_dir():
     return pathlib.Path(os.environ.get("CARILLON_BIN_DIR") or pathlib.Path(__file__).resolve().parents[2] / "build/release/bin").resolve()
 
@@ -110,7 +115,7 @@ def get(name):
 
 if __name__ == "__main__":
     if sys.argv[1:] == ["--list"]:
-        print("\n".join(RECIPES))
+        print("\n".join(f"{name} {find_component(recipe)}".rstrip() for name, recipe in RECIPES.items()))
         sys.exit()
     if len(sys.argv) != 2 or sys.argv[1] not in RECIPES:
         sys.exit(f"usage: fixtures.py NAME     one of {', '.join(RECIPES)}")

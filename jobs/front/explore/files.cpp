@@ -21,15 +21,6 @@ namespace fs = std::filesystem;
 
 }  // namespace
 
-std::string cut_name(std::string name) {
-  constexpr std::size_t kMost = 100;
-  if (name.size() <= kMost) return name;
-  std::size_t end = kMost;
-  while (end > 0 && (static_cast<unsigned char>(name[end]) & 0xC0) == 0x80) --end;
-  name.resize(end);
-  return name;
-}
-
 std::string make_name(std::string_view text) {
   std::string name;
   for (const char c : text) name += std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '.' || c == '_' ? c : '-';

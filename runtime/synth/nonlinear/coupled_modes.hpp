@@ -11,14 +11,9 @@
 
 #include "runtime/bank/quartic_energy.hpp"
 #include "runtime/synth/nonlinear/evaluator.hpp"
+#include "runtime/synth/nonlinear/mode_constants.hpp"
 
 namespace carillon::nonlinear {
-
-/// Linear constants of a coupled mode.
-struct ModeConstants {
-  double eigenvalue_rad2_s2 = 0.0;
-  double decay_per_s = 0.0;
-};
 
 /// Time-stepping scheme.
 enum class Integrator {

@@ -104,6 +104,7 @@ class Path(Bench):
             self.refuse("submit", file, f"--memory-gb={word}", says="--memory-gb")
         self.refuse("run", "--memory-gb=nan", says="--memory-gb")
 
+    @unittest.skipUnless((BIN / "carillon-study").exists(), "a build without the component STUDIES")
     def test_study_speaks_json_too(self):
         for words in (["study", "scaling", "none.json", "--json"], ["--json", "study", "scaling", "none.json"]):
             done = subprocess.run([BIN / "carillon", *words], cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
@@ -233,7 +234,9 @@ class Path(Bench):
         self.assertIn('"memory_gb" of the job is 0.2, and it needs at least', job["reason"])
         self.run_it("retry", "large.json", "--memory-gb", "3")
         self.run_it("run", "--quiet")
-        # The queue ends a simulation above the memory limit.
+
+    @unittest.skipUnless((BIN / "carillon-simulate").exists(), "a build without the component SIMULATION")
+    def test_the_queue_ends_a_simulation_above_its_memory(self):
         simulation = make_simulation(duration_s=1000.0, resources={"ranks": 1, "memory_gb": 0.01})
         self.ask("submit", self.write("long.json", simulation))
         self.run_it("run", "--quiet", code=3)
