@@ -240,12 +240,17 @@ void check_writable(const fs::path& file, std::string_view what) {
     throw InputError(fmt::format("{}: cannot make the folder of the {} ({}); choose another place", find_name(folder), what,
                                  error ? error.message() : "it is not a folder"));
   }
-  if (::lstat(file.c_str(), &info) != 0 && errno != ENOENT) {  // name too long, or a symlink loop
-    throw InputError(
-        fmt::format("{}: the {} cannot be written here: {}; choose another name", find_name(file), what, std::strerror(errno)));
-  }
   const fs::path probe = make_temporary_name(file);
+  for (const fs::path& name : {file, probe}) {
+    if (::lstat(name.c_str(), &info) != 0 && errno != ENOENT) {  // name too long, or a symlink loop
+      throw InputError(
+          fmt::format("{}: the {} cannot be written here: {}; choose another name", find_name(file), what, std::strerror(errno)));
+    }
+  }
+  // A nameless file leaves nothing behind, whenever the program is ended.
+  if (const Descriptor nameless(::open(folder.c_str(), O_WRONLY | O_TMPFILE | O_CLOEXEC, 0600)); nameless.get() >= 0) return;
   ::unlink(probe.c_str());  // left by a killed process of the same PID; O_EXCL follows no planted link
+  const SignalPause pause;
   const Descriptor fd(::open(probe.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600));
   if (fd.get() < 0) {
     throw InputError(fmt::format("{}: the {} cannot be written here: {}; choose a folder that you may write to", find_name(file), what,
