@@ -396,20 +396,26 @@ class Sounds(Case):
             self.fail("the ring has no end")
 
     def test_other_threads_run_during_playback(self):
-        synthesiser = carillon.Synthesiser()
-        body = synthesiser.add_body(carillon.Bank(self.bank_file).edited(density=1e-3))
-        for k in range(60):
-            synthesiser.strike(body, [0, 0, 1e-2], triangle=0, time_s=0.1 * k)
-        seen = []
-        worker = threading.Thread(target=lambda: seen.append(synthesiser.process(30 * 48000)))
-        worker.start()
-        ticks = 0
-        while worker.is_alive():
-            time.sleep(0.0005)
-            ticks += 1
-        worker.join()
-        self.assertEqual(seen[0].shape, (30 * 48000, 2))
-        self.assertGreater(ticks, 5)
+        bank = carillon.Bank(self.bank_file).edited(density=1e-3)
+        most = 0
+        for _ in range(50):  # on a busy machine, this thread may get no time during a short playback
+            synthesiser = carillon.Synthesiser()
+            body = synthesiser.add_body(bank)
+            for k in range(60):
+                synthesiser.strike(body, [0, 0, 1e-2], triangle=0, time_s=0.1 * k)
+            seen = []
+            worker = threading.Thread(target=lambda synthesiser=synthesiser, seen=seen: seen.append(synthesiser.process(30 * 48000)))
+            worker.start()
+            ticks = 0
+            while worker.is_alive():
+                time.sleep(0.0005)
+                ticks += 1
+            worker.join()
+            self.assertEqual(seen[0].shape, (30 * 48000, 2))
+            most = max(most, ticks)
+            if most > 5:
+                break
+        self.assertGreater(most, 5)
 
 
 class Module(unittest.TestCase):
