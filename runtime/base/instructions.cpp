@@ -9,7 +9,7 @@
 namespace carillon::base {
 namespace {
 
-constexpr std::array kNames{"plain", "simd128", "neon", "sse4", "avx2", "avx512"};
+constexpr std::array kNames{"plain", "simd128", "neon", "sse4", "avx2", "avx512", "best"};
 
 bool is_supported(Instructions set) noexcept { return (HWY_SUPPORTED_TARGETS & HWY_TARGETS & get_targets(set)) != 0; }
 
@@ -35,7 +35,7 @@ Instructions find_instructions() noexcept {
 }
 
 std::int64_t get_targets(Instructions set) noexcept {
-  constexpr std::array<std::int64_t, kNames.size()> kTargets{HWY_EMU128 | HWY_SCALAR, HWY_WASM, HWY_NEON, HWY_SSE4, HWY_AVX2, HWY_AVX3};
+  constexpr std::array<std::int64_t, kNames.size()> kTargets{HWY_EMU128 | HWY_SCALAR, HWY_WASM, HWY_NEON, HWY_SSE4, HWY_AVX2, HWY_AVX3, 0};
   return kTargets[static_cast<std::size_t>(set)];
 }
 

@@ -6,10 +6,11 @@
 
 namespace carillon::base {
 
-/// Ascending on each processor. kPlain: one number at a time; kSimd128: WebAssembly; kAvx2 includes FMA; kAvx512 is F, BW, DQ and VL.
-enum class Instructions : std::uint8_t { kPlain, kSimd128, kNeon, kSse4, kAvx2, kAvx512 };
+/// Ascending on each processor. kPlain: one number at a time; kSimd128: WebAssembly; kAvx2 includes FMA; kAvx512 is F, BW, DQ and VL;
+/// kBest: the best there is.
+enum class Instructions : std::uint8_t { kPlain, kSimd128, kNeon, kSse4, kAvx2, kAvx512, kBest };
 
-/// "plain", "simd128", "neon", "sse4", "avx2", "avx512".
+/// "plain", "simd128", "neon", "sse4", "avx2", "avx512", "best".
 const char* get_name(Instructions set) noexcept;
 
 /// Best set of this processor, limited by the environment variable CARILLON_INSTRUCTIONS (one of the names; for comparisons; other values:

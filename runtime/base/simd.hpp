@@ -30,7 +30,7 @@ namespace carillon::base {
 
 /// The function of HWY_DISPATCH_TABLE(function) for a set, or the best one below it that is supported. [audio-thread]
 template <typename Function, std::size_t kCount>
-Function choose(const Function (&table)[kCount], Instructions wanted = find_instructions()) noexcept {
+Function choose(const Function (&table)[kCount], Instructions wanted = Instructions::kBest) noexcept {
   if constexpr (kCount == 1) {
     return table[0];
   } else {
@@ -44,5 +44,7 @@ Function choose(const Function (&table)[kCount], Instructions wanted = find_inst
 
 #endif  // CARILLON_SIMD
 
+#ifdef HWY_TARGET_INCLUDE  // by carillon_simd_sources(); there is one set for WebAssembly
 #include <hwy/foreach_target.h>
+#endif
 #include <hwy/highway.h>

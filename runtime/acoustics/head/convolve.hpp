@@ -20,6 +20,6 @@ struct Loops {
 };
 
 /// Loops of the best supported instruction set up to `best`. Any thread.
-const Loops& get_loops(base::Instructions best = base::find_instructions()) noexcept;
+const Loops& get_loops(base::Instructions best = base::Instructions::kBest) noexcept;
 
 }  // namespace carillon::head

@@ -29,6 +29,6 @@ struct FlowLoops {
 };
 
 /// Loops of the best supported instruction set up to `best`.
-const FlowLoops& find_flow_loops(base::Instructions best = base::find_instructions());
+const FlowLoops& find_flow_loops(base::Instructions best = base::Instructions::kBest);
 
 }  // namespace carillon::radiation

@@ -37,7 +37,7 @@ class Transfers {
  public:
   /// Copies the multipoles. Throws InputError for a bank without multipoles and for arrays that disagree. Not for an audio thread. Uses the
   /// best instructions of the processor up to `best`.
-  explicit Transfers(const bank::Bank& bank, base::Instructions best = base::find_instructions());
+  explicit Transfers(const bank::Bank& bank, base::Instructions best = base::Instructions::kBest);
 
   int get_mode_count() const noexcept { return static_cast<int>(orders_.size()); }
   const Vec3& get_centre_m() const noexcept { return centre_m_; }

@@ -37,6 +37,6 @@ struct Loops {
 };
 
 /// Loops of the best supported instruction set up to `best`.
-const Loops& find_loops(base::Instructions best = base::find_instructions());
+const Loops& find_loops(base::Instructions best = base::Instructions::kBest);
 
 }  // namespace carillon::packed

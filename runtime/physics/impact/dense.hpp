@@ -19,6 +19,6 @@ struct Functions {
 };
 
 /// Implementation for the best supported instruction set up to `best`.
-const Functions& get_functions(base::Instructions best = base::find_instructions());
+const Functions& get_functions(base::Instructions best = base::Instructions::kBest);
 
 }  // namespace carillon::impact::dense

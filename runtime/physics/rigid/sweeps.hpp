@@ -106,7 +106,7 @@ struct Functions {
 };
 
 /// Implementation for the best supported instruction set up to `best`.
-const Functions& get_functions(base::Instructions best = base::find_instructions());
+const Functions& get_functions(base::Instructions best = base::Instructions::kBest);
 
 }  // namespace carillon::rigid::sweeps
 
