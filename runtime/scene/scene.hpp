@@ -133,7 +133,7 @@ struct Output {
 };
 
 /// Names of quality.instructions, in the order of synth::Isa.
-inline const std::vector<std::string> kInstructionNames{"plain", "simd128", "sse2", "avx2", "avx512", "best"};
+inline const std::vector<std::string> kInstructionNames{"plain", "simd128", "neon", "sse4", "avx2", "avx512", "best"};
 
 /// Accuracy against CPU time; the defaults are chosen in docs/accuracy.md.
 struct Quality {

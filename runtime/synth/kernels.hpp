@@ -1,11 +1,12 @@
 // Inner loops over modes, selected by instruction set at run time.
 //
-// Modes come in groups of kGroup; empty lanes have zero tables. Source files of instruction sets are compiled with their own flags, so this
-// header has no inline functions.
+// Modes come in groups of kGroup; empty lanes have zero tables.
 #pragma once
 
 #include <array>
 #include <cstdint>
+
+#include "runtime/base/instructions.hpp"
 
 namespace carillon::synth {
 
@@ -19,8 +20,8 @@ inline constexpr int kTerms = 10;       // Chebyshev terms of a strike: -169 dB 
 inline constexpr int kStrikeRows = 9;   // three corners times three axes
 inline constexpr int kMaxContacts = 8;  // active contacts per body
 
-/// Instruction sets in ascending order. kBest: the best of the processor. kSimd128: WebAssembly.
-enum class Isa : std::uint8_t { kPlain, kSimd128, kSse2, kAvx2, kAvx512, kBest };
+using Isa = base::Instructions;
+using base::get_name;
 
 /// Sound of each mode over a column: sample k of mode m is re wave[m / 2][0][k][m % 2] + im wave[m / 2][1][k][m % 2] for the state re + i
 /// im at the start of the column.
@@ -136,19 +137,7 @@ struct Kernels {
   void (*read)(const Reading* readings, int count, float* out) noexcept;
 };
 
-/// Best instruction set of this processor. Any thread.
-Isa find_best_isa() noexcept;
 /// Kernels of an instruction set, or of the best one below it that the processor has. Any thread.
 const Kernels& get_kernels(Isa isa) noexcept;
-/// "plain", "simd128", "sse2", "avx2", "avx512".
-const char* get_name(Isa isa) noexcept;
-
-// Use get_kernels().
-extern const Kernels kPlainKernels;
-#if defined(__x86_64__)
-extern const Kernels kSse2Kernels, kAvx2Kernels, kAvx512Kernels;
-#elif defined(__wasm_simd128__)
-extern const Kernels kSimd128Kernels;
-#endif
 
 }  // namespace carillon::synth

@@ -8,9 +8,8 @@
 //             the product of the factors.
 // Source:     docs/decisions/resonator-kernel.md.
 //
-// Included by kernels_*.cpp, which give the types F (lanes of float), D (as many lanes of double), P (lanes of float in pairs) and
-// kVectors, kHeldColumns: how many vectors of samples of how many columns emit holds in registers at once. Everything is in an unnamed
-// namespace and nothing of std is used, so that no function compiled for one processor can be linked in place of another's. The pragmas
+// Included by kernels.cpp once per instruction set, which gives the types F (lanes of float), D (as many lanes of double), P (lanes of
+// float in pairs) and kVectors, kHeldColumns: how many vectors of samples of how many columns emit holds in registers at once. The pragmas
 // make g++ 12 keep arrays of sums in registers.
 
 template <int kNumber>

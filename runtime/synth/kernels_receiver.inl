@@ -3,7 +3,7 @@
 //             read with the same taps, are summed before.
 // Source:     docs/equations.md.
 //
-// Included by kernels_*.cpp after kernels_body.inl.
+// Included by kernels.cpp after kernels_body.inl.
 
 void convolve(const float* taps, const float* samples, float* out) noexcept {
   constexpr int kParts = kSubBlock / F::kWidth;

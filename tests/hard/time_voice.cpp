@@ -164,8 +164,7 @@ TEST(time, table_turns) {
   for (int m = 0; m < 4096; ++m) dense.emplace_back(to_lambda(50.0 + 4.0 * m + 4.5e-4 * m * m), 0.5);
   const std::int64_t minute = 60 * static_cast<std::int64_t>(kRate);
   const std::vector<Real> late = calc_sound(all, 10 * minute, 4800), loud = calc_sound(dense, 48000, 1024);
-  for (const Isa isa : {Isa::kPlain, Isa::kSse2, Isa::kAvx2, Isa::kAvx512}) {
-    if (synth::get_kernels(isa).isa != isa) continue;
+  for (const Isa isa : base::list_instructions()) {
     const synth::ResonatorOptions options{.silence_pa = 1e-30, .isa = isa};
     const std::string name = synth::get_name(isa);
     for (const double freq : freqs) {

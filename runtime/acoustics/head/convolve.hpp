@@ -1,6 +1,8 @@
 // Inner loops of head filters, selected by instruction set at run time.
 #pragma once
 
+#include "runtime/base/instructions.hpp"
+
 namespace carillon::head {
 
 inline constexpr int kChunk = 32;    // samples per convolution
@@ -17,12 +19,7 @@ struct Loops {
   void (*blend)(const float* const* rows, const float* weight, int taps, float* out) noexcept;
 };
 
-extern const Loops kPlainLoops;
-#if defined(__x86_64__)
-extern const Loops kAvx2Loops, kAvx512Loops;
-#endif
-
-/// Best loops of this processor. Any thread.
-const Loops& get_loops() noexcept;
+/// Loops of the best supported instruction set up to `best`. Any thread.
+const Loops& get_loops(base::Instructions best = base::Instructions::kBest) noexcept;
 
 }  // namespace carillon::head

@@ -21,7 +21,6 @@
 #include "runtime/bank/multipoles.hpp"
 #include "runtime/bank/surface.hpp"
 #include "runtime/base/hankel.hpp"
-#include "runtime/base/instructions.hpp"
 #include "runtime/base/vector.hpp"
 
 namespace carillon::radiation {
@@ -122,25 +121,12 @@ Skin make_skin(const bank::Bank& bank) {
   return skin;
 }
 
-struct Loops {
-  AddFlow add_flow = add_flow_plain;
-  CalcThrough calc_through = calc_through_plain;
-};
-
-Loops find_loops() {
-#if defined(__x86_64__)
-  if (base::has_instructions(base::Instructions::kAvx512)) return {add_flow_avx512, calc_through_avx512};
-  if (base::has_instructions(base::Instructions::kAvx2)) return {add_flow_avx2, calc_through_avx2};
-#endif
-  return {};
-}
-
 /// Radiated power of a mode per order: U_l^2 summed over m, and the remainder.
 using Power = std::array<double, kOrders + 1>;
 
 std::vector<Power> calc_powers(const bank::Bank& bank, const Skin& skin) {
   static_assert(kHarmonics <= kFlowColumns);
-  const Loops loops = find_loops();
+  const FlowLoops& loops = find_flow_loops();
   const Recurrence recurrence;
   const std::size_t modes = bank.mode_count(), rows = (modes + kFlowRows - 1) / kFlowRows * kFlowRows;
   const double per_area = 1.0 / (skin.radius_m * skin.radius_m);

@@ -1,9 +1,10 @@
-// Inner loops of Transfers, one per instruction set. Source files of instruction sets are compiled with their own flags, so this header has
-// no inline functions.
+// Inner loops of Transfers, selected by instruction set at run time.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+
+#include "runtime/base/instructions.hpp"
 
 namespace carillon::radiation {
 
@@ -44,10 +45,6 @@ struct HarmonicWork {
   int order;
 };
 
-/// Real orthonormal harmonics up to work.order, (order + 1)^2 in the sequence of TransferGroup, with space for kHarmonicsPadding more.
-/// Values below 1e-20 are 0.
-using CalcHarmonics = void (*)(const HarmonicWork& work, float* harmonics);
-
 /// A place. `radial`: buffer (order + 1, 3, kTransferLanes); `re`, `im`: T of every mode of the group.
 struct TransferPlace {
   const float* harmonics;     // up to the order of the group
@@ -65,14 +62,15 @@ struct TransferWork {
   int count;  // of places
 };
 
-/// T of every mode of the group at each place.
-using CalcTransfers = void (*)(const TransferWork& work);
+struct TransferLoops {
+  /// Real orthonormal harmonics up to work.order, (order + 1)^2 in the sequence of TransferGroup, with space for kHarmonicsPadding more.
+  /// Values below 1e-20 are 0.
+  void (*calc_harmonics)(const HarmonicWork& work, float* harmonics);
+  /// T of every mode of the group at each place.
+  void (*calc_transfers)(const TransferWork& work);
+};
 
-void calc_harmonics_plain(const HarmonicWork& work, float* harmonics);
-void calc_harmonics_avx2(const HarmonicWork& work, float* harmonics);
-void calc_harmonics_avx512(const HarmonicWork& work, float* harmonics);
-void calc_transfers_plain(const TransferWork& work);
-void calc_transfers_avx2(const TransferWork& work);
-void calc_transfers_avx512(const TransferWork& work);
+/// Loops of the best supported instruction set up to `best`.
+const TransferLoops& find_transfer_loops(base::Instructions best);
 
 }  // namespace carillon::radiation

@@ -40,18 +40,7 @@ std::size_t find_place(int l, int i) { return i >= l ? i - l : l + (l - i); }
 
 }  // namespace
 
-Transfers::Transfers(const bank::Bank& bank, [[maybe_unused]] base::Instructions best)
-    : calc_harmonics_(calc_harmonics_plain), calc_transfers_(calc_transfers_plain) {
-#if defined(__x86_64__)
-  best = std::min(best, base::find_instructions());
-  if (best == base::Instructions::kAvx512) {
-    calc_harmonics_ = calc_harmonics_avx512;
-    calc_transfers_ = calc_transfers_avx512;
-  } else if (best == base::Instructions::kAvx2) {
-    calc_harmonics_ = calc_harmonics_avx2;
-    calc_transfers_ = calc_transfers_avx2;
-  }
-#endif
+Transfers::Transfers(const bank::Bank& bank, base::Instructions best) : loops_(&find_transfer_loops(best)) {
   const bank::Multipoles& air = bank.multipoles;
   const std::size_t modes = bank.mode_count();
   check(air, modes);
@@ -167,15 +156,15 @@ void Transfers::evaluate_at(std::span<const Vec3> places_m, std::span<const std:
     const Vec3 way = places_m[p] - centre_m_;
     const double distance = std::sqrt(dot(way, way)), across = std::sqrt(way[0] * way[0] + way[1] * way[1]);
     const double r = std::max(distance, kNearestRadii * radius_m_);
-    calc_harmonics_({.ahead = ahead_.data(),
-                     .behind = behind_.data(),
-                     .diagonal = diagonal_.data(),
-                     .cosine = distance > 0.0 ? way[2] / distance : 1.0,
-                     .sine = distance > 0.0 ? across / distance : 0.0,
-                     .turn_cosine = across > 0.0 ? way[0] / across : 1.0,
-                     .turn_sine = across > 0.0 ? way[1] / across : 0.0,
-                     .order = order},
-                    rooms[p].harmonics.data());
+    loops_->calc_harmonics({.ahead = ahead_.data(),
+                            .behind = behind_.data(),
+                            .diagonal = diagonal_.data(),
+                            .cosine = distance > 0.0 ? way[2] / distance : 1.0,
+                            .sine = distance > 0.0 ? across / distance : 0.0,
+                            .turn_cosine = across > 0.0 ? way[0] / across : 1.0,
+                            .turn_sine = across > 0.0 ? way[1] / across : 0.0,
+                            .order = order},
+                           rooms[p].harmonics.data());
     work.places[p] = {.harmonics = rooms[p].harmonics.data(),
                       .nearness = static_cast<float>(radius_m_ / r),
                       .inverse_r = static_cast<float>(1.0 / r),
@@ -201,7 +190,7 @@ void Transfers::evaluate_at(std::span<const Vec3> places_m, std::span<const std:
         work.places[p].re = &rooms[p].re[place - lane];
         work.places[p].im = &rooms[p].im[place - lane];
       }
-      calc_transfers_(work);
+      loops_->calc_transfers(work);
       done |= bit;
     }
     for (std::size_t p = 0; p < places_m.size(); ++p) transfers[p][i] = {rooms[p].re[place], rooms[p].im[place]};

@@ -37,7 +37,7 @@ class Transfers {
  public:
   /// Copies the multipoles. Throws InputError for a bank without multipoles and for arrays that disagree. Not for an audio thread. Uses the
   /// best instructions of the processor up to `best`.
-  explicit Transfers(const bank::Bank& bank, base::Instructions best = base::Instructions::kAvx512);
+  explicit Transfers(const bank::Bank& bank, base::Instructions best = base::Instructions::kBest);
 
   int get_mode_count() const noexcept { return static_cast<int>(orders_.size()); }
   const Vec3& get_centre_m() const noexcept { return centre_m_; }
@@ -86,8 +86,7 @@ class Transfers {
   std::vector<MultipoleLine> lines_;
   std::vector<RadialLine> radial_;
   std::vector<double> ahead_, behind_, diagonal_;  // of HarmonicWork
-  CalcHarmonics calc_harmonics_;
-  CalcTransfers calc_transfers_;
+  const TransferLoops* loops_;
 };
 
 /// Transfers of a bank, shared by all that play it; nullptr without multipoles. Throws InputError for arrays that disagree.

@@ -1,10 +1,11 @@
-// Inner loops of shapes, one version per instruction set.
+// Inner loops of shapes, selected by instruction set at run time.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 
 #include "runtime/bank/packed/stencil.hpp"
+#include "runtime/base/instructions.hpp"
 
 namespace carillon::packed {
 
@@ -35,9 +36,7 @@ struct Loops {
   void (*round)(const float* row, const float* factor, std::size_t padded, std::int16_t* shape);
 };
 
-extern const Loops kLoopsPlain, kLoopsAvx2, kLoopsAvx512;
-
-/// Loops for this processor.
-const Loops& find_loops();
+/// Loops of the best supported instruction set up to `best`.
+const Loops& find_loops(base::Instructions best = base::Instructions::kBest);
 
 }  // namespace carillon::packed

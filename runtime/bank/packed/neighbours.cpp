@@ -45,7 +45,7 @@ int find_cell_shift(std::span<const Place> places) {
 static_assert(8 * NeighbourSearch::kMostOfCell <= Near::kMost);
 
 NeighbourSearch::NeighbourSearch(std::span<const Place> known, int cell_shift)
-    : known_(known), cell_shift_(cell_shift), near_(std::make_unique<Near>()) {}
+    : loops_(find_loops()), known_(known), cell_shift_(cell_shift), near_(std::make_unique<Near>()) {}
 NeighbourSearch::~NeighbourSearch() = default;
 
 NeighbourSearch::Grid NeighbourSearch::make_grid(int shift) const {
@@ -97,7 +97,7 @@ Neighbours NeighbourSearch::find(const Place& place) {
     }
     Neighbours found;
     if (near_->count >= kNeighbours) {
-      find_loops().find_nearest(*near_, place, grid.shift + 2, found);  // at most 1.5 cells away
+      loops_.find_nearest(*near_, place, grid.shift + 2, found);  // at most 1.5 cells away
       return found;
     }
     if (grid.shift < kMaxGridShift) continue;

@@ -22,6 +22,7 @@ int find_cell_shift(std::span<const Place> places);
 inline constexpr int kMaxCellShift = 24;
 
 struct Near;
+struct Loops;
 
 /// Search among the first vertices of a surface: at least kNeighbours, which must outlive it.
 class NeighbourSearch {
@@ -55,6 +56,7 @@ class NeighbourSearch {
   Grid make_grid(int shift) const;
   void gather(const Grid& grid, const Place& low);
 
+  const Loops& loops_;
   std::span<const Place> known_;
   int cell_shift_;
   std::unique_ptr<Near> near_;  // cached 2x2x2 cells from near_low_ of this grid, often shared by the next query

@@ -81,7 +81,7 @@ WEB_EXPORT(const std::byte*, web_bytes)() { return bytes.data(); }
 WEB_EXPORT(int, web_bytes_count)() { return static_cast<int>(bytes.size()); }
 /// "simd128" or "plain".
 WEB_EXPORT(int, web_instructions)() {
-  text = synth::get_name(synth::find_best_isa());
+  text = base::get_name(base::find_instructions());
   return 0;
 }
 

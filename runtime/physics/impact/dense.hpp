@@ -3,6 +3,8 @@
 
 #include <cstddef>
 
+#include "runtime/base/instructions.hpp"
+
 namespace carillon::impact::dense {
 
 /// Implementation for one instruction set. All give the same results.
@@ -16,9 +18,7 @@ struct Functions {
   void (*substitute)(const double* LU, std::size_t n, std::size_t stride, const std::size_t* pivots, double* x);
 };
 
-extern const Functions kPlain, kAvx2;
-
-/// The fastest implementation that this processor supports.
-const Functions& get_functions();
+/// Implementation for the best supported instruction set up to `best`.
+const Functions& get_functions(base::Instructions best = base::Instructions::kBest);
 
 }  // namespace carillon::impact::dense

@@ -17,8 +17,6 @@
 namespace carillon::rigid {
 namespace {
 
-using sweeps::combine;
-using sweeps::dot;
 using sweeps::Four;
 using sweeps::Locked;
 using sweeps::Response;
@@ -136,6 +134,8 @@ namespace {
 
 Four to_four(const Vec3& a) { return Four{a[0], a[1], a[2], 0.0}; }
 Vec3 to_vec(const Four& a) { return {a[0], a[1], a[2]}; }
+double calc_square(const Four& a) { return a[0] * a[0] + (a[1] * a[1] + a[2] * a[2]); }
+Vec3 to_world(const Four (&axes)[3], const Four& a) { return to_vec(a[0] * axes[0] + (a[1] * axes[1] + a[2] * axes[2])); }
 void set_columns(Four (&columns)[3], const Mat3& m) {
   for (std::size_t c = 0; c < 3; ++c) columns[c] = Four{m[0][c], m[1][c], m[2][c], 0.0};
 }
@@ -298,8 +298,8 @@ void Solver::take(std::vector<Mover>& movers, std::vector<Point>& points) const 
   }
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Row& row = problem_.rows[i];
-    points[i].impulse = to_vec(combine(row.axis, row.impulse));
-    points[i].couple = row.turning >= 0 ? to_vec(combine(row.axis, problem_.turnings[row.turning].couple)) : Vec3{};
+    points[i].impulse = to_world(row.axis, row.impulse);
+    points[i].couple = row.turning >= 0 ? to_world(row.axis, problem_.turnings[row.turning].couple) : Vec3{};
   }
 }
 
@@ -356,7 +356,7 @@ double Solver::run(double tolerance_m_s, int max_sweeps) {
     double now = 0.0;
     for (std::size_t i = 0; i < rows.size(); ++i) {
       before_[i].by = rows[i].impulse - before_[i].by;
-      now += dot(before_[i].by, before_[i].by) * rows[i].mobility;
+      now += calc_square(before_[i].by) * rows[i].mobility;
     }
     const double part = last > 0.0 ? now / last : 0.0;
     last = now;

@@ -5,18 +5,14 @@
 #include <cstddef>
 #include <vector>
 
+#include "runtime/base/instructions.hpp"
+
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wpsabi"  // no vector is passed between instruction sets
 
 namespace carillon::rigid::sweeps {
 
 typedef double Four __attribute__((vector_size(32), aligned(32)));  // a 3-vector and a zero
-
-/// Matrix by columns times vector, and scalar product; compiled once per instruction set.
-[[gnu::always_inline]] static inline Four combine(const Four (&columns)[3], const Four& by) {
-  return by[0] * columns[0] + (by[1] * columns[1] + by[2] * columns[2]);
-}
-[[gnu::always_inline]] static inline double dot(const Four& a, const Four& b) { return a[0] * b[0] + (a[1] * b[1] + a[2] * b[2]); }
 
 /// Velocity of the centre and spin, world axes [m/s, rad/s].
 struct Body {
@@ -109,10 +105,8 @@ struct Functions {
   void (*share)(Problem&, double part);
 };
 
-extern const Functions kPlain, kAvx2;
-
-/// The fastest implementation that this processor supports.
-const Functions& get_functions();
+/// Implementation for the best supported instruction set up to `best`.
+const Functions& get_functions(base::Instructions best = base::Instructions::kBest);
 
 }  // namespace carillon::rigid::sweeps
 

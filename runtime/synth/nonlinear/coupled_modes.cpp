@@ -18,7 +18,6 @@
 #include <numbers>
 
 #include "runtime/base/error.hpp"
-#include "runtime/base/instructions.hpp"
 
 namespace carillon::nonlinear {
 namespace {
@@ -33,14 +32,6 @@ constexpr double kLargestJ = 1e60;
 constexpr int pad(int count) noexcept { return (count + kUnit - 1) / kUnit * kUnit + kUnit; }
 
 }  // namespace
-
-const CoupledKernels& get_kernels() noexcept {
-#if defined(__x86_64__)
-  if (base::has_instructions(base::Instructions::kAvx512)) return kAvx512Kernels;
-  if (base::has_instructions(base::Instructions::kAvx2)) return kAvx2Kernels;
-#endif
-  return kPlainKernels;
-}
 
 /// Sums at a sample, after rotation and push, before the kick.
 struct CoupledModes::Step {

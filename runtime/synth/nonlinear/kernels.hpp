@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "runtime/base/instructions.hpp"
+
 namespace carillon::nonlinear {
 
 inline constexpr int kUnit = 16;       // floats: vector lengths are multiples of this, zero-padded
@@ -75,12 +77,7 @@ constexpr std::ptrdiff_t find_column(std::ptrdiff_t j) noexcept {
   return kColumnUnit * (kColumnUnit * full * (full + 1) / 2 + rest * (full + 1));
 }
 
-extern const CoupledKernels kPlainKernels;
-#if defined(__x86_64__)
-extern const CoupledKernels kAvx2Kernels, kAvx512Kernels;
-#endif
-
-/// Best kernels of this processor. Any thread.
-const CoupledKernels& get_kernels() noexcept;
+/// Kernels of the best supported instruction set up to `best`. Any thread.
+const CoupledKernels& get_kernels(base::Instructions best = base::Instructions::kBest) noexcept;
 
 }  // namespace carillon::nonlinear

@@ -70,7 +70,7 @@ int main(int argc, char** argv) {
   }
   std::printf("| us a block of %d and ear | still | still, dipoles | moves | moves, dipoles |\n|---|--:|--:|--:|--:|\n", kBlock);
   std::vector<synth::Isa> sets;
-  for (const synth::Isa isa : {synth::Isa::kAvx512, synth::Isa::kAvx2, synth::Isa::kSse2, synth::Isa::kPlain}) {
+  for (const synth::Isa isa : {synth::Isa::kAvx512, synth::Isa::kAvx2, synth::Isa::kSse4, synth::Isa::kPlain}) {
     if (synth::get_kernels(isa).isa == isa) sets.push_back(isa);
   }
   std::vector<std::array<std::vector<double>, 4>> seconds(sets.size());

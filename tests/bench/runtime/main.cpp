@@ -96,7 +96,7 @@ int main(int argc, char** argv) {
   const int rounds = quick ? 1 : 7;
   const double seconds = quick ? 0.01 : 0.1;
   std::vector<synth::Isa> isas;
-  for (const synth::Isa isa : {synth::Isa::kAvx512, synth::Isa::kAvx2, synth::Isa::kSse2}) {
+  for (const synth::Isa isa : {synth::Isa::kAvx512, synth::Isa::kAvx2, synth::Isa::kSse4}) {
     if (synth::get_kernels(isa).isa == isa) isas.push_back(isa);
   }
   std::printf("One voice, blocks of %zu frames:\n\n", kFrames);

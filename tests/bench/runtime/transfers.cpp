@@ -6,7 +6,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <complex>
 #include <cstring>
@@ -69,12 +68,9 @@ int main(int argc, char** argv) {
   const bank::Bank bank = make_bank();
   fmt::print("{} modes, {} multipoles; median us of one evaluation at\n", kModes, bank.multipoles.coefficient.size() / 2);
   fmt::print("| instructions | 1.05 R | 2 R | 1 m | 10 m |\n|---|--:|--:|--:|--:|\n");
-  constexpr std::array kNames{"plain", "AVX2", "AVX-512"};
-  for (int i = 0; i < 3; ++i) {
-    const auto instructions = static_cast<base::Instructions>(i);
-    if (!base::has_instructions(instructions)) continue;
+  for (const base::Instructions instructions : base::list_instructions()) {
     const radiation::Transfers transfers(bank, instructions);
-    fmt::print("| {} ", kNames[i]);
+    fmt::print("| {} ", base::get_name(instructions));
     for (const double distance_m : {1.05 * kRadius, 2.0 * kRadius, 1.0, 10.0})
       fmt::print("| {:.1f} ", time_us(transfers, distance_m, quick ? 21 : 5001));
     fmt::print("|\n");

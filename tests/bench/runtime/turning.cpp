@@ -138,15 +138,13 @@ void measure_cost(const bank::Bank* given, bool quick) {
   struct Kind {
     const char* name;
     base::Instructions instructions;
-    synth::Isa isa;
   };
   const synth::EffectSet plain = synth::kDefaultEffects, directed = plain.with(Effect::kDirectivity);
   const double deadline_us = 1e6 * kFrames / kRate;
   std::printf("%s, two ears, calls of %d samples: %.0f us; CPU time, us\n",
               given != nullptr ? "bodies of one bank" : "228 modes a body, random multipoles, tables of its own", kFrames, deadline_us);
   std::printf("| instructions | scene | p50 | p99 | largest | p99 / deadline | looked up a block |\n|---|---|--:|--:|--:|--:|--:|\n");
-  for (const Kind kind :
-       {Kind{"AVX2", base::Instructions::kAvx2, synth::Isa::kAvx2}, Kind{"AVX-512", base::Instructions::kAvx512, synth::Isa::kAvx512}}) {
+  for (const Kind kind : {Kind{"AVX2", base::Instructions::kAvx2}, Kind{"AVX-512", base::Instructions::kAvx512}}) {
     if (!base::has_instructions(kind.instructions)) continue;
     std::vector<std::shared_ptr<const synth::Model>> models;
     for (int b = 0; b < (quick ? 20 : 40); ++b) {
@@ -165,8 +163,8 @@ void measure_cost(const bank::Bank* given, bool quick) {
     if (!quick) rows.push_back({"40 bodies turn at 10 rad/s, the listener walks", 40, directed, 10.0, 1.5});
     for (int round = 0; round < (quick ? 1 : 5); ++round)
       for (Row& row : rows)
-        row.rounds.push_back(
-            play({models.begin(), models.begin() + row.bodies}, kind.isa, row.effects, row.turn_rad_s, row.walk_m_s, quick ? 60 : 600));
+        row.rounds.push_back(play({models.begin(), models.begin() + row.bodies}, kind.instructions, row.effects, row.turn_rad_s,
+                                  row.walk_m_s, quick ? 60 : 600));
     for (const Row& row : rows) {
       const auto find = [&](double Times::*value) {
         std::vector<double> values;

@@ -11,7 +11,7 @@ from sounds import np
 NAME, TITLE = "playing", "Playing: what each knob of the runtime costs and buys"
 PROGRAMS = banks.PROGRAMS
 EFFECTS = ("modal", "hertz_pulse", "roughness", "rolling", "contact_damping", "acceleration_noise", "air_delay", "doppler", "two_ears")
-INSTRUCTIONS = ("plain", "sse2", "avx2", "avx512")
+INSTRUCTIONS = ("plain", "sse4", "avx2", "avx512")
 SOUND_SPEED = 343.0  # m/s
 # Most accurate thresholds of effect selection that a scene may set: reference for selection errors.
 STRICTEST = {"planner_db": -150, "quiet_db": 250, "silence_pa": 1e-15}

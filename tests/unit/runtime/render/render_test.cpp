@@ -125,7 +125,7 @@ TEST(Render, EachMicrophoneHasItsPosition) {
 }
 
 TEST(Render, AllInstructionSetsMatchTheClosedFormToSinglePrecision) {
-  for (const synth::Isa isa : {synth::Isa::kPlain, synth::Isa::kSse2, synth::Isa::kAvx2, synth::Isa::kAvx512}) {
+  for (const synth::Isa isa : base::list_instructions()) {
     Case c({{1000.0, 0.0, 2.0}}, {3.0, 0.0, 0.0}, 0.1);
     c.scene.quality.instructions = isa;
     const Heard sound = c.render();

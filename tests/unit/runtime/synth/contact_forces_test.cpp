@@ -25,7 +25,7 @@ TEST(ContactForces, DriveTheModesAsQuadrature) {
   modes.push_back({300.0, 3000.0, 0.5, {0.2, 0.0, 1.0}});  // over-damped, too
   const bank::Bank bank = make_cube_bank(modes);
   const auto model = Model::make(bank);
-  for (const Isa isa : {Isa::kPlain, Isa::kSse2, Isa::kAvx2, Isa::kAvx512}) {
+  for (const Isa isa : base::list_instructions()) {
     const auto make = [](double t) { return make_sliding(t, 0.3 + 2.0 * t); };
     ContactForces traced(model, {.effects = kNoise}), contacts(model, {.effects = kNoise});
     ResonatorBank voice(model, {.isa = isa});

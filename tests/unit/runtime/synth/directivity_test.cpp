@@ -242,7 +242,7 @@ TEST(Directivity, RadiatedEnergyIsThatOfTheStrike) {
 TEST(Directivity, StrikesSoundAsByGains) { expect_as_by_gains(make_gains_scene(), -85.0); }
 
 TEST(Directivity, EveryInstructionSetSoundsTheSame) {
-  for (const Isa isa : {Isa::kPlain, Isa::kSse2, Isa::kAvx2, Isa::kAvx512}) {
+  for (const Isa isa : base::list_instructions()) {
     Scene scene = make_gains_scene();
     scene.isa = isa;
     expect_as_by_gains(scene, -85.0);

@@ -185,7 +185,7 @@ TEST(Force, SoundsTheSameInBlocksOfAnySizeAndOnAnyInstructionSetToRounding) {
   const bank::Bank bank = make_cube_bank(make_modes(33));
   const Course course = make_course(2.1e-3, 1.3e-5, 300, true);
   std::vector<float> first;
-  for (const Isa isa : {Isa::kPlain, Isa::kSse2, Isa::kAvx2, Isa::kAvx512}) {
+  for (const Isa isa : base::list_instructions()) {
     std::vector<float> own;
     for (const std::size_t block : {1U, 31U, 128U, 1000U}) {
       ResonatorBank voice(Model::make(bank, {.rate_hz = kRate}), {.isa = isa});

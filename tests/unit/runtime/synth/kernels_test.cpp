@@ -17,14 +17,6 @@ namespace {
 
 using Complex = std::complex<double>;
 
-std::vector<Isa> list_isas() {
-  std::vector<Isa> isas;
-  for (const Isa isa : {Isa::kPlain, Isa::kSse2, Isa::kAvx2, Isa::kAvx512}) {
-    if (get_kernels(isa).isa == isa) isas.push_back(isa);
-  }
-  return isas;
-}
-
 /// `modes` modes with random tables; empty lanes zero.
 struct Invented {
   std::vector<SoundTable> sound;
@@ -90,14 +82,13 @@ Complex turn_on(const Invented& of, std::size_t g, int l, Complex x, int columns
 const std::array<int, 12> kCounts{0, 1, 2, 3, 4, 7, 8, 15, 16, 17, 33, 160};
 
 TEST(Kernels, TheBestExists) {
-  EXPECT_EQ(get_kernels(Isa::kBest).isa, find_best_isa());
-  EXPECT_EQ(list_isas().front(), Isa::kPlain);
-  EXPECT_EQ(list_isas().back(), find_best_isa());
+  EXPECT_EQ(get_kernels(Isa::kBest).isa, base::find_instructions());
+  for (const Isa isa : base::list_instructions()) EXPECT_EQ(get_kernels(isa).isa, isa);
   EXPECT_STREQ(get_name(Isa::kAvx2), "avx2");
 }
 
 TEST(Kernels, AdvanceTurnsTheStateAndFillsTheStarts) {
-  for (const Isa isa : list_isas()) {
+  for (const Isa isa : base::list_instructions()) {
     for (const int count : kCounts) {
       Invented now(count);
       const Invented before(count);
@@ -120,7 +111,7 @@ TEST(Kernels, AdvanceTurnsTheStateAndFillsTheStarts) {
 }
 
 TEST(Kernels, EmitSumsTheSoundOfAllModes) {
-  for (const Isa isa : list_isas()) {
+  for (const Isa isa : base::list_instructions()) {
     for (const int count : kCounts) {
       Invented invented(count);
       get_kernels(isa).advance(invented.turn.data(), invented.state.data(), invented.starts.data(), invented.groups);
@@ -147,7 +138,7 @@ TEST(Kernels, EmitSumsTheSoundOfAllModes) {
 }
 
 TEST(Kernels, TheDivisionOfABlockDoesNotChangeABit) {
-  for (const Isa isa : list_isas()) {
+  for (const Isa isa : base::list_instructions()) {
     const Kernels& kernels = get_kernels(isa);
     for (const int count : {16, 33, 160, 400}) {
       Invented whole(count), cut(count);
@@ -169,7 +160,7 @@ TEST(Kernels, TheDivisionOfABlockDoesNotChangeABit) {
 }
 
 TEST(Kernels, AStrikeAddsItsAnswerAndLeavesItToTheRestOfThePeriod) {
-  for (const Isa isa : list_isas()) {
+  for (const Isa isa : base::list_instructions()) {
     for (const int count : kCounts) {
       for (int sub_block = 0; sub_block < kSubBlocks; ++sub_block) {
         Invented now(count);
@@ -214,7 +205,7 @@ TEST(Kernels, AStrikeAddsItsAnswerAndLeavesItToTheRestOfThePeriod) {
 
 // emit_weighted() equals emit() of weighted states.
 TEST(Kernels, EmitWeightedIsEmitOfTheProducts) {
-  for (const Isa isa : list_isas()) {
+  for (const Isa isa : base::list_instructions()) {
     const Kernels& kernels = get_kernels(isa);
     for (const int count : kCounts) {
       Invented invented(count);
@@ -257,7 +248,7 @@ std::vector<ModeWeight> make_weight(const Invented& of) {
 
 // The kept states of two pulses, weighed like the table, give the rendered sound; all else is unchanged.
 TEST(Kernels, KeptStatesOfAStrikeAreItsSound) {
-  for (const Isa isa : list_isas()) {
+  for (const Isa isa : base::list_instructions()) {
     const Kernels& kernels = get_kernels(isa);
     for (const int count : kCounts) {
       Invented plain(count), kept(count);
@@ -287,7 +278,7 @@ TEST(Kernels, KeptStatesOfAStrikeAreItsSound) {
 TEST(Kernels, ADriveAddsItsForcesAndDampsTheRinging) {
   std::mt19937 random(11);
   std::uniform_real_distribution<float> number(-1.0F, 1.0F);
-  for (const Isa isa : list_isas()) {
+  for (const Isa isa : base::list_instructions()) {
     for (const int count : kCounts) {
       for (const bool forces : {false, true}) {
         for (const bool damps : {false, true}) {

@@ -449,7 +449,7 @@ TEST(Ears, EveryInstructionSetHearsTheSame) {
   for (const Trajectory& path :
        {make_still({1.0, 0.3, -0.2}), make_path({{0.0, {1.0, 0.0, 0.0}}, {0.02, {1.5, 0.2, 0.1}}, {0.04, {1.2, 0.0, -0.3}}})}) {
     std::vector<double> plain;
-    for (const Isa isa : {Isa::kPlain, Isa::kSse2, Isa::kAvx2, Isa::kAvx512}) {
+    for (const Isa isa : base::list_instructions()) {
       std::vector<DelayLine> delay_lines(4, DelayLine(10.0, kRate, 77));
       const Source source{&path, delay_lines.data(), {&delay_lines[1], &delay_lines[2], &delay_lines[3]}};
       Receiver ear({0.0, 0.1, 0.0}, kRate, {Effect::kAirDelay, Effect::kDoppler}, isa);

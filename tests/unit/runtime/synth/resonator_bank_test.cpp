@@ -165,7 +165,7 @@ TEST(ResonatorBank, SoundsAsTheExactMapOfEachMode) {
         {.time_s = time_s, .triangle = triangle, .barycentric = {0.2, 0.3, 0.5}, .impulse_n_s = impulse, .duration_s = duration_s});
   }
   const std::vector<double> slow = calc_sound(bank, strikes, 36000);
-  for (const Isa isa : {Isa::kPlain, Isa::kSse2, Isa::kAvx2, Isa::kAvx512}) {
+  for (const Isa isa : base::list_instructions()) {
     ResonatorBank voice(make_model(bank), {.isa = isa});
     for (const events::Impulse& strike : strikes) voice.strike(strike);
     const std::vector<float> fast = play(voice, 36000);

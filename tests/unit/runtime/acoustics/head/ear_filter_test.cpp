@@ -157,15 +157,11 @@ TEST(EarFilter, AllInstructionSetsAgree) {
   std::vector<float> x(300), h(128);
   for (std::size_t n = 0; n < x.size(); ++n) x[n] = static_cast<float>(noise[n]);
   for (std::size_t n = 0; n < h.size(); ++n) h[n] = static_cast<float>(noise[299 - n]);
-  std::vector<const Loops*> all{&kPlainLoops};
-#if defined(__x86_64__)
-  if (base::has_instructions(base::Instructions::kAvx2)) all.push_back(&kAvx2Loops);
-  if (base::has_instructions(base::Instructions::kAvx512)) all.push_back(&kAvx512Loops);
-#endif
-  for (const Loops* loops : all) {
+  for (const base::Instructions instructions : base::list_instructions()) {
+    const Loops& loops = get_loops(instructions);
     std::array<float, kChunk> one{}, a{}, b{};
-    loops->convolve(h.data(), 128, x.data() + 200, one.data());
-    loops->convolve_pair(h.data(), h.data() + 16, 112, x.data() + 200, a.data(), b.data());
+    loops.convolve(h.data(), 128, x.data() + 200, one.data());
+    loops.convolve_pair(h.data(), h.data() + 16, 112, x.data() + 200, a.data(), b.data());
     for (std::size_t n = 0; n < kChunk; ++n) {
       double sum = 0.0, sum_a = 0.0, sum_b = 0.0;
       for (std::size_t k = 0; k < 128; ++k) sum += static_cast<double>(h[k]) * static_cast<double>(x[200 + n - k]);
@@ -178,7 +174,7 @@ TEST(EarFilter, AllInstructionSetsAgree) {
     const float* rows[3] = {x.data(), x.data() + 20, x.data() + 50};
     const float weight[3] = {0.2F, 0.5F, 0.3F};
     std::array<float, 48> blend{};
-    loops->blend(rows, weight, 48, blend.data());
+    loops.blend(rows, weight, 48, blend.data());
     for (std::size_t n = 0; n < 48; ++n)
       EXPECT_NEAR(static_cast<double>(blend[n]), 0.2 * noise[n] + 0.5 * noise[n + 20] + 0.3 * noise[n + 50], 1e-6);
   }

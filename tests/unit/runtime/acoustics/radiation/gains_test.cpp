@@ -149,12 +149,6 @@ TEST(Gains, ComeWithTheRadiusAsEachDoesAlone) {
 }
 
 TEST(Gains, EveryInstructionSetSendsTheSameThroughATriangle) {
-  std::vector<CalcThrough> kinds{calc_through_plain};
-#if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) kinds.push_back(calc_through_avx2);
-  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq"))
-    kinds.push_back(calc_through_avx512);
-#endif
   std::mt19937 random(3);
   for (const std::size_t modes : {0, 1, 15, 16, 47, 100}) {
     std::array<std::vector<std::int16_t>, 3> rows;
@@ -170,9 +164,9 @@ TEST(Gains, EveryInstructionSetSendsTheSameThroughATriangle) {
       const float square = expected[m] * expected[m];
       expected_squares[m] += square * 0.01F;
     }
-    for (const CalcThrough calc_through : kinds) {
+    for (const base::Instructions instructions : base::list_instructions()) {
       std::vector<float> through(modes), squares(modes, 2.0F);
-      calc_through(corners, modes, through.data(), squares.data());
+      find_flow_loops(instructions).calc_through(corners, modes, through.data(), squares.data());
       EXPECT_EQ(through, expected) << modes;
       EXPECT_EQ(squares, expected_squares) << modes;
     }

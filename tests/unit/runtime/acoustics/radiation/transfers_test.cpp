@@ -45,13 +45,6 @@ std::vector<Vec3> make_directions(int count) {
   return directions;
 }
 
-std::vector<base::Instructions> find_instruction_sets() {
-  std::vector<base::Instructions> sets;
-  for (const auto one : {base::Instructions::kPlain, base::Instructions::kAvx2, base::Instructions::kAvx512})
-    if (base::has_instructions(one)) sets.push_back(one);
-  return sets;
-}
-
 TEST(Transfers, EachMultipoleIsItsClosedFormAtEveryDistance) {
   constexpr Complex kOne(1.0, -1.0);  // 16 bits hold it
   struct Mode {
@@ -69,7 +62,7 @@ TEST(Transfers, EachMultipoleIsItsClosedFormAtEveryDistance) {
     }
   }
   double worst = 0.0;
-  for (const base::Instructions instructions : find_instruction_sets()) {
+  for (const base::Instructions instructions : base::list_instructions()) {
     const Transfers transfers(bank, instructions);
     for (const double distance : {1.05, 1.3, 2.0, 10.0, 100.0, 1000.0}) {
       for (const Vec3& direction : make_directions(12)) {
@@ -99,7 +92,7 @@ double find_monopole_error(const std::vector<std::pair<double, int>>& modes, con
   bank::Bank bank = testing::make_empty_multipoles();
   for (const auto& [ka, order] : modes) add_multipoles(bank, ka, testing::calc_monopole(ka, source, order));
   double worst = 0.0;
-  for (const base::Instructions instructions : find_instruction_sets()) {
+  for (const base::Instructions instructions : base::list_instructions()) {
     const Transfers transfers(bank, instructions);
     for (const double distance : distances) {
       for (const Vec3& direction : make_directions(directions)) {
@@ -167,7 +160,7 @@ TEST(Transfers, InstructionSetsAgreeToTheLastBits) {
   for (const Vec3& direction : make_directions(20)) {
     for (const double distance : {1.1, 3.0, 40.0}) {
       const auto expected = evaluate(Transfers(bank, base::Instructions::kPlain), distance * kSphereRadius * direction);
-      for (const base::Instructions instructions : find_instruction_sets()) {
+      for (const base::Instructions instructions : base::list_instructions()) {
         const Transfers transfers(bank, instructions);
         const auto found = evaluate(transfers, distance * kSphereRadius * direction);
         for (std::size_t m = 0; m < found.size(); ++m)
@@ -196,7 +189,7 @@ TEST(Transfers, AnySelectionInAnyOrderIsTheSame) {
 TEST(Transfers, TwoPlacesAtOnceAreTheSame) {
   const bank::Bank bank = make_random_bank(50, 30);
   const std::array<Vec3, 2> places{kSphereCentre + Vec3{0.4, 0.2, -0.1}, kSphereCentre + Vec3{-1.0, 2.0, 0.3}};
-  for (const base::Instructions instructions : find_instruction_sets()) {
+  for (const base::Instructions instructions : base::list_instructions()) {
     const Transfers transfers(bank, instructions);
     const std::vector<std::int32_t> modes{3, 0, 49, 17, 18, 3};
     std::array<std::vector<std::complex<float>>, 2> both;

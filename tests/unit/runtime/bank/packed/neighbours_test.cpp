@@ -183,13 +183,10 @@ TEST(CodecStencil, is_finite_for_coincident_neighbours) {
 
 // ---- instruction sets ----
 
-std::vector<std::pair<const char*, const Loops*>> list_others() {
-  std::vector<std::pair<const char*, const Loops*>> others;
-#if defined(__x86_64__)
-  if (base::has_instructions(base::Instructions::kAvx2)) others.emplace_back("AVX2", &kLoopsAvx2);
-  if (base::has_instructions(base::Instructions::kAvx512)) others.emplace_back("AVX-512", &kLoopsAvx512);
-#endif
-  return others;
+std::vector<std::pair<const char*, const Loops*>> list_loops() {
+  std::vector<std::pair<const char*, const Loops*>> all;
+  for (const base::Instructions set : base::list_instructions()) all.emplace_back(base::get_name(set), &find_loops(set));
+  return all;
 }
 
 TEST(CodecLoops, of_all_instruction_sets_find_the_same_neighbours_in_the_same_order) {
@@ -210,12 +207,12 @@ TEST(CodecLoops, of_all_instruction_sets_find_the_same_neighbours_in_the_same_or
       expected.emplace_back(calc_distance2(place, {near.x[i], near.y[i], near.z[i]}), static_cast<std::int32_t>(i));
     }
     Neighbours plain;
-    kLoopsPlain.find_nearest(near, place, reach, plain);
+    find_loops(base::Instructions::kPlain).find_nearest(near, place, reach, plain);
     if (reach <= kReachBits) {  // exact
       std::sort(expected.begin(), expected.end());
       for (std::size_t k = 0; k < kNeighbours; ++k) ASSERT_EQ(plain[k], near.vertex[expected[k].second]) << round;
     }
-    for (const auto& [name, loops] : list_others()) {
+    for (const auto& [name, loops] : list_loops()) {
       Neighbours found;
       loops->find_nearest(near, place, reach, found);
       ASSERT_EQ(found, plain) << name << " " << round;
@@ -227,8 +224,9 @@ TEST(CodecLoops, of_all_instruction_sets_make_the_same_stencils) {
   const Stencils all(example::make_ball(3));
   const std::size_t count = all.stencils.size() - 1;  // not a multiple of the vector length
   std::vector<Stencil> plain(count), found(count);
-  kLoopsPlain.calc_stencils(&all.surface.places[all.first], all.neighbours.data(), all.surface.places.data(), count, plain.data());
-  for (const auto& [name, loops] : list_others()) {
+  find_loops(base::Instructions::kPlain)
+      .calc_stencils(&all.surface.places[all.first], all.neighbours.data(), all.surface.places.data(), count, plain.data());
+  for (const auto& [name, loops] : list_loops()) {
     loops->calc_stencils(&all.surface.places[all.first], all.neighbours.data(), all.surface.places.data(), count, found.data());
     for (std::size_t i = 0; i < count; ++i)
       for (std::size_t k = 0; k < kNeighbours; ++k) {
@@ -245,8 +243,6 @@ TEST(CodecLoops, of_all_instruction_sets_make_the_same_stencils) {
 TEST(CodecLoops, match_double_precision_sums) {
   std::mt19937 random(5);
   std::uniform_real_distribution<float> draw(-1.0F, 1.0F);
-  std::vector<std::pair<const char*, const Loops*>> all = list_others();
-  all.emplace_back("plain", &kLoopsPlain);
   for (const std::size_t padded : {16u, 32u, 48u, 64u, 80u, 208u}) {
     Rows rows(kNeighbours, padded);
     ASSERT_EQ(rows.get_padded(), padded);
@@ -266,7 +262,7 @@ TEST(CodecLoops, match_double_precision_sums) {
     std::array<float, kDifferenceNumbers> differences;
     for (float& x : gradient) x = draw(random);
     for (float& x : differences) x = draw(random);
-    for (const auto& [name, loops] : all) {
+    for (const auto& [name, loops] : list_loops()) {
       SCOPED_TRACE(name);
       loops->add_weighted(from.data(), stencil.value.data(), 3 * padded, row.data());
       for (std::size_t i = 0; i < 3 * padded; ++i) {
@@ -317,9 +313,7 @@ TEST(CodecLoops, round_to_nearest_and_clamp) {
   const std::vector<float> odd{0.0F, -0.0F, 0.2499F, 0.25F, -0.25F, 16383.4F, 16383.6F, -16383.6F, 1e30F, -1e30F, kInf, -kInf, kNan, 3e38F};
   std::copy(odd.begin(), odd.end(), row.begin() + kPadded);
   const std::vector<std::int16_t> expected{0, 0, 0, 1, -1, 32767, 32767, -32767, 32767, -32767, 32767, -32767, 0, 32767};
-  std::vector<std::pair<const char*, const Loops*>> all = list_others();
-  all.emplace_back("plain", &kLoopsPlain);
-  for (const auto& [name, loops] : all) {
+  for (const auto& [name, loops] : list_loops()) {
     std::vector<std::int16_t> shape(3 * kPadded);
     loops->round(row.data(), factor.data(), kPadded, shape.data());
     for (std::size_t i = 0; i < odd.size(); ++i) EXPECT_EQ(shape[3 * i + 1], expected[i]) << name << " " << odd[i];

@@ -166,8 +166,6 @@ TEST(solver, momenta_and_energy_of_free_pairs) {
 }
 
 TEST(solver, same_results_for_all_instruction_sets) {
-#if defined(__x86_64__)
-  if (!__builtin_cpu_supports("avx2")) GTEST_SKIP() << "this processor has no AVX2";
   const double h = 1e-3, g = 9.81;
   const Vec3 size{0.05, 0.04, 0.03};
   std::mt19937_64 random(7);
@@ -194,8 +192,10 @@ TEST(solver, same_results_for_all_instruction_sets) {
     for (const Point& p : pushed) all.insert(all.end(), {p.impulse[0], p.impulse[1], p.impulse[2], p.couple[0], p.couple[1], p.couple[2]});
     return all;
   };
-  for (const bool evenly : {false, true}) EXPECT_EQ(run(sweeps::kPlain, evenly), run(sweeps::kAvx2, evenly));
-#endif
+  for (const base::Instructions set : base::list_instructions())
+    for (const bool evenly : {false, true})
+      EXPECT_EQ(run(sweeps::get_functions(set), evenly), run(sweeps::get_functions(base::Instructions::kPlain), evenly))
+          << base::get_name(set);
 }
 
 }  // namespace

@@ -71,28 +71,25 @@ void expect_same(const bank::QuarticEnergy& energy, const CoupledKernels& kernel
 }
 
 TEST(Evaluator, IsTheSumsInDoublePrecisionInEveryFormAndInstructionSet) {
-  std::vector<const CoupledKernels*> sets{&kPlainKernels};
-#if defined(__x86_64__)
-  if (base::has_instructions(base::Instructions::kAvx2)) sets.push_back(&kAvx2Kernels);
-  if (base::has_instructions(base::Instructions::kAvx512)) sets.push_back(&kAvx512Kernels);
-#endif
-  for (const CoupledKernels* kernels : sets)
+  for (const base::Instructions set : base::list_instructions()) {
+    const CoupledKernels& kernels = get_kernels(set);
     for (const bool is_curved : {false, true}) {
       for (const std::size_t n : {2u, 7u, 8u, 9u, 16u, 17u, 30u, 51u})
         for (const std::size_t rows : {1u, 3u, 40u}) {
-          expect_same(make_rows(n, rows, false, is_curved, 1e6), *kernels, 2e-5);
-          expect_same(make_rows(n, rows, true, is_curved, 1e-3), *kernels, 1e-13);
+          expect_same(make_rows(n, rows, false, is_curved, 1e6), kernels, 2e-5);
+          expect_same(make_rows(n, rows, true, is_curved, 1e-3), kernels, 1e-13);
         }
       for (const std::size_t n : {2u, 9u, 30u, 51u}) {
         const bank::QuarticEnergy energy = make_entries(n, n < 30 ? 33 : 150, is_curved);
-        expect_same(energy, *kernels, 2e-5);
+        expect_same(energy, kernels, 2e-5);
         if (n > 9) {
-          EXPECT_LT(Evaluator(energy, *kernels).calc_bytes(), energy.rows.size() * sizeof(float) / 2) << "kept by entries";
+          EXPECT_LT(Evaluator(energy, kernels).calc_bytes(), energy.rows.size() * sizeof(float) / 2) << "kept by entries";
         }
       }
       for (const std::size_t parts : {6u, 9u})
-        for (const std::size_t n : {2u, 5u, 30u}) expect_same(make_points(n, 9, 23, parts, is_curved), *kernels, 1e-5);
+        for (const std::size_t n : {2u, 5u, 30u}) expect_same(make_points(n, 9, 23, parts, is_curved), kernels, 1e-5);
     }
+  }
 }
 
 }  // namespace

@@ -1,15 +1,22 @@
-// Compiled once per instruction set, without contraction. All loops run along columns, element by element, so results do not depend on the
-// instruction set. No templates of the standard library: the linker keeps one copy of them for all files, possibly one with unsupported
-// instructions.
+// Without contraction: all loops run along columns, element by element, so results do not depend on the instruction set.
 // Source: G. H. Golub, C. F. Van Loan, "Matrix Computations" (2013), algorithm 3.4.1.
 #include "runtime/physics/impact/dense.hpp"
 
-namespace carillon::impact::dense {
+#include "runtime/base/simd.hpp"
 
+HWY_BEFORE_NAMESPACE();
+namespace carillon::impact::dense::HWY_NAMESPACE {
 namespace {
 
+namespace hn = hwy::HWY_NAMESPACE;
+
 inline void add(double* __restrict y, const double* __restrict x, double by, std::size_t count) {
-  for (std::size_t i = 0; i < count; ++i) y[i] += by * x[i];
+  const hn::CappedTag<double, 4> few;  // columns are short
+  constexpr std::size_t kLanes = hn::MaxLanes(few);
+  std::size_t i = 0;
+  for (; i + kLanes <= count; i += kLanes) hn::StoreU(hn::LoadU(few, y + i) + hn::Set(few, by) * hn::LoadU(few, x + i), few, y + i);
+#pragma GCC unroll 4
+  for (; i < count; ++i) y[i] += by * x[i];
 }
 
 void add_columns(const double* A, std::size_t stride, const std::size_t* which, const double* x, std::size_t count, double* y,
@@ -55,5 +62,20 @@ void substitute(const double* LU, std::size_t n, std::size_t stride, const std::
   }
 }
 
+const Functions& get_table() {
+  static constexpr Functions kFunctions{add_columns, factorise, substitute};
+  return kFunctions;
+}
+
 }  // namespace
+}  // namespace carillon::impact::dense::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace carillon::impact::dense {
+
+HWY_EXPORT(get_table);
+const Functions& get_functions(base::Instructions best) { return base::choose(HWY_DISPATCH_TABLE(get_table), best)(); }
+
 }  // namespace carillon::impact::dense
+#endif

@@ -1,15 +1,21 @@
-// Loops over the points. Compiled once per instruction set, without contraction, so results do not depend on the instruction set. No vector
-// is created or grown here: such a function may be emitted separately, and the linker keeps one copy of it for all files, possibly one with
-// unsupported instructions.
+// Loops over the points. Without contraction, so results do not depend on the instruction set.
+#include "runtime/physics/rigid/sweeps.hpp"
+
 #include <algorithm>
 #include <cmath>
 
-#include "runtime/physics/rigid/sweeps.hpp"
+#include "runtime/base/simd.hpp"
 
 #pragma GCC diagnostic ignored "-Wpsabi"  // no vector is passed between instruction sets
 
-namespace carillon::rigid::sweeps {
+HWY_BEFORE_NAMESPACE();
+namespace carillon::rigid::sweeps::HWY_NAMESPACE {
 namespace {
+
+/// Matrix by columns times vector.
+inline Four combine(const Four (&columns)[3], const Four& by) { return by[0] * columns[0] + (by[1] * columns[1] + by[2] * columns[2]); }
+
+inline double dot(const Four& a, const Four& b) { return a[0] * b[0] + (a[1] * b[1] + a[2] * b[2]); }
 
 /// Tangential part.
 inline Four drop_normal(const Four& from) {
@@ -173,5 +179,20 @@ void share(Problem& problem, double part) {
   add(problem, problem.changes);
 }
 
+const Functions& get_table() {
+  static constexpr Functions kFunctions{prepare, sweep, add, begin, share};
+  return kFunctions;
+}
+
 }  // namespace
+}  // namespace carillon::rigid::sweeps::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace carillon::rigid::sweeps {
+
+HWY_EXPORT(get_table);
+const Functions& get_functions(base::Instructions best) { return base::choose(HWY_DISPATCH_TABLE(get_table), best)(); }
+
 }  // namespace carillon::rigid::sweeps
+#endif

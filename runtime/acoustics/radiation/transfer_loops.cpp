@@ -1,25 +1,31 @@
-// The multipoles of a group of modes at a place, kLanes modes at once; the file that includes this says how many. Nothing from the standard
-// library: an inline function of it could end up in code for other processors.
+// The multipoles of a group of modes at a place, a vector of modes at once.
 #include "runtime/acoustics/radiation/transfer_loops.hpp"
-#include "runtime/bank/multipoles.hpp"
 
-namespace carillon::radiation {
+#include "runtime/bank/multipoles.hpp"
+#include "runtime/base/simd.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace carillon::radiation::HWY_NAMESPACE {
 namespace {
 
-typedef std::int32_t Ints __attribute__((vector_size(4 * kLanes)));
-typedef float Floats __attribute__((vector_size(4 * kLanes)));
+namespace hn = hwy::HWY_NAMESPACE;
+const hn::ScalableTag<float> kFloats;
+const hn::ScalableTag<std::int32_t> kInts;
+using Floats = hn::Vec<decltype(kFloats)>;
 
-constexpr int kWide = kLanes / 2;
-typedef double Doubles __attribute__((vector_size(8 * kWide)));
-typedef float HalfFloats __attribute__((vector_size(4 * kWide)));
-static_assert(kWide <= kHarmonicsPadding);
-
+constexpr int kLanes = static_cast<int>(hn::MaxLanes(kFloats));
 constexpr int kParts = kTransferLanes / kLanes;   // vectors that hold a group
 constexpr int kAtOnce = kParts < 2 ? kParts : 2;  // more sums than registers cost more than reading the harmonics again
 constexpr float kLower = 1.0F / 65536.0F;         // what the real part is of a number
 constexpr float kSilent = 1e-30F;                 // a radial factor below is 0, so that nothing becomes denormal
 constexpr float kLeftOut = 5e-5F;                 // of the level may be left out, rms over directions: -86 dB
 constexpr double kNoHarmonic = 1e-20;             // a harmonic below is 0
+
+// Vectors of doubles of the compiler: Highway 1.0 has none for WebAssembly.
+constexpr int kWide = HWY_MAX_BYTES / sizeof(double);
+typedef double Doubles __attribute__((vector_size(8 * kWide)));
+typedef float HalfFloats __attribute__((vector_size(4 * kWide)));
+static_assert(kWide <= kHarmonicsPadding);
 
 template <class Vector, class Number>
 Vector load(const Number* from) {
@@ -78,6 +84,11 @@ void calc_harmonics(const HarmonicWork& work, float* harmonics) {
   }
 }
 
+struct Complex {
+  Floats re, im;
+};
+Complex multiply(const Complex& a, const Complex& b) { return {hn::MulSub(a.re, b.re, a.im * b.im), hn::MulAdd(a.re, b.im, a.im * b.re)}; }
+
 /// Fills place.radial with F_l = h_l(k r) / h_l(k R) e^{-i k (r - R)}, real and imaginary part, and returns the highest order that counts.
 /// F_{l+1} = (2 l + 1) / (k r) u_{l+1} F_l - u_{l+1} u_l F_{l-1} with the steps u of the sphere; F_0 = F_{-1} = R / r.
 int calc_radial(const TransferWork& work, const TransferPlace& place) {
@@ -86,49 +97,47 @@ int calc_radial(const TransferWork& work, const TransferPlace& place) {
   for (int part = 0; part < kParts; ++part) {
     const int lane = part * kLanes;
     float* const to = place.radial + lane;
-    const Floats inverse_x = load<Floats>(work.group->inverse_k_m + lane) * place.inverse_r;
-    const Floats none{};
-    Floats re = none + place.nearness, im = none, before_re = re, before_im = none;
-    Floats u_re = load<Floats>(work.steps[0].step_re + lane), u_im = load<Floats>(work.steps[0].step_im + lane);
-    Floats most = re * load<Floats>(work.steps[0].level + lane);
-    store(re, to);
-    store(im, to + kTransferLanes);
-    store(most, to + 2 * kTransferLanes);
+    const Floats inverse_x = hn::Load(kFloats, work.group->inverse_k_m + lane) * hn::Set(kFloats, place.inverse_r);
+    const Floats none = hn::Zero(kFloats);
+    Floats re = hn::Set(kFloats, place.nearness), im = none, before_re = re, before_im = none;
+    Floats u_re = hn::Load(kFloats, work.steps[0].step_re + lane), u_im = hn::Load(kFloats, work.steps[0].step_im + lane);
+    Floats most = re * hn::Load(kFloats, work.steps[0].level + lane);
+    hn::Store(re, kFloats, to);
+    hn::Store(im, kFloats, to + kTransferLanes);
+    hn::Store(most, kFloats, to + 2 * kTransferLanes);
     for (int l = 0; l < order; ++l) {
       const RadialLine& line = work.steps[l + 1];
-      const Floats v_re = load<Floats>(line.step_re + lane), v_im = load<Floats>(line.step_im + lane);
-      const Floats both_re = v_re * u_re - v_im * u_im, both_im = v_re * u_im + v_im * u_re;
-      const Floats rest_re = both_re * before_re - both_im * before_im, rest_im = both_re * before_im + both_im * before_re;
-      const Floats odd = static_cast<float>(2 * l + 1) * inverse_x;
+      const Floats v_re = hn::Load(kFloats, line.step_re + lane), v_im = hn::Load(kFloats, line.step_im + lane);
+      const Complex both = multiply({v_re, v_im}, {u_re, u_im}), rest = multiply(both, {before_re, before_im});
+      const Floats odd = hn::Set(kFloats, static_cast<float>(2 * l + 1)) * inverse_x;
       const Floats grow_re = odd * v_re, grow_im = odd * v_im;
-      Floats next_re = grow_re * re - rest_re - grow_im * im, next_im = grow_re * im - rest_im + grow_im * re;
-      const Floats size = (next_re < none ? -next_re : next_re) + (next_im < none ? -next_im : next_im);
-      next_re = size > kSilent ? next_re : none;
-      next_im = size > kSilent ? next_im : none;
-      const Floats level = size * load<Floats>(line.level + lane);
-      most = level > most ? level : most;
+      const Floats next_re = hn::NegMulAdd(grow_im, im, hn::MulSub(grow_re, re, rest.re));
+      const Floats next_im = hn::MulAdd(grow_im, re, hn::MulSub(grow_re, im, rest.im));
+      const Floats size = hn::Abs(next_re) + hn::Abs(next_im);
+      const auto sounds = size > hn::Set(kFloats, kSilent);
+      const Floats level = size * hn::Load(kFloats, line.level + lane);
+      most = hn::Max(level, most);
       before_re = re;
       before_im = im;
-      re = next_re;
-      im = next_im;
+      re = hn::IfThenElseZero(sounds, next_re);
+      im = hn::IfThenElseZero(sounds, next_im);
       u_re = v_re;
       u_im = v_im;
       float* const row = to + static_cast<std::ptrdiff_t>(l + 1) * 3 * kTransferLanes;
-      store(re, row);
-      store(im, row + kTransferLanes);
-      store(level, row + 2 * kTransferLanes);
+      hn::Store(re, kFloats, row);
+      hn::Store(im, kFloats, row + kTransferLanes);
+      hn::Store(level, kFloats, row + 2 * kTransferLanes);
     }
     // The tail from each order on: it shrinks with the order, so that the number of those that count says where it stops to count.
-    Floats tail = none;
-    Ints count{};
-    most *= kLeftOut;
+    const Floats one = hn::Set(kFloats, 1.0F);
+    Floats tail = none, count = none;
+    most = most * hn::Set(kFloats, kLeftOut);
     for (int l = order; l > 0; --l) {
-      tail += load<Floats>(to + (static_cast<std::ptrdiff_t>(l) * 3 + 2) * kTransferLanes);
-      count -= tail > most;
+      tail = tail + hn::Load(kFloats, to + (static_cast<std::ptrdiff_t>(l) * 3 + 2) * kTransferLanes);
+      count = count + hn::IfThenElseZero(tail > most, one);
     }
-    std::int32_t counts[kLanes];
-    store(count, counts);
-    for (const std::int32_t one : counts) highest = one > highest ? one : highest;
+    const int counted = static_cast<int>(hn::GetLane(hn::MaxOfLanes(kFloats, count)));
+    highest = counted > highest ? counted : highest;
   }
   return highest;
 }
@@ -142,39 +151,51 @@ void sum_up(const TransferWork& work, int highest, int first) {
     harmonic[p] = work.places[p].harmonics;
     radial[p] = work.places[p].radial + first * kLanes;
   }
-  Floats sum_re[kVectors][kPlaces] = {}, sum_im[kVectors][kPlaces] = {};
+  struct Sums {
+    Floats at[kVectors][kPlaces];
+    Sums() {
+#pragma GCC unroll 8
+      for (auto& part : at) {
+#pragma GCC unroll 8
+        for (Floats& one : part) one = hn::Zero(kFloats);
+      }
+    }
+  };
+  Sums sum_re, sum_im;
   for (int l = 0; l <= highest; ++l) {
     // Two sums of each row, so that a sum need not wait for itself; one begins with m = 0. Those of whole numbers stand for the imaginary
     // part: what the real parts are of them goes at the end of the row.
-    Floats row_re[kVectors][kPlaces] = {}, row_all[kVectors][kPlaces] = {};
-    Floats other_re[kVectors][kPlaces] = {}, other_all[kVectors][kPlaces] = {};
+    Sums row_re, row_all, other_re, other_all;
     const auto add = [first, &harmonic](const MultipoleLine& steps, int i, int part, Floats* to_re, Floats* to_all) {
-      const Ints both = load<Ints>(steps.steps + (first + part) * kLanes);  // each part as a number of its own, 65536 times as large
-      const Floats real = __builtin_convertvector(both << 16, Floats), all = __builtin_convertvector(both, Floats);
+      const auto both = hn::Load(kInts, steps.steps + (first + part) * kLanes);  // each part as a number of its own, 65536 times as large
+      const Floats real = hn::ConvertTo(kFloats, hn::ShiftLeft<16>(both)), all = hn::ConvertTo(kFloats, both);
 #pragma GCC unroll 8
       for (int p = 0; p < kPlaces; ++p) {
-        to_re[p] += real * harmonic[p][i];
-        to_all[p] += all * harmonic[p][i];
+        const Floats factor = hn::Set(kFloats, harmonic[p][i]);
+        to_re[p] = hn::MulAdd(real, factor, to_re[p]);
+        to_all[p] = hn::MulAdd(all, factor, to_all[p]);
       }
     };
 #pragma GCC unroll 8
-    for (int part = 0; part < kVectors; ++part) add(line[0], 0, part, row_re[part], row_all[part]);
+    for (int part = 0; part < kVectors; ++part) add(line[0], 0, part, row_re.at[part], row_all.at[part]);
     for (int i = 1; i < 2 * l; i += 2) {
 #pragma GCC unroll 8
       for (int part = 0; part < kVectors; ++part) {
-        add(line[i], i, part, row_re[part], row_all[part]);
-        add(line[i + 1], i + 1, part, other_re[part], other_all[part]);
+        add(line[i], i, part, row_re.at[part], row_all.at[part]);
+        add(line[i + 1], i + 1, part, other_re.at[part], other_all.at[part]);
       }
     }
 #pragma GCC unroll 8
     for (int part = 0; part < kVectors; ++part) {
 #pragma GCC unroll 8
       for (int p = 0; p < kPlaces; ++p) {
-        const Floats f_re = load<Floats>(radial[p] + part * kLanes), f_im = load<Floats>(radial[p] + kTransferLanes + part * kLanes);
-        const Floats all_re = row_re[part][p] + other_re[part][p];
-        const Floats all_im = row_all[part][p] + other_all[part][p] - all_re * kLower;
-        sum_re[part][p] += f_re * all_re - f_im * all_im;
-        sum_im[part][p] += f_re * all_im + f_im * all_re;
+        const Floats f_re = hn::Load(kFloats, radial[p] + part * kLanes);
+        const Floats f_im = hn::Load(kFloats, radial[p] + kTransferLanes + part * kLanes);
+        const Floats all_re = row_re.at[part][p] + other_re.at[part][p];
+        const Floats all_im = hn::NegMulAdd(all_re, hn::Set(kFloats, kLower), row_all.at[part][p] + other_all.at[part][p]);
+        const Complex sound = multiply({f_re, f_im}, {all_re, all_im});
+        sum_re.at[part][p] = sum_re.at[part][p] + sound.re;
+        sum_im.at[part][p] = sum_im.at[part][p] + sound.im;
       }
     }
     line += 2 * l + 1;
@@ -183,12 +204,14 @@ void sum_up(const TransferWork& work, int highest, int first) {
       radial[p] += 3 * kTransferLanes;
     }
   }
+#pragma GCC unroll 8
   for (int part = 0; part < kVectors; ++part) {
     const int lane = (first + part) * kLanes;
-    const Floats scale = load<Floats>(work.group->scale + lane);
+    const Floats scale = hn::Load(kFloats, work.group->scale + lane);
+#pragma GCC unroll 8
     for (int p = 0; p < kPlaces; ++p) {
-      store(sum_re[part][p] * scale, work.places[p].re + lane);
-      store(sum_im[part][p] * scale, work.places[p].im + lane);
+      hn::Store(sum_re.at[part][p] * scale, kFloats, work.places[p].re + lane);
+      hn::Store(sum_im.at[part][p] * scale, kFloats, work.places[p].im + lane);
     }
   }
 }
@@ -204,5 +227,20 @@ void calc_transfers(const TransferWork& work) {
   for (int first = 0; first < kParts; ++first) sum_up<1, kTransferPlaces>(work, highest, first);
 }
 
+const TransferLoops& get_table() {
+  static constexpr TransferLoops kLoops{calc_harmonics, calc_transfers};
+  return kLoops;
+}
+
 }  // namespace
+}  // namespace carillon::radiation::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace carillon::radiation {
+
+HWY_EXPORT(get_table);
+const TransferLoops& find_transfer_loops(base::Instructions best) { return base::choose(HWY_DISPATCH_TABLE(get_table), best)(); }
+
 }  // namespace carillon::radiation
+#endif

@@ -1,7 +1,0 @@
-#include "runtime/acoustics/head/convolve.inl"
-
-namespace carillon::head {
-
-const Loops kPlainLoops{convolve<4, 4>, convolve_pair<4, 2>, blend};
-
-}  // namespace carillon::head
