@@ -175,6 +175,20 @@ function(carillon_library name)
   carillon_compile(carillon_${name} plain)
 endfunction()
 
+# carillon_simd_sources(TARGET file... [OPTIONS option...]): loops that Highway compiles for every instruction set, see
+# runtime/base/simd.hpp. Each file includes itself, so it is a unit of its own.
+function(carillon_simd_sources target)
+  cmake_parse_arguments(arg "" "" "OPTIONS" ${ARGN})
+  target_sources(${target} PRIVATE ${arg_UNPARSED_ARGUMENTS})
+  target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:carillon::simd>)
+  set_source_files_properties(${arg_UNPARSED_ARGUMENTS} PROPERTIES COMPILE_OPTIONS "-O3;${arg_OPTIONS}" SKIP_PRECOMPILE_HEADERS ON)
+  foreach(source ${arg_UNPARSED_ARGUMENTS})
+    cmake_path(ABSOLUTE_PATH source OUTPUT_VARIABLE path)
+    cmake_path(RELATIVE_PATH path BASE_DIRECTORY ${PROJECT_SOURCE_DIR})
+    set_source_files_properties(${source} PROPERTIES COMPILE_DEFINITIONS "HWY_TARGET_INCLUDE=\"${path}\"")
+  endforeach()
+endfunction()
+
 # carillon_program(carillon-NAME SOURCES ... LINK libs...)
 function(carillon_program name)
   cmake_parse_arguments(arg "" "" "SOURCES;LINK" ${ARGN})

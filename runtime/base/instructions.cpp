@@ -1,33 +1,49 @@
 #include "runtime/base/instructions.hpp"
 
-#include <algorithm>
+#include <hwy/targets.h>
+
+#include <array>
 #include <cstdlib>
 #include <string_view>
 
 namespace carillon::base {
 namespace {
 
-Instructions find_best() noexcept {
-#if defined(__x86_64__)
-  __builtin_cpu_init();
-  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl"))
-    return Instructions::kAvx512;
-  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return Instructions::kAvx2;
-#endif
-  return Instructions::kPlain;
-}
+constexpr std::array kNames{"plain", "simd128", "neon", "sse4", "avx2", "avx512"};
 
-Instructions find_allowed() noexcept {
-  const char* name = std::getenv("CARILLON_INSTRUCTIONS");
-  const std::string_view allowed = name != nullptr ? name : "";
-  return allowed == "plain" ? Instructions::kPlain : allowed == "avx2" ? Instructions::kAvx2 : Instructions::kAvx512;
+bool is_supported(Instructions set) noexcept { return (HWY_SUPPORTED_TARGETS & HWY_TARGETS & get_targets(set)) != 0; }
+
+/// Best supported set, not above the one that the environment names.
+Instructions find_best() noexcept {
+  const char* value = std::getenv("CARILLON_INSTRUCTIONS");
+  const std::string_view name = value != nullptr ? value : "";
+  Instructions best{};
+  for (std::size_t s = 0; s < kNames.size(); ++s) {
+    if (is_supported(static_cast<Instructions>(s))) best = static_cast<Instructions>(s);
+    if (name == kNames[s]) break;
+  }
+  return best;
 }
 
 }  // namespace
 
+const char* get_name(Instructions set) noexcept { return kNames[static_cast<std::size_t>(set)]; }
+
 Instructions find_instructions() noexcept {
-  static const Instructions instructions = std::min(find_best(), find_allowed());
+  static const Instructions instructions = find_best();
   return instructions;
+}
+
+std::int64_t get_targets(Instructions set) noexcept {
+  constexpr std::array<std::int64_t, kNames.size()> kTargets{HWY_EMU128 | HWY_SCALAR, HWY_WASM, HWY_NEON, HWY_SSE4, HWY_AVX2, HWY_AVX3};
+  return kTargets[static_cast<std::size_t>(set)];
+}
+
+std::vector<Instructions> list_instructions() {
+  std::vector<Instructions> sets;
+  for (std::size_t s = 0; s <= static_cast<std::size_t>(find_instructions()); ++s)
+    if (is_supported(static_cast<Instructions>(s))) sets.push_back(static_cast<Instructions>(s));
+  return sets;
 }
 
 }  // namespace carillon::base

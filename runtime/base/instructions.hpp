@@ -1,16 +1,28 @@
-// Run-time selection of the instruction set of multi-version loops.
+// Run-time selection of the instruction set of loops that are compiled for several (simd.hpp).
 #pragma once
+
+#include <cstdint>
+#include <vector>
 
 namespace carillon::base {
 
-/// Ascending. kAvx2 includes FMA; kAvx512 is F, DQ and VL.
-enum class Instructions { kPlain, kAvx2, kAvx512 };
+/// Ascending on each processor. kPlain: one number at a time; kSimd128: WebAssembly; kAvx2 includes FMA; kAvx512 is F, BW, DQ and VL.
+enum class Instructions : std::uint8_t { kPlain, kSimd128, kNeon, kSse4, kAvx2, kAvx512 };
 
-/// Best set of this processor, limited by the environment variable CARILLON_INSTRUCTIONS ("plain", "avx2" or "avx512"; for comparisons;
-/// other values: no limit). Cached. kPlain on processors other than x86-64.
+/// "plain", "simd128", "neon", "sse4", "avx2", "avx512".
+const char* get_name(Instructions set) noexcept;
+
+/// Best set of this processor, limited by the environment variable CARILLON_INSTRUCTIONS (one of the names; for comparisons; other values:
+/// no limit). Cached. Any thread.
 Instructions find_instructions() noexcept;
 
 /// True if supported and allowed.
 inline bool has_instructions(Instructions wanted) noexcept { return find_instructions() >= wanted; }
+
+/// All supported and allowed sets that loops are compiled for, ascending.
+std::vector<Instructions> list_instructions();
+
+/// Highway's targets of a set, as bits (hwy/targets.h). Any thread.
+std::int64_t get_targets(Instructions set) noexcept;
 
 }  // namespace carillon::base

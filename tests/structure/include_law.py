@@ -12,6 +12,7 @@ import sys
 LIBRARIES = {
     "rapidjson": ["rapidjson/"],
     "fmt": ["fmt/"],
+    "hwy": ["hwy/"],
     "cli": ["CLI/"],
     "hdf5": ["hdf5", "H5"],
     "openssl": ["openssl/"],
@@ -37,7 +38,7 @@ LIBRARIES = {
 # Parts of a folder stand in the order in which they may include each other: downwards is forbidden.
 RULES = {
     "partition": (["runtime/base"], ["fmt", "metis"]),
-    "runtime/base": ([], ["fmt", "openssl", "rapidjson"]),
+    "runtime/base": ([], ["fmt", "hwy", "openssl", "rapidjson"]),
     "runtime/material": (["runtime/base"], ["fmt"]),
     "runtime/bank/packed": (["runtime/base"], ["deflate", "eigen", "fmt", "stb"]),
     "runtime/bank": (["runtime/base", "runtime/material"], ["fmt", "hdf5"]),

@@ -32,7 +32,7 @@ LINKED = {
     r"libunwind.*\.a": "libunwind",
     r"lib(standalonewasm|noexit|stubs|al|jsmath).*\.a": "emscripten",
 }
-INCLUDED = {"fmt": "fmt", "rapidjson": "RapidJSON", "stb_image.h": "stb_image"}
+INCLUDED = {"fmt": "fmt", "hwy": "Highway", "rapidjson": "RapidJSON", "stb_image.h": "stb_image"}
 # Header libraries of the include law (tests/structure/include_law.py).
 HEADERS = {
     "rapidjson": "RapidJSON",
@@ -42,6 +42,7 @@ HEADERS = {
     "pybind11": "pybind11",
     "stb": "stb_image",
     "fmt": "fmt",
+    "hwy": "Highway",
 }
 faults = []
 

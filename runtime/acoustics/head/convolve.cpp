@@ -11,7 +11,7 @@ const Loops& get_loops() noexcept {
       return kAvx512Loops;
     case base::Instructions::kAvx2:
       return kAvx2Loops;
-    case base::Instructions::kPlain:
+    default:
       break;
   }
 #endif

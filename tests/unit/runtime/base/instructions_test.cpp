@@ -30,5 +30,12 @@ TEST(Instructions, are_limited_by_the_environment) {
   EXPECT_EQ(find_with("CARILLON_INSTRUCTIONS=avx512"), best);
 }
 
+TEST(Instructions, are_listed_ascending) {
+  const std::vector<Instructions> sets = list_instructions();
+  ASSERT_FALSE(sets.empty());
+  EXPECT_TRUE(std::is_sorted(sets.begin(), sets.end()));
+  EXPECT_EQ(sets.back(), find_instructions());
+}
+
 }  // namespace
 }  // namespace carillon::base
