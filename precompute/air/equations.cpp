@@ -15,28 +15,10 @@
 #include <numbers>
 #include <utility>
 
-#include "runtime/base/instructions.hpp"
-
 namespace carillon::air {
 namespace {
 
 constexpr std::size_t kPatchFacets = 192;  // rows of its midpoints fit into the L2 cache
-
-CalcTile find_tile() {
-#if defined(__x86_64__)
-  if (base::has_instructions(base::Instructions::kAvx512)) return calc_tile_avx512;
-  if (base::has_instructions(base::Instructions::kAvx2)) return calc_tile_avx2;
-#endif
-  return calc_tile_plain;
-}
-
-MultiplyRows find_multiply() {
-#if defined(__x86_64__)
-  if (base::has_instructions(base::Instructions::kAvx512)) return multiply_rows_avx512;
-  if (base::has_instructions(base::Instructions::kAvx2)) return multiply_rows_avx2;
-#endif
-  return multiply_rows_plain;
-}
 
 using ComplexMatrix = Eigen::Matrix<std::complex<float>, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
@@ -67,7 +49,6 @@ std::vector<std::int32_t> number_locally(std::span<const std::int32_t> items, st
 }  // namespace
 
 void LinearSystem::multiply(const Sides& x, Sides& y) const {
-  static const MultiplyRows multiply_rows = find_multiply();
   multiply_rows(reinterpret_cast<const float*>(matrix.data()), count_rows(), unknowns, x.values.data(), x.padded / kSideLanes,
                 y.values.data());
 }
@@ -99,7 +80,6 @@ double solve_directly(const LinearSystem& system, Sides& solution) {
 }
 
 void BlockInverse::apply(Sides& rows) const {
-  static const MultiplyRows multiply_rows = find_multiply();
   std::vector<float> result(kBlockRows * 2 * rows.padded);
   for (std::size_t b = 0; b < blocks_.size(); ++b) {
     const std::size_t count = std::min(kBlockRows, rows.unknowns - b * kBlockRows), size = count * 2 * rows.padded;
@@ -117,8 +97,7 @@ BoundaryEquations::BoundaryEquations(const RadiatingSurface& surface, const Sphe
       count_(count),
       sphere_(sphere),
       static_(make_static_part(surface, velocity_, count)),
-      mass_(surface.count_nodes()),
-      calc_tile_(find_tile()) {
+      mass_(surface.count_nodes()) {
   for (const Facet& facet : surface_.get_facets())
     for (const std::int32_t node : facet.corners) mass_[node] += facet.area_m2 / 3.0;
   for (std::size_t first = 0; first < surface_.count_facets(); first += kPatchFacets)
@@ -263,7 +242,7 @@ void BoundaryEquations::assemble(double k, std::span<const std::int32_t> sides, 
                         .source = sources[p].data(),
                         .sources = static_cast<int>(padded),
                         .may_be_near = gap < std::max(size, data.size_m)};
-      calc_tile_(block, patch, wave, {point_room.get(), facet_room.get()}, matrix_room.get(), right_room.get());
+      calc_tile(block, patch, wave, {point_room.get(), facet_room.get()}, matrix_room.get(), right_room.get());
       for (std::size_t lane = 0; lane < lanes; ++lane) {
         for (std::size_t c = 0; c < 3; ++c) {
           const std::int32_t row = block_facets[lane].corners[c];

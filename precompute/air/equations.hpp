@@ -89,7 +89,6 @@ class BoundaryEquations {
   StaticPart static_;
   std::vector<double> mass_;  // (N) lumped
   std::vector<PatchData> patches_;
-  CalcTile calc_tile_ = calc_tile_plain;
 };
 
 /// 1 / max(k, 1 / R): magnitude of alpha.

@@ -1,6 +1,4 @@
-// Inner loop of the boundary elements: sixteen test facets against one patch of source facets at one wave number. One implementation for
-// all instruction sets.
-// implementation for every instruction set.
+// Inner loop of the boundary elements: sixteen test facets against one patch of source facets at one wave number.
 #pragma once
 
 #include <cstddef>
@@ -56,21 +54,10 @@ struct TileRoom {
 
 /// Fills `matrix` (nodes, 3, 2, kLanes): for corner c of each lane's facet the entry of - K - alpha W with the node, real and imaginary.
 /// Adds - V - alpha K' of the sources to `right` (sources, 3, 2, kLanes).
-using CalcTile = void (*)(const TestBlock& block, const Patch& patch, const WaveNumber& wave, const TileRoom& room, float* matrix,
-                          float* right);
+void calc_tile(const TestBlock& block, const Patch& patch, const WaveNumber& wave, const TileRoom& room, float* matrix, float* right);
 
 /// y = A x: A (rows, unknowns) complex; x and y in the layout of Sides, `vectors` times kLanes sides. The bits of a row do not depend on
 /// the other rows.
-using MultiplyRows = void (*)(const float* matrix, std::size_t rows, std::size_t unknowns, const float* x, std::size_t vectors, float* y);
-
-void multiply_rows_plain(const float* matrix, std::size_t rows, std::size_t unknowns, const float* x, std::size_t vectors, float* y);
-void calc_tile_plain(const TestBlock& block, const Patch& patch, const WaveNumber& wave, const TileRoom& room, float* matrix, float* right);
-#if defined(__x86_64__)
-void multiply_rows_avx2(const float* matrix, std::size_t rows, std::size_t unknowns, const float* x, std::size_t vectors, float* y);
-void multiply_rows_avx512(const float* matrix, std::size_t rows, std::size_t unknowns, const float* x, std::size_t vectors, float* y);
-void calc_tile_avx2(const TestBlock& block, const Patch& patch, const WaveNumber& wave, const TileRoom& room, float* matrix, float* right);
-void calc_tile_avx512(const TestBlock& block, const Patch& patch, const WaveNumber& wave, const TileRoom& room, float* matrix,
-                      float* right);
-#endif
+void multiply_rows(const float* matrix, std::size_t rows, std::size_t unknowns, const float* x, std::size_t vectors, float* y);
 
 }  // namespace carillon::air

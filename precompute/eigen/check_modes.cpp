@@ -11,6 +11,7 @@
 #include <cstddef>
 #include <tuple>
 
+#include "precompute/eigen/mode_sums.hpp"
 #include "precompute/la/lapack.hpp"
 #include "precompute/la/local_columns.hpp"
 #include "precompute/petsc/diagonal.hpp"
@@ -47,45 +48,6 @@ la::Matrix calc_gram(const comm::Communicator& comm, const Columns& phi, const C
   return gram;
 }
 
-// Sums over the rows for sixteen columns each; r = K phi - lambda M phi with a given lambda.
-enum Sum : int { kPhiMPhi, kPhiR, kRR, kRMPhi, kMPhiMPhi, kDiagonal, kSums };
-using Sums = std::array<Row, kSums>;
-typedef double Vector __attribute__((vector_size(64), may_alias));
-constexpr int kVectors = kStrip / 8;
-
-// Loops over the sums are unrolled: GCC 12 spills them to memory otherwise.
-#if defined(__x86_64__)
-__attribute__((target_clones("avx512f", "arch=haswell", "default")))
-#endif
-void add_sums(std::size_t rows, const Row* phi_rows, const Row* m_rows, const Row* k_rows, const double* diagonal, const Row& lambda,
-              Row* total_rows) {
-  const auto* phi = reinterpret_cast<const Vector*>(phi_rows);
-  const auto* m_phi = reinterpret_cast<const Vector*>(m_rows);
-  const auto* k_phi = reinterpret_cast<const Vector*>(k_rows);
-  auto* total = reinterpret_cast<Vector*>(total_rows);
-#pragma GCC unroll 2
-  for (int v = 0; v < kVectors; ++v) {
-    Vector sum[kSums];
-#pragma GCC unroll 6
-    for (int k = 0; k < kSums; ++k) sum[k] = Vector{};
-    const Vector by = reinterpret_cast<const Vector*>(&lambda)[v];
-    for (std::size_t i = 0; i < rows; ++i) {
-      const Vector own = phi[i * kVectors + v];
-      const Vector m = m_phi[i * kVectors + v];
-      const Vector r = k_phi[i * kVectors + v] - by * m;
-      const Vector d = diagonal[i] * own;
-      sum[kPhiMPhi] += own * m;
-      sum[kPhiR] += own * r;
-      sum[kRR] += r * r;
-      sum[kRMPhi] += r * m;
-      sum[kMPhiMPhi] += m * m;
-      sum[kDiagonal] += d * d;
-    }
-#pragma GCC unroll 6
-    for (int k = 0; k < kSums; ++k) total[k * kVectors + v] += sum[k];
-  }
-}
-
 // K and M times columns first ... first + 15 of phi, a few nodes at a time: sums and M phi.
 void multiply_and_sum(const Operators& operators, const Columns& phi, int first, const Row& lambda, std::vector<Row>& packed,
                       std::vector<Row>& packed_for_mass, Sums& total, const Columns& m_phi) {
@@ -101,7 +63,7 @@ void multiply_and_sum(const Operators& operators, const Columns& phi, int first,
     const std::size_t count = std::min(kNodes, nodes - node);
     operators.stiffness.multiply_rows(packed.data(), node, count, k_rows);
     operators.mass.multiply_rows(for_mass.data(), node, count, m_rows);
-    add_sums(3 * count, packed.data() + 3 * node, m_rows, k_rows, operators.stiffness_diagonal.data() + 3 * node, lambda, total.data());
+    add_sums(3 * count, packed.data() + 3 * node, m_rows, k_rows, operators.stiffness_diagonal.data() + 3 * node, lambda, total);
     NodeMatrix::unpack(m_rows, node, count, m_phi);
   }
   operators.comm.sum(std::span(reinterpret_cast<double*>(total.data()), kSums * kStrip));

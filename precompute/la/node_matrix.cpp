@@ -12,6 +12,7 @@
 #include <limits>
 #include <utility>
 
+#include "precompute/la/node_products.hpp"
 #include "precompute/la/node_rows.hpp"
 #include "precompute/petsc/session.hpp"
 #include "precompute/petsc/work.hpp"
@@ -23,76 +24,7 @@ using petsc::check;
 
 constexpr int kStrip = NodeMatrix::kStrip;
 using Row = NodeMatrix::Row;
-#if defined(__x86_64__)
-#define CARILLON_CLONES __attribute__((target_clones("avx512f", "arch=haswell", "default")))
-#else
-#define CARILLON_CLONES
-#endif
-
 constexpr std::size_t kNodes = 32;  // unpacked at a time, while their products are in the first-level cache
-
-typedef double Vector __attribute__((vector_size(64), may_alias));
-constexpr int kVectors = kStrip / 8;
-
-constexpr int kAhead = 4;  // blocks by which rows of x are prefetched, as their addresses are irregular
-
-[[gnu::always_inline]] inline void prefetch_rows(const Row* rows) {
-#pragma GCC unroll 6
-  for (int line = 0; line < 3 * kVectors; ++line) __builtin_prefetch(reinterpret_cast<const Vector*>(rows) + line);
-}
-
-// Rows of nodes: y (3 x 16) = rest (3 x 3) times own x (3 x 16) + sum of blocks (3 x 3) times differences from it. The neighbour list is
-// padded by kAhead entries. All loops over the sums are unrolled: GCC 12 spills them to memory otherwise.
-CARILLON_CLONES void multiply_blocks(const std::int64_t* start, const std::int32_t* neighbour, const double* values, const double* rest,
-                                     std::size_t nodes, const Row* own_rows, const Row* x, Row* y) {
-  auto* out = reinterpret_cast<Vector*>(y);
-  const auto* own_row = reinterpret_cast<const Vector*>(own_rows);
-  for (std::size_t node = 0; node < nodes; ++node, out += 3 * kVectors, own_row += 3 * kVectors, rest += 9) {
-    Vector sum[3][kVectors];
-    Vector own[3 * kVectors];
-#pragma GCC unroll 6
-    for (int v = 0; v < 3 * kVectors; ++v) own[v] = own_row[v];
-#pragma GCC unroll 3
-    for (int d = 0; d < 3; ++d)
-#pragma GCC unroll 2
-      for (int v = 0; v < kVectors; ++v)
-        sum[d][v] = rest[3 * d] * own[v] + rest[3 * d + 1] * own[kVectors + v] + rest[3 * d + 2] * own[2 * kVectors + v];
-    for (std::int64_t k = start[node]; k < start[node + 1]; ++k) {
-      const double* a = values + 9 * k;
-      const auto* from = reinterpret_cast<const Vector*>(x + 3 * static_cast<std::ptrdiff_t>(neighbour[k]));
-      prefetch_rows(x + 3 * static_cast<std::ptrdiff_t>(neighbour[k + kAhead]));
-#pragma GCC unroll 3
-      for (int d = 0; d < 3; ++d)
-#pragma GCC unroll 2
-        for (int v = 0; v < kVectors; ++v)
-          sum[d][v] += a[3 * d] * (from[v] - own[v]) + a[3 * d + 1] * (from[kVectors + v] - own[kVectors + v]) +
-                       a[3 * d + 2] * (from[2 * kVectors + v] - own[2 * kVectors + v]);
-    }
-#pragma GCC unroll 3
-    for (int d = 0; d < 3; ++d)
-#pragma GCC unroll 2
-      for (int v = 0; v < kVectors; ++v) out[d * kVectors + v] = sum[d][v];
-  }
-}
-
-CARILLON_CLONES void multiply_scalars(const std::int64_t* start, const std::int32_t* neighbour, const double* values, std::size_t nodes,
-                                      const Row* x, Row* y) {
-  constexpr int kAll = 3 * kVectors;
-  auto* out = reinterpret_cast<Vector*>(y);
-  for (std::size_t node = 0; node < nodes; ++node, out += kAll) {
-    Vector sum[kAll];
-#pragma GCC unroll 6
-    for (int v = 0; v < kAll; ++v) sum[v] = Vector{};
-    for (std::int64_t k = start[node]; k < start[node + 1]; ++k) {
-      const auto* from = reinterpret_cast<const Vector*>(x + 3 * static_cast<std::ptrdiff_t>(neighbour[k]));
-      prefetch_rows(x + 3 * static_cast<std::ptrdiff_t>(neighbour[k + kAhead]));
-#pragma GCC unroll 6
-      for (int v = 0; v < kAll; ++v) sum[v] += values[k] * from[v];
-    }
-#pragma GCC unroll 6
-    for (int v = 0; v < kAll; ++v) out[v] = sum[v];
-  }
-}
 
 // At most sixteen columns.
 void to_rows(const Columns& x, Row* out) {

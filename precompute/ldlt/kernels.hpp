@@ -1,8 +1,7 @@
-// Inner loops, compiled for several instruction sets and selected at run time.
+// Inner loops, compiled for several instruction sets; those of this processor are found at run time.
 #pragma once
 
 #include <cstdint>
-#include <vector>
 
 namespace carillon::ldlt {
 
@@ -49,18 +48,8 @@ struct Panel {
   int begin = 0;
 };
 
-/// Right-hand sides are rows of 8 * vectors numbers, aligned to 64 bytes; vectors is 1 or 2.
-struct Kernels {
-  /// X -= A in, A (m, n) in tiles; in: n rows. Affects rows 3 nodes[i], 3 nodes[i] + 1 and 3 nodes[i] + 2 of X for i < m / 3.
-  void (*subtract_product)(const double* tiles, int m, int n, int vectors, const double* in, const int* nodes, double* x);
-  /// out (n rows) -= A^T X. next: data read after A, which is prefetched.
-  void (*subtract_transposed)(const double* tiles, int m, int n, int vectors, const int* nodes, double* x, double* out, const double* next);
-  /// out (n rows) = T in, T a lower triangle in tiles.
-  void (*trmm)(const double* tiles, int n, int vectors, const double* in, double* out);
-  /// out (n rows) += T^T in. next: as above.
-  void (*add_trmm_transposed)(const double* tiles, int n, int vectors, double* in, double* out, const double* next);
-  /// out (n rows) = D^-1 in; diagonal and off: as in BlockPivots, from the first row on.
-  void (*multiply_by_d_inverse)(const double* diagonal, const double* off, int n, int vectors, const double* in, double* out);
+/// Inner loops of a factorisation.
+struct FactorKernels {
   /// Factorises a symmetric block, both triangles given, columns kMaxBlock apart, by rook pivoting; overwrites it and stores L^-1 in tiles
   /// (count_triangle). False if a pivot is exactly zero or not finite.
   bool (*factorise_block)(double* block, int n, BlockPivots& pivots, double* tiles);
@@ -79,15 +68,24 @@ struct Kernels {
   /// target[c][run.to + i] += source[c][run.from + i] for every run and three columns; in column c the first c rows of the first run are
   /// skipped.
   void (*extend_add)(const double* const* source, const RowRun* runs, int count, double* const* target);
+};
+const FactorKernels& find_factor_kernels();
+
+/// Inner loops of a solve. Right-hand sides are rows of 8 * vectors numbers, aligned to 64 bytes; vectors is 1 or 2.
+struct SolveKernels {
+  /// X -= A in, A (m, n) in tiles; in: n rows. Affects rows 3 nodes[i], 3 nodes[i] + 1 and 3 nodes[i] + 2 of X for i < m / 3.
+  void (*subtract_product)(const double* tiles, int m, int n, int vectors, const double* in, const int* nodes, double* x);
+  /// out (n rows) -= A^T X. next: data read after A, which is prefetched.
+  void (*subtract_transposed)(const double* tiles, int m, int n, int vectors, const int* nodes, double* x, double* out, const double* next);
+  /// out (n rows) = T in, T a lower triangle in tiles.
+  void (*trmm)(const double* tiles, int n, int vectors, const double* in, double* out);
+  /// out (n rows) += T^T in. next: as above.
+  void (*add_trmm_transposed)(const double* tiles, int n, int vectors, double* in, double* out, const double* next);
+  /// out (n rows) = D^-1 in; diagonal and off: as in BlockPivots, from the first row on.
+  void (*multiply_by_d_inverse)(const double* diagonal, const double* off, int n, int vectors, const double* in, double* out);
   /// to (m rows of n numbers, to_stride apart) = transpose of from (n rows of m numbers, from_stride apart). They must not overlap.
   void (*transpose)(const double* from, long from_stride, int n, int m, double* to, long to_stride);
-  const char* name;
 };
-
-/// Kernels supported by this processor, fastest first.
-std::vector<const Kernels*> list_kernels();
-/// The fastest of them, or the choice of set_kernels (for tests; before any factorisation, the same on all ranks).
-const Kernels& get_kernels();
-void set_kernels(const Kernels* kernels);
+const SolveKernels& find_solve_kernels();
 
 }  // namespace carillon::ldlt

@@ -41,7 +41,7 @@ class Factoriser {
         k_factor_(pencil.stiffness_factor),
         m_factor_(-sigma * pencil.mass_factor),
         numbers_(numbers),
-        kernels_(get_kernels()),
+        kernels_(find_factor_kernels()),
         shared_(plan, numbers, received_) {
     std::int64_t scratch = 0;
     for (const Front& front : plan.fronts) scratch = std::max(scratch, count_wide(front.width, front.size()));
@@ -281,7 +281,7 @@ class Factoriser {
   double k_factor_;  // of K and M: a and -sigma b of A = a K - sigma b M
   double m_factor_;
   Numbers& numbers_;
-  const Kernels& kernels_;
+  const FactorKernels& kernels_;
 
   // Current front: w pivot columns of f rows, and the contribution block of the r other rows.
   int w_ = 0, r_ = 0, f_ = 0;
@@ -305,7 +305,7 @@ class Factoriser {
 
 }  // namespace
 
-void Outcome::eliminate(const Kernels& kernels, double* block, int n, BlockPivots& pivots, double* triangle) {
+void Outcome::eliminate(const FactorKernels& kernels, double* block, int n, BlockPivots& pivots, double* triangle) {
   if (kernels.factorise_block(block, n, pivots, triangle)) {
     negative += pivots.negative;
     smallest = std::min(smallest, pivots.smallest);

@@ -20,7 +20,7 @@ struct Outcome {
 
   /// triangle <- L^-1 of a diagonal block (columns kMaxBlock apart, both triangles). If a pivot vanishes, sets triangle and pivots to zero,
   /// so that later values stay finite.
-  void eliminate(const Kernels& kernels, double* block, int n, BlockPivots& pivots, double* triangle);
+  void eliminate(const FactorKernels& kernels, double* block, int n, BlockPivots& pivots, double* triangle);
 };
 
 /// Offsets of a panel of a shared front in this rank's numbers; -1: not on this rank.

@@ -54,7 +54,7 @@ SharedFactoriser::SharedFactoriser(const Plan& plan, Numbers& numbers, const std
     : plan_(plan),
       numbers_(numbers),
       blocks_(blocks),
-      kernels_(get_kernels()),
+      kernels_(find_factor_kernels()),
       mailbox_(plan.comm, kTag + numbers.generation % 2, {numbers.panels.data(), static_cast<std::size_t>(plan.room.panels)}),
       works_(plan.shared.size()),
       block_(plan.shared.empty() ? 0 : kMaxBlock * kMaxBlock),

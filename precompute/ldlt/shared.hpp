@@ -85,7 +85,7 @@ class SharedFactoriser {
   const Plan& plan_;
   Numbers& numbers_;
   const std::vector<std::vector<double>>& blocks_;
-  const Kernels& kernels_;
+  const FactorKernels& kernels_;
   Mailbox mailbox_;
   std::vector<Work> works_;
   std::map<std::int32_t, std::int32_t> shared_of_id_;

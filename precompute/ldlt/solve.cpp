@@ -28,7 +28,7 @@ struct Block {
 class Solver {
  public:
   Solver(const Plan& plan, const Numbers& numbers, Workspace& workspace, int columns)
-      : plan_(plan), numbers_(numbers), kernels_(get_kernels()) {
+      : plan_(plan), numbers_(numbers), kernels_(find_solve_kernels()) {
     for (int first = 0; first < columns; first += kBlockColumns) {
       const int count = std::min(kBlockColumns, columns - first);
       blocks_.push_back({workspace.blocks[first / kBlockColumns], count > 8 ? 16 : 8, count, first});
@@ -438,7 +438,7 @@ class Solver {
 
   const Plan& plan_;
   const Numbers& numbers_;
-  const Kernels& kernels_;
+  const SolveKernels& kernels_;
   std::vector<Block> blocks_;
   Ints nodes_;  // of the current front
   int row_width_ = 0;

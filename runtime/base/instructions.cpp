@@ -2,7 +2,9 @@
 
 #include <hwy/targets.h>
 
+#include <algorithm>
 #include <array>
+#include <atomic>
 #include <cstdlib>
 #include <string_view>
 
@@ -25,14 +27,18 @@ Instructions find_best() noexcept {
   return best;
 }
 
+std::atomic<Instructions> limit{Instructions::kBest};
+
 }  // namespace
 
 const char* get_name(Instructions set) noexcept { return kNames[static_cast<std::size_t>(set)]; }
 
 Instructions find_instructions() noexcept {
   static const Instructions instructions = find_best();
-  return instructions;
+  return std::min(instructions, limit.load(std::memory_order_relaxed));
 }
+
+void limit_instructions(Instructions most) noexcept { limit.store(most, std::memory_order_relaxed); }
 
 std::int64_t get_targets(Instructions set) noexcept {
   constexpr std::array<std::int64_t, kNames.size()> kTargets{HWY_EMU128 | HWY_SCALAR, HWY_WASM, HWY_NEON, HWY_SSE4, HWY_AVX2, HWY_AVX3, 0};

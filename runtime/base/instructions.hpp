@@ -14,8 +14,11 @@ enum class Instructions : std::uint8_t { kPlain, kSimd128, kNeon, kSse4, kAvx2, 
 const char* get_name(Instructions set) noexcept;
 
 /// Best set of this processor, limited by the environment variable CARILLON_INSTRUCTIONS (one of the names; for comparisons; other values:
-/// no limit). Cached. Any thread.
+/// no limit) and by limit_instructions(). Cached. Any thread.
 Instructions find_instructions() noexcept;
+
+/// For tests: nothing above `most` is used until the next call. Loops that were chosen before stay.
+void limit_instructions(Instructions most) noexcept;
 
 /// True if supported and allowed.
 inline bool has_instructions(Instructions wanted) noexcept { return find_instructions() >= wanted; }

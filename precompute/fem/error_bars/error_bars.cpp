@@ -125,7 +125,7 @@ std::vector<double> calc_sums(const comm::Communicator& comm, const mesh::LocalM
     recovery.nodes.reserve(3 * kLanes * sizeof(double));
     recovery.vertices.reserve(static_cast<std::size_t>(elements.terms) * materials * 6 * kLanes * sizeof(float));
   });
-  const ElementKernels& kernels = *list_kernels(elements.nodes).front();
+  const ElementKernels& kernels = find_kernels(elements.nodes);
   PetscInt stride = 0;
   const PetscScalar* shapes = nullptr;
   petsc::check(MatDenseGetLDA(solution.shapes, &stride));

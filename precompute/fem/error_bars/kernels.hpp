@@ -85,10 +85,9 @@ struct ElementKernels {
                      DoubleLanes& change, DoubleLanes& magnitude);
   /// Adds the energy of the recovered tractions.
   void (*add_tractions)(const std::vector<Traction>& tractions, const Strain* values, DoubleLanes& error);
-  const char* name;
 };
 
-/// Kernel tables supported by this processor, the fastest first. nodes: 4 or 10.
-std::vector<const ElementKernels*> list_kernels(int nodes);
+/// nodes: 4 or 10.
+const ElementKernels& find_kernels(int nodes);
 
 }  // namespace carillon::error_bars

@@ -69,7 +69,6 @@ struct RowLoops {
   void (*add_rows)(double* open, const double* value, std::size_t rows, const double* const* weight, std::size_t count);
 };
 
-extern const RowLoops kLoopsPlain, kLoopsAvx2, kLoopsAvx512;
 const RowLoops& find_loops();
 
 }  // namespace carillon::emission

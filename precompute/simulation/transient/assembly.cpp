@@ -312,7 +312,7 @@ std::vector<std::array<std::int32_t, 6>> list_skin(const Assembly& assembly, std
     }
     return triangles;
   }
-  // Mid nodes by local corners, as in kernel.inl.
+  // Mid nodes by local corners, as in kernel.cpp.
   constexpr int kMiddle[4][4] = {{0, 4, 6, 7}, {4, 1, 5, 8}, {6, 5, 2, 9}, {7, 8, 9, 3}};
   struct Facet {
     std::array<std::int32_t, 3> key;

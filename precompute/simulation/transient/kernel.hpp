@@ -72,12 +72,6 @@ struct Loops {
   MoveNodes move_nodes = nullptr;
 };
 
-const Loops& get_loops_plain();
-#if defined(__x86_64__)
-const Loops& get_loops_avx2();
-const Loops& get_loops_avx512();
-#endif
-/// Loops for this processor (base::find_instructions()).
 const Loops& find_loops();
 
 }  // namespace carillon::transient

@@ -4,7 +4,6 @@
 #include <algorithm>
 
 #include "precompute/simulation/transient/vectors.hpp"
-#include "runtime/base/instructions.hpp"
 
 namespace carillon::transient {
 namespace {
@@ -104,24 +103,12 @@ Sheets::Sheets(const SheetElements& elements, std::span<const std::int32_t> whic
   }
 }
 
-namespace {
-
-AddSheetForces* find_loop() {
-#if defined(__x86_64__)
-  if (base::has_instructions(base::Instructions::kAvx512)) return add_sheet_forces_avx512;
-  if (base::has_instructions(base::Instructions::kAvx2)) return add_sheet_forces_avx2;
-#endif
-  return add_sheet_forces_plain;
-}
-
-}  // namespace
-
 void Sheets::add_forces(const StepWeights& weights, const Quad* x, const Quad* v, Quad* f) {
-  find_loop()(blocks_.data(), blocks_.size(), is_damped_, weights, x, v, f, lag_.data(), spent_.data());
+  add_sheet_forces(blocks_.data(), blocks_.size(), is_damped_, weights, x, v, f, lag_.data(), spent_.data());
 }
 
 void Sheets::add_elastic_forces(const Quad* x, Quad* f) const {
-  find_loop()(blocks_.data(), blocks_.size(), false, {}, x, nullptr, f, nullptr, nullptr);
+  add_sheet_forces(blocks_.data(), blocks_.size(), false, {}, x, nullptr, f, nullptr, nullptr);
 }
 
 void Sheets::save_state(std::size_t k, double* state) const {

@@ -73,13 +73,8 @@ class Sheets {
   std::vector<double> spent_;  // (blocks, lanes) [J]
 };
 
-/// Loop over blocks, once per instruction set. lag: (count, 6, kLanes), spent: (count, kLanes).
-using AddSheetForces = void(const Sheets::Block* blocks, std::size_t count, bool is_damped, const StepWeights& weights, const Quad* x,
-                            const Quad* v, Quad* f, double* lag, double* spent);
-AddSheetForces add_sheet_forces_plain;
-#if defined(__x86_64__)
-AddSheetForces add_sheet_forces_avx2;
-AddSheetForces add_sheet_forces_avx512;
-#endif
+/// Loop over blocks. lag: (count, 6, kLanes), spent: (count, kLanes).
+void add_sheet_forces(const Sheets::Block* blocks, std::size_t count, bool is_damped, const StepWeights& weights, const Quad* x,
+                      const Quad* v, Quad* f, double* lag, double* spent);
 
 }  // namespace carillon::transient

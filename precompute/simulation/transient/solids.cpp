@@ -1,20 +1,10 @@
 // Method: consecutive elements of equal kind and law form a run; a run is split into blocks of the processor's lane count, and the last
-//   block is padded with its last element at weight 0. Loops: kernel.inl. docs/equations.md E11.
+//   block is padded with its last element at weight 0. Loops: kernel.cpp. docs/equations.md E11.
 #include "precompute/simulation/transient/solids.hpp"
 
 #include <algorithm>
 
-#include "runtime/base/instructions.hpp"
-
 namespace carillon::transient {
-
-const Loops& find_loops() {
-#if defined(__x86_64__)
-  if (base::has_instructions(base::Instructions::kAvx512)) return get_loops_avx512();
-  if (base::has_instructions(base::Instructions::kAvx2)) return get_loops_avx2();
-#endif
-  return get_loops_plain();
-}
 
 void AlignedDoubles::resize(std::size_t count) {
   lines_.assign((count + 7) / 8, Line{});

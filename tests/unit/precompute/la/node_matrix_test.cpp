@@ -10,6 +10,7 @@
 #include "precompute/la/node_rows.hpp"
 #include "precompute/petsc/handle.hpp"
 #include "precompute/petsc/session.hpp"
+#include "tests/support/instruction_sets.hpp"
 
 namespace carillon::la {
 namespace {
@@ -45,32 +46,34 @@ petsc::MatHandle make_matrix(bool is_mass, PetscInt nodes = kNodes) {
 }
 
 TEST(NodeMatrix, multiplies_as_petsc_does) {
-  constexpr int kColumns = 19;
-  for (const bool is_mass : {false, true}) {
-    const petsc::MatHandle matrix = make_matrix(is_mass);
-    const NodeMatrix blocks(matrix, 2.0);
-    petsc::VecHandle x, y;
-    check(MatCreateVecs(matrix, x.out(), y.out()));
-    PetscInt first = 0, last = 0;
-    check(MatGetOwnershipRange(matrix, &first, &last));
-    const auto rows = static_cast<std::ptrdiff_t>(last - first);
-    std::vector<double> in(rows * kColumns), out(in.size());
-    for (int j = 0; j < kColumns; ++j) {
-      for (std::ptrdiff_t i = 0; i < rows; ++i) in[j * rows + i] = std::sin(0.3 * static_cast<double>(first + i) + 1.1 * j);
+  tests::for_each_instruction_set([&] {
+    constexpr int kColumns = 19;
+    for (const bool is_mass : {false, true}) {
+      const petsc::MatHandle matrix = make_matrix(is_mass);
+      const NodeMatrix blocks(matrix, 2.0);
+      petsc::VecHandle x, y;
+      check(MatCreateVecs(matrix, x.out(), y.out()));
+      PetscInt first = 0, last = 0;
+      check(MatGetOwnershipRange(matrix, &first, &last));
+      const auto rows = static_cast<std::ptrdiff_t>(last - first);
+      std::vector<double> in(rows * kColumns), out(in.size());
+      for (int j = 0; j < kColumns; ++j) {
+        for (std::ptrdiff_t i = 0; i < rows; ++i) in[j * rows + i] = std::sin(0.3 * static_cast<double>(first + i) + 1.1 * j);
+      }
+      blocks.multiply({in.data(), rows, rows, kColumns}, {out.data(), rows, rows, kColumns});
+      for (int j = 0; j < kColumns; ++j) {
+        PetscScalar* values = nullptr;
+        check(VecGetArray(x, &values));
+        std::copy_n(in.data() + j * rows, rows, values);
+        check(VecRestoreArray(x, &values));
+        check(MatMult(matrix, x, y));
+        const PetscScalar* result = nullptr;
+        check(VecGetArrayRead(y, &result));
+        for (std::ptrdiff_t i = 0; i < rows; ++i) EXPECT_NEAR(out[j * rows + i], 2 * result[i], 1e-12);
+        check(VecRestoreArrayRead(y, &result));
+      }
     }
-    blocks.multiply({in.data(), rows, rows, kColumns}, {out.data(), rows, rows, kColumns});
-    for (int j = 0; j < kColumns; ++j) {
-      PetscScalar* values = nullptr;
-      check(VecGetArray(x, &values));
-      std::copy_n(in.data() + j * rows, rows, values);
-      check(VecRestoreArray(x, &values));
-      check(MatMult(matrix, x, y));
-      const PetscScalar* result = nullptr;
-      check(VecGetArrayRead(y, &result));
-      for (std::ptrdiff_t i = 0; i < rows; ++i) EXPECT_NEAR(out[j * rows + i], 2 * result[i], 1e-12);
-      check(VecRestoreArrayRead(y, &result));
-    }
-  }
+  });
 }
 
 // Every entry is visited once: count and sums equal those of PETSc over all ranks.

@@ -19,6 +19,7 @@
 #include "precompute/petsc/session.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/host.hpp"
+#include "tests/support/instruction_sets.hpp"
 #include "tests/unit/precompute/ldlt/pencil.hpp"
 
 namespace {
@@ -359,18 +360,14 @@ TEST(factor, names_the_need_when_one_rank_runs_out_of_memory) {
 TEST(factor, counts_and_solves_alike_with_every_instruction_set_of_this_processor) {
   Pencil pencil = make_lattice(13, 7, 5, 1, MassKind::kConsistent, 14);
   const Eigen::VectorXd lambda = calc_eigenvalues(pencil);
-  EXPECT_GE(list_kernels().size(), 1U);
-  for (const Kernels* kernels : list_kernels()) {
-    set_kernels(kernels);
+  tests::for_each_instruction_set([&] {
     Factor factor({pencil.k, pencil.m});
     for (const double sigma : pick_shifts(lambda, 4)) {
-      ASSERT_TRUE(factor.factorise(sigma)) << kernels->name << " " << sigma;
-      EXPECT_EQ(factor.get_negative_pivots(), count_below(lambda, sigma)) << kernels->name;
-      for (const int columns : {1, 8, 13, 32})
-        EXPECT_LT(solve_and_measure(factor, pencil, sigma, columns), kSolveTolerance) << kernels->name;
+      ASSERT_TRUE(factor.factorise(sigma)) << sigma;
+      EXPECT_EQ(factor.get_negative_pivots(), count_below(lambda, sigma));
+      for (const int columns : {1, 8, 13, 32}) EXPECT_LT(solve_and_measure(factor, pencil, sigma, columns), kSolveTolerance);
     }
-  }
-  set_kernels(nullptr);
+  });
 }
 
 Eigen::MatrixXd make_numbers(int rows, int columns, std::mt19937& random) {
@@ -392,7 +389,8 @@ std::vector<double> make_tiles(const Eigen::MatrixXd& a, bool is_triangle) {
 
 TEST(kernels, of_every_instruction_set_multiply_tiles_as_the_definition_says) {
   std::mt19937 random(5);
-  for (const Kernels* kernels : list_kernels())
+  tests::for_each_instruction_set([&] {
+    const SolveKernels& kernels = find_solve_kernels();
     for (const int m : {3, 6, 9, 12, 15, 39})
       for (const int n : {3, 21, 72})
         for (const int vectors : {1, 2}) {
@@ -412,26 +410,27 @@ TEST(kernels, of_every_instruction_set_multiply_tiles_as_the_definition_says) {
           };
           const auto expect = [&](const double* out, const Eigen::MatrixXd& expected) {
             for (int i = 0; i < expected.rows(); ++i)
-              for (int c = 0; c < width; ++c)
-                ASSERT_NEAR(out[i * width + c], expected(i, c), 1e-12) << kernels->name << " " << m << " " << n;
+              for (int c = 0; c < width; ++c) ASSERT_NEAR(out[i * width + c], expected(i, c), 1e-12) << m << " " << n;
           };
           put(x, rows);
           put(y, block);
-          kernels->subtract_product(tiles.data(), m, n, vectors, block, nodes.data(), rows);
+          kernels.subtract_product(tiles.data(), m, n, vectors, block, nodes.data(), rows);
           Eigen::MatrixXd wanted = x;
           for (int i = 0; i < m; ++i) wanted.row(row_of[i]) -= a.row(i) * y;
           expect(rows, wanted);
           put(x, rows);
-          kernels->subtract_transposed(tiles.data(), m, n, vectors, nodes.data(), rows, block, tiles.data());
+          kernels.subtract_transposed(tiles.data(), m, n, vectors, nodes.data(), rows, block, tiles.data());
           wanted = y;
           for (int i = 0; i < m; ++i) wanted -= a.row(i).transpose() * x.row(row_of[i]);
           expect(block, wanted);
         }
+  });
 }
 
 TEST(kernels, of_every_instruction_set_multiply_triangles) {
   std::mt19937 random(6);
-  for (const Kernels* kernels : list_kernels())
+  tests::for_each_instruction_set([&] {
+    const SolveKernels& kernels = find_solve_kernels();
     for (const int n : {3, 12, 18, 57, 72})
       for (const int vectors : {1, 2}) {
         const int width = 8 * vectors;
@@ -441,20 +440,22 @@ TEST(kernels, of_every_instruction_set_multiply_triangles) {
         const Eigen::MatrixXd x = make_numbers(n, width, random);
         alignas(64) double in[72 * 16], out[72 * 16];
         for (int i = 0; i < n * width; ++i) in[i] = out[i] = x(i / width, i % width);
-        kernels->add_trmm_transposed(tiles.data(), n, vectors, in, out, tiles.data());
+        kernels.add_trmm_transposed(tiles.data(), n, vectors, in, out, tiles.data());
         const Eigen::MatrixXd sum = x + a.transpose() * x;
-        for (int i = 0; i < n * width; ++i) ASSERT_NEAR(out[i], sum(i / width, i % width), 1e-12) << kernels->name << " " << n;
-        kernels->trmm(tiles.data(), n, vectors, in, out);
+        for (int i = 0; i < n * width; ++i) ASSERT_NEAR(out[i], sum(i / width, i % width), 1e-12) << n;
+        kernels.trmm(tiles.data(), n, vectors, in, out);
         const Eigen::MatrixXd product = a * x;
-        for (int i = 0; i < n * width; ++i) ASSERT_NEAR(out[i], product(i / width, i % width), 1e-12) << kernels->name << " " << n;
+        for (int i = 0; i < n * width; ++i) ASSERT_NEAR(out[i], product(i / width, i % width), 1e-12) << n;
       }
+  });
 }
 
 // A front of w pivots in one panel, and r rows behind it: L and the update matrix against dense algebra, with the update matrix overwritten
 // or added to.
 TEST(kernels, of_every_instruction_set_eliminate_a_panel) {
   std::mt19937 random(7);
-  for (const Kernels* kernels : list_kernels())
+  tests::for_each_instruction_set([&] {
+    const FactorKernels& kernels = find_factor_kernels();
     for (const int w : {3, 15, 36, 72})
       for (const int r : {3, 12, 30, 96, 201})
         for (const bool is_made : {false, true}) {
@@ -469,7 +470,7 @@ TEST(kernels, of_every_instruction_set_eliminate_a_panel) {
             for (int i = 0; i < w; ++i) block[j * kMaxBlock + i] = a(i, j);
           BlockPivots pivots;
           std::vector<double> triangle(count_triangle(w)), tiles(r * w);
-          ASSERT_TRUE(kernels->factorise_block(block, w, pivots, triangle.data()));
+          ASSERT_TRUE(kernels.factorise_block(block, w, pivots, triangle.data()));
           std::vector<double*> columns(w + r);
           const double* ordered[kMaxBlock];
           for (int j = 0; j < w + r; ++j) columns[j] = front.col(j).data();
@@ -477,18 +478,18 @@ TEST(kernels, of_every_instruction_set_eliminate_a_panel) {
           const auto wide = std::unique_ptr<double, void (*)(void*)>(
               static_cast<double*>(std::aligned_alloc(64, sizeof(double) * w * (r + kWideRows) / 64 * 64 + 64)), std::free);
           double growth = 0;
-          kernels->trsm(ordered, w, w + r, w, triangle.data(), wide.get());
-          kernels->scale_by_d_inverse(wide.get(), 0, r, w, pivots, tiles.data(), growth);
-          kernels->update({tiles.data(), wide.get(), w, w}, w, w + r, is_made, columns.data());
+          kernels.trsm(ordered, w, w + r, w, triangle.data(), wide.get());
+          kernels.scale_by_d_inverse(wide.get(), 0, r, w, pivots, tiles.data(), growth);
+          kernels.update({tiles.data(), wide.get(), w, w}, w, w + r, is_made, columns.data());
           const double scale = schur.cwiseAbs().maxCoeff() + a.cwiseAbs().maxCoeff();
           double largest = 0;
           for (const double l : tiles) largest = std::max(largest, std::abs(l));
           EXPECT_EQ(growth, largest);
           const double tolerance = 1e-12 * scale * std::max(1.0, growth);
           for (int j = 0; j < r; ++j)
-            for (int i = j; i < r; ++i)
-              ASSERT_NEAR(front(w + i, w + j), schur(i, j), tolerance) << kernels->name << " " << w << " " << r << " " << i << " " << j;
+            for (int i = j; i < r; ++i) ASSERT_NEAR(front(w + i, w + j), schur(i, j), tolerance) << w << " " << r << " " << i << " " << j;
         }
+  });
 }
 
 TEST(factor, refuses_rows_that_are_not_whole_nodes) {

@@ -6,8 +6,10 @@
 #include <cmath>
 #include <map>
 #include <random>
+#include <utility>
 
 #include "precompute/mesh/tet_mesh.hpp"
+#include "tests/support/instruction_sets.hpp"
 
 namespace carillon::error_bars {
 namespace {
@@ -79,24 +81,25 @@ TEST_P(Loops, give_the_same_with_every_instruction_set) {
   DoubleLanes lambda;
   for (int l = 0; l < kLanes; ++l) lambda.lane[l] = 0.1 * (l + 1);
   std::array<DoubleLanes, 8> first{};
-  const std::vector<const ElementKernels*> tables = list_kernels(GetParam());
-  for (const ElementKernels* kernels : tables) {
+  bool is_first = true;
+  tests::for_each_instruction_set([&] {
+    const ElementKernels& kernels = find_kernels(GetParam());
     std::vector<Strain> patches(40 * work.elements.terms, Strain{}), strains(work.elements.count * work.elements.samples);
     std::array<DoubleLanes, 8> sums{};
-    kernels->add_strains(work.elements, true, displacement, strains.data(), patches.data(), sums[2]);
+    kernels.add_strains(work.elements, true, displacement, strains.data(), patches.data(), sums[2]);
     std::vector<Strain> values(patches.begin(), patches.begin() + 40);
-    if (GetParam() == 10) kernels->find_middles(work.middles, 1, patches.data(), values.data());
-    kernels->add_energies(work.elements, work.value_of.data(), values.data(), displacement, strains.data(), sums[0], sums[6], sums[7],
-                          sums[1]);
-    kernels->add_shifts(work.shifts, patches.data(), displacement, lambda, sums[3], sums[4]);
-    kernels->add_tractions(work.tractions, patches.data(), sums[5]);
-    if (kernels == tables.front()) first = sums;
+    if (GetParam() == 10) kernels.find_middles(work.middles, 1, patches.data(), values.data());
+    kernels.add_energies(work.elements, work.value_of.data(), values.data(), displacement, strains.data(), sums[0], sums[6], sums[7],
+                         sums[1]);
+    kernels.add_shifts(work.shifts, patches.data(), displacement, lambda, sums[3], sums[4]);
+    kernels.add_tractions(work.tractions, patches.data(), sums[5]);
+    if (std::exchange(is_first, false)) first = sums;
     for (int s = 0; s < 8; ++s)
       for (int l = 0; l < kLanes; ++l) {
-        EXPECT_NEAR(sums[s].lane[l], first[s].lane[l], 1e-5 * first[s == 3 ? 4 : s].lane[l]) << kernels->name << " " << s;
+        EXPECT_NEAR(sums[s].lane[l], first[s].lane[l], 1e-5 * first[s == 3 ? 4 : s].lane[l]) << s;
         EXPECT_GT(first[s == 3 ? 4 : s].lane[l], 0) << s;
       }
-  }
+  });
 }
 
 /// Polynomial in the four barycentric coordinates: coefficients by exponents.
@@ -147,16 +150,16 @@ TEST(Energies, of_T10_are_the_exact_integrals_of_the_squared_field) {
         field[l][both] += 4 * u;
       }
     }
-  for (const ElementKernels* kernels : list_kernels(10)) {
+  tests::for_each_instruction_set([&] {
     DoubleLanes error{}, singular{}, bent{}, energy{};
-    kernels->add_energies(elements, value_of.data(), values.data(), nullptr, strains.data(), error, singular, bent, energy);
+    find_kernels(10).add_energies(elements, value_of.data(), values.data(), nullptr, strains.data(), error, singular, bent, energy);
     for (int l = 0; l < kLanes; ++l) {
-      EXPECT_NEAR(error.lane[l] / (2.5 * calc_mean_square(field[l])), 1, 1e-5) << kernels->name << " " << l;
+      EXPECT_NEAR(error.lane[l] / (2.5 * calc_mean_square(field[l])), 1, 1e-5) << l;
       EXPECT_EQ(singular.lane[l], error.lane[l]);
       EXPECT_EQ(bent.lane[l], 2 * error.lane[l]);
       EXPECT_EQ(energy.lane[l], 0);
     }
-  }
+  });
 }
 
 INSTANTIATE_TEST_SUITE_P(ElementKernels, Loops, testing::Values(4, 10));

@@ -8,7 +8,7 @@
 #include <numeric>
 #include <random>
 
-#include "runtime/base/instructions.hpp"
+#include "tests/support/instruction_sets.hpp"
 #include "tests/unit/precompute/simulation/transient/bodies.hpp"
 
 namespace carillon::transient {
@@ -103,15 +103,6 @@ struct Choice {
 };
 void PrintTo(const Choice& choice, std::ostream* out) { *out << choice.name; }
 
-std::vector<const Loops*> list_loops() {
-  std::vector<const Loops*> all{&get_loops_plain()};
-#if defined(__x86_64__)
-  if (base::has_instructions(base::Instructions::kAvx2)) all.push_back(&get_loops_avx2());
-  if (base::has_instructions(base::Instructions::kAvx512)) all.push_back(&get_loops_avx512());
-#endif
-  return all;
-}
-
 class OfKind : public ::testing::TestWithParam<Choice> {};
 INSTANTIATE_TEST_SUITE_P(Solids, OfKind, ::testing::Values(Choice{"T4", 1, 0.0}, Choice{"T10", 2, 0.0}, Choice{"curved", 2, 0.004}),
                          [](const auto& info) { return std::string(info.param.name); });
@@ -123,8 +114,8 @@ TEST_P(OfKind, homogeneous_deformation) {
   law.lambda_pa = 2.0;
   law.mu_pa = 1.0;
   law.density_kg_m3 = 1.0;
-  for (const Loops* loops : list_loops()) {
-    const Body body = make_body(GetParam().order, GetParam().bend_m, law, *loops);
+  tests::for_each_instruction_set([&] {
+    const Body body = make_body(GetParam().order, GetParam().bend_m, law, find_loops());
     double volume = 0.0;
     for (const SolidElement& element : body.elements) {
       std::vector<Vec3> x;
@@ -160,7 +151,7 @@ TEST_P(OfKind, homogeneous_deformation) {
         EXPECT_LT(inside, 1e-14) << patch.name;
       }
     }
-  }
+  });
 }
 
 TEST_P(OfKind, rotation) {
@@ -217,15 +208,15 @@ TEST_P(OfKind, damping_work) {
 
 // Every instruction set sums in the order of the elements, and a block's size does not show: the elements one by one give the same bits.
 TEST_P(OfKind, independence_of_blocks) {
-  for (const Loops* loops : list_loops()) {
-    Body body = make_body(GetParam().order, GetParam().bend_m, testing::make_law(3.0, 0.3, 1.0, 0.02), *loops, {3, 1, 1});
+  tests::for_each_instruction_set([&] {
+    Body body = make_body(GetParam().order, GetParam().bend_m, testing::make_law(3.0, 0.3, 1.0, 0.02), find_loops(), {3, 1, 1});
     const std::vector<Quad> u = make_random(body.nodes(), 0.01, 4), v = make_random(body.nodes(), 1.0, 5);
     std::vector<Quad> together(body.nodes() + 1), apart(body.nodes() + 1);
     body.solids.add_forces({1e-3, 0.0, 1e-3}, u.data(), v.data(), together.data());
     double spent = 0.0;
     const std::vector<double> by_element = body.solids.list_spent();
     for (std::size_t e = 0; e < body.elements.size(); ++e) {
-      Solids one({body.elements[e]}, {body.law}, body.mesh.nodes_m, static_cast<std::int32_t>(body.nodes()), *loops);
+      Solids one({body.elements[e]}, {body.law}, body.mesh.nodes_m, static_cast<std::int32_t>(body.nodes()), find_loops());
       one.add_forces({1e-3, 0.0, 1e-3}, u.data(), v.data(), apart.data());
       EXPECT_EQ(one.list_spent()[0], by_element[e]);
       spent += by_element[e];
@@ -236,7 +227,7 @@ TEST_P(OfKind, independence_of_blocks) {
       EXPECT_EQ(together[n].y, apart[n].y);
       EXPECT_EQ(together[n].z, apart[n].z);
     }
-  }
+  });
 }
 
 TEST_P(OfKind, smallest_determinant) {

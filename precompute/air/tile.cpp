@@ -2,9 +2,13 @@
 //             g = (1/r - ik) G / r, combined to the kernels of - K - alpha W and - V - alpha K'; then sums over the midpoints next to a
 //             node, and over its facets for the curls. Points that are near each other take part without the static kernels, by series.
 // Source:     docs/equations.md E10. Sine and cosine: reduction by pi / 2 in three parts, polynomials of degree 7 and 8 (least squares).
-//
-// Included by tile_*.cpp inside an unnamed namespace; nothing of std is used, so that no function compiled for one processor can be linked
-// in place of another's.
+#include "precompute/air/tile.hpp"
+
+#include "runtime/base/simd.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace carillon::air::HWY_NAMESPACE {
+namespace {
 
 typedef float F __attribute__((vector_size(64)));
 typedef std::int32_t I __attribute__((vector_size(64)));
@@ -155,8 +159,7 @@ inline void calc_points(const TestBlock& block, const Patch& patch, const WaveNu
   }
 }
 
-inline void calc_tile(const TestBlock& block, const Patch& patch, const WaveNumber& wave, const TileRoom& room, float* matrix,
-                      float* right) {
+void calc_tile(const TestBlock& block, const Patch& patch, const WaveNumber& wave, const TileRoom& room, float* matrix, float* right) {
   if (patch.may_be_near) {
     calc_points<true>(block, patch, wave, room.point, right);
   } else {
@@ -259,7 +262,7 @@ inline void multiply_vectors(const float* matrix, std::size_t rows, std::size_t 
   }
 }
 
-inline void multiply_rows(const float* matrix, std::size_t rows, std::size_t unknowns, const float* x, std::size_t vectors, float* y) {
+void multiply_rows(const float* matrix, std::size_t rows, std::size_t unknowns, const float* x, std::size_t vectors, float* y) {
   const std::size_t stride = vectors * kLanes;
   for (std::size_t i = 0; i < rows * 2 * stride; ++i) y[i] = 0.0F;
   for (std::size_t v = 0; v < vectors; v += 2) {
@@ -270,3 +273,24 @@ inline void multiply_rows(const float* matrix, std::size_t rows, std::size_t unk
     }
   }
 }
+
+}  // namespace
+}  // namespace carillon::air::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace carillon::air {
+
+HWY_EXPORT(calc_tile);
+HWY_EXPORT(multiply_rows);
+
+void calc_tile(const TestBlock& block, const Patch& patch, const WaveNumber& wave, const TileRoom& room, float* matrix, float* right) {
+  base::choose(HWY_DISPATCH_TABLE(calc_tile))(block, patch, wave, room, matrix, right);
+}
+
+void multiply_rows(const float* matrix, std::size_t rows, std::size_t unknowns, const float* x, std::size_t vectors, float* y) {
+  base::choose(HWY_DISPATCH_TABLE(multiply_rows))(matrix, rows, unknowns, x, vectors, y);
+}
+
+}  // namespace carillon::air
+#endif

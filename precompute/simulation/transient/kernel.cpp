@@ -4,9 +4,16 @@
 //   small tetrahedron at corner q. Forces by the transpose.
 // Source: docs/equations.md E11. O'Brien, Cook and Essl 2001; Miller, Joldes, Lance and Wittek 2007 (total Lagrangian, explicit).
 //
-// Included by solids_*.cpp inside an unnamed namespace after kLanes; no std functions, so that code compiled for one instruction set cannot
-// be linked into another. Lanes are independent of each other.
+// Lanes are independent of each other.
+#include "precompute/simulation/transient/kernel.hpp"
 
+#include "runtime/base/simd.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace carillon::transient::HWY_NAMESPACE {
+namespace {
+
+constexpr int kLanes = HWY_MAX_BYTES < 16 ? 2 : HWY_MAX_BYTES / sizeof(double);
 typedef double V __attribute__((vector_size(8 * kLanes)));
 typedef double Pair __attribute__((vector_size(16)));
 typedef double Four __attribute__((vector_size(32)));
@@ -449,3 +456,19 @@ const Loops kLoops{kLanes,
                    step_nodes,
                    move_nodes};
 #undef CARILLON_INLINE
+
+const Loops& get_loops() { return kLoops; }
+
+}  // namespace
+}  // namespace carillon::transient::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace carillon::transient {
+
+HWY_EXPORT(get_loops);
+
+const Loops& find_loops() { return base::choose(HWY_DISPATCH_TABLE(get_loops))(); }
+
+}  // namespace carillon::transient
+#endif

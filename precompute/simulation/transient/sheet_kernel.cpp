@@ -1,8 +1,12 @@
 // Method: four triangles in the lanes. Membrane: constant Green strain in plane stress. Bending: s = turn * 2 tan(theta / 2) +- psi of each
 //   edge, M = B (s - s0 + alpha1 s'); each triangle handles its own side of a hinge, so no separate edge pass is needed.
 // Source: docs/equations.md E11; Grinspun, Gingold, Reisman and Zorin 2006 (mid-edge normals), with 2 tan(theta / 2) for theta.
-//
-// Included by sheets_*.cpp inside an unnamed namespace; no std functions.
+#include "precompute/simulation/transient/sheets.hpp"
+#include "runtime/base/simd.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace carillon::transient::HWY_NAMESPACE {
+namespace {
 
 typedef double Lanes __attribute__((vector_size(32)));
 
@@ -59,7 +63,7 @@ inline Lanes spend(const StepWeights& weights, double* lag, Lanes stress, Lanes 
 template <bool kIsDamped>
 inline void add_block(const Sheets::Block& block, const StepWeights& weights, const Quad* x, const Quad* v, Quad* f, double* lag,
                       double* spent) {
-  const auto constant = [&](int k) { return load(block.constant[k]); };
+  const auto constant = [&](int k) HWY_ATTR { return load(block.constant[k]); };
   Lanes3 at[6], speed[6], force[6];
   for (int k = 0; k < 6; ++k) at[k] = gather(x, block.read[k]);
   if constexpr (kIsDamped)
@@ -165,3 +169,20 @@ inline void add_blocks(const Sheets::Block* blocks, std::size_t count, bool is_d
       add_block<false>(blocks[b], weights, x, v, f, nullptr, nullptr);
   }
 }
+
+}  // namespace
+}  // namespace carillon::transient::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace carillon::transient {
+
+HWY_EXPORT(add_blocks);
+
+void add_sheet_forces(const Sheets::Block* blocks, std::size_t count, bool is_damped, const StepWeights& weights, const Quad* x,
+                      const Quad* v, Quad* f, double* lag, double* spent) {
+  base::choose(HWY_DISPATCH_TABLE(add_blocks))(blocks, count, is_damped, weights, x, v, f, lag, spent);
+}
+
+}  // namespace carillon::transient
+#endif

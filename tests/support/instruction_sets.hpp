@@ -1,0 +1,21 @@
+// Checks with every instruction set of this processor.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include "runtime/base/instructions.hpp"
+
+namespace carillon::tests {
+
+/// Calls work() once for each set, ascending, with loops of that set.
+template <typename Work>
+void for_each_instruction_set(const Work& work) {
+  for (const base::Instructions set : base::list_instructions()) {
+    SCOPED_TRACE(base::get_name(set));
+    base::limit_instructions(set);
+    work();
+  }
+  base::limit_instructions(base::Instructions::kBest);
+}
+
+}  // namespace carillon::tests
