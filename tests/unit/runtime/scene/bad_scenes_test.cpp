@@ -174,7 +174,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadScene{"coarse_contacts", with_root("\"quality\": {\"contact_step_s\": 0.1}"), {":2:", "contact_step_s", "0.002"}},
         BadScene{"fewer_modes_than_a_group", with_root("\"quality\": {\"modes\": 1}"), {":2:", "modes", "16"}},
         BadScene{"loud_effects", with_root("\"quality\": {\"planner_db\": 3}"), {":2:", "planner_db", "-10"}},
-        BadScene{"unknown_instructions", with_root("\"quality\": {\"instructions\": \"neon\"}"), {":2:", "instructions", "avx2"}},
+        BadScene{"unknown_instructions", with_root("\"quality\": {\"instructions\": \"altivec\"}"), {":2:", "instructions", "avx2"}},
         BadScene{"unknown_radiation", with_root("\"radiation\": \"sfere\""), {":2:", "radiation", "sphere"}},
         BadScene{"strikes_as_object", with_root("\"strikes\": {}"), {":2:", "strikes", "list"}},
         BadScene{"strike_at_no_body",
