@@ -3,8 +3,8 @@ import dataclasses
 import math
 import pathlib
 
-import gmsh
 import known
+import mesh_file
 from lab import Case
 from errors import InputError
 
@@ -82,7 +82,7 @@ class Body:
         names = ([self.change[0]] if self.change else []) + (["straight"] if is_straight else [])
 
         def change(path):
-            mesh = gmsh.MeshFile(path)
+            mesh = mesh_file.MeshFile(path)
             if self.change:
                 self.change[1](mesh)
             if is_straight:

@@ -22,8 +22,8 @@ STUDY = ROOT / "tests/bench/study"
 sys.path[:0] = [str(STUDY), str(ROOT / "jobs/study")]
 import bodies
 import cents
-import gmsh
 import known
+import mesh_file
 import papers
 import plots
 
@@ -376,7 +376,7 @@ class Parts(unittest.TestCase):
                 subprocess.run(
                     [BIN / "carillon-mesh", *map(str, body.words), "--nodes", "9000", "-o", path], check=True, capture_output=True
                 )
-                mesh = gmsh.MeshFile(path)
+                mesh = mesh_file.MeshFile(path)
                 body.change[1](mesh)
                 found = 0.0
                 for tet in mesh.tets:
