@@ -111,7 +111,7 @@ inline void add_tile(const SoundTable* sound, const ColumnStates* starts, int gr
                      Sums& sums) noexcept {
   for (int k = 0; k < kColumn; k += kVectors * P::kWidth / 2) {
     int q = 0;
-    const auto add = [&](auto held) {
+    const auto add = [&](auto held) HWY_ATTR {
       // Two pairs rather than three and one.
       for (; columns - q >= held.count && (held.count != 3 || columns - q != 4); q += held.count) {
         add_columns<held.count>(sound, starts, groups, first + q, k, is_first, sums.of[q][k]);
@@ -356,6 +356,20 @@ inline F calc_damping(const ContactBlock& drive, int end, int mode, F scale, F a
   return p / (F::all(1.0F) + p);
 }
 
+/// Forces of all contacts on a vector of modes, at the samples of a sub-block and the first of the next.
+inline void calc_forces(const ContactBlock& drive, int m, F scale, F* force) noexcept {
+  for (int n = 0; n <= kSubBlock; ++n) force[n] = F::zero();
+  for (int c = 0; c < drive.contacts; ++c) {
+    for (const ContactEnd& push : drive.push[c]) {
+      if (!push.forces) continue;
+      F amplitude = F::zero();
+      for (int i = 0; i < kStrikeRows; ++i) amplitude = fma(F::all(push.force[i]), F::convert(push.row[i] + m), amplitude);
+      amplitude = amplitude * scale;
+      for (int n = 0; n <= kSubBlock; ++n) force[n] = fma(F::all(push.signal[n]), amplitude, force[n]);
+    }
+  }
+}
+
 template <bool kForces, bool kDamps, bool kKeeps>
 inline void drive_modes(const StrikeTable* strike, const RotationTable* turn, const ContactBlock& drive, int sub_block, ModeState* state,
                         ColumnStates* starts, int groups, float* out, SampleStates* kept) noexcept {
@@ -372,17 +386,7 @@ inline void drive_modes(const StrikeTable* strike, const RotationTable* turn, co
     F force[kSubBlock + 1];
     F first_re = F::zero(), first_im = F::zero(), second_re = F::zero(), second_im = F::zero();  // answers to 1 - u and u
     if constexpr (kForces) {
-      for (int n = 0; n <= kSubBlock; ++n) force[n] = F::zero();
-      for (int c = 0; c < drive.contacts; ++c) {
-        for (int end = 0; end < 2; ++end) {
-          const ContactEnd& push = drive.push[c][end];
-          if (!push.forces) continue;
-          F amplitude = F::zero();
-          for (int i = 0; i < kStrikeRows; ++i) amplitude = fma(F::all(push.force[i]), F::convert(push.row[i] + m), amplitude);
-          amplitude = amplitude * scale;
-          for (int n = 0; n <= kSubBlock; ++n) force[n] = fma(F::all(push.signal[n]), amplitude, force[n]);
-        }
-      }
+      calc_forces(drive, m, scale, force);
       for (int j = 0; j < kTerms; ++j) {
         const F re = F::load(table.force_re[j] + lane), im = F::load(table.force_im[j] + lane);
         first_re = fma(F::all(drive.ramp[0][j]), re, first_re);

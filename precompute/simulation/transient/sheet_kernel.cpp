@@ -59,6 +59,53 @@ inline Lanes spend(const StepWeights& weights, double* lag, Lanes stress, Lanes 
   return work;
 }
 
+/// Membrane forces on the corners of a triangle; returns the damping power.
+template <bool kIsDamped>
+inline Lanes add_membrane(const Sheets::Block& block, const StepWeights& weights, const Lanes3* at, const Lanes3* speed, double* lag,
+                          Lanes3* force) {
+  const Lanes per_p = load(block.constant[0]), skew = load(block.constant[1]), per_r = load(block.constant[2]);
+  const Lanes lambda = load(block.constant[3]), twice_mu = load(block.constant[4]), alpha1 = load(block.constant[17]);
+  Lanes lost{};
+  const Lanes3 d1 = at[1] - at[0], d2 = at[2] - at[0];
+  const Lanes3 f1 = per_p * d1, f2 = skew * d1 + per_r * d2;
+  Lanes e11 = 0.5 * (dot(f1, f1) - 1.0), e22 = 0.5 * (dot(f2, f2) - 1.0), e12 = 0.5 * dot(f1, f2);
+  if constexpr (kIsDamped) {
+    const Lanes3 r1 = speed[1] - speed[0], r2 = speed[2] - speed[0];
+    const Lanes3 g1 = per_p * r1, g2 = skew * r1 + per_r * r2;
+    const Lanes q11 = dot(f1, g1), q22 = dot(f2, g2), q12 = 0.5 * (dot(f1, g2) + dot(f2, g1));
+    const Lanes trace = alpha1 * lambda * (q11 + q22), part = alpha1 * twice_mu;
+    lost = spend(weights, lag, trace + part * q11, q11) + spend(weights, lag + 4, trace + part * q22, q22) +
+           spend(weights, lag + 8, 2.0 * part * q12, q12);
+    e11 += alpha1 * q11;
+    e22 += alpha1 * q22;
+    e12 += alpha1 * q12;
+  }
+  const Lanes pressure = lambda * (e11 + e22);
+  const Lanes s11 = pressure + twice_mu * e11, s22 = pressure + twice_mu * e22, s12 = twice_mu * e12;
+  const Lanes3 p1 = s11 * f1 + s12 * f2, p2 = s12 * f1 + s22 * f2;
+  const Lanes3 on1 = per_p * p1 + skew * p2, on2 = per_r * p2;
+  force[0] = on1 + on2;
+  force[1] = Lanes{} * on1 - on1;
+  force[2] = Lanes{} * on2 - on2;
+  return lost;
+}
+
+/// Adds to the nodes, lane by lane: a node's sum over triangles is in ascending order.
+inline void scatter(const Sheets::Block& block, const Lanes3* force, const Lanes* on_edge, Quad* f) {
+  Lanes rows[6][4];
+  for (int k = 0; k < 6; ++k) {
+    rows[k][0] = force[k].x;
+    rows[k][1] = force[k].y;
+    rows[k][2] = force[k].z;
+    rows[k][3] = Lanes{};
+    transpose(rows[k][0], rows[k][1], rows[k][2], rows[k][3]);
+  }
+  for (int lane = 0; lane < 4; ++lane) {
+    for (int k = 0; k < 6; ++k) *reinterpret_cast<Lanes*>(&f[block.write[k][lane]].x) += rows[k][lane];
+    for (int i = 0; i < 3; ++i) f[block.write[6 + i][lane]].x += on_edge[i][lane];
+  }
+}
+
 /// Forces of a triangle and its three neighbours.
 template <bool kIsDamped>
 inline void add_block(const Sheets::Block& block, const StepWeights& weights, const Quad* x, const Quad* v, Quad* f, double* lag,
@@ -69,33 +116,7 @@ inline void add_block(const Sheets::Block& block, const StepWeights& weights, co
   if constexpr (kIsDamped)
     for (int k = 0; k < 6; ++k) speed[k] = gather(v, block.read[k]);
   const Lanes alpha1 = constant(17);
-  Lanes lost{};
-  // ---- membrane ----
-  {
-    const Lanes per_p = constant(0), skew = constant(1), per_r = constant(2), lambda = constant(3), twice_mu = constant(4);
-    const Lanes3 d1 = at[1] - at[0], d2 = at[2] - at[0];
-    const Lanes3 f1 = per_p * d1, f2 = skew * d1 + per_r * d2;
-    Lanes e11 = 0.5 * (dot(f1, f1) - 1.0), e22 = 0.5 * (dot(f2, f2) - 1.0), e12 = 0.5 * dot(f1, f2);
-    if constexpr (kIsDamped) {
-      const Lanes3 r1 = speed[1] - speed[0], r2 = speed[2] - speed[0];
-      const Lanes3 g1 = per_p * r1, g2 = skew * r1 + per_r * r2;
-      const Lanes q11 = dot(f1, g1), q22 = dot(f2, g2), q12 = 0.5 * (dot(f1, g2) + dot(f2, g1));
-      const Lanes trace = alpha1 * lambda * (q11 + q22), part = alpha1 * twice_mu;
-      lost = spend(weights, lag, trace + part * q11, q11) + spend(weights, lag + 4, trace + part * q22, q22) +
-             spend(weights, lag + 8, 2.0 * part * q12, q12);
-      e11 += alpha1 * q11;
-      e22 += alpha1 * q22;
-      e12 += alpha1 * q12;
-    }
-    const Lanes pressure = lambda * (e11 + e22);
-    const Lanes s11 = pressure + twice_mu * e11, s22 = pressure + twice_mu * e22, s12 = twice_mu * e12;
-    const Lanes3 p1 = s11 * f1 + s12 * f2, p2 = s12 * f1 + s22 * f2;
-    const Lanes3 on1 = per_p * p1 + skew * p2, on2 = per_r * p2;
-    force[0] = on1 + on2;
-    force[1] = Lanes{} * on1 - on1;
-    force[2] = Lanes{} * on2 - on2;
-  }
-  // ---- bending ----
+  Lanes lost = add_membrane<kIsDamped>(block, weights, at, speed, lag, force);
   const Lanes3 own = cross(at[1] - at[0], at[2] - at[0]);
   const Lanes own2 = dot(own, own), own_size = calc_root(own2);
   Lanes angle[3], rate[3], slope[3];
@@ -145,19 +166,7 @@ inline void add_block(const Sheets::Block& block, const StepWeights& weights, co
     on_edge[i] = -moment[i] * constant(14 + i);
   }
   if constexpr (kIsDamped) store_loose(spent, load_loose(spent) + lost);
-  // Lane by lane: a node's sum over triangles is in ascending order.
-  Lanes rows[6][4];
-  for (int k = 0; k < 6; ++k) {
-    rows[k][0] = force[k].x;
-    rows[k][1] = force[k].y;
-    rows[k][2] = force[k].z;
-    rows[k][3] = Lanes{};
-    transpose(rows[k][0], rows[k][1], rows[k][2], rows[k][3]);
-  }
-  for (int lane = 0; lane < 4; ++lane) {
-    for (int k = 0; k < 6; ++k) *reinterpret_cast<Lanes*>(&f[block.write[k][lane]].x) += rows[k][lane];
-    for (int i = 0; i < 3; ++i) f[block.write[6 + i][lane]].x += on_edge[i][lane];
-  }
+  scatter(block, force, on_edge, f);
 }
 
 inline void add_blocks(const Sheets::Block* blocks, std::size_t count, bool is_damped, const StepWeights& weights, const Quad* x,
