@@ -10,7 +10,7 @@ HWY_BEFORE_NAMESPACE();
 namespace carillon::la::HWY_NAMESPACE {
 namespace {
 
-#if HWY_TARGET == HWY_SCALAR
+#if HWY_TARGET == HWY_SCALAR || HWY_TARGET == HWY_EMU128
 constexpr BlockTiles kTiles;
 #else
 namespace hn = hwy::HWY_NAMESPACE;

@@ -128,9 +128,6 @@ std::string Object::choice_or(std::string_view key, const std::vector<std::strin
 
 double Object::number(std::string_view key, Range range) { return to_number(*this, require_value(key), key, range); }
 double Object::number_or(std::string_view key, double fallback, Range range) { return has(key) ? number(key, range) : fallback; }
-std::optional<double> Object::number_if(std::string_view key, Range range) {
-  return has(key) ? std::optional(number(key, range)) : std::nullopt;
-}
 
 long long Object::integer(std::string_view key, long long low, long long high) {
   const Value& value = require_value(key);

@@ -56,7 +56,6 @@ class Object {
 
   double number(std::string_view key, Range range = {});
   double number_or(std::string_view key, double fallback, Range range = {});
-  std::optional<double> number_if(std::string_view key, Range range = {});
   long long integer(std::string_view key, long long low, long long high);  // low <= value <= high
   std::optional<long long> integer_if(std::string_view key, long long low, long long high);
   bool boolean_or(std::string_view key, bool fallback);

@@ -11,8 +11,6 @@
 namespace carillon::base {
 namespace {
 
-constexpr std::array kNames{"plain", "simd128", "neon", "sse4", "avx2", "avx512", "best"};
-
 bool is_supported(Instructions set) noexcept { return (HWY_SUPPORTED_TARGETS & HWY_TARGETS & get_targets(set)) != 0; }
 
 /// Best supported set, not above the one that the environment names.
@@ -20,9 +18,9 @@ Instructions find_best() noexcept {
   const char* value = std::getenv("CARILLON_INSTRUCTIONS");
   const std::string_view name = value != nullptr ? value : "";
   Instructions best{};
-  for (std::size_t s = 0; s < kNames.size(); ++s) {
+  for (std::size_t s = 0; s < kInstructionNames.size(); ++s) {
     if (is_supported(static_cast<Instructions>(s))) best = static_cast<Instructions>(s);
-    if (name == kNames[s]) break;
+    if (name == kInstructionNames[s]) break;
   }
   return best;
 }
@@ -30,8 +28,6 @@ Instructions find_best() noexcept {
 std::atomic<Instructions> limit{Instructions::kBest};
 
 }  // namespace
-
-const char* get_name(Instructions set) noexcept { return kNames[static_cast<std::size_t>(set)]; }
 
 Instructions find_instructions() noexcept {
   static const Instructions instructions = find_best();
@@ -41,7 +37,8 @@ Instructions find_instructions() noexcept {
 void limit_instructions(Instructions most) noexcept { limit.store(most, std::memory_order_relaxed); }
 
 std::int64_t get_targets(Instructions set) noexcept {
-  constexpr std::array<std::int64_t, kNames.size()> kTargets{HWY_EMU128 | HWY_SCALAR, HWY_WASM, HWY_NEON, HWY_SSE4, HWY_AVX2, HWY_AVX3, 0};
+  constexpr std::array<std::int64_t, kInstructionNames.size()> kTargets{
+      HWY_EMU128 | HWY_SCALAR, HWY_WASM, HWY_NEON, HWY_SSE4, HWY_AVX2, HWY_AVX3, 0};
   return kTargets[static_cast<std::size_t>(set)];
 }
 

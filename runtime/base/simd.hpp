@@ -14,7 +14,8 @@
 //     }  // namespace carillon::part
 //     #endif
 //
-// The file is included once more for each set, and with it the end of this one. An exported function is not noexcept (Highway 1.0).
+// The file is included once more for each set, and with it the end of this one. An exported function is not noexcept (Highway 1.0), and
+// lambdas have HWY_ATTR before their brace.
 #ifndef CARILLON_SIMD
 #define CARILLON_SIMD
 
@@ -22,6 +23,7 @@
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
 #include <hwy/targets.h>
 
+#include <algorithm>
 #include <cstddef>
 
 #include "runtime/base/instructions.hpp"
@@ -35,7 +37,7 @@ Function choose(const Function (&table)[kCount], Instructions wanted = Instructi
     return table[0];
   } else {
     hwy::ChosenTarget target;
-    target.Update(get_targets(wanted < find_instructions() ? wanted : find_instructions()));
+    target.Update(get_targets(std::min(wanted, find_instructions())));
     return table[target.GetIndex()];
   }
 }

@@ -132,8 +132,8 @@ struct Output {
   bool fade_end = true;  // fades within the last 10 ms if not silent
 };
 
-/// Names of quality.instructions, in the order of synth::Isa.
-inline const std::vector<std::string> kInstructionNames{"plain", "simd128", "neon", "sse4", "avx2", "avx512", "best"};
+/// Names of quality.instructions.
+inline const std::vector<std::string> kInstructionNames(base::kInstructionNames.begin(), base::kInstructionNames.end());
 
 /// Accuracy against CPU time; the defaults are chosen in docs/accuracy.md.
 struct Quality {

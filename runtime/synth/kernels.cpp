@@ -87,7 +87,7 @@ struct D {
     return {Doubles(wasm_f64x2_promote_low_f32x4(x.v.raw)), Doubles(wasm_f64x2_promote_low_f32x4(hn::Shuffle1032(x.v).raw))};
   }
   F narrow() const {
-    const auto demote = [](Doubles half) { return hn::Vec<decltype(kFloats)>{wasm_f32x4_demote_f64x2_zero(v128_t(half))}; };
+    const auto demote = [](Doubles half) HWY_ATTR { return hn::Vec<decltype(kFloats)>{wasm_f32x4_demote_f64x2_zero(v128_t(half))}; };
     return {hn::ConcatLowerLower(kFloats, demote(hi), demote(lo))};
   }
 #endif

@@ -39,7 +39,7 @@ void read(const Reading* readings, int count, float* out) noexcept {
   for (int i = 0; i < count; ++i) {
     const Reading& reading = readings[i];
     const F mix = F::all(reading.mix);
-    const auto get_tap = [&](int at) {
+    const auto get_tap = [&](int at) HWY_ATTR {
       const F tap = F::load(reading.taps + at);
       return fma(mix, F::load(reading.taps + kTaps + at) - tap, tap);
     };

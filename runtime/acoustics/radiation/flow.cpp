@@ -54,7 +54,7 @@ void calc_through(const Corners& corners, std::size_t modes, float* through, flo
     alignas(64) float motion[3 * kLanes];
 #pragma GCC unroll 3
     for (std::size_t i = 0; i < 3 * kLanes; i += kLanes) {
-      const auto load = [&](const std::int16_t* steps) { return hn::PromoteTo(ints, hn::LoadU(shorts, steps + 3 * m + i)); };
+      const auto load = [&](const std::int16_t* steps) HWY_ATTR { return hn::PromoteTo(ints, hn::LoadU(shorts, steps + 3 * m + i)); };
       hn::Store(hn::ConvertTo(kFloats, load(corners.steps[0]) + load(corners.steps[1]) + load(corners.steps[2])), kFloats, motion + i);
     }
     auto x = hn::Undefined(kFloats), y = x, z = x;

@@ -166,7 +166,7 @@ void sum_up(const TransferWork& work, int highest, int first) {
     // Two sums of each row, so that a sum need not wait for itself; one begins with m = 0. Those of whole numbers stand for the imaginary
     // part: what the real parts are of them goes at the end of the row.
     Sums row_re, row_all, other_re, other_all;
-    const auto add = [first, &harmonic](const MultipoleLine& steps, int i, int part, Floats* to_re, Floats* to_all) {
+    const auto add = [first, &harmonic](const MultipoleLine& steps, int i, int part, Floats* to_re, Floats* to_all) HWY_ATTR {
       const auto both = hn::Load(kInts, steps.steps + (first + part) * kLanes);  // each part as a number of its own, 65536 times as large
       const Floats real = hn::ConvertTo(kFloats, hn::ShiftLeft<16>(both)), all = hn::ConvertTo(kFloats, both);
 #pragma GCC unroll 8

@@ -117,9 +117,8 @@ void find_nearest(const Near& near, const Place& place, int reach, Neighbours& f
   const int shift = std::max(reach - kReachBits, 0);
   alignas(64) std::int32_t keys[Near::kMost];
   const std::size_t whole = (near.count + kLanes - 1) / kLanes * kLanes;
-  const auto load = [&](const std::array<std::int32_t, Near::kMost>& from, std::size_t i, std::int32_t origin) {
-    return hn::ShiftRightSame(hn::Load(kInts, from.data() + i) - hn::Set(kInts, origin), shift);
-  };
+  const auto load = [&](const std::array<std::int32_t, Near::kMost>& from, std::size_t i, std::int32_t origin)
+                        HWY_ATTR { return hn::ShiftRightSame(hn::Load(kInts, from.data() + i) - hn::Set(kInts, origin), shift); };
   const auto count = hn::Set(kInts, static_cast<std::int32_t>(near.count)), far = hn::Set(kInts, std::numeric_limits<std::int32_t>::max());
   auto number = hn::Iota(kInts, 0);
   for (std::size_t i = 0; i < whole; i += kLanes) {

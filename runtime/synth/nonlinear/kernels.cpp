@@ -183,7 +183,7 @@ double weigh(int count, float factor, const float* linear, float* eta, float* we
 void strain(int parts, int length, const float* gradient, float* out) noexcept {
   const int axes = parts / 3;
   for (int at = 0; at < length; at += kLanes) {
-    const auto part = [&](int k, int a) { return load(gradient + (k * axes + a) * static_cast<std::ptrdiff_t>(length) + at); };
+    const auto part = [&](int k, int a) HWY_ATTR { return load(gradient + (k * axes + a) * static_cast<std::ptrdiff_t>(length) + at); };
     F s[6];
     clear(s);
 #pragma GCC unroll 3

@@ -145,7 +145,7 @@ void measure_cost(const bank::Bank* given, bool quick) {
               given != nullptr ? "bodies of one bank" : "228 modes a body, random multipoles, tables of its own", kFrames, deadline_us);
   std::printf("| instructions | scene | p50 | p99 | largest | p99 / deadline | looked up a block |\n|---|---|--:|--:|--:|--:|--:|\n");
   for (const Kind kind : {Kind{"AVX2", base::Instructions::kAvx2}, Kind{"AVX-512", base::Instructions::kAvx512}}) {
-    if (!base::has_instructions(kind.instructions)) continue;
+    if (base::find_instructions() < kind.instructions) continue;
     std::vector<std::shared_ptr<const synth::Model>> models;
     for (int b = 0; b < (quick ? 20 : 40); ++b) {
       if (given != nullptr && b > 0) {
