@@ -57,8 +57,9 @@ struct Course {
 };
 
 /// Calls `look` (may be empty) with every motion.
-inline Course run(const WorldSpec& spec, double middle_s, double end_s, const std::function<void(const events::BodyMotion&)>& look = {}) {
-  World world(spec, {.end_s = end_s, .lasting_contacts = false, .audits_energy = true});
+inline Course run(const WorldSpec& spec, double middle_s, double end_s, const std::function<void(const events::BodyMotion&)>& look = {},
+                  bool lasting_contacts = false) {
+  World world(spec, {.end_s = end_s, .lasting_contacts = lasting_contacts, .audits_energy = true});
   Course course;
   course.end.resize(spec.bodies.size());
   const auto take = [&](const events::Event& e) {

@@ -2,8 +2,6 @@
 """clang-tidy (.clang-tidy, and clang's own warnings) over the product's sources, by the compile commands of a build.
 
 usage: tidy.py [-j N] SOURCE_DIR BUILD_DIR [FOLDER...]        folders: runtime jobs ..., default all; exit 1 and one line per place
-
-Sources that compile one body for several instruction sets (kernels_avx2.cpp) are looked at once, as the plain one.
 """
 import argparse
 import concurrent.futures
@@ -17,7 +15,6 @@ import sys
 import tempfile
 
 TOPS = ("runtime", "partition", "jobs", "precompute")
-TWIN = re.compile(r"_(avx2|avx512)\.cpp$")
 PLACE = re.compile(r"(.+?:\d+:\d+): (?:warning|error): (.+)")
 
 
@@ -26,7 +23,7 @@ def read_commands(source, build, folders):
     chosen = {}
     for entry in json.loads((build / "compile_commands.json").read_text()):
         path = pathlib.Path(entry["file"])
-        if not any(path.is_relative_to(source / folder) for folder in folders) or TWIN.search(path.name):
+        if not any(path.is_relative_to(source / folder) for folder in folders):
             continue
         words = shlex.split(entry["command"])
         words = words[1:] if pathlib.Path(words[0]).name == "ccache" else words

@@ -11,6 +11,9 @@ sys.path[:0] = [str(pathlib.Path(__file__).resolve().parent), str(pathlib.Path(_
 import charts
 import comparing
 import measuring
+import numpy
+import scipy.sparse
+import system
 from errors import RunError
 
 
@@ -84,6 +87,12 @@ class Measuring(unittest.TestCase):
     def test_different_numbers_of_frequencies_never_agree(self):
         self.assertEqual(comparing.compare_frequencies([100.0], [100.0, 200.0]), float("inf"))
         self.assertAlmostEqual(comparing.compare_frequencies([100.0, 200.2], [100.0, 200.0]), 0.001, 6)
+
+    def test_a_wrong_answer_is_found(self):
+        stiffness, mass = scipy.sparse.diags(numpy.arange(1.0, 9.0)), scipy.sparse.identity(8)
+        values, vectors = numpy.arange(1.0, 9.0), numpy.eye(8)
+        self.assertLess(max(map(numpy.max, system.measure_answer(stiffness, mass, values, vectors))), 1e-12)
+        self.assertAlmostEqual(system.measure_answer(stiffness, mass, values * 1.001, vectors)[0].max(), 1e-3 / 1.001, 9)
 
     def test_the_table_gives_ratios_to_ours(self):
         entry = {"wall_s": [1.0], "peak_bytes": 10**9, "modes": 7, "residual": 1e-9, "frequency_error": 0.0}

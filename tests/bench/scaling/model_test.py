@@ -9,6 +9,7 @@ import unittest
 sys.path[:0] = [str(pathlib.Path(__file__).resolve().parent)]
 import counting
 import fronts
+import messages
 import model
 
 BODY = model.Body(
@@ -62,6 +63,12 @@ class Model(unittest.TestCase):
         sizes = [self.here.calc_memory_bytes(p) - model.PROGRAM_BYTES for p in (1, 4, 64, 1024)]
         for many, few in zip(sizes[1:], sizes):
             self.assertLess(many, few / 2)
+
+
+class Messages(unittest.TestCase):
+    def test_functions_belong_to_phases(self):
+        names = ("carillon::error_bars::estimate_errors", "carillon::mesh::distribute(int)", "carillon::mesh::read_mesh", "main")
+        self.assertEqual([messages.find_phase([name]) for name in names], ["error bars", "partition", "read", "other"])
 
 
 class Tree(unittest.TestCase):

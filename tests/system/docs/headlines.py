@@ -100,7 +100,7 @@ def make_counts(page):
     t10, million = ({row[0]: row for row in read_rows(read_between(page, f"counts-{name}"), 14)} for name in ("t10", "million"))
     head = [
         "ranks",
-        "bunny of 102,730 nodes, T10: path",
+        "bunny of 106,471 nodes, T10: path",
         "fullest rank",
         "a million unknowns, T4: path",
         "fullest rank",

@@ -201,7 +201,7 @@ def slices(folder):
         check_bank(folder, "out.bank", body.expected, "slices")
     else:
         body.resume(2, "slices")
-    check(stops_made >= 2, "the run was stopped too seldom")
+    check(stops_made >= 3, "the run was stopped too seldom")
 
 
 def kills(folder):

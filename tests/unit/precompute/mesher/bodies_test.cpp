@@ -101,6 +101,16 @@ TEST(bodies, off_sphere_volume_convergence) {
   EXPECT_LT(last, 0.02);
 }
 
+TEST(bodies, announced_node_count) {
+  SurfaceReport report;
+  double announced = 0;
+  const auto m = mesh_surface({.surface = write_text("announced.off", to_off(make_box(0.1, 0.08, 0.06))), .edge_m = 0.01}, report,
+                              [&](std::string_view phase) {
+                                if (phase.starts_with("about ")) announced = std::stod(std::string(phase.substr(6)));
+                              });
+  EXPECT_NEAR(std::log2(announced / static_cast<double>(m.nodes_m.size())), 0.0, 1.0);
+}
+
 TEST(bodies, cube_edges_and_corners) {
   SurfaceReport report;
   const auto m = mesh_surface({.surface = write_text("cube.obj", to_obj(make_box(1, 1, 1))), .nodes = 3000}, report);

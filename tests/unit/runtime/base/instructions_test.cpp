@@ -33,6 +33,7 @@ TEST(Instructions, are_limited_by_the_environment) {
 TEST(Instructions, are_listed_ascending) {
   const std::vector<Instructions> sets = list_instructions();
   ASSERT_FALSE(sets.empty());
+  EXPECT_EQ(sets.front(), Instructions::kPlain);
   EXPECT_TRUE(std::is_sorted(sets.begin(), sets.end()));
   EXPECT_EQ(sets.back(), find_instructions());
 }

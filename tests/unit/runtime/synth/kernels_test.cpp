@@ -12,6 +12,8 @@
 #include <utility>
 #include <vector>
 
+#include "tests/support/instruction_sets.hpp"
+
 namespace carillon::synth {
 namespace {
 
@@ -84,6 +86,7 @@ const std::array<int, 12> kCounts{0, 1, 2, 3, 4, 7, 8, 15, 16, 17, 33, 160};
 TEST(Kernels, TheBestExists) {
   EXPECT_EQ(get_kernels(Isa::kBest).isa, base::find_instructions());
   for (const Isa isa : base::list_instructions()) EXPECT_EQ(get_kernels(isa).isa, isa);
+  tests::for_each_instruction_set([] { EXPECT_EQ(get_kernels(Isa::kBest).isa, base::find_instructions()); });
   EXPECT_STREQ(get_name(Isa::kAvx2), "avx2");
 }
 

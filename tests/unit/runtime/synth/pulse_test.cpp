@@ -58,6 +58,16 @@ TEST(Pulse, TheGaussianHasTheAreaTheMiddleAndTheVarianceOfTheHertzPulse) {
   EXPECT_NEAR(length, 8.0 * calc_reference_deviation() * tau, 1e-9);
 }
 
+TEST(Pulse, TheHertzPulseIs3And20DbDownWhereItShould) {
+  const auto calc_level_db = [](double cycles) {
+    const double at = 2.0 * std::numbers::pi * cycles;
+    return 20.0 *
+           std::log10(testing::integrate([=](double x) { return calc_pulse(PulseShape::kHertz, x) * std::cos(at * (x - 0.5)); }, 0.0, 1.0));
+  };
+  EXPECT_NEAR(calc_level_db(0.66), -3.0, 0.1);
+  EXPECT_NEAR(calc_level_db(1.48), -20.0, 0.3);
+}
+
 TEST(Pulse, TheGaussiansSpectrumIsGaussian) {
   for (const double omega_tau : {0.5, 3.0, 10.0, 20.0}) {
     const double length = calc_pulse_length(PulseShape::kGaussian, 1.0);

@@ -86,7 +86,8 @@ TEST(ResonatorBank, AnImpulseBetweenSamplesHasItsAnalyticPhase) {
 
 TEST(ResonatorBank, BothPulsesMatchQuadratureBeforeDuringAndAfter) {
   for (const PulseShape shape : {PulseShape::kHertz, PulseShape::kGaussian}) {
-    for (const auto& [freq, decay] : {std::pair{440.0, 3.0}, {5000.0, 30.0}, {19900.0, 100.0}, {3000.0, 18000.0}}) {
+    for (const auto& [freq, decay] :
+         {std::pair{440.0, 3.0}, {5000.0, 30.0}, {19900.0, 100.0}, {3000.0, 18000.0}, {1000.0, 7000.0}, {1000.0, 40000.0}}) {
       const bank::Bank bank = make_cube_bank({{freq, decay}});
       for (const double tau : {4e-6, 30e-6, 100e-6, 1.1e-3}) {
         ResonatorBank voice(make_model(bank));
@@ -244,6 +245,7 @@ TEST(ResonatorBank, TheDirectionOfTheImpulseIsKept) {
   };
   EXPECT_NEAR(first({1.0, 0.0, 0.0}), 1.0, 1e-6);
   EXPECT_EQ(first({0.0, 1.0, 1.0}), 0.0F);
+  EXPECT_EQ(first({0.0, 0.0, 0.0}), 0.0F);
   EXPECT_NEAR(first({0.6, 0.8, 0.0}), 0.6, 1e-6);
   EXPECT_EQ(first({-0.6, 0.8, 0.0}), -first({0.6, -0.8, 0.0}));
 }

@@ -15,6 +15,7 @@
 
 #include "precompute/simulation/transient/sheet_mesh.hpp"
 #include "runtime/base/error.hpp"
+#include "tests/support/instruction_sets.hpp"
 
 namespace carillon::transient {
 namespace {
@@ -74,31 +75,33 @@ std::vector<bool> mark(const SheetMesh& mesh, const std::string& set) {
 }
 
 TEST(Sheets, forces_against_energy_gradient) {
-  const SheetMesh mesh = make_rectangle(0.3, 0.2, 6, 0.02);
-  Sheet sheet(mesh, mark(mesh, "x-min"), make_law(0.01));
-  std::mt19937 random(7);
-  std::normal_distribution<double> draw(0.0, 3e-3);
-  for (std::int32_t n = 0; n < sheet.nodes; ++n) {
-    Quad& q = sheet.x[n];
-    q.x += draw(random);
-    if (!sheet.is_angle(n)) q.y += draw(random), q.z += draw(random);
-  }
-  const std::vector<Quad> forces = sheet.calc_forces();
-  double largest = 0, worst = 0;
-  for (std::int32_t n = 0; n < sheet.nodes; ++n)
-    for (int axis = 0; axis < (sheet.is_angle(n) ? 1 : 3); ++axis) {
-      double& value = (&sheet.x[n].x)[axis];
-      const double kept = value, step = 1e-6;
-      value = kept + step;
-      const double above = sheet.calc_energy();
-      value = kept - step;
-      const double below = sheet.calc_energy();
-      value = kept;
-      const double force = (&forces[n].x)[axis];
-      worst = std::max(worst, std::abs(force + (above - below) / (2 * step)));
-      largest = std::max(largest, std::abs(force));
+  tests::for_each_instruction_set([&] {
+    const SheetMesh mesh = make_rectangle(0.3, 0.2, 6, 0.02);
+    Sheet sheet(mesh, mark(mesh, "x-min"), make_law(0.01));
+    std::mt19937 random(7);
+    std::normal_distribution<double> draw(0.0, 3e-3);
+    for (std::int32_t n = 0; n < sheet.nodes; ++n) {
+      Quad& q = sheet.x[n];
+      q.x += draw(random);
+      if (!sheet.is_angle(n)) q.y += draw(random), q.z += draw(random);
     }
-  EXPECT_LT(worst, 1e-8 * largest);
+    const std::vector<Quad> forces = sheet.calc_forces();
+    double largest = 0, worst = 0;
+    for (std::int32_t n = 0; n < sheet.nodes; ++n)
+      for (int axis = 0; axis < (sheet.is_angle(n) ? 1 : 3); ++axis) {
+        double& value = (&sheet.x[n].x)[axis];
+        const double kept = value, step = 1e-6;
+        value = kept + step;
+        const double above = sheet.calc_energy();
+        value = kept - step;
+        const double below = sheet.calc_energy();
+        value = kept;
+        const double force = (&forces[n].x)[axis];
+        worst = std::max(worst, std::abs(force + (above - below) / (2 * step)));
+        largest = std::max(largest, std::abs(force));
+      }
+    EXPECT_LT(worst, 1e-8 * largest);
+  });
 }
 
 TEST(Sheets, rigid_motion) {
@@ -185,24 +188,26 @@ TEST(Sheets, kirchhoff_plate_frequencies) {
 
 // Stretched by e in one direction and free to contract in the other two: E of a plane strip, and the same force from a rate by alpha1.
 TEST(Sheets, membrane_stress_and_damping) {
-  const SheetMesh mesh = make_rectangle(0.2, 0.1, 4);
-  const double alpha1 = 1e-5, strain = 1e-7, rate = 1e-2;
-  Sheet sheet(mesh, mark(mesh, ""), make_law(0.002, alpha1));
-  for (std::int32_t n = 0; n < sheet.elements.vertices; ++n) {
-    const Vec3& r = sheet.elements.rest_m[n];
-    sheet.set(n, {r[0] * (1 + strain), r[1] * (1 - kPoisson * strain), 0});
-    sheet.v[n] = {rate * r[0], -kPoisson * rate * r[1], 0, 0};
-  }
-  sheet.calc_forces({0.5e-6, 0.5e-6, 1e-6});
-  double pull = 0;
-  for (const std::int32_t n : mesh.node_sets.at("x-max")) pull -= sheet.f[n].x;
-  const double section = 0.1 * 0.002, expected = kYoung * section * (strain + alpha1 * rate);
-  EXPECT_NEAR(pull, expected, 1e-5 * expected);
-  // The same again: two halves of the work of a step of 1e-6 s, and the first half of the next.
-  sheet.calc_forces({0.5e-6, 0.5e-6, 1e-6});
-  double spent = 0;
-  for (std::size_t k = 0; k < sheet.sheets->count(); ++k) spent += sheet.sheets->get_spent(k);
-  EXPECT_NEAR(spent, 1.5e-6 * kYoung * alpha1 * rate * rate * section * 0.2, 1e-5 * spent);
+  tests::for_each_instruction_set([&] {
+    const SheetMesh mesh = make_rectangle(0.2, 0.1, 4);
+    const double alpha1 = 1e-5, strain = 1e-7, rate = 1e-2;
+    Sheet sheet(mesh, mark(mesh, ""), make_law(0.002, alpha1));
+    for (std::int32_t n = 0; n < sheet.elements.vertices; ++n) {
+      const Vec3& r = sheet.elements.rest_m[n];
+      sheet.set(n, {r[0] * (1 + strain), r[1] * (1 - kPoisson * strain), 0});
+      sheet.v[n] = {rate * r[0], -kPoisson * rate * r[1], 0, 0};
+    }
+    sheet.calc_forces({0.5e-6, 0.5e-6, 1e-6});
+    double pull = 0;
+    for (const std::int32_t n : mesh.node_sets.at("x-max")) pull -= sheet.f[n].x;
+    const double section = 0.1 * 0.002, expected = kYoung * section * (strain + alpha1 * rate);
+    EXPECT_NEAR(pull, expected, 1e-5 * expected);
+    // The same again: two halves of the work of a step of 1e-6 s, and the first half of the next.
+    sheet.calc_forces({0.5e-6, 0.5e-6, 1e-6});
+    double spent = 0;
+    for (std::size_t k = 0; k < sheet.sheets->count(); ++k) spent += sheet.sheets->get_spent(k);
+    EXPECT_NEAR(spent, 1.5e-6 * kYoung * alpha1 * rate * rate * section * 0.2, 1e-5 * spent);
+  });
 }
 
 TEST(SheetMesh, refusals) {
