@@ -5,7 +5,8 @@
 
 namespace carillon::base {
 
-/// Blocks all signals of this thread during its lifetime; they are delivered afterwards.
+/// Blocks all signals of this thread during its lifetime; they are delivered afterwards. Signals of the process still end it if another
+/// thread does not block them.
 class SignalPause {
  public:
   SignalPause() {

@@ -41,7 +41,8 @@ struct Slot {
 std::array<Slot, kMaxFolders> slots;
 std::array<std::atomic<pid_t>, kMaxChildren> children{};
 std::atomic<int> folder_count{0};
-static_assert(std::atomic<int>::is_always_lock_free && std::atomic<pid_t>::is_always_lock_free,
+std::atomic<bool> is_ending{false};  // a handler has begun: no further folders
+static_assert(std::atomic<int>::is_always_lock_free && std::atomic<pid_t>::is_always_lock_free && std::atomic<bool>::is_always_lock_free,
               "Signal handlers require lock-free atomics.");
 
 void handle(int signal) {
@@ -105,8 +106,21 @@ bool remove_by_rm(const char* folder) {
   return child > 0 && status == 0;
 }
 
+/// A free slot, now changing; null if the table is full. Under SignalPause: the handler of another thread waits for the change.
+Slot* claim_slot() {
+  for (Slot& slot : slots) {
+    int expected = 0;
+    if (!slot.state.compare_exchange_strong(expected, 1)) continue;
+    if (!is_ending.load()) return &slot;
+    slot.state.store(0);
+    for (;;) ::pause();  // another thread ends the process
+  }
+  return nullptr;
+}
+
 /// Removes a folder from the handler's table.
 void release(Slot& slot) {
+  const SignalPause pause;
   slot.state.store(1);
   if (slot.lock >= 0) ::close(slot.lock);
   slot.lock = -1;
@@ -118,23 +132,27 @@ void release(Slot& slot) {
 
 fs::path make_temporary_folder(const fs::path& parent, const std::string& begin) {
   sweep(parent, begin);
-  const SignalPause pause;  // until the folder is in the table of the handler
   std::string path = (parent / (begin + kLetters)).string();
-  if (path.size() >= kMaxPath || ::mkdtemp(path.data()) == nullptr)
-    throw_system_error(errno, fmt::format("{}: no temporary folder can be made here: {}; make room there, or name another place (temporary "
-                                          "files: TMPDIR)",
-                                          find_name(path), std::strerror(errno)));
+  // Another thread, such as one of MPI, may take a signal at any time: handler and slot come before the folder.
+  const SignalPause pause;
   if (folder_count.fetch_add(1) == 0) set_handlers(true);
-  for (Slot& slot : slots) {
-    int expected = 0;
-    if (!slot.state.compare_exchange_strong(expected, 1)) continue;
-    std::memcpy(slot.path.data(), path.c_str(), path.size() + 1);
-    slot.lock = ::open((path + "/" + kMark).c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
-    if (slot.lock >= 0) (void)::flock(slot.lock, LOCK_EX | LOCK_NB);
-    slot.state.store(2);
+  Slot* slot = claim_slot();
+  if (path.size() >= kMaxPath || ::mkdtemp(path.data()) == nullptr) {
+    const int error = path.size() >= kMaxPath ? ENAMETOOLONG : errno;
+    if (slot != nullptr) slot->state.store(0);
+    if (folder_count.fetch_sub(1) == 1) set_handlers(false);
+    throw_system_error(error, fmt::format("{}: no temporary folder can be made here: {}; make room there, or name another place (temporary "
+                                          "files: TMPDIR)",
+                                          find_name(path), std::strerror(error)));
+  }
+  if (slot == nullptr) {  // table full: removed only by the destructor
+    folder_count.fetch_sub(1);
     return path;
   }
-  folder_count.fetch_sub(1);  // table full: removed only by the destructor
+  std::memcpy(slot->path.data(), path.c_str(), path.size() + 1);
+  slot->lock = ::open((path + "/" + kMark).c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+  if (slot->lock >= 0) (void)::flock(slot->lock, LOCK_EX | LOCK_NB);
+  slot->state.store(2);
   return path;
 }
 
@@ -171,6 +189,7 @@ void forget_child(pid_t child) noexcept {
 }
 
 void end_children_and_temporaries() noexcept {
+  is_ending.store(true);
   for (const int signal : {SIGTERM, SIGKILL}) {
     for (std::atomic<pid_t>& slot : children)
       if (const pid_t child = slot.load(); child > 0) ::kill(child, signal);
@@ -190,6 +209,7 @@ void end_children_and_temporaries() noexcept {
     }
   }
   for (Slot& slot : slots) {
+    for (int waited_ms = 0; slot.state.load() == 1 && waited_ms < kPatienceMs; ++waited_ms) ::poll(nullptr, 0, 1);
     if (slot.state.load() != 2) continue;
     // Grandchildren such as a shell's mkdir may outlive the child briefly: rm then finds a folder that is not empty.
     for (int waited_ms = 0; !remove_by_rm(slot.path.data()) && waited_ms < kPatienceMs; waited_ms += kStepMs) ::poll(nullptr, 0, kStepMs);

@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <thread>
 
 #include "runtime/base/command.hpp"
 
@@ -71,6 +72,29 @@ TEST_F(Temporary, ends_with_its_scope_unless_kept) {
   keep_temporary_folder(kept);
   (void)TemporaryFolder(parent_, ".page.");
   EXPECT_EQ(std::distance(fs::directory_iterator(kept), fs::directory_iterator()), 1);  // without the lock file
+}
+
+TEST_F(Temporary, is_removed_after_a_signal_to_a_second_thread) {
+  for (int k = 0; k < 200; ++k) {
+    int ready[2];
+    ASSERT_EQ(::pipe(ready), 0);
+    const pid_t child = ::fork();
+    if (child == 0) {
+      std::thread([] {
+        for (;;) ::pause();
+      }).detach();
+      (void)!::write(ready[1], "1", 1);
+      for (;;) TemporaryFolder(parent_, ".page.");
+    }
+    char got = 0;
+    ASSERT_EQ(::read(ready[0], &got, 1), 1);
+    ::close(ready[0]);
+    ::close(ready[1]);
+    ::usleep(7 * k);
+    ::kill(child, SIGTERM);
+    ASSERT_EQ(::waitpid(child, nullptr, 0), child);
+    ASSERT_TRUE(is_empty()) << k;
+  }
 }
 
 TEST_F(Temporary, is_removed_after_a_signal) {
