@@ -248,7 +248,7 @@ void check_writable(const fs::path& file, std::string_view what) {
     }
   }
   // A nameless file leaves nothing behind, whenever the program is ended.
-  if (const Descriptor nameless(::open(folder.c_str(), O_WRONLY | O_TMPFILE | O_CLOEXEC, 0600)); nameless.get() >= 0) return;
+  if (const Descriptor nameless(open_nameless(folder)); nameless.get() >= 0) return;
   ::unlink(probe.c_str());  // left by a killed process of the same PID; O_EXCL follows no planted link
   const SignalPause pause;
   const Descriptor fd(::open(probe.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600));

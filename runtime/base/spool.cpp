@@ -8,6 +8,8 @@
 #include <cstring>
 #include <utility>
 
+#include "runtime/base/signal_pause.hpp"
+
 namespace carillon::base {
 namespace {
 
@@ -16,6 +18,7 @@ int open_unlinked(const std::filesystem::path& folder) {
   const int descriptor = ::open(folder.c_str(), O_RDWR | O_TMPFILE | O_CLOEXEC, 0600);
   if (descriptor >= 0) return descriptor;
   // File systems without nameless files (NFS): create and unlink.
+  const SignalPause pause;
   std::string name = (folder / ".carillon-spool-XXXXXX").string();
   const int named = ::mkostemp(name.data(), O_CLOEXEC);
   if (named >= 0) ::unlink(name.c_str());
