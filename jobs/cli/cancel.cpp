@@ -47,7 +47,6 @@ int run_cancel(Shared& shared, const CancelOptions& options) {
 }
 
 int run_retry(Shared& shared, const RetryOptions& options) {
-  if (options.resources.engine == "slurm") check_slurm();
   shared.settle();
   if (options.words.empty() && !options.all_failed)
     throw InputError("no job given; give an id or a job file, or --failed for all failed jobs");
@@ -55,16 +54,21 @@ int run_retry(Shared& shared, const RetryOptions& options) {
   if (options.all_failed) {
     for (registry::Job& job : shared.registry().list({registry::JobState::failed})) jobs.push_back(std::move(job));
   }
+  const auto will_be_in_slurm = [&](registry::Job job) {
+    options.resources.apply(job);
+    return job.engine == store::JobEngine::slurm;
+  };
+  if (std::any_of(jobs.begin(), jobs.end(), will_be_in_slurm)) check_slurm();
   std::optional<store::Lock> lock = shared.store().lock_shared();  // gc waits
   const int code = do_to_all(shared, jobs, [&](const registry::Job& job) {
     return queue::retry(shared.store(), shared.registry(), job.id, [&](registry::Job& row) { options.resources.apply(row); });
   });
   lock.reset();
-  const auto is_for_slurm = [&](const registry::Job& job) {
+  const auto is_in_slurm = [&](const registry::Job& job) {
     const auto row = shared.registry().find(job.id);
     return row && row->engine == store::JobEngine::slurm;
   };
-  if (std::any_of(jobs.begin(), jobs.end(), is_for_slurm)) hand_over_to_slurm(shared);
+  if (std::any_of(jobs.begin(), jobs.end(), is_in_slurm)) hand_over_to_slurm(shared);
   return code;
 }
 

@@ -42,7 +42,7 @@ Profile read_profile(const std::string& option) {
     if (entry.object) throw InputError(entry.place + ": \"mpirun_options\" is a list of arguments of mpirun");
     profile.mpirun_options.push_back(entry.text);
   }
-  profile.slurm = slurm::read_settings(root.object_if("slurm"));
+  profile.slurm = queue::read_slurm_settings(root.object_if("slurm"));
   profile.slurm.mpirun_options = profile.mpirun_options;
   root.finish();
   return profile;

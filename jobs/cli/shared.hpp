@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "jobs/queue/slurm/settings.hpp"
+#include "jobs/queue/slurm_settings.hpp"
 #include "jobs/store/registry/registry.hpp"
 #include "jobs/store/store.hpp"
 #include "runtime/base/error.hpp"
@@ -28,7 +28,7 @@ struct Profile {
   std::filesystem::path file;                         // empty: none
   std::filesystem::path store;                        // "store"
   store::JobEngine engine = store::JobEngine::local;  // "on"
-  slurm::Settings slurm;                              // "slurm"
+  queue::SlurmSettings slurm;                         // "slurm"
   std::vector<std::string> mpirun_options;            // arguments of mpirun, here and in Slurm
 };
 

@@ -24,8 +24,8 @@ using registry::JobState;
 
 constexpr long kStepNs = 200'000'000;
 
-slurm::Settings find_settings(Shared& shared) {
-  slurm::Settings settings = shared.profile().slurm;
+queue::SlurmSettings find_settings(Shared& shared) {
+  queue::SlurmSettings settings = shared.profile().slurm;
   settings.has_pictures = settings.has_pictures || shared.has_pictures;
   return settings;
 }

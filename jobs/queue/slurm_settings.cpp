@@ -1,8 +1,8 @@
-#include "jobs/queue/slurm/settings.hpp"
+#include "jobs/queue/slurm_settings.hpp"
 
 #include <optional>
 
-namespace carillon::slurm {
+namespace carillon::queue {
 namespace {
 
 constexpr std::size_t kMaxWords = 100;
@@ -18,8 +18,8 @@ std::vector<std::string> read_texts(base::Object& object, std::string_view key) 
 
 }  // namespace
 
-Settings read_settings(std::optional<base::Object> object) {
-  Settings settings;
+SlurmSettings read_slurm_settings(std::optional<base::Object> object) {
+  SlurmSettings settings;
   if (!object) return settings;
   settings.partition = object->string_or("partition", settings.partition);
   settings.account = object->string_or("account", settings.account);
@@ -42,4 +42,4 @@ Settings read_settings(std::optional<base::Object> object) {
   return settings;
 }
 
-}  // namespace carillon::slurm
+}  // namespace carillon::queue

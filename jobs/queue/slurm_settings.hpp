@@ -7,9 +7,9 @@
 
 #include "runtime/base/document.hpp"
 
-namespace carillon::slurm {
+namespace carillon::queue {
 
-struct Settings {
+struct SlurmSettings {
   std::string partition, account, qos;      // empty: default of Slurm
   std::string launcher = "mpirun";          // or "srun": starts the ranks inside the allocation
   double signal_before_s = 120.0;           // time of the signal to save before the time limit
@@ -28,6 +28,6 @@ struct Settings {
 };
 
 /// InputError "file:line: ...". Without `object` all defaults.
-Settings read_settings(std::optional<base::Object> object);
+SlurmSettings read_slurm_settings(std::optional<base::Object> object);
 
-}  // namespace carillon::slurm
+}  // namespace carillon::queue

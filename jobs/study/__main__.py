@@ -17,7 +17,7 @@ import programs
 import report
 import scaling
 import work
-from errors import InputError, RunError, printable
+from errors import InputError, Parser, RunError, printable
 
 VERSION = "unknown"  # set by the build
 
@@ -40,11 +40,6 @@ def read_count(text):
     if len(numbers) != 1:
         raise argparse.ArgumentTypeError(f"{text!r}: give one number")
     return numbers[0]
-
-
-class Parser(argparse.ArgumentParser):
-    def error(self, message):
-        raise InputError(f"{message}; {self.prog} see --help")
 
 
 def make_parser():

@@ -1,4 +1,5 @@
 """Errors of a study and their exit codes."""
+import argparse
 import unicodedata
 
 
@@ -12,6 +13,13 @@ class RunError(Exception):
     def __init__(self, code, text, possible_nodes=None):
         super().__init__(text)
         self.code, self.possible_nodes = code, possible_nodes
+
+
+class Parser(argparse.ArgumentParser):
+    """Bad arguments raise InputError: one line, like all other errors."""
+
+    def error(self, message):
+        raise InputError(f"{message}; see {self.prog} --help")
 
 
 def printable(text):

@@ -237,7 +237,6 @@ PUBLIC = {
         "slurm/engine.hpp",
         "slurm/inside.hpp",
         "slurm/needs.hpp",
-        "slurm/settings.hpp",
         "slurm/task.hpp",
     ],
 }
@@ -259,7 +258,6 @@ FACES = {
     "jobs/front/explore/names.hpp",
     "jobs/front/explore/serve.hpp",
     "jobs/queue/slurm/inside.hpp",
-    "jobs/queue/slurm/settings.hpp",
     "jobs/queue/slurm/task.hpp",
 }
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')

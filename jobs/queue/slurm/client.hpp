@@ -9,7 +9,7 @@
 
 #include "jobs/queue/slurm/packing.hpp"
 #include "jobs/queue/slurm/script.hpp"
-#include "jobs/queue/slurm/settings.hpp"
+#include "jobs/queue/slurm_settings.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::slurm {
@@ -35,8 +35,8 @@ struct SlurmStatus {
 /// refuses.
 class SlurmClient {
  public:
-  explicit SlurmClient(Settings settings) : settings_(std::move(settings)) {}
-  const Settings& settings() const { return settings_; }
+  explicit SlurmClient(queue::SlurmSettings settings) : settings_(std::move(settings)) {}
+  const queue::SlurmSettings& settings() const { return settings_; }
 
   /// Submits a batch; returns the number of the job. Unreachable; SystemError "Slurm refuses ...: reason".
   std::string submit(const Batch& batch) const;
@@ -64,7 +64,7 @@ class SlurmClient {
   int find_max_tasks() const;
 
  private:
-  Settings settings_;
+  queue::SlurmSettings settings_;
 };
 
 /// "123_4" and "123_4.7" -> "123".

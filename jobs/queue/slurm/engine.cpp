@@ -71,7 +71,7 @@ store::Resources find_asked(const fs::path& work) {
   }
 }
 
-bool may_pack(const Needs& needs, const Machine& machine, const Settings& settings) {
+bool may_pack(const Needs& needs, const Machine& machine, const queue::SlurmSettings& settings) {
   const int ranks = std::max(1, needs.pack.ranks);
   if (!needs.is_short || ranks > machine.cores || (ranks > 1 && settings.launcher == "srun")) return false;
   return machine.memory_gb <= 0.0 || needs.pack.memory_gb.empty() || needs.pack.memory_gb.back() <= machine.memory_gb;
@@ -85,7 +85,7 @@ bool has_ready(const registry::Registry& registry) {
 
 }  // namespace
 
-Engine::Engine(const store::Store& store, Settings settings, fs::path program, std::function<void(const std::string&)> say)
+Engine::Engine(const store::Store& store, queue::SlurmSettings settings, fs::path program, std::function<void(const std::string&)> say)
     : store_(store), client_(std::move(settings)), program_(std::move(program)), say_(std::move(say)) {
   if (!client_.settings().program.empty()) program_ = client_.settings().program;
 }
@@ -166,7 +166,7 @@ void Engine::submit_packed(registry::Registry& registry, const Machine& machine,
                            Rows& changed) {
   std::vector<PackJob> shapes;
   for (const Needs& need : needs) shapes.push_back(need.pack);
-  const Settings& settings = client_.settings();
+  const queue::SlurmSettings& settings = client_.settings();
   PackTerms terms;
   terms.longest_s = std::max(1.0, 60.0 * settings.pack_minutes);
   terms.max_tasks = max_tasks;

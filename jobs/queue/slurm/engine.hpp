@@ -13,7 +13,7 @@
 #include "jobs/queue/slurm/client.hpp"
 #include "jobs/queue/slurm/needs.hpp"
 #include "jobs/queue/slurm/records.hpp"
-#include "jobs/queue/slurm/settings.hpp"
+#include "jobs/queue/slurm_settings.hpp"
 #include "jobs/store/outcome/outcome.hpp"
 #include "jobs/store/registry/registry.hpp"
 #include "jobs/store/store.hpp"
@@ -28,7 +28,8 @@ class Engine {
   using FindNeeds = std::function<Needs(const registry::Job&)>;
 
   /// `program`: path of carillon, unless set in the settings. `say`: messages about Slurm itself.
-  Engine(const store::Store& store, Settings settings, std::filesystem::path program, std::function<void(const std::string&)> say);
+  Engine(const store::Store& store, queue::SlurmSettings settings, std::filesystem::path program,
+         std::function<void(const std::string&)> say);
 
   /// Submits all ready jobs: short jobs packed into the tasks of one array (packing.hpp), others with equal resources in one array. Refused
   /// jobs fail with the reason; if Slurm does not answer, jobs stay queued. Returns accepted and refused rows. Call follow() first.

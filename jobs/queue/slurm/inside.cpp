@@ -34,7 +34,7 @@ int end_attempt(const std::filesystem::path& work, int exit_code) {
   if (job == nullptr || exit_code != kExitCheckpointed) return exit_code;
   const std::optional<outcome::Outcome> left = outcome::read_outcome(work);
   if (!left || is_for_outside(left->cause)) return exit_code;
-  const SlurmClient client{Settings{}};
+  const SlurmClient client{queue::SlurmSettings{}};
   const int failures = read_failures(work);
   try {
     if (!client.is_running(job)) return exit_code;

@@ -32,7 +32,8 @@ double find_charged(const queue::Need& need, int ranks) {
 
 }  // namespace
 
-Needs find_needs(const store::Store& store, const registry::Job& job, const Settings& settings, const std::filesystem::path& program) {
+Needs find_needs(const store::Store& store, const registry::Job& job, const queue::SlurmSettings& settings,
+                 const std::filesystem::path& program) {
   queue::JobNeeds needs = queue::find_needs(store, job);
   if (needs.wants_prediction) {
     predict(store, job, needs.need, program);

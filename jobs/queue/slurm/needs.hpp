@@ -4,7 +4,7 @@
 #include <filesystem>
 
 #include "jobs/queue/slurm/packing.hpp"
-#include "jobs/queue/slurm/settings.hpp"
+#include "jobs/queue/slurm_settings.hpp"
 #include "jobs/store/registry/registry.hpp"
 #include "jobs/store/store.hpp"
 
@@ -21,6 +21,7 @@ struct Needs {
 
 /// As requested by the job; else ranks from the predicted time on one rank (at most settings.max_ranks), memory as predicted for them.
 /// Large jobs are predicted by `program` attempt --predict on this host; if that fails the estimate is used.
-Needs find_needs(const store::Store& store, const registry::Job& job, const Settings& settings, const std::filesystem::path& program);
+Needs find_needs(const store::Store& store, const registry::Job& job, const queue::SlurmSettings& settings,
+                 const std::filesystem::path& program);
 
 }  // namespace carillon::slurm

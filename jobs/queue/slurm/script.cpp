@@ -50,7 +50,7 @@ std::string escape_pattern(const std::string& path) {
 long long round_up(double value) { return static_cast<long long>(std::ceil(value)); }
 
 /// At most half of the time limit.
-long long calc_signal_s(const Batch& batch, const Settings& settings) {
+long long calc_signal_s(const Batch& batch, const queue::SlurmSettings& settings) {
   const double max_s = batch.time_limit_s > 0.0 ? batch.time_limit_s / 2.0 : settings.signal_before_s;
   return std::max(1LL, round_up(std::min(settings.signal_before_s, max_s)));
 }
@@ -70,7 +70,7 @@ std::string quote_word(std::string_view word) {
   return result + "'";
 }
 
-std::string make_script(const Batch& batch, const Settings& settings) {
+std::string make_script(const Batch& batch, const queue::SlurmSettings& settings) {
   std::string prologue, folders, options;
   for (const std::string& line : settings.prologue) prologue += line + "\n";
   for (const std::string& word : settings.mpirun_options) options += " --mpirun-option=" + quote_word(word);
@@ -88,7 +88,7 @@ std::string make_script(const Batch& batch, const Settings& settings) {
                                                            {"@OPTIONS@", options}});
 }
 
-std::vector<std::string> make_sbatch(const Batch& batch, const Settings& settings) {
+std::vector<std::string> make_sbatch(const Batch& batch, const queue::SlurmSettings& settings) {
   std::vector<std::string> words{"sbatch"};
   words.insert(words.end(), settings.options.begin(), settings.options.end());
   const auto add = [&](std::string word) { words.push_back(std::move(word)); };

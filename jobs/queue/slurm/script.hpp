@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "jobs/queue/slurm/settings.hpp"
+#include "jobs/queue/slurm_settings.hpp"
 
 namespace carillon::slurm {
 
@@ -31,10 +31,10 @@ struct Batch {
 /// Quotes a word for a shell. InputError for newlines and zero bytes.
 std::string quote_word(std::string_view word);
 
-std::string make_script(const Batch& batch, const Settings& settings);
+std::string make_script(const Batch& batch, const queue::SlurmSettings& settings);
 
 /// sbatch with options; its input is the script. InputError for a store path with a backslash.
-std::vector<std::string> make_sbatch(const Batch& batch, const Settings& settings);
+std::vector<std::string> make_sbatch(const Batch& batch, const queue::SlurmSettings& settings);
 
 /// File with Slurm's output of a task (of a single job: 0).
 std::filesystem::path make_output_file(const std::filesystem::path& root, const std::string& batch, int task);

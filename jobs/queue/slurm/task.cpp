@@ -175,7 +175,7 @@ class TaskRunner {
     const char* number = std::getenv("SLURM_JOB_ID");
     if (number == nullptr) return kExitCheckpointed;
     try {
-      const SlurmClient client{Settings{}};
+      const SlurmClient client{queue::SlurmSettings{}};
       if (client.is_running(number)) client.requeue(number, 0.0);
     } catch (const SystemError& error) {
       fmt::print(stderr, "carillon task: {}\n", error.what());

@@ -68,6 +68,13 @@ with tempfile.TemporaryDirectory() as scratch:
         file = write("bar.json", BAR)
         expect_refusal("SLURM", BIN / "carillon", *store, "submit", "--on", "slurm", file)
         expect_refusal("SLURM", BIN / "carillon", *store, "run", "--on", "slurm")
+        subprocess.run([BIN / "carillon", *store, "submit", file], cwd=folder, check=True, capture_output=True)
+        subprocess.run([BIN / "carillon", *store, "cancel", file], cwd=folder, check=True, capture_output=True)
+        expect_refusal("SLURM", BIN / "carillon", *store, "retry", "--on", "slurm", file)
+        words = [BIN / "carillon", *store, "status", "--json"]
+        listed = subprocess.run(words, cwd=folder, check=True, capture_output=True, text=True).stdout
+        if [job["state"] for job in json.loads(listed)["jobs"]] != ["cancelled"]:
+            faults.append(f"SLURM: a refused retry queued the job: {listed}")
     if "HEADS" in OFF:
         expect_refusal("HEADS", BIN / "carillon-render", write("scene.json", SCENE), "-o", "sound.wav")
     if "STUDIES" in OFF:

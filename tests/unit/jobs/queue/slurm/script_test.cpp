@@ -57,7 +57,7 @@ TEST(slurm_script, each_task_takes_its_own_folder) {
   Batch batch = make_batch(root, {"ab/ab1", "cd/cd2", "ef/ef3"});
   batch.ranks = 3;
   batch.memory_gb = 1.5;
-  Settings settings;
+  queue::SlurmSettings settings;
   settings.prologue = {"echo 'before all'", "GREETING=hello; export GREETING"};
   const std::string script = make_script(batch, settings);
   for (int task = 0; task < 3; ++task) {
@@ -75,7 +75,7 @@ TEST(slurm_script, options_say_what_the_job_needs) {
   batch.ranks = 4;
   batch.memory_gb = 1.0;
   batch.time_limit_s = 90.0;
-  Settings settings;
+  queue::SlurmSettings settings;
   settings.partition = "long; rm -rf /";
   settings.options = {"--constraint=zen3", "--nodes=1"};
   const std::vector<std::string> words = make_sbatch(batch, settings);
@@ -96,7 +96,7 @@ TEST(slurm_script, a_packed_array_has_tasks_of_one_node_that_run_their_own_lists
   batch.tasks = 3;
   batch.ranks = 64;
   batch.memory_gb = 128.0;
-  Settings settings;
+  queue::SlurmSettings settings;
   settings.has_pictures = true;
   const Finished finished = run_command({"/usr/bin/env", "SLURM_ARRAY_TASK_ID=2", "/bin/sh"}, make_script(batch, settings));
   EXPECT_EQ(finished.errors, "");
@@ -109,7 +109,7 @@ TEST(slurm_script, a_packed_array_has_tasks_of_one_node_that_run_their_own_lists
 }
 
 TEST(slurm_script, more_jobs_are_an_array) {
-  Settings settings;
+  queue::SlurmSettings settings;
   settings.max_running = 5;
   const std::vector<std::string> words = make_sbatch(make_batch("/st%re", {"ab/ab1", "cd/cd2", "ef/ef3"}), settings);
   EXPECT_TRUE(has(words, "--array=0-2%5"));
