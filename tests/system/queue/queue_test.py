@@ -231,7 +231,6 @@ def hang(service):
         [service.bin / "carillon", "attempt", work, "--ranks", "2", "--hang-s", "3"], stderr=subprocess.DEVNULL
     ) as attempt:
         service.wait_for("two ranks", lambda: len(service.processes()["rank"]) == 2)
-        time.sleep(1)
         service.kill(service.processes()["rank"][0], signal.SIGSTOP)
         check(attempt.wait(timeout=60) == 85, f"exit code {attempt.returncode}")
     outcome = json.loads((work / "outcome.json").read_text())
