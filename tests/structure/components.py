@@ -45,7 +45,7 @@ def update(page, source):
     return CORE.sub(lambda row: row[0].replace(f"| {row[1]} |", f"| {round(lines[None], -1):,} |"), page)
 
 
-def find_compiled(build):
+def find_compiled(source, build):
     """Sources of OFF components in the build: compiled alone, or in a unit that includes them."""
     cache = (build / "CMakeCache.txt").read_text()
     off = {name for name in COMPONENTS if re.search(rf"^CARILLON_{name}:BOOL=OFF$", cache, re.M)}
@@ -53,7 +53,9 @@ def find_compiled(build):
     for command in json.loads((build / "compile_commands.json").read_text()):
         file = pathlib.Path(command["file"])
         names = re.findall(r'^#include "(.+)"', file.read_text(), re.M) if build / "units" in file.parents else [str(file)]
-        sources |= {match[0] for name in names if (match := re.search(r"\b(runtime|precompute|jobs)/(?!units/).+", name))}
+        for path in map(pathlib.Path, names):
+            root = next((root for root in (build, source) if root in path.parents), pathlib.Path())  # the build has generated sources
+            sources.add(str(path.relative_to(root)))
     return [
         f"{path} is compiled without {find_component(path)}"
         for path in sorted(sources)
@@ -65,7 +67,7 @@ def main():
     source = pathlib.Path(sys.argv[1])
     path = source / "docs/components.md"
     if sys.argv[2:3] == ["--built"]:
-        faults = find_compiled(pathlib.Path(sys.argv[3]))
+        faults = find_compiled(source.resolve(), pathlib.Path(sys.argv[3]).resolve())
     else:
         if sys.argv[2:] == ["--update"]:
             path.write_text(update(path.read_text(), source))

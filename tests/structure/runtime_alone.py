@@ -20,6 +20,7 @@ import tempfile
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "support"))
 import ctest
+import namespaces
 
 HIDDEN = re.compile(
     r"^(libopenmpi|openmpi|mpi-default|libpetsc|petsc|libslepc|slepc|libmetis|libmumps|libptscotch|libscotch|libscalapack|libhypre|"
@@ -187,15 +188,13 @@ def main():
         return test_hidden(source, build, work, None if from_nothing else pathlib.Path(os.environ["CARILLON_INSIDE"]))
     shutil.rmtree(work, ignore_errors=True)
     work.mkdir(parents=True)
-    flags = ["-m"] if os.geteuid() == 0 else ["-r", "-m"]
+    namespace = namespaces.find_mount_namespace()
     try:
-        if subprocess.run(["unshare", *flags, "true"], capture_output=True).returncode != 0:
+        if not namespace:
             print("no mount namespace can be made here: building in plain sight, and looking at what was read and what is loaded")
             return build_and_test(source, work)
         with tempfile.TemporaryDirectory(prefix="carillon-whole-") as whole:
-            return subprocess.run(
-                ["unshare", *flags, "--propagation", "private", sys.executable, *sys.argv], env={**os.environ, "CARILLON_INSIDE": whole}
-            ).returncode
+            return subprocess.run([*namespace, sys.executable, *sys.argv], env={**os.environ, "CARILLON_INSIDE": whole}).returncode
     finally:
         shutil.rmtree(work, ignore_errors=True)
 
