@@ -281,14 +281,29 @@ function(carillon_test_program name)
   carillon_warnings(test_${name})
 endfunction()
 
+# In carillon_test(): the test NAME.SUFFIX of these cases; with RANKS on the first number of them.
+macro(carillon_test_of_cases suffix cases_of_it labels_of_it)
+  string(REPLACE ";" "," only "${cases_of_it}")
+  set(mpi)
+  if(arg_RANKS)
+    list(GET arg_RANKS 0 ranks)
+    carillon_mpi_command(mpi ${ranks})
+  endif()
+  add_test(NAME ${name}.${suffix} COMMAND ${mpi} $<TARGET_FILE:test_${arg_PROGRAM}> --sources=${chosen} --only=${only} --gtest_brief=1)
+  set_tests_properties(${name}.${suffix} PROPERTIES TIMEOUT ${limit} COST ${arg_TIMEOUT} LABELS "${labels_of_it}")
+  if(arg_RANKS)
+    carillon_set_ranks(${name}.${suffix} ${ranks})
+  endif()
+endmacro()
+
 # carillon_test(NAME SOURCES ... LINK libs... [RANKS 1 2 3] [PROGRAM p] [LABELS ...] [COMPONENTS ...] [TIMEOUT s] [PART part]
 # [SLOW Suite.Case ...] [COMPONENT_CASES name Suite.Case ... name Suite.Case ...])
 # GoogleTest cases of one module, in test_PROGRAM with those of others (CARILLON_TEST_PROGRAM, the program of the folder, where not given), and
 # one CTest test: NAME, or with RANKS those of test_ranks under mpirun, NAME.npN. One process for all cases: to start one that loads PETSc
 # takes longer than most cases. SEPARATE: names in the sources' unnamed namespaces are equal, so each is compiled alone. A case alone:
 # GTEST_FILTER=Suite.Case ctest -R '^NAME$'.
-# SLOW: these cases are a test of their own, NAME.slow, in part slow. COMPONENT_CASES: those after the name of a component, or of several
-# joined by commas, need it, and are the test NAME.COMPONENT.
+# SLOW: these cases are a test of their own, NAME.slow, in part slow, on the first number of ranks. COMPONENT_CASES: those after the name of
+# a component, or of several joined by commas, need it, and are the test NAME.COMPONENT.
 # COMPONENTS: those that it needs (Components.cmake), with those of the folder, CARILLON_TEST_COMPONENTS: without them there is no test.
 # Labels: CARILLON_TEST_KIND, the kind of the folder; component.NAME; the part (docs/howto/test.md), basic where not given, where ranks are other than 2
 # `ranks`. Every test has a TIMEOUT (carillon_limit_time), which is its COST, too: CTest takes the longest first.
@@ -328,21 +343,21 @@ function(carillon_test name)
   list(JOIN chosen "," chosen)
   list(PREPEND labels ${CARILLON_TEST_KIND} ${arg_LABELS})
   set(cases --sources=${chosen})
+  if(arg_COMPONENT_CASES AND arg_RANKS MATCHES ";")
+    message(FATAL_ERROR "${name}: COMPONENT_CASES take one number of ranks, not ${arg_RANKS}")
+  endif()
   if(arg_SLOW)
+    carillon_test_of_cases(slow "${arg_SLOW}" "${labels};part.slow")
     list(JOIN arg_SLOW "," slow)
-    set(mpi)
-    if(arg_RANKS)
-      carillon_mpi_command(mpi 1)
-    endif()
-    add_test(NAME ${name}.slow COMMAND ${mpi} $<TARGET_FILE:test_${arg_PROGRAM}> ${cases} --only=${slow} --gtest_brief=1)
-    set_tests_properties(${name}.slow PROPERTIES TIMEOUT ${limit} COST ${arg_TIMEOUT} LABELS "${labels};part.slow" ENVIRONMENT "${CARILLON_MPI_ENVIRONMENT}")
     list(APPEND cases --without=${slow})
   endif()
-  set(needed)
+  set(groups)
+  set(apart)
   foreach(word ${arg_COMPONENT_CASES})
     if(NOT word MATCHES "[.]")
       string(REPLACE "," "_" needed ${word})
       set(components_${needed} ${word})
+      set(cases_${needed})
       list(APPEND groups ${needed})
     else()
       list(APPEND cases_${needed} ${word})
@@ -353,14 +368,7 @@ function(carillon_test name)
     string(REPLACE "," ";" components ${components_${group}})
     carillon_label_components(own is_left_out ${components} ${arg_COMPONENTS})
     if(NOT is_left_out)
-      list(JOIN cases_${group} "," only)
-      set(mpi)
-      if(arg_RANKS)
-        carillon_mpi_command(mpi 1)
-      endif()
-      add_test(NAME ${name}.${group} COMMAND ${mpi} $<TARGET_FILE:test_${arg_PROGRAM}> --sources=${chosen} --only=${only} --gtest_brief=1)
-      set_tests_properties(${name}.${group} PROPERTIES TIMEOUT ${limit} COST ${arg_TIMEOUT} LABELS "${labels};${own};part.${arg_PART}"
-        ENVIRONMENT "${CARILLON_MPI_ENVIRONMENT}")
+      carillon_test_of_cases(${group} "${cases_${group}}" "${labels};${own};part.${arg_PART}")
     endif()
   endforeach()
   if(apart)
