@@ -1,5 +1,6 @@
 // Method: convex polyhedra by clipping; other pairs by one pass in each direction (pass.hpp), then ridges against ridges. Candidates and
 // near samples are cached with a slack: a distance changes by at most the relative movement of the pair.
+#include "runtime/physics/geometry/lowest.hpp"
 #include "runtime/physics/geometry/pass.hpp"
 #include "runtime/physics/geometry/reduce.hpp"
 
@@ -65,6 +66,25 @@ void find_candidates(const Shape& a, const Frame& fa, const Shape& b, const Fram
   cross_ridges(a, fa, b, fb, reach, out);
 }
 
+/// The lowest vertex of a body over that facet of a polyhedron over which it is highest becomes `found` if it is in the polyhedron, deeper
+/// than found.gap_m. False if the facet's plane separates the bodies up to that gap: no other point is deeper. `pose`: of the body in the
+/// polyhedron.
+bool find_lowest_over(const Shape& body, const Frame& pose, const Polyhedron& polyhedron, Deepest& found) {
+  std::pair<int, double> best{-1, -Box::kFar};
+  for (std::size_t f = 0; f < polyhedron.normals.size(); ++f) {
+    const Vec3& n = polyhedron.normals[f];
+    const double over = dot(n, pose.position_m) - polyhedron.offsets_m[f];
+    const auto [vertex, height] = body.low_vertices().find(body, turn_back(pose.rotation, n));
+    if (height + over > best.second) best = {vertex, height + over};
+    if (best.second >= found.gap_m) return false;
+  }
+  const Vec3 x = to_world(pose, body.mesh().vertices[best.first]);
+  double gap = best.second;
+  for (std::size_t f = 0; f < polyhedron.normals.size(); ++f) gap = std::max(gap, dot(polyhedron.normals[f], x) - polyhedron.offsets_m[f]);
+  if (gap < found.gap_m) found = {.place = best.first, .gap_m = gap};
+  return true;
+}
+
 }  // namespace
 
 Deepest find_deepest(const Shape& a, const Frame& fa, const Shape& b, const Frame& fb, double gap, PairMemory& memory) {
@@ -72,22 +92,31 @@ Deepest find_deepest(const Shape& a, const Frame& fa, const Shape& b, const Fram
   const double far = a.get_radius_m() + b.get_radius_m();
   if (norm2(to_world(fa, a.get_middle_m()) - to_world(fb, b.get_middle_m())) > far * far || (a.is_polyhedron() && b.is_polyhedron()))
     return found;
+  if (a.is_polyhedron() || b.is_polyhedron()) {
+    const bool is_of_a = b.is_polyhedron();
+    if (!find_lowest_over(is_of_a ? a : b, calc_relative(is_of_a ? fa : fb, is_of_a ? fb : fa), *(is_of_a ? b : a).polyhedron(), found))
+      return found;
+    if (found.place >= 0) found.is_of_a = is_of_a;
+  }
   std::vector<Touch> none;
   NearSamples& near = memory.near;
   update_near(a, fa, b, fb, std::max(a.get_sag_m(), b.get_sag_m()), near);
   const Frame relative = calc_relative(fa, fb);
   near.gone_m += calc_way(near.last, relative, a);
   near.last = relative;
-  found.place = Pass(a, fa, b, fb, 0.0, none).find_deepest(found.gap_m, near.samples[0], near.gone_m, near.least_m[0]);
-  if (const int place = Pass(b, fb, a, fa, 0.0, none).find_deepest(found.gap_m, near.samples[1], near.gone_m, near.least_m[1]); place >= 0)
-    found.place = place, found.is_of_a = false;
+  for (const bool is_of_a : {true, false}) {
+    const std::size_t k = is_of_a ? 0 : 1;
+    const Pass pass = is_of_a ? Pass(a, fa, b, fb, 0.0, none) : Pass(b, fb, a, fa, 0.0, none);
+    if (const int place = pass.find_deepest(found.gap_m, near.samples[k], near.gone_m, near.least_m[k]); place >= 0)
+      found = {.place = place, .gap_m = found.gap_m, .is_of_a = is_of_a, .is_vertex = false};
+  }
   return found;
 }
 
 Touch make_touch(const Shape& a, const Frame& fa, const Shape& b, const Frame& fb, const Deepest& at) {
   std::vector<Touch> none;
-  if (at.is_of_a) return Pass(a, fa, b, fb, 0.0, none).make_touch(at.place);
-  Touch t = Pass(b, fb, a, fa, 0.0, none).make_touch(at.place);
+  if (at.is_of_a) return Pass(a, fa, b, fb, 0.0, none).make_touch(at.place, at.is_vertex);
+  Touch t = Pass(b, fb, a, fa, 0.0, none).make_touch(at.place, at.is_vertex);
   turn_round(t);
   return t;
 }

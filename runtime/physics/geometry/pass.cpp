@@ -106,8 +106,11 @@ void Pass::run_ridges() {
     if (ends[i] == ends[i - 1] && (i < 2 || ends[i] != ends[i - 2])) add_end(ends[i]);
 }
 
-Touch Pass::make_touch(int place) const {
-  const Sample& sample = mine_.samples().samples[place];
+Touch Pass::make_touch(int place, bool is_vertex) const {
+  const Skin& skin = mine_.skin();
+  const Sample sample =
+      is_vertex ? Sample{.point = mine_.mesh().vertices[place], .kind = skin.kind(place), .vertex = place, .face = skin.find_face(place)}
+                : mine_.samples().samples[place];
   const Nearest at = surface_.find_nearest(to_theirs(sample.point));
   const Mesh& mesh = theirs_.mesh();
   const bool is_curved = !theirs_.skin().is_flat(at.face);
@@ -117,11 +120,11 @@ Touch Pass::make_touch(int place) const {
   t.curvature_a_per_m = get_sharp_curvature(mine_, sample.kind);
   t.rim_m = mine_.skin().calc_rim_radius_m(sample.vertex);
   if (sample.kind == VertexKind::smooth) {
-    const Spot spot = mine_.skin().locate(sample.point, sample.face);
-    t.curvature_a_per_m = mine_.skin().calc_mean_curvature(spot.face, spot.weights);
+    const Spot spot = skin.locate(sample.point, sample.face);
+    t.curvature_a_per_m = skin.calc_mean_curvature(spot.face, spot.weights);
   }
   settle(t, mine_, fm_, &theirs_, ft_, mine_.samples().spacing_m, kSearchIterations);
-  t.id = make_id(Feature::corner_a, place, kMissedTouchId);
+  t.id = make_id(Feature::corner_a, place, is_vertex ? kMissedVertexId : kMissedTouchId);
   return t;
 }
 

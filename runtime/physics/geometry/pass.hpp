@@ -45,8 +45,8 @@ class Pass {
   int find_deepest(double& gap_m, const std::vector<std::pair<int, double>>& near, double gone_m, std::vector<double>& least_m) const;
   /// Ridges of mine against curved parts of theirs: lowest points of straight pieces, and corners from which both pieces rise.
   void run_ridges();
-  /// Touch of a sample with the nearest point of theirs.
-  Touch make_touch(int place) const;
+  /// Touch of a vertex or sample with the nearest point of theirs.
+  Touch make_touch(int place, bool is_vertex) const;
 
  private:
   Vec3 to_theirs(const Vec3& x) const { return rotation_ * x + offset_; }

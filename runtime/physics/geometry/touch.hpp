@@ -73,18 +73,18 @@ inline double calc_travel(const Touch& from, const Touch& to) {
   return from.curvature_a_per_m >= from.curvature_b_per_m ? norm(to.station_a - from.station_a) : norm(to.station_b - from.station_b);
 }
 
-/// Deepest point of one body in another (a sample) or in the ground (a vertex).
+/// Deepest point of one body in another or in the ground.
 struct Deepest {
-  int place = -1;
+  int place = -1;      // a vertex, or a sample
   double gap_m = 0.0;  // negative: penetration
-  bool is_of_a = true;
+  bool is_of_a = true, is_vertex = true;
 };
 Deepest find_lowest(const Shape& a, const Frame& frame, double height_m);
 /// True if a vertex can reach the plane through the first touch within `time_s` at the present spin and is farther than `far_m` from the
 /// line between the first and the last touch. `touches`: mesh frame; `normal`: of the plane, world.
 bool may_tip(const Shape& a, const Frame& frame, const Vec3& normal, const Vec3& spin, std::span<const Vec3> touches, double far_m,
              double time_s);
-/// None (-1) between two polyhedra, whose touches are complete, and if no sample is deeper than `gap_m`.
+/// None (-1) between two polyhedra, whose touches are complete, and if no vertex in a polyhedron and no sample is deeper than `gap_m`.
 Deepest find_deepest(const Shape& a, const Frame& frame_a, const Shape& b, const Frame& frame_b, double gap_m, PairMemory& memory);
 /// Touch of such a vertex, at these or other frames.
 Touch make_ground_touch(const Shape& a, const Frame& frame, double height_m, int vertex);

@@ -454,6 +454,34 @@ TEST(pairs, deepest_sample_from_memory) {
   EXPECT_GT(deep, 300);
 }
 
+TEST(pairs, deepest_vertex_on_a_slab) {
+  const auto slab = make_box({1.0, 1.0, 0.05}, 4).make();
+  const Solid pen = make_lathe({{0, -0.07}, {0.0045, -0.055}, {0.0045, 0.065}, {0, 0.07}}, 20, false),
+              coin = make_cylinder(0.012, 0.002, 48);
+  Dice dice(12);
+  for (const Solid& solid : {pen, coin}) {
+    const auto body = solid.make();
+    PairMemory memory;
+    int deep = 0;
+    for (int i = 0; i < 2000; ++i) {
+      Frame frame;
+      frame.rotation = dice.roll_turn();
+      double lowest = 1.0;
+      for (const Vec3& x : solid.vertices) lowest = std::min(lowest, to_world(frame, x)[2]);
+      const double depth = 1e-4 * (dice.roll_way()[0] + 0.5);
+      frame.position_m = {0.1, -0.2, 0.025 - lowest - depth};
+      if (i % 10 != 0) memory = {};
+      const Deepest found = find_deepest(*body, frame, *slab, {}, -5e-6, memory);
+      if (depth < 5e-6) continue;
+      ++deep;
+      ASSERT_GE(found.place, 0) << i;
+      EXPECT_LE(found.gap_m, -depth + 1e-12) << i;
+      EXPECT_NEAR(make_touch(*body, frame, *slab, {}, found).gap_m, found.gap_m, 1e-12) << i;
+    }
+    EXPECT_GT(deep, 1000);
+  }
+}
+
 TEST(pairs, independence_of_mesh_fineness) {
   const auto ball = make_ball(0.02, 8).make();
   const auto l_block = [](int n) {
