@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <exception>
 #include <functional>
 #include <map>
 #include <new>
@@ -27,7 +28,7 @@
 #include "precompute/mesher/two_sides.hpp"
 #include "precompute/mesher/volume_mesh.hpp"
 #include "precompute/mesher/wall_error.hpp"
-#include "runtime/base/error.hpp"
+#include "runtime/base/failure.hpp"
 
 namespace carillon::mesher {
 namespace {
@@ -126,20 +127,28 @@ CurvedEdges curve_mesh(mesh::TetMesh& mesh, const std::vector<Polyline>& curves,
   return out;
 }
 
-/// Meshes a wall by extrusion. False for an impossible wall; fault: the reason, completing a sentence.
-bool extrude_wall(const ThinBody& body, const SurfaceOptions& options, SurfaceReport& report, Phases& phases, mesh::TetMesh& out,
-                  std::string& fault) {
+/// Why a wall cannot be extruded: completes a sentence. `refusal`: the count of nodes is out of its reach.
+struct WallFault {
+  std::string text;
+  std::exception_ptr refusal;
+};
+
+/// Meshes a wall by extrusion, or tells why not. Where the volume may be meshed instead (`is_optional`), a refused count is such a fault.
+std::optional<mesh::TetMesh> extrude_wall(const ThinBody& body, const SurfaceOptions& options, bool is_optional, SurfaceReport& report,
+                                          Phases& phases, WallFault& fault) {
   const SurfaceReport before = report;
   try {
-    out = mesh_thin_wall(body, options, report, phases);
-    return true;
+    return mesh_thin_wall(body, options, report, phases);
   } catch (const WallError& failure) {
-    fault = failure.what();
-    auto seconds = std::move(report.seconds);
-    report = before;
-    report.seconds = std::move(seconds);
-    return false;
+    fault = {failure.what(), nullptr};
+  } catch (const CountRefusal&) {
+    if (!is_optional) throw;
+    fault = {fmt::format("has no mesh of its skin within 10 % of {} nodes", *options.nodes), std::current_exception()};
   }
+  auto seconds = std::move(report.seconds);
+  report = before;
+  report.seconds = std::move(seconds);
+  return std::nullopt;
 }
 
 /// Open sheet with a wall. Throws InputError if it cannot be extruded.
@@ -163,26 +172,25 @@ mesh::TetMesh make_sheet(Sheet sheet, const SurfaceOptions& options, SurfaceRepo
                   : side == Side::kOutside ? "outside"
                                            : "inside",
                   1000 * *options.wall_m);
-  mesh::TetMesh out;
-  std::string fault;
-  if (!extrude_wall({.skin = body, .wall_m = *options.wall_m, .side = side}, options, report, phases, out, fault)) refuse(fault);
-  return out;
+  WallFault fault;
+  auto out = extrude_wall({.skin = body, .wall_m = *options.wall_m, .side = side}, options, false, report, phases, fault);
+  if (!out) refuse(fault.text);
+  return std::move(*out);
 }
 
 /// Extruded wall of a closed body, if requested or thinner than the element length. Empty for bodies left to the volume meshers, with the
-/// reason in the report. Throws InputError if extrusion was requested and is impossible.
-std::optional<mesh::TetMesh> make_thin(const Body& body, const SurfaceOptions& options, SurfaceReport& report, Phases& phases) {
+/// reason in the report and in `fault`. Throws InputError if extrusion was requested and is impossible.
+std::optional<mesh::TetMesh> make_thin(const Body& body, const SurfaceOptions& options, SurfaceReport& report, Phases& phases,
+                                       WallFault& fault) {
   const bool must = options.method == Method::kExtrusion || (options.side != Side::kAutomatic && options.side != Side::kOutside);
   if (!must && (options.method != Method::kAutomatic || options.order == 1)) return std::nullopt;
-  const auto give_up = [&](const std::string& fault) {
-    if (must) throw InputError(fmt::format("{}: the wall cannot be extruded from this surface: it {}", options.surface.string(), fault));
+  const auto give_up = [&](const std::string& why) {
+    if (must) throw InputError(fmt::format("{}: the wall cannot be extruded from this surface: it {}", options.surface.string(), why));
     report.reason.clear();
     report.remarks.push_back(
-        fmt::format("The wall is thin, but it {}: the volume was meshed instead of the skin, which takes more nodes.", fault));
+        fmt::format("The wall is thin, but it {}: the volume was meshed instead of the skin, which takes more nodes.", why));
     return std::nullopt;
   };
-  mesh::TetMesh out;
-  std::string fault;
   if (options.wall_m) {
     ThinBody thin{.skin = body, .wall_m = *options.wall_m, .side = options.side == Side::kAutomatic ? Side::kOutside : options.side};
     const double edge = find_thin_edge(thin, options);
@@ -195,8 +203,8 @@ std::optional<mesh::TetMesh> make_thin(const Body& body, const SurfaceOptions& o
     report.reason =
         must ? "it was asked for"
              : fmt::format("the wall ({:.3g} mm) is thinner than the elements are long ({:.3g} mm)", 1000 * *options.wall_m, 1000 * edge);
-    if (extrude_wall(thin, options, report, phases, out, fault)) return out;
-    return give_up(fault);
+    if (auto out = extrude_wall(thin, options, !must, report, phases, fault)) return out;
+    return give_up(fault.text);
   }
   std::optional<TwoSides> sides;
   if (!report.wrapped && report.components <= 2)
@@ -219,8 +227,8 @@ std::optional<mesh::TetMesh> make_thin(const Body& body, const SurfaceOptions& o
   if (!must && edge <= thin.wall_m) return std::nullopt;
   report.reason = fmt::format("the body is itself a wall, of {:.3g} mm, and thinner than the elements are long ({:.3g} mm)",
                               1000 * thin.wall_m, 1000 * edge);
-  if (extrude_wall(thin, options, report, phases, out, fault)) return out;
-  return give_up(fault);
+  if (auto out = extrude_wall(thin, options, !must, report, phases, fault)) return out;
+  return give_up(fault.text);
 }
 
 constexpr double kSmallest = 1e-10, kLargest = 1e9;  // body size, in metres
@@ -378,18 +386,25 @@ mesh::TetMesh make_mesh(const SurfaceOptions& given, SurfaceReport& report, Phas
   const TriangleSurface& surface = body.repaired.surface;
   report.input_area_m2 = calc_area(surface);
   report.input_volume_m3 = body.round ? body.round->calc_volume() : calc_volume(surface) - body.repaired.offset_m * report.input_area_m2;
-  if (std::optional<mesh::TetMesh> thin = make_thin(body, options, report, phases)) return std::move(*thin);
+  WallFault wall;
+  if (std::optional<mesh::TetMesh> thin = make_thin(body, options, report, phases, wall)) return std::move(*thin);
   if (options.order == 0) options.order = 1;
   set_model(body, options, report.input_volume_m3, report.input_area_m2);
   const double edge = find_first_edge(body, options);
   check_edge(options, edge, calc_box(surface.points).diagonal(), body.model.calc_nodes(edge), 1.5 * kMaxNodes);
   const double min_nodes = calc_min_nodes(body);
   cpu_limit.emplace(calc_limit(kMinCpu, options.nodes ? asked : std::max(body.model.calc_nodes(edge), min_nodes)));
-  check_count(options, min_nodes);
-  if (!options.edge_m && !options.nodes)
-    report.remarks.push_back("Neither nodes nor edge was given: about 10,000 corner nodes (order 2: 30,000 nodes in all) were aimed at.");
-  phases.show(fmt::format("about {:.0f} nodes", std::max(body.model.calc_nodes(edge), min_nodes)));
-  mesh::TetMesh linear = make_volume_mesh(body, options, edge, report, phases);
+  mesh::TetMesh linear;
+  try {
+    check_count(options, min_nodes);
+    if (!options.edge_m && !options.nodes)
+      report.remarks.push_back("Neither nodes nor edge was given: about 10,000 corner nodes (order 2: 30,000 nodes in all) were aimed at.");
+    phases.show(fmt::format("about {:.0f} nodes", std::max(body.model.calc_nodes(edge), min_nodes)));
+    linear = make_volume_mesh(body, options, edge, report, phases);
+  } catch (const CountRefusal&) {
+    if (wall.refusal) std::rethrow_exception(wall.refusal);  // its skin takes fewer
+    throw;
+  }
   mesh::TetMesh out = options.order == 2 ? mesh::to_quadratic(linear) : std::move(linear);
   if (options.order == 2 && !options.straight) phases.run("curving", [&] { curve(out, body, report); });
   if (body.round || options.order == 2) phases.run("placing nodes", [&] { place_nodes(out, body, options, report); });
