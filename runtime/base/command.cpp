@@ -176,7 +176,10 @@ std::optional<int> await(pid_t child, double deadline_s, const std::function<boo
     int status = 0;
     const pid_t ended = ::waitpid(child, &status, WNOHANG);
     if (ended == child) return status;
-    if (ended < 0 && errno != EINTR) return W_EXITCODE(kExitSystem, 0);  // reaped elsewhere: status lost
+    if (ended < 0 && errno != EINTR) {
+      const WholeStep step;               // a handler in another thread may have reaped it
+      return W_EXITCODE(kExitSystem, 0);  // reaped elsewhere: status lost
+    }
     if (get_boot_s() >= deadline_s || (may_stop && may_stop())) return std::nullopt;
     const timespec pause{0, kWaitPollNs};
     ::nanosleep(&pause, nullptr);
@@ -187,7 +190,7 @@ std::optional<int> await(pid_t child, double deadline_s, const std::function<boo
 class Reaper {
  public:
   explicit Reaper(const Command& command) {
-    const SignalPause pause;  // until the handler of signals knows the child
+    const WholeStep step;  // until the handler of signals knows the child
     child_ = start(command);
     note_child(child_);
   }

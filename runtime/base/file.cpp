@@ -158,7 +158,7 @@ void WholeFile::append(std::string_view bytes) {
 void WholeFile::commit() {
   if (::fsync(descriptor_) != 0) refuse(errno);
   {
-    // A catchable signal must not leave a temporary name behind.
+    // No temporary name is left behind, unless another thread takes a signal just now.
     const SignalPause pause;
     if (is_nameless_) {
       if (const int error = link_nameless(descriptor_, temporary_); error != 0) refuse(error);
@@ -202,19 +202,19 @@ WholeFolder::~WholeFolder() {
 }
 
 void WholeFolder::commit() {
-  const SignalPause pause;
+  const WholeStep step;
   std::error_code error;
   const std::filesystem::path before = path_.string() + ".before";  // keep the old folder until the new one is in place
   const bool has_before = std::filesystem::exists(place_, error);
   if (has_before) std::filesystem::rename(place_, before, error);
   if (error) refuse_folder(place_, error);
-  keep_temporary_folder(path_);
   std::filesystem::rename(path_, place_, error);
   if (error) {
     std::error_code ignored;
     if (has_before) std::filesystem::rename(before, place_, ignored);
     refuse_folder(place_, error);
   }
+  keep_temporary_folder(path_, place_);
   path_.clear();
   if (has_before) std::filesystem::remove_all(before, error);
 }

@@ -5,8 +5,8 @@
 
 namespace carillon::base {
 
-/// Blocks all signals of this thread during its lifetime; they are delivered afterwards. Signals of the process still end it if another
-/// thread does not block them.
+/// Blocks all signals of this thread during its lifetime; they are delivered afterwards. A signal to the process still ends it if another
+/// thread does not block that signal (WholeStep of temporary.hpp waits for those, too).
 class SignalPause {
  public:
   SignalPause() {

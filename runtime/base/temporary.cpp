@@ -15,12 +15,12 @@
 #include <atomic>
 #include <cerrno>
 #include <cstring>
+#include <mutex>
 #include <system_error>
 
 #include "runtime/base/descriptor.hpp"
 #include "runtime/base/failure.hpp"
 #include "runtime/base/message.hpp"
-#include "runtime/base/signal_pause.hpp"
 
 namespace carillon::base {
 namespace {
@@ -34,14 +34,17 @@ constexpr int kStepMs = 20, kPatienceMs = 3000;
 constexpr std::array kSignals{SIGINT, SIGTERM, SIGHUP};
 
 struct Slot {
-  std::atomic<int> state{0};  // 0: free, 1: changing, 2: in use
+  std::atomic<bool> is_used{false};
   std::array<char, kMaxPath> path{};
   int lock = -1;
 };
 std::array<Slot, kMaxFolders> slots;
 std::array<std::atomic<pid_t>, kMaxChildren> children{};
-std::atomic<int> folder_count{0};
-std::atomic<bool> is_ending{false};  // a handler has begun: no further folders
+int folder_count = 0;
+std::atomic<bool> is_ending{false};  // a handler has begun: no further WholeStep
+std::atomic<int> step_count{0};      // threads in a WholeStep
+thread_local int step_depth = 0;
+std::mutex handlers_mutex;  // of folder_count and the handlers
 static_assert(std::atomic<int>::is_always_lock_free && std::atomic<pid_t>::is_always_lock_free && std::atomic<bool>::is_always_lock_free,
               "Signal handlers require lock-free atomics.");
 
@@ -87,7 +90,7 @@ void sweep(const fs::path& parent, const std::string& begin) {
 
 Slot* find_slot(const fs::path& folder) {
   for (Slot& slot : slots)
-    if (slot.state.load() == 2 && folder == slot.path.data()) return &slot;
+    if (slot.is_used.load() && folder == slot.path.data()) return &slot;
   return nullptr;
 }
 
@@ -106,53 +109,56 @@ bool remove_by_rm(const char* folder) {
   return child > 0 && status == 0;
 }
 
-/// A free slot, now changing; null if the table is full. Under SignalPause: the handler of another thread waits for the change.
-Slot* claim_slot() {
-  for (Slot& slot : slots) {
-    int expected = 0;
-    if (!slot.state.compare_exchange_strong(expected, 1)) continue;
-    if (!is_ending.load()) return &slot;
-    slot.state.store(0);
-    for (;;) ::pause();  // another thread ends the process
-  }
-  return nullptr;
+void count_folder(int change) {
+  const std::lock_guard lock(handlers_mutex);
+  const int before = folder_count;
+  folder_count += change;
+  if (before == 0 || folder_count == 0) set_handlers(before == 0);
 }
 
 /// Removes a folder from the handler's table.
 void release(Slot& slot) {
-  const SignalPause pause;
-  slot.state.store(1);
+  const WholeStep step;
+  slot.is_used.store(false);
   if (slot.lock >= 0) ::close(slot.lock);
   slot.lock = -1;
-  slot.state.store(0);
-  if (folder_count.fetch_sub(1) == 1) set_handlers(false);
+  count_folder(-1);
 }
 
 }  // namespace
 
+WholeStep::WholeStep() {
+  if (step_depth++ > 0) return;
+  step_count.fetch_add(1);
+  if (!is_ending.load()) return;
+  step_count.fetch_sub(1);
+  for (;;) ::pause();  // another thread ends the process
+}
+
+WholeStep::~WholeStep() {
+  if (--step_depth == 0) step_count.fetch_sub(1);
+}
+
 fs::path make_temporary_folder(const fs::path& parent, const std::string& begin) {
   sweep(parent, begin);
   std::string path = (parent / (begin + kLetters)).string();
-  // Another thread, such as one of MPI, may take a signal at any time: handler and slot come before the folder.
-  const SignalPause pause;
-  if (folder_count.fetch_add(1) == 0) set_handlers(true);
-  Slot* slot = claim_slot();
+  const WholeStep step;
+  count_folder(1);
   if (path.size() >= kMaxPath || ::mkdtemp(path.data()) == nullptr) {
     const int error = path.size() >= kMaxPath ? ENAMETOOLONG : errno;
-    if (slot != nullptr) slot->state.store(0);
-    if (folder_count.fetch_sub(1) == 1) set_handlers(false);
+    count_folder(-1);
     throw_system_error(error, fmt::format("{}: no temporary folder can be made here: {}; make room there, or name another place (temporary "
                                           "files: TMPDIR)",
                                           find_name(path), std::strerror(error)));
   }
-  if (slot == nullptr) {  // table full: removed only by the destructor
-    folder_count.fetch_sub(1);
+  for (Slot& slot : slots) {
+    if (slot.is_used.exchange(true)) continue;
+    std::memcpy(slot.path.data(), path.c_str(), path.size() + 1);
+    slot.lock = ::open((path + "/" + kMark).c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+    if (slot.lock >= 0) (void)::flock(slot.lock, LOCK_EX | LOCK_NB);
     return path;
   }
-  std::memcpy(slot->path.data(), path.c_str(), path.size() + 1);
-  slot->lock = ::open((path + "/" + kMark).c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
-  if (slot->lock >= 0) (void)::flock(slot->lock, LOCK_EX | LOCK_NB);
-  slot->state.store(2);
+  count_folder(-1);  // table full: removed only by the destructor
   return path;
 }
 
@@ -163,9 +169,9 @@ void remove_temporary_folder(const fs::path& folder) noexcept {
   if (Slot* slot = find_slot(folder)) release(*slot);
 }
 
-void keep_temporary_folder(const fs::path& folder) noexcept {
+void keep_temporary_folder(const fs::path& folder, const fs::path& moved_to) noexcept {
   if (Slot* slot = find_slot(folder)) release(*slot);
-  ::unlink((folder / kMark).c_str());
+  ::unlink(((moved_to.empty() ? folder : moved_to) / kMark).c_str());
 }
 
 TemporaryFolder::TemporaryFolder(const std::string& begin) {
@@ -190,6 +196,7 @@ void forget_child(pid_t child) noexcept {
 
 void end_children_and_temporaries() noexcept {
   is_ending.store(true);
+  for (int waited_ms = 0; step_count.load() > 0 && waited_ms < kPatienceMs; ++waited_ms) ::poll(nullptr, 0, 1);
   for (const int signal : {SIGTERM, SIGKILL}) {
     for (std::atomic<pid_t>& slot : children)
       if (const pid_t child = slot.load(); child > 0) ::kill(child, signal);
@@ -209,8 +216,7 @@ void end_children_and_temporaries() noexcept {
     }
   }
   for (Slot& slot : slots) {
-    for (int waited_ms = 0; slot.state.load() == 1 && waited_ms < kPatienceMs; ++waited_ms) ::poll(nullptr, 0, 1);
-    if (slot.state.load() != 2) continue;
+    if (!slot.is_used.load()) continue;
     // Grandchildren such as a shell's mkdir may outlive the child briefly: rm then finds a folder that is not empty.
     for (int waited_ms = 0; !remove_by_rm(slot.path.data()) && waited_ms < kPatienceMs; waited_ms += kStepMs) ::poll(nullptr, 0, kStepMs);
   }

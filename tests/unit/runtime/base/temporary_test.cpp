@@ -83,6 +83,7 @@ TEST_F(Temporary, is_removed_after_a_signal_to_a_second_thread) {
       std::thread([] {
         for (;;) ::pause();
       }).detach();
+      const TemporaryFolder first(parent_, ".page.");
       (void)!::write(ready[1], "1", 1);
       for (;;) TemporaryFolder(parent_, ".page.");
     }
@@ -92,7 +93,9 @@ TEST_F(Temporary, is_removed_after_a_signal_to_a_second_thread) {
     ::close(ready[1]);
     ::usleep(7 * k);
     ::kill(child, SIGTERM);
-    ASSERT_EQ(::waitpid(child, nullptr, 0), child);
+    int status = 0;
+    ASSERT_EQ(::waitpid(child, &status, 0), child);
+    ASSERT_TRUE(WIFSIGNALED(status) && WTERMSIG(status) == SIGTERM) << status;
     ASSERT_TRUE(is_empty()) << k;
   }
 }
