@@ -66,8 +66,8 @@ void find_candidates(const Shape& a, const Frame& fa, const Shape& b, const Fram
   cross_ridges(a, fa, b, fb, reach, out);
 }
 
-/// The lowest vertex of a body over that facet of a polyhedron over which it is highest becomes `found` if it is in the polyhedron, deeper
-/// than found.gap_m. False if the facet's plane separates the bodies up to that gap: no other point is deeper. `pose`: of the body in the
+/// Takes the facet above whose plane the body's lowest vertex is highest. If that vertex is inside the polyhedron and deeper than
+/// found.gap_m, it becomes `found`. False: that plane separates the skin from the polyhedron, up to that gap. `pose`: of the body in the
 /// polyhedron.
 bool find_lowest_over(const Shape& body, const Frame& pose, const Polyhedron& polyhedron, Deepest& found) {
   std::pair<int, double> best{-1, -Box::kFar};
@@ -76,7 +76,7 @@ bool find_lowest_over(const Shape& body, const Frame& pose, const Polyhedron& po
     const double over = dot(n, pose.position_m) - polyhedron.offsets_m[f];
     const auto [vertex, height] = body.low_vertices().find(body, turn_back(pose.rotation, n));
     if (height + over > best.second) best = {vertex, height + over};
-    if (best.second >= found.gap_m) return false;
+    if (best.second - body.get_sag_m() >= found.gap_m) return false;
   }
   const Vec3 x = to_world(pose, body.mesh().vertices[best.first]);
   double gap = best.second;

@@ -22,7 +22,7 @@ void cross_ridges(const Shape& a, const Frame& frame_a, const Shape& b, const Fr
 /// True if a corner or ridge vertex of the skin may touch a surface with this outward normal (mesh frame) first: no neighbour is lower.
 bool carries(const Mesh& mesh, int vertex, const Vec3& normal);
 
-// Second number of the id of a touch that a search missed, at a sample or a vertex.
+// Second number of the id of a touch that a search missed: at a sample (over the ground at a vertex), at a vertex of a pair.
 inline constexpr int kMissedTouchId = 2, kMissedVertexId = 4;
 
 /// Mean curvature of a corner or an edge.

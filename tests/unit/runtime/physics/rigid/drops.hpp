@@ -259,8 +259,8 @@ struct DropBounds {
   double missed_m = 2e-6, gained = 1e-5, lifted = 1e-3;
 };
 inline constexpr DropBounds kWanted;
-/// Bounds of any drop of the fuzzer. Of 7,200 random drops none slept deeper than 25 um, rods on slabs were 2 times the allowed depth in
-/// single steps, and pens on slabs were lifted by 0.035.
+/// Bounds of any drop of the fuzzer. Of 7,200 random drops none came to rest deeper than 25 um; two rods on slabs were up to twice as
+/// deep as allowed in a single step, and pens on slabs were lifted by up to 0.035.
 inline constexpr DropBounds kHeldToday{.rests_m = 5e-5, .ever = 5.0, .missed_m = 5e-5, .gained = 1e-3, .lifted = 1.0};
 
 /// The bound that an outcome has violated; empty: none.
