@@ -1,7 +1,6 @@
 // carillon cancel and carillon retry.
 #include <fmt/core.h>
 
-#include <algorithm>
 #include <cstdio>
 #include <optional>
 
@@ -47,6 +46,7 @@ int run_cancel(Shared& shared, const CancelOptions& options) {
 }
 
 int run_retry(Shared& shared, const RetryOptions& options) {
+  if (options.resources.engine == "slurm") check_slurm();
   shared.settle();
   if (options.words.empty() && !options.all_failed)
     throw InputError("no job given; give an id or a job file, or --failed for all failed jobs");
@@ -54,21 +54,22 @@ int run_retry(Shared& shared, const RetryOptions& options) {
   if (options.all_failed) {
     for (registry::Job& job : shared.registry().list({registry::JobState::failed})) jobs.push_back(std::move(job));
   }
-  const auto will_be_in_slurm = [&](registry::Job job) {
-    options.resources.apply(job);
-    return job.engine == store::JobEngine::slurm;
-  };
-  if (std::any_of(jobs.begin(), jobs.end(), will_be_in_slurm)) check_slurm();
   std::optional<store::Lock> lock = shared.store().lock_shared();  // gc waits
-  const int code = do_to_all(shared, jobs, [&](const registry::Job& job) {
-    return queue::retry(shared.store(), shared.registry(), job.id, [&](registry::Job& row) { options.resources.apply(row); });
+  bool is_for_slurm = false;
+  const int code = do_to_all(shared, jobs, [&](const registry::Job& job) -> queue::CommandResult {
+    try {
+      return queue::retry(shared.store(), shared.registry(), job.id, [&](registry::Job& row) {
+        options.resources.apply(row);
+        if (row.engine != store::JobEngine::slurm) return;
+        check_slurm();
+        is_for_slurm = true;
+      });
+    } catch (const InputError& error) {
+      return {false, error.what()};
+    }
   });
   lock.reset();
-  const auto is_in_slurm = [&](const registry::Job& job) {
-    const auto row = shared.registry().find(job.id);
-    return row && row->engine == store::JobEngine::slurm;
-  };
-  if (std::any_of(jobs.begin(), jobs.end(), is_in_slurm)) hand_over_to_slurm(shared);
+  if (is_for_slurm) hand_over_to_slurm(shared);
   return code;
 }
 

@@ -6,6 +6,7 @@ usage: refusals.py BIN_DIR NAME...     the components that are OFF
 import json
 import pathlib
 import shutil
+import sqlite3
 import subprocess
 import sys
 import tempfile
@@ -68,13 +69,20 @@ with tempfile.TemporaryDirectory() as scratch:
         file = write("bar.json", BAR)
         expect_refusal("SLURM", BIN / "carillon", *store, "submit", "--on", "slurm", file)
         expect_refusal("SLURM", BIN / "carillon", *store, "run", "--on", "slurm")
-        subprocess.run([BIN / "carillon", *store, "submit", file], cwd=folder, check=True, capture_output=True)
-        subprocess.run([BIN / "carillon", *store, "cancel", file], cwd=folder, check=True, capture_output=True)
-        expect_refusal("SLURM", BIN / "carillon", *store, "retry", "--on", "slurm", file)
-        words = [BIN / "carillon", *store, "status", "--json"]
-        listed = subprocess.run(words, cwd=folder, check=True, capture_output=True, text=True).stdout
-        if [job["state"] for job in json.loads(listed)["jobs"]] != ["cancelled"]:
-            faults.append(f"SLURM: a refused retry queued the job: {listed}")
+        # A job that another build has queued for Slurm is not queued again, and the profile of Slurm is checked here, too.
+        for command in ("submit", "cancel"):
+            subprocess.run([BIN / "carillon", *store, command, file], cwd=folder, check=True, capture_output=True)
+        with sqlite3.connect(folder / "store/registry.sqlite") as registry:
+            registry.execute("UPDATE jobs SET engine = 'slurm'")
+        done = subprocess.run([BIN / "carillon", *store, "retry", file], cwd=folder, capture_output=True, text=True)
+        listed = subprocess.run([BIN / "carillon", *store, "status", "--json"], cwd=folder, check=True, capture_output=True, text=True)
+        states = [job["state"] for job in json.loads(listed.stdout)["jobs"]]
+        if done.returncode != 1 or "-DCARILLON_SLURM=ON" not in done.stdout or states != ["cancelled"]:
+            faults.append(f"SLURM: retry ended with {done.returncode}, {states}: {done.stdout}{done.stderr}")
+        profile = write("profile.json", {"slurm": {"partitoin": "x"}})
+        done = subprocess.run([BIN / "carillon", "--profile", profile, *store, "submit", file], cwd=folder, capture_output=True, text=True)
+        if done.returncode != 2 or "profile.json:1" not in done.stderr or "partitoin" not in done.stderr:
+            faults.append(f"SLURM: a bad profile ended with {done.returncode}: {done.stderr}")
     if "HEADS" in OFF:
         expect_refusal("HEADS", BIN / "carillon-render", write("scene.json", SCENE), "-o", "sound.wav")
     if "STUDIES" in OFF:

@@ -64,6 +64,7 @@ class Leftovers(Bench):
         program.send_signal(number)
         said = program.communicate(timeout=60)[1]
         if program.returncode == 0:  # done before the signal
+            self.assertEqual(list(self.temporary.iterdir()), [])
             shutil.rmtree(self.out)
             self.out.mkdir()
             return False

@@ -223,7 +223,7 @@ def clock(service):
 
 
 def hang(service):
-    """A stopped rank is detected as hung, killed, and the job resumed from its checkpoint."""
+    """A stopped rank is detected as hung and killed, and the job runs again."""
     service.mesh("bar.msh", LONG_NODES)
     (identity,) = service.submit(service.write_job("job.json", "bar.msh", 30000))
     work = service.store / "work" / identity[:2] / identity
