@@ -281,7 +281,7 @@ function(carillon_test_program name)
   carillon_warnings(test_${name})
 endfunction()
 
-# In carillon_test(): the test NAME.SUFFIX of these cases; with RANKS on the first number of them.
+# In carillon_test(): adds the test NAME.SUFFIX for these cases; with RANKS, on the first of these numbers.
 macro(carillon_test_of_cases suffix cases_of_it labels_of_it)
   string(REPLACE ";" "," only "${cases_of_it}")
   set(mpi)
