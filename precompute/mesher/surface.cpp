@@ -133,7 +133,7 @@ struct WallFault {
   std::exception_ptr refusal;
 };
 
-/// Meshes a wall by extrusion, or tells why not. Where the volume may be meshed instead (`is_optional`), a refused count is such a fault.
+/// Meshes a wall by extrusion, or sets `fault`. Where the volume may be meshed instead (`is_optional`), a refused count is such a fault.
 std::optional<mesh::TetMesh> extrude_wall(const ThinBody& body, const SurfaceOptions& options, bool is_optional, SurfaceReport& report,
                                           Phases& phases, WallFault& fault) {
   const SurfaceReport before = report;
