@@ -11,6 +11,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cerrno>
@@ -40,11 +41,10 @@ struct Slot {
 };
 std::array<Slot, kMaxFolders> slots;
 std::array<std::atomic<pid_t>, kMaxChildren> children{};
-int folder_count = 0;
 std::atomic<bool> is_ending{false};  // a handler has begun: no further WholeStep
 std::atomic<int> step_count{0};      // threads in a WholeStep
 thread_local int step_depth = 0;
-std::mutex handlers_mutex;  // of folder_count and the handlers
+std::mutex handlers_mutex;
 static_assert(std::atomic<int>::is_always_lock_free && std::atomic<pid_t>::is_always_lock_free && std::atomic<bool>::is_always_lock_free,
               "Signal handlers require lock-free atomics.");
 
@@ -61,16 +61,16 @@ bool is_ours(int signal) {
   return ::sigaction(signal, nullptr, &action) == 0 && action.sa_handler == handle;
 }
 
-/// Installed with the first folder, removed with the last. Signals that are ignored or handled elsewhere stay so.
-void set_handlers(bool is_first) {
+/// Signals that are ignored or handled elsewhere stay so.
+void set_handlers(bool is_needed) {
   for (const int signal : kSignals) {
     struct sigaction action {};
     if (::sigaction(signal, nullptr, &action) != 0) continue;
-    if (is_first ? action.sa_handler != SIG_DFL : !is_ours(signal)) continue;
+    if (is_needed ? action.sa_handler != SIG_DFL : !is_ours(signal)) continue;
     action = {};
-    action.sa_handler = is_first ? handle : SIG_DFL;
+    action.sa_handler = is_needed ? handle : SIG_DFL;
     sigfillset(&action.sa_mask);
-    action.sa_flags = is_first ? SA_RESTART : 0;
+    action.sa_flags = is_needed ? SA_RESTART : 0;
     ::sigaction(signal, &action, nullptr);
   }
 }
@@ -109,20 +109,20 @@ bool remove_by_rm(const char* folder) {
   return child > 0 && status == 0;
 }
 
-void count_folder(int change) {
+/// Handlers are installed while a slot is used.
+void update_handlers() {
   const std::lock_guard lock(handlers_mutex);
-  const int before = folder_count;
-  folder_count += change;
-  if (before == 0 || folder_count == 0) set_handlers(before == 0);
+  set_handlers(std::any_of(slots.begin(), slots.end(), [](const Slot& slot) { return slot.is_used.load(); }));
 }
 
 /// Removes a folder from the handler's table.
 void release(Slot& slot) {
   const WholeStep step;
-  slot.is_used.store(false);
   if (slot.lock >= 0) ::close(slot.lock);
   slot.lock = -1;
-  count_folder(-1);
+  slot.path[0] = '\0';
+  slot.is_used.store(false);
+  update_handlers();
 }
 
 }  // namespace
@@ -143,22 +143,19 @@ fs::path make_temporary_folder(const fs::path& parent, const std::string& begin)
   sweep(parent, begin);
   std::string path = (parent / (begin + kLetters)).string();
   const WholeStep step;
-  count_folder(1);
+  const auto slot = std::find_if(slots.begin(), slots.end(), [](Slot& one) { return !one.is_used.exchange(true); });
+  update_handlers();
   if (path.size() >= kMaxPath || ::mkdtemp(path.data()) == nullptr) {
     const int error = path.size() >= kMaxPath ? ENAMETOOLONG : errno;
-    count_folder(-1);
+    if (slot != slots.end()) release(*slot);
     throw_system_error(error, fmt::format("{}: no temporary folder can be made here: {}; make room there, or name another place (temporary "
                                           "files: TMPDIR)",
                                           find_name(path), std::strerror(error)));
   }
-  for (Slot& slot : slots) {
-    if (slot.is_used.exchange(true)) continue;
-    std::memcpy(slot.path.data(), path.c_str(), path.size() + 1);
-    slot.lock = ::open((path + "/" + kMark).c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
-    if (slot.lock >= 0) (void)::flock(slot.lock, LOCK_EX | LOCK_NB);
-    return path;
-  }
-  count_folder(-1);  // table full: removed only by the destructor
+  if (slot == slots.end()) return path;  // table full: removed only by the destructor
+  std::memcpy(slot->path.data(), path.c_str(), path.size() + 1);
+  slot->lock = ::open((path + "/" + kMark).c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+  if (slot->lock >= 0) (void)::flock(slot->lock, LOCK_EX | LOCK_NB);
   return path;
 }
 

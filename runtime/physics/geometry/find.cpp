@@ -67,9 +67,10 @@ void find_candidates(const Shape& a, const Frame& fa, const Shape& b, const Fram
 }
 
 /// Takes the facet above whose plane the body's lowest vertex is highest. If that vertex is inside the polyhedron and deeper than
-/// found.gap_m, it becomes `found`. False: that plane separates the skin from the polyhedron, up to that gap. `pose`: of the body in the
-/// polyhedron.
-bool find_lowest_over(const Shape& body, const Frame& pose, const Polyhedron& polyhedron, Deepest& found) {
+/// found.gap_m, it becomes `found`. False: that plane separates the skin from the polyhedron, up to that gap. `pose`: of the body in
+/// `other`, the polyhedron.
+bool find_lowest_over(const Shape& body, const Frame& pose, const Shape& other, Deepest& found) {
+  const Polyhedron& polyhedron = *other.polyhedron();
   std::pair<int, double> best{-1, -Box::kFar};
   for (std::size_t f = 0; f < polyhedron.normals.size(); ++f) {
     const Vec3& n = polyhedron.normals[f];
@@ -78,9 +79,7 @@ bool find_lowest_over(const Shape& body, const Frame& pose, const Polyhedron& po
     if (height + over > best.second) best = {vertex, height + over};
     if (best.second - body.get_sag_m() >= found.gap_m) return false;
   }
-  const Vec3 x = to_world(pose, body.mesh().vertices[best.first]);
-  double gap = best.second;
-  for (std::size_t f = 0; f < polyhedron.normals.size(); ++f) gap = std::max(gap, dot(polyhedron.normals[f], x) - polyhedron.offsets_m[f]);
+  const double gap = SurfaceProbe(other).calc_gap(to_world(pose, body.mesh().vertices[best.first]), found.gap_m);
   if (gap < found.gap_m) found = {.place = best.first, .gap_m = gap};
   return true;
 }
@@ -92,16 +91,15 @@ Deepest find_deepest(const Shape& a, const Frame& fa, const Shape& b, const Fram
   const double far = a.get_radius_m() + b.get_radius_m();
   if (norm2(to_world(fa, a.get_middle_m()) - to_world(fb, b.get_middle_m())) > far * far || (a.is_polyhedron() && b.is_polyhedron()))
     return found;
+  const Frame relative = calc_relative(fa, fb);
   if (a.is_polyhedron() || b.is_polyhedron()) {
     const bool is_of_a = b.is_polyhedron();
-    if (!find_lowest_over(is_of_a ? a : b, calc_relative(is_of_a ? fa : fb, is_of_a ? fb : fa), *(is_of_a ? b : a).polyhedron(), found))
-      return found;
+    if (!(is_of_a ? find_lowest_over(a, relative, b, found) : find_lowest_over(b, calc_relative(fb, fa), a, found))) return found;
     if (found.place >= 0) found.is_of_a = is_of_a;
   }
   std::vector<Touch> none;
   NearSamples& near = memory.near;
   update_near(a, fa, b, fb, std::max(a.get_sag_m(), b.get_sag_m()), near);
-  const Frame relative = calc_relative(fa, fb);
   near.gone_m += calc_way(near.last, relative, a);
   near.last = relative;
   for (const bool is_of_a : {true, false}) {
