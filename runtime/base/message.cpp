@@ -43,7 +43,7 @@ std::string show_message(std::string_view text) { return printable(shorten(text)
 
 std::string find_name(const fs::path& file) {
   constexpr std::string_view kBegin = "/proc/self/fd/";
-  const std::string text = file.string();
+  std::string text = file.string();
   if (!text.starts_with(kBegin)) return text;
   const std::size_t slash = std::min(text.find('/', kBegin.size()), text.size());
   std::error_code error;
