@@ -67,7 +67,7 @@ struct Pair {
   struct SlowHit {
     double time_s = -1.0, speed_m_s = 0.0;
   };
-  std::array<SlowHit, 4> slow_hits{};  // its last impacts slower than kRattleSpeedMS, since a faster one
+  std::array<SlowHit, 4> slow_hits{};  // its last impacts slower than kRattleSpeedMS
   double rattles_until_s = -1.0;       // until then slow touches are persistent
   double stored_j = 0.0;               // energy left in the springs of ended impacts, available for lifting
   double sag_m = 0.0;                  // depth left by an ended modal impact: permitted, decays

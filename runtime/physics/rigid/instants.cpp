@@ -19,7 +19,7 @@ constexpr double kGapToleranceM = 1e-9;  // m; gap tolerance of an instant of im
 constexpr int kMaxEvaluations = 20;      // maximum number of evaluations
 constexpr double kStrikeGapM = 1e-6;     // m; a touch nearer than this at the end of a step strikes there
 constexpr double kCrowdedS = 2e-3;       // s; duration of the crowded state of an island
-constexpr double kRattleS = 10e-3;  // s; a pair with more slow impacts than Pair::slow_hits within this time has none for the same time
+constexpr double kRattleS = 50e-3;  // s; a pair with more slow impacts than Pair::slow_hits within this time has none for the same time
 
 /// True if this touch closes within the step, faster than `slowest`.
 bool is_faster(const Bodies& bodies, const Contact& c, double h, double slowest) {
@@ -162,11 +162,7 @@ void Instants::note(const std::vector<ContactRef>& contacts, const std::vector<H
     if (!hit.is_cord) fastest[ref.pair] = std::max(fastest[ref.pair], hit.approach_m_s);
   }
   for (const auto& [pair, speed] : fastest) {
-    if (speed <= kMinImpactSpeedMS) continue;
-    if (speed >= kRattleSpeedMS) {
-      pair->slow_hits.fill({});
-      continue;
-    }
+    if (speed <= kMinImpactSpeedMS || speed >= kRattleSpeedMS) continue;
     // A ball bouncing to rest also strikes often, but each time slower by its restitution e: by e^4 over these.
     const Pair::SlowHit& first = pair->slow_hits.front();
     const bool decays = speed < std::pow(bodies_.calc_restitution(pair->a, pair->b), 2.0) * first.speed_m_s;

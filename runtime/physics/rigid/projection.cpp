@@ -121,6 +121,12 @@ void Projection::move(const Step& step, const std::vector<Mover>& displacements,
     const double spent_j = std::clamp(gained_j, 0.0, pair->stored_j);
     pair->stored_j -= spent_j;
     gained_j -= spent_j;
+    for (Contact& c : pair->contacts) {  // a contact that closed in the last step was stopped too deep, and lost the energy for this work
+      const double back_j = std::clamp(gained_j, 0.0, std::max(c.lost_j, 0.0));
+      c.lost_j -= back_j;
+      gained_j -= back_j;
+      ledger_.lose(-back_j);
+    }
   }
   if (gained_j > 0.0)
     ledger_.lift(gained_j);

@@ -134,14 +134,18 @@ void TouchSets::keep_lost(Pair& pair, const std::vector<Contact>& old) const {
     if (pair.b >= 0 && !c.touching) continue;
     geometry::Touch touch = c.touch;
     if (!follow(pair, touch, a, b)) continue;
-    const bool is_found = std::any_of(pair.contacts.begin(), pair.contacts.end(), [&](const Contact& found) {
-      return found.touch.id == touch.id || norm(found.touch.where_m - touch.where_m) < near_m;
+    const auto found = std::find_if(pair.contacts.begin(), pair.contacts.end(), [&](const Contact& other) {
+      return other.touch.id == touch.id || norm(other.touch.where_m - touch.where_m) < near_m;
     });
     const bool carries = pair.b < 0 && c.touching && dot(c.impulse, c.touch.normal) > 0.0 && !is_between(touch);
     const double most_m = pair.b >= 0                ? kDeepM
                           : touch.smooth && !carries ? least_m - kMissingDepthM
                                                      : std::max(least_m - kMissingDepthM, kTouchGapM);
-    if (touch.gap_m <= most_m && !is_found) pair.contacts.emplace_back(c).touch = touch;
+    if (touch.gap_m > most_m) continue;
+    if (found == pair.contacts.end())
+      pair.contacts.emplace_back(c).touch = touch;
+    else if (touch.gap_m < found->touch.gap_m - kMissingDepthM)  // the search has found a neighbouring point that is less deep
+      (*found = c).touch = touch;
   }
 }
 

@@ -259,9 +259,9 @@ struct DropBounds {
   double missed_m = 2e-6, gained = 1e-5, lifted = 1e-3;
 };
 inline constexpr DropBounds kWanted;
-/// Bounds of any drop of the fuzzer. Of 7,200 random drops none came to rest deeper than 25 um; two rods on slabs were up to twice as
-/// deep as allowed in a single step, and pens on slabs were lifted by up to 0.035.
-inline constexpr DropBounds kHeldToday{.rests_m = 5e-5, .ever = 5.0, .missed_m = 5e-5, .gained = 1e-3, .lifted = 1.0};
+/// Bounds of any drop of the fuzzer. Of 3,600 random drops none came to rest deeper than 25 um; two rods on slabs were up to twice as
+/// deep as allowed in a single step, and nine, most of them low falls of discs and coins on their rims, were lifted by 0.0011 to 0.094.
+inline constexpr DropBounds kHeldToday{.rests_m = 5e-5, .ever = 5.0, .missed_m = 5e-5, .gained = 1e-3, .lifted = 0.5};
 
 /// The bound that an outcome has violated; empty: none.
 inline std::string describe_fault(const DropOutcome& o, const DropBounds& bounds) {
