@@ -1,13 +1,14 @@
 // Method: augmented Lagrangian. With the residual r = w - J v of the active rows and a compliance eps,
 //     (M + sum J^T J / eps) d = J^T r / eps,   lambda += (r - J d) / eps,   v = v_free + M^-1 J^T lambda,
 // symmetric, positive definite and as sparse as the contact graph; iterated until r vanishes (3 to 5 times) with one factorisation. Rows
-// are released and added by the signs of the solution. The cone is round; the impulse of a sliding point lags by one guess.
+// are released and added by the signs of the solution. The cone is round; the direction of a sliding point follows by the secant method.
 // Source: A. Enzenhoefer, N. Lefebvre, S. Andrews, "Efficient block pivoting for multibody simulations with contact" (2019): pivoting of
 // blocks with a compliant system; factorisation by Eigen.
 #include <Eigen/LU>
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <type_traits>
 
 #include "runtime/physics/rigid/solver.hpp"
@@ -26,6 +27,7 @@ constexpr int kMaxCorrections = 12;             // iterations per guess,
 constexpr double kResidualRatio = 1e-10;        // final residual relative to the wanted velocities,
 constexpr double kStagnationRatio = 0.9;        // or ratio of consecutive residuals, if held points conflict
 constexpr double kCoupleBoundRatio = 0.5;       // fraction of its bound: larger couples of the previous step are first guessed at the bound
+constexpr double kMaxTurnRad = 0.5;             // rad; of the direction of sliding, per guess
 constexpr int kMaxDenseBodies = 12;             // bodies; larger systems are factorised as sparse matrices
 
 enum class Hold : char { kOpen, kSticks, kSlides };
@@ -177,6 +179,7 @@ class Guess {
         right_(6 * static_cast<int>(free.size())),
         left_(points.size()),
         left_spin_(points.size()) {
+    held_.reserve(points.size());
     for (const Point& p : points) scale_ = std::max(scale_, norm(p.wanted - calc_relative_velocity(free, p)));
   }
   /// Adds the next point. Masses: impulse per velocity along the normal, couple per spin (0: none). `is_swept`: its impulse is a solution.
@@ -195,6 +198,7 @@ class Guess {
     double stiffness = 0.0, turning_mass = 0.0;
     std::array<Vec3, 3> axes{};
     Vec3 sliding{}, impulse{}, couple{};
+    double last_angle = 0.0, last_turn = 0.0;  // of the sliding impulse in the preceding guess; turn 0: none
     /// Held part of a spin or couple.
     Vec3 hold_turning(const Vec3& turning) const {
       if (rolls && twists) return {};
@@ -202,6 +206,16 @@ class Guess {
       return rolls ? twist : twists ? turning - twist : turning;
     }
     Vec3 free_turning(const Vec3& turning) const { return turning - hold_turning(turning); }
+    double calc_angle(const Vec3& across) const { return std::atan2(dot(across, axes[2]), dot(across, axes[1])); }
+    /// Turn of the sliding impulse towards the direction against its slip, by the secant method: halving alone diverges at small slip.
+    double choose_turn(const Vec3& against_slip) {
+      const double angle = calc_angle(sliding), left = std::remainder(calc_angle(against_slip) - angle, 2.0 * std::numbers::pi);
+      const double moved = std::remainder(angle - last_angle, 2.0 * std::numbers::pi), change = left - last_turn;
+      const bool has_secant = last_turn != 0.0 && moved != 0.0 && change != 0.0;
+      last_angle = angle;
+      last_turn = left;
+      return has_secant ? std::clamp(-left * moved / change, -kMaxTurnRad, kMaxTurnRad) : 0.5 * left;
+    }
     bool holds_turning(int axis) const { return turning_mass > 0.0 && !(axis == 0 ? twists : rolls); }
   };
 
@@ -383,6 +397,7 @@ Hold Guess::correct_hold(const std::vector<Mover>& movers, const Point& p, Held&
     if (!(size > limit)) return Hold::kSticks;
     held.sliding = (limit / size) * across;
     held.impulse = push * p.normal + held.sliding;
+    held.last_turn = 0.0;
     return Hold::kSlides;
   }
   // Continues to slide against its velocity; sticks if that would no longer brake.
@@ -390,10 +405,8 @@ Hold Guess::correct_hold(const std::vector<Mover>& movers, const Point& p, Held&
   const Vec3 across = short_of - dot(short_of, p.normal) * p.normal;
   const double size = norm(across);
   if (dot(across, held.sliding) < 0.0 && may_stick) return Hold::kSticks;
-  const Vec3 next = size > 0.0 ? (limit / size) * across : held.sliding;
-  const Vec3 mean = 0.5 * (next + held.sliding);
-  const double length = norm(mean);
-  const Vec3 turned = length > 0.0 ? (limit / length) * mean : Vec3{};
+  const double angle = held.calc_angle(held.sliding) + held.choose_turn(size > 0.0 ? across : held.sliding);
+  const Vec3 turned = limit * (std::cos(angle) * held.axes[1] + std::sin(angle) * held.axes[2]);
   if (norm(turned - held.sliding) > 1e-3 * p.friction * push) confirmed = false;
   held.sliding = turned;
   held.impulse = push * p.normal + turned;
