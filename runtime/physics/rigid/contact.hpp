@@ -70,6 +70,7 @@ struct Pair {
   std::array<SlowHit, 4> slow_hits{};  // its last impacts slower than kRattleSpeedMS
   double rattles_until_s = -1.0;       // until then slow touches are persistent
   double stored_j = 0.0;               // energy left in the springs of ended impacts, available for lifting
+  double stopped_j = 0.0;              // lost in the last step by contacts that closed in it, available for lifting in the next
   double sag_m = 0.0;                  // depth left by an ended modal impact: permitted, decays
   Vec3 apart_m{};                      // displacement of a in touch searches if the penetration is large for the thickness
 

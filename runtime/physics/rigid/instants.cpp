@@ -19,7 +19,7 @@ constexpr double kGapToleranceM = 1e-9;  // m; gap tolerance of an instant of im
 constexpr int kMaxEvaluations = 20;      // maximum number of evaluations
 constexpr double kStrikeGapM = 1e-6;     // m; a touch nearer than this at the end of a step strikes there
 constexpr double kCrowdedS = 2e-3;       // s; duration of the crowded state of an island
-constexpr double kRattleS = 50e-3;  // s; a pair with more slow impacts than Pair::slow_hits within this time has none for the same time
+constexpr double kRattleS = 60e-3;  // s; a pair with more slow impacts than Pair::slow_hits within this time has none for the same time
 
 /// True if this touch closes within the step, faster than `slowest`.
 bool is_faster(const Bodies& bodies, const Contact& c, double h, double slowest) {

@@ -4,7 +4,7 @@
 namespace carillon::rigid {
 
 inline constexpr double kMinImpactSpeedMS = 1e-3;   // m/s; slower touches are no impacts (a fall from 0.05 um)
-inline constexpr double kRattleSpeedMS = 6e-2;      // m/s; slower touches of a rattling pair are no impacts
+inline constexpr double kRattleSpeedMS = 8e-2;      // m/s; slower touches of a rattling pair are no impacts
 inline constexpr double kSimultaneousS = 1e-4;      // s; touches nearer in time are one impact
 inline constexpr double kTouchGapM = 1e-7;          // m; smaller gaps count as contact
 inline constexpr double kDeepM = 2e-6;              // m; deeper contacts are pushed out

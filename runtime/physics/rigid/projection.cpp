@@ -118,14 +118,10 @@ void Projection::move(const Step& step, const std::vector<Mover>& displacements,
   if (const double owed_j = bodies_.calc_energy(step.island().bodies) - before_j; is_held && owed_j > 0.0) pay(step, displacements, owed_j);
   double gained_j = bodies_.calc_energy(step.island().bodies) - before_j;
   for (Pair* pair : step.island().pairs) {
-    const double spent_j = std::clamp(gained_j, 0.0, pair->stored_j);
-    pair->stored_j -= spent_j;
-    gained_j -= spent_j;
-    for (Contact& c : pair->contacts) {  // a contact that closed in the last step was stopped too deep, and lost the energy for this work
-      const double back_j = std::clamp(gained_j, 0.0, std::max(c.lost_j, 0.0));
-      c.lost_j -= back_j;
-      gained_j -= back_j;
-      ledger_.lose(-back_j);
+    for (double* source : {&pair->stored_j, &pair->stopped_j}) {
+      const double spent_j = std::clamp(gained_j, 0.0, *source);
+      *source -= spent_j;
+      gained_j -= spent_j;
     }
   }
   if (gained_j > 0.0)

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <limits>
 #include <map>
+#include <utility>
 
 #include "runtime/base/groups.hpp"
 #include "runtime/physics/rigid/limits.hpp"
@@ -92,6 +93,7 @@ Rest::Balance Rest::try_sleep(Island& island, double h, const std::vector<joints
     });
     return Balance::none;
   }
+  for (Pair* pair : island.pairs) ledger_.lose(std::exchange(pair->stopped_j, 0.0));
   for (int n = 0; const Point& p : points) {
     Contact& c = rows[n++].get();
     c.impulse = p.impulse;

@@ -158,9 +158,9 @@ void Space::step_island(Island& island, double start_s, double length_s) {
 /// body is displaced: bodies falling back from a displacement would never come to rest.
 bool Space::try_rest(Island& island, double length_s) {
   std::vector<State> kept;
-  std::vector<std::pair<double, Pair::Errors>> kept_pairs;
+  std::vector<std::tuple<double, double, Pair::Errors>> kept_pairs;
   for (const int body : island.bodies) kept.push_back(bodies_.state(body));
-  for (const Pair* pair : island.pairs) kept_pairs.emplace_back(pair->stored_j, pair->errors);
+  for (const Pair* pair : island.pairs) kept_pairs.emplace_back(pair->stored_j, pair->stopped_j, pair->errors);
   Books before, after;
   ledger_.add_to(before);
   const std::int64_t pushes = ledger_.costs.pushes;
@@ -182,7 +182,7 @@ bool Space::try_rest(Island& island, double length_s) {
   }
   for (int n = 0; Pair * pair : island.pairs) {
     if (!pair->contacts.empty()) touches_.refresh(*pair);
-    std::tie(pair->stored_j, pair->errors) = kept_pairs[n++];
+    std::tie(pair->stored_j, pair->stopped_j, pair->errors) = kept_pairs[n++];
   }
   return rest_.try_island(island, length_s);
 }

@@ -177,15 +177,22 @@ bool StepProblem::solve_rest(Step& step, double h, const std::vector<joints::Spa
 
 void StepProblem::keep_impulses(const Step& step, double at_s) const {
   const double h = step.length_s;
+  for (Pair* pair : step.island().pairs) ledger_.lose(std::exchange(pair->stopped_j, 0.0));
   for (int n = 0; const Point& p : step.points) {
-    Contact& c = step.rows[n++].get();
+    const ContactRef& row = step.rows[n++];
+    Contact& c = row.get();
+    const bool closes = c.cord < 0 && !c.touching && c.touch.gap_m > kTouchGapM;
     c.impulse = p.impulse;
     if (c.is_load) c.impulse = c.impulse + h * c.rest_n;
     c.couple = p.couple;
     c.step_s = h;
     c.until_s = bodies_.get_time() + at_s;
     c.lost_j = step.calc_loss(p, 1.0);
-    ledger_.lose(at_s < h ? step.calc_loss(p, at_s / h) : c.lost_j);
+    const double lost_j = at_s < h ? step.calc_loss(p, at_s / h) : c.lost_j;
+    if (closes && lost_j > 0.0)
+      row.pair->stopped_j += lost_j;
+    else
+      ledger_.lose(lost_j);
     const bool comes = c.touch.gap_m > kTouchGapM && dot(calc_relative_velocity(step.movers, p), p.normal) < -kStrikeSpeedMS;
     c.touching = (dot(c.impulse, c.touch.normal) > 0.0 && !comes) || c.is_closed();
   }

@@ -67,7 +67,10 @@ void TouchSets::forget_far(std::int64_t window) {
   for (auto at = pairs_.begin(); at != pairs_.end();) {
     Pair& pair = at->second;
     const bool is_far = pair.window != window && (bodies_.moves(pair.a) || bodies_.moves(pair.b));
-    if (is_far) lose_stored(pair);
+    if (is_far) {
+      lose_stored(pair);
+      ledger_.lose(pair.stopped_j);
+    }
     at = is_far ? pairs_.erase(at) : std::next(at);
   }
 }
@@ -369,7 +372,7 @@ void TouchSets::lose_stored(Pair& pair) const {
 }
 
 void TouchSets::add_to(Books& books) const {
-  for (const auto& [bodies, pair] : pairs_) books.springs_j += pair.stored_j;
+  for (const auto& [bodies, pair] : pairs_) books.springs_j += pair.stored_j + pair.stopped_j;
 }
 
 void TouchSets::release(int a, int b, double depth_m, double stored_j) {

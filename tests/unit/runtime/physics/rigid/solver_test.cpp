@@ -112,7 +112,10 @@ TEST(solver, direction_of_small_slip) {
     std::vector<Mover> movers{coin};
     std::vector<Point> points{p};
     Solver solver;
-    if (!solver.solve_directly(movers, points, 12)) { ++failed; continue; }
+    if (!solver.solve_directly(movers, points, 12)) {
+      ++failed;
+      continue;
+    }
     const double push = points[0].impulse[2], most = p.friction * push;
     const Vec3 slip = calc_relative_velocity(movers, p), pull = points[0].impulse - push * p.normal;
     ASSERT_NEAR(slip[2], 0.0, 2e-3 * g * h);

@@ -160,7 +160,7 @@ TEST(instants, slow_touches_of_rattling_pair) {
     stages.bodies.state(0).velocity = {0, 0, -0.1};
     EXPECT_TRUE(strikes());
     stages.bodies.state(0).velocity = {0, 0, -0.02};
-    stages.bodies.set_time(0.06);
+    stages.bodies.set_time(0.07);
     EXPECT_TRUE(strikes()) << "it rattles no longer";
   }
 }
