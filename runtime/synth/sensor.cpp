@@ -9,6 +9,7 @@
 #include <bit>
 #include <cmath>
 #include <complex>
+#include <limits>
 #include <string>
 
 #include "runtime/base/error.hpp"
@@ -49,6 +50,51 @@ class RigidAnswer {
   Vec3 centre_m_, along_, spin_{};
 };
 
+/// A triangle of a bank, its unit normal and area.
+struct Face {
+  std::array<Vec3, 3> corner;
+  Vec3 normal;
+  double area_m2;
+  Face(const bank::Bank& bank, const std::array<std::int32_t, 3>& triangle)
+      : corner{bank.vertices_m[triangle[0]], bank.vertices_m[triangle[1]], bank.vertices_m[triangle[2]]} {
+    const Vec3 twice = cross(corner[1] - corner[0], corner[2] - corner[0]);
+    area_m2 = 0.5 * norm(twice);
+    normal = calc_unit(twice);
+  }
+  /// Gradient of the barycentric coordinate of a corner, along a direction.
+  double calc_slope(std::size_t k, const Vec3& along) const {
+    return dot(along, cross(normal, corner[(k + 2) % 3] - corner[(k + 1) % 3])) / (2.0 * area_m2);
+  }
+};
+
+/// Rows and weights of the strain along a direction: at each corner the mean over the triangles about it, weighted by area, and linear
+/// between the corners. The strain of one triangle is constant, and that of its middle only to first order.
+std::vector<std::pair<std::size_t, double>> find_gauge(const bank::Bank& bank, const SensorSettings& settings) {
+  constexpr double kSameFace = 0.9;  // cosine of the angle between triangles of one face
+  const Face own(bank, bank.triangles[settings.triangle]);
+  if (!(own.area_m2 > 0.0)) throw InputError("sensor: its triangle has no area; move it");
+  const auto lay = [direction = calc_unit(settings.direction)](const Vec3& normal) { return direction - dot(direction, normal) * normal; };
+  if (!(norm(lay(own.normal)) > 1e-3)) throw InputError("sensor: a strain gauge lies in the surface, and its direction is normal to it");
+  std::vector<std::pair<std::size_t, double>> weights;
+  for (std::size_t corner = 0; corner < 3; ++corner) {
+    const std::int32_t vertex = bank.triangles[settings.triangle][corner];
+    const std::size_t first = weights.size();
+    double area_m2 = 0.0;
+    for (const auto& triangle : bank.triangles) {
+      if (std::find(triangle.begin(), triangle.end(), vertex) == triangle.end()) continue;
+      const Face face(bank, triangle);
+      if (!(face.area_m2 > 0.0) || dot(face.normal, own.normal) < kSameFace) continue;
+      area_m2 += face.area_m2;
+      const Vec3 along = calc_unit(lay(face.normal));
+      for (std::size_t k = 0; k < 3; ++k)
+        for (std::size_t axis = 0; axis < 3; ++axis)
+          weights.emplace_back(static_cast<std::size_t>(triangle[k]) * 3 + axis, face.area_m2 * face.calc_slope(k, along) * along[axis]);
+    }
+    for (std::size_t i = first; i < weights.size(); ++i) weights[i].second *= settings.barycentric[corner] / area_m2;
+  }
+  return weights;
+}
+
 Vec3 find_point(const bank::Bank& bank, const SensorSettings& settings) {
   Vec3 point{};
   for (std::size_t c = 0; c < 3; ++c) point = point + settings.barycentric[c] * bank.vertices_m[bank.triangles[settings.triangle][c]];
@@ -61,7 +107,7 @@ Sensor::Sensor(const std::shared_ptr<const Model>& model, const bank::Bank& bank
     : model_(model), quantity_(settings.quantity), rate_hz_(settings.rate_hz), step_s_(1.0 / model->get_rate_hz()) {
   check(bank, settings);
   if (rate_hz_ == 0.0) rate_hz_ = model->get_rate_hz();
-  add_modes(find_weights(bank, settings), settings.triangle);
+  add_modes(find_weights(bank, settings));
   if (quantity_ != Quantity::kStrain && !settings.is_held && is_free(bank)) add_rigid(bank, settings);
   if (rate_hz_ != model->get_rate_hz()) {
     base::Sinc::get();
@@ -85,42 +131,28 @@ void Sensor::check(const bank::Bank& bank, const SensorSettings& settings) const
   if (!(settings.buffer_s >= 0.0 && settings.buffer_s <= 600.0)) throw InputError("sensor: its buffer is 0 to 600 s");
 }
 
-/// Weights of the mode shapes' rows of its triangle: one per corner and axis.
 Sensor::Weights Sensor::find_weights(const bank::Bank& bank, const SensorSettings& settings) const {
-  Vec3 along = calc_unit(settings.direction);
-  Vec3 at_corner = settings.barycentric;
-  if (quantity_ == Quantity::kStrain) {
-    const auto& corners = bank.triangles[settings.triangle];
-    const Vec3 &a = bank.vertices_m[corners[0]], &b = bank.vertices_m[corners[1]], &c = bank.vertices_m[corners[2]];
-    const Vec3 normal = cross(b - a, c - a);
-    const double twice_area = norm(normal);
-    if (!(twice_area > 0.0)) throw InputError("sensor: its triangle has no area; move it");
-    const Vec3 unit = (1.0 / twice_area) * normal;
-    along = along - dot(along, unit) * unit;
-    if (!(norm(along) > 1e-3)) throw InputError("sensor: a strain gauge lies in the surface, and its direction is normal to it");
-    along = normalise(along);
-    at_corner = {dot(along, cross(unit, c - b)), dot(along, cross(unit, a - c)), dot(along, cross(unit, b - a))};
-    at_corner = (1.0 / twice_area) * at_corner;
-  }
-  Weights weights{};
+  if (quantity_ == Quantity::kStrain) return find_gauge(bank, settings);
+  const Vec3 along = calc_unit(settings.direction);
+  Weights weights;
   for (std::size_t corner = 0; corner < 3; ++corner)
-    for (std::size_t axis = 0; axis < 3; ++axis) weights[corner * 3 + axis] = at_corner[corner] * along[axis];
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      weights.emplace_back(static_cast<std::size_t>(bank.triangles[settings.triangle][corner]) * 3 + axis,
+                           settings.barycentric[corner] * along[axis]);
   return weights;
 }
 
-void Sensor::add_modes(const Weights& weights, std::int32_t triangle) {
+void Sensor::add_modes(const Weights& weights) {
   const Model& model = *model_;
   const int ringing = model.get_ringing_mode_count();
   sound_.assign(model.get_sound_tables().size(), SoundTable{});
   weight_.assign(sound_.size(), ModeWeight{});
-  const std::int16_t* row[kStrikeRows];
-  model.find_rows(triangle, row);
   const ModelSurface& surface = *model.get_surface();
   std::vector<double> along(surface.columns, 0.0);  // phi(p) times the scale of the shapes, by column
   for (int m = 0; m < model.get_mode_count(); ++m) {
     const std::size_t column = m < ringing ? m : model.get_damped_column(static_cast<std::size_t>(m - ringing));
     double phi = 0.0;
-    for (std::size_t r = 0; r < weights.size(); ++r) phi += weights[r] * row[r][column];
+    for (const auto& [row, weight] : weights) phi += weight * surface.shape[row * surface.columns + column];
     phi *= model.get_scale(m);
     along[column] = phi * model.get_scale(m);
     const double lambda = model.get_eigenvalue_rad2_s2(m), d = model.get_decay_per_s(m);
@@ -264,26 +296,35 @@ void Sensor::silence(int from, int samples) noexcept {
 }
 
 void Sensor::finish(int samples) noexcept {
-  for (int n = 0; n < samples; ++n) {
+  std::array<double, kBlock> values;
+  for (int n = 0; n < samples; ++n) values[n] = (n == 0 ? last_modal_ : static_cast<double>(modal_[n - 1])) + other_[n];
+  if (!rigid_.empty()) add_rigid_way(std::span(values).first(samples));
+  for (int n = 0; n < samples; ++n) values[n] = std::abs(values[n]) <= std::numeric_limits<double>::max() ? values[n] : 0.0;
+  last_modal_ = static_cast<double>(modal_[samples - 1]);
+  other_[0] = other_[samples];
+  std::fill_n(other_.begin() + 1, samples, 0.0);
+  std::fill_n(modal_.begin(), samples, 0.0F);
+  const std::span<const double> ready = std::span<const double>(values).subspan(has_last_ ? 0 : 1, samples - (has_last_ ? 0 : 1));
+  has_last_ = true;
+  if (history_.empty()) return put(ready);
+  for (const double value : ready) convert(value);
+}
+
+/// Adds velocity or way of the rigid body.
+void Sensor::add_rigid_way(std::span<double> values) noexcept {
+  for (std::size_t n = 0; n < values.size(); ++n) {
     way_ += velocity_ * step_s_ + moved_[n];
     velocity_ += gained_[n];
-    double value = (n == 0 ? last_modal_ : static_cast<double>(modal_[n - 1])) + other_[n];
-    if (quantity_ == Quantity::kVelocity) value += velocity_;
-    if (quantity_ == Quantity::kDisplacement) value += way_;
-    if (has_last_) pass_on(std::isfinite(value) ? value : 0.0);
-    has_last_ = true;
+    values[n] += quantity_ == Quantity::kVelocity ? velocity_ : way_;
   }
-  last_modal_ = static_cast<double>(modal_[samples - 1]);
-  for (auto* signal : {&other_, &gained_, &moved_}) {
-    (*signal)[0] = (*signal)[samples];
-    std::fill(signal->begin() + 1, signal->end(), 0.0);
+  for (auto* signal : {&gained_, &moved_}) {
+    (*signal)[0] = (*signal)[values.size()];
+    std::fill_n(signal->begin() + 1, values.size(), 0.0);
   }
-  modal_.fill(0.0F);
 }
 
 /// Converts to the own rate: a sinc, stretched to the lower rate, about each of its samples.
-void Sensor::pass_on(double value) noexcept {
-  if (history_.empty()) return put(value);
+void Sensor::convert(double value) noexcept {
   const auto mask = static_cast<std::int64_t>(history_.size()) - 1;
   history_[inputs_++ & mask] = value;
   const double reach = base::kSincHalf * stretch_;
@@ -295,18 +336,17 @@ void Sensor::pass_on(double value) noexcept {
       weights += weight;
       if (k >= 0) sum += weight * history_[k & mask];
     }
-    put(sum / weights);
+    const double between = sum / weights;
+    put({&between, 1});
   }
 }
 
-void Sensor::put(double value) noexcept {
+void Sensor::put(std::span<const double> values) noexcept {
   const std::uint64_t written = written_.load(std::memory_order_relaxed);
-  if (written - taken_.load(std::memory_order_acquire) >= ring_.size()) {
-    lost_.fetch_add(1, std::memory_order_relaxed);
-    return;
-  }
-  ring_[written & (ring_.size() - 1)] = value;
-  written_.store(written + 1, std::memory_order_release);
+  const std::size_t room = ring_.size() - (written - taken_.load(std::memory_order_acquire)), count = std::min(room, values.size());
+  for (std::size_t i = 0; i < count; ++i) ring_[(written + i) & (ring_.size() - 1)] = values[i];
+  written_.store(written + count, std::memory_order_release);
+  if (count < values.size()) lost_.fetch_add(static_cast<std::int64_t>(values.size() - count), std::memory_order_relaxed);
 }
 
 BodySensors::Trace BodySensors::make_trace(const Model& model) {

@@ -13,6 +13,7 @@
 #include <memory>
 #include <span>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "runtime/bank/bank.hpp"
@@ -61,6 +62,8 @@ class Sensor {
   Quantity get_quantity() const noexcept { return quantity_; }
   /// Time of its first sample; the body's first block with it. [any-thread]
   double get_begin_s() const noexcept { return begin_s_.load(std::memory_order_relaxed); }
+  /// Samples that read() would give now, or fewer. [any-thread]
+  std::size_t count_ready() const noexcept { return written_.load(std::memory_order_acquire) - taken_.load(std::memory_order_acquire); }
   /// The next samples, as many as are ready; returns their number. [one thread]: no heap, no lock, no throw.
   std::size_t read(std::span<double> samples) noexcept;
   /// Samples lost because none were read for SensorSettings::buffer_s. [any-thread]
@@ -88,21 +91,23 @@ class Sensor {
   void clear_damped_level() noexcept { damped_level_ = 0.0; }
 
  private:
-  using Weights = std::array<double, kStrikeRows>;
+  /// Weights of the rows of the shapes: vertex * 3 + axis, weight.
+  using Weights = std::vector<std::pair<std::size_t, double>>;
   struct Reading {
     double of_q, of_v;
   };
 
   void check(const bank::Bank& bank, const SensorSettings& settings) const;
   Weights find_weights(const bank::Bank& bank, const SensorSettings& settings) const;
-  void add_modes(const Weights& weights, std::int32_t triangle);
+  void add_modes(const Weights& weights);
   void add_rigid(const bank::Bank& bank, const SensorSettings& settings);
   double find_share(const std::vector<double>& field, const std::int16_t* const* row, const float* weight) const noexcept;
   template <class MakeMoments>
   void add_pulse(double direct, double rigid, double begin, double end, int offset, const MakeMoments& make) noexcept;
   void add_contacts(const ContactBlock& drive, int offset) noexcept;
-  void pass_on(double value) noexcept;
-  void put(double value) noexcept;
+  void add_rigid_way(std::span<double> values) noexcept;
+  void convert(double value) noexcept;
+  void put(std::span<const double> values) noexcept;
 
   std::shared_ptr<const Model> model_;
   Quantity quantity_;
