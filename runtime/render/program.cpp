@@ -17,6 +17,7 @@
 #include "runtime/base/standard_output.hpp"
 #include "runtime/render/render.hpp"
 #include "runtime/render/report.hpp"
+#include "runtime/render/sensor_playback.hpp"
 #include "runtime/render/sound/spectrogram.hpp"
 #include "runtime/render/sound_file.hpp"
 #include "runtime/render/surface_playback.hpp"
@@ -106,6 +107,9 @@ class Outputs {
   std::vector<OutputFile> files_;
 };
 
+/// "NAME.sensors.wav" next to the WAV file.
+fs::path find_sensor_file(const fs::path& wav) { return fs::path(wav).replace_extension(".sensors.wav"); }
+
 bool is_same_file(const fs::path& a, const fs::path& b) {
   std::error_code error;
   if (fs::equivalent(a, b, error)) return true;
@@ -127,6 +131,10 @@ void check_outputs(const ProgramOptions& options, const scene::Scene& scene) {
   if (options.trajectory) outputs.emplace_back(*options.trajectory, "trajectory");
   if (options.report) outputs.emplace_back(*options.report, "report");
   if (options.record) outputs.emplace_back(*options.record, "contacts file");
+  const bool has_sensors = !options.plan && !scene.sensors.empty();
+  if (has_sensors && is_standard_output(options.wav))
+    throw InputError(fmt::format("{}: the scene has sensors, whose file is named after the WAV file; give -o a name", scene.file.string()));
+  if (has_sensors) outputs.emplace_back(find_sensor_file(options.wav), "file of the sensors");
   std::vector<std::pair<fs::path, std::string>> taken{{scene.file, "scene"}};
   if (options.contacts) taken.emplace_back(*options.contacts, "contacts file to play");
   for (const scene::SceneBody& body : scene.bodies)
@@ -309,12 +317,14 @@ class Run {
   void render(const scene::Plan& plan) {
     const auto started = Clock::now();
     sound::SoundStore store(scene_.sample_rate_hz, scene::count_channels(scene_), make_spool("sound"));
+    sound::SoundStore sensors(find_sensor_rate(scene_), std::max<std::size_t>(1, scene_.sensors.size()), make_spool("sensors"));
     const Sound sound = calc_sound(scene_, body_banks_, happened_.events,
                                    {.rate_hz = scene_.sample_rate_hz,
                                     .plan = &plan,
                                     .audits = options_->audit,
                                     .fades_end = scene_.output.fade_end,
                                     .head = &head_,
+                                    .sensors = &sensors,
                                     .progress = Progress("sound", options_->quiet)},
                                    store);
     figures_.sound_s = get_seconds_since(started);
@@ -335,7 +345,7 @@ class Run {
     figures_.real_time_factor = (figures_.physics_s + figures_.sound_s) / scene_.duration_s;
     figures_.modes = sound.modes;
     figures_.gain = calc_gain(scene_.output, sound.peak_pa);
-    write(plan, sound, store);
+    write(plan, sound, store, sensors);
   }
 
   const scene::Scene& get_scene() const { return scene_; }
@@ -343,7 +353,7 @@ class Run {
  private:
   base::Spool make_spool(const char* what) const { return base::Spool(find_spool_folder(options_->wav), what); }
 
-  void write(const scene::Plan& plan, const Sound& sound, const sound::SoundStore& store) {
+  void write(const scene::Plan& plan, const Sound& sound, const sound::SoundStore& store, const sound::SoundStore& sensors) {
     const bool to_standard_output = is_standard_output(options_->wav);
     std::FILE* notes = to_standard_output ? stderr : stdout;
     Outputs outputs;
@@ -360,6 +370,8 @@ class Run {
     if (options_->report) outputs.add(*options_->report, "report").append(make_report_json(scene_, sound, plan, figures_));
     if (options_->record) scene::write_recording(happened_, append_to(outputs.add(*options_->record, "contacts file")));
     const auto write_sound = [&](auto&& sink) { write_wav(store, figures_.gain.per_pa, scene_.output.format, sink); };
+    if (!scene_.sensors.empty())
+      write_wav(sensors, 1.0, scene::SampleFormat::kFloat, append_to(outputs.add(find_sensor_file(options_->wav), "sensors")));
     if (!to_standard_output) write_sound(append_to(outputs.add(options_->wav, "sound")));
     if (!options_->quiet) print_summary(notes, scene_, sound, figures_);
     print_warnings(scene_, sound, figures_);

@@ -11,6 +11,7 @@
 
 #include "runtime/base/clock.hpp"
 #include "runtime/render/event_playback.hpp"
+#include "runtime/render/sensor_playback.hpp"
 #include "runtime/scene/microphones.hpp"
 #include "runtime/scene/pose.hpp"
 #include "runtime/scene/session.hpp"
@@ -70,14 +71,18 @@ std::vector<BodySummary> summarise(const scene::Scene& scene, const std::vector<
   return summaries;
 }
 
-/// Effects of each body, by the plan or else by the scene. Bodies without events have none, bodies without lasting contacts none of those.
+/// Effects of each body, by the plan or else by the scene. Bodies without events and sensors have none, bodies without lasting contacts
+/// none of those.
 std::vector<synth::EffectSet> find_body_effects(const scene::Scene& scene, const std::vector<BodySummary>& summaries,
                                                 const scene::Plan* plan) {
   std::vector<synth::EffectSet> found(summaries.size());
+  std::vector<bool> is_sensed(summaries.size());
+  for (const scene::SceneSensor& sensor : scene.sensors) is_sensed[sensor.body] = true;
   for (std::size_t i = 0; i < summaries.size(); ++i) {
-    if (!summaries[i].is_played) continue;
+    if (!summaries[i].is_played && !is_sensed[i]) continue;
     const synth::EffectSet chosen = plan != nullptr ? plan->selector.choose(static_cast<int>(i)) : scene.effects;
     found[i] = find_effects(scene, i, summaries[i].is_touched ? chosen : chosen.without(synth::kContactEffects));
+    if (is_sensed[i]) found[i] = found[i].with({Effect::kModal, Effect::kHertzPulse});  // also where they are not heard
   }
   return found;
 }
@@ -177,6 +182,8 @@ class Rendering {
         effects_(find_body_effects(scene, summaries_, options.plan)),
         playback_(events, list_scheduled_bodies(), path_),
         synthesiser_(&open()) {
+    if (options.sensors != nullptr && !scene.sensors.empty())
+      sensors_.emplace(scene, banks, *synthesiser_, count_frames(scene.duration_s, find_sensor_rate(scene)), *options.sensors);
     if (!scene.surfaces.empty()) surfaces_.emplace(scene, session_.get_microphones(), session_.get_head(), options.rate_hz);
   }
 
@@ -203,6 +210,7 @@ class Rendering {
       const std::size_t count = std::min(kBlock, samples - start);
       playback_.push_until(static_cast<double>(start + kBlock) / rate_hz, *synthesiser_);
       synthesiser_->process(out.data(), static_cast<int>(out.size()), static_cast<int>(count));
+      if (sensors_) sensors_->take();
       if (options_->audits) note_energy();
       const std::size_t skipped = std::min(count, start < latency ? latency - start : 0);
       for (std::size_t c = 0; c < out.size(); ++c) heard[c] = blocks[c].data() + skipped;
@@ -214,6 +222,12 @@ class Rendering {
       outlet.add(heard, count - skipped);
       if (options_->progress) options_->progress(static_cast<double>(start + count) / static_cast<double>(samples));
     }
+  }
+
+  /// Slower sensors lag behind the sound: their samples reach ahead.
+  void finish_sensors() {
+    std::array<float, kBlock> block{};
+    for (float* out = block.data(); sensors_ && !sensors_->is_complete(); sensors_->take()) synthesiser_->process(&out, 1, kBlock);
   }
 
   std::size_t get_latency() const { return synthesiser_->get_latency(); }
@@ -295,6 +309,7 @@ class Rendering {
   synth::Synthesiser* synthesiser_;
   double max_modes_j_ = 0.0;
   std::optional<SurfacePlayback> surfaces_;  // empty without recorded surfaces
+  std::optional<SensorPlayback> sensors_;    // empty without sensors
 };
 
 }  // namespace
@@ -309,6 +324,7 @@ Sound calc_sound(const scene::Scene& scene, const std::vector<const bank::Bank*>
   Outlet outlet(store, frames, options.fades_end);
   const double began_s = base::get_process_cpu_s();
   rendering.render(frames + rendering.get_latency(), outlet);
+  rendering.finish_sensors();
   sound.seconds_playing_cpu = std::max(0.0, base::get_process_cpu_s() - began_s - outlet.get_seconds_cpu());
   outlet.finish(sound);
   rendering.count(sound);

@@ -74,6 +74,7 @@ struct RenderOptions {
   bool fades_end = false;             // fade a sound that is cut off within kFadeS
   /// make_head() of the scene at this rate, if already made; nullptr: made here.
   const std::optional<synth::ListeningHead>* head = nullptr;
+  sound::SoundStore* sensors = nullptr;    // for the readings of the scene's sensors (SensorPlayback); nullptr: not read
   std::function<void(double)> progress{};  // may be empty; called with the finished fraction
 };
 
