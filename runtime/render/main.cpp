@@ -42,6 +42,8 @@ int main(int argc, char** argv) {
   app.add_option("--contacts", options.contacts, "Contacts file to play instead of the scene's physics and strikes")
       ->option_text("IN.jsonl");
   app.add_option("--record", options.record, "Contacts file to write: all events, for replay")->option_text("OUT.jsonl");
+  app.add_option("--labels", options.labels, "Labels for learning: contacts, hits, poses and modal energies on the clock of the WAV")
+      ->option_text("OUT.npz|OUT.jsonl");
   app.add_option("--rate", options.rate_hz, "Sample rate instead of the scene's, 8000 to 192000")
       ->check(carillon::base::whole_range(8000, 192000), carillon::base::describe_whole_range(8000, 192000))
       ->option_text("HZ");

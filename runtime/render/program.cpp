@@ -15,6 +15,7 @@
 #include "runtime/base/file.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/base/standard_output.hpp"
+#include "runtime/render/labels.hpp"
 #include "runtime/render/render.hpp"
 #include "runtime/render/report.hpp"
 #include "runtime/render/sensor_playback.hpp"
@@ -110,6 +111,8 @@ class Outputs {
 /// "NAME.sensors.wav" next to the WAV file.
 fs::path find_sensor_file(const fs::path& wav) { return fs::path(wav).replace_extension(".sensors.wav"); }
 
+bool is_npz(const fs::path& labels) { return base::find_extension(labels) == ".npz"; }
+
 bool is_same_file(const fs::path& a, const fs::path& b) {
   std::error_code error;
   if (fs::equivalent(a, b, error)) return true;
@@ -131,6 +134,7 @@ void check_outputs(const ProgramOptions& options, const scene::Scene& scene) {
   if (options.trajectory) outputs.emplace_back(*options.trajectory, "trajectory");
   if (options.report) outputs.emplace_back(*options.report, "report");
   if (options.record) outputs.emplace_back(*options.record, "contacts file");
+  if (options.labels) outputs.emplace_back(*options.labels, "file of labels");
   const bool has_sensors = !options.plan && !scene.sensors.empty();
   if (has_sensors && is_standard_output(options.wav))
     throw InputError(fmt::format("{}: the scene has sensors, whose file is named after the WAV file; give -o a name", scene.file.string()));
@@ -151,6 +155,8 @@ void check_outputs(const ProgramOptions& options, const scene::Scene& scene) {
     taken.emplace_back(file, what);
   }
   if (!options.plan) check_sound_name(options.wav);
+  if (options.labels && !is_npz(*options.labels) && base::find_extension(*options.labels) != ".jsonl")
+    throw InputError(fmt::format("{}: labels are written as .npz or .jsonl; give the file a name that ends so", options.labels->string()));
 }
 
 /// One line per body whose bank ends below the audible range.
@@ -263,7 +269,8 @@ scene::Scene prepare_scene(const ProgramOptions& options) {
     const auto name = std::find(scene::kSampleFormatNames.begin(), scene::kSampleFormatNames.end(), *options.format);
     scene.output.format = static_cast<scene::SampleFormat>(name - scene::kSampleFormatNames.begin());
   }
-  if (options.plan && (options.spectrogram || options.trajectory || options.report || options.record || !options.wav.empty())) {
+  if (options.plan &&
+      (options.spectrogram || options.trajectory || options.report || options.record || options.labels || !options.wav.empty())) {
     throw InputError("--plan makes no sound and writes no files; remove the options that name files");
   }
   return scene;
@@ -299,7 +306,8 @@ class Run {
         scene::make_facts(scene_, scene::make_microphones(scene_), options_->contacts.has_value() || scene::has_physics(scene_));
     const auto started = Clock::now();
     const double cpu_s = base::get_process_cpu_s();
-    const bool has_contacts = options_->record.has_value() || effects::EffectSelector(facts).needs_contacts();
+    const bool has_contacts =
+        options_->record.has_value() || options_->labels.has_value() || effects::EffectSelector(facts).needs_contacts();
     happened_ = options_->contacts
                     ? scene::read_scene_events(*options_->contacts, scene_, make_spool("contacts"))
                     : scene::simulate(scene_, has_contacts, options_->audit, Progress("physics", options_->quiet), make_spool("contacts"));
@@ -325,6 +333,7 @@ class Run {
                                     .fades_end = scene_.output.fade_end,
                                     .head = &head_,
                                     .sensors = &sensors,
+                                    .energies = options_->labels ? &energies_ : nullptr,
                                     .progress = Progress("sound", options_->quiet)},
                                    store);
     figures_.sound_s = get_seconds_since(started);
@@ -368,6 +377,10 @@ class Run {
                        append_to(outputs.add(*options_->trajectory, "trajectory")));
     }
     if (options_->report) outputs.add(*options_->report, "report").append(make_report_json(scene_, sound, plan, figures_));
+    if (options_->labels) {
+      const auto write_labels = is_npz(*options_->labels) ? write_npz : write_jsonl;
+      write_labels(make_labels(scene_, body_banks_, happened_.events, energies_), append_to(outputs.add(*options_->labels, "labels")));
+    }
     if (options_->record) scene::write_recording(happened_, append_to(outputs.add(*options_->record, "contacts file")));
     const auto write_sound = [&](auto&& sink) { write_wav(store, figures_.gain.per_pa, scene_.output.format, sink); };
     if (!scene_.sensors.empty())
@@ -389,6 +402,7 @@ class Run {
   std::optional<synth::ListeningHead> head_;  // head of the listener
   scene::SceneEvents happened_;
   Figures figures_;
+  ModalEnergies energies_;  // with labels
 };
 
 }  // namespace

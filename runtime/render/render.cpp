@@ -211,6 +211,7 @@ class Rendering {
       playback_.push_until(static_cast<double>(start + kBlock) / rate_hz, *synthesiser_);
       synthesiser_->process(out.data(), static_cast<int>(out.size()), static_cast<int>(count));
       if (sensors_) sensors_->take();
+      if (options_->energies != nullptr && start + count <= samples - latency) measure_energies(*options_->energies, start + count);
       if (options_->audits) note_energy();
       const std::size_t skipped = std::min(count, start < latency ? latency - start : 0);
       for (std::size_t c = 0; c < out.size(); ++c) heard[c] = blocks[c].data() + skipped;
@@ -231,6 +232,21 @@ class Rendering {
   }
 
   std::size_t get_latency() const { return synthesiser_->get_latency(); }
+
+  /// At a sample; at every block that follows a hundredth of a second. Lightly damped modes: lambda A^2 / 2.
+  void measure_energies(ModalEnergies& energies, std::size_t sample) {
+    const double time_s = static_cast<double>(sample) / options_->rate_hz;
+    if (time_s * ModalEnergies::kRateHz < static_cast<double>(energies.time_s.size())) return;
+    energies.time_s.push_back(time_s);
+    for (std::size_t i = 0; i < scene_->bodies.size(); ++i) {
+      const bank::Bank& bank = *scene_->bodies[i].spec.bank;
+      amplitudes_.assign(bank.mode_count(), 0.0F);
+      synthesiser_->measure_amplitudes(static_cast<int>(i), amplitudes_);
+      double energy_j = 0.0;
+      for (std::size_t m = 0; m < amplitudes_.size(); ++m) energy_j += 0.5 * bank.eigenvalue_rad2_s2[m] * std::pow(amplitudes_[m], 2.0);
+      energies.modes_j.push_back(energy_j);
+    }
+  }
 
   void note_energy() {
     double held_j = 0.0;
@@ -310,6 +326,7 @@ class Rendering {
   double max_modes_j_ = 0.0;
   std::optional<SurfacePlayback> surfaces_;  // empty without recorded surfaces
   std::optional<SensorPlayback> sensors_;    // empty without sensors
+  std::vector<float> amplitudes_;            // buffer
 };
 
 }  // namespace
