@@ -125,7 +125,7 @@ class SensorsTest(unittest.TestCase):
         # Newton and Euler: the mean after the blow is that of a rigid body.
         inertia = MASS * (LENGTH**2 + THICKNESS**2) / 12
         rigid = IMPULSE * (1 / MASS + self.struck_m[0] * x / inertia)
-        self.assertLess(abs(mean / rigid - 1), 2e-3)
+        self.assertLess(abs(mean / rigid - 1), 1e-6)
 
     def test_acceleration_through_the_blow(self):
         place = numpy.array([LENGTH / 4, 0.0, THICKNESS / 2])
