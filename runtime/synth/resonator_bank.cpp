@@ -197,10 +197,10 @@ void ResonatorBank::add_damped(const SubBlock& now) noexcept {
   if (damped_.is_live()) directed_->add_damped(sound.data(), now.index, static_cast<int>(now.out - block_.data()));
 }
 
-/// Coupled modes; at the ears by the groups in which they would ring.
+/// Coupled modes; at ears and sensors by the groups in which they would ring.
 void ResonatorBank::add_nonlinear(const SubBlock& now) noexcept {
   if (!nonlinear_->is_live() && !now.struck && !now.is_driven()) return;
-  if (directed_ != nullptr) ringing_.wake(nonlinear_->get_group_count());
+  if (directed_ != nullptr || sensors_ != nullptr) ringing_.wake(nonlinear_->get_group_count());
   SampleStates* traced = find_traced();
   nonlinear_->add(now.sample, strikes_, now.struck, now.drive, now.out, traced, ringing_.get_ringing_groups());
   counters_.coupled_samples += static_cast<std::int64_t>(nonlinear_->get_limit()) * kSubBlock;

@@ -12,6 +12,7 @@
 #include "runtime/base/error.hpp"
 #include "runtime/synth/synthesiser.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
+#include "tests/unit/runtime/synth/multipole_cube.hpp"
 
 namespace carillon::synth {
 namespace {
@@ -241,6 +242,61 @@ TEST(Sensor, SamplesKeepTheirTimeWhileTheBodySleeps) {
   late.time_s = 0.51;
   const auto read = play(bank, {.triangle = 9}, {make_blow(1e-3), late}, 48000);
   for (std::size_t n = 450; n < 600; ++n) EXPECT_NEAR(read[n], read[n + 24000], 1e-3 * std::abs(read[480])) << n;
+}
+
+TEST(Sensor, DirectivityDoesNotChangeWhatIsRead) {
+  bank::Bank bank = make_bank();
+  const std::vector<testing::ModeMultipoles> multipoles(bank.mode_count(), testing::make_dipole(1.0));
+  testing::give_multipoles(bank, multipoles, 0.09);
+  const SensorSettings settings{.triangle = 9};
+  const auto plain = play(bank, settings, {make_blow(1e-3)}, 2048);
+  const auto directed = play(bank, settings, {make_blow(1e-3)}, 2048, 128, kDefaultEffects.with(Effect::kDirectivity));
+  EXPECT_LT(compare(directed, plain), 1e-6);
+}
+
+TEST(Sensor, CoupledModesAreReadAsLinearOnesWhileTheyMoveSoftly) {
+  bank::Bank bank = make_cube_bank({{400.0, 5.0, 1e-2, {0.3, -0.2, 1.0}, 0.1}, {900.0, 5.0, 1e-2, {0.1, 0.3, 0.7}, 0.2}});
+  bank.quartic.modes = {0, 1};
+  bank.quartic.rows.assign(2 * bank::count_pairs(2), 1e-3F);
+  const SensorSettings settings{.triangle = 9, .quantity = Quantity::kVelocity};
+  const auto linear = play(bank, settings, {make_blow(1e-3)}, 4096);
+  try {
+    const auto coupled = play(bank, settings, {make_blow(1e-3)}, 4096, 128, kDefaultEffects.with(Effect::kNonlinear));
+    EXPECT_LT(compare(coupled, linear), 1e-3);
+    EXPECT_THROW(play(bank, {.triangle = 9}, {}, 128, 128, kDefaultEffects.with(Effect::kNonlinear)), InputError);
+  } catch (const InputError&) {
+    GTEST_SKIP() << "built without nonlinear";
+  }
+}
+
+TEST(Sensor, RollingNoiseIsReadAsForceAndMotion) {
+  const bank::Bank bank = make_cube_bank({{400.0, 30.0, 1e-2, {0.3, -0.2, 1.0}, 0.1}});
+  std::vector<events::Event> events;
+  for (int k = 0; k < 40; ++k)
+    events.emplace_back(events::LastingContact{.time_s = 0.005 * k,
+                                               .id = 7,
+                                               .triangle = 2,
+                                               .barycentric = kCorner,
+                                               .normal = {0.0, 0.0, 1.0},
+                                               .slip_m_s = {0.1, 0.0, 0.0},
+                                               .force_n = 2.0,
+                                               .sweep_m_s = 0.1,
+                                               .other_sweep_m_s = 0.1,
+                                               .patch_radius_m = 1e-5,
+                                               .impedance_n_s_m = 0.0});
+  const EffectSet effects = kDefaultEffects.with(Effect::kRoughness);
+  SensorSettings settings{.triangle = 9};
+  const auto a = play(bank, settings, events, 7200, 128, effects);
+  settings.quantity = Quantity::kVelocity;
+  const auto v = play(bank, settings, events, 7200, 128, effects);
+  double sum = 0.0, largest = 0.0, off = 0.0;
+  for (std::size_t n = 1; n < v.size(); ++n) {
+    sum += 0.5 * (a[n - 1] + a[n]) / kRate;
+    largest = std::max(largest, std::abs(v[n]));
+    off = std::max(off, std::abs(sum - v[n]));
+  }
+  EXPECT_GT(largest, 1e-6);
+  EXPECT_LT(off / largest, 0.05);
 }
 
 TEST(Sensor, ItRefusesWhatCannotBeRead) {
