@@ -11,6 +11,7 @@
 #include "runtime/base/json.hpp"
 #include "runtime/base/vector.hpp"
 #include "runtime/render/npz.hpp"
+#include "runtime/synth/sensor.hpp"
 
 namespace carillon::render {
 namespace {
@@ -52,7 +53,7 @@ class Filler {
 
 /// Mass of a body as a blow at a point feels it [kg]; 0: it cannot move.
 double calc_effective_mass(const bank::Bank& bank, bool is_fixed, const Vec3& point_m, const Vec3& along) {
-  if (is_fixed || !(bank.rigid.mass_kg > 0.0) || bank.supports.count() > 0) return 0.0;
+  if (is_fixed || !synth::moves_freely(bank)) return 0.0;
   const auto& i = bank.rigid.inertia_kg_m2;
   const Mat3 inertia{Vec3{i[0], i[1], i[2]}, Vec3{i[3], i[4], i[5]}, Vec3{i[6], i[7], i[8]}};
   double mobility = 1.0 / bank.rigid.mass_kg;

@@ -30,11 +30,6 @@ std::complex<double> calc_weight(Quantity quantity, double lambda, double decay)
   return {0.0, -1.0 / omega_d};
 }
 
-/// True for a body that moves as a rigid body.
-bool is_free(const bank::Bank& bank) {
-  return bank.rigid.mass_kg > 0.0 && bank.supports.count() == 0 && (bank.element != "analytic" || bank.counts.rigid_modes >= 6);
-}
-
 /// Force on the body at a vertex to acceleration of the rigid body at a point, along a direction [1/kg].
 class RigidAnswer {
  public:
@@ -103,12 +98,16 @@ Vec3 find_point(const bank::Bank& bank, const SensorSettings& settings) {
 
 }  // namespace
 
+bool moves_freely(const bank::Bank& bank) {
+  return bank.rigid.mass_kg > 0.0 && bank.supports.count() == 0 && (bank.element != "analytic" || bank.counts.rigid_modes >= 6);
+}
+
 Sensor::Sensor(const std::shared_ptr<const Model>& model, const bank::Bank& bank, const SensorSettings& settings)
     : model_(model), quantity_(settings.quantity), rate_hz_(settings.rate_hz), step_s_(1.0 / model->get_rate_hz()) {
   check(bank, settings);
   if (rate_hz_ == 0.0) rate_hz_ = model->get_rate_hz();
   add_modes(find_weights(bank, settings));
-  if (quantity_ != Quantity::kStrain && !settings.is_held && is_free(bank)) add_rigid(bank, settings);
+  if (quantity_ != Quantity::kStrain && !settings.is_held && moves_freely(bank)) add_rigid(bank, settings);
   if (rate_hz_ != model->get_rate_hz()) {
     base::Sinc::get();
     ratio_ = model->get_rate_hz() / rate_hz_;

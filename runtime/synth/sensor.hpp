@@ -38,6 +38,9 @@ struct SensorSettings {
   double buffer_s = 1.0;  // samples that wait for read()
 };
 
+/// True for a body that moves as a rigid body: with a mass, and not held anywhere.
+bool moves_freely(const bank::Bank& bank);
+
 /// Rates of sensors [Hz].
 inline constexpr double kSlowestSensorHz = 50.0, kFastestSensorHz = 192000.0;
 

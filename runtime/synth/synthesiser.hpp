@@ -120,8 +120,8 @@ class Synthesiser {
   /// Effect::kNonlinear, whose coupling forces it would lack, more than BodySensors::kMax of a body or kMaxSensors, and as Sensor does.
   /// [main-thread]
   int add_sensor(int body, const bank::Bank& bank, const SensorSettings& settings);
-  /// nullptr for a missing number. It outlives its body. [any-thread]
-  Sensor* find_sensor(int sensor) noexcept {
+  /// nullptr for a missing number. A sensor and its number outlive its body, until the destructor. [any-thread]
+  Sensor* find_sensor(int sensor) const noexcept {
     return sensor >= 0 && sensor < sensor_count_.load(std::memory_order_acquire) ? sensors_[sensor].get() : nullptr;
   }
   static constexpr int kMaxSensors = 4096;

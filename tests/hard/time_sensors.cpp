@@ -76,6 +76,9 @@ TEST(time, sensors) {
   check("at the struck point", bank, {.triangle = kStruck}, true, 1e-5);
   check("elsewhere", bank, {.triangle = kAway}, true, 1e-5);
   check("held", bank, {.triangle = kAway, .is_held = true}, false, 1e-5);
+  bank::Bank clamped = bank;
+  clamped.supports.area_m2 = {1e-4};
+  check("clamped", clamped, {.triangle = kAway}, false, 1e-5);
   bank::Bank light = bank;
   light.rigid = {};
   check("no mass", light, {.triangle = kAway}, false, 1e-5);

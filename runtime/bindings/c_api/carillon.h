@@ -449,9 +449,9 @@ CARILLON_API carillon_status carillon_add_sensor(carillon_synth* synth, const ca
  * sensor. Sample n is the reading at carillon_sensor_begin_s + n / rate_hz, without delay. */
 CARILLON_API int32_t carillon_read_sensor(carillon_synth* synth, int32_t number, double* out, int32_t samples);
 /* [any] Time of the first sample; 0 for a sensor that was added before the first frame. */
-CARILLON_API double carillon_sensor_begin_s(carillon_synth* synth, int32_t number);
+CARILLON_API double carillon_sensor_begin_s(const carillon_synth* synth, int32_t number);
 /* [any] Samples lost because the buffer was full. */
-CARILLON_API int64_t carillon_sensor_lost(carillon_synth* synth, int32_t number);
+CARILLON_API int64_t carillon_sensor_lost(const carillon_synth* synth, int32_t number);
 
 #ifdef __cplusplus
 }

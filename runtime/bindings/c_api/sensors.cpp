@@ -59,12 +59,12 @@ int32_t carillon_read_sensor(carillon_synth* synth, int32_t number, double* out,
   return static_cast<int32_t>(sensor->read(std::span(out, static_cast<std::size_t>(samples))));
 }
 
-double carillon_sensor_begin_s(carillon_synth* synth, int32_t number) {
+double carillon_sensor_begin_s(const carillon_synth* synth, int32_t number) {
   const synth::Sensor* sensor = synth == nullptr ? nullptr : synth->synthesiser.find_sensor(number);
   return sensor == nullptr ? 0.0 : sensor->get_begin_s();
 }
 
-int64_t carillon_sensor_lost(carillon_synth* synth, int32_t number) {
+int64_t carillon_sensor_lost(const carillon_synth* synth, int32_t number) {
   const synth::Sensor* sensor = synth == nullptr ? nullptr : synth->synthesiser.find_sensor(number);
   return sensor == nullptr ? 0 : sensor->get_lost();
 }
