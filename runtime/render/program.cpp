@@ -15,8 +15,10 @@
 #include "runtime/base/file.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/base/standard_output.hpp"
+#include "runtime/render/labels.hpp"
 #include "runtime/render/render.hpp"
 #include "runtime/render/report.hpp"
+#include "runtime/render/sensor_playback.hpp"
 #include "runtime/render/sound/spectrogram.hpp"
 #include "runtime/render/sound_file.hpp"
 #include "runtime/render/surface_playback.hpp"
@@ -106,6 +108,11 @@ class Outputs {
   std::vector<OutputFile> files_;
 };
 
+/// "NAME.sensors.wav" next to the WAV file.
+fs::path find_sensor_file(const fs::path& wav) { return fs::path(wav).replace_extension(".sensors.wav"); }
+
+bool is_npz(const fs::path& labels) { return base::find_extension(labels) == ".npz"; }
+
 bool is_same_file(const fs::path& a, const fs::path& b) {
   std::error_code error;
   if (fs::equivalent(a, b, error)) return true;
@@ -127,6 +134,11 @@ void check_outputs(const ProgramOptions& options, const scene::Scene& scene) {
   if (options.trajectory) outputs.emplace_back(*options.trajectory, "trajectory");
   if (options.report) outputs.emplace_back(*options.report, "report");
   if (options.record) outputs.emplace_back(*options.record, "contacts file");
+  if (options.labels) outputs.emplace_back(*options.labels, "file of labels");
+  const bool has_sensors = !options.plan && !scene.sensors.empty();
+  if (has_sensors && is_standard_output(options.wav))
+    throw InputError(fmt::format("{}: the scene has sensors, whose file is named after the WAV file; give -o a name", scene.file.string()));
+  if (has_sensors) outputs.emplace_back(find_sensor_file(options.wav), "file of the sensors");
   std::vector<std::pair<fs::path, std::string>> taken{{scene.file, "scene"}};
   if (options.contacts) taken.emplace_back(*options.contacts, "contacts file to play");
   for (const scene::SceneBody& body : scene.bodies)
@@ -143,6 +155,8 @@ void check_outputs(const ProgramOptions& options, const scene::Scene& scene) {
     taken.emplace_back(file, what);
   }
   if (!options.plan) check_sound_name(options.wav);
+  if (options.labels && !is_npz(*options.labels) && base::find_extension(*options.labels) != ".jsonl")
+    throw InputError(fmt::format("{}: labels are written as .npz or .jsonl; give the file a name that ends so", options.labels->string()));
 }
 
 /// One line per body whose bank ends below the audible range.
@@ -255,7 +269,8 @@ scene::Scene prepare_scene(const ProgramOptions& options) {
     const auto name = std::find(scene::kSampleFormatNames.begin(), scene::kSampleFormatNames.end(), *options.format);
     scene.output.format = static_cast<scene::SampleFormat>(name - scene::kSampleFormatNames.begin());
   }
-  if (options.plan && (options.spectrogram || options.trajectory || options.report || options.record || !options.wav.empty())) {
+  if (options.plan &&
+      (options.spectrogram || options.trajectory || options.report || options.record || options.labels || !options.wav.empty())) {
     throw InputError("--plan makes no sound and writes no files; remove the options that name files");
   }
   return scene;
@@ -291,7 +306,8 @@ class Run {
         scene::make_facts(scene_, scene::make_microphones(scene_), options_->contacts.has_value() || scene::has_physics(scene_));
     const auto started = Clock::now();
     const double cpu_s = base::get_process_cpu_s();
-    const bool has_contacts = options_->record.has_value() || effects::EffectSelector(facts).needs_contacts();
+    const bool has_contacts =
+        options_->record.has_value() || options_->labels.has_value() || effects::EffectSelector(facts).needs_contacts();
     happened_ = options_->contacts
                     ? scene::read_scene_events(*options_->contacts, scene_, make_spool("contacts"))
                     : scene::simulate(scene_, has_contacts, options_->audit, Progress("physics", options_->quiet), make_spool("contacts"));
@@ -309,12 +325,15 @@ class Run {
   void render(const scene::Plan& plan) {
     const auto started = Clock::now();
     sound::SoundStore store(scene_.sample_rate_hz, scene::count_channels(scene_), make_spool("sound"));
+    sound::SoundStore sensors(find_sensor_rate(scene_), std::max<std::size_t>(1, scene_.sensors.size()), make_spool("sensors"));
     const Sound sound = calc_sound(scene_, body_banks_, happened_.events,
                                    {.rate_hz = scene_.sample_rate_hz,
                                     .plan = &plan,
                                     .audits = options_->audit,
                                     .fades_end = scene_.output.fade_end,
                                     .head = &head_,
+                                    .sensors = &sensors,
+                                    .energies = options_->labels ? &energies_ : nullptr,
                                     .progress = Progress("sound", options_->quiet)},
                                    store);
     figures_.sound_s = get_seconds_since(started);
@@ -335,7 +354,7 @@ class Run {
     figures_.real_time_factor = (figures_.physics_s + figures_.sound_s) / scene_.duration_s;
     figures_.modes = sound.modes;
     figures_.gain = calc_gain(scene_.output, sound.peak_pa);
-    write(plan, sound, store);
+    write(plan, sound, store, sensors);
   }
 
   const scene::Scene& get_scene() const { return scene_; }
@@ -343,7 +362,7 @@ class Run {
  private:
   base::Spool make_spool(const char* what) const { return base::Spool(find_spool_folder(options_->wav), what); }
 
-  void write(const scene::Plan& plan, const Sound& sound, const sound::SoundStore& store) {
+  void write(const scene::Plan& plan, const Sound& sound, const sound::SoundStore& store, const sound::SoundStore& sensors) {
     const bool to_standard_output = is_standard_output(options_->wav);
     std::FILE* notes = to_standard_output ? stderr : stdout;
     Outputs outputs;
@@ -358,8 +377,14 @@ class Run {
                        append_to(outputs.add(*options_->trajectory, "trajectory")));
     }
     if (options_->report) outputs.add(*options_->report, "report").append(make_report_json(scene_, sound, plan, figures_));
+    if (options_->labels) {
+      const auto write_labels = is_npz(*options_->labels) ? write_npz : write_jsonl;
+      write_labels(make_labels(scene_, body_banks_, happened_.events, energies_), append_to(outputs.add(*options_->labels, "labels")));
+    }
     if (options_->record) scene::write_recording(happened_, append_to(outputs.add(*options_->record, "contacts file")));
     const auto write_sound = [&](auto&& sink) { write_wav(store, figures_.gain.per_pa, scene_.output.format, sink); };
+    if (!scene_.sensors.empty())
+      write_wav(sensors, 1.0, scene::SampleFormat::kFloat, append_to(outputs.add(find_sensor_file(options_->wav), "sensors")));
     if (!to_standard_output) write_sound(append_to(outputs.add(options_->wav, "sound")));
     if (!options_->quiet) print_summary(notes, scene_, sound, figures_);
     print_warnings(scene_, sound, figures_);
@@ -377,6 +402,7 @@ class Run {
   std::optional<synth::ListeningHead> head_;  // head of the listener
   scene::SceneEvents happened_;
   Figures figures_;
+  ModalEnergies energies_;  // with labels
 };
 
 }  // namespace

@@ -13,16 +13,17 @@ struct ProgramOptions {
   std::optional<std::filesystem::path> spectrogram, trajectory, report;
   std::optional<std::filesystem::path> contacts;  // replaces the scene's physics and strikes
   std::optional<std::filesystem::path> record;
-  std::optional<int> rate_hz;         // overrides the scene's
-  std::optional<std::string> format;  // overrides the scene's
-  bool audit = false;                 // energy balance
-  bool plan = false;                  // print the planned effects with reasons; no sound
-  bool quiet = false;                 // print warnings only
+  std::optional<std::filesystem::path> labels;  // .npz or .jsonl
+  std::optional<int> rate_hz;                   // overrides the scene's
+  std::optional<std::string> format;            // overrides the scene's
+  bool audit = false;                           // energy balance
+  bool plan = false;                            // print the planned effects with reasons; no sound
+  bool quiet = false;                           // print warnings only
 };
 
 /// Reads all inputs, simulates, renders and writes all outputs. Notes go to stdout (stderr if the sound goes to stdout), progress and
-/// warnings to stderr. Outputs appear together and complete, or not at all. Memory does not grow with the length of the scene. Throws
-/// InputError before any work for an invalid input or an unwritable output.
+/// warnings to stderr. Outputs appear together and complete, or not at all. Memory does not grow with the length of the scene, but for
+/// labels. Throws InputError before any work for an invalid input or an unwritable output.
 void run(const ProgramOptions& options);
 
 }  // namespace carillon::render

@@ -11,6 +11,7 @@
 
 #include "runtime/base/clock.hpp"
 #include "runtime/render/event_playback.hpp"
+#include "runtime/render/sensor_playback.hpp"
 #include "runtime/scene/microphones.hpp"
 #include "runtime/scene/pose.hpp"
 #include "runtime/scene/session.hpp"
@@ -70,14 +71,18 @@ std::vector<BodySummary> summarise(const scene::Scene& scene, const std::vector<
   return summaries;
 }
 
-/// Effects of each body, by the plan or else by the scene. Bodies without events have none, bodies without lasting contacts none of those.
+/// Effects of each body, by the plan or else by the scene. Bodies without events and sensors have none, bodies without lasting contacts
+/// none of those.
 std::vector<synth::EffectSet> find_body_effects(const scene::Scene& scene, const std::vector<BodySummary>& summaries,
                                                 const scene::Plan* plan) {
   std::vector<synth::EffectSet> found(summaries.size());
+  std::vector<bool> is_sensed(summaries.size());
+  for (const scene::SceneSensor& sensor : scene.sensors) is_sensed[sensor.body] = true;
   for (std::size_t i = 0; i < summaries.size(); ++i) {
-    if (!summaries[i].is_played) continue;
+    if (!summaries[i].is_played && !is_sensed[i]) continue;
     const synth::EffectSet chosen = plan != nullptr ? plan->selector.choose(static_cast<int>(i)) : scene.effects;
     found[i] = find_effects(scene, i, summaries[i].is_touched ? chosen : chosen.without(synth::kContactEffects));
+    if (is_sensed[i]) found[i] = found[i].with({Effect::kModal, Effect::kHertzPulse});  // also where they are not heard
   }
   return found;
 }
@@ -177,6 +182,8 @@ class Rendering {
         effects_(find_body_effects(scene, summaries_, options.plan)),
         playback_(events, list_scheduled_bodies(), path_),
         synthesiser_(&open()) {
+    if (options.sensors != nullptr && !scene.sensors.empty())
+      sensors_.emplace(scene, banks, *synthesiser_, count_frames(scene.duration_s, find_sensor_rate(scene)), *options.sensors);
     if (!scene.surfaces.empty()) surfaces_.emplace(scene, session_.get_microphones(), session_.get_head(), options.rate_hz);
   }
 
@@ -203,6 +210,8 @@ class Rendering {
       const std::size_t count = std::min(kBlock, samples - start);
       playback_.push_until(static_cast<double>(start + kBlock) / rate_hz, *synthesiser_);
       synthesiser_->process(out.data(), static_cast<int>(out.size()), static_cast<int>(count));
+      if (sensors_) sensors_->take();
+      if (options_->energies != nullptr && start + count <= samples - latency) measure_energies(*options_->energies, start + count);
       if (options_->audits) note_energy();
       const std::size_t skipped = std::min(count, start < latency ? latency - start : 0);
       for (std::size_t c = 0; c < out.size(); ++c) heard[c] = blocks[c].data() + skipped;
@@ -216,7 +225,28 @@ class Rendering {
     }
   }
 
+  /// Slower sensors lag behind the sound: their samples reach ahead.
+  void finish_sensors() {
+    std::array<float, kBlock> block{};
+    for (float* out = block.data(); sensors_ && !sensors_->is_complete(); sensors_->take()) synthesiser_->process(&out, 1, kBlock);
+  }
+
   std::size_t get_latency() const { return synthesiser_->get_latency(); }
+
+  /// At a sample; at every block that follows a hundredth of a second. Lightly damped modes: lambda A^2 / 2.
+  void measure_energies(ModalEnergies& energies, std::size_t sample) {
+    const double time_s = static_cast<double>(sample) / options_->rate_hz;
+    if (time_s * ModalEnergies::kRateHz < static_cast<double>(energies.time_s.size())) return;
+    energies.time_s.push_back(time_s);
+    for (std::size_t i = 0; i < scene_->bodies.size(); ++i) {
+      const bank::Bank& bank = *scene_->bodies[i].spec.bank;
+      amplitudes_.assign(bank.mode_count(), 0.0F);
+      synthesiser_->measure_amplitudes(static_cast<int>(i), amplitudes_);
+      double energy_j = 0.0;
+      for (std::size_t m = 0; m < amplitudes_.size(); ++m) energy_j += 0.5 * bank.eigenvalue_rad2_s2[m] * std::pow(amplitudes_[m], 2.0);
+      energies.modes_j.push_back(energy_j);
+    }
+  }
 
   void note_energy() {
     double held_j = 0.0;
@@ -295,6 +325,8 @@ class Rendering {
   synth::Synthesiser* synthesiser_;
   double max_modes_j_ = 0.0;
   std::optional<SurfacePlayback> surfaces_;  // empty without recorded surfaces
+  std::optional<SensorPlayback> sensors_;    // empty without sensors
+  std::vector<float> amplitudes_;            // buffer
 };
 
 }  // namespace
@@ -309,6 +341,7 @@ Sound calc_sound(const scene::Scene& scene, const std::vector<const bank::Bank*>
   Outlet outlet(store, frames, options.fades_end);
   const double began_s = base::get_process_cpu_s();
   rendering.render(frames + rendering.get_latency(), outlet);
+  rendering.finish_sensors();
   sound.seconds_playing_cpu = std::max(0.0, base::get_process_cpu_s() - began_s - outlet.get_seconds_cpu());
   outlet.finish(sound);
   rendering.count(sound);

@@ -67,6 +67,13 @@ struct Sound {
   double seconds_playing_cpu = 0.0;  // block-by-block synthesis only
 };
 
+/// Energies of the modes during a sound.
+struct ModalEnergies {
+  static constexpr double kRateHz = 100.0;
+  std::vector<double> time_s;   // (n) at least 1 / kRateHz apart
+  std::vector<double> modes_j;  // (n, bodies)
+};
+
 struct RenderOptions {
   int rate_hz = 48000;
   const scene::Plan* plan = nullptr;  // choice of effects; nullptr: all bodies have the scene's effects
@@ -74,6 +81,8 @@ struct RenderOptions {
   bool fades_end = false;             // fade a sound that is cut off within kFadeS
   /// make_head() of the scene at this rate, if already made; nullptr: made here.
   const std::optional<synth::ListeningHead>* head = nullptr;
+  sound::SoundStore* sensors = nullptr;    // for the readings of the scene's sensors (SensorPlayback); nullptr: not read
+  ModalEnergies* energies = nullptr;       // to be filled; nullptr: not measured
   std::function<void(double)> progress{};  // may be empty; called with the finished fraction
 };
 

@@ -15,7 +15,7 @@ namespace carillon::render {
 namespace {
 
 constexpr double kPosesPerS = 200.0;
-constexpr std::size_t kPiece = 1 << 16;  // bytes per write
+constexpr std::size_t kPieceBytes = 1 << 16;  // bytes per write
 
 using Paths = base::RecordLists<physics::Pose>;
 
@@ -258,7 +258,7 @@ class JsonPieces {
     levels_.push_back({end});
   }
   void place(std::string_view key) {
-    if (json_.size() >= kPiece) flush();
+    if (json_.size() >= kPieceBytes) flush();
     if (!std::exchange(levels_.back().is_empty, false)) json_ += ',';
     start_line();
     json_ += key;

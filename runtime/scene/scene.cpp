@@ -134,6 +134,8 @@ const base::Keys<Scene> kScene{
     {"joints", "none", "hinges, ball joints, sliders ([joints](hear-a-scene.md#joints-and-cords))"},
     {"cords", "none", "strings ([joints](hear-a-scene.md#joints-and-cords))"},
     {"strikes", "none", "blows in addition to those of the physics"},
+    {"sensors", "none", "accelerometers, strain gauges ([Sensors](#sensors))"},
+    {"sensor_rate_hz", &Scene::sensor_rate_hz, Limits{50, 192000}, "of all sensors, by default `sample_rate_hz`"},
     {"listener", "none", "two ears, with the keys below"},
     {"microphones", "none", "replaces `listener`: 1 to 16 positions `[x, y, z]`, one per channel"},
     {"effects", "`\"auto\"`", "chosen automatically; a list: exactly these; `{\"on\": [...], \"off\": [...]}` ([Effects](#effects))"},
@@ -180,7 +182,8 @@ const base::Keys<Quality> kQuality{
      "impacts include the modes ([cost](../decisions/impact.md)). False: rigid bodies, given restitution and a Hertz pulse; thin "
      "plates then get too much energy"},
     {"masking", &Quality::masking,
-     "omits hits that are masked by earlier ones of the body; inaudible, and 6 to 8 % less CPU time ([figures](../decisions/contact.md))"},
+     "omits hits that are masked by earlier ones of the body; inaudible, and 6 to 8 % less CPU time "
+     "([figures](../decisions/contact.md)). False by default with `sensors`"},
     {"instructions", &Quality::instructions, kInstructionNames, "instruction set; falls back if unsupported"}};
 const base::Keys<effects::SelectionThresholds> kThresholds{
     {"quiet_db", &effects::SelectionThresholds::below_loudest_db, Limits{20, 250},
@@ -281,8 +284,7 @@ Output parse_output(base::Object& object) {
   return output;
 }
 
-Quality parse_quality(base::Object& object) {
-  Quality quality;
+Quality parse_quality(base::Object& object, Quality quality) {
   if (object.has("planner_db")) quality.thresholds.audible_share = std::pow(10.0, 0.1 * read_within(object, "planner_db", -150.0, -10.0));
   kThresholds.read(object, quality.thresholds);
   kQuality.read(object, quality);
@@ -346,6 +348,7 @@ Scene parse_scene(const base::Document& document) {
   const Names names = parse_bodies(root, scene);
   parse_joints(root, names, scene);
   parse_strikes(root, names, scene);
+  parse_sensors(root, names, scene);
   if (auto listener = root.object_if("listener")) scene.listener = parse_listener(*listener);
   if (root.has("microphones")) {
     if (root.has("listener")) root.fail("microphones", "takes the place of \"listener\"; keep one of them");
@@ -360,7 +363,8 @@ Scene parse_scene(const base::Document& document) {
   check_head(root, scene);
   check_floor(root, scene);
   if (auto output = root.object_if("output")) scene.output = parse_output(*output);
-  if (auto quality = root.object_if("quality")) scene.quality = parse_quality(*quality);
+  scene.quality.masking = scene.sensors.empty();  // hits that are not heard are still read
+  if (auto quality = root.object_if("quality")) scene.quality = parse_quality(*quality, scene.quality);
   root.finish();
   return scene;
 }
@@ -376,6 +380,7 @@ std::vector<base::KeyTable> describe_scene_keys() {
   kThresholds.describe(tables[1]);
   describe_body_keys(tables);
   describe_strike_keys(tables);
+  describe_sensor_keys(tables);
   describe_joint_keys(tables);
   return tables;
 }

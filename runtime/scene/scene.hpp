@@ -22,6 +22,7 @@
 #include "runtime/synth/effects.hpp"
 #include "runtime/synth/floor.hpp"
 #include "runtime/synth/kernels.hpp"
+#include "runtime/synth/sensor.hpp"
 #include "runtime/synth/trajectory.hpp"
 
 namespace carillon::recording {
@@ -116,6 +117,17 @@ struct SceneStrike {
   std::optional<Mallet> mallet{};  // replaces impulse and duration
 };
 
+/// A sensor on a modal body. Point and direction are in the frame of the body's mesh.
+struct SceneSensor {
+  std::string name;
+  std::string place;                          // "file:line", for messages
+  std::size_t body = 0;                       // index into Scene::bodies
+  std::optional<Vec3> point_m{};              // moved to the nearest point of the surface; or
+  std::optional<std::int32_t> triangle = {};  // centre of this triangle of the bank
+  Vec3 direction{0.0, 0.0, 1.0};              // unit
+  synth::Quantity quantity = synth::Quantity::kAcceleration;
+};
+
 struct SceneListener {
   Vec3 position_m{0.0, -1.5, 0.5};     // between the ears, at the start
   std::vector<synth::PathPoint> path;  // of a moving listener
@@ -160,6 +172,8 @@ struct Scene {
   std::vector<physics::JointSpec> joints;
   std::vector<physics::CordSpec> cords;
   std::vector<SceneStrike> strikes;  // in the order of the file
+  std::vector<SceneSensor> sensors;
+  std::optional<int> sensor_rate_hz;  // empty: sample_rate_hz
   SceneListener listener;
   std::vector<Vec3> microphones_m;  // replace the listener's ears, one per channel
   radiation::GainKind radiation = radiation::GainKind::kAuto;
@@ -181,6 +195,9 @@ Scene parse_scene(const base::Document& document);
 
 /// Reference of the keys, for carillon-render --keys.
 std::vector<base::KeyTable> describe_scene_keys();
+
+/// A sensor on the bank of its body. Throws InputError "file:line: ..." for a place that is not there.
+synth::SensorSettings locate_sensor(const Scene& scene, const SceneSensor& sensor, const bank::Bank& bank);
 
 /// Reflecting ground; empty if it does not reflect.
 std::optional<synth::Floor> find_floor(const Scene& scene);

@@ -16,11 +16,12 @@
 namespace carillon::scene {
 
 inline constexpr double kLongestS = 3600.0;
-inline constexpr double kFarthestM = 1e4;     // of positions; half a minute at the speed of sound
-inline constexpr double kMaxSpeedMs = 300.0;  // below the speed of sound in air
-inline constexpr double kRoughestM = 1e-3;    // larger heights belong to the shape
-inline constexpr double kSoftestPa = 100.0;   // a jelly
-inline constexpr double kStiffestPa = 1e13;   // ten times diamond
+inline constexpr double kFarthestM = 1e4;       // of positions; half a minute at the speed of sound
+inline constexpr double kMaxSpeedMs = 300.0;    // below the speed of sound in air
+inline constexpr double kFarthestShare = 0.25;  // largest distance of a point from the surface, share of the body's extent
+inline constexpr double kRoughestM = 1e-3;      // larger heights belong to the shape
+inline constexpr double kSoftestPa = 100.0;     // a jelly
+inline constexpr double kStiffestPa = 1e13;     // ten times diamond
 
 using base::read_vector;
 using base::read_within;
@@ -49,6 +50,12 @@ inline constexpr std::size_t kMaxStrikes = 100000;
 
 /// Reads the key "strikes" of a scene whose duration is known. Throws InputError "file:line: ...".
 void parse_strikes(base::Object& root, const Names& names, Scene& scene);
+
+/// Reads the key "sensors" of a scene. Throws InputError "file:line: ...".
+void parse_sensors(base::Object& root, const Names& names, Scene& scene);
+
+/// Appends the table "sensor" of the reference.
+void describe_sensor_keys(std::vector<base::KeyTable>& tables);
 
 /// Appends the tables "strike" and "mallet" of the reference.
 void describe_strike_keys(std::vector<base::KeyTable>& tables);

@@ -12,13 +12,13 @@
 #include "runtime/bank/nearest.hpp"
 #include "runtime/base/vector.hpp"
 #include "runtime/scene/planning.hpp"
+#include "runtime/scene/scene_bodies.hpp"
 #include "runtime/synth/variation.hpp"
 
 namespace carillon::scene {
 namespace {
 
 constexpr double kQuestionedNs = 1.0, kQuestionedJ = 20.0;  // limits of plausible ideal impulses
-constexpr double kFarthestShare = 0.25;                     // largest distance of a point from the surface, share of the body's extent
 
 /// Nearest points of a bank's surface; uses a tree for many strikes.
 class Finder {

@@ -149,7 +149,8 @@ DampedModes::Range DampedModes::find_range(std::size_t first, bool forced) const
   return range;
 }
 
-void DampedModes::add(std::int64_t sample, const StrikeQueue& strikes, bool struck, const ContactForces* contacts, float* out) noexcept {
+void DampedModes::add(std::int64_t sample, const StrikeQueue& strikes, bool struck, const ContactForces* contacts, float* out,
+                      DampedState* states) noexcept {
   const bool forced = struck || contacts != nullptr;
   const auto& modes = model_->get_damped_modes();
   is_live_ = !modes.empty();
@@ -166,6 +167,7 @@ void DampedModes::add(std::int64_t sample, const StrikeQueue& strikes, bool stru
         DampedState& s = states_[i];
         if (!forced) s = {m.qq * s.q + m.qv * s.v, m.vq * s.q + m.vv * s.v};
         pressure += m.gain * s.v;
+        if (states != nullptr) states[static_cast<std::size_t>(n) * modes.size() + i] = s;
       }
       out[n] += static_cast<float>(pressure);
     }

@@ -32,8 +32,9 @@ class DampedModes {
   }
 
   /// Adds the pressure [Pa at 1 m] of the kSubBlock samples from `sample` on. `struck`: some of `strikes` act; `contacts`: with a force in
-  /// this sub-block, or nullptr.
-  void add(std::int64_t sample, const StrikeQueue& strikes, bool struck, const ContactForces* contacts, float* out) noexcept;
+  /// this sub-block, or nullptr. `states`: for the states at each sample, (kSubBlock, modes), or nullptr.
+  void add(std::int64_t sample, const StrikeQueue& strikes, bool struck, const ContactForces* contacts, float* out,
+           DampedState* states = nullptr) noexcept;
 
   /// Silences the modes if their total pressure stays below this [Pa at 1 m].
   void drop_below(double pressure_pa) noexcept;

@@ -69,6 +69,7 @@ void ResonatorBank::render(int sub_blocks) noexcept {
   horizon_ += sub_blocks * kSubBlock;
   block_samples_ = unread_samples_ = sub_blocks * kSubBlock;
   if (directed_ != nullptr) directed_->clear(block_samples_);
+  if (sensors_ != nullptr) sensors_->begin(block_samples_);
   silent_ = !is_awake() && !fades_ && strikes_.is_empty() && (contacts_ == nullptr || contacts_->is_resting());
   if (silent_) return;
   const bool touched = contacts_ != nullptr && !contacts_->is_idle();
@@ -90,7 +91,7 @@ void ResonatorBank::begin_block() noexcept {
   if (horizon_ / kBlock % kCullEvery != 0 || !is_awake()) return;
   const double share = silence_pa_ / static_cast<double>(ringing_.get_model_groups() + 1);
   ringing_.drop_below(share, get_weights());
-  damped_.drop_below(share);
+  if (sensors_ == nullptr || !sensors_->reads_damped()) damped_.drop_below(share);
   if (nonlinear_) nonlinear_->drop_below(share);
 }
 
@@ -101,8 +102,8 @@ void ResonatorBank::render_sub_blocks(std::int64_t start, int sub_blocks, bool s
   const auto first = static_cast<int>(start % kBlock / kSubBlock);
   const bool judged = model_->get_bending().thickness_m > 0.0;
   const bool watched = judged && bending_.is_watching();
-  // The starts are needed for the ears, and while the bending is watched.
-  const bool whole = sub_blocks == kSubBlocks && !struck_at_all && !touched && directed_ == nullptr && !watched;
+  // The starts are needed for ears and sensors, and while the bending is watched.
+  const bool whole = sub_blocks == kSubBlocks && !struck_at_all && !touched && directed_ == nullptr && sensors_ == nullptr && !watched;
   if (const int ringing = ringing_.get_ringing_groups(); ringing > 0 && whole) {
     kernels.ring(model_->get_sound_tables().data(), model_->get_rotation_tables().data(), ringing_.get_state_data(), ringing,
                  block_.data());
@@ -126,6 +127,7 @@ void ResonatorBank::render_sub_blocks(std::int64_t start, int sub_blocks, bool s
       if (const int ringing = ringing_.get_ringing_groups(); ringing > 0 && !now.is_damped()) {
         kernels.emit(model_->get_sound_tables().data(), ringing_.get_starts(), ringing, now.index, made - q, now.out);
         if (directed_ != nullptr) directed_->emit(kernels, ringing_.get_starts(), ringing, now.index, made - q, q * kSubBlock);
+        if (sensors_ != nullptr) sensors_->emit(kernels, ringing_.get_starts(), ringing, now.index, made - q, q * kSubBlock);
       }
     }
     render_forces(now, judged, audited);
@@ -140,7 +142,9 @@ void ResonatorBank::render_forces(const SubBlock& now, bool judged, bool audited
   if (const bool acted = now.struck || now.is_driven(); judged && (acted || bending_.is_watching()))
     bending_.look(ringing_.get_state_data(), ringing_.get_starts(), end_column, ringing_.get_ringing_groups(), damped_.get_states(), acted);
   if (audited) note_energy_acted(now.sample + kSubBlock, end_column, now.is_damped());
-  if (directed_ != nullptr) add_directed(now);
+  const int traced = std::exchange(traced_groups_, 0);
+  if (directed_ != nullptr) add_directed(now, traced);
+  if (sensors_ != nullptr) add_sensed(now, traced);
 }
 
 /// Clears the state, and the samples from this sub-block on, if the sub-block is not finite; true then.
@@ -151,39 +155,52 @@ bool ResonatorBank::clear_if_not_finite(const SubBlock& now) noexcept {
   reset();
   std::fill(now.out, block_.data() + block_samples_, 0.0F);
   if (directed_ != nullptr) directed_->silence(static_cast<int>(now.out - block_.data()));
+  if (sensors_ != nullptr) sensors_->silence(static_cast<int>(now.out - block_.data()));
   return true;
 }
 
-/// Buffer for the trace of responses to forces in this sub-block, for the ears and the energy book: all ringing groups, new ones zeroed;
-/// nullptr if neither needs it.
+/// Buffer for the trace of responses to forces in this sub-block, for ears, sensors and the energy book: all ringing groups, new ones
+/// zeroed; nullptr if none needs it.
 SampleStates* ResonatorBank::find_traced() noexcept {
-  if (directed_ == nullptr && !traces_for_book_) return nullptr;
-  SampleStates* traced = directed_ != nullptr ? directed_->get_kept().data() : book_->get_kept();
+  if (directed_ == nullptr && sensors_ == nullptr && !traces_for_book_) return nullptr;
+  SampleStates* traced = directed_ != nullptr  ? directed_->get_kept().data()
+                         : sensors_ != nullptr ? sensors_->get_kept()
+                                               : book_->get_kept();
   for (; traced_groups_ < ringing_.get_ringing_groups(); ++traced_groups_) traced[traced_groups_] = SampleStates{};
   return traced;
 }
 
 /// Adds the responses to forces of a sub-block at the ears.
-void ResonatorBank::add_directed(const SubBlock& now) noexcept {
-  const int groups = std::exchange(traced_groups_, 0), offset = static_cast<int>(now.out - block_.data());
-  if (groups > 0) directed_->weigh(ringing_.get_kernels(), directed_->get_kept().data(), groups, now.index, offset);
+void ResonatorBank::add_directed(const SubBlock& now, int traced) noexcept {
+  const int offset = static_cast<int>(now.out - block_.data());
+  if (traced > 0) directed_->weigh(ringing_.get_kernels(), directed_->get_kept().data(), traced, now.index, offset);
   if (fades_) directed_->add_fade(now.index, offset);
+}
+
+/// Adds the responses to forces of a sub-block, damped modes and the forces themselves to the sensors. What fades out is not read.
+void ResonatorBank::add_sensed(const SubBlock& now, int traced) noexcept {
+  const int offset = static_cast<int>(now.out - block_.data());
+  const SampleStates* kept = directed_ != nullptr ? directed_->get_kept().data() : sensors_->get_kept();
+  if (traced > 0) sensors_->weigh(ringing_.get_kernels(), kept, traced, offset);
+  if (damped_.is_live()) sensors_->add_damped(offset);
+  if (now.struck || now.is_driven()) sensors_->add_forces(strikes_, now.drive, now.sample, offset);
 }
 
 void ResonatorBank::add_damped(const SubBlock& now) noexcept {
   const ContactForces* contacts = now.is_driven() ? contacts_ : nullptr;
   if (!now.struck && contacts == nullptr && !damped_.is_live()) return;
-  if (directed_ == nullptr) return damped_.add(now.sample, strikes_, now.struck, contacts, now.out);
+  DampedState* states = sensors_ != nullptr ? sensors_->get_damped() : nullptr;
+  if (directed_ == nullptr) return damped_.add(now.sample, strikes_, now.struck, contacts, now.out, states);
   alignas(64) std::array<float, kSubBlock> sound{};
-  damped_.add(now.sample, strikes_, now.struck, contacts, sound.data());
+  damped_.add(now.sample, strikes_, now.struck, contacts, sound.data(), states);
   for (std::size_t n = 0; n < sound.size(); ++n) now.out[n] += sound[n];
   if (damped_.is_live()) directed_->add_damped(sound.data(), now.index, static_cast<int>(now.out - block_.data()));
 }
 
-/// Coupled modes; at the ears by the groups in which they would ring.
+/// Coupled modes; at ears and sensors by the groups in which they would ring.
 void ResonatorBank::add_nonlinear(const SubBlock& now) noexcept {
   if (!nonlinear_->is_live() && !now.struck && !now.is_driven()) return;
-  if (directed_ != nullptr) ringing_.wake(nonlinear_->get_group_count());
+  if (directed_ != nullptr || sensors_ != nullptr) ringing_.wake(nonlinear_->get_group_count());
   SampleStates* traced = find_traced();
   nonlinear_->add(now.sample, strikes_, now.struck, now.drive, now.out, traced, ringing_.get_ringing_groups());
   counters_.coupled_samples += static_cast<std::int64_t>(nonlinear_->get_limit()) * kSubBlock;
@@ -345,7 +362,6 @@ void ResonatorBank::note_energy_acted(std::int64_t sample, int column, bool damp
       [&](int m) { return is_coupled(m); }, nonlinear_ ? nonlinear_->calc_energy_j() : 0.0);
   counters_.energy = book_->get();
   traces_for_book_ = false;
-  if (directed_ == nullptr) traced_groups_ = 0;
 }
 
 void ResonatorBank::reset() noexcept {
@@ -358,6 +374,7 @@ void ResonatorBank::reset() noexcept {
 }
 
 std::span<const std::array<float, kGroup>> ResonatorBank::get_weights() const noexcept {
+  if (sensors_ != nullptr) return sensors_->get_weights();
   return directed_ != nullptr ? model_->get_directivity()->weight : model_->get_weights();
 }
 

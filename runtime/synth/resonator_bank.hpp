@@ -23,6 +23,7 @@
 #include "runtime/synth/model.hpp"
 #include "runtime/synth/nonlinear_modes.hpp"
 #include "runtime/synth/ringing_modes.hpp"
+#include "runtime/synth/sensor.hpp"
 #include "runtime/synth/strike_queue.hpp"
 
 namespace carillon::synth {
@@ -77,6 +78,9 @@ class ResonatorBank {
   /// Also renders to the ears of `ears` (nullptr: none), for the same model; it must outlive its use and have the weights of the block in
   /// which process() is called, whose calls then take whole sub-blocks within one block.
   void direct(Directivity* ears) noexcept { directed_ = ears; }
+
+  /// Also gives the readings of these sensors (nullptr: none), for the same model, under the conditions of direct().
+  void sense(BodySensors* sensors) noexcept { sensors_ = sensors; }
 
   /// Adds the pressure at 1 m [Pa] of the next pressure_pa.size() samples. Free without energy. Flushes denormal numbers inside.
   void process(std::span<float> pressure_pa) noexcept;
@@ -154,7 +158,8 @@ class ResonatorBank {
   void limit_touch(double begin, double end) noexcept;
   void add_damped(const SubBlock& now) noexcept;
   void add_nonlinear(const SubBlock& now) noexcept;
-  void add_directed(const SubBlock& now) noexcept;
+  void add_directed(const SubBlock& now, int traced) noexcept;
+  void add_sensed(const SubBlock& now, int traced) noexcept;
   int find_reach(float strength_n_s) const noexcept;
   void fade_out(int groups) noexcept;
   void reset() noexcept;
@@ -182,6 +187,7 @@ class ResonatorBank {
   std::unique_ptr<NonlinearModes> nonlinear_;  // only if is_nonlinear
   ContactForces* contacts_ = nullptr;
   Directivity* directed_ = nullptr;
+  BodySensors* sensors_ = nullptr;
   BendingWatch bending_;
   std::unique_ptr<EnergyBook> book_;  // only with audits_energy
   int kept_groups_ = 0;               // ringing groups allowed at the start of the next block

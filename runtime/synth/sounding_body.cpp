@@ -90,6 +90,18 @@ std::unique_ptr<ModelSwap> SoundingBody::make_swap(std::shared_ptr<const Model> 
   return swap;
 }
 
+std::unique_ptr<BodySensors> SoundingBody::make_sensors() const {
+  auto sensors = std::make_unique<BodySensors>(BodySensors::make_trace(*model_));
+  sensors->set_bounds(is_directed() ? model_->get_directivity()->weight : model_->get_weights());
+  return sensors;
+}
+
+void SoundingBody::sense(BodySensors& sensors, Sensor& sensor, std::int64_t sample) noexcept {
+  sensors_ = &sensors;
+  modes_->sense(sensors_);
+  sensors.attach(sensor, *model_, frame_.silence_pa, static_cast<double>(sample) / frame_.propagation.rate_hz);
+}
+
 void SoundingBody::begin(const ListenerTracks& listener, std::int64_t sample) noexcept {
   rendered_ = first_ = sample;
   if (acceleration_noise_) acceleration_noise_->attitude.push(turned_s_, rotation_);

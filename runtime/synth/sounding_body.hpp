@@ -88,6 +88,10 @@ class SoundingBody {
   EffectSet get_effects() const noexcept { return effects_; }
   /// Throws InputError for a model without the data for the effects. [main-thread]
   void check(const Model& model) const;
+  /// [main-thread]
+  const std::shared_ptr<const Model>& get_model() const noexcept { return model_; }
+  /// For its first sensor; only with Effect::kModal. [main-thread]
+  std::unique_ptr<BodySensors> make_sensors() const;
   /// Modules of a checked model, which the body has from then on. [main-thread]
   std::unique_ptr<ModelSwap> make_swap(std::shared_ptr<const Model> model);
 
@@ -99,6 +103,12 @@ class SoundingBody {
   void apply(ModelSwap& swap, const ListenerTracks& listener, std::int64_t sample) noexcept;
   /// At the first sample of a block: the swap that is over, with the old modules; or nullptr.
   ModelSwap* finish_swap(std::int64_t sample) noexcept;
+
+  /// At the first sample of a block: one more sensor, of `sensors`, which are made by make_sensors().
+  void sense(BodySensors& sensors, Sensor& sensor, std::int64_t sample) noexcept;
+  /// After render(), also of a body that sleeps: passes on the sensors' samples.
+  void finish_sensors(int samples) noexcept { sensors_->finish(samples); }
+  bool has_sensors() const noexcept { return sensors_ != nullptr; }
 
   /// `sample`: the first that is not rendered. False when no effect could take it.
   bool take(const events::Impulse& impulse, std::int64_t sample) noexcept;
@@ -159,6 +169,7 @@ class SoundingBody {
   std::unique_ptr<ResonatorBank> modes_;
   std::unique_ptr<BodyAccelerationNoise> acceleration_noise_;
   std::unique_ptr<ContactForces> contacts_;  // attached to modes_
+  BodySensors* sensors_ = nullptr;           // nullptr: none
   ContactSurface surface_;                   // with the material of the model
   std::unique_ptr<Propagation> propagation_;
   ModelSwap* swap_ = nullptr;    // in its block

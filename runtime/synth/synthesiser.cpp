@@ -23,6 +23,7 @@ constexpr int kMaxBodies = 1 << 20;
 constexpr std::int64_t kGiveBackEvery = 8;  // blocks: 21 ms at 48 kHz
 constexpr int kMaxMicrophones = 256;
 constexpr int kMaxRoom = 1 << 24;
+constexpr std::size_t kWaitingSensors = 1024;
 
 SynthesiserOptions check(SynthesiserOptions options) {
   const auto refuse = [](const char* what) { throw InputError(std::string("a synthesiser needs ") + what); };
@@ -76,6 +77,11 @@ class Synthesiser::Pipe {
     head_.store((head + 1) % items_.size(), std::memory_order_release);
     return true;
   }
+  /// Items that push() would take now, or more.
+  std::size_t get_room() const noexcept {
+    const std::size_t head = head_.load(std::memory_order_acquire), tail = tail_.load(std::memory_order_relaxed);
+    return (head + items_.size() - tail - 1) % items_.size();
+  }
 
  private:
   std::vector<T> items_;
@@ -90,13 +96,14 @@ Synthesiser::Synthesiser(SynthesiserOptions options)
                 options_.head),
       allowed_(options_.budget) {
   const std::size_t bodies = options_.max_bodies;
-  // Per number at most three commands (add, swap, remove) and two answers.
-  commands_ = std::make_unique<Pipe<Command>>(3 * bodies);
+  // Per number at most three commands (add, swap, remove) and two answers; add_sensor() leaves room for them.
+  commands_ = std::make_unique<Pipe<Command>>(3 * bodies + kWaitingSensors);
   gone_ = std::make_unique<Pipe<Command>>(2 * bodies);
   owned_.resize(bodies);
   published_bodies_ = std::make_unique<Published[]>(bodies);
   playing_.resize(bodies);
   directed_.reserve(bodies);
+  sensed_.reserve(bodies);
   awake_.resize((bodies + 63) / 64);
   mix_.resize(options_.microphones_m.size());
   if (options_.head) latency_ += options_.head->head->get_latency();
@@ -183,6 +190,7 @@ void Synthesiser::swap_model(int body, std::shared_ptr<const Model> model) {
   check_model(model.get());
   collect();
   Owned& owned = owned_[check_owned(body)];
+  if (owned.sensors != nullptr) throw InputError("a body with sensors keeps its model; remove it and add it again");
   owned.body->check(*model);
   std::shared_ptr<const Model> before = std::exchange(owned.wanted_model, std::move(model));
   try {
@@ -191,6 +199,28 @@ void Synthesiser::swap_model(int body, std::shared_ptr<const Model> model) {
     owned.wanted_model = std::move(before);
     throw;
   }
+}
+
+int Synthesiser::add_sensor(int body, const bank::Bank& bank, const SensorSettings& settings) {
+  Owned& owned = owned_[check_owned(body)];
+  const EffectSet effects = owned.body->get_effects();
+  if (!effects.has(Effect::kModal)) throw InputError("a sensor needs the effect \"modal\" of its body");
+  if (effects.has(Effect::kNonlinear) && settings.quantity == Quantity::kAcceleration)
+    throw InputError("the acceleration of a body with the effect \"nonlinear\" is not known; use its velocity, or leave the effect out");
+  if (owned.swap != nullptr || owned.wanted_model != nullptr) throw InputError("add sensors before the model of a body is swapped");
+  if (owned.sensor_count == BodySensors::kMax || sensors_.size() == kMaxSensors)
+    throw InputError("there are too many sensors; a body may have " + std::to_string(BodySensors::kMax));
+  if (commands_->get_room() <= 3 * owned_.size()) throw InputError("too many new sensors wait; process the next frames first");
+  auto sensor = std::make_unique<Sensor>(owned.body->get_model(), bank, settings);
+  if (owned.sensors == nullptr) owned.sensors = owned.body->make_sensors();
+  sensors_.reserve(kMaxSensors);  // so that find_sensor() needs no lock
+  commands_->push(
+      {.body = owned.body.get(), .sensors = owned.sensors.get(), .sensor = sensor.get(), .number = body, .kind = Command::Kind::kSense});
+  ++owned.sensor_count;
+  sensors_.push_back(std::move(sensor));
+  const auto number = static_cast<int>(sensors_.size()) - 1;
+  sensor_count_.store(number + 1, std::memory_order_release);
+  return number;
 }
 
 EffectSet Synthesiser::get_effects(int body) const { return owned_[check_owned(body)].body->get_effects(); }
@@ -243,10 +273,14 @@ void Synthesiser::set_awake(int number) noexcept {
   awake_[static_cast<std::size_t>(number) / 64] |= std::uint64_t{1} << (static_cast<unsigned>(number) % 64U);
 }
 
-void Synthesiser::list_directed() noexcept {
+/// Bodies with directivity and with sensors.
+void Synthesiser::list_kinds() noexcept {
   directed_.clear();
-  for (SoundingBody* body : playing_)
+  sensed_.clear();
+  for (SoundingBody* body : playing_) {
     if (body != nullptr && body->is_directed()) directed_.push_back(body);
+    if (body != nullptr && body->has_sensors()) sensed_.push_back(body);
+  }
 }
 
 /// At the start of a block: distributes the transfer look-ups over the bodies.
@@ -269,13 +303,15 @@ void Synthesiser::apply_commands() noexcept {
       continue;
     }
     playing_[command.number] = command.body;
-    if (command.kind == Command::Kind::kSwap)
+    if (command.kind == Command::Kind::kSense)
+      command.body->sense(*command.sensors, *command.sensor, sample_);
+    else if (command.kind == Command::Kind::kSwap)
       command.body->apply(*command.swap, listener_, sample_);
     else
       command.body->begin(listener_, sample_);
     set_awake(command.number);
   }
-  if (changes) list_directed();
+  if (changes) list_kinds();
 }
 
 /// Calls `work(number, body)` for every awake body, by number; those for which it returns false fall asleep.
@@ -454,6 +490,7 @@ void Synthesiser::render(int samples) noexcept {
     publish(number);
     return true;
   });
+  for (SoundingBody* body : sensed_) body->finish_sensors(samples);
   sample_ += samples;
   rendered_ = held_ = samples;
   horizon_.store(sample_, std::memory_order_relaxed);

@@ -111,8 +111,20 @@ class Synthesiser {
   /// Modes correspond by their number in the bank: each keeps its energy and phase and continues at its new frequency and decay, with a
   /// cross-fade over one block; other modes fade out or begin at rest. Active strikes act on the new model. The memory of the old model is
   /// freed by collect() once the audio thread has released it. While a swap is in progress later ones wait, and of those only the last is
-  /// played. Throws InputError for a missing body, a model of another rate, and one that cannot have the body's effects. [main-thread]
+  /// played. Throws InputError for a missing body, one with sensors, a model of another rate, and one that cannot have the body's effects.
+  /// [main-thread]
   void swap_model(int body, std::shared_ptr<const Model> model);
+
+  /// Adds a sensor to a body, which reads from the next block on. `bank`: that of the body's model, not kept. Returns its number. Bodies
+  /// without sensors do no work for them. Throws InputError for a missing body, one without Effect::kModal, the acceleration of one with
+  /// Effect::kNonlinear, whose coupling forces it would lack, more than BodySensors::kMax of a body or kMaxSensors, and as Sensor does.
+  /// [main-thread]
+  int add_sensor(int body, const bank::Bank& bank, const SensorSettings& settings);
+  /// nullptr for a missing number. A sensor and its number outlive its body, until the destructor. [any-thread]
+  Sensor* find_sensor(int sensor) const noexcept {
+    return sensor >= 0 && sensor < sensor_count_.load(std::memory_order_acquire) ? sensors_[sensor].get() : nullptr;
+  }
+  static constexpr int kMaxSensors = 4096;
 
   /// Throws InputError for a missing body. [main-thread]
   EffectSet get_effects(int body) const;
@@ -176,9 +188,11 @@ class Synthesiser {
  private:
   /// Request to the audio thread, and its answer: a removed body, or a finished swap.
   struct Command {
-    enum class Kind : std::uint8_t { kAdd, kSwap, kRemove };
+    enum class Kind : std::uint8_t { kAdd, kSwap, kRemove, kSense };
     SoundingBody* body = nullptr;
     ModelSwap* swap = nullptr;
+    BodySensors* sensors = nullptr;
+    Sensor* sensor = nullptr;
     int number = -1;
     Kind kind = Kind::kAdd;
   };
@@ -187,6 +201,8 @@ class Synthesiser {
     std::unique_ptr<SoundingBody> body;
     std::unique_ptr<ModelSwap> swap;            // in progress
     std::shared_ptr<const Model> wanted_model;  // pending; nullptr: none
+    std::unique_ptr<BodySensors> sensors;       // nullptr: none
+    std::size_t sensor_count = 0;
     bool is_leaving = false;
   };
   /// Figures of a body for all threads.
@@ -222,7 +238,7 @@ class Synthesiser {
   void for_awake(Work&& work) noexcept;
   void publish(int number) noexcept;
   void keep_budget() noexcept;
-  void list_directed() noexcept;
+  void list_kinds() noexcept;
   void share_transfers() noexcept;
   void give_floor(SoundingBody& body) noexcept;
   void publish_counters() noexcept;
@@ -250,6 +266,9 @@ class Synthesiser {
   std::int64_t spent_before_ = 0;  // mode-samples before the last block
   TransferBudget transfers_;
   std::vector<SoundingBody*> directed_;  // bodies with directivity, by number
+  std::vector<SoundingBody*> sensed_;    // bodies with sensors, by number
+  std::vector<std::unique_ptr<Sensor>> sensors_;
+  std::atomic<int> sensor_count_{0};
   std::atomic<double> allowed_;
   SynthesiserCounters work_;  // audio thread
   std::atomic<float> gain_{1.0F};

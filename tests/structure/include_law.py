@@ -64,7 +64,7 @@ RULES = {
     "runtime/render/sound": (["runtime/base"], ["cairo", "eigen", "fmt"]),
     "runtime/render": (
         ["runtime/base", "runtime/bank", "runtime/events", "runtime/acoustics", "runtime/synth", "runtime/scene"],
-        ["cli", "fmt", "sndfile"],
+        ["cli", "deflate", "fmt", "sndfile"],
     ),
     "runtime/render/live": (
         ["runtime/base", "runtime/events", "runtime/synth", "runtime/physics", "runtime/scene"],

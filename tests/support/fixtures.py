@@ -49,6 +49,15 @@ RECIPES = {
         "max_modes": 40,
     },
     # Solved by FEM.
+    "free_bar.hdf": {
+        "body": {"shape": "bar", "length_m": 0.4, "width_m": 0.01, "thickness_m": 0.006, "nodes": 12000},
+        "material": {
+            "young_modulus_pa": 70e9,
+            "poisson_ratio": 0.33,
+            "density_kg_m3": 2700,
+            "damping": {"rayleigh": {"alpha1_s": 1e-8, "alpha2_per_s": 2}},
+        },
+    },
     "glass_bowl.hdf": {
         "body": {"shape": "bowl", "outer_radius_m": 0.06, "wall_m": 0.004, "nodes": 3000},
         "material": "glass",

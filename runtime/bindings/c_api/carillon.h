@@ -26,7 +26,7 @@ extern "C" {
 
 /* Incremented with every added function or field. The number in the name of libcarillon.so.3 differs: it changes only when
  * programs must be recompiled. */
-#define CARILLON_ABI_VERSION 10
+#define CARILLON_ABI_VERSION 11
 
 /* ABI version of the library. */
 CARILLON_API uint32_t carillon_abi_version(void);
@@ -413,6 +413,45 @@ CARILLON_API double carillon_peak_pa(const carillon_synth* synth, int32_t body);
 /* [any] Largest modal deflection so far, in thicknesses (twice the volume over the surface). 0 up to half a thickness, the range of
  * linear modes; for banks with a nonlinear energy, strings and membranes; and for an unknown body. */
 CARILLON_API double carillon_deflection(const carillon_synth* synth, int32_t body);
+
+/* ---- Sensors on bodies (docs/howto/robot-hearing.md) ---- */
+
+typedef enum carillon_quantity {
+  CARILLON_ACCELERATION = 0, /* m/s2 */
+  CARILLON_VELOCITY = 1,     /* m/s */
+  CARILLON_DISPLACEMENT = 2, /* m */
+  CARILLON_STRAIN = 3        /* 1 */
+} carillon_quantity;
+
+/* Place and direction are in the frame of the body's mesh. */
+typedef struct carillon_sensor {
+  uint32_t size;
+  int32_t body;
+  int32_t triangle; /* of the bank */
+  int32_t quantity; /* carillon_quantity */
+  double barycentric[3];
+  double direction[3]; /* any length; CARILLON_STRAIN: axis of the gauge, projected onto the surface */
+  double rate_hz;      /* of its samples, 50 to 192000; 0: that of the sound */
+  double buffer_s;     /* samples that wait for carillon_read_sensor; more are lost and counted */
+  int32_t held;        /* not 0: the body does not move as a rigid body */
+  int32_t reserved;
+} carillon_sensor;
+
+/* An accelerometer along z in the middle of triangle 0 of body 0, at the rate of the sound, with a buffer of 1 s. */
+#define carillon_sensor_init(sensor) carillon_sensor_init_sized((sensor), sizeof(carillon_sensor))
+CARILLON_API void carillon_sensor_init_sized(carillon_sensor* sensor, size_t size);
+/* [main] Adds a sensor, which reads from the next 128 frames on. `bank`: that of the body's model; not kept. CARILLON_BAD_INPUT for an
+ * unknown body or triangle, a body without CARILLON_MODAL, the acceleration of one with CARILLON_NONLINEAR, a direction without length,
+ * and a rate out of range. A body with sensors refuses carillon_swap_model. */
+CARILLON_API carillon_status carillon_add_sensor(carillon_synth* synth, const carillon_bank* bank, const carillon_sensor* sensor,
+                                                 int32_t* number, char* message, size_t message_size);
+/* [any], one thread per sensor. The next readings in SI units, as many as carillon_process has made; returns their number, 0 for an unknown
+ * sensor. Sample n is the reading at carillon_sensor_begin_s + n / rate_hz, without delay. */
+CARILLON_API int32_t carillon_read_sensor(carillon_synth* synth, int32_t number, double* out, int32_t samples);
+/* [any] Time of the first sample; 0 for a sensor that was added before the first frame. */
+CARILLON_API double carillon_sensor_begin_s(const carillon_synth* synth, int32_t number);
+/* [any] Samples lost because the buffer was full. */
+CARILLON_API int64_t carillon_sensor_lost(const carillon_synth* synth, int32_t number);
 
 #ifdef __cplusplus
 }

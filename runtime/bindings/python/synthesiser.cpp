@@ -2,6 +2,7 @@
 #include "runtime/synth/synthesiser.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
@@ -22,6 +23,7 @@
 #include "runtime/events/events.hpp"
 #include "runtime/synth/effects.hpp"
 #include "runtime/synth/model.hpp"
+#include "runtime/synth/sensor.hpp"
 
 namespace carillon::python {
 namespace {
@@ -141,6 +143,40 @@ class Instrument {
     return samples;
   }
 
+  int add_sensor(int body, const Vec3& direction, const std::optional<Vec3>& point_m, const std::optional<std::int32_t>& triangle,
+                 const std::string& quantity, const std::optional<double>& rate_hz, bool held, double buffer_s) {
+    SharedBank& bank = require(body);
+    if (point_m.has_value() == triangle.has_value()) throw InputError("add_sensor: give point_m or triangle");
+    const auto name = std::find(synth::kQuantityNames.begin(), synth::kQuantityNames.end(), quantity);
+    if (name == synth::kQuantityNames.end())
+      throw InputError(fmt::format("add_sensor: quantity \"{}\" is none of {}", quantity, fmt::join(synth::kQuantityNames, ", ")));
+    synth::SensorSettings settings{.triangle = triangle.value_or(0),
+                                   .direction = direction,
+                                   .quantity = static_cast<synth::Quantity>(name - synth::kQuantityNames.begin()),
+                                   .rate_hz = rate_hz.value_or(0.0),
+                                   .is_held = held,
+                                   .buffer_s = buffer_s};
+    if (point_m) {
+      const bank::NearestPlace place = bank.get_tree().find(*point_m);
+      if (place.triangle < 0) throw InputError("add_sensor: point_m is not finite or too far away");
+      settings.triangle = place.triangle;
+      settings.barycentric = place.barycentric;
+    }
+    return get().add_sensor(body, *bank.played, settings);
+  }
+
+  synth::Sensor& find_sensor(int sensor) {
+    if (synth::Sensor* found = get().find_sensor(sensor)) return *found;
+    throw InputError(fmt::format("there is no sensor {}; add_sensor() returns their numbers", sensor));
+  }
+
+  py::array_t<double> read_sensor(int sensor) {
+    synth::Sensor& from = find_sensor(sensor);
+    std::vector<double> samples(from.count_ready());
+    from.read(samples);
+    return py::array_t<double>(static_cast<py::ssize_t>(samples.size()), samples.data());
+  }
+
   double get_rate_hz() const { return rate_hz_; }
   int get_channels() const { return synthesiser_->get_microphone_count(); }
   double get_time_s() const { return synthesiser_->get_time_s(); }
@@ -202,6 +238,21 @@ void bind_synthesiser(py::module_& module) {
            "triangle.")
       .def("move", &Instrument::move, "body"_a, "position_m"_a, "velocity_m_s"_a = Vec3{}, "rotation"_a = events::Quaternion{1.0, 0, 0, 0},
            "time_s"_a = py::none(), "Sets position, velocity and rotation of a body from time_s on [m, m/s].")
+      .def("add_sensor", &Instrument::add_sensor, "body"_a, "direction"_a, py::kw_only(), "point_m"_a = py::none(),
+           "triangle"_a = py::none(), "quantity"_a = "acceleration", "rate_hz"_a = py::none(), "held"_a = false, "buffer_s"_a = 60.0,
+           "A sensor at the point of the surface nearest to a point [m], or in the middle of a triangle, along a direction in the frame of "
+           "the mesh; strain: axis of the gauge. quantity: \"acceleration\" [m/s2], \"velocity\" [m/s], \"displacement\" [m] or "
+           "\"strain\". rate_hz: of its samples, by default that of the sound. held: the body does not move as a rigid body. buffer_s: "
+           "samples that wait for read_sensor(). Returns its number.")
+      .def("read_sensor", &Instrument::read_sensor, "sensor"_a,
+           "The readings since the last call: (n) float64, SI units. Sample n of a sensor is the reading at sensor_begin_s() + n / "
+           "rate_hz, without delay.")
+      .def(
+          "sensor_begin_s", [](Instrument& self, int sensor) { return self.find_sensor(sensor).get_begin_s(); }, "sensor"_a,
+          "Time of the first sample of a sensor [s].")
+      .def(
+          "sensor_lost", [](Instrument& self, int sensor) { return self.find_sensor(sensor).get_lost(); }, "sensor"_a,
+          "Samples lost because the buffer of a sensor was full.")
       .def("process", &Instrument::process, "frames"_a, "The next frames: (frames, channels) float32 [Pa].")
       .def_property_readonly("rate_hz", &Instrument::get_rate_hz)
       .def_property_readonly("channels", &Instrument::get_channels)

@@ -1,4 +1,4 @@
-// Cost of directivity and ground reflection: a body of 228 modes that rings, heard by two ears.
+// Cost of directivity, ground reflection and sensors: a body of 228 modes that rings, heard by two ears.
 //
 // usage: bench_directivity [--quick]       prints the figures of docs/reports/performance-runtime.md
 //
@@ -45,11 +45,15 @@ bank::Bank make_bank() {
   return bank;
 }
 
-void play(const char* name, const std::shared_ptr<const synth::Model>& model, synth::EffectSet effects, double turn_rad_s, int blocks) {
+/// `extra_ears`, `sensors`: in addition to two ears. Returns the median [us].
+double play(const char* name, const std::shared_ptr<const synth::Model>& model, synth::EffectSet effects, double turn_rad_s, int blocks,
+            int extra_ears = 0, int sensors = 0) {
   synth::SynthesiserOptions options{.rate_hz = kRate, .max_waypoints = 512};
+  for (int i = 0; i < extra_ears; ++i) options.microphones_m.push_back({0.0, 0.1 * (i + 1), 0.2});
   options.floor = synth::Floor{.point_m = {0.0, 0.0, -1.0}};
   synth::Synthesiser synthesiser(options);
   const int body = synthesiser.add_body(model, {.position_m = {0.0, 1.5, 0.0}, .effects = effects});
+  for (int i = 0; i < sensors; ++i) synthesiser.add_sensor(body, make_bank(), {.triangle = i});
   synthesiser.push(events::Impulse{.time_s = 0.001, .body = body, .impulse_n_s = {0.0, 0.0, 1.0}});
   std::array<float, synth::kBlock> left{}, right{};
   const std::array<float*, 2> out{left.data(), right.data()};
@@ -69,6 +73,18 @@ void play(const char* name, const std::shared_ptr<const synth::Model>& model, sy
   const auto pick = [&](double share) { return spent[share * (static_cast<double>(spent.size()) - 1.0)]; };
   std::printf("%-52s %7.1f us  99.9 %%: %7.1f us  looked up a block: %6.1f\n", name, pick(0.5), pick(0.999),
               static_cast<double>(synthesiser.get_effect_counters(body).units[Effect::kDirectivity]) / blocks);
+  return pick(0.5);
+}
+
+/// Price of one sensor, of several in one run, over that of a microphone with directivity.
+void compare_sensors(const std::shared_ptr<const synth::Model>& model, synth::EffectSet plain, synth::EffectSet directed, int blocks) {
+  constexpr int kMore = 4;
+  const double bare = play("still", model, plain, 0.0, blocks), sensed = play("still, 4 sensors", model, plain, 0.0, blocks, 0, kMore);
+  const double two = play("still, directivity", model, directed, 0.0, blocks);
+  const double more = play("still, directivity, 4 more microphones", model, directed, 0.0, blocks, kMore);
+  const double sensor = (sensed - bare) / kMore, microphone = (more - two) / kMore;
+  std::printf("%-52s %7.2f us, a microphone with directivity: %.2f us, ratio %.2f\n", "one sensor", sensor, microphone,
+              sensor / microphone);
 }
 
 }  // namespace
@@ -85,5 +101,6 @@ int main(int argc, char** argv) {
   play("turning at 1 rad/s, directivity", model, directed, 1.0, blocks);
   play("turning at 10 rad/s, directivity", model, directed, 10.0, blocks);
   play("turning at 10 rad/s, directivity, ground_reflection", model, directed.with(Effect::kGroundReflection), 10.0, blocks);
+  compare_sensors(model, plain, directed, blocks);
   return 0;
 }

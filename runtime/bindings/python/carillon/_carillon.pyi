@@ -105,6 +105,21 @@ class Synthesiser:
     def move(
         self, body: int, position_m: Vector, velocity_m_s: Vector = ..., rotation: Vector = ..., time_s: Optional[float] = None
     ) -> None: ...
+    def add_sensor(
+        self,
+        body: int,
+        direction: Vector,
+        *,
+        point_m: Optional[Vector] = None,
+        triangle: Optional[int] = None,
+        quantity: str = "acceleration",
+        rate_hz: Optional[float] = None,
+        held: bool = False,
+        buffer_s: float = 60.0,
+    ) -> int: ...
+    def read_sensor(self, sensor: int) -> Doubles: ...  # (n), SI units
+    def sensor_begin_s(self, sensor: int) -> float: ...
+    def sensor_lost(self, sensor: int) -> int: ...
     def process(self, frames: int) -> Floats: ...  # (frames, channels), Pa
     @property
     def rate_hz(self) -> float: ...

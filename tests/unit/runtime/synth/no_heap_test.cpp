@@ -106,6 +106,31 @@ TEST(NoHeap, StrikingAndProcessingTakeNoMemory) {
   EXPECT_GT(contacts.get_counters().dropped, 0);
 }
 
+TEST(NoHeap, SensorsTakeNoMemoryWhileTheyRead) {
+  std::vector<testing::InventedMode> modes;
+  for (int m = 0; m < 50; ++m) modes.push_back({100.0 + 300.0 * m, 5.0 + (m % 7 == 0 ? 1e5 : 0.0)});
+  const bank::Bank bank = testing::make_cube_bank(modes);
+  Synthesiser synthesiser({.rate_hz = 48000.0});
+  const int body = synthesiser.add_body(Model::make(bank));
+  for (const double rate_hz : {0.0, 3200.0, 44100.0}) synthesiser.add_sensor(body, bank, {.triangle = 3, .rate_hz = rate_hz});
+  std::vector<float> left(128), right(128);
+  std::vector<double> samples(256);
+  float* const out[] = {left.data(), right.data()};
+  std::size_t count = 0;
+  const long before = g_allocations;
+  for (int i = 0; i < 300; ++i) {
+    if (i % 10 == 0)
+      synthesiser.push(events::Impulse{.time_s = synthesiser.get_horizon_s() + 1e-3,
+                                       .body = body,
+                                       .impulse_n_s = {0.0, 0.0, 1.0},
+                                       .duration_s = i % 20 == 0 ? 1e-3 : 0.0});
+    synthesiser.process(out, 2, 128);
+    for (int sensor = 0; sensor < 3; ++sensor) count += synthesiser.find_sensor(sensor)->read(samples);
+  }
+  EXPECT_EQ(g_allocations - before, 0);
+  EXPECT_GT(count, 70000U);
+}
+
 /// Heap bytes that a body of these effects takes.
 long measure_bytes(Synthesiser& synthesiser, const std::shared_ptr<const Model>& model, EffectSet effects) {
   const long before = g_bytes;

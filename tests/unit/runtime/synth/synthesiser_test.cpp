@@ -391,5 +391,44 @@ TEST(Synthesiser, TakesEventsFromManyThreadsWhileItPlays) {
   EXPECT_GE(synthesiser.get_counters().strikes, 300);
 }
 
+// Sensors come, are read by another thread, and their bodies go during playback (for a data race detector).
+TEST(Synthesiser, SensorsAreAddedAndReadDuringPlayback) {
+  const bank::Bank bank = testing::make_cube_bank({{400.0, 30.0}, {900.0, 60.0}});
+  const auto model = Model::make(bank, {.rate_hz = kRate});
+  Synthesiser synthesiser(SynthesiserOptions{.rate_hz = kRate});
+  std::atomic<bool> stops{false};
+  std::atomic<int> known{0};
+  std::thread audio([&] {
+    std::vector<float> left(64), right(64);
+    const std::array<float*, 2> out{left.data(), right.data()};
+    for (int i = 0; i < 1500; ++i) {
+      synthesiser.process(out.data(), 2, 64);
+      std::this_thread::yield();
+    }
+    stops = true;
+  });
+  std::size_t read = 0;
+  std::thread reader([&] {
+    std::vector<double> samples(4096);
+    while (!stops) {
+      for (int sensor = 0; sensor < known; ++sensor) read += synthesiser.find_sensor(sensor)->read(samples);
+      std::this_thread::yield();
+    }
+  });
+  while (!stops) {
+    if (known < 60 && !synthesiser.is_full()) {
+      const int body = synthesiser.add_body(model);
+      known = synthesiser.add_sensor(body, bank, {.triangle = 3, .rate_hz = known % 2 == 0 ? 0.0 : 4000.0}) + 1;
+      synthesiser.push(events::Impulse{.time_s = synthesiser.get_horizon_s(), .body = body, .impulse_n_s = {0.0, 0.0, 1.0}});
+      if (known % 3 == 0) synthesiser.remove_body(body);
+    }
+    synthesiser.collect();
+    std::this_thread::yield();
+  }
+  audio.join();
+  reader.join();
+  EXPECT_GT(read, 1000U);
+}
+
 }  // namespace
 }  // namespace carillon::synth

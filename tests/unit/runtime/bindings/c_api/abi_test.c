@@ -663,6 +663,58 @@ static void check_synth(const carillon_model* model) {
 }
 
 /* On a floor the pressure is twice that without one; programs that know of none have none. */
+static void check_sensors(const carillon_bank* bank, const carillon_model* model) {
+  static double samples[4096];
+  const double place[3] = {0, 1, 0};
+  carillon_options options;
+  carillon_synth* synth;
+  carillon_sensor sensor;
+  carillon_impulse impulse;
+  int32_t body, number, count, i;
+  double largest = 0;
+  carillon_options_init(&options);
+  CHECK(carillon_create(&options, &synth, message, sizeof message) == CARILLON_OK);
+  CHECK(carillon_add_body(synth, model, place, &body, message, sizeof message) == CARILLON_OK);
+  carillon_sensor_init(&sensor);
+  carillon_sensor_init(NULL);
+  CHECK(sensor.quantity == CARILLON_ACCELERATION && sensor.rate_hz == 0 && sensor.buffer_s == 1 && sensor.direction[2] == 1);
+  sensor.body = body;
+  CHECK(carillon_add_sensor(synth, bank, &sensor, &number, message, sizeof message) == CARILLON_OK && number == 0);
+  sensor.quantity = 4;
+  CHECK(carillon_add_sensor(synth, bank, &sensor, &number, message, sizeof message) == CARILLON_BAD_INPUT && number == -1);
+  sensor.quantity = CARILLON_STRAIN;
+  sensor.rate_hz = 1e9;
+  CHECK(carillon_add_sensor(synth, bank, &sensor, &number, message, sizeof message) == CARILLON_BAD_INPUT && message[0] != '\0');
+  sensor.rate_hz = 0;
+  sensor.body = 7;
+  CHECK(carillon_add_sensor(synth, bank, &sensor, &number, NULL, 0) == CARILLON_BAD_INPUT);
+  sensor.size = 0;
+  CHECK(carillon_add_sensor(synth, bank, &sensor, &number, NULL, 0) == CARILLON_BAD_ARGUMENT);
+  CHECK(carillon_add_sensor(NULL, NULL, NULL, NULL, NULL, 0) == CARILLON_BAD_ARGUMENT);
+  carillon_impulse_init(&impulse);
+  impulse.body = body;
+  impulse.impulse_n_s[2] = 0.01;
+  impulse.time_s = 0.002;
+  CHECK(carillon_push_impulse(synth, &impulse) == CARILLON_OK);
+  CHECK(carillon_read_sensor(synth, 0, samples, 4096) == 0);
+  play(synth, 40);
+  count = carillon_read_sensor(synth, 0, samples, 4096);
+  CHECK(count > 2000 && carillon_sensor_begin_s(synth, 0) == 0 && carillon_sensor_lost(synth, 0) == 0);
+  for (i = 0; i < count; ++i) largest = fabs(samples[i]) > largest ? fabs(samples[i]) : largest;
+  CHECK(largest > 0 && samples[95] == 0 && samples[96] != 0); /* 0.002 s */
+  CHECK(carillon_read_sensor(synth, 0, NULL, 10) == 0 && carillon_read_sensor(synth, 9, samples, 10) == 0);
+  CHECK(carillon_read_sensor(NULL, 0, samples, 10) == 0 && carillon_sensor_lost(NULL, 0) == 0 && carillon_sensor_begin_s(NULL, 0) == 0);
+  play(synth, 1200);
+  CHECK(carillon_sensor_lost(synth, 0) > 0);
+  CHECK(carillon_swap_model(synth, body, model, message, sizeof message) == CARILLON_BAD_INPUT);
+  CHECK(carillon_remove_body(synth, body) == CARILLON_OK);
+  play(synth, 2);
+  carillon_collect(synth);
+  CHECK(carillon_read_sensor(synth, 0, samples, 4096) > 0);
+  play(synth, 2);
+  carillon_destroy(synth);
+}
+
 static void check_floor(const carillon_model* model) {
   static float heard[128];
   static const double on_it[1][3] = {{0, 0, -0.5}};
@@ -777,6 +829,7 @@ int main(int argc, char** argv) {
   CHECK(strlen(carillon_status_text((carillon_status)99)) > 3);
   check_edits(bank);
   check_bodies(bank, model);
+  check_sensors(bank, model);
   carillon_bank_close(bank); /* the model stays */
   check_synth(model);
   check_forces(model);
