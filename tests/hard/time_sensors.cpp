@@ -17,13 +17,13 @@
 namespace carillon::hard {
 namespace {
 
-constexpr double kRate = 48000.0, kLength = 1e-3, kBegin = 0.01;
+constexpr double kOutputRateHz = 48000.0, kLength = 1e-3, kBegin = 0.01;
 const Vec3 kDirection{0.0, 0.0, 1.0}, kCorner{1.0, 0.0, 0.0};
 constexpr int kStruck = 2, kAway = 9;  // triangles of the cube; their first corners are struck and read
 
 std::vector<double> read(const bank::Bank& bank, const synth::SensorSettings& settings) {
-  synth::Synthesiser synthesiser(synth::SynthesiserOptions{.rate_hz = kRate});
-  const int body = synthesiser.add_body(synth::Model::make(bank, {.rate_hz = kRate}));
+  synth::Synthesiser synthesiser(synth::SynthesiserOptions{.rate_hz = kOutputRateHz});
+  const int body = synthesiser.add_body(synth::Model::make(bank, {.rate_hz = kOutputRateHz}));
   const int sensor = synthesiser.add_sensor(body, bank, settings);
   synthesiser.push(events::Impulse{.time_s = kBegin + 0.5 * kLength,
                                    .body = body,
@@ -60,10 +60,10 @@ void check(const std::string& part, const bank::Bank& bank, synth::SensorSetting
   settings.direction = kDirection;
   settings.quantity = synth::Quantity::kVelocity;
   const std::vector<double> samples = read(bank, settings);
-  const double rate = settings.rate_hz > 0.0 ? settings.rate_hz : kRate;
+  const double rate = settings.rate_hz > 0.0 ? settings.rate_hz : kOutputRateHz;
   Real largest = 0, off = 0;
   for (std::size_t n = samples.size() / 31; n < samples.size(); n += samples.size() / 61) {
-    const Real known = calc_reading(bank, settings.triangle, is_rigid, 0.5 * kRate, static_cast<Real>(n) / static_cast<Real>(rate));
+    const Real known = calc_reading(bank, settings.triangle, is_rigid, 0.5 * kOutputRateHz, static_cast<Real>(n) / static_cast<Real>(rate));
     largest = std::max(largest, std::abs(known));
     off = std::max(off, std::abs(static_cast<Real>(samples[n]) - known));
   }
@@ -82,10 +82,10 @@ TEST(time, sensors) {
   bank::Bank light = bank;
   light.rigid = {};
   check("no mass", light, {.triangle = kAway}, false, 1e-5);
-  check("0.499 fs", testing::make_cube_bank({modes[0], {0.499 * kRate, 3.0, 1e-2, {0.3, -0.2, 1.0}, 0.1}}), {.triangle = kAway}, true,
-        1e-5);
-  check("beyond the band", testing::make_cube_bank({modes[0], {0.501 * kRate, 3.0, 1e-2, {0.3, -0.2, 1.0}, 0.1}}), {.triangle = kAway},
+  check("0.499 fs", testing::make_cube_bank({modes[0], {0.499 * kOutputRateHz, 3.0, 1e-2, {0.3, -0.2, 1.0}, 0.1}}), {.triangle = kAway},
         true, 1e-5);
+  check("beyond the band", testing::make_cube_bank({modes[0], {0.501 * kOutputRateHz, 3.0, 1e-2, {0.3, -0.2, 1.0}, 0.1}}),
+        {.triangle = kAway}, true, 1e-5);
   for (const double rate : {6400.0 * std::numbers::phi, 44100.0, 96000.0 / 7.0, 192000.0})
     check(std::to_string(rate) + " Hz", testing::make_cube_bank({modes[0]}), {.triangle = kAway, .rate_hz = rate}, true, 2e-3);
 }
