@@ -82,7 +82,10 @@ RULES = {
         ["cli", "fmt", "portaudio"],
     ),
     "runtime/render/samples": (["runtime/base", "runtime/material", "runtime/bank", "runtime/scene"], ["cli", "fmt"]),
-    "runtime/bindings/c_api": (["runtime/base", "runtime/bank", "runtime/events", "runtime/acoustics", "runtime/synth"], []),
+    "runtime/bindings/c_api": (
+        ["runtime/base", "runtime/bank", "runtime/events", "runtime/acoustics", "runtime/synth", "runtime/drive"],
+        [],
+    ),
     "runtime/bindings/python": (
         [
             "runtime/base",
@@ -91,6 +94,7 @@ RULES = {
             "runtime/events",
             "runtime/acoustics",
             "runtime/synth",
+            "runtime/drive",
             "runtime/scene",
             "runtime/render",
         ],
