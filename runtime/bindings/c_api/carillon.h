@@ -456,7 +456,7 @@ CARILLON_API void carillon_touches_options_init_sized(carillon_touches_options* 
 typedef struct carillon_touches_body {
   uint32_t size;
   int32_t body;  /* number in the synthesiser; -1: silent, but strikes others */
-  int32_t fixed; /* not 0: moved by nobody, or by the program: infinite mass */
+  int32_t fixed; /* not 0: static, or moved by the program: infinite mass */
   int32_t reserved;
   const carillon_bank* bank; /* surface, inertia, moduli, modes; must outlive the carillon_touches. NULL: only for silent bodies */
   uint64_t name_seed;        /* carillon_name_seed of a name: contacts sound the same whatever other bodies there are */
@@ -494,10 +494,10 @@ typedef struct carillon_point {
   double point_m[3];      /* on b */
   double normal[3];       /* unit, from b into a */
   double gap_m;           /* negative: overlap; on a the point is point_m + gap_m * normal */
-  double impulse_n_s;     /* on a along the normal, sum of the whole step; NAN: found from the velocities, of all points */
+  double impulse_n_s;     /* on a along the normal, sum of the whole step; NAN: found from the change of velocities */
   double friction_n_s[3]; /* on a, across the normal; NAN: found likewise */
   double curvature_per_m; /* of both surfaces together; NAN: from the shapes of the banks */
-  uint64_t feature;       /* 0, or an id of the engine, which decides between equal candidates only */
+  uint64_t reserved;      /* 0; contacts are recognised by their positions, not by ids of the engine */
 } carillon_point;
 
 /* `synth`: may be NULL if options give a sink; must outlive the carillon_touches. */
@@ -533,7 +533,7 @@ typedef struct carillon_touches_counters {
   int64_t impacts;        /* of them integrated with modes */
   int64_t simplified;     /* beyond max_impacts: limited Hertz pulses */
   int64_t limited;        /* pulses reduced to the energy of the blow */
-  int64_t masked;         /* hits left out: inaudible beside others */
+  int64_t masked;         /* hits left out: inaudible next to others */
   int64_t weights;        /* impulses that were load only */
   int64_t settled;        /* pulses of lasting contacts taken for load */
   int64_t cut;            /* hits ended by longest_hit_s */
@@ -541,6 +541,7 @@ typedef struct carillon_touches_counters {
   int64_t records;        /* carillon_contacts */
   int64_t teleports;
   int64_t waiting;      /* events kept because the ring was full, now */
+  int64_t lost;         /* events dropped because more than a million were waiting */
   double longest_hit_s; /* so far */
 } carillon_touches_counters;
 
