@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "runtime/bank/bank.hpp"
+#include "runtime/drive/mode_sets.hpp"
 #include "runtime/events/events.hpp"
 #include "runtime/physics/impact/impact.hpp"
-#include "runtime/drive/mode_sets.hpp"
 #include "runtime/scene/scene.hpp"
 
 namespace carillon::scene {
