@@ -19,6 +19,7 @@ constexpr double kModalShare = 0.02;       // of the blow: below, a Hertz pulse 
 constexpr double kMinElasticShare = 0.01;  // of the blow: least energy of the modes
 constexpr double kMinImpactSpeed = 5e-3;   // m/s; slower hits are not integrated
 constexpr double kLongestImpactS = 20e-3;  // s
+constexpr double kLongestPulses = 50.0;    // an impact lasts at most this many Hertz times, for the sake of its cost
 constexpr double kRubbedRatio = 0.02;      // of the impulse: below, without friction
 
 /// Energy of the modes of a body after a pulse of this length on it [J]; impulse: mesh axes.
@@ -161,7 +162,8 @@ bool HitSounds::integrate(const StepView& step, const Contact& c, TouchesCounter
   try {
     impact::Impact impact(bodies, {contact});
     if (!(impact.calc_approach(0) > rigid::kMinImpactSpeedMS)) return false;
-    (void)impact.advance(kLongestImpactS);
+    const double hertz_s = impact::calc_hertz_duration(c.compliance, c.radius_m, c.mass_kg, c.speed_m_s);
+    (void)impact.advance(std::min(kLongestImpactS, kLongestPulses * hertz_s));
     pulses = impact.take_pulses();
     const impact::Books books = impact.get_books();
     modal_j = books.modal + books.dissipated_modes + books.above_band;

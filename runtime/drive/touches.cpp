@@ -24,7 +24,10 @@ constexpr double kUnitTolerance = 1e-3;         // of quaternions
 constexpr double kNormalTolerance = 1e-2;       // of normals of points
 constexpr std::size_t kMaxWaiting = 1'000'000;  // events
 
-bool is_finite(const Vec3& x) { return std::isfinite(x[0]) && std::isfinite(x[1]) && std::isfinite(x[2]); }
+constexpr double kMost = 1e9;  // of any unit; squares stay finite
+
+bool is_sane(double x) { return std::abs(x) <= kMost; }
+bool is_finite(const Vec3& x) { return is_sane(x[0]) && is_sane(x[1]) && is_sane(x[2]); }
 bool is_nan(const Vec3& x) { return std::isnan(x[0]) || std::isnan(x[1]) || std::isnan(x[2]); }
 void require(bool holds, const std::string& fault) {
   if (!holds) throw InputError(fault);
@@ -87,8 +90,8 @@ void check_body(const TouchesBody& b) {
   if (b.fixed) return;
   require(is_positive(b.mass_kg), "a body that moves needs a mass above 0, of its own or of its bank");
   const Mat3 inertia = to_rows(b.inertia_kg_m2);
-  const bool is_sane = is_finite(inertia[0]) && is_finite(inertia[1]) && is_finite(inertia[2]);
-  require(is_sane && inertia[0][0] > 0.0 && calc_det(inertia[0], inertia[1], inertia[2]) > 0.0,
+  const bool is_set = is_finite(inertia[0]) && is_finite(inertia[1]) && is_finite(inertia[2]);
+  require(is_set && inertia[0][0] > 0.0 && calc_det(inertia[0], inertia[1], inertia[2]) > 0.0,
           "a body that moves needs a positive definite inertia, of its own or of its bank");
 }
 
@@ -96,7 +99,7 @@ void check_pose(const TouchesPose& pose, std::size_t index) {
   const auto& q = pose.rotation;
   const double size = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
   if (!is_finite(pose.position_m) || !is_finite(pose.velocity_m_s) || !is_finite(pose.spin_rad_s) || !std::isfinite(size))
-    throw InputError("the pose of body " + std::to_string(index) + " is not finite");
+    throw InputError("the pose of body " + std::to_string(index) + " has a number that is not finite, or above 1e9");
   if (std::abs(std::sqrt(size) - 1.0) > kUnitTolerance)
     throw InputError("the rotation of body " + std::to_string(index) + " is no unit quaternion");
 }
@@ -315,8 +318,8 @@ void Touches::Course::take_points(const StepView& view, std::span<const TouchPoi
 bool Touches::Course::take_point(const StepView& view, const TouchPoint& given) {
   const auto is_body = [&](int body) { return body >= 0 && body < count() && bodies_[body].is_used; };
   if (!is_body(given.a) || (given.b != -1 && !is_body(given.b)) || given.a == given.b) return false;
-  if (!is_finite(given.point_m) || !is_finite(given.normal) || !std::isfinite(given.gap_m) || std::isinf(given.impulse_n_s) ||
-      std::isinf(given.curvature_per_m))
+  if (!is_finite(given.point_m) || !is_finite(given.normal) || !is_sane(given.gap_m) || given.impulse_n_s > kMost ||
+      given.curvature_per_m > kMost)
     return false;
   const double length = norm(given.normal);
   if (std::abs(length - 1.0) > kNormalTolerance || (!is_nan(given.friction_n_s) && !is_finite(given.friction_n_s))) return false;
@@ -378,6 +381,10 @@ void Touches::Course::hand_over(double mark_s) {
           if constexpr (requires { e.other; }) e.other = number(e.other);
         },
         event);
+    if (events::find_fault(event) != nullptr) {  // of extreme input
+      ++counters_.lost;
+      continue;
+    }
     if (std::holds_alternative<events::LastingContact>(event)) ++counters_.records;
     waiting_.push_back(event);
   }

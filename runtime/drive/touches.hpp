@@ -88,7 +88,7 @@ struct TouchesCounters {
   std::int64_t records = 0;         // events::LastingContact
   std::int64_t teleports = 0;
   std::int64_t waiting = 0;  // events that the sink did not take, kept for the next step
-  std::int64_t lost = 0;     // events dropped because too many were waiting
+  std::int64_t lost = 0;     // events dropped: too many were waiting, or numbers out of range
   double longest_hit_s = 0.0;
 };
 

@@ -541,7 +541,7 @@ typedef struct carillon_touches_counters {
   int64_t records;        /* carillon_contacts */
   int64_t teleports;
   int64_t waiting;      /* events kept because the ring was full, now */
-  int64_t lost;         /* events dropped because more than a million were waiting */
+  int64_t lost;         /* events dropped: more than a million were waiting, or numbers were out of range */
   double longest_hit_s; /* so far */
 } carillon_touches_counters;
 

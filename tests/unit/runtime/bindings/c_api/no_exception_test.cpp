@@ -34,6 +34,7 @@ void process(carillon_synth* synth, int blocks) {
 class Session {
  public:
   ~Session() {
+    carillon_touches_destroy(touches_);
     carillon_destroy(synth_);
     carillon_model_release(model_);
     carillon_bank_close(edited_);
@@ -82,13 +83,41 @@ class Session {
     carillon_remove_body(synth_, other);
     process(synth_, 2);
     carillon_collect(synth_);
-    return CARILLON_OK;
+    return fall();
   }
 
  private:
+  /// A body that falls on the ground and stays there.
+  carillon_status fall() {
+    char message[100];
+    carillon_touches_options options;
+    carillon_touches_options_init(&options);
+    carillon_status status = carillon_touches_create(synth_, &options, &touches_, message, sizeof message);
+    if (status != CARILLON_OK) return status;
+    carillon_touches_body body;
+    carillon_touches_body_init(&body);
+    body.body = body_;
+    body.bank = bank_;
+    int32_t index = -1;
+    if ((status = carillon_touches_add(touches_, &body, &index, message, sizeof message)) != CARILLON_OK) return status;
+    carillon_pose pose{};
+    pose.rotation[0] = 1.0;
+    pose.velocity_m_s[2] = -1.0;
+    if ((status = carillon_touches_start(touches_, 0.0, &pose, 1, message, sizeof message)) != CARILLON_OK) return status;
+    carillon_point point{};
+    point.b = -1;
+    point.normal[2] = 1.0;
+    point.impulse_n_s = std::nan("");
+    pose.velocity_m_s[2] = 0.0;
+    for (int n = 1; n < 6; ++n)
+      if ((status = carillon_touches_step(touches_, 0.01 * n, &pose, 1, &point, 1, message, sizeof message)) != CARILLON_OK) return status;
+    return carillon_touches_remove(touches_, index);
+  }
+
   carillon_bank *bank_ = nullptr, *edited_ = nullptr;
   carillon_model* model_ = nullptr;
   carillon_synth* synth_ = nullptr;
+  carillon_touches* touches_ = nullptr;
   int32_t body_ = -1;
 };
 
