@@ -440,9 +440,11 @@ TEST(Touches, EventsWaitForRoom) {
   touches.start(0.0, poses);
   EXPECT_FALSE(touches.step(0.01, poses, {}));
   EXPECT_GT(touches.get_counters().waiting, 0);
+  EXPECT_EQ(touches.get_mark_s(), 0.0) << "what waits has not been passed on";
   room = 1000;
   EXPECT_TRUE(touches.step(0.02, poses, {}));
   EXPECT_EQ(touches.get_counters().waiting, 0);
+  EXPECT_EQ(touches.get_mark_s(), 0.02);
   ASSERT_FALSE(taken.empty());
   EXPECT_EQ(std::get<events::BodyMotion>(taken.front()).body, 7) << "the first one";
 }
