@@ -104,6 +104,7 @@ struct BodyMotion {
   Vec3 position_m{};
   Vec3 velocity_m_s{};
   Quaternion rotation{1.0, 0.0, 0.0, 0.0};
+  bool cut = false;  // jumps here (a teleport): no path from the motion before
 };
 
 /// Pose of the listener; microphones are given in this frame (x right, y forward, z up).

@@ -104,6 +104,7 @@ void write_moving(Out out, const Moving& e) {
 
 void write(Out out, const BodyMotion& e) {
   fmt::format_to(out, R"({{"motion": {{"time_s": {}, "body": {}, )", format_number(e.time_s), e.body);
+  if (e.cut) fmt::format_to(out, R"("cut": true, )");
   write_moving(out, e);
 }
 
@@ -175,6 +176,7 @@ class EventReader {
   BodyMotion read_motion() {
     BodyMotion e;
     e.body = read_body("body", 0);
+    e.cut = in_.boolean_or("cut", false);
     read_moving(e);
     return finish(e);
   }

@@ -13,13 +13,12 @@
 
 #include "runtime/base/clock.hpp"
 #include "runtime/base/error.hpp"
+#include "runtime/drive/mode_sets.hpp"
 #include "runtime/physics/check.hpp"
 #include "runtime/physics/geometry/boxes.hpp"
-#include "runtime/physics/lasting.hpp"
-#include "runtime/physics/mode_sets.hpp"
-#include "runtime/physics/pulses.hpp"
 #include "runtime/physics/rigid/limits.hpp"
 #include "runtime/physics/rigid/space.hpp"
+#include "runtime/physics/sounding.hpp"
 #include "runtime/physics/watch.hpp"
 
 namespace carillon::physics {
@@ -56,7 +55,7 @@ rigid::Solid make_solid(const BodySpec& b, Shapes& shapes) {
   return solid;
 }
 
-void add_modes(rigid::Solid& solid, const bank::Bank& bank, ModeSets& sets) {
+void add_modes(rigid::Solid& solid, const bank::Bank& bank, drive::ModeSets& sets) {
   solid.modes = sets.find(bank);
   if (!solid.modes) return;
   solid.find_shape = [&bank](const geometry::Place& place) { return bank::calc_shapes(bank, place.triangle, place.barycentric); };
@@ -70,15 +69,6 @@ rigid::State make_state(const BodySpec& b, const rigid::Solid& solid) {
   state.velocity = b.velocity_m_s;
   if (!b.fixed) state.momentum = rotation * (solid.inertia_kg_m2 * (transpose(rotation) * b.angular_velocity_rad_s));
   return state;
-}
-
-std::vector<Matter> list_matter(const WorldSpec& spec) {
-  std::vector<Matter> matter;
-  for (const BodySpec& b : spec.bodies)
-    matter.push_back({b.name, b.bank->material.young_modulus_pa, b.bank->material.poisson_ratio, b.bank->material.density_kg_m3});
-  const GroundSpec ground = spec.ground.value_or(GroundSpec{});
-  matter.push_back({"", ground.young_modulus_pa, ground.poisson_ratio, ground.density_kg_m3});
-  return matter;
 }
 
 /// Stops of a joint: one at each end of its travel.
@@ -148,7 +138,7 @@ void check_start(const WorldSpec& spec, const rigid::Space& space) {
 rigid::Space make_space(const WorldSpec& spec, const WorldOptions& options) {
   check(spec, options);
   Shapes shapes;
-  ModeSets modes;
+  drive::ModeSets modes;
   std::vector<rigid::Solid> solids;
   std::vector<rigid::State> states;
   for (const BodySpec& body : spec.bodies) {
@@ -175,9 +165,8 @@ rigid::Space make_space(const WorldSpec& spec, const WorldOptions& options) {
 class World::Course {
  public:
   Course(const WorldSpec& spec, const WorldOptions& options)
-      : options_(options), space_(make_space(spec, options)), lasting_(list_matter(spec)) {
+      : options_(options), space_(make_space(spec, options)), sounding_(spec, space_, options.masks_hits) {
     check_start(spec, space_);
-    if (options_.masks_hits) masks_.emplace(count());
     check_overlaps(spec);
     prepare_shapes(spec.ground.has_value());
     if (!options_.audits_energy) return;
@@ -242,7 +231,7 @@ class World::Course {
       for (const rigid::Strike& strike : strikes) take(strike);
       for (const rigid::Forces& forces : all_forces) take(forces);
       if (options_.audits_energy) watch(strikes, all_forces);
-      if (options_.lasting_contacts) lasting_.update(space_, events_);
+      if (options_.lasting_contacts) sounding_.update(events_);
     }
     if (!space_.is_at_window()) return;
     if (!slept) audit();
@@ -265,7 +254,7 @@ class World::Course {
     for (std::size_t k = 0; k < strike.bodies.size(); ++k)
       events_.push_back(make_motion(strike.bodies[k], strike.before[k], strike.time_s));
     for (std::size_t k = 0; k < strike.bodies.size(); ++k) events_.push_back(make_motion(strike.bodies[k], strike.after[k], strike.time_s));
-    add_pulses(space_, strike, lasting_, masks_ ? &*masks_ : nullptr, events_);
+    sounding_.add(strike, events_);
     if (!options_.audits_energy) return;
     double taken = 0.0;
     for (std::size_t k = 0; k < strike.bodies.size(); ++k)
@@ -277,16 +266,12 @@ class World::Course {
 
   /// One event per ringing or moving body, split at the maximum length of events.
   void take(const rigid::Forces& forces) {
+    sounding_.note(forces);
     for (const int side : {0, 1}) {
       const int body = side == 0 ? forces.a : forces.b;
       if (body < 0) continue;
       const geometry::Place& place = side == 0 ? forces.place_a : forces.place_b;
       const std::vector<Vec3>& impulses = side == 0 ? forces.on_a : forces.on_b;
-      if (masks_) {
-        Vec3 given{};
-        for (const Vec3& impulse : impulses) given = given + impulse;
-        masks_->take(body, forces.time_s, norm(given), forces.step_s * static_cast<double>(impulses.size()));
-      }
       events::Force first;
       first.time_s = forces.time_s;
       first.step_s = forces.step_s;
@@ -367,8 +352,7 @@ class World::Course {
 
   WorldOptions options_;
   rigid::Space space_;
-  LastingContacts lasting_;
-  std::optional<Masks> masks_;
+  Sounding sounding_;
   std::vector<events::Event> events_, later_;  // of this window; those not reported yet
   std::vector<std::pair<double, std::size_t>> order_;
   std::vector<char> still_;

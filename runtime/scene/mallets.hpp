@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "runtime/bank/bank.hpp"
+#include "runtime/drive/mode_sets.hpp"
 #include "runtime/events/events.hpp"
 #include "runtime/physics/impact/impact.hpp"
-#include "runtime/physics/mode_sets.hpp"
 #include "runtime/scene/scene.hpp"
 
 namespace carillon::scene {
@@ -45,7 +45,7 @@ class Mallets {
             std::vector<Blow>& blows, std::vector<std::string>& warnings);
 
  private:
-  physics::ModeSets modes_;
+  drive::ModeSets modes_;
 };
 
 }  // namespace carillon::scene

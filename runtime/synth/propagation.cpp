@@ -78,8 +78,9 @@ void DirectedSound::push(const events::BodyMotion& motion) noexcept {
   attitude_.push(motion.time_s, motion.rotation);
   const Vec3 now = turn(motion.rotation, offset_m_);
   const double since_s = motion.time_s - last_s_;
-  const Vec3 speed = since_s > 0.0 ? (1.0 / since_s) * (now - last_m_) : Vec3{};
+  const Vec3 speed = since_s > 0.0 && !motion.cut ? (1.0 / since_s) * (now - last_m_) : Vec3{};
   centre_.push({motion.time_s, motion.position_m + now, motion.velocity_m_s + speed});
+  if (motion.cut) centre_.cut(motion.time_s);
   last_s_ = motion.time_s;
   last_m_ = now;
 }

@@ -185,15 +185,26 @@ void Receiver::find_path_states(const Source& source, const Trajectory& listener
   sub_block_ = sub_block;
   // If nothing moves after the emission, the path is constant to the end.
   const double arrival_s = static_cast<double>(sub_block * kSubBlock - latency_) / rate_hz_;
-  const bool rests = from_.delay_slope == 0.0 && from_.spreading_slope == 0.0 && source.track->is_still_from(arrival_s - travel_s_) &&
-                     listener.is_still_from(arrival_s);
+  // For the travel time after a jump the path to the old place is no longer that of what rests.
+  constexpr double kLongestTravelS = 300.0;  // of 100 km
+  const bool has_jumped = source.track->is_cut(arrival_s - kLongestTravelS, arrival_s);
+  const bool rests = !has_jumped && from_.delay_slope == 0.0 && from_.spreading_slope == 0.0 &&
+                     source.track->is_still_from(arrival_s - travel_s_) && listener.is_still_from(arrival_s);
+  const double begin_travel_s = travel_s_;
   to_ = rests ? from_ : find_path_state(source, listener, sub_block + 1, travel_s_);
+  // After a jump away from the ear nothing arrives for a while: the emission may then be on either side of the cut.
+  const auto [least_s, most_s] = std::minmax(begin_travel_s, travel_s_);
+  is_cut_ = !rests && source.track->is_cut(arrival_s - most_s, arrival_s + kSubBlock / rate_hz_ - least_s);
+  set_path(from_, to_);
+}
+
+void Receiver::set_path(const PathState& from, const PathState& to) noexcept {
   const double width_s = kSubBlock / rate_hz_;
-  delay_ = Cubic::make(rate_hz_ * from_.delay_s + latency_, kSubBlock * from_.delay_slope, rate_hz_ * to_.delay_s + latency_,
-                       kSubBlock * to_.delay_slope);
-  spreading_ = Cubic::make(from_.spreading_1_m, width_s * from_.spreading_slope, to_.spreading_1_m, width_s * to_.spreading_slope);
+  delay_ = Cubic::make(rate_hz_ * from.delay_s + latency_, kSubBlock * from.delay_slope, rate_hz_ * to.delay_s + latency_,
+                       kSubBlock * to.delay_slope);
+  spreading_ = Cubic::make(from.spreading_1_m, width_s * from.spreading_slope, to.spreading_1_m, width_s * to.spreading_slope);
   for (std::size_t k = 0; k < 3; ++k) {
-    direction_[k] = Cubic::make(from_.direction[k], width_s * from_.direction_slope[k], to_.direction[k], width_s * to_.direction_slope[k]);
+    direction_[k] = Cubic::make(from.direction[k], width_s * from.direction_slope[k], to.direction[k], width_s * to.direction_slope[k]);
   }
 }
 
@@ -203,16 +214,42 @@ int Receiver::process(const Source& source, const Trajectory& listener, std::int
     if (sample / kSubBlock != sub_block_) find_path_states(source, listener, sample / kSubBlock);
     const std::size_t left = kSubBlock - sample % kSubBlock;
     const auto piece = received_pa.first(std::min(left, received_pa.size()));
-    if (delay_.is_constant()) {
-      process_still(source, sample, piece);
-    } else {
-      process_moving(source, sample, piece);
-      moved += static_cast<int>(piece.size());
-    }
+    if (!delay_.is_constant()) moved += static_cast<int>(piece.size());
+    if (is_cut_)
+      process_cut(source, sample, piece);
+    else
+      process_piece(source, sample, piece);
     sample += static_cast<std::int64_t>(piece.size());
     received_pa = received_pa.subspan(piece.size());
   }
   return moved;
+}
+
+void Receiver::process_piece(const Source& source, std::int64_t sample, std::span<double> received_pa) noexcept {
+  if (delay_.is_constant())
+    process_still(source, sample, received_pa);
+  else
+    process_moving(source, sample, received_pa);
+}
+
+/// From the old to the new path without one in between, whose changing delay would be a chirp.
+void Receiver::process_cut(const Source& source, std::int64_t sample, std::span<double> received_pa) noexcept {
+  const auto hold = [](PathState path) {
+    path.delay_slope = path.spreading_slope = 0.0;
+    path.direction_slope = {};
+    return path;
+  };
+  std::array<double, kSubBlock> before{}, after{};
+  const std::size_t count = received_pa.size();
+  set_path(hold(from_), hold(from_));
+  process_piece(source, sample, std::span(before).first(count));
+  set_path(hold(to_), hold(to_));
+  process_piece(source, sample, std::span(after).first(count));
+  set_path(from_, to_);
+  for (std::size_t i = 0; i < count; ++i) {
+    const double share = (static_cast<double>(sample % kSubBlock) + static_cast<double>(i) + 0.5) / kSubBlock;
+    received_pa[i] += (1.0 - share) * before[i] + share * after[i];
+  }
 }
 
 void Receiver::process_still(const Source& source, std::int64_t sample, std::span<double> received_pa) noexcept {

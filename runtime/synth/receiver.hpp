@@ -81,6 +81,9 @@ class Receiver {
   PathState find_path_state(const Source& source, const Trajectory& listener, std::int64_t border, double& travel_s) noexcept;
   PathState calc_way(const Source& source, const Trajectory& listener, double time_s) const noexcept;
   void find_path_states(const Source& source, const Trajectory& listener, std::int64_t sub_block) noexcept;
+  void set_path(const PathState& from, const PathState& to) noexcept;
+  void process_piece(const Source& source, std::int64_t sample, std::span<double> received_pa) noexcept;
+  void process_cut(const Source& source, std::int64_t sample, std::span<double> received_pa) noexcept;
   void process_still(const Source& source, std::int64_t sample, std::span<double> received_pa) noexcept;
   void process_moving(const Source& source, std::int64_t sample, std::span<double> received_pa) const noexcept;
 
@@ -94,6 +97,7 @@ class Receiver {
   PathState from_, to_;
   Cubic delay_, spreading_;  // between them [samples], [1/m]
   std::array<Cubic, 3> direction_;
+  bool is_cut_ = false;         // the source jumps in the sub-block
   bool is_placed_ = false;      // first_delay_s_ is known
   double first_delay_s_ = 0.0;  // for receivers without kDoppler
   double travel_s_ = 0.0;       // of the sound at the end of the sub-block, regardless of effects

@@ -246,7 +246,27 @@ void SoundingBody::reach(double time_s) noexcept {
   if (contacts_) contacts_->reach(calc_own_s(time_s));
 }
 
+/// Where the body was before a jump: on its way for a moment, then at rest.
+events::BodyMotion SoundingBody::find_before(const events::BodyMotion& jump) const noexcept {
+  constexpr double kOnWayS = 0.1;  // s
+  events::BodyMotion before = jump;
+  before.cut = false;
+  before.time_s = std::nextafter(jump.time_s, -std::numeric_limits<double>::infinity());
+  before.rotation = rotation_;
+  const Waypoint last = track_.get_count() > 0 ? track_.get_waypoint(track_.get_count() - 1) : track_.find(before.time_s);
+  const double since_s = before.time_s - last.time_s;
+  const bool is_on_way = since_s >= 0.0 && since_s <= kOnWayS;
+  before.velocity_m_s = is_on_way ? last.velocity_m_s : Vec3{};
+  before.position_m = last.position_m;
+  if (is_on_way) before.position_m = last.position_m + since_s * last.velocity_m_s;
+  return before;
+}
+
 bool SoundingBody::take(const events::BodyMotion& motion) noexcept {
+  if (motion.cut) {
+    (void)take(find_before(motion));
+    track_.cut(motion.time_s);
+  }
   if (!track_.push({motion.time_s, motion.position_m, motion.velocity_m_s})) return false;
   turned_s_ = motion.time_s;
   rotation_ = motion.rotation;

@@ -138,6 +138,7 @@ class SoundingBody {
   float calc_nearness(const ListenerTracks& listener, std::int64_t sample) const noexcept;
 
  private:
+  events::BodyMotion find_before(const events::BodyMotion& jump) const noexcept;
   template <class Strike>
   bool play(const Strike& strike, bool has_length, bool is_new, std::int64_t sample) noexcept;
   void wake(std::int64_t sample) noexcept;

@@ -83,6 +83,21 @@ void StrikeQueue::begin_in_time(double& begin, std::int64_t horizon) noexcept {
   ++counters_.late;
 }
 
+/// Pieces of one late pulse are shifted together: at the horizon they would act at once.
+void StrikeQueue::begin_in_time(QueuedForce& force, bool continues, std::int64_t horizon) noexcept {
+  constexpr double kSame = 1e-2;  // samples
+  const double begin = force.begin, end = force.calc_end();
+  const auto before = std::find_if(late_.begin(), late_.end(), [&](const LateForce& late) {
+    return continues && late.triangle == force.triangle && std::abs(late.end - begin) < kSame;
+  });
+  if (before != late_.end()) force.begin += before->shift;
+  if (before == late_.end() || force.begin <= static_cast<double>(horizon - 1)) begin_in_time(force.begin, horizon);
+  if (!(force.begin > begin)) return;
+  LateForce& late = before != late_.end() ? *before : late_[oldest_late_];
+  if (before == late_.end()) oldest_late_ = (oldest_late_ + 1) % late_.size();
+  late = {force.triangle, end, force.begin - begin};
+}
+
 bool StrikeQueue::push(const events::Impulse& impulse, std::int64_t horizon) noexcept {
   if (!is_playable(impulse, *model_) || pulses_.size() == pulses_.capacity()) {
     ++counters_.refused;
@@ -114,9 +129,9 @@ bool StrikeQueue::push(const events::Force& force, std::int64_t horizon) noexcep
   QueuedForce queued{};
   queued.begin = force.time_s * model_->get_rate_hz();
   queued.step = std::max(force.step_s * model_->get_rate_hz(), kShortestStep);
-  begin_in_time(queued.begin, horizon);
   queued.triangle = force.triangle;
   queued.count = force.count;
+  begin_in_time(queued, force.continues, horizon);
   for (std::size_t corner = 0; corner < 3; ++corner) queued.barycentric[corner] = static_cast<float>(force.barycentric[corner]);
   Steps steps{};
   double strength = 0.0;
@@ -133,6 +148,8 @@ bool StrikeQueue::push(const events::Force& force, std::int64_t horizon) noexcep
 
 void StrikeQueue::take_over(const StrikeQueue& other) noexcept {
   counters_ = other.counters_;
+  late_ = other.late_;
+  oldest_late_ = other.oldest_late_;
   clear();
   for (const QueuedPulse& pulse : other.pulses_) {
     if (pulses_.size() == pulses_.capacity() || !model_->has_triangle(pulse.triangle)) {

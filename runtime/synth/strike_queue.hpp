@@ -90,12 +90,22 @@ class StrikeQueue {
   const StrikeCounters& get_counters() const noexcept { return counters_; }
 
  private:
+  /// A force that was moved to the horizon, and may continue.
+  struct LateForce {
+    std::int32_t triangle = -1;
+    double end = 0.0;    // as given, in samples
+    double shift = 0.0;  // samples
+  };
+
   void begin_in_time(double& begin, std::int64_t horizon) noexcept;
+  void begin_in_time(QueuedForce& force, bool continues, std::int64_t horizon) noexcept;
 
   const Model* model_;
   std::vector<QueuedPulse> pulses_;  // capacity max_pulses, never grown
   std::vector<QueuedForce> forces_;  // capacity max_forces, never grown
   StrikeCounters counters_;
+  std::array<LateForce, 8> late_{};  // the last ones; impacts at several places may take turns
+  std::size_t oldest_late_ = 0;
 };
 
 }  // namespace carillon::synth

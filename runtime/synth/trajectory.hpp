@@ -32,6 +32,10 @@ class Trajectory {
   /// [audio-thread] At rest at the origin without waypoints.
   Waypoint find(double time_s) const noexcept;
 
+  /// [audio-thread] The track jumps at this time; the last one is remembered.
+  void cut(double time_s) noexcept { cut_s_ = time_s; }
+  bool is_cut(double after_s, double until_s) const noexcept { return after_s < cut_s_ && cut_s_ <= until_s; }
+
   bool is_still() const { return count_ < 2; }
 
   /// Remembered waypoints; 0 is the oldest.
@@ -49,7 +53,7 @@ class Trajectory {
 
   std::vector<Waypoint> waypoints_;  // a ring
   std::size_t first_ = 0, count_ = 0;
-  double rest_begin_s_ = -std::numeric_limits<double>::infinity();
+  double rest_begin_s_ = -std::numeric_limits<double>::infinity(), cut_s_ = rest_begin_s_;
 };
 
 /// Rotation over time: shortest path between its last attitudes; constant before the first and after the last. One thread at a time.

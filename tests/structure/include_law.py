@@ -55,10 +55,21 @@ RULES = {
     "runtime/physics/impact": (["runtime/base"], []),
     "runtime/physics/joints": (["runtime/base"], ["fmt", "simbody"]),
     "runtime/physics/rigid": (["runtime/base"], ["eigen", "fmt"]),
-    "runtime/physics": (["runtime/base", "runtime/bank", "runtime/events"], ["fmt"]),
+    # Only the parts of physics below it: shapes and impacts.
+    "runtime/drive": (["runtime/base", "runtime/bank", "runtime/events", "runtime/physics"], []),
+    "runtime/physics": (["runtime/base", "runtime/bank", "runtime/events", "runtime/drive"], ["fmt"]),
     "runtime/scene/effects": (["runtime/base", "runtime/bank", "runtime/events", "runtime/acoustics", "runtime/synth"], ["fmt"]),
     "runtime/scene": (
-        ["runtime/base", "runtime/material", "runtime/bank", "runtime/events", "runtime/acoustics", "runtime/synth", "runtime/physics"],
+        [
+            "runtime/base",
+            "runtime/material",
+            "runtime/bank",
+            "runtime/events",
+            "runtime/acoustics",
+            "runtime/synth",
+            "runtime/drive",
+            "runtime/physics",
+        ],
         ["fmt"],
     ),
     "runtime/render/sound": (["runtime/base"], ["cairo", "eigen", "fmt"]),
@@ -71,7 +82,10 @@ RULES = {
         ["cli", "fmt", "portaudio"],
     ),
     "runtime/render/samples": (["runtime/base", "runtime/material", "runtime/bank", "runtime/scene"], ["cli", "fmt"]),
-    "runtime/bindings/c_api": (["runtime/base", "runtime/bank", "runtime/events", "runtime/acoustics", "runtime/synth"], []),
+    "runtime/bindings/c_api": (
+        ["runtime/base", "runtime/bank", "runtime/events", "runtime/acoustics", "runtime/synth", "runtime/drive"],
+        [],
+    ),
     "runtime/bindings/python": (
         [
             "runtime/base",
@@ -80,6 +94,7 @@ RULES = {
             "runtime/events",
             "runtime/acoustics",
             "runtime/synth",
+            "runtime/drive",
             "runtime/scene",
             "runtime/render",
         ],
@@ -222,7 +237,7 @@ PUBLIC = {
     "runtime/bank": ["mounting/"],
     "runtime/acoustics": ["radiation/", "head/", "recording/"],
     "runtime/exchange": ["gltf/"],
-    "runtime/physics": ["impact/impact.hpp", "impact/predict.hpp"],
+    "runtime/physics": ["geometry/shape.hpp", "impact/", "rigid/limits.hpp"],
     "runtime/scene": ["effects/effect_selector.hpp", "effects/table.hpp"],
     "runtime/render": ["sound/sound_store.hpp", "sound/spectrogram.hpp"],
     "precompute/job": ["cost/"],

@@ -315,6 +315,8 @@ typedef struct carillon_motion {
   double position_m[3];
   double velocity_m_s[3];
   double rotation[4]; /* of the frame of its mesh: w x y z, unit */
+  int32_t cut;        /* not 0: the body jumps here from where it was (a teleport), without a path in between */
+  int32_t reserved;
 } carillon_motion;
 
 /* Position of the listener. */
@@ -452,6 +454,140 @@ CARILLON_API int32_t carillon_read_sensor(carillon_synth* synth, int32_t number,
 CARILLON_API double carillon_sensor_begin_s(const carillon_synth* synth, int32_t number);
 /* [any] Samples lost because the buffer was full. */
 CARILLON_API int64_t carillon_sensor_lost(const carillon_synth* synth, int32_t number);
+
+/* ---- Touches: what a physics engine computes in a step, turned into impulses, forces, contacts, motions and marks
+ * (docs/howto/my-engine.md). [main] all of it: one thread at a time per carillon_touches; it allocates. Its events go to the synthesiser
+ * as by carillon_push_*. Vectors are in world axes. */
+typedef struct carillon_touches carillon_touches;
+
+typedef enum carillon_event_kind {
+  CARILLON_EVENT_MARK = 0,    /* event: double, as of carillon_push_mark */
+  CARILLON_EVENT_IMPULSE = 1, /* carillon_impulse */
+  CARILLON_EVENT_FORCE = 2,   /* carillon_force */
+  CARILLON_EVENT_CONTACT = 3, /* carillon_contact */
+  CARILLON_EVENT_MOTION = 4   /* carillon_motion */
+} carillon_event_kind;
+
+typedef struct carillon_touches_options {
+  uint32_t size;
+  int32_t max_points;   /* per step; of more the weakest are left out and counted */
+  int32_t points_after; /* 0: points are of the poses before the step (Bullet, MuJoCo, PhysX, Jolt); 1: of those after it (Simbody) */
+  int32_t compliant;    /* not 0: a hit lasts many steps (Simbody, MuJoCo): it ends when its force has decayed */
+  int32_t early;        /* not 0: hits are reported when they begin, with (1 + e) m v instead of the engine's impulse */
+  int32_t max_impacts;  /* with modes, per step; further hits are Hertz pulses limited in energy, counted as `simplified` */
+  double gravity_m_s2[3];
+  double slowest_m_s;     /* slower approaches are no hits; 0: 1 mm/s, or half of gravity times the step if that is more */
+  double longest_hit_s;   /* hits that last longer are ended, and counted as `cut` */
+  double ground_young_pa; /* of body -1; concrete */
+  double ground_poisson;
+  double ground_density_kg_m3;
+  double ground_restitution;
+  double ground_friction;
+  /* NULL: to the synthesiser. Called within carillon_touches_start, _step and _remove; the event is valid during the call. */
+  void (*sink)(void* user, int32_t kind, const void* event);
+  void* user;
+} carillon_touches_options;
+
+/* 4096 points of the poses before the step, 8 impacts, gravity 9.81 along -z, hits of at most 60 ms, a floor of concrete. */
+#define carillon_touches_options_init(options) carillon_touches_options_init_sized((options), sizeof(carillon_touches_options))
+CARILLON_API void carillon_touches_options_init_sized(carillon_touches_options* options, size_t size);
+
+typedef struct carillon_touches_body {
+  uint32_t size;
+  int32_t body;  /* number in the synthesiser; -1: silent, but strikes others */
+  int32_t fixed; /* not 0: static, or moved by the program: infinite mass */
+  int32_t reserved;
+  const carillon_bank* bank; /* surface, inertia, moduli, modes; must outlive the carillon_touches. NULL: only for silent bodies */
+  uint64_t name_seed;        /* carillon_name_seed of a name: contacts sound the same whatever other bodies there are */
+  double mass_kg;            /* 0, as of all others up to size_m: that of the bank. The engine's, where it differs */
+  double inertia_kg_m2[9];   /* about the centre of mass, mesh axes; all 0: of the bank, without bank that of a ball of size_m */
+  double young_pa;
+  double poisson;
+  double density_kg_m3;
+  double size_m;      /* diagonal of the bounding box */
+  double restitution; /* a contact uses the geometric mean of both bodies */
+  double friction;    /* likewise */
+} carillon_touches_body;
+
+/* Restitution 0.5, friction 0.4, all others of the bank. */
+#define carillon_touches_body_init(body) carillon_touches_body_init_sized((body), sizeof(carillon_touches_body))
+CARILLON_API void carillon_touches_body_init_sized(carillon_touches_body* body, size_t size);
+
+#define CARILLON_ASLEEP 1u     /* the engine has put the body to sleep: it rests until this is gone */
+#define CARILLON_TELEPORTED 2u /* moved by the program in this step: its contacts end, its path is cut */
+#define CARILLON_JOINTED 4u    /* on joints: its effective mass is measured from the step */
+
+/* Motion of a body at the end of a step; its centre of mass. This layout never changes. */
+typedef struct carillon_pose {
+  double position_m[3];
+  double rotation[4]; /* of the frame of its mesh: w x y z, unit to 1e-3 */
+  double velocity_m_s[3];
+  double spin_rad_s[3]; /* world axes */
+  uint32_t flags;       /* sum of CARILLON_ASLEEP, ... */
+  uint32_t reserved;
+} carillon_pose;
+
+/* A contact point of a step. This layout never changes. Given the pose that `points_after` names. */
+typedef struct carillon_point {
+  int32_t a, b;           /* indices of carillon_touches_add; b may be -1: the ground */
+  double point_m[3];      /* on b */
+  double normal[3];       /* unit, from b into a */
+  double gap_m;           /* negative: overlap; on a the point is point_m + gap_m * normal */
+  double impulse_n_s;     /* on a along the normal, sum of the whole step; NAN: found from the change of velocities */
+  double friction_n_s[3]; /* on a, across the normal; NAN: found likewise */
+  double curvature_per_m; /* of both surfaces together; NAN: from the shapes of the banks */
+  uint64_t reserved;      /* 0; contacts are recognised by their positions, not by ids of the engine */
+} carillon_point;
+
+/* `synth`: may be NULL if options give a sink; must outlive the carillon_touches. */
+CARILLON_API carillon_status carillon_touches_create(carillon_synth* synth, const carillon_touches_options* options,
+                                                     carillon_touches** touches, char* message, size_t message_size);
+/* NULL is allowed. */
+CARILLON_API void carillon_touches_destroy(carillon_touches* touches);
+/* Adds a body; `index` is its place in `poses` from the next step on: the lowest one that is free. CARILLON_BAD_INPUT for an open surface,
+ * and a silent body without mass, modulus or size. */
+CARILLON_API carillon_status carillon_touches_add(carillon_touches* touches, const carillon_touches_body* body, int32_t* index,
+                                                  char* message, size_t message_size);
+/* Ends the contacts of the body; its pose is ignored from now on. */
+CARILLON_API carillon_status carillon_touches_remove(carillon_touches* touches, int32_t index);
+/* Time and poses before the first step; again after a break, such as a loaded game. `bodies`: the highest index plus 1. */
+CARILLON_API carillon_status carillon_touches_start(carillon_touches* touches, double time_s, const carillon_pose* poses, int32_t bodies,
+                                                    char* message, size_t message_size);
+/* A step of the engine from the time before to time_s, of any length. CARILLON_BAD_INPUT for time that does not advance, poses that are not
+ * finite, and a wrong number of bodies: nothing has changed. Points with numbers that cannot be used are left out and counted.
+ * CARILLON_FULL if the ring has no room: the events are kept and come first at the next step. `points` may be NULL if count is 0. */
+CARILLON_API carillon_status carillon_touches_step(carillon_touches* touches, double time_s, const carillon_pose* poses, int32_t bodies,
+                                                   const carillon_point* points, int32_t count, char* message, size_t message_size);
+/* [any] No earlier events follow. The sound must stay this far behind the physics: its time below carillon_touches_mark_s. */
+CARILLON_API double carillon_touches_mark_s(const carillon_touches* touches);
+
+typedef struct carillon_touches_counters {
+  uint32_t size;
+  uint32_t reserved;
+  int64_t steps;
+  int64_t points;         /* accepted */
+  int64_t bad_points;     /* left out: not finite, normal not unit, unknown bodies */
+  int64_t dropped_points; /* left out: more than max_points */
+  int64_t hits;           /* pulses and impacts that were sounded */
+  int64_t impacts;        /* of them integrated with modes */
+  int64_t simplified;     /* beyond max_impacts: limited Hertz pulses */
+  int64_t limited;        /* pulses reduced to the energy of the blow */
+  int64_t masked;         /* hits left out: inaudible next to others */
+  int64_t weights;        /* impulses that were load only */
+  int64_t settled;        /* pulses of lasting contacts taken for load */
+  int64_t cut;            /* hits ended by longest_hit_s */
+  int64_t touches;        /* lasting contacts begun */
+  int64_t records;        /* carillon_contacts */
+  int64_t teleports;
+  int64_t waiting;      /* events kept because the ring was full, now */
+  int64_t lost;         /* events dropped: more than a million were waiting, or numbers were out of range */
+  double longest_hit_s; /* so far */
+} carillon_touches_counters;
+
+#define carillon_touches_counters_init(counters) carillon_touches_counters_init_sized((counters), sizeof(carillon_touches_counters))
+CARILLON_API void carillon_touches_counters_init_sized(carillon_touches_counters* counters, size_t size);
+/* [main] `counters->size` must be set. */
+CARILLON_API carillon_status carillon_touches_get_counters(const carillon_touches* touches, carillon_touches_counters* counters);
 
 #ifdef __cplusplus
 }

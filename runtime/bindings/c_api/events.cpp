@@ -172,7 +172,8 @@ carillon_status carillon_push_motion(carillon_synth* synth, const carillon_motio
                                         .body = ours->body,
                                         .position_m = to_vector(ours->position_m),
                                         .velocity_m_s = to_vector(ours->velocity_m_s),
-                                        .rotation = to_quaternion(ours->rotation)});
+                                        .rotation = to_quaternion(ours->rotation),
+                                        .cut = ours->cut != 0});
 }
 
 carillon_status carillon_push_listener(carillon_synth* synth, const carillon_listener* listener) {

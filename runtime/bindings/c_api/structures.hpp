@@ -19,6 +19,8 @@ inline constexpr std::size_t kMinSize<carillon_options> = offsetof(carillon_opti
 template <>
 inline constexpr std::size_t kMinSize<carillon_effect_counters> = offsetof(carillon_effect_counters, head_units);
 template <>
+inline constexpr std::size_t kMinSize<carillon_motion> = offsetof(carillon_motion, cut);
+template <>
 inline constexpr std::size_t kMinSize<carillon_counters> = offsetof(carillon_counters, contacts_accepted);
 
 /// Defaults of a structure; specialised where they are not 0.

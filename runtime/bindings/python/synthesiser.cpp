@@ -177,6 +177,7 @@ class Instrument {
     return py::array_t<double>(static_cast<py::ssize_t>(samples.size()), samples.data());
   }
 
+  synth::Synthesiser& get() { return *synthesiser_; }
   double get_rate_hz() const { return rate_hz_; }
   int get_channels() const { return synthesiser_->get_microphone_count(); }
   double get_time_s() const { return synthesiser_->get_time_s(); }
@@ -188,8 +189,6 @@ class Instrument {
   }
 
  private:
-  synth::Synthesiser& get() { return *synthesiser_; }
-
   SharedBank& require(int body) {
     const auto found = banks_.find(body);
     if (found == banks_.end()) throw InputError(fmt::format("there is no body {}; add_body() returns the numbers of bodies", body));
@@ -209,6 +208,11 @@ class Instrument {
 };
 
 }  // namespace
+
+synth::Synthesiser& find_synthesiser(const py::object& object) {
+  if (!py::isinstance<Instrument>(object)) throw py::type_error("synthesiser: give a carillon.Synthesiser");
+  return object.cast<Instrument&>().get();
+}
 
 void bind_synthesiser(py::module_& module) {
   using py::literals::operator""_a;

@@ -87,4 +87,10 @@ ElasticPulse calc_elastic_pulse(const Spring& spring, double mass_kg, double spe
   return {y, 2.0 * y / speed_m_s * std::sqrt(std::numbers::pi) * std::tgamma(1.0 + n) / std::tgamma(0.5 + n)};
 }
 
+double calc_hertz_duration(double compliance, double radius, double mass, double speed) {
+  constexpr double kMinSpeedMS = 1e-3, kMinS = 5e-6, kMaxS = 20e-3;
+  const double duration = 2.87 * std::pow(mass * mass * compliance * compliance / (radius * std::max(speed, kMinSpeedMS)), 0.2);
+  return std::clamp(duration, kMinS, kMaxS);
+}
+
 }  // namespace carillon::impact

@@ -51,4 +51,8 @@ struct ElasticPulse {
 };
 ElasticPulse calc_elastic_pulse(const Spring& spring, double mass_kg, double speed_m_s);
 
+/// Hertz contact time [s]: 2.87 (m^2 / (R E*^2 v))^(1/5) (K. L. Johnson, "Contact mechanics" (1985), eq. 11.24), of at least 1 mm/s,
+/// clamped to 5 us .. 20 ms.
+double calc_hertz_duration(double compliance_per_pa, double radius_m, double mass_kg, double speed_m_s);
+
 }  // namespace carillon::impact

@@ -1,5 +1,4 @@
 // Method: states, and frames derived from them; mean properties of two touching bodies.
-// Source: K. L. Johnson, "Contact mechanics" (1985), eq. 11.24.
 #include "runtime/physics/rigid/bodies.hpp"
 
 #include <fmt/format.h>
@@ -12,16 +11,6 @@
 #include "runtime/physics/rigid/limits.hpp"
 
 namespace carillon::rigid {
-namespace {
-
-constexpr double kMaxHertzS = 20e-3;  // s
-
-}  // namespace
-
-double calc_hertz_duration(double compliance, double radius, double mass, double speed) {
-  const double duration = 2.87 * std::pow(mass * mass * compliance * compliance / (radius * std::max(speed, kMinImpactSpeedMS)), 0.2);
-  return std::clamp(duration, 5e-6, kMaxHertzS);
-}
 
 Bodies::Bodies(std::vector<Solid> solids, std::vector<State> states, std::optional<Ground> ground, const Vec3& gravity,
                const std::vector<joints::Joint>& joints, double joint_tolerance)

@@ -14,9 +14,6 @@
 
 namespace carillon::rigid {
 
-/// Hertz contact time [s]: 2.87 (m^2 / (R E*^2 v))^(1/5) (K. L. Johnson, "Contact mechanics" (1985), eq. 11.24), clamped to 5 us .. 20 ms.
-double calc_hertz_duration(double compliance_per_pa, double radius_m, double mass_kg, double speed_m_s);
-
 /// The half space z <= height_m.
 struct Ground {
   double height_m = 0.0;
@@ -115,9 +112,9 @@ class Bodies {
   double calc_compliance(int a, int b) const;  // 1/E* [1/Pa]
   /// 1/R is the summed curvature, clamped between the curvature for half the size of the smaller body and 1/(0.5 mm).
   double calc_contact_radius(const geometry::Touch& touch, int a, int b) const;
-  /// Duration of an impact at the touch (calc_hertz_duration) for an effective mass and speed [s].
+  /// Duration of an impact at the touch for an effective mass and speed [s].
   double calc_contact_time(const geometry::Touch& touch, int a, int b, double mass_kg, double speed_m_s) const {
-    return calc_hertz_duration(calc_compliance(a, b), calc_contact_radius(touch, a, b), mass_kg, speed_m_s);
+    return impact::calc_hertz_duration(calc_compliance(a, b), calc_contact_radius(touch, a, b), mass_kg, speed_m_s);
   }
 
   std::vector<Articulation>& articulations() { return articulations_; }

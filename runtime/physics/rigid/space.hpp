@@ -79,10 +79,6 @@ class Space {
   /// Returns the forces of modal impacts since the last call.
   std::vector<Forces> take_forces() { return modal_impacts_.take_forces(); }
   Books calc_books() const;
-  /// Duration of an impact (calc_hertz_duration) for an effective mass and speed [s].
-  double calc_contact_time(const Hit& hit, double mass_kg, double speed_m_s) const {
-    return bodies_.calc_contact_time(hit.touch, hit.a, hit.b, mass_kg, speed_m_s);
-  }
   int count_mechanisms() const { return static_cast<int>(bodies_.articulations().size()); }
   /// Difference between the given start velocity and the motions permitted by the joints of a body [m/s]; 0 without joints.
   double get_start_error(int body) const { return bodies_.get_start_error(body); }

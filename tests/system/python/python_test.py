@@ -418,6 +418,67 @@ class Sounds(Case):
         self.assertGreater(most, 5)
 
 
+class Engines(Case):
+    """A body of hand-written physics that falls on the ground."""
+
+    def play(self, touches, bank, body, impulse):
+        """Falls at 1 m/s; what is left of it after the step is 0.2 m/s."""
+        index = touches.add(bank, body, "bar", restitution=0.5)
+        self.assertEqual(index, 0)
+        lowest = bank.vertices_m[numpy.argmin(bank.vertices_m[:, 2])]
+        position = numpy.array([bank.centre_m - lowest])
+        rotation, spin = numpy.array([[1.0, 0, 0, 0]]), numpy.zeros((1, 3))
+        touches.start(0.0, position, rotation, numpy.array([[0, 0, -1.0]]), spin)
+        points = {"pair": numpy.array([[0, -1]], numpy.int32), "point": numpy.zeros((1, 3)), "normal": numpy.array([[0, 0, 1.0]])}
+        dt = 1 / 240
+        self.assertTrue(touches.step(dt, position, rotation, numpy.array([[0, 0, -0.2]]), spin, impulse=impulse, **points))
+        for n in range(2, 30):
+            touches.step(n * dt, position, rotation, numpy.array([[0, 0, 0.1]]), spin)
+        return touches.counters
+
+    def test_a_hit_is_an_event(self):
+        bank = carillon.Bank(PINNED / "version_1_5.hdf")
+        touches = carillon.Touches()
+        counters = self.play(touches, bank, 0, numpy.array([0.84 * bank.mass_kg]))
+        self.assertEqual((counters["hits"], counters["steps"], counters["points"]), (1, 29, 1))
+        lines = [json.loads(line) for line in touches.take_lines().splitlines()]
+        pulses = [one for one in lines if "impulse" in one or "force" in one]
+        self.assertTrue(pulses)
+        self.assertEqual(touches.take_lines(), "")
+        self.assertAlmostEqual(touches.mark_s, 29 / 240)
+
+    def test_a_synthesiser_sounds(self):
+        bank = carillon.Bank(PINNED / "version_1_5.hdf")
+        synthesiser = carillon.Synthesiser()
+        body = synthesiser.add_body(bank)
+        touches = carillon.Touches(synthesiser)
+        self.play(touches, bank, body, None)  # found from the velocities
+        del touches
+        self.assertGreater(abs(synthesiser.process(9600)).max(), 0)
+
+    def test_wrong_arrays_are_one_message(self):
+        bank = carillon.Bank(PINNED / "version_1_5.hdf")
+        touches = carillon.Touches()
+        touches.add(bank, 0)
+        one, turn = numpy.zeros((1, 3)), numpy.array([[1.0, 0, 0, 0]])
+        touches.start(0.0, one, turn)
+        for arrays, part in (
+            ((numpy.zeros((2, 3)), turn, one, one), "position: 2 rows; give 1"),
+            ((one, numpy.zeros((1, 3)), one, one), r"rotation: give an array \(1, 4\)"),
+            ((one, 2 * turn, one, one), "no unit quaternion"),
+            ((one, turn, numpy.full((1, 3), numpy.nan), one), "not finite"),
+        ):
+            with self.assertRaisesRegex(carillon.InputError, part):
+                touches.step(0.1, *arrays)
+        with self.assertRaisesRegex(carillon.InputError, "pair, point and normal"):
+            touches.step(0.1, one, turn, one, one, pair=numpy.array([[0, -1]], numpy.int32))
+        self.assertEqual(touches.counters["steps"], 0)
+        with self.assertRaisesRegex(carillon.InputError, "needs a bank"):
+            touches.add(None, 0, mass_kg=1.0, young_pa=1e9, density_kg_m3=1e3, size_m=0.1)
+        with self.assertRaises(TypeError):
+            carillon.Touches(3)
+
+
 class Module(unittest.TestCase):
     def test_the_stub_matches_the_module(self):
         declared = ast.parse((pathlib.Path(carillon.__file__).parent / "_carillon.pyi").read_text())

@@ -12,12 +12,24 @@ import typing as _typing
 
 import numpy as _numpy
 
-from ._carillon import Bank, InputError, SolveError, Synthesiser, SystemError, __version__, materials
+from ._carillon import Bank, InputError, SolveError, Synthesiser, SystemError, Touches, __version__, materials
 from ._carillon import render as _render
 from .documents import write_json as _write_json
 from .solving import solve
 
-__all__ = ["Bank", "InputError", "SolveError", "Sound", "Synthesiser", "SystemError", "__version__", "materials", "render", "solve"]
+__all__ = [
+    "Bank",
+    "InputError",
+    "SolveError",
+    "Sound",
+    "Synthesiser",
+    "SystemError",
+    "Touches",
+    "__version__",
+    "materials",
+    "render",
+    "solve",
+]
 
 
 class Sound(_typing.NamedTuple):

@@ -9,6 +9,8 @@ File = Union[str, os.PathLike]
 Vector = Sequence[float]
 Doubles = numpy.typing.NDArray[numpy.float64]
 Floats = numpy.typing.NDArray[numpy.float32]
+Integers = numpy.typing.NDArray[numpy.int32]
+Booleans = numpy.typing.NDArray[numpy.bool_]
 
 __version__: str
 
@@ -129,6 +131,67 @@ class Synthesiser:
     def time_s(self) -> float: ...
     @property
     def counters(self) -> Dict[str, int]: ...
+
+class Touches:
+    """What a physics engine computes in a step, turned into events of a synthesiser."""
+
+    def __init__(
+        self,
+        synthesiser: Optional[Synthesiser] = None,
+        gravity: Vector = ...,
+        *,
+        compliant: bool = False,
+        early: bool = False,
+        points_after: bool = False,
+        max_points: int = 4096,
+        max_impacts: int = 8,
+        slowest_m_s: float = 0.0,
+        longest_hit_s: float = 0.06,
+        ground_restitution: float = 0.5,
+        ground_friction: float = 0.5,
+    ) -> None: ...
+    def add(
+        self,
+        bank: Optional[Bank] = None,
+        body: int = -1,
+        name: str = "",
+        fixed: bool = False,
+        restitution: float = 0.5,
+        friction: float = 0.4,
+        mass_kg: float = 0.0,
+        inertia_kg_m2: Optional[Sequence[float]] = None,
+        young_pa: float = 0.0,
+        poisson: float = 0.0,
+        density_kg_m3: float = 0.0,
+        size_m: float = 0.0,
+    ) -> int: ...
+    def remove(self, index: int) -> None: ...
+    def start(
+        self, time_s: float, position: Doubles, rotation: Doubles, velocity: Optional[Doubles] = None, spin: Optional[Doubles] = None
+    ) -> None: ...
+    def step(
+        self,
+        time_s: float,
+        position: Doubles,
+        rotation: Doubles,
+        velocity: Doubles,
+        spin: Doubles,
+        pair: Optional[Integers] = None,
+        point: Optional[Doubles] = None,
+        normal: Optional[Doubles] = None,
+        gap: Optional[Doubles] = None,
+        impulse: Optional[Doubles] = None,
+        friction: Optional[Doubles] = None,
+        curvature: Optional[Doubles] = None,
+        asleep: Optional[Booleans] = None,
+        teleported: Optional[Booleans] = None,
+        jointed: Optional[Booleans] = None,
+    ) -> bool: ...
+    def take_lines(self) -> str: ...
+    @property
+    def mark_s(self) -> float: ...
+    @property
+    def counters(self) -> Dict[str, float]: ...
 
 def materials() -> Dict[str, Dict[str, Any]]: ...
 def render(file: File, text: str = "", rate_hz: Optional[int] = None) -> Tuple[Floats, int]: ...

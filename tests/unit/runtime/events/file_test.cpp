@@ -98,7 +98,7 @@ Event draw_event(std::mt19937_64& random) {
                             draw_amount(random) + 1e-9,
                             draw_amount(random)};
     case 3:
-      return BodyMotion{draw_time(random), 1, draw_vector(random), draw_vector(random), draw_rotation(random)};
+      return BodyMotion{draw_time(random), 1, draw_vector(random), draw_vector(random), draw_rotation(random), random() % 2 == 0};
     default:
       return Listener{draw_time(random), draw_vector(random), draw_vector(random), draw_rotation(random)};
   }
@@ -148,6 +148,7 @@ void expect_same_moving(const T& a, const T& b) {
 
 void expect_same(const BodyMotion& a, const BodyMotion& b) {
   EXPECT_EQ(a.body, b.body);
+  EXPECT_EQ(a.cut, b.cut);
   expect_same_moving(a, b);
 }
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <set>
 
-#include "runtime/physics/pulses.hpp"
+#include "runtime/drive/pulses.hpp"
 #include "tests/unit/runtime/physics/checks.hpp"
 #include "tests/unit/runtime/physics/solids.hpp"
 
@@ -221,7 +221,7 @@ TEST(HollowBody, ContactOfOuterWallOnly) {
 
 TEST(Masks, MaskingOfMuchWeakerHits) {
   constexpr double kLength = 5e-4;
-  Masks masks(2);
+  drive::Masks masks(2);
   EXPECT_FALSE(masks.take(0, 1.0, 1.0, kLength));
   EXPECT_TRUE(masks.take(0, 1.001, 0.0045, kLength));
   EXPECT_FALSE(masks.take(0, 1.001, 0.0051, kLength));

@@ -245,6 +245,29 @@ TEST(Force, LateForcesKeepTheirImpulse) {
   EXPECT_NEAR(play(voice, 64).back(), sum, 0.15 * sum) << "a 25th of a period later";
 }
 
+TEST(Force, LatePiecesAreShiftedTogether) {
+  const bank::Bank bank = make_cube_bank(make_modes(20));
+  const Course late = make_course(0.01, 2e-5, 100, false), other = make_course(0.01, 3e-5, 60, false);
+  ResonatorBank voice(Model::make(bank, {.rate_hz = kRate})), in_time(Model::make(bank, {.rate_hz = kRate}));
+  play(voice, 4800);
+  play(in_time, 4800);
+  // Pieces of two pulses take turns; the last one comes when it would no longer be late.
+  const std::vector<Force> first = make_pieces(late), second = make_pieces(other, 1);
+  for (std::size_t k = 0; k < first.size(); ++k) {
+    ASSERT_TRUE(voice.push(first[k]));
+    if (k < second.size()) ASSERT_TRUE(voice.push(second[k]));
+  }
+  EXPECT_EQ(voice.get_counters().late, 2) << "pulses";
+  for (const Course* course : {&late, &other}) {
+    Course shifted = *course;
+    shifted.begin_s = 4799.0001 / kRate;
+    for (const Force& piece : make_pieces(shifted, course == &late ? 0 : 1)) ASSERT_TRUE(in_time.push(piece));
+  }
+  EXPECT_EQ(in_time.get_counters().late, 0);
+  const auto wanted = play(in_time, 2400);
+  EXPECT_LT(calc_error(play(voice, 2400), std::vector<double>(wanted.begin(), wanted.end())), 1e-3);
+}
+
 TEST(Force, MovesAClickAsTheSamePulseInOnePiece) {
   // A Hertz pulse in 4,000 steps.
   constexpr double kLength = 1.3e-3, kBegin = 2.01e-3;

@@ -126,6 +126,37 @@ TEST(Synthesiser, IsItsResonatorBanksWithPropagation) {
   for (int n = kAll; n < 20000; ++n) ASSERT_NEAR(distance * out[0][n], alone[n - kAll], 2e-6 * peak) << n;
 }
 
+TEST(Synthesiser, ABodyThatIsCutJumpsWithoutAChirp) {
+  constexpr double kJump = 0.1;
+  const Vec3 near{0.0, 1.0, 0.0}, far{0.0, 4.0, 0.0};
+  const auto ring = [&](const Vec3& from, const Vec3& to, bool is_cut) {
+    Synthesiser synthesiser({.rate_hz = kRate});
+    const int body = synthesiser.add_body(make_model(1, 2.0), {.position_m = from});
+    std::vector<events::Event> events{make_impulse(body, 0.01)};
+    if (from != to) events.emplace_back(events::BodyMotion{.time_s = kJump, .body = body, .position_m = to, .cut = is_cut});
+    return play(synthesiser, events, 9600, [] { return 100; })[0];
+  };
+  for (const bool leaves : {true, false}) {
+    const Vec3 &from = leaves ? near : far, &to = leaves ? far : near;
+    const auto jump = ring(from, to, true), before = ring(from, from, false), after = ring(to, to, false);
+    const auto path = ring(from, to, false);
+    const int begin = static_cast<int>((kJump + 1.0 / 343.0) * kRate) - 64, end = static_cast<int>((kJump + 4.0 / 343.0) * kRate) + 128;
+    double largest = 0.0, least = 0.0;
+    for (int n = 0; n < begin; ++n) largest = std::max(largest, static_cast<double>(std::abs(before[n])));
+    for (int n = 0; n < begin; ++n) ASSERT_NEAR(jump[n], before[n], 1e-4 * largest) << n;
+    for (int n = end; n < 9600; ++n) ASSERT_NEAR(jump[n], after[n], 1e-4 * largest) << n;
+    double step = 0.0, chirp = 0.0;
+    for (int n = begin; n < end; ++n) {
+      step = std::max(step, static_cast<double>(std::abs(jump[n] - jump[n - 1])));
+      least = std::max(
+          {least, static_cast<double>(std::abs(before[n] - before[n - 1])), static_cast<double>(std::abs(after[n] - after[n - 1]))});
+      chirp = std::max(chirp, static_cast<double>(std::abs(path[n] - before[n])));
+    }
+    EXPECT_LT(step, 3.0 * least) << "no click";
+    EXPECT_GT(chirp, 0.1 * largest) << "a path in between is heard";
+  }
+}
+
 TEST(Synthesiser, AddsBodiesUpAndKeepsTimeForThoseThatComeLater) {
   const auto model = make_model(12);
   const auto play_one = [&](double time_s, int before) {

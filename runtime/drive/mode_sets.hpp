@@ -7,7 +7,7 @@
 #include "runtime/bank/bank.hpp"
 #include "runtime/physics/impact/modes.hpp"
 
-namespace carillon::physics {
+namespace carillon::drive {
 
 /// Bodies of one bank share their modes. Banks must not move in memory.
 class ModeSets {
@@ -19,4 +19,4 @@ class ModeSets {
   std::map<const bank::Bank*, std::shared_ptr<const impact::Modes>> sets_;
 };
 
-}  // namespace carillon::physics
+}  // namespace carillon::drive

@@ -1,10 +1,10 @@
-#include "runtime/physics/mode_sets.hpp"
+#include "runtime/drive/mode_sets.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
-namespace carillon::physics {
+namespace carillon::drive {
 
 std::shared_ptr<const impact::Modes> ModeSets::find(const bank::Bank& bank) {
   if (bank.mode_count() == 0) return nullptr;
@@ -17,4 +17,4 @@ std::shared_ptr<const impact::Modes> ModeSets::find(const bank::Bank& bank) {
   return modes;
 }
 
-}  // namespace carillon::physics
+}  // namespace carillon::drive

@@ -1,0 +1,81 @@
+#include "runtime/drive/sharp_edges.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "runtime/base/chance.hpp"
+
+namespace carillon::drive {
+namespace {
+
+constexpr double kSharpCosine = 0.906;   // of 25 degrees
+constexpr double kParallelCosine = 0.9;  // edges of one direction
+constexpr double kNearRatio = 0.01;      // of the size
+
+}  // namespace
+
+std::size_t SharpEdges::Hash::operator()(const Cell& cell) const noexcept {
+  std::uint64_t hash = 0;
+  for (const std::int64_t k : cell) hash = base::scramble(hash + static_cast<std::uint64_t>(k) + base::kChanceStep);
+  return static_cast<std::size_t>(hash);
+}
+
+SharpEdges::SharpEdges(std::span<const Vec3> vertices, std::span<const std::array<std::int32_t, 3>> triangles, double size_m)
+    : near_m_(kNearRatio * size_m) {
+  std::map<std::pair<std::int32_t, std::int32_t>, Vec3> normals;  // of the first facet of an edge
+  for (const auto& corners : triangles) {
+    const Vec3 n = calc_unit(cross(vertices[corners[1]] - vertices[corners[0]], vertices[corners[2]] - vertices[corners[0]]));
+    for (int k = 0; k < 3; ++k) {
+      const std::int32_t from = corners[k], to = corners[(k + 1) % 3];
+      const auto [at, is_first] = normals.try_emplace(std::minmax(from, to), n);
+      if (is_first) continue;
+      const Vec3 along = vertices[to] - vertices[from];
+      const bool is_convex = dot(cross(n, at->second), along) > 0.0;
+      if (is_convex && dot(n, at->second) < kSharpCosine) add({vertices[from], vertices[to]});
+    }
+  }
+}
+
+SharpEdges::Cell SharpEdges::find_cell(const Vec3& x) const {
+  Cell cell{};
+  for (std::size_t k = 0; k < 3; ++k) cell[k] = static_cast<std::int64_t>(std::floor(std::clamp(x[k] / (2.0 * near_m_), -1e15, 1e15)));
+  return cell;
+}
+
+void SharpEdges::add(const Edge& edge) {
+  const int index = static_cast<int>(edges_.size());
+  edges_.push_back(edge);
+  const int parts = std::max(1, static_cast<int>(std::ceil(norm(edge.end - edge.begin) / near_m_)));
+  for (int part = 0; part <= parts; ++part) {
+    const Cell middle = find_cell(edge.begin + (static_cast<double>(part) / parts) * (edge.end - edge.begin));
+    for (int k = 0; k < 27; ++k) {
+      std::vector<int>& cell = cells_[{middle[0] + k % 3 - 1, middle[1] + k / 3 % 3 - 1, middle[2] + k / 9 - 1}];
+      if (cell.empty() || cell.back() != index) cell.push_back(index);
+    }
+  }
+}
+
+int SharpEdges::count_directions(const Vec3& point) const {
+  const auto found = cells_.find(find_cell(point));
+  if (found == cells_.end()) return 0;
+  Vec3 first{};
+  int count = 0;
+  for (const int index : found->second) {
+    const Edge& edge = edges_[index];
+    const Vec3 along = edge.end - edge.begin;
+    const double share = std::clamp(dot(point - edge.begin, along) / dot(along, along), 0.0, 1.0);
+    if (norm(edge.begin + share * along - point) > near_m_) continue;
+    const Vec3 direction = calc_unit(along);
+    if (count == 0) {
+      first = direction;
+      count = 1;
+    } else if (std::abs(dot(first, direction)) < kParallelCosine) {
+      return 2;
+    }
+  }
+  return count;
+}
+
+}  // namespace carillon::drive

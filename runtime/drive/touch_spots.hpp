@@ -1,0 +1,82 @@
+// Positions of contact, tracked from step to step: when a hit begins and ends, and what is load. Internal to this folder.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "runtime/drive/lasting.hpp"
+#include "runtime/drive/touch_bodies.hpp"
+
+namespace carillon::drive {
+
+/// A complete hit.
+struct FinishedHit {
+  int a = 0, b = -1;
+  double touch_s = 0.0, end_s = 0.0;
+  double approach_m_s = 0.0, parting_m_s = 0.0;  // before and after; parting >= 0
+  double inverse_mass = 0.0;                     // 1/m_eff along the normal [1/kg]
+  double push_n_s = 0.0;                         // along the normal, without weight
+  double curvature_per_m = 0.0;                  // NaN: unknown
+  Vec3 normal{};                                 // world, from b to a
+  double rubbed_n_s = 0.0;                       // friction
+  std::array<Vec3, 2> stations_m{}, outwards{};  // on a and b, mesh axes; outward normals
+  std::array<Vec3, 2> impulses_n_s{};            // on a and b, mesh axes
+  std::array<Motion, 2> before{};                // motions of a and b before its first step
+};
+
+/// Invariant: a position belongs to one pair (a, b), in the order of the names; it lives until it has had no load for a few steps.
+class TouchSpots {
+ public:
+  /// A step with its points, sorted by pair and impulse. Appends finished hits and the averaged load of every position.
+  void advance(const StepView& step, std::span<const StepPoint> points, TouchesCounters& counters, std::vector<FinishedHit>& hits,
+               std::vector<Load>& loads);
+  /// Forgets all positions of a body.
+  void forget(int body);
+  /// Begin of the earliest hit that is not reported yet; at most `now_s`.
+  double find_first_open(double now_s) const;
+
+ private:
+  /// Points of a step at one position.
+  struct Group {
+    int a = 0, b = -1;
+    double push_n_s = 0.0, approach_m_s = 0.0, gap_m = 0.0, curvature_per_m = 0.0, rubbed_n_s = 0.0;
+    Vec3 where_m{}, normal{}, impulse_n_s{};  // where: at the end of the step
+    std::array<Vec3, 2> stations_m{};         // mesh frames
+  };
+  struct Spot {
+    std::uint64_t number = 0;  // identity for LastingContacts
+    int a = 0, b = -1;
+    Vec3 where_m{}, normal{};
+    std::array<Vec3, 2> stations_m{};
+    double curvature_per_m = -1.0;                     // of both surfaces; negative: unknown
+    int owner = -2;                                    // body with the sharper surface; -2: unknown
+    bool is_round = false;                             // the owner: the position may roll over it
+    double born_s = 0.0, seen_s = 0.0, quiet_s = 0.0;  // first and last step with a push; end of the last hit
+    double load_n = 0.0, mean_n = 0.0;                 // averaged: without hits, with hits
+    bool is_gone = false, is_open = false, is_reported = false;
+    double peak_n = 0.0;  // of the open hit
+    FinishedHit hit;      // sums of the open hit, weighted by impulse
+  };
+
+  std::vector<Group> make_groups(const StepView& step, std::span<const StepPoint> points) const;
+  Spot& find_spot(const StepView& step, const Group& group, std::vector<Spot>& spots);
+  void follow(const StepView& step, const Group& group, int count, Spot& spot, std::vector<FinishedHit>& hits);
+  void open(const StepView& step, const Group& group, double inverse_mass, Spot& spot);
+  void gather(const StepView& step, const Group& group, double push_n_s, Spot& spot);
+  void report_early(const StepView& step, Spot& spot, std::vector<FinishedHit>& hits);
+  void close(const StepView& step, Spot& spot, std::vector<FinishedHit>& hits);
+  static Vec3 calc_where(const StepView& step, const Group& group, const Spot& spot);
+  void miss(const StepView& step, Spot& spot, std::vector<FinishedHit>& hits);
+  void add_load(const StepView& step, Spot& spot, std::vector<Load>& loads) const;
+
+  std::map<std::pair<int, int>, std::vector<Spot>> spots_;
+  std::vector<char> struck_;  // bodies with a hit in this step
+  std::uint64_t numbers_ = 0;
+  TouchesCounters* counters_ = nullptr;
+};
+
+}  // namespace carillon::drive
