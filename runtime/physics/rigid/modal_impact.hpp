@@ -55,6 +55,10 @@ class ModalImpacts {
   bool begin(const Step& step, Collision& collision, const Instants& instants, TouchSets& touches);
   /// A rigid impact ends the modal impacts of its bodies.
   void end(const std::vector<Hit>& hits, TouchSets& touches);
+  /// Ends the modal impact of a body.
+  void end(int body, TouchSets& touches) {
+    if (ModalImpact* modal = find(body); modal != nullptr) end(*modal, touches);
+  }
   /// Ends impacts with slow touches elsewhere, or touches deeper than their springs and modes explain, at the time of the touches.
   void end_where_touching(const Step& step, TouchSets& touches);
   /// Moves contacts of impacts to their touches; touches that may close within a step become open contacts.
