@@ -3,10 +3,12 @@
 #include "runtime/render/live/player.hpp"
 
 #include <fmt/core.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <memory>
 #include <thread>
@@ -16,6 +18,7 @@
 #include "runtime/base/printable.hpp"
 #include "runtime/events/events.hpp"
 #include "runtime/physics/world.hpp"
+#include "runtime/render/live/commands.hpp"
 #include "runtime/render/live/device.hpp"
 #include "runtime/render/render.hpp"
 #include "runtime/render/surface_playback.hpp"
@@ -75,6 +78,8 @@ class Physics {
     window_cpu_s_ += now_s - counted_s_;
     return time_s_ > was_s || now_s - began_s >= kSliceS;
   }
+  /// nullptr: no body can move.
+  physics::World* get_world() { return world_.get(); }
   /// Largest CPU time of one window of physics (2 ms of scene time).
   double get_worst_window_s() const { return worst_window_s_; }
   /// Time up to which all events are known.
@@ -101,6 +106,7 @@ class Player {
   Player(const scene::Scene& scene, const std::vector<const bank::Bank*>& banks, const PlayerOptions& options)
       : scene_(&scene),
         look_ahead_s_(options.look_ahead_s),
+        takes_commands_(options.takes_commands),
         pushed_s_(std::min(kPushedS, options.look_ahead_s)),
         session_(scene, banks, scene.sample_rate_hz, true, scene::make_head(scene, scene.sample_rate_hz)),
         selector_(scene::make_facts(scene, session_.get_microphones(), scene::has_physics(scene))),
@@ -134,6 +140,12 @@ class Player {
     return advanced;
   }
 
+  Hands make_hands() {
+    Hands hands{.world = physics_.get_world(), .names = {}};
+    for (const scene::SceneBody& body : scene_->bodies) hands.names.push_back(body.name);
+    return hands;
+  }
+
   /// Smallest lead of the physics over the sound; infinite without physics.
   double get_min_lead_s() const { return min_lead_s_; }
   double get_worst_window_s() const { return physics_.get_worst_window_s(); }
@@ -148,7 +160,7 @@ class Player {
     std::vector<scene::ScheduledBody> bodies;
     for (std::size_t i = 0; i < scene_->bodies.size(); ++i) {
       bodies.push_back({.number = static_cast<int>(i),
-                        .moves = !scene_->bodies[i].spec.fixed,
+                        .moves = takes_commands_ || !scene_->bodies[i].spec.fixed,
                         .lead_s = scene::calc_strike_lead_s(session_.get_model(i), find_effects(i))});
     }
     return bodies;
@@ -171,6 +183,7 @@ class Player {
 
   const scene::Scene* scene_;
   double look_ahead_s_;  // of the physics
+  bool takes_commands_;  // which may move fixed bodies too
   double pushed_s_;      // of the events
   scene::Session session_;
   effects::EffectSelector selector_;
@@ -179,6 +192,22 @@ class Player {
   synth::Synthesiser* synthesiser_;
   double min_lead_s_ = std::numeric_limits<double>::infinity();
 };
+
+/// Carries out the commands that have arrived. False: quit.
+bool obey(LineReader& reader, const Hands& hands) {
+  for (const std::string& line : reader.read()) {
+    if (line == "quit") return false;
+    try {
+      if (const std::string text = carry_out(line, hands); !text.empty()) {
+        fmt::print("{}\n", text);
+        std::fflush(stdout);
+      }
+    } catch (const InputError& error) {
+      warn({error.what()});
+    }
+  }
+  return true;
+}
 
 void print_statistics(const DeviceStatistics& card, const synth::SynthesiserCounters& counters, const Player& player, double rate_hz) {
   const double card_s = std::max(static_cast<double>(card.frames), 1.0) / rate_hz;
@@ -212,7 +241,10 @@ void play(const PlayerOptions& options) {
   player.begin();
   device.start();
   synth::LoadKeeper keeper;
+  LineReader reader(STDIN_FILENO);
+  const Hands hands = player.make_hands();
   for (double now_s = 0.0; now_s < scene.duration_s; now_s = synthesiser.get_time_s()) {
+    if (options.takes_commands && !obey(reader, hands)) break;
     const bool advanced = player.step(now_s);
     if (options.cpu_share > 0.0) keeper.keep(synthesiser, options.cpu_share, device.get_statistics().busy_s);
     if (!advanced) std::this_thread::sleep_for(std::chrono::milliseconds(2));
