@@ -63,13 +63,10 @@ RULES = {
     ),
     "runtime/render/sound": (["runtime/base"], ["cairo", "eigen", "fmt"]),
     "runtime/render": (
-        ["runtime/base", "runtime/bank", "runtime/events", "runtime/acoustics", "runtime/synth", "runtime/scene"],
+        ["runtime/base", "runtime/bank", "runtime/events", "runtime/acoustics", "runtime/synth", "runtime/physics", "runtime/scene"],
         ["cli", "fmt", "sndfile"],
     ),
-    "runtime/render/live": (
-        ["runtime/base", "runtime/events", "runtime/synth", "runtime/physics", "runtime/scene"],
-        ["cli", "fmt", "portaudio"],
-    ),
+    "runtime/render/live": (["runtime/base", "runtime/synth", "runtime/physics", "runtime/scene"], ["cli", "fmt", "portaudio"]),
     "runtime/render/samples": (["runtime/base", "runtime/material", "runtime/bank", "runtime/scene"], ["cli", "fmt"]),
     "runtime/bindings/c_api": (["runtime/base", "runtime/bank", "runtime/events", "runtime/acoustics", "runtime/synth"], []),
     "runtime/bindings/python": (
@@ -80,6 +77,7 @@ RULES = {
             "runtime/events",
             "runtime/acoustics",
             "runtime/synth",
+            "runtime/physics",
             "runtime/scene",
             "runtime/render",
         ],
