@@ -67,4 +67,5 @@ PYBIND11_MODULE(_carillon, module) {
   bind_bank(module);
   bind_render(module);
   bind_synthesiser(module);
+  bind_world(module);
 }

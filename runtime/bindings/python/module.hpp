@@ -11,5 +11,7 @@ void bind_bank(pybind11::module_& module);
 void bind_render(pybind11::module_& module);
 /// Synthesiser driven by calls.
 void bind_synthesiser(pybind11::module_& module);
+/// Scenes simulated and played by calls.
+void bind_world(pybind11::module_& module);
 
 }  // namespace carillon::python
