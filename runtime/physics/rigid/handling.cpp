@@ -69,9 +69,10 @@ void Space::pull_joints(const Island& island, double length_s) {
 }
 
 /// Books the work of grabs in the completed part of a step; returns it [J].
-double Space::give_pulls(const std::vector<State>& before, double part_s) {
+double Space::give_pulls(const std::vector<State>& before, const std::vector<char>& in_impact, double part_s) {
   double work_j = 0.0;
-  for (int n = 0; n < step_.count(); ++n) work_j += step_.calc_pull_work(n, before[n], part_s);
+  for (int n = 0; n < step_.count(); ++n)
+    if (in_impact[n] == 0) work_j += step_.calc_pull_work(n, before[n], part_s);  // ModalImpacts book the others
   ledger_.give(work_j);
   return work_j;
 }

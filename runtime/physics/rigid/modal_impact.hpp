@@ -115,6 +115,7 @@ class ModalImpacts {
   void for_contacts(const Pair& pair, Do&& act) const;
   double calc_depth(const Pair& pair, const Vec3& where) const;
   void move_articulation(const ArticulationStep& step, const impact::Body& struck, double time_s, double step_s);
+  void give_pull(const Step& step, int n, const Vec3& moved, const Vec3& turned);
   void undo_pull(const Step& step, int body, const joints::Spatial& pull, double time_s);
   void keep_pulses(ModalImpact& modal);
   void report(ModalContact& contact);

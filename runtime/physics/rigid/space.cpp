@@ -228,7 +228,7 @@ void Space::move(double to_s, double part_s) {
     if (!in_impact[n]) bodies_.state(step_.body(n)) = moved[n];
     bodies_.place(step_.body(n));
   }
-  const double pulls_j = before.empty() ? 0.0 : give_pulls(before, part_s);
+  const double pulls_j = before.empty() ? 0.0 : give_pulls(before, in_impact, part_s);
   if (!has_impacts) problem_.remove_gain(step_, before_j + loads_j + pulls_j);
 }
 

@@ -118,7 +118,7 @@ class Space {
   bool strike_at_once(double start_s, double length_s);
   void move(double to_s, double part_s);
   void pull_joints(const Island& island, double length_s);
-  double give_pulls(const std::vector<State>& before, double part_s);
+  double give_pulls(const std::vector<State>& before, const std::vector<char>& in_impact, double part_s);
   void stir(int body);
   void strike(const std::vector<ContactRef>& first);
 
