@@ -9,7 +9,7 @@
 // later. Invalid arguments reject with an Error of one sentence.
 
 const kGround = { height_m: 0, young_modulus_pa: 30e9, poisson_ratio: 0.2, restitution: 0.5, friction: 0.5, density_kg_m3: 2400, roughness_m: 20e-6 };
-const kStill = [0, 0, 0];
+const kStill = [0, 0, 0], kKept = 4096; // poses of a body that wait to be asked for
 const kKeys = { ArrowLeft: [-1, 0, 0], ArrowRight: [1, 0, 0], ArrowUp: [0, 1, 0], ArrowDown: [0, -1, 0], PageUp: [0, 0, 1], PageDown: [0, 0, -1] };
 
 export class World {
@@ -52,7 +52,10 @@ export class World {
     });
   }
   take({ id, result, message, poses, failed }) {
-    if (poses !== undefined) for (const [body, ...pose] of poses) this.paths[body].push(pose);
+    for (const [body, ...pose] of poses ?? []) {
+      const path = this.paths[body];
+      if (path.push(pose) > kKept) path.splice(0, kKept / 2);
+    }
     if (failed !== undefined) this.audio.report(failed);
     const { resolve, reject } = this.waiting.get(id) ?? {};
     this.waiting.delete(id);
