@@ -3,12 +3,15 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "runtime/base/error.hpp"
 #include "runtime/base/groups.hpp"
+#include "runtime/physics/rigid/body.hpp"
 
 namespace carillon::physics {
 namespace {
@@ -55,19 +58,8 @@ void check_body(const BodySpec& b) {
   const std::string who = fmt::format("body '{}'", b.name);
   if (b.bank == nullptr) throw InputError(who + ": has no bank; name the file of its mode bank");
   check_contact_numbers(who, b.restitution, b.friction, b.bank->material.young_modulus_pa, b.bank->material.poisson_ratio);
-  if (!is_finite(b.initial.position_m) || !is_finite(b.velocity_m_s) || !is_finite(b.angular_velocity_rad_s)) {
-    throw InputError(who + ": position, velocity and angular velocity must be finite numbers");
-  }
-  const auto& q = b.initial.rotation;
-  const double norm = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
-  if (!(norm > 1e-12 && std::isfinite(norm))) {
-    throw InputError(who + ": the rotation (quaternion w x y z) is zero or not finite; use 1 0 0 0 for no rotation");
-  }
-  if (!b.fixed) {
-    check_rigid(who, b.bank->rigid);
-  } else if (!is_zero(b.velocity_m_s) || !is_zero(b.angular_velocity_rad_s)) {
-    throw InputError(who + ": is fixed but has a velocity; remove one of the two");
-  }
+  check_entry(b);
+  if (!b.fixed) check_rigid(who, b.bank->rigid);
 }
 
 void check_joints(const WorldSpec& spec) {
@@ -75,6 +67,10 @@ void check_joints(const WorldSpec& spec) {
   const auto is_fixed = [&](int body) { return body < 0 || spec.bodies[body].fixed; };
   const auto check_ends = [&](const std::string& place, const char* what, int body, int to) {
     if (body < 0 || body >= count || to < -1 || to >= count) throw InputError(fmt::format("{}: a {} names no body", place, what));
+    for (const int end : {body, to})
+      if (end >= 0 && spec.bodies[end].absent)
+        throw InputError(fmt::format("{} holds '{}', which is absent at the start; remove one of the two",
+                                     describe(spec, place, what, body, to), spec.bodies[end].name));
     std::string who = describe(spec, place, what, body, to);
     if (body == to) throw InputError(who + " connects a body to itself; name another body, or \"world\"");
     if (is_fixed(body) && is_fixed(to)) throw InputError(who + " connects two bodies that do not move");
@@ -131,6 +127,20 @@ std::string describe(const WorldSpec& spec, const std::string& place, const char
   return fmt::format("{}{}the {} between {} and {}", place, place.empty() ? "" : ": ", what, name(body), name(to));
 }
 
+void check_entry(const BodySpec& b) {
+  const std::string who = fmt::format("body '{}'", b.name);
+  if (!is_finite(b.initial.position_m) || !is_finite(b.velocity_m_s) || !is_finite(b.angular_velocity_rad_s)) {
+    throw InputError(who + ": position, velocity and angular velocity must be finite numbers");
+  }
+  const auto& q = b.initial.rotation;
+  const double norm = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+  if (!(norm > 1e-12 && std::isfinite(norm))) {
+    throw InputError(who + ": the rotation (quaternion w x y z) is zero or not finite; use 1 0 0 0 for no rotation");
+  }
+  if (b.fixed && !(is_zero(b.velocity_m_s) && is_zero(b.angular_velocity_rad_s)))
+    throw InputError(who + ": is fixed but has a velocity; remove one of the two");
+}
+
 void check(const WorldSpec& spec, const WorldOptions& options) {
   if (!(options.end_s >= 0.0)) throw InputError(fmt::format("the end time {} s must be a number, 0 or more", options.end_s));
   if (!(options.contact_step_s >= 2e-6 && options.contact_step_s <= 2e-3))
@@ -144,6 +154,45 @@ void check(const WorldSpec& spec, const WorldOptions& options) {
   }
   for (const BodySpec& body : spec.bodies) check_body(body);
   check_joints(spec);
+}
+
+std::vector<std::string> ask_about_links(const WorldSpec& spec) {
+  constexpr double kFarRadii = 30.0;  // radii of a body
+  std::vector<std::string> questions;
+  const auto calc_distance = [&](int body, const Vec3& where, double& radius) {
+    const BodySpec& b = spec.bodies[body];
+    radius = 0.0;
+    for (const Vec3& v : b.bank->vertices_m) radius = std::max(radius, norm(v - b.bank->rigid.centre_m));
+    const Mat3 rotation = rigid::make_rotation(rigid::normalise(b.initial.rotation));
+    return norm(where - b.initial.position_m - rotation * b.bank->rigid.centre_m);
+  };
+  const auto name = [&](int body) { return spec.bodies[body].name; };
+  for (const JointSpec& joint : spec.joints) {
+    bool far = true;
+    double nearest = std::numeric_limits<double>::infinity(), of = 0.0;
+    int body = joint.body;
+    for (const int one : {joint.body, joint.to}) {
+      if (one < 0) continue;
+      double radius = 0.0;
+      const double distance = calc_distance(one, joint.at_m, radius);
+      far = far && distance > kFarRadii * radius;
+      if (distance < nearest) nearest = distance, of = radius, body = one;
+    }
+    if (far)
+      questions.push_back(fmt::format("{} is {:.3g} m from the centre of '{}', a body of {:.2g} m: is \"at_m\" the place in the world?",
+                                      describe(spec, joint.place, "joint", joint.body, joint.to), nearest, name(body), 2.0 * of));
+  }
+  for (const CordSpec& cord : spec.cords)
+    for (const bool from : {true, false}) {
+      const int body = from ? cord.body : cord.to;
+      if (body < 0) continue;
+      double radius = 0.0;
+      const double distance = calc_distance(body, from ? cord.from_m : cord.to_m, radius);
+      if (distance > 1.01 * radius)
+        questions.push_back(fmt::format("{} is tied {:.3g} m from the centre of '{}', outside of it: is that the place in the world?",
+                                        describe(spec, cord.place, "cord", cord.body, cord.to), distance, name(body)));
+    }
+  return questions;
 }
 
 }  // namespace carillon::physics

@@ -38,8 +38,8 @@ struct EnergyAudit {
   double hit_rise_j = 0.0;  // maximum energy added by a hit; 0 expected
   double kinetic_j = 0.0;   // maximum so far
   double weight_n = 0.0;    // of all moving bodies; rise_j over it is a height
-  // Current values; start = motion + modes + lost - lifted + error. Radiated energy is taken from the modes by the player, and is in
-  // `lost`.
+  // Current values; start = motion + modes + lost - lifted - given + error. Radiated energy is taken from the modes by the player, and is
+  // in `lost`.
   double start_j = 0.0;      // total at the start; gravity relative to the origin
   double motion_j = 0.0;     // kinetic and gravitational
   double modes_j = 0.0;      // in the modes
@@ -47,6 +47,7 @@ struct EnergyAudit {
   double modes_share = 0.0;  // maximum of modes over the energy lost by the motion until then; above 1 modes hold more than was lost
   double lost_j = 0.0;       // by friction, in contacts, by modal damping
   double lifted_j = 0.0;     // given to bodies that were moved apart, beyond the share paid by their motion
+  double given_j = 0.0;      // from outside, by pushes, grabs, and bodies added or removed
   double error_j = 0.0;      // maximum so far
 };
 

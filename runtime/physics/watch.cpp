@@ -57,7 +57,7 @@ void ContactWatch::keep(const Depth& depth) {
 void ContactWatch::look_at_ground(const rigid::Space& space) {
   if (!space.ground()) return;
   for (int i = 0; i < static_cast<int>(space.states().size()); ++i)
-    if (!space.is_still(i)) keep(measure(space, i, -1));
+    if (!space.is_still(i) && !space.is_absent(i)) keep(measure(space, i, -1));
 }
 
 void ContactWatch::look_at_pairs(const rigid::Space& space, const std::vector<Bodies>& pairs, bool is_start) {
@@ -83,7 +83,7 @@ ContactAudit ContactWatch::find(const rigid::Space& space) const {
     if (const Depth depth = measure(space, a, b); depth.depth_m > audit.now.depth_m) audit.now = depth;
   };
   for (int i = 0; space.ground() && i < static_cast<int>(space.states().size()); ++i)
-    if (!space.solid(i).fixed) take(i, -1);
+    if (!space.solid(i).fixed && !space.is_absent(i)) take(i, -1);
   for (const auto& [bodies, pair] : space.pairs())
     if (bodies.second >= 0) take(bodies.first, bodies.second);
   Recent second = second_;

@@ -1,5 +1,5 @@
-// Checks a world, runs its rigid bodies (runtime/physics/rigid), and writes the events needed for its sound. One class, whose bodies,
-// shapes and records change together in every step; longer than most files.
+// Runs the rigid bodies of a world (runtime/physics/rigid), and writes the events needed for its sound. One class, whose bodies and records
+// change together in every step.
 #include "runtime/physics/world.hpp"
 
 #include <fmt/format.h>
@@ -7,15 +7,15 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
+#include <numbers>
 #include <utility>
 #include <variant>
 
 #include "runtime/base/clock.hpp"
 #include "runtime/base/error.hpp"
-#include "runtime/drive/mode_sets.hpp"
 #include "runtime/physics/check.hpp"
 #include "runtime/physics/geometry/boxes.hpp"
+#include "runtime/physics/make_space.hpp"
 #include "runtime/physics/rigid/limits.hpp"
 #include "runtime/physics/rigid/space.hpp"
 #include "runtime/physics/sounding.hpp"
@@ -24,139 +24,12 @@
 namespace carillon::physics {
 namespace {
 
-Mat3 to_matrix(const std::array<double, 9>& m) { return {Vec3{m[0], m[1], m[2]}, Vec3{m[3], m[4], m[5]}, Vec3{m[6], m[7], m[8]}}; }
+constexpr double kMaxGrabWeights = 30.0;   // largest force of a grab by default
+constexpr double kStandardGravity = 9.81;  // m/s^2
 
-/// Bodies of one bank share their shape.
-using Shapes = std::map<const bank::Bank*, std::shared_ptr<const geometry::Shape>>;
-
-rigid::Solid make_solid(const BodySpec& b, Shapes& shapes) {
-  rigid::Solid solid;
-  auto& shared = shapes[b.bank];
-  if (!shared) {
-    try {
-      shared = std::make_shared<geometry::Shape>(b.bank->vertices_m, b.bank->triangles);
-    } catch (const InputError& e) {
-      throw InputError(fmt::format("body '{}': {}", b.name, e.what()));
-    }
-  }
-  solid.shape = shared;
-  solid.fixed = b.fixed;
-  solid.mass_kg = b.bank->rigid.mass_kg;
-  solid.centre_m = b.bank->rigid.centre_m;
-  if (!b.fixed) {
-    solid.inertia_kg_m2 = to_matrix(b.bank->rigid.inertia_kg_m2);
-    solid.inverse_inertia = calc_inverse(solid.inertia_kg_m2);
-  }
-  for (const Vec3& v : b.bank->vertices_m) solid.radius_m = std::max(solid.radius_m, calc_length(v - solid.centre_m));
-  solid.restitution = b.restitution;
-  solid.friction = b.friction;
-  solid.young_modulus_pa = b.bank->material.young_modulus_pa;
-  solid.poisson_ratio = b.bank->material.poisson_ratio;
-  return solid;
-}
-
-void add_modes(rigid::Solid& solid, const bank::Bank& bank, drive::ModeSets& sets) {
-  solid.modes = sets.find(bank);
-  if (!solid.modes) return;
-  solid.find_shape = [&bank](const geometry::Place& place) { return bank::calc_shapes(bank, place.triangle, place.barycentric); };
-}
-
-rigid::State make_state(const BodySpec& b, const rigid::Solid& solid) {
-  rigid::State state;
-  state.rotation = rigid::normalise(b.initial.rotation);
-  const Mat3 rotation = rigid::make_rotation(state.rotation);
-  state.centre = b.initial.position_m + rotation * solid.centre_m;
-  state.velocity = b.velocity_m_s;
-  if (!b.fixed) state.momentum = rotation * (solid.inertia_kg_m2 * (transpose(rotation) * b.angular_velocity_rad_s));
-  return state;
-}
-
-/// Stops of a joint: one at each end of its travel.
-void add_stops(const JointSpec& j, const std::vector<rigid::Solid>& solids, const std::vector<rigid::State>& states, rigid::Links& links) {
-  const bool turned = solids[j.body].fixed;  // the moving body comes first
-  const int a = turned ? j.to : j.body, b = turned ? j.body : j.to;
-  const auto get_turn = [&](int body) {
-    return body < 0 ? Mat3{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}} : transpose(rigid::make_rotation(states[body].rotation));
-  };
-  const auto get_place = [&](int body) { return body < 0 ? j.at_m : get_turn(body) * (j.at_m - states[body].centre); };
-  const Vec3 lever = find_across(j.axis);
-  double arm = solids[a].radius_m;
-  if (b >= 0 && !solids[b].fixed) arm = std::min(arm, solids[b].radius_m);
-  for (const bool is_lower : {true, false}) {
-    rigid::Stop stop{.turns = j.kind == joints::Kind::kHinge, .at_a = get_place(a), .at_b = get_place(b), .axis = get_turn(b) * j.axis};
-    stop.lever_a = get_turn(a) * lever;
-    stop.lever_b = get_turn(b) * lever;
-    stop.arm_m = arm;
-    stop.is_lower = is_lower;
-    stop.max = turned ? -(*j.limits)[is_lower ? 1 : 0] : (*j.limits)[is_lower ? 0 : 1];
-    links.cords.push_back({.a = a, .b = b, .restitution = j.stop_restitution, .stop = stop});
-  }
-}
-
-rigid::Links make_links(const WorldSpec& spec, const std::vector<rigid::Solid>& solids, const std::vector<rigid::State>& states) {
-  rigid::Links links;
-  for (const JointSpec& j : spec.joints) {
-    links.joints.push_back({j.kind, j.body, j.to, j.at_m, j.axis, j.second_axis, j.damping});
-    if (j.limits) add_stops(j, solids, states, links);
-  }
-  for (const CordSpec& c : spec.cords) {
-    const auto tie = [&](int body, const Vec3& where) {
-      if (body < 0) return where;
-      const rigid::State& state = states[body];
-      return transpose(rigid::make_rotation(state.rotation)) * (where - state.centre);
-    };
-    rigid::Cord cord;
-    // The moving body comes first.
-    const bool turned = solids[c.body].fixed;
-    cord.a = turned ? c.to : c.body;
-    cord.b = turned ? c.body : c.to;
-    cord.at_a = tie(cord.a, turned ? c.to_m : c.from_m);
-    cord.at_b = tie(cord.b, turned ? c.from_m : c.to_m);
-    cord.length_m = std::max(c.length_m.value_or(0.0), calc_length(c.from_m - c.to_m));
-    cord.restitution = c.restitution;
-    links.cords.push_back(cord);
-  }
-  return links;
-}
-
-/// Checks that the start velocities are compatible with the joints.
-void check_start(const WorldSpec& spec, const rigid::Space& space) {
-  for (std::size_t i = 0; i < spec.bodies.size() && !spec.joints.empty(); ++i) {
-    const BodySpec& body = spec.bodies[i];
-    const double error = space.get_start_error(static_cast<int>(i));
-    if (body.fixed || (body.velocity_m_s == Vec3{} && body.angular_velocity_rad_s == Vec3{})) continue;
-    double fastest = 0.0;
-    for (const BodySpec& other : spec.bodies) fastest = std::max(fastest, calc_length(other.velocity_m_s));
-    if (error > 1e-3 + 0.01 * fastest)
-      throw InputError(fmt::format(
-          "body '{}': its start velocities differ by {:.3g} m/s from those that its joints allow; a body that rotates about a joint has "
-          "\"velocity_m_s\" = \"angular_velocity_rad_s\" x (its centre of mass - the joint), and bodies attached to it move along",
-          body.name, error));
-  }
-}
-
-rigid::Space make_space(const WorldSpec& spec, const WorldOptions& options) {
-  check(spec, options);
-  Shapes shapes;
-  drive::ModeSets modes;
-  std::vector<rigid::Solid> solids;
-  std::vector<rigid::State> states;
-  for (const BodySpec& body : spec.bodies) {
-    solids.push_back(make_solid(body, shapes));
-    if (options.modes) add_modes(solids.back(), *body.bank, modes);
-    states.push_back(make_state(body, solids.back()));
-  }
-  std::optional<rigid::Ground> ground;
-  if (spec.ground)
-    ground = {spec.ground->height_m, spec.ground->restitution, spec.ground->friction, spec.ground->young_modulus_pa,
-              spec.ground->poisson_ratio};
-  const rigid::Links links = make_links(spec, solids, states);
-  try {
-    return rigid::Space(std::move(solids), std::move(states), ground, spec.gravity_m_s2,
-                        {.step_s = options.contact_step_s, .islands = options.islands, .joint_tolerance = options.joint_tolerance}, links);
-  } catch (const std::invalid_argument& error) {  // joints that do not form trees
-    throw InputError(error.what());
-  }
+void check_vector(const char* what, const Vec3& x) {
+  for (const double value : x)
+    if (!std::isfinite(value)) throw InputError(fmt::format("{} must be three finite numbers", what));
 }
 
 }  // namespace
@@ -165,9 +38,17 @@ rigid::Space make_space(const WorldSpec& spec, const WorldOptions& options) {
 class World::Course {
  public:
   Course(const WorldSpec& spec, const WorldOptions& options)
-      : options_(options), space_(make_space(spec, options)), sounding_(spec, space_, options.masks_hits) {
+      : options_(options),
+        space_(make_space(spec, options)),
+        sounding_(spec, space_, options.masks_hits),
+        has_links_(spec.bodies.size(), 0) {
+    for (const BodySpec& body : spec.bodies) names_.push_back(body.name);
+    note_links(spec.joints);
+    note_links(spec.cords);
+    for (int i = 0; i < count(); ++i)
+      if (spec.bodies[i].absent) space_.leave_out(i);
     check_start(spec, space_);
-    check_overlaps(spec);
+    check_overlaps();
     prepare_shapes(spec.ground.has_value());
     if (!options_.audits_energy) return;
     for (int i = 0; i < count(); ++i)
@@ -178,12 +59,23 @@ class World::Course {
     // The processor clock needs a system call, a tenth of a step; the steady clock does not, and never runs behind it.
     const bool is_limited = std::isfinite(cpu_s);
     const double began_s = is_limited ? base::get_steady_s() : 0.0, started_s = is_limited ? base::get_thread_cpu_s() : 0.0;
+    if (std::exchange(is_unsent_, false)) emit(sink);
     while (!begun_ || (until_s - reached_s_ > kTimeToleranceS && !is_over())) {
       step(sink);
       if (is_limited && base::get_steady_s() - began_s >= cpu_s && base::get_thread_cpu_s() - started_s >= cpu_s) break;
     }
     return reached_s_;
   }
+
+  void push(int body, const Vec3& at_m, const Vec3& impulse_n_s);
+  void grab(int body, const Vec3& at_m, const GrabSpec& spec);
+  void drag(int body, const Vec3& target_m, double over_s);
+  void release(int body);
+  void add(int body, const Entry& entry);
+  void remove(int body);
+  bool is_absent(int body) const { return space_.is_absent(body); }
+  Vec3 get_centre(int body) const { return space_.state(body).centre; }
+  Pose get_pose(int body) const { return calc_pose(make_motion(body, space_.state(body), space_.get_time()), space_.solid(body).centre_m); }
 
   Statistics get_statistics() const {
     Statistics s;
@@ -206,6 +98,15 @@ class World::Course {
   static constexpr double kMaxPulseLeadS =
       rigid::kSimultaneousS;  // a pulse found in a window may have begun this much earlier (pulses.cpp)
 
+  static constexpr double kLeaveS = 1e-5;       // s; a body that is moved by hand leaves its place this much earlier
+  static constexpr double kContactEndS = 0.02;  // s; longer than contacts take to end
+
+  template <typename Links>
+  void note_links(const Links& links) {
+    for (const auto& link : links)
+      for (const int body : {link.body, link.to})
+        if (body >= 0) has_links_[body] = 1;
+  }
   int count() const { return static_cast<int>(space_.states().size()); }
   bool is_over() const { return options_.end_s - reached_s_ <= kTimeToleranceS; }
 
@@ -221,7 +122,14 @@ class World::Course {
       watch_start();
       return;
     }
-    const bool slept = space_.is_at_window() && space_.is_all_asleep();  // and no impact is in progress
+    walk();
+    if (space_.is_at_window()) emit(sink);
+  }
+
+  /// One step; at the end of a window its poses.
+  void walk() {
+    // No impact is in progress, and no contact of a removed body.
+    const bool slept = space_.is_at_window() && space_.is_all_asleep() && space_.get_time() >= ends_until_s_;
     if (slept) {
       space_.skip_window(options_.end_s);
     } else {
@@ -238,9 +146,9 @@ class World::Course {
     reached_s_ = space_.get_time();
     for (int i = 0; i < count(); ++i) {
       const bool fell_asleep = just_slept(i);
-      if (is_over() || (!space_.is_still(i) && !slept) || fell_asleep) events_.push_back(make_motion(i, space_.state(i), reached_s_));
+      const bool moves = !space_.is_still(i) && !slept && !space_.is_absent(i);
+      if (is_over() || moves || fell_asleep) events_.push_back(make_motion(i, space_.state(i), reached_s_));
     }
-    emit(sink);
   }
 
   /// A body's motion ends with the window in which it falls asleep.
@@ -289,14 +197,16 @@ class World::Course {
     double kinetic = 0.0;
     for (int i = 0; i < count(); ++i) kinetic += rigid::calc_kinetic(space_.solid(i), space_.state(i));
     const rigid::Books books = space_.calc_books();
-    const double now = books.motion_j + books.modes_j + books.springs_j - books.lifted_j;
+    const double now = books.motion_j + books.modes_j + books.springs_j - books.lifted_j - books.given_j;
     if (!has_books_) energy_.start_j = now, has_books_ = true;
     energy_.motion_j = books.motion_j;
     energy_.modes_j = books.modes_j;
     energy_.max_modes_j = std::max(energy_.max_modes_j, books.modes_j);
-    if (books.modes_j > 0.0) energy_.modes_share = std::max(energy_.modes_share, books.modes_j / (energy_.start_j - books.motion_j));
+    if (books.modes_j > 0.0)
+      energy_.modes_share = std::max(energy_.modes_share, books.modes_j / (energy_.start_j + books.given_j - books.motion_j));
     energy_.lost_j = books.lost_j;
     energy_.lifted_j = books.lifted_j;
+    energy_.given_j = books.given_j;
     energy_.error_j = std::max(energy_.error_j, std::abs(now + books.lost_j - energy_.start_j));
     energy_.rise_j = std::max(energy_.rise_j, now + taken_j_ - min_j_);
     energy_.kinetic_j = std::max(energy_.kinetic_j, kinetic);
@@ -346,8 +256,18 @@ class World::Course {
     sink(events::TimeWatermark{mark_s});
   }
 
+  void finish_window() {
+    for (; begun_ && !space_.is_at_window(); is_unsent_ = true) walk();
+  }
+  template <typename Act>
+  void handle(int body, Act&& act);
+  void check_handled(int body, bool must_move) const;
+  geometry::Box get_box(int body) const {
+    return space_.solid(body).shape->calc_box(rigid::place(space_.solid(body), space_.state(body)).frame);
+  }
   std::vector<std::vector<int>> find_near() const;
-  void check_overlaps(const WorldSpec& spec) const;
+  void check_overlaps() const;
+  void check_overlap(int body, const std::vector<int>& others) const;
   void prepare_shapes(bool has_ground) const;
 
   WorldOptions options_;
@@ -356,6 +276,10 @@ class World::Course {
   std::vector<events::Event> events_, later_;  // of this window; those not reported yet
   std::vector<std::pair<double, std::size_t>> order_;
   std::vector<char> still_;
+  std::vector<std::string> names_;
+  std::vector<char> has_links_;  // of the bodies: on joints or cords
+  bool is_unsent_ = false;       // events of a window completed by an operation
+  double ends_until_s_ = 0.0;    // contacts of removed bodies end
   bool begun_ = false;
   double reached_s_ = 0.0;
   EnergyAudit energy_;
@@ -365,13 +289,123 @@ class World::Course {
   double min_j_ = std::numeric_limits<double>::infinity();  // minimum energy so far, with losses by hits added back
 };
 
+/// Completes the window, and reports the motion of the bodies that `act` wakes or, in the list, moves.
+template <typename Act>
+void World::Course::handle(int body, Act&& act) {
+  finish_window();
+  std::vector<char> was_still(count());
+  for (int i = 0; i < count(); ++i) was_still[i] = space_.is_still(i) ? 1 : 0;
+  const rigid::State before = space_.state(body);
+  act();
+  if (!begun_) return;
+  for (int i = 0; i < count(); ++i)
+    if (was_still[i] != 0 && !space_.is_still(i) && !space_.is_absent(i))
+      events_.push_back(make_motion(i, i == body ? before : space_.state(i), reached_s_));
+  const rigid::State& after = space_.state(body);
+  if (after.centre != before.centre || after.rotation != before.rotation)
+    events_.push_back(make_motion(body, before, reached_s_ - kLeaveS));
+  else
+    events_.push_back(make_motion(body, before, reached_s_));
+  events_.push_back(make_motion(body, after, reached_s_));
+}
+
+void World::Course::check_handled(int body, bool must_move) const {
+  if (body < 0 || body >= count()) throw InputError(fmt::format("there is no body {}; bodies have the numbers 0 to {}", body, count() - 1));
+  if (space_.is_absent(body)) throw InputError(fmt::format("body '{}' is not in the world; add it first", names_[body]));
+  if (must_move && space_.solid(body).fixed) throw InputError(fmt::format("body '{}' is fixed: it cannot be pushed or held", names_[body]));
+}
+
+void World::Course::push(int body, const Vec3& at_m, const Vec3& impulse_n_s) {
+  check_handled(body, true);
+  check_vector("the place of a push", at_m);
+  check_vector("an impulse", impulse_n_s);
+  handle(body, [&] { space_.push(body, at_m, impulse_n_s); });
+}
+
+void World::Course::grab(int body, const Vec3& at_m, const GrabSpec& spec) {
+  check_handled(body, true);
+  check_vector("the place of a grab", at_m);
+  if (!(spec.frequency_hz >= 0.1 && spec.frequency_hz <= 100.0))
+    throw InputError(fmt::format("the frequency of a grab, {} Hz, is not within 0.1..100", spec.frequency_hz));
+  if (!(spec.damping_ratio >= 0.0 && spec.damping_ratio <= 10.0))
+    throw InputError(fmt::format("the damping ratio of a grab, {}, is not within 0..10", spec.damping_ratio));
+  if (!(spec.max_force_n >= 0.0 && std::isfinite(spec.max_force_n)))
+    throw InputError(fmt::format("the largest force of a grab, {} N, must be a finite number, 0 or more", spec.max_force_n));
+  handle(body, [&] {
+    const double mass_kg = space_.solid(body).mass_kg, omega = 2.0 * std::numbers::pi * spec.frequency_hz;
+    const rigid::State& state = space_.state(body);
+    rigid::Grab grab{.body = body, .stiffness_n_m = mass_kg * omega * omega, .damping_n_s_m = 2.0 * spec.damping_ratio * mass_kg * omega};
+    grab.at = transpose(rigid::make_rotation(state.rotation)) * (at_m - state.centre);
+    grab.max_force_n = spec.max_force_n > 0.0 ? spec.max_force_n : kMaxGrabWeights * mass_kg * kStandardGravity;
+    grab.from_m = grab.to_m = at_m;
+    grab.from_s = space_.get_time() - 1.0;
+    grab.to_s = space_.get_time();
+    space_.grab(grab);
+  });
+}
+
+void World::Course::drag(int body, const Vec3& target_m, double over_s) {
+  check_handled(body, true);
+  check_vector("the target of a grab", target_m);
+  if (!(over_s >= 1e-3 && over_s <= 1e3)) throw InputError(fmt::format("the time of a drag, {} s, is not within 0.001..1000", over_s));
+  if (space_.find_grab(body) == nullptr) throw InputError(fmt::format("body '{}' is not held; grab it first", names_[body]));
+  finish_window();
+  rigid::Grab grab = *space_.find_grab(body);
+  grab.from_m = grab.find_target(space_.get_time());
+  grab.to_m = target_m;
+  grab.from_s = space_.get_time();
+  grab.to_s = grab.from_s + over_s;
+  space_.grab(grab);
+}
+
+void World::Course::release(int body) {
+  check_handled(body, true);
+  finish_window();
+  space_.release(body);
+}
+
+void World::Course::add(int body, const Entry& entry) {
+  if (body < 0 || body >= count()) check_handled(body, false);
+  if (!space_.is_absent(body)) throw InputError(fmt::format("body '{}' is in the world already; remove it first", names_[body]));
+  BodySpec spec;
+  spec.name = names_[body];
+  spec.fixed = space_.solid(body).fixed;
+  spec.initial = entry.pose;
+  spec.velocity_m_s = entry.velocity_m_s;
+  spec.angular_velocity_rad_s = entry.angular_velocity_rad_s;
+  check_entry(spec);
+  finish_window();
+  const rigid::State state = make_state(spec, space_.solid(body)), before = space_.state(body);
+  space_.place_absent(body, state);
+  const geometry::Box box = get_box(body);
+  std::vector<int> near;
+  for (int i = 0; i < count(); ++i)
+    if (!space_.is_absent(i) && !(space_.solid(i).fixed && spec.fixed) && get_box(i).overlaps(box)) near.push_back(i);
+  try {
+    check_overlap(body, near);
+  } catch (const InputError&) {
+    space_.place_absent(body, before);
+    throw;
+  }
+  space_.place_absent(body, before);
+  handle(body, [&] { space_.add(body, state); });
+}
+
+void World::Course::remove(int body) {
+  check_handled(body, false);
+  if (has_links_[body] != 0) throw InputError(fmt::format("body '{}' is on a joint or a cord: it cannot be removed", names_[body]));
+  handle(body, [&] { space_.remove(body); });
+  ends_until_s_ = space_.get_time() + kContactEndS;
+}
+
 /// For each body those with overlapping boxes; each pair is listed once, at the body with the lower index, and not if both are fixed.
 /// Sorted.
 std::vector<std::vector<int>> World::Course::find_near() const {
   std::vector<geometry::Box> boxes;
-  for (int i = 0; i < count(); ++i) boxes.push_back(space_.solid(i).shape->calc_box(rigid::place(space_.solid(i), space_.state(i)).frame));
+  for (int i = 0; i < count(); ++i) boxes.push_back(get_box(i));
   std::vector<std::vector<int>> near(boxes.size());
   geometry::for_overlaps(boxes, [&](int a, int b) {
+    if (space_.is_absent(a) || space_.is_absent(b)) return;
     if (!space_.solid(a).fixed || !space_.solid(b).fixed) near[std::min(a, b)].push_back(std::max(a, b));
   });
   for (std::vector<int>& bodies : near) std::sort(bodies.begin(), bodies.end());
@@ -393,31 +427,36 @@ void World::Course::prepare_shapes(bool has_ground) const {
   }
 }
 
-void World::Course::check_overlaps(const WorldSpec& spec) const {
+void World::Course::check_overlaps() const {
   const std::vector<std::vector<int>> near = find_near();
+  for (int a = 0; a < count(); ++a)
+    if (!space_.is_absent(a)) check_overlap(a, near[a]);
+}
+
+/// Throws InputError if a body overlaps the ground or one of `others`.
+void World::Course::check_overlap(int a, const std::vector<int>& others) const {
   const auto allowed_m = [&](int body) { return std::min(2e-4, 5e-3 * space_.solid(body).shape->get_size_m()); };
-  for (int a = 0; a < count(); ++a) {
-    const rigid::Placed at_a = rigid::place(space_.solid(a), space_.state(a));
-    if (spec.ground && !space_.solid(a).fixed) {
-      geometry::PairMemory memory;
-      std::vector<geometry::Touch> touches;
-      geometry::find_ground_touches(*space_.solid(a).shape, at_a.frame, spec.ground->height_m, allowed_m(a), memory, touches);
-      double depth = 0.0;
-      for (const geometry::Touch& touch : touches) depth = std::max(depth, -touch.gap_m);
-      if (depth > allowed_m(a))
-        throw InputError(fmt::format("body '{}' starts {:.2f} mm inside the ground (height {:g} m); raise it by that much",
-                                     spec.bodies[a].name, depth * 1e3, spec.ground->height_m));
-    }
-    for (const int b : near[a]) {
-      if (space_.is_joined(a, b)) continue;
-      Vec3 where{};
-      const double depth = geometry::calc_overlap(*space_.solid(a).shape, at_a.frame, *space_.solid(b).shape,
-                                                  rigid::place(space_.solid(b), space_.state(b)).frame, where);
-      if (depth > std::min(allowed_m(a), allowed_m(b)))
-        throw InputError(
-            fmt::format("bodies '{}' and '{}' start inside each other, {:.2f} mm deep near ({:.4f}, {:.4f}, {:.4f}) m; move one of them",
-                        spec.bodies[a].name, spec.bodies[b].name, depth * 1e3, where[0], where[1], where[2]));
-    }
+  const rigid::Placed at_a = rigid::place(space_.solid(a), space_.state(a));
+  if (space_.ground() && !space_.solid(a).fixed) {
+    const double height_m = space_.ground()->height_m;
+    geometry::PairMemory memory;
+    std::vector<geometry::Touch> touches;
+    geometry::find_ground_touches(*space_.solid(a).shape, at_a.frame, height_m, allowed_m(a), memory, touches);
+    double depth = 0.0;
+    for (const geometry::Touch& touch : touches) depth = std::max(depth, -touch.gap_m);
+    if (depth > allowed_m(a))
+      throw InputError(fmt::format("body '{}' starts {:.2f} mm inside the ground (height {:g} m); raise it by that much", names_[a],
+                                   depth * 1e3, height_m));
+  }
+  for (const int b : others) {
+    if (space_.is_joined(a, b)) continue;
+    Vec3 where{};
+    const double depth = geometry::calc_overlap(*space_.solid(a).shape, at_a.frame, *space_.solid(b).shape,
+                                                rigid::place(space_.solid(b), space_.state(b)).frame, where);
+    if (depth > std::min(allowed_m(a), allowed_m(b)))
+      throw InputError(
+          fmt::format("bodies '{}' and '{}' start inside each other, {:.2f} mm deep near ({:.4f}, {:.4f}, {:.4f}) m; move one of them",
+                      names_[a], names_[b], depth * 1e3, where[0], where[1], where[2]));
   }
 }
 
@@ -430,89 +469,14 @@ double World::advance(double until_s, double cpu_s, const Sink& sink) { return c
 
 Statistics World::get_statistics() const { return course_->get_statistics(); }
 
-std::vector<std::string> ask_about_links(const WorldSpec& spec) {
-  constexpr double kFarRadii = 30.0;  // radii of a body
-  std::vector<std::string> questions;
-  const auto calc_distance = [&](int body, const Vec3& where, double& radius) {
-    const BodySpec& b = spec.bodies[body];
-    radius = 0.0;
-    for (const Vec3& v : b.bank->vertices_m) radius = std::max(radius, norm(v - b.bank->rigid.centre_m));
-    const Mat3 rotation = rigid::make_rotation(rigid::normalise(b.initial.rotation));
-    return norm(where - b.initial.position_m - rotation * b.bank->rigid.centre_m);
-  };
-  const auto name = [&](int body) { return spec.bodies[body].name; };
-  for (const JointSpec& joint : spec.joints) {
-    bool far = true;
-    double nearest = std::numeric_limits<double>::infinity(), of = 0.0;
-    int body = joint.body;
-    for (const int one : {joint.body, joint.to}) {
-      if (one < 0) continue;
-      double radius = 0.0;
-      const double distance = calc_distance(one, joint.at_m, radius);
-      far = far && distance > kFarRadii * radius;
-      if (distance < nearest) nearest = distance, of = radius, body = one;
-    }
-    if (far)
-      questions.push_back(fmt::format("{} is {:.3g} m from the centre of '{}', a body of {:.2g} m: is \"at_m\" the place in the world?",
-                                      describe(spec, joint.place, "joint", joint.body, joint.to), nearest, name(body), 2.0 * of));
-  }
-  for (const CordSpec& cord : spec.cords)
-    for (const bool from : {true, false}) {
-      const int body = from ? cord.body : cord.to;
-      if (body < 0) continue;
-      double radius = 0.0;
-      const double distance = calc_distance(body, from ? cord.from_m : cord.to_m, radius);
-      if (distance > 1.01 * radius)
-        questions.push_back(fmt::format("{} is tied {:.3g} m from the centre of '{}', outside of it: is that the place in the world?",
-                                        describe(spec, cord.place, "cord", cord.body, cord.to), distance, name(body)));
-    }
-  return questions;
-}
-
-Pose calc_pose(const events::BodyMotion& motion, const Vec3& c) {
-  const auto& q = motion.rotation;
-  const Vec3 u{q[1], q[2], q[3]};
-  const Vec3 t = cross(u, c), s = cross(u, t);
-  Pose pose{motion.time_s, motion.position_m, q};
-  for (std::size_t k = 0; k < 3; ++k) pose.position_m[k] -= c[k] + 2.0 * (q[0] * t[k] + s[k]);
-  return pose;
-}
-
-Simulation collect(const std::vector<events::Event>& events, const std::vector<Vec3>& centres_m) {
-  Simulation all;
-  all.poses.resize(centres_m.size());
-  const auto is_known = [&](std::int32_t body) { return body >= 0 && body < std::ssize(centres_m); };
-  for (const events::Event& event : events) {
-    if (const auto* impulse = std::get_if<Impulse>(&event); impulse != nullptr && is_known(impulse->body)) {
-      all.impulses.push_back(*impulse);
-    } else if (const auto* motion = std::get_if<events::BodyMotion>(&event); motion != nullptr && is_known(motion->body)) {
-      const std::size_t body = motion->body;
-      auto& path = all.poses[body];
-      if (!path.empty() && path.back().time_s >= motion->time_s) continue;  // after an impact the pose is unchanged
-      path.push_back(calc_pose(*motion, centres_m[body]));
-    }
-  }
-  const auto earlier = [](const Impulse& x, const Impulse& y) { return x.time_s < y.time_s; };
-  std::stable_sort(all.impulses.begin(), all.impulses.end(), earlier);
-  return all;
-}
-
-Simulation simulate(const WorldSpec& spec, double duration_s, const std::function<void(double)>& progress) {
-  if (!(duration_s >= 0.0 && std::isfinite(duration_s)))
-    throw InputError(fmt::format("the duration {} s must be a finite number, 0 or more", duration_s));
-  World world(spec, {.end_s = duration_s, .lasting_contacts = false});
-  std::vector<events::Event> events;
-  constexpr int kParts = 100;
-  for (int part = 1; part <= kParts; ++part) {
-    world.advance(duration_s * part / kParts, std::numeric_limits<double>::infinity(),
-                  [&](const events::Event& event) { events.push_back(event); });
-    if (progress) progress(static_cast<double>(part) / kParts);
-  }
-  std::vector<Vec3> centres_m;
-  for (const BodySpec& body : spec.bodies) centres_m.push_back(body.bank->rigid.centre_m);
-  Simulation all = collect(events, centres_m);
-  all.steps = world.get_statistics().steps;
-  return all;
-}
+void World::push(int body, const Vec3& at_m, const Vec3& impulse_n_s) { course_->push(body, at_m, impulse_n_s); }
+void World::grab(int body, const Vec3& at_m, const GrabSpec& spec) { course_->grab(body, at_m, spec); }
+void World::drag(int body, const Vec3& target_m, double over_s) { course_->drag(body, target_m, over_s); }
+void World::release(int body) { course_->release(body); }
+void World::add(int body, const Entry& entry) { course_->add(body, entry); }
+void World::remove(int body) { course_->remove(body); }
+Pose World::get_pose(int body) const { return course_->get_pose(body); }
+Vec3 World::get_centre(int body) const { return course_->get_centre(body); }
+bool World::is_absent(int body) const { return course_->is_absent(body); }
 
 }  // namespace carillon::physics

@@ -25,6 +25,7 @@ struct BodySpec {
   double restitution = 0.5;          // 0..1; a contact uses the geometric mean of both bodies
   double friction = 0.4;             // Coulomb, >= 0; a contact uses the geometric mean of both bodies
   double roughness_m = 2e-6;         // rms height of the surface; used by the contact player only
+  bool absent = false;               // not in the world until World::add()
 };
 
 /// Floor: the half space z <= height_m. It is rigid ground without sound. Its `body` index in impulses is -1.
@@ -72,6 +73,20 @@ struct WorldSpec {
   std::vector<CordSpec> cords;
 };
 
+/// A damped spring that holds a body, as a hand would.
+struct GrabSpec {
+  double frequency_hz = 4.0;   // of the body's mass on the spring; 0.1 to 100
+  double damping_ratio = 1.0;  // 1: critical; 0 to 10
+  double max_force_n = 0.0;    // 0: 30 times the mass times 9.81 m/s^2
+};
+
+/// Where, and how fast, a body enters the world.
+struct Entry {
+  Pose pose;                      // of the mesh frame; time_s is ignored, the quaternion is normalised
+  Vec3 velocity_m_s{};            // of the centre of mass, world frame
+  Vec3 angular_velocity_rad_s{};  // world frame
+};
+
 /// World of bodies, ground, joints and cords, and its time. Invariant: all events up to the time returned by advance() have been passed to
 /// its sink, and none depends on how the calls divide time. Bodies that cannot touch each other at present are integrated separately, each
 /// group with its own steps (docs/decisions/contact.md). [main-thread]: allocates and throws.
@@ -93,7 +108,28 @@ class World {
   using Sink = std::function<void(const events::Event&)>;
   double advance(double until_s, double cpu_s, const Sink& sink);
 
+  // Between two calls of advance(), at the time that it returned; a window that it left unfinished is completed first. The same calls at
+  // the same times give the same bits. Bodies that sleep wake. Energy from outside is EnergyAudit::given_j; a hand makes no sound. Throw
+  // InputError, and change nothing, for numbers out of range, a body that is absent or does not move, or one that would overlap another.
+  /// Gives a moving body an impulse [N s] at a world point.
+  void push(int body, const Vec3& at_m, const Vec3& impulse_n_s);
+  /// Holds a moving body at the point of it that is now at `at_m`, with a target at the same place; replaces an earlier grab of the body.
+  void grab(int body, const Vec3& at_m, const GrabSpec& spec = {});
+  /// Moves the target of a grab evenly to `target_m` within `over_s` seconds, 1e-3 to 1e3.
+  void drag(int body, const Vec3& target_m, double over_s = 0.02);
+  /// Ends a grab; the body keeps its velocity. Nothing happens if there is none.
+  void release(int body);
+  /// Puts an absent body into the world.
+  void add(int body, const Entry& entry);
+  /// Takes a body, moving or fixed, without joints and cords, out of the world. It stays in the list, and rings on.
+  void remove(int body);
+
   Statistics get_statistics() const;
+  /// Current pose of a body's mesh frame.
+  Pose get_pose(int body) const;
+  /// Current centre of mass in the world [m].
+  Vec3 get_centre(int body) const;
+  bool is_absent(int body) const;
 
  private:
   class Course;

@@ -37,6 +37,7 @@ const base::Keys<SceneBody> kBody{
     {"nonlinear", "its effects", "[large motion](nonlinear-bodies.md): `\"auto\"`, true (needs a bank with a nonlinear energy) or false"}};
 const base::Keys<physics::BodySpec> kMotion{
     {"fixed", &physics::BodySpec::fixed, "does not move, but is struck and sounds"},
+    {"absent", &physics::BodySpec::absent, "not in the world until it is [added live](hear-a-scene.md#commands)"},
     {"velocity_m_s", &physics::BodySpec::velocity_m_s, within(kMaxSpeedMs), "initial velocity of the centre of mass"},
     {"angular_velocity_rad_s", &physics::BodySpec::angular_velocity_rad_s, within(1e4), "initial angular velocity"},
     {"restitution", &physics::BodySpec::restitution, Limits{0, 1},

@@ -34,6 +34,7 @@ PROGRAMS = {
     "carillon": ["jobs/cli", "precompute/simulation", "runtime/render", *SOLVER],
     "import carillon": ["runtime/bindings", *SOLVER],
     "share/carillon/web": ["runtime/bindings"],
+    "share/carillon/world": ["runtime/bindings"],
 }
 # How things are built reaches everything.
 ALL = re.compile(

@@ -32,7 +32,7 @@ LINKED = {
     r"libunwind.*\.a": "libunwind",
     r"lib(standalonewasm|noexit|stubs|al|jsmath).*\.a": "emscripten",
 }
-INCLUDED = {"fmt": "fmt", "hwy": "Highway", "rapidjson": "RapidJSON", "stb_image.h": "stb_image"}
+INCLUDED = {"Eigen": "Eigen", "fmt": "fmt", "hwy": "Highway", "rapidjson": "RapidJSON", "stb_image.h": "stb_image"}
 # Header libraries of the include law (tests/structure/include_law.py).
 HEADERS = {
     "rapidjson": "RapidJSON",

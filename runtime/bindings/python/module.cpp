@@ -68,4 +68,5 @@ PYBIND11_MODULE(_carillon, module) {
   bind_render(module);
   bind_synthesiser(module);
   bind_touches(module);
+  bind_world(module);
 }

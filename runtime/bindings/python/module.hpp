@@ -19,5 +19,7 @@ void bind_synthesiser(pybind11::module_& module);
 synth::Synthesiser& find_synthesiser(const pybind11::object& object);
 /// Contact tracker for other engines.
 void bind_touches(pybind11::module_& module);
+/// Scenes simulated and played by calls.
+void bind_world(pybind11::module_& module);
 
 }  // namespace carillon::python

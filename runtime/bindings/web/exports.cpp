@@ -14,9 +14,8 @@
 
 #include "runtime/base/error.hpp"
 #include "runtime/bindings/web/engine.hpp"
+#include "runtime/bindings/web/results.hpp"
 #include "runtime/bindings/web/workshop.hpp"
-
-#define WEB_EXPORT(result, name) extern "C" __attribute__((export_name(#name))) result name
 
 namespace {
 
@@ -26,29 +25,10 @@ constexpr int kChannels = 16, kFrames = 1024;
 
 std::unique_ptr<web::Engine> engine;
 std::unique_ptr<web::Workshop> workshop;
-std::string text;            // last result, or error message
-std::vector<double> words;   // last event rows or poses
-std::vector<float> numbers;  // last list of numbers
-std::vector<std::byte> bytes;
 float channels[kChannels][kFrames];
 float* const channel_at[kChannels] = {channels[0],  channels[1],  channels[2],  channels[3], channels[4],  channels[5],
                                       channels[6],  channels[7],  channels[8],  channels[9], channels[10], channels[11],
                                       channels[12], channels[13], channels[14], channels[15]};
-
-/// The value of `work`, or -1 with a message in `text`.
-template <class Work>
-int run(Work&& work) noexcept {
-  try {
-    return static_cast<int>(work());
-  } catch (const std::bad_alloc&) {
-    text = "there is not enough memory";
-  } catch (const std::exception& error) {
-    text = error.what();
-  } catch (...) {
-    text = "an unknown error";
-  }
-  return -1;
-}
 
 web::Engine& get_engine() {
   if (engine == nullptr) throw InputError("the engine is not open");
@@ -59,11 +39,6 @@ web::Workshop& get_workshop() {
   return *workshop;
 }
 
-std::string_view to_text(const char* at, int size) { return {at, static_cast<std::size_t>(std::max(size, 0))}; }
-template <class Value>
-std::span<const Value> to_span(const Value* at, int count) {
-  return {at, static_cast<std::size_t>(std::max(count, 0))};
-}
 synth::EffectSet to_effects(int mask) { return synth::EffectSet::from_mask(static_cast<unsigned>(mask)); }
 std::optional<double> to_time(double time_s, int is_exact) { return is_exact != 0 ? std::optional(time_s) : std::nullopt; }
 
@@ -71,14 +46,6 @@ std::optional<double> to_time(double time_s, int is_exact) { return is_exact != 
 
 // ---- common
 
-WEB_EXPORT(const char*, web_text)() { return text.data(); }
-WEB_EXPORT(int, web_text_size)() { return static_cast<int>(text.size()); }
-WEB_EXPORT(const double*, web_words)() { return words.data(); }
-WEB_EXPORT(int, web_words_count)() { return static_cast<int>(words.size()); }
-WEB_EXPORT(const float*, web_numbers)() { return numbers.data(); }
-WEB_EXPORT(int, web_numbers_count)() { return static_cast<int>(numbers.size()); }
-WEB_EXPORT(const std::byte*, web_bytes)() { return bytes.data(); }
-WEB_EXPORT(int, web_bytes_count)() { return static_cast<int>(bytes.size()); }
 /// "simd128" or "plain".
 WEB_EXPORT(int, web_instructions)() {
   text = base::get_name(base::find_instructions());

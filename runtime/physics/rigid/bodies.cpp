@@ -8,6 +8,7 @@
 
 #include "runtime/base/error.hpp"
 #include "runtime/physics/impact/spring.hpp"
+#include "runtime/physics/rigid/grab.hpp"
 #include "runtime/physics/rigid/limits.hpp"
 
 namespace carillon::rigid {
@@ -16,7 +17,7 @@ Bodies::Bodies(std::vector<Solid> solids, std::vector<State> states, std::option
                const std::vector<joints::Joint>& joints, double joint_tolerance)
     : solids_(std::move(solids)), states_(std::move(states)), ground_(ground), gravity_(gravity), joint_tolerance_(joint_tolerance) {
   placed_.resize(solids_.size());
-  asleep_.assign(solids_.size(), 0);
+  stays_.assign(solids_.size(), kAwake);
   in_impact_.assign(solids_.size(), 0);
   struck_s_.assign(solids_.size(), -1.0);
   swings_m_.assign(solids_.size(), 0.0);
@@ -93,7 +94,50 @@ double Bodies::calc_kinetic(const std::vector<int>& bodies) const {
 
 void Bodies::add_to(Books& books) const {
   for (const Articulation& articulation : articulations_) books.lost_j += articulation.now.lost_j;
-  for (int i = 0; i < count(); ++i) books.motion_j += rigid::calc_energy(solids_[i], states_[i], gravity_);
+  for (int i = 0; i < count(); ++i)
+    if (!is_absent(i)) books.motion_j += rigid::calc_energy(solids_[i], states_[i], gravity_);
+}
+
+double Bodies::apply_impulse(int body, const joints::Spatial& impulse) {
+  if (Articulation* articulation = find_articulation(body); articulation != nullptr) {
+    const double before_j = calc_kinetic(articulation->bodies);
+    std::vector<joints::Spatial> impulses(articulation->bodies.size());
+    impulses[get_member(body)] = impulse;
+    apply_impulses(*articulation, impulses);
+    return calc_kinetic(articulation->bodies) - before_j;
+  }
+  const double before_j = calc_kinetic({body});
+  State& s = states_[body];
+  s.velocity = s.velocity + (1.0 / solids_[body].mass_kg) * impulse.linear;
+  s.momentum = s.momentum + impulse.angular;
+  place(body);
+  return calc_kinetic({body}) - before_j;
+}
+
+const Grab* Bodies::find_grab(int body) const {
+  const auto at = std::find_if(grabs_.begin(), grabs_.end(), [&](const Grab& grab) { return grab.body == body; });
+  return at == grabs_.end() ? nullptr : &*at;
+}
+
+void Bodies::set_grab(const Grab& grab) {
+  drop_grab(grab.body);
+  grabs_.push_back(grab);
+  note_pulls();
+}
+
+void Bodies::drop_grab(int body) {
+  std::erase_if(grabs_, [&](const Grab& grab) { return grab.body == body; });
+  note_pulls();
+}
+
+void Bodies::note_pulls() {
+  pulls_m_s2_.assign(solids_.size(), 0.0);
+  for (const Grab& grab : grabs_) {
+    const double pull = calc_pull(solids_[grab.body], grab.max_force_n);
+    const Articulation* articulation = find_articulation(grab.body);
+    if (articulation == nullptr) pulls_m_s2_[grab.body] += pull;
+    for (std::size_t k = 0; articulation != nullptr && k < articulation->bodies.size(); ++k) pulls_m_s2_[articulation->bodies[k]] += pull;
+  }
 }
 
 double Bodies::calc_friction(int a, int b) const {

@@ -30,8 +30,21 @@ struct Articulation {
   int struck = -1;  // member that an impact with modes moves; -1: none
 };
 
-/// All bodies and the ground, body -1. Invariants: fixed and sleeping bodies do not move; frames and spins match the states, except between
-/// a change of state() and the following place(); bodies on joints match the coordinates of their articulation.
+/// A damped spring from a point of a body to a target that moves evenly from one place to another, and then stays.
+struct Grab {
+  int body = 0;
+  Vec3 at{};  // mesh axes, from the centre of mass
+  double stiffness_n_m = 0.0, damping_n_s_m = 0.0, max_force_n = 0.0;
+  Vec3 from_m{}, to_m{};
+  double from_s = 0.0, to_s = 0.0;
+
+  Vec3 find_target(double time_s) const { return time_s >= to_s ? to_m : from_m + ((time_s - from_s) / (to_s - from_s)) * (to_m - from_m); }
+  Vec3 find_velocity(double time_s) const { return time_s > to_s ? Vec3{} : (1.0 / (to_s - from_s)) * (to_m - from_m); }
+};
+
+/// All bodies and the ground, body -1. Invariants: fixed, sleeping and absent bodies do not move; absent ones meet nothing; frames and
+/// spins match the states, except between a change of state() and the following place(); bodies on joints match the coordinates of their
+/// articulation.
 class Bodies {
  public:
   /// Bodies on joints must form trees (joints::make_mechanism); their velocities are projected onto the motions permitted by the joints.
@@ -57,9 +70,12 @@ class Bodies {
   double get_time() const { return time_s_; }
 
   bool is_fixed(int body) const { return body < 0 || solids_[body].fixed; }
-  bool is_asleep(int body) const { return body >= 0 && asleep_[body] != 0; }
-  bool moves(int body) const { return !is_fixed(body) && !asleep_[body]; }
-  void set_asleep(int body, bool sleeps) { asleep_[body] = sleeps ? 1 : 0; }
+  bool is_asleep(int body) const { return body >= 0 && stays_[body] == kAsleep; }
+  /// Taken out of the world.
+  bool is_absent(int body) const { return body >= 0 && stays_[body] == kAbsent; }
+  bool moves(int body) const { return !is_fixed(body) && stays_[body] == kAwake; }
+  void set_asleep(int body, bool sleeps) { stays_[body] = sleeps ? kAsleep : kAwake; }
+  void set_absent(int body, bool is_absent) { stays_[body] = is_absent ? kAbsent : kAwake; }
   bool are_all_asleep() const;
   bool has_modes(int body) const { return body >= 0 && solids_[body].modes != nullptr; }
   /// True if the surface has no curved parts.
@@ -117,6 +133,14 @@ class Bodies {
     return impact::calc_hertz_duration(calc_compliance(a, b), calc_contact_radius(touch, a, b), mass_kg, speed_m_s);
   }
 
+  const std::vector<Grab>& grabs() const { return grabs_; }
+  const Grab* find_grab(int body) const;
+  /// Adds a grab, or replaces that of its body.
+  void set_grab(const Grab& grab);
+  void drop_grab(int body);
+  /// Bound of the acceleration of any point by a grab of the body or of its articulation [m/s^2]; 0: not grabbed.
+  double get_pull(int body) const { return grabs_.empty() || body < 0 ? 0.0 : pulls_m_s2_[body]; }
+
   std::vector<Articulation>& articulations() { return articulations_; }
   const std::vector<Articulation>& articulations() const { return articulations_; }
   Articulation* find_articulation(int body) {
@@ -140,6 +164,8 @@ class Bodies {
   State make_member_state(int body, const joints::Motion& motion) const;
   /// Applies simultaneous impulses, one per member.
   void apply_impulses(Articulation& articulation, const std::vector<joints::Spatial>& impulses);
+  /// Applies an impulse to a body; returns the kinetic energy gained [J].
+  double apply_impulse(int body, const joints::Spatial& impulse);
   /// Bound of the acceleration of any point due to joints: twice the present one [m/s^2].
   double calc_joint_acceleration(const Articulation& articulation) const;
   /// True if the articulation is in equilibrium without velocity and contacts.
@@ -156,14 +182,20 @@ class Bodies {
   }
 
  private:
+  enum Stay : char { kAwake, kAsleep, kAbsent };
+
   void make_articulations(const std::vector<joints::Joint>& joints);
+  void note_pulls();
 
   std::vector<Solid> solids_;
   std::vector<State> states_;
   std::vector<Placed> placed_;
-  std::vector<char> asleep_, in_impact_;
+  std::vector<char> stays_;  // Stay
+  std::vector<char> in_impact_;
   std::vector<double> struck_s_;
   std::vector<double> swings_m_;
+  std::vector<Grab> grabs_;
+  std::vector<double> pulls_m_s2_;  // of the bodies; empty without grabs
   std::optional<Ground> ground_;
   Vec3 gravity_{};
   std::vector<Articulation> articulations_;

@@ -5,7 +5,7 @@
 
 namespace carillon::rigid {
 
-/// Current energies, and energies lost or lifted since the start [J]; their total is constant.
+/// Current energies, and energies lost, lifted or given since the start [J]; their total is constant.
 struct Books {
   double motion_j = 0.0;   // kinetic and gravitational
   double modes_j = 0.0;    // in the bodies' modes
@@ -13,7 +13,9 @@ struct Books {
   double lost_j = 0.0;     // by friction, in contacts, by modal damping, above the bands
   double lifted_j = 0.0;   // given to bodies that were moved apart, beyond the share paid by their motion
 
-  double calc_total() const { return motion_j + modes_j + springs_j + lost_j - lifted_j; }
+  double given_j = 0.0;  // from outside: pushes, grabs, bodies added or removed
+
+  double calc_total() const { return motion_j + modes_j + springs_j + lost_j - lifted_j - given_j; }
 };
 
 struct Costs {
@@ -33,16 +35,18 @@ class Ledger {
   /// Negative: an energy gain [J].
   void lose(double energy_j) { lost_j_ += energy_j; }
   void lift(double energy_j) { lifted_j_ += energy_j; }
+  void give(double energy_j) { given_j_ += energy_j; }
   /// Adds losses and gains to the books.
   void add_to(Books& books) const {
     books.lost_j += lost_j_;
     books.lifted_j += lifted_j_;
+    books.given_j += given_j_;
   }
 
   Costs costs;
 
  private:
-  double lost_j_ = 0.0, lifted_j_ = 0.0;
+  double lost_j_ = 0.0, lifted_j_ = 0.0, given_j_ = 0.0;
 };
 
 }  // namespace carillon::rigid

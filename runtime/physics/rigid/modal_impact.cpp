@@ -334,6 +334,7 @@ void ModalImpacts::advance(const Step& step, double to_s, double part_s, double 
         move_articulation(step.articulations[number], bodies[k], modal.impact->get_time() - begun_s, step.length_s);
         continue;
       }
+      give_pull(step, n, bodies[k].moved_m, bodies[k].turned_rad);
       State& s = bodies_.state(body);
       s.velocity = bodies[k].velocity_m_s;
       s.centre = s.centre + bodies[k].moved_m;
@@ -392,6 +393,11 @@ void ModalImpacts::move_articulation(const ArticulationStep& step, const impact:
   bodies_.place(articulation);
 }
 
+/// Books the work of a grab on the nth body of the step, while an impact moves it.
+void ModalImpacts::give_pull(const Step& step, int n, const Vec3& moved, const Vec3& turned) {
+  if (!step.pulls.empty()) ledger_.give((1.0 / step.length_s) * (dot(step.pulls[n].linear, moved) + dot(step.pulls[n].angular, turned)));
+}
+
 /// Reverts the effect of cords and other contacts on a body in the last `time_s`.
 void ModalImpacts::undo_pull(const Step& step, int body, const joints::Spatial& pull, double time_s) {
   if (pull.linear == Vec3{} && pull.angular == Vec3{}) return;
@@ -403,6 +409,9 @@ void ModalImpacts::undo_pull(const Step& step, int body, const joints::Spatial& 
     return;
   }
   State& s = bodies_.state(body);
+  const Vec3 mean = s.velocity - (0.5 * time_s) * pull.linear,
+             mean_spin = bodies_.placed(body).inverse_inertia * s.momentum - (0.5 * time_s) * pull.angular;
+  give_pull(step, step.find(body), -time_s * mean, -time_s * mean_spin);
   s.velocity = s.velocity - time_s * pull.linear;
   s.centre = s.centre + (0.5 * time_s * time_s) * pull.linear;
   s.momentum = s.momentum - time_s * (bodies_.calc_inertia(body) * pull.angular);

@@ -55,6 +55,10 @@ class ModalImpacts {
   bool begin(const Step& step, Collision& collision, const Instants& instants, TouchSets& touches);
   /// A rigid impact ends the modal impacts of its bodies.
   void end(const std::vector<Hit>& hits, TouchSets& touches);
+  /// Ends the modal impact of a body.
+  void end(int body, TouchSets& touches) {
+    if (ModalImpact* modal = find(body); modal != nullptr) end(*modal, touches);
+  }
   /// Ends impacts with slow touches elsewhere, or touches deeper than their springs and modes explain, at the time of the touches.
   void end_where_touching(const Step& step, TouchSets& touches);
   /// Moves contacts of impacts to their touches; touches that may close within a step become open contacts.
@@ -111,6 +115,7 @@ class ModalImpacts {
   void for_contacts(const Pair& pair, Do&& act) const;
   double calc_depth(const Pair& pair, const Vec3& where) const;
   void move_articulation(const ArticulationStep& step, const impact::Body& struck, double time_s, double step_s);
+  void give_pull(const Step& step, int n, const Vec3& moved, const Vec3& turned);
   void undo_pull(const Step& step, int body, const joints::Spatial& pull, double time_s);
   void keep_pulses(ModalImpact& modal);
   void report(ModalContact& contact);

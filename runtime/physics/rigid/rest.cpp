@@ -31,7 +31,8 @@ bool Rest::may_sleep(const std::vector<int>& bodies, double time_s) {
   bool all = true;
   for (const int body : bodies) {
     Pace& pace = paces_[body];
-    pace.slow_s = bodies_.calc_speed(body) < kSlowSpeedMS && !bodies_.is_moved_by_impact(body) ? pace.slow_s + time_s : 0.0;
+    const bool is_slow = bodies_.calc_speed(body) < kSlowSpeedMS && !bodies_.is_moved_by_impact(body) && bodies_.get_pull(body) == 0.0;
+    pace.slow_s = is_slow ? pace.slow_s + time_s : 0.0;
     all = all && pace.slow_s > kSlowDelayS && bodies_.get_time() >= pace.next_proof_s;
   }
   return all;

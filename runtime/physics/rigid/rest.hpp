@@ -36,6 +36,8 @@ class Rest {
   /// Puts an articulation to sleep that touches nothing during a window.
   bool try_articulation(Articulation& articulation, double length_s);
 
+  /// Wakes a body and the sleeping bodies connected to it, at the start of a window.
+  void wake(int body) { wake(body, body); }
   /// Updates the touches of a pair for a step. Wakes a sleeping body of the pair if a supporting contact has opened, or if another body is
   /// about to touch it.
   void watch(Pair& pair, double step_s);

@@ -95,6 +95,7 @@ void Space::open_window(double end_s) {
 }
 
 void Space::step_island(Island& island, double start_s, double length_s) {
+  pull_joints(island, length_s);
   step_.begin(island);
   double done = 0.0;
   int impacts = 0, missed = 0, more = 0;
@@ -202,7 +203,8 @@ bool Space::strike_at_once(double start_s, double length_s) {
 /// Advances the bodies of an island through the completed part of a step.
 void Space::move(double to_s, double part_s) {
   const double before_j = bodies_.calc_energy(step_.island().bodies);
-  std::vector<State> moved;
+  std::vector<State> moved, before;
+  for (int n = 0; n < step_.count() && !step_.pulls.empty(); ++n) before.push_back(bodies_.state(step_.body(n)));
   std::vector<char> in_impact;  // includes impacts that end in this part, which have moved their bodies
   double loads_j = 0.0;         // work of sleeping bodies supported by these
   for (int n = 0; n < step_.count(); ++n) {
@@ -226,7 +228,8 @@ void Space::move(double to_s, double part_s) {
     if (!in_impact[n]) bodies_.state(step_.body(n)) = moved[n];
     bodies_.place(step_.body(n));
   }
-  if (!has_impacts) problem_.remove_gain(step_, before_j + loads_j);
+  const double pulls_j = before.empty() ? 0.0 : give_pulls(before, in_impact, part_s);
+  if (!has_impacts) problem_.remove_gain(step_, before_j + loads_j + pulls_j);
 }
 
 /// Applies all current strikes, rigid or modal.

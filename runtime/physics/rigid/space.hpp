@@ -45,6 +45,23 @@ class Space {
   Space(const Space&) = delete;  // stages refer to each other
   Space& operator=(const Space&) = delete;
 
+  // At the start of a window only. Energy from outside is booked as given; bodies that sleep wake.
+  /// Impulse on a moving body at a world point [N s].
+  void push(int body, const Vec3& where, const Vec3& impulse);
+  /// Holds a moving body by a spring, instead of an earlier one.
+  void grab(const Grab& grab);
+  void release(int body) { bodies_.drop_grab(body); }
+  const Grab* find_grab(int body) const { return bodies_.find_grab(body); }
+  /// Takes a body without joints and cords out of the world; wakes those that touch it.
+  void remove(int body);
+  /// The same for a body that is not in the world from the start: nothing is booked.
+  void leave_out(int body) { bodies_.set_absent(body, true); }
+  /// Pose of a body that stays absent.
+  void place_absent(int body, const State& state);
+  /// Puts an absent body into the world.
+  void add(int body, const State& state);
+  bool is_absent(int body) const { return bodies_.is_absent(body); }
+
   /// One small step of all awake bodies, to at most `until_s`. At the start of a window all bodies are at its time; within it flying bodies
   /// are at its end. Throws SolveError if a state is not finite.
   void step(double until_s);
@@ -56,8 +73,8 @@ class Space {
   const Solid& solid(int body) const { return bodies_.solid(body); }
   const State& state(int body) const { return bodies_.state(body); }
   const std::vector<State>& states() const { return bodies_.states(); }
-  /// Fixed or asleep.
-  bool is_still(int body) const { return !bodies_.moves(body); }
+  /// Fixed or asleep; not absent, so that its contacts end.
+  bool is_still(int body) const { return !bodies_.moves(body) && !bodies_.is_absent(body); }
   bool is_all_asleep() const { return bodies_.are_all_asleep(); }
   /// If all bodies sleep: advances to the end of the next window without a step.
   void skip_window(double end_s);
@@ -96,6 +113,9 @@ class Space {
   bool try_rest(Island& island, double length_s);
   bool strike_at_once(double start_s, double length_s);
   void move(double to_s, double part_s);
+  void pull_joints(const Island& island, double length_s);
+  double give_pulls(const std::vector<State>& before, const std::vector<char>& in_impact, double part_s);
+  void stir(int body);
   void strike(const std::vector<ContactRef>& first);
 
   Options options_;

@@ -41,7 +41,9 @@ State Step::calc_moved(int n, double part_s) const {
   const Vec3 spun = movers[n].spin - free[n].placed.spin;
   to.rotation = normalise(multiply(make_turn((0.5 * part_s * part_s / length_s) * spun), to.rotation));
   // The impulses act at the middle of the part: the centre is then behind the origin of their arms.
-  const Vec3 late = cross((0.5 * (length_s - part_s)) * from.velocity, (bodies_.solid(i).mass_kg * length_s) * gained);
+  Vec3 given = (bodies_.solid(i).mass_kg * length_s) * gained;
+  if (!pulls.empty()) given = given - pulls[n].linear;  // a pull moves along with its body
+  const Vec3 late = cross((0.5 * (length_s - part_s)) * from.velocity, given);
   to.momentum = to.momentum + (part_s / length_s) * (turned[n] + late);
   return to;
 }
@@ -70,6 +72,13 @@ double Step::calc_load_work(int n, const State& to, double part_s) const {
   const double part = part_s / length_s;
   const Vec3 turn = part_s * (spin + (0.5 * part) * (movers[n].spin - spin));
   return (1.0 / length_s) * (dot(loads[n].linear, to.centre - bodies_.state(body(n)).centre) + dot(loads[n].angular, turn));
+}
+
+double Step::calc_pull_work(int n, const State& from, double part_s) const {
+  // Twice the mean spin: with the momentum before the pull, and after it.
+  const State& to = bodies_.state(body(n));
+  const Vec3 spins = bodies_.placed(body(n)).inverse_inertia * (from.momentum + to.momentum);
+  return (1.0 / length_s) * (dot(pulls[n].linear, to.centre - from.centre) + (0.5 * part_s) * dot(pulls[n].angular, spins));
 }
 
 Point make_point(const Bodies& bodies, const Step& step, const Contact& c) {

@@ -60,6 +60,7 @@ class Step {
   std::vector<FreeMotion> free;
   std::vector<ArticulationStep> articulations;
   std::vector<joints::Spatial> loads;  // impulses of sleeping bodies on these
+  std::vector<joints::Spatial> pulls;  // impulses of grabs on these; empty: none
   std::vector<Point> points;
   std::vector<ContactRef> rows;  // contact of each point
   std::vector<Vec3> turned;      // angular impulses on the bodies
@@ -71,6 +72,8 @@ class Step {
   double calc_loss(const Point& point, double part) const;
   /// Work of the loads on the nth body in a part of the step that ends at `to` [J].
   double calc_load_work(int n, const State& to, double part_s) const;
+  /// Work of the pulls on the nth body, now moved by a part of the step from `from` [J].
+  double calc_pull_work(int n, const State& from, double part_s) const;
 
  private:
   const Bodies& bodies_;

@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "runtime/physics/rigid/cords.hpp"
+#include "runtime/physics/rigid/grab.hpp"
 #include "runtime/physics/rigid/instants.hpp"
 #include "runtime/physics/rigid/limits.hpp"
 #include "runtime/physics/rigid/step_problem.hpp"
@@ -103,6 +104,7 @@ void StepProblem::predict(Step& step, double length_s, bool at_rest) {
     step.movers[n] = {1.0 / bodies_.solid(i).mass_kg, to.placed.inverse_inertia, to.state.velocity, to.placed.spin};
   }
   add_loads(step);
+  add_pulls(step);
 }
 
 void StepProblem::predict_articulation(Step& step, int number, bool at_rest) {
@@ -141,6 +143,20 @@ void StepProblem::add_loads(Step& step) const {
     Mover& mover = step.movers[n];
     mover.velocity = mover.velocity + mover.inverse_mass * step.loads[n].linear;
     mover.spin = mover.spin + mover.inverse_inertia * step.loads[n].angular;
+  }
+}
+
+/// Grabs of free bodies act all along the step. Bodies on joints get their impulse at its start (Space::pull_joints()).
+void StepProblem::add_pulls(Step& step) const {
+  step.pulls.clear();
+  for (const Grab& grab : bodies_.grabs()) {
+    const int n = step.find(grab.body);
+    if (n < 0 || step.movers[n].linkage != nullptr) continue;
+    step.pulls.resize(step.count());
+    step.pulls[n] = calc_grab_impulse(bodies_, grab, step.length_s);
+    Mover& mover = step.movers[n];
+    mover.velocity = mover.velocity + mover.inverse_mass * step.pulls[n].linear;
+    mover.spin = mover.spin + mover.inverse_inertia * step.pulls[n].angular;
   }
 }
 

@@ -104,6 +104,7 @@ void StepProblem::find_impulses(Step& step) {
 void StepProblem::sum_impulses(Step& step) const {
   step.turned.assign(step.count(), Vec3{});
   for (int n = 0; n < step.count(); ++n) step.turned[n] = step.loads[n].angular;
+  for (std::size_t n = 0; n < step.pulls.size(); ++n) step.turned[n] = step.turned[n] + step.pulls[n].angular;
   for (const Point& p : step.points) {
     if (p.a >= 0) step.turned[p.a] = step.turned[p.a] + cross(p.arm_a, p.impulse) + p.couple;
     if (p.b >= 0) step.turned[p.b] = step.turned[p.b] - cross(p.arm_b, p.impulse) - p.couple;

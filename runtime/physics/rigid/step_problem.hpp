@@ -34,6 +34,7 @@ class StepProblem {
  private:
   void predict_articulation(Step& step, int number, bool at_rest);
   void add_loads(Step& step) const;
+  void add_pulls(Step& step) const;
   double calc_rolling_radius(const Step& step, const Point& point, const Contact& contact, const geometry::Touch& moved) const;
   Point make_lasting_point(const Step& step, Pair& pair, const Contact& contact) const;
   double calc_patch_radius(const Contact& contact) const;

@@ -75,6 +75,12 @@ void TouchSets::forget_far(std::int64_t window) {
   }
 }
 
+void TouchSets::forget(int body) {
+  for (auto& [key, pair] : pairs_)
+    if (key.first == body || key.second == body) lose_stored(pair);
+  std::erase_if(pairs_, [&](const auto& entry) { return entry.first.first == body || entry.first.second == body; });
+}
+
 void TouchSets::search(Pair& pair, double step_s) {
   if (pair.cord >= 0) return refresh(pair);
   ++ledger_.costs.searches;
@@ -347,7 +353,8 @@ geometry::Touch TouchSets::find_closing(Pair& pair, const Contact& contact, doub
 double TouchSets::calc_way(const Pair& pair, double time_s, double step_s) const {
   const bool is_over_ground = pair.b < 0 && bodies_.moves(pair.a);
   const double speed = is_over_ground ? bodies_.calc_sinking_speed(pair.a) : bodies_.calc_closing_speed(pair.a, pair.b);
-  return (speed + norm(bodies_.gravity()) * step_s) * time_s;
+  const double pull = bodies_.get_pull(pair.a) + bodies_.get_pull(pair.b);
+  return (speed + (norm(bodies_.gravity()) + pull) * step_s) * time_s;
 }
 
 void TouchSets::travel(Pair& pair, double time_s, double step_s) const {

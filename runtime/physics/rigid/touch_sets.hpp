@@ -32,6 +32,8 @@ class TouchSets {
   const Cord& cord(int number) const { return cords_[number]; }
   /// Removes pairs that are not near in this window, unless both bodies are static or asleep.
   void forget_far(std::int64_t window);
+  /// Removes the pairs of a body.
+  void forget(int body);
 
   /// Searches the touches at the current poses.
   void search(Pair& pair, double step_s);

@@ -55,6 +55,10 @@ void Windows::add(Pair& pair) {
   near_is_sorted_ = false;
 }
 
+void Windows::forget(int body) {
+  std::erase_if(near_, [&](const Pair* pair) { return pair->a == body || pair->b == body; });
+}
+
 void Windows::add(int a, int b) {
   if (b >= 0 && a > b) std::swap(a, b);
   if (!bodies_.is_joined(a, b)) add(touches_.get(a, b));
@@ -81,18 +85,20 @@ void Windows::open(double end_s, const std::list<ModalImpact>& impacts) {
     reach_m_s_[i] = bodies_.moves(i) ? bodies_.calc_speed(i) + g * length : 0.0;
     if (const Articulation* articulation = bodies_.find_articulation(i); articulation != nullptr && bodies_.moves(i))
       reach_m_s_[i] += bodies_.calc_joint_acceleration(*articulation) * length;
+    if (bodies_.moves(i)) reach_m_s_[i] += bodies_.get_pull(i) * length;
     boxes[i] = bodies_.calc_box(i, bodies_.moves(i) ? reach_m_s_[i] * length + bodies_.get_swing(i) + kBoxMarginM : 0.0);
   }
   for (int i = 0; i < count; ++i)
     if (bodies_.moves(i) && bodies_.ground() && boxes[i].low[2] < bodies_.ground()->height_m) add(i, -1), active_[i] = 1;
   geometry::for_overlaps(boxes, [&](int i, int j) {
-    if ((!bodies_.moves(i) && !bodies_.moves(j)) || bodies_.is_joined(i, j)) return;
+    if ((!bodies_.moves(i) && !bodies_.moves(j)) || bodies_.is_joined(i, j) || bodies_.is_absent(i) || bodies_.is_absent(j)) return;
     add(i, j);
     active_[i] = active_[j] = 1;
   });
   open_cords();
   for (const ModalImpact& impact : impacts)
     for (const int body : impact.bodies) active_[body] = 1;
+  for (const Grab& grab : bodies_.grabs()) active_[grab.body] = 1;
   // A member that may meet something prevents the flight of the whole articulation.
   for (const Articulation& articulation : bodies_.articulations())
     if (std::any_of(articulation.bodies.begin(), articulation.bodies.end(), [&](int body) { return active_[body] != 0; }))
@@ -182,7 +188,7 @@ void Windows::find_rolling(base::Groups& groups) {
   std::vector<char> rolls(count, 0), touches(count, 0);
   for (int i = 0; i < count; ++i) {
     rolls[i] = bodies_.moves(i) && sizes[groups.find(i)] == 1 && !bodies_.is_flat(i) && bodies_.find_articulation(i) == nullptr &&
-               !bodies_.is_in_impact(i) && start_s_ - bodies_.get_struck_s(i) > kQuietS;
+               bodies_.get_pull(i) == 0.0 && !bodies_.is_in_impact(i) && start_s_ - bodies_.get_struck_s(i) > kQuietS;
   }
   std::vector<double> errors(count, 0.0);  // relative to the permitted ones
   std::vector<Vec3> stations;
@@ -251,7 +257,8 @@ void Windows::choose_steps() {
   }
   for (int i = 0; i < count; ++i) {
     if (!bodies_.moves(i)) continue;
-    if (bodies_.find_articulation(i) != nullptr || bodies_.is_moved_by_impact(i)) ask(i, length_s / options_.step_s);
+    if (bodies_.find_articulation(i) != nullptr || bodies_.is_moved_by_impact(i) || bodies_.get_pull(i) > 0.0)
+      ask(i, length_s / options_.step_s);
     // A point on an arc leaves its chord by w v h^2 / 2 within a step, with v its speed due to the spin w, at most w times the radius.
     const Solid& solid = bodies_.solid(i);
     const double sag = std::max(kArcSagM, kArcSagRatio * solid.shape->get_thickness_m());
@@ -362,7 +369,7 @@ void Windows::extend(int body) {
   const geometry::Box box = bodies_.calc_box(body, speed * left + kBoxMarginM);
   if (bodies_.ground() && box.low[2] < bodies_.ground()->height_m) add(body, -1);
   for (int j = 0; j < bodies_.count(); ++j) {
-    if (j == body) continue;
+    if (j == body || bodies_.is_absent(j)) continue;
     const double reach_m = bodies_.moves(j) ? reach_m_s_[j] * (flying_[j] ? kLength : others_left) + kBoxMarginM : 0.0;
     if (!box.overlaps(bodies_.calc_box(j, reach_m)) || bodies_.is_joined(body, j)) continue;
     undo_flight(j, body);

@@ -55,6 +55,8 @@ class Windows {
   const std::vector<Pair*>& near() const { return near_; }
   void sort_near();
   void add(Pair& pair);
+  /// Drops the pairs of a body, which are about to be removed.
+  void forget(int body);
   void add(int a, int b);
   /// Islands whose steps start now.
   std::vector<Island> make_islands(const std::list<ModalImpact>& impacts);

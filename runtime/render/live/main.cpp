@@ -13,6 +13,7 @@
 #include "runtime/base/printable.hpp"
 #include "runtime/base/version.hpp"
 #include "runtime/base/whole_range.hpp"
+#include "runtime/render/live/commands.hpp"
 #include "runtime/render/live/device.hpp"
 #include "runtime/render/live/player.hpp"
 
@@ -51,6 +52,8 @@ int main(int argc, char** argv) {
                  "Share of one core available to the sound, 0.01 to 1; the least audible modes fade out to meet it")
       ->check(CLI::Range(0.01, 1.0))
       ->option_text("SHARE");
+  app.add_flag("--commands", options.takes_commands, "Move bodies by commands from standard input, one a line");
+  app.footer(std::string("Commands (--commands); a NAME with spaces in double quotes:\n") + carillon::live::kCommandText);
   app.add_flag("-q,--quiet", options.quiet, "Print warnings and errors only");
   try {
     app.parse(argc, argv);

@@ -157,6 +157,63 @@ class Live(unittest.TestCase):
             self.assertEqual(refused, "0")
             self.assertGreater(int(strikes), rendered / 2)
 
+    def test_commands_move_bodies(self):
+        scene = json.loads(self.scene.read_text())
+        scene["duration_s"] = 60.0
+        scene["strikes"] = []
+        scene["bodies"][0]["position_m"] = [0, 0, 0.051]
+        scene["bodies"][0]["rotation_deg"] = [0, 0, 0]
+        scene["bodies"].append({"name": "the other", "bank": "cube.h5", "position_m": [0, 3, 0.2], "absent": True})
+        path = self.root / "hands.json"
+        path.write_text(json.dumps(scene))
+        with subprocess.Popen(
+            [BIN / "carillon-live", path, "--null", "--commands", "--look-ahead", "0.05"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        ) as player:
+
+            def say(*lines):
+                player.stdin.write("".join(line + "\n" for line in lines))
+                player.stdin.flush()
+
+            def find(body):
+                say(f"where {body}")
+                words = player.stdout.readline().removeprefix(body.strip('"')).split()
+                return [float(word) for word in words[:3]], words[3:]
+
+            def wait_for(body, condition):
+                for _ in range(100):
+                    place, _ = find(body)
+                    if condition(place):
+                        return place
+                    time.sleep(0.05)
+                self.fail(f"{body} is at {place}")
+
+            self.assertEqual(find('"the other"')[1], ["absent"])
+            wait_for("cube", lambda place: abs(place[2] - 0.05) < 1e-4)
+            say("grab cube", "drag cube 0.2 0.1 0.4 0.2")
+            wait_for("cube", lambda place: abs(place[0] - 0.2) < 0.01 and abs(place[2] - 0.4) < 0.03)
+            say("# the held body falls", "", "release cube")
+            wait_for("cube", lambda place: place[2] < 0.1)
+            say("push cube 0 0 5")
+            wait_for("cube", lambda place: place[2] > 0.15)
+            say('add "the other" 0 3 0.3 0 0 -1', "remove gong")
+            wait_for('"the other"', lambda place: place[2] < 0.1)
+            self.assertEqual(find("gong")[1], ["absent"])
+            say("jump cube 1", "push cuba 0 0 1", "push cube 0 0", "push cube 0 0 x", "remove gong", "push gong 1 0 0", "drag cube 0 0 0")
+            say("quit")
+            out, errors = player.communicate(timeout=20)
+        self.assertEqual(player.returncode, 0)
+        self.assertLess(float(re.search(r"played +(\S+) s", out)[1]), 50.0, "quit ends it")
+        self.assertGreater(int(re.search(r"strikes +(\d+)", out)[1]), 3)
+        wanted = ['no command "jump"', 'mean "cube"', "2 numbers", '"x" is no number', "not in the world", "not in the world", "not held"]
+        lines = errors.splitlines()
+        self.assertEqual(len(lines), len(wanted), errors)
+        for line, words in zip(lines, wanted):
+            self.assertIn(words, line)
+
     def test_null_needs_no_device_and_quiet_is_quiet(self):
         run = live(self.scene, "--null", "--device", "system")
         self.assertEqual(run.returncode, 2)

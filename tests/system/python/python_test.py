@@ -259,6 +259,71 @@ class Jobs(Case):
         self.assertGreater(ticks, 20)
 
 
+class Worlds(Case):
+    def make_scene(self):
+        bar = {"bank": str(self.bank_file), "restitution": 0.3}
+        return {
+            "duration_s": 0.5,
+            "ground": {},
+            "listener": {"position_m": [0, -1, 0.3]},
+            "bodies": [
+                {"name": "bar", "position_m": [-0.2, 0.09, -0.199], **bar},
+                {"name": "spare", "position_m": [-0.2, 1.09, 0.1], "absent": True, **bar},
+                {"name": "shelf", "position_m": [0.4, 0.09, 0.0], "fixed": True, **bar},
+            ],
+        }
+
+    def test_bodies_are_pushed_held_added_and_removed(self):
+        world = carillon.World(self.make_scene(), look_ahead_s=0.02)
+        self.assertEqual((world.bodies, world.rate_hz, world.time_s), (["bar", "spare", "shelf"], 48000, 0))
+        pressure = world.advance(0.5)
+        self.assertEqual((pressure.shape, pressure.dtype), ((24000, 2), numpy.float32))
+        self.assertGreater(abs(pressure).max(), 0)
+        numpy.testing.assert_allclose(world.centre("bar"), [0, 0, 0.005], atol=1e-4)
+        speed = 1.0
+        world.push("bar", [0, 0, speed * carillon.Bank(self.bank_file).mass_kg])
+        world.advance(0.05)
+        flown_s = 0.05  # a parabola
+        numpy.testing.assert_allclose(world.centre("bar")[2], 0.005 + speed * flown_s - 9.81 / 2 * flown_s**2, atol=5e-4)
+        world.grab("bar", frequency_hz=6)
+        world.drag("bar", [0, 0, 0.5], over_s=0.2)
+        world.advance(1.0)
+        sag_m = 9.81 / (2 * numpy.pi * 6) ** 2
+        numpy.testing.assert_allclose(world.centre("bar"), [0, 0, 0.5 - sag_m], atol=2e-3)
+        self.assertTrue(world.is_absent("spare"))
+        world.add("spare", [-0.2, 1.09, 0.2], velocity_m_s=[0, 0, -1])
+        world.release("bar")
+        self.assertGreater(abs(world.advance(0.5)).max(), 10 * abs(pressure[-4800:]).max(), "both fall")
+        position, rotation = world.pose("spare")
+        self.assertEqual((len(position), len(rotation)), (3, 4))
+        world.remove("shelf")
+        self.assertTrue(world.is_absent("shelf"))
+        self.assertAlmostEqual(world.time_s, 2.05, places=9)
+
+    def test_what_cannot_be_done_is_one_message(self):
+        world = carillon.World(self.make_scene())
+        self.refuse(carillon.InputError, lambda: world.push("ba", [0, 0, 1]), 'did you mean "bar"?')
+        self.refuse(carillon.InputError, lambda: world.push("bar", [0, 0, float("nan")]), "finite")
+        self.refuse(carillon.InputError, lambda: world.push("shelf", [0, 0, 1]), "fixed")
+        self.refuse(carillon.InputError, lambda: world.grab("spare"), "not in the world")
+        self.refuse(carillon.InputError, lambda: world.grab("bar", frequency_hz=0), "frequency")
+        self.refuse(carillon.InputError, lambda: world.drag("bar", [0, 0, 1]), "not held")
+        self.refuse(carillon.InputError, lambda: world.add("bar", [0, 0, 1]), "already")
+        self.refuse(carillon.InputError, lambda: world.add("spare", [-0.2, 0.09, -0.199]), "inside each other")
+        self.refuse(carillon.InputError, lambda: world.advance(-1), "advance")
+        self.refuse(carillon.InputError, lambda: carillon.World(self.make_scene(), look_ahead_s=0), "look_ahead_s")
+        self.refuse(carillon.InputError, lambda: carillon.World("none.json"), "none.json")
+
+    def test_sound_is_that_of_the_whole_scene(self):
+        scene = {**self.make_scene(), "output": {"fade_end": False}}
+        whole = carillon.render(scene).samples_pa.astype(float)
+        world = carillon.World(scene)
+        pieces = numpy.concatenate([world.advance(0.1) for _ in range(5)]).astype(float)
+        # Here the latency of the synthesiser stays, as live, and bodies have effects for whatever may happen.
+        worst = min(numpy.square(pieces[late:] - whole[: len(whole) - late]).sum() for late in range(48))
+        self.assertLess(worst, 1e-3 * numpy.square(whole).sum())
+
+
 class Sounds(Case):
     def make_scene(self):
         bank = carillon.Bank(self.bank_file)

@@ -21,6 +21,7 @@ from browser import Browser, serve
 
 BIN = pathlib.Path(os.environ["CARILLON_BIN_DIR"])
 WEB = BIN.parent / "share" / "carillon" / "web"
+WORLD = BIN.parent / "share" / "carillon" / "world"
 HERE = pathlib.Path(__file__).parent
 EFFECTS = ["modal", "hertz_pulse", "air_delay", "doppler", "two_ears"]
 CONTACTS = ["roughness", "rolling", "contact_damping"]
@@ -56,7 +57,7 @@ class Bench:
     def __enter__(self):
         self.temporary = tempfile.TemporaryDirectory(prefix="carillon-web-")
         self.folder = pathlib.Path(self.temporary.name)
-        self.server = serve(HERE, WEB, self.folder)
+        self.server = serve(HERE, WEB, WORLD, self.folder)
         self.browser = Browser(self.flags)
         self.page = self.browser.open(self.server.url + "page.html")
         self.page.wait_for("window.isReady")
@@ -384,6 +385,71 @@ def test_hard():
         bank = bench.make_bank("thousand.hdf", 4, 1000)
         scene = make_scene(0.5, bodies=[{**BODY, "bank": bank}])
         bench.compare("1000 modes", scene, options, LOAD.replace("a.hdf", bank) + STRIKE_AT % 0.1)
+
+
+def test_world():
+    """Bodies that fall, are pushed, held, added and removed in the page."""
+    with Bench() as bench:
+        bench.make_bank("a.hdf", 3, 30)
+        page = bench.page
+        page.evaluate(
+            """(async () => {
+          const audio = window.audio = await live();
+          const bytes = await (await fetch('a.hdf')).arrayBuffer(), bank = await audio.addBank(bytes.slice(), 'a.hdf');
+          const add = (name, position_m) => audio.addBody({bank, name, position_m});
+          window.a = await add('a', [0, 0, 0.1]);
+          window.b = await add('b', [1, 0, 0.5]);
+          const bodies = [{body: a, bank: bytes, restitution: 0.3}, {body: b, bank: bytes, absent: true}];
+          window.world = await World.open(audio, {bodies, modes: false});
+        })()"""
+        )
+        page.wait_for("world.time_s > 0.2 && world.pose(a).position_m[2] < 0.05")
+        page.evaluate("world.grab(a)")
+        page.evaluate("world.drag(a, [0.2, 0, 0.5], 0.3)")
+        page.wait_for("world.pose(a).position_m[2] > 0.45 && Math.abs(world.pose(a).position_m[0] - 0.2) < 0.01")
+        page.evaluate("world.release(a)")
+        page.evaluate("world.add(b, {position_m: [1, 0, 0.3]})")
+        page.wait_for("world.pose(a).position_m[2] < 0.05 && world.pose(b).position_m[2] < 0.05")
+        page.evaluate("world.push(a, [0, 0, 2 * a.mass_kg])")
+        page.wait_for("world.pose(a).position_m[2] > 0.1")
+        # A pointer takes the body along and throws it; a key pushes it.
+        page.evaluate(
+            """(async () => {
+          await new Promise((resolve) => setTimeout(resolve, 1000));
+          const hand = window.hand = document.body;
+          hand.setPointerCapture = undefined; // the pointer of a test is none
+          const at = {...world.pose(a)}.position_m;
+          window.unfollow = world.follow(hand, {
+            pick: () => ({body: a, at_m: at}),
+            place: ({clientX, clientY}) => [at[0] + clientX / 1000, at[1], at[2] - clientY / 1000],
+          });
+          const send = (type, clientX, clientY) => hand.dispatchEvent(new PointerEvent(type, {pointerId: 7, clientX, clientY}));
+          send('pointerdown', 0, 0);
+          for (let k = 1; k <= 20; ++k) {
+            await new Promise((resolve) => setTimeout(resolve, 16));
+            send('pointermove', -20 * k, -20 * k);
+          }
+          send('pointerup', -400, -400);
+          window.fromX = at[0];
+        })()"""
+        )
+        page.wait_for("world.pose(a).position_m[0] < fromX - 0.25 && world.pose(a).position_m[2] > 0.2")
+        page.wait_for("world.pose(a).position_m[2] < 0.05")
+        page.evaluate("hand.dispatchEvent(new KeyboardEvent('keydown', {key: 'PageUp'})), unfollow()")
+        page.wait_for("world.pose(a).position_m[2] > 0.035")
+        page.evaluate("world.remove(b)")
+        for call, words in (
+            ("world.remove(b)", "not in the world"),
+            ("world.drag(a, [0, 0, 1])", "not held"),
+            ("world.push({}, [0, 0, 1])", "not one"),
+        ):
+            said = page.evaluate(f"{call}.then(() => 'done', (error) => error.message)")
+            assert words in said, said
+        counters = page.evaluate("audio.counters()")
+        print(counters)
+        assert counters["strikes"] > 5 and counters["faults"] == counters["resets"] == 0, counters
+        assert page.evaluate("audio.seen.errors") == []
+        page.evaluate("world.close()")
 
 
 def test_live():

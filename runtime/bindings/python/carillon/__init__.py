@@ -13,6 +13,7 @@ import typing as _typing
 import numpy as _numpy
 
 from ._carillon import Bank, InputError, SolveError, Synthesiser, SystemError, Touches, __version__, materials
+from ._carillon import World as _World
 from ._carillon import render as _render
 from .documents import write_json as _write_json
 from .solving import solve
@@ -25,6 +26,7 @@ __all__ = [
     "Synthesiser",
     "SystemError",
     "Touches",
+    "World",
     "__version__",
     "materials",
     "render",
@@ -49,3 +51,22 @@ def render(scene: _typing.Union[dict, str, _os.PathLike], *, rate_hz: _typing.Op
     if isinstance(scene, dict):
         return Sound(*_render(_os.path.join(_os.getcwd(), "scene"), _write_json(scene, "scene"), rate_hz))
     return Sound(*_render(_os.fspath(scene), "", rate_hz))
+
+
+class World(_World):
+    """A scene that is simulated and played step by step, and whose bodies are pushed, held, added and removed meanwhile.
+
+        world = carillon.World("scene.json")
+        world.push("ball", [0, 0, -0.2])   # N s, at its centre of mass
+        pressure = world.advance(0.5)      # the next half second: (frames, channels) float32 [Pa]
+
+    scene: a scene file, or a scene as a dict with paths relative to the current directory; its duration_s is not used.
+    look_ahead_s: lead of the physics over the sound, 0.02 to 10: what is done acts that much later.
+    Raises InputError for what cannot be used or done, and SolveError if the physics fails.
+    """
+
+    def __init__(self, scene: _typing.Union[dict, str, _os.PathLike], *, look_ahead_s: float = 0.05) -> None:
+        if isinstance(scene, dict):
+            super().__init__(_os.path.join(_os.getcwd(), "scene"), _write_json(scene, "scene"), look_ahead_s)
+        else:
+            super().__init__(_os.fspath(scene), "", look_ahead_s)
