@@ -1,0 +1,66 @@
+#!/usr/bin/env python3
+"""Table of an engine's sound against our own contact: all scenes and steps.
+
+usage: survey.py PROGRAMS ENGINE [SCENE...] [--hz HZ...] [--banks FOLDER]     folder with box.h5, ball.h5 and tube.h5; solved if missing
+"""
+import argparse
+import json
+import math
+import pathlib
+import tempfile
+
+import numpy as np
+
+import scenes
+
+
+def compare(programs, folder, engine, name, hz, own):
+    """Figures of one run: differences from our own contact `own` (sound), and the levels."""
+    seconds, bodies = scenes.SCENES[name]
+    output = scenes.run(programs / f"engine_{engine}", hz, seconds, "contacts.jsonl", cwd=folder, input=scenes.format_solids(bodies))
+    sound = scenes.render(programs, folder, name, "contacts.jsonl")
+    levels, wanted = scenes.calc_levels(sound), scenes.calc_levels(own)
+    peak, centroid = scenes.find_first_hit(sound)
+    own_peak, own_centroid = scenes.find_first_hit(own)
+    early = wanted[:4] > 60.0
+    return {
+        **json.loads(output),
+        "first_db": 20 * math.log10(peak / own_peak),
+        "centroid_percent": 100 * (centroid / own_centroid - 1),
+        "windows_db": float(np.median(abs(levels - wanted)[:4][early])) if early.any() else math.nan,
+        "levels": levels,
+    }
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("programs", type=pathlib.Path)
+    parser.add_argument("engine")
+    parser.add_argument("scenes", nargs="*", default=list(scenes.SCENES))
+    parser.add_argument("--hz", type=int, nargs="*", default=[60, 240, 1000])
+    parser.add_argument("--banks", type=pathlib.Path)
+    options = parser.parse_args()
+    programs = options.programs.resolve()
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        if options.banks:
+            for kind in scenes.BANKS:
+                (folder / f"{kind}.h5").symlink_to(options.banks.resolve() / f"{kind}.h5")
+        else:
+            scenes.solve_banks(programs, folder)
+        for scene in options.scenes or list(scenes.SCENES):
+            scenes.write_scene(folder / f"{scene}.json", *scenes.SCENES[scene])
+            own = scenes.render(programs, folder, scene)
+            print(f"{scene:5}  own   {' '.join(f'{x:4.0f}' for x in scenes.calc_levels(own))}")
+            for hz in options.hz:
+                r = compare(programs, folder, options.engine, scene, hz, own)
+                print(f"{'':5} {hz:5}  {' '.join(f'{x:4.0f}' for x in r['levels'])}")
+                print(
+                    f"{'':12} first hit {r['first_db']:+.1f} dB, centroid {r['centroid_percent']:+.1f} %, windows {r['windows_db']:.1f} dB;"
+                    f" {r['hits']} hits, {r['touches']} contacts, {r['bad_points']} bad points, latest {1e3 * r['latest_s']:.1f} ms,"
+                    f" {r['cpu_s'] / scenes.SCENES[scene][0]:.4f} CPU s/s"
+                )
+
+
+if __name__ == "__main__":
+    main()
