@@ -28,6 +28,7 @@ DEV = {
     "files": [
         "include/carillon.h",
         "include/carillon/bullet.h",
+        "include/carillon/mujoco.h",
         "include/carillon/simbody.h",
         "lib/libcarillon.so",
         "lib/pkgconfig/carillon.pc",
