@@ -184,7 +184,7 @@ void TouchSpots::follow(const StepView& step, const Group& g, int count, Spot& s
   if (g.curvature_per_m >= 0.0) spot.curvature_per_m = g.curvature_per_m;
   if (!spot.is_open) return;
   spot.hit.parting_m_s = std::max(0.0, parting);
-  if (step.options.early && !spot.is_reported) report_early(step, count, spot, hits);
+  if (step.options.early && !spot.is_reported) report_early(step, spot, hits);
   const bool has_decayed = !step.options.compliant || hit < kDecayedRatio * spot.peak_n * dt;
   const bool is_long = step.scene.time_s - spot.hit.touch_s > step.options.longest_hit_s;
   if (is_long) ++counters_->cut;
@@ -240,13 +240,13 @@ FinishedHit make_mean(const FinishedHit& sums, double end_s) {
 
 }  // namespace
 
-/// The hit as a rigid impact of the pair's restitution; `count` positions that begin at once share it.
-void TouchSpots::report_early(const StepView& step, int count, Spot& spot, std::vector<FinishedHit>& hits) {
+/// The hit as a rigid impact of the pair's restitution at this point alone.
+void TouchSpots::report_early(const StepView& step, Spot& spot, std::vector<FinishedHit>& hits) {
   spot.is_reported = true;
   FinishedHit hit = make_mean(spot.hit, step.scene.time_s);
   if (!(hit.inverse_mass > 0.0)) return;
   const double e = step.calc_restitution(hit.a, hit.b);
-  const double push = (1.0 + e) * hit.approach_m_s / (hit.inverse_mass * count);
+  const double push = (1.0 + e) * hit.approach_m_s / hit.inverse_mass;
   for (Vec3& impulse : hit.impulses_n_s) impulse = (push / hit.push_n_s) * impulse;
   hit.rubbed_n_s *= push / hit.push_n_s;
   hit.push_n_s = push;

@@ -67,7 +67,7 @@ class TouchSpots {
   void follow(const StepView& step, const Group& group, int count, Spot& spot, std::vector<FinishedHit>& hits);
   void open(const StepView& step, const Group& group, double inverse_mass, Spot& spot);
   void gather(const StepView& step, const Group& group, double push_n_s, Spot& spot);
-  void report_early(const StepView& step, int count, Spot& spot, std::vector<FinishedHit>& hits);
+  void report_early(const StepView& step, Spot& spot, std::vector<FinishedHit>& hits);
   void close(const StepView& step, Spot& spot, std::vector<FinishedHit>& hits);
   static Vec3 calc_where(const StepView& step, const Group& group, const Spot& spot);
   void miss(const StepView& step, Spot& spot, std::vector<FinishedHit>& hits);

@@ -149,7 +149,8 @@ class Touches::Course {
   std::deque<events::Event> waiting_;  // not taken by the sink yet
   double moved_s_ = 0.0;               // time of the last motions
   std::vector<char> stirred_;          // 1: moved since its last motion event, 2: reported with this step
-  std::atomic<double> mark_s_{0.0};
+  double last_mark_s_ = 0.0;           // queued
+  std::atomic<double> mark_s_{0.0};    // passed to the sink
   // Of the current step:
   std::vector<StepPoint> points_;
   std::vector<FinishedHit> hits_;
@@ -206,7 +207,7 @@ void Touches::Course::remove(int index) {
   events_.clear();
   spots_.forget(index);
   lasting_.end(scene_, index, events_);
-  hand_over(get_mark_s());
+  hand_over(last_mark_s_);
   bodies_[index] = {};
   (void)flush();
 }
@@ -389,12 +390,13 @@ void Touches::Course::hand_over(double mark_s) {
     waiting_.push_back(event);
   }
   waiting_.push_back(events::TimeWatermark{mark_s});
-  mark_s_.store(mark_s, std::memory_order_release);
+  last_mark_s_ = mark_s;
   for (; waiting_.size() > kMaxWaiting; waiting_.pop_front()) ++counters_.lost;
 }
 
 bool Touches::Course::flush() {
-  while (!waiting_.empty() && sink_(waiting_.front())) waiting_.pop_front();
+  for (; !waiting_.empty() && sink_(waiting_.front()); waiting_.pop_front())
+    if (const auto* mark = std::get_if<events::TimeWatermark>(&waiting_.front())) mark_s_.store(mark->time_s, std::memory_order_release);
   counters_.waiting = std::ssize(waiting_);
   return waiting_.empty();
 }

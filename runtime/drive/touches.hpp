@@ -92,8 +92,8 @@ struct TouchesCounters {
   double longest_hit_s = 0.0;
 };
 
-/// The bodies of an engine and their contacts. Invariant: all events up to get_mark_s() have been passed to the sink or wait for it; none
-/// depends on the order of bodies and points. [main-thread]: allocates and throws; an InputError leaves everything unchanged.
+/// The bodies of an engine and their contacts. Invariant: all events up to get_mark_s() have been passed to the sink; none depends on the
+/// order of bodies and points. [main-thread]: allocates and throws; an InputError leaves everything unchanged.
 class Touches {
  public:
   /// Receives events in time order, each step's ended by a TimeWatermark. False: no room; the event is passed again at the next step.

@@ -305,7 +305,7 @@ TEST(Touches, ImpulsesAreFoundFromVelocities) {
 
 TEST(Touches, SlidingAndRolling) {
   const bank::Bank ball = make_ball(kRadius), box = make_box({0.1, 0.08, 0.04});
-  for (const auto [rate, is_after] : {std::pair(60.0, false), {240.0, false}, {1000.0, false}, {60.0, true}, {240.0, true}}) {
+  for (const auto& [rate, is_after] : {std::pair(60.0, false), {240.0, false}, {1000.0, false}, {60.0, true}, {240.0, true}}) {
     Rig rig({.points_after = is_after});
     rig.add(ball, "ball", {0, 0, kRadius}, {0.5, 0, 0});
     rig.add(box, "box", {0, 1, 0.02}, {0.8, 0, 0});
@@ -440,9 +440,11 @@ TEST(Touches, EventsWaitForRoom) {
   touches.start(0.0, poses);
   EXPECT_FALSE(touches.step(0.01, poses, {}));
   EXPECT_GT(touches.get_counters().waiting, 0);
+  EXPECT_EQ(touches.get_mark_s(), 0.0) << "what waits has not been passed on";
   room = 1000;
   EXPECT_TRUE(touches.step(0.02, poses, {}));
   EXPECT_EQ(touches.get_counters().waiting, 0);
+  EXPECT_EQ(touches.get_mark_s(), 0.02);
   ASSERT_FALSE(taken.empty());
   EXPECT_EQ(std::get<events::BodyMotion>(taken.front()).body, 7) << "the first one";
 }
