@@ -1,5 +1,6 @@
 #include <carillon/mujoco.h>
 
+#include <cmath>
 #include <cstdio>
 #include <stdexcept>
 
@@ -8,7 +9,8 @@
 namespace carillon::testing {
 namespace {
 
-constexpr double kSpring = 0.008, kDamping = 0.215;  // solref [s, 1]: restitution 0.5; steps of at most half of the first
+constexpr double kSpring = 0.008, kDamping = 0.215;  // solref [s, 1]: restitution 0.5
+constexpr double kLongestStep = 0.001;               // s; beyond half of kSpring bodies gain energy
 
 template <class... Numbers>
 std::string format(const char* text, Numbers... numbers) {
@@ -33,12 +35,13 @@ std::string describe(const Solid& s) {
 
 class Mujoco : public Engine {
  public:
-  Mujoco(const std::vector<Solid>& solids, double step_s, carillon_touches* touches) {
+  Mujoco(const std::vector<Solid>& solids, double step_s, carillon_touches* touches)
+      : substeps_(static_cast<int>(std::ceil(step_s / kLongestStep - 1e-9))) {
     std::string text = format(
         "<mujoco><compiler angle='degree'/><option timestep='%.9g' cone='elliptic' impratio='10'/><default><geom "
         "friction='%.3f 0.0001 0.00001' solref='%.9g %.3f' solimp='0.95 0.99 0.0005' condim='4'/></default>"
         "<worldbody><geom type='plane' size='5 5 0.1'/>",
-        step_s, kFriction, kSpring, kDamping);
+        step_s / substeps_, kFriction, kSpring, kDamping);
     for (const Solid& solid : solids) text += describe(solid);
     text += "</worldbody></mujoco>";
     std::FILE* file = std::fopen("mujoco.xml", "w");
@@ -67,11 +70,16 @@ class Mujoco : public Engine {
 
   carillon_status start(char* message, std::size_t size) override { return reader_->start(message, size); }
   carillon_status step(double, char* message, std::size_t size) override {
+    for (int n = 1; n < substeps_; ++n) {
+      mj_step(model_, data_);
+      if (const carillon_status status = reader_->step(message, size); status != CARILLON_OK) return status;
+    }
     mj_step(model_, data_);
     return reader_->step(message, size);
   }
 
  private:
+  int substeps_;
   mjModel* model_ = nullptr;
   mjData* data_ = nullptr;
   std::unique_ptr<MujocoTouches> reader_;

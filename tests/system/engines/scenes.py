@@ -139,3 +139,25 @@ def find_first_hit(sound, rate=48000):
     part = sound[begin : begin + rate // 50]
     power = abs(np.fft.rfft(part)) ** 2
     return abs(part).max(), (power * np.fft.rfftfreq(len(part), 1 / rate)).sum() / power.sum()
+
+
+def compare(programs, folder, engine, name, hz, own):
+    """An engine's scene at a step against our own contact, whose sound is `own`: counters, and differences of the first hit (level and
+    centroid), the median of the windows of the first half second above 60 dB(A), and that of all windows from 0.25 s to 2 s; the level of
+    the last 0.5 s; all levels."""
+    seconds, bodies = SCENES[name]
+    output = run(programs / f"engine_{engine}", hz, seconds, "contacts.jsonl", cwd=folder, input=format_solids(bodies))
+    sound = render(programs, folder, name, "contacts.jsonl")
+    levels, wanted = calc_levels(sound), calc_levels(own)
+    peak, centroid = find_first_hit(sound)
+    own_peak, own_centroid = find_first_hit(own)
+    loud = wanted[:4] > 60.0
+    return {
+        **json.loads(output),
+        "first_db": 20 * math.log10(peak / own_peak),
+        "centroid_percent": 100 * (centroid / own_centroid - 1),
+        "windows_db": float(np.median(abs(levels - wanted)[:4][loud])) if loud.any() else 0.0,
+        "quiet_db": float(np.median(abs(levels - wanted)[2:16])),
+        "end_db": float(levels[-4:].max()),
+        "levels": levels,
+    }

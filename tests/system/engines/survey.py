@@ -4,32 +4,10 @@
 usage: survey.py PROGRAMS ENGINE [SCENE...] [--hz HZ...] [--banks FOLDER]     folder with box.h5, ball.h5 and tube.h5; solved if missing
 """
 import argparse
-import json
-import math
 import pathlib
 import tempfile
 
-import numpy as np
-
 import scenes
-
-
-def compare(programs, folder, engine, name, hz, own):
-    """Figures of one run: differences from our own contact `own` (sound), and the levels."""
-    seconds, bodies = scenes.SCENES[name]
-    output = scenes.run(programs / f"engine_{engine}", hz, seconds, "contacts.jsonl", cwd=folder, input=scenes.format_solids(bodies))
-    sound = scenes.render(programs, folder, name, "contacts.jsonl")
-    levels, wanted = scenes.calc_levels(sound), scenes.calc_levels(own)
-    peak, centroid = scenes.find_first_hit(sound)
-    own_peak, own_centroid = scenes.find_first_hit(own)
-    early = wanted[:4] > 60.0
-    return {
-        **json.loads(output),
-        "first_db": 20 * math.log10(peak / own_peak),
-        "centroid_percent": 100 * (centroid / own_centroid - 1),
-        "windows_db": float(np.median(abs(levels - wanted)[:4][early])) if early.any() else math.nan,
-        "levels": levels,
-    }
 
 
 def main():
@@ -53,12 +31,12 @@ def main():
             own = scenes.render(programs, folder, scene)
             print(f"{scene:5}  own   {' '.join(f'{x:4.0f}' for x in scenes.calc_levels(own))}")
             for hz in options.hz:
-                r = compare(programs, folder, options.engine, scene, hz, own)
+                r = scenes.compare(programs, folder, options.engine, scene, hz, own)
                 print(f"{'':5} {hz:5}  {' '.join(f'{x:4.0f}' for x in r['levels'])}")
                 print(
-                    f"{'':12} first hit {r['first_db']:+.1f} dB, centroid {r['centroid_percent']:+.1f} %, windows {r['windows_db']:.1f} dB;"
-                    f" {r['hits']} hits, {r['touches']} contacts, {r['bad_points']} bad points, latest {1e3 * r['latest_s']:.1f} ms,"
-                    f" {r['cpu_s'] / scenes.SCENES[scene][0]:.4f} CPU s/s"
+                    f"{'':12} first hit {r['first_db']:+.1f} dB, centroid {r['centroid_percent']:+.1f} %, windows {r['windows_db']:.1f} dB,"
+                    f" quiet ones {r['quiet_db']:.1f} dB, at the end {r['end_db']:.0f} dB(A); {r['hits']} hits, {r['touches']} contacts,"
+                    f" {r['bad_points']} bad points, latest {1e3 * r['latest_s']:.1f} ms, {r['cpu_s'] / scenes.SCENES[scene][0]:.4f} CPU s/s"
                 )
 
 
