@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The sound of a physics engine against our own contact, in all scenes at 60, 240 and 1000 steps per second. Exit code 77 (skipped) where the
+"""The sound of a physics engine against our own contact, in all scenes at 60, 240 and 1000 steps a second. Exit code 77 (skipped) where the
 engine is not installed.
 
 usage: acceptance.py PROGRAMS ENGINE      bullet, simbody or mujoco

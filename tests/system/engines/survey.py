@@ -34,9 +34,11 @@ def main():
                 r = scenes.compare(programs, folder, options.engine, scene, hz, own)
                 print(f"{'':5} {hz:5}  {' '.join(f'{x:4.0f}' for x in r['levels'])}")
                 print(
-                    f"{'':12} first hit {r['first_db']:+.1f} dB, centroid {r['centroid_percent']:+.1f} %, windows {r['windows_db']:.1f} dB,"
+                    f"{'':12} first hit {r['first_db']:+.1f} dB, centroid {r['centroid_percent']:+.1f} %,"
+                    f" windows {r['windows_db']:.1f} dB,"
                     f" quiet ones {r['quiet_db']:.1f} dB, at the end {r['end_db']:.0f} dB(A); {r['hits']} hits, {r['touches']} contacts,"
-                    f" {r['bad_points']} bad points, latest {1e3 * r['latest_s']:.1f} ms, {r['cpu_s'] / scenes.SCENES[scene][0]:.4f} CPU s/s"
+                    f" {r['bad_points']} bad points, latest {1e3 * r['latest_s']:.1f} ms,"
+                    f" {r['cpu_s'] / scenes.SCENES[scene][0]:.4f} CPU s/s"
                 )
 
 
