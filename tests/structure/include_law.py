@@ -21,6 +21,9 @@ LIBRARIES = {
     "mysofa": ["mysofa.h"],
     "cairo": ["cairo"],
     "portaudio": ["portaudio.h"],
+    "bullet": ["btBulletDynamicsCommon.h"],
+    "mujoco": ["mujoco/"],
+    "carillon": ["carillon.h"],
     "metis": ["metis.h"],
     "mpi": ["mpi.h"],
     "petsc": ["petsc", "slepc"],
@@ -83,6 +86,7 @@ RULES = {
         ["runtime/base", "runtime/bank", "runtime/events", "runtime/acoustics", "runtime/synth", "runtime/drive"],
         [],
     ),
+    "runtime/bindings/engines/carillon": ([], ["bullet", "carillon", "mujoco", "simbody"]),
     "runtime/bindings/python": (
         [
             "runtime/base",

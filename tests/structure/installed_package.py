@@ -25,7 +25,15 @@ RUNTIME = {
     "free_of": "mpi|petsc|slepc|metis|mumps|libcgal|libgmp",
 }
 DEV = {
-    "files": ["include/carillon.h", "lib/libcarillon.so", "lib/pkgconfig/carillon.pc", "lib/cmake/carillon/carillon-config.cmake"],
+    "files": [
+        "include/carillon.h",
+        "include/carillon/bullet.h",
+        "include/carillon/mujoco.h",
+        "include/carillon/simbody.h",
+        "lib/libcarillon.so",
+        "lib/pkgconfig/carillon.pc",
+        "lib/cmake/carillon/carillon-config.cmake",
+    ],
     "needs": "carillon-runtime",
     "free_of": "mpi|petsc",
 }

@@ -1,0 +1,81 @@
+#include <carillon/bullet.h>
+
+#include <cmath>
+
+#include "tests/system/engines/engine.hpp"
+
+namespace carillon::testing {
+namespace {
+
+btVector3 to_bullet(const double (&x)[3]) { return {btScalar(x[0]), btScalar(x[1]), btScalar(x[2])}; }
+
+std::unique_ptr<btCollisionShape> make_shape(const Solid& solid) {
+  const btVector3 half = to_bullet(solid.half_m);
+  if (solid.kind == "ball") return std::make_unique<btSphereShape>(half[0]);
+  std::unique_ptr<btCollisionShape> shape;
+  if (solid.kind == "box")
+    shape = std::make_unique<btBoxShape>(half);
+  else
+    shape = std::make_unique<btCylinderShapeX>(half);
+  shape->setMargin(btScalar(0.0005));
+  return shape;
+}
+
+class Bullet : public Engine {
+ public:
+  Bullet(const std::vector<Solid>& solids, double step_s, carillon_touches* touches) : step_s_(step_s), reader_(world_, touches) {
+    world_.setGravity(btVector3(0, 0, btScalar(-9.81)));
+    world_.getSolverInfo().m_solverMode |= SOLVER_USE_2_FRICTION_DIRECTIONS;
+    add(btRigidBody::btRigidBodyConstructionInfo(0, nullptr, &plane_));
+    for (const Solid& solid : solids) {
+      shapes_.push_back(make_shape(solid));
+      btRigidBody::btRigidBodyConstructionInfo info(btScalar(solid.mass_kg), nullptr, shapes_.back().get(), to_bullet(solid.inertia_kg_m2));
+      const auto& q = solid.rotation;
+      info.m_startWorldTransform =
+          btTransform(btQuaternion(btScalar(q[1]), btScalar(q[2]), btScalar(q[3]), btScalar(q[0])), to_bullet(solid.position_m));
+      btRigidBody& body = add(info);
+      body.setLinearVelocity(to_bullet(solid.velocity_m_s));
+      body.setAngularVelocity(to_bullet(solid.spin_rad_s));
+      reader_.add(body, static_cast<std::int32_t>(bodies_.size()) - 2);
+    }
+  }
+  ~Bullet() override {
+    for (const auto& body : bodies_) world_.removeRigidBody(body.get());
+  }
+
+  carillon_status start(char* message, std::size_t size) override { return reader_.start(0.0, message, size); }
+  carillon_status step(double time_s, char* message, std::size_t size) override {
+    world_.stepSimulation(btScalar(step_s_), 0);
+    return reader_.step(time_s, message, size);
+  }
+
+ private:
+  btRigidBody& add(btRigidBody::btRigidBodyConstructionInfo info) {
+    info.m_restitution = btScalar(std::sqrt(kRestitution));  // Bullet takes products
+    info.m_friction = btScalar(std::sqrt(kFriction));
+    bodies_.push_back(std::make_unique<btRigidBody>(info));
+    bodies_.back()->setContactProcessingThreshold(0);
+    world_.addRigidBody(bodies_.back().get());
+    return *bodies_.back();
+  }
+
+  double step_s_;
+  btDefaultCollisionConfiguration configuration_;
+  btCollisionDispatcher dispatcher_{&configuration_};
+  btDbvtBroadphase broadphase_;
+  btSequentialImpulseConstraintSolver solver_;
+  btDiscreteDynamicsWorld world_{&dispatcher_, &broadphase_, &solver_, &configuration_};
+  btStaticPlaneShape plane_{btVector3(0, 0, 1), 0};
+  std::vector<std::unique_ptr<btCollisionShape>> shapes_;
+  std::vector<std::unique_ptr<btRigidBody>> bodies_;
+  BulletTouches reader_;
+};
+
+}  // namespace
+
+void set_options(carillon_touches_options&) {}
+std::unique_ptr<Engine> make_engine(const std::vector<Solid>& solids, double step_s, carillon_touches* touches) {
+  return std::make_unique<Bullet>(solids, step_s, touches);
+}
+
+}  // namespace carillon::testing

@@ -1,0 +1,163 @@
+"""Scenes for our own contact and for other engines, and what is compared of their sound."""
+import json
+import math
+import pathlib
+import subprocess
+
+import numpy as np
+
+FRICTION, RESTITUTION = 0.4, 0.5  # of every body
+BOX, BALL, TUBE = [0.06, 0.04, 0.025], [0.03, 0.03, 0.03], [0.075, 0.02, 0.02]
+BANKS = {
+    "box": {
+        "body": {"shape": "hollow-box", "length_m": 0.12, "width_m": 0.08, "height_m": 0.05, "wall_m": 0.003, "nodes": 4000},
+        "material": {"young_modulus_pa": 12.6e9, "poisson_ratio": 0.35, "density_kg_m3": 700, "damping": 0.01},
+    },
+    "ball": {
+        "body": {"shape": "sphere", "radius_m": 0.03, "wall_m": 0.002, "nodes": 5000},
+        "material": {"young_modulus_pa": 1e11, "poisson_ratio": 0.34, "density_kg_m3": 8500, "damping": 0.0005},
+    },
+    "tube": {
+        "body": {"shape": "tube", "length_m": 0.15, "outer_radius_m": 0.02, "wall_m": 0.002, "nodes": 5000},
+        "material": {"young_modulus_pa": 7e10, "poisson_ratio": 0.33, "density_kg_m3": 2700, "damping": 0.001},
+    },
+}
+
+
+def solve_banks(programs, folder):
+    for name, job in BANKS.items():
+        material = {**job["material"], "damping": {"internal_friction": {"tan_phi": job["material"]["damping"]}}}
+        file = folder / f"{name}-job.json"
+        file.write_text(json.dumps({"body": job["body"], "material": material, "band_hz": [20, 20000], "bank": f"{name}.h5"}))
+        run(programs / "carillon-precompute", "-q", file.name, cwd=folder)
+
+
+def place(name, kind, half, position, turns=(0, 0, 0), velocity=(0, 0, 0), spin=(0, 0, 0)):
+    """A body; turns in degrees about the fixed axes x, y, z."""
+    return dict(name=name, kind=kind, half=half, position=position, turns=turns, velocity=velocity, spin=spin)
+
+
+def make_pile(count, spread):
+    boxes = []
+    for i in range(count):
+        column, level = i % spread**2, i // spread**2
+        x, y = (0.02 * (i % 3) - 0.02, 0.015 * (i % 2)) if spread == 1 else (0.14 * (column % spread), 0.14 * (column // spread))
+        boxes.append(place(f"b{i}", "box", BOX, (x, y, 0.1 + 0.15 * level), (17 * i, 29 * i, 41 * i)))
+    return boxes
+
+
+# Name: seconds and bodies.
+SCENES = {
+    "box": (3, [place("box", "box", BOX, (0, 0, 0.3), (30, 40, 0), spin=(2, 5, 1))]),
+    "slide": (2, [place("box", "box", BOX, (0, 0, 0.025), velocity=(1.5, 0, 0))]),
+    "ball": (3, [place("ball", "ball", BALL, (-0.6, 0, 0.03), velocity=(0.5, 0, 0), spin=(0, 0.5 / 0.03, 0))]),
+    "tube": (3, [place("tube", "tube", TUBE, (0, -0.5, 0.05), velocity=(0, 0.4, 0))]),
+    "two": (2, [place("a", "ball", BALL, (-0.1, 0, 0.5), velocity=(1, 0, 0)), place("b", "ball", BALL, (0, 0, 0.5))]),
+    "pile": (3, make_pile(10, 1)),
+}
+
+
+def run(*command, **options):
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=300, **options)
+    if done.returncode != 0:
+        raise SystemExit(f"{command[0]} failed ({done.returncode}): {done.stdout}{done.stderr}")
+    return done.stdout
+
+
+def calc_quaternion(turns):
+    """w x y z of turns [degrees] about the fixed axes x, then y, then z."""
+    q = np.array([1.0, 0, 0, 0])
+    for axis, angle in enumerate(turns):
+        half = math.radians(angle) / 2
+        v = np.zeros(3)
+        v[axis] = math.sin(half)
+        w = math.cos(half)
+        q = np.concatenate([[w * q[0] - v @ q[1:]], w * q[1:] + q[0] * v + np.cross(v, q[1:])])
+    return q
+
+
+def format_solids(bodies):
+    lines = []
+    for b in bodies:
+        numbers = [*b["half"], *b["position"], *calc_quaternion(b["turns"]), *b["velocity"], *b["spin"]]
+        lines.append(f"{b['name']} {b['kind']} {b['kind']}.h5 " + " ".join(f"{x:.17g}" for x in numbers))
+    return "\n".join(lines) + "\n"
+
+
+def write_scene(file, seconds, bodies):
+    scene = {
+        "duration_s": seconds,
+        "ground": {"restitution": RESTITUTION},
+        "listener": {"position_m": [0, -1, 0.4]},
+        "effects": ["modal", "hertz_pulse", "roughness", "rolling", "contact_damping", "air_delay", "doppler", "two_ears"],
+        "output": {"format": "float", "gain": 1e-3, "fade_end": False},
+        "bodies": [
+            {
+                "name": b["name"],
+                "bank": f"{b['kind']}.h5",
+                "position_m": b["position"],
+                "rotation_deg": b["turns"],
+                "velocity_m_s": b["velocity"],
+                "angular_velocity_rad_s": b["spin"],
+                "restitution": RESTITUTION,
+                "friction": FRICTION,
+            }
+            for b in bodies
+        ],
+    }
+    file.write_text(json.dumps(scene))
+
+
+def read_wav(file):
+    """(frames, 2) in Pa of a WAV file of floats with gain 1e-3."""
+    data = pathlib.Path(file).read_bytes()
+    at = data.index(b"data")
+    size = int.from_bytes(data[at + 4 : at + 8], "little")
+    return np.frombuffer(data[at + 8 : at + 8 + size], dtype="<f4").reshape(-1, 2) * 1e3
+
+
+def render(programs, folder, scene, contacts=None):
+    """Sound of the left ear [Pa] at 48 kHz."""
+    words = ["--contacts", contacts] if contacts else []
+    run(programs / "carillon-render", "-q", f"{scene}.json", "-o", "sound.wav", *words, cwd=folder)
+    return read_wav(folder / "sound.wav")[:, 0].astype(float)
+
+
+def calc_levels(sound, rate=48000, window_s=0.125):
+    """A-weighted levels [dB(A)] of windows, at least -120."""
+    n = int(window_s * rate)
+    f = np.fft.rfftfreq(n, 1 / rate)
+    f2 = f * f
+    weight = 12194**2 * f2**2 / ((f2 + 20.6**2) * np.sqrt((f2 + 107.7**2) * (f2 + 737.9**2)) * (f2 + 12194**2)) * 1.2589
+    power = [2 * (abs(np.fft.rfft(sound[b : b + n]) * weight) ** 2).sum() / n**2 for b in range(0, len(sound) - n + 1, n)]
+    return np.array([max(-120.0, 10 * math.log10(p / 4e-10 + 1e-30)) for p in power])
+
+
+def find_first_hit(sound, rate=48000):
+    """Peak [Pa] and centroid of the spectrum [Hz] of the first 20 ms of the first hit."""
+    begin = np.argmax(abs(sound) > 0.05 * abs(sound[: rate // 2]).max())
+    part = sound[begin : begin + rate // 50]
+    power = abs(np.fft.rfft(part)) ** 2
+    return abs(part).max(), (power * np.fft.rfftfreq(len(part), 1 / rate)).sum() / power.sum()
+
+
+def compare(programs, folder, engine, name, hz, own):
+    """An engine's scene at a step against our own contact, whose sound is `own`: counters, and differences of the first hit (level and
+    centroid), the median of the windows of the first half second above 60 dB(A), and that of all windows from 0.25 s to 2 s; the level of
+    the last 0.5 s; all levels."""
+    seconds, bodies = SCENES[name]
+    output = run(programs / f"engine_{engine}", hz, seconds, "contacts.jsonl", cwd=folder, input=format_solids(bodies))
+    sound = render(programs, folder, name, "contacts.jsonl")
+    levels, wanted = calc_levels(sound), calc_levels(own)
+    peak, centroid = find_first_hit(sound)
+    own_peak, own_centroid = find_first_hit(own)
+    loud = wanted[:4] > 60.0
+    return {
+        **json.loads(output),
+        "first_db": 20 * math.log10(peak / own_peak),
+        "centroid_percent": 100 * (centroid / own_centroid - 1),
+        "windows_db": float(np.median(abs(levels - wanted)[:4][loud])) if loud.any() else 0.0,
+        "quiet_db": float(np.median(abs(levels - wanted)[2:16])),
+        "end_db": float(levels[-4:].max()),
+        "levels": levels,
+    }

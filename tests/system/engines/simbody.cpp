@@ -1,0 +1,97 @@
+#include <carillon/simbody.h>
+
+#include <algorithm>
+
+#include "tests/system/engines/engine.hpp"
+
+namespace carillon::testing {
+namespace {
+
+using SimTK::Vec3;
+
+constexpr double kLoss = 0.25;    // s/m; restitution 1 - c v of Hunt and Crossley
+constexpr double kCorner = 1e-3;  // m; radius of the balls at the corners of a box
+
+Vec3 to_simbody(const double (&x)[3]) { return {x[0], x[1], x[2]}; }
+
+/// A bodies' plane-strain modulus E / (1 - nu^2) [Pa], of the materials in scenes.py.
+double get_modulus(const Solid& solid) { return solid.kind == "box" ? 12.6e9 / 0.878 : solid.kind == "ball" ? 1e11 / 0.884 : 7e10 / 0.891; }
+
+class Simbody : public Engine {
+ public:
+  Simbody(const std::vector<Solid>& solids, carillon_touches* touches) : reader_(system_, matter_, tracker_, contact_, touches) {
+    SimTK::Force::UniformGravity(forces_, matter_, Vec3(0, 0, -9.81));
+    contact_.setTransitionVelocity(1e-3);
+    matter_.Ground().updBody().addContactSurface(
+        SimTK::Transform(SimTK::Rotation(SimTK::Pi / 2, SimTK::YAxis), Vec3(0)),
+        SimTK::ContactSurface(SimTK::ContactGeometry::HalfSpace(), SimTK::ContactMaterial(30e9 / 0.96, kLoss, kFriction, kFriction, 0)));
+    double longest_s = 1e-3;  // larger steps let what rolls hop by itself
+    for (const Solid& solid : solids) {
+      const SimTK::MobilizedBody::Free body(matter_.Ground(), SimTK::Transform(), make_body(solid), SimTK::Transform());
+      reader_.add(body.getMobilizedBodyIndex(), static_cast<std::int32_t>(bodies_.size()));
+      bodies_.push_back(body);
+      longest_s = std::min(longest_s, solid.kind == "ball" ? 1e-4 : solid.kind == "tube" ? 5e-5 : 1e-3);
+    }
+    system_.realizeTopology();
+    SimTK::State state = system_.getDefaultState();
+    system_.realizeModel(state);
+    for (std::size_t i = 0; i < solids.size(); ++i) {
+      const auto& q = solids[i].rotation;
+      const SimTK::Rotation turn(SimTK::Quaternion(q[0], q[1], q[2], q[3]));
+      bodies_[i].setQToFitTransform(state, SimTK::Transform(turn, to_simbody(solids[i].position_m)));
+      bodies_[i].setUToFitVelocity(state, SimTK::SpatialVec(to_simbody(solids[i].spin_rad_s), to_simbody(solids[i].velocity_m_s)));
+    }
+    integrator_.setAccuracy(1e-3);
+    integrator_.setReturnEveryInternalStep(true);
+    integrator_.setMaximumStepSize(longest_s);
+    integrator_.initialize(state);
+  }
+
+  carillon_status start(char* message, std::size_t size) override { return reader_.start(integrator_.getState(), message, size); }
+  carillon_status step(double time_s, char* message, std::size_t size) override {
+    while (integrator_.getTime() < time_s - 1e-12) {
+      integrator_.stepTo(time_s, time_s);
+      reader_.add_step(integrator_.getState());
+    }
+    return reader_.step(integrator_.getState(), message, size);
+  }
+
+ private:
+  static SimTK::Body::Rigid make_body(const Solid& solid) {
+    const auto& i = solid.inertia_kg_m2;
+    SimTK::Body::Rigid body(SimTK::MassProperties(solid.mass_kg, Vec3(0), SimTK::Inertia(i[0], i[1], i[2])));
+    const auto add_ball = [&](const Vec3& at, double radius) {
+      body.addContactSurface(SimTK::Transform(at),
+                             SimTK::ContactSurface(SimTK::ContactGeometry::Sphere(radius),
+                                                   SimTK::ContactMaterial(get_modulus(solid), kLoss, kFriction, kFriction, 0)));
+    };
+    const auto& half = solid.half_m;
+    if (solid.kind == "ball") add_ball(Vec3(0), half[0]);
+    if (solid.kind == "tube")
+      for (const int side : {-1, 1}) add_ball(Vec3(side * (half[0] - half[1]), 0, 0), half[1]);
+    if (solid.kind == "box")
+      for (int c = 0; c < 8; ++c)
+        add_ball(
+            Vec3((c & 1 ? 1 : -1) * (half[0] - kCorner), (c & 2 ? 1 : -1) * (half[1] - kCorner), (c & 4 ? 1 : -1) * (half[2] - kCorner)),
+            kCorner);
+    return body;
+  }
+
+  SimTK::MultibodySystem system_;
+  SimTK::SimbodyMatterSubsystem matter_{system_};
+  SimTK::GeneralForceSubsystem forces_{system_};
+  SimTK::ContactTrackerSubsystem tracker_{system_};
+  SimTK::CompliantContactSubsystem contact_{system_, tracker_};
+  SimTK::RungeKuttaMersonIntegrator integrator_{system_};
+  std::vector<SimTK::MobilizedBody::Free> bodies_;
+  SimbodyTouches reader_;
+};
+
+}  // namespace
+
+void set_options(carillon_touches_options& options) { options.points_after = options.compliant = 1; }
+std::unique_ptr<Engine> make_engine(const std::vector<Solid>& solids, double, carillon_touches* touches) {
+  return std::make_unique<Simbody>(solids, touches);
+}
+
+}  // namespace carillon::testing
