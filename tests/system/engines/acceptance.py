@@ -64,6 +64,8 @@ def main():
                 continue
             scenes.write_scene(folder / f"{scene}.json", *scenes.SCENES[scene])
             own = scenes.render(programs, folder, scene)
+            lost = scenes.count_lost(programs, folder, engine, scene, 240)
+            assert lost == 0, f"{scene}: {lost} events lost or late"
             for hz in STEPS:
                 found = scenes.compare(programs, folder, engine, scene, hz, own)
                 assert found["bad_points"] == 0 and found["points"] > 0, found
