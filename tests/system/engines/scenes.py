@@ -141,6 +141,13 @@ def find_first_hit(sound, rate=48000):
     return abs(part).max(), (power * np.fft.rfftfreq(len(part), 1 / rate)).sum() / power.sum()
 
 
+def count_lost(programs, folder, engine, name, hz):
+    """Events that were lost or late while an engine's scene played live, as far behind the physics as its mark says."""
+    seconds, bodies = SCENES[name]
+    output = run(programs / f"engine_{engine}", hz, seconds, "live.jsonl", "live.f32", cwd=folder, input=format_solids(bodies))
+    return json.loads(output)["lost"]
+
+
 def compare(programs, folder, engine, name, hz, own):
     """An engine's scene at a step against our own contact, whose sound is `own`: counters, and differences of the first hit (level and
     centroid), the median of the windows of the first half second above 60 dB(A), and that of all windows from 0.25 s to 2 s; the level of

@@ -42,16 +42,11 @@ class SimbodyTouches {
   /// After each internal step of the integrator (setReturnEveryInternalStep(true)): adds its impulses, by the mean of the forces at both
   /// ends.
   void add_step(const SimTK::State& state) {
-    const double half_s = 0.5 * (state.getTime() - last_s_);
-    if (!(half_s > 0)) return;
-    std::map<SimTK::ContactId, Force> forces = read_forces(state);
-    for (const auto* end : {&forces_, &forces})
-      for (const auto& [id, force] : *end) {
-        Force& sum = sums_.try_emplace(id, Force{force.point, SimTK::Vec3(0), SimTK::Vec3(0)}).first->second;
-        sum.point = force.point;
-        sum.normal_n += half_s * force.normal_n;
-        sum.friction_n += half_s * force.friction_n;
-      }
+    const double step_s = state.getTime() - last_s_;
+    if (!(step_s > 0)) return;
+    Forces forces = read_forces(state);
+    add(forces_, step_s / 2);
+    add(forces, step_s / 2);
     forces_ = std::move(forces);
     last_s_ = state.getTime();
   }
@@ -60,13 +55,25 @@ class SimbodyTouches {
   carillon_status step(const SimTK::State& state, char* message, std::size_t size) {
     read_poses(state);
     points_.clear();
-    for (auto& [id, sum] : sums_) {
+    for (const auto& [pair, sum] : sums_) {
       const double impulse = sum.normal_n.norm();
       if (!(impulse > 0)) continue;
-      copy(sum.normal_n / impulse, sum.point.normal);
-      copy(sum.friction_n, sum.point.friction_n_s);
-      sum.point.impulse_n_s = impulse;
-      points_.push_back(sum.point);
+      carillon_point point = carillon_point();
+      point.a = sum.a;
+      point.b = sum.b;
+      // Both bodies have moved on since they touched there.
+      const SimTK::Vec3 normal = sum.normal_n / impulse;
+      const SimTK::Vec3 on_a = locate(state, sum.a, sum.station_a_m / sum.weight_n),
+                        on_b = locate(state, sum.b, sum.station_b_m / sum.weight_n);
+      point.gap_m = sum.b < 0 ? 0.0 : SimTK::dot(on_a - on_b, normal);
+      copy(sum.b < 0 ? on_a : (on_a + on_b - point.gap_m * normal) / 2, point.point_m);
+      copy(normal, point.normal);
+      // Friction of what sticks changes its sign from step to step, so that its sum means nothing: it is found from the velocities, and
+      // is 0 where joints have changed those, too.
+      copy(SimTK::Vec3(is_jointed(sum.a) || is_jointed(sum.b) ? 0.0 : SimTK::NaN), point.friction_n_s);
+      point.impulse_n_s = impulse;
+      point.curvature_per_m = NAN;  // of the surfaces of the banks
+      points_.push_back(point);
     }
     sums_.clear();
     return carillon_touches_step(touches_, state.getTime(), poses_.data(), static_cast<std::int32_t>(poses_.size()), points_.data(),
@@ -79,11 +86,14 @@ class SimbodyTouches {
     SimTK::Rotation mesh;
     std::uint32_t flags;
   };
-  /// On body a of the point; in a sum the impulses.
+  /// On body a; stations are in the frames of the bodies. In a sum: impulses, and stations times impulses.
   struct Force {
-    carillon_point point;
-    SimTK::Vec3 normal_n, friction_n;
+    std::int32_t a = -1, b = -1;
+    SimTK::Vec3 normal_n{0.0}, station_a_m{0.0}, station_b_m{0.0};
+    double weight_n = 0.0;
   };
+  using Forces = std::map<std::pair<SimTK::ContactSurfaceIndex, SimTK::ContactSurfaceIndex>, Force>;
+
   static void copy(const SimTK::Vec3& from, double to[3]) {
     for (int k = 0; k < 3; ++k) to[k] = from[k];
   }
@@ -109,30 +119,49 @@ class SimbodyTouches {
       pose.flags = bodies_[i].flags;
     }
   }
-  std::map<SimTK::ContactId, Force> read_forces(const SimTK::State& state) const {
+  bool is_jointed(std::int32_t body) const { return body >= 0 && (bodies_[static_cast<std::size_t>(body)].flags & CARILLON_JOINTED) != 0u; }
+  void add(const Forces& forces, double weight_s) {
+    for (const auto& [pair, force] : forces) {
+      Force& sum = sums_[pair];
+      sum.a = force.a;
+      sum.b = force.b;
+      sum.normal_n += weight_s * force.normal_n;
+      sum.station_a_m += weight_s * force.weight_n * force.station_a_m;
+      sum.station_b_m += weight_s * force.weight_n * force.station_b_m;
+      sum.weight_n += weight_s * force.weight_n;
+    }
+  }
+  /// A station of a body in the world; without body it is there already.
+  SimTK::Vec3 locate(const SimTK::State& state, std::int32_t body, const SimTK::Vec3& station) const {
+    if (body < 0) return station;
+    return matter_.getMobilizedBody(bodies_[static_cast<std::size_t>(body)].index).findStationLocationInGround(state, station);
+  }
+  SimTK::Vec3 find_station(const SimTK::State& state, std::int32_t body, const SimTK::Vec3& point) const {
+    if (body < 0) return point;
+    return matter_.getMobilizedBody(bodies_[static_cast<std::size_t>(body)].index).findStationAtGroundPoint(state, point);
+  }
+  Forces read_forces(const SimTK::State& state) const {
     system_.realize(state, SimTK::Stage::Dynamics);
-    std::map<SimTK::ContactId, Force> forces;
+    Forces forces;
     const SimTK::ContactSnapshot& active = tracker_.getActiveContacts(state);
     for (int i = 0; i < contact_.getNumContactForces(state); ++i) {
       const SimTK::ContactForce& from = contact_.getContactForce(state, i);
       const SimTK::Contact& contact = active.getContactById(from.getContactId());
       const std::int32_t first = find(contact.getSurface1()), second = find(contact.getSurface2());
-      SimTK::Vec3 force = from.getForceOnSurface2()[1];
+      const SimTK::Vec3 force = (second < 0 ? -1.0 : 1.0) * from.getForceOnSurface2()[1];
       SimTK::ContactPatch patch;
       if (first == second || !(force.norm() > 0) || !contact_.calcContactPatchDetailsById(state, from.getContactId(), patch)) continue;
       SimTK::Vec3 normal(0);  // of a mesh the mean of its elements
       for (int k = 0; k < patch.getNumDetails(); ++k)
         normal += patch.getContactDetail(k).getForceOnSurface2().norm() * patch.getContactDetail(k).getContactNormal();
       normal = normal.norm() > 0 ? normal.normalize() : force.normalize();
-      Force to = {carillon_point(), normal, SimTK::Vec3(0)};
-      to.point.a = second < 0 ? first : second;
-      to.point.b = second < 0 ? -1 : first;
-      if (second < 0) force = -force;
+      Force& to = forces[{contact.getSurface1(), contact.getSurface2()}];
+      to.a = second < 0 ? first : second;
+      to.b = second < 0 ? -1 : first;
       to.normal_n = SimTK::dot(force, normal) * normal;
-      to.friction_n = force - to.normal_n;
-      copy(from.getContactPoint(), to.point.point_m);
-      to.point.curvature_per_m = NAN;  // of the surfaces of the banks
-      forces.emplace(from.getContactId(), to);
+      to.weight_n = to.normal_n.norm();
+      to.station_a_m = find_station(state, to.a, from.getContactPoint());
+      to.station_b_m = find_station(state, to.b, from.getContactPoint());
     }
     return forces;
   }
@@ -144,7 +173,7 @@ class SimbodyTouches {
   carillon_touches* touches_;
   std::vector<Body> bodies_;
   std::map<SimTK::MobilizedBodyIndex, std::int32_t> indices_;
-  std::map<SimTK::ContactId, Force> forces_, sums_;  // at the last internal step; impulses since the last step
+  Forces forces_, sums_;  // at the last internal step; impulses since the last step
   double last_s_ = 0.0;
   std::vector<carillon_pose> poses_;
   std::vector<carillon_point> points_;

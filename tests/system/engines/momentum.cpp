@@ -1,0 +1,121 @@
+// momentum_NAME: what an adapter hands over, held against mechanics: impulses are the change of momentum (along the
+// vertical, where friction is left to the tracker), points lie between the surfaces
+// of both bodies at the pose that they belong to. This program takes the place of the tracker.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <stdexcept>
+
+#include "tests/system/engines/engine.hpp"
+
+namespace {
+
+using carillon::testing::Solid;
+
+constexpr double kRadius = 0.03;
+
+struct Seen {
+  std::vector<carillon_pose> before, now;
+  std::vector<double> sums_n_s;  // x y z of each body
+  double off_m = 0.0;            // of points from the surfaces of balls
+  double normal = 0.0;           // largest deviation of a normal from a unit vector
+  bool points_after = false, has_friction = true;
+  long points = 0;
+};
+Seen seen;
+
+void take(const carillon_point& p) {
+  ++seen.points;
+  if (std::isnan(p.friction_n_s[0])) seen.has_friction = false;
+  const std::vector<carillon_pose>& poses = seen.points_after ? seen.now : seen.before;
+  double length2 = 0.0;
+  for (int k = 0; k < 3; ++k) {
+    const double push = p.impulse_n_s * p.normal[k] + (seen.has_friction ? p.friction_n_s[k] : 0.0);
+    length2 += p.normal[k] * p.normal[k];
+    seen.sums_n_s[static_cast<std::size_t>(3 * p.a + k)] += push;
+    if (p.b >= 0) seen.sums_n_s[static_cast<std::size_t>(3 * p.b + k)] -= push;
+  }
+  seen.normal = std::max(seen.normal, std::abs(std::sqrt(length2) - 1.0));
+  for (const int body : {p.a, p.b}) {
+    if (body < 0) continue;
+    double distance2 = 0.0;
+    for (int k = 0; k < 3; ++k) {
+      const double at = p.point_m[k] + (body == p.a ? p.gap_m * p.normal[k] : 0.0) - poses[static_cast<std::size_t>(body)].position_m[k];
+      distance2 += at * at;
+    }
+    seen.off_m = std::max(seen.off_m, std::abs(std::sqrt(distance2) - kRadius));
+  }
+}
+
+/// Balls that meet in flight, fall, slide and roll.
+std::vector<Solid> make_balls() {
+  std::vector<Solid> balls(2);
+  for (std::size_t i = 0; i < 2; ++i) {
+    Solid& ball = balls[i];
+    ball.name = i == 0 ? "a" : "b";
+    ball.kind = "ball";
+    ball.mass_kg = 0.5;
+    ball.rotation[0] = 1.0;
+    ball.position_m[0] = i == 0 ? -0.1 : 0.0;
+    ball.position_m[2] = 0.2;
+    ball.velocity_m_s[0] = i == 0 ? 1.0 : 0.0;
+    for (int k = 0; k < 3; ++k) {
+      ball.half_m[k] = kRadius;
+      ball.inertia_kg_m2[k] = 0.4 * ball.mass_kg * kRadius * kRadius;
+    }
+  }
+  return balls;
+}
+
+}  // namespace
+
+// In place of the library.
+extern "C" {
+carillon_status carillon_touches_start(carillon_touches*, double, const carillon_pose* poses, int32_t bodies, char*, size_t) {
+  seen.now.assign(poses, poses + bodies);
+  seen.sums_n_s.assign(static_cast<std::size_t>(3 * bodies), 0.0);
+  return CARILLON_OK;
+}
+carillon_status carillon_touches_step(carillon_touches*, double, const carillon_pose* poses, int32_t bodies, const carillon_point* points,
+                                      int32_t count, char*, size_t) {
+  seen.before = seen.now;
+  seen.now.assign(poses, poses + bodies);
+  for (int32_t i = 0; i < count; ++i) take(points[i]);
+  return CARILLON_OK;
+}
+}
+
+int main(int argc, char** argv) {
+  if (argc != 3) return std::fputs("usage: momentum_NAME LARGEST_SHARE LARGEST_OFFSET_M\n", stderr), 2;
+  try {
+    constexpr double kStep = 1.0 / 240.0;
+    const std::vector<Solid> balls = make_balls();
+    carillon_touches_options options;
+    carillon_touches_options_init(&options);
+    carillon::testing::set_options(options);
+    seen.points_after = options.points_after != 0;
+    const auto engine = carillon::testing::make_engine(balls, kStep, nullptr);
+    engine->start(nullptr, 0);
+    const std::vector<carillon_pose> begin = seen.now;
+    constexpr int kSteps = 240;
+    for (int n = 1; n <= kSteps; ++n) engine->step(n * kStep, nullptr, 0);
+    double worst = 0.0;
+    for (std::size_t i = 0; i < balls.size(); ++i) {
+      const double weight_n_s = balls[i].mass_kg * 9.81 * kSteps * kStep;
+      for (int k = 0; k < 3; ++k) {
+        const double gained = balls[i].mass_kg * (seen.now[i].velocity_m_s[k] - begin[i].velocity_m_s[k]);
+        const double given = seen.sums_n_s[3 * i + static_cast<std::size_t>(k)] - (k == 2 ? weight_n_s : 0.0);
+        std::printf("body %zu, axis %d: momentum %.6f N s, impulses %.6f N s\n", i, k, gained, given);
+        if (!seen.has_friction && k != 2) continue;
+        worst = std::max(worst, std::abs(gained - given) / weight_n_s);
+      }
+    }
+    std::printf("%ld points, impulses off by %.3g of the weight, points by %.3g m, normals by %.3g\n", seen.points, worst, seen.off_m,
+                seen.normal);
+    return seen.points > 10 && worst <= std::atof(argv[1]) && seen.off_m <= std::atof(argv[2]) && seen.normal < 1e-6 ? 0 : 1;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s: %s\n", argv[0], error.what());
+    return 1;
+  }
+}
