@@ -1,6 +1,6 @@
-// engine_NAME HZ SECONDS OUT.jsonl [LIVE.f32] < BODIES: the sound of a physics engine's scene. OUT: its contacts file; LIVE: what two ears
-// hear meanwhile, pairs of floats at 48 kHz [Pa]. A line of BODIES: name kind bank, then half extents, position, rotation (w x y z),
-// velocity and spin. Prints counters and costs as JSON.
+// engine_NAME HZ SECONDS OUT.jsonl [LIVE.f32 [MAX_IMPACTS]] < BODIES: the sound of a physics engine's scene. OUT: its contacts file; LIVE:
+// what two ears hear meanwhile, pairs of floats at 48 kHz [Pa]. A line of BODIES: name kind bank, then half extents, position, rotation (w
+// x y z), velocity and spin. Prints counters and costs as JSON.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -163,7 +163,7 @@ void play(carillon_synth* synth, double until_s, std::vector<float>& heard) {
   }
 }
 
-void run(double hz, double seconds, const char* contacts, const char* live) {
+void run(double hz, double seconds, const char* contacts, const char* live, const char* max_impacts) {
   std::vector<Solid> solids = read_solids(std::cin);
   std::map<std::string, OpenBank> banks;
   std::vector<events::RecordedBody> recorded;
@@ -173,6 +173,7 @@ void run(double hz, double seconds, const char* contacts, const char* live) {
   carillon_touches_options options;
   carillon_touches_options_init(&options);
   testing::set_options(options);
+  if (max_impacts != nullptr) options.max_impacts = std::atoi(max_impacts);
   options.sink = Recorder::take;
   options.user = &recorder;
   check(carillon_touches_create(synth, &options, &touches, message, sizeof message));
@@ -224,9 +225,9 @@ void run(double hz, double seconds, const char* contacts, const char* live) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc < 4) return std::fputs("usage: engine_NAME HZ SECONDS OUT.jsonl [LIVE.f32] < BODIES\n", stderr), 2;
+  if (argc < 4) return std::fputs("usage: engine_NAME HZ SECONDS OUT.jsonl [LIVE.f32 [MAX_IMPACTS]] < BODIES\n", stderr), 2;
   try {
-    run(std::atof(argv[1]), std::atof(argv[2]), argv[3], argc > 4 ? argv[4] : nullptr);
+    run(std::atof(argv[1]), std::atof(argv[2]), argv[3], argc > 4 ? argv[4] : nullptr, argc > 5 ? argv[5] : nullptr);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s: %s\n", argv[0], error.what());
     return 1;
