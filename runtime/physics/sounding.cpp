@@ -10,8 +10,7 @@ namespace {
 
 constexpr double kTimeToleranceS = 1e-8;  // s; shorter than any step, longer than the permitted remainder of a step
 
-void set_motion(const rigid::Solid& solid, const rigid::State& state, drive::Motion& motion) {
-  const rigid::Placed placed = rigid::place(solid, state);
+void set_motion(const rigid::Solid& solid, const rigid::State& state, const rigid::Placed& placed, drive::Motion& motion) {
   motion.centre_m = state.centre;
   motion.velocity_m_s = solid.fixed ? Vec3{} : state.velocity;
   motion.spin_rad_s = placed.spin;
@@ -62,7 +61,7 @@ Sounding::Sounding(const WorldSpec& spec, const rigid::Space& space, bool masks_
 void Sounding::copy_motion(int body) {
   if (body < 0 || copied_[body] == step_) return;
   copied_[body] = step_;
-  set_motion(space_.solid(body), space_.state(body), scene_.motions[body]);
+  set_motion(space_.solid(body), space_.state(body), space_.placed(body), scene_.motions[body]);
 }
 
 void Sounding::add(const rigid::Strike& strike, std::vector<events::Event>& events) {
@@ -75,8 +74,10 @@ void Sounding::add(const rigid::Strike& strike, std::vector<events::Event>& even
     copy_motion(hit.b);
   }
   // Before the impact, which may not have moved all of them.
-  for (std::size_t k = 0; k < strike.bodies.size(); ++k)
-    set_motion(space_.solid(strike.bodies[k]), strike.before[k], scene_.motions[strike.bodies[k]]);
+  for (int k = 0; const int body : strike.bodies) {
+    const rigid::State& before = strike.before[k++];
+    set_motion(space_.solid(body), before, rigid::place(space_.solid(body), before), scene_.motions[body]);
+  }
   scene_.time_s = strike.time_s;
   drive::add_pulses(scene_, given, lasting_, masks_ ? &*masks_ : nullptr, events);
 }

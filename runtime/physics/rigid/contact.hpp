@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "runtime/physics/geometry/touch.hpp"
@@ -74,6 +75,7 @@ struct Pair {
   double sag_m = 0.0;                  // depth left by an ended modal impact: permitted, decays
   Vec3 apart_m{};                      // displacement of a in touch searches if the penetration is large for the thickness
 
+  double take_stopped_j() { return std::exchange(stopped_j, 0.0); }
   bool touches() const {
     return std::any_of(contacts.begin(), contacts.end(), [](const Contact& c) { return c.touching; });
   }

@@ -94,7 +94,7 @@ Rest::Balance Rest::try_sleep(Island& island, double h, const std::vector<joints
     });
     return Balance::none;
   }
-  for (Pair* pair : island.pairs) ledger_.lose(std::exchange(pair->stopped_j, 0.0));
+  for (Pair* pair : island.pairs) ledger_.lose(pair->take_stopped_j());
   for (int n = 0; const Point& p : points) {
     Contact& c = rows[n++].get();
     c.impulse = p.impulse;

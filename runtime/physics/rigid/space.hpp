@@ -81,7 +81,7 @@ class Space {
   /// Velocity of a body at a point [m/s]; zero for the ground and fixed bodies.
   Vec3 calc_velocity(int body, const Vec3& where) const { return bodies_.calc_velocity(body, where); }
   geometry::Frame get_frame(int body) const { return bodies_.get_frame(body); }
-  const Vec3& get_spin(int body) const { return bodies_.placed(body).spin; }
+  const Placed& placed(int body) const { return bodies_.placed(body); }
   /// Contacts of bodies that are awake.
   void list_contacts(std::vector<const Contact*>& out) const;
   /// Pairs of bodies near in this window, and of static or sleeping ones that touch. b: -1 for the ground, or greater than a.

@@ -178,7 +178,7 @@ bool StepProblem::solve_rest(Step& step, double h, const std::vector<joints::Spa
 
 void StepProblem::keep_impulses(const Step& step, double at_s) const {
   const double h = step.length_s;
-  for (Pair* pair : step.island().pairs) ledger_.lose(std::exchange(pair->stopped_j, 0.0));
+  for (Pair* pair : step.island().pairs) ledger_.lose(pair->take_stopped_j());
   for (int n = 0; const Point& p : step.points) {
     const ContactRef& row = step.rows[n++];
     Contact& c = row.get();

@@ -67,17 +67,14 @@ void TouchSets::forget_far(std::int64_t window) {
   for (auto at = pairs_.begin(); at != pairs_.end();) {
     Pair& pair = at->second;
     const bool is_far = pair.window != window && (bodies_.moves(pair.a) || bodies_.moves(pair.b));
-    if (is_far) {
-      lose_stored(pair);
-      ledger_.lose(pair.stopped_j);
-    }
+    if (is_far) lose_all(pair);
     at = is_far ? pairs_.erase(at) : std::next(at);
   }
 }
 
 void TouchSets::forget(int body) {
   for (auto& [key, pair] : pairs_)
-    if (key.first == body || key.second == body) lose_stored(pair);
+    if (key.first == body || key.second == body) lose_all(pair);
   std::erase_if(pairs_, [&](const auto& entry) { return entry.first.first == body || entry.first.second == body; });
 }
 
@@ -376,6 +373,12 @@ void TouchSets::limit_apart(Pair& pair) const {
 void TouchSets::lose_stored(Pair& pair) const {
   ledger_.lose(pair.stored_j);
   pair.stored_j = 0.0;
+}
+
+/// Before the pair is removed.
+void TouchSets::lose_all(Pair& pair) const {
+  lose_stored(pair);
+  ledger_.lose(pair.take_stopped_j());
 }
 
 void TouchSets::add_to(Books& books) const {

@@ -72,6 +72,7 @@ class TouchSets {
   bool follow(const Pair& pair, geometry::Touch& touch, const geometry::Frame& a, const geometry::Frame& b) const;
   double calc_way(const Pair& pair, double time_s, double step_s) const;
   void lose_stored(Pair& pair) const;
+  void lose_all(Pair& pair) const;
   void limit_apart(Pair& pair) const;
   std::pair<Contact*, double> find_least(Pair& pair, const geometry::Frame& a, const geometry::Frame& b) const;
   bool complete(Pair& pair, const geometry::Frame& a, const geometry::Frame& b, double closing_s);

@@ -104,7 +104,7 @@ TEST(joints, ball_against_hinged_bar) {
     const double inertia = bar * (l * l + sides[0] * sides[0]) / 12.0 + bar * 0.25 * l * l, m = inertia / (d * d);
     EXPECT_NEAR(space.state(1).velocity[0], -v * (ball - m) / (ball + m), 2e-3 * v) << d;
     const double spin = 2.0 * ball * v / (ball + m) / d;  // of the bar
-    EXPECT_NEAR(norm(space.get_spin(0)), spin, 2e-3 * spin) << d;
+    EXPECT_NEAR(norm(space.placed(0).spin), spin, 2e-3 * spin) << d;
     EXPECT_NEAR(space.calc_books().calc_total(), 0.5 * ball * v * v, 1e-9);
   }
 }
@@ -137,7 +137,7 @@ TEST(joints, sleep_and_wake_of_pendulum) {
   EXPECT_TRUE(space.is_still(0));
   run(space, 0.55);
   EXPECT_FALSE(space.is_still(0));
-  EXPECT_GT(norm(space.get_spin(0)), 0.5);
+  EXPECT_GT(norm(space.placed(0).spin), 0.5);
 }
 
 TEST(joints, sleep_of_hanging_chain) {
@@ -237,7 +237,7 @@ TEST(joints, friction_loss_on_floor) {
   run(space, t);
   // The ball is kept from rolling by its hinge: it slides. I w' = -mu N R with N the weight of both.
   const double inertia = mass * arm * arm + 0.4 * mass * 0.02 * 0.02, slope = mu * (mass + 1e-3) * kG * arm / inertia;
-  EXPECT_NEAR(space.get_spin(0)[2], w - slope * t, 0.01 * w);
+  EXPECT_NEAR(space.placed(0).spin[2], w - slope * t, 0.01 * w);
   EXPECT_NEAR(space.calc_books().calc_total(), before, 0.01 * space.calc_books().lost_j);
 }
 
