@@ -49,6 +49,12 @@ std::vector<double> calc_shapes(const Bank& bank, std::int32_t triangle, const V
   return shapes;
 }
 
+Vec3 calc_point(const Bank& bank, std::int32_t triangle, const Vec3& barycentric) {
+  Vec3 point{};
+  for (std::size_t c = 0; c < 3; ++c) point = point + barycentric[c] * bank.vertices_m[bank.triangles[triangle][c]];
+  return point;
+}
+
 double calc_shape_scale(double largest) {
   // A subnormal step would violate the error bound; physical shapes are far larger.
   return largest > 0.0 ? std::max(largest / 32767.0, std::numeric_limits<double>::min()) : 0.0;

@@ -192,6 +192,9 @@ struct Bank {
 /// Shapes of all modes at a point of a triangle, (m, 3) [kg^-1/2]: linear interpolation.
 std::vector<double> calc_shapes(const Bank& bank, std::int32_t triangle, const Vec3& barycentric);
 
+/// Point of a triangle [m], mesh axes. The triangle must exist.
+Vec3 calc_point(const Bank& bank, std::int32_t triangle, const Vec3& barycentric);
+
 /// Integer step of a mode with largest absolute component `largest`: largest / 32767, 0 for a mode at rest.
 double calc_shape_scale(double largest);
 

@@ -50,6 +50,9 @@ inline std::array<Vec3, 2> find_tangents(const Vec3& n) {
   return {first, cross(n, first)};
 }
 
+inline bool is_finite(const Vec3& a) { return std::isfinite(a[0]) && std::isfinite(a[1]) && std::isfinite(a[2]); }
+/// From its rows, one after another.
+inline Mat3 make_matrix(const std::array<double, 9>& m) { return {Vec3{m[0], m[1], m[2]}, Vec3{m[3], m[4], m[5]}, Vec3{m[6], m[7], m[8]}}; }
 inline Vec3 operator*(const Mat3& m, const Vec3& a) { return {dot(m[0], a), dot(m[1], a), dot(m[2], a)}; }
 /// M^T a.
 inline Vec3 turn_back(const Mat3& m, const Vec3& a) { return a[0] * m[0] + a[1] * m[1] + a[2] * m[2]; }

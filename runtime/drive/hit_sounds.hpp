@@ -20,14 +20,14 @@ class HitSounds {
            std::vector<events::Event>& events);
 
  private:
-  /// A hit with what its pulse needs.
+  /// A hit and the properties of its pulse.
   struct Contact {
     const FinishedHit& hit;
     double mass_kg = 0.0, speed_m_s = 0.0, restitution = 0.0, radius_m = 0.0, compliance = 0.0;
     std::array<geometry::Place, 2> places{};
     std::array<std::vector<double>, 2> shapes{};  // (n, 3) at the places; empty: no modes
 
-    /// What the motion loses [J]; modes of an elastic hit still get 1 % of the blow.
+    /// Kinetic energy lost [J], at least 1 % of the blow.
     double calc_lost_j() const;
   };
 

@@ -15,7 +15,7 @@
 
 namespace carillon::drive {
 
-/// What a Touches knows of a body beyond its Matter.
+/// A body of a Touches: its description, surface and modes.
 struct TouchBody {
   TouchesBody given;
   bool is_used = false;                          // false: removed

@@ -1,4 +1,4 @@
-// Positions of contact, tracked from step to step: when a hit begins and ends, and what is load. Internal to this folder.
+// Positions of contact, tracked from step to step: beginnings and ends of hits, and loads. Internal to this folder.
 #pragma once
 
 #include <array>

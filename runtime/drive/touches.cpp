@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "runtime/base/error.hpp"
+#include "runtime/base/quaternion.hpp"
 #include "runtime/drive/hit_sounds.hpp"
 #include "runtime/drive/lasting.hpp"
 #include "runtime/drive/mode_sets.hpp"
@@ -27,24 +28,17 @@ constexpr std::size_t kMaxWaiting = 1'000'000;  // events
 constexpr double kMost = 1e9;  // of any unit; squares stay finite
 
 bool is_sane(double x) { return std::abs(x) <= kMost; }
-bool is_finite(const Vec3& x) { return is_sane(x[0]) && is_sane(x[1]) && is_sane(x[2]); }
+bool is_sane(const Vec3& x) { return is_sane(x[0]) && is_sane(x[1]) && is_sane(x[2]); }
 bool is_nan(const Vec3& x) { return std::isnan(x[0]) || std::isnan(x[1]) || std::isnan(x[2]); }
 void require(bool holds, const std::string& fault) {
   if (!holds) throw InputError(fault);
 }
 bool is_positive(double x) { return x > 0.0 && std::isfinite(x); }
 
-Mat3 make_turn_matrix(const events::Quaternion& q) {
-  const double s = 2.0 / (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]), w = q[0], x = q[1], y = q[2], z = q[3];
-  return {Vec3{1 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)},
-          Vec3{s * (x * y + w * z), 1 - s * (x * x + z * z), s * (y * z - w * x)},
-          Vec3{s * (x * z - w * y), s * (y * z + w * x), 1 - s * (x * x + y * y)}};
-}
-
 void check_options(const TouchesOptions& o) {
   require(o.max_points >= 1 && o.max_points <= 1 << 24, "max_points: give 1 to 16,777,216");
   require(o.max_impacts >= 0, "max_impacts: give 0 or more");
-  require(is_finite(o.gravity_m_s2), "gravity_m_s2 is not finite");
+  require(is_sane(o.gravity_m_s2), "gravity_m_s2 is not finite");
   require(o.slowest_m_s >= 0.0 && std::isfinite(o.slowest_m_s), "slowest_m_s: give 0 or more");
   require(is_positive(o.longest_hit_s), "longest_hit_s: give more than 0");
   require(is_positive(o.ground_young_pa) && is_positive(o.ground_density_kg_m3) && o.ground_poisson > -1.0 && o.ground_poisson < 0.5,
@@ -77,8 +71,6 @@ TouchesBody complete(TouchesBody body, const geometry::Shape* shape) {
   return body;
 }
 
-Mat3 to_rows(const std::array<double, 9>& m) { return {Vec3{m[0], m[1], m[2]}, Vec3{m[3], m[4], m[5]}, Vec3{m[6], m[7], m[8]}}; }
-
 void check_body(const TouchesBody& b) {
   require(b.body >= -1, "body: give its number in the synthesiser, or -1 for a silent body");
   require(b.bank != nullptr || b.body < 0, "a body that sounds needs a bank");
@@ -89,8 +81,8 @@ void check_body(const TouchesBody& b) {
   require(b.friction >= 0.0 && std::isfinite(b.friction), "friction: give 0 or more");
   if (b.fixed) return;
   require(is_positive(b.mass_kg), "a body that moves needs a mass above 0, of its own or of its bank");
-  const Mat3 inertia = to_rows(b.inertia_kg_m2);
-  const bool is_set = is_finite(inertia[0]) && is_finite(inertia[1]) && is_finite(inertia[2]);
+  const Mat3 inertia = make_matrix(b.inertia_kg_m2);
+  const bool is_set = is_sane(inertia[0]) && is_sane(inertia[1]) && is_sane(inertia[2]);
   require(is_set && inertia[0][0] > 0.0 && calc_det(inertia[0], inertia[1], inertia[2]) > 0.0,
           "a body that moves needs a positive definite inertia, of its own or of its bank");
 }
@@ -98,7 +90,7 @@ void check_body(const TouchesBody& b) {
 void check_pose(const TouchesPose& pose, std::size_t index) {
   const auto& q = pose.rotation;
   const double size = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
-  if (!is_finite(pose.position_m) || !is_finite(pose.velocity_m_s) || !is_finite(pose.spin_rad_s) || !std::isfinite(size))
+  if (!is_sane(pose.position_m) || !is_sane(pose.velocity_m_s) || !is_sane(pose.spin_rad_s) || !std::isfinite(size))
     throw InputError("the pose of body " + std::to_string(index) + " has a number that is not finite, or above 1e9");
   if (std::abs(std::sqrt(size) - 1.0) > kUnitTolerance)
     throw InputError("the rotation of body " + std::to_string(index) + " is no unit quaternion");
@@ -174,7 +166,7 @@ int Touches::Course::add(const TouchesBody& given) {
   check_body(body.given);
   body.is_used = true;
   if (!given.fixed) {
-    body.inertia = to_rows(body.given.inertia_kg_m2);
+    body.inertia = make_matrix(body.given.inertia_kg_m2);
     body.inverse_inertia = calc_inverse(body.inertia);
   }
   const auto free = std::find_if(bodies_.begin(), bodies_.end(), [](const TouchBody& b) { return !b.is_used; });
@@ -248,7 +240,7 @@ void Touches::Course::take_poses(std::span<const TouchesPose> poses) {
     now.centre_m = pose.position_m;
     now.velocity_m_s = pose.velocity_m_s;
     now.spin_rad_s = pose.spin_rad_s;
-    now.rotation = make_turn_matrix(pose.rotation);
+    now.rotation = make_rotation(normalise(pose.rotation));
     now.inverse_inertia = now.rotation * (body.inverse_inertia * transpose(now.rotation));
     now.is_still = pose.asleep || (body.given.fixed && !has_moved && pose.velocity_m_s == Vec3{} && pose.spin_rad_s == Vec3{});
     body.pose = pose;
@@ -319,11 +311,11 @@ void Touches::Course::take_points(const StepView& view, std::span<const TouchPoi
 bool Touches::Course::take_point(const StepView& view, const TouchPoint& given) {
   const auto is_body = [&](int body) { return body >= 0 && body < count() && bodies_[body].is_used; };
   if (!is_body(given.a) || (given.b != -1 && !is_body(given.b)) || given.a == given.b) return false;
-  if (!is_finite(given.point_m) || !is_finite(given.normal) || !is_sane(given.gap_m) || given.impulse_n_s > kMost ||
+  if (!is_sane(given.point_m) || !is_sane(given.normal) || !is_sane(given.gap_m) || given.impulse_n_s > kMost ||
       given.curvature_per_m > kMost)
     return false;
   const double length = norm(given.normal);
-  if (std::abs(length - 1.0) > kNormalTolerance || (!is_nan(given.friction_n_s) && !is_finite(given.friction_n_s))) return false;
+  if (std::abs(length - 1.0) > kNormalTolerance || (!is_nan(given.friction_n_s) && !is_sane(given.friction_n_s))) return false;
   if (!view.moves(given.a) && !view.moves(given.b)) return true;
   for (const int body : {given.a, given.b})
     if (body >= 0 && (bodies_[body].is_new || bodies_[body].pose.teleported)) return true;

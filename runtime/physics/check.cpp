@@ -18,8 +18,6 @@ namespace {
 
 constexpr double kMaxHingeRad = kWidestHingeDeg * std::numbers::pi / 180.0 * (1.0 + 1e-12);  // rad; tolerance for rounding of degrees
 
-bool is_finite(const Vec3& x) { return std::isfinite(x[0]) && std::isfinite(x[1]) && std::isfinite(x[2]); }
-
 bool is_zero(const Vec3& x) { return x[0] == 0.0 && x[1] == 0.0 && x[2] == 0.0; }
 
 void check_contact_numbers(const std::string& who, double restitution, double friction, double young, double poisson) {

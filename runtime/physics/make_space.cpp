@@ -18,8 +18,6 @@
 namespace carillon::physics {
 namespace {
 
-Mat3 to_matrix(const std::array<double, 9>& m) { return {Vec3{m[0], m[1], m[2]}, Vec3{m[3], m[4], m[5]}, Vec3{m[6], m[7], m[8]}}; }
-
 /// Bodies of one bank share their shape.
 using Shapes = std::map<const bank::Bank*, std::shared_ptr<const geometry::Shape>>;
 
@@ -38,7 +36,7 @@ rigid::Solid make_solid(const BodySpec& b, Shapes& shapes) {
   solid.mass_kg = b.bank->rigid.mass_kg;
   solid.centre_m = b.bank->rigid.centre_m;
   if (!b.fixed) {
-    solid.inertia_kg_m2 = to_matrix(b.bank->rigid.inertia_kg_m2);
+    solid.inertia_kg_m2 = make_matrix(b.bank->rigid.inertia_kg_m2);
     solid.inverse_inertia = calc_inverse(solid.inertia_kg_m2);
   }
   for (const Vec3& v : b.bank->vertices_m) solid.radius_m = std::max(solid.radius_m, calc_length(v - solid.centre_m));

@@ -28,8 +28,7 @@ constexpr double kMaxGrabWeights = 30.0;   // largest force of a grab by default
 constexpr double kStandardGravity = 9.81;  // m/s^2
 
 void check_vector(const char* what, const Vec3& x) {
-  for (const double value : x)
-    if (!std::isfinite(value)) throw InputError(fmt::format("{} must be three finite numbers", what));
+  if (!is_finite(x)) throw InputError(fmt::format("{} must be three finite numbers", what));
 }
 
 }  // namespace

@@ -54,21 +54,13 @@ class Filler {
 /// Mass of a body as a blow at a point feels it [kg]; 0: it cannot move.
 double calc_effective_mass(const bank::Bank& bank, bool is_fixed, const Vec3& point_m, const Vec3& along) {
   if (is_fixed || !synth::moves_freely(bank)) return 0.0;
-  const auto& i = bank.rigid.inertia_kg_m2;
-  const Mat3 inertia{Vec3{i[0], i[1], i[2]}, Vec3{i[3], i[4], i[5]}, Vec3{i[6], i[7], i[8]}};
+  const Mat3 inertia = make_matrix(bank.rigid.inertia_kg_m2);
   double mobility = 1.0 / bank.rigid.mass_kg;
   if (calc_det(inertia[0], inertia[1], inertia[2]) > 0.0) {
     const Vec3 arm = cross(point_m - bank.rigid.centre_m, along);
     mobility += dot(arm, calc_inverse(inertia) * arm);
   }
   return 1.0 / mobility;
-}
-
-Vec3 find_point(const bank::Bank& bank, std::int32_t triangle, const Vec3& barycentric) {
-  Vec3 point{};
-  if (triangle < 0 || triangle >= std::ssize(bank.triangles)) return point;
-  for (std::size_t c = 0; c < 3; ++c) point = point + barycentric[c] * bank.vertices_m[bank.triangles[triangle][c]];
-  return point;
 }
 
 /// A blow; a pulse given in pieces is one.
@@ -157,7 +149,8 @@ LabelTable list_hits(const std::vector<Hit>& hits, const scene::Scene& scene, co
   for (const Hit& at : hits) {
     const bank::Bank& bank = *banks[at.blow.body];
     const double size = norm(at.blow.impulse_n_s);
-    const Vec3 point = find_point(bank, at.blow.triangle, at.blow.barycentric);
+    const bool is_on_surface = at.blow.triangle >= 0 && at.blow.triangle < std::ssize(bank.triangles);
+    const Vec3 point = is_on_surface ? bank::calc_point(bank, at.blow.triangle, at.blow.barycentric) : Vec3{};
     const bool is_fixed = scene.bodies[at.blow.body].spec.fixed;
     put(hit, at, point, size > 0.0 ? calc_effective_mass(bank, is_fixed, point, (1.0 / size) * at.blow.impulse_n_s) : 0.0,
         scene.sample_rate_hz);

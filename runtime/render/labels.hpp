@@ -1,4 +1,4 @@
-// Labels of a rendered scene, for learning: what touched what, when, how strongly; poses and modal energies.
+// Labels of a rendered scene, for learning: hits, contacts, poses and modal energies.
 #pragma once
 
 #include <cstdint>

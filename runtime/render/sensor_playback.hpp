@@ -21,7 +21,7 @@ class SensorPlayback {
   SensorPlayback(const scene::Scene& scene, const std::vector<const bank::Bank*>& banks, synth::Synthesiser& synthesiser,
                  std::uint64_t frames, sound::SoundStore& store);
 
-  /// Takes what the synthesiser has made; call it at least every half second of sound.
+  /// Appends the new samples of the sensors; call it at least every half second of sound.
   void take();
   /// True when all frames are in the store.
   bool is_complete() const { return store_->get_frames() >= frames_; }

@@ -8,6 +8,7 @@
 #include <variant>
 
 #include "runtime/base/clock.hpp"
+#include "runtime/base/document.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/events/events.hpp"
 #include "runtime/scene/events.hpp"
@@ -25,6 +26,13 @@ constexpr int kMaxStrikes = 1024, kMaxForces = 2048;  // per body, waiting or ac
 constexpr int kMaxWaypoints = 1024, kRingEvents = 1 << 14;
 
 }  // namespace
+
+int find_body(const std::vector<std::string>& names, const std::string& name) {
+  const auto at = std::find(names.begin(), names.end(), name);
+  if (at != names.end()) return static_cast<int>(at - names.begin());
+  const std::string nearest = base::find_nearest(name, names);
+  throw InputError(fmt::format("no body is called \"{}\"{}", name, nearest.empty() ? "" : fmt::format("; did you mean \"{}\"?", nearest)));
+}
 
 /// Physics of a scene, advanced in slices ahead of the sound. Its events go to the scheduler in order of time.
 class Stage::Physics {

@@ -17,6 +17,9 @@
 
 namespace carillon::render {
 
+/// Index of a name of a body. Throws InputError with the nearest one for an unknown name.
+int find_body(const std::vector<std::string>& names, const std::string& name);
+
 struct StageOptions {
   double look_ahead_s = 0.1;  // lead of the physics over the sound, > 0
   double gain_per_pa = 1.0;   // of the synthesiser's output

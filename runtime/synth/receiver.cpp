@@ -185,7 +185,7 @@ void Receiver::find_path_states(const Source& source, const Trajectory& listener
   sub_block_ = sub_block;
   // If nothing moves after the emission, the path is constant to the end.
   const double arrival_s = static_cast<double>(sub_block * kSubBlock - latency_) / rate_hz_;
-  // For the travel time after a jump the path to the old place is no longer that of what rests.
+  // After a jump the path to the old place still changes for its travel time.
   constexpr double kLongestTravelS = 300.0;  // of 100 km
   const bool has_jumped = source.track->is_cut(arrival_s - kLongestTravelS, arrival_s);
   const bool rests = !has_jumped && from_.delay_slope == 0.0 && from_.spreading_slope == 0.0 &&

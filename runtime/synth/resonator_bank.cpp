@@ -177,7 +177,7 @@ void ResonatorBank::add_directed(const SubBlock& now, int traced) noexcept {
   if (fades_) directed_->add_fade(now.index, offset);
 }
 
-/// Adds the responses to forces of a sub-block, damped modes and the forces themselves to the sensors. What fades out is not read.
+/// Adds the responses to forces of a sub-block, damped modes and the forces themselves to the sensors. Modes that fade out are not read.
 void ResonatorBank::add_sensed(const SubBlock& now, int traced) noexcept {
   const int offset = static_cast<int>(now.out - block_.data());
   const SampleStates* kept = directed_ != nullptr ? directed_->get_kept().data() : sensors_->get_kept();

@@ -1,8 +1,7 @@
-// Method:     as directivity has it, a reading is one complex weight per ringing mode: with z = (q' + d q) + i omega_d q, -omega^2 q - 2 d
-// q'
-//             = Re(w z) for w = -2 d + i (omega^2 - 2 d^2) / omega_d, q' for w = 1 + i d / omega_d, q for w = -i / omega_d. What a force
-//             adds at once, phi_i(p) phi_i(s) summed over modes, and the rigid body are a field over the vertices that a force can act on.
-// Source:     rigid-body dynamics; strain of linear triangles: the gradient of the barycentric coordinates.
+// Method: a reading is one complex weight per ringing mode: with z = (q' + d q) + i omega_d q, Re(w z) is
+//   -omega^2 q - 2 d q' for w = -2 d + i (omega^2 - 2 d^2) / omega_d, q' for w = 1 + i d / omega_d, q for w = -i / omega_d.
+// The immediate response to a force, phi_i(p) phi_i(s) summed over modes, and the rigid body are a field over the vertices.
+// Source: rigid-body dynamics; strain of linear triangles: the gradient of the barycentric coordinates.
 #include "runtime/synth/sensor.hpp"
 
 #include <algorithm>
@@ -35,8 +34,7 @@ class RigidAnswer {
  public:
   RigidAnswer(const bank::RigidBody& body, const Vec3& point_m, const Vec3& along)
       : centre_m_(body.centre_m), along_((1.0 / body.mass_kg) * along) {
-    const auto& i = body.inertia_kg_m2;
-    const Mat3 inertia{Vec3{i[0], i[1], i[2]}, Vec3{i[3], i[4], i[5]}, Vec3{i[6], i[7], i[8]}};
+    const Mat3 inertia = make_matrix(body.inertia_kg_m2);
     if (calc_det(inertia[0], inertia[1], inertia[2]) > 0.0) spin_ = calc_inverse(inertia) * cross(point_m - centre_m_, along);
   }
   Vec3 at(const Vec3& vertex_m) const { return along_ + cross(spin_, vertex_m - centre_m_); }
@@ -90,12 +88,6 @@ std::vector<std::pair<std::size_t, double>> find_gauge(const bank::Bank& bank, c
   return weights;
 }
 
-Vec3 find_point(const bank::Bank& bank, const SensorSettings& settings) {
-  Vec3 point{};
-  for (std::size_t c = 0; c < 3; ++c) point = point + settings.barycentric[c] * bank.vertices_m[bank.triangles[settings.triangle][c]];
-  return point;
-}
-
 }  // namespace
 
 bool moves_freely(const bank::Bank& bank) {
@@ -118,7 +110,6 @@ Sensor::Sensor(const std::shared_ptr<const Model>& model, const bank::Bank& bank
 }
 
 void Sensor::check(const bank::Bank& bank, const SensorSettings& settings) const {
-  const auto is_finite = [](const Vec3& v) { return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]); };
   if (settings.triangle < 0 || settings.triangle >= std::ssize(bank.triangles) || !model_->has_triangle(settings.triangle))
     throw InputError("sensor: there is no triangle " + std::to_string(settings.triangle));
   if (!is_finite(settings.barycentric)) throw InputError("sensor: its barycentric coordinates are not finite");
@@ -181,7 +172,7 @@ void Sensor::add_modes(const Weights& weights) {
 }
 
 void Sensor::add_rigid(const bank::Bank& bank, const SensorSettings& settings) {
-  const RigidAnswer answer(bank.rigid, find_point(bank, settings), calc_unit(settings.direction));
+  const RigidAnswer answer(bank.rigid, bank::calc_point(bank, settings.triangle, settings.barycentric), calc_unit(settings.direction));
   std::vector<double>& field = quantity_ == Quantity::kAcceleration ? direct_ : rigid_;
   field.resize(3 * bank.vertices_m.size(), 0.0);
   for (std::size_t v = 0; v < bank.vertices_m.size(); ++v) {

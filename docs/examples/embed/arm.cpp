@@ -1,7 +1,7 @@
 // An arm of two links that swings by motors and lets go of a box, by Simbody: carillon/simbody.h reads the contacts of the program's own
 // system.
 //
-//   simbody_arm BOX OUT.f32    BOX: bank of a box; what two ears hear, as pairs of floats at 48 kHz [Pa]. Prints how it falls.
+//   simbody_arm BOX OUT.f32    BOX: bank of a box; OUT: pressure at two ears [Pa], pairs of floats at 48 kHz. Prints the fall.
 #include <carillon/simbody.h>
 
 #include <algorithm>

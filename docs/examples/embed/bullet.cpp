@@ -1,6 +1,6 @@
 // A body falls, slides and rolls by Bullet, and sounds while it does: carillon/bullet.h reads its contacts.
 //
-//   bullet_drop BANK OUT.f32    what two ears hear, as pairs of floats at 48 kHz [Pa]
+//   bullet_drop BANK OUT.f32    OUT: pressure at two ears [Pa], pairs of floats at 48 kHz
 #include <carillon/bullet.h>
 
 #include <memory>

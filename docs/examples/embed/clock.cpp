@@ -1,7 +1,7 @@
 // A clock that strikes, by Simbody: two pendulums with brass bobs side by side; one falls against the other. carillon/simbody.h reads the
 // contacts of the program's own system.
 //
-//   simbody_clock BOB OUT.f32    BOB: bank of a ball; what two ears hear, as pairs of floats at 48 kHz [Pa]. Prints the strikes.
+//   simbody_clock BOB OUT.f32    BOB: bank of a ball; OUT: pressure at two ears [Pa], pairs of floats at 48 kHz. Prints the strikes.
 #include <carillon/simbody.h>
 
 #include <algorithm>

@@ -1,7 +1,7 @@
 // Any MuJoCo model, whose bodies sound: carillon/mujoco.h reads its contacts.
 //
-//   mujoco_play MODEL.xml OUT.f32 BODY=BANK...    bodies of these names sound as their banks, whose mass and inertia they get; OUT: what
-//   two ears hear, as pairs of floats at 48 kHz [Pa]
+//   mujoco_play MODEL.xml OUT.f32 BODY=BANK...    bodies of these names sound as their banks, and get their mass and inertia; OUT: pressure
+//   at two ears [Pa], pairs of floats at 48 kHz
 #include <carillon/mujoco.h>
 
 #include <algorithm>
@@ -48,7 +48,7 @@ int main(int argc, char** argv) {
     set_mass(model, body, sound.get_bank(index));
     mujoco.add(body, index);
   }
-  mj_setConst(model, data);  // what follows from the masses
+  mj_setConst(model, data);  // quantities derived from the masses
 
   Message message;
   message.check(mujoco.start(message.text(), message.size()));

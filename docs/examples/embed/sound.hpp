@@ -1,4 +1,4 @@
-// What the examples with physics engines share: bodies that sound, their contact tracker, and what two ears hear. C++14.
+// Synthesiser, contact tracker and output of the examples with physics engines. C++14.
 #pragma once
 
 #include <carillon.h>
@@ -80,7 +80,7 @@ class Sound {
       for (int n = 0; n < 128; ++n) heard_.insert(heard_.end(), {left[n], right[n]});
     }
   }
-  /// Writes pairs of floats at 48 kHz [Pa], and prints what was counted.
+  /// Writes pairs of floats at 48 kHz [Pa], and prints the counters.
   void finish(const char* file) {
     std::ofstream out(file, std::ios::binary);
     out.write(reinterpret_cast<const char*>(heard_.data()), static_cast<std::streamsize>(heard_.size() * sizeof(float)));

@@ -455,7 +455,7 @@ CARILLON_API double carillon_sensor_begin_s(const carillon_synth* synth, int32_t
 /* [any] Samples lost because the buffer was full. */
 CARILLON_API int64_t carillon_sensor_lost(const carillon_synth* synth, int32_t number);
 
-/* ---- Touches: what a physics engine computes in a step, turned into impulses, forces, contacts, motions and marks
+/* ---- Touches: steps of a physics engine to impulses, forces, contacts, motions and marks
  * (docs/howto/my-engine.md). [main] all of it: one thread at a time per carillon_touches; it allocates. Its events go to the synthesiser
  * as by carillon_push_*. Vectors are in world axes. */
 typedef struct carillon_touches carillon_touches;

@@ -145,16 +145,10 @@ class Scenery {
   void act(const std::string& name, Act&& act) {
     const py::gil_scoped_release others_run;  // a running advance() needs the GIL to end
     const std::lock_guard one_at_a_time(calls_);
-    const std::vector<std::string> names = list_names();
-    const auto at = std::find(names.begin(), names.end(), name);
-    if (at == names.end()) {
-      const std::string nearest = base::find_nearest(name, names);
-      throw InputError(
-          fmt::format("no body is called \"{}\"{}", name, nearest.empty() ? "" : fmt::format("; did you mean \"{}\"?", nearest)));
-    }
+    const int body = render::find_body(list_names(), name);
     physics::World* const world = stage_->get_world();
     if (world == nullptr) throw InputError("no body of the scene can move");
-    act(*world, static_cast<int>(at - names.begin()));
+    act(*world, body);
   }
 
   scene::Scene scene_;
@@ -170,7 +164,7 @@ void bind_world(py::module_& module) {
   py::class_<Scenery>(
       module, "World",
       "A scene that is simulated and played step by step, and whose bodies are pushed, held, added and removed meanwhile, as "
-      "by carillon-live. Bodies are given by name; points are in the world [m]. What is done acts look_ahead_s after the "
+      "by carillon-live. Bodies are given by name; points are in the world [m]. Actions take effect look_ahead_s after the "
       "sound so far. Raises InputError, and changes nothing, for what cannot be done.")
       .def(py::init<const std::filesystem::path&, const std::string&, double>(), "file"_a, "text"_a = "", "look_ahead_s"_a = 0.05)
       .def("advance", &Scenery::advance, "seconds"_a,

@@ -5,7 +5,7 @@
 //   await world.grab(cup), await world.drag(cup, [0, 0, 0.4], 0.1), await world.release(cup);
 //   draw(world.pose(cup));
 //
-// SI units, as in carillon-audio.js. The world is simulated on a worker, look_ahead_s ahead of the sound: what is done is heard that much
+// SI units, as in carillon-audio.js. The world is simulated on a worker, look_ahead_s ahead of the sound: actions are heard that much
 // later. Invalid arguments reject with an Error of one sentence.
 
 const kGround = { height_m: 0, young_modulus_pa: 30e9, poisson_ratio: 0.2, restitution: 0.5, friction: 0.5, density_kg_m3: 2400, roughness_m: 20e-6 };
@@ -136,7 +136,7 @@ export class World {
   get time_s() {
     return this.audio.heard_s - this.at_s;
   }
-  /** What is heard now of a body: {position_m of its centre of mass, rotation}; undefined before the start. */
+  /** Pose of a body at the time heard now: {position_m of its centre of mass, rotation}; undefined before the start. */
   pose(body) {
     const path = this.paths[this.numbers.get(body)], now_s = this.time_s;
     while (path.length > 1 && path[1][0] <= now_s) path.shift();

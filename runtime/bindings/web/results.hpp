@@ -1,4 +1,4 @@
-// What all modules of a page share: results by address, and errors as text. For one source of a module only.
+// Results by address and errors as text, for all modules of a page. To be included in one source of a module.
 #pragma once
 
 #include <algorithm>

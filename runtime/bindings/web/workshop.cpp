@@ -136,12 +136,6 @@ void check_place(const bank::Bank& bank, std::int32_t triangle) {
     throw InputError(fmt::format("there is no triangle {}; the surface has {}", triangle, bank.triangles.size()));
 }
 
-Vec3 find_point(const bank::Bank& bank, std::int32_t triangle, const Vec3& barycentric) {
-  Vec3 point{};
-  for (std::size_t c = 0; c < 3; ++c) point = point + barycentric[c] * bank.vertices_m[bank.triangles[triangle][c]];
-  return point;
-}
-
 /// Outward, not of unit length; degenerate triangles included.
 Vec3 find_normal(const bank::Bank& bank, std::int32_t triangle) {
   const Vec3 across = bank::calc_normal(bank.vertices_m, bank.triangles[triangle]);
@@ -332,7 +326,7 @@ std::string Workshop::make_blow(int body, std::string_view scene, std::int32_t t
   described.bodies[0].spec.bank = made.played.get();
   scene::SceneStrike& strike = described.strikes[0];
   strike.triangle.reset();
-  strike.point_m = find_point(*made.played, triangle, barycentric);
+  strike.point_m = bank::calc_point(*made.played, triangle, barycentric);
   scene::Strikes strikes = scene::make_strikes(described, {made.played.get()});
   const double begin_s = strike.time_s;
   for (events::Event event : strikes.events) {

@@ -17,8 +17,6 @@ constexpr double kMinSpeedMS = 1e-6;      // m/s; assumed for the step length if
 constexpr double kSettledSpeedMS = 1e-3;  // m/s; maximum speed of settled contacts
 constexpr double kMaxTouchDelayS = 1e-3;  // s; maximum time to the next touch of bodies still in contact
 
-bool is_finite(const Vec3& x) { return std::isfinite(x[0]) && std::isfinite(x[1]) && std::isfinite(x[2]); }
-
 /// Zero unless positive definite, as for a mallet head without spin.
 Mat3 invert_inertia(const Mat3& m) {
   const Mat3 minors{cross(m[1], m[2]), cross(m[2], m[0]), cross(m[0], m[1])};

@@ -14,13 +14,13 @@
 
 namespace carillon::rigid {
 
+using carillon::make_rotation;
 using carillon::multiply;
+using carillon::normalise;
 using carillon::Quaternion;
 
-Mat3 make_rotation(const Quaternion& q);
 /// From a rotation vector [rad], exact.
 Quaternion make_turn(const Vec3& turn);
-Quaternion normalise(const Quaternion& q);
 
 /// Constant properties of a body.
 struct Solid {

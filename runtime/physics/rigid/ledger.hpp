@@ -9,7 +9,7 @@ namespace carillon::rigid {
 struct Books {
   double motion_j = 0.0;   // kinetic and gravitational
   double modes_j = 0.0;    // in the bodies' modes
-  double springs_j = 0.0;  // of current modal impacts, and what may lift bodies in the next step
+  double springs_j = 0.0;  // of current modal impacts, and energy for lifting in the next step
   double lost_j = 0.0;     // by friction, in contacts, by modal damping, above the bands
   double lifted_j = 0.0;   // given to bodies that were moved apart, beyond the share paid by their motion
 

@@ -14,6 +14,7 @@
 #include "runtime/base/document.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/printable.hpp"
+#include "runtime/render/stage.hpp"
 
 namespace carillon::live {
 namespace {
@@ -39,13 +40,6 @@ std::vector<std::string> split(std::string_view line) {
   }
   if (is_quoted) throw InputError("a name has a double quote at its start only; close it");
   return words;
-}
-
-int find_body(const std::string& name, const Hands& hands) {
-  const auto at = std::find(hands.names.begin(), hands.names.end(), name);
-  if (at != hands.names.end()) return static_cast<int>(at - hands.names.begin());
-  const std::string nearest = base::find_nearest(name, hands.names);
-  throw InputError(fmt::format("no body is called \"{}\"{}", name, nearest.empty() ? "" : fmt::format("; did you mean \"{}\"?", nearest)));
 }
 
 double read_number(const std::string& word) {
@@ -145,7 +139,7 @@ std::string carry_out(std::string_view line, const Hands& hands) {
   if (hands.world == nullptr) throw InputError("no body of the scene can move");
   const Command& command = found->second;
   if (words.size() < 2) throw InputError(fmt::format("{} needs the name of a body", words[0]));
-  const int body = find_body(words[1], hands);
+  const int body = render::find_body(hands.names, words[1]);
   Numbers numbers;
   for (std::size_t k = 2; k < words.size(); ++k) numbers.push_back(read_number(words[k]));
   if (std::find(command.sizes.begin(), command.sizes.end(), numbers.size()) == command.sizes.end())

@@ -1,6 +1,6 @@
 // engine_NAME HZ SECONDS OUT.jsonl [LIVE.f32 [MAX_IMPACTS]] < BODIES: the sound of a physics engine's scene. OUT: its contacts file; LIVE:
-// what two ears hear meanwhile, pairs of floats at 48 kHz [Pa]. A line of BODIES: name kind bank, then half extents, position, rotation (w
-// x y z), velocity and spin. Prints counters and costs as JSON.
+// pressure at two ears [Pa], pairs of floats at 48 kHz. A line of BODIES: name kind bank, then half extents, position, rotation (w x y z),
+// velocity and spin. Prints counters and costs as JSON.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>

@@ -1,6 +1,5 @@
-// momentum_NAME: what an adapter hands over, held against mechanics: impulses are the change of momentum (along the
-// vertical, where friction is left to the tracker), points lie between the surfaces
-// of both bodies at the pose that they belong to. This program takes the place of the tracker.
+// momentum_NAME: output of an adapter against mechanics. Impulses are the change of momentum (along the vertical if the tracker finds the
+// friction); points lie between the surfaces of both bodies at their pose. This program takes the place of the tracker.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>

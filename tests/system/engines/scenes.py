@@ -1,4 +1,4 @@
-"""Scenes for our own contact and for other engines, and what is compared of their sound."""
+"""Scenes for our own contact and for other engines, and the comparison of their sound."""
 import json
 import math
 import pathlib

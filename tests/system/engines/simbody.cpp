@@ -25,7 +25,7 @@ class Simbody : public Engine {
     matter_.Ground().updBody().addContactSurface(
         SimTK::Transform(SimTK::Rotation(SimTK::Pi / 2, SimTK::YAxis), Vec3(0)),
         SimTK::ContactSurface(SimTK::ContactGeometry::HalfSpace(), SimTK::ContactMaterial(30e9 / 0.96, kLoss, kFriction, kFriction, 0)));
-    double longest_s = 1e-3;  // larger steps let what rolls hop by itself
+    double longest_s = 1e-3;  // rolling bodies hop in larger steps
     for (const Solid& solid : solids) {
       const SimTK::MobilizedBody::Free body(matter_.Ground(), SimTK::Transform(), make_body(solid), SimTK::Transform());
       reader_.add(body.getMobilizedBodyIndex(), static_cast<std::int32_t>(bodies_.size()));

@@ -487,7 +487,7 @@ class Engines(Case):
     """A body of hand-written physics that falls on the ground."""
 
     def play(self, touches, bank, body, impulse):
-        """Falls at 1 m/s; what is left of it after the step is 0.2 m/s."""
+        """Falls at 1 m/s; after the step 0.2 m/s are left."""
         index = touches.add(bank, body, "bar", restitution=0.5)
         self.assertEqual(index, 0)
         lowest = bank.vertices_m[numpy.argmin(bank.vertices_m[:, 2])]

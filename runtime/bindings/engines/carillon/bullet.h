@@ -97,7 +97,7 @@ class BulletTouches {
     for (int m = 0; m < dispatcher.getNumManifolds(); ++m) {
       const btPersistentManifold& manifold = *dispatcher.getManifoldByIndexInternal(m);
       const std::int32_t first = find(manifold.getBody0()), second = find(manifold.getBody1());
-      // Points of what sleeps keep the impulse of their last step.
+      // Points of sleeping bodies keep the impulse of their last step.
       if ((first < 0 && second < 0) || (!manifold.getBody0()->isActive() && !manifold.getBody1()->isActive())) continue;
       for (int k = 0; k < manifold.getNumContacts(); ++k) {
         const btManifoldPoint& from = manifold.getContactPoint(k);

@@ -68,8 +68,8 @@ class SimbodyTouches {
       point.gap_m = sum.b < 0 ? 0.0 : SimTK::dot(on_a - on_b, normal);
       copy(sum.b < 0 ? on_a : (on_a + on_b - point.gap_m * normal) / 2, point.point_m);
       copy(normal, point.normal);
-      // Friction of what sticks changes its sign from step to step, so that its sum means nothing: it is found from the velocities, and
-      // is 0 where joints have changed those, too.
+      // The friction of a sticking contact changes its sign at every step: it is found from the velocities instead; 0 for bodies on
+      // joints, which change the velocities, too.
       copy(SimTK::Vec3(is_jointed(sum.a) || is_jointed(sum.b) ? 0.0 : SimTK::NaN), point.friction_n_s);
       point.impulse_n_s = impulse;
       point.curvature_per_m = NAN;  // of the surfaces of the banks

@@ -61,7 +61,7 @@ class World(_World):
         pressure = world.advance(0.5)      # the next half second: (frames, channels) float32 [Pa]
 
     scene: a scene file, or a scene as a dict with paths relative to the current directory; its duration_s is not used.
-    look_ahead_s: lead of the physics over the sound, 0.02 to 10: what is done acts that much later.
+    look_ahead_s: lead of the physics over the sound, 0.02 to 10: actions take effect that much later.
     Raises InputError for what cannot be used or done, and SolveError if the physics fails.
     """
 

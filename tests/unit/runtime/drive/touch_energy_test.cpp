@@ -1,4 +1,4 @@
-// Energy that hits give to modes: never above what the motion lost.
+// Energy that hits give to modes: never above the loss of kinetic energy.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -16,7 +16,7 @@ namespace carillon::drive::tests {
 
 constexpr double kGravity = 9.81;
 
-/// Bodies, their poses, and what a Touches made of them.
+/// Bodies, their poses, and the events of their Touches.
 class Rig {
  public:
   explicit Rig(const TouchesOptions& options = {})

@@ -18,7 +18,7 @@ namespace {
 const std::string kTouchedBank = carillon::tests::get_source_dir() + "/tests/unit/runtime/bank/pinned/version_1_5.hdf";
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-/// What a sink was given.
+/// Events received by a sink.
 struct Received {
   std::array<int, 5> counts{};
   double impulse_n_s[3] = {0, 0, 0}, mark_s = -1.0;
