@@ -12,49 +12,8 @@
 namespace carillon::drive {
 namespace {
 
-using rigid::kMinImpactSpeedMS;
-
-constexpr double kMaskedRatio = 0.01;        // relative to the largest impulse of the same instant: -40 dB
 constexpr double kForwardMaskRatio = 0.005;  // relative to an earlier impulse of the same body: -46 dB
 constexpr double kMaskDecayS = 0.05;         // s; decay time (1/e) of the latter threshold
-
-void add_spot(const Scene& scene, const Strike& strike, const std::vector<const Hit*>& hits, double touch_s, double max_push,
-              LastingContacts& lasting, Masks* masks, std::vector<events::Event>& events) {
-  const Hit& first = *hits.front();
-  Vec3 impulse{}, where{}, normal{};
-  double push = 0.0, approach = 0.0, curvature = 0.0;
-  for (const Hit* hit : hits) {
-    const double share = dot(hit->impulse_n_s, hit->normal);
-    impulse = impulse + hit->impulse_n_s;
-    where = where + share * hit->where_m;
-    normal = normal + share * hit->normal;
-    curvature += share * hit->curvature_per_m;
-    approach = std::max(approach, hit->approach_m_s);
-    push += share;
-  }
-  where = (1.0 / push) * where;
-  normal = (1.0 / norm(normal)) * normal;
-  const double inverse_mass =
-      first.linked_mass_kg > 0.0 ? 1.0 / first.linked_mass_kg : scene.calc_inverse_mass(first.a, first.b, where, normal);
-  // A resting spot hardly moved by the impact elsewhere, or negligible next to other pulses of the same instant.
-  if (!(inverse_mass > 0.0) || push * inverse_mass < 0.2 * kMinImpactSpeedMS || push < kMaskedRatio * max_push) return;
-  const double speed = approach > kMinImpactSpeedMS ? approach : push * inverse_mass;
-  const double mass = std::min(push / ((1.0 + first.restitution) * speed), 1.0 / inverse_mass);
-  lasting.note_impact(scene, first.a, first.b, where, strike.time_s);
-  Blow blow{.a = first.a, .b = first.b, .touch_s = touch_s, .masked_s = strike.time_s, .impulse_n_s = norm(impulse)};
-  blow.duration_s = impact::calc_hertz_duration(scene.calc_compliance(first.a, first.b),
-                                                scene.calc_contact_radius(first.a, first.b, curvature / push), mass, speed);
-  for (const int side : {0, 1}) {
-    const int body = side == 0 ? first.a : first.b;
-    if (body < 0) continue;
-    const double sign = side == 0 ? 1.0 : -1.0;
-    // The position of a single hit is known; several hits are on the same face or near it.
-    const std::optional<geometry::Place>& known = first.places[side];
-    blow.places[side] = known && hits.size() == 1 ? *known : scene.find_place(body, where, (-sign) * normal, first.triangles[side]);
-    blow.impulses_n_s[side] = transpose(scene.motions[body].rotation) * (sign * impulse);
-  }
-  add_pulses(scene, blow, masks, events);
-}
 
 }  // namespace
 
@@ -83,31 +42,6 @@ int add_pulses(const Scene& scene, const Blow& blow, Masks* masks, std::vector<e
     ++count;
   }
   return count;
-}
-
-void add_pulses(const Scene& scene, const Strike& strike, LastingContacts& lasting, Masks* masks, std::vector<events::Event>& events) {
-  std::vector<const Hit*> order;
-  for (const Hit& hit : strike.hits)
-    if (dot(hit.impulse_n_s, hit.normal) > 0.0) order.push_back(&hit);
-  std::stable_sort(order.begin(), order.end(),
-                   [](const auto* x, const auto* y) { return dot(x->impulse_n_s, x->impulse_n_s) > dot(y->impulse_n_s, y->impulse_n_s); });
-  const double max_push = order.empty() ? 0.0 : norm(order.front()->impulse_n_s);
-  std::vector<char> taken(order.size(), 0);
-  for (std::size_t seed = 0; seed < order.size(); ++seed) {
-    if (taken[seed]) continue;
-    std::vector<const Hit*> spot;
-    double wait_s = strike.together_s;
-    for (std::size_t i = seed; i < order.size(); ++i) {
-      const Hit& hit = *order[i];
-      if (taken[i] || hit.a != order[seed]->a || hit.b != order[seed]->b) continue;
-      if (norm(hit.where_m - order[seed]->where_m) > scene.calc_spot_radius(hit.a, hit.b)) continue;
-      taken[i] = 1;
-      spot.push_back(&hit);
-      wait_s = std::min(wait_s, hit.approach_m_s > kMinImpactSpeedMS ? hit.gap_m / hit.approach_m_s : 0.0);
-    }
-    add_spot(scene, strike, spot, strike.time_s + std::clamp(wait_s, -rigid::kSimultaneousS, strike.together_s), max_push, lasting, masks,
-             events);
-  }
 }
 
 }  // namespace carillon::drive

@@ -3,34 +3,12 @@
 
 #include <array>
 #include <cstdint>
-#include <optional>
 #include <vector>
 
-#include "runtime/drive/lasting.hpp"
 #include "runtime/drive/scene.hpp"
 #include "runtime/events/events.hpp"
 
 namespace carillon::drive {
-
-/// One point of an impact.
-struct Hit {
-  int a = 0, b = -1;                                       // -1: the ground
-  Vec3 where_m{}, normal{};                                // normal: unit, from b to a
-  double gap_m = 0.0;                                      // before the impact
-  double curvature_per_m = 0.0;                            // of both surfaces
-  double approach_m_s = 0.0, restitution = 0.0;            // approach: 0 or less for a point that rests
-  Vec3 impulse_n_s{};                                      // on a
-  double linked_mass_kg = 0.0;                             // effective mass at the point, for bodies on joints; 0: of the free bodies
-  std::array<std::optional<geometry::Place>, 2> places{};  // on a and b, if already searched
-  std::array<std::int32_t, 2> triangles{-1, -1};           // likely ones
-};
-
-/// One instant of impact. The scene holds the motions before it.
-struct Strike {
-  double time_s = 0.0;
-  double together_s = 0.0;  // interval in which its points close
-  std::vector<Hit> hits{};
-};
 
 /// The force of an impact at one spot as a pulse on each of its bodies.
 struct Blow {
@@ -61,10 +39,6 @@ class Masks {
   };
   std::vector<Mask> masks_;
 };
-
-/// Groups the points of an impact into spots, strongest first, and appends one pulse per spot and body; with masks only audible ones.
-/// Notifies `lasting`.
-void add_pulses(const Scene& scene, const Strike& strike, LastingContacts& lasting, Masks* masks, std::vector<events::Event>& events);
 
 /// Appends the pulses of a blow on bodies with a shape; with masks only audible ones. Returns their number.
 int add_pulses(const Scene& scene, const Blow& blow, Masks* masks, std::vector<events::Event>& events);

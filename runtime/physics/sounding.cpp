@@ -1,13 +1,19 @@
+// Method: hits of one instant are grouped into spots, strongest first; each spot sounds as one Hertz pulse on both bodies. If several spots
+// share an impact, each carries its share of the mass.
 #include "runtime/physics/sounding.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include "runtime/base/chance.hpp"
+#include "runtime/physics/impact/spring.hpp"
 
 namespace carillon::physics {
 namespace {
 
+using rigid::kMinImpactSpeedMS;
+
+constexpr double kMaskedRatio = 0.01;     // relative to the largest impulse of the same instant: -40 dB
 constexpr double kTimeToleranceS = 1e-8;  // s; shorter than any step, longer than the permitted remainder of a step
 
 void set_motion(const rigid::Solid& solid, const rigid::State& state, const rigid::Placed& placed, drive::Motion& motion) {
@@ -18,20 +24,7 @@ void set_motion(const rigid::Solid& solid, const rigid::State& state, const rigi
   motion.inverse_inertia = placed.inverse_inertia;
 }
 
-drive::Hit to_hit(const rigid::Hit& hit) {
-  return {.a = hit.a,
-          .b = hit.b,
-          .where_m = hit.touch.where_m,
-          .normal = hit.touch.normal,
-          .gap_m = hit.touch.gap_m,
-          .curvature_per_m = hit.touch.curvature_a_per_m + hit.touch.curvature_b_per_m,
-          .approach_m_s = hit.approach_m_s,
-          .restitution = hit.restitution,
-          .impulse_n_s = hit.impulse,
-          .linked_mass_kg = hit.linked_mass_kg,
-          .places = hit.places,
-          .triangles = hit.triangles};
-}
+double calc_push(const rigid::Hit& hit) { return dot(hit.impulse, hit.touch.normal); }
 
 }  // namespace
 
@@ -66,10 +59,10 @@ void Sounding::copy_motion(int body) {
 
 void Sounding::add(const rigid::Strike& strike, std::vector<events::Event>& events) {
   ++step_;
-  drive::Strike given{.time_s = strike.time_s, .together_s = strike.together_s};
+  std::vector<const rigid::Hit*> order;
   for (const rigid::Hit& hit : strike.hits) {
-    if (hit.is_cord) continue;
-    given.hits.push_back(to_hit(hit));
+    if (hit.is_cord || !(calc_push(hit) > 0.0)) continue;
+    order.push_back(&hit);
     copy_motion(hit.a);
     copy_motion(hit.b);
   }
@@ -79,15 +72,75 @@ void Sounding::add(const rigid::Strike& strike, std::vector<events::Event>& even
     set_motion(space_.solid(body), before, rigid::place(space_.solid(body), before), scene_.motions[body]);
   }
   scene_.time_s = strike.time_s;
-  drive::add_pulses(scene_, given, lasting_, masks_ ? &*masks_ : nullptr, events);
+  std::stable_sort(order.begin(), order.end(),
+                   [](const auto* x, const auto* y) { return dot(x->impulse, x->impulse) > dot(y->impulse, y->impulse); });
+  const double audible_n_s = order.empty() ? 0.0 : kMaskedRatio * norm(order.front()->impulse);
+  for (auto rest = order.begin(); rest != order.end();) {
+    const rigid::Hit& first = **rest;
+    const auto end = std::stable_partition(rest, order.end(), [&](const rigid::Hit* hit) {
+      return hit->a == first.a && hit->b == first.b &&
+             norm(hit->touch.where_m - first.touch.where_m) <= scene_.calc_spot_radius(hit->a, hit->b);
+    });
+    add_spot({&*rest, static_cast<std::size_t>(end - rest)}, strike, audible_n_s, events);
+    rest = end;
+  }
 }
 
-void Sounding::note(const rigid::Forces& forces) {
-  if (!masks_) return;
+void Sounding::add_spot(std::span<const rigid::Hit* const> hits, const rigid::Strike& strike, double audible_n_s,
+                        std::vector<events::Event>& events) {
+  const rigid::Hit& first = *hits.front();
+  Vec3 impulse{}, where{}, normal{};
+  double push = 0.0, approach = 0.0, curvature = 0.0, wait_s = strike.together_s;
+  for (const rigid::Hit* hit : hits) {
+    const double share = calc_push(*hit);
+    impulse = impulse + hit->impulse;
+    where = where + share * hit->touch.where_m;
+    normal = normal + share * hit->touch.normal;
+    curvature += share * (hit->touch.curvature_a_per_m + hit->touch.curvature_b_per_m);
+    approach = std::max(approach, hit->approach_m_s);
+    wait_s = std::min(wait_s, hit->approach_m_s > kMinImpactSpeedMS ? hit->touch.gap_m / hit->approach_m_s : 0.0);
+    push += share;
+  }
+  where = (1.0 / push) * where;
+  normal = (1.0 / norm(normal)) * normal;
+  const double inverse_mass =
+      first.linked_mass_kg > 0.0 ? 1.0 / first.linked_mass_kg : scene_.calc_inverse_mass(first.a, first.b, where, normal);
+  // A resting spot hardly moved by the impact elsewhere, or negligible next to other pulses of the same instant.
+  if (!(inverse_mass > 0.0) || push * inverse_mass < 0.2 * kMinImpactSpeedMS || push < audible_n_s) return;
+  const double speed = approach > kMinImpactSpeedMS ? approach : push * inverse_mass;
+  const double mass = std::min(push / ((1.0 + first.restitution) * speed), 1.0 / inverse_mass);
+  lasting_.note_impact(scene_, first.a, first.b, where, strike.time_s);
+  const double touch_s = strike.time_s + std::clamp(wait_s, -rigid::kSimultaneousS, strike.together_s);
+  drive::Blow blow{.a = first.a, .b = first.b, .touch_s = touch_s, .masked_s = strike.time_s, .impulse_n_s = norm(impulse)};
+  blow.duration_s = impact::calc_hertz_duration(scene_.calc_compliance(first.a, first.b),
+                                                scene_.calc_contact_radius(first.a, first.b, curvature / push), mass, speed);
+  for (const int side : {0, 1}) {
+    const int body = side == 0 ? first.a : first.b;
+    if (body < 0) continue;
+    const double sign = side == 0 ? 1.0 : -1.0;
+    // The position of a single hit is known; several hits are on the same face or near it.
+    const std::optional<geometry::Place>& known = first.places[side];
+    blow.places[side] = known && hits.size() == 1 ? *known : scene_.find_place(body, where, (-sign) * normal, first.triangles[side]);
+    blow.impulses_n_s[side] = transpose(scene_.motions[body].rotation) * (sign * impulse);
+  }
+  (void)drive::add_pulses(scene_, blow, masks_ ? &*masks_ : nullptr, events);
+}
+
+void Sounding::add(const rigid::Forces& forces, std::vector<events::Event>& events) {
   for (const int side : {0, 1}) {
     const int body = side == 0 ? forces.a : forces.b;
     if (body < 0) continue;
+    const geometry::Place& place = side == 0 ? forces.place_a : forces.place_b;
     const std::vector<Vec3>& impulses = side == 0 ? forces.on_a : forces.on_b;
+    const events::Force first{.time_s = forces.time_s,
+                              .step_s = forces.step_s,
+                              .body = body,
+                              .other = side == 0 ? forces.b : forces.a,
+                              .triangle = place.triangle,
+                              .continues = forces.continues,
+                              .barycentric = place.barycentric};
+    events::split_force(first, impulses, [&](const events::Force& force) { events.push_back(force); });
+    if (!masks_) continue;
     Vec3 given{};
     for (const Vec3& impulse : impulses) given = given + impulse;
     (void)masks_->take(body, forces.time_s, norm(given), forces.step_s * static_cast<double>(impulses.size()));

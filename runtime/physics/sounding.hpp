@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "runtime/drive/lasting.hpp"
@@ -19,13 +20,15 @@ class Sounding {
 
   /// Pulses of an impact.
   void add(const rigid::Strike& strike, std::vector<events::Event>& events);
-  /// An impact with modes, for the masks.
-  void note(const rigid::Forces& forces);
+  /// Forces of an impact with modes, one event per body, split at the maximum length of events.
+  void add(const rigid::Forces& forces, std::vector<events::Event>& events);
   /// After a step: lasting contacts.
   void update(std::vector<events::Event>& events);
 
  private:
   void copy_motion(int body);
+  void add_spot(std::span<const rigid::Hit* const> hits, const rigid::Strike& strike, double audible_n_s,
+                std::vector<events::Event>& events);
 
   const rigid::Space& space_;
   drive::Scene scene_;

@@ -136,7 +136,7 @@ class World::Course {
       const std::vector<rigid::Strike> strikes = space_.take_strikes();
       const std::vector<rigid::Forces> all_forces = space_.take_forces();
       for (const rigid::Strike& strike : strikes) take(strike);
-      for (const rigid::Forces& forces : all_forces) take(forces);
+      for (const rigid::Forces& forces : all_forces) sounding_.add(forces, events_);
       if (options_.audits_energy) watch(strikes, all_forces);
       if (options_.lasting_contacts) sounding_.update(events_);
     }
@@ -169,26 +169,6 @@ class World::Course {
                rigid::calc_kinetic(space_.solid(strike.bodies[k]), strike.after[k]);
     taken_j_ += taken - strike.modes_j;
     energy_.hit_rise_j = std::max(energy_.hit_rise_j, strike.modes_j - taken);
-  }
-
-  /// One event per ringing or moving body, split at the maximum length of events.
-  void take(const rigid::Forces& forces) {
-    sounding_.note(forces);
-    for (const int side : {0, 1}) {
-      const int body = side == 0 ? forces.a : forces.b;
-      if (body < 0) continue;
-      const geometry::Place& place = side == 0 ? forces.place_a : forces.place_b;
-      const std::vector<Vec3>& impulses = side == 0 ? forces.on_a : forces.on_b;
-      events::Force first;
-      first.time_s = forces.time_s;
-      first.step_s = forces.step_s;
-      first.body = body;
-      first.other = side == 0 ? forces.b : forces.a;
-      first.triangle = place.triangle;
-      first.barycentric = place.barycentric;
-      first.continues = forces.continues;
-      events::split_force(first, impulses, [&](const events::Force& force) { events_.push_back(force); });
-    }
   }
 
   void audit() {
