@@ -12,6 +12,8 @@ PALETTE = {
     "orthogonalise": "#7b5ea7",
     "errors": "#e09f3e",
     "error bars": "#e09f3e",
+    "air": "#5fa8d3",
+    "coupling": "#b56576",
     "write": "#588157",
     "other": "#bdbdbd",
     "in all": "#1a1a1a",

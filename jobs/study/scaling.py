@@ -11,7 +11,7 @@ import stat
 import measuring
 from errors import InputError
 
-PHASES = ("read", "partition", "assemble", "factor", "solve", "orthogonalise", "errors", "write", "other")
+PHASES = ("read", "partition", "assemble", "factor", "solve", "orthogonalise", "errors", "air", "coupling", "write", "other")
 MAX_BYTES = 16 << 20
 QUICK_NODES = [600, 1200]
 

@@ -14,7 +14,8 @@ namespace {
 
 using petsc::check;
 
-constexpr double kDenseRounding = 1e4;  // Factor on epsilon times the largest ratio of the diagonals: far above the rounding of LAPACK.
+constexpr double kDenseRounding = 1e4;   // Factor on epsilon times the largest ratio of the diagonals: far above the rounding of LAPACK.
+constexpr double kSparseRounding = 1e3;  // The same: modes a tenth of the lower end's frequency are above the rounding of K.
 constexpr double kMechanismTolerance = 1e2;  // Factor on the same: smaller eigenvalues count as zero.
 constexpr double kMechanismRatio = 1e-4;     // Relative to the lower end of the band: upper limit for mechanisms.
 
@@ -28,7 +29,7 @@ double find_fastest(const Operators& operators) {
 
 // If rounding is near the lower end, the end may have to move, so it is counted.
 bool can_assume_low_end(const BandProblem& body) {
-  return eigen::can_assume_low_end(body.options) && body.asked.low > kDenseRounding * body.rounding();
+  return eigen::can_assume_low_end(body.options) && body.asked.low > kSparseRounding * body.rounding();
 }
 
 // The following stages copy K and M.

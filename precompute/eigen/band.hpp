@@ -67,7 +67,7 @@ struct BandCounts {
   std::int64_t count_below_low = 0;  // and below it
   std::int64_t mechanism_count = 0;  // see Modes
   bool is_low_assumed = false;       // the lower end was not counted: only the rigid modes are assumed to lie below it
-  bool is_low_derived = false;       // the count at a shift inside the band has proven that assumption
+  bool is_low_derived = false;       // the count at a shift inside the band gave the count there
 };
 
 /// Source of counts: an InertiaCounter, or its record.
@@ -77,8 +77,8 @@ struct BandCounter {
 };
 
 /// Counts by the inertia of K - lambda M at both ends, and again near zero if more than the rigid modes lies below the band. A very low
-/// lower end is not counted: usually only rigid modes lie below it, and the count at a shift inside the band proves it once all modes up to
-/// the shift are found. Collective. Throws SolveError if the counts contradict each other.
+/// lower end is not counted: few modes lie below it, and the count at a shift inside the band gives it once all modes up to the shift are
+/// found. Collective. Throws SolveError if the counts contradict each other.
 BandCounts count_band(const BandProblem& body, const BandCounter& counter);
 /// Counts at the lower end that count_band() has assumed. Collective; throws as count_band() does.
 void count_low_end(const BandProblem& body, const BandCounter& counter, BandCounts& counts);

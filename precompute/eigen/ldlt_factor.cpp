@@ -11,7 +11,7 @@ class LdltFactor final : public ShiftedFactor {
   LdltFactor(const la::Pencil& pencil, const ldlt::MeshOrder* order)
       : factor_(pencil, order), rank_(petsc::get_communicator(pencil.stiffness).rank()) {}
 
-  bool factorise(double sigma) override { return factor_.factorise(sigma); }
+  bool try_factorise(double sigma) override { return factor_.factorise(sigma); }
   void solve(const double* b, double* x, std::ptrdiff_t stride, int columns) override {
     factor_.solve(b, x, petsc::to_petsc_int(stride), columns);
   }

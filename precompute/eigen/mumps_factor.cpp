@@ -97,7 +97,7 @@ class MumpsFactor final : public ShiftedFactor {
   MumpsFactor(const la::Pencil& pencil, const std::vector<std::int32_t>& elimination_position);
   ~MumpsFactor() override;
 
-  bool factorise(double sigma) override;
+  bool try_factorise(double sigma) override;
   void solve(const double* b, double* x, std::ptrdiff_t stride, int columns) override;
   std::int64_t get_negative_pivots() const override;
   double get_backward_error() const override { return 0; }
@@ -215,7 +215,7 @@ MumpsFactor::~MumpsFactor() {
   if (state_ != nullptr && state_->is_alive && !(unwinds && state_->size > 1)) (void)state_->call(kJobEnd);
 }
 
-bool MumpsFactor::factorise(double sigma) {
+bool MumpsFactor::try_factorise(double sigma) {
   State& s = *state_;
   std::size_t entry = 0;
   visit_lower_entries(s.pencil, [&](PetscInt, PetscInt, double k, double m) { s.values[entry++] = k - sigma * m; });

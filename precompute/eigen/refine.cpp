@@ -5,7 +5,7 @@
 // Rayleigh-Ritz in the group separates its members; Gram-Schmidt from the lowest mode up makes the whole set M-orthonormal again. Modes
 // still bad are repeated in narrower groups with nearer shifts, down to single modes. The residual of a correct slow mode may be large, as
 // the stiffness of fast motions amplifies the rounding of its entries. The inverse removes this: with d = (K - sigma M)^-1 r there is an
-// eigenvalue within |lambda - sigma| ||d||_M of lambda - sigma, relative to itself, as for any residual of the inverse.
+// eigenvalue within |lambda - sigma| ||d||_M of lambda, to first order, as for any residual of the inverse.
 // Source: Parlett, The symmetric eigenvalue problem, 1998, sections 4.2 (inverse iteration), 11.3 (Rayleigh-Ritz).
 #include "precompute/eigen/refine.hpp"
 
@@ -19,6 +19,7 @@
 #include "precompute/la/lapack.hpp"
 #include "precompute/la/local_columns.hpp"
 #include "precompute/petsc/session.hpp"
+#include "precompute/petsc/work.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::eigen {
@@ -94,6 +95,7 @@ void calc_residuals(const Operators& operators, const Group& group, const std::v
 double factorise_below(const RefineRequest& request, const Group& group, double nearness, const std::vector<double>& lambda,
                        RefineCost& cost) {
   constexpr int kShifts = 6;
+  const petsc::WorkScope scope(petsc::WorkPhase::kFactor);
   const double low = lambda[group.front()];
   do {
     ShiftedFactor& factor = request.get_factor();
@@ -106,9 +108,10 @@ double factorise_below(const RefineRequest& request, const Group& group, double 
   throw SolveError("K - sigma M is singular all around a mode: the mesh has nodes without mass or stiffness.");
 }
 
-// The modes of a group and their corrections (K - sigma M)^-1 (K phi - lambda M phi), with the current factor.
+// The modes of a group and their corrections (K - sigma M)^-1 (K phi - lambda M phi).
 struct Corrections {
-  Corrections(const RefineRequest& request, const Group& group, const std::vector<double>& lambda, const Columns& all, RefineCost& cost)
+  Corrections(const RefineRequest& request, ShiftedFactor& factor, const Group& group, const std::vector<double>& lambda,
+              const Columns& all, RefineCost& cost)
       : rows(static_cast<std::size_t>(all.rows)),
         space(3 * rows * group.size()),
         phi{space.data(), all.rows, all.rows, static_cast<int>(group.size())},
@@ -117,20 +120,20 @@ struct Corrections {
     for (std::size_t j = 0; j < group.size(); ++j)
       std::copy_n(all.column(static_cast<int>(group[j])), rows, phi.column(static_cast<int>(j)));
     calc_residuals(*request.operators, group, lambda, phi, d, work);
-    request.get_factor().solve(d.values, d.values, d.stride, d.count);
+    factor.solve(d.values, d.values, d.stride, d.count);
     cost.solves += d.count;
   }
   Corrections(const Corrections&) = delete;
   Corrections& operator=(const Corrections&) = delete;
 
-  /// ||d||_M of each.
-  std::vector<double> calc_norms(const RefineRequest& request) {
+  /// ||d||_M |lambda - sigma| / lambda of each.
+  std::vector<double> calc_bounds(const RefineRequest& request, const Group& group, const std::vector<double>& lambda, double sigma) {
     request.operators->mass.multiply(d, work);
-    std::vector<double> norms;
-    for (int c = 0; c < d.count; ++c) norms.push_back(std::inner_product(d.column(c), d.column(c) + rows, work.column(c), 0.0));
-    request.operators->comm.sum(norms);
-    for (double& norm : norms) norm = std::sqrt(norm);
-    return norms;
+    std::vector<double> bounds;
+    for (int c = 0; c < d.count; ++c) bounds.push_back(std::inner_product(d.column(c), d.column(c) + rows, work.column(c), 0.0));
+    request.operators->comm.sum(bounds);
+    for (std::size_t c = 0; c < group.size(); ++c) bounds[c] = std::sqrt(bounds[c]) * std::abs(lambda[group[c]] - sigma) / lambda[group[c]];
+    return bounds;
   }
 
   /// Replaces the modes of the group by Ritz vectors in the span of the corrected modes, and lambda by their values.
@@ -155,7 +158,31 @@ void improve_group(const RefineRequest& request, const Group& group, double near
   factorise_below(request, group, nearness, lambda, cost);
   const LocalColumns access(shapes);
   const Columns all = access.view();
-  Corrections(request, group, lambda, all, cost).apply(request, group, lambda, all);
+  Corrections(request, request.get_factor(), group, lambda, all, cost).apply(request, group, lambda, all);
+}
+
+Group find_above(const ModeErrors& errors, double tolerance) {
+  Group above;
+  for (std::size_t j = 0; j < errors.residual.size(); ++j)
+    if (errors.residual[j] > tolerance) above.push_back(j);
+  return above;
+}
+
+// Bounds the errors of modes above the tolerance by the inverse at hand, at whatever shift: modes limited by rounding need no
+// factorisation of their own.
+void bound_at_hand(const RefineRequest& request, const std::vector<double>& lambda, Mat shapes, ModeErrors& errors, RefineCost& cost) {
+  if (request.at_hand == nullptr) return;
+  constexpr std::size_t kBlock = 16;  // columns, for the sake of memory
+  const Group above = find_above(errors, request.tolerance);
+  const LocalColumns access(shapes);
+  const Columns all = access.view();
+  for (std::size_t first = 0; first < above.size(); first += kBlock) {
+    const Group block(above.begin() + static_cast<std::ptrdiff_t>(first),
+                      above.begin() + static_cast<std::ptrdiff_t>(std::min(above.size(), first + kBlock)));
+    Corrections corrections(request, *request.at_hand, block, lambda, all, cost);
+    const std::vector<double> bounds = corrections.calc_bounds(request, block, lambda, request.at_hand->get_shift());
+    for (std::size_t c = 0; c < block.size(); ++c) errors.residual[block[c]] = std::min(errors.residual[block[c]], bounds[c]);
+  }
 }
 
 // Passes the bad modes through the available operator, at any shift, and removes the components along other modes. Modes that do not
@@ -239,22 +266,20 @@ RefineCost bound_error_by_inverse_residual(const RefineRequest& request, std::ve
   RefineCost cost;
   for (std::size_t round = 0;; ++round) {
     const auto [spread, nearness] = kRounds[round];
-    Group above;
-    for (std::size_t j = 0; j < lambda.size(); ++j) {
-      if (errors.residual[j] > request.tolerance) above.push_back(j);
-    }
+    if (round == 0) bound_at_hand(request, lambda, shapes, errors, cost);
+    const Group above = find_above(errors, request.tolerance);
     std::vector<double> bounded = errors.residual;
     bool is_corrected = false;
     for (const Group& group : group_neighbours(above, lambda, spread)) {
       const double sigma = factorise_below(request, group, nearness, lambda, cost);
       const LocalColumns access(shapes);
       const Columns all = access.view();
-      Corrections corrections(request, group, lambda, all, cost);
-      const std::vector<double> size = corrections.calc_norms(request);
+      Corrections corrections(request, request.get_factor(), group, lambda, all, cost);
+      const std::vector<double> bounds = corrections.calc_bounds(request, group, lambda, sigma);
       double worst = 0;
       for (std::size_t c = 0; c < group.size(); ++c) {
         const std::size_t j = group[c];
-        bounded[j] = std::min(bounded[j], size[c] * (lambda[j] - sigma) / lambda[j]);
+        bounded[j] = std::min(bounded[j], bounds[c]);
         worst = std::max(worst, bounded[j]);
       }
       if (worst <= request.tolerance || round + 1 == kRounds.size()) continue;
@@ -274,14 +299,12 @@ RefineCost refine_modes(const RefineRequest& request, std::vector<double>& lambd
   RefineCost cost;
   errors = measure_orthonormal(request, lambda, shapes);
   constexpr std::size_t kFew = 32;
-  Group above;
-  for (std::size_t j = 0; j < lambda.size(); ++j) {
-    if (errors.residual[j] > request.tolerance) above.push_back(j);
-  }
+  const Group above = find_above(errors, request.tolerance);
   if (request.at_hand != nullptr && !above.empty() && above.size() <= kFew) {
     polish(request, above, lambda, shapes, errors, cost);
     sort_modes(lambda, shapes, errors);
   }
+  bound_at_hand(request, lambda, shapes, errors, cost);
   for (std::size_t pass = 0; pass < kSpread.size(); ++pass) {
     std::vector<std::size_t> bad;
     for (std::size_t j = 0; j < lambda.size(); ++j) {

@@ -22,6 +22,7 @@ namespace {
 constexpr double kEdge = BandLimits::kTolerance;
 constexpr int kMaxRounds = 60;       // Maximum Krylov runs per interval,
 constexpr int kMaxIdleRounds = 2;    // and without a new mode.
+constexpr double kBelowBand = 1e-2;  // Relative to a lower end that was not counted: modes down to here are searched as well.
 constexpr double kLockedMargin = 1;  // Modes found within this distance of a slice, in widths of the slice, are locked.
 constexpr double kKrylovTolerance =
     0.1;  // Relative to the tolerance: Ritz residuals of the inverse omit the amplification of high frequencies by K.
@@ -76,7 +77,7 @@ KrylovRequest Search::make_request(const Slice& slice, double sigma, Missing mis
   request.pencil = body_.pencil;
   request.mass_blocks = &body_.operators.mass;
   request.sigma = sigma;
-  request.low = slice.low * (1 - kEdge);
+  request.low = slice.low * (counts_->is_low_assumed ? kBelowBand : 1 - kEdge);
   request.high = slice.high * (1 + kEdge);
   request.count = petsc::to_petsc_int(missing.count);
   request.is_count_known = missing.is_known;
@@ -122,11 +123,15 @@ double Search::run_round(const Slice& slice, double sigma, Missing missing, int 
 }
 
 // Called after the first run, whose slice starts at the lower end of the band. If the modes found up to the shift equal the count there
-// less the rigid modes, no mode is below the band; otherwise the lower end is counted.
+// less the rigid modes, those found below the band are all there are; otherwise the lower end is counted.
 void Search::settle_low_end(Slice& slice, const Inertia& shift) {
-  const std::int64_t found = count_found(found_.lambda, slice.low * (1 - kEdge), shift.lambda);
-  if (shift.below - found == slice.below_low && find_margin(found_.lambda, shift.lambda) >= kSafeMargin) {
+  const std::int64_t found = count_found(found_.lambda, kBelowBand * slice.low, shift.lambda);
+  const double margin = std::min(find_margin(found_.lambda, shift.lambda), find_margin(found_.lambda, slice.low));
+  if (shift.below - found == slice.below_low && margin >= kSafeMargin) {
+    slice.below_low += count_found(found_.lambda, kBelowBand * slice.low, slice.low);
     counter_.restore({slice.low, slice.below_low});
+    counts_->band.below_low = counts_->count_below_low = slice.below_low;
+    counts_->band_count = counts_->band.count();
     counts_->is_low_assumed = false;
     counts_->is_low_derived = true;
     return;

@@ -23,7 +23,12 @@ class ShiftedFactor {
 
   /// Factorises K - sigma M. False if a pivot vanished: sigma is an eigenvalue, use another. Throws SolveError for other breakdowns,
   /// SystemError if memory runs out.
-  virtual bool factorise(double sigma) = 0;
+  bool factorise(double sigma) {
+    shift_ = sigma;
+    return try_factorise(sigma);
+  }
+  /// Sigma of the last factorise.
+  double get_shift() const { return shift_; }
   /// X <- (K - sigma M)^-1 B: rows of this rank, column-major, same stride. b and x are equal or do not overlap.
   virtual void solve(const double* b, double* x, std::ptrdiff_t stride, int columns) = 0;
   /// Number of eigenvalues below the sigma of the last factorise (Sylvester's law of inertia).
@@ -37,6 +42,11 @@ class ShiftedFactor {
   virtual std::string get_ordering() const = 0;
   virtual std::int64_t get_entries() const = 0;  // of the factor; 0 if unknown
   virtual double get_flops() const = 0;          // of a factorisation; 0 if unknown
+
+ private:
+  virtual bool try_factorise(double sigma) = 0;
+
+  double shift_ = 0;
 };
 
 /// carillon::ldlt: parallel supernodal L D L^T for many right-hand sides. factorise is also false if its measured backward error is too

@@ -29,10 +29,10 @@ struct Effort {
   double mpi_seconds = 0;  // part of wall_seconds inside MPI, transfers and waiting; 0 if not measured
 };
 
-enum class WorkPhase { kOther, kRead, kPartition, kAssemble, kFactor, kSolve, kOrthogonalise, kErrors, kWrite };
-inline constexpr std::size_t kWorkPhases = 9;
-inline constexpr std::array<const char*, kWorkPhases> kWorkPhaseNames{"other", "read",          "partition", "assemble", "factor",
-                                                                      "solve", "orthogonalise", "errors",    "write"};
+enum class WorkPhase { kOther, kRead, kPartition, kAssemble, kFactor, kSolve, kOrthogonalise, kErrors, kAir, kCoupling, kWrite };
+inline constexpr std::size_t kWorkPhases = 11;
+inline constexpr std::array<const char*, kWorkPhases> kWorkPhaseNames{"other",         "read",   "partition", "assemble", "factor", "solve",
+                                                                      "orthogonalise", "errors", "air",       "coupling", "write"};
 
 /// Assigns subsequent work of this process to a phase. Returns the previous one.
 WorkPhase set_work_phase(WorkPhase phase);

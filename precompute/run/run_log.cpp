@@ -39,6 +39,8 @@ petsc::WorkPhase find_work_phase(const std::string& phase) {
   if (phase == "assemble") return petsc::WorkPhase::kAssemble;
   if (phase == "modes") return petsc::WorkPhase::kOrthogonalise;
   if (phase == "errors") return petsc::WorkPhase::kErrors;
+  if (phase == "air") return petsc::WorkPhase::kAir;
+  if (phase == "coupling") return petsc::WorkPhase::kCoupling;
   return petsc::WorkPhase::kWrite;
 }
 

@@ -72,19 +72,25 @@ TEST(Proof, leaves_a_low_end_to_the_shift_inside) {
   }
 }
 
-// Two blocks connected by threads: six modes below the band that are not rigid. The assumption about the lower end is wrong, so it is
-// counted.
-TEST(Proof, counts_a_low_end_with_modes_below_it) {
-  constexpr double kThread = 1e-6;  // [N/m], 1 inside the blocks
+// Two blocks connected by threads: six modes that are not rigid, far below the others.
+// `stiffness`: of a thread [N/m].
+Network make_threaded_blocks(double stiffness) {
   Network two = test::join(make_block(4, 4, 9), make_block(3, 4, 8, {12, 0.5, 0.7}));
   const int first = 4 * 4 * 9;
   std::fill(two.component.begin(), two.component.end(), 0);
-  for (int k = 0; k < 24; ++k) two.springs.push_back({(37 * k) % first, first + (29 * k) % (3 * 4 * 8), kThread});
+  for (int k = 0; k < 24; ++k) two.springs.push_back({(37 * k) % first, first + (29 * k) % (3 * 4 * 8), stiffness});
+  return two;
+}
+
+// The six modes are too far below the band to be searched, so the lower end is counted.
+TEST(Proof, counts_a_low_end_with_modes_below_it) {
+  const Network two = make_threaded_blocks(1e-6);
   const std::vector<double> all = test::calc_all_eigenvalues(two);
   const test::System system = test::make_system(two);
   Options options;
   options.high_hz = to_hz(0.5 * (all[90] + all[91]));
   options.low_hz = 0.009 * options.high_hz;
+  ASSERT_LT(to_hz(all[6]), 0.1 * options.low_hz);
   ASSERT_LT(to_hz(all[11]), 0.5 * options.low_hz);
   ASSERT_GT(to_hz(all[12]), options.low_hz);
   ASSERT_GT(all[6], 1e-12) << "not rigid";
@@ -98,6 +104,23 @@ TEST(Proof, counts_a_low_end_with_modes_below_it) {
     EXPECT_LE(modes.proof.counts.front().freq_hz, options.low_hz);
     EXPECT_EQ(modes.proof.method.find("first shift"), std::string::npos) << modes.proof.method;
   }
+}
+
+// Modes a little below the band are found with those of the band: no factorisation at its lower end.
+TEST(Proof, finds_modes_just_below_the_band) {
+  const Network two = make_threaded_blocks(100);
+  const std::vector<double> all = test::calc_all_eigenvalues(two);
+  const test::System system = test::make_system(two);
+  Options options;
+  options.high_hz = to_hz(0.5 * (all[90] + all[91]));
+  options.low_hz = 0.5 * (to_hz(all[8]) + to_hz(all[9]));
+  ASSERT_GT(to_hz(all[6]), 0.1 * options.low_hz);
+  const Modes modes = solve_modes(system.problem, options);
+  expect_eigenvalues(modes, {all.begin() + 9, all.begin() + 91});
+  EXPECT_EQ(modes.count_below_low, 9);
+  EXPECT_EQ(modes.mechanism_count, 0);
+  EXPECT_NE(modes.proof.method.find("first shift"), std::string::npos) << modes.proof.method;
+  EXPECT_EQ(modes.factor.factorisations, 2) << "at the upper end and at the shift";
 }
 
 TEST(Proof, counts_a_small_body_by_its_whole_spectrum) {

@@ -72,7 +72,7 @@ TEST(RefineModes, brings_spoiled_modes_back_within_the_tolerance) {
 class RoundingFactor : public ShiftedFactor {
  public:
   explicit RoundingFactor(ShiftedFactor& exact) : exact_(exact) {}
-  bool factorise(double sigma) override { return exact_.factorise(sigma); }
+  bool try_factorise(double sigma) override { return exact_.factorise(sigma); }
   void solve(const double* b, double* x, std::ptrdiff_t stride, int columns) override {
     exact_.solve(b, x, stride, columns);
     for (std::ptrdiff_t i = 0; i < stride * columns; ++i) x[i] *= 1 + 1e-7 * std::sin(12.9898 * static_cast<double>(i + 1));
