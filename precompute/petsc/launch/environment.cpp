@@ -56,6 +56,7 @@ void prepare_environment() {
   ::unsetenv("PETSC_OPTIONS_YAML");
   base::isolate_lone_process();
   if (is_on_one_host()) ::setenv("OMPI_MCA_pml", "ob1", 0);
+  if (std::getenv("SLURM_JOB_ID") == nullptr) ::setenv("OMPI_MCA_mpi_yield_when_idle", "1", 0);
   ::setenv("HWLOC_COMPONENTS", "-gl", 0);
   ::setenv("GLIBC_TUNABLES", "glibc.malloc.hugetlb=1", 0);
   choose_kernels();

@@ -72,6 +72,18 @@ TEST(Environment, has_the_transport_of_one_host_only_on_one_host) {
   EXPECT_THAT(std::getenv("OMPI_MCA_pml"), StrEq("ob1"));
 }
 
+TEST(Environment, lets_waiting_ranks_yield_except_under_slurm) {
+  const Environment yields("OMPI_MCA_mpi_yield_when_idle", nullptr), job("SLURM_JOB_ID", "7");
+  prepare_environment();
+  EXPECT_EQ(std::getenv("OMPI_MCA_mpi_yield_when_idle"), nullptr);
+  ::unsetenv("SLURM_JOB_ID");
+  prepare_environment();
+  EXPECT_THAT(std::getenv("OMPI_MCA_mpi_yield_when_idle"), StrEq("1"));
+  ::setenv("OMPI_MCA_mpi_yield_when_idle", "0", 1);
+  prepare_environment();
+  EXPECT_THAT(std::getenv("OMPI_MCA_mpi_yield_when_idle"), StrEq("0"));  // set by the user
+}
+
 TEST(Environment, isolates_a_rank_that_no_launcher_started) {
   const std::array<Environment, 7> none{{{"OMPI_MCA_ess_singleton_isolated", nullptr},
                                          {"OMPI_COMM_WORLD_RANK", nullptr},
