@@ -14,14 +14,17 @@
 
 namespace carillon {
 
-/// Poses and contact points of any MultibodySystem with compliant contact. Options of the carillon_touches: points_after 1, compliant 1.
+/// Poses and contact points of any MultibodySystem. Options of the carillon_touches: points_after 1, compliant 1 (impacts: 0).
 /// One thread: that of the physics.
 class SimbodyTouches {
  public:
-  /// All must outlive this object.
+  /// With compliant contact. All must outlive this object.
   SimbodyTouches(const SimTK::MultibodySystem& system, const SimTK::SimbodyMatterSubsystem& matter,
                  const SimTK::ContactTrackerSubsystem& tracker, const SimTK::CompliantContactSubsystem& contact, carillon_touches* touches)
-      : system_(system), matter_(matter), tracker_(tracker), contact_(contact), touches_(touches) {}
+      : system_(system), matter_(matter), tracker_(&tracker), contact_(&contact), touches_(touches) {}
+  /// With impacts (SimTK::UnilateralContact): points by add_point() only.
+  SimbodyTouches(const SimTK::MultibodySystem& system, const SimTK::SimbodyMatterSubsystem& matter, carillon_touches* touches)
+      : system_(system), matter_(matter), touches_(touches) {}
 
   /// `index` of carillon_touches_add, one after another from 0. Bodies that are not added are the ground. `mesh`: rotation of the frame of
   /// the bank's mesh in the body's frame. `flags`: CARILLON_JOINTED for bodies on joints.
@@ -50,11 +53,23 @@ class SimbodyTouches {
     forces_ = std::move(forces);
     last_s_ = state.getTime();
   }
+  /// A point of body a against b (-1: the ground) that other than compliant contact pushes apart in this step, before step(). `where`: on b
+  /// in the world; `normal`: unit, from b to a; `gap`: of the surfaces at the end of the step. Its impulse is found from the velocities.
+  void add_point(std::int32_t a, std::int32_t b, const SimTK::Vec3& where, const SimTK::UnitVec3& normal, double gap) {
+    carillon_point point = carillon_point();
+    point.a = a;
+    point.b = b;
+    copy(where, point.point_m);
+    copy(SimTK::Vec3(normal), point.normal);
+    copy(SimTK::Vec3(SimTK::NaN), point.friction_n_s);
+    point.gap_m = gap;
+    point.impulse_n_s = point.curvature_per_m = NAN;
+    points_.push_back(point);
+  }
   /// Hands over the steps added since the last call: each one, or those of a step of the program. Status and message as of
   /// carillon_touches_step.
   carillon_status step(const SimTK::State& state, char* message, std::size_t size) {
     read_poses(state);
-    points_.clear();
     for (const auto& [pair, sum] : sums_) {
       const double impulse = sum.normal_n.norm();
       if (!(impulse > 0)) continue;
@@ -76,8 +91,9 @@ class SimbodyTouches {
       points_.push_back(point);
     }
     sums_.clear();
-    return carillon_touches_step(touches_, state.getTime(), poses_.data(), static_cast<std::int32_t>(poses_.size()), points_.data(),
-                                 static_cast<std::int32_t>(points_.size()), message, size);
+    const std::vector<carillon_point> points = std::exchange(points_, {});
+    return carillon_touches_step(touches_, state.getTime(), poses_.data(), static_cast<std::int32_t>(poses_.size()), points.data(),
+                                 static_cast<std::int32_t>(points.size()), message, size);
   }
 
  private:
@@ -98,7 +114,7 @@ class SimbodyTouches {
     for (int k = 0; k < 3; ++k) to[k] = from[k];
   }
   std::int32_t find(SimTK::ContactSurfaceIndex surface) const {
-    const auto found = indices_.find(tracker_.getMobilizedBody(surface).getMobilizedBodyIndex());
+    const auto found = indices_.find(tracker_->getMobilizedBody(surface).getMobilizedBodyIndex());
     return found == indices_.end() ? -1 : found->second;
   }
 
@@ -141,16 +157,17 @@ class SimbodyTouches {
     return matter_.getMobilizedBody(bodies_[static_cast<std::size_t>(body)].index).findStationAtGroundPoint(state, point);
   }
   Forces read_forces(const SimTK::State& state) const {
-    system_.realize(state, SimTK::Stage::Dynamics);
     Forces forces;
-    const SimTK::ContactSnapshot& active = tracker_.getActiveContacts(state);
-    for (int i = 0; i < contact_.getNumContactForces(state); ++i) {
-      const SimTK::ContactForce& from = contact_.getContactForce(state, i);
+    if (contact_ == nullptr) return forces;
+    system_.realize(state, SimTK::Stage::Dynamics);
+    const SimTK::ContactSnapshot& active = tracker_->getActiveContacts(state);
+    for (int i = 0; i < contact_->getNumContactForces(state); ++i) {
+      const SimTK::ContactForce& from = contact_->getContactForce(state, i);
       const SimTK::Contact& contact = active.getContactById(from.getContactId());
       const std::int32_t first = find(contact.getSurface1()), second = find(contact.getSurface2());
       const SimTK::Vec3 force = (second < 0 ? -1.0 : 1.0) * from.getForceOnSurface2()[1];
       SimTK::ContactPatch patch;
-      if (first == second || !(force.norm() > 0) || !contact_.calcContactPatchDetailsById(state, from.getContactId(), patch)) continue;
+      if (first == second || !(force.norm() > 0) || !contact_->calcContactPatchDetailsById(state, from.getContactId(), patch)) continue;
       SimTK::Vec3 normal(0);  // of a mesh the mean of its elements
       for (int k = 0; k < patch.getNumDetails(); ++k)
         normal += patch.getContactDetail(k).getForceOnSurface2().norm() * patch.getContactDetail(k).getContactNormal();
@@ -168,8 +185,8 @@ class SimbodyTouches {
 
   const SimTK::MultibodySystem& system_;
   const SimTK::SimbodyMatterSubsystem& matter_;
-  const SimTK::ContactTrackerSubsystem& tracker_;
-  const SimTK::CompliantContactSubsystem& contact_;
+  const SimTK::ContactTrackerSubsystem* tracker_ = nullptr;
+  const SimTK::CompliantContactSubsystem* contact_ = nullptr;
   carillon_touches* touches_;
   std::vector<Body> bodies_;
   std::map<SimTK::MobilizedBodyIndex, std::int32_t> indices_;
