@@ -41,7 +41,8 @@ struct Contact {
   }
   /// Closed, not in a modal impact, not a cord.
   bool carries() const { return !presses && cord < 0 && touch.gap_m <= kTouchGapM; }
-  bool is_closed() const { return touching && touch.gap_m <= kTouchGapM; }
+  /// A rolling contact stays closed where its gap drifts.
+  bool is_closed() const { return touching && touch.gap_m <= (touch.smooth ? kGapDriftM : kTouchGapM); }
 };
 
 /// Contacts of two bodies, of a body and the ground, or of a cord.

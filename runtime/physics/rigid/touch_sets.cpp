@@ -270,7 +270,8 @@ bool TouchSets::complete(Pair& pair, const geometry::Frame& a, const geometry::F
   }
   const auto [lowest, least_m] = find_least(pair, a, b);
   if (deepest.gap_m < std::min(least_m, 0.0) - kMissingDepthM) return add(pair, deepest), true;
-  if (lowest == nullptr || lowest->touch.gap_m <= kTouchGapM || least_m > -kMissingDepthM || lowest->rests || !(closing_s > 0.0))
+  if (lowest == nullptr || lowest->is_closed() || lowest->touch.gap_m <= kTouchGapM || least_m > -kMissingDepthM || lowest->rests ||
+      !(closing_s > 0.0))
     return false;
   lowest->touching = false;
   return std::exchange(lowest->closes_s, closing_s * lowest->touch.gap_m / (lowest->touch.gap_m - least_m)) < 0.0;

@@ -28,7 +28,6 @@ constexpr double kRollingStepRatio = 4.0;  // longest step, times options.step_s
 constexpr double kQuietS = 10e-3;          // s; required time without an impact
 constexpr double kNearRatio = 0.02;        // fraction of its size,
 constexpr double kTravelRatio = 3.0;       // or touch travel per window: no vertex farther from the touches may come down
-constexpr double kGapDriftM = 5e-7;        // m; maximum change of a gap per step
 constexpr double kMaxTurnRad = 0.05;       // rad; maximum rotation of a normal in the body per step
 constexpr double kMaxSpanRatio = 0.25;     // fraction of its size: touches farther apart prevent hopping
 
