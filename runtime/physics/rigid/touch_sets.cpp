@@ -356,7 +356,7 @@ double TouchSets::calc_way(const Pair& pair, double time_s, double step_s) const
 }
 
 void TouchSets::travel(Pair& pair, double time_s, double step_s) const {
-  pair.travelled_m += calc_way(pair, time_s, step_s) + 1e-12;
+  pair.travelled_m += calc_way(pair, time_s, step_s) + Pair::kMovedM;
   if (pair.sag_m > 0.0) pair.sag_m *= std::exp(-time_s / kSagDecayS);
   limit_apart(pair);
   if (pair.sag_m < kDeepM) lose_stored(pair);

@@ -211,7 +211,10 @@ void Windows::find_rolling(base::Groups& groups) {
     const geometry::Shape& shape = *bodies_.get_shape(body);
     rolling_[body].spans = norm(stations.front() - stations.back()) > kMaxSpanRatio * shape.get_size_m();
     const double far_m = std::max(kNearRatio * shape.get_size_m(), kTravelRatio * last.way_m * find_steps(body));
-    if (geometry::may_tip(shape, bodies_.get_frame(body), up, bodies_.placed(body).spin, stations, far_m, get_length())) rolls[body] = 0;
+    if (geometry::may_tip(shape, bodies_.get_frame(body), up, bodies_.placed(body).spin, stations, far_m, get_length()))
+      rolls[body] = 0;
+    else if (pair->b < 0)
+      pair->renew_search();
   }
   for (int i = 0; i < count; ++i) {
     Rolling& r = rolling_[i];
