@@ -41,6 +41,8 @@ struct Contact {
   }
   /// Closed, not in a modal impact, not a cord.
   bool carries() const { return !presses && cord < 0 && touch.gap_m <= kTouchGapM; }
+  /// Touching, or of a curved surface that hops over its facets.
+  bool is_close() const { return touching || (touch.smooth && touch.gap_m <= kMissingDepthM); }
   /// A rolling contact stays closed where its gap drifts.
   bool is_closed() const { return touching && touch.gap_m <= (touch.smooth ? kGapDriftM : kTouchGapM); }
 };

@@ -190,9 +190,9 @@ void TouchSets::refresh(Pair& pair) const {
     const bool follows = is_there || follow(pair, c.touch, a, b);
     if (is_there) c.touch = pair.ahead.touches[k++];
     pair.searched = pair.searched && follows;
-    if (c.touching && c.touch.smooth) {
+    if (c.touch.smooth && c.is_close()) {
       const double way_m = geometry::calc_travel(before, c.touch);
-      pair.errors.drift_m = std::max(pair.errors.drift_m, std::abs(c.touch.gap_m - before.gap_m));
+      if (c.touching) pair.errors.drift_m = std::max(pair.errors.drift_m, std::abs(c.touch.gap_m - before.gap_m));
       pair.errors.way_m = std::max(pair.errors.way_m, way_m);
       pair.errors.turn = std::max(pair.errors.turn, way_m * c.touch.steepest_per_m);
     }

@@ -196,13 +196,13 @@ void Windows::find_rolling(base::Groups& groups) {
     if (!bodies_.moves(body)) continue;
     const Pair::Errors last = std::exchange(pair->errors, {});
     errors[body] = std::max({errors[body], std::cbrt(last.drift_m / kGapDriftM), last.turn / kMaxTurnRad});
-    if (pair->cord >= 0 || start_s_ < pair->rattles_until_s || pair->sag_m > 0.0) rolls[body] = 0;
+    if (pair->cord >= 0 || pair->sag_m > 0.0) rolls[body] = 0;
     if (rolls[body] == 0) continue;
     stations.clear();
     Vec3 up{};
     for (const Contact& c : pair->contacts) {
       if (c.presses || (c.touching && !c.touch.smooth)) rolls[body] = 0;
-      if (!c.touching) continue;
+      if (!c.is_close()) continue;
       stations.push_back(body == pair->a ? c.touch.station_a : c.touch.station_b);
       up = (body == pair->a ? 1.0 : -1.0) * c.touch.normal;
     }
