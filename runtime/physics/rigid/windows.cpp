@@ -19,10 +19,11 @@ constexpr double kMaxSteps = 1024;  // per window
 constexpr double kLongStepRatio =
     0.15;                          // fraction of the thinner body's thickness: a pair that moves this far in a long step takes short ones
 constexpr double kArcSagM = 5e-6;  // m; permitted deviation of a point on an arc from its chord in a step,
-constexpr double kArcSagRatio = 5e-4;     // the same relative to the thickness of its body
-constexpr double kRollingArcRatio = 4.0;  // times the arc bounded by a body's box: keeps long rolling bodies within 50 um
-constexpr double kFlatStepRatio = 2.0;    // times the step of others: for groups with flat contacts only
-constexpr double kBoxMarginM = 1e-4;      // m; enlargement of boxes
+constexpr double kArcSagRatio = 5e-4;       // the same relative to the thickness of its body
+constexpr double kRollingArcRatio = 4.0;    // times the arc bounded by a body's box: keeps long rolling bodies within 50 um
+constexpr double kSpanningArcRatio = 0.25;  // the same on smooth touches far apart, which follow the surface
+constexpr double kFlatStepRatio = 2.0;      // times the step of others: for groups with flat contacts only
+constexpr double kBoxMarginM = 1e-4;        // m; enlargement of boxes
 // A body that rolls alone on smooth touches takes longer steps:
 constexpr double kRollingStepRatio = 4.0;  // longest step, times options.step_s
 constexpr double kQuietS = 10e-3;          // s; required time without an impact
@@ -265,7 +266,7 @@ void Windows::choose_steps() {
     const Solid& solid = bodies_.solid(i);
     const double sag = std::max(kArcSagM, kArcSagRatio * solid.shape->get_thickness_m());
     const double spin = norm(bodies_.placed(i).spin);
-    const double rolls = rolling_[i].asked > 0.0 && rolling_[i].spans ? 1.0 : kRollingArcRatio;
+    const double rolls = rolling_[i].asked > 0.0 && rolling_[i].spans ? kSpanningArcRatio : kRollingArcRatio;
     ask(i, length_s * std::sqrt(spin * std::min(rolls * bodies_.calc_turning_speed(i), spin * solid.radius_m) / (2.0 * sag)));
   }
   // Powers of two: the steps of a group do not depend on other groups.
