@@ -41,7 +41,10 @@ struct Contact {
   }
   /// Closed, not in a modal impact, not a cord.
   bool carries() const { return !presses && cord < 0 && touch.gap_m <= kTouchGapM; }
-  bool is_closed() const { return touching && touch.gap_m <= kTouchGapM; }
+  /// Touching, or of a curved surface that hops over its facets.
+  bool is_close() const { return touching || (touch.smooth && touch.gap_m <= kMissingDepthM); }
+  /// A rolling contact stays closed where its gap drifts.
+  bool is_closed() const { return touching && touch.gap_m <= (touch.smooth ? kGapDriftM : kTouchGapM); }
 };
 
 /// Contacts of two bodies, of a body and the ground, or of a cord.
@@ -54,6 +57,7 @@ struct Pair {
     std::vector<geometry::Touch> touches;  // of the contacts; cleared whenever they change
   };
   Ahead ahead;                               // at predicted frames
+  static constexpr double kMovedM = 1e-12;   // m; least travel of touches that must be refreshed
   double margin_m = 0.0, travelled_m = 0.0;  // since the last search
   struct Errors {
     double drift_m = 0.0, way_m = 0.0, turn = 0.0;
@@ -75,6 +79,8 @@ struct Pair {
   double sag_m = 0.0;                  // depth left by an ended modal impact: permitted, decays
   Vec3 apart_m{};                      // displacement of a in touch searches if the penetration is large for the thickness
 
+  /// Nothing but the present touches comes near: as after a search.
+  void renew_search() { travelled_m = std::min(travelled_m, kMovedM); }
   double take_stopped_j() { return std::exchange(stopped_j, 0.0); }
   bool touches() const {
     return std::any_of(contacts.begin(), contacts.end(), [](const Contact& c) { return c.touching; });

@@ -7,6 +7,7 @@ inline constexpr double kMinImpactSpeedMS = 1e-3;   // m/s; slower touches are n
 inline constexpr double kRattleSpeedMS = 8e-2;      // m/s; slower touches of a rattling pair are no impacts
 inline constexpr double kSimultaneousS = 1e-4;      // s; touches nearer in time are one impact
 inline constexpr double kTouchGapM = 1e-7;          // m; smaller gaps count as contact
+inline constexpr double kGapDriftM = 5e-7;          // m; change of the gap of a rolling contact per step
 inline constexpr double kDeepM = 2e-6;              // m; deeper contacts are pushed out
 inline constexpr double kMaxDepthM = 2e-5;          // m; deeper bodies are moved apart
 inline constexpr double kMissingDepthM = 5e-6;      // m; excess of a missing touch over all touches of a pair

@@ -21,7 +21,7 @@ constexpr double kLooseSpeedRatio = 1e-3;                // relative to the fast
 constexpr double kMaxLooseMS = 0.3 * kMinImpactSpeedMS;  // upper bound: standing bodies must not strike
 constexpr int kMaxStepGuesses = 6;                       // of a factorised problem per step
 constexpr double kRetryS = 4e-3;                         // s; time by sweeps after failed guesses,
-constexpr double kSmallRetryS = 1e-3;                    // s; for a small island
+constexpr double kExactRetryS = 1e-3;                    // s; where accuracy matters
 constexpr int kProofSweeps = 600;                        // sweeps of a test of rest,
 constexpr int kMaxProofSweeps = 1200;                    // for bodies slow for kLongSlowS
 
@@ -58,16 +58,17 @@ void StepProblem::find_impulses(Step& step) {
   const bool settles = fastest < kSettlingSpeedMS;
   const bool is_small = count <= options_.max_direct && static_cast<int>(points.size()) <= kMaxDirectPoints;
   const bool rolls = std::any_of(points.begin(), points.end(), [](const Point& p) { return p.rolling_m > 0.0; });
+  const bool is_exact = is_small && (count == 1 || rolls || !step.articulations.empty());  // fast bodies that tumble need less
   const auto factorise = [&](bool are_swept) {
-    if (solver_.solve_directly(movers, points, is_small ? kMaxGuesses : kMaxStepGuesses, are_swept) && !gains_energy(free, step))
+    if (solver_.solve_directly(movers, points, is_exact ? kMaxGuesses : kMaxStepGuesses, are_swept) && !gains_energy(free, step))
       return true;
     // Rolling bodies conserve energy better this way, even if a guess fails occasionally.
-    const double pause_s = !is_small ? kRetryS : rolls ? 0.0 : kSmallRetryS;
+    const double pause_s = !is_exact ? kRetryS : rolls ? 0.0 : kExactRetryS;
     for (const int body : bodies) next_guess_s_[body] = bodies_.get_time() + pause_s;
     return false;
   };
   const auto sweep = [&](int max) {
-    const bool is_loose = !settles && !is_small;  // fast motion needs less accuracy than bodies coming to rest
+    const bool is_loose = !settles && !is_exact;  // fast motion needs less accuracy than bodies coming to rest
     const double tolerance =
                      is_loose ? std::max(kLooseRatio * tolerance_m_s, std::min(kLooseSpeedRatio * fastest, kMaxLooseMS)) : tolerance_m_s,
                  left = solver_.solve(movers, points, tolerance, max);

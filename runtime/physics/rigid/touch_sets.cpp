@@ -190,9 +190,9 @@ void TouchSets::refresh(Pair& pair) const {
     const bool follows = is_there || follow(pair, c.touch, a, b);
     if (is_there) c.touch = pair.ahead.touches[k++];
     pair.searched = pair.searched && follows;
-    if (c.touching && c.touch.smooth) {
+    if (c.touch.smooth && c.is_close()) {
       const double way_m = geometry::calc_travel(before, c.touch);
-      pair.errors.drift_m = std::max(pair.errors.drift_m, std::abs(c.touch.gap_m - before.gap_m));
+      if (c.touching) pair.errors.drift_m = std::max(pair.errors.drift_m, std::abs(c.touch.gap_m - before.gap_m));
       pair.errors.way_m = std::max(pair.errors.way_m, way_m);
       pair.errors.turn = std::max(pair.errors.turn, way_m * c.touch.steepest_per_m);
     }
@@ -270,7 +270,8 @@ bool TouchSets::complete(Pair& pair, const geometry::Frame& a, const geometry::F
   }
   const auto [lowest, least_m] = find_least(pair, a, b);
   if (deepest.gap_m < std::min(least_m, 0.0) - kMissingDepthM) return add(pair, deepest), true;
-  if (lowest == nullptr || lowest->touch.gap_m <= kTouchGapM || least_m > -kMissingDepthM || lowest->rests || !(closing_s > 0.0))
+  if (lowest == nullptr || lowest->is_closed() || lowest->touch.gap_m <= kTouchGapM || least_m > -kMissingDepthM || lowest->rests ||
+      !(closing_s > 0.0))
     return false;
   lowest->touching = false;
   return std::exchange(lowest->closes_s, closing_s * lowest->touch.gap_m / (lowest->touch.gap_m - least_m)) < 0.0;
@@ -355,7 +356,7 @@ double TouchSets::calc_way(const Pair& pair, double time_s, double step_s) const
 }
 
 void TouchSets::travel(Pair& pair, double time_s, double step_s) const {
-  pair.travelled_m += calc_way(pair, time_s, step_s) + 1e-12;
+  pair.travelled_m += calc_way(pair, time_s, step_s) + Pair::kMovedM;
   if (pair.sag_m > 0.0) pair.sag_m *= std::exp(-time_s / kSagDecayS);
   limit_apart(pair);
   if (pair.sag_m < kDeepM) lose_stored(pair);

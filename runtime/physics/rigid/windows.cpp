@@ -19,16 +19,16 @@ constexpr double kMaxSteps = 1024;  // per window
 constexpr double kLongStepRatio =
     0.15;                          // fraction of the thinner body's thickness: a pair that moves this far in a long step takes short ones
 constexpr double kArcSagM = 5e-6;  // m; permitted deviation of a point on an arc from its chord in a step,
-constexpr double kArcSagRatio = 5e-4;     // the same relative to the thickness of its body
-constexpr double kRollingArcRatio = 4.0;  // times the arc bounded by a body's box: keeps long rolling bodies within 50 um
-constexpr double kFlatStepRatio = 2.0;    // times the step of others: for groups with flat contacts only
-constexpr double kBoxMarginM = 1e-4;      // m; enlargement of boxes
+constexpr double kArcSagRatio = 5e-4;       // the same relative to the thickness of its body
+constexpr double kRollingArcRatio = 4.0;    // times the arc bounded by a body's box: keeps long rolling bodies within 50 um
+constexpr double kSpanningArcRatio = 0.25;  // the same on smooth touches far apart, which follow the surface
+constexpr double kFlatStepRatio = 2.0;      // times the step of others: for groups with flat contacts only
+constexpr double kBoxMarginM = 1e-4;        // m; enlargement of boxes
 // A body that rolls alone on smooth touches takes longer steps:
 constexpr double kRollingStepRatio = 4.0;  // longest step, times options.step_s
 constexpr double kQuietS = 10e-3;          // s; required time without an impact
 constexpr double kNearRatio = 0.02;        // fraction of its size,
 constexpr double kTravelRatio = 3.0;       // or touch travel per window: no vertex farther from the touches may come down
-constexpr double kGapDriftM = 5e-7;        // m; maximum change of a gap per step
 constexpr double kMaxTurnRad = 0.05;       // rad; maximum rotation of a normal in the body per step
 constexpr double kMaxSpanRatio = 0.25;     // fraction of its size: touches farther apart prevent hopping
 
@@ -197,13 +197,13 @@ void Windows::find_rolling(base::Groups& groups) {
     if (!bodies_.moves(body)) continue;
     const Pair::Errors last = std::exchange(pair->errors, {});
     errors[body] = std::max({errors[body], std::cbrt(last.drift_m / kGapDriftM), last.turn / kMaxTurnRad});
-    if (pair->cord >= 0 || start_s_ < pair->rattles_until_s || pair->sag_m > 0.0) rolls[body] = 0;
+    if (pair->cord >= 0 || pair->sag_m > 0.0) rolls[body] = 0;
     if (rolls[body] == 0) continue;
     stations.clear();
     Vec3 up{};
     for (const Contact& c : pair->contacts) {
       if (c.presses || (c.touching && !c.touch.smooth)) rolls[body] = 0;
-      if (!c.touching) continue;
+      if (!c.is_close()) continue;
       stations.push_back(body == pair->a ? c.touch.station_a : c.touch.station_b);
       up = (body == pair->a ? 1.0 : -1.0) * c.touch.normal;
     }
@@ -212,7 +212,10 @@ void Windows::find_rolling(base::Groups& groups) {
     const geometry::Shape& shape = *bodies_.get_shape(body);
     rolling_[body].spans = norm(stations.front() - stations.back()) > kMaxSpanRatio * shape.get_size_m();
     const double far_m = std::max(kNearRatio * shape.get_size_m(), kTravelRatio * last.way_m * find_steps(body));
-    if (geometry::may_tip(shape, bodies_.get_frame(body), up, bodies_.placed(body).spin, stations, far_m, get_length())) rolls[body] = 0;
+    if (geometry::may_tip(shape, bodies_.get_frame(body), up, bodies_.placed(body).spin, stations, far_m, get_length()))
+      rolls[body] = 0;
+    else if (pair->b < 0)
+      pair->renew_search();
   }
   for (int i = 0; i < count; ++i) {
     Rolling& r = rolling_[i];
@@ -263,7 +266,7 @@ void Windows::choose_steps() {
     const Solid& solid = bodies_.solid(i);
     const double sag = std::max(kArcSagM, kArcSagRatio * solid.shape->get_thickness_m());
     const double spin = norm(bodies_.placed(i).spin);
-    const double rolls = rolling_[i].asked > 0.0 && rolling_[i].spans ? 1.0 : kRollingArcRatio;
+    const double rolls = rolling_[i].asked > 0.0 && rolling_[i].spans ? kSpanningArcRatio : kRollingArcRatio;
     ask(i, length_s * std::sqrt(spin * std::min(rolls * bodies_.calc_turning_speed(i), spin * solid.radius_m) / (2.0 * sag)));
   }
   // Powers of two: the steps of a group do not depend on other groups.

@@ -12,6 +12,7 @@
 
 #include "tests/unit/runtime/physics/bodies.hpp"
 #include "tests/unit/runtime/physics/leaning_train.hpp"
+#include "tests/unit/runtime/physics/rigid/drops.hpp"
 
 namespace carillon::physics::tests {
 namespace {
@@ -85,6 +86,34 @@ TEST(Rolling, LossByRollingResistance) {
     EXPECT_NEAR(motions.back().velocity_m_s[0] / (0.5 - 5.0 / 7.0 * kRollingResistance * kGravity * 4.0), 1.0, 0.003) << n;
     EXPECT_EQ(hits, 0) << n;
   }
+}
+
+TEST(Rolling, NoHitsOverFacets) {
+  const bank::Bank ball = make_round(0.03, 6);
+  for (const double speed : {0.51, 0.54, 0.55, 0.57}) {
+    WorldSpec w;
+    w.ground = GroundSpec{};
+    w.bodies = {make_body(ball, {0, 0, 0.03}, 0.5)};
+    w.bodies[0].velocity_m_s = {speed, 0, 0};
+    w.bodies[0].angular_velocity_rad_s = {0, speed / 0.03, 0};
+    int hits = 0;
+    run(w, 4.0, &hits);
+    EXPECT_EQ(hits, 0) << speed << " m/s";
+  }
+}
+
+TEST(Rolling, AccelerationOfFastPen) {
+  // 20 facets: from 0.5 m/s on it leaves the plane by micrometres.
+  const double a = 5.0 * M_PI / 180, radius = 0.0045, end_s = 2.0;
+  const bank::Bank pen = make_bank(rigid::tests::make_drop_surface(4));
+  WorldSpec w;
+  w.ground = GroundSpec{};
+  w.gravity_m_s2 = {kGravity * std::sin(a), 0, -kGravity * std::cos(a)};
+  w.bodies = {make_body(pen, {0, 0, radius}, 0.4)};
+  w.bodies[0].initial.rotation = {std::sqrt(0.5), std::sqrt(0.5), 0, 0};
+  const double inertia = pen.rigid.inertia_kg_m2[8] / (pen.rigid.mass_kg * radius * radius);
+  const double expected = kGravity * (std::sin(a) - kRollingResistance * std::cos(a)) / (1.0 + inertia);
+  EXPECT_NEAR(get_at(run(w, end_s)[0], end_s).position_m[0] / (0.5 * expected * end_s * end_s), 1.0, 0.002);
 }
 
 class SlidingToRolling : public testing::TestWithParam<std::tuple<double, double>> {};
