@@ -21,27 +21,6 @@ namespace {
 
 constexpr std::size_t kMaxLine = 1000;
 
-/// Words of a line; a word in double quotes may have spaces.
-std::vector<std::string> split(std::string_view line) {
-  std::vector<std::string> words;
-  bool is_quoted = false, is_word = false;
-  for (const char c : line) {
-    if (c == '"') {
-      is_quoted = !is_quoted;
-      if (is_quoted) words.emplace_back();
-      is_word = is_quoted;
-    } else if (!is_quoted && (c == ' ' || c == '\t' || c == '\r')) {
-      is_word = false;
-    } else {
-      if (!is_word) words.emplace_back();
-      is_word = true;
-      words.back() += c;
-    }
-  }
-  if (is_quoted) throw InputError("a name has a double quote at its start only; close it");
-  return words;
-}
-
 double read_number(const std::string& word) {
   double value = 0.0;
   const char* const end = word.data() + word.size();
@@ -125,8 +104,28 @@ const char* const kCommandText =
     "where NAME                   print the position of its centre of mass [m]\n"
     "quit                         end before the scene does\n";
 
-std::string carry_out(std::string_view line, const Hands& hands) {
-  const std::vector<std::string> words = split(line.substr(0, line.find('#') == 0 ? 0 : line.size()));
+std::vector<std::string> split(std::string_view line) {
+  std::vector<std::string> words;
+  if (line.starts_with('#')) return words;
+  bool is_quoted = false, is_word = false;
+  for (const char c : line) {
+    if (c == '"') {
+      is_quoted = !is_quoted;
+      if (is_quoted) words.emplace_back();
+      is_word = is_quoted;
+    } else if (!is_quoted && (c == ' ' || c == '\t' || c == '\r')) {
+      is_word = false;
+    } else {
+      if (!is_word) words.emplace_back();
+      is_word = true;
+      words.back() += c;
+    }
+  }
+  if (is_quoted) throw InputError("a name has a double quote at its start only; close it");
+  return words;
+}
+
+std::string carry_out(const std::vector<std::string>& words, const Hands& hands) {
   if (words.empty()) return {};
   const auto found = get_commands().find(words[0]);
   if (found == get_commands().end()) {

@@ -19,10 +19,12 @@ struct Hands {
   std::vector<std::string> names;  // of the bodies, in order
 };
 
-/// Carries out one command: a word, the name of a body (in double quotes if it has spaces), and numbers; points in metres, in the world.
-/// Returns a line of text to print, or none. An empty line, and one that begins with #, does nothing. Throws InputError, and changes
-/// nothing, for a line that cannot be used.
-std::string carry_out(std::string_view line, const Hands& hands);
+/// Words of a line; a word in double quotes may have spaces. None if it begins with #. Throws InputError for quotes that are not closed.
+std::vector<std::string> split(std::string_view line);
+
+/// Carries out one command: a word, the name of a body, and numbers; points in metres, in the world. Returns a line of text to print, or
+/// none. No words do nothing. Throws InputError, and changes nothing, for words that cannot be used.
+std::string carry_out(const std::vector<std::string>& words, const Hands& hands);
 
 /// Lines that have arrived at a file descriptor, without waiting for more.
 class LineReader {
