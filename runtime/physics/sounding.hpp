@@ -17,6 +17,9 @@ class Sounding {
   /// `masks_hits`: omits hits masked by earlier ones.
   Sounding(const WorldSpec& spec, const rigid::Space& space, bool masks_hits);
 
+  /// The last body of the space is new.
+  void add_body(const BodySpec& body);
+
   /// Pulses of an impact.
   void add(const rigid::Strike& strike, std::vector<events::Event>& events);
   /// An impact with modes, for the masks.
