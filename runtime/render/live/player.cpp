@@ -108,19 +108,17 @@ void print_statistics(const DeviceStatistics& card, const synth::SynthesiserCoun
 void play(const PlayerOptions& options) {
   scene::Scene scene = scene::read_scene(options.scene);
   render::refuse_surfaces(scene, "carillon-live");
-  const scene::Banks banks = scene::read_banks(scene, options.quiet);
-  std::vector<const bank::Bank*> body_banks;
-  for (const scene::SceneBody& body : scene.bodies) body_banks.push_back(body.spec.bank);
+  scene::Banks banks = scene::read_banks(scene, options.quiet);
   warn(scene.warnings);
   const double gain_per_pa = options.gain_per_pa > 0.0 ? options.gain_per_pa : scene.output.gain_per_pa.value_or(1.0);
   render::Stage stage(
-      scene, body_banks,
-      {.look_ahead_s = options.look_ahead_s, .gain_per_pa = gain_per_pa, .moves_fixed = options.takes_commands || !options.osc.empty()});
+      scene,
+      {.look_ahead_s = options.look_ahead_s, .gain_per_pa = gain_per_pa, .is_handled = options.takes_commands || !options.osc.empty()});
   warn(stage.get_warnings());
   synth::Synthesiser& synthesiser = stage.get_synthesiser();
   const double rate_hz = scene.sample_rate_hz;
   Device device(synthesiser, {.name = options.device, .null = options.null, .rate_hz = rate_hz, .frames = options.frames});
-  Hands hands{.world = stage.get_world(), .names = {}};
+  Hands hands{.world = stage.get_world(), .names = {}, .make = [&](const std::string& text) { return stage.add_body(text, banks); }};
   for (const scene::SceneBody& body : scene.bodies) hands.names.push_back(body.name);
   Orders orders(options, std::move(hands));
   stage.begin();
@@ -135,7 +133,7 @@ void play(const PlayerOptions& options) {
   device.stop();
   for (std::size_t i = 0; i < scene.bodies.size(); ++i)
     if (const std::string text =
-            render::describe_bending(scene.bodies[i].name, *body_banks[i], synthesiser.get_deflection(static_cast<int>(i)));
+            render::describe_bending(scene.bodies[i].name, *scene.bodies[i].spec.bank, synthesiser.get_deflection(static_cast<int>(i)));
         !text.empty())
       warn({text});
   if (options.quiet) return;

@@ -263,13 +263,30 @@ class Live(unittest.TestCase):
             say('add "the other" 0 3 0.3 0 0 -1', "remove gong")
             wait_for('"the other"', lambda place: place[2] < 0.1)
             self.assertEqual(find("gong")[1], ["absent"])
+            new = {"name": "a new one", "bank": "cube.h5", "position_m": [0, 5, 0.4], "velocity_m_s": [0, 0, -1]}
+            say("add " + json.dumps(new))
+            wait_for('"a new one"', lambda place: abs(place[2] - 0.05) < 0.01)
+            say('push "a new one" 0 0 5')
+            wait_for('"a new one"', lambda place: place[2] > 0.15)
+            say("add " + json.dumps(new), "add " + json.dumps({**new, "name": "third", "position_m": [0, 0, 0]}), 'add {"name": "fourth"}')
             say("jump cube 1", "push cuba 0 0 1", "push cube 0 0", "push cube 0 0 x", "remove gong", "push gong 1 0 0", "drag cube 0 0 0")
             say("quit")
             out, errors = player.communicate(timeout=20)
         self.assertEqual(player.returncode, 0)
         self.assertLess(float(re.search(r"played +(\S+) s", out)[1]), 50.0, "quit ends it")
         self.assertGreater(int(re.search(r"strikes +(\d+)", out)[1]), 3)
-        wanted = ['no command "jump"', 'mean "cube"', "2 numbers", '"x" is no number', "not in the world", "not in the world", "not held"]
+        wanted = [
+            'called "a new one" already',
+            "starts 50.00 mm inside the ground",
+            '"bank" is missing',
+            'no command "jump"',
+            'mean "cube"',
+            "2 numbers",
+            '"x" is no number',
+            "not in the world",
+            "not in the world",
+            "not held",
+        ]
         lines = errors.splitlines()
         self.assertEqual(len(lines), len(wanted), errors)
         for line, words in zip(lines, wanted):
