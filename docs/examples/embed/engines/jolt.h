@@ -1,5 +1,5 @@
-// The steps of a Jolt Physics system for carillon_touches. A sample: compiled with the headers of Jolt after 5.5.0 (3b47ec39, 2026-06-30),
-// not run. C++17; build it with the definitions of your Jolt library.
+// The steps of a Jolt Physics system for carillon_touches. A sample: compiled with Jolt after 5.5.0 (3b47ec39, 2026-06-30), and run with
+// two boxes that fall on each other. C++17; build it with the definitions of your Jolt library.
 //
 //   carillon::JoltTouches jolt(system, touches);        // options of the carillon_touches: points_after 0, compliant 0
 //   system.SetContactListener(&jolt);                   // or call read() in your own listener
