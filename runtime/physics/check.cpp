@@ -52,14 +52,6 @@ void check_rigid(const std::string& who, const bank::RigidBody& r) {
   }
 }
 
-void check_body(const BodySpec& b) {
-  const std::string who = fmt::format("body '{}'", b.name);
-  if (b.bank == nullptr) throw InputError(who + ": has no bank; name the file of its mode bank");
-  check_contact_numbers(who, b.restitution, b.friction, b.bank->material.young_modulus_pa, b.bank->material.poisson_ratio);
-  check_entry(b);
-  if (!b.fixed) check_rigid(who, b.bank->rigid);
-}
-
 void check_joints(const WorldSpec& spec) {
   const int count = static_cast<int>(spec.bodies.size());
   const auto is_fixed = [&](int body) { return body < 0 || spec.bodies[body].fixed; };
@@ -137,6 +129,14 @@ void check_entry(const BodySpec& b) {
   }
   if (b.fixed && !(is_zero(b.velocity_m_s) && is_zero(b.angular_velocity_rad_s)))
     throw InputError(who + ": is fixed but has a velocity; remove one of the two");
+}
+
+void check_body(const BodySpec& b) {
+  const std::string who = fmt::format("body '{}'", b.name);
+  if (b.bank == nullptr) throw InputError(who + ": has no bank; name the file of its mode bank");
+  check_contact_numbers(who, b.restitution, b.friction, b.bank->material.young_modulus_pa, b.bank->material.poisson_ratio);
+  check_entry(b);
+  if (!b.fixed) check_rigid(who, b.bank->rigid);
 }
 
 void check(const WorldSpec& spec, const WorldOptions& options) {

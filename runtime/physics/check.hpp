@@ -10,6 +10,9 @@ namespace carillon::physics {
 /// Throws InputError for the first fault in numbers, masses and inertias, joints (loops, axes) or cords (lengths).
 void check(const WorldSpec& spec, const WorldOptions& options);
 
+/// The same for the numbers of one body.
+void check_body(const BodySpec& body);
+
 /// Throws InputError for a pose or velocities out of range.
 void check_entry(const BodySpec& body);
 

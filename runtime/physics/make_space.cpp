@@ -5,53 +5,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <utility>
 
 #include "runtime/base/error.hpp"
-#include "runtime/drive/mode_sets.hpp"
 #include "runtime/physics/check.hpp"
 
 namespace carillon::physics {
 namespace {
-
-/// Bodies of one bank share their shape.
-using Shapes = std::map<const bank::Bank*, std::shared_ptr<const geometry::Shape>>;
-
-rigid::Solid make_solid(const BodySpec& b, Shapes& shapes) {
-  rigid::Solid solid;
-  auto& shared = shapes[b.bank];
-  if (!shared) {
-    try {
-      shared = std::make_shared<geometry::Shape>(b.bank->vertices_m, b.bank->triangles);
-    } catch (const InputError& e) {
-      throw InputError(fmt::format("body '{}': {}", b.name, e.what()));
-    }
-  }
-  solid.shape = shared;
-  solid.fixed = b.fixed;
-  solid.mass_kg = b.bank->rigid.mass_kg;
-  solid.centre_m = b.bank->rigid.centre_m;
-  if (!b.fixed) {
-    solid.inertia_kg_m2 = make_matrix(b.bank->rigid.inertia_kg_m2);
-    solid.inverse_inertia = calc_inverse(solid.inertia_kg_m2);
-  }
-  for (const Vec3& v : b.bank->vertices_m) solid.radius_m = std::max(solid.radius_m, calc_length(v - solid.centre_m));
-  solid.restitution = b.restitution;
-  solid.friction = b.friction;
-  solid.young_modulus_pa = b.bank->material.young_modulus_pa;
-  solid.poisson_ratio = b.bank->material.poisson_ratio;
-  return solid;
-}
-
-void add_modes(rigid::Solid& solid, const bank::Bank& bank, drive::ModeSets& sets) {
-  solid.modes = sets.find(bank);
-  if (!solid.modes) return;
-  solid.find_shape = [&bank](const geometry::Place& place) { return bank::calc_shapes(bank, place.triangle, place.barycentric); };
-}
 
 /// Stops of a joint: one at each end of its travel.
 void add_stops(const JointSpec& j, const std::vector<rigid::Solid>& solids, const std::vector<rigid::State>& states, rigid::Links& links) {
@@ -103,6 +65,37 @@ rigid::Links make_links(const WorldSpec& spec, const std::vector<rigid::Solid>& 
 
 }  // namespace
 
+rigid::Solid SolidMaker::make(const BodySpec& b) {
+  rigid::Solid solid;
+  auto& shared = shapes_[b.bank];
+  if (!shared) {
+    try {
+      shared = std::make_shared<geometry::Shape>(b.bank->vertices_m, b.bank->triangles);
+    } catch (const InputError& e) {
+      throw InputError(fmt::format("body '{}': {}", b.name, e.what()));
+    }
+  }
+  solid.shape = shared;
+  solid.fixed = b.fixed;
+  solid.mass_kg = b.bank->rigid.mass_kg;
+  solid.centre_m = b.bank->rigid.centre_m;
+  if (!b.fixed) {
+    solid.inertia_kg_m2 = make_matrix(b.bank->rigid.inertia_kg_m2);
+    solid.inverse_inertia = calc_inverse(solid.inertia_kg_m2);
+  }
+  for (const Vec3& v : b.bank->vertices_m) solid.radius_m = std::max(solid.radius_m, calc_length(v - solid.centre_m));
+  solid.restitution = b.restitution;
+  solid.friction = b.friction;
+  solid.young_modulus_pa = b.bank->material.young_modulus_pa;
+  solid.poisson_ratio = b.bank->material.poisson_ratio;
+  if (has_modes_) solid.modes = modes_.find(*b.bank);
+  if (solid.modes)
+    solid.find_shape = [bank = b.bank](const geometry::Place& place) {
+      return bank::calc_shapes(*bank, place.triangle, place.barycentric);
+    };
+  return solid;
+}
+
 rigid::State make_state(const BodySpec& b, const rigid::Solid& solid) {
   rigid::State state;
   state.rotation = rigid::normalise(b.initial.rotation);
@@ -128,15 +121,12 @@ void check_start(const WorldSpec& spec, const rigid::Space& space) {
   }
 }
 
-rigid::Space make_space(const WorldSpec& spec, const WorldOptions& options) {
+rigid::Space make_space(const WorldSpec& spec, const WorldOptions& options, SolidMaker& maker) {
   check(spec, options);
-  Shapes shapes;
-  drive::ModeSets modes;
   std::vector<rigid::Solid> solids;
   std::vector<rigid::State> states;
   for (const BodySpec& body : spec.bodies) {
-    solids.push_back(make_solid(body, shapes));
-    if (options.modes) add_modes(solids.back(), *body.bank, modes);
+    solids.push_back(maker.make(body));
     states.push_back(make_state(body, solids.back()));
   }
   std::optional<rigid::Ground> ground;

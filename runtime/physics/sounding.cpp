@@ -29,26 +29,29 @@ double calc_push(const rigid::Hit& hit) { return dot(hit.impulse, hit.touch.norm
 }  // namespace
 
 Sounding::Sounding(const WorldSpec& spec, const rigid::Space& space, bool masks_hits) : space_(space) {
-  for (int i = 0; i < std::ssize(spec.bodies); ++i) {
-    const rigid::Solid& solid = space.solid(i);
-    scene_.bodies.push_back({.name_hash = base::hash_name(spec.bodies[i].name),
-                             .young_modulus_pa = solid.young_modulus_pa,
-                             .poisson_ratio = solid.poisson_ratio,
-                             .density_kg_m3 = spec.bodies[i].bank->material.density_kg_m3,
-                             .shape = solid.shape.get(),
-                             .size_m = solid.shape->get_size_m(),
-                             .fixed = solid.fixed,
-                             .mass_kg = solid.mass_kg,
-                             .centre_m = solid.centre_m});
-  }
+  if (masks_hits) masks_.emplace(0);
+  for (const BodySpec& body : spec.bodies) add_body(body);
   const GroundSpec ground = spec.ground.value_or(GroundSpec{});
   scene_.ground = {.young_modulus_pa = ground.young_modulus_pa,
                    .poisson_ratio = ground.poisson_ratio,
                    .density_kg_m3 = ground.density_kg_m3,
                    .fixed = true};
-  scene_.motions.resize(scene_.bodies.size());
-  copied_.assign(scene_.bodies.size(), -1);
-  if (masks_hits) masks_.emplace(static_cast<int>(scene_.bodies.size()));
+}
+
+void Sounding::add_body(const BodySpec& body) {
+  const rigid::Solid& solid = space_.solid(static_cast<int>(scene_.bodies.size()));
+  scene_.bodies.push_back({.name_hash = base::hash_name(body.name),
+                           .young_modulus_pa = solid.young_modulus_pa,
+                           .poisson_ratio = solid.poisson_ratio,
+                           .density_kg_m3 = body.bank->material.density_kg_m3,
+                           .shape = solid.shape.get(),
+                           .size_m = solid.shape->get_size_m(),
+                           .fixed = solid.fixed,
+                           .mass_kg = solid.mass_kg,
+                           .centre_m = solid.centre_m});
+  scene_.motions.emplace_back();
+  copied_.push_back(-1);
+  if (masks_) masks_->resize(static_cast<int>(scene_.bodies.size()));
 }
 
 void Sounding::copy_motion(int body) {

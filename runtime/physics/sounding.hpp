@@ -18,6 +18,9 @@ class Sounding {
   /// `masks_hits`: omits hits masked by earlier ones.
   Sounding(const WorldSpec& spec, const rigid::Space& space, bool masks_hits);
 
+  /// The last body of the space is new.
+  void add_body(const BodySpec& body);
+
   /// Pulses of an impact.
   void add(const rigid::Strike& strike, std::vector<events::Event>& events);
   /// Forces of an impact with modes, one event per body, split at the maximum length of events.

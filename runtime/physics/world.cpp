@@ -38,7 +38,9 @@ class World::Course {
  public:
   Course(const WorldSpec& spec, const WorldOptions& options)
       : options_(options),
-        space_(make_space(spec, options)),
+        gravity_m_s2_(norm(spec.gravity_m_s2)),
+        maker_(options.modes),
+        space_(make_space(spec, options, maker_)),
         sounding_(spec, space_, options.masks_hits),
         has_links_(spec.bodies.size(), 0) {
     for (const BodySpec& body : spec.bodies) names_.push_back(body.name);
@@ -48,10 +50,8 @@ class World::Course {
       if (spec.bodies[i].absent) space_.leave_out(i);
     check_start(spec, space_);
     check_overlaps();
-    prepare_shapes(spec.ground.has_value());
-    if (!options_.audits_energy) return;
-    for (int i = 0; i < count(); ++i)
-      if (!space_.solid(i).fixed) energy_.weight_n += space_.solid(i).mass_kg * norm(spec.gravity_m_s2);
+    for (int i = 0; i < count(); ++i) prepare_shape(i);
+    for (int i = 0; i < count(); ++i) note_weight(i);
   }
 
   double advance(double until_s, double cpu_s, const Sink& sink) {
@@ -71,6 +71,7 @@ class World::Course {
   void drag(int body, const Vec3& target_m, double over_s);
   void release(int body);
   void add(int body, const Entry& entry);
+  int add(const BodySpec& body);
   void remove(int body);
   bool is_absent(int body) const { return space_.is_absent(body); }
   Vec3 get_centre(int body) const { return space_.state(body).centre; }
@@ -241,15 +242,26 @@ class World::Course {
   template <typename Act>
   void handle(int body, Act&& act);
   void check_handled(int body, bool must_move) const;
-  geometry::Box get_box(int body) const {
-    return space_.solid(body).shape->calc_box(rigid::place(space_.solid(body), space_.state(body)).frame);
-  }
+  /// A body where it is, or may be put.
+  struct Guest {
+    const std::string& name;
+    const rigid::Solid& solid;
+    const rigid::State& state;
+  };
+  Guest get_guest(int body) const { return {names_[body], space_.solid(body), space_.state(body)}; }
+  static geometry::Box get_box(const Guest& guest) { return guest.solid.shape->calc_box(rigid::place(guest.solid, guest.state).frame); }
   std::vector<std::vector<int>> find_near() const;
   void check_overlaps() const;
-  void check_overlap(int body, const std::vector<int>& others) const;
-  void prepare_shapes(bool has_ground) const;
+  void check_overlap(const Guest& guest, const std::vector<int>& others) const;
+  void check_free(const Guest& guest) const;
+  void prepare_shape(int body) const;
+  void note_weight(int body) {
+    if (options_.audits_energy && !space_.solid(body).fixed) energy_.weight_n += space_.solid(body).mass_kg * gravity_m_s2_;
+  }
 
   WorldOptions options_;
+  double gravity_m_s2_;
+  SolidMaker maker_;
   rigid::Space space_;
   Sounding sounding_;
   std::vector<events::Event> events_, later_;  // of this window; those not reported yet
@@ -354,20 +366,35 @@ void World::Course::add(int body, const Entry& entry) {
   spec.angular_velocity_rad_s = entry.angular_velocity_rad_s;
   check_entry(spec);
   finish_window();
-  const rigid::State state = make_state(spec, space_.solid(body)), before = space_.state(body);
-  space_.place_absent(body, state);
-  const geometry::Box box = get_box(body);
+  const rigid::State state = make_state(spec, space_.solid(body));
+  check_free({names_[body], space_.solid(body), state});
+  handle(body, [&] { space_.add(body, state); });
+}
+
+int World::Course::add(const BodySpec& spec) {
+  check_body(spec);
+  finish_window();
+  rigid::Solid solid = maker_.make(spec);
+  const rigid::State state = make_state(spec, solid);
+  check_free({spec.name, solid, state});
+  const int body = space_.append(std::move(solid), state);
+  names_.push_back(spec.name);
+  has_links_.push_back(0);
+  sounding_.add_body(spec);
+  note_weight(body);
+  for (int i = 0; i < count(); ++i) prepare_shape(i);
+  space_.add(body, state);
+  if (begun_) events_.push_back(make_motion(body, state, reached_s_));
+  return body;
+}
+
+/// Throws InputError if a body overlaps one that is there, or the ground.
+void World::Course::check_free(const Guest& guest) const {
+  const geometry::Box box = get_box(guest);
   std::vector<int> near;
   for (int i = 0; i < count(); ++i)
-    if (!space_.is_absent(i) && !(space_.solid(i).fixed && spec.fixed) && get_box(i).overlaps(box)) near.push_back(i);
-  try {
-    check_overlap(body, near);
-  } catch (const InputError&) {
-    space_.place_absent(body, before);
-    throw;
-  }
-  space_.place_absent(body, before);
-  handle(body, [&] { space_.add(body, state); });
+    if (!space_.is_absent(i) && !(space_.solid(i).fixed && guest.solid.fixed) && get_box(get_guest(i)).overlaps(box)) near.push_back(i);
+  check_overlap(guest, near);
 }
 
 void World::Course::remove(int body) {
@@ -381,7 +408,7 @@ void World::Course::remove(int body) {
 /// Sorted.
 std::vector<std::vector<int>> World::Course::find_near() const {
   std::vector<geometry::Box> boxes;
-  for (int i = 0; i < count(); ++i) boxes.push_back(get_box(i));
+  for (int i = 0; i < count(); ++i) boxes.push_back(get_box(get_guest(i)));
   std::vector<std::vector<int>> near(boxes.size());
   geometry::for_overlaps(boxes, [&](int a, int b) {
     if (space_.is_absent(a) || space_.is_absent(b)) return;
@@ -391,51 +418,53 @@ std::vector<std::vector<int>> World::Course::find_near() const {
   return near;
 }
 
-/// Creates the search data of the shapes now, so that real-time scenes do not wait for it. Polyhedra need it only against other kinds of
+/// Creates the search data of a shape now, so that real-time scenes do not wait for it. Polyhedra need it only against other kinds of
 /// bodies.
-void World::Course::prepare_shapes(bool has_ground) const {
-  for (int a = 0; a < count(); ++a) {
-    const rigid::Solid& solid = space_.solid(a);
-    const auto can_meet = [&](const rigid::Solid& other) {
-      return !(solid.fixed && other.fixed) && !(solid.shape->is_polyhedron() && other.shape->is_polyhedron());
-    };
-    bool meets_bodies = false;
-    for (int b = 0; b < count() && !meets_bodies; ++b) meets_bodies = b != a && can_meet(space_.solid(b));
-    const bool meets_ground = has_ground && !solid.fixed && !solid.shape->is_polyhedron();
-    if (meets_bodies || meets_ground) solid.shape->prepare(meets_bodies);
-  }
+void World::Course::prepare_shape(int a) const {
+  const rigid::Solid& solid = space_.solid(a);
+  const auto can_meet = [&](const rigid::Solid& other) {
+    return !(solid.fixed && other.fixed) && !(solid.shape->is_polyhedron() && other.shape->is_polyhedron());
+  };
+  bool meets_bodies = false;
+  for (int b = 0; b < count() && !meets_bodies; ++b) meets_bodies = b != a && can_meet(space_.solid(b));
+  const bool meets_ground = space_.ground() && !solid.fixed && !solid.shape->is_polyhedron();
+  if (meets_bodies || meets_ground) solid.shape->prepare(meets_bodies);
 }
 
 void World::Course::check_overlaps() const {
   const std::vector<std::vector<int>> near = find_near();
   for (int a = 0; a < count(); ++a)
-    if (!space_.is_absent(a)) check_overlap(a, near[a]);
+    if (!space_.is_absent(a)) {
+      std::vector<int> others = near[a];
+      std::erase_if(others, [&](int b) { return space_.is_joined(a, b); });
+      check_overlap(get_guest(a), others);
+    }
 }
 
 /// Throws InputError if a body overlaps the ground or one of `others`.
-void World::Course::check_overlap(int a, const std::vector<int>& others) const {
-  const auto allowed_m = [&](int body) { return std::min(2e-4, 5e-3 * space_.solid(body).shape->get_size_m()); };
-  const rigid::Placed at_a = rigid::place(space_.solid(a), space_.state(a));
-  if (space_.ground() && !space_.solid(a).fixed) {
+void World::Course::check_overlap(const Guest& guest, const std::vector<int>& others) const {
+  const auto calc_allowed_m = [](const rigid::Solid& solid) { return std::min(2e-4, 5e-3 * solid.shape->get_size_m()); };
+  const rigid::Placed placed = rigid::place(guest.solid, guest.state);
+  const double allowed_m = calc_allowed_m(guest.solid);
+  if (space_.ground() && !guest.solid.fixed) {
     const double height_m = space_.ground()->height_m;
     geometry::PairMemory memory;
     std::vector<geometry::Touch> touches;
-    geometry::find_ground_touches(*space_.solid(a).shape, at_a.frame, height_m, allowed_m(a), memory, touches);
+    geometry::find_ground_touches(*guest.solid.shape, placed.frame, height_m, allowed_m, memory, touches);
     double depth = 0.0;
     for (const geometry::Touch& touch : touches) depth = std::max(depth, -touch.gap_m);
-    if (depth > allowed_m(a))
-      throw InputError(fmt::format("body '{}' starts {:.2f} mm inside the ground (height {:g} m); raise it by that much", names_[a],
+    if (depth > allowed_m)
+      throw InputError(fmt::format("body '{}' starts {:.2f} mm inside the ground (height {:g} m); raise it by that much", guest.name,
                                    depth * 1e3, height_m));
   }
   for (const int b : others) {
-    if (space_.is_joined(a, b)) continue;
     Vec3 where{};
-    const double depth = geometry::calc_overlap(*space_.solid(a).shape, at_a.frame, *space_.solid(b).shape,
+    const double depth = geometry::calc_overlap(*guest.solid.shape, placed.frame, *space_.solid(b).shape,
                                                 rigid::place(space_.solid(b), space_.state(b)).frame, where);
-    if (depth > std::min(allowed_m(a), allowed_m(b)))
+    if (depth > std::min(allowed_m, calc_allowed_m(space_.solid(b))))
       throw InputError(
           fmt::format("bodies '{}' and '{}' start inside each other, {:.2f} mm deep near ({:.4f}, {:.4f}, {:.4f}) m; move one of them",
-                      names_[a], names_[b], depth * 1e3, where[0], where[1], where[2]));
+                      guest.name, names_[b], depth * 1e3, where[0], where[1], where[2]));
   }
 }
 
@@ -453,6 +482,7 @@ void World::grab(int body, const Vec3& at_m, const GrabSpec& spec) { course_->gr
 void World::drag(int body, const Vec3& target_m, double over_s) { course_->drag(body, target_m, over_s); }
 void World::release(int body) { course_->release(body); }
 void World::add(int body, const Entry& entry) { course_->add(body, entry); }
+int World::add(const BodySpec& body) { return course_->add(body); }
 void World::remove(int body) { course_->remove(body); }
 Pose World::get_pose(int body) const { return course_->get_pose(body); }
 Vec3 World::get_centre(int body) const { return course_->get_centre(body); }

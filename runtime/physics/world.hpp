@@ -121,6 +121,9 @@ class World {
   void release(int body);
   /// Puts an absent body into the world.
   void add(int body, const Entry& entry);
+  /// Puts a new body, without joints and cords, into the world, as one of the spec: the same checks and messages. Its bank must outlive the
+  /// world; bodies of one bank share what is prepared from it. Returns its number, the next one.
+  int add(const BodySpec& body);
   /// Takes a body, moving or fixed, without joints and cords, out of the world. It stays in the list, and rings on.
   void remove(int body);
 

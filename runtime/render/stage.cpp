@@ -13,6 +13,7 @@
 #include "runtime/events/events.hpp"
 #include "runtime/scene/events.hpp"
 #include "runtime/scene/planning.hpp"
+#include "runtime/scene/scene_bodies.hpp"
 #include "runtime/scene/strikes.hpp"
 
 namespace carillon::render {
@@ -24,6 +25,12 @@ constexpr double kMarginS = 0.01;  // lead of waypoints and contact records over
 constexpr double kPushedS = 0.25;
 constexpr int kMaxStrikes = 1024, kMaxForces = 2048;  // per body, waiting or active
 constexpr int kMaxWaypoints = 1024, kRingEvents = 1 << 14;
+
+std::vector<const bank::Bank*> list_banks(const scene::Scene& scene) {
+  std::vector<const bank::Bank*> banks;
+  for (const scene::SceneBody& body : scene.bodies) banks.push_back(body.spec.bank);
+  return banks;
+}
 
 }  // namespace
 
@@ -88,17 +95,18 @@ class Stage::Physics {
   double window_cpu_s_ = 0.0, worst_window_s_ = 0.0, counted_s_ = 0.0;
 };
 
-Stage::Stage(const scene::Scene& scene, const std::vector<const bank::Bank*>& banks, const StageOptions& options)
+Stage::Stage(scene::Scene& scene, const StageOptions& options)
     : scene_(&scene),
+      is_handled_(options.is_handled),
       look_ahead_s_(options.look_ahead_s),
       pushed_s_(std::min(kPushedS, options.look_ahead_s)),
-      session_(scene, banks, scene.sample_rate_hz, true, scene::make_head(scene, scene.sample_rate_hz)),
+      session_(scene, list_banks(scene), scene.sample_rate_hz, true, scene::make_head(scene, scene.sample_rate_hz)),
       selector_(scene::make_facts(scene, session_.get_microphones(), scene::has_physics(scene))),
-      scheduler_(list_scheduled_bodies(options.moves_fixed), kMarginS),
+      scheduler_(list_scheduled_bodies(), kMarginS),
       physics_(std::make_unique<Physics>(scene, selector_.needs_contacts(), scheduler_)),
       synthesiser_(&open()) {
   synthesiser_->set_gain(options.gain_per_pa);
-  scene::Strikes strikes = scene::make_strikes(scene, banks);
+  scene::Strikes strikes = scene::make_strikes(scene, list_banks(scene));
   warnings_ = std::move(strikes.warnings);
   for (const events::Event& strike : strikes.events) scheduler_.add(strike);
   const std::vector<events::Listener> path = scene::list_listener_path(session_.get_microphones());
@@ -130,14 +138,47 @@ synth::EffectSet Stage::find_effects(std::size_t body) const {
   return scene::find_effects(*scene_, body, selector_.get_possible(static_cast<int>(body)));
 }
 
-std::vector<scene::ScheduledBody> Stage::list_scheduled_bodies(bool moves_fixed) const {
+scene::ScheduledBody Stage::schedule(std::size_t body, synth::EffectSet effects) const {
+  return {.number = static_cast<int>(body),
+          .moves = is_handled_ || !scene_->bodies[body].spec.fixed,
+          .lead_s = scene::calc_strike_lead_s(session_.get_model(body), effects)};
+}
+
+std::vector<scene::ScheduledBody> Stage::list_scheduled_bodies() const {
   std::vector<scene::ScheduledBody> bodies;
-  for (std::size_t i = 0; i < scene_->bodies.size(); ++i) {
-    bodies.push_back({.number = static_cast<int>(i),
-                      .moves = moves_fixed || !scene_->bodies[i].spec.fixed,
-                      .lead_s = scene::calc_strike_lead_s(session_.get_model(i), find_effects(i))});
-  }
+  for (std::size_t i = 0; i < scene_->bodies.size(); ++i) bodies.push_back(schedule(i, find_effects(i)));
   return bodies;
+}
+
+std::string Stage::add_body(const std::string& text, scene::Banks& banks) {
+  physics::World* const world = get_world();
+  if (world == nullptr) throw InputError("no body of the scene can move, so that it has no physics");
+  if (synthesiser_->is_full()) throw InputError(fmt::format("{} bodies have been added already, the most of a run", kMaxAdded));
+  scene::SceneBody body = scene::parse_new_body(base::parse_document(text, scene_->file.parent_path() / "new body"), *scene_);
+  scene::read_bank(*scene_, body, banks);
+  const std::string name = body.name;
+  const std::size_t number = scene_->bodies.size();
+  scene_->bodies.push_back(std::move(body));
+  try {
+    session_.add_model(scene_->bodies[number].spec.bank);
+    try {
+      world->add(scene_->bodies[number].spec);
+    } catch (...) {
+      session_.drop_model();
+      throw;
+    }
+  } catch (...) {
+    scene_->bodies.pop_back();
+    throw;
+  }
+  scene::Scene alone = *scene_;
+  alone.bodies = {scene_->bodies[number]};
+  alone.strikes.clear();
+  const effects::EffectSelector selector(scene::make_facts(alone, session_.get_microphones(), true));
+  const synth::EffectSet effects = scene::find_effects(*scene_, number, selector.get_possible(0));
+  scheduler_.add_body(schedule(number, effects));
+  session_.add_body(session_.make_settings(number, effects));
+  return name;
 }
 
 synth::Synthesiser& Stage::open() {
@@ -146,6 +187,7 @@ synth::Synthesiser& Stage::open() {
   room.max_forces = kMaxForces;
   room.max_waypoints = kMaxWaypoints;
   room.ring_events = kRingEvents;
+  if (is_handled_) room.max_bodies += kMaxAdded;
   return session_.open(room);
 }
 

@@ -9,6 +9,7 @@
 
 #include "runtime/bank/bank.hpp"
 #include "runtime/physics/world.hpp"
+#include "runtime/scene/banks.hpp"
 #include "runtime/scene/effects/effect_selector.hpp"
 #include "runtime/scene/event_scheduler.hpp"
 #include "runtime/scene/scene.hpp"
@@ -23,15 +24,15 @@ int find_body(const std::vector<std::string>& names, const std::string& name);
 struct StageOptions {
   double look_ahead_s = 0.1;  // lead of the physics over the sound, > 0
   double gain_per_pa = 1.0;   // of the synthesiser's output
-  bool moves_fixed = false;   // bodies that are fixed may be removed and added elsewhere
+  bool is_handled = false;    // bodies are added, and those that are fixed may be removed and added elsewhere
 };
 
 /// A synthesiser with the bodies of a scene, and the physics that plays them. Bodies have all effects that they may need. Scene and banks
 /// must outlive it. process() of the synthesiser may run on another thread; everything else is for one thread.
 class Stage {
  public:
-  /// banks[i] belongs to scene.bodies[i]. Throws InputError for an invalid scene.
-  Stage(const scene::Scene& scene, const std::vector<const bank::Bank*>& banks, const StageOptions& options);
+  /// The scene's bodies have their banks. Throws InputError for an invalid scene.
+  Stage(scene::Scene& scene, const StageOptions& options);
   ~Stage();
   Stage(const Stage&) = delete;
   Stage& operator=(const Stage&) = delete;
@@ -46,6 +47,12 @@ class Stage {
   /// Work when the sound has reached a time. False if the physics need not advance. Throws SolveError if the physics fails.
   bool step(double now_s);
 
+  /// Puts a new body into the scene and its world. `text`: JSON with the keys of a body in a scene file; paths are relative to that of the
+  /// scene. Banks that `banks` has need not be read; others hold up the physics meanwhile. Returns the name. Throws InputError with the
+  /// messages of a scene file, and changes nothing, for a body that cannot be used, and where kMaxAdded have been added.
+  std::string add_body(const std::string& text, scene::Banks& banks);
+  static constexpr int kMaxAdded = 256;
+
   /// Smallest lead of the physics over the sound; infinite without physics.
   double get_min_lead_s() const { return min_lead_s_; }
   /// Largest CPU time of one window of physics (2 ms of scene time).
@@ -56,11 +63,13 @@ class Stage {
   class Physics;
 
   synth::EffectSet find_effects(std::size_t body) const;
-  std::vector<scene::ScheduledBody> list_scheduled_bodies(bool moves_fixed) const;
+  scene::ScheduledBody schedule(std::size_t body, synth::EffectSet effects) const;
+  std::vector<scene::ScheduledBody> list_scheduled_bodies() const;
   synth::Synthesiser& open();
   void push(double now_s);
 
-  const scene::Scene* scene_;
+  scene::Scene* scene_;
+  bool is_handled_;
   double look_ahead_s_;  // of the physics
   double pushed_s_;      // of the events
   scene::Session session_;

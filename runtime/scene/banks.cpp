@@ -55,21 +55,27 @@ fs::path make_bank(const Scene& scene, const SceneBody& body, bool is_quiet) {
   base::throw_error(result);
 }
 
-/// Sets the bank file of every body without one. `carillon bank-for`, a program of the precompute side, finds or computes it, once per
-/// distinct description. Progress goes to standard error. Throws InputError with the place in the scene if it is refused or not installed,
+/// Sets the bank file of a body without one. `carillon bank-for`, a program of the precompute side, finds or computes it, once per distinct
+/// description. Progress goes to standard error. Throws InputError with the place in the scene if it is refused or not installed,
 /// SolveError and SystemError as reported.
-void find_missing_banks(Scene& scene, bool is_quiet) {
-  std::map<std::string, fs::path> made;  // by the description of the body, without its place
-  for (SceneBody& body : scene.bodies) {
-    if (!body.bank.empty()) continue;
+class MissingBanks {
+ public:
+  MissingBanks(const Scene& scene, bool is_quiet) : scene_(scene), is_quiet_(is_quiet) {}
+  void find(SceneBody& body) {
+    if (!body.bank.empty()) return;
     std::string words;
     for (const char c : body.job.text)
       if (c != '\n') words += c;
-    const auto [entry, is_new] = made.try_emplace(words);
-    if (is_new) entry->second = make_bank(scene, body, is_quiet);
+    const auto [entry, is_new] = made_.try_emplace(words);
+    if (is_new) entry->second = make_bank(scene_, body, is_quiet_);
     body.bank = entry->second;
   }
-}
+
+ private:
+  const Scene& scene_;
+  bool is_quiet_;
+  std::map<std::string, fs::path> made_;  // by the description of the body, without its place
+};
 
 /// Applies the support losses to the body's bank.
 void mount(Scene& scene, SceneBody& body, bank::Bank& bank) {
@@ -83,10 +89,40 @@ void mount(Scene& scene, SceneBody& body, bank::Bank& bank) {
   for (std::size_t m = 0; m < bank.mode_count(); ++m) body.mounting.freq_hz.push_back(bank.freq_hz(m));
 }
 
+/// The bank of a body, from that of its file. Throws InputError naming scene and body.
+template <class GetBank>
+std::unique_ptr<ReadBank> make_read_bank(Scene& scene, SceneBody& body, GetBank&& get_bank) {
+  const std::string place = body.support_place.empty() ? scene.file.string() : body.support_place;
+  try {
+    auto read = std::make_unique<ReadBank>();
+    read->bank = get_bank();
+    mount(scene, body, read->bank);
+    const radiation::PutGains put = radiation::put_gains(read->bank, scene.radiation);
+    read->sphere_radius_m = put.sphere_radius_m;
+    read->limited = put.limited;
+    read->transfers = radiation::make_transfers(read->bank);
+    return read;
+  } catch (const InputError& error) {
+    throw InputError(fmt::format("{}: the bank of body \"{}\": {}", place, body.name, error.what()));
+  }
+}
+
+void use_bank(SceneBody& body, const ReadBank& read) {
+  body.spec.bank = &read.bank;
+  body.sphere_radius_m = read.sphere_radius_m;
+  body.limited = read.limited;
+  body.transfers = read.transfers;
+}
+
+bank::Bank read_file(const Scene& scene, const fs::path& file) {
+  return bank::choose_frequencies(bank::read_bank(file), scene.frequencies);
+}
+
 }  // namespace
 
 Banks read_banks(Scene& scene, bool is_quiet) {
-  find_missing_banks(scene, is_quiet);
+  MissingBanks missing(scene, is_quiet);
+  for (SceneBody& body : scene.bodies) missing.find(body);
   Banks banks;
   std::map<std::filesystem::path, int> left;  // bodies that still need the unmodified bank
   for (const SceneBody& body : scene.bodies) ++left[body.bank];
@@ -96,29 +132,25 @@ Banks read_banks(Scene& scene, bool is_quiet) {
     const bool is_last = --left[body.bank] == 0;
     auto& slot = banks[{body.bank, mounting::write_key(body.support)}];
     if (!slot) {
-      const std::string place = body.support_place.empty() ? scene.file.string() : body.support_place;
-      try {
-        slot = std::make_unique<ReadBank>();
-        if (!files.contains(body.bank)) files[body.bank] = bank::choose_frequencies(bank::read_bank(body.bank), scene.frequencies);
-        slot->bank = is_last ? std::move(files[body.bank]) : files[body.bank];
-        mount(scene, body, slot->bank);
-        const radiation::PutGains put = radiation::put_gains(slot->bank, scene.radiation);
-        slot->sphere_radius_m = put.sphere_radius_m;
-        slot->limited = put.limited;
-        slot->transfers = radiation::make_transfers(slot->bank);
-      } catch (const InputError& error) {
-        throw InputError(fmt::format("{}: the bank of body \"{}\": {}", place, body.name, error.what()));
-      }
+      slot = make_read_bank(scene, body, [&]() -> bank::Bank {
+        if (!files.contains(body.bank)) files[body.bank] = read_file(scene, body.bank);
+        return is_last ? std::move(files[body.bank]) : files[body.bank];
+      });
       mountings[slot.get()] = &body.mounting;
     } else {
       body.mounting = *mountings[slot.get()];
     }
-    body.spec.bank = &slot->bank;
-    body.sphere_radius_m = slot->sphere_radius_m;
-    body.limited = slot->limited;
-    body.transfers = slot->transfers;
+    use_bank(body, *slot);
   }
   return banks;
+}
+
+void read_bank(Scene& scene, SceneBody& body, Banks& banks) {
+  MissingBanks(scene, true).find(body);
+  const Banks::key_type key{body.bank, mounting::write_key(body.support)};
+  auto found = banks.find(key);
+  if (found == banks.end()) found = banks.emplace(key, make_read_bank(scene, body, [&] { return read_file(scene, body.bank); })).first;
+  use_bank(body, *found->second);
 }
 
 }  // namespace carillon::scene

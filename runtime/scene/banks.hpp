@@ -26,4 +26,7 @@ using Banks = std::map<std::pair<std::filesystem::path, std::string>, std::uniqu
 /// the scene's. Missing banks are found or computed first (find_missing_banks()). Throws InputError naming scene and body.
 Banks read_banks(Scene& scene, bool is_quiet = false);
 
+/// The same for a body that joins the scene: reads its bank, unless `banks` has it.
+void read_bank(Scene& scene, SceneBody& body, Banks& banks);
+
 }  // namespace carillon::scene

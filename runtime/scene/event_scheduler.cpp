@@ -8,7 +8,7 @@
 namespace carillon::scene {
 namespace {
 
-constexpr double kFromTheStart = -std::numeric_limits<double>::infinity();
+constexpr double kFromTheStart = -std::numeric_limits<double>::infinity();  // a first waypoint has no predecessor
 
 }  // namespace
 

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <map>
 #include <queue>
 #include <span>
@@ -55,10 +56,13 @@ class DueTimes {
   }
   /// Invalid events so far (events::find_fault); they are never due.
   std::int64_t get_faults() const { return faults_; }
+  /// The last of the bodies is new.
+  void add_body() { last_s_.insert(last_s_.end() - 1, kNever); }
   /// nullptr for an unplayed body.
   const ScheduledBody* find_body(std::int32_t body) const;
 
  private:
+  static constexpr double kNever = -std::numeric_limits<double>::infinity();
   static constexpr std::uint64_t kListenerNumbers = std::uint64_t{1} << 63;
 
   int find(const events::Event& event, DueEvent* due);
@@ -83,6 +87,12 @@ class EventScheduler {
   EventScheduler(std::vector<ScheduledBody> bodies, double margin_s);
   EventScheduler(const EventScheduler&) = delete;
   EventScheduler& operator=(const EventScheduler&) = delete;
+
+  /// Another body of the events.
+  void add_body(const ScheduledBody& body) {
+    bodies_.push_back(body);
+    times_.add_body();
+  }
 
   /// Adds an event, in order of time. events::Listener is ignored: the scene defines the listener.
   void add(const events::Event& event) {

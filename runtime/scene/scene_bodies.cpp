@@ -222,6 +222,14 @@ SceneBody parse_body(base::Object& object, const Scene& scene) {
   return body;
 }
 
+void check_count(base::Object& object, const char* key, std::size_t bodies) {
+  if (bodies > kMaxBodies) object.fail(key, fmt::format("has {} bodies, at most {} are allowed: split the scene", bodies, kMaxBodies));
+}
+
+[[noreturn]] void refuse_name(base::Object& object, const std::string& name) {
+  object.fail("name", fmt::format("there is a body called \"{}\" already; give this one another name", name));
+}
+
 SceneSurface parse_surface(base::Object& object) {
   SceneSurface surface;
   surface.name = base::read_name(object, "name");
@@ -261,8 +269,7 @@ const material::Material* read_material(base::Object& object, double& young_modu
 
 Names parse_bodies(base::Object& root, Scene& scene) {
   std::vector<base::Object> bodies = root.objects("bodies");
-  if (bodies.size() > kMaxBodies)
-    root.fail("bodies", fmt::format("has {} bodies, at most {} are allowed: split the scene", bodies.size(), kMaxBodies));
+  check_count(root, "bodies", bodies.size());
   if (root.has("effects")) scene.overrides = read_effects(root);
   scene.effects = find_usual(scene.overrides);
   Names names;
@@ -273,10 +280,21 @@ Names parse_bodies(base::Object& root, Scene& scene) {
     else
       scene.bodies.push_back(parse_body(object, scene));
     const std::string& name = is_recorded ? scene.surfaces.back().name : scene.bodies.back().name;
-    if (!names.emplace(name, is_recorded ? kNotModal : scene.bodies.size() - 1).second)
-      object.fail("name", fmt::format("there is a body called \"{}\" already; give this one another name", name));
+    if (!names.emplace(name, is_recorded ? kNotModal : scene.bodies.size() - 1).second) refuse_name(object, name);
   }
   return names;
+}
+
+SceneBody parse_new_body(const base::Document& document, const Scene& scene) {
+  base::Object root = document.root();
+  check_count(root, "", scene.bodies.size() + 1);
+  if (root.has("recording")) root.fail("recording", "plays from the start of a scene only; name a \"bank\"");
+  SceneBody body = parse_body(root, scene);
+  const auto is_called = [&](const auto& other) { return other.name == body.name; };
+  if (std::any_of(scene.bodies.begin(), scene.bodies.end(), is_called) ||
+      std::any_of(scene.surfaces.begin(), scene.surfaces.end(), is_called))
+    refuse_name(root, body.name);
+  return body;
 }
 
 void describe_body_keys(std::vector<base::KeyTable>& tables) {

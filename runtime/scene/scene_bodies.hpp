@@ -40,6 +40,10 @@ using Names = std::map<std::string, std::size_t>;  // body to index in Scene::bo
 /// Reads the keys "bodies", "effects" and "variation" of a scene. Throws InputError "file:line: ...".
 Names parse_bodies(base::Object& root, Scene& scene);
 
+/// Reads a body that joins a scene: a document with the keys of one of "bodies". Throws InputError as parse_bodies() does, and for a
+/// recording, which has no motion.
+SceneBody parse_new_body(const base::Document& document, const Scene& scene);
+
 /// Appends the tables "body" and "recording" of the reference.
 void describe_body_keys(std::vector<base::KeyTable>& tables);
 

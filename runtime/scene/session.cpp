@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <limits>
-#include <map>
 
 #include "runtime/acoustics/radiation/gains.hpp"
 #include "runtime/base/error.hpp"
@@ -22,26 +21,33 @@ std::shared_ptr<const synth::Model> make_model(const bank::Bank& bank, const Sce
 
 Session::Session(const Scene& scene, const std::vector<const bank::Bank*>& banks, double rate_hz, bool has_clicks,
                  std::optional<synth::ListeningHead> head)
-    : scene_(&scene), banks_(banks), rate_hz_(rate_hz), microphones_(make_microphones(scene)), head_(std::move(head)) {
-  std::map<const bank::Bank*, std::shared_ptr<const synth::Model>> models;
-  for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
-    std::shared_ptr<const synth::Model>& model = models[banks[i]];
-    if (!model) model = make_model(*banks[i], scene.bodies[i], rate_hz, has_clicks);
-    models_.push_back(model);
-    if (scene.bodies[i].overrides.on.has(synth::Effect::kDirectivity) && model->get_directivity() == nullptr)
-      throw InputError(scene.bodies[i].place +
-                       ": \"effects\" names \"directivity\", which needs a bank with multipoles, and this bank has none; compute its bank "
-                       "with them, or remove the effect");
-    if (scene.bodies[i].overrides.on.has(synth::Effect::kCascade) && !model->has_cascade())
-      throw InputError(
-          scene.bodies[i].place +
-          ": \"effects\" names \"cascade\", which needs a bank with a nonlinear energy, a thickness and modes above the coupled "
-          "ones, and this bank lacks one of them; compute the bank with \"nonlinear\", or remove the effect");
-    if (scene.bodies[i].overrides.on.has(synth::Effect::kNonlinear) && model->get_nonlinear() == nullptr)
-      throw InputError(scene.bodies[i].place +
-                       ": the effect \"nonlinear\" is asked for, which needs a bank with a nonlinear energy, and this bank has none; "
-                       "compute its bank with it, or remove the effect");
-  }
+    : scene_(&scene), rate_hz_(rate_hz), has_clicks_(has_clicks), microphones_(make_microphones(scene)), head_(std::move(head)) {
+  for (const bank::Bank* bank : banks) add_model(bank);
+}
+
+void Session::add_model(const bank::Bank* bank) {
+  const SceneBody& body = scene_->bodies[models_.size()];
+  std::shared_ptr<const synth::Model>& shared = shared_[bank];
+  if (!shared) shared = make_model(*bank, body, rate_hz_, has_clicks_);
+  if (body.overrides.on.has(synth::Effect::kDirectivity) && shared->get_directivity() == nullptr)
+    throw InputError(body.place +
+                     ": \"effects\" names \"directivity\", which needs a bank with multipoles, and this bank has none; compute its bank "
+                     "with them, or remove the effect");
+  if (body.overrides.on.has(synth::Effect::kCascade) && !shared->has_cascade())
+    throw InputError(body.place +
+                     ": \"effects\" names \"cascade\", which needs a bank with a nonlinear energy, a thickness and modes above the coupled "
+                     "ones, and this bank lacks one of them; compute the bank with \"nonlinear\", or remove the effect");
+  if (body.overrides.on.has(synth::Effect::kNonlinear) && shared->get_nonlinear() == nullptr)
+    throw InputError(body.place +
+                     ": the effect \"nonlinear\" is asked for, which needs a bank with a nonlinear energy, and this bank has none; "
+                     "compute its bank with it, or remove the effect");
+  banks_.push_back(bank);
+  models_.push_back(shared);
+}
+
+void Session::drop_model() {
+  banks_.pop_back();
+  models_.pop_back();
 }
 
 synth::SynthesiserOptions Session::make_options() const {

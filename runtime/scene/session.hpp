@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <map>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -33,6 +34,12 @@ class Session {
   /// Initial pose, silence threshold, surface and instruction set of a body with these effects.
   synth::BodySettings make_settings(std::size_t body, synth::EffectSet effects) const;
 
+  /// Makes the model of the last body of the scene, which is new, or shares that of another one. Throws InputError for effects that it
+  /// cannot have.
+  void add_model(const bank::Bank* bank);
+  /// Forgets it, before it has been added.
+  void drop_model();
+
   /// Makes the synthesiser. Throws as synth::Synthesiser does.
   synth::Synthesiser& open(const synth::SynthesiserOptions& options);
   /// Adds the next body of the scene.
@@ -42,8 +49,10 @@ class Session {
   const Scene* scene_;
   std::vector<const bank::Bank*> banks_;
   double rate_hz_;
+  bool has_clicks_;
   Microphones microphones_;
   std::optional<synth::ListeningHead> head_;
+  std::map<const bank::Bank*, std::shared_ptr<const synth::Model>> shared_;
   std::vector<std::shared_ptr<const synth::Model>> models_;  // per body
   std::unique_ptr<synth::Synthesiser> synthesiser_;
   std::size_t added_ = 0;

@@ -291,7 +291,7 @@ INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 
 # The C library and POSIX: free everywhere. A header of C++ itself has neither a folder nor an ending.
 SYSTEM = re.compile(
-    r"^(sys/[a-z]+|unistd|fcntl|dirent|dlfcn|signal|pthread|poll|netinet/in|termios|errno|limits|"
+    r"^(sys/[a-z]+|unistd|fcntl|dirent|dlfcn|signal|pthread|poll|netinet/in|arpa/inet|termios|errno|limits|"
     r"stddef|stdint|stdlib|stdio|string|math|time|sched|spawn|immintrin|xmmintrin|wasm_simd128|pwd|malloc)\.h$"
 )
 

@@ -1,9 +1,11 @@
 #!/usr/bin/env python3
-"""The runtime's programs and its Python module load no MPI, PETSc, SLEPc, METIS, MUMPS, parallel HDF5 or GPL mesher.
+"""The runtime's programs, its C library and its Python module load no MPI, PETSc, SLEPc, METIS, MUMPS, parallel HDF5 or GPL mesher, and no
+physics engine.
 
 usage: runtime_links.py BIN_DIR
 
-GMP stands for CGAL here. Debian's serial HDF5 loads it as well, for its downloads (curl, GnuTLS); from there it is excused.
+Simbody comes with carillon-joints.so, for scenes with joints only. GMP stands for CGAL here. Debian's serial
+HDF5 loads it as well, for its downloads (curl, GnuTLS); from there it is excused.
 """
 import pathlib
 import re
@@ -12,7 +14,7 @@ import sys
 
 FORBIDDEN = re.compile(
     r"lib(mpi|open-rte|petsc|slepc|metis|dmumps|mumps|cholmod|CGAL|gmp|mpfr|openvdb|hdf5_openmpi|vtk|"
-    r"umfpack|spqr|fftw|scotch|gsl|readline)",
+    r"umfpack|spqr|fftw|scotch|gsl|readline|SimTK|mujoco|Bullet|LinearMath)",
     re.I,
 )
 
@@ -26,6 +28,7 @@ def list_libraries(file):
 bad = []
 folder = pathlib.Path(sys.argv[1])
 optional = [*folder.glob("carillon-samples"), *folder.parent.glob("python/carillon/_carillon*.so")]  # where they are built
+optional += folder.parent.glob("runtime/bindings/c_api/libcarillon.so")
 for name in ("carillon-bank", "carillon-render", "carillon-live", *optional):
     program = folder / name
     loaded = list_libraries(program)

@@ -14,17 +14,6 @@ namespace {
 constexpr double kSeconds = 2.0;
 constexpr double kRestitution = 0.5, kFriction = 0.4;
 
-/// The body of the model takes the mass of the bank, about the bank's centre of mass in its own frame.
-void set_mass(mjModel* model, int body, const carillon_bank* bank) {
-  carillon_body_facts facts;
-  carillon_body_facts_init(&facts);
-  carillon_bank_get_facts(bank, &facts);
-  carillon_bank_centre_m(bank, model->body_ipos + 3 * body);
-  model->body_mass[body] = facts.mass_kg;
-  mjtNum axes[9];  // principal axes, as columns
-  mju_eig3(model->body_inertia + 3 * body, axes, model->body_iquat + 4 * body, facts.inertia_kg_m2);
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -45,7 +34,7 @@ int main(int argc, char** argv) {
     const int body = mj_name2id(model, mjOBJ_BODY, name.c_str());
     if (body < 0) return std::fprintf(stderr, "%s: has no body %s\n", argv[1], name.c_str()), 1;
     const std::int32_t index = sound.add(bank.c_str(), name.c_str(), kRestitution, kFriction);
-    set_mass(model, body, sound.get_bank(index));
+    carillon::set_mass(model, body, sound.get_bank(index));
     mujoco.add(body, index);
   }
   mj_setConst(model, data);  // quantities derived from the masses

@@ -45,9 +45,7 @@ class Scenery {
       render::refuse_surfaces(scene_, "carillon.World");
       banks_ = scene::read_banks(scene_);
       scene_.duration_s = kEndlessS;
-      std::vector<const bank::Bank*> banks;
-      for (const scene::SceneBody& body : scene_.bodies) banks.push_back(body.spec.bank);
-      stage_.emplace(scene_, banks, render::StageOptions{.look_ahead_s = look_ahead_s, .moves_fixed = true});
+      stage_.emplace(scene_, render::StageOptions{.look_ahead_s = look_ahead_s, .is_handled = true});
       stage_->begin();
     }
     for (const std::vector<std::string>& warnings : {scene_.warnings, stage_->get_warnings()})
@@ -108,6 +106,12 @@ class Scenery {
       if (rotation) entry.pose.rotation = *rotation;
       world.add(body, entry);
     });
+  }
+
+  std::string add_body(const std::string& text) {
+    const py::gil_scoped_release others_run;
+    const std::lock_guard one_at_a_time(calls_);
+    return stage_->add_body(text, banks_);
   }
 
   void remove(const std::string& name) {
@@ -181,6 +185,9 @@ void bind_world(py::module_& module) {
       .def("add", &Scenery::add, "body"_a, "position_m"_a, "rotation"_a = py::none(), "velocity_m_s"_a = Vec3{},
            "angular_velocity_rad_s"_a = Vec3{},
            "Puts a body that is absent into the world: position of its mesh frame [m], unit quaternion w x y z (default: as it was).")
+      .def("add_body", &Scenery::add_body, "text"_a,
+           "Puts a new body into the world: JSON with the keys of a body in a scene file. Returns its name. The first body of a bank reads "
+           "it.")
       .def("remove", &Scenery::remove, "body"_a, "Takes a body without joints and cords out of the world; it rings on.")
       .def("pose", &Scenery::get_pose, "body"_a, "(position [m], rotation w x y z) of the body's mesh frame, look_ahead_s after the sound.")
       .def("centre", &Scenery::get_centre, "body"_a, "Centre of mass [m], look_ahead_s after the sound.")

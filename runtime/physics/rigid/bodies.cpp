@@ -25,6 +25,18 @@ Bodies::Bodies(std::vector<Solid> solids, std::vector<State> states, std::option
   make_articulations(joints);
 }
 
+void Bodies::append(Solid solid, const State& state) {
+  placed_.push_back(rigid::place(solid, state));
+  solids_.push_back(std::move(solid));
+  states_.push_back(state);
+  stays_.push_back(kAbsent);
+  in_impact_.push_back(0);
+  struck_s_.push_back(-1.0);
+  swings_m_.push_back(0.0);
+  if (!articulation_of_.empty()) articulation_of_.push_back(-1), member_.push_back(-1);
+  note_pulls();
+}
+
 void Bodies::place(int body) {
   const State& s = states_[body];
   double sum = 0.0;

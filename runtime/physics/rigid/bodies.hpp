@@ -51,6 +51,9 @@ class Bodies {
   Bodies(std::vector<Solid> solids, std::vector<State> states, std::optional<Ground> ground, const Vec3& gravity,
          const std::vector<joints::Joint>& joints = {}, double joint_tolerance = joints::kTolerance);
 
+  /// Adds a body without joints, absent at first. Every stage needs an add_body() with it: Space::append().
+  void append(Solid solid, const State& state);
+
   int count() const { return static_cast<int>(solids_.size()); }
   const Solid& solid(int body) const { return solids_[body]; }
   const State& state(int body) const { return states_[body]; }

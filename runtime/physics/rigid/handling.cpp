@@ -1,5 +1,6 @@
 // Bodies pushed, held, added and removed from outside.
 #include <algorithm>
+#include <utility>
 #include <vector>
 
 #include "runtime/physics/rigid/grab.hpp"
@@ -48,13 +49,20 @@ void Space::remove(int body) {
   bodies_.set_absent(body, true);
 }
 
-void Space::place_absent(int body, const State& state) {
-  bodies_.state(body) = state;
-  bodies_.place(body);
+int Space::append(Solid solid, const State& state) {
+  bodies_.append(std::move(solid), state);
+  modal_states_.add_body();
+  windows_.add_body();
+  problem_.add_body();
+  instants_.add_body();
+  rest_.add_body();
+  step_.add_body();
+  return bodies_.count() - 1;
 }
 
 void Space::add(int body, const State& state) {
-  place_absent(body, state);
+  bodies_.state(body) = state;
+  bodies_.place(body);
   bodies_.set_absent(body, false);
   rest_.reset({body});
   ledger_.give(calc_energy(bodies_.solid(body), state, bodies_.gravity()));

@@ -28,6 +28,7 @@ void note_swing(Bodies& bodies, int body, const std::vector<double>& q, const st
 class ModalStates {
  public:
   ModalStates(Bodies& bodies, Ledger& ledger) : bodies_(bodies), ledger_(ledger), states_(bodies.count()) {}
+  void add_body() { states_.emplace_back(); }
 
   /// Advances freely to a time, unless it is later already; books damping losses.
   ModalState& advance(int body, double time_s);

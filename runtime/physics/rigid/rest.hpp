@@ -24,6 +24,10 @@ class Rest {
         ledger_(ledger),
         trial_(bodies),
         paces_(bodies.count()) {}
+  void add_body() {
+    trial_.add_body();
+    paces_.emplace_back();
+  }
 
   /// Restarts the slow time of these bodies.
   void reset(const std::vector<int>& bodies);

@@ -56,8 +56,8 @@ class Space {
   void remove(int body);
   /// The same for a body that is not in the world from the start: nothing is booked.
   void leave_out(int body) { bodies_.set_absent(body, true); }
-  /// Pose of a body that stays absent.
-  void place_absent(int body, const State& state);
+  /// A new body without joints, which stays out of the world. Returns its number.
+  int append(Solid solid, const State& state);
   /// Puts an absent body into the world.
   void add(int body, const State& state);
   bool is_absent(int body) const { return bodies_.is_absent(body); }

@@ -38,6 +38,7 @@ struct ArticulationStep {
 class Step {
  public:
   explicit Step(const Bodies& bodies) : bodies_(bodies), index_(bodies.count(), -1) {}
+  void add_body() { index_.push_back(-1); }
 
   void begin(Island& island);
   void end();

@@ -15,6 +15,7 @@ class StepProblem {
  public:
   StepProblem(Bodies& bodies, const TouchSets& touches, const Options& options, Ledger& ledger)
       : bodies_(bodies), touches_(touches), options_(options), ledger_(ledger), next_guess_s_(bodies.count(), 0.0) {}
+  void add_body() { next_guess_s_.push_back(0.0); }
 
   /// Motion of every body without contacts in a step of that length; `at_rest`: from zero velocity.
   void predict(Step& step, double length_s, bool at_rest);

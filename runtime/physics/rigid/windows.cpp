@@ -47,6 +47,15 @@ Windows::Windows(Bodies& bodies, TouchSets& touches, const Options& options, Led
       flew_from_(bodies.states()),
       articulation_flew_from_(bodies.articulations().size()) {}
 
+void Windows::add_body() {
+  active_.push_back(0);
+  flying_.push_back(0);
+  strides_.push_back(1);
+  rolling_.emplace_back();
+  reach_m_s_.push_back(0.0);
+  flew_from_.push_back(bodies_.states().back());
+}
+
 void Windows::add(Pair& pair) {
   if (pair.window == number_) return;
   pair.window = number_;

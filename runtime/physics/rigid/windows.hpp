@@ -21,6 +21,9 @@ class Windows {
 
   Windows(Bodies& bodies, TouchSets& touches, const Options& options, Ledger& ledger);
 
+  /// The last of the bodies is new.
+  void add_body();
+
   // Call in this order: new window, flights, small steps.
   /// Determines the pairs that are near until the end of the window, `end_s` at the latest. All bodies are at its start.
   void open(double end_s, const std::list<ModalImpact>& impacts);

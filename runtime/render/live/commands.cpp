@@ -19,28 +19,7 @@
 namespace carillon::live {
 namespace {
 
-constexpr std::size_t kMaxLine = 1000;
-
-/// Words of a line; a word in double quotes may have spaces.
-std::vector<std::string> split(std::string_view line) {
-  std::vector<std::string> words;
-  bool is_quoted = false, is_word = false;
-  for (const char c : line) {
-    if (c == '"') {
-      is_quoted = !is_quoted;
-      if (is_quoted) words.emplace_back();
-      is_word = is_quoted;
-    } else if (!is_quoted && (c == ' ' || c == '\t' || c == '\r')) {
-      is_word = false;
-    } else {
-      if (!is_word) words.emplace_back();
-      is_word = true;
-      words.back() += c;
-    }
-  }
-  if (is_quoted) throw InputError("a name has a double quote at its start only; close it");
-  return words;
-}
+constexpr std::size_t kMaxLine = 100000;
 
 double read_number(const std::string& word) {
   double value = 0.0;
@@ -122,11 +101,37 @@ const char* const kCommandText =
     "release NAME                 let go\n"
     "remove NAME                  take the body out of the world\n"
     "add NAME X Y Z [VX VY VZ]    put it there again [m], with a velocity [m/s]\n"
+    "add {\"name\": ..., ...}      a new body: JSON with the keys of a body in a scene file\n"
     "where NAME                   print the position of its centre of mass [m]\n"
     "quit                         end before the scene does\n";
 
-std::string carry_out(std::string_view line, const Hands& hands) {
-  const std::vector<std::string> words = split(line.substr(0, line.find('#') == 0 ? 0 : line.size()));
+std::vector<std::string> split(std::string_view line) {
+  std::vector<std::string> words;
+  if (line.starts_with('#')) return words;
+  bool is_quoted = false, is_word = false;
+  for (std::size_t n = 0; n < line.size(); ++n) {
+    const char c = line[n];
+    if (c == '{' && !is_quoted && !is_word) {
+      words.emplace_back(line.substr(n));
+      break;
+    }
+    if (c == '"') {
+      is_quoted = !is_quoted;
+      if (is_quoted) words.emplace_back();
+      is_word = is_quoted;
+    } else if (!is_quoted && (c == ' ' || c == '\t' || c == '\r')) {
+      is_word = false;
+    } else {
+      if (!is_word) words.emplace_back();
+      is_word = true;
+      words.back() += c;
+    }
+  }
+  if (is_quoted) throw InputError("a name has a double quote at its start only; close it");
+  return words;
+}
+
+std::string carry_out(const std::vector<std::string>& words, Hands& hands) {
   if (words.empty()) return {};
   const auto found = get_commands().find(words[0]);
   if (found == get_commands().end()) {
@@ -137,6 +142,10 @@ std::string carry_out(std::string_view line, const Hands& hands) {
                                  nearest.empty() ? "; carillon-live --help lists them" : fmt::format("; did you mean \"{}\"?", nearest)));
   }
   if (hands.world == nullptr) throw InputError("no body of the scene can move");
+  if (words[0] == "add" && words.size() == 2 && words[1].starts_with('{')) {
+    hands.names.push_back(hands.make(words[1]));
+    return {};
+  }
   const Command& command = found->second;
   if (words.size() < 2) throw InputError(fmt::format("{} needs the name of a body", words[0]));
   const int body = render::find_body(hands.names, words[1]);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -16,20 +17,24 @@ extern const char* const kCommandText;
 /// Bodies of a running world by their names.
 struct Hands {
   physics::World* world = nullptr;
-  std::vector<std::string> names;  // of the bodies, in order
+  std::vector<std::string> names;                                   // of the bodies, in order
+  std::function<std::string(const std::string& description)> make;  // Stage::add_body(): returns the name
 };
 
-/// Carries out one command: a word, the name of a body (in double quotes if it has spaces), and numbers; points in metres, in the world.
-/// Returns a line of text to print, or none. An empty line, and one that begins with #, does nothing. Throws InputError, and changes
-/// nothing, for a line that cannot be used.
-std::string carry_out(std::string_view line, const Hands& hands);
+/// Words of a line; a word in double quotes may have spaces, and one that begins with { is the rest of the line. None if it begins with #.
+/// Throws InputError for quotes that are not closed.
+std::vector<std::string> split(std::string_view line);
+
+/// Carries out one command: a word, the name of a body, and numbers; points in metres, in the world. Or "add" and the JSON of a new body.
+/// Returns a line of text to print, or none. No words do nothing. Throws InputError, and changes nothing, for words that cannot be used.
+std::string carry_out(const std::vector<std::string>& words, Hands& hands);
 
 /// Lines that have arrived at a file descriptor, without waiting for more.
 class LineReader {
  public:
   explicit LineReader(int descriptor) : descriptor_(descriptor) {}
-  /// The complete lines since the last call; at the end of the input also the last one without an end. Lines of more than 1,000 characters
-  /// are cut.
+  /// The complete lines since the last call; at the end of the input also the last one without an end. Lines of more than 100,000
+  /// characters are cut.
   std::vector<std::string> read();
 
  private:

@@ -8,14 +8,17 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "runtime/base/error.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/render/live/commands.hpp"
 #include "runtime/render/live/device.hpp"
+#include "runtime/render/live/osc.hpp"
 #include "runtime/render/render.hpp"
 #include "runtime/render/stage.hpp"
 #include "runtime/render/surface_playback.hpp"
@@ -31,21 +34,58 @@ void warn(const std::vector<std::string>& warnings) {
   for (const std::string& warning : warnings) fmt::print(stderr, "carillon-live: warning: {}\n", base::printable(warning));
 }
 
-/// Carries out the commands that have arrived. False: quit.
-bool obey(LineReader& reader, const Hands& hands) {
-  for (const std::string& line : reader.read()) {
-    if (line == "quit") return false;
+/// Commands from standard input and by OSC.
+class Orders {
+ public:
+  Orders(const PlayerOptions& options, Hands hands) : hands_(std::move(hands)) {
+    if (options.takes_commands) reader_.emplace(STDIN_FILENO);
+    if (options.osc.empty()) return;
+    port_.emplace(options.osc);
+    if (!options.quiet) fmt::print("commands by OSC    UDP port {}\n", port_->get_port());
+    std::fflush(stdout);
+  }
+
+  /// Carries out the commands that have arrived. False: quit.
+  bool obey() {
+    if (reader_)
+      for (const std::string& line : reader_->read())
+        if (!take([&] { return split(line); })) return false;
+    if (port_)
+      for (const Words& words : port_->read([&](const std::string& reason) { refuse("a packet of OSC is left out: " + reason); }))
+        if (!take([&] { return words; })) return false;
+    return true;
+  }
+  void print() const {
+    if (port_) fmt::print("OSC                {} commands or packets left out\n", refused_);
+  }
+
+ private:
+  static constexpr int kMaxWarnings = 100;
+
+  template <class GetWords>
+  bool take(GetWords&& get_words) {
     try {
-      if (const std::string text = carry_out(line, hands); !text.empty()) {
+      const Words words = get_words();
+      if (words == Words{"quit"}) return false;
+      if (const std::string text = carry_out(words, hands_); !text.empty()) {
         fmt::print("{}\n", text);
         std::fflush(stdout);
       }
     } catch (const InputError& error) {
-      warn({error.what()});
+      refuse(error.what());
     }
+    return true;
   }
-  return true;
-}
+  void refuse(const std::string& reason) {
+    if (++refused_ <= kMaxWarnings) warn({reason});
+    if (refused_ == kMaxWarnings) warn({"further commands that cannot be used are only counted"});
+  }
+
+  Hands hands_;
+  std::optional<LineReader> reader_;
+  std::optional<OscPort> port_;
+  int refused_ = 0;
+};
 
 void print_statistics(const DeviceStatistics& card, const synth::SynthesiserCounters& counters, render::Stage& stage, double rate_hz) {
   const double card_s = std::max(static_cast<double>(card.frames), 1.0) / rate_hz;
@@ -68,25 +108,24 @@ void print_statistics(const DeviceStatistics& card, const synth::SynthesiserCoun
 void play(const PlayerOptions& options) {
   scene::Scene scene = scene::read_scene(options.scene);
   render::refuse_surfaces(scene, "carillon-live");
-  const scene::Banks banks = scene::read_banks(scene, options.quiet);
-  std::vector<const bank::Bank*> body_banks;
-  for (const scene::SceneBody& body : scene.bodies) body_banks.push_back(body.spec.bank);
+  scene::Banks banks = scene::read_banks(scene, options.quiet);
   warn(scene.warnings);
   const double gain_per_pa = options.gain_per_pa > 0.0 ? options.gain_per_pa : scene.output.gain_per_pa.value_or(1.0);
-  render::Stage stage(scene, body_banks,
-                      {.look_ahead_s = options.look_ahead_s, .gain_per_pa = gain_per_pa, .moves_fixed = options.takes_commands});
+  render::Stage stage(
+      scene,
+      {.look_ahead_s = options.look_ahead_s, .gain_per_pa = gain_per_pa, .is_handled = options.takes_commands || !options.osc.empty()});
   warn(stage.get_warnings());
   synth::Synthesiser& synthesiser = stage.get_synthesiser();
   const double rate_hz = scene.sample_rate_hz;
   Device device(synthesiser, {.name = options.device, .null = options.null, .rate_hz = rate_hz, .frames = options.frames});
+  Hands hands{.world = stage.get_world(), .names = {}, .make = [&](const std::string& text) { return stage.add_body(text, banks); }};
+  for (const scene::SceneBody& body : scene.bodies) hands.names.push_back(body.name);
+  Orders orders(options, std::move(hands));
   stage.begin();
   device.start();
   synth::LoadKeeper keeper;
-  LineReader reader(STDIN_FILENO);
-  Hands hands{.world = stage.get_world(), .names = {}};
-  for (const scene::SceneBody& body : scene.bodies) hands.names.push_back(body.name);
   for (double now_s = 0.0; now_s < scene.duration_s; now_s = synthesiser.get_time_s()) {
-    if (options.takes_commands && !obey(reader, hands)) break;
+    if (!orders.obey()) break;
     const bool advanced = stage.step(now_s);
     if (options.cpu_share > 0.0) keeper.keep(synthesiser, options.cpu_share, device.get_statistics().busy_s);
     if (!advanced) std::this_thread::sleep_for(std::chrono::milliseconds(2));
@@ -94,10 +133,12 @@ void play(const PlayerOptions& options) {
   device.stop();
   for (std::size_t i = 0; i < scene.bodies.size(); ++i)
     if (const std::string text =
-            render::describe_bending(scene.bodies[i].name, *body_banks[i], synthesiser.get_deflection(static_cast<int>(i)));
+            render::describe_bending(scene.bodies[i].name, *scene.bodies[i].spec.bank, synthesiser.get_deflection(static_cast<int>(i)));
         !text.empty())
       warn({text});
-  if (!options.quiet) print_statistics(device.get_statistics(), synthesiser.get_counters(), stage, rate_hz);
+  if (options.quiet) return;
+  print_statistics(device.get_statistics(), synthesiser.get_counters(), stage, rate_hz);
+  orders.print();
 }
 
 }  // namespace carillon::live

@@ -37,9 +37,9 @@ LIMITS = {
         ("slide", 1000): {"windows_db": 12.0},
         ("tube", 60): {"first_db": 4.0, "windows_db": 9.0},
         ("tube", 240): {"windows_db": 9.0},
-        ("pile", 60): {"windows_db": 8.0, "end_db": 25.0},
-        ("pile", 240): {"windows_db": 8.0, "end_db": 25.0},
-        ("pile", 1000): {"windows_db": 8.0, "end_db": 25.0},
+        ("pile", 60): {"windows_db": 5.0},
+        ("pile", 240): {"windows_db": 5.0},
+        ("pile", 1000): {"windows_db": 5.0},
     },
 }
 # Simbody's contact of boxes needs meshes, which cost 10 CPU s per s; its impacts are tested with balls.

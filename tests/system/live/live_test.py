@@ -2,10 +2,13 @@
 """carillon-live on a sound server: jackd with its dummy driver, which has a clock and no card. The number of underflows is printed;
 a busy machine causes a few, so most blocks must be in time and none lost."""
 import json
+import math
 import os
 import pathlib
 import re
 import resource
+import socket
+import struct
 import subprocess
 import tempfile
 import time
@@ -18,6 +21,14 @@ ENVIRONMENT = {**os.environ, "JACK_DEFAULT_SERVER": SERVER, "JACK_NO_AUDIO_RESER
 
 def live(*arguments, environment=ENVIRONMENT):
     return subprocess.run([BIN / "carillon-live", *map(str, arguments)], capture_output=True, text=True, timeout=180, env=environment)
+
+
+def osc(address, *arguments):
+    """A message of Open Sound Control 1.0."""
+    pad = lambda text: text.encode() + bytes(4 - len(text.encode()) % 4)
+    types = "".join("s" if isinstance(x, str) else "i" if isinstance(x, int) else "f" for x in arguments)
+    parts = [pad(x) if isinstance(x, str) else struct.pack(">i" if isinstance(x, int) else ">f", x) for x in arguments]
+    return b"".join([pad(address), pad("," + types), *parts])
 
 
 class Live(unittest.TestCase):
@@ -157,6 +168,56 @@ class Live(unittest.TestCase):
             self.assertEqual(refused, "0")
             self.assertGreater(int(strikes), rendered / 2)
 
+    def test_messages_of_osc_move_bodies(self):
+        scene = json.loads(self.scene.read_text())
+        scene["duration_s"] = 60.0
+        scene["strikes"] = []
+        path = self.root / "osc.json"
+        path.write_text(json.dumps(scene))
+        words = [BIN / "carillon-live", path, "--null", "--osc", "0", "--look-ahead", "0.05"]
+        with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as player:
+            to = ("127.0.0.1", int(player.stdout.readline().split()[-1]))
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
+                say = lambda *message: out.sendto(osc(*message), to)
+
+                def find(body):
+                    say("/where", body)
+                    return player.stdout.readline().split()
+
+                say("/remove", "gong")
+                self.assertEqual(find("gong")[-1], "absent")
+                say("/grab", "cube")
+                say("/drag", "cube", 0.2, 0.1, 0.4, 0.2)
+                places = []
+                while len(places) < 100 and not (places and abs(places[-1][0] - 0.2) < 0.01 and abs(places[-1][2] - 0.4) < 0.03):
+                    places.append([float(word) for word in find("cube")[1:4]])
+                    time.sleep(0.05)
+                self.assertLess(len(places), 100, places[-1])
+                bundle = b"#bundle\0" + bytes(8)
+                for part in (osc("/release", "cube"), osc("/push", "cube", 0, 0, 5)):
+                    bundle += len(part).to_bytes(4, "big") + part
+                out.sendto(bundle, to)
+                self.assertGreater(max(float(find("cube")[3]) for _ in range(30) if not time.sleep(0.02)), 0.42)
+                for bad in (
+                    b"",
+                    b"push",
+                    b"/push\0\0\0,s\0\0cube",
+                    osc("/push", "cube", 0, 0),
+                    osc("/push", "cube", 0, 0, math.nan),
+                    bundle[:-4],
+                ):
+                    out.sendto(bad, to)
+                say("/quit")
+            printed, errors = player.communicate(timeout=20)
+        self.assertEqual(player.returncode, 0, errors)
+        self.assertEqual(len(errors.splitlines()), 6, errors)
+        self.assertEqual(errors.count("a packet of OSC is left out: "), 4, errors)
+        self.assertRegex(printed, r"OSC +6 commands or packets left out")
+        for where in ("65536", "x", "1.2.3:9000"):
+            refused = live(self.scene, "--null", "--osc", where)
+            self.assertEqual((refused.returncode, refused.stderr.count("\n")), (2, 1), refused.stderr)
+            self.assertIn("is no port; give one like 9000", refused.stderr)
+
     def test_commands_move_bodies(self):
         scene = json.loads(self.scene.read_text())
         scene["duration_s"] = 60.0
@@ -202,13 +263,30 @@ class Live(unittest.TestCase):
             say('add "the other" 0 3 0.3 0 0 -1', "remove gong")
             wait_for('"the other"', lambda place: place[2] < 0.1)
             self.assertEqual(find("gong")[1], ["absent"])
+            new = {"name": "a new one", "bank": "cube.h5", "position_m": [0, 5, 0.4], "velocity_m_s": [0, 0, -1]}
+            say("add " + json.dumps(new))
+            wait_for('"a new one"', lambda place: abs(place[2] - 0.05) < 0.01)
+            say('push "a new one" 0 0 5')
+            wait_for('"a new one"', lambda place: place[2] > 0.15)
+            say("add " + json.dumps(new), "add " + json.dumps({**new, "name": "third", "position_m": [0, 0, 0]}), 'add {"name": "fourth"}')
             say("jump cube 1", "push cuba 0 0 1", "push cube 0 0", "push cube 0 0 x", "remove gong", "push gong 1 0 0", "drag cube 0 0 0")
             say("quit")
             out, errors = player.communicate(timeout=20)
         self.assertEqual(player.returncode, 0)
         self.assertLess(float(re.search(r"played +(\S+) s", out)[1]), 50.0, "quit ends it")
         self.assertGreater(int(re.search(r"strikes +(\d+)", out)[1]), 3)
-        wanted = ['no command "jump"', 'mean "cube"', "2 numbers", '"x" is no number', "not in the world", "not in the world", "not held"]
+        wanted = [
+            'called "a new one" already',
+            "starts 50.00 mm inside the ground",
+            '"bank" is missing',
+            'no command "jump"',
+            'mean "cube"',
+            "2 numbers",
+            '"x" is no number',
+            "not in the world",
+            "not in the world",
+            "not held",
+        ]
         lines = errors.splitlines()
         self.assertEqual(len(lines), len(wanted), errors)
         for line, words in zip(lines, wanted):

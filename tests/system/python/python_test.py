@@ -299,6 +299,37 @@ class Worlds(Case):
         world.remove("shelf")
         self.assertTrue(world.is_absent("shelf"))
         self.assertAlmostEqual(world.time_s, 2.05, places=9)
+        world.advance(2.0)  # all come to rest
+        new = {"name": "new", "bank": str(self.bank_file), "position_m": [-0.2, 2.09, 0.3], "restitution": 0.3}
+        self.assertEqual((world.add_body(new), world.bodies[-1]), ("new", "new"))
+        quiet = abs(world.advance(0.2)).max()
+        self.assertGreater(abs(world.advance(0.5)).max(), 10 * quiet, "it falls")
+        numpy.testing.assert_allclose(world.centre("new")[2], 0.005, atol=1e-3)
+        self.refuse(carillon.InputError, lambda: world.add_body(new), 'called "new" already')
+        self.refuse(carillon.InputError, lambda: world.add_body({**new, "name": "inside"} | {"position_m": [-0.2, 2.09, -0.3]}), "inside")
+        self.refuse(carillon.InputError, lambda: world.add_body({**new, "name": "odd", "colour": 1}), "colour")
+        self.refuse(carillon.InputError, lambda: world.add_body({**new, "name": "no", "bank": "no.h5"}), "no.h5")
+        self.assertEqual(world.bodies[-1], "new", "what is refused leaves no trace")
+        world.push("new", [0, 0, 0.1])
+
+    def test_new_body_sounds_as_one_that_was_absent(self):
+        def play(is_new):
+            scene = self.make_scene()
+            spare = scene["bodies"].pop(1)
+            del spare["absent"]
+            if not is_new:
+                scene["bodies"].append({**spare, "absent": True})
+            world = carillon.World(scene)
+            begin = world.advance(0.3)
+            if is_new:
+                world.add_body({**spare, "velocity_m_s": [0, 0, -1]})
+            else:
+                world.add("spare", spare["position_m"], velocity_m_s=[0, 0, -1])
+            return begin, world.advance(0.7)
+
+        (_, new), (begin, absent) = play(True), play(False)
+        self.assertGreater(abs(absent).max(), abs(begin[-4800:]).max())
+        numpy.testing.assert_allclose(new, absent, atol=1e-6 * abs(absent).max())
 
     def test_what_cannot_be_done_is_one_message(self):
         world = carillon.World(self.make_scene())

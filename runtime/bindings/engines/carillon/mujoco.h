@@ -12,8 +12,23 @@
 
 namespace carillon {
 
+/// Gives a body of the model the mass and inertia of a bank, whose mesh frame is the body's. Then call mj_setConst.
+inline void set_mass(mjModel* model, int body, const carillon_bank* bank) {
+  carillon_body_facts facts;
+  carillon_body_facts_init(&facts);
+  carillon_bank_get_facts(bank, &facts);
+  mjtNum inertia[9], axes[9];  // principal axes, as columns
+  double centre_m[3];
+  carillon_bank_centre_m(bank, centre_m);
+  for (int k = 0; k < 3; ++k) model->body_ipos[3 * body + k] = mjtNum(centre_m[k]);
+  for (int k = 0; k < 9; ++k) inertia[k] = mjtNum(facts.inertia_kg_m2[k]);
+  model->body_mass[body] = mjtNum(facts.mass_kg);
+  mju_eig3(model->body_inertia + 3 * body, axes, model->body_iquat + 4 * body, inertia);
+}
+
 /// Poses and contact points of a MuJoCo model after each mj_step, with any integrator but RK4, whose contacts are of a stage inside the
-/// step. Options of the carillon_touches: points_after 0, compliant 1. One thread: that of the physics.
+/// step. Options of the carillon_touches: points_after 0, compliant 1. MuJoCo lets no body sleep: one whose points are slower than 1 mm/s
+/// and stay within 0.1 mm for 0.1 s is asleep here. One thread: that of the physics.
 class MujocoTouches {
  public:
   /// All must outlive this object.
@@ -31,11 +46,18 @@ class MujocoTouches {
     for (int other = 1; other < model_->nbody; ++other)
       if (model_->body_parentid[other] == body && model_->body_dofnum[other] > 0) is_free = false;
     added.flags = is_free ? 0u : CARILLON_JOINTED;
+    for (int n = 0, geom = model_->body_geomadr[body]; n < model_->body_geomnum[body]; ++n, ++geom) {
+      const mjtNum* at = model_->geom_pos + 3 * geom;
+      mjtNum arm[3];
+      mju_sub3(arm, at, model_->body_ipos + 3 * body);
+      added.radius_m = std::fmax(added.radius_m, static_cast<double>(mju_norm3(arm) + model_->geom_rbound[geom]));
+    }
     indices_[static_cast<std::size_t>(body)] = index;
   }
 
   /// Before the first step, and after the program has changed qpos or qvel. Status and message as of carillon_touches_start.
   carillon_status start(char* message, std::size_t size) {
+    for (Body& body : bodies_) body.rest = carillon_pose();  // none has rested
     read_poses();
     return carillon_touches_start(touches_, static_cast<double>(data_->time), poses_.data(), static_cast<std::int32_t>(poses_.size()),
                                   message, size);
@@ -53,6 +75,9 @@ class MujocoTouches {
     int id = -1;
     mjtNum mesh[4];
     std::uint32_t flags;
+    double radius_m = 0.0;  // about the centre of mass
+    carillon_pose rest;
+    double slow_since_s = 0.0;
   };
   std::int32_t find(int geom) const {
     if (geom < 0) return -1;
@@ -81,6 +106,26 @@ class MujocoTouches {
         pose.velocity_m_s[k] = static_cast<double>(motion[3 + k]);
       }
       pose.flags = bodies_[i].flags;
+      settle(bodies_[i], pose);
+    }
+  }
+  /// A body whose points stay slow and near a pose keeps that pose until they do not.
+  void settle(Body& body, carillon_pose& pose) const {
+    double way2 = 0.0, turn2 = 0.0, speed2 = 0.0, spin2 = 0.0;
+    for (int k = 0; k < 4; ++k) turn2 += 4 * std::pow(pose.rotation[k] - body.rest.rotation[k], 2);
+    for (int k = 0; k < 3; ++k) {
+      way2 += std::pow(pose.position_m[k] - body.rest.position_m[k], 2);
+      speed2 += std::pow(pose.velocity_m_s[k], 2);
+      spin2 += std::pow(pose.spin_rad_s[k], 2);
+    }
+    const double time_s = static_cast<double>(data_->time);
+    const auto calc_largest = [&](double centre2, double about2) { return std::sqrt(centre2) + body.radius_m * std::sqrt(about2); };
+    if (calc_largest(speed2, spin2) > 1e-3 || calc_largest(way2, turn2) > 1e-4) {
+      body.rest = pose;
+      body.slow_since_s = time_s;
+    } else if (time_s - body.slow_since_s > 0.1) {
+      pose = body.rest;
+      pose.flags |= CARILLON_ASLEEP;
     }
   }
   void read_points() {

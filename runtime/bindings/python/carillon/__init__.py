@@ -70,3 +70,10 @@ class World(_World):
             super().__init__(_os.path.join(_os.getcwd(), "scene"), _write_json(scene, "scene"), look_ahead_s)
         else:
             super().__init__(_os.fspath(scene), "", look_ahead_s)
+
+    def add_body(self, body: dict) -> str:
+        """Puts a new body into the world: a dict with the keys of a body in a scene file. Returns its name.
+
+        Paths are relative to the scene. The first body of a bank reads it, which takes its time before the next sound.
+        """
+        return super().add_body(_write_json(body, "body"))

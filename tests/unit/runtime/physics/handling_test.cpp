@@ -7,6 +7,7 @@
 #include <map>
 #include <random>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -231,6 +232,65 @@ TEST(Remove, FixedShelf) {
   w.run(3.0);
   EXPECT_GT(w.hits, hits) << "against the shelf above it";
   EXPECT_LT(w.get_deepest_m(), 1e-4);
+}
+
+TEST(Add, NewBodyIsAsOneThatWasAbsent) {
+  const bank::Bank box = make_box({0.06, 0.05, 0.04});
+  BodySpec later = make_body("later", box, {0.01, 0, 0.1});
+  later.velocity_m_s = {0.1, 0, -1};
+  const auto run = [&](bool is_absent) {
+    WorldSpec spec = make_floor({make_body("box", box, {0, 0, 0.02})});
+    if (is_absent) spec.bodies.push_back(later), spec.bodies.back().absent = true;
+    Watched w(spec);
+    w.run(0.3);
+    if (is_absent)
+      w.world.add(1, {.pose = later.initial, .velocity_m_s = later.velocity_m_s});
+    else
+      EXPECT_EQ(w.world.add(later), 1);
+    w.run(1.5);
+    EXPECT_GT(w.hits, 0);
+    EXPECT_LT(w.get_energy().error_j, 1e-6);
+    return std::tuple(w.hits, w.last[0].position_m, w.last[1].position_m, w.last[1].rotation, w.open);
+  };
+  EXPECT_EQ(run(true), run(false));
+}
+
+TEST(Add, NewBodiesMakeAPile) {
+  const bank::Bank box = make_box({0.06, 0.05, 0.04}), slab = make_box({0.3, 0.3, 0.03});
+  Watched w(make_floor({make_body("box", box, {0, 0, 0.02})}));
+  w.world.grab(0, {0, 0, 0.02});  // before the start, and while others are added
+  double placed_j = 0.0;
+  for (int i = 1; i <= 12; ++i) {
+    w.run(0.15 * i);
+    BodySpec spec = make_body("box " + std::to_string(i), box, {0.004 * (i % 3), 0.003 * (i % 2), 0.05 + 0.045 * i});
+    EXPECT_EQ(w.world.add(spec), i);
+    placed_j += box.rigid.mass_kg * kGravity * spec.initial.position_m[2];
+    spec.fixed = true;
+    EXPECT_THROW(w.world.add(spec), InputError) << "inside the one before";
+  }
+  w.run(1.9);
+  EXPECT_NEAR(w.get_energy().given_j, placed_j, 0.02 * placed_j);  // and the work of the grab
+  w.world.release(0);
+  w.run(6.0);
+  EXPECT_LT(w.get_deepest_m(), 1e-4);
+  EXPECT_LT(w.get_energy().error_j, 1e-5);
+  BodySpec shelf = make_body("shelf", slab, {0, 0, 1.0});
+  shelf.fixed = true;
+  EXPECT_EQ(w.world.add(shelf), 13);
+  BodySpec on_it = make_body("on it", box, {0, 0, 1.1});
+  EXPECT_EQ(w.world.add(on_it), 14);
+  w.world.push(14, {0, 0, 1.1}, {0, 0, -0.01});
+  w.run(7.0);
+  EXPECT_NEAR(w.last[14].position_m[2], 1.035, 1e-4);
+  w.world.remove(13);
+  w.run(8.0);
+  EXPECT_LT(w.last[14].position_m[2], 0.9);
+  BodySpec bad = make_body("bad", box, {0, 0, 3});
+  bad.restitution = 2.0;
+  EXPECT_THROW(w.world.add(bad), InputError);
+  bad.restitution = 0.5;
+  bad.bank = nullptr;
+  EXPECT_THROW(w.world.add(bad), InputError);
 }
 
 TEST(Add, AbsentBodyAndItsErrors) {
