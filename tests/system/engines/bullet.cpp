@@ -25,6 +25,7 @@ class Bullet : public Engine {
  public:
   Bullet(const std::vector<Solid>& solids, double step_s, carillon_touches* touches) : step_s_(step_s), reader_(world_, touches) {
     world_.setGravity(btVector3(0, 0, btScalar(-9.81)));
+    configuration_.setPlaneConvexMultipointIterations();  // else a box on the ground gets one point per step
     world_.getSolverInfo().m_solverMode |= SOLVER_USE_2_FRICTION_DIRECTIONS;
     // Depth is corrected apart from velocities, or hits bounce too high; in longer steps a pile would not come to rest.
     if (step_s < 1e-3) world_.getSolverInfo().m_splitImpulsePenetrationThreshold = 1;
