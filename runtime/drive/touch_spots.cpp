@@ -26,6 +26,15 @@ double calc_pull(const StepView& step, int a, int b, const Vec3& normal) {
   return std::max(0.0, (step.moves(b) ? along : 0.0) - (step.moves(a) ? along : 0.0));
 }
 
+/// Time from the begin of the step until the surfaces touch, in free fall from their gap then [s].
+double calc_wait_s(const StepView& step, int a, int b, const std::array<Vec3, 2>& stations, const Vec3& normal, double gap_m,
+                   double approach_m_s) {
+  if (step.options.points_after) gap_m = dot(step.place(step.before, a, stations[0]) - step.place(step.before, b, stations[1]), normal);
+  if (!(approach_m_s > 0.0) || !(gap_m > 0.0)) return 0.0;
+  const double pull = calc_pull(step, a, b, normal);
+  return std::min(step.dt_s, 2.0 * gap_m / (approach_m_s + std::sqrt(approach_m_s * approach_m_s + 2.0 * pull * gap_m)));
+}
+
 /// Impulse that carries the weight of the pair along the normal in this step [N s].
 double calc_weight(const StepView& step, int a, int b, const Vec3& normal) {
   double inverse = 0.0;
@@ -157,7 +166,7 @@ Vec3 TouchSpots::calc_where(const StepView& step, const Group& g, const Spot& sp
 void TouchSpots::follow(const StepView& step, const Group& g, int count, Spot& spot, std::vector<FinishedHit>& hits) {
   const double dt = step.dt_s, slowest = step.calc_slowest();
   const double parting = dot(step.calc_relative(step.scene.motions, g.a, g.b, g.stations_m), g.normal);
-  const double weight = calc_weight(step, g.a, g.b, g.normal) / count;
+  double weight = calc_weight(step, g.a, g.b, g.normal) / count;
   double inverse = step.scene.calc_inverse_mass(g.a, g.b, g.where_m, g.normal);
   const bool is_jointed = step.bodies[g.a].pose.jointed || (g.b >= 0 && step.bodies[g.b].pose.jointed);
   if (is_jointed && parting + g.approach_m_s > slowest) inverse = std::min(inverse, (parting + g.approach_m_s) / g.push_n_s);
@@ -167,9 +176,12 @@ void TouchSpots::follow(const StepView& step, const Group& g, int count, Spot& s
   const bool is_shaken = is_loaded && g.push_n_s < kSettledRatio * spot.load_n * dt;
   double hit = 0.0;
   if (spot.is_open || ((g.approach_m_s > slowest || shares) && !is_shaken)) {
+    const double wait_s = spot.is_open ? 0.0 : calc_wait_s(step, g.a, g.b, g.stations_m, g.normal, g.gap_m, g.approach_m_s);
+    // Sums over internal steps: nothing carries the bodies before they touch, nor after they have parted.
+    if (!spot.is_open && step.options.points_after) weight *= parting > slowest ? 0.0 : 1.0 - wait_s / dt;
     hit = std::max(0.0, g.push_n_s - weight);
     if (hit > 0.0) {
-      if (!spot.is_open) open(step, g, inverse, spot);
+      if (!spot.is_open) open(step, g, wait_s, inverse, spot);
       gather(step, g, hit, spot);
     }
   } else {
@@ -185,22 +197,28 @@ void TouchSpots::follow(const StepView& step, const Group& g, int count, Spot& s
   if (!spot.is_open) return;
   spot.hit.parting_m_s = std::max(0.0, parting);
   if (step.options.early && !spot.is_reported) report_early(step, spot, hits);
-  const bool has_decayed = !step.options.compliant || hit < kDecayedRatio * spot.peak_n * dt;
+  const double gap =
+      dot(step.place(step.scene.motions, g.a, g.stations_m[0]) - step.place(step.scene.motions, g.b, g.stations_m[1]), g.normal);
+  const bool has_decayed = !step.options.compliant || hit < kDecayedRatio * spot.peak_n * dt || (gap > 0.0 && parting > slowest);
   const bool is_long = step.scene.time_s - spot.hit.touch_s > step.options.longest_hit_s;
   if (is_long) ++counters_->cut;
   if (is_long || !(hit > 0.0) || (parting > -slowest && has_decayed)) close(step, spot, hits);
 }
 
-void TouchSpots::open(const StepView& step, const Group& g, double inverse_mass, Spot& spot) {
+void TouchSpots::open(const StepView& step, const Group& g, double wait_s, double inverse_mass, Spot& spot) {
   spot.is_open = true;
   spot.peak_n = 0.0;
   spot.hit = {.a = g.a, .b = g.b};
-  const double from_s = step.options.points_after ? step.scene.time_s : step.scene.before_s;
-  const double wait_s = g.approach_m_s > 0.0 ? g.gap_m / g.approach_m_s : 0.0;
-  spot.hit.touch_s = std::clamp(from_s + wait_s, step.scene.before_s, step.scene.time_s);
+  spot.hit.opened_s = step.scene.before_s;
+  spot.hit.touch_s = step.scene.before_s + wait_s;
+  spot.hit.approach_m_s = g.approach_m_s + wait_s * calc_pull(step, g.a, g.b, g.normal);
   spot.hit.inverse_mass = inverse_mass;
-  spot.hit.before[0] = step.before[g.a];
-  if (g.b >= 0) spot.hit.before[1] = step.before[g.b];
+  for (const std::size_t side : {0, 1}) {
+    const int body = side == 0 ? g.a : g.b;
+    if (body < 0) continue;
+    spot.hit.before[side] = step.before[body];
+    if (step.moves(body)) spot.hit.before[side].velocity_m_s = step.before[body].velocity_m_s + wait_s * step.options.gravity_m_s2;
+  }
 }
 
 /// Adds the part `push_n_s` of the group's impulse to the open hit.

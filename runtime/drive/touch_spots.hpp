@@ -16,6 +16,7 @@ namespace carillon::drive {
 /// A complete hit.
 struct FinishedHit {
   int a = 0, b = -1;
+  double opened_s = 0.0;  // begin of its first step
   double touch_s = 0.0, end_s = 0.0;
   double approach_m_s = 0.0, parting_m_s = 0.0;  // before and after; parting >= 0
   double inverse_mass = 0.0;                     // 1/m_eff along the normal [1/kg]
@@ -25,7 +26,7 @@ struct FinishedHit {
   double rubbed_n_s = 0.0;                       // friction
   std::array<Vec3, 2> stations_m{}, outwards{};  // on a and b, mesh axes; outward normals
   std::array<Vec3, 2> impulses_n_s{};            // on a and b, mesh axes
-  std::array<Motion, 2> before{};                // motions of a and b before its first step
+  std::array<Motion, 2> before{};                // motions of a and b before its first step, velocities at the touch
 };
 
 /// Invariant: a position belongs to one pair (a, b), in the order of the names; it lives until it has had no load for a few steps.
@@ -65,7 +66,7 @@ class TouchSpots {
   std::vector<Group> make_groups(const StepView& step, std::span<const StepPoint> points) const;
   Spot& find_spot(const StepView& step, const Group& group, std::vector<Spot>& spots);
   void follow(const StepView& step, const Group& group, int count, Spot& spot, std::vector<FinishedHit>& hits);
-  void open(const StepView& step, const Group& group, double inverse_mass, Spot& spot);
+  void open(const StepView& step, const Group& group, double wait_s, double inverse_mass, Spot& spot);
   void gather(const StepView& step, const Group& group, double push_n_s, Spot& spot);
   void report_early(const StepView& step, Spot& spot, std::vector<FinishedHit>& hits);
   void close(const StepView& step, Spot& spot, std::vector<FinishedHit>& hits);

@@ -134,11 +134,14 @@ def calc_levels(sound, rate=48000, window_s=0.125):
 
 
 def find_first_hit(sound, rate=48000):
-    """Peak [Pa] and centroid of the spectrum [Hz] of the first 20 ms of the first hit."""
+    """Peak [Pa] and centroid of the spectrum [Hz] of the first 20 ms of the first hit. Peak: of the wave between its samples, as a sound of
+    14 kHz has 3.4 of them in a period."""
     begin = np.argmax(abs(sound) > 0.05 * abs(sound[: rate // 2]).max())
     part = sound[begin : begin + rate // 50]
-    power = abs(np.fft.rfft(part)) ** 2
-    return abs(part).max(), (power * np.fft.rfftfreq(len(part), 1 / rate)).sum() / power.sum()
+    spectrum = np.fft.rfft(part)
+    power = abs(spectrum) ** 2
+    wave = 8 * np.fft.irfft(spectrum, 8 * len(part))
+    return abs(wave).max(), (power * np.fft.rfftfreq(len(part), 1 / rate)).sum() / power.sum()
 
 
 def count_lost(programs, folder, engine, name, hz):

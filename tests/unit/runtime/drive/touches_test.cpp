@@ -48,6 +48,26 @@ TEST(Touches, OneHitInAnyNumberOfStepsIsOnePulse) {
   }
 }
 
+TEST(Touches, HitsInsideAStepBeginAtTheTouchWithItsSpeed) {
+  // The ball falls 8 mm and bounces, all within one step, as in sums over the internal steps of an engine.
+  const bank::Bank ball = make_ball(kRadius);
+  const double dt = 1.0 / 60.0, height = 8e-3, speed = 0.6;
+  const double touch = std::sqrt(speed * speed + 2.0 * kGravity * height), wait = (touch - speed) / kGravity;
+  Rig rig({.points_after = true, .compliant = true});
+  rig.add(ball, "ball", {0, 0, kRadius + height}, {0, 0, -speed});
+  rig.start();
+  rig.poses[0].velocity_m_s[2] = 0.5 * touch - kGravity * (dt - wait);
+  rig.poses[0].position_m[2] = kRadius + (dt - wait) * (0.5 * touch - 0.5 * kGravity * (dt - wait));
+  TouchPoint point = on_ground(0, {}, 1.5 * touch * ball.rigid.mass_kg);
+  point.gap_m = rig.poses[0].position_m[2] - kRadius;
+  rig.step(dt, {point});
+  rig.step(dt, {});
+  const auto pulses = rig.list<events::Impulse>();
+  ASSERT_EQ(pulses.size(), 1U);
+  EXPECT_NEAR(pulses[0].time_s - 0.5 * pulses[0].duration_s, wait, 1e-6);
+  EXPECT_NEAR(pulses[0].impulse_n_s[2], 1.5 * touch * ball.rigid.mass_kg, 1e-9);
+}
+
 TEST(Touches, EarlyHitsAreReportedInTheirFirstStep) {
   const bank::Bank ball = make_ball(kRadius);
   Rig rig({.compliant = true, .early = true});
