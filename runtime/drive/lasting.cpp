@@ -180,7 +180,8 @@ LastingContacts::Spot& LastingContacts::find_spot(const Scene& scene, const Grou
   spot.where = g.where;
   spot.features = g.features;
   spot.load_n = g.push_n;
-  spot.quiet_s = spot.seen_s = scene.time_s;
+  spot.seen_s = scene.time_s;
+  spot.quiet_s = scene.time_s - scene.before_s > kMinQuietS ? scene.before_s : scene.time_s;
   spots.push_back(spot);
   return spots.back();
 }

@@ -192,7 +192,9 @@ void TouchSpots::follow(const StepView& step, const Group& g, int count, Spot& s
   spot.stations_m = g.stations_m;
   spot.seen_s = step.scene.time_s;
   spot.mean_n += dt / (dt + kMeanS) * (g.push_n_s / dt - spot.mean_n);
-  spot.load_n += dt / (dt + calc_load_s(dt)) * ((g.push_n_s - hit) / dt - spot.load_n);
+  // Of a new contact, or after a hit, the mean since then.
+  const double known_s = step.scene.before_s - std::max(spot.born_s, spot.quiet_s);
+  spot.load_n += dt / (dt + std::min(calc_load_s(dt), known_s)) * ((g.push_n_s - hit) / dt - spot.load_n);
   if (g.curvature_per_m >= 0.0) spot.curvature_per_m = g.curvature_per_m;
   if (!spot.is_open) return;
   spot.hit.parting_m_s = std::max(0.0, parting);

@@ -103,6 +103,18 @@ TEST(Touches, WeightAloneIsNoHit) {
   }
 }
 
+TEST(Touches, NewContactsCarryTheirWeightAtOnce) {
+  const bank::Bank box = make_box({0.1, 0.08, 0.04});
+  const double weight = box.rigid.mass_kg * kGravity, dt = 1.0 / 60.0;
+  Rig rig;
+  rig.add(box, "box", {0, 0, 0.02});
+  rig.start();
+  for (int n = 0; n < 3; ++n) rig.step(dt, on_four_corners(0, {}, {0.05, 0.04, 0.02}, weight * dt));
+  for (const auto& c : rig.list<events::LastingContact>())
+    EXPECT_NEAR(c.force_n, c.time_s > 2.5 * dt ? 0.25 * weight : 0.0, 0.01 * weight) << c.time_s;
+  EXPECT_EQ(rig.list<events::LastingContact>().size(), 8U);
+}
+
 TEST(Touches, LoadThatHopsIsTwoConstantContacts) {
   const bank::Bank box = make_box({0.1, 0.08, 0.04});
   const double weight = box.rigid.mass_kg * kGravity;
