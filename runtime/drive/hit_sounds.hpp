@@ -1,11 +1,13 @@
 // Hits of a step as pulses or as impacts with modes. Internal to this folder.
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "runtime/drive/lasting.hpp"
 #include "runtime/drive/pulses.hpp"
 #include "runtime/drive/touch_spots.hpp"
+#include "runtime/physics/impact/impact.hpp"
 
 namespace carillon::drive {
 
@@ -24,17 +26,25 @@ class HitSounds {
   struct Contact {
     const FinishedHit& hit;
     double mass_kg = 0.0, speed_m_s = 0.0, restitution = 0.0, radius_m = 0.0, compliance = 0.0;
+    Blow blow{};           // as a Hertz pulse
+    double modal_j = 0.0;  // that it would give to the modes
     std::array<geometry::Place, 2> places{};
     std::array<std::vector<double>, 2> shapes{};  // (n, 3) at the places; empty: no modes
 
     /// Kinetic energy lost [J], at least 1 % of the blow.
     double calc_lost_j() const;
+    /// The hit is integrated with the modes of its bodies.
+    bool needs_modes() const;
   };
 
-  bool sound(const StepView& step, const FinishedHit& hit, TouchesCounters& counters, std::vector<events::Event>& events);
   static Contact make_contact(const StepView& step, const FinishedHit& hit);
-  bool integrate(const StepView& step, const Contact& contact, TouchesCounters& counters, std::vector<events::Event>& events);
+  std::vector<Contact> gather(const StepView& step, std::span<const FinishedHit* const> hits, std::size_t first);
+  void sound(const StepView& step, const std::vector<Contact>& contacts, TouchesCounters& counters, std::vector<events::Event>& events);
+  bool integrate(const StepView& step, const std::vector<Contact>& contacts, TouchesCounters& counters, std::vector<events::Event>& events);
+  static void add_forces(const StepView& step, const Contact& contact, double touch_s, std::size_t index,
+                         std::span<const impact::Pulse> pulses, double scale, std::vector<events::Event>& events);
 
+  std::vector<char> taken_;  // of the hits of the step
   Masks masks_{0};
   int impacts_left_ = 0;
 };

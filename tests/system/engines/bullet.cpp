@@ -1,6 +1,7 @@
 #include <carillon/bullet.h>
 
 #include <cmath>
+#include <utility>
 
 #include "tests/system/engines/engine.hpp"
 
@@ -9,16 +10,29 @@ namespace {
 
 btVector3 to_bullet(const double (&x)[3]) { return {btScalar(x[0]), btScalar(x[1]), btScalar(x[2])}; }
 
-std::unique_ptr<btCollisionShape> make_shape(const Solid& solid) {
+/// Shapes of a body; the last one is its own. A tube is a disc at each end: a cylinder gets one point per step on a plane, at one of its
+/// ends.
+std::vector<std::unique_ptr<btCollisionShape>> make_shapes(const Solid& solid) {
   const btVector3 half = to_bullet(solid.half_m);
-  if (solid.kind == "ball") return std::make_unique<btSphereShape>(half[0]);
-  std::unique_ptr<btCollisionShape> shape;
-  if (solid.kind == "box")
-    shape = std::make_unique<btBoxShape>(half);
-  else
-    shape = std::make_unique<btCylinderShapeX>(half);
-  shape->setMargin(btScalar(0.0005));
-  return shape;
+  std::vector<std::unique_ptr<btCollisionShape>> shapes;
+  const auto add = [&](std::unique_ptr<btCollisionShape> shape) {
+    shape->setMargin(btScalar(0.0005));
+    shapes.push_back(std::move(shape));
+  };
+  if (solid.kind == "ball") {
+    shapes.push_back(std::make_unique<btSphereShape>(half[0]));
+  } else if (solid.kind == "box") {
+    add(std::make_unique<btBoxShape>(half));
+  } else {
+    const btScalar thin = btScalar(0.01) * half[0];
+    auto both = std::make_unique<btCompoundShape>();
+    add(std::make_unique<btCylinderShapeX>(btVector3(thin, half[1], half[2])));
+    for (const int side : {-1, 1})
+      both->addChildShape(btTransform(btQuaternion::getIdentity(), btVector3(btScalar(side) * (half[0] - thin), 0, 0)),
+                          shapes.front().get());
+    shapes.push_back(std::move(both));
+  }
+  return shapes;
 }
 
 class Bullet : public Engine {
@@ -31,7 +45,7 @@ class Bullet : public Engine {
     if (step_s < 1e-3) world_.getSolverInfo().m_splitImpulsePenetrationThreshold = 1;
     add(btRigidBody::btRigidBodyConstructionInfo(0, nullptr, &plane_));
     for (const Solid& solid : solids) {
-      shapes_.push_back(make_shape(solid));
+      for (auto& shape : make_shapes(solid)) shapes_.push_back(std::move(shape));
       btRigidBody::btRigidBodyConstructionInfo info(btScalar(solid.mass_kg), nullptr, shapes_.back().get(), to_bullet(solid.inertia_kg_m2));
       const auto& q = solid.rotation;
       info.m_startWorldTransform =

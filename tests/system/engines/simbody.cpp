@@ -68,7 +68,7 @@ class Simbody : public Engine {
     const auto& half = solid.half_m;
     if (solid.kind == "ball") add_ball(Vec3(0), half[0]);
     if (solid.kind == "tube")
-      for (const int side : {-1, 1}) add_ball(Vec3(side * (half[0] - half[1]), 0, 0), half[1]);
+      for (const int side : {-1, 1}) add_ball(Vec3(side * half[0], 0, 0), half[1]);
     if (solid.kind == "box")
       for (int c = 0; c < 8; ++c)
         add_ball(
