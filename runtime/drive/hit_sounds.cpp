@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
@@ -153,36 +154,85 @@ void HitSounds::sound(const StepView& step, const std::vector<Contact>& contacts
   }
 }
 
+/// A body that rings from the impacts before.
+impact::Body HitSounds::make_body(const StepView& step, int index, const Motion& before, bool has_modes, double touch_s) {
+  const TouchBody& given = step.bodies[index];
+  impact::Body body;
+  body.centre_m = before.centre_m;
+  if (step.moves(index)) {
+    body.mass_kg = step.scene.bodies[index].mass_kg;
+    body.inertia_kg_m2 = before.rotation * (given.inertia * transpose(before.rotation));
+  }
+  body.velocity_m_s = before.velocity_m_s;
+  body.spin_rad_s = before.spin_rad_s;
+  if (!has_modes) return body;
+  body.modes = given.modes.get();
+  Ringing& ringing = ringing_[static_cast<std::size_t>(index)];
+  if (ringing.time_s > touch_s + kLongestImpactS) ringing = {};  // the time was set back
+  body.q = ringing.q;
+  body.q_dot = ringing.q_dot;
+  if (!body.q.empty()) body.modes->move_freely(body.q, body.q_dot, std::max(0.0, touch_s - ringing.time_s));
+  return body;
+}
+
+/// Keeps the modal states after an impact whose forces are scaled by at most `scale`, so that modes gain at most `most_j`. Returns the
+/// factor.
+double HitSounds::keep_ringing(const std::array<int, 2>& bodies, const impact::Impact& impact, const std::vector<impact::Body>& before,
+                               double touch_s, double scale, double most_j) {
+  const impact::Books books = impact.get_books();
+  std::vector<impact::Body> free = before, after = impact.get_bodies();
+  double at_first_j = 0.0, of_forces_j = books.above_band;
+  for (std::size_t i = 0; i < after.size(); ++i) {
+    const impact::Modes* modes = after[i].modes;
+    if (modes == nullptr) continue;
+    if (free[i].q.empty()) {
+      free[i].q.assign(after[i].q.size(), 0.0);
+      free[i].q_dot = free[i].q;
+    }
+    at_first_j += modes->calc_energy(free[i].q, free[i].q_dot);
+    modes->move_freely(free[i].q, free[i].q_dot, impact.get_time());
+    for (std::size_t m = 0; m < free[i].q.size(); ++m) {
+      after[i].q[m] -= free[i].q[m];
+      after[i].q_dot[m] -= free[i].q_dot[m];
+    }
+    of_forces_j += modes->calc_energy(after[i].q, after[i].q_dot);
+  }
+  const double gain_j = books.modal + books.dissipated_modes + books.above_band - at_first_j;
+  if (at_first_j == 0.0) of_forces_j = gain_j;
+  const double shared_j = gain_j - of_forces_j;  // the gain is shared x + of_forces x^2 for a factor x
+  if (of_forces_j > 0.0 && scale * (shared_j + scale * of_forces_j) > most_j)
+    scale = (std::sqrt(shared_j * shared_j + 4.0 * of_forces_j * most_j) - shared_j) / (2.0 * of_forces_j);
+  for (std::size_t i = 0, side = 0; i < after.size(); ++i, ++side) {
+    if (bodies[side] < 0) ++side;
+    if (after[i].modes == nullptr) continue;
+    for (std::size_t m = 0; m < free[i].q.size(); ++m) {
+      free[i].q[m] += scale * after[i].q[m];
+      free[i].q_dot[m] += scale * after[i].q_dot[m];
+    }
+    ringing_[static_cast<std::size_t>(bodies[side])] = {std::move(free[i].q), std::move(free[i].q_dot), touch_s + impact.get_time()};
+  }
+  return scale;
+}
+
 /// False if it cannot be integrated: nothing is appended.
 bool HitSounds::integrate(const StepView& step, const std::vector<Contact>& contacts, TouchesCounters& counters,
                           std::vector<events::Event>& events) {
   const FinishedHit& first = contacts.front().hit;
   impacts_left_ -= static_cast<int>(contacts.size());
-  std::vector<impact::Body> bodies;
-  std::array<int, 2> indices{-1, -1};
-  for (const std::size_t side : {0, 1}) {
-    const int index = side == 0 ? first.a : first.b;
-    if (index < 0) continue;
-    const TouchBody& given = step.bodies[index];
-    const Motion& before = first.before[side];
-    impact::Body body;
-    body.centre_m = before.centre_m;
-    if (step.moves(index)) {
-      body.mass_kg = step.scene.bodies[index].mass_kg;
-      body.inertia_kg_m2 = before.rotation * (given.inertia * transpose(before.rotation));
-    }
-    body.velocity_m_s = before.velocity_m_s;
-    body.spin_rad_s = before.spin_rad_s;
-    if (!contacts.front().shapes[side].empty()) body.modes = given.modes.get();
-    indices[side] = static_cast<int>(bodies.size());
-    bodies.push_back(body);
-  }
   double touch_s = first.touch_s, longest_s = 0.0, wanted = 0.0, most_j = 0.0;
   for (const Contact& c : contacts) {
     touch_s = std::min(touch_s, c.hit.touch_s);
     longest_s = std::max(longest_s, kLongestPulses * c.blow.duration_s);
     wanted += c.hit.push_n_s;
     most_j += c.calc_lost_j();
+  }
+  std::vector<impact::Body> bodies;
+  const std::array<int, 2> pair{first.a, first.b};
+  std::array<int, 2> indices{-1, -1};
+  for (const std::size_t side : {0, 1}) {
+    if (pair[side] < 0) continue;
+    indices[side] = static_cast<int>(bodies.size());
+    bodies.push_back(make_body(step, pair[side], first.before[side], !contacts.front().shapes[side].empty(), touch_s));
   }
   std::vector<std::array<std::vector<double>, 2>> shapes(contacts.size());
   std::vector<impact::Contact> springs;
@@ -204,27 +254,21 @@ bool HitSounds::integrate(const StepView& step, const std::vector<Contact>& cont
     contact.shape_a = shapes[i][0];
     contact.shape_b = shapes[i][1];
   }
-  std::vector<impact::Pulse> pulses;
-  double modal_j = 0.0;
+  std::optional<impact::Impact> impact;
   try {
-    impact::Impact impact(bodies, springs);
-    if (!(impact.calc_approach(0) > rigid::kMinImpactSpeedMS)) return false;
-    (void)impact.advance(std::min(kLongestImpactS, longest_s));
-    pulses = impact.take_pulses();
-    const impact::Books books = impact.get_books();
-    modal_j = books.modal + books.dissipated_modes + books.above_band;
+    impact.emplace(bodies, springs);
+    if (!(impact->calc_approach(0) > rigid::kMinImpactSpeedMS)) return false;
+    (void)impact->advance(std::min(kLongestImpactS, longest_s));
   } catch (const std::invalid_argument&) {
     return false;
   }
+  const std::vector<impact::Pulse> pulses = impact->take_pulses();
   double push = 0.0;
   for (const impact::Pulse& pulse : pulses)
     for (const Vec3& impulse : pulse.impulse_n_s) push += dot(impulse, contacts[pulse.contact].hit.normal);
   if (!(push > 0.0)) return false;
-  double scale = std::min(1.0, wanted / push);
-  if (modal_j * scale * scale > most_j) {
-    ++counters.limited;
-    scale = std::sqrt(most_j / modal_j);
-  }
+  const double largest = std::min(1.0, wanted / push), scale = keep_ringing(pair, *impact, bodies, touch_s, largest, most_j);
+  if (scale < largest) ++counters.limited;
   counters.impacts += std::ssize(contacts);
   for (std::size_t i = 0; i < contacts.size(); ++i) add_forces(step, contacts[i], touch_s, i, pulses, scale, events);
   return true;

@@ -14,8 +14,14 @@ namespace carillon::drive {
 /// Invariant: no hit gives the modes of its bodies more energy than it took from their motion.
 class HitSounds {
  public:
-  void resize(int bodies) { masks_.resize(bodies); }
-  void forget(int body) { masks_.forget(body); }
+  void resize(int bodies) {
+    masks_.resize(bodies);
+    ringing_.resize(static_cast<std::size_t>(bodies));
+  }
+  void forget(int body) {
+    masks_.forget(body);
+    ringing_[static_cast<std::size_t>(body)] = {};
+  }
 
   /// Sounds the hits of a step, strongest first. Appends events and notifies `lasting`.
   void add(const StepView& step, std::vector<FinishedHit>& hits, LastingContacts& lasting, TouchesCounters& counters,
@@ -37,15 +43,25 @@ class HitSounds {
     bool needs_modes() const;
   };
 
+  /// Modal state of a body after its last impact; empty: at rest.
+  struct Ringing {
+    std::vector<double> q, q_dot;
+    double time_s = 0.0;
+  };
+
   static Contact make_contact(const StepView& step, const FinishedHit& hit);
   std::vector<Contact> gather(const StepView& step, std::span<const FinishedHit* const> hits, std::size_t first);
   void sound(const StepView& step, const std::vector<Contact>& contacts, TouchesCounters& counters, std::vector<events::Event>& events);
   bool integrate(const StepView& step, const std::vector<Contact>& contacts, TouchesCounters& counters, std::vector<events::Event>& events);
+  impact::Body make_body(const StepView& step, int index, const Motion& before, bool has_modes, double touch_s);
+  double keep_ringing(const std::array<int, 2>& bodies, const impact::Impact& impact, const std::vector<impact::Body>& before,
+                      double touch_s, double scale, double most_j);
   static void add_forces(const StepView& step, const Contact& contact, double touch_s, std::size_t index,
                          std::span<const impact::Pulse> pulses, double scale, std::vector<events::Event>& events);
 
   std::vector<char> taken_;  // of the hits of the step
   Masks masks_{0};
+  std::vector<Ringing> ringing_;  // per body
   int impacts_left_ = 0;
 };
 
