@@ -10,7 +10,10 @@ namespace {
 
 constexpr double kLoadS = 5e-3;  // s; averaging time of loads, at least four steps
 constexpr int kLoadSteps = 4;
-constexpr double kMeanS = 50e-3;        // s; averaging time of all impulses of a position
+constexpr double kMeanS = 50e-3;  // s; averaging time of all impulses of a position
+constexpr double kSlipS = 50e-3;  // s; averaging time of slip, at least eight steps
+constexpr int kSlipSteps = 8;
+constexpr double kCreepMS = 1e-3;       // m/s; slower slip is creep of an engine's friction
 constexpr double kSettledS = 0.1;       // s; a position older than this has settled
 constexpr double kSettledRatio = 3.0;   // a hit on a loaded position is above this times its load
 constexpr double kSharedRatio = 2.0;    // an impulse that comes from a hit elsewhere on the body: above this times weight and load
@@ -190,6 +193,7 @@ void TouchSpots::follow(const StepView& step, const Group& g, int count, Spot& s
   spot.where_m = calc_where(step, g, spot);
   spot.normal = g.normal;
   spot.stations_m = g.stations_m;
+  note_slip(step, g, spot);
   spot.seen_s = step.scene.time_s;
   spot.mean_n += dt / (dt + kMeanS) * (g.push_n_s / dt - spot.mean_n);
   // Of a new contact, or after a hit, the mean since then.
@@ -309,6 +313,15 @@ void TouchSpots::miss(const StepView& step, Spot& spot, std::vector<FinishedHit>
   spot.is_gone = step.scene.time_s - spot.seen_s > calc_load_s(dt);
 }
 
+void TouchSpots::note_slip(const StepView& step, const Group& g, Spot& spot) {
+  const Vec3 relative = step.scene.calc_velocity(g.a, spot.where_m) - step.scene.calc_velocity(g.b, spot.where_m);
+  const Vec3 slip = relative - dot(relative, g.normal) * g.normal;
+  const double mean_s = std::min(std::max(kSlipS, kSlipSteps * step.dt_s), step.scene.before_s - spot.born_s);
+  const double share = step.dt_s / (step.dt_s + mean_s);
+  spot.slip_m_s = spot.slip_m_s + share * (slip - spot.slip_m_s);
+  spot.slip_speed_m_s += share * (norm(slip) - spot.slip_speed_m_s);
+}
+
 void TouchSpots::add_load(const StepView& step, Spot& spot, std::vector<Load>& loads) const {
   if (!(spot.load_n > kMinLoadN) || rests(step, spot.a, spot.b)) return;
   if (spot.owner < -1) {
@@ -320,6 +333,9 @@ void TouchSpots::add_load(const StepView& step, Spot& spot, std::vector<Load>& l
     spot.is_round = spot.owner == spot.a ? c.is_a_round : c.is_b_round;
     if (!(spot.curvature_per_m >= 0.0)) spot.curvature_per_m = c.calc_sum();
   }
+  // Slip to and fro is tremble.
+  const double mean = norm(spot.slip_m_s);
+  const double slip_share = mean > kCreepMS ? mean / spot.slip_speed_m_s * std::sqrt(1.0 - kCreepMS * kCreepMS / (mean * mean)) : 0.0;
   loads.push_back({.a = spot.a,
                    .b = spot.b,
                    .owner = spot.owner,
@@ -327,6 +343,7 @@ void TouchSpots::add_load(const StepView& step, Spot& spot, std::vector<Load>& l
                    .normal = spot.normal,
                    .push_n = spot.load_n,
                    .curvature_per_m = spot.curvature_per_m,
+                   .slip_share = std::min(1.0, slip_share),
                    .feature = spot.number,
                    .spot = spot.number});
 }

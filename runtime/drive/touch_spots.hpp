@@ -58,6 +58,8 @@ class TouchSpots {
     bool is_round = false;                             // the owner: the position may roll over it
     double born_s = 0.0, seen_s = 0.0, quiet_s = 0.0;  // first and last step with a push; end of the last hit
     double load_n = 0.0, mean_n = 0.0;                 // averaged: without hits, with hits
+    Vec3 slip_m_s{};                                   // averaged,
+    double slip_speed_m_s = 0.0;                       // and its magnitude
     bool is_gone = false, is_open = false, is_reported = false;
     double peak_n = 0.0;  // of the open hit
     FinishedHit hit;      // sums of the open hit, weighted by impulse
@@ -72,6 +74,7 @@ class TouchSpots {
   void close(const StepView& step, Spot& spot, std::vector<FinishedHit>& hits);
   static Vec3 calc_where(const StepView& step, const Group& group, const Spot& spot);
   void miss(const StepView& step, Spot& spot, std::vector<FinishedHit>& hits);
+  static void note_slip(const StepView& step, const Group& group, Spot& spot);
   void add_load(const StepView& step, Spot& spot, std::vector<Load>& loads) const;
 
   std::map<std::pair<int, int>, std::vector<Spot>> spots_;
