@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <stdexcept>
 #include <utility>
@@ -112,26 +113,30 @@ void HitSounds::add(const StepView& step, std::vector<FinishedHit>& hits, Lastin
     if (taken_[first] == 0) sound(step, gather(step, heard, first), counters, events);
 }
 
-/// The hit and those that are integrated together with it: of the same bodies, within its pulse.
+/// The hit and those of the same bodies that began with it: one impact, if modes matter at one of them.
 std::vector<HitSounds::Contact> HitSounds::gather(const StepView& step, std::span<const FinishedHit* const> hits, std::size_t first) {
-  std::vector<Contact> together{make_contact(step, *hits[first])};
-  if (!together.front().needs_modes()) return together;
   const FinishedHit& seed = *hits[first];
+  std::vector<Contact> together{make_contact(step, seed)};
+  std::vector<std::size_t> others;
   const std::size_t most = std::min<std::size_t>(kMaxTogether, std::max(impacts_left_, 1));
   for (std::size_t i = first + 1; i < hits.size() && together.size() < most; ++i) {
     const FinishedHit& hit = *hits[i];
     if (taken_[i] != 0 || hit.a != seed.a || hit.b != seed.b || hit.opened_s != seed.opened_s) continue;
-    if (std::abs(hit.touch_s - seed.touch_s) > together.front().blow.duration_s || !(hit.approach_m_s > kMinImpactSpeed)) continue;
-    taken_[i] = 1;
+    if (std::abs(hit.touch_s - seed.touch_s) > together.front().blow.duration_s) continue;
+    others.push_back(i);
     together.push_back(make_contact(step, hit));
   }
+  if (std::none_of(together.begin(), together.end(), [](const Contact& c) { return c.needs_modes(); }))
+    while (together.size() > 1) together.pop_back();
+  else
+    for (const std::size_t i : others) taken_[i] = 1;
   return together;
 }
 
 void HitSounds::sound(const StepView& step, const std::vector<Contact>& contacts, TouchesCounters& counters,
                       std::vector<events::Event>& events) {
   const auto count = static_cast<int>(contacts.size());
-  if (contacts.front().needs_modes()) {
+  if (std::any_of(contacts.begin(), contacts.end(), [](const Contact& c) { return c.needs_modes(); })) {
     if (impacts_left_ < count) {
       counters.simplified += count;
     } else if (integrate(step, contacts, counters, events)) {
@@ -248,6 +253,7 @@ bool HitSounds::integrate(const StepView& step, const std::vector<Contact>& cont
     contact.spring.stiffness = impact::calc_hertz_stiffness(c.compliance, c.radius_m);
     contact.restitution = step.calc_restitution(hit.a, hit.b);
     contact.is_limit = true;
+    contact.rests = !(hit.approach_m_s > rigid::kMinImpactSpeedMS);
     contact.friction = hit.rubbed_n_s > kRubbedRatio * hit.push_n_s ? step.calc_friction(hit.a, hit.b) : 0.0;
     for (const std::size_t side : {0, 1})
       if (!c.shapes[side].empty()) shapes[i][side] = turn_shape(first.before[side].rotation, c.shapes[side]);
@@ -257,7 +263,9 @@ bool HitSounds::integrate(const StepView& step, const std::vector<Contact>& cont
   std::optional<impact::Impact> impact;
   try {
     impact.emplace(bodies, springs);
-    if (!(impact->calc_approach(0) > rigid::kMinImpactSpeedMS)) return false;
+    bool closes = false;
+    for (int i = 0; i < static_cast<int>(springs.size()); ++i) closes = closes || impact->calc_approach(i) > rigid::kMinImpactSpeedMS;
+    if (!closes) return false;
     (void)impact->advance(std::min(kLongestImpactS, longest_s));
   } catch (const std::invalid_argument&) {
     return false;
@@ -267,7 +275,10 @@ bool HitSounds::integrate(const StepView& step, const std::vector<Contact>& cont
   for (const impact::Pulse& pulse : pulses)
     for (const Vec3& impulse : pulse.impulse_n_s) push += dot(impulse, contacts[pulse.contact].hit.normal);
   if (!(push > 0.0)) return false;
-  const double largest = std::min(1.0, wanted / push), scale = keep_ringing(pair, *impact, bodies, touch_s, largest, most_j);
+  // A predicted impulse, of one point alone, limits nothing: the impact knows all of its points.
+  if (first.is_predicted) most_j = std::numeric_limits<double>::max();
+  const double largest = first.is_predicted ? 1.0 : std::min(1.0, wanted / push);
+  const double scale = keep_ringing(pair, *impact, bodies, touch_s, largest, most_j);
   if (scale < largest) ++counters.limited;
   counters.impacts += std::ssize(contacts);
   for (std::size_t i = 0; i < contacts.size(); ++i) add_forces(step, contacts[i], touch_s, i, pulses, scale, events);

@@ -202,7 +202,9 @@ void TouchSpots::follow(const StepView& step, const Group& g, int count, Spot& s
   if (g.curvature_per_m >= 0.0) spot.curvature_per_m = g.curvature_per_m;
   if (!spot.is_open) return;
   spot.hit.parting_m_s = std::max(0.0, parting);
-  if (step.options.early && !spot.is_reported) report_early(step, spot, hits);
+  // Whether a settled contact is struck or shaken is known at the end only.
+  const bool is_settled = step.scene.time_s - spot.born_s > kSettledS;
+  if (step.options.early && !spot.is_reported && !is_settled) report_early(step, spot, hits);
   const double gap =
       dot(step.place(step.scene.motions, g.a, g.stations_m[0]) - step.place(step.scene.motions, g.b, g.stations_m[1]), g.normal);
   const bool has_decayed = !step.options.compliant || hit < kDecayedRatio * spot.peak_n * dt || (gap > 0.0 && parting > slowest);
@@ -274,6 +276,7 @@ void TouchSpots::report_early(const StepView& step, Spot& spot, std::vector<Fini
   for (Vec3& impulse : hit.impulses_n_s) impulse = (push / hit.push_n_s) * impulse;
   hit.rubbed_n_s *= push / hit.push_n_s;
   hit.push_n_s = push;
+  hit.is_predicted = true;
   hit.parting_m_s = e * hit.approach_m_s;
   hits.push_back(hit);
 }
