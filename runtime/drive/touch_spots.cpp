@@ -19,6 +19,7 @@ constexpr double kSettledRatio = 3.0;   // a hit on a loaded position is above t
 constexpr double kSharedRatio = 2.0;    // an impulse that comes from a hit elsewhere on the body: above this times weight and load
 constexpr double kDecayedRatio = 0.05;  // of the largest force: the end of a compliant hit
 constexpr double kMatchRatio = 0.2;     // of the size: distance from the last position
+constexpr double kGroupRatio = 0.05;    // of the size: points of one position; corners of an edge that lands are apart
 constexpr double kMinLoadN = 1e-9;
 
 double calc_load_s(double dt_s) { return std::max(kLoadS, kLoadSteps * dt_s); }
@@ -107,7 +108,7 @@ std::vector<TouchSpots::Group> TouchSpots::make_groups(const StepView& step, std
   for (std::size_t seed = 0; seed < points.size(); ++seed) {
     const StepPoint& first = points[seed];
     if (taken[seed] != 0 || !(first.impulse_n_s > 0.0)) continue;
-    const double near = step.scene.calc_spot_radius(first.a, first.b);
+    const double near = kGroupRatio * step.scene.calc_size(first.a, first.b);
     Group g{.a = first.a, .b = first.b, .gap_m = first.gap_m};
     for (std::size_t i = seed; i < points.size() && points[i].a == first.a && points[i].b == first.b; ++i) {
       const StepPoint& p = points[i];

@@ -186,6 +186,8 @@ void run(double hz, double seconds, const char* contacts, const char* live, cons
   for (Solid& solid : solids) {
     const OpenBank& bank = banks.try_emplace(solid.bank, solid.bank).first->second;
     solid.mass_kg = bank.ours.rigid.mass_kg;
+    const auto& material = bank.ours.material;
+    solid.modulus_pa = material.young_modulus_pa / (1.0 - material.poisson_ratio * material.poisson_ratio);
     for (int k = 0; k < 3; ++k) solid.inertia_kg_m2[k] = bank.ours.rigid.inertia_kg_m2[4 * k];
     carillon_touches_body body;
     carillon_touches_body_init(&body);
