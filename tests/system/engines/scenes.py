@@ -81,10 +81,10 @@ SCENES = {
     # Constants of the tracker were chosen on the six above; these confirm them.
     "bar": (3, [place("bar", "bar", BAR, (0, 0, 0.25), (0, 75, 0), velocity=(0.2, 0, 0))]),
     "slap": (3, [place("pane", "pane", PANE, (0, 0, 0.11), (0, 25, 0))]),
-    "rod": (3, [place("rod", "rod", ROD, (0, -0.3, 0.1), (0, 12, 0), velocity=(0, 0.3, 0))]),
-    "row": (2, [place(name, "ball", BALL, (x, 0, 0.03), velocity=(v, 0, 0), spin=(0, v / 0.03, 0)) for name, x, v in ROW]),
+    "rod": (2, [place("rod", "rod", ROD, (0, -0.3, 0.1), (0, 12, 0), velocity=(0, 0.3, 0))]),
+    "row": (1, [place(name, "ball", BALL, (x, 0, 0.03), velocity=(v, 0, 0), spin=(0, v / 0.03, 0)) for name, x, v in ROW]),
     "bead": (2, [place("pane", "pane", PANE, (0, 0, 0.002), lies=True), place("bead", "bead", BEAD, (0.045, 0.03, 0.2))]),
-    "drop": (3, [place("ball", "ball", BALL, (0, 0, 0.2), spin=(0, 10, 0))]),
+    "drop": (1, [place("ball", "ball", BALL, (0, 0, 0.2), spin=(0, 10, 0))]),
 }
 
 
