@@ -15,7 +15,7 @@ constexpr double kParallelCosine = 0.9;  // edges of one direction
 constexpr double kNearRatio = 0.01;      // of the size
 constexpr double kFlatCosine = 0.9998;   // of 1 degree: facets of a flat surface
 constexpr double kSameCosine = 0.9;      // normals of a contact and of a surface that it lies on
-constexpr double kLevelSlope = 0.02;     // of a contact that lies on a surface beside an edge
+constexpr double kLevelSlope = 0.02;     // of a contact that lies on a surface next to an edge
 
 }  // namespace
 
