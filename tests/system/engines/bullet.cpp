@@ -42,6 +42,8 @@ class Bullet : public Engine {
     world_.setGravity(btVector3(0, 0, btScalar(-9.81)));
     configuration_.setPlaneConvexMultipointIterations();  // else a box on the ground gets one point per step
     world_.getSolverInfo().m_solverMode |= SOLVER_USE_2_FRICTION_DIRECTIONS;
+    // Depth is corrected apart from velocities, or hits bounce too high; in longer steps a pile would not come to rest.
+    if (step_s < 1e-3) world_.getSolverInfo().m_splitImpulsePenetrationThreshold = 1;
     // Less depth than a body falls in a step is not corrected, or a pile would not come to rest; above 0.1 mm hits would be braked.
     world_.getSolverInfo().m_linearSlop = btScalar(std::min(1e-4, 9.81 * step_s * step_s));
     add(btRigidBody::btRigidBodyConstructionInfo(0, nullptr, &plane_));
