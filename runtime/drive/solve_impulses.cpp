@@ -9,7 +9,7 @@
 namespace carillon::drive {
 namespace {
 
-constexpr int kMaxSweeps = 60;
+constexpr int kMaxSweeps = 20;
 constexpr double kEnough = 1e-4;  // relative to the largest impulse of the group: change in a sweep
 
 /// Change of velocity that no impulse explains yet.
