@@ -53,6 +53,10 @@ double HitSounds::Contact::calc_lost_j() const {
   return 0.5 * mass_kg * speed_m_s * speed_m_s * std::max(kMinElasticShare, 1.0 - restitution * restitution);
 }
 
+double HitSounds::Contact::calc_part_j() const {
+  return 0.5 * hit.push_n_s * hit.approach_m_s * std::max(kMinElasticShare, 1.0 - restitution);
+}
+
 HitSounds::Contact HitSounds::make_contact(const StepView& step, const FinishedHit& hit) {
   Contact c{.hit = hit};
   c.speed_m_s = std::max(hit.approach_m_s, rigid::kMinImpactSpeedMS);
@@ -229,7 +233,7 @@ bool HitSounds::integrate(const StepView& step, const std::vector<Contact>& cont
     touch_s = std::min(touch_s, c.hit.touch_s);
     longest_s = std::max(longest_s, kLongestPulses * c.blow.duration_s);
     wanted += c.hit.push_n_s;
-    most_j += c.calc_lost_j();
+    most_j += contacts.size() > 1 ? c.calc_part_j() : c.calc_lost_j();
   }
   std::vector<impact::Body> bodies;
   const std::array<int, 2> pair{first.a, first.b};

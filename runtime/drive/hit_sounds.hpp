@@ -39,6 +39,8 @@ class HitSounds {
 
     /// Kinetic energy lost [J], at least 1 % of the blow.
     double calc_lost_j() const;
+    /// The same of one of several hits that share the impulse.
+    double calc_part_j() const;
     /// The hit is integrated with the modes of its bodies.
     bool needs_modes() const;
   };
