@@ -12,7 +12,7 @@ import scenes
 
 STEPS = (60, 240, 1000)  # per second
 # Largest differences: of the first hit [dB, %], of windows [dB]; level at the end [dB(A)]. Levels of rolling bodies: of all windows. The
-# rules of the tracker were found on the first six scenes, the others confirm them.
+# rules of the tracker were found on the first six scenes, the others came later.
 THROWN = {"first_db": 3.0, "centroid_percent": 10.0, "windows_db": 3.0}
 WANTED = {
     "box": {**THROWN, "end_db": 0.0},

@@ -78,7 +78,7 @@ SCENES = {
     "tube": (3, [place("tube", "tube", TUBE, (0, -0.5, 0.05), velocity=(0, 0.4, 0))]),
     "two": (2, [place("a", "ball", BALL, (-0.1, 0, 0.5), velocity=(1, 0, 0)), place("b", "ball", BALL, (0, 0, 0.5))]),
     "pile": (3, make_pile(10, 1)),
-    # Constants of the tracker were chosen on the six above; these confirm them.
+    # The tracker's constants were chosen on the six above.
     "bar": (3, [place("bar", "bar", BAR, (0, 0, 0.25), (0, 75, 0), velocity=(0.2, 0, 0))]),
     "slap": (3, [place("pane", "pane", PANE, (0, 0, 0.11), (0, 25, 0))]),
     "rod": (2, [place("rod", "rod", ROD, (0, -0.3, 0.1), (0, 12, 0), velocity=(0, 0.3, 0))]),
