@@ -1,11 +1,15 @@
 // Method: a Hertz pulse of the reduced mass that explains the engine's impulse; where modes would take more than 2 % of the blow, the
-// impact is integrated from the motions before it and scaled to at most the engine's impulse.
+// impact is integrated from the motions before it and scaled to at most the engine's impulse. Hits of two bodies at the same time, as of
+// both ends of a tube, are one impact.
 // Source: runtime/physics/impact; K. L. Johnson, "Contact mechanics" (1985), eq. 11.24.
 #include "runtime/drive/hit_sounds.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <optional>
 #include <stdexcept>
+#include <utility>
 
 #include "runtime/physics/impact/impact.hpp"
 #include "runtime/physics/impact/predict.hpp"
@@ -20,6 +24,7 @@ constexpr double kMinElasticShare = 0.01;  // of the blow: least energy of the m
 constexpr double kMinImpactSpeed = 5e-3;   // m/s; slower hits are not integrated
 constexpr double kLongestImpactS = 20e-3;  // s
 constexpr double kLongestPulses = 50.0;    // an impact lasts at most this many Hertz times, for the sake of its cost
+constexpr std::size_t kMaxTogether = 4;    // hits of an impact: its cost is cubic in them
 constexpr double kRubbedRatio = 0.02;      // of the impulse: below, without friction
 
 /// Energy of the modes of a body after a pulse of this length on it [J]; impulse: mesh axes.
@@ -48,6 +53,10 @@ double HitSounds::Contact::calc_lost_j() const {
   return 0.5 * mass_kg * speed_m_s * speed_m_s * std::max(kMinElasticShare, 1.0 - restitution * restitution);
 }
 
+double HitSounds::Contact::calc_part_j() const {
+  return 0.5 * hit.push_n_s * hit.approach_m_s * std::max(kMinElasticShare, 1.0 - restitution);
+}
+
 HitSounds::Contact HitSounds::make_contact(const StepView& step, const FinishedHit& hit) {
   Contact c{.hit = hit};
   c.speed_m_s = std::max(hit.approach_m_s, rigid::kMinImpactSpeedMS);
@@ -68,7 +77,20 @@ HitSounds::Contact HitSounds::make_contact(const StepView& step, const FinishedH
     c.places[side] = b.shape->find_place(hit.stations_m[side], hit.outwards[side]);
     if (b.modes) c.shapes[side] = bank::calc_shapes(*b.given.bank, c.places[side].triangle, c.places[side].barycentric);
   }
+  c.blow = {.a = hit.a, .b = hit.b, .touch_s = hit.touch_s, .masked_s = hit.touch_s, .places = c.places};
+  c.blow.duration_s = impact::calc_hertz_duration(c.compliance, c.radius_m, c.mass_kg, c.speed_m_s);
+  c.blow.impulses_n_s = hit.impulses_n_s;
+  c.blow.impulse_n_s = norm(hit.impulses_n_s[0]);
+  for (const std::size_t side : {0, 1})
+    if (!c.shapes[side].empty())
+      c.modal_j += calc_modal_j(*step.bodies[side == 0 ? hit.a : hit.b].modes, c.shapes[side], hit.impulses_n_s[side], c.blow.duration_s);
   return c;
+}
+
+bool HitSounds::Contact::needs_modes() const {
+  const double elastic = 2.0 * mass_kg * speed_m_s / hit.push_n_s;
+  return modal_j * elastic * elastic > kModalShare * 0.5 * mass_kg * speed_m_s * speed_m_s && speed_m_s > kMinImpactSpeed &&
+         hit.approach_m_s > rigid::kMinImpactSpeedMS;
 }
 
 void HitSounds::add(const StepView& step, std::vector<FinishedHit>& hits, LastingContacts& lasting, TouchesCounters& counters,
@@ -80,122 +102,213 @@ void HitSounds::add(const StepView& step, std::vector<FinishedHit>& hits, Lastin
     return std::pair(name(x.a), name(x.b)) < std::pair(name(y.a), name(y.b));
   });
   impacts_left_ = step.options.max_impacts;
+  std::vector<const FinishedHit*> heard;
   for (const FinishedHit& hit : hits) {
     const Vec3 where = step.place(step.scene.motions, hit.a, hit.stations_m[0]);
     lasting.note_impact(step.scene, hit.a, hit.b, where, step.scene.time_s);
     const bool is_felt = hit.push_n_s * hit.inverse_mass >= 0.2 * rigid::kMinImpactSpeedMS;
-    if (is_felt && hit.push_n_s >= kQuietRatio * hits.front().push_n_s && sound(step, hit, counters, events))
-      ++counters.hits;
+    if (is_felt && hit.push_n_s >= kQuietRatio * hits.front().push_n_s)
+      heard.push_back(&hit);
     else
       ++counters.masked;
   }
+  taken_.assign(heard.size(), 0);
+  for (std::size_t first = 0; first < heard.size(); ++first)
+    if (taken_[first] == 0) sound(step, gather(step, heard, first), counters, events);
 }
 
-/// False if masked.
-bool HitSounds::sound(const StepView& step, const FinishedHit& hit, TouchesCounters& counters, std::vector<events::Event>& events) {
-  const Contact c = make_contact(step, hit);
-  Blow blow{.a = hit.a, .b = hit.b, .touch_s = hit.touch_s, .masked_s = hit.touch_s, .places = c.places};
-  blow.duration_s = impact::calc_hertz_duration(c.compliance, c.radius_m, c.mass_kg, c.speed_m_s);
-  blow.impulses_n_s = hit.impulses_n_s;
-  blow.impulse_n_s = norm(hit.impulses_n_s[0]);
-  double modal_j = 0.0;
-  for (const std::size_t side : {0, 1})
-    if (!c.shapes[side].empty())
-      modal_j += calc_modal_j(*step.bodies[side == 0 ? hit.a : hit.b].modes, c.shapes[side], hit.impulses_n_s[side], blow.duration_s);
-  const double blow_j = 0.5 * c.mass_kg * c.speed_m_s * c.speed_m_s, elastic = 2.0 * c.mass_kg * c.speed_m_s / hit.push_n_s;
-  if (modal_j * elastic * elastic > kModalShare * blow_j && c.speed_m_s > kMinImpactSpeed) {
-    if (impacts_left_ <= 0) {
-      ++counters.simplified;
-    } else if (integrate(step, c, counters, events)) {
-      for (const int body : {hit.a, hit.b})
-        if (body >= 0) (void)masks_.take(body, hit.touch_s, blow.impulse_n_s, blow.duration_s);
-      return true;
+/// The hit and those of the same bodies that began with it: one impact, if modes matter at one of them.
+std::vector<HitSounds::Contact> HitSounds::gather(const StepView& step, std::span<const FinishedHit* const> hits, std::size_t first) {
+  const FinishedHit& seed = *hits[first];
+  std::vector<Contact> together{make_contact(step, seed)};
+  std::vector<std::size_t> others;
+  const std::size_t most = std::min<std::size_t>(kMaxTogether, std::max(impacts_left_, 1));
+  for (std::size_t i = first + 1; i < hits.size() && together.size() < most; ++i) {
+    const FinishedHit& hit = *hits[i];
+    if (taken_[i] != 0 || hit.a != seed.a || hit.b != seed.b || hit.opened_s != seed.opened_s) continue;
+    if (std::abs(hit.touch_s - seed.touch_s) > together.front().blow.duration_s) continue;
+    others.push_back(i);
+    together.push_back(make_contact(step, hit));
+  }
+  if (std::none_of(together.begin(), together.end(), [](const Contact& c) { return c.needs_modes(); }))
+    while (together.size() > 1) together.pop_back();
+  else
+    for (const std::size_t i : others) taken_[i] = 1;
+  return together;
+}
+
+void HitSounds::sound(const StepView& step, const std::vector<Contact>& contacts, TouchesCounters& counters,
+                      std::vector<events::Event>& events) {
+  const auto count = static_cast<int>(contacts.size());
+  if (std::any_of(contacts.begin(), contacts.end(), [](const Contact& c) { return c.needs_modes(); })) {
+    if (impacts_left_ < count) {
+      counters.simplified += count;
+    } else if (integrate(step, contacts, counters, events)) {
+      counters.hits += count;
+      for (const Contact& c : contacts)
+        for (const int body : {c.hit.a, c.hit.b})
+          if (body >= 0) (void)masks_.take(body, c.hit.touch_s, c.blow.impulse_n_s, c.blow.duration_s);
+      return;
     }
   }
-  if (const double most_j = c.calc_lost_j(); modal_j > most_j) {
-    ++counters.limited;
-    const double scale = std::sqrt(most_j / modal_j);
-    for (Vec3& impulse : blow.impulses_n_s) impulse = scale * impulse;
-    blow.impulse_n_s *= scale;
+  for (const Contact& c : contacts) {
+    Blow blow = c.blow;
+    if (const double most_j = c.calc_lost_j(); c.modal_j > most_j) {
+      ++counters.limited;
+      const double scale = std::sqrt(most_j / c.modal_j);
+      for (Vec3& impulse : blow.impulses_n_s) impulse = scale * impulse;
+      blow.impulse_n_s *= scale;
+    }
+    ++(add_pulses(step.scene, blow, &masks_, events) > 0 ? counters.hits : counters.masked);
   }
-  return add_pulses(step.scene, blow, &masks_, events) > 0;
+}
+
+/// A body that rings from the impacts before.
+impact::Body HitSounds::make_body(const StepView& step, int index, const Motion& before, bool has_modes, double touch_s) {
+  const TouchBody& given = step.bodies[index];
+  impact::Body body;
+  body.centre_m = before.centre_m;
+  if (step.moves(index)) {
+    body.mass_kg = step.scene.bodies[index].mass_kg;
+    body.inertia_kg_m2 = before.rotation * (given.inertia * transpose(before.rotation));
+  }
+  body.velocity_m_s = before.velocity_m_s;
+  body.spin_rad_s = before.spin_rad_s;
+  if (!has_modes) return body;
+  body.modes = given.modes.get();
+  Ringing& ringing = ringing_[static_cast<std::size_t>(index)];
+  if (ringing.time_s > touch_s + kLongestImpactS) ringing = {};  // the time was set back
+  body.q = ringing.q;
+  body.q_dot = ringing.q_dot;
+  if (!body.q.empty()) body.modes->move_freely(body.q, body.q_dot, std::max(0.0, touch_s - ringing.time_s));
+  return body;
+}
+
+/// Keeps the modal states after an impact whose forces are scaled by at most `scale`, so that modes gain at most `most_j`. Returns the
+/// factor.
+double HitSounds::keep_ringing(const std::array<int, 2>& bodies, const impact::Impact& impact, const std::vector<impact::Body>& before,
+                               double touch_s, double scale, double most_j) {
+  const impact::Books books = impact.get_books();
+  std::vector<impact::Body> free = before, after = impact.get_bodies();
+  double at_first_j = 0.0, of_forces_j = books.above_band;
+  for (std::size_t i = 0; i < after.size(); ++i) {
+    const impact::Modes* modes = after[i].modes;
+    if (modes == nullptr) continue;
+    if (free[i].q.empty()) {
+      free[i].q.assign(after[i].q.size(), 0.0);
+      free[i].q_dot = free[i].q;
+    }
+    at_first_j += modes->calc_energy(free[i].q, free[i].q_dot);
+    modes->move_freely(free[i].q, free[i].q_dot, impact.get_time());
+    for (std::size_t m = 0; m < free[i].q.size(); ++m) {
+      after[i].q[m] -= free[i].q[m];
+      after[i].q_dot[m] -= free[i].q_dot[m];
+    }
+    of_forces_j += modes->calc_energy(after[i].q, after[i].q_dot);
+  }
+  const double gain_j = books.modal + books.dissipated_modes + books.above_band - at_first_j;
+  if (at_first_j == 0.0) of_forces_j = gain_j;
+  const double shared_j = gain_j - of_forces_j;  // the gain is shared x + of_forces x^2 for a factor x
+  if (of_forces_j > 0.0 && scale * (shared_j + scale * of_forces_j) > most_j)
+    scale = (std::sqrt(shared_j * shared_j + 4.0 * of_forces_j * most_j) - shared_j) / (2.0 * of_forces_j);
+  for (std::size_t i = 0, side = 0; i < after.size(); ++i, ++side) {
+    if (bodies[side] < 0) ++side;
+    if (after[i].modes == nullptr) continue;
+    for (std::size_t m = 0; m < free[i].q.size(); ++m) {
+      free[i].q[m] += scale * after[i].q[m];
+      free[i].q_dot[m] += scale * after[i].q_dot[m];
+    }
+    ringing_[static_cast<std::size_t>(bodies[side])] = {std::move(free[i].q), std::move(free[i].q_dot), touch_s + impact.get_time()};
+  }
+  return scale;
 }
 
 /// False if it cannot be integrated: nothing is appended.
-bool HitSounds::integrate(const StepView& step, const Contact& c, TouchesCounters& counters, std::vector<events::Event>& events) {
-  const FinishedHit& hit = c.hit;
-  if (!(hit.approach_m_s > rigid::kMinImpactSpeedMS)) return false;
-  --impacts_left_;
-  std::vector<impact::Body> bodies;
-  std::array<std::vector<double>, 2> shapes;
-  impact::Contact contact;
-  contact.where_m = hit.before[0].centre_m + hit.before[0].rotation * (hit.stations_m[0] - step.scene.bodies[hit.a].centre_m);
-  contact.normal = hit.normal;
-  contact.spring.stiffness = impact::calc_hertz_stiffness(c.compliance, c.radius_m);
-  contact.restitution = step.calc_restitution(hit.a, hit.b);
-  contact.is_limit = true;
-  contact.friction = hit.rubbed_n_s > kRubbedRatio * hit.push_n_s ? step.calc_friction(hit.a, hit.b) : 0.0;
-  for (const std::size_t side : {0, 1}) {
-    const int index = side == 0 ? hit.a : hit.b;
-    if (index < 0) continue;
-    const TouchBody& given = step.bodies[index];
-    const Motion& before = hit.before[side];
-    impact::Body body;
-    body.centre_m = before.centre_m;
-    if (step.moves(index)) {
-      body.mass_kg = step.scene.bodies[index].mass_kg;
-      body.inertia_kg_m2 = before.rotation * (given.inertia * transpose(before.rotation));
-    }
-    body.velocity_m_s = before.velocity_m_s;
-    body.spin_rad_s = before.spin_rad_s;
-    if (!c.shapes[side].empty()) {
-      body.modes = given.modes.get();
-      shapes[side] = turn_shape(before.rotation, c.shapes[side]);
-    }
-    (side == 0 ? contact.a : contact.b) = static_cast<int>(bodies.size());
-    bodies.push_back(body);
+bool HitSounds::integrate(const StepView& step, const std::vector<Contact>& contacts, TouchesCounters& counters,
+                          std::vector<events::Event>& events) {
+  const FinishedHit& first = contacts.front().hit;
+  impacts_left_ -= static_cast<int>(contacts.size());
+  double touch_s = first.touch_s, longest_s = 0.0, wanted = 0.0, most_j = 0.0;
+  for (const Contact& c : contacts) {
+    touch_s = std::min(touch_s, c.hit.touch_s);
+    longest_s = std::max(longest_s, kLongestPulses * c.blow.duration_s);
+    wanted += c.hit.push_n_s;
+    most_j += contacts.size() > 1 ? c.calc_part_j() : c.calc_lost_j();
   }
-  contact.shape_a = shapes[0];
-  contact.shape_b = shapes[1];
-  std::vector<impact::Pulse> pulses;
-  double modal_j = 0.0;
+  std::vector<impact::Body> bodies;
+  const std::array<int, 2> pair{first.a, first.b};
+  std::array<int, 2> indices{-1, -1};
+  for (const std::size_t side : {0, 1}) {
+    if (pair[side] < 0) continue;
+    indices[side] = static_cast<int>(bodies.size());
+    bodies.push_back(make_body(step, pair[side], first.before[side], !contacts.front().shapes[side].empty(), touch_s));
+  }
+  std::vector<std::array<std::vector<double>, 2>> shapes(contacts.size());
+  std::vector<impact::Contact> springs;
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    const Contact& c = contacts[i];
+    const FinishedHit& hit = c.hit;
+    impact::Contact& contact = springs.emplace_back();
+    contact.a = indices[0];
+    contact.b = indices[1];
+    contact.where_m = hit.before[0].centre_m + hit.before[0].rotation * (hit.stations_m[0] - step.scene.bodies[hit.a].centre_m);
+    contact.normal = hit.normal;
+    contact.gap_m = (hit.touch_s - touch_s) * hit.approach_m_s;
+    contact.spring.stiffness = impact::calc_hertz_stiffness(c.compliance, c.radius_m);
+    contact.restitution = step.calc_restitution(hit.a, hit.b);
+    contact.is_limit = true;
+    contact.rests = !(hit.approach_m_s > rigid::kMinImpactSpeedMS);
+    contact.friction = hit.rubbed_n_s > kRubbedRatio * hit.push_n_s ? step.calc_friction(hit.a, hit.b) : 0.0;
+    for (const std::size_t side : {0, 1})
+      if (!c.shapes[side].empty()) shapes[i][side] = turn_shape(first.before[side].rotation, c.shapes[side]);
+    contact.shape_a = shapes[i][0];
+    contact.shape_b = shapes[i][1];
+  }
+  std::optional<impact::Impact> impact;
   try {
-    impact::Impact impact(bodies, {contact});
-    if (!(impact.calc_approach(0) > rigid::kMinImpactSpeedMS)) return false;
-    const double hertz_s = impact::calc_hertz_duration(c.compliance, c.radius_m, c.mass_kg, c.speed_m_s);
-    (void)impact.advance(std::min(kLongestImpactS, kLongestPulses * hertz_s));
-    pulses = impact.take_pulses();
-    const impact::Books books = impact.get_books();
-    modal_j = books.modal + books.dissipated_modes + books.above_band;
+    impact.emplace(bodies, springs);
+    bool closes = false;
+    for (int i = 0; i < static_cast<int>(springs.size()); ++i) closes = closes || impact->calc_approach(i) > rigid::kMinImpactSpeedMS;
+    if (!closes) return false;
+    (void)impact->advance(std::min(kLongestImpactS, longest_s));
   } catch (const std::invalid_argument&) {
     return false;
   }
+  const std::vector<impact::Pulse> pulses = impact->take_pulses();
   double push = 0.0;
   for (const impact::Pulse& pulse : pulses)
-    for (const Vec3& impulse : pulse.impulse_n_s) push += dot(impulse, hit.normal);
+    for (const Vec3& impulse : pulse.impulse_n_s) push += dot(impulse, contacts[pulse.contact].hit.normal);
   if (!(push > 0.0)) return false;
-  double scale = std::min(1.0, hit.push_n_s / push);
-  if (const double most_j = c.calc_lost_j(); modal_j * scale * scale > most_j) {
-    ++counters.limited;
-    scale = std::sqrt(most_j / modal_j);
-  }
-  ++counters.impacts;
+  // A predicted impulse, of one point alone, limits nothing: the impact knows all of its points.
+  if (first.is_predicted) most_j = std::numeric_limits<double>::max();
+  const double largest = first.is_predicted ? 1.0 : std::min(1.0, wanted / push);
+  const double scale = keep_ringing(pair, *impact, bodies, touch_s, largest, most_j);
+  if (scale < largest) ++counters.limited;
+  counters.impacts += std::ssize(contacts);
+  for (std::size_t i = 0; i < contacts.size(); ++i) add_forces(step, contacts[i], touch_s, i, pulses, scale, events);
+  return true;
+}
+
+/// The pulses of one contact of an impact that began at `touch_s`.
+void HitSounds::add_forces(const StepView& step, const Contact& c, double touch_s, std::size_t contact,
+                           std::span<const impact::Pulse> pulses, double scale, std::vector<events::Event>& events) {
   for (const std::size_t side : {0, 1}) {
-    const int body = side == 0 ? hit.a : hit.b;
+    const int body = side == 0 ? c.hit.a : c.hit.b;
     if (body < 0 || step.scene.bodies[body].shape == nullptr) continue;
     const double sign = side == 0 ? scale : -scale;
+    bool continues = false;
     for (const impact::Pulse& pulse : pulses) {
-      events::Force first{.time_s = hit.touch_s + pulse.start_s, .step_s = pulse.step_s, .body = body};
-      first.other = side == 0 ? hit.b : hit.a;
+      if (pulse.contact != static_cast<int>(contact)) continue;
+      events::Force first{.time_s = touch_s + pulse.start_s, .step_s = pulse.step_s, .body = body};
+      first.other = side == 0 ? c.hit.b : c.hit.a;
       first.triangle = c.places[side].triangle;
       first.barycentric = c.places[side].barycentric;
-      first.continues = &pulse != pulses.data();
+      first.continues = std::exchange(continues, true);
       std::vector<Vec3> impulses;
-      for (const Vec3& impulse : pulse.impulse_n_s) impulses.push_back(turn_back(hit.before[side].rotation, sign * impulse));
+      for (const Vec3& impulse : pulse.impulse_n_s) impulses.push_back(turn_back(c.hit.before[side].rotation, sign * impulse));
       events::split_force(first, impulses, [&](const events::Force& force) { events.push_back(force); });
     }
   }
-  return true;
 }
 
 }  // namespace carillon::drive

@@ -1,19 +1,27 @@
 // Hits of a step as pulses or as impacts with modes. Internal to this folder.
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "runtime/drive/lasting.hpp"
 #include "runtime/drive/pulses.hpp"
 #include "runtime/drive/touch_spots.hpp"
+#include "runtime/physics/impact/impact.hpp"
 
 namespace carillon::drive {
 
 /// Invariant: no hit gives the modes of its bodies more energy than it took from their motion.
 class HitSounds {
  public:
-  void resize(int bodies) { masks_.resize(bodies); }
-  void forget(int body) { masks_.forget(body); }
+  void resize(int bodies) {
+    masks_.resize(bodies);
+    ringing_.resize(static_cast<std::size_t>(bodies));
+  }
+  void forget(int body) {
+    masks_.forget(body);
+    ringing_[static_cast<std::size_t>(body)] = {};
+  }
 
   /// Sounds the hits of a step, strongest first. Appends events and notifies `lasting`.
   void add(const StepView& step, std::vector<FinishedHit>& hits, LastingContacts& lasting, TouchesCounters& counters,
@@ -24,18 +32,38 @@ class HitSounds {
   struct Contact {
     const FinishedHit& hit;
     double mass_kg = 0.0, speed_m_s = 0.0, restitution = 0.0, radius_m = 0.0, compliance = 0.0;
+    Blow blow{};           // as a Hertz pulse
+    double modal_j = 0.0;  // that it would give to the modes
     std::array<geometry::Place, 2> places{};
     std::array<std::vector<double>, 2> shapes{};  // (n, 3) at the places; empty: no modes
 
     /// Kinetic energy lost [J], at least 1 % of the blow.
     double calc_lost_j() const;
+    /// The same of one of several hits that share the impulse.
+    double calc_part_j() const;
+    /// The hit is integrated with the modes of its bodies.
+    bool needs_modes() const;
   };
 
-  bool sound(const StepView& step, const FinishedHit& hit, TouchesCounters& counters, std::vector<events::Event>& events);
-  static Contact make_contact(const StepView& step, const FinishedHit& hit);
-  bool integrate(const StepView& step, const Contact& contact, TouchesCounters& counters, std::vector<events::Event>& events);
+  /// Modal state of a body after its last impact; empty: at rest.
+  struct Ringing {
+    std::vector<double> q, q_dot;
+    double time_s = 0.0;
+  };
 
+  static Contact make_contact(const StepView& step, const FinishedHit& hit);
+  std::vector<Contact> gather(const StepView& step, std::span<const FinishedHit* const> hits, std::size_t first);
+  void sound(const StepView& step, const std::vector<Contact>& contacts, TouchesCounters& counters, std::vector<events::Event>& events);
+  bool integrate(const StepView& step, const std::vector<Contact>& contacts, TouchesCounters& counters, std::vector<events::Event>& events);
+  impact::Body make_body(const StepView& step, int index, const Motion& before, bool has_modes, double touch_s);
+  double keep_ringing(const std::array<int, 2>& bodies, const impact::Impact& impact, const std::vector<impact::Body>& before,
+                      double touch_s, double scale, double most_j);
+  static void add_forces(const StepView& step, const Contact& contact, double touch_s, std::size_t index,
+                         std::span<const impact::Pulse> pulses, double scale, std::vector<events::Event>& events);
+
+  std::vector<char> taken_;  // of the hits of the step
   Masks masks_{0};
+  std::vector<Ringing> ringing_;  // per body
   int impacts_left_ = 0;
 };
 

@@ -71,6 +71,7 @@ LastingContacts::Group LastingContacts::make_group(const Scene& scene, std::span
     g.normal = g.normal + load.push_n * load.normal;
     g.carried = g.carried + load.push_n * scene.calc_velocity(load.owner, load.where_m);
     g.curvature_per_m += load.push_n * load.curvature_per_m;
+    g.slip_share = std::max(g.slip_share, load.slip_share);
     g.smooth = g.smooth || load.smooth;
     g.features += scramble(load.feature);  // independent of the order
   }
@@ -109,12 +110,20 @@ void LastingContacts::record(const Scene& scene, const Group& g, Spot& spot, std
   spot.recorded_s = time_s;
   const Vec3 va = scene.calc_velocity(g.a, g.where), vb = scene.calc_velocity(g.b, g.where), u = va - vb;
   Vec3 slip = u - dot(u, g.normal) * g.normal;
-  if (norm(slip) < kMinSlipSpeedMS) slip = {};
   const auto calc_sweep = [&](const Vec3& surface) {
     const Vec3 w = g.carried + spot.drift - surface;
-    return norm(w - dot(w, g.normal) * g.normal);
+    return w - dot(w, g.normal) * g.normal;
   };
-  const double sweep_a = calc_sweep(va), sweep_b = calc_sweep(vb), patch = calc_patch(scene, g.a, g.b, g.push_n, spot.radius_m);
+  Vec3 over_a = calc_sweep(va), over_b = calc_sweep(vb);
+  if (g.slip_share < 1.0) {  // the tremble is that of the surface which moves faster under the contact
+    slip = g.slip_share * slip;
+    if (norm(over_a) <= norm(over_b))
+      over_b = over_a + slip;
+    else
+      over_a = over_b - slip;
+  }
+  if (norm(slip) < kMinSlipSpeedMS) slip = {};
+  const double sweep_a = norm(over_a), sweep_b = norm(over_b), patch = calc_patch(scene, g.a, g.b, g.push_n, spot.radius_m);
   for (const int side : {0, 1}) {
     const int body = side == 0 ? g.a : g.b, other = side == 0 ? g.b : g.a;
     if (body < 0 || scene.bodies[body].shape == nullptr) continue;
@@ -180,7 +189,8 @@ LastingContacts::Spot& LastingContacts::find_spot(const Scene& scene, const Grou
   spot.where = g.where;
   spot.features = g.features;
   spot.load_n = g.push_n;
-  spot.quiet_s = spot.seen_s = scene.time_s;
+  spot.seen_s = scene.time_s;
+  spot.quiet_s = scene.time_s - scene.before_s > kMinQuietS ? scene.before_s : scene.time_s;
   spots.push_back(spot);
   return spots.back();
 }

@@ -20,6 +20,7 @@ struct Load {
   Vec3 where_m{}, normal{};      // normal: unit, from b to a
   double push_n = 0.0;           // normal force, > 0
   double curvature_per_m = 0.0;  // of both surfaces
+  double slip_share = 1.0;       // of the slip that is motion, not tremble of an engine
   bool smooth = false;           // the point moves over a curved surface
   std::uint64_t feature = 0;     // of the surfaces; constant while the same ones touch
   std::uint64_t spot = 0;        // identity of the position, if known; 0: by nearness
@@ -44,7 +45,7 @@ class LastingContacts {
     int a = 0, b = -1;
     Vec3 where{}, normal{}, turn{};
     Vec3 carried{};  // velocity of the surface that owns the loaded points
-    double push_n = 0.0, curvature_per_m = 0.0;
+    double push_n = 0.0, curvature_per_m = 0.0, slip_share = 0.0;
     bool smooth = false;
     std::uint64_t features = 0;  // hash of the loaded features
     std::uint64_t spot = 0;

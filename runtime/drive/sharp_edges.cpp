@@ -13,6 +13,9 @@ namespace {
 constexpr double kSharpCosine = 0.906;   // of 25 degrees
 constexpr double kParallelCosine = 0.9;  // edges of one direction
 constexpr double kNearRatio = 0.01;      // of the size
+constexpr double kFlatCosine = 0.9998;   // of 1 degree: facets of a flat surface
+constexpr double kSameCosine = 0.9;      // normals of a contact and of a surface that it lies on
+constexpr double kLevelSlope = 0.02;     // of a contact that lies on a surface next to an edge
 
 }  // namespace
 
@@ -24,17 +27,40 @@ std::size_t SharpEdges::Hash::operator()(const Cell& cell) const noexcept {
 
 SharpEdges::SharpEdges(std::span<const Vec3> vertices, std::span<const std::array<std::int32_t, 3>> triangles, double size_m)
     : near_m_(kNearRatio * size_m) {
-  std::map<std::pair<std::int32_t, std::int32_t>, Vec3> normals;  // of the first facet of an edge
-  for (const auto& corners : triangles) {
-    const Vec3 n = calc_unit(cross(vertices[corners[1]] - vertices[corners[0]], vertices[corners[2]] - vertices[corners[0]]));
+  struct Seam {
+    std::size_t facet = 0, next = 0;
+    bool is_sharp = false;
+  };
+  std::vector<Vec3> normals;
+  std::vector<char> curved(triangles.size(), 0);
+  std::map<std::pair<std::int32_t, std::int32_t>, Seam> seams;
+  for (std::size_t f = 0; f < triangles.size(); ++f) {
+    const auto& corners = triangles[f];
+    const Vec3& n =
+        normals.emplace_back(calc_unit(cross(vertices[corners[1]] - vertices[corners[0]], vertices[corners[2]] - vertices[corners[0]])));
     for (int k = 0; k < 3; ++k) {
       const std::int32_t from = corners[k], to = corners[(k + 1) % 3];
-      const auto [at, is_first] = normals.try_emplace(std::minmax(from, to), n);
+      const auto [at, is_first] = seams.try_emplace(std::minmax(from, to), Seam{f, f});
       if (is_first) continue;
-      const Vec3 along = vertices[to] - vertices[from];
-      const bool is_convex = dot(cross(n, at->second), along) > 0.0;
-      if (is_convex && dot(n, at->second) < kSharpCosine) add({vertices[from], vertices[to]});
+      Seam& seam = at->second;
+      seam.next = f;
+      const double cosine = dot(n, normals[seam.facet]);
+      const bool is_convex = dot(cross(n, normals[seam.facet]), vertices[to] - vertices[from]) > 0.0;
+      seam.is_sharp = is_convex && cosine < kSharpCosine;
+      if (cosine > kSharpCosine && cosine < kFlatCosine) curved[seam.facet] = curved[f] = 1;
     }
+  }
+  for (const auto& [ends, seam] : seams) {
+    if (!seam.is_sharp) continue;
+    Edge edge{.begin = vertices[ends.first], .end = vertices[ends.second]};
+    for (const std::size_t side : {0, 1}) {
+      const std::size_t own = side == 0 ? seam.facet : seam.next, other = side == 0 ? seam.next : seam.facet;
+      if (curved[own] == 0) continue;
+      const Vec3 off = cross(edge.end - edge.begin, normals[own]);
+      edge.normals[side] = normals[own];
+      edge.off[side] = (dot(off, normals[other]) < 0.0 ? -1.0 : 1.0) * calc_unit(off);
+    }
+    add(edge);
   }
 }
 
@@ -57,7 +83,7 @@ void SharpEdges::add(const Edge& edge) {
   }
 }
 
-int SharpEdges::count_directions(const Vec3& point) const {
+int SharpEdges::count_directions(const Vec3& point, const Vec3& outward) const {
   const auto found = cells_.find(find_cell(point));
   if (found == cells_.end()) return 0;
   Vec3 first{};
@@ -67,6 +93,10 @@ int SharpEdges::count_directions(const Vec3& point) const {
     const Vec3 along = edge.end - edge.begin;
     const double share = std::clamp(dot(point - edge.begin, along) / dot(along, along), 0.0, 1.0);
     if (norm(edge.begin + share * along - point) > near_m_) continue;
+    const auto lies_on = [&](std::size_t side) {
+      return dot(outward, edge.normals[side]) > kSameCosine && dot(outward, edge.off[side]) < kLevelSlope;
+    };
+    if (lies_on(0) || lies_on(1)) continue;
     const Vec3 direction = calc_unit(along);
     if (count == 0) {
       first = direction;

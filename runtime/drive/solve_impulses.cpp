@@ -1,110 +1,174 @@
 // Method: projected Gauss-Seidel for the normal impulses >= 0, and friction within Coulomb's cone, whose sum is the change of velocities
-// less gravity and gyroscopic terms.
+// less gravity and gyroscopic terms; every group of bodies that touch by itself, until its impulses have settled.
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "runtime/drive/touch_bodies.hpp"
 
 namespace carillon::drive {
 namespace {
 
-constexpr int kMaxSweeps = 60;
-constexpr double kEnough = 1e-5;  // relative to the largest impulse: change in a sweep
+constexpr int kMaxSweeps = 20;
+constexpr double kEnough = 1e-4;  // relative to the largest impulse of the group: change in a sweep
 
-/// Changes of velocity that no impulse explains yet.
-class Unexplained {
+/// Change of velocity that no impulse explains yet.
+struct Change {
+  Vec3 linear{}, angular{};
+};
+
+/// One direction at a point: change of velocities of both bodies along it, and per impulse on a along it.
+struct Row {
+  Vec3 along{};
+  std::array<Vec3, 2> turning{}, linear{}, angular{};
+  double inverse_mass = 0.0;
+};
+
+/// A point whose impulse or friction is not known.
+struct Unknown {
+  StepPoint* point = nullptr;
+  std::array<int, 2> bodies{-1, -1};  // -1: its velocity cannot change
+  std::array<Row, 3> rows{};          // normal, tangents
+  std::array<double, 2> rubbed{};     // friction along the tangents [N s]
+  double friction = 0.0;
+  int group = 0;
+};
+
+double find_speed(const std::vector<Change>& changes, const Unknown& u, const Row& row) {
+  double sum = 0.0;
+  for (const std::size_t side : {0, 1}) {
+    if (u.bodies[side] < 0) continue;
+    const Change& change = changes[static_cast<std::size_t>(u.bodies[side])];
+    const double own = dot(change.linear, row.along) + dot(change.angular, row.turning[side]);
+    sum += side == 0 ? own : -own;
+  }
+  return sum;
+}
+
+void explain(std::vector<Change>& changes, const Unknown& u, const Row& row, double impulse_n_s) {
+  for (const std::size_t side : {0, 1}) {
+    if (u.bodies[side] < 0) continue;
+    Change& change = changes[static_cast<std::size_t>(u.bodies[side])];
+    const double given = side == 0 ? -impulse_n_s : impulse_n_s;
+    change.linear = change.linear + given * row.linear[side];
+    change.angular = change.angular + given * row.angular[side];
+  }
+}
+
+class Solver {
  public:
-  explicit Unexplained(const StepView& step) : step_(step), change_(step.before.size()) {
-    for (std::size_t i = 0; i < change_.size(); ++i) {
-      if (!can_change(static_cast<int>(i))) continue;
-      const Motion &before = step.before[i], &now = step.scene.motions[i];
-      const Mat3 inertia = before.rotation * (step.bodies[i].inertia * transpose(before.rotation));
-      const Vec3 couple = cross(before.spin_rad_s, inertia * before.spin_rad_s);
-      change_[i].linear = now.velocity_m_s - before.velocity_m_s - step.dt_s * step.options.gravity_m_s2;
-      change_[i].angular = now.spin_rad_s - before.spin_rad_s + step.dt_s * (before.inverse_inertia * couple);
+  Solver(const StepView& step, std::vector<StepPoint>& points) : step_(step), changes_(step.before.size()), groups_(step.before.size()) {
+    std::iota(groups_.begin(), groups_.end(), 0);
+    for (std::size_t i = 0; i < changes_.size(); ++i) find_change(static_cast<int>(i));
+    for (StepPoint& p : points) {
+      const bool is_known = p.is_impulse_known && p.is_friction_known;
+      Unknown u = make(p);
+      explain_known(u);
+      if (is_known || !(u.rows[0].inverse_mass > 0.0)) continue;
+      if (u.bodies[0] >= 0 && u.bodies[1] >= 0) groups_[find_group(u.bodies[0])] = find_group(u.bodies[1]);
+      unknowns_.push_back(u);
     }
+    for (Unknown& u : unknowns_) u.group = static_cast<int>(find_group(std::max(u.bodies[0], u.bodies[1])));
+    std::stable_sort(unknowns_.begin(), unknowns_.end(), [](const Unknown& x, const Unknown& y) { return x.group < y.group; });
   }
 
-  bool can_change(int body) const { return step_.moves(body) && step_.bodies[body].is_used && !step_.bodies[body].pose.asleep; }
-
-  double calc_inverse_mass(const StepPoint& p, const Vec3& along) const {
-    double sum = 0.0;
-    for (const int body : {p.a, p.b}) {
-      if (!can_change(body)) continue;
-      const Vec3 arm = cross(p.where_m - step_.get_given()[body].centre_m, along);
-      sum += 1.0 / step_.scene.bodies[body].mass_kg + dot(arm, step_.before[body].inverse_inertia * arm);
-    }
-    return sum;
-  }
-
-  /// Of a relative to b.
-  Vec3 find(const StepPoint& p) const {
-    Vec3 sum{};
-    for (const int body : {p.a, p.b}) {
-      if (!can_change(body)) continue;
-      const Vec3 own = change_[body].linear + cross(change_[body].angular, p.where_m - step_.get_given()[body].centre_m);
-      sum = body == p.a ? sum + own : sum - own;
-    }
-    return sum;
-  }
-
-  void explain(const StepPoint& p, const Vec3& impulse) {
-    for (const int body : {p.a, p.b}) {
-      if (!can_change(body)) continue;
-      const double sign = body == p.a ? -1.0 : 1.0;
-      const Vec3 arm = p.where_m - step_.get_given()[body].centre_m;
-      change_[body].linear = change_[body].linear + (sign / step_.scene.bodies[body].mass_kg) * impulse;
-      change_[body].angular = change_[body].angular + sign * (step_.before[body].inverse_inertia * cross(arm, impulse));
+  void solve() {
+    for (auto first = unknowns_.begin(); first != unknowns_.end();) {
+      const auto last = std::find_if(first, unknowns_.end(), [&](const Unknown& u) { return u.group != first->group; });
+      for (int sweep = 0; sweep < kMaxSweeps; ++sweep) {
+        double moved = 0.0, largest = 0.0;
+        for (auto u = first; u != last; ++u) {
+          moved = std::max(moved, improve(*u));
+          largest = std::max(largest, u->point->impulse_n_s);
+        }
+        if (moved <= kEnough * largest) break;
+      }
+      for (; first != last; ++first)
+        if (!first->point->is_friction_known)
+          first->point->friction_n_s = first->rubbed[0] * first->rows[1].along + first->rubbed[1] * first->rows[2].along;
     }
   }
 
  private:
-  struct Change {
-    Vec3 linear{}, angular{};
-  };
-  const StepView& step_;
-  std::vector<Change> change_;
-};
+  bool can_change(int body) const { return step_.moves(body) && step_.bodies[body].is_used && !step_.bodies[body].pose.asleep; }
 
-/// Returns the change of the point's impulse.
-double improve(const StepView& step, Unexplained& rest, StepPoint& p) {
-  double moved = 0.0;
-  if (!p.is_impulse_known) {
-    const double inverse = rest.calc_inverse_mass(p, p.normal);
-    if (!(inverse > 0.0)) return 0.0;
-    const double impulse = std::max(0.0, p.impulse_n_s + dot(rest.find(p), p.normal) / inverse);
-    moved = std::abs(impulse - p.impulse_n_s);
-    rest.explain(p, (impulse - p.impulse_n_s) * p.normal);
-    p.impulse_n_s = impulse;
+  void find_change(int body) {
+    if (!can_change(body)) return;
+    const Motion &before = step_.before[body], &now = step_.scene.motions[body];
+    const Mat3 inertia = before.rotation * (step_.bodies[body].inertia * transpose(before.rotation));
+    const Vec3 couple = cross(before.spin_rad_s, inertia * before.spin_rad_s);
+    changes_[body].linear = now.velocity_m_s - before.velocity_m_s - step_.dt_s * step_.options.gravity_m_s2;
+    changes_[body].angular = now.spin_rad_s - before.spin_rad_s + step_.dt_s * (before.inverse_inertia * couple);
   }
-  if (p.is_friction_known) return moved;
-  const double limit = step.calc_friction(p.a, p.b) * p.impulse_n_s;
-  Vec3 wanted = p.friction_n_s;
-  for (const Vec3& along : find_tangents(p.normal)) {
-    const double inverse = rest.calc_inverse_mass(p, along);
-    if (inverse > 0.0) wanted = wanted + (dot(rest.find(p), along) / inverse) * along;
+
+  std::size_t find_group(int body) {
+    auto at = static_cast<std::size_t>(body);
+    while (groups_[at] != at) at = groups_[at] = groups_[groups_[at]];
+    return at;
   }
-  if (const double size = norm(wanted); size > limit) wanted = (limit / size) * wanted;
-  rest.explain(p, wanted - p.friction_n_s);
-  p.friction_n_s = wanted;
-  return moved;
-}
+
+  Unknown make(StepPoint& p) const {
+    Unknown u{.point = &p, .friction = step_.calc_friction(p.a, p.b)};
+    const auto tangents = find_tangents(p.normal);
+    u.rows[0].along = p.normal;
+    u.rows[1].along = tangents[0];
+    u.rows[2].along = tangents[1];
+    for (const std::size_t side : {0, 1}) {
+      const int body = side == 0 ? p.a : p.b;
+      if (!can_change(body)) continue;
+      u.bodies[side] = body;
+      const Vec3 arm = p.where_m - step_.get_given()[body].centre_m;
+      for (Row& row : u.rows) {
+        row.turning[side] = cross(arm, row.along);
+        row.linear[side] = (1.0 / step_.scene.bodies[body].mass_kg) * row.along;
+        row.angular[side] = step_.before[body].inverse_inertia * row.turning[side];
+        row.inverse_mass += 1.0 / step_.scene.bodies[body].mass_kg + dot(row.turning[side], row.angular[side]);
+      }
+    }
+    return u;
+  }
+
+  void explain_known(const Unknown& u) {
+    const Vec3 known = u.point->impulse_n_s * u.point->normal + u.point->friction_n_s;
+    if (known == Vec3{}) return;
+    for (const Row& row : u.rows) explain(changes_, u, row, dot(known, row.along));
+  }
+
+  /// Returns the change of the point's impulse.
+  double improve(Unknown& u) {
+    StepPoint& p = *u.point;
+    double moved = 0.0;
+    if (!p.is_impulse_known) {
+      const Row& row = u.rows[0];
+      const double impulse = std::max(0.0, p.impulse_n_s + find_speed(changes_, u, row) / row.inverse_mass);
+      moved = std::abs(impulse - p.impulse_n_s);
+      explain(changes_, u, row, impulse - p.impulse_n_s);
+      p.impulse_n_s = impulse;
+    }
+    if (p.is_friction_known) return moved;
+    std::array<double, 2> wanted = u.rubbed;
+    for (const std::size_t k : {0, 1}) wanted[k] += find_speed(changes_, u, u.rows[k + 1]) / u.rows[k + 1].inverse_mass;
+    const double limit = u.friction * p.impulse_n_s, size = std::sqrt(wanted[0] * wanted[0] + wanted[1] * wanted[1]);
+    for (const std::size_t k : {0, 1}) {
+      if (size > limit) wanted[k] *= limit / size;
+      explain(changes_, u, u.rows[k + 1], wanted[k] - u.rubbed[k]);
+    }
+    u.rubbed = wanted;
+    return moved;
+  }
+
+  const StepView& step_;
+  std::vector<Change> changes_;      // per body
+  std::vector<std::size_t> groups_;  // per body: another one of its group, or itself
+  std::vector<Unknown> unknowns_;
+};
 
 }  // namespace
 
 void solve_impulses(const StepView& step, std::vector<StepPoint>& points) {
   const auto is_known = [](const StepPoint& p) { return p.is_impulse_known && p.is_friction_known; };
   if (std::all_of(points.begin(), points.end(), is_known)) return;
-  Unexplained rest(step);
-  for (const StepPoint& p : points) rest.explain(p, p.impulse_n_s * p.normal + p.friction_n_s);
-  for (int sweep = 0; sweep < kMaxSweeps; ++sweep) {
-    double moved = 0.0, largest = 0.0;
-    for (StepPoint& p : points) {
-      if (!is_known(p)) moved = std::max(moved, improve(step, rest, p));
-      largest = std::max(largest, p.impulse_n_s);
-    }
-    if (moved <= kEnough * largest) break;
-  }
+  Solver(step, points).solve();
 }
 
 }  // namespace carillon::drive

@@ -9,7 +9,7 @@ void calc_own(const TouchBody& body, const Vec3& station, const Vec3& outward, d
     is_round = true;
     return;
   }
-  const int directions = body.edges->count_directions(station);
+  const int directions = body.edges->count_directions(station, outward);
   is_round = directions == 0 && !body.shape->is_polyhedron();
   if (directions == 0)
     curvature = std::max(0.0, body.shape->find_place(station, outward).curvature_per_m);

@@ -10,12 +10,16 @@ namespace {
 
 constexpr double kLoadS = 5e-3;  // s; averaging time of loads, at least four steps
 constexpr int kLoadSteps = 4;
-constexpr double kMeanS = 50e-3;        // s; averaging time of all impulses of a position
+constexpr double kMeanS = 50e-3;  // s; averaging time of all impulses of a position
+constexpr double kSlipS = 50e-3;  // s; averaging time of slip, at least eight steps
+constexpr int kSlipSteps = 8;
+constexpr double kCreepMS = 1e-3;       // m/s; slower slip is creep of an engine's friction
 constexpr double kSettledS = 0.1;       // s; a position older than this has settled
 constexpr double kSettledRatio = 3.0;   // a hit on a loaded position is above this times its load
 constexpr double kSharedRatio = 2.0;    // an impulse that comes from a hit elsewhere on the body: above this times weight and load
 constexpr double kDecayedRatio = 0.05;  // of the largest force: the end of a compliant hit
 constexpr double kMatchRatio = 0.2;     // of the size: distance from the last position
+constexpr double kGroupRatio = 0.05;    // of the size: points of one position; corners of an edge that lands are apart
 constexpr double kMinLoadN = 1e-9;
 
 double calc_load_s(double dt_s) { return std::max(kLoadS, kLoadSteps * dt_s); }
@@ -24,6 +28,15 @@ double calc_load_s(double dt_s) { return std::max(kLoadS, kLoadSteps * dt_s); }
 double calc_pull(const StepView& step, int a, int b, const Vec3& normal) {
   const double along = dot(step.options.gravity_m_s2, normal);
   return std::max(0.0, (step.moves(b) ? along : 0.0) - (step.moves(a) ? along : 0.0));
+}
+
+/// Time from the begin of the step until the surfaces touch, in free fall from their gap then [s].
+double calc_wait_s(const StepView& step, int a, int b, const std::array<Vec3, 2>& stations, const Vec3& normal, double gap_m,
+                   double approach_m_s) {
+  if (step.options.points_after) gap_m = dot(step.place(step.before, a, stations[0]) - step.place(step.before, b, stations[1]), normal);
+  if (!(approach_m_s > 0.0) || !(gap_m > 0.0)) return 0.0;
+  const double pull = calc_pull(step, a, b, normal);
+  return std::min(step.dt_s, 2.0 * gap_m / (approach_m_s + std::sqrt(approach_m_s * approach_m_s + 2.0 * pull * gap_m)));
 }
 
 /// Impulse that carries the weight of the pair along the normal in this step [N s].
@@ -95,7 +108,7 @@ std::vector<TouchSpots::Group> TouchSpots::make_groups(const StepView& step, std
   for (std::size_t seed = 0; seed < points.size(); ++seed) {
     const StepPoint& first = points[seed];
     if (taken[seed] != 0 || !(first.impulse_n_s > 0.0)) continue;
-    const double near = step.scene.calc_spot_radius(first.a, first.b);
+    const double near = kGroupRatio * step.scene.calc_size(first.a, first.b);
     Group g{.a = first.a, .b = first.b, .gap_m = first.gap_m};
     for (std::size_t i = seed; i < points.size() && points[i].a == first.a && points[i].b == first.b; ++i) {
       const StepPoint& p = points[i];
@@ -157,7 +170,7 @@ Vec3 TouchSpots::calc_where(const StepView& step, const Group& g, const Spot& sp
 void TouchSpots::follow(const StepView& step, const Group& g, int count, Spot& spot, std::vector<FinishedHit>& hits) {
   const double dt = step.dt_s, slowest = step.calc_slowest();
   const double parting = dot(step.calc_relative(step.scene.motions, g.a, g.b, g.stations_m), g.normal);
-  const double weight = calc_weight(step, g.a, g.b, g.normal) / count;
+  double weight = calc_weight(step, g.a, g.b, g.normal) / count;
   double inverse = step.scene.calc_inverse_mass(g.a, g.b, g.where_m, g.normal);
   const bool is_jointed = step.bodies[g.a].pose.jointed || (g.b >= 0 && step.bodies[g.b].pose.jointed);
   if (is_jointed && parting + g.approach_m_s > slowest) inverse = std::min(inverse, (parting + g.approach_m_s) / g.push_n_s);
@@ -167,9 +180,12 @@ void TouchSpots::follow(const StepView& step, const Group& g, int count, Spot& s
   const bool is_shaken = is_loaded && g.push_n_s < kSettledRatio * spot.load_n * dt;
   double hit = 0.0;
   if (spot.is_open || ((g.approach_m_s > slowest || shares) && !is_shaken)) {
+    const double wait_s = spot.is_open ? 0.0 : calc_wait_s(step, g.a, g.b, g.stations_m, g.normal, g.gap_m, g.approach_m_s);
+    // Sums over internal steps: nothing carries the bodies before they touch, nor after they have parted.
+    if (!spot.is_open && step.options.points_after) weight *= parting > slowest ? 0.0 : 1.0 - wait_s / dt;
     hit = std::max(0.0, g.push_n_s - weight);
     if (hit > 0.0) {
-      if (!spot.is_open) open(step, g, inverse, spot);
+      if (!spot.is_open) open(step, g, wait_s, inverse, spot);
       gather(step, g, hit, spot);
     }
   } else {
@@ -178,29 +194,40 @@ void TouchSpots::follow(const StepView& step, const Group& g, int count, Spot& s
   spot.where_m = calc_where(step, g, spot);
   spot.normal = g.normal;
   spot.stations_m = g.stations_m;
+  note_slip(step, g, spot);
   spot.seen_s = step.scene.time_s;
   spot.mean_n += dt / (dt + kMeanS) * (g.push_n_s / dt - spot.mean_n);
-  spot.load_n += dt / (dt + calc_load_s(dt)) * ((g.push_n_s - hit) / dt - spot.load_n);
+  // Of a new contact, or after a hit, the mean since then.
+  const double known_s = step.scene.before_s - std::max(spot.born_s, spot.quiet_s);
+  spot.load_n += dt / (dt + std::min(calc_load_s(dt), known_s)) * ((g.push_n_s - hit) / dt - spot.load_n);
   if (g.curvature_per_m >= 0.0) spot.curvature_per_m = g.curvature_per_m;
   if (!spot.is_open) return;
   spot.hit.parting_m_s = std::max(0.0, parting);
-  if (step.options.early && !spot.is_reported) report_early(step, spot, hits);
-  const bool has_decayed = !step.options.compliant || hit < kDecayedRatio * spot.peak_n * dt;
+  // Whether a settled contact is struck or shaken is known at the end only.
+  const bool is_settled = step.scene.time_s - spot.born_s > kSettledS;
+  if (step.options.early && !spot.is_reported && !is_settled) report_early(step, spot, hits);
+  const double gap =
+      dot(step.place(step.scene.motions, g.a, g.stations_m[0]) - step.place(step.scene.motions, g.b, g.stations_m[1]), g.normal);
+  const bool has_decayed = !step.options.compliant || hit < kDecayedRatio * spot.peak_n * dt || (gap > 0.0 && parting > slowest);
   const bool is_long = step.scene.time_s - spot.hit.touch_s > step.options.longest_hit_s;
   if (is_long) ++counters_->cut;
   if (is_long || !(hit > 0.0) || (parting > -slowest && has_decayed)) close(step, spot, hits);
 }
 
-void TouchSpots::open(const StepView& step, const Group& g, double inverse_mass, Spot& spot) {
+void TouchSpots::open(const StepView& step, const Group& g, double wait_s, double inverse_mass, Spot& spot) {
   spot.is_open = true;
   spot.peak_n = 0.0;
   spot.hit = {.a = g.a, .b = g.b};
-  const double from_s = step.options.points_after ? step.scene.time_s : step.scene.before_s;
-  const double wait_s = g.approach_m_s > 0.0 ? g.gap_m / g.approach_m_s : 0.0;
-  spot.hit.touch_s = std::clamp(from_s + wait_s, step.scene.before_s, step.scene.time_s);
+  spot.hit.opened_s = step.scene.before_s;
+  spot.hit.touch_s = step.scene.before_s + wait_s;
+  spot.hit.approach_m_s = g.approach_m_s + wait_s * calc_pull(step, g.a, g.b, g.normal);
   spot.hit.inverse_mass = inverse_mass;
-  spot.hit.before[0] = step.before[g.a];
-  if (g.b >= 0) spot.hit.before[1] = step.before[g.b];
+  for (const std::size_t side : {0, 1}) {
+    const int body = side == 0 ? g.a : g.b;
+    if (body < 0) continue;
+    spot.hit.before[side] = step.before[body];
+    if (step.moves(body)) spot.hit.before[side].velocity_m_s = step.before[body].velocity_m_s + wait_s * step.options.gravity_m_s2;
+  }
 }
 
 /// Adds the part `push_n_s` of the group's impulse to the open hit.
@@ -250,6 +277,7 @@ void TouchSpots::report_early(const StepView& step, Spot& spot, std::vector<Fini
   for (Vec3& impulse : hit.impulses_n_s) impulse = (push / hit.push_n_s) * impulse;
   hit.rubbed_n_s *= push / hit.push_n_s;
   hit.push_n_s = push;
+  hit.is_predicted = true;
   hit.parting_m_s = e * hit.approach_m_s;
   hits.push_back(hit);
 }
@@ -289,6 +317,15 @@ void TouchSpots::miss(const StepView& step, Spot& spot, std::vector<FinishedHit>
   spot.is_gone = step.scene.time_s - spot.seen_s > calc_load_s(dt);
 }
 
+void TouchSpots::note_slip(const StepView& step, const Group& g, Spot& spot) {
+  const Vec3 relative = step.scene.calc_velocity(g.a, spot.where_m) - step.scene.calc_velocity(g.b, spot.where_m);
+  const Vec3 slip = relative - dot(relative, g.normal) * g.normal;
+  const double mean_s = std::min(std::max(kSlipS, kSlipSteps * step.dt_s), step.scene.before_s - spot.born_s);
+  const double share = step.dt_s / (step.dt_s + mean_s);
+  spot.slip_m_s = spot.slip_m_s + share * (slip - spot.slip_m_s);
+  spot.slip_speed_m_s += share * (norm(slip) - spot.slip_speed_m_s);
+}
+
 void TouchSpots::add_load(const StepView& step, Spot& spot, std::vector<Load>& loads) const {
   if (!(spot.load_n > kMinLoadN) || rests(step, spot.a, spot.b)) return;
   if (spot.owner < -1) {
@@ -300,6 +337,9 @@ void TouchSpots::add_load(const StepView& step, Spot& spot, std::vector<Load>& l
     spot.is_round = spot.owner == spot.a ? c.is_a_round : c.is_b_round;
     if (!(spot.curvature_per_m >= 0.0)) spot.curvature_per_m = c.calc_sum();
   }
+  // Slip to and fro is tremble.
+  const double mean = norm(spot.slip_m_s);
+  const double slip_share = mean > kCreepMS ? mean / spot.slip_speed_m_s * std::sqrt(1.0 - kCreepMS * kCreepMS / (mean * mean)) : 0.0;
   loads.push_back({.a = spot.a,
                    .b = spot.b,
                    .owner = spot.owner,
@@ -307,6 +347,7 @@ void TouchSpots::add_load(const StepView& step, Spot& spot, std::vector<Load>& l
                    .normal = spot.normal,
                    .push_n = spot.load_n,
                    .curvature_per_m = spot.curvature_per_m,
+                   .slip_share = std::min(1.0, slip_share),
                    .feature = spot.number,
                    .spot = spot.number});
 }

@@ -16,16 +16,18 @@ namespace carillon::drive {
 /// A complete hit.
 struct FinishedHit {
   int a = 0, b = -1;
+  double opened_s = 0.0;  // begin of its first step
   double touch_s = 0.0, end_s = 0.0;
   double approach_m_s = 0.0, parting_m_s = 0.0;  // before and after; parting >= 0
   double inverse_mass = 0.0;                     // 1/m_eff along the normal [1/kg]
   double push_n_s = 0.0;                         // along the normal, without weight
+  bool is_predicted = false;                     // the impulse, of a rigid impact at this point alone
   double curvature_per_m = 0.0;                  // NaN: unknown
   Vec3 normal{};                                 // world, from b to a
   double rubbed_n_s = 0.0;                       // friction
   std::array<Vec3, 2> stations_m{}, outwards{};  // on a and b, mesh axes; outward normals
   std::array<Vec3, 2> impulses_n_s{};            // on a and b, mesh axes
-  std::array<Motion, 2> before{};                // motions of a and b before its first step
+  std::array<Motion, 2> before{};                // motions of a and b before its first step, velocities at the touch
 };
 
 /// Invariant: a position belongs to one pair (a, b), in the order of the names; it lives until it has had no load for a few steps.
@@ -57,6 +59,8 @@ class TouchSpots {
     bool is_round = false;                             // the owner: the position may roll over it
     double born_s = 0.0, seen_s = 0.0, quiet_s = 0.0;  // first and last step with a push; end of the last hit
     double load_n = 0.0, mean_n = 0.0;                 // averaged: without hits, with hits
+    Vec3 slip_m_s{};                                   // averaged,
+    double slip_speed_m_s = 0.0;                       // and its magnitude
     bool is_gone = false, is_open = false, is_reported = false;
     double peak_n = 0.0;  // of the open hit
     FinishedHit hit;      // sums of the open hit, weighted by impulse
@@ -65,12 +69,13 @@ class TouchSpots {
   std::vector<Group> make_groups(const StepView& step, std::span<const StepPoint> points) const;
   Spot& find_spot(const StepView& step, const Group& group, std::vector<Spot>& spots);
   void follow(const StepView& step, const Group& group, int count, Spot& spot, std::vector<FinishedHit>& hits);
-  void open(const StepView& step, const Group& group, double inverse_mass, Spot& spot);
+  void open(const StepView& step, const Group& group, double wait_s, double inverse_mass, Spot& spot);
   void gather(const StepView& step, const Group& group, double push_n_s, Spot& spot);
   void report_early(const StepView& step, Spot& spot, std::vector<FinishedHit>& hits);
   void close(const StepView& step, Spot& spot, std::vector<FinishedHit>& hits);
   static Vec3 calc_where(const StepView& step, const Group& group, const Spot& spot);
   void miss(const StepView& step, Spot& spot, std::vector<FinishedHit>& hits);
+  static void note_slip(const StepView& step, const Group& group, Spot& spot);
   void add_load(const StepView& step, Spot& spot, std::vector<Load>& loads) const;
 
   std::map<std::pair<int, int>, std::vector<Spot>> spots_;

@@ -11,7 +11,8 @@ import tempfile
 import scenes
 
 STEPS = (60, 240, 1000)  # per second
-# Largest differences: of the first hit [dB, %], of windows [dB]; level at the end [dB(A)]. Levels of rolling bodies: of all windows.
+# Largest differences: of the first hit [dB, %], of windows [dB]; level at the end [dB(A)]. Levels of rolling bodies: of all windows. The
+# rules of the tracker were found on the first six scenes, the others came later.
 THROWN = {"first_db": 3.0, "centroid_percent": 10.0, "windows_db": 3.0}
 WANTED = {
     "box": {**THROWN, "end_db": 0.0},
@@ -20,30 +21,65 @@ WANTED = {
     "slide": {"windows_db": 3.0, "end_db": 0.0},
     "ball": {"quiet_db": 6.0},
     "pile": {"windows_db": 3.0, "end_db": 0.0},
+    "bar": {**THROWN, "end_db": 0.0},
+    "slap": {**THROWN, "end_db": 0.0},
+    "rod": {**THROWN, "quiet_db": 6.0},
+    "row": {"first_db": 3.0, "centroid_percent": 10.0, "windows_db": 3.0},
+    "bead": THROWN,
+    "drop": THROWN,
 }
+WAYS = ("box", "tube", "two")  # with impulses found from velocities, and with early hits, in Bullet
+WANTED_WAYS = {"found_db": 1.5, "early_db": 1.5}
 # What an engine does not meet, and its bound instead; the reasons are in docs/howto/my-engine.md.
 LIMITS = {
     "bullet": {
-        ("slide", 60): {"windows_db": 9.0},
-        ("pile", 60): {"windows_db": 10.0, "end_db": 40.0},
-        ("pile", 240): {"windows_db": 10.0, "end_db": 20.0},
-        ("pile", 1000): {"windows_db": 6.0, "end_db": 20.0},
+        ("tube", 1000): {"found_db": 3.5},
+        ("slide", 60): {"windows_db": 4.0},
+        ("pile", 60): {"windows_db": 4.5, "end_db": 20.0},
+        ("bar", 60): {"end_db": 6.0},
+        ("bar", 240): {"end_db": 6.0},
+        ("bar", 1000): {"end_db": 6.0},
+        ("slap", 60): {"windows_db": 6.5},
+        ("slap", 240): {"windows_db": 4.0},
+        ("slap", 1000): {"windows_db": 4.0},
+        ("rod", 60): {"first_db": 4.5, "quiet_db": 13.0},
+        ("rod", 240): {"windows_db": 4.0},
+        ("rod", 1000): {"first_db": 4.5, "centroid_percent": 13.0},
+        ("row", 240): {"windows_db": 4.0},
+        ("bead", 240): {"windows_db": 4.5},
+        ("bead", 1000): {"windows_db": 4.5},
     },
-    "simbody": {("box", 240): {"end_db": 15.0}, ("slide", 60): {"windows_db": 6.0}, ("tube", 60): {"first_db": 7.5, "windows_db": 6.0}},
+    "simbody": {
+        ("slap", 240): {"windows_db": 4.5},
+        ("slap", 1000): {"windows_db": 4.5},
+        ("rod", 60): {"centroid_percent": 12.0, "quiet_db": 10.0},
+        ("rod", 240): {"quiet_db": 22.0},
+        ("rod", 1000): {"quiet_db": 36.0},
+    },
     "mujoco": {
-        ("two", 60): {"first_db": 1.0},
-        ("slide", 60): {"windows_db": 12.0},
-        ("slide", 240): {"windows_db": 12.0},
-        ("slide", 1000): {"windows_db": 12.0},
-        ("tube", 60): {"first_db": 4.0, "windows_db": 9.0},
-        ("tube", 240): {"windows_db": 9.0},
-        ("pile", 60): {"windows_db": 5.0},
-        ("pile", 240): {"windows_db": 5.0},
-        ("pile", 1000): {"windows_db": 5.0},
+        ("tube", 240): {"windows_db": 4.0},
+        ("slide", 60): {"windows_db": 10.5},
+        ("slide", 240): {"windows_db": 10.5},
+        ("slide", 1000): {"windows_db": 10.5},
+        ("pile", 60): {"windows_db": 4.5},
+        ("pile", 240): {"windows_db": 4.5},
+        ("pile", 1000): {"windows_db": 4.5},
+        ("slap", 240): {"windows_db": 4.0},
+        ("slap", 1000): {"windows_db": 4.0},
+        ("rod", 60): {"first_db": 4.5},
+        ("rod", 240): {"first_db": 4.5, "centroid_percent": 15.0},
+        ("rod", 1000): {"centroid_percent": 25.0, "windows_db": 4.0},
+        ("row", 240): {"first_db": 4.0, "windows_db": 4.0},
+        ("bead", 60): {"windows_db": 4.5},
+        ("bead", 240): {"windows_db": 4.5},
+        ("bead", 1000): {"windows_db": 4.5},
     },
 }
-# Simbody's contact of boxes needs meshes, which cost 10 CPU s per s; its impacts are tested with balls.
-LEFT_OUT = {"simbody": ("pile",), "impacts": ("box", "tube", "slide", "pile")}
+LEFT_OUT = {
+    "simbody": ("pile", "bead"),  # its contact of boxes needs meshes, which cost 10 CPU s per s
+    "impacts": ("box", "tube", "slide", "pile", "bar", "slap", "rod", "bead"),  # tested with balls
+    "bullet": (("bead", 60),),  # the ball falls through the pane: 33 mm in a step
+}
 
 
 def main():
@@ -58,15 +94,20 @@ def main():
         for scene, wanted in WANTED.items():
             if scene in LEFT_OUT.get(engine, ()):
                 continue
-            scenes.write_scene(folder / f"{scene}.json", *scenes.SCENES[scene])
-            own = scenes.render(programs, folder, scene)
+            own = scenes.render_own(programs, folder, scene)
             lost = scenes.count_lost(programs, folder, engine, scene, 240)
             assert lost == 0, f"{scene}: {lost} events lost or late"
             for hz in STEPS:
+                if (scene, hz) in LEFT_OUT.get(engine, ()):
+                    continue
                 found = scenes.compare(programs, folder, engine, scene, hz, own)
+                wanted_here = wanted
+                if engine == "bullet" and scene in WAYS:
+                    found.update(scenes.compare_ways(programs, folder, engine, scene, hz))
+                    wanted_here = {**wanted, **WANTED_WAYS}
                 assert found["bad_points"] == 0 and found["points"] > 0, found
                 limits = LIMITS.get(engine, {}).get((scene, hz), {})
-                for figure, bound in wanted.items():
+                for figure, bound in wanted_here.items():
                     value = found[figure] if figure == "end_db" else abs(found[figure])
                     limit = limits.get(figure, bound)
                     failed += value > limit

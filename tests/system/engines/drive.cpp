@@ -1,7 +1,9 @@
-// engine_NAME HZ SECONDS OUT.jsonl [LIVE.f32 [MAX_IMPACTS]] < BODIES: the sound of a physics engine's scene. OUT: its contacts file; LIVE:
-// pressure at two ears [Pa], pairs of floats at 48 kHz. A line of BODIES: name kind bank, then half extents, position, rotation (w x y z),
-// velocity and spin. Prints counters and costs as JSON.
+// engine_NAME HZ SECONDS OUT.jsonl [LIVE.f32 [MAX_IMPACTS [WAY]]] < BODIES: the sound of a physics engine's scene. OUT: its contacts file;
+// LIVE: pressure at two ears [Pa], pairs of floats at 48 kHz; "-": none. WAY: "found", impulses are withheld, and found from the
+// velocities; "early", hits are reported when they begin. A line of BODIES: name kind bank, then half extents, position, rotation
+// (w x y z), velocity and spin. Prints counters, costs and the sum of the engine's impulses on bodies along the vertical as JSON.
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <ctime>
@@ -20,6 +22,8 @@ using namespace carillon;
 using testing::Solid;
 
 char message[512];
+bool is_found = false;    // impulses are withheld
+double pushed_n_s = 0.0;  // impulses of the engine, upwards
 
 void check(carillon_status status) {
   if (status != CARILLON_OK) throw std::runtime_error(std::string(carillon_status_text(status)) + ": " + message);
@@ -163,7 +167,7 @@ void play(carillon_synth* synth, double until_s, std::vector<float>& heard) {
   }
 }
 
-void run(double hz, double seconds, const char* contacts, const char* live, const char* max_impacts) {
+void run(double hz, double seconds, const char* contacts, const char* live, const char* max_impacts, const std::string& way) {
   std::vector<Solid> solids = read_solids(std::cin);
   std::map<std::string, OpenBank> banks;
   std::vector<events::RecordedBody> recorded;
@@ -174,12 +178,16 @@ void run(double hz, double seconds, const char* contacts, const char* live, cons
   carillon_touches_options_init(&options);
   testing::set_options(options);
   if (max_impacts != nullptr) options.max_impacts = std::atoi(max_impacts);
+  is_found = way == "found";
+  options.early = way == "early" ? 1 : 0;
   options.sink = Recorder::take;
   options.user = &recorder;
   check(carillon_touches_create(synth, &options, &touches, message, sizeof message));
   for (Solid& solid : solids) {
     const OpenBank& bank = banks.try_emplace(solid.bank, solid.bank).first->second;
     solid.mass_kg = bank.ours.rigid.mass_kg;
+    const auto& material = bank.ours.material;
+    solid.modulus_pa = material.young_modulus_pa / (1.0 - material.poisson_ratio * material.poisson_ratio);
     for (int k = 0; k < 3; ++k) solid.inertia_kg_m2[k] = bank.ours.rigid.inertia_kg_m2[4 * k];
     carillon_touches_body body;
     carillon_touches_body_init(&body);
@@ -214,20 +222,37 @@ void run(double hz, double seconds, const char* contacts, const char* live, cons
   check(carillon_touches_get_counters(touches, &seen));
   std::printf(
       "{\"steps\": %lld, \"points\": %lld, \"bad_points\": %lld, \"hits\": %lld, \"touches\": %lld, \"latest_s\": %.6g, "
-      "\"cpu_s\": %.6g, \"lost\": %lld}\n",
+      "\"cpu_s\": %.6g, \"lost\": %lld, \"limited\": %lld, \"pushed_n_s\": %.9g}\n",
       static_cast<long long>(seen.steps), static_cast<long long>(seen.points), static_cast<long long>(seen.bad_points),
       static_cast<long long>(seen.hits), static_cast<long long>(seen.touches), latest_s, total_s,
-      static_cast<long long>(counters.refused + counters.late + counters.faults + counters.overflows + counters.resets));
+      static_cast<long long>(counters.refused + counters.late + counters.faults + counters.overflows + counters.resets),
+      static_cast<long long>(seen.limited), pushed_n_s);
   carillon_touches_destroy(touches);
   carillon_destroy(synth);
 }
 
 }  // namespace
 
+// Between the adapter and the library (--wrap of the linker).
+extern "C" {
+carillon_status __real_carillon_touches_step(carillon_touches*, double, const carillon_pose*, int32_t, const carillon_point*, int32_t,
+                                             char*, size_t);
+carillon_status __wrap_carillon_touches_step(carillon_touches* touches, double time_s, const carillon_pose* poses, int32_t bodies,
+                                             const carillon_point* points, int32_t count, char* text, size_t size) {
+  std::vector<carillon_point> given(points, points + count);
+  for (carillon_point& p : given) {
+    if (p.b < 0) pushed_n_s += p.impulse_n_s * p.normal[2];
+    if (is_found) p.impulse_n_s = p.friction_n_s[0] = p.friction_n_s[1] = p.friction_n_s[2] = std::nan("");
+  }
+  return __real_carillon_touches_step(touches, time_s, poses, bodies, given.data(), count, text, size);
+}
+}
+
 int main(int argc, char** argv) {
-  if (argc < 4) return std::fputs("usage: engine_NAME HZ SECONDS OUT.jsonl [LIVE.f32 [MAX_IMPACTS]] < BODIES\n", stderr), 2;
+  if (argc < 4) return std::fputs("usage: engine_NAME HZ SECONDS OUT.jsonl [LIVE.f32 [MAX_IMPACTS [WAY]]] < BODIES\n", stderr), 2;
   try {
-    run(std::atof(argv[1]), std::atof(argv[2]), argv[3], argc > 4 ? argv[4] : nullptr, argc > 5 ? argv[5] : nullptr);
+    run(std::atof(argv[1]), std::atof(argv[2]), argv[3], argc > 4 && std::string(argv[4]) != "-" ? argv[4] : nullptr,
+        argc > 5 ? argv[5] : nullptr, argc > 6 ? argv[6] : "");
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s: %s\n", argv[0], error.what());
     return 1;

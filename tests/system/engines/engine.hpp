@@ -16,6 +16,7 @@ struct Solid {
   double half_m[3] = {};         // half extents
   double position_m[3] = {}, rotation[4] = {}, velocity_m_s[3] = {}, spin_rad_s[3] = {};
   double mass_kg = 0.0, inertia_kg_m2[3] = {};
+  double modulus_pa = 1e11;  // E / (1 - nu^2)
 };
 
 constexpr double kRestitution = 0.5, kFriction = 0.447;  // of every contact: geometric mean of bodies (0.4) and ground (0.5)

@@ -39,7 +39,7 @@ class Mujoco : public Engine {
       : substeps_(static_cast<int>(std::ceil(step_s / kLongestStep - 1e-9))) {
     std::string text = format(
         "<mujoco><compiler angle='degree'/><option timestep='%.9g' cone='elliptic' impratio='10'/><default><geom "
-        "friction='%.3f 0.0001 0.00001' solref='%.9g %.3f' solimp='0.5 0.95 0.001' condim='4'/></default>"
+        "friction='%.3f 0.0001 0.00001' solref='%.9g %.3f' solimp='0.95 0.99 0.0005' condim='4'/></default>"
         "<worldbody><geom type='plane' size='5 5 0.1'/>",
         step_s / substeps_, kFriction, kSpring, kDamping);
     for (const Solid& solid : solids) text += describe(solid);

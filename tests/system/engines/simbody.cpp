@@ -14,9 +14,6 @@ constexpr double kCorner = 1e-3;  // m; radius of the balls at the corners of a 
 
 Vec3 to_simbody(const double (&x)[3]) { return {x[0], x[1], x[2]}; }
 
-/// A bodies' plane-strain modulus E / (1 - nu^2) [Pa], of the materials in scenes.py.
-double get_modulus(const Solid& solid) { return solid.kind == "box" ? 12.6e9 / 0.878 : solid.kind == "ball" ? 1e11 / 0.884 : 7e10 / 0.891; }
-
 class Simbody : public Engine {
  public:
   Simbody(const std::vector<Solid>& solids, carillon_touches* touches) : reader_(system_, matter_, tracker_, contact_, touches) {
@@ -63,12 +60,12 @@ class Simbody : public Engine {
     const auto add_ball = [&](const Vec3& at, double radius) {
       body.addContactSurface(SimTK::Transform(at),
                              SimTK::ContactSurface(SimTK::ContactGeometry::Sphere(radius),
-                                                   SimTK::ContactMaterial(get_modulus(solid), kLoss, kFriction, kFriction, 0)));
+                                                   SimTK::ContactMaterial(solid.modulus_pa, kLoss, kFriction, kFriction, 0)));
     };
     const auto& half = solid.half_m;
     if (solid.kind == "ball") add_ball(Vec3(0), half[0]);
     if (solid.kind == "tube")
-      for (const int side : {-1, 1}) add_ball(Vec3(side * (half[0] - half[1]), 0, 0), half[1]);
+      for (const int side : {-1, 1}) add_ball(Vec3(side * half[0], 0, 0), half[1]);
     if (solid.kind == "box")
       for (int c = 0; c < 8; ++c)
         add_ball(

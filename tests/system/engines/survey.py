@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Table of an engine's sound against our own contact: all scenes and steps.
 
-usage: survey.py PROGRAMS ENGINE [SCENE...] [--hz HZ...] [--banks FOLDER]     folder with box.h5, ball.h5 and tube.h5; solved if missing
+usage: survey.py PROGRAMS ENGINE [SCENE...] [--hz HZ...] [--banks FOLDER]     folder with the banks (box.h5, ...); solved if missing
 """
 import argparse
 import pathlib
@@ -27,9 +27,8 @@ def main():
         else:
             scenes.solve_banks(programs, folder)
         for scene in options.scenes or list(scenes.SCENES):
-            scenes.write_scene(folder / f"{scene}.json", *scenes.SCENES[scene])
-            own = scenes.render(programs, folder, scene)
-            print(f"{scene:5}  own   {' '.join(f'{x:4.0f}' for x in scenes.calc_levels(own))}")
+            own = scenes.render_own(programs, folder, scene)
+            print(f"{scene:5}  own   {' '.join(f'{x:4.0f}' for x in scenes.calc_levels(own[0]))}")
             for hz in options.hz:
                 r = scenes.compare(programs, folder, options.engine, scene, hz, own)
                 print(f"{'':5} {hz:5}  {' '.join(f'{x:4.0f}' for x in r['levels'])}")

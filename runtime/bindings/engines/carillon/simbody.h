@@ -80,8 +80,8 @@ class SimbodyTouches {
       const SimTK::Vec3 normal = sum.normal_n / impulse;
       const SimTK::Vec3 on_a = locate(state, sum.a, sum.station_a_m / sum.weight_n),
                         on_b = locate(state, sum.b, sum.station_b_m / sum.weight_n);
-      point.gap_m = sum.b < 0 ? 0.0 : SimTK::dot(on_a - on_b, normal);
-      copy(sum.b < 0 ? on_a : (on_a + on_b - point.gap_m * normal) / 2, point.point_m);
+      point.gap_m = SimTK::dot(on_a - on_b, normal);
+      copy(sum.b < 0 ? on_a - point.gap_m * normal : (on_a + on_b - point.gap_m * normal) / 2, point.point_m);
       copy(normal, point.normal);
       // The friction of a sticking contact changes its sign at every step: it is found from the velocities instead; 0 for bodies on
       // joints, which change the velocities, too.

@@ -70,5 +70,44 @@ TEST(TouchEnergy, PlatesNeverRingWithMoreThanTheBlow) {
   }
 }
 
+/// A plate that falls at `speed` and is struck at both ends at once, so that it leaves with e times the speed; steps of 0.1 ms.
+void strike_both_ends(Rig& rig, const bank::Bank& plate, double speed, double e) {
+  const double impulse = (1.0 + e) * speed * plate.rigid.mass_kg;
+  rig.poses[0].velocity_m_s[2] = -speed;
+  rig.step(1e-4, {});
+  rig.poses[0].velocity_m_s[2] = e * speed;
+  rig.step(1e-4, {on_ground(0, {0.1, 0.0, 0.0}, 0.5 * impulse), on_ground(0, {-0.1, 0.0, 0.0}, 0.5 * impulse)});
+  for (int n = 0; n < 300; ++n) rig.step(1e-4, {});
+}
+
+TEST(TouchEnergy, BothEndsStrikeTogether) {
+  const bank::Bank plate = physics::tests::make_plate_bank(0.2, 5e-3, 8000.0, 8, 1.0);
+  const double e = 0.5, speed = 1.0;
+  Rig rig({.ground_restitution = e});
+  rig.add(plate, "plate", {0, 0, 2.5e-3}, {}, e);
+  rig.start();
+  strike_both_ends(rig, plate, speed, e);
+  const double wanted = (1.0 + e) * speed * plate.rigid.mass_kg;
+  EXPECT_EQ(rig.touches.get_counters().impacts, 2);
+  EXPECT_LE(rig.sum_impulses(0)[2], 1.001 * wanted);
+  EXPECT_GE(rig.sum_impulses(0)[2], 0.8 * wanted) << "each alone turns the plate, and gives a quarter";
+}
+
+TEST(TouchEnergy, BlowsOnARingingPlateAddNoMoreThanTheirOwn) {
+  const double e = 0.5, speed = 1.0;
+  for (const double thickness : {0.5e-3, 2e-3}) {
+    const bank::Bank plate = physics::tests::make_plate_bank(0.2, thickness, 8000.0, 8, 1e-6);
+    Rig rig({.ground_restitution = e});
+    rig.add(plate, "plate", {0, 0, 0.5 * thickness}, {}, e);
+    rig.start();
+    for (int blows = 1; blows <= 4; ++blows) {
+      strike_both_ends(rig, plate, speed, e);
+      const double lost_j = 0.5 * plate.rigid.mass_kg * speed * speed * (1.0 - e * e);
+      EXPECT_LE(calc_modal_j(rig, plate, 0), 1.01 * blows * lost_j) << thickness << " m, after " << blows;
+    }
+    EXPECT_GT(rig.touches.get_counters().impacts, 0);
+  }
+}
+
 }  // namespace
 }  // namespace carillon::drive::tests

@@ -48,6 +48,26 @@ TEST(Touches, OneHitInAnyNumberOfStepsIsOnePulse) {
   }
 }
 
+TEST(Touches, HitsInsideAStepBeginAtTheTouchWithItsSpeed) {
+  // The ball falls 8 mm and bounces, all within one step, as in sums over the internal steps of an engine.
+  const bank::Bank ball = make_ball(kRadius);
+  const double dt = 1.0 / 60.0, height = 8e-3, speed = 0.6;
+  const double touch = std::sqrt(speed * speed + 2.0 * kGravity * height), wait = (touch - speed) / kGravity;
+  Rig rig({.points_after = true, .compliant = true});
+  rig.add(ball, "ball", {0, 0, kRadius + height}, {0, 0, -speed});
+  rig.start();
+  rig.poses[0].velocity_m_s[2] = 0.5 * touch - kGravity * (dt - wait);
+  rig.poses[0].position_m[2] = kRadius + (dt - wait) * (0.5 * touch - 0.5 * kGravity * (dt - wait));
+  TouchPoint point = on_ground(0, {}, 1.5 * touch * ball.rigid.mass_kg);
+  point.gap_m = rig.poses[0].position_m[2] - kRadius;
+  rig.step(dt, {point});
+  rig.step(dt, {});
+  const auto pulses = rig.list<events::Impulse>();
+  ASSERT_EQ(pulses.size(), 1U);
+  EXPECT_NEAR(pulses[0].time_s - 0.5 * pulses[0].duration_s, wait, 1e-6);
+  EXPECT_NEAR(pulses[0].impulse_n_s[2], 1.5 * touch * ball.rigid.mass_kg, 1e-9);
+}
+
 TEST(Touches, EarlyHitsAreReportedInTheirFirstStep) {
   const bank::Bank ball = make_ball(kRadius);
   Rig rig({.compliant = true, .early = true});
@@ -81,6 +101,18 @@ TEST(Touches, WeightAloneIsNoHit) {
     EXPECT_NEAR(sum, weight, 0.03 * weight) << rate;
     EXPECT_TRUE(rig.faults.empty()) << rig.faults.front();
   }
+}
+
+TEST(Touches, NewContactsCarryTheirWeightAtOnce) {
+  const bank::Bank box = make_box({0.1, 0.08, 0.04});
+  const double weight = box.rigid.mass_kg * kGravity, dt = 1.0 / 60.0;
+  Rig rig;
+  rig.add(box, "box", {0, 0, 0.02});
+  rig.start();
+  for (int n = 0; n < 3; ++n) rig.step(dt, on_four_corners(0, {}, {0.05, 0.04, 0.02}, weight * dt));
+  for (const auto& c : rig.list<events::LastingContact>())
+    EXPECT_NEAR(c.force_n, c.time_s > 2.5 * dt ? 0.25 * weight : 0.0, 0.01 * weight) << c.time_s;
+  EXPECT_EQ(rig.list<events::LastingContact>().size(), 8U);
 }
 
 TEST(Touches, LoadThatHopsIsTwoConstantContacts) {
@@ -338,6 +370,31 @@ TEST(Touches, SlidingAndRolling) {
     EXPECT_EQ(ids.size(), 5U) << rate;
     EXPECT_TRUE(rig.faults.empty());
   }
+}
+
+TEST(Touches, SlipToAndFroIsTremble) {
+  const bank::Bank box = make_box({0.1, 0.08, 0.04});
+  const double weight = box.rigid.mass_kg * kGravity;
+  for (const double rate : {60.0, 240.0, 1000.0})
+    for (const auto& [steady, tremble, wanted] : {std::array{0.0, 0.01, 0.0}, {0.02, 0.0, 0.02}, {5e-4, 0.0, 0.0}, {0.02, 0.002, 0.02}}) {
+      Rig rig;
+      rig.add(box, "box", {0, 0, 0.02});
+      rig.start();
+      double slip = 0.0, sweep = 0.0;
+      int records = 0;
+      for (int n = 0; n < 0.5 * rate; ++n) {
+        rig.poses[0].velocity_m_s[0] = steady + (n % 2 == 0 ? tremble : -tremble);
+        rig.step(1.0 / rate, on_four_corners(0, {}, {0.05, 0.04, 0.02}, weight / rate));
+      }
+      for (const auto& c : rig.list<events::LastingContact>()) {
+        if (c.time_s < 0.3) continue;
+        slip += norm(c.slip_m_s);
+        sweep += c.other_sweep_m_s;
+        ++records;
+      }
+      EXPECT_NEAR(slip / records, wanted, 5e-4) << rate << " Hz, " << steady << " and " << tremble << " m/s";
+      EXPECT_NEAR(sweep / records, wanted, 1e-3) << rate << " Hz, " << steady << " and " << tremble << " m/s";
+    }
 }
 
 TEST(Touches, ManyPointsAreLimited) {
