@@ -28,10 +28,15 @@ function advance() {
   engine.postMessage({ type: 'played', playback, words: events }, [events.buffer]);
 }
 
+/** Advances to the look-ahead beyond the engine. */
+async function catchUp() {
+  const now_s = (await ask({ type: 'settle' })) - at_s;
+  while (isOpen && reached_s < now_s + look_ahead_s) advance();
+}
+
 async function keepAhead() {
   try {
-    const now_s = (await ask({ type: 'settle' })) - at_s;
-    while (isOpen && reached_s < now_s + look_ahead_s) advance();
+    await catchUp();
     if (isOpen) setTimeout(keepAhead, kPause_ms);
   } catch (error) {
     postMessage({ failed: `the physics has failed: ${error.message}` });
@@ -68,6 +73,7 @@ const obey = {
   release: ({ body }) => void wasm.call('web_release_grab', body),
   add: ({ body, numbers }) => void wasm.call('web_enter_body', body, toRow(numbers)),
   remove: ({ body }) => void wasm.call('web_take_out_body', body),
+  settle: catchUp,
   close() {
     isOpen = false;
     engine.postMessage({ name: 'web_end_playback', numbers: [playback] });

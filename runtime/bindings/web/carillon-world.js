@@ -142,6 +142,10 @@ export class World {
     while (path.length > 1 && path[1][0] <= now_s) path.shift();
     return path.length === 0 ? undefined : { position_m: path[0].slice(1, 4), rotation: path[0].slice(4, 8) };
   }
+  /** Resolves when it is look_ahead_s ahead of the engine; an OfflineAudioContext waits for it, suspended at least that often. */
+  settled() {
+    return this.ask({ type: 'settle' });
+  }
   close() {
     void this.ask({ type: 'close' }).then(() => this.thread.terminate());
   }
