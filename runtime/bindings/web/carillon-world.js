@@ -17,10 +17,11 @@ export class World {
    * bodies: [{body, bank: bytes of its bank, fixed, absent, velocity_m_s, angular_velocity_rad_s, restitution (0.5), friction (0.4),
    * roughness_m}]; each body of the audio starts where it was added. ground: keys of kGround, or null: none. modes: impacts include modes.
    * masking: inaudible hits are omitted.
+   * moved: called when there are new poses.
    */
-  static async open(audio, { bodies, ground = {}, gravity_m_s2 = [0, 0, -9.81], look_ahead_s = 0.1, modes = true, masking = true }) {
+  static async open(audio, { bodies, ground = {}, gravity_m_s2 = [0, 0, -9.81], look_ahead_s = 0.1, modes = true, masking = true, moved = () => {} }) {
     const world = new World();
-    Object.assign(world, { audio, numbers: new Map(), paths: bodies.map(() => []), ids: 0, waiting: new Map() });
+    Object.assign(world, { audio, numbers: new Map(), paths: bodies.map(() => []), ids: 0, waiting: new Map(), moved });
     const url = new URL('./carillon-physics.wasm', import.meta.url), answer = await fetch(url);
     if (!answer.ok) throw new Error(`${url.pathname} cannot be read (${answer.status}); make the page's folder again`);
     const module = await WebAssembly.compile(await answer.arrayBuffer());
@@ -56,6 +57,7 @@ export class World {
       const path = this.paths[body];
       if (path.push(pose) > kKept) path.splice(0, kKept / 2);
     }
+    if (poses !== undefined) this.moved();
     if (failed !== undefined) this.audio.report(failed);
     const { resolve, reject } = this.waiting.get(id) ?? {};
     this.waiting.delete(id);
@@ -94,9 +96,10 @@ export class World {
   /**
    * Mouse, pen, fingers and keys of an element move bodies; returns a function that ends it. pick(event): {body, at_m} under the pointer, or
    * undefined. place(event, at_m): the point of the world where the pointer has moved to, for one held at at_m. Each pointer holds one body
-   * and throws it when it leaves. The arrow and page keys push the last one held, to a speed of speed_m_s, in the directions of `keys`.
+   * and throws it when it leaves. Keys push the body chosen(), the last one held, to a speed of speed_m_s; keys(event): the direction, or
+   * undefined (arrow and page keys, along the axes of the world).
    */
-  follow(element, { pick, place, speed_m_s = 1, keys = kKeys }) {
+  follow(element, { pick, place, speed_m_s = 1, keys = ({ key }) => kKeys[key], chosen = () => last }) {
     const held = new Map(), ends = new AbortController();
     let last;
     const quietly = (work) => void work.catch(({ message }) => this.audio.report(message));
@@ -124,10 +127,10 @@ export class World {
         if (held.delete(event.pointerId)) quietly(this.release(of.body));
       });
     on('keydown', (event) => {
-      const direction = keys[event.key];
-      if (direction === undefined || last === undefined) return;
+      const direction = keys(event), body = chosen();
+      if (direction === undefined || body === undefined) return;
       event.preventDefault();
-      quietly(this.push(last, direction.map((x) => x * speed_m_s * last.mass_kg)));
+      quietly(this.push(body, direction.map((x) => x * speed_m_s * body.mass_kg)));
     });
     return () => ends.abort();
   }
