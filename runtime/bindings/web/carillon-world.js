@@ -15,9 +15,8 @@ const kKeys = { ArrowLeft: [-1, 0, 0], ArrowRight: [1, 0, 0], ArrowUp: [0, 1, 0]
 export class World {
   /**
    * bodies: [{body, bank: bytes of its bank, fixed, absent, velocity_m_s, angular_velocity_rad_s, restitution (0.5), friction (0.4),
-   * roughness_m}]; each body of the audio starts where it was added. ground: keys of kGround, or null: none. modes: impacts include modes.
-   * masking: inaudible hits are omitted.
-   * moved: called when there are new poses.
+   * roughness_m}]; each body of the audio starts where it was added. ground: keys of kGround, or null: none. modes: impacts include modes, as
+   * long as the physics is ahead of the sound. masking: inaudible hits are omitted. moved: called when there are new poses.
    */
   static async open(audio, { bodies, ground = {}, gravity_m_s2 = [0, 0, -9.81], look_ahead_s = 0.1, modes = true, masking = true, moved = () => {} }) {
     const world = new World();
@@ -41,7 +40,7 @@ export class World {
     });
     const between = new MessageChannel(), playback = ++audio.playbacks;
     audio.engine.tell({ type: 'port', port: between.port1 }, [between.port1]);
-    const message = { type: 'open', module, port: between.port2, banks, bodies: described, world: row, playback, look_ahead_s };
+    const message = { type: 'open', module, port: between.port2, banks, bodies: described, world: row, playback, look_ahead_s, isLive: !(audio.context instanceof OfflineAudioContext) };
     world.at_s = await Promise.race([world.ask(message, [between.port2]), failed]);
     return world;
   }
