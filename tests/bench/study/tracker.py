@@ -69,12 +69,11 @@ def measure(lab, names):
 def describe(name, found):
     pick = lambda hz, knob="default": found[name, hz, knob]
     say = lambda hz, knob="default": (
-        f"{pick(hz, knob)[0]['windows_db']:.1f} dB (first hit {pick(hz, knob)[0]['first_db']:+.1f} dB) for"
-        f" {measuring.find_median(pick(hz, knob)[1]):.2g} CPU s per s"
+        f"{pick(hz, knob)[0]['windows_db']:.1f} dB for {measuring.find_median(pick(hz, knob)[1]):.2g} CPU s per s"
     )
-    rates = "; ".join(f"{say(hz)} at {hz}" for hz in RATES)
-    knobs = "; ".join(f"{knob}: {say(USUAL_HZ, knob)}" for knob in KNOBS if knob != "default")
-    return f"**{SCENES[name].capitalize()}** by steps a second: {rates}. At {USUAL_HZ} steps, {knobs}."
+    rates = ", ".join(f"{say(hz)} at {hz}" for hz in RATES)
+    knobs = ", ".join(f"{say(USUAL_HZ, knob)} ({knob})" for knob in KNOBS if knob != "default")
+    return f"**{SCENES[name].capitalize()}** by steps a second: {rates}. At {USUAL_HZ} steps: {knobs}."
 
 
 def study(lab, bodies):
@@ -82,8 +81,8 @@ def study(lab, bodies):
     names = QUICK_SCENES if lab.quick else tuple(SCENES)
     found = measure(lab, names)
     section.say(
-        "Bodies fall in Bullet (`tests/system/engines/scenes.py`). The tracker makes contacts of its steps, and `carillon-render` plays them:"
-        " against the same scene in our own physics. Error: median difference of the levels of windows of 125 ms above"
+        "Bodies fall in Bullet (`tests/system/engines/scenes.py`). The tracker makes contacts of its steps, and `carillon-render` plays"
+        " them, against the same scene in our own physics. Error: median difference of the levels of windows of 125 ms above"
         f" {LOUD_DB:g} dB(A), and of the peak of the first hit. A heap parts from ours for its motion alone. CPU is of the tracker."
     )
     for name in names:
