@@ -16,7 +16,7 @@ export function listMovable({ bodies }) {
 export class Thrower {
   /** page: {scene, audio, player, view, hands, panel, transport}. Joints and cords stay with carillon-render: no button. */
   constructor(page) {
-    Object.assign(this, page, { movable: listMovable(page.scene), isPhone: matchMedia('(pointer: coarse)').matches });
+    Object.assign(this, page, { movable: listMovable(page.scene), away: new Set(), isPhone: matchMedia('(pointer: coarse)').matches });
     find('throwing').hidden = Boolean(this.scene.joints?.length || this.scene.cords?.length);
     find('throw').addEventListener('click', () => void (this.isOn ? this.stop() : this.start()));
     find('back').addEventListener('click', () => this.putBack());
@@ -120,21 +120,23 @@ export class Thrower {
         const pose = this.movable[i] ? world.pose(sound) : undefined;
         if (pose === undefined) return;
         shown.setCentrePose(pose.position_m, pose.rotation);
-        if (norm(subtract(pose.position_m, this.view.middle)) > kReach * this.view.size) void this.fetch(i);
+        if (norm(subtract(pose.position_m, this.view.middle)) > kReach * this.view.size) void this.bringBack(i);
       });
       return this.isFollowing;
     });
   }
-  /** Lets a body that is far away fall in the middle. */
-  async fetch(i) {
-    this.fetched ??= new Set();
-    if (this.fetched.has(i)) return;
-    this.fetched.add(i);
-    const { shown, sound } = this.player.bodies[i], { middle, floor_m, size } = this.view, { rotation } = shown.rest;
-    const above = [middle[0], middle[1], floor_m + 0.6 * size], origin = add(above, subtract(shown.rest.position_m, shown.findRestCentre()));
-    await this.world.remove(sound);
-    await this.world.add(sound, { position_m: origin, rotation });
-    setTimeout(() => this.fetched.delete(i), 1000);
+  /** Lets a body that is far away fall in the middle, from where there is room. */
+  async bringBack(i) {
+    if (this.away.has(i)) return;
+    this.away.add(i);
+    const { shown, sound } = this.player.bodies[i], { middle, floor_m, size } = this.view, { rotation } = shown.rest, { world } = this;
+    const offset = subtract(shown.rest.position_m, shown.findRestCentre());
+    await world.remove(sound);
+    for (let height = 0.6; height < 5; height += 0.2) {
+      const position_m = add([middle[0], middle[1], floor_m + height * size], offset);
+      if (await world.add(sound, { position_m, rotation }).then(() => true, () => false)) break;
+    }
+    setTimeout(() => this.away.delete(i), 1000); // until the new poses are heard
   }
 
   // ---- hands
