@@ -98,7 +98,7 @@ export class World {
    * and throws it when it leaves. Keys push the body chosen(), the last one held, to a speed of speed_m_s; keys(event): the direction, or
    * undefined (arrow and page keys, along the axes of the world).
    */
-  follow(element, { pick, place, speed_m_s = 1, keys = ({ key }) => kKeys[key], chosen = () => last }) {
+  follow(element, { pick, place, speed_m_s = 1, keys = ({ key }) => kKeys[key], chosen }) {
     const held = new Map(), ends = new AbortController();
     let last;
     const quietly = (work) => void work.catch(({ message }) => this.audio.report(message));
@@ -126,7 +126,7 @@ export class World {
         if (held.delete(event.pointerId)) quietly(this.release(of.body));
       });
     on('keydown', (event) => {
-      const direction = keys(event), body = chosen();
+      const direction = keys(event), body = chosen ? chosen() : last;
       if (direction === undefined || body === undefined) return;
       event.preventDefault();
       quietly(this.push(body, direction.map((x) => x * speed_m_s * body.mass_kg)));
