@@ -348,7 +348,9 @@ class PageTest(unittest.TestCase):
         self.press(page, "Enter")
         self.assertEqual(self.wait_for_log(page, 1)[0]["name"], "bar 9")
         # One that is thrown out of sight comes back.
-        page.evaluate("(({sound}) => carillon.thrower.world.push(sound, [20 * sound.mass_kg, 0, 3 * sound.mass_kg]))(carillon.player.bodies[9])")
+        page.evaluate(
+            "(({sound}) => carillon.thrower.world.push(sound, [20 * sound.mass_kg, 0, 3 * sound.mass_kg]))(carillon.player.bodies[9])"
+        )
         page.wait_for("carillon.thrower.away.size === 1", timeout_s=60)
         page.wait_for("carillon.thrower.away.size === 0", timeout_s=60)
         find_x = "carillon.player.bodies[9].shown.toWorld(carillon.player.bodies[9].bank.centre_m)[0]"
