@@ -70,6 +70,7 @@ class World::Course {
   void grab(int body, const Vec3& at_m, const GrabSpec& spec);
   void drag(int body, const Vec3& target_m, double over_s);
   void release(int body);
+  void allow_modal_impacts(bool may_begin) { space_.allow_modal_impacts(may_begin); }
   void add(int body, const Entry& entry);
   int add(const BodySpec& body);
   void remove(int body);
@@ -481,6 +482,7 @@ void World::push(int body, const Vec3& at_m, const Vec3& impulse_n_s) { course_-
 void World::grab(int body, const Vec3& at_m, const GrabSpec& spec) { course_->grab(body, at_m, spec); }
 void World::drag(int body, const Vec3& target_m, double over_s) { course_->drag(body, target_m, over_s); }
 void World::release(int body) { course_->release(body); }
+void World::allow_modal_impacts(bool may_begin) { course_->allow_modal_impacts(may_begin); }
 void World::add(int body, const Entry& entry) { course_->add(body, entry); }
 int World::add(const BodySpec& body) { return course_->add(body); }
 void World::remove(int body) { course_->remove(body); }

@@ -119,6 +119,8 @@ class World {
   void drag(int body, const Vec3& target_m, double over_s = 0.02);
   /// Ends a grab; the body keeps its velocity. Nothing happens if there is none.
   void release(int body);
+  /// False: from now on no impact includes modes; they only limit its restitution. For a machine that is behind the sound.
+  void allow_modal_impacts(bool may_begin);
   /// Puts an absent body into the world.
   void add(int body, const Entry& entry);
   /// Puts a new body, without joints and cords, into the world, as one of the spec: the same checks and messages. Its bank must outlive the

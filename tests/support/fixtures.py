@@ -63,6 +63,15 @@ RECIPES = {
         "material": "glass",
         "max_modes": 60,
     },
+    "hollow_box.hdf": {
+        "body": {"shape": "hollow-box", "length_m": 0.12, "width_m": 0.08, "height_m": 0.05, "wall_m": 0.003, "nodes": 4000},
+        "material": {
+            "young_modulus_pa": 12.6e9,
+            "poisson_ratio": 0.35,
+            "density_kg_m3": 700,
+            "damping": {"internal_friction": {"tan_phi": 0.01}},
+        },
+    },
     "wood_box.hdf": {
         "body": {"shape": "plate", "length_m": 0.06, "width_m": 0.05, "thickness_m": 0.04, "nodes": 500},
         "material": {

@@ -252,6 +252,10 @@ fs::path find_engine() {
   return base::find_data_folder("web", "install Carillon with its page, or build it where emscripten is installed");
 }
 
+fs::path find_world() {
+  return base::find_data_folder("world", "install Carillon with its page, or build it where emscripten is installed");
+}
+
 /// Default title; for "scene.json" the name of its folder.
 std::string find_title(const PageOrder& order) {
   if (!order.title.empty()) return order.title;
@@ -329,6 +333,7 @@ class Work {
       : order_(order),
         page_(find_page()),
         engine_(find_engine()),
+        world_(find_world()),
         place_(find_place(order)),
         folder_(place_),
         banks_(folder_.path() / kBankFolder, order.keeps_banks),
@@ -442,10 +447,11 @@ class Work {
     base::write_file(path(kAboutFile), to_text(about));
     put_folder(page_, folder_.path());
     put_folder(engine_, folder_.path() / "audio");
+    put_folder(world_, folder_.path() / "audio");
   }
 
   const PageOrder& order_;
-  fs::path page_, engine_, place_;
+  fs::path page_, engine_, world_, place_;
   base::WholeFolder folder_;
   PageBanks banks_;
   process::Programs programs_;
@@ -466,6 +472,7 @@ bool is_installed() {
   try {
     (void)find_page();
     (void)find_engine();
+    (void)find_world();
   } catch (const SystemError&) {
     return false;
   }

@@ -4,7 +4,7 @@ import { Refusal, Wasm } from './carillon-wasm.js';
 const kStep_s = 0.004, kPause_ms = 4;
 
 let wasm, engine; // engine: the port to the audio thread
-let playback, look_ahead_s, at_s, reached_s = 0, isOpen = false; // at_s: the world's start in engine time
+let playback, look_ahead_s, isLive, at_s, reached_s = 0, isOpen = false; // at_s: the world's start in engine time
 const waiting = new Map(); // messages to the engine by id
 let messages = 0;
 
@@ -28,10 +28,19 @@ function advance() {
   engine.postMessage({ type: 'played', playback, words: events }, [events.buffer]);
 }
 
+/** Advances to the look-ahead beyond the engine. In real time impacts are without modes while less than a third of it is left. */
+async function catchUp() {
+  const now_s = (await ask({ type: 'settle' })) - at_s, began_ms = performance.now();
+  while (isOpen && reached_s < now_s + look_ahead_s) {
+    const left_s = reached_s - now_s - (performance.now() - began_ms) / 1000;
+    if (isLive) wasm.call('web_allow_modal_impacts', +(left_s > look_ahead_s / 3));
+    advance();
+  }
+}
+
 async function keepAhead() {
   try {
-    const now_s = (await ask({ type: 'settle' })) - at_s;
-    while (isOpen && reached_s < now_s + look_ahead_s) advance();
+    await catchUp();
     if (isOpen) setTimeout(keepAhead, kPause_ms);
   } catch (error) {
     postMessage({ failed: `the physics has failed: ${error.message}` });
@@ -50,7 +59,7 @@ const obey = {
       if (data.type === 'error') reject?.(new Refusal(data.message));
       else resolve?.(data.result);
     };
-    ({ playback, look_ahead_s } = rest);
+    ({ playback, look_ahead_s, isLive } = rest);
     wasm = new Wasm(module);
     wasm.call('web_open_world');
     for (const [n, { bytes, name }] of banks.entries()) wasm.call('web_add_bank', n, new Uint8Array(bytes), name);
@@ -68,6 +77,7 @@ const obey = {
   release: ({ body }) => void wasm.call('web_release_grab', body),
   add: ({ body, numbers }) => void wasm.call('web_enter_body', body, toRow(numbers)),
   remove: ({ body }) => void wasm.call('web_take_out_body', body),
+  settle: catchUp,
   close() {
     isOpen = false;
     engine.postMessage({ name: 'web_end_playback', numbers: [playback] });

@@ -15,12 +15,12 @@ const kKeys = { ArrowLeft: [-1, 0, 0], ArrowRight: [1, 0, 0], ArrowUp: [0, 1, 0]
 export class World {
   /**
    * bodies: [{body, bank: bytes of its bank, fixed, absent, velocity_m_s, angular_velocity_rad_s, restitution (0.5), friction (0.4),
-   * roughness_m}]; each body of the audio starts where it was added. ground: keys of kGround, or null: none. modes: impacts include modes.
-   * masking: inaudible hits are omitted.
+   * roughness_m}]; each body of the audio starts where it was added. ground: keys of kGround, or null: none. modes: impacts include modes, as
+   * long as the physics is ahead of the sound. masking: inaudible hits are omitted. moved: called when there are new poses.
    */
-  static async open(audio, { bodies, ground = {}, gravity_m_s2 = [0, 0, -9.81], look_ahead_s = 0.1, modes = true, masking = true }) {
+  static async open(audio, { bodies, ground = {}, gravity_m_s2 = [0, 0, -9.81], look_ahead_s = 0.1, modes = true, masking = true, moved = () => {} }) {
     const world = new World();
-    Object.assign(world, { audio, numbers: new Map(), paths: bodies.map(() => []), ids: 0, waiting: new Map() });
+    Object.assign(world, { audio, numbers: new Map(), paths: bodies.map(() => []), ids: 0, waiting: new Map(), moved });
     const url = new URL('./carillon-physics.wasm', import.meta.url), answer = await fetch(url);
     if (!answer.ok) throw new Error(`${url.pathname} cannot be read (${answer.status}); make the page's folder again`);
     const module = await WebAssembly.compile(await answer.arrayBuffer());
@@ -40,7 +40,7 @@ export class World {
     });
     const between = new MessageChannel(), playback = ++audio.playbacks;
     audio.engine.tell({ type: 'port', port: between.port1 }, [between.port1]);
-    const message = { type: 'open', module, port: between.port2, banks, bodies: described, world: row, playback, look_ahead_s };
+    const message = { type: 'open', module, port: between.port2, banks, bodies: described, world: row, playback, look_ahead_s, isLive: !(audio.context instanceof OfflineAudioContext) };
     world.at_s = await Promise.race([world.ask(message, [between.port2]), failed]);
     return world;
   }
@@ -56,6 +56,7 @@ export class World {
       const path = this.paths[body];
       if (path.push(pose) > kKept) path.splice(0, kKept / 2);
     }
+    if (poses !== undefined) this.moved();
     if (failed !== undefined) this.audio.report(failed);
     const { resolve, reject } = this.waiting.get(id) ?? {};
     this.waiting.delete(id);
@@ -94,9 +95,10 @@ export class World {
   /**
    * Mouse, pen, fingers and keys of an element move bodies; returns a function that ends it. pick(event): {body, at_m} under the pointer, or
    * undefined. place(event, at_m): the point of the world where the pointer has moved to, for one held at at_m. Each pointer holds one body
-   * and throws it when it leaves. The arrow and page keys push the last one held, to a speed of speed_m_s, in the directions of `keys`.
+   * and throws it when it leaves. Keys push the body chosen(), the last one held, to a speed of speed_m_s; keys(event): the direction, or
+   * undefined (arrow and page keys, along the axes of the world).
    */
-  follow(element, { pick, place, speed_m_s = 1, keys = kKeys }) {
+  follow(element, { pick, place, speed_m_s = 1, keys = ({ key }) => kKeys[key], chosen }) {
     const held = new Map(), ends = new AbortController();
     let last;
     const quietly = (work) => void work.catch(({ message }) => this.audio.report(message));
@@ -124,10 +126,10 @@ export class World {
         if (held.delete(event.pointerId)) quietly(this.release(of.body));
       });
     on('keydown', (event) => {
-      const direction = keys[event.key];
-      if (direction === undefined || last === undefined) return;
+      const direction = keys(event), body = chosen ? chosen() : last;
+      if (direction === undefined || body === undefined) return;
       event.preventDefault();
-      quietly(this.push(last, direction.map((x) => x * speed_m_s * last.mass_kg)));
+      quietly(this.push(body, direction.map((x) => x * speed_m_s * body.mass_kg)));
     });
     return () => ends.abort();
   }
@@ -141,6 +143,10 @@ export class World {
     const path = this.paths[this.numbers.get(body)], now_s = this.time_s;
     while (path.length > 1 && path[1][0] <= now_s) path.shift();
     return path.length === 0 ? undefined : { position_m: path[0].slice(1, 4), rotation: path[0].slice(4, 8) };
+  }
+  /** Resolves when it is look_ahead_s ahead of the engine; an OfflineAudioContext waits for it, suspended at least that often. */
+  settled() {
+    return this.ask({ type: 'settle' });
   }
   close() {
     void this.ask({ type: 'close' }).then(() => this.thread.terminate());

@@ -71,6 +71,10 @@ WEB_EXPORT(int, web_drag_body)(int body, const double* target, int count, double
 WEB_EXPORT(int, web_release_grab)(int body) {
   return run([&] { return get_world().get_world().release(body), 0; });
 }
+/// may_begin: 0 or 1.
+WEB_EXPORT(int, web_allow_modal_impacts)(int may_begin) {
+  return run([&] { return get_world().get_world().allow_modal_impacts(may_begin != 0), 0; });
+}
 /// Position of the mesh frame (3), rotation (4), velocity (3), angular velocity (3).
 WEB_EXPORT(int, web_enter_body)(int body, const double* row, int count) {
   return run([&] {

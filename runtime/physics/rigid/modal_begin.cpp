@@ -77,7 +77,7 @@ bool ModalImpacts::predict(const Step& step, Collision& collision) {
     }
     const impact::Prediction p =
         impact::predict(make_spring(bodies_, hit), 1.0 / inverse_mass, hit.approach_m_s, hit.restitution, sides[0], sides[1]);
-    integrate = integrate || (!p.is_enough && is_free);
+    integrate = integrate || (!p.is_enough && is_free && may_begin_);
     if (p.restitution < hit.restitution) {
       hit.restitution = p.restitution;
       point.wanted = (hit.restitution * hit.approach_m_s) * hit.touch.normal;
@@ -314,6 +314,7 @@ bool ModalImpacts::may_begin_early(const Step& step, const Pair& pair, const Ins
 }
 
 void ModalImpacts::begin_early(const Step& step, double length_s, const Instants& instants) {
+  if (!may_begin_) return;
   for (Pair* pair : step.island().pairs) {
     if (!may_begin_early(step, *pair, instants)) continue;
     std::vector<Contact*> early;

@@ -49,6 +49,8 @@ class ModalImpacts {
   /// True if the two bodies of a pair are in an impact at that point. Touch ids change while bodies roll.
   bool is_pressed(const Pair& pair, const Vec3& where) const;
 
+  /// False: none begins; impacts are rigid, with the restitution that the modes leave.
+  void allow(bool may_begin) { may_begin_ = may_begin; }
   /// Limits the restitution of every hit by the energy transferred to modes; true if the impact must be integrated.
   bool predict(const Step& step, Collision& collision);
   /// Begins an impact, or adds the hits to a current one. False if there are too many points: use the rigid impact.
@@ -126,6 +128,7 @@ class ModalImpacts {
   ModalStates& states_;
   Ledger& ledger_;
   std::list<ModalImpact> impacts_;
+  bool may_begin_ = true;
   std::vector<Forces> forces_;
 };
 

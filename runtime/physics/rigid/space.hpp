@@ -51,6 +51,7 @@ class Space {
   /// Holds a moving body by a spring, instead of an earlier one.
   void grab(const Grab& grab);
   void release(int body) { bodies_.drop_grab(body); }
+  void allow_modal_impacts(bool may_begin) { modal_impacts_.allow(may_begin); }
   const Grab* find_grab(int body) const { return bodies_.find_grab(body); }
   /// Takes a body without joints and cords out of the world; wakes those that touch it.
   void remove(int body);

@@ -24,6 +24,7 @@ GROUPS = {
     "air": "radiation by boundary elements",
     "motion": "large motion: full order, coupled modes",
     "time": "long times, contacts, joints, sound",
+    "touches": "contacts from the steps of other engines",
     "formats": "formats of other programs",
     "cross": "answers of other solvers and engines",
 }

@@ -109,6 +109,7 @@ class Explore(unittest.TestCase):
             "LICENSE.txt",
             "NOTICES.txt",
             "audio/carillon-audio.js",
+            "audio/carillon-physics.wasm",
         ):
             self.assertTrue((self.root / "two" / name).is_file(), name)
         # It is a scene: carillon-render plays it. And made again in the same place it is the same.

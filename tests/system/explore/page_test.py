@@ -37,6 +37,13 @@ ROOM = {
     "listener": {"position_m": [0, -0.8, 0.5], "look_at_m": [0, 0, 0.2]},
 }
 FALL = {"duration_s": 0.8, "ground": {}, "bodies": [BODY]}
+# Ten that rest on the floor, those behind first.
+TABLE = {
+    "duration_s": 0.1,
+    "ground": {},
+    "bodies": [{"name": f"bar {k}", "bank": "bar.hdf", "position_m": [0.4 * (k % 2), 0.6 - 0.15 * (k // 2), 0.004]} for k in range(10)],
+    "listener": {"position_m": [0.2, -1.0, 0.8], "look_at_m": [0.2, 0.3, 0]},
+}
 KEYS = {"ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39, "ArrowDown": 40, "Home": 36}
 
 
@@ -59,7 +66,7 @@ class PageTest(unittest.TestCase):
         cls.scratch = tempfile.TemporaryDirectory(prefix="carillon-page-")
         cls.root = pathlib.Path(cls.scratch.name)
         fixtures.copy("brass_beam.hdf", cls.root, "bar.hdf")
-        for name, scene in (("room", ROOM), ("fall", FALL)):
+        for name, scene in (("room", ROOM), ("fall", FALL), ("table", TABLE)):
             (cls.root / f"{name}.json").write_text(json.dumps(scene))
             run(BIN / "carillon", "explore", f"{name}.json", "-o", name, cwd=cls.root)
         cls.server = serve(cls.root)
@@ -309,6 +316,61 @@ class PageTest(unittest.TestCase):
         self.assertLess(off, 0.5)
         page.wait_for("!carillon.transport.isPlaying", timeout_s=60)
         self.assertGreater(page.evaluate("window.peak"), 0)
+        self.assertEqual(page.errors, [])
+
+    def test_ten_bodies_are_thrown(self):
+        page = self.open("table")
+        find_height = "carillon.player.bodies[%d].shown.toWorld(carillon.player.bodies[%d].bank.centre_m)[2]"
+        page.evaluate(
+            "window.peak = 0; carillon.audio.addEventListener('state', ({detail}) => (window.peak = Math.max(window.peak, detail.peak_pa)))"
+        )
+        page.evaluate("document.getElementById('throw').click()")
+        page.wait_for("carillon.thrower.isOn", timeout_s=60)
+        self.assertTrue(page.evaluate("document.getElementById('edit').hidden"))
+        # The mouse takes each up and lets go.
+        for body in range(10):
+            point = f"(b => carillon.view.project(b.shown.toWorld(b.bank.centre_m)))(carillon.player.bodies[{body}])"
+            page.wait_for(f"(({{x, y}}) => carillon.view.pick(x, y)?.body === carillon.view.bodies[{body}])({point})")
+            spot = page.evaluate(point)
+            page.mouse("mouseMoved", spot["x"], spot["y"])
+            page.mouse("mousePressed", spot["x"], spot["y"], "left", clickCount=1, buttons=1)
+            for step in range(1, 9):
+                page.mouse("mouseMoved", spot["x"], spot["y"] - 15 * step, "left", buttons=1)
+                time.sleep(0.02)
+            page.wait_for(f"{find_height % (body, body)} > 0.05", timeout_s=60)
+            page.mouse("mouseReleased", spot["x"], spot["y"] - 120, "left", clickCount=1)
+        page.wait_for(f"{find_height % (9, 9)} < 0.05", timeout_s=60)
+        self.assertGreater(page.evaluate("window.peak"), 0)
+        # A key throws up the one that was held; Enter strikes it where it lies.
+        page.wait_for("carillon.thrower.isFollowing === false", timeout_s=60)
+        page.press("PageUp", key_code=33)
+        page.wait_for(f"{find_height % (9, 9)} > 0.05", timeout_s=60)
+        self.press(page, "Enter")
+        self.assertEqual(self.wait_for_log(page, 1)[0]["name"], "bar 9")
+        # One that is thrown out of sight comes back.
+        page.evaluate(
+            "(({sound}) => carillon.thrower.world.push(sound, [20 * sound.mass_kg, 0, 3 * sound.mass_kg]))(carillon.player.bodies[9])"
+        )
+        page.wait_for("carillon.thrower.away.size === 1", timeout_s=60)
+        page.wait_for("carillon.thrower.away.size === 0", timeout_s=60)
+        find_x = "carillon.player.bodies[9].shown.toWorld(carillon.player.bodies[9].bank.centre_m)[0]"
+        self.assertLess(abs(page.evaluate(find_x) - page.evaluate("carillon.view.middle[0]")), page.evaluate("carillon.view.size"))
+        counters = page.evaluate("carillon.audio.counters()")
+        self.assertEqual([counters[name] for name in ("faults", "resets", "zeroed")], [0, 0, 0])
+        # Back to their places, and to striking.
+        page.evaluate("document.getElementById('back').click()")
+        for body in (0, 9):
+            self.assertAlmostEqual(page.evaluate(find_height % (body, body)), 0.004, places=6)
+        self.assertFalse(page.evaluate("carillon.thrower.isOn || document.getElementById('edit').hidden"))
+        self.assertEqual(page.find_strangers(self.server.url), [])
+        self.assertEqual((page.errors, page.console), ([], []))
+
+    def test_bodies_of_a_page_of_banks_come_off_their_stands(self):
+        page = self.open("room")
+        page.evaluate("document.getElementById('throw').click()")
+        page.wait_for("carillon.thrower.isOn", timeout_s=60)
+        page.wait_for("(b => b.shown.toWorld(b.bank.centre_m)[2] < 0.16)(carillon.player.bodies[0])", timeout_s=60)
+        self.assertFalse(page.evaluate("carillon.view.stands.visible"))
         self.assertEqual(page.errors, [])
 
     def test_its_own_server_gives_the_browser_all_that_it_asks_for(self):

@@ -452,6 +452,49 @@ def test_world():
         page.evaluate("world.close()")
 
 
+def test_throw():
+    """Ten boxes thrown in the page sound as the same throw by carillon-render."""
+    bodies = [
+        {
+            "name": f"box {k}",
+            "bank": "a.hdf",
+            "position_m": [0.3 * (k % 5) - 0.6, 0.4 * (k // 5), 0.15 + 0.02 * k],
+            "quaternion": [0.8, 0.6, 0.0, 0.0],
+            "velocity_m_s": [0.2 * (k % 3) - 0.2, 0.1 * k - 0.5, 0.5],
+            "angular_velocity_rad_s": [3.0 - k, 2.0, k - 4.0],
+        }
+        for k in range(10)
+    ]
+    seconds = 1.5
+    act = """
+      const bytes = await (await fetch('a.hdf')).arrayBuffer(), bank = await audio.addBank(bytes.slice(), 'a.hdf'), bodies = [];
+      for (const {name, position_m, quaternion, velocity_m_s, angular_velocity_rad_s} of %s) {
+        const body = await audio.addBody({bank, name, position_m, rotation: quaternion, effects: %s});
+        bodies.push({body, bank: bytes, velocity_m_s, angular_velocity_rad_s});
+      }
+      const world = await World.open(audio, {bodies});
+      for (let time_s = 0.05; time_s < %g; time_s += 0.05) at(time_s, () => world.settled());
+      await world.settled();
+      return world.at_s;
+    """
+    with Bench() as bench:
+        bench.make_bank("a.hdf", 3, 30)
+        effects = [*EFFECTS, *CONTACTS]
+        act %= json.dumps(bodies), json.dumps(effects), seconds + 0.2
+        got = bench.render_page({"seconds": seconds + 0.2, "listener": LISTENER}, act)
+        assert got["errors"] == [] and got["counters"]["late"] == 0, got
+        begin = round(got["extra"] * 48000)
+        page = got["sound"][begin : begin + round(seconds * 48000)].astype(float)
+        native = bench.render_file({"duration_s": seconds, "bodies": bodies, "ground": {}, "listener": LISTENER, "effects": effects})
+        first = int(np.argmax(abs(native[:, 0]) > 0.1 * abs(native[:4800, 0]).max()))
+        check("the first hit", page[first - 48 : first + 960], native[first - 48 : first + 960])
+        levels = [10.0 * np.log10(np.mean(x.reshape(-1, 6000, 2) ** 2.0, axis=(1, 2)) + 1e-30) for x in (page, native)]
+        loud = levels[1] > levels[1].max() - 60.0
+        worst = abs(levels[0] - levels[1])[loud].max()
+        print(f"windows of 125 ms: {worst:.2f} dB, limit 3 dB")
+        assert loud.sum() >= 6 and worst < 3.0, levels
+
+
 def test_live():
     """Real time: interactive contacts, a suspended page, a trap in the audio thread."""
     with Bench() as bench:

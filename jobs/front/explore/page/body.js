@@ -1,9 +1,10 @@
 // A drawn body: a lit surface that can be animated in one mode.
 import * as THREE from './three/three.module.min.js';
-import { add, findBox, findNormal, findPoint, makeCorners, rotate, rotateBack, scale, subtract } from './geometry.js';
+import { add, findBox, findNormal, findPoint, makeCorners, rotate, rotateBack, scale, simplify, subtract } from './geometry.js';
 
 const kBend = 0.045; // largest displacement of the animation / size of the body
 const kBendHz = 1.1; // rate of the animation
+const kSketchCells = 18; // per size of the body
 
 // How materials look, by group and by name.
 const kGroups = {
@@ -28,6 +29,13 @@ export function makeLook(material, group) {
   return look;
 }
 
+function makeGeometry({ positions, normals, index }) {
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute('position', new THREE.BufferAttribute(positions, 3));
+  geometry.setAttribute('normal', new THREE.BufferAttribute(normals, 3));
+  return geometry.setIndex(new THREE.BufferAttribute(index, 1));
+}
+
 const kBendVertex = `
 attribute vec3 bend;
 uniform float uBend;
@@ -40,12 +48,11 @@ export class ShownBody {
     Object.assign(this, { name, surface, centre_m, fixed });
     this.box = findBox(surface);
     this.corners = makeCorners(surface);
-    const geometry = new THREE.BufferGeometry();
-    geometry.setAttribute('position', new THREE.BufferAttribute(this.corners.positions, 3));
-    geometry.setAttribute('normal', new THREE.BufferAttribute(this.corners.normals, 3));
+    this.geometry = makeGeometry(this.corners);
     this.uniforms = { uBend: { value: 0 }, uTint: { value: 0 } };
     this.material = this.makeMaterial(look);
-    this.mesh = new THREE.Mesh(geometry, this.material);
+    this.look = look;
+    this.mesh = new THREE.Mesh(this.geometry, this.material);
     this.mesh.castShadow = this.mesh.receiveShadow = true;
     this.mesh.matrixAutoUpdate = false;
     this.size = 1;
@@ -57,7 +64,7 @@ export class ShownBody {
     const { opacity = 1, ...rest } = look;
     const material = new THREE.MeshPhysicalMaterial({ ...rest, side: THREE.DoubleSide, envMapIntensity: 0.9 });
     if (opacity < 1) Object.assign(material, { transparent: true, opacity, depthWrite: true });
-    const hasBend = () => this.mesh?.geometry.hasAttribute('bend');
+    const hasBend = () => this.geometry.hasAttribute('bend');
     material.customProgramCacheKey = () => (hasBend() ? 'bends' : 'rigid');
     material.onBeforeCompile = (shader) => {
       if (!hasBend()) return;
@@ -72,8 +79,18 @@ export class ShownBody {
   }
 
   setLook(look) {
+    this.look = look;
     this.material.dispose();
     this.material = this.mesh.material = this.makeMaterial(look);
+  }
+  /** Without reflections and of few triangles, for motion on machines without a graphics card. */
+  setSketched(isSketched) {
+    const { color, opacity = 1 } = this.look;
+    this.sketch ??= makeGeometry(makeCorners(simplify(this.surface, kSketchCells)));
+    this.mesh.geometry = isSketched ? this.sketch : this.geometry;
+    this.mesh.material = isSketched
+      ? new THREE.MeshLambertMaterial({ color, emissive: color, emissiveIntensity: 0.15, transparent: opacity < 1, opacity })
+      : this.material;
   }
 
   /** Sets the position of the mesh's origin. */
@@ -92,6 +109,10 @@ export class ShownBody {
   /** Sets the position of the centre of mass, as in recorded motions. */
   setCentrePose(position_m, rotation) {
     this.setPose(subtract(position_m, rotate(rotation, this.centre_m)), rotation);
+  }
+  /** Its centre of mass where the scene has it. */
+  findRestCentre() {
+    return add(this.rest.position_m, rotate(this.rest.rotation, this.centre_m));
   }
   setSize(size) {
     this.size = size;
@@ -123,7 +144,7 @@ export class ShownBody {
     const { vertexOf } = this.corners, bend = new Float32Array(3 * vertexOf.length), part = largest > 0 ? 1 / largest : 0;
     for (let i = 0; i < vertexOf.length; ++i)
       for (let c = 0; c < 3; ++c) bend[3 * i + c] = part * shape[3 * vertexOf[i] + c];
-    const { geometry } = this.mesh, isNew = !geometry.hasAttribute('bend');
+    const { geometry } = this, isNew = !geometry.hasAttribute('bend');
     geometry.setAttribute('bend', new THREE.BufferAttribute(bend, 3));
     if (isNew) this.material.needsUpdate = true;
     this.uniforms.uTint.value = 1;

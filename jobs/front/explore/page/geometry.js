@@ -124,7 +124,7 @@ export function findNamedPlaces(surface, rotation, loudest) {
 }
 
 /** Corners for drawing: smooth where neighbouring triangles meet at less than the crease, sharp elsewhere.
- * -> {positions, normals: Float32Array(9 T), vertexOf: Uint32Array(3 T)}. */
+ * -> {positions, normals: Float32Array(3 N), vertexOf: Uint32Array(N), index: Uint32Array(3 T)}; N: corners that differ. */
 export function makeCorners(surface, creaseDegrees = 38) {
   const { vertices_m: v, triangles: t } = surface;
   const count = t.length / 3, flat = new Float32Array(3 * count), least = Math.cos((creaseDegrees * Math.PI) / 180);
@@ -139,7 +139,8 @@ export function makeCorners(surface, creaseDegrees = 38) {
     flat.set(normalise(n), 3 * i);
     for (let k = 0; k < 3; ++k) around[filled[t[3 * i + k]]++] = i;
   }
-  const positions = new Float32Array(9 * count), normals = new Float32Array(9 * count), vertexOf = Uint32Array.from(t);
+  const normals = [], vertexOf = [], index = new Uint32Array(t.length);
+  const latest = new Int32Array(v.length / 3).fill(-1), before = []; // corners of a vertex, linked
   for (let i = 0; i < t.length; ++i) {
     const vertex = t[i], own = Math.floor(i / 3), nx = flat[3 * own], ny = flat[3 * own + 1], nz = flat[3 * own + 2];
     let x = 0, y = 0, z = 0;
@@ -150,9 +151,43 @@ export function makeCorners(surface, creaseDegrees = 38) {
       y += areas[other] * oy;
       z += areas[other] * oz;
     }
-    const length = Math.hypot(x, y, z) || 1;
-    normals.set([x / length, y / length, z / length], 3 * i);
-    positions.set([v[3 * vertex], v[3 * vertex + 1], v[3 * vertex + 2]], 3 * i);
+    const length = Math.hypot(x, y, z) || 1, normal = [x / length, y / length, z / length];
+    let same = latest[vertex];
+    while (same >= 0 && dot(normal, normals[same]) < 1 - 1e-6) same = before[same];
+    if (same < 0) {
+      same = vertexOf.push(vertex) - 1;
+      normals.push(normal);
+      before.push(latest[vertex]);
+      latest[vertex] = same;
+    }
+    index[i] = same;
   }
-  return { positions, normals, vertexOf };
+  const positions = vertexOf.flatMap((vertex) => [v[3 * vertex], v[3 * vertex + 1], v[3 * vertex + 2]]);
+  return { positions: Float32Array.from(positions), normals: Float32Array.from(normals.flat()), vertexOf: Uint32Array.from(vertexOf), index };
+}
+
+/** The surface with fewer triangles: the vertices of a cell whose normals point to one side become their mean. cells: per size of the body. */
+export function simplify(surface, cells) {
+  const { vertices_m: v, triangles: t } = surface, { low, size } = findBox(surface), step = size / cells;
+  const normals = new Float32Array(v.length);
+  for (let i = 0; i < t.length; i += 3) {
+    const [a, b, c] = [0, 1, 2].map((k) => corner(surface, i / 3, k)), n = cross(subtract(b, a), subtract(c, a));
+    for (let k = 0; k < 3; ++k) for (let axis = 0; axis < 3; ++axis) normals[3 * t[i + k] + axis] += n[axis];
+  }
+  const merged = new Map(), sums = [], target = new Uint32Array(v.length / 3);
+  for (let i = 0; i < target.length; ++i) {
+    const at = [0, 1, 2].map((axis) => v[3 * i + axis]), n = [0, 1, 2].map((axis) => normals[3 * i + axis]), least = 0.3 * norm(n);
+    const key = at.map((x, axis) => `${Math.floor((x - low[axis]) / step)} ${Math.abs(n[axis]) > least ? Math.sign(n[axis]) : 0}`).join();
+    if (!merged.has(key)) merged.set(key, sums.push([0, 0, 0, 0]) - 1);
+    target[i] = merged.get(key);
+    const sum = sums[target[i]];
+    at.forEach((x, axis) => (sum[axis] += x));
+    ++sum[3];
+  }
+  const triangles = [];
+  for (let i = 0; i < t.length; i += 3) {
+    const [a, b, c] = [target[t[i]], target[t[i + 1]], target[t[i + 2]]];
+    if (a !== b && b !== c && c !== a) triangles.push(a, b, c);
+  }
+  return { vertices_m: Float32Array.from(sums.flatMap(([x, y, z, count]) => [x / count, y / count, z / count])), triangles: Uint32Array.from(triangles) };
 }

@@ -13,7 +13,8 @@ const kKeyTurn = 0.09; // rad
 const kKeyScrape = { radius: 0.05, hz: 1.7 }; // circle of the key S: radius / size of the body, rate
 
 export class Hands {
-  /** gesture: 'strike', 'scrape' or 'press', the initial action of a press. */
+  /** gesture: 'strike', 'scrape' or 'press', the initial action of a press. holds(body), while bodies are thrown: true for those that a pointer
+   * takes along; they and the arrow keys are left to the thrower. */
   constructor(view, player) {
     Object.assign(this, { view, player, gesture: 'strike', pointers: new Map(), keys: new Map() });
     const { canvas } = view, on = (name, work) => canvas.addEventListener(name, (event) => work.call(this, event));
@@ -51,11 +52,12 @@ export class Hands {
     document.documentElement.classList.remove('by-keys');
     this.view.canvas.focus({ preventScroll: true });
     this.view.orbit.stop();
+    const hit = event.button === 0 && !event.ctrlKey ? this.view.pick(event.clientX, event.clientY) : null;
+    if (hit && this.holds?.(hit.body)) return;
     this.view.canvas.setPointerCapture(event.pointerId);
     const pointer = { x: event.clientX, y: event.clientY, startX: event.clientX, startY: event.clientY, kind: 'turn', trail: this.trail ?? [] };
     this.pointers.set(event.pointerId, pointer);
     if (this.pointers.size > 1) return this.beginPinch();
-    const hit = event.button === 0 && !event.ctrlKey ? this.view.pick(event.clientX, event.clientY) : null;
     if (event.button === 2 || event.button === 1 || event.ctrlKey) pointer.kind = event.shiftKey ? 'pan' : 'turn';
     if (!hit) {
       if (event.shiftKey) pointer.kind = 'pan';
@@ -152,7 +154,7 @@ export class Hands {
   }
 
   hover(event) {
-    if (this.hovering) return;
+    if (this.hovering || event.buttons !== 0) return;
     this.hovering = true;
     requestAnimationFrame(() => {
       this.hovering = false;
@@ -208,6 +210,7 @@ export class Hands {
       this.view.orbit.turn(-kKeyTurn * arrow[0], kKeyTurn * arrow[1]);
       this.turned();
     } else if (arrow) {
+      if (this.holds) return;
       this.step(...arrow);
     } else if (event.key === '+' || event.key === '=' || event.key === '-') {
       this.view.orbit.zoom(event.key === '-' ? 1.12 : 1 / 1.12);

@@ -7,6 +7,7 @@ import { Panel } from './panel.js';
 import { Spectrum } from './spectrum.js';
 import { Transport } from './recording.js';
 import { Recorder } from './recorder.js';
+import { Thrower } from './throw.js';
 import { fromDegrees, norm, subtract } from './geometry.js';
 
 const kVersion = 1; // of explore.json
@@ -162,8 +163,9 @@ async function begin() {
     find('fold').setAttribute('aria-expanded', String(!isFolded));
     view.resize();
   });
+  const thrower = new Thrower({ scene, audio, player, view, hands, panel, transport });
   // For scripts and tests.
-  window.carillon = { about, scene, audio, player, view, hands, panel, transport, Recorder };
+  window.carillon = { about, scene, audio, player, view, hands, panel, transport, thrower, Recorder };
   find('cover').hidden = true;
   document.documentElement.dataset.state = 'ready';
   panel.say(`${about.title} is ready`);

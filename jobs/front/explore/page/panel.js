@@ -155,6 +155,16 @@ export class Panel {
       this.edit();
     });
   }
+  /** Takes back the edits of all bodies. */
+  reset() {
+    const { current } = this;
+    this.player.bodies.forEach(({ edit }, index) => {
+      if (Object.values(edit).every((value) => !value)) return;
+      this.select(index, true, false);
+      find('reset').click();
+    });
+    this.select(current, true, false);
+  }
 
   /** Applies the values of the sliders, at most once every kEditS. */
   edit() {
@@ -163,8 +173,8 @@ export class Panel {
     const row = this.player.audio.materials.find(({ name }) => name === material);
     body.shown.setLook(row ? makeLook(row.name, row.group) : body.look);
     this.view.draw();
-    clearTimeout(this.editing);
-    this.editing = setTimeout(async () => {
+    clearTimeout(body.editing);
+    body.editing = setTimeout(async () => {
       const wish = { size_scale: 2 ** size, damping_scale: 2 ** damping, stiffness_scale: 2 ** stiffness, density_scale: 2 ** density };
       if (material) wish.material = material;
       try {

@@ -4,8 +4,8 @@ import { castRay, rotate, rotateBack, scale, add, norm, normalise, subtract, cro
 import { makeStand } from './stand.js';
 import { OrbitCamera } from './camera.js';
 
-const kSlowFrameMs = 45; // slower frames reduce the resolution during motion
-const kLeastPixels = 0.5;
+const kSlowFrameMs = 25; // slower frames reduce the resolution during motion
+const kLeastPixels = 0.35;
 const kRippleS = 0.55;
 
 /** True for software rendering, which competes with the sound for the CPU. */
@@ -70,6 +70,7 @@ export class View extends EventTarget {
     super();
     this.canvas = canvas;
     this.isPlain = isSoftware();
+    document.documentElement.classList.toggle('plain', this.isPlain);
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !this.isPlain, alpha: true });
     this.renderer.toneMapping = THREE.ACESFilmicToneMapping;
     this.renderer.toneMappingExposure = 1.05;
@@ -130,20 +131,40 @@ export class View extends EventTarget {
     for (const at of this.listCorners()) at.forEach((x, c) => ([low[c], high[c]] = [Math.min(low[c], x), Math.max(high[c], x)]));
     this.middle = scale(0.5, add(low, high));
     this.size = norm(subtract(high, low));
-    const floor = ground_m ?? low[2];
+    const floor = (this.floor_m = ground_m ?? low[2]);
     this.scene.add((this.floor = makeFloor(Math.max(this.size, 2 * (this.middle[2] - floor)), floor - 1e-3 * this.size, this.middle)));
     this.floor.visible = ground_m !== null || high[2] - low[2] < 4 * Math.max(high[0] - low[0], high[1] - low[1]);
+    this.stands = new THREE.Group();
     for (const body of this.bodies) {
       const stand = body.fixed ? makeStand(body, floor) : null;
-      if (stand) this.scene.add(stand);
+      if (stand) this.stands.add(stand);
     }
-    const reach = 0.75 * this.size, { camera } = this.key.shadow;
+    this.scene.add(this.stands);
+    this.hasFloor = this.floor.visible;
     this.key.position.set(...add(this.middle, scale(2.2 * this.size, normalise([-0.55, -0.6, 1.1]))));
     this.key.target.position.set(...this.middle);
+    this.isReady = true;
+    this.setLoose(false);
+  }
+
+  /** isLoose: bodies are off their stands, on the floor, and cast shadows farther away. */
+  setLoose(isLoose) {
+    const reach = (isLoose ? 1.5 : 0.75) * this.size, { camera } = this.key.shadow;
     Object.assign(camera, { left: -reach, right: reach, top: reach, bottom: -reach, near: 0.2 * this.size, far: 5 * this.size });
     camera.updateProjectionMatrix();
-    this.isReady = true;
+    this.stands.visible = !isLoose;
+    this.floor.visible = isLoose || this.hasFloor;
+    this.shadowPose = undefined;
+    this.setSketched(isLoose && this.isPlain);
     this.draw();
+  }
+
+  /** A picture that software draws in a frame: no shadows and reflections, few triangles. */
+  setSketched(isSketched) {
+    if (isSketched === Boolean(this.isSketched)) return;
+    this.isSketched = isSketched;
+    this.floor.children[1].visible = !isSketched;
+    for (const body of this.bodies) body.setSketched(isSketched);
   }
 
   resize() {
@@ -172,7 +193,7 @@ export class View extends EventTarget {
 
   frame(now) {
     this.isWaiting = false;
-    const began = performance.now(), passed = Math.min(0.1, (now - (this.lastFrame ?? now)) / 1000);
+    const passed = Math.min(0.1, (now - (this.lastFrame ?? now)) / 1000);
     this.lastFrame = now;
     let moves = this.orbit.advance(passed);
     if (moves) this.dispatchEvent(new Event('turned'));
@@ -182,7 +203,7 @@ export class View extends EventTarget {
       else this.movers.delete(mover);
     }
     this.paint();
-    this.govern(performance.now() - began, moves);
+    this.govern(now, moves);
     if (moves) this.draw();
     else this.lastFrame = undefined;
   }
@@ -190,16 +211,18 @@ export class View extends EventTarget {
   paint() {
     if (this.cursorPlace) this.placeMark(this.cursor, this.cursorPlace, 0.011);
     const pose = this.bodies.map(({ mesh, uniforms }) => `${mesh.matrix.elements} ${uniforms.uBend.value}`).join();
-    this.renderer.shadowMap.needsUpdate = pose !== this.shadowPose; // only after motion
-    this.shadowPose = pose;
+    this.renderer.shadowMap.needsUpdate = !this.isSketched && pose !== this.shadowPose; // only after motion
+    if (!this.isSketched) this.shadowPose = pose;
     this.renderer.render(this.scene, this.orbit.camera);
   }
 
   /** Reduced resolution on slow machines during motion. */
-  govern(took_ms, moves) {
+  govern(now, moves) {
+    const took_ms = now - (this.governed ?? now);
+    this.governed = moves ? now : undefined;
     this.took_ms = 0.7 * (this.took_ms ?? took_ms) + 0.3 * took_ms;
     let pixels = this.pixels;
-    if (moves && this.took_ms > kSlowFrameMs) pixels = Math.max(kLeastPixels, 0.8 * pixels);
+    if (moves && this.took_ms > kSlowFrameMs) pixels = Math.max(kLeastPixels, 0.6 * pixels);
     if (!moves) pixels = 1;
     if (pixels === this.pixels) return;
     this.pixels = pixels;
@@ -211,10 +234,12 @@ export class View extends EventTarget {
 
   /** Picking: {body, triangle, barycentric, point, normal} with point and normal in the world, or null. */
   pick(clientX, clientY) {
-    const box = this.canvas.getBoundingClientRect();
-    const x = (2 * (clientX - box.left)) / box.width - 1, y = 1 - (2 * (clientY - box.top)) / box.height;
-    const { origin, direction } = this.orbit.findRay(x, y);
+    const { origin, direction } = this.findRay(clientX, clientY);
     return this.cast(origin, direction);
+  }
+  findRay(clientX, clientY) {
+    const box = this.canvas.getBoundingClientRect();
+    return this.orbit.findRay((2 * (clientX - box.left)) / box.width - 1, 1 - (2 * (clientY - box.top)) / box.height);
   }
   cast(origin, direction, only = null) {
     let nearest = null;
@@ -242,8 +267,8 @@ export class View extends EventTarget {
   }
 
   placeMark(mark, place, size) {
-    const { body, triangle, barycentric } = place, point = body.findWorldPoint({ triangle, barycentric });
-    const normal = place.normal, away = norm(subtract(this.orbit.position_m, point));
+    const { body, triangle } = place, point = body.findWorldPoint(place);
+    const normal = body.findWorldNormal(triangle), away = norm(subtract(this.orbit.position_m, point));
     mark.position.set(...add(point, scale(0.003 * away, normal)));
     const side = normalise(Math.abs(normal[2]) < 0.9 ? cross([0, 0, 1], normal) : cross([1, 0, 0], normal));
     const up = cross(normal, side);

@@ -14,6 +14,7 @@
 
 #include "runtime/base/error.hpp"
 #include "tests/unit/runtime/physics/bodies.hpp"
+#include "tests/unit/runtime/physics/plate_bank.hpp"
 
 namespace carillon::physics::tests {
 namespace {
@@ -345,6 +346,20 @@ TEST(Handling, SameBitsHoweverTimeIsDivided) {
     ends.push_back(last);
   }
   EXPECT_EQ(ends[0], ends[1]);
+}
+
+TEST(AllowModalImpacts, RigidOnesLoseTheEnergyThatModesTake) {
+  const bank::Bank plate = make_plate_bank(0.2, 2e-3, 8000.0, 8, 1.0);
+  for (const bool may_begin : {true, false}) {
+    Watched w(make_floor({make_body("plate", plate, {0, 0, 0.1}, 1.0)}));
+    w.world.allow_modal_impacts(may_begin);
+    w.run(0.16);
+    EXPECT_EQ(w.world.get_statistics().contacts.longest_impact_s > 0.0, may_begin);
+    EXPECT_GT(w.hits, 0);
+    EXPECT_LT(w.get_energy().error_j, 1e-3 * w.get_energy().start_j);
+    const double rebound = w.last[0].velocity_m_s[2];
+    EXPECT_LT(rebound, 1.2) << "restitution 1, but modes took of 1.4 m/s";
+  }
 }
 
 class RandomHandling : public testing::TestWithParam<int> {};

@@ -69,10 +69,27 @@ test('corners are smooth on a ball and sharp on a box', () => {
     const at = geometry.normalise([...smooth.positions.slice(i, i + 3)]);
     assert.ok(geometry.dot(at, [...smooth.normals.slice(i, i + 3)]) > 0.999);
   }
+  assert.equal(smooth.vertexOf.length, ball.vertices_m.length / 3, 'a corner per vertex');
   const sharp = geometry.makeCorners(kBox);
-  for (let i = 0; i < sharp.normals.length; i += 3)
-    near([...sharp.normals.slice(i, i + 3)], geometry.findNormal(kBox, Math.floor(i / 9)));
+  assert.equal(sharp.vertexOf.length, 24);
+  sharp.index.forEach((corner, i) => {
+    near([...sharp.normals.slice(3 * corner, 3 * corner + 3)], geometry.findNormal(kBox, Math.floor(i / 3)));
+    assert.equal(sharp.vertexOf[corner], kBox.triangles[i]);
+  });
   sharp.vertexOf.forEach((vertex, i) => near([...sharp.positions.slice(3 * i, 3 * i + 3)], [...kBox.vertices_m.slice(3 * vertex, 3 * vertex + 3)]));
+});
+
+test('a simplified surface is near the surface and has few triangles', () => {
+  const ball = makeBall(2, 4), few = geometry.simplify(ball, 6);
+  assert.ok(few.triangles.length < 0.2 * ball.triangles.length && few.triangles.length > 100, `${few.triangles.length} of ${ball.triangles.length}`);
+  for (let i = 0; i < few.vertices_m.length; i += 3) assert.ok(Math.abs(geometry.norm([...few.vertices_m.slice(i, i + 3)]) - 2) < 0.2);
+  let outwards = 0;
+  for (let i = 0; i < few.triangles.length / 3; ++i) {
+    const [a, b, c] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map((at) => geometry.findPoint(few, i, at));
+    outwards += geometry.dot(a, geometry.cross(b, c)) / 6;
+  }
+  assert.ok(Math.abs(outwards / ((4 / 3) * Math.PI * 8) - 1) < 0.1, `the volume is ${outwards}`);
+  assert.equal(geometry.simplify(kBox, 6).triangles.length, kBox.triangles.length);
 });
 
 test('named places lie on the sides that they name, also of a body that is turned', () => {
