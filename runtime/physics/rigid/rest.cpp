@@ -240,7 +240,8 @@ std::vector<int> Rest::wake(int body, int by, bool alone) {
     bodies_.set_asleep(i, false);
     awake.push_back(i);
     paces_[i].slow_s = 0.0;
-    paces_[i].anchored_s = bodies_.get_time();
+    // A change of forces is no motion: what woke has to stay for kSleepDelayS.
+    paces_[i].anchored_s = std::max(paces_[i].anchored_s, bodies_.get_time() + kSleepDelayS - kLongSlowS);
     windows_.wake(i, by);
     for (auto& [key, pair] : touches_.pairs()) {
       if (key.first != i && key.second != i) continue;
