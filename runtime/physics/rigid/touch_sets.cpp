@@ -246,7 +246,7 @@ std::pair<Contact*, double> TouchSets::find_least(Pair& pair, const geometry::Fr
     const bool follows = follow(pair, moved, a, b);
     all_follow = all_follow && follows;
     const double gap_m = moved.gap_m + dot(moved.normal, pair.apart_m);
-    if (follows && gap_m < least.second) least = {&c, gap_m};
+    if (follows && !is_jump(pair, c.touch, moved) && gap_m < least.second) least = {&c, gap_m};
   }
   if (!all_follow) pair.ahead.touches.clear();  // refresh() drops lost ones
   return least;
