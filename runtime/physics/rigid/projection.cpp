@@ -1,6 +1,6 @@
 // Method: min 1/2 dx^T M dx with n.(da - db) >= -gap - allowance for all touches of an island: the velocity problem without friction, with
 // velocities read as displacements. Open touches may close, but not overlap. The work is paid by the motion along the displacement, then by
-// all motion of the displaced bodies.
+// all motion of the displaced bodies, now or once they move: a body that rocks to and fro would gain energy at each turn, where it is slow.
 // Source: V. Acary, "Projected event-capturing time-stepping schemes for nonsmooth mechanical systems with unilateral contact and Coulomb's
 //   friction", Comput. Methods Appl. Mech. Eng. 256 (2013) 224.
 #include "runtime/physics/rigid/projection.hpp"
@@ -55,6 +55,27 @@ std::vector<Point> Projection::make_points(const Step& step, bool& is_held) cons
     }
   }
   return points;
+}
+
+void Projection::collect(const Step& step) {
+  const auto is_owing = [&](int body) { return owed_j_[body] > 0.0; };
+  if (std::none_of(step.island().bodies.begin(), step.island().bodies.end(), is_owing)) return;
+  const bool is_held = std::any_of(step.island().pairs.begin(), step.island().pairs.end(), [&](const Pair* pair) {
+    return can_part(step, *pair) && pair->touches() && !(is_movable(pair->a) && is_movable(pair->b));
+  });
+  if (!is_held) return;  // a free island keeps its momentum
+  for (const int i : step.island().bodies) {
+    if (!is_owing(i) || !is_movable(i)) continue;
+    State& s = bodies_.state(i);
+    const double kinetic_j = calc_kinetic(bodies_.solid(i), s, bodies_.placed(i)), paid_j = std::min(owed_j_[i], kMaxPaidRatio * kinetic_j);
+    if (!(paid_j > 0.0)) continue;
+    const double part = std::sqrt(1.0 - paid_j / kinetic_j);
+    s.velocity = part * s.velocity;
+    s.momentum = part * s.momentum;
+    bodies_.place(i);
+    owed_j_[i] -= paid_j;
+    ledger_.lift(-paid_j);
+  }
 }
 
 void Projection::run(const Step& step, double allowed_m) {
@@ -124,10 +145,22 @@ void Projection::move(const Step& step, const std::vector<Mover>& displacements,
       gained_j -= spent_j;
     }
   }
-  if (gained_j > 0.0)
-    ledger_.lift(gained_j);
-  else
-    ledger_.lose(-gained_j);
+  if (!(gained_j > 0.0)) return ledger_.lose(-gained_j);
+  ledger_.lift(gained_j);
+  if (is_held && bodies_.get_time() > 0.0) owe(step, displacements, gained_j);
+}
+
+/// Divides gained energy between the displaced bodies by the squares of their displacements in the mass norm.
+void Projection::owe(const Step& step, const std::vector<Mover>& displacements, double gained_j) {
+  std::vector<double> squares(step.count(), 0.0);
+  double sum = 0.0;
+  for (int n = 0; n < step.count(); ++n) {
+    const int i = step.body(n);
+    const Mover& d = displacements[n];
+    if (is_movable(i)) squares[n] = bodies_.solid(i).mass_kg * dot(d.velocity, d.velocity) + dot(d.spin, bodies_.calc_inertia(i) * d.spin);
+    sum += squares[n];
+  }
+  for (int n = 0; n < step.count() && sum > 0.0; ++n) owed_j_[step.body(n)] += gained_j * squares[n] / sum;
 }
 
 void Projection::pay(const Step& step, const std::vector<Mover>& displacements, double owed_j) {

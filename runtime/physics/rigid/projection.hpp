@@ -11,14 +11,20 @@
 namespace carillon::rigid {
 
 /// Displaces the bodies of an island so that no touch is deeper than allowed, by the least displacement in the mass norm. Invariants: a
-/// free island keeps its momentum and angular momentum; energy is gained only where motion cannot pay for it, and is then booked as lifted.
-/// Bodies on joints and in modal impacts are not moved.
+/// free island keeps its momentum and angular momentum; energy is gained only where motion cannot pay for it; it is then booked as lifted,
+/// and the displaced bodies owe it until they move. Bodies on joints and in modal impacts are not moved.
 class Projection {
  public:
-  Projection(Bodies& bodies, TouchSets& touches, Ledger& ledger) : bodies_(bodies), touches_(touches), ledger_(ledger) {}
+  Projection(Bodies& bodies, TouchSets& touches, Ledger& ledger)
+      : bodies_(bodies), touches_(touches), ledger_(ledger), owed_j_(bodies.count()) {}
 
+  /// Takes energy that bodies owe from their motion. Call at the start of a step, before run().
+  void collect(const Step& step);
   /// Call at the start of a step. Separates touches deeper than `allowed_m` plus their allowance (Pair::sag_m).
   void run(const Step& step, double allowed_m);
+  /// Energy that each body owes, for a return to an earlier state.
+  const std::vector<double>& get_owed() const { return owed_j_; }
+  void set_owed(const std::vector<double>& owed_j) { owed_j_ = owed_j; }
 
  private:
   bool is_movable(int body) const {
@@ -29,6 +35,7 @@ class Projection {
   std::vector<Point> make_points(const Step& step, bool& is_held) const;
   void limit(const Step& step, double most_m, std::vector<Mover>& displacements) const;
   void move(const Step& step, const std::vector<Mover>& displacements, bool is_held);
+  void owe(const Step& step, const std::vector<Mover>& displacements, double gained_j);
   void pay(const Step& step, const std::vector<Mover>& displacements, double owed_j);
   Vec3 calc_angular_momentum(const Step& step) const;
   void turn(const Step& step, const Vec3& gained);
@@ -37,6 +44,7 @@ class Projection {
   TouchSets& touches_;
   Ledger& ledger_;
   Solver solver_;
+  std::vector<double> owed_j_;  // of each body
 };
 
 }  // namespace carillon::rigid

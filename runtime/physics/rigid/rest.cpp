@@ -1,6 +1,7 @@
 // Method: a body that has been slow for a while sleeps if contact forces exist that balance it at rest. An island sleeps as a whole. If
 // other bodies of the island move, bodies sleep separately under the current forces of the others. These forces are monitored: if they
-// change by more than a fraction of its weight, the sleeping body wakes, and then possibly the bodies it supports, one after another.
+// change by more than a fraction of its weight, the sleeping body wakes, and then possibly the bodies it supports, one after another. Where
+// touches move along curved surfaces no balance may be found; an island of which no body has moved away for kLongSlowS sleeps without it.
 // Source: J. J. Moreau, "Unilateral contact and dry friction in finite freedom dynamics" (1988), the solution with zero velocities.
 #include "runtime/physics/rigid/rest.hpp"
 
@@ -19,6 +20,7 @@ constexpr double kSlowDelayS = 0.02;       // s; minimum time below kSlowSpeedMS
 constexpr double kSleepDelayS = 0.1;       // s; minimum slow time of a body that may sleep among moving ones,
 constexpr double kNeighbourSlowS = 0.05;   // s; and of the bodies that it touches,
 constexpr double kMaxTouchSpeedMS = 5e-4;  // m/s; with no faster contact
+constexpr double kStillM = 5e-5;           // m; invisible: no point of a body that stays where it is moves farther
 constexpr double kWakeForceRatio = 0.05;   // fraction of the weight: change of the forces that wakes a body
 
 }  // namespace
@@ -36,6 +38,62 @@ bool Rest::may_sleep(const std::vector<int>& bodies, double time_s) {
     all = all && pace.slow_s > kSlowDelayS && bodies_.get_time() >= pace.next_proof_s;
   }
   return all;
+}
+
+void Rest::note_still() {
+  for (int i = 0; i < bodies_.count(); ++i) {
+    if (!bodies_.moves(i)) continue;
+    Pace& pace = paces_[i];
+    const State& now = bodies_.state(i);
+    double same = 0.0;
+    for (int k = 0; k < 4; ++k) same += now.rotation[k] * pace.anchor.rotation[k];
+    const double turned = 2.0 * std::sqrt(std::max(0.0, 1.0 - same * same));
+    if (norm(now.centre - pace.anchor.centre) + turned * bodies_.solid(i).radius_m <= kStillM) continue;
+    pace.anchor = now;
+    pace.anchored_s = bodies_.get_time();
+  }
+}
+
+bool Rest::try_still(Island& island, double h) {
+  for (const int body : island.bodies) {
+    const bool is_still = bodies_.get_time() - paces_[body].anchored_s > kLongSlowS && bodies_.calc_speed(body) < kSlowSpeedMS &&
+                          !bodies_.is_moved_by_impact(body) && bodies_.get_pull(body) == 0.0 && bodies_.find_articulation(body) == nullptr;
+    if (!is_still) return false;
+  }
+  const auto carries = [&](const Contact& c, int body) {
+    const Vec3 force_n = (c.a == body ? 1.0 : -1.0) * c.calc_force();
+    return (c.a == body || c.b == body) && dot(force_n, bodies_.gravity()) < 0.0;
+  };
+  for (const int body : island.bodies)
+    if (std::none_of(island.pairs.begin(), island.pairs.end(), [&](const Pair* pair) {
+          return std::any_of(pair->contacts.begin(), pair->contacts.end(), [&](const Contact& c) { return carries(c, body); });
+        }))
+      return false;
+  for (const Pair* pair : island.pairs)
+    if (pair->cord >= 0 || pair->sag_m > kDeepM ||
+        std::any_of(pair->contacts.begin(), pair->contacts.end(), [](const Contact& c) { return c.touch.gap_m < -kMaxDepthM; }))
+      return false;
+  for (const int body : island.bodies) {
+    State& s = bodies_.state(body);
+    ledger_.lose(calc_kinetic(bodies_.solid(body), s));
+    s.velocity = s.momentum = {};
+    bodies_.place(body);
+    bodies_.set_asleep(body, true);
+  }
+  for (Pair* pair : island.pairs) {
+    ledger_.lose(pair->take_stopped_j());
+    for (Contact& c : pair->contacts) fall_asleep(c, h * c.calc_force(), h);
+  }
+  return true;
+}
+
+/// Keeps the impulse of a step of `h` seconds as the force of a sleeping contact.
+void Rest::fall_asleep(Contact& c, const Vec3& impulse, double h) {
+  c.impulse = impulse;
+  c.step_s = h;
+  c.touching = dot(c.impulse, c.touch.normal) > 0.0;
+  c.rests = c.is_load = c.touch.gap_m <= kDeepM;
+  c.rest_n = (1.0 / h) * c.impulse;
 }
 
 bool Rest::try_articulation(Articulation& articulation, double length_s) {
@@ -97,13 +155,8 @@ Rest::Balance Rest::try_sleep(Island& island, double h, const std::vector<joints
   for (Pair* pair : island.pairs) ledger_.lose(pair->take_stopped_j());
   for (int n = 0; const Point& p : points) {
     Contact& c = rows[n++].get();
-    c.impulse = p.impulse;
-    if (c.is_load) c.impulse = c.impulse + h * c.rest_n;
     c.couple = p.couple;
-    c.step_s = h;
-    c.touching = dot(c.impulse, c.touch.normal) > 0.0;
-    c.rests = c.is_load = c.touch.gap_m <= kDeepM;
-    c.rest_n = (1.0 / h) * c.impulse;
+    fall_asleep(c, c.is_load ? p.impulse + h * c.rest_n : p.impulse, h);
   }
   return stands ? Balance::stands : Balance::leans;
 }
@@ -187,6 +240,8 @@ std::vector<int> Rest::wake(int body, int by, bool alone) {
     bodies_.set_asleep(i, false);
     awake.push_back(i);
     paces_[i].slow_s = 0.0;
+    // A change of forces is no motion: what woke has to stay for kSleepDelayS.
+    paces_[i].anchored_s = std::max(paces_[i].anchored_s, bodies_.get_time() + kSleepDelayS - kLongSlowS);
     windows_.wake(i, by);
     for (auto& [key, pair] : touches_.pairs()) {
       if (key.first != i && key.second != i) continue;

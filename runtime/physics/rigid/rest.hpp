@@ -35,6 +35,10 @@ class Rest {
   bool may_sleep(const std::vector<int>& bodies, double time_s);
   /// Puts an island to sleep if it is balanced at rest; true if so.
   bool try_island(Island& island, double step_s) { return try_sleep(island, step_s, {}) != Balance::none; }
+  /// Notes which bodies stay where they are. Call at the start of a window.
+  void note_still();
+  /// Puts an island to sleep that has stayed where it is, whether or not its balance can be proven; true if so.
+  bool try_still(Island& island, double step_s);
   /// Puts bodies to sleep whose island keeps moving elsewhere. Call at the start of a window; uses the contacts of the last step.
   void try_parts();
   /// Puts an articulation to sleep that touches nothing during a window.
@@ -57,9 +61,12 @@ class Rest {
     double slow_s = 0.0;        // duration of slow motion
     double next_proof_s = 0.0;  // next test of rest,
     double next_part_s = 0.0;   // that of a part of its island
+    State anchor;               // pose from which it has not moved away,
+    double anchored_s = 0.0;    // since then
   };
   enum class Balance { none, stands, leans };  // leans: only with the forces of others
 
+  static void fall_asleep(Contact& contact, const Vec3& impulse, double step_s);
   Balance try_sleep(Island& island, double step_s, const std::vector<joints::Spatial>& pulls);
   std::vector<char> find_slow() const;
   std::vector<int> wake(int body, int by, bool alone = false);

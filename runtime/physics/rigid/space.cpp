@@ -86,6 +86,7 @@ void Space::step(double end_s) {
 }
 
 void Space::open_window(double end_s) {
+  rest_.note_still();
   if (options_.islands) rest_.try_parts();
   windows_.open(end_s, modal_impacts_.list());
   rest_.reset(windows_.fly_bodies());
@@ -116,9 +117,10 @@ void Space::step_island(Island& island, double start_s, double length_s) {
     modal_impacts_.begin_early(step_, h, instants_);
     modal_impacts_.follow(step_, h, touches_);
     modal_impacts_.end_where_touching(step_, touches_);
-    const bool may_sleep = !std::exchange(begun, true) && rest_.may_sleep(island.bodies, h);
+    const bool begins = !std::exchange(begun, true), may_sleep = begins && rest_.may_sleep(island.bodies, h);
+    projection_.collect(step_);
     projection_.run(step_, open_m);
-    if (may_sleep && try_rest(island, h)) break;
+    if ((may_sleep && try_rest(island, h)) || (begins && rest_.try_still(island, h))) break;
     touches_.forget_closing(step_);
     bool is_completed = false;
     for (int n = 0; n <= kMaxCompleted; ++n) {
@@ -160,6 +162,7 @@ void Space::step_island(Island& island, double start_s, double length_s) {
 bool Space::try_rest(Island& island, double length_s) {
   std::vector<State> kept;
   std::vector<std::tuple<double, double, Pair::Errors>> kept_pairs;
+  const std::vector<double> owed_j = projection_.get_owed();
   for (const int body : island.bodies) kept.push_back(bodies_.state(body));
   for (const Pair* pair : island.pairs) kept_pairs.emplace_back(pair->stored_j, pair->stopped_j, pair->errors);
   Books before, after;
@@ -177,6 +180,7 @@ bool Space::try_rest(Island& island, double length_s) {
   ledger_.add_to(after);
   ledger_.lose(before.lost_j - after.lost_j);
   ledger_.lift(before.lifted_j - after.lifted_j);
+  projection_.set_owed(owed_j);
   for (int n = 0; const int body : island.bodies) {
     bodies_.state(body) = kept[n++];
     bodies_.place(body);

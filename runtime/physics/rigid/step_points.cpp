@@ -67,7 +67,7 @@ struct ArmPath {
 };
 
 /// `later`: the touch at the end of the step; n: index of the body in the step.
-ArmPath make_arm_path(const Bodies& bodies, const Step& step, const geometry::Touch& t, const Vec3& later, int body, int n) {
+ArmPath make_arm_path(const Bodies& bodies, const Step& step, const geometry::Touch& t, bool moves, const Vec3& later, int body, int n) {
   const State& state = bodies.state(body);
   const FreeMotion& free = step.free[n];
   ArmPath path;
@@ -79,7 +79,7 @@ ArmPath make_arm_path(const Bodies& bodies, const Step& step, const geometry::To
     path.centre = free.state.centre;
   }
   path.first = t.where_m - state.centre;
-  path.last = t.smooth ? later - free.state.centre : free.placed.rotation * (transpose(bodies.placed(body).rotation) * path.first);
+  path.last = moves ? later - free.state.centre : free.placed.rotation * (transpose(bodies.placed(body).rotation) * path.first);
   return path;
 }
 
@@ -188,14 +188,16 @@ Point StepProblem::make_lasting_point(const Step& step, Pair& pair, const Contac
     const int n = step.find(body);
     return n >= 0 ? step.free[n].placed.frame : bodies_.get_frame(body);
   };
-  const geometry::Touch moved = t.smooth ? touches_.find_moved(pair, t, get_frame(pair.a), get_frame(pair.b)) : t;
+  geometry::Touch moved = t.smooth ? touches_.find_moved(pair, t, get_frame(pair.a), get_frame(pair.b)) : t;
+  const bool jumps = t.smooth && touches_.is_far_jump(pair, t, moved);  // as of a rod from end to end: the other end is a touch of its own
+  if (jumps) moved = t;
   const Vec3& later = moved.where_m;
   // The impulse acts at mid-step, at the same point for both bodies.
   Vec3 where{};
   ArmPath sa, sb;
-  if (p.a >= 0) sa = make_arm_path(bodies_, step, t, later, c.a, p.a), where = sa.middle + 0.5 * (sa.first + sa.last);
+  if (p.a >= 0) sa = make_arm_path(bodies_, step, t, t.smooth && !jumps, later, c.a, p.a), where = sa.middle + 0.5 * (sa.first + sa.last);
   if (p.b >= 0) {
-    sb = make_arm_path(bodies_, step, t, later, c.b, p.b);
+    sb = make_arm_path(bodies_, step, t, t.smooth && !jumps, later, c.b, p.b);
     const Vec3 other = sb.middle + 0.5 * (sb.first + sb.last);
     where = p.a >= 0 ? 0.5 * (where + other) : other;
   }
@@ -231,7 +233,7 @@ Point StepProblem::make_lasting_point(const Step& step, Pair& pair, const Contac
   }
   p.wanted = (speed + turning) * p.normal - beyond;
   const double curvature = t.curvature_a_per_m + t.curvature_b_per_m;
-  if (t.smooth && curvature > 0.0) {
+  if (t.smooth && (curvature > 0.0 || t.steepest_per_m * bodies_.calc_size(c.a, c.b) > 1.0)) {
     p.rolling_m = options_.rolling_resistance * calc_rolling_radius(step, p, c, moved);
     p.twisting_m = kTwistArmRatio * p.friction * calc_patch_radius(c);
   }

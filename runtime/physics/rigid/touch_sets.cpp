@@ -21,6 +21,7 @@ constexpr double kMaxLookAheadS = 4e-3;      // s; maximum look-ahead of these
 constexpr double kSearchIntervalS = 2e-3;    // s; interval of searches for missing touches of a pair
 constexpr double kSameTouchRatio = 0.02;     // fraction of the size: maximum distance of identical touches
 constexpr double kMergeRatio = 1e-4;         // fraction of the size: maximum distance of merged touches
+constexpr double kFarJumpRatio = 0.25;       // relative to the size: a touch that goes farther within a step is another one
 constexpr double kJumpRad = 0.2;             // rad; rotation of the normal in the body by which a touch has jumped
 constexpr double kSagDecayS = 10e-3;         // s
 constexpr int kMaxAdded = 4;                 // missing touches added at the end of a flight
@@ -181,6 +182,10 @@ bool TouchSets::is_jump(const Pair& pair, const geometry::Touch& from, const geo
   return way_m > kSameTouchRatio * bodies_.calc_size(pair.a, pair.b) && way_m * from.steepest_per_m > kJumpRad;
 }
 
+bool TouchSets::is_far_jump(const Pair& pair, const geometry::Touch& from, const geometry::Touch& to) const {
+  return is_jump(pair, from, to) && geometry::calc_travel(from, to) > kFarJumpRatio * bodies_.calc_size(pair.a, pair.b);
+}
+
 void TouchSets::refresh(Pair& pair) const {
   if (pair.cord >= 0) return update_cord(bodies_, cords_[pair.cord], pair);
   const geometry::Frame a = bodies_.get_frame(pair.a), b = bodies_.get_frame(pair.b);
@@ -246,7 +251,7 @@ std::pair<Contact*, double> TouchSets::find_least(Pair& pair, const geometry::Fr
     const bool follows = follow(pair, moved, a, b);
     all_follow = all_follow && follows;
     const double gap_m = moved.gap_m + dot(moved.normal, pair.apart_m);
-    if (follows && gap_m < least.second) least = {&c, gap_m};
+    if (follows && !is_far_jump(pair, c.touch, moved) && gap_m < least.second) least = {&c, gap_m};
   }
   if (!all_follow) pair.ahead.touches.clear();  // refresh() drops lost ones
   return least;

@@ -65,10 +65,13 @@ class TouchSets {
   /// A touch of a pair with its bodies at these frames.
   geometry::Touch find_moved(const Pair& pair, geometry::Touch touch, const geometry::Frame& a, const geometry::Frame& b) const;
 
+  /// True if a touch has moved to a far part of its surface.
+  bool is_far_jump(const Pair& pair, const geometry::Touch& from, const geometry::Touch& to) const;
+
  private:
+  bool is_jump(const Pair& pair, const geometry::Touch& from, const geometry::Touch& to) const;
   void keep_lost(Pair& pair, const std::vector<Contact>& old) const;
   void merge(Pair& pair) const;
-  bool is_jump(const Pair& pair, const geometry::Touch& from, const geometry::Touch& to) const;
   bool follow(const Pair& pair, geometry::Touch& touch, const geometry::Frame& a, const geometry::Frame& b) const;
   double calc_way(const Pair& pair, double time_s, double step_s) const;
   void lose_stored(Pair& pair) const;

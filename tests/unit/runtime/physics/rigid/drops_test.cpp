@@ -22,10 +22,12 @@ TEST(drops, complete_floor_touches_at_end_of_steps) {
 }
 
 // One side lands and throws the other down within a step: its touch is missing at the beginning of the step. Before added touches were
-// kept these drops were 70 to 170 um deep.
+// kept these drops were 70 to 170 um deep; the rods, whose one touch jumped from end to end, 130 and 200 um.
 TEST(drops, depth_of_far_side_at_landing) {
   const std::array<std::uint8_t, 16> drops[] = {{0, 222, 225, 252, 142, 195, 61, 83, 236, 253, 11, 205, 5, 84, 11, 2},
                                                 {1, 61, 195, 86, 73, 51, 37, 146, 193, 47, 128, 220, 44, 240, 173, 107},
+                                                {3, 13, 237, 200, 189, 117, 148, 9, 226, 122, 142, 220, 79, 47, 157, 150},
+                                                {3, 219, 136, 9, 75, 251, 249, 84, 43, 26, 109, 66, 26, 106, 147, 199},
                                                 {5, 41, 161, 54, 81, 152, 214, 13, 233, 208, 243, 235, 209, 15, 206, 188},
                                                 {5, 127, 152, 73, 191, 187, 122, 49, 35, 207, 104, 68, 244, 14, 103, 117},
                                                 {6, 199, 100, 232, 232, 243, 184, 109, 156, 237, 71, 93, 117, 136, 155, 234},

@@ -73,6 +73,35 @@ TEST(projection, work_paid_by_motion) {
   }
 }
 
+// A box at rest is lifted. Once it moves on the ground it pays for that, a half of its energy at a time; in the air it does not.
+TEST(projection, lift_paid_by_later_motion) {
+  std::mt19937 random(8);
+  for (int n = 0; n < 20; ++n) {
+    Stages stages = make_box_in_ground(random, 1e-4, 0.0);
+    stages.begin({{0, -1}});
+    stages.bodies.set_time(0.1);
+    const double total = stages.calc_books().calc_total();
+    stages.projection.run(stages.step, kMaxDepthM);
+    const double lifted = stages.calc_books().lifted_j;
+    ASSERT_GT(lifted, 0.0);
+    const double speed = std::sqrt(lifted / 0.1);
+    stages.bodies.state(0).velocity = {speed, 0, 0};  // its energy is half of that owed
+    stages.bodies.place(0);
+    stages.projection.collect(stages.step);
+    EXPECT_EQ(stages.bodies.state(0).velocity[0], speed);
+    for (Contact& c : stages.island.pairs[0]->contacts) c.touching = true;
+    stages.projection.collect(stages.step);
+    EXPECT_NEAR(stages.calc_books().lifted_j, 0.75 * lifted, 1e-9 * lifted);
+    EXPECT_NEAR(stages.bodies.state(0).velocity[0], std::sqrt(0.5) * speed, 1e-9 * speed);
+    stages.bodies.state(0).velocity = {10.0 * speed, 0, 0};
+    stages.bodies.place(0);
+    for (int again = 0; again < 2; ++again) stages.projection.collect(stages.step);
+    const Books books = stages.calc_books();
+    EXPECT_NEAR(books.lifted_j, 0.0, 1e-9 * lifted);
+    EXPECT_NEAR(books.calc_total(), total + 0.05 * (100.0 + 0.5) * speed * speed, 1e-12 * std::abs(total) + 1e-9 * lifted);
+  }
+}
+
 TEST(projection, momenta_of_separated_free_bodies) {
   std::mt19937 random(5);
   std::normal_distribution<double> normal;
