@@ -23,7 +23,7 @@ using testing::Solid;
 
 char message[512];
 bool is_found = false;    // impulses are withheld
-double pushed_n_s = 0.0;  // impulses of the engine, upwards
+double pushed_n_s = 0.0;  // impulses of the engine on bodies on the ground, upwards; without those it does not tell
 
 void check(carillon_status status) {
   if (status != CARILLON_OK) throw std::runtime_error(std::string(carillon_status_text(status)) + ": " + message);
@@ -222,11 +222,11 @@ void run(double hz, double seconds, const char* contacts, const char* live, cons
   check(carillon_touches_get_counters(touches, &seen));
   std::printf(
       "{\"steps\": %lld, \"points\": %lld, \"bad_points\": %lld, \"hits\": %lld, \"touches\": %lld, \"latest_s\": %.6g, "
-      "\"cpu_s\": %.6g, \"lost\": %lld, \"limited\": %lld, \"pushed_n_s\": %.9g}\n",
+      "\"cpu_s\": %.6g, \"lost\": %lld, \"limited\": %lld, \"pushed_n_s\": %.9g, \"mass_kg\": %.9g}\n",
       static_cast<long long>(seen.steps), static_cast<long long>(seen.points), static_cast<long long>(seen.bad_points),
       static_cast<long long>(seen.hits), static_cast<long long>(seen.touches), latest_s, total_s,
       static_cast<long long>(counters.refused + counters.late + counters.faults + counters.overflows + counters.resets),
-      static_cast<long long>(seen.limited), pushed_n_s);
+      static_cast<long long>(seen.limited), pushed_n_s, solids.front().mass_kg);
   carillon_touches_destroy(touches);
   carillon_destroy(synth);
 }
@@ -241,7 +241,7 @@ carillon_status __wrap_carillon_touches_step(carillon_touches* touches, double t
                                              const carillon_point* points, int32_t count, char* text, size_t size) {
   std::vector<carillon_point> given(points, points + count);
   for (carillon_point& p : given) {
-    if (p.b < 0) pushed_n_s += p.impulse_n_s * p.normal[2];
+    if (p.b < 0 && std::isfinite(p.impulse_n_s)) pushed_n_s += p.impulse_n_s * p.normal[2];
     if (is_found) p.impulse_n_s = p.friction_n_s[0] = p.friction_n_s[1] = p.friction_n_s[2] = std::nan("");
   }
   return __real_carillon_touches_step(touches, time_s, poses, bodies, given.data(), count, text, size);

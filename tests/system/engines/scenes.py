@@ -211,6 +211,24 @@ def play(programs, folder, engine, name, hz, height_m=0.0, seconds=None, way="gi
     return read_counters(output), render(programs, folder, name, "contacts.jsonl")
 
 
+def calc_momentum(programs, folder, engine, hz):
+    """Distance of the pulse of a steel ball that bounces from the engine's impulse [%], which may include the weight of the steps in which
+    the ball touches."""
+    seconds, file = 0.25, folder / "fall.jsonl"
+    bodies = [place("bead", "bead", BEAD, (0, 0, 0.1))]
+    counters = read_counters(
+        run(programs / f"engine_{engine}", hz, seconds, file.name, "-", 0, "given", cwd=folder, input=format_solids(bodies))
+    )
+    assert counters["limited"] == 0 and counters["hits"] == 1, counters
+    given = 0.0
+    for line in file.read_text().splitlines():
+        event = json.loads(line)
+        given += event["impulse"]["impulse_n_s"][2] if "impulse" in event else 0.0
+    weight = counters["mass_kg"] * 9.81 * counters["points"] * seconds / counters["steps"]
+    pushed = counters["pushed_n_s"]
+    return 100 * max(pushed - weight - given, given - pushed, 0.0) / pushed
+
+
 def find_differences(sound, own):
     """Of the windows of the first half second that are above 60 dB(A) in our own contact [dB]."""
     levels, wanted = calc_levels(sound)[:4], calc_levels(own)[:4]
