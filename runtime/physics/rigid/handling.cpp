@@ -56,6 +56,7 @@ int Space::append(Solid solid, const State& state) {
   problem_.add_body();
   instants_.add_body();
   rest_.add_body();
+  projection_.add_body();
   step_.add_body();
   return bodies_.count() - 1;
 }

@@ -17,6 +17,7 @@ class Projection {
  public:
   Projection(Bodies& bodies, TouchSets& touches, Ledger& ledger)
       : bodies_(bodies), touches_(touches), ledger_(ledger), owed_j_(bodies.count()) {}
+  void add_body() { owed_j_.push_back(0.0); }
 
   /// Takes energy that bodies owe from their motion. Call at the start of a step, before run().
   void collect(const Step& step);
