@@ -13,6 +13,7 @@ constexpr int kLoadSteps = 4;
 constexpr double kMeanS = 50e-3;  // s; averaging time of all impulses of a position
 constexpr double kSlipS = 50e-3;  // s; averaging time of slip, at least eight steps
 constexpr int kSlipSteps = 8;
+constexpr double kPartedM = 1e-6;       // m; gap of surfaces that have parted
 constexpr double kCreepMS = 1e-3;       // m/s; slower slip is creep of an engine's friction
 constexpr double kSettledS = 0.1;       // s; a position older than this has settled
 constexpr double kSettledRatio = 3.0;   // a hit on a loaded position is above this times its load
@@ -208,7 +209,7 @@ void TouchSpots::follow(const StepView& step, const Group& g, int count, Spot& s
   if (step.options.early && !spot.is_reported && !is_settled) report_early(step, spot, hits);
   const double gap =
       dot(step.place(step.scene.motions, g.a, g.stations_m[0]) - step.place(step.scene.motions, g.b, g.stations_m[1]), g.normal);
-  const bool has_decayed = !step.options.compliant || hit < kDecayedRatio * spot.peak_n * dt || (gap > 0.0 && parting > slowest);
+  const bool has_decayed = !step.options.compliant || hit < kDecayedRatio * spot.peak_n * dt || (gap > kPartedM && parting > slowest);
   const bool is_long = step.scene.time_s - spot.hit.touch_s > step.options.longest_hit_s;
   if (is_long) ++counters_->cut;
   if (is_long || !(hit > 0.0) || (parting > -slowest && has_decayed)) close(step, spot, hits);
