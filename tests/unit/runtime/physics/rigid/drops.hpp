@@ -41,15 +41,15 @@ inline std::vector<std::array<double, 2>> refine(const std::vector<std::array<do
 }
 
 /// Surface of a body of kDropBodies, about its own origin.
-inline geometry::tests::Solid make_drop_surface(int body) {
+inline geometry::tests::Solid make_drop_surface(int body, int fine = 1) {
   using namespace geometry::tests;
   switch (body) {
     case 0:
       return make_cylinder(0.0375, 0.006, 48);
     case 1:
-      return make_cylinder(0.012, 0.002, 48);
+      return make_cylinder(0.012, 0.002, 48 * fine);
     case 2:
-      return make_ring(0.02, 0.003, 48, 16);
+      return make_ring(0.02, 0.003, 48 * fine, 16 * fine);
     case 3:
       return make_cylinder(0.005, 0.2, 24);
     case 4:
@@ -57,13 +57,15 @@ inline geometry::tests::Solid make_drop_surface(int body) {
                         false);
     case 5:
       return make_lathe(
-          refine({{0, 0}, {0.025, 0}, {0.0325, 0.02}, {0.04, 0.09}, {0.037, 0.09}, {0.0295, 0.021}, {0.023, 0.004}, {0, 0.004}}, 0.006), 40,
-          false);
+          refine({{0, 0}, {0.025, 0}, {0.0325, 0.02}, {0.04, 0.09}, {0.037, 0.09}, {0.0295, 0.021}, {0.023, 0.004}, {0, 0.004}},
+                 0.006 / fine),
+          40 * fine, false);
     case 6: {
       std::vector<std::array<double, 2>> outline;
-      for (int i = 0; i <= 12; ++i) outline.push_back({0.08 * std::sin(0.1 * i), 0.08 * (1 - std::cos(0.1 * i))});
-      for (int i = 12; i >= 0; --i) outline.push_back({0.076 * std::sin(0.1 * i), 0.08 - 0.076 * std::cos(0.1 * i)});
-      return make_lathe(outline, 48, false);
+      const double part = 0.1 / fine;
+      for (int i = 0; i <= 12 * fine; ++i) outline.push_back({0.08 * std::sin(part * i), 0.08 * (1 - std::cos(part * i))});
+      for (int i = 12 * fine; i >= 0; --i) outline.push_back({0.076 * std::sin(part * i), 0.08 - 0.076 * std::cos(part * i)});
+      return make_lathe(outline, 48 * fine, false);
     }
     case 7:
       return make_box({0.2, 0.15, 0.0005}, 8);
