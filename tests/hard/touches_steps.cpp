@@ -1,4 +1,4 @@
-// Hard cases of the contact tracker: steps of an engine, written by hand, against the impulses and weights that were put in.
+// Hard cases of the contact tracker: synthetic steps of an engine, against their impulses and weights.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -140,7 +140,7 @@ std::vector<std::tuple<double, int, std::uint64_t, double>> play_stack(const ban
       for (TouchPoint p : on_four_corners(k, {}, kHalf, (2 - k) * weight * dt + (n % 25 == 20 ? 0.5 : 0.0))) {
         p.point_m[2] = kSize[2] * k;
         p.b = k - 1;
-        if (seed > 1 && p.b >= 0 && chance() % 2 == 0) {  // the pair the other way round
+        if (seed > 1 && p.b >= 0 && chance() % 2 == 0) {  // swaps the pair
           std::swap(p.a, p.b);
           p.normal = -1.0 * p.normal;
         }
@@ -269,8 +269,8 @@ TEST(touches, touch_nan) {
     } catch (const InputError&) {
     }
   }
-  hold("touch_nan", taken + static_cast<double>(rig.events.size() - events), 0.0, "steps that are taken");
-  // Bad points among good ones: these carry the weight on.
+  hold("touch_nan", taken + static_cast<double>(rig.events.size() - events), 0.0, "steps accepted");
+  // Bad points among good ones, which still carry the weight.
   std::vector<TouchPoint> points = on_four_corners(0, {}, kHalf, box.rigid.mass_kg * kGravity / 240.0);
   const TouchPoint good = points[0];
   int bad_points = 0;
@@ -282,12 +282,13 @@ TEST(touches, touch_nan) {
        : field < 7 ? p.gap_m
        : field < 8 ? p.impulse_n_s
                    : p.friction_n_s[field - 8]) = bad;
-      if (field >= 7 && (std::isnan(bad) || (field == 7 && bad < 0.0))) continue;  // found from the velocities; a pull is none
+      if (field >= 7 && (std::isnan(bad) || (field == 7 && bad < 0.0)))
+        continue;  // NaN: found from the velocities; a negative impulse counts as 0
       points.push_back(p);
       ++bad_points;
     }
   for (int n = 0; n < 20; ++n) rig.step(1.0 / 240.0, points);
-  hold("touch_nan", std::abs(rig.touches.get_counters().bad_points / 20.0 - bad_points), 0.0, "points that are taken");
+  hold("touch_nan", std::abs(rig.touches.get_counters().bad_points / 20.0 - bad_points), 0.0, "points accepted");
   hold("touch_nan", std::abs(sum_forces(rig) / wanted - 1.0) + count_hits(rig), 0.03, "weight, relative");
 }
 

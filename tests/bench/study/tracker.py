@@ -16,7 +16,8 @@ PROGRAMS = ("carillon-precompute", "carillon-mesh", "carillon-render", "engine_b
 SCENES = {"box": "box", "tube": "tube", "pile": "heap of ten boxes"}
 QUICK_SCENES = ("box",)
 RATES, USUAL_HZ = (60, 240, 1000), 240
-KNOBS = {"default": (8, "given"), "impacts without modes": (0, "given"), "early": (8, "early"), "impulses not given": (8, "found")}  # drive.cpp
+# Arguments MAX_IMPACTS and WAY of engine_bullet.
+KNOBS = {"default": (8, "given"), "impacts without modes": (0, "given"), "early": (8, "early"), "impulses not given": (8, "found")}
 LOUD_DB = 60.0  # windows that count, dB(A)
 
 
