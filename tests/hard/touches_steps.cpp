@@ -169,33 +169,10 @@ TEST(touches, touch_renumbered) {
 
 TEST(touches, touch_random_steps) {
   const bank::Bank ball = make_ball(kRadius);
-  const double mass = ball.rigid.mass_kg;
   double worst = 0.0, faults = 0.0;
   for (unsigned seed = 0; seed < 10; ++seed) {
-    std::mt19937 chance(seed);
-    std::uniform_real_distribution<double> exponent(std::log(1e-7), std::log(1.0 / 30.0));
     Rig rig;
-    rig.add(ball, "ball", {0, 0, 0.2}, {0, 0, -0.5});
-    rig.start();
-    double given = 0.0;
-    for (int n = 0; n < 3000; ++n) {
-      const double dt = std::exp(exponent(chance));
-      auto& pose = rig.poses[0];
-      const double before = pose.velocity_m_s[2];
-      double after = before - kGravity * dt, impulse = 0.0;
-      if (pose.position_m[2] <= kRadius && after < 0.0) {
-        const double wanted = before < -0.1 ? -0.5 * before : 0.0;
-        impulse = mass * (wanted - after);
-        if (before < -0.1) given += mass * (wanted - before);
-        after = wanted;
-      }
-      const Vec3 where{0, 0, pose.position_m[2] - kRadius};
-      pose.velocity_m_s[2] = after;
-      pose.position_m[2] = std::max(kRadius - 1e-3, pose.position_m[2] + dt * after);
-      std::vector<TouchPoint> points;
-      if (impulse > 0.0) points.push_back(on_ground(0, where, impulse));
-      rig.step(dt, points);
-    }
+    const double given = drive::tests::bounce_in_random_steps(rig, ball, kRadius, seed);
     faults += static_cast<double>(rig.faults.size());
     worst = std::max(worst, std::abs(rig.sum_impulses(0)[2] / given - 1.0));
   }

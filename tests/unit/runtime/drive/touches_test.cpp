@@ -211,31 +211,8 @@ TEST(Touches, OrderOfPointsAndBodiesChangesNothing) {
 
 TEST(Touches, StepsOfAnyLength) {
   const bank::Bank ball = make_ball(kRadius);
-  std::mt19937 chance(5);
-  std::uniform_real_distribution<double> exponent(std::log(1e-7), std::log(1.0 / 30.0));
   Rig rig;
-  rig.add(ball, "ball", {0, 0, 0.2}, {0, 0, -0.5});
-  rig.start();
-  double given = 0.0;
-  for (int n = 0; n < 3000; ++n) {
-    const double dt = std::exp(exponent(chance));
-    auto& pose = rig.poses[0];
-    const bool touches = pose.position_m[2] <= kRadius;
-    const double before = pose.velocity_m_s[2];
-    double after = before - kGravity * dt, impulse = 0.0;
-    if (touches && after < 0.0) {
-      const double wanted = before < -0.1 ? -0.5 * before : 0.0;
-      impulse = ball.rigid.mass_kg * (wanted - after);
-      if (before < -0.1) given += ball.rigid.mass_kg * (wanted - before);
-      after = wanted;
-    }
-    const Vec3 where{0, 0, pose.position_m[2] - kRadius};
-    pose.velocity_m_s[2] = after;
-    pose.position_m[2] = std::max(kRadius - 1e-3, pose.position_m[2] + dt * after);
-    std::vector<TouchPoint> points;
-    if (impulse > 0.0) points.push_back(on_ground(0, where, impulse));
-    rig.step(dt, points);
-  }
+  const double given = bounce_in_random_steps(rig, ball, kRadius, 5);
   EXPECT_TRUE(rig.faults.empty()) << rig.faults.front();
   EXPECT_GE(rig.touches.get_counters().hits, 2);
   EXPECT_NEAR(rig.sum_impulses(0)[2], given, 0.05 * given);
