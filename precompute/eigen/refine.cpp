@@ -168,11 +168,11 @@ Group find_above(const ModeErrors& errors, double tolerance) {
   return above;
 }
 
-// Bounds the errors of modes above the tolerance by the inverse at hand, at whatever shift: modes limited by rounding need no
-// factorisation of their own.
+// Bounds the errors of modes above the tolerance with the existing factor, at any shift: modes limited by rounding need no factorisation of
+// their own.
 void bound_at_hand(const RefineRequest& request, const std::vector<double>& lambda, Mat shapes, ModeErrors& errors, RefineCost& cost) {
   if (request.at_hand == nullptr) return;
-  constexpr std::size_t kBlock = 16;  // columns, for the sake of memory
+  constexpr std::size_t kBlock = 16;  // columns; limits memory
   const Group above = find_above(errors, request.tolerance);
   const LocalColumns access(shapes);
   const Columns all = access.view();

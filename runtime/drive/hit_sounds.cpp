@@ -1,6 +1,6 @@
 // Method: a Hertz pulse of the reduced mass that explains the engine's impulse; where modes would take more than 2 % of the blow, the
-// impact is integrated from the motions before it and scaled to at most the engine's impulse. Hits of two bodies at the same time, as of
-// both ends of a tube, are one impact.
+// impact is integrated from the motions before it and scaled to at most the engine's impulse. Simultaneous hits of two
+// bodies, as of both ends of a tube, are one impact.
 // Source: runtime/physics/impact; K. L. Johnson, "Contact mechanics" (1985), eq. 11.24.
 #include "runtime/drive/hit_sounds.hpp"
 
@@ -117,7 +117,7 @@ void HitSounds::add(const StepView& step, std::vector<FinishedHit>& hits, Lastin
     if (taken_[first] == 0) sound(step, gather(step, heard, first), counters, events);
 }
 
-/// The hit and those of the same bodies that began with it: one impact, if modes matter at one of them.
+/// The hit with the simultaneous ones of its bodies, if any of them needs modes; else the hit alone.
 std::vector<HitSounds::Contact> HitSounds::gather(const StepView& step, std::span<const FinishedHit* const> hits, std::size_t first) {
   const FinishedHit& seed = *hits[first];
   std::vector<Contact> together{make_contact(step, seed)};
@@ -163,7 +163,7 @@ void HitSounds::sound(const StepView& step, const std::vector<Contact>& contacts
   }
 }
 
-/// A body that rings from the impacts before.
+/// Body of an impact at touch_s, with the modal state that earlier impacts left.
 impact::Body HitSounds::make_body(const StepView& step, int index, const Motion& before, bool has_modes, double touch_s) {
   const TouchBody& given = step.bodies[index];
   impact::Body body;
@@ -184,8 +184,8 @@ impact::Body HitSounds::make_body(const StepView& step, int index, const Motion&
   return body;
 }
 
-/// Keeps the modal states after an impact whose forces are scaled by at most `scale`, so that modes gain at most `most_j`. Returns the
-/// factor.
+/// Stores the modal states after an impact whose forces are scaled by a factor of at most `scale`, so that modes gain at most `most_j` [J].
+/// Returns the factor.
 double HitSounds::keep_ringing(const std::array<int, 2>& bodies, const impact::Impact& impact, const std::vector<impact::Body>& before,
                                double touch_s, double scale, double most_j) {
   const impact::Books books = impact.get_books();
@@ -208,7 +208,7 @@ double HitSounds::keep_ringing(const std::array<int, 2>& bodies, const impact::I
   }
   const double gain_j = books.modal + books.dissipated_modes + books.above_band - at_first_j;
   if (at_first_j == 0.0) of_forces_j = gain_j;
-  const double shared_j = gain_j - of_forces_j;  // the gain is shared x + of_forces x^2 for a factor x
+  const double shared_j = gain_j - of_forces_j;  // work on the earlier motion; a factor x gains shared x + of_forces x^2
   if (of_forces_j > 0.0 && scale * (shared_j + scale * of_forces_j) > most_j)
     scale = (std::sqrt(shared_j * shared_j + 4.0 * of_forces_j * most_j) - shared_j) / (2.0 * of_forces_j);
   for (std::size_t i = 0, side = 0; i < after.size(); ++i, ++side) {
@@ -279,7 +279,7 @@ bool HitSounds::integrate(const StepView& step, const std::vector<Contact>& cont
   for (const impact::Pulse& pulse : pulses)
     for (const Vec3& impulse : pulse.impulse_n_s) push += dot(impulse, contacts[pulse.contact].hit.normal);
   if (!(push > 0.0)) return false;
-  // A predicted impulse, of one point alone, limits nothing: the impact knows all of its points.
+  // Predicted impulses are of single points; the integrated impact has all points, so they set no limit.
   if (first.is_predicted) most_j = std::numeric_limits<double>::max();
   const double largest = first.is_predicted ? 1.0 : std::min(1.0, wanted / push);
   const double scale = keep_ringing(pair, *impact, bodies, touch_s, largest, most_j);
@@ -289,7 +289,7 @@ bool HitSounds::integrate(const StepView& step, const std::vector<Contact>& cont
   return true;
 }
 
-/// The pulses of one contact of an impact that began at `touch_s`.
+/// Appends the forces of one contact of an impact that began at `touch_s`.
 void HitSounds::add_forces(const StepView& step, const Contact& c, double touch_s, std::size_t contact,
                            std::span<const impact::Pulse> pulses, double scale, std::vector<events::Event>& events) {
   for (const std::size_t side : {0, 1}) {

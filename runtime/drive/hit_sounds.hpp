@@ -32,16 +32,16 @@ class HitSounds {
   struct Contact {
     const FinishedHit& hit;
     double mass_kg = 0.0, speed_m_s = 0.0, restitution = 0.0, radius_m = 0.0, compliance = 0.0;
-    Blow blow{};           // as a Hertz pulse
-    double modal_j = 0.0;  // that it would give to the modes
+    Blow blow{};           // the hit as a Hertz pulse,
+    double modal_j = 0.0;  // and the energy it would give to the modes
     std::array<geometry::Place, 2> places{};
     std::array<std::vector<double>, 2> shapes{};  // (n, 3) at the places; empty: no modes
 
     /// Kinetic energy lost [J], at least 1 % of the blow.
     double calc_lost_j() const;
-    /// The same of one of several hits that share the impulse.
+    /// The same for one of several simultaneous hits, from its share of the impulse.
     double calc_part_j() const;
-    /// The hit is integrated with the modes of its bodies.
+    /// True if the hit must be integrated with the modes of its bodies.
     bool needs_modes() const;
   };
 
@@ -61,7 +61,7 @@ class HitSounds {
   static void add_forces(const StepView& step, const Contact& contact, double touch_s, std::size_t index,
                          std::span<const impact::Pulse> pulses, double scale, std::vector<events::Event>& events);
 
-  std::vector<char> taken_;  // of the hits of the step
+  std::vector<char> taken_;  // per hit of the step: part of an impact already
   Masks masks_{0};
   std::vector<Ringing> ringing_;  // per body
   int impacts_left_ = 0;

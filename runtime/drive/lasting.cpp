@@ -115,7 +115,7 @@ void LastingContacts::record(const Scene& scene, const Group& g, Spot& spot, std
     return w - dot(w, g.normal) * g.normal;
   };
   Vec3 over_a = calc_sweep(va), over_b = calc_sweep(vb);
-  if (g.slip_share < 1.0) {  // the tremble is that of the surface which moves faster under the contact
+  if (g.slip_share < 1.0) {  // solver jitter is taken from the surface that moves faster under the contact
     slip = g.slip_share * slip;
     if (norm(over_a) <= norm(over_b))
       over_b = over_a + slip;

@@ -20,7 +20,7 @@ struct Load {
   Vec3 where_m{}, normal{};      // normal: unit, from b to a
   double push_n = 0.0;           // normal force, > 0
   double curvature_per_m = 0.0;  // of both surfaces
-  double slip_share = 1.0;       // of the slip that is motion, not tremble of an engine
+  double slip_share = 1.0;       // share of the slip that is motion, not solver jitter
   bool smooth = false;           // the point moves over a curved surface
   std::uint64_t feature = 0;     // of the surfaces; constant while the same ones touch
   std::uint64_t spot = 0;        // identity of the position, if known; 0: by nearness

@@ -16,14 +16,14 @@ class SharpEdges {
  public:
   SharpEdges(std::span<const Vec3> vertices_m, std::span<const std::array<std::int32_t, 3>> triangles, double size_m);
 
-  /// Directions of the edges within 1 % of the size of a contact [m]: 0 on a face, 1 on an edge, 2 at a corner. `outward`: normal of the
-  /// contact. A tube that lies flat touches with its curved side, also at its rims; a box, whose sides are flat, with its corners.
+  /// Number of directions of edges near a contact point [m] (1 % of the size): 0 on a face, 1 on an edge, 2 at a corner. outward: contact
+  /// normal. At its rims a tube that lies flat counts as a face, a box at its corners does not.
   int count_directions(const Vec3& point_m, const Vec3& outward) const;
 
  private:
   struct Edge {
     Vec3 begin{}, end{};
-    std::array<Vec3, 2> normals{}, off{};  // of the facets that are part of a curved surface; directions from them over the edge
+    std::array<Vec3, 2> normals{}, off{};  // of its facets on curved surfaces; directions in them out over the edge
   };
   using Cell = std::array<std::int64_t, 3>;
   struct Hash {

@@ -1,5 +1,5 @@
 // Method: projected Gauss-Seidel for the normal impulses >= 0, and friction within Coulomb's cone, whose sum is the change of velocities
-// less gravity and gyroscopic terms; every group of bodies that touch by itself, until its impulses have settled.
+// less gravity and gyroscopic terms; each group of touching bodies separately.
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -12,12 +12,12 @@ namespace {
 constexpr int kMaxSweeps = 20;
 constexpr double kEnough = 1e-4;  // relative to the largest impulse of the group: change in a sweep
 
-/// Change of velocity that no impulse explains yet.
+/// Change of velocity of a body that no impulse explains yet [m/s, rad/s].
 struct Change {
   Vec3 linear{}, angular{};
 };
 
-/// One direction at a point: change of velocities of both bodies along it, and per impulse on a along it.
+/// Row of the Jacobian: one direction at a point, and the change of velocity of both bodies per impulse along it.
 struct Row {
   Vec3 along{};
   std::array<Vec3, 2> turning{}, linear{}, angular{};
@@ -159,7 +159,7 @@ class Solver {
 
   const StepView& step_;
   std::vector<Change> changes_;      // per body
-  std::vector<std::size_t> groups_;  // per body: another one of its group, or itself
+  std::vector<std::size_t> groups_;  // per body: its parent in the union-find of groups, or itself
   std::vector<Unknown> unknowns_;
 };
 

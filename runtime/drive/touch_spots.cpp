@@ -31,7 +31,7 @@ double calc_pull(const StepView& step, int a, int b, const Vec3& normal) {
   return std::max(0.0, (step.moves(b) ? along : 0.0) - (step.moves(a) ? along : 0.0));
 }
 
-/// Time from the begin of the step until the surfaces touch, in free fall from their gap then [s].
+/// Time from the start of the step until the surfaces touch, in free fall across their gap [s].
 double calc_wait_s(const StepView& step, int a, int b, const std::array<Vec3, 2>& stations, const Vec3& normal, double gap_m,
                    double approach_m_s) {
   if (step.options.points_after) gap_m = dot(step.place(step.before, a, stations[0]) - step.place(step.before, b, stations[1]), normal);
@@ -198,13 +198,13 @@ void TouchSpots::follow(const StepView& step, const Group& g, int count, Spot& s
   note_slip(step, g, spot);
   spot.seen_s = step.scene.time_s;
   spot.mean_n += dt / (dt + kMeanS) * (g.push_n_s / dt - spot.mean_n);
-  // Of a new contact, or after a hit, the mean since then.
+  // Averages since the contact began or was last hit.
   const double known_s = step.scene.before_s - std::max(spot.born_s, spot.quiet_s);
   spot.load_n += dt / (dt + std::min(calc_load_s(dt), known_s)) * ((g.push_n_s - hit) / dt - spot.load_n);
   if (g.curvature_per_m >= 0.0) spot.curvature_per_m = g.curvature_per_m;
   if (!spot.is_open) return;
   spot.hit.parting_m_s = std::max(0.0, parting);
-  // Whether a settled contact is struck or shaken is known at the end only.
+  // Hits of a settled contact are distinguished from shaking only at their end.
   const bool is_settled = step.scene.time_s - spot.born_s > kSettledS;
   if (step.options.early && !spot.is_reported && !is_settled) report_early(step, spot, hits);
   const double gap =
@@ -338,7 +338,7 @@ void TouchSpots::add_load(const StepView& step, Spot& spot, std::vector<Load>& l
     spot.is_round = spot.owner == spot.a ? c.is_a_round : c.is_b_round;
     if (!(spot.curvature_per_m >= 0.0)) spot.curvature_per_m = c.calc_sum();
   }
-  // Slip to and fro is tremble.
+  // Slip that averages out is solver jitter.
   const double mean = norm(spot.slip_m_s);
   const double slip_share = mean > kCreepMS ? mean / spot.slip_speed_m_s * std::sqrt(1.0 - kCreepMS * kCreepMS / (mean * mean)) : 0.0;
   loads.push_back({.a = spot.a,

@@ -16,12 +16,12 @@ namespace carillon::drive {
 /// A complete hit.
 struct FinishedHit {
   int a = 0, b = -1;
-  double opened_s = 0.0;  // begin of its first step
+  double opened_s = 0.0;  // start of its first step
   double touch_s = 0.0, end_s = 0.0;
   double approach_m_s = 0.0, parting_m_s = 0.0;  // before and after; parting >= 0
   double inverse_mass = 0.0;                     // 1/m_eff along the normal [1/kg]
   double push_n_s = 0.0;                         // along the normal, without weight
-  bool is_predicted = false;                     // the impulse, of a rigid impact at this point alone
+  bool is_predicted = false;                     // the impulse is that of a rigid impact at this point alone
   double curvature_per_m = 0.0;                  // NaN: unknown
   Vec3 normal{};                                 // world, from b to a
   double rubbed_n_s = 0.0;                       // friction
@@ -59,8 +59,8 @@ class TouchSpots {
     bool is_round = false;                             // the owner: the position may roll over it
     double born_s = 0.0, seen_s = 0.0, quiet_s = 0.0;  // first and last step with a push; end of the last hit
     double load_n = 0.0, mean_n = 0.0;                 // averaged: without hits, with hits
-    Vec3 slip_m_s{};                                   // averaged,
-    double slip_speed_m_s = 0.0;                       // and its magnitude
+    Vec3 slip_m_s{};                                   // averaged slip,
+    double slip_speed_m_s = 0.0;                       // and averaged magnitude of it
     bool is_gone = false, is_open = false, is_reported = false;
     double peak_n = 0.0;  // of the open hit
     FinishedHit hit;      // sums of the open hit, weighted by impulse

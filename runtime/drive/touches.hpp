@@ -25,7 +25,7 @@ struct TouchesOptions {
   int max_points = 4096;      // per step; of more the weakest are left out
   bool points_after = false;  // points are of the poses after the step, otherwise of those before it
   bool compliant = false;     // a hit lasts many steps: it ends when its force has decayed
-  bool early = false;         // hits are reported when they begin, with the impulse of an impact of the bodies' restitution
+  bool early = false;         // hits are reported when they begin, with the impulse predicted from the restitution
   int max_impacts = 8;        // integrated with modes, per step; further hits are limited Hertz pulses
   Vec3 gravity_m_s2{0.0, 0.0, -9.81};
   double slowest_m_s = 0.0;  // slower approaches are no hits; 0: 1 mm/s, or half of gravity times the step if that is more

@@ -1,5 +1,5 @@
-// Method: hits of one instant are grouped into spots, strongest first; each spot sounds as one Hertz pulse on both bodies. If several spots
-// share an impact, each carries its share of the mass.
+// Method: hits of one instant are grouped into spots, strongest first; each spot gives one Hertz pulse on both bodies. Spots that
+// share an impact divide the mass in proportion to their impulses.
 #include "runtime/physics/sounding.hpp"
 
 #include <algorithm>

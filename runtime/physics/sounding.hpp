@@ -18,7 +18,7 @@ class Sounding {
   /// `masks_hits`: omits hits masked by earlier ones.
   Sounding(const WorldSpec& spec, const rigid::Space& space, bool masks_hits);
 
-  /// The last body of the space is new.
+  /// Takes up the last body of the space, which is new.
   void add_body(const BodySpec& body);
 
   /// Pulses of an impact.

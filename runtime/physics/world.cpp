@@ -243,18 +243,18 @@ class World::Course {
   template <typename Act>
   void handle(int body, Act&& act);
   void check_handled(int body, bool must_move) const;
-  /// A body where it is, or may be put.
-  struct Guest {
+  /// A body at its present pose, or at one to be checked.
+  struct Posed {
     const std::string& name;
     const rigid::Solid& solid;
     const rigid::State& state;
   };
-  Guest get_guest(int body) const { return {names_[body], space_.solid(body), space_.state(body)}; }
-  static geometry::Box get_box(const Guest& guest) { return guest.solid.shape->calc_box(rigid::place(guest.solid, guest.state).frame); }
+  Posed get_posed(int body) const { return {names_[body], space_.solid(body), space_.state(body)}; }
+  static geometry::Box get_box(const Posed& posed) { return posed.solid.shape->calc_box(rigid::place(posed.solid, posed.state).frame); }
   std::vector<std::vector<int>> find_near() const;
   void check_overlaps() const;
-  void check_overlap(const Guest& guest, const std::vector<int>& others) const;
-  void check_free(const Guest& guest) const;
+  void check_overlap(const Posed& posed, const std::vector<int>& others) const;
+  void check_free(const Posed& posed) const;
   void prepare_shape(int body) const;
   void note_weight(int body) {
     if (options_.audits_energy && !space_.solid(body).fixed) energy_.weight_n += space_.solid(body).mass_kg * gravity_m_s2_;
@@ -390,12 +390,12 @@ int World::Course::add(const BodySpec& spec) {
 }
 
 /// Throws InputError if a body overlaps one that is there, or the ground.
-void World::Course::check_free(const Guest& guest) const {
-  const geometry::Box box = get_box(guest);
+void World::Course::check_free(const Posed& posed) const {
+  const geometry::Box box = get_box(posed);
   std::vector<int> near;
   for (int i = 0; i < count(); ++i)
-    if (!space_.is_absent(i) && !(space_.solid(i).fixed && guest.solid.fixed) && get_box(get_guest(i)).overlaps(box)) near.push_back(i);
-  check_overlap(guest, near);
+    if (!space_.is_absent(i) && !(space_.solid(i).fixed && posed.solid.fixed) && get_box(get_posed(i)).overlaps(box)) near.push_back(i);
+  check_overlap(posed, near);
 }
 
 void World::Course::remove(int body) {
@@ -409,7 +409,7 @@ void World::Course::remove(int body) {
 /// Sorted.
 std::vector<std::vector<int>> World::Course::find_near() const {
   std::vector<geometry::Box> boxes;
-  for (int i = 0; i < count(); ++i) boxes.push_back(get_box(get_guest(i)));
+  for (int i = 0; i < count(); ++i) boxes.push_back(get_box(get_posed(i)));
   std::vector<std::vector<int>> near(boxes.size());
   geometry::for_overlaps(boxes, [&](int a, int b) {
     if (space_.is_absent(a) || space_.is_absent(b)) return;
@@ -438,34 +438,34 @@ void World::Course::check_overlaps() const {
     if (!space_.is_absent(a)) {
       std::vector<int> others = near[a];
       std::erase_if(others, [&](int b) { return space_.is_joined(a, b); });
-      check_overlap(get_guest(a), others);
+      check_overlap(get_posed(a), others);
     }
 }
 
 /// Throws InputError if a body overlaps the ground or one of `others`.
-void World::Course::check_overlap(const Guest& guest, const std::vector<int>& others) const {
+void World::Course::check_overlap(const Posed& posed, const std::vector<int>& others) const {
   const auto calc_allowed_m = [](const rigid::Solid& solid) { return std::min(2e-4, 5e-3 * solid.shape->get_size_m()); };
-  const rigid::Placed placed = rigid::place(guest.solid, guest.state);
-  const double allowed_m = calc_allowed_m(guest.solid);
-  if (space_.ground() && !guest.solid.fixed) {
+  const rigid::Placed placed = rigid::place(posed.solid, posed.state);
+  const double allowed_m = calc_allowed_m(posed.solid);
+  if (space_.ground() && !posed.solid.fixed) {
     const double height_m = space_.ground()->height_m;
     geometry::PairMemory memory;
     std::vector<geometry::Touch> touches;
-    geometry::find_ground_touches(*guest.solid.shape, placed.frame, height_m, allowed_m, memory, touches);
+    geometry::find_ground_touches(*posed.solid.shape, placed.frame, height_m, allowed_m, memory, touches);
     double depth = 0.0;
     for (const geometry::Touch& touch : touches) depth = std::max(depth, -touch.gap_m);
     if (depth > allowed_m)
-      throw InputError(fmt::format("body '{}' starts {:.2f} mm inside the ground (height {:g} m); raise it by that much", guest.name,
+      throw InputError(fmt::format("body '{}' starts {:.2f} mm inside the ground (height {:g} m); raise it by that much", posed.name,
                                    depth * 1e3, height_m));
   }
   for (const int b : others) {
     Vec3 where{};
-    const double depth = geometry::calc_overlap(*guest.solid.shape, placed.frame, *space_.solid(b).shape,
+    const double depth = geometry::calc_overlap(*posed.solid.shape, placed.frame, *space_.solid(b).shape,
                                                 rigid::place(space_.solid(b), space_.state(b)).frame, where);
     if (depth > std::min(allowed_m, calc_allowed_m(space_.solid(b))))
       throw InputError(
           fmt::format("bodies '{}' and '{}' start inside each other, {:.2f} mm deep near ({:.4f}, {:.4f}, {:.4f}) m; move one of them",
-                      guest.name, names_[b], depth * 1e3, where[0], where[1], where[2]));
+                      posed.name, names_[b], depth * 1e3, where[0], where[1], where[2]));
   }
 }
 

@@ -119,7 +119,7 @@ class World {
   void drag(int body, const Vec3& target_m, double over_s = 0.02);
   /// Ends a grab; the body keeps its velocity. Nothing happens if there is none.
   void release(int body);
-  /// False: from now on no impact includes modes; they only limit its restitution. For a machine that is behind the sound.
+  /// False: from now on impacts are rigid, and modes only reduce their restitution. For hosts that fall behind real time.
   void allow_modal_impacts(bool may_begin);
   /// Puts an absent body into the world.
   void add(int body, const Entry& entry);

@@ -153,7 +153,7 @@ std::vector<scene::ScheduledBody> Stage::list_scheduled_bodies() const {
 std::string Stage::add_body(const std::string& text, scene::Banks& banks) {
   physics::World* const world = get_world();
   if (world == nullptr) throw InputError("no body of the scene can move, so that it has no physics");
-  if (synthesiser_->is_full()) throw InputError(fmt::format("{} bodies have been added already, the most of a run", kMaxAdded));
+  if (synthesiser_->is_full()) throw InputError(fmt::format("{} bodies have been added, the maximum of a run", kMaxAdded));
   scene::SceneBody body = scene::parse_new_body(base::parse_document(text, scene_->file.parent_path() / "new body"), *scene_);
   scene::read_bank(*scene_, body, banks);
   const std::string name = body.name;

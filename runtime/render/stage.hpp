@@ -24,14 +24,14 @@ int find_body(const std::vector<std::string>& names, const std::string& name);
 struct StageOptions {
   double look_ahead_s = 0.1;  // lead of the physics over the sound, > 0
   double gain_per_pa = 1.0;   // of the synthesiser's output
-  bool is_handled = false;    // bodies are added, and those that are fixed may be removed and added elsewhere
+  bool is_handled = false;    // bodies may be added, and fixed ones removed and added elsewhere
 };
 
 /// A synthesiser with the bodies of a scene, and the physics that plays them. Bodies have all effects that they may need. Scene and banks
 /// must outlive it. process() of the synthesiser may run on another thread; everything else is for one thread.
 class Stage {
  public:
-  /// The scene's bodies have their banks. Throws InputError for an invalid scene.
+  /// The bodies of the scene must have their banks. Throws InputError for an invalid scene.
   Stage(scene::Scene& scene, const StageOptions& options);
   ~Stage();
   Stage(const Stage&) = delete;
@@ -47,9 +47,9 @@ class Stage {
   /// Work when the sound has reached a time. False if the physics need not advance. Throws SolveError if the physics fails.
   bool step(double now_s);
 
-  /// Puts a new body into the scene and its world. `text`: JSON with the keys of a body in a scene file; paths are relative to that of the
-  /// scene. Banks that `banks` has need not be read; others hold up the physics meanwhile. Returns the name. Throws InputError with the
-  /// messages of a scene file, and changes nothing, for a body that cannot be used, and where kMaxAdded have been added.
+  /// Puts a new body into the scene and its world. `text`: JSON with the keys of a body in a scene file; paths are relative to the
+  /// scene file. A bank that is not in `banks` is read here, which blocks the physics. Returns the name. Throws InputError as for a scene
+  /// file, without effect, for an invalid body or after kMaxAdded.
   std::string add_body(const std::string& text, scene::Banks& banks);
   static constexpr int kMaxAdded = 256;
 

@@ -56,7 +56,7 @@ class DueTimes {
   }
   /// Invalid events so far (events::find_fault); they are never due.
   std::int64_t get_faults() const { return faults_; }
-  /// The last of the bodies is new.
+  /// Appends a body.
   void add_body() { last_s_.insert(last_s_.end() - 1, kNever); }
   /// nullptr for an unplayed body.
   const ScheduledBody* find_body(std::int32_t body) const;
@@ -88,7 +88,7 @@ class EventScheduler {
   EventScheduler(const EventScheduler&) = delete;
   EventScheduler& operator=(const EventScheduler&) = delete;
 
-  /// Another body of the events.
+  /// Appends a body.
   void add_body(const ScheduledBody& body) {
     bodies_.push_back(body);
     times_.add_body();

@@ -34,10 +34,10 @@ class Session {
   /// Initial pose, silence threshold, surface and instruction set of a body with these effects.
   synth::BodySettings make_settings(std::size_t body, synth::EffectSet effects) const;
 
-  /// Makes the model of the last body of the scene, which is new, or shares that of another one. Throws InputError for effects that it
-  /// cannot have.
+  /// Makes the model of the last, new body of the scene, or shares that of another body. Throws InputError for effects that its bank does
+  /// not support.
   void add_model(const bank::Bank* bank);
-  /// Forgets it, before it has been added.
+  /// Undoes add_model().
   void drop_model();
 
   /// Makes the synthesiser. Throws as synth::Synthesiser does.

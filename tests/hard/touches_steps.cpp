@@ -1,4 +1,4 @@
-// Hard cases of the contact tracker: steps of an engine, written by hand, against the impulses and weights that were put in.
+// Hard cases of the contact tracker: synthetic steps of an engine, against their impulses and weights.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -140,7 +140,7 @@ std::vector<std::tuple<double, int, std::uint64_t, double>> play_stack(const ban
       for (TouchPoint p : on_four_corners(k, {}, kHalf, (2 - k) * weight * dt + (n % 25 == 20 ? 0.5 : 0.0))) {
         p.point_m[2] = kSize[2] * k;
         p.b = k - 1;
-        if (seed > 1 && p.b >= 0 && chance() % 2 == 0) {  // the pair the other way round
+        if (seed > 1 && p.b >= 0 && chance() % 2 == 0) {  // swaps the pair
           std::swap(p.a, p.b);
           p.normal = -1.0 * p.normal;
         }
@@ -169,33 +169,10 @@ TEST(touches, touch_renumbered) {
 
 TEST(touches, touch_random_steps) {
   const bank::Bank ball = make_ball(kRadius);
-  const double mass = ball.rigid.mass_kg;
   double worst = 0.0, faults = 0.0;
   for (unsigned seed = 0; seed < 10; ++seed) {
-    std::mt19937 chance(seed);
-    std::uniform_real_distribution<double> exponent(std::log(1e-7), std::log(1.0 / 30.0));
     Rig rig;
-    rig.add(ball, "ball", {0, 0, 0.2}, {0, 0, -0.5});
-    rig.start();
-    double given = 0.0;
-    for (int n = 0; n < 3000; ++n) {
-      const double dt = std::exp(exponent(chance));
-      auto& pose = rig.poses[0];
-      const double before = pose.velocity_m_s[2];
-      double after = before - kGravity * dt, impulse = 0.0;
-      if (pose.position_m[2] <= kRadius && after < 0.0) {
-        const double wanted = before < -0.1 ? -0.5 * before : 0.0;
-        impulse = mass * (wanted - after);
-        if (before < -0.1) given += mass * (wanted - before);
-        after = wanted;
-      }
-      const Vec3 where{0, 0, pose.position_m[2] - kRadius};
-      pose.velocity_m_s[2] = after;
-      pose.position_m[2] = std::max(kRadius - 1e-3, pose.position_m[2] + dt * after);
-      std::vector<TouchPoint> points;
-      if (impulse > 0.0) points.push_back(on_ground(0, where, impulse));
-      rig.step(dt, points);
-    }
+    const double given = drive::tests::bounce_in_random_steps(rig, ball, kRadius, seed);
     faults += static_cast<double>(rig.faults.size());
     worst = std::max(worst, std::abs(rig.sum_impulses(0)[2] / given - 1.0));
   }
@@ -269,8 +246,8 @@ TEST(touches, touch_nan) {
     } catch (const InputError&) {
     }
   }
-  hold("touch_nan", taken + static_cast<double>(rig.events.size() - events), 0.0, "steps that are taken");
-  // Bad points among good ones: these carry the weight on.
+  hold("touch_nan", taken + static_cast<double>(rig.events.size() - events), 0.0, "steps accepted");
+  // Bad points among good ones, which still carry the weight.
   std::vector<TouchPoint> points = on_four_corners(0, {}, kHalf, box.rigid.mass_kg * kGravity / 240.0);
   const TouchPoint good = points[0];
   int bad_points = 0;
@@ -282,12 +259,13 @@ TEST(touches, touch_nan) {
        : field < 7 ? p.gap_m
        : field < 8 ? p.impulse_n_s
                    : p.friction_n_s[field - 8]) = bad;
-      if (field >= 7 && (std::isnan(bad) || (field == 7 && bad < 0.0))) continue;  // found from the velocities; a pull is none
+      if (field >= 7 && (std::isnan(bad) || (field == 7 && bad < 0.0)))
+        continue;  // NaN: found from the velocities; a negative impulse counts as 0
       points.push_back(p);
       ++bad_points;
     }
   for (int n = 0; n < 20; ++n) rig.step(1.0 / 240.0, points);
-  hold("touch_nan", std::abs(rig.touches.get_counters().bad_points / 20.0 - bad_points), 0.0, "points that are taken");
+  hold("touch_nan", std::abs(rig.touches.get_counters().bad_points / 20.0 - bad_points), 0.0, "points accepted");
   hold("touch_nan", std::abs(sum_forces(rig) / wanted - 1.0) + count_hits(rig), 0.03, "weight, relative");
 }
 

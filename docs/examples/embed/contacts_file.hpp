@@ -1,4 +1,4 @@
-// Contact tracker of examples whose physics runs without sound: its events as a contacts file (docs/howto/contacts-file.md). C++14.
+// Contact tracker of examples without playback: writes its events as a contacts file (docs/howto/contacts-file.md). C++14.
 #pragma once
 
 #include <carillon.h>
@@ -25,7 +25,7 @@ class ContactsFile {
   ContactsFile(const ContactsFile&) = delete;
   ContactsFile& operator=(const ContactsFile&) = delete;
 
-  /// Adds a body; bodies may share a bank. Its index in the tracker, and in the file.
+  /// Adds a body; bodies may share a bank. Returns its index in the tracker and in the file.
   std::int32_t add(const std::string& bank_file, const std::string& name, double restitution, double friction, bool is_fixed = false) {
     carillon_bank*& bank = banks_[bank_file];
     if (bank == nullptr) message_.check(carillon_bank_open(bank_file.c_str(), &bank, message_.text(), message_.size()));

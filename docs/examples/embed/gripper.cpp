@@ -1,8 +1,8 @@
-// A robot's gripper puts twenty objects one after the other on the other half of a table, and pushes the bars, by MuJoCo: no sound is
-// played, the contacts go into a file for carillon-render (--contacts, --labels).
+// A gripper simulated by MuJoCo moves twenty objects one by one to the other half of a table, and pushes the bars. Writes the contacts to a
+// file for carillon-render (--contacts, --labels).
 //
-//   mujoco_gripper FOLDER OUT.jsonl    FOLDER: banks table, finger, box, can, ball and bar (.hdf). Prints what the robot does and when, as
-//   lines of JSON, and the CPU time.
+//   mujoco_gripper FOLDER OUT.jsonl    FOLDER: banks table, finger, box, can, ball and bar (.hdf). Prints actions with
+//   their times, and the CPU time, as lines of JSON.
 #include <carillon/mujoco.h>
 
 #include <algorithm>
@@ -17,17 +17,17 @@
 namespace {
 
 constexpr double kRestitution = 0.46, kFriction = 0.45;
-constexpr mjtNum kAir = 1e-4;                   // N m s/rad; cans and balls stop
-constexpr double kOpen = 0.0, kClosed = 0.045;  // m; way of each finger
+constexpr mjtNum kRollDamping = 1e-4;           // N m s/rad; stops rolling cans and balls
+constexpr double kOpen = 0.0, kClosed = 0.045;  // m; travel of each finger
 constexpr int kObjects = 20, kColumns = 5;
 const char* const kKinds[] = {"bar", "box", "can", "ball"};
 const char* const kGeoms[] = {"type='box' size='0.06 0.006 0.0125'", "type='box' size='0.03 0.025 0.025'",
                               "type='cylinder' size='0.02 0.05' zaxis='1 0 0'", "type='sphere' size='0.025'"};
-const double kHeights[] = {0.0125, 0.025, 0.02, 0.025};  // m; of their centres above the table
+const double kHeights[] = {0.0125, 0.025, 0.02, 0.025};  // m; centres above the table
 
 std::string make_name(int object) { return kKinds[object % 4] + std::to_string(object / 4 + 1); }
 
-/// The hand hangs on three motors; its fingers are bars whose lower ends are 7 mm above the table when it is down.
+/// The hand has three position actuators; in its lowest position the ends of its fingers are 7 mm above the table.
 std::string make_model() {
   std::string text =
       R"(<mujoco><size nconmax="500" njmax="2000"/><option timestep="0.001" cone="elliptic" impratio="10" jacobian="sparse"/><default>
@@ -74,11 +74,11 @@ class Robot {
       : model_(model), data_(mj_makeData(model)), mujoco_(model, data_, file.get_touches()) {
     for (int body = 1; body < model->nbody; ++body) {
       const std::string name = mj_id2name(model, mjOBJ_BODY, body), kind = name.substr(0, name.find_first_of("12345"));
-      if (name == "hand") continue;  // moves without sound
+      if (name == "hand") continue;  // has no bank: makes no sound
       const std::string bank = folder + "/" + kind + ".hdf";
       mujoco_.add(body, file.add(bank, name, kRestitution, kFriction, kind == "table"));
       carillon::set_mass(model, body, file.get_bank(bank));
-      if (model->body_dofnum[body] == 6) std::fill_n(model->dof_damping + model->body_dofadr[body] + 3, 3, kAir);
+      if (model->body_dofnum[body] == 6) std::fill_n(model->dof_damping + model->body_dofadr[body] + 3, 3, kRollDamping);
     }
     mj_setConst(model, data_);
     data_->qpos[2] = data_->ctrl[2] = 0.16;  // the hand begins above the objects
@@ -88,7 +88,7 @@ class Robot {
 
   double time_s() const { return data_->time; }
   const mjtNum* find(const std::string& name) const { return data_->xpos + 3 * mj_name2id(model_, mjOBJ_BODY, name.c_str()); }
-  /// Moves the hand, its height counted from where it is down, and the fingers evenly within a time.
+  /// Moves hand and fingers smoothly to a position. z: height above the lowest position of the hand [m].
   void move(double x, double y, double z, double grip, double over_s) {
     const std::array<mjtNum, 5> to{x, y, z, grip, grip};
     std::array<mjtNum, 5> from;

@@ -1,4 +1,4 @@
-"""A gripper of MuJoCo that puts twenty objects on a table: microphone, accelerometers and labels on one clock."""
+"""A MuJoCo gripper that drops twenty objects on a table: timing of microphone, accelerometers and labels."""
 import json
 import re
 import resource
@@ -16,7 +16,7 @@ LARGEST_M = 0.065  # half the diagonal of an object
 
 
 def write_scene(stage, contacts, seconds):
-    """The bodies of the contacts file, with ears: a microphone, an accelerometer on a finger and one below the table."""
+    """The bodies of the contacts file, a microphone, an accelerometer on a finger and one below the table."""
     head = json.loads(contacts.open().readline())
     bodies = [{"name": body["name"], "bank": re.sub(r"\d+$", "", body["name"]) + ".hdf"} for body in head["bodies"]]
     scene = {
@@ -41,8 +41,8 @@ def calc_cpu_s(work):
 
 
 def find_onset(signal, frame, before, after, of_peak=0.0):
-    """The first frame, from `before` frames before a frame to `after` after it, above three times all of the 5 ms before these, and a share
-    of their peak; None: there is none."""
+    """First frame in [frame - before, frame + after) above three times the peak of the 5 ms before `frame - before`, and above the share
+    `of_peak` of the peak of the range; None if there is none."""
     quiet = abs(signal[frame - RATE // 200 : frame - before]).max()
     part = abs(signal[frame - before : frame + after])
     above = numpy.flatnonzero(part > max(3 * quiet, of_peak * part.max()))
@@ -71,7 +71,7 @@ class Labels:
 
 
 def draw(stage, sound, read, labels, begin_s, end_s):
-    """Microphone, both accelerometers, and under them the contacts and hits of the labels."""
+    """Plots the microphone, both accelerometers, and the contacts and hits of the labels."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -141,7 +141,7 @@ def play(stage):
 
 
 def check_clock(stage, sound, read, labels, drops):
-    """Labels against what is read and heard."""
+    """Compares times of the labels with the onsets in the sensors and at the microphone."""
     for channel, body in enumerate(("finger1", "table")):
         first = labels["hit.begin_s"][labels.find_first_hit(body, 0.0)]
         begun = numpy.flatnonzero(read[:, channel])[0]
@@ -158,5 +158,5 @@ def check_clock(stage, sound, read, labels, drops):
         on_table += 1
         onset = find_onset(read[:, 1], round(begin * RATE), 2, RATE // 50)
         exact += onset is not None and abs(onset - round(begin * RATE)) <= 1
-    stage.expect(f"20 drops are heard after the way of the sound ({heard} of {len(drops)})", heard == len(drops) == 20)
-    stage.expect(f"those on the table are in its sensor at the frame of the label ({exact} of {on_table})", exact == on_table >= 5)
+    stage.expect(f"20 drops are heard after the propagation time of their sound ({heard} of {len(drops)})", heard == len(drops) == 20)
+    stage.expect(f"those on the table reach its sensor at the frame of the label ({exact} of {on_table})", exact == on_table >= 5)

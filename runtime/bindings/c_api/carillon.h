@@ -473,7 +473,7 @@ typedef struct carillon_touches_options {
   int32_t max_points;   /* per step; of more the weakest are left out and counted */
   int32_t points_after; /* 0: points are of the poses before the step (Bullet, MuJoCo, PhysX, Jolt); 1: of those after it (Simbody) */
   int32_t compliant;    /* not 0: a hit lasts many steps (Simbody, MuJoCo): it ends when its force has decayed */
-  int32_t early;        /* not 0: hits are reported when they begin, with the impulse of an impact of the bodies' restitution */
+  int32_t early;        /* not 0: hits are reported when they begin, with the impulse predicted from the restitution */
   int32_t max_impacts;  /* with modes, per step; further hits are Hertz pulses limited in energy, counted as `simplified` */
   double gravity_m_s2[3];
   double slowest_m_s;     /* slower approaches are no hits; 0: 1 mm/s, or half of gravity times the step if that is more */

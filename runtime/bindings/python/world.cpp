@@ -186,8 +186,8 @@ void bind_world(py::module_& module) {
            "angular_velocity_rad_s"_a = Vec3{},
            "Puts a body that is absent into the world: position of its mesh frame [m], unit quaternion w x y z (default: as it was).")
       .def("add_body", &Scenery::add_body, "text"_a,
-           "Puts a new body into the world: JSON with the keys of a body in a scene file. Returns its name. The first body of a bank reads "
-           "it.")
+           "Puts a new body into the world: JSON with the keys of a body in a scene file. Returns its name. The first body of a bank "
+           "reads it.")
       .def("remove", &Scenery::remove, "body"_a, "Takes a body without joints and cords out of the world; it rings on.")
       .def("pose", &Scenery::get_pose, "body"_a, "(position [m], rotation w x y z) of the body's mesh frame, look_ahead_s after the sound.")
       .def("centre", &Scenery::get_centre, "body"_a, "Centre of mass [m], look_ahead_s after the sound.")

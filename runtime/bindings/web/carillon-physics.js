@@ -28,7 +28,7 @@ function advance() {
   engine.postMessage({ type: 'played', playback, words: events }, [events.buffer]);
 }
 
-/** Advances to the look-ahead beyond the engine. In real time impacts are without modes while less than a third of it is left. */
+/** Advances to the look-ahead beyond the engine. In real time impacts are rigid while less than a third of the look-ahead is left. */
 async function catchUp() {
   const now_s = (await ask({ type: 'settle' })) - at_s, began_ms = performance.now();
   while (isOpen && reached_s < now_s + look_ahead_s) {

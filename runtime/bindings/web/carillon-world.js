@@ -15,8 +15,8 @@ const kKeys = { ArrowLeft: [-1, 0, 0], ArrowRight: [1, 0, 0], ArrowUp: [0, 1, 0]
 export class World {
   /**
    * bodies: [{body, bank: bytes of its bank, fixed, absent, velocity_m_s, angular_velocity_rad_s, restitution (0.5), friction (0.4),
-   * roughness_m}]; each body of the audio starts where it was added. ground: keys of kGround, or null: none. modes: impacts include modes, as
-   * long as the physics is ahead of the sound. masking: inaudible hits are omitted. moved: called when there are new poses.
+   * roughness_m}]; each body of the audio starts where it was added. ground: keys of kGround, or null: none. modes: impacts include modes
+   * while the physics is ahead of the sound. masking: inaudible hits are omitted. moved: called after new poses.
    */
   static async open(audio, { bodies, ground = {}, gravity_m_s2 = [0, 0, -9.81], look_ahead_s = 0.1, modes = true, masking = true, moved = () => {} }) {
     const world = new World();
@@ -95,8 +95,8 @@ export class World {
   /**
    * Mouse, pen, fingers and keys of an element move bodies; returns a function that ends it. pick(event): {body, at_m} under the pointer, or
    * undefined. place(event, at_m): the point of the world where the pointer has moved to, for one held at at_m. Each pointer holds one body
-   * and throws it when it leaves. Keys push the body chosen(), the last one held, to a speed of speed_m_s; keys(event): the direction, or
-   * undefined (arrow and page keys, along the axes of the world).
+   * and throws it when it leaves. Keys push a body to speed_m_s. keys(event): direction of the push, or undefined (default:
+   * arrow and page keys, along the axes of the world); chosen(): the body (default: the last one held).
    */
   follow(element, { pick, place, speed_m_s = 1, keys = ({ key }) => kKeys[key], chosen }) {
     const held = new Map(), ends = new AbortController();
@@ -144,7 +144,7 @@ export class World {
     while (path.length > 1 && path[1][0] <= now_s) path.shift();
     return path.length === 0 ? undefined : { position_m: path[0].slice(1, 4), rotation: path[0].slice(4, 8) };
   }
-  /** Resolves when it is look_ahead_s ahead of the engine; an OfflineAudioContext waits for it, suspended at least that often. */
+  /** Resolves when the physics is look_ahead_s ahead of the engine. An OfflineAudioContext must be suspended for it at least that often. */
   settled() {
     return this.ask({ type: 'settle' });
   }

@@ -41,7 +41,7 @@ struct Contact {
   }
   /// Closed, not in a modal impact, not a cord.
   bool carries() const { return !presses && cord < 0 && touch.gap_m <= kTouchGapM; }
-  /// Touching, or of a curved surface that hops over its facets.
+  /// Touching, or open by no more than facets of a rolling surface cause.
   bool is_close() const { return touching || (touch.smooth && touch.gap_m <= kMissingDepthM); }
   /// A rolling contact stays closed where its gap drifts.
   bool is_closed() const { return touching && touch.gap_m <= (touch.smooth ? kGapDriftM : kTouchGapM); }
@@ -79,7 +79,7 @@ struct Pair {
   double sag_m = 0.0;                  // depth left by an ended modal impact: permitted, decays
   Vec3 apart_m{};                      // displacement of a in touch searches if the penetration is large for the thickness
 
-  /// Nothing but the present touches comes near: as after a search.
+  /// Resets the travel, as after a search: no other point of the pair can touch.
   void renew_search() { travelled_m = std::min(travelled_m, kMovedM); }
   double take_stopped_j() { return std::exchange(stopped_j, 0.0); }
   bool touches() const {

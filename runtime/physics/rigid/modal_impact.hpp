@@ -49,7 +49,7 @@ class ModalImpacts {
   /// True if the two bodies of a pair are in an impact at that point. Touch ids change while bodies roll.
   bool is_pressed(const Pair& pair, const Vec3& where) const;
 
-  /// False: none begins; impacts are rigid, with the restitution that the modes leave.
+  /// False: no modal impact begins; impacts are rigid, their restitution reduced by the energy that modes would take.
   void allow(bool may_begin) { may_begin_ = may_begin; }
   /// Limits the restitution of every hit by the energy transferred to modes; true if the impact must be integrated.
   bool predict(const Step& step, Collision& collision);

@@ -1,6 +1,6 @@
 // Method: min 1/2 dx^T M dx with n.(da - db) >= -gap - allowance for all touches of an island: the velocity problem without friction, with
 // velocities read as displacements. Open touches may close, but not overlap. The work is paid by the motion along the displacement, then by
-// all motion of the displaced bodies, now or once they move: a body that rocks to and fro would gain energy at each turn, where it is slow.
+// all motion of the displaced bodies, now or later, when they move: otherwise a rocking body would gain energy at each reversal.
 // Source: V. Acary, "Projected event-capturing time-stepping schemes for nonsmooth mechanical systems with unilateral contact and Coulomb's
 //   friction", Comput. Methods Appl. Mech. Eng. 256 (2013) 224.
 #include "runtime/physics/rigid/projection.hpp"

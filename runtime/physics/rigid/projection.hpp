@@ -11,15 +11,15 @@
 namespace carillon::rigid {
 
 /// Displaces the bodies of an island so that no touch is deeper than allowed, by the least displacement in the mass norm. Invariants: a
-/// free island keeps its momentum and angular momentum; energy is gained only where motion cannot pay for it; it is then booked as lifted,
-/// and the displaced bodies owe it until they move. Bodies on joints and in modal impacts are not moved.
+/// free island keeps its momentum and angular momentum; energy that motion cannot pay for at once is booked as lifted, and taken from the
+/// displaced bodies when they move. Bodies on joints and in modal impacts are not moved.
 class Projection {
  public:
   Projection(Bodies& bodies, TouchSets& touches, Ledger& ledger)
       : bodies_(bodies), touches_(touches), ledger_(ledger), owed_j_(bodies.count()) {}
   void add_body() { owed_j_.push_back(0.0); }
 
-  /// Takes energy that bodies owe from their motion. Call at the start of a step, before run().
+  /// Takes the energy that bodies owe from their motion. Call at the start of a step, before run().
   void collect(const Step& step);
   /// Call at the start of a step. Separates touches deeper than `allowed_m` plus their allowance (Pair::sag_m).
   void run(const Step& step, double allowed_m);

@@ -1,7 +1,7 @@
 // Method: a body that has been slow for a while sleeps if contact forces exist that balance it at rest. An island sleeps as a whole. If
 // other bodies of the island move, bodies sleep separately under the current forces of the others. These forces are monitored: if they
-// change by more than a fraction of its weight, the sleeping body wakes, and then possibly the bodies it supports, one after another. Where
-// touches move along curved surfaces no balance may be found; an island of which no body has moved away for kLongSlowS sleeps without it.
+// change by more than a fraction of its weight, the sleeping body wakes, and then possibly the bodies it supports, one after another. On
+// curved surfaces the proof of balance may fail; an island whose bodies have stayed in place for kLongSlowS sleeps without it.
 // Source: J. J. Moreau, "Unilateral contact and dry friction in finite freedom dynamics" (1988), the solution with zero velocities.
 #include "runtime/physics/rigid/rest.hpp"
 
@@ -20,7 +20,7 @@ constexpr double kSlowDelayS = 0.02;       // s; minimum time below kSlowSpeedMS
 constexpr double kSleepDelayS = 0.1;       // s; minimum slow time of a body that may sleep among moving ones,
 constexpr double kNeighbourSlowS = 0.05;   // s; and of the bodies that it touches,
 constexpr double kMaxTouchSpeedMS = 5e-4;  // m/s; with no faster contact
-constexpr double kStillM = 5e-5;           // m; invisible: no point of a body that stays where it is moves farther
+constexpr double kStillM = 5e-5;           // m; a body stays in place while no point moves farther
 constexpr double kWakeForceRatio = 0.05;   // fraction of the weight: change of the forces that wakes a body
 
 }  // namespace
@@ -240,7 +240,7 @@ std::vector<int> Rest::wake(int body, int by, bool alone) {
     bodies_.set_asleep(i, false);
     awake.push_back(i);
     paces_[i].slow_s = 0.0;
-    // A change of forces is no motion: what woke has to stay for kSleepDelayS.
+    // Waking is no motion: to sleep again the body must stay in place for kSleepDelayS only.
     paces_[i].anchored_s = std::max(paces_[i].anchored_s, bodies_.get_time() + kSleepDelayS - kLongSlowS);
     windows_.wake(i, by);
     for (auto& [key, pair] : touches_.pairs()) {

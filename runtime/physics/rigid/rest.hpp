@@ -35,9 +35,9 @@ class Rest {
   bool may_sleep(const std::vector<int>& bodies, double time_s);
   /// Puts an island to sleep if it is balanced at rest; true if so.
   bool try_island(Island& island, double step_s) { return try_sleep(island, step_s, {}) != Balance::none; }
-  /// Notes which bodies stay where they are. Call at the start of a window.
+  /// Updates how long each body has stayed in place. Call at the start of a window.
   void note_still();
-  /// Puts an island to sleep that has stayed where it is, whether or not its balance can be proven; true if so.
+  /// Puts an island to sleep whose bodies have stayed in place, without proof of balance. True if it sleeps.
   bool try_still(Island& island, double step_s);
   /// Puts bodies to sleep whose island keeps moving elsewhere. Call at the start of a window; uses the contacts of the last step.
   void try_parts();
@@ -61,8 +61,8 @@ class Rest {
     double slow_s = 0.0;        // duration of slow motion
     double next_proof_s = 0.0;  // next test of rest,
     double next_part_s = 0.0;   // that of a part of its island
-    State anchor;               // pose from which it has not moved away,
-    double anchored_s = 0.0;    // since then
+    State anchor;               // pose at which it has stayed in place
+    double anchored_s = 0.0;    // since this time
   };
   enum class Balance { none, stands, leans };  // leans: only with the forces of others
 

@@ -189,7 +189,8 @@ Point StepProblem::make_lasting_point(const Step& step, Pair& pair, const Contac
     return n >= 0 ? step.free[n].placed.frame : bodies_.get_frame(body);
   };
   geometry::Touch moved = t.smooth ? touches_.find_moved(pair, t, get_frame(pair.a), get_frame(pair.b)) : t;
-  const bool jumps = t.smooth && touches_.is_far_jump(pair, t, moved);  // as of a rod from end to end: the other end is a touch of its own
+  const bool jumps =
+      t.smooth && touches_.is_far_jump(pair, t, moved);  // e.g. from one end of a rod to the other, which is a separate touch
   if (jumps) moved = t;
   const Vec3& later = moved.where_m;
   // The impulse acts at mid-step, at the same point for both bodies.

@@ -21,7 +21,7 @@ class Windows {
 
   Windows(Bodies& bodies, TouchSets& touches, const Options& options, Ledger& ledger);
 
-  /// The last of the bodies is new.
+  /// Takes up the last of the bodies, which is new.
   void add_body();
 
   // Call in this order: new window, flights, small steps.

@@ -26,7 +26,7 @@ struct Hands {
 std::vector<std::string> split(std::string_view line);
 
 /// Carries out one command: a word, the name of a body, and numbers; points in metres, in the world. Or "add" and the JSON of a new body.
-/// Returns a line of text to print, or none. No words do nothing. Throws InputError, and changes nothing, for words that cannot be used.
+/// Returns a line of text to print, or none. Without words it does nothing. Throws InputError, without effect, for invalid commands.
 std::string carry_out(const std::vector<std::string>& words, Hands& hands);
 
 /// Lines that have arrived at a file descriptor, without waiting for more.

@@ -53,7 +53,7 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(0.01, 1.0))
       ->option_text("SHARE");
   app.add_flag("--commands", options.takes_commands, "Move bodies by commands from standard input, one a line");
-  app.add_option("--osc", options.osc, "Take the commands as OSC messages on this UDP port, of this machine if no address is given")
+  app.add_option("--osc", options.osc, "Take commands as OSC messages on this UDP port; from this machine only if no address is given")
       ->option_text("[ADDRESS:]PORT");
   app.footer(std::string("Commands (--commands, --osc); a NAME with spaces in double quotes:\n") + carillon::live::kCommandText);
   app.add_flag("-q,--quiet", options.quiet, "Print warnings and errors only");

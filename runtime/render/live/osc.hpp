@@ -11,15 +11,15 @@ namespace carillon::live {
 
 using Words = std::vector<std::string>;
 
-/// The messages of a packet, those of bundles in order, whose time tags are ignored: "/push" ,sfff becomes push and four more words.
+/// The messages of a packet, those of bundles in order without regard to time tags: "/push" ,sfff becomes "push" and four more words.
 /// Arguments are strings, symbols, numbers (i, f, h, d) and booleans. Throws InputError for a packet that cannot be used.
 std::vector<Words> parse_osc(std::span<const std::byte> packet);
 
 /// A UDP port. [main-thread]
 class OscPort {
  public:
-  /// "PORT" of this machine only, or "ADDRESS:PORT" (IPv4, 0.0.0.0 is all networks). Port 0 is any free one. Throws InputError for an
-  /// address that is none, SystemError if it cannot be used.
+  /// "PORT" of this machine only, or "ADDRESS:PORT" (IPv4, 0.0.0.0 is all networks). Port 0: any free one. Throws InputError for an
+  /// invalid address, SystemError if the port cannot be opened.
   explicit OscPort(const std::string& where);
   ~OscPort();
   OscPort(const OscPort&) = delete;

@@ -35,9 +35,9 @@ void warn(const std::vector<std::string>& warnings) {
 }
 
 /// Commands from standard input and by OSC.
-class Orders {
+class CommandInput {
  public:
-  Orders(const PlayerOptions& options, Hands hands) : hands_(std::move(hands)) {
+  CommandInput(const PlayerOptions& options, Hands hands) : hands_(std::move(hands)) {
     if (options.takes_commands) reader_.emplace(STDIN_FILENO);
     if (options.osc.empty()) return;
     port_.emplace(options.osc);
@@ -51,12 +51,12 @@ class Orders {
       for (const std::string& line : reader_->read())
         if (!take([&] { return split(line); })) return false;
     if (port_)
-      for (const Words& words : port_->read([&](const std::string& reason) { refuse("a packet of OSC is left out: " + reason); }))
+      for (const Words& words : port_->read([&](const std::string& reason) { refuse("OSC packet ignored: " + reason); }))
         if (!take([&] { return words; })) return false;
     return true;
   }
   void print() const {
-    if (port_) fmt::print("OSC                {} commands or packets left out\n", refused_);
+    if (port_) fmt::print("OSC                {} commands or packets rejected\n", refused_);
   }
 
  private:
@@ -78,7 +78,7 @@ class Orders {
   }
   void refuse(const std::string& reason) {
     if (++refused_ <= kMaxWarnings) warn({reason});
-    if (refused_ == kMaxWarnings) warn({"further commands that cannot be used are only counted"});
+    if (refused_ == kMaxWarnings) warn({"further rejected commands are only counted"});
   }
 
   Hands hands_;
@@ -120,12 +120,12 @@ void play(const PlayerOptions& options) {
   Device device(synthesiser, {.name = options.device, .null = options.null, .rate_hz = rate_hz, .frames = options.frames});
   Hands hands{.world = stage.get_world(), .names = {}, .make = [&](const std::string& text) { return stage.add_body(text, banks); }};
   for (const scene::SceneBody& body : scene.bodies) hands.names.push_back(body.name);
-  Orders orders(options, std::move(hands));
+  CommandInput commands(options, std::move(hands));
   stage.begin();
   device.start();
   synth::LoadKeeper keeper;
   for (double now_s = 0.0; now_s < scene.duration_s; now_s = synthesiser.get_time_s()) {
-    if (!orders.obey()) break;
+    if (!commands.obey()) break;
     const bool advanced = stage.step(now_s);
     if (options.cpu_share > 0.0) keeper.keep(synthesiser, options.cpu_share, device.get_statistics().busy_s);
     if (!advanced) std::this_thread::sleep_for(std::chrono::milliseconds(2));
@@ -138,7 +138,7 @@ void play(const PlayerOptions& options) {
       warn({text});
   if (options.quiet) return;
   print_statistics(device.get_statistics(), synthesiser.get_counters(), stage, rate_hz);
-  orders.print();
+  commands.print();
 }
 
 }  // namespace carillon::live

@@ -15,7 +15,7 @@ struct PlayerOptions {
   double cpu_share = 0.0;       // share of a core available to the sound; 0: unlimited
   double gain_per_pa = 0.0;     // 0: the scene's gain_per_pa, or 1
   bool takes_commands = false;  // from standard input: carry_out() (commands.hpp)
-  std::string osc;              // where they come by OSC: OscPort (osc.hpp); empty: nowhere
+  std::string osc;              // address of commands by OSC: OscPort (osc.hpp); empty: none
   bool quiet = false;
 };
 

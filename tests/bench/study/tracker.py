@@ -1,6 +1,5 @@
 """Section: sound of Bullet through the contact tracker against our own contact, by steps a second and by knobs of the tracker: impacts with
 modes, early hits, impulses that the engine does not give."""
-import json
 import pathlib
 import sys
 
@@ -13,11 +12,12 @@ sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "system/engine
 import scenes
 
 NAME, TITLE = "tracker", "Contact tracker: what the steps of an engine and the tracker's knobs cost and buy"
-PROGRAMS = ("carillon-precompute", "carillon-mesh", "carillon-render", "tracker_knobs")
+PROGRAMS = ("carillon-precompute", "carillon-mesh", "carillon-render", "engine_bullet")
 SCENES = {"box": "box", "tube": "tube", "pile": "heap of ten boxes"}
 QUICK_SCENES = ("box",)
 RATES, USUAL_HZ = (60, 240, 1000), 240
-KNOBS = {"default": (), "impacts without modes": ("--max-impacts", "0"), "early": ("--early",), "impulses not given": ("--unknown",)}
+# Arguments MAX_IMPACTS and WAY of engine_bullet.
+KNOBS = {"default": (8, "given"), "impacts without modes": (0, "given"), "early": (8, "early"), "impulses not given": (8, "found")}
 LOUD_DB = 60.0  # windows that count, dB(A)
 
 
@@ -27,11 +27,11 @@ def list_settings():
 
 
 def play(lab, folder, name, hz, knob, own):
-    """{first_db, centroid_percent, windows_db, hits, impacts, tracker_cpu}"""
+    """{first_db, centroid_percent, windows_db, hits, latest_ms, cpu: of the tracker [CPU s per s]}"""
     seconds, bodies = scenes.SCENES[name]
-    program = lab.find_program("tracker_knobs")
-    lines = scenes.run(program, *KNOBS[knob], hz, seconds, "contacts.jsonl", cwd=folder, input=scenes.format_solids(bodies)).splitlines()
-    counters = {key: value for line in lines for key, value in json.loads(line).items()}
+    words = [hz, seconds, "contacts.jsonl", "-", *KNOBS[knob]]
+    output = scenes.run(lab.find_program("engine_bullet"), *words, cwd=folder, input=scenes.format_solids(bodies))
+    counters = scenes.read_counters(output)
     sound = scenes.render(lab.find_program("carillon-render").parent, folder, name, "contacts.jsonl")
     (peak, centroid), (own_peak, own_centroid) = scenes.find_first_hit(sound), scenes.find_first_hit(own)
     levels, wanted = scenes.calc_levels(sound), scenes.calc_levels(own)
@@ -83,7 +83,7 @@ def study(lab, bodies):
     section.say(
         "Bodies fall in Bullet (`tests/system/engines/scenes.py`). The tracker makes contacts of its steps, and `carillon-render` plays"
         " them, against the same scene in our own physics. Error: median difference of the levels of windows of 125 ms above"
-        f" {LOUD_DB:g} dB(A), and of the peak of the first hit. A heap parts from ours for its motion alone. CPU is of the tracker."
+        f" {LOUD_DB:g} dB(A), and of the peak of the first hit. A heap differs already by its motion. CPU is of the tracker."
     )
     for name in names:
         section.conclude(describe(name, found))

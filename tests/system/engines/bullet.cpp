@@ -11,8 +11,8 @@ namespace {
 
 btVector3 to_bullet(const double (&x)[3]) { return {btScalar(x[0]), btScalar(x[1]), btScalar(x[2])}; }
 
-/// Shapes of a body; the last one is its own. A tube is a disc at each end: a cylinder gets one point per step on a plane, at one of its
-/// ends.
+/// Collision shapes of a body; the last one is the whole. A tube is a disc at each end: a cylinder on a plane gets one point per step, at
+/// one of its ends.
 std::vector<std::unique_ptr<btCollisionShape>> make_shapes(const Solid& solid) {
   const btVector3 half = to_bullet(solid.half_m);
   std::vector<std::unique_ptr<btCollisionShape>> shapes;
@@ -44,7 +44,7 @@ class Bullet : public Engine {
     world_.getSolverInfo().m_solverMode |= SOLVER_USE_2_FRICTION_DIRECTIONS;
     // Depth is corrected apart from velocities, or hits bounce too high; in longer steps a pile would not come to rest.
     if (step_s < 1e-3) world_.getSolverInfo().m_splitImpulsePenetrationThreshold = 1;
-    // Less depth than a body falls in a step is not corrected, or a pile would not come to rest; above 0.1 mm hits would be braked.
+    // Overlap below the fall of a step is not corrected, so that piles come to rest; above 0.1 mm hits would be slowed down.
     world_.getSolverInfo().m_linearSlop = btScalar(std::min(1e-4, 9.81 * step_s * step_s));
     add(btRigidBody::btRigidBodyConstructionInfo(0, nullptr, &plane_));
     for (const Solid& solid : solids) {

@@ -1,7 +1,8 @@
 // engine_NAME HZ SECONDS OUT.jsonl [LIVE.f32 [MAX_IMPACTS [WAY]]] < BODIES: the sound of a physics engine's scene. OUT: its contacts file;
 // LIVE: pressure at two ears [Pa], pairs of floats at 48 kHz; "-": none. WAY: "found", impulses are withheld, and found from the
 // velocities; "early", hits are reported when they begin. A line of BODIES: name kind bank, then half extents, position, rotation
-// (w x y z), velocity and spin. Prints counters, costs and the sum of the engine's impulses on bodies along the vertical as JSON.
+// (w x y z), velocity and spin. Prints as JSON: counters, CPU time of all and of the tracker, the engine's vertical impulses from the
+// ground.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -13,6 +14,7 @@
 #include <stdexcept>
 
 #include "runtime/bank/bank.hpp"
+#include "runtime/base/clock.hpp"
 #include "runtime/events/file.hpp"
 #include "tests/system/engines/engine.hpp"
 
@@ -23,7 +25,8 @@ using testing::Solid;
 
 char message[512];
 bool is_found = false;    // impulses are withheld
-double pushed_n_s = 0.0;  // impulses of the engine on bodies on the ground, upwards; without those it does not tell
+double pushed_n_s = 0.0;  // the engine's impulses from the ground on bodies, upwards; without unknown ones
+double tracker_s = 0.0;   // CPU time of carillon_touches_step
 
 void check(carillon_status status) {
   if (status != CARILLON_OK) throw std::runtime_error(std::string(carillon_status_text(status)) + ": " + message);
@@ -167,6 +170,19 @@ void play(carillon_synth* synth, double until_s, std::vector<float>& heard) {
   }
 }
 
+void print_figures(carillon_touches* touches, const carillon_counters& counters, double latest_s, double total_s, double mass_kg) {
+  carillon_touches_counters seen;
+  carillon_touches_counters_init(&seen);
+  check(carillon_touches_get_counters(touches, &seen));
+  std::printf(
+      "{\"steps\": %lld, \"points\": %lld, \"bad_points\": %lld, \"hits\": %lld, \"touches\": %lld, \"latest_s\": %.6g, "
+      "\"cpu_s\": %.6g, \"tracker_cpu_s\": %.6g, \"lost\": %lld, \"limited\": %lld, \"pushed_n_s\": %.9g, \"mass_kg\": %.9g}\n",
+      static_cast<long long>(seen.steps), static_cast<long long>(seen.points), static_cast<long long>(seen.bad_points),
+      static_cast<long long>(seen.hits), static_cast<long long>(seen.touches), latest_s, total_s, tracker_s,
+      static_cast<long long>(counters.refused + counters.late + counters.faults + counters.overflows + counters.resets),
+      static_cast<long long>(seen.limited), pushed_n_s, mass_kg);
+}
+
 void run(double hz, double seconds, const char* contacts, const char* live, const char* max_impacts, const std::string& way) {
   std::vector<Solid> solids = read_solids(std::cin);
   std::map<std::string, OpenBank> banks;
@@ -199,7 +215,7 @@ void run(double hz, double seconds, const char* contacts, const char* live, cons
     recorded.push_back({solid.name, std::ssize(bank.ours.triangles), events::mark_surface(bank.ours.vertices_m, bank.ours.triangles)});
   }
   std::vector<float> heard;
-  double tracker_s = get_cpu_s(), total_s = -tracker_s, latest_s = 0.0;
+  double total_s = -get_cpu_s(), latest_s = 0.0;
   const auto engine = testing::make_engine(solids, 1.0 / hz, touches);
   check(engine->start(message, sizeof message));
   const int steps = static_cast<int>(seconds * hz + 0.5);
@@ -217,16 +233,7 @@ void run(double hz, double seconds, const char* contacts, const char* live, cons
     std::ofstream(live, std::ios::binary)
         .write(reinterpret_cast<const char*>(heard.data()), static_cast<std::streamsize>(heard.size() * sizeof(float)));
   }
-  carillon_touches_counters seen;
-  carillon_touches_counters_init(&seen);
-  check(carillon_touches_get_counters(touches, &seen));
-  std::printf(
-      "{\"steps\": %lld, \"points\": %lld, \"bad_points\": %lld, \"hits\": %lld, \"touches\": %lld, \"latest_s\": %.6g, "
-      "\"cpu_s\": %.6g, \"lost\": %lld, \"limited\": %lld, \"pushed_n_s\": %.9g, \"mass_kg\": %.9g}\n",
-      static_cast<long long>(seen.steps), static_cast<long long>(seen.points), static_cast<long long>(seen.bad_points),
-      static_cast<long long>(seen.hits), static_cast<long long>(seen.touches), latest_s, total_s,
-      static_cast<long long>(counters.refused + counters.late + counters.faults + counters.overflows + counters.resets),
-      static_cast<long long>(seen.limited), pushed_n_s, solids.front().mass_kg);
+  print_figures(touches, counters, latest_s, total_s, solids.front().mass_kg);
   carillon_touches_destroy(touches);
   carillon_destroy(synth);
 }
@@ -244,7 +251,10 @@ carillon_status __wrap_carillon_touches_step(carillon_touches* touches, double t
     if (p.b < 0 && std::isfinite(p.impulse_n_s)) pushed_n_s += p.impulse_n_s * p.normal[2];
     if (is_found) p.impulse_n_s = p.friction_n_s[0] = p.friction_n_s[1] = p.friction_n_s[2] = std::nan("");
   }
-  return __real_carillon_touches_step(touches, time_s, poses, bodies, given.data(), count, text, size);
+  tracker_s -= carillon::base::get_thread_cpu_s();
+  const carillon_status status = __real_carillon_touches_step(touches, time_s, poses, bodies, given.data(), count, text, size);
+  tracker_s += carillon::base::get_thread_cpu_s();
+  return status;
 }
 }
 

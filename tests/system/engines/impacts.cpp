@@ -12,7 +12,7 @@ namespace {
 using SimTK::Vec3;
 
 constexpr double kStep = 1e-3;  // s, at most
-constexpr double kGap = 1e-5;   // m; that touches
+constexpr double kGap = 1e-5;   // m; of a contact
 const SimTK::UnitVec3 kUp(0, 0, 1);
 
 Vec3 to_simbody(const double (&x)[3]) { return {x[0], x[1], x[2]}; }
@@ -79,7 +79,7 @@ class Impacts : public Engine {
     matter_.adoptUnilateralContact(contact);
     pairs_.push_back(pair);
   }
-  /// Of two balls near enough to have touched in the step.
+  /// Adds the point of a pair near enough to have touched in the step.
   void add_point(const SimTK::State& state, const Pair& pair, double step_s) {
     const Ball& a = balls_[static_cast<std::size_t>(pair.a)];
     const Vec3 centre = a.body.getBodyOriginLocation(state), velocity = a.body.getBodyOriginVelocity(state);

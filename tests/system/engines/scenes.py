@@ -8,7 +8,7 @@ import numpy as np
 
 FRICTION, RESTITUTION = 0.4, 0.5  # of every body
 THROWN = ("box", "tube", "two", "bar", "slap", "rod", "bead", "drop")
-STARTS_M = (0.001, -0.001)  # further heights of thrown bodies: a bounce more or less is chance
+STARTS_M = (0.001, -0.001)  # offsets of further starts of thrown bodies: single bounces are chaotic
 BOX, BALL, TUBE = [0.06, 0.04, 0.025], [0.03, 0.03, 0.03], [0.075, 0.02, 0.02]
 BEAD, PANE, BAR, ROD = [0.008] * 3, [0.1, 0.075, 0.002], [0.1, 0.01, 0.006], [0.08, 0.005, 0.005]
 BANKS = {
@@ -55,7 +55,7 @@ def solve_banks(programs, folder):
 
 
 def place(name, kind, half, position, turns=(0, 0, 0), velocity=(0, 0, 0), spin=(0, 0, 0), lies=False):
-    """A body; turns in degrees about the fixed axes x, y, z. `lies`: on the ground, at all starts."""
+    """A body; turns in degrees about the fixed axes x, y, z. `lies`: it starts on the ground, not raised by STARTS_M."""
     return dict(name=name, kind=kind, half=half, position=position, turns=turns, velocity=velocity, spin=spin, lies=lies)
 
 
@@ -165,8 +165,8 @@ def calc_levels(sound, rate=48000, window_s=0.125):
 
 
 def find_first_hit(sound, rate=48000):
-    """Peak [Pa] and centroid of the spectrum [Hz] of the first 20 ms of the first hit. Peak: of the wave between its samples, as a sound of
-    14 kHz has 3.4 of them in a period."""
+    """Peak [Pa] and centroid of the spectrum [Hz] of the first 20 ms of the first hit. Peak: after 8-fold
+    interpolation, as a period at 14 kHz has only 3.4 samples."""
     begin = np.argmax(abs(sound) > 0.05 * abs(sound[: rate // 2]).max())
     part = sound[begin : begin + rate // 50]
     spectrum = np.fft.rfft(part)
@@ -176,7 +176,7 @@ def find_first_hit(sound, rate=48000):
 
 
 def read_counters(output):
-    """The last line: Debian's Simbody prints what its time stepper does."""
+    """Counters of the last line; Debian's Simbody logs its time stepper in those before."""
     return json.loads(output.splitlines()[-1])
 
 
@@ -192,7 +192,7 @@ def raise_bodies(bodies, height_m):
 
 
 def render_own(programs, folder, name):
-    """Our own contact's sound of a scene, and of the other starts of a thrown one."""
+    """Sounds of a scene by our own contact: of its start, and of the further starts of a thrown one."""
     seconds, bodies = SCENES[name]
     sounds = []
     for height_m in (0.0, *STARTS_M) if name in THROWN else (0.0,):

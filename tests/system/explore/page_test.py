@@ -365,7 +365,7 @@ class PageTest(unittest.TestCase):
         self.assertEqual(page.find_strangers(self.server.url), [])
         self.assertEqual((page.errors, page.console), ([], []))
 
-    def test_bodies_of_a_page_of_banks_come_off_their_stands(self):
+    def test_thrown_bodies_leave_their_stands(self):
         page = self.open("room")
         page.evaluate("document.getElementById('throw').click()")
         page.wait_for("carillon.thrower.isOn", timeout_s=60)

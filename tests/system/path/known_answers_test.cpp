@@ -187,7 +187,7 @@ TEST(Cantilever, of_aluminium_rings_as_the_clamped_bar_of_3_D_theory) {
   }
 }
 
-// Rounding of K limits the residuals of its lowest modes: they are bounded by a factor at hand, not by one for each group.
+// Rounding of K limits the residuals of the lowest modes: an existing factor bounds them, not one per group of modes.
 TEST(Cantilever, slender_and_fine_needs_four_factorisations_at_most) {
   JobFolder folder;
   mesh::write_gmsh(shapes::make_box({2.4, 0.01, 0.01}, {480, 2, 2}, 1), folder / "mesh.msh");

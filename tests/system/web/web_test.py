@@ -453,7 +453,7 @@ def test_world():
 
 
 def test_throw():
-    """Ten boxes thrown in the page sound as the same throw by carillon-render."""
+    """Ten boxes thrown in a page sound like the same throw by carillon-render."""
     bodies = [
         {
             "name": f"box {k}",

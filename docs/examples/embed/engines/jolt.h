@@ -23,8 +23,8 @@
 
 namespace carillon {
 
-/// One collision step for each Update: contacts of several would meet the poses of the last only. The listener runs on several threads,
-/// everything else on that of the physics.
+/// Use one collision step per Update: poses are read after the last one only. The listener may run on several threads, everything else on
+/// that of the physics.
 class JoltTouches : public JPH::ContactListener {
  public:
   /// Both must outlive this object.

@@ -1,4 +1,4 @@
-// Poses and contact points of a step for carillon_touches, of any engine: what jolt.h, physx.h and box3d.h share. C++17.
+// Poses and contact points of a step of any engine for carillon_touches; used by jolt.h, physx.h and box3d.h. C++17.
 #ifndef CARILLON_STEP_H
 #define CARILLON_STEP_H
 
@@ -22,7 +22,7 @@ class Step {
   void make_room(std::int32_t index) {
     if (poses_.size() <= static_cast<std::size_t>(index)) poses_.resize(static_cast<std::size_t>(index) + 1, make_pose());
   }
-  /// Of a body that was added. `spin` in world axes, `rotation` w x y z of the mesh.
+  /// Pose of an added body. rotation: w x y z of the mesh axes; spin [rad/s] in world axes.
   void set_pose(std::int32_t index, const Vector& centre, const std::array<double, 4>& rotation, const Vector& velocity, const Vector& spin,
                 std::uint32_t flags) {
     carillon_pose& pose = poses_[static_cast<std::size_t>(index)];
@@ -39,8 +39,8 @@ class Step {
     return {at[0], at[1], at[2]};
   }
 
-  /// A point on body b with the normal from b into a, and the impulse on a along it; NAN: found from the velocities. -1: the ground, for
-  /// one of both.
+  /// A contact of bodies a and b; one of them may be the ground (-1). on_b: on the surface of b, in the world [m]; normal: unit, from b to
+  /// a; gap [m]; impulse: on a along the normal [N s], NAN: found from the velocities.
   void add(std::int32_t a, std::int32_t b, const Vector& on_b, const Vector& normal, double gap, double impulse) {
     if (a == b) return;
     const bool is_turned = a < 0;
@@ -58,7 +58,7 @@ class Step {
     points_.push_back(point);
   }
 
-  /// As of carillon_touches_start and carillon_touches_step, which takes the points.
+  /// Call carillon_touches_start and carillon_touches_step; the latter consumes the points.
   carillon_status start(double time_s, char* message, std::size_t size) {
     points_.clear();
     return carillon_touches_start(touches_, time_s, poses_.data(), static_cast<std::int32_t>(poses_.size()), message, size);

@@ -83,7 +83,7 @@ export class ShownBody {
     this.material.dispose();
     this.material = this.mesh.material = this.makeMaterial(look);
   }
-  /** Without reflections and of few triangles, for motion on machines without a graphics card. */
+  /** Draws without reflections and with few triangles, for motion without a graphics card. */
   setSketched(isSketched) {
     const { color, opacity = 1 } = this.look;
     this.sketch ??= makeGeometry(makeCorners(simplify(this.surface, kSketchCells)));
@@ -110,7 +110,7 @@ export class ShownBody {
   setCentrePose(position_m, rotation) {
     this.setPose(subtract(position_m, rotate(rotation, this.centre_m)), rotation);
   }
-  /** Its centre of mass where the scene has it. */
+  /** Its centre of mass in the scene [m]. */
   findRestCentre() {
     return add(this.rest.position_m, rotate(this.rest.rotation, this.centre_m));
   }

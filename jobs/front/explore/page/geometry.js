@@ -124,7 +124,7 @@ export function findNamedPlaces(surface, rotation, loudest) {
 }
 
 /** Corners for drawing: smooth where neighbouring triangles meet at less than the crease, sharp elsewhere.
- * -> {positions, normals: Float32Array(3 N), vertexOf: Uint32Array(N), index: Uint32Array(3 T)}; N: corners that differ. */
+ * -> {positions, normals: Float32Array(3 N), vertexOf: Uint32Array(N), index: Uint32Array(3 T)}; N: distinct corners. */
 export function makeCorners(surface, creaseDegrees = 38) {
   const { vertices_m: v, triangles: t } = surface;
   const count = t.length / 3, flat = new Float32Array(3 * count), least = Math.cos((creaseDegrees * Math.PI) / 180);
@@ -166,7 +166,7 @@ export function makeCorners(surface, creaseDegrees = 38) {
   return { positions: Float32Array.from(positions), normals: Float32Array.from(normals.flat()), vertexOf: Uint32Array.from(vertexOf), index };
 }
 
-/** The surface with fewer triangles: the vertices of a cell whose normals point to one side become their mean. cells: per size of the body. */
+/** Simplified surface by vertex clustering: vertices of a cell with similar normals become their mean. cells: per size of the body. */
 export function simplify(surface, cells) {
   const { vertices_m: v, triangles: t } = surface, { low, size } = findBox(surface), step = size / cells;
   const normals = new Float32Array(v.length);

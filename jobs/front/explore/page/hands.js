@@ -13,8 +13,8 @@ const kKeyTurn = 0.09; // rad
 const kKeyScrape = { radius: 0.05, hz: 1.7 }; // circle of the key S: radius / size of the body, rate
 
 export class Hands {
-  /** gesture: 'strike', 'scrape' or 'press', the initial action of a press. holds(body), while bodies are thrown: true for those that a pointer
-   * takes along; they and the arrow keys are left to the thrower. */
+  /** gesture: 'strike', 'scrape' or 'press', the initial action of a press. holds(body), in throw mode: true for movable
+   * bodies, which like the arrow keys are left to the Thrower. */
   constructor(view, player) {
     Object.assign(this, { view, player, gesture: 'strike', pointers: new Map(), keys: new Map() });
     const { canvas } = view, on = (name, work) => canvas.addEventListener(name, (event) => work.call(this, event));

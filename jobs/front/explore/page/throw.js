@@ -1,20 +1,20 @@
-// Bodies that are grabbed, thrown and dropped: a world of rigid bodies, which loads when it is first asked for.
+// Throw mode: bodies are grabbed, thrown and dropped in a world of rigid bodies, loaded at first use.
 import { add, dot, norm, scale, subtract } from './geometry.js';
 
-const kReach = 2.5; // bodies come back from this distance / size of the scene
-const kStill_ms = 700;
-const kPush = 0.3; // height / size of the scene that a key throws a body to
+const kReach = 2.5; // distance / size of the scene at which bodies are brought back
+const kStill_ms = 700; // drawing goes on after the last pose: the sound is later
+const kPush = 0.3; // height of a throw by key / size of the scene
 
 const find = (id) => document.getElementById(id);
 
-/** Those that move: of a scene in which all are fixed, all. */
+/** Per body: true if it can be thrown. In a scene of fixed bodies only, all can. */
 export function listMovable({ bodies }) {
   const free = bodies.map(({ fixed = false }) => !fixed);
   return free.includes(true) ? free : free.map(() => true);
 }
 
 export class Thrower {
-  /** page: {scene, audio, player, view, hands, panel, transport}. Joints and cords stay with carillon-render: no button. */
+  /** page: {scene, audio, player, view, hands, panel, transport}. Scenes with joints or cords have no button: the page has no physics for them. */
   constructor(page) {
     Object.assign(this, page, { movable: listMovable(page.scene), away: new Set(), isPhone: matchMedia('(pointer: coarse)').matches });
     find('throwing').hidden = Boolean(this.scene.joints?.length || this.scene.cords?.length);
@@ -95,7 +95,7 @@ export class Thrower {
     this.transport?.show(0);
     this.view.draw();
   }
-  /** What would contradict the world waits for its end: edits of the bodies, the recording. */
+  /** Hides edits and the recording while the world is open: they hold for the poses of the scene. */
   setOpen(isOpen) {
     find('back').hidden = !isOpen;
     find('edit').hidden = isOpen;
@@ -107,7 +107,7 @@ export class Thrower {
     if (text !== '') this.panel.say(text);
   }
 
-  /** Draws the bodies while they move, and a little longer: the sound comes after the poses. */
+  /** Draws the bodies while they move, and kStill_ms longer. */
   follow() {
     this.moved_ms = performance.now();
     if (this.isFollowing) return;
@@ -125,7 +125,7 @@ export class Thrower {
       return this.isFollowing;
     });
   }
-  /** Lets a body that is far away fall in the middle, from where there is room. */
+  /** Drops a body that is far away onto the middle of the scene, from the lowest free height. */
   async bringBack(i) {
     if (this.away.has(i)) return;
     this.away.add(i);
@@ -136,7 +136,7 @@ export class Thrower {
       const position_m = add([middle[0], middle[1], floor_m + height * size], offset);
       if (await world.add(sound, { position_m, rotation }).then(() => true, () => false)) break;
     }
-    setTimeout(() => this.away.delete(i), 1000); // until the new poses are heard
+    setTimeout(() => this.away.delete(i), 1000); // until its new pose is current
   }
 
   // ---- hands
@@ -149,14 +149,14 @@ export class Thrower {
     this.hands.select(hit);
     return { body: this.player.bodies[this.hands.indexOf(hit.body)].sound, at_m: hit.point };
   }
-  /** Under the pointer, as far away as before; not below the floor. */
+  /** Point under the pointer at the same depth as before, not below the floor [m]. */
   place(event, at_m) {
     const { origin, direction } = this.view.findRay(event.clientX, event.clientY), { forward } = this.view.orbit.findAxes();
     const away = dot(subtract(at_m, origin), forward) / dot(direction, forward);
     const [x, y, z] = add(origin, scale(away, direction));
     return [x, y, Math.max(this.view.floor_m, z)];
   }
-  /** Level directions of the view. */
+  /** Direction of a push by key: horizontal ones are those of the view. */
   findDirection({ key, shiftKey }) {
     const { right } = this.view.orbit.findAxes(), away = [-right[1], right[0], 0], up = [0, 0, 1];
     const directions = {

@@ -147,7 +147,7 @@ export class View extends EventTarget {
     this.setLoose(false);
   }
 
-  /** isLoose: bodies are off their stands, on the floor, and cast shadows farther away. */
+  /** isLoose: bodies have left their stands for the floor, and shadows reach farther. */
   setLoose(isLoose) {
     const reach = (isLoose ? 1.5 : 0.75) * this.size, { camera } = this.key.shadow;
     Object.assign(camera, { left: -reach, right: reach, top: reach, bottom: -reach, near: 0.2 * this.size, far: 5 * this.size });
@@ -159,7 +159,7 @@ export class View extends EventTarget {
     this.draw();
   }
 
-  /** A picture that software draws in a frame: no shadows and reflections, few triangles. */
+  /** Draws without shadows and reflections and with few triangles, fast enough for software rendering. */
   setSketched(isSketched) {
     if (isSketched === Boolean(this.isSketched)) return;
     this.isSketched = isSketched;

@@ -12,7 +12,7 @@
 
 namespace carillon {
 
-/// Gives a body of the model the mass and inertia of a bank, whose mesh frame is the body's. Then call mj_setConst.
+/// Sets mass and inertia of a body of the model from a bank, whose mesh frame is the body's. Call mj_setConst afterwards.
 inline void set_mass(mjModel* model, int body, const carillon_bank* bank) {
   carillon_body_facts facts;
   carillon_body_facts_init(&facts);
@@ -27,8 +27,8 @@ inline void set_mass(mjModel* model, int body, const carillon_bank* bank) {
 }
 
 /// Poses and contact points of a MuJoCo model after each mj_step, with any integrator but RK4, whose contacts are of a stage inside the
-/// step. Options of the carillon_touches: points_after 0, compliant 1. MuJoCo lets no body sleep: one whose points are slower than 1 mm/s
-/// and stay within 0.1 mm for 0.1 s is asleep here. One thread: that of the physics.
+/// step. Options of the carillon_touches: points_after 0, compliant 1. MuJoCo has no sleep: bodies whose points have been slower than
+/// 1 mm/s and within 0.1 mm for 0.1 s are reported asleep. One thread: that of the physics.
 class MujocoTouches {
  public:
   /// All must outlive this object.
@@ -57,7 +57,7 @@ class MujocoTouches {
 
   /// Before the first step, and after the program has changed qpos or qvel. Status and message as of carillon_touches_start.
   carillon_status start(char* message, std::size_t size) {
-    for (Body& body : bodies_) body.rest = carillon_pose();  // none has rested
+    for (Body& body : bodies_) body.rest = carillon_pose();  // none rests yet
     read_poses();
     return carillon_touches_start(touches_, static_cast<double>(data_->time), poses_.data(), static_cast<std::int32_t>(poses_.size()),
                                   message, size);
@@ -76,7 +76,7 @@ class MujocoTouches {
     mjtNum mesh[4];
     std::uint32_t flags;
     double radius_m = 0.0;  // about the centre of mass
-    carillon_pose rest;
+    carillon_pose rest;     // pose it has stayed at since slow_since_s
     double slow_since_s = 0.0;
   };
   std::int32_t find(int geom) const {
@@ -109,7 +109,7 @@ class MujocoTouches {
       settle(bodies_[i], pose);
     }
   }
-  /// A body whose points stay slow and near a pose keeps that pose until they do not.
+  /// Holds a body at its rest pose, asleep, while its points stay slow and near it.
   void settle(Body& body, carillon_pose& pose) const {
     double way2 = 0.0, turn2 = 0.0, speed2 = 0.0, spin2 = 0.0;
     for (int k = 0; k < 4; ++k) turn2 += 4 * std::pow(pose.rotation[k] - body.rest.rotation[k], 2);

@@ -18,11 +18,11 @@ namespace carillon {
 /// One thread: that of the physics.
 class SimbodyTouches {
  public:
-  /// With compliant contact. All must outlive this object.
+  /// For compliant contact. All must outlive this object.
   SimbodyTouches(const SimTK::MultibodySystem& system, const SimTK::SimbodyMatterSubsystem& matter,
                  const SimTK::ContactTrackerSubsystem& tracker, const SimTK::CompliantContactSubsystem& contact, carillon_touches* touches)
       : system_(system), matter_(matter), tracker_(&tracker), contact_(&contact), touches_(touches) {}
-  /// With impacts (SimTK::UnilateralContact): points by add_point() only.
+  /// For impacts (SimTK::UnilateralContact): points come from add_point() only.
   SimbodyTouches(const SimTK::MultibodySystem& system, const SimTK::SimbodyMatterSubsystem& matter, carillon_touches* touches)
       : system_(system), matter_(matter), touches_(touches) {}
 
@@ -53,8 +53,8 @@ class SimbodyTouches {
     forces_ = std::move(forces);
     last_s_ = state.getTime();
   }
-  /// A point of body a against b (-1: the ground) that other than compliant contact pushes apart in this step, before step(). `where`: on b
-  /// in the world; `normal`: unit, from b to a; `gap`: of the surfaces at the end of the step. Its impulse is found from the velocities.
+  /// Adds a contact of bodies a and b (-1: the ground) that is no compliant one; call before step(). where: on b, in the world [m]; normal:
+  /// unit, from b to a; gap: at the end of the step [m]. Its impulse is found from the velocities.
   void add_point(std::int32_t a, std::int32_t b, const SimTK::Vec3& where, const SimTK::UnitVec3& normal, double gap) {
     carillon_point point = carillon_point();
     point.a = a;

@@ -74,6 +74,6 @@ class World(_World):
     def add_body(self, body: dict) -> str:
         """Puts a new body into the world: a dict with the keys of a body in a scene file. Returns its name.
 
-        Paths are relative to the scene. The first body of a bank reads it, which takes its time before the next sound.
+        Paths are relative to the scene. The first body of a bank reads it, which blocks until it is done.
         """
         return super().add_body(_write_json(body, "body"))

@@ -10,7 +10,7 @@
 namespace carillon::drive::tests {
 namespace {
 
-TEST(SharpEdges, BoxTouchesWithItsCornersAlsoOnAFace) {
+TEST(SharpEdges, BoxHasCornersAlsoOnAFace) {
   const auto box = geometry::tests::make_box({0.1, 0.08, 0.04}, {1, 1, 1});
   const SharpEdges edges(box.vertices, box.triangles, std::sqrt(0.1 * 0.1 + 0.08 * 0.08 + 0.04 * 0.04));
   const Vec3 down{0, 0, -1};
@@ -19,7 +19,7 @@ TEST(SharpEdges, BoxTouchesWithItsCornersAlsoOnAFace) {
   EXPECT_EQ(edges.count_directions({0.0, 0.0, -0.02}, down), 0);
 }
 
-TEST(SharpEdges, CylinderTouchesWithItsSideWhereItLiesFlat) {
+TEST(SharpEdges, CylinderLyingFlatHasNoEdge) {
   constexpr double kRadius = 0.02, kHalf = 0.05;
   const auto cylinder = geometry::tests::make_cylinder(kRadius, 2.0 * kHalf, 48);
   const SharpEdges edges(cylinder.vertices, cylinder.triangles, std::hypot(2.0 * kHalf, 2.0 * std::sqrt(2.0) * kRadius));

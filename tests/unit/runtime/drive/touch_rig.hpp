@@ -1,8 +1,10 @@
 // Steps of an engine, written by hand, for drive::Touches.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <map>
+#include <random>
 #include <span>
 #include <string>
 #include <variant>
@@ -78,6 +80,36 @@ inline std::vector<TouchPoint> on_four_corners(int body, const Vec3& centre_m, c
     for (const double y : {-1.0, 1.0})
       points.push_back(on_ground(body, {centre_m[0] + x * half_m[0], centre_m[1] + y * half_m[1], 0.0}, 0.25 * impulse_n_s));
   return points;
+}
+
+/// A ball of this radius [m] bounces on the ground with restitution 0.5 in 3,000 steps of random length, 1e-7 to 1/30 s. Returns the
+/// impulse of its hits without its weight [N s].
+inline double bounce_in_random_steps(Rig& rig, const bank::Bank& ball, double radius_m, unsigned seed) {
+  std::mt19937 chance(seed);
+  std::uniform_real_distribution<double> exponent(std::log(1e-7), std::log(1.0 / 30.0));
+  rig.add(ball, "ball", {0, 0, 0.2}, {0, 0, -0.5});
+  rig.start();
+  const double mass = ball.rigid.mass_kg;
+  double given = 0.0;
+  for (int n = 0; n < 3000; ++n) {
+    const double dt = std::exp(exponent(chance));
+    auto& pose = rig.poses[0];
+    const double before = pose.velocity_m_s[2];
+    double after = before - kGravity * dt, impulse = 0.0;
+    if (pose.position_m[2] <= radius_m && after < 0.0) {
+      const double wanted = before < -0.1 ? -0.5 * before : 0.0;
+      impulse = mass * (wanted - after);
+      if (before < -0.1) given += mass * (wanted - before);
+      after = wanted;
+    }
+    const Vec3 where{0, 0, pose.position_m[2] - radius_m};
+    pose.velocity_m_s[2] = after;
+    pose.position_m[2] = std::max(radius_m - 1e-3, pose.position_m[2] + dt * after);
+    std::vector<TouchPoint> points;
+    if (impulse > 0.0) points.push_back(on_ground(0, where, impulse));
+    rig.step(dt, points);
+  }
+  return given;
 }
 
 }  // namespace carillon::drive::tests

@@ -73,7 +73,7 @@ TEST(projection, work_paid_by_motion) {
   }
 }
 
-// A box at rest is lifted. Once it moves on the ground it pays for that, a half of its energy at a time; in the air it does not.
+// A box at rest is lifted. When it moves on the ground, each step takes at most half of its energy until that is paid; in the air none.
 TEST(projection, lift_paid_by_later_motion) {
   std::mt19937 random(8);
   for (int n = 0; n < 20; ++n) {

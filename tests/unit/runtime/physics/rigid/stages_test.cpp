@@ -435,9 +435,9 @@ TEST(rest, sleep_and_wake_of_balanced_island) {
   }
 }
 
-// A box on a slope too steep for its friction has no balance. Held where it is, as by bodies that the proof of rest does not find, it
-// sleeps after 0.3 s, and after 0.1 s once woken; not if it moves 60 um within that time, without a contact that carries it, or too deep.
-TEST(rest, sleep_of_island_that_stays_where_it_is) {
+// A box on a slope too steep for its friction has no balance. Kept in place nevertheless it sleeps after 0.3 s, and after 0.1 s once woken;
+// not if it moves 60 um within that time, is not carried by a contact, or is too deep.
+TEST(rest, sleep_of_island_that_stays_in_place) {
   enum Case { stays, moves, turns, is_open, is_deep };
   for (const Case now : {stays, moves, turns, is_open, is_deep}) {
     Stages stages({make_box(0.1, kBoxSides)}, {make_state({0, 0, 0.02})}, kWood, {kGravity * std::sin(0.5), 0, -kGravity * std::cos(0.5)});
