@@ -202,11 +202,7 @@ constexpr double kAudibleCents = 50.0;
 std::string describe_wide_bars(const bank::Bank& bank, const Setting& setting, bool is_asked) {
   const std::vector<double>& cents = bank.corrected.error_cents;
   if (cents.empty() || is_asked) return {};
-  const bool is_unknown = std::isinf(*std::max_element(cents.begin(), cents.end()));
-  if (is_unknown && bank.mass != "lumped")
-    return "frequencies have no error bars: most elements of T4 have no neighbour to compare strains with; use \"element\": \"T10\" or a "
-           "finer mesh";
-  if (is_unknown)
+  if (std::isinf(*std::max_element(cents.begin(), cents.end())))
     return "frequencies have no error bars: among so few modes of T4 with a lumped mass a whole family may be missing; use a consistent "
            "mass, \"element\": \"T10\", or a wider band";
   // Errors within the width of a strongly damped mode's resonance are inaudible.

@@ -119,7 +119,7 @@ Corrections correct(const Level& level, const std::vector<ErrorParts>& parts, co
   const OwnIntervals own = find_intervals(level, parts, corrections, verdict.least_cents);
   corrections.cents = widen_for_order(level.lambda, own, level.unlisted);
   corrections.facet_cents = find_facet_cents(level, own, corrections.cents);
-  if (is_unknown(level)) std::fill(corrections.cents.begin(), corrections.cents.end(), std::numeric_limits<double>::infinity());
+  if (is_too_short(level)) std::fill(corrections.cents.begin(), corrections.cents.end(), std::numeric_limits<double>::infinity());
   return corrections;
 }
 
@@ -208,10 +208,9 @@ Level predict_level(const Level& level, double power, bool keeps_geometry, doubl
   return then;
 }
 
-bool is_unknown(const Level& level) {
+bool is_too_short(const Level& level) {
   constexpr std::size_t kFew = 4;
-  constexpr double kMost = 0.5;
-  return level.kind == Kind::kT4 && (level.alone > kMost || (level.is_lumped && level.lambda.size() < kFew));
+  return level.is_lumped && level.kind == Kind::kT4 && level.lambda.size() < kFew;
 }
 
 std::size_t find_computed_count(std::size_t wanted) {

@@ -18,7 +18,6 @@ struct Level {
   Kind kind = Kind::kT4;
   bool is_lumped = false;  // the mass
   double one_layer = 0.0;  // fraction of elements that are flat and have all corners on the surface: 1 for a single-layer wall
-  double alone = 0.0;      // fraction of elements with no other in any of their patches, whose strains nothing can be compared with
   Unlisted unlisted;
 };
 
@@ -35,7 +34,7 @@ Level predict_level(const Level& level, double power, bool keeps_geometry, doubl
 struct Corrections {
   std::vector<double> lambda;  // (m) [rad^2/s^2] stated values: corrected, or the mesh's
   std::vector<double> cents;   // (m) bar: distance of the k-th lowest of `lambda` from the k-th true one, k as in ErrorBars; infinite if
-                               // is_unknown()
+                               // is_too_short()
   std::vector<double> facet_cents;  // (m) as ErrorBars::facet_cents, around `lambda`; empty: no facets in doubt
   // (m) one mesh: half the mesh's bar (T4: 0.4 of it); two meshes: a quarter (a third for curved elements); rough estimates: the mesh's own
   // interval; uncorrected modes: the mesh's bar; disputed modes: the distance of the two meshes
@@ -52,9 +51,9 @@ std::vector<double> find_facet_cents(const Level& level, const OwnIntervals& own
 /// Factor of lambda after removal of interpolation, lumping and geometry errors; > 0. Pure.
 double calc_share_left(const ErrorParts& parts, Kind kind, bool is_lumped);
 
-/// True if no bar of T4 can be known: most elements are alone; or the list is short, and among few modes with a lumped mass a whole family
-/// (bending) may be missing because the mesh shifts it far up. Pure.
-bool is_unknown(const Level& level);
+/// True if a list is too short for bars: among few lumped T4 modes a whole family (bending) may be missing because the mesh shifts it far
+/// up. Pure.
+bool is_too_short(const Level& level);
 
 /// Number of modes to compute for `wanted` reliable ones: the order of the last modes and the bars of short lists need a few more.
 std::size_t find_computed_count(std::size_t wanted);

@@ -174,7 +174,6 @@ ErrorBars calc_error_bars(const comm::Communicator& comm, const mesh::LocalMesh&
   level.is_lumped = mass_kind == job::Mass::lumped;
   level.lambda.assign(solution.lambda.begin(), solution.lambda.end());
   level.one_layer = recovery.one_layer;
-  level.alone = recovery.alone;
   level.unlisted = {solution.high_hz, solution.low_hz, solution.below};
   OwnIntervals own;
   for (std::size_t m = 0; m < solution.lambda.size(); ++m) {
@@ -200,7 +199,7 @@ ErrorBars calc_error_bars(const comm::Communicator& comm, const mesh::LocalMesh&
   bars.discretisation_cents = widen_for_order(solution.lambda, own, level.unlisted);
   bars.facet_cents = find_facet_cents(level, own, bars.discretisation_cents);
   bars.corrected = calc_corrections(level);
-  if (is_unknown(level)) bars.discretisation_cents = bars.corrected.cents;
+  if (is_too_short(level)) bars.discretisation_cents = bars.corrected.cents;
   return bars;
 }
 

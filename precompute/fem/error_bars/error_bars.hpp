@@ -39,7 +39,7 @@ struct ErrorBars {
   std::vector<double> algebraic_cents;
   /// Discretisation: distance between the frequencies of K phi = lambda M phi and of the elastic body: an estimate with safety factor, for
   /// the k-th of the sorted frequencies even if modes change order or enter the list. k counts elastic modes below the band too. Infinite
-  /// if is_unknown().
+  /// if is_too_short().
   std::vector<double> discretisation_cents;
   /// Estimated additional error of the k-th frequency if the facets are of the other kind (planes, or samples of a smooth surface).
   /// Independent of the mesh and not part of any bar. Empty: no ambiguous facets.

@@ -146,9 +146,6 @@ class Patches {
     }
   }
 
-  /// Samples of a patch, after sum() and before invert().
-  double count(std::size_t patch) const { return normal_[patch * terms_ * terms_]; }
-
   /// Contribution of a sample with monomials p to term t of the patch polynomial.
   double weight(std::size_t patch, const std::array<double, 10>& p, int t) const {
     const double* row = &normal_[(patch * terms_ + t) * terms_];
@@ -423,11 +420,6 @@ Recovery make_recovery(const comm::Communicator& comm, const mesh::LocalMesh& lo
     for_each_sample(local, recovery, *patches, [&](std::size_t, int, int, std::size_t patch, const auto& p) { patches->add(patch, p); });
   });
   patches->sum(recovery.vertices, elements.materials);
-  double alone = 0.0;
-  for (std::size_t at = 0; at < elements.patch.size(); at += 4)
-    if (std::all_of(&elements.patch[at], &elements.patch[at] + 4, [&](auto patch) { return patches->count(patch) <= elements.samples; }))
-      alone += 1.0;
-  recovery.alone = comm.sum(alone) / size[1];
   const std::vector<SurfaceEdge> doubtful = find_doubtful_edges(comm, local);
   comm.agree([&] {
     patches->invert();

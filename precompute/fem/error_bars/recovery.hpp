@@ -24,7 +24,7 @@ struct Recovery {
   std::vector<Shift> shifts, doubts;       // to the smooth surface; to the alternative surface
   std::vector<Traction> tractions;         // T10 with a consistent mass only
   comm::HaloExchange nodes, vertices;      // of values at places; at places among the vertices
-  double one_layer = 0.0, alone = 0.0;     // as in Level
+  double one_layer = 0.0;                  // Level::one_layer
 };
 
 /// Collective. Throws InputError naming an element without volume or a material that is not positive definite, on all ranks alike.
