@@ -146,6 +146,9 @@ class Patches {
     }
   }
 
+  /// Samples of a patch, after sum() and before invert().
+  double count(std::size_t patch) const { return normal_[patch * terms_ * terms_]; }
+
   /// Contribution of a sample with monomials p to term t of the patch polynomial.
   double weight(std::size_t patch, const std::array<double, 10>& p, int t) const {
     const double* row = &normal_[(patch * terms_ + t) * terms_];
@@ -420,13 +423,17 @@ Recovery make_recovery(const comm::Communicator& comm, const mesh::LocalMesh& lo
     for_each_sample(local, recovery, *patches, [&](std::size_t, int, int, std::size_t patch, const auto& p) { patches->add(patch, p); });
   });
   patches->sum(recovery.vertices, elements.materials);
+  // An element with no other in any of its patches has nothing to be compared with: its whole strain counts as error.
+  std::vector<char> is_alone(elements.count);
+  for (std::size_t e = 0; e < elements.count && local.order == 1; ++e)
+    is_alone[e] = std::all_of(&elements.patch[4 * e], &elements.patch[4 * e] + 4, [&](auto patch) { return patches->count(patch) < 1.5; });
   const std::vector<SurfaceEdge> doubtful = find_doubtful_edges(comm, local);
   comm.agree([&] {
     patches->invert();
     elements.weight.resize(elements.count * 4 * elements.samples * elements.terms);
     for_each_sample(local, recovery, *patches, [&](std::size_t e, int v, int s, std::size_t patch, const auto& p) {
       float* weight = &elements.weight[((e * 4 + v) * elements.samples + s) * elements.terms];
-      for (int t = 0; t < elements.terms; ++t) weight[t] = static_cast<float>(patches->weight(patch, p, t));
+      for (int t = 0; t < elements.terms; ++t) weight[t] = is_alone[e] != 0 ? 0.0F : static_cast<float>(patches->weight(patch, p, t));
     });
     if (local.order == 2) find_middles(local, *patches, recovery);
     recovery.shifts = find_shifts(surface.edges, local, material_of_tet, recovery);

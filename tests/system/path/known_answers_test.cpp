@@ -200,6 +200,19 @@ TEST(Cantilever, slender_and_fine_needs_four_factorisations_at_most) {
   EXPECT_LE(*std::max_element(bank.residual.begin(), bank.residual.end()), 1e-8);
 }
 
+// It has no neighbour to be compared with. T10 of a finer mesh is 1,100 cents lower.
+TEST(Bars, of_one_element_are_wide) {
+  JobFolder folder;
+  mesh::TetMesh one;
+  one.nodes_m = {{0, 0, 0}, {0.1, 0, 0}, {0, 0.1, 0}, {0, 0, 0.1}};
+  one.tets = {0, 1, 2, 3};
+  mesh::write_gmsh(one, folder / "mesh.msh");
+  folder.write_job(kSteel, R"("element": "T4", "mass": "consistent", "band_hz": [20, 60000],)");
+  const bank::Bank bank = folder.solve();
+  ASSERT_EQ(bank.mode_count(), 5U);
+  for (const double cents : bank.discretisation_error_cents) EXPECT_GT(cents, 1100.0);
+}
+
 TEST(Lumped, mass_of_T4_lowers_and_of_T10_keeps_the_frequencies_of_a_bar_within_a_few_per_cent) {
   JobFolder folder;
   mesh::write_gmsh(shapes::make_box({0.3, 0.02, 0.01}, {30, 2, 1}, 2), folder / "mesh.msh");
