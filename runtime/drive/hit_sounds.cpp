@@ -23,7 +23,8 @@ constexpr double kModalShare = 0.02;       // of the blow: below, a Hertz pulse 
 constexpr double kMinElasticShare = 0.01;  // of the blow: least energy of the modes
 constexpr double kMinImpactSpeed = 5e-3;   // m/s; slower hits are not integrated
 constexpr double kLongestImpactS = 20e-3;  // s
-constexpr double kLongestPulses = 50.0;    // an impact lasts at most this many Hertz times, for the sake of its cost
+constexpr double kLongestPulses = 50.0;    // an impact lasts at most this many Hertz times, for the sake of its cost,
+constexpr double kMostSteps = 5e4;         // or steps: its hits may be of very different lengths
 constexpr std::size_t kMaxTogether = 4;    // hits of an impact: its cost is cubic in them
 constexpr double kRubbedRatio = 0.02;      // of the impulse: below, without friction
 
@@ -270,7 +271,7 @@ bool HitSounds::integrate(const StepView& step, const std::vector<Contact>& cont
     bool closes = false;
     for (int i = 0; i < static_cast<int>(springs.size()); ++i) closes = closes || impact->calc_approach(i) > rigid::kMinImpactSpeedMS;
     if (!closes) return false;
-    (void)impact->advance(std::min(kLongestImpactS, longest_s));
+    (void)impact->advance(std::min({kLongestImpactS, longest_s, kMostSteps * impact->get_step_length()}));
   } catch (const std::invalid_argument&) {
     return false;
   }

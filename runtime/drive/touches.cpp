@@ -83,7 +83,8 @@ void check_body(const TouchesBody& b) {
   require(is_positive(b.mass_kg), "a body that moves needs a mass above 0, of its own or of its bank");
   const Mat3 inertia = make_matrix(b.inertia_kg_m2);
   const bool is_set = is_sane(inertia[0]) && is_sane(inertia[1]) && is_sane(inertia[2]);
-  require(is_set && inertia[0][0] > 0.0 && calc_det(inertia[0], inertia[1], inertia[2]) > 0.0,
+  const double minor = inertia[0][0] * inertia[1][1] - inertia[0][1] * inertia[1][0];
+  require(is_set && inertia[0][0] > 0.0 && minor > 0.0 && calc_det(inertia[0], inertia[1], inertia[2]) > 0.0,
           "a body that moves needs a positive definite inertia, of its own or of its bank");
 }
 

@@ -27,8 +27,20 @@ namespace {
 constexpr double kMaxGrabWeights = 30.0;   // largest force of a grab by default
 constexpr double kStandardGravity = 9.81;  // m/s^2
 
-void check_vector(const char* what, const Vec3& x) {
-  if (!is_finite(x)) throw InputError(fmt::format("{} must be three finite numbers", what));
+// Largest numbers given by hand. Beyond them steps become too many, and motions not finite.
+constexpr double kFarthestM = 1e4, kMaxSpeedMS = 300.0, kMaxSpinRadS = 1e4;
+constexpr double kMaxArmSizes = 10.0;  // sizes of a body from its centre of mass to the point held
+
+void check_vector(const char* what, const Vec3& x, double most) {
+  for (const double value : x)
+    if (!(std::abs(value) <= most))
+      throw InputError(fmt::format("{} must be three finite numbers, each within {:g} and {:g}", what, -most, most));
+}
+
+void check_motion(const Vec3& position_m, const Vec3& velocity_m_s, const Vec3& spin_rad_s) {
+  check_vector("a position [m]", position_m, kFarthestM);
+  check_vector("a velocity [m/s]", velocity_m_s, kMaxSpeedMS);
+  check_vector("an angular velocity [rad/s]", spin_rad_s, kMaxSpinRadS);
 }
 
 }  // namespace
@@ -243,6 +255,7 @@ class World::Course {
   template <typename Act>
   void handle(int body, Act&& act);
   void check_handled(int body, bool must_move) const;
+  void check_push(int body, const Vec3& at_m, const Vec3& impulse_n_s) const;
   /// A body at its present pose, or at one to be checked.
   struct Posed {
     const std::string& name;
@@ -307,22 +320,43 @@ void World::Course::check_handled(int body, bool must_move) const {
   if (must_move && space_.solid(body).fixed) throw InputError(fmt::format("body '{}' is fixed: it cannot be pushed or held", names_[body]));
 }
 
+/// A body may be faster than the limits, but no push makes it so.
+void World::Course::check_push(int body, const Vec3& at_m, const Vec3& impulse_n_s) const {
+  const rigid::Solid& solid = space_.solid(body);
+  const rigid::State& state = space_.state(body);
+  const rigid::Placed& placed = space_.placed(body);
+  const auto check = [&](const Vec3& before, const Vec3& change, double most, const char* unit) {
+    const double after = norm(before + change);
+    if (!(after <= std::max(most, norm(before))))
+      throw InputError(
+          fmt::format("the push gives body '{}' {:.3g} {}, and {:g} are the most; reduce the impulse", names_[body], after, unit, most));
+  };
+  check(state.velocity, (1.0 / solid.mass_kg) * impulse_n_s, kMaxSpeedMS, "m/s");
+  check(placed.spin, placed.inverse_inertia * cross(at_m - state.centre, impulse_n_s), kMaxSpinRadS, "rad/s");
+}
+
 void World::Course::push(int body, const Vec3& at_m, const Vec3& impulse_n_s) {
   check_handled(body, true);
-  check_vector("the place of a push", at_m);
-  check_vector("an impulse", impulse_n_s);
+  check_vector("the place of a push [m]", at_m, kFarthestM);
+  check_vector("an impulse [N s]", impulse_n_s, std::numeric_limits<double>::max());
+  finish_window();
+  check_push(body, at_m, impulse_n_s);
   handle(body, [&] { space_.push(body, at_m, impulse_n_s); });
 }
 
 void World::Course::grab(int body, const Vec3& at_m, const GrabSpec& spec) {
   check_handled(body, true);
-  check_vector("the place of a grab", at_m);
+  check_vector("the place of a grab [m]", at_m, kFarthestM);
   if (!(spec.frequency_hz >= 0.1 && spec.frequency_hz <= 100.0))
     throw InputError(fmt::format("the frequency of a grab, {} Hz, is not within 0.1..100", spec.frequency_hz));
   if (!(spec.damping_ratio >= 0.0 && spec.damping_ratio <= 10.0))
     throw InputError(fmt::format("the damping ratio of a grab, {}, is not within 0..10", spec.damping_ratio));
   if (!(spec.max_force_n >= 0.0 && std::isfinite(spec.max_force_n)))
     throw InputError(fmt::format("the largest force of a grab, {} N, must be a finite number, 0 or more", spec.max_force_n));
+  finish_window();
+  if (const double arm_m = norm(at_m - get_centre(body)), most_m = kMaxArmSizes * space_.solid(body).shape->get_size_m(); arm_m > most_m)
+    throw InputError(
+        fmt::format("the place of a grab is {:.3g} m from the centre of body '{}', and {:.3g} m is the most", arm_m, names_[body], most_m));
   handle(body, [&] {
     const double mass_kg = space_.solid(body).mass_kg, omega = 2.0 * std::numbers::pi * spec.frequency_hz;
     const rigid::State& state = space_.state(body);
@@ -338,7 +372,7 @@ void World::Course::grab(int body, const Vec3& at_m, const GrabSpec& spec) {
 
 void World::Course::drag(int body, const Vec3& target_m, double over_s) {
   check_handled(body, true);
-  check_vector("the target of a grab", target_m);
+  check_vector("the target of a grab [m]", target_m, kFarthestM);
   if (!(over_s >= 1e-3 && over_s <= 1e3)) throw InputError(fmt::format("the time of a drag, {} s, is not within 0.001..1000", over_s));
   if (space_.find_grab(body) == nullptr) throw InputError(fmt::format("body '{}' is not held; grab it first", names_[body]));
   finish_window();
@@ -366,6 +400,7 @@ void World::Course::add(int body, const Entry& entry) {
   spec.velocity_m_s = entry.velocity_m_s;
   spec.angular_velocity_rad_s = entry.angular_velocity_rad_s;
   check_entry(spec);
+  check_motion(entry.pose.position_m, entry.velocity_m_s, entry.angular_velocity_rad_s);
   finish_window();
   const rigid::State state = make_state(spec, space_.solid(body));
   check_free({names_[body], space_.solid(body), state});
@@ -374,6 +409,7 @@ void World::Course::add(int body, const Entry& entry) {
 
 int World::Course::add(const BodySpec& spec) {
   check_body(spec);
+  check_motion(spec.initial.position_m, spec.velocity_m_s, spec.angular_velocity_rad_s);
   finish_window();
   rigid::Solid solid = maker_.make(spec);
   const rigid::State state = make_state(spec, solid);

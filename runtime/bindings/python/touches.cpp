@@ -98,7 +98,10 @@ class Tracker {
     return touches_.step(time_s, poses_, points_);
   }
 
-  std::string take_lines() { return std::exchange(lines_, {}); }
+  std::string take_lines() {
+    const std::lock_guard one_at_a_time(calls_);
+    return std::exchange(lines_, {});
+  }
   double get_mark_s() const { return touches_.get_mark_s(); }
 
   py::dict describe_counters() const {

@@ -136,15 +136,21 @@ class Scenery {
     return is_absent;
   }
 
-  std::vector<std::string> list_names() const {
-    std::vector<std::string> names;
-    for (const scene::SceneBody& body : scene_.bodies) names.push_back(body.name);
-    return names;
+  std::vector<std::string> list_bodies() {
+    const py::gil_scoped_release others_run;
+    const std::lock_guard one_at_a_time(calls_);
+    return list_names();
   }
   double get_rate_hz() const { return scene_.sample_rate_hz; }
   double get_time_s() { return stage_->get_synthesiser().get_time_s(); }
 
  private:
+  std::vector<std::string> list_names() const {
+    std::vector<std::string> names;
+    for (const scene::SceneBody& body : scene_.bodies) names.push_back(body.name);
+    return names;
+  }
+
   template <typename Act>
   void act(const std::string& name, Act&& act) {
     const py::gil_scoped_release others_run;  // a running advance() needs the GIL to end
@@ -192,7 +198,7 @@ void bind_world(py::module_& module) {
       .def("pose", &Scenery::get_pose, "body"_a, "(position [m], rotation w x y z) of the body's mesh frame, look_ahead_s after the sound.")
       .def("centre", &Scenery::get_centre, "body"_a, "Centre of mass [m], look_ahead_s after the sound.")
       .def("is_absent", &Scenery::is_absent, "body"_a, "True if the body is not in the world.")
-      .def_property_readonly("bodies", &Scenery::list_names, "Names of the bodies.")
+      .def_property_readonly("bodies", &Scenery::list_bodies, "Names of the bodies.")
       .def_property_readonly("rate_hz", &Scenery::get_rate_hz)
       .def_property_readonly("time_s", &Scenery::get_time_s, "Time of the next frame [s].");
 }

@@ -412,6 +412,7 @@ TEST(Touches, BadInputChangesNothing) {
   EXPECT_THROW(rig.touches.step(0.0, rig.poses, {}), InputError) << "time does not advance";
   EXPECT_THROW(rig.touches.step(nan, rig.poses, {}), InputError);
   EXPECT_THROW(rig.touches.step(0.01, {}, {}), InputError) << "poses are missing";
+  EXPECT_THROW(rig.touches.add({.bank = &box, .inertia_kg_m2 = {1, 0, 0, 0, -1, 0, 0, 0, -1}}), InputError) << "two moments below 0";
   EXPECT_TRUE(rig.events.empty());
   EXPECT_EQ(rig.touches.get_counters().steps, 0);
   std::vector<TouchPoint> bad(9, on_ground(0, {}, 1e-3));

@@ -322,6 +322,40 @@ TEST(Add, AbsentBodyAndItsErrors) {
   EXPECT_THROW(World{tied}, InputError);
 }
 
+TEST(Handling, HugeNumbersAreRefused) {
+  const bank::Bank box = make_box({0.06, 0.05, 0.04});
+  BodySpec later = make_body("later", box, {0, 0, 0.02});
+  later.absent = true;
+  Watched w(make_floor({make_body("box", box, {0, 0, 0.02}), later}));
+  w.run(0.1);
+  const double mass_kg = box.rigid.mass_kg;
+  const Vec3 centre = w.world.get_centre(0);
+  for (const double huge : {1e5, 1e12, 1e300}) {
+    EXPECT_THROW(w.world.push(0, centre, {0, 0, mass_kg * huge}), InputError) << huge;
+    EXPECT_THROW(w.world.push(0, {huge, 0, 0.02}, {0, 0, mass_kg}), InputError) << huge;
+    EXPECT_THROW(w.world.push(0, {9e3, 0, 0.02}, {0, 0, mass_kg}), InputError) << "turns too fast";
+    EXPECT_THROW(w.world.grab(0, {huge, 0, 0.02}), InputError) << huge;
+    EXPECT_THROW(w.world.grab(0, {5, 0, 0.02}), InputError) << "far outside";
+    EXPECT_THROW(w.world.add(1, {.pose = {.position_m = {huge, 0, 1}}}), InputError) << huge;
+    EXPECT_THROW(w.world.add(1, {.pose = {.position_m = {0, 0, 1}}, .velocity_m_s = {huge, 0, 0}}), InputError) << huge;
+    EXPECT_THROW(w.world.add(1, {.pose = {.position_m = {0, 0, 1}}, .angular_velocity_rad_s = {huge, 0, 0}}), InputError) << huge;
+    BodySpec fast = make_body("fast", box, {0, 0, 1});
+    fast.angular_velocity_rad_s = {0, huge, 0};
+    EXPECT_THROW(w.world.add(fast), InputError) << huge;
+  }
+  int pushes = 0;
+  const auto push_on = [&] {
+    for (; pushes < 10; ++pushes) w.world.push(0, w.world.get_centre(0), {0, 0, mass_kg * 120});
+  };
+  EXPECT_THROW(push_on(), InputError) << "pushes add up";
+  EXPECT_EQ(pushes, 2);
+  w.world.push(0, w.world.get_centre(0), {0, 0, -mass_kg * 299});
+  w.world.grab(0, w.world.get_centre(0));
+  EXPECT_THROW(w.world.drag(0, {0, 1e300, 0}), InputError);
+  w.run(0.2);
+  EXPECT_TRUE(is_finite(w.world.get_centre(0)));
+}
+
 TEST(Handling, SameBitsHoweverTimeIsDivided) {
   const bank::Bank box = make_box({0.06, 0.05, 0.04});
   const WorldSpec spec = make_floor({make_body("a", box, {0, 0, 0.1}), make_body("b", box, {0.02, 0.01, 0.2})});
