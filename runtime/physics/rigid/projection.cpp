@@ -65,7 +65,8 @@ void Projection::collect(const Step& step) {
   });
   if (!is_held) return;  // a free island keeps its momentum
   for (const int i : step.island().bodies) {
-    if (!is_owing(i) || !is_movable(i)) continue;
+    // A slow body that pays goes on creeping: a heap would not come to rest.
+    if (!is_owing(i) || !is_movable(i) || bodies_.calc_speed(i) < kSlowSpeedMS) continue;
     State& s = bodies_.state(i);
     const double kinetic_j = calc_kinetic(bodies_.solid(i), s, bodies_.placed(i)), paid_j = std::min(owed_j_[i], kMaxPaidRatio * kinetic_j);
     if (!(paid_j > 0.0)) continue;
