@@ -156,7 +156,6 @@ std::string Stage::add_body(const std::string& text, scene::Banks& banks) {
   if (synthesiser_->is_full()) throw InputError(fmt::format("{} bodies have been added, the maximum of a run", kMaxAdded));
   scene::SceneBody body = scene::parse_new_body(base::parse_document(text, scene_->file.parent_path() / "new body"), *scene_);
   scene::read_bank(*scene_, body, banks);
-  const std::string name = body.name;
   const std::size_t number = scene_->bodies.size();
   scene_->bodies.push_back(std::move(body));
   try {
@@ -178,7 +177,7 @@ std::string Stage::add_body(const std::string& text, scene::Banks& banks) {
   const synth::EffectSet effects = scene::find_effects(*scene_, number, selector.get_possible(0));
   scheduler_.add_body(schedule(number, effects));
   session_.add_body(session_.make_settings(number, effects));
-  return name;
+  return scene_->bodies[number].name;
 }
 
 synth::Synthesiser& Stage::open() {
