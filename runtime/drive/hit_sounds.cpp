@@ -1,6 +1,6 @@
 // Method: a Hertz pulse of the reduced mass that explains the engine's impulse; where modes would take more than 2 % of the blow, the
-// impact is integrated from the motions before it and scaled to at most the engine's impulse. Simultaneous hits of two
-// bodies, as of both ends of a tube, are one impact.
+// impact is integrated from the motions before it and scaled to at most the engine's impulse. Simultaneous hits of two bodies, as of both
+// ends of a tube, are one impact.
 // Source: runtime/physics/impact; K. L. Johnson, "Contact mechanics" (1985), eq. 11.24.
 #include "runtime/drive/hit_sounds.hpp"
 
@@ -59,7 +59,7 @@ double HitSounds::Contact::calc_part_j() const {
 }
 
 HitSounds::Contact HitSounds::make_contact(const StepView& step, const FinishedHit& hit) {
-  Contact c{.hit = hit};
+  Contact c{.hit = hit, .blow = {.a = hit.a, .b = hit.b, .touch_s = hit.touch_s, .masked_s = hit.touch_s}};
   c.speed_m_s = std::max(hit.approach_m_s, rigid::kMinImpactSpeedMS);
   c.restitution = std::clamp(hit.parting_m_s / c.speed_m_s, 0.0, 1.0);
   c.mass_kg = hit.push_n_s / ((1.0 + c.restitution) * c.speed_m_s);
@@ -75,10 +75,9 @@ HitSounds::Contact HitSounds::make_contact(const StepView& step, const FinishedH
     const int body = side == 0 ? hit.a : hit.b;
     if (body < 0 || !step.bodies[body].shape) continue;
     const TouchBody& b = step.bodies[body];
-    c.places[side] = b.shape->find_place(hit.stations_m[side], hit.outwards[side]);
-    if (b.modes) c.shapes[side] = bank::calc_shapes(*b.given.bank, c.places[side].triangle, c.places[side].barycentric);
+    geometry::Place& place = c.blow.places[side] = b.shape->find_place(hit.stations_m[side], hit.outwards[side]);
+    if (b.modes) c.shapes[side] = bank::calc_shapes(*b.given.bank, place.triangle, place.barycentric);
   }
-  c.blow = {.a = hit.a, .b = hit.b, .touch_s = hit.touch_s, .masked_s = hit.touch_s, .places = c.places};
   c.blow.duration_s = impact::calc_hertz_duration(c.compliance, c.radius_m, c.mass_kg, c.speed_m_s);
   c.blow.impulses_n_s = hit.impulses_n_s;
   c.blow.impulse_n_s = norm(hit.impulses_n_s[0]);
@@ -302,8 +301,8 @@ void HitSounds::add_forces(const StepView& step, const Contact& c, double touch_
       if (pulse.contact != static_cast<int>(contact)) continue;
       events::Force first{.time_s = touch_s + pulse.start_s, .step_s = pulse.step_s, .body = body};
       first.other = side == 0 ? c.hit.b : c.hit.a;
-      first.triangle = c.places[side].triangle;
-      first.barycentric = c.places[side].barycentric;
+      first.triangle = c.blow.places[side].triangle;
+      first.barycentric = c.blow.places[side].barycentric;
       first.continues = std::exchange(continues, true);
       std::vector<Vec3> impulses;
       for (const Vec3& impulse : pulse.impulse_n_s) impulses.push_back(turn_back(c.hit.before[side].rotation, sign * impulse));

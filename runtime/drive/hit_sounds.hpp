@@ -32,10 +32,9 @@ class HitSounds {
   struct Contact {
     const FinishedHit& hit;
     double mass_kg = 0.0, speed_m_s = 0.0, restitution = 0.0, radius_m = 0.0, compliance = 0.0;
-    Blow blow{};           // the hit as a Hertz pulse,
-    double modal_j = 0.0;  // and the energy it would give to the modes
-    std::array<geometry::Place, 2> places{};
-    std::array<std::vector<double>, 2> shapes{};  // (n, 3) at the places; empty: no modes
+    Blow blow{};                                  // the hit as a Hertz pulse,
+    double modal_j = 0.0;                         // and the energy it would give to the modes
+    std::array<std::vector<double>, 2> shapes{};  // (n, 3) at the places of the blow; empty: no modes
 
     /// Kinetic energy lost [J], at least 1 % of the blow.
     double calc_lost_j() const;

@@ -2,8 +2,8 @@
 // less gravity and gyroscopic terms; each group of touching bodies separately.
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
+#include "runtime/base/groups.hpp"
 #include "runtime/drive/touch_bodies.hpp"
 
 namespace carillon::drive {
@@ -57,18 +57,18 @@ void explain(std::vector<Change>& changes, const Unknown& u, const Row& row, dou
 
 class Solver {
  public:
-  Solver(const StepView& step, std::vector<StepPoint>& points) : step_(step), changes_(step.before.size()), groups_(step.before.size()) {
-    std::iota(groups_.begin(), groups_.end(), 0);
+  Solver(const StepView& step, std::vector<StepPoint>& points) : step_(step), changes_(step.before.size()) {
+    base::Groups groups(static_cast<int>(changes_.size()));
     for (std::size_t i = 0; i < changes_.size(); ++i) find_change(static_cast<int>(i));
     for (StepPoint& p : points) {
       const bool is_known = p.is_impulse_known && p.is_friction_known;
       Unknown u = make(p);
       explain_known(u);
       if (is_known || !(u.rows[0].inverse_mass > 0.0)) continue;
-      if (u.bodies[0] >= 0 && u.bodies[1] >= 0) groups_[find_group(u.bodies[0])] = find_group(u.bodies[1]);
+      if (u.bodies[0] >= 0 && u.bodies[1] >= 0) groups.join(u.bodies[0], u.bodies[1]);
       unknowns_.push_back(u);
     }
-    for (Unknown& u : unknowns_) u.group = static_cast<int>(find_group(std::max(u.bodies[0], u.bodies[1])));
+    for (Unknown& u : unknowns_) u.group = groups.find(std::max(u.bodies[0], u.bodies[1]));
     std::stable_sort(unknowns_.begin(), unknowns_.end(), [](const Unknown& x, const Unknown& y) { return x.group < y.group; });
   }
 
@@ -99,12 +99,6 @@ class Solver {
     const Vec3 couple = cross(before.spin_rad_s, inertia * before.spin_rad_s);
     changes_[body].linear = now.velocity_m_s - before.velocity_m_s - step_.dt_s * step_.options.gravity_m_s2;
     changes_[body].angular = now.spin_rad_s - before.spin_rad_s + step_.dt_s * (before.inverse_inertia * couple);
-  }
-
-  std::size_t find_group(int body) {
-    auto at = static_cast<std::size_t>(body);
-    while (groups_[at] != at) at = groups_[at] = groups_[groups_[at]];
-    return at;
   }
 
   Unknown make(StepPoint& p) const {
@@ -158,8 +152,7 @@ class Solver {
   }
 
   const StepView& step_;
-  std::vector<Change> changes_;      // per body
-  std::vector<std::size_t> groups_;  // per body: its parent in the union-find of groups, or itself
+  std::vector<Change> changes_;  // per body
   std::vector<Unknown> unknowns_;
 };
 

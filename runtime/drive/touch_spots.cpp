@@ -1,5 +1,5 @@
-// Method: docs/howto/my-engine.md. A hit needs a speed of approach before the step; a lasting contact has a hit only
-// above three times its load, as engines shake resting bodies.
+// Method: docs/howto/my-engine.md. A hit needs a speed of approach before the step; a lasting contact has a hit only above
+// three times its load, as engines shake resting bodies.
 #include "runtime/drive/touch_spots.hpp"
 
 #include <algorithm>

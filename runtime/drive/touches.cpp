@@ -9,6 +9,7 @@
 #include <variant>
 #include <vector>
 
+#include "runtime/base/definite.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/quaternion.hpp"
 #include "runtime/drive/hit_sounds.hpp"
@@ -83,9 +84,7 @@ void check_body(const TouchesBody& b) {
   require(is_positive(b.mass_kg), "a body that moves needs a mass above 0, of its own or of its bank");
   const Mat3 inertia = make_matrix(b.inertia_kg_m2);
   const bool is_set = is_sane(inertia[0]) && is_sane(inertia[1]) && is_sane(inertia[2]);
-  const double minor = inertia[0][0] * inertia[1][1] - inertia[0][1] * inertia[1][0];
-  require(is_set && inertia[0][0] > 0.0 && minor > 0.0 && calc_det(inertia[0], inertia[1], inertia[2]) > 0.0,
-          "a body that moves needs a positive definite inertia, of its own or of its bank");
+  require(is_set && is_positive_definite(inertia), "a body that moves needs a positive definite inertia, of its own or of its bank");
 }
 
 void check_pose(const TouchesPose& pose, std::size_t index) {

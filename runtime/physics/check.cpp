@@ -9,6 +9,7 @@
 #include <limits>
 #include <numbers>
 
+#include "runtime/base/definite.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/groups.hpp"
 #include "runtime/physics/rigid/body.hpp"
@@ -29,25 +30,17 @@ void check_contact_numbers(const std::string& who, double restitution, double fr
   if (!(poisson > -1.0 && poisson <= 0.5)) throw InputError(fmt::format("{}: poisson_ratio {} is not within -1..0.5", who, poisson));
 }
 
-/// Sylvester's criterion, with a tolerance relative to the trace. False for NaN.
-bool is_positive_definite(const std::array<double, 9>& m, double tolerance) {
-  const double trace = m[0] + m[4] + m[8];
-  const double minor2 = m[0] * m[4] - m[1] * m[3];
-  const double minor3 = m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) + m[2] * (m[3] * m[7] - m[4] * m[6]);
-  return std::isfinite(trace) && m[0] > tolerance * trace && minor2 > tolerance * trace * trace &&
-         minor3 > tolerance * trace * trace * trace;
-}
-
 void check_rigid(const std::string& who, const bank::RigidBody& r) {
   if (!(r.mass_kg > 0.0 && std::isfinite(r.mass_kg)) || !is_finite(r.centre_m)) {
     throw InputError(fmt::format("{}: invalid mass {} kg or centre of mass in its bank; make the bank again", who, r.mass_kg));
   }
   const auto& i = r.inertia_kg_m2;
-  if (!is_positive_definite(i, 0.0)) throw InputError(who + ": the inertia in its bank is not positive definite; make the bank again");
+  if (!is_positive_definite(make_matrix(i)))
+    throw InputError(who + ": the inertia in its bank is not positive definite; make the bank again");
   // tr(I)/2 - I is the integral of x x^T over the mass, which is positive semidefinite for any mass distribution.
   const double half_trace = 0.5 * (i[0] + i[4] + i[8]);
   const std::array<double, 9> second{half_trace - i[0], -i[1], -i[2], -i[3], half_trace - i[4], -i[5], -i[6], -i[7], half_trace - i[8]};
-  if (!is_positive_definite(second, -1e-9)) {
+  if (!is_positive_definite(make_matrix(second), -1e-9)) {
     throw InputError(who + ": impossible inertia in its bank (one principal moment exceeds the sum of the others); make the bank again");
   }
 }

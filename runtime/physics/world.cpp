@@ -27,8 +27,6 @@ namespace {
 constexpr double kMaxGrabWeights = 30.0;   // largest force of a grab by default
 constexpr double kStandardGravity = 9.81;  // m/s^2
 
-// Largest numbers given by hand. Beyond them steps become too many, and motions not finite.
-constexpr double kFarthestM = 1e4, kMaxSpeedMS = 300.0, kMaxSpinRadS = 1e4;
 constexpr double kMaxArmSizes = 10.0;  // sizes of a body from its centre of mass to the point held
 
 void check_vector(const char* what, const Vec3& x, double most) {

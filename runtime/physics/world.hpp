@@ -39,6 +39,11 @@ struct GroundSpec {
   double roughness_m = 20e-6;  // as above; smooth trowelled concrete
 };
 
+// Largest values of bodies in scenes and of bodies moved from outside; beyond them steps become too many, and motions not finite.
+inline constexpr double kFarthestM = 1e4;     // of positions; half a minute at the speed of sound
+inline constexpr double kMaxSpeedMS = 300.0;  // below the speed of sound in air
+inline constexpr double kMaxSpinRadS = 1e4;
+
 /// Limit of hinge stops, from the start: beyond 180 degrees the angle wraps around.
 inline constexpr double kWidestHingeDeg = 175.0;
 

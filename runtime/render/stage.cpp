@@ -160,13 +160,9 @@ std::string Stage::add_body(const std::string& text, scene::Banks& banks) {
   scene_->bodies.push_back(std::move(body));
   try {
     session_.add_model(scene_->bodies[number].spec.bank);
-    try {
-      world->add(scene_->bodies[number].spec);
-    } catch (...) {
-      session_.drop_model();
-      throw;
-    }
+    world->add(scene_->bodies[number].spec);
   } catch (...) {
+    session_.keep_models(number);
     scene_->bodies.pop_back();
     throw;
   }

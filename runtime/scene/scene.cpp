@@ -228,8 +228,8 @@ std::vector<synth::PathPoint> read_path(base::Object& object, std::string_view k
       }
       const Vec3 &a = last.position_m, &b = place.position_m;
       const double speed = calc_length(b - a) / (place.time_s - last.time_s);
-      if (speed > kMaxSpeedMs) {
-        object.fail(key, fmt::format("moves at {:.4g} m/s after {} s; give {} m/s at most", speed, last.time_s, kMaxSpeedMs));
+      if (speed > kMaxSpeedMS) {
+        object.fail(key, fmt::format("moves at {:.4g} m/s after {} s; give {} m/s at most", speed, last.time_s, kMaxSpeedMS));
       }
     }
     path.push_back(place);

@@ -38,8 +38,8 @@ const base::Keys<SceneBody> kBody{
 const base::Keys<physics::BodySpec> kMotion{
     {"fixed", &physics::BodySpec::fixed, "does not move, but is struck and sounds"},
     {"absent", &physics::BodySpec::absent, "not in the world until it is [added live](hear-a-scene.md#commands)"},
-    {"velocity_m_s", &physics::BodySpec::velocity_m_s, within(kMaxSpeedMs), "initial velocity of the centre of mass"},
-    {"angular_velocity_rad_s", &physics::BodySpec::angular_velocity_rad_s, within(1e4), "initial angular velocity"},
+    {"velocity_m_s", &physics::BodySpec::velocity_m_s, within(kMaxSpeedMS), "initial velocity of the centre of mass"},
+    {"angular_velocity_rad_s", &physics::BodySpec::angular_velocity_rad_s, within(physics::kMaxSpinRadS), "initial angular velocity"},
     {"restitution", &physics::BodySpec::restitution, Limits{0, 1},
      "upper limit of the rebound: ringing bodies may keep more. Contacts use the geometric mean of both bodies"},
     {"friction", &physics::BodySpec::friction, Limits{0, 10}, "Coulomb coefficient. Contacts use the geometric mean of both bodies"},

@@ -16,8 +16,6 @@
 namespace carillon::scene {
 
 inline constexpr double kLongestS = 3600.0;
-inline constexpr double kFarthestM = 1e4;       // of positions; half a minute at the speed of sound
-inline constexpr double kMaxSpeedMs = 300.0;    // below the speed of sound in air
 inline constexpr double kFarthestShare = 0.25;  // largest distance of a point from the surface, share of the body's extent
 inline constexpr double kRoughestM = 1e-3;      // larger heights belong to the shape
 inline constexpr double kSoftestPa = 100.0;     // a jelly
@@ -25,6 +23,8 @@ inline constexpr double kStiffestPa = 1e13;     // ten times diamond
 
 using base::read_vector;
 using base::read_within;
+using physics::kFarthestM;
+using physics::kMaxSpeedMS;
 
 /// Three required numbers of magnitude at most `limit`.
 Vec3 read_required_vector(base::Object& object, std::string_view key, double limit = kFarthestM);

@@ -48,7 +48,7 @@ const base::Keys<SceneStrike> kStrike{
 const base::Keys<Mallet> kMallet{
     {"from", "none", "name of a mallet, whose numbers the other keys replace"},
     {"mass_kg", &Mallet::mass_kg, Limits{1e-6, 1e3}, "required without `from`: of the head; a loosely held stick adds little"},
-    {"speed_m_s", &Mallet::speed_m_s, Limits{1e-6, kMaxSpeedMs}, "required without `from`: relative to the body"},
+    {"speed_m_s", &Mallet::speed_m_s, Limits{1e-6, kMaxSpeedMS}, "required without `from`: relative to the body"},
     {"felt", "none", "soft head: `{\"stiffness_n_m_p\": K, \"exponent\": p}` of F = K y^p, p 2.5 by default, of felts 2.2 to 3.5"},
     {"restitution", &Mallet::restitution, Limits{0, 1},
      "on a rigid surface: loss in the head (Hunt and Crossley); 0.7 with `felt`, own estimate"},

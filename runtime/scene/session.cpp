@@ -45,9 +45,9 @@ void Session::add_model(const bank::Bank* bank) {
   models_.push_back(shared);
 }
 
-void Session::drop_model() {
-  banks_.pop_back();
-  models_.pop_back();
+void Session::keep_models(std::size_t count) {
+  banks_.resize(count);
+  models_.resize(count);
 }
 
 synth::SynthesiserOptions Session::make_options() const {

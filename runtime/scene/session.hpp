@@ -37,8 +37,8 @@ class Session {
   /// Makes the model of the last, new body of the scene, or shares that of another body. Throws InputError for effects that its bank does
   /// not support.
   void add_model(const bank::Bank* bank);
-  /// Undoes add_model().
-  void drop_model();
+  /// Drops the models of the bodies from `count` on.
+  void keep_models(std::size_t count);
 
   /// Makes the synthesiser. Throws as synth::Synthesiser does.
   synth::Synthesiser& open(const synth::SynthesiserOptions& options);

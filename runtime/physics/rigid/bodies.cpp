@@ -35,6 +35,7 @@ void Bodies::append(Solid solid, const State& state) {
   swings_m_.push_back(0.0);
   if (!articulation_of_.empty()) articulation_of_.push_back(-1), member_.push_back(-1);
   note_pulls();
+  for (BodyTable* table : tables_) table->resize(count());
 }
 
 void Bodies::place(int body) {

@@ -42,6 +42,15 @@ struct Grab {
   Vec3 find_velocity(double time_s) const { return time_s > to_s ? Vec3{} : (1.0 / (to_s - from_s)) * (to_m - from_m); }
 };
 
+/// Entries of a PerBody, of any type.
+class BodyTable {
+ public:
+  virtual void resize(int count) = 0;
+
+ protected:
+  ~BodyTable() = default;
+};
+
 /// All bodies and the ground, body -1. Invariants: fixed, sleeping and absent bodies do not move; absent ones meet nothing; frames and
 /// spins match the states, except between a change of state() and the following place(); bodies on joints match the coordinates of their
 /// articulation.
@@ -51,7 +60,7 @@ class Bodies {
   Bodies(std::vector<Solid> solids, std::vector<State> states, std::optional<Ground> ground, const Vec3& gravity,
          const std::vector<joints::Joint>& joints = {}, double joint_tolerance = joints::kTolerance);
 
-  /// Adds a body without joints, absent at first. Every stage needs an add_body() with it: Space::append().
+  /// Adds a body without joints, absent at first, and an entry to every PerBody.
   void append(Solid solid, const State& state);
 
   int count() const { return static_cast<int>(solids_.size()); }
@@ -184,6 +193,10 @@ class Bodies {
         act(*articulation);
   }
 
+  // Of PerBody:
+  void track(BodyTable& table) { tables_.push_back(&table); }
+  void forget(const BodyTable& table) { std::erase(tables_, &table); }
+
  private:
   enum Stay : char { kAwake, kAsleep, kAbsent };
 
@@ -205,6 +218,29 @@ class Bodies {
   std::vector<int> articulation_of_, member_;  // of each body; empty without joints
   std::set<std::pair<int, int>> joined_;       // pairs that do not collide
   double joint_tolerance_ = joints::kTolerance, time_s_ = 0.0;
+  std::vector<BodyTable*> tables_;
+};
+
+/// Data of a stage, an entry per body; new bodies get `fresh`.
+template <class T>
+class PerBody final : private BodyTable {
+ public:
+  explicit PerBody(Bodies& bodies, T fresh = {}) : bodies_(bodies), fresh_(std::move(fresh)), entries_(bodies.count(), fresh_) {
+    bodies_.track(*this);
+  }
+  ~PerBody() { bodies_.forget(*this); }
+  PerBody(const PerBody&) = delete;
+  PerBody& operator=(const PerBody&) = delete;
+
+  T& operator[](int body) { return entries_[body]; }
+  const T& operator[](int body) const { return entries_[body]; }
+
+ private:
+  void resize(int count) override { entries_.resize(count, fresh_); }
+
+  Bodies& bodies_;
+  T fresh_;
+  std::vector<T> entries_;
 };
 
 }  // namespace carillon::rigid

@@ -51,13 +51,6 @@ void Space::remove(int body) {
 
 int Space::append(Solid solid, const State& state) {
   bodies_.append(std::move(solid), state);
-  modal_states_.add_body();
-  windows_.add_body();
-  problem_.add_body();
-  instants_.add_body();
-  rest_.add_body();
-  projection_.add_body();
-  step_.add_body();
   return bodies_.count() - 1;
 }
 

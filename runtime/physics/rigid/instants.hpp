@@ -16,8 +16,7 @@ bool is_fast(const Bodies& bodies, const Pair& pair, const Contact& contact, dou
 /// step.
 class Instants {
  public:
-  Instants(const Bodies& bodies, TouchSets& touches) : bodies_(bodies), touches_(touches), crowded_until_s_(bodies.count(), 0.0) {}
-  void add_body() { crowded_until_s_.push_back(0.0); }
+  Instants(Bodies& bodies, TouchSets& touches) : bodies_(bodies), touches_(touches), crowded_until_s_(bodies) {}
 
   /// First instant from now at which a fast touch closes on the paths of the step; sets `at_s` and the touches that close with it.
   bool find(const Step& step, double& at_s, std::vector<ContactRef>& first) const;
@@ -39,7 +38,7 @@ class Instants {
 
   const Bodies& bodies_;
   TouchSets& touches_;
-  std::vector<double> crowded_until_s_;  // per body: until then its impacts are simultaneous
+  PerBody<double> crowded_until_s_;  // until then the impacts of a body are simultaneous
 };
 
 }  // namespace carillon::rigid

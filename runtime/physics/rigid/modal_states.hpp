@@ -27,8 +27,7 @@ void note_swing(Bodies& bodies, int body, const std::vector<double>& q, const st
 /// Modal states of all bodies with modes. A modal impact owns those of its bodies until it returns them (set()).
 class ModalStates {
  public:
-  ModalStates(Bodies& bodies, Ledger& ledger) : bodies_(bodies), ledger_(ledger), states_(bodies.count()) {}
-  void add_body() { states_.emplace_back(); }
+  ModalStates(Bodies& bodies, Ledger& ledger) : bodies_(bodies), ledger_(ledger), states_(bodies) {}
 
   /// Advances freely to a time, unless it is later already; books damping losses.
   ModalState& advance(int body, double time_s);
@@ -44,7 +43,7 @@ class ModalStates {
  private:
   Bodies& bodies_;
   Ledger& ledger_;
-  std::vector<ModalState> states_;
+  PerBody<ModalState> states_;
 };
 
 }  // namespace carillon::rigid

@@ -15,17 +15,15 @@ namespace carillon::rigid {
 /// displaced bodies when they move. Bodies on joints and in modal impacts are not moved.
 class Projection {
  public:
-  Projection(Bodies& bodies, TouchSets& touches, Ledger& ledger)
-      : bodies_(bodies), touches_(touches), ledger_(ledger), owed_j_(bodies.count()) {}
-  void add_body() { owed_j_.push_back(0.0); }
+  Projection(Bodies& bodies, TouchSets& touches, Ledger& ledger) : bodies_(bodies), touches_(touches), ledger_(ledger), owed_j_(bodies) {}
 
   /// Takes the energy that bodies owe from their motion. Call at the start of a step, before run().
   void collect(const Step& step);
   /// Call at the start of a step. Separates touches deeper than `allowed_m` plus their allowance (Pair::sag_m).
   void run(const Step& step, double allowed_m);
-  /// Energy that each body owes, for a return to an earlier state.
-  const std::vector<double>& get_owed() const { return owed_j_; }
-  void set_owed(const std::vector<double>& owed_j) { owed_j_ = owed_j; }
+  /// Energy that a body owes, for a return to an earlier state.
+  double get_owed(int body) const { return owed_j_[body]; }
+  void set_owed(int body, double owed_j) { owed_j_[body] = owed_j; }
 
  private:
   bool is_movable(int body) const {
@@ -45,7 +43,7 @@ class Projection {
   TouchSets& touches_;
   Ledger& ledger_;
   Solver solver_;
-  std::vector<double> owed_j_;  // of each body
+  PerBody<double> owed_j_;
 };
 
 }  // namespace carillon::rigid

@@ -23,11 +23,7 @@ class Rest {
         options_(options),
         ledger_(ledger),
         trial_(bodies),
-        paces_(bodies.count()) {}
-  void add_body() {
-    trial_.add_body();
-    paces_.emplace_back();
-  }
+        paces_(bodies) {}
 
   /// Restarts the slow time of these bodies.
   void reset(const std::vector<int>& bodies);
@@ -78,7 +74,7 @@ class Rest {
   const Options& options_;
   Ledger& ledger_;
   Step trial_;  // with zero velocities
-  std::vector<Pace> paces_;
+  PerBody<Pace> paces_;
 };
 
 }  // namespace carillon::rigid

@@ -160,10 +160,9 @@ void Space::step_island(Island& island, double start_s, double length_s) {
 /// Puts an island to sleep if contact forces balance it: first with its bodies separated to kDeepM, then unchanged. If neither balances, no
 /// body is displaced: bodies falling back from a displacement would never come to rest.
 bool Space::try_rest(Island& island, double length_s) {
-  std::vector<State> kept;
+  std::vector<std::pair<State, double>> kept;  // and the energy owed
   std::vector<std::tuple<double, double, Pair::Errors>> kept_pairs;
-  const std::vector<double> owed_j = projection_.get_owed();
-  for (const int body : island.bodies) kept.push_back(bodies_.state(body));
+  for (const int body : island.bodies) kept.emplace_back(bodies_.state(body), projection_.get_owed(body));
   for (const Pair* pair : island.pairs) kept_pairs.emplace_back(pair->stored_j, pair->stopped_j, pair->errors);
   Books before, after;
   ledger_.add_to(before);
@@ -180,9 +179,9 @@ bool Space::try_rest(Island& island, double length_s) {
   ledger_.add_to(after);
   ledger_.lose(before.lost_j - after.lost_j);
   ledger_.lift(before.lifted_j - after.lifted_j);
-  projection_.set_owed(owed_j);
   for (int n = 0; const int body : island.bodies) {
-    bodies_.state(body) = kept[n++];
+    projection_.set_owed(body, kept[n].second);
+    bodies_.state(body) = kept[n++].first;
     bodies_.place(body);
   }
   for (int n = 0; Pair * pair : island.pairs) {

@@ -37,8 +37,7 @@ struct ArticulationStep {
 /// has its index in island().bodies.
 class Step {
  public:
-  explicit Step(const Bodies& bodies) : bodies_(bodies), index_(bodies.count(), -1) {}
-  void add_body() { index_.push_back(-1); }
+  explicit Step(Bodies& bodies) : bodies_(bodies), index_(bodies, -1) {}
 
   void begin(Island& island);
   void end();
@@ -79,7 +78,7 @@ class Step {
  private:
   const Bodies& bodies_;
   Island* island_ = nullptr;
-  std::vector<int> index_;
+  PerBody<int> index_;
 };
 
 /// Point of a contact between bodies of the step, current geometry.

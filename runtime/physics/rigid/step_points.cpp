@@ -189,16 +189,15 @@ Point StepProblem::make_lasting_point(const Step& step, Pair& pair, const Contac
     return n >= 0 ? step.free[n].placed.frame : bodies_.get_frame(body);
   };
   geometry::Touch moved = t.smooth ? touches_.find_moved(pair, t, get_frame(pair.a), get_frame(pair.b)) : t;
-  const bool jumps =
-      t.smooth && touches_.is_far_jump(pair, t, moved);  // e.g. from one end of a rod to the other, which is a separate touch
-  if (jumps) moved = t;
+  const bool moves = t.smooth && !touches_.is_far_jump(pair, t, moved);  // not from one end of a rod to the other, a touch of its own
+  if (!moves) moved = t;
   const Vec3& later = moved.where_m;
   // The impulse acts at mid-step, at the same point for both bodies.
   Vec3 where{};
   ArmPath sa, sb;
-  if (p.a >= 0) sa = make_arm_path(bodies_, step, t, t.smooth && !jumps, later, c.a, p.a), where = sa.middle + 0.5 * (sa.first + sa.last);
+  if (p.a >= 0) sa = make_arm_path(bodies_, step, t, moves, later, c.a, p.a), where = sa.middle + 0.5 * (sa.first + sa.last);
   if (p.b >= 0) {
-    sb = make_arm_path(bodies_, step, t, t.smooth && !jumps, later, c.b, p.b);
+    sb = make_arm_path(bodies_, step, t, moves, later, c.b, p.b);
     const Vec3 other = sb.middle + 0.5 * (sb.first + sb.last);
     where = p.a >= 0 ? 0.5 * (where + other) : other;
   }

@@ -14,8 +14,7 @@ namespace carillon::rigid {
 class StepProblem {
  public:
   StepProblem(Bodies& bodies, const TouchSets& touches, const Options& options, Ledger& ledger)
-      : bodies_(bodies), touches_(touches), options_(options), ledger_(ledger), next_guess_s_(bodies.count(), 0.0) {}
-  void add_body() { next_guess_s_.push_back(0.0); }
+      : bodies_(bodies), touches_(touches), options_(options), ledger_(ledger), next_guess_s_(bodies) {}
 
   /// Motion of every body without contacts in a step of that length; `at_rest`: from zero velocity.
   void predict(Step& step, double length_s, bool at_rest);
@@ -48,7 +47,7 @@ class StepProblem {
   const Options& options_;
   Ledger& ledger_;
   Solver solver_;
-  std::vector<double> next_guess_s_;  // per body: time of the next factorisation
+  PerBody<double> next_guess_s_;  // time of the next factorisation
 };
 
 }  // namespace carillon::rigid

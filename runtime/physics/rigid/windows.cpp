@@ -39,22 +39,13 @@ Windows::Windows(Bodies& bodies, TouchSets& touches, const Options& options, Led
       touches_(touches),
       options_(options),
       ledger_(ledger),
-      active_(bodies.count(), 0),
-      flying_(bodies.count(), 0),
-      strides_(bodies.count(), 1),
-      rolling_(bodies.count()),
-      reach_m_s_(bodies.count(), 0.0),
-      flew_from_(bodies.states()),
+      active_(bodies),
+      flying_(bodies),
+      strides_(bodies, 1),
+      rolling_(bodies),
+      reach_m_s_(bodies),
+      flew_from_(bodies),
       articulation_flew_from_(bodies.articulations().size()) {}
-
-void Windows::add_body() {
-  active_.push_back(0);
-  flying_.push_back(0);
-  strides_.push_back(1);
-  rolling_.emplace_back();
-  reach_m_s_.push_back(0.0);
-  flew_from_.push_back(bodies_.states().back());
-}
 
 void Windows::add(Pair& pair) {
   if (pair.window == number_) return;

@@ -21,9 +21,6 @@ class Windows {
 
   Windows(Bodies& bodies, TouchSets& touches, const Options& options, Ledger& ledger);
 
-  /// Takes up the last of the bodies, which is new.
-  void add_body();
-
   // Call in this order: new window, flights, small steps.
   /// Determines the pairs that are near until the end of the window, `end_s` at the latest. All bodies are at its start.
   void open(double end_s, const std::list<ModalImpact>& impacts);
@@ -93,12 +90,12 @@ class Windows {
   int step_ = 0, steps_ = 1, islands_ = 0;
   bool any_active_ = false, near_is_sorted_ = true;
   std::vector<Pair*> near_;
-  std::vector<char> active_, flying_;  // active: may meet something
+  PerBody<char> active_, flying_;  // active: may meet something
   std::vector<int> flown_;
-  std::vector<int> strides_;       // small steps that a body takes at once
-  std::vector<Rolling> rolling_;   // of the bodies
-  std::vector<double> reach_m_s_;  // planned speed
-  std::vector<State> flew_from_;   // of flying bodies; and of the articulations:
+  PerBody<int> strides_;  // small steps that a body takes at once
+  PerBody<Rolling> rolling_;
+  PerBody<double> reach_m_s_;  // planned speed
+  PerBody<State> flew_from_;   // of flying bodies; and of the articulations:
   std::vector<joints::Coordinates> articulation_flew_from_;
 };
 

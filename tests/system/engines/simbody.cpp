@@ -1,8 +1,6 @@
-#include <carillon/simbody.h>
-
 #include <algorithm>
 
-#include "tests/system/engines/engine.hpp"
+#include "tests/system/engines/simbody_bodies.hpp"
 
 namespace carillon::testing {
 namespace {
@@ -11,8 +9,6 @@ using SimTK::Vec3;
 
 constexpr double kLoss = 0.25;    // s/m; restitution 1 - c v of Hunt and Crossley
 constexpr double kCorner = 1e-3;  // m; radius of the balls at the corners of a box
-
-Vec3 to_simbody(const double (&x)[3]) { return {x[0], x[1], x[2]}; }
 
 class Simbody : public Engine {
  public:
@@ -29,19 +25,10 @@ class Simbody : public Engine {
       bodies_.push_back(body);
       longest_s = std::min(longest_s, solid.kind == "ball" ? 1e-4 : solid.kind == "tube" ? 5e-5 : 1e-3);
     }
-    system_.realizeTopology();
-    SimTK::State state = system_.getDefaultState();
-    system_.realizeModel(state);
-    for (std::size_t i = 0; i < solids.size(); ++i) {
-      const auto& q = solids[i].rotation;
-      const SimTK::Rotation turn(SimTK::Quaternion(q[0], q[1], q[2], q[3]));
-      bodies_[i].setQToFitTransform(state, SimTK::Transform(turn, to_simbody(solids[i].position_m)));
-      bodies_[i].setUToFitVelocity(state, SimTK::SpatialVec(to_simbody(solids[i].spin_rad_s), to_simbody(solids[i].velocity_m_s)));
-    }
     integrator_.setAccuracy(1e-3);
     integrator_.setReturnEveryInternalStep(true);
     integrator_.setMaximumStepSize(longest_s);
-    integrator_.initialize(state);
+    integrator_.initialize(make_state(system_, bodies_, solids));
   }
 
   carillon_status start(char* message, std::size_t size) override { return reader_.start(integrator_.getState(), message, size); }
@@ -55,8 +42,7 @@ class Simbody : public Engine {
 
  private:
   static SimTK::Body::Rigid make_body(const Solid& solid) {
-    const auto& i = solid.inertia_kg_m2;
-    SimTK::Body::Rigid body(SimTK::MassProperties(solid.mass_kg, Vec3(0), SimTK::Inertia(i[0], i[1], i[2])));
+    SimTK::Body::Rigid body(make_mass(solid));
     const auto add_ball = [&](const Vec3& at, double radius) {
       body.addContactSurface(SimTK::Transform(at),
                              SimTK::ContactSurface(SimTK::ContactGeometry::Sphere(radius),
