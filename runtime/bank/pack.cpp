@@ -10,6 +10,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
+#include <utility>
 
 #include "runtime/bank/packed/fit_shapes.hpp"
 #include "runtime/bank/packed/levels.hpp"
@@ -25,11 +27,12 @@ constexpr double kMostLattice = 1 << 22;
 constexpr double kMaxRelativeStep = 1.0;  // maximum step of a mode over its mean motion, so that none vanishes
 constexpr double kCavityFactor = 16.0;    // permitted error of inner walls over that of the outer surface
 constexpr double kSurfaceShare = 0.95;    // fraction of the surface within the stated error
-constexpr double kMaxSlackDb = 0.4;       // dB below the requested error: converged
+constexpr double kMaxSlackDb = 0.8;       // dB below the requested error: converged
 constexpr int kMaxSampledTrials = 5, kMaxNearTrials = 3,
               kMaxTrials = 20;                            // trials on a sample; on all vertices until near; on all vertices
 constexpr std::size_t kSubsampling = 8;                   // subsampling of the finest level in sampled trials
-constexpr double kFirstOffsetDb = -4.0;                   // offset of the first trial from the request
+constexpr double kFirstOffsetDb = -5.0;                   // offset of the first trial from the request
+constexpr double kNextIsNearDb = 3.0;                     // miss of a trial after which the next is expected to be near
 constexpr double kMaxStepDb = 20.0, kRefinementDb = 2.0;  // step limit of the secant method; step without it [dB]
 constexpr std::size_t kWitnesses = 24;
 
@@ -127,9 +130,9 @@ std::vector<double> calc_motion(const Bank& bank) {
 }
 
 /// Steps that give each mode an equal share of `error` times the audible energy `loudest` at the loudest vertex [kg^-1/2].
-std::vector<float> calc_steps(const Bank& bank, const std::vector<double>& weight, double loudest, double error) {
+std::vector<float> calc_steps(const Bank& bank, const std::vector<double>& motion, const std::vector<double>& weight, double loudest,
+                              double error) {
   const double share = 12.0 * error * loudest / static_cast<double>(bank.mode_count());
-  const std::vector<double> motion = calc_motion(bank);
   std::vector<float> step;
   for (std::size_t m = 0; m < bank.mode_count(); ++m) {
     const double most = kMaxRelativeStep * motion[m];
@@ -149,50 +152,52 @@ std::vector<std::uint8_t> calc_fineness(const std::vector<double>& exposure, dou
   return fineness;
 }
 
-packed::Rows make_rows(const Bank& bank, const std::vector<float>& step) {
-  packed::Rows rows(bank.vertex_count(), bank.mode_count());
-  std::vector<float> row(rows.get_width(), 0.0F);
-  std::vector<float> factor;
-  for (std::size_t m = 0; m < bank.mode_count(); ++m)
-    factor.push_back(step[m] > 0.0F ? static_cast<float>(bank.shape_scale[m] / static_cast<double>(step[m])) : 0.0F);
-  const std::int16_t* shape = bank.shape.data();
-  for (std::size_t v = 0; v < bank.vertex_count(); ++v) {
-    for (std::size_t m = 0; m < bank.mode_count(); ++m)
-      for (std::size_t c = 0; c < 3; ++c) row[c * rows.get_padded() + m] = static_cast<float>(*shape++) * factor[m];
-    rows.append(row);
-  }
-  return rows;
-}
+/// Vertices of a bank, and their surface without triangles: all, or the coarser levels and a sample of the finest.
+struct Sample {
+  packed::Surface surface;
+  std::vector<std::int32_t> vertices;
+  std::vector<double> area_m2;  // for which each stands
 
-/// Reference decoder in double precision, like read_shapes(), at the vertices with `is_known`.
-std::vector<std::int16_t> make_shape(const Bank& bank, const packed::Rows& rows, const std::vector<float>& step,
-                                     const std::vector<bool>& is_known) {
-  std::vector<std::int16_t> shape(bank.shape.size(), 0);
-  for (std::size_t v = 0; v < bank.vertex_count(); ++v) {
-    if (!is_known[v]) continue;
+  Sample(const packed::Surface& whole, const std::vector<double>& area_m2_of_all, std::size_t subsampling) {
+    const std::size_t levels = whole.level_count(), finest = whole.level_begin[levels - 1];
+    surface = {whole.origin_m, whole.step_m, {}, {}, {whole.level_begin.begin(), whole.level_begin.end() - 1}};
+    for (std::size_t v = 0; v < whole.places.size(); v += v < finest ? 1 : subsampling) {
+      surface.places.push_back(whole.places[v]);
+      vertices.push_back(static_cast<std::int32_t>(v));
+      area_m2.push_back(area_m2_of_all[v] * (v < finest ? 1.0 : static_cast<double>(subsampling)));
+    }
+    surface.level_begin.push_back(vertices.size());
+  }
+};
+
+/// Reference decoder in double precision, like read_shapes(): shapes (n, m, 3) of n rows.
+std::vector<std::int16_t> make_shape(const Bank& bank, const packed::Rows& rows, std::size_t count, const std::vector<float>& step) {
+  std::vector<std::int16_t> shape;
+  shape.reserve(count * 3 * bank.mode_count());
+  for (std::size_t v = 0; v < count; ++v) {
     const float* row = rows.get(v);
     for (std::size_t m = 0; m < bank.mode_count(); ++m)
       for (std::size_t c = 0; c < 3; ++c) {
         const double value = static_cast<double>(row[c * rows.get_padded() + m]) * static_cast<double>(step[m]);
         const double most = 32767.0 * bank.shape_scale[m];
-        shape[(v * bank.mode_count() + m) * 3 + c] = find_step(std::clamp(value, -most, most), bank.shape_scale[m]);
+        shape.push_back(find_step(std::clamp(value, -most, most), bank.shape_scale[m]));
       }
   }
   return shape;
 }
 
-/// Error of shapes (V, m, 3) against those of the bank, at the vertices with `is_known`, weighted by the areas (V) [m^2]. Without
-/// witnesses.
-Packing calc_error(const Bank& bank, const Blows& blows, const std::vector<double>& area_m2, const std::vector<std::int16_t>& shape,
-                   const std::vector<bool>& is_known) {
+/// Error of shapes (n, m, 3) at n vertices that stand for the areas (n). Without witnesses.
+Packing calc_error(const Bank& bank, const Blows& blows, const std::vector<std::int32_t>& vertices, const std::vector<double>& area_m2,
+                   const std::vector<std::int16_t>& shape) {
   std::vector<std::pair<double, double>> errors;  // [dB], area
   double area = 0.0;
-  for (std::size_t v = 0; v < bank.vertex_count(); ++v) {
-    if (!(area_m2[v] > 0.0) || !is_known[v]) continue;
-    const std::size_t row = v * bank.mode_count() * 3;
-    const double missed = calc_heard(blows.weight, blows.skin.normal[v], bank.shape.data() + row, shape.data() + row);
-    errors.emplace_back(calc_db(missed, blows.exposure[v]), area_m2[v]);
-    area += area_m2[v];
+  const std::size_t width = 3 * bank.mode_count();
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    const std::size_t v = vertices[i];
+    if (!(area_m2[i] > 0.0)) continue;
+    const double missed = calc_heard(blows.weight, blows.skin.normal[v], bank.shape.data() + v * width, shape.data() + i * width);
+    errors.emplace_back(calc_db(missed, blows.exposure[v]), area_m2[i]);
+    area += area_m2[i];
   }
   std::sort(errors.begin(), errors.end());
   Packing packing;
@@ -219,7 +224,8 @@ std::vector<std::int32_t> choose_witnesses(const StruckSkin& skin, std::size_t c
 /// Secant search for the step scale that gives the requested error.
 class Packer {
  public:
-  Packer(const Bank& bank, const packed::Surface& surface) : bank_(bank), surface_(surface), blows_(bank) {
+  Packer(const Bank& bank, const packed::Surface& surface)
+      : bank_(bank), blows_(bank), motion_(calc_motion(bank)), all_(surface, blows_.skin.area_m2, 1) {
     std::vector<double> exposure = blows_.exposure;
     for (std::size_t v = 0; v < exposure.size(); ++v) {
       if (!(blows_.skin.area_m2[v] > 0.0)) exposure[v] *= kCavityFactor;
@@ -228,8 +234,12 @@ class Packer {
     fineness_ = calc_fineness(exposure, loudest_);
   }
 
-  /// Returns the bytes of the shapes; fills `packing`.
-  std::vector<std::uint8_t> run(double error_db, Packing& packing) {
+  struct Packed {
+    std::vector<std::uint8_t> bytes;
+    std::vector<std::int16_t> shape;  // as decoded
+    Packing packing;
+  };
+  Packed run(double error_db) {
     const auto is_near = [&](double found_db) { return found_db <= error_db && found_db > error_db - kMaxSlackDb; };
     double asked_db = error_db + kFirstOffsetDb, before_db = 0.0, found_before_db = 0.0;
     const auto find_next = [&](int tries, double found_db) {
@@ -238,69 +248,75 @@ class Packer {
       found_before_db = found_db;
       asked_db += std::clamp((error_db - 0.5 * kMaxSlackDb - found_db) / std::clamp(slope, 0.4, 1.5), -kMaxStepDb, kMaxStepDb);
     };
-    if (surface_.level_count() > 1) {
+    if (all_.surface.level_count() > 1) {
+      const Sample sample(all_.surface, blows_.skin.area_m2, kSubsampling);
       for (int tries = 0; tries < kMaxSampledTrials; ++tries) {
-        const double found_db = try_sampled(asked_db);
+        const double found_db = try_sampled(asked_db, sample);
         if (is_near(found_db)) break;
         find_next(tries, found_db);
+        if (std::abs(found_db - error_db) < kNextIsNearDb) break;
       }
     }
-    std::vector<std::uint8_t> best;
+    Packed best;
     double least_db = std::numeric_limits<double>::infinity();
     for (int tries = 0; tries < kMaxTrials; ++tries) {
-      Packing found;
-      std::vector<std::uint8_t> bytes;
-      const double found_db = try_whole(asked_db, bytes, found);
+      Packed found = try_whole(asked_db);
+      const double found_db = found.packing.error_db;
       least_db = std::min(least_db, found_db);
-      if (found_db <= error_db && (best.empty() || bytes.size() < best.size())) {
-        best = std::move(bytes);
-        packing = found;
-      }
-      if (is_near(found_db) || (tries >= kMaxNearTrials && !best.empty())) break;
+      if (found_db <= error_db && (best.bytes.empty() || found.bytes.size() < best.bytes.size())) best = std::move(found);
+      if (is_near(found_db) || (tries >= kMaxNearTrials && !best.bytes.empty())) break;
       if (tries < kMaxNearTrials)
         find_next(tries, found_db);
       else
         asked_db -= std::max(kRefinementDb, found_db - error_db);  // with few vertices the error is not smooth
     }
-    if (best.empty())
+    if (best.bytes.empty())
       throw InputError(fmt::format("an error of {} dB(A) cannot be reached, the least that was found is {:.1f}; use the bank as it is",
                                    error_db, least_db));
-    packing.witness = choose_witnesses(blows_.skin, kWitnesses);
-    for (const std::int32_t v : packing.witness) append_row(bank_, v, packing.witness_shape);
+    best.packing.witness = choose_witnesses(blows_.skin, kWitnesses);
+    for (const std::int32_t v : best.packing.witness) append_row(bank_, v, best.packing.witness_shape);
     return best;
   }
 
  private:
   std::vector<float> make_steps(double asked_db) const {
-    return calc_steps(bank_, blows_.weight, loudest_, std::pow(10.0, asked_db / 10.0));
+    return calc_steps(bank_, motion_, blows_.weight, loudest_, std::pow(10.0, asked_db / 10.0));
   }
 
-  /// Error on the coarser levels and a sample of the finest one.
-  double try_sampled(double asked_db) const {
-    const std::size_t finest = surface_.level_begin[surface_.level_count() - 1];
-    std::vector<bool> is_known(bank_.vertex_count());
-    for (std::size_t v = 0; v < is_known.size(); ++v) is_known[v] = v < finest || v % kSubsampling == 0;
-    const std::vector<float> step = make_steps(asked_db);
-    const packed::FittedShapes fitted = packed::fit_shapes(surface_, make_rows(bank_, step), bank_.mode_count(), fineness_, kSubsampling);
-    // The sample under-represents the finest level: reweight the areas.
-    std::vector<double> area_m2 = blows_.skin.area_m2;
-    for (std::size_t v = finest; v < is_known.size(); ++v) area_m2[v] *= static_cast<double>(kSubsampling);
-    return calc_error(bank_, blows_, area_m2, make_shape(bank_, fitted.rows, step, is_known), is_known).error_db;
+  packed::FittedShapes fit(const Sample& sample, const std::vector<float>& step) const {
+    const std::size_t modes = bank_.mode_count();
+    std::vector<std::uint8_t> fineness;
+    for (const std::int32_t v : sample.vertices) fineness.push_back(fineness_[v]);
+    std::vector<float> factor;
+    for (std::size_t m = 0; m < modes; ++m)
+      factor.push_back(step[m] > 0.0F ? static_cast<float>(bank_.shape_scale[m] / static_cast<double>(step[m])) : 0.0F);
+    return packed::fit_shapes(sample.surface, modes, fineness, [&](std::size_t v, std::span<float> row) {
+      const std::int16_t* shape = bank_.shape.data() + 3 * modes * static_cast<std::size_t>(sample.vertices[v]);
+      const std::size_t padded = row.size() / 3;
+      for (std::size_t m = 0; m < modes; ++m)
+        for (std::size_t c = 0; c < 3; ++c) row[c * padded + m] = static_cast<float>(*shape++) * factor[m];
+    });
   }
 
-  double try_whole(double asked_db, std::vector<std::uint8_t>& bytes, Packing& packing) const {
+  double try_sampled(double asked_db, const Sample& sample) const {
     const std::vector<float> step = make_steps(asked_db);
-    const packed::FittedShapes fitted = packed::fit_shapes(surface_, make_rows(bank_, step), bank_.mode_count(), fineness_);
-    bytes = packed::write_shapes(step, fitted.levels);
-    const std::vector<std::int16_t> shape =
-        packed::read_shapes(std::as_bytes(std::span(bytes)), surface_, bank_.shape_scale, "the packed shapes");
-    packing = calc_error(bank_, blows_, blows_.skin.area_m2, shape, std::vector<bool>(bank_.vertex_count(), true));
-    return packing.error_db;
+    const std::vector<std::int16_t> shape = make_shape(bank_, fit(sample, step).rows, sample.vertices.size(), step);
+    return calc_error(bank_, blows_, sample.vertices, sample.area_m2, shape).error_db;
+  }
+
+  Packed try_whole(double asked_db) const {
+    const std::vector<float> step = make_steps(asked_db);
+    Packed packed;
+    packed.bytes = packed::write_shapes(step, fit(all_, step).levels);
+    packed.shape = packed::read_shapes(std::as_bytes(std::span(packed.bytes)), all_.surface, bank_.shape_scale, "the packed shapes");
+    packed.packing = calc_error(bank_, blows_, all_.vertices, all_.area_m2, packed.shape);
+    return packed;
   }
 
   const Bank& bank_;
-  const packed::Surface& surface_;
   Blows blows_;
+  std::vector<double> motion_;
+  Sample all_;
   double loudest_ = 0.0;  // over all vertices, cavity walls weighted
   std::vector<std::uint8_t> fineness_;
 };
@@ -311,12 +327,11 @@ PackedBank calc_packed(const Bank& bank, double error_db, bool keep_numbers) {
   if (!(error_db >= kMinPackError && error_db <= kMaxPackError))
     throw InputError(fmt::format("an error of {} dB(A); give {} to {}", error_db, kMinPackError, kMaxPackError));
   if (bank.mode_count() == 0) throw InputError("a bank without modes has nothing to pack; use it as it is");
-  const PackedSurface at_places = pack_surface(bank, keep_numbers);
-  PackedBank packed{at_places.bank, at_places.bytes, {}, at_places.order};
-  Packing packing;
-  packed.shape = Packer(at_places.bank, at_places.surface).run(error_db, packing);
-  packed.bank.shape =
-      packed::read_shapes(std::as_bytes(std::span(packed.shape)), at_places.surface, packed.bank.shape_scale, "the packed shapes");
+  PackedSurface at_places = pack_surface(bank, keep_numbers);
+  Packer::Packed found = Packer(at_places.bank, at_places.surface).run(error_db);
+  Packing& packing = found.packing;
+  PackedBank packed{std::move(at_places.bank), std::move(at_places.bytes), std::move(found.bytes), std::move(at_places.order)};
+  packed.bank.shape = std::move(found.shape);
   packed.bank.shape_bytes = 2;
   packed.bank.provenance = fmt::format(R"({{"packed": {{"error_db": {:.2f}, "worst_db": {:.2f}}})", packing.error_db, packing.worst_db) +
                            (bank.provenance.empty() ? "}" : fmt::format(R"(, "of": {}}})", bank.provenance));
@@ -334,7 +349,9 @@ Packing compare_packed(const Bank& packed, const Bank& original) {
                     packed.vertex_count(), packed.triangles.size(), packed.mode_count(), exact.vertex_count(), exact.triangles.size(),
                     exact.mode_count()));
   const Blows blows(exact);
-  return calc_error(exact, blows, blows.skin.area_m2, packed.shape, std::vector<bool>(exact.vertex_count(), true));
+  std::vector<std::int32_t> all(exact.vertex_count());
+  std::iota(all.begin(), all.end(), 0);
+  return calc_error(exact, blows, all, blows.skin.area_m2, packed.shape);
 }
 
 Check check_original(const Bank& packed, const Bank& original) {

@@ -6,9 +6,11 @@
 #include <array>
 #include <cmath>
 
+#include "runtime/bank/packed/fit_loops.hpp"
 #include "runtime/bank/packed/loops.hpp"
 #include "runtime/bank/packed/neighbours.hpp"
 #include "runtime/bank/packed/stencil.hpp"
+#include "runtime/base/large.hpp"
 
 namespace carillon::packed {
 namespace {
@@ -22,41 +24,31 @@ constexpr double kPrior = 0.02;
 // Bits of a number q: constant at 0, a + 2 log2 |q| elsewhere; squared error [squared steps] traded for one bit.
 constexpr float kZeroResidual = 0.25F, kOneResidual = 2.5F, kZeroCoefficient = 1.0F, kOneCoefficient = 1.8F, kPerError = 3.0F;
 constexpr std::size_t kFeatureSamples = 400;  // vertices per level sampled for feature sizes
-constexpr int kGradients = 9, kFeatures = 9 + 3 * static_cast<int>(kNeighbours);
-constexpr float kMaxSteps = 1e9F;  // limit of a number; the finest steps are 46,000 times smaller than those of the level
-
-using Field = Eigen::Matrix<float, Eigen::Dynamic, 3>;  // (padded, 3): a row of Rows in memory order
-using FieldMap = Eigen::Map<const Field>;
+constexpr float kMaxSteps = 1e9F;             // limit of a number; the finest steps are 46,000 times smaller than those of the level
 
 template <std::size_t N>
 float find_of_level(const std::array<float, N>& values, std::size_t from_finest) {
   return values[std::min(from_finest, N - 1)];
 }
 
-/// Bits of a number other than 0, without the constant.
-float calc_size_bits(float q) { return 2.0F * std::log2(q); }
-
-/// Neighbourhood of a vertex. Columns: gradient along j of component c at 3 c + j, then the difference of neighbour k at
-/// kGradients + kNeighbours c + k.
-struct Features {
-  Field value;             // prediction by kriging alone
-  Eigen::MatrixXf fields;  // (padded, kFeatures)
-  float energy = 0.0F;     // mean square of the neighbours
-};
+// No memory of its own: a million are made per bank.
+using Coefficients = Eigen::Matrix<double, Eigen::Dynamic, 3, 0, kFields, 3>;
+using Rounded = Eigen::Matrix<int, Eigen::Dynamic, 3, 0, kFields, 3>;
+using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kFields, kFields>;
 
 class Fitter {
  public:
-  Fitter(const Surface& surface, const Rows& wanted, std::size_t modes, std::span<const std::uint8_t> fineness)
+  Fitter(const Surface& surface, std::size_t modes, std::span<const std::uint8_t> fineness, const GetRow& get_wanted)
       : surface_(surface),
         fineness_(fineness),
-        wanted_(wanted),
+        get_wanted_(get_wanted),
         modes_(modes),
-        padded_(static_cast<Eigen::Index>(wanted.get_padded())),
         rows_(surface.places.size(), modes),
-        row_(wanted.get_width()) {}
+        wanted_(rows_.get_width()),
+        row_(rows_.get_width()),
+        columns_(rows_.get_padded()) {}
 
-  FittedShapes run(std::size_t sampled) {
-    sampled_ = sampled;
+  FittedShapes run() {
     std::vector<LevelNumbers> levels;
     for (std::size_t level = 0; level < surface_.level_count(); ++level) levels.push_back(fit_level(level));
     return {std::move(levels), std::move(rows_)};
@@ -66,27 +58,29 @@ class Fitter {
   /// One candidate prediction of a vertex: coefficients and residual.
   struct Trial {
     Fit fit = Fit::kNone;
-    Eigen::MatrixXi numbers;  // (features, 3)
-    float cost = 0.0F;        // bits plus weighted error
+    Rounded numbers;    // (fields, 3)
+    float cost = 0.0F;  // bits plus weighted error
   };
 
   void begin_vertex(std::size_t v) {
     share_ = LevelSteps::calc_share(fineness_[v]);
-    step_ = share_ * level_step_;
+    cost_.step = step_ = share_ * level_step_;
+    get_wanted_(v, wanted_);
   }
 
   LevelNumbers fit_level(std::size_t level) {
     const std::size_t first = surface_.level_begin[level], end = surface_.level_begin[level + 1];
     const std::size_t from_finest = surface_.level_count() - 1 - level;
     level_step_ = step_ = find_of_level(kResidualSteps, from_finest);
-    rounding_ = find_of_level(kRounding, from_finest);
+    cost_.rounding = find_of_level(kRounding, from_finest);
     LevelNumbers numbers;
     numbers.steps.residual = level_step_;
+    base::reserve_large(numbers.residual, (end - first) * 3 * modes_);
     if (level == 0) {
       for (std::size_t v = first; v < end; ++v) {
         std::fill(row_.begin(), row_.end(), 0.0F);
         begin_vertex(v);
-        numbers.kinds.push_back({Fit::kNone, add_residual(v, numbers), fineness_[v]});
+        numbers.kinds.push_back({Fit::kNone, add_residual(numbers), fineness_[v]});
       }
       return numbers;
     }
@@ -99,202 +93,158 @@ class Fitter {
     for (std::size_t v = first; v < end; ++v) neighbours[v - first] = search.find(surface_.places[v]);
     calc_stencils(std::span(surface_.places).subspan(first, end - first), neighbours, surface_.places, stencils);
     set_coefficient_steps(neighbours, stencils, numbers.steps);
-    for (std::size_t v = first; v < end; ++v) {
-      if (from_finest > 0 || v % sampled_ == 0) {
-        fit_vertex(v, neighbours[v - first], stencils[v - first], numbers);
-      } else {
-        std::fill(row_.begin(), row_.end(), 0.0F);
-        rows_.append(row_);
-      }
-    }
+    for (std::size_t v = first; v < end; ++v) fit_vertex(v, neighbours[v - first], stencils[v - first], numbers);
     return numbers;
   }
 
-  void calc_features(const Neighbours& neighbours, const Stencil& stencil) {
-    constexpr auto n = static_cast<Eigen::Index>(kNeighbours);
-    Eigen::Matrix<float, n, 1> value;
-    Eigen::Matrix<float, n, 3> gradient;
-    Eigen::Matrix<float, 3, n> offset;
-    for (Eigen::Index k = 0; k < n; ++k) {
-      const std::size_t i = k;
-      value[k] = stencil.value[i];
-      for (std::size_t j = 0; j < 3; ++j) {
-        gradient(k, static_cast<Eigen::Index>(j)) = stencil.gradient[j][i];
-        offset(static_cast<Eigen::Index>(j), k) = stencil.offset[j][i];
-      }
-    }
-    const Eigen::Matrix<float, n, n> difference =
-        Eigen::Matrix<float, n, n>::Identity() - value * Eigen::Matrix<float, 1, n>::Ones() - gradient * offset;
-    features_.value.resize(padded_, 3);
-    features_.fields.resize(padded_, kFeatures);
-    features_.energy = 0.0F;
-    for (Eigen::Index c = 0; c < 3; ++c) {
-      gathered_.resize(padded_, n);
-      for (Eigen::Index k = 0; k < n; ++k)
-        gathered_.col(k) = FieldMap(rows_.get(static_cast<std::size_t>(neighbours[k])), padded_, 3).col(c);
-      features_.energy += gathered_.squaredNorm() / static_cast<float>(kNeighbours);
-      features_.value.col(c).noalias() = gathered_ * value;
-      features_.fields.middleCols(3 * c, 3).noalias() = gathered_ * gradient;
-      features_.fields.middleCols(kGradients + n * c, n).noalias() = gathered_ * difference;
-    }
+  void calc_columns(const Neighbours& neighbours, const Stencil& stencil) {
+    for (std::size_t k = 0; k < kNeighbours; ++k) from_[k] = rows_.get(neighbours[k]);
+    energy_ = fit_loops_.calc_columns(from_.data(), wanted_.data(), stencil, columns_) / static_cast<float>(kNeighbours);
   }
 
   /// Coefficient steps whose rounding changes the prediction by kCoefficientStep of the residual's step on average.
   void set_coefficient_steps(const std::vector<Neighbours>& neighbours, const std::vector<Stencil>& stencils, LevelSteps& steps) {
     double gradient = 0.0, differences = 0.0, count = 0.0;
-    const std::size_t stride = std::max<std::size_t>(neighbours.size() / kFeatureSamples, 1);
+    const std::size_t stride = std::max<std::size_t>(neighbours.size() / kFeatureSamples, 1), padded = columns_.get_padded();
     for (std::size_t i = 0; i < neighbours.size(); i += stride) {
-      calc_features(neighbours[i], stencils[i]);
-      const auto calc_log = [&](Eigen::Index first, Eigen::Index columns) {
-        const double mean = static_cast<double>(features_.fields.middleCols(first, columns).squaredNorm()) / static_cast<double>(columns);
-        return std::log((1.0 + static_cast<double>(features_.energy)) / std::max(mean, 1e-6));
+      calc_columns(neighbours[i], stencils[i]);
+      const auto calc_log = [&](std::size_t column, std::size_t fields) {
+        const double mean = static_cast<double>(loops_.calc_energy(columns_.get(column), fields * padded)) / static_cast<double>(fields);
+        return std::log((1.0 + static_cast<double>(energy_)) / std::max(mean, 1e-6));
       };
-      gradient += calc_log(0, kGradients);
-      differences += calc_log(kGradients, kFeatures - kGradients);
+      gradient += calc_log(Columns::kGradient, kGradientFields);
+      differences += calc_log(Columns::kDifferences, kFields - kGradientFields);
       count += 1.0;
     }
     const double error = kCoefficientStep * static_cast<double>(level_step_) * std::sqrt(static_cast<double>(modes_));
-    steps.gradient = static_cast<float>(error / std::sqrt(kGradients) * std::exp(0.5 * gradient / count));
-    steps.differences = static_cast<float>(error / std::sqrt(kFeatures) * std::exp(0.5 * differences / count));
+    steps.gradient = static_cast<float>(error / std::sqrt(kGradientFields) * std::exp(0.5 * gradient / count));
+    steps.differences = static_cast<float>(error / std::sqrt(kFields) * std::exp(0.5 * differences / count));
   }
 
-  /// Bits of the residual plus weighted error.
-  float calc_cost(const Field& left) const {
-    float bits = 0.0F, error = 0.0F;
-    const float per_step = 1.0F / step_;
-    for (Eigen::Index c = 0; c < 3; ++c) {
-      for (Eigen::Index m = 0; m < static_cast<Eigen::Index>(modes_); ++m) {
-        const float x = std::abs(left(m, c)) * per_step, q = std::floor(x + rounding_);
-        bits += q > 0.0F ? kOneResidual + calc_size_bits(q) : kZeroResidual;
-        error += (x - q) * (x - q);
-      }
-    }
-    return bits + kPerError * error;
-  }
-
-  Trial try_fit(Fit fit, const Field& left, const Eigen::MatrixXd& gram, const Eigen::MatrixXd& right, const LevelSteps& steps) const {
-    const Eigen::Index count = gram.rows();
-    const double unit = static_cast<double>(share_) / std::sqrt(1.0 + static_cast<double>(features_.energy));
-    Eigen::VectorXd step(count);
-    for (Eigen::Index j = 0; j < count; ++j) step[j] = unit * static_cast<double>(j < kGradients ? steps.gradient : steps.differences);
-    Eigen::MatrixXd regular = gram;
-    for (Eigen::Index j = 0; j < count; ++j) {
+  /// Least squares for the first `count` fields from products_, regularised, and rounded.
+  Trial try_fit(Fit fit, std::size_t count, const LevelSteps& steps) const {
+    const auto fields = static_cast<Eigen::Index>(count);
+    const double unit = static_cast<double>(share_) / std::sqrt(1.0 + static_cast<double>(energy_));
+    const auto get_product = [&](std::size_t field, std::size_t column) {
+      return static_cast<double>(products_[(Columns::kGradient + field) * Columns::kCount + column]);
+    };
+    std::array<double, kFields> step;
+    Square regular(fields, fields);
+    Coefficients target(fields, 3), coefficients(fields, 3);
+    for (std::size_t j = 0; j < count; ++j) {
+      const auto row = static_cast<Eigen::Index>(j);
+      step[j] = unit * static_cast<double>(j < kGradientFields ? steps.gradient : steps.differences);
+      for (std::size_t i = 0; i <= j; ++i) regular(row, static_cast<Eigen::Index>(i)) = get_product(j, Columns::kGradient + i);
       const double weight = static_cast<double>(step_) / step[j];
-      regular(j, j) += kPrior * weight * weight + 1e-12;
+      regular(row, row) += kPrior * weight * weight + 1e-12;
+      for (std::size_t to = 0; to < 3; ++to) target(row, static_cast<Eigen::Index>(to)) = get_product(j, to);
     }
-    const Eigen::LLT<Eigen::MatrixXd> factor(regular);
-    const Eigen::MatrixXd upper = factor.matrixU();
-    const Eigen::MatrixXd target = factor.matrixL().solve(right);
-    Trial trial{fit, Eigen::MatrixXi(count, 3), 0.0F};
-    Eigen::MatrixXd coefficients(count, 3);
+    const Eigen::LLT<Eigen::Ref<Square>, Eigen::Lower> factor(regular);  // in place
+    regular.triangularView<Eigen::Lower>().solveInPlace(target);
+    Trial trial{fit, Rounded(fields, 3), 0.0F};
+    std::array<float, 3 * kFields> as_used;
     for (Eigen::Index to = 0; to < 3; ++to) {
-      for (Eigen::Index j = count; j-- > 0;) {
-        const Eigen::Index rest = count - 1 - j;
-        const double x = (target(j, to) - upper.row(j).tail(rest).dot(coefficients.col(to).tail(rest))) / upper(j, j);
+      for (Eigen::Index j = fields; j-- > 0;) {
+        const Eigen::Index rest = fields - 1 - j;
+        const double x = (target(j, to) - regular.col(j).tail(rest).dot(coefficients.col(to).tail(rest))) / regular(j, j);
         const double rounded = std::clamp(std::nearbyint(x / step[j]), -static_cast<double>(kMaxSteps), static_cast<double>(kMaxSteps));
         trial.numbers(j, to) = static_cast<int>(rounded);
         coefficients(j, to) = rounded * step[j];
-        trial.cost += rounded == 0.0 ? kZeroCoefficient : kOneCoefficient + calc_size_bits(static_cast<float>(std::abs(rounded)));
+        as_used[3 * j + to] = static_cast<float>(coefficients(j, to));
+        trial.cost += rounded == 0.0 ? kZeroCoefficient : kOneCoefficient + 2.0F * std::log2(static_cast<float>(std::abs(rounded)));
       }
     }
-    const Field rest = left - features_.fields.leftCols(count) * coefficients.cast<float>();
-    trial.cost += calc_cost(rest);
+    trial.cost += fit_loops_.calc_cost(columns_, as_used.data(), count, cost_);
     return trial;
   }
 
   void fit_vertex(std::size_t v, const Neighbours& neighbours, const Stencil& stencil, LevelNumbers& numbers) {
-    calc_features(neighbours, stencil);
     begin_vertex(v);
-    const Field left = FieldMap(wanted_.get(v), padded_, 3) - features_.value;
-    Trial best{Fit::kNone, {}, calc_cost(left)};
+    calc_columns(neighbours, stencil);
+    Trial best{Fit::kNone, {}, fit_loops_.calc_cost(columns_, nullptr, 0, cost_)};
     // Lower bound of a trial's cost: all coefficients and residuals are 0.
-    const auto find_least = [&](int features) {
-      return 3.0F * (static_cast<float>(features) * kZeroCoefficient + static_cast<float>(modes_) * kZeroResidual);
+    const auto find_least = [&](std::size_t fields) {
+      return 3.0F * (static_cast<float>(fields) * kZeroCoefficient + static_cast<float>(columns_.get_padded()) * kZeroResidual);
     };
-    if (best.cost > find_least(kGradients)) {
-      const auto try_one = [&](Fit fit, int count) {
-        const auto fields = features_.fields.leftCols(count);
-        gram_.setZero(count, count);
-        gram_.selfadjointView<Eigen::Lower>().rankUpdate(fields.transpose());
-        const Eigen::MatrixXd gram = Eigen::MatrixXf(gram_.selfadjointView<Eigen::Lower>()).cast<double>();
-        Trial trial = try_fit(fit, left, gram, (fields.transpose() * left).cast<double>(), numbers.steps);
-        if (trial.cost < best.cost) best = std::move(trial);
-      };
-      try_one(Fit::kGradient, kGradients);
-      if (best.cost > find_least(kFeatures)) try_one(Fit::kDifferences, kFeatures);
-    }
-    predict(best, neighbours, stencil, numbers);
-    numbers.kinds.push_back({best.fit, add_residual(v, numbers), fineness_[v]});
+    const auto try_one = [&](Fit fit, std::size_t fields, std::size_t begin, std::size_t end) {
+      if (!(best.cost > find_least(fields))) return;
+      fit_loops_.calc_products(columns_, begin, end, products_);
+      if (Trial trial = try_fit(fit, fields, numbers.steps); trial.cost < best.cost) best = trial;
+    };
+    try_one(Fit::kGradient, kGradientFields, 0, Columns::kDifferences);
+    try_one(Fit::kDifferences, kFields, Columns::kDifferences, Columns::kCount);
+    predict(best, stencil, numbers);
+    numbers.kinds.push_back({best.fit, add_residual(numbers), fineness_[v]});
   }
 
   /// Same arithmetic as read_shapes().
-  void predict(const Trial& trial, const Neighbours& neighbours, const Stencil& stencil, LevelNumbers& numbers) {
-    std::array<const float*, kNeighbours> from;
-    for (std::size_t k = 0; k < kNeighbours; ++k) from[k] = rows_.get(static_cast<std::size_t>(neighbours[k]));
-    if (trial.fit == Fit::kNone) return loops_.add_weighted(from.data(), stencil.value.data(), row_.size(), row_.data());
-    const float unit = share_ / std::sqrt(1.0F + features_.energy);
+  void predict(const Trial& trial, const Stencil& stencil, LevelNumbers& numbers) {
+    if (trial.fit == Fit::kNone) return loops_.add_weighted(from_.data(), stencil.value.data(), row_.size(), row_.data());
+    const float unit = share_ / std::sqrt(1.0F + energy_);
     std::array<float, kGradientNumbers> of_gradient;
     std::array<float, kDifferenceNumbers> of_differences;
     // By field, then contribution, then component.
-    const auto take = [&](Eigen::Index first, Eigen::Index fields, float step, std::span<float> scaled, std::vector<std::int32_t>& said) {
+    const auto take = [&](std::size_t first, std::size_t fields, float step, std::span<float> scaled, std::vector<std::int32_t>& said) {
       std::size_t i = 0;
-      for (Eigen::Index f = 0; f < fields; ++f)
+      for (std::size_t f = 0; f < fields; ++f)
         for (Eigen::Index to = 0; to < 3; ++to)
-          for (Eigen::Index c = 0; c < 3; ++c) {
-            const int number = trial.numbers(first + fields * c + f, to);
+          for (std::size_t c = 0; c < 3; ++c) {
+            const int number = trial.numbers(static_cast<Eigen::Index>(first + fields * c + f), to);
             said.push_back(number);
             scaled[i++] = step * unit * static_cast<float>(number);
           }
     };
     take(0, 3, numbers.steps.gradient, of_gradient, numbers.gradient);
     const bool is_wide = trial.fit == Fit::kDifferences;
-    if (is_wide) take(kGradients, static_cast<Eigen::Index>(kNeighbours), numbers.steps.differences, of_differences, numbers.differences);
+    if (is_wide) take(kGradientFields, kNeighbours, numbers.steps.differences, of_differences, numbers.differences);
     Matrix matrix;
     loops_.calc_matrix(stencil, of_gradient.data(), is_wide ? of_differences.data() : nullptr, matrix);
-    loops_.multiply(from.data(), matrix.data(), static_cast<std::size_t>(padded_), row_.data());
+    loops_.multiply(from_.data(), matrix.data(), columns_.get_padded(), row_.data());
   }
 
   /// Adds the quantised residual of the vertex to row_ and keeps the row. False if the residual is 0.
-  bool add_residual(std::size_t v, LevelNumbers& numbers) {
-    const std::size_t padded = padded_;
-    const float* wanted = wanted_.get(v);
-    const std::size_t before = numbers.residual.size();
-    bool is_any = false;
+  bool add_residual(LevelNumbers& numbers) {
+    const std::size_t padded = columns_.get_padded(), before = numbers.residual.size();
+    numbers.residual.resize(before + 3 * modes_);
+    std::int32_t* number = numbers.residual.data() + before;
+    const float per_step = 1.0F / step_;
+    std::int32_t any = 0;
     for (std::size_t m = 0; m < modes_; ++m) {
       for (std::size_t c = 0; c < 3; ++c) {
         float& value = row_[c * padded + m];
-        const float x = (wanted[c * padded + m] - value) / step_;
-        const float size = std::min(std::floor(std::abs(x) + rounding_), kMaxSteps);
-        const float q = std::copysign(size, x);
-        value += step_ * q;
-        is_any = is_any || size > 0.0F;
-        numbers.residual.push_back(static_cast<std::int32_t>(q));
+        const float x = (wanted_[c * padded + m] - value) * per_step;
+        const auto size = static_cast<std::int32_t>(std::min(std::abs(x) + cost_.rounding, kMaxSteps));
+        *number = x < 0.0F ? -size : size;
+        value += step_ * static_cast<float>(*number);
+        any |= *number++;
       }
     }
-    if (!is_any) numbers.residual.resize(before);
+    if (any == 0) numbers.residual.resize(before);
     rows_.append(row_);
-    return is_any;
+    return any != 0;
   }
 
   const Surface& surface_;
   std::span<const std::uint8_t> fineness_;
-  const Rows& wanted_;
-  std::size_t modes_, sampled_ = 1;
-  Eigen::Index padded_;
+  const GetRow& get_wanted_;
+  std::size_t modes_;
   const Loops& loops_ = find_loops();
+  const FitLoops& fit_loops_ = find_fit_loops();
   Rows rows_;
-  std::vector<float> row_;
-  Features features_;
-  Eigen::MatrixXf gathered_, gram_;
-  float level_step_ = 1.0F, rounding_ = 0.5F;  // per level
-  float share_ = 1.0F, step_ = 1.0F;           // per vertex: its steps are `share_` of the level's
+  std::vector<float> wanted_, row_;
+  float level_step_ = 1.0F;
+  // Of a vertex. Its steps are `share_` of the level's.
+  float share_ = 1.0F, step_ = 1.0F, energy_ = 0.0F;  // mean square of the neighbours
+  std::array<const float*, kNeighbours> from_{};
+  Columns columns_;
+  Products products_{};
+  ResidualCost cost_{.bits_of_0 = kZeroResidual, .bits_of_1 = kOneResidual, .per_error = kPerError};
 };
 
 }  // namespace
 
-FittedShapes fit_shapes(const Surface& surface, const Rows& wanted, std::size_t modes, std::span<const std::uint8_t> fineness,
-                        std::size_t sampled) {
-  return Fitter(surface, wanted, modes, fineness).run(sampled);
+FittedShapes fit_shapes(const Surface& surface, std::size_t modes, std::span<const std::uint8_t> fineness, const GetRow& get_wanted) {
+  return Fitter(surface, modes, fineness, get_wanted).run();
 }
 
 }  // namespace carillon::packed

@@ -1,6 +1,8 @@
 // Encoder of shapes for read_shapes().
 #pragma once
 
+#include <functional>
+#include <span>
 #include <vector>
 
 #include "runtime/bank/packed/rows.hpp"
@@ -9,7 +11,7 @@
 
 namespace carillon::packed {
 
-/// Numbers for write_shapes() with which read_shapes() reproduces `wanted` (V), in surface order and in steps of each mode, to about
+/// Numbers for write_shapes() with which read_shapes() reproduces the wanted rows, in surface order and in steps of each mode, to about
 /// 2^(-fineness / 2) steps, fineness (V) per vertex; and the decoded result, (V). `modes`: used columns of the rows.
 ///
 /// Method: three predictions per vertex, kriging alone and with coefficients of either kind (Fit); the one with the lowest rate-distortion
@@ -20,8 +22,8 @@ struct FittedShapes {
   std::vector<LevelNumbers> levels;
   Rows rows;
 };
-/// sampled: fits only every sampled-th vertex of the finest level, for trials; the others stay 0.
-FittedShapes fit_shapes(const Surface& surface, const Rows& wanted, std::size_t modes, std::span<const std::uint8_t> fineness,
-                        std::size_t sampled = 1);
+/// Fills the wanted row (3, padded) of a vertex; the padding is and stays 0.
+using GetRow = std::function<void(std::size_t vertex, std::span<float> row)>;
+FittedShapes fit_shapes(const Surface& surface, std::size_t modes, std::span<const std::uint8_t> fineness, const GetRow& get_wanted);
 
 }  // namespace carillon::packed

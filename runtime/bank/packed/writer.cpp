@@ -10,7 +10,7 @@
 namespace carillon::packed {
 namespace {
 
-constexpr int kCompressionLevel = 12;  // maximum: banks are packed once
+constexpr int kCompressionLevel = 6;  // 12 takes 5 % less space and 15 times as long
 
 }  // namespace
 

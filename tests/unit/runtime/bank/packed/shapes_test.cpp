@@ -52,6 +52,11 @@ struct Shapes {
   }
   static bool is_rest(std::size_t mode, bool is_any_at_rest) { return is_any_at_rest && mode % 3 == 1; }
 
+  FittedShapes fit(const Surface& surface) const {
+    return fit_shapes(surface, modes, fineness,
+                      [&](std::size_t v, std::span<float> row) { std::copy_n(wanted.get(v), row.size(), row.begin()); });
+  }
+
   double find_wanted(std::size_t v, std::size_t m, std::size_t c) const {
     return static_cast<double>(wanted.get(v)[c * wanted.get_padded() + m]);
   }
@@ -65,7 +70,7 @@ struct Result {
 };
 
 Result pack(const Surface& surface, const Shapes& shapes) {
-  const FittedShapes fitted = fit_shapes(surface, shapes.wanted, shapes.modes, shapes.fineness);
+  const FittedShapes fitted = shapes.fit(surface);
   Result result;
   result.bytes = write_shapes(shapes.step, fitted.levels);
   result.shape = read_shapes(example::as_bytes(result.bytes), surface, shapes.scale, "shapes");
@@ -154,7 +159,7 @@ TEST(CodecShapes, at_the_finest_are_exact) {
     shapes.fineness[v] = is_fixed ? kMaxFineness : 0;
   }
   shapes.wanted = std::move(wanted);
-  const FittedShapes fitted = fit_shapes(surface, shapes.wanted, 5, shapes.fineness);
+  const FittedShapes fitted = shapes.fit(surface);
   const std::vector<std::uint8_t> bytes = write_shapes(shapes.step, fitted.levels);
   const std::vector<std::int16_t> shape = read_shapes(example::as_bytes(bytes), surface, shapes.scale, "shapes");
   for (std::size_t v = 0; v < surface.places.size(); ++v)
@@ -183,17 +188,6 @@ TEST(CodecShapes, of_noise_read_back_within_steps) {
   EXPECT_LT(pack(surface, shapes).worst, 1.01 * kMostLeft);
 }
 
-TEST(CodecShapes, of_a_sample_cover_coarse_levels_and_sampled_vertices) {
-  const Surface surface = example::make_surface(example::make_ball(3));
-  const Shapes shapes(surface, 5, 0.02);
-  const FittedShapes all = fit_shapes(surface, shapes.wanted, 5, shapes.fineness),
-                     some = fit_shapes(surface, shapes.wanted, 5, shapes.fineness, 8);
-  const std::size_t finest = surface.level_begin[surface.level_count() - 1];
-  for (std::size_t v = 0; v < surface.places.size(); ++v)
-    for (std::size_t i = 0; i < all.rows.get_width(); ++i)
-      ASSERT_EQ(some.rows.get(v)[i], v < finest || v % 8 == 0 ? all.rows.get(v)[i] : 0.0F) << v;
-}
-
 // ---- damaged bytes ----
 
 /// False if the bytes are rejected.
@@ -215,9 +209,7 @@ struct Sample {
   std::vector<LevelNumbers> levels;
 
   explicit Sample(int divisions, std::size_t modes = 2, double step = 0.2)
-      : surface(example::make_surface(example::make_ball(divisions))),
-        shapes(surface, modes, step),
-        levels(fit_shapes(surface, shapes.wanted, modes, shapes.fineness).levels) {}
+      : surface(example::make_surface(example::make_ball(divisions))), shapes(surface, modes, step), levels(shapes.fit(surface).levels) {}
   std::vector<std::uint8_t> write() const { return write_shapes(shapes.step, levels); }
   bool try_read(const std::vector<std::uint8_t>& bytes) const { return packed::try_read(example::as_bytes(bytes), surface, shapes.scale); }
 };
