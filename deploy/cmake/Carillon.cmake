@@ -398,16 +398,16 @@ endfunction()
 # The environment and the command line under which tests start MPI programs: one thread a rank, and for Open MPI, which alone reads OMPI_*:
 # more ranks than cores allowed, root allowed, no binding to cores. MPIEXEC_* are those of CMake's FindMPI; what another MPI needs goes
 # into MPIEXEC_PREFLAGS. A waiting rank that yields loses its core to any other program (a test of two ranks next to a compiler takes three
-# times as long), one that polls keeps it from the rank it waits for: CARILLON_MPI_ENVIRONMENT yields, carillon_set_ranks() says for which tests not.
+# times as long), one that polls keeps it from the rank it waits for: carillon_set_ranks() says which tests yield. carillon-precompute decides for
+# itself.
 set(CARILLON_MPI_SETTINGS OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 HWLOC_COMPONENTS=-gl OMPI_MCA_pml=ob1
   OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_rmaps_base_oversubscribe=1 OMPI_MCA_hwloc_base_binding_policy=none)
-set(CARILLON_MPI_ENVIRONMENT ${CARILLON_MPI_SETTINGS} OMPI_MCA_mpi_yield_when_idle=1)
 # A test on so many ranks: its cores, and its environment, where more than two ranks yield.
 function(carillon_set_ranks test ranks)
   carillon_take_cores(${test} ${ranks})
   set(environment ${CARILLON_MPI_SETTINGS})
   if(ranks GREATER 2)
-    set(environment ${CARILLON_MPI_ENVIRONMENT})
+    list(APPEND environment OMPI_MCA_mpi_yield_when_idle=1)
   endif()
   set_property(TEST ${test} APPEND PROPERTY ENVIRONMENT "${environment}")
 endfunction()
@@ -441,7 +441,7 @@ function(carillon_script_test name)
   list(PREPEND labels ${CARILLON_TEST_KIND} ${arg_LABELS} part.${arg_PART})
   add_test(NAME ${name} COMMAND ${arg_COMMAND})
   set_tests_properties(${name} PROPERTIES TIMEOUT ${limit} COST ${arg_TIMEOUT} LABELS "${labels}"
-    ENVIRONMENT "${CARILLON_MPI_ENVIRONMENT};CARILLON_BIN_DIR=${CMAKE_BINARY_DIR}/bin;CARILLON_SOURCE_DIR=${PROJECT_SOURCE_DIR}")
+    ENVIRONMENT "${CARILLON_MPI_SETTINGS};CARILLON_BIN_DIR=${CMAKE_BINARY_DIR}/bin;CARILLON_SOURCE_DIR=${PROJECT_SOURCE_DIR}")
   if(arg_FIXTURES)
     set_tests_properties(${name} PROPERTIES FIXTURES_REQUIRED "${arg_FIXTURES}")
   endif()

@@ -25,6 +25,12 @@ bool is_on_one_host() {
   return !base::is_launched();
 }
 
+/// False for a run on one rank.
+bool has_peers() {
+  const char* all = std::getenv("OMPI_COMM_WORLD_SIZE");
+  return all != nullptr ? std::string_view(all) != "1" : base::is_launched();
+}
+
 /// Kernels that OpenBLAS selects on this processor; empty for another BLAS, or a build for one processor only.
 std::string find_default_kernels() {
   void* blas = ::dlopen("libblas.so.3", RTLD_LAZY | RTLD_LOCAL);
@@ -56,7 +62,7 @@ void prepare_environment() {
   ::unsetenv("PETSC_OPTIONS_YAML");
   base::isolate_lone_process();
   if (is_on_one_host()) ::setenv("OMPI_MCA_pml", "ob1", 0);
-  if (std::getenv("SLURM_JOB_ID") == nullptr) ::setenv("OMPI_MCA_mpi_yield_when_idle", "1", 0);
+  if (has_peers() && std::getenv("SLURM_JOB_ID") == nullptr) ::setenv("OMPI_MCA_mpi_yield_when_idle", "1", 0);
   ::setenv("HWLOC_COMPONENTS", "-gl", 0);
   ::setenv("GLIBC_TUNABLES", "glibc.malloc.hugetlb=1", 0);
   choose_kernels();

@@ -54,7 +54,6 @@ class JobFolder : public Folder {
   Outcome run(int ranks = 1, const std::string& arguments = "job.json") const {
     for (const auto& [name, value] : std::vector<std::array<const char*, 2>>{{"OMPI_ALLOW_RUN_AS_ROOT", "1"},
                                                                              {"OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1"},
-                                                                             {"OMPI_MCA_mpi_yield_when_idle", "1"},
                                                                              {"OPENBLAS_NUM_THREADS", "1"}})
       setenv(name, value, 1);
     const std::string command = fmt::format("cd '{}' && mpirun -np {} --oversubscribe --bind-to none '{}/carillon-precompute' {} 2>&1",

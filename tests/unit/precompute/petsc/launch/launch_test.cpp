@@ -72,8 +72,12 @@ TEST(Environment, has_the_transport_of_one_host_only_on_one_host) {
   EXPECT_THAT(std::getenv("OMPI_MCA_pml"), StrEq("ob1"));
 }
 
-TEST(Environment, lets_waiting_ranks_yield_except_under_slurm) {
-  const Environment yields("OMPI_MCA_mpi_yield_when_idle", nullptr), job("SLURM_JOB_ID", "7");
+TEST(Environment, lets_ranks_that_wait_for_others_yield_except_under_slurm) {
+  const Environment yields("OMPI_MCA_mpi_yield_when_idle", nullptr), job("SLURM_JOB_ID", nullptr), all("OMPI_COMM_WORLD_SIZE", "1");
+  prepare_environment();
+  EXPECT_EQ(std::getenv("OMPI_MCA_mpi_yield_when_idle"), nullptr);
+  ::setenv("OMPI_COMM_WORLD_SIZE", "2", 1);
+  ::setenv("SLURM_JOB_ID", "7", 1);
   prepare_environment();
   EXPECT_EQ(std::getenv("OMPI_MCA_mpi_yield_when_idle"), nullptr);
   ::unsetenv("SLURM_JOB_ID");
