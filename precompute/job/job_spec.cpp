@@ -253,5 +253,6 @@ JobSpec read_job(const fs::path& file, BankKey bank) { return read_root(base::re
 
 std::string to_text(Element element) { return kElementNames[static_cast<std::size_t>(element)]; }
 std::string to_text(Mass mass) { return kMassNames[static_cast<std::size_t>(mass)]; }
+std::string to_text(Shapes shapes) { return kShapesNames[static_cast<std::size_t>(shapes)]; }
 
 }  // namespace carillon::job

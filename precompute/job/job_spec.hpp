@@ -19,6 +19,7 @@ using material::Material;
 
 enum class Element { T4, T10 };
 enum class Mass { consistent, lumped };
+enum class Shapes { packed, exact };
 /// Eigensolver. automatic: dense LAPACK for small problems, else the fastest for the band.
 enum class Method { automatic, block_lanczos, krylov_schur, dense };
 /// Sparse factorisation of shift-invert. automatic: the own L D L^T, and MUMPS if that is unstable.
@@ -97,6 +98,7 @@ struct JobSpec {
   std::optional<Body> body;                   // alternative to mesh
   std::optional<AnalyticBody> analytic;       // alternative to both: known modes, no mesh
   std::filesystem::path bank;                 // absolute; empty: none given
+  Shapes shapes = Shapes::packed;             // in the bank
   Material material;                          // of the whole body, or of regions not in `materials`
   bool has_material = true;                   // false: `materials` must cover all regions; `material` is its first
   std::map<std::string, Material> materials;  // by region of the mesh: its tag as text, or its name
@@ -147,5 +149,6 @@ std::vector<base::KeyTable> describe_job_keys();
 /// Words of the job.
 std::string to_text(Element element);
 std::string to_text(Mass mass);
+std::string to_text(Shapes shapes);
 
 }  // namespace carillon::job

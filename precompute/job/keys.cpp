@@ -14,6 +14,8 @@ const base::Keys<JobSpec> kJobKeys{
     {"body", "one form",
      "the same as `{\"shape\": \"bar\", ...}`, a surface with the keys below, or a [known body](bodies-with-known-modes.md)"},
     {"bank", "required by `carillon-precompute`", "path of the bank; `<bank>.resolved.json` next to it is a job with the same result"},
+    {"shapes", &JobSpec::shapes, kShapesNames,
+     "mode shapes in the bank: [packed](../packed-banks.md) at -60 dB(A) where they take more than 1 MB, or exact"},
     {"accuracy_cents", &JobSpec::accuracy_cents, Limits{1e-3, 1200},
      "chooses element, mesh size and `solver.tolerance`: [choose-accuracy](choose-accuracy.md)"},
     {"material", "required", "name (`\"steel\"`) or object: [materials](materials.md)"},

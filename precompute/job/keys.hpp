@@ -12,6 +12,7 @@ namespace carillon::job {
 // In the order of the enumerations.
 inline const std::vector<std::string> kElementNames{"T4", "T10"};
 inline const std::vector<std::string> kMassNames{"consistent", "lumped"};
+inline const std::vector<std::string> kShapesNames{"packed", "exact"};
 inline const std::vector<std::string> kMethodNames{"automatic", "block-lanczos", "krylov-schur", "dense"};
 inline const std::vector<std::string> kFactorisationNames{"automatic", "ldlt", "mumps"};
 inline const std::vector<std::string> kAirNames{"none", "auto", "bem"};

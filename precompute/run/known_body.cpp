@@ -58,7 +58,7 @@ RunSummary write_known_body(Run& run) {
     const std::string record =
         job::resolved_json(run.job, fs::absolute(summary.bank).parent_path(), describe_known_body(run, made).sorted_text());
     made.bank.provenance = record;
-    bank::write_bank(made.bank, run.bank);
+    write_bank(run, made.bank);
     base::write_file(job::find_resolved_path(run.bank), record);
     summary.result = fmt::format("{}\n{}\n{}", made.theory, bank::describe_completeness(made.bank), bank::describe_accuracy(made.bank));
     if (!made.coupling.empty()) summary.result += "\n" + made.coupling;

@@ -22,7 +22,9 @@
 #include "runtime/bank/bank.hpp"
 #include "runtime/bank/corrected.hpp"
 #include "runtime/bank/of_material.hpp"
+#include "runtime/bank/pack.hpp"
 #include "runtime/bank/select.hpp"
+#include "runtime/bank/write.hpp"
 #include "runtime/base/file.hpp"
 #include "runtime/base/json.hpp"
 
@@ -235,6 +237,28 @@ std::string describe_result(const bank::Bank& bank) {
   return text;
 }
 
+}  // namespace
+
+void write_bank(Run& run, const bank::Bank& bank) {
+  std::string packing = "exact shapes";
+  if (run.job.shapes == job::Shapes::exact || !bank::is_worth_packing(bank)) {
+    bank::write_bank(bank, run.bank);
+  } else {
+    try {
+      bank::PackedBank packed = bank::calc_packed(bank, bank::kPackError, true);
+      packed.bank.provenance = bank.provenance;
+      bank::write_packed_bank(packed, run.bank);
+      packing = "shapes packed, " + bank::describe(*packed.bank.packing);
+    } catch (const InputError& fault) {
+      bank::write_bank(bank, run.bank);
+      packing += fmt::format(", not packed: {}", fault.what());
+    }
+  }
+  run.log.print(fmt::format("{} bytes, {}", fs::file_size(run.bank), packing));
+}
+
+namespace {
+
 /// The record in the bank is made before the bank is written; <bank>.resolved.json includes the time of writing.
 RunSummary write_outputs(Run& run, const Solution& found, const AccuracyReport& accuracy, const AirReport& air,
                          const CouplingReport& coupling, bank::Bank bank) {
@@ -259,8 +283,7 @@ RunSummary write_outputs(Run& run, const Solution& found, const AccuracyReport& 
   comm::Communicator(run.comm).agree([&] {
     if (!run.comm.is_root()) return;
     bank.provenance = make_record(measured);
-    bank::write_bank(bank, run.bank);
-    run.log.print(fmt::format("{} bytes", fs::file_size(run.bank)));
+    write_bank(run, bank);
     summary.result = describe_result(bank);
   });
   run.log.end();

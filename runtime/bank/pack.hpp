@@ -10,6 +10,7 @@
 namespace carillon::bank {
 
 inline constexpr double kMinPackError = -90.0, kMaxPackError = -10.0;  // dB(A)
+inline constexpr double kPackError = -60.0;                            // default
 
 struct PackedBank {
   Bank bank;                                        // as decoded: quantised shapes and vertices, in file order
@@ -22,6 +23,9 @@ struct PackedBank {
 /// Frequencies, decays, gains and the rest are unchanged; the provenance records the packing. Throws InputError for an error out of range
 /// and for a bank without modes. The bank must be valid. Takes seconds.
 PackedBank calc_packed(const Bank& bank, double error_db, bool keep_numbers = false);
+
+/// False for banks whose shapes take less than a megabyte, which gain little.
+inline bool is_worth_packing(const Bank& bank) { return bank.shape.size() * sizeof(std::int16_t) >= 1'000'000; }
 
 /// Error of an unpacked bank against its original, without witnesses. Throws InputError if they do not match. Both must be valid.
 Packing compare_packed(const Bank& packed, const Bank& original);

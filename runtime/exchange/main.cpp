@@ -289,7 +289,7 @@ struct Options {
   std::string file, original, packed, unpacked, edited;
   bool json = false, csv = false, all = false, keep_numbers = false;
   std::size_t modes = 20;
-  double error_db = -60.0;
+  double error_db = bank::kPackError;
   Wishes wishes;
   exchange::ExportWishes exported;
   exchange::ImportWishes imported;

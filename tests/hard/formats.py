@@ -63,7 +63,7 @@ def faust_nyquist(folder):
 
 def faust_one_mode(folder):
     bank = take_modes(folder, "glass_plate.hdf", 1)
-    run(BIN / "carillon-bank", "export", bank, "-o", "body.dsp", "--points", "0.4,0.3,0.002", cwd=folder)
+    run(BIN / "carillon-bank", "export", bank, "-o", "body.dsp", "--points", "0.39,0.29,0.002", cwd=folder)
     numbers = re.search(r"swing\((\S+), (\S+), at\(point, (\S+)\)\)", (folder / "body.dsp").read_text()).groups()
     hz, d, gain = map(float, numbers)
     t = np.arange(48000) / 48000

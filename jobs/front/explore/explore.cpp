@@ -65,9 +65,6 @@ class PageBanks {
   std::vector<const BankFacts*> order_;
 };
 
-constexpr std::uintmax_t kSmallBytes = 4'000'000;  // not packed below
-constexpr double kPackErrorDb = -60.0;             // for larger ones
-
 const material::Row* find_nearest(const material::MaterialTable& table, const bank::Material& material) {
   const material::Row* nearest = nullptr;
   double least = std::numeric_limits<double>::infinity();
@@ -134,10 +131,10 @@ const BankFacts& PageBanks::add(const fs::path& file) {
   facts.kept.name = stem + ".hdf";
   for (int k = 2; taken.contains(facts.kept.name); ++k) facts.kept.name = fmt::format("{}-{}.hdf", stem, k);
   const fs::path target = folder_ / facts.kept.name;
-  if (keeps_all_ || bank.packing || facts.kept.full_bytes <= kSmallBytes) {
+  if (keeps_all_ || bank.packing || !bank::is_worth_packing(bank)) {
     put_file(file, target);
   } else {
-    const bank::PackedBank packed = bank::calc_packed(bank, kPackErrorDb, true);
+    const bank::PackedBank packed = bank::calc_packed(bank, bank::kPackError, true);
     bank::write_packed_bank(packed, target);
     facts.kept.change = "packed, " + bank::describe(*packed.bank.packing);
   }

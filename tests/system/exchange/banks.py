@@ -21,7 +21,7 @@ def run(*words, cwd=None, code=0):
 
 def make_bank(folder, name, body, **job):
     """The path of a bank of a body that no other test has."""
-    job = {"body": body, "material": "glass", "bank": f"{name}.hdf", **job}
+    job = {"body": body, "material": "glass", "shapes": "exact", "bank": f"{name}.hdf", **job}
     (folder / f"{name}.json").write_text(json.dumps(job))
     run(BIN / "carillon-precompute", "-q", f"{name}.json", cwd=folder)
     return folder / f"{name}.hdf"
