@@ -30,6 +30,7 @@ constexpr std::size_t kMaxTrials = 7;
 constexpr std::int64_t kCoarseShapeNodes = 1500, kCoarseSurfaceNodes = 6000;
 constexpr double kGoal = 0.85;        // safety factor of the target, so that the next trial is the last
 constexpr double kFinestStep = 0.25;  // range of the convergence rates, see predict_level()
+constexpr double kFirstGrowth = 3.0;  // maximum, of the nodes from the first mesh to the second
 constexpr double kMinStep = 0.9;      // maximum: nearly equal edges give no new information
 constexpr double kLinearFrom = 20e3;  // T10 nodes above which T4 is tried too
 constexpr int kMaxCounts = 4;         // node counts tried per trial
@@ -241,7 +242,9 @@ Decision Search::decide_on_body() {
     quadratic_.reset();
     return {0, is_linear_cheaper ? linear.setting : quadratic_forecast_.setting};
   }
-  const double ratio = std::min(find_ratio(kGoal * asked_, kFinestStep), kMinStep);
+  // Errors estimated on one mesh are often twenty times too large; two meshes tell more, and a second of three times the nodes is cheap.
+  const double finest = find_before(last) == nullptr ? std::pow(kFirstGrowth, -1.0 / find_dimension()) : kFinestStep;
+  const double ratio = std::min(find_ratio(kGoal * asked_, finest), kMinStep);
   const Forecast next = forecast(make_setting(last.setting.element, ratio), ratio);
   if (report_.trials.size() == 1 && next.nodes > kLinearFrom) {
     quadratic_ = last;

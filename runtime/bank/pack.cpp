@@ -22,7 +22,8 @@
 namespace carillon::bank {
 namespace {
 
-constexpr double kLatticePerSize = 32768.0, kLatticePerEdge = 8.0;  // lattice steps per body size, per shortest edge
+constexpr double kLatticePerSize = 1 << 20,
+                 kLatticePerEdge = 8.0;  // steps per body size (flat faces stay flat to contact), per shortest edge
 constexpr double kMostLattice = 1 << 22;
 constexpr double kMaxRelativeStep = 1.0;  // maximum step of a mode over its mean motion, so that none vanishes
 constexpr double kCavityFactor = 16.0;    // permitted error of inner walls over that of the outer surface

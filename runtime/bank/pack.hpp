@@ -19,7 +19,7 @@ struct PackedBank {
 
 /// Packs shapes and surface so that the error of a hard blow is just below `error_db` (Packing::error_db). Audible modes and places with
 /// quiet blows are kept more precisely; walls of closed cavities may have 12 dB more. All triangles stay, reordered unless `keep_numbers`
-/// (contact events refer to triangle numbers); vertices move by less than 1/30,000 of the body's size, unused ones are removed.
+/// (contact events refer to triangle numbers); vertices move by less than 1/1,000,000 of the body's size, unused ones are removed.
 /// Frequencies, decays, gains and the rest are unchanged; the provenance records the packing. Throws InputError for an error out of range
 /// and for a bank without modes. The bank must be valid. Takes seconds.
 PackedBank calc_packed(const Bank& bank, double error_db, bool keep_numbers = false);

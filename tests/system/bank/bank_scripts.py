@@ -290,7 +290,7 @@ def check_packed(folder):
         # Triangles keep their numbers, and their corners their places, to half a step of the lattice.
         size = np.ptp(old["mesh/vertices"][:], axis=0).max()
         corners = [bank["mesh/vertices"][:][bank["mesh/triangles"][:]] for bank in (old, new)]
-        assert np.abs(corners[0] - corners[1]).max() <= size / 32768 / 2 * 1.001
+        assert np.abs(corners[0] - corners[1]).max() <= size / 2**20 / 2 * 1.001
         shapes = [bank["modes/shape"][:][bank["mesh/triangles"][:]] * bank["modes/shape_scale"][:][:, None] for bank in (old, new)]
         error = np.sqrt(np.mean((shapes[0] - shapes[1]) ** 2) / np.mean(shapes[0] ** 2))
         assert 1e-4 < error < 0.1, error  # not the same, and not another

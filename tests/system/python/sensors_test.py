@@ -154,7 +154,7 @@ class SensorsTest(unittest.TestCase):
 
     def test_strain_is_the_curvature(self):
         faces = self.bank.vertices_m[self.bank.triangles]
-        top = numpy.flatnonzero(numpy.all(numpy.abs(faces[:, :, 2] - THICKNESS / 2) < 1e-9, axis=1))
+        top = numpy.flatnonzero(numpy.all(numpy.abs(faces[:, :, 2] - THICKNESS / 2) < 1e-6, axis=1))
         centres = faces.mean(axis=1)
         duration_s = 2e-4
         omega = 2 * numpy.pi * self.bank.frequency_hz[self.bending]
