@@ -171,22 +171,6 @@ struct Sample {
   }
 };
 
-/// Reference decoder in double precision, like read_shapes(): shapes (n, m, 3) of n rows.
-std::vector<std::int16_t> make_shape(const Bank& bank, const packed::Rows& rows, std::size_t count, const std::vector<float>& step) {
-  std::vector<std::int16_t> shape;
-  shape.reserve(count * 3 * bank.mode_count());
-  for (std::size_t v = 0; v < count; ++v) {
-    const float* row = rows.get(v);
-    for (std::size_t m = 0; m < bank.mode_count(); ++m)
-      for (std::size_t c = 0; c < 3; ++c) {
-        const double value = static_cast<double>(row[c * rows.get_padded() + m]) * static_cast<double>(step[m]);
-        const double most = 32767.0 * bank.shape_scale[m];
-        shape.push_back(find_step(std::clamp(value, -most, most), bank.shape_scale[m]));
-      }
-  }
-  return shape;
-}
-
 /// Error of shapes (n, m, 3) at n vertices that stand for the areas (n). Without witnesses.
 Packing calc_error(const Bank& bank, const Blows& blows, const std::vector<std::int32_t>& vertices, const std::vector<double>& area_m2,
                    const std::vector<std::int16_t>& shape) {
@@ -288,28 +272,29 @@ class Packer {
     const std::size_t modes = bank_.mode_count();
     std::vector<std::uint8_t> fineness;
     for (const std::int32_t v : sample.vertices) fineness.push_back(fineness_[v]);
-    std::vector<float> factor;
+    std::vector<float> per_step;
     for (std::size_t m = 0; m < modes; ++m)
-      factor.push_back(step[m] > 0.0F ? static_cast<float>(bank_.shape_scale[m] / static_cast<double>(step[m])) : 0.0F);
-    return packed::fit_shapes(sample.surface, modes, fineness, [&](std::size_t v, std::span<float> row) {
+      per_step.push_back(step[m] > 0.0F ? static_cast<float>(bank_.shape_scale[m] / static_cast<double>(step[m])) : 0.0F);
+    const std::vector<float> factor = packed::calc_factors(step, bank_.shape_scale);
+    return packed::fit_shapes(sample.surface, modes, fineness, factor, [&](std::size_t v, std::span<float> row) {
       const std::int16_t* shape = bank_.shape.data() + 3 * modes * static_cast<std::size_t>(sample.vertices[v]);
       const std::size_t padded = row.size() / 3;
       for (std::size_t m = 0; m < modes; ++m)
-        for (std::size_t c = 0; c < 3; ++c) row[c * padded + m] = static_cast<float>(*shape++) * factor[m];
+        for (std::size_t c = 0; c < 3; ++c) row[c * padded + m] = static_cast<float>(*shape++) * per_step[m];
     });
   }
 
   double try_sampled(double asked_db, const Sample& sample) const {
     const std::vector<float> step = make_steps(asked_db);
-    const std::vector<std::int16_t> shape = make_shape(bank_, fit(sample, step).rows, sample.vertices.size(), step);
-    return calc_error(bank_, blows_, sample.vertices, sample.area_m2, shape).error_db;
+    return calc_error(bank_, blows_, sample.vertices, sample.area_m2, fit(sample, step).shape).error_db;
   }
 
   Packed try_whole(double asked_db) const {
     const std::vector<float> step = make_steps(asked_db);
     Packed packed;
-    packed.bytes = packed::write_shapes(step, fit(all_, step).levels);
-    packed.shape = packed::read_shapes(std::as_bytes(std::span(packed.bytes)), all_.surface, bank_.shape_scale, "the packed shapes");
+    packed::FittedShapes fitted = fit(all_, step);
+    packed.bytes = packed::write_shapes(step, fitted.levels);
+    packed.shape = std::move(fitted.shape);
     packed.packing = calc_error(bank_, blows_, all_.vertices, all_.area_m2, packed.shape);
     return packed;
   }

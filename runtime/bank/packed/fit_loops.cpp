@@ -12,9 +12,8 @@ const hn::ScalableTag<std::int32_t> kInts;
 using Vector = hn::Vec<decltype(kFloats)>;
 constexpr std::size_t kLanes = hn::MaxLanes(kFloats);
 
-float calc_columns(const float* const* rows, const float* wanted, const Stencil& stencil, Columns& columns) {
+void calc_columns(const float* const* rows, const float* wanted, const Stencil& stencil, Columns& columns) {
   const std::size_t padded = columns.get_padded();
-  auto energy = hn::Zero(kFloats);
   for (std::size_t c = 0; c < 3; ++c) {
     float* const left = columns.get(c);
     float* const gradient = columns.get(Columns::kGradient + 3 * c);
@@ -23,7 +22,6 @@ float calc_columns(const float* const* rows, const float* wanted, const Stencil&
       Vector x[kNeighbours], value = hn::Zero(kFloats), g[3] = {value, value, value};
       for (std::size_t k = 0; k < kNeighbours; ++k) {
         x[k] = hn::LoadU(kFloats, rows[k] + c * padded + i);
-        energy = hn::MulAdd(x[k], x[k], energy);
         value = hn::MulAdd(hn::Set(kFloats, stencil.value[k]), x[k], value);
         for (std::size_t j = 0; j < 3; ++j) g[j] = hn::MulAdd(hn::Set(kFloats, stencil.gradient[j][k]), x[k], g[j]);
       }
@@ -36,7 +34,6 @@ float calc_columns(const float* const* rows, const float* wanted, const Stencil&
       }
     }
   }
-  return hn::GetLane(hn::SumOfLanes(kFloats, energy));
 }
 
 /// Products of 4 columns from `row` on with kWide columns from `column` on.

@@ -44,8 +44,8 @@ struct ResidualCost {
 };
 
 struct FitLoops {
-  /// Fills the columns of a vertex from the rows of its neighbours and its own; returns the sum of squares of the neighbours.
-  float (*calc_columns)(const float* const* rows, const float* wanted, const Stencil& stencil, Columns& columns);
+  /// Fills the columns of a vertex from the rows of its neighbours and its own.
+  void (*calc_columns)(const float* const* rows, const float* wanted, const Stencil& stencil, Columns& columns);
   /// Inner products of the columns [begin, end), multiples of 4, with all columns up to their own.
   void (*calc_products)(const Columns& columns, std::size_t begin, std::size_t end, Products& products);
   /// Cost of what the first `fields` fields leave with coefficients (fields, 3). log2 is piecewise linear: off by 0.09 at most.

@@ -38,20 +38,25 @@ using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kFields,
 
 class Fitter {
  public:
-  Fitter(const Surface& surface, std::size_t modes, std::span<const std::uint8_t> fineness, const GetRow& get_wanted)
+  Fitter(const Surface& surface, std::size_t modes, std::span<const std::uint8_t> fineness, std::span<const float> factor,
+         const GetRow& get_wanted)
       : surface_(surface),
         fineness_(fineness),
+        factor_(factor),
         get_wanted_(get_wanted),
         modes_(modes),
-        rows_(surface.places.size(), modes),
+        rows_(surface.level_begin[surface.level_count() - 1], modes),
         wanted_(rows_.get_width()),
         row_(rows_.get_width()),
-        columns_(rows_.get_padded()) {}
+        shape_row_(rows_.get_width()),
+        columns_(rows_.get_padded()) {
+    base::reserve_large(shape_, surface.places.size() * modes * 3);
+  }
 
   FittedShapes run() {
     std::vector<LevelNumbers> levels;
     for (std::size_t level = 0; level < surface_.level_count(); ++level) levels.push_back(fit_level(level));
-    return {std::move(levels), std::move(rows_)};
+    return {std::move(levels), std::move(shape_)};
   }
 
  private:
@@ -73,6 +78,7 @@ class Fitter {
     const std::size_t from_finest = surface_.level_count() - 1 - level;
     level_step_ = step_ = find_of_level(kResidualSteps, from_finest);
     cost_.rounding = find_of_level(kRounding, from_finest);
+    is_finest_ = from_finest == 0;
     LevelNumbers numbers;
     numbers.steps.residual = level_step_;
     base::reserve_large(numbers.residual, (end - first) * 3 * modes_);
@@ -98,8 +104,12 @@ class Fitter {
   }
 
   void calc_columns(const Neighbours& neighbours, const Stencil& stencil) {
-    for (std::size_t k = 0; k < kNeighbours; ++k) from_[k] = rows_.get(neighbours[k]);
-    energy_ = fit_loops_.calc_columns(from_.data(), wanted_.data(), stencil, columns_) / static_cast<float>(kNeighbours);
+    energy_ = 0.0F;
+    for (std::size_t k = 0; k < kNeighbours; ++k) {
+      from_[k] = rows_.get(neighbours[k]);
+      energy_ += energies_[neighbours[k]] / static_cast<float>(kNeighbours);
+    }
+    fit_loops_.calc_columns(from_.data(), wanted_.data(), stencil, columns_);
   }
 
   /// Coefficient steps whose rounding changes the prediction by kCoefficientStep of the residual's step on average.
@@ -202,7 +212,7 @@ class Fitter {
     loops_.multiply(from_.data(), matrix.data(), columns_.get_padded(), row_.data());
   }
 
-  /// Adds the quantised residual of the vertex to row_ and keeps the row. False if the residual is 0.
+  /// Adds the quantised residual of the vertex to row_, and keeps the row and its shape. False if the residual is 0.
   bool add_residual(LevelNumbers& numbers) {
     const std::size_t padded = columns_.get_padded(), before = numbers.residual.size();
     numbers.residual.resize(before + 3 * modes_);
@@ -220,18 +230,27 @@ class Fitter {
       }
     }
     if (any == 0) numbers.residual.resize(before);
-    rows_.append(row_);
+    if (!is_finest_) {
+      rows_.append(row_);
+      energies_.push_back(loops_.calc_energy(row_.data(), row_.size()));
+    }
+    loops_.round(row_.data(), factor_.data(), padded, shape_row_.data());
+    shape_.insert(shape_.end(), shape_row_.begin(), shape_row_.begin() + static_cast<std::ptrdiff_t>(3 * modes_));
     return any != 0;
   }
 
   const Surface& surface_;
   std::span<const std::uint8_t> fineness_;
+  std::span<const float> factor_;
   const GetRow& get_wanted_;
   std::size_t modes_;
   const Loops& loops_ = find_loops();
   const FitLoops& fit_loops_ = find_fit_loops();
-  Rows rows_;
+  Rows rows_;                    // all levels but the finest
+  std::vector<float> energies_;  // per row
   std::vector<float> wanted_, row_;
+  std::vector<std::int16_t> shape_row_, shape_;
+  bool is_finest_ = false;
   float level_step_ = 1.0F;
   // Of a vertex. Its steps are `share_` of the level's.
   float share_ = 1.0F, step_ = 1.0F, energy_ = 0.0F;  // mean square of the neighbours
@@ -243,8 +262,9 @@ class Fitter {
 
 }  // namespace
 
-FittedShapes fit_shapes(const Surface& surface, std::size_t modes, std::span<const std::uint8_t> fineness, const GetRow& get_wanted) {
-  return Fitter(surface, modes, fineness, get_wanted).run();
+FittedShapes fit_shapes(const Surface& surface, std::size_t modes, std::span<const std::uint8_t> fineness, std::span<const float> factor,
+                        const GetRow& get_wanted) {
+  return Fitter(surface, modes, fineness, factor, get_wanted).run();
 }
 
 }  // namespace carillon::packed

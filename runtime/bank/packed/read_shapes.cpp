@@ -220,6 +220,13 @@ class ShapeReader {
 
 }  // namespace
 
+std::vector<float> calc_factors(std::span<const float> step, std::span<const double> scale) {
+  std::vector<float> factor((step.size() + kRowUnit - 1) / kRowUnit * kRowUnit, 0.0F);
+  for (std::size_t m = 0; m < step.size(); ++m)
+    if (scale[m] > 0.0) factor[m] = static_cast<float>(static_cast<double>(step[m]) / scale[m]);
+  return factor;
+}
+
 std::vector<std::int16_t> read_shapes(std::span<const std::byte> bytes, const Surface& surface, std::span<const double> scale,
                                       const std::string& name) {
   Reader reader(bytes, name, "packed shapes");
@@ -239,11 +246,9 @@ std::vector<std::int16_t> read_shapes(std::span<const std::byte> bytes, const Su
     reader.fail(fmt::format("{} modes at {} vertices are more than any bank of this length becomes", modes, vertices));
 
   const std::vector<float> step = reader.get_list<float>(modes);
-  std::vector<float> factor((modes + kRowUnit - 1) / kRowUnit * kRowUnit, 0.0F);
-  for (std::size_t m = 0; m < modes; ++m) {
+  for (std::size_t m = 0; m < modes; ++m)
     if (!(step[m] >= 0.0F) || !std::isfinite(step[m])) reader.fail(fmt::format("the step of mode {} is {}", m, step[m]));
-    factor[m] = scale[m] > 0.0 ? static_cast<float>(static_cast<double>(step[m]) / scale[m]) : 0.0F;
-  }
+  const std::vector<float> factor = calc_factors(step, scale);
   std::vector<std::int16_t> shape = ShapeReader(reader, surface, modes, factor).run();
   reader.finish();
   return shape;

@@ -48,6 +48,9 @@ struct LevelNumbers {
 /// Bytes for read_shapes(). step (m): quantisation step of each mode [kg^-1/2]; levels (L).
 std::vector<std::uint8_t> write_shapes(std::span<const float> step, std::span<const LevelNumbers> levels);
 
+/// Steps of the decoded shape per step of each mode, padded for Rows: step / scale, 0 for modes at rest.
+std::vector<float> calc_factors(std::span<const float> step, std::span<const double> scale);
+
 /// Shapes (V, m, 3) in steps of `scale` (m) [kg^-1/2] from the bytes of write_shapes() for this surface and as many modes; modes of scale 0
 /// are at rest. Untrusted bytes as in read_surface().
 ///
