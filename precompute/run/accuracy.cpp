@@ -11,7 +11,6 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <optional>
 #include <type_traits>
 
 #include "precompute/eigen/memory.hpp"
@@ -32,7 +31,6 @@ constexpr double kGoal = 0.85;        // safety factor of the target, so that th
 constexpr double kFinestStep = 0.25;  // range of the convergence rates, see predict_level()
 constexpr double kFirstGrowth = 3.0;  // maximum, of the nodes from the first mesh to the second
 constexpr double kMinStep = 0.9;      // maximum: nearly equal edges give no new information
-constexpr double kLinearFrom = 20e3;  // T10 nodes above which T4 is tried too
 constexpr int kMaxCounts = 4;         // node counts tried per trial
 constexpr int kMaxRefinements = 4;    // of a mesh file: 4,096 elements per element
 
@@ -92,8 +90,6 @@ class Search {
   double tolerance_;
   bool is_refinable_ = false;       // the mesh file can be refined: it is read by rank 0
   double order_ = 4.0;              // convergence order of the errors of the last trial
-  std::optional<Trial> quadratic_;  // the T10 trial, during the T4 trial that follows it
-  Forecast quadratic_forecast_;
   AccuracyReport report_;
   Solution current_;
 };
@@ -232,28 +228,10 @@ std::string Search::describe_surface(double cents) const {
 Decision Search::decide_on_body() {
   const Trial& last = report_.trials.back();
   if (last.modes == 0) return {0, make_setting(last.setting.element, 0.5)};
-  if (last.setting.element == job::Element::T4 && quadratic_) {
-    // T10 was tried first; use the cheaper of the two forecasts.
-    const double ratio = find_ratio(kGoal * asked_, kFinestStep / 4);
-    const Forecast linear = forecast(make_setting(job::Element::T4, ratio), ratio);
-    const bool is_linear_cheaper = linear.worst_cents <= asked_ && linear.cpu_seconds < quadratic_forecast_.cpu_seconds;
-    run_.log.print(fmt::format("T4 needs about {:.0f} nodes, T10 {:.0f}: {} is cheaper", linear.nodes, quadratic_forecast_.nodes,
-                               is_linear_cheaper ? "T4" : "T10"));
-    quadratic_.reset();
-    return {0, is_linear_cheaper ? linear.setting : quadratic_forecast_.setting};
-  }
   // Errors estimated on one mesh are often twenty times too large; two meshes tell more, and a second of three times the nodes is cheap.
   const double finest = find_before(last) == nullptr ? std::pow(kFirstGrowth, -1.0 / find_dimension()) : kFinestStep;
   const double ratio = std::min(find_ratio(kGoal * asked_, finest), kMinStep);
-  const Forecast next = forecast(make_setting(last.setting.element, ratio), ratio);
-  if (report_.trials.size() == 1 && next.nodes > kLinearFrom) {
-    quadratic_ = last;
-    quadratic_forecast_ = next;
-    Setting linear = last.setting;
-    linear.element = job::Element::T4;
-    return {0, linear};
-  }
-  return {0, next.setting};
+  return {0, make_setting(last.setting.element, ratio)};
 }
 
 /// Rank 0: next setting of a mesh file: T4, T10, T10 refined.

@@ -142,6 +142,13 @@ Banks read_banks(Scene& scene, bool is_quiet) {
     }
     use_bank(body, *slot);
   }
+  // A strain is a derivative: it magnifies the error of packed shapes. Their files have version 2.
+  for (const SceneSensor& sensor : scene.sensors)
+    if (const SceneBody& body = scene.bodies[sensor.body];
+        sensor.quantity == synth::Quantity::kStrain && bank::read_version(body.bank)[0] == 2)
+      scene.warnings.push_back(
+          fmt::format("{}: the shapes of \"{}\" are packed, which changes a strain by several percent; give its job \"shapes\": \"exact\"",
+                      sensor.place, body.name));
   return banks;
 }
 

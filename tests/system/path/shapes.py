@@ -51,9 +51,24 @@ def check_body(folder, name, job):
     assert not is_packed(few) and "exact shapes" in said, said
 
 
+def check_strain(folder):
+    """A gauge on packed shapes is not exact, and an accelerometer is."""
+    for bank, quantity, warns in (("solved", "strain", True), ("solved", "acceleration", False), ("solved-exact", "strain", False)):
+        scene = {
+            "bodies": [{"name": "plate", "bank": f"{bank}.hdf"}],
+            "strikes": [{"body": "plate", "time_s": 0, "point_m": [0.1, 0.07, 0.002], "impulse_n_s": [0, 0, -0.01]}],
+            "sensors": [{"name": "gauge", "body": "plate", "point_m": [0, 0, 0.002], "direction": [1, 0, 0], "quantity": quantity}],
+            "duration_s": 0.1,
+        }
+        (folder / "scene.json").write_text(json.dumps(scene))
+        said = run(folder, BIN / "carillon-render", "scene.json", "-o", "sound.wav")
+        assert ('the shapes of "plate" are packed' in said) == warns, (bank, quantity, said)
+
+
 with tempfile.TemporaryDirectory() as name:
     folder = pathlib.Path(name)
     for body, job in BODIES.items():
         check_body(folder, body, job)
+    check_strain(folder)
     _, said = make_bank(folder, "bad", code=2, shapes="small", **BODIES["known"])
     assert 'job.json:1: "shapes"' in said and 'none of "packed", "exact"' in said and not (folder / "bad.hdf").exists(), said
