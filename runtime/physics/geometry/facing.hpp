@@ -52,7 +52,12 @@ class SurfaceProbe {
     const Grid::Near near = grid_->find_near(x);
     if (near.face < 0) return near.min_m - sag;
     const auto [on, is_inside] = find_side(x, near.face);
-    return !is_inside && on.distance2 > far * far ? std::sqrt(on.distance2) - sag : calc_skin_gap(shape_, x, on, is_inside);
+    if (!is_inside && on.distance2 > far * far) return std::sqrt(on.distance2) - sag;
+    const double gap = calc_skin_gap(shape_, x, on, is_inside);
+    if (!is_inside || !(gap < limit_m)) return gap;
+    // Inside, a walk ends at the nearest face on its side of an edge.
+    const Nearest nearest = shape_.mesh().find_nearest(x, Box::kFar, on.face);
+    return calc_skin_gap(shape_, x, nearest, shape_.mesh().is_inside(x, nearest));
   }
   Nearest find_nearest(const Vec3& x) const {
     const int face = body_ != nullptr ? -1 : grid_->find_near(x).face;

@@ -454,6 +454,24 @@ TEST(pairs, deepest_sample_from_memory) {
   EXPECT_GT(deep, 300);
 }
 
+// The deepest point is below the face, not deep inside the rim next to it, whose facets are off its skin by the sag.
+TEST(pairs, deepest_sample_next_to_a_rim) {
+  constexpr double kDepth = 1e-5;
+  const auto coin = make_cylinder(0.012, 0.002, 48).make();
+  Dice dice(13);
+  for (int i = 0; i < 500; ++i) {
+    Frame frame;
+    frame.rotation = make_turn({0, 0, 1}, dice.roll());
+    const Vec3 way = dice.roll_way();
+    frame.position_m = {0.01 * way[0], 0.01 * way[1], 0.002 - kDepth};
+    PairMemory memory;
+    const Deepest found = find_deepest(*coin, frame, *coin, {}, -5e-6, memory);
+    ASSERT_GE(found.place, 0) << i;
+    EXPECT_LE(found.gap_m, -kDepth + 1e-12) << i;
+    EXPECT_GE(found.gap_m, -kDepth - coin->get_sag_m()) << i;
+  }
+}
+
 TEST(pairs, deepest_vertex_on_a_slab) {
   const auto slab = make_box({1.0, 1.0, 0.05}, 4).make();
   const Solid pen = make_lathe({{0, -0.07}, {0.0045, -0.055}, {0.0045, 0.065}, {0, 0.07}}, 20, false),
