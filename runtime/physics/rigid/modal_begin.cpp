@@ -257,7 +257,7 @@ void ModalImpacts::add_contact(ModalImpact& modal, Contact& touch, double sag_m,
     std::swap(contact.forces.place_a, contact.forces.place_b);
     std::swap(contact.shape_a, contact.shape_b);
   }
-  const double gap_m = rests ? 0.0 : hit.touch.gap_m;
+  const double gap_m = rests ? std::min(hit.touch.gap_m, 0.0) : hit.touch.gap_m;
   const double open_m = gap_m + calc_yield(spring, modal.impact != nullptr ? modal.impact->get_bodies() : made.bodies);
   spring.gap_m = std::max(open_m, 0.0);
   spring.yielded_m = std::clamp(-open_m, 0.0, sag_m);
