@@ -18,6 +18,8 @@ namespace {
 constexpr double kGapToleranceM = 1e-9;  // m; gap tolerance of an instant of impact,
 constexpr int kMaxEvaluations = 20;      // maximum number of evaluations
 constexpr double kStrikeGapM = 1e-6;     // m; a touch nearer than this at the end of a step strikes there
+constexpr double kMaxStopM = 5e-5;       // m; depth of a touch that a row stops,
+constexpr double kMinPartS = 4e-6;       // s; unless the step becomes shorter
 constexpr double kCrowdedS = 2e-3;       // s; duration of the crowded state of an island
 constexpr double kRattleS = 60e-3;  // s; a pair with more slow impacts than Pair::slow_hits within this time has none for the same time
 
@@ -153,6 +155,17 @@ bool Instants::confirm(const Step& step, std::vector<ContactRef>& first, double 
     }
   }
   return any;
+}
+
+double Instants::calc_stopping_time(const Step& step) const {
+  double time_s = step.length_s;
+  for (const ContactRef& row : step.rows) {
+    const Contact& c = row.get();
+    const double approach = bodies_.calc_approach(c.touch, c.a, c.b);
+    if (c.cord < 0 && approach > 0.0)
+      time_s = std::min(time_s, std::max(2.0 * (std::max(c.touch.gap_m, 0.0) + kMaxStopM) / approach, kMinPartS));
+  }
+  return time_s;
 }
 
 void Instants::note(const std::vector<ContactRef>& contacts, const std::vector<Hit>& hits, double time_s) const {

@@ -25,6 +25,9 @@ class Instants {
   /// Searches the pairs of an impact again at its instant: closely passing edges were treated as planes until now. Keeps the touches that
   /// close within step.together_s of the first one, with gaps up to `near_m` (infinite: current gap).
   bool confirm(const Step& step, std::vector<ContactRef>& first, double step_s, double near_m) const;
+  /// Longest part of a step without impacts whose rows let no touch get much deeper: a row stops its touch at the end, half of its movement
+  /// too deep.
+  double calc_stopping_time(const Step& step) const;
 
   /// Records an impact of these hits: a pair with many slow ones rattles.
   void note(const std::vector<ContactRef>& contacts, const std::vector<Hit>& hits, double time_s) const;

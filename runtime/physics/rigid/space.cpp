@@ -112,7 +112,7 @@ void Space::step_island(Island& island, double start_s, double length_s) {
     impacts = max_impacts;
   }
   while (length_s - done > kMinStepS) {
-    const double h = impacts > 0 && !modal_impacts_.list().empty() ? std::min(length_s - done, kMaxStruckStepS) : length_s - done;
+    double h = impacts > 0 && !modal_impacts_.list().empty() ? std::min(length_s - done, kMaxStruckStepS) : length_s - done;
     bodies_.set_time(start_s + done);
     modal_impacts_.begin_early(step_, h, instants_);
     modal_impacts_.follow(step_, h, touches_);
@@ -122,16 +122,23 @@ void Space::step_island(Island& island, double start_s, double length_s) {
     projection_.run(step_, open_m);
     if ((may_sleep && try_rest(island, h)) || (begins && rest_.try_still(island, h))) break;
     touches_.forget_closing(step_);
-    bool is_completed = false;
-    for (int n = 0; n <= kMaxCompleted; ++n) {
-      problem_.predict(step_, h, false);
-      problem_.make_points(step_, impacts < max_impacts);
-      problem_.solve(step_);
-      if (!touches_.complete(step_, missed < kMaxSought)) break;
-      is_completed = true;
-    }
-    // A row stops a touch only at the end of a step, half of its movement too deep: missing touches strike at the start instead.
+    const auto solve = [&] {  // true: touches were missing
+      for (int n = 0; n <= kMaxCompleted; ++n) {
+        problem_.predict(step_, h, false);
+        problem_.make_points(step_, impacts < max_impacts);
+        problem_.solve(step_);
+        if (!touches_.complete(step_, missed < kMaxSought)) return n > 0;
+      }
+      return true;
+    };
+    const bool is_completed = solve();
+    // A row stops a touch only at the end of a step, half of its movement too deep: missing touches strike at the start instead, and steps
+    // without impacts are short.
     if (is_completed && impacts >= max_impacts && more++ < kMaxCompleted && strike_at_once(start_s + done, h)) continue;
+    for (double stops_s = 0.0; impacts >= max_impacts && (stops_s = instants_.calc_stopping_time(step_)) < h;) {
+      h = stops_s;
+      solve();
+    }
     double at = h;
     std::vector<ContactRef> first;
     step_.together_s = kSimultaneousS;
