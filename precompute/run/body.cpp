@@ -178,6 +178,7 @@ Body make_body(Run& run, const Setting& setting) {
   });
   if (run.comm.size() > 1) run.log.print(body.order != nullptr ? kByOrder : kByMetis);
   broadcast_fixed_nodes(run.comm, std::move(fixed), body.pieces.local);
+  body.pieces.local.is_surface_known = run.job.body.has_value();
   mesh = {};
   for (std::int32_t& row : body.surface.row) row = body.pieces.row_of_node[row];
   body.pieces.row_of_node = {};

@@ -37,6 +37,11 @@ ModeProperties calc_errors(Run& run, const Body& body, const AssembledSystem& sy
   errors.shares = std::move(decay.shares);
   errors.supports = fem::calc_supports(run.comm, mesh, materials, run.job.mass, modes.lambda, modes.shapes);
   errors.bars = name_errors(body.source, run, [&] { return calc_bars(run, body, system, modes); });
+  if (errors.bars.level.is_guessed)
+    run.log.warn_once(
+        "some facets of the mesh are one element wide and turn by 50 to 80 degrees: they may be planes of the body or samples of a round "
+        "surface; the difference is stated next to the error bars (facets in doubt); finer elements or mid-side nodes on the surface "
+        "resolve it");
   run.log.end();
   return errors;
 }

@@ -28,16 +28,19 @@ constexpr double kRoughT4 = 0.5, kStiffT4 = 1.0, kRoughT10 = 0.3, kStiffT10 = 0.
 constexpr double kRoughWidthT4 = 0.45, kRoughWidthLumped = 0.5;                  // of the mesh's bar
 constexpr double kSingularShare = 0.25;                                          // of the estimate's energy
 constexpr double kHalf = 0.5, kHalfT4 = 0.4, kQuarter = 0.25, kThird = 1.0 / 3;  // of the mesh's bar
-constexpr double kSameEigenvalue = 1e-6;                                         // of lambda
+constexpr double kSameEigenvalue = 1e-6;  // of lambda
 
 double to_cents(double share) { return 600 * std::log2(share); }
 
-Correction find_correction(const ErrorParts& parts, Kind kind, bool is_lumped) {
-  if (is_lumped && kind != Kind::kT4) return Correction::kLumped;
+Correction find_correction(const ErrorParts& parts, const Level& level) {
+  const Kind kind = level.kind;
+  if (level.is_lumped && kind != Kind::kT4) return Correction::kLumped;
   const bool is_t4 = kind == Kind::kT4;
   const double excess = calc_excess(parts, kind);
   if (excess > (is_t4 ? kStiffT4 : kStiffT10)) return Correction::kStiff;
   if (excess > (is_t4 ? kRoughT4 : kRoughT10) || parts.singular > kSingularShare * parts.interpolation) return Correction::kRough;
+  constexpr double kDoubt = 0.25;  // half of the bar
+  if (level.is_guessed && calc_facet_cents(parts) > kDoubt * calc_cents(parts, kind)) return Correction::kRough;
   return Correction::kOneMesh;
 }
 
@@ -148,7 +151,7 @@ Verdict compare(const Level& level, const Corrections& corrections, const Level&
 Corrections calc_corrections(const Level& level, const Level* coarser) {
   const std::vector<ErrorParts> parts = share_parts(level);
   Verdict verdict{{}, std::vector<double>(parts.size(), 0.0)};
-  for (const ErrorParts& mode : parts) verdict.correction.push_back(find_correction(mode, level.kind, level.is_lumped));
+  for (const ErrorParts& mode : parts) verdict.correction.push_back(find_correction(mode, level));
   const Corrections alone = correct(level, parts, verdict);
   return coarser == nullptr ? alone : correct(level, parts, compare(level, alone, *coarser));
 }

@@ -16,8 +16,9 @@ struct Level {
   std::vector<double> lambda;     // (m) [rad^2/s^2], ascending, m > 0
   std::vector<ErrorParts> parts;  // (m)
   Kind kind = Kind::kT4;
-  bool is_lumped = false;  // the mass
-  double one_layer = 0.0;  // fraction of elements that are flat and have all corners on the surface: 1 for a single-layer wall
+  bool is_lumped = false;   // the mass
+  bool is_guessed = false;  // ErrorParts::doubt is of facets that nobody judged: Surface::doubts
+  double one_layer = 0.0;   // fraction of elements that are flat and have all corners on the surface: 1 for a single-layer wall
   Unlisted unlisted;
 };
 

@@ -22,6 +22,8 @@
 namespace carillon::error_bars {
 namespace {
 
+constexpr double kNegligible = 0.05;  // of the bar: doubts at some creases of a scan
+
 void check_arguments(const comm::Communicator& comm, const mesh::LocalMesh& local, std::span<const Solid> solids,
                      std::span<const std::int32_t> material_of_tet, const Solution& solution) {
   comm.agree([&] {
@@ -174,6 +176,7 @@ ErrorBars calc_error_bars(const comm::Communicator& comm, const mesh::LocalMesh&
   level.is_lumped = mass_kind == job::Mass::lumped;
   level.lambda.assign(solution.lambda.begin(), solution.lambda.end());
   level.one_layer = recovery.one_layer;
+  level.is_guessed = recovery.is_guessed;
   level.unlisted = {solution.high_hz, solution.low_hz, solution.below};
   OwnIntervals own;
   for (std::size_t m = 0; m < solution.lambda.size(); ++m) {
@@ -195,6 +198,12 @@ ErrorBars calc_error_bars(const comm::Communicator& comm, const mesh::LocalMesh&
     own.low.push_back(-cents);
     own.high.push_back(cents);
     own.above.push_back(calc_cents(parts, level.kind));
+  }
+  if (level.is_guessed && std::all_of(level.parts.begin(), level.parts.end(), [&](const ErrorParts& parts) {
+        return calc_facet_cents(parts) < kNegligible * calc_cents(parts, level.kind);
+      })) {
+    for (ErrorParts& parts : level.parts) parts.doubt = parts.doubt_noise = 0.0;
+    level.is_guessed = false;
   }
   bars.discretisation_cents = widen_for_order(solution.lambda, own, level.unlisted);
   bars.facet_cents = find_facet_cents(level, own, bars.discretisation_cents);

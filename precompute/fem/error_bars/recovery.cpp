@@ -415,6 +415,7 @@ Recovery make_recovery(const comm::Communicator& comm, const mesh::LocalMesh& lo
   });
   comm.sum(size);
   recovery.one_layer = size[2] / size[1];
+  recovery.is_guessed = !comm.all(surface.doubts.empty());
 
   std::unique_ptr<Patches> patches;
   comm.agree([&] {
@@ -427,7 +428,8 @@ Recovery make_recovery(const comm::Communicator& comm, const mesh::LocalMesh& lo
   std::vector<char> is_alone(elements.count);
   for (std::size_t e = 0; e < elements.count && local.order == 1; ++e)
     is_alone[e] = std::all_of(&elements.patch[4 * e], &elements.patch[4 * e] + 4, [&](auto patch) { return patches->count(patch) < 1.5; });
-  const std::vector<SurfaceEdge> doubtful = find_doubtful_edges(comm, local);
+  std::vector<SurfaceEdge> doubtful = find_doubtful_edges(comm, local);
+  doubtful.insert(doubtful.end(), surface.doubts.begin(), surface.doubts.end());
   comm.agree([&] {
     patches->invert();
     elements.weight.resize(elements.count * 4 * elements.samples * elements.terms);

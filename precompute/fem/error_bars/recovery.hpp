@@ -25,6 +25,7 @@ struct Recovery {
   std::vector<Traction> tractions;         // T10 with a consistent mass only
   comm::HaloExchange nodes, vertices;      // of values at places; at places among the vertices
   double one_layer = 0.0;                  // Level::one_layer
+  bool is_guessed = false;                 // Level::is_guessed
 };
 
 /// Collective. Throws InputError naming an element without volume or a material that is not positive definite, on all ranks alike.

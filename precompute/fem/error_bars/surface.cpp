@@ -2,6 +2,8 @@
 //   the face in question. An arc over an edge of length t with normals n_a, n_b rises (n_b - n_a) . t / 8 above the chord; the rise of the
 //   mid-side node is subtracted. For T10 the rise is to fourth order: midway between the values from sines (the formula) and tangents of
 //   the arc's ends; a fraction of their difference is the mean gap left by a parabolic triangle with its mid-side nodes on the surface.
+//   Faces with turns of 50 to 80 degrees at all corners are planes one element wide, or samples of a round surface with five to seven
+//   sides: there the alternative surface has the mean normals of the faces within 80 degrees.
 // Source: weights: Max 1999, J. Graphics Tools 4(2), 1 (exact on a sphere). Arc: Vlachos et al. 2001, "Curved PN triangles".
 #include "precompute/fem/error_bars/surface.hpp"
 
@@ -20,6 +22,8 @@ namespace carillon::error_bars {
 namespace {
 
 constexpr double kSmoothCosine = 0.642787609686539;  // 50 degrees
+constexpr double kRoundCosine = 0.173648177666930;   // 80 degrees
+constexpr double kSameCosine = 0.9998;               // of 1 degree
 constexpr double kInwardSine = 0.766044443118978;    // of 50 degrees
 constexpr double kParabola = 0.37;                   // measured on a sphere 0.36, on a cylinder 0.13
 
@@ -149,27 +153,49 @@ std::vector<Corner> list_corners(const mesh::LocalMesh& local, const std::vector
   return corners;
 }
 
-/// For each corner the mean normal of all corners at its vertex within the smoothing angle.
-std::vector<Vec3> smooth_normals(const std::vector<Corner>& corners) {
+/// Normals at a corner of a face.
+struct Normals {
+  Vec3 smooth{};  // unit: mean of the corners at its vertex within the smoothing angle
+  Vec3 round{};   // unit: the same for the alternative surface
+};
+
+std::vector<Normals> smooth_normals(const std::vector<Corner>& corners) {
   std::unordered_map<std::int32_t, std::vector<const Corner*>> around;
   for (const Corner& corner : corners) around[corner.vertex].push_back(&corner);
-  std::vector<Vec3> normals;
+  std::vector<Normals> normals;
   for (const Corner& corner : corners) {
-    Vec3 sum{};
-    for (const Corner* other : around[corner.vertex])
-      if (dot(other->normal, corner.normal) >= kSmoothCosine)
-        for (int k = 0; k < 3; ++k) sum[k] += other->weight * other->normal[k];
-    normals.push_back(normalise(sum));
+    Vec3 smooth{}, round{};
+    for (const Corner* other : around[corner.vertex]) {
+      const double cosine = dot(other->normal, corner.normal);
+      if (cosine < kRoundCosine) continue;
+      for (int k = 0; k < 3; ++k) {
+        round[k] += other->weight * other->normal[k];
+        if (cosine >= kSmoothCosine) smooth[k] += other->weight * other->normal[k];
+      }
+    }
+    normals.push_back({normalise(smooth), normalise(round)});
   }
   return normals;
 }
 
-/// Smooth normals at the corners of the faces, (faces, 3). Collective.
-std::vector<Vec3> find_normals(const comm::Communicator& comm, const mesh::LocalMesh& local, const std::vector<Face>& faces) {
+/// Normals at the corners of the faces, (faces, 3). Collective.
+std::vector<Normals> find_normals(const comm::Communicator& comm, const mesh::LocalMesh& local, const std::vector<Face>& faces) {
   const auto corners = comm.agree([&] { return list_corners(local, faces); });
-  return comm::query_owners<Vec3>(
+  return comm::query_owners<Normals>(
       comm, corners, [&](const Corner& corner) { return corner.vertex % comm.size(); },
       [](const comm::ByRank<Corner>& met) { return smooth_normals(met.items); });
+}
+
+/// Gap between the mesh and a smooth surface with normals na, nb at the corners a, b of an element, in the middle of their edge.
+double calc_gap(const mesh::LocalMesh& local, std::int32_t tet, int a, int b, const Vec3& na, const Vec3& nb) {
+  const Vec3 &xa = local.nodes_m[get_node(local, tet, a)], &xb = local.nodes_m[get_node(local, tet, b)];
+  double gap = dot(nb - na, xb - xa) / 8;
+  if (local.order == 1) return gap;
+  const Vec3 mean = normalise(na + nb);
+  const double across = dot(na, mean);  // same for nb
+  if (across > 0.5) gap = (gap + gap / across) / 2 + kParabola * (gap / across - gap);
+  const Vec3& xm = local.nodes_m[get_node(local, tet, 4 + mesh::find_edge(a, b))];
+  return gap - dot(xm - 0.5 * (xa + xb), mean);
 }
 
 /// Surface flags of a node.
@@ -249,7 +275,7 @@ std::vector<Mark> find_marks(const comm::Communicator& comm, const mesh::LocalMe
 
 Surface find_surface(const comm::Communicator& comm, const mesh::LocalMesh& local) {
   const std::vector<Face> faces = find_faces(comm, local);
-  const std::vector<Vec3> normals = find_normals(comm, local, faces);
+  const std::vector<Normals> normals = find_normals(comm, local, faces);
   Surface surface;
   std::vector<float> bend(faces.size(), 0.0F);
   for (std::size_t f = 0; f < faces.size(); ++f) {
@@ -263,22 +289,19 @@ Surface find_surface(const comm::Communicator& comm, const mesh::LocalMesh& loca
     FreeFace free{faces[f].tet, static_cast<std::int8_t>(faces[f].face), {}, twice / 2, 0.0};
     const Vec3& apex = local.nodes_m[get_node(local, faces[f].tet, faces[f].face)];  // opposite
     if (twice > 0) free.height_m = std::abs(dot(area, apex - origin)) / twice;
+    bool is_doubtful = !local.is_surface_known && local.doubt_m.empty();  // not judged by the mesher
+    for (int i = 0; i < 3; ++i) is_doubtful = is_doubtful && dot(normals[3 * f + i].smooth, normals[3 * f + i].round) < kSameCosine;
     for (int i = 0; i < 3; ++i) {
       const int j = (i + 1) % 3, edge = mesh::find_edge(loop[i], loop[j]);
-      const Vec3 &xa = local.nodes_m[nodes[i]], &xb = local.nodes_m[nodes[j]], &na = normals[3 * f + i], &nb = normals[3 * f + j];
-      const Vec3 along = xb - xa, mean = normalise({na[0] + nb[0], na[1] + nb[1], na[2] + nb[2]});
-      free.normal[i] = mean;
-      double gap = dot(nb - na, along) / 8;
-      if (free.height_m > 0) bend[f] = std::max(bend[f], static_cast<float>(std::abs(gap) / free.height_m));
-      if (local.order == 2) {
-        const double across = dot(na, mean);  // same for nb
-        if (across > 0.5) gap = (gap + gap / across) / 2 + kParabola * (gap / across - gap);
-        const Vec3& xm = local.nodes_m[get_node(local, faces[f].tet, 4 + edge)];
-        const Vec3 rise{xm[0] - (xa[0] + xb[0]) / 2, xm[1] - (xa[1] + xb[1]) / 2, xm[2] - (xa[2] + xb[2]) / 2};
-        gap -= dot(rise, mean);
-      }
-      if (gap * gap > 1e-20 * dot(along, along))
-        surface.edges.push_back({faces[f].tet, static_cast<std::int8_t>(edge), is_fixed, gap, third});
+      const Vec3 &xa = local.nodes_m[nodes[i]], &xb = local.nodes_m[nodes[j]], along = xb - xa;
+      const Normals &a = normals[3 * f + i], &b = normals[3 * f + j];
+      free.normal[i] = normalise(a.smooth + b.smooth);
+      if (free.height_m > 0) bend[f] = std::max(bend[f], static_cast<float>(std::abs(dot(b.smooth - a.smooth, along) / 8) / free.height_m));
+      const double gap = calc_gap(local, faces[f].tet, loop[i], loop[j], a.smooth, b.smooth);
+      const double doubt = is_doubtful ? calc_gap(local, faces[f].tet, loop[i], loop[j], a.round, b.round) - gap : 0.0;
+      for (const auto& [to, height] : {std::pair(&surface.edges, gap), std::pair(&surface.doubts, doubt)})
+        if (height * height > 1e-20 * dot(along, along))
+          to->push_back({faces[f].tet, static_cast<std::int8_t>(edge), is_fixed, height, third});
     }
     if (!is_fixed) surface.free_faces.push_back(free);
   }

@@ -10,6 +10,7 @@
 #include "precompute/eigen/solve_modes.hpp"
 #include "precompute/fem/assemble.hpp"
 #include "precompute/fem/error_bars/algebraic.hpp"
+#include "precompute/mesh/check.hpp"
 #include "precompute/mesh/distributed/distribute.hpp"
 #include "precompute/petsc/session.hpp"
 #include "tests/unit/precompute/fem/error_bars/bodies.hpp"
@@ -257,6 +258,34 @@ TEST(GeometryPart, foretells_what_curving_the_sides_of_T10_changes) {
 
 TEST(GeometryPart, is_nothing_where_faces_are_flat) {
   const Outcome outcome = solve(PETSC_COMM_WORLD, get_body("box"), -3, MeshKind::T4);
+  for (const auto& parts : outcome.bars.level.parts) EXPECT_EQ(parts.geometry_noise, 0);
+}
+
+TEST(GeometryPart, of_a_round_rod_with_six_sides_is_a_doubt_next_to_the_bars_of_rough_modes) {
+  const Outcome outcome = solve(PETSC_COMM_WORLD, get_body("cylinder-10"), 1, MeshKind::T10);
+  const error_bars::Corrections& corrected = outcome.bars.corrected;
+  ASSERT_EQ(corrected.facet_cents.size(), outcome.freq_hz.size());
+  int outside = 0;
+  for (std::size_t m = 0; m < outcome.true_hz.size(); ++m) {
+    const std::size_t c = outcome.by_correction[m];
+    const double error = std::abs(outcome.corrected_error_cents(m));
+    EXPECT_LE(error, outcome.corrected_bar_cents(m) + corrected.facet_cents[c]) << m;
+    if (error <= outcome.corrected_bar_cents(m)) continue;
+    outside += error > 50 ? 1 : 0;
+    EXPECT_EQ(corrected.correction[c], bank::Correction::kRough) << m;
+  }
+  EXPECT_GE(outside, 6) << "planes of the body: no longer a hard mesh";
+}
+
+TEST(GeometryPart, of_a_rod_whose_six_planes_are_two_elements_wide_is_no_doubt) {
+  std::vector<std::int32_t> fixed;
+  const Body& body = get_body("cylinder-10");
+  mesh::TetMesh rod = make_mesh(body, 2, MeshKind::T4, fixed);
+  for (Vec3& x : rod.nodes_m)  // twelve sides: every other corner goes to the middle of a plane
+    if (std::abs(std::remainder(std::atan2(x[1], x[0]) - std::numbers::pi / 6, std::numbers::pi / 3)) < 1e-6)
+      for (int k = 0; k < 2; ++k) x[k] *= std::cos(std::numbers::pi / 6);
+  const Outcome outcome = solve(PETSC_COMM_WORLD, mesh::to_quadratic(rod), fixed, body.materials, false, 20, 1e6, 12);
+  EXPECT_TRUE(outcome.bars.facet_cents.empty());
   for (const auto& parts : outcome.bars.level.parts) EXPECT_EQ(parts.geometry_noise, 0);
 }
 
