@@ -28,6 +28,7 @@ constexpr double kRoughT4 = 0.5, kStiffT4 = 1.0, kRoughT10 = 0.3, kStiffT10 = 0.
 constexpr double kRoughWidthT4 = 0.45, kRoughWidthLumped = 0.5;                  // of the mesh's bar
 constexpr double kSingularShare = 0.25;                                          // of the estimate's energy
 constexpr double kHalf = 0.5, kHalfT4 = 0.4, kQuarter = 0.25, kThird = 1.0 / 3;  // of the mesh's bar
+constexpr double kOverlaid = 12.0;        // bar of a T4 mode with the others, over its own: scatter is the same from 2 to 12
 constexpr double kSameEigenvalue = 1e-6;  // of lambda
 
 double to_cents(double share) { return 600 * std::log2(share); }
@@ -43,6 +44,8 @@ Correction find_correction(const ErrorParts& parts, const Level& level) {
   if (level.is_guessed && calc_facet_cents(parts) > kDoubt * calc_cents(parts, kind)) return Correction::kRough;
   return Correction::kOneMesh;
 }
+
+bool is_reliable(Correction correction) { return correction == Correction::kOneMesh || correction == Correction::kTwoMeshes; }
 
 /// Averages the parts of degenerate modes.
 std::vector<ErrorParts> share_parts(const Level& level) {
@@ -121,6 +124,10 @@ Corrections correct(const Level& level, const std::vector<ErrorParts>& parts, co
   }
   const OwnIntervals own = find_intervals(level, parts, corrections, verdict.least_cents);
   corrections.cents = widen_for_order(level.lambda, own, level.unlisted);
+  if (level.kind == Kind::kT4)  // where bending is octaves too high, the k-th of the list need not be the k-th of the body
+    for (std::size_t m = 0; m < parts.size(); ++m)
+      if (is_reliable(corrections.correction[m]) && corrections.cents[m] > kOverlaid * (own.high[m] - own.stated[m]))
+        corrections.correction[m] = Correction::kRough;
   corrections.facet_cents = find_facet_cents(level, own, corrections.cents);
   if (is_too_short(level)) std::fill(corrections.cents.begin(), corrections.cents.end(), std::numeric_limits<double>::infinity());
   return corrections;

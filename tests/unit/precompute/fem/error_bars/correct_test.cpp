@@ -122,6 +122,17 @@ TEST(Correction, of_a_mode_that_is_not_corrected_to_half_its_bar_leaves_the_mesh
   EXPECT_NEAR(rough.cents[0], std::max(stated + all, -stated), 1e-9);
 }
 
+TEST(Correction, of_T4_is_rough_where_other_modes_may_take_the_place_of_the_mode) {
+  // The third is bending on one layer, octaves too high: the first of the body may be far below the first of the list.
+  const std::vector<double> hz{1000, 2000, 2100};
+  const error_bars::Corrections t4 = error_bars::calc_corrections(make_level(hz, {0.01, 0.01, 1.2}, Kind::kT4));
+  EXPECT_EQ(t4.correction, (std::vector{Correction::kRough, Correction::kRough, Correction::kStiff}));
+  EXPECT_GT(std::min(t4.cents[0], t4.cents[1]), 1190);
+  const error_bars::Corrections apart = error_bars::calc_corrections(make_level({1000, 2000}, {0.01, 0.01}, Kind::kT4));
+  EXPECT_EQ(apart.correction, std::vector(2, Correction::kOneMesh));
+  EXPECT_EQ(apart.lambda[1], t4.lambda[1]);
+}
+
 TEST(Facets, in_doubt_are_no_part_of_any_bar_and_are_stated_next_to_it) {
   Level sure = make_level({1000, 1020, 2500}, {0.01, 0.02, 0.45}), level = sure;
   level.parts[0].doubt = -0.02;
