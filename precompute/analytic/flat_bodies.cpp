@@ -37,6 +37,12 @@ double calc_i(int m, double x) { return std::cyl_bessel_i(m, x); }
 
 constexpr double kMaxRoot = 600.0;  // I_m overflows beyond it
 
+/// high_hz, or a lower frequency with about max_modes modes below it.
+double find_enough_hz(double high_hz, bool is_plate, double rate, double area_m2, double rim_m, std::int64_t max_modes) {
+  const double k = find_wave_number(area_m2, rim_m, 1.05 * static_cast<double>(max_modes) + 5.0);
+  return std::min(high_hz, std::sqrt(rate) * (is_plate ? k * k : k) / (2.0 * pi));
+}
+
 }  // namespace
 
 std::array<double, 2> find_sheet(const job::MembraneBody& body, const material::Material& material) {
@@ -95,7 +101,8 @@ SineRectangle::SineRectangle(const job::PlateBody& body, const material::Materia
   set_rigid(density_kg_m2_);
 }
 
-ModeList SineRectangle::list_modes(double high_hz, std::int64_t) {
+ModeList SineRectangle::list_modes(double high_hz, std::int64_t max_modes) {
+  high_hz = find_enough_hz(high_hz, is_plate_, rate_, length_m_ * width_m_, 2.0 * (length_m_ + width_m_), max_modes);
   ModeList list{{}, high_hz};
   const double high = square(2.0 * pi * high_hz);
   const double k2_high = is_plate_ ? std::sqrt(high / rate_) : high / rate_;
@@ -271,14 +278,16 @@ Circle::Radial Circle::make_radial(int m, double k) const {
   return radial;
 }
 
-ModeList Circle::list_modes(double high_hz, std::int64_t) {
+ModeList Circle::list_modes(double high_hz, std::int64_t max_modes) {
+  high_hz = find_enough_hz(high_hz, is_plate_, rate_, pi * square(radius_m_), 2.0 * pi * radius_m_, max_modes);
   ModeList list{{}, high_hz};
   radials_.clear();
   const double omega = 2.0 * pi * high_hz;
   const double max_root = (is_plate_ ? std::sqrt(omega / std::sqrt(rate_)) : omega / std::sqrt(rate_)) * radius_m_;
   if (max_root > kMaxRoot)
-    throw InputError(fmt::format("the circle has about {:.0f} half-waves across at {:g} Hz, more than {:.0f}; lower the end of \"band_hz\"",
-                                 max_root / pi * 2.0, high_hz, kMaxRoot / pi * 2.0));
+    throw InputError(fmt::format(
+        "the circle has about {:.0f} half-waves across at {:g} Hz, more than {:.0f}; lower the end of \"band_hz\", or give \"max_modes\"",
+        max_root / pi * 2.0, high_hz, kMaxRoot / pi * 2.0));
   // The first root of each m lies above 0.7 m, and roots of the same m are more than 2 apart.
   constexpr double kStep = 0.25, kFirst = 0.7;
   for (int m = 0; kFirst * m <= max_root; ++m) {

@@ -47,8 +47,9 @@ std::unique_ptr<KnownBody> make_known_body(const job::AnalyticBody& body, const 
 
 void check_mode_count(double count, double high_hz) {
   if (!(count <= kMaxListed))
-    throw InputError(fmt::format("there are about {:.2g} modes up to {:g} Hz, more than {:g}; lower the end of \"band_hz\"", count, high_hz,
-                                 kMaxListed));
+    throw InputError(
+        fmt::format("there are about {:.2g} modes up to {:g} Hz, more than {:g}; lower the end of \"band_hz\", or give \"max_modes\"",
+                    count, high_hz, kMaxListed));
 }
 
 }  // namespace carillon::analytic

@@ -56,9 +56,10 @@ String::String(const job::StringBody& body, const material::Material& material) 
   method = "closed form: every number of half-waves up to the end of the band, along y and along z";
 }
 
-ModeList String::list_modes(double high_hz, std::int64_t) {
+ModeList String::list_modes(double high_hz, std::int64_t max_modes) {
+  const double first_hz = std::sqrt(tension_n_ / mass_kg_m_) / (2.0 * length_m_), most = 0.5 * static_cast<double>(max_modes) + 1.0;
+  high_hz = std::min(high_hz, (most + 0.5) * first_hz * std::sqrt(1.0 + stiffness_ * square(most + 0.5)));
   ModeList list{{}, high_hz};
-  const double first_hz = std::sqrt(tension_n_ / mass_kg_m_) / (2.0 * length_m_);
   check_mode_count(2.0 * high_hz / first_hz, high_hz);
   for (int n = 1;; ++n) {
     const double hz = n * first_hz * std::sqrt(1.0 + stiffness_ * n * n);

@@ -96,6 +96,22 @@ TEST(KnownBanks, too_large_are_refused_before_they_are_made) {
   EXPECT_THROW(make_bank(parse(R"({"plate": {"shape": "circle", "radius_m": 1000, "thickness_m": 0.001}})")), InputError);
 }
 
+TEST(KnownBanks, with_max_modes_hold_the_lowest_however_wide_the_band) {
+  for (const char* body :
+       {R"({"membrane": {"shape": "circle", "radius_m": 0.2, "lowest_hz": 110, "thickness_m": 0.00025}})",
+        R"({"membrane": {"shape": "rectangle", "length_m": 0.4, "width_m": 0.3, "lowest_hz": 110, "thickness_m": 0.00025}})",
+        R"({"membrane": {"shape": "rectangle", "length_m": 1, "width_m": 0.001, "lowest_hz": 110, "thickness_m": 0.00025}})",
+        R"({"plate": {"shape": "circle", "radius_m": 0.2, "thickness_m": 0.0001}})",
+        R"({"string": {"length_m": 1, "tension_n": 50, "mass_kg_m": 1e-3, "diameter_m": 0.0004}})"}) {
+    const bank::Bank wide = make_bank(parse(body, R"("steel")", R"(, "band_hz": [20, 3e6], "max_modes": 30)")).bank,
+                     narrow = make_bank(parse(body, R"("steel")", R"(, "band_hz": [20, 2500], "max_modes": 30)")).bank;
+    ASSERT_EQ(wide.mode_count(), 30U) << body;
+    ASSERT_EQ(narrow.mode_count(), 30U) << body;
+    EXPECT_EQ(wide.eigenvalue_rad2_s2, narrow.eigenvalue_rad2_s2) << body;
+    EXPECT_FALSE(wide.complete);
+  }
+}
+
 TEST(KnownBanks, say_where_the_theory_is_not_the_body) {
   const auto warnings = make_bank(parse(R"({"beam": {"length_m": 0.2, "width_m": 0.03, "thickness_m": 0.03}})")).warnings;
   ASSERT_FALSE(warnings.empty());
