@@ -259,6 +259,20 @@ void write_bank(Run& run, const bank::Bank& bank) {
 
 namespace {
 
+/// Modes that may be on either side of the upper end of the band, and where modes of the body may be missing; empty: neither.
+std::string describe_end(const job::JobSpec& job, const bank::Bank& bank, const error_bars::Corrections& corrected) {
+  if (!bank.complete || corrected.lambda.empty()) return {};
+  const double high_hz = job.band_hz[1], complete_hz = std::sqrt(corrected.complete_below) / (2 * std::numbers::pi);
+  int near = 0;
+  for (std::size_t m = 0; m < bank.mode_count(); ++m)
+    near += std::abs(1200 * std::log2(bank.corrected.freq_hz[m] / high_hz)) <= bank.corrected.error_cents[m] ? 1 : 0;
+  std::string text;
+  if (near > 0) text = fmt::format("within its bar of the end of the band at {:g} Hz: {} mode{}", high_hz, near, near == 1 ? "" : "s");
+  if (complete_hz < high_hz)
+    text += fmt::format("{}modes of the body from {:.4g} Hz on may be missing", text.empty() ? "" : "; ", complete_hz);
+  return text;
+}
+
 /// The record in the bank is made before the bank is written; <bank>.resolved.json includes the time of writing.
 RunSummary write_outputs(Run& run, const Solution& found, const AccuracyReport& accuracy, const AirReport& air,
                          const CouplingReport& coupling, bank::Bank bank) {
@@ -266,6 +280,7 @@ RunSummary write_outputs(Run& run, const Solution& found, const AccuracyReport& 
   summary.bank = run.job.bank;
   summary.resolved = job::find_resolved_path(run.job.bank);
   if (run.comm.is_root()) summary.warning = describe_wide_bars(bank, found.setting, run.job.accuracy_cents.has_value());
+  const std::string end = run.comm.is_root() ? describe_end(run.job, bank, found.solved.errors.bars.corrected) : "";
   const fs::path folder = fs::absolute(summary.bank).parent_path();
   const auto make_record = [&](const Measured& measured) {
     base::Json record = describe_run(run, found, measured);
@@ -274,6 +289,7 @@ RunSummary write_outputs(Run& run, const Solution& found, const AccuracyReport& 
       record["air"].set("solved", air.is_solved).set("why", air.why);
       if (!air.result.empty()) record["air"]["result"] = air.result;
     }
+    if (!end.empty()) record["end_of_band"] = end;
     if (!coupling.result.empty()) record["coupling"] = coupling.result;
     if (!summary.warning.empty()) record["warnings"].append(summary.warning);
     return job::resolved_json(run.job, folder, record.sorted_text());
@@ -284,7 +300,7 @@ RunSummary write_outputs(Run& run, const Solution& found, const AccuracyReport& 
     if (!run.comm.is_root()) return;
     bank.provenance = make_record(measured);
     write_bank(run, bank);
-    summary.result = describe_result(bank);
+    summary.result = describe_result(bank) + (end.empty() ? "" : "\n" + end);
   });
   run.log.end();
   measured = measure(run.comm);

@@ -124,6 +124,7 @@ Corrections correct(const Level& level, const std::vector<ErrorParts>& parts, co
   }
   const OwnIntervals own = find_intervals(level, parts, corrections, verdict.least_cents);
   corrections.cents = widen_for_order(level.lambda, own, level.unlisted);
+  corrections.complete_below = find_lowest_unlisted(level.lambda, own, level.unlisted);
   if (level.kind == Kind::kT4)  // where bending is octaves too high, the k-th of the list need not be the k-th of the body
     for (std::size_t m = 0; m < parts.size(); ++m)
       if (is_reliable(corrections.correction[m]) && corrections.cents[m] > kOverlaid * (own.high[m] - own.stated[m]))

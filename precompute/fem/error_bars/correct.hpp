@@ -37,6 +37,7 @@ struct Corrections {
   std::vector<double> cents;   // (m) bar: distance of the k-th lowest of `lambda` from the k-th true one, k as in ErrorBars; infinite if
                                // is_too_short()
   std::vector<double> facet_cents;  // (m) as ErrorBars::facet_cents, around `lambda`; empty: no facets in doubt
+  double complete_below = 0.0;      // [rad^2/s^2] modes of the body that are not listed lie above
   // (m) one mesh: half the mesh's bar (T4: 0.4 of it); two meshes: a quarter (a third for curved elements); rough estimates: the mesh's own
   // interval; uncorrected modes: the mesh's bar; disputed modes: the distance of the two meshes
   std::vector<bank::Correction> correction;

@@ -22,6 +22,9 @@ struct Unlisted {
   std::int64_t below = 0;  // number below, without rigid modes
 };
 
+/// Lower bound of the true lambda [rad^2/s^2] of unlisted modes above the list. Arguments as below. Pure.
+double find_lowest_unlisted(std::span<const double> lambda, const OwnIntervals& own, const Unlisted& unlisted);
+
 /// Bars [cents] of the stated frequencies: the k-th lowest of them is within its bar of the k-th true one, k counting unlisted modes below
 /// too. lambda: (m) of the mesh, ascending, m > 0. Returns (m), in the order of lambda. Pure.
 std::vector<double> widen_for_order(std::span<const double> lambda, const OwnIntervals& own, const Unlisted& unlisted);

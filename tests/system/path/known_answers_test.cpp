@@ -200,6 +200,20 @@ TEST(Cantilever, slender_and_fine_needs_four_factorisations_at_most) {
   EXPECT_LE(*std::max_element(bank.residual.begin(), bank.residual.end()), 1e-8);
 }
 
+// The mesh has the second mode of the body, 1,135.46 Hz, above the end of the band.
+TEST(Band, says_from_where_on_modes_of_the_body_may_be_missing) {
+  JobFolder folder;
+  mesh::write_gmsh(shapes::make_box({0.3, 0.02, 0.01}, {100, 6, 4}), folder / "mesh.msh");
+  folder.write_job(kSteel, R"("element": "T4", "band_hz": [20, 1150],)");
+  const bank::Bank bank = folder.solve();
+  ASSERT_EQ(bank.mode_count(), 1U);
+  const std::regex pattern(R"(modes of the body from ([0-9.e+]+) Hz on may be missing)");
+  std::smatch match;
+  ASSERT_TRUE(std::regex_search(bank.provenance, match, pattern));
+  EXPECT_LT(std::stod(match[1]), 1135.46);
+  EXPECT_GT(std::stod(match[1]), 574.44);
+}
+
 // It has no neighbour to be compared with. T10 of a finer mesh is 1,100 cents lower.
 TEST(Bars, of_one_element_are_wide) {
   JobFolder folder;
