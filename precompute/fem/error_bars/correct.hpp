@@ -17,7 +17,7 @@ struct Level {
   std::vector<ErrorParts> parts;  // (m)
   Kind kind = Kind::kT4;
   bool is_lumped = false;   // the mass
-  bool is_guessed = false;  // ErrorParts::doubt is of facets that nobody judged: Surface::doubts
+  bool is_guessed = false;  // ErrorParts::doubt comes from the mesh alone: Surface::doubts
   double one_layer = 0.0;   // fraction of elements that are flat and have all corners on the surface: 1 for a single-layer wall
   Unlisted unlisted;
 };
