@@ -14,8 +14,6 @@ constexpr double kSharpCosine = 0.906;   // of 25 degrees
 constexpr double kParallelCosine = 0.9;  // edges of one direction
 constexpr double kNearRatio = 0.01;      // of the size
 constexpr double kFlatCosine = 0.9998;   // of 1 degree: facets of a flat surface
-constexpr double kSameCosine = 0.9;      // normals of a contact and of a surface that it lies on
-constexpr double kLevelSlope = 0.02;     // of a contact that lies on a surface next to an edge
 
 }  // namespace
 
@@ -53,13 +51,8 @@ SharpEdges::SharpEdges(std::span<const Vec3> vertices, std::span<const std::arra
   for (const auto& [ends, seam] : seams) {
     if (!seam.is_sharp) continue;
     Edge edge{.begin = vertices[ends.first], .end = vertices[ends.second]};
-    for (const std::size_t side : {0, 1}) {
-      const std::size_t own = side == 0 ? seam.facet : seam.next, other = side == 0 ? seam.next : seam.facet;
-      if (curved[own] == 0) continue;
-      const Vec3 off = cross(edge.end - edge.begin, normals[own]);
-      edge.normals[side] = normals[own];
-      edge.off[side] = (dot(off, normals[other]) < 0.0 ? -1.0 : 1.0) * calc_unit(off);
-    }
+    for (const std::size_t facet : {seam.facet, seam.next})
+      if (curved[facet] != 0) edge.outward = normals[facet];
     add(edge);
   }
 }
@@ -83,29 +76,35 @@ void SharpEdges::add(const Edge& edge) {
   }
 }
 
-int SharpEdges::count_directions(const Vec3& point, const Vec3& outward) const {
+NearEdges SharpEdges::find_near(const Vec3& point) const {
+  NearEdges near;
   const auto found = cells_.find(find_cell(point));
-  if (found == cells_.end()) return 0;
+  if (found == cells_.end()) return near;
   Vec3 first{};
-  int count = 0;
+  double nearest = near_m_;
   for (const int index : found->second) {
     const Edge& edge = edges_[index];
     const Vec3 along = edge.end - edge.begin;
     const double share = std::clamp(dot(point - edge.begin, along) / dot(along, along), 0.0, 1.0);
-    if (norm(edge.begin + share * along - point) > near_m_) continue;
-    const auto lies_on = [&](std::size_t side) {
-      return dot(outward, edge.normals[side]) > kSameCosine && dot(outward, edge.off[side]) < kLevelSlope;
-    };
-    if (lies_on(0) || lies_on(1)) continue;
+    const Vec3 foot = edge.begin + share * along;
+    const double distance = norm(foot - point);
+    if (distance > near_m_) continue;
+    if (edge.outward != Vec3{}) {
+      if (distance > nearest) continue;
+      nearest = distance;
+      near.rim_m = foot;
+      near.outward = edge.outward;
+      continue;
+    }
     const Vec3 direction = calc_unit(along);
-    if (count == 0) {
+    if (near.directions == 0) {
       first = direction;
-      count = 1;
+      near.directions = 1;
     } else if (std::abs(dot(first, direction)) < kParallelCosine) {
-      return 2;
+      near.directions = 2;
     }
   }
-  return count;
+  return near;
 }
 
 }  // namespace carillon::drive

@@ -11,19 +11,24 @@
 
 namespace carillon::drive {
 
+/// What touches at a point. As in our own contact, the rim of a curved surface has the curvature of that surface, however it is tilted.
+struct NearEdges {
+  int directions = 0;       // of edges between flat facets: 0 on a face, 1 on an edge, 2 at a corner
+  Vec3 rim_m{}, outward{};  // nearest point of a rim, and the normal of the curved surface there; zeros: none
+};
+
 /// Edges between facets that differ by more than 25 degrees, in a grid. Immutable.
 class SharpEdges {
  public:
   SharpEdges(std::span<const Vec3> vertices_m, std::span<const std::array<std::int32_t, 3>> triangles, double size_m);
 
-  /// Number of directions of edges near a contact point [m] (1 % of the size): 0 on a face, 1 on an edge, 2 at a corner. outward: contact
-  /// normal. At its rims a tube that lies flat counts as a face, a box at its corners does not.
-  int count_directions(const Vec3& point_m, const Vec3& outward) const;
+  /// Edges within 1 % of the size of a contact point [m].
+  NearEdges find_near(const Vec3& point_m) const;
 
  private:
   struct Edge {
     Vec3 begin{}, end{};
-    std::array<Vec3, 2> normals{}, off{};  // of its facets on curved surfaces; directions in them out over the edge
+    Vec3 outward{};  // normal of its facet on a curved surface; zero: none
   };
   using Cell = std::array<std::int64_t, 3>;
   struct Hash {

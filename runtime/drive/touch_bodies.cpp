@@ -9,12 +9,13 @@ void calc_own(const TouchBody& body, const Vec3& station, const Vec3& outward, d
     is_round = true;
     return;
   }
-  const int directions = body.edges->count_directions(station, outward);
-  is_round = directions == 0 && !body.shape->is_polyhedron();
-  if (directions == 0)
-    curvature = std::max(0.0, body.shape->find_place(station, outward).curvature_per_m);
+  const NearEdges near = body.edges->find_near(station);
+  const bool is_rim = near.outward != Vec3{};
+  is_round = near.directions == 0 && !body.shape->is_polyhedron();
+  if (near.directions > 0)
+    curvature = (near.directions == 1 ? 0.5 : 1.0) * body.shape->get_corner_curvature_per_m();
   else
-    curvature = (directions == 1 ? 0.5 : 1.0) * body.shape->get_corner_curvature_per_m();
+    curvature = std::max(0.0, body.shape->find_place(is_rim ? near.rim_m : station, is_rim ? near.outward : outward).curvature_per_m);
 }
 
 }  // namespace

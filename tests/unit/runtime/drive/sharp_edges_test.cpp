@@ -13,28 +13,24 @@ namespace {
 TEST(SharpEdges, BoxHasCornersAlsoOnAFace) {
   const auto box = geometry::tests::make_box({0.1, 0.08, 0.04}, {1, 1, 1});
   const SharpEdges edges(box.vertices, box.triangles, std::sqrt(0.1 * 0.1 + 0.08 * 0.08 + 0.04 * 0.04));
-  const Vec3 down{0, 0, -1};
-  EXPECT_EQ(edges.count_directions({0.05, 0.04, -0.02}, down), 2);
-  EXPECT_EQ(edges.count_directions({0.0, 0.04, -0.02}, down), 1);
-  EXPECT_EQ(edges.count_directions({0.0, 0.0, -0.02}, down), 0);
+  EXPECT_EQ(edges.find_near({0.05, 0.04, -0.02}).directions, 2);
+  EXPECT_EQ(edges.find_near({0.0, 0.04, -0.02}).directions, 1);
+  EXPECT_EQ(edges.find_near({0.0, 0.0, -0.02}).directions, 0);
+  EXPECT_EQ(edges.find_near({0.0, 0.04, -0.02}).outward, Vec3{}) << "no rim";
 }
 
-TEST(SharpEdges, CylinderLyingFlatHasNoEdge) {
+TEST(SharpEdges, RimOfACylinderHasTheCurvatureOfItsSide) {
   constexpr double kRadius = 0.02, kHalf = 0.05;
   const auto cylinder = geometry::tests::make_cylinder(kRadius, 2.0 * kHalf, 48);
-  const SharpEdges edges(cylinder.vertices, cylinder.triangles, std::hypot(2.0 * kHalf, 2.0 * std::sqrt(2.0) * kRadius));
+  const geometry::Shape shape(cylinder.vertices, cylinder.triangles);
+  const SharpEdges edges(cylinder.vertices, cylinder.triangles, shape.get_size_m());
   for (const double turn : {0.0, 0.05, 1.0}) {  // at vertices of the rim and between them
     const Vec3 radial{std::cos(turn), std::sin(turn), 0.0};
-    const auto count = [&](double height, double tilt) {
-      return edges.count_directions(kRadius * radial + Vec3{0, 0, height}, std::cos(tilt) * radial + Vec3{0, 0, std::sin(tilt)});
-    };
-    EXPECT_EQ(count(kHalf, 0.0), 0) << "lies flat";
-    EXPECT_EQ(count(kHalf, 0.01), 0);
-    EXPECT_EQ(count(kHalf, -0.3), 0) << "leans over the side, as on the edge of another body";
-    EXPECT_EQ(count(kHalf, 0.1), 1) << "tilted onto its rim";
-    EXPECT_EQ(count(kHalf, 0.8), 1);
-    EXPECT_EQ(count(kHalf, 1.5708), 1) << "stands on its flat end";
-    EXPECT_EQ(count(0.5 * kHalf, 0.0), 0) << "away from the rim";
+    const NearEdges near = edges.find_near(kRadius * radial + Vec3{0, 0, kHalf});
+    EXPECT_EQ(near.directions, 0);
+    EXPECT_GT(dot(near.outward, radial), 0.99) << "of the side, not of the end";
+    EXPECT_NEAR(shape.find_place(near.rim_m, near.outward).curvature_per_m, 0.5 / kRadius, 0.02 / kRadius);
+    EXPECT_EQ(edges.find_near(kRadius * radial + Vec3{0, 0, 0.5 * kHalf}).outward, Vec3{}) << "away from the rim";
   }
 }
 
