@@ -26,7 +26,6 @@ constexpr double kLongestImpactS = 20e-3;  // s
 constexpr double kLongestPulses = 50.0;    // an impact lasts at most this many Hertz times, for the sake of its cost,
 constexpr double kMostSteps = 5e4;         // or steps: its hits may be of very different lengths
 constexpr std::size_t kMaxTogether = 4;    // hits of an impact: its cost is cubic in them
-constexpr double kRubbedRatio = 0.02;      // of the impulse: below, without friction
 
 /// Energy of the modes of a body after a pulse of this length on it [J]; impulse: mesh axes.
 double calc_modal_j(const impact::Modes& modes, const std::vector<double>& shape, const Vec3& impulse, double length_s) {
@@ -258,7 +257,7 @@ bool HitSounds::integrate(const StepView& step, const std::vector<Contact>& cont
     contact.restitution = step.calc_restitution(hit.a, hit.b);
     contact.is_limit = true;
     contact.rests = !(hit.approach_m_s > rigid::kMinImpactSpeedMS);
-    contact.friction = hit.rubbed_n_s > kRubbedRatio * hit.push_n_s ? step.calc_friction(hit.a, hit.b) : 0.0;
+    contact.friction = step.calc_friction(hit.a, hit.b);
     for (const std::size_t side : {0, 1})
       if (!c.shapes[side].empty()) shapes[i][side] = turn_shape(first.before[side].rotation, c.shapes[side]);
     contact.shape_a = shapes[i][0];

@@ -119,7 +119,6 @@ std::vector<TouchSpots::Group> TouchSpots::make_groups(const StepView& step, std
       g.push_n_s += push;
       g.normal = g.normal + push * p.normal;
       g.impulse_n_s = g.impulse_n_s + push * p.normal + p.friction_n_s;
-      g.rubbed_n_s += norm(p.friction_n_s);
       g.curvature_per_m += push * p.curvature_per_m;
       g.gap_m = std::min(g.gap_m, p.gap_m);
       g.approach_m_s = std::max(g.approach_m_s, calc_approach(step, p));
@@ -237,7 +236,6 @@ void TouchSpots::gather(const StepView& step, const Group& g, double push_n_s, S
   hit.approach_m_s = std::max(hit.approach_m_s, g.approach_m_s);
   hit.push_n_s += push_n_s;
   hit.curvature_per_m += push_n_s * g.curvature_per_m;
-  hit.rubbed_n_s += push_n_s / g.push_n_s * g.rubbed_n_s;
   hit.normal = hit.normal + push_n_s * g.normal;
   for (const std::size_t side : {0, 1}) {
     const int body = side == 0 ? g.a : g.b;
@@ -276,7 +274,6 @@ void TouchSpots::report_early(const StepView& step, Spot& spot, std::vector<Fini
   const double e = step.calc_restitution(hit.a, hit.b);
   const double push = (1.0 + e) * hit.approach_m_s / hit.inverse_mass;
   for (Vec3& impulse : hit.impulses_n_s) impulse = (push / hit.push_n_s) * impulse;
-  hit.rubbed_n_s *= push / hit.push_n_s;
   hit.push_n_s = push;
   hit.is_predicted = true;
   hit.parting_m_s = e * hit.approach_m_s;

@@ -24,7 +24,6 @@ struct FinishedHit {
   bool is_predicted = false;                     // the impulse is that of a rigid impact at this point alone
   double curvature_per_m = 0.0;                  // NaN: unknown
   Vec3 normal{};                                 // world, from b to a
-  double rubbed_n_s = 0.0;                       // friction
   std::array<Vec3, 2> stations_m{}, outwards{};  // on a and b, mesh axes; outward normals
   std::array<Vec3, 2> impulses_n_s{};            // on a and b, mesh axes
   std::array<Motion, 2> before{};                // motions of a and b before its first step, velocities at the touch
@@ -45,7 +44,7 @@ class TouchSpots {
   /// Points of a step at one position.
   struct Group {
     int a = 0, b = -1;
-    double push_n_s = 0.0, approach_m_s = 0.0, gap_m = 0.0, curvature_per_m = 0.0, rubbed_n_s = 0.0;
+    double push_n_s = 0.0, approach_m_s = 0.0, gap_m = 0.0, curvature_per_m = 0.0;
     Vec3 where_m{}, normal{}, impulse_n_s{};  // where: at the end of the step
     std::array<Vec3, 2> stations_m{};         // mesh frames
   };
