@@ -1,12 +1,14 @@
 // Method: a Hertz pulse of the reduced mass that explains the engine's impulse; where modes would take more than 2 % of the blow, the
-// impact is integrated from the motions before it and scaled to at most the engine's impulse. Simultaneous hits of two bodies, as of both
-// ends of a tube, are one impact.
+// impact is integrated from the motions before it. If the engine's impulse is less than that of rigid bodies with the same motions, the
+// forces are scaled by the ratio: what ringing adds or takes is unknown to the engine. Simultaneous hits of two bodies, as of both ends of
+// a tube, are one impact.
 // Source: runtime/physics/impact; K. L. Johnson, "Contact mechanics" (1985), eq. 11.24.
 #include "runtime/drive/hit_sounds.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <optional>
 #include <stdexcept>
 #include <utility>
@@ -222,6 +224,37 @@ double HitSounds::keep_ringing(const std::array<int, 2>& bodies, const impact::I
   return scale;
 }
 
+/// Sum of the normal impulses after which rigid bodies part at all contacts with their restitution [N s]. Projected Gauss-Seidel.
+double HitSounds::calc_rigid_push(const StepView& step, const std::vector<Contact>& contacts) {
+  constexpr int kSweeps = 20;
+  std::vector<double> pushes(contacts.size(), 0.0);
+  std::array<Vec3, 2> linear{}, angular{};  // changes of the velocities of a and b
+  for (int sweep = 0; sweep < (contacts.size() > 1 ? kSweeps : 1); ++sweep) {
+    for (std::size_t i = 0; i < contacts.size(); ++i) {
+      const FinishedHit& hit = contacts[i].hit;
+      const double e = step.calc_restitution(hit.a, hit.b);
+      double missing = (1.0 + e) * std::max(0.0, hit.approach_m_s);
+      std::array<Vec3, 2> turning{};
+      for (const std::size_t side : {0, 1}) {
+        const int body = side == 0 ? hit.a : hit.b;
+        if (!step.moves(body)) continue;
+        const Vec3 along = side == 0 ? hit.normal : -1.0 * hit.normal;
+        turning[side] = cross(hit.before[side].rotation * (hit.stations_m[side] - step.scene.bodies[body].centre_m), along);
+        missing -= dot(linear[side], along) + dot(angular[side], turning[side]);
+      }
+      const double given = std::max(-pushes[i], missing / hit.inverse_mass);
+      pushes[i] += given;
+      for (const std::size_t side : {0, 1}) {
+        const int body = side == 0 ? hit.a : hit.b;
+        if (!step.moves(body)) continue;
+        linear[side] = linear[side] + (side == 0 ? given : -given) / step.scene.bodies[body].mass_kg * hit.normal;
+        angular[side] = angular[side] + given * (hit.before[side].inverse_inertia * turning[side]);
+      }
+    }
+  }
+  return std::accumulate(pushes.begin(), pushes.end(), 0.0);
+}
+
 /// False if it cannot be integrated: nothing is appended.
 bool HitSounds::integrate(const StepView& step, const std::vector<Contact>& contacts, TouchesCounters& counters,
                           std::vector<events::Event>& events) {
@@ -274,13 +307,10 @@ bool HitSounds::integrate(const StepView& step, const std::vector<Contact>& cont
     return false;
   }
   const std::vector<impact::Pulse> pulses = impact->take_pulses();
-  double push = 0.0;
-  for (const impact::Pulse& pulse : pulses)
-    for (const Vec3& impulse : pulse.impulse_n_s) push += dot(impulse, contacts[pulse.contact].hit.normal);
-  if (!(push > 0.0)) return false;
+  if (pulses.empty()) return false;
   // Predicted impulses are of single points; the integrated impact has all points, so they set no limit.
   if (first.is_predicted) most_j = std::numeric_limits<double>::max();
-  const double largest = first.is_predicted ? 1.0 : std::min(1.0, wanted / push);
+  const double largest = first.is_predicted ? 1.0 : std::min(1.0, wanted / calc_rigid_push(step, contacts));
   const double scale = keep_ringing(pair, *impact, bodies, touch_s, largest, most_j);
   if (scale < largest) ++counters.limited;
   counters.impacts += std::ssize(contacts);

@@ -53,6 +53,7 @@ class HitSounds {
   static Contact make_contact(const StepView& step, const FinishedHit& hit);
   std::vector<Contact> gather(const StepView& step, std::span<const FinishedHit* const> hits, std::size_t first);
   void sound(const StepView& step, const std::vector<Contact>& contacts, TouchesCounters& counters, std::vector<events::Event>& events);
+  static double calc_rigid_push(const StepView& step, const std::vector<Contact>& contacts);
   bool integrate(const StepView& step, const std::vector<Contact>& contacts, TouchesCounters& counters, std::vector<events::Event>& events);
   impact::Body make_body(const StepView& step, int index, const Motion& before, bool has_modes, double touch_s);
   double keep_ringing(const std::array<int, 2>& bodies, const impact::Impact& impact, const std::vector<impact::Body>& before,
