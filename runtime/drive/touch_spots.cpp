@@ -293,6 +293,7 @@ void TouchSpots::close(const StepView& step, Spot& spot, std::vector<FinishedHit
     hits.push_back(make_mean(spot.hit, now_s));
   }
   spot.quiet_s = now_s;
+  if (spot.hit.parting_m_s > step.calc_slowest()) spot.load_n = 0.0;  // it bounces: nothing rests here
   counters_->longest_hit_s = std::max(counters_->longest_hit_s, length_s);
 }
 

@@ -83,6 +83,16 @@ TEST(Touches, EarlyHitsAreReportedInTheirFirstStep) {
   EXPECT_EQ(rig.list<events::Impulse>().size(), 1U) << "reported once";
 }
 
+TEST(Touches, BouncesAreNoLastingContacts) {
+  const bank::Bank ball = make_ball(kRadius);
+  for (const double rate : {60.0, 240.0, 1000.0}) {
+    Rig rig;
+    strike_in_steps(rig, ball, 1, 1.0 / rate);
+    EXPECT_TRUE(rig.has_hits());
+    EXPECT_TRUE(rig.list<events::LastingContact>().empty()) << rate;
+  }
+}
+
 TEST(Touches, WeightAloneIsNoHit) {
   const Vec3 half{0.05, 0.04, 0.02};
   const bank::Bank box = make_box({0.1, 0.08, 0.04});
