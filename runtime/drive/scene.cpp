@@ -13,12 +13,12 @@ Vec3 Scene::calc_velocity(int body, const Vec3& where) const {
   return m.velocity_m_s + cross(m.spin_rad_s, where - m.centre_m);
 }
 
-double Scene::calc_inverse_mass(int a, int b, const Vec3& where, const Vec3& normal) const {
+double Scene::calc_inverse_mass(const std::vector<Motion>& at, int a, int b, const Vec3& where, const Vec3& normal) const {
   double sum = 0.0;
   for (const int body : {a, b}) {
     if (body < 0 || bodies[body].fixed) continue;
-    const Vec3 arm = cross(where - motions[body].centre_m, normal);
-    sum += 1.0 / bodies[body].mass_kg + dot(arm, motions[body].inverse_inertia * arm);
+    const Vec3 arm = cross(where - at[body].centre_m, normal);
+    sum += 1.0 / bodies[body].mass_kg + dot(arm, at[body].inverse_inertia * arm);
   }
   return sum;
 }

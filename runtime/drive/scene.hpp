@@ -41,8 +41,8 @@ struct Scene {
   bool is_still(int body) const { return body < 0 || motions[body].is_still; }
   /// Velocity of a body at a point [m/s]; zero for the ground.
   Vec3 calc_velocity(int body, const Vec3& where) const;
-  /// 1/m_eff of two bodies along a unit vector at a point [1/kg].
-  double calc_inverse_mass(int a, int b, const Vec3& where, const Vec3& normal) const;
+  /// 1/m_eff of two bodies along a unit vector at a point [1/kg]; poses of `at`, one per body.
+  double calc_inverse_mass(const std::vector<Motion>& at, int a, int b, const Vec3& where, const Vec3& normal) const;
   /// Size of the smaller one [m].
   double calc_size(int a, int b) const;
   /// Maximum distance of points of a pair in one spot [m]: a tenth of that size.

@@ -50,7 +50,7 @@ double calc_weight(const StepView& step, int a, int b, const Vec3& normal) {
 
 /// Speed at which the surfaces closed before the step [m/s].
 double calc_approach(const StepView& step, const StepPoint& p) {
-  const double of_surfaces = -dot(step.calc_relative(step.before, p.a, p.b, p.stations_m), p.normal);
+  const double of_surfaces = -dot(step.calc_relative(step.before, step.before, p.a, p.b, p.stations_m), p.normal);
   if (!step.options.points_after) return of_surfaces;
   // A point of a surface that rolls came down to the contact during the step; the contact itself did not.
   const auto calc = [&](int body) {
@@ -169,9 +169,10 @@ Vec3 TouchSpots::calc_where(const StepView& step, const Group& g, const Spot& sp
 /// `count`: positions of the pair in this step, which share its weight.
 void TouchSpots::follow(const StepView& step, const Group& g, int count, Spot& spot, std::vector<FinishedHit>& hits) {
   const double dt = step.dt_s, slowest = step.calc_slowest();
-  const double parting = dot(step.calc_relative(step.scene.motions, g.a, g.b, g.stations_m), g.normal);
+  // Engines solve for the velocities after the step at the points that they report.
+  const double parting = dot(step.calc_relative(step.scene.motions, step.get_given(), g.a, g.b, g.stations_m), g.normal);
   double weight = calc_weight(step, g.a, g.b, g.normal) / count;
-  double inverse = step.scene.calc_inverse_mass(g.a, g.b, g.where_m, g.normal);
+  double inverse = step.scene.calc_inverse_mass(step.get_given(), g.a, g.b, step.place(step.get_given(), g.a, g.stations_m[0]), g.normal);
   const bool is_jointed = step.bodies[g.a].pose.jointed || (g.b >= 0 && step.bodies[g.b].pose.jointed);
   if (is_jointed && parting + g.approach_m_s > slowest) inverse = std::min(inverse, (parting + g.approach_m_s) / g.push_n_s);
   const bool is_near_hit = struck_[g.a] != 0 || (g.b >= 0 && struck_[g.b] != 0);
@@ -292,8 +293,8 @@ void TouchSpots::close(const StepView& step, Spot& spot, std::vector<FinishedHit
     }
     hits.push_back(make_mean(spot.hit, now_s));
   }
-  spot.quiet_s = now_s;
   if (spot.hit.parting_m_s > step.calc_slowest()) spot.load_n = 0.0;  // it bounces: nothing rests here
+  spot.quiet_s = now_s;
   counters_->longest_hit_s = std::max(counters_->longest_hit_s, length_s);
 }
 
@@ -301,7 +302,7 @@ void TouchSpots::close(const StepView& step, Spot& spot, std::vector<FinishedHit
 void TouchSpots::miss(const StepView& step, Spot& spot, std::vector<FinishedHit>& hits) {
   const double dt = step.dt_s;
   if (spot.is_open) {
-    const double parting = dot(step.calc_relative(step.scene.motions, spot.a, spot.b, spot.stations_m), spot.normal);
+    const double parting = dot(step.calc_relative(step.scene.motions, step.scene.motions, spot.a, spot.b, spot.stations_m), spot.normal);
     spot.hit.parting_m_s = std::max(spot.hit.parting_m_s, parting);
     close(step, spot, hits);
   }

@@ -107,7 +107,7 @@ void Sounding::add_spot(std::span<const rigid::Hit* const> hits, const rigid::St
   where = (1.0 / push) * where;
   normal = (1.0 / norm(normal)) * normal;
   const double inverse_mass =
-      first.linked_mass_kg > 0.0 ? 1.0 / first.linked_mass_kg : scene_.calc_inverse_mass(first.a, first.b, where, normal);
+      first.linked_mass_kg > 0.0 ? 1.0 / first.linked_mass_kg : scene_.calc_inverse_mass(scene_.motions, first.a, first.b, where, normal);
   // A resting spot hardly moved by the impact elsewhere, or negligible next to other pulses of the same instant.
   if (!(inverse_mass > 0.0) || push * inverse_mass < 0.2 * kMinImpactSpeedMS || push < audible_n_s) return;
   const double speed = approach > kMinImpactSpeedMS ? approach : push * inverse_mass;

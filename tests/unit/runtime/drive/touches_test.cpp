@@ -83,6 +83,30 @@ TEST(Touches, EarlyHitsAreReportedInTheirFirstStep) {
   EXPECT_EQ(rig.list<events::Impulse>().size(), 1U) << "reported once";
 }
 
+TEST(Touches, RestitutionDoesNotDependOnTheTurnWithinAStep) {
+  const bank::Bank box = make_box({0.1, 0.08, 0.04});
+  const Vec3 arm{0.05, 0.0, -0.02};  // an edge strikes; 1/m_eff = 1/m + x^2 / I
+  const double inertia = box.rigid.inertia_kg_m2[4];
+  const double impulse = 1.5 / (1.0 / box.rigid.mass_kg + arm[0] * arm[0] / inertia), spin = -arm[0] * impulse / inertia;
+  std::vector<double> durations;
+  for (const double dt : {1e-4, 1.0 / 60.0}) {
+    Rig rig({.gravity_m_s2 = {}});
+    rig.add(box, "box", {0, 0, 0.02}, {0, 0, -1.0});
+    rig.start();
+    auto& pose = rig.poses[0];
+    pose.velocity_m_s[2] += impulse / box.rigid.mass_kg;
+    pose.spin_rad_s = {0, spin, 0};
+    pose.position_m[2] += dt * pose.velocity_m_s[2];
+    pose.rotation = {std::cos(0.5 * spin * dt), 0, std::sin(0.5 * spin * dt), 0};
+    rig.step(dt, {on_ground(0, {arm[0], 0, 0}, impulse)});
+    rig.step(dt, {});
+    const auto pulses = rig.list<events::Impulse>();
+    ASSERT_EQ(pulses.size(), 1U);
+    durations.push_back(pulses[0].duration_s);
+  }
+  EXPECT_NEAR(durations[1], durations[0], 1e-3 * durations[0]);
+}
+
 TEST(Touches, BouncesAreNoLastingContacts) {
   const bank::Bank ball = make_ball(kRadius);
   for (const double rate : {60.0, 240.0, 1000.0}) {
