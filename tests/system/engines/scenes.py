@@ -7,7 +7,7 @@ import subprocess
 import numpy as np
 
 FRICTION, RESTITUTION = 0.4, 0.5  # of every body
-THROWN = ("box", "tube", "two", "bar", "slap", "rod", "bead", "drop")
+THROWN = ("box", "tube", "two", "pile", "bar", "slap", "rod", "bead", "drop")
 STARTS_M = (0.001, -0.001)  # offsets of further starts of thrown bodies: single bounces are chaotic
 BOX, BALL, TUBE = [0.06, 0.04, 0.025], [0.03, 0.03, 0.03], [0.075, 0.02, 0.02]
 BEAD, PANE, BAR, ROD = [0.008] * 3, [0.1, 0.075, 0.002], [0.1, 0.01, 0.006], [0.08, 0.005, 0.005]
@@ -79,7 +79,7 @@ SCENES = {
     "two": (2, [place("a", "ball", BALL, (-0.1, 0, 0.5), velocity=(1, 0, 0)), place("b", "ball", BALL, (0, 0, 0.5))]),
     "pile": (3, make_pile(10, 1)),
     # The tracker's constants were chosen on the six above.
-    "bar": (3, [place("bar", "bar", BAR, (0, 0, 0.25), (0, 75, 0), velocity=(0.2, 0, 0))]),
+    "bar": (4, [place("bar", "bar", BAR, (0, 0, 0.25), (0, 75, 0), velocity=(0.2, 0, 0))]),
     "slap": (3, [place("pane", "pane", PANE, (0, 0, 0.11), (0, 25, 0))]),
     "rod": (2, [place("rod", "rod", ROD, (0, -0.3, 0.1), (0, 12, 0), velocity=(0, 0.3, 0))]),
     "row": (1, [place(name, "ball", BALL, (x, 0, 0.03), velocity=(v, 0, 0), spin=(0, v / 0.03, 0)) for name, x, v in ROW]),
@@ -165,10 +165,10 @@ def calc_levels(sound, rate=48000, window_s=0.125):
 
 
 def find_first_hit(sound, rate=48000):
-    """Peak [Pa] and centroid of the spectrum [Hz] of the first 20 ms of the first hit. Peak: after 8-fold
-    interpolation, as a period at 14 kHz has only 3.4 samples."""
+    """Peak [Pa] and centroid of the spectrum [Hz] of the first 10 ms of the first hit; the other end of the rod follows after 15 ms. Peak:
+    after 8-fold interpolation, as a period at 14 kHz has only 3.4 samples."""
     begin = np.argmax(abs(sound) > 0.05 * abs(sound[: rate // 2]).max())
-    part = sound[begin : begin + rate // 50]
+    part = sound[begin : begin + rate // 100]
     spectrum = np.fft.rfft(part)
     power = abs(spectrum) ** 2
     wave = 8 * np.fft.irfft(spectrum, 8 * len(part))
